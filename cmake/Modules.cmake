@@ -1,0 +1,51 @@
+# One way to make a module, so that the dependency directions cannot be got wrong by accident.
+#
+#   cli → report, io, ground, sim → records → core
+#
+# trihedron_module(<name> [SOURCES …] [MODULES …] [LIBRARIES …] [PRIVATE_LIBRARIES …])
+#   makes the target trihedron_<name> with the alias trihedron::<name>; MODULES must be allowed by the table below.
+# trihedron_test(<module> <file.cpp>… [LIBRARIES …])
+#   makes the Google Test program <module>_test and registers its tests as <module>.<Suite>.<Name>.
+
+set(TRIHEDRON_core_MAY_USE)
+set(TRIHEDRON_records_MAY_USE core)
+set(TRIHEDRON_sim_MAY_USE core records)
+set(TRIHEDRON_io_MAY_USE core records)
+set(TRIHEDRON_ground_MAY_USE core records)
+set(TRIHEDRON_report_MAY_USE core records ground)
+set(TRIHEDRON_cli_MAY_USE core records sim io ground report)
+
+function(trihedron_module name)
+  cmake_parse_arguments(arg "" "" "SOURCES;MODULES;LIBRARIES;PRIVATE_LIBRARIES" ${ARGN})
+  set(target trihedron_${name})
+  if(arg_SOURCES)
+    add_library(${target} STATIC ${arg_SOURCES})
+    set(scope PUBLIC)
+    target_link_libraries(${target} PRIVATE $<BUILD_INTERFACE:trihedron_warnings> ${arg_PRIVATE_LIBRARIES})
+  else()
+    add_library(${target} INTERFACE)
+    set(scope INTERFACE)
+  endif()
+  add_library(trihedron::${name} ALIAS ${target})
+  target_compile_features(${target} ${scope} cxx_std_20)
+  target_include_directories(${target} ${scope}
+    $<BUILD_INTERFACE:${CMAKE_CURRENT_SOURCE_DIR}/include> $<INSTALL_INTERFACE:include>)
+  foreach(module IN LISTS arg_MODULES)
+    if(NOT module IN_LIST TRIHEDRON_${name}_MAY_USE)
+      message(FATAL_ERROR "module ${name} may not use module ${module}: see cmake/Modules.cmake")
+    endif()
+    target_link_libraries(${target} ${scope} trihedron::${module})
+  endforeach()
+  target_link_libraries(${target} ${scope} ${arg_LIBRARIES})
+endfunction()
+
+function(trihedron_test module)
+  if(NOT TRIHEDRON_BUILD_TESTS)
+    return()
+  endif()
+  cmake_parse_arguments(arg "" "" "LIBRARIES" ${ARGN})
+  add_executable(${module}_test ${arg_UNPARSED_ARGUMENTS})
+  target_link_libraries(${module}_test PRIVATE trihedron::${module} ${arg_LIBRARIES} GTest::gmock GTest::gtest_main rapidcheck
+    trihedron_warnings)
+  gtest_discover_tests(${module}_test TEST_PREFIX ${module}. DISCOVERY_TIMEOUT 60 PROPERTIES TIMEOUT 300)
+endfunction()

@@ -1,0 +1,77 @@
+#pragma once
+/// Drift of an electrostatic gyro: angular velocity of the rotor's momentum as a function of its direction in the case.
+
+#include <Eigen/Core>
+#include <array>
+
+#include "trihedron/core/frames.hpp"
+
+namespace trihedron {
+
+/// Eq. (1): seven members of the drift family, ω_b(h) = B(h) κ.
+/// κ = (k0, μ12, μ23, μ31, ν12, ν23, ν31), rad/s. Only the part of ω across h moves the momentum.
+/// A drift model is a type with this interface: a linear family with its Jacobians.
+struct Esg7 {
+  static constexpr int kSize = 7;
+  enum Index : int { kK0, kMu12, kMu23, kMu31, kNu12, kNu23, kNu31 };
+  static constexpr std::array<const char*, kSize> kNames = {"k0", "mu12", "mu23", "mu31", "nu12", "nu23", "nu31"};
+  static constexpr const char* kModelName = "esg7";
+
+  template <class S>
+  using Coefficients = Eigen::Matrix<S, kSize, 1>;
+  template <class S>
+  using Basis = Eigen::Matrix<S, 3, kSize>;
+
+  /// B(h), the Jacobian of ω by κ. h: direction cosines in case axes, unit; a reading with noise is fine. Eq. (1).
+  template <class S>
+  [[nodiscard]] static Basis<S> basis(const Vector3<S>& h) {
+    const Vector3<S> s = h.cwiseProduct(h);
+    const Vector3<S> q = s.cwiseProduct(s);
+    const S zero(0);
+    Basis<S> b;
+    // clang-format off
+    b << h(0) * (q(0) - s(0) + q(1) + q(2)),  h(0) * s(1), zero, -h(0) * s(2),  zero, h(1) * h(2), zero,
+         h(1) * (q(1) - s(1) + q(2) + q(0)), -h(1) * s(0),  h(1) * s(2), zero,  zero, zero, h(2) * h(0),
+         h(2) * (q(2) - s(2) + q(0) + q(1)),  zero, -h(2) * s(1),  h(2) * s(0),  h(0) * h(1), zero, zero;
+    // clang-format on
+    return b;
+  }
+
+  /// ω_b(h), rad/s, case axes. Eq. (1).
+  template <class S>
+  [[nodiscard]] static Vector3<S> rate(const Vector3<S>& h, const Coefficients<S>& kappa) {
+    return basis(h) * kappa;
+  }
+
+  /// ∂ω_b/∂h, rad/s, h taken as three free numbers. Eq. (1) differentiated.
+  template <class S>
+  [[nodiscard]] static Matrix3<S> rate_by_h(const Vector3<S>& h, const Coefficients<S>& kappa) {
+    const Vector3<S> s = h.cwiseProduct(h);
+    const Vector3<S> cube = s.cwiseProduct(h);
+    const S sum4 = s.squaredNorm();
+    const S k0 = kappa(kK0);
+    const S mu12 = kappa(kMu12);
+    const S mu23 = kappa(kMu23);
+    const S mu31 = kappa(kMu31);
+    const S nu12 = kappa(kNu12);
+    const S nu23 = kappa(kNu23);
+    const S nu31 = kappa(kNu31);
+    const S two(2);
+    Matrix3<S> d;
+    // clang-format off
+    d << mu12 * s(1) - mu31 * s(2), two * mu12 * h(0) * h(1) + nu23 * h(2), -two * mu31 * h(0) * h(2) + nu23 * h(1),
+         -two * mu12 * h(0) * h(1) + nu31 * h(2), mu23 * s(2) - mu12 * s(0), two * mu23 * h(1) * h(2) + nu31 * h(0),
+         two * mu31 * h(0) * h(2) + nu12 * h(1), -two * mu23 * h(1) * h(2) + nu12 * h(0), mu31 * s(0) - mu23 * s(1);
+    // clang-format on
+    // k0 row i: h_i (Σh⁴ − h_i²), differentiated by h_j.
+    for (int i = 0; i < 3; ++i) {
+      for (int j = 0; j < 3; ++j) {
+        d(i, j) += k0 * h(i) * S(4) * cube(j);
+      }
+      d(i, i) += k0 * (sum4 - S(3) * s(i));
+    }
+    return d;
+  }
+};
+
+}  // namespace trihedron

@@ -1,0 +1,49 @@
+#pragma once
+/// A calibration in memory: what calibration.json holds.
+
+#include <Eigen/Core>
+#include <map>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "trihedron/core/time.hpp"
+
+namespace trihedron {
+
+/// One thing that a user of the result must know.
+struct Finding {
+  enum class Severity { kNote, kWarning, kDoNotUse };
+  std::string code;      ///< stable, for programs: "nis-out-of-bounds"
+  std::string text;      ///< for people: what was seen
+  std::string evidence;  ///< the numbers behind it
+  std::string cure;      ///< what to do about it
+  Severity severity = Severity::kWarning;
+};
+
+struct Verdict {
+  bool trustworthy = false;
+  std::vector<Finding> findings;
+};
+
+struct GyroCalibration {
+  std::string drift_model;                                   ///< "esg7"
+  std::vector<std::pair<std::string, double>> drift_rad_s;   ///< by coefficient name, in the model's order
+  Eigen::Vector3d alignment_rotation_vector_rad{0, 0, 0};    ///< Λ: C_c_b = exp([Λ×])
+  Eigen::Vector3d momentum_in{0, 0, 0};                      ///< h_in at `t`, unit
+};
+
+struct Calibration {
+  std::string estimator;
+  Time epoch{};  ///< of the pass
+  Time t{};      ///< for which the momenta stand
+  std::vector<GyroCalibration> gyros;
+  /// "gyro1.k0" … "gyro1.nu31", "gyro1.align_x" …; one per row of `covariance`.
+  std::vector<std::string> states;
+  /// rad/s for drift, rad for alignment: error δ with C_c_b(true) = exp([δ×]) C_c_b(est), c axes.
+  Eigen::MatrixXd covariance;
+  Verdict verdict;
+  std::map<std::string, double> statistics;
+};
+
+}  // namespace trihedron

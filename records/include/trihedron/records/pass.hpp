@@ -1,0 +1,86 @@
+#pragma once
+/// One stretch of telemetry in memory, and the truth behind a simulated one. Frames: docs/notation.md.
+
+#include <Eigen/Core>
+#include <Eigen/Geometry>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "trihedron/core/time.hpp"
+#include "trihedron/records/calibration.hpp"
+
+namespace trihedron {
+
+/// What is known of one gyro before the pass: prior means and 1-sigma.
+struct GyroPrior {
+  double readout_noise_rad = 0;                                ///< per direction cosine
+  std::map<std::string, double> drift_rad_s;                   ///< by coefficient; missing means 0
+  std::map<std::string, double> drift_sigma_rad_s;             ///< by coefficient; missing means the common sigma
+  double drift_common_sigma_rad_s = 0;
+  Eigen::Vector3d alignment_rotation_vector_rad{0, 0, 0};
+  Eigen::Vector3d alignment_sigma_rad{0, 0, 0};
+};
+
+struct PassSettings {
+  std::string spacecraft;
+  Time epoch{};
+  Duration duration{};
+  Duration gyro_period{};
+  Duration star_tracker_period{};
+  Eigen::Vector3d star_tracker_noise_rad{0, 0, 0};  ///< 1-sigma about c x, y, z
+  std::vector<GyroPrior> gyros;
+  std::optional<Calibration> prior;  ///< an earlier calibration: replaces drift and alignment of `gyros`, with its covariance
+};
+
+/// Direction cosines as telemetered: not normalised, may hold NaN. Times strictly increase.
+struct GyroTelemetry {
+  int gyros = 0;
+  std::vector<Time> t;
+  std::vector<double> h;  ///< sample-major: h[(sample * gyros + gyro) * 3 + axis], case axes of each gyro
+
+  [[nodiscard]] std::size_t size() const { return t.size(); }
+  [[nodiscard]] Eigen::Vector3d direction(std::size_t sample, int gyro) const {
+    const double* p = &h[(sample * static_cast<std::size_t>(gyros) + static_cast<std::size_t>(gyro)) * 3];
+    return {p[0], p[1], p[2]};
+  }
+};
+
+/// Fixes as telemetered: q_in_c, Hamilton; not normalised, of either sign, may hold NaN. Times strictly increase.
+struct StarTrackerTelemetry {
+  std::vector<Time> t;
+  std::vector<Eigen::Quaterniond> q_in_c;
+
+  [[nodiscard]] std::size_t size() const { return t.size(); }
+};
+
+struct Pass {
+  PassSettings settings;
+  GyroTelemetry gyro;
+  StarTrackerTelemetry star_tracker;
+};
+
+/// What a simulator knows. Never part of a Pass, so that no estimator can read it.
+struct Truth {
+  struct Gyro {
+    std::vector<std::pair<std::string, double>> drift_rad_s;  ///< coefficients of eq. (1)
+    std::vector<std::pair<std::string, double>> unmodelled_rad_s;  ///< drift outside eq. (1), by name
+    Eigen::Vector3d alignment_rotation_vector_rad{0, 0, 0};
+  };
+  std::vector<Gyro> gyros;
+  std::vector<Time> t;
+  std::vector<Eigen::Quaterniond> q_in_c;
+  std::vector<double> h_in;  ///< sample-major: h_in[(sample * gyros + gyro) * 3 + axis]
+};
+
+/// An attitude solution: q_in_c with 1-sigma of the small rotation about c x, y, z.
+struct AttitudeHistory {
+  std::vector<Time> t;
+  std::vector<Eigen::Quaterniond> q_in_c;
+  std::vector<Eigen::Vector3d> sigma_rad;
+
+  [[nodiscard]] std::size_t size() const { return t.size(); }
+};
+
+}  // namespace trihedron
