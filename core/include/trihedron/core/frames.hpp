@@ -40,6 +40,37 @@ template <class S>
   return atan2(a.cross(b).norm(), a.dot(b));
 }
 
+namespace detail {
+
+template <class S>
+struct RodriguesCoefficients {
+  S a;  ///< sin x / x
+  S b;  ///< (1 − cos x) / x²
+};
+
+/// exp([v×]) = I + a [v×] + b [v×]² for |v|² = angle2.
+template <class S>
+[[nodiscard]] RodriguesCoefficients<S> rodrigues_coefficients(S angle2) {
+  using std::sin;
+  using std::sqrt;
+  if (angle2 < S(1e-6)) {  // the quotients would lose digits; the next terms of the series are below 1e-17
+    return {S(1) - angle2 / S(6) * (S(1) - angle2 / S(20)), S(0.5) - angle2 / S(24) * (S(1) - angle2 / S(30))};
+  }
+  const S angle = sqrt(angle2);
+  const S half = sin(angle / S(2));
+  return {sin(angle) / angle, S(2) * half * half / angle2};
+}
+
+}  // namespace detail
+
+/// exp([v×]) u: u turned by the rotation vector v, rad.
+template <class S>
+[[nodiscard]] Vector3<S> rotated(const Vector3<S>& u, const Vector3<S>& v) {
+  const auto [a, b] = detail::rodrigues_coefficients(v.squaredNorm());
+  const Vector3<S> c = v.cross(u);
+  return u + a * c + b * v.cross(c);
+}
+
 /// A free vector given by its components in frame F.
 template <class F, class S = double>
 class Vec {
@@ -85,22 +116,7 @@ class Rot {
 
   /// exp([v×]) for a rotation vector v in rad; valid for any length. Its components are the same in both frames.
   [[nodiscard]] static Rot exp(const Vec<To, S>& v) {
-    using std::cos;
-    using std::sin;
-    using std::sqrt;
-    const S angle2 = v.raw().squaredNorm();
-    // sin(x)/x and (1 − cos x)/x² by series where the quotients would lose digits; next term < 1e-17.
-    S a;
-    S b;
-    if (angle2 < S(1e-6)) {
-      a = S(1) - angle2 / S(6) * (S(1) - angle2 / S(20));
-      b = S(0.5) - angle2 / S(24) * (S(1) - angle2 / S(30));
-    } else {
-      const S angle = sqrt(angle2);
-      const S half = sin(angle / S(2));
-      a = sin(angle) / angle;
-      b = S(2) * half * half / angle2;
-    }
+    const auto [a, b] = detail::rodrigues_coefficients(v.raw().squaredNorm());
     const Raw k = skew(v.raw());
     return Rot(Raw::Identity() + a * k + b * k * k);
   }

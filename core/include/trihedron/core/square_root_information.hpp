@@ -1,0 +1,117 @@
+#pragma once
+/// Linear estimation with the square root of the information matrix (Bierman, "Factorization Methods for Discrete Sequential
+/// Estimation", 1977; process noise after Dyer and McReynolds, 1969).
+
+#include <Eigen/Core>
+#include <Eigen/LU>
+#include <cmath>
+
+namespace trihedron {
+
+/// Rotates the rows of `extra` into the upper triangular rows of `root` (Householder), column by column; the first `columns` columns
+/// of `extra` become zero. rootᵀ root + extraᵀ extra is unchanged. Rows of `root` may be zero (no information yet).
+template <class Root, class Extra>
+void rotate_into(Eigen::MatrixBase<Root>& root, Eigen::MatrixBase<Extra>& extra, int columns) {
+  using S = typename Root::Scalar;
+  using std::sqrt;
+  for (int j = 0; j < columns; ++j) {
+    const S below = extra.col(j).squaredNorm();
+    if (!(below > S(0))) {
+      continue;
+    }
+    const S diagonal = root(j, j);
+    const S norm = sqrt(diagonal * diagonal + below);
+    const S alpha = diagonal > S(0) ? -norm : norm;
+    const S v0 = diagonal - alpha;
+    const S beta = S(-1) / (alpha * v0);
+    const auto rest = root.cols() - 1 - j;
+    const Eigen::Matrix<S, Extra::RowsAtCompileTime, 1> v = extra.col(j);
+    // One row of scratch for the reflection; its maximal size is known, so it lives on the stack.
+    const Eigen::Matrix<S, 1, Eigen::Dynamic, Eigen::RowMajor, 1, Root::ColsAtCompileTime> s =
+        beta * (v0 * root.row(j).tail(rest) + v.transpose().lazyProduct(extra.rightCols(rest)));
+    root.row(j).tail(rest) -= v0 * s;
+    extra.rightCols(rest) -= v.lazyProduct(s);
+    root(j, j) = alpha;
+    extra.col(j).setZero();
+  }
+}
+
+/// Estimate errors x ~ (0, (RᵀR)⁻¹) of N states, the first D of which move; the other N − D are constants. R is upper triangular.
+/// A direction without information costs nothing and gains nothing: R times it stays zero to rounding, whatever the number of steps.
+/// The estimate itself is kept by the owner, who adds each correction to it ("feedback"), so that the mean of x is always zero.
+template <int N, int D, class S = double>
+class SquareRootInformation {
+ public:
+  static constexpr int kStates = N;
+  static constexpr int kDynamic = D;
+  using Vector = Eigen::Matrix<S, N, 1>;
+  using Matrix = Eigen::Matrix<S, N, N>;
+  using DynamicMatrix = Eigen::Matrix<S, D, D>;
+  using DynamicByConstants = Eigen::Matrix<S, D, N - D>;
+  template <int M>
+  using Rows = Eigen::Matrix<S, M, N, M == 1 ? Eigen::RowMajor : Eigen::ColMajor>;
+
+  /// Adds the prior of the constants: `root` with rootᵀ root their information matrix, of any shape.
+  void add_prior_of_constants(const Eigen::Matrix<S, N - D, N - D>& root) {
+    Eigen::Matrix<S, N - D, N + 1, Eigen::RowMajor> extra;
+    extra.setZero();
+    extra.template block<N - D, N - D>(0, D) = root;
+    rotate_into(root_, extra, N);
+  }
+
+  /// Time update: x_d ← A x_d + B x_c + L w, w ~ (0, I). A must be invertible; L = 0 is allowed.
+  void propagate(const DynamicMatrix& A, const DynamicByConstants& B, const DynamicMatrix& L) {
+    // Rows of R with x_d(before) = A⁻¹ (x_d(after) − B x_c − L w) put in: columns are w, x_d(after), x_c. Then w is eliminated.
+    Eigen::Matrix<S, D, D + N, Eigen::RowMajor> moved;
+    const DynamicMatrix R_d = root_.template topLeftCorner<D, D>().template triangularView<Eigen::Upper>() * A.inverse();
+    moved.template leftCols<D>() = -R_d * L;
+    moved.template middleCols<D>(D) = R_d;
+    moved.template rightCols<N - D>() = root_.template block<D, N - D>(0, D) - R_d * B;
+    Eigen::Matrix<S, D, D + N, Eigen::RowMajor> noise;
+    noise.setZero();
+    noise.template leftCols<D>().setIdentity();
+    rotate_into(noise, moved, D);
+    auto top = root_.template topLeftCorner<D, N>();
+    auto kept = moved.template rightCols<N>();
+    top.setZero();
+    rotate_into(top, kept, D);
+  }
+
+  /// H R⁻¹: rows of H seen through the present uncertainty; H P Hᵀ is its product with its transpose. Needs regular().
+  template <int M>
+  [[nodiscard]] Rows<M> through_uncertainty(const Rows<M>& H) const {
+    return root_.template leftCols<N>().template triangularView<Eigen::Upper>().template solve<Eigen::OnTheRight>(H);
+  }
+
+  /// Measurement update with `H` and `y`, y = H x + unit white noise. Returns the correction, to be fed back; needs regular() after it.
+  template <int M>
+  [[nodiscard]] Vector update(const Rows<M>& H, const Eigen::Matrix<S, M, 1>& y) {
+    Eigen::Matrix<S, M, N + 1, Eigen::RowMajor> extra;
+    extra.template leftCols<N>() = H;
+    extra.col(N) = y;
+    rotate_into(root_, extra, N);
+    const Vector x = root_.template leftCols<N>().template triangularView<Eigen::Upper>().solve(root_.col(N));
+    root_.col(N).setZero();
+    return x;
+  }
+
+  /// R⁻¹, a square root of the covariance: P = R⁻¹ R⁻ᵀ. Needs regular().
+  [[nodiscard]] Matrix inverse_root() const {
+    return root_.template leftCols<N>().template triangularView<Eigen::Upper>().solve(Matrix::Identity());
+  }
+
+  /// R, upper triangular.
+  [[nodiscard]] Matrix root() const { return root_.template leftCols<N>(); }
+
+  /// Whether each state has information, so that a covariance exists.
+  [[nodiscard]] bool regular() const {
+    const S largest = root_.diagonal().cwiseAbs().maxCoeff();
+    return root_.diagonal().cwiseAbs().minCoeff() > largest * S(1e-300);
+  }
+
+ private:
+  // R, and right of it z of R x = z, which is zero except within update().
+  Eigen::Matrix<S, N, N + 1, Eigen::RowMajor> root_ = Eigen::Matrix<S, N, N + 1, Eigen::RowMajor>::Zero();
+};
+
+}  // namespace trihedron

@@ -1,0 +1,31 @@
+#pragma once
+/// What enters the on-board cycle: raw telemetry, in time order.
+
+#include <Eigen/Core>
+#include <Eigen/Geometry>
+#include <array>
+
+#include "trihedron/core/time.hpp"
+
+namespace trihedron {
+
+/// A direction or quaternion further than this from unit length is not believed. Readout noise moves a norm by a tenth of it at most.
+inline constexpr double kNormTolerance = 1e-3;
+
+/// Direction cosines of the N momenta, each in its own case axes; as telemetered, not normalised.
+template <int N>
+struct GyroSample {
+  Time t{};
+  std::array<Eigen::Vector3d, N> h_b;
+};
+
+/// Star-tracker fix q_in_c, Hamilton; as telemetered, of either sign.
+struct StarFix {
+  Time t{};
+  Eigen::Quaterniond q_in_c = Eigen::Quaterniond::Identity();
+};
+
+/// Whether the length is within kNormTolerance of one; false for NaN.
+[[nodiscard]] inline bool nearly_unit(double norm) { return norm >= 1 - kNormTolerance && norm <= 1 + kNormTolerance; }
+
+}  // namespace trihedron

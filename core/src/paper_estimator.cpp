@@ -1,0 +1,181 @@
+#include "trihedron/core/paper_estimator.hpp"
+
+namespace trihedron {
+
+template <class Model>
+Result<PaperEstimator<Model>, SetupFault> PaperEstimator<Model>::create(const Setup& setup) {
+  if (!setup.noise_is_positive()) {
+    return SetupFault::kNoiseNotPositive;
+  }
+  if (!(setup.gate_nis > 0) || !(setup.reopen_after_rejections > 0)) {
+    return SetupFault::kGateNotPositive;
+  }
+  const auto root = information_root<Layout::kParameters>(setup.prior_covariance);
+  if (!root) {
+    return root.fault();
+  }
+  PaperEstimator estimator;
+  estimator.setup_ = setup;
+  estimator.gyros_ = setup.prior;
+  estimator.information_.add_prior_of_constants(root.value());
+  return estimator;
+}
+
+template <class Model>
+auto PaperEstimator<Model>::quasi_inertial(const Trihedron<In>& t) -> QuasiInertial {
+  QuasiInertial qi;
+  qi.components[0] << t.q1().transpose(), t.q3().transpose();
+  qi.tangents[0] << t.q1(), t.q3();
+  // Gyro 2 lies in the plane of q2 and q3; its errors across itself have −cotθ in component 3 for 1 in component 2.
+  qi.components[1] << t.q1().transpose(), t.q2().transpose();
+  qi.tangents[1] << t.q1(), t.q2() - t.cosine / t.sine * t.q3();
+  qi.sine = t.sine;
+  return qi;
+}
+
+template <class Model>
+void PaperEstimator<Model>::predict(const Eigen::Matrix3d& C_in_c, const Directions& h_b, double dt_s) {
+  for (std::size_t k = 0; k < kGyros; ++k) {
+    precess(gyros_[k], since_fix_[k], C_in_c, h_b[k], dt_s);
+  }
+  time_since_fix_s_ += dt_s;
+}
+
+template <class Model>
+void PaperEstimator<Model>::update_covariance_to_now(const QuasiInertial& now) {
+  // Δh = φ × h carries the sensitivities, which are in φ, to the paper's components.
+  typename Information::DynamicMatrix by_start = Information::DynamicMatrix::Zero();
+  typename Information::DynamicByConstants by_parameters = Information::DynamicByConstants::Zero();
+  for (int k = 0; k < kGyros; ++k) {
+    const auto g = static_cast<std::size_t>(k);
+    const Eigen::Matrix3d cross_h = skew<double>(gyros_[g].h_in);
+    const Eigen::Matrix<double, 2, 3> components_of_phi = -now.components[g] * cross_h;
+    const Eigen::Vector3d h_before = since_fix_[g].by_start.transpose() * gyros_[g].h_in;
+    const int row = Layout::direction(k);
+    by_start.template block<2, 2>(row, row) =
+        components_of_phi * since_fix_[g].by_start * skew<double>(h_before) * qi_.tangents[g];
+    by_parameters.template block<2, Model::kSize>(row, Layout::drift(k) - Layout::kDynamic) =
+        components_of_phi * since_fix_[g].by_drift;
+    by_parameters.template block<2, 3>(row, Layout::alignment(k) - Layout::kDynamic) =
+        components_of_phi * since_fix_[g].by_alignment;
+  }
+  const double walk = setup_.direction_random_walk_rad_sqrt_s;
+  const double sigma = std::sqrt(walk * walk * time_since_fix_s_ + extra_variance_rad2_);
+  // Component 2 of gyro 2 sees sinθ of an isotropic error across h2.
+  const Eigen::Vector4d noise(sigma, sigma, sigma, sigma * now.sine);
+  information_.propagate(by_start, by_parameters, noise.asDiagonal());
+  qi_ = now;
+  since_fix_ = {};
+  time_since_fix_s_ = 0;
+  extra_variance_rad2_ = 0;
+}
+
+template <class Model>
+auto PaperEstimator<Model>::correct(const Eigen::Matrix3d& C_in_c, const Directions& h_b) -> Report {
+  Report report;
+  // Reference directions h_et and, at the first fix, the predicted ones too.
+  Directions h_c;
+  Directions reference_in;
+  for (std::size_t k = 0; k < kGyros; ++k) {
+    h_c[k] = gyros_[k].C_c_b * h_b[k];
+    reference_in[k] = C_in_c * h_c[k];
+  }
+  const auto trihedron = make_trihedron(Vec<In>::assume(started_ ? gyros_[0].h_in : reference_in[0]),
+                                        Vec<In>::assume(started_ ? gyros_[1].h_in : reference_in[1]));
+  if (!trihedron) {
+    report.status = FixStatus::kRejectedGeometry;
+    return report;
+  }
+  const QuasiInertial now = quasi_inertial(trihedron.value());
+  if (started_) {
+    update_covariance_to_now(now);
+  } else {
+    for (std::size_t k = 0; k < kGyros; ++k) {
+      gyros_[k].h_in = reference_in[k];
+    }
+    qi_ = now;
+  }
+
+  // y = h_et − h_R = Δh − (C_in_c δ) × h + noise; noise: the tracker's rotation, common to both gyros, and each gyro's readout.
+  Innovation innovation;
+  MeasurementMatrix H = MeasurementMatrix::Zero();
+  Eigen::Matrix<double, kMeasurements, 3 + 3 * kGyros> noise = Eigen::Matrix<double, kMeasurements, 3 + 3 * kGyros>::Zero();
+  for (int k = 0; k < kGyros; ++k) {
+    const auto g = static_cast<std::size_t>(k);
+    const int row = Layout::direction(k);
+    const Eigen::Matrix<double, 2, 3>& components = now.components[g];
+    const Eigen::Matrix<double, 2, 3> cross_h = components * skew<double>(reference_in[g]);
+    innovation.template segment<2>(row) = components * (reference_in[g] - gyros_[g].h_in);
+    H.template block<2, 2>(row, row).setIdentity();
+    H.template block<2, 3>(row, Layout::alignment(k)) = cross_h * C_in_c;
+    noise.template block<2, 3>(row, 0) = cross_h * C_in_c * setup_.star_tracker_noise_rad.asDiagonal();
+    noise.template block<2, 3>(row, 3 + 3 * k) = setup_.readout_noise_rad[g] * cross_h;
+  }
+  const Eigen::LLT<InnovationCovariance> noise_factor(noise * noise.transpose());
+  const MeasurementMatrix H_white = noise_factor.matrixL().solve(H);
+  const Innovation innovation_white = noise_factor.matrixL().solve(innovation);
+
+  if (!started_) {
+    static_cast<void>(information_.update(H_white, innovation_white));
+    started_ = true;
+    report.status = FixStatus::kStarted;
+    return report;
+  }
+
+  const auto assess = [&] {
+    const MeasurementMatrix through = information_.through_uncertainty(H_white);
+    const InnovationCovariance white = InnovationCovariance::Identity() + through * through.transpose();
+    report.innovation = innovation;
+    report.innovation_covariance = noise_factor.matrixL() * white * noise_factor.matrixL().transpose();
+    report.nis = innovation_white.dot(white.llt().solve(innovation_white));
+  };
+  assess();
+  report.status = FixStatus::kUsed;
+  if (!(report.nis <= setup_.gate_nis)) {
+    report.rejections_in_a_row = ++rejections_in_a_row_;
+    if (rejections_in_a_row_ < setup_.reopen_after_rejections) {
+      report.status = FixStatus::kRejectedByGate;
+      return report;
+    }
+    add_direction_variance(innovation.squaredNorm() / kMeasurements);
+    update_covariance_to_now(now);
+    assess();
+    report.status = FixStatus::kUsedAfterReopening;
+  }
+  rejections_in_a_row_ = 0;
+  feed_back(information_.update(H_white, innovation_white));
+  return report;
+}
+
+template <class Model>
+void PaperEstimator<Model>::feed_back(const typename Information::Vector& correction) {
+  for (int k = 0; k < kGyros; ++k) {
+    const auto g = static_cast<std::size_t>(k);
+    GyroModel<Model>& gyro = gyros_[g];
+    const Eigen::Vector3d direction_error = qi_.tangents[g] * correction.template segment<2>(Layout::direction(k));
+    const Eigen::Vector3d alignment_error = correction.template segment<3>(Layout::alignment(k));
+    gyro.h_in = rotated<double>(gyro.h_in, gyro.h_in.cross(direction_error)).normalized();
+    gyro.drift_rad_s += correction.template segment<Model::kSize>(Layout::drift(k));
+    // Through the quaternion, so that rounding cannot pile up in the matrix over months of fixes.
+    gyro.C_c_b = Eigen::Quaterniond(Rot<C, C>::exp(Vec<C>::assume(alignment_error)).raw() * gyro.C_c_b)
+                     .normalized()
+                     .toRotationMatrix();
+  }
+}
+
+template <class Model>
+auto PaperEstimator<Model>::error_root() const -> ErrorRoot {
+  const typename Information::Matrix root = information_.inverse_root();
+  ErrorRoot errors;
+  for (int k = 0; k < kGyros; ++k) {
+    const auto g = static_cast<std::size_t>(k);
+    errors.template middleRows<3>(Errors::direction(k)) =
+        skew<double>(gyros_[g].h_in) * qi_.tangents[g] * root.template middleRows<2>(Layout::direction(k));
+  }
+  errors.template bottomRows<Layout::kParameters>() = root.template bottomRows<Layout::kParameters>();
+  return errors;
+}
+
+template class PaperEstimator<Esg7>;
+
+}  // namespace trihedron
