@@ -35,7 +35,7 @@ auto PaperEstimator<Model>::quasi_inertial(const Trihedron<In>& t) -> QuasiInert
 
 template <class Model>
 void PaperEstimator<Model>::predict(const Eigen::Matrix3d& C_in_c, const Directions& h_b, double dt_s) {
-  for (std::size_t k = 0; k < kGyros; ++k) {
+  for (int k = 0; k < kGyros; ++k) {
     precess(gyros_[k], since_fix_[k], C_in_c, h_b[k], dt_s);
   }
   time_since_fix_s_ += dt_s;
@@ -47,17 +47,16 @@ void PaperEstimator<Model>::update_covariance_to_now(const QuasiInertial& now) {
   typename Information::DynamicMatrix by_start = Information::DynamicMatrix::Zero();
   typename Information::DynamicByConstants by_parameters = Information::DynamicByConstants::Zero();
   for (int k = 0; k < kGyros; ++k) {
-    const auto g = static_cast<std::size_t>(k);
-    const Eigen::Matrix3d cross_h = skew<double>(gyros_[g].h_in);
-    const Eigen::Matrix<double, 2, 3> components_of_phi = -now.components[g] * cross_h;
-    const Eigen::Vector3d h_before = since_fix_[g].by_start.transpose() * gyros_[g].h_in;
+    const Eigen::Matrix3d cross_h = skew<double>(gyros_[k].h_in);
+    const Eigen::Matrix<double, 2, 3> components_of_phi = -now.components[k] * cross_h;
+    const Eigen::Vector3d h_before = since_fix_[k].by_start.transpose() * gyros_[k].h_in;
     const int row = Layout::direction(k);
     by_start.template block<2, 2>(row, row) =
-        components_of_phi * since_fix_[g].by_start * skew<double>(h_before) * qi_.tangents[g];
+        components_of_phi * since_fix_[k].by_start * skew<double>(h_before) * qi_.tangents[k];
     by_parameters.template block<2, Model::kSize>(row, Layout::drift(k) - Layout::kDynamic) =
-        components_of_phi * since_fix_[g].by_drift;
+        components_of_phi * since_fix_[k].by_drift;
     by_parameters.template block<2, 3>(row, Layout::alignment(k) - Layout::kDynamic) =
-        components_of_phi * since_fix_[g].by_alignment;
+        components_of_phi * since_fix_[k].by_alignment;
   }
   const double walk = setup_.direction_random_walk_rad_sqrt_s;
   const double sigma = std::sqrt(walk * walk * time_since_fix_s_ + extra_variance_rad2_);
@@ -76,7 +75,7 @@ auto PaperEstimator<Model>::correct(const Eigen::Matrix3d& C_in_c, const Directi
   // Reference directions h_et and, at the first fix, the predicted ones too.
   Directions h_c;
   Directions reference_in;
-  for (std::size_t k = 0; k < kGyros; ++k) {
+  for (int k = 0; k < kGyros; ++k) {
     h_c[k] = gyros_[k].C_c_b * h_b[k];
     reference_in[k] = C_in_c * h_c[k];
   }
@@ -90,26 +89,27 @@ auto PaperEstimator<Model>::correct(const Eigen::Matrix3d& C_in_c, const Directi
   if (started_) {
     update_covariance_to_now(now);
   } else {
-    for (std::size_t k = 0; k < kGyros; ++k) {
+    for (int k = 0; k < kGyros; ++k) {
       gyros_[k].h_in = reference_in[k];
     }
     qi_ = now;
   }
 
-  // y = h_et − h_R = Δh − (C_in_c δ) × h + noise; noise: the tracker's rotation, common to both gyros, and each gyro's readout.
+  // y = h_et − h_R = Δh − (C_in_c δ) × h + noise; noise: the tracker's rotation, common to both gyros, and each gyro's
+  // readout.
   Innovation innovation;
   MeasurementMatrix H = MeasurementMatrix::Zero();
-  Eigen::Matrix<double, kMeasurements, 3 + 3 * kGyros> noise = Eigen::Matrix<double, kMeasurements, 3 + 3 * kGyros>::Zero();
+  Eigen::Matrix<double, kMeasurements, 3 + 3 * kGyros> noise =
+      Eigen::Matrix<double, kMeasurements, 3 + 3 * kGyros>::Zero();
   for (int k = 0; k < kGyros; ++k) {
-    const auto g = static_cast<std::size_t>(k);
     const int row = Layout::direction(k);
-    const Eigen::Matrix<double, 2, 3>& components = now.components[g];
-    const Eigen::Matrix<double, 2, 3> cross_h = components * skew<double>(reference_in[g]);
-    innovation.template segment<2>(row) = components * (reference_in[g] - gyros_[g].h_in);
+    const Eigen::Matrix<double, 2, 3>& components = now.components[k];
+    const Eigen::Matrix<double, 2, 3> cross_h = components * skew<double>(reference_in[k]);
+    innovation.template segment<2>(row) = components * (reference_in[k] - gyros_[k].h_in);
     H.template block<2, 2>(row, row).setIdentity();
     H.template block<2, 3>(row, Layout::alignment(k)) = cross_h * C_in_c;
     noise.template block<2, 3>(row, 0) = cross_h * C_in_c * setup_.star_tracker_noise_rad.asDiagonal();
-    noise.template block<2, 3>(row, 3 + 3 * k) = setup_.readout_noise_rad[g] * cross_h;
+    noise.template block<2, 3>(row, 3 + 3 * k) = setup_.readout_noise_rad[k] * cross_h;
   }
   const Eigen::LLT<InnovationCovariance> noise_factor(noise * noise.transpose());
   const MeasurementMatrix H_white = noise_factor.matrixL().solve(H);
@@ -150,9 +150,8 @@ auto PaperEstimator<Model>::correct(const Eigen::Matrix3d& C_in_c, const Directi
 template <class Model>
 void PaperEstimator<Model>::feed_back(const typename Information::Vector& correction) {
   for (int k = 0; k < kGyros; ++k) {
-    const auto g = static_cast<std::size_t>(k);
-    GyroModel<Model>& gyro = gyros_[g];
-    const Eigen::Vector3d direction_error = qi_.tangents[g] * correction.template segment<2>(Layout::direction(k));
+    GyroModel<Model>& gyro = gyros_[k];
+    const Eigen::Vector3d direction_error = qi_.tangents[k] * correction.template segment<2>(Layout::direction(k));
     const Eigen::Vector3d alignment_error = correction.template segment<3>(Layout::alignment(k));
     gyro.h_in = rotated<double>(gyro.h_in, gyro.h_in.cross(direction_error)).normalized();
     gyro.drift_rad_s += correction.template segment<Model::kSize>(Layout::drift(k));
@@ -168,9 +167,8 @@ auto PaperEstimator<Model>::error_root() const -> ErrorRoot {
   const typename Information::Matrix root = information_.inverse_root();
   ErrorRoot errors;
   for (int k = 0; k < kGyros; ++k) {
-    const auto g = static_cast<std::size_t>(k);
     errors.template middleRows<3>(Errors::direction(k)) =
-        skew<double>(gyros_[g].h_in) * qi_.tangents[g] * root.template middleRows<2>(Layout::direction(k));
+        skew<double>(gyros_[k].h_in) * qi_.tangents[k] * root.template middleRows<2>(Layout::direction(k));
   }
   errors.template bottomRows<Layout::kParameters>() = root.template bottomRows<Layout::kParameters>();
   return errors;

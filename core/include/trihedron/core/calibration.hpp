@@ -3,10 +3,10 @@
 
 #include <Eigen/Cholesky>
 #include <Eigen/Core>
-#include <array>
 #include <cstdint>
 
 #include "trihedron/core/attitude.hpp"
+#include "trihedron/core/per_gyro.hpp"
 #include "trihedron/core/precession.hpp"
 #include "trihedron/core/result.hpp"
 #include "trihedron/core/time.hpp"
@@ -22,8 +22,8 @@ struct ParameterLayout {
   [[nodiscard]] static constexpr int alignment(int gyro) { return gyro * kPerGyro + Model::kSize; }
 };
 
-/// Errors whose covariance every estimator can give: φ of each momentum (3 components in `in`; along the momentum zero or without
-/// meaning), then the parameters. See Sensitivity for the definition of φ, Δκ and δ.
+/// Errors whose covariance every estimator can give: φ of each momentum (3 components in `in`; along the momentum zero
+/// or without meaning), then the parameters. See Sensitivity for the definition of φ, Δκ and δ.
 template <class Model, int N>
 struct ErrorLayout {
   static constexpr int kDirections = 3 * N;
@@ -41,16 +41,16 @@ template <class Model, int N>
 struct CalibrationSetup {
   using Layout = ParameterLayout<Model, N>;
 
-  std::array<GyroModel<Model>, N> prior;  ///< prior means; the momenta come from the first fix
+  PerGyro<GyroModel<Model>, N> prior;  ///< prior means; the momenta come from the first fix
   Eigen::Matrix<double, Layout::kSize, Layout::kSize> prior_covariance =
       Eigen::Matrix<double, Layout::kSize, Layout::kSize>::Zero();  ///< rad/s and rad, positive definite
-  std::array<double, N> readout_noise_rad{};                         ///< 1-sigma per direction cosine
-  Eigen::Vector3d star_tracker_noise_rad{0, 0, 0};                   ///< 1-sigma about c x, y, z
-  double direction_random_walk_rad_sqrt_s = 0;                       ///< process noise of each momentum, per axis across it
+  PerGyro<double, N> readout_noise_rad{};                           ///< 1-sigma per direction cosine
+  Eigen::Vector3d star_tracker_noise_rad{0, 0, 0};                  ///< 1-sigma about c x, y, z
+  double direction_random_walk_rad_sqrt_s = 0;  ///< process noise of each momentum, per axis across it
   /// A fix with a NIS above this is rejected. χ² of 4 degrees of freedom passes 30 once in 2e5 good fixes.
   double gate_nis = 30;
-  /// After so many rejections in a row the directions are set free by the size of the misfit and the fix is used: the model was
-  /// wrong, not the tracker.
+  /// After so many rejections in a row the directions are set free by the size of the misfit and the fix is used: the
+  /// model was wrong, not the tracker.
   int reopen_after_rejections = 20;
 
   [[nodiscard]] bool noise_is_positive() const {
@@ -63,16 +63,16 @@ struct CalibrationSetup {
 };
 
 enum class FixStatus : std::uint8_t {
-  kNone,               ///< no fix was due
-  kPending,            ///< held until the gyro sample after it
-  kStarted,            ///< the first fix: sets the directions
-  kUsed,               ///< calibration updated
-  kUsedAfterReopening, ///< used after a run of rejections, with the directions set free
-  kRejectedNotRotation,   ///< quaternion not finite or not unit
-  kRejectedOutOfOrder,    ///< not later than the fix before it, or earlier than the latest gyro sample
-  kRejectedNoGyro,        ///< no gyro samples close enough round it
-  kRejectedGeometry,      ///< momenta nearly parallel
-  kRejectedByGate,        ///< NIS above the gate
+  kNone,                 ///< no fix was due
+  kPending,              ///< held until the gyro sample after it
+  kStarted,              ///< the first fix: sets the directions
+  kUsed,                 ///< calibration updated
+  kUsedAfterReopening,   ///< used after a run of rejections, with the directions set free
+  kRejectedNotRotation,  ///< quaternion not finite or not unit
+  kRejectedOutOfOrder,   ///< not later than the fix before it, or earlier than the latest gyro sample
+  kRejectedNoGyro,       ///< no gyro samples close enough round it
+  kRejectedGeometry,     ///< momenta nearly parallel
+  kRejectedByGate,       ///< NIS above the gate
 };
 
 /// Eq. (3), components 2–5, at one fix, and what was done with it.
@@ -82,7 +82,7 @@ struct FixReport {
   Time t{};
   Eigen::Matrix<double, M, 1> innovation = Eigen::Matrix<double, M, 1>::Zero();  ///< −z of eq. (3)
   Eigen::Matrix<double, M, M> innovation_covariance = Eigen::Matrix<double, M, M>::Zero();
-  double nis = 0;              ///< innovation² over its covariance; M degrees of freedom
+  double nis = 0;  ///< innovation² over its covariance; M degrees of freedom
   int rejections_in_a_row = 0;
 
   [[nodiscard]] bool used() const {

@@ -1,9 +1,11 @@
 #pragma once
-/// The on-board cycle: gyro samples and fixes in, in time order; calibration and attitude out. One object, no heap, no exceptions.
+/// The on-board cycle: gyro samples and fixes in, in time order; calibration and attitude out. One object, no heap, no
+/// exceptions.
 
 #include <algorithm>
 #include <chrono>
 #include <cstdint>
+#include <optional>
 
 #include "trihedron/core/navigator.hpp"
 #include "trihedron/core/telemetry.hpp"
@@ -32,7 +34,11 @@ struct StepReport {
   SampleStatus sample = SampleStatus::kUsed;
   typename Estimator::Report fix;  ///< of the fix that fell between the sample before and this one, if any
   bool corrected = false;          ///< the navigator was corrected at that fix
-  /// z1 of eq. (3), cosθ predicted minus cosθ measured: the integrity of the pair, without a star tracker. Zero before the start.
+  /// Attitude at that fix, where it was used: of the calibration itself, and of the open-loop navigator.
+  std::optional<AttitudeSolution> calibrated;
+  std::optional<AttitudeSolution> navigated;
+  /// z1 of eq. (3), cosθ predicted minus cosθ measured: the integrity of the pair, without a star tracker. Zero before
+  /// the start.
   double angle_residual = 0;
 };
 
@@ -44,7 +50,8 @@ class Cycle {
   using Setup = typename Estimator::Setup;
   using Directions = typename Estimator::Directions;
 
-  /// A fix is interpolated between samples no further apart than this; the body's acceleration over it is below the readout noise.
+  /// A fix is interpolated between samples no further apart than this; the body's acceleration over it is below the
+  /// readout noise.
   static constexpr Duration kMaxInterpolation = std::chrono::milliseconds(500);
 
   [[nodiscard]] static Result<Cycle, SetupFault> create(const Setup& setup, const CorrectionPolicy& policy) {
@@ -72,7 +79,7 @@ class Cycle {
     }
     if (has_pending_fix_) {
       has_pending_fix_ = false;
-      report.fix = correct_between_samples(sample.t, h_b, report.corrected);
+      correct_between_samples(sample.t, h_b, report);
     }
     if (!predict_to(sample.t, h_b)) {
       report.sample = SampleStatus::kRejectedGeometry;
@@ -81,8 +88,8 @@ class Cycle {
     return report;
   }
 
-  /// One fix. On the time of the latest gyro sample it is used at once, later ones are held for the sample after them and reported
-  /// there.
+  /// One fix. On the time of the latest gyro sample it is used at once, later ones are held for the sample after them
+  /// and reported there.
   Report on_fix(const StarFix& fix) {
     Report report;
     report.t = fix.t;
@@ -99,7 +106,7 @@ class Cycle {
       fix_t_ = fix.t;
       const Rot<In, C> C_in_c = Rot<In, C>::assume(fix.q_in_c.normalized());
       if (has_sample_ && fix.t == t_) {
-        report.fix = correct_now(C_in_c, report.corrected);
+        correct_now(C_in_c, report);
         report.angle_residual = angle_residual();
       } else {
         has_pending_fix_ = true;
@@ -120,17 +127,12 @@ class Cycle {
     return navigator_.attitude_with_covariance(h_b_, estimator_.since_fix(), estimator_.setup());
   }
 
-  /// The calibration's own attitude at the latest sample. Needs estimator().started().
-  [[nodiscard]] Result<AttitudeSolution, DirectionsFault> calibration_attitude() const {
-    return estimator_.attitude_with_covariance(h_b_);
-  }
-
  private:
   [[nodiscard]] SampleStatus screen(const GyroSample<kGyros>& sample, Directions& h_b) const {
     if (has_sample_ && !(sample.t > t_)) {
       return SampleStatus::kRejectedOutOfOrder;
     }
-    for (std::size_t k = 0; k < h_b.size(); ++k) {
+    for (int k = 0; k < h_b.size(); ++k) {
       const double norm = sample.h_b[k].norm();
       if (!nearly_unit(norm)) {
         return SampleStatus::kRejectedNotDirection;
@@ -141,34 +143,34 @@ class Cycle {
   }
 
   /// The pending fix, at readings interpolated to its time.
-  typename Estimator::Report correct_between_samples(Time t_next, const Directions& h_b_next, bool& corrected) {
-    typename Estimator::Report report;
-    report.t = fix_t_;
+  void correct_between_samples(Time t_next, const Directions& h_b_next, Report& report) {
+    report.fix.t = fix_t_;
     const bool on_next = t_next == fix_t_;
     const bool interpolable = has_sample_ && t_next > fix_t_ && t_next - t_ <= kMaxInterpolation;
     if (!on_next && !interpolable) {
-      report.status = FixStatus::kRejectedNoGyro;
-      return report;
+      report.fix.status = FixStatus::kRejectedNoGyro;
+      return;
     }
     Directions h_b = h_b_next;
     if (!on_next) {
       const double fraction = to_seconds(fix_t_ - t_) / to_seconds(t_next - t_);
-      for (std::size_t k = 0; k < h_b.size(); ++k) {
+      for (int k = 0; k < h_b.size(); ++k) {
         h_b[k] = ((1 - fraction) * h_b_[k] + fraction * h_b_next[k]).normalized();
       }
     }
     if (!predict_to(fix_t_, h_b)) {
-      report.status = FixStatus::kRejectedGeometry;
-      return report;
+      report.fix.status = FixStatus::kRejectedGeometry;
+      return;
     }
-    return correct_now(pending_C_in_c_, corrected);
+    correct_now(pending_C_in_c_, report);
   }
 
-  /// Prediction of both models to `t` with the midpoint of the readings. False, and nothing moved, where the momenta are parallel.
+  /// Prediction of both models to `t` with the midpoint of the readings. False, and nothing moved, where the momenta
+  /// are parallel.
   bool predict_to(Time t, const Directions& h_b) {
     if (estimator_.started() && t > t_) {
       Directions middle;
-      for (std::size_t k = 0; k < h_b.size(); ++k) {
+      for (int k = 0; k < h_b.size(); ++k) {
         middle[k] = (h_b_[k] + h_b[k]).normalized();
       }
       const auto calibrated = trihedron_attitude(estimator_.gyros(), middle);
@@ -189,10 +191,11 @@ class Cycle {
     return true;
   }
 
-  /// What the midpoint rule may miss when the body turned far between two samples, rad²: the drift over the step, times the turn.
+  /// What the midpoint rule may miss when the body turned far between two samples, rad²: the drift over the step, times
+  /// the turn.
   [[nodiscard]] double variance_of_long_step(const Directions& h_b, double dt_s) const {
     double largest_rad = 0;
-    for (std::size_t k = 0; k < h_b.size(); ++k) {
+    for (int k = 0; k < h_b.size(); ++k) {
       const double drift_rad = estimator_.gyros()[k].drift_rad_s.norm() * dt_s;
       largest_rad = std::max(largest_rad, drift_rad * angle_between<double>(h_b_[k], h_b[k]));
     }
@@ -200,22 +203,37 @@ class Cycle {
   }
 
   /// Astro-correction at the present time: the calibration always, the navigator when it is due.
-  typename Estimator::Report correct_now(const Rot<In, C>& C_in_c, bool& corrected) {
+  void correct_now(const Rot<In, C>& C_in_c, Report& report) {
     const typename Estimator::Sensitivities stretch = estimator_.since_fix();
-    typename Estimator::Report report = estimator_.correct(C_in_c.raw(), h_b_);
-    report.t = t_;
-    if (report.status == FixStatus::kRejectedGeometry) {
-      return report;  // the estimator did not move its covariance to this fix
+    report.fix = estimator_.correct(C_in_c.raw(), h_b_);
+    report.fix.t = t_;
+    if (report.fix.status == FixStatus::kRejectedGeometry) {
+      return;  // the estimator did not move its covariance to this fix
     }
     navigator_.extend(stretch);
-    const bool due = !navigator_.started() ||
-                     (policy_.interval != CorrectionPolicy::kOnlyFirst && t_ - corrected_t_ >= policy_.interval);
-    if (report.used() && due) {
+    if (!report.fix.used()) {
+      return;
+    }
+    if (!navigator_.started() ||
+        (policy_.interval != CorrectionPolicy::kOnlyFirst && t_ - corrected_t_ >= policy_.interval)) {
       navigator_.correct(estimator_, policy_.take_parameters);
       corrected_t_ = t_;
-      corrected = true;
+      report.corrected = true;
     }
-    return report;
+    if (const auto solution = calibration_attitude()) {
+      report.calibrated = solution.value();
+    }
+    if (const auto solution = navigation_attitude()) {
+      report.navigated = solution.value();
+    }
+  }
+
+  /// The calibration's own attitude; readout noise of a fix at this very sample is counted twice, which only shows at
+  /// the first fixes.
+  [[nodiscard]] Result<AttitudeSolution, DirectionsFault> calibration_attitude() const {
+    return trihedron_attitude<typename Estimator::DriftModel>(estimator_.gyros(), h_b_, estimator_.error_root(),
+                                                              estimator_.since_fix(),
+                                                              estimator_.setup().readout_noise_rad, 0.0);
   }
 
   [[nodiscard]] double angle_residual() const {

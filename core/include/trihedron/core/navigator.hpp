@@ -1,9 +1,9 @@
 #pragma once
-/// The open-loop navigator: between astro-corrections the momenta turn by the drift model alone, and they give the attitude.
-
-#include <array>
+/// The open-loop navigator: between astro-corrections the momenta turn by the drift model alone, and they give the
+/// attitude.
 
 #include "trihedron/core/calibration.hpp"
+#include "trihedron/core/per_gyro.hpp"
 
 namespace trihedron {
 
@@ -16,8 +16,8 @@ struct AttitudeSolution {
 /// C_in_c by the trihedra on the momenta believed in `in` and read in the cases (paper: reference gyro 1, Fig. 4).
 /// `in_c` is filled for callers that need θ. h_b: direction cosines, need not be exactly unit.
 template <class Model>
-[[nodiscard]] Result<Rot<In, C>, DirectionsFault> trihedron_attitude(const std::array<GyroModel<Model>, 2>& gyros,
-                                                                     const std::array<Eigen::Vector3d, 2>& h_b) {
+[[nodiscard]] Result<Rot<In, C>, DirectionsFault> trihedron_attitude(const PerGyro<GyroModel<Model>, 2>& gyros,
+                                                                     const PerGyro<Eigen::Vector3d, 2>& h_b) {
   const auto in = make_trihedron(Vec<In>::assume(gyros[0].h_in), Vec<In>::assume(gyros[1].h_in));
   if (!in) {
     return in.fault();
@@ -29,13 +29,13 @@ template <class Model>
   return attitude(in.value(), c.value());
 }
 
-/// Attitude with its covariance: errors at a reference epoch (rows of `errors` as in ErrorLayout), carried by `since`, plus the
-/// readout noise of this sample and a random walk of the directions of `walk_variance_rad2` per axis.
+/// Attitude with its covariance: errors at a reference epoch (rows of `errors` as in ErrorLayout), carried by `since`,
+/// plus the readout noise of this sample and a random walk of the directions of `walk_variance_rad2` per axis.
 template <class Model, int Columns>
 [[nodiscard]] Result<AttitudeSolution, DirectionsFault> trihedron_attitude(
-    const std::array<GyroModel<Model>, 2>& gyros, const std::array<Eigen::Vector3d, 2>& h_b,
+    const PerGyro<GyroModel<Model>, 2>& gyros, const PerGyro<Eigen::Vector3d, 2>& h_b,
     const Eigen::Matrix<double, ErrorLayout<Model, 2>::kSize, Columns>& errors,
-    const std::array<Sensitivity<Model>, 2>& since, const std::array<double, 2>& readout_noise_rad,
+    const PerGyro<Sensitivity<Model>, 2>& since, const PerGyro<double, 2>& readout_noise_rad,
     double walk_variance_rad2) {
   using Errors = ErrorLayout<Model, 2>;
   const auto in = make_trihedron(Vec<In>::assume(gyros[0].h_in), Vec<In>::assume(gyros[1].h_in));
@@ -52,13 +52,12 @@ template <class Model, int Columns>
   const Eigen::Matrix<double, 3, 6> by_directions = attitude_by_directions(c.value());
   Eigen::Matrix<double, 3, Errors::kSize> by_errors = Eigen::Matrix<double, 3, Errors::kSize>::Zero();
   for (int k = 0; k < 2; ++k) {
-    const auto g = static_cast<std::size_t>(k);
     const Eigen::Matrix3d by_phi = by_directions.middleCols<3>(3 * k);
     const Eigen::Matrix3d by_phi_in = by_phi * C_c_in;
-    by_errors.template middleCols<3>(Errors::direction(k)) = by_phi_in * since[g].by_start;
-    by_errors.template middleCols<Model::kSize>(Errors::drift(k)) = by_phi_in * since[g].by_drift;
-    by_errors.template middleCols<3>(Errors::alignment(k)) = by_phi_in * since[g].by_alignment - by_phi;
-    const double white = readout_noise_rad[g] * readout_noise_rad[g] + walk_variance_rad2;
+    by_errors.template middleCols<3>(Errors::direction(k)) = by_phi_in * since[k].by_start;
+    by_errors.template middleCols<Model::kSize>(Errors::drift(k)) = by_phi_in * since[k].by_drift;
+    by_errors.template middleCols<3>(Errors::alignment(k)) = by_phi_in * since[k].by_alignment - by_phi;
+    const double white = readout_noise_rad[k] * readout_noise_rad[k] + walk_variance_rad2;
     solution.covariance_rad2 += white * by_phi * by_phi.transpose();
   }
   const Eigen::Matrix<double, 3, Columns> spread = by_errors * errors;
@@ -75,9 +74,10 @@ class Navigator {
   [[nodiscard]] bool started() const { return started_; }
   [[nodiscard]] const typename Estimator::Gyros& gyros() const { return gyros_; }
 
-  /// Instantaneous astro-correction: takes over the estimator's directions and, where told or at the start, its parameters.
+  /// Instantaneous astro-correction: takes over the estimator's directions and, where told or at the start, its
+  /// parameters.
   void correct(const Estimator& estimator, bool take_parameters) {
-    for (std::size_t k = 0; k < gyros_.size(); ++k) {
+    for (int k = 0; k < gyros_.size(); ++k) {
       if (take_parameters || !started_) {
         gyros_[k] = estimator.gyros()[k];
       } else {
@@ -92,7 +92,7 @@ class Navigator {
 
   /// Open-loop prediction over one step; C_in_c and h_b of its middle. Needs started().
   void predict(const Eigen::Matrix3d& C_in_c, const typename Estimator::Directions& h_b, double dt_s) {
-    for (std::size_t k = 0; k < gyros_.size(); ++k) {
+    for (int k = 0; k < gyros_.size(); ++k) {
       precess(gyros_[k], C_in_c, h_b[k], dt_s);
     }
     time_since_correction_s_ += dt_s;
@@ -100,7 +100,7 @@ class Navigator {
 
   /// Carries the errors over the stretch between two fixes, for which the estimator has integrated the sensitivities.
   void extend(const typename Estimator::Sensitivities& stretch) {
-    for (std::size_t k = 0; k < gyros_.size(); ++k) {
+    for (int k = 0; k < gyros_.size(); ++k) {
       since_correction_[k] = since_correction_[k].then(stretch[k]);
     }
   }
@@ -110,7 +110,7 @@ class Navigator {
       const typename Estimator::Directions& h_b, const typename Estimator::Sensitivities& since_fix,
       const typename Estimator::Setup& setup) const {
     typename Estimator::Sensitivities since = since_correction_;
-    for (std::size_t k = 0; k < gyros_.size(); ++k) {
+    for (int k = 0; k < gyros_.size(); ++k) {
       since[k] = since[k].then(since_fix[k]);
     }
     const double walk = setup.direction_random_walk_rad_sqrt_s;

@@ -1,10 +1,10 @@
 #pragma once
-/// The paper's filter: 24 states, feedback into the model, quasi-inertial frame re-based at every fix (Odintsov 2009, eqs. 3 and 4).
-
-#include <array>
+/// The paper's filter: 24 states, feedback into the model, quasi-inertial frame re-based at every fix (Odintsov 2009,
+/// eqs. 3 and 4).
 
 #include "trihedron/core/calibration.hpp"
 #include "trihedron/core/drift.hpp"
+#include "trihedron/core/per_gyro.hpp"
 #include "trihedron/core/square_root_information.hpp"
 
 namespace trihedron {
@@ -23,10 +23,10 @@ struct PaperLayout {
   }
 };
 
-/// Kalman filter on eq. (3) with the full correlated noise, in square-root information form. Estimates are held in `gyros()`;
-/// the filter knows their errors, Δh = h(true) − h(est), κ(true) − κ(est), and δ with C_c_b(true) = exp([δ×]) C_c_b(est).
-/// H is taken at the raw star-tracker attitude, as in the paper: in steady flight the filter therefore gains information that does
-/// not exist, and its sigmas about the orbit normal are too small.
+/// Kalman filter on eq. (3) with the full correlated noise, in square-root information form. Estimates are held in
+/// `gyros()`; the filter knows their errors, Δh = h(true) − h(est), κ(true) − κ(est), and δ with C_c_b(true) =
+/// exp([δ×]) C_c_b(est). H is taken at the raw star-tracker attitude, as in the paper: in steady flight the filter
+/// therefore gains information that does not exist, and its sigmas about the orbit normal are too small.
 template <class Model = Esg7>
 class PaperEstimator {
  public:
@@ -36,9 +36,9 @@ class PaperEstimator {
   static constexpr int kMeasurements = 4;
   static constexpr const char* kName = "paper";
   using Setup = CalibrationSetup<Model, kGyros>;
-  using Gyros = std::array<GyroModel<Model>, kGyros>;
-  using Sensitivities = std::array<Sensitivity<Model>, kGyros>;
-  using Directions = std::array<Eigen::Vector3d, kGyros>;
+  using Gyros = PerGyro<GyroModel<Model>, kGyros>;
+  using Sensitivities = PerGyro<Sensitivity<Model>, kGyros>;
+  using Directions = PerGyro<Eigen::Vector3d, kGyros>;
   using Report = FixReport<kMeasurements>;
   using Errors = ErrorLayout<Model, kGyros>;
   using ErrorRoot = Eigen::Matrix<double, Errors::kSize, Layout::kStates>;
@@ -74,8 +74,8 @@ class PaperEstimator {
 
   /// Tangent bases of both momenta in the quasi-inertial frame on given directions, in `in` components.
   struct QuasiInertial {
-    std::array<Eigen::Matrix<double, 2, 3>, kGyros> components;  ///< the paper's two components of each Δh
-    std::array<Eigen::Matrix<double, 3, 2>, kGyros> tangents;    ///< back: Δh = tangents · components · Δh for Δh across h
+    PerGyro<Eigen::Matrix<double, 2, 3>, kGyros> components;  ///< the paper's two components of each Δh
+    PerGyro<Eigen::Matrix<double, 3, 2>, kGyros> tangents;  ///< back: Δh = tangents · components · Δh for Δh across h
     double sine = 1;
   };
   [[nodiscard]] static QuasiInertial quasi_inertial(const Trihedron<In>& t);

@@ -8,9 +8,9 @@ namespace trihedron {
 /// What the on-board computer believes of one gyro; inside of the estimators, plain numbers with frames in the names.
 template <class Model, class S = double>
 struct GyroModel {
-  Vector3<S> h_in = Vector3<S>::UnitX();                                             ///< direction of the momentum
+  Vector3<S> h_in = Vector3<S>::UnitX();  ///< direction of the momentum
   typename Model::template Coefficients<S> drift_rad_s = Model::template Coefficients<S>::Zero();  ///< κ
-  Matrix3<S> C_c_b = Matrix3<S>::Identity();                                         ///< alignment, exp([Λ×])
+  Matrix3<S> C_c_b = Matrix3<S>::Identity();  ///< alignment, exp([Λ×])
 };
 
 /// Linearised effect of three causes on one momentum since a reference epoch:
@@ -32,8 +32,8 @@ struct Sensitivity {
   }
 };
 
-/// Turns one momentum by its drift over `dt_s`, with attitude and reading of the middle of the step (midpoint rule; exact for
-/// constant ω_in). C_in_c: attitude; h_b: direction cosines in the case, unit. Returns ω_in, rad/s.
+/// Turns one momentum by its drift over `dt_s`, with attitude and reading of the middle of the step (midpoint rule;
+/// exact for constant ω_in). C_in_c: attitude; h_b: direction cosines in the case, unit. Returns ω_in, rad/s.
 template <class Model, class S>
 Vector3<S> precess(GyroModel<Model, S>& gyro, const Matrix3<S>& C_in_c, const Vector3<S>& h_b, S dt_s) {
   const Vector3<S> omega_in = C_in_c * (gyro.C_c_b * Model::template rate<S>(h_b, gyro.drift_rad_s));

@@ -1,6 +1,6 @@
 #pragma once
-/// Linear estimation with the square root of the information matrix (Bierman, "Factorization Methods for Discrete Sequential
-/// Estimation", 1977; process noise after Dyer and McReynolds, 1969).
+/// Linear estimation with the square root of the information matrix (Bierman, "Factorization Methods for Discrete
+/// Sequential Estimation", 1977; process noise after Dyer and McReynolds, 1969).
 
 #include <Eigen/Core>
 #include <Eigen/LU>
@@ -8,8 +8,9 @@
 
 namespace trihedron {
 
-/// Rotates the rows of `extra` into the upper triangular rows of `root` (Householder), column by column; the first `columns` columns
-/// of `extra` become zero. rootᵀ root + extraᵀ extra is unchanged. Rows of `root` may be zero (no information yet).
+/// Rotates the rows of `extra` into the upper triangular rows of `root` (Householder), column by column; the first
+/// `columns` columns of `extra` become zero. rootᵀ root + extraᵀ extra is unchanged. Rows of `root` may be zero (no
+/// information yet).
 template <class Root, class Extra>
 void rotate_into(Eigen::MatrixBase<Root>& root, Eigen::MatrixBase<Extra>& extra, int columns) {
   using S = typename Root::Scalar;
@@ -36,9 +37,10 @@ void rotate_into(Eigen::MatrixBase<Root>& root, Eigen::MatrixBase<Extra>& extra,
   }
 }
 
-/// Estimate errors x ~ (0, (RᵀR)⁻¹) of N states, the first D of which move; the other N − D are constants. R is upper triangular.
-/// A direction without information costs nothing and gains nothing: R times it stays zero to rounding, whatever the number of steps.
-/// The estimate itself is kept by the owner, who adds each correction to it ("feedback"), so that the mean of x is always zero.
+/// Estimate errors x ~ (0, (RᵀR)⁻¹) of N states, the first D of which move; the other N − D are constants. R is upper
+/// triangular. A direction without information costs nothing and gains nothing: R times it stays zero to rounding,
+/// whatever the number of steps. The estimate itself is kept by the owner, who adds each correction to it ("feedback"),
+/// so that the mean of x is always zero.
 template <int N, int D, class S = double>
 class SquareRootInformation {
  public:
@@ -61,9 +63,11 @@ class SquareRootInformation {
 
   /// Time update: x_d ← A x_d + B x_c + L w, w ~ (0, I). A must be invertible; L = 0 is allowed.
   void propagate(const DynamicMatrix& A, const DynamicByConstants& B, const DynamicMatrix& L) {
-    // Rows of R with x_d(before) = A⁻¹ (x_d(after) − B x_c − L w) put in: columns are w, x_d(after), x_c. Then w is eliminated.
+    // Rows of R with x_d(before) = A⁻¹ (x_d(after) − B x_c − L w) put in: columns are w, x_d(after), x_c. Then w is
+    // eliminated.
     Eigen::Matrix<S, D, D + N, Eigen::RowMajor> moved;
-    const DynamicMatrix R_d = root_.template topLeftCorner<D, D>().template triangularView<Eigen::Upper>() * A.inverse();
+    const DynamicMatrix R_d =
+        root_.template topLeftCorner<D, D>().template triangularView<Eigen::Upper>() * A.inverse();
     moved.template leftCols<D>() = -R_d * L;
     moved.template middleCols<D>(D) = R_d;
     moved.template rightCols<N - D>() = root_.template block<D, N - D>(0, D) - R_d * B;
@@ -83,7 +87,8 @@ class SquareRootInformation {
     return root_.template leftCols<N>().template triangularView<Eigen::Upper>().template solve<Eigen::OnTheRight>(H);
   }
 
-  /// Measurement update with `H` and `y`, y = H x + unit white noise. Returns the correction, to be fed back; needs regular() after it.
+  /// Measurement update with `H` and `y`, y = H x + unit white noise. Returns the correction, to be fed back; needs
+  /// regular() after it.
   template <int M>
   [[nodiscard]] Vector update(const Rows<M>& H, const Eigen::Matrix<S, M, 1>& y) {
     Eigen::Matrix<S, M, N + 1, Eigen::RowMajor> extra;

@@ -3,20 +3,21 @@
 
 #include <Eigen/Core>
 #include <Eigen/Geometry>
-#include <array>
 
+#include "trihedron/core/per_gyro.hpp"
 #include "trihedron/core/time.hpp"
 
 namespace trihedron {
 
-/// A direction or quaternion further than this from unit length is not believed. Readout noise moves a norm by a tenth of it at most.
+/// A direction or quaternion further than this from unit length is not believed. Readout noise moves a norm by a tenth
+/// of it at most.
 inline constexpr double kNormTolerance = 1e-3;
 
 /// Direction cosines of the N momenta, each in its own case axes; as telemetered, not normalised.
 template <int N>
 struct GyroSample {
   Time t{};
-  std::array<Eigen::Vector3d, N> h_b;
+  PerGyro<Eigen::Vector3d, N> h_b;
 };
 
 /// Star-tracker fix q_in_c, Hamilton; as telemetered, of either sign.

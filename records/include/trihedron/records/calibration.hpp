@@ -27,10 +27,10 @@ struct Verdict {
 };
 
 struct GyroCalibration {
-  std::string drift_model;                                   ///< "esg7"
-  std::vector<std::pair<std::string, double>> drift_rad_s;   ///< by coefficient name, in the model's order
-  Eigen::Vector3d alignment_rotation_vector_rad{0, 0, 0};    ///< Λ: C_c_b = exp([Λ×])
-  Eigen::Vector3d momentum_in{0, 0, 0};                      ///< h_in at `t`, unit
+  std::string drift_model;                                  ///< "esg7"
+  std::vector<std::pair<std::string, double>> drift_rad_s;  ///< by coefficient name, in the model's order
+  Eigen::Vector3d alignment_rotation_vector_rad{0, 0, 0};   ///< Λ: C_c_b = exp([Λ×])
+  Eigen::Vector3d momentum_in{0, 0, 0};                     ///< h_in at `t`, unit
 };
 
 struct Calibration {

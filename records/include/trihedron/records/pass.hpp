@@ -15,9 +15,9 @@ namespace trihedron {
 
 /// What is known of one gyro before the pass: prior means and 1-sigma.
 struct GyroPrior {
-  double readout_noise_rad = 0;                                ///< per direction cosine
-  std::map<std::string, double> drift_rad_s;                   ///< by coefficient; missing means 0
-  std::map<std::string, double> drift_sigma_rad_s;             ///< by coefficient; missing means the common sigma
+  double readout_noise_rad = 0;                     ///< per direction cosine
+  std::map<std::string, double> drift_rad_s;        ///< by coefficient; missing means 0
+  std::map<std::string, double> drift_sigma_rad_s;  ///< by coefficient; missing means the common sigma
   double drift_common_sigma_rad_s = 0;
   Eigen::Vector3d alignment_rotation_vector_rad{0, 0, 0};
   Eigen::Vector3d alignment_sigma_rad{0, 0, 0};
@@ -31,7 +31,8 @@ struct PassSettings {
   Duration star_tracker_period{};
   Eigen::Vector3d star_tracker_noise_rad{0, 0, 0};  ///< 1-sigma about c x, y, z
   std::vector<GyroPrior> gyros;
-  std::optional<Calibration> prior;  ///< an earlier calibration: replaces drift and alignment of `gyros`, with its covariance
+  std::optional<Calibration>
+      prior;  ///< an earlier calibration: replaces drift and alignment of `gyros`, with its covariance
 };
 
 /// Direction cosines as telemetered: not normalised, may hold NaN. Times strictly increase.
@@ -64,7 +65,7 @@ struct Pass {
 /// What a simulator knows. Never part of a Pass, so that no estimator can read it.
 struct Truth {
   struct Gyro {
-    std::vector<std::pair<std::string, double>> drift_rad_s;  ///< coefficients of eq. (1)
+    std::vector<std::pair<std::string, double>> drift_rad_s;       ///< coefficients of eq. (1)
     std::vector<std::pair<std::string, double>> unmodelled_rad_s;  ///< drift outside eq. (1), by name
     Eigen::Vector3d alignment_rotation_vector_rad{0, 0, 0};
   };
@@ -74,11 +75,13 @@ struct Truth {
   std::vector<double> h_in;  ///< sample-major: h_in[(sample * gyros + gyro) * 3 + axis]
 };
 
-/// An attitude solution: q_in_c with 1-sigma of the small rotation about c x, y, z.
+/// An attitude solution: q_in_c with 1-sigma of the small rotation about c x, y, z, and what else is known of each
+/// epoch.
 struct AttitudeHistory {
   std::vector<Time> t;
   std::vector<Eigen::Quaterniond> q_in_c;
-  std::vector<Eigen::Vector3d> sigma_rad;
+  std::vector<Eigen::Vector3d> sigma_rad;  ///< empty where unknown
+  std::vector<double> age_s;               ///< time since the last astro-correction; empty where unknown
 
   [[nodiscard]] std::size_t size() const { return t.size(); }
 };

@@ -1,0 +1,89 @@
+#pragma once
+/// A pass through the on-board cycle: calibration, and everything that was seen on the way.
+
+#include <Eigen/Core>
+#include <array>
+#include <functional>
+#include <map>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include "trihedron/core/calibration.hpp"
+#include "trihedron/core/cycle.hpp"
+#include "trihedron/records/calibration.hpp"
+#include "trihedron/records/pass.hpp"
+
+namespace trihedron::ground {
+
+/// What a user may set; the effective values are written beside each result.
+struct CalibrationOptions {
+  std::string estimator = "paper";
+  std::string drift_model = "esg7";
+  /// Process noise of each momentum across itself. The default is small against the readout, and lets go of 0.1″ in 9
+  /// h.
+  double direction_random_walk_rad_sqrt_s = 3e-9;
+  double gate_nis = 30;
+  int reopen_after_rejections = 20;
+  CorrectionPolicy corrections;
+};
+
+/// One fix: eq. (3), components 2–5, and what was done with it.
+struct FixRecord {
+  Time t{};
+  FixStatus status = FixStatus::kNone;
+  std::array<double, 4> innovation{};        ///< rad
+  std::array<double, 4> innovation_sigma{};  ///< rad
+  double nis = 0;
+  bool corrected_navigator = false;
+};
+
+/// Estimates after each fix, for the figures of the paper: one row per used fix, columns as in Calibration::states.
+struct ParameterHistory {
+  std::vector<Time> t;
+  std::vector<std::vector<double>> value;  ///< [row][state]; alignment as rotation vector, rad; drift rad/s
+  std::vector<std::vector<double>> sigma;
+};
+
+struct CalibrationRun {
+  CalibrationOptions options;
+  Calibration calibration;  ///< with verdict and statistics
+  std::vector<FixRecord> fixes;
+  ParameterHistory parameters;
+  AttitudeHistory attitude;    ///< of the calibration itself, at the fixes' epochs
+  AttitudeHistory navigation;  ///< of the open-loop navigator at the fixes' epochs
+  std::vector<Time> angle_t;   ///< z1 of eq. (3), decimated by min/max
+  std::vector<double> angle_residual_min, angle_residual_max;
+  std::map<std::string, long> samples;     ///< gyro samples by what was done with them
+  std::map<std::string, long> fix_counts;  ///< fixes by what was done with them
+};
+
+/// Called now and then with the fraction done, 0 … 1.
+using Progress = std::function<void(double)>;
+
+/// Error of a set-up that cannot work: unknown estimator, prior not positive definite, too few gyros. what() is one
+/// line.
+class SetupError : public std::runtime_error {
+ public:
+  using std::runtime_error::runtime_error;
+};
+
+/// Calibrates. Throws SetupError.
+[[nodiscard]] CalibrationRun calibrate(const Pass& pass, const CalibrationOptions& options,
+                                       const Progress& progress = {});
+
+struct NavigationRun {
+  AttitudeHistory attitude;  ///< at every gyro sample used
+  std::vector<FixRecord> fixes;
+  std::map<std::string, double> statistics;
+  Verdict verdict;
+};
+/// Attitude by the navigator, corrected as `options.corrections` says, with the calibration running along from the
+/// pass's prior. Throws SetupError.
+[[nodiscard]] NavigationRun navigate(const Pass& pass, const CalibrationOptions& options,
+                                     const Progress& progress = {});
+
+[[nodiscard]] const char* name_of(FixStatus status);
+[[nodiscard]] const char* name_of(SampleStatus status);
+
+}  // namespace trihedron::ground

@@ -1,0 +1,51 @@
+#pragma once
+/// Attitude error against a reference: roll, pitch, heading; per stretch of time; after each correction.
+
+#include <Eigen/Core>
+#include <optional>
+#include <vector>
+
+#include "trihedron/records/pass.hpp"
+
+namespace trihedron::ground {
+
+/// Errors at the epochs common to both, within half a millisecond: the rotation vector of C_in_c(ref)ᵀ
+/// C_in_c(solution), c axes.
+struct AttitudeErrors {
+  std::vector<Time> t;
+  std::vector<Eigen::Vector3d> error_rad;  ///< x roll, y pitch, z heading
+  std::vector<Eigen::Vector3d> sigma_rad;  ///< as the solution claims; empty where it claims none
+  std::vector<double> age_s;               ///< time since the last astro-correction; empty where unknown
+};
+
+[[nodiscard]] AttitudeErrors attitude_errors(const AttitudeHistory& solution, const std::vector<Time>& reference_t,
+                                             const std::vector<Eigen::Quaterniond>& reference_q_in_c);
+
+struct ErrorStatistics {
+  Time from{};
+  Time to{};
+  std::size_t count = 0;
+  Eigen::Vector3d rms_rad{0, 0, 0};
+  Eigen::Vector3d max_rad{0, 0, 0};
+  double max_total_rad = 0;
+  /// Mean over the axes of (error/sigma)²: 1 for honest sigmas. Absent where the solution claims none.
+  std::optional<double> normalised_square;
+};
+
+/// Over the whole, and over consecutive stretches of `length` from the first epoch's pass epoch `start`.
+[[nodiscard]] ErrorStatistics statistics(const AttitudeErrors& errors);
+[[nodiscard]] std::vector<ErrorStatistics> statistics_by_stretch(const AttitudeErrors& errors, Time start,
+                                                                 Duration length);
+
+/// After each astro-correction: the time until the total error first passes `limit_rad`; absent where it did not before
+/// the next.
+struct CorrectionInterval {
+  Time corrected{};
+  Duration observed{};             ///< how long this stretch was watched
+  std::optional<Duration> passed;  ///< when the limit was passed
+  double max_total_rad = 0;
+};
+/// Empty where `errors` does not know the ages.
+[[nodiscard]] std::vector<CorrectionInterval> correction_intervals(const AttitudeErrors& errors, double limit_rad);
+
+}  // namespace trihedron::ground

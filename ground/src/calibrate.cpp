@@ -1,0 +1,373 @@
+#include "trihedron/ground/calibrate.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <memory>
+#include <utility>
+
+#include "trihedron/core/drift.hpp"
+#include "trihedron/core/paper_estimator.hpp"
+#include "trihedron/ground/replay.hpp"
+#include "trihedron/ground/verdict.hpp"
+
+namespace trihedron::ground {
+namespace {
+
+template <class Model>
+std::vector<std::string> state_names(int gyros) {
+  std::vector<std::string> names;
+  for (int k = 1; k <= gyros; ++k) {
+    for (const char* coefficient : Model::kNames) {
+      names.push_back(fmt::format("gyro{}.{}", k, coefficient));
+    }
+    for (const char axis : {'x', 'y', 'z'}) {
+      names.push_back(fmt::format("gyro{}.align_{}", k, axis));
+    }
+  }
+  return names;
+}
+
+/// Prior means and sigmas of pass.toml.
+template <class Estimator>
+void use_settings(const PassSettings& settings, typename Estimator::Setup& setup) {
+  using Model = typename Estimator::DriftModel;
+  using Layout = typename Estimator::Setup::Layout;
+  for (int k = 0; k < Estimator::kGyros; ++k) {
+    const GyroPrior& prior = settings.gyros[static_cast<std::size_t>(k)];
+    for (const auto* table : {&prior.drift_rad_s, &prior.drift_sigma_rad_s}) {
+      for (const auto& [name, value] : *table) {
+        if (std::find(Model::kNames.begin(), Model::kNames.end(), name) == Model::kNames.end()) {
+          throw SetupError(
+              fmt::format("gyro {}: the prior names drift coefficient '{}', which drift model {} does not have", k + 1,
+                          name, Model::kModelName));
+        }
+      }
+    }
+    const auto value_or = [](const std::map<std::string, double>& table, const char* name, double otherwise) {
+      const auto found = table.find(name);
+      return found == table.end() ? otherwise : found->second;
+    };
+    Eigen::Matrix<double, Layout::kPerGyro, 1> sigma;
+    for (int i = 0; i < Model::kSize; ++i) {
+      const char* name = Model::kNames[static_cast<std::size_t>(i)];
+      setup.prior[k].drift_rad_s(i) = value_or(prior.drift_rad_s, name, 0);
+      sigma(i) = value_or(prior.drift_sigma_rad_s, name, prior.drift_common_sigma_rad_s);
+    }
+    setup.prior[k].C_c_b = Rot<C, B<1>>::exp(Vec<C>::assume(prior.alignment_rotation_vector_rad)).raw();
+    sigma.template tail<3>() = prior.alignment_sigma_rad;
+    setup.prior_covariance.diagonal().template segment<Layout::kPerGyro>(Layout::drift(k)) = sigma.cwiseAbs2();
+  }
+}
+
+/// Values and covariance of an earlier calibration.
+template <class Estimator>
+void use_calibration(const Calibration& prior, typename Estimator::Setup& setup) {
+  using Model = typename Estimator::DriftModel;
+  const std::vector<std::string> names = state_names<Model>(Estimator::kGyros);
+  std::vector<Eigen::Index> rows;
+  for (const std::string& name : names) {
+    const auto found = std::find(prior.states.begin(), prior.states.end(), name);
+    if (found == prior.states.end()) {
+      throw SetupError(fmt::format("the earlier calibration has no covariance of '{}'", name));
+    }
+    rows.push_back(found - prior.states.begin());
+  }
+  for (Eigen::Index i = 0; i < setup.prior_covariance.rows(); ++i) {
+    for (Eigen::Index j = 0; j < setup.prior_covariance.cols(); ++j) {
+      setup.prior_covariance(i, j) =
+          prior.covariance(rows[static_cast<std::size_t>(i)], rows[static_cast<std::size_t>(j)]);
+    }
+  }
+  for (int k = 0; k < Estimator::kGyros; ++k) {
+    const GyroCalibration& gyro = prior.gyros[static_cast<std::size_t>(k)];
+    if (gyro.drift_model != Model::kModelName || gyro.drift_rad_s.size() != Model::kSize) {
+      throw SetupError(fmt::format("the earlier calibration of gyro {} is of drift model '{}', not {}", k + 1,
+                                   gyro.drift_model, Model::kModelName));
+    }
+    for (std::size_t i = 0; i < Model::kSize; ++i) {
+      setup.prior[k].drift_rad_s(static_cast<Eigen::Index>(i)) = gyro.drift_rad_s[i].second;
+    }
+    setup.prior[k].C_c_b = Rot<C, B<1>>::exp(Vec<C>::assume(gyro.alignment_rotation_vector_rad)).raw();
+  }
+}
+
+template <class Estimator>
+typename Estimator::Setup make_setup(const Pass& pass, const CalibrationOptions& options) {
+  const PassSettings& settings = pass.settings;
+  if (settings.gyros.size() < Estimator::kGyros || pass.gyro.gyros < Estimator::kGyros) {
+    throw SetupError(
+        fmt::format("estimator {} needs {} gyros; the pass has {}", Estimator::kName, Estimator::kGyros,
+                    std::min<std::size_t>(settings.gyros.size(), static_cast<std::size_t>(pass.gyro.gyros))));
+  }
+  typename Estimator::Setup setup;
+  use_settings<Estimator>(settings, setup);
+  if (settings.prior) {
+    if (settings.prior->gyros.size() < Estimator::kGyros) {
+      throw SetupError(fmt::format("the earlier calibration has {} gyros; estimator {} needs {}",
+                                   settings.prior->gyros.size(), Estimator::kName, Estimator::kGyros));
+    }
+    use_calibration<Estimator>(*settings.prior, setup);
+  }
+  for (int k = 0; k < Estimator::kGyros; ++k) {
+    setup.readout_noise_rad[k] = settings.gyros[static_cast<std::size_t>(k)].readout_noise_rad;
+  }
+  setup.star_tracker_noise_rad = settings.star_tracker_noise_rad;
+  setup.direction_random_walk_rad_sqrt_s = options.direction_random_walk_rad_sqrt_s;
+  setup.gate_nis = options.gate_nis;
+  setup.reopen_after_rejections = options.reopen_after_rejections;
+  return setup;
+}
+
+template <class Estimator>
+std::unique_ptr<Cycle<Estimator>> make_cycle(const Pass& pass, const CalibrationOptions& options) {
+  const auto cycle = Cycle<Estimator>::create(make_setup<Estimator>(pass, options), options.corrections);
+  if (!cycle) {
+    switch (cycle.fault()) {
+      case SetupFault::kPriorNotPositiveDefinite:
+        throw SetupError(
+            "the prior covariance is not positive definite: each prior sigma must be positive, correlations below 1");
+      case SetupFault::kNoiseNotPositive:
+        throw SetupError("readout and star-tracker noise must be positive, process noise must not be negative");
+      case SetupFault::kGateNotPositive:
+        throw SetupError("the gate and the number of rejections before reopening must be positive");
+    }
+  }
+  return std::make_unique<Cycle<Estimator>>(cycle.value());
+}
+
+template <class Report>
+FixRecord record_of(const Report& report) {
+  FixRecord record;
+  record.t = report.fix.t;
+  record.status = report.fix.status;
+  for (std::size_t i = 0; i < record.innovation.size(); ++i) {
+    const auto row = static_cast<Eigen::Index>(i);
+    record.innovation[i] = report.fix.innovation(row);
+    record.innovation_sigma[i] = std::sqrt(report.fix.innovation_covariance(row, row));
+  }
+  record.nis = report.fix.nis;
+  record.corrected_navigator = report.corrected;
+  return record;
+}
+
+/// Estimates in the order of state_names().
+template <class Estimator>
+std::vector<double> parameter_values(const Estimator& estimator) {
+  std::vector<double> values;
+  for (const auto& gyro : estimator.gyros()) {
+    values.insert(values.end(), gyro.drift_rad_s.begin(), gyro.drift_rad_s.end());
+    const Eigen::Vector3d lambda = Rot<C, B<1>>::assume(gyro.C_c_b).log().raw();
+    values.insert(values.end(), lambda.begin(), lambda.end());
+  }
+  return values;
+}
+
+void append(AttitudeHistory& history, Time t, const AttitudeSolution& solution) {
+  history.t.push_back(t);
+  history.q_in_c.push_back(solution.C_in_c.quaternion());
+  history.sigma_rad.emplace_back(solution.covariance_rad2.diagonal().cwiseSqrt());
+}
+
+/// Reports progress about a hundred times over a pass.
+class Meter {
+ public:
+  Meter(const Progress& progress, std::size_t steps)
+      : progress_(progress), steps_(steps), every_(std::max<std::size_t>(steps / 100, 1)) {}
+  void step() {
+    if (++done_ % every_ == 0 && progress_) {
+      progress_(static_cast<double>(done_) / static_cast<double>(steps_));
+    }
+  }
+
+ private:
+  const Progress& progress_;
+  std::size_t steps_;
+  std::size_t every_;
+  std::size_t done_ = 0;
+};
+
+std::map<std::string, double> statistics_of(const std::vector<FixRecord>& fixes) {
+  double nis_sum = 0;
+  double count = 0;
+  double used = 0;
+  double outliers = 0;
+  double reopened = 0;
+  std::array<double, 4> squares{};
+  for (const FixRecord& fix : fixes) {
+    used += fix.status == FixStatus::kStarted || fix.status == FixStatus::kUsed ||
+            fix.status == FixStatus::kUsedAfterReopening;
+    outliers += fix.status == FixStatus::kRejectedByGate;
+    reopened += fix.status == FixStatus::kUsedAfterReopening;
+    if (fix.status == FixStatus::kUsed) {
+      nis_sum += fix.nis;
+      ++count;
+      for (std::size_t i = 0; i < squares.size(); ++i) {
+        squares[i] += std::pow(fix.innovation[i], 2);
+      }
+    }
+  }
+  std::map<std::string, double> statistics{{"fixes", static_cast<double>(fixes.size())},
+                                           {"fixes_used", used},
+                                           {"fixes_rejected_as_outliers", outliers},
+                                           {"reopened", reopened},
+                                           {"nis_count", count},
+                                           {"nis_degrees_of_freedom", 4}};
+  if (count > 0) {
+    statistics["nis_mean"] = nis_sum / count;
+    for (std::size_t i = 0; i < squares.size(); ++i) {
+      statistics[fmt::format("innovation_{}_rms_rad", i + 1)] = std::sqrt(squares[i] / count);
+    }
+  }
+  return statistics;
+}
+
+/// Keeps the extremes of z1 over each stretch of 3 s.
+class AngleTrack {
+ public:
+  explicit AngleTrack(CalibrationRun& run) : run_(run) {}
+  void add(Time t, double residual) {
+    if (run_.angle_t.empty() || t - run_.angle_t.back() >= std::chrono::seconds(3)) {
+      run_.angle_t.push_back(t);
+      run_.angle_residual_min.push_back(residual);
+      run_.angle_residual_max.push_back(residual);
+      return;
+    }
+    run_.angle_residual_min.back() = std::min(run_.angle_residual_min.back(), residual);
+    run_.angle_residual_max.back() = std::max(run_.angle_residual_max.back(), residual);
+  }
+
+ private:
+  CalibrationRun& run_;
+};
+
+template <class Estimator>
+Calibration result_of(const Pass& pass, const Cycle<Estimator>& cycle) {
+  using Model = typename Estimator::DriftModel;
+  Calibration result;
+  result.estimator = Estimator::kName;
+  result.epoch = pass.settings.epoch;
+  result.t = cycle.t();
+  for (const auto& gyro : cycle.estimator().gyros()) {
+    GyroCalibration out;
+    out.drift_model = Model::kModelName;
+    for (std::size_t i = 0; i < Model::kSize; ++i) {
+      out.drift_rad_s.emplace_back(Model::kNames[i], gyro.drift_rad_s(static_cast<Eigen::Index>(i)));
+    }
+    out.alignment_rotation_vector_rad = Rot<C, B<1>>::assume(gyro.C_c_b).log().raw();
+    out.momentum_in = gyro.h_in;
+    result.gyros.push_back(out);
+  }
+  result.states = state_names<Model>(Estimator::kGyros);
+  const Eigen::MatrixXd root =
+      cycle.estimator().error_root().bottomRows(static_cast<Eigen::Index>(result.states.size()));
+  result.covariance = root * root.transpose();
+  return result;
+}
+
+template <class Estimator>
+CalibrationRun calibrate_with(const Pass& pass, const CalibrationOptions& options, const Progress& progress) {
+  const auto cycle = make_cycle<Estimator>(pass, options);
+  CalibrationRun run;
+  run.options = options;
+  AngleTrack angle(run);
+  Time corrected{};
+  const auto on_fix = [&](const typename Cycle<Estimator>::Report& report) {
+    run.fixes.push_back(record_of(report));
+    ++run.fix_counts[name_of(report.fix.status)];
+    corrected = report.corrected ? report.fix.t : corrected;
+    if (!report.fix.used()) {
+      return;
+    }
+    run.parameters.t.push_back(report.fix.t);
+    run.parameters.value.push_back(parameter_values(cycle->estimator()));
+    const auto root = cycle->estimator().error_root();
+    std::vector<double>& sigma = run.parameters.sigma.emplace_back();
+    for (Eigen::Index row = Estimator::Errors::kDirections; row < root.rows(); ++row) {
+      sigma.push_back(root.row(row).norm());
+    }
+    if (report.calibrated) {
+      append(run.attitude, report.fix.t, *report.calibrated);
+    }
+    if (report.navigated) {
+      append(run.navigation, report.fix.t, *report.navigated);
+      run.navigation.age_s.push_back(to_seconds(report.fix.t - corrected));
+    }
+  };
+  std::array<long, 4> samples{};
+  Meter meter(progress, pass.gyro.size());
+  replay(pass, *cycle, on_fix, [&](const typename Cycle<Estimator>::Report& report) {
+    ++samples[static_cast<std::size_t>(report.sample)];
+    if (cycle->estimator().started() && report.sample == SampleStatus::kUsed) {
+      angle.add(report.t, report.angle_residual);
+    }
+    meter.step();
+  });
+  for (std::size_t i = 0; i < samples.size(); ++i) {
+    if (samples[i] > 0) {
+      run.samples[name_of(static_cast<SampleStatus>(i))] = samples[i];
+    }
+  }
+  if (!cycle->estimator().started()) {
+    throw SetupError("no fix could be used: every one was rejected, or no gyro samples lie round it");
+  }
+  run.calibration = result_of(pass, *cycle);
+  run.calibration.statistics = statistics_of(run.fixes);
+  run.calibration.verdict = judge(pass, run);
+  return run;
+}
+
+template <class Estimator>
+NavigationRun navigate_with(const Pass& pass, const CalibrationOptions& options, const Progress& progress) {
+  const auto cycle = make_cycle<Estimator>(pass, options);
+  NavigationRun run;
+  Time corrected{};
+  Meter meter(progress, pass.gyro.size());
+  replay(
+      pass, *cycle,
+      [&](const typename Cycle<Estimator>::Report& report) {
+        run.fixes.push_back(record_of(report));
+        corrected = report.corrected ? report.fix.t : corrected;
+      },
+      [&](const typename Cycle<Estimator>::Report& report) {
+        meter.step();
+        if (report.sample != SampleStatus::kUsed || !cycle->navigator().started()) {
+          return;
+        }
+        if (const auto solution = cycle->navigation_attitude()) {
+          append(run.attitude, report.t, solution.value());
+          run.attitude.age_s.push_back(to_seconds(report.t - corrected));
+        }
+      });
+  if (run.attitude.t.empty()) {
+    throw SetupError("no attitude: no fix could be used to start from");
+  }
+  run.statistics = statistics_of(run.fixes);
+  return run;
+}
+
+/// Calls `body` with the chosen estimator as a type tag.
+template <class Body>
+auto with_estimator(const CalibrationOptions& options, Body&& body) {
+  if (options.estimator != "paper") {
+    throw SetupError(fmt::format("there is no estimator '{}'; there is: paper", options.estimator));
+  }
+  if (options.drift_model != Esg7::kModelName) {
+    throw SetupError(fmt::format("estimator {} has no drift model '{}'; it has: {}", options.estimator,
+                                 options.drift_model, Esg7::kModelName));
+  }
+  return body.template operator()<PaperEstimator<Esg7>>();
+}
+
+}  // namespace
+
+CalibrationRun calibrate(const Pass& pass, const CalibrationOptions& options, const Progress& progress) {
+  return with_estimator(options, [&]<class Estimator>() { return calibrate_with<Estimator>(pass, options, progress); });
+}
+
+NavigationRun navigate(const Pass& pass, const CalibrationOptions& options, const Progress& progress) {
+  return with_estimator(options, [&]<class Estimator>() { return navigate_with<Estimator>(pass, options, progress); });
+}
+
+}  // namespace trihedron::ground

@@ -1,0 +1,109 @@
+#include "trihedron/ground/evaluate.hpp"
+
+#include <algorithm>
+#include <chrono>
+
+#include "trihedron/core/frames.hpp"
+
+namespace trihedron::ground {
+namespace {
+
+constexpr Duration kSameEpoch = std::chrono::microseconds(500);
+
+ErrorStatistics statistics_of(const AttitudeErrors& errors, std::size_t begin, std::size_t end) {
+  ErrorStatistics result;
+  result.count = end - begin;
+  if (begin == end) {
+    return result;
+  }
+  result.from = errors.t[begin];
+  result.to = errors.t[end - 1];
+  Eigen::Vector3d squares = Eigen::Vector3d::Zero();
+  double normalised = 0;
+  for (std::size_t i = begin; i < end; ++i) {
+    const Eigen::Vector3d& e = errors.error_rad[i];
+    squares += e.cwiseAbs2();
+    result.max_rad = result.max_rad.cwiseMax(e.cwiseAbs());
+    result.max_total_rad = std::max(result.max_total_rad, e.norm());
+    if (!errors.sigma_rad.empty()) {
+      normalised += e.cwiseQuotient(errors.sigma_rad[i]).squaredNorm() / 3;
+    }
+  }
+  const auto count = static_cast<double>(result.count);
+  result.rms_rad = (squares / count).cwiseSqrt();
+  if (!errors.sigma_rad.empty()) {
+    result.normalised_square = normalised / count;
+  }
+  return result;
+}
+
+}  // namespace
+
+AttitudeErrors attitude_errors(const AttitudeHistory& solution, const std::vector<Time>& reference_t,
+                               const std::vector<Eigen::Quaterniond>& reference_q_in_c) {
+  AttitudeErrors errors;
+  std::size_t r = 0;
+  for (std::size_t i = 0; i < solution.size(); ++i) {
+    while (r < reference_t.size() && reference_t[r] < solution.t[i] - kSameEpoch) {
+      ++r;
+    }
+    if (r == reference_t.size()) {
+      break;
+    }
+    if (reference_t[r] > solution.t[i] + kSameEpoch) {
+      continue;
+    }
+    const auto reference = Rot<In, C>::assume(reference_q_in_c[r].normalized());
+    const auto estimate = Rot<In, C>::assume(solution.q_in_c[i].normalized());
+    const Eigen::Vector3d error = (reference.inverse() * estimate).log().raw();
+    if (!error.allFinite()) {  // a reference from telemetry may hold what is no rotation
+      continue;
+    }
+    errors.t.push_back(solution.t[i]);
+    errors.error_rad.push_back(error);
+    if (!solution.sigma_rad.empty()) {
+      errors.sigma_rad.push_back(solution.sigma_rad[i]);
+    }
+    if (!solution.age_s.empty()) {
+      errors.age_s.push_back(solution.age_s[i]);
+    }
+  }
+  return errors;
+}
+
+ErrorStatistics statistics(const AttitudeErrors& errors) { return statistics_of(errors, 0, errors.t.size()); }
+
+std::vector<ErrorStatistics> statistics_by_stretch(const AttitudeErrors& errors, Time start, Duration length) {
+  std::vector<ErrorStatistics> stretches;
+  for (std::size_t begin = 0; begin < errors.t.size();) {
+    const auto number = (errors.t[begin] - start) / length;
+    std::size_t end = begin;
+    while (end < errors.t.size() && (errors.t[end] - start) / length == number) {
+      ++end;
+    }
+    stretches.push_back(statistics_of(errors, begin, end));
+    begin = end;
+  }
+  return stretches;
+}
+
+std::vector<CorrectionInterval> correction_intervals(const AttitudeErrors& errors, double limit_rad) {
+  std::vector<CorrectionInterval> intervals;
+  for (std::size_t i = 0; i < errors.age_s.size(); ++i) {
+    if (i == 0 || errors.age_s[i] < errors.age_s[i - 1]) {
+      CorrectionInterval next;
+      next.corrected = errors.t[i] - from_seconds(errors.age_s[i]);
+      intervals.push_back(next);
+    }
+    CorrectionInterval& now = intervals.back();
+    const double total_rad = errors.error_rad[i].norm();
+    now.observed = from_seconds(errors.age_s[i]);
+    now.max_total_rad = std::max(now.max_total_rad, total_rad);
+    if (!now.passed && !(total_rad <= limit_rad)) {
+      now.passed = now.observed;
+    }
+  }
+  return intervals;
+}
+
+}  // namespace trihedron::ground

@@ -1,0 +1,45 @@
+#include "trihedron/ground/calibrate.hpp"
+
+namespace trihedron::ground {
+
+const char* name_of(FixStatus status) {
+  switch (status) {
+    case FixStatus::kNone:
+      return "none";
+    case FixStatus::kPending:
+      return "pending";
+    case FixStatus::kStarted:
+      return "started the filter";
+    case FixStatus::kUsed:
+      return "used";
+    case FixStatus::kUsedAfterReopening:
+      return "used after reopening";
+    case FixStatus::kRejectedNotRotation:
+      return "rejected: not a rotation";
+    case FixStatus::kRejectedOutOfOrder:
+      return "rejected: out of order";
+    case FixStatus::kRejectedNoGyro:
+      return "rejected: no gyro samples round it";
+    case FixStatus::kRejectedGeometry:
+      return "rejected: momenta nearly parallel";
+    case FixStatus::kRejectedByGate:
+      return "rejected: outlier";
+  }
+  return "unknown";
+}
+
+const char* name_of(SampleStatus status) {
+  switch (status) {
+    case SampleStatus::kUsed:
+      return "used";
+    case SampleStatus::kRejectedNotDirection:
+      return "rejected: not a direction";
+    case SampleStatus::kRejectedOutOfOrder:
+      return "rejected: out of order";
+    case SampleStatus::kRejectedGeometry:
+      return "rejected: momenta nearly parallel";
+  }
+  return "unknown";
+}
+
+}  // namespace trihedron::ground

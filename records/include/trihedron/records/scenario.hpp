@@ -1,0 +1,187 @@
+#pragma once
+/// What a simulated pass is made of. The defaults are the paper's experiment: nine hours of Resurs-DK1, two gyros at 8
+/// Hz, a fix every 3 s, 30′ of misalignment, unknown drift coefficients. SI units, angles in radians, sigmas 1-sigma.
+/// Frames: docs/notation.md. A field of probability is per sample or per fix; zero switches its fault off.
+
+#include <Eigen/Core>
+#include <Eigen/Geometry>
+#include <array>
+#include <chrono>
+#include <cstdint>
+#include <limits>
+#include <numbers>
+#include <optional>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include "trihedron/core/time.hpp"
+
+namespace trihedron {
+
+inline constexpr double kDegree = std::numbers::pi / 180;
+inline constexpr double kArcminute = kDegree / 60;
+inline constexpr double kArcsecond = kDegree / 3600;
+
+/// A stretch of the pass, seconds from its start; holds begin_s, not end_s.
+struct Interval {
+  double begin_s = 0;
+  double end_s = 0;
+};
+
+/// Mean elements at the start of the pass; equator and equinox of `in`. Kepler's motion with the secular rates of J2.
+struct OrbitScenario {
+  double perigee_altitude_m = 360e3;  ///< above the equatorial radius
+  double apogee_altitude_m = 604e3;
+  double inclination_rad = 70 * kDegree;
+  double ascending_node_rad = 40 * kDegree;
+  double argument_of_perigee_rad = 60 * kDegree;
+  double mean_anomaly_rad = 0;
+};
+
+/// From `begin_s` on, turn about one fixed axis to these angles from the reference attitude, at rest at both ends, and
+/// stay there. The offset is C_reference_c = Rz(yaw) Ry(pitch) Rx(roll).
+struct Slew {
+  double begin_s = 0;
+  double roll_rad = 0;
+  double pitch_rad = 0;
+  double yaw_rad = 0;
+};
+
+/// Slews drawn from the seed: to a target drawn evenly within the limits, a dwell there, back to the reference
+/// attitude.
+struct ImagingProgramme {
+  double max_roll_rad = 30 * kDegree;
+  double max_pitch_rad = 15 * kDegree;
+  double mean_rest_s = 600;  ///< between slews, exponentially distributed
+  double dwell_s = 60;
+};
+
+/// Part of a recorded attitude. Neighbours less than 90° apart; times strictly increase.
+struct AttitudeSample {
+  double t_s = 0;
+  Eigen::Quaterniond q_in_c = Eigen::Quaterniond::Identity();
+};
+
+struct AttitudeScenario {
+  enum class Reference {
+    kOrbital,     ///< z up along the radius, y orbit normal (r × v), x along track
+    kYawSteered,  ///< z up along the radius, x along the track over the rotating Earth
+    kInertial,    ///< `inertial_q_in_c`
+    kRecorded     ///< `recorded`, by a natural cubic spline; must cover the pass
+  };
+  Reference reference = Reference::kOrbital;
+  Eigen::Quaterniond inertial_q_in_c = Eigen::Quaterniond::Identity();
+  std::vector<AttitudeSample> recorded{};
+
+  std::variant<std::vector<Slew>, ImagingProgramme> slews = ImagingProgramme{};
+  double max_slew_rate_rad_s = 0.5 * kDegree;
+  double max_slew_acceleration_rad_s2 = 0.02 * kDegree;
+
+  double jitter_rad = 20 * kArcsecond;  ///< 1-sigma about each c axis
+  double jitter_bandwidth_hz = 0.02;    ///< half-power; far above it there is nothing
+};
+
+/// One member of the drift family ω = −∇W + h × ∇D on the unit sphere of h in case axes, W or D = amplitude × Y(degree,
+/// order) with real orthonormal spherical harmonics; order < 0 are the sines.
+struct DriftHarmonic {
+  enum class Potential { kW, kD };
+  Potential potential = Potential::kW;
+  int degree = 1;  ///< 1 … 20
+  int order = 0;   ///< −degree … degree
+  double amplitude_rad_s = 0;
+};
+
+/// How the momentum of a gyro precesses.
+struct DriftScenario {
+  /// κ of eq. (1): k0, μ12, μ23, μ31, ν12, ν23, ν31. Without it drawn from the seed, normal, with `prior_sigma_rad_s`.
+  std::optional<std::array<double, 7>> kappa_rad_s{};
+  double prior_sigma_rad_s = 2e-6;  ///< what the estimator is told of each coefficient
+
+  std::vector<DriftHarmonic> harmonics{};  ///< drift that eq. (1) does not contain
+  /// Amplitude, 1-sigma, of further members drawn from the seed: all of degree 1 and 2 that eq. (1) does not contain.
+  double outside_sigma_rad_s = 0;
+
+  double coefficient_walk_rad_s_sqrt_s = 0;  ///< each κ wanders: rad/s per √s
+  double warm_up_fraction = 0;               ///< κ(t) = κ (1 + fraction exp(−t / warm_up_time_s))
+  double warm_up_time_s = 3600;
+  double direction_walk_rad_sqrt_s = 0;  ///< the momentum wanders about each case axis: rad per √s
+  double markov_sigma_rad_s = 0;  ///< first-order Gauss–Markov drift about each case axis, stationary from the start
+  double markov_time_s = 3600;
+};
+
+/// How the direction of the momentum is read in case axes: reading = unit((1 + scale) h + bias + noise), then
+/// quantised.
+struct ReadoutScenario {
+  double noise_rad = 2 * kArcsecond;  ///< per direction cosine, white
+  Eigen::Vector3d bias_rad{0, 0, 0};
+  Eigen::Vector3d scale{0, 0, 0};
+  double quantum_rad = 0;
+
+  double dropout_probability = 0;  ///< the sample is NaN
+  double spike_probability = 0;    ///< one direction cosine is off by up to ± spike_rad
+  double spike_rad = 1 * kDegree;
+  double stuck_probability = 0;  ///< the readout starts to repeat its last value, for stuck_s
+  double stuck_s = 2;
+};
+
+struct GyroScenario {
+  Eigen::Vector3d start_direction_c{0.995, 0.087, 0.045};  ///< of the momentum, c axes, at the start; any length but 0
+  Eigen::Vector3d mounting_rotation_vector_rad{0, 0, 0};  ///< as designed and known: C_c_b = exp([m×]) exp([mounting×])
+  /// m, c axes. Without it drawn from the seed: even in direction, of the length `misalignment_magnitude_rad`.
+  std::optional<Eigen::Vector3d> misalignment_rad{};
+  double misalignment_magnitude_rad = 30 * kArcminute;
+  double alignment_prior_sigma_rad = 30 * kArcminute;  ///< what the estimator is told, per axis
+  DriftScenario drift{};
+  ReadoutScenario readout{};
+};
+
+/// A star-tracker head. A fix stamped t holds C_in_c(t + clock_offset − latency) exp([e×]), e in c axes the sum of the
+/// errors below.
+struct StarTrackerScenario {
+  Eigen::Vector3d noise_rad{3 * kArcsecond, 3 * kArcsecond, 20 * kArcsecond};  ///< white, about c x, y, z
+  double clock_offset_s = 0;
+  double latency_s = 0;
+
+  /// p_s, p_c of the error p_s sin nt + p_c cos nt; n the mean rate of the argument of latitude, t from the start of
+  /// the pass.
+  Eigen::Vector3d orbital_sine_rad{0, 0, 0};
+  Eigen::Vector3d orbital_cosine_rad{0, 0, 0};
+
+  /// Error that belongs to the place of the stars in the field of view: changes as the field moves over the sky by
+  /// `field_correlation_rad`, frozen when the attitude is inertial.
+  Eigen::Vector3d field_error_rad{0, 0, 0};
+  double field_correlation_rad = 2 * kDegree;
+
+  enum class Aberration { kCorrected, kUncorrected };
+  Aberration aberration = Aberration::kCorrected;
+
+  /// No fix with the boresight nearer to the Sun's centre, or to the Earth's limb, than this.
+  std::optional<double> sun_exclusion_rad{};
+  std::optional<double> earth_exclusion_rad{};
+  double max_rate_rad_s = std::numeric_limits<double>::infinity();  ///< no fix above this body rate
+
+  std::vector<Interval> outages{};
+  double dropout_probability = 0;  ///< the fix is missing
+  double outlier_probability = 0;  ///< off by a rotation of random axis and an angle even in 0 … outlier_rad
+  double outlier_rad = 2 * kDegree;
+  double wrong_sign_probability = 0;  ///< −q in place of q
+};
+
+struct Scenario {
+  std::string spacecraft = "Resurs-DK1";
+  std::uint64_t seed = 0;
+  Time epoch{std::chrono::sys_days{std::chrono::year{2009} / 5 / 20} -
+             std::chrono::sys_days{std::chrono::year{1958} / 1 / 1}};
+  Duration duration = std::chrono::hours{9};
+  Duration gyro_period = std::chrono::milliseconds{125};
+  Duration star_tracker_period = std::chrono::seconds{3};  ///< a multiple of gyro_period
+  std::vector<Interval> gyro_gaps{};                       ///< no gyro sample at all
+
+  OrbitScenario orbit{};
+  AttitudeScenario attitude{};
+  std::vector<GyroScenario> gyros{GyroScenario{}, GyroScenario{.start_direction_c = {0.14, 0.985, 0.094}}};
+  StarTrackerScenario star_tracker{};
+};
+
+}  // namespace trihedron
