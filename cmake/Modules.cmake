@@ -5,7 +5,8 @@
 # trihedron_module(<name> [SOURCES …] [MODULES …] [LIBRARIES …] [PRIVATE_LIBRARIES …])
 #   makes the target trihedron_<name> with the alias trihedron::<name>; MODULES must be allowed by the table below.
 # trihedron_test(<module> <file.cpp>… [LIBRARIES …])
-#   makes the Google Test program <module>_test and registers its tests as <module>.<Suite>.<Name>.
+#   makes the Google Test program <module>_test, linked with the module if there is one of that name, and registers its tests as
+#   <module>.<Suite>.<Name>.
 
 set(TRIHEDRON_core_MAY_USE)
 set(TRIHEDRON_records_MAY_USE core)
@@ -45,7 +46,9 @@ function(trihedron_test module)
   endif()
   cmake_parse_arguments(arg "" "" "LIBRARIES" ${ARGN})
   add_executable(${module}_test ${arg_UNPARSED_ARGUMENTS})
-  target_link_libraries(${module}_test PRIVATE trihedron::${module} ${arg_LIBRARIES} GTest::gmock GTest::gtest_main rapidcheck
-    trihedron_warnings)
+  if(TARGET trihedron::${module})
+    target_link_libraries(${module}_test PRIVATE trihedron::${module})
+  endif()
+  target_link_libraries(${module}_test PRIVATE ${arg_LIBRARIES} GTest::gmock GTest::gtest_main rapidcheck trihedron_warnings)
   gtest_discover_tests(${module}_test TEST_PREFIX ${module}. DISCOVERY_TIMEOUT 60 PROPERTIES TIMEOUT 300)
 endfunction()

@@ -70,17 +70,35 @@ void PaperEstimator<Model>::update_covariance_to_now(const QuasiInertial& now) {
 }
 
 template <class Model>
+auto PaperEstimator<Model>::measure(const Gyros& gyros, const QuasiInertial& qi, const Eigen::Matrix3d& C_in_c,
+                                    const Directions& h_b, const Setup& setup) -> Measurement {
+  // y = Δh − (C_in_c δ) × h + noise
+  Measurement measurement;
+  Eigen::Matrix<double, kMeasurements, 3 + 3 * kGyros> noise =
+      Eigen::Matrix<double, kMeasurements, 3 + 3 * kGyros>::Zero();
+  for (int k = 0; k < kGyros; ++k) {
+    const int row = Layout::direction(k);
+    const Eigen::Vector3d reference_in = C_in_c * (gyros[k].C_c_b * h_b[k]);
+    const Eigen::Matrix<double, 2, 3> cross_h = qi.components[k] * skew<double>(reference_in);
+    measurement.innovation.template segment<2>(row) = qi.components[k] * (reference_in - gyros[k].h_in);
+    measurement.H.template block<2, 2>(row, row).setIdentity();
+    measurement.H.template block<2, 3>(row, Layout::alignment(k)) = cross_h * C_in_c;
+    noise.template block<2, 3>(row, 0) = cross_h * C_in_c * setup.star_tracker_noise_rad.asDiagonal();
+    noise.template block<2, 3>(row, 3 + 3 * k) = setup.readout_noise_rad[k] * cross_h;
+  }
+  measurement.R = noise * noise.transpose();
+  return measurement;
+}
+
+template <class Model>
 auto PaperEstimator<Model>::correct(const Eigen::Matrix3d& C_in_c, const Directions& h_b) -> Report {
   Report report;
-  // Reference directions h_et and, at the first fix, the predicted ones too.
-  Directions h_c;
-  Directions reference_in;
-  for (int k = 0; k < kGyros; ++k) {
-    h_c[k] = gyros_[k].C_c_b * h_b[k];
-    reference_in[k] = C_in_c * h_c[k];
+  if (!started_) {
+    for (int k = 0; k < kGyros; ++k) {
+      gyros_[k].h_in = C_in_c * (gyros_[k].C_c_b * h_b[k]);
+    }
   }
-  const auto trihedron = make_trihedron(Vec<In>::assume(started_ ? gyros_[0].h_in : reference_in[0]),
-                                        Vec<In>::assume(started_ ? gyros_[1].h_in : reference_in[1]));
+  const auto trihedron = make_trihedron(Vec<In>::assume(gyros_[0].h_in), Vec<In>::assume(gyros_[1].h_in));
   if (!trihedron) {
     report.status = FixStatus::kRejectedGeometry;
     return report;
@@ -89,31 +107,12 @@ auto PaperEstimator<Model>::correct(const Eigen::Matrix3d& C_in_c, const Directi
   if (started_) {
     update_covariance_to_now(now);
   } else {
-    for (int k = 0; k < kGyros; ++k) {
-      gyros_[k].h_in = reference_in[k];
-    }
     qi_ = now;
   }
-
-  // y = h_et − h_R = Δh − (C_in_c δ) × h + noise; noise: the tracker's rotation, common to both gyros, and each gyro's
-  // readout.
-  Innovation innovation;
-  MeasurementMatrix H = MeasurementMatrix::Zero();
-  Eigen::Matrix<double, kMeasurements, 3 + 3 * kGyros> noise =
-      Eigen::Matrix<double, kMeasurements, 3 + 3 * kGyros>::Zero();
-  for (int k = 0; k < kGyros; ++k) {
-    const int row = Layout::direction(k);
-    const Eigen::Matrix<double, 2, 3>& components = now.components[k];
-    const Eigen::Matrix<double, 2, 3> cross_h = components * skew<double>(reference_in[k]);
-    innovation.template segment<2>(row) = components * (reference_in[k] - gyros_[k].h_in);
-    H.template block<2, 2>(row, row).setIdentity();
-    H.template block<2, 3>(row, Layout::alignment(k)) = cross_h * C_in_c;
-    noise.template block<2, 3>(row, 0) = cross_h * C_in_c * setup_.star_tracker_noise_rad.asDiagonal();
-    noise.template block<2, 3>(row, 3 + 3 * k) = setup_.readout_noise_rad[k] * cross_h;
-  }
-  const Eigen::LLT<InnovationCovariance> noise_factor(noise * noise.transpose());
-  const MeasurementMatrix H_white = noise_factor.matrixL().solve(H);
-  const Innovation innovation_white = noise_factor.matrixL().solve(innovation);
+  const Measurement measurement = measure(gyros_, now, C_in_c, h_b, setup_);
+  const Eigen::LLT<InnovationCovariance> noise_factor(measurement.R);
+  const MeasurementMatrix H_white = noise_factor.matrixL().solve(measurement.H);
+  const Innovation innovation_white = noise_factor.matrixL().solve(measurement.innovation);
 
   if (!started_) {
     static_cast<void>(information_.update(H_white, innovation_white));
@@ -125,7 +124,7 @@ auto PaperEstimator<Model>::correct(const Eigen::Matrix3d& C_in_c, const Directi
   const auto assess = [&] {
     const MeasurementMatrix through = information_.through_uncertainty(H_white);
     const InnovationCovariance white = InnovationCovariance::Identity() + through * through.transpose();
-    report.innovation = innovation;
+    report.innovation = measurement.innovation;
     report.innovation_covariance = noise_factor.matrixL() * white * noise_factor.matrixL().transpose();
     report.nis = innovation_white.dot(white.llt().solve(innovation_white));
   };
@@ -137,7 +136,7 @@ auto PaperEstimator<Model>::correct(const Eigen::Matrix3d& C_in_c, const Directi
       report.status = FixStatus::kRejectedByGate;
       return report;
     }
-    add_direction_variance(innovation.squaredNorm() / kMeasurements);
+    add_direction_variance(measurement.innovation.squaredNorm() / kMeasurements);
     update_covariance_to_now(now);
     assess();
     report.status = FixStatus::kUsedAfterReopening;

@@ -120,9 +120,26 @@ typename Estimator::Setup make_setup(const Pass& pass, const CalibrationOptions&
   return setup;
 }
 
+CorrectionPolicy policy_of(const CorrectionOptions& options) {
+  CorrectionPolicy policy;
+  policy.take_parameters = options.take_parameters;
+  switch (options.when) {
+    case CorrectionOptions::When::kEvery:
+      policy.interval = options.interval;
+      break;
+    case CorrectionOptions::When::kOnlyFirst:
+      policy.interval = CorrectionPolicy::kOnlyFirst;
+      break;
+    case CorrectionOptions::When::kEachFix:
+      policy.interval = CorrectionPolicy::kEveryFix;
+      break;
+  }
+  return policy;
+}
+
 template <class Estimator>
 std::unique_ptr<Cycle<Estimator>> make_cycle(const Pass& pass, const CalibrationOptions& options) {
-  const auto cycle = Cycle<Estimator>::create(make_setup<Estimator>(pass, options), options.corrections);
+  const auto cycle = Cycle<Estimator>::create(make_setup<Estimator>(pass, options), policy_of(options.corrections));
   if (!cycle) {
     switch (cycle.fault()) {
       case SetupFault::kPriorNotPositiveDefinite:
@@ -196,8 +213,7 @@ std::map<std::string, double> statistics_of(const std::vector<FixRecord>& fixes)
   double reopened = 0;
   std::array<double, 4> squares{};
   for (const FixRecord& fix : fixes) {
-    used += fix.status == FixStatus::kStarted || fix.status == FixStatus::kUsed ||
-            fix.status == FixStatus::kUsedAfterReopening;
+    used += fix.used();
     outliers += fix.status == FixStatus::kRejectedByGate;
     reopened += fix.status == FixStatus::kUsedAfterReopening;
     if (fix.status == FixStatus::kUsed) {
@@ -344,6 +360,7 @@ NavigationRun navigate_with(const Pass& pass, const CalibrationOptions& options,
     throw SetupError("no attitude: no fix could be used to start from");
   }
   run.statistics = statistics_of(run.fixes);
+  run.verdict = judge_navigation(run);
   return run;
 }
 

@@ -7,7 +7,9 @@
 #include <boost/math/distributions/chi_squared.hpp>
 #include <cmath>
 #include <limits>
+#include <map>
 #include <numbers>
+#include <utility>
 
 #include "trihedron/core/frames.hpp"
 #include "trihedron/core/telemetry.hpp"
@@ -26,57 +28,76 @@ constexpr double kNisTolerance = 0.05;
 constexpr double kNisWrong = 0.25;
 /// Two nominal alignment accuracies of the system.
 constexpr double kWeakAlignment_rad = 20 * kArcsecond;
+/// One in twenty.
+constexpr double kManyRejected = 0.05;
+constexpr double kBadlyPlacedSine = 0.5;
 /// The paper: alignment settles within one orbit.
 constexpr double kOneOrbit_s = 90 * 60;
 
-double statistic(const CalibrationRun& run, const char* name) {
-  const auto found = run.calibration.statistics.find(name);
-  return found == run.calibration.statistics.end() ? 0 : found->second;
+using Statistics = std::map<std::string, double>;
+
+double statistic(const Statistics& statistics, const char* name) {
+  const auto found = statistics.find(name);
+  return found == statistics.end() ? 0 : found->second;
 }
 
-void judge_number_of_fixes(const Pass& pass, const CalibrationRun& run, std::vector<Finding>& findings) {
-  const double used = statistic(run, "fixes_used");
+void add(std::vector<Finding>& findings, Severity severity, std::string code, std::string text, std::string evidence,
+         std::string cure) {
+  findings.push_back({std::move(code), std::move(text), std::move(evidence), std::move(cure), severity});
+}
+
+Verdict verdict_of(std::vector<Finding> findings) {
+  Verdict verdict;
+  verdict.findings = std::move(findings);
+  verdict.trustworthy = std::none_of(verdict.findings.begin(), verdict.findings.end(),
+                                     [](const Finding& f) { return f.severity == Severity::kDoNotUse; });
+  return verdict;
+}
+
+void judge_number_of_fixes(const Statistics& statistics, std::vector<Finding>& findings) {
+  const double used = statistic(statistics, "fixes_used");
   if (used < 100) {
-    findings.push_back({"too-few-fixes", fmt::format("Only {:.0f} star-tracker fixes could be used.", used),
-                        fmt::format("{:.0f} fixes in the telemetry", statistic(run, "fixes")),
-                        "Calibrate on a longer pass, or find out why the fixes were rejected.", Severity::kDoNotUse});
+    add(findings, Severity::kDoNotUse, "too-few-fixes",
+        fmt::format("Only {:.0f} star-tracker fixes could be used.", used),
+        fmt::format("{:.0f} fixes in the telemetry", statistic(statistics, "fixes")),
+        "Calibrate on a longer pass, or find out why the fixes were rejected.");
   }
-  const double span_s = pass.gyro.t.empty() ? 0 : to_seconds(pass.gyro.t.back() - pass.gyro.t.front());
+}
+
+void judge_length(const Pass& pass, std::vector<Finding>& findings) {
+  const double span_s = to_seconds(pass.gyro.t.back() - pass.gyro.t.front());
   if (span_s < kOneOrbit_s) {
-    findings.push_back({"short-pass",
-                        "The pass is shorter than one orbit: alignment and drift coefficients are not yet told apart.",
-                        fmt::format("{:.0f} min of telemetry", span_s / 60),
-                        "Alignment takes about one orbit, drift coefficients two to three.", Severity::kWarning});
+    add(findings, Severity::kWarning, "short-pass",
+        "The pass is shorter than one orbit: alignment and drift coefficients are not yet told apart.",
+        fmt::format("{:.1f} min of telemetry", span_s / 60),
+        "Alignment takes about one orbit, drift coefficients two to three.");
   }
 }
 
-void judge_rejections(const CalibrationRun& run, std::vector<Finding>& findings) {
-  const double outliers = statistic(run, "fixes_rejected_as_outliers");
-  const double fixes = statistic(run, "fixes");
-  if (outliers > 0.05 * fixes) {
-    findings.push_back(
-        {"many-rejected", fmt::format("{:.1f} % of the fixes were rejected as outliers.", 100 * outliers / fixes),
-         fmt::format("{:.0f} of {:.0f}", outliers, fixes),
-         "More than one in twenty is seldom the tracker alone: look for a clock offset, a wrong noise figure or drift "
-         "outside the model.",
-         outliers > 0.5 * fixes ? Severity::kDoNotUse : Severity::kWarning});
+void judge_rejections(const Statistics& statistics, std::vector<Finding>& findings) {
+  const double outliers = statistic(statistics, "fixes_rejected_as_outliers");
+  const double fixes = statistic(statistics, "fixes");
+  if (outliers > kManyRejected * fixes) {
+    add(findings, outliers > 0.5 * fixes ? Severity::kDoNotUse : Severity::kWarning, "many-rejected",
+        fmt::format("{:.1f} % of the fixes were rejected as outliers.", 100 * outliers / fixes),
+        fmt::format("{:.0f} of {:.0f}", outliers, fixes),
+        "This is seldom the tracker alone: look for a clock offset, a wrong noise figure or drift outside the model.");
   }
-  if (const double reopened = statistic(run, "reopened"); reopened > 0) {
-    findings.push_back(
-        {"reopened", "The filter lost the momenta and had to be set free: the drift model did not hold between fixes.",
-         fmt::format("{:.0f} times, each after {} rejections in a row", reopened, run.options.reopen_after_rejections),
-         "Raise the process noise, or look for a gap, a jump of the tracker or drift outside the model there.",
-         Severity::kWarning});
+  if (const double reopened = statistic(statistics, "reopened"); reopened > 0) {
+    add(findings, Severity::kWarning, "reopened",
+        "The filter lost the momenta and had to set them free: the model did not hold between fixes.",
+        fmt::format("{:.0f} time(s), each after a run of rejections", reopened),
+        "Raise the process noise, or look there for a gap, a jump of the tracker or drift outside the model.");
   }
 }
 
-void judge_nis(const CalibrationRun& run, std::vector<Finding>& findings) {
-  const double count = statistic(run, "nis_count");
-  const double freedom = statistic(run, "nis_degrees_of_freedom");
+void judge_nis(const Statistics& statistics, const std::string& what_is_wrong, std::vector<Finding>& findings) {
+  const double count = statistic(statistics, "nis_count");
+  const double freedom = statistic(statistics, "nis_degrees_of_freedom");
   if (count < 1) {
     return;
   }
-  const double nis = statistic(run, "nis_mean");
+  const double nis = statistic(statistics, "nis_mean");
   const boost::math::chi_squared sum(freedom * count);
   const double low = boost::math::quantile(sum, 0.0005) / count;
   const double high = boost::math::quantile(boost::math::complement(sum, 0.0005)) / count;
@@ -85,74 +106,60 @@ void judge_nis(const CalibrationRun& run, std::vector<Finding>& findings) {
   }
   const bool above = nis > freedom;
   const bool wrong = nis > freedom * (1 + kNisWrong) || nis < freedom * (1 - kNisWrong);
-  findings.push_back(
-      {"nis-out-of-bounds",
-       above
-           ? "The fixes scatter more than the filter expects: its model is incomplete or the noise is understated, and "
-             "its sigmas are too small."
-           : "The fixes scatter less than the filter expects: the noise is overstated, and its sigmas are too large.",
-       fmt::format("mean NIS {:.3f} over {:.0f} fixes; 99.9 % of consistent filters lie in {:.3f} … {:.3f}", nis, count,
-                   low, high),
-       above
-           ? "Look for a tracker clock offset, an error at orbital period, drift outside the model; correct the noise "
-             "figures or raise the process noise."
-           : "Correct the noise figures in pass.toml.",
-       wrong ? Severity::kDoNotUse : Severity::kWarning});
+  add(findings, wrong ? Severity::kDoNotUse : Severity::kWarning, "nis-out-of-bounds",
+      above ? "The fixes scatter more than the filter expects: " + what_is_wrong + ", and its sigmas are too small."
+            : "The fixes scatter less than the filter expects: the noise is overstated, and its sigmas are too large.",
+      fmt::format("mean NIS {:.3f} over {:.0f} fixes; 99.9 % of consistent filters lie in {:.3f} … {:.3f}", nis, count,
+                  low, high),
+      above ? "Look for a tracker clock offset, an error at orbital period or drift outside the model; correct the "
+              "noise figures or "
+              "raise the process noise."
+            : "Correct the noise figures in pass.toml.");
 }
 
-void judge_determination(const Pass& pass, const CalibrationRun& run, std::vector<Finding>& findings) {
-  // Against the first sigmas after the start, which are those of the prior.
-  const auto& history = run.parameters;
-  if (history.sigma.empty()) {
-    return;
-  }
+void judge_determination(const CalibrationRun& run, std::vector<Finding>& findings) {
+  // The first fix tells nothing of the parameters: its sigmas are those of the prior.
   std::string names;
   for (std::size_t i = 0; i < run.calibration.states.size(); ++i) {
     const auto row = static_cast<Eigen::Index>(i);
     const double sigma = std::sqrt(run.calibration.covariance(row, row));
-    if (sigma > 0.5 * history.sigma.front()[i]) {
+    if (sigma > 0.5 * run.parameters.sigma.front()[i]) {
       names += (names.empty() ? "" : ", ") + run.calibration.states[i];
     }
   }
   if (!names.empty()) {
-    findings.push_back({"not-determined",
-                        "The data do not determine: " + names + ". Their values and sigmas are those of the prior.",
-                        "posterior sigma above half of the prior sigma",
-                        "Fly slews during the calibration, or a longer pass.", Severity::kWarning});
-  }
-
-  const auto observability = alignment_observability(pass.star_tracker, pass.settings.star_tracker_noise_rad,
-                                                     pass.settings.star_tracker_noise_rad.minCoeff());
-  if (observability.sigma_rad > kWeakAlignment_rad) {
-    const Eigen::Vector3d& axis = observability.weakest_axis_c;
-    findings.push_back(
-        {"weak-alignment-axis",
-         fmt::format("Steady flight: the body turns about one axis, ({:+.3f}, {:+.3f}, {:+.3f}) in c, which is fixed "
-                     "in the body and in "
-                     "space. Each gyro's alignment about it cannot be told from that gyro's initial direction. "
-                     "Estimator {} takes noise "
-                     "for information there: its sigmas about this axis are too small. The attitude itself does not "
-                     "suffer while the "
-                     "flight stays steady.",
-                     axis.x(), axis.y(), axis.z(), run.options.estimator),
-         fmt::format("at best {:.0f}″ about this axis from the fixes alone", observability.sigma_rad / kArcsecond),
-         "Fly slews about the other axes during the calibration; ten minutes of 10° and more suffice.",
-         Severity::kDoNotUse});
+    add(findings, Severity::kWarning, "not-determined",
+        "The data do not determine " + names + "; value and sigma are about those of the prior.",
+        "posterior sigma above half of the prior sigma", "Calibrate on a longer pass, with slews.");
   }
 }
 
-void judge_pair(const CalibrationRun& run, std::vector<Finding>& findings) {
-  if (run.calibration.gyros.size() < 2) {
+void judge_steadiness(const Pass& pass, const CalibrationRun& run, std::vector<Finding>& findings) {
+  const Eigen::Vector3d& noise = pass.settings.star_tracker_noise_rad;
+  const auto observability = alignment_observability(pass.star_tracker, noise, noise.minCoeff());
+  if (observability.sigma_rad <= kWeakAlignment_rad) {
     return;
   }
+  const Eigen::Vector3d& axis = observability.weakest_axis_c;
+  add(findings, Severity::kDoNotUse, "weak-alignment-axis",
+      fmt::format("Steady flight: the axis ({:+.3f}, {:+.3f}, {:+.3f}) in c is fixed in the body and in space, so the "
+                  "alignment of each "
+                  "gyro about it cannot be told from its initial direction. Estimator {} takes noise for information "
+                  "there: do not "
+                  "believe its sigmas about this axis. The attitude does not suffer while the flight stays steady.",
+                  axis.x(), axis.y(), axis.z(), run.options.estimator),
+      fmt::format("at best {:.0f}″ about this axis from the fixes alone", observability.sigma_rad / kArcsecond),
+      "Fly slews about the other axes during the calibration: ten minutes of 10° and more suffice.");
+}
+
+void judge_pair(const CalibrationRun& run, std::vector<Finding>& findings) {
   const double angle =
       angle_between<double>(run.calibration.gyros[0].momentum_in, run.calibration.gyros[1].momentum_in);
-  if (std::sin(angle) < 0.5) {
-    findings.push_back(
-        {"pair-badly-placed",
-         "The momenta lie within 30° of one line: the attitude about them is worse than the readout by 1/sinθ.",
-         fmt::format("angle {:.1f}°, factor {:.1f}", angle * 180 / std::numbers::pi, 1 / std::sin(angle)),
-         "Start one rotor along another axis.", Severity::kWarning});
+  if (std::sin(angle) < kBadlyPlacedSine) {
+    add(findings, Severity::kWarning, "pair-badly-placed",
+        "The momenta lie within 30° of one line: the attitude about them is worse than the readout by 1/sinθ.",
+        fmt::format("angle {:.1f}°, factor {:.1f}", angle * 180 / std::numbers::pi, 1 / std::sin(angle)),
+        "Start one rotor along another axis.");
   }
 }
 
@@ -183,15 +190,23 @@ AlignmentObservability alignment_observability(const StarTrackerTelemetry& track
 }
 
 Verdict judge(const Pass& pass, const CalibrationRun& run) {
-  Verdict verdict;
-  judge_number_of_fixes(pass, run, verdict.findings);
-  judge_rejections(run, verdict.findings);
-  judge_nis(run, verdict.findings);
-  judge_determination(pass, run, verdict.findings);
-  judge_pair(run, verdict.findings);
-  verdict.trustworthy = std::none_of(verdict.findings.begin(), verdict.findings.end(),
-                                     [](const Finding& f) { return f.severity == Severity::kDoNotUse; });
-  return verdict;
+  std::vector<Finding> findings;
+  const Statistics& statistics = run.calibration.statistics;
+  judge_number_of_fixes(statistics, findings);
+  judge_length(pass, findings);
+  judge_rejections(statistics, findings);
+  judge_nis(statistics, "its model is incomplete or the noise is understated", findings);
+  judge_determination(run, findings);
+  judge_steadiness(pass, run, findings);
+  judge_pair(run, findings);
+  return verdict_of(std::move(findings));
+}
+
+Verdict judge_navigation(const NavigationRun& run) {
+  std::vector<Finding> findings;
+  judge_rejections(run.statistics, findings);
+  judge_nis(run.statistics, "the calibration in use does not fit this pass, or the model is incomplete", findings);
+  return verdict_of(std::move(findings));
 }
 
 }  // namespace trihedron::ground

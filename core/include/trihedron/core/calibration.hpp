@@ -54,7 +54,7 @@ struct CalibrationSetup {
   int reopen_after_rejections = 20;
 
   [[nodiscard]] bool noise_is_positive() const {
-    bool positive = star_tracker_noise_rad.minCoeff() > 0 && direction_random_walk_rad_sqrt_s >= 0;
+    bool positive = (star_tracker_noise_rad.array() > 0).all() && direction_random_walk_rad_sqrt_s >= 0;
     for (const double noise : readout_noise_rad) {
       positive = positive && noise > 0;
     }
@@ -75,6 +75,10 @@ enum class FixStatus : std::uint8_t {
   kRejectedByGate,       ///< NIS above the gate
 };
 
+[[nodiscard]] constexpr bool is_used(FixStatus status) {
+  return status == FixStatus::kStarted || status == FixStatus::kUsed || status == FixStatus::kUsedAfterReopening;
+}
+
 /// Eq. (3), components 2–5, at one fix, and what was done with it.
 template <int M>
 struct FixReport {
@@ -85,24 +89,22 @@ struct FixReport {
   double nis = 0;  ///< innovation² over its covariance; M degrees of freedom
   int rejections_in_a_row = 0;
 
-  [[nodiscard]] bool used() const {
-    return status == FixStatus::kStarted || status == FixStatus::kUsed || status == FixStatus::kUsedAfterReopening;
-  }
+  [[nodiscard]] bool used() const { return is_used(status); }
 };
 
-/// Upper triangular-free square root of the information in `covariance`: rootᵀ root = covariance⁻¹.
+/// Some square root of the information in `covariance`: rootᵀ root = covariance⁻¹.
 template <int P>
 [[nodiscard]] Result<Eigen::Matrix<double, P, P>, SetupFault> information_root(
     const Eigen::Matrix<double, P, P>& covariance) {
   // Scaled to unit diagonal first: the states differ by 1e6 in size.
   const Eigen::Matrix<double, P, 1> sigma = covariance.diagonal().cwiseSqrt();
-  if (!(sigma.minCoeff() > 0) || !sigma.allFinite()) {
+  if (!(sigma.array() > 0).all() || !sigma.allFinite()) {
     return SetupFault::kPriorNotPositiveDefinite;
   }
   const Eigen::Matrix<double, P, P> correlation =
       sigma.cwiseInverse().asDiagonal() * covariance * sigma.cwiseInverse().asDiagonal();
   const Eigen::LLT<Eigen::Matrix<double, P, P>> factor(correlation);
-  if (!(factor.info() == Eigen::Success) || !(factor.matrixLLT().diagonal().minCoeff() > 1e-12)) {
+  if (!(factor.info() == Eigen::Success) || !(factor.matrixLLT().diagonal().array() > 1e-12).all()) {
     return SetupFault::kPriorNotPositiveDefinite;
   }
   Eigen::Matrix<double, P, P> root = sigma.cwiseInverse().asDiagonal();

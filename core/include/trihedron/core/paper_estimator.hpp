@@ -66,19 +66,31 @@ class PaperEstimator {
   /// Square root of the covariance of the errors at the last fix, rows as in ErrorLayout. Needs started().
   [[nodiscard]] ErrorRoot error_root() const;
 
- private:
-  using Information = SquareRootInformation<Layout::kStates, Layout::kDynamic>;
-  using MeasurementMatrix = typename Information::template Rows<kMeasurements>;
-  using Innovation = Eigen::Matrix<double, kMeasurements, 1>;
-  using InnovationCovariance = Eigen::Matrix<double, kMeasurements, kMeasurements>;
-
-  /// Tangent bases of both momenta in the quasi-inertial frame on given directions, in `in` components.
+  /// The paper's components of direction errors: tangent bases of both momenta in the quasi-inertial frame, in `in`
+  /// components.
   struct QuasiInertial {
     PerGyro<Eigen::Matrix<double, 2, 3>, kGyros> components;  ///< the paper's two components of each Δh
     PerGyro<Eigen::Matrix<double, 3, 2>, kGyros> tangents;  ///< back: Δh = tangents · components · Δh for Δh across h
-    double sine = 1;
+    double sine = 1;                                        ///< of the angle between the momenta
   };
   [[nodiscard]] static QuasiInertial quasi_inertial(const Trihedron<In>& t);
+
+  using Innovation = Eigen::Matrix<double, kMeasurements, 1>;
+  using MeasurementMatrix = Eigen::Matrix<double, kMeasurements, Layout::kStates>;
+  using InnovationCovariance = Eigen::Matrix<double, kMeasurements, kMeasurements>;
+
+  /// Eq. (3), components 2–5 with the sign turned: y = h_et − h_R = H x + noise, noise covariance R. The tracker's
+  /// error is common to all four components, each readout's to its own two.
+  struct Measurement {
+    Innovation innovation = Innovation::Zero();
+    MeasurementMatrix H = MeasurementMatrix::Zero();
+    InnovationCovariance R = InnovationCovariance::Zero();
+  };
+  [[nodiscard]] static Measurement measure(const Gyros& gyros, const QuasiInertial& qi, const Eigen::Matrix3d& C_in_c,
+                                           const Directions& h_b, const Setup& setup);
+
+ private:
+  using Information = SquareRootInformation<Layout::kStates, Layout::kDynamic>;
 
   void update_covariance_to_now(const QuasiInertial& now);
   void feed_back(const typename Information::Vector& correction);

@@ -25,13 +25,12 @@ void rotate_into(Eigen::MatrixBase<Root>& root, Eigen::MatrixBase<Extra>& extra,
     const S alpha = diagonal > S(0) ? -norm : norm;
     const S v0 = diagonal - alpha;
     const S beta = S(-1) / (alpha * v0);
-    const auto rest = root.cols() - 1 - j;
     const Eigen::Matrix<S, Extra::RowsAtCompileTime, 1> v = extra.col(j);
-    // One row of scratch for the reflection; its maximal size is known, so it lives on the stack.
-    const Eigen::Matrix<S, 1, Eigen::Dynamic, Eigen::RowMajor, 1, Root::ColsAtCompileTime> s =
-        beta * (v0 * root.row(j).tail(rest) + v.transpose().lazyProduct(extra.rightCols(rest)));
-    root.row(j).tail(rest) -= v0 * s;
-    extra.rightCols(rest) -= v.lazyProduct(s);
+    for (int k = j + 1; k < root.cols(); ++k) {
+      const S s = beta * (v0 * root(j, k) + v.dot(extra.col(k)));
+      root(j, k) -= v0 * s;
+      extra.col(k) -= s * v;
+    }
     root(j, j) = alpha;
     extra.col(j).setZero();
   }
@@ -55,7 +54,7 @@ class SquareRootInformation {
 
   /// Adds the prior of the constants: `root` with rootᵀ root their information matrix, of any shape.
   void add_prior_of_constants(const Eigen::Matrix<S, N - D, N - D>& root) {
-    Eigen::Matrix<S, N - D, N + 1, Eigen::RowMajor> extra;
+    Eigen::Matrix<S, N - D, N + 1> extra;
     extra.setZero();
     extra.template block<N - D, N - D>(0, D) = root;
     rotate_into(root_, extra, N);
@@ -65,7 +64,7 @@ class SquareRootInformation {
   void propagate(const DynamicMatrix& A, const DynamicByConstants& B, const DynamicMatrix& L) {
     // Rows of R with x_d(before) = A⁻¹ (x_d(after) − B x_c − L w) put in: columns are w, x_d(after), x_c. Then w is
     // eliminated.
-    Eigen::Matrix<S, D, D + N, Eigen::RowMajor> moved;
+    Eigen::Matrix<S, D, D + N> moved;
     const DynamicMatrix R_d =
         root_.template topLeftCorner<D, D>().template triangularView<Eigen::Upper>() * A.inverse();
     moved.template leftCols<D>() = -R_d * L;
@@ -91,7 +90,7 @@ class SquareRootInformation {
   /// regular() after it.
   template <int M>
   [[nodiscard]] Vector update(const Rows<M>& H, const Eigen::Matrix<S, M, 1>& y) {
-    Eigen::Matrix<S, M, N + 1, Eigen::RowMajor> extra;
+    Eigen::Matrix<S, M, N + 1> extra;
     extra.template leftCols<N>() = H;
     extra.col(N) = y;
     rotate_into(root_, extra, N);

@@ -12,21 +12,10 @@
 #include "trihedron/core/calibration.hpp"
 #include "trihedron/core/cycle.hpp"
 #include "trihedron/records/calibration.hpp"
+#include "trihedron/records/options.hpp"
 #include "trihedron/records/pass.hpp"
 
 namespace trihedron::ground {
-
-/// What a user may set; the effective values are written beside each result.
-struct CalibrationOptions {
-  std::string estimator = "paper";
-  std::string drift_model = "esg7";
-  /// Process noise of each momentum across itself. The default is small against the readout, and lets go of 0.1″ in 9
-  /// h.
-  double direction_random_walk_rad_sqrt_s = 3e-9;
-  double gate_nis = 30;
-  int reopen_after_rejections = 20;
-  CorrectionPolicy corrections;
-};
 
 /// One fix: eq. (3), components 2–5, and what was done with it.
 struct FixRecord {
@@ -36,6 +25,8 @@ struct FixRecord {
   std::array<double, 4> innovation_sigma{};  ///< rad
   double nis = 0;
   bool corrected_navigator = false;
+
+  [[nodiscard]] bool used() const { return is_used(status); }
 };
 
 /// Estimates after each fix, for the figures of the paper: one row per used fix, columns as in Calibration::states.
@@ -57,6 +48,10 @@ struct CalibrationRun {
   std::map<std::string, long> samples;     ///< gyro samples by what was done with them
   std::map<std::string, long> fix_counts;  ///< fixes by what was done with them
 };
+
+/// What `CalibrationOptions::estimator` and `drift_model` may name.
+inline constexpr std::array<const char*, 1> kEstimators = {"paper"};
+inline constexpr std::array<const char*, 1> kDriftModels = {"esg7"};
 
 /// Called now and then with the fraction done, 0 … 1.
 using Progress = std::function<void(double)>;

@@ -6,6 +6,8 @@ namespace trihedron::ground {
 
 /// What a user must know before he uses the result: findings with evidence and cure, and one word, trustworthy or not.
 [[nodiscard]] Verdict judge(const Pass& pass, const CalibrationRun& run);
+/// Whether the parameters in use fit the pass.
+[[nodiscard]] Verdict judge_navigation(const NavigationRun& run);
 
 /// How well an attitude history separates an alignment from an initial direction. Where an axis n is fixed in the body
 /// and in space, an alignment error about n looks like an error of the initial direction about n, whatever the number
