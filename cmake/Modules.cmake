@@ -7,6 +7,8 @@
 # trihedron_test(<module> <file.cpp>… [LIBRARIES …])
 #   makes the Google Test program <module>_test, linked with the module if there is one of that name, and registers its tests as
 #   <module>.<Suite>.<Name>.
+# trihedron_pytest(<name> <file.py>)
+#   registers the tests of a Python file as one test; they find the build directory in TRIHEDRON_BUILD.
 
 set(TRIHEDRON_core_MAY_USE)
 set(TRIHEDRON_records_MAY_USE core)
@@ -51,4 +53,10 @@ function(trihedron_test module)
   endif()
   target_link_libraries(${module}_test PRIVATE ${arg_LIBRARIES} GTest::gmock GTest::gtest_main rapidcheck trihedron_warnings)
   gtest_discover_tests(${module}_test TEST_PREFIX ${module}. DISCOVERY_TIMEOUT 60 PROPERTIES TIMEOUT 300)
+endfunction()
+
+function(trihedron_pytest name file)
+  add_test(NAME ${name}.pytest COMMAND ${TRIHEDRON_PYTHON} -m pytest -q -p no:cacheprovider ${file})
+  set_tests_properties(${name}.pytest PROPERTIES TIMEOUT 900
+    ENVIRONMENT "TRIHEDRON_BUILD=${PROJECT_BINARY_DIR};PYTHONDONTWRITEBYTECODE=1")
 endfunction()

@@ -1,0 +1,61 @@
+# For users: `make demo`, `make test`. Everything else is CMake; see CMakePresets.json.
+SHELL := bash
+JOBS ?= $(shell nproc)
+BUILD := build
+SOURCES := $(shell git ls-files '*.cpp' '*.hpp' 2>/dev/null)
+
+.PHONY: help setup build demo test bench format lint sanitize coverage install clean
+
+help:
+	@echo 'make demo     install what is missing, build, calibrate the example pass, say where the report is'
+	@echo 'make test     build and run all tests'
+	@echo 'make build    leaves the program at $(BUILD)/trihedron'
+	@echo 'make bench    measure: steps of the cycle, reading of a pass'
+	@echo 'make install  into PREFIX (default /usr/local)'
+	@echo 'make setup | format | lint | sanitize | coverage | clean'
+
+setup:
+	@cmake/setup.sh
+
+build: setup
+	cmake --preset release $(CMAKE_FLAGS)
+	cmake --build $(BUILD) --parallel $(JOBS)
+
+demo: build
+	@rm -rf out/demo
+	$(BUILD)/trihedron inspect examples/pass.nc
+	$(BUILD)/trihedron calibrate examples/pass.nc -o out/demo
+	@echo
+	@echo "The report is at out/demo/report.html"
+
+test: build
+	ctest --test-dir $(BUILD) --output-on-failure --parallel $(JOBS)
+
+bench: build
+	$(BUILD)/trihedron_bench
+
+sanitize: setup
+	cmake --preset asan-ubsan $(CMAKE_FLAGS)
+	cmake --build build-asan-ubsan --parallel $(JOBS)
+	ctest --test-dir build-asan-ubsan --output-on-failure --parallel $(JOBS) -LE slow
+
+coverage: setup
+	cmake --preset coverage $(CMAKE_FLAGS)
+	cmake --build build-coverage --parallel $(JOBS) --target core_test core_no_heap_test
+	ctest --test-dir build-coverage --output-on-failure -R '^core'
+	gcovr --root . --filter 'core/(include|src)/' --exclude-throw-branches --exclude-unreachable-branches \
+	  --fail-under-line 95 --print-summary build-coverage
+
+format:
+	clang-format -i $(SOURCES)
+
+lint: setup
+	clang-format --dry-run --Werror $(SOURCES)
+	test -f $(BUILD)/compile_commands.json || cmake --preset release $(CMAKE_FLAGS)
+	git ls-files '*.cpp' | grep -v /test/ | xargs -P $(JOBS) -n 1 clang-tidy --quiet --warnings-as-errors='*' -p $(BUILD)
+
+install: build
+	cmake --install $(BUILD) $(if $(PREFIX),--prefix $(PREFIX))
+
+clean:
+	rm -rf build build-* out

@@ -1,0 +1,149 @@
+#include <fmt/core.h>
+
+#include <filesystem>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "commands.hpp"
+#include "progress.hpp"
+#include "summary.hpp"
+#include "trihedron/io/atomic_file.hpp"
+#include "trihedron/io/attitude.hpp"
+#include "trihedron/io/calibration.hpp"
+#include "trihedron/io/config.hpp"
+#include "trihedron/io/error.hpp"
+#include "trihedron/io/quantity.hpp"
+#include "trihedron/io/residuals.hpp"
+#include "trihedron/report/report.hpp"
+
+namespace trihedron::cli {
+namespace {
+
+struct Arguments {
+  std::string pass;
+  std::string out;
+  std::string estimator;
+  std::string drift_model;
+  std::string config;
+};
+
+std::vector<io::Table> residual_tables(const ground::CalibrationRun& run) {
+  io::Table fixes{"fixes", {}, {}};
+  for (const char* component : {"gyro1_1", "gyro1_3", "gyro2_1", "gyro2_2"}) {
+    fixes.columns.push_back({fmt::format("innovation_{}", component),
+                             "rad",
+                             fmt::format("innovation of eq. (3), gyro and component in qi: {}", component),
+                             {}});
+    fixes.columns.push_back({fmt::format("innovation_{}_sigma", component), "rad", "its 1-sigma by the filter", {}});
+  }
+  fixes.columns.push_back({"nis", "1", "normalised innovation squared, 4 degrees of freedom", {}});
+  fixes.columns.push_back({"used", "1", "1 used, 0 rejected", {}});
+  for (const ground::FixRecord& fix : run.fixes) {
+    fixes.t.push_back(fix.t);
+    for (std::size_t i = 0; i < fix.innovation.size(); ++i) {
+      fixes.columns[2 * i].values.push_back(fix.innovation[i]);
+      fixes.columns[2 * i + 1].values.push_back(fix.innovation_sigma[i]);
+    }
+    fixes.columns[8].values.push_back(fix.nis);
+    fixes.columns[9].values.push_back(fix.used() ? 1 : 0);
+  }
+
+  io::Table parameters{"parameters", run.parameters.t, {}};
+  for (std::size_t i = 0; i < run.calibration.states.size(); ++i) {
+    const std::string& state = run.calibration.states[i];
+    std::string name = state;
+    name[name.find('.')] = '_';
+    const char* unit = state.find("align") == std::string::npos ? "rad s-1" : "rad";
+    std::vector<double> value;
+    std::vector<double> sigma;
+    for (std::size_t row = 0; row < run.parameters.t.size(); ++row) {
+      value.push_back(run.parameters.value[row][i]);
+      sigma.push_back(run.parameters.sigma[row][i]);
+    }
+    parameters.columns.push_back({name, unit, "estimate of " + state + " after the fix", std::move(value)});
+    parameters.columns.push_back({name + "_sigma", unit, "its 1-sigma", std::move(sigma)});
+  }
+
+  io::Table angle{"angle", run.angle_t, {}};
+  angle.columns.push_back({"residual_min", "1", "z1 of eq. (3), least of 3 s", run.angle_residual_min});
+  angle.columns.push_back({"residual_max", "1", "z1 of eq. (3), greatest of 3 s", run.angle_residual_max});
+  return {fixes, parameters, angle};
+}
+
+int run(const Arguments& arguments, const Common& common) {
+  CalibrationOptions options;
+  if (!arguments.config.empty()) {
+    options = io::read_config(arguments.config);
+  }
+  if (!arguments.estimator.empty()) {
+    options.estimator = arguments.estimator;
+  }
+  if (!arguments.drift_model.empty()) {
+    options.drift_model = arguments.drift_model;
+  }
+  const io::LoadedPass loaded = io::read_pass(arguments.pass);
+  const std::filesystem::path out = arguments.out;
+  io::make_directory(out);
+
+  ground::CalibrationRun result;
+  {
+    ProgressBar bar("calibrate", common.quiet);
+    result = ground::calibrate(loaded.pass, options, bar.meter());
+  }
+  const Time epoch = loaded.pass.settings.epoch;
+  const auto truth = io::read_truth(arguments.pass);
+  const double limit_rad = io::parse_angle_rad("5arcmin");
+  const Evaluation navigation = evaluate(result.navigation, loaded.pass, truth, limit_rad);
+  const Evaluation attitude = evaluate(result.attitude, loaded.pass, truth, limit_rad);
+
+  io::write_calibration(out / "calibration.json", result.calibration);
+  io::write_attitude(out / "attitude.csv", epoch, result.attitude);
+  io::write_residuals(out / "residuals.nc", epoch, residual_tables(result));
+  io::write_file(out / "effective-config.toml", io::format_config(options));
+
+  report::ReportInput input{loaded.pass, result, truth ? &*truth : nullptr, {}, {}};
+  input.evaluation = report::Evaluation{"the " + navigation.reference, navigation.errors, attitude.errors,
+                                        navigation.intervals, limit_rad};
+  for (const io::Defect& defect : loaded.defects) {
+    input.telemetry_notes.push_back(defect.text());
+  }
+  io::write_file(out / "report.html", report::render(input));
+
+  if (common.json) {
+    nlohmann::ordered_json json = {
+        {"pass", pass_json(loaded)},
+        {"calibration", nlohmann::ordered_json::parse(io::format_calibration(result.calibration))},
+        {"fixes", result.fix_counts},
+        {"samples", result.samples},
+        {"navigation", evaluation_json(navigation, epoch)},
+        {"attitude", evaluation_json(attitude, epoch)}};
+    fmt::print("{}\n", json.dump(1));
+  } else if (!common.quiet) {
+    fmt::print(
+        "{}{}{}\n{}\n{}\nWritten     {}: calibration.json attitude.csv residuals.nc report.html "
+        "effective-config.toml\n",
+        pass_text(loaded), verdict_text(result.calibration.verdict), calibration_text(result, truth),
+        evaluation_text(navigation, epoch, "Navigator, corrected every 90 min,"),
+        evaluation_text(attitude, epoch, "Attitude of the calibration itself"), out.string());
+  }
+  return result.calibration.verdict.trustworthy ? kTrustworthy : kDoNotUse;
+}
+
+}  // namespace
+
+void add_calibrate(CLI::App& program, const Common& common, int& exit_status) {
+  auto arguments = std::make_shared<Arguments>();
+  CLI::App* command =
+      program.add_subcommand("calibrate", "Calibrate drift and alignment of the gyros against the star tracker");
+  command->add_option("PASS", arguments->pass, "Directory or NetCDF file")->required();
+  command->add_option("-o,--output", arguments->out, "Directory to write into")->required();
+  command->add_option("--estimator", arguments->estimator, "Estimator")
+      ->check(CLI::IsMember(std::vector<std::string>(ground::kEstimators.begin(), ground::kEstimators.end())));
+  command->add_option("--drift-model", arguments->drift_model, "Drift model")
+      ->check(CLI::IsMember(std::vector<std::string>(ground::kDriftModels.begin(), ground::kDriftModels.end())));
+  command->add_option("--config", arguments->config, "Settings (TOML); see effective-config.toml of any run");
+  command->callback([&common, &exit_status, arguments] { exit_status = run(*arguments, common); });
+}
+
+}  // namespace trihedron::cli

@@ -1,0 +1,26 @@
+#include <fmt/core.h>
+
+#include <memory>
+#include <string>
+
+#include "commands.hpp"
+#include "summary.hpp"
+
+namespace trihedron::cli {
+
+void add_inspect(CLI::App& program, const Common& common, int& exit_status) {
+  auto pass = std::make_shared<std::string>();
+  CLI::App* command = program.add_subcommand("inspect", "Say what a pass holds and what is wrong with its telemetry");
+  command->add_option("PASS", *pass, "Directory or NetCDF file")->required();
+  command->callback([&common, &exit_status, pass] {
+    const io::LoadedPass loaded = io::read_pass(*pass);
+    if (common.json) {
+      fmt::print("{}\n", pass_json(loaded).dump(1));
+    } else if (!common.quiet) {
+      fmt::print("{}{}", pass_text(loaded), loaded.defects.empty() ? "            no defects\n" : "");
+    }
+    exit_status = kTrustworthy;
+  });
+}
+
+}  // namespace trihedron::cli

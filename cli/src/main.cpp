@@ -1,0 +1,57 @@
+#include <fmt/core.h>
+
+#include <exception>
+#include <new>
+
+#include "commands.hpp"
+#include "trihedron/ground/calibrate.hpp"
+#include "trihedron/io/error.hpp"
+
+namespace {
+
+int fail(int status, const char* message) {
+  fmt::print(stderr, "trihedron: {}\n", message);
+  return status;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  using namespace trihedron;
+  int exit_status = cli::kWrongUsage;
+  try {
+    CLI::App program("Calibrates electrostatic gyros in flight against a star tracker, and gives the attitude.",
+                     "trihedron");
+    program.set_version_flag("--version", TRIHEDRON_VERSION);
+    program.require_subcommand(1);
+    program.fallthrough();
+    cli::Common common;
+    program.add_flag("--quiet", common.quiet, "Print nothing but errors");
+    program.add_flag("--json", common.json, "Print the summary as JSON");
+    cli::add_inspect(program, common, exit_status);
+    cli::add_calibrate(program, common, exit_status);
+    cli::add_navigate(program, common, exit_status);
+    cli::add_evaluate(program, common, exit_status);
+    try {
+      program.parse(argc, argv);
+    } catch (const CLI::ParseError& error) {
+      if (error.get_exit_code() == 0) {  // --help, --version
+        return program.exit(error);
+      }
+      return fail(cli::kWrongUsage, fmt::format("{}; see trihedron --help", error.what()).c_str());
+    }
+    return exit_status;
+  } catch (const io::UsageError& error) {
+    return fail(cli::kWrongUsage, error.what());
+  } catch (const io::InputRefused& error) {
+    return fail(cli::kInputRefused, error.what());
+  } catch (const ground::SetupError& error) {
+    return fail(cli::kInputRefused, error.what());
+  } catch (const io::MachineFailed& error) {
+    return fail(cli::kMachineFailed, error.what());
+  } catch (const std::bad_alloc&) {
+    return fail(cli::kMachineFailed, "out of memory; free some, or use a shorter pass");
+  } catch (const std::exception& error) {
+    return fail(cli::kMachineFailed, error.what());
+  }
+}

@@ -1,0 +1,80 @@
+#include <fmt/core.h>
+
+#include <memory>
+#include <string>
+
+#include "commands.hpp"
+#include "progress.hpp"
+#include "summary.hpp"
+#include "trihedron/io/attitude.hpp"
+#include "trihedron/io/calibration.hpp"
+#include "trihedron/io/config.hpp"
+#include "trihedron/io/error.hpp"
+#include "trihedron/io/quantity.hpp"
+
+namespace trihedron::cli {
+namespace {
+
+struct Arguments {
+  std::string pass;
+  std::string calibration;
+  bool online = false;
+  std::string interval = "90min";
+  std::string attitude;
+  std::string config;
+};
+
+int run(const Arguments& arguments, const Common& common) {
+  CalibrationOptions options;
+  if (!arguments.config.empty()) {
+    options = io::read_config(arguments.config);
+  }
+  options.corrections = io::parse_correction_interval(arguments.interval);
+  options.corrections.take_parameters = arguments.online;
+  io::LoadedPass loaded = io::read_pass(arguments.pass);
+  if (!arguments.online) {
+    loaded.pass.settings.prior = io::read_calibration(arguments.calibration);
+    options.estimator = loaded.pass.settings.prior->estimator;
+  }
+  ground::NavigationRun result;
+  {
+    ProgressBar bar("navigate", common.quiet);
+    result = ground::navigate(loaded.pass, options, bar.meter());
+  }
+  const Time epoch = loaded.pass.settings.epoch;
+  io::write_attitude(arguments.attitude, epoch, result.attitude);
+  const Evaluation evaluation =
+      evaluate(result.attitude, loaded.pass, io::read_truth(arguments.pass), io::parse_angle_rad("5arcmin"));
+  if (common.json) {
+    nlohmann::ordered_json json = {{"pass", pass_json(loaded)},
+                                   {"verdict", verdict_json(result.verdict)},
+                                   {"statistics", result.statistics},
+                                   {"evaluation", evaluation_json(evaluation, epoch)}};
+    fmt::print("{}\n", json.dump(1));
+  } else if (!common.quiet) {
+    fmt::print("{}{}\n{}\nWritten     {}: {} epochs\n", pass_text(loaded), verdict_text(result.verdict),
+               evaluation_text(evaluation, epoch, "Attitude error"), arguments.attitude, result.attitude.size());
+  }
+  return result.verdict.trustworthy ? kTrustworthy : kDoNotUse;
+}
+
+}  // namespace
+
+void add_navigate(CLI::App& program, const Common& common, int& exit_status) {
+  auto arguments = std::make_shared<Arguments>();
+  CLI::App* command = program.add_subcommand("navigate", "Give the attitude at every gyro sample");
+  command->add_option("PASS", arguments->pass, "Directory or NetCDF file")->required();
+  CLI::Option_group* source = command->add_option_group("parameters");
+  source->add_option("--calibration", arguments->calibration, "Hold the values of a calibration.json");
+  source->add_flag("--online", arguments->online, "Calibrate along, and take over the estimates at each correction");
+  source->require_option(1);
+  command
+      ->add_option("--correction-interval", arguments->interval,
+                   "Time between astro-corrections: a duration, none or continuous")
+      ->capture_default_str();
+  command->add_option("--config", arguments->config, "Estimator settings (TOML)");
+  command->add_option("-o,--output", arguments->attitude, "Attitude file to write (CSV)")->required();
+  command->callback([&common, &exit_status, arguments] { exit_status = run(*arguments, common); });
+}
+
+}  // namespace trihedron::cli

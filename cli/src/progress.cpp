@@ -1,0 +1,32 @@
+#include "progress.hpp"
+
+#include <fmt/core.h>
+#include <unistd.h>
+
+#include <cstdio>
+#include <utility>
+
+namespace trihedron::cli {
+
+ProgressBar::ProgressBar(std::string what, bool quiet)
+    : what_(std::move(what)), shown_(!quiet && isatty(STDERR_FILENO) == 1) {}
+
+ProgressBar::~ProgressBar() {
+  if (shown_) {
+    fmt::print(stderr, "\r\033[K");
+  }
+}
+
+std::function<void(double)> ProgressBar::meter() {
+  if (!shown_) {
+    return {};
+  }
+  return [this](double fraction) {
+    constexpr int kWidth = 40;
+    const int full = static_cast<int>(fraction * kWidth);
+    fmt::print(stderr, "\r{} [{:=<{}}{: <{}}] {:3.0f} %", what_, "", full, "", kWidth - full, 100 * fraction);
+    std::fflush(stderr);
+  };
+}
+
+}  // namespace trihedron::cli

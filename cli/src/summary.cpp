@@ -1,0 +1,210 @@
+#include "summary.hpp"
+
+#include <fmt/format.h>
+
+#include <Eigen/Geometry>
+#include <chrono>
+#include <cmath>
+#include <iterator>
+#include <numbers>
+
+#include "trihedron/io/time_text.hpp"
+
+namespace trihedron::cli {
+namespace {
+
+constexpr double kArcsecond = std::numbers::pi / 180 / 3600;
+constexpr double kArcminute = 60 * kArcsecond;
+constexpr Duration kStretch = std::chrono::minutes(90);
+
+double minutes(Duration d) { return to_seconds(d) / 60; }
+
+/// An angle in the unit that suits its size.
+std::string angle_text(double rad) {
+  return std::abs(rad) < 100 * kArcsecond ? fmt::format("{:.2f}″", rad / kArcsecond)
+                                          : fmt::format("{:.2f}′", rad / kArcminute);
+}
+
+nlohmann::ordered_json axes_json(const Eigen::Vector3d& rad) {
+  return {{"roll_rad", rad.x()}, {"pitch_rad", rad.y()}, {"heading_rad", rad.z()}};
+}
+
+nlohmann::ordered_json statistics_json(const ground::ErrorStatistics& s, Time epoch) {
+  nlohmann::ordered_json json = {
+      {"from_s", to_seconds(s.from - epoch)}, {"to_s", to_seconds(s.to - epoch)}, {"epochs", s.count},
+      {"rms", axes_json(s.rms_rad)},          {"max", axes_json(s.max_rad)},      {"max_total_rad", s.max_total_rad}};
+  if (s.normalised_square) {
+    json["normalised_square"] = *s.normalised_square;
+  }
+  return json;
+}
+
+}  // namespace
+
+Evaluation evaluate(const AttitudeHistory& attitude, const Pass& pass, const std::optional<Truth>& truth,
+                    double limit_rad) {
+  Evaluation result;
+  result.reference = truth ? "truth" : "star tracker";
+  result.errors = truth ? ground::attitude_errors(attitude, truth->t, truth->q_in_c)
+                        : ground::attitude_errors(attitude, pass.star_tracker.t, pass.star_tracker.q_in_c);
+  result.whole = ground::statistics(result.errors);
+  result.stretches = ground::statistics_by_stretch(result.errors, pass.settings.epoch, kStretch);
+  result.limit_rad = limit_rad;
+  result.intervals = ground::correction_intervals(result.errors, limit_rad);
+  return result;
+}
+
+std::string pass_text(const io::LoadedPass& loaded) {
+  const PassSettings& settings = loaded.pass.settings;
+  std::string text;
+  auto out = std::back_inserter(text);
+  fmt::format_to(out, "Pass        {}, {} TAI, {:.1f} min\n", settings.spacecraft, io::format_epoch(settings.epoch),
+                 minutes(settings.duration));
+  fmt::format_to(out, "Telemetry   {} samples of {} gyros, {} fixes\n", loaded.pass.gyro.size(), loaded.pass.gyro.gyros,
+                 loaded.pass.star_tracker.size());
+  for (const io::Defect& defect : loaded.defects) {
+    fmt::format_to(out, "            {}\n", defect.text());
+  }
+  return text;
+}
+
+std::string verdict_text(const Verdict& verdict) {
+  std::string text = fmt::format("Verdict     {}\n", verdict.trustworthy ? "trustworthy" : "DO NOT USE");
+  for (const Finding& finding : verdict.findings) {
+    fmt::format_to(std::back_inserter(text), "  {:<20}{}\n{:22}{}\n{:22}→ {}\n", finding.code, finding.text, "",
+                   finding.evidence, "", finding.cure);
+  }
+  return text;
+}
+
+std::string calibration_text(const ground::CalibrationRun& run, const std::optional<Truth>& truth) {
+  std::string text;
+  auto out = std::back_inserter(text);
+  const Calibration& calibration = run.calibration;
+  Eigen::Index state = 0;
+  for (std::size_t k = 0; k < calibration.gyros.size(); ++k) {
+    const GyroCalibration& gyro = calibration.gyros[k];
+    fmt::format_to(out, "\nGyro {}      {:>18} {:>12}{}\n", k + 1, "value", "1σ", truth ? "         error" : "");
+    const auto sigma = [&] { return std::sqrt(calibration.covariance(state, state)); };
+    for (std::size_t i = 0; i < gyro.drift_rad_s.size(); ++i, ++state) {
+      const auto& [name, value] = gyro.drift_rad_s[i];
+      fmt::format_to(out, "  {:<8} {:>+13.4e} rad/s {:>12.1e}", name, value, sigma());
+      if (truth) {
+        fmt::format_to(out, " {:>+13.1e}", truth->gyros[k].drift_rad_s[i].second - value);
+      }
+      text += '\n';
+    }
+    const Eigen::Vector3d lambda = gyro.alignment_rotation_vector_rad;
+    Eigen::Vector3d error = Eigen::Vector3d::Zero();
+    if (truth) {
+      // C_c_b(true) = exp([δ×]) C_c_b(est)
+      error = (Rot<C, B<1>>::exp(Vec<C>::assume(truth->gyros[k].alignment_rotation_vector_rad)) *
+               Rot<C, B<1>>::exp(Vec<C>::assume(lambda)).inverse())
+                  .log()
+                  .raw();
+    }
+    for (int axis = 0; axis < 3; ++axis, ++state) {
+      fmt::format_to(out, "  align_{:<2} {:>+13.4f} ′     {:>11.2f}″", std::string(1, "xyz"[axis]),
+                     lambda(axis) / kArcminute, sigma() / kArcsecond);
+      if (truth) {
+        fmt::format_to(out, " {:>+12.2f}″", error(axis) / kArcsecond);
+      }
+      text += '\n';
+    }
+  }
+  const auto statistic = [&](const std::string& name) {
+    const auto found = calibration.statistics.find(name);
+    return found == calibration.statistics.end() ? std::nan("") : found->second;
+  };
+  text += "\nFixes      ";
+  for (const auto& [name, count] : run.fix_counts) {
+    fmt::format_to(out, " {} {};", count, name);
+  }
+  text.back() = '\n';
+  text += "Samples    ";
+  for (const auto& [name, count] : run.samples) {
+    fmt::format_to(out, " {} {};", count, name);
+  }
+  text.back() = '\n';
+  fmt::format_to(out, "Residuals   rms");
+  for (int i = 1; i <= 4; ++i) {
+    fmt::format_to(out, " {:.2f}″", statistic(fmt::format("innovation_{}_rms_rad", i)) / kArcsecond);
+  }
+  fmt::format_to(out, "; mean NIS {:.3f} ({:.0f} expected)\n", statistic("nis_mean"),
+                 statistic("nis_degrees_of_freedom"));
+  return text;
+}
+
+std::string evaluation_text(const Evaluation& evaluation, Time epoch, const std::string& title) {
+  std::string text = fmt::format("{} against the {}\n", title, evaluation.reference);
+  auto out = std::back_inserter(text);
+  if (evaluation.errors.t.empty()) {
+    return text + "  no common epochs\n";
+  }
+  fmt::format_to(out, "  {:>13} {:>10} {:>10} {:>10} {:>12} {:>13}\n", "minutes", "roll rms", "pitch rms", "head. rms",
+                 "largest", "(error/σ)²");
+  const auto row = [&](const std::string& name, const ground::ErrorStatistics& s) {
+    fmt::format_to(out, "  {:>13} {:>10} {:>10} {:>10} {:>12} {:>13}\n", name, angle_text(s.rms_rad.x()),
+                   angle_text(s.rms_rad.y()), angle_text(s.rms_rad.z()), angle_text(s.max_total_rad),
+                   s.normalised_square ? fmt::format("{:.2f}", *s.normalised_square) : "");
+  };
+  for (const auto& s : evaluation.stretches) {
+    row(fmt::format("{:.0f} … {:.0f}", minutes(s.from - epoch), minutes(s.to - epoch)), s);
+  }
+  row("all", evaluation.whole);
+  for (const auto& interval : evaluation.intervals) {
+    fmt::format_to(out, "  corrected at {:>6.1f} min: {}, largest {}\n", minutes(interval.corrected - epoch),
+                   interval.passed ? fmt::format("passed {} after {:.1f} min", angle_text(evaluation.limit_rad),
+                                                 minutes(*interval.passed))
+                                   : fmt::format("within {} for all of {:.1f} min", angle_text(evaluation.limit_rad),
+                                                 minutes(interval.observed)),
+                   angle_text(interval.max_total_rad));
+  }
+  return text;
+}
+
+nlohmann::ordered_json pass_json(const io::LoadedPass& loaded) {
+  const PassSettings& settings = loaded.pass.settings;
+  nlohmann::ordered_json json = {
+      {"spacecraft", settings.spacecraft},           {"epoch_tai", io::format_epoch(settings.epoch)},
+      {"duration_s", to_seconds(settings.duration)}, {"gyros", loaded.pass.gyro.gyros},
+      {"gyro_samples", loaded.pass.gyro.size()},     {"fixes", loaded.pass.star_tracker.size()},
+      {"defects", nlohmann::ordered_json::array()}};
+  for (const io::Defect& defect : loaded.defects) {
+    nlohmann::ordered_json item = {
+        {"kind", io::name_of(defect.kind)}, {"where", defect.where}, {"count", defect.count}};
+    item["text"] = defect.text();
+    json["defects"].push_back(item);
+  }
+  return json;
+}
+
+nlohmann::ordered_json verdict_json(const Verdict& verdict) {
+  nlohmann::ordered_json json = {{"trustworthy", verdict.trustworthy}, {"findings", nlohmann::ordered_json::array()}};
+  for (const Finding& finding : verdict.findings) {
+    json["findings"].push_back(
+        {{"code", finding.code}, {"text", finding.text}, {"evidence", finding.evidence}, {"cure", finding.cure}});
+  }
+  return json;
+}
+
+nlohmann::ordered_json evaluation_json(const Evaluation& evaluation, Time epoch) {
+  nlohmann::ordered_json json = {{"reference", evaluation.reference},
+                                 {"whole", statistics_json(evaluation.whole, epoch)},
+                                 {"per_90_min", nlohmann::ordered_json::array()},
+                                 {"limit_rad", evaluation.limit_rad},
+                                 {"corrections", nlohmann::ordered_json::array()}};
+  for (const auto& s : evaluation.stretches) {
+    json["per_90_min"].push_back(statistics_json(s, epoch));
+  }
+  for (const auto& interval : evaluation.intervals) {
+    nlohmann::ordered_json item = {{"t_s", to_seconds(interval.corrected - epoch)},
+                                   {"observed_s", to_seconds(interval.observed)},
+                                   {"max_total_rad", interval.max_total_rad}};
+    item["passed_limit_after_s"] = interval.passed ? nlohmann::ordered_json(to_seconds(*interval.passed)) : nullptr;
+    json["corrections"].push_back(item);
+  }
+  return json;
+}
+
+}  // namespace trihedron::cli

@@ -1,0 +1,77 @@
+#pragma once
+/// Passes as files: a directory with pass.toml, gyro.csv and star_tracker.csv, or one NetCDF-4 file with the same
+/// variables.
+
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "trihedron/core/time.hpp"
+#include "trihedron/records/pass.hpp"
+
+namespace trihedron::io {
+
+/// Where something was seen.
+struct Place {
+  std::int64_t line = 0;    ///< of the CSV file, from 1; 0 in a NetCDF file
+  std::int64_t sample = 0;  ///< of the table, from 0, as the file has it
+  double t_s = 0;           ///< as the file has it; NaN where it has none
+};
+
+/// One kind of dirt in one table, with its count and first places. Nothing is left out of a Pass without one.
+struct Defect {
+  enum class Kind {
+    kMissingTime,      ///< left out
+    kTimeOutsidePass,  ///< left out: more than a period before the epoch or after the end
+    kRepeatedTime,     ///< left out: the first of equal times stays
+    kBackwardTime,     ///< left out: as few as possible, so that the times of the others increase
+    kTruncatedLine,    ///< left out: the last line was cut short
+    kMissingValue,     ///< kept: NaN, infinity or an empty field in a component
+    kZeroNorm,         ///< kept
+    kWrongNorm,        ///< kept: off 1 by more than 1e-3
+    kSignFlip,         ///< kept: q changes hemisphere between neighbouring fixes
+    kStuckSamples,     ///< kept: one gyro's direction is identical for 8 samples or more; counts the samples
+    kSilentGyro,       ///< kept: no usable direction for a minute or more; counts the stretches
+    kGap,              ///< more than 1.5 periods without a row, at the ends of the pass too; counts the gaps
+  };
+  static constexpr std::size_t kPlaces = 5;
+
+  Kind kind{};
+  std::string where;  ///< "gyro.csv", "gyro.csv, gyro 2", "group star_tracker"
+  std::int64_t count = 0;
+  std::vector<Place> first;  ///< at most kPlaces
+  Duration total{};          ///< of gaps and of stuck and silent stretches
+  Duration longest{};        ///< same
+
+  /// One sentence for a person.
+  [[nodiscard]] std::string text() const;
+};
+
+/// Stable, for programs: "missing-time", "time-outside-pass" …
+[[nodiscard]] const char* name_of(Defect::Kind kind);
+
+struct LoadedPass {
+  Pass pass;
+  std::vector<Defect> defects;
+};
+
+/// Reads a pass and screens its telemetry. Throws InputRefused for what cannot be understood, MachineFailed when the
+/// disk fails. Not to be called from two threads at once for NetCDF.
+[[nodiscard]] LoadedPass read_pass(const std::filesystem::path& path);
+
+/// The truth of a simulated pass; nullopt when there is none. Throws as read_pass, also for any flaw in it.
+[[nodiscard]] std::optional<Truth> read_truth(const std::filesystem::path& path);
+
+struct PassFormat {
+  /// Step of the packed direction cosines in NetCDF; the error is at most half of it. CSV has nine decimals always.
+  double direction_step = 5e-10;
+};
+
+/// Writes a pass: NetCDF-4 when the name ends in .nc, else a directory, replacing the pass that is there with its
+/// truth. `truth` may be null. The prior calibration goes along. Throws MachineFailed when it cannot be written; then
+/// nothing half-written stays.
+void write_pass(const std::filesystem::path& path, const Pass& pass, const Truth* truth, const PassFormat& format = {});
+
+}  // namespace trihedron::io

@@ -1,0 +1,30 @@
+#pragma once
+/// Columns against time in a CF NetCDF-4 file, a group per table: residuals and whatever else is worth plotting.
+
+#include <filesystem>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "trihedron/core/time.hpp"
+
+namespace trihedron::io {
+
+struct Column {
+  std::string name;   ///< of the variable; NetCDF allows letters, digits and _
+  std::string units;  ///< UDUNITS: "1", "rad", "arcsec"
+  std::string long_name;
+  std::vector<double> values;  ///< one per time; NaN where there is none
+};
+
+struct Table {
+  std::string group;
+  std::vector<Time> t;
+  std::vector<Column> columns;
+};
+
+/// `xarray.open_dataset(path, group=...)` reads each table. Columns must be as long as their `t`
+/// (std::invalid_argument). Throws MachineFailed when the file cannot be written; then nothing stays.
+void write_residuals(const std::filesystem::path& path, Time epoch, std::span<const Table> tables);
+
+}  // namespace trihedron::io

@@ -1,0 +1,92 @@
+#include "trihedron/io/attitude.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+
+#include "csv.hpp"
+#include "trihedron/io/atomic_file.hpp"
+#include "trihedron/io/time_text.hpp"
+
+namespace trihedron::io {
+namespace {
+
+[[noreturn]] void refuse(const Series& series, std::size_t row, std::string reason) {
+  throw InputRefused(series.file, series.position(row), std::move(reason), "repair or remove the line");
+}
+
+}  // namespace
+
+AttitudeHistory read_attitude(const std::filesystem::path& path, Time epoch) {
+  constexpr double kNormTolerance = 1e-3;
+  const Series series = read_csv(path, attitude_columns);
+  if (series.cut_line > 0) {
+    throw InputRefused(path, {series.cut_line, 0}, "the last line is cut short", "write the file again");
+  }
+  if (series.rows() == 0) {
+    throw InputRefused(path, {}, "holds no attitude", "give a file with rows");
+  }
+  const auto has = [&](const char* column) { return std::ranges::count(series.columns, column) > 0; };
+  const bool has_sigma = has("sigma_x_rad");
+  const bool has_age = has("age_s");
+  AttitudeHistory attitude;
+  for (std::size_t i = 0; i < series.rows(); ++i) {
+    const double* row = series.row(i);
+    if (!(std::abs(series.t_s[i]) < 1e9)) {
+      refuse(series, i, "t_s is missing or not below 1e9 s");
+    }
+    const Time t = epoch + from_seconds(series.t_s[i]);
+    if (i > 0 && t <= attitude.t.back()) {
+      refuse(series, i, "the time stamp does not increase");
+    }
+    const Eigen::Quaterniond q(row[3], row[0], row[1], row[2]);
+    if (!(std::abs(q.norm() - 1) <= kNormTolerance)) {
+      refuse(series, i, "q is not a unit quaternion");
+    }
+    attitude.t.push_back(t);
+    attitude.q_in_c.push_back(q);
+    if (has_sigma) {
+      const Eigen::Vector3d sigma(row[4], row[5], row[6]);
+      if ((sigma.array() < 0).any()) {
+        refuse(series, i, "a sigma is negative");
+      }
+      attitude.sigma_rad.push_back(sigma);
+    }
+    if (has_age) {
+      attitude.age_s.push_back(row[has_sigma ? 7 : 4]);
+    }
+  }
+  return attitude;
+}
+
+void write_attitude(const std::filesystem::path& path, Time epoch, const AttitudeHistory& attitude) {
+  const bool has_sigma = !attitude.sigma_rad.empty();
+  const bool has_age = !attitude.age_s.empty();
+  if (attitude.q_in_c.size() != attitude.size() || (has_sigma && attitude.sigma_rad.size() != attitude.size()) ||
+      (has_age && attitude.age_s.size() != attitude.size())) {
+    throw std::invalid_argument("the columns of an attitude history differ in length");
+  }
+  fmt::memory_buffer out;
+  constexpr std::size_t kLineLength = 120;
+  out.reserve(attitude.size() * kLineLength);
+  fmt::format_to(fmt::appender(out), "t_s,q_x,q_y,q_z,q_w{}{}\n",
+                 has_sigma ? ",sigma_x_rad,sigma_y_rad,sigma_z_rad" : "", has_age ? ",age_s" : "");
+  for (std::size_t i = 0; i < attitude.size(); ++i) {
+    const Eigen::Quaterniond& q = attitude.q_in_c[i];
+    fmt::format_to(fmt::appender(out), "{},{:.12f},{:.12f},{:.12f},{:.12f}", format_seconds(attitude.t[i] - epoch),
+                   q.x(), q.y(), q.z(), q.w());
+    if (has_sigma) {
+      const Eigen::Vector3d& sigma = attitude.sigma_rad[i];
+      fmt::format_to(fmt::appender(out), ",{:.6e},{:.6e},{:.6e}", sigma.x(), sigma.y(), sigma.z());
+    }
+    if (has_age) {
+      fmt::format_to(fmt::appender(out), ",{:.3f}", attitude.age_s[i]);
+    }
+    out.push_back('\n');
+  }
+  write_file(path, {out.data(), out.size()});
+}
+
+}  // namespace trihedron::io

@@ -1,0 +1,129 @@
+#include "trihedron/io/config.hpp"
+
+#include <fmt/format.h>
+
+#include "text_file.hpp"
+#include "toml_table.hpp"
+#include "trihedron/io/quantity.hpp"
+
+namespace trihedron::io {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// A text with a unit, read by one of the parsers of quantity.hpp.
+template <class Parse>
+auto quantity(const TomlTable& table, const toml::node& node, std::string_view key, Parse&& parse) {
+  const std::string text = node.is_number() ? "" : table.text(node, key);
+  try {
+    if (text.empty()) {
+      throw UsageError(fmt::format("\"{}\" is a bare number; write it as a text with its unit", key));
+    }
+    return parse(text);
+  } catch (const UsageError& error) {
+    table.refuse(node, error.what(), "see effective-config.toml of any run");
+  }
+}
+
+int whole_number(const TomlTable& table, const toml::node& node, std::string_view key) {
+  const auto value = node.value_exact<std::int64_t>();
+  if (!value || *value < 1 || *value > 1'000'000) {
+    table.refuse(node, fmt::format("\"{}\" is not a whole number from 1 to 1000000", key), "give the number of fixes");
+  }
+  return static_cast<int>(*value);
+}
+
+void read_corrections(const TomlTable& table, CorrectionOptions& corrections) {
+  const toml::node* node = table.find("interval");
+  if (node == nullptr) {
+    return;
+  }
+  const std::string text = node->is_number() ? "" : table.text(*node, "interval");
+  try {
+    corrections = parse_correction_interval(text);
+  } catch (const UsageError& error) {
+    table.refuse(*node, error.what(), "write \"90min\", \"none\" or \"continuous\"");
+  }
+}
+
+}  // namespace
+
+CorrectionOptions parse_correction_interval(std::string_view text) {
+  CorrectionOptions corrections;
+  if (text == "none") {
+    corrections.when = CorrectionOptions::When::kOnlyFirst;
+  } else if (text == "continuous") {
+    corrections.when = CorrectionOptions::When::kEachFix;
+  } else {
+    corrections.interval = parse_duration(text);
+    if (!(corrections.interval > Duration::zero())) {
+      throw UsageError("a correction interval must be positive; say continuous to use each fix");
+    }
+  }
+  return corrections;
+}
+
+std::string format_correction_interval(const CorrectionOptions& corrections) {
+  switch (corrections.when) {
+    case CorrectionOptions::When::kOnlyFirst:
+      return "none";
+    case CorrectionOptions::When::kEachFix:
+      return "continuous";
+    case CorrectionOptions::When::kEvery:
+      break;
+  }
+  return format_duration(corrections.interval);
+}
+
+CalibrationOptions read_config(const fs::path& path) {
+  const TextFile file(path);
+  const toml::table document = parse_toml(file.text(), path);
+  const TomlTable root(document, path, "the file", {"estimator", "drift_model", "filter", "corrections"});
+  CalibrationOptions options;
+  if (const toml::node* node = root.find("estimator")) {
+    options.estimator = root.text(*node, "estimator");
+  }
+  if (const toml::node* node = root.find("drift_model")) {
+    options.drift_model = root.text(*node, "drift_model");
+  }
+  if (root.find("filter") != nullptr) {
+    const TomlTable filter(root.table_at("filter"), path, "[filter]",
+                           {"direction_random_walk", "gate_nis", "reopen_after_rejections"});
+    if (const toml::node* node = filter.find("direction_random_walk")) {
+      options.direction_random_walk_rad_sqrt_s =
+          quantity(filter, *node, "direction_random_walk", parse_random_walk_rad_sqrt_s);
+      if (!(options.direction_random_walk_rad_sqrt_s >= 0)) {
+        filter.refuse(*node, "\"direction_random_walk\" is negative", "give zero or more");
+      }
+    }
+    if (const toml::node* node = filter.find("gate_nis")) {
+      options.gate_nis = filter.positive(*node, "gate_nis");
+    }
+    if (const toml::node* node = filter.find("reopen_after_rejections")) {
+      options.reopen_after_rejections = whole_number(filter, *node, "reopen_after_rejections");
+    }
+  }
+  if (root.find("corrections") != nullptr) {
+    read_corrections(TomlTable(root.table_at("corrections"), path, "[corrections]", {"interval"}), options.corrections);
+  }
+  return options;
+}
+
+std::string format_config(const CalibrationOptions& options) {
+  return fmt::format(
+      "# Settings in effect. Give this file to --config to repeat the run.\n"
+      "estimator = \"{}\"\n"
+      "drift_model = \"{}\"\n"
+      "\n"
+      "[filter]\n"
+      "direction_random_walk = \"{}\"  # process noise of each momentum, per axis across it\n"
+      "gate_nis = {}  # a fix with a larger normalised innovation squared is rejected\n"
+      "reopen_after_rejections = {}  # in a row; then the directions are set free and the fix is used\n"
+      "\n"
+      "[corrections]\n"
+      "interval = \"{}\"  # of the open-loop navigator: a duration, none or continuous\n",
+      options.estimator, options.drift_model, format_random_walk(options.direction_random_walk_rad_sqrt_s),
+      options.gate_nis, options.reopen_after_rejections, format_correction_interval(options.corrections));
+}
+
+}  // namespace trihedron::io

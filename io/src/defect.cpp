@@ -1,0 +1,76 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "trihedron/io/pass.hpp"
+
+namespace trihedron::io {
+namespace {
+
+struct Words {
+  const char* name;
+  const char* one;
+  const char* many;
+  const char* consequence;
+};
+
+Words words(Defect::Kind kind) {
+  using enum Defect::Kind;
+  switch (kind) {
+    case kMissingTime:
+      return {"missing-time", "row without a time stamp", "rows without a time stamp", "left out"};
+    case kTimeOutsidePass:
+      return {"time-outside-pass", "row with a time outside the pass", "rows with a time outside the pass", "left out"};
+    case kRepeatedTime:
+      return {"repeated-time", "row that repeats a time stamp", "rows that repeat a time stamp", "left out"};
+    case kBackwardTime:
+      return {"backward-time", "row out of order in time", "rows out of order in time", "left out"};
+    case kTruncatedLine:
+      return {"truncated-line", "last line that is cut short", "last lines that are cut short", "left out"};
+    case kMissingValue:
+      return {"missing-value", "row with a missing value", "rows with a missing value",
+              "kept for the estimator to reject"};
+    case kZeroNorm:
+      return {"zero-norm", "row with a zero vector", "rows with a zero vector", "kept for the estimator to reject"};
+    case kWrongNorm:
+      return {"wrong-norm", "row whose norm is not 1", "rows whose norm is not 1", "kept for the estimator to judge"};
+    case kSignFlip:
+      return {"sign-flip", "sign flip of the quaternion", "sign flips of the quaternion", "harmless"};
+    case kStuckSamples:
+      return {"stuck-samples", "stuck sample", "stuck samples", "kept for the estimator to judge"};
+    case kSilentGyro:
+      return {"silent-gyro", "stretch of silence", "stretches of silence", "kept for the estimator to reject"};
+    case kGap:
+      return {"gap", "gap", "gaps", "not filled"};
+  }
+  return {"defect", "defect", "defects", "kept"};
+}
+
+std::string place_text(const Place& place) {
+  std::string text = place.line > 0 ? fmt::format("line {}", place.line) : fmt::format("sample {}", place.sample);
+  if (std::isfinite(place.t_s)) {
+    text += fmt::format(" (t_s {})", place.t_s);
+  }
+  return text;
+}
+
+}  // namespace
+
+const char* name_of(Defect::Kind kind) { return words(kind).name; }
+
+std::string Defect::text() const {
+  constexpr std::size_t kShown = 3;
+  const Words said = words(kind);
+  std::string text = fmt::format("{}: {} {}", where, count, count == 1 ? said.one : said.many);
+  if (total > Duration::zero()) {
+    text += fmt::format(", {:.6g} s in total, the longest {:.6g} s", to_seconds(total), to_seconds(longest));
+  }
+  text += fmt::format(", {}", said.consequence);
+  for (std::size_t i = 0; i < std::min(first.size(), kShown); ++i) {
+    text += fmt::format("{}{}", i == 0 ? (count == 1 ? ": " : "; first: ") : ", ", place_text(first[i]));
+  }
+  return text + ".";
+}
+
+}  // namespace trihedron::io

@@ -1,0 +1,287 @@
+#include "netcdf_file.hpp"
+
+#include <H5public.h>
+#include <fmt/format.h>
+#include <netcdf.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <limits>
+#include <utility>
+
+#include "trihedron/io/atomic_file.hpp"
+#include "trihedron/io/time_text.hpp"
+#include "wording.hpp"
+
+namespace trihedron::io {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr std::int32_t kPackedFill = std::numeric_limits<std::int32_t>::min();
+constexpr const char* kLayoutCure = "write it as `trihedron simulate` does";
+
+/// Whether every value can be packed: NaN can, infinity and outliers beyond 32 bits cannot and must not be lost.
+bool fits(const std::vector<double>& values, double lsb) {
+  const double limit = lsb * std::numeric_limits<std::int32_t>::max();
+  return lsb > 0 && std::ranges::all_of(values, [=](double v) { return std::isnan(v) || std::abs(v) <= limit; });
+}
+
+/// HDF5 below NetCDF tidies up at the end of a program, and crashes there when a full disk kept it from closing a file.
+/// All files of ours are closed by then. To be called before anything else of either library.
+void prepare_library() { [[maybe_unused]] static const herr_t once = H5dont_atexit(); }
+
+}  // namespace
+
+NetcdfReader::NetcdfReader(fs::path file) : file_(std::move(file)) {
+  prepare_library();
+  // Absolute, because the library takes a name with "://" for a web address.
+  const int status = nc_open(fs::absolute(file_).c_str(), NC_NOWRITE, &id_);
+  if (status != NC_NOERR) {
+    refuse(fmt::format("is no NetCDF file that can be read ({})", nc_strerror(status)),
+           "give a pass: a directory with pass.toml, gyro.csv and star_tracker.csv, or a NetCDF-4 file");
+  }
+}
+
+NetcdfReader::~NetcdfReader() { nc_close(id_); }
+
+void NetcdfReader::refuse(std::string reason, std::string cure) const {
+  throw InputRefused(file_, {}, std::move(reason), std::move(cure));
+}
+
+void NetcdfReader::check(int status, const std::string& doing) const {
+  if (status != NC_NOERR) {
+    refuse(fmt::format("{} failed ({})", doing, nc_strerror(status)), "the file is damaged: get it again");
+  }
+}
+
+bool NetcdfReader::has_group(const std::string& group) const {
+  int id = 0;
+  // A file of the classic format, which has no groups, answers with itself.
+  return nc_inq_ncid(id_, group.c_str(), &id) == NC_NOERR && id != id_;
+}
+
+int NetcdfReader::group_id(const std::string& group) const {
+  if (group.empty()) {
+    return id_;
+  }
+  if (!has_group(group)) {
+    refuse(fmt::format("lacks group {}", in_quotes(group)), kLayoutCure);
+  }
+  int id = 0;
+  check(nc_inq_ncid(id_, group.c_str(), &id), "opening a group");
+  return id;
+}
+
+std::optional<std::string> NetcdfReader::text_attribute(const std::string& group, const std::string& name) const {
+  return text_attribute(group_id(group), NC_GLOBAL, name.c_str());
+}
+
+std::optional<std::string> NetcdfReader::text_attribute(int group, int variable, const char* name) const {
+  nc_type type = NC_NAT;
+  std::size_t length = 0;
+  if (nc_inq_att(group, variable, name, &type, &length) != NC_NOERR) {
+    return std::nullopt;
+  }
+  if (type == NC_STRING && length == 1) {  // as h5netcdf writes text
+    char* text = nullptr;
+    check(nc_get_att_string(group, variable, name, &text), fmt::format("reading attribute {}", in_quotes(name)));
+    std::string result(text);
+    nc_free_string(1, &text);
+    return result;
+  }
+  if (type != NC_CHAR) {
+    refuse(fmt::format("attribute {} is not text", in_quotes(name)), kLayoutCure);
+  }
+  std::string result(length, '\0');
+  check(nc_get_att_text(group, variable, name, result.data()), fmt::format("reading attribute {}", in_quotes(name)));
+  return result;
+}
+
+std::optional<double> NetcdfReader::number_attribute(int group, int variable, const char* name) const {
+  std::size_t length = 0;
+  double value = 0;
+  if (nc_inq_attlen(group, variable, name, &length) != NC_NOERR) {
+    return std::nullopt;
+  }
+  if (length != 1 || nc_get_att_double(group, variable, name, &value) != NC_NOERR) {
+    refuse(fmt::format("attribute {} is not a number", in_quotes(name)), kLayoutCure);
+  }
+  return value;
+}
+
+void NetcdfReader::check_time_units(const std::string& group, int id, int variable, Time epoch) const {
+  const std::string units = text_attribute(id, variable, "units").value_or("seconds");
+  constexpr std::string_view kSeconds = "seconds";
+  constexpr std::string_view kSince = "seconds since ";
+  std::string since = units.starts_with(kSince) ? units.substr(kSince.size()) : "";
+  std::ranges::replace(since, ' ', 'T');
+  // A bare date is how xarray writes a midnight.
+  const std::optional<Time> named = parse_epoch(since.size() == 10 ? since + "T00:00:00" : since);
+  if (units != kSeconds && named != epoch) {
+    refuse(fmt::format("group {}: t_s has units {}", in_quotes(group), in_quotes(units)),
+           fmt::format("they must be \"seconds since {}\", the epoch of the pass", format_epoch(epoch)));
+  }
+}
+
+void NetcdfReader::read_column(int id, int variable, std::vector<double>& values) const {
+  check(nc_get_var_double(id, variable, values.data()), "reading a variable");
+  const double scale = number_attribute(id, variable, "scale_factor").value_or(1);
+  const double offset = number_attribute(id, variable, "add_offset").value_or(0);
+  const std::optional<double> fill = number_attribute(id, variable, "_FillValue");
+  for (double& value : values) {
+    value = value == fill ? std::numeric_limits<double>::quiet_NaN() : value * scale + offset;
+  }
+}
+
+Series NetcdfReader::read_group(const std::string& group, Time epoch, ChooseRules choose) const {
+  const int id = group_id(group);
+  int dimension = 0;
+  std::size_t rows = 0;
+  if (nc_inq_dimid(id, kTimeDimension, &dimension) != NC_NOERR || nc_inq_dimlen(id, dimension, &rows) != NC_NOERR) {
+    refuse(fmt::format("group {} lacks dimension \"time\"", in_quotes(group)), kLayoutCure);
+  }
+  int variables = 0;
+  check(nc_inq_nvars(id, &variables), "listing the variables");
+  std::vector<ColumnName> present;
+  std::vector<int> ids;
+  for (int variable = 0; variable < variables; ++variable) {
+    std::array<char, NC_MAX_NAME + 1> name{};
+    check(nc_inq_varname(id, variable, name.data()), "listing the variables");
+    if (std::string_view(name.data()) != kTimeDimension) {  // a coordinate that other tools may add
+      present.push_back({name.data(), {}});
+      ids.push_back(variable);
+    }
+  }
+
+  Series series;
+  series.file = file_;
+  series.name = "group " + group;
+  ColumnPlan plan = plan_columns(fs::path(file_.string() + ":" + group), present, choose);
+  series.columns = std::move(plan.columns);
+  const std::size_t width = series.columns.size();
+  series.t_s.resize(rows);
+  series.values.resize(rows * width);
+  std::vector<double> column(rows);
+  for (std::size_t i = 0; i < present.size(); ++i) {
+    int dimensions = 0;
+    int first = -1;
+    nc_type type = NC_NAT;
+    check(nc_inq_varndims(id, ids[i], &dimensions), "reading the dimensions");
+    if (dimensions == 1) {
+      check(nc_inq_vardimid(id, ids[i], &first), "reading the dimensions");
+    }
+    if (first != dimension) {
+      refuse(fmt::format("group {}: variable {} is not along dimension \"time\" alone", in_quotes(group),
+                         in_quotes(present[i].name)),
+             kLayoutCure);
+    }
+    check(nc_inq_vartype(id, ids[i], &type), "reading a type");
+    if (type == NC_CHAR || type >= NC_STRING) {
+      refuse(fmt::format("group {}: variable {} does not hold numbers", in_quotes(group), in_quotes(present[i].name)),
+             kLayoutCure);
+    }
+    if (plan.target[i] == ColumnPlan::kSkip) {
+      continue;
+    }
+    read_column(id, ids[i], column);
+    if (plan.target[i] == ColumnPlan::kTime) {
+      check_time_units(group, id, ids[i], epoch);
+      series.t_s = column;
+    } else {
+      for (std::size_t row = 0; row < rows; ++row) {
+        series.values[row * width + static_cast<std::size_t>(plan.target[i])] = column[row];
+      }
+    }
+  }
+  return series;
+}
+
+NetcdfWriter::NetcdfWriter(const fs::path& path) : path_(path), file_(path) {
+  prepare_library();
+  if (file_.temporary() == path) {
+    throw MachineFailed(path, "is no regular file", "give the name of a file on a disk: NetCDF needs one");
+  }
+  check(nc_create(fs::absolute(file_.temporary()).c_str(), NC_NETCDF4, &id_));
+}
+
+NetcdfWriter::~NetcdfWriter() {
+  if (id_ >= 0) {
+    nc_close(id_);
+  }
+}
+
+void NetcdfWriter::check(int status) const {
+  if (status != NC_NOERR) {
+    throw MachineFailed(path_, fmt::format("cannot be written: {}", nc_strerror(status)),
+                        "check that the directory may be written and that the disk has room");
+  }
+}
+
+int NetcdfWriter::group_id(const std::string& group) {
+  int id = id_;
+  if (!group.empty() && nc_inq_ncid(id_, group.c_str(), &id) != NC_NOERR) {
+    check(nc_def_grp(id_, group.c_str(), &id));
+  }
+  return id;
+}
+
+void NetcdfWriter::write_attribute(const std::string& group, const std::string& name, const std::string& text) {
+  check(nc_put_att_text(group_id(group), NC_GLOBAL, name.c_str(), text.size(), text.c_str()));
+}
+
+int NetcdfWriter::define(int group, int dimension, const Column& column, bool packed, double lsb) const {
+  constexpr int kShuffle = 1;
+  constexpr int kDeflate = 1;
+  constexpr int kDeflateLevel = 1;
+  int variable = 0;
+  check(nc_def_var(group, column.name.c_str(), packed ? NC_INT : NC_DOUBLE, 1, &dimension, &variable));
+  check(nc_def_var_deflate(group, variable, kShuffle, kDeflate, kDeflateLevel));
+  check(nc_put_att_text(group, variable, "units", column.units.size(), column.units.c_str()));
+  check(nc_put_att_text(group, variable, "long_name", column.long_name.size(), column.long_name.c_str()));
+  if (packed) {
+    check(nc_def_var_fill(group, variable, NC_FILL, &kPackedFill));
+    check(nc_put_att_double(group, variable, "scale_factor", NC_DOUBLE, 1, &lsb));
+  }
+  return variable;
+}
+
+void NetcdfWriter::write_group(const std::string& group, Time epoch, std::span<const Time> t,
+                               std::span<const PackedColumn> columns) {
+  const int id = group_id(group);
+  int dimension = 0;
+  check(nc_def_dim(id, kTimeDimension, t.size(), &dimension));
+
+  Column time{kTimeColumn, "seconds since " + format_epoch(epoch), "time since the epoch of the pass", {}};
+  std::ranges::transform(t, std::back_inserter(time.values), [&](Time at) { return rounded_seconds(at - epoch); });
+  constexpr std::string_view kStandardName = "time";
+  constexpr std::string_view kComment = "time scale TAI: every second is counted, there are no leap seconds";
+  const int time_variable = define(id, dimension, time, false, 0);
+  check(nc_put_att_text(id, time_variable, "standard_name", kStandardName.size(), kStandardName.data()));
+  check(nc_put_att_text(id, time_variable, "comment", kComment.size(), kComment.data()));
+  check(nc_put_var_double(id, time_variable, time.values.data()));
+
+  for (const PackedColumn& column : columns) {
+    const bool packed = fits(column.values, column.lsb);
+    const int variable = define(id, dimension, column, packed, column.lsb);
+    check(nc_put_att_text(id, variable, "coordinates", 3, kTimeColumn));
+    if (packed) {
+      std::vector<std::int32_t> values(column.values.size());
+      std::ranges::transform(column.values, values.begin(), [&](double v) {
+        return std::isnan(v) ? kPackedFill : static_cast<std::int32_t>(std::lround(v / column.lsb));
+      });
+      check(nc_put_var_int(id, variable, values.data()));
+    } else {
+      check(nc_put_var_double(id, variable, column.values.data()));
+    }
+  }
+}
+
+void NetcdfWriter::commit() {
+  check(nc_close(std::exchange(id_, -1)));
+  file_.commit();
+}
+
+}  // namespace trihedron::io

@@ -1,0 +1,282 @@
+#include "trihedron/io/pass.hpp"
+
+#include <fmt/format.h>
+
+#include <system_error>
+#include <utility>
+
+#include "csv.hpp"
+#include "netcdf_file.hpp"
+#include "pass_toml.hpp"
+#include "screening.hpp"
+#include "text_file.hpp"
+#include "trihedron/io/atomic_file.hpp"
+#include "trihedron/io/calibration.hpp"
+#include "trihedron/io/time_text.hpp"
+#include "truth.hpp"
+
+namespace trihedron::io {
+namespace fs = std::filesystem;
+namespace {
+
+// Names in a directory.
+constexpr const char* kSettingsFile = "pass.toml";
+constexpr const char* kGyroFile = "gyro.csv";
+constexpr const char* kStarTrackerFile = "star_tracker.csv";
+constexpr const char* kTruthFile = "truth.csv";
+constexpr const char* kTruthParametersFile = "truth.json";
+constexpr const char* kPriorFile = "prior.json";
+// Names in a NetCDF file.
+constexpr const char* kGyroGroup = "gyro";
+constexpr const char* kStarTrackerGroup = "star_tracker";
+constexpr const char* kTruthGroup = "truth";
+constexpr const char* kSettingsAttribute = "pass_toml";
+constexpr const char* kPriorAttribute = "prior_json";
+constexpr const char* kTruthAttribute = "truth_json";
+
+const std::vector<std::string> kQuaternionNames = {"q_x", "q_y", "q_z", "q_w"};
+
+bool is_netcdf_name(const fs::path& path) { return path.extension() == ".nc"; }
+
+fs::path inside(const fs::path& file, const char* part) { return file.string() + ":" + part; }
+
+void check_there(const fs::path& path) {
+  std::error_code ignored;
+  if (!fs::exists(path, ignored)) {
+    throw InputRefused(path, {}, "there is no such file or directory",
+                       "give a pass: a directory with pass.toml, gyro.csv and star_tracker.csv, or a NetCDF-4 file");
+  }
+}
+
+/// Settings and tables as the format holds them, before any judgement.
+struct RawPass {
+  PassSettings settings;
+  Series gyro;
+  Series star_tracker;
+};
+
+int gyros_of(const Series& gyro) { return static_cast<int>(gyro.columns.size() / 3); }
+
+RawPass read_raw_directory(const fs::path& directory) {
+  const fs::path settings_file = directory / kSettingsFile;
+  const TextFile settings(settings_file);
+  Series gyro = read_csv(directory / kGyroFile, gyro_columns);
+  const int gyros = gyros_of(gyro);
+  return {parse_pass_toml(settings.text(), settings_file, directory, gyros), std::move(gyro),
+          read_csv(directory / kStarTrackerFile, star_tracker_columns)};
+}
+
+std::string required_attribute(const NetcdfReader& reader, const fs::path& file, const char* group, const char* name) {
+  std::optional<std::string> text = reader.text_attribute(group, name);
+  if (!text) {
+    throw InputRefused(file, {}, fmt::format("lacks the attribute \"{}\"", name),
+                       "write it as `trihedron simulate` does");
+  }
+  return *std::move(text);
+}
+
+RawPass read_raw_netcdf(const fs::path& file) {
+  const NetcdfReader reader(file);
+  const std::string settings_text = required_attribute(reader, file, "", kSettingsAttribute);
+  const Time epoch = parse_pass_epoch(settings_text, inside(file, kSettingsAttribute));
+  RawPass raw;
+  raw.gyro = reader.read_group(kGyroGroup, epoch, gyro_columns);
+  raw.star_tracker = reader.read_group(kStarTrackerGroup, epoch, star_tracker_columns);
+  raw.settings =
+      parse_pass_toml(settings_text, inside(file, kSettingsAttribute), file.parent_path(), gyros_of(raw.gyro));
+  if (const auto prior = reader.text_attribute("", kPriorAttribute)) {
+    raw.settings.prior = parse_calibration(*prior, inside(file, kPriorAttribute));
+    check_prior(*raw.settings.prior, inside(file, kPriorAttribute), gyros_of(raw.gyro));
+  }
+  return raw;
+}
+
+/// One row per line, each column with its number of decimals.
+void append_rows(fmt::memory_buffer& out, Time epoch, const std::vector<Time>& t, const std::vector<double>& values,
+                 int decimals) {
+  const std::size_t width = t.empty() ? 0 : values.size() / t.size();
+  out.reserve(t.size() * (12 + width * static_cast<std::size_t>(decimals + 4)));
+  for (std::size_t i = 0; i < t.size(); ++i) {
+    fmt::format_to(fmt::appender(out), "{}", format_seconds(t[i] - epoch));
+    for (std::size_t j = 0; j < width; ++j) {
+      fmt::format_to(fmt::appender(out), ",{:.{}f}", values[i * width + j], decimals);
+    }
+    out.push_back('\n');
+  }
+}
+
+std::string csv_text(Time epoch, const std::vector<std::string>& columns, const std::vector<Time>& t,
+                     const std::vector<double>& values, int decimals) {
+  fmt::memory_buffer out;
+  append_header(out, columns);
+  append_rows(out, epoch, t, values, decimals);
+  return fmt::to_string(out);
+}
+
+std::vector<double> quaternion_values(const std::vector<Eigen::Quaterniond>& quaternions) {
+  std::vector<double> values;
+  values.reserve(quaternions.size() * 4);
+  for (const Eigen::Quaterniond& q : quaternions) {
+    values.insert(values.end(), {q.x(), q.y(), q.z(), q.w()});
+  }
+  return values;
+}
+
+std::vector<std::string> truth_names(const Truth& truth) {
+  std::vector<std::string> names = kQuaternionNames;
+  for (std::string& name : direction_names(static_cast<int>(truth.gyros.size()))) {
+    names.push_back(std::move(name));
+  }
+  return names;
+}
+
+std::vector<double> truth_values(const Truth& truth) {
+  const std::size_t width = truth.gyros.size() * 3;
+  std::vector<double> values;
+  values.reserve(truth.t.size() * (4 + width));
+  for (std::size_t i = 0; i < truth.t.size(); ++i) {
+    const Eigen::Quaterniond& q = truth.q_in_c[i];
+    values.insert(values.end(), {q.x(), q.y(), q.z(), q.w()});
+    const auto h = truth.h_in.begin() + static_cast<std::ptrdiff_t>(i * width);
+    values.insert(values.end(), h, h + static_cast<std::ptrdiff_t>(width));
+  }
+  return values;
+}
+
+void write_directory(const fs::path& directory, const Pass& pass, const Truth* truth) {
+  // The sample passes' decimals: well below the noise of each quantity, the truth's below anything that is judged.
+  constexpr int kGyroDecimals = 9;
+  constexpr int kFixDecimals = 10;
+  constexpr int kTruthDecimals = 12;
+  const Time epoch = pass.settings.epoch;
+  const bool created = make_directory(directory);
+  std::error_code fault;
+  try {
+    std::vector<AtomicFile> files;
+    const auto add = [&](const char* name, const std::string& text) {
+      files.emplace_back(directory / name).write(text);
+    };
+    add(kSettingsFile, format_pass_toml(pass.settings, pass.settings.prior ? kPriorFile : ""));
+    add(kGyroFile, csv_text(epoch, direction_names(pass.gyro.gyros), pass.gyro.t, pass.gyro.h, kGyroDecimals));
+    add(kStarTrackerFile, csv_text(epoch, kQuaternionNames, pass.star_tracker.t,
+                                   quaternion_values(pass.star_tracker.q_in_c), kFixDecimals));
+    if (pass.settings.prior) {
+      add(kPriorFile, format_calibration(*pass.settings.prior));
+    }
+    if (truth != nullptr) {
+      add(kTruthFile, csv_text(epoch, truth_names(*truth), truth->t, truth_values(*truth), kTruthDecimals));
+      add(kTruthParametersFile, format_truth_parameters(*truth));
+    }
+    for (AtomicFile& file : files) {
+      file.commit();
+    }
+  } catch (...) {
+    if (created) {
+      fs::remove(directory, fault);  // only when it is empty again
+    }
+    throw;
+  }
+  if (truth == nullptr) {
+    // The truth of the pass that was here before is not that of this one.
+    fs::remove(directory / kTruthFile, fault);
+    fs::remove(directory / kTruthParametersFile, fault);
+  }
+}
+
+std::string long_name(const std::string& column, bool measured) {
+  if (column.front() == 'q') {
+    return fmt::format("attitude quaternion from star-tracker to inertial axes, {} component (Hamilton)",
+                       column.back());
+  }
+  return fmt::format("direction cosine {} of the angular momentum of gyro {} in {} axes", column.back(),
+                     column.substr(1, column.size() - 3), measured ? "its case" : "inertial");
+}
+
+/// Splits rows into columns.
+std::vector<PackedColumn> columns_of(const std::vector<std::string>& names, const std::vector<double>& values,
+                                     double step, bool measured) {
+  const std::size_t width = names.size();
+  std::vector<PackedColumn> columns(width);
+  for (std::size_t j = 0; j < width; ++j) {
+    columns[j] = {{names[j], "1", long_name(names[j], measured), {}}, step};
+    columns[j].values.reserve(values.size() / width);
+    for (std::size_t k = j; k < values.size(); k += width) {
+      columns[j].values.push_back(values[k]);
+    }
+  }
+  return columns;
+}
+
+void write_netcdf(const fs::path& path, const Pass& pass, const Truth* truth, const PassFormat& format) {
+  const Time epoch = pass.settings.epoch;
+  NetcdfWriter file(path);
+  file.write_attribute("", "Conventions", "CF-1.8");
+  file.write_attribute("", "title", "Telemetry of electrostatic gyros and a star tracker");
+  file.write_attribute("", "spacecraft", pass.settings.spacecraft);
+  file.write_attribute("", "epoch_tai", format_epoch(epoch));
+  file.write_attribute("", kSettingsAttribute, format_pass_toml(pass.settings, ""));
+  if (pass.settings.prior) {
+    file.write_attribute("", kPriorAttribute, format_calibration(*pass.settings.prior));
+  }
+  file.write_group(kGyroGroup, epoch, pass.gyro.t,
+                   columns_of(direction_names(pass.gyro.gyros), pass.gyro.h, format.direction_step, true));
+  file.write_group(kStarTrackerGroup, epoch, pass.star_tracker.t,
+                   columns_of(kQuaternionNames, quaternion_values(pass.star_tracker.q_in_c), 0, true));
+  if (truth != nullptr) {
+    file.write_group(kTruthGroup, epoch, truth->t, columns_of(truth_names(*truth), truth_values(*truth), 0, false));
+    file.write_attribute(kTruthGroup, kTruthAttribute, format_truth_parameters(*truth));
+  }
+  file.commit();
+}
+
+std::optional<Truth> read_truth_netcdf(const fs::path& file) {
+  const NetcdfReader reader(file);
+  if (!reader.has_group(kTruthGroup)) {
+    return std::nullopt;
+  }
+  const std::string parameters = required_attribute(reader, file, kTruthGroup, kTruthAttribute);
+  const std::string settings_text = required_attribute(reader, file, "", kSettingsAttribute);
+  const Time epoch = parse_pass_epoch(settings_text, inside(file, kSettingsAttribute));
+  return make_truth(parameters, inside(file, kTruthAttribute), reader.read_group(kTruthGroup, epoch, truth_columns),
+                    epoch);
+}
+
+std::optional<Truth> read_truth_directory(const fs::path& directory) {
+  const fs::path table = directory / kTruthFile;
+  const fs::path parameters_file = directory / kTruthParametersFile;
+  if (!fs::exists(table) && !fs::exists(parameters_file)) {
+    return std::nullopt;
+  }
+  const TextFile parameters(parameters_file);
+  const Series series = read_csv(table, truth_columns);
+  const fs::path settings_file = directory / kSettingsFile;
+  const TextFile settings(settings_file);
+  return make_truth(parameters.text(), parameters_file, series, parse_pass_epoch(settings.text(), settings_file));
+}
+
+}  // namespace
+
+LoadedPass read_pass(const fs::path& path) {
+  check_there(path);
+  RawPass raw = fs::is_directory(path) ? read_raw_directory(path) : read_raw_netcdf(path);
+  LoadedPass loaded;
+  loaded.pass.gyro = screen_gyro(std::move(raw.gyro), raw.settings, loaded.defects);
+  loaded.pass.star_tracker = screen_star_tracker(std::move(raw.star_tracker), raw.settings, loaded.defects);
+  loaded.pass.settings = std::move(raw.settings);
+  return loaded;
+}
+
+std::optional<Truth> read_truth(const fs::path& path) {
+  check_there(path);
+  return fs::is_directory(path) ? read_truth_directory(path) : read_truth_netcdf(path);
+}
+
+void write_pass(const fs::path& path, const Pass& pass, const Truth* truth, const PassFormat& format) {
+  if (is_netcdf_name(path)) {
+    write_netcdf(path, pass, truth, format);
+  } else {
+    write_directory(path, pass, truth);
+  }
+}
+
+}  // namespace trihedron::io

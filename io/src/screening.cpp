@@ -1,0 +1,306 @@
+#include "screening.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <utility>
+
+namespace trihedron::io {
+namespace {
+
+constexpr double kNormTolerance = 1e-3;
+constexpr std::size_t kStuckSamples = 8;
+constexpr Duration kSilence = std::chrono::minutes(1);
+constexpr Duration kShortestPass = std::chrono::minutes(1);
+constexpr double kGapPeriods = 1.5;
+
+/// Collects one kind of defect of one table.
+class Tally {
+ public:
+  Tally(const Series& series, Defect::Kind kind, std::string where) : series_(series) {
+    defect_.kind = kind;
+    defect_.where = std::move(where);
+  }
+
+  void add(std::size_t row, std::int64_t count = 1) {
+    defect_.count += count;
+    if (defect_.first.size() < Defect::kPlaces) {
+      const double t_s = row < series_.rows() ? series_.t_s[row] : std::numeric_limits<double>::quiet_NaN();
+      defect_.first.push_back({series_.position(row).line, static_cast<std::int64_t>(row), t_s});
+    }
+  }
+  void add_stretch(std::size_t row, std::int64_t count, Duration length) {
+    add(row, count);
+    defect_.total += length;
+    defect_.longest = std::max(defect_.longest, length);
+  }
+  void report(std::vector<Defect>& defects) {
+    if (defect_.count > 0) {
+      defects.push_back(std::move(defect_));
+    }
+  }
+
+ private:
+  const Series& series_;
+  Defect defect_;
+};
+
+/// The rows that stay, and their times.
+struct Kept {
+  std::vector<std::size_t> rows;
+  std::vector<Time> t;
+};
+
+Kept keep_increasing(const Series& series, const PassSettings& settings, Duration period,
+                     std::vector<Defect>& defects) {
+  using enum Defect::Kind;
+  Tally missing(series, kMissingTime, series.name);
+  Tally outside(series, kTimeOutsidePass, series.name);
+  Tally repeated(series, kRepeatedTime, series.name);
+  Tally backward(series, kBackwardTime, series.name);
+
+  const double earliest_s = -to_seconds(period);
+  const double latest_s = to_seconds(settings.duration + period);
+  std::vector<Time> t(series.rows());
+  std::vector<std::size_t> candidates;
+  candidates.reserve(series.rows());
+  for (std::size_t row = 0; row < series.rows(); ++row) {
+    const double t_s = series.t_s[row];
+    if (!std::isfinite(t_s)) {
+      missing.add(row);
+    } else if (t_s < earliest_s || t_s > latest_s) {
+      outside.add(row);
+    } else {
+      t[row] = settings.epoch + from_seconds(t_s);
+      candidates.push_back(row);
+    }
+  }
+
+  Kept kept;
+  kept.rows = longest_increasing(t, candidates);
+  kept.t.reserve(kept.rows.size());
+  for (const std::size_t row : kept.rows) {
+    kept.t.push_back(t[row]);
+  }
+  if (kept.rows.size() < candidates.size()) {
+    std::vector<std::size_t> left_out;
+    std::ranges::set_difference(candidates, kept.rows, std::back_inserter(left_out));
+    for (const std::size_t row : left_out) {
+      (std::ranges::binary_search(kept.t, t[row]) ? repeated : backward).add(row);
+    }
+  }
+
+  Tally truncated(series, kTruncatedLine, series.name);
+  if (series.cut_line > 0) {
+    truncated.add(series.rows());
+  }
+  Tally gaps(series, kGap, series.name);
+  const Duration longest_step(std::llround(static_cast<double>(period.count()) * kGapPeriods));
+  if (!kept.t.empty()) {
+    Time last = settings.epoch;
+    for (std::size_t i = 0; i <= kept.t.size(); ++i) {
+      const Time next = i < kept.t.size() ? kept.t[i] : settings.epoch + settings.duration;
+      if (next - last > longest_step) {
+        gaps.add_stretch(kept.rows[i > 0 ? i - 1 : 0], 1, next - last);
+      }
+      last = next;
+    }
+  }
+  for (Tally* tally : {&missing, &outside, &repeated, &backward, &truncated, &gaps}) {
+    tally->report(defects);
+  }
+  return kept;
+}
+
+/// Leaves the rows that stay, in place.
+void compact(Series& series, const Kept& kept) {
+  const std::size_t width = series.columns.size();
+  if (kept.rows.size() == series.rows()) {
+    return;
+  }
+  for (std::size_t i = 0; i < kept.rows.size(); ++i) {
+    std::copy_n(series.row(kept.rows[i]), width, series.values.begin() + static_cast<std::ptrdiff_t>(i * width));
+  }
+  series.values.resize(kept.rows.size() * width);
+}
+
+enum class Norm { kGood, kMissing, kZero, kWrong };
+
+template <int Size>
+Norm judge_norm(const double* v) {
+  const double norm = Eigen::Map<const Eigen::Matrix<double, Size, 1>>(v).norm();
+  if (!std::isfinite(norm)) {
+    return Norm::kMissing;
+  }
+  if (norm == 0) {
+    return Norm::kZero;
+  }
+  return std::abs(norm - 1) <= kNormTolerance ? Norm::kGood : Norm::kWrong;
+}
+
+/// Tallies of the three ways in which a norm can be bad.
+struct NormTallies {
+  Tally missing;
+  Tally zero;
+  Tally wrong;
+
+  NormTallies(const Series& series, const std::string& where)
+      : missing(series, Defect::Kind::kMissingValue, where),
+        zero(series, Defect::Kind::kZeroNorm, where),
+        wrong(series, Defect::Kind::kWrongNorm, where) {}
+
+  void add(Norm norm, std::size_t row) {
+    switch (norm) {
+      case Norm::kGood:
+        return;
+      case Norm::kMissing:
+        return missing.add(row);
+      case Norm::kZero:
+        return zero.add(row);
+      case Norm::kWrong:
+        return wrong.add(row);
+    }
+  }
+  void report(std::vector<Defect>& defects) {
+    missing.report(defects);
+    zero.report(defects);
+    wrong.report(defects);
+  }
+};
+
+/// Calls `stretch(first, last)` for each run of neighbouring samples of which `joined(i)` says that i belongs to the
+/// run of i − 1.
+template <class Joined, class Stretch>
+void for_each_run(std::size_t size, Joined joined, Stretch stretch) {
+  std::size_t first = 0;
+  for (std::size_t i = 1; i <= size; ++i) {
+    if (i == size || !joined(i)) {
+      stretch(first, i - 1);
+      first = i;
+    }
+  }
+}
+
+void screen_one_gyro(const Series& series, const Kept& kept, std::size_t gyro, std::vector<Defect>& defects) {
+  const std::string where = fmt::format("{}, gyro {}", series.name, gyro + 1);
+  const auto direction = [&](std::size_t i) { return series.row(kept.rows[i]) + gyro * 3; };
+  NormTallies norms(series, where);
+  Tally stuck(series, Defect::Kind::kStuckSamples, where);
+  Tally silent(series, Defect::Kind::kSilentGyro, where);
+
+  const std::size_t size = kept.rows.size();
+  std::vector<char> usable(size);
+  for (std::size_t i = 0; i < size; ++i) {
+    const Norm norm = judge_norm<3>(direction(i));
+    usable[i] = norm == Norm::kGood ? 1 : 0;
+    if (norm != Norm::kGood) {
+      norms.add(norm, kept.rows[i]);
+    }
+  }
+  if (std::ranges::count(usable, 1) == 0) {
+    throw InputRefused(series.file, {},
+                       fmt::format("{} is silent all pass long: not one of its directions is a unit vector", where),
+                       "leave this gyro out, or repair its telemetry");
+  }
+  const auto length = [&](std::size_t first, std::size_t last) { return kept.t[last] - kept.t[first]; };
+  for_each_run(
+      size, [&](std::size_t i) { return usable[i] && std::equal(direction(i), direction(i) + 3, direction(i - 1)); },
+      [&](std::size_t first, std::size_t last) {
+        if (const std::size_t count = last - first + 1; count >= kStuckSamples && usable[first]) {
+          stuck.add_stretch(kept.rows[first], static_cast<std::int64_t>(count), length(first, last));
+        }
+      });
+  for_each_run(
+      size, [&](std::size_t i) { return usable[i] == usable[i - 1]; },
+      [&](std::size_t first, std::size_t last) {
+        if (!usable[first] && length(first, last) >= kSilence) {
+          silent.add_stretch(kept.rows[first], 1, length(first, last));
+        }
+      });
+  norms.report(defects);
+  stuck.report(defects);
+  silent.report(defects);
+}
+
+}  // namespace
+
+std::vector<std::size_t> longest_increasing(const std::vector<Time>& t, std::vector<std::size_t> rows) {
+  const auto not_increasing = [&](std::size_t a, std::size_t b) { return t[a] >= t[b]; };
+  if (std::ranges::adjacent_find(rows, not_increasing) == rows.end()) {
+    return rows;
+  }
+  // Longest increasing subsequence by patience sorting: one wild time stamp costs one row, not all that follow it.
+  constexpr std::size_t kNone = std::numeric_limits<std::size_t>::max();
+  std::vector<std::size_t> tails;  // tails[n]: the row with the earliest time that ends n + 1 increasing ones
+  std::vector<std::size_t> previous(t.size(), kNone);
+  for (const std::size_t row : rows) {
+    const auto place = std::ranges::lower_bound(tails, t[row], {}, [&](std::size_t tail) { return t[tail]; });
+    if (place != tails.end() && t[*place] == t[row]) {
+      continue;
+    }
+    previous[row] = place == tails.begin() ? kNone : *std::prev(place);
+    if (place == tails.end()) {
+      tails.push_back(row);
+    } else {
+      *place = row;
+    }
+  }
+  std::vector<std::size_t> longest;
+  for (std::size_t row = tails.empty() ? kNone : tails.back(); row != kNone; row = previous[row]) {
+    longest.push_back(row);
+  }
+  std::ranges::reverse(longest);
+  return longest;
+}
+
+GyroTelemetry screen_gyro(Series series, const PassSettings& settings, std::vector<Defect>& defects) {
+  Kept kept = keep_increasing(series, settings, settings.gyro_period, defects);
+  if (kept.t.empty()) {
+    throw InputRefused(series.file, {}, fmt::format("{} has no samples with a time inside the pass", series.name),
+                       "give gyro telemetry; check t_s, epoch_tai and duration_s");
+  }
+  if (kept.t.back() - kept.t.front() + settings.gyro_period < kShortestPass) {
+    throw InputRefused(series.file, {}, fmt::format("{} covers less than a minute", series.name),
+                       "give a longer pass: nothing can be calibrated");
+  }
+  const std::size_t gyros = series.columns.size() / 3;
+  for (std::size_t gyro = 0; gyro < gyros; ++gyro) {
+    screen_one_gyro(series, kept, gyro, defects);
+  }
+  compact(series, kept);
+  return {static_cast<int>(gyros), std::move(kept.t), std::move(series.values)};
+}
+
+StarTrackerTelemetry screen_star_tracker(Series series, const PassSettings& settings, std::vector<Defect>& defects) {
+  Kept kept = keep_increasing(series, settings, settings.star_tracker_period, defects);
+  NormTallies norms(series, series.name);
+  Tally flips(series, Defect::Kind::kSignFlip, series.name);
+  StarTrackerTelemetry fixes;
+  std::size_t usable = 0;
+  bool comparable = false;  // over a gap, or after a bad fix, a change of hemisphere can be true motion
+  for (std::size_t i = 0; i < kept.rows.size(); ++i) {
+    const double* row = series.row(kept.rows[i]);
+    const Eigen::Quaterniond q_in_c(row[3], row[0], row[1], row[2]);
+    const Norm norm = judge_norm<4>(row);
+    norms.add(norm, kept.rows[i]);
+    if (norm == Norm::kGood && comparable && kept.t[i] - kept.t[i - 1] < 2 * settings.star_tracker_period &&
+        q_in_c.dot(fixes.q_in_c.back()) < 0) {
+      flips.add(kept.rows[i]);
+    }
+    comparable = norm == Norm::kGood;
+    usable += comparable ? 1 : 0;
+    fixes.q_in_c.push_back(q_in_c);
+  }
+  if (usable == 0) {
+    throw InputRefused(series.file, {}, fmt::format("{} has no fix at all that can be used", series.name),
+                       "give star-tracker telemetry: unit quaternions at times inside the pass");
+  }
+  norms.report(defects);
+  flips.report(defects);
+  fixes.t = std::move(kept.t);
+  return fixes;
+}
+
+}  // namespace trihedron::io

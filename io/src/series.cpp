@@ -1,0 +1,119 @@
+#include "series.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <charconv>
+
+#include "wording.hpp"
+
+namespace trihedron::io {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr int kFewestGyros = 2;
+constexpr int kMostGyros = 4;
+
+/// K of "hK_x", "hK_y", "hK_z"; 0 for any other name.
+int gyro_number(std::string_view name) {
+  if (name.size() < 4 || name.front() != 'h' || name[name.size() - 2] != '_' || name.back() < 'x' ||
+      name.back() > 'z') {
+    return 0;
+  }
+  int number = 0;
+  const char* end = name.data() + name.size() - 2;
+  return std::from_chars(name.data() + 1, end, number).ptr == end ? number : 0;
+}
+
+/// The highest gyro number among the columns.
+int count_gyros(const fs::path& file, std::span<const ColumnName> present) {
+  int gyros = 0;
+  for (const ColumnName& column : present) {
+    gyros = std::max(gyros, gyro_number(column.name));
+    if (gyros > kMostGyros) {
+      throw InputRefused(file, column.position, fmt::format("{} is of a fifth or later gyro", in_quotes(column.name)),
+                         fmt::format("at most {} gyros are handled", kMostGyros));
+    }
+  }
+  if (gyros == 1) {
+    throw InputRefused(file, {}, "has one gyro only", "attitude needs the columns of two gyros, h1_x … h2_z");
+  }
+  return std::max(gyros, kFewestGyros);
+}
+
+const std::vector<std::string> kQuaternion = {"q_x", "q_y", "q_z", "q_w"};
+
+}  // namespace
+
+std::vector<std::string> direction_names(int gyros) {
+  std::vector<std::string> names;
+  for (int gyro = 1; gyro <= gyros; ++gyro) {
+    for (const char axis : {'x', 'y', 'z'}) {
+      names.push_back(fmt::format("h{}_{}", gyro, axis));
+    }
+  }
+  return names;
+}
+
+ColumnRules gyro_columns(const fs::path& file, std::span<const ColumnName> present) {
+  return {direction_names(count_gyros(file, present)), {}};
+}
+
+ColumnRules star_tracker_columns(const fs::path& /*file*/, std::span<const ColumnName> /*present*/) {
+  return {kQuaternion, {}};
+}
+
+ColumnRules truth_columns(const fs::path& file, std::span<const ColumnName> present) {
+  ColumnRules rules{kQuaternion, {}};
+  std::ranges::move(direction_names(count_gyros(file, present)), std::back_inserter(rules.required));
+  return rules;
+}
+
+ColumnRules attitude_columns(const fs::path& /*file*/, std::span<const ColumnName> present) {
+  ColumnRules rules{kQuaternion, {"age_s"}, true};
+  const std::vector<std::string> sigmas = {"sigma_x_rad", "sigma_y_rad", "sigma_z_rad"};
+  // All three or none: one alone would be taken for something else.
+  const bool any =
+      std::ranges::any_of(present, [&](const ColumnName& c) { return std::ranges::count(sigmas, c.name) > 0; });
+  if (any) {
+    std::ranges::copy(sigmas, std::back_inserter(rules.required));
+  }
+  return rules;
+}
+
+ColumnPlan plan_columns(const fs::path& file, std::span<const ColumnName> present, ChooseRules choose) {
+  const ColumnRules rules = choose(file, present);
+  const auto is_present = [&](const std::string& name) {
+    return std::ranges::count(present, name, &ColumnName::name) > 0;
+  };
+
+  ColumnPlan plan{{}, rules.required};
+  std::ranges::copy_if(rules.optional, std::back_inserter(plan.columns), is_present);
+  std::vector<std::string_view> known = {"t_s"};
+  known.insert(known.end(), plan.columns.begin(), plan.columns.end());
+
+  for (std::size_t i = 0; i < present.size(); ++i) {
+    const auto& [name, position] = present[i];
+    const auto found = std::ranges::find(known, name);
+    if (found == known.end() && !rules.others_allowed) {
+      throw InputRefused(file, position, fmt::format("column {} is not known", in_quotes(name)),
+                         suggestion(name, known));
+    }
+    if (found != known.end() && std::ranges::count(present.first(i), name, &ColumnName::name) > 0) {
+      throw InputRefused(file, position, fmt::format("column {} is there twice", in_quotes(name)), "keep one of them");
+    }
+    const auto index = static_cast<int>(found - known.begin());
+    plan.target.push_back(found == known.end() ? ColumnPlan::kSkip : index == 0 ? ColumnPlan::kTime : index - 1);
+  }
+  for (const std::string_view name : known) {
+    if (!is_present(std::string(name))) {
+      throw InputRefused(file, present.empty() ? Position{} : Position{present.front().position.line, 0},
+                         fmt::format("lacks column {}", in_quotes(name)),
+                         fmt::format("its columns must be {}", fmt::join(known, ",")));
+    }
+  }
+  return plan;
+}
+
+}  // namespace trihedron::io

@@ -1,0 +1,67 @@
+#pragma once
+/// A table against time, as any format delivers it; and which columns each table of a pass has.
+
+#include <filesystem>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "trihedron/io/error.hpp"
+
+namespace trihedron::io {
+
+/// One named column and where the file names it.
+struct ColumnName {
+  std::string name;
+  Position position;
+};
+
+/// The columns that a table must and may have beside `t_s`.
+struct ColumnRules {
+  std::vector<std::string> required;
+  std::vector<std::string> optional;
+  bool others_allowed = false;  ///< others are skipped, else refused
+};
+
+/// Rules may depend on what is there: the number of gyros is read off the columns.
+using ChooseRules = ColumnRules (*)(const std::filesystem::path& file, std::span<const ColumnName> present);
+
+ColumnRules gyro_columns(const std::filesystem::path& file, std::span<const ColumnName> present);
+ColumnRules star_tracker_columns(const std::filesystem::path& file, std::span<const ColumnName> present);
+ColumnRules truth_columns(const std::filesystem::path& file, std::span<const ColumnName> present);
+ColumnRules attitude_columns(const std::filesystem::path& file, std::span<const ColumnName> present);
+
+/// "h1_x", "h1_y", "h1_z", "h2_x" …
+[[nodiscard]] std::vector<std::string> direction_names(int gyros);
+
+/// Rows as they stand in the file: nothing is left out, times may be anything.
+struct Series {
+  std::filesystem::path file;
+  std::string name;                  ///< for people: "gyro.csv", "group gyro"
+  std::int64_t first_line = 0;       ///< of the first row; 0 where the format has no lines
+  std::vector<std::string> columns;  ///< in the order of the rules, without t_s
+  std::vector<double> t_s;
+  std::vector<double> values;  ///< row-major, columns.size() per row; NaN where missing
+  std::int64_t cut_line = 0;   ///< of a last line that was cut short and left out; 0 when there is none
+
+  [[nodiscard]] std::size_t rows() const { return t_s.size(); }
+  [[nodiscard]] const double* row(std::size_t i) const { return values.data() + i * columns.size(); }
+  [[nodiscard]] Position position(std::size_t row_index) const {
+    return {first_line > 0 ? first_line + static_cast<std::int64_t>(row_index) : 0, 0};
+  }
+};
+
+/// Where each present column goes.
+struct ColumnPlan {
+  static constexpr int kTime = -1;
+  static constexpr int kSkip = -2;
+  std::vector<int> target;           ///< per present column: index in `columns`, kTime or kSkip
+  std::vector<std::string> columns;  ///< required ones, then the optional ones that are there
+};
+
+/// Throws InputRefused when a column is missing, unknown or there twice.
+[[nodiscard]] ColumnPlan plan_columns(const std::filesystem::path& file, std::span<const ColumnName> present,
+                                      ChooseRules choose);
+
+}  // namespace trihedron::io

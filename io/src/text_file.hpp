@@ -1,0 +1,25 @@
+#pragma once
+/// A whole text file in memory.
+
+#include <filesystem>
+#include <memory>
+#include <string_view>
+
+namespace trihedron::io {
+
+/// The bytes of a file, followed by one '\n' that is not part of them: a parser needs no test for the end within a
+/// line.
+class TextFile {
+ public:
+  /// Throws InputRefused when there is no such file or it may not be read, MachineFailed when reading fails.
+  explicit TextFile(const std::filesystem::path& path);
+
+  [[nodiscard]] std::string_view text() const { return {bytes_.get(), size_}; }
+  [[nodiscard]] bool ends_with_newline() const { return text().ends_with('\n'); }
+
+ private:
+  std::unique_ptr<char[]> bytes_;
+  std::size_t size_ = 0;
+};
+
+}  // namespace trihedron::io

@@ -1,0 +1,126 @@
+#include "toml_table.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "wording.hpp"
+
+namespace trihedron::io {
+namespace {
+
+Position position_of(const toml::source_region& region) {
+  return {static_cast<std::int64_t>(region.begin.line), static_cast<std::int64_t>(region.begin.column)};
+}
+
+std::string type_of(const toml::node& node) {
+  switch (node.type()) {
+    case toml::node_type::table:
+      return "a table";
+    case toml::node_type::array:
+      return "an array";
+    case toml::node_type::string:
+      return "a string";
+    case toml::node_type::integer:
+    case toml::node_type::floating_point:
+      return "a number";
+    case toml::node_type::boolean:
+      return "a boolean";
+    default:
+      return "a date or time";
+  }
+}
+
+}  // namespace
+
+TomlTable::TomlTable(const toml::table& table, std::filesystem::path file, std::string name,
+                     const std::vector<std::string_view>& known)
+    : table_(table), file_(std::move(file)), name_(std::move(name)) {
+  for (const auto& [key, node] : table_) {
+    if (std::ranges::find(known, key.str()) == known.end()) {
+      throw InputRefused(file_, position_of(key.source()),
+                         fmt::format("key {} is not known in {}", in_quotes(key.str()), name_),
+                         suggestion(key.str(), known));
+    }
+  }
+}
+
+const toml::node& TomlTable::at(std::string_view key) const {
+  const toml::node* node = find(key);
+  if (node == nullptr) {
+    refuse(table_, fmt::format("key \"{}\" is missing in {}", key, name_), "add it");
+  }
+  return *node;
+}
+
+const toml::table& TomlTable::as_table(const toml::node& node, std::string_view key) const {
+  const toml::table* table = node.as_table();
+  if (table == nullptr) {
+    refuse(node, fmt::format("\"{}\" is {}", key, type_of(node)), "make it a table");
+  }
+  return *table;
+}
+
+const toml::table& TomlTable::table_at(std::string_view key) const { return as_table(at(key), key); }
+
+std::string TomlTable::text(const toml::node& node, std::string_view key) const {
+  const auto* value = node.as_string();
+  if (value == nullptr) {
+    refuse(node, fmt::format("\"{}\" is {}", key, type_of(node)), "make it a string");
+  }
+  return value->get();
+}
+
+double TomlTable::number(const toml::node& node, std::string_view key) const {
+  const std::optional<double> value = node.is_number() ? node.value<double>() : std::nullopt;
+  if (!value) {
+    refuse(node, fmt::format("\"{}\" is {}", key, type_of(node)),
+           "make it a number; its unit is in the name of the key");
+  }
+  if (!std::isfinite(*value)) {
+    refuse(node, fmt::format("\"{}\" is not finite", key), "give a finite number");
+  }
+  return *value;
+}
+
+double TomlTable::positive(const toml::node& node, std::string_view key) const {
+  const double value = number(node, key);
+  if (!(value > 0)) {
+    refuse(node, fmt::format("\"{}\" is {}", key, value), "it must be positive");
+  }
+  return value;
+}
+
+Eigen::Vector3d TomlTable::three_numbers(const toml::node& node, std::string_view key) const {
+  const toml::array* array = node.as_array();
+  if (array == nullptr || array->size() != 3) {
+    refuse(node,
+           array == nullptr ? fmt::format("\"{}\" is {}", key, type_of(node))
+                            : fmt::format("\"{}\" has {} elements", key, array->size()),
+           "give three numbers: [x, y, z]");
+  }
+  return {number((*array)[0], key), number((*array)[1], key), number((*array)[2], key)};
+}
+
+Eigen::Vector3d TomlTable::three_positive(const toml::node& node, std::string_view key) const {
+  const Eigen::Vector3d values = three_numbers(node, key);
+  if (!(values.minCoeff() > 0)) {
+    refuse(node, fmt::format("\"{}\" has an element that is not positive", key), "all three must be positive");
+  }
+  return values;
+}
+
+void TomlTable::refuse(const toml::node& node, std::string reason, std::string cure) const {
+  throw InputRefused(file_, position_of(node.source()), std::move(reason), std::move(cure));
+}
+
+toml::table parse_toml(std::string_view text, const std::filesystem::path& file) {
+  try {
+    return toml::parse(text, file.string());
+  } catch (const toml::parse_error& error) {
+    throw InputRefused(file, position_of(error.source()), std::string(error.description()), "repair the TOML syntax");
+  }
+}
+
+}  // namespace trihedron::io

@@ -1,0 +1,20 @@
+#pragma once
+/// Words in messages: quoting what a file holds, suggesting the name that was meant.
+
+#include <span>
+#include <string>
+#include <string_view>
+
+namespace trihedron::io {
+
+/// Without the blanks (space, tab, CR) at both ends.
+[[nodiscard]] std::string_view trimmed(std::string_view text);
+
+/// In quotation marks, printable and of bounded length, whatever the text is.
+[[nodiscard]] std::string in_quotes(std::string_view text);
+
+/// `did you mean "period_s"?`, or the list of the known names when none is near. A name that the unknown one begins
+/// (its unit suffix is missing) is nearest.
+[[nodiscard]] std::string suggestion(std::string_view unknown, std::span<const std::string_view> known);
+
+}  // namespace trihedron::io

@@ -1,0 +1,146 @@
+#include "trihedron/io/atomic_file.hpp"
+
+#include <gmock/gmock.h>
+#include <sys/resource.h>
+#include <unistd.h>
+
+#include <csignal>
+
+#include "fixtures.hpp"
+#include "trihedron/io/attitude.hpp"
+#include "trihedron/io/calibration.hpp"
+#include "trihedron/io/residuals.hpp"
+
+namespace trihedron::io {
+namespace {
+
+using testing::ElementsAre;
+using testing::HasSubstr;
+using testing::IsEmpty;
+
+/// Makes every file of this process end at `bytes`, as a full disk would.
+class FileSizeLimit {
+ public:
+  explicit FileSizeLimit(rlim_t bytes) {
+    old_handler_ = std::signal(SIGXFSZ, SIG_IGN);
+    ::getrlimit(RLIMIT_FSIZE, &old_);
+    const rlimit limit{bytes, old_.rlim_max};
+    ::setrlimit(RLIMIT_FSIZE, &limit);
+  }
+  FileSizeLimit(const FileSizeLimit&) = delete;
+  FileSizeLimit& operator=(const FileSizeLimit&) = delete;
+  ~FileSizeLimit() {
+    ::setrlimit(RLIMIT_FSIZE, &old_);
+    std::signal(SIGXFSZ, old_handler_);
+  }
+
+ private:
+  rlimit old_{};
+  void (*old_handler_)(int) = SIG_DFL;
+};
+
+TEST(AtomicFile, AppearsOnlyAtCommit) {
+  const TemporaryDirectory directory;
+  {
+    AtomicFile file(directory / "a.txt");
+    file.write("half");
+    EXPECT_FALSE(std::filesystem::exists(directory / "a.txt"));
+    file.write(" and half");
+    file.commit();
+  }
+  EXPECT_EQ(read_text(directory / "a.txt"), "half and half");
+  EXPECT_THAT(directory.names(), ElementsAre("a.txt"));
+}
+
+TEST(AtomicFile, LeavesTheOldFileAndNothingElseWithoutCommit) {
+  const TemporaryDirectory directory;
+  write_text(directory / "a.txt", "old");
+  {
+    AtomicFile file(directory / "a.txt");
+    file.write("new");
+  }
+  EXPECT_EQ(read_text(directory / "a.txt"), "old");
+  EXPECT_THAT(directory.names(), ElementsAre("a.txt"));
+}
+
+TEST(AtomicFile, MovedFromFileRemovesNothing) {
+  const TemporaryDirectory directory;
+  AtomicFile first(directory / "a.txt");
+  {
+    AtomicFile second(std::move(first));
+    second.write("x");
+    second.commit();
+  }
+  EXPECT_EQ(read_text(directory / "a.txt"), "x");
+}
+
+TEST(AtomicFile, FailsWhereTheDirectoryIsMissingOrTheTargetIsADirectory) {
+  const TemporaryDirectory directory;
+  EXPECT_THROW(write_file(directory / "none/a.txt", "x"), MachineFailed);
+  EXPECT_THROW(write_file(directory.path(), "x"), MachineFailed);
+  EXPECT_THAT(directory.names(), IsEmpty());
+}
+
+TEST(AtomicFile, FailsInAReadOnlyDirectory) {
+  if (::geteuid() == 0) {
+    GTEST_SKIP() << "root may write into read-only directories";
+  }
+  const TemporaryDirectory directory;
+  std::filesystem::permissions(directory.path(),
+                               std::filesystem::perms::owner_read | std::filesystem::perms::owner_exec);
+  EXPECT_THROW(write_file(directory / "a.txt", "x"), MachineFailed);
+  std::filesystem::permissions(directory.path(), std::filesystem::perms::owner_all);
+  EXPECT_THAT(directory.names(), IsEmpty());
+}
+
+TEST(AtomicFile, WritesStraightToADeviceAndReportsThatItIsFull) {
+  write_file("/dev/null", "x");
+  EXPECT_TRUE(std::filesystem::is_character_file("/dev/null"));
+  try {
+    write_file("/dev/full", "x");
+    FAIL() << "a full device took the text";
+  } catch (const MachineFailed& failed) {
+    EXPECT_THAT(failed.what(), HasSubstr("/dev/full: cannot be written: No space left on device"));
+  }
+  EXPECT_TRUE(std::filesystem::is_character_file("/dev/full"));
+}
+
+TEST(AtomicFile, NothingStaysOfAnyFileWhenTheDiskIsFull) {
+  const TemporaryDirectory directory;
+  const RawPass raw = clean_pass();
+  raw.save_directory(directory / "in");
+  const Pass pass = read_pass(directory / "in").pass;
+  const Truth truth = clean_truth();
+  std::filesystem::remove_all(directory / "in");
+  write_text(directory / "calibration.json", "old");
+  {
+    const FileSizeLimit limit(1000);
+    EXPECT_THROW(write_pass(directory / "out", pass, &truth), MachineFailed);
+    EXPECT_THROW(write_pass(directory / "out.nc", pass, &truth), MachineFailed);
+    EXPECT_THROW(write_calibration(directory / "calibration.json", sample_calibration()), MachineFailed);
+    EXPECT_THROW(write_attitude(directory / "attitude.csv", truth.t[0], {truth.t, truth.q_in_c, {}, {}}),
+                 MachineFailed);
+  }
+  EXPECT_THAT(directory.names(), ElementsAre("calibration.json"));
+  EXPECT_EQ(read_text(directory / "calibration.json"), "old");
+}
+
+TEST(MakeDirectory, SaysWhetherItWasThereAndRefusesTheNameOfAFile) {
+  const TemporaryDirectory directory;
+  EXPECT_TRUE(make_directory(directory / "a/b"));
+  EXPECT_FALSE(make_directory(directory / "a/b"));
+  write_text(directory / "file", "x");
+  EXPECT_THROW(make_directory(directory / "file"), MachineFailed);
+  EXPECT_THROW(make_directory(directory / "file/a"), MachineFailed);
+}
+
+TEST(AtomicFile, NetcdfIsNotWrittenOverADeviceNorWithoutADirectory) {
+  const TemporaryDirectory directory;
+  const Table table{"g", {}, {}};
+  EXPECT_THROW(write_residuals("/dev/null", Time{}, {&table, 1}), MachineFailed);
+  EXPECT_TRUE(std::filesystem::is_character_file("/dev/null"));
+  EXPECT_THROW(write_residuals(directory / "none/r.nc", Time{}, {&table, 1}), MachineFailed);
+}
+
+}  // namespace
+}  // namespace trihedron::io

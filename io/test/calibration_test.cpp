@@ -1,0 +1,180 @@
+#include "trihedron/io/calibration.hpp"
+
+#include <gmock/gmock.h>
+#include <rapidcheck/gtest.h>
+
+#include <bit>
+#include <cmath>
+#include <cstdint>
+
+#include "fixtures.hpp"
+
+namespace trihedron::io {
+namespace {
+
+using testing::HasSubstr;
+
+std::string refusal_of(std::string_view text) {
+  return refusal([&] { static_cast<void>(parse_calibration(text, "c.json")); });
+}
+
+std::string sample_text() { return format_calibration(sample_calibration()); }
+
+TEST(CalibrationJson, ComesBackFromAFileWhole) {
+  const TemporaryDirectory directory;
+  const Calibration calibration = sample_calibration();
+  write_calibration(directory / "c.json", calibration);
+  const Calibration back = read_calibration(directory / "c.json");
+  EXPECT_EQ(back.estimator, calibration.estimator);
+  EXPECT_EQ(back.epoch, calibration.epoch);
+  EXPECT_EQ(back.t, calibration.t);
+  ASSERT_EQ(back.gyros.size(), 2U);
+  for (std::size_t i = 0; i < 2; ++i) {
+    EXPECT_EQ(back.gyros[i].drift_model, "esg7");
+    EXPECT_EQ(back.gyros[i].drift_rad_s, calibration.gyros[i].drift_rad_s);
+    EXPECT_EQ(back.gyros[i].alignment_rotation_vector_rad, calibration.gyros[i].alignment_rotation_vector_rad);
+    EXPECT_EQ(back.gyros[i].momentum_in, calibration.gyros[i].momentum_in);
+  }
+  EXPECT_EQ(back.states, calibration.states);
+  EXPECT_EQ(back.covariance, calibration.covariance);
+  EXPECT_FALSE(back.verdict.trustworthy);
+  ASSERT_EQ(back.verdict.findings.size(), 2U);
+  const Finding& finding = back.verdict.findings[0];
+  EXPECT_EQ(finding.code, "nis-out-of-bounds");
+  EXPECT_EQ(finding.text, "The innovations are \"too large\".");
+  EXPECT_EQ(finding.evidence, "4.7 instead of 4");
+  EXPECT_EQ(finding.cure, "add harmonics");
+  EXPECT_EQ(finding.severity, Finding::Severity::kDoNotUse);
+  EXPECT_EQ(back.verdict.findings[1].severity, Finding::Severity::kNote);
+  EXPECT_EQ(back.statistics, calibration.statistics);
+}
+
+RC_GTEST_PROP(CalibrationJson, NumbersComeBackBitForBit, (std::uint64_t bits)) {
+  const auto value = std::bit_cast<double>(bits);
+  RC_PRE(std::isfinite(value));
+  Calibration calibration = sample_calibration();
+  calibration.gyros[0].drift_rad_s[2].second = value;
+  const Calibration back = parse_calibration(format_calibration(calibration), "c.json");
+  RC_ASSERT(std::bit_cast<std::uint64_t>(back.gyros[0].drift_rad_s[2].second) == bits);
+}
+
+TEST(CalibrationJson, StatisticWithoutAValueBecomesNullAndNan) {
+  Calibration calibration = sample_calibration();
+  calibration.statistics = {{"nees", std::nan("")}};
+  EXPECT_THAT(format_calibration(calibration), HasSubstr("\"nees\":null"));
+  EXPECT_TRUE(std::isnan(parse_calibration(format_calibration(calibration), "c.json").statistics.at("nees")));
+}
+
+TEST(CalibrationJson, TextThatIsNoUtf8DoesNotCostTheFile) {
+  Calibration calibration = sample_calibration();
+  calibration.verdict.findings[0].text = "bad \xff byte";
+  EXPECT_THAT(parse_calibration(format_calibration(calibration), "c.json").verdict.findings[0].text, HasSubstr("bad "));
+}
+
+TEST(CalibrationJson, FurtherKeysAndStatesOfOtherThingsAreFine) {
+  std::string text = replaced(sample_text(), "{\"format\"", "{\"made_by\": \"x\", \"format\"");
+  text = replaced(text, "\"gyro2.align_z\"", "\"tracker.clock_offset_s\"");
+  EXPECT_EQ(refusal_of(text), "");
+}
+
+TEST(CalibrationJson, RefusesSyntaxErrorWithItsPlace) {
+  EXPECT_THAT(refusal_of("{\"format\":\n  oops}"), HasSubstr("c.json:2:3: is not valid JSON here"));
+  EXPECT_THAT(refusal_of(""), HasSubstr("c.json:1:1: is not valid JSON here"));
+  EXPECT_THAT(refusal_of("{\"format\": 1e999}"), HasSubstr("too large for a double"));
+  EXPECT_THAT(refusal_of("[]"), HasSubstr("c.json: is array; make it an object"));
+  EXPECT_THAT(refusal([] { static_cast<void>(read_calibration("none.json")); }),
+              HasSubstr("none.json: cannot be opened"));
+}
+
+TEST(CalibrationJson, RefusesAnotherFormatOrVersion) {
+  EXPECT_THAT(refusal_of(replaced(sample_text(), "trihedron-calibration", "other")), HasSubstr("format is \"other\""));
+  EXPECT_THAT(refusal_of(replaced(sample_text(), "\"version\": 1", "\"version\": 2")),
+              HasSubstr("version is 2; this program reads version 1"));
+}
+
+TEST(CalibrationJson, RefusesEachMissingKey) {
+  for (const char* key : {"format",
+                          "version",
+                          "estimator",
+                          "epoch_tai",
+                          "t_s",
+                          "gyros",
+                          "covariance",
+                          "states",
+                          "matrix",
+                          "verdict",
+                          "trustworthy",
+                          "findings",
+                          "statistics",
+                          "drift_model",
+                          "drift_rad_s",
+                          "mu12",
+                          "alignment_rotation_vector_rad",
+                          "momentum_in",
+                          "code",
+                          "text"}) {
+    const std::string name = '"' + std::string(key) + '"';
+    const std::string message = refusal_of(replaced(sample_text(), name + ":", "\"renamed\":"));
+    EXPECT_TRUE(message.find("lacks key " + name) != std::string::npos ||
+                message.find("coefficient \"renamed\"") != std::string::npos)
+        << message;
+  }
+}
+
+TEST(CalibrationJson, RefusesWrongTypesNamingThePath) {
+  EXPECT_THAT(refusal_of(replaced(sample_text(), "\"invariant\"", "3")),
+              HasSubstr("estimator is number; make it a string"));
+  EXPECT_THAT(refusal_of(replaced(sample_text(), "\"trustworthy\": false", "\"trustworthy\": 0")),
+              HasSubstr("verdict.trustworthy is number; make it true or false"));
+  EXPECT_THAT(refusal_of(replaced(sample_text(), "2009-05-20", "20 May")),
+              HasSubstr("epoch_tai is \"20 MayT00:00:00\""));
+  EXPECT_THAT(refusal_of(replaced(sample_text(), "32400.125", "1e12")), HasSubstr("t_s is 1000000000000"));
+  EXPECT_THAT(refusal_of(replaced(sample_text(), "\"do-not-use\"", "\"fatal\"")),
+              HasSubstr("verdict.findings[0].severity is \"fatal\"; it must be note, warning or do-not-use"));
+}
+
+TEST(CalibrationJson, RefusesUnknownCoefficientSuggestingTheRightOne) {
+  EXPECT_THAT(refusal_of(replaced(sample_text(), "\"mu23\"", "\"mu32\"")),
+              HasSubstr("gyros[0].drift_rad_s has coefficient \"mu32\", not one of esg7; did you mean \"mu"));
+}
+
+TEST(CalibrationJson, RefusesMomentumThatIsNoDirectionAndNoGyros) {
+  Calibration calibration = sample_calibration();
+  calibration.gyros[1].momentum_in *= 1.1;
+  EXPECT_THAT(refusal_of(format_calibration(calibration)), HasSubstr("gyros[1].momentum_in is not a unit vector"));
+  calibration.gyros.clear();
+  calibration.states.clear();
+  calibration.covariance.resize(0, 0);
+  EXPECT_THAT(refusal_of(format_calibration(calibration)), HasSubstr("gyros is empty"));
+}
+
+TEST(CalibrationJson, RefusesStatesOfUnknownGyrosOrTwice) {
+  for (const char* state : {"gyro3.k0", "gyro0.k0", "gyro.k0", "gyro2", "gyro-1.k0"}) {
+    EXPECT_THAT(
+        refusal_of(replaced(sample_text(), "\"gyro2.k0\"", '"' + std::string(state) + '"')),
+        HasSubstr("covariance.states names \"" + std::string(state) + "\", which is not of any of the 2 gyros"));
+  }
+  EXPECT_THAT(refusal_of(replaced(sample_text(), "\"gyro2.k0\"", "\"gyro1.k0\"")),
+              HasSubstr("names \"gyro1.k0\" twice"));
+}
+
+TEST(CalibrationJson, RefusesAMatrixThatIsNoCovariance) {
+  Calibration calibration = sample_calibration();
+  calibration.covariance(3, 4) *= 1.001;
+  EXPECT_THAT(refusal_of(format_calibration(calibration)),
+              HasSubstr("covariance.matrix is not symmetric at row 5, column 4"));
+  calibration = sample_calibration();
+  calibration.covariance(2, 2) = -1e-20;
+  EXPECT_THAT(refusal_of(format_calibration(calibration)), HasSubstr("covariance.matrix[2] has a negative variance"));
+  calibration = sample_calibration();
+  calibration.covariance(2, 2) = std::nan("");
+  EXPECT_THAT(refusal_of(format_calibration(calibration)), HasSubstr("covariance.matrix[2][2] is null"));
+  calibration = sample_calibration();
+  calibration.covariance.conservativeResize(20, 19);
+  EXPECT_THAT(refusal_of(format_calibration(calibration)), HasSubstr("covariance.matrix[0] has 19 elements"));
+  calibration.covariance = Eigen::MatrixXd::Identity(19, 19);
+  EXPECT_THAT(refusal_of(format_calibration(calibration)), HasSubstr("covariance.matrix has 19 rows for 20 states"));
+}
+
+}  // namespace
+}  // namespace trihedron::io

@@ -1,0 +1,226 @@
+#include "fixtures.hpp"
+
+#include <fmt/format.h>
+#include <netcdf.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cmath>
+#include <fstream>
+#include <iterator>
+
+#include "trihedron/core/drift.hpp"
+
+namespace trihedron::io {
+namespace fs = std::filesystem;
+namespace {
+
+void require(int status) {
+  if (status != NC_NOERR) {
+    throw std::runtime_error(nc_strerror(status));
+  }
+}
+
+void put_group(int file, const char* name, const char* dimension_name, const RawTable& table) {
+  int group = 0;
+  int dimension = 0;
+  require(nc_def_grp(file, name, &group));
+  require(nc_def_dim(group, dimension_name, table.rows.size(), &dimension));
+  for (std::size_t i = 0; i < table.columns.size(); ++i) {
+    int variable = 0;
+    std::vector<double> column;
+    std::ranges::transform(table.rows, std::back_inserter(column), [&](const auto& row) { return row[i]; });
+    require(nc_def_var(group, table.columns[i].c_str(), NC_DOUBLE, 1, &dimension, &variable));
+    require(nc_put_var_double(group, variable, column.data()));
+  }
+}
+
+}  // namespace
+
+TemporaryDirectory::TemporaryDirectory() {
+  std::string name = (fs::temp_directory_path() / "trihedron-io-XXXXXX").string();
+  path_ = ::mkdtemp(name.data());
+}
+
+TemporaryDirectory::~TemporaryDirectory() {
+  std::error_code ignored;
+  fs::remove_all(path_, ignored);
+}
+
+std::vector<std::string> TemporaryDirectory::names() const {
+  std::vector<std::string> names;
+  for (const auto& entry : fs::directory_iterator(path_)) {
+    names.push_back(entry.path().filename().string());
+  }
+  std::ranges::sort(names);
+  return names;
+}
+
+void write_text(const fs::path& file, std::string_view text) {
+  std::ofstream(file, std::ios::binary).write(text.data(), static_cast<std::streamsize>(text.size()));
+}
+
+std::string read_text(const fs::path& file) {
+  std::ifstream stream(file, std::ios::binary);
+  return {std::istreambuf_iterator<char>(stream), {}};
+}
+
+std::string RawTable::csv() const {
+  std::string text = fmt::format("{}\n", fmt::join(columns, ","));
+  for (const auto& row : rows) {
+    text += fmt::format("{}\n", fmt::join(row, ","));
+  }
+  return text;
+}
+
+void RawPass::save_directory(const fs::path& directory) const {
+  fs::create_directories(directory);
+  write_text(directory / "pass.toml", toml);
+  write_text(directory / "gyro.csv", gyro.csv());
+  write_text(directory / "star_tracker.csv", star_tracker.csv());
+}
+
+void RawPass::save_netcdf(const fs::path& file, const char* dimension) const {
+  int id = 0;
+  require(nc_create(file.c_str(), NC_NETCDF4 | NC_CLOBBER, &id));
+  require(nc_put_att_text(id, NC_GLOBAL, "pass_toml", toml.size(), toml.c_str()));
+  put_group(id, "gyro", dimension, gyro);
+  put_group(id, "star_tracker", dimension, star_tracker);
+  require(nc_close(id));
+}
+
+RawPass clean_pass() {
+  RawPass pass;
+  pass.toml = R"([pass]
+spacecraft = "TEST"
+epoch_tai = "2009-05-20T00:00:00"
+duration_s = 90
+
+[gyro]
+period_s = 0.5
+readout_noise_rad = 1e-05
+drift_prior_sigma_rad_s = 2e-06
+alignment_prior_sigma_rad = 8e-03
+
+[star_tracker]
+period_s = 3
+noise_rad = [1e-05, 2e-05, 9e-05]
+)";
+  pass.gyro.columns = {"t_s", "h1_x", "h1_y", "h1_z", "h2_x", "h2_y", "h2_z"};
+  for (int i = 0; i <= 180; ++i) {
+    const double t = 0.5 * i;
+    const double c = std::cos(1e-3 * t);
+    const double s = std::sin(1e-3 * t);
+    pass.gyro.rows.push_back({t, c, s, 0, 0, c, s});
+  }
+  pass.star_tracker.columns = {"t_s", "q_x", "q_y", "q_z", "q_w"};
+  for (int i = 0; i <= 30; ++i) {
+    const double t = 3.0 * i;
+    pass.star_tracker.rows.push_back({t, 0, 0, std::sin(5e-4 * t), std::cos(5e-4 * t)});
+  }
+  return pass;
+}
+
+Truth clean_truth() {
+  Truth truth;
+  for (int gyro = 0; gyro < 2; ++gyro) {
+    Truth::Gyro parameters;
+    for (int i = 0; i < Esg7::kSize; ++i) {
+      parameters.drift_rad_s.emplace_back(Esg7::kNames.at(static_cast<std::size_t>(i)), 1e-7 / 3 * (i + 1 + 10 * gyro));
+    }
+    parameters.unmodelled_rad_s = {{"w20", 1e-9 / 7}, {"w21", -1e-8}};
+    parameters.alignment_rotation_vector_rad = {1e-3, -2e-3, 1e-3 / 3};
+    truth.gyros.push_back(parameters);
+  }
+  for (const auto& row : clean_pass().star_tracker.rows) {
+    truth.t.push_back(sample_calibration().epoch + from_seconds(row[0]));
+    truth.q_in_c.emplace_back(row[4], row[1], row[2], row[3]);
+    truth.h_in.insert(truth.h_in.end(), {1, 0, 0, 0, 0.6, 0.8});
+  }
+  return truth;
+}
+
+Calibration sample_calibration() {
+  Calibration calibration;
+  calibration.estimator = "invariant";
+  calibration.epoch = Time(std::chrono::sys_days(std::chrono::year(2009) / 5 / 20) -
+                           std::chrono::sys_days(std::chrono::year(1958) / 1 / 1));
+  calibration.t = calibration.epoch + from_seconds(32400.125);
+  for (int gyro = 1; gyro <= 2; ++gyro) {
+    GyroCalibration one;
+    one.drift_model = "esg7";
+    for (const char* name : Esg7::kNames) {
+      one.drift_rad_s.emplace_back(name, 1e-6 / (3.0 + static_cast<double>(one.drift_rad_s.size())) * gyro);
+      calibration.states.push_back(fmt::format("gyro{}.{}", gyro, name));
+    }
+    for (const char axis : {'x', 'y', 'z'}) {
+      calibration.states.push_back(fmt::format("gyro{}.align_{}", gyro, axis));
+    }
+    one.alignment_rotation_vector_rad = {1e-3 / 3, -2e-3 / 7, -0.0};
+    one.momentum_in = Eigen::Vector3d(1, 2, gyro).normalized();
+    calibration.gyros.push_back(one);
+  }
+  const Eigen::Index n = 20;
+  calibration.covariance = Eigen::MatrixXd::Identity(n, n) * (1e-12 / 3);
+  calibration.covariance(3, 4) = calibration.covariance(4, 3) = 1e-13 / 7;
+  calibration.verdict.trustworthy = false;
+  calibration.verdict.findings = {
+      {"nis-out-of-bounds", "The innovations are \"too large\".", "4.7 instead of 4", "add harmonics",
+       Finding::Severity::kDoNotUse},
+      {"null-direction", "One direction is not determined.", "", "slew", Finding::Severity::kNote}};
+  calibration.statistics = {{"nis_mean", 4.7}, {"fixes", 10800}, {"pi_third", M_PI / 3}};
+  return calibration;
+}
+
+Defect only(const std::vector<Defect>& defects, Defect::Kind kind) {
+  EXPECT_EQ(std::ranges::count(defects, kind, &Defect::kind), 1);
+  const auto found = std::ranges::find(defects, kind, &Defect::kind);
+  return found == defects.end() ? Defect{} : *found;
+}
+
+std::string replaced(std::string text, std::string_view from, std::string_view to) {
+  const std::size_t at = text.find(from);
+  EXPECT_NE(at, std::string::npos) << from;
+  return at == std::string::npos ? text : text.replace(at, from.size(), to);
+}
+
+void expect_same_pass(const Pass& a, const Pass& b, double h_tolerance, double q_tolerance) {
+  const PassSettings& s = a.settings;
+  const PassSettings& r = b.settings;
+  EXPECT_EQ(s.spacecraft, r.spacecraft);
+  EXPECT_EQ(s.epoch, r.epoch);
+  EXPECT_EQ(s.duration, r.duration);
+  EXPECT_EQ(s.gyro_period, r.gyro_period);
+  EXPECT_EQ(s.star_tracker_period, r.star_tracker_period);
+  EXPECT_EQ(s.star_tracker_noise_rad, r.star_tracker_noise_rad);
+  ASSERT_EQ(s.gyros.size(), r.gyros.size());
+  for (std::size_t i = 0; i < s.gyros.size(); ++i) {
+    EXPECT_EQ(s.gyros[i].readout_noise_rad, r.gyros[i].readout_noise_rad);
+    EXPECT_EQ(s.gyros[i].drift_rad_s, r.gyros[i].drift_rad_s);
+    EXPECT_EQ(s.gyros[i].drift_sigma_rad_s, r.gyros[i].drift_sigma_rad_s);
+    EXPECT_EQ(s.gyros[i].alignment_rotation_vector_rad, r.gyros[i].alignment_rotation_vector_rad);
+    EXPECT_EQ(s.gyros[i].alignment_sigma_rad, r.gyros[i].alignment_sigma_rad);
+  }
+  EXPECT_EQ(a.gyro.gyros, b.gyro.gyros);
+  EXPECT_EQ(a.gyro.t, b.gyro.t);
+  EXPECT_EQ(a.star_tracker.t, b.star_tracker.t);
+  ASSERT_EQ(a.gyro.h.size(), b.gyro.h.size());
+  const auto differ = [](double x, double y, double tolerance) {
+    return std::isnan(x) != std::isnan(y) || std::abs(x - y) > tolerance;
+  };
+  std::ptrdiff_t different = 0;
+  for (std::size_t i = 0; i < a.gyro.h.size(); ++i) {
+    different += differ(a.gyro.h[i], b.gyro.h[i], h_tolerance) ? 1 : 0;
+  }
+  EXPECT_EQ(different, 0) << "direction cosines";
+  ASSERT_EQ(a.star_tracker.size(), b.star_tracker.size());
+  for (std::size_t i = 0; i < a.star_tracker.size(); ++i) {
+    for (Eigen::Index k = 0; k < 4; ++k) {
+      different +=
+          differ(a.star_tracker.q_in_c[i].coeffs()(k), b.star_tracker.q_in_c[i].coeffs()(k), q_tolerance) ? 1 : 0;
+    }
+  }
+  EXPECT_EQ(different, 0) << "quaternions";
+}
+
+}  // namespace trihedron::io

@@ -1,0 +1,80 @@
+#pragma once
+/// A small clean pass to spoil, in every format, and help to look at refusals.
+
+#include <gtest/gtest.h>
+
+#include <Eigen/Core>
+#include <filesystem>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "trihedron/io/error.hpp"
+#include "trihedron/io/pass.hpp"
+#include "trihedron/records/calibration.hpp"
+#include "trihedron/records/pass.hpp"
+
+namespace trihedron::io {
+
+/// A directory that is gone with its content at the end of the test.
+class TemporaryDirectory {
+ public:
+  TemporaryDirectory();
+  TemporaryDirectory(const TemporaryDirectory&) = delete;
+  TemporaryDirectory& operator=(const TemporaryDirectory&) = delete;
+  ~TemporaryDirectory();
+  [[nodiscard]] const std::filesystem::path& path() const { return path_; }
+  [[nodiscard]] std::filesystem::path operator/(const char* name) const { return path_ / name; }
+  /// Everything in it by name, hidden files too.
+  [[nodiscard]] std::vector<std::string> names() const;
+
+ private:
+  std::filesystem::path path_;
+};
+
+void write_text(const std::filesystem::path& file, std::string_view text);
+[[nodiscard]] std::string read_text(const std::filesystem::path& file);
+
+/// Rows as a file holds them, t_s first.
+struct RawTable {
+  std::vector<std::string> columns;
+  std::vector<std::vector<double>> rows;
+
+  [[nodiscard]] std::string csv() const;
+};
+
+/// 90 s of two gyros at 2 Hz and fixes every 3 s, without a flaw; and its truth.
+struct RawPass {
+  std::string toml;
+  RawTable gyro;
+  RawTable star_tracker;
+
+  void save_directory(const std::filesystem::path& directory) const;
+  /// Plain doubles, written with the NetCDF library alone: independent of the module's own writer.
+  void save_netcdf(const std::filesystem::path& file, const char* dimension = "time") const;
+};
+[[nodiscard]] RawPass clean_pass();
+[[nodiscard]] Truth clean_truth();
+[[nodiscard]] Calibration sample_calibration();
+
+/// what() of the InputRefused that `action` throws; empty when it throws none.
+template <class Action>
+std::string refusal(Action action) {
+  try {
+    action();
+  } catch (const InputRefused& refused) {
+    return refused.what();
+  }
+  return {};
+}
+
+/// The defect of this kind; fails the test when there is not exactly one.
+[[nodiscard]] Defect only(const std::vector<Defect>& defects, Defect::Kind kind);
+
+/// Replaces the first occurrence; fails the test when there is none.
+[[nodiscard]] std::string replaced(std::string text, std::string_view from, std::string_view to);
+
+/// Field by field, telemetry with NaN equal to NaN.
+void expect_same_pass(const Pass& a, const Pass& b, double h_tolerance, double q_tolerance);
+
+}  // namespace trihedron::io

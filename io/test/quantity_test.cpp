@@ -1,0 +1,106 @@
+#include "trihedron/io/quantity.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <rapidcheck/gtest.h>
+
+#include <cmath>
+#include <numbers>
+
+#include "trihedron/io/error.hpp"
+
+namespace trihedron::io {
+namespace {
+
+using testing::HasSubstr;
+
+template <class Parse>
+std::string usage_error(Parse parse, std::string_view text) {
+  try {
+    static_cast<void>(parse(text));
+  } catch (const UsageError& error) {
+    return error.what();
+  }
+  return {};
+}
+
+TEST(Quantity, ReadsDurationsInEveryUnit) {
+  EXPECT_EQ(parse_duration("90min"), std::chrono::minutes(90));
+  EXPECT_EQ(parse_duration("3s"), std::chrono::seconds(3));
+  EXPECT_EQ(parse_duration(" 2 h "), std::chrono::hours(2));
+  EXPECT_EQ(parse_duration("10ms"), std::chrono::milliseconds(10));
+  EXPECT_EQ(parse_duration("0.1s"), std::chrono::milliseconds(100));
+  EXPECT_EQ(parse_duration("1.5us"), Duration(1500));
+  EXPECT_EQ(parse_duration("7ns"), Duration(7));
+  EXPECT_EQ(parse_duration("1e1d"), std::chrono::days(10));
+  EXPECT_EQ(parse_duration("0s"), Duration::zero());
+}
+
+TEST(Quantity, ReadsNegativeDurationsOnlyWhereTheyAreAllowed) {
+  EXPECT_EQ(parse_signed_duration("-10ms"), std::chrono::milliseconds(-10));
+  EXPECT_THAT(usage_error(parse_duration, "-10ms"), HasSubstr("must not be negative"));
+}
+
+TEST(Quantity, ReadsAnglesRatesAndRandomWalks) {
+  constexpr double kPi = std::numbers::pi;
+  EXPECT_DOUBLE_EQ(parse_angle_rad("5arcmin"), 5 * kPi / 10800);
+  EXPECT_DOUBLE_EQ(parse_angle_rad("2arcsec"), 2 * kPi / 648000);
+  EXPECT_DOUBLE_EQ(parse_angle_rad("0.5deg"), kPi / 360);
+  EXPECT_EQ(parse_angle_rad("1e-5rad"), 1e-5);
+  EXPECT_EQ(parse_angle_rad("-1rad"), -1);
+  EXPECT_DOUBLE_EQ(parse_rate_rad_s("0.1deg/h"), kPi / 1800 / 3600);
+  EXPECT_EQ(parse_rate_rad_s("1e-6rad/s"), 1e-6);
+  EXPECT_EQ(parse_random_walk_rad_sqrt_s("1e-8rad/s^0.5"), 1e-8);
+  EXPECT_DOUBLE_EQ(parse_random_walk_rad_sqrt_s("0.001deg/h^0.5"), 0.001 * kPi / 180 / 60);
+  EXPECT_EQ(parse_number("-2.5e3"), -2500);
+}
+
+TEST(Quantity, RefusesBareNumberSayingWhichUnitsAreAccepted) {
+  EXPECT_THAT(usage_error(parse_duration, "90"),
+              HasSubstr("the unit is missing; accepted units: d, h, min, s, ms, us, ns"));
+  EXPECT_THAT(usage_error(parse_angle_rad, "5"), HasSubstr("accepted units: deg, arcmin, arcsec, rad"));
+  EXPECT_THAT(usage_error(parse_rate_rad_s, "5"), HasSubstr("deg/h"));
+  EXPECT_THAT(usage_error(parse_random_walk_rad_sqrt_s, "5"), HasSubstr("deg/h^0.5"));
+}
+
+TEST(Quantity, RefusesGarbageNotFiniteOverflowAndUnitsOfAnotherKind) {
+  for (const char* text : {"", " ", "min", "nanmin", "infs", "-infs", "1e999s", "1e300h", "--1s", "5 arcmin", "5min!",
+                           "5s s", "1e-12s", "300000d", "0x10s", "1,5s"}) {
+    EXPECT_NE(usage_error(parse_signed_duration, text), "") << text;
+  }
+  for (const char* text : {"", "nan", "inf", "5s", "1e999rad", "5arcmin/s", "5Deg"}) {
+    EXPECT_NE(usage_error(parse_angle_rad, text), "") << text;
+  }
+  EXPECT_NE(usage_error(parse_rate_rad_s, "5deg"), "");
+  EXPECT_NE(usage_error(parse_random_walk_rad_sqrt_s, "5deg/h"), "");
+  for (const char* text : {"", "nan", "1e999", "5s", "5 5"}) {
+    EXPECT_NE(usage_error(parse_number, text), "") << text;
+  }
+}
+
+TEST(Quantity, FormatsTheWayAPersonWrites) {
+  EXPECT_EQ(format_duration(std::chrono::minutes(90)), "90min");
+  EXPECT_EQ(format_duration(std::chrono::milliseconds(-125)), "-125ms");
+  EXPECT_EQ(format_duration(Duration::zero()), "0s");
+  EXPECT_EQ(format_angle(parse_angle_rad("5arcmin")), "5arcmin");
+  EXPECT_EQ(format_angle(parse_angle_rad("2arcsec")), "2arcsec");
+  EXPECT_EQ(format_angle(1e-5), "1e-05rad");
+  EXPECT_EQ(format_rate(parse_rate_rad_s("0.1deg/h")), "0.1deg/h");
+  EXPECT_EQ(format_random_walk(parse_random_walk_rad_sqrt_s("0.001deg/h^0.5")), "0.001deg/h^0.5");
+}
+
+RC_GTEST_PROP(Quantity, FormattedDurationsComeBackExactlyBelow104Days, ()) {
+  // Beyond 2^53 ns a duration in an odd number of nanoseconds is no double any more.
+  const auto ns = *rc::gen::inRange<std::int64_t>(-(std::int64_t{1} << 53), std::int64_t{1} << 53);
+  RC_ASSERT(parse_signed_duration(format_duration(Duration(ns))) == Duration(ns));
+}
+
+RC_GTEST_PROP(Quantity, FormattedAnglesRatesAndRandomWalksComeBackBitForBit, (double value)) {
+  RC_PRE(std::isfinite(value));
+  RC_ASSERT(parse_angle_rad(format_angle(value)) == value);
+  RC_ASSERT(parse_rate_rad_s(format_rate(value)) == value);
+  RC_ASSERT(parse_random_walk_rad_sqrt_s(format_random_walk(value)) == value);
+}
+
+}  // namespace
+}  // namespace trihedron::io

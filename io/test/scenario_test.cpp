@@ -1,0 +1,132 @@
+#include "trihedron/io/scenario.hpp"
+
+#include <gmock/gmock.h>
+
+#include "fixtures.hpp"
+#include "trihedron/io/error.hpp"
+
+namespace trihedron::io {
+namespace {
+
+using testing::HasSubstr;
+
+Scenario parse(std::string_view toml) { return parse_scenario(toml, "scenario.toml"); }
+
+std::string why_refused(std::string_view toml) {
+  return refusal([&] { static_cast<void>(parse(toml)); });
+}
+
+TEST(ScenarioToml, EmptyFileIsThePapersExperiment) {
+  const Scenario scenario = parse("");
+  EXPECT_EQ(scenario.duration, std::chrono::hours{9});
+  EXPECT_EQ(scenario.gyros.size(), 2U);
+  EXPECT_DOUBLE_EQ(scenario.star_tracker.noise_rad.z(), 20 * kArcsecond);
+}
+
+TEST(ScenarioToml, ValuesGoWhereTheirNamesSay) {
+  const Scenario scenario = parse(R"(
+[scenario]
+spacecraft = "Test"
+seed = 42
+epoch_tai = "2010-01-02T03:04:05"
+duration = "90min"
+
+[orbit]
+perigee_altitude = "500km"
+apogee_altitude = "510000 m"
+inclination = "97deg"
+
+[attitude]
+reference = "yaw-steered"
+max_slew_acceleration = "0.1deg/s^2"
+jitter = "0arcsec"
+slews = [{begin = "10min", roll = "30deg"}, {begin = "20min"}]
+
+[gyro]
+period = "250ms"
+gaps = [{begin = "1min", end = "2min"}]
+readout = {noise = "1arcsec"}
+
+[[gyro.unit]]
+start_direction_c = [1, 0, 0]
+[gyro.unit.drift]
+kappa = {k0 = "1e-6rad/s", nu31 = "0.1deg/h"}
+harmonics = [{potential = "D", degree = 2, order = -1, amplitude = "1e-7rad/s"}]
+
+[[gyro.unit]]
+misalignment = ["30arcmin", "0deg", "-1e-3rad"]
+readout = {noise = "3arcsec", quantum = "0.5arcsec"}
+
+[[gyro.unit]]
+
+[star_tracker]
+noise = ["1arcsec", "2arcsec", "30arcsec"]
+clock_offset = "-10ms"
+aberration = "uncorrected"
+sun_exclusion = "30deg"
+outages = [{begin = "1h", end = "65min"}]
+outlier_probability = 0.01
+)");
+  EXPECT_EQ(scenario.spacecraft, "Test");
+  EXPECT_EQ(scenario.seed, 42U);
+  EXPECT_EQ(scenario.epoch - Scenario{}.epoch, std::chrono::days{227} + std::chrono::seconds{11045});
+  EXPECT_EQ(scenario.duration, std::chrono::minutes{90});
+  EXPECT_EQ(scenario.orbit.perigee_altitude_m, 500e3);
+  EXPECT_EQ(scenario.orbit.apogee_altitude_m, 510e3);
+  EXPECT_EQ(scenario.orbit.inclination_rad, 97 * kDegree);
+  EXPECT_EQ(scenario.attitude.reference, AttitudeScenario::Reference::kYawSteered);
+  EXPECT_EQ(scenario.attitude.max_slew_acceleration_rad_s2, 0.1 * kDegree);
+  EXPECT_EQ(scenario.attitude.jitter_rad, 0);
+  const auto& slews = std::get<std::vector<Slew>>(scenario.attitude.slews);
+  ASSERT_EQ(slews.size(), 2U);
+  EXPECT_EQ(slews[0].begin_s, 600);
+  EXPECT_EQ(slews[0].roll_rad, 30 * kDegree);
+  EXPECT_EQ(scenario.gyro_period, std::chrono::milliseconds{250});
+  ASSERT_EQ(scenario.gyro_gaps.size(), 1U);
+  EXPECT_EQ(scenario.gyro_gaps[0].end_s, 120);
+
+  ASSERT_EQ(scenario.gyros.size(), 3U);
+  EXPECT_DOUBLE_EQ(scenario.gyros[0].readout.noise_rad, kArcsecond);
+  EXPECT_DOUBLE_EQ(scenario.gyros[1].readout.noise_rad, 3 * kArcsecond);
+  EXPECT_DOUBLE_EQ(scenario.gyros[2].readout.noise_rad, kArcsecond);
+  EXPECT_EQ(scenario.gyros[0].start_direction_c, Eigen::Vector3d::UnitX());
+  ASSERT_TRUE(scenario.gyros[0].drift.kappa_rad_s);
+  EXPECT_EQ(scenario.gyros[0].drift.kappa_rad_s->front(), 1e-6);
+  EXPECT_EQ(scenario.gyros[0].drift.kappa_rad_s->at(1), 0);
+  EXPECT_DOUBLE_EQ(scenario.gyros[0].drift.kappa_rad_s->back(), 0.1 * kDegree / 3600);
+  EXPECT_FALSE(scenario.gyros[1].drift.kappa_rad_s);
+  ASSERT_EQ(scenario.gyros[0].drift.harmonics.size(), 1U);
+  EXPECT_EQ(scenario.gyros[0].drift.harmonics[0].order, -1);
+  ASSERT_TRUE(scenario.gyros[1].misalignment_rad);
+  EXPECT_EQ(scenario.gyros[1].misalignment_rad->z(), -1e-3);
+
+  EXPECT_DOUBLE_EQ(scenario.star_tracker.noise_rad.y(), 2 * kArcsecond);
+  EXPECT_EQ(scenario.star_tracker.clock_offset_s, -0.01);
+  EXPECT_EQ(scenario.star_tracker.aberration, StarTrackerScenario::Aberration::kUncorrected);
+  EXPECT_EQ(scenario.star_tracker.sun_exclusion_rad, 30 * kDegree);
+  EXPECT_FALSE(scenario.star_tracker.earth_exclusion_rad);
+  EXPECT_EQ(scenario.star_tracker.outages.at(0).begin_s, 3600);
+  EXPECT_EQ(scenario.star_tracker.outlier_probability, 0.01);
+}
+
+TEST(ScenarioToml, SlewsNoneAndImagingAreAlternatives) {
+  EXPECT_TRUE(std::get<std::vector<Slew>>(parse("attitude = {slews = \"none\"}").attitude.slews).empty());
+  EXPECT_EQ(std::get<ImagingProgramme>(parse("attitude = {imaging = {dwell = \"5min\"}}").attitude.slews).dwell_s, 300);
+  EXPECT_THAT(why_refused("attitude = {slews = \"none\", imaging = {dwell = \"5min\"}}"), HasSubstr("keep one"));
+}
+
+TEST(ScenarioToml, RefusalNamesPlaceReasonAndCure) {
+  EXPECT_THAT(why_refused("[orbit]\ninclinaton = \"70deg\""), HasSubstr("scenario.toml:2:1"));
+  EXPECT_THAT(why_refused("[orbit]\ninclinaton = \"70deg\""), HasSubstr("did you mean \"inclination\"?"));
+  EXPECT_THAT(why_refused("[orbit]\ninclination = 70"), HasSubstr("with its unit"));
+  EXPECT_THAT(why_refused("[orbit]\ninclination = \"70\""), HasSubstr("accepted units: deg"));
+  EXPECT_THAT(why_refused("[orbit]\nperigee_altitude = \"360 miles\""), HasSubstr("accepted units: km, m"));
+  EXPECT_THAT(why_refused("[attitude]\nreference = \"orbit\""), HasSubstr("orbital"));
+  EXPECT_THAT(why_refused("[scenario]\nepoch_tai = \"yesterday\""), HasSubstr("not a date and time"));
+  EXPECT_THAT(why_refused("[star_tracker]\nnoise = [\"1arcsec\"]"), HasSubstr("[x, y, z]"));
+  EXPECT_THAT(why_refused("[gyro]\nunit = 3"), HasSubstr("[[gyro.unit]]"));
+  EXPECT_THAT(why_refused("[scenario]\nseed = -1"), HasSubstr("whole number"));
+}
+
+}  // namespace
+}  // namespace trihedron::io

@@ -1,0 +1,283 @@
+#include "screening.hpp"
+
+#include <gmock/gmock.h>
+#include <rapidcheck/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <set>
+
+#include "fixtures.hpp"
+
+namespace trihedron::io {
+namespace {
+
+using testing::ElementsAre;
+using testing::HasSubstr;
+using testing::IsEmpty;
+using Kind = Defect::Kind;
+
+constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
+
+/// Every claim holds in both formats: the rows go through a file of the format that is the parameter.
+class Screening : public testing::TestWithParam<std::string> {
+ protected:
+  [[nodiscard]] bool csv() const { return GetParam() == "csv"; }
+  [[nodiscard]] std::string gyro_table() const { return csv() ? "gyro.csv" : "group gyro"; }
+  [[nodiscard]] std::string fix_table() const { return csv() ? "star_tracker.csv" : "group star_tracker"; }
+
+  [[nodiscard]] LoadedPass load() const {
+    const std::filesystem::path path = directory_ / (csv() ? "pass" : "pass.nc");
+    csv() ? raw_.save_directory(path) : raw_.save_netcdf(path);
+    return read_pass(path);
+  }
+  [[nodiscard]] std::string load_refused() const {
+    return refusal([&] { static_cast<void>(load()); });
+  }
+
+  TemporaryDirectory directory_;
+  RawPass raw_ = clean_pass();
+};
+
+INSTANTIATE_TEST_SUITE_P(Formats, Screening, testing::Values("csv", "netcdf"),
+                         [](const auto& format) { return format.param; });
+
+TEST_P(Screening, FindsNothingInACleanPass) { EXPECT_THAT(load().defects, IsEmpty()); }
+
+TEST_P(Screening, LeavesOutRowsWithoutATime) {
+  raw_.gyro.rows[10][0] = kNaN;
+  raw_.gyro.rows[20][0] = std::numeric_limits<double>::infinity();
+  const LoadedPass loaded = load();
+  EXPECT_EQ(loaded.pass.gyro.size(), 179U);
+  const Defect defect = only(loaded.defects, Kind::kMissingTime);
+  EXPECT_EQ(defect.count, 2);
+  EXPECT_EQ(defect.where, gyro_table());
+  EXPECT_EQ(defect.first[0].sample, 10);
+  EXPECT_EQ(defect.first[0].line, csv() ? 12 : 0);
+}
+
+TEST_P(Screening, LeavesOutRepeatedTimesKeepingTheFirst) {
+  const auto row = raw_.gyro.rows[10];
+  raw_.gyro.rows.insert(raw_.gyro.rows.begin() + 11, {row[0], 0, 0, 1, 1, 0, 0});
+  const LoadedPass loaded = load();
+  EXPECT_EQ(loaded.pass.gyro.size(), 181U);
+  EXPECT_EQ(loaded.pass.gyro.direction(10, 0).x(), row[1]);
+  const Defect defect = only(loaded.defects, Kind::kRepeatedTime);
+  EXPECT_EQ(defect.count, 1);
+  EXPECT_EQ(defect.first[0].sample, 11);
+  EXPECT_EQ(loaded.defects.size(), 1U);
+}
+
+TEST_P(Screening, LeavesOutATimeThatRunsBackward) {
+  raw_.gyro.rows[100][0] = 1.25;
+  const LoadedPass loaded = load();
+  EXPECT_EQ(loaded.pass.gyro.size(), 180U);
+  const Defect defect = only(loaded.defects, Kind::kBackwardTime);
+  EXPECT_EQ(defect.count, 1);
+  EXPECT_EQ(defect.first[0].t_s, 1.25);
+}
+
+TEST_P(Screening, ATimeThatJumpsAheadCostsOnlyItsOwnRow) {
+  raw_.gyro.rows[10][0] = 80.1;
+  const LoadedPass loaded = load();
+  EXPECT_EQ(loaded.pass.gyro.size(), 180U);
+  EXPECT_EQ(only(loaded.defects, Kind::kBackwardTime).count, 1);
+}
+
+TEST_P(Screening, LeavesOutTimesOutsideThePass) {
+  raw_.star_tracker.rows[5][0] = -4;
+  raw_.star_tracker.rows[6][0] = 1e300;
+  raw_.star_tracker.rows[30][0] = 94;
+  const LoadedPass loaded = load();
+  EXPECT_EQ(loaded.pass.star_tracker.size(), 28U);
+  EXPECT_EQ(only(loaded.defects, Kind::kTimeOutsidePass).count, 3);
+}
+
+TEST_P(Screening, CountsMissingValuesAndKeepsTheirRows) {
+  raw_.gyro.rows[7][2] = kNaN;
+  raw_.gyro.rows[8][4] = -std::numeric_limits<double>::infinity();
+  raw_.star_tracker.rows[4][3] = kNaN;
+  const LoadedPass loaded = load();
+  EXPECT_EQ(loaded.pass.gyro.size(), 181U);
+  EXPECT_EQ(loaded.pass.star_tracker.size(), 31U);
+  ASSERT_EQ(loaded.defects.size(), 3U);
+  EXPECT_EQ(loaded.defects[0].where, gyro_table() + ", gyro 1");
+  EXPECT_EQ(loaded.defects[1].where, gyro_table() + ", gyro 2");
+  EXPECT_EQ(loaded.defects[2].where, fix_table());
+  for (const Defect& defect : loaded.defects) {
+    EXPECT_EQ(defect.kind, Kind::kMissingValue);
+    EXPECT_EQ(defect.count, 1);
+  }
+}
+
+TEST_P(Screening, TellsAWrongNormFromAZeroOneAndFromATolerableOne) {
+  raw_.gyro.rows[3] = {1.5, 1.0011, 0, 0, 0, 0, 0};
+  raw_.gyro.rows[4] = {2.0, 1.0009, 0, 0, 0, 0.9989, 0};
+  raw_.star_tracker.rows[2] = {6, 0, 0, 0, 0.998};
+  raw_.star_tracker.rows[3] = {9, 0, 0, 0, 0};
+  const LoadedPass loaded = load();
+  EXPECT_EQ(loaded.pass.gyro.size(), 181U);
+  std::vector<std::pair<std::string, Kind>> found;
+  for (const Defect& defect : loaded.defects) {
+    EXPECT_EQ(defect.count, 1);
+    found.emplace_back(defect.where, defect.kind);
+  }
+  EXPECT_THAT(found, ElementsAre(std::pair(gyro_table() + ", gyro 1", Kind::kWrongNorm),
+                                 std::pair(gyro_table() + ", gyro 2", Kind::kZeroNorm),
+                                 std::pair(gyro_table() + ", gyro 2", Kind::kWrongNorm),
+                                 std::pair(fix_table(), Kind::kZeroNorm), std::pair(fix_table(), Kind::kWrongNorm)));
+}
+
+TEST_P(Screening, CountsSignFlipsOfTheQuaternion) {
+  for (std::size_t i = 10; i < 15; ++i) {
+    std::for_each(raw_.star_tracker.rows[i].begin() + 1, raw_.star_tracker.rows[i].end(), [](double& v) { v = -v; });
+  }
+  const LoadedPass loaded = load();
+  EXPECT_EQ(only(loaded.defects, Kind::kSignFlip).count, 2);
+  EXPECT_EQ(loaded.pass.star_tracker.q_in_c[12].w(), -std::cos(5e-4 * 36));
+}
+
+TEST_P(Screening, AChangeOfHemisphereOverAGapIsNoFlip) {
+  raw_.star_tracker.rows.erase(raw_.star_tracker.rows.begin() + 10, raw_.star_tracker.rows.begin() + 20);
+  for (std::size_t i = 10; i < raw_.star_tracker.rows.size(); ++i) {
+    std::for_each(raw_.star_tracker.rows[i].begin() + 1, raw_.star_tracker.rows[i].end(), [](double& v) { v = -v; });
+  }
+  const LoadedPass loaded = load();
+  ASSERT_EQ(loaded.defects.size(), 1U);
+  EXPECT_EQ(loaded.defects[0].kind, Kind::kGap);
+}
+
+TEST_P(Screening, CountsEightIdenticalSamplesAsStuckButNotSeven) {
+  const auto freeze = [&](std::size_t first, std::size_t count, std::size_t gyro) {
+    for (std::size_t i = first; i < first + count; ++i) {
+      std::copy_n(raw_.gyro.rows[first].begin() + 1 + static_cast<std::ptrdiff_t>(gyro * 3), 3,
+                  raw_.gyro.rows[i].begin() + 1 + static_cast<std::ptrdiff_t>(gyro * 3));
+    }
+  };
+  freeze(20, 7, 0);
+  EXPECT_THAT(load().defects, IsEmpty());
+  freeze(40, 8, 1);
+  freeze(173, 8, 1);
+  const LoadedPass loaded = load();
+  const Defect defect = only(loaded.defects, Kind::kStuckSamples);
+  EXPECT_EQ(defect.where, gyro_table() + ", gyro 2");
+  EXPECT_EQ(defect.count, 16);
+  EXPECT_EQ(defect.total, std::chrono::seconds(7));
+  EXPECT_EQ(defect.longest, std::chrono::milliseconds(3500));
+  EXPECT_EQ(loaded.defects.size(), 1U);
+}
+
+TEST_P(Screening, MeasuresGapsInsideAndAtBothEnds) {
+  auto& gyro = raw_.gyro.rows;
+  gyro.erase(gyro.begin() + 170, gyro.end());          // 84.5 s … 90 s
+  gyro.erase(gyro.begin() + 100, gyro.begin() + 110);  // 49.5 s … 55 s
+  gyro.erase(gyro.begin(), gyro.begin() + 4);          // 0 s … 2 s
+  const LoadedPass loaded = load();
+  const Defect defect = only(loaded.defects, Kind::kGap);
+  EXPECT_EQ(defect.count, 3);
+  EXPECT_EQ(defect.total, std::chrono::seconds(13));
+  EXPECT_EQ(defect.longest, std::chrono::milliseconds(5500));
+  EXPECT_THAT(defect.text(), HasSubstr(": 3 gaps, 13 s in total, the longest 5.5 s, not filled; first: "));
+}
+
+TEST_P(Screening, OneAndAHalfPeriodsAreNoGapYet) {
+  raw_.star_tracker.rows[10][0] += 1.5;
+  EXPECT_THAT(load().defects, IsEmpty());
+  raw_.star_tracker.rows[10][0] += 0.1;
+  EXPECT_EQ(only(load().defects, Kind::kGap).count, 1);
+}
+
+TEST_P(Screening, ReportsAGyroThatIsSilentForAMinute) {
+  for (std::size_t i = 20; i <= 140; ++i) {
+    raw_.gyro.rows[i][4] = raw_.gyro.rows[i][5] = raw_.gyro.rows[i][6] = i % 2 == 0 ? kNaN : 0;
+  }
+  const Defect defect = only(load().defects, Kind::kSilentGyro);
+  EXPECT_EQ(defect.count, 1);
+  EXPECT_EQ(defect.where, gyro_table() + ", gyro 2");
+  EXPECT_EQ(defect.longest, std::chrono::seconds(60));
+}
+
+TEST_P(Screening, RefusesAGyroThatIsSilentAllPassLong) {
+  for (const double silence : {kNaN, 0.0}) {
+    for (auto& row : raw_.gyro.rows) {
+      row[4] = row[5] = row[6] = silence;
+    }
+    EXPECT_THAT(load_refused(), HasSubstr(gyro_table() + ", gyro 2 is silent all pass long"));
+  }
+}
+
+TEST_P(Screening, RefusesTelemetryShorterThanAMinute) {
+  raw_.gyro.rows.resize(119);
+  EXPECT_THAT(load_refused(), HasSubstr("covers less than a minute"));
+  raw_ = clean_pass();
+  raw_.gyro.rows.resize(120);
+  EXPECT_EQ(load_refused(), "");
+}
+
+TEST_P(Screening, RefusesSamplesThatAreAllOutsideThePass) {
+  for (auto& row : raw_.gyro.rows) {
+    row[0] += 1e6;
+  }
+  EXPECT_THAT(load_refused(), HasSubstr("has no samples with a time inside the pass"));
+}
+
+TEST_P(Screening, RefusesFixesOfWhichNotOneIsUsable) {
+  for (auto& row : raw_.star_tracker.rows) {
+    row[4] = kNaN;
+  }
+  EXPECT_THAT(load_refused(), HasSubstr("no fix at all"));
+}
+
+TEST_P(Screening, KeepsTheFirstPlacesAndTheWholeCount) {
+  for (std::size_t i = 0; i < 20; ++i) {
+    raw_.gyro.rows[2 * i][1] = kNaN;
+  }
+  const Defect defect = only(load().defects, Kind::kMissingValue);
+  EXPECT_EQ(defect.count, 20);
+  EXPECT_EQ(defect.first.size(), Defect::kPlaces);
+  EXPECT_EQ(defect.text(), gyro_table() +
+                               ", gyro 1: 20 rows with a missing value, kept for the estimator to reject; first: " +
+                               (csv() ? "line 2 (t_s 0), line 4 (t_s 1), line 6 (t_s 2)."
+                                      : "sample 0 (t_s 0), sample 2 (t_s 1), sample 4 (t_s 2)."));
+}
+
+TEST(Defect, EveryKindHasASentenceAndItsOwnName) {
+  std::set<std::string> names;
+  for (int kind = 0; kind <= static_cast<int>(Kind::kGap); ++kind) {
+    const Defect defect{static_cast<Kind>(kind), "gyro.csv", 2, {{7, 5, kNaN}}, {}, {}};
+    EXPECT_THAT(defect.text(), testing::StartsWith("gyro.csv: 2 ")) << kind;
+    EXPECT_THAT(defect.text(), testing::EndsWith("; first: line 7.")) << kind;
+    names.insert(name_of(defect.kind));
+  }
+  EXPECT_EQ(names.size(), static_cast<std::size_t>(Kind::kGap) + 1);
+}
+
+RC_GTEST_PROP(LongestIncreasing, KeepsTheMostRowsThatIncrease, ()) {
+  const auto ticks = *rc::gen::container<std::vector<int>>(rc::gen::inRange(0, 30));
+  RC_PRE(ticks.size() <= 60U);
+  std::vector<Time> t;
+  std::vector<std::size_t> rows;
+  for (const int tick : ticks) {
+    rows.push_back(rows.size());
+    t.push_back(Time(Duration(tick)));
+  }
+  const auto kept = longest_increasing(t, rows);
+  for (std::size_t i = 1; i < kept.size(); ++i) {
+    RC_ASSERT(kept[i] > kept[i - 1]);
+    RC_ASSERT(t[kept[i]] > t[kept[i - 1]]);
+  }
+  // The plain quadratic recursion, for comparison.
+  std::vector<std::size_t> best(t.size(), 1);
+  for (std::size_t i = 0; i < t.size(); ++i) {
+    for (std::size_t j = 0; j < i; ++j) {
+      if (t[j] < t[i]) {
+        best[i] = std::max(best[i], best[j] + 1);
+      }
+    }
+  }
+  RC_ASSERT(kept.size() == (best.empty() ? 0 : *std::ranges::max_element(best)));
+}
+
+}  // namespace
+}  // namespace trihedron::io

@@ -1,0 +1,311 @@
+#include "figures.hpp"
+
+#include <algorithm>
+#include <array>
+#include <boost/math/distributions/chi_squared.hpp>
+#include <boost/math/distributions/normal.hpp>
+#include <cmath>
+#include <functional>
+#include <numeric>
+
+#include "decimate.hpp"
+#include "innovations.hpp"
+#include "trihedron/core/telemetry.hpp"
+#include "units.hpp"
+
+namespace trihedron::report {
+namespace {
+
+using nlohmann::json;
+
+/// Stretches of time that a figure tells apart: about the pixels of a figure across the page, or of one in two columns.
+constexpr std::size_t kWide = 700;
+constexpr std::size_t kHalf = 350;
+constexpr std::size_t kTrack = 1500;
+
+/// A gap of a line is a hole of more fixes than a few lost ones.
+constexpr double kFixesOfGap = 10;
+
+class Figures {
+ public:
+  Figures(const ReportInput& input, const std::vector<Parameter>& parameters)
+      : input_(input),
+        run_(input.run),
+        parameters_(parameters),
+        fix_step_min_(kFixesOfGap * to_minutes(input.pass.settings.star_tracker_period)) {}
+
+  [[nodiscard]] json all() const {
+    json data = {{"duration_min", to_minutes(input_.pass.settings.duration)}, {"gyros", run_.calibration.gyros.size()}};
+    const auto put = [&](const char* name, json value) {
+      if (!value.empty()) {
+        data[name] = std::move(value);
+      }
+    };
+    put("parameters", parameters());
+    put("corrections", corrections());
+    if (input_.evaluation) {
+      put("navigation", errors(input_.evaluation->navigation, kArcminute_rad));
+      put("attitude", errors(input_.evaluation->attitude, kArcsecond_rad));
+    }
+    put("innovations", innovations());
+    put("histogram", histogram());
+    put("nis", nis());
+    put("correlation", correlation());
+    put("tracks", tracks());
+    put("angle", angle());
+    put("telemetry", telemetry());
+    return data;
+  }
+
+ private:
+  [[nodiscard]] double minutes(Time t) const { return to_minutes(t - run_.calibration.epoch); }
+
+  [[nodiscard]] json parameters() const {
+    json figures = json::object();
+    const ground::ParameterHistory& history = run_.parameters;
+    for (std::size_t column = 0; column < parameters_.size() && !history.t.empty(); ++column) {
+      const Parameter& parameter = parameters_[column];
+      const double unit = parameter.is_alignment ? kArcminute_rad : kMicroradian;
+      Series series(2, fix_step_min_);
+      for (std::size_t row = 0; row < history.t.size(); ++row) {
+        series.add(minutes(history.t[row]), {history.value[row][column] / unit, history.sigma[row][column] / unit});
+      }
+      json figure = series.drawn(kHalf);
+      figure["gyro"] = parameter.gyro + 1;
+      figure["name"] = parameter.name;
+      figure["symbol"] = parameter.symbol;
+      figure["final"] = parameter.value / unit;
+      figure["final_sigma"] = parameter.sigma / unit;
+      if (parameter.truth) {
+        figure["truth"] = *parameter.truth / unit;
+      }
+      if (parameter.converged_min) {
+        figure["converged"] = *parameter.converged_min;
+      }
+      figures[parameter.state] = std::move(figure);
+    }
+    return figures;
+  }
+
+  [[nodiscard]] json corrections() const {
+    json times = json::array();
+    for (const ground::FixRecord& fix : run_.fixes) {
+      if (fix.corrected_navigator) {
+        times.push_back(rounded(minutes(fix.t), 6));
+      }
+    }
+    return times;
+  }
+
+  /// Roll, pitch, heading: error and, where claimed, sigma.
+  [[nodiscard]] json errors(const ground::AttitudeErrors& errors, double unit) const {
+    json axes = json::array();
+    for (Eigen::Index axis = 0; axis < 3 && !errors.t.empty(); ++axis) {
+      Series series(errors.sigma_rad.empty() ? 1 : 2, fix_step_min_);
+      for (std::size_t i = 0; i < errors.t.size(); ++i) {
+        const double error = errors.error_rad[i](axis) / unit;
+        if (errors.sigma_rad.empty()) {
+          series.add(minutes(errors.t[i]), {error});
+        } else {
+          series.add(minutes(errors.t[i]), {error, errors.sigma_rad[i](axis) / unit});
+        }
+      }
+      axes.push_back(series.drawn(kWide));
+    }
+    return axes;
+  }
+
+  /// Per component the used ones with their sigmas, and the ones that the gate rejected.
+  [[nodiscard]] json innovations() const {
+    json components = json::array();
+    for (std::size_t i = 0; i < kInnovations; ++i) {
+      Series used(2, fix_step_min_);
+      Series rejected(1, to_minutes(input_.pass.settings.duration));
+      for (const ground::FixRecord& fix : run_.fixes) {
+        if (fix.status == FixStatus::kUsed) {
+          used.add(minutes(fix.t), {fix.innovation[i] / kArcsecond_rad, fix.innovation_sigma[i] / kArcsecond_rad});
+        } else if (fix.status == FixStatus::kRejectedByGate) {
+          rejected.add(minutes(fix.t), {fix.innovation[i] / kArcsecond_rad});
+        }
+      }
+      if (used.empty() && rejected.empty()) {
+        return json::array();
+      }
+      components.push_back({{"used", used.drawn(kHalf)}, {"rejected", rejected.drawn(kHalf)}});
+    }
+    return components;
+  }
+
+  [[nodiscard]] json histogram() const {
+    constexpr double kWidth = 0.25;
+    constexpr int kBins = 40;
+    std::vector<double> count(kBins, 0);
+    double total = 0;
+    long outside = 0;
+    for_each_normalised(run_.fixes, [&](std::size_t, double value) {
+      ++total;
+      const int bin = static_cast<int>(std::floor(std::clamp(value / kWidth, -1e6, 1e6))) + kBins / 2;
+      if (bin >= 0 && bin < kBins) {
+        ++count[static_cast<std::size_t>(bin)];
+      } else {
+        ++outside;
+      }
+    });
+    if (total == 0) {
+      return {};
+    }
+    const boost::math::normal normal;
+    json centre = json::array();
+    json density = json::array();
+    json expected = json::array();
+    for (int bin = 0; bin < kBins; ++bin) {
+      const double x = (bin - kBins / 2 + 0.5) * kWidth;
+      centre.push_back(x);
+      density.push_back(rounded(count[static_cast<std::size_t>(bin)] / total / kWidth, 4));
+      expected.push_back(rounded(boost::math::pdf(normal, x), 4));
+    }
+    return {{"x", centre}, {"density", density}, {"normal", expected}, {"width", kWidth}, {"outside", outside}};
+  }
+
+  [[nodiscard]] json nis() const {
+    Series used(1, fix_step_min_);
+    Series rejected(1, to_minutes(input_.pass.settings.duration));
+    std::vector<double> t;
+    std::vector<double> nis;
+    for (const ground::FixRecord& fix : run_.fixes) {
+      if (fix.status == FixStatus::kUsed) {
+        used.add(minutes(fix.t), {fix.nis});
+        t.push_back(minutes(fix.t));
+        nis.push_back(fix.nis);
+      } else if (fix.status == FixStatus::kRejectedByGate) {
+        rejected.add(minutes(fix.t), {fix.nis});
+      }
+    }
+    if (used.empty()) {
+      return {};
+    }
+    const boost::math::chi_squared one(kInnovations);
+    json figure = {{"used", used.drawn(kWide)},
+                   {"rejected", rejected.drawn(kWide)},
+                   {"expected", kInnovations},
+                   {"low", boost::math::quantile(one, 0.025)},
+                   {"high", boost::math::quantile(one, 0.975)},
+                   {"gate", run_.options.gate_nis}};
+    const std::size_t window = std::min<std::size_t>(100, nis.size());
+    const double sum_freedom = static_cast<double>(kInnovations * window);
+    const boost::math::chi_squared sum(sum_freedom);
+    Series mean(1, fix_step_min_);
+    double total = std::accumulate(nis.begin(), nis.begin() + static_cast<std::ptrdiff_t>(window), 0.0);
+    for (std::size_t end = window; end <= nis.size(); ++end) {
+      mean.add((t[end - window] + t[end - 1]) / 2, {total / static_cast<double>(window)});
+      if (end < nis.size()) {
+        total += nis[end] - nis[end - window];
+      }
+    }
+    figure["mean"] = mean.drawn(kWide);
+    figure["window"] = window;
+    figure["mean_low"] = boost::math::quantile(sum, 0.025) / static_cast<double>(window);
+    figure["mean_high"] = boost::math::quantile(sum, 0.975) / static_cast<double>(window);
+    return figure;
+  }
+
+  [[nodiscard]] json correlation() const {
+    json names = json::array();
+    json rows = json::array();
+    const Eigen::MatrixXd& covariance = run_.calibration.covariance;
+    for (std::size_t i = 0; i < parameters_.size(); ++i) {
+      names.push_back({{"gyro", parameters_[i].gyro + 1}, {"symbol", parameters_[i].symbol}});
+      json row = json::array();
+      for (std::size_t j = 0; j < parameters_.size(); ++j) {
+        const double rho = covariance(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j)) /
+                           (parameters_[i].sigma * parameters_[j].sigma);
+        row.push_back(std::round(rho * 1000) / 1000);
+      }
+      rows.push_back(std::move(row));
+    }
+    return names.empty() ? json{} : json{{"names", names}, {"values", rows}};
+  }
+
+  /// Of each momentum in its case axes: x, y, z over time.
+  [[nodiscard]] json tracks() const {
+    json figures = json::array();
+    const GyroTelemetry& gyro = input_.pass.gyro;
+    for (int k = 0; k < gyro.gyros && gyro.size() > 0; ++k) {
+      Series series(3, kFixesOfGap * to_minutes(input_.pass.settings.gyro_period));
+      for (std::size_t i = 0; i < gyro.size(); ++i) {
+        const Eigen::Vector3d h = gyro.direction(i, k);
+        if (nearly_unit(h.norm())) {
+          series.add(minutes(gyro.t[i]), {h.x(), h.y(), h.z()});
+        }
+      }
+      figures.push_back(series.drawn(kTrack));
+    }
+    return figures;
+  }
+
+  /// z1, in 1e-6.
+  [[nodiscard]] json angle() const {
+    Series series(2, fix_step_min_);
+    for (std::size_t i = 0; i < run_.angle_t.size(); ++i) {
+      series.add(minutes(run_.angle_t[i]), {run_.angle_residual_min[i] * 1e6, run_.angle_residual_max[i] * 1e6});
+    }
+    return series.empty() ? json{} : series.drawn(kWide);
+  }
+
+  /// Per stretch of time what came and what was done with it, in parts of what should have come.
+  [[nodiscard]] json telemetry() const {
+    const PassSettings& settings = input_.pass.settings;
+    const double duration_min = to_minutes(settings.duration);
+    if (!(duration_min > 0)) {
+      return {};
+    }
+    const double width_min = std::max(1.0, std::ceil(duration_min / 180));
+    const auto bins = static_cast<std::size_t>(std::ceil(duration_min / width_min));
+    const auto bin_of = [&](Time t) {
+      return std::min(bins - 1, static_cast<std::size_t>(std::max(0.0, minutes(t) / width_min)));
+    };
+    using Counts = std::vector<double>;
+    const Counts none(bins, 0);
+
+    std::array<Counts, 2> gyro{none, none};  // good, bad
+    for (std::size_t i = 0; i < input_.pass.gyro.size(); ++i) {
+      bool good = true;
+      for (int k = 0; k < input_.pass.gyro.gyros; ++k) {
+        good = good && nearly_unit(input_.pass.gyro.direction(i, k).norm());
+      }
+      ++gyro[good ? 0 : 1][bin_of(input_.pass.gyro.t[i])];
+    }
+    std::array<Counts, 3> fixes{none, none, none};  // used, rejected by the gate, rejected for another reason
+    for (const ground::FixRecord& fix : run_.fixes) {
+      const bool by_gate = fix.status == FixStatus::kRejectedByGate;
+      ++fixes[fix.used() ? 0 : by_gate ? 1 : 2][bin_of(fix.t)];
+    }
+    const auto percent = [&](const Counts& counts, Duration period) {
+      json result = json::array();
+      for (std::size_t bin = 0; bin < bins; ++bin) {
+        const double length_min = std::min(width_min, duration_min - static_cast<double>(bin) * width_min);
+        result.push_back(rounded(100 * counts[bin] * to_minutes(period) / length_min, 4));
+      }
+      return result;
+    };
+    return {{"width", width_min},
+            {"bins", bins},
+            {"gyro", {percent(gyro[0], settings.gyro_period), percent(gyro[1], settings.gyro_period)}},
+            {"fixes",
+             {percent(fixes[0], settings.star_tracker_period), percent(fixes[1], settings.star_tracker_period),
+              percent(fixes[2], settings.star_tracker_period)}}};
+  }
+
+  const ReportInput& input_;
+  const ground::CalibrationRun& run_;
+  const std::vector<Parameter>& parameters_;
+  double fix_step_min_;
+};
+
+}  // namespace
+
+json figure_data(const ReportInput& input, const std::vector<Parameter>& parameters) {
+  return Figures(input, parameters).all();
+}
+
+}  // namespace trihedron::report

@@ -1,0 +1,15 @@
+#pragma once
+/// The numbers behind the figures, decimated and in the units of their axes; assets/figures.js draws them.
+
+#include <nlohmann/json.hpp>
+#include <vector>
+
+#include "parameters.hpp"
+#include "trihedron/report/report.hpp"
+
+namespace trihedron::report {
+
+/// One member per figure; a figure without data has none.
+[[nodiscard]] nlohmann::json figure_data(const ReportInput& input, const std::vector<Parameter>& parameters);
+
+}  // namespace trihedron::report

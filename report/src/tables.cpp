@@ -1,0 +1,320 @@
+#include "tables.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <chrono>
+#include <cmath>
+#include <map>
+#include <set>
+
+#include "innovations.hpp"
+#include "units.hpp"
+#include "wording.hpp"
+
+namespace trihedron::report {
+namespace {
+
+using nlohmann::json;
+
+constexpr std::array<const char*, 3> kAxes = {"roll", "pitch", "heading"};
+
+// ---- Parameters
+
+json row_of(const Parameter& parameter) {
+  json row = {
+      {"symbol", parameter.symbol},
+      {"name", parameter.name},
+      {"undetermined", !parameter.determined()},
+      {"shrunk", parameter.first_sigma > 0 ? significant(100 * parameter.sigma / parameter.first_sigma, 2) : "—"},
+      {"converged", parameter.converged_min ? number(*parameter.converged_min, 0) : "not yet"}};
+  if (!parameter.determined()) {
+    row["converged"] = "—";
+  }
+  const auto put = [&](const std::string& suffix, double unit, double sigma_unit, double error_unit) {
+    const int decimals = decimals_for(parameter.sigma / unit);
+    row["value" + suffix] = signed_number(parameter.value / unit, decimals);
+    row["sigma" + suffix] = number(parameter.sigma / sigma_unit, decimals_for(parameter.sigma / sigma_unit));
+    row["truth" + suffix] = parameter.truth ? signed_number(*parameter.truth / unit, decimals) : "—";
+    row["error" + suffix] =
+        parameter.error ? signed_number(*parameter.error / error_unit, decimals_for(parameter.sigma / error_unit))
+                        : "—";
+  };
+  if (parameter.is_alignment) {
+    put("", kArcminute_rad, kArcsecond_rad, kArcsecond_rad);
+  } else {
+    put("", kMicroradian, kMicroradian, kMicroradian);
+    put("_deg_h", kDegreePerHour_rad_s, kDegreePerHour_rad_s, kDegreePerHour_rad_s);
+  }
+  const double ratio = parameter.error ? *parameter.error / parameter.sigma : 0;
+  row["ratio"] = parameter.error ? signed_number(ratio, 1) : "—";
+  row["beyond_3_sigma"] = !(std::abs(ratio) <= 3);
+  return row;
+}
+
+json gyros_of(const ReportInput& input, const std::vector<Parameter>& parameters) {
+  json gyros = json::array();
+  for (std::size_t k = 0; k < input.run.calibration.gyros.size(); ++k) {
+    json gyro = {{"number", k + 1},
+                 {"model", input.run.calibration.gyros[k].drift_model},
+                 {"drift", json::array()},
+                 {"alignment", json::array()},
+                 {"unmodelled", json::array()}};
+    for (const Parameter& parameter : parameters) {
+      if (parameter.gyro == k) {
+        gyro[parameter.is_alignment ? "alignment" : "drift"].push_back(row_of(parameter));
+      }
+    }
+    if (input.truth != nullptr && k < input.truth->gyros.size()) {
+      for (const auto& [name, value] : input.truth->gyros[k].unmodelled_rad_s) {
+        gyro["unmodelled"].push_back({{"name", name}, {"value", signed_number(value / kMicroradian, 4)}});
+      }
+    }
+    gyros.push_back(std::move(gyro));
+  }
+  return gyros;
+}
+
+/// The drift coefficients of any gyro, once each, for the choice of figures. Those of the paper's Figs 5–7 are shown
+/// first.
+json coefficients_of(const std::vector<Parameter>& parameters) {
+  const std::map<std::string, std::string> in_paper = {{"k0", "Fig. 5"}, {"mu31", "Fig. 6"}, {"nu31", "Fig. 7"}};
+  const bool any_in_paper =
+      std::any_of(parameters.begin(), parameters.end(), [&](const Parameter& p) { return in_paper.contains(p.name); });
+  json list = json::array();
+  std::set<std::string> seen;
+  for (const Parameter& parameter : parameters) {
+    if (parameter.is_alignment || !seen.insert(parameter.name).second) {
+      continue;
+    }
+    const auto figure = in_paper.find(parameter.name);
+    const bool shown = any_in_paper ? figure != in_paper.end() : list.size() < 3;
+    list.push_back({{"name", parameter.name},
+                    {"symbol", parameter.symbol},
+                    {"paper", figure == in_paper.end() ? "" : figure->second},
+                    {"shown", shown}});
+  }
+  return list;
+}
+
+json strongest_correlations(const ReportInput& input, const std::vector<Parameter>& parameters) {
+  struct Pair {
+    double rho;
+    std::string names;
+  };
+  std::vector<Pair> pairs;
+  for (std::size_t i = 0; i < parameters.size(); ++i) {
+    for (std::size_t j = 0; j < i; ++j) {
+      const double rho = input.run.calibration.covariance(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j)) /
+                         (parameters[i].sigma * parameters[j].sigma);
+      if (std::abs(rho) >= 0.5) {
+        pairs.push_back({rho, parameters[j].full_symbol() + " and " + parameters[i].full_symbol()});
+      }
+    }
+  }
+  std::stable_sort(pairs.begin(), pairs.end(),
+                   [](const Pair& a, const Pair& b) { return std::abs(a.rho) > std::abs(b.rho); });
+  pairs.resize(std::min<std::size_t>(pairs.size(), 6));
+  json list = json::array();
+  for (const Pair& pair : pairs) {
+    list.push_back({{"rho", signed_number(pair.rho, 3)}, {"names", pair.names}});
+  }
+  return list;
+}
+
+// ---- Attitude
+
+json stretches_of(const ReportInput& input, const ground::AttitudeErrors& errors, double unit) {
+  json rows = json::array();
+  for (const auto& stretch : ground::statistics_by_stretch(errors, input.pass.settings.epoch, kStretch)) {
+    json row = {{"from", number(to_minutes(stretch.from - input.pass.settings.epoch), 0)},
+                {"to", number(to_minutes(stretch.to - input.pass.settings.epoch), 0)},
+                {"count", number(static_cast<double>(stretch.count), 0)},
+                {"total", number(stretch.max_total_rad / unit, 2)}};
+    for (std::size_t axis = 0; axis < kAxes.size(); ++axis) {
+      row[std::string("rms_") + kAxes[axis]] = number(stretch.rms_rad(static_cast<Eigen::Index>(axis)) / unit, 2);
+      row[std::string("max_") + kAxes[axis]] = number(stretch.max_rad(static_cast<Eigen::Index>(axis)) / unit, 2);
+    }
+    row["honesty"] = stretch.normalised_square ? number(*stretch.normalised_square, 2) : "—";
+    rows.push_back(std::move(row));
+  }
+  return rows;
+}
+
+json intervals_of(const ReportInput& input) {
+  json rows = json::array();
+  for (const ground::CorrectionInterval& interval : input.evaluation->intervals) {
+    rows.push_back({{"corrected", number(to_minutes(interval.corrected - input.pass.settings.epoch), 0)},
+                    {"observed", number(to_minutes(interval.observed), 0)},
+                    {"passed", interval.passed ? number(to_minutes(*interval.passed), 1) + " min" : "not passed"},
+                    {"total", number(interval.max_total_rad / kArcminute_rad, 2)}});
+  }
+  return rows;
+}
+
+json evaluation_of(const ReportInput& input) {
+  if (!input.evaluation || (input.evaluation->navigation.t.empty() && input.evaluation->attitude.t.empty())) {
+    return nullptr;
+  }
+  const Evaluation& evaluation = *input.evaluation;
+  return {{"reference", evaluation.reference},
+          {"navigation", stretches_of(input, evaluation.navigation, kArcminute_rad)},
+          {"attitude", stretches_of(input, evaluation.attitude, kArcsecond_rad)},
+          {"intervals", intervals_of(input)},
+          {"has_intervals", !evaluation.intervals.empty()},
+          {"limit", fmt::format("{:.3g}", evaluation.limit_rad / kArcminute_rad)}};
+}
+
+// ---- Innovations
+
+json innovation_rows(const ReportInput& input) {
+  static constexpr std::array<const char*, kInnovations> kNames = {"gyro 1, first", "gyro 1, second", "gyro 2, first",
+                                                                   "gyro 2, second"};
+  struct Sums {
+    double count = 0, sum = 0, squares = 0, beyond = 0;
+  };
+  std::array<Sums, kInnovations> sums;
+  for_each_normalised(input.run.fixes, [&](std::size_t i, double value) {
+    ++sums[i].count;
+    sums[i].sum += value;
+    sums[i].squares += value * value;
+    sums[i].beyond += std::abs(value) > 3;
+  });
+  json rows = json::array();
+  for (std::size_t i = 0; i < kInnovations && sums[i].count > 0; ++i) {
+    const double mean = sums[i].sum / sums[i].count;
+    rows.push_back({{"name", kNames[i]},
+                    {"mean", signed_number(mean, 3)},
+                    {"deviation", number(std::sqrt(sums[i].squares / sums[i].count - mean * mean), 3)},
+                    {"beyond", number(100 * sums[i].beyond / sums[i].count, 2)}});
+  }
+  return rows;
+}
+
+// ---- Telemetry
+
+json counts_of(const std::map<std::string, long>& counts) {
+  json rows = json::array();
+  long total = 0;
+  for (const auto& [name, count] : counts) {
+    total += count;
+  }
+  for (const auto& [name, count] : counts) {
+    const double percent = 100 * static_cast<double>(count) / static_cast<double>(total);
+    rows.push_back({{"name", name}, {"count", number(static_cast<double>(count), 0)}, {"percent", number(percent, 2)}});
+  }
+  return rows;
+}
+
+struct Gap {
+  const char* sensor;
+  Time from;
+  Duration length;
+};
+
+void find_gaps(const char* sensor, const std::vector<Time>& t, Duration longest_step, const PassSettings& settings,
+               std::vector<Gap>& gaps) {
+  Time last = settings.epoch;
+  const auto step_to = [&](Time next) {
+    if (next - last > longest_step) {
+      gaps.push_back({sensor, last, next - last});
+    }
+    last = next;
+  };
+  std::for_each(t.begin(), t.end(), step_to);
+  step_to(settings.epoch + settings.duration);
+}
+
+void put_gaps(const ReportInput& input, json& values) {
+  const PassSettings& settings = input.pass.settings;
+  std::vector<Gap> gaps;
+  find_gaps("gyros", input.pass.gyro.t, std::max<Duration>(8 * settings.gyro_period, std::chrono::seconds(1)), settings,
+            gaps);
+  find_gaps("star tracker", input.pass.star_tracker.t, 10 * settings.star_tracker_period, settings, gaps);
+  std::stable_sort(gaps.begin(), gaps.end(), [](const Gap& a, const Gap& b) { return a.length > b.length; });
+  constexpr std::size_t kShown = 12;
+  values["gaps"] = json::array();
+  for (const Gap& gap : gaps) {
+    if (values["gaps"].size() < kShown) {
+      values["gaps"].push_back({{"sensor", gap.sensor},
+                                {"from", number(to_minutes(gap.from - settings.epoch), 1)},
+                                {"length", span(gap.length)}});
+    }
+  }
+  values["more_gaps"] = gaps.size() > kShown ? std::to_string(gaps.size() - kShown) : "";
+}
+
+json settings_of(const ReportInput& input) {
+  const CalibrationOptions& options = input.run.options;
+  json rows = json::array();
+  const auto put = [&](const std::string& name, const std::string& value) {
+    rows.push_back({{"name", name}, {"value", value}});
+  };
+  put("Estimator", input.run.calibration.estimator);
+  put("Drift model", options.drift_model);
+  put("Process noise of each momentum",
+      fmt::format("{}″ per √h", significant(options.direction_random_walk_rad_sqrt_s * 60 / kArcsecond_rad, 2)));
+  put("Gate", fmt::format("fixes with a NIS above {:.4g} are rejected", options.gate_nis));
+  put("Reopening", fmt::format("after {} rejections in a row", options.reopen_after_rejections));
+  using When = CorrectionOptions::When;
+  const CorrectionOptions& corrections = options.corrections;
+  put("Navigator corrected", corrections.when == When::kEachFix     ? "at every fix"
+                             : corrections.when == When::kOnlyFirst ? "at the first fix only"
+                                                                    : "every " + span(corrections.interval));
+  put("Parameters at a correction", corrections.take_parameters ? "taken from the calibration" : "held");
+  for (std::size_t k = 0; k < input.pass.settings.gyros.size(); ++k) {
+    put(fmt::format("Readout noise of gyro {}", k + 1),
+        significant(input.pass.settings.gyros[k].readout_noise_rad / kArcsecond_rad, 3) + "″ per direction cosine, 1σ");
+  }
+  put("Star-tracker noise",
+      of_axes(input.pass.settings.star_tracker_noise_rad, kArcsecond_rad) + " ″ about roll / pitch / heading, 1σ");
+  return rows;
+}
+
+json statistics_rows(const std::map<std::string, double>& statistics) {
+  json rows = json::array();
+  for (const auto& [name, value] : statistics) {
+    rows.push_back({{"name", name}, {"value", fmt::format("{:.6g}", value)}});
+  }
+  return rows;
+}
+
+json facts_of(const ReportInput& input) {
+  const PassSettings& settings = input.pass.settings;
+  const auto fact = [](const std::string& name, const std::string& value) -> json {
+    return {{"name", name}, {"value", value}};
+  };
+  return {fact("Start", calendar(settings.epoch)), fact("Length", span(settings.duration)),
+          fact("Gyros", fmt::format("{}, {} samples", input.pass.gyro.gyros,
+                                    number(static_cast<double>(input.pass.gyro.size()), 0))),
+          fact("Star tracker", counted(static_cast<long>(input.pass.star_tracker.size()), "fix", "fixes")),
+          fact("Estimator",
+               fmt::format("{}, drift model {}", input.run.calibration.estimator, input.run.options.drift_model))};
+}
+
+}  // namespace
+
+json table_values(const ReportInput& input, const std::vector<Parameter>& parameters) {
+  const std::string& spacecraft = input.pass.settings.spacecraft;
+  json values = {{"spacecraft", spacecraft.empty() ? "Unnamed spacecraft" : spacecraft},
+                 {"facts", facts_of(input)},
+                 {"gyros", gyros_of(input, parameters)},
+                 {"has_truth", input.truth != nullptr},
+                 {"coefficients", coefficients_of(parameters)},
+                 {"correlations", strongest_correlations(input, parameters)},
+                 {"evaluation", evaluation_of(input)},
+                 {"innovation_rows", innovation_rows(input)},
+                 {"fix_counts", counts_of(input.run.fix_counts)},
+                 {"sample_counts", counts_of(input.run.samples)},
+                 {"telemetry_notes", input.telemetry_notes},
+                 {"settings", settings_of(input)},
+                 {"statistics", statistics_rows(input.run.calibration.statistics)}};
+  put_gaps(input, values);
+  for (const char* list : {"correlations", "gaps", "telemetry_notes"}) {
+    values[std::string("has_") + list] = !values[list].empty();
+  }
+  return values;
+}
+
+}  // namespace trihedron::report

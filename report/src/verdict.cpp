@@ -1,0 +1,252 @@
+#include "verdict.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <set>
+
+#include "units.hpp"
+#include "wording.hpp"
+
+namespace trihedron::report {
+namespace {
+
+using nlohmann::json;
+using Severity = Finding::Severity;
+
+const char* word_of(Severity severity) {
+  switch (severity) {
+    case Severity::kNote:
+      return "Note";
+    case Severity::kWarning:
+      return "Warning";
+    case Severity::kDoNotUse:
+      return "Do not use";
+  }
+  return "Warning";
+}
+
+const char* style_of(Severity severity) {
+  switch (severity) {
+    case Severity::kNote:
+      return "note";
+    case Severity::kWarning:
+      return "caution";
+    case Severity::kDoNotUse:
+      return "bad";
+  }
+  return "caution";
+}
+
+json verdict_of(const Verdict& verdict) {
+  std::vector<Finding> findings = verdict.findings;
+  std::stable_sort(findings.begin(), findings.end(),
+                   [](const Finding& a, const Finding& b) { return a.severity > b.severity; });
+  const long warnings = std::count_if(findings.begin(), findings.end(),
+                                      [](const Finding& f) { return f.severity == Severity::kWarning; });
+  json result = {{"findings", json::array()}, {"to_do", json::array()}};
+  std::set<std::string> cures;
+  for (const Finding& finding : findings) {
+    result["findings"].push_back({{"style", style_of(finding.severity)},
+                                  {"word", word_of(finding.severity)},
+                                  {"code", finding.code},
+                                  {"text", finding.text},
+                                  {"evidence", finding.evidence},
+                                  {"cure", finding.cure}});
+    if (finding.severity != Severity::kNote && !finding.cure.empty() && cures.insert(finding.cure).second) {
+      result["to_do"].push_back(finding.cure);
+    }
+  }
+  if (!verdict.trustworthy) {
+    result["style"] = "bad";
+    result["word"] = "Do not use";
+    result["lead"] = findings.empty() ? "The calibration was judged untrustworthy." : findings.front().text;
+  } else if (warnings > 0) {
+    result["style"] = "caution";
+    result["word"] = "Trustworthy, with " + counted(warnings, "warning", "warnings");
+    result["lead"] = "The result can be used as it is. What to keep in mind: " + findings.front().text;
+  } else {
+    result["style"] = "good";
+    result["word"] = "Trustworthy";
+    result["lead"] =
+        "The result can be used as it is: the telemetry agrees with the model, and the fixes scatter as much as the "
+        "noise figures say.";
+  }
+  return result;
+}
+
+json figure_of_merit(const std::string& name, const std::string& value, const std::string& unit,
+                     const std::string& note) {
+  return {{"name", name}, {"value", value}, {"unit", unit}, {"note", note}};
+}
+
+/// Statistics per 90 min, without the rest of a stretch that the end of the pass cut short.
+std::vector<ground::ErrorStatistics> whole_stretches(const ReportInput& input, const ground::AttitudeErrors& errors) {
+  auto stretches = ground::statistics_by_stretch(errors, input.pass.settings.epoch, kStretch);
+  while (stretches.size() > 1 && stretches.back().to - stretches.back().from < kStretch / 2) {
+    stretches.pop_back();
+  }
+  return stretches;
+}
+
+json attitude_number(const ReportInput& input) {
+  if (input.evaluation && !input.evaluation->attitude.t.empty()) {
+    const auto stretches = whole_stretches(input, input.evaluation->attitude);
+    return figure_of_merit("Attitude error while calibrating", of_axes(stretches.back().rms_rad, kArcsecond_rad), "″",
+                           "roll / pitch / heading, rms in the last 90 min against " + input.evaluation->reference);
+  }
+  if (!input.run.attitude.sigma_rad.empty()) {
+    return figure_of_merit("Attitude at the end", of_axes(input.run.attitude.sigma_rad.back(), kArcsecond_rad), "″",
+                           "roll / pitch / heading, 1σ as claimed; there is nothing to compare it with");
+  }
+  return nullptr;
+}
+
+json navigation_number(const ReportInput& input) {
+  if (!input.evaluation || input.evaluation->navigation.t.empty()) {
+    return nullptr;
+  }
+  const auto stretches = whole_stretches(input, input.evaluation->navigation);
+  const auto greatest = [](const ground::ErrorStatistics& stretch) {
+    return significant(stretch.max_total_rad / kArcminute_rad, 2);
+  };
+  const std::string name = "Greatest error between corrections";
+  return stretches.size() == 1 ? figure_of_merit(name, greatest(stretches.front()), "′", "open loop, total angle")
+                               : figure_of_merit(name, greatest(stretches.front()) + " → " + greatest(stretches.back()),
+                                                 "′", "open loop, total angle: in the first and in the last 90 min");
+}
+
+json alignment_number(const std::vector<Parameter>& parameters) {
+  double worst_sigma = 0;
+  double worst_error = 0;
+  bool has_error = false;
+  for (const Parameter& parameter : parameters) {
+    if (parameter.is_alignment) {
+      worst_sigma = std::max(worst_sigma, parameter.sigma);
+      has_error = has_error || parameter.error;
+      worst_error = std::max(worst_error, std::abs(parameter.error.value_or(0)));
+    }
+  }
+  if (worst_sigma == 0) {
+    return nullptr;
+  }
+  const std::string sigma = significant(worst_sigma / kArcsecond_rad, 2);
+  return has_error ? figure_of_merit("Alignment error, worst axis", significant(worst_error / kArcsecond_rad, 2), "″",
+                                     "against the truth; claimed 1σ " + sigma + "″")
+                   : figure_of_merit("Alignment known to", sigma, "″", "1σ as claimed, worst axis");
+}
+
+/// When the last of the chosen parameters settled. Those that the data do not determine have nothing to settle to.
+json convergence_number(const std::vector<Parameter>& parameters, bool alignment) {
+  double latest_min = 0;
+  std::vector<std::string> late;
+  std::string last;
+  bool to_truth = false;
+  for (const Parameter& parameter : parameters) {
+    if (parameter.is_alignment != alignment || !parameter.determined()) {
+      continue;
+    }
+    to_truth = to_truth || parameter.truth;
+    if (!parameter.converged_min) {
+      late.push_back(parameter.full_symbol());
+    } else if (last.empty() || *parameter.converged_min > latest_min) {
+      latest_min = *parameter.converged_min;
+      last = parameter.full_symbol();
+    }
+  }
+  if (last.empty() && late.empty()) {
+    return nullptr;
+  }
+  const std::string name = alignment ? "Alignment settled after" : "Drift coefficients settled after";
+  const std::string towards = to_truth ? "to the truth" : "to its final value";
+  const std::string paper = alignment ? "; the paper: one orbit, 90 min" : "; the paper: 200–300 min";
+  if (!late.empty()) {
+    return figure_of_merit(name, "not yet", "",
+                           "still moving at the end: " + fmt::format("{}", fmt::join(late, ", ")) + paper);
+  }
+  return figure_of_merit(name, number(latest_min, 0), " min", "last " + towards + ": " + last + paper);
+}
+
+json extension_number(const ReportInput& input) {
+  if (!input.evaluation || input.evaluation->intervals.size() < 2) {
+    return nullptr;
+  }
+  const auto& intervals = input.evaluation->intervals;
+  const std::string limit = fmt::format("{:.3g}", input.evaluation->limit_rad / kArcminute_rad) + "′";
+  const ground::CorrectionInterval& before = intervals.front();
+  // A stretch cut short by the end of the pass says little.
+  const bool cut = intervals.back().observed < before.observed / 2 && !intervals.back().passed && intervals.size() > 2;
+  const ground::CorrectionInterval& after = cut ? intervals[intervals.size() - 2] : intervals.back();
+  const auto in_words = [](const ground::CorrectionInterval& interval) {
+    return interval.passed ? span(*interval.passed) : "more than " + span(interval.observed);
+  };
+  const std::string note = fmt::format("the error passes {} {} after the first correction, {} after the last", limit,
+                                       in_words(before), in_words(after));
+  if (!before.passed) {
+    return figure_of_merit("Correction interval", "≥ " + number(to_minutes(after.passed.value_or(after.observed)), 0),
+                           " min", note);
+  }
+  const double ratio = to_seconds(after.passed.value_or(after.observed)) / std::max(1.0, to_seconds(*before.passed));
+  return figure_of_merit("Correction interval extended", (after.passed ? "" : "≥ ") + significant(ratio, 2), " ×",
+                         note + "; the paper: 3–5 times");
+}
+
+json nis_number(const ReportInput& input) {
+  double sum = 0;
+  double count = 0;
+  for (const ground::FixRecord& fix : input.run.fixes) {
+    if (fix.status == FixStatus::kUsed) {
+      sum += fix.nis;
+      ++count;
+    }
+  }
+  return count == 0 ? json(nullptr)
+                    : figure_of_merit("Mean NIS of the fixes", number(sum / count, 2), "",
+                                      "4 is expected: below, the noise is overstated; above, the model is incomplete");
+}
+
+json undetermined_of(const std::vector<Parameter>& parameters) {
+  json list = json::array();
+  for (const Parameter& parameter : parameters) {
+    if (!parameter.determined()) {
+      list.push_back(
+          {{"symbol", parameter.full_symbol()}, {"percent", number(100 * parameter.sigma / parameter.first_sigma, 0)}});
+    }
+  }
+  return list;
+}
+
+json rejected_of(const std::map<std::string, long>& counts, const std::string& one, const std::string& many) {
+  json list = json::array();
+  for (const auto& [name, count] : counts) {
+    if (name.starts_with("rejected") && count > 0) {
+      list.push_back(counted(count, one, many) + " " + name);
+    }
+  }
+  return list;
+}
+
+}  // namespace
+
+json verdict_values(const ReportInput& input, const std::vector<Parameter>& parameters) {
+  json numbers = json::array();
+  for (json& merit : std::vector<json>{attitude_number(input), alignment_number(parameters),
+                                       convergence_number(parameters, true), convergence_number(parameters, false),
+                                       navigation_number(input), extension_number(input), nis_number(input)}) {
+    if (!merit.is_null()) {
+      numbers.push_back(std::move(merit));
+    }
+  }
+  json rejected = rejected_of(input.run.fix_counts, "fix", "fixes");
+  for (json& line : rejected_of(input.run.samples, "gyro sample", "gyro samples")) {
+    rejected.push_back(std::move(line));
+  }
+  return {{"verdict", verdict_of(input.run.calibration.verdict)},
+          {"numbers", numbers},
+          {"undetermined", undetermined_of(parameters)},
+          {"rejected", rejected}};
+}
+
+}  // namespace trihedron::report

@@ -1,0 +1,15 @@
+#pragma once
+/// The verdict in words, and the numbers that matter: what a reader sees first. Values for assets/page.html.
+
+#include <nlohmann/json.hpp>
+#include <vector>
+
+#include "parameters.hpp"
+#include "trihedron/report/report.hpp"
+
+namespace trihedron::report {
+
+/// verdict, numbers, undetermined, rejected.
+[[nodiscard]] nlohmann::json verdict_values(const ReportInput& input, const std::vector<Parameter>& parameters);
+
+}  // namespace trihedron::report

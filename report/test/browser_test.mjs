@@ -1,0 +1,144 @@
+// Opens the reports of report_samples in headless Chromium, as their readers do:
+//   node browser_test.mjs CHROMIUM DIRECTORY
+// Fails where a report says something on the console, asks for anything over the network, has a figure without data,
+// opens slowly, or is wider than its screen. Screenshots and a printed copy stay beside the reports.
+
+import assert from "node:assert/strict";
+import { createRequire } from "node:module";
+import path from "node:path";
+import { test, before, after } from "node:test";
+import { pathToFileURL } from "node:url";
+
+const { chromium } = createRequire(new URL("../../package.json", import.meta.url))("playwright-core");
+
+const [executablePath, directory] = process.argv.slice(2);
+const OPENS_WITHIN_MS = 2000;
+
+let browser;
+before(async () => { browser = await chromium.launch({ executablePath, args: ["--no-sandbox"] }); });
+after(() => browser.close());
+
+/** A page with the report open, and what it complained of. */
+async function open(name, { width = 1280, height = 900, colorScheme = "light" } = {}) {
+  const page = await browser.newPage({ viewport: { width, height }, colorScheme });
+  const complaints = [];
+  page.on("console", (message) => { if (["error", "warning"].includes(message.type())) complaints.push(message.text()); });
+  page.on("pageerror", (error) => complaints.push(String(error)));
+  page.on("request", (request) => { if (!/^(file|data|blob):/.test(request.url())) complaints.push(`asked for ${request.url()}`); });
+  const report = pathToFileURL(path.resolve(directory, name)).href;
+  await page.goto(report);
+  return { page, complaints };
+}
+
+/** Scrolls through the report, so that every figure is drawn. */
+async function readThrough(page) {
+  await page.evaluate(async () => {
+    for (let y = 0; y < document.body.scrollHeight; y += 300) {
+      scrollTo({ top: y, behavior: "instant" });
+      await new Promise((done) => requestAnimationFrame(() => setTimeout(done, 20)));
+    }
+    scrollTo({ top: 0, behavior: "instant" });
+  });
+}
+
+/** Per figure that is shown: its name and the number of points drawn. */
+const figurePoints = (page) => page.evaluate(() =>
+  [...document.querySelectorAll("figure[data-figure]:not([hidden])")].map((figure) => {
+    const tracks = [...figure.querySelectorAll("path.track")].map((track) => track.getAttribute("d").split("L").length);
+    const traces = (figure.querySelector(".plot")?.data ?? []).map(({ y, z }) => (z ? z.flat().length : y.filter((v) => v !== null).length));
+    return { name: figure.id, points: [...tracks, ...traces].reduce((a, b) => a + b, 0), drawn: figure.dataset.drawn === "true" };
+  }));
+
+const overflow = (page) => page.evaluate(() => document.documentElement.scrollWidth - document.documentElement.clientWidth);
+
+for (const name of ["good.html", "troubled.html", "alone.html"]) {
+  test(`${name} draws every figure, says nothing on the console and asks for nothing`, async () => {
+    const { page, complaints } = await open(name);
+    await readThrough(page);
+    const figures = await figurePoints(page);
+    assert.ok(figures.length >= 8, `only ${figures.length} figures`);
+    for (const { name, points, drawn } of figures) {
+      assert.ok(drawn, `${name} was not drawn`);
+      assert.ok(points > 50, `${name} holds ${points} points`);
+    }
+    assert.deepEqual(complaints, []);
+    await page.close();
+  });
+}
+
+test(`nine hours open within ${OPENS_WITHIN_MS} ms`, async () => {
+  // The least of three: whatever else the machine does only adds.
+  let least = Infinity;
+  for (let i = 0; i < 3; ++i) {
+    const { page } = await open("good.html");
+    least = Math.min(least, await page.evaluate(() => performance.getEntriesByName("report-ready")[0].startTime));
+    await page.close();
+  }
+  console.log(`open after ${least.toFixed(0)} ms`);
+  assert.ok(least < OPENS_WITHIN_MS);
+});
+
+for (const colorScheme of ["light", "dark"]) {
+  test(`the theme is ${colorScheme} where the reader's is, until he chooses the other`, async () => {
+    const { page, complaints } = await open("troubled.html", { colorScheme });
+    const theme = () => page.evaluate(() => document.documentElement.dataset.theme);
+    assert.equal(await theme(), colorScheme);
+    await readThrough(page);
+    await page.screenshot({ path: path.join(directory, `${colorScheme}.png`), fullPage: true });
+    await page.click("#theme");
+    assert.notEqual(await theme(), colorScheme);
+    assert.deepEqual(complaints, []);
+    await page.close();
+  });
+}
+
+for (const width of [360, 768, 1920]) {
+  test(`fits a screen of ${width} pixels`, async () => {
+    const { page, complaints } = await open("troubled.html", { width });
+    await readThrough(page);
+    assert.ok((await overflow(page)) <= 0, `wider by ${await overflow(page)} pixels`);
+    await page.screenshot({ path: path.join(directory, `width-${width}.png`), fullPage: true });
+    assert.deepEqual(complaints, []);
+    await page.close();
+  });
+}
+
+test("shows any coefficient, and enlarged", async () => {
+  const { page, complaints } = await open("good.html");
+  await page.click("#all-coefficients");
+  await page.check('input[name="view"][value="detail"]');
+  await readThrough(page);
+  const coefficients = (await figurePoints(page)).filter(({ name }) => /k0|mu|nu/.test(name));
+  assert.equal(coefficients.length, 7);
+  await page.locator("#coefficients").screenshot({ path: path.join(directory, "coefficients-enlarged.png") });
+  await page.uncheck('input[name="coefficient"][value="k0"]');
+  assert.ok(await page.locator("#figure-k0").isHidden());
+  assert.deepEqual(complaints, []);
+  await page.close();
+});
+
+test("a sphere turns with the keyboard", async () => {
+  const { page } = await open("good.html");
+  await readThrough(page);
+  const track = () => page.locator(".sphere path.track").first().getAttribute("d");
+  const start = await track();
+  await page.locator(".sphere svg").first().focus();
+  await page.keyboard.press("ArrowRight");
+  assert.notEqual(await track(), start);
+  await page.close();
+});
+
+test("a hostile name of a spacecraft is only text", async () => {
+  const { page } = await open("alone.html");
+  assert.match(await page.locator("h1").textContent(), /<\/script><script>throw/);
+  await page.close();
+});
+
+test("prints every figure on white, also from the dark theme, and goes back to it", async () => {
+  const { page, complaints } = await open("troubled.html", { colorScheme: "dark" });
+  await page.pdf({ path: path.join(directory, "print.pdf"), preferCSSPageSize: true, printBackground: true });
+  assert.equal(await page.evaluate(() => document.documentElement.dataset.theme), "dark");
+  assert.equal(await page.evaluate(() => document.querySelectorAll("figure[data-figure]:not([data-drawn])").length), 0);
+  assert.deepEqual(complaints, []);
+  await page.close();
+});

@@ -1,0 +1,68 @@
+#include "parameters.hpp"
+
+#include <gmock/gmock.h>
+
+#include <cmath>
+
+#include "synthetic_run.hpp"
+#include "units.hpp"
+
+namespace trihedron::report {
+namespace {
+
+TEST(SymbolOf, WritesTheNamesOfThePaper) {
+  EXPECT_EQ(symbol_of("k0"), "k₀");
+  EXPECT_EQ(symbol_of("mu31"), "μ₃₁");
+  EXPECT_EQ(symbol_of("nu12"), "ν₁₂");
+  EXPECT_EQ(symbol_of("align_y"), "Λy");
+}
+
+TEST(SymbolOf, LeavesOtherNamesAlone) {
+  EXPECT_EQ(symbol_of("w_3_-2"), "w_3_-2");
+  EXPECT_EQ(symbol_of("k0_extra"), "k0_extra");
+}
+
+TEST(SettledFrom, CountsTheLastExcursion) {
+  EXPECT_EQ(settled_from({5, 0.1, 3, 0.2, 0.1}, 1), 3U);
+  EXPECT_EQ(settled_from({0.1, 0.2}, 1), 0U);
+}
+
+TEST(SettledFrom, IsTheEndWhereTheLastRowIsOutside) { EXPECT_EQ(settled_from({0, 0, 2}, 1), 3U); }
+
+TEST(SettledFrom, DoesNotTakeNaNForSettled) { EXPECT_EQ(settled_from({0, std::nan(""), 0}, 1), 2U); }
+
+class ParametersOfARun : public testing::Test {
+ protected:
+  test::SyntheticRun run = test::synthetic_run({.duration = std::chrono::hours(3), .troubled = true});
+};
+
+TEST_F(ParametersOfARun, AreInTheOrderOfTheStates) {
+  const auto parameters = parameters_of(run.judged());
+  ASSERT_EQ(parameters.size(), 20U);
+  EXPECT_EQ(parameters[0].state, "gyro1.k0");
+  EXPECT_EQ(parameters[19].state, "gyro2.align_z");
+  EXPECT_EQ(parameters[19].gyro, 1U);
+}
+
+TEST_F(ParametersOfARun, KnowTheirErrorWhereTheTruthIsKnown) {
+  const auto parameters = parameters_of(run.judged());
+  EXPECT_DOUBLE_EQ(*parameters[0].error, parameters[0].value - *parameters[0].truth);
+  // The rotation from truth to estimate differs from the difference of two rotation vectors of 30′ in the second order.
+  EXPECT_NEAR(*parameters[7].error, parameters[7].value - *parameters[7].truth, 0.01 * kArcminute_rad);
+}
+
+TEST_F(ParametersOfARun, ClaimNoErrorWithoutTruth) {
+  for (const Parameter& parameter : parameters_of(run.alone())) {
+    EXPECT_FALSE(parameter.truth);
+    EXPECT_FALSE(parameter.error);
+  }
+}
+
+TEST_F(ParametersOfARun, SayWhatTheDataDoNotDetermine) {
+  for (const Parameter& parameter : parameters_of(run.judged())) {
+    EXPECT_EQ(parameter.determined(), parameter.state != "gyro2.nu12") << parameter.state;
+  }
+}
+
+}  // namespace
+}  // namespace trihedron::report

@@ -1,0 +1,152 @@
+#include "trihedron/report/report.hpp"
+
+#include <gmock/gmock.h>
+
+#include <regex>
+
+#include "synthetic_run.hpp"
+#include "wording.hpp"
+
+namespace trihedron::report {
+namespace {
+
+using testing::HasSubstr;
+using testing::Not;
+
+std::size_t occurrences(const std::string& text, const std::string& part) {
+  std::size_t count = 0;
+  for (std::size_t at = text.find(part); at != std::string::npos; at = text.find(part, at + 1)) {
+    ++count;
+  }
+  return count;
+}
+
+const test::SyntheticRun& nine_hours() {
+  static const test::SyntheticRun run = test::synthetic_run({});
+  return run;
+}
+
+test::SyntheticRun short_run() { return test::synthetic_run({.duration = std::chrono::minutes(30)}); }
+
+TEST(Report, OfNineHoursStaysBelow6MB) { EXPECT_LT(render(nine_hours().judged()).size(), 6'000'000U); }
+
+TEST(Report, IsTheSameForTheSameInput) { EXPECT_EQ(render(nine_hours().judged()), render(nine_hours().judged())); }
+
+TEST(Report, RefersToNothingOutsideItself) {
+  const std::string html = render(nine_hours().judged());
+  // The plotting library holds addresses it could be told to use; the page must load none.
+  const std::string page = html.substr(0, html.find("id=\"data\""));
+  EXPECT_FALSE(std::regex_search(page, std::regex("https?:")));
+  EXPECT_EQ(occurrences(html, "<script src"), 0U);
+  EXPECT_EQ(occurrences(html, "@import"), 0U);
+}
+
+TEST(Report, ClosesEachScriptOnce) {
+  const std::string html = render(nine_hours().judged());
+  EXPECT_EQ(occurrences(html, "</script"), 4U);
+  EXPECT_EQ(occurrences(html, "</style"), 1U);
+}
+
+TEST(Report, IsNotBrokenByTheNameOfTheSpacecraft) {
+  test::SyntheticRun run = short_run();
+  run.pass.settings.spacecraft = "</script><img src=x onerror=alert(1)>\xff{{x}}";
+  const std::string html = render(run.judged());
+  EXPECT_THAT(html, Not(HasSubstr("<img")));
+  EXPECT_EQ(occurrences(html, "</script"), 4U);
+}
+
+TEST(Report, EscapesFindingsAndNotes) {
+  test::SyntheticRun run = short_run();
+  run.run.calibration.verdict.findings.push_back({"<c>", "<t>", "<e>", "<u>"});
+  ReportInput input = run.judged();
+  input.telemetry_notes = {"<n>"};
+  const std::string html = render(input);
+  for (const char* tag : {"<c>", "<t>", "<e>", "<u>", "<n>"}) {
+    EXPECT_THAT(html, Not(HasSubstr(tag)));
+  }
+  EXPECT_THAT(html, HasSubstr("&lt;n&gt;"));
+}
+
+TEST(Report, SaysFirstWhetherTheResultCanBeTrusted) {
+  test::SyntheticRun run = short_run();
+  EXPECT_THAT(render(run.judged()), HasSubstr("<p class=\"word\">Trustworthy</p>"));
+  run.run.calibration.verdict.findings = {{"a", "weak", "", "cure A"}};
+  EXPECT_THAT(render(run.judged()), HasSubstr("<p class=\"word\">Trustworthy, with 1 warning</p>"));
+  run.run.calibration.verdict = {false, {{"b", "broken", "", "cure B", Finding::Severity::kDoNotUse}}};
+  const std::string html = render(run.judged());
+  EXPECT_THAT(html, HasSubstr("<p class=\"word\">Do not use</p>"));
+  EXPECT_THAT(html, HasSubstr("<li>cure B</li>"));
+}
+
+TEST(Report, PutsTheWorstFindingFirst) {
+  test::SyntheticRun run = short_run();
+  run.run.calibration.verdict = {
+      false,
+      {{"mild", "mild", "", "", Finding::Severity::kNote}, {"grave", "grave", "", "", Finding::Severity::kDoNotUse}}};
+  const std::string html = render(run.judged());
+  EXPECT_LT(html.find("<code>grave"), html.find("<code>mild"));
+  EXPECT_THAT(html, HasSubstr("<p class=\"lead\">grave</p>"));
+}
+
+TEST(Report, ShowsEverySectionWhereThereAreData) {
+  const std::string html = render(nine_hours().judged());
+  for (const char* id : {"verdict", "parameters", "coefficients", "alignment", "attitude", "innovations", "correlation",
+                         "momenta", "angle", "telemetry", "settings"}) {
+    EXPECT_THAT(html, HasSubstr("<section id=\"" + std::string(id) + "\"")) << id;
+    EXPECT_THAT(html, HasSubstr("href=\"#" + std::string(id) + "\"")) << id;
+  }
+}
+
+TEST(Report, LeavesOutWhatHasNoData) {
+  test::SyntheticRun run = short_run();
+  run.run.fixes.clear();
+  run.run.angle_t.clear();
+  run.run.parameters = {};
+  const std::string html = render(run.alone());
+  for (const char* id : {"coefficients", "alignment", "attitude", "innovations", "angle"}) {
+    EXPECT_THAT(html, Not(HasSubstr("<section id=\"" + std::string(id) + "\""))) << id;
+    EXPECT_THAT(html, Not(HasSubstr("href=\"#" + std::string(id) + "\""))) << id;
+  }
+}
+
+TEST(Report, SpeaksOfTruthOnlyWhereItIsKnown) {
+  const test::SyntheticRun run = short_run();
+  const std::string alone = render(run.alone());
+  EXPECT_THAT(alone, Not(HasSubstr("Against the truth")));
+  EXPECT_THAT(alone, HasSubstr("final value"));
+  EXPECT_THAT(render(run.judged()), HasSubstr("Against the truth"));
+}
+
+TEST(Report, GivesTheExtensionOfTheCorrectionInterval) {
+  // The error passes 5′ some 40 min after the first correction, and not within 90 min later.
+  EXPECT_THAT(render(nine_hours().judged()), HasSubstr("Correction interval extended"));
+}
+
+TEST(Report, TellsWhatWasRejected) {
+  const std::string html = render(test::synthetic_run({.duration = std::chrono::hours(2), .troubled = true}).judged());
+  EXPECT_TRUE(std::regex_search(html, std::regex("<li>[0-9]+ fixes rejected: outlier</li>")));
+  EXPECT_TRUE(std::regex_search(html, std::regex("<li>[0-9]+ gyro samples rejected: not a direction</li>")));
+}
+
+TEST(Report, ListsTheOutageOfTheTracker) {
+  const std::string html = render(test::synthetic_run({.duration = std::chrono::hours(5), .troubled = true}).judged());
+  EXPECT_TRUE(std::regex_search(html, std::regex("star tracker</th><td>[0-9.]+</td><td>42 min")));
+}
+
+TEST(Wording, UsesTypographicSignsAndThousands) {
+  EXPECT_EQ(number(-1234567.25, 1), "\u22121\u202f234\u202f567.2");
+  EXPECT_EQ(signed_number(2.5, 1), "+2.5");
+  EXPECT_EQ(number(std::nan(""), 1), "—");
+}
+
+TEST(Wording, ShowsTwoDigitsOfASigma) {
+  EXPECT_EQ(decimals_for(0.0123), 3);
+  EXPECT_EQ(decimals_for(123.0), 0);
+}
+
+TEST(Wording, WritesTaiAsACalendarDate) {
+  EXPECT_EQ(calendar(Time{} + std::chrono::hours(25)), "1958-01-02 01:00:00 TAI");
+}
+
+}  // namespace
+}  // namespace trihedron::report

@@ -1,0 +1,34 @@
+#pragma once
+/// A plausible calibration made of formulas, to try the report on: what a run looks like, not what an estimator does.
+
+#include <chrono>
+#include <string>
+
+#include "trihedron/report/report.hpp"
+
+namespace trihedron::report::test {
+
+struct SyntheticOptions {
+  Duration duration = std::chrono::hours(9);
+  std::string spacecraft = "Resurs-DK1";
+  /// A tracker outage of 42 min, outliers, broken gyro samples, a coefficient that stays unknown.
+  bool troubled = false;
+  Verdict verdict{true, {}};
+};
+
+struct SyntheticRun {
+  Pass pass;
+  Truth truth;
+  ground::CalibrationRun run;
+  Evaluation evaluation;
+
+  /// With truth and evaluation.
+  [[nodiscard]] ReportInput judged() const { return {pass, run, &truth, {}, evaluation}; }
+  /// As after a real pass.
+  [[nodiscard]] ReportInput alone() const { return {pass, run, nullptr, {}, std::nullopt}; }
+};
+
+/// The same options give the same run.
+[[nodiscard]] SyntheticRun synthetic_run(const SyntheticOptions& options);
+
+}  // namespace trihedron::report::test

@@ -1,0 +1,110 @@
+#pragma once
+/// What the spacecraft's attitude does: a reference attitude, slews from it, jitter on top.
+
+#include <Eigen/Core>
+#include <Eigen/Geometry>
+#include <vector>
+
+#include "trihedron/core/frames.hpp"
+#include "trihedron/records/scenario.hpp"
+#include "trihedron/sim/orbit.hpp"
+#include "trihedron/sim/random.hpp"
+
+namespace trihedron::sim {
+
+/// C_in_c of the orbital attitude: z up along the radius, y along r × v, x along track.
+[[nodiscard]] Rot<In, C> orbital_attitude(const OrbitState& state);
+
+/// C_in_c with z up along the radius and x along the horizontal velocity over the rotating Earth, so that the ground
+/// moves along x in an image. The Earth's axis is taken along in_z: precession since 2000 is left out.
+[[nodiscard]] Rot<In, C> yaw_steered_attitude(const OrbitState& state);
+
+/// Offsets from the reference attitude. Each turn is about one fixed axis and rest to rest, its angle a polynomial of
+/// degree 5 in time: rate and acceleration are continuous.
+class SlewPlan {
+ public:
+  SlewPlan() = default;
+  /// Throws std::invalid_argument where a slew begins before the one before has ended, or for limits that are not
+  /// positive.
+  SlewPlan(const std::vector<Slew>& slews, double max_rate_rad_s, double max_acceleration_rad_s2);
+
+  /// q_reference_c.
+  [[nodiscard]] Eigen::Quaterniond at(double t_s) const;
+
+  struct Turn {
+    double begin_s;
+    double end_s;
+    Eigen::Quaterniond from;
+    Eigen::Quaterniond to;
+    Eigen::Vector3d rotation_vector_rad;  ///< to = from exp([v×])
+  };
+  [[nodiscard]] const std::vector<Turn>& turns() const { return turns_; }
+
+ private:
+  std::vector<Turn> turns_;
+};
+
+/// Time that a rest-to-rest turn of a SlewPlan takes, s.
+[[nodiscard]] double turn_duration_s(double angle_rad, double max_rate_rad_s, double max_acceleration_rad_s2);
+
+/// q_reference_c of Rz(yaw) Ry(pitch) Rx(roll).
+[[nodiscard]] Eigen::Quaterniond slew_target(const Slew& slew);
+
+/// Slews of an imaging programme for 0 … duration_s; the last may end after it.
+[[nodiscard]] std::vector<Slew> imaging_slews(const ImagingProgramme& programme, double max_rate_rad_s,
+                                              double max_acceleration_rad_s2, double duration_s, Stream random);
+
+/// Smooth, band-limited, stationary Gaussian noise in three independent axes, unit variance: a B-spline of degree 5
+/// (four times differentiable) with white coefficients. Its power falls as sinc¹²(f Δ), Δ the distance of the knots.
+class SmoothNoise {
+ public:
+  /// For begin_s … end_s. bandwidth_hz: half-power, positive.
+  SmoothNoise(double bandwidth_hz, double begin_s, double end_s, Stream random);
+
+  [[nodiscard]] Eigen::Vector3d at(double t_s) const;
+
+ private:
+  double begin_s_;
+  double knots_per_s_;
+  std::vector<Eigen::Vector3d> coefficients_;
+};
+
+/// Recorded attitude, twice differentiable: a natural cubic spline of the quaternion's components, normalised.
+class AttitudeSpline {
+ public:
+  /// Signs of the samples are free. Throws std::invalid_argument for fewer than two samples, times that do not
+  /// increase, or neighbours 90° apart and more.
+  explicit AttitudeSpline(const std::vector<AttitudeSample>& samples);
+
+  /// q_in_c; its sign is that of the first sample carried on.
+  [[nodiscard]] Eigen::Quaterniond at(double t_s) const;
+  [[nodiscard]] double begin_s() const { return t_s_.front(); }
+  [[nodiscard]] double end_s() const { return t_s_.back(); }
+
+ private:
+  std::vector<double> t_s_;
+  std::vector<Eigen::Vector4d> q_;
+  std::vector<Eigen::Vector4d> q_second_;  ///< second derivative at the samples
+};
+
+/// The true attitude, at any time between begin_s and end_s, seconds from the start of the pass.
+class AttitudeProgramme {
+ public:
+  /// `ephemeris` is used here only. Throws std::invalid_argument as its parts do, and for a recorded attitude that does
+  /// not cover begin_s … end_s up to 0.2 s.
+  AttitudeProgramme(const AttitudeScenario& scenario, const Ephemeris& ephemeris, std::uint64_t seed, double begin_s,
+                    double end_s);
+
+  /// C_in_c.
+  [[nodiscard]] Rot<In, C> at(double t_s) const;
+  /// Angular velocity of c relative to in, rad/s.
+  [[nodiscard]] Vec<C> rate(double t_s) const;
+
+ private:
+  AttitudeSpline reference_;
+  SlewPlan slews_;
+  double jitter_rad_;
+  std::optional<SmoothNoise> jitter_;
+};
+
+}  // namespace trihedron::sim

@@ -1,0 +1,98 @@
+#pragma once
+/// One gyro: the momentum that precesses in inertial space, and its readout in case axes.
+
+#include <optional>
+#include <vector>
+
+#include "trihedron/core/drift.hpp"
+#include "trihedron/core/frames.hpp"
+#include "trihedron/records/pass.hpp"
+#include "trihedron/records/scenario.hpp"
+#include "trihedron/sim/event.hpp"
+#include "trihedron/sim/harmonics.hpp"
+#include "trihedron/sim/random.hpp"
+
+namespace trihedron::sim {
+
+/// Case axes of the gyro at hand, whichever its number.
+using Case = B<0>;
+
+/// ω_b of a momentum in case axes, with what changes in time. Random parts are constant over a step and drawn at its
+/// start.
+class Drift {
+ public:
+  /// Throws std::invalid_argument for a harmonic that does not exist.
+  Drift(const DriftScenario& scenario, std::uint64_t seed, std::uint64_t gyro);
+
+  /// To the step that begins at t_s and lasts step_s.
+  void next_step(double t_s, double step_s);
+
+  /// ω_b(h), rad/s, during the step. h: unit.
+  [[nodiscard]] Vec<Case> rate(const Vec<Case>& h) const {
+    return Vec<Case>::assume(Esg7::rate<double>(h.raw(), kappa_now_rad_s_) + field_.rate<double>(h.raw()) +
+                             markov_rad_s_);
+  }
+  /// The random rotation that the momentum takes during the step beside its drift, rad, if there is one.
+  [[nodiscard]] const std::optional<Vec<Case>>& walk() const { return walk_rad_; }
+
+  /// κ of eq. (1) as it is now, rad/s.
+  [[nodiscard]] const Esg7::Coefficients<double>& kappa_rad_s() const { return kappa_now_rad_s_; }
+  [[nodiscard]] const HarmonicField& outside() const { return field_; }
+  [[nodiscard]] const Vector3<double>& markov_rad_s() const { return markov_rad_s_; }
+
+ private:
+  DriftScenario scenario_;
+  Esg7::Coefficients<double> kappa_rad_s_;  ///< before warm-up
+  Esg7::Coefficients<double> kappa_now_rad_s_;
+  HarmonicField field_;
+  Vector3<double> markov_rad_s_ = Vector3<double>::Zero();
+  std::optional<Vec<Case>> walk_rad_;
+  Stream coefficient_random_;
+  Stream walk_random_;
+  Stream markov_random_;
+};
+
+/// What telemetry makes of a direction.
+class Readout {
+ public:
+  Readout(const ReadoutScenario& scenario, Duration sample_period, std::uint64_t seed, int gyro);
+
+  /// Direction cosines as telemetered; NaN when dropped. Faults are appended to `events`.
+  [[nodiscard]] Eigen::Vector3d read(Time t, const Vec<Case>& h, std::vector<Event>& events);
+
+ private:
+  ReadoutScenario scenario_;
+  int gyro_;
+  int stuck_samples_;
+  int stuck_left_ = 0;
+  Eigen::Vector3d last_{0, 0, 0};
+  Stream noise_;
+  Stream dropout_;
+  Stream spike_;
+  Stream stuck_;
+};
+
+class Gyro {
+ public:
+  /// At the start of the pass, with the body at C_in_c. Throws std::invalid_argument for a start direction of no
+  /// length.
+  Gyro(const GyroScenario& scenario, const Rot<In, C>& C_in_c, std::uint64_t seed, int gyro);
+
+  /// Integrates over one step that begins at t_s, from where the last one ended; C_in_c in its middle and at its end.
+  void advance(double t_s, double step_s, const Rot<In, C>& middle, const Rot<In, C>& end);
+
+  [[nodiscard]] const Vec<In>& momentum() const { return h_in_; }
+  [[nodiscard]] Vec<Case> momentum_in_case() const { return C_in_b_.inverse() * h_in_; }
+  [[nodiscard]] const Rot<C, Case>& alignment() const { return C_c_b_; }
+  [[nodiscard]] const Drift& drift() const { return drift_; }
+  /// Coefficients as they are now.
+  [[nodiscard]] Truth::Gyro truth() const;
+
+ private:
+  Drift drift_;
+  Rot<C, Case> C_c_b_;
+  Rot<In, Case> C_in_b_;
+  Vec<In> h_in_;
+};
+
+}  // namespace trihedron::sim

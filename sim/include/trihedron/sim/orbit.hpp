@@ -1,0 +1,61 @@
+#pragma once
+/// Where the spacecraft is.
+
+#include "trihedron/core/frames.hpp"
+#include "trihedron/records/scenario.hpp"
+
+namespace trihedron::sim {
+
+/// WGS 84 / EGM96: gravitational parameter, equatorial radius, J2, rate of rotation.
+inline constexpr double kEarthGravity_m3_s2 = 3.986004418e14;
+inline constexpr double kEarthRadius_m = 6378137.0;
+inline constexpr double kEarthJ2 = 1.08262668e-3;
+inline constexpr double kEarthRate_rad_s = 7.292115e-5;
+
+struct OrbitState {
+  Vec<In> position_m;    ///< from the Earth's centre
+  Vec<In> velocity_m_s;  ///< relative to the Earth's centre
+};
+
+/// The seam for other sources of position (CCSDS OEM, two-line elements). Seconds from the start of the pass.
+class Ephemeris {
+ public:
+  virtual ~Ephemeris() = default;
+  [[nodiscard]] virtual OrbitState at(double t_s) const = 0;
+  /// Mean rate of the argument of latitude, the n of what repeats every revolution.
+  [[nodiscard]] virtual double mean_rate_rad_s() const = 0;
+};
+
+/// Kepler's motion on an ellipse whose node, perigee and mean anomaly run at the secular rates of J2, first order
+/// (Vallado, Fundamentals of Astrodynamics, 9.6). The velocity is that of the ellipse of the moment, so that r × v is
+/// its normal.
+class KeplerJ2 final : public Ephemeris {
+ public:
+  /// Throws std::invalid_argument unless 0 < perigee ≤ apogee.
+  explicit KeplerJ2(const OrbitScenario& orbit);
+
+  [[nodiscard]] OrbitState at(double t_s) const override;
+  [[nodiscard]] double mean_rate_rad_s() const override { return anomaly_rate_rad_s_ + perigee_rate_rad_s_; }
+
+  [[nodiscard]] double semi_major_axis_m() const { return semi_major_axis_m_; }
+  [[nodiscard]] double eccentricity() const { return eccentricity_; }
+  [[nodiscard]] double node_rate_rad_s() const { return node_rate_rad_s_; }
+  [[nodiscard]] double perigee_rate_rad_s() const { return perigee_rate_rad_s_; }
+  [[nodiscard]] double anomaly_rate_rad_s() const { return anomaly_rate_rad_s_; }
+
+ private:
+  OrbitScenario start_;
+  double semi_major_axis_m_;
+  double eccentricity_;
+  double mean_motion_rad_s_;  ///< of the ellipse, without J2
+  double anomaly_rate_rad_s_;
+  double perigee_rate_rad_s_;
+  double node_rate_rad_s_;
+  double cos_inclination_;
+  double sin_inclination_;
+};
+
+/// E with E − e sin E = M, |error| < 1e-14 rad for 0 ≤ e < 1.
+[[nodiscard]] double eccentric_anomaly(double mean_anomaly_rad, double eccentricity);
+
+}  // namespace trihedron::sim

@@ -1,0 +1,115 @@
+#pragma once
+/// Random streams that depend on (seed, source, index) alone, and are the same on every machine and thread count.
+
+#include <Eigen/Core>
+#include <array>
+#include <bit>
+#include <cmath>
+#include <cstdint>
+#include <numbers>
+
+namespace trihedron::sim {
+
+/// What a stream is for. The numbers are part of every pass ever made from a seed: add, never renumber.
+enum class Source : std::uint64_t {
+  kKappa = 1,
+  kMisalignment,
+  kOutsideDrift,
+  kCoefficientWalk,
+  kDirectionWalk,
+  kMarkovDrift,
+  kReadoutNoise,
+  kReadoutDropout,
+  kReadoutSpike,
+  kReadoutStuck,
+  kImaging,
+  kJitter,
+  kTrackerNoise,
+  kTrackerField,
+  kTrackerDropout,
+  kTrackerOutlier,
+  kTrackerSign,
+};
+
+/// splitmix64 (Steele, Lea, Flood 2014): advances the state and returns its next value. Bijective in the state.
+[[nodiscard]] constexpr std::uint64_t splitmix64(std::uint64_t& state) {
+  state += 0x9e3779b97f4a7c15;
+  std::uint64_t z = state;
+  z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9;
+  z = (z ^ (z >> 27)) * 0x94d049bb133111eb;
+  return z ^ (z >> 31);
+}
+
+/// xoshiro256++ 1.0 (Blackman, Vigna 2019), period 2²⁵⁶ − 1, seeded by splitmix64 as its authors ask.
+class Stream {
+ public:
+  /// The stream of one source of one thing (gyro `index`, head `index`, …).
+  Stream(std::uint64_t seed, Source source, std::uint64_t index = 0) {
+    // Each part is mixed before the next comes in, so that neither neighbours nor sums of the three collide.
+    std::uint64_t key = seed;
+    key = splitmix64(key) ^ static_cast<std::uint64_t>(source);
+    key = splitmix64(key) ^ index;
+    for (std::uint64_t& word : state_) {
+      word = splitmix64(key);
+    }
+  }
+
+  [[nodiscard]] std::uint64_t bits() {
+    const std::uint64_t result = std::rotl(state_[0] + state_[3], 23) + state_[0];
+    const std::uint64_t t = state_[1] << 17;
+    state_[2] ^= state_[0];
+    state_[3] ^= state_[1];
+    state_[1] ^= state_[2];
+    state_[0] ^= state_[3];
+    state_[2] ^= t;
+    state_[3] = std::rotl(state_[3], 45);
+    return result;
+  }
+
+  /// Even in [0, 1), 53 bits.
+  [[nodiscard]] double uniform() { return static_cast<double>(bits() >> 11) * 0x1p-53; }
+  [[nodiscard]] double uniform(double low, double high) { return low + (high - low) * uniform(); }
+  [[nodiscard]] bool happens(double probability) { return uniform() < probability; }
+
+  /// Standard normal: Marsaglia's polar method, which gives them in pairs.
+  [[nodiscard]] double normal() {
+    if (spare_ready_) {
+      spare_ready_ = false;
+      return spare_;
+    }
+    double x;
+    double y;
+    double s;
+    do {
+      x = uniform(-1, 1);
+      y = uniform(-1, 1);
+      s = x * x + y * y;
+    } while (!(s < 1 && s > 0));
+    const double factor = std::sqrt(-2 * std::log(s) / s);
+    spare_ = y * factor;
+    spare_ready_ = true;
+    return x * factor;
+  }
+
+  /// Three independent standard normals.
+  [[nodiscard]] Eigen::Vector3d normal3() {
+    const double x = normal();
+    const double y = normal();
+    return {x, y, normal()};
+  }
+
+  /// Unit vector, even over the sphere (Archimedes: its z is even in −1 … 1).
+  [[nodiscard]] Eigen::Vector3d direction() {
+    const double z = uniform(-1, 1);
+    const double azimuth = uniform(0, 2 * std::numbers::pi);
+    const double r = std::sqrt(1 - z * z);
+    return {r * std::cos(azimuth), r * std::sin(azimuth), z};
+  }
+
+ private:
+  std::array<std::uint64_t, 4> state_{};
+  double spare_ = 0;
+  bool spare_ready_ = false;
+};
+
+}  // namespace trihedron::sim

@@ -1,0 +1,25 @@
+#pragma once
+/// A pass of telemetry and its truth from a scenario.
+
+#include <vector>
+
+#include "trihedron/records/pass.hpp"
+#include "trihedron/records/scenario.hpp"
+#include "trihedron/sim/event.hpp"
+
+namespace trihedron::sim {
+
+struct SimulatedPass {
+  Pass pass;
+  /// At every epoch of a fix, whether there is one or not. Drift coefficients as they are at the end of the pass;
+  /// `unmodelled_rad_s` holds the amplitudes of orthonormal harmonics, "W(1,0)".
+  Truth truth;
+  std::vector<Event>
+      events;  ///< what was done to the telemetry; gyros' first, then the star tracker's, each in time order
+};
+
+/// The same scenario gives the same pass, bit for bit, whatever else runs. Throws std::invalid_argument for a scenario
+/// that makes no sense, naming the field.
+[[nodiscard]] SimulatedPass simulate(const Scenario& scenario);
+
+}  // namespace trihedron::sim

@@ -1,0 +1,160 @@
+#include "trihedron/sim/gyro.hpp"
+
+#include <cmath>
+#include <limits>
+#include <stdexcept>
+
+#include "trihedron/sim/precession.hpp"
+
+namespace trihedron::sim {
+namespace {
+
+using Eigen::Vector3d;
+
+Esg7::Coefficients<double> initial_kappa(const DriftScenario& scenario, std::uint64_t seed, std::uint64_t gyro) {
+  Esg7::Coefficients<double> kappa;
+  Stream random(seed, Source::kKappa, gyro);
+  for (int i = 0; i < Esg7::kSize; ++i) {
+    kappa(i) = scenario.kappa_rad_s ? (*scenario.kappa_rad_s)[static_cast<std::size_t>(i)]
+                                    : scenario.prior_sigma_rad_s * random.normal();
+  }
+  return kappa;
+}
+
+std::vector<DriftHarmonic> outside_members(const DriftScenario& scenario, std::uint64_t seed, std::uint64_t gyro) {
+  std::vector<DriftHarmonic> members = scenario.harmonics;
+  if (scenario.outside_sigma_rad_s > 0) {
+    Stream random(seed, Source::kOutsideDrift, gyro);
+    for (DriftHarmonic member : members_outside_eq1()) {
+      member.amplitude_rad_s = scenario.outside_sigma_rad_s * random.normal();
+      members.push_back(member);
+    }
+  }
+  return members;
+}
+
+Rot<C, Case> true_alignment(const GyroScenario& scenario, std::uint64_t seed, std::uint64_t gyro) {
+  const Vector3d misalignment = scenario.misalignment_rad.value_or(
+      scenario.misalignment_magnitude_rad * Stream(seed, Source::kMisalignment, gyro).direction());
+  return Rot<C, C>::exp(Vec<C>::assume(misalignment)) *
+         Rot<C, Case>::exp(Vec<C>::assume(scenario.mounting_rotation_vector_rad));
+}
+
+Vec<C> start_direction(const GyroScenario& scenario) {
+  const double length = scenario.start_direction_c.norm();
+  if (!(length > 0 && std::isfinite(length))) {
+    throw std::invalid_argument("gyro: the start direction must have a length");
+  }
+  return Vec<C>::assume(scenario.start_direction_c / length);
+}
+
+}  // namespace
+
+Drift::Drift(const DriftScenario& scenario, std::uint64_t seed, std::uint64_t gyro)
+    : scenario_(scenario),
+      kappa_rad_s_(initial_kappa(scenario, seed, gyro)),
+      kappa_now_rad_s_(kappa_rad_s_ * (1 + scenario.warm_up_fraction)),
+      field_(outside_members(scenario, seed, gyro)),
+      coefficient_random_(seed, Source::kCoefficientWalk, gyro),
+      walk_random_(seed, Source::kDirectionWalk, gyro),
+      markov_random_(seed, Source::kMarkovDrift, gyro) {
+  if (scenario.markov_sigma_rad_s > 0) {
+    markov_rad_s_ = scenario.markov_sigma_rad_s * markov_random_.normal3();
+  }
+}
+
+void Drift::next_step(double t_s, double step_s) {
+  if (scenario_.coefficient_walk_rad_s_sqrt_s > 0) {
+    const double sigma = scenario_.coefficient_walk_rad_s_sqrt_s * std::sqrt(step_s);
+    for (int i = 0; i < Esg7::kSize; ++i) {
+      kappa_rad_s_(i) += sigma * coefficient_random_.normal();
+    }
+    kappa_now_rad_s_ = kappa_rad_s_;
+  }
+  if (scenario_.warm_up_fraction != 0) {
+    kappa_now_rad_s_ = kappa_rad_s_ * (1 + scenario_.warm_up_fraction * std::exp(-t_s / scenario_.warm_up_time_s));
+  }
+  if (scenario_.direction_walk_rad_sqrt_s > 0) {
+    walk_rad_ = Vec<Case>::assume(scenario_.direction_walk_rad_sqrt_s * std::sqrt(step_s) * walk_random_.normal3());
+  }
+  if (scenario_.markov_sigma_rad_s > 0) {
+    const double kept = std::exp(-step_s / scenario_.markov_time_s);
+    markov_rad_s_ =
+        kept * markov_rad_s_ + scenario_.markov_sigma_rad_s * std::sqrt(1 - kept * kept) * markov_random_.normal3();
+  }
+}
+
+Readout::Readout(const ReadoutScenario& scenario, Duration sample_period, std::uint64_t seed, int gyro)
+    : scenario_(scenario),
+      gyro_(gyro),
+      stuck_samples_(static_cast<int>(std::lround(scenario.stuck_s / to_seconds(sample_period)))),
+      noise_(seed, Source::kReadoutNoise, static_cast<std::uint64_t>(gyro)),
+      dropout_(seed, Source::kReadoutDropout, static_cast<std::uint64_t>(gyro)),
+      spike_(seed, Source::kReadoutSpike, static_cast<std::uint64_t>(gyro)),
+      stuck_(seed, Source::kReadoutStuck, static_cast<std::uint64_t>(gyro)) {}
+
+Vector3d Readout::read(Time t, const Vec<Case>& h, std::vector<Event>& events) {
+  Vector3d reading = h.raw() + scenario_.scale.cwiseProduct(h.raw()) + scenario_.bias_rad;
+  if (scenario_.noise_rad > 0) {
+    reading += scenario_.noise_rad * noise_.normal3();
+  }
+  reading.normalize();
+  if (scenario_.quantum_rad > 0) {
+    reading = (reading / scenario_.quantum_rad).array().round().matrix() * scenario_.quantum_rad;
+  }
+  if (scenario_.spike_probability > 0 && spike_.happens(scenario_.spike_probability)) {
+    const auto axis = static_cast<Eigen::Index>(spike_.bits() % 3);
+    reading(axis) += spike_.uniform(-scenario_.spike_rad, scenario_.spike_rad);
+    events.push_back({t, Fault::kReadoutSpike, gyro_});
+  }
+  if (scenario_.stuck_probability > 0) {
+    if (stuck_left_ == 0 && stuck_.happens(scenario_.stuck_probability)) {
+      stuck_left_ = stuck_samples_;
+      last_ = reading;
+    } else if (stuck_left_ > 0) {
+      --stuck_left_;
+      reading = last_;
+      events.push_back({t, Fault::kReadoutStuck, gyro_});
+    }
+  }
+  if (scenario_.dropout_probability > 0 && dropout_.happens(scenario_.dropout_probability)) {
+    reading.setConstant(std::numeric_limits<double>::quiet_NaN());
+    events.push_back({t, Fault::kReadoutDropout, gyro_});
+  }
+  return reading;
+}
+
+Gyro::Gyro(const GyroScenario& scenario, const Rot<In, C>& C_in_c, std::uint64_t seed, int gyro)
+    : drift_(scenario.drift, seed, static_cast<std::uint64_t>(gyro)),
+      C_c_b_(true_alignment(scenario, seed, static_cast<std::uint64_t>(gyro))),
+      C_in_b_(C_in_c * C_c_b_),
+      h_in_(C_in_c * start_direction(scenario)) {}
+
+void Gyro::advance(double t_s, double step_s, const Rot<In, C>& middle, const Rot<In, C>& end) {
+  drift_.next_step(t_s, step_s);
+  const Rot<In, Case> C_in_b[3] = {C_in_b_, middle * C_c_b_, end * C_c_b_};
+  const auto omega_in = [&](int stage, const Vector3d& h) -> Vector3d {
+    const Rot<In, Case>& C_in_b_now = C_in_b[stage];
+    return (C_in_b_now * drift_.rate(C_in_b_now.inverse() * Vec<In>::assume(h))).raw();
+  };
+  Vector3d h = precess<double>(h_in_.raw(), step_s, omega_in);
+  if (drift_.walk()) {
+    h = rotated<double>((C_in_b[2] * *drift_.walk()).raw(), h);
+  }
+  h_in_ = Vec<In>::assume(h);
+  C_in_b_ = C_in_b[2];
+}
+
+Truth::Gyro Gyro::truth() const {
+  Truth::Gyro truth;
+  for (int i = 0; i < Esg7::kSize; ++i) {
+    truth.drift_rad_s.emplace_back(Esg7::kNames[static_cast<std::size_t>(i)], drift_.kappa_rad_s()(i));
+  }
+  for (const DriftHarmonic& member : drift_.outside().members()) {
+    truth.unmodelled_rad_s.emplace_back(name(member), member.amplitude_rad_s);
+  }
+  truth.alignment_rotation_vector_rad = C_c_b_.log().raw();
+  return truth;
+}
+
+}  // namespace trihedron::sim

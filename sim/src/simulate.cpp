@@ -1,0 +1,168 @@
+#include "trihedron/sim/simulate.hpp"
+
+#include <cmath>
+#include <stdexcept>
+#include <string>
+
+#include "trihedron/sim/attitude.hpp"
+#include "trihedron/sim/gyro.hpp"
+#include "trihedron/sim/interval.hpp"
+#include "trihedron/sim/orbit.hpp"
+#include "trihedron/sim/sky.hpp"
+#include "trihedron/sim/star_tracker.hpp"
+
+namespace trihedron::sim {
+namespace {
+
+void require(bool condition, const std::string& message) {
+  if (!condition) {
+    throw std::invalid_argument("scenario: " + message);
+  }
+}
+
+bool is_probability(double p) { return p >= 0 && p <= 1; }
+
+void check(const GyroScenario& gyro, const std::string& name) {
+  const DriftScenario& drift = gyro.drift;
+  const ReadoutScenario& readout = gyro.readout;
+  require(gyro.misalignment_magnitude_rad >= 0, name + ".misalignment_magnitude_rad must not be negative");
+  require(gyro.alignment_prior_sigma_rad > 0, name + ".alignment_prior_sigma_rad must be positive");
+  require(drift.prior_sigma_rad_s > 0, name + ".drift.prior_sigma_rad_s must be positive");
+  require(drift.outside_sigma_rad_s >= 0, name + ".drift.outside_sigma_rad_s must not be negative");
+  require(drift.coefficient_walk_rad_s_sqrt_s >= 0, name + ".drift.coefficient_walk_rad_s_sqrt_s must not be negative");
+  require(drift.direction_walk_rad_sqrt_s >= 0, name + ".drift.direction_walk_rad_sqrt_s must not be negative");
+  require(drift.markov_sigma_rad_s >= 0, name + ".drift.markov_sigma_rad_s must not be negative");
+  require(drift.warm_up_time_s > 0, name + ".drift.warm_up_time_s must be positive");
+  require(drift.markov_time_s > 0, name + ".drift.markov_time_s must be positive");
+  require(readout.noise_rad >= 0, name + ".readout.noise_rad must not be negative");
+  require(readout.quantum_rad >= 0, name + ".readout.quantum_rad must not be negative");
+  require(readout.stuck_s >= 0, name + ".readout.stuck_s must not be negative");
+  require(is_probability(readout.dropout_probability), name + ".readout.dropout_probability must be 0 … 1");
+  require(is_probability(readout.spike_probability), name + ".readout.spike_probability must be 0 … 1");
+  require(is_probability(readout.stuck_probability), name + ".readout.stuck_probability must be 0 … 1");
+}
+
+void check(const StarTrackerScenario& head) {
+  require((head.noise_rad.array() >= 0).all(), "star_tracker.noise_rad must not be negative");
+  require((head.field_error_rad.array() >= 0).all(), "star_tracker.field_error_rad must not be negative");
+  require(head.field_correlation_rad > 0, "star_tracker.field_correlation_rad must be positive");
+  require(std::isfinite(head.clock_offset_s), "star_tracker.clock_offset_s must be finite");
+  require(std::isfinite(head.latency_s), "star_tracker.latency_s must be finite");
+  require(is_probability(head.dropout_probability), "star_tracker.dropout_probability must be 0 … 1");
+  require(is_probability(head.outlier_probability), "star_tracker.outlier_probability must be 0 … 1");
+  require(is_probability(head.wrong_sign_probability), "star_tracker.wrong_sign_probability must be 0 … 1");
+}
+
+void check(const Scenario& scenario) {
+  require(scenario.duration > Duration{0}, "duration must be positive");
+  require(scenario.gyro_period > Duration{0}, "gyro_period must be positive");
+  require(
+      scenario.star_tracker_period > Duration{0} && scenario.star_tracker_period % scenario.gyro_period == Duration{0},
+      "star_tracker_period must be a multiple of gyro_period");
+  require(scenario.gyros.size() >= 2 && scenario.gyros.size() <= 4, "there must be 2 to 4 gyros");
+  for (std::size_t i = 0; i < scenario.gyros.size(); ++i) {
+    check(scenario.gyros[i], "gyros[" + std::to_string(i) + "]");
+  }
+  require(scenario.attitude.jitter_rad >= 0, "attitude.jitter_rad must not be negative");
+  check(scenario.star_tracker);
+}
+
+PassSettings settings(const Scenario& scenario) {
+  PassSettings settings;
+  settings.spacecraft = scenario.spacecraft;
+  settings.epoch = scenario.epoch;
+  settings.duration = scenario.duration;
+  settings.gyro_period = scenario.gyro_period;
+  settings.star_tracker_period = scenario.star_tracker_period;
+  settings.star_tracker_noise_rad = scenario.star_tracker.noise_rad;
+  for (const GyroScenario& gyro : scenario.gyros) {
+    GyroPrior prior;
+    prior.readout_noise_rad = gyro.readout.noise_rad;
+    prior.drift_common_sigma_rad_s = gyro.drift.prior_sigma_rad_s;
+    prior.alignment_rotation_vector_rad = gyro.mounting_rotation_vector_rad;
+    prior.alignment_sigma_rad.setConstant(gyro.alignment_prior_sigma_rad);
+    settings.gyros.push_back(prior);
+  }
+  return settings;
+}
+
+void append(std::vector<double>& values, const Eigen::Vector3d& v) { values.insert(values.end(), v.begin(), v.end()); }
+
+void record_truth(Time t, const Rot<In, C>& C_in_c, const std::vector<Gyro>& gyros, Truth& truth) {
+  Eigen::Quaterniond q = C_in_c.quaternion();
+  if (!truth.q_in_c.empty() && q.dot(truth.q_in_c.back()) < 0) {
+    q.coeffs() = -q.coeffs();
+  }
+  truth.t.push_back(t);
+  truth.q_in_c.push_back(q);
+  for (const Gyro& gyro : gyros) {
+    append(truth.h_in, gyro.momentum().raw());
+  }
+}
+
+}  // namespace
+
+SimulatedPass simulate(const Scenario& scenario) {
+  check(scenario);
+  const double duration_s = to_seconds(scenario.duration);
+  const double step_s = to_seconds(scenario.gyro_period);
+  // Fixes look at C(t + offset), and their rate a little to both sides.
+  const double margin_s =
+      std::abs(scenario.star_tracker.clock_offset_s) + std::abs(scenario.star_tracker.latency_s) + 0.1;
+
+  const KeplerJ2 orbit(scenario.orbit);
+  const AttitudeProgramme attitude(scenario.attitude, orbit, scenario.seed, -margin_s, duration_s + margin_s);
+
+  Rot<In, C> C_in_c = attitude.at(0);
+  std::vector<Gyro> gyros;
+  std::vector<Readout> readouts;
+  for (std::size_t i = 0; i < scenario.gyros.size(); ++i) {
+    const auto number = static_cast<int>(i);
+    gyros.emplace_back(scenario.gyros[i], C_in_c, scenario.seed, number);
+    readouts.emplace_back(scenario.gyros[i].readout, scenario.gyro_period, scenario.seed, number);
+  }
+
+  SimulatedPass result;
+  result.pass.settings = settings(scenario);
+  GyroTelemetry& telemetry = result.pass.gyro;
+  telemetry.gyros = static_cast<int>(gyros.size());
+  const auto samples = static_cast<std::size_t>(scenario.duration / scenario.gyro_period) + 1;
+  telemetry.t.reserve(samples);
+  telemetry.h.reserve(samples * gyros.size() * 3);
+
+  for (Duration since{0};; since += scenario.gyro_period) {
+    const Time t = scenario.epoch + since;
+    const double t_s = to_seconds(since);
+    if (since % scenario.star_tracker_period == Duration{0}) {
+      record_truth(t, C_in_c, gyros, result.truth);
+    }
+    if (within(scenario.gyro_gaps, since)) {
+      result.events.push_back({t, Fault::kGyroGap});
+    } else {
+      telemetry.t.push_back(t);
+      for (std::size_t i = 0; i < gyros.size(); ++i) {
+        append(telemetry.h, readouts[i].read(t, gyros[i].momentum_in_case(), result.events));
+      }
+    }
+    if (since + scenario.gyro_period > scenario.duration) {
+      break;
+    }
+    const Rot<In, C> middle = attitude.at(t_s + step_s / 2);
+    const Rot<In, C> end = attitude.at(t_s + step_s);
+    for (Gyro& gyro : gyros) {
+      gyro.advance(t_s, step_s, middle, end);
+    }
+    C_in_c = end;
+  }
+  for (const Gyro& gyro : gyros) {
+    result.truth.gyros.push_back(gyro.truth());
+  }
+
+  const Sky sky(scenario.epoch, -margin_s, duration_s + margin_s);
+  result.pass.star_tracker =
+      simulate_fixes(scenario.star_tracker, {attitude, orbit, sky}, scenario.epoch, scenario.duration,
+                     scenario.star_tracker_period, scenario.seed, result.events);
+  return result;
+}
+
+}  // namespace trihedron::sim
