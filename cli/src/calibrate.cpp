@@ -83,14 +83,15 @@ int run(const Arguments& arguments, const Common& common) {
     options.drift_model = arguments.drift_model;
   }
   const io::LoadedPass loaded = io::read_pass(arguments.pass);
+  ground::CalibrationRun result;
+  try {
+    const ProgressBar bar("calibrate", common.quiet);
+    result = ground::calibrate(loaded.pass, options, bar.meter());
+  } catch (const ground::SetupError& error) {
+    throw io::InputRefused(arguments.pass, {}, error.what(), error.cure());
+  }
   const std::filesystem::path out = arguments.out;
   io::make_directory(out);
-
-  ground::CalibrationRun result;
-  {
-    ProgressBar bar("calibrate", common.quiet);
-    result = ground::calibrate(loaded.pass, options, bar.meter());
-  }
   const Time epoch = loaded.pass.settings.epoch;
   const auto truth = io::read_truth(arguments.pass);
   const double limit_rad = io::parse_angle_rad("5arcmin");

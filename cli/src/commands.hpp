@@ -5,7 +5,7 @@
 
 namespace trihedron::cli {
 
-/// Pinned: docs/interfaces in README. 2 to 4 come from exceptions, see main.cpp.
+/// Pinned, see README. 2 to 4 come from exceptions, see main.cpp.
 enum ExitStatus : int { kTrustworthy = 0, kDoNotUse = 1, kWrongUsage = 2, kInputRefused = 3, kMachineFailed = 4 };
 
 struct Common {
@@ -13,6 +13,7 @@ struct Common {
   bool json = false;
 };
 
+void add_simulate(CLI::App& program, const Common& common, int& exit_status);
 void add_inspect(CLI::App& program, const Common& common, int& exit_status);
 void add_calibrate(CLI::App& program, const Common& common, int& exit_status);
 void add_navigate(CLI::App& program, const Common& common, int& exit_status);

@@ -4,7 +4,6 @@
 #include <new>
 
 #include "commands.hpp"
-#include "trihedron/ground/calibrate.hpp"
 #include "trihedron/io/error.hpp"
 
 namespace {
@@ -28,6 +27,7 @@ int main(int argc, char** argv) {
     cli::Common common;
     program.add_flag("--quiet", common.quiet, "Print nothing but errors");
     program.add_flag("--json", common.json, "Print the summary as JSON");
+    cli::add_simulate(program, common, exit_status);
     cli::add_inspect(program, common, exit_status);
     cli::add_calibrate(program, common, exit_status);
     cli::add_navigate(program, common, exit_status);
@@ -44,8 +44,6 @@ int main(int argc, char** argv) {
   } catch (const io::UsageError& error) {
     return fail(cli::kWrongUsage, error.what());
   } catch (const io::InputRefused& error) {
-    return fail(cli::kInputRefused, error.what());
-  } catch (const ground::SetupError& error) {
     return fail(cli::kInputRefused, error.what());
   } catch (const io::MachineFailed& error) {
     return fail(cli::kMachineFailed, error.what());

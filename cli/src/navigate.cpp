@@ -37,9 +37,11 @@ int run(const Arguments& arguments, const Common& common) {
     options.estimator = loaded.pass.settings.prior->estimator;
   }
   ground::NavigationRun result;
-  {
-    ProgressBar bar("navigate", common.quiet);
+  try {
+    const ProgressBar bar("navigate", common.quiet);
     result = ground::navigate(loaded.pass, options, bar.meter());
+  } catch (const ground::SetupError& error) {
+    throw io::InputRefused(arguments.pass, {}, error.what(), error.cure());
   }
   const Time epoch = loaded.pass.settings.epoch;
   io::write_attitude(arguments.attitude, epoch, result.attitude);

@@ -17,7 +17,7 @@ ProgressBar::~ProgressBar() {
   }
 }
 
-std::function<void(double)> ProgressBar::meter() {
+std::function<void(double)> ProgressBar::meter() const {
   if (!shown_) {
     return {};
   }

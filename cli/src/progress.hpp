@@ -14,7 +14,7 @@ class ProgressBar {
   ProgressBar& operator=(const ProgressBar&) = delete;
 
   /// To be called with the fraction done, 0 … 1.
-  [[nodiscard]] std::function<void(double)> meter();
+  [[nodiscard]] std::function<void(double)> meter() const;
 
  private:
   std::string what_;

@@ -1,0 +1,362 @@
+"""The program as users run it: outputs, exit status, messages. Run by CTest with TRIHEDRON_BUILD naming the build directory."""
+import csv
+import json
+import os
+import pathlib
+import resource
+import signal
+import subprocess
+
+import pytest
+import xarray
+
+ROOT = pathlib.Path(__file__).resolve().parents[2]
+PROGRAM = pathlib.Path(os.environ["TRIHEDRON_BUILD"]) / "trihedron"
+EXAMPLE = ROOT / "examples" / "pass.nc"
+
+TRUSTWORTHY, DO_NOT_USE, WRONG_USAGE, INPUT_REFUSED, MACHINE_FAILED = range(5)
+
+
+def run(*arguments, **options):
+    return subprocess.run([str(PROGRAM), *map(str, arguments)], capture_output=True, text=True, **options)
+
+
+def refused(result, status, *words):
+    """One line on stderr that holds the words, nothing on stdout, the status."""
+    assert result.returncode == status, result.stderr
+    assert result.stdout == ""
+    assert result.stderr.count("\n") == 1, result.stderr
+    assert result.stderr.startswith("trihedron: ")
+    for word in words:
+        assert word in result.stderr, result.stderr
+
+
+@pytest.fixture(scope="session")
+def example_columns():
+    columns = {}
+    for group in ("gyro", "star_tracker", "truth"):
+        with xarray.open_dataset(EXAMPLE, group=group, decode_times=False) as data:
+            columns[group] = {name: data[name].values for name in data.variables}
+    return columns
+
+
+@pytest.fixture
+def csv_pass(tmp_path, example_columns):
+    """The first minutes of the example as a CSV directory, without its truth."""
+
+    def make(minutes=20, toml_edit=None):
+        directory = tmp_path / "pass"
+        directory.mkdir()
+        toml = xarray.open_dataset(EXAMPLE).attrs["pass_toml"]
+        lines = [f"duration_s = {60.0 * minutes}" if line.startswith("duration_s") else line for line in toml.splitlines()]
+        text = "\n".join(lines) + "\n"
+        (directory / "pass.toml").write_text(toml_edit(text) if toml_edit else text)
+        for group, names in (("gyro", ["t_s"] + [f"h{k}_{a}" for k in (1, 2) for a in "xyz"]),
+                             ("star_tracker", ["t_s", "q_x", "q_y", "q_z", "q_w"])):
+            data = example_columns[group]
+            with open(directory / f"{group}.csv", "w", newline="") as file:
+                writer = csv.writer(file, lineterminator="\n")
+                writer.writerow(names)
+                for row in zip(*(data[name] for name in names)):
+                    if row[0] <= 60 * minutes:
+                        writer.writerow([f"{row[0]:.3f}"] + [f"{value:.9f}" for value in row[1:]])
+        return directory
+
+    return make
+
+
+def edit_lines(path, edit):
+    lines = path.read_text().splitlines(keepends=True)
+    edit(lines)
+    path.write_text("".join(lines))
+
+
+# What the commands give.
+
+
+def test_inspect_says_what_a_pass_holds():
+    result = run("inspect", EXAMPLE)
+    assert result.returncode == TRUSTWORTHY
+    assert "samples of 2 gyros" in result.stdout
+    facts = json.loads(run("--json", "inspect", EXAMPLE).stdout)
+    assert facts["gyros"] == 2
+    assert facts["gyro_samples"] > 50_000
+
+
+@pytest.fixture(scope="session")
+def calibrated(tmp_path_factory):
+    out = tmp_path_factory.mktemp("calibrated")
+    result = run("calibrate", EXAMPLE, "-o", out, "--estimator", "paper")
+    assert result.returncode == TRUSTWORTHY, result.stderr + result.stdout
+    return out, result.stdout
+
+
+def test_calibrate_writes_what_is_pinned(calibrated):
+    out, _ = calibrated
+    assert sorted(f.name for f in out.iterdir()) == ["attitude.csv", "calibration.json", "effective-config.toml", "report.html",
+                                                     "residuals.nc"]
+    calibration = json.loads((out / "calibration.json").read_text())
+    assert calibration["format"] == "trihedron-calibration"
+    assert len(calibration["gyros"]) == 2
+    assert calibration["covariance"]["states"][7:11] == ["gyro1.align_x", "gyro1.align_y", "gyro1.align_z", "gyro2.k0"]
+    assert calibration["verdict"]["trustworthy"] is True
+    with xarray.open_dataset(out / "residuals.nc", group="fixes") as residuals:
+        assert 3.8 < float(residuals["nis"][residuals["used"] == 1].mean()) < 4.2
+    with xarray.open_dataset(out / "residuals.nc", group="parameters") as parameters:
+        assert parameters["gyro2_align_z_sigma"].attrs["units"] == "rad"
+    with open(out / "attitude.csv") as file:
+        header = file.readline().strip()
+    assert header.startswith("t_s,q_x,q_y,q_z,q_w,sigma_x_rad,sigma_y_rad,sigma_z_rad")
+
+
+def test_calibrate_finds_the_truth_of_the_example(calibrated):
+    _, text = calibrated
+    rows = [line.split() for line in text.splitlines() if line.strip().startswith("align_")]
+    assert len(rows) == 6
+    for row in rows:  # name, value, ′, sigma″, error″
+        assert abs(float(row[4].rstrip("″"))) < 4 * float(row[3].rstrip("″"))
+        assert float(row[3].rstrip("″")) < 5
+
+
+def test_effective_config_repeats_the_run(calibrated, tmp_path):
+    out, _ = calibrated
+    result = run("calibrate", EXAMPLE, "-o", tmp_path / "again", "--config", out / "effective-config.toml")
+    assert result.returncode == TRUSTWORTHY
+    assert (tmp_path / "again" / "calibration.json").read_bytes() == (out / "calibration.json").read_bytes()
+
+
+def test_json_is_one_document(tmp_path):
+    result = run("calibrate", EXAMPLE, "-o", tmp_path / "out", "--json")
+    summary = json.loads(result.stdout)
+    assert summary["calibration"]["verdict"]["trustworthy"] is True
+    assert summary["navigation"]["reference"] == "truth"
+
+
+def test_quiet_prints_nothing(tmp_path):
+    result = run("--quiet", "calibrate", EXAMPLE, "-o", tmp_path / "out")
+    assert (result.returncode, result.stdout, result.stderr) == (TRUSTWORTHY, "", "")
+
+
+def navigate_and_evaluate(tmp_path, *options):
+    attitude = tmp_path / "attitude.csv"
+    result = run("navigate", EXAMPLE, *options, "-o", attitude)
+    assert result.returncode == TRUSTWORTHY, result.stderr + result.stdout
+    evaluation = run("--json", "evaluate", EXAMPLE, "--attitude", attitude)
+    assert evaluation.returncode == TRUSTWORTHY, evaluation.stderr
+    return json.loads(evaluation.stdout)
+
+
+ARCSECOND = 4.8481e-6
+
+
+def test_navigation_online_improves_with_each_correction(tmp_path):
+    stretches = navigate_and_evaluate(tmp_path, "--online")["per_90_min"]
+    assert stretches[0]["max_total_rad"] > 600 * ARCSECOND
+    assert all(s["max_total_rad"] < 60 * ARCSECOND for s in stretches[1:])
+
+
+def test_navigation_by_a_calibration_is_good_from_the_start(calibrated, tmp_path):
+    out, _ = calibrated
+    evaluation = navigate_and_evaluate(tmp_path, "--calibration", out / "calibration.json")
+    assert all(s["max_total_rad"] < 60 * ARCSECOND for s in evaluation["per_90_min"])
+    assert [round(c["t_s"]) for c in evaluation["corrections"]][:2] == [0, 5400]
+
+
+def test_navigation_without_corrections_and_with_each_fix(calibrated, tmp_path):
+    out, _ = calibrated
+    once = navigate_and_evaluate(tmp_path, "--calibration", out / "calibration.json", "--correction-interval", "none")
+    assert len(once["corrections"]) == 1
+    each = navigate_and_evaluate(tmp_path, "--online", "--correction-interval", "continuous")
+    assert len(each["corrections"]) > 1000
+    assert each["per_90_min"][-1]["max_total_rad"] < 30 * ARCSECOND
+
+
+def test_a_calibration_of_another_start_up_is_not_to_be_used(calibrated, tmp_path):
+    out, _ = calibrated
+    calibration = json.loads((out / "calibration.json").read_text())
+    for gyro in calibration["gyros"]:
+        gyro["drift_rad_s"]["nu12"] += 5e-7
+    other = tmp_path / "other.json"
+    other.write_text(json.dumps(calibration))
+    result = run("navigate", EXAMPLE, "--calibration", other, "-o", tmp_path / "attitude.csv")
+    assert result.returncode == DO_NOT_USE
+    assert "DO NOT USE" in result.stdout
+
+
+def test_evaluation_without_truth_is_against_the_star_tracker(csv_pass, tmp_path):
+    directory = csv_pass()
+    run("navigate", directory, "--online", "-o", tmp_path / "attitude.csv")
+    result = run("evaluate", directory, "--attitude", tmp_path / "attitude.csv", "--limit", "1deg")
+    assert result.returncode == TRUSTWORTHY
+    assert "against the star tracker" in result.stdout
+
+
+def test_installed_help_names_every_command():
+    result = run("--help")
+    assert result.returncode == 0
+    for command in ("inspect", "calibrate", "navigate", "evaluate"):
+        assert command in result.stdout
+    assert run("--version").stdout.strip()
+
+
+# Wrong usage.
+
+
+@pytest.mark.parametrize("arguments, word", [
+    ((), "subcommand"),
+    (("nonsense",), "subcommand"),
+    (("calibrate", EXAMPLE), "--output"),
+    (("calibrate", EXAMPLE, "-o", "x", "--estimator", "magic"), "magic"),
+    (("navigate", EXAMPLE, "-o", "x"), "--online"),
+    (("navigate", EXAMPLE, "-o", "x", "--online", "--calibration", "y"), "--online"),
+    (("navigate", EXAMPLE, "-o", "x", "--online", "--correction-interval", "90"), "unit"),
+    (("navigate", EXAMPLE, "-o", "x", "--online", "--correction-interval", "0min"), "positive"),
+    (("evaluate", EXAMPLE, "--attitude", "x", "--limit", "5"), "unit"),
+])
+def test_wrong_usage_is_told_in_one_line(arguments, word):
+    refused(run(*arguments), WRONG_USAGE, word)
+
+
+# Bad input: each refused with file, place, reason and cure, and nothing left behind.
+
+
+def test_a_missing_pass_is_refused(tmp_path):
+    refused(run("inspect", tmp_path / "nowhere"), INPUT_REFUSED, "nowhere")
+
+
+def test_no_fix_at_all_is_refused(csv_pass, tmp_path):
+    directory = csv_pass(2)
+    edit_lines(directory / "star_tracker.csv", lambda lines: lines.__delitem__(slice(1, None)))
+    refused(run("calibrate", directory, "-o", tmp_path / "out"), INPUT_REFUSED, "star_tracker.csv")
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_silent_gyro_is_refused(csv_pass, tmp_path):
+    directory = csv_pass(2)
+
+    def silence(lines):
+        for i in range(1, len(lines)):
+            fields = lines[i].rstrip("\n").split(",")
+            lines[i] = ",".join(fields[:4] + ["nan"] * 3) + "\n"
+
+    edit_lines(directory / "gyro.csv", silence)
+    refused(run("calibrate", directory, "-o", tmp_path / "out"), INPUT_REFUSED, "gyro.csv", "gyro 2")
+
+
+def test_parallel_momenta_are_refused(csv_pass, tmp_path):
+    directory = csv_pass(2)
+
+    def copy(lines):
+        for i in range(1, len(lines)):
+            fields = lines[i].rstrip("\n").split(",")
+            lines[i] = ",".join(fields[:4] + fields[1:4]) + "\n"
+
+    edit_lines(directory / "gyro.csv", copy)
+    refused(run("calibrate", directory, "-o", tmp_path / "out"), INPUT_REFUSED, "parallel")
+    assert not (tmp_path / "out" / "calibration.json").exists()
+
+
+def test_a_pass_shorter_than_a_minute_is_refused(csv_pass, tmp_path):
+    refused(run("calibrate", csv_pass(0.5), "-o", tmp_path / "out"), INPUT_REFUSED, "minute")
+
+
+def test_unordered_and_repeated_times_are_counted(csv_pass):
+    directory = csv_pass(2)
+
+    def disorder(lines):
+        lines[100], lines[101] = lines[101], lines[100]
+        lines.insert(200, lines[199])
+
+    edit_lines(directory / "gyro.csv", disorder)
+    kinds = {d["kind"]: d["count"] for d in json.loads(run("--json", "inspect", directory).stdout)["defects"]}
+    assert sum(count for kind, count in kinds.items() if "backward" in kind) == 1
+    assert sum(count for kind, count in kinds.items() if "repeated" in kind) == 1
+
+
+def test_dirty_quaternions_are_counted_and_survived(csv_pass, tmp_path):
+    directory = csv_pass(20)
+
+    def dirty(lines):
+        def rewrite(i, change):
+            fields = lines[i].rstrip("\n").split(",")
+            lines[i] = ",".join([fields[0]] + [change(f) for f in fields[1:]]) + "\n"
+        rewrite(50, lambda f: "nan")
+        rewrite(60, lambda f: "0.0")
+        rewrite(70, lambda f: f[1:] if f.startswith("-") else "-" + f)
+
+    edit_lines(directory / "star_tracker.csv", dirty)
+    result = run("calibrate", directory, "-o", tmp_path / "out")
+    assert result.returncode in (TRUSTWORTHY, DO_NOT_USE)
+    assert "2 rejected: not a rotation" in result.stdout
+    assert "nan" not in (tmp_path / "out" / "calibration.json").read_text().lower()
+
+
+def test_a_line_cut_short_at_the_end_is_survived(csv_pass):
+    directory = csv_pass(2)
+    text = (directory / "gyro.csv").read_text()
+    (directory / "gyro.csv").write_text(text[:-30])
+    result = run("inspect", directory)
+    assert result.returncode == TRUSTWORTHY
+    assert "cut short" in result.stdout
+
+
+@pytest.mark.parametrize("edit, words", [
+    (lambda text: text.replace("period_s = 0.125", ""), ("period_s",)),
+    (lambda text: text.replace("readout_noise_rad", "readout_noise"), ("readout_noise", "readout_noise_rad")),
+    (lambda text: text.replace("[gyro]", "[gyros]"), ("gyros",)),
+    (lambda text: text + "\n[oven]\nheat = 3\n", ("oven",)),
+])
+def test_missing_and_unknown_keys_are_named_with_their_place(csv_pass, edit, words):
+    refused(run("inspect", csv_pass(2, toml_edit=edit)), INPUT_REFUSED, "pass.toml", *words)
+
+
+def test_a_field_that_is_no_number_is_named_with_line_and_column(csv_pass):
+    directory = csv_pass(2)
+    edit_lines(directory / "gyro.csv", lambda lines: lines.__setitem__(5, "0.500,oops,0,0,1,0,0\n"))
+    refused(run("inspect", directory), INPUT_REFUSED, "gyro.csv:6:7")
+
+
+@pytest.mark.parametrize("config, word", [
+    ("[filter]\ndirection_random_walk = 1e-8\n", "unit"),
+    ("[filter]\ngate = 3\n", "gate_nis"),
+    ("[filter]\ngate_nis = -1\n", "gate_nis"),
+    ("[filter]\nreopen_after_rejections = 0.5\n", "reopen_after_rejections"),
+    ("[corrections]\ninterval = 90\n", "interval"),
+    ("[corrections]\ninterval = \"-5min\"\n", "interval"),
+    ("estimator = \"magic\"\n", "magic"),
+])
+def test_bad_settings_are_refused(tmp_path, config, word):
+    file = tmp_path / "config.toml"
+    file.write_text(config)
+    refused(run("calibrate", EXAMPLE, "-o", tmp_path / "out", "--config", file), INPUT_REFUSED, word)
+
+
+def test_an_attitude_of_another_time_is_refused(tmp_path):
+    file = tmp_path / "attitude.csv"
+    file.write_text("t_s,q_x,q_y,q_z,q_w\n1e6,0,0,0,1\n")
+    refused(run("evaluate", EXAMPLE, "--attitude", file), INPUT_REFUSED, "attitude.csv", "no epoch in common")
+
+
+# A machine that fails.
+
+
+def test_an_output_directory_that_cannot_be_made_is_a_machine_failure(tmp_path):
+    (tmp_path / "file").write_text("")
+    refused(run("calibrate", EXAMPLE, "-o", tmp_path / "file" / "out"), MACHINE_FAILED, "out")
+
+
+def test_a_full_disk_leaves_no_half_written_file(tmp_path):
+    out = tmp_path / "out"
+
+    def limit():  # writes past 100 kB fail, as on a full disk
+        signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+        resource.setrlimit(resource.RLIMIT_FSIZE, (100_000, 100_000))
+
+    result = run("calibrate", EXAMPLE, "-o", out, preexec_fn=limit)
+    refused(result, MACHINE_FAILED, "out")
+    # What is there is whole: the small file written before the large one failed, no temporary beside it.
+    assert {f.name for f in out.iterdir()} <= {"calibration.json"}
+
+
+def test_a_read_only_directory_is_a_machine_failure():
+    refused(run("calibrate", EXAMPLE, "-o", "/proc/trihedron"), MACHINE_FAILED, "/proc/trihedron")

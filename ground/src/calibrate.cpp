@@ -39,9 +39,8 @@ void use_settings(const PassSettings& settings, typename Estimator::Setup& setup
     for (const auto* table : {&prior.drift_rad_s, &prior.drift_sigma_rad_s}) {
       for (const auto& [name, value] : *table) {
         if (std::find(Model::kNames.begin(), Model::kNames.end(), name) == Model::kNames.end()) {
-          throw SetupError(
-              fmt::format("gyro {}: the prior names drift coefficient '{}', which drift model {} does not have", k + 1,
-                          name, Model::kModelName));
+          throw SetupError(fmt::format("the prior of gyro {} names drift coefficient '{}'", k + 1, name),
+                           fmt::format("drift model {} has {}", Model::kModelName, fmt::join(Model::kNames, ", ")));
         }
       }
     }
@@ -70,7 +69,8 @@ void use_calibration(const Calibration& prior, typename Estimator::Setup& setup)
   for (const std::string& name : names) {
     const auto found = std::find(prior.states.begin(), prior.states.end(), name);
     if (found == prior.states.end()) {
-      throw SetupError(fmt::format("the earlier calibration has no covariance of '{}'", name));
+      throw SetupError(fmt::format("the earlier calibration has no covariance of '{}'", name),
+                       "use a calibration of this pair of gyros");
     }
     rows.push_back(found - prior.states.begin());
   }
@@ -84,7 +84,8 @@ void use_calibration(const Calibration& prior, typename Estimator::Setup& setup)
     const GyroCalibration& gyro = prior.gyros[static_cast<std::size_t>(k)];
     if (gyro.drift_model != Model::kModelName || gyro.drift_rad_s.size() != Model::kSize) {
       throw SetupError(fmt::format("the earlier calibration of gyro {} is of drift model '{}', not {}", k + 1,
-                                   gyro.drift_model, Model::kModelName));
+                                   gyro.drift_model, Model::kModelName),
+                       "use a calibration made with the same drift model");
     }
     for (std::size_t i = 0; i < Model::kSize; ++i) {
       setup.prior[k].drift_rad_s(static_cast<Eigen::Index>(i)) = gyro.drift_rad_s[i].second;
@@ -99,14 +100,16 @@ typename Estimator::Setup make_setup(const Pass& pass, const CalibrationOptions&
   if (settings.gyros.size() < Estimator::kGyros || pass.gyro.gyros < Estimator::kGyros) {
     throw SetupError(
         fmt::format("estimator {} needs {} gyros; the pass has {}", Estimator::kName, Estimator::kGyros,
-                    std::min<std::size_t>(settings.gyros.size(), static_cast<std::size_t>(pass.gyro.gyros))));
+                    std::min<std::size_t>(settings.gyros.size(), static_cast<std::size_t>(pass.gyro.gyros))),
+        "give telemetry of a pair");
   }
   typename Estimator::Setup setup;
   use_settings<Estimator>(settings, setup);
   if (settings.prior) {
     if (settings.prior->gyros.size() < Estimator::kGyros) {
       throw SetupError(fmt::format("the earlier calibration has {} gyros; estimator {} needs {}",
-                                   settings.prior->gyros.size(), Estimator::kName, Estimator::kGyros));
+                                   settings.prior->gyros.size(), Estimator::kName, Estimator::kGyros),
+                       "use a calibration of this pair of gyros");
     }
     use_calibration<Estimator>(*settings.prior, setup);
   }
@@ -143,12 +146,14 @@ std::unique_ptr<Cycle<Estimator>> make_cycle(const Pass& pass, const Calibration
   if (!cycle) {
     switch (cycle.fault()) {
       case SetupFault::kPriorNotPositiveDefinite:
-        throw SetupError(
-            "the prior covariance is not positive definite: each prior sigma must be positive, correlations below 1");
+        throw SetupError("the prior covariance is not positive definite",
+                         "give each parameter a prior sigma above zero, and correlations below one");
       case SetupFault::kNoiseNotPositive:
-        throw SetupError("readout and star-tracker noise must be positive, process noise must not be negative");
+        throw SetupError("a noise sigma is not positive",
+                         "give positive readout and star-tracker noise, and process noise of zero or more");
       case SetupFault::kGateNotPositive:
-        throw SetupError("the gate and the number of rejections before reopening must be positive");
+        throw SetupError("the gate or the number of rejections before reopening is not positive",
+                         "give positive numbers");
     }
   }
   return std::make_unique<Cycle<Estimator>>(cycle.value());
@@ -239,6 +244,20 @@ std::map<std::string, double> statistics_of(const std::vector<FixRecord>& fixes)
   return statistics;
 }
 
+/// No fix started the filter: says what became of them.
+SetupError nothing_used(const std::vector<FixRecord>& fixes) {
+  std::map<std::string, long> counts;
+  for (const FixRecord& fix : fixes) {
+    ++counts[name_of(fix.status)];
+  }
+  std::string what_became;
+  for (const auto& [name, count] : counts) {
+    what_became += fmt::format("{}{} {}", what_became.empty() ? "" : ", ", count, name);
+  }
+  return {fmt::format("no fix could be used to start from ({})", what_became.empty() ? "there is none" : what_became),
+          "look at the telemetry with `trihedron inspect`"};
+}
+
 /// Keeps the extremes of z1 over each stretch of 3 s.
 class AngleTrack {
  public:
@@ -326,7 +345,7 @@ CalibrationRun calibrate_with(const Pass& pass, const CalibrationOptions& option
     }
   }
   if (!cycle->estimator().started()) {
-    throw SetupError("no fix could be used: every one was rejected, or no gyro samples lie round it");
+    throw nothing_used(run.fixes);
   }
   run.calibration = result_of(pass, *cycle);
   run.calibration.statistics = statistics_of(run.fixes);
@@ -357,7 +376,7 @@ NavigationRun navigate_with(const Pass& pass, const CalibrationOptions& options,
         }
       });
   if (run.attitude.t.empty()) {
-    throw SetupError("no attitude: no fix could be used to start from");
+    throw nothing_used(run.fixes);
   }
   run.statistics = statistics_of(run.fixes);
   run.verdict = judge_navigation(run);
@@ -368,11 +387,12 @@ NavigationRun navigate_with(const Pass& pass, const CalibrationOptions& options,
 template <class Body>
 auto with_estimator(const CalibrationOptions& options, Body&& body) {
   if (options.estimator != "paper") {
-    throw SetupError(fmt::format("there is no estimator '{}'; there is: paper", options.estimator));
+    throw SetupError(fmt::format("there is no estimator '{}'", options.estimator),
+                     fmt::format("use one of: {}", fmt::join(kEstimators, ", ")));
   }
   if (options.drift_model != Esg7::kModelName) {
-    throw SetupError(fmt::format("estimator {} has no drift model '{}'; it has: {}", options.estimator,
-                                 options.drift_model, Esg7::kModelName));
+    throw SetupError(fmt::format("estimator {} has no drift model '{}'", options.estimator, options.drift_model),
+                     fmt::format("use one of: {}", fmt::join(kDriftModels, ", ")));
   }
   return body.template operator()<PaperEstimator<Esg7>>();
 }

@@ -2,9 +2,10 @@
 
 #include <fmt/format.h>
 
-#include <Eigen/SVD>
+#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <boost/math/distributions/chi_squared.hpp>
+#include <chrono>
 #include <cmath>
 #include <limits>
 #include <map>
@@ -28,6 +29,9 @@ constexpr double kNisTolerance = 0.05;
 constexpr double kNisWrong = 0.25;
 /// Two nominal alignment accuracies of the system.
 constexpr double kWeakAlignment_rad = 20 * kArcsecond;
+/// A drift of a few degrees per day, of a gyro or of the orbit plane, is below the noise over this time; over longer
+/// ones it can stand in for an alignment.
+constexpr Duration kDriftStretch = std::chrono::minutes(10);
 /// One in twenty.
 constexpr double kManyRejected = 0.05;
 constexpr double kBadlyPlacedSine = 0.5;
@@ -148,7 +152,7 @@ void judge_steadiness(const Pass& pass, const CalibrationRun& run, std::vector<F
                   "there: do not "
                   "believe its sigmas about this axis. The attitude does not suffer while the flight stays steady.",
                   axis.x(), axis.y(), axis.z(), run.options.estimator),
-      fmt::format("at best {:.0f}″ about this axis from the fixes alone", observability.sigma_rad / kArcsecond),
+      fmt::format("about {:.0f}″ at best about this axis from the fixes alone", observability.sigma_rad / kArcsecond),
       "Fly slews about the other axes during the calibration: ten minutes of 10° and more suffice.");
 }
 
@@ -167,25 +171,37 @@ void judge_pair(const CalibrationRun& run, std::vector<Finding>& findings) {
 
 AlignmentObservability alignment_observability(const StarTrackerTelemetry& tracker,
                                                const Eigen::Vector3d& tracker_noise_rad, double fix_noise_rad) {
-  Eigen::Matrix3d mean = Eigen::Matrix3d::Zero();
+  // With a free direction φ in each stretch, fixes y = φ − C δ leave Σ (C − mean C)ᵀ (C − mean C) of information on δ.
+  Eigen::Matrix3d information = Eigen::Matrix3d::Zero();
+  Eigen::Matrix3d sum = Eigen::Matrix3d::Zero();
   double count = 0;
-  for (const Eigen::Quaterniond& q : tracker.q_in_c) {
-    if (nearly_unit(q.norm())) {
-      mean += q.normalized().toRotationMatrix();
+  double total = 0;
+  const auto close_stretch = [&] {
+    if (count > 0) {
+      information += count * Eigen::Matrix3d::Identity() - sum.transpose() * sum / count;
+    }
+    total += count;
+    sum.setZero();
+    count = 0;
+  };
+  for (std::size_t i = 0; i < tracker.size(); ++i) {
+    if (i > 0 &&
+        (tracker.t[i] - tracker.t.front()) / kDriftStretch != (tracker.t[i - 1] - tracker.t.front()) / kDriftStretch) {
+      close_stretch();
+    }
+    if (nearly_unit(tracker.q_in_c[i].norm())) {
+      sum += tracker.q_in_c[i].normalized().toRotationMatrix();
       ++count;
     }
   }
+  close_stretch();
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(information);
   AlignmentObservability result;
-  if (count < 2) {
-    result.sigma_rad = std::numeric_limits<double>::infinity();
-    return result;
-  }
-  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(mean / count, Eigen::ComputeFullU | Eigen::ComputeFullV);
-  result.weakest_axis_c = svd.matrixV().col(0);
-  const double strayed = 1 - std::pow(svd.singularValues()(0), 2);
-  // The tracker's own noise makes the axis seem to stray.
-  const double noise = (tracker_noise_rad.cwiseAbs2().array() * (1 - result.weakest_axis_c.array().square())).sum();
-  result.sigma_rad = fix_noise_rad / std::sqrt(count * std::max(strayed - noise, 0.0));
+  result.weakest_axis_c = solver.eigenvectors().col(0);
+  // The tracker's own noise makes a steady axis seem to move.
+  const double noise =
+      total * (tracker_noise_rad.cwiseAbs2().array() * (1 - result.weakest_axis_c.array().square())).sum();
+  result.sigma_rad = fix_noise_rad / std::sqrt(std::max(solver.eigenvalues()(0) - noise, 0.0));
   return result;
 }
 

@@ -232,7 +232,7 @@ std::string format_calibration(const Calibration& calibration) {
       " \"verdict\": {{\"trustworthy\": {}, \"findings\": {}}},\n"
       " \"statistics\": {}}}\n",
       kFormat, kVersion, dump(Json(calibration.estimator)), format_epoch(calibration.epoch),
-      dump(Json(rounded_seconds(calibration.t - calibration.epoch))), lines(gyros), dump(Json(calibration.states)),
+      dump(Json(to_seconds(calibration.t - calibration.epoch))), lines(gyros), dump(Json(calibration.states)),
       lines(matrix), calibration.verdict.trustworthy, lines(findings), dump(Json(calibration.statistics)));
 }
 

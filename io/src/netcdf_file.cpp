@@ -255,7 +255,7 @@ void NetcdfWriter::write_group(const std::string& group, Time epoch, std::span<c
   check(nc_def_dim(id, kTimeDimension, t.size(), &dimension));
 
   Column time{kTimeColumn, "seconds since " + format_epoch(epoch), "time since the epoch of the pass", {}};
-  std::ranges::transform(t, std::back_inserter(time.values), [&](Time at) { return rounded_seconds(at - epoch); });
+  std::ranges::transform(t, std::back_inserter(time.values), [&](Time at) { return to_seconds(at - epoch); });
   constexpr std::string_view kStandardName = "time";
   constexpr std::string_view kComment = "time scale TAI: every second is counted, there are no leap seconds";
   const int time_variable = define(id, dimension, time, false, 0);

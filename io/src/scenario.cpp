@@ -76,7 +76,7 @@ double parse_acceleration_rad_s2(std::string_view text) {
 double parse_rate_walk_rad_s_sqrt_s(std::string_view text) {
   return parse_in(text, {{"deg/h/s^0.5", kDegree / 3600}, {"rad/s/s^0.5", 1}});
 }
-double parse_signed_duration_s(std::string_view text) { return rounded_seconds(parse_signed_duration(text)); }
+double parse_signed_duration_s(std::string_view text) { return to_seconds(parse_signed_duration(text)); }
 
 /// The text of a value with a unit.
 std::string quantity_text(const TomlTable& table, const toml::node& node, std::string_view key) {
@@ -244,7 +244,7 @@ Fields attitude_fields(AttitudeScenario& attitude, const fs::path& file, Time ep
              const AttitudeHistory history = read_attitude(file.parent_path() / table.text(node, "recorded"), epoch);
              attitude.recorded.clear();
              for (std::size_t i = 0; i < history.size(); ++i) {
-               attitude.recorded.push_back({rounded_seconds(history.t[i] - epoch), history.q_in_c[i]});
+               attitude.recorded.push_back({to_seconds(history.t[i] - epoch), history.q_in_c[i]});
              }
            }},
           {"slews",

@@ -126,6 +126,10 @@ const level = (value, axes, colour, dash = "dash", width = 1.2) => ({
   line: { color: colour, width, dash },
 });
 
+const moment = (t, axes, colour) => ({
+  type: "line", xref: axes.xaxis, yref: `${axes.yaxis} domain`, x0: t, x1: t, y0: 0, y1: 1, line: { color: colour, width: 1, dash: "dot" },
+});
+
 const scaled = (values, factor, offset = 0) => values.map((v) => (v === null ? null : (v - offset) * factor));
 
 /** Greatest |value| of the rows from time `from` on. */
@@ -218,23 +222,29 @@ const FIGURES = {
 
   navigation(data, look) {
     const { colour } = look;
-    const layout = panels(look, {
-      rows: 3, columns: 1, rowHeight: 150, duration: data.duration_min,
-      titles: AXES.map((name) => name[0].toUpperCase() + name.slice(1)), units: AXES.map(() => "error, ′"),
-    });
-    const traces = data.navigation.map(({ t, y }, i) => line(t, y[0], panel(i), {
-      name: AXES[i], line: { color: axisColours(colour)[i], width: 1.3 },
-      hovertemplate: `%{x:.1f} min: %{y:.3~g}′<extra>${AXES[i]}</extra>`,
-    }));
     const corrections = data.corrections ?? [];
-    if (corrections.length <= 60) {
-      for (const t of corrections) {
-        for (let i = 0; i < 3; ++i) {
-          const axes = panel(i);
-          layout.shapes.push({ type: "line", xref: axes.xaxis, yref: `${axes.yaxis} domain`, x0: t, x1: t, y0: 0, y1: 1,
-            line: { color: colour.muted, width: 1, dash: "dot" } });
-        }
+    const views = corrections.length > 1 ? ["", ", enlarged"] : [""];
+    const columns = look.width < 640 ? 1 : views.length;
+    const cells = columns > 1
+      ? AXES.flatMap((_, axis) => views.map((view) => ({ axis, view })))
+      : views.flatMap((view) => AXES.map((_, axis) => ({ axis, view })));
+    const layout = panels(look, {
+      rows: cells.length / columns, columns, rowHeight: 150, duration: data.duration_min,
+      titles: cells.map(({ axis, view }) => AXES[axis][0].toUpperCase() + AXES[axis].slice(1) + view),
+      units: cells.map((_, i) => (i % columns === 0 ? "error, ′" : "")),
+    });
+    const traces = cells.map(({ axis, view }, i) => {
+      const { t, y } = data.navigation[axis];
+      if (view) {
+        // What remains once the calibration has been taken over: from the second correction on.
+        const half = 1.15 * greatest(t, y[0], corrections[1] + 0.1) || 1;
+        layout[panel(i).ykey].range = [-half, half];
       }
+      return line(t, y[0], panel(i), { name: AXES[axis], line: { color: axisColours(colour)[axis], width: 1.3 },
+        hovertemplate: `%{x:.1f} min: %{y:.3~g}′<extra>${AXES[axis]}</extra>` });
+    });
+    if (corrections.length <= 60) {
+      cells.forEach((_, i) => corrections.forEach((t) => layout.shapes.push(moment(t, panel(i), colour.muted))));
       traces.push(legendOnly("astro-correction", { color: colour.muted, dash: "dot", width: 1 }));
     }
     return { traces, layout };
@@ -297,7 +307,7 @@ const FIGURES = {
   histogram(data, look) {
     const { colour } = look;
     const h = data.histogram;
-    const layout = baseLayout(look, 320);
+    const layout = baseLayout(look, look.print ? 250 : 320);
     layout.xaxis = { ...axisStyle(colour), title: axisTitle("innovation / σ", 8), range: [-5, 5], dtick: 1, zeroline: true };
     layout.yaxis = { ...axisStyle(colour), title: axisTitle("density", 6), rangemode: "tozero" };
     layout.bargap = 0.06;
@@ -343,6 +353,10 @@ const FIGURES = {
       legendOnly("95 % bounds", { color: colour.ink, dash: "dash", width: 1.2 }),
       legendOnly("gate", { color: colour.purple, dash: "dot", width: 1.6 }),
     ];
+    if (n.reopened.length > 0) {
+      for (const t of n.reopened) layout.shapes.push(moment(t, one, colour.green), moment(t, mean, colour.green));
+      traces.push(legendOnly("momenta set free", { color: colour.green, dash: "dot", width: 1 }));
+    }
     return { traces, layout };
   },
 

@@ -172,6 +172,7 @@ class Figures {
     Series rejected(1, to_minutes(input_.pass.settings.duration));
     std::vector<double> t;
     std::vector<double> nis;
+    json reopened = json::array();
     for (const ground::FixRecord& fix : run_.fixes) {
       if (fix.status == FixStatus::kUsed) {
         used.add(minutes(fix.t), {fix.nis});
@@ -179,6 +180,8 @@ class Figures {
         nis.push_back(fix.nis);
       } else if (fix.status == FixStatus::kRejectedByGate) {
         rejected.add(minutes(fix.t), {fix.nis});
+      } else if (fix.status == FixStatus::kUsedAfterReopening) {
+        reopened.push_back(rounded(minutes(fix.t), 6));
       }
     }
     if (used.empty()) {
@@ -187,6 +190,7 @@ class Figures {
     const boost::math::chi_squared one(kInnovations);
     json figure = {{"used", used.drawn(kWide)},
                    {"rejected", rejected.drawn(kWide)},
+                   {"reopened", reopened},
                    {"expected", kInnovations},
                    {"low", boost::math::quantile(one, 0.025)},
                    {"high", boost::math::quantile(one, 0.975)},

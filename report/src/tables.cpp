@@ -128,6 +128,9 @@ json strongest_correlations(const ReportInput& input, const std::vector<Paramete
 json stretches_of(const ReportInput& input, const ground::AttitudeErrors& errors, double unit) {
   json rows = json::array();
   for (const auto& stretch : ground::statistics_by_stretch(errors, input.pass.settings.epoch, kStretch)) {
+    if (stretch.to == stretch.from) {  // the pass ends on the first epoch of the next stretch
+      continue;
+    }
     json row = {{"from", number(to_minutes(stretch.from - input.pass.settings.epoch), 0)},
                 {"to", number(to_minutes(stretch.to - input.pass.settings.epoch), 0)},
                 {"count", number(static_cast<double>(stretch.count), 0)},
@@ -145,6 +148,9 @@ json stretches_of(const ReportInput& input, const ground::AttitudeErrors& errors
 json intervals_of(const ReportInput& input) {
   json rows = json::array();
   for (const ground::CorrectionInterval& interval : input.evaluation->intervals) {
+    if (interval.observed == Duration::zero()) {
+      continue;
+    }
     rows.push_back({{"corrected", number(to_minutes(interval.corrected - input.pass.settings.epoch), 0)},
                     {"observed", number(to_minutes(interval.observed), 0)},
                     {"passed", interval.passed ? number(to_minutes(*interval.passed), 1) + " min" : "not passed"},

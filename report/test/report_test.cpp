@@ -122,6 +122,14 @@ TEST(Report, GivesTheExtensionOfTheCorrectionInterval) {
   EXPECT_THAT(render(nine_hours().judged()), HasSubstr("Correction interval extended"));
 }
 
+TEST(Report, GivesALowerBoundWhereTheLimitIsNotPassedAnyMore) {
+  test::SyntheticRun run = short_run();
+  const Time start = run.pass.settings.epoch;
+  using std::chrono::minutes;
+  run.evaluation.intervals = {{start, minutes(90), minutes(20), 0.01}, {start + minutes(90), minutes(90), {}, 0.0001}};
+  EXPECT_THAT(render(run.judged()), HasSubstr("<strong>≥ 4.5<span class=\"unit\"> ×</span></strong>"));
+}
+
 TEST(Report, TellsWhatWasRejected) {
   const std::string html = render(test::synthetic_run({.duration = std::chrono::hours(2), .troubled = true}).judged());
   EXPECT_TRUE(std::regex_search(html, std::regex("<li>[0-9]+ fixes rejected: outlier</li>")));

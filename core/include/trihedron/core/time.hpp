@@ -18,7 +18,8 @@ struct Tai {
 using Time = Tai::time_point;
 using Duration = Tai::duration;
 
-[[nodiscard]] constexpr double to_seconds(Duration d) { return static_cast<double>(d.count()) * 1e-9; }
+/// Correctly rounded: 3 s is 3.0 and not its neighbour, so that files show what was meant.
+[[nodiscard]] constexpr double to_seconds(Duration d) { return static_cast<double>(d.count()) / 1e9; }
 
 /// Nearest whole nanosecond; |seconds| must be below 9.2e9.
 [[nodiscard]] constexpr Duration from_seconds(double seconds) {

@@ -7,6 +7,7 @@
 #include <map>
 #include <stdexcept>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "trihedron/core/calibration.hpp"
@@ -56,11 +57,14 @@ inline constexpr std::array<const char*, 1> kDriftModels = {"esg7"};
 /// Called now and then with the fraction done, 0 … 1.
 using Progress = std::function<void(double)>;
 
-/// Error of a set-up that cannot work: unknown estimator, prior not positive definite, too few gyros. what() is one
-/// line.
+/// A pass or setting that cannot work: unknown estimator, prior not positive definite, too few gyros, no usable fix.
 class SetupError : public std::runtime_error {
  public:
-  using std::runtime_error::runtime_error;
+  SetupError(const std::string& reason, std::string cure) : std::runtime_error(reason), cure_(std::move(cure)) {}
+  [[nodiscard]] const std::string& cure() const { return cure_; }
+
+ private:
+  std::string cure_;
 };
 
 /// Calibrates. Throws SetupError.

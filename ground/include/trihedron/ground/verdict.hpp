@@ -17,7 +17,7 @@ struct AlignmentObservability {
   double sigma_rad =
       0;  ///< of the alignment about that axis from the fixes alone, at best; infinite where it never moved
 };
-/// From the mean of C_in_c over the pass, in which an axis that keeps still keeps its length.
+/// From the scatter of C_in_c within stretches of ten minutes; what moves more slowly than that is not told from drift.
 /// `tracker_noise_rad`: 1-sigma about c x, y, z; `fix_noise_rad`: of a fix about the best axis.
 [[nodiscard]] AlignmentObservability alignment_observability(const StarTrackerTelemetry& tracker,
                                                              const Eigen::Vector3d& tracker_noise_rad,

@@ -15,9 +15,6 @@ namespace trihedron::io {
 [[nodiscard]] std::optional<Time> parse_epoch(std::string_view iso);
 [[nodiscard]] std::string format_epoch(Time epoch);
 
-/// Seconds, correctly rounded: 3 s is 3.0 and not its neighbour, so that files show what was meant.
-[[nodiscard]] constexpr double rounded_seconds(Duration d) { return static_cast<double>(d.count()) / 1e9; }
-
 /// Three decimals where that is exact, else nine.
 [[nodiscard]] std::string format_seconds(Duration duration);
 
