@@ -81,11 +81,30 @@ TEST(AtomicFile, FailsWhereTheDirectoryIsMissingOrTheTargetIsADirectory) {
   EXPECT_THAT(directory.names(), IsEmpty());
 }
 
-TEST(AtomicFile, FailsInAReadOnlyDirectory) {
-  if (::geteuid() == 0) {
-    GTEST_SKIP() << "root may write into read-only directories";
+/// Another user for a while, where the test runs as root: root may write into read-only directories.
+class NotRoot {
+ public:
+  explicit NotRoot(const std::filesystem::path& directory) : was_root_(::geteuid() == 0) {
+    constexpr ::uid_t kNobody = 65534;
+    if (was_root_ && (::chown(directory.c_str(), kNobody, kNobody) != 0 || ::seteuid(kNobody) != 0)) {
+      throw std::runtime_error("cannot become another user");
+    }
   }
+  ~NotRoot() {
+    if (was_root_ && ::seteuid(0) != 0) {
+      std::abort();
+    }
+  }
+  NotRoot(const NotRoot&) = delete;
+  NotRoot& operator=(const NotRoot&) = delete;
+
+ private:
+  bool was_root_;
+};
+
+TEST(AtomicFile, FailsInAReadOnlyDirectory) {
   const TemporaryDirectory directory;
+  const NotRoot other_user(directory.path());
   std::filesystem::permissions(directory.path(),
                                std::filesystem::perms::owner_read | std::filesystem::perms::owner_exec);
   EXPECT_THROW(write_file(directory / "a.txt", "x"), MachineFailed);

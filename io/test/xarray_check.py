@@ -1,11 +1,8 @@
 """What a user of xarray sees in a pass and in a residuals file written by io. Arguments: PASS.nc RESIDUALS.nc"""
 import sys
 
-try:
-    import numpy as np
-    import xarray as xr
-except ImportError:
-    sys.exit(77)
+import numpy as np
+import xarray as xr
 
 pass_file, residuals_file = sys.argv[1:]
 

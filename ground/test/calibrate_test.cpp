@@ -1,0 +1,216 @@
+#include "trihedron/ground/calibrate.hpp"
+
+#include <gmock/gmock.h>
+
+#include <cmath>
+#include <filesystem>
+#include <numbers>
+
+#include "trihedron/core/frames.hpp"
+#include "trihedron/ground/evaluate.hpp"
+#include "trihedron/io/pass.hpp"
+#include "trihedron/sim/simulate.hpp"
+
+namespace trihedron::ground {
+namespace {
+
+using testing::HasSubstr;
+
+/// Two hours of the paper's experiment.
+const sim::SimulatedPass& two_hours() {
+  static const sim::SimulatedPass simulated = [] {
+    Scenario scenario;
+    scenario.seed = 5;
+    scenario.duration = std::chrono::hours(2);
+    return sim::simulate(scenario);
+  }();
+  return simulated;
+}
+
+Eigen::Vector3d alignment_error(const Truth::Gyro& truth, const GyroCalibration& estimate) {
+  return (Rot<C, B<1>>::exp(Vec<C>::assume(truth.alignment_rotation_vector_rad)) *
+          Rot<C, B<1>>::exp(Vec<C>::assume(estimate.alignment_rotation_vector_rad)).inverse())
+      .log()
+      .raw();
+}
+
+TEST(Calibrate, FindsTheTruthWithinItsSigmas) {
+  std::vector<double> progress;
+  const auto run = calibrate(two_hours().pass, {}, [&](double fraction) { progress.push_back(fraction); });
+  const Calibration& result = run.calibration;
+  ASSERT_EQ(result.states.size(), 20U);
+  EXPECT_EQ(result.states[9], "gyro1.align_z");
+  Eigen::Index row = 0;
+  for (std::size_t k = 0; k < 2; ++k) {
+    const Truth::Gyro& truth = two_hours().truth.gyros[k];
+    for (std::size_t i = 0; i < 7; ++i, ++row) {
+      EXPECT_EQ(result.gyros[k].drift_rad_s[i].first, truth.drift_rad_s[i].first);
+      EXPECT_LT(std::abs(result.gyros[k].drift_rad_s[i].second - truth.drift_rad_s[i].second),
+                4 * std::sqrt(result.covariance(row, row)));
+    }
+    const Eigen::Vector3d error = alignment_error(truth, result.gyros[k]);
+    for (int axis = 0; axis < 3; ++axis, ++row) {
+      EXPECT_LT(std::abs(error(axis)), 4 * std::sqrt(result.covariance(row, row)));
+    }
+  }
+  EXPECT_NEAR(result.statistics.at("nis_mean"), 4, 0.2);
+  EXPECT_EQ(result.t, two_hours().pass.gyro.t.back());
+  EXPECT_GT(progress.size(), 50U);
+  EXPECT_LE(progress.back(), 1);
+}
+
+TEST(Calibrate, RecordsEveryFixAndSample) {
+  const auto run = calibrate(two_hours().pass, {});
+  EXPECT_EQ(run.fixes.size(), two_hours().pass.star_tracker.size());
+  EXPECT_EQ(run.samples.at("used"), static_cast<long>(two_hours().pass.gyro.size()));
+  EXPECT_EQ(run.fix_counts.at("used"), static_cast<long>(run.fixes.size()) - 1);
+  EXPECT_EQ(run.parameters.t.size(), run.fixes.size());
+  EXPECT_EQ(run.attitude.size(), run.fixes.size());
+  EXPECT_EQ(run.navigation.age_s.size(), run.fixes.size());
+  EXPECT_EQ(run.angle_t.size(), run.fixes.size());
+  EXPECT_EQ(
+      std::count_if(run.fixes.begin(), run.fixes.end(), [](const FixRecord& fix) { return fix.corrected_navigator; }),
+      2);
+  // After the correction at 90 min the open loop holds an arcminute.
+  const auto errors = attitude_errors(run.navigation, two_hours().truth.t, two_hours().truth.q_in_c);
+  EXPECT_LT(
+      statistics_by_stretch(errors, two_hours().pass.settings.epoch, std::chrono::minutes(90)).at(1).max_total_rad,
+      2.9e-4);
+}
+
+TEST(Calibrate, StartsFromAnEarlierCalibration) {
+  const auto first = calibrate(two_hours().pass, {});
+  Pass pass = two_hours().pass;
+  pass.settings.prior = first.calibration;
+  const auto second = calibrate(pass, {});
+  // Known beforehand: the navigator is good from the first minute.
+  const auto errors = attitude_errors(second.navigation, two_hours().truth.t, two_hours().truth.q_in_c);
+  EXPECT_LT(statistics_by_stretch(errors, pass.settings.epoch, std::chrono::minutes(90)).at(0).max_total_rad, 2.9e-4);
+  EXPECT_LT(second.calibration.covariance.trace(), first.calibration.covariance.trace());
+}
+
+TEST(Calibrate, UsesThePriorsOfThePass) {
+  Pass pass = two_hours().pass;
+  pass.settings.gyros[1].drift_rad_s["nu12"] = two_hours().truth.gyros[1].drift_rad_s[4].second;
+  pass.settings.gyros[1].drift_sigma_rad_s["nu12"] = 1e-12;
+  const auto run = calibrate(pass, {});
+  EXPECT_LE(std::sqrt(run.calibration.covariance(14, 14)), 1.001e-12);
+  EXPECT_EQ(run.calibration.states[14], "gyro2.nu12");
+}
+
+TEST(Navigate, GivesAnAttitudeForEverySampleAndAHonestSigma) {
+  CalibrationOptions options;
+  options.corrections.interval = std::chrono::minutes(30);
+  const auto run = navigate(two_hours().pass, options);
+  EXPECT_EQ(run.attitude.size(), two_hours().pass.gyro.size());
+  EXPECT_TRUE(run.verdict.trustworthy);
+  const auto errors = attitude_errors(run.attitude, two_hours().truth.t, two_hours().truth.q_in_c);
+  // The last half hour: 600 epochs whose readout noise is independent; parameters are shared, hence the wide band.
+  EXPECT_NEAR(
+      *statistics_by_stretch(errors, two_hours().pass.settings.epoch, std::chrono::minutes(30)).at(3).normalised_square,
+      1, 0.5);
+}
+
+TEST(Navigate, HoldsTheParametersItWasGiven) {
+  Pass pass = two_hours().pass;
+  pass.settings.prior = calibrate(pass, {}).calibration;
+  CalibrationOptions options;
+  options.corrections.when = CorrectionOptions::When::kOnlyFirst;
+  options.corrections.take_parameters = false;
+  const auto run = navigate(pass, options);
+  EXPECT_NEAR(run.attitude.age_s.back(), 7200, 0.2);
+  const auto errors = attitude_errors(run.attitude, two_hours().truth.t, two_hours().truth.q_in_c);
+  EXPECT_LT(statistics(errors).max_total_rad, 5e-4);
+}
+
+std::string setup_error(const Pass& pass, const CalibrationOptions& options = {}) {
+  try {
+    static_cast<void>(calibrate(pass, options));
+  } catch (const SetupError& error) {
+    EXPECT_FALSE(error.cure().empty());
+    return error.what();
+  }
+  return "no error";
+}
+
+TEST(SetupError, NamesWhatCannotWork) {
+  const Pass& good = two_hours().pass;
+  CalibrationOptions options;
+  options.estimator = "magic";
+  EXPECT_THAT(setup_error(good, options), HasSubstr("magic"));
+  options = {};
+  options.drift_model = "vsh:9";
+  EXPECT_THAT(setup_error(good, options), HasSubstr("vsh:9"));
+  options = {};
+  options.gate_nis = 0;
+  EXPECT_THAT(setup_error(good, options), HasSubstr("gate"));
+  options = {};
+  options.direction_random_walk_rad_sqrt_s = -1;
+  EXPECT_THAT(setup_error(good, options), HasSubstr("noise"));
+
+  Pass pass = good;
+  pass.settings.gyros[0].drift_sigma_rad_s["k7"] = 1;
+  EXPECT_THAT(setup_error(pass), HasSubstr("k7"));
+  pass = good;
+  pass.settings.gyros[1].drift_common_sigma_rad_s = 0;
+  EXPECT_THAT(setup_error(pass), HasSubstr("positive definite"));
+  pass = good;
+  pass.settings.gyros.pop_back();
+  EXPECT_THAT(setup_error(pass), HasSubstr("needs 2 gyros"));
+  pass = good;
+  pass.star_tracker = {};
+  EXPECT_THAT(setup_error(pass), HasSubstr("no fix could be used"));
+  for (std::size_t i = 0; i < pass.gyro.size(); ++i) {
+    std::copy_n(&pass.gyro.h[6 * i], 3, &pass.gyro.h[6 * i + 3]);
+  }
+  pass.star_tracker = good.star_tracker;
+  EXPECT_THAT(setup_error(pass), HasSubstr("parallel"));
+  EXPECT_THROW(static_cast<void>(navigate(pass, {})), SetupError);
+}
+
+TEST(SetupError, NamesWhatIsWrongWithAnEarlierCalibration) {
+  Pass pass = two_hours().pass;
+  const Calibration good = calibrate(pass, {}).calibration;
+  pass.settings.prior = good;
+  pass.settings.prior->gyros.pop_back();
+  EXPECT_THAT(setup_error(pass), HasSubstr("1 gyros"));
+  pass.settings.prior = good;
+  pass.settings.prior->gyros[1].drift_model = "vsh:3";
+  EXPECT_THAT(setup_error(pass), HasSubstr("vsh:3"));
+  pass.settings.prior = good;
+  pass.settings.prior->states[3] = "gyro1.heat";
+  EXPECT_THAT(setup_error(pass), HasSubstr("gyro1.mu31"));
+  pass.settings.prior = good;
+  pass.settings.prior->covariance.setZero();
+  EXPECT_THAT(setup_error(pass), HasSubstr("positive definite"));
+}
+
+/// Passes made by an independent generator; no part of the product.
+class SamplePass : public testing::TestWithParam<const char*> {};
+
+INSTANTIATE_TEST_SUITE_P(WithSlews, SamplePass, testing::Values("pass-a", "pass-d"),
+                         [](const auto& name) { return std::string(1, name.param[5]); });
+
+TEST_P(SamplePass, IsCalibratedToAnArcsecond) {
+  const std::filesystem::path path = std::filesystem::path(TRIHEDRON_SAMPLE_PASSES) / GetParam();
+  if (!std::filesystem::exists(path)) {
+    GTEST_SKIP() << "no sample passes here";
+  }
+  constexpr double kArcsecond = std::numbers::pi / 180 / 3600;
+  const auto run = calibrate(io::read_pass(path).pass, {});
+  const Truth truth = io::read_truth(path).value();
+  for (std::size_t k = 0; k < 2; ++k) {
+    EXPECT_LT(alignment_error(truth.gyros[k], run.calibration.gyros[k]).norm(), 1 * kArcsecond);
+    double error2 = 0;
+    double size2 = 0;
+    for (std::size_t i = 0; i < 7; ++i) {
+      error2 += std::pow(truth.gyros[k].drift_rad_s[i].second - run.calibration.gyros[k].drift_rad_s[i].second, 2);
+      size2 += std::pow(truth.gyros[k].drift_rad_s[i].second, 2);
+    }
+    EXPECT_LT(std::sqrt(error2 / size2), 0.03);
+  }
+  EXPECT_NEAR(run.calibration.statistics.at("nis_mean"), 4, 0.2);
+}
+
+}  // namespace
+}  // namespace trihedron::ground

@@ -1,0 +1,179 @@
+#include "trihedron/ground/verdict.hpp"
+
+#include <gmock/gmock.h>
+
+#include <cmath>
+
+#include "trihedron/core/frames.hpp"
+
+namespace trihedron::ground {
+namespace {
+
+using testing::Contains;
+using testing::ElementsAre;
+using testing::IsEmpty;
+using testing::Not;
+
+const Eigen::Vector3d kNoise_rad{1.45e-5, 1.45e-5, 9.7e-5};
+
+/// Three hours of fixes in orbital flight, with rolls of `slew_rad`.
+StarTrackerTelemetry flight(double slew_rad) {
+  StarTrackerTelemetry tracker;
+  for (int i = 0; i <= 3600; ++i) {
+    const double t_s = 3.0 * i;
+    const auto turn = [](double x, double y, double z) { return Rot<C, C>::exp(Vec<C>::assume(x, y, z)); };
+    tracker.t.push_back(Time(from_seconds(t_s)));
+    tracker.q_in_c.push_back((turn(0, 1.1e-3 * t_s, 0) * turn(slew_rad * std::sin(t_s / 97), 0, 0)).quaternion());
+  }
+  return tracker;
+}
+
+Pass good_pass() {
+  Pass pass;
+  pass.settings.star_tracker_noise_rad = kNoise_rad;
+  pass.star_tracker = flight(0.5);
+  pass.gyro.gyros = 2;
+  pass.gyro.t = {pass.star_tracker.t.front(), pass.star_tracker.t.back()};
+  return pass;
+}
+
+CalibrationRun good_run() {
+  CalibrationRun run;
+  run.calibration.gyros.resize(2);
+  run.calibration.gyros[0].momentum_in = {1, 0, 0};
+  run.calibration.gyros[1].momentum_in = {0, 1, 0};
+  run.calibration.states = {"gyro1.k0", "gyro1.align_x"};
+  run.calibration.covariance = Eigen::Vector2d(1e-18, 1e-12).asDiagonal();
+  run.parameters.sigma = {{2e-6, 8.7e-3}};
+  run.calibration.statistics = {
+      {"fixes", 3601},     {"fixes_used", 3601}, {"fixes_rejected_as_outliers", 0}, {"reopened", 0},
+      {"nis_count", 3600}, {"nis_mean", 4.02},   {"nis_degrees_of_freedom", 4}};
+  return run;
+}
+
+std::vector<std::string> codes(const Verdict& verdict) {
+  std::vector<std::string> all;
+  for (const Finding& finding : verdict.findings) {
+    all.push_back(finding.code);
+    EXPECT_FALSE(finding.text.empty() || finding.evidence.empty() || finding.cure.empty()) << finding.code;
+  }
+  return all;
+}
+
+TEST(Verdict, OfAGoodRunIsTrustworthyWithoutFindings) {
+  const Verdict verdict = judge(good_pass(), good_run());
+  EXPECT_TRUE(verdict.trustworthy);
+  EXPECT_THAT(codes(verdict), IsEmpty());
+}
+
+TEST(Verdict, FindsTooFewFixes) {
+  auto run = good_run();
+  run.calibration.statistics["fixes_used"] = 99;
+  EXPECT_THAT(codes(judge(good_pass(), run)), ElementsAre("too-few-fixes"));
+  EXPECT_FALSE(judge(good_pass(), run).trustworthy);
+}
+
+TEST(Verdict, FindsAPassShorterThanAnOrbit) {
+  auto pass = good_pass();
+  pass.gyro.t.back() = pass.gyro.t.front() + std::chrono::minutes(89);
+  EXPECT_THAT(codes(judge(pass, good_run())), ElementsAre("short-pass"));
+  EXPECT_TRUE(judge(pass, good_run()).trustworthy);
+}
+
+TEST(Verdict, FindsManyRejections) {
+  auto run = good_run();
+  run.calibration.statistics["fixes_rejected_as_outliers"] = 170;
+  EXPECT_THAT(codes(judge(good_pass(), run)), IsEmpty());  // under one in twenty
+  run.calibration.statistics["fixes_rejected_as_outliers"] = 200;
+  EXPECT_THAT(codes(judge(good_pass(), run)), ElementsAre("many-rejected"));
+  EXPECT_TRUE(judge(good_pass(), run).trustworthy);
+  run.calibration.statistics["fixes_rejected_as_outliers"] = 2000;
+  EXPECT_FALSE(judge(good_pass(), run).trustworthy);
+}
+
+TEST(Verdict, FindsThatTheFilterWasReopened) {
+  auto run = good_run();
+  run.calibration.statistics["reopened"] = 1;
+  EXPECT_THAT(codes(judge(good_pass(), run)), ElementsAre("reopened"));
+}
+
+TEST(Verdict, FindsNisOutOfBoundsOnBothSides) {
+  auto run = good_run();
+  for (const auto& [nis, trustworthy] :
+       {std::pair(4.4, true), std::pair(5.1, false), std::pair(3.5, true), std::pair(2.9, false)}) {
+    run.calibration.statistics["nis_mean"] = nis;
+    const Verdict verdict = judge(good_pass(), run);
+    EXPECT_THAT(codes(verdict), ElementsAre("nis-out-of-bounds")) << nis;
+    EXPECT_EQ(verdict.trustworthy, trustworthy) << nis;
+  }
+  // Few fixes scatter more: the same mean is then no finding.
+  run.calibration.statistics["nis_mean"] = 4.4;
+  run.calibration.statistics["nis_count"] = 120;
+  EXPECT_THAT(codes(judge(good_pass(), run)), IsEmpty());
+  run.calibration.statistics["nis_count"] = 0;
+  EXPECT_THAT(codes(judge(good_pass(), run)), Not(Contains("nis-out-of-bounds")));
+}
+
+TEST(Verdict, NamesTheParametersThatTheDataDoNotDetermine) {
+  auto run = good_run();
+  run.calibration.covariance(1, 1) = 5e-3 * 5e-3;
+  const Verdict verdict = judge(good_pass(), run);
+  EXPECT_THAT(codes(verdict), ElementsAre("not-determined"));
+  EXPECT_NE(verdict.findings[0].text.find("gyro1.align_x"), std::string::npos);
+  EXPECT_EQ(verdict.findings[0].text.find("gyro1.k0"), std::string::npos);
+}
+
+TEST(Verdict, FindsSteadyFlightAndNamesItsAxis) {
+  auto pass = good_pass();
+  pass.star_tracker = flight(0);
+  const Verdict verdict = judge(pass, good_run());
+  EXPECT_THAT(codes(verdict), ElementsAre("weak-alignment-axis"));
+  EXPECT_NE(verdict.findings[0].text.find("+1.000"), std::string::npos);
+  EXPECT_FALSE(verdict.trustworthy);
+}
+
+TEST(Verdict, FindsABadlyPlacedPair) {
+  auto run = good_run();
+  run.calibration.gyros[1].momentum_in = {std::cos(0.5), std::sin(0.5), 0};
+  EXPECT_THAT(codes(judge(good_pass(), run)), ElementsAre("pair-badly-placed"));
+  run.calibration.gyros[1].momentum_in = {-std::cos(0.5), std::sin(0.5), 0};
+  EXPECT_THAT(codes(judge(good_pass(), run)), ElementsAre("pair-badly-placed"));
+}
+
+TEST(Verdict, OfANavigationSaysWhetherTheParametersFit) {
+  NavigationRun run;
+  run.statistics = good_run().calibration.statistics;
+  EXPECT_TRUE(judge_navigation(run).trustworthy);
+  run.statistics["nis_mean"] = 40;
+  EXPECT_THAT(codes(judge_navigation(run)), ElementsAre("nis-out-of-bounds"));
+  EXPECT_FALSE(judge_navigation(run).trustworthy);
+}
+
+TEST(AlignmentObservability, IsNilWhereTheAxisNeverMoves) {
+  const auto steady = alignment_observability(flight(0), {0, 0, 0}, 1.45e-5);
+  EXPECT_NEAR(std::abs(steady.weakest_axis_c.y()), 1, 1e-6);
+  EXPECT_GT(steady.sigma_rad, 1e-3);  // infinite but for rounding
+}
+
+TEST(AlignmentObservability, DoesNotTakeTheNoiseOfTheTrackerForMotion) {
+  auto tracker = flight(0);
+  // A deterministic error of the size of the noise, alternating.
+  for (std::size_t i = 0; i < tracker.size(); ++i) {
+    const Eigen::Vector3d error = (i % 2 == 0 ? 1 : -1) * kNoise_rad;
+    tracker.q_in_c[i] = tracker.q_in_c[i] * Rot<C, C>::exp(Vec<C>::assume(error)).quaternion();
+  }
+  EXPECT_LT(alignment_observability(tracker, {0, 0, 0}, 1.45e-5).sigma_rad, 5e-3);
+  EXPECT_GT(alignment_observability(tracker, kNoise_rad, 1.45e-5).sigma_rad, 5e-3);
+}
+
+TEST(AlignmentObservability, PassesOverWhatIsNoRotation) {
+  auto tracker = flight(0.5);
+  const double clean = alignment_observability(tracker, kNoise_rad, 1.45e-5).sigma_rad;
+  EXPECT_LT(clean, 1e-6);
+  tracker.q_in_c[100].coeffs().setZero();
+  tracker.q_in_c[101].coeffs().setConstant(std::nan(""));
+  EXPECT_NEAR(alignment_observability(tracker, kNoise_rad, 1.45e-5).sigma_rad, clean, 1e-2 * clean);
+}
+
+}  // namespace
+}  // namespace trihedron::ground
