@@ -90,9 +90,10 @@ std::vector<ErrorStatistics> statistics_by_stretch(const AttitudeErrors& errors,
 std::vector<CorrectionInterval> correction_intervals(const AttitudeErrors& errors, double limit_rad) {
   std::vector<CorrectionInterval> intervals;
   for (std::size_t i = 0; i < errors.age_s.size(); ++i) {
-    if (i == 0 || errors.age_s[i] < errors.age_s[i - 1]) {
+    const Time corrected = errors.t[i] - from_seconds(errors.age_s[i]);
+    if (intervals.empty() || corrected > intervals.back().corrected + kSameEpoch) {
       CorrectionInterval next;
-      next.corrected = errors.t[i] - from_seconds(errors.age_s[i]);
+      next.corrected = corrected;
       intervals.push_back(next);
     }
     CorrectionInterval& now = intervals.back();

@@ -14,14 +14,13 @@ namespace fs = std::filesystem;
 /// A text with a unit, read by one of the parsers of quantity.hpp.
 template <class Parse>
 auto quantity(const TomlTable& table, const toml::node& node, std::string_view key, Parse&& parse) {
-  const std::string text = node.is_number() ? "" : table.text(node, key);
+  if (node.is_number()) {
+    table.refuse(node, fmt::format("\"{}\" is a bare number", key), "write it as a text with its unit");
+  }
   try {
-    if (text.empty()) {
-      throw UsageError(fmt::format("\"{}\" is a bare number; write it as a text with its unit", key));
-    }
-    return parse(text);
+    return parse(table.text(node, key));
   } catch (const UsageError& error) {
-    table.refuse(node, error.what(), "see effective-config.toml of any run");
+    table.refuse(node, fmt::format("\"{}\": {}", key, error.what()), "correct the value");
   }
 }
 
@@ -31,19 +30,6 @@ int whole_number(const TomlTable& table, const toml::node& node, std::string_vie
     table.refuse(node, fmt::format("\"{}\" is not a whole number from 1 to 1000000", key), "give the number of fixes");
   }
   return static_cast<int>(*value);
-}
-
-void read_corrections(const TomlTable& table, CorrectionOptions& corrections) {
-  const toml::node* node = table.find("interval");
-  if (node == nullptr) {
-    return;
-  }
-  const std::string text = node->is_number() ? "" : table.text(*node, "interval");
-  try {
-    corrections = parse_correction_interval(text);
-  } catch (const UsageError& error) {
-    table.refuse(*node, error.what(), "write \"90min\", \"none\" or \"continuous\"");
-  }
 }
 
 }  // namespace
@@ -104,7 +90,10 @@ CalibrationOptions read_config(const fs::path& path) {
     }
   }
   if (root.find("corrections") != nullptr) {
-    read_corrections(TomlTable(root.table_at("corrections"), path, "[corrections]", {"interval"}), options.corrections);
+    const TomlTable corrections(root.table_at("corrections"), path, "[corrections]", {"interval"});
+    if (const toml::node* node = corrections.find("interval")) {
+      options.corrections = quantity(corrections, *node, "interval", parse_correction_interval);
+    }
   }
   return options;
 }
