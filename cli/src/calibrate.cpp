@@ -20,7 +20,7 @@
 namespace trihedron::cli {
 namespace {
 
-struct Arguments {
+struct CalibrateArguments {
   std::string pass;
   std::string out;
   std::string estimator;
@@ -71,7 +71,7 @@ std::vector<io::Table> residual_tables(const ground::CalibrationRun& run) {
   return {fixes, parameters, angle};
 }
 
-int run(const Arguments& arguments, const Common& common) {
+int run_calibrate(const CalibrateArguments& arguments, const Common& common) {
   CalibrationOptions options;
   if (!arguments.config.empty()) {
     options = io::read_config(arguments.config);
@@ -134,7 +134,7 @@ int run(const Arguments& arguments, const Common& common) {
 }  // namespace
 
 void add_calibrate(CLI::App& program, const Common& common, int& exit_status) {
-  auto arguments = std::make_shared<Arguments>();
+  auto arguments = std::make_shared<CalibrateArguments>();
   CLI::App* command =
       program.add_subcommand("calibrate", "Calibrate drift and alignment of the gyros against the star tracker");
   command->add_option("PASS", arguments->pass, "Directory or NetCDF file")->required();
@@ -144,7 +144,7 @@ void add_calibrate(CLI::App& program, const Common& common, int& exit_status) {
   command->add_option("--drift-model", arguments->drift_model, "Drift model")
       ->check(CLI::IsMember(std::vector<std::string>(ground::kDriftModels.begin(), ground::kDriftModels.end())));
   command->add_option("--config", arguments->config, "Settings (TOML); see effective-config.toml of any run");
-  command->callback([&common, &exit_status, arguments] { exit_status = run(*arguments, common); });
+  command->callback([&common, &exit_status, arguments] { exit_status = run_calibrate(*arguments, common); });
 }
 
 }  // namespace trihedron::cli

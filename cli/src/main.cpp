@@ -16,7 +16,8 @@ int fail(int status, const char* message) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  using namespace trihedron;
+  namespace cli = trihedron::cli;
+  namespace io = trihedron::io;
   int exit_status = cli::kWrongUsage;
   try {
     CLI::App program("Calibrates electrostatic gyros in flight against a star tracker, and gives the attitude.",

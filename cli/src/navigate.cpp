@@ -15,7 +15,7 @@
 namespace trihedron::cli {
 namespace {
 
-struct Arguments {
+struct NavigateArguments {
   std::string pass;
   std::string calibration;
   bool online = false;
@@ -24,7 +24,7 @@ struct Arguments {
   std::string config;
 };
 
-int run(const Arguments& arguments, const Common& common) {
+int run_navigate(const NavigateArguments& arguments, const Common& common) {
   CalibrationOptions options;
   if (!arguments.config.empty()) {
     options = io::read_config(arguments.config);
@@ -63,7 +63,7 @@ int run(const Arguments& arguments, const Common& common) {
 }  // namespace
 
 void add_navigate(CLI::App& program, const Common& common, int& exit_status) {
-  auto arguments = std::make_shared<Arguments>();
+  auto arguments = std::make_shared<NavigateArguments>();
   CLI::App* command = program.add_subcommand("navigate", "Give the attitude at every gyro sample");
   command->add_option("PASS", arguments->pass, "Directory or NetCDF file")->required();
   CLI::Option_group* source = command->add_option_group("parameters");
@@ -76,7 +76,7 @@ void add_navigate(CLI::App& program, const Common& common, int& exit_status) {
       ->capture_default_str();
   command->add_option("--config", arguments->config, "Estimator settings (TOML)");
   command->add_option("-o,--output", arguments->attitude, "Attitude file to write (CSV)")->required();
-  command->callback([&common, &exit_status, arguments] { exit_status = run(*arguments, common); });
+  command->callback([&common, &exit_status, arguments] { exit_status = run_navigate(*arguments, common); });
 }
 
 }  // namespace trihedron::cli

@@ -1,3 +1,5 @@
+#include "trihedron/sim/simulate.hpp"
+
 #include <fmt/core.h>
 
 #include <algorithm>
@@ -10,17 +12,16 @@
 #include "trihedron/io/error.hpp"
 #include "trihedron/io/pass.hpp"
 #include "trihedron/io/scenario.hpp"
-#include "trihedron/sim/simulate.hpp"
 
 namespace trihedron::cli {
 namespace {
 
-struct Arguments {
+struct SimulateArguments {
   std::string scenario;
   std::string pass;
 };
 
-sim::SimulatedPass simulated(const Arguments& arguments, const Scenario& scenario) {
+sim::SimulatedPass simulated(const SimulateArguments& arguments, const Scenario& scenario) {
   try {
     return sim::simulate(scenario);
   } catch (const std::invalid_argument& error) {
@@ -28,7 +29,7 @@ sim::SimulatedPass simulated(const Arguments& arguments, const Scenario& scenari
   }
 }
 
-int run(const Arguments& arguments, const Common& common) {
+int run_simulate(const SimulateArguments& arguments, const Common& common) {
   const Scenario scenario = io::read_scenario(arguments.scenario);
   const sim::SimulatedPass result = simulated(arguments, scenario);
   // A readout in steps needs no finer ones in the file.
@@ -50,11 +51,12 @@ int run(const Arguments& arguments, const Common& common) {
 }  // namespace
 
 void add_simulate(CLI::App& program, const Common& common, int& exit_status) {
-  auto arguments = std::make_shared<Arguments>();
-  CLI::App* command = program.add_subcommand("simulate", "Make the telemetry of a pass, and its truth, from a scenario");
+  auto arguments = std::make_shared<SimulateArguments>();
+  CLI::App* command =
+      program.add_subcommand("simulate", "Make the telemetry of a pass, and its truth, from a scenario");
   command->add_option("SCENARIO", arguments->scenario, "Scenario (TOML)")->required();
   command->add_option("-o,--output", arguments->pass, "Pass to write: a directory, or a name in .nc")->required();
-  command->callback([&common, &exit_status, arguments] { exit_status = run(*arguments, common); });
+  command->callback([&common, &exit_status, arguments] { exit_status = run_simulate(*arguments, common); });
 }
 
 }  // namespace trihedron::cli

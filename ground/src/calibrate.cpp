@@ -218,9 +218,9 @@ std::map<std::string, double> statistics_of(const std::vector<FixRecord>& fixes)
   double reopened = 0;
   std::array<double, 4> squares{};
   for (const FixRecord& fix : fixes) {
-    used += fix.used();
-    outliers += fix.status == FixStatus::kRejectedByGate;
-    reopened += fix.status == FixStatus::kUsedAfterReopening;
+    used += fix.used() ? 1 : 0;
+    outliers += fix.status == FixStatus::kRejectedByGate ? 1 : 0;
+    reopened += fix.status == FixStatus::kUsedAfterReopening ? 1 : 0;
     if (fix.status == FixStatus::kUsed) {
       nis_sum += fix.nis;
       ++count;

@@ -157,8 +157,7 @@ void judge_steadiness(const Pass& pass, const CalibrationRun& run, std::vector<F
 }
 
 void judge_pair(const CalibrationRun& run, std::vector<Finding>& findings) {
-  const double angle =
-      angle_between<double>(run.calibration.gyros[0].momentum_in, run.calibration.gyros[1].momentum_in);
+  const auto angle = angle_between<double>(run.calibration.gyros[0].momentum_in, run.calibration.gyros[1].momentum_in);
   if (std::sin(angle) < kBadlyPlacedSine) {
     add(findings, Severity::kWarning, "pair-badly-placed",
         "The momenta lie within 30° of one line: the attitude about them is worse than the readout by 1/sinθ.",

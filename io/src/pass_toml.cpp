@@ -6,6 +6,7 @@
 #include <array>
 #include <sstream>
 
+#include "screening.hpp"
 #include "toml_table.hpp"
 #include "trihedron/core/drift.hpp"
 #include "trihedron/io/calibration.hpp"
@@ -17,7 +18,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr Duration kShortestPass = std::chrono::minutes(1);
 constexpr double kLongestPass_s = 1e9;  // keeps every time far from the end of int64 nanoseconds
 
 constexpr std::string_view kNoise = "readout_noise_rad";

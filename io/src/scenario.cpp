@@ -51,14 +51,14 @@ void read_fields(const toml::table& table, const fs::path& file, const std::stri
 
 // Quantities that only scenarios have.
 
-struct Unit {
+struct UnitOfMeasure {
   std::string_view name;
   double factor;
 };
 
-double parse_in(std::string_view text, std::initializer_list<Unit> units) {
+double parse_in(std::string_view text, std::initializer_list<UnitOfMeasure> units) {
   std::string accepted;
-  for (const Unit& unit : units) {
+  for (const UnitOfMeasure& unit : units) {
     if (text.ends_with(unit.name)) {
       return parse_number(trimmed(text.substr(0, text.size() - unit.name.size()))) * unit.factor;
     }

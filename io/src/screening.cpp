@@ -13,7 +13,6 @@ namespace {
 constexpr double kNormTolerance = 1e-3;
 constexpr std::size_t kStuckSamples = 8;
 constexpr Duration kSilence = std::chrono::minutes(1);
-constexpr Duration kShortestPass = std::chrono::minutes(1);
 constexpr double kGapPeriods = 1.5;
 
 /// Collects one kind of defect of one table.
@@ -206,16 +205,17 @@ void screen_one_gyro(const Series& series, const Kept& kept, std::size_t gyro, s
   }
   const auto length = [&](std::size_t first, std::size_t last) { return kept.t[last] - kept.t[first]; };
   for_each_run(
-      size, [&](std::size_t i) { return usable[i] && std::equal(direction(i), direction(i) + 3, direction(i - 1)); },
+      size,
+      [&](std::size_t i) { return usable[i] != 0 && std::equal(direction(i), direction(i) + 3, direction(i - 1)); },
       [&](std::size_t first, std::size_t last) {
-        if (const std::size_t count = last - first + 1; count >= kStuckSamples && usable[first]) {
+        if (const std::size_t count = last - first + 1; count >= kStuckSamples && usable[first] != 0) {
           stuck.add_stretch(kept.rows[first], static_cast<std::int64_t>(count), length(first, last));
         }
       });
   for_each_run(
       size, [&](std::size_t i) { return usable[i] == usable[i - 1]; },
       [&](std::size_t first, std::size_t last) {
-        if (!usable[first] && length(first, last) >= kSilence) {
+        if (usable[first] == 0 && length(first, last) >= kSilence) {
           silent.add_stretch(kept.rows[first], 1, length(first, last));
         }
       });

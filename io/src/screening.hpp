@@ -8,6 +8,9 @@
 
 namespace trihedron::io {
 
+/// A shorter pass is refused.
+inline constexpr Duration kShortestPass = std::chrono::minutes(1);
+
 /// Gyro rows (columns h1_x, h1_y, …) with increasing times; appends the defects found. Throws InputRefused when nothing
 /// can be done with them: no sample, less than a minute, a gyro without one usable direction.
 [[nodiscard]] GyroTelemetry screen_gyro(Series series, const PassSettings& settings, std::vector<Defect>& defects);

@@ -33,7 +33,7 @@ std::vector<std::string> unmodelled_names(const JsonNode& gyro, std::size_t size
   return names;
 }
 
-Truth::Gyro parse_gyro(const JsonNode& node) {
+Truth::Gyro parse_truth_of_gyro(const JsonNode& node) {
   Truth::Gyro gyro;
   const JsonNode drift = node.at("drift_rad_s");
   const std::vector<double> coefficients = drift.numbers();
@@ -86,7 +86,7 @@ Truth make_truth(std::string_view json, const std::filesystem::path& json_file, 
   const JsonNode gyros = JsonNode(document, json_file).at("gyros");
   Truth truth;
   for (const JsonNode& gyro : gyros.elements()) {
-    truth.gyros.push_back(parse_gyro(gyro));
+    truth.gyros.push_back(parse_truth_of_gyro(gyro));
   }
   const std::size_t width = series.columns.size();
   if (const std::size_t in_table = (width - 4) / 3; truth.gyros.size() != in_table) {

@@ -159,7 +159,7 @@ class Figures {
     json density = json::array();
     json expected = json::array();
     for (int bin = 0; bin < kBins; ++bin) {
-      const double x = (bin - kBins / 2 + 0.5) * kWidth;
+      const double x = (bin + 0.5 * (1 - kBins)) * kWidth;
       centre.push_back(x);
       density.push_back(rounded(count[static_cast<std::size_t>(bin)] / total / kWidth, 4));
       expected.push_back(rounded(boost::math::pdf(normal, x), 4));
@@ -196,7 +196,7 @@ class Figures {
                    {"high", boost::math::quantile(one, 0.975)},
                    {"gate", run_.options.gate_nis}};
     const std::size_t window = std::min<std::size_t>(100, nis.size());
-    const double sum_freedom = static_cast<double>(kInnovations * window);
+    const auto sum_freedom = static_cast<double>(kInnovations * window);
     const boost::math::chi_squared sum(sum_freedom);
     Series mean(1, fix_step_min_);
     double total = std::accumulate(nis.begin(), nis.begin() + static_cast<std::ptrdiff_t>(window), 0.0);

@@ -185,7 +185,7 @@ json innovation_rows(const ReportInput& input) {
     ++sums[i].count;
     sums[i].sum += value;
     sums[i].squares += value * value;
-    sums[i].beyond += std::abs(value) > 3;
+    sums[i].beyond += std::abs(value) > 3 ? 1 : 0;
   });
   json rows = json::array();
   for (std::size_t i = 0; i < kInnovations && sums[i].count > 0; ++i) {

@@ -55,7 +55,7 @@ std::string counted(long count, const std::string& one, const std::string& many)
 }
 
 std::string calendar(Time t) {
-  using namespace std::chrono;
+  using namespace std::chrono;  // NOLINT(google-build-using-namespace): year{1958} / 1 / 1 is written for it
   // The count of days of TAI, read as a calendar without leap seconds.
   const sys_time<nanoseconds> civil{t.time_since_epoch() + sys_days{year{1958} / 1 / 1}.time_since_epoch()};
   const auto day = floor<days>(civil);

@@ -52,7 +52,7 @@ template <class Model, int Columns>
   const Eigen::Matrix<double, 3, 6> by_directions = attitude_by_directions(c.value());
   Eigen::Matrix<double, 3, Errors::kSize> by_errors = Eigen::Matrix<double, 3, Errors::kSize>::Zero();
   for (int k = 0; k < 2; ++k) {
-    const Eigen::Matrix3d by_phi = by_directions.middleCols<3>(3 * k);
+    const Eigen::Matrix3d by_phi = by_directions.middleCols<3>(Errors::direction(k));
     const Eigen::Matrix3d by_phi_in = by_phi * C_c_in;
     by_errors.template middleCols<3>(Errors::direction(k)) = by_phi_in * since[k].by_start;
     by_errors.template middleCols<Model::kSize>(Errors::drift(k)) = by_phi_in * since[k].by_drift;

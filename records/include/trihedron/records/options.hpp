@@ -13,13 +13,14 @@ struct CorrectionOptions {
   enum class When { kEvery, kOnlyFirst, kEachFix };
   When when = When::kEvery;
   Duration interval = std::chrono::minutes(90);  ///< for kEvery
-  bool take_parameters = true;  ///< false: the parameters known before the pass are held
+  bool take_parameters = true;                   ///< false: the parameters known before the pass are held
 };
 
 struct CalibrationOptions {
   std::string estimator = "paper";
   std::string drift_model = "esg7";
-  /// Process noise of each momentum across itself. The default is small against the readout, and lets go of 0.1″ in 9 h.
+  /// Process noise of each momentum across itself. The default is small against the readout, and lets go of 0.1″ in 9
+  /// h.
   double direction_random_walk_rad_sqrt_s = 3e-9;
   /// A fix with a NIS above this is rejected. χ² of 4 degrees of freedom passes 30 once in 2e5 good fixes.
   double gate_nis = 30;

@@ -88,7 +88,8 @@ class HarmonicTable {
 
  private:
   [[nodiscard]] static constexpr std::size_t index(int degree, int order) {
-    return static_cast<std::size_t>(degree * (degree + 1) / 2 + order);
+    const int number = degree * (degree + 1) / 2 + order;
+    return static_cast<std::size_t>(number);
   }
 
   static constexpr std::size_t kSize = (kMaxDegree + 1) * (kMaxDegree + 2) / 2;

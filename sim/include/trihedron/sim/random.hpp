@@ -77,9 +77,9 @@ class Stream {
       spare_ready_ = false;
       return spare_;
     }
-    double x;
-    double y;
-    double s;
+    double x = 0;
+    double y = 0;
+    double s = 0;
     do {
       x = uniform(-1, 1);
       y = uniform(-1, 1);
