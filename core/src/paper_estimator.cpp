@@ -1,5 +1,7 @@
 #include "trihedron/core/paper_estimator.hpp"
 
+#include <algorithm>
+
 namespace trihedron {
 
 template <class Model>
@@ -17,7 +19,8 @@ Result<PaperEstimator<Model>, SetupFault> PaperEstimator<Model>::create(const Se
   PaperEstimator estimator;
   estimator.setup_ = setup;
   estimator.gyros_ = setup.prior;
-  estimator.information_.add_prior_of_constants(root.value());
+  estimator.prior_.add_prior_of_constants(root.value());
+  estimator.information_ = estimator.prior_;
   return estimator;
 }
 
@@ -121,14 +124,11 @@ auto PaperEstimator<Model>::correct(const Eigen::Matrix3d& C_in_c, const Directi
     return report;
   }
 
-  const auto assess = [&] {
-    const MeasurementMatrix through = information_.through_uncertainty(H_white);
-    const InnovationCovariance white = InnovationCovariance::Identity() + through * through.transpose();
-    report.innovation = measurement.innovation;
-    report.innovation_covariance = noise_factor.matrixL() * white * noise_factor.matrixL().transpose();
-    report.nis = innovation_white.dot(white.llt().solve(innovation_white));
-  };
-  assess();
+  const MeasurementMatrix through = information_.through_uncertainty(H_white);
+  const InnovationCovariance white = InnovationCovariance::Identity() + through * through.transpose();
+  report.innovation = measurement.innovation;
+  report.innovation_covariance = noise_factor.matrixL() * white * noise_factor.matrixL().transpose();
+  report.nis = innovation_white.dot(white.llt().solve(innovation_white));
   report.status = FixStatus::kUsed;
   if (!(report.nis <= setup_.gate_nis)) {
     report.rejections_in_a_row = ++rejections_in_a_row_;
@@ -136,14 +136,26 @@ auto PaperEstimator<Model>::correct(const Eigen::Matrix3d& C_in_c, const Directi
       report.status = FixStatus::kRejectedByGate;
       return report;
     }
-    add_direction_variance(measurement.innovation.squaredNorm() / kMeasurements);
-    update_covariance_to_now(now);
-    assess();
-    report.status = FixStatus::kUsedAfterReopening;
+    reopen(now, measurement.innovation, report);
   }
   rejections_in_a_row_ = 0;
+  fixes_to_forgive_ = std::max(fixes_to_forgive_ - 1, 0);
   feed_back(information_.update(H_white, innovation_white));
   return report;
+}
+
+template <class Model>
+void PaperEstimator<Model>::reopen(const QuasiInertial& now, const Innovation& innovation, Report& report) {
+  if (fixes_to_forgive_ > 0) {
+    // Information gathered about a far wrong estimate: linearise anew about the present one.
+    information_ = prior_;
+    report.status = FixStatus::kRestarted;
+  } else {
+    add_direction_variance(innovation.squaredNorm() / kMeasurements);
+    update_covariance_to_now(now);
+    report.status = FixStatus::kUsedAfterReopening;
+  }
+  fixes_to_forgive_ = setup_.restart_within_fixes;
 }
 
 template <class Model>

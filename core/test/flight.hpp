@@ -3,6 +3,7 @@
 /// simulator proper is a module above core; this one only has to be independent of the code under test where it
 /// matters, and exact.
 
+#include <algorithm>
 #include <cmath>
 #include <random>
 #include <vector>
@@ -15,7 +16,9 @@ namespace trihedron::test {
 struct FlightPlan {
   double duration_s = 1800;
   double slews_rad = 0.5;  ///< amplitude of rolls; a third of it in pitch
-  double noise = 1;        ///< of the nominal noise
+  double steady_until_s = 0;
+  double misalignment = 1;  ///< times 30′
+  double noise = 1;         ///< of the nominal noise
   unsigned seed = 1;
   double fix_offset_s = 0;  ///< fixes at 3 s · n + offset
 };
@@ -29,10 +32,11 @@ struct Flight {
   std::vector<StarFix> fixes;
   std::vector<Eigen::Matrix3d> C_in_c_at_samples;
 
-  [[nodiscard]] static Eigen::Matrix3d attitude(double t_s, double slews_rad) {
+  [[nodiscard]] static Eigen::Matrix3d attitude(double t_s, double slews_rad, double steady_until_s = 0) {
     const auto turn = [](double x, double y, double z) { return Rot<C, C>::exp(Vec<C>::assume(x, y, z)).raw(); };
-    const double roll = slews_rad * std::sin(t_s / 97);
-    const double pitch = slews_rad / 3 * std::sin(t_s / 151);
+    const double slewing_s = std::max(t_s - steady_until_s, 0.0);
+    const double roll = slews_rad * std::sin(slewing_s / 97);
+    const double pitch = slews_rad / 3 * std::sin(slewing_s / 151);
     return Rot<In, C>::exp(Vec<In>::assume(0.3, -0.2, 0.9)).raw() * turn(0, 1.1e-3 * t_s, 0) * turn(roll, 0, 0) *
            turn(0, pitch, 0);
   }
@@ -42,8 +46,10 @@ struct Flight {
     truth[1].h_in = Eigen::Vector3d(-0.72, 0.49, 0.49).normalized();
     truth[0].drift_rad_s << -2.0e-6, -3.8e-7, -4.7e-8, -1.2e-6, 1.8e-6, 7.0e-7, -7.8e-7;
     truth[1].drift_rad_s << 4.4e-8, 1.4e-7, -1.3e-7, -1.3e-6, 1.5e-6, 9.3e-7, 1.8e-6;
-    truth[0].C_c_b = Rot<C, B<1>>::exp(Vec<C>::assume(2.4e-3, -4.2e-3, -7.3e-3)).raw();
-    truth[1].C_c_b = Rot<C, B<2>>::exp(Vec<C>::assume(4.0e-3, -2.0e-3, -7.5e-3)).raw();
+    truth[0].C_c_b =
+        Rot<C, B<1>>::exp(Vec<C>::assume(plan.misalignment * Eigen::Vector3d(2.4e-3, -4.2e-3, -7.3e-3))).raw();
+    truth[1].C_c_b =
+        Rot<C, B<2>>::exp(Vec<C>::assume(plan.misalignment * Eigen::Vector3d(4.0e-3, -2.0e-3, -7.5e-3))).raw();
     std::mt19937 random(plan.seed);
     std::normal_distribution<double> normal;
     const auto white = [&] { return Eigen::Vector3d(normal(random), normal(random), normal(random)); };
@@ -53,7 +59,7 @@ struct Flight {
     double next_fix_s = plan.fix_offset_s;
     for (int i = 0; i <= count; ++i) {
       const double t_s = i * kPeriod_s;
-      const Eigen::Matrix3d C_in_c = attitude(t_s, plan.slews_rad);
+      const Eigen::Matrix3d C_in_c = attitude(t_s, plan.slews_rad, plan.steady_until_s);
       GyroSample<2> sample;
       sample.t = Time(from_seconds(t_s));
       for (int k = 0; k < 2; ++k) {
@@ -65,14 +71,14 @@ struct Flight {
       for (; next_fix_s < t_s + kPeriod_s && next_fix_s <= plan.duration_s; next_fix_s += 3) {
         const Eigen::Vector3d error = plan.noise * kTracker_rad.cwiseProduct(white());
         const Eigen::Matrix3d measured =
-            attitude(next_fix_s, plan.slews_rad) * Rot<C, C>::exp(Vec<C>::assume(error)).raw();
+            attitude(next_fix_s, plan.slews_rad, plan.steady_until_s) * Rot<C, C>::exp(Vec<C>::assume(error)).raw();
         fixes.push_back({Time(from_seconds(next_fix_s)), Eigen::Quaterniond(measured)});
       }
       if (i == count) {
         break;
       }
       for (int k = 0; k < 2; ++k) {
-        const Eigen::Matrix3d middle = attitude(t_s + kPeriod_s / 2, plan.slews_rad);
+        const Eigen::Matrix3d middle = attitude(t_s + kPeriod_s / 2, plan.slews_rad, plan.steady_until_s);
         precess(truth[k], middle, Eigen::Vector3d(truth[k].C_c_b.transpose() * middle.transpose() * truth[k].h_in),
                 kPeriod_s);
       }

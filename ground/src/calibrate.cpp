@@ -220,7 +220,8 @@ std::map<std::string, double> statistics_of(const std::vector<FixRecord>& fixes)
   for (const FixRecord& fix : fixes) {
     used += fix.used() ? 1 : 0;
     outliers += fix.status == FixStatus::kRejectedByGate ? 1 : 0;
-    reopened += fix.status == FixStatus::kUsedAfterReopening ? 1 : 0;
+    const bool was_reopened = fix.status == FixStatus::kUsedAfterReopening || fix.status == FixStatus::kRestarted;
+    reopened += was_reopened ? 1 : 0;
     if (fix.status == FixStatus::kUsed) {
       nis_sum += fix.nis;
       ++count;

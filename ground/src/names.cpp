@@ -14,6 +14,8 @@ const char* name_of(FixStatus status) {
       return "used";
     case FixStatus::kUsedAfterReopening:
       return "used after reopening";
+    case FixStatus::kRestarted:
+      return "used, filter restarted";
     case FixStatus::kRejectedNotRotation:
       return "rejected: not a rotation";
     case FixStatus::kRejectedOutOfOrder:

@@ -32,6 +32,8 @@ constexpr double kWeakAlignment_rad = 20 * kArcsecond;
 /// A drift of a few degrees per day, of a gyro or of the orbit plane, is below the noise over this time; over longer
 /// ones it can stand in for an alignment.
 constexpr Duration kDriftStretch = std::chrono::minutes(10);
+/// One in five: the filter then lives on a selection of its own.
+constexpr double kMostlyRejected = 0.2;
 /// One in twenty.
 constexpr double kManyRejected = 0.05;
 constexpr double kBadlyPlacedSine = 0.5;
@@ -82,7 +84,7 @@ void judge_rejections(const Statistics& statistics, std::vector<Finding>& findin
   const double outliers = statistic(statistics, "fixes_rejected_as_outliers");
   const double fixes = statistic(statistics, "fixes");
   if (outliers > kManyRejected * fixes) {
-    add(findings, outliers > 0.5 * fixes ? Severity::kDoNotUse : Severity::kWarning, "many-rejected",
+    add(findings, outliers > kMostlyRejected * fixes ? Severity::kDoNotUse : Severity::kWarning, "many-rejected",
         fmt::format("{:.1f} % of the fixes were rejected as outliers.", 100 * outliers / fixes),
         fmt::format("{:.0f} of {:.0f}", outliers, fixes),
         "This is seldom the tracker alone: look for a clock offset, a wrong noise figure or drift outside the model.");

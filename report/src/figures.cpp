@@ -180,7 +180,7 @@ class Figures {
         nis.push_back(fix.nis);
       } else if (fix.status == FixStatus::kRejectedByGate) {
         rejected.add(minutes(fix.t), {fix.nis});
-      } else if (fix.status == FixStatus::kUsedAfterReopening) {
+      } else if (fix.status == FixStatus::kUsedAfterReopening || fix.status == FixStatus::kRestarted) {
         reopened.push_back(rounded(minutes(fix.t), 6));
       }
     }

@@ -6,16 +6,20 @@
 import assert from "node:assert/strict";
 import { createRequire } from "node:module";
 import path from "node:path";
-import { test, before, after } from "node:test";
+import { test as unlimitedTest, before, after } from "node:test";
 import { pathToFileURL } from "node:url";
 
 const { chromium } = createRequire(new URL("../../package.json", import.meta.url))("playwright-core");
 
 const [executablePath, directory] = process.argv.slice(2);
 const OPENS_WITHIN_MS = 2000;
+const test = (name, body) => unlimitedTest(name, { timeout: 120_000 }, body);
+
+// Without a screen to wait for, headless Chromium now and then stops giving frames; it does not where it waits for none.
+const args = ["--no-sandbox", "--disable-gpu-vsync", "--disable-frame-rate-limit"];
 
 let browser;
-before(async () => { browser = await chromium.launch({ executablePath, args: ["--no-sandbox"] }); });
+before(async () => { browser = await chromium.launch({ executablePath, args }); });
 after(() => browser.close());
 
 /** A page with the report open, and what it complained of. */
@@ -30,15 +34,28 @@ async function open(name, { width = 1280, height = 900, colorScheme = "light" } 
   return { page, complaints };
 }
 
-/** Scrolls through the report, so that every figure is drawn. */
-async function readThrough(page) {
-  await page.evaluate(async () => {
-    for (let y = 0; y < document.body.scrollHeight; y += 300) {
-      scrollTo({ top: y, behavior: "instant" });
-      await new Promise((done) => requestAnimationFrame(() => setTimeout(done, 20)));
-    }
-    scrollTo({ top: 0, behavior: "instant" });
+/** Scrolls through the report, so that every figure is drawn. False where the browser stopped giving frames. */
+const readThrough = (page) => page.evaluate(async () => {
+  const frame = () => new Promise((done) => {
+    requestAnimationFrame(() => setTimeout(() => done(true), 20));
+    setTimeout(() => done(false), 5000);
   });
+  for (let y = 0; y < document.body.scrollHeight; y += 300) {
+    scrollTo({ top: y, behavior: "instant" });
+    if (!(await frame())) return false;
+  }
+  scrollTo({ top: 0, behavior: "instant" });
+  return true;
+});
+
+/** A page with the report read through; opened anew where the browser, not the report, stopped. */
+async function openAndRead(name, options) {
+  for (let attempt = 0; attempt < 3; ++attempt) {
+    const opened = await open(name, options);
+    if (await readThrough(opened.page)) return opened;
+    await opened.page.close();
+  }
+  return assert.fail("the browser gave no frames, three times");
 }
 
 /** Per figure that is shown: its name and the number of points drawn. */
@@ -53,8 +70,7 @@ const overflow = (page) => page.evaluate(() => document.documentElement.scrollWi
 
 for (const name of ["good.html", "troubled.html", "alone.html"]) {
   test(`${name} draws every figure, says nothing on the console and asks for nothing`, async () => {
-    const { page, complaints } = await open(name);
-    await readThrough(page);
+    const { page, complaints } = await openAndRead(name);
     const figures = await figurePoints(page);
     assert.ok(figures.length >= 8, `only ${figures.length} figures`);
     for (const { name, points, drawn } of figures) {
@@ -80,10 +96,9 @@ test(`nine hours open within ${OPENS_WITHIN_MS} ms`, async () => {
 
 for (const colorScheme of ["light", "dark"]) {
   test(`the theme is ${colorScheme} where the reader's is, until he chooses the other`, async () => {
-    const { page, complaints } = await open("troubled.html", { colorScheme });
+    const { page, complaints } = await openAndRead("troubled.html", { colorScheme });
     const theme = () => page.evaluate(() => document.documentElement.dataset.theme);
     assert.equal(await theme(), colorScheme);
-    await readThrough(page);
     await page.screenshot({ path: path.join(directory, `${colorScheme}.png`), fullPage: true });
     await page.click("#theme");
     assert.notEqual(await theme(), colorScheme);
@@ -94,8 +109,7 @@ for (const colorScheme of ["light", "dark"]) {
 
 for (const width of [360, 768, 1920]) {
   test(`fits a screen of ${width} pixels`, async () => {
-    const { page, complaints } = await open("troubled.html", { width });
-    await readThrough(page);
+    const { page, complaints } = await openAndRead("troubled.html", { width });
     assert.ok((await overflow(page)) <= 0, `wider by ${await overflow(page)} pixels`);
     await page.screenshot({ path: path.join(directory, `width-${width}.png`), fullPage: true });
     assert.deepEqual(complaints, []);
@@ -107,7 +121,7 @@ test("shows any coefficient, and enlarged", async () => {
   const { page, complaints } = await open("good.html");
   await page.click("#all-coefficients");
   await page.check('input[name="view"][value="detail"]');
-  await readThrough(page);
+  assert.ok(await readThrough(page));
   const coefficients = (await figurePoints(page)).filter(({ name }) => /k0|mu|nu/.test(name));
   assert.equal(coefficients.length, 7);
   await page.locator("#coefficients").screenshot({ path: path.join(directory, "coefficients-enlarged.png") });
@@ -118,8 +132,7 @@ test("shows any coefficient, and enlarged", async () => {
 });
 
 test("a sphere turns with the keyboard", async () => {
-  const { page } = await open("good.html");
-  await readThrough(page);
+  const { page } = await openAndRead("good.html");
   const track = () => page.locator(".sphere path.track").first().getAttribute("d");
   const start = await track();
   await page.locator(".sphere svg").first().focus();

@@ -52,6 +52,9 @@ struct CalibrationSetup {
   /// After so many rejections in a row the directions are set free by the size of the misfit and the fix is used: the
   /// model was wrong, not the tracker.
   int reopen_after_rejections = 20;
+  /// When that happens again within so many fixes, the parameters are what is wrong: the estimates stay, their
+  /// information goes.
+  int restart_within_fixes = 200;
 
   [[nodiscard]] bool noise_is_positive() const {
     bool positive = (star_tracker_noise_rad.array() > 0).all() && direction_random_walk_rad_sqrt_s >= 0;
@@ -68,6 +71,7 @@ enum class FixStatus : std::uint8_t {
   kStarted,              ///< the first fix: sets the directions
   kUsed,                 ///< calibration updated
   kUsedAfterReopening,   ///< used after a run of rejections, with the directions set free
+  kRestarted,            ///< used after another run of rejections soon after: the filter began anew from its estimates
   kRejectedNotRotation,  ///< quaternion not finite or not unit
   kRejectedOutOfOrder,   ///< not later than the fix before it, or earlier than the latest gyro sample
   kRejectedNoGyro,       ///< no gyro samples close enough round it
@@ -76,7 +80,8 @@ enum class FixStatus : std::uint8_t {
 };
 
 [[nodiscard]] constexpr bool is_used(FixStatus status) {
-  return status == FixStatus::kStarted || status == FixStatus::kUsed || status == FixStatus::kUsedAfterReopening;
+  return status == FixStatus::kStarted || status == FixStatus::kUsed || status == FixStatus::kUsedAfterReopening ||
+         status == FixStatus::kRestarted;
 }
 
 /// Eq. (3), components 2–5, at one fix, and what was done with it.

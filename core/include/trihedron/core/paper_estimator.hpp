@@ -93,6 +93,7 @@ class PaperEstimator {
   using Information = SquareRootInformation<Layout::kStates, Layout::kDynamic>;
 
   void update_covariance_to_now(const QuasiInertial& now);
+  void reopen(const QuasiInertial& now, const Innovation& innovation, Report& report);
   void feed_back(const typename Information::Vector& correction);
 
   Setup setup_;
@@ -100,9 +101,11 @@ class PaperEstimator {
   Sensitivities since_fix_;
   QuasiInertial qi_;  ///< basis of the direction errors in information_
   Information information_;
+  Information prior_;  ///< of the parameters alone
   double time_since_fix_s_ = 0;
   double extra_variance_rad2_ = 0;
   int rejections_in_a_row_ = 0;
+  int fixes_to_forgive_ = 0;  ///< a run of rejections before these have passed means a restart
   bool started_ = false;
 };
 
