@@ -93,7 +93,7 @@ int run_calibrate(const CalibrateArguments& arguments, const Common& common) {
   const std::filesystem::path out = arguments.out;
   io::make_directory(out);
   const Time epoch = loaded.pass.settings.epoch;
-  const auto truth = io::read_truth(arguments.pass);
+  const auto truth = read_truth_of(arguments.pass, loaded.pass);
   const double limit_rad = io::parse_angle_rad("5arcmin");
   const Evaluation navigation = evaluate(result.navigation, loaded.pass, truth, limit_rad);
   const Evaluation attitude = evaluate(result.attitude, loaded.pass, truth, limit_rad);
@@ -125,7 +125,8 @@ int run_calibrate(const CalibrateArguments& arguments, const Common& common) {
         "{}{}{}\n{}\n{}\nWritten     {}: calibration.json attitude.csv residuals.nc report.html "
         "effective-config.toml\n",
         pass_text(loaded), verdict_text(result.calibration.verdict), calibration_text(result, truth),
-        evaluation_text(navigation, epoch, "Navigator, corrected every 90 min,"),
+        evaluation_text(navigation, epoch,
+                        "Navigator, correction interval " + io::format_correction_interval(options.corrections) + ","),
         evaluation_text(attitude, epoch, "Attitude of the calibration itself"), out.string());
   }
   return result.calibration.verdict.trustworthy ? kTrustworthy : kDoNotUse;

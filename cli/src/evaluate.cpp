@@ -26,7 +26,7 @@ void add_evaluate(CLI::App& program, const Common& common, int& exit_status) {
   command->callback([&common, &exit_status, arguments] {
     const double limit_rad = io::parse_angle_rad(arguments->limit);
     const io::LoadedPass loaded = io::read_pass(arguments->pass);
-    const auto truth = io::read_truth(arguments->pass);
+    const auto truth = read_truth_of(arguments->pass, loaded.pass);
     const Time epoch = loaded.pass.settings.epoch;
     const Evaluation evaluation =
         evaluate(io::read_attitude(arguments->attitude, epoch), loaded.pass, truth, limit_rad);

@@ -1,5 +1,6 @@
 #include <fmt/core.h>
 
+#include <cstdio>
 #include <exception>
 #include <new>
 
@@ -40,6 +41,9 @@ int main(int argc, char** argv) {
         return program.exit(error);
       }
       return fail(cli::kWrongUsage, fmt::format("{}; see trihedron --help", error.what()).c_str());
+    }
+    if (std::fflush(stdout) != 0) {
+      return fail(cli::kMachineFailed, "standard output: cannot be written; free some space");
     }
     return exit_status;
   } catch (const io::UsageError& error) {

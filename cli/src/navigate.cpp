@@ -19,7 +19,7 @@ struct NavigateArguments {
   std::string pass;
   std::string calibration;
   bool online = false;
-  std::string interval = "90min";
+  std::string interval;
   std::string attitude;
   std::string config;
 };
@@ -29,12 +29,13 @@ int run_navigate(const NavigateArguments& arguments, const Common& common) {
   if (!arguments.config.empty()) {
     options = io::read_config(arguments.config);
   }
-  options.corrections = io::parse_correction_interval(arguments.interval);
+  if (!arguments.interval.empty()) {
+    options.corrections = io::parse_correction_interval(arguments.interval);
+  }
   options.corrections.take_parameters = arguments.online;
   io::LoadedPass loaded = io::read_pass(arguments.pass);
   if (!arguments.online) {
     loaded.pass.settings.prior = io::read_calibration(arguments.calibration);
-    options.estimator = loaded.pass.settings.prior->estimator;
   }
   ground::NavigationRun result;
   try {
@@ -45,8 +46,8 @@ int run_navigate(const NavigateArguments& arguments, const Common& common) {
   }
   const Time epoch = loaded.pass.settings.epoch;
   io::write_attitude(arguments.attitude, epoch, result.attitude);
-  const Evaluation evaluation =
-      evaluate(result.attitude, loaded.pass, io::read_truth(arguments.pass), io::parse_angle_rad("5arcmin"));
+  const Evaluation evaluation = evaluate(result.attitude, loaded.pass, read_truth_of(arguments.pass, loaded.pass),
+                                         io::parse_angle_rad("5arcmin"));
   if (common.json) {
     nlohmann::ordered_json json = {{"pass", pass_json(loaded)},
                                    {"verdict", verdict_json(result.verdict)},
@@ -70,10 +71,9 @@ void add_navigate(CLI::App& program, const Common& common, int& exit_status) {
   source->add_option("--calibration", arguments->calibration, "Hold the values of a calibration.json");
   source->add_flag("--online", arguments->online, "Calibrate along, and take over the estimates at each correction");
   source->require_option(1);
-  command
-      ->add_option("--correction-interval", arguments->interval,
-                   "Time between astro-corrections: a duration, none or continuous")
-      ->capture_default_str();
+  command->add_option(
+      "--correction-interval", arguments->interval,
+      "Time between astro-corrections: a duration, none or continuous (90min unless the settings say otherwise)");
   command->add_option("--config", arguments->config, "Estimator settings (TOML)");
   command->add_option("-o,--output", arguments->attitude, "Attitude file to write (CSV)")->required();
   command->callback([&common, &exit_status, arguments] { exit_status = run_navigate(*arguments, common); });

@@ -8,6 +8,7 @@
 #include <iterator>
 #include <numbers>
 
+#include "trihedron/io/error.hpp"
 #include "trihedron/io/time_text.hpp"
 
 namespace trihedron::cli {
@@ -41,12 +42,28 @@ nlohmann::ordered_json statistics_json(const ground::ErrorStatistics& s, Time ep
 
 }  // namespace
 
+std::optional<Truth> read_truth_of(const std::filesystem::path& path, const Pass& pass) {
+  std::optional<Truth> truth = io::read_truth(path);
+  if (truth && truth->gyros.size() != static_cast<std::size_t>(pass.gyro.gyros)) {
+    throw io::InputRefused(
+        path, {}, fmt::format("the truth has {} gyros, the telemetry {}", truth->gyros.size(), pass.gyro.gyros),
+        "give the truth of this pass, or none");
+  }
+  return truth;
+}
+
 Evaluation evaluate(const AttitudeHistory& attitude, const Pass& pass, const std::optional<Truth>& truth,
                     double limit_rad) {
   Evaluation result;
   result.reference = truth ? "truth" : "star tracker";
   result.errors = truth ? ground::attitude_errors(attitude, truth->t, truth->q_in_c)
                         : ground::attitude_errors(attitude, pass.star_tracker.t, pass.star_tracker.q_in_c);
+  if (!truth) {
+    // The reference has an error of its own.
+    for (Eigen::Vector3d& sigma : result.errors.sigma_rad) {
+      sigma = (sigma.cwiseAbs2() + pass.settings.star_tracker_noise_rad.cwiseAbs2()).cwiseSqrt();
+    }
+  }
   result.whole = ground::statistics(result.errors);
   result.stretches = ground::statistics_by_stretch(result.errors, pass.settings.epoch, kStretch);
   result.limit_rad = limit_rad;
@@ -136,7 +153,9 @@ std::string calibration_text(const ground::CalibrationRun& run, const std::optio
 }
 
 std::string evaluation_text(const Evaluation& evaluation, Time epoch, const std::string& title) {
-  std::string text = fmt::format("{} against the {}\n", title, evaluation.reference);
+  std::string text =
+      fmt::format("{} against the {}{}\n", title, evaluation.reference,
+                  evaluation.reference == "truth" ? "" : ", whose noise and outliers are in the figures");
   auto out = std::back_inserter(text);
   if (evaluation.errors.t.empty()) {
     return text + "  no common epochs\n";
@@ -152,6 +171,11 @@ std::string evaluation_text(const Evaluation& evaluation, Time epoch, const std:
     row(fmt::format("{:.0f} … {:.0f}", minutes(s.from - epoch), minutes(s.to - epoch)), s);
   }
   row("all", evaluation.whole);
+  constexpr std::size_t kListed = 20;
+  if (evaluation.intervals.size() > kListed) {
+    fmt::format_to(out, "  corrected {} times\n", evaluation.intervals.size());
+    return text;
+  }
   for (const auto& interval : evaluation.intervals) {
     fmt::format_to(out, "  corrected at {:>6.1f} min: {}, largest {}\n", minutes(interval.corrected - epoch),
                    interval.passed ? fmt::format("passed {} after {:.1f} min", angle_text(evaluation.limit_rad),

@@ -1,6 +1,7 @@
 #pragma once
 /// What the commands print: text for people, JSON for programs.
 
+#include <filesystem>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
@@ -11,6 +12,9 @@
 #include "trihedron/io/pass.hpp"
 
 namespace trihedron::cli {
+
+/// The truth of a pass, if it has one. Refuses one of another number of gyros.
+[[nodiscard]] std::optional<Truth> read_truth_of(const std::filesystem::path& path, const Pass& pass);
 
 /// Errors of an attitude against the best reference that the pass has.
 struct Evaluation {

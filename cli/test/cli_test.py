@@ -199,6 +199,13 @@ def test_installed_help_names_every_command():
     assert run("--version").stdout.strip()
 
 
+def test_settings_give_the_correction_interval_unless_the_option_does(tmp_path):
+    config = tmp_path / "config.toml"
+    config.write_text("[corrections]\ninterval = \"30min\"\n")
+    assert len(navigate_and_evaluate(tmp_path, "--online", "--config", config)["corrections"]) == 10
+    assert len(navigate_and_evaluate(tmp_path, "--online", "--config", config, "--correction-interval", "none")["corrections"]) == 1
+
+
 # Wrong usage.
 
 
@@ -356,6 +363,22 @@ def test_a_full_disk_leaves_no_half_written_file(tmp_path):
     refused(result, MACHINE_FAILED, "out")
     # What is there is whole: the small file written before the large one failed, no temporary beside it.
     assert {f.name for f in out.iterdir()} <= {"calibration.json"}
+
+
+def test_an_output_that_cannot_be_printed_is_a_machine_failure():
+    with open("/dev/full", "w") as full:
+        result = subprocess.run([str(PROGRAM), "inspect", str(EXAMPLE)], stdout=full, stderr=subprocess.PIPE, text=True)
+    assert result.returncode == MACHINE_FAILED
+    assert "standard output" in result.stderr
+
+
+def test_a_truth_of_another_number_of_gyros_is_refused(csv_pass):
+    directory = csv_pass(2)
+    gyro = '{"drift_rad_s": [0, 0, 0, 0, 0, 0, 0], "lambda_rad": [0, 0, 0]}'
+    (directory / "truth.json").write_text('{"gyros": [%s]}' % ", ".join([gyro] * 3))
+    (directory / "truth.csv").write_text("t_s,q_x,q_y,q_z,q_w,h1_x,h1_y,h1_z,h2_x,h2_y,h2_z,h3_x,h3_y,h3_z\n0,0,0,0,1,1,0,0,0,1,0,0,0,1\n")
+    (directory / "attitude.csv").write_text("t_s,q_x,q_y,q_z,q_w\n0,0,0,0,1\n")
+    refused(run("evaluate", directory, "--attitude", directory / "attitude.csv"), INPUT_REFUSED, "3 gyros")
 
 
 def test_a_read_only_directory_is_a_machine_failure():

@@ -12,6 +12,9 @@ Result<PaperEstimator<Model>, SetupFault> PaperEstimator<Model>::create(const Se
   if (!(setup.gate_nis > 0) || !(setup.reopen_after_rejections > 0)) {
     return SetupFault::kGateNotPositive;
   }
+  if (!setup.means_are_usable()) {
+    return SetupFault::kPriorMeanNotUsable;
+  }
   const auto root = information_root<Layout::kParameters>(setup.prior_covariance);
   if (!root) {
     return root.fault();
@@ -139,14 +142,14 @@ auto PaperEstimator<Model>::correct(const Eigen::Matrix3d& C_in_c, const Directi
     reopen(now, measurement.innovation, report);
   }
   rejections_in_a_row_ = 0;
-  fixes_to_forgive_ = std::max(fixes_to_forgive_ - 1, 0);
+  fixes_under_suspicion_ = std::max(fixes_under_suspicion_ - 1, 0);
   feed_back(information_.update(H_white, innovation_white));
   return report;
 }
 
 template <class Model>
 void PaperEstimator<Model>::reopen(const QuasiInertial& now, const Innovation& innovation, Report& report) {
-  if (fixes_to_forgive_ > 0) {
+  if (fixes_under_suspicion_ > 0) {
     // Information gathered about a far wrong estimate: linearise anew about the present one.
     information_ = prior_;
     report.status = FixStatus::kRestarted;
@@ -155,7 +158,7 @@ void PaperEstimator<Model>::reopen(const QuasiInertial& now, const Innovation& i
     update_covariance_to_now(now);
     report.status = FixStatus::kUsedAfterReopening;
   }
-  fixes_to_forgive_ = setup_.restart_within_fixes;
+  fixes_under_suspicion_ = setup_.restart_within_fixes;
 }
 
 template <class Model>

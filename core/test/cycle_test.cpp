@@ -94,9 +94,11 @@ TEST(Cycle, AttitudeImprovesWithTheParametersTakenOver) {
   test::fly(flight, taken, [](const auto&) {});
   EXPECT_GT(attitude_error(held, flight), 300 * kArcsecond);
   EXPECT_LT(attitude_error(taken, flight), 20 * kArcsecond);
-  // …and the covariance knows: its 3-sigma holds the error.
-  const auto solution = taken.navigation_attitude().value();
-  EXPECT_LT(attitude_error(taken, flight), 3 * std::sqrt(solution.covariance_rad2.trace()));
+  // …and the covariance knows in both: its 3-sigma holds the error.
+  for (const OnBoard* cycle : {&held, &taken}) {
+    EXPECT_LT(attitude_error(*cycle, flight),
+              3 * std::sqrt(cycle->navigation_attitude().value().covariance_rad2.trace()));
+  }
 }
 
 TEST(Cycle, AttitudeErrorsAreThoseOfItsCovariance) {
@@ -173,6 +175,37 @@ TEST(Cycle, TakesAQuaternionOfEitherSign) {
   EXPECT_EQ(plain.estimator().gyros()[0].drift_rad_s, flipped.estimator().gyros()[0].drift_rad_s);
 }
 
+TEST(Cycle, BelievesATimeFarAheadOnlyWhenASecondSampleConfirmsIt) {
+  const test::Flight flight({.duration_s = 60});
+  const auto sample_at = [&](double t_s) {
+    GyroSample<2> sample = flight.samples[0];
+    sample.t = Time(from_seconds(t_s));
+    return sample;
+  };
+  auto cycle = make_cycle();
+  cycle.on_gyro(sample_at(0));
+  EXPECT_EQ(cycle.on_gyro(sample_at(1e6)).sample, SampleStatus::kRejectedOutOfOrder);
+  EXPECT_EQ(cycle.on_gyro(sample_at(0.125)).sample, SampleStatus::kUsed);  // no harm done
+  EXPECT_EQ(cycle.on_gyro(sample_at(8000)).sample, SampleStatus::kRejectedOutOfOrder);
+  EXPECT_EQ(cycle.on_gyro(sample_at(8000.125)).sample, SampleStatus::kUsed);
+}
+
+TEST(Cycle, NavigatorDoesNotRestOnAFirstFixThatAllOthersContradict) {
+  test::Flight flight({.duration_s = 600});
+  flight.fixes[0].q_in_c =
+      flight.fixes[0].q_in_c * Eigen::Quaterniond(Eigen::AngleAxisd(0.02, Eigen::Vector3d::UnitX()));
+  auto setup = test::nominal_setup();
+  setup.prior = flight.truth;
+  setup.prior_covariance *= 1e-6;  // well known: only the first fix is wrong
+  for (const bool take : {true, false}) {
+    auto cycle = OnBoard::create(setup, {.interval = CorrectionPolicy::kOnlyFirst, .take_parameters = take}).value();
+    Log log;
+    test::fly(flight, cycle, std::ref(log));
+    EXPECT_EQ(log.corrections, 2);
+    EXPECT_LT(attitude_error(cycle, flight), 120 * kArcsecond);
+  }
+}
+
 TEST(Cycle, RejectsFixesOutOfOrder) {
   const test::Flight flight({.duration_s = 60});
   auto cycle = make_cycle();
@@ -185,20 +218,25 @@ TEST(Cycle, RejectsFixesOutOfOrder) {
 }
 
 TEST(Cycle, RejectsFixesWithoutGyroSamplesRoundThem) {
-  const test::Flight flight({.duration_s = 60, .fix_offset_s = 0.05});
+  const test::Flight flight({.duration_s = 60});
+  const auto fix_at = [&](double t_s) {
+    return StarFix{Time(from_seconds(t_s)), Eigen::Quaterniond(test::Flight::attitude(t_s, 0.5))};
+  };
   auto cycle = make_cycle();
-  // No sample yet: held, and given up at the first sample.
-  EXPECT_EQ(cycle.on_fix(flight.fixes[0]).fix.status, FixStatus::kPending);
-  EXPECT_EQ(cycle.on_gyro(flight.samples[10]).fix.status, FixStatus::kRejectedNoGyro);
-  // The gyros fall silent for 6 s: the first fix in it is held and given up, the second given up at once.
-  EXPECT_EQ(cycle.on_fix(flight.fixes[1]).fix.status, FixStatus::kPending);
-  EXPECT_EQ(cycle.on_fix(flight.fixes[2]).fix.status, FixStatus::kRejectedNoGyro);
+  EXPECT_EQ(cycle.on_fix(fix_at(0)).fix.status, FixStatus::kRejectedNoGyro);  // no sample yet
+  cycle.on_gyro(flight.samples[0]);
+  // A wild time stamp is rejected, and does no harm to the fixes after it.
+  EXPECT_EQ(cycle.on_fix(fix_at(1e6)).fix.status, FixStatus::kRejectedNoGyro);
+  EXPECT_EQ(cycle.on_fix(fix_at(0.3)).fix.status, FixStatus::kPending);
+  EXPECT_EQ(cycle.on_fix(fix_at(0.4)).fix.status, FixStatus::kRejectedNoGyro);  // a second one before the next sample
+  // It waits for the first sample that is not before it.
+  EXPECT_EQ(cycle.on_gyro(flight.samples[1]).fix.status, FixStatus::kNone);
+  EXPECT_EQ(cycle.on_gyro(flight.samples[2]).fix.status, FixStatus::kNone);
+  EXPECT_EQ(cycle.on_gyro(flight.samples[3]).fix.status, FixStatus::kStarted);
+  // The gyros fall silent: nothing to interpolate between.
+  EXPECT_EQ(cycle.on_fix(fix_at(0.4)).fix.status, FixStatus::kPending);
   EXPECT_EQ(cycle.on_gyro(flight.samples[60]).fix.status, FixStatus::kRejectedNoGyro);
-  // A fix on the very time of the sample after a gap is good.
-  StarFix fix = flight.fixes[3];
-  fix.t = flight.samples[120].t;
-  EXPECT_EQ(cycle.on_fix(fix).fix.status, FixStatus::kPending);
-  EXPECT_EQ(cycle.on_gyro(flight.samples[120]).fix.status, FixStatus::kStarted);
+  EXPECT_EQ(cycle.on_fix(fix_at(7.5)).fix.status, FixStatus::kUsed);
 }
 
 TEST(Cycle, BridgesAGapOfTheGyrosAndWidensItsUncertainty) {
@@ -207,7 +245,16 @@ TEST(Cycle, BridgesAGapOfTheGyrosAndWidensItsUncertainty) {
   flight.samples.erase(first, first + 8 * 300);
   auto cycle = make_cycle();
   Log log;
-  test::fly(flight, cycle, std::ref(log));
+  double sigma_before = 0;
+  double sigma_after = 0;
+  test::fly(flight, cycle, [&](const OnBoard::Report& report) {
+    log(report);
+    if (report.fix.status == FixStatus::kNone && cycle.navigator().started()) {
+      double& sigma = report.t < Time(std::chrono::seconds(2400)) ? sigma_before : sigma_after;
+      sigma = sigma_after == 0 ? std::sqrt(cycle.navigation_attitude().value().covariance_rad2.trace()) : sigma;
+    }
+  });
+  EXPECT_GT(sigma_after, sigma_before);
   EXPECT_EQ(log.count(FixStatus::kRejectedByGate), 0);
   EXPECT_GE(log.count(FixStatus::kRejectedNoGyro), 99);
   EXPECT_LT(angle_between<double>(cycle.estimator().gyros()[0].h_in, flight.truth[0].h_in), 2 * kArcsecond);
@@ -269,7 +316,7 @@ TEST(Cycle, StartsAnewWhenItsInformationIsAboutAFarWrongEstimate) {
 TEST(Cycle, RefusesParallelMomentaWithoutLosingItself) {
   test::Flight flight({.duration_s = 60});
   auto cycle = make_cycle();
-  // At the start: no trihedron can be made.
+  // At the start no trihedron can be made.
   GyroSample<2> parallel = flight.samples[0];
   parallel.h_b[1] = parallel.h_b[0];
   EXPECT_EQ(cycle.on_gyro(parallel).sample, SampleStatus::kUsed);

@@ -120,6 +120,15 @@ TEST(PaperEstimator, RefusesSetupsThatCannotWork) {
   setup.direction_random_walk_rad_sqrt_s = -1e-9;
   EXPECT_EQ(Estimator::create(setup).fault(), SetupFault::kNoiseNotPositive);
   setup = test::nominal_setup();
+  setup.star_tracker_noise_rad(0) = std::numeric_limits<double>::infinity();
+  EXPECT_EQ(Estimator::create(setup).fault(), SetupFault::kNoiseNotPositive);
+  setup = test::nominal_setup();
+  setup.prior[0].drift_rad_s(2) = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_EQ(Estimator::create(setup).fault(), SetupFault::kPriorMeanNotUsable);
+  setup = test::nominal_setup();
+  setup.prior[1].C_c_b *= 1.001;
+  EXPECT_EQ(Estimator::create(setup).fault(), SetupFault::kPriorMeanNotUsable);
+  setup = test::nominal_setup();
   setup.gate_nis = 0;
   EXPECT_EQ(Estimator::create(setup).fault(), SetupFault::kGateNotPositive);
   setup = test::nominal_setup();

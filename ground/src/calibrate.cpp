@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <boost/math/distributions/chi_squared.hpp>
 #include <cmath>
 #include <memory>
 #include <utility>
@@ -148,6 +149,8 @@ std::unique_ptr<Cycle<Estimator>> make_cycle(const Pass& pass, const Calibration
       case SetupFault::kPriorNotPositiveDefinite:
         throw SetupError("the prior covariance is not positive definite",
                          "give each parameter a prior sigma above zero, and correlations below one");
+      case SetupFault::kPriorMeanNotUsable:
+        throw SetupError("a prior mean is not finite, or an alignment is not a rotation", "correct the prior");
       case SetupFault::kNoiseNotPositive:
         throw SetupError("a noise sigma is not positive",
                          "give positive readout and star-tracker noise, and process noise of zero or more");
@@ -184,6 +187,21 @@ std::vector<double> parameter_values(const Estimator& estimator) {
     values.insert(values.end(), lambda.begin(), lambda.end());
   }
   return values;
+}
+
+/// Squared distance of the estimates from the prior means, in prior sigmas.
+template <class Estimator>
+double misfit(const Estimator& estimator) {
+  using Layout = typename Estimator::Setup::Layout;
+  Eigen::Matrix<double, Layout::kSize, 1> moved;
+  for (int k = 0; k < Estimator::kGyros; ++k) {
+    const auto& held = estimator.setup().prior[k];
+    const auto& estimate = estimator.gyros()[k];
+    moved.template segment<Estimator::DriftModel::kSize>(Layout::drift(k)) = estimate.drift_rad_s - held.drift_rad_s;
+    moved.template segment<3>(Layout::alignment(k)) =
+        Rot<C, C>::assume(Eigen::Matrix3d(estimate.C_c_b * held.C_c_b.transpose())).log().raw();
+  }
+  return moved.dot(estimator.setup().prior_covariance.llt().solve(moved));
 }
 
 void append(AttitudeHistory& history, Time t, const AttitudeSolution& solution) {
@@ -313,15 +331,14 @@ CalibrationRun calibrate_with(const Pass& pass, const CalibrationOptions& option
     run.fixes.push_back(record_of(report));
     ++run.fix_counts[name_of(report.fix.status)];
     corrected = report.corrected ? report.fix.t : corrected;
-    if (!report.fix.used()) {
-      return;
-    }
-    run.parameters.t.push_back(report.fix.t);
-    run.parameters.value.push_back(parameter_values(cycle->estimator()));
-    const auto root = cycle->estimator().error_root();
-    std::vector<double>& sigma = run.parameters.sigma.emplace_back();
-    for (Eigen::Index row = Estimator::Errors::kDirections; row < root.rows(); ++row) {
-      sigma.push_back(root.row(row).norm());
+    if (report.fix.used()) {
+      run.parameters.t.push_back(report.fix.t);
+      run.parameters.value.push_back(parameter_values(cycle->estimator()));
+      const auto root = cycle->estimator().error_root();
+      std::vector<double>& sigma = run.parameters.sigma.emplace_back();
+      for (Eigen::Index row = Estimator::Errors::kDirections; row < root.rows(); ++row) {
+        sigma.push_back(root.row(row).norm());
+      }
     }
     if (report.calibrated) {
       append(run.attitude, report.fix.t, *report.calibrated);
@@ -380,6 +397,10 @@ NavigationRun navigate_with(const Pass& pass, const CalibrationOptions& options,
     throw nothing_used(run.fixes);
   }
   run.statistics = statistics_of(run.fixes);
+  if (!options.corrections.take_parameters) {
+    run.held_parameters_misfit = misfit(cycle->estimator());
+    run.misfit_limit = boost::math::quantile(boost::math::chi_squared(Estimator::Setup::Layout::kSize), 0.999);
+  }
   run.verdict = judge_navigation(run);
   return run;
 }

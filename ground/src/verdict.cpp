@@ -141,8 +141,19 @@ void judge_determination(const CalibrationRun& run, std::vector<Finding>& findin
 }
 
 void judge_steadiness(const Pass& pass, const CalibrationRun& run, std::vector<Finding>& findings) {
+  // Outliers would seem to move a steady axis.
+  StarTrackerTelemetry used;
+  auto record = run.fixes.begin();
+  for (std::size_t i = 0; i < pass.star_tracker.size(); ++i) {
+    const Time t = pass.star_tracker.t[i];
+    record = std::find_if(record, run.fixes.end(), [&](const FixRecord& r) { return r.t >= t; });
+    if (record != run.fixes.end() && record->t == t && record->used()) {
+      used.t.push_back(t);
+      used.q_in_c.push_back(pass.star_tracker.q_in_c[i]);
+    }
+  }
   const Eigen::Vector3d& noise = pass.settings.star_tracker_noise_rad;
-  const auto observability = alignment_observability(pass.star_tracker, noise, noise.minCoeff());
+  const auto observability = alignment_observability(used, noise, noise.minCoeff());
   if (observability.sigma_rad <= kWeakAlignment_rad) {
     return;
   }
@@ -156,6 +167,16 @@ void judge_steadiness(const Pass& pass, const CalibrationRun& run, std::vector<F
                   axis.x(), axis.y(), axis.z(), run.options.estimator),
       fmt::format("about {:.0f}″ at best about this axis from the fixes alone", observability.sigma_rad / kArcsecond),
       "Fly slews about the other axes during the calibration: ten minutes of 10° and more suffice.");
+}
+
+void judge_unused_gyros(const Pass& pass, const CalibrationRun& run, std::vector<Finding>& findings) {
+  const auto used = static_cast<int>(run.calibration.gyros.size());
+  if (pass.gyro.gyros > used) {
+    add(findings, Severity::kNote, "gyros-not-used",
+        fmt::format("Estimator {} works on a pair: gyros beyond the first {} were not used.", run.options.estimator,
+                    used),
+        fmt::format("{} gyros in the telemetry", pass.gyro.gyros), "None needed; put the pair you want first.");
+  }
 }
 
 void judge_pair(const CalibrationRun& run, std::vector<Finding>& findings) {
@@ -216,11 +237,20 @@ Verdict judge(const Pass& pass, const CalibrationRun& run) {
   judge_determination(run, findings);
   judge_steadiness(pass, run, findings);
   judge_pair(run, findings);
+  judge_unused_gyros(pass, run, findings);
   return verdict_of(std::move(findings));
 }
 
 Verdict judge_navigation(const NavigationRun& run) {
   std::vector<Finding> findings;
+  if (run.held_parameters_misfit && *run.held_parameters_misfit > run.misfit_limit) {
+    add(findings, Severity::kDoNotUse, "calibration-does-not-fit",
+        "The parameters held do not fit this pass: the calibration that ran along moved away from them by more than "
+        "their sigmas allow.",
+        fmt::format("misfit {:.0f} (squared, in sigmas); 99.9 % of fitting calibrations lie below {:.0f}",
+                    *run.held_parameters_misfit, run.misfit_limit),
+        "Calibrate anew; drift coefficients change at every start of a rotor.");
+  }
   judge_rejections(run.statistics, findings);
   judge_nis(run.statistics, "the calibration in use does not fit this pass, or the model is incomplete", findings);
   return verdict_of(std::move(findings));

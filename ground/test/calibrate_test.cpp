@@ -123,6 +123,29 @@ TEST(Navigate, HoldsTheParametersItWasGiven) {
   EXPECT_LT(statistics(errors).max_total_rad, 5e-4);
 }
 
+TEST(Navigate, KnowsHowWrongTheParametersItHoldsMayBe) {
+  // Nothing known beforehand, and nothing taken over: minutes of error, under sigmas of minutes.
+  CalibrationOptions options;
+  options.corrections.take_parameters = false;
+  const auto run = navigate(two_hours().pass, options);
+  const auto errors = attitude_errors(run.attitude, two_hours().truth.t, two_hours().truth.q_in_c);
+  const auto whole = statistics(errors);
+  EXPECT_GT(whole.max_total_rad, 1e-3);
+  // One draw of the parameters for the whole pass: the mean square is about one, within a factor of several.
+  EXPECT_LT(*whole.normalised_square, 4);
+  ASSERT_TRUE(run.held_parameters_misfit.has_value());
+  EXPECT_LT(*run.held_parameters_misfit, run.misfit_limit);  // the truth is a draw from the prior
+}
+
+TEST(Replay, TellsOfFixesAfterTheLastSample) {
+  Pass pass = two_hours().pass;
+  pass.gyro.t.resize(8 * 3600);
+  pass.gyro.h.resize(6 * pass.gyro.t.size());
+  const auto run = calibrate(pass, {});
+  EXPECT_EQ(run.fixes.size(), pass.star_tracker.size());
+  EXPECT_EQ(run.fix_counts.at("rejected: no gyro samples round it"), 1201);  // from 3600 s on, 7200 s among them
+}
+
 std::string setup_error(const Pass& pass, const CalibrationOptions& options = {}) {
   try {
     static_cast<void>(calibrate(pass, options));
@@ -154,6 +177,9 @@ TEST(SetupError, NamesWhatCannotWork) {
   pass = good;
   pass.settings.gyros[1].drift_common_sigma_rad_s = 0;
   EXPECT_THAT(setup_error(pass), HasSubstr("positive definite"));
+  pass = good;
+  pass.settings.gyros[0].drift_rad_s["k0"] = std::nan("");
+  EXPECT_THAT(setup_error(pass), HasSubstr("mean"));
   pass = good;
   pass.settings.gyros.pop_back();
   EXPECT_THAT(setup_error(pass), HasSubstr("needs 2 gyros"));

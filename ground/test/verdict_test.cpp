@@ -45,6 +45,11 @@ CalibrationRun good_run() {
   run.calibration.states = {"gyro1.k0", "gyro1.align_x"};
   run.calibration.covariance = Eigen::Vector2d(1e-18, 1e-12).asDiagonal();
   run.parameters.sigma = {{2e-6, 8.7e-3}};
+  for (int i = 0; i <= 3600; ++i) {
+    FixRecord& fix = run.fixes.emplace_back();
+    fix.t = Time(std::chrono::seconds(3 * i));
+    fix.status = FixStatus::kUsed;
+  }
   run.calibration.statistics = {
       {"fixes", 3601},     {"fixes_used", 3601}, {"fixes_rejected_as_outliers", 0}, {"reopened", 0},
       {"nis_count", 3600}, {"nis_mean", 4.02},   {"nis_degrees_of_freedom", 4}};
@@ -132,6 +137,26 @@ TEST(Verdict, FindsSteadyFlightAndNamesItsAxis) {
   EXPECT_FALSE(verdict.trustworthy);
 }
 
+TEST(Verdict, FindsSteadyFlightBehindRejectedOutliers) {
+  auto pass = good_pass();
+  pass.star_tracker = flight(0);
+  auto run = good_run();
+  for (std::size_t i = 50; i < run.fixes.size(); i += 100) {
+    pass.star_tracker.q_in_c[i] =
+        pass.star_tracker.q_in_c[i] * Rot<C, C>::exp(Vec<C>::assume(0.03, 0, 0.01)).quaternion();
+    run.fixes[i].status = FixStatus::kRejectedByGate;
+  }
+  EXPECT_THAT(codes(judge(pass, run)), ElementsAre("weak-alignment-axis"));
+}
+
+TEST(Verdict, TellsOfGyrosThatAreNotUsed) {
+  auto pass = good_pass();
+  pass.gyro.gyros = 3;
+  const Verdict verdict = judge(pass, good_run());
+  EXPECT_THAT(codes(verdict), ElementsAre("gyros-not-used"));
+  EXPECT_TRUE(verdict.trustworthy);
+}
+
 TEST(Verdict, FindsABadlyPlacedPair) {
   auto run = good_run();
   run.calibration.gyros[1].momentum_in = {std::cos(0.5), std::sin(0.5), 0};
@@ -144,6 +169,13 @@ TEST(Verdict, OfANavigationSaysWhetherTheParametersFit) {
   NavigationRun run;
   run.statistics = good_run().calibration.statistics;
   EXPECT_TRUE(judge_navigation(run).trustworthy);
+  run.misfit_limit = 45;
+  run.held_parameters_misfit = 30;
+  EXPECT_TRUE(judge_navigation(run).trustworthy);
+  run.held_parameters_misfit = 60;
+  EXPECT_THAT(codes(judge_navigation(run)), ElementsAre("calibration-does-not-fit"));
+  EXPECT_FALSE(judge_navigation(run).trustworthy);
+  run.held_parameters_misfit.reset();
   run.statistics["nis_mean"] = 40;
   EXPECT_THAT(codes(judge_navigation(run)), ElementsAre("nis-out-of-bounds"));
   EXPECT_FALSE(judge_navigation(run).trustworthy);

@@ -49,13 +49,17 @@ AttitudeHistory read_attitude(const std::filesystem::path& path, Time epoch) {
     attitude.q_in_c.push_back(q);
     if (has_sigma) {
       const Eigen::Vector3d sigma(row[4], row[5], row[6]);
-      if ((sigma.array() < 0).any()) {
-        refuse(series, i, "a sigma is negative");
+      if ((sigma.array() <= 0).any()) {
+        refuse(series, i, "a sigma is not positive");
       }
       attitude.sigma_rad.push_back(sigma);
     }
     if (has_age) {
-      attitude.age_s.push_back(row[has_sigma ? 7 : 4]);
+      const double age_s = row[has_sigma ? 7 : 4];
+      if (!(age_s >= 0 && age_s < 1e9)) {
+        refuse(series, i, "age_s is not between 0 and 1e9 s");
+      }
+      attitude.age_s.push_back(age_s);
     }
   }
   return attitude;

@@ -86,7 +86,7 @@ TEST_F(AttitudeCsv, RefusesWhatIsNoCleanSolution) {
   EXPECT_THAT(refusal_of("t_s,q_x,q_y,q_z\n"), HasSubstr("lacks column \"q_w\""));
   EXPECT_THAT(refusal_of("t_s,q_x,q_y,q_z,q_w,sigma_x_rad\n"), HasSubstr("lacks column \"sigma_y_rad\""));
   EXPECT_THAT(refusal_of("t_s,q_x,q_y,q_z,q_w,sigma_x_rad,sigma_y_rad,sigma_z_rad\n0,0,0,0,1,1,-1,1\n"),
-              HasSubstr("a.csv:2: a sigma is negative"));
+              HasSubstr("a.csv:2: a sigma is not positive"));
 }
 
 TEST_F(AttitudeCsv, ColumnsOfUnequalLengthAreAProgrammersMistake) {

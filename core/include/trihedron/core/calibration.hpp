@@ -35,7 +35,7 @@ struct ErrorLayout {
   }
 };
 
-enum class SetupFault { kPriorNotPositiveDefinite, kNoiseNotPositive, kGateNotPositive };
+enum class SetupFault { kPriorNotPositiveDefinite, kPriorMeanNotUsable, kNoiseNotPositive, kGateNotPositive };
 
 template <class Model, int N>
 struct CalibrationSetup {
@@ -56,10 +56,22 @@ struct CalibrationSetup {
   /// information goes.
   int restart_within_fixes = 200;
 
+  /// Finite drift coefficients and alignments that are rotations.
+  [[nodiscard]] bool means_are_usable() const {
+    for (const auto& gyro : prior) {
+      const double off = (gyro.C_c_b * gyro.C_c_b.transpose() - Eigen::Matrix3d::Identity()).norm();
+      if (!gyro.drift_rad_s.allFinite() || !(off < 1e-6)) {
+        return false;
+      }
+    }
+    return true;
+  }
+
   [[nodiscard]] bool noise_is_positive() const {
-    bool positive = (star_tracker_noise_rad.array() > 0).all() && direction_random_walk_rad_sqrt_s >= 0;
+    bool positive = (star_tracker_noise_rad.array() > 0).all() && star_tracker_noise_rad.allFinite() &&
+                    direction_random_walk_rad_sqrt_s >= 0;
     for (const double noise : readout_noise_rad) {
-      positive = positive && noise > 0;
+      positive = positive && noise > 0 && noise < 1;
     }
     return positive;
   }

@@ -15,7 +15,7 @@ namespace trihedron {
 enum class SampleStatus : std::uint8_t {
   kUsed,
   kRejectedNotDirection,  ///< a reading is not finite or not unit
-  kRejectedOutOfOrder,    ///< not later than the sample before it
+  kRejectedOutOfOrder,    ///< not later than the sample before it, or alone more than an hour ahead
   kRejectedGeometry,      ///< momenta nearly parallel
 };
 
@@ -34,7 +34,7 @@ struct StepReport {
   SampleStatus sample = SampleStatus::kUsed;
   typename Estimator::Report fix;  ///< of the fix that fell between the sample before and this one, if any
   bool corrected = false;          ///< the navigator was corrected at that fix
-  /// Attitude at that fix, where it was used: of the calibration itself, and of the open-loop navigator.
+  /// Attitude at that fix, used or rejected as an outlier: of the calibration itself, and of the open-loop navigator.
   std::optional<AttitudeSolution> calibrated;
   std::optional<AttitudeSolution> navigated;
   /// z1 of eq. (3), cosθ predicted minus cosθ measured: the integrity of the pair, without a star tracker. Zero before
@@ -53,6 +53,8 @@ class Cycle {
   /// A fix is interpolated between samples no further apart than this; the body's acceleration over it is below the
   /// readout noise.
   static constexpr Duration kMaxInterpolation = std::chrono::milliseconds(500);
+  /// A sample further ahead is believed only when the next one confirms it.
+  static constexpr Duration kMaxGap = std::chrono::hours(1);
 
   [[nodiscard]] static Result<Cycle, SetupFault> create(const Setup& setup, const CorrectionPolicy& policy) {
     const auto estimator = Estimator::create(setup);
@@ -74,10 +76,13 @@ class Cycle {
     report.t = sample.t;
     Directions h_b;
     report.sample = screen(sample, h_b);
+    if (report.sample == SampleStatus::kUsed && is_wild(sample.t)) {
+      report.sample = SampleStatus::kRejectedOutOfOrder;
+    }
     if (report.sample != SampleStatus::kUsed) {
       return report;
     }
-    if (has_pending_fix_) {
+    if (has_pending_fix_ && pending_fix_.t <= sample.t) {
       has_pending_fix_ = false;
       correct_between_samples(sample.t, h_b, report);
     }
@@ -96,23 +101,18 @@ class Cycle {
     report.fix.t = fix.t;
     if (!fix.q_in_c.coeffs().allFinite() || !nearly_unit(fix.q_in_c.norm())) {
       report.fix.status = FixStatus::kRejectedNotRotation;
-    } else if ((has_fix_ && fix.t <= fix_t_) || (has_sample_ && fix.t < t_)) {
+    } else if ((has_used_fix_ && fix.t <= used_fix_t_) || (has_sample_ && fix.t < t_)) {
       report.fix.status = FixStatus::kRejectedOutOfOrder;
-    } else if (has_pending_fix_) {
-      // Two fixes between two gyro samples: the gyros are silent.
+    } else if (!has_sample_ || fix.t - t_ > kMaxInterpolation || has_pending_fix_) {
+      // Too far from the latest sample to be interpolated, whatever comes next; or a second one before the next sample.
       report.fix.status = FixStatus::kRejectedNoGyro;
+    } else if (fix.t == t_) {
+      correct_now(Rot<In, C>::assume(fix.q_in_c.normalized()), report);
+      report.angle_residual = angle_residual();
     } else {
-      has_fix_ = true;
-      fix_t_ = fix.t;
-      const Rot<In, C> C_in_c = Rot<In, C>::assume(fix.q_in_c.normalized());
-      if (has_sample_ && fix.t == t_) {
-        correct_now(C_in_c, report);
-        report.angle_residual = angle_residual();
-      } else {
-        has_pending_fix_ = true;
-        pending_C_in_c_ = C_in_c;
-        report.fix.status = FixStatus::kPending;
-      }
+      has_pending_fix_ = true;
+      pending_fix_ = fix;
+      report.fix.status = FixStatus::kPending;
     }
     return report;
   }
@@ -142,27 +142,35 @@ class Cycle {
     return SampleStatus::kUsed;
   }
 
+  /// Whether a time lies so far ahead that it needs a second one beside it to be believed: a single wild time stamp
+  /// would otherwise put everything after it out of order.
+  [[nodiscard]] bool is_wild(Time t) {
+    if (!has_sample_ || t - t_ <= kMaxGap) {
+      return false;
+    }
+    const bool confirmed = has_suspect_ && t > suspect_t_ && t - suspect_t_ <= kMaxInterpolation;
+    has_suspect_ = !confirmed;
+    suspect_t_ = t;
+    return !confirmed;
+  }
+
   /// The pending fix, at readings interpolated to its time.
   void correct_between_samples(Time t_next, const Directions& h_b_next, Report& report) {
-    report.fix.t = fix_t_;
-    const bool on_next = t_next == fix_t_;
-    const bool interpolable = has_sample_ && t_next > fix_t_ && t_next - t_ <= kMaxInterpolation;
-    if (!on_next && !interpolable) {
+    report.fix.t = pending_fix_.t;
+    if (t_next - t_ > kMaxInterpolation) {
       report.fix.status = FixStatus::kRejectedNoGyro;
       return;
     }
-    Directions h_b = h_b_next;
-    if (!on_next) {
-      const double fraction = to_seconds(fix_t_ - t_) / to_seconds(t_next - t_);
-      for (int k = 0; k < h_b.size(); ++k) {
-        h_b[k] = ((1 - fraction) * h_b_[k] + fraction * h_b_next[k]).normalized();
-      }
+    const double fraction = to_seconds(pending_fix_.t - t_) / to_seconds(t_next - t_);
+    Directions h_b;
+    for (int k = 0; k < h_b.size(); ++k) {
+      h_b[k] = ((1 - fraction) * h_b_[k] + fraction * h_b_next[k]).normalized();
     }
-    if (!predict_to(fix_t_, h_b)) {
+    if (!predict_to(pending_fix_.t, h_b)) {
       report.fix.status = FixStatus::kRejectedGeometry;
       return;
     }
-    correct_now(pending_C_in_c_, report);
+    correct_now(Rot<In, C>::assume(pending_fix_.q_in_c.normalized()), report);
   }
 
   /// Prediction of both models to `t` with the midpoint of the readings. False, and nothing moved, where the momenta
@@ -173,16 +181,18 @@ class Cycle {
       for (int k = 0; k < h_b.size(); ++k) {
         middle[k] = (h_b_[k] + h_b[k]).normalized();
       }
-      const auto calibrated = trihedron_attitude(estimator_.gyros(), middle);
-      const auto navigated = trihedron_attitude(navigator_.gyros(), middle);
+      const auto calibrated = make_trihedra(estimator_.gyros(), middle);
+      const auto navigated = make_trihedra(navigator_.gyros(), middle);
       if (!calibrated || !navigated) {
         return false;
       }
       const double dt_s = to_seconds(t - t_);
-      estimator_.predict(calibrated.value().raw(), middle, dt_s);
-      navigator_.predict(navigated.value().raw(), middle, dt_s);
+      estimator_.predict(calibrated.value().C_in_c().raw(), middle, dt_s);
+      navigator_.predict(navigated.value().C_in_c().raw(), middle, dt_s);
       if (t - t_ > kMaxInterpolation) {
-        estimator_.add_direction_variance(variance_of_long_step(h_b, dt_s));
+        const double variance_rad2 = variance_of_long_step(h_b, dt_s);
+        estimator_.add_direction_variance(variance_rad2);
+        navigator_.add_direction_variance(variance_rad2);
       }
     }
     t_ = t;
@@ -211,21 +221,38 @@ class Cycle {
       return;  // the estimator did not move its covariance to this fix
     }
     navigator_.extend(stretch);
-    if (!report.fix.used()) {
-      return;
-    }
-    if (!navigator_.started() ||
-        (policy_.interval != CorrectionPolicy::kOnlyFirst && t_ - corrected_t_ >= policy_.interval)) {
-      navigator_.correct(estimator_, policy_.take_parameters);
-      corrected_t_ = t_;
-      report.corrected = true;
-    }
     if (const auto solution = calibration_attitude()) {
       report.calibrated = solution.value();
+    }
+    if (report.fix.used()) {
+      has_used_fix_ = true;
+      used_fix_t_ = t_;
+      correct_navigator(report);
     }
     if (const auto solution = navigation_attitude()) {
       report.navigated = solution.value();
     }
+  }
+
+  /// Astro-correction of the navigator, when it is due.
+  void correct_navigator(Report& report) {
+    const bool interval_over =
+        policy_.interval != CorrectionPolicy::kOnlyFirst && t_ - corrected_t_ >= policy_.interval;
+    // The fix that started both was contradicted by all the fixes after it: the navigator must not rest on it.
+    const bool start_was_wrong = start_unconfirmed_ && report.fix.status == FixStatus::kUsedAfterReopening;
+    start_unconfirmed_ = report.fix.status == FixStatus::kStarted;
+    if (navigator_.started() && !interval_over && !start_was_wrong) {
+      return;
+    }
+    if (policy_.take_parameters) {
+      navigator_.correct(estimator_);
+    } else if (report.calibrated) {
+      navigator_.correct_directions(estimator_, *report.calibrated, h_b_);
+    } else {
+      return;
+    }
+    corrected_t_ = t_;
+    report.corrected = true;
   }
 
   /// The calibration's own attitude; readout noise of a fix at this very sample is counted twice, which only shows at
@@ -249,11 +276,14 @@ class Cycle {
   CorrectionPolicy policy_;
   Time t_{};
   Directions h_b_;
-  Time fix_t_{};
-  Rot<In, C> pending_C_in_c_;
+  Time used_fix_t_{};
+  StarFix pending_fix_;
   Time corrected_t_{};
+  Time suspect_t_{};
   bool has_sample_ = false;
-  bool has_fix_ = false;
+  bool has_suspect_ = false;
+  bool start_unconfirmed_ = false;
+  bool has_used_fix_ = false;
   bool has_pending_fix_ = false;
 };
 

@@ -13,11 +13,17 @@ struct AttitudeSolution {
   Eigen::Matrix3d covariance_rad2 = Eigen::Matrix3d::Zero();
 };
 
-/// C_in_c by the trihedra on the momenta believed in `in` and read in the cases (paper: reference gyro 1, Fig. 4).
-/// `in_c` is filled for callers that need θ. h_b: direction cosines, need not be exactly unit.
+/// The gyro trihedron as believed in `in` and as read in the cases (paper: reference gyro 1, Fig. 4).
+struct TrihedronPair {
+  Trihedron<In> in;
+  Trihedron<C> c;
+  [[nodiscard]] Rot<In, C> C_in_c() const { return attitude(in, c); }
+};
+
+/// h_b: direction cosines, need not be exactly unit.
 template <class Model>
-[[nodiscard]] Result<Rot<In, C>, DirectionsFault> trihedron_attitude(const PerGyro<GyroModel<Model>, 2>& gyros,
-                                                                     const PerGyro<Eigen::Vector3d, 2>& h_b) {
+[[nodiscard]] Result<TrihedronPair, DirectionsFault> make_trihedra(const PerGyro<GyroModel<Model>, 2>& gyros,
+                                                                   const PerGyro<Eigen::Vector3d, 2>& h_b) {
   const auto in = make_trihedron(Vec<In>::assume(gyros[0].h_in), Vec<In>::assume(gyros[1].h_in));
   if (!in) {
     return in.fault();
@@ -26,7 +32,7 @@ template <class Model>
   if (!c) {
     return c.fault();
   }
-  return attitude(in.value(), c.value());
+  return TrihedronPair{in.value(), c.value()};
 }
 
 /// Attitude with its covariance: errors at a reference epoch (rows of `errors` as in ErrorLayout), carried by `since`,
@@ -38,18 +44,14 @@ template <class Model, int Columns>
     const PerGyro<Sensitivity<Model>, 2>& since, const PerGyro<double, 2>& readout_noise_rad,
     double walk_variance_rad2) {
   using Errors = ErrorLayout<Model, 2>;
-  const auto in = make_trihedron(Vec<In>::assume(gyros[0].h_in), Vec<In>::assume(gyros[1].h_in));
-  if (!in) {
-    return in.fault();
-  }
-  const auto c = make_trihedron(Vec<C>::assume(gyros[0].C_c_b * h_b[0]), Vec<C>::assume(gyros[1].C_c_b * h_b[1]));
-  if (!c) {
-    return c.fault();
+  const auto trihedra = make_trihedra(gyros, h_b);
+  if (!trihedra) {
+    return trihedra.fault();
   }
   AttitudeSolution solution;
-  solution.C_in_c = attitude(in.value(), c.value());
+  solution.C_in_c = trihedra.value().C_in_c();
   const Eigen::Matrix3d C_c_in = solution.C_in_c.raw().transpose();
-  const Eigen::Matrix<double, 3, 6> by_directions = attitude_by_directions(c.value());
+  const Eigen::Matrix<double, 3, 6> by_directions = attitude_by_directions(trihedra.value().c);
   Eigen::Matrix<double, 3, Errors::kSize> by_errors = Eigen::Matrix<double, 3, Errors::kSize>::Zero();
   for (int k = 0; k < 2; ++k) {
     const Eigen::Matrix3d by_phi = by_directions.middleCols<3>(Errors::direction(k));
@@ -74,20 +76,36 @@ class Navigator {
   [[nodiscard]] bool started() const { return started_; }
   [[nodiscard]] const typename Estimator::Gyros& gyros() const { return gyros_; }
 
-  /// Instantaneous astro-correction: takes over the estimator's directions and, where told or at the start, its
-  /// parameters.
-  void correct(const Estimator& estimator, bool take_parameters) {
-    for (int k = 0; k < gyros_.size(); ++k) {
-      if (take_parameters || !started_) {
-        gyros_[k] = estimator.gyros()[k];
-      } else {
-        gyros_[k].h_in = estimator.gyros()[k].h_in;
-      }
-    }
+  /// Instantaneous astro-correction: takes over the estimator's directions and parameters.
+  void correct(const Estimator& estimator) {
+    gyros_ = estimator.gyros();
     errors_ = estimator.error_root();
-    since_correction_ = {};
-    time_since_correction_s_ = 0;
-    started_ = true;
+    restart_clock();
+  }
+
+  /// Instantaneous astro-correction with the parameters of the set-up held: the directions are those that the held
+  /// alignments read at this attitude (`h_b`), and the errors those of the set-up and of the attitude.
+  void correct_directions(const Estimator& estimator, const AttitudeSolution& attitude,
+                          const typename Estimator::Directions& h_b) {
+    using Errors = typename Estimator::Errors;
+    constexpr int kParameters = Estimator::Setup::Layout::kSize;
+    static_assert(Estimator::ErrorRoot::ColsAtCompileTime >= kParameters + 3);
+    if (!started_) {
+      gyros_ = estimator.setup().prior;
+    }
+    const Eigen::Matrix3d& C_in_c = attitude.C_in_c.raw();
+    errors_.setZero();
+    errors_.template block<kParameters, kParameters>(Errors::kDirections, 0) =
+        estimator.setup().prior_covariance.llt().matrixL();
+    const Eigen::Matrix3d attitude_root = attitude.covariance_rad2.llt().matrixL();
+    for (int k = 0; k < gyros_.size(); ++k) {
+      gyros_[k].h_in = (C_in_c * (gyros_[k].C_c_b * h_b[k])).normalized();
+      // φ = C_in_c (δ + ε): h_in was read through the held alignment at the estimated attitude.
+      errors_.template middleRows<3>(Errors::direction(k)) =
+          C_in_c * errors_.template middleRows<3>(Errors::alignment(k));
+      errors_.template block<3, 3>(Errors::direction(k), kParameters) = C_in_c * attitude_root;
+    }
+    restart_clock();
   }
 
   /// Open-loop prediction over one step; C_in_c and h_b of its middle. Needs started().
@@ -97,6 +115,9 @@ class Navigator {
     }
     time_since_correction_s_ += dt_s;
   }
+
+  /// Widens the directions: `variance_rad2` per axis, as the estimator's.
+  void add_direction_variance(double variance_rad2) { extra_variance_rad2_ += variance_rad2; }
 
   /// Carries the errors over the stretch between two fixes, for which the estimator has integrated the sensitivities.
   void extend(const typename Estimator::Sensitivities& stretch) {
@@ -115,14 +136,22 @@ class Navigator {
     }
     const double walk = setup.direction_random_walk_rad_sqrt_s;
     return trihedron_attitude<Model>(gyros_, h_b, errors_, since, setup.readout_noise_rad,
-                                     walk * walk * time_since_correction_s_);
+                                     walk * walk * time_since_correction_s_ + extra_variance_rad2_);
   }
 
  private:
+  void restart_clock() {
+    since_correction_ = {};
+    time_since_correction_s_ = 0;
+    extra_variance_rad2_ = 0;
+    started_ = true;
+  }
+
   typename Estimator::Gyros gyros_;
   typename Estimator::ErrorRoot errors_ = Estimator::ErrorRoot::Zero();
   typename Estimator::Sensitivities since_correction_;
   double time_since_correction_s_ = 0;
+  double extra_variance_rad2_ = 0;
   bool started_ = false;
 };
 

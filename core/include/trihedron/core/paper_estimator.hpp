@@ -105,7 +105,7 @@ class PaperEstimator {
   double time_since_fix_s_ = 0;
   double extra_variance_rad2_ = 0;
   int rejections_in_a_row_ = 0;
-  int fixes_to_forgive_ = 0;  ///< a run of rejections before these have passed means a restart
+  int fixes_under_suspicion_ = 0;  ///< a run of rejections before these have passed means a restart
   bool started_ = false;
 };
 

@@ -6,6 +6,8 @@
 #include <Eigen/LU>
 #include <cmath>
 
+#include "trihedron/core/assert.hpp"
+
 namespace trihedron {
 
 /// Rotates the rows of `extra` into the upper triangular rows of `root` (Householder), column by column; the first
@@ -83,11 +85,12 @@ class SquareRootInformation {
   /// H R⁻¹: rows of H seen through the present uncertainty; H P Hᵀ is its product with its transpose. Needs regular().
   template <int M>
   [[nodiscard]] Rows<M> through_uncertainty(const Rows<M>& H) const {
+    TRIHEDRON_ASSERT(regular());
     return root_.template leftCols<N>().template triangularView<Eigen::Upper>().template solve<Eigen::OnTheRight>(H);
   }
 
-  /// Measurement update with `H` and `y`, y = H x + unit white noise. Returns the correction, to be fed back; needs
-  /// regular() after it.
+  /// Measurement update with `H` and `y`, y = H x + unit white noise. Returns the correction, to be fed back; not
+  /// finite unless regular() after it.
   template <int M>
   [[nodiscard]] Vector update(const Rows<M>& H, const Eigen::Matrix<S, M, 1>& y) {
     Eigen::Matrix<S, M, N + 1> extra;
@@ -101,6 +104,7 @@ class SquareRootInformation {
 
   /// R⁻¹, a square root of the covariance: P = R⁻¹ R⁻ᵀ. Needs regular().
   [[nodiscard]] Matrix inverse_root() const {
+    TRIHEDRON_ASSERT(regular());
     return root_.template leftCols<N>().template triangularView<Eigen::Upper>().solve(Matrix::Identity());
   }
 
@@ -108,10 +112,7 @@ class SquareRootInformation {
   [[nodiscard]] Matrix root() const { return root_.template leftCols<N>(); }
 
   /// Whether each state has information, so that a covariance exists.
-  [[nodiscard]] bool regular() const {
-    const S largest = root_.diagonal().cwiseAbs().maxCoeff();
-    return root_.diagonal().cwiseAbs().minCoeff() > largest * S(1e-300);
-  }
+  [[nodiscard]] bool regular() const { return (root_.diagonal().array() != S(0)).all(); }
 
  private:
   // R, and right of it z of R x = z, which is zero except within update().

@@ -5,6 +5,7 @@
 #include <array>
 #include <functional>
 #include <map>
+#include <optional>
 #include <stdexcept>
 #include <string>
 #include <utility>
@@ -75,6 +76,10 @@ struct NavigationRun {
   AttitudeHistory attitude;  ///< at every gyro sample used
   std::vector<FixRecord> fixes;
   std::map<std::string, double> statistics;
+  /// Where parameters are held: (estimated − held)ᵀ P⁻¹ (estimated − held), P the covariance they were given with, and
+  /// its 99.9 % limit.
+  std::optional<double> held_parameters_misfit;
+  double misfit_limit = 0;
   Verdict verdict;
 };
 /// Attitude by the navigator, corrected as `options.corrections` says, with the calibration running along from the
