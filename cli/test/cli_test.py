@@ -374,7 +374,7 @@ def test_an_output_that_cannot_be_printed_is_a_machine_failure():
 
 def test_a_truth_of_another_number_of_gyros_is_refused(csv_pass):
     directory = csv_pass(2)
-    gyro = '{"drift_rad_s": [0, 0, 0, 0, 0, 0, 0], "lambda_rad": [0, 0, 0]}'
+    gyro = '{"drift_rad_s": [0, 0, 0, 0, 0, 0, 0], "lambda_rad": [0, 0, 0], "unmodelled_rad_s": [0, 0, 0, 0, 0, 0]}'
     (directory / "truth.json").write_text('{"gyros": [%s]}' % ", ".join([gyro] * 3))
     (directory / "truth.csv").write_text("t_s,q_x,q_y,q_z,q_w,h1_x,h1_y,h1_z,h2_x,h2_y,h2_z,h3_x,h3_y,h3_z\n0,0,0,0,1,1,0,0,0,1,0,0,0,1\n")
     (directory / "attitude.csv").write_text("t_s,q_x,q_y,q_z,q_w\n0,0,0,0,1\n")
