@@ -3,6 +3,7 @@
 
 #include <Eigen/Cholesky>
 #include <Eigen/Core>
+#include <algorithm>
 #include <cstdint>
 
 #include "trihedron/core/attitude.hpp"
@@ -58,22 +59,17 @@ struct CalibrationSetup {
 
   /// Finite drift coefficients and alignments that are rotations.
   [[nodiscard]] bool means_are_usable() const {
-    for (const auto& gyro : prior) {
+    return std::all_of(prior.begin(), prior.end(), [](const GyroModel<Model>& gyro) {
       const double off = (gyro.C_c_b * gyro.C_c_b.transpose() - Eigen::Matrix3d::Identity()).norm();
-      if (!gyro.drift_rad_s.allFinite() || !(off < 1e-6)) {
-        return false;
-      }
-    }
-    return true;
+      return gyro.drift_rad_s.allFinite() && off < 1e-6;
+    });
   }
 
   [[nodiscard]] bool noise_is_positive() const {
-    bool positive = (star_tracker_noise_rad.array() > 0).all() && star_tracker_noise_rad.allFinite() &&
-                    direction_random_walk_rad_sqrt_s >= 0;
-    for (const double noise : readout_noise_rad) {
-      positive = positive && noise > 0 && noise < 1;
-    }
-    return positive;
+    return (star_tracker_noise_rad.array() > 0).all() && star_tracker_noise_rad.allFinite() &&
+           direction_random_walk_rad_sqrt_s >= 0 &&
+           std::all_of(readout_noise_rad.begin(), readout_noise_rad.end(),
+                       [](double noise) { return noise > 0 && noise < 1; });
   }
 };
 
