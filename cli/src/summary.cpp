@@ -77,8 +77,13 @@ std::string pass_text(const io::LoadedPass& loaded) {
   auto out = std::back_inserter(text);
   fmt::format_to(out, "Pass        {}, {} TAI, {:.1f} min\n", settings.spacecraft, io::format_epoch(settings.epoch),
                  minutes(settings.duration));
-  fmt::format_to(out, "Telemetry   {} samples of {} gyros, {} fixes\n", loaded.pass.gyro.size(), loaded.pass.gyro.gyros,
-                 loaded.pass.star_tracker.size());
+  fmt::format_to(out, "Telemetry   {} samples of {} gyros, {} fixes{}\n", loaded.pass.gyro.size(),
+                 loaded.pass.gyro.gyros, loaded.pass.star_tracker.size(),
+                 loaded.pass.further_star_trackers.empty() ? "" : " of the first star tracker");
+  for (std::size_t i = 0; i < loaded.pass.further_star_trackers.size(); ++i) {
+    fmt::format_to(out, "            {} fixes of star tracker {}\n", loaded.pass.further_star_trackers[i].size(),
+                   i + 2);
+  }
   for (const io::Defect& defect : loaded.defects) {
     fmt::format_to(out, "            {}\n", defect.text());
   }
@@ -194,6 +199,9 @@ nlohmann::ordered_json pass_json(const io::LoadedPass& loaded) {
       {"duration_s", to_seconds(settings.duration)}, {"gyros", loaded.pass.gyro.gyros},
       {"gyro_samples", loaded.pass.gyro.size()},     {"fixes", loaded.pass.star_tracker.size()},
       {"defects", nlohmann::ordered_json::array()}};
+  for (const StarTrackerTelemetry& fixes : loaded.pass.further_star_trackers) {
+    json["fixes_of_further_star_trackers"].push_back(fixes.size());
+  }
   for (const io::Defect& defect : loaded.defects) {
     nlohmann::ordered_json item = {
         {"kind", io::name_of(defect.kind)}, {"where", defect.where}, {"count", defect.count}};

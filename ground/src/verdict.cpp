@@ -169,13 +169,18 @@ void judge_steadiness(const Pass& pass, const CalibrationRun& run, std::vector<F
       "Fly slews about the other axes during the calibration: ten minutes of 10° and more suffice.");
 }
 
-void judge_unused_gyros(const Pass& pass, const CalibrationRun& run, std::vector<Finding>& findings) {
+void judge_unused_sensors(const Pass& pass, const CalibrationRun& run, std::vector<Finding>& findings) {
   const auto used = static_cast<int>(run.calibration.gyros.size());
   if (pass.gyro.gyros > used) {
     add(findings, Severity::kNote, "gyros-not-used",
         fmt::format("Estimator {} works on a pair: gyros beyond the first {} were not used.", run.options.estimator,
                     used),
         fmt::format("{} gyros in the telemetry", pass.gyro.gyros), "None needed; put the pair you want first.");
+  }
+  if (!pass.further_star_trackers.empty()) {
+    add(findings, Severity::kNote, "star-trackers-not-used",
+        fmt::format("Estimator {} works with one star tracker: only the first was used.", run.options.estimator),
+        fmt::format("{} star trackers in the telemetry", 1 + pass.further_star_trackers.size()), "None needed.");
   }
 }
 
@@ -237,7 +242,7 @@ Verdict judge(const Pass& pass, const CalibrationRun& run) {
   judge_determination(run, findings);
   judge_steadiness(pass, run, findings);
   judge_pair(run, findings);
-  judge_unused_gyros(pass, run, findings);
+  judge_unused_sensors(pass, run, findings);
   return verdict_of(std::move(findings));
 }
 

@@ -157,6 +157,14 @@ TEST(Verdict, TellsOfGyrosThatAreNotUsed) {
   EXPECT_TRUE(verdict.trustworthy);
 }
 
+TEST(Verdict, TellsOfStarTrackersThatAreNotUsed) {
+  auto pass = good_pass();
+  pass.further_star_trackers.push_back(pass.star_tracker);
+  const Verdict verdict = judge(pass, good_run());
+  EXPECT_THAT(codes(verdict), ElementsAre("star-trackers-not-used"));
+  EXPECT_TRUE(verdict.trustworthy);
+}
+
 TEST(Verdict, FindsABadlyPlacedPair) {
   auto run = good_run();
   run.calibration.gyros[1].momentum_in = {std::cos(0.5), std::sin(0.5), 0};

@@ -22,19 +22,26 @@ namespace {
 // Names in a directory.
 constexpr const char* kSettingsFile = "pass.toml";
 constexpr const char* kGyroFile = "gyro.csv";
-constexpr const char* kStarTrackerFile = "star_tracker.csv";
 constexpr const char* kTruthFile = "truth.csv";
 constexpr const char* kTruthParametersFile = "truth.json";
 constexpr const char* kPriorFile = "prior.json";
-// Names in a NetCDF file.
+// Names in a NetCDF file; the table of a star tracker is named by star_tracker_name() in both.
 constexpr const char* kGyroGroup = "gyro";
-constexpr const char* kStarTrackerGroup = "star_tracker";
 constexpr const char* kTruthGroup = "truth";
 constexpr const char* kSettingsAttribute = "pass_toml";
 constexpr const char* kPriorAttribute = "prior_json";
 constexpr const char* kTruthAttribute = "truth_json";
 
 const std::vector<std::string> kQuaternionNames = {"q_x", "q_y", "q_z", "q_w"};
+
+/// "star_tracker", "star_tracker_2" …
+std::string star_tracker_name(std::size_t head) {
+  return head == 0 ? "star_tracker" : fmt::format("star_tracker_{}", head + 1);
+}
+
+const StarTrackerTelemetry& star_tracker_of(const Pass& pass, std::size_t head) {
+  return head == 0 ? pass.star_tracker : pass.further_star_trackers[head - 1];
+}
 
 bool is_netcdf_name(const fs::path& path) { return path.extension() == ".nc"; }
 
@@ -52,7 +59,7 @@ void check_there(const fs::path& path) {
 struct RawPass {
   PassSettings settings;
   Series gyro;
-  Series star_tracker;
+  std::vector<Series> star_trackers;  ///< the first head, then the further ones
 };
 
 int gyros_of(const Series& gyro) { return static_cast<int>(gyro.columns.size() / 3); }
@@ -61,9 +68,13 @@ RawPass read_raw_directory(const fs::path& directory) {
   const fs::path settings_file = directory / kSettingsFile;
   const TextFile settings(settings_file);
   Series gyro = read_csv(directory / kGyroFile, gyro_columns);
-  const int gyros = gyros_of(gyro);
-  return {parse_pass_toml(settings.text(), settings_file, directory, gyros), std::move(gyro),
-          read_csv(directory / kStarTrackerFile, star_tracker_columns)};
+  RawPass raw;
+  raw.settings = parse_pass_toml(settings.text(), settings_file, directory, gyros_of(gyro));
+  raw.gyro = std::move(gyro);
+  for (std::size_t head = 0; head <= raw.settings.further_star_trackers.size(); ++head) {
+    raw.star_trackers.push_back(read_csv(directory / (star_tracker_name(head) + ".csv"), star_tracker_columns));
+  }
+  return raw;
 }
 
 std::string required_attribute(const NetcdfReader& reader, const fs::path& file, const char* group, const char* name) {
@@ -81,9 +92,11 @@ RawPass read_raw_netcdf(const fs::path& file) {
   const Time epoch = parse_pass_epoch(settings_text, inside(file, kSettingsAttribute));
   RawPass raw;
   raw.gyro = reader.read_group(kGyroGroup, epoch, gyro_columns);
-  raw.star_tracker = reader.read_group(kStarTrackerGroup, epoch, star_tracker_columns);
   raw.settings =
       parse_pass_toml(settings_text, inside(file, kSettingsAttribute), file.parent_path(), gyros_of(raw.gyro));
+  for (std::size_t head = 0; head <= raw.settings.further_star_trackers.size(); ++head) {
+    raw.star_trackers.push_back(reader.read_group(star_tracker_name(head), epoch, star_tracker_columns));
+  }
   if (const auto prior = reader.text_attribute("", kPriorAttribute)) {
     raw.settings.prior = parse_calibration(*prior, inside(file, kPriorAttribute));
     check_prior(*raw.settings.prior, inside(file, kPriorAttribute), gyros_of(raw.gyro));
@@ -153,13 +166,16 @@ void write_directory(const fs::path& directory, const Pass& pass, const Truth* t
   std::error_code fault;
   try {
     std::vector<AtomicFile> files;
-    const auto add = [&](const char* name, const std::string& text) {
+    const auto add = [&](const std::string& name, const std::string& text) {
       files.emplace_back(directory / name).write(text);
     };
     add(kSettingsFile, format_pass_toml(pass.settings, pass.settings.prior ? kPriorFile : ""));
     add(kGyroFile, csv_text(epoch, direction_names(pass.gyro.gyros), pass.gyro.t, pass.gyro.h, kGyroDecimals));
-    add(kStarTrackerFile, csv_text(epoch, kQuaternionNames, pass.star_tracker.t,
-                                   quaternion_values(pass.star_tracker.q_in_c), kFixDecimals));
+    for (std::size_t head = 0; head <= pass.further_star_trackers.size(); ++head) {
+      const StarTrackerTelemetry& fixes = star_tracker_of(pass, head);
+      add(star_tracker_name(head) + ".csv",
+          csv_text(epoch, kQuaternionNames, fixes.t, quaternion_values(fixes.q_in_c), kFixDecimals));
+    }
     if (pass.settings.prior) {
       add(kPriorFile, format_calibration(*pass.settings.prior));
     }
@@ -220,8 +236,11 @@ void write_netcdf(const fs::path& path, const Pass& pass, const Truth* truth, co
   }
   file.write_group(kGyroGroup, epoch, pass.gyro.t,
                    columns_of(direction_names(pass.gyro.gyros), pass.gyro.h, format.direction_step, true));
-  file.write_group(kStarTrackerGroup, epoch, pass.star_tracker.t,
-                   columns_of(kQuaternionNames, quaternion_values(pass.star_tracker.q_in_c), 0, true));
+  for (std::size_t head = 0; head <= pass.further_star_trackers.size(); ++head) {
+    const StarTrackerTelemetry& fixes = star_tracker_of(pass, head);
+    file.write_group(star_tracker_name(head), epoch, fixes.t,
+                     columns_of(kQuaternionNames, quaternion_values(fixes.q_in_c), 0, true));
+  }
   if (truth != nullptr) {
     file.write_group(kTruthGroup, epoch, truth->t, columns_of(truth_names(*truth), truth_values(*truth), 0, false));
     file.write_attribute(kTruthGroup, kTruthAttribute, format_truth_parameters(*truth));
@@ -261,7 +280,11 @@ LoadedPass read_pass(const fs::path& path) {
   RawPass raw = fs::is_directory(path) ? read_raw_directory(path) : read_raw_netcdf(path);
   LoadedPass loaded;
   loaded.pass.gyro = screen_gyro(std::move(raw.gyro), raw.settings, loaded.defects);
-  loaded.pass.star_tracker = screen_star_tracker(std::move(raw.star_tracker), raw.settings, loaded.defects);
+  for (std::size_t head = 0; head < raw.star_trackers.size(); ++head) {
+    StarTrackerTelemetry& fixes =
+        head == 0 ? loaded.pass.star_tracker : loaded.pass.further_star_trackers.emplace_back();
+    fixes = screen_star_tracker(std::move(raw.star_trackers[head]), raw.settings, loaded.defects);
+  }
   loaded.pass.settings = std::move(raw.settings);
   return loaded;
 }

@@ -20,6 +20,8 @@ namespace fs = std::filesystem;
 
 constexpr double kLongestPass_s = 1e9;  // keeps every time far from the end of int64 nanoseconds
 
+constexpr std::string_view kHeadNoise = "noise_rad";
+constexpr std::string_view kMounting = "mounting_rotation_vector_rad";
 constexpr std::string_view kNoise = "readout_noise_rad";
 constexpr std::string_view kDrift = "drift_prior_rad_s";
 constexpr std::string_view kDriftSigma = "drift_prior_sigma_rad_s";
@@ -89,6 +91,27 @@ void read_prior(const TomlTable& table, const fs::path& file, GyroPrior& prior) 
     prior.alignment_sigma_rad = node->is_array() ? table.three_positive(*node, kAlignmentSigma)
                                                  : Eigen::Vector3d::Constant(table.positive(*node, kAlignmentSigma));
   }
+}
+
+std::vector<FurtherStarTracker> read_further_star_trackers(const TomlTable& table, const fs::path& file) {
+  std::vector<FurtherStarTracker> heads;
+  const toml::node* further = table.find("further");
+  if (further == nullptr) {
+    return heads;
+  }
+  const toml::array* array = further->as_array();
+  if (array == nullptr || !array->is_array_of_tables()) {
+    table.refuse(*further, "\"further\" is not an array of tables",
+                 "begin the part of each further head with [[star_tracker.further]]");
+  }
+  for (const toml::node& element : *array) {
+    const TomlTable head(*element.as_table(), file, fmt::format("[[star_tracker.further]] {}", heads.size() + 1),
+                         {kHeadNoise, kMounting, kAlignmentSigma});
+    heads.push_back({head.three_positive(head.at(kHeadNoise), kHeadNoise),
+                     head.three_numbers(head.at(kMounting), kMounting),
+                     head.positive(head.at(kAlignmentSigma), kAlignmentSigma)});
+  }
+  return heads;
 }
 
 std::vector<GyroPrior> read_gyros(const TomlTable& table, const fs::path& file, int gyros) {
@@ -191,7 +214,8 @@ PassSettings parse_pass_toml(std::string_view text, const fs::path& file, const 
   const TomlTable pass = pass_table(root, file);
   const TomlTable gyro(root.table_at("gyro"), file, "[gyro]",
                        {"period_s", kNoise, kDriftSigma, kAlignmentSigma, "unit"});
-  const TomlTable star_tracker(root.table_at("star_tracker"), file, "[star_tracker]", {"period_s", "noise_rad"});
+  const TomlTable star_tracker(root.table_at("star_tracker"), file, "[star_tracker]",
+                               {"period_s", kHeadNoise, "further"});
 
   PassSettings settings;
   settings.spacecraft = pass.text(pass.at("spacecraft"), "spacecraft");
@@ -203,7 +227,8 @@ PassSettings parse_pass_toml(std::string_view text, const fs::path& file, const 
   }
   settings.gyro_period = period(gyro, "period_s");
   settings.star_tracker_period = period(star_tracker, "period_s");
-  settings.star_tracker_noise_rad = star_tracker.three_positive(star_tracker.at("noise_rad"), "noise_rad");
+  settings.star_tracker_noise_rad = star_tracker.three_positive(star_tracker.at(kHeadNoise), kHeadNoise);
+  settings.further_star_trackers = read_further_star_trackers(star_tracker, file);
   settings.gyros = read_gyros(gyro, file, gyros);
 
   const bool at_root = root.find("prior") != nullptr;
@@ -243,9 +268,15 @@ std::string format_pass_toml(const PassSettings& settings, std::string_view prio
       text += format_unit(gyro, common);
     }
   }
-  return text + fmt::format("\n[star_tracker]\nperiod_s = {}\nnoise_rad = {}  # 1-sigma about c x, y, z\n",
-                            format_seconds(settings.star_tracker_period),
-                            format_three(settings.star_tracker_noise_rad));
+  text += fmt::format("\n[star_tracker]\nperiod_s = {}\n{} = {}  # 1-sigma about c x, y, z\n",
+                      format_seconds(settings.star_tracker_period), kHeadNoise,
+                      format_three(settings.star_tracker_noise_rad));
+  for (const FurtherStarTracker& head : settings.further_star_trackers) {
+    text += fmt::format("\n[[star_tracker.further]]\n{} = {}  # about its own axes\n{} = {}\n{} = {}\n", kHeadNoise,
+                        format_three(head.noise_rad), kMounting, format_three(head.mounting_rotation_vector_rad),
+                        kAlignmentSigma, head.alignment_prior_sigma_rad);
+  }
+  return text;
 }
 
 }  // namespace trihedron::io

@@ -342,11 +342,9 @@ void read_gyros(const toml::table& table, const fs::path& file, Scenario& scenar
   }
 }
 
-Fields star_tracker_fields(Scenario& scenario, const fs::path& file) {
+Fields head_fields(StarTrackerScenario& head, const fs::path& file) {
   using Aberration = StarTrackerScenario::Aberration;
-  StarTrackerScenario& head = scenario.star_tracker;
-  return {quantity("period", scenario.star_tracker_period, parse_duration),
-          three("noise", head.noise_rad, parse_angle_rad),
+  return {three("noise", head.noise_rad, parse_angle_rad),
           quantity("clock_offset", head.clock_offset_s, parse_signed_duration_s),
           quantity("latency", head.latency_s, parse_signed_duration_s),
           three("orbital_sine", head.orbital_sine_rad, parse_angle_rad),
@@ -365,6 +363,29 @@ Fields star_tracker_fields(Scenario& scenario, const fs::path& file) {
           pure("wrong_sign_probability", head.wrong_sign_probability)};
 }
 
+/// What [star_tracker] says of all heads, and [[star_tracker.further]] of each beside the first.
+void read_star_trackers(const toml::table& table, const fs::path& file, Scenario& scenario) {
+  const toml::node* further = table.get("further");
+  if (further != nullptr && (further->as_array() == nullptr || !further->as_array()->is_array_of_tables())) {
+    TomlTable(table, file, "[star_tracker]", {"further"})
+        .refuse(*further, "\"further\" is not an array of tables",
+                "begin the part of each further head with [[star_tracker.further]]");
+  }
+  read_fields(table, file, "[star_tracker]",
+              Fields{quantity("period", scenario.star_tracker_period, parse_duration),
+                     {"further", [](const TomlTable&, const toml::node&) {}}} +
+                  head_fields(scenario.star_tracker, file));
+  for (std::size_t i = 0; further != nullptr && i < further->as_array()->size(); ++i) {
+    StarTrackerScenario head = scenario.star_tracker;
+    read_fields(*(*further->as_array())[i].as_table(), file, fmt::format("[[star_tracker.further]] {}", i + 1),
+                Fields{three("mounting_rotation_vector", head.mounting_rotation_vector_rad, parse_angle_rad),
+                       three("misalignment", head.misalignment_rad, parse_angle_rad),
+                       quantity("alignment_prior_sigma", head.alignment_prior_sigma_rad, parse_angle_rad)} +
+                    head_fields(head, file));
+    scenario.further_star_trackers.push_back(head);
+  }
+}
+
 }  // namespace
 
 Scenario parse_scenario(std::string_view text, const fs::path& file) {
@@ -378,7 +399,9 @@ Scenario parse_scenario(std::string_view text, const fs::path& file) {
                        [&] { return attitude_fields(scenario.attitude, file, scenario.epoch); }),
                {"gyro", [&](const TomlTable& table,
                             const toml::node& node) { read_gyros(table.as_table(node, "gyro"), file, scenario); }},
-               section("star_tracker", file, "[star_tracker]", [&] { return star_tracker_fields(scenario, file); })});
+               {"star_tracker", [&](const TomlTable& table, const toml::node& node) {
+                  read_star_trackers(table.as_table(node, "star_tracker"), file, scenario);
+                }}});
   return scenario;
 }
 

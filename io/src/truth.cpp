@@ -71,22 +71,59 @@ Json gyro_json(const Truth::Gyro& gyro) {
           {"unmodelled_rad_s", values}};
 }
 
+Truth::StarTracker parse_truth_of_star_tracker(const JsonNode& node) {
+  return {node.at("clock_offset_s").number(), node.at("orbital_sine_rad").vector3(),
+          node.at("orbital_cosine_rad").vector3(), node.at("misalignment_rad").vector3()};
+}
+
+Json star_tracker_json(const Truth::StarTracker& head) {
+  return {{"clock_offset_s", head.clock_offset_s},
+          {"orbital_sine_rad", to_json_array(head.orbital_sine_rad)},
+          {"orbital_cosine_rad", to_json_array(head.orbital_cosine_rad)},
+          {"misalignment_rad", to_json_array(head.misalignment_rad)}};
+}
+
+/// The items of a JSON array, one per line.
+std::string lines_of(const std::vector<Json>& items) {
+  std::string lines;
+  for (const Json& item : items) {
+    lines += fmt::format("{}\n  {}", lines.empty() ? "" : ",", dump(item));
+  }
+  return lines;
+}
+
 }  // namespace
 
 std::string format_truth_parameters(const Truth& truth) {
-  std::string gyros;
+  std::vector<Json> gyros;
   for (const Truth::Gyro& gyro : truth.gyros) {
-    gyros += fmt::format("{}\n  {}", gyros.empty() ? "" : ",", dump(gyro_json(gyro)));
+    gyros.push_back(gyro_json(gyro));
   }
-  return fmt::format("{{\n \"convention\": \"{}\",\n \"gyros\": [{}\n ]\n}}\n", kConvention, gyros);
+  std::vector<Json> heads;
+  for (const Truth::StarTracker& head : truth.star_trackers) {
+    heads.push_back(star_tracker_json(head));
+  }
+  return fmt::format(
+      "{{\n \"convention\": \"{}\",\n \"orbital_rate_rad_s\": {},\n \"gyros\": [{}\n ],\n \"star_trackers\": [{}\n "
+      "]\n}}\n",
+      kConvention, dump(Json(truth.orbital_rate_rad_s)), lines_of(gyros), lines_of(heads));
 }
 
 Truth make_truth(std::string_view json, const std::filesystem::path& json_file, const Series& series, Time epoch) {
   const Json document = parse_json(json, json_file);
-  const JsonNode gyros = JsonNode(document, json_file).at("gyros");
+  const JsonNode root(document, json_file);
+  const JsonNode gyros = root.at("gyros");
   Truth truth;
   for (const JsonNode& gyro : gyros.elements()) {
     truth.gyros.push_back(parse_truth_of_gyro(gyro));
+  }
+  if (const auto rate = root.find("orbital_rate_rad_s")) {
+    truth.orbital_rate_rad_s = rate->number();
+  }
+  if (const auto heads = root.find("star_trackers")) {
+    for (const JsonNode& head : heads->elements()) {
+      truth.star_trackers.push_back(parse_truth_of_star_tracker(head));
+    }
   }
   const std::size_t width = series.columns.size();
   if (const std::size_t in_table = (width - 4) / 3; truth.gyros.size() != in_table) {

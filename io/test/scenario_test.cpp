@@ -23,6 +23,28 @@ TEST(ScenarioToml, EmptyFileIsThePapersExperiment) {
   EXPECT_DOUBLE_EQ(scenario.star_tracker.noise_rad.z(), 20 * kArcsecond);
 }
 
+TEST(ScenarioToml, FurtherStarTrackerIsAsTheFirstInWhatItDoesNotSay) {
+  const Scenario scenario = parse(R"(
+[star_tracker]
+clock_offset = "5ms"
+max_rate = "1deg/s"
+[[star_tracker.further]]
+mounting_rotation_vector = ["90deg", "0deg", "0deg"]
+misalignment = ["1arcmin", "0deg", "0deg"]
+clock_offset = "7ms"
+)");
+  ASSERT_EQ(scenario.further_star_trackers.size(), 1U);
+  const StarTrackerScenario& head = scenario.further_star_trackers[0];
+  EXPECT_EQ(head.clock_offset_s, 7e-3);
+  EXPECT_EQ(head.max_rate_rad_s, kDegree);
+  EXPECT_EQ(head.mounting_rotation_vector_rad.x(), 90 * kDegree);
+  EXPECT_EQ(head.misalignment_rad.x(), kArcminute);
+  EXPECT_EQ(scenario.star_tracker.clock_offset_s, 5e-3);
+  EXPECT_TRUE(scenario.star_tracker.mounting_rotation_vector_rad.isZero(0));
+  EXPECT_THAT(why_refused("[star_tracker]\nfurther = 1"), HasSubstr("begin the part of each further head with"));
+  EXPECT_THAT(why_refused("[star_tracker]\nmisalignment = [\"1deg\", \"0deg\", \"0deg\"]"), HasSubstr("misalignment"));
+}
+
 TEST(ScenarioToml, ValuesGoWhereTheirNamesSay) {
   const Scenario scenario = parse(R"(
 [scenario]

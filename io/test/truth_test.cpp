@@ -38,6 +38,8 @@ TEST_F(TruthFiles, AreRead) {
   EXPECT_EQ(truth->t[1] - truth->t[0], std::chrono::seconds(3));
   EXPECT_EQ(truth->q_in_c[1].z(), 0.6);
   EXPECT_EQ(truth->h_in[11], 0.8);
+  EXPECT_EQ(truth->orbital_rate_rad_s, 1e-3);
+  EXPECT_TRUE(truth->star_trackers.empty());
 }
 
 TEST_F(TruthFiles, AbsenceIsNoError) {
@@ -93,6 +95,14 @@ TEST_F(TruthFiles, ComeBackFromBothFormats) {
       EXPECT_EQ(back->gyros[i].drift_rad_s, truth.gyros[i].drift_rad_s);
       EXPECT_EQ(back->gyros[i].unmodelled_rad_s, truth.gyros[i].unmodelled_rad_s);
       EXPECT_EQ(back->gyros[i].alignment_rotation_vector_rad, truth.gyros[i].alignment_rotation_vector_rad);
+    }
+    EXPECT_EQ(back->orbital_rate_rad_s, truth.orbital_rate_rad_s);
+    ASSERT_EQ(back->star_trackers.size(), truth.star_trackers.size());
+    for (std::size_t i = 0; i < truth.star_trackers.size(); ++i) {
+      EXPECT_EQ(back->star_trackers[i].clock_offset_s, truth.star_trackers[i].clock_offset_s);
+      EXPECT_EQ(back->star_trackers[i].orbital_sine_rad, truth.star_trackers[i].orbital_sine_rad);
+      EXPECT_EQ(back->star_trackers[i].orbital_cosine_rad, truth.star_trackers[i].orbital_cosine_rad);
+      EXPECT_EQ(back->star_trackers[i].misalignment_rad, truth.star_trackers[i].misalignment_rad);
     }
     EXPECT_EQ(back->h_in, truth.h_in);
     for (std::size_t i = 0; i < truth.t.size(); ++i) {

@@ -1,5 +1,6 @@
 #include "trihedron/sim/simulate.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <stdexcept>
 #include <string>
@@ -42,15 +43,16 @@ void check(const GyroScenario& gyro, const std::string& name) {
   require(is_probability(readout.stuck_probability), name + ".readout.stuck_probability must be 0 … 1");
 }
 
-void check(const StarTrackerScenario& head) {
-  require((head.noise_rad.array() >= 0).all(), "star_tracker.noise_rad must not be negative");
-  require((head.field_error_rad.array() >= 0).all(), "star_tracker.field_error_rad must not be negative");
-  require(head.field_correlation_rad > 0, "star_tracker.field_correlation_rad must be positive");
-  require(std::isfinite(head.clock_offset_s), "star_tracker.clock_offset_s must be finite");
-  require(std::isfinite(head.latency_s), "star_tracker.latency_s must be finite");
-  require(is_probability(head.dropout_probability), "star_tracker.dropout_probability must be 0 … 1");
-  require(is_probability(head.outlier_probability), "star_tracker.outlier_probability must be 0 … 1");
-  require(is_probability(head.wrong_sign_probability), "star_tracker.wrong_sign_probability must be 0 … 1");
+void check(const StarTrackerScenario& head, const std::string& name) {
+  require((head.noise_rad.array() >= 0).all(), name + ".noise_rad must not be negative");
+  require((head.field_error_rad.array() >= 0).all(), name + ".field_error_rad must not be negative");
+  require(head.field_correlation_rad > 0, name + ".field_correlation_rad must be positive");
+  require(std::isfinite(head.clock_offset_s), name + ".clock_offset_s must be finite");
+  require(std::isfinite(head.latency_s), name + ".latency_s must be finite");
+  require(is_probability(head.dropout_probability), name + ".dropout_probability must be 0 … 1");
+  require(is_probability(head.outlier_probability), name + ".outlier_probability must be 0 … 1");
+  require(is_probability(head.wrong_sign_probability), name + ".wrong_sign_probability must be 0 … 1");
+  require(head.alignment_prior_sigma_rad > 0, name + ".alignment_prior_sigma_rad must be positive");
 }
 
 void check(const Scenario& scenario) {
@@ -64,7 +66,13 @@ void check(const Scenario& scenario) {
     check(scenario.gyros[i], "gyros[" + std::to_string(i) + "]");
   }
   require(scenario.attitude.jitter_rad >= 0, "attitude.jitter_rad must not be negative");
-  check(scenario.star_tracker);
+  check(scenario.star_tracker, "star_tracker");
+  require(
+      scenario.star_tracker.mounting_rotation_vector_rad.isZero(0) && scenario.star_tracker.misalignment_rad.isZero(0),
+      "the axes of the first star tracker are c: it has no mounting and no misalignment");
+  for (std::size_t i = 0; i < scenario.further_star_trackers.size(); ++i) {
+    check(scenario.further_star_trackers[i], "further_star_trackers[" + std::to_string(i) + "]");
+  }
 }
 
 PassSettings settings(const Scenario& scenario) {
@@ -75,6 +83,10 @@ PassSettings settings(const Scenario& scenario) {
   settings.gyro_period = scenario.gyro_period;
   settings.star_tracker_period = scenario.star_tracker_period;
   settings.star_tracker_noise_rad = scenario.star_tracker.noise_rad;
+  for (const StarTrackerScenario& head : scenario.further_star_trackers) {
+    settings.further_star_trackers.push_back(
+        {head.noise_rad, head.mounting_rotation_vector_rad, head.alignment_prior_sigma_rad});
+  }
   for (const GyroScenario& gyro : scenario.gyros) {
     GyroPrior prior;
     prior.readout_noise_rad = gyro.readout.noise_rad;
@@ -100,15 +112,23 @@ void record_truth(Time t, const Rot<In, C>& C_in_c, const std::vector<Gyro>& gyr
   }
 }
 
+Truth::StarTracker truth_of(const StarTrackerScenario& head) {
+  return {head.clock_offset_s - head.latency_s, head.orbital_sine_rad, head.orbital_cosine_rad, head.misalignment_rad};
+}
+
 }  // namespace
 
 SimulatedPass simulate(const Scenario& scenario) {
   check(scenario);
   const double duration_s = to_seconds(scenario.duration);
   const double step_s = to_seconds(scenario.gyro_period);
+  std::vector<StarTrackerScenario> heads{scenario.star_tracker};
+  heads.insert(heads.end(), scenario.further_star_trackers.begin(), scenario.further_star_trackers.end());
   // Fixes look at C(t + offset), and their rate a little to both sides.
-  const double margin_s =
-      std::abs(scenario.star_tracker.clock_offset_s) + std::abs(scenario.star_tracker.latency_s) + 0.1;
+  double margin_s = 0;
+  for (const StarTrackerScenario& head : heads) {
+    margin_s = std::max(margin_s, std::abs(head.clock_offset_s) + std::abs(head.latency_s) + 0.1);
+  }
 
   const KeplerJ2 orbit(scenario.orbit);
   const AttitudeProgramme attitude(scenario.attitude, orbit, scenario.seed, -margin_s, duration_s + margin_s);
@@ -159,9 +179,13 @@ SimulatedPass simulate(const Scenario& scenario) {
   }
 
   const Sky sky(scenario.epoch, -margin_s, duration_s + margin_s);
-  result.pass.star_tracker =
-      simulate_fixes(scenario.star_tracker, {attitude, orbit, sky}, scenario.epoch, scenario.duration,
-                     scenario.star_tracker_period, scenario.seed, result.events);
+  for (std::size_t i = 0; i < heads.size(); ++i) {
+    StarTrackerTelemetry& fixes = i == 0 ? result.pass.star_tracker : result.pass.further_star_trackers.emplace_back();
+    fixes = simulate_fixes(heads[i], {attitude, orbit, sky}, scenario.epoch, scenario.duration,
+                           scenario.star_tracker_period, scenario.seed, result.events, static_cast<int>(i));
+    result.truth.star_trackers.push_back(truth_of(heads[i]));
+  }
+  result.truth.orbital_rate_rad_s = orbit.mean_rate_rad_s();
   return result;
 }
 

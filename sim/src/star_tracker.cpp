@@ -33,12 +33,13 @@ class FieldError {
 };
 
 /// What of the attitude and the sky keeps the head from a fix now, if anything.
-std::optional<Fault> obstacle(const StarTrackerScenario& head, const StarTrackerView& view, double t_s) {
+std::optional<Fault> obstacle(const StarTrackerScenario& head, const StarTrackerView& view, const Rot<C, Head>& C_c_s,
+                              double t_s) {
   if (std::isfinite(head.max_rate_rad_s) && !(view.attitude.rate(t_s).norm() <= head.max_rate_rad_s)) {
     return Fault::kFixTooFast;
   }
   if (head.sun_exclusion_rad || head.earth_exclusion_rad) {
-    const Vector3d boresight = view.attitude.at(t_s).raw().col(2);
+    const Vector3d boresight = (view.attitude.at(t_s) * C_c_s).raw().col(2);
     const Vector3d from_earth = view.ephemeris.at(t_s).position_m.raw();
     if (head.sun_exclusion_rad &&
         angle_between<double>(boresight, view.sky.at(t_s).sun_m.raw() - from_earth) < *head.sun_exclusion_rad) {
@@ -55,25 +56,29 @@ std::optional<Fault> obstacle(const StarTrackerScenario& head, const StarTracker
 
 }  // namespace
 
-Vec<C> aberration_error(const Rot<In, C>& C_in_c, const Vec<In>& velocity_m_s) {
-  Vector3d star = C_in_c.raw().col(2);
+Vec<Head> aberration_error(const Rot<In, Head>& C_in_s, const Vec<In>& velocity_m_s) {
+  Vector3d star = C_in_s.raw().col(2);
   Vector3d beta = velocity_m_s.raw() / ERFA_CMPS;
   Vector3d seen;
   // The Sun's potential moves a star by 0.4 mas at most: left out by a distance of 1e9 au.
   eraAb(star.data(), beta.data(), 1e9, std::sqrt(1 - beta.squaredNorm()), seen.data());
   // The head reports the attitude in which its catalogue would look like this: turned against the stars' displacement.
-  return C_in_c.inverse() * Vec<In>::assume(-star.cross(seen));
+  return C_in_s.inverse() * Vec<In>::assume(-star.cross(seen));
 }
 
 StarTrackerTelemetry simulate_fixes(const StarTrackerScenario& head, const StarTrackerView& view, Time epoch,
                                     Duration duration, Duration period, std::uint64_t seed, std::vector<Event>& events,
-                                    std::uint64_t head_index) {
+                                    int head_number) {
+  const auto head_index = static_cast<std::uint64_t>(head_number);
+  const auto tell = [&](Time t, Fault fault) { events.push_back({t, fault, -1, head_number}); };
   Stream noise(seed, Source::kTrackerNoise, head_index);
   Stream dropout(seed, Source::kTrackerDropout, head_index);
   Stream outlier(seed, Source::kTrackerOutlier, head_index);
   Stream sign(seed, Source::kTrackerSign, head_index);
   FieldError field(head, Stream(seed, Source::kTrackerField, head_index));
   const double n = view.ephemeris.mean_rate_rad_s();
+  const auto C_c_s_designed = Rot<C, Head>::exp(Vec<C>::assume(head.mounting_rotation_vector_rad));
+  const Rot<C, Head> C_c_s = Rot<C, C>::exp(Vec<C>::assume(head.misalignment_rad)) * C_c_s_designed;
 
   StarTrackerTelemetry fixes;
   Quaterniond previous = Quaterniond::Identity();
@@ -95,35 +100,35 @@ StarTrackerTelemetry simulate_fixes(const StarTrackerScenario& head, const StarT
     const bool is_dropped = dropout.happens(head.dropout_probability);
 
     if (within(head.outages, since)) {
-      events.push_back({t, Fault::kFixOutage});
+      tell(t, Fault::kFixOutage);
       continue;
     }
-    if (const std::optional<Fault> why = obstacle(head, view, t_s)) {
-      events.push_back({t, *why});
+    if (const std::optional<Fault> why = obstacle(head, view, C_c_s, t_s)) {
+      tell(t, *why);
       continue;
     }
     if (is_dropped) {
-      events.push_back({t, Fault::kFixDropout});
+      tell(t, Fault::kFixDropout);
       continue;
     }
 
-    const Rot<In, C> truth = view.attitude.at(t_s);
+    const Rot<In, Head> truth = view.attitude.at(t_s) * C_c_s;
     if (head.aberration == StarTrackerScenario::Aberration::kUncorrected) {
       error += aberration_error(truth, view.ephemeris.at(t_s).velocity_m_s + view.sky.at(t_s).earth_velocity_m_s).raw();
     }
-    Rot<In, C> measured = truth * Rot<C, C>::exp(Vec<C>::assume(error));
+    Rot<In, Head> measured = truth * Rot<Head, Head>::exp(Vec<Head>::assume(error));
     if (is_outlier) {
-      measured = measured * Rot<C, C>::exp(Vec<C>::assume(gross));
-      events.push_back({t, Fault::kFixOutlier});
+      measured = measured * Rot<Head, Head>::exp(Vec<Head>::assume(gross));
+      tell(t, Fault::kFixOutlier);
     }
-    Quaterniond q = measured.quaternion();
+    Quaterniond q = (measured * C_c_s_designed.inverse()).quaternion();
     if (q.dot(previous) < 0) {
       q.coeffs() = -q.coeffs();
     }
     previous = q;
     if (is_wrong_sign) {
       q.coeffs() = -q.coeffs();
-      events.push_back({t, Fault::kFixWrongSign});
+      tell(t, Fault::kFixWrongSign);
     }
     fixes.t.push_back(t);
     fixes.q_in_c.push_back(q);

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
 #include "statistics.hpp"
 
@@ -104,6 +105,40 @@ TEST_F(StarTracker, NoiseHasItsSigmaAboutEachAxisAndIsWhite) {
                   test::kBand * test::allan_variance_sigma(kFixes / m));
     }
   }
+}
+
+TEST_F(StarTracker, NoiseOfAFurtherHeadIsAboutItsOwnAxesAndIndependent) {
+  StarTrackerScenario head;
+  head.mounting_rotation_vector_rad = {std::numbers::pi / 2, 0, 0};  // its boresight along −c_y
+  head.misalignment_rad = {1e-3, -2e-3, 3e-3};
+  const std::vector<Vector3d> first = errors(fixes({}));
+  const auto second = simulate_fixes(head, {attitude_, orbit_, sky_}, kEpoch, kDuration, kPeriod, 7, events_, 1);
+  std::vector<Vector3d> e;
+  for (std::size_t i = 0; i < second.size(); ++i) {
+    const Rot<In, C> expected = attitude_.at(t_s(second.t[i])) * Rot<C, C>::exp(Vec<C>::assume(head.misalignment_rad));
+    e.push_back((expected.inverse() * Rot<In, C>::assume(second.q_in_c[i])).log().raw());
+  }
+  const Vector3d sigma(head.noise_rad.x(), head.noise_rad.z(), head.noise_rad.y());
+  for (Eigen::Index axis = 0; axis < 3; ++axis) {
+    const Sequence x = component(e, axis);
+    EXPECT_NEAR(test::mean_square(x) / std::pow(sigma(axis), 2), 1, test::kBand * test::mean_square_sigma(kFixes));
+    EXPECT_NEAR(test::correlation(x, component(first, axis)), 0, test::kBand * test::correlation_sigma(kFixes));
+  }
+}
+
+TEST_F(InertialStarTracker, ExclusionAnglesOfAFurtherHeadAreFromItsOwnBoresight) {
+  StarTrackerScenario head = perfect();
+  head.earth_exclusion_rad = 20 * kDegree;
+  const std::size_t of_the_first = fixes(head).size();
+  head.mounting_rotation_vector_rad = {std::numbers::pi, 0,
+                                       0};  // the other way: sees the Earth when the first does not
+  const auto second = simulate_fixes(head, {attitude_, orbit_, sky_}, kEpoch, kDuration, kPeriod, 7, events_, 1);
+  EXPECT_GT(of_the_first, kFixes / 4);
+  EXPECT_LT(of_the_first, kFixes);
+  EXPECT_GT(of_the_first + second.size(), kFixes / 2);
+  EXPECT_LT(second.size(), kFixes);
+  EXPECT_NE(second.size(), of_the_first);
+  EXPECT_EQ(events_.back().head, 1);
 }
 
 TEST_F(StarTracker, NoiseOfSeedsIsIndependent) {

@@ -23,13 +23,22 @@ struct GyroPrior {
   Eigen::Vector3d alignment_sigma_rad{0, 0, 0};
 };
 
+/// A star-tracker head beside the first. The first head's axes are c; the axes s of this one are turned from them:
+/// C_c_s = exp([m×]) exp([mounting×]), m unknown. It is telemetered as q_in_c, C_in_s exp([mounting×])ᵀ.
+struct FurtherStarTracker {
+  Eigen::Vector3d noise_rad{0, 0, 0};  ///< 1-sigma about s x, y, z
+  Eigen::Vector3d mounting_rotation_vector_rad{0, 0, 0};
+  double alignment_prior_sigma_rad = 0;  ///< of m, per axis
+};
+
 struct PassSettings {
   std::string spacecraft;
   Time epoch{};
   Duration duration{};
   Duration gyro_period{};
   Duration star_tracker_period{};
-  Eigen::Vector3d star_tracker_noise_rad{0, 0, 0};  ///< 1-sigma about c x, y, z
+  Eigen::Vector3d star_tracker_noise_rad{0, 0, 0};  ///< of the first head, 1-sigma about c x, y, z
+  std::vector<FurtherStarTracker> further_star_trackers;
   std::vector<GyroPrior> gyros;
   std::optional<Calibration>
       prior;  ///< an earlier calibration: replaces drift and alignment of `gyros`, with its covariance
@@ -59,7 +68,8 @@ struct StarTrackerTelemetry {
 struct Pass {
   PassSettings settings;
   GyroTelemetry gyro;
-  StarTrackerTelemetry star_tracker;
+  StarTrackerTelemetry star_tracker;                        ///< of the first head
+  std::vector<StarTrackerTelemetry> further_star_trackers;  ///< as in PassSettings
 };
 
 /// What a simulator knows. Never part of a Pass, so that no estimator can read it.
@@ -69,7 +79,16 @@ struct Truth {
     std::vector<std::pair<std::string, double>> unmodelled_rad_s;  ///< drift outside eq. (1), by name
     Eigen::Vector3d alignment_rotation_vector_rad{0, 0, 0};
   };
+  /// Errors of a head that do not change at random; C_c_s as in FurtherStarTracker.
+  struct StarTracker {
+    double clock_offset_s = 0;                  ///< a fix stamped t holds the attitude at t + offset
+    Eigen::Vector3d orbital_sine_rad{0, 0, 0};  ///< of the error p_s sin nt + p_c cos nt, head axes
+    Eigen::Vector3d orbital_cosine_rad{0, 0, 0};
+    Eigen::Vector3d misalignment_rad{0, 0, 0};  ///< m, c axes
+  };
   std::vector<Gyro> gyros;
+  std::vector<StarTracker> star_trackers;  ///< empty where the simulator did not tell
+  double orbital_rate_rad_s = 0;           ///< n; 0 where the simulator did not tell
   std::vector<Time> t;
   std::vector<Eigen::Quaterniond> q_in_c;
   std::vector<double> h_in;  ///< sample-major: h_in[(sample * gyros + gyro) * 3 + axis]

@@ -136,10 +136,15 @@ struct GyroScenario {
   ReadoutScenario readout{};
 };
 
-/// A star-tracker head. A fix stamped t holds C_in_c(t + clock_offset − latency) exp([e×]), e in c axes the sum of the
-/// errors below.
+/// A star-tracker head with axes s; those of the first are c. A fix stamped t holds C_in_s(t + clock_offset − latency)
+/// exp([e×]), e in s axes the sum of the errors below, and is given as q_in_c by the mounting as designed.
 struct StarTrackerScenario {
-  Eigen::Vector3d noise_rad{3 * kArcsecond, 3 * kArcsecond, 20 * kArcsecond};  ///< white, about c x, y, z
+  // Of further heads only: C_c_s = exp([misalignment×]) exp([mounting×]).
+  Eigen::Vector3d mounting_rotation_vector_rad{0, 0, 0};
+  Eigen::Vector3d misalignment_rad{0, 0, 0};      ///< c axes
+  double alignment_prior_sigma_rad = kArcminute;  ///< what the estimator is told of it, per axis
+
+  Eigen::Vector3d noise_rad{3 * kArcsecond, 3 * kArcsecond, 20 * kArcsecond};  ///< white, about s x, y, z
   double clock_offset_s = 0;
   double latency_s = 0;
 
@@ -181,7 +186,8 @@ struct Scenario {
   OrbitScenario orbit{};
   AttitudeScenario attitude{};
   std::vector<GyroScenario> gyros{GyroScenario{}, GyroScenario{.start_direction_c = {0.14, 0.985, 0.094}}};
-  StarTrackerScenario star_tracker{};
+  StarTrackerScenario star_tracker{};  ///< the first head
+  std::vector<StarTrackerScenario> further_star_trackers{};
 };
 
 }  // namespace trihedron

@@ -24,6 +24,7 @@ struct Event {
   Time t{};
   Fault fault{};
   int gyro = -1;  ///< from 0; −1 where it concerns no single gyro
+  int head = -1;  ///< of the star tracker, from 0; −1 where it concerns none
 };
 
 }  // namespace trihedron::sim

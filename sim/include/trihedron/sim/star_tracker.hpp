@@ -12,6 +12,9 @@
 
 namespace trihedron::sim {
 
+/// Axes s of the head at hand, whichever its number; c for the first.
+struct Head {};
+
 /// Everything outside the head that a fix depends on.
 struct StarTrackerView {
   const AttitudeProgramme& attitude;
@@ -23,10 +26,10 @@ struct StarTrackerView {
 /// Signs of q follow on from one fix to the next, but for the wrong ones.
 [[nodiscard]] StarTrackerTelemetry simulate_fixes(const StarTrackerScenario& head, const StarTrackerView& view,
                                                   Time epoch, Duration duration, Duration period, std::uint64_t seed,
-                                                  std::vector<Event>& events, std::uint64_t head_index = 0);
+                                                  std::vector<Event>& events, int head_number = 0);
 
-/// The small rotation e of a fix C_in_c exp([e×]) that takes the stars where aberration shows them: first and higher
+/// The small rotation e of a fix C_in_s exp([e×]) that takes the stars where aberration shows them: first and higher
 /// orders of the velocity, as they move the boresight. velocity_m_s: of the spacecraft in the solar system.
-[[nodiscard]] Vec<C> aberration_error(const Rot<In, C>& C_in_c, const Vec<In>& velocity_m_s);
+[[nodiscard]] Vec<Head> aberration_error(const Rot<In, Head>& C_in_s, const Vec<In>& velocity_m_s);
 
 }  // namespace trihedron::sim
