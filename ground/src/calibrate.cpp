@@ -4,10 +4,12 @@
 
 #include <algorithm>
 #include <boost/math/distributions/chi_squared.hpp>
+#include <chrono>
 #include <cmath>
 #include <memory>
 #include <utility>
 
+#include "gyro_model.hpp"
 #include "trihedron/core/drift.hpp"
 #include "trihedron/core/paper_estimator.hpp"
 #include "trihedron/ground/replay.hpp"
@@ -15,6 +17,9 @@
 
 namespace trihedron::ground {
 namespace {
+
+/// Between the paper's corrections.
+constexpr Duration kWatchedCorrections = std::chrono::minutes(90);
 
 template <class Model>
 std::vector<std::string> state_names(int gyros) {
@@ -83,15 +88,12 @@ void use_calibration(const Calibration& prior, typename Estimator::Setup& setup)
   }
   for (int k = 0; k < Estimator::kGyros; ++k) {
     const GyroCalibration& gyro = prior.gyros[static_cast<std::size_t>(k)];
-    if (gyro.drift_model != Model::kModelName || gyro.drift_rad_s.size() != Model::kSize) {
+    if (!is_of_model<Model>(gyro)) {
       throw SetupError(fmt::format("the earlier calibration of gyro {} is of drift model '{}', not {}", k + 1,
                                    gyro.drift_model, Model::kModelName),
                        "use a calibration made with the same drift model");
     }
-    for (std::size_t i = 0; i < Model::kSize; ++i) {
-      setup.prior[k].drift_rad_s(static_cast<Eigen::Index>(i)) = gyro.drift_rad_s[i].second;
-    }
-    setup.prior[k].C_c_b = Rot<C, B<1>>::exp(Vec<C>::assume(gyro.alignment_rotation_vector_rad)).raw();
+    setup.prior[k] = to_model<Model>(gyro);
   }
 }
 
@@ -304,20 +306,29 @@ Calibration result_of(const Pass& pass, const Cycle<Estimator>& cycle) {
   result.epoch = pass.settings.epoch;
   result.t = cycle.t();
   for (const auto& gyro : cycle.estimator().gyros()) {
-    GyroCalibration out;
-    out.drift_model = Model::kModelName;
-    for (std::size_t i = 0; i < Model::kSize; ++i) {
-      out.drift_rad_s.emplace_back(Model::kNames[i], gyro.drift_rad_s(static_cast<Eigen::Index>(i)));
-    }
-    out.alignment_rotation_vector_rad = Rot<C, B<1>>::assume(gyro.C_c_b).log().raw();
-    out.momentum_in = gyro.h_in;
-    result.gyros.push_back(out);
+    result.gyros.push_back(to_record(gyro));
   }
   result.states = state_names<Model>(Estimator::kGyros);
   const Eigen::MatrixXd root =
       cycle.estimator().error_root().bottomRows(static_cast<Eigen::Index>(result.states.size()));
   result.covariance = root * root.transpose();
   return result;
+}
+
+template <class Estimator>
+Correction correction_of(const Estimator& estimator, const AttitudeSolution& attitude, Time t) {
+  Correction correction;
+  correction.t = t;
+  const Eigen::Matrix3d& C_in_c = attitude.C_in_c.raw();
+  for (int k = 0; k < Estimator::kGyros; ++k) {
+    const auto& calibrated = estimator.gyros()[k];
+    auto before = estimator.setup().prior[k];
+    // Where the momentum is in the case, seen through the alignment known before.
+    before.h_in = C_in_c * (before.C_c_b * (calibrated.C_c_b.transpose() * (C_in_c.transpose() * calibrated.h_in)));
+    correction.known_before.push_back(to_record(before));
+    correction.calibrated.push_back(to_record(calibrated));
+  }
+  return correction;
 }
 
 template <class Estimator>
@@ -339,6 +350,10 @@ CalibrationRun calibrate_with(const Pass& pass, const CalibrationOptions& option
       for (Eigen::Index row = Estimator::Errors::kDirections; row < root.rows(); ++row) {
         sigma.push_back(root.row(row).norm());
       }
+    }
+    if (report.fix.used() && report.calibrated &&
+        (run.corrections.empty() || report.fix.t - run.corrections.back().t >= kWatchedCorrections)) {
+      run.corrections.push_back(correction_of(cycle->estimator(), *report.calibrated, report.fix.t));
     }
     if (report.calibrated) {
       append(run.attitude, report.fix.t, *report.calibrated);
@@ -420,6 +435,20 @@ auto with_estimator(const CalibrationOptions& options, Body&& body) {
 }
 
 }  // namespace
+
+StarTrackerTelemetry used_fixes(const Pass& pass, const std::vector<FixRecord>& fixes) {
+  StarTrackerTelemetry used;
+  auto record = fixes.begin();
+  for (std::size_t i = 0; i < pass.star_tracker.size(); ++i) {
+    const Time t = pass.star_tracker.t[i];
+    record = std::find_if(record, fixes.end(), [&](const FixRecord& r) { return r.t >= t; });
+    if (record != fixes.end() && record->t == t && record->used()) {
+      used.t.push_back(t);
+      used.q_in_c.push_back(pass.star_tracker.q_in_c[i]);
+    }
+  }
+  return used;
+}
 
 CalibrationRun calibrate(const Pass& pass, const CalibrationOptions& options, const Progress& progress) {
   return with_estimator(options, [&]<class Estimator>() { return calibrate_with<Estimator>(pass, options, progress); });

@@ -14,6 +14,7 @@
 
 #include "trihedron/core/frames.hpp"
 #include "trihedron/core/telemetry.hpp"
+#include "trihedron/ground/convergence.hpp"
 
 namespace trihedron::ground {
 namespace {
@@ -124,12 +125,9 @@ void judge_nis(const Statistics& statistics, const std::string& what_is_wrong, s
 }
 
 void judge_determination(const CalibrationRun& run, std::vector<Finding>& findings) {
-  // The first fix tells nothing of the parameters: its sigmas are those of the prior.
   std::string names;
   for (std::size_t i = 0; i < run.calibration.states.size(); ++i) {
-    const auto row = static_cast<Eigen::Index>(i);
-    const double sigma = std::sqrt(run.calibration.covariance(row, row));
-    if (sigma > 0.5 * run.parameters.sigma.front()[i]) {
+    if (!is_determined(run, i)) {
       names += (names.empty() ? "" : ", ") + run.calibration.states[i];
     }
   }
@@ -142,16 +140,7 @@ void judge_determination(const CalibrationRun& run, std::vector<Finding>& findin
 
 void judge_steadiness(const Pass& pass, const CalibrationRun& run, std::vector<Finding>& findings) {
   // Outliers would seem to move a steady axis.
-  StarTrackerTelemetry used;
-  auto record = run.fixes.begin();
-  for (std::size_t i = 0; i < pass.star_tracker.size(); ++i) {
-    const Time t = pass.star_tracker.t[i];
-    record = std::find_if(record, run.fixes.end(), [&](const FixRecord& r) { return r.t >= t; });
-    if (record != run.fixes.end() && record->t == t && record->used()) {
-      used.t.push_back(t);
-      used.q_in_c.push_back(pass.star_tracker.q_in_c[i]);
-    }
-  }
+  const StarTrackerTelemetry used = used_fixes(pass, run.fixes);
   const Eigen::Vector3d& noise = pass.settings.star_tracker_noise_rad;
   const auto observability = alignment_observability(used, noise, noise.minCoeff());
   if (observability.sigma_rad <= kWeakAlignment_rad) {

@@ -16,12 +16,15 @@ namespace {
 
 using testing::HasSubstr;
 
-/// Two hours of the paper's experiment.
+/// Two hours of the paper's experiment, all drift in the model.
 const sim::SimulatedPass& two_hours() {
   static const sim::SimulatedPass simulated = [] {
     Scenario scenario;
     scenario.seed = 5;
     scenario.duration = std::chrono::hours(2);
+    for (GyroScenario& gyro : scenario.gyros) {
+      gyro.drift.outside_sigma_rad_s = 0;
+    }
     return sim::simulate(scenario);
   }();
   return simulated;

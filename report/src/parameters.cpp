@@ -4,12 +4,11 @@
 #include <cmath>
 
 #include "trihedron/core/frames.hpp"
+#include "trihedron/ground/convergence.hpp"
 #include "units.hpp"
 
 namespace trihedron::report {
 namespace {
-
-constexpr std::string_view kAlignmentPrefix = "align_";
 
 const double* find(const std::vector<std::pair<std::string, double>>& table, const std::string& name) {
   const auto found = std::find_if(table.begin(), table.end(), [&](const auto& entry) { return entry.first == name; });
@@ -43,38 +42,11 @@ void set_value_and_truth(const ReportInput& input, Parameter& parameter) {
   }
 }
 
-void set_history(const ReportInput& input, std::size_t column, Parameter& parameter) {
-  const ground::ParameterHistory& history = input.run.parameters;
-  parameter.first_sigma = parameter.sigma;
-  if (history.t.empty()) {
-    return;
-  }
-  parameter.first_sigma = history.sigma.front()[column];
-  const double final_value = parameter.truth.value_or(parameter.value);
-  std::vector<double> error;
-  error.reserve(history.t.size());
-  for (const std::vector<double>& row : history.value) {
-    error.push_back(row[column] - final_value);
-  }
-  const double tolerance = std::max(3 * parameter.sigma, 0.1 * std::abs(error.front()));
-  if (const std::size_t row = settled_from(error, tolerance); row < error.size()) {
-    parameter.converged_min = to_minutes(history.t[row] - input.run.calibration.epoch);
-  }
-}
-
 }  // namespace
 
-std::size_t settled_from(const std::vector<double>& error, double tolerance) {
-  std::size_t row = error.size();
-  while (row > 0 && std::abs(error[row - 1]) <= tolerance) {
-    --row;
-  }
-  return row;
-}
-
 std::string symbol_of(const std::string& name) {
-  if (name.starts_with(kAlignmentPrefix)) {
-    return "Λ" + name.substr(kAlignmentPrefix.size());
+  if (constexpr std::string_view kAlignment = "align_"; name.starts_with(kAlignment)) {
+    return "Λ" + name.substr(kAlignment.size());
   }
   const std::size_t digits = std::min(name.find_first_of("0123456789"), name.size());
   const std::string letters = name.substr(0, digits);
@@ -91,20 +63,24 @@ std::string symbol_of(const std::string& name) {
 
 std::vector<Parameter> parameters_of(const ReportInput& input) {
   const Calibration& calibration = input.run.calibration;
+  const auto convergence = ground::convergence(input.run, input.truth);
   std::vector<Parameter> parameters;
   for (std::size_t i = 0; i < calibration.states.size(); ++i) {
-    const std::string& state = calibration.states[i];
-    const std::size_t dot = state.find('.');
+    const StateName name(calibration.states[i]);
     Parameter parameter;
-    parameter.state = state;
-    parameter.gyro = std::stoul(state.substr(std::string_view("gyro").size())) - 1;
-    parameter.name = state.substr(dot + 1);
+    parameter.state = calibration.states[i];
+    parameter.gyro = name.gyro;
+    parameter.name = name.parameter;
     parameter.symbol = symbol_of(parameter.name);
-    parameter.is_alignment = parameter.name.starts_with(kAlignmentPrefix);
+    parameter.is_alignment = name.is_alignment;
     const auto row = static_cast<Eigen::Index>(i);
     parameter.sigma = std::sqrt(calibration.covariance(row, row));
+    parameter.first_sigma = input.run.parameters.t.empty() ? parameter.sigma : input.run.parameters.sigma.front()[i];
+    parameter.is_determined = convergence[i].determined;
+    if (convergence[i].settled) {
+      parameter.converged_min = to_minutes(*convergence[i].settled);
+    }
     set_value_and_truth(input, parameter);
-    set_history(input, i, parameter);
     parameters.push_back(std::move(parameter));
   }
   return parameters;

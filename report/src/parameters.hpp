@@ -16,20 +16,17 @@ struct Parameter {
   std::string name;      ///< "k0", "align_x"
   std::string symbol;    ///< "k₀", "Λx"
   bool is_alignment = false;
-  double value = 0;        ///< rad/s; alignment: component of the rotation vector, rad
-  double sigma = 0;        ///< rad/s or rad
-  double first_sigma = 0;  ///< before the data: of the first row of the history
+  double value = 0;           ///< rad/s; alignment: component of the rotation vector, rad
+  double sigma = 0;           ///< rad/s or rad
+  double first_sigma = 0;     ///< before the data: of the first row of the history
+  bool is_determined = true;  ///< the data say more of it than was known before
   std::optional<double> truth;
   /// Estimate minus truth; alignment: −δ of C_c_b(true) = exp([δ×]) C_c_b(est).
   std::optional<double> error;
-  /// Time of the pass after which the error stays within 3 final sigmas or 10 % of its first value, whichever is
-  /// larger; against the truth, or else the final value. Absent where the last row is still outside.
-  std::optional<double> converged_min;
+  std::optional<double> converged_min;  ///< as ground::Convergence::settled
 
   /// "k₀ of gyro 1"
   [[nodiscard]] std::string full_symbol() const { return symbol + " of gyro " + std::to_string(gyro + 1); }
-  /// Whether the data say more of it than was known before.
-  [[nodiscard]] bool determined() const { return !(sigma > 0.5 * first_sigma); }
 };
 
 /// All of them, in the order of Calibration::states.
@@ -37,8 +34,5 @@ struct Parameter {
 
 /// For people: "k0" → "k₀", "mu31" → "μ₃₁", "align_x" → "Λx"; other names as they are.
 [[nodiscard]] std::string symbol_of(const std::string& name);
-
-/// Row after which `error` stays within `tolerance`; the number of rows where it does not at the end.
-[[nodiscard]] std::size_t settled_from(const std::vector<double>& error, double tolerance);
 
 }  // namespace trihedron::report

@@ -26,10 +26,10 @@ json row_of(const Parameter& parameter) {
   json row = {
       {"symbol", parameter.symbol},
       {"name", parameter.name},
-      {"undetermined", !parameter.determined()},
+      {"undetermined", !parameter.is_determined},
       {"shrunk", parameter.first_sigma > 0 ? significant(100 * parameter.sigma / parameter.first_sigma, 2) : "—"},
       {"converged", parameter.converged_min ? number(*parameter.converged_min, 0) : "not yet"}};
-  if (!parameter.determined()) {
+  if (!parameter.is_determined) {
     row["converged"] = "—";
   }
   const auto put = [&](const std::string& suffix, double unit, double sigma_unit, double error_unit) {

@@ -144,7 +144,7 @@ json convergence_number(const std::vector<Parameter>& parameters, bool alignment
   std::vector<std::string> off;
   std::size_t count = 0;
   for (const Parameter& parameter : parameters) {
-    if (parameter.is_alignment != alignment || !parameter.determined()) {
+    if (parameter.is_alignment != alignment || !parameter.is_determined) {
       continue;
     }
     ++count;
@@ -210,7 +210,7 @@ json nis_number(const ReportInput& input) {
 json undetermined_of(const std::vector<Parameter>& parameters) {
   json list = json::array();
   for (const Parameter& parameter : parameters) {
-    if (!parameter.determined()) {
+    if (!parameter.is_determined) {
       list.push_back(
           {{"symbol", parameter.full_symbol()}, {"percent", number(100 * parameter.sigma / parameter.first_sigma, 0)}});
     }

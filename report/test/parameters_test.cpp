@@ -22,15 +22,6 @@ TEST(SymbolOf, LeavesOtherNamesAlone) {
   EXPECT_EQ(symbol_of("k0_extra"), "k0_extra");
 }
 
-TEST(SettledFrom, CountsTheLastExcursion) {
-  EXPECT_EQ(settled_from({5, 0.1, 3, 0.2, 0.1}, 1), 3U);
-  EXPECT_EQ(settled_from({0.1, 0.2}, 1), 0U);
-}
-
-TEST(SettledFrom, IsTheEndWhereTheLastRowIsOutside) { EXPECT_EQ(settled_from({0, 0, 2}, 1), 3U); }
-
-TEST(SettledFrom, DoesNotTakeNaNForSettled) { EXPECT_EQ(settled_from({0, std::nan(""), 0}, 1), 2U); }
-
 class ParametersOfARun : public testing::Test {
  protected:
   test::SyntheticRun run = test::synthetic_run({.duration = std::chrono::hours(3), .troubled = true});
@@ -60,7 +51,7 @@ TEST_F(ParametersOfARun, ClaimNoErrorWithoutTruth) {
 
 TEST_F(ParametersOfARun, SayWhatTheDataDoNotDetermine) {
   for (const Parameter& parameter : parameters_of(run.judged())) {
-    EXPECT_EQ(parameter.determined(), parameter.state != "gyro2.nu12") << parameter.state;
+    EXPECT_EQ(parameter.is_determined, parameter.state != "gyro2.nu12") << parameter.state;
   }
 }
 

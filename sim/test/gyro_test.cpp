@@ -190,10 +190,11 @@ TEST(Readout, AFaultLeavesTheNoiseOfOtherSamplesAsItWas) {
   EXPECT_NEAR(static_cast<double>(same), expected, test::kBand * std::sqrt(0.19 * expected));
 }
 
-/// κ = 0 unless told.
+/// κ = 0 and nothing outside eq. (1) unless told.
 DriftScenario no_drift() {
   DriftScenario scenario;
   scenario.kappa_rad_s.emplace();
+  scenario.outside_sigma_rad_s = 0;
   return scenario;
 }
 

@@ -71,6 +71,7 @@ TEST(SamplePass, OurGyrosOnItsAttitudeRepeatItsMomentaAndReadings) {
   const Eigen::Quaterniond q_in_c = scenario.attitude.recorded.front().q_in_c.normalized();
   for (std::size_t gyro = 0; gyro < 2; ++gyro) {
     GyroScenario& ours = scenario.gyros[gyro];
+    ours.drift.outside_sigma_rad_s = 0;
     ours.start_direction_c = q_in_c.conjugate() * Vector3d(&truth.front()[5 + 3 * gyro]);
     ours.misalignment_rad = Vector3d(lambda[gyro].data());
     std::copy(kappa[gyro].begin(), kappa[gyro].end(), ours.drift.kappa_rad_s.emplace().begin());

@@ -38,14 +38,22 @@ struct ParameterHistory {
   std::vector<std::vector<double>> sigma;
 };
 
+/// What a navigator could start from at an astro-correction; momentum_in of both is that of `t`.
+struct Correction {
+  Time t{};
+  std::vector<GyroCalibration> known_before;  ///< the parameters of before the pass
+  std::vector<GyroCalibration> calibrated;    ///< as estimated until then
+};
+
 struct CalibrationRun {
   CalibrationOptions options;
   Calibration calibration;  ///< with verdict and statistics
   std::vector<FixRecord> fixes;
   ParameterHistory parameters;
-  AttitudeHistory attitude;    ///< of the calibration itself, at the fixes' epochs
-  AttitudeHistory navigation;  ///< of the open-loop navigator at the fixes' epochs
-  std::vector<Time> angle_t;   ///< z1 of eq. (3), decimated by min/max
+  std::vector<Correction> corrections;  ///< at the first used fix, and then every 90 min
+  AttitudeHistory attitude;             ///< of the calibration itself, at the fixes' epochs
+  AttitudeHistory navigation;           ///< of the open-loop navigator at the fixes' epochs
+  std::vector<Time> angle_t;            ///< z1 of eq. (3), decimated by min/max
   std::vector<double> angle_residual_min, angle_residual_max;
   std::map<std::string, long> samples;     ///< gyro samples by what was done with them
   std::map<std::string, long> fix_counts;  ///< fixes by what was done with them
@@ -82,6 +90,10 @@ struct NavigationRun {
   double misfit_limit = 0;
   Verdict verdict;
 };
+
+/// The fixes of the first star tracker that the calibration or navigation used.
+[[nodiscard]] StarTrackerTelemetry used_fixes(const Pass& pass, const std::vector<FixRecord>& fixes);
+
 /// Attitude by the navigator, corrected as `options.corrections` says, with the calibration running along from the
 /// pass's prior. Throws SetupError.
 [[nodiscard]] NavigationRun navigate(const Pass& pass, const CalibrationOptions& options,

@@ -33,6 +33,20 @@ struct GyroCalibration {
   Eigen::Vector3d momentum_in{0, 0, 0};                     ///< h_in at `t`, unit
 };
 
+/// The parts of a state's name, "gyro2.align_x".
+struct StateName {
+  std::size_t gyro = 0;   ///< from 0
+  std::string parameter;  ///< "k0", "align_x"
+  bool is_alignment = false;
+  Eigen::Index alignment_axis = 0;  ///< where it is an alignment
+
+  explicit StateName(const std::string& state)
+      : gyro(std::stoul(state.substr(4)) - 1),
+        parameter(state.substr(state.find('.') + 1)),
+        is_alignment(parameter.starts_with("align_")),
+        alignment_axis(is_alignment ? parameter.back() - 'x' : 0) {}
+};
+
 struct Calibration {
   std::string estimator;
   Time epoch{};  ///< of the pass

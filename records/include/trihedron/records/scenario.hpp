@@ -100,7 +100,7 @@ struct DriftScenario {
 
   std::vector<DriftHarmonic> harmonics{};  ///< drift that eq. (1) does not contain
   /// Amplitude, 1-sigma, of further members drawn from the seed: all of degree 1 and 2 that eq. (1) does not contain.
-  double outside_sigma_rad_s = 0;
+  double outside_sigma_rad_s = 1e-8;
 
   double coefficient_walk_rad_s_sqrt_s = 0;  ///< each κ wanders: rad/s per √s
   double warm_up_fraction = 0;               ///< κ(t) = κ (1 + fraction exp(−t / warm_up_time_s))

@@ -1,0 +1,155 @@
+#include "trihedron/ground/open_loop.hpp"
+
+#include <algorithm>
+#include <chrono>
+
+#include "gyro_model.hpp"
+#include "trihedron/core/drift.hpp"
+#include "trihedron/core/navigator.hpp"
+#include "trihedron/core/telemetry.hpp"
+
+namespace trihedron::ground {
+namespace {
+
+constexpr int kPair = 2;
+using Directions = PerGyro<Eigen::Vector3d, kPair>;
+
+/// The drift turns by nanoradians over such a step: the midpoint rule loses nothing even in a slew.
+constexpr Duration kStep = std::chrono::seconds(3);
+/// The body's acceleration over it is below the readout noise.
+constexpr Duration kMaxInterpolation = std::chrono::milliseconds(500);
+
+/// Directions at any time, interpolated between samples; asked for in ascending order.
+class Readings {
+ public:
+  explicit Readings(const GyroTelemetry& telemetry) : telemetry_(telemetry) {}
+
+  /// Nothing in a gap, or where a sample is no direction.
+  [[nodiscard]] std::optional<Directions> at(Time t) {
+    const auto& times = telemetry_.t;
+    while (next_ < times.size() && times[next_] < t) {
+      ++next_;
+    }
+    if (next_ == times.size()) {
+      return std::nullopt;
+    }
+    const std::size_t before = times[next_] == t || next_ == 0 ? next_ : next_ - 1;
+    const Duration apart = times[next_] - times[before];
+    if (times[before] > t || apart > kMaxInterpolation) {
+      return std::nullopt;
+    }
+    const double fraction = apart == Duration::zero() ? 0 : to_seconds(t - times[before]) / to_seconds(apart);
+    Directions h_b;
+    for (int k = 0; k < kPair; ++k) {
+      const Eigen::Vector3d first = telemetry_.direction(before, k);
+      const Eigen::Vector3d second = telemetry_.direction(next_, k);
+      if (!nearly_unit(first.norm()) || !nearly_unit(second.norm())) {
+        return std::nullopt;
+      }
+      h_b[k] = ((1 - fraction) * first + fraction * second).normalized();
+    }
+    return h_b;
+  }
+
+ private:
+  const GyroTelemetry& telemetry_;
+  std::size_t next_ = 0;
+};
+
+template <class Model>
+AttitudeHistory fly(const Pass& pass, Time t, const std::vector<GyroCalibration>& records,
+                    const std::vector<Time>& epochs) {
+  PerGyro<GyroModel<Model>, kPair> gyros;
+  for (int k = 0; k < kPair; ++k) {
+    gyros[k] = to_model<Model>(records[static_cast<std::size_t>(k)]);
+  }
+  AttitudeHistory history;
+  Readings readings(pass.gyro);
+  std::optional<Directions> last = readings.at(t);
+  Time last_t = t;
+  auto epoch = std::lower_bound(epochs.begin(), epochs.end(), t);
+  for (Time now = t; epoch != epochs.end(); now = std::min(now + kStep, *epoch)) {
+    if (const std::optional<Directions> h_b = readings.at(now)) {
+      Directions middle = *h_b;
+      for (int k = 0; k < kPair && last; ++k) {
+        middle[k] = ((*last)[k] + (*h_b)[k]).normalized();
+      }
+      if (const auto trihedra = make_trihedra(gyros, middle)) {
+        const Eigen::Matrix3d C_in_c = trihedra.value().C_in_c().raw();
+        for (int k = 0; k < kPair; ++k) {
+          precess(gyros[k], C_in_c, middle[k], to_seconds(now - last_t));
+        }
+        last = h_b;
+        last_t = now;
+      }
+      if (const auto trihedra = make_trihedra(gyros, *h_b); trihedra && now == *epoch) {
+        history.t.push_back(now);
+        history.q_in_c.push_back(trihedra.value().C_in_c().quaternion());
+        history.age_s.push_back(to_seconds(now - t));
+      }
+    }
+    if (now == *epoch && ++epoch == epochs.end()) {
+      break;
+    }
+  }
+  return history;
+}
+
+CorrectionInterval interval_of(const AttitudeErrors& errors, double limit_rad) {
+  const auto intervals = correction_intervals(errors, limit_rad);
+  return intervals.empty() ? CorrectionInterval{} : intervals.front();
+}
+
+}  // namespace
+
+AttitudeHistory fly_open_loop(const Pass& pass, Time t, const std::vector<GyroCalibration>& gyros,
+                              const std::vector<Time>& epochs) {
+  if (gyros.size() < kPair || !std::all_of(gyros.begin(), gyros.begin() + kPair, is_of_model<Esg7>)) {
+    throw SetupError("an open loop needs two gyros of drift model esg7", "give a calibration of a pair");
+  }
+  return fly<Esg7>(pass, t, gyros, epochs);
+}
+
+std::optional<double> OpenLoops::extension() const {
+  if (!interval_known_before.passed || interval_calibrated.observed == Duration::zero()) {
+    return std::nullopt;
+  }
+  // A limit passed at the very correction has lasted one step of the reference at most.
+  const double before_s = std::max(to_seconds(*interval_known_before.passed), 1.0);
+  return to_seconds(interval_calibrated.passed.value_or(interval_calibrated.observed)) / before_s;
+}
+
+Extension measure_extension(const Pass& pass, const CalibrationRun& run, const std::vector<Time>& reference_t,
+                            const std::vector<Eigen::Quaterniond>& reference_q_in_c, double limit_rad) {
+  Extension result;
+  result.limit_rad = limit_rad;
+  const auto errors_of = [&](Time t, const std::vector<GyroCalibration>& gyros) {
+    return attitude_errors(fly_open_loop(pass, t, gyros, reference_t), reference_t, reference_q_in_c);
+  };
+  struct Factor {
+    double value;
+    bool is_lower_bound;
+  };
+  std::vector<Factor> factors;
+  for (const Correction& correction : run.corrections) {
+    OpenLoops loops;
+    loops.known_before = errors_of(correction.t, correction.known_before);
+    loops.calibrated = errors_of(correction.t, correction.calibrated);
+    loops.interval_known_before = interval_of(loops.known_before, limit_rad);
+    loops.interval_calibrated = interval_of(loops.calibrated, limit_rad);
+    if (const auto factor = loops.extension(); factor && !result.loops.empty()) {
+      factors.push_back({*factor, !loops.interval_calibrated.passed});
+    }
+    result.loops.push_back(std::move(loops));
+  }
+  if (!factors.empty()) {
+    std::ranges::sort(factors, {}, &Factor::value);
+    const auto median = factors.begin() + static_cast<std::ptrdiff_t>((factors.size() - 1) / 2);
+    result.factor = median->value;
+    result.is_lower_bound =
+        std::any_of(factors.begin(), median + 1, [](const Factor& factor) { return factor.is_lower_bound; });
+  }
+  return result;
+}
+
+}  // namespace trihedron::ground
