@@ -4,13 +4,14 @@ JOBS ?= $(shell nproc)
 BUILD := build
 SOURCES := $(shell git ls-files '*.cpp' '*.hpp' 2>/dev/null)
 
-.PHONY: help setup build demo test bench format lint sanitize coverage install clean
+.PHONY: help setup build demo test bench validation format lint sanitize coverage install clean
 
 help:
-	@echo 'make demo     install what is missing, build, calibrate the example pass, say where the report is'
+	@echo 'make demo     install what is missing, build, repeat the experiment of the paper, say where the report is'
 	@echo 'make test     build and run all tests'
 	@echo 'make build    leaves the program at $(BUILD)/trihedron'
 	@echo 'make bench    measure: steps of the cycle, reading of a pass'
+	@echo 'make validation  measure again what docs/validation.md tells'
 	@echo 'make install  into PREFIX (default /usr/local)'
 	@echo 'make setup | format | lint | sanitize | coverage | clean'
 
@@ -22,17 +23,16 @@ build: setup
 	cmake --build $(BUILD) --parallel $(JOBS)
 
 demo: build
-	@rm -rf out/demo
-	$(BUILD)/trihedron inspect examples/pass.nc
-	$(BUILD)/trihedron calibrate examples/pass.nc -o out/demo
-	@echo
-	@echo "The report is at out/demo/report.html"
+	$(BUILD)/trihedron demo -o out/demo
 
 test: build
 	ctest --test-dir $(BUILD) --output-on-failure --parallel $(JOBS)
 
 bench: build
 	$(BUILD)/trihedron_bench
+
+validation: build
+	validation/validate.py $(BUILD)/trihedron docs/validation.md
 
 sanitize: setup
 	cmake --preset asan-ubsan $(CMAKE_FLAGS)

@@ -7,6 +7,7 @@
 
 #include "commands.hpp"
 #include "progress.hpp"
+#include "steps.hpp"
 #include "summary.hpp"
 #include "trihedron/io/atomic_file.hpp"
 #include "trihedron/io/attitude.hpp"
@@ -19,14 +20,6 @@
 
 namespace trihedron::cli {
 namespace {
-
-struct CalibrateArguments {
-  std::string pass;
-  std::string out;
-  std::string estimator;
-  std::string drift_model;
-  std::string config;
-};
 
 std::vector<io::Table> residual_tables(const ground::CalibrationRun& run) {
   io::Table fixes{"fixes", {}, {}};
@@ -71,41 +64,36 @@ std::vector<io::Table> residual_tables(const ground::CalibrationRun& run) {
   return {fixes, parameters, angle};
 }
 
-int run_calibrate(const CalibrateArguments& arguments, const Common& common) {
-  CalibrationOptions options;
-  if (!arguments.config.empty()) {
-    options = io::read_config(arguments.config);
-  }
-  if (!arguments.estimator.empty()) {
-    options.estimator = arguments.estimator;
-  }
-  if (!arguments.drift_model.empty()) {
-    options.drift_model = arguments.drift_model;
-  }
-  const io::LoadedPass loaded = io::read_pass(arguments.pass);
+}  // namespace
+
+ExitStatus calibrate_pass(const std::filesystem::path& pass, const CalibrationOptions& options,
+                          const std::filesystem::path& out, const Common& common) {
+  const io::LoadedPass loaded = io::read_pass(pass);
   ground::CalibrationRun result;
   try {
     const ProgressBar bar("calibrate", common.quiet);
     result = ground::calibrate(loaded.pass, options, bar.meter());
   } catch (const ground::SetupError& error) {
-    throw io::InputRefused(arguments.pass, {}, error.what(), error.cure());
+    throw io::InputRefused(pass, {}, error.what(), error.cure());
   }
-  const std::filesystem::path out = arguments.out;
-  io::make_directory(out);
   const Time epoch = loaded.pass.settings.epoch;
-  const auto truth = read_truth_of(arguments.pass, loaded.pass);
+  const auto truth = read_truth_of(pass, loaded.pass);
   const double limit_rad = io::parse_angle_rad("5arcmin");
-  const Evaluation navigation = evaluate(result.navigation, loaded.pass, truth, limit_rad);
-  const Evaluation attitude = evaluate(result.attitude, loaded.pass, truth, limit_rad);
+  const Reference reference = reference_of(truth, ground::used_fixes(loaded.pass, result.fixes), loaded.pass);
+  const Evaluation navigation = evaluate(result.navigation, reference, epoch, limit_rad);
+  const Evaluation attitude = evaluate(result.attitude, reference, epoch, limit_rad);
+  const Course course{ground::convergence(result, truth ? &*truth : nullptr),
+                      ground::fly_open_loops(loaded.pass, result, reference.t, reference.q_in_c, limit_rad), limit_rad};
 
+  io::make_directory(out);
   io::write_calibration(out / "calibration.json", result.calibration);
   io::write_attitude(out / "attitude.csv", epoch, result.attitude);
   io::write_residuals(out / "residuals.nc", epoch, residual_tables(result));
   io::write_file(out / "effective-config.toml", io::format_config(options));
 
   report::ReportInput input{loaded.pass, result, truth ? &*truth : nullptr, {}, {}};
-  input.evaluation = report::Evaluation{"the " + navigation.reference, navigation.errors, attitude.errors,
-                                        navigation.intervals, limit_rad};
+  input.evaluation =
+      report::Evaluation{"the " + reference.name, navigation.errors, attitude.errors, course.open_loops, limit_rad};
   for (const io::Defect& defect : loaded.defects) {
     input.telemetry_notes.push_back(defect.text());
   }
@@ -119,12 +107,14 @@ int run_calibrate(const CalibrateArguments& arguments, const Common& common) {
         {"samples", result.samples},
         {"navigation", evaluation_json(navigation, epoch)},
         {"attitude", evaluation_json(attitude, epoch)}};
+    json.update(course_json(result, course));
     fmt::print("{}\n", json.dump(1));
   } else if (!common.quiet) {
     fmt::print(
-        "{}{}{}\n{}\n{}\nWritten     {}: calibration.json attitude.csv residuals.nc report.html "
+        "{}{}{}{}\n{}\n{}\nWritten     {}: calibration.json attitude.csv residuals.nc report.html "
         "effective-config.toml\n",
         pass_text(loaded), verdict_text(result.calibration.verdict), calibration_text(result, truth),
+        course_text(result, course),
         evaluation_text(navigation, epoch,
                         "Navigator, correction interval " + io::format_correction_interval(options.corrections) + ","),
         evaluation_text(attitude, epoch, "Attitude of the calibration itself"), out.string());
@@ -132,10 +122,15 @@ int run_calibrate(const CalibrateArguments& arguments, const Common& common) {
   return result.calibration.verdict.trustworthy ? kTrustworthy : kDoNotUse;
 }
 
-}  // namespace
-
 void add_calibrate(CLI::App& program, const Common& common, int& exit_status) {
-  auto arguments = std::make_shared<CalibrateArguments>();
+  struct Arguments {
+    std::string pass;
+    std::string out;
+    std::string estimator;
+    std::string drift_model;
+    std::string config;
+  };
+  auto arguments = std::make_shared<Arguments>();
   CLI::App* command =
       program.add_subcommand("calibrate", "Calibrate drift and alignment of the gyros against the star tracker");
   command->add_option("PASS", arguments->pass, "Directory or NetCDF file")->required();
@@ -145,7 +140,16 @@ void add_calibrate(CLI::App& program, const Common& common, int& exit_status) {
   command->add_option("--drift-model", arguments->drift_model, "Drift model")
       ->check(CLI::IsMember(std::vector<std::string>(ground::kDriftModels.begin(), ground::kDriftModels.end())));
   command->add_option("--config", arguments->config, "Settings (TOML); see effective-config.toml of any run");
-  command->callback([&common, &exit_status, arguments] { exit_status = run_calibrate(*arguments, common); });
+  command->callback([&common, &exit_status, arguments] {
+    CalibrationOptions options = arguments->config.empty() ? CalibrationOptions{} : io::read_config(arguments->config);
+    if (!arguments->estimator.empty()) {
+      options.estimator = arguments->estimator;
+    }
+    if (!arguments->drift_model.empty()) {
+      options.drift_model = arguments->drift_model;
+    }
+    exit_status = calibrate_pass(arguments->pass, options, arguments->out, common);
+  });
 }
 
 }  // namespace trihedron::cli

@@ -5,6 +5,7 @@
 
 #include "commands.hpp"
 #include "progress.hpp"
+#include "steps.hpp"
 #include "summary.hpp"
 #include "trihedron/io/attitude.hpp"
 #include "trihedron/io/calibration.hpp"
@@ -13,41 +14,26 @@
 #include "trihedron/io/quantity.hpp"
 
 namespace trihedron::cli {
-namespace {
 
-struct NavigateArguments {
-  std::string pass;
-  std::string calibration;
-  bool online = false;
-  std::string interval;
-  std::string attitude;
-  std::string config;
-};
-
-int run_navigate(const NavigateArguments& arguments, const Common& common) {
-  CalibrationOptions options;
-  if (!arguments.config.empty()) {
-    options = io::read_config(arguments.config);
-  }
-  if (!arguments.interval.empty()) {
-    options.corrections = io::parse_correction_interval(arguments.interval);
-  }
-  options.corrections.take_parameters = arguments.online;
-  io::LoadedPass loaded = io::read_pass(arguments.pass);
-  if (!arguments.online) {
-    loaded.pass.settings.prior = io::read_calibration(arguments.calibration);
+ExitStatus navigate_pass(const std::filesystem::path& pass, const std::optional<std::filesystem::path>& calibration,
+                         const CalibrationOptions& options, const std::filesystem::path& attitude,
+                         const Common& common) {
+  io::LoadedPass loaded = io::read_pass(pass);
+  if (calibration) {
+    loaded.pass.settings.prior = io::read_calibration(*calibration);
   }
   ground::NavigationRun result;
   try {
     const ProgressBar bar("navigate", common.quiet);
     result = ground::navigate(loaded.pass, options, bar.meter());
   } catch (const ground::SetupError& error) {
-    throw io::InputRefused(arguments.pass, {}, error.what(), error.cure());
+    throw io::InputRefused(pass, {}, error.what(), error.cure());
   }
   const Time epoch = loaded.pass.settings.epoch;
-  io::write_attitude(arguments.attitude, epoch, result.attitude);
-  const Evaluation evaluation = evaluate(result.attitude, loaded.pass, read_truth_of(arguments.pass, loaded.pass),
-                                         io::parse_angle_rad("5arcmin"));
+  io::write_attitude(attitude, epoch, result.attitude);
+  const Reference reference =
+      reference_of(read_truth_of(pass, loaded.pass), ground::used_fixes(loaded.pass, result.fixes), loaded.pass);
+  const Evaluation evaluation = evaluate(result.attitude, reference, epoch, io::parse_angle_rad("5arcmin"));
   if (common.json) {
     nlohmann::ordered_json json = {{"pass", pass_json(loaded)},
                                    {"verdict", verdict_json(result.verdict)},
@@ -56,27 +42,44 @@ int run_navigate(const NavigateArguments& arguments, const Common& common) {
     fmt::print("{}\n", json.dump(1));
   } else if (!common.quiet) {
     fmt::print("{}{}\n{}\nWritten     {}: {} epochs\n", pass_text(loaded), verdict_text(result.verdict),
-               evaluation_text(evaluation, epoch, "Attitude error"), arguments.attitude, result.attitude.size());
+               evaluation_text(evaluation, epoch, "Attitude error"), attitude.string(), result.attitude.size());
   }
   return result.verdict.trustworthy ? kTrustworthy : kDoNotUse;
 }
 
-}  // namespace
-
 void add_navigate(CLI::App& program, const Common& common, int& exit_status) {
-  auto arguments = std::make_shared<NavigateArguments>();
+  struct Arguments {
+    std::string pass;
+    std::string calibration;
+    bool online = false;
+    bool prior = false;
+    std::string interval;
+    std::string attitude;
+    std::string config;
+  };
+  auto arguments = std::make_shared<Arguments>();
   CLI::App* command = program.add_subcommand("navigate", "Give the attitude at every gyro sample");
   command->add_option("PASS", arguments->pass, "Directory or NetCDF file")->required();
   CLI::Option_group* source = command->add_option_group("parameters");
   source->add_option("--calibration", arguments->calibration, "Hold the values of a calibration.json");
   source->add_flag("--online", arguments->online, "Calibrate along, and take over the estimates at each correction");
+  source->add_flag("--prior", arguments->prior, "Hold the values known before the pass, those of its pass.toml");
   source->require_option(1);
   command->add_option(
       "--correction-interval", arguments->interval,
       "Time between astro-corrections: a duration, none or continuous (90min unless the settings say otherwise)");
   command->add_option("--config", arguments->config, "Estimator settings (TOML)");
   command->add_option("-o,--output", arguments->attitude, "Attitude file to write (CSV)")->required();
-  command->callback([&common, &exit_status, arguments] { exit_status = run_navigate(*arguments, common); });
+  command->callback([&common, &exit_status, arguments] {
+    CalibrationOptions options = arguments->config.empty() ? CalibrationOptions{} : io::read_config(arguments->config);
+    if (!arguments->interval.empty()) {
+      options.corrections = io::parse_correction_interval(arguments->interval);
+    }
+    options.corrections.take_parameters = arguments->online;
+    const auto calibration =
+        arguments->calibration.empty() ? std::nullopt : std::optional(std::filesystem::path(arguments->calibration));
+    exit_status = navigate_pass(arguments->pass, calibration, options, arguments->attitude, common);
+  });
 }
 
 }  // namespace trihedron::cli

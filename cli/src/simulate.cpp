@@ -8,6 +8,7 @@
 #include <string>
 
 #include "commands.hpp"
+#include "steps.hpp"
 #include "summary.hpp"
 #include "trihedron/io/error.hpp"
 #include "trihedron/io/pass.hpp"
@@ -21,17 +22,19 @@ struct SimulateArguments {
   std::string pass;
 };
 
-sim::SimulatedPass simulated(const SimulateArguments& arguments, const Scenario& scenario) {
+sim::SimulatedPass simulated(const Scenario& scenario, const std::string& name) {
   try {
     return sim::simulate(scenario);
   } catch (const std::invalid_argument& error) {
-    throw io::InputRefused(arguments.scenario, {}, error.what(), "correct the scenario");
+    throw io::InputRefused(name, {}, error.what(), "correct the scenario");
   }
 }
 
-int run_simulate(const SimulateArguments& arguments, const Common& common) {
-  const Scenario scenario = io::read_scenario(arguments.scenario);
-  const sim::SimulatedPass result = simulated(arguments, scenario);
+}  // namespace
+
+void simulate_pass(const Scenario& scenario, const std::string& name, const std::filesystem::path& pass,
+                   const Common& common) {
+  const sim::SimulatedPass result = simulated(scenario, name);
   // A readout in steps needs no finer ones in the file.
   io::PassFormat format;
   double step = scenario.gyros.front().readout.quantum_rad;
@@ -39,16 +42,13 @@ int run_simulate(const SimulateArguments& arguments, const Common& common) {
     step = std::min(step, gyro.readout.quantum_rad);
   }
   format.direction_step = std::max(step, format.direction_step);
-  io::write_pass(arguments.pass, result.pass, &result.truth, format);
+  io::write_pass(pass, result.pass, &result.truth, format);
   if (common.json) {
     fmt::print("{}\n", pass_json({result.pass, {}}).dump(1));
   } else if (!common.quiet) {
-    fmt::print("{}Written     {}\n", pass_text({result.pass, {}}), arguments.pass);
+    fmt::print("{}Written     {}\n", pass_text({result.pass, {}}), pass.string());
   }
-  return kTrustworthy;
 }
-
-}  // namespace
 
 void add_simulate(CLI::App& program, const Common& common, int& exit_status) {
   auto arguments = std::make_shared<SimulateArguments>();
@@ -56,7 +56,10 @@ void add_simulate(CLI::App& program, const Common& common, int& exit_status) {
       program.add_subcommand("simulate", "Make the telemetry of a pass, and its truth, from a scenario");
   command->add_option("SCENARIO", arguments->scenario, "Scenario (TOML)")->required();
   command->add_option("-o,--output", arguments->pass, "Pass to write: a directory, or a name in .nc")->required();
-  command->callback([&common, &exit_status, arguments] { exit_status = run_simulate(*arguments, common); });
+  command->callback([&common, &exit_status, arguments] {
+    simulate_pass(io::read_scenario(arguments->scenario), arguments->scenario, arguments->pass, common);
+    exit_status = kTrustworthy;
+  });
 }
 
 }  // namespace trihedron::cli

@@ -40,6 +40,13 @@ nlohmann::ordered_json statistics_json(const ground::ErrorStatistics& s, Time ep
   return json;
 }
 
+nlohmann::ordered_json interval_json(const ground::CorrectionInterval& interval) {
+  nlohmann::ordered_json json = {{"observed_s", to_seconds(interval.observed)},
+                                 {"max_total_rad", interval.max_total_rad}};
+  json["passed_limit_after_s"] = interval.passed ? nlohmann::ordered_json(to_seconds(*interval.passed)) : nullptr;
+  return json;
+}
+
 }  // namespace
 
 std::optional<Truth> read_truth_of(const std::filesystem::path& path, const Pass& pass) {
@@ -52,20 +59,20 @@ std::optional<Truth> read_truth_of(const std::filesystem::path& path, const Pass
   return truth;
 }
 
-Evaluation evaluate(const AttitudeHistory& attitude, const Pass& pass, const std::optional<Truth>& truth,
-                    double limit_rad) {
+Reference reference_of(const std::optional<Truth>& truth, const StarTrackerTelemetry& fixes, const Pass& pass) {
+  return truth ? Reference{"truth", truth->t, truth->q_in_c, Eigen::Vector3d::Zero()}
+               : Reference{"star tracker", fixes.t, fixes.q_in_c, pass.settings.star_tracker_noise_rad};
+}
+
+Evaluation evaluate(const AttitudeHistory& attitude, const Reference& reference, Time epoch, double limit_rad) {
   Evaluation result;
-  result.reference = truth ? "truth" : "star tracker";
-  result.errors = truth ? ground::attitude_errors(attitude, truth->t, truth->q_in_c)
-                        : ground::attitude_errors(attitude, pass.star_tracker.t, pass.star_tracker.q_in_c);
-  if (!truth) {
-    // The reference has an error of its own.
-    for (Eigen::Vector3d& sigma : result.errors.sigma_rad) {
-      sigma = (sigma.cwiseAbs2() + pass.settings.star_tracker_noise_rad.cwiseAbs2()).cwiseSqrt();
-    }
+  result.reference = reference.name;
+  result.errors = ground::attitude_errors(attitude, reference.t, reference.q_in_c);
+  for (Eigen::Vector3d& sigma : result.errors.sigma_rad) {
+    sigma = (sigma.cwiseAbs2() + reference.sigma_rad.cwiseAbs2()).cwiseSqrt();
   }
   result.whole = ground::statistics(result.errors);
-  result.stretches = ground::statistics_by_stretch(result.errors, pass.settings.epoch, kStretch);
+  result.stretches = ground::statistics_by_stretch(result.errors, epoch, kStretch);
   result.limit_rad = limit_rad;
   result.intervals = ground::correction_intervals(result.errors, limit_rad);
   return result;
@@ -157,10 +164,44 @@ std::string calibration_text(const ground::CalibrationRun& run, const std::optio
   return text;
 }
 
+std::string extension_text(const std::optional<ground::Extension>& extension) {
+  return extension ? fmt::format("{}{:.3g} times", extension->is_lower_bound ? "≥ " : "", extension->factor)
+                   : "none measured";
+}
+
+std::string course_text(const ground::CalibrationRun& run, const Course& course) {
+  const auto settled = [&](bool alignments) {
+    const auto time = ground::settled(run, course.convergence, alignments);
+    return time ? fmt::format("after {:.0f} min", minutes(*time)) : "not yet";
+  };
+  std::string text = fmt::format("Settled     alignment {}, drift coefficients {} (the paper: 90, 200–300)\n",
+                                 settled(true), settled(false));
+  if (course.open_loops.empty()) {
+    return text;
+  }
+  auto out = std::back_inserter(text);
+  fmt::format_to(out, "\nOpen loop until the error passes {}, from a correction with\n  {:>13} {:>14} {:>14} {:>12}\n",
+                 angle_text(course.limit_rad), "at, min", "known before", "calibrated", "extended");
+  const auto interval = [](const ground::CorrectionInterval& i) {
+    return i.passed ? fmt::format("{:.1f} min", minutes(*i.passed)) : fmt::format("> {:.0f} min", minutes(i.observed));
+  };
+  for (const ground::OpenLoops& loops : course.open_loops) {
+    const auto& [before, after] = loops.intervals;
+    const auto factor = loops.intervals.extension();
+    if (after.observed > Duration::zero()) {
+      fmt::format_to(out, "  {:>13.0f} {:>14} {:>14} {:>12}\n", minutes(after.corrected - run.calibration.epoch),
+                     interval(before), interval(after),
+                     factor ? fmt::format("{}{:.3g}", after.passed ? "" : "≥ ", *factor) : "");
+    }
+  }
+  fmt::format_to(out, "  correction interval extended {} (the paper: 3–5)\n",
+                 extension_text(ground::median_extension(course.open_loops)));
+  return text;
+}
+
 std::string evaluation_text(const Evaluation& evaluation, Time epoch, const std::string& title) {
-  std::string text =
-      fmt::format("{} against the {}{}\n", title, evaluation.reference,
-                  evaluation.reference == "truth" ? "" : ", whose noise and outliers are in the figures");
+  std::string text = fmt::format("{} against the {}{}\n", title, evaluation.reference,
+                                 evaluation.reference == "truth" ? "" : ", whose errors are in the figures");
   auto out = std::back_inserter(text);
   if (evaluation.errors.t.empty()) {
     return text + "  no common epochs\n";
@@ -220,6 +261,41 @@ nlohmann::ordered_json verdict_json(const Verdict& verdict) {
   return json;
 }
 
+nlohmann::ordered_json extension_json(const std::vector<ground::IntervalPair>& pairs,
+                                      const std::optional<ground::Extension>& median, Time epoch) {
+  nlohmann::ordered_json json = {{"corrections", nlohmann::ordered_json::array()}, {"factor", nullptr}};
+  for (const ground::IntervalPair& pair : pairs) {
+    json["corrections"].push_back({{"t_s", to_seconds(pair.calibrated.corrected - epoch)},
+                                   {"known_before", interval_json(pair.known_before)},
+                                   {"calibrated", interval_json(pair.calibrated)}});
+  }
+  if (median) {
+    json["factor"] = median->factor;
+    json["is_lower_bound"] = median->is_lower_bound;
+  }
+  return json;
+}
+
+nlohmann::ordered_json course_json(const ground::CalibrationRun& run, const Course& course) {
+  const auto seconds = [](const std::optional<Duration>& time) {
+    return time ? nlohmann::ordered_json(to_seconds(*time)) : nlohmann::ordered_json(nullptr);
+  };
+  nlohmann::ordered_json states;
+  for (std::size_t i = 0; i < course.convergence.size(); ++i) {
+    states[run.calibration.states[i]] = {{"determined", course.convergence[i].determined},
+                                         {"settled_s", seconds(course.convergence[i].settled)}};
+  }
+  std::vector<ground::IntervalPair> pairs;
+  for (const ground::OpenLoops& loops : course.open_loops) {
+    pairs.push_back(loops.intervals);
+  }
+  return {{"convergence",
+           {{"alignment_s", seconds(ground::settled(run, course.convergence, true))},
+            {"drift_s", seconds(ground::settled(run, course.convergence, false))},
+            {"states", states}}},
+          {"extension", extension_json(pairs, ground::median_extension(course.open_loops), run.calibration.epoch)}};
+}
+
 nlohmann::ordered_json evaluation_json(const Evaluation& evaluation, Time epoch) {
   nlohmann::ordered_json json = {{"reference", evaluation.reference},
                                  {"whole", statistics_json(evaluation.whole, epoch)},
@@ -230,10 +306,8 @@ nlohmann::ordered_json evaluation_json(const Evaluation& evaluation, Time epoch)
     json["per_90_min"].push_back(statistics_json(s, epoch));
   }
   for (const auto& interval : evaluation.intervals) {
-    nlohmann::ordered_json item = {{"t_s", to_seconds(interval.corrected - epoch)},
-                                   {"observed_s", to_seconds(interval.observed)},
-                                   {"max_total_rad", interval.max_total_rad}};
-    item["passed_limit_after_s"] = interval.passed ? nlohmann::ordered_json(to_seconds(*interval.passed)) : nullptr;
+    nlohmann::ordered_json item = {{"t_s", to_seconds(interval.corrected - epoch)}};
+    item.update(interval_json(interval));
     json["corrections"].push_back(item);
   }
   return json;

@@ -1,4 +1,5 @@
 """The program as users run it: outputs, exit status, messages. Run by CTest with TRIHEDRON_BUILD naming the build directory."""
+import atexit
 import csv
 import json
 import os
@@ -6,19 +7,39 @@ import pathlib
 import resource
 import signal
 import subprocess
+import tempfile
 
 import pytest
 import xarray
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 PROGRAM = pathlib.Path(os.environ["TRIHEDRON_BUILD"]) / "trihedron"
-EXAMPLE = ROOT / "examples" / "pass.nc"
-
 TRUSTWORTHY, DO_NOT_USE, WRONG_USAGE, INPUT_REFUSED, MACHINE_FAILED = range(5)
 
 
 def run(*arguments, **options):
     return subprocess.run([str(PROGRAM), *map(str, arguments)], capture_output=True, text=True, **options)
+
+
+def simulated(scenario):
+    """A pass by this scenario in a directory that goes with the process."""
+    directory = tempfile.TemporaryDirectory()
+    atexit.register(directory.cleanup)
+    path = pathlib.Path(directory.name)
+    (path / "scenario.toml").write_text(scenario)
+    result = run("--quiet", "simulate", path / "scenario.toml", "-o", path / "pass.nc")
+    assert result.returncode == 0, result.stderr
+    return path / "pass.nc"
+
+
+# Half of the paper's experiment, all drift in eq. (1).
+EXAMPLE = simulated("""
+[scenario]
+seed = 1
+duration = "270min"
+[gyro.drift]
+outside_sigma = "0rad/s"
+""")
 
 
 def refused(result, status, *words):
@@ -181,6 +202,54 @@ def test_a_calibration_of_another_start_up_is_not_to_be_used(calibrated, tmp_pat
     result = run("navigate", EXAMPLE, "--calibration", other, "-o", tmp_path / "attitude.csv")
     assert result.returncode == DO_NOT_USE
     assert "DO NOT USE" in result.stdout
+
+
+def test_extension_of_the_correction_interval_by_attitude_files(calibrated, tmp_path):
+    out, _ = calibrated
+    for name, source in (("before", ["--prior"]), ("after", ["--calibration", out / "calibration.json"])):
+        run("navigate", EXAMPLE, *source, "-o", tmp_path / f"{name}.csv", "--correction-interval", "60min")
+    result = run("evaluate", EXAMPLE, "--attitude", tmp_path / "after.csv", "--before", tmp_path / "before.csv")
+    assert "correction interval extended ≥ " in result.stdout
+    extension = json.loads(run("--json", "evaluate", EXAMPLE, "--attitude", tmp_path / "after.csv", "--before",
+                               tmp_path / "before.csv").stdout)["extension"]
+    assert len(extension["corrections"]) == 5
+    assert extension["corrections"][1]["known_before"]["passed_limit_after_s"] < 1800
+    assert extension["corrections"][1]["calibrated"]["passed_limit_after_s"] is None
+    assert extension["is_lower_bound"] is True and extension["factor"] > 3
+
+
+def test_calibrate_measures_convergence_and_extension(tmp_path):
+    outcome = json.loads(run("calibrate", EXAMPLE, "-o", tmp_path / "out", "--json").stdout)
+    assert 0 < outcome["convergence"]["alignment_s"] < 90 * 60
+    assert len(outcome["convergence"]["states"]) == 20
+    assert [c["t_s"] for c in outcome["extension"]["corrections"]] == [0, 5400, 10800, 16200]
+    assert outcome["extension"]["factor"] > 3
+
+
+def test_demo_repeats_the_papers_experiment(tmp_path):
+    result = run("demo", "-o", tmp_path / "demo")
+    assert result.returncode == TRUSTWORTHY, result.stderr + result.stdout
+    assert "nis-out-of-bounds" in result.stdout  # a drift that eq. (1) does not contain
+    assert f"The report is {tmp_path / 'demo' / 'report.html'}" in result.stdout
+    assert sorted(f.name for f in (tmp_path / "demo").iterdir()) == [
+        "attitude.csv", "calibration.json", "effective-config.toml", "navigation.csv", "pass.nc", "report.html", "residuals.nc",
+        "scenario.toml"]
+    again = run("--quiet", "simulate", tmp_path / "demo" / "scenario.toml", "-o", tmp_path / "again.nc")
+    assert again.returncode == TRUSTWORTHY
+    assert (tmp_path / "again.nc").read_bytes() == (tmp_path / "demo" / "pass.nc").read_bytes()
+
+
+@pytest.mark.parametrize("scenario", sorted((ROOT / "examples").glob("*.toml")), ids=lambda path: path.stem)
+def test_examples_simulate_and_calibrate(scenario, tmp_path):
+    assert run("--quiet", "simulate", scenario, "-o", tmp_path / "pass.nc").returncode == TRUSTWORTHY
+    assert run("--quiet", "calibrate", tmp_path / "pass.nc", "-o", tmp_path / "out").returncode in (TRUSTWORTHY, DO_NOT_USE)
+
+
+def test_the_papers_example_says_the_defaults(tmp_path):
+    (tmp_path / "empty.toml").write_text("")
+    for name, scenario in (("empty", tmp_path / "empty.toml"), ("paper", ROOT / "examples" / "paper.toml")):
+        run("--quiet", "simulate", scenario, "-o", tmp_path / f"{name}.nc")
+    assert (tmp_path / "empty.nc").read_bytes() == (tmp_path / "paper.nc").read_bytes()
 
 
 def test_evaluation_without_truth_is_against_the_star_tracker(csv_pass, tmp_path):

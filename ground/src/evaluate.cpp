@@ -107,4 +107,43 @@ std::vector<CorrectionInterval> correction_intervals(const AttitudeErrors& error
   return intervals;
 }
 
+std::optional<double> IntervalPair::extension() const {
+  if (!known_before.passed || calibrated.observed == Duration::zero()) {
+    return std::nullopt;
+  }
+  // Passed at the very correction: it lasted less than the step of the reference.
+  const double before_s = std::max(to_seconds(*known_before.passed), 1.0);
+  return to_seconds(calibrated.passed.value_or(calibrated.observed)) / before_s;
+}
+
+std::optional<Extension> median_extension(const std::vector<IntervalPair>& pairs) {
+  std::vector<Extension> factors;
+  for (const IntervalPair& pair : pairs) {
+    if (const auto factor = pair.extension()) {
+      factors.push_back({*factor, !pair.calibrated.passed});
+    }
+  }
+  if (factors.empty()) {
+    return std::nullopt;
+  }
+  std::ranges::sort(factors, {}, &Extension::factor);
+  const auto median = factors.begin() + static_cast<std::ptrdiff_t>((factors.size() - 1) / 2);
+  return Extension{median->factor, std::any_of(factors.begin(), median + 1,
+                                               [](const Extension& factor) { return factor.is_lower_bound; })};
+}
+
+std::vector<IntervalPair> paired(const std::vector<CorrectionInterval>& known_before,
+                                 const std::vector<CorrectionInterval>& calibrated) {
+  std::vector<IntervalPair> pairs;
+  for (const CorrectionInterval& after : calibrated) {
+    const auto before = std::ranges::find_if(known_before, [&](const CorrectionInterval& interval) {
+      return std::chrono::abs(interval.corrected - after.corrected) <= std::chrono::seconds(2);
+    });
+    if (before != known_before.end()) {
+      pairs.push_back({*before, after});
+    }
+  }
+  return pairs;
+}
+
 }  // namespace trihedron::ground

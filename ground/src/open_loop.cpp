@@ -110,46 +110,28 @@ AttitudeHistory fly_open_loop(const Pass& pass, Time t, const std::vector<GyroCa
   return fly<Esg7>(pass, t, gyros, epochs);
 }
 
-std::optional<double> OpenLoops::extension() const {
-  if (!interval_known_before.passed || interval_calibrated.observed == Duration::zero()) {
-    return std::nullopt;
-  }
-  // A limit passed at the very correction has lasted one step of the reference at most.
-  const double before_s = std::max(to_seconds(*interval_known_before.passed), 1.0);
-  return to_seconds(interval_calibrated.passed.value_or(interval_calibrated.observed)) / before_s;
-}
-
-Extension measure_extension(const Pass& pass, const CalibrationRun& run, const std::vector<Time>& reference_t,
-                            const std::vector<Eigen::Quaterniond>& reference_q_in_c, double limit_rad) {
-  Extension result;
-  result.limit_rad = limit_rad;
+std::vector<OpenLoops> fly_open_loops(const Pass& pass, const CalibrationRun& run, const std::vector<Time>& reference_t,
+                                      const std::vector<Eigen::Quaterniond>& reference_q_in_c, double limit_rad) {
   const auto errors_of = [&](Time t, const std::vector<GyroCalibration>& gyros) {
     return attitude_errors(fly_open_loop(pass, t, gyros, reference_t), reference_t, reference_q_in_c);
   };
-  struct Factor {
-    double value;
-    bool is_lower_bound;
-  };
-  std::vector<Factor> factors;
+  std::vector<OpenLoops> all;
   for (const Correction& correction : run.corrections) {
     OpenLoops loops;
     loops.known_before = errors_of(correction.t, correction.known_before);
     loops.calibrated = errors_of(correction.t, correction.calibrated);
-    loops.interval_known_before = interval_of(loops.known_before, limit_rad);
-    loops.interval_calibrated = interval_of(loops.calibrated, limit_rad);
-    if (const auto factor = loops.extension(); factor && !result.loops.empty()) {
-      factors.push_back({*factor, !loops.interval_calibrated.passed});
-    }
-    result.loops.push_back(std::move(loops));
+    loops.intervals = {interval_of(loops.known_before, limit_rad), interval_of(loops.calibrated, limit_rad)};
+    all.push_back(std::move(loops));
   }
-  if (!factors.empty()) {
-    std::ranges::sort(factors, {}, &Factor::value);
-    const auto median = factors.begin() + static_cast<std::ptrdiff_t>((factors.size() - 1) / 2);
-    result.factor = median->value;
-    result.is_lower_bound =
-        std::any_of(factors.begin(), median + 1, [](const Factor& factor) { return factor.is_lower_bound; });
+  return all;
+}
+
+std::optional<Extension> median_extension(const std::vector<OpenLoops>& loops) {
+  std::vector<IntervalPair> pairs;
+  for (std::size_t i = 1; i < loops.size(); ++i) {
+    pairs.push_back(loops[i].intervals);
   }
-  return result;
+  return median_extension(pairs);
 }
 
 }  // namespace trihedron::ground

@@ -25,7 +25,7 @@ constexpr double kArcsecond = std::numbers::pi / 180 / 3600;
 
 /// A mean NIS off its expectation by more than this part says that the noise is not what the filter was told, whatever
 /// the number of fixes; its sigmas are then off by half of it.
-constexpr double kNisTolerance = 0.05;
+constexpr double kNisTolerance = 0.025;
 /// …and by more than this, that the model is wrong: the error hides in the parameters.
 constexpr double kNisWrong = 0.25;
 /// Two nominal alignment accuracies of the system.

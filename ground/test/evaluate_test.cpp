@@ -112,5 +112,36 @@ TEST(CorrectionIntervals, AreUnknownWithoutAges) {
   EXPECT_TRUE(correction_intervals(errors, 1e-4).empty());
 }
 
+IntervalPair pair(std::optional<Duration> before, std::optional<Duration> after, Duration watched = minutes(100)) {
+  return {{at(seconds(0)), watched, before, 0}, {at(seconds(0)), watched, after, 0}};
+}
+
+TEST(Extension, IsTheRatioOfTheIntervals) {
+  EXPECT_EQ(pair(minutes(5), minutes(20)).extension(), 4);
+  EXPECT_EQ(pair(minutes(5), std::nullopt).extension(), 20);
+  EXPECT_EQ(pair(std::nullopt, minutes(20)).extension(), std::nullopt);
+  EXPECT_EQ(pair(minutes(5), std::nullopt, Duration::zero()).extension(), std::nullopt);
+  EXPECT_EQ(pair(Duration::zero(), minutes(1)).extension(), 60);
+}
+
+TEST(Extension, OfSeveralIsTheirMedianAndALowerBoundWhereOneThatBearsOnItIs) {
+  EXPECT_FALSE(median_extension(std::vector<IntervalPair>{}).has_value());
+  const auto exact =
+      median_extension({pair(minutes(5), minutes(20)), pair(minutes(5), std::nullopt), pair(minutes(5), minutes(10))});
+  EXPECT_EQ(exact->factor, 4);
+  EXPECT_FALSE(exact->is_lower_bound);
+  const auto bound =
+      median_extension({pair(minutes(5), minutes(20)), pair(minutes(50), std::nullopt), pair(minutes(5), minutes(30))});
+  EXPECT_EQ(bound->factor, 4);
+  EXPECT_TRUE(bound->is_lower_bound);
+}
+
+TEST(Extension, PairsCorrectionsOfTheSameTime) {
+  const auto corrected = [](int s) { return CorrectionInterval{at(seconds(s)), minutes(10), {}, 0}; };
+  const auto pairs = paired({corrected(0), corrected(5400)}, {corrected(1), corrected(900), corrected(5400)});
+  ASSERT_EQ(pairs.size(), 2U);
+  EXPECT_EQ(pairs[1].calibrated.corrected, at(seconds(5400)));
+}
+
 }  // namespace
 }  // namespace trihedron::ground

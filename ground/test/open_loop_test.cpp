@@ -80,28 +80,29 @@ TEST(OpenLoop, RefusesWhatItCannotFly) {
   EXPECT_THROW(static_cast<void>(fly_open_loop(pass, epochs[0], gyros, epochs)), SetupError);
 }
 
-TEST(Extension, IsMeasuredFromTheSecondCorrectionOn) {
+TEST(OpenLoops, MeasureTheExtensionFromTheSecondCorrectionOn) {
   const auto& [pass, truth, events] = three_hours();
   const CalibrationRun run = calibrate(pass, {});
   ASSERT_EQ(run.corrections.size(), 3U);
   EXPECT_EQ(run.corrections[1].t - run.corrections[0].t, minutes(90));
-  const Extension extension = measure_extension(pass, run, truth.t, truth.q_in_c, kLimit);
-  ASSERT_EQ(extension.loops.size(), 3U);
-  const OpenLoops& second = extension.loops[1];
-  ASSERT_TRUE(second.interval_known_before.passed);
-  EXPECT_LT(*second.interval_known_before.passed, minutes(15));
-  EXPECT_FALSE(second.interval_calibrated.passed);
-  EXPECT_EQ(second.interval_calibrated.observed, minutes(90));
-  EXPECT_DOUBLE_EQ(*extension.factor, to_seconds(minutes(90)) / to_seconds(*second.interval_known_before.passed));
-  EXPECT_TRUE(extension.is_lower_bound);
+  const auto loops = fly_open_loops(pass, run, truth.t, truth.q_in_c, kLimit);
+  ASSERT_EQ(loops.size(), 3U);
+  const auto& [before, after] = loops[1].intervals;
+  ASSERT_TRUE(before.passed);
+  EXPECT_LT(*before.passed, minutes(15));
+  EXPECT_FALSE(after.passed);
+  EXPECT_EQ(after.observed, minutes(90));
+  const auto extension = median_extension(loops);
+  ASSERT_TRUE(extension);
+  EXPECT_DOUBLE_EQ(extension->factor, to_seconds(minutes(90)) / to_seconds(*before.passed));
+  EXPECT_TRUE(extension->is_lower_bound);
   // The third is at the end of the pass: nothing to watch.
-  EXPECT_EQ(extension.loops[2].extension(), std::nullopt);
+  EXPECT_EQ(loops[2].intervals.extension(), std::nullopt);
 }
 
-TEST(Extension, IsExactWhereTheLimitIsPassed) {
+TEST(OpenLoops, WithBetterCoefficientsLastLonger) {
   const auto& [pass, truth, events] = three_hours();
   CalibrationRun run;
-  // Coefficients that are off by ten times as much let go of the attitude about ten times sooner.
   for (const std::size_t epoch : {0U, 600U, 1200U}) {
     Correction correction{truth.t[epoch], true_gyros(epoch), true_gyros(epoch)};
     for (std::size_t i = 0; i < 7; ++i) {
@@ -110,16 +111,11 @@ TEST(Extension, IsExactWhereTheLimitIsPassed) {
     }
     run.corrections.push_back(correction);
   }
-  const Extension extension = measure_extension(pass, run, truth.t, truth.q_in_c, kArcminute);
-  ASSERT_TRUE(extension.factor);
-  EXPECT_FALSE(extension.is_lower_bound);
-  EXPECT_GT(*extension.factor, 3);
-  EXPECT_LT(*extension.factor, 30);
-}
-
-TEST(Extension, IsAbsentWithoutCorrections) {
-  const auto& [pass, truth, events] = three_hours();
-  EXPECT_EQ(measure_extension(pass, {}, truth.t, truth.q_in_c, kLimit).factor, std::nullopt);
+  const auto extension = median_extension(fly_open_loops(pass, run, truth.t, truth.q_in_c, kArcminute));
+  ASSERT_TRUE(extension);
+  EXPECT_FALSE(extension->is_lower_bound);
+  EXPECT_GT(extension->factor, 3);
+  EXPECT_LT(extension->factor, 30);
 }
 
 }  // namespace

@@ -276,6 +276,30 @@ const FIGURES = {
     return { traces, layout };
   },
 
+  open_loops(data, look) {
+    const { colour } = look;
+    const { loops, limit } = data.open_loops;
+    const layout = baseLayout(look, look.print ? 300 : 420);
+    const longest = Math.max(...loops.map(({ calibrated }) => calibrated.t.at(-1)));
+    layout.xaxis = { ...axisStyle(colour), title: axisTitle("time since the correction, min", 8), range: [0, longest],
+      dtick: timeTick(longest, look.width), tick0: 0, hoverformat: ".1f" };
+    layout.yaxis = { ...axisStyle(colour), type: "log", title: axisTitle("total error, ″", 6), dtick: 1 };
+    layout.shapes.push(level(limit, panel(0), colour.ink, "dot", 1.4));
+    layout.annotations.push({ text: `${Number((limit / 60).toPrecision(3))}′`, xref: "paper", yref: "y", x: 1, y: Math.log10(limit),
+      xanchor: "right", yanchor: "bottom", showarrow: false, font: { color: colour.ink } });
+    const drawn = ({ t, y }, corrected, kind, style) => line(t, y[0], panel(0), { line: style,
+      hovertemplate: `%{x:.1f} min after: %{y:.3~g}″<extra>corrected at ${Math.round(corrected)} min, ${kind}</extra>` });
+    const traces = loops.flatMap(({ corrected, known_before, calibrated }, i) => [
+      drawn(known_before, corrected, "known before", { color: faded(colour.vermillion, 0.8), dash: "dash", width: 1 }),
+      // At the first nothing is calibrated yet. The later the correction, the fuller the colour.
+      ...(i === 0 ? [] : [drawn(calibrated, corrected, "calibrated",
+        { color: faded(colour.blue, 0.35 + (0.65 * i) / (loops.length - 1)), width: 1.6 })]),
+    ]);
+    traces.push(legendOnly("known before", { color: colour.vermillion, dash: "dash", width: 1.2 }),
+      legendOnly("calibrated", { color: colour.blue, width: 1.6 }), legendOnly("limit", { color: colour.ink, dash: "dot", width: 1.4 }));
+    return { traces, layout };
+  },
+
   innovations(data, look) {
     const { colour } = look;
     const columns = look.width < 640 ? 1 : 2;

@@ -46,6 +46,7 @@ class Figures {
     if (input_.evaluation) {
       put("navigation", errors(input_.evaluation->navigation, kArcminute_rad));
       put("attitude", errors(input_.evaluation->attitude, kArcsecond_rad));
+      put("open_loops", open_loops());
     }
     put("innovations", innovations());
     put("histogram", histogram());
@@ -113,6 +114,26 @@ class Figures {
       axes.push_back(series.drawn(kWide));
     }
     return axes;
+  }
+
+  /// Per correction the total error over the time since it, ″.
+  [[nodiscard]] json open_loops() const {
+    const auto total = [&](const ground::AttitudeErrors& errors) {
+      Series series(1, fix_step_min_);
+      for (std::size_t i = 0; i < errors.t.size(); ++i) {
+        series.add(errors.age_s[i] / 60, {errors.error_rad[i].norm() / kArcsecond_rad});
+      }
+      return series.drawn(kHalf / 2);
+    };
+    json loops = json::array();
+    for (const ground::OpenLoops& one : input_.evaluation->open_loops) {
+      if (one.calibrated.t.size() > 1 && one.known_before.t.size() > 1) {
+        loops.push_back({{"corrected", rounded(minutes(one.calibrated.t.front()), 6)},
+                         {"known_before", total(one.known_before)},
+                         {"calibrated", total(one.calibrated)}});
+      }
+    }
+    return loops.empty() ? loops : json{{"limit", input_.evaluation->limit_rad / kArcsecond_rad}, {"loops", loops}};
   }
 
   /// Per component the used ones with their sigmas, and the ones that the gate rejected.

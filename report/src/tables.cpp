@@ -145,16 +145,22 @@ json stretches_of(const ReportInput& input, const ground::AttitudeErrors& errors
   return rows;
 }
 
-json intervals_of(const ReportInput& input) {
+json open_loop_rows(const ReportInput& input) {
+  const auto in_words = [](const ground::CorrectionInterval& interval) {
+    return interval.passed ? number(to_minutes(*interval.passed), 1) : "> " + number(to_minutes(interval.observed), 0);
+  };
   json rows = json::array();
-  for (const ground::CorrectionInterval& interval : input.evaluation->intervals) {
-    if (interval.observed == Duration::zero()) {
+  for (const ground::OpenLoops& loops : input.evaluation->open_loops) {
+    const auto& [before, after] = loops.intervals;
+    if (after.observed == Duration::zero()) {  // corrected at the end of the pass
       continue;
     }
-    rows.push_back({{"corrected", number(to_minutes(interval.corrected - input.pass.settings.epoch), 0)},
-                    {"observed", number(to_minutes(interval.observed), 0)},
-                    {"passed", interval.passed ? number(to_minutes(*interval.passed), 1) + " min" : "not passed"},
-                    {"total", number(interval.max_total_rad / kArcminute_rad, 2)}});
+    const auto extension = loops.intervals.extension();
+    rows.push_back({{"corrected", number(to_minutes(after.corrected - input.pass.settings.epoch), 0)},
+                    {"before", in_words(before)},
+                    {"after", in_words(after)},
+                    {"extension", extension ? (after.passed ? "" : "≥ ") + significant(*extension, 2) : "—"},
+                    {"total", number(after.max_total_rad / kArcminute_rad, 2)}});
   }
   return rows;
 }
@@ -167,8 +173,7 @@ json evaluation_of(const ReportInput& input) {
   return {{"reference", evaluation.reference},
           {"navigation", stretches_of(input, evaluation.navigation, kArcminute_rad)},
           {"attitude", stretches_of(input, evaluation.attitude, kArcsecond_rad)},
-          {"intervals", intervals_of(input)},
-          {"has_intervals", !evaluation.intervals.empty()},
+          {"open_loops", open_loop_rows(input)},
           {"limit", fmt::format("{:.3g}", evaluation.limit_rad / kArcminute_rad)}};
 }
 

@@ -170,27 +170,20 @@ json convergence_number(const std::vector<Parameter>& parameters, bool alignment
 }
 
 json extension_number(const ReportInput& input) {
-  if (!input.evaluation || input.evaluation->intervals.size() < 2) {
+  if (!input.evaluation) {
     return nullptr;
   }
-  const auto& intervals = input.evaluation->intervals;
-  const std::string limit = fmt::format("{:.3g}", input.evaluation->limit_rad / kArcminute_rad) + "′";
-  const ground::CorrectionInterval& before = intervals.front();
-  // A stretch cut short by the end of the pass says little.
-  const bool cut = intervals.back().observed < before.observed / 2 && !intervals.back().passed && intervals.size() > 2;
-  const ground::CorrectionInterval& after = cut ? intervals[intervals.size() - 2] : intervals.back();
-  const auto in_words = [](const ground::CorrectionInterval& interval) {
-    return interval.passed ? span(*interval.passed) : "more than " + span(interval.observed);
-  };
-  const std::string note = fmt::format("the error passes {} {} after the first correction, {} after the last", limit,
-                                       in_words(before), in_words(after));
-  if (!before.passed) {
-    return figure_of_merit("Correction interval", "≥ " + number(to_minutes(after.passed.value_or(after.observed)), 0),
-                           " min", note);
+  const auto extension = ground::median_extension(input.evaluation->open_loops);
+  if (!extension) {
+    return nullptr;
   }
-  const double ratio = to_seconds(after.passed.value_or(after.observed)) / std::max(1.0, to_seconds(*before.passed));
-  return figure_of_merit("Correction interval extended", (after.passed ? "" : "≥ ") + significant(ratio, 2), " ×",
-                         note + "; the paper: 3–5 times");
+  return figure_of_merit(
+      "Correction interval extended", (extension->is_lower_bound ? "≥ " : "") + significant(extension->factor, 2), " ×",
+      fmt::format(
+          "time until the error passes {:.3g}′, with the calibrated values over those known before; median over "
+          "the corrections; the paper: 3–5 times{}",
+          input.evaluation->limit_rad / kArcminute_rad,
+          extension->is_lower_bound ? "; the pass ended before the limit was passed" : ""));
 }
 
 json nis_number(const ReportInput& input) {

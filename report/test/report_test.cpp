@@ -118,16 +118,24 @@ TEST(Report, SpeaksOfTruthOnlyWhereItIsKnown) {
 }
 
 TEST(Report, GivesTheExtensionOfTheCorrectionInterval) {
-  // The error passes 5′ some 40 min after the first correction, and not within 90 min later.
-  EXPECT_THAT(render(nine_hours().judged()), HasSubstr("Correction interval extended"));
+  // 5′ at 2e-6 and 1e-7 rad/s: a ratio of 20; the late corrections outlast the pass.
+  const std::string html = render(nine_hours().judged());
+  EXPECT_THAT(html, HasSubstr("Correction interval extended"));
+  EXPECT_THAT(html, HasSubstr("<strong>≥ 19<span class=\"unit\"> ×</span></strong>"));
 }
 
 TEST(Report, GivesALowerBoundWhereTheLimitIsNotPassedAnyMore) {
   test::SyntheticRun run = short_run();
   const Time start = run.pass.settings.epoch;
   using std::chrono::minutes;
-  run.evaluation.intervals = {{start, minutes(90), minutes(20), 0.01}, {start + minutes(90), minutes(90), {}, 0.0001}};
-  EXPECT_THAT(render(run.judged()), HasSubstr("<strong>≥ 4.5<span class=\"unit\"> ×</span></strong>"));
+  const auto interval = [&](std::optional<Duration> passed) {
+    return ground::CorrectionInterval{start + minutes(90), minutes(90), passed, 0};
+  };
+  run.evaluation.open_loops.resize(2);
+  run.evaluation.open_loops[1].intervals = {interval(minutes(20)), interval({})};
+  const std::string html = render(run.judged());
+  EXPECT_THAT(html, HasSubstr("<strong>≥ 4.5<span class=\"unit\"> ×</span></strong>"));
+  EXPECT_THAT(html, HasSubstr("<td>20.0</td><td>&gt; 90</td><td>≥ 4.5</td>"));
 }
 
 TEST(Report, TellsWhatWasRejected) {

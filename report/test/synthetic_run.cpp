@@ -201,7 +201,28 @@ class Generator {
       out_.run.attitude.q_in_c.push_back(attitude(t_s));
       out_.run.attitude.sigma_rad.push_back(sigma_rad);
     }
-    evaluation.intervals = ground::correction_intervals(evaluation.navigation, evaluation.limit_rad);
+    make_open_loops();
+  }
+
+  /// The error grows as a share of the time since the correction, the smaller the later the correction.
+  void make_open_loops() {
+    auto& evaluation = out_.evaluation;
+    const double end_s = seconds(out_.run.fixes.back().t);
+    for (double from_s = 0; from_s <= end_s; from_s += 5400) {
+      const auto grown = [&](double rad_per_s) {
+        ground::AttitudeErrors errors;
+        for (double age_s = 0; from_s + age_s <= end_s; age_s += 30) {
+          errors.t.push_back(at(from_s + age_s));
+          errors.error_rad.emplace_back(2 * kArcsecond_rad, rad_per_s * age_s, 0);
+          errors.age_s.push_back(age_s);
+        }
+        return errors;
+      };
+      ground::OpenLoops loops{grown(2e-6), grown(from_s == 0 ? 2e-6 : 1e-7), {}};
+      loops.intervals = {ground::correction_intervals(loops.known_before, evaluation.limit_rad).front(),
+                         ground::correction_intervals(loops.calibrated, evaluation.limit_rad).front()};
+      evaluation.open_loops.push_back(loops);
+    }
   }
 
   void make_angle() {

@@ -48,4 +48,26 @@ struct CorrectionInterval {
 /// Empty where `errors` does not know the ages.
 [[nodiscard]] std::vector<CorrectionInterval> correction_intervals(const AttitudeErrors& errors, double limit_rad);
 
+/// The same astro-correction with the parameters known before a calibration, and with those calibrated.
+struct IntervalPair {
+  CorrectionInterval known_before;
+  CorrectionInterval calibrated;
+
+  /// Interval with calibrated over interval with known parameters; a lower bound where the calibrated one did not pass
+  /// the limit while it was watched. Absent where the known one did not, or nothing was watched.
+  [[nodiscard]] std::optional<double> extension() const;
+};
+
+/// Extension of the correction interval (the paper claims 3–5): the median over corrections.
+struct Extension {
+  double factor = 0;
+  bool is_lower_bound = false;  ///< a correction that bears on the median outlasted the time it was watched
+};
+/// Absent where no pair has one.
+[[nodiscard]] std::optional<Extension> median_extension(const std::vector<IntervalPair>& pairs);
+
+/// Pairs of corrections at the same time, within two seconds; others have no partner.
+[[nodiscard]] std::vector<IntervalPair> paired(const std::vector<CorrectionInterval>& known_before,
+                                               const std::vector<CorrectionInterval>& calibrated);
+
 }  // namespace trihedron::ground

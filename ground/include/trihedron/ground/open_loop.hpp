@@ -1,6 +1,6 @@
 #pragma once
 /// How long the attitude holds without the star tracker: open loops from the astro-corrections of a calibration to the
-/// end of the pass, and the extension of the correction interval.
+/// end of the pass.
 
 #include <optional>
 #include <vector>
@@ -15,31 +15,20 @@ namespace trihedron::ground {
 [[nodiscard]] AttitudeHistory fly_open_loop(const Pass& pass, Time t, const std::vector<GyroCalibration>& gyros,
                                             const std::vector<Time>& epochs);
 
-/// The same astro-correction with the parameters known before the pass, and with those calibrated until then.
+/// Both open loops from one of the corrections of a calibration to the end of the pass.
 struct OpenLoops {
   AttitudeErrors known_before;
   AttitudeErrors calibrated;
-  CorrectionInterval interval_known_before;
-  CorrectionInterval interval_calibrated;
-
-  /// Interval with calibrated over interval with known parameters; a lower bound where the calibrated one did not pass
-  /// the limit before the end of the pass. Absent where the known one did not.
-  [[nodiscard]] std::optional<double> extension() const;
+  IntervalPair intervals;
 };
 
-struct Extension {
-  double limit_rad = 0;
-  std::vector<OpenLoops> loops;  ///< one per astro-correction
-  /// Median over the loops from the second correction on: the first has nothing calibrated yet. Absent where there is
-  /// none.
-  std::optional<double> factor;
-  bool is_lower_bound = false;  ///< some loop that bears on the median outlasted the pass
-};
+/// From each of the run's corrections, against a reference attitude.
+[[nodiscard]] std::vector<OpenLoops> fly_open_loops(const Pass& pass, const CalibrationRun& run,
+                                                    const std::vector<Time>& reference_t,
+                                                    const std::vector<Eigen::Quaterniond>& reference_q_in_c,
+                                                    double limit_rad);
 
-/// Flies both open loops from each of the run's corrections against a reference attitude. Mathematics: extension of the
-/// correction interval (paper: 3–5).
-[[nodiscard]] Extension measure_extension(const Pass& pass, const CalibrationRun& run,
-                                          const std::vector<Time>& reference_t,
-                                          const std::vector<Eigen::Quaterniond>& reference_q_in_c, double limit_rad);
+/// Over the corrections from the second on: at the first nothing is calibrated yet.
+[[nodiscard]] std::optional<Extension> median_extension(const std::vector<OpenLoops>& loops);
 
 }  // namespace trihedron::ground

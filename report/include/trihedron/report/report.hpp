@@ -7,6 +7,7 @@
 
 #include "trihedron/ground/calibrate.hpp"
 #include "trihedron/ground/evaluate.hpp"
+#include "trihedron/ground/open_loop.hpp"
 #include "trihedron/records/pass.hpp"
 
 namespace trihedron::report {
@@ -14,10 +15,10 @@ namespace trihedron::report {
 /// What the attitude of a run is compared with, and how far off it was.
 struct Evaluation {
   std::string reference;  ///< in words, as in "the error against …": "the simulated truth", "the star tracker"
-  ground::AttitudeErrors navigation;                  ///< of CalibrationRun::navigation
-  ground::AttitudeErrors attitude;                    ///< of CalibrationRun::attitude
-  std::vector<ground::CorrectionInterval> intervals;  ///< of `navigation`; may be empty
-  double limit_rad = 0;                               ///< that the intervals stand for
+  ground::AttitudeErrors navigation;          ///< of CalibrationRun::navigation
+  ground::AttitudeErrors attitude;            ///< of CalibrationRun::attitude
+  std::vector<ground::OpenLoops> open_loops;  ///< from the run's corrections; may be empty
+  double limit_rad = 0;                       ///< that their intervals stand for
 };
 
 /// Refers to its parts; they must outlive it. Sections whose data are absent or empty are left out of the report.

@@ -1,0 +1,28 @@
+#pragma once
+/// What commands and the demonstration have in common: each reads its files, does its work, writes and prints.
+
+#include <filesystem>
+#include <optional>
+#include <string>
+
+#include "commands.hpp"
+#include "trihedron/records/options.hpp"
+#include "trihedron/records/scenario.hpp"
+
+namespace trihedron::cli {
+
+/// `name`: of the scenario, for a refusal.
+void simulate_pass(const Scenario& scenario, const std::string& name, const std::filesystem::path& pass,
+                   const Common& common);
+
+/// Writes calibration.json, attitude.csv, residuals.nc, report.html and effective-config.toml into `out`.
+[[nodiscard]] ExitStatus calibrate_pass(const std::filesystem::path& pass, const CalibrationOptions& options,
+                                        const std::filesystem::path& out, const Common& common);
+
+/// `calibration`: a file whose values replace those known before the pass.
+[[nodiscard]] ExitStatus navigate_pass(const std::filesystem::path& pass,
+                                       const std::optional<std::filesystem::path>& calibration,
+                                       const CalibrationOptions& options, const std::filesystem::path& attitude,
+                                       const Common& common);
+
+}  // namespace trihedron::cli

@@ -1,0 +1,175 @@
+#!/usr/bin/python3
+"""Measures what docs/validation.md tells, and writes its tables: validate.py PROGRAM DOCUMENT.
+
+Each table stands between `<!-- NAME -->` and `<!-- end -->`; the text around it is left alone.
+"""
+import json
+import math
+import pathlib
+import re
+import statistics
+import subprocess
+import sys
+import tempfile
+
+ARCSECOND = math.pi / 180 / 3600
+SEEDS = range(11, 21)
+
+
+class Bench:
+    """Runs the program in a directory of its own."""
+
+    def __init__(self, program, directory):
+        self.program, self.directory = program, directory
+
+    def run(self, *arguments):
+        result = subprocess.run([self.program, *map(str, arguments)], cwd=self.directory, capture_output=True, text=True)
+        if result.returncode > 1:
+            raise RuntimeError(result.stderr)
+        return result.stdout
+
+    def calibrated(self, scenario):
+        """A pass by this scenario, calibrated: what `calibrate --json` prints, and the errors of the alignments, rad."""
+        (self.directory / "scenario.toml").write_text(scenario)
+        self.run("--quiet", "simulate", "scenario.toml", "-o", "pass.nc")
+        outcome = json.loads(self.run("--json", "calibrate", "pass.nc", "-o", "out", "--estimator", "paper"))
+        text = self.run("calibrate", "pass.nc", "-o", "out", "--estimator", "paper")
+        rows = [line.split() for line in text.splitlines() if line.strip().startswith("align_")]
+        outcome["alignment_error_rad"] = [float(row[4].rstrip("″")) * ARCSECOND for row in rows]
+        outcome["alignment_sigma_rad"] = [float(row[3].rstrip("″")) * ARCSECOND for row in rows]
+        return outcome
+
+
+def table(heads, rows):
+    return "\n".join("| " + " | ".join(row) + " |" for row in [heads, ["---"] * len(heads), *rows])
+
+
+def minutes_of(values):
+    """Median of settling times where None is never."""
+    known = [v / 60 for v in values if v is not None]
+    if len(known) * 2 <= len(values):
+        return f"not by the end in {len(values) - len(known)} of {len(values)}"
+    padded = sorted(known) + [math.inf] * (len(values) - len(known))
+    late = len(values) - len(known)
+    return f"{padded[(len(padded) - 1) // 2]:.0f} min" + (f"; not by the end in {late} of {len(values)}" if late else "")
+
+
+def angle(rad):
+    return f"{rad / ARCSECOND:.1f}″" if rad < 60 * ARCSECOND else f"{rad / ARCSECOND / 60:.0f}′"
+
+
+def span(values):
+    low, high = min(values), max(values)
+    return f"{angle(low)} … {angle(high)}"
+
+
+def extension_of(runs):
+    factors = sorted((run["extension"]["factor"], run["extension"]["is_lower_bound"]) for run in runs)
+    middle = (len(factors) - 1) // 2
+    bound = any(lower for _, lower in factors[: middle + 1])
+    return f"{'≥ ' if bound else ''}{factors[middle][0]:.0f}"
+
+
+def known_interval(runs, which):
+    """Minutes until 5′, median over all corrections of all runs, those of the first correction apart."""
+    values = []
+    for run in runs:
+        for correction in run["extension"]["corrections"][1:]:
+            interval = correction[which]
+            if interval["observed_s"] > 0:
+                values.append((interval["passed_limit_after_s"] or interval["observed_s"], interval["passed_limit_after_s"] is None))
+    values.sort()
+    middle = (len(values) - 1) // 2
+    bound = any(lower for _, lower in values[: middle + 1])
+    return f"{'> ' if bound else ''}{values[middle][0] / 60:.1f} min"
+
+
+def per_stretch(run):
+    return [stretch["max_total_rad"] for stretch in run["navigation"]["per_90_min"] if stretch["epochs"] > 1]
+
+
+def scenario_of(seed, outside, extra=""):
+    return f'[scenario]\nseed = {seed}\n[gyro]\n{extra}[gyro.drift]\noutside_sigma = "{outside}rad/s"\n'
+
+
+def paper_claims(bench):
+    kinds = {"0": [], "1e-8": [], "1e-7": []}
+    for outside, runs in kinds.items():
+        for seed in SEEDS:
+            runs.append(bench.calibrated(scenario_of(seed, outside)))
+    columns = list(kinds.values())
+    rows = [
+        ["alignment settled", "one orbit, about 90 min"] + [minutes_of([r["convergence"]["alignment_s"] for r in c]) for c in columns],
+        ["drift coefficients settled", "200–300 min"] + [minutes_of([r["convergence"]["drift_s"] for r in c]) for c in columns],
+        ["largest error, first 90 min", "15′ in roll and heading"] + [span([per_stretch(r)[0] for r in c]) for c in columns],
+        ["… second 90 min", "falling"] + [span([per_stretch(r)[1] for r in c]) for c in columns],
+        ["… last 90 min", "falling"] + [span([per_stretch(r)[-1] for r in c]) for c in columns],
+        ["open loop within 5′, known before", ""] + [known_interval(c, "known_before") for c in columns],
+        ["open loop within 5′, calibrated", ""] + [known_interval(c, "calibrated") for c in columns],
+        ["correction interval extended", "3–5 times"] + [extension_of(c) + " times" for c in columns],
+        ["alignment error, rms of all axes", ""] + [
+            angle(math.sqrt(statistics.mean(e * e for r in c for e in r["alignment_error_rad"]))) for c in columns],
+        ["mean NIS, 4 expected", ""] + [f"{statistics.mean(r['calibration']['statistics']['nis_mean'] for r in c):.2f}" for c in columns],
+    ]
+    return table(["", "the paper", "all drift in eq. (1)", "1e-8 rad/s outside", "1e-7 rad/s outside"], rows)
+
+
+def seeds(bench):
+    rows = []
+    for seed in SEEDS:
+        run = bench.calibrated(scenario_of(seed, "0"))
+        pitch = [run["alignment_error_rad"][i] for i in (1, 4)]
+        sigma = [run["alignment_sigma_rad"][i] for i in (1, 4)]
+        rest = [abs(run["alignment_error_rad"][i]) for i in (0, 2, 3, 5)]
+        rows.append([
+            str(seed),
+            " ".join(f"{v / ARCSECOND:+.2f}″" for v in pitch),
+            " ".join(f"{v / ARCSECOND:.2f}″" for v in sigma),
+            f"{max(rest) / ARCSECOND:.2f}″",
+            f"{run['calibration']['statistics']['nis_mean']:.3f}",
+            " ".join(angle(v) for v in per_stretch(run)),
+        ])
+    return table(["seed", "pitch alignment error, gyro 1, 2", "claimed 1σ", "other axes, largest", "NIS",
+                  "largest open-loop error per 90 min"], rows)
+
+
+def one_degree(bench):
+    rows = []
+    for seed in (1, 2, 3):
+        run = bench.calibrated(scenario_of(seed, "0", 'misalignment_magnitude = "1deg"\nalignment_prior_sigma = "1deg"\n'))
+        worst = max(abs(v) for v in run["alignment_error_rad"])
+        restarts = run["fixes"].get("used, filter restarted", 0)
+        rows.append([str(seed), f"{worst / ARCSECOND:.2f}″", f"{run['calibration']['statistics']['nis_mean']:.3f}", str(restarts)])
+    return table(["seed", "alignment error, worst axis", "NIS", "begun anew"], rows)
+
+
+def steady(bench):
+    rows = []
+    for seed in (1, 2, 3, 4):
+        run = bench.calibrated(f'[scenario]\nseed = {seed}\n[attitude]\nslews = "none"\njitter = "0arcsec"\n[gyro.drift]\noutside_sigma = "0rad/s"\n')
+        codes = [finding["code"] for finding in run["calibration"]["verdict"]["findings"]]
+        rows.append([str(seed), f"{run['alignment_error_rad'][1] / ARCSECOND:+.0f}″", f"{run['alignment_sigma_rad'][1] / ARCSECOND:.0f}″",
+                     "yes" if run["calibration"]["verdict"]["trustworthy"] else "no: " + ", ".join(codes)])
+    return table(["seed", "pitch alignment error, gyro 1", "claimed 1σ", "trustworthy"], rows)
+
+
+TABLES = {"paper-claims": paper_claims, "seeds": seeds, "one-degree": one_degree, "steady": steady}
+
+
+def main():
+    program, document = pathlib.Path(sys.argv[1]).resolve(), pathlib.Path(sys.argv[2])
+    text = document.read_text()
+    with tempfile.TemporaryDirectory() as directory:
+        bench = Bench(program, pathlib.Path(directory))
+        for name, measure in TABLES.items():
+            pattern = re.compile(rf"(<!-- {name} -->\n).*?(<!-- end -->)", re.DOTALL)
+            if not pattern.search(text):
+                sys.exit(f"{document}: has no place for the table {name}")
+            measured = measure(bench)
+            text = pattern.sub(lambda place: place[1] + measured + "\n" + place[2], text)
+            print(f"{name}\n{measured}\n", flush=True)
+    document.write_text(text)
+
+
+if __name__ == "__main__":
+    main()
