@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <array>
 #include <map>
 #include <string>
 
@@ -62,6 +64,28 @@ void draw_of_gyro(std::uint64_t seed, int gyro, Draws& draws) {
   draws.add("readout noise" + suffix, Vector3d(readout.read({}, z, events)).head<2>());
 }
 
+/// ±1 for struck or not, where the chance is a half.
+double struck(const std::vector<Event>& events, Fault fault) {
+  return std::any_of(events.begin(), events.end(), [fault](const Event& e) { return e.fault == fault; }) ? 1 : -1;
+}
+
+/// The first fault of each kind. Later ones of two kinds on one stream would not meet, for they use it at different
+/// rates.
+void draw_faults_of_gyro(std::uint64_t seed, int gyro, Draws& draws) {
+  constexpr Duration kPeriod = std::chrono::milliseconds{125};
+  const ReadoutScenario scenario{
+      .dropout_probability = 0.5, .spike_probability = 0.5, .stuck_probability = 0.5, .stuck_s = 0.125};
+  Readout readout(scenario, kPeriod, seed, gyro);
+  const Vec<Case> z = Vec<Case>::assume(0, 0, 1);
+  std::vector<Event> first;
+  std::vector<Event> second;  // tells whether the readout has been stuck since the first
+  static_cast<void>(readout.read({}, z, first));
+  static_cast<void>(readout.read(Time{} + kPeriod, z, second));
+  draws.add("faults of gyro " + std::to_string(gyro),
+            std::array{struck(first, Fault::kReadoutDropout), struck(first, Fault::kReadoutSpike),
+                       struck(second, Fault::kReadoutStuck)});
+}
+
 /// A pass of one fix, attitude at rest but for jitter.
 Scenario one_fix(std::uint64_t seed) {
   Scenario scenario;
@@ -93,7 +117,12 @@ void draw_of_head(std::uint64_t seed, Draws& draws) {
   draws.add("field error", error_of_fix(simulate(scenario)));
   scenario = one_fix(seed);
   scenario.star_tracker.outlier_probability = 1;
-  draws.add("outlier", error_of_fix(simulate(scenario)));
+  scenario.star_tracker.wrong_sign_probability = 0.5;
+  const SimulatedPass wrong = simulate(scenario);
+  draws.add("outlier", error_of_fix(wrong));
+  scenario.star_tracker.dropout_probability = 0.5;
+  draws.add("faults of the tracker", std::array{struck(wrong.events, Fault::kFixWrongSign),
+                                                struck(simulate(scenario).events, Fault::kFixDropout)});
 }
 
 TEST(Independence, SourcesGyrosAndSeedsDrawApart) {
@@ -102,9 +131,11 @@ TEST(Independence, SourcesGyrosAndSeedsDrawApart) {
   for (std::uint64_t seed = 0; seed < kSeeds; ++seed) {
     draw_of_gyro(seed, 0, draws);
     draw_of_gyro(seed, 1, draws);
+    draw_faults_of_gyro(seed, 0, draws);
+    draw_faults_of_gyro(seed, 1, draws);
     draw_of_head(seed, draws);
   }
-  ASSERT_EQ(draws.by_name().size(), 2U * 40 + 12);
+  ASSERT_EQ(draws.by_name().size(), 2U * 43 + 14);
   const double band = test::kBand * test::correlation_sigma(kSeeds);
   for (auto a = draws.by_name().begin(); a != draws.by_name().end(); ++a) {
     EXPECT_LT(std::abs(test::mean(a->second)), test::kBand * std::sqrt(test::mean_square(a->second) / kSeeds))
