@@ -120,6 +120,7 @@ void draw_of_head(std::uint64_t seed, Draws& draws) {
   scenario.star_tracker.wrong_sign_probability = 0.5;
   const SimulatedPass wrong = simulate(scenario);
   draws.add("outlier", error_of_fix(wrong));
+  draws.add("size of outlier", std::array{error_of_fix(wrong).norm() - scenario.star_tracker.outlier_rad / 2});
   scenario.star_tracker.dropout_probability = 0.5;
   draws.add("faults of the tracker", std::array{struck(wrong.events, Fault::kFixWrongSign),
                                                 struck(simulate(scenario).events, Fault::kFixDropout)});
@@ -135,7 +136,7 @@ TEST(Independence, SourcesGyrosAndSeedsDrawApart) {
     draw_faults_of_gyro(seed, 1, draws);
     draw_of_head(seed, draws);
   }
-  ASSERT_EQ(draws.by_name().size(), 2U * 43 + 14);
+  ASSERT_EQ(draws.by_name().size(), 2U * 43 + 15);
   const double band = test::kBand * test::correlation_sigma(kSeeds);
   for (auto a = draws.by_name().begin(); a != draws.by_name().end(); ++a) {
     EXPECT_LT(std::abs(test::mean(a->second)), test::kBand * std::sqrt(test::mean_square(a->second) / kSeeds))
