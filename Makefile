@@ -10,7 +10,7 @@ help:
 	@echo 'make demo     install what is missing, build, repeat the experiment of the paper, say where the report is'
 	@echo 'make test     build and run all tests'
 	@echo 'make build    leaves the program at $(BUILD)/trihedron'
-	@echo 'make bench    measure: steps of the cycle, reading of a pass'
+	@echo 'make bench    measure: steps of the cycle, reading, writing and simulating a pass'
 	@echo 'make validation  measure again what docs/validation.md tells'
 	@echo 'make install  into PREFIX (default /usr/local)'
 	@echo 'make setup | format | lint | sanitize | coverage | clean'

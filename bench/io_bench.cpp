@@ -1,4 +1,4 @@
-// Reading a nine-hour pass, CSV and NetCDF.
+// Reading a nine-hour pass, CSV and NetCDF, and writing it.
 
 #include <benchmark/benchmark.h>
 
@@ -6,6 +6,7 @@
 
 #include "flight.hpp"
 #include "trihedron/io/pass.hpp"
+#include "trihedron/sim/simulate.hpp"
 
 namespace {
 
@@ -40,9 +41,7 @@ Pass nine_hours() {
   return pass;
 }
 
-void read(benchmark::State& state, const char* name) {
-  const fs::path path = fs::temp_directory_path() / name;
-  io::write_pass(path, nine_hours(), nullptr);
+std::int64_t bytes_of(const fs::path& path) {
   std::uintmax_t bytes = 0;
   if (fs::is_directory(path)) {
     for (const auto& file : fs::directory_iterator(path)) {
@@ -51,14 +50,33 @@ void read(benchmark::State& state, const char* name) {
   } else {
     bytes = fs::file_size(path);
   }
+  return static_cast<std::int64_t>(bytes);
+}
+
+void read(benchmark::State& state, const char* name) {
+  const fs::path path = fs::temp_directory_path() / name;
+  io::write_pass(path, nine_hours(), nullptr);
   for (auto _ : state) {
     benchmark::DoNotOptimize(io::read_pass(path));
   }
-  state.SetBytesProcessed(state.iterations() * static_cast<std::int64_t>(bytes));
+  state.SetBytesProcessed(state.iterations() * bytes_of(path));
+  fs::remove_all(path);
+}
+
+/// What `simulate` does after simulating.
+void write(benchmark::State& state, const char* name) {
+  const fs::path path = fs::temp_directory_path() / name;
+  const sim::SimulatedPass simulated = sim::simulate({});
+  for (auto _ : state) {
+    io::write_pass(path, simulated.pass, &simulated.truth);
+  }
+  state.counters["file_MB"] = static_cast<double>(bytes_of(path)) / 1e6;
   fs::remove_all(path);
 }
 
 BENCHMARK_CAPTURE(read, csv, "trihedron-bench-pass")->Unit(benchmark::kMillisecond);
 BENCHMARK_CAPTURE(read, netcdf, "trihedron-bench-pass.nc")->Unit(benchmark::kMillisecond);
+BENCHMARK_CAPTURE(write, csv, "trihedron-bench-written")->Unit(benchmark::kMillisecond);
+BENCHMARK_CAPTURE(write, netcdf, "trihedron-bench-written.nc")->Unit(benchmark::kMillisecond);
 
 }  // namespace

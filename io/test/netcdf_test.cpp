@@ -88,6 +88,24 @@ TEST_F(PassNetcdf, CoarserStepMakesASmallerFileAndARougherOne) {
   expect_same_pass(pass, read_pass(directory_ / "coarse.nc").pass, 5.01e-7, 0);
 }
 
+TEST_F(PassNetcdf, CoarserStepMakesASmallerFileOfALongPassToo) {
+  Pass pass = read_pass(file()).pass;
+  const GyroTelemetry once = pass.gyro;
+  while (pass.gyro.size() < 20'000) {
+    pass.gyro.t.push_back(pass.gyro.t.back() + std::chrono::milliseconds{125});
+    const std::size_t row = (pass.gyro.size() * 7919) % once.size();  // jumps, as noise makes them
+    const auto begin = once.h.begin() + static_cast<std::ptrdiff_t>(row * 6);
+    pass.gyro.h.insert(pass.gyro.h.end(), begin, begin + 6);
+  }
+  pass.gyro.h.resize(pass.gyro.size() * 6);
+  pass.settings.duration = pass.gyro.t.back() - pass.settings.epoch;
+  write_pass(directory_ / "fine.nc", pass, nullptr);
+  write_pass(directory_ / "coarse.nc", pass, nullptr, {.direction_step = 1e-4});
+  EXPECT_LT(2 * std::filesystem::file_size(directory_ / "coarse.nc"),
+            std::filesystem::file_size(directory_ / "fine.nc"));
+  expect_same_pass(pass, read_pass(directory_ / "fine.nc").pass, 2.51e-10, 0);
+}
+
 TEST_F(PassNetcdf, ValuesThatCannotBePackedAreNotLost) {
   Pass pass = read_pass(file()).pass;
   pass.gyro.h[0] = 17.25;

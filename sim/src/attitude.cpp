@@ -217,8 +217,13 @@ AttitudeSpline::AttitudeSpline(const std::vector<AttitudeSample>& samples) {
 }
 
 Quaterniond AttitudeSpline::at(double t_s) const {
-  const auto after = std::upper_bound(t_s_.begin() + 1, t_s_.end() - 1, t_s);
-  const auto i = static_cast<std::size_t>(after - t_s_.begin());
+  // Evenly spaced samples, the usual case, need no search.
+  const auto last = static_cast<double>(t_s_.size() - 1);
+  const double even = (t_s - t_s_.front()) / (t_s_.back() - t_s_.front()) * last;
+  auto i = static_cast<std::size_t>(std::clamp(std::floor(even), 0.0, last - 1)) + 1;
+  if (!(t_s_[i - 1] <= t_s && t_s < t_s_[i])) {
+    i = static_cast<std::size_t>(std::upper_bound(t_s_.begin() + 1, t_s_.end() - 1, t_s) - t_s_.begin());
+  }
   const double step = t_s_[i] - t_s_[i - 1];
   const double b = (t_s - t_s_[i - 1]) / step;
   const double a = 1 - b;

@@ -46,7 +46,18 @@ int checked_max_degree(const std::vector<DriftHarmonic>& members) {
 }  // namespace
 
 HarmonicField::HarmonicField(std::vector<DriftHarmonic> members)
-    : members_(std::move(members)), table_(checked_max_degree(members_)) {}
+    : members_(std::move(members)), table_(checked_max_degree(members_)) {
+  for (const DriftHarmonic& member : members_) {
+    const int order = std::abs(member.order);
+    auto term = std::ranges::find_if(
+        terms_, [&](const Term& candidate) { return candidate.degree == member.degree && candidate.order == order; });
+    if (term == terms_.end()) {
+      term = terms_.insert(term, {member.degree, order});
+    }
+    auto& amplitudes = member.potential == DriftHarmonic::Potential::kW ? term->w : term->d;
+    amplitudes[member.order < 0 ? 1 : 0] += member.amplitude_rad_s;
+  }
+}
 
 std::vector<DriftHarmonic> members_outside_eq1() {
   using Potential = DriftHarmonic::Potential;

@@ -94,7 +94,8 @@ StarTrackerTelemetry simulate_fixes(const StarTrackerScenario& head, const StarT
     if (!head.field_error_rad.isZero(0)) {
       error += field.after_move(view.attitude.rate(t_s).norm() * to_seconds(period));
     }
-    const Vector3d gross = outlier.direction() * outlier.uniform(0, head.outlier_rad);
+    const double gross_rad = outlier.uniform(0, head.outlier_rad);
+    const Vector3d gross = gross_rad * outlier.direction();
     const bool is_outlier = outlier.happens(head.outlier_probability);
     const bool is_wrong_sign = sign.happens(head.wrong_sign_probability);
     const bool is_dropped = dropout.happens(head.dropout_probability);

@@ -233,6 +233,19 @@ TEST(RecordedAttitude, PassesThroughItsSamplesWhateverTheirSigns) {
   EXPECT_LT(spline.at(254).angularDistance(orbital_attitude(orbit.at(254)).quaternion()), 1e-10);
 }
 
+TEST(RecordedAttitude, PassesThroughSamplesOfAnySpacing) {
+  const KeplerJ2 orbit{OrbitScenario{}};
+  std::vector<AttitudeSample> samples;
+  for (int i = 0; i < 30; ++i) {
+    const double t = i * i;
+    samples.push_back({t, orbital_attitude(orbit.at(t)).quaternion()});
+  }
+  const AttitudeSpline spline(samples);
+  for (const AttitudeSample& sample : samples) {
+    EXPECT_LT(spline.at(sample.t_s).angularDistance(sample.q_in_c), 1e-14);
+  }
+}
+
 TEST(RecordedAttitude, RefusesWhatItCannotJoin) {
   const Quaterniond one = Quaterniond::Identity();
   const Quaterniond far(Eigen::AngleAxisd(100 * kDegree, Vector3d::UnitX()));

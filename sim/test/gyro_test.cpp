@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cmath>
 
 #include "statistics.hpp"
@@ -111,6 +112,25 @@ TEST(Readout, QuantisationRoundsToItsMultiplesWithTheVarianceOfEvenError) {
               test::kBand * std::sqrt(0.8 / static_cast<double>(kSamples)));
 }
 
+TEST(Readout, QuantisationErrorIsWhiteAndHasNothingOfTheNoise) {
+  ReadoutScenario scenario;
+  scenario.quantum_rad = 0.5 * kArcsecond;  // a quarter of the noise, which makes the errors of neighbours independent
+  const std::vector<Vector3d> quantised = readings(scenario);
+  scenario.quantum_rad = 0;
+  const std::vector<Vector3d> fine = readings(scenario);
+  Sequence error;
+  Sequence noise;
+  for (std::size_t i = 0; i < kSamples; ++i) {
+    error.push_back(quantised[i].x() - fine[i].x());
+    noise.push_back(fine[i].x() - kDirection.raw().x());
+  }
+  const double band = test::kBand * test::correlation_sigma(kSamples);
+  EXPECT_NEAR(test::correlation(error, noise), 0, band);
+  for (std::size_t lag = 1; lag <= 8; ++lag) {
+    EXPECT_NEAR(test::correlation(error, error, lag), 0, band) << lag;
+  }
+}
+
 TEST(Readout, BiasAndScaleDistortTheDirectionCosines) {
   ReadoutScenario scenario = silent();
   scenario.bias_rad << 1e-5, -2e-5, 3e-5;
@@ -155,6 +175,30 @@ TEST(Readout, SpikesAreOnOneAxisWithinTheirLimit) {
   EXPECT_EQ(events.size(), spikes);
   EXPECT_LE(largest, scenario.spike_rad);
   EXPECT_GT(largest, 0.98 * scenario.spike_rad);  // of 1000 even draws: short of the limit by 1/1000 on average
+}
+
+TEST(Readout, SpikesAreEvenWithinTheirLimitAndOverTheAxes) {
+  ReadoutScenario scenario = silent();
+  scenario.spike_probability = 1;
+  std::array<double, 3> count{};
+  Sequence size;
+  for (const Vector3d& reading : readings(scenario)) {
+    const Vector3d error = reading - kDirection.raw();
+    Eigen::Index axis = 0;
+    error.cwiseAbs().maxCoeff(&axis);
+    ++count[static_cast<std::size_t>(axis)];
+    size.push_back(error(axis) / scenario.spike_rad);
+  }
+  const double n = static_cast<double>(kSamples);
+  for (const double spikes : count) {
+    EXPECT_NEAR(spikes, n / 3, test::kBand * std::sqrt(n * 2 / 9));
+  }
+  // Even in ±1: mean square 1/3, that of the square 1/5; the mean is 0.
+  EXPECT_NEAR(test::mean(size), 0, test::kBand / std::sqrt(3 * n));
+  EXPECT_NEAR(test::mean_square(size), 1.0 / 3, test::kBand * std::sqrt((1.0 / 5 - 1.0 / 9) / n));
+  for (std::size_t lag = 1; lag <= 4; ++lag) {
+    EXPECT_NEAR(test::correlation(size, size, lag), 0, test::kBand * test::correlation_sigma(kSamples)) << lag;
+  }
 }
 
 TEST(Readout, StuckSamplesRepeatForTheirTime) {

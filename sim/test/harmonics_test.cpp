@@ -113,6 +113,27 @@ TEST(Harmonics, GradientIsTheDerivativeAlongTheSphere) {
   }
 }
 
+TEST(Harmonics, FieldIsTheSumOfItsMembersHoweverTheyCome) {
+  const HarmonicTable table(HarmonicTable::kMaxDegree);
+  Stream stream(1, Source::kOutsideDrift);
+  std::vector<DriftHarmonic> members;
+  for (int i = 0; i < 200; ++i) {  // some twice
+    const int degree = 1 + static_cast<int>(stream.uniform() * HarmonicTable::kMaxDegree);
+    const int order = static_cast<int>(stream.uniform() * (2 * degree + 1)) - degree;
+    members.push_back({stream.happens(0.5) ? Potential::kW : Potential::kD, degree, order, stream.normal()});
+  }
+  const HarmonicField field(members);
+  for (const Vector3d& h : directions()) {
+    const auto y = table.at(h);
+    Vector3d expected = Vector3d::Zero();
+    for (const DriftHarmonic& member : members) {
+      const Vector3d gradient = member.amplitude_rad_s * y(member.degree, member.order).gradient;
+      expected += member.potential == Potential::kW ? Vector3d(-gradient) : Vector3d(h.cross(gradient));
+    }
+    EXPECT_LT((field.rate(h) - expected).norm(), 1e-12);  // rounding of 200 gradients of up to 20 each
+  }
+}
+
 TEST(Harmonics, RefuseWhatDoesNotExist) {
   EXPECT_THROW(HarmonicField({{Potential::kW, 2, 3, 1e-7}}), std::invalid_argument);
   EXPECT_THROW(HarmonicField({{Potential::kD, 0, 0, 1e-7}}), std::invalid_argument);

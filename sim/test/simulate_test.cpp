@@ -4,6 +4,7 @@
 
 #include <cmath>
 #include <future>
+#include <thread>
 
 #include "statistics.hpp"
 #include "trihedron/core/frames.hpp"
@@ -102,6 +103,35 @@ TEST(Simulate, GivesTheSamePassOnAnyThread) {
   for (std::future<SimulatedPass>& pass : elsewhere) {
     EXPECT_TRUE(same(here, pass.get()));
   }
+}
+
+TEST(Simulate, GivesEachPassAsAloneWhileOthersAreMade) {
+  std::vector<Scenario> scenarios;
+  for (const std::uint64_t seed : {0U, 1U, 0U, 2U}) {
+    scenarios.push_back(short_scenario(seed));
+    scenarios.back().star_tracker.aberration = StarTrackerScenario::Aberration::kUncorrected;
+  }
+  scenarios.back().gyros[0].drift.outside_sigma_rad_s = 1e-7;
+  std::vector<SimulatedPass> alone;
+  for (const Scenario& scenario : scenarios) {
+    alone.push_back(simulate(scenario));
+  }
+  for (const std::size_t threads : {2U, 4U}) {
+    std::vector<SimulatedPass> together(scenarios.size());
+    std::vector<std::jthread> running;
+    for (std::size_t first = 0; first < threads; ++first) {
+      running.emplace_back([&, first] {
+        for (std::size_t i = first; i < scenarios.size(); i += threads) {
+          together[i] = simulate(scenarios[i]);
+        }
+      });
+    }
+    running.clear();  // waits for all
+    for (std::size_t i = 0; i < scenarios.size(); ++i) {
+      EXPECT_TRUE(same(alone[i], together[i])) << i << " of " << threads << " threads";
+    }
+  }
+  EXPECT_TRUE(same(alone[0], alone[2]));
 }
 
 TEST(Simulate, SeedsDiffer) {

@@ -42,15 +42,16 @@ class HarmonicTable {
         re_[m] = h.x() * re_[m - 1] - h.y() * im_[m - 1];
         im_[m] = h.x() * im_[m - 1] + h.y() * re_[m - 1];
       }
-      for (int m = 0; m <= degree; ++m) {
-        q_[index(m, m)] = S(table.diagonal_[static_cast<std::size_t>(m)]);
-        for (int l = m + 1; l <= degree; ++l) {
+      // By degree, because the orders of one degree do not wait for each other.
+      for (int l = 0; l <= degree; ++l) {
+        for (int m = 0; m < l - 1; ++m) {
           const std::size_t i = index(l, m);
-          q_[i] = S(table.up_[i]) * h.z() * q_[index(l - 1, m)];
-          if (l > m + 1) {
-            q_[i] -= S(table.up_two_[i]) * q_[index(l - 2, m)];
-          }
+          q_[i] = S(table.up_[i]) * h.z() * q_[index(l - 1, m)] - S(table.up_two_[i]) * q_[index(l - 2, m)];
         }
+        if (l > 0) {
+          q_[index(l, l - 1)] = S(table.up_[index(l, l - 1)]) * h.z() * q_[index(l - 1, l - 1)];
+        }
+        q_[index(l, l)] = S(table.diagonal_[static_cast<std::size_t>(l)]);
       }
     }
 
@@ -121,14 +122,25 @@ class HarmonicField {
     const HarmonicTable::At<S> y = table_.at(h);
     Vector3<S> w = Vector3<S>::Zero();
     Vector3<S> d = Vector3<S>::Zero();
-    for (const DriftHarmonic& member : members_) {
-      Vector3<S>& potential = member.potential == DriftHarmonic::Potential::kW ? w : d;
-      potential += S(member.amplitude_rad_s) * y.polynomial_gradient(member.degree, member.order);
+    for (const Term& term : terms_) {
+      const Vector3<S> cosine = y.polynomial_gradient(term.degree, term.order);
+      const Vector3<S> sine = y.polynomial_gradient(term.degree, -term.order);
+      w += S(term.w[0]) * cosine + S(term.w[1]) * sine;
+      d += S(term.d[0]) * cosine + S(term.d[1]) * sine;
     }
     return h * h.dot(w) - w + h.cross(d);
   }
 
+  /// What the members of one degree and one |order| add up to, so that each polynomial is taken once.
+  struct Term {
+    int degree;
+    int order;                  ///< not negative
+    std::array<double, 2> w{};  ///< amplitudes of cosine and sine, rad/s
+    std::array<double, 2> d{};
+  };
+
   std::vector<DriftHarmonic> members_;
+  std::vector<Term> terms_;
   HarmonicTable table_;
 };
 
