@@ -37,10 +37,15 @@ struct Esg7 {
     return b;
   }
 
-  /// ω_b(h), rad/s, case axes. Eq. (1).
+  /// ω_b(h) = B(h) κ, rad/s, case axes, without the zeros of B. Eq. (1).
   template <class S>
   [[nodiscard]] static Vector3<S> rate(const Vector3<S>& h, const Coefficients<S>& kappa) {
-    return basis(h) * kappa;
+    const Vector3<S> s = h.cwiseProduct(h);
+    const S sum4 = s.squaredNorm();
+    return {
+        h(0) * (kappa(kK0) * (sum4 - s(0)) + kappa(kMu12) * s(1) - kappa(kMu31) * s(2)) + kappa(kNu23) * h(1) * h(2),
+        h(1) * (kappa(kK0) * (sum4 - s(1)) + kappa(kMu23) * s(2) - kappa(kMu12) * s(0)) + kappa(kNu31) * h(2) * h(0),
+        h(2) * (kappa(kK0) * (sum4 - s(2)) + kappa(kMu31) * s(0) - kappa(kMu23) * s(1)) + kappa(kNu12) * h(0) * h(1)};
   }
 
   /// ∂ω_b/∂h, rad/s, h taken as three free numbers. Eq. (1) differentiated.
