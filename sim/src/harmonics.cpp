@@ -55,7 +55,7 @@ HarmonicField::HarmonicField(std::vector<DriftHarmonic> members)
       term = terms_.insert(term, {member.degree, order});
     }
     auto& amplitudes = member.potential == DriftHarmonic::Potential::kW ? term->w : term->d;
-    amplitudes[member.order < 0 ? 1 : 0] += member.amplitude_rad_s;
+    amplitudes[member.order < 0 ? 1U : 0U] += member.amplitude_rad_s;
   }
 }
 
