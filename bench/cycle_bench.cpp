@@ -33,7 +33,7 @@ void filter_alone(benchmark::State& state) {
     for (std::size_t i = 0; i < flight().samples.size(); ++i) {
       const auto& h_b = flight().samples[i].h_b;
       if (estimator.started()) {
-        estimator.predict(make_trihedra(estimator.gyros(), h_b).value().C_in_c().raw(), h_b, 0.125);
+        estimator.predict(PaperEstimator<Esg7>::attitude(estimator.gyros(), h_b).value().C_in_c.raw(), h_b, 0.125);
       }
       if (fix < flight().fixes.size() && flight().fixes[fix].t <= flight().samples[i].t) {
         benchmark::DoNotOptimize(estimator.correct(flight().fixes[fix].q_in_c.toRotationMatrix(), h_b));
@@ -55,7 +55,7 @@ void dense_covariance_at_8_hz(benchmark::State& state) {
     Matrix P = Matrix::Identity() * 1e-6;
     std::size_t fix = 0;
     for (const auto& sample : flight().samples) {
-      const Eigen::Matrix3d C_in_c = make_trihedra(gyros, sample.h_b).value().C_in_c().raw();
+      const Eigen::Matrix3d C_in_c = PaperEstimator<Esg7>::attitude(gyros, sample.h_b).value().C_in_c.raw();
       const auto qi = Estimator::quasi_inertial(
           make_trihedron(Vec<In>::assume(gyros[0].h_in), Vec<In>::assume(gyros[1].h_in)).value());
       Matrix F = Matrix::Identity();

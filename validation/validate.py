@@ -12,6 +12,9 @@ import subprocess
 import sys
 import tempfile
 
+import numpy
+import xarray
+
 ARCSECOND = math.pi / 180 / 3600
 SEEDS = range(11, 21)
 
@@ -28,16 +31,46 @@ class Bench:
             raise RuntimeError(result.stderr)
         return result.stdout
 
-    def calibrated(self, scenario):
-        """A pass by this scenario, calibrated: what `calibrate --json` prints, and the errors of the alignments, rad."""
+    def simulated(self, scenario):
         (self.directory / "scenario.toml").write_text(scenario)
         self.run("--quiet", "simulate", "scenario.toml", "-o", "pass.nc")
+
+    def nees(self, estimator):
+        """Of the 20 parameters: squared errors over the covariance that the estimator claims; its alignments' errors, rad."""
+        self.run("--quiet", "calibrate", "pass.nc", "-o", "out", "--estimator", estimator)
+        calibration = json.loads((self.directory / "out" / "calibration.json").read_text())
+        with xarray.open_dataset(self.directory / "pass.nc", group="truth", decode_times=False) as data:
+            truth = json.loads(data.attrs["truth_json"])
+        error = []
+        for true, found in zip(truth["gyros"], calibration["gyros"]):
+            error += [a - b for a, b in zip(true["drift_rad_s"], found["drift_rad_s"].values())]
+            error += list(rotation_vector(rotation(true["lambda_rad"]) @ rotation(found["alignment_rotation_vector_rad"]).T))
+        error = numpy.array(error)
+        alignments = error[[7, 8, 9, 17, 18, 19]]
+        return error @ numpy.linalg.solve(numpy.array(calibration["covariance"]["matrix"]), error), alignments
+
+    def calibrated(self, scenario):
+        """A pass by this scenario, calibrated: what `calibrate --json` prints, and the errors of the alignments, rad."""
+        self.simulated(scenario)
         outcome = json.loads(self.run("--json", "calibrate", "pass.nc", "-o", "out", "--estimator", "paper"))
         text = self.run("calibrate", "pass.nc", "-o", "out", "--estimator", "paper")
         rows = [line.split() for line in text.splitlines() if line.strip().startswith("align_")]
         outcome["alignment_error_rad"] = [float(row[4].rstrip("″")) * ARCSECOND for row in rows]
         outcome["alignment_sigma_rad"] = [float(row[3].rstrip("″")) * ARCSECOND for row in rows]
         return outcome
+
+
+def rotation(vector):
+    """exp([v×])"""
+    x, y, z = vector
+    cross = numpy.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
+    angle = math.sqrt(x * x + y * y + z * z)
+    return numpy.eye(3) + numpy.sinc(angle / math.pi) * cross + 0.5 * numpy.sinc(angle / 2 / math.pi) ** 2 * cross @ cross
+
+
+def rotation_vector(matrix):
+    """Of a small rotation."""
+    return numpy.array([matrix[2, 1] - matrix[1, 2], matrix[0, 2] - matrix[2, 0], matrix[1, 0] - matrix[0, 1]]) / 2
 
 
 def table(heads, rows):
@@ -153,7 +186,36 @@ def steady(bench):
     return table(["seed", "pitch alignment error, gyro 1", "claimed 1σ", "trustworthy"], rows)
 
 
-TABLES = {"paper-claims": paper_claims, "seeds": seeds, "one-degree": one_degree, "steady": steady}
+def estimators(bench):
+    still = '[attitude]\nslews = "none"\njitter = "0arcsec"\n'
+    cases = [("slews", "", 30, "2e-6"), ("slews", "", 30, "1e-5"), ("slews", "", 1, "2e-6"), ("none", still, 1, "2e-6"),
+             ("none", still, 30, "2e-6"), ("none", still, 30, "1e-5")]
+    rows = []
+    for name, attitude, arcminutes, kappa in cases:
+        row = [name, f"{arcminutes}′", f"{kappa} rad/s"]
+        values = {"paper": [], "invariant": []}
+        errors = {"paper": [], "invariant": []}
+        for seed in SEEDS:
+            # The prior sigma per axis of a misalignment of this length in a random direction.
+            sigma = arcminutes / math.sqrt(3)
+            bench.simulated(f'[scenario]\nseed = {seed}\n{attitude}[gyro]\nmisalignment_magnitude = "{arcminutes}arcmin"\n'
+                            f'alignment_prior_sigma = "{sigma}arcmin"\n'
+                            f'[gyro.drift]\nprior_sigma = "{kappa}rad/s"\noutside_sigma = "0rad/s"\n')
+            for estimator in values:
+                nees, alignments = bench.nees(estimator)
+                values[estimator].append(nees)
+                errors[estimator].append(alignments)
+        for estimator in values:
+            row.append(f"{statistics.mean(values[estimator]):.1f}")
+        for estimator in values:
+            rms = numpy.sqrt(numpy.mean(numpy.square(errors[estimator]), axis=(0,)))
+            row.append(" ".join(angle(max(rms[axis], rms[3 + axis])) for axis in range(3)))
+        rows.append(row)
+    return table(["slews", "misalignment", "coefficients", "NEES, paper", "NEES, invariant", "alignment rms x y z, paper", "… invariant"],
+                 rows)
+
+
+TABLES = {"estimators": estimators, "paper-claims": paper_claims, "seeds": seeds, "one-degree": one_degree, "steady": steady}
 
 
 def main():

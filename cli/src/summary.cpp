@@ -145,6 +145,11 @@ std::string calibration_text(const ground::CalibrationRun& run, const std::optio
     const auto found = calibration.statistics.find(name);
     return found == calibration.statistics.end() ? std::nan("") : found->second;
   };
+  for (const FurtherEstimate& estimate : calibration.further) {
+    fmt::format_to(out, "{}  {:<24} {:>+13.4e} {:>12.1e}\n",
+                   &estimate == calibration.further.data() ? "\nStar tracker\n" : "", estimate.name, estimate.value,
+                   estimate.sigma);
+  }
   text += "\nFixes      ";
   for (const auto& [name, count] : run.fix_counts) {
     fmt::format_to(out, " {} {};", count, name);

@@ -146,6 +146,18 @@ def test_effective_config_repeats_the_run(calibrated, tmp_path):
     assert (tmp_path / "again" / "calibration.json").read_bytes() == (out / "calibration.json").read_bytes()
 
 
+def test_invariant_estimator_with_further_states(tmp_path):
+    (tmp_path / "config.toml").write_text(
+        'estimator = "invariant"\n[further_states]\nestimated = true\nwandering_drift = "1e-9rad/s"\nwandering_time = "30min"\n')
+    result = run("calibrate", EXAMPLE, "-o", tmp_path / "out", "--config", tmp_path / "config.toml")
+    assert result.returncode == TRUSTWORTHY, result.stderr + result.stdout
+    assert "clock_offset_s" in result.stdout
+    further = json.loads((tmp_path / "out" / "calibration.json").read_text())["further"]
+    assert len(further) == 7
+    assert abs(further["clock_offset_s"]["value"]) < 4 * further["clock_offset_s"]["sigma"] < 4e-3
+    assert "wandering_time = \"30min\"" in (tmp_path / "out" / "effective-config.toml").read_text()
+
+
 def test_json_is_one_document(tmp_path):
     result = run("calibrate", EXAMPLE, "-o", tmp_path / "out", "--json")
     summary = json.loads(result.stdout)
@@ -397,6 +409,9 @@ def test_a_field_that_is_no_number_is_named_with_line_and_column(csv_pass):
     ("[filter]\ngate = 3\n", "gate_nis"),
     ("[filter]\ngate_nis = -1\n", "gate_nis"),
     ("[filter]\nreopen_after_rejections = 0.5\n", "reopen_after_rejections"),
+    ("[further_states]\nestimated = 1\n", "estimated"),
+    ("[further_states]\nwandering_drift = \"-1e-8rad/s\"\n", "wandering_drift"),
+    ("[further_states]\nwandering_time = \"0h\"\n", "wandering_time"),
     ("[corrections]\ninterval = 90\n", "interval"),
     ("[corrections]\ninterval = \"-5min\"\n", "interval"),
     ("estimator = \"magic\"\n", "magic"),

@@ -1,7 +1,5 @@
 #include "trihedron/core/paper_estimator.hpp"
 
-#include <algorithm>
-
 namespace trihedron {
 
 template <class Model>
@@ -22,6 +20,7 @@ Result<PaperEstimator<Model>, SetupFault> PaperEstimator<Model>::create(const Se
   PaperEstimator estimator;
   estimator.setup_ = setup;
   estimator.gyros_ = setup.prior;
+  estimator.gate_ = OutlierGate(setup.gate_nis, setup.reopen_after_rejections, setup.restart_within_fixes);
   estimator.prior_.add_prior_of_constants(root.value());
   estimator.information_ = estimator.prior_;
   return estimator;
@@ -132,33 +131,24 @@ auto PaperEstimator<Model>::correct(const Eigen::Matrix3d& C_in_c, const Directi
   report.innovation = measurement.innovation;
   report.innovation_covariance = noise_factor.matrixL() * white * noise_factor.matrixL().transpose();
   report.nis = innovation_white.dot(white.llt().solve(innovation_white));
-  report.status = FixStatus::kUsed;
-  if (!(report.nis <= setup_.gate_nis)) {
-    report.rejections_in_a_row = ++rejections_in_a_row_;
-    if (rejections_in_a_row_ < setup_.reopen_after_rejections) {
-      report.status = FixStatus::kRejectedByGate;
+  report.status = gate_.judge(report.nis);
+  report.rejections_in_a_row = gate_.rejections_in_a_row();
+  switch (report.status) {
+    case FixStatus::kRejectedByGate:
       return report;
-    }
-    reopen(now, measurement.innovation, report);
+    case FixStatus::kRestarted:
+      // Information gathered about a far wrong estimate: linearise anew about the present one.
+      information_ = prior_;
+      break;
+    case FixStatus::kUsedAfterReopening:
+      add_direction_variance(measurement.innovation.squaredNorm() / kMeasurements);
+      update_covariance_to_now(now);
+      break;
+    default:
+      break;
   }
-  rejections_in_a_row_ = 0;
-  fixes_under_suspicion_ = std::max(fixes_under_suspicion_ - 1, 0);
   feed_back(information_.update(H_white, innovation_white));
   return report;
-}
-
-template <class Model>
-void PaperEstimator<Model>::reopen(const QuasiInertial& now, const Innovation& innovation, Report& report) {
-  if (fixes_under_suspicion_ > 0) {
-    // Information gathered about a far wrong estimate: linearise anew about the present one.
-    information_ = prior_;
-    report.status = FixStatus::kRestarted;
-  } else {
-    add_direction_variance(innovation.squaredNorm() / kMeasurements);
-    update_covariance_to_now(now);
-    report.status = FixStatus::kUsedAfterReopening;
-  }
-  fixes_under_suspicion_ = setup_.restart_within_fixes;
 }
 
 template <class Model>

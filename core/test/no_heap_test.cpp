@@ -9,6 +9,7 @@
 
 #include "flight.hpp"
 #include "trihedron/core/cycle.hpp"
+#include "trihedron/core/invariant_estimator.hpp"
 
 namespace {
 
@@ -50,17 +51,18 @@ TEST(Allocations, AreCounted) {
   std::free(q);
 }
 
-TEST(Cycle, AllocatesNothingInAnyStep) {
+/// Every way through a step: outliers up to reopening, bad samples, bad fixes.
+template <class Estimator>
+void expect_no_allocations(const typename Estimator::Setup& setup) {
   test::Flight flight({.duration_s = 600, .fix_offset_s = 0.05});
-  // Every way through a step: outliers up to reopening, bad samples, bad fixes.
   for (std::size_t i = 100; i < 125; ++i) {
     flight.fixes[i].q_in_c =
         flight.fixes[i].q_in_c * Eigen::Quaterniond(Eigen::AngleAxisd(0.001, Eigen::Vector3d::UnitX()));
   }
   flight.samples[77].h_b[0].setZero();
   flight.fixes[33].q_in_c.coeffs().setZero();
-  auto cycle = std::make_unique<Cycle<PaperEstimator<Esg7>>>(
-      Cycle<PaperEstimator<Esg7>>::create(test::nominal_setup(), {.interval = std::chrono::minutes(1)}).value());
+  auto cycle = std::make_unique<Cycle<Estimator>>(
+      Cycle<Estimator>::create(setup, {.interval = std::chrono::minutes(1)}).value());
   const long before = allocations;
   double used = 0;
   test::fly(flight, *cycle, [&](const auto& report) { used += report.fix.used(); });
@@ -68,6 +70,16 @@ TEST(Cycle, AllocatesNothingInAnyStep) {
   EXPECT_EQ(allocations, before);
   EXPECT_TRUE(solution.ok());
   EXPECT_GT(used, 150);
+}
+
+TEST(Cycle, OfThePaperAllocatesNothingInAnyStep) { expect_no_allocations<PaperEstimator<Esg7>>(test::nominal_setup()); }
+
+TEST(Cycle, OfTheInvariantErrorAllocatesNothingInAnyStep) {
+  using Estimator = InvariantEstimator<Esg7, 2, kAllFurtherStates>;
+  Estimator::Setup setup;
+  static_cast<CalibrationSetup<Esg7, 2>&>(setup) = test::nominal_setup();
+  setup.wandering_sigma_rad_s = 1e-8;
+  expect_no_allocations<Estimator>(setup);
 }
 
 }  // namespace

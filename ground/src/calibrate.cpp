@@ -11,6 +11,7 @@
 
 #include "gyro_model.hpp"
 #include "trihedron/core/drift.hpp"
+#include "trihedron/core/invariant_estimator.hpp"
 #include "trihedron/core/paper_estimator.hpp"
 #include "trihedron/ground/replay.hpp"
 #include "trihedron/ground/verdict.hpp"
@@ -38,7 +39,7 @@ std::vector<std::string> state_names(int gyros) {
 /// Prior means and sigmas of pass.toml.
 template <class Estimator>
 void use_settings(const PassSettings& settings, typename Estimator::Setup& setup) {
-  using Model = typename Estimator::DriftModel;
+  using Model = typename Estimator::BaseModel;
   using Layout = typename Estimator::Setup::Layout;
   for (int k = 0; k < Estimator::kGyros; ++k) {
     const GyroPrior& prior = settings.gyros[static_cast<std::size_t>(k)];
@@ -69,7 +70,7 @@ void use_settings(const PassSettings& settings, typename Estimator::Setup& setup
 /// Values and covariance of an earlier calibration.
 template <class Estimator>
 void use_calibration(const Calibration& prior, typename Estimator::Setup& setup) {
-  using Model = typename Estimator::DriftModel;
+  using Model = typename Estimator::BaseModel;
   const std::vector<std::string> names = state_names<Model>(Estimator::kGyros);
   std::vector<Eigen::Index> rows;
   for (const std::string& name : names) {
@@ -95,6 +96,27 @@ void use_calibration(const Calibration& prior, typename Estimator::Setup& setup)
     }
     setup.prior[k] = to_model<Model>(gyro);
   }
+}
+
+/// The rate of the orbit, as the attitude shows it: the mean of the body's, in which slews cancel. An attitude that
+/// stands still in space does not show it; then that of a low orbit.
+double mean_rate(const StarTrackerTelemetry& tracker) {
+  constexpr double kFastest_rad_s = 0.02;  // beyond, an outlier
+  constexpr double kLowOrbit_rad_s = 1.1e-3;
+  Eigen::Vector3d turned = Eigen::Vector3d::Zero();
+  double time_s = 0;
+  for (std::size_t i = 1; i < tracker.size(); ++i) {
+    const double step_s = to_seconds(tracker.t[i] - tracker.t[i - 1]);
+    const auto before = Rot<In, C>::assume(tracker.q_in_c[i - 1].normalized());
+    const auto after = Rot<In, C>::assume(tracker.q_in_c[i].normalized());
+    const Eigen::Vector3d turn = (before.inverse() * after).log().raw();
+    if (step_s < 60 && turn.norm() < kFastest_rad_s * step_s) {
+      turned += turn;
+      time_s += step_s;
+    }
+  }
+  const double rate = time_s > 0 ? turned.norm() / time_s : 0;
+  return rate > 0.5 * kLowOrbit_rad_s ? rate : kLowOrbit_rad_s;
 }
 
 template <class Estimator>
@@ -123,6 +145,12 @@ typename Estimator::Setup make_setup(const Pass& pass, const CalibrationOptions&
   setup.direction_random_walk_rad_sqrt_s = options.direction_random_walk_rad_sqrt_s;
   setup.gate_nis = options.gate_nis;
   setup.reopen_after_rejections = options.reopen_after_rejections;
+  if constexpr (requires { setup.orbital_rate_rad_s; }) {
+    setup.orbital_rate_rad_s = mean_rate(pass.star_tracker);
+    setup.orbital_phase_zero = settings.epoch;
+    setup.wandering_sigma_rad_s = options.wandering_drift_rad_s;
+    setup.wandering_time_s = to_seconds(options.wandering_time);
+  }
   return setup;
 }
 
@@ -184,11 +212,26 @@ template <class Estimator>
 std::vector<double> parameter_values(const Estimator& estimator) {
   std::vector<double> values;
   for (const auto& gyro : estimator.gyros()) {
-    values.insert(values.end(), gyro.drift_rad_s.begin(), gyro.drift_rad_s.end());
+    values.insert(values.end(), gyro.drift_rad_s.begin(), gyro.drift_rad_s.begin() + Estimator::BaseModel::kSize);
     const Eigen::Vector3d lambda = Rot<C, B<1>>::assume(gyro.C_c_b).log().raw();
     values.insert(values.end(), lambda.begin(), lambda.end());
   }
   return values;
+}
+
+/// Square root of the covariance of the parameters, rows in the order of state_names().
+template <class Estimator>
+auto parameter_root(const Estimator& estimator) {
+  using Base = typename Estimator::BaseModel;
+  using Layout = ParameterLayout<Base, Estimator::kGyros>;
+  const auto all = estimator.error_root();
+  Eigen::Matrix<double, Layout::kSize, Estimator::ErrorRoot::ColsAtCompileTime> root;
+  for (int k = 0; k < Estimator::kGyros; ++k) {
+    root.template middleRows<Base::kSize>(Layout::drift(k)) =
+        all.template middleRows<Base::kSize>(Estimator::Errors::drift(k));
+    root.template middleRows<3>(Layout::alignment(k)) = all.template middleRows<3>(Estimator::Errors::alignment(k));
+  }
+  return root;
 }
 
 /// Squared distance of the estimates from the prior means, in prior sigmas.
@@ -199,7 +242,9 @@ double misfit(const Estimator& estimator) {
   for (int k = 0; k < Estimator::kGyros; ++k) {
     const auto& held = estimator.setup().prior[k];
     const auto& estimate = estimator.gyros()[k];
-    moved.template segment<Estimator::DriftModel::kSize>(Layout::drift(k)) = estimate.drift_rad_s - held.drift_rad_s;
+    constexpr int kSize = Estimator::BaseModel::kSize;
+    moved.template segment<kSize>(Layout::drift(k)) =
+        estimate.drift_rad_s.template head<kSize>() - held.drift_rad_s.template head<kSize>();
     moved.template segment<3>(Layout::alignment(k)) =
         Rot<C, C>::assume(Eigen::Matrix3d(estimate.C_c_b * held.C_c_b.transpose())).log().raw();
   }
@@ -299,18 +344,43 @@ class AngleTrack {
 };
 
 template <class Estimator>
+std::vector<FurtherEstimate> further_of(const Estimator& estimator) {
+  std::vector<FurtherEstimate> further;
+  if constexpr (requires { estimator.shared(); }) {
+    using Layout = typename Estimator::Layout;
+    std::vector<std::string> names;
+    if (Estimator::kFurther.clock_offset) {
+      names.emplace_back("clock_offset_s");
+    }
+    if (Estimator::kFurther.orbital_error) {
+      for (const char* wave : {"sine", "cosine"}) {
+        for (const char axis : {'x', 'y', 'z'}) {
+          names.push_back(fmt::format("orbital_{}_{}_rad", wave, axis));
+        }
+      }
+    }
+    const auto root = estimator.information().inverse_root();
+    for (std::size_t i = 0; i < names.size(); ++i) {
+      const auto row = static_cast<Eigen::Index>(i);
+      further.push_back({names[i], estimator.shared()(row), root.row(Layout::kShared + row).norm()});
+    }
+  }
+  return further;
+}
+
+template <class Estimator>
 Calibration result_of(const Pass& pass, const Cycle<Estimator>& cycle) {
-  using Model = typename Estimator::DriftModel;
+  using Model = typename Estimator::BaseModel;
   Calibration result;
   result.estimator = Estimator::kName;
   result.epoch = pass.settings.epoch;
   result.t = cycle.t();
   for (const auto& gyro : cycle.estimator().gyros()) {
-    result.gyros.push_back(to_record(gyro));
+    result.gyros.push_back(to_record<Model>(gyro));
   }
+  result.further = further_of(cycle.estimator());
   result.states = state_names<Model>(Estimator::kGyros);
-  const Eigen::MatrixXd root =
-      cycle.estimator().error_root().bottomRows(static_cast<Eigen::Index>(result.states.size()));
+  const auto root = parameter_root(cycle.estimator());
   result.covariance = root * root.transpose();
   return result;
 }
@@ -322,11 +392,11 @@ Correction correction_of(const Estimator& estimator, const AttitudeSolution& att
   const Eigen::Matrix3d& C_in_c = attitude.C_in_c.raw();
   for (int k = 0; k < Estimator::kGyros; ++k) {
     const auto& calibrated = estimator.gyros()[k];
-    auto before = estimator.setup().prior[k];
+    auto before = estimator.prior_gyros()[k];
     // Where the momentum is in the case, seen through the alignment known before.
     before.h_in = C_in_c * (before.C_c_b * (calibrated.C_c_b.transpose() * (C_in_c.transpose() * calibrated.h_in)));
-    correction.known_before.push_back(to_record(before));
-    correction.calibrated.push_back(to_record(calibrated));
+    correction.known_before.push_back(to_record<typename Estimator::BaseModel>(before));
+    correction.calibrated.push_back(to_record<typename Estimator::BaseModel>(calibrated));
   }
   return correction;
 }
@@ -345,9 +415,9 @@ CalibrationRun calibrate_with(const Pass& pass, const CalibrationOptions& option
     if (report.fix.used()) {
       run.parameters.t.push_back(report.fix.t);
       run.parameters.value.push_back(parameter_values(cycle->estimator()));
-      const auto root = cycle->estimator().error_root();
+      const auto root = parameter_root(cycle->estimator());
       std::vector<double>& sigma = run.parameters.sigma.emplace_back();
-      for (Eigen::Index row = Estimator::Errors::kDirections; row < root.rows(); ++row) {
+      for (Eigen::Index row = 0; row < root.rows(); ++row) {
         sigma.push_back(root.row(row).norm());
       }
     }
@@ -423,15 +493,19 @@ NavigationRun navigate_with(const Pass& pass, const CalibrationOptions& options,
 /// Calls `body` with the chosen estimator as a type tag.
 template <class Body>
 auto with_estimator(const CalibrationOptions& options, Body&& body) {
-  if (options.estimator != "paper") {
-    throw SetupError(fmt::format("there is no estimator '{}'", options.estimator),
-                     fmt::format("use one of: {}", fmt::join(kEstimators, ", ")));
-  }
   if (options.drift_model != Esg7::kModelName) {
     throw SetupError(fmt::format("estimator {} has no drift model '{}'", options.estimator, options.drift_model),
                      fmt::format("use one of: {}", fmt::join(kDriftModels, ", ")));
   }
-  return body.template operator()<PaperEstimator<Esg7>>();
+  if (options.estimator == "paper") {
+    return body.template operator()<PaperEstimator<Esg7>>();
+  }
+  if (options.estimator == "invariant") {
+    return options.further_states ? body.template operator()<InvariantEstimator<Esg7, 2, kAllFurtherStates>>()
+                                  : body.template operator()<InvariantEstimator<Esg7, 2>>();
+  }
+  throw SetupError(fmt::format("there is no estimator '{}'", options.estimator),
+                   fmt::format("use one of: {}", fmt::join(kEstimators, ", ")));
 }
 
 }  // namespace

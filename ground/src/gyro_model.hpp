@@ -28,12 +28,13 @@ template <class Model>
   return model;
 }
 
-template <class Model>
+/// The coefficients of Base, which the model has first.
+template <class Base, class Model>
 [[nodiscard]] GyroCalibration to_record(const GyroModel<Model>& model) {
   GyroCalibration gyro;
-  gyro.drift_model = Model::kModelName;
-  for (std::size_t i = 0; i < Model::kSize; ++i) {
-    gyro.drift_rad_s.emplace_back(Model::kNames[i], model.drift_rad_s(static_cast<Eigen::Index>(i)));
+  gyro.drift_model = Base::kModelName;
+  for (std::size_t i = 0; i < Base::kSize; ++i) {
+    gyro.drift_rad_s.emplace_back(Base::kNames[i], model.drift_rad_s(static_cast<Eigen::Index>(i)));
   }
   gyro.alignment_rotation_vector_rad = Rot<C, B<1>>::assume(model.C_c_b).log().raw();
   gyro.momentum_in = model.h_in;

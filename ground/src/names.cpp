@@ -22,6 +22,10 @@ const char* name_of(FixStatus status) {
       return "rejected: out of order";
     case FixStatus::kRejectedNoGyro:
       return "rejected: no gyro samples round it";
+    case FixStatus::kRejectedUnknownHead:
+      return "rejected: of an unknown star tracker";
+    case FixStatus::kRejectedBacklog:
+      return "rejected: too many waiting";
     case FixStatus::kRejectedGeometry:
       return "rejected: momenta nearly parallel";
     case FixStatus::kRejectedByGate:

@@ -5,7 +5,8 @@
 
 #include "gyro_model.hpp"
 #include "trihedron/core/drift.hpp"
-#include "trihedron/core/navigator.hpp"
+#include "trihedron/core/optimal_attitude.hpp"
+#include "trihedron/core/precession.hpp"
 #include "trihedron/core/telemetry.hpp"
 
 namespace trihedron::ground {
@@ -74,17 +75,17 @@ AttitudeHistory fly(const Pass& pass, Time t, const std::vector<GyroCalibration>
       for (int k = 0; k < kPair && last; ++k) {
         middle[k] = ((*last)[k] + (*h_b)[k]).normalized();
       }
-      if (const auto trihedra = make_trihedra(gyros, middle)) {
-        const Eigen::Matrix3d C_in_c = trihedra.value().C_in_c().raw();
+      if (const auto attitude = trihedron_attitude(momenta(gyros), in_c(gyros, middle))) {
+        const Eigen::Matrix3d& C_in_c = attitude.value().C_in_c.raw();
         for (int k = 0; k < kPair; ++k) {
           precess(gyros[k], C_in_c, middle[k], to_seconds(now - last_t));
         }
         last = h_b;
         last_t = now;
       }
-      if (const auto trihedra = make_trihedra(gyros, *h_b); trihedra && now == *epoch) {
+      if (const auto attitude = trihedron_attitude(momenta(gyros), in_c(gyros, *h_b)); attitude && now == *epoch) {
         history.t.push_back(now);
-        history.q_in_c.push_back(trihedra.value().C_in_c().quaternion());
+        history.q_in_c.push_back(attitude.value().C_in_c.quaternion());
         history.age_s.push_back(to_seconds(now - t));
       }
     }

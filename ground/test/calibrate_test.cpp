@@ -241,5 +241,80 @@ TEST_P(SamplePass, IsCalibratedToAnArcsecond) {
   EXPECT_NEAR(run.calibration.statistics.at("nis_mean"), 4, 0.2);
 }
 
+TEST(Calibrate, ByTheInvariantErrorFindsTheTruthAndSmoothsTheAttitude) {
+  CalibrationOptions options;
+  options.estimator = "invariant";
+  const auto run = calibrate(two_hours().pass, options);
+  EXPECT_EQ(run.calibration.estimator, "invariant");
+  EXPECT_EQ(run.fixes.size(), two_hours().pass.star_tracker.size());
+  EXPECT_NEAR(run.calibration.statistics.at("nis_mean"), 4, 0.2);
+  for (std::size_t k = 0; k < 2; ++k) {
+    const Eigen::Vector3d error = alignment_error(two_hours().truth.gyros[k], run.calibration.gyros[k]);
+    for (int axis = 0; axis < 3; ++axis) {
+      const Eigen::Index row = static_cast<Eigen::Index>(10 * k) + 7 + axis;
+      EXPECT_LT(std::abs(error(axis)), 4 * std::sqrt(run.calibration.covariance(row, row)));
+    }
+  }
+  const auto errors = attitude_errors(run.attitude, two_hours().truth.t, two_hours().truth.q_in_c);
+  const auto last = statistics_by_stretch(errors, two_hours().pass.settings.epoch, std::chrono::minutes(30)).at(3);
+  // Single readings give 2″.
+  EXPECT_LT(last.rms_rad.maxCoeff(), 1.2 * kArcsecond);
+  EXPECT_NEAR(*last.normalised_square, 1, 0.5);
+  EXPECT_TRUE(run.calibration.further.empty());
+}
+
+TEST(Calibrate, FindsTheClockOffsetAsAFurtherState) {
+  Scenario scenario;
+  scenario.seed = 6;
+  scenario.duration = std::chrono::hours(2);
+  scenario.star_tracker.clock_offset_s = 0.01;
+  scenario.star_tracker.orbital_sine_rad = Eigen::Vector3d(6, -5, 8) * kArcsecond;
+  for (GyroScenario& gyro : scenario.gyros) {
+    gyro.drift.outside_sigma_rad_s = 0;
+  }
+  const auto simulated = sim::simulate(scenario);
+  CalibrationOptions options;
+  options.estimator = "invariant";
+  options.further_states = true;
+  options.wandering_drift_rad_s = 1e-9;
+  const auto run = calibrate(simulated.pass, options);
+  ASSERT_EQ(run.calibration.further.size(), 7U);
+  const Truth::StarTracker& truth = simulated.truth.star_trackers[0];
+  for (const FurtherEstimate& estimate : run.calibration.further) {
+    const double expected = estimate.name == "clock_offset_s"       ? truth.clock_offset_s
+                            : estimate.name == "orbital_sine_x_rad" ? truth.orbital_sine_rad.x()
+                            : estimate.name == "orbital_sine_y_rad" ? truth.orbital_sine_rad.y()
+                            : estimate.name == "orbital_sine_z_rad" ? truth.orbital_sine_rad.z()
+                                                                    : 0;
+    EXPECT_LT(std::abs(estimate.value - expected), 4 * estimate.sigma) << estimate.name;
+  }
+  EXPECT_LT(run.calibration.further[0].sigma, 5e-4);
+}
+
+TEST(Calibrate, KnowsTheRateOfTheOrbitFromTheAttitude) {
+  // An attitude that stands still in space does not show it; the filter must not fall over that.
+  Scenario scenario;
+  scenario.duration = std::chrono::minutes(30);
+  scenario.attitude.reference = AttitudeScenario::Reference::kInertial;
+  CalibrationOptions options;
+  options.estimator = "invariant";
+  options.further_states = true;
+  const auto run = calibrate(sim::simulate(scenario).pass, options);
+  EXPECT_EQ(run.calibration.further.size(), 7U);
+  EXPECT_TRUE(run.calibration.covariance.allFinite());
+}
+
+TEST(Navigate, CorrectedAtEachFixByTheInvariantErrorIsBetterThanASingleReading) {
+  CalibrationOptions options;
+  options.estimator = "invariant";
+  options.corrections.when = CorrectionOptions::When::kEachFix;
+  const auto run = navigate(two_hours().pass, options);
+  // From when the samples round the first fix are there.
+  EXPECT_GT(run.attitude.size(), two_hours().pass.gyro.size() - 20);
+  const auto errors = attitude_errors(run.attitude, two_hours().truth.t, two_hours().truth.q_in_c);
+  const auto last = statistics_by_stretch(errors, two_hours().pass.settings.epoch, std::chrono::minutes(30)).at(3);
+  EXPECT_LT(last.rms_rad.maxCoeff(), 1.7 * kArcsecond);
+}
+
 }  // namespace
 }  // namespace trihedron::ground

@@ -204,6 +204,11 @@ Calibration parse_calibration(std::string_view text, const std::filesystem::path
   for (const JsonNode& finding : verdict.at("findings").elements()) {
     calibration.verdict.findings.push_back(parse_finding(finding));
   }
+  if (const auto further = root.find("further")) {
+    for (const auto& [name, estimate] : further->members()) {
+      calibration.further.push_back({name, estimate.at("value").number(), estimate.at("sigma").number()});
+    }
+  }
   for (const auto& [name, value] : root.at("statistics").members()) {
     calibration.statistics[name] = value.is_null() ? std::numeric_limits<double>::quiet_NaN() : value.number();
   }
@@ -220,6 +225,10 @@ std::string format_calibration(const Calibration& calibration) {
     const Eigen::RowVectorXd row = calibration.covariance.row(i);
     matrix.push_back(std::vector<double>(row.begin(), row.end()));
   }
+  Json further = Json::object();
+  for (const FurtherEstimate& estimate : calibration.further) {
+    further[estimate.name] = {{"value", estimate.value}, {"sigma", estimate.sigma}};
+  }
   Json findings = Json::array();
   for (const Finding& finding : calibration.verdict.findings) {
     findings.push_back(finding_json(finding));
@@ -228,12 +237,14 @@ std::string format_calibration(const Calibration& calibration) {
       "{{\"format\": \"{}\", \"version\": {},\n"
       " \"estimator\": {}, \"epoch_tai\": \"{}\", \"t_s\": {},\n"
       " \"gyros\": {},\n"
+      " \"further\": {},\n"
       " \"covariance\": {{\n  \"states\": {},\n  \"matrix\": {}}},\n"
       " \"verdict\": {{\"trustworthy\": {}, \"findings\": {}}},\n"
       " \"statistics\": {}}}\n",
       kFormat, kVersion, dump(Json(calibration.estimator)), format_epoch(calibration.epoch),
-      dump(Json(to_seconds(calibration.t - calibration.epoch))), lines(gyros), dump(Json(calibration.states)),
-      lines(matrix), calibration.verdict.trustworthy, lines(findings), dump(Json(calibration.statistics)));
+      dump(Json(to_seconds(calibration.t - calibration.epoch))), lines(gyros), dump(further),
+      dump(Json(calibration.states)), lines(matrix), calibration.verdict.trustworthy, lines(findings),
+      dump(Json(calibration.statistics)));
 }
 
 void write_calibration(const std::filesystem::path& path, const Calibration& calibration) {

@@ -64,7 +64,8 @@ std::string format_correction_interval(const CorrectionOptions& corrections) {
 CalibrationOptions read_config(const fs::path& path) {
   const TextFile file(path);
   const toml::table document = parse_toml(file.text(), path);
-  const TomlTable root(document, path, "the file", {"estimator", "drift_model", "filter", "corrections"});
+  const TomlTable root(document, path, "the file",
+                       {"estimator", "drift_model", "filter", "further_states", "corrections"});
   CalibrationOptions options;
   if (const toml::node* node = root.find("estimator")) {
     options.estimator = root.text(*node, "estimator");
@@ -89,6 +90,29 @@ CalibrationOptions read_config(const fs::path& path) {
       options.reopen_after_rejections = whole_number(filter, *node, "reopen_after_rejections");
     }
   }
+  if (root.find("further_states") != nullptr) {
+    const TomlTable further(root.table_at("further_states"), path, "[further_states]",
+                            {"estimated", "wandering_drift", "wandering_time"});
+    if (const toml::node* node = further.find("estimated")) {
+      const auto estimated = node->value_exact<bool>();
+      if (!estimated) {
+        further.refuse(*node, "\"estimated\" is neither true nor false", "write true or false");
+      }
+      options.further_states = *estimated;
+    }
+    if (const toml::node* node = further.find("wandering_drift")) {
+      options.wandering_drift_rad_s = quantity(further, *node, "wandering_drift", parse_rate_rad_s);
+      if (!(options.wandering_drift_rad_s > 0)) {
+        further.refuse(*node, "\"wandering_drift\" is not positive", "give more than zero");
+      }
+    }
+    if (const toml::node* node = further.find("wandering_time")) {
+      options.wandering_time = quantity(further, *node, "wandering_time", parse_duration);
+      if (!(options.wandering_time > Duration::zero())) {
+        further.refuse(*node, "\"wandering_time\" is not positive", "give more than zero");
+      }
+    }
+  }
   if (root.find("corrections") != nullptr) {
     const TomlTable corrections(root.table_at("corrections"), path, "[corrections]", {"interval"});
     if (const toml::node* node = corrections.find("interval")) {
@@ -109,10 +133,17 @@ std::string format_config(const CalibrationOptions& options) {
       "gate_nis = {}  # a fix with a larger normalised innovation squared is rejected\n"
       "reopen_after_rejections = {}  # in a row; then the directions are set free and the fix is used\n"
       "\n"
+      "[further_states]  # of estimator invariant\n"
+      "estimated = {}  # clock offset and error at orbital period of the star tracker, drift that wanders\n"
+      "wandering_drift = \"{}\"  # its 1-sigma about each case axis\n"
+      "wandering_time = \"{}\"  # and its correlation time\n"
+      "\n"
       "[corrections]\n"
       "interval = \"{}\"  # of the open-loop navigator: a duration, none or continuous\n",
       options.estimator, options.drift_model, format_random_walk(options.direction_random_walk_rad_sqrt_s),
-      options.gate_nis, options.reopen_after_rejections, format_correction_interval(options.corrections));
+      options.gate_nis, options.reopen_after_rejections, options.further_states,
+      fmt::format("{}rad/s", options.wandering_drift_rad_s), format_duration(options.wandering_time),
+      format_correction_interval(options.corrections));
 }
 
 }  // namespace trihedron::io

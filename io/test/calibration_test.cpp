@@ -35,6 +35,13 @@ TEST(CalibrationJson, ComesBackFromAFileWhole) {
     EXPECT_EQ(back.gyros[i].alignment_rotation_vector_rad, calibration.gyros[i].alignment_rotation_vector_rad);
     EXPECT_EQ(back.gyros[i].momentum_in, calibration.gyros[i].momentum_in);
   }
+  ASSERT_EQ(back.further.size(), 2U);
+  for (const FurtherEstimate& estimate : back.further) {
+    const FurtherEstimate& written = calibration.further[estimate.name == "clock_offset_s" ? 0 : 1];
+    EXPECT_EQ(estimate.name, written.name);
+    EXPECT_EQ(estimate.value, written.value);
+    EXPECT_EQ(estimate.sigma, written.sigma);
+  }
   EXPECT_EQ(back.states, calibration.states);
   EXPECT_EQ(back.covariance, calibration.covariance);
   EXPECT_FALSE(back.verdict.trustworthy);

@@ -75,14 +75,16 @@ struct CalibrationSetup {
 
 enum class FixStatus : std::uint8_t {
   kNone,                 ///< no fix was due
-  kPending,              ///< held until the gyro sample after it
+  kPending,              ///< held until the gyro samples round it are there
   kStarted,              ///< the first fix: sets the directions
   kUsed,                 ///< calibration updated
   kUsedAfterReopening,   ///< used after a run of rejections, with the directions set free
   kRestarted,            ///< used after another run of rejections soon after: the filter began anew from its estimates
   kRejectedNotRotation,  ///< quaternion not finite or not unit
-  kRejectedOutOfOrder,   ///< not later than the fix before it, or earlier than the latest gyro sample
+  kRejectedOutOfOrder,   ///< repeated, or too late: the calibration has passed its time
   kRejectedNoGyro,       ///< no gyro samples close enough round it
+  kRejectedUnknownHead,  ///< of a star tracker that the estimator does not have
+  kRejectedBacklog,      ///< more fixes are waiting than there is room for
   kRejectedGeometry,     ///< momenta nearly parallel
   kRejectedByGate,       ///< NIS above the gate
 };

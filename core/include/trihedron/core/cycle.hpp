@@ -3,10 +3,13 @@
 /// exceptions.
 
 #include <algorithm>
+#include <array>
 #include <chrono>
 #include <cstdint>
 #include <optional>
 
+#include "trihedron/core/directions_fit.hpp"
+#include "trihedron/core/fix_readings.hpp"
 #include "trihedron/core/navigator.hpp"
 #include "trihedron/core/telemetry.hpp"
 
@@ -32,7 +35,7 @@ template <class Estimator>
 struct StepReport {
   Time t{};
   SampleStatus sample = SampleStatus::kUsed;
-  typename Estimator::Report fix;  ///< of the fix that fell between the sample before and this one, if any
+  typename Estimator::Report fix;  ///< of the fix that was dealt with in this step, if any; its time is its own
   bool corrected = false;          ///< the navigator was corrected at that fix
   /// Attitude at that fix, used or rejected as an outlier: of the calibration itself, and of the open-loop navigator.
   std::optional<AttitudeSolution> calibrated;
@@ -55,6 +58,10 @@ class Cycle {
   static constexpr Duration kMaxInterpolation = std::chrono::milliseconds(500);
   /// A sample further ahead is believed only when the next one confirms it.
   static constexpr Duration kMaxGap = std::chrono::hours(1);
+  /// Samples that are taken together for the attitude now, where the estimator takes any together.
+  static constexpr Duration kRecent = std::chrono::milliseconds(2500);
+  static constexpr int kBufferedSamples = 64;
+  static constexpr int kBufferedFixes = 8;
 
   [[nodiscard]] static Result<Cycle, SetupFault> create(const Setup& setup, const CorrectionPolicy& policy) {
     const auto estimator = Estimator::create(setup);
@@ -70,49 +77,51 @@ class Cycle {
   /// A default one is not set up; it exists for Result only.
   Cycle() = default;
 
-  /// One gyro sample: the whole 125 ms step.
+  /// One gyro sample: the whole 125 ms step. The navigator moves to it at once; the calibration follows
+  /// Estimator::kReach behind, when the samples round a fix are there. At most one fix is dealt with.
   Report on_gyro(const GyroSample<kGyros>& sample) {
     Report report;
     report.t = sample.t;
-    Directions h_b;
-    report.sample = screen(sample, h_b);
-    if (report.sample == SampleStatus::kUsed && is_wild(sample.t)) {
-      report.sample = SampleStatus::kRejectedOutOfOrder;
-    }
+    GyroSample<kGyros> screened = sample;
+    report.sample = screen(screened);
     if (report.sample != SampleStatus::kUsed) {
       return report;
     }
-    if (has_pending_fix_ && pending_fix_.t <= sample.t) {
-      has_pending_fix_ = false;
-      correct_between_samples(sample.t, h_b, report);
+    if (navigator_.started()) {
+      predict_navigator(samples_.latest().t, samples_.latest().h_b, screened.t, screened.h_b);
     }
-    if (!predict_to(sample.t, h_b)) {
-      report.sample = SampleStatus::kRejectedGeometry;
+    if (behind_ == kBufferedSamples) {  // more samples than the reach was made for: the oldest cannot wait
+      follow(samples_[0].t, samples_[0].h_b);
+      --behind_;
     }
+    samples_.push(screened);
+    ++behind_;
+    calibrate_until(screened.t - Estimator::kReach, report);
     report.angle_residual = angle_residual();
     return report;
   }
 
-  /// One fix. On the time of the latest gyro sample it is used at once, later ones are held for the sample after them
-  /// and reported there.
+  /// One fix. It waits for the gyro samples round it and is reported with the step that has them; without need for them
+  /// at once.
   Report on_fix(const StarFix& fix) {
     Report report;
     report.t = fix.t;
     report.fix.t = fix.t;
-    if (!fix.q_in_c.coeffs().allFinite() || !nearly_unit(fix.q_in_c.norm())) {
-      report.fix.status = FixStatus::kRejectedNotRotation;
-    } else if ((has_used_fix_ && fix.t <= used_fix_t_) || (has_sample_ && fix.t < t_)) {
-      report.fix.status = FixStatus::kRejectedOutOfOrder;
-    } else if (!has_sample_ || fix.t - t_ > kMaxInterpolation || has_pending_fix_) {
-      // Too far from the latest sample to be interpolated, whatever comes next; or a second one before the next sample.
-      report.fix.status = FixStatus::kRejectedNoGyro;
-    } else if (fix.t == t_) {
-      correct_now(Rot<In, C>::assume(fix.q_in_c.normalized()), report);
+    report.fix.status = take_up(fix);
+    if (report.fix.status == FixStatus::kPending) {
+      calibrate_until(samples_.latest().t - Estimator::kReach, report);
       report.angle_residual = angle_residual();
-    } else {
-      has_pending_fix_ = true;
-      pending_fix_ = fix;
-      report.fix.status = FixStatus::kPending;
+    }
+    return report;
+  }
+
+  /// After the last sample: deals with one of the fixes that still wait, with the samples that there are. Status kNone
+  /// when none waits.
+  Report flush() {
+    Report report;
+    if (fixes_ > 0) {
+      report.t = samples_.latest().t;
+      calibrate_until(std::max(report.t, pending_[0].t), report);
     }
     return report;
   }
@@ -120,24 +129,35 @@ class Cycle {
   [[nodiscard]] const Estimator& estimator() const { return estimator_; }
   [[nodiscard]] const Navigator<Estimator>& navigator() const { return navigator_; }
   /// Time of the latest sample used.
-  [[nodiscard]] Time t() const { return t_; }
+  [[nodiscard]] Time t() const { return samples_.latest().t; }
 
   /// Open-loop attitude at the latest sample. Needs navigator().started().
   [[nodiscard]] Result<AttitudeSolution, DirectionsFault> navigation_attitude() const {
-    return navigator_.attitude_with_covariance(h_b_, estimator_.since_fix(), estimator_.setup());
+    const FixReadings<kGyros> now = readings_now();
+    return navigator_.attitude_with_covariance(now.h_b, now.noise_factor, estimator_.since_fix(), estimator_.setup());
   }
 
  private:
-  [[nodiscard]] SampleStatus screen(const GyroSample<kGyros>& sample, Directions& h_b) const {
-    if (has_sample_ && !(sample.t > t_)) {
+  // ---- What comes in
+
+  [[nodiscard]] SampleStatus screen(GyroSample<kGyros>& sample) {
+    if (has_sample() && !(sample.t > t())) {
       return SampleStatus::kRejectedOutOfOrder;
     }
-    for (int k = 0; k < h_b.size(); ++k) {
-      const double norm = sample.h_b[k].norm();
+    for (Eigen::Vector3d& h : sample.h_b) {
+      const double norm = h.norm();
       if (!nearly_unit(norm)) {
         return SampleStatus::kRejectedNotDirection;
       }
-      h_b[k] = sample.h_b[k] / norm;
+      h /= norm;
+    }
+    if (is_wild(sample.t)) {
+      return SampleStatus::kRejectedOutOfOrder;
+    }
+    // The prediction to it is made with the middle of the step.
+    if (estimator_.started() &&
+        !Estimator::attitude(estimator_.gyros(), between(samples_.latest().h_b, sample.h_b, 0.5))) {
+      return SampleStatus::kRejectedGeometry;
     }
     return SampleStatus::kUsed;
   }
@@ -145,7 +165,7 @@ class Cycle {
   /// Whether a time lies so far ahead that it needs a second one beside it to be believed: a single wild time stamp
   /// would otherwise put everything after it out of order.
   [[nodiscard]] bool is_wild(Time t) {
-    if (!has_sample_ || t - t_ <= kMaxGap) {
+    if (!has_sample() || t - this->t() <= kMaxGap) {
       return false;
     }
     const bool confirmed = has_suspect_ && t > suspect_t_ && t - suspect_t_ <= kMaxInterpolation;
@@ -154,90 +174,92 @@ class Cycle {
     return !confirmed;
   }
 
-  /// The pending fix, at readings interpolated to its time.
-  void correct_between_samples(Time t_next, const Directions& h_b_next, Report& report) {
-    report.fix.t = pending_fix_.t;
-    if (t_next - t_ > kMaxInterpolation) {
+  /// Puts a fix among those that wait, in the order of their times.
+  [[nodiscard]] FixStatus take_up(const StarFix& fix) {
+    if (!fix.q_in_c.coeffs().allFinite() || !nearly_unit(fix.q_in_c.norm())) {
+      return FixStatus::kRejectedNotRotation;
+    }
+    if (fix.head < 0 || fix.head >= Estimator::kHeads) {
+      return FixStatus::kRejectedUnknownHead;
+    }
+    if (!has_sample() || fix.t - t() > kMaxInterpolation) {
+      return FixStatus::kRejectedNoGyro;
+    }
+    const auto waiting = pending_.begin() + fixes_;
+    const bool repeated = std::any_of(pending_.begin(), waiting,
+                                      [&](const StarFix& other) { return other.t == fix.t && other.head == fix.head; });
+    const auto& used_t = used_fix_t_[fix.head];
+    if (repeated || (used_t && fix.t <= *used_t) || (followed_ && fix.t < follower_t_)) {
+      return FixStatus::kRejectedOutOfOrder;
+    }
+    if (fixes_ == kBufferedFixes) {
+      return FixStatus::kRejectedBacklog;
+    }
+    const auto place =
+        std::upper_bound(pending_.begin(), waiting, fix, [](const StarFix& a, const StarFix& b) { return a.t < b.t; });
+    std::move_backward(place, waiting, waiting + 1);
+    *place = fix;
+    ++fixes_;
+    return FixStatus::kPending;
+  }
+
+  // ---- Calibration
+
+  /// The estimator over the samples and fixes until `limit`, in time order; stops before a second fix.
+  void calibrate_until(Time limit, Report& report) {
+    bool dealt_with_one = false;
+    while (true) {
+      const bool sample_due = behind_ > 0 && next_sample().t <= limit;
+      const bool fix_due = fixes_ > 0 && pending_[0].t <= limit;
+      if (fix_due && !(sample_due && next_sample().t <= pending_[0].t)) {
+        if (dealt_with_one) {
+          return;
+        }
+        dealt_with_one = true;
+        const StarFix fix = pending_[0];
+        std::move(pending_.begin() + 1, pending_.begin() + fixes_, pending_.begin());
+        --fixes_;
+        correct(fix, report);
+      } else if (sample_due) {
+        follow(next_sample().t, next_sample().h_b);
+        --behind_;
+      } else {
+        return;
+      }
+    }
+  }
+
+  /// Astro-correction: the calibration always, the navigator when it is due.
+  void correct(const StarFix& fix, Report& report) {
+    report.fix = {};
+    report.fix.t = fix.t;
+    const std::optional<FixReadings<kGyros>> readings = readings_at(fix.t);
+    if (!readings) {
       report.fix.status = FixStatus::kRejectedNoGyro;
       return;
     }
-    const double fraction = to_seconds(pending_fix_.t - t_) / to_seconds(t_next - t_);
-    Directions h_b;
-    for (int k = 0; k < h_b.size(); ++k) {
-      h_b[k] = ((1 - fraction) * h_b_[k] + fraction * h_b_next[k]).normalized();
-    }
-    if (!predict_to(pending_fix_.t, h_b)) {
-      report.fix.status = FixStatus::kRejectedGeometry;
-      return;
-    }
-    correct_now(Rot<In, C>::assume(pending_fix_.q_in_c.normalized()), report);
-  }
-
-  /// Prediction of both models to `t` with the midpoint of the readings. False, and nothing moved, where the momenta
-  /// are parallel.
-  bool predict_to(Time t, const Directions& h_b) {
-    if (estimator_.started() && t > t_) {
-      Directions middle;
-      for (int k = 0; k < h_b.size(); ++k) {
-        middle[k] = (h_b_[k] + h_b[k]).normalized();
-      }
-      const auto calibrated = make_trihedra(estimator_.gyros(), middle);
-      const auto navigated = make_trihedra(navigator_.gyros(), middle);
-      if (!calibrated || !navigated) {
-        return false;
-      }
-      const double dt_s = to_seconds(t - t_);
-      estimator_.predict(calibrated.value().C_in_c().raw(), middle, dt_s);
-      navigator_.predict(navigated.value().C_in_c().raw(), middle, dt_s);
-      if (t - t_ > kMaxInterpolation) {
-        const double variance_rad2 = variance_of_long_step(h_b, dt_s);
-        estimator_.add_direction_variance(variance_rad2);
-        navigator_.add_direction_variance(variance_rad2);
-      }
-    }
-    t_ = t;
-    h_b_ = h_b;
-    has_sample_ = true;
-    return true;
-  }
-
-  /// What the midpoint rule may miss when the body turned far between two samples, rad²: the drift over the step, times
-  /// the turn.
-  [[nodiscard]] double variance_of_long_step(const Directions& h_b, double dt_s) const {
-    double largest_rad = 0;
-    for (int k = 0; k < h_b.size(); ++k) {
-      const double drift_rad = estimator_.gyros()[k].drift_rad_s.norm() * dt_s;
-      largest_rad = std::max(largest_rad, drift_rad * angle_between<double>(h_b_[k], h_b[k]));
-    }
-    return largest_rad * largest_rad;
-  }
-
-  /// Astro-correction at the present time: the calibration always, the navigator when it is due.
-  void correct_now(const Rot<In, C>& C_in_c, Report& report) {
+    follow(fix.t, readings->h_b);
     const typename Estimator::Sensitivities stretch = estimator_.since_fix();
-    report.fix = estimator_.correct(C_in_c.raw(), h_b_);
-    report.fix.t = t_;
+    report.fix = estimator_.correct(fix, *readings);
+    report.fix.t = fix.t;
     if (report.fix.status == FixStatus::kRejectedGeometry) {
       return;  // the estimator did not move its covariance to this fix
     }
     navigator_.extend(stretch);
-    if (const auto solution = calibration_attitude()) {
-      report.calibrated = solution.value();
-    }
+    report.calibrated = calibration_attitude(*readings);
     if (report.fix.used()) {
-      has_used_fix_ = true;
-      used_fix_t_ = t_;
-      correct_navigator(report);
+      used_fix_t_[fix.head] = fix.t;
+      correct_navigator(*readings, report);
     }
-    if (const auto solution = navigation_attitude()) {
-      report.navigated = solution.value();
+    if (navigator_.started() && !report.corrected) {
+      report.navigated = navigated_before(fix.t, *readings);
     }
   }
 
-  /// Astro-correction of the navigator, when it is due.
-  void correct_navigator(Report& report) {
-    const bool interval_over =
-        policy_.interval != CorrectionPolicy::kOnlyFirst && t_ - corrected_t_ >= policy_.interval;
+  /// Astro-correction of the navigator at the time of this fix, when it is due; then on to the latest sample.
+  void correct_navigator(const FixReadings<kGyros>& readings, Report& report) {
+    const Time t = report.fix.t;
+    const bool interval_over = policy_.interval != CorrectionPolicy::kOnlyFirst && t - corrected_t_ >= policy_.interval;
     // The fix that started both was contradicted by all the fixes after it: the navigator must not rest on it.
     const bool start_was_wrong = start_unconfirmed_ && report.fix.status == FixStatus::kUsedAfterReopening;
     start_unconfirmed_ = report.fix.status == FixStatus::kStarted;
@@ -247,20 +269,196 @@ class Cycle {
     if (policy_.take_parameters) {
       navigator_.correct(estimator_);
     } else if (report.calibrated) {
-      navigator_.correct_directions(estimator_, *report.calibrated, h_b_);
+      navigator_.correct_directions(estimator_, *report.calibrated, readings.h_b);
     } else {
       return;
     }
-    corrected_t_ = t_;
+    corrected_t_ = t;
     report.corrected = true;
+    const auto solution = navigator_.attitude_with_covariance(readings.h_b, readings.noise_factor,
+                                                              estimator_.since_fix(), estimator_.setup());
+    if (solution) {
+      report.navigated = solution.value();
+    }
+    Time from_t = t;
+    Directions from = readings.h_b;
+    for (int i = first_after(t); i < samples_.size(); ++i) {
+      predict_navigator(from_t, from, samples_[i].t, samples_[i].h_b);
+      from_t = samples_[i].t;
+      from = samples_[i].h_b;
+    }
   }
 
-  /// The calibration's own attitude; readout noise of a fix at this very sample is counted twice, which only shows at
-  /// the first fixes.
-  [[nodiscard]] Result<AttitudeSolution, DirectionsFault> calibration_attitude() const {
-    return trihedron_attitude<typename Estimator::DriftModel>(estimator_.gyros(), h_b_, estimator_.error_root(),
-                                                              estimator_.since_fix(),
-                                                              estimator_.setup().readout_noise_rad, 0.0);
+  // ---- Prediction
+
+  /// The estimator to `t`, with the midpoint of the readings.
+  void follow(Time t, const Directions& h_b) {
+    if (estimator_.started() && t > follower_t_) {
+      const Directions middle = between(follower_h_b_, h_b, 0.5);
+      if (const auto attitude = Estimator::attitude(estimator_.gyros(), middle)) {
+        const double dt_s = to_seconds(t - follower_t_);
+        estimator_.predict(attitude.value().C_in_c.raw(), middle, dt_s);
+        if (t - follower_t_ > kMaxInterpolation) {
+          estimator_.add_direction_variance(variance_of_long_step(follower_h_b_, h_b, dt_s));
+        }
+      }
+    }
+    follower_t_ = t;
+    follower_h_b_ = h_b;
+    followed_ = true;
+  }
+
+  void predict_navigator(Time from_t, const Directions& from, Time to_t, const Directions& to) {
+    const Directions middle = between(from, to, 0.5);
+    if (const auto attitude = navigator_.attitude(middle)) {
+      const double dt_s = to_seconds(to_t - from_t);
+      navigator_.predict(attitude.value().C_in_c.raw(), middle, dt_s);
+      if (to_t - from_t > kMaxInterpolation) {
+        navigator_.add_direction_variance(variance_of_long_step(from, to, dt_s));
+      }
+    }
+  }
+
+  /// What the midpoint rule may miss when the body turned far between two samples, rad²: the drift over the step, times
+  /// the turn.
+  [[nodiscard]] double variance_of_long_step(const Directions& from, const Directions& to, double dt_s) const {
+    double largest_rad = 0;
+    for (int k = 0; k < kGyros; ++k) {
+      const double drift_rad = estimator_.gyros()[k].drift_rad_s.norm() * dt_s;
+      largest_rad = std::max(largest_rad, drift_rad * angle_between<double>(from[k], to[k]));
+    }
+    return largest_rad * largest_rad;
+  }
+
+  // ---- Readings
+
+  [[nodiscard]] static Directions between(const Directions& a, const Directions& b, double fraction) {
+    Directions h_b;
+    for (int k = 0; k < kGyros; ++k) {
+      h_b[k] = ((1 - fraction) * a[k] + fraction * b[k]).normalized();
+    }
+    return h_b;
+  }
+
+  /// Index of the first buffered sample after `t`.
+  [[nodiscard]] int first_after(Time t) const {
+    int i = samples_.size();
+    while (i > 0 && samples_[i - 1].t > t) {
+      --i;
+    }
+    return i;
+  }
+
+  /// Readings at the time of a fix; nothing where there are no samples close enough round it.
+  [[nodiscard]] std::optional<FixReadings<kGyros>> readings_at(Time t) const {
+    const int after = first_after(t);
+    if (after == 0) {
+      return std::nullopt;
+    }
+    const GyroSample<kGyros>& before = samples_[after - 1];
+    FixReadings<kGyros> readings;
+    if (before.t == t) {
+      readings.h_b = before.h_b;
+    } else if (after < samples_.size() && samples_[after].t - before.t <= kMaxInterpolation) {
+      const GyroSample<kGyros>& next = samples_[after];
+      readings.h_b = between(before.h_b, next.h_b, to_seconds(t - before.t) / to_seconds(next.t - before.t));
+    } else {
+      return std::nullopt;
+    }
+    if constexpr (Estimator::kReach > Duration::zero()) {
+      int begin = after - 1;
+      while (begin > 0 && t - samples_[begin - 1].t <= Estimator::kReach && adjacent(begin - 1)) {
+        --begin;
+      }
+      int end = after;
+      while (end < samples_.size() && samples_[end].t - t <= Estimator::kReach && adjacent(end - 1)) {
+        ++end;
+      }
+      fit(begin, end, t, 3, readings);
+    }
+    return readings;
+  }
+
+  /// Readings at the latest sample.
+  [[nodiscard]] FixReadings<kGyros> readings_now() const {
+    FixReadings<kGyros> readings;
+    readings.h_b = samples_.latest().h_b;
+    if constexpr (Estimator::kReach > Duration::zero()) {
+      int begin = samples_.size() - 1;
+      while (begin > 0 && t() - samples_[begin - 1].t <= kRecent && adjacent(begin - 1)) {
+        --begin;
+      }
+      fit(begin, samples_.size(), t(), 2, readings);
+    }
+    return readings;
+  }
+
+  /// Whether sample i and the next are close enough to be taken together.
+  [[nodiscard]] bool adjacent(int i) const { return samples_[i + 1].t - samples_[i].t <= kMaxInterpolation; }
+
+  /// Takes the samples begin … end − 1 together, if they are more than a polynomial needs.
+  void fit(int begin, int end, Time t, int degree, FixReadings<kGyros>& readings) const {
+    if (end - begin < 2 * (degree + 1)) {
+      return;
+    }
+    const FittedDirections<kGyros> fitted = fit_directions(samples_, begin, end, t, degree);
+    if (!explains(fitted)) {
+      return;
+    }
+    readings.h_b = fitted.h_b;
+    readings.noise_factor = fitted.noise_factor;
+    // ḣ_c = −ω × h_c: each gyro sees ω across its momentum.
+    Eigen::Matrix3d across = Eigen::Matrix3d::Zero();
+    Eigen::Vector3d seen = Eigen::Vector3d::Zero();
+    for (int k = 0; k < kGyros; ++k) {
+      const Eigen::Matrix3d& C_c_b = estimator_.gyros()[k].C_c_b;
+      const Eigen::Vector3d h_c = C_c_b * fitted.h_b[k];
+      across += Eigen::Matrix3d::Identity() - h_c * h_c.transpose();
+      seen += (C_c_b * fitted.h_b_rate[k]).cross(h_c);
+    }
+    readings.rate_c = across.inverse() * seen;
+  }
+
+  /// Whether a polynomial is what the body did: its residuals are those of the readout, within five sigmas.
+  [[nodiscard]] bool explains(const FittedDirections<kGyros>& fitted) const {
+    const double bound = fitted.freedom + 5 * std::sqrt(2.0 * fitted.freedom);
+    for (int k = 0; k < kGyros; ++k) {
+      const double sigma_rad = estimator_.setup().readout_noise_rad[k];
+      if (!(fitted.residual_square[k] <= bound * sigma_rad * sigma_rad)) {
+        return false;
+      }
+    }
+    return true;
+  }
+
+  // ---- What comes out
+
+  [[nodiscard]] std::optional<AttitudeSolution> calibration_attitude(const FixReadings<kGyros>& readings) const {
+    const auto attitude = Estimator::attitude(estimator_.gyros(), readings.h_b);
+    if (!attitude) {
+      return std::nullopt;
+    }
+    PerGyro<double, kGyros> noise_rad;
+    for (int k = 0; k < kGyros; ++k) {
+      noise_rad[k] = readings.noise_factor * estimator_.setup().readout_noise_rad[k];
+    }
+    // Readout noise of a fix at this very sample is counted twice, which only shows at the first fixes.
+    return with_covariance<typename Estimator::DriftModel, kGyros>(attitude.value(), estimator_.error_root(),
+                                                                   estimator_.since_fix(), noise_rad, 0.0);
+  }
+
+  /// The navigator's attitude at a time it has passed, within the samples buffered.
+  [[nodiscard]] std::optional<AttitudeSolution> navigated_before(Time t, const FixReadings<kGyros>& readings) const {
+    Navigator<Estimator> past = navigator_;
+    const Directions middle = between(readings.h_b, samples_.latest().h_b, 0.5);
+    const auto attitude = past.attitude(middle);
+    if (!attitude) {
+      return std::nullopt;
+    }
+    past.predict(attitude.value().C_in_c.raw(), middle, to_seconds(t - this->t()));
+    const auto solution =
+        past.attitude_with_covariance(readings.h_b, readings.noise_factor, estimator_.since_fix(), estimator_.setup());
+    return solution ? std::optional(solution.value()) : std::nullopt;
   }
 
   [[nodiscard]] double angle_residual() const {
@@ -268,23 +466,29 @@ class Cycle {
       return 0;
     }
     const auto& gyros = estimator_.gyros();
-    return gyros[0].h_in.dot(gyros[1].h_in) - (gyros[0].C_c_b * h_b_[0]).dot(gyros[1].C_c_b * h_b_[1]);
+    const Directions& h_b = samples_.latest().h_b;
+    return gyros[0].h_in.dot(gyros[1].h_in) - (gyros[0].C_c_b * h_b[0]).dot(gyros[1].C_c_b * h_b[1]);
   }
+
+  [[nodiscard]] bool has_sample() const { return samples_.size() > 0; }
+  /// The oldest sample that the estimator has not yet followed.
+  [[nodiscard]] const GyroSample<kGyros>& next_sample() const { return samples_[samples_.size() - behind_]; }
 
   Estimator estimator_;
   Navigator<Estimator> navigator_;
   CorrectionPolicy policy_;
-  Time t_{};
-  Directions h_b_;
-  Time used_fix_t_{};
-  StarFix pending_fix_;
+  SampleBuffer<kGyros, kBufferedSamples> samples_;
+  int behind_ = 0;  ///< samples that the estimator has not yet followed
+  Time follower_t_{};
+  Directions follower_h_b_;
+  std::array<StarFix, kBufferedFixes + 1> pending_{};
+  int fixes_ = 0;                                               ///< of them
+  PerGyro<std::optional<Time>, Estimator::kHeads> used_fix_t_;  ///< per star tracker
   Time corrected_t_{};
   Time suspect_t_{};
-  bool has_sample_ = false;
+  bool followed_ = false;
   bool has_suspect_ = false;
   bool start_unconfirmed_ = false;
-  bool has_used_fix_ = false;
-  bool has_pending_fix_ = false;
 };
 
 }  // namespace trihedron

@@ -3,6 +3,7 @@
 /// attitude.
 
 #include "trihedron/core/calibration.hpp"
+#include "trihedron/core/optimal_attitude.hpp"
 #include "trihedron/core/per_gyro.hpp"
 
 namespace trihedron {
@@ -13,48 +14,20 @@ struct AttitudeSolution {
   Eigen::Matrix3d covariance_rad2 = Eigen::Matrix3d::Zero();
 };
 
-/// The gyro trihedron as believed in `in` and as read in the cases (paper: reference gyro 1, Fig. 4).
-struct TrihedronPair {
-  Trihedron<In> in;
-  Trihedron<C> c;
-  [[nodiscard]] Rot<In, C> C_in_c() const { return attitude(in, c); }
-};
-
-/// h_b: direction cosines, need not be exactly unit.
-template <class Model>
-[[nodiscard]] Result<TrihedronPair, DirectionsFault> make_trihedra(const PerGyro<GyroModel<Model>, 2>& gyros,
-                                                                   const PerGyro<Eigen::Vector3d, 2>& h_b) {
-  const auto in = make_trihedron(Vec<In>::assume(gyros[0].h_in), Vec<In>::assume(gyros[1].h_in));
-  if (!in) {
-    return in.fault();
-  }
-  const auto c = make_trihedron(Vec<C>::assume(gyros[0].C_c_b * h_b[0]), Vec<C>::assume(gyros[1].C_c_b * h_b[1]));
-  if (!c) {
-    return c.fault();
-  }
-  return TrihedronPair{in.value(), c.value()};
-}
-
 /// Attitude with its covariance: errors at a reference epoch (rows of `errors` as in ErrorLayout), carried by `since`,
-/// plus the readout noise of this sample and a random walk of the directions of `walk_variance_rad2` per axis.
-template <class Model, int Columns>
-[[nodiscard]] Result<AttitudeSolution, DirectionsFault> trihedron_attitude(
-    const PerGyro<GyroModel<Model>, 2>& gyros, const PerGyro<Eigen::Vector3d, 2>& h_b,
-    const Eigen::Matrix<double, ErrorLayout<Model, 2>::kSize, Columns>& errors,
-    const PerGyro<Sensitivity<Model>, 2>& since, const PerGyro<double, 2>& readout_noise_rad,
+/// plus the readout noise of these readings and a random walk of the directions of `walk_variance_rad2` per axis.
+template <class Model, int N, int Columns>
+[[nodiscard]] AttitudeSolution with_covariance(
+    const AttitudeByDirections<N>& attitude, const Eigen::Matrix<double, ErrorLayout<Model, N>::kSize, Columns>& errors,
+    const PerGyro<Sensitivity<Model>, N>& since, const PerGyro<double, N>& readout_noise_rad,
     double walk_variance_rad2) {
-  using Errors = ErrorLayout<Model, 2>;
-  const auto trihedra = make_trihedra(gyros, h_b);
-  if (!trihedra) {
-    return trihedra.fault();
-  }
+  using Errors = ErrorLayout<Model, N>;
   AttitudeSolution solution;
-  solution.C_in_c = trihedra.value().C_in_c();
+  solution.C_in_c = attitude.C_in_c;
   const Eigen::Matrix3d C_c_in = solution.C_in_c.raw().transpose();
-  const Eigen::Matrix<double, 3, 6> by_directions = attitude_by_directions(trihedra.value().c);
   Eigen::Matrix<double, 3, Errors::kSize> by_errors = Eigen::Matrix<double, 3, Errors::kSize>::Zero();
-  for (int k = 0; k < 2; ++k) {
-    const Eigen::Matrix3d by_phi = by_directions.middleCols<3>(Errors::direction(k));
+  for (int k = 0; k < N; ++k) {
+    const Eigen::Matrix3d by_phi = attitude.by_directions.template middleCols<3>(3 * k);
     const Eigen::Matrix3d by_phi_in = by_phi * C_c_in;
     by_errors.template middleCols<3>(Errors::direction(k)) = by_phi_in * since[k].by_start;
     by_errors.template middleCols<Model::kSize>(Errors::drift(k)) = by_phi_in * since[k].by_drift;
@@ -72,6 +45,7 @@ template <class Estimator>
 class Navigator {
  public:
   using Model = typename Estimator::DriftModel;
+  static constexpr int kGyros = Estimator::kGyros;
 
   [[nodiscard]] bool started() const { return started_; }
   [[nodiscard]] const typename Estimator::Gyros& gyros() const { return gyros_; }
@@ -88,17 +62,16 @@ class Navigator {
   void correct_directions(const Estimator& estimator, const AttitudeSolution& attitude,
                           const typename Estimator::Directions& h_b) {
     using Errors = typename Estimator::Errors;
-    constexpr int kParameters = Estimator::Setup::Layout::kSize;
+    constexpr int kParameters = Errors::kSize - Errors::kDirections;
     static_assert(Estimator::ErrorRoot::ColsAtCompileTime >= kParameters + 3);
     if (!started_) {
-      gyros_ = estimator.setup().prior;
+      gyros_ = estimator.prior_gyros();
     }
     const Eigen::Matrix3d& C_in_c = attitude.C_in_c.raw();
     errors_.setZero();
-    errors_.template block<kParameters, kParameters>(Errors::kDirections, 0) =
-        estimator.setup().prior_covariance.llt().matrixL();
+    errors_.template block<kParameters, kParameters>(Errors::kDirections, 0) = estimator.prior_parameter_root();
     const Eigen::Matrix3d attitude_root = attitude.covariance_rad2.llt().matrixL();
-    for (int k = 0; k < gyros_.size(); ++k) {
+    for (int k = 0; k < kGyros; ++k) {
       gyros_[k].h_in = (C_in_c * (gyros_[k].C_c_b * h_b[k])).normalized();
       // φ = C_in_c (δ + ε): h_in was read through the held alignment at the estimated attitude.
       errors_.template middleRows<3>(Errors::direction(k)) =
@@ -110,7 +83,7 @@ class Navigator {
 
   /// Open-loop prediction over one step; C_in_c and h_b of its middle. Needs started().
   void predict(const Eigen::Matrix3d& C_in_c, const typename Estimator::Directions& h_b, double dt_s) {
-    for (int k = 0; k < gyros_.size(); ++k) {
+    for (int k = 0; k < kGyros; ++k) {
       precess(gyros_[k], C_in_c, h_b[k], dt_s);
     }
     time_since_correction_s_ += dt_s;
@@ -121,22 +94,35 @@ class Navigator {
 
   /// Carries the errors over the stretch between two fixes, for which the estimator has integrated the sensitivities.
   void extend(const typename Estimator::Sensitivities& stretch) {
-    for (int k = 0; k < gyros_.size(); ++k) {
+    for (int k = 0; k < kGyros; ++k) {
       since_correction_[k] = since_correction_[k].then(stretch[k]);
     }
   }
 
-  /// Attitude at readings h_b; `since_fix`: the stretch not yet given to extend(). Needs started().
+  /// Attitude by the momenta and these readings. Needs started().
+  [[nodiscard]] Result<AttitudeByDirections<kGyros>, DirectionsFault> attitude(
+      const typename Estimator::Directions& h_b) const {
+    return Estimator::attitude(gyros_, h_b);
+  }
+
+  /// The same with its covariance; `since_fix`: the stretch not yet given to extend(), `noise_factor`: 1-sigma of the
+  /// readings over that of a single one.
   [[nodiscard]] Result<AttitudeSolution, DirectionsFault> attitude_with_covariance(
-      const typename Estimator::Directions& h_b, const typename Estimator::Sensitivities& since_fix,
-      const typename Estimator::Setup& setup) const {
+      const typename Estimator::Directions& h_b, double noise_factor,
+      const typename Estimator::Sensitivities& since_fix, const typename Estimator::Setup& setup) const {
+    const auto by_directions = attitude(h_b);
+    if (!by_directions) {
+      return by_directions.fault();
+    }
     typename Estimator::Sensitivities since = since_correction_;
-    for (int k = 0; k < gyros_.size(); ++k) {
+    PerGyro<double, kGyros> noise_rad;
+    for (int k = 0; k < kGyros; ++k) {
       since[k] = since[k].then(since_fix[k]);
+      noise_rad[k] = noise_factor * setup.readout_noise_rad[k];
     }
     const double walk = setup.direction_random_walk_rad_sqrt_s;
-    return trihedron_attitude<Model>(gyros_, h_b, errors_, since, setup.readout_noise_rad,
-                                     walk * walk * time_since_correction_s_ + extra_variance_rad2_);
+    return with_covariance<Model, kGyros>(by_directions.value(), errors_, since, noise_rad,
+                                          walk * walk * time_since_correction_s_ + extra_variance_rad2_);
   }
 
  private:

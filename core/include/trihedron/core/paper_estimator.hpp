@@ -4,8 +4,12 @@
 
 #include "trihedron/core/calibration.hpp"
 #include "trihedron/core/drift.hpp"
+#include "trihedron/core/fix_readings.hpp"
+#include "trihedron/core/optimal_attitude.hpp"
+#include "trihedron/core/outlier_gate.hpp"
 #include "trihedron/core/per_gyro.hpp"
 #include "trihedron/core/square_root_information.hpp"
+#include "trihedron/core/telemetry.hpp"
 
 namespace trihedron {
 
@@ -30,11 +34,15 @@ struct PaperLayout {
 template <class Model = Esg7>
 class PaperEstimator {
  public:
+  using BaseModel = Model;
   using DriftModel = Model;
   using Layout = PaperLayout<Model>;
   static constexpr int kGyros = Layout::kGyros;
   static constexpr int kMeasurements = 4;
   static constexpr const char* kName = "paper";
+  static constexpr int kHeads = 1;
+  /// Readings to both sides of a fix that are taken together: none.
+  static constexpr Duration kReach = Duration::zero();
   using Setup = CalibrationSetup<Model, kGyros>;
   using Gyros = PerGyro<GyroModel<Model>, kGyros>;
   using Sensitivities = PerGyro<Sensitivity<Model>, kGyros>;
@@ -54,6 +62,18 @@ class PaperEstimator {
   [[nodiscard]] const Sensitivities& since_fix() const { return since_fix_; }
   [[nodiscard]] const Setup& setup() const { return setup_; }
 
+  /// The trihedron: gyro 1 is the reference.
+  [[nodiscard]] static Result<AttitudeByDirections<kGyros>, DirectionsFault> attitude(const Gyros& gyros,
+                                                                                      const Directions& h_b) {
+    return trihedron_attitude(momenta(gyros), in_c(gyros, h_b));
+  }
+  /// What was known before.
+  [[nodiscard]] const Gyros& prior_gyros() const { return setup_.prior; }
+  /// A square root of the prior covariance, rows as the parameters in ErrorLayout.
+  [[nodiscard]] Eigen::Matrix<double, Layout::kParameters, Layout::kParameters> prior_parameter_root() const {
+    return setup_.prior_covariance.llt().matrixL();
+  }
+
   /// Prediction of both momenta over one step, attitude and readings of its middle. Needs started().
   void predict(const Eigen::Matrix3d& C_in_c, const Directions& h_b, double dt_s);
 
@@ -62,6 +82,10 @@ class PaperEstimator {
 
   /// Astro-correction: the first one starts the filter, each further one updates it. C_in_c: the tracker's attitude.
   [[nodiscard]] Report correct(const Eigen::Matrix3d& C_in_c, const Directions& h_b);
+  /// The same; the paper takes a single sample and one star tracker.
+  [[nodiscard]] Report correct(const StarFix& fix, const FixReadings<kGyros>& readings) {
+    return correct(fix.q_in_c.normalized().toRotationMatrix(), readings.h_b);
+  }
 
   /// Square root of the covariance of the errors at the last fix, rows as in ErrorLayout. Needs started().
   [[nodiscard]] ErrorRoot error_root() const;
@@ -93,7 +117,6 @@ class PaperEstimator {
   using Information = SquareRootInformation<Layout::kStates, Layout::kDynamic>;
 
   void update_covariance_to_now(const QuasiInertial& now);
-  void reopen(const QuasiInertial& now, const Innovation& innovation, Report& report);
   void feed_back(const typename Information::Vector& correction);
 
   Setup setup_;
@@ -102,10 +125,9 @@ class PaperEstimator {
   QuasiInertial qi_;  ///< basis of the direction errors in information_
   Information information_;
   Information prior_;  ///< of the parameters alone
+  OutlierGate gate_;
   double time_since_fix_s_ = 0;
   double extra_variance_rad2_ = 0;
-  int rejections_in_a_row_ = 0;
-  int fixes_under_suspicion_ = 0;  ///< a run of rejections before these have passed means a restart
   bool started_ = false;
 };
 

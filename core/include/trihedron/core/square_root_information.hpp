@@ -62,6 +62,14 @@ class SquareRootInformation {
     rotate_into(root_, extra, N);
   }
 
+  /// Adds information rows about any states: unit white noise = rows · x.
+  template <int M>
+  void add_information(const Rows<M>& rows) {
+    Eigen::Matrix<S, M, N + 1> extra = Eigen::Matrix<S, M, N + 1>::Zero();
+    extra.template leftCols<N>() = rows;
+    rotate_into(root_, extra, N);
+  }
+
   /// Time update: x_d ← A x_d + B x_c + L w, w ~ (0, I). A must be invertible; L = 0 is allowed.
   void propagate(const DynamicMatrix& A, const DynamicByConstants& B, const DynamicMatrix& L) {
     // Rows of R with x_d(before) = A⁻¹ (x_d(after) − B x_c − L w) put in: columns are w, x_d(after), x_c. Then w is

@@ -23,7 +23,8 @@ struct GyroSample {
 /// Star-tracker fix q_in_c, Hamilton; as telemetered, of either sign.
 struct StarFix {
   Time t{};
-  Eigen::Quaterniond q_in_c = Eigen::Quaterniond::Identity();
+  Eigen::Quaterniond q_in_c = Eigen::Quaterniond::Identity();  ///< of a further head: by its mounting as designed
+  int head = 0;                                                ///< which star tracker; the axes of the first are c
 };
 
 /// Whether the length is within kNormTolerance of one; false for NaN.

@@ -60,7 +60,7 @@ struct CalibrationRun {
 };
 
 /// What `CalibrationOptions::estimator` and `drift_model` may name.
-inline constexpr std::array<const char*, 1> kEstimators = {"paper"};
+inline constexpr std::array<const char*, 2> kEstimators = {"invariant", "paper"};
 inline constexpr std::array<const char*, 1> kDriftModels = {"esg7"};
 
 /// Called now and then with the fraction done, 0 … 1.

@@ -37,13 +37,9 @@ void replay(const Pass& pass, Cycle& cycle, OnFix&& on_fix, OnSample&& on_sample
     feed_fixes([&](Time t) { return t == sample.t; });
     on_sample(report);
   }
-  // After the last sample nothing can be interpolated; what is left is told, not dropped.
-  for (; next_fix < tracker.size(); ++next_fix) {
-    Report report = cycle.on_fix(StarFix{tracker.t[next_fix], tracker.q_in_c[next_fix]});
-    if (report.fix.status == FixStatus::kPending) {
-      report.fix.status = FixStatus::kRejectedNoGyro;
-    }
-    tell(report);
+  feed_fixes([](Time) { return true; });
+  for (Report report = cycle.flush(); report.fix.status != FixStatus::kNone; report = cycle.flush()) {
+    on_fix(report);
   }
 }
 

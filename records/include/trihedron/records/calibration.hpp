@@ -47,6 +47,13 @@ struct StateName {
         alignment_axis(is_alignment ? parameter.back() - 'x' : 0) {}
 };
 
+/// A further state of an estimator: "clock_offset_s", "orbital_sine_x_rad" …
+struct FurtherEstimate {
+  std::string name;
+  double value = 0;
+  double sigma = 0;
+};
+
 struct Calibration {
   std::string estimator;
   Time epoch{};  ///< of the pass
@@ -56,6 +63,7 @@ struct Calibration {
   std::vector<std::string> states;
   /// rad/s for drift, rad for alignment: error δ with C_c_b(true) = exp([δ×]) C_c_b(est), c axes.
   Eigen::MatrixXd covariance;
+  std::vector<FurtherEstimate> further;  ///< of the star trackers; empty where not estimated
   Verdict verdict;
   std::map<std::string, double> statistics;
 };

@@ -26,6 +26,10 @@ struct CalibrationOptions {
   double gate_nis = 30;
   /// After so many rejections in a row the directions are set free and the fix is used.
   int reopen_after_rejections = 20;
+  /// Estimator invariant: clock offset and error at orbital period of the star tracker, and a drift that wanders.
+  bool further_states = false;
+  double wandering_drift_rad_s = 1e-8;  ///< 1-sigma about each case axis, first-order Gauss–Markov
+  Duration wandering_time = std::chrono::hours(1);
   CorrectionOptions corrections;
 };
 

@@ -1,0 +1,107 @@
+#pragma once
+/// Attitude from N directions with weights: Wahba's problem. The trihedron is its case of two directions that trusts
+/// the first.
+
+#include <Eigen/LU>
+
+#include "trihedron/core/attitude.hpp"
+#include "trihedron/core/per_gyro.hpp"
+
+namespace trihedron {
+
+/// Attitude, and its error by those of the directions: with h_in(true) = exp([φ_k×]) h_in and h_c(true) = exp([ρ_k×])
+/// h_c, C_in_c(true) = C_in_c exp([ε×]) has ε = by_directions · (C_c_in φ_k − ρ_k), c axes.
+template <int N>
+struct AttitudeByDirections {
+  Rot<In, C> C_in_c;
+  Eigen::Matrix<double, 3, 3 * N> by_directions = Eigen::Matrix<double, 3, 3 * N>::Zero();
+};
+
+/// The trihedron on the first two directions, and errors by theirs. Eq. of section 5, paper Fig. 4.
+[[nodiscard]] inline Result<AttitudeByDirections<2>, DirectionsFault> trihedron_attitude(
+    const PerGyro<Eigen::Vector3d, 2>& h_in, const PerGyro<Eigen::Vector3d, 2>& h_c) {
+  const auto in = make_trihedron(Vec<In>::assume(h_in[0]), Vec<In>::assume(h_in[1]));
+  if (!in) {
+    return in.fault();
+  }
+  const auto c = make_trihedron(Vec<C>::assume(h_c[0]), Vec<C>::assume(h_c[1]));
+  if (!c) {
+    return c.fault();
+  }
+  return AttitudeByDirections<2>{attitude(in.value(), c.value()), attitude_by_directions(c.value())};
+}
+
+/// Readings h_b of gyros, seen in c.
+template <class Gyros, int N>
+[[nodiscard]] PerGyro<Eigen::Vector3d, N> in_c(const Gyros& gyros, const PerGyro<Eigen::Vector3d, N>& h_b) {
+  PerGyro<Eigen::Vector3d, N> h_c;
+  for (int k = 0; k < N; ++k) {
+    h_c[k] = gyros[k].C_c_b * h_b[k];
+  }
+  return h_c;
+}
+
+/// Momenta of gyros in `in`.
+template <class Gyros, int N = Gyros::size()>
+[[nodiscard]] PerGyro<Eigen::Vector3d, N> momenta(const Gyros& gyros) {
+  PerGyro<Eigen::Vector3d, N> h_in;
+  for (int k = 0; k < N; ++k) {
+    h_in[k] = gyros[k].h_in;
+  }
+  return h_in;
+}
+
+/// Least squares over all directions, Σ w_k |h_in,k − C h_c,k|². Weights: positive where a direction is to be used, 0
+/// where not; at least two used ones must stand further than asin(kMinSine) from one line.
+template <int N>
+[[nodiscard]] Result<AttitudeByDirections<N>, DirectionsFault> optimal_attitude(const PerGyro<Eigen::Vector3d, N>& h_in,
+                                                                                const PerGyro<Eigen::Vector3d, N>& h_c,
+                                                                                const PerGyro<double, N>& weight) {
+  // From the best placed pair …
+  double best = 0;
+  int first = 0;
+  int second = 1;
+  for (int j = 0; j < N; ++j) {
+    for (int k = j + 1; k < N; ++k) {
+      const double sine = weight[j] > 0 && weight[k] > 0 ? h_in[j].cross(h_in[k]).norm() : 0;
+      if (sine > best) {
+        best = sine;
+        first = j;
+        second = k;
+      }
+    }
+  }
+  if (!(best >= kMinSine)) {
+    return DirectionsFault::kMomentaNearlyParallel;
+  }
+  PerGyro<Eigen::Vector3d, 2> pair_in;
+  PerGyro<Eigen::Vector3d, 2> pair_c;
+  pair_in[0] = h_in[first];
+  pair_in[1] = h_in[second];
+  pair_c[0] = h_c[first];
+  pair_c[1] = h_c[second];
+  const auto start = trihedron_attitude(pair_in, pair_c);
+  if (!start) {
+    return start.fault();
+  }
+  // … Gauss–Newton, whose second step is already below rounding for directions that agree within a degree.
+  AttitudeByDirections<N> result;
+  result.C_in_c = start.value().C_in_c;
+  for (int step = 0; step < 3; ++step) {
+    Eigen::Matrix3d normal = Eigen::Matrix3d::Zero();
+    Eigen::Vector3d misfit = Eigen::Vector3d::Zero();
+    for (int k = 0; k < N; ++k) {
+      const Eigen::Vector3d seen = result.C_in_c.raw().transpose() * h_in[k];
+      const Eigen::Matrix3d across = weight[k] * (Eigen::Matrix3d::Identity() - h_c[k] * h_c[k].transpose());
+      normal += across;
+      misfit += weight[k] * h_c[k].cross(seen);
+      result.by_directions.template middleCols<3>(3 * k) = across;
+    }
+    const Eigen::Matrix3d inverse = normal.inverse();
+    result.by_directions = inverse * result.by_directions;
+    result.C_in_c = result.C_in_c * Rot<C, C>::exp(Vec<C>::assume(inverse * misfit));
+  }
+  return result;
+}
+
+}  // namespace trihedron

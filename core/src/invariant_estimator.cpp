@@ -1,0 +1,339 @@
+#include "trihedron/core/invariant_estimator.hpp"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
+
+namespace trihedron {
+
+template <class Base, int N, FurtherStates F>
+Result<InvariantEstimator<Base, N, F>, SetupFault> InvariantEstimator<Base, N, F>::create(const Setup& setup) {
+  if (!setup.noise_is_positive()) {
+    return SetupFault::kNoiseNotPositive;
+  }
+  if (!(setup.gate_nis > 0) || !(setup.reopen_after_rejections > 0)) {
+    return SetupFault::kGateNotPositive;
+  }
+  if (!setup.means_are_usable()) {
+    return SetupFault::kPriorMeanNotUsable;
+  }
+  if ((F.clock_offset && !(setup.clock_offset_sigma_s > 0)) ||
+      (F.orbital_error && !(setup.orbital_error_sigma_rad > 0)) ||
+      (F.wandering_drift && !(setup.wandering_sigma_rad_s > 0 && setup.wandering_time_s > 0)) ||
+      !std::all_of(setup.further_heads.begin(), setup.further_heads.end(),
+                   [](const HeadSetup& head) { return head.alignment_sigma_rad > 0; })) {
+    return SetupFault::kPriorNotPositiveDefinite;
+  }
+  constexpr int kOwn = N * Layout::kPerGyro;
+  constexpr int kConstants = Layout::kStates - Layout::kDynamic;
+  const auto root = information_root<kOwn>(setup.prior_covariance);
+  if (!root) {
+    return root.fault();
+  }
+  InvariantEstimator e;
+  e.setup_ = setup;
+  e.gyros_ = e.prior_gyros();
+  Eigen::Matrix<double, kConstants, kConstants> constants = Eigen::Matrix<double, kConstants, kConstants>::Zero();
+  constants.template topLeftCorner<kOwn, kOwn>() = root.value();
+  constexpr int kFirst = Layout::kDynamic;
+  if constexpr (F.clock_offset) {
+    constants(Layout::clock_offset() - kFirst, Layout::clock_offset() - kFirst) = 1 / setup.clock_offset_sigma_s;
+  }
+  if constexpr (F.orbital_error) {
+    constants.diagonal()
+        .template segment<6>(Layout::orbital_error() - kFirst)
+        .setConstant(1 / setup.orbital_error_sigma_rad);
+  }
+  for (int head = 1; head <= F.further_heads; ++head) {
+    constants.diagonal()
+        .template segment<3>(Layout::head(head) - kFirst)
+        .setConstant(1 / setup.further_heads[static_cast<std::size_t>(head - 1)].alignment_sigma_rad);
+  }
+  e.prior_.add_prior_of_constants(constants);
+  if constexpr (F.wandering_drift) {
+    Eigen::Matrix<double, 3 * N, Layout::kStates> rows = Eigen::Matrix<double, 3 * N, Layout::kStates>::Zero();
+    rows.template middleCols<3 * N>(Layout::kDirections).setIdentity();
+    e.prior_.add_information(Eigen::Matrix<double, 3 * N, Layout::kStates>(rows / setup.wandering_sigma_rad_s));
+  }
+  e.gate_ = OutlierGate(setup.gate_nis, setup.reopen_after_rejections, setup.restart_within_fixes);
+  return e;
+}
+
+template <class Base, int N, FurtherStates F>
+void InvariantEstimator<Base, N, F>::update_to_now() {
+  using DynamicMatrix = typename Information::DynamicMatrix;
+  DynamicMatrix A = DynamicMatrix::Zero();
+  typename Information::DynamicByConstants B = Information::DynamicByConstants::Zero();
+  DynamicMatrix L = DynamicMatrix::Zero();
+  const double walk = setup_.direction_random_walk_rad_sqrt_s;
+  const double sigma = std::sqrt(walk * walk * time_since_fix_s_ + extra_variance_rad2_);
+  for (int k = 0; k < N; ++k) {
+    const int row = Layout::direction(k);
+    A.template block<3, 3>(row, row) = since_fix_[k].by_start;
+    B.template block<3, Base::kSize>(row, Layout::drift(k) - Layout::kDynamic) =
+        since_fix_[k].by_drift.template leftCols<Base::kSize>();
+    B.template block<3, 3>(row, Layout::alignment(k) - Layout::kDynamic) = since_fix_[k].by_alignment;
+    L.diagonal().template segment<3>(row).setConstant(sigma);
+    if constexpr (F.wandering_drift) {
+      const double kept = std::exp(-time_since_fix_s_ / setup_.wandering_time_s);
+      const int wandering = Layout::wandering(k);
+      A.template block<3, 3>(row, wandering) = since_fix_[k].by_drift.template rightCols<3>();
+      A.template block<3, 3>(wandering, wandering) = kept * Eigen::Matrix3d::Identity();
+      L.diagonal().template segment<3>(wandering).setConstant(setup_.wandering_sigma_rad_s *
+                                                              std::sqrt(1 - kept * kept));
+      gyros_[k].drift_rad_s.template tail<3>() *= kept;
+    }
+  }
+  information_.propagate(A, B, L);
+  since_fix_ = {};
+  time_since_fix_s_ = 0;
+  extra_variance_rad2_ = 0;
+}
+
+template <class Base, int N, FurtherStates F>
+void InvariantEstimator<Base, N, F>::start(const Eigen::Matrix3d& C_in_c, const FixReadings<N>& readings,
+                                           const Eigen::Matrix3d& R_c, const FixBySharedStates& by_shared) {
+  // φ_k = C (δ_k − e) + readout: the momentum is read through the alignment at the fix, whose error e is common.
+  Eigen::Matrix<double, 3 * N, Layout::kStates> H = Eigen::Matrix<double, 3 * N, Layout::kStates>::Zero();
+  Eigen::Matrix<double, 3 * N, 3 * N> R;
+  const Eigen::Matrix3d R_in = C_in_c * R_c * C_in_c.transpose();
+  for (int k = 0; k < N; ++k) {
+    gyros_[k].h_in = (C_in_c * (gyros_[k].C_c_b * readings.h_b[k])).normalized();
+    H.template block<3, 3>(3 * k, Layout::direction(k)).setIdentity();
+    H.template block<3, 3>(3 * k, Layout::alignment(k)) = -C_in_c;
+    H.template block<3, F.shared()>(3 * k, Layout::kShared) = C_in_c * by_shared;
+    for (int j = 0; j < N; ++j) {
+      R.template block<3, 3>(3 * k, 3 * j) = R_in;
+    }
+    const double sigma = setup_.readout_noise_rad[k] * readings.noise_factor;
+    R.template block<3, 3>(3 * k, 3 * k).diagonal().array() += sigma * sigma;
+  }
+  const Eigen::LLT<Eigen::Matrix<double, 3 * N, 3 * N>> factor(R);
+  information_ = prior_;
+  information_.add_information(Eigen::Matrix<double, 3 * N, Layout::kStates>(factor.matrixL().solve(H)));
+  since_fix_ = {};
+  time_since_fix_s_ = 0;
+  extra_variance_rad2_ = 0;
+}
+
+template <class Base, int N, FurtherStates F>
+auto InvariantEstimator<Base, N, F>::attitude(const Gyros& gyros, const Directions& h_b)
+    -> Result<AttitudeByDirections<N>, DirectionsFault> {
+  PerGyro<double, N> weight;
+  std::fill(weight.begin(), weight.end(), 1.0);
+  return optimal_attitude<N>(momenta(gyros), in_c(gyros, h_b), weight);
+}
+
+template <class Base, int N, FurtherStates F>
+auto InvariantEstimator<Base, N, F>::prior_gyros() const -> Gyros {
+  Gyros gyros;
+  for (int k = 0; k < N; ++k) {
+    gyros[k].drift_rad_s.setZero();
+    gyros[k].drift_rad_s.template head<Base::kSize>() = setup_.prior[k].drift_rad_s;
+    gyros[k].C_c_b = setup_.prior[k].C_c_b;
+  }
+  return gyros;
+}
+
+template <class Base, int N, FurtherStates F>
+void InvariantEstimator<Base, N, F>::predict(const Eigen::Matrix3d& C_in_c, const Directions& h_b, double dt_s) {
+  for (int k = 0; k < N; ++k) {
+    precess(gyros_[k], since_fix_[k], C_in_c, h_b[k], dt_s);
+  }
+  time_since_fix_s_ += dt_s;
+}
+
+template <class Base, int N, FurtherStates F>
+auto InvariantEstimator<Base, N, F>::fix_by_shared(Time t, int head, const Eigen::Vector3d& rate_c) const
+    -> FixBySharedStates {
+  FixBySharedStates by = FixBySharedStates::Zero();
+  if constexpr (F.clock_offset) {
+    by.col(Layout::clock_offset() - Layout::kShared) = rate_c;
+  }
+  if constexpr (F.orbital_error) {
+    if (head == 0) {
+      const double phase = setup_.orbital_rate_rad_s * to_seconds(t - setup_.orbital_phase_zero);
+      constexpr int kFirst = Layout::orbital_error() - Layout::kShared;
+      by.template middleCols<3>(kFirst) = std::sin(phase) * Eigen::Matrix3d::Identity();
+      by.template middleCols<3>(kFirst + 3) = std::cos(phase) * Eigen::Matrix3d::Identity();
+    }
+  }
+  if constexpr (F.further_heads > 0) {
+    if (head > 0) {
+      by.template middleCols<3>(Layout::head(head) - Layout::kShared).setIdentity();
+    }
+  }
+  return by;
+}
+
+template <class Base, int N, FurtherStates F>
+Eigen::Matrix3d InvariantEstimator<Base, N, F>::fix_noise(int head) const {
+  Eigen::Matrix3d root = setup_.star_tracker_noise_rad.asDiagonal();
+  if constexpr (F.further_heads > 0) {
+    if (head > 0) {
+      const HeadSetup& its = setup_.further_heads[static_cast<std::size_t>(head - 1)];
+      root = its.C_c_s * its.noise_rad.asDiagonal();
+    }
+  }
+  return root * root.transpose();
+}
+
+template <class Base, int N, FurtherStates F>
+Eigen::Matrix3d InvariantEstimator<Base, N, F>::fused_attitude(const AttitudeByDirections<N>& by_gyros,
+                                                               const Rot<In, C>& by_fix, const Eigen::Matrix3d& R_c,
+                                                               double noise_factor) const {
+  const Eigen::Matrix3d C_c_in = by_gyros.C_in_c.raw().transpose();
+  Eigen::Matrix<double, 3, Layout::kStates> by_states = Eigen::Matrix<double, 3, Layout::kStates>::Zero();
+  Eigen::Matrix3d P = Eigen::Matrix3d::Zero();
+  for (int k = 0; k < N; ++k) {
+    const Eigen::Matrix3d by_phi = by_gyros.by_directions.template middleCols<3>(3 * k);
+    by_states.template middleCols<3>(Layout::direction(k)) = by_phi * C_c_in;
+    by_states.template middleCols<3>(Layout::alignment(k)) = -by_phi;
+    const double sigma = setup_.readout_noise_rad[k] * noise_factor;
+    P += sigma * sigma * by_phi * by_phi.transpose();
+  }
+  const Eigen::Matrix<double, 3, Layout::kStates> spread = information_.template through_uncertainty<3>(by_states);
+  P += spread * spread.transpose();
+  const Eigen::Vector3d apart = (by_gyros.C_in_c.inverse() * by_fix).log().raw();
+  const Eigen::Vector3d towards_fix = P * (P + R_c).llt().solve(apart);
+  return (by_gyros.C_in_c * Rot<C, C>::exp(Vec<C>::assume(towards_fix))).raw();
+}
+
+template <class Base, int N, FurtherStates F>
+auto InvariantEstimator<Base, N, F>::measure(const Gyros& gyros, const Eigen::Matrix3d& C_in_c,
+                                             const Eigen::Matrix3d& C_linear, const Directions& h_b,
+                                             const Eigen::Matrix3d& R_c, const FixBySharedStates& by_shared,
+                                             const PerGyro<double, N>& readout_noise_rad) -> Measurement {
+  Measurement m;
+  Eigen::Matrix<double, kMeasurements, 3> by_fix;
+  for (int k = 0; k < N; ++k) {
+    const Eigen::Vector3d& h = gyros[k].h_in;
+    Eigen::Matrix<double, 2, 3> across;
+    across.row(0) = h.cross(gyros[(k + 1) % N].h_in).normalized().transpose();
+    across.row(1) = h.cross(across.row(0).transpose()).transpose();
+    const int row = 2 * k;
+    m.y.template segment<2>(row) = across * h.cross(C_in_c * (gyros[k].C_c_b * h_b[k]));
+    m.H.template block<2, 3>(row, Layout::direction(k)) = across;
+    m.H.template block<2, 3>(row, Layout::alignment(k)) = -across * C_linear;
+    by_fix.template middleRows<2>(row) = across * C_linear;
+    m.R.template block<2, 2>(row, row).diagonal().setConstant(readout_noise_rad[k] * readout_noise_rad[k]);
+  }
+  m.H.template rightCols<F.shared()>() = by_fix * by_shared;
+  m.R += by_fix * R_c * by_fix.transpose();
+  return m;
+}
+
+template <class Base, int N, FurtherStates F>
+auto InvariantEstimator<Base, N, F>::correct(const StarFix& fix, const FixReadings<N>& readings) -> Report {
+  Report report;
+  report.t = fix.t;
+  // The fix without what is known of its error.
+  const FixBySharedStates by_shared = fix_by_shared(fix.t, fix.head, readings.rate_c);
+  const Eigen::Vector3d known_error = by_shared * shared_;
+  const Rot<In, C> C_in_c = Rot<In, C>::assume(fix.q_in_c.normalized()) * Rot<C, C>::exp(-Vec<C>::assume(known_error));
+  const Eigen::Matrix3d R_c = fix_noise(fix.head);
+  const auto by_gyros = attitude(gyros_, readings.h_b);
+  if (!started_) {
+    start(C_in_c.raw(), readings, R_c, by_shared);
+    started_ = attitude(gyros_, readings.h_b).ok();
+    report.status = started_ ? FixStatus::kStarted : FixStatus::kRejectedGeometry;
+    return report;
+  }
+  if (!by_gyros) {
+    report.status = FixStatus::kRejectedGeometry;
+    return report;
+  }
+  update_to_now();
+  PerGyro<double, N> readout_noise_rad;
+  for (int k = 0; k < N; ++k) {
+    readout_noise_rad[k] = setup_.readout_noise_rad[k] * readings.noise_factor;
+  }
+  const Eigen::Matrix3d C_linear = fused_attitude(by_gyros.value(), C_in_c, R_c, readings.noise_factor);
+  const Measurement m = measure(gyros_, C_in_c.raw(), C_linear, readings.h_b, R_c, by_shared, readout_noise_rad);
+
+  const Eigen::LLT<InnovationCovariance> noise_factor(m.R);
+  const MeasurementRows H_white = noise_factor.matrixL().solve(m.H);
+  const Innovation y_white = noise_factor.matrixL().solve(m.y);
+  const MeasurementRows through = information_.template through_uncertainty<kMeasurements>(H_white);
+  const InnovationCovariance white = InnovationCovariance::Identity() + through * through.transpose();
+  report.innovation = m.y;
+  report.innovation_covariance = noise_factor.matrixL() * white * noise_factor.matrixL().transpose();
+  report.nis = y_white.dot(white.llt().solve(y_white));
+  report.status = gate_.judge(report.nis);
+  report.rejections_in_a_row = gate_.rejections_in_a_row();
+  switch (report.status) {
+    case FixStatus::kRejectedByGate:
+      return report;
+    case FixStatus::kRestarted:
+      // Information gathered about a far wrong estimate: begin anew from the present one.
+      start(C_in_c.raw(), readings, R_c, by_shared);
+      return report;
+    case FixStatus::kUsedAfterReopening:
+      add_direction_variance(m.y.squaredNorm() / kMeasurements);
+      update_to_now();
+      break;
+    default:
+      break;
+  }
+  feed_back(information_.template update<kMeasurements>(H_white, y_white));
+  return report;
+}
+
+template <class Base, int N, FurtherStates F>
+void InvariantEstimator<Base, N, F>::feed_back(const typename Information::Vector& x) {
+  for (int k = 0; k < N; ++k) {
+    auto& gyro = gyros_[k];
+    gyro.h_in = rotated<double>(gyro.h_in, x.template segment<3>(Layout::direction(k))).normalized();
+    gyro.drift_rad_s.template head<Base::kSize>() += x.template segment<Base::kSize>(Layout::drift(k));
+    if constexpr (F.wandering_drift) {
+      gyro.drift_rad_s.template tail<3>() += x.template segment<3>(Layout::wandering(k));
+    }
+    const Eigen::Vector3d delta = x.template segment<3>(Layout::alignment(k));
+    gyro.C_c_b =
+        Eigen::Quaterniond(Rot<C, C>::exp(Vec<C>::assume(delta)).raw() * gyro.C_c_b).normalized().toRotationMatrix();
+  }
+  shared_ += x.template tail<F.shared()>();
+}
+
+template <class Base, int N, FurtherStates F>
+auto InvariantEstimator<Base, N, F>::error_root() const -> ErrorRoot {
+  const typename Information::Matrix root = information_.inverse_root();
+  ErrorRoot errors;
+  for (int k = 0; k < N; ++k) {
+    errors.template middleRows<3>(Errors::direction(k)) = root.template middleRows<3>(Layout::direction(k));
+    errors.template middleRows<Base::kSize>(Errors::drift(k)) = root.template middleRows<Base::kSize>(Layout::drift(k));
+    if constexpr (F.wandering_drift) {
+      errors.template middleRows<3>(Errors::drift(k) + Base::kSize) = root.template middleRows<3>(Layout::wandering(k));
+    }
+    errors.template middleRows<3>(Errors::alignment(k)) = root.template middleRows<3>(Layout::alignment(k));
+  }
+  return errors;
+}
+
+template <class Base, int N, FurtherStates F>
+auto InvariantEstimator<Base, N, F>::prior_parameter_root() const
+    -> Eigen::Matrix<double, Errors::kSize - Errors::kDirections, Errors::kSize - Errors::kDirections> {
+  constexpr int kSize = Errors::kSize - Errors::kDirections;
+  using Own = ParameterLayout<Base, N>;
+  Eigen::Matrix<double, kSize, kSize> root = Eigen::Matrix<double, kSize, kSize>::Zero();
+  const Eigen::Matrix<double, Own::kSize, Own::kSize> own = setup_.prior_covariance.llt().matrixL();
+  for (int k = 0; k < N; ++k) {
+    const int row = Errors::drift(k) - Errors::kDirections;
+    root.template block<Base::kSize, Own::kSize>(row, 0) = own.template middleRows<Base::kSize>(Own::drift(k));
+    root.template block<3, Own::kSize>(Errors::alignment(k) - Errors::kDirections, 0) =
+        own.template middleRows<3>(Own::alignment(k));
+    if constexpr (F.wandering_drift) {
+      root.template block<3, 3>(row + Base::kSize, Own::kSize + 3 * k)
+          .diagonal()
+          .setConstant(setup_.wandering_sigma_rad_s);
+    }
+  }
+  return root;
+}
+
+template class InvariantEstimator<Esg7, 2>;
+template class InvariantEstimator<Esg7, 2, kAllFurtherStates>;
+template class InvariantEstimator<Esg7, 3>;
+template class InvariantEstimator<Esg7, 4>;
+
+}  // namespace trihedron

@@ -1,0 +1,542 @@
+#include "trihedron/core/invariant_estimator.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <limits>
+#include <memory>
+#include <numbers>
+#include <random>
+#include <utility>
+#include <vector>
+
+#include "flight.hpp"
+#include "numerical_jacobian.hpp"
+#include "trihedron/core/cycle.hpp"
+
+namespace trihedron {
+namespace {
+
+using Estimator = InvariantEstimator<Esg7, 2>;
+using WithAll = InvariantEstimator<Esg7, 2, kAllFurtherStates>;
+constexpr double kArcsecond = std::numbers::pi / 180 / 3600;
+
+template <class E = Estimator>
+typename E::Setup nominal() {
+  typename E::Setup setup;
+  static_cast<CalibrationSetup<Esg7, 2>&>(setup) = test::nominal_setup();
+  setup.wandering_sigma_rad_s = 1e-9;
+  return setup;
+}
+
+/// Rotation vector by which the estimated alignment is off, rad.
+template <class Gyro>
+Eigen::Vector3d alignment_error(const GyroModel<Esg7>& truth, const Gyro& estimate) {
+  return Rot<C, C>::assume(Eigen::Matrix3d(truth.C_c_b * estimate.C_c_b.transpose())).log().raw();
+}
+
+TEST(InvariantMeasurement, JacobianIsThatOfTheInnovation) {
+  // y of a fix and readings that are true, as a function of how far the estimates are from the truth.
+  const Eigen::Matrix3d C_in_c = Rot<In, C>::exp(Vec<In>::assume(0.3, -0.2, 0.9)).raw();
+  WithAll::Gyros gyros;
+  gyros[0].h_in = Eigen::Vector3d(0.51, 0.59, 0.63).normalized();
+  gyros[1].h_in = Eigen::Vector3d(-0.72, 0.49, 0.49).normalized();
+  WithAll::Directions h_b;
+  for (int k = 0; k < 2; ++k) {
+    gyros[k].drift_rad_s.setZero();
+    gyros[k].C_c_b = Rot<C, B<1>>::exp(Vec<C>::assume(0.1, -0.2, 0.3 * (k + 1))).raw();
+    h_b[k] = gyros[k].C_c_b.transpose() * C_in_c.transpose() * gyros[k].h_in;
+  }
+  const Eigen::Vector3d rate_c(1e-3, -2e-3, 5e-4);
+  WithAll::FixBySharedStates by_shared = WithAll::FixBySharedStates::Zero();
+  by_shared.col(0) = rate_c;
+  by_shared.middleCols<3>(1) = 0.6 * Eigen::Matrix3d::Identity();
+  by_shared.middleCols<3>(4) = 0.8 * Eigen::Matrix3d::Identity();
+  PerGyro<double, 2> noise;
+  noise[0] = noise[1] = 1e-5;
+  using State = Eigen::Matrix<double, WithAll::Layout::kStates, 1>;
+  // Errors x: truth = estimate ⊕ x. The estimate moves the other way; the fix carries its shared error.
+  const auto measured = [&](const State& x) {
+    WithAll::Gyros estimate = gyros;
+    for (int k = 0; k < 2; ++k) {
+      estimate[k].h_in = rotated<double>(gyros[k].h_in, -x.segment<3>(WithAll::Layout::direction(k)));
+      const Eigen::Vector3d delta = -x.segment<3>(WithAll::Layout::alignment(k));
+      estimate[k].C_c_b = Rot<C, C>::exp(Vec<C>::assume(delta)).raw() * gyros[k].C_c_b;
+    }
+    const Eigen::Vector3d error = by_shared * x.tail<7>();
+    const Eigen::Matrix3d given = C_in_c * Rot<C, C>::exp(Vec<C>::assume(error)).raw();
+    return WithAll::measure(estimate, given, C_in_c, h_b, Eigen::Matrix3d::Identity(), by_shared, noise).y;
+  };
+  // Seconds and radians alike are steps of 1e-5 here: the clock offset acts as 1e-3 of it.
+  const auto numerical =
+      test::central_differences<decltype(measured)&, WithAll::Layout::kStates>(measured, State::Zero(), 1e-5);
+  const auto m = WithAll::measure(gyros, C_in_c, C_in_c, h_b, Eigen::Matrix3d::Identity(), by_shared, noise);
+  test::expect_jacobian(m.H, numerical, 1e-8);
+  test::expect_jacobian(m.H.rightCols<7>().col(0).eval(), numerical.col(WithAll::Layout::clock_offset()).eval(), 1e-6);
+  EXPECT_LT(m.y.norm(), 1e-15);
+}
+
+TEST(InvariantMeasurement, NoiseIsThatOfFixAndReadouts) {
+  const test::Flight flight({.duration_s = 3, .noise = 0});
+  Estimator::Gyros gyros = flight.truth;
+  const Eigen::Matrix3d C_in_c = flight.C_in_c_at_samples.back();
+  Eigen::Matrix3d R_c;
+  R_c << 4, 1, 0, 1, 9, 2, 0, 2, 25;
+  PerGyro<double, 2> sigma;
+  sigma[0] = 1.5;
+  sigma[1] = 0.5;
+  const auto at = [&](const Eigen::Matrix<double, 9, 1>& cause) {
+    Estimator::Directions h_b = flight.samples.back().h_b;
+    for (int k = 0; k < 2; ++k) {
+      h_b[k] += cause.segment<3>(3 + 3 * k);
+    }
+    const Eigen::Matrix3d given = C_in_c * Rot<C, C>::exp(Vec<C>::assume(Eigen::Vector3d(cause.head<3>()))).raw();
+    return Estimator::measure(gyros, given, C_in_c, h_b, R_c, {}, sigma).y;
+  };
+  const auto by_cause = test::central_differences<decltype(at)&, 9>(at, Eigen::Matrix<double, 9, 1>::Zero(), 1e-5);
+  Eigen::Matrix<double, 9, 9> causes = Eigen::Matrix<double, 9, 9>::Zero();
+  causes.topLeftCorner<3, 3>() = R_c;
+  causes.diagonal().tail<6>() << 2.25, 2.25, 2.25, 0.25, 0.25, 0.25;
+  const Eigen::Matrix4d expected = by_cause * causes * by_cause.transpose();
+  test::expect_jacobian(Estimator::measure(gyros, C_in_c, C_in_c, flight.samples.back().h_b, R_c, {}, sigma).R,
+                        expected, 1e-6);
+}
+
+TEST(InvariantEstimator, GainsNothingAboutTheAxisOfASteadyTurnInTenThousandSteps) {
+  // An axis n fixed in the body and in space; everything else at random. Readings agree with the estimates, so that
+  // the attitude in H is the true one.
+  std::mt19937 random(3);
+  std::uniform_real_distribution<double> uniform(-1, 1);
+  const auto vector = [&] { return Eigen::Vector3d(uniform(random), uniform(random), uniform(random)); };
+  auto setup = nominal();
+  for (int k = 0; k < 2; ++k) {
+    setup.prior[k].drift_rad_s << 1e-5, -2e-5, 1e-5, 3e-5, -1e-5, 2e-5, 1e-5;
+    setup.prior[k].C_c_b = Rot<C, B<1>>::exp(Vec<C>::assume(vector())).raw();
+  }
+  auto estimator = Estimator::create(setup).value();
+  const Eigen::Vector3d n = vector().normalized();
+  const Eigen::Matrix3d first = Rot<In, C>::exp(Vec<In>::assume(vector())).raw();
+  Eigen::Matrix3d C_in_c = first;
+  const auto readings = [&] {
+    FixReadings<2> r;
+    for (int k = 0; k < 2; ++k) {
+      r.h_b[k] = estimator.gyros()[k].C_c_b.transpose() * C_in_c.transpose() * estimator.gyros()[k].h_in;
+    }
+    return r;
+  };
+  FixReadings<2> start;
+  start.h_b[0] = estimator.gyros()[0].C_c_b.transpose() * Eigen::Vector3d(0.8, 0.1, 0.6).normalized();
+  start.h_b[1] = estimator.gyros()[1].C_c_b.transpose() * Eigen::Vector3d(-0.1, 0.9, 0.4).normalized();
+  ASSERT_EQ(estimator.correct({Time{}, Eigen::Quaterniond(C_in_c)}, start).status, FixStatus::kStarted);
+
+  // Of one gyro alone, φ = n and δ = C_c_in n change no measurement of it, whatever the other does.
+  const auto information_about = [&](int gyro) {
+    Estimator::Information::Vector v = Estimator::Information::Vector::Zero();
+    v.segment<3>(Estimator::Layout::direction(gyro)) = n;
+    v.segment<3>(Estimator::Layout::alignment(gyro)) = first.transpose() * n;
+    return (estimator.information().root() * v).squaredNorm();
+  };
+  const double before[2] = {information_about(0), information_about(1)};
+  for (int step = 1; step <= 10'000; ++step) {
+    C_in_c = Rot<In, In>::exp(Vec<In>::assume(Eigen::Vector3d(3 * uniform(random) * n))).raw() * C_in_c;
+    estimator.predict(C_in_c, readings().h_b, 0.1 + 0.1 * uniform(random));
+    if (step % 5 == 0) {
+      const Time t(from_seconds(step));
+      ASSERT_EQ(estimator.correct({t, Eigen::Quaterniond(C_in_c)}, readings()).status, FixStatus::kUsed);
+    }
+  }
+  // The prior's information, to the rounding of 2000 fixes whose own is 1e9 times as large.
+  for (int k = 0; k < 2; ++k) {
+    EXPECT_NEAR(information_about(k) / before[k], 1, 1e-6) << k;
+  }
+  // About another axis there is plenty.
+  Estimator::Information::Vector other = Estimator::Information::Vector::Zero();
+  other.segment<3>(Estimator::Layout::alignment(0)) = first.transpose() * n.unitOrthogonal();
+  other.segment<3>(Estimator::Layout::direction(0)) = n.unitOrthogonal();
+  EXPECT_GT((estimator.information().root() * other).squaredNorm(), 1e6 * before[0]);
+}
+
+struct Outcome {
+  double nees = 0;
+  double nis = 0;
+  double rejected = 0;
+};
+
+/// Means over flights whose priors are drawn about the truth.
+template <class E = Estimator>
+Outcome fly_many(int runs, double alignment_sigma_rad, const test::FlightPlan& plan) {
+  Outcome mean;
+  double fixes = 0;
+  for (int run = 1; run <= runs; ++run) {
+    test::FlightPlan own = plan;
+    own.seed = static_cast<unsigned>(run);
+    const test::Flight flight(own);
+    auto setup = nominal<E>();
+    std::mt19937 random(static_cast<unsigned>(run) + 1000);
+    std::normal_distribution<double> normal;
+    for (int k = 0; k < 2; ++k) {
+      setup.prior[k].drift_rad_s =
+          flight.truth[k].drift_rad_s + 2e-6 * Esg7::Coefficients<double>::NullaryExpr([&] { return normal(random); });
+      setup.prior_covariance.diagonal()
+          .template segment<3>(10 * k + 7)
+          .setConstant(alignment_sigma_rad * alignment_sigma_rad);
+      const Eigen::Vector3d delta = alignment_sigma_rad * Eigen::Vector3d::NullaryExpr([&] { return normal(random); });
+      setup.prior[k].C_c_b = Rot<C, C>::exp(Vec<C>::assume(delta)).raw() * flight.truth[k].C_c_b;
+    }
+    auto cycle = std::make_unique<Cycle<E>>(Cycle<E>::create(setup, {}).value());
+    test::fly(flight, *cycle, [&](const auto& report) {
+      if (report.fix.status == FixStatus::kUsed) {
+        mean.nis += report.fix.nis;
+        ++fixes;
+      }
+      mean.rejected += report.fix.status == FixStatus::kRejectedByGate ? 1 : 0;
+    });
+    Eigen::Matrix<double, 20, 1> error;
+    Eigen::Matrix<double, 20, E::ErrorRoot::ColsAtCompileTime> root;
+    const typename E::ErrorRoot all = cycle->estimator().error_root();
+    for (int k = 0; k < 2; ++k) {
+      const auto& estimate = cycle->estimator().gyros()[k];
+      error.template segment<7>(10 * k) = flight.truth[k].drift_rad_s - estimate.drift_rad_s.template head<7>();
+      error.template segment<3>(10 * k + 7) = alignment_error(flight.truth[k], estimate);
+      root.template middleRows<7>(10 * k) = all.template middleRows<7>(E::Errors::drift(k));
+      root.template middleRows<3>(10 * k + 7) = all.template middleRows<3>(E::Errors::alignment(k));
+    }
+    mean.nees += error.dot((root * root.transpose()).llt().solve(error)) / runs;
+  }
+  mean.nis /= fixes;
+  return mean;
+}
+
+// 99.9 % of the mean NEES of a consistent filter over n runs lie in 20 ± 3.29·√(40/n).
+double nees_band(int runs) { return 3.29 * std::sqrt(40.0 / runs); }
+
+TEST(InvariantEstimator, IsConsistentWithSlewsAndHalfADegree) {
+  const Outcome mean = fly_many(20, 8e-3, {.duration_s = 1800});
+  EXPECT_NEAR(mean.nees, 20, nees_band(20));
+  EXPECT_NEAR(mean.nis, 4, 0.06);  // 3.29·√(8/12000) = 0.085 for independent ones
+}
+
+TEST(InvariantEstimator, IsConsistentInSteadyFlight) {
+  // With misalignments of half a degree and coefficients of 2e-6 rad/s together, the second order of their first, wrong
+  // values stays in its information: a mean NEES of 43 after half an hour, 27 after one and a half.
+  const Outcome mean = fly_many(20, 1e-3, {.duration_s = 1800, .slews_rad = 0});
+  EXPECT_NEAR(mean.nees, 20, nees_band(20));
+  EXPECT_NEAR(mean.nis, 4, 0.085);
+}
+
+/// The whole flight through a cycle.
+template <class E>
+std::unique_ptr<Cycle<E>> flown(const test::Flight& flight, const typename E::Setup& setup,
+                                const CorrectionPolicy& policy = {}) {
+  auto cycle = std::make_unique<Cycle<E>>(Cycle<E>::create(setup, policy).value());
+  test::fly(flight, *cycle, [](const auto&) {});
+  while (cycle->flush().fix.status != FixStatus::kNone) {
+  }
+  return cycle;
+}
+
+TEST(InvariantEstimator, DoesNotDependOnTheInertialFrame) {
+  const test::Flight flight({.duration_s = 900});
+  test::Flight turned = flight;
+  const Eigen::Quaterniond q(Eigen::AngleAxisd(2, Eigen::Vector3d(1, 2, 3).normalized()));
+  for (StarFix& fix : turned.fixes) {
+    fix.q_in_c = q * fix.q_in_c;
+  }
+  const auto a = flown<Estimator>(flight, nominal());
+  const auto b = flown<Estimator>(turned, nominal());
+  for (int k = 0; k < 2; ++k) {
+    EXPECT_LT(alignment_error(a->estimator().gyros()[k], b->estimator().gyros()[k]).norm(), 1e-11);
+    EXPECT_LT((a->estimator().gyros()[k].drift_rad_s - b->estimator().gyros()[k].drift_rad_s).norm(), 1e-14);
+  }
+}
+
+TEST(InvariantEstimator, DoesNotDependOnTheNumbersOfTheGyros) {
+  const test::Flight flight({.duration_s = 900});
+  test::Flight swapped = flight;
+  for (auto& sample : swapped.samples) {
+    std::swap(sample.h_b[0], sample.h_b[1]);
+  }
+  const auto a = flown<Estimator>(flight, nominal());
+  const auto b = flown<Estimator>(swapped, nominal());
+  for (int k = 0; k < 2; ++k) {
+    EXPECT_LT(alignment_error(a->estimator().gyros()[k], b->estimator().gyros()[1 - k]).norm(), 1e-11);
+    EXPECT_LT((a->estimator().gyros()[k].drift_rad_s - b->estimator().gyros()[1 - k].drift_rad_s).norm(), 1e-14);
+  }
+}
+
+TEST(InvariantEstimator, AStepInTwoHalvesIsTheStep) {
+  const test::Flight flight({.duration_s = 60});
+  auto whole = Estimator::create(nominal()).value();
+  FixReadings<2> readings;
+  readings.h_b = flight.samples[0].h_b;
+  ASSERT_EQ(whole.correct(flight.fixes[0], readings).status, FixStatus::kStarted);
+  auto halves = whole;
+  for (std::size_t i = 1; i <= 24; ++i) {
+    const Eigen::Matrix3d& C_in_c = flight.C_in_c_at_samples[i];
+    whole.predict(C_in_c, flight.samples[i].h_b, 0.125);
+    halves.predict(C_in_c, flight.samples[i].h_b, 0.0625);
+    halves.predict(C_in_c, flight.samples[i].h_b, 0.0625);
+  }
+  readings.h_b = flight.samples[24].h_b;
+  EXPECT_EQ(whole.correct(flight.fixes[1], readings).status, FixStatus::kUsed);
+  EXPECT_EQ(halves.correct(flight.fixes[1], readings).status, FixStatus::kUsed);
+  for (int k = 0; k < 2; ++k) {
+    EXPECT_LT(alignment_error(whole.gyros()[k], halves.gyros()[k]).norm(), 1e-15);
+    EXPECT_LT((whole.gyros()[k].h_in - halves.gyros()[k].h_in).norm(), 1e-15);
+  }
+}
+
+TEST(InvariantEstimator, FindsTheClockOffsetAndTheErrorAtOrbitalPeriod) {
+  test::Flight flight({.duration_s = 5400});
+  const Eigen::Vector3d sine(3e-5, -2e-5, 4e-5);
+  const Eigen::Vector3d cosine(-1e-5, 5e-5, 2e-5);
+  constexpr double kRate = 1.1e-3;
+  constexpr double kOffset_s = 0.02;
+  for (StarFix& fix : flight.fixes) {
+    const double t_s = to_seconds(fix.t.time_since_epoch());
+    const auto at = [&](double time_s) { return Eigen::Quaterniond(test::Flight::attitude(time_s, 0.5)); };
+    const Eigen::Vector3d e = sine * std::sin(kRate * t_s) + cosine * std::cos(kRate * t_s);
+    const Eigen::Quaterniond noise = at(t_s).conjugate() * fix.q_in_c;
+    fix.q_in_c = at(t_s + kOffset_s) * Rot<C, C>::exp(Vec<C>::assume(e)).quaternion() * noise;
+  }
+  auto setup = nominal<WithAll>();
+  setup.orbital_rate_rad_s = kRate;
+  const auto cycle = flown<WithAll>(flight, setup);
+  const auto& shared = cycle->estimator().shared();
+  const auto root = cycle->estimator().information().inverse_root();
+  Eigen::Matrix<double, 7, 1> truth;
+  truth << kOffset_s, sine, cosine;
+  for (int i = 0; i < 7; ++i) {
+    const double sigma = root.row(WithAll::Layout::kShared + i).norm();
+    EXPECT_LT(std::abs(shared(i) - truth(i)), 4 * sigma) << i;
+  }
+  EXPECT_LT(root.row(WithAll::Layout::kShared).norm(), 1e-3);
+  EXPECT_LT(root.row(WithAll::Layout::kShared + 1).norm(), 5 * kArcsecond);
+}
+
+TEST(InvariantEstimator, OfThreeGyrosIsBetterThanOfTwo) {
+  const test::Flight pair({.duration_s = 1800});
+  using Three = InvariantEstimator<Esg7, 3>;
+  Three::Setup setup;
+  const auto two = nominal();
+  setup.star_tracker_noise_rad = two.star_tracker_noise_rad;
+  for (int k = 0; k < 3; ++k) {
+    setup.readout_noise_rad[k] = two.readout_noise_rad[0];
+    setup.prior_covariance.block<10, 10>(10 * k, 10 * k) = two.prior_covariance.block<10, 10>(0, 0);
+  }
+  auto cycle = std::make_unique<Cycle<Three>>(Cycle<Three>::create(setup, {}).value());
+  // The third is as the first, half a turn about z further in its case, with noise of its own.
+  std::mt19937 random(9);
+  std::normal_distribution<double> normal;
+  std::size_t fix = 0;
+  for (const auto& sample : pair.samples) {
+    GyroSample<3> three;
+    three.t = sample.t;
+    three.h_b[0] = sample.h_b[0];
+    three.h_b[1] = sample.h_b[1];
+    const std::size_t i = static_cast<std::size_t>(&sample - pair.samples.data());
+    const Eigen::Vector3d h_in = Eigen::Vector3d(0.1, -0.8, 0.6).normalized();  // a rotor without drift
+    three.h_b[2] = pair.C_in_c_at_samples[i].transpose() * h_in +
+                   test::Flight::kReadout_rad * Eigen::Vector3d(normal(random), normal(random), normal(random));
+    cycle->on_gyro(three);
+    for (; fix < pair.fixes.size() && pair.fixes[fix].t == sample.t; ++fix) {
+      cycle->on_fix(pair.fixes[fix]);
+    }
+  }
+  const auto error = [&](const auto& solution) {
+    return Rot<C, C>::assume(Eigen::Matrix3d(pair.C_in_c_at_samples.back().transpose() * solution.C_in_c.raw())).log();
+  };
+  const auto three = cycle->navigation_attitude().value();
+  EXPECT_LT(error(three).norm(), 4 * std::sqrt(three.covariance_rad2.trace()));
+  EXPECT_LT(alignment_error(GyroModel<Esg7>{}, cycle->estimator().gyros()[2]).norm(), 1e-4);
+  const auto of_two = flown<Estimator>(pair, nominal())->navigation_attitude().value();
+  EXPECT_LT(three.covariance_rad2.trace(), of_two.covariance_rad2.trace());
+}
+
+TEST(InvariantEstimator, RefusesSetupsThatCannotWork) {
+  auto setup = nominal<WithAll>();
+  EXPECT_TRUE(WithAll::create(setup).ok());
+  setup.prior_covariance(3, 3) = 0;
+  EXPECT_EQ(WithAll::create(setup).fault(), SetupFault::kPriorNotPositiveDefinite);
+  setup = nominal<WithAll>();
+  setup.readout_noise_rad[0] = 0;
+  EXPECT_EQ(WithAll::create(setup).fault(), SetupFault::kNoiseNotPositive);
+  setup = nominal<WithAll>();
+  setup.gate_nis = 0;
+  EXPECT_EQ(WithAll::create(setup).fault(), SetupFault::kGateNotPositive);
+  setup = nominal<WithAll>();
+  setup.prior[0].C_c_b *= 2;
+  EXPECT_EQ(WithAll::create(setup).fault(), SetupFault::kPriorMeanNotUsable);
+  for (double* further : {&setup.clock_offset_sigma_s, &setup.orbital_error_sigma_rad, &setup.wandering_sigma_rad_s,
+                          &setup.wandering_time_s}) {
+    setup.prior[0].C_c_b.setIdentity();
+    const double good = *further;
+    for (const double bad : {0.0, -1.0, std::numeric_limits<double>::quiet_NaN()}) {
+      *further = bad;
+      EXPECT_EQ(WithAll::create(setup).fault(), SetupFault::kPriorNotPositiveDefinite);
+    }
+    *further = good;
+  }
+}
+
+TEST(InvariantEstimator, RejectsOutliersReopensAndBeginsAnew) {
+  test::Flight flight({.duration_s = 1200});
+  const auto jump = [&](std::size_t from, std::size_t to, double angle) {
+    for (std::size_t i = from; i < to; ++i) {
+      flight.fixes[i].q_in_c =
+          flight.fixes[i].q_in_c * Eigen::Quaterniond(Eigen::AngleAxisd(angle, Eigen::Vector3d::UnitX()));
+    }
+  };
+  jump(50, 51, 0.01);    // one outlier
+  jump(100, 400, 0.01);  // the tracker turns for good, and again soon
+  jump(150, 400, 0.01);
+  auto cycle = std::make_unique<Cycle<Estimator>>(Cycle<Estimator>::create(nominal(), {}).value());
+  std::vector<FixStatus> statuses;
+  test::fly(flight, *cycle, [&](const auto& report) {
+    if (report.fix.status != FixStatus::kNone && report.fix.status != FixStatus::kPending) {
+      statuses.push_back(report.fix.status);
+    }
+  });
+  EXPECT_EQ(statuses[50], FixStatus::kRejectedByGate);
+  EXPECT_EQ(statuses[51], FixStatus::kUsed);
+  EXPECT_EQ(std::count(statuses.begin(), statuses.end(), FixStatus::kUsedAfterReopening), 1);
+  EXPECT_GE(std::count(statuses.begin(), statuses.end(), FixStatus::kRestarted), 1);
+  EXPECT_EQ(statuses.back(), FixStatus::kUsed);
+}
+
+TEST(InvariantEstimator, RefusesParallelMomenta) {
+  auto estimator = Estimator::create(nominal()).value();
+  FixReadings<2> readings;
+  readings.h_b[0] = readings.h_b[1] = Eigen::Vector3d::UnitX();
+  EXPECT_EQ(estimator.correct({}, readings).status, FixStatus::kRejectedGeometry);
+  EXPECT_FALSE(estimator.started());
+  readings.h_b[1] = Eigen::Vector3d::UnitY();
+  EXPECT_EQ(estimator.correct({}, readings).status, FixStatus::kStarted);
+  readings.h_b[1] = readings.h_b[0];
+  EXPECT_EQ(estimator.correct({Time(std::chrono::seconds(3)), Eigen::Quaterniond::Identity()}, readings).status,
+            FixStatus::kRejectedGeometry);
+}
+
+TEST(CycleOfInvariant, AttitudeNowIsBetterThanASingleReadingAndHonest) {
+  // Corrected at each fix; the samples of the last seconds are taken together.
+  double square = 0;
+  double normalised = 0;
+  constexpr int kRuns = 12;
+  for (unsigned seed = 1; seed <= kRuns; ++seed) {
+    const test::Flight flight({.duration_s = 3600, .seed = seed});
+    const auto cycle = flown<Estimator>(flight, nominal(), {.interval = CorrectionPolicy::kEveryFix});
+    const auto solution = cycle->navigation_attitude().value();
+    const Eigen::Vector3d error =
+        Rot<C, C>::assume(Eigen::Matrix3d(flight.C_in_c_at_samples.back().transpose() * solution.C_in_c.raw()))
+            .log()
+            .raw();
+    square += error.squaredNorm() / (3 * kRuns);
+    normalised += error.dot(solution.covariance_rad2.llt().solve(error)) / kRuns;
+  }
+  EXPECT_LT(std::sqrt(square), 1.8 * kArcsecond);  // a single reading: 2″ and what is not yet calibrated
+  EXPECT_NEAR(normalised, 3, 3.29 * std::sqrt(6.0 / kRuns));
+}
+
+TEST(CycleOfInvariant, TakesFixesLateAndOutOfTurnOnce) {
+  const test::Flight flight({.duration_s = 60});
+  auto cycle = std::make_unique<Cycle<Estimator>>(Cycle<Estimator>::create(nominal(), {}).value());
+  std::vector<std::pair<Time, FixStatus>> dealt;
+  const auto note = [&](const auto& report) {
+    if (report.fix.status != FixStatus::kNone && report.fix.status != FixStatus::kPending) {
+      dealt.emplace_back(report.fix.t, report.fix.status);
+    }
+  };
+  for (std::size_t i = 0; i < flight.samples.size(); ++i) {
+    note(cycle->on_gyro(flight.samples[i]));
+    if (i == 8) {  // a second late
+      EXPECT_EQ(cycle->on_fix(flight.fixes[0]).fix.status, FixStatus::kPending);
+      EXPECT_EQ(cycle->on_fix(flight.fixes[0]).fix.status, FixStatus::kRejectedOutOfOrder);  // repeated
+    }
+    if (i == 30) {  // the one of 3 s while the one of 0 s is long dealt with
+      EXPECT_EQ(cycle->on_fix(flight.fixes[1]).fix.status, FixStatus::kPending);
+    }
+    if (i == 60) {  // too late: the calibration has passed its time
+      EXPECT_EQ(cycle->on_fix(flight.fixes[1]).fix.status, FixStatus::kRejectedOutOfOrder);
+    }
+  }
+  ASSERT_EQ(dealt.size(), 2U);
+  EXPECT_EQ(dealt[0], std::pair(flight.fixes[0].t, FixStatus::kStarted));
+  EXPECT_EQ(dealt[1], std::pair(flight.fixes[1].t, FixStatus::kUsed));
+}
+
+TEST(CycleOfInvariant, RefusesFixesOfUnknownStarTrackersAndMoreThanCanWait) {
+  const test::Flight flight({.duration_s = 60});
+  auto cycle = std::make_unique<Cycle<Estimator>>(Cycle<Estimator>::create(nominal(), {}).value());
+  cycle->on_gyro(flight.samples[0]);
+  StarFix fix = flight.fixes[0];
+  fix.head = 1;
+  EXPECT_EQ(cycle->on_fix(fix).fix.status, FixStatus::kRejectedUnknownHead);
+  fix.head = 0;
+  for (int i = 0; i < Cycle<Estimator>::kBufferedFixes; ++i) {
+    fix.t += std::chrono::milliseconds(1);
+    EXPECT_EQ(cycle->on_fix(fix).fix.status, FixStatus::kPending);
+  }
+  fix.t += std::chrono::milliseconds(1);
+  EXPECT_EQ(cycle->on_fix(fix).fix.status, FixStatus::kRejectedBacklog);
+  // At the end without a sample after them they cannot be interpolated; none is forgotten.
+  for (int i = 0; i < Cycle<Estimator>::kBufferedFixes; ++i) {
+    EXPECT_EQ(cycle->flush().fix.status, FixStatus::kRejectedNoGyro);
+  }
+  EXPECT_EQ(cycle->flush().fix.status, FixStatus::kNone);
+}
+
+TEST(CycleOfInvariant, TakesSingleReadingsWhereTheBodyIsNoPolynomial) {
+  // The body jerks to and fro by 20″ at 4 Hz: a fit over seconds would miss it by as much.
+  test::Flight flight({.duration_s = 300, .noise = 0.5});
+  const auto jerked = [](Eigen::Matrix3d& C_in_c, double t_s) {
+    C_in_c = C_in_c * Rot<C, C>::exp(Vec<C>::assume(0, 1e-4 * std::cos(8 * std::numbers::pi * t_s + 0.3), 0)).raw();
+  };
+  for (std::size_t i = 0; i < flight.samples.size(); ++i) {
+    const double t_s = 0.125 * static_cast<double>(i);
+    const Eigen::Matrix3d smooth = flight.C_in_c_at_samples[i];
+    jerked(flight.C_in_c_at_samples[i], t_s);
+    const Eigen::Matrix3d turn = flight.C_in_c_at_samples[i].transpose() * smooth;
+    for (int k = 0; k < 2; ++k) {
+      flight.samples[i].h_b[k] =
+          flight.truth[k].C_c_b.transpose() * turn * flight.truth[k].C_c_b * flight.samples[i].h_b[k];
+    }
+  }
+  for (StarFix& fix : flight.fixes) {
+    Eigen::Matrix3d C_in_c = fix.q_in_c.toRotationMatrix();
+    jerked(C_in_c, to_seconds(fix.t.time_since_epoch()));
+    fix.q_in_c = Eigen::Quaterniond(C_in_c);
+  }
+  auto cycle = std::make_unique<Cycle<Estimator>>(Cycle<Estimator>::create(nominal(), {}).value());
+  double worst = 0;
+  test::fly(flight, *cycle, [&](const auto& report) {
+    if (report.calibrated && report.fix.t > Time(std::chrono::seconds(100))) {
+      const auto i = static_cast<std::size_t>(to_seconds(report.fix.t.time_since_epoch()) * 8 + 0.5);
+      const Eigen::Matrix3d off = flight.C_in_c_at_samples[i].transpose() * report.calibrated->C_in_c.raw();
+      worst = std::max(worst, Rot<C, C>::assume(off).log().norm());
+    }
+  });
+  EXPECT_GT(worst, 0);
+  EXPECT_LT(worst, 10 * kArcsecond);
+}
+
+TEST(CycleOfInvariant, HoldsTheParametersOfTheSetup) {
+  const test::Flight flight({.duration_s = 600});
+  auto setup = nominal<WithAll>();
+  for (int k = 0; k < 2; ++k) {
+    setup.prior[k] = flight.truth[k];
+    setup.prior_covariance.block<10, 10>(10 * k, 10 * k) *= 1e-6;
+  }
+  const auto cycle = flown<WithAll>(flight, setup, {.take_parameters = false});
+  const auto solution = cycle->navigation_attitude().value();
+  const Eigen::Vector3d error =
+      Rot<C, C>::assume(Eigen::Matrix3d(flight.C_in_c_at_samples.back().transpose() * solution.C_in_c.raw()))
+          .log()
+          .raw();
+  EXPECT_LT(error.norm(), 4 * std::sqrt(solution.covariance_rad2.trace()));
+  for (int k = 0; k < 2; ++k) {
+    EXPECT_EQ(cycle->navigator().gyros()[k].C_c_b, setup.prior[k].C_c_b);
+  }
+}
+
+}  // namespace
+}  // namespace trihedron

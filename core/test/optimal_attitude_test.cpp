@@ -1,0 +1,108 @@
+#include "trihedron/core/optimal_attitude.hpp"
+
+#include <gtest/gtest.h>
+
+#include <Eigen/SVD>
+
+#include "numerical_jacobian.hpp"
+
+namespace trihedron {
+namespace {
+
+constexpr int kN = 3;
+using Directions = PerGyro<Eigen::Vector3d, kN>;
+
+const Rot<In, C> kAttitude = Rot<In, C>::exp(Vec<In>::assume(1, -2, 0.5));
+
+Directions in_space() {
+  Directions h;
+  h[0] = Eigen::Vector3d(0.5, 0.6, 0.62).normalized();
+  h[1] = Eigen::Vector3d(-0.7, 0.5, 0.5).normalized();
+  h[2] = Eigen::Vector3d(0.1, -0.8, 0.6).normalized();
+  return h;
+}
+
+/// As seen in c, each turned by ρ_k from where it should be.
+Directions in_body(const Eigen::Matrix<double, 3 * kN, 1>& rho = Eigen::Matrix<double, 3 * kN, 1>::Zero()) {
+  Directions h = in_space();
+  for (int k = 0; k < kN; ++k) {
+    h[k] = rotated<double>(kAttitude.raw().transpose() * h[k], Eigen::Vector3d(rho.segment<3>(3 * k)));
+  }
+  return h;
+}
+
+PerGyro<double, kN> weights(double w0, double w1, double w2) {
+  PerGyro<double, kN> w;
+  w[0] = w0;
+  w[1] = w1;
+  w[2] = w2;
+  return w;
+}
+
+double off(const Rot<In, C>& attitude) { return (kAttitude.inverse() * attitude).log().norm(); }
+
+TEST(OptimalAttitude, IsExactForDirectionsThatAgree) {
+  EXPECT_LT(off(optimal_attitude<kN>(in_space(), in_body(), weights(1, 2, 3)).value().C_in_c), 1e-15);
+}
+
+TEST(OptimalAttitude, IsThatOfTheSingularValueDecomposition) {
+  // Markley's solution of Wahba's problem, for directions that disagree by half a degree.
+  Eigen::Matrix<double, 3 * kN, 1> rho;
+  rho << 5e-3, -3e-3, 8e-3, -7e-3, 2e-3, 4e-3, 1e-3, 6e-3, -9e-3;
+  const Directions in = in_space();
+  const Directions c = in_body(rho);
+  const auto w = weights(1, 2, 0.5);
+  Eigen::Matrix3d B = Eigen::Matrix3d::Zero();
+  for (int k = 0; k < kN; ++k) {
+    B += w[k] * in[k] * c[k].transpose();
+  }
+  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(B, Eigen::ComputeFullU | Eigen::ComputeFullV);
+  const double sign = svd.matrixU().determinant() * svd.matrixV().determinant();
+  const Eigen::Matrix3d expected = svd.matrixU() * Eigen::Vector3d(1, 1, sign).asDiagonal() * svd.matrixV().transpose();
+  // Three steps of Gauss–Newton: what is left is of the fourth order in the disagreement.
+  EXPECT_LT((optimal_attitude<kN>(in, c, w).value().C_in_c.raw() - expected).norm(), 1e-8);
+}
+
+TEST(OptimalAttitude, ErrorFollowsErrorsOfTheDirections) {
+  const auto w = weights(1, 2, 0.5);
+  const auto solution = optimal_attitude<kN>(in_space(), in_body(), w).value();
+  // True C = est · exp([ε×]), ε = J (C_c_in φ − ρ): a direction read too far by ρ has the true one at −ρ.
+  const auto error = [&](const Eigen::Matrix<double, 3 * kN, 1>& rho) {
+    const auto moved = optimal_attitude<kN>(in_space(), in_body(rho), w).value().C_in_c;
+    return Eigen::Vector3d((moved.inverse() * solution.C_in_c).log().raw());
+  };
+  test::expect_jacobian(
+      solution.by_directions,
+      test::central_differences<decltype(error)&, 3 * kN>(error, Eigen::Matrix<double, 3 * kN, 1>::Zero(), 1e-5), 1e-8);
+}
+
+TEST(OptimalAttitude, DoesNotLookAtADirectionWithoutWeight) {
+  Directions c = in_body();
+  c[1] = rotated<double>(c[1], Eigen::Vector3d(0.5, 0, 0));
+  EXPECT_GT(off(optimal_attitude<kN>(in_space(), c, weights(1, 1, 1)).value().C_in_c), 0.1);
+  EXPECT_LT(off(optimal_attitude<kN>(in_space(), c, weights(1, 0, 1)).value().C_in_c), 1e-15);
+}
+
+TEST(OptimalAttitude, NeedsTwoDirectionsApart) {
+  EXPECT_EQ(optimal_attitude<kN>(in_space(), in_body(), weights(1, 0, 0)).fault(),
+            DirectionsFault::kMomentaNearlyParallel);
+  Directions in = in_space();
+  in[2] = in[1] = -in[0];
+  EXPECT_EQ(optimal_attitude<kN>(in, in_body(), weights(1, 1, 1)).fault(), DirectionsFault::kMomentaNearlyParallel);
+}
+
+TEST(OptimalAttitude, OfTwoIsBetterThanTheTrihedron) {
+  // Where both are read with the same noise, the trihedron does not use what the second says about q1.
+  PerGyro<Eigen::Vector3d, 2> in;
+  in[0] = Eigen::Vector3d::UnitX();
+  in[1] = Eigen::Vector3d::UnitY();
+  PerGyro<double, 2> alike;
+  alike[0] = alike[1] = 1;
+  const auto optimal = optimal_attitude<2>(in, in, alike).value().by_directions;
+  const auto trihedron = trihedron_attitude(in, in).value().by_directions;
+  EXPECT_NEAR((optimal * optimal.transpose()).trace(), 2.5, 1e-12);
+  EXPECT_NEAR((trihedron * trihedron.transpose()).trace(), 3, 1e-12);
+}
+
+}  // namespace
+}  // namespace trihedron
