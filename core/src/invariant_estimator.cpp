@@ -4,18 +4,14 @@
 #include <algorithm>
 #include <cmath>
 
+#include "trihedron/core/innovation.hpp"
+
 namespace trihedron {
 
 template <class Base, int N, FurtherStates F>
 Result<InvariantEstimator<Base, N, F>, SetupFault> InvariantEstimator<Base, N, F>::create(const Setup& setup) {
-  if (!setup.noise_is_positive()) {
-    return SetupFault::kNoiseNotPositive;
-  }
-  if (!(setup.gate_nis > 0) || !(setup.reopen_after_rejections > 0)) {
-    return SetupFault::kGateNotPositive;
-  }
-  if (!setup.means_are_usable()) {
-    return SetupFault::kPriorMeanNotUsable;
+  if (const auto fault = setup.fault()) {
+    return *fault;
   }
   if ((F.clock_offset && !(setup.clock_offset_sigma_s > 0)) ||
       (F.orbital_error && !(setup.orbital_error_sigma_rad > 0)) ||
@@ -251,14 +247,8 @@ auto InvariantEstimator<Base, N, F>::correct(const StarFix& fix, const FixReadin
   const Eigen::Matrix3d C_linear = fused_attitude(by_gyros.value(), C_in_c, R_c, readings.noise_factor);
   const Measurement m = measure(gyros_, C_in_c.raw(), C_linear, readings.h_b, R_c, by_shared, readout_noise_rad);
 
-  const Eigen::LLT<InnovationCovariance> noise_factor(m.R);
-  const MeasurementRows H_white = noise_factor.matrixL().solve(m.H);
-  const Innovation y_white = noise_factor.matrixL().solve(m.y);
-  const MeasurementRows through = information_.template through_uncertainty<kMeasurements>(H_white);
-  const InnovationCovariance white = InnovationCovariance::Identity() + through * through.transpose();
-  report.innovation = m.y;
-  report.innovation_covariance = noise_factor.matrixL() * white * noise_factor.matrixL().transpose();
-  report.nis = y_white.dot(white.llt().solve(y_white));
+  const WhiteMeasurement<Information, kMeasurements> white(m.H, m.y, m.R);
+  report_innovation(information_, white, report);
   report.status = gate_.judge(report.nis);
   report.rejections_in_a_row = gate_.rejections_in_a_row();
   switch (report.status) {
@@ -275,7 +265,7 @@ auto InvariantEstimator<Base, N, F>::correct(const StarFix& fix, const FixReadin
     default:
       break;
   }
-  feed_back(information_.template update<kMeasurements>(H_white, y_white));
+  feed_back(information_.template update<kMeasurements>(white.H, white.y));
   return report;
 }
 
@@ -333,6 +323,7 @@ auto InvariantEstimator<Base, N, F>::prior_parameter_root() const
 
 template class InvariantEstimator<Esg7, 2>;
 template class InvariantEstimator<Esg7, 2, kAllFurtherStates>;
+template class InvariantEstimator<Esg7, 2, kOneFurtherHead>;
 template class InvariantEstimator<Esg7, 3>;
 template class InvariantEstimator<Esg7, 4>;
 

@@ -1,17 +1,13 @@
 #include "trihedron/core/paper_estimator.hpp"
 
+#include "trihedron/core/innovation.hpp"
+
 namespace trihedron {
 
 template <class Model>
 Result<PaperEstimator<Model>, SetupFault> PaperEstimator<Model>::create(const Setup& setup) {
-  if (!setup.noise_is_positive()) {
-    return SetupFault::kNoiseNotPositive;
-  }
-  if (!(setup.gate_nis > 0) || !(setup.reopen_after_rejections > 0)) {
-    return SetupFault::kGateNotPositive;
-  }
-  if (!setup.means_are_usable()) {
-    return SetupFault::kPriorMeanNotUsable;
+  if (const auto fault = setup.fault()) {
+    return *fault;
   }
   const auto root = information_root<Layout::kParameters>(setup.prior_covariance);
   if (!root) {
@@ -115,22 +111,16 @@ auto PaperEstimator<Model>::correct(const Eigen::Matrix3d& C_in_c, const Directi
     qi_ = now;
   }
   const Measurement measurement = measure(gyros_, now, C_in_c, h_b, setup_);
-  const Eigen::LLT<InnovationCovariance> noise_factor(measurement.R);
-  const MeasurementMatrix H_white = noise_factor.matrixL().solve(measurement.H);
-  const Innovation innovation_white = noise_factor.matrixL().solve(measurement.innovation);
+  const WhiteMeasurement<Information, kMeasurements> white(measurement.H, measurement.innovation, measurement.R);
 
   if (!started_) {
-    static_cast<void>(information_.update(H_white, innovation_white));
+    information_.add_information(white.H);
     started_ = true;
     report.status = FixStatus::kStarted;
     return report;
   }
 
-  const MeasurementMatrix through = information_.through_uncertainty(H_white);
-  const InnovationCovariance white = InnovationCovariance::Identity() + through * through.transpose();
-  report.innovation = measurement.innovation;
-  report.innovation_covariance = noise_factor.matrixL() * white * noise_factor.matrixL().transpose();
-  report.nis = innovation_white.dot(white.llt().solve(innovation_white));
+  report_innovation(information_, white, report);
   report.status = gate_.judge(report.nis);
   report.rejections_in_a_row = gate_.rejections_in_a_row();
   switch (report.status) {
@@ -147,7 +137,7 @@ auto PaperEstimator<Model>::correct(const Eigen::Matrix3d& C_in_c, const Directi
     default:
       break;
   }
-  feed_back(information_.update(H_white, innovation_white));
+  feed_back(information_.update(white.H, white.y));
   return report;
 }
 

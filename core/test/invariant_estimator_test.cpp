@@ -314,6 +314,51 @@ TEST(InvariantEstimator, FindsTheClockOffsetAndTheErrorAtOrbitalPeriod) {
   EXPECT_LT(root.row(WithAll::Layout::kShared + 1).norm(), 5 * kArcsecond);
 }
 
+TEST(InvariantEstimator, FindsTheAlignmentOfAFurtherHead) {
+  using TwoHeads = InvariantEstimator<Esg7, 2, kOneFurtherHead>;
+  const test::Flight flight({.duration_s = 1800});
+  auto setup = nominal<TwoHeads>();
+  HeadSetup& head = setup.further_heads[0];
+  head.C_c_s = Rot<C, C>::exp(Vec<C>::assume(1.2, 0, 0)).raw();
+  head.noise_rad = setup.star_tracker_noise_rad;
+  head.alignment_sigma_rad = 3e-4;
+  const Eigen::Vector3d misalignment(2e-4, -3e-4, 1e-4);
+  auto cycle = std::make_unique<Cycle<TwoHeads>>(Cycle<TwoHeads>::create(setup, {}).value());
+  std::mt19937 random(2);
+  std::normal_distribution<double> normal;
+  long used = 0;
+  const auto note = [&](const auto& report) { used += report.fix.status == FixStatus::kUsed ? 1 : 0; };
+  std::size_t fix = 0;
+  for (const auto& sample : flight.samples) {
+    note(cycle->on_gyro(sample));
+    if (fix < flight.fixes.size() && flight.fixes[fix].t == sample.t) {
+      note(cycle->on_fix(flight.fixes[fix]));
+      // Both heads look at the same time; C_in_c of the second is by its mounting as designed.
+      const Eigen::Vector3d noise_s =
+          head.noise_rad.cwiseProduct(Eigen::Vector3d(normal(random), normal(random), normal(random)));
+      const Eigen::Vector3d error = misalignment + head.C_c_s * noise_s;
+      const Eigen::Matrix3d C_in_c =
+          flight.C_in_c_at_samples[static_cast<std::size_t>(&sample - flight.samples.data())];
+      note(cycle->on_fix({sample.t, Eigen::Quaterniond(C_in_c * Rot<C, C>::exp(Vec<C>::assume(error)).raw()), 1}));
+      ++fix;
+    }
+  }
+  while (true) {
+    const auto report = cycle->flush();
+    note(report);
+    if (report.fix.status == FixStatus::kNone) {
+      break;
+    }
+  }
+  EXPECT_EQ(used, 2 * static_cast<long>(flight.fixes.size()) - 1);
+  const auto root = cycle->estimator().information().inverse_root();
+  for (int axis = 0; axis < 3; ++axis) {
+    const double sigma = root.row(TwoHeads::Layout::head(1) + axis).norm();
+    EXPECT_LT(std::abs(cycle->estimator().shared()(axis) - misalignment(axis)), 4 * sigma);
+    EXPECT_LT(sigma, 2 * kArcsecond);
+  }
+}
+
 TEST(InvariantEstimator, OfThreeGyrosIsBetterThanOfTwo) {
   const test::Flight pair({.duration_s = 1800});
   using Three = InvariantEstimator<Esg7, 3>;

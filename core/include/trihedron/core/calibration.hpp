@@ -5,6 +5,7 @@
 #include <Eigen/Core>
 #include <algorithm>
 #include <cstdint>
+#include <optional>
 
 #include "trihedron/core/attitude.hpp"
 #include "trihedron/core/per_gyro.hpp"
@@ -63,6 +64,20 @@ struct CalibrationSetup {
       const double off = (gyro.C_c_b * gyro.C_c_b.transpose() - Eigen::Matrix3d::Identity()).norm();
       return gyro.drift_rad_s.allFinite() && off < 1e-6;
     });
+  }
+
+  /// What keeps it from working, beside the prior covariance.
+  [[nodiscard]] std::optional<SetupFault> fault() const {
+    if (!noise_is_positive()) {
+      return SetupFault::kNoiseNotPositive;
+    }
+    if (!(gate_nis > 0) || !(reopen_after_rejections > 0)) {
+      return SetupFault::kGateNotPositive;
+    }
+    if (!means_are_usable()) {
+      return SetupFault::kPriorMeanNotUsable;
+    }
+    return std::nullopt;
   }
 
   [[nodiscard]] bool noise_is_positive() const {

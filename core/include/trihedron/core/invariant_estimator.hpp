@@ -161,6 +161,7 @@ class InvariantEstimator {
 
 extern template class InvariantEstimator<Esg7, 2>;
 extern template class InvariantEstimator<Esg7, 2, kAllFurtherStates>;
+extern template class InvariantEstimator<Esg7, 2, kOneFurtherHead>;
 extern template class InvariantEstimator<Esg7, 3>;
 extern template class InvariantEstimator<Esg7, 4>;
 
