@@ -5,78 +5,25 @@
 
 import assert from "node:assert/strict";
 import { writeFile } from "node:fs/promises";
-import { createRequire } from "node:module";
 import path from "node:path";
 import { test as unlimitedTest, before, after } from "node:test";
-import { pathToFileURL } from "node:url";
-
-const { chromium } = createRequire(new URL("../../package.json", import.meta.url))("playwright-core");
+import { Reader, expectDrawn, figurePoints, readThrough } from "./reader.mjs";
 
 const [executablePath, directory] = process.argv.slice(2);
 const test = (name, body) => unlimitedTest(name, { timeout: 120_000 }, body);
 
-// Without a screen to wait for, headless Chromium now and then stops giving frames; it does not where it waits for none.
-const args = ["--no-sandbox", "--disable-gpu-vsync", "--disable-frame-rate-limit"];
-
-let browser;
-before(async () => { browser = await chromium.launch({ executablePath, args }); });
-after(() => browser.close());
-
-/** A page with the report open, and what it complained of. */
-async function open(name, { width = 1280, height = 900, colorScheme = "light" } = {}) {
-  const page = await browser.newPage({ viewport: { width, height }, colorScheme });
-  const complaints = [];
-  page.on("console", (message) => { if (["error", "warning"].includes(message.type())) complaints.push(message.text()); });
-  page.on("pageerror", (error) => complaints.push(String(error)));
-  page.on("request", (request) => { if (!/^(file|data|blob):/.test(request.url())) complaints.push(`asked for ${request.url()}`); });
-  const report = pathToFileURL(path.resolve(directory, name)).href;
-  await page.goto(report);
-  return { page, complaints };
-}
-
-/** Scrolls through the report, so that every figure is drawn. False where the browser stopped giving frames. */
-const readThrough = (page) => page.evaluate(async () => {
-  const frame = () => new Promise((done) => {
-    requestAnimationFrame(() => setTimeout(() => done(true), 20));
-    setTimeout(() => done(false), 5000);
-  });
-  for (let y = 0; y < document.body.scrollHeight; y += 300) {
-    scrollTo({ top: y, behavior: "instant" });
-    if (!(await frame())) return false;
-  }
-  scrollTo({ top: 0, behavior: "instant" });
-  return true;
-});
-
-/** A page with the report read through; opened anew where the browser, not the report, stopped. */
-async function openAndRead(name, options) {
-  for (let attempt = 0; attempt < 3; ++attempt) {
-    const opened = await open(name, options);
-    if (await readThrough(opened.page)) return opened;
-    await opened.page.close();
-  }
-  return assert.fail("the browser gave no frames, three times");
-}
-
-/** Per figure that is shown: its name and the number of points drawn. */
-const figurePoints = (page) => page.evaluate(() =>
-  [...document.querySelectorAll("figure[data-figure]:not([hidden])")].map((figure) => {
-    const tracks = [...figure.querySelectorAll("path.track")].map((track) => track.getAttribute("d").split("L").length);
-    const traces = (figure.querySelector(".plot")?.data ?? []).map(({ y, z }) => (z ? z.flat().length : y.filter((v) => v !== null).length));
-    return { name: figure.id, points: [...tracks, ...traces].reduce((a, b) => a + b, 0), drawn: figure.dataset.drawn === "true" };
-  }));
+let reader;
+before(async () => { reader = await Reader.start(executablePath); });
+after(() => reader.close());
+const open = (name, options) => reader.open(path.resolve(directory, name), options);
+const openAndRead = (name, options) => reader.openAndRead(path.resolve(directory, name), options);
 
 const overflow = (page) => page.evaluate(() => document.documentElement.scrollWidth - document.documentElement.clientWidth);
 
 for (const name of ["good.html", "troubled.html", "alone.html"]) {
   test(`${name} draws every figure, says nothing on the console and asks for nothing`, async () => {
     const { page, complaints } = await openAndRead(name);
-    const figures = await figurePoints(page);
-    assert.ok(figures.length >= 8, `only ${figures.length} figures`);
-    for (const { name, points, drawn } of figures) {
-      assert.ok(drawn, `${name} was not drawn`);
-      assert.ok(points > 50, `${name} holds ${points} points`);
-    }
+    expectDrawn(await figurePoints(page));
     assert.deepEqual(complaints, []);
     await page.close();
   });
