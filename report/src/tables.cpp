@@ -60,16 +60,18 @@ json gyros_of(const ReportInput& input, const std::vector<Parameter>& parameters
                  {"model", input.run.calibration.gyros[k].drift_model},
                  {"drift", json::array()},
                  {"alignment", json::array()},
-                 {"unmodelled", json::array()}};
+                 {"unmodelled", ""}};
     for (const Parameter& parameter : parameters) {
       if (parameter.gyro == k) {
         gyro[parameter.is_alignment ? "alignment" : "drift"].push_back(row_of(parameter));
       }
     }
     if (input.truth != nullptr && k < input.truth->gyros.size()) {
+      std::string list;
       for (const auto& [name, value] : input.truth->gyros[k].unmodelled_rad_s) {
-        gyro["unmodelled"].push_back({{"name", name}, {"value", signed_number(value / kMicroradian, 4)}});
+        list += fmt::format("{}{} {}", list.empty() ? "" : ", ", name, signed_number(value / kMicroradian, 4));
       }
+      gyro["unmodelled"] = list;
     }
     gyros.push_back(std::move(gyro));
   }

@@ -117,6 +117,16 @@ TEST(Report, SpeaksOfTruthOnlyWhereItIsKnown) {
   EXPECT_THAT(render(run.judged()), HasSubstr("Against the truth"));
 }
 
+TEST(Report, ListsTheSimulatedDriftOutsideTheModelInOneSentence) {
+  test::SyntheticRun run = short_run();
+  run.truth.gyros[0].unmodelled_rad_s = {{"W(1,0)", 1e-8}, {"D(2,1)", -2.5e-9}};
+  run.truth.gyros[1].unmodelled_rad_s.clear();
+  const std::string html = render(run.judged());
+  const std::string sentence = "Simulated drift outside the model, 10⁻⁶ rad/s: W(1,0) +0.0100, D(2,1) −0.0025.";
+  EXPECT_NE(html.find(sentence), std::string::npos);
+  EXPECT_EQ(html.find("Simulated drift outside", html.find(sentence) + 1), std::string::npos);
+}
+
 TEST(Report, GivesTheExtensionOfTheCorrectionInterval) {
   // 5′ at 2e-6 and 1e-7 rad/s: a ratio of 20; the late corrections outlast the pass.
   const std::string html = render(nine_hours().judged());
