@@ -325,6 +325,5 @@ template class InvariantEstimator<Esg7, 2>;
 template class InvariantEstimator<Esg7, 2, kAllFurtherStates>;
 template class InvariantEstimator<Esg7, 2, kOneFurtherHead>;
 template class InvariantEstimator<Esg7, 3>;
-template class InvariantEstimator<Esg7, 4>;
 
 }  // namespace trihedron
