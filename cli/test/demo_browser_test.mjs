@@ -6,26 +6,27 @@ import { execFileSync } from "node:child_process";
 import { statSync } from "node:fs";
 import path from "node:path";
 import { test } from "node:test";
-import { Reader, expectDrawn, figurePoints } from "../../report/test/reader.mjs";
+import { Reader, expectDrawn, figurePoints, readThrough } from "../../report/test/reader.mjs";
 
 const [executablePath, program, directory] = process.argv.slice(2);
 
-test("the demonstration's report draws every figure in both themes and asks for nothing", { timeout: 300_000 }, async () => {
+test("the demonstration's report draws every figure in both themes and asks for nothing", { timeout: 500_000 }, async () => {
   execFileSync(program, ["--quiet", "demo", "-o", directory]);
   const report = path.resolve(directory, "report.html");
   assert.ok(statSync(report).size < 6e6);
   const reader = await Reader.start(executablePath);
   for (const colorScheme of ["light", "dark"]) {
-    const { page, complaints } = await reader.openAndRead(report, { colorScheme });
-    const figures = await figurePoints(page);
-    expectDrawn(figures);
-    for (const name of ["figure-k0", "figure-alignment", "figure-navigation", "figure-open-loops", "figure-innovations", "figure-nis"]) {
-      assert.ok(figures.some((figure) => figure.name === name), `no ${name}`);
-    }
-    assert.match(await page.locator(".verdict .word").textContent(), /Trustworthy/);
-    await page.screenshot({ path: path.join(directory, `${colorScheme}.png`), fullPage: true });
-    assert.deepEqual(complaints, []);
-    await page.close();
+    await reader.open(report, { colorScheme }, async (page, complaints) => {
+      await readThrough(page);
+      const figures = await figurePoints(page);
+      expectDrawn(figures);
+      for (const name of ["figure-k0", "figure-alignment", "figure-navigation", "figure-open-loops", "figure-innovations", "figure-nis"]) {
+        assert.ok(figures.some((figure) => figure.name === name), `no ${name}`);
+      }
+      assert.match(await page.locator(".verdict .word").textContent(), /Trustworthy/);
+      await page.screenshot({ path: path.join(directory, `${colorScheme}.png`), fullPage: true });
+      assert.deepEqual(complaints, []);
+    });
   }
   await reader.close();
 });

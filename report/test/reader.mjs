@@ -6,51 +6,63 @@ import { pathToFileURL } from "node:url";
 
 const { chromium } = createRequire(new URL("../../package.json", import.meta.url))("playwright-core");
 
-// Without a screen to wait for, headless Chromium now and then stops giving frames; it does not where it waits for none.
+// Without a screen to wait for, headless Chromium now and then stops giving frames, and everything that waits for one
+// hangs; less often where it is told not to wait for a screen.
 const args = ["--no-sandbox", "--disable-gpu-vsync", "--disable-frame-rate-limit"];
+const hangsAfterMs = 60_000;
+const attempts = 3;
+const hang = Symbol("hang");
 
 export class Reader {
   static async start(executablePath) {
     const reader = new Reader();
+    reader.executablePath = executablePath;
     reader.browser = await chromium.launch({ executablePath, args });
     return reader;
   }
   close() { return this.browser.close(); }
 
-  /** A page with the report open, and what it complained of. */
-  async open(file, { width = 1280, height = 900, colorScheme = "light" } = {}) {
+  /** What `visit(page, complaints)` returns, of a page with the report open and what it complained of.
+   *  Made again in a new browser where one hangs; a visit that fails has failed. */
+  async open(file, options, visit) {
+    for (let attempt = 0; attempt < attempts; ++attempt) {
+      let timer;
+      const hung = new Promise((_, reject) => { timer = setTimeout(reject, hangsAfterMs, hang); });
+      try {
+        return await Promise.race([this.#visit(file, options, visit), hung]);
+      } catch (error) {
+        if (error !== hang) throw error;
+        console.log("the browser hangs");
+        await this.browser.close();
+        this.browser = await chromium.launch({ executablePath: this.executablePath, args });
+      } finally {
+        clearTimeout(timer);
+      }
+    }
+    return assert.fail(`the browser hung ${attempts} times`);
+  }
+
+  async #visit(file, { width = 1280, height = 900, colorScheme = "light" }, visit) {
     const page = await this.browser.newPage({ viewport: { width, height }, colorScheme });
+    page.setDefaultTimeout(0);
     const complaints = [];
     page.on("console", (message) => { if (["error", "warning"].includes(message.type())) complaints.push(message.text()); });
     page.on("pageerror", (error) => complaints.push(String(error)));
     page.on("request", (request) => { if (!/^(file|data|blob):/.test(request.url())) complaints.push(`asked for ${request.url()}`); });
     await page.goto(pathToFileURL(file).href);
-    return { page, complaints };
-  }
-
-  /** A page with the report read through; opened anew where the browser, not the report, stopped. */
-  async openAndRead(file, options) {
-    for (let attempt = 0; attempt < 3; ++attempt) {
-      const opened = await this.open(file, options);
-      if (await readThrough(opened.page)) return opened;
-      await opened.page.close();
-    }
-    return assert.fail("the browser gave no frames, three times");
+    const result = await visit(page, complaints);
+    await page.close();
+    return result;
   }
 }
 
-/** Scrolls through the report, so that every figure is drawn. False where the browser stopped giving frames. */
+/** Scrolls through the report, so that every figure is drawn. */
 export const readThrough = (page) => page.evaluate(async () => {
-  const frame = () => new Promise((done) => {
-    requestAnimationFrame(() => setTimeout(() => done(true), 20));
-    setTimeout(() => done(false), 5000);
-  });
   for (let y = 0; y < document.body.scrollHeight; y += 300) {
     scrollTo({ top: y, behavior: "instant" });
-    if (!(await frame())) return false;
+    await new Promise((done) => { requestAnimationFrame(() => setTimeout(done, 20)); });
   }
   scrollTo({ top: 0, behavior: "instant" });
-  return true;
 });
 
 /** Per figure that is shown: its name and the number of points drawn. */
