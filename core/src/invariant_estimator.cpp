@@ -56,15 +56,34 @@ Result<InvariantEstimator<Base, N, F>, SetupFault> InvariantEstimator<Base, N, F
 }
 
 template <class Base, int N, FurtherStates F>
-void InvariantEstimator<Base, N, F>::update_to_now() {
+double InvariantEstimator<Base, N, F>::second_order_rad(const Rows3& a, const Rows3& b) const {
+  // E|a × b|² = tr A tr B − tr AB, over the two axes across a momentum.
+  const auto spread_a = information_.template through_uncertainty<3>(a);
+  const auto spread_b = information_.template through_uncertainty<3>(b);
+  const double square =
+      spread_a.squaredNorm() * spread_b.squaredNorm() - (spread_a.transpose() * spread_b).squaredNorm();
+  return std::sqrt(std::max(square, 0.0) / 8);
+}
+
+template <class Base, int N, FurtherStates F>
+void InvariantEstimator<Base, N, F>::update_to_now(const Eigen::Matrix3d& C_in_c) {
   using DynamicMatrix = typename Information::DynamicMatrix;
   DynamicMatrix A = DynamicMatrix::Zero();
   typename Information::DynamicByConstants B = Information::DynamicByConstants::Zero();
   DynamicMatrix L = DynamicMatrix::Zero();
   const double walk = setup_.direction_random_walk_rad_sqrt_s;
-  const double sigma = std::sqrt(walk * walk * time_since_fix_s_ + extra_variance_rad2_);
   for (int k = 0; k < N; ++k) {
     const int row = Layout::direction(k);
+    // An error that keeps its sign as long as the estimates are what they are: its sigma grows, not its variance.
+    Rows3 alignment = Rows3::Zero();
+    Rows3 drifted = Rows3::Zero();
+    alignment.template middleCols<3>(Layout::alignment(k)) = C_in_c;
+    drifted.template middleCols<Base::kSize>(Layout::drift(k)) =
+        since_fix_[k].by_drift.template leftCols<Base::kSize>();
+    const double before = second_order_rad_[k];
+    second_order_rad_[k] += second_order_rad(alignment, drifted);
+    const double sigma = std::sqrt(walk * walk * time_since_fix_s_ + extra_variance_rad2_ +
+                                   second_order_rad_[k] * second_order_rad_[k] - before * before);
     A.template block<3, 3>(row, row) = since_fix_[k].by_start;
     B.template block<3, Base::kSize>(row, Layout::drift(k) - Layout::kDynamic) =
         since_fix_[k].by_drift.template leftCols<Base::kSize>();
@@ -106,6 +125,7 @@ void InvariantEstimator<Base, N, F>::start(const Eigen::Matrix3d& C_in_c, const 
   }
   const Eigen::LLT<Eigen::Matrix<double, 3 * N, 3 * N>> factor(R);
   information_ = prior_;
+  std::fill(second_order_rad_.begin(), second_order_rad_.end(), 0.0);
   information_.add_information(Eigen::Matrix<double, 3 * N, Layout::kStates>(factor.matrixL().solve(H)));
   since_fix_ = {};
   time_since_fix_s_ = 0;
@@ -239,12 +259,17 @@ auto InvariantEstimator<Base, N, F>::correct(const StarFix& fix, const FixReadin
     report.status = FixStatus::kRejectedGeometry;
     return report;
   }
-  update_to_now();
+  update_to_now(by_gyros.value().C_in_c.raw());
+  const Eigen::Matrix3d C_linear = fused_attitude(by_gyros.value(), C_in_c, R_c, readings.noise_factor);
   PerGyro<double, N> readout_noise_rad;
   for (int k = 0; k < N; ++k) {
-    readout_noise_rad[k] = setup_.readout_noise_rad[k] * readings.noise_factor;
+    Rows3 alignment = Rows3::Zero();
+    alignment.template middleCols<3>(Layout::alignment(k)) = C_linear;
+    Rows3 apart = -alignment;
+    apart.template middleCols<3>(Layout::direction(k)).setIdentity();
+    readout_noise_rad[k] =
+        std::hypot(setup_.readout_noise_rad[k] * readings.noise_factor, second_order_rad(alignment, apart));
   }
-  const Eigen::Matrix3d C_linear = fused_attitude(by_gyros.value(), C_in_c, R_c, readings.noise_factor);
   const Measurement m = measure(gyros_, C_in_c.raw(), C_linear, readings.h_b, R_c, by_shared, readout_noise_rad);
 
   const WhiteMeasurement<Information, kMeasurements> white(m.H, m.y, m.R);
@@ -260,7 +285,7 @@ auto InvariantEstimator<Base, N, F>::correct(const StarFix& fix, const FixReadin
       return report;
     case FixStatus::kUsedAfterReopening:
       add_direction_variance(m.y.squaredNorm() / kMeasurements);
-      update_to_now();
+      update_to_now(C_linear);
       break;
     default:
       break;

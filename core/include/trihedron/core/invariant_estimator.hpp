@@ -60,7 +60,9 @@ struct InvariantSetup : CalibrationSetup<Base, N> {
 };
 
 /// y_k = h_k × h_et,k = (φ_k − C_in_c δ_k)⊥ + noise; dφ_k/dt = ω × φ_k + C_in_b B Δκ_k + (C_in_c δ_k) × ω. The attitude
-/// in H is not the tracker's but the fused one, so that noise does not pass for information.
+/// in H is not the tracker's but the fused one, so that noise does not pass for information. The terms of second order,
+/// ½ C_in_c δ_k × (φ_k − C_in_c δ_k) and ½ C_in_c δ_k × C_in_b B Δκ_k, count as noise of the size that the present
+/// covariance gives them (docs/adr/0004): early readings do not claim more than the first, wrong values allow.
 template <class Base, int N, FurtherStates F = FurtherStates{}>
 class InvariantEstimator {
  public:
@@ -135,6 +137,7 @@ class InvariantEstimator {
                                            const PerGyro<double, N>& readout_noise_rad);
 
  private:
+  using Rows3 = Eigen::Matrix<double, 3, Layout::kStates>;
   /// Error of a fix by the shared states, c axes: as given = true · exp([e×]).
   [[nodiscard]] FixBySharedStates fix_by_shared(Time t, int head, const Eigen::Vector3d& rate_c) const;
   /// Covariance of a fix's noise, c axes.
@@ -144,7 +147,9 @@ class InvariantEstimator {
                                                const Eigen::Matrix3d& R_c, double noise_factor) const;
   void start(const Eigen::Matrix3d& C_in_c, const FixReadings<N>& readings, const Eigen::Matrix3d& R_c,
              const FixBySharedStates& by_shared);
-  void update_to_now();
+  /// 1-sigma per axis of ½ a × b, what the linear model leaves out; a, b: rows of independent errors.
+  [[nodiscard]] double second_order_rad(const Rows3& a, const Rows3& b) const;
+  void update_to_now(const Eigen::Matrix3d& C_in_c);
   void feed_back(const typename Information::Vector& x);
 
   Setup setup_;
@@ -154,6 +159,7 @@ class InvariantEstimator {
   Information information_;
   Information prior_;  ///< without anything of the directions
   OutlierGate gate_;
+  PerGyro<double, N> second_order_rad_{};  ///< 1-sigma of what the linear model has left out since the start
   double time_since_fix_s_ = 0;
   double extra_variance_rad2_ = 0;
   bool started_ = false;
