@@ -348,7 +348,8 @@ auto InvariantEstimator<Base, N, F>::prior_parameter_root() const
 
 template class InvariantEstimator<Esg7, 2>;
 template class InvariantEstimator<Esg7, 2, kAllFurtherStates>;
-template class InvariantEstimator<Esg7, 2, kOneFurtherHead>;
+template class InvariantEstimator<Esg20, 2, kAllFurtherStates>;
 template class InvariantEstimator<Esg7, 3>;
+template class InvariantEstimator<Esg7, 4>;
 
 }  // namespace trihedron

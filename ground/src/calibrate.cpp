@@ -9,7 +9,8 @@
 #include <memory>
 #include <utility>
 
-#include "gyro_model.hpp"
+#include "decide.hpp"
+#include "setup.hpp"
 #include "trihedron/core/drift.hpp"
 #include "trihedron/core/invariant_estimator.hpp"
 #include "trihedron/core/paper_estimator.hpp"
@@ -21,176 +22,6 @@ namespace {
 
 /// Between the paper's corrections.
 constexpr Duration kWatchedCorrections = std::chrono::minutes(90);
-
-template <class Model>
-std::vector<std::string> state_names(int gyros) {
-  std::vector<std::string> names;
-  for (int k = 1; k <= gyros; ++k) {
-    for (const char* coefficient : Model::kNames) {
-      names.push_back(fmt::format("gyro{}.{}", k, coefficient));
-    }
-    for (const char axis : {'x', 'y', 'z'}) {
-      names.push_back(fmt::format("gyro{}.align_{}", k, axis));
-    }
-  }
-  return names;
-}
-
-/// Prior means and sigmas of pass.toml.
-template <class Estimator>
-void use_settings(const PassSettings& settings, typename Estimator::Setup& setup) {
-  using Model = typename Estimator::BaseModel;
-  using Layout = typename Estimator::Setup::Layout;
-  for (int k = 0; k < Estimator::kGyros; ++k) {
-    const GyroPrior& prior = settings.gyros[static_cast<std::size_t>(k)];
-    for (const auto* table : {&prior.drift_rad_s, &prior.drift_sigma_rad_s}) {
-      for (const auto& [name, value] : *table) {
-        if (std::find(Model::kNames.begin(), Model::kNames.end(), name) == Model::kNames.end()) {
-          throw SetupError(fmt::format("the prior of gyro {} names drift coefficient '{}'", k + 1, name),
-                           fmt::format("drift model {} has {}", Model::kModelName, fmt::join(Model::kNames, ", ")));
-        }
-      }
-    }
-    const auto value_or = [](const std::map<std::string, double>& table, const char* name, double otherwise) {
-      const auto found = table.find(name);
-      return found == table.end() ? otherwise : found->second;
-    };
-    Eigen::Matrix<double, Layout::kPerGyro, 1> sigma;
-    for (int i = 0; i < Model::kSize; ++i) {
-      const char* name = Model::kNames[static_cast<std::size_t>(i)];
-      setup.prior[k].drift_rad_s(i) = value_or(prior.drift_rad_s, name, 0);
-      sigma(i) = value_or(prior.drift_sigma_rad_s, name, prior.drift_common_sigma_rad_s);
-    }
-    setup.prior[k].C_c_b = Rot<C, B<1>>::exp(Vec<C>::assume(prior.alignment_rotation_vector_rad)).raw();
-    sigma.template tail<3>() = prior.alignment_sigma_rad;
-    setup.prior_covariance.diagonal().template segment<Layout::kPerGyro>(Layout::drift(k)) = sigma.cwiseAbs2();
-  }
-}
-
-/// Values and covariance of an earlier calibration.
-template <class Estimator>
-void use_calibration(const Calibration& prior, typename Estimator::Setup& setup) {
-  using Model = typename Estimator::BaseModel;
-  const std::vector<std::string> names = state_names<Model>(Estimator::kGyros);
-  std::vector<Eigen::Index> rows;
-  for (const std::string& name : names) {
-    const auto found = std::find(prior.states.begin(), prior.states.end(), name);
-    if (found == prior.states.end()) {
-      throw SetupError(fmt::format("the earlier calibration has no covariance of '{}'", name),
-                       "use a calibration of this pair of gyros");
-    }
-    rows.push_back(found - prior.states.begin());
-  }
-  for (Eigen::Index i = 0; i < setup.prior_covariance.rows(); ++i) {
-    for (Eigen::Index j = 0; j < setup.prior_covariance.cols(); ++j) {
-      setup.prior_covariance(i, j) =
-          prior.covariance(rows[static_cast<std::size_t>(i)], rows[static_cast<std::size_t>(j)]);
-    }
-  }
-  for (int k = 0; k < Estimator::kGyros; ++k) {
-    const GyroCalibration& gyro = prior.gyros[static_cast<std::size_t>(k)];
-    if (!is_of_model<Model>(gyro)) {
-      throw SetupError(fmt::format("the earlier calibration of gyro {} is of drift model '{}', not {}", k + 1,
-                                   gyro.drift_model, Model::kModelName),
-                       "use a calibration made with the same drift model");
-    }
-    setup.prior[k] = to_model<Model>(gyro);
-  }
-}
-
-/// The rate of the orbit, as the attitude shows it: the mean of the body's, in which slews cancel. An attitude that
-/// stands still in space does not show it; then that of a low orbit.
-double mean_rate(const StarTrackerTelemetry& tracker) {
-  constexpr double kFastest_rad_s = 0.02;  // beyond, an outlier
-  constexpr double kLowOrbit_rad_s = 1.1e-3;
-  Eigen::Vector3d turned = Eigen::Vector3d::Zero();
-  double time_s = 0;
-  for (std::size_t i = 1; i < tracker.size(); ++i) {
-    const double step_s = to_seconds(tracker.t[i] - tracker.t[i - 1]);
-    const auto before = Rot<In, C>::assume(tracker.q_in_c[i - 1].normalized());
-    const auto after = Rot<In, C>::assume(tracker.q_in_c[i].normalized());
-    const Eigen::Vector3d turn = (before.inverse() * after).log().raw();
-    if (step_s < 60 && turn.norm() < kFastest_rad_s * step_s) {
-      turned += turn;
-      time_s += step_s;
-    }
-  }
-  const double rate = time_s > 0 ? turned.norm() / time_s : 0;
-  return rate > 0.5 * kLowOrbit_rad_s ? rate : kLowOrbit_rad_s;
-}
-
-template <class Estimator>
-typename Estimator::Setup make_setup(const Pass& pass, const CalibrationOptions& options) {
-  const PassSettings& settings = pass.settings;
-  if (settings.gyros.size() < Estimator::kGyros || pass.gyro.gyros < Estimator::kGyros) {
-    throw SetupError(
-        fmt::format("estimator {} needs {} gyros; the pass has {}", Estimator::kName, Estimator::kGyros,
-                    std::min<std::size_t>(settings.gyros.size(), static_cast<std::size_t>(pass.gyro.gyros))),
-        "give telemetry of a pair");
-  }
-  typename Estimator::Setup setup;
-  use_settings<Estimator>(settings, setup);
-  if (settings.prior) {
-    if (settings.prior->gyros.size() < Estimator::kGyros) {
-      throw SetupError(fmt::format("the earlier calibration has {} gyros; estimator {} needs {}",
-                                   settings.prior->gyros.size(), Estimator::kName, Estimator::kGyros),
-                       "use a calibration of this pair of gyros");
-    }
-    use_calibration<Estimator>(*settings.prior, setup);
-  }
-  for (int k = 0; k < Estimator::kGyros; ++k) {
-    setup.readout_noise_rad[k] = settings.gyros[static_cast<std::size_t>(k)].readout_noise_rad;
-  }
-  setup.star_tracker_noise_rad = settings.star_tracker_noise_rad;
-  setup.direction_random_walk_rad_sqrt_s = options.direction_random_walk_rad_sqrt_s;
-  setup.gate_nis = options.gate_nis;
-  setup.reopen_after_rejections = options.reopen_after_rejections;
-  if constexpr (requires { setup.orbital_rate_rad_s; }) {
-    setup.orbital_rate_rad_s = mean_rate(pass.star_tracker);
-    setup.orbital_phase_zero = settings.epoch;
-    setup.wandering_sigma_rad_s = options.wandering_drift_rad_s;
-    setup.wandering_time_s = to_seconds(options.wandering_time);
-  }
-  return setup;
-}
-
-CorrectionPolicy policy_of(const CorrectionOptions& options) {
-  CorrectionPolicy policy;
-  policy.take_parameters = options.take_parameters;
-  switch (options.when) {
-    case CorrectionOptions::When::kEvery:
-      policy.interval = options.interval;
-      break;
-    case CorrectionOptions::When::kOnlyFirst:
-      policy.interval = CorrectionPolicy::kOnlyFirst;
-      break;
-    case CorrectionOptions::When::kEachFix:
-      policy.interval = CorrectionPolicy::kEveryFix;
-      break;
-  }
-  return policy;
-}
-
-template <class Estimator>
-std::unique_ptr<Cycle<Estimator>> make_cycle(const Pass& pass, const CalibrationOptions& options) {
-  const auto cycle = Cycle<Estimator>::create(make_setup<Estimator>(pass, options), policy_of(options.corrections));
-  if (!cycle) {
-    switch (cycle.fault()) {
-      case SetupFault::kPriorNotPositiveDefinite:
-        throw SetupError("the prior covariance is not positive definite",
-                         "give each parameter a prior sigma above zero, and correlations below one");
-      case SetupFault::kPriorMeanNotUsable:
-        throw SetupError("a prior mean is not finite, or an alignment is not a rotation", "correct the prior");
-      case SetupFault::kNoiseNotPositive:
-        throw SetupError("a noise sigma is not positive",
-                         "give positive readout and star-tracker noise, and process noise of zero or more");
-      case SetupFault::kGateNotPositive:
-        throw SetupError("the gate or the number of rejections before reopening is not positive",
-                         "give positive numbers");
-    }
-  }
-  return std::make_unique<Cycle<Estimator>>(cycle.value());
-}
 
 template <class Report>
 FixRecord record_of(const Report& report) {
@@ -343,33 +174,42 @@ class AngleTrack {
   CalibrationRun& run_;
 };
 
+/// The shared states that are on.
 template <class Estimator>
-std::vector<FurtherEstimate> further_of(const Estimator& estimator) {
+std::vector<FurtherEstimate> further_of(const Estimator& estimator, const Pass& pass,
+                                        const FurtherStateOptions& states) {
   std::vector<FurtherEstimate> further;
   if constexpr (requires { estimator.shared(); }) {
-    using Layout = typename Estimator::Layout;
-    std::vector<std::string> names;
-    if (Estimator::kFurther.clock_offset) {
-      names.emplace_back("clock_offset_s");
-    }
-    if (Estimator::kFurther.orbital_error) {
-      for (const char* wave : {"sine", "cosine"}) {
-        for (const char axis : {'x', 'y', 'z'}) {
-          names.push_back(fmt::format("orbital_{}_{}_rad", wave, axis));
+    if constexpr (Estimator::kFurther.shared() > 0) {
+      using Layout = typename Estimator::Layout;
+      const auto root = estimator.information().inverse_root();
+      const auto tell = [&](std::string name, int state) {
+        further.push_back({std::move(name), estimator.shared()(state - Layout::kShared), root.row(state).norm()});
+      };
+      constexpr auto kOn = FurtherStateOptions::Choice::kOn;
+      if (states.clock_offset == kOn) {
+        tell("clock_offset_s", Layout::clock_offset());
+      }
+      if (states.orbital_error == kOn) {
+        int state = Layout::orbital_error();
+        for (const char* wave : {"sine", "cosine"}) {
+          for (const char axis : {'x', 'y', 'z'}) {
+            tell(fmt::format("orbital_{}_{}_rad", wave, axis), state++);
+          }
         }
       }
-    }
-    const auto root = estimator.information().inverse_root();
-    for (std::size_t i = 0; i < names.size(); ++i) {
-      const auto row = static_cast<Eigen::Index>(i);
-      further.push_back({names[i], estimator.shared()(row), root.row(Layout::kShared + row).norm()});
+      if (!pass.further_star_trackers.empty()) {
+        for (int i = 0; i < 3; ++i) {
+          tell(fmt::format("star_tracker_2_align_{}_rad", "xyz"[i]), Layout::head(1) + i);
+        }
+      }
     }
   }
   return further;
 }
 
 template <class Estimator>
-Calibration result_of(const Pass& pass, const Cycle<Estimator>& cycle) {
+Calibration result_of(const Pass& pass, const Cycle<Estimator>& cycle, const FurtherStateOptions& states) {
   using Model = typename Estimator::BaseModel;
   Calibration result;
   result.estimator = Estimator::kName;
@@ -378,7 +218,7 @@ Calibration result_of(const Pass& pass, const Cycle<Estimator>& cycle) {
   for (const auto& gyro : cycle.estimator().gyros()) {
     result.gyros.push_back(to_record<Model>(gyro));
   }
-  result.further = further_of(cycle.estimator());
+  result.further = further_of(cycle.estimator(), pass, states);
   result.states = state_names<Model>(Estimator::kGyros);
   const auto root = parameter_root(cycle.estimator());
   result.covariance = root * root.transpose();
@@ -402,10 +242,11 @@ Correction correction_of(const Estimator& estimator, const AttitudeSolution& att
 }
 
 template <class Estimator>
-CalibrationRun calibrate_with(const Pass& pass, const CalibrationOptions& options, const Progress& progress) {
-  const auto cycle = make_cycle<Estimator>(pass, options);
+CalibrationRun calibrate_with(const Pass& pass, Decision decision, const Progress& progress) {
+  const auto cycle = make_cycle<Estimator>(pass, decision.options);
   CalibrationRun run;
-  run.options = options;
+  run.options = std::move(decision.options);
+  run.evidence = std::move(decision.evidence);
   AngleTrack angle(run);
   Time corrected{};
   const auto on_fix = [&](const typename Cycle<Estimator>::Report& report) {
@@ -450,7 +291,7 @@ CalibrationRun calibrate_with(const Pass& pass, const CalibrationOptions& option
   if (!cycle->estimator().started()) {
     throw nothing_used(run.fixes);
   }
-  run.calibration = result_of(pass, *cycle);
+  run.calibration = result_of(pass, *cycle, run.options.further_states);
   run.calibration.statistics = statistics_of(run.fixes);
   run.calibration.verdict = judge(pass, run);
   return run;
@@ -490,22 +331,40 @@ NavigationRun navigate_with(const Pass& pass, const CalibrationOptions& options,
   return run;
 }
 
-/// Calls `body` with the chosen estimator as a type tag.
+/// Calls `body` with the estimator as a type tag. Of what is built, the smallest that has what is asked for.
 template <class Body>
-auto with_estimator(const CalibrationOptions& options, Body&& body) {
-  if (options.drift_model != Esg7::kModelName) {
-    throw SetupError(fmt::format("estimator {} has no drift model '{}'", options.estimator, options.drift_model),
+auto with_estimator(const Pass& pass, const CalibrationOptions& options, Body&& body) {
+  if (std::find(kEstimators.begin(), kEstimators.end(), options.estimator) == kEstimators.end()) {
+    throw SetupError(fmt::format("there is no estimator '{}'", options.estimator),
+                     fmt::format("use one of: {}", fmt::join(kEstimators, ", ")));
+  }
+  const bool esg20 = options.drift_model == Esg20::kModelName;
+  if ((!esg20 && options.drift_model != Esg7::kModelName) ||
+      (esg20 && (options.estimator == "paper" || pass.gyro.gyros > 2))) {
+    throw SetupError(fmt::format("estimator {} of {} gyros has no drift model '{}'", options.estimator, pass.gyro.gyros,
+                                 options.drift_model),
                      fmt::format("use one of: {}", fmt::join(kDriftModels, ", ")));
   }
   if (options.estimator == "paper") {
     return body.template operator()<PaperEstimator<Esg7>>();
   }
-  if (options.estimator == "invariant") {
-    return options.further_states ? body.template operator()<InvariantEstimator<Esg7, 2, kAllFurtherStates>>()
-                                  : body.template operator()<InvariantEstimator<Esg7, 2>>();
+  switch (pass.gyro.gyros) {
+    case 3:
+      return body.template operator()<InvariantEstimator<Esg7, 3>>();
+    case 4:
+      return body.template operator()<InvariantEstimator<Esg7, 4>>();
+    default:
+      break;
   }
-  throw SetupError(fmt::format("there is no estimator '{}'", options.estimator),
-                   fmt::format("use one of: {}", fmt::join(kEstimators, ", ")));
+  if (esg20) {
+    return body.template operator()<InvariantEstimator<Esg20, 2, kAllFurtherStates>>();
+  }
+  constexpr auto kOn = FurtherStateOptions::Choice::kOn;
+  const FurtherStateOptions& states = options.further_states;
+  const bool further = states.clock_offset == kOn || states.orbital_error == kOn || states.wandering_drift == kOn ||
+                       !pass.further_star_trackers.empty();
+  return further ? body.template operator()<InvariantEstimator<Esg7, 2, kAllFurtherStates>>()
+                 : body.template operator()<InvariantEstimator<Esg7, 2>>();
 }
 
 }  // namespace
@@ -525,11 +384,16 @@ StarTrackerTelemetry used_fixes(const Pass& pass, const std::vector<FixRecord>& 
 }
 
 CalibrationRun calibrate(const Pass& pass, const CalibrationOptions& options, const Progress& progress) {
-  return with_estimator(options, [&]<class Estimator>() { return calibrate_with<Estimator>(pass, options, progress); });
+  Decision decision = decide(pass, options);
+  return with_estimator(pass, decision.options, [&]<class Estimator>() {
+    return calibrate_with<Estimator>(pass, std::move(decision), progress);
+  });
 }
 
 NavigationRun navigate(const Pass& pass, const CalibrationOptions& options, const Progress& progress) {
-  return with_estimator(options, [&]<class Estimator>() { return navigate_with<Estimator>(pass, options, progress); });
+  const CalibrationOptions decided = decide(pass, options).options;
+  return with_estimator(pass, decided,
+                        [&]<class Estimator>() { return navigate_with<Estimator>(pass, decided, progress); });
 }
 
 }  // namespace trihedron::ground

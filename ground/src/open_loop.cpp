@@ -1,5 +1,7 @@
 #include "trihedron/ground/open_loop.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <chrono>
 
@@ -105,10 +107,18 @@ CorrectionInterval interval_of(const AttitudeErrors& errors, double limit_rad) {
 
 AttitudeHistory fly_open_loop(const Pass& pass, Time t, const std::vector<GyroCalibration>& gyros,
                               const std::vector<Time>& epochs) {
-  if (gyros.size() < kPair || !std::all_of(gyros.begin(), gyros.begin() + kPair, is_of_model<Esg7>)) {
-    throw SetupError("an open loop needs two gyros of drift model esg7", "give a calibration of a pair");
+  const auto pair_is_of = [&]<class Model>() {
+    return gyros.size() >= kPair && std::all_of(gyros.begin(), gyros.begin() + kPair, is_of_model<Model>);
+  };
+  if (pair_is_of.operator()<Esg7>()) {
+    return fly<Esg7>(pass, t, gyros, epochs);
   }
-  return fly<Esg7>(pass, t, gyros, epochs);
+  if (pair_is_of.operator()<Esg20>()) {
+    return fly<Esg20>(pass, t, gyros, epochs);
+  }
+  throw SetupError(
+      fmt::format("an open loop needs two gyros of drift model {} or {}", Esg7::kModelName, Esg20::kModelName),
+      "give a calibration of a pair");
 }
 
 std::vector<OpenLoops> fly_open_loops(const Pass& pass, const CalibrationRun& run, const std::vector<Time>& reference_t,

@@ -243,7 +243,6 @@ TEST_P(SamplePass, IsCalibratedToAnArcsecond) {
 
 TEST(Calibrate, ByTheInvariantErrorFindsTheTruthAndSmoothsTheAttitude) {
   CalibrationOptions options;
-  options.estimator = "invariant";
   const auto run = calibrate(two_hours().pass, options);
   EXPECT_EQ(run.calibration.estimator, "invariant");
   EXPECT_EQ(run.fixes.size(), two_hours().pass.star_tracker.size());
@@ -263,7 +262,7 @@ TEST(Calibrate, ByTheInvariantErrorFindsTheTruthAndSmoothsTheAttitude) {
   EXPECT_TRUE(run.calibration.further.empty());
 }
 
-TEST(Calibrate, FindsTheClockOffsetAsAFurtherState) {
+TEST(Calibrate, DecidesByItselfForClockOffsetAndErrorAtOrbitalPeriod) {
   Scenario scenario;
   scenario.seed = 6;
   scenario.duration = std::chrono::hours(2);
@@ -273,12 +272,9 @@ TEST(Calibrate, FindsTheClockOffsetAsAFurtherState) {
     gyro.drift.outside_sigma_rad_s = 0;
   }
   const auto simulated = sim::simulate(scenario);
-  CalibrationOptions options;
-  options.estimator = "invariant";
-  options.further_states = true;
-  options.wandering_drift_rad_s = 1e-9;
-  const auto run = calibrate(simulated.pass, options);
+  const auto run = calibrate(simulated.pass, {});
   ASSERT_EQ(run.calibration.further.size(), 7U);
+  EXPECT_EQ(run.calibration.gyros[0].drift_model, "esg7");
   const Truth::StarTracker& truth = simulated.truth.star_trackers[0];
   for (const FurtherEstimate& estimate : run.calibration.further) {
     const double expected = estimate.name == "clock_offset_s"       ? truth.clock_offset_s
@@ -297,8 +293,7 @@ TEST(Calibrate, KnowsTheRateOfTheOrbitFromTheAttitude) {
   scenario.duration = std::chrono::minutes(30);
   scenario.attitude.reference = AttitudeScenario::Reference::kInertial;
   CalibrationOptions options;
-  options.estimator = "invariant";
-  options.further_states = true;
+  options.further_states.clock_offset = options.further_states.orbital_error = FurtherStateOptions::Choice::kOn;
   const auto run = calibrate(sim::simulate(scenario).pass, options);
   EXPECT_EQ(run.calibration.further.size(), 7U);
   EXPECT_TRUE(run.calibration.covariance.allFinite());
@@ -306,7 +301,6 @@ TEST(Calibrate, KnowsTheRateOfTheOrbitFromTheAttitude) {
 
 TEST(Navigate, CorrectedAtEachFixByTheInvariantErrorIsBetterThanASingleReading) {
   CalibrationOptions options;
-  options.estimator = "invariant";
   options.corrections.when = CorrectionOptions::When::kEachFix;
   const auto run = navigate(two_hours().pass, options);
   // From when the samples round the first fix are there.

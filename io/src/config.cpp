@@ -2,6 +2,11 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <array>
+#include <optional>
+#include <utility>
+
 #include "text_file.hpp"
 #include "toml_table.hpp"
 #include "trihedron/io/quantity.hpp"
@@ -30,6 +35,27 @@ int whole_number(const TomlTable& table, const toml::node& node, std::string_vie
     table.refuse(node, fmt::format("\"{}\" is not a whole number from 1 to 1000000", key), "give the number of fixes");
   }
   return static_cast<int>(*value);
+}
+
+using Choice = FurtherStateOptions::Choice;
+constexpr std::array<std::pair<Choice, const char*>, 3> kChoices = {
+    {{Choice::kAuto, "auto"}, {Choice::kOff, "off"}, {Choice::kOn, "on"}}};
+
+const char* name_of(Choice choice) {
+  return std::find_if(kChoices.begin(), kChoices.end(), [&](const auto& c) { return c.first == choice; })->second;
+}
+
+std::optional<Choice> choice_of(std::string_view text) {
+  const auto found = std::find_if(kChoices.begin(), kChoices.end(), [&](const auto& c) { return c.second == text; });
+  return found == kChoices.end() ? std::nullopt : std::optional(found->first);
+}
+
+Choice choice(const TomlTable& table, const toml::node& node, std::string_view key) {
+  const auto chosen = choice_of(table.text(node, key));
+  if (!chosen) {
+    table.refuse(node, fmt::format("\"{}\" is neither auto nor on nor off", key), "write one of them");
+  }
+  return *chosen;
 }
 
 }  // namespace
@@ -92,23 +118,28 @@ CalibrationOptions read_config(const fs::path& path) {
   }
   if (root.find("further_states") != nullptr) {
     const TomlTable further(root.table_at("further_states"), path, "[further_states]",
-                            {"estimated", "wandering_drift", "wandering_time"});
-    if (const toml::node* node = further.find("estimated")) {
-      const auto estimated = node->value_exact<bool>();
-      if (!estimated) {
-        further.refuse(*node, "\"estimated\" is neither true nor false", "write true or false");
-      }
-      options.further_states = *estimated;
+                            {"clock_offset", "orbital_error", "wandering_drift", "wandering_time"});
+    FurtherStateOptions& states = options.further_states;
+    if (const toml::node* node = further.find("clock_offset")) {
+      states.clock_offset = choice(further, *node, "clock_offset");
+    }
+    if (const toml::node* node = further.find("orbital_error")) {
+      states.orbital_error = choice(further, *node, "orbital_error");
     }
     if (const toml::node* node = further.find("wandering_drift")) {
-      options.wandering_drift_rad_s = quantity(further, *node, "wandering_drift", parse_rate_rad_s);
-      if (!(options.wandering_drift_rad_s > 0)) {
-        further.refuse(*node, "\"wandering_drift\" is not positive", "give more than zero");
+      if (const auto word = choice_of(further.text(*node, "wandering_drift")); word && *word != Choice::kOn) {
+        states.wandering_drift = *word;
+      } else {
+        states.wandering_drift = Choice::kOn;
+        states.wandering_drift_rad_s = quantity(further, *node, "wandering_drift", parse_rate_rad_s);
+        if (!(states.wandering_drift_rad_s > 0)) {
+          further.refuse(*node, "\"wandering_drift\" is not positive", "give auto, off, or more than zero");
+        }
       }
     }
     if (const toml::node* node = further.find("wandering_time")) {
-      options.wandering_time = quantity(further, *node, "wandering_time", parse_duration);
-      if (!(options.wandering_time > Duration::zero())) {
+      states.wandering_time = quantity(further, *node, "wandering_time", parse_duration);
+      if (!(states.wandering_time > Duration::zero())) {
         further.refuse(*node, "\"wandering_time\" is not positive", "give more than zero");
       }
     }
@@ -123,6 +154,7 @@ CalibrationOptions read_config(const fs::path& path) {
 }
 
 std::string format_config(const CalibrationOptions& options) {
+  const FurtherStateOptions& states = options.further_states;
   return fmt::format(
       "# Settings in effect. Give this file to --config to repeat the run.\n"
       "estimator = \"{}\"\n"
@@ -134,16 +166,18 @@ std::string format_config(const CalibrationOptions& options) {
       "reopen_after_rejections = {}  # in a row; then the directions are set free and the fix is used\n"
       "\n"
       "[further_states]  # of estimator invariant\n"
-      "estimated = {}  # clock offset and error at orbital period of the star tracker, drift that wanders\n"
-      "wandering_drift = \"{}\"  # its 1-sigma about each case axis\n"
+      "clock_offset = \"{}\"  # of the star tracker: auto, on or off\n"
+      "orbital_error = \"{}\"  # of the star tracker, at orbital period: auto, on or off\n"
+      "wandering_drift = \"{}\"  # about each case axis: auto, off, or its 1-sigma\n"
       "wandering_time = \"{}\"  # and its correlation time\n"
       "\n"
       "[corrections]\n"
       "interval = \"{}\"  # of the open-loop navigator: a duration, none or continuous\n",
       options.estimator, options.drift_model, format_random_walk(options.direction_random_walk_rad_sqrt_s),
-      options.gate_nis, options.reopen_after_rejections, options.further_states,
-      fmt::format("{}rad/s", options.wandering_drift_rad_s), format_duration(options.wandering_time),
-      format_correction_interval(options.corrections));
+      options.gate_nis, options.reopen_after_rejections, name_of(states.clock_offset), name_of(states.orbital_error),
+      states.wandering_drift == Choice::kOn ? fmt::format("{}rad/s", states.wandering_drift_rad_s)
+                                            : name_of(states.wandering_drift),
+      format_duration(states.wandering_time), format_correction_interval(options.corrections));
 }
 
 }  // namespace trihedron::io

@@ -49,6 +49,7 @@ template <class Estimator>
 class Cycle {
  public:
   static constexpr int kGyros = Estimator::kGyros;
+  static constexpr int kHeads = Estimator::kHeads;
   using Report = StepReport<Estimator>;
   using Setup = typename Estimator::Setup;
   using Directions = typename Estimator::Directions;

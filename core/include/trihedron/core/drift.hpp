@@ -79,4 +79,64 @@ struct Esg7 {
   }
 };
 
+/// Eq. (1) and thirteen more members of −∇W + h × ∇D (mathematics, Helmholtz–Hodge): what it lacks of degree 1 and 2,
+/// and D of Σh⁴/4, of which it has W alone (k0), while it has both of its other shapes of higher degree. Named by
+/// degree and order of the real spherical harmonic, unit mean square over 4π. Degree 1 of W stands still in the case.
+struct Esg20 {
+  static constexpr int kQuadratic = 6;  ///< members of degree 1 and 2, of W and of D each
+  static constexpr int kMembers = 2 * kQuadratic + 1;
+  static constexpr int kSize = Esg7::kSize + kMembers;
+  static constexpr std::array<const char*, kSize> kNames = {
+      "k0",      "mu12",    "mu23",   "mu31",    "nu12",   "nu23",   "nu31",    "W(1,-1)", "W(1,0)", "W(1,1)",
+      "W(2,-2)", "W(2,-1)", "W(2,1)", "D(1,-1)", "D(1,0)", "D(1,1)", "D(2,-2)", "D(2,-1)", "D(2,1)", "D(k0)"};
+  static constexpr const char* kModelName = "esg20";
+
+  template <class S>
+  using Coefficients = Eigen::Matrix<S, kSize, 1>;
+  template <class S>
+  using Basis = Eigen::Matrix<S, 3, kSize>;
+
+  /// B(h) as of Esg7. What points along h is left in, since it moves nothing.
+  template <class S>
+  [[nodiscard]] static Basis<S> basis(const Vector3<S>& h) {
+    const Eigen::Matrix<S, 3, kQuadratic> slopes = gradients<S>(h);
+    const Matrix3<S> cross = skew<S>(h);
+    Basis<S> b;
+    b << Esg7::basis<S>(h), -slopes, cross * slopes, cross * cube<S>(h);
+    return b;
+  }
+
+  /// ω_b(h) = B(h) κ, rad/s, case axes.
+  template <class S>
+  [[nodiscard]] static Vector3<S> rate(const Vector3<S>& h, const Coefficients<S>& kappa) {
+    const Eigen::Matrix<S, 3, kQuadratic> slopes = gradients<S>(h);
+    return Esg7::rate<S>(h, kappa.template head<Esg7::kSize>()) -
+           slopes * kappa.template segment<kQuadratic>(Esg7::kSize) +
+           h.cross(slopes * kappa.template segment<kQuadratic>(Esg7::kSize + kQuadratic) +
+                   cube<S>(h) * kappa(kSize - 1));
+  }
+
+ private:
+  /// ∇Σh⁴/4
+  template <class S>
+  [[nodiscard]] static Vector3<S> cube(const Vector3<S>& h) {
+    return h.cwiseProduct(h).cwiseProduct(h);
+  }
+
+  /// Of the harmonics (1, −1), (1, 0), (1, 1), (2, −2), (2, −1), (2, 1).
+  template <class S>
+  [[nodiscard]] static Eigen::Matrix<S, 3, kQuadratic> gradients(const Vector3<S>& h) {
+    const S one(0.48860251190291992);  // √(3/4π)
+    const S two(1.0925484305920792);   // √(15/4π)
+    const S zero(0);
+    Eigen::Matrix<S, 3, kQuadratic> g;
+    // clang-format off
+    g << zero, zero, one,  two * h(1), zero,       two * h(2),
+         one,  zero, zero, two * h(0), two * h(2), zero,
+         zero, one,  zero, zero,       two * h(1), two * h(0);
+    // clang-format on
+    return g;
+  }
+};
+
 }  // namespace trihedron

@@ -19,9 +19,9 @@ struct FurtherStates {
   }
 };
 
-/// Of one star tracker, everything.
-inline constexpr FurtherStates kAllFurtherStates{.clock_offset = true, .orbital_error = true, .wandering_drift = true};
-inline constexpr FurtherStates kOneFurtherHead{.further_heads = 1};
+/// Everything, of two star trackers. What is not wanted is held by a prior sigma near zero.
+inline constexpr FurtherStates kAllFurtherStates{
+    .clock_offset = true, .orbital_error = true, .wandering_drift = true, .further_heads = 1};
 
 /// A drift model with three more coefficients: a drift about the case axes, the same wherever the momentum points.
 template <class Base>

@@ -43,9 +43,9 @@ struct InvariantLayout {
 
 /// A star tracker as the filter knows it.
 struct HeadSetup {
-  Eigen::Vector3d noise_rad{0, 0, 0};                   ///< 1-sigma about its own axes s
-  Eigen::Matrix3d C_c_s = Eigen::Matrix3d::Identity();  ///< as designed; identity for the first
-  double alignment_sigma_rad = 0;                       ///< of the others, per axis
+  Eigen::Vector3d noise_rad{1e-4, 1e-4, 1e-4};          ///< 1-sigma about its own axes s
+  Eigen::Matrix3d C_c_s = Eigen::Matrix3d::Identity();  ///< as designed
+  double alignment_sigma_rad = 1e-2;                    ///< per axis
 };
 
 template <class Base, int N, FurtherStates F>
@@ -168,7 +168,8 @@ class InvariantEstimator {
 // The set that is built; another is one line here and one in the source.
 extern template class InvariantEstimator<Esg7, 2>;
 extern template class InvariantEstimator<Esg7, 2, kAllFurtherStates>;
-extern template class InvariantEstimator<Esg7, 2, kOneFurtherHead>;
+extern template class InvariantEstimator<Esg20, 2, kAllFurtherStates>;
 extern template class InvariantEstimator<Esg7, 3>;
+extern template class InvariantEstimator<Esg7, 4>;
 
 }  // namespace trihedron

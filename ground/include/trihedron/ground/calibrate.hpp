@@ -45,9 +45,17 @@ struct Correction {
   std::vector<GyroCalibration> calibrated;    ///< as estimated until then
 };
 
+/// For estimating a kind of further states instead of taking them as zero.
+struct Evidence {
+  std::string states;  ///< "clock_offset", "orbital_error", "drift_outside_eq1"
+  double log_bayes_factor = 0;
+  bool accepted = false;
+};
+
 struct CalibrationRun {
-  CalibrationOptions options;
-  Calibration calibration;  ///< with verdict and statistics
+  CalibrationOptions options;      ///< as decided
+  std::vector<Evidence> evidence;  ///< of what was left to the program to decide
+  Calibration calibration;         ///< with verdict and statistics
   std::vector<FixRecord> fixes;
   ParameterHistory parameters;
   std::vector<Correction> corrections;  ///< at the first used fix, and then every 90 min
@@ -61,7 +69,8 @@ struct CalibrationRun {
 
 /// What `CalibrationOptions::estimator` and `drift_model` may name.
 inline constexpr std::array<const char*, 2> kEstimators = {"invariant", "paper"};
-inline constexpr std::array<const char*, 1> kDriftModels = {"esg7"};
+inline constexpr const char* kAutoDriftModel = "auto";
+inline constexpr std::array<const char*, 3> kDriftModels = {kAutoDriftModel, "esg7", "esg20"};
 
 /// Called now and then with the fraction done, 0 … 1.
 using Progress = std::function<void(double)>;

@@ -1,6 +1,8 @@
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
+#include <vector>
 
 #include "trihedron/core/telemetry.hpp"
 #include "trihedron/records/pass.hpp"
@@ -9,7 +11,7 @@ namespace trihedron::ground {
 
 /// Feeds a pass to the on-board cycle in time order: a fix on the time of a gyro sample comes after it. Calls
 /// on_fix(report) when what was done with a fix is known, and on_sample(report) after each sample and the fixes on its
-/// time. Gyros beyond the cycle's number are not used.
+/// time. Gyros and star trackers beyond those of the cycle are not used.
 template <class Cycle, class OnFix, class OnSample>
 void replay(const Pass& pass, Cycle& cycle, OnFix&& on_fix, OnSample&& on_sample) {
   using Report = typename Cycle::Report;
@@ -18,11 +20,18 @@ void replay(const Pass& pass, Cycle& cycle, OnFix&& on_fix, OnSample&& on_sample
       on_fix(report);
     }
   };
-  const auto& tracker = pass.star_tracker;
-  std::size_t next_fix = 0;
+  std::vector<const StarTrackerTelemetry*> heads{&pass.star_tracker};
+  for (const StarTrackerTelemetry& further : pass.further_star_trackers) {
+    heads.push_back(&further);
+  }
+  heads.resize(std::min<std::size_t>(heads.size(), Cycle::kHeads));
+  std::vector<std::size_t> next_fix(heads.size(), 0);
   const auto feed_fixes = [&](auto due) {
-    for (; next_fix < tracker.size() && due(tracker.t[next_fix]); ++next_fix) {
-      tell(cycle.on_fix(StarFix{tracker.t[next_fix], tracker.q_in_c[next_fix]}));
+    for (std::size_t head = 0; head < heads.size(); ++head) {
+      const StarTrackerTelemetry& tracker = *heads[head];
+      for (std::size_t& i = next_fix[head]; i < tracker.size() && due(tracker.t[i]); ++i) {
+        tell(cycle.on_fix(StarFix{tracker.t[i], tracker.q_in_c[i], static_cast<int>(head)}));
+      }
     }
   };
   for (std::size_t i = 0; i < pass.gyro.size(); ++i) {

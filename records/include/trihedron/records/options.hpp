@@ -16,9 +16,19 @@ struct CorrectionOptions {
   bool take_parameters = true;                   ///< false: the parameters known before the pass are held
 };
 
+/// What estimator invariant estimates beside alignment and eq. (1). kAuto: whatever the pass gives evidence of.
+struct FurtherStateOptions {
+  enum class Choice { kAuto, kOff, kOn };
+  Choice clock_offset = Choice::kAuto;     ///< of the star trackers
+  Choice orbital_error = Choice::kAuto;    ///< of the first star tracker, at orbital period
+  Choice wandering_drift = Choice::kAuto;  ///< first-order Gauss–Markov, about the case axes of each gyro
+  double wandering_drift_rad_s = 1e-8;     ///< its 1-sigma, where on
+  Duration wandering_time = std::chrono::hours(1);
+};
+
 struct CalibrationOptions {
-  std::string estimator = "paper";
-  std::string drift_model = "esg7";
+  std::string estimator = "invariant";
+  std::string drift_model = "auto";  ///< "esg7", "esg20", or the one that the pass gives evidence of
   /// Process noise of each momentum across itself. The default is small against the readout, and lets go of 0.1″ in 9
   /// h.
   double direction_random_walk_rad_sqrt_s = 3e-9;
@@ -26,10 +36,7 @@ struct CalibrationOptions {
   double gate_nis = 30;
   /// After so many rejections in a row the directions are set free and the fix is used.
   int reopen_after_rejections = 20;
-  /// Estimator invariant: clock offset and error at orbital period of the star tracker, and a drift that wanders.
-  bool further_states = false;
-  double wandering_drift_rad_s = 1e-8;  ///< 1-sigma about each case axis, first-order Gauss–Markov
-  Duration wandering_time = std::chrono::hours(1);
+  FurtherStateOptions further_states;
   CorrectionOptions corrections;
 };
 

@@ -1,0 +1,21 @@
+#pragma once
+/// What a pass gives evidence of beside alignment and eq. (1).
+
+#include <vector>
+
+#include "trihedron/ground/calibrate.hpp"
+
+namespace trihedron::ground {
+
+/// The options with nothing left to decide, and on what evidence.
+struct Decision {
+  CalibrationOptions options;
+  std::vector<Evidence> evidence;  ///< empty where nothing was to be decided
+};
+
+/// Settles each choice that is left to the program. Estimator paper, and passes of more than two gyros, have no further
+/// states; a prior calibration tells them where the pass has one; else they are those with more evidence for than
+/// against.
+[[nodiscard]] Decision decide(const Pass& pass, const CalibrationOptions& options);
+
+}  // namespace trihedron::ground
