@@ -118,8 +118,8 @@ std::string calibration_text(const ground::CalibrationRun& run, const std::optio
     for (std::size_t i = 0; i < gyro.drift_rad_s.size(); ++i, ++state) {
       const auto& [name, value] = gyro.drift_rad_s[i];
       fmt::format_to(out, "  {:<8} {:>+13.4e} rad/s {:>12.1e}", name, value, sigma());
-      if (truth) {
-        fmt::format_to(out, " {:>+13.1e}", truth->gyros[k].drift_rad_s[i].second - value);
+      if (const auto true_value = truth ? truth->gyros[k].drift(name) : std::nullopt) {
+        fmt::format_to(out, " {:>+13.1e}", *true_value - value);
       }
       text += '\n';
     }

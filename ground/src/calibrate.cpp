@@ -359,10 +359,7 @@ auto with_estimator(const Pass& pass, const CalibrationOptions& options, Body&& 
   if (esg20) {
     return body.template operator()<InvariantEstimator<Esg20, 2, kAllFurtherStates>>();
   }
-  constexpr auto kOn = FurtherStateOptions::Choice::kOn;
-  const FurtherStateOptions& states = options.further_states;
-  const bool further = states.clock_offset == kOn || states.orbital_error == kOn || states.wandering_drift == kOn ||
-                       !pass.further_star_trackers.empty();
+  const bool further = has_further_states(options) || !pass.further_star_trackers.empty();
   return further ? body.template operator()<InvariantEstimator<Esg7, 2, kAllFurtherStates>>()
                  : body.template operator()<InvariantEstimator<Esg7, 2>>();
 }

@@ -14,8 +14,7 @@ std::optional<double> true_value(const Truth& truth, const StateName& state) {
   if (state.is_alignment) {
     return gyro.alignment_rotation_vector_rad(state.alignment_axis);
   }
-  const auto found = std::ranges::find(gyro.drift_rad_s, state.parameter, [](const auto& c) { return c.first; });
-  return found == gyro.drift_rad_s.end() ? std::nullopt : std::optional(found->second);
+  return gyro.drift(state.parameter);
 }
 
 double final_sigma(const CalibrationRun& run, std::size_t row) {

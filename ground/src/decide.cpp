@@ -2,7 +2,13 @@
 
 #include <Eigen/Cholesky>
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <future>
+#include <memory>
+#include <numbers>
+#include <optional>
+#include <vector>
 
 #include "setup.hpp"
 #include "trihedron/core/invariant_estimator.hpp"
@@ -16,6 +22,10 @@ using Full = InvariantEstimator<Esg20, 2, kAllFurtherStates>;
 
 /// Odds of 20 to 1.
 constexpr double kStrong = 3;
+/// Pairs of fixes that give the noise of the star tracker within some percent.
+constexpr std::size_t kEnough = 1000;
+/// A difference of the noise that is more than chance.
+constexpr double kNotable = 0.1;
 
 /// ln of the Bayes factor for states being free instead of zero (Savage and Dickey): the density of zero before over
 /// that after. `root`: a square root of their covariance now.
@@ -26,17 +36,82 @@ double log_evidence(const Eigen::VectorXd& estimate, const Eigen::MatrixXd& root
   return white.squaredNorm() / 2 + covariance.matrixLLT().diagonal().array().log().sum();
 }
 
-/// States of the estimator, and how they stand after the pass.
-class Outcome {
+/// One run over the pass.
+template <class Estimator>
+class Trial {
  public:
-  explicit Outcome(const Full& estimator) : estimator_(estimator), root_(estimator.information().inverse_root()) {}
-
-  [[nodiscard]] double of_shared(int state, int size, double prior_sigma) const {
-    return log_evidence(estimator_.shared().segment(state - Full::Layout::kShared, size), root_.middleRows(state, size),
-                        Eigen::VectorXd::Constant(size, prior_sigma));
+  Trial(const Pass& pass, const CalibrationOptions& options) : cycle_(make_cycle<Estimator>(pass, options)) {
+    const auto ignore = [](const auto&) {};
+    const double gate_nis = options.gate_nis;
+    std::optional<Eigen::Quaterniond> last;
+    Time last_t{};
+    auto fix = pass.star_tracker.t.begin();
+    const auto on_fix = [&](const typename Cycle<Estimator>::Report& report) {
+      if (report.fix.status != FixStatus::kUsed && report.fix.status != FixStatus::kRejectedByGate) {
+        return;
+      }
+      // An outlier counts as one, however far out it is.
+      log_likelihood_ -= std::min(report.fix.nis, gate_nis) / 2 +
+                         report.fix.innovation_covariance.llt().matrixLLT().diagonal().array().log().sum();
+      fix = std::lower_bound(fix, pass.star_tracker.t.end(), report.fix.t);
+      if (!report.calibrated || fix == pass.star_tracker.t.end() || *fix != report.fix.t) {
+        return;
+      }
+      const auto i = static_cast<std::size_t>(fix - pass.star_tracker.t.begin());
+      const Eigen::Quaterniond apart =
+          report.calibrated->C_in_c.quaternion().conjugate() * pass.star_tracker.q_in_c[i].normalized();
+      if (last && report.fix.t - last_t < kClose) {
+        const Eigen::Vector3d change = Rot<C, C>::assume(last->conjugate() * apart).log().raw();
+        for (int axis = 0; axis < 3; ++axis) {
+          changes_rad_[static_cast<std::size_t>(axis)].push_back(std::abs(change(axis)));
+        }
+      }
+      last = apart;
+      last_t = report.fix.t;
+    };
+    replay(pass, *cycle_, on_fix, ignore);
   }
-  /// Of all gyros' coefficients that Esg20 has and eq. (1) does not.
-  [[nodiscard]] double of_drift_outside() const {
+
+  [[nodiscard]] const Estimator& estimator() const { return cycle_->estimator(); }
+  [[nodiscard]] double log_likelihood() const { return log_likelihood_; }
+
+  /// 1-sigma of the first star tracker about c x, y, z, by how its difference from the gyros changes from fix to fix:
+  /// all that is slow cancels, and of outliers only the median feels. Needs changes().
+  [[nodiscard]] Eigen::Vector3d star_tracker_noise_rad() const {
+    constexpr double kMedianOfNormal = 0.6744897501960817;
+    Eigen::Vector3d noise_rad;
+    for (int axis = 0; axis < 3; ++axis) {
+      std::vector<double> changes = changes_rad_[static_cast<std::size_t>(axis)];
+      const auto middle = changes.begin() + static_cast<std::ptrdiff_t>(changes.size() / 2);
+      std::nth_element(changes.begin(), middle, changes.end());
+      noise_rad(axis) = *middle / kMedianOfNormal / std::numbers::sqrt2;
+    }
+    return noise_rad;
+  }
+  [[nodiscard]] std::size_t changes() const { return changes_rad_[0].size(); }
+
+ private:
+  static constexpr Duration kClose = std::chrono::seconds(10);  ///< fixes between which nothing slow changes
+
+  std::unique_ptr<Cycle<Estimator>> cycle_;
+  double log_likelihood_ = 0;
+  std::array<std::vector<double>, 3> changes_rad_;
+};
+
+/// What a run with all further states shows of each.
+class States {
+ public:
+  /// Needs estimator.started().
+  explicit States(const Full& estimator) : estimator_(estimator), root_(estimator.information().inverse_root()) {}
+
+  [[nodiscard]] double clock_offset() const {
+    return of_shared(Full::Layout::clock_offset(), 1, setup().clock_offset_sigma_s);
+  }
+  [[nodiscard]] double orbital_error() const {
+    return of_shared(Full::Layout::orbital_error(), 6, setup().orbital_error_sigma_rad);
+  }
+  /// Of all gyros' coefficients that eq. (1) does not have.
+  [[nodiscard]] double drift_outside() const {
     constexpr int kMembers = Esg20::kMembers;
     Eigen::VectorXd estimate(2 * kMembers);
     Eigen::VectorXd sigma(2 * kMembers);
@@ -45,7 +120,7 @@ class Outcome {
       const int row = k * kMembers;
       estimate.segment<kMembers>(row) = estimator_.gyros()[k].drift_rad_s.segment<kMembers>(Esg7::kSize);
       root.middleRows<kMembers>(row) = root_.middleRows<kMembers>(Full::Layout::drift(k) + Esg7::kSize);
-      sigma.segment<kMembers>(row) = estimator_.setup()
+      sigma.segment<kMembers>(row) = setup()
                                          .prior_covariance.diagonal()
                                          .segment<kMembers>(Full::Setup::Layout::drift(k) + Esg7::kSize)
                                          .cwiseSqrt();
@@ -54,9 +129,47 @@ class Outcome {
   }
 
  private:
+  [[nodiscard]] const Full::Setup& setup() const { return estimator_.setup(); }
+  [[nodiscard]] double of_shared(int state, int size, double prior_sigma) const {
+    return log_evidence(estimator_.shared().segment(state - Full::Layout::kShared, size), root_.middleRows(state, size),
+                        Eigen::VectorXd::Constant(size, prior_sigma));
+  }
+
   const Full& estimator_;
-  Full::Information::Matrix root_;
+  Eigen::MatrixXd root_;
 };
+
+/// The process noise that makes the pass most likely, not below that of the options: by factors of two, then a parabola
+/// over its logarithm. Two runs at a time.
+double most_likely_walk(const Pass& pass, CalibrationOptions options) {
+  const double least = options.direction_random_walk_rad_sqrt_s;
+  const auto likelihood = [&](double walk) {
+    CalibrationOptions trial = options;
+    trial.direction_random_walk_rad_sqrt_s = walk;
+    return has_further_states(trial) ? Trial<Full>(pass, trial).log_likelihood()
+                                     : Trial<InvariantEstimator<Esg7, 2>>(pass, trial).log_likelihood();
+  };
+  constexpr double kFactor = 2;
+  constexpr int kMost = 10;
+  std::vector<double> log_likelihood;
+  for (int i = 0; i < kMost; i += 2) {
+    const double walk = least * std::pow(kFactor, i);
+    auto next = std::async(std::launch::async, likelihood, kFactor * walk);
+    log_likelihood.push_back(likelihood(walk));
+    log_likelihood.push_back(next.get());
+    if (log_likelihood.back() < *(log_likelihood.end() - 2)) {
+      break;
+    }
+  }
+  const auto best = std::max_element(log_likelihood.begin(), log_likelihood.end());
+  const auto i = static_cast<double>(best - log_likelihood.begin());
+  if (best == log_likelihood.begin() || best + 1 == log_likelihood.end()) {
+    return least * std::pow(kFactor, i);
+  }
+  const double below = *(best - 1);
+  const double above = *(best + 1);
+  return least * std::pow(kFactor, i + (above - below) / (4 * *best - 2 * below - 2 * above));
+}
 
 CalibrationOptions without_further_states(CalibrationOptions options) {
   options.drift_model = Esg7::kModelName;
@@ -88,58 +201,79 @@ CalibrationOptions as_before(CalibrationOptions options, const Calibration& prio
   return options;
 }
 
-}  // namespace
-
-Decision decide(const Pass& pass, const CalibrationOptions& options) {
-  FurtherStateOptions states = options.further_states;
-  if (options.estimator != Full::kName || pass.gyro.gyros != Full::kGyros) {
-    CalibrationOptions decided = without_further_states(options);
-    decided.drift_model = options.drift_model == kAutoDriftModel ? Esg7::kModelName : options.drift_model;
-    return {decided, {}};
-  }
-  if (pass.settings.prior) {
-    return {as_before(options, *pass.settings.prior), {}};
-  }
-  Decision decision{options, {}};
-  FurtherStateOptions& decided = decision.options.further_states;
-  if (decided.wandering_drift == Choice::kAuto) {
-    decided.wandering_drift = Choice::kOff;
-  }
-  if (options.drift_model != kAutoDriftModel && states.clock_offset != Choice::kAuto &&
-      states.orbital_error != Choice::kAuto) {
-    return decision;
-  }
-  CalibrationOptions everything = decision.options;
-  everything.drift_model = Esg20::kModelName;
-  for (Choice* choice : {&everything.further_states.clock_offset, &everything.further_states.orbital_error}) {
-    *choice = Choice::kOn;
-  }
-  const auto cycle = make_cycle<Full>(pass, everything);
-  const auto ignore = [](const auto&) {};
-  replay(pass, *cycle, ignore, ignore);
-  if (!cycle->estimator().started()) {
-    return {without_further_states(options), {}};
-  }
-  const Outcome outcome(cycle->estimator());
-  const auto& setup = cycle->estimator().setup();
-  const auto settle = [&](const char* name, double log_evidence) {
-    decision.evidence.push_back({name, log_evidence, log_evidence > kStrong});
+/// Turns the choices that are left open, and the drift model, by what a trial with everything shows.
+void settle_states(const States& everything, const CalibrationOptions& asked, Decision& decision) {
+  decision.evidence.clear();
+  const auto settle = [&](const char* states, double log_bayes_factor) {
+    decision.evidence.push_back({states, log_bayes_factor, log_bayes_factor > kStrong});
     return decision.evidence.back().accepted;
   };
-  if (states.clock_offset == Choice::kAuto) {
-    const bool on =
-        settle("clock_offset", outcome.of_shared(Full::Layout::clock_offset(), 1, setup.clock_offset_sigma_s));
-    decided.clock_offset = on ? Choice::kOn : Choice::kOff;
+  const auto choose = [&](Choice FurtherStateOptions::*choice, const char* states, double log_bayes_factor) {
+    if (asked.further_states.*choice == Choice::kAuto) {
+      decision.options.further_states.*choice = settle(states, log_bayes_factor) ? Choice::kOn : Choice::kOff;
+    }
+  };
+  choose(&FurtherStateOptions::clock_offset, "clock_offset", everything.clock_offset());
+  choose(&FurtherStateOptions::orbital_error, "orbital_error", everything.orbital_error());
+  if (asked.drift_model == kAutoDriftModel) {
+    const bool outside = settle("drift_outside_eq1", everything.drift_outside());
+    decision.options.drift_model = outside ? Esg20::kModelName : Esg7::kModelName;
   }
-  if (states.orbital_error == Choice::kAuto) {
-    const bool on =
-        settle("orbital_error", outcome.of_shared(Full::Layout::orbital_error(), 6, setup.orbital_error_sigma_rad));
-    decided.orbital_error = on ? Choice::kOn : Choice::kOff;
+}
+
+/// Everything on that is on or may be.
+CalibrationOptions with_everything(CalibrationOptions options, const CalibrationOptions& asked) {
+  for (const auto choice : {&FurtherStateOptions::clock_offset, &FurtherStateOptions::orbital_error}) {
+    options.further_states.*choice = asked.further_states.*choice == Choice::kOff ? Choice::kOff : Choice::kOn;
   }
-  if (options.drift_model == kAutoDriftModel) {
-    const bool on = settle("drift_outside_eq1", outcome.of_drift_outside());
-    decision.options.drift_model = on ? Esg20::kModelName : Esg7::kModelName;
+  options.drift_model = asked.drift_model == Esg7::kModelName ? Esg7::kModelName : Esg20::kModelName;
+  return options;
+}
+
+}  // namespace
+
+Decision decide(const Pass& pass, const CalibrationOptions& asked) {
+  Decision decision{asked, {}};
+  if (asked.estimator != Full::kName || pass.gyro.gyros != Full::kGyros) {
+    decision.options = without_further_states(asked);
+    if (asked.drift_model != kAutoDriftModel) {
+      decision.options.drift_model = asked.drift_model;
+    }
+    return decision;
   }
+  if (pass.settings.prior) {
+    decision.options = as_before(asked, *pass.settings.prior);
+    return decision;
+  }
+  CalibrationOptions& options = decision.options;
+  if (options.further_states.wandering_drift == Choice::kAuto) {
+    options.further_states.wandering_drift = Choice::kOff;
+  }
+  const bool states_are_settled = asked.drift_model != kAutoDriftModel &&
+                                  asked.further_states.clock_offset != Choice::kAuto &&
+                                  asked.further_states.orbital_error != Choice::kAuto;
+  if (states_are_settled && !asked.find_noise) {
+    return decision;
+  }
+  Trial<Full> everything(pass, with_everything(options, asked));
+  if (!everything.estimator().started()) {
+    decision.options = without_further_states(asked);
+    return decision;
+  }
+  if (asked.find_noise && everything.changes() >= kEnough) {
+    const Eigen::Vector3d& told = pass.settings.star_tracker_noise_rad;
+    const Eigen::Vector3d found = everything.star_tracker_noise_rad();
+    if (((found - told).array().abs() > kNotable * told.array()).any()) {
+      options.star_tracker_noise_rad = found;
+      everything = Trial<Full>(pass, with_everything(options, asked));
+    }
+    settle_states(States(everything.estimator()), asked, decision);
+    options.direction_random_walk_rad_sqrt_s = most_likely_walk(pass, options);
+    if (options.direction_random_walk_rad_sqrt_s > asked.direction_random_walk_rad_sqrt_s) {
+      everything = Trial<Full>(pass, with_everything(options, asked));
+    }
+  }
+  settle_states(States(everything.estimator()), asked, decision);
   return decision;
 }
 

@@ -96,8 +96,16 @@ void use_calibration(const Calibration& prior, typename Estimator::Setup& setup)
   }
 }
 
-/// The rate of the orbit, as the attitude shows it. An attitude that stands still in space does not show it; then that of
-/// a low orbit.
+/// Whether any state is on that the smallest estimator of a pair does not have.
+[[nodiscard]] inline bool has_further_states(const CalibrationOptions& options) {
+  constexpr auto kOn = FurtherStateOptions::Choice::kOn;
+  const FurtherStateOptions& states = options.further_states;
+  return options.drift_model != Esg7::kModelName || states.clock_offset == kOn || states.orbital_error == kOn ||
+         states.wandering_drift == kOn;
+}
+
+/// The rate of the orbit, as the attitude shows it. An attitude that stands still in space does not show it; then that
+/// of a low orbit.
 [[nodiscard]] double orbital_rate_rad_s(const StarTrackerTelemetry& tracker);
 
 /// Prior sigmas of the further states; near zero for those that are off.
@@ -141,7 +149,7 @@ typename Estimator::Setup make_setup(const Pass& pass, const CalibrationOptions&
   for (int k = 0; k < Estimator::kGyros; ++k) {
     setup.readout_noise_rad[k] = settings.gyros[static_cast<std::size_t>(k)].readout_noise_rad;
   }
-  setup.star_tracker_noise_rad = settings.star_tracker_noise_rad;
+  setup.star_tracker_noise_rad = options.star_tracker_noise_rad.value_or(settings.star_tracker_noise_rad);
   setup.direction_random_walk_rad_sqrt_s = options.direction_random_walk_rad_sqrt_s;
   setup.gate_nis = options.gate_nis;
   setup.reopen_after_rejections = options.reopen_after_rejections;

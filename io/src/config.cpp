@@ -101,7 +101,14 @@ CalibrationOptions read_config(const fs::path& path) {
   }
   if (root.find("filter") != nullptr) {
     const TomlTable filter(root.table_at("filter"), path, "[filter]",
-                           {"direction_random_walk", "gate_nis", "reopen_after_rejections"});
+                           {"noise", "direction_random_walk", "gate_nis", "reopen_after_rejections"});
+    if (const toml::node* node = filter.find("noise")) {
+      const std::string noise = filter.text(*node, "noise");
+      if (noise != "found" && noise != "told") {
+        filter.refuse(*node, "\"noise\" is neither found nor told", "write one of them");
+      }
+      options.find_noise = noise == "found";
+    }
     if (const toml::node* node = filter.find("direction_random_walk")) {
       options.direction_random_walk_rad_sqrt_s =
           quantity(filter, *node, "direction_random_walk", parse_random_walk_rad_sqrt_s);
@@ -161,6 +168,7 @@ std::string format_config(const CalibrationOptions& options) {
       "drift_model = \"{}\"\n"
       "\n"
       "[filter]\n"
+      "noise = \"{}\"  # found: from the pass; told: as set here and in pass.toml\n"
       "direction_random_walk = \"{}\"  # process noise of each momentum, per axis across it\n"
       "gate_nis = {}  # a fix with a larger normalised innovation squared is rejected\n"
       "reopen_after_rejections = {}  # in a row; then the directions are set free and the fix is used\n"
@@ -173,8 +181,9 @@ std::string format_config(const CalibrationOptions& options) {
       "\n"
       "[corrections]\n"
       "interval = \"{}\"  # of the open-loop navigator: a duration, none or continuous\n",
-      options.estimator, options.drift_model, format_random_walk(options.direction_random_walk_rad_sqrt_s),
-      options.gate_nis, options.reopen_after_rejections, name_of(states.clock_offset), name_of(states.orbital_error),
+      options.estimator, options.drift_model, options.find_noise ? "found" : "told",
+      format_random_walk(options.direction_random_walk_rad_sqrt_s), options.gate_nis, options.reopen_after_rejections,
+      name_of(states.clock_offset), name_of(states.orbital_error),
       states.wandering_drift == Choice::kOn ? fmt::format("{}rad/s", states.wandering_drift_rad_s)
                                             : name_of(states.wandering_drift),
       format_duration(states.wandering_time), format_correction_interval(options.corrections));

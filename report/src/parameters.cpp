@@ -35,8 +35,7 @@ void set_value_and_truth(const ReportInput& input, Parameter& parameter) {
   }
   const double* value = find(gyro.drift_rad_s, parameter.name);
   parameter.value = value == nullptr ? std::nan("") : *value;
-  const double* truth = has_truth ? find(input.truth->gyros[parameter.gyro].drift_rad_s, parameter.name) : nullptr;
-  if (truth != nullptr) {
+  if (const auto truth = has_truth ? input.truth->gyros[parameter.gyro].drift(parameter.name) : std::nullopt) {
     parameter.truth = *truth;
     parameter.error = parameter.value - *truth;
   }

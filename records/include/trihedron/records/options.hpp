@@ -1,7 +1,9 @@
 #pragma once
 /// What a user may set for a calibration; the effective values are written beside each result.
 
+#include <Eigen/Core>
 #include <chrono>
+#include <optional>
 #include <string>
 
 #include "trihedron/core/time.hpp"
@@ -29,9 +31,13 @@ struct FurtherStateOptions {
 struct CalibrationOptions {
   std::string estimator = "invariant";
   std::string drift_model = "auto";  ///< "esg7", "esg20", or the one that the pass gives evidence of
-  /// Process noise of each momentum across itself. The default is small against the readout, and lets go of 0.1″ in 9
-  /// h.
+  /// Whether estimator invariant finds the noise from a pass that is long enough, instead of believing what it is told.
+  bool find_noise = true;
+  /// Process noise of each momentum across itself; where it is found, the least that is taken. The default is small
+  /// against the readout, and lets go of 0.1″ in 9 h.
   double direction_random_walk_rad_sqrt_s = 3e-9;
+  /// In place of the figure of the pass, where one was found.
+  std::optional<Eigen::Vector3d> star_tracker_noise_rad;
   /// A fix with a NIS above this is rejected. χ² of 4 degrees of freedom passes 30 once in 2e5 good fixes.
   double gate_nis = 30;
   /// After so many rejections in a row the directions are set free and the fix is used.

@@ -3,6 +3,7 @@
 
 #include <Eigen/Core>
 #include <Eigen/Geometry>
+#include <algorithm>
 #include <map>
 #include <optional>
 #include <string>
@@ -78,6 +79,17 @@ struct Truth {
     std::vector<std::pair<std::string, double>> drift_rad_s;       ///< coefficients of eq. (1)
     std::vector<std::pair<std::string, double>> unmodelled_rad_s;  ///< drift outside eq. (1), by name
     Eigen::Vector3d alignment_rotation_vector_rad{0, 0, 0};
+
+    /// Of eq. (1) or outside it, by name; nothing where the simulator did not tell.
+    [[nodiscard]] std::optional<double> drift(const std::string& name) const {
+      for (const auto* list : {&drift_rad_s, &unmodelled_rad_s}) {
+        const auto found = std::ranges::find(*list, name, [](const auto& c) { return c.first; });
+        if (found != list->end()) {
+          return found->second;
+        }
+      }
+      return std::nullopt;
+    }
   };
   /// Errors of a head that do not change at random; C_c_s as in FurtherStarTracker.
   struct StarTracker {
