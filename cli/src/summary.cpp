@@ -150,6 +150,11 @@ std::string calibration_text(const ground::CalibrationRun& run, const std::optio
                    &estimate == calibration.further.data() ? "\nStar tracker\n" : "", estimate.name, estimate.value,
                    estimate.sigma);
   }
+  for (const ground::Evidence& evidence : run.evidence) {
+    fmt::format_to(out, "{}  {:<24} ln Bayes factor {:>+9.1f}: {}\n",
+                   &evidence == run.evidence.data() ? "\nEvidence\n" : "", evidence.states, evidence.log_bayes_factor,
+                   evidence.accepted ? "estimated" : "taken as zero");
+  }
   text += "\nFixes      ";
   for (const auto& [name, count] : run.fix_counts) {
     fmt::format_to(out, " {} {};", count, name);
@@ -166,6 +171,13 @@ std::string calibration_text(const ground::CalibrationRun& run, const std::optio
   }
   fmt::format_to(out, "; mean NIS {:.3f} ({:.0f} expected)\n", statistic("nis_mean"),
                  statistic("nis_degrees_of_freedom"));
+  fmt::format_to(out, "Noise       random walk of each momentum {:.1e} rad/√s, {}",
+                 run.options.direction_random_walk_rad_sqrt_s, run.options.find_noise ? "the most likely" : "as told");
+  if (const auto& noise = run.options.star_tracker_noise_rad) {
+    fmt::format_to(out, "; star tracker {:.1f}″ {:.1f}″ {:.1f}″, which is not what was told", noise->x() / kArcsecond,
+                   noise->y() / kArcsecond, noise->z() / kArcsecond);
+  }
+  text += '\n';
   return text;
 }
 

@@ -124,10 +124,24 @@ void judge_nis(const Statistics& statistics, const std::string& what_is_wrong, s
             : "Correct the noise figures in pass.toml.");
 }
 
+void judge_noise(const Pass& pass, const CalibrationRun& run, std::vector<Finding>& findings) {
+  if (const auto& found = run.options.star_tracker_noise_rad) {
+    const Eigen::Vector3d told = pass.settings.star_tracker_noise_rad / kArcsecond;
+    const Eigen::Vector3d now = *found / kArcsecond;
+    add(findings, Severity::kWarning, "star-tracker-noise",
+        "The fixes scatter otherwise than pass.toml says; the noise found was used.",
+        fmt::format("{:.1f}″ {:.1f}″ {:.1f}″ found, {:.1f}″ {:.1f}″ {:.1f}″ told", now.x(), now.y(), now.z(), told.x(),
+                    told.y(), told.z()),
+        "Correct the noise figures of the star tracker in pass.toml.");
+  }
+}
+
 void judge_determination(const CalibrationRun& run, std::vector<Finding>& findings) {
   std::string names;
   for (std::size_t i = 0; i < run.calibration.states.size(); ++i) {
-    if (!is_determined(run, i)) {
+    // A member outside eq. (1) is taken on so that the others do not suffer; alone it need not be known.
+    const bool outside = StateName(run.calibration.states[i]).parameter.find('(') != std::string::npos;
+    if (!outside && !is_determined(run, i)) {
       names += (names.empty() ? "" : ", ") + run.calibration.states[i];
     }
   }
@@ -228,6 +242,7 @@ Verdict judge(const Pass& pass, const CalibrationRun& run) {
   judge_length(pass, findings);
   judge_rejections(statistics, findings);
   judge_nis(statistics, "its model is incomplete or the noise is understated", findings);
+  judge_noise(pass, run, findings);
   judge_determination(run, findings);
   judge_steadiness(pass, run, findings);
   judge_pair(run, findings);

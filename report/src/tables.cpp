@@ -266,6 +266,7 @@ json settings_of(const ReportInput& input) {
   };
   put("Estimator", input.run.calibration.estimator);
   put("Drift model", options.drift_model);
+  put("Noise", options.find_noise ? "found from the pass where it is long enough" : "as told");
   put("Process noise of each momentum",
       fmt::format("{}″ per √h", significant(options.direction_random_walk_rad_sqrt_s * 60 / kArcsecond_rad, 2)));
   put("Gate", fmt::format("fixes with a NIS above {:.4g} are rejected", options.gate_nis));
@@ -280,9 +281,40 @@ json settings_of(const ReportInput& input) {
     put(fmt::format("Readout noise of gyro {}", k + 1),
         significant(input.pass.settings.gyros[k].readout_noise_rad / kArcsecond_rad, 3) + "″ per direction cosine, 1σ");
   }
-  put("Star-tracker noise",
+  if (options.star_tracker_noise_rad) {
+    put("Star-tracker noise found",
+        of_axes(*options.star_tracker_noise_rad, kArcsecond_rad) + " ″ about roll / pitch / heading, 1σ");
+  }
+  put(options.star_tracker_noise_rad ? "Star-tracker noise told" : "Star-tracker noise",
       of_axes(input.pass.settings.star_tracker_noise_rad, kArcsecond_rad) + " ″ about roll / pitch / heading, 1σ");
   return rows;
+}
+
+/// The states beside alignment and drift.
+json further_of(const ReportInput& input) {
+  json rows = json::array();
+  for (const FurtherEstimate& estimate : input.run.calibration.further) {
+    const bool is_time = estimate.name.ends_with("_s");
+    const double unit = is_time ? 1e-3 : kArcsecond_rad;
+    std::string name = estimate.name.substr(0, estimate.name.rfind('_'));
+    std::replace(name.begin(), name.end(), '_', ' ');
+    rows.push_back({{"name", name},
+                    {"value", number(estimate.value / unit, 2)},
+                    {"sigma", significant(estimate.sigma / unit, 2)},
+                    {"unit", is_time ? "ms" : "″"}});
+  }
+  return rows;
+}
+
+json states_decided(const ReportInput& input) {
+  json sentences = json::array();
+  for (const ground::Evidence& evidence : input.run.evidence) {
+    std::string states = evidence.states;
+    std::replace(states.begin(), states.end(), '_', ' ');
+    sentences.push_back(fmt::format("{}: ln {}, {}.", states, number(evidence.log_bayes_factor, 1),
+                                    evidence.accepted ? "estimated" : "taken as zero"));
+  }
+  return sentences;
 }
 
 json statistics_rows(const std::map<std::string, double>& statistics) {
@@ -321,10 +353,12 @@ json table_values(const ReportInput& input, const std::vector<Parameter>& parame
                  {"fix_counts", counts_of(input.run.fix_counts)},
                  {"sample_counts", counts_of(input.run.samples)},
                  {"telemetry_notes", input.telemetry_notes},
+                 {"further", further_of(input)},
+                 {"states_decided", states_decided(input)},
                  {"settings", settings_of(input)},
                  {"statistics", statistics_rows(input.run.calibration.statistics)}};
   put_gaps(input, values);
-  for (const char* list : {"correlations", "gaps", "telemetry_notes"}) {
+  for (const char* list : {"correlations", "gaps", "telemetry_notes", "further", "states_decided"}) {
     values[std::string("has_") + list] = !values[list].empty();
   }
   return values;
