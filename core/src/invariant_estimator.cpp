@@ -51,7 +51,7 @@ Result<InvariantEstimator<Base, N, F>, SetupFault> InvariantEstimator<Base, N, F
     rows.template middleCols<3 * N>(Layout::kDirections).setIdentity();
     e.prior_.add_information(Eigen::Matrix<double, 3 * N, Layout::kStates>(rows / setup.wandering_sigma_rad_s));
   }
-  e.gate_ = OutlierGate(setup.gate_nis, setup.reopen_after_rejections, setup.restart_within_fixes);
+  e.gate_ = OutlierGate(setup);
   return e;
 }
 
@@ -157,6 +157,7 @@ void InvariantEstimator<Base, N, F>::predict(const Eigen::Matrix3d& C_in_c, cons
     precess(gyros_[k], since_fix_[k], C_in_c, h_b[k], dt_s);
   }
   time_since_fix_s_ += dt_s;
+  gate_.elapse(dt_s);
 }
 
 template <class Base, int N, FurtherStates F>
@@ -274,8 +275,9 @@ auto InvariantEstimator<Base, N, F>::correct(const StarFix& fix, const FixReadin
 
   const WhiteMeasurement<Information, kMeasurements> white(m.H, m.y, m.R);
   report_innovation(information_, white, report);
-  report.status = gate_.judge(report.nis);
+  report.status = gate_.judge(report.nis, m.y.norm());
   report.rejections_in_a_row = gate_.rejections_in_a_row();
+  report.jumped = gate_.jumped();
   switch (report.status) {
     case FixStatus::kRejectedByGate:
       return report;

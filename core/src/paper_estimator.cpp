@@ -16,7 +16,7 @@ Result<PaperEstimator<Model>, SetupFault> PaperEstimator<Model>::create(const Se
   PaperEstimator estimator;
   estimator.setup_ = setup;
   estimator.gyros_ = setup.prior;
-  estimator.gate_ = OutlierGate(setup.gate_nis, setup.reopen_after_rejections, setup.restart_within_fixes);
+  estimator.gate_ = OutlierGate(setup);
   estimator.prior_.add_prior_of_constants(root.value());
   estimator.information_ = estimator.prior_;
   return estimator;
@@ -40,6 +40,7 @@ void PaperEstimator<Model>::predict(const Eigen::Matrix3d& C_in_c, const Directi
     precess(gyros_[k], since_fix_[k], C_in_c, h_b[k], dt_s);
   }
   time_since_fix_s_ += dt_s;
+  gate_.elapse(dt_s);
 }
 
 template <class Model>
@@ -121,8 +122,9 @@ auto PaperEstimator<Model>::correct(const Eigen::Matrix3d& C_in_c, const Directi
   }
 
   report_innovation(information_, white, report);
-  report.status = gate_.judge(report.nis);
+  report.status = gate_.judge(report.nis, measurement.innovation.norm());
   report.rejections_in_a_row = gate_.rejections_in_a_row();
+  report.jumped = gate_.jumped();
   switch (report.status) {
     case FixStatus::kRejectedByGate:
       return report;

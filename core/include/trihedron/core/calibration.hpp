@@ -54,6 +54,8 @@ struct CalibrationSetup {
   /// After so many rejections in a row the directions are set free by the size of the misfit and the fix is used: the
   /// model was wrong, not the tracker.
   int reopen_after_rejections = 20;
+  /// The same where the run began with a misfit that no drift can make: the tracker was wrong, or has been turned.
+  int reopen_after_jump_rejections = 400;
   /// When that happens again within so many fixes, the parameters are what is wrong: the estimates stay, their
   /// information goes.
   int restart_within_fixes = 200;
@@ -71,7 +73,7 @@ struct CalibrationSetup {
     if (!noise_is_positive()) {
       return SetupFault::kNoiseNotPositive;
     }
-    if (!(gate_nis > 0) || !(reopen_after_rejections > 0)) {
+    if (!(gate_nis > 0) || !(reopen_after_rejections > 0) || !(reopen_after_jump_rejections > 0)) {
       return SetupFault::kGateNotPositive;
     }
     if (!means_are_usable()) {
@@ -118,6 +120,7 @@ struct FixReport {
   Eigen::Matrix<double, M, M> innovation_covariance = Eigen::Matrix<double, M, M>::Zero();
   double nis = 0;  ///< innovation² over its covariance; M degrees of freedom
   int rejections_in_a_row = 0;
+  bool jumped = false;  ///< the misfit came at once and is more than drift can make: put down to the star tracker
 
   [[nodiscard]] bool used() const { return is_used(status); }
 };
