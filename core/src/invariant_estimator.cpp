@@ -1,10 +1,9 @@
 #include "trihedron/core/invariant_estimator.hpp"
 
 #include <Eigen/Cholesky>
+#include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
-
-#include "trihedron/core/innovation.hpp"
 
 namespace trihedron {
 
@@ -241,6 +240,23 @@ auto InvariantEstimator<Base, N, F>::measure(const Gyros& gyros, const Eigen::Ma
 }
 
 template <class Base, int N, FurtherStates F>
+auto InvariantEstimator<Base, N, F>::reading_noise(const Eigen::Matrix3d& C_linear, double noise_factor, int n) const
+    -> PerGyro<double, N> {
+  PerGyro<double, N> noise_rad;
+  // Without a fix between them they keep their sign: n readings must not average them away.
+  const double in_a_row = std::sqrt(static_cast<double>(n));
+  for (int k = 0; k < N; ++k) {
+    Rows3 alignment = Rows3::Zero();
+    alignment.template middleCols<3>(Layout::alignment(k)) = C_linear;
+    Rows3 apart = -alignment;
+    apart.template middleCols<3>(Layout::direction(k)).setIdentity();
+    noise_rad[k] =
+        std::hypot(setup_.readout_noise_rad[k] * noise_factor, in_a_row * second_order_rad(alignment, apart));
+  }
+  return noise_rad;
+}
+
+template <class Base, int N, FurtherStates F>
 auto InvariantEstimator<Base, N, F>::correct(const StarFix& fix, const FixReadings<N>& readings) -> Report {
   Report report;
   report.t = fix.t;
@@ -262,16 +278,8 @@ auto InvariantEstimator<Base, N, F>::correct(const StarFix& fix, const FixReadin
   }
   update_to_now(by_gyros.value().C_in_c.raw());
   const Eigen::Matrix3d C_linear = fused_attitude(by_gyros.value(), C_in_c, R_c, readings.noise_factor);
-  PerGyro<double, N> readout_noise_rad;
-  for (int k = 0; k < N; ++k) {
-    Rows3 alignment = Rows3::Zero();
-    alignment.template middleCols<3>(Layout::alignment(k)) = C_linear;
-    Rows3 apart = -alignment;
-    apart.template middleCols<3>(Layout::direction(k)).setIdentity();
-    readout_noise_rad[k] =
-        std::hypot(setup_.readout_noise_rad[k] * readings.noise_factor, second_order_rad(alignment, apart));
-  }
-  const Measurement m = measure(gyros_, C_in_c.raw(), C_linear, readings.h_b, R_c, by_shared, readout_noise_rad);
+  const PerGyro<double, N> noise_rad = reading_noise(C_linear, readings.noise_factor, 1);
+  const Measurement m = measure(gyros_, C_in_c.raw(), C_linear, readings.h_b, R_c, by_shared, noise_rad);
 
   const WhiteMeasurement<Information, kMeasurements> white(m.H, m.y, m.R);
   report_innovation(information_, white, report);
@@ -292,7 +300,49 @@ auto InvariantEstimator<Base, N, F>::correct(const StarFix& fix, const FixReadin
     default:
       break;
   }
+  angles_since_fix_ = 0;
   feed_back(information_.template update<kMeasurements>(white.H, white.y));
+  return report;
+}
+
+template <class Base, int N, FurtherStates F>
+auto InvariantEstimator<Base, N, F>::angles_of(const Measurement& m) -> WhiteAngles {
+  // The rows of H by the alignments are, but for the sign, those by an error of the attitude, common to all. A large
+  // R_c in its place would still be a claim, and 10 000 of them no small one.
+  Eigen::Matrix<double, kMeasurements, 3> by_attitude;
+  for (int k = 0; k < N; ++k) {
+    by_attitude.template middleRows<2>(2 * k) = m.H.template block<2, 3>(2 * k, Layout::alignment(k));
+  }
+  const InnovationCovariance whiten = m.R.diagonal().cwiseSqrt().cwiseInverse().asDiagonal();
+  const Eigen::HouseholderQR<Eigen::Matrix<double, kMeasurements, 3>> qr(whiten * by_attitude);
+  const InnovationCovariance Q = qr.householderQ();
+  const Eigen::Matrix<double, kAngles, kMeasurements> across = Q.template rightCols<kAngles>().transpose() * whiten;
+  return WhiteAngles(across * m.H, across * m.y, Eigen::Matrix<double, kAngles, kAngles>::Identity());
+}
+
+template <class Base, int N, FurtherStates F>
+auto InvariantEstimator<Base, N, F>::check_angles(Time t, const FixReadings<N>& readings) -> AngleReport {
+  AngleReport report;
+  report.t = t;
+  const auto by_gyros = attitude(gyros_, readings.h_b);
+  if (!by_gyros) {
+    report.status = FixStatus::kRejectedGeometry;
+    return report;
+  }
+  const Eigen::Matrix3d& C_in_c = by_gyros.value().C_in_c.raw();
+  update_to_now(C_in_c);
+  const WhiteAngles white =
+      angles_of(measure(gyros_, C_in_c, C_in_c, readings.h_b, Eigen::Matrix3d::Zero(), FixBySharedStates::Zero(),
+                        reading_noise(C_in_c, readings.noise_factor, ++angles_since_fix_)));
+  report_innovation(information_, white, report);
+  if (!(report.nis <= gate_of_freedom(kAngles, setup_.gate_nis, kMeasurements))) {
+    report.status = FixStatus::kRejectedByGate;
+    report.rejections_in_a_row = ++angle_rejections_in_a_row_;
+    return report;
+  }
+  report.status = FixStatus::kUsed;
+  angle_rejections_in_a_row_ = 0;
+  feed_back(information_.template update<kAngles>(white.H, white.y));
   return report;
 }
 

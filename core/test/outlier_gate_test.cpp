@@ -31,6 +31,15 @@ int rejections(OutlierGate& gate, double misfit_rad) {
   return count;
 }
 
+TEST(GateOfFreedom, IsPassedAsOftenByGoodMeasurements) {
+  // χ² quantiles of the probability that 4 degrees of freedom leave above 30: 4.9e-6.
+  EXPECT_DOUBLE_EQ(gate_of_freedom(4, 30, 4), 30);
+  EXPECT_NEAR(gate_of_freedom(1, 30, 4), 20.9, 1.2);
+  EXPECT_NEAR(gate_of_freedom(2, 30, 4), 24.5, 0.6);
+  EXPECT_NEAR(gate_of_freedom(3, 30, 4), 27.4, 0.3);
+  EXPECT_NEAR(gate_of_freedom(6, 30, 4), 34.6, 0.5);
+}
+
 TEST(OutlierGate, RejectsAboveTheGateAndWhatIsNoNumber) {
   OutlierGate gate = make_gate(5, 50);
   EXPECT_EQ(gate.judge(30, kSmall_rad), FixStatus::kUsed);

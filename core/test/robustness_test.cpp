@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <memory>
 #include <numbers>
+#include <random>
 #include <vector>
 
 #include "flight.hpp"
@@ -133,6 +134,235 @@ TYPED_TEST(LyingTracker, OfTheFirstFixOnlyIsOutvotedByThoseAfterIt) {
   EXPECT_EQ(count(fixes, FixStatus::kRejectedByGate), 19);
   EXPECT_EQ(count(fixes, FixStatus::kUsedAfterReopening), 1);
   EXPECT_LT(momentum_error(*cycle, flight), 60 * kArcsecond);
+}
+
+// ---- Without a star tracker: the angles between the momenta
+
+using Pair = InvariantEstimator<Esg7, 2>;
+
+/// Priors drawn about the truth.
+Pair::Setup drawn_setup(const test::Flight& flight, unsigned seed, double alignment_sigma_rad) {
+  auto setup = nominal<Pair>();
+  std::mt19937 random(seed + 1000);
+  std::normal_distribution<double> normal;
+  for (int k = 0; k < 2; ++k) {
+    setup.prior[k].drift_rad_s =
+        flight.truth[k].drift_rad_s + 2e-6 * Esg7::Coefficients<double>::NullaryExpr([&] { return normal(random); });
+    const Eigen::Vector3d delta = alignment_sigma_rad * Eigen::Vector3d::NullaryExpr([&] { return normal(random); });
+    setup.prior[k].C_c_b = Rot<C, C>::exp(Vec<C>::assume(delta)).raw() * flight.truth[k].C_c_b;
+    setup.prior_covariance.diagonal().segment<3>(10 * k + 7).setConstant(alignment_sigma_rad * alignment_sigma_rad);
+  }
+  return setup;
+}
+
+/// After the last sample: errors of momenta and parameters over flights, with and without the angles.
+struct Bridged {
+  double angle_square = 0;    ///< of the error of the angle between the momenta, rad²
+  double angle_variance = 0;  ///< as the estimator gives it
+  double angle_nees = 0;      ///< of the two, mean
+  double nees = 0;            ///< of the 20 parameters, mean
+  long looked = 0;
+  long rejected = 0;
+};
+
+Bridged bridge(int runs, const test::FlightPlan& plan, double last_fix_s, double alignment_sigma_rad, bool use_angles) {
+  Bridged mean;
+  for (int run = 1; run <= runs; ++run) {
+    test::FlightPlan own = plan;
+    own.seed = static_cast<unsigned>(run);
+    test::Flight flight(own);
+    flight.fixes.resize(static_cast<std::size_t>(last_fix_s / 3) + 1);
+    auto setup = drawn_setup(flight, own.seed, alignment_sigma_rad);
+    setup.angles_after = use_angles ? std::chrono::minutes(1) : Pair::Setup::kNever;
+    const auto cycle = make_cycle<Pair>(setup);
+    test::fly(flight, *cycle, [&](const auto& report) {
+      mean.looked += report.angles.status == FixStatus::kUsed;
+      mean.rejected += report.angles.status == FixStatus::kRejectedByGate;
+    });
+    // The estimator stands some seconds before the end; the momenta turn by thousandths of an arcsecond in them.
+    const auto& gyros = cycle->estimator().gyros();
+    const auto& since = cycle->estimator().since_fix();
+    const Pair::ErrorRoot root = cycle->estimator().error_root();
+    const Eigen::Vector3d n = gyros[0].h_in.cross(gyros[1].h_in).normalized();
+    Eigen::Matrix<double, 1, Pair::ErrorRoot::ColsAtCompileTime> spread;
+    spread.setZero();
+    Eigen::Matrix<double, 20, 1> error;
+    Eigen::Matrix<double, 20, Pair::ErrorRoot::ColsAtCompileTime> parameters;
+    for (int k = 0; k < 2; ++k) {
+      const double sign = k == 0 ? 1 : -1;
+      const auto drift = root.middleRows<7>(Pair::Errors::drift(k));
+      const auto alignment = root.middleRows<3>(Pair::Errors::alignment(k));
+      spread += sign * n.transpose() *
+                (since[k].by_start * root.middleRows<3>(Pair::Errors::direction(k)) + since[k].by_drift * drift +
+                 since[k].by_alignment * alignment);
+      error.segment<7>(10 * k) = flight.truth[k].drift_rad_s - gyros[k].drift_rad_s;
+      error.segment<3>(10 * k + 7) =
+          Rot<C, C>::assume(Eigen::Matrix3d(flight.truth[k].C_c_b * gyros[k].C_c_b.transpose())).log().raw();
+      parameters.middleRows<7>(10 * k) = drift;
+      parameters.middleRows<3>(10 * k + 7) = alignment;
+    }
+    const double off = angle_between<double>(gyros[0].h_in, gyros[1].h_in) -
+                       angle_between<double>(flight.truth[0].h_in, flight.truth[1].h_in);
+    mean.angle_square += off * off / runs;
+    mean.angle_variance += spread.squaredNorm() / runs;
+    mean.angle_nees += off * off / spread.squaredNorm() / runs;
+    mean.nees += error.dot((parameters * parameters.transpose()).llt().solve(error)) / runs;
+  }
+  return mean;
+}
+
+TEST(AnglesWithoutFixes, KeepTheAngleOverAnHourAndAreHonest) {
+  constexpr int kRuns = 20;
+  const test::FlightPlan plan{.duration_s = 600 + 3600};
+  const Bridged without = bridge(kRuns, plan, 600, 8e-3, false);
+  const Bridged with = bridge(kRuns, plan, 600, 8e-3, true);
+  EXPECT_EQ(without.looked + without.rejected, 0);
+  EXPECT_NEAR(static_cast<double>(with.looked) / kRuns, (3600 - 60) / 3, 3);
+  EXPECT_LE(with.rejected, 1);  // of 24 000 that are good
+  EXPECT_LT(with.angle_square, 1e-4 * without.angle_square);
+  EXPECT_LT(with.angle_variance, 1e-4 * without.angle_variance);
+  EXPECT_NEAR(with.angle_nees, 1, 3.29 * std::sqrt(2.0 / kRuns));
+  EXPECT_NEAR(with.nees, 20, 3.29 * std::sqrt(40.0 / kRuns));
+}
+
+TEST(AnglesWithoutFixes, AreHonestInSteadyFlightWithHalfADegree) {
+  // The terms of second order are large here, and the same in all 1200 looks.
+  constexpr int kRuns = 20;
+  const Bridged with = bridge(kRuns, {.duration_s = 600 + 3600, .slews_rad = 0}, 600, 8e-3, true);
+  EXPECT_LT(with.angle_nees, 1 + 3.29 * std::sqrt(2.0 / kRuns));
+  EXPECT_LT(with.nees, 20 + 3.29 * std::sqrt(40.0 / kRuns));
+}
+
+/// An estimator that has just been started, and readings that agree with it.
+template <int N>
+struct Started {
+  using Estimator = InvariantEstimator<Esg7, N>;
+  Estimator estimator;
+  Eigen::Matrix3d C_in_c = Rot<In, C>::exp(Vec<In>::assume(0.3, -0.2, 0.9)).raw();
+  FixReadings<N> readings;
+
+  explicit Started(const typename Estimator::Setup& setup) : estimator(Estimator::create(setup).value()) {
+    const Eigen::Vector3d h_c[] = {{0.8, 0.1, 0.6}, {-0.1, 0.9, 0.4}, {0.5, -0.6, 0.7}};
+    for (int k = 0; k < N; ++k) {
+      readings.h_b[k] = setup.prior[k].C_c_b.transpose() * h_c[k].normalized();
+    }
+    EXPECT_EQ(estimator.correct({Time{}, Eigen::Quaterniond(C_in_c)}, readings).status, FixStatus::kStarted);
+  }
+};
+
+InvariantEstimator<Esg7, 3>::Setup triple_setup() {
+  InvariantEstimator<Esg7, 3>::Setup setup;
+  const auto two = test::nominal_setup();
+  setup.star_tracker_noise_rad = two.star_tracker_noise_rad;
+  for (int k = 0; k < 3; ++k) {
+    setup.readout_noise_rad[k] = two.readout_noise_rad[0];
+    setup.prior_covariance.block<10, 10>(10 * k, 10 * k) = two.prior_covariance.block<10, 10>(0, 0);
+  }
+  return setup;
+}
+
+template <int N>
+void expect_nothing_of_common_turns(const typename InvariantEstimator<Esg7, N>::Setup& setup) {
+  using Estimator = InvariantEstimator<Esg7, N>;
+  using Layout = typename Estimator::Layout;
+  Started<N> s(setup);
+  const auto information_of = [&](const typename Estimator::Information::Vector& v) {
+    return (s.estimator.information().root() * v).squaredNorm();
+  };
+  // A turn of all directions, of all alignments, and of one gyro's direction and alignment together.
+  typename Estimator::Information::Vector unseen[3];
+  const Eigen::Vector3d n = Eigen::Vector3d(1, 2, 3).normalized();
+  for (auto& v : unseen) {
+    v.setZero();
+  }
+  for (int k = 0; k < N; ++k) {
+    unseen[0].template segment<3>(Layout::direction(k)) = n;
+    unseen[1].template segment<3>(Layout::alignment(k)) = n;
+  }
+  unseen[2].template segment<3>(Layout::direction(0)) = n;
+  unseen[2].template segment<3>(Layout::alignment(0)) = s.C_in_c.transpose() * n;
+  typename Estimator::Information::Vector seen = Estimator::Information::Vector::Zero();
+  seen.template segment<3>(Layout::direction(0)) =
+      s.estimator.gyros()[0].h_in.cross(s.estimator.gyros()[1].h_in).normalized();
+  const double before[] = {information_of(unseen[0]), information_of(unseen[1]), information_of(unseen[2])};
+  const double seen_before = information_of(seen);
+  constexpr int kLooks = 1000;
+  for (int i = 1; i <= kLooks; ++i) {
+    ASSERT_EQ(s.estimator.check_angles(Time(std::chrono::seconds(3 * i)), s.readings).status, FixStatus::kUsed);
+  }
+  for (int i = 0; i < 3; ++i) {
+    EXPECT_NEAR(information_of(unseen[i]) / before[i], 1, 1e-9) << i;
+  }
+  const double sigma_rad = setup.readout_noise_rad[0];
+  EXPECT_GT(information_of(seen) - seen_before, 1 / (sigma_rad * sigma_rad));
+}
+
+TEST(AnglesWithoutFixes, SayNothingOfWhatTurnsAllMomenta) {
+  expect_nothing_of_common_turns<2>(nominal<Pair>());
+  expect_nothing_of_common_turns<3>(triple_setup());
+}
+
+TEST(AnglesWithoutFixes, ShowAGyroThatHasJumped) {
+  Started<2> s(nominal<Pair>());
+  const Eigen::Vector3d other = s.readings.h_b[1];
+  s.readings.h_b[0] = (s.readings.h_b[0] + 1e-3 * other).normalized();
+  const auto before = s.estimator.gyros()[0].h_in;
+  for (int i = 1; i <= 30; ++i) {  // never believed, however often
+    const auto report = s.estimator.check_angles(Time(std::chrono::seconds(3 * i)), s.readings);
+    EXPECT_EQ(report.status, FixStatus::kRejectedByGate);
+    EXPECT_EQ(report.rejections_in_a_row, i);
+    EXPECT_GT(report.nis, 21);
+  }
+  EXPECT_EQ(s.estimator.gyros()[0].h_in, before);
+}
+
+TEST(AnglesWithoutFixes, ShareNoSamplesWithFixes) {
+  // The star tracker falls silent at 60 s and comes back at some second of the interval between two looks.
+  for (int back_s = 150; back_s < 153; ++back_s) {
+    test::Flight flight({.duration_s = 200, .fix_offset_s = 0.25});
+    std::erase_if(flight.fixes, [&](const StarFix& fix) {
+      return fix.t > Time(std::chrono::seconds(60)) && fix.t < Time(std::chrono::seconds(back_s));
+    });
+    auto cycle = make_cycle<Pair>(nominal<Pair>());
+    std::vector<Time> looks;
+    std::vector<Time> fixes;
+    test::fly(flight, *cycle, [&](const auto& report) {
+      if (report.angles.status != FixStatus::kNone) {
+        EXPECT_EQ(report.angles.status, FixStatus::kUsed);
+        looks.push_back(report.angles.t);
+      }
+      if (report.fix.used()) {
+        fixes.push_back(report.fix.t);
+      }
+    });
+    ASSERT_GE(looks.size(), 9U);
+    EXPECT_EQ(looks.front(), flight.fixes[19].t + std::chrono::minutes(1));
+    EXPECT_GE(fixes.size(), flight.fixes.size() - 1);  // none is lost but the last, which waits
+    for (const Time look : looks) {
+      for (const Time fix : fixes) {
+        EXPECT_GE(std::max(look - fix, fix - look), 2 * Pair::kReach);
+      }
+    }
+    for (std::size_t i = 1; i < looks.size(); ++i) {
+      EXPECT_GE(looks[i] - looks[i - 1], 2 * Pair::kReach);
+    }
+  }
+}
+
+TEST(AnglesWithoutFixes, GoOnOverAGapOfTheGyros) {
+  test::Flight flight({.duration_s = 900});
+  flight.fixes.resize(60);  // until 3 min
+  flight.samples.erase(flight.samples.begin() + 8 * 400, flight.samples.begin() + 8 * 600);
+  auto cycle = make_cycle<Pair>(nominal<Pair>());
+  std::vector<Time> looks;
+  test::fly(flight, *cycle, [&](const auto& report) {
+    if (report.angles.status != FixStatus::kNone) {
+      EXPECT_EQ(report.angles.status, FixStatus::kUsed);
+      looks.push_back(report.angles.t);
+    }
+  });
+  const auto is_late = [](Time t) { return t > Time(std::chrono::seconds(600)); };
+  EXPECT_NEAR(static_cast<double>(std::count_if(looks.begin(), looks.end(), is_late)), 98, 2);
 }
 
 }  // namespace

@@ -4,6 +4,7 @@
 #include <Eigen/Cholesky>
 #include <Eigen/Core>
 #include <algorithm>
+#include <chrono>
 #include <cstdint>
 #include <optional>
 
@@ -42,6 +43,7 @@ enum class SetupFault { kPriorNotPositiveDefinite, kPriorMeanNotUsable, kNoiseNo
 template <class Model, int N>
 struct CalibrationSetup {
   using Layout = ParameterLayout<Model, N>;
+  static constexpr Duration kNever = Duration::max();
 
   PerGyro<GyroModel<Model>, N> prior;  ///< prior means; the momenta come from the first fix
   Eigen::Matrix<double, Layout::kSize, Layout::kSize> prior_covariance =
@@ -59,6 +61,8 @@ struct CalibrationSetup {
   /// When that happens again within so many fixes, the parameters are what is wrong: the estimates stay, their
   /// information goes.
   int restart_within_fixes = 200;
+  /// Without a fix that could be used for longer than this, the angles between the momenta are used alone; or kNever.
+  Duration angles_after = std::chrono::minutes(1);
 
   /// Finite drift coefficients and alignments that are rotations.
   [[nodiscard]] bool means_are_usable() const {

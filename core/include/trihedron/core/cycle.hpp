@@ -40,6 +40,9 @@ struct StepReport {
   /// Attitude at that fix, used or rejected as an outlier: of the calibration itself, and of the open-loop navigator.
   std::optional<AttitudeSolution> calibrated;
   std::optional<AttitudeSolution> navigated;
+  /// Of the angles between the momenta, where they were looked at in this step because no fix could be used for long:
+  /// the integrity of the gyros without a star tracker, and of use to the calibration. Its time is its own.
+  typename Estimator::AngleReport angles;
   /// z1 of eq. (3), cosθ predicted minus cosθ measured: the integrity of the pair, without a star tracker. Zero before
   /// the start.
   double angle_residual = 0;
@@ -60,6 +63,9 @@ class Cycle {
   static constexpr Duration kMaxGap = std::chrono::hours(1);
   /// Samples that are taken together for the attitude now, where the estimator takes any together.
   static constexpr Duration kRecent = std::chrono::milliseconds(2500);
+  /// Without fixes the angles between the momenta are looked at so often; no two times share samples.
+  static constexpr Duration kAngleInterval = std::chrono::seconds(3);
+  static constexpr bool kUsesAngles = requires(Estimator e, FixReadings<kGyros> r) { e.check_angles(Time{}, r); };
   static constexpr int kBufferedSamples = 64;
   static constexpr int kBufferedFixes = 8;
 
@@ -121,6 +127,7 @@ class Cycle {
     Report report;
     if (fixes_ > 0) {
       report.t = samples_.latest().t;
+      angles_t_ = Time::max();  // or the fix would wait for them
       calibrate_until(std::max(report.t, pending_[0].t), report);
     }
     return report;
@@ -189,7 +196,7 @@ class Cycle {
     const bool repeated = std::any_of(pending_.begin(), waiting,
                                       [&](const StarFix& other) { return other.t == fix.t && other.head == fix.head; });
     const auto& used_t = used_fix_t_[fix.head];
-    if (repeated || (used_t && fix.t <= *used_t) || (followed_ && fix.t < follower_t_)) {
+    if (repeated || (used_t && fix.t <= *used_t) || fix.t < taken_until_) {
       return FixStatus::kRejectedOutOfOrder;
     }
     if (fixes_ == kBufferedFixes) {
@@ -209,9 +216,15 @@ class Cycle {
   void calibrate_until(Time limit, Report& report) {
     bool dealt_with_one = false;
     while (true) {
-      const bool sample_due = behind_ > 0 && next_sample().t <= limit;
-      const bool fix_due = fixes_ > 0 && pending_[0].t <= limit;
-      if (fix_due && !(sample_due && next_sample().t <= pending_[0].t)) {
+      const Time sample_t = behind_ > 0 ? next_sample().t : Time::max();
+      const Time fix_t = fixes_ > 0 ? pending_[0].t : Time::max();
+      // A fix that would share samples with the angles goes before them; they wait until none can come any more.
+      if (angles_t_ < sample_t && angles_t_ <= fix_t - 2 * Estimator::kReach) {
+        if (angles_t_ > limit - 2 * Estimator::kReach || report.angles.status != FixStatus::kNone) {
+          return;
+        }
+        look_at_angles(report);
+      } else if (fix_t < sample_t && fix_t <= limit) {
         if (dealt_with_one) {
           return;
         }
@@ -220,7 +233,7 @@ class Cycle {
         std::move(pending_.begin() + 1, pending_.begin() + fixes_, pending_.begin());
         --fixes_;
         correct(fix, report);
-      } else if (sample_due) {
+      } else if (sample_t <= limit) {
         follow(next_sample().t, next_sample().h_b);
         --behind_;
       } else {
@@ -250,9 +263,37 @@ class Cycle {
     if (report.fix.used()) {
       used_fix_t_[fix.head] = fix.t;
       correct_navigator(*readings, report);
+      const Duration after = estimator_.setup().angles_after;
+      angles_t_ = kUsesAngles && after != Estimator::Setup::kNever ? fix.t + after : Time::max();
+    } else if (fix.t >= angles_t_) {
+      use_angles(fix.t, *readings, report);  // these samples are free, and the step has come so far
     }
     if (navigator_.started() && !report.corrected) {
       report.navigated = navigated_before(fix.t, *readings);
+    }
+  }
+
+  /// The angles between the momenta alone, at the time that they are due.
+  void look_at_angles(Report& report) {
+    const Time t = std::max(angles_t_, follower_t_);
+    if (const auto readings = readings_at(t)) {
+      follow(t, readings->h_b);
+      const typename Estimator::Sensitivities stretch = estimator_.since_fix();
+      use_angles(t, *readings, report);
+      if (report.angles.status != FixStatus::kRejectedGeometry) {
+        navigator_.extend(stretch);
+      }
+    } else {  // a gap of the gyros: on where they are back
+      angles_t_ = next_sample().t + Estimator::kReach;
+    }
+  }
+
+  /// Readings and estimator at `t`.
+  void use_angles(Time t, const FixReadings<kGyros>& readings, Report& report) {
+    if constexpr (kUsesAngles) {
+      report.angles = estimator_.check_angles(t, readings);
+      taken_until_ = t + 2 * Estimator::kReach;
+      angles_t_ = t + kAngleInterval;
     }
   }
 
@@ -304,8 +345,8 @@ class Cycle {
       }
     }
     follower_t_ = t;
+    taken_until_ = std::max(taken_until_, t);
     follower_h_b_ = h_b;
-    followed_ = true;
   }
 
   void predict_navigator(Time from_t, const Directions& from, Time to_t, const Directions& to) {
@@ -486,7 +527,8 @@ class Cycle {
   PerGyro<std::optional<Time>, Estimator::kHeads> used_fix_t_;  ///< per star tracker
   Time corrected_t_{};
   Time suspect_t_{};
-  bool followed_ = false;
+  Time angles_t_ = Time::max();     ///< when the angles are due
+  Time taken_until_ = Time::min();  ///< a fix before it is too late: passed, or its samples are used
   bool has_suspect_ = false;
   bool start_unconfirmed_ = false;
 };

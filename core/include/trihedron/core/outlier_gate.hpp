@@ -1,10 +1,21 @@
 #pragma once
 
 #include <algorithm>
+#include <cmath>
 
 #include "trihedron/core/calibration.hpp"
 
 namespace trihedron {
+
+/// The gate that good measurements of `freedom` degrees of freedom pass as often as those of `its_freedom` pass
+/// `gate_nis` (Wilson and Hilferty 1931: the cube root of χ²/n is nearly normal, of mean 1 − 2/9n and variance 2/9n).
+[[nodiscard]] inline double gate_of_freedom(int freedom, double gate_nis, int its_freedom) {
+  const double variance = 2.0 / (9 * freedom);
+  const double its_variance = 2.0 / (9 * its_freedom);
+  const double sigmas = (std::cbrt(gate_nis / its_freedom) - (1 - its_variance)) / std::sqrt(its_variance);
+  const double root = std::max(1 - variance + sigmas * std::sqrt(variance), 0.0);
+  return freedom * root * root * root;
+}
 
 /// Rejects fixes whose NIS is above a gate, and cannot lock out good ones: after a run of rejections the model was
 /// wrong, not the tracker, and the directions are set free; when that happens again soon, the filter begins anew. Where

@@ -48,6 +48,7 @@ class PaperEstimator {
   using Sensitivities = PerGyro<Sensitivity<Model>, kGyros>;
   using Directions = PerGyro<Eigen::Vector3d, kGyros>;
   using Report = FixReport<kMeasurements>;
+  using AngleReport = FixReport<1>;  ///< of the others; here the angle is shown by StepReport::angle_residual only
   using Errors = ErrorLayout<Model, kGyros>;
   using ErrorRoot = Eigen::Matrix<double, Errors::kSize, Layout::kStates>;
 
