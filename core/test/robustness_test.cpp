@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 #include <memory>
 #include <numbers>
 #include <random>
@@ -363,6 +364,224 @@ TEST(AnglesWithoutFixes, GoOnOverAGapOfTheGyros) {
   });
   const auto is_late = [](Time t) { return t > Time(std::chrono::seconds(600)); };
   EXPECT_NEAR(static_cast<double>(std::count_if(looks.begin(), looks.end(), is_late)), 98, 2);
+}
+
+// ---- Gyros that fail
+
+using Triple = InvariantEstimator<Esg7, 3>;
+
+/// A pair's flight with a third gyro of a rotor that does not drift.
+struct Flight3 {
+  explicit Flight3(const test::FlightPlan& plan) : pair(plan) {
+    std::mt19937 random(plan.seed + 77);
+    std::normal_distribution<double> normal;
+    for (std::size_t i = 0; i < pair.samples.size(); ++i) {
+      GyroSample<3>& sample = samples.emplace_back();
+      sample.t = pair.samples[i].t;
+      sample.h_b[0] = pair.samples[i].h_b[0];
+      sample.h_b[1] = pair.samples[i].h_b[1];
+      sample.h_b[2] = pair.C_in_c_at_samples[i].transpose() * third_in +
+                      test::Flight::kReadout_rad * Eigen::Vector3d(normal(random), normal(random), normal(random));
+    }
+  }
+  Eigen::Vector3d third_in = Eigen::Vector3d(0.1, -0.8, 0.6).normalized();
+  test::Flight pair;
+  std::vector<GyroSample<3>> samples;
+};
+
+template <class Samples, class Cycle, class OnReport>
+void fly(const Samples& samples, const std::vector<StarFix>& fixes, Cycle& cycle, OnReport&& on_report) {
+  std::size_t fix = 0;
+  for (const auto& sample : samples) {
+    on_report(cycle.on_gyro(sample));
+    for (; fix < fixes.size() && fixes[fix].t <= sample.t; ++fix) {
+      on_report(cycle.on_fix(fixes[fix]));
+    }
+  }
+}
+
+/// Readings of one gyro stand still over an interval, in s.
+template <class Samples>
+void stick(Samples& samples, int gyro, double from_s, double to_s) {
+  const auto at = [](double t_s) { return static_cast<std::size_t>(8 * t_s); };
+  for (std::size_t i = at(from_s); i < at(to_s); ++i) {
+    samples[i].h_b[gyro] = samples[at(from_s)].h_b[gyro];
+  }
+}
+
+/// The rotor slows down and its momentum wanders off, about an axis of its case, faster and faster.
+template <class Samples>
+void wander_off(Samples& samples, int gyro, double from_s, double acceleration_rad_s2) {
+  for (std::size_t i = static_cast<std::size_t>(8 * from_s); i < samples.size(); ++i) {
+    const double age_s = static_cast<double>(i) / 8 - from_s;
+    const Eigen::Vector3d turn = acceleration_rad_s2 * age_s * age_s / 2 * Eigen::Vector3d(0.3, 0.5, 0.8);
+    samples[i].h_b[gyro] = rotated<double>(samples[i].h_b[gyro], turn);
+  }
+}
+
+/// What a flight with a failing gyro came to.
+struct Outcome {
+  long too_few = 0;        ///< samples rejected
+  long too_few_fixes = 0;  ///< fixes rejected
+  long used = 0;           ///< fixes
+  long rejected = 0;       ///< by the gate
+  double first_not_used_s = 0;
+  double worst_rad = 0;  ///< error of the navigator's attitude from 3 s after the failure on
+};
+
+template <class Estimator, class Samples>
+Outcome outcome(const Samples& samples, const test::Flight& truth, Cycle<Estimator>& cycle, int gyro, double from_s) {
+  Outcome sum;
+  fly(samples, truth.fixes, cycle, [&](const auto& report) {
+    sum.too_few += report.sample == SampleStatus::kRejectedTooFewGyros;
+    sum.too_few_fixes += report.fix.status == FixStatus::kRejectedTooFewGyros;
+    sum.used += report.fix.used();
+    sum.rejected += report.fix.status == FixStatus::kRejectedByGate;
+    const double t_s = to_seconds(report.t.time_since_epoch());
+    if (report.gyros[gyro] != GyroState::kUsed && sum.first_not_used_s == 0) {
+      sum.first_not_used_s = t_s;
+    }
+    if (report.fix.status == FixStatus::kNone && report.sample == SampleStatus::kUsed && t_s > from_s + 3) {
+      const auto i = static_cast<std::size_t>(8 * t_s + 0.5);
+      const Eigen::Matrix3d off =
+          truth.C_in_c_at_samples[i].transpose() * cycle.navigation_attitude().value().C_in_c.raw();
+      sum.worst_rad = std::max(sum.worst_rad, Rot<C, C>::assume(off).log().norm());
+    }
+  });
+  return sum;
+}
+
+template <class Estimator>
+auto every_fix(const typename Estimator::Setup& setup) {
+  return std::make_unique<Cycle<Estimator>>(
+      Cycle<Estimator>::create(setup, {.interval = CorrectionPolicy::kEveryFix}).value());
+}
+
+TEST(StuckGyro, OfThreeIsLeftOutWhileItIsStuck) {
+  Flight3 flight({.duration_s = 2400});
+  auto good = every_fix<Triple>(triple_setup());
+  const Outcome without = outcome(flight.samples, flight.pair, *good, 2, 900);
+  EXPECT_EQ(without.first_not_used_s, 0);
+  for (const int gyro : {0, 2}) {
+    Flight3 stuck = flight;
+    stick(stuck.samples, gyro, 900, 1500);
+    auto cycle = every_fix<Triple>(triple_setup());
+    const Outcome with = outcome(stuck.samples, flight.pair, *cycle, gyro, 900);
+    EXPECT_NEAR(with.first_not_used_s, 902, 0.2);
+    EXPECT_EQ(with.too_few + with.too_few_fixes, 0);
+    EXPECT_LE(with.rejected, 2);  // those of the seconds before it is known
+    EXPECT_GE(with.used, without.used - 2);
+    EXPECT_LT(with.worst_rad, 3 * without.worst_rad);
+    // Used again, and no worse for it at the end.
+    EXPECT_EQ(cycle->on_gyro(stuck.samples.back()).gyros[gyro], GyroState::kUsed);
+    const auto& gyros = cycle->estimator().gyros();
+    EXPECT_LT(angle_between<double>(gyros[0].h_in, flight.pair.truth[0].h_in), 5 * kArcsecond);
+    EXPECT_LT(angle_between<double>(gyros[2].h_in, flight.third_in), 5 * kArcsecond);
+  }
+}
+
+TEST(StuckGyro, WithoutADirectionIsLeftOutToo) {
+  Flight3 flight({.duration_s = 900});
+  for (std::size_t i = 8 * 300; i < flight.samples.size(); ++i) {
+    flight.samples[i].h_b[1].setZero();
+  }
+  auto cycle = every_fix<Triple>(triple_setup());
+  long not_direction = 0;
+  long used = 0;
+  fly(flight.samples, flight.pair.fixes, *cycle, [&](const auto& report) {
+    not_direction += report.sample == SampleStatus::kRejectedNotDirection;
+    used += report.fix.used();
+  });
+  EXPECT_EQ(not_direction, 15);  // the sixteenth is known for what it is
+  EXPECT_GE(used, 298);
+  EXPECT_TRUE(cycle->navigation_attitude().ok());
+}
+
+TEST(StuckGyro, OfAPairStopsItUntilItLivesAgain) {
+  const test::Flight flight({.duration_s = 2400});
+  test::Flight stuck = flight;
+  stick(stuck.samples, 1, 900, 1200);
+  auto cycle = every_fix<Pair>(nominal<Pair>());
+  const Outcome sum = outcome(stuck.samples, flight, *cycle, 1, 1200);
+  EXPECT_NEAR(static_cast<double>(sum.too_few), 8 * 298, 8);
+  EXPECT_NEAR(static_cast<double>(sum.too_few_fixes), 100, 2);
+  EXPECT_GE(sum.used, 801 - 103);
+  EXPECT_LE(sum.rejected, 2);
+  EXPECT_LT(momentum_error(*cycle, flight), 2 * kArcsecond);
+  EXPECT_LT(sum.worst_rad, 60 * kArcsecond);
+}
+
+TEST(WanderingGyro, OfThreeIsIsolatedAndTheOthersGoOn) {
+  Flight3 flight({.duration_s = 2400});
+  auto good = every_fix<Triple>(triple_setup());
+  const Outcome without = outcome(flight.samples, flight.pair, *good, 0, 900);
+  EXPECT_EQ(without.first_not_used_s, 0);
+  for (const int gyro : {0, 1, 2}) {
+    Flight3 failing = flight;
+    wander_off(failing.samples, gyro, 900, 1e-7);
+    auto cycle = every_fix<Triple>(triple_setup());
+    const Outcome with = outcome(failing.samples, flight.pair, *cycle, gyro, 900);
+    EXPECT_GT(with.first_not_used_s, 900);
+    EXPECT_LT(with.first_not_used_s, 1200) << gyro;
+    for (int other = 0; other < 3; ++other) {
+      EXPECT_EQ(cycle->on_gyro(failing.samples.back()).gyros[other],
+                other == gyro ? GyroState::kIsolated : GyroState::kUsed);
+    }
+    EXPECT_LT(with.rejected, 30);
+    EXPECT_LT(with.worst_rad, 60 * kArcsecond) << gyro;
+  }
+}
+
+TEST(WanderingGyro, OfThreeIsFoundWithoutAStarTrackerToo) {
+  Flight3 flight({.duration_s = 3000});
+  flight.pair.fixes.resize(600);
+  wander_off(flight.samples, 1, 2000, 1e-7);
+  auto cycle = every_fix<Triple>(triple_setup());
+  const Outcome sum = outcome(flight.samples, flight.pair, *cycle, 1, 2000);
+  EXPECT_GT(sum.first_not_used_s, 2000);
+  EXPECT_LT(sum.first_not_used_s, 2200);
+  EXPECT_EQ(cycle->on_gyro(flight.samples.back()).gyros[0], GyroState::kUsed);
+  EXPECT_EQ(cycle->on_gyro(flight.samples.back()).gyros[2], GyroState::kUsed);
+}
+
+TEST(WanderingGyro, OfAPairStopsItForGood) {
+  for (const int gyro : {0, 1}) {
+    test::Flight flight({.duration_s = 2400});
+    wander_off(flight.samples, gyro, 900, 1e-6);
+    auto cycle = every_fix<Pair>(nominal<Pair>());
+    long after = 0;
+    SampleStatus last{};
+    PerGyro<GyroState, 2> states{};
+    test::fly(flight, *cycle, [&](const auto& report) {
+      states = report.gyros;
+      if (report.fix.status == FixStatus::kNone) {
+        last = report.sample;
+      }
+      after += report.fix.used() && report.fix.t > Time(std::chrono::seconds(1300));
+    });
+    EXPECT_EQ(states[gyro], GyroState::kIsolated) << gyro;
+    EXPECT_EQ(states[1 - gyro], GyroState::kUsed) << gyro;
+    EXPECT_EQ(last, SampleStatus::kRejectedTooFewGyros);
+    EXPECT_EQ(after, 0);
+  }
+}
+
+TEST(WanderingGyro, IsNotSuspectedWhenTheStarTrackerIsAtFault) {
+  test::Flight flight({.duration_s = 1800});
+  std::mt19937 random(5);
+  std::uniform_real_distribution<double> uniform(-1, 1);
+  for (std::size_t i = 100; i < flight.fixes.size(); ++i) {  // about each axis, small and large, five minutes in ten
+    const Eigen::Vector3d axis(uniform(random), uniform(random), uniform(random));
+    if (i % 40 < 19) {
+      const double angle_rad = std::pow(10, -3 + uniform(random));
+      flight.fixes[i].q_in_c =
+          flight.fixes[i].q_in_c * Eigen::Quaterniond(Eigen::AngleAxisd(angle_rad, axis.normalized()));
+    }
+  }
+  auto cycle = make_cycle<Pair>(nominal<Pair>());
+  for (const auto& report : fly(flight, *cycle)) {
+    EXPECT_EQ(report.fix.odd_gyro, kNoGyro);
+  }
 }
 
 }  // namespace

@@ -107,6 +107,7 @@ enum class FixStatus : std::uint8_t {
   kRejectedUnknownHead,  ///< of a star tracker that the estimator does not have
   kRejectedBacklog,      ///< more fixes are waiting than there is room for
   kRejectedGeometry,     ///< momenta nearly parallel
+  kRejectedTooFewGyros,  ///< fewer than two gyros can be used, or at the start not all; the step's report names them
   kRejectedByGate,       ///< NIS above the gate
 };
 
@@ -125,6 +126,8 @@ struct FixReport {
   double nis = 0;  ///< innovation² over its covariance; M degrees of freedom
   int rejections_in_a_row = 0;
   bool jumped = false;  ///< the misfit came at once and is more than drift can make: put down to the star tracker
+
+  int odd_gyro = kNoGyro;  ///< index of the gyro that alone, and not the star tracker, explains why it was rejected
 
   [[nodiscard]] bool used() const { return is_used(status); }
 };

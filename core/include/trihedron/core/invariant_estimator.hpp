@@ -100,9 +100,9 @@ class InvariantEstimator {
   [[nodiscard]] const Setup& setup() const { return setup_; }
   [[nodiscard]] const Information& information() const { return information_; }
 
-  /// Least squares, all gyros alike.
-  [[nodiscard]] static Result<AttitudeByDirections<N>, DirectionsFault> attitude(const Gyros& gyros,
-                                                                                 const Directions& h_b);
+  /// Least squares, all gyros used alike.
+  [[nodiscard]] static Result<AttitudeByDirections<N>, DirectionsFault> attitude(
+      const Gyros& gyros, const Directions& h_b, const GyroMask<N>& used = all_gyros<N>());
   /// What was known before.
   [[nodiscard]] Gyros prior_gyros() const;
   /// A square root of the prior covariance, rows as the parameters in ErrorLayout.
@@ -147,7 +147,13 @@ class InvariantEstimator {
   /// What is left of a measurement, its R that of the readings alone, when the attitude is eliminated.
   [[nodiscard]] static WhiteAngles angles_of(const Measurement& m);
 
+  /// Takes a gyro out of a measurement: its components say nothing and have to do with no others.
+  static void leave_out(int gyro, Measurement& m);
+  static void leave_out_unused(const GyroMask<N>& used, Measurement& m);
+
  private:
+  /// 1-sigma of a direction of which nothing is known.
+  static constexpr double kUnknown_rad = 1;
   using Rows3 = Eigen::Matrix<double, 3, Layout::kStates>;
   /// Error of a fix by the shared states, c axes: as given = true · exp([e×]).
   [[nodiscard]] FixBySharedStates fix_by_shared(Time t, int head, const Eigen::Vector3d& rate_c) const;
@@ -162,6 +168,13 @@ class InvariantEstimator {
   [[nodiscard]] double second_order_rad(const Rows3& a, const Rows3& b) const;
   /// 1-sigma of the readings with what the linear model leaves out, here for the n-th time in a row.
   [[nodiscard]] PerGyro<double, N> reading_noise(const Eigen::Matrix3d& C_linear, double noise_factor, int n) const;
+  /// By readings alone, at the attitude that they give; for the n-th time in a row.
+  [[nodiscard]] Measurement measure_angles(const Eigen::Matrix3d& C_in_c, const FixReadings<N>& readings, int n) const;
+  [[nodiscard]] bool angles_agree(const Measurement& m, const GyroMask<N>& used) const;
+  [[nodiscard]] bool agrees(const Measurement& m, const GyroMask<N>& used) const;
+  /// The one gyro without which a measurement that does not agree does.
+  template <class Agrees>
+  [[nodiscard]] static int odd_gyro(const Measurement& m, const GyroMask<N>& used, Agrees&& agrees);
   void update_to_now(const Eigen::Matrix3d& C_in_c);
   void feed_back(const typename Information::Vector& x);
 

@@ -64,8 +64,11 @@ class PaperEstimator {
   [[nodiscard]] const Setup& setup() const { return setup_; }
 
   /// The trihedron: gyro 1 is the reference.
-  [[nodiscard]] static Result<AttitudeByDirections<kGyros>, DirectionsFault> attitude(const Gyros& gyros,
-                                                                                      const Directions& h_b) {
+  [[nodiscard]] static Result<AttitudeByDirections<kGyros>, DirectionsFault> attitude(
+      const Gyros& gyros, const Directions& h_b, const GyroMask<kGyros>& used = all_gyros<kGyros>()) {
+    if (count(used) < kGyros) {
+      return DirectionsFault::kTooFew;
+    }
     return trihedron_attitude(momenta(gyros), in_c(gyros, h_b));
   }
   /// What was known before.
