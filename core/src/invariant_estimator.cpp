@@ -129,6 +129,7 @@ void InvariantEstimator<Base, N, F>::start(const Eigen::Matrix3d& C_in_c, const 
   std::fill(second_order_rad_.begin(), second_order_rad_.end(), 0.0);
   information_.add_information(Eigen::Matrix<double, 3 * N, Layout::kStates>(factor.matrixL().solve(H)));
   since_fix_ = {};
+  angles_since_fix_ = 0;
   time_since_fix_s_ = 0;
   extra_variance_rad2_ = 0;
 }
@@ -289,6 +290,7 @@ auto InvariantEstimator<Base, N, F>::correct(const StarFix& fix, const FixReadin
   report.status = gate_.judge(report.nis, m.y.norm());
   report.rejections_in_a_row = gate_.rejections_in_a_row();
   report.jumped = gate_.jumped();
+  report.weight = student_t_weight(setup_.student_t_freedom, report.nis, 2 * count(readings.used));
   switch (report.status) {
     case FixStatus::kRejectedByGate:
       // What a turn of them all explains is the star tracker's.
@@ -296,20 +298,27 @@ auto InvariantEstimator<Base, N, F>::correct(const StarFix& fix, const FixReadin
         report.odd_gyro = odd_gyro(
             m, readings.used, [this](const Measurement& rest, const GyroMask<N>& used) { return agrees(rest, used); });
       }
-      return report;
+      if (!(report.weight < 1) || report.jumped || report.odd_gyro != kNoGyro) {
+        return report;
+      }
+      report.status = FixStatus::kUsed;
+      break;
     case FixStatus::kRestarted:
       // Information gathered about a far wrong estimate: begin anew from the present one.
       start(C_in_c.raw(), readings, R_c, by_shared);
+      report.weight = 1;
       return report;
     case FixStatus::kUsedAfterReopening:
       add_direction_variance(m.y.squaredNorm() / kMeasurements);
       update_to_now(C_linear);
+      report.weight = 1;
       break;
     default:
       break;
   }
   angles_since_fix_ = 0;
-  feed_back(information_.template update<kMeasurements>(white.H, white.y));
+  const double root_weight = std::sqrt(report.weight);
+  feed_back(information_.template update<kMeasurements>(root_weight * white.H, root_weight * white.y));
   return report;
 }
 
