@@ -707,5 +707,86 @@ TEST(StudentTWeight, IsTheMeanOfTheScaleGivenTheInnovation) {
   EXPECT_NEAR(student_t_weight(kFreedom, kNis, 4), mean / sum, 1e-6);
 }
 
+// ---- A clock that is set back
+
+template <class Estimator>
+class ClockSetBack : public testing::Test {};
+TYPED_TEST_SUITE(ClockSetBack, Estimators);
+
+TYPED_TEST(ClockSetBack, IsTakenOverAfterSixteenSamples) {
+  const test::Flight flight({.duration_s = 1800});
+  for (const double back_s : {5.0, 600.0, 1e6}) {
+    test::Flight set_back = flight;
+    const Time from(std::chrono::seconds(900));
+    for (auto& sample : set_back.samples) {
+      sample.t -= sample.t > from ? from_seconds(back_s) : Duration::zero();
+    }
+    for (auto& fix : set_back.fixes) {
+      fix.t -= fix.t > from ? from_seconds(back_s) : Duration::zero();
+    }
+    auto cycle = make_cycle<TypeParam>(nominal<TypeParam>());
+    long rejected = 0;
+    long taken_over = 0;
+    long used = 0;
+    std::size_t fix = 0;
+    for (std::size_t i = 0; i < flight.samples.size(); ++i) {
+      const auto report = cycle->on_gyro(set_back.samples[i]);
+      rejected += report.sample == SampleStatus::kRejectedOutOfOrder;
+      taken_over += report.sample == SampleStatus::kUsedAfterClockSetBack;
+      used += report.fix.used();
+      if (report.sample == SampleStatus::kUsedAfterClockSetBack) {
+        EXPECT_EQ(flight.samples[i].t, from + 16 * std::chrono::milliseconds(125));
+        EXPECT_EQ(report.t, set_back.samples[i].t);
+      }
+      for (; fix < flight.fixes.size() && flight.fixes[fix].t == flight.samples[i].t; ++fix) {
+        used += cycle->on_fix(set_back.fixes[fix]).fix.used();
+      }
+    }
+    EXPECT_EQ(rejected, 15);
+    EXPECT_EQ(taken_over, 1);
+    EXPECT_GE(used, 598);
+    // Two seconds of drift are not predicted: 1″ at the most.
+    EXPECT_LT(momentum_error(*cycle, flight), 3 * kArcsecond);
+  }
+}
+
+TYPED_TEST(ClockSetBack, IsNotBelievedOfSamplesThatComeLate) {
+  // A block of old samples among the present ones, and a few that go backwards.
+  const test::Flight flight({.duration_s = 600});
+  auto cycle = make_cycle<TypeParam>(nominal<TypeParam>());
+  auto plain = make_cycle<TypeParam>(nominal<TypeParam>());
+  std::size_t fix = 0;
+  for (std::size_t i = 0; i < flight.samples.size(); ++i) {
+    EXPECT_EQ(cycle->on_gyro(flight.samples[i]).sample, SampleStatus::kUsed);
+    plain->on_gyro(flight.samples[i]);
+    if (i > 2000) {
+      EXPECT_EQ(cycle->on_gyro(flight.samples[i - 1000]).sample, SampleStatus::kRejectedOutOfOrder);
+    }
+    for (std::size_t j = 0; i == 1000 && j < 100; ++j) {
+      EXPECT_EQ(cycle->on_gyro(flight.samples[900 - j]).sample, SampleStatus::kRejectedOutOfOrder);
+    }
+    for (; fix < flight.fixes.size() && flight.fixes[fix].t == flight.samples[i].t; ++fix) {
+      cycle->on_fix(flight.fixes[fix]);
+      plain->on_fix(flight.fixes[fix]);
+    }
+  }
+  EXPECT_EQ(cycle->estimator().gyros()[0].drift_rad_s, plain->estimator().gyros()[0].drift_rad_s);
+}
+
+TEST(ClockSetBackOfInvariant, TellsOfTheFixesThatWaited) {
+  const test::Flight flight({.duration_s = 60});
+  auto cycle = make_cycle<Pair>(nominal<Pair>());
+  for (std::size_t i = 0; i <= 24 * 5; ++i) {
+    cycle->on_gyro(flight.samples[i]);
+  }
+  EXPECT_EQ(cycle->on_fix(flight.fixes[5]).fix.status, FixStatus::kPending);
+  int dropped = 0;
+  for (std::size_t i = 0; i < 24; ++i) {
+    dropped += cycle->on_gyro(flight.samples[i]).fixes_dropped;
+  }
+  EXPECT_EQ(dropped, 1);
+  EXPECT_EQ(cycle->flush().fix.status, FixStatus::kNone);
+}
+
 }  // namespace
 }  // namespace trihedron

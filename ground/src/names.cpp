@@ -48,6 +48,8 @@ const char* name_of(SampleStatus status) {
       return "rejected: momenta nearly parallel";
     case SampleStatus::kRejectedTooFewGyros:
       return "rejected: too few gyros can be used";
+    case SampleStatus::kUsedAfterClockSetBack:
+      return "used after the clock was set back";
   }
   return "unknown";
 }

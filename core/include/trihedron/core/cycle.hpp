@@ -7,6 +7,7 @@
 #include <chrono>
 #include <cstdint>
 #include <optional>
+#include <utility>
 
 #include "trihedron/core/directions_fit.hpp"
 #include "trihedron/core/fix_readings.hpp"
@@ -18,12 +19,18 @@ namespace trihedron {
 
 enum class SampleStatus : std::uint8_t {
   kUsed,
-  kRejectedNotDirection,  ///< a reading is not finite or not unit
-  kRejectedOutOfOrder,    ///< not later than the sample before it, or alone more than an hour ahead
-  kRejectedGeometry,      ///< momenta nearly parallel
-  kRejectedTooFewGyros,   ///< fewer than two gyros can be used; the report names them
+  kRejectedNotDirection,   ///< a reading is not finite or not unit
+  kRejectedOutOfOrder,     ///< not later than the sample before it, or alone more than an hour ahead
+  kRejectedGeometry,       ///< momenta nearly parallel
+  kRejectedTooFewGyros,    ///< fewer than two gyros can be used; the report names them
+  kUsedAfterClockSetBack,  ///< used, the first since the clock of the telemetry was set back: nothing is predicted over
+                           ///< that
 };
-inline constexpr std::size_t kSampleStatuses = 5;
+inline constexpr std::size_t kSampleStatuses = 6;
+
+[[nodiscard]] constexpr bool is_used(SampleStatus status) {
+  return status == SampleStatus::kUsed || status == SampleStatus::kUsedAfterClockSetBack;
+}
 
 /// Astro-corrections of the navigator.
 struct CorrectionPolicy {
@@ -40,6 +47,7 @@ struct StepReport {
   SampleStatus sample = SampleStatus::kUsed;
   PerGyro<GyroState, Estimator::kGyros> gyros{};  ///< after this step
   typename Estimator::Report fix;  ///< of the fix that was dealt with in this step, if any; its time is its own
+  int fixes_dropped = 0;           ///< that waited when the clock was set back: nobody knows their time now
   bool corrected = false;          ///< the navigator was corrected at that fix
   /// Attitude at that fix, used or rejected as an outlier: of the calibration itself, and of the open-loop navigator.
   std::optional<AttitudeSolution> calibrated;
@@ -70,6 +78,8 @@ class Cycle {
   /// Without fixes the angles between the momenta are looked at so often; no two times share samples.
   static constexpr Duration kAngleInterval = std::chrono::seconds(3);
   static constexpr bool kUsesAngles = requires(Estimator e, FixReadings<kGyros> r) { e.check_angles(Time{}, r); };
+  /// So many samples in a row behind the present time set it back.
+  static constexpr int kSetBackSamples = 16;
   static constexpr int kBufferedSamples = 64;
   static constexpr int kBufferedFixes = 8;
 
@@ -98,10 +108,11 @@ class Cycle {
     if (report.sample == SampleStatus::kRejectedTooFewGyros) {
       calibrate_until(screened.t - Estimator::kReach, report);  // what waits for samples waits in vain
     }
-    if (report.sample != SampleStatus::kUsed) {
+    if (!is_used(report.sample)) {
       return report;
     }
-    if (navigator_.started()) {
+    report.fixes_dropped = std::exchange(fixes_dropped_, 0);
+    if (navigator_.started() && has_sample()) {
       predict_navigator(samples_.latest().t, samples_.latest().h_b, screened.t, screened.h_b);
     }
     if (behind_ == kBufferedSamples) {  // more samples than the reach was made for: the oldest cannot wait
@@ -159,8 +170,12 @@ class Cycle {
 
   [[nodiscard]] SampleStatus screen(GyroSample<kGyros>& sample) {
     if (has_sample() && !(sample.t > t())) {
-      return SampleStatus::kRejectedOutOfOrder;
+      if (!is_set_back(sample.t)) {
+        return SampleStatus::kRejectedOutOfOrder;
+      }
+      set_clock(sample.t);
     }
+    behind_present_ = 0;
     if (is_wild(sample.t)) {
       return SampleStatus::kRejectedOutOfOrder;
     }
@@ -181,12 +196,39 @@ class Cycle {
       }
     }
     // The prediction to it is made with the middle of the step.
-    if (estimator_.started() &&
+    if (estimator_.started() && has_sample() &&
         !Estimator::attitude(estimator_.gyros(), between(samples_.latest().h_b, sample.h_b, 0.5),
                              used_over(t(), sample.t))) {
       return SampleStatus::kRejectedGeometry;
     }
-    return SampleStatus::kUsed;
+    return std::exchange(clock_set_back_, false) ? SampleStatus::kUsedAfterClockSetBack : SampleStatus::kUsed;
+  }
+
+  /// Whether the samples behind the present time are so many, and run so well forward among themselves, that theirs is
+  /// the time now: without it all would be out of order until the old time is reached again.
+  [[nodiscard]] bool is_set_back(Time t) {
+    const bool runs_on = behind_present_ > 0 && t > behind_present_t_ && t - behind_present_t_ <= kMaxInterpolation;
+    behind_present_ = runs_on ? behind_present_ + 1 : 1;
+    behind_present_t_ = t;
+    return behind_present_ >= kSetBackSamples;
+  }
+
+  /// Begins a new time at `t`. The estimates stay as they are at the last sample: how long the jump took is unknown.
+  void set_clock(Time t) {
+    for (; behind_ > 0; --behind_) {
+      follow(next_sample().t, next_sample().h_b);
+    }
+    const Duration shift = t - this->t();
+    corrected_t_ += shift;
+    angles_t_ = angles_t_ == Time::max() ? angles_t_ : angles_t_ + shift;
+    taken_until_ = Time::min();
+    follower_t_ = t;
+    used_fix_t_ = {};
+    fixes_dropped_ += std::exchange(fixes_, 0);
+    samples_ = {};
+    has_suspect_ = false;
+    health_.set_clock(t);
+    clock_set_back_ = true;
   }
 
   /// Whether a time lies so far ahead that it needs a second one beside it to be believed: a single wild time stamp
@@ -605,6 +647,10 @@ class Cycle {
   Time suspect_t_{};
   Time angles_t_ = Time::max();     ///< when the angles are due
   Time taken_until_ = Time::min();  ///< a fix before it is too late: passed, or its samples are used
+  int behind_present_ = 0;          ///< samples in a row
+  Time behind_present_t_{};
+  int fixes_dropped_ = 0;
+  bool clock_set_back_ = false;  ///< and no sample used since
   bool has_suspect_ = false;
   bool start_unconfirmed_ = false;
 };
