@@ -1,10 +1,9 @@
 #include "trihedron/core/invariant_estimator.hpp"
 
 #include <Eigen/Cholesky>
+#include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
-
-#include "trihedron/core/innovation.hpp"
 
 namespace trihedron {
 
@@ -51,7 +50,7 @@ Result<InvariantEstimator<Base, N, F>, SetupFault> InvariantEstimator<Base, N, F
     rows.template middleCols<3 * N>(Layout::kDirections).setIdentity();
     e.prior_.add_information(Eigen::Matrix<double, 3 * N, Layout::kStates>(rows / setup.wandering_sigma_rad_s));
   }
-  e.gate_ = OutlierGate(setup.gate_nis, setup.reopen_after_rejections, setup.restart_within_fixes);
+  e.gate_ = OutlierGate(setup);
   return e;
 }
 
@@ -113,14 +112,16 @@ void InvariantEstimator<Base, N, F>::start(const Eigen::Matrix3d& C_in_c, const 
   Eigen::Matrix<double, 3 * N, 3 * N> R;
   const Eigen::Matrix3d R_in = C_in_c * R_c * C_in_c.transpose();
   for (int k = 0; k < N; ++k) {
-    gyros_[k].h_in = (C_in_c * (gyros_[k].C_c_b * readings.h_b[k])).normalized();
+    if (readings.used[k]) {
+      gyros_[k].h_in = (C_in_c * (gyros_[k].C_c_b * readings.h_b[k])).normalized();
+    }
     H.template block<3, 3>(3 * k, Layout::direction(k)).setIdentity();
     H.template block<3, 3>(3 * k, Layout::alignment(k)) = -C_in_c;
     H.template block<3, F.shared()>(3 * k, Layout::kShared) = C_in_c * by_shared;
     for (int j = 0; j < N; ++j) {
       R.template block<3, 3>(3 * k, 3 * j) = R_in;
     }
-    const double sigma = setup_.readout_noise_rad[k] * readings.noise_factor;
+    const double sigma = readings.used[k] ? setup_.readout_noise_rad[k] * readings.noise_factor : kUnknown_rad;
     R.template block<3, 3>(3 * k, 3 * k).diagonal().array() += sigma * sigma;
   }
   const Eigen::LLT<Eigen::Matrix<double, 3 * N, 3 * N>> factor(R);
@@ -128,15 +129,16 @@ void InvariantEstimator<Base, N, F>::start(const Eigen::Matrix3d& C_in_c, const 
   std::fill(second_order_rad_.begin(), second_order_rad_.end(), 0.0);
   information_.add_information(Eigen::Matrix<double, 3 * N, Layout::kStates>(factor.matrixL().solve(H)));
   since_fix_ = {};
+  angles_since_fix_ = 0;
   time_since_fix_s_ = 0;
   extra_variance_rad2_ = 0;
 }
 
 template <class Base, int N, FurtherStates F>
-auto InvariantEstimator<Base, N, F>::attitude(const Gyros& gyros, const Directions& h_b)
+auto InvariantEstimator<Base, N, F>::attitude(const Gyros& gyros, const Directions& h_b, const GyroMask<N>& used)
     -> Result<AttitudeByDirections<N>, DirectionsFault> {
   PerGyro<double, N> weight;
-  std::fill(weight.begin(), weight.end(), 1.0);
+  std::transform(used.begin(), used.end(), weight.begin(), [](bool it) { return it ? 1.0 : 0.0; });
   return optimal_attitude<N>(momenta(gyros), in_c(gyros, h_b), weight);
 }
 
@@ -157,6 +159,7 @@ void InvariantEstimator<Base, N, F>::predict(const Eigen::Matrix3d& C_in_c, cons
     precess(gyros_[k], since_fix_[k], C_in_c, h_b[k], dt_s);
   }
   time_since_fix_s_ += dt_s;
+  gate_.elapse(dt_s);
 }
 
 template <class Base, int N, FurtherStates F>
@@ -240,6 +243,23 @@ auto InvariantEstimator<Base, N, F>::measure(const Gyros& gyros, const Eigen::Ma
 }
 
 template <class Base, int N, FurtherStates F>
+auto InvariantEstimator<Base, N, F>::reading_noise(const Eigen::Matrix3d& C_linear, double noise_factor, int n) const
+    -> PerGyro<double, N> {
+  PerGyro<double, N> noise_rad;
+  // Without a fix between them they keep their sign: n readings must not average them away.
+  const double in_a_row = std::sqrt(static_cast<double>(n));
+  for (int k = 0; k < N; ++k) {
+    Rows3 alignment = Rows3::Zero();
+    alignment.template middleCols<3>(Layout::alignment(k)) = C_linear;
+    Rows3 apart = -alignment;
+    apart.template middleCols<3>(Layout::direction(k)).setIdentity();
+    noise_rad[k] =
+        std::hypot(setup_.readout_noise_rad[k] * noise_factor, in_a_row * second_order_rad(alignment, apart));
+  }
+  return noise_rad;
+}
+
+template <class Base, int N, FurtherStates F>
 auto InvariantEstimator<Base, N, F>::correct(const StarFix& fix, const FixReadings<N>& readings) -> Report {
   Report report;
   report.t = fix.t;
@@ -248,7 +268,7 @@ auto InvariantEstimator<Base, N, F>::correct(const StarFix& fix, const FixReadin
   const Eigen::Vector3d known_error = by_shared * shared_;
   const Rot<In, C> C_in_c = Rot<In, C>::assume(fix.q_in_c.normalized()) * Rot<C, C>::exp(-Vec<C>::assume(known_error));
   const Eigen::Matrix3d R_c = fix_noise(fix.head);
-  const auto by_gyros = attitude(gyros_, readings.h_b);
+  const auto by_gyros = attitude(gyros_, readings.h_b, readings.used);
   if (!started_) {
     start(C_in_c.raw(), readings, R_c, by_shared);
     started_ = attitude(gyros_, readings.h_b).ok();
@@ -261,36 +281,150 @@ auto InvariantEstimator<Base, N, F>::correct(const StarFix& fix, const FixReadin
   }
   update_to_now(by_gyros.value().C_in_c.raw());
   const Eigen::Matrix3d C_linear = fused_attitude(by_gyros.value(), C_in_c, R_c, readings.noise_factor);
-  PerGyro<double, N> readout_noise_rad;
-  for (int k = 0; k < N; ++k) {
-    Rows3 alignment = Rows3::Zero();
-    alignment.template middleCols<3>(Layout::alignment(k)) = C_linear;
-    Rows3 apart = -alignment;
-    apart.template middleCols<3>(Layout::direction(k)).setIdentity();
-    readout_noise_rad[k] =
-        std::hypot(setup_.readout_noise_rad[k] * readings.noise_factor, second_order_rad(alignment, apart));
-  }
-  const Measurement m = measure(gyros_, C_in_c.raw(), C_linear, readings.h_b, R_c, by_shared, readout_noise_rad);
+  const PerGyro<double, N> noise_rad = reading_noise(C_linear, readings.noise_factor, 1);
+  Measurement m = measure(gyros_, C_in_c.raw(), C_linear, readings.h_b, R_c, by_shared, noise_rad);
+  leave_out_unused(readings.used, m);
 
   const WhiteMeasurement<Information, kMeasurements> white(m.H, m.y, m.R);
   report_innovation(information_, white, report);
-  report.status = gate_.judge(report.nis);
+  report.status = gate_.judge(report.nis, m.y.norm());
   report.rejections_in_a_row = gate_.rejections_in_a_row();
+  report.jumped = gate_.jumped();
+  report.weight = student_t_weight(setup_.student_t_freedom, report.nis, 2 * count(readings.used));
   switch (report.status) {
     case FixStatus::kRejectedByGate:
-      return report;
+      // What a turn of them all explains is the star tracker's.
+      if (!angles_agree(measure_angles(by_gyros.value().C_in_c.raw(), readings, 1), readings.used)) {
+        report.odd_gyro = odd_gyro(
+            m, readings.used, [this](const Measurement& rest, const GyroMask<N>& used) { return agrees(rest, used); });
+      }
+      if (!(report.weight < 1) || report.jumped || report.odd_gyro != kNoGyro) {
+        return report;
+      }
+      report.status = FixStatus::kUsed;
+      break;
     case FixStatus::kRestarted:
       // Information gathered about a far wrong estimate: begin anew from the present one.
       start(C_in_c.raw(), readings, R_c, by_shared);
+      report.weight = 1;
       return report;
     case FixStatus::kUsedAfterReopening:
       add_direction_variance(m.y.squaredNorm() / kMeasurements);
       update_to_now(C_linear);
+      report.weight = 1;
       break;
     default:
       break;
   }
-  feed_back(information_.template update<kMeasurements>(white.H, white.y));
+  angles_since_fix_ = 0;
+  const double root_weight = std::sqrt(report.weight);
+  feed_back(information_.template update<kMeasurements>(root_weight * white.H, root_weight * white.y));
+  return report;
+}
+
+template <class Base, int N, FurtherStates F>
+auto InvariantEstimator<Base, N, F>::angles_of(const Measurement& m) -> WhiteAngles {
+  // The rows of H by the alignments are, but for the sign, those by an error of the attitude, common to all. A large
+  // R_c in its place would still be a claim, and 10 000 of them no small one.
+  Eigen::Matrix<double, kMeasurements, 3> by_attitude;
+  for (int k = 0; k < N; ++k) {
+    by_attitude.template middleRows<2>(2 * k) = m.H.template block<2, 3>(2 * k, Layout::alignment(k));
+  }
+  const InnovationCovariance whiten = m.R.diagonal().cwiseSqrt().cwiseInverse().asDiagonal();
+  const Eigen::HouseholderQR<Eigen::Matrix<double, kMeasurements, 3>> qr(whiten * by_attitude);
+  const InnovationCovariance Q = qr.householderQ();
+  const Eigen::Matrix<double, kAngles, kMeasurements> across = Q.template rightCols<kAngles>().transpose() * whiten;
+  return WhiteAngles(across * m.H, across * m.y, Eigen::Matrix<double, kAngles, kAngles>::Identity());
+}
+
+template <class Base, int N, FurtherStates F>
+void InvariantEstimator<Base, N, F>::leave_out(int gyro, Measurement& m) {
+  const int row = 2 * gyro;
+  m.y.template segment<2>(row).setZero();
+  m.H.template middleRows<2>(row).setZero();
+  m.R.template middleRows<2>(row).setZero();
+  m.R.template middleCols<2>(row).setZero();
+  m.R.template block<2, 2>(row, row).setIdentity();
+}
+
+template <class Base, int N, FurtherStates F>
+void InvariantEstimator<Base, N, F>::leave_out_unused(const GyroMask<N>& used, Measurement& m) {
+  for (int k = 0; k < N; ++k) {
+    if (!used[k]) {
+      leave_out(k, m);
+    }
+  }
+}
+
+template <class Base, int N, FurtherStates F>
+auto InvariantEstimator<Base, N, F>::measure_angles(const Eigen::Matrix3d& C_in_c, const FixReadings<N>& readings,
+                                                    int n) const -> Measurement {
+  Measurement m = measure(gyros_, C_in_c, C_in_c, readings.h_b, Eigen::Matrix3d::Zero(), FixBySharedStates::Zero(),
+                          reading_noise(C_in_c, readings.noise_factor, n));
+  leave_out_unused(readings.used, m);
+  return m;
+}
+
+template <class Base, int N, FurtherStates F>
+bool InvariantEstimator<Base, N, F>::agrees(const Measurement& m, const GyroMask<N>& used) const {
+  Report report;
+  report_innovation(information_, WhiteMeasurement<Information, kMeasurements>(m.H, m.y, m.R), report);
+  return report.nis <= gate_of_freedom(2 * count(used), setup_.gate_nis, kMeasurements);
+}
+
+template <class Base, int N, FurtherStates F>
+bool InvariantEstimator<Base, N, F>::angles_agree(const Measurement& m, const GyroMask<N>& used) const {
+  AngleReport report;
+  report_innovation(information_, angles_of(m), report);
+  return report.nis <= gate_of_freedom(2 * count(used) - 3, setup_.gate_nis, kMeasurements);
+}
+
+template <class Base, int N, FurtherStates F>
+template <class Agrees>
+int InvariantEstimator<Base, N, F>::odd_gyro(const Measurement& m, const GyroMask<N>& used, Agrees&& agrees) {
+  int odd = kNoGyro;
+  for (int k = 0; k < N; ++k) {
+    GyroMask<N> others = used;
+    others[k] = false;
+    Measurement rest = m;
+    leave_out(k, rest);
+    if (used[k] && agrees(rest, others)) {
+      if (odd != kNoGyro) {
+        return kNoGyro;  // either may be
+      }
+      odd = k;
+    }
+  }
+  return odd;
+}
+
+template <class Base, int N, FurtherStates F>
+auto InvariantEstimator<Base, N, F>::check_angles(Time t, const FixReadings<N>& readings) -> AngleReport {
+  AngleReport report;
+  report.t = t;
+  const auto by_gyros = attitude(gyros_, readings.h_b, readings.used);
+  if (!by_gyros) {
+    report.status = FixStatus::kRejectedGeometry;
+    return report;
+  }
+  const Eigen::Matrix3d& C_in_c = by_gyros.value().C_in_c.raw();
+  update_to_now(C_in_c);
+  const Measurement m = measure_angles(C_in_c, readings, ++angles_since_fix_);
+  const WhiteAngles white = angles_of(m);
+  report_innovation(information_, white, report);
+  if (!angles_agree(m, readings.used)) {
+    report.status = FixStatus::kRejectedByGate;
+    if (count(readings.used) > 2) {
+      report.odd_gyro = odd_gyro(m, readings.used, [this](const Measurement& rest, const GyroMask<N>& used) {
+        return angles_agree(rest, used);
+      });
+    }
+    report.rejections_in_a_row = ++angle_rejections_in_a_row_;
+    return report;
+  }
+  report.status = FixStatus::kUsed;
+  angle_rejections_in_a_row_ = 0;
+  feed_back(information_.template update<kAngles>(white.H, white.y));
   return report;
 }
 

@@ -1,5 +1,7 @@
 #include "trihedron/core/paper_estimator.hpp"
 
+#include <cmath>
+
 #include "trihedron/core/innovation.hpp"
 
 namespace trihedron {
@@ -16,7 +18,7 @@ Result<PaperEstimator<Model>, SetupFault> PaperEstimator<Model>::create(const Se
   PaperEstimator estimator;
   estimator.setup_ = setup;
   estimator.gyros_ = setup.prior;
-  estimator.gate_ = OutlierGate(setup.gate_nis, setup.reopen_after_rejections, setup.restart_within_fixes);
+  estimator.gate_ = OutlierGate(setup);
   estimator.prior_.add_prior_of_constants(root.value());
   estimator.information_ = estimator.prior_;
   return estimator;
@@ -40,6 +42,7 @@ void PaperEstimator<Model>::predict(const Eigen::Matrix3d& C_in_c, const Directi
     precess(gyros_[k], since_fix_[k], C_in_c, h_b[k], dt_s);
   }
   time_since_fix_s_ += dt_s;
+  gate_.elapse(dt_s);
 }
 
 template <class Model>
@@ -121,23 +124,32 @@ auto PaperEstimator<Model>::correct(const Eigen::Matrix3d& C_in_c, const Directi
   }
 
   report_innovation(information_, white, report);
-  report.status = gate_.judge(report.nis);
+  report.status = gate_.judge(report.nis, measurement.innovation.norm());
   report.rejections_in_a_row = gate_.rejections_in_a_row();
+  report.jumped = gate_.jumped();
+  report.weight = student_t_weight(setup_.student_t_freedom, report.nis, kMeasurements);
   switch (report.status) {
     case FixStatus::kRejectedByGate:
-      return report;
+      if (!(report.weight < 1) || report.jumped) {
+        return report;
+      }
+      report.status = FixStatus::kUsed;
+      break;
     case FixStatus::kRestarted:
       // Information gathered about a far wrong estimate: linearise anew about the present one.
       information_ = prior_;
+      report.weight = 1;
       break;
     case FixStatus::kUsedAfterReopening:
       add_direction_variance(measurement.innovation.squaredNorm() / kMeasurements);
       update_covariance_to_now(now);
+      report.weight = 1;
       break;
     default:
       break;
   }
-  feed_back(information_.update(white.H, white.y));
+  const double root_weight = std::sqrt(report.weight);
+  feed_back(information_.template update<kMeasurements>(root_weight * white.H, root_weight * white.y));
   return report;
 }
 

@@ -440,9 +440,9 @@ TEST(InvariantEstimator, RejectsOutliersReopensAndBeginsAnew) {
           flight.fixes[i].q_in_c * Eigen::Quaterniond(Eigen::AngleAxisd(angle, Eigen::Vector3d::UnitX()));
     }
   };
-  jump(50, 51, 0.01);    // one outlier
-  jump(100, 400, 0.01);  // the tracker turns for good, and again soon
-  jump(150, 400, 0.01);
+  jump(50, 51, 0.01);     // one outlier
+  jump(100, 400, 0.001);  // the tracker turns for good, and again soon
+  jump(150, 400, 0.001);
   auto cycle = std::make_unique<Cycle<Estimator>>(Cycle<Estimator>::create(nominal(), {}).value());
   std::vector<FixStatus> statuses;
   test::fly(flight, *cycle, [&](const auto& report) {

@@ -4,33 +4,109 @@
 
 #include <limits>
 
+#include "trihedron/core/drift.hpp"
+
 namespace trihedron {
 namespace {
 
+constexpr double kSmall_rad = 1e-3;
+constexpr double kLie_rad = 0.05;
+
+OutlierGate make_gate(int reopen_after, int reopen_after_jump) {
+  CalibrationSetup<Esg7, 2> setup;
+  setup.gate_nis = 30;
+  setup.reopen_after_rejections = reopen_after;
+  setup.reopen_after_jump_rejections = reopen_after_jump;
+  setup.restart_within_fixes = 10;
+  return OutlierGate(setup);
+}
+
+/// How many of the same misfit, one each 3 s, are rejected before one is used.
+int rejections(OutlierGate& gate, double misfit_rad) {
+  int count = 0;
+  while (gate.judge(100, misfit_rad) == FixStatus::kRejectedByGate) {
+    gate.elapse(3);
+    ++count;
+  }
+  return count;
+}
+
+TEST(GateOfFreedom, IsPassedAsOftenByGoodMeasurements) {
+  // χ² quantiles of the probability that 4 degrees of freedom leave above 30: 4.9e-6.
+  EXPECT_DOUBLE_EQ(gate_of_freedom(4, 30, 4), 30);
+  EXPECT_NEAR(gate_of_freedom(1, 30, 4), 20.9, 1.2);
+  EXPECT_NEAR(gate_of_freedom(2, 30, 4), 24.5, 0.6);
+  EXPECT_NEAR(gate_of_freedom(3, 30, 4), 27.4, 0.3);
+  EXPECT_NEAR(gate_of_freedom(6, 30, 4), 34.6, 0.5);
+}
+
 TEST(OutlierGate, RejectsAboveTheGateAndWhatIsNoNumber) {
-  OutlierGate gate(30, 5, 10);
-  EXPECT_EQ(gate.judge(30), FixStatus::kUsed);
-  EXPECT_EQ(gate.judge(30.1), FixStatus::kRejectedByGate);
-  EXPECT_EQ(gate.judge(std::numeric_limits<double>::quiet_NaN()), FixStatus::kRejectedByGate);
+  OutlierGate gate = make_gate(5, 50);
+  EXPECT_EQ(gate.judge(30, kSmall_rad), FixStatus::kUsed);
+  EXPECT_EQ(gate.judge(30.1, kSmall_rad), FixStatus::kRejectedByGate);
+  EXPECT_FALSE(gate.jumped());
+  constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_EQ(gate.judge(kNaN, kNaN), FixStatus::kRejectedByGate);
+  EXPECT_TRUE(gate.jumped());
   EXPECT_EQ(gate.rejections_in_a_row(), 2);
-  EXPECT_EQ(gate.judge(3), FixStatus::kUsed);
+  EXPECT_EQ(gate.judge(3, kSmall_rad), FixStatus::kUsed);
+  EXPECT_FALSE(gate.jumped());
   EXPECT_EQ(gate.rejections_in_a_row(), 0);
 }
 
 TEST(OutlierGate, ReopensAfterARunAndRestartsAfterAnotherSoon) {
-  OutlierGate gate(30, 3, 10);
+  OutlierGate gate = make_gate(3, 50);
   const auto run = [&] {
-    EXPECT_EQ(gate.judge(100), FixStatus::kRejectedByGate);
-    EXPECT_EQ(gate.judge(100), FixStatus::kRejectedByGate);
-    return gate.judge(100);
+    EXPECT_EQ(gate.judge(100, kSmall_rad), FixStatus::kRejectedByGate);
+    EXPECT_EQ(gate.judge(100, kSmall_rad), FixStatus::kRejectedByGate);
+    return gate.judge(100, kSmall_rad);
   };
   EXPECT_EQ(run(), FixStatus::kUsedAfterReopening);
   EXPECT_EQ(run(), FixStatus::kRestarted);
   // Ten good fixes later the suspicion is over.
   for (int i = 0; i < 10; ++i) {
-    EXPECT_EQ(gate.judge(4), FixStatus::kUsed);
+    EXPECT_EQ(gate.judge(4, kSmall_rad), FixStatus::kUsed);
   }
   EXPECT_EQ(run(), FixStatus::kUsedAfterReopening);
+}
+
+TEST(OutlierGate, WaitsLongerWhereTheMisfitHasJumped) {
+  OutlierGate gate = make_gate(3, 50);
+  EXPECT_EQ(gate.judge(4, kSmall_rad), FixStatus::kUsed);
+  EXPECT_EQ(rejections(gate, kLie_rad), 49);
+  // What it has reopened to is in doubt until a fix agrees with it.
+  EXPECT_EQ(rejections(gate, kLie_rad), 2);
+  EXPECT_EQ(gate.judge(4, kSmall_rad), FixStatus::kUsed);
+  EXPECT_EQ(rejections(gate, kLie_rad), 49);
+}
+
+TEST(OutlierGate, WaitsLongerWhereASmallOutlierWentBefore) {
+  OutlierGate gate = make_gate(3, 50);
+  EXPECT_EQ(gate.judge(4, kSmall_rad), FixStatus::kUsed);
+  EXPECT_EQ(gate.judge(100, kSmall_rad), FixStatus::kRejectedByGate);
+  EXPECT_EQ(rejections(gate, kLie_rad), 48);
+}
+
+TEST(OutlierGate, DoesNotTakeWhatDriftMayDoInTheTimeForAJump) {
+  for (const double since_s : {3.0, 6000.0}) {
+    OutlierGate gate = make_gate(3, 50);
+    EXPECT_EQ(gate.judge(4, kSmall_rad), FixStatus::kUsed);
+    gate.elapse(since_s);
+    EXPECT_EQ(rejections(gate, kLie_rad), since_s > 5000 ? 2 : 49) << since_s;
+  }
+  // Nor what grows step by step.
+  OutlierGate gate = make_gate(10, 50);
+  EXPECT_EQ(gate.judge(4, 0), FixStatus::kUsed);
+  int count = 0;
+  for (double misfit_rad = 2e-3; gate.judge(100, misfit_rad) == FixStatus::kRejectedByGate; misfit_rad += 2e-3) {
+    ++count;
+  }
+  EXPECT_EQ(count, 9);
+}
+
+TEST(OutlierGate, BelievesAllOthersAgainstAStartThatNoneConfirms) {
+  OutlierGate gate = make_gate(3, 50);
+  EXPECT_EQ(rejections(gate, kLie_rad), 2);
 }
 
 }  // namespace

@@ -134,6 +134,9 @@ TEST(PaperEstimator, RefusesSetupsThatCannotWork) {
   setup = test::nominal_setup();
   setup.reopen_after_rejections = 0;
   EXPECT_EQ(Estimator::create(setup).fault(), SetupFault::kGateNotPositive);
+  setup = test::nominal_setup();
+  setup.reopen_after_jump_rejections = 0;
+  EXPECT_EQ(Estimator::create(setup).fault(), SetupFault::kGateNotPositive);
 }
 
 /// Rotation vector by which the estimated alignment is off, rad.

@@ -274,7 +274,7 @@ CalibrationRun calibrate_with(const Pass& pass, Decision decision, const Progres
       run.navigation.age_s.push_back(to_seconds(report.fix.t - corrected));
     }
   };
-  std::array<long, 4> samples{};
+  std::array<long, kSampleStatuses> samples{};
   Meter meter(progress, pass.gyro.size());
   replay(pass, *cycle, on_fix, [&](const typename Cycle<Estimator>::Report& report) {
     ++samples[static_cast<std::size_t>(report.sample)];

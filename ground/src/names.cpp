@@ -28,6 +28,8 @@ const char* name_of(FixStatus status) {
       return "rejected: too many waiting";
     case FixStatus::kRejectedGeometry:
       return "rejected: momenta nearly parallel";
+    case FixStatus::kRejectedTooFewGyros:
+      return "rejected: too few gyros can be used";
     case FixStatus::kRejectedByGate:
       return "rejected: outlier";
   }
@@ -44,6 +46,10 @@ const char* name_of(SampleStatus status) {
       return "rejected: out of order";
     case SampleStatus::kRejectedGeometry:
       return "rejected: momenta nearly parallel";
+    case SampleStatus::kRejectedTooFewGyros:
+      return "rejected: too few gyros can be used";
+    case SampleStatus::kUsedAfterClockSetBack:
+      return "used after the clock was set back";
   }
   return "unknown";
 }

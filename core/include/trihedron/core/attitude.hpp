@@ -6,7 +6,7 @@
 
 namespace trihedron {
 
-enum class DirectionsFault { kNotFinite, kMomentaNearlyParallel };
+enum class DirectionsFault { kNotFinite, kMomentaNearlyParallel, kTooFew };
 
 /// Momenta closer than asin(kMinSine) = 2.9° to one line give no attitude: errors about them grow 20 times.
 inline constexpr double kMinSine = 0.05;

@@ -4,6 +4,7 @@
 #include <Eigen/Cholesky>
 #include <Eigen/Core>
 #include <algorithm>
+#include <chrono>
 #include <cstdint>
 #include <optional>
 
@@ -42,6 +43,7 @@ enum class SetupFault { kPriorNotPositiveDefinite, kPriorMeanNotUsable, kNoiseNo
 template <class Model, int N>
 struct CalibrationSetup {
   using Layout = ParameterLayout<Model, N>;
+  static constexpr Duration kNever = Duration::max();
 
   PerGyro<GyroModel<Model>, N> prior;  ///< prior means; the momenta come from the first fix
   Eigen::Matrix<double, Layout::kSize, Layout::kSize> prior_covariance =
@@ -51,12 +53,21 @@ struct CalibrationSetup {
   double direction_random_walk_rad_sqrt_s = 0;  ///< process noise of each momentum, per axis across it
   /// A fix with a NIS above this is rejected. χ² of 4 degrees of freedom passes 30 once in 2e5 good fixes.
   double gate_nis = 30;
+  /// ν of Student's t, or 0 for normal noise. With it a fix above the gate is used with its weight instead of rejected,
+  /// unless the star tracker or one gyro is plainly at fault; a run above the gate still reopens.
+  /// Better where many fixes are a few times too noisy; few far outliers the gate alone keeps out no worse, and the
+  /// paper's filter better. Between 5 and 20.
+  double student_t_freedom = 0;
   /// After so many rejections in a row the directions are set free by the size of the misfit and the fix is used: the
   /// model was wrong, not the tracker.
   int reopen_after_rejections = 20;
+  /// The same where the run began with a misfit that no drift can make: the tracker was wrong, or has been turned.
+  int reopen_after_jump_rejections = 400;
   /// When that happens again within so many fixes, the parameters are what is wrong: the estimates stay, their
   /// information goes.
   int restart_within_fixes = 200;
+  /// Without a fix that could be used for longer than this, the angles between the momenta are used alone; or kNever.
+  Duration angles_after = std::chrono::minutes(1);
 
   /// Finite drift coefficients and alignments that are rotations.
   [[nodiscard]] bool means_are_usable() const {
@@ -71,7 +82,8 @@ struct CalibrationSetup {
     if (!noise_is_positive()) {
       return SetupFault::kNoiseNotPositive;
     }
-    if (!(gate_nis > 0) || !(reopen_after_rejections > 0)) {
+    if (!(gate_nis > 0) || !(student_t_freedom >= 0) || !(reopen_after_rejections > 0) ||
+        !(reopen_after_jump_rejections > 0)) {
       return SetupFault::kGateNotPositive;
     }
     if (!means_are_usable()) {
@@ -101,6 +113,7 @@ enum class FixStatus : std::uint8_t {
   kRejectedUnknownHead,  ///< of a star tracker that the estimator does not have
   kRejectedBacklog,      ///< more fixes are waiting than there is room for
   kRejectedGeometry,     ///< momenta nearly parallel
+  kRejectedTooFewGyros,  ///< fewer than two gyros can be used, or at the start not all; the step's report names them
   kRejectedByGate,       ///< NIS above the gate
 };
 
@@ -116,11 +129,23 @@ struct FixReport {
   Time t{};
   Eigen::Matrix<double, M, 1> innovation = Eigen::Matrix<double, M, 1>::Zero();  ///< −z of eq. (3)
   Eigen::Matrix<double, M, M> innovation_covariance = Eigen::Matrix<double, M, M>::Zero();
-  double nis = 0;  ///< innovation² over its covariance; M degrees of freedom
-  int rejections_in_a_row = 0;
+  double nis = 0;               ///< innovation² over its covariance; M degrees of freedom
+  double weight = 1;            ///< its noise was taken for 1/√weight of the nominal; 1 without Student's t
+  int rejections_in_a_row = 0;  ///< or, with Student's t, fixes above the gate
+  bool jumped = false;  ///< the misfit came at once and is more than drift can make: put down to the star tracker
+
+  int odd_gyro = kNoGyro;  ///< index of the gyro that alone, and not the star tracker, explains why it was rejected
 
   [[nodiscard]] bool used() const { return is_used(status); }
 };
+
+/// Weight of an innovation when its noise is not normal but Student's t with ν degrees of freedom: of normal noise with
+/// covariance R/w, w ~ Γ(ν/2, ν/2), the mean of w given an innovation of M components is (ν + M)/(ν + NIS). One step,
+/// at the NIS before the update: R is nearly all of its covariance once the filter has settled, and before that too
+/// large a weight is the safe side. Never above 1: what agrees too well is chance. ν = 0: always 1.
+[[nodiscard]] inline double student_t_weight(double freedom, double nis, int components) {
+  return freedom > 0 ? std::min((freedom + components) / (freedom + nis), 1.0) : 1.0;
+}
 
 /// Some square root of the information in `covariance`: rootᵀ root = covariance⁻¹.
 template <int P>

@@ -7,9 +7,11 @@
 #include <chrono>
 #include <cstdint>
 #include <optional>
+#include <utility>
 
 #include "trihedron/core/directions_fit.hpp"
 #include "trihedron/core/fix_readings.hpp"
+#include "trihedron/core/gyro_health.hpp"
 #include "trihedron/core/navigator.hpp"
 #include "trihedron/core/telemetry.hpp"
 
@@ -17,10 +19,18 @@ namespace trihedron {
 
 enum class SampleStatus : std::uint8_t {
   kUsed,
-  kRejectedNotDirection,  ///< a reading is not finite or not unit
-  kRejectedOutOfOrder,    ///< not later than the sample before it, or alone more than an hour ahead
-  kRejectedGeometry,      ///< momenta nearly parallel
+  kRejectedNotDirection,   ///< a reading is not finite or not unit
+  kRejectedOutOfOrder,     ///< not later than the sample before it, or alone more than an hour ahead
+  kRejectedGeometry,       ///< momenta nearly parallel
+  kRejectedTooFewGyros,    ///< fewer than two gyros can be used; the report names them
+  kUsedAfterClockSetBack,  ///< used, the first since the clock of the telemetry was set back: nothing is predicted over
+                           ///< that
 };
+inline constexpr std::size_t kSampleStatuses = 6;
+
+[[nodiscard]] constexpr bool is_used(SampleStatus status) {
+  return status == SampleStatus::kUsed || status == SampleStatus::kUsedAfterClockSetBack;
+}
 
 /// Astro-corrections of the navigator.
 struct CorrectionPolicy {
@@ -35,13 +45,18 @@ template <class Estimator>
 struct StepReport {
   Time t{};
   SampleStatus sample = SampleStatus::kUsed;
+  PerGyro<GyroState, Estimator::kGyros> gyros{};  ///< after this step
   typename Estimator::Report fix;  ///< of the fix that was dealt with in this step, if any; its time is its own
+  int fixes_dropped = 0;           ///< that waited when the clock was set back: nobody knows their time now
   bool corrected = false;          ///< the navigator was corrected at that fix
   /// Attitude at that fix, used or rejected as an outlier: of the calibration itself, and of the open-loop navigator.
   std::optional<AttitudeSolution> calibrated;
   std::optional<AttitudeSolution> navigated;
+  /// Of the angles between the momenta, where they were looked at in this step because no fix could be used for long:
+  /// the integrity of the gyros without a star tracker, and of use to the calibration. Its time is its own.
+  typename Estimator::AngleReport angles;
   /// z1 of eq. (3), cosθ predicted minus cosθ measured: the integrity of the pair, without a star tracker. Zero before
-  /// the start.
+  /// the start, and where one of the two cannot be used.
   double angle_residual = 0;
 };
 
@@ -61,6 +76,11 @@ class Cycle {
   static constexpr Duration kMaxGap = std::chrono::hours(1);
   /// Samples that are taken together for the attitude now, where the estimator takes any together.
   static constexpr Duration kRecent = std::chrono::milliseconds(2500);
+  /// Without fixes the angles between the momenta are looked at so often; no two times share samples.
+  static constexpr Duration kAngleInterval = std::chrono::seconds(3);
+  static constexpr bool kUsesAngles = requires(Estimator e, FixReadings<kGyros> r) { e.check_angles(Time{}, r); };
+  /// So many samples in a row behind the present time set it back.
+  static constexpr int kSetBackSamples = 16;
   static constexpr int kBufferedSamples = 64;
   static constexpr int kBufferedFixes = 8;
 
@@ -85,10 +105,15 @@ class Cycle {
     report.t = sample.t;
     GyroSample<kGyros> screened = sample;
     report.sample = screen(screened);
-    if (report.sample != SampleStatus::kUsed) {
+    report.gyros = health_.states();
+    if (report.sample == SampleStatus::kRejectedTooFewGyros) {
+      calibrate_until(screened.t - Estimator::kReach, report);  // what waits for samples waits in vain
+    }
+    if (!is_used(report.sample)) {
       return report;
     }
-    if (navigator_.started()) {
+    report.fixes_dropped = std::exchange(fixes_dropped_, 0);
+    if (navigator_.started() && has_sample()) {
       predict_navigator(samples_.latest().t, samples_.latest().h_b, screened.t, screened.h_b);
     }
     if (behind_ == kBufferedSamples) {  // more samples than the reach was made for: the oldest cannot wait
@@ -107,6 +132,7 @@ class Cycle {
   Report on_fix(const StarFix& fix) {
     Report report;
     report.t = fix.t;
+    report.gyros = health_.states();
     report.fix.t = fix.t;
     report.fix.status = take_up(fix);
     if (report.fix.status == FixStatus::kPending) {
@@ -120,8 +146,10 @@ class Cycle {
   /// when none waits.
   Report flush() {
     Report report;
+    report.gyros = health_.states();
     if (fixes_ > 0) {
       report.t = samples_.latest().t;
+      angles_t_ = Time::max();  // or the fix would wait for them
       calibrate_until(std::max(report.t, pending_[0].t), report);
     }
     return report;
@@ -135,7 +163,7 @@ class Cycle {
   /// Open-loop attitude at the latest sample. Needs navigator().started().
   [[nodiscard]] Result<AttitudeSolution, DirectionsFault> navigation_attitude() const {
     const FixReadings<kGyros> now = readings_now();
-    return navigator_.attitude_with_covariance(now.h_b, now.noise_factor, estimator_.since_fix(), estimator_.setup());
+    return navigator_.attitude_with_covariance(now, estimator_.since_fix(), estimator_.setup());
   }
 
  private:
@@ -143,24 +171,65 @@ class Cycle {
 
   [[nodiscard]] SampleStatus screen(GyroSample<kGyros>& sample) {
     if (has_sample() && !(sample.t > t())) {
-      return SampleStatus::kRejectedOutOfOrder;
-    }
-    for (Eigen::Vector3d& h : sample.h_b) {
-      const double norm = h.norm();
-      if (!nearly_unit(norm)) {
-        return SampleStatus::kRejectedNotDirection;
+      if (!is_set_back(sample.t)) {
+        return SampleStatus::kRejectedOutOfOrder;
       }
-      h /= norm;
+      set_clock(sample.t);
     }
+    behind_present_ = 0;
     if (is_wild(sample.t)) {
       return SampleStatus::kRejectedOutOfOrder;
     }
+    health_.look_at(sample);
+    const GyroMask<kGyros> used = health_.usable(sample.t, sample.t);
+    if (count(used) < 2) {
+      return SampleStatus::kRejectedTooFewGyros;
+    }
+    for (int k = 0; k < kGyros; ++k) {
+      Eigen::Vector3d& h = sample.h_b[k];
+      const double norm = h.norm();
+      if (nearly_unit(norm)) {
+        h /= norm;
+      } else if (used[k]) {
+        return SampleStatus::kRejectedNotDirection;
+      } else {
+        h = Eigen::Vector3d::UnitX();  // not used, but finite
+      }
+    }
     // The prediction to it is made with the middle of the step.
-    if (estimator_.started() &&
-        !Estimator::attitude(estimator_.gyros(), between(samples_.latest().h_b, sample.h_b, 0.5))) {
+    if (estimator_.started() && has_sample() &&
+        !Estimator::attitude(estimator_.gyros(), between(samples_.latest().h_b, sample.h_b, 0.5),
+                             used_over(t(), sample.t))) {
       return SampleStatus::kRejectedGeometry;
     }
-    return SampleStatus::kUsed;
+    return std::exchange(clock_set_back_, false) ? SampleStatus::kUsedAfterClockSetBack : SampleStatus::kUsed;
+  }
+
+  /// Whether the samples behind the present time are so many, and run so well forward among themselves, that theirs is
+  /// the time now: without it all would be out of order until the old time is reached again.
+  [[nodiscard]] bool is_set_back(Time t) {
+    const bool runs_on = behind_present_ > 0 && t > behind_present_t_ && t - behind_present_t_ <= kMaxInterpolation;
+    behind_present_ = runs_on ? behind_present_ + 1 : 1;
+    behind_present_t_ = t;
+    return behind_present_ >= kSetBackSamples;
+  }
+
+  /// Begins a new time at `t`. The estimates stay as they are at the last sample: how long the jump took is unknown.
+  void set_clock(Time t) {
+    for (; behind_ > 0; --behind_) {
+      follow(next_sample().t, next_sample().h_b);
+    }
+    const Duration shift = t - this->t();
+    corrected_t_ += shift;
+    angles_t_ = angles_t_ == Time::max() ? angles_t_ : angles_t_ + shift;
+    taken_until_ = Time::min();
+    follower_t_ = t;
+    used_fix_t_ = {};
+    fixes_dropped_ += std::exchange(fixes_, 0);
+    samples_ = {};
+    has_suspect_ = false;
+    health_.set_clock(t);
+    clock_set_back_ = true;
   }
 
   /// Whether a time lies so far ahead that it needs a second one beside it to be believed: a single wild time stamp
@@ -183,6 +252,9 @@ class Cycle {
     if (fix.head < 0 || fix.head >= Estimator::kHeads) {
       return FixStatus::kRejectedUnknownHead;
     }
+    if (count(health_.usable(fix.t, fix.t)) < 2 || too_few_now()) {
+      return FixStatus::kRejectedTooFewGyros;
+    }
     if (!has_sample() || fix.t - t() > kMaxInterpolation) {
       return FixStatus::kRejectedNoGyro;
     }
@@ -190,7 +262,7 @@ class Cycle {
     const bool repeated = std::any_of(pending_.begin(), waiting,
                                       [&](const StarFix& other) { return other.t == fix.t && other.head == fix.head; });
     const auto& used_t = used_fix_t_[fix.head];
-    if (repeated || (used_t && fix.t <= *used_t) || (followed_ && fix.t < follower_t_)) {
+    if (repeated || (used_t && fix.t <= *used_t) || fix.t < taken_until_) {
       return FixStatus::kRejectedOutOfOrder;
     }
     if (fixes_ == kBufferedFixes) {
@@ -210,9 +282,15 @@ class Cycle {
   void calibrate_until(Time limit, Report& report) {
     bool dealt_with_one = false;
     while (true) {
-      const bool sample_due = behind_ > 0 && next_sample().t <= limit;
-      const bool fix_due = fixes_ > 0 && pending_[0].t <= limit;
-      if (fix_due && !(sample_due && next_sample().t <= pending_[0].t)) {
+      const Time sample_t = behind_ > 0 ? next_sample().t : Time::max();
+      const Time fix_t = fixes_ > 0 ? pending_[0].t : Time::max();
+      // A fix that would share samples with the angles goes before them; they wait until none can come any more.
+      if (behind_ > 0 && angles_t_ < sample_t && angles_t_ <= fix_t - 2 * Estimator::kReach) {
+        if (angles_t_ > limit - 2 * Estimator::kReach || report.angles.status != FixStatus::kNone) {
+          return;
+        }
+        look_at_angles(report);
+      } else if (fix_t < sample_t && fix_t <= limit) {
         if (dealt_with_one) {
           return;
         }
@@ -221,7 +299,7 @@ class Cycle {
         std::move(pending_.begin() + 1, pending_.begin() + fixes_, pending_.begin());
         --fixes_;
         correct(fix, report);
-      } else if (sample_due) {
+      } else if (sample_t <= limit) {
         follow(next_sample().t, next_sample().h_b);
         --behind_;
       } else {
@@ -235,6 +313,10 @@ class Cycle {
     report.fix = {};
     report.fix.t = fix.t;
     const std::optional<FixReadings<kGyros>> readings = readings_at(fix.t);
+    if (count(readings ? readings->used : health_.usable(fix.t, fix.t)) < (estimator_.started() ? 2 : kGyros)) {
+      report.fix.status = FixStatus::kRejectedTooFewGyros;
+      return;
+    }
     if (!readings) {
       report.fix.status = FixStatus::kRejectedNoGyro;
       return;
@@ -247,13 +329,49 @@ class Cycle {
       return;  // the estimator did not move its covariance to this fix
     }
     navigator_.extend(stretch);
+    judge(report.fix.odd_gyro, report);
     report.calibrated = calibration_attitude(*readings);
     if (report.fix.used()) {
       used_fix_t_[fix.head] = fix.t;
       correct_navigator(*readings, report);
+      const Duration after = estimator_.setup().angles_after;
+      angles_t_ = kUsesAngles && after != Estimator::Setup::kNever ? fix.t + after : Time::max();
+    } else if (fix.t >= angles_t_) {
+      use_angles(fix.t, *readings, report);  // these samples are free, and the step has come so far
     }
     if (navigator_.started() && !report.corrected) {
       report.navigated = navigated_before(fix.t, *readings);
+    }
+  }
+
+  /// The angles between the momenta alone, at the time that they are due.
+  void look_at_angles(Report& report) {
+    const Time t = std::max(angles_t_, follower_t_);
+    const auto readings = readings_at(t);
+    if (readings && count(readings->used) >= 2) {
+      follow(t, readings->h_b);
+      const typename Estimator::Sensitivities stretch = estimator_.since_fix();
+      use_angles(t, *readings, report);
+      judge(report.angles.odd_gyro, report);
+      if (report.angles.status != FixStatus::kRejectedGeometry) {
+        navigator_.extend(stretch);
+      }
+    } else {  // a gap of the gyros: on where they are back
+      angles_t_ = next_sample().t + Estimator::kReach;
+    }
+  }
+
+  void judge(int odd_gyro, Report& report) {
+    health_.judge(odd_gyro);
+    report.gyros = health_.states();
+  }
+
+  /// Readings and estimator at `t`.
+  void use_angles(Time t, const FixReadings<kGyros>& readings, Report& report) {
+    if constexpr (kUsesAngles) {
+      report.angles = estimator_.check_angles(t, readings);
+      taken_until_ = t + 2 * Estimator::kReach;
+      angles_t_ = t + kAngleInterval;
     }
   }
 
@@ -276,8 +394,7 @@ class Cycle {
     }
     corrected_t_ = t;
     report.corrected = true;
-    const auto solution = navigator_.attitude_with_covariance(readings.h_b, readings.noise_factor,
-                                                              estimator_.since_fix(), estimator_.setup());
+    const auto solution = navigator_.attitude_with_covariance(readings, estimator_.since_fix(), estimator_.setup());
     if (solution) {
       report.navigated = solution.value();
     }
@@ -294,9 +411,14 @@ class Cycle {
 
   /// The estimator to `t`, with the midpoint of the readings.
   void follow(Time t, const Directions& h_b) {
+    if (count(health_.usable(t, t)) < 2) {
+      return;  // the next step that can be made begins where the last ended
+    }
     if (estimator_.started() && t > follower_t_) {
-      const Directions middle = between(follower_h_b_, h_b, 0.5);
-      if (const auto attitude = Estimator::attitude(estimator_.gyros(), middle)) {
+      Directions middle = between(follower_h_b_, h_b, 0.5);
+      const GyroMask<kGyros> used = used_over(follower_t_, t);
+      if (const auto attitude = Estimator::attitude(estimator_.gyros(), middle, used)) {
+        read_by_others(estimator_.gyros(), attitude.value().C_in_c.raw(), used, middle);
         const double dt_s = to_seconds(t - follower_t_);
         estimator_.predict(attitude.value().C_in_c.raw(), middle, dt_s);
         if (t - follower_t_ > kMaxInterpolation) {
@@ -305,19 +427,46 @@ class Cycle {
       }
     }
     follower_t_ = t;
+    taken_until_ = std::max(taken_until_, t);
     follower_h_b_ = h_b;
-    followed_ = true;
   }
 
   void predict_navigator(Time from_t, const Directions& from, Time to_t, const Directions& to) {
-    const Directions middle = between(from, to, 0.5);
-    if (const auto attitude = navigator_.attitude(middle)) {
+    Directions middle = between(from, to, 0.5);
+    const GyroMask<kGyros> used = used_over(from_t, to_t);
+    if (const auto attitude = navigator_.attitude(middle, used)) {
+      read_by_others(navigator_.gyros(), attitude.value().C_in_c.raw(), used, middle);
       const double dt_s = to_seconds(to_t - from_t);
       navigator_.predict(attitude.value().C_in_c.raw(), middle, dt_s);
       if (to_t - from_t > kMaxInterpolation) {
         navigator_.add_direction_variance(variance_of_long_step(from, to, dt_s));
       }
     }
+  }
+
+  /// What the gyros that are not used would read at the attitude of the others: their momenta turn all the same.
+  static void read_by_others(const typename Estimator::Gyros& gyros, const Eigen::Matrix3d& C_in_c,
+                             const GyroMask<kGyros>& used, Directions& h_b) {
+    for (int k = 0; k < kGyros; ++k) {
+      if (!used[k]) {
+        h_b[k] = gyros[k].C_c_b.transpose() * (C_in_c.transpose() * gyros[k].h_in);
+      }
+    }
+  }
+
+  /// Gyros that can be used at both ends of a step; where those are too few, at its end.
+  [[nodiscard]] GyroMask<kGyros> used_over(Time from, Time to) const {
+    GyroMask<kGyros> at_both = health_.usable(from, from);
+    const GyroMask<kGyros> at_end = health_.usable(to, to);
+    for (int k = 0; k < kGyros; ++k) {
+      at_both[k] = at_both[k] && at_end[k];
+    }
+    return count(at_both) >= 2 ? at_both : at_end;
+  }
+
+  [[nodiscard]] bool too_few_now() const {
+    const auto states = health_.states();
+    return std::count(states.begin(), states.end(), GyroState::kUsed) < 2;
   }
 
   /// What the midpoint rule may miss when the body turned far between two samples, rad²: the drift over the step, times
@@ -358,10 +507,12 @@ class Cycle {
     }
     const GyroSample<kGyros>& before = samples_[after - 1];
     FixReadings<kGyros> readings;
+    readings.used = health_.usable(before.t, t);
     if (before.t == t) {
       readings.h_b = before.h_b;
     } else if (after < samples_.size() && samples_[after].t - before.t <= kMaxInterpolation) {
       const GyroSample<kGyros>& next = samples_[after];
+      readings.used = health_.usable(before.t, next.t);
       readings.h_b = between(before.h_b, next.h_b, to_seconds(t - before.t) / to_seconds(next.t - before.t));
     } else {
       return std::nullopt;
@@ -383,6 +534,7 @@ class Cycle {
   /// Readings at the latest sample.
   [[nodiscard]] FixReadings<kGyros> readings_now() const {
     FixReadings<kGyros> readings;
+    readings.used = health_.usable(t(), t());
     readings.h_b = samples_.latest().h_b;
     if constexpr (Estimator::kReach > Duration::zero()) {
       int begin = samples_.size() - 1;
@@ -403,29 +555,33 @@ class Cycle {
       return;
     }
     const FittedDirections<kGyros> fitted = fit_directions(samples_, begin, end, t, degree);
-    if (!explains(fitted)) {
+    const GyroMask<kGyros> used = health_.usable(samples_[begin].t, samples_[end - 1].t);
+    if (count(used) < 2 || !explains(fitted, used)) {
       return;
     }
+    readings.used = used;
     readings.h_b = fitted.h_b;
     readings.noise_factor = fitted.noise_factor;
     // ḣ_c = −ω × h_c: each gyro sees ω across its momentum.
     Eigen::Matrix3d across = Eigen::Matrix3d::Zero();
     Eigen::Vector3d seen = Eigen::Vector3d::Zero();
     for (int k = 0; k < kGyros; ++k) {
-      const Eigen::Matrix3d& C_c_b = estimator_.gyros()[k].C_c_b;
-      const Eigen::Vector3d h_c = C_c_b * fitted.h_b[k];
-      across += Eigen::Matrix3d::Identity() - h_c * h_c.transpose();
-      seen += (C_c_b * fitted.h_b_rate[k]).cross(h_c);
+      if (used[k]) {
+        const Eigen::Matrix3d& C_c_b = estimator_.gyros()[k].C_c_b;
+        const Eigen::Vector3d h_c = C_c_b * fitted.h_b[k];
+        across += Eigen::Matrix3d::Identity() - h_c * h_c.transpose();
+        seen += (C_c_b * fitted.h_b_rate[k]).cross(h_c);
+      }
     }
     readings.rate_c = across.inverse() * seen;
   }
 
   /// Whether a polynomial is what the body did: its residuals are those of the readout, within five sigmas.
-  [[nodiscard]] bool explains(const FittedDirections<kGyros>& fitted) const {
+  [[nodiscard]] bool explains(const FittedDirections<kGyros>& fitted, const GyroMask<kGyros>& used) const {
     const double bound = fitted.freedom + 5 * std::sqrt(2.0 * fitted.freedom);
     for (int k = 0; k < kGyros; ++k) {
       const double sigma_rad = estimator_.setup().readout_noise_rad[k];
-      if (!(fitted.residual_square[k] <= bound * sigma_rad * sigma_rad)) {
+      if (used[k] && !(fitted.residual_square[k] <= bound * sigma_rad * sigma_rad)) {
         return false;
       }
     }
@@ -435,7 +591,7 @@ class Cycle {
   // ---- What comes out
 
   [[nodiscard]] std::optional<AttitudeSolution> calibration_attitude(const FixReadings<kGyros>& readings) const {
-    const auto attitude = Estimator::attitude(estimator_.gyros(), readings.h_b);
+    const auto attitude = Estimator::attitude(estimator_.gyros(), readings.h_b, readings.used);
     if (!attitude) {
       return std::nullopt;
     }
@@ -451,19 +607,21 @@ class Cycle {
   /// The navigator's attitude at a time it has passed, within the samples buffered.
   [[nodiscard]] std::optional<AttitudeSolution> navigated_before(Time t, const FixReadings<kGyros>& readings) const {
     Navigator<Estimator> past = navigator_;
-    const Directions middle = between(readings.h_b, samples_.latest().h_b, 0.5);
-    const auto attitude = past.attitude(middle);
+    Directions middle = between(readings.h_b, samples_.latest().h_b, 0.5);
+    const GyroMask<kGyros> used = used_over(t, this->t());
+    const auto attitude = past.attitude(middle, used);
     if (!attitude) {
       return std::nullopt;
     }
+    read_by_others(past.gyros(), attitude.value().C_in_c.raw(), used, middle);
     past.predict(attitude.value().C_in_c.raw(), middle, to_seconds(t - this->t()));
-    const auto solution =
-        past.attitude_with_covariance(readings.h_b, readings.noise_factor, estimator_.since_fix(), estimator_.setup());
+    const auto solution = past.attitude_with_covariance(readings, estimator_.since_fix(), estimator_.setup());
     return solution ? std::optional(solution.value()) : std::nullopt;
   }
 
   [[nodiscard]] double angle_residual() const {
-    if (!estimator_.started()) {
+    const GyroMask<kGyros> used = health_.usable(t(), t());
+    if (!estimator_.started() || !used[0] || !used[1]) {
       return 0;
     }
     const auto& gyros = estimator_.gyros();
@@ -478,6 +636,7 @@ class Cycle {
   Estimator estimator_;
   Navigator<Estimator> navigator_;
   CorrectionPolicy policy_;
+  GyroHealth<kGyros> health_;
   SampleBuffer<kGyros, kBufferedSamples> samples_;
   int behind_ = 0;  ///< samples that the estimator has not yet followed
   Time follower_t_{};
@@ -487,7 +646,12 @@ class Cycle {
   PerGyro<std::optional<Time>, Estimator::kHeads> used_fix_t_;  ///< per star tracker
   Time corrected_t_{};
   Time suspect_t_{};
-  bool followed_ = false;
+  Time angles_t_ = Time::max();     ///< when the angles are due
+  Time taken_until_ = Time::min();  ///< a fix before it is too late: passed, or its samples are used
+  int behind_present_ = 0;          ///< samples in a row
+  Time behind_present_t_{};
+  int fixes_dropped_ = 0;
+  bool clock_set_back_ = false;  ///< and no sample used since
   bool has_suspect_ = false;
   bool start_unconfirmed_ = false;
 };

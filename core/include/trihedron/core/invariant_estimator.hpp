@@ -13,6 +13,7 @@
 #include "trihedron/core/drift.hpp"
 #include "trihedron/core/fix_readings.hpp"
 #include "trihedron/core/further_states.hpp"
+#include "trihedron/core/innovation.hpp"
 #include "trihedron/core/optimal_attitude.hpp"
 #include "trihedron/core/outlier_gate.hpp"
 #include "trihedron/core/square_root_information.hpp"
@@ -78,6 +79,8 @@ class InvariantEstimator {
   using Sensitivities = PerGyro<Sensitivity<DriftModel>, N>;
   using Directions = PerGyro<Eigen::Vector3d, N>;
   using Report = FixReport<kMeasurements>;
+  static constexpr int kAngles = 2 * N - 3;  ///< of the components at a fix, those that no common rotation changes
+  using AngleReport = FixReport<kAngles>;    ///< its innovation in 1-sigmas of the readings
   using Errors = ErrorLayout<DriftModel, N>;
   using ErrorRoot = Eigen::Matrix<double, Errors::kSize, Layout::kStates>;
   static constexpr int kHeads = 1 + F.further_heads;
@@ -97,9 +100,9 @@ class InvariantEstimator {
   [[nodiscard]] const Setup& setup() const { return setup_; }
   [[nodiscard]] const Information& information() const { return information_; }
 
-  /// Least squares, all gyros alike.
-  [[nodiscard]] static Result<AttitudeByDirections<N>, DirectionsFault> attitude(const Gyros& gyros,
-                                                                                 const Directions& h_b);
+  /// Least squares, all gyros used alike.
+  [[nodiscard]] static Result<AttitudeByDirections<N>, DirectionsFault> attitude(
+      const Gyros& gyros, const Directions& h_b, const GyroMask<N>& used = all_gyros<N>());
   /// What was known before.
   [[nodiscard]] Gyros prior_gyros() const;
   /// A square root of the prior covariance, rows as the parameters in ErrorLayout.
@@ -116,6 +119,10 @@ class InvariantEstimator {
 
   /// The first fix starts the filter, each further one updates it.
   [[nodiscard]] Report correct(const StarFix& fix, const FixReadings<N>& readings);
+  /// Update without a fix: by the angles between the momenta, which the readings give without the attitude. Says
+  /// nothing of it, nor of anything that turns all momenta alike. Never reopens: that is for the fixes. Needs
+  /// started().
+  [[nodiscard]] AngleReport check_angles(Time t, const FixReadings<N>& readings);
 
   using Innovation = Eigen::Matrix<double, kMeasurements, 1>;
   using MeasurementRows = Eigen::Matrix<double, kMeasurements, Layout::kStates>;
@@ -136,7 +143,17 @@ class InvariantEstimator {
                                            const Eigen::Matrix3d& R_c, const FixBySharedStates& by_shared,
                                            const PerGyro<double, N>& readout_noise_rad);
 
+  using WhiteAngles = WhiteMeasurement<Information, kAngles>;
+  /// What is left of a measurement, its R that of the readings alone, when the attitude is eliminated.
+  [[nodiscard]] static WhiteAngles angles_of(const Measurement& m);
+
+  /// Takes a gyro out of a measurement: its components say nothing and have to do with no others.
+  static void leave_out(int gyro, Measurement& m);
+  static void leave_out_unused(const GyroMask<N>& used, Measurement& m);
+
  private:
+  /// 1-sigma of a direction of which nothing is known.
+  static constexpr double kUnknown_rad = 1;
   using Rows3 = Eigen::Matrix<double, 3, Layout::kStates>;
   /// Error of a fix by the shared states, c axes: as given = true · exp([e×]).
   [[nodiscard]] FixBySharedStates fix_by_shared(Time t, int head, const Eigen::Vector3d& rate_c) const;
@@ -149,6 +166,15 @@ class InvariantEstimator {
              const FixBySharedStates& by_shared);
   /// 1-sigma per axis of ½ a × b, what the linear model leaves out; a, b: rows of independent errors.
   [[nodiscard]] double second_order_rad(const Rows3& a, const Rows3& b) const;
+  /// 1-sigma of the readings with what the linear model leaves out, here for the n-th time in a row.
+  [[nodiscard]] PerGyro<double, N> reading_noise(const Eigen::Matrix3d& C_linear, double noise_factor, int n) const;
+  /// By readings alone, at the attitude that they give; for the n-th time in a row.
+  [[nodiscard]] Measurement measure_angles(const Eigen::Matrix3d& C_in_c, const FixReadings<N>& readings, int n) const;
+  [[nodiscard]] bool angles_agree(const Measurement& m, const GyroMask<N>& used) const;
+  [[nodiscard]] bool agrees(const Measurement& m, const GyroMask<N>& used) const;
+  /// The one gyro without which a measurement that does not agree does.
+  template <class Agrees>
+  [[nodiscard]] static int odd_gyro(const Measurement& m, const GyroMask<N>& used, Agrees&& agrees);
   void update_to_now(const Eigen::Matrix3d& C_in_c);
   void feed_back(const typename Information::Vector& x);
 
@@ -162,6 +188,8 @@ class InvariantEstimator {
   PerGyro<double, N> second_order_rad_{};  ///< 1-sigma of what the linear model has left out since the start
   double time_since_fix_s_ = 0;
   double extra_variance_rad2_ = 0;
+  int angles_since_fix_ = 0;
+  int angle_rejections_in_a_row_ = 0;
   bool started_ = false;
 };
 

@@ -3,6 +3,7 @@
 /// attitude.
 
 #include "trihedron/core/calibration.hpp"
+#include "trihedron/core/fix_readings.hpp"
 #include "trihedron/core/optimal_attitude.hpp"
 #include "trihedron/core/per_gyro.hpp"
 
@@ -101,16 +102,15 @@ class Navigator {
 
   /// Attitude by the momenta and these readings. Needs started().
   [[nodiscard]] Result<AttitudeByDirections<kGyros>, DirectionsFault> attitude(
-      const typename Estimator::Directions& h_b) const {
-    return Estimator::attitude(gyros_, h_b);
+      const typename Estimator::Directions& h_b, const GyroMask<kGyros>& used) const {
+    return Estimator::attitude(gyros_, h_b, used);
   }
 
-  /// The same with its covariance; `since_fix`: the stretch not yet given to extend(), `noise_factor`: 1-sigma of the
-  /// readings over that of a single one.
+  /// The same with its covariance; `since_fix`: the stretch not yet given to extend().
   [[nodiscard]] Result<AttitudeSolution, DirectionsFault> attitude_with_covariance(
-      const typename Estimator::Directions& h_b, double noise_factor,
-      const typename Estimator::Sensitivities& since_fix, const typename Estimator::Setup& setup) const {
-    const auto by_directions = attitude(h_b);
+      const FixReadings<kGyros>& readings, const typename Estimator::Sensitivities& since_fix,
+      const typename Estimator::Setup& setup) const {
+    const auto by_directions = attitude(readings.h_b, readings.used);
     if (!by_directions) {
       return by_directions.fault();
     }
@@ -118,7 +118,7 @@ class Navigator {
     PerGyro<double, kGyros> noise_rad;
     for (int k = 0; k < kGyros; ++k) {
       since[k] = since[k].then(since_fix[k]);
-      noise_rad[k] = noise_factor * setup.readout_noise_rad[k];
+      noise_rad[k] = readings.noise_factor * setup.readout_noise_rad[k];
     }
     const double walk = setup.direction_random_walk_rad_sqrt_s;
     return with_covariance<Model, kGyros>(by_directions.value(), errors_, since, noise_rad,

@@ -1,41 +1,83 @@
 #pragma once
 
 #include <algorithm>
+#include <cmath>
 
 #include "trihedron/core/calibration.hpp"
 
 namespace trihedron {
 
+/// The gate that good measurements of `freedom` degrees of freedom pass as often as those of `its_freedom` pass
+/// `gate_nis` (Wilson and Hilferty 1931: the cube root of χ²/n is nearly normal, of mean 1 − 2/9n and variance 2/9n).
+[[nodiscard]] inline double gate_of_freedom(int freedom, double gate_nis, int its_freedom) {
+  const double variance = 2.0 / (9 * freedom);
+  const double its_variance = 2.0 / (9 * its_freedom);
+  const double sigmas = (std::cbrt(gate_nis / its_freedom) - (1 - its_variance)) / std::sqrt(its_variance);
+  const double root = std::max(1 - variance + sigmas * std::sqrt(variance), 0.0);
+  return freedom * root * root * root;
+}
+
 /// Rejects fixes whose NIS is above a gate, and cannot lock out good ones: after a run of rejections the model was
-/// wrong, not the tracker, and the directions are set free; when that happens again soon, the filter begins anew.
+/// wrong, not the tracker, and the directions are set free; when that happens again soon, the filter begins anew. Where
+/// the misfit has jumped by what no momentum can, the tracker is wrong and the run may be much longer.
 class OutlierGate {
  public:
-  OutlierGate() = default;
-  OutlierGate(double gate_nis, int reopen_after_rejections, int restart_within_fixes)
-      : gate_nis_(gate_nis), reopen_after_(reopen_after_rejections), restart_within_(restart_within_fixes) {}
+  /// What a wrong model may add to the misfit from one fix to the next: at once, with an alignment wrong by ten
+  /// degrees in a slew of 1°/s, and in time, ten times the drift of a good gyro, or an alignment wrong by half a degree
+  /// in a body that turns at orbital rate.
+  static constexpr double kLargestStep_rad = 8.7e-3;  // 30′
+  static constexpr double kLargestRate_rad_s = 1e-5;
 
-  /// kUsed, kRejectedByGate, kUsedAfterReopening or kRestarted: what to do with the fix.
-  [[nodiscard]] FixStatus judge(double nis) {
+  OutlierGate() = default;
+  template <class Model, int N>
+  explicit OutlierGate(const CalibrationSetup<Model, N>& setup)
+      : gate_nis_(setup.gate_nis),
+        reopen_after_(setup.reopen_after_rejections),
+        reopen_after_jump_(setup.reopen_after_jump_rejections),
+        restart_within_(setup.restart_within_fixes) {}
+
+  /// The time that goes by between the fixes.
+  void elapse(double dt_s) { since_fix_s_ += dt_s; }
+
+  /// kUsed, kRejectedByGate, kUsedAfterReopening or kRestarted: what to do with the fix. `misfit_rad`: the length of
+  /// the innovation.
+  [[nodiscard]] FixStatus judge(double nis, double misfit_rad) {
+    const double largest_rad = kLargestStep_rad + kLargestRate_rad_s * since_fix_s_;
+    const bool jumped_now = !(misfit_rad - misfit_rad_ <= largest_rad);
+    misfit_rad_ = misfit_rad;
+    since_fix_s_ = 0;
     FixStatus status = FixStatus::kUsed;
     if (!(nis <= gate_nis_)) {
-      if (++rejections_in_a_row_ < reopen_after_) {
+      // A start that no fix has confirmed yet may itself be what was wrong.
+      jumped_ = jumped_ || (jumped_now && confirmed_);
+      if (++rejections_in_a_row_ < (jumped_ ? reopen_after_jump_ : reopen_after_)) {
         return FixStatus::kRejectedByGate;
       }
       status = under_suspicion_ > 0 ? FixStatus::kRestarted : FixStatus::kUsedAfterReopening;
       under_suspicion_ = restart_within_ + 1;
+      misfit_rad_ = 0;
     }
+    confirmed_ = status == FixStatus::kUsed;
+    jumped_ = false;
     rejections_in_a_row_ = 0;
     under_suspicion_ = std::max(under_suspicion_ - 1, 0);
     return status;
   }
   [[nodiscard]] int rejections_in_a_row() const { return rejections_in_a_row_; }
+  /// Whether the present run of rejections is put down to the tracker.
+  [[nodiscard]] bool jumped() const { return jumped_; }
 
  private:
   double gate_nis_ = 0;
   int reopen_after_ = 0;
+  int reopen_after_jump_ = 0;
   int restart_within_ = 0;
+  double since_fix_s_ = 0;
+  double misfit_rad_ = 0;  ///< of the last fix
   int rejections_in_a_row_ = 0;
   int under_suspicion_ = 0;
+  bool confirmed_ = false;  ///< what the filter rests on has agreed with a fix after it
+  bool jumped_ = false;
 };
 
 }  // namespace trihedron

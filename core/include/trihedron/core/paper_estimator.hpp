@@ -48,6 +48,7 @@ class PaperEstimator {
   using Sensitivities = PerGyro<Sensitivity<Model>, kGyros>;
   using Directions = PerGyro<Eigen::Vector3d, kGyros>;
   using Report = FixReport<kMeasurements>;
+  using AngleReport = FixReport<1>;  ///< of the others; here the angle is shown by StepReport::angle_residual only
   using Errors = ErrorLayout<Model, kGyros>;
   using ErrorRoot = Eigen::Matrix<double, Errors::kSize, Layout::kStates>;
 
@@ -63,8 +64,11 @@ class PaperEstimator {
   [[nodiscard]] const Setup& setup() const { return setup_; }
 
   /// The trihedron: gyro 1 is the reference.
-  [[nodiscard]] static Result<AttitudeByDirections<kGyros>, DirectionsFault> attitude(const Gyros& gyros,
-                                                                                      const Directions& h_b) {
+  [[nodiscard]] static Result<AttitudeByDirections<kGyros>, DirectionsFault> attitude(
+      const Gyros& gyros, const Directions& h_b, const GyroMask<kGyros>& used = all_gyros<kGyros>()) {
+    if (count(used) < kGyros) {
+      return DirectionsFault::kTooFew;
+    }
     return trihedron_attitude(momenta(gyros), in_c(gyros, h_b));
   }
   /// What was known before.

@@ -21,4 +21,29 @@ class PerGyro {
   std::array<T, static_cast<std::size_t>(N)> items_{};
 };
 
+/// Which of N gyros are used.
+template <int N>
+using GyroMask = PerGyro<bool, N>;
+
+/// Where the number of a gyro stands, none.
+inline constexpr int kNoGyro = -1;
+
+template <int N>
+[[nodiscard]] constexpr GyroMask<N> all_gyros() {
+  GyroMask<N> mask;
+  for (bool& used : mask) {
+    used = true;
+  }
+  return mask;
+}
+
+template <int N>
+[[nodiscard]] constexpr int count(const GyroMask<N>& mask) {
+  int used = 0;
+  for (const bool it : mask) {
+    used += it ? 1 : 0;
+  }
+  return used;
+}
+
 }  // namespace trihedron
