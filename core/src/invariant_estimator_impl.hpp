@@ -1,10 +1,13 @@
-#include "trihedron/core/invariant_estimator.hpp"
+#pragma once
+/// Definitions of InvariantEstimator. Each instantiation is a translation unit of its own, since one takes the compiler
+/// half a minute.
 
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 
 #include "trihedron/core/innovation.hpp"
+#include "trihedron/core/invariant_estimator.hpp"
 
 namespace trihedron {
 
@@ -345,10 +348,5 @@ auto InvariantEstimator<Base, N, F>::prior_parameter_root() const
   }
   return root;
 }
-
-template class InvariantEstimator<Esg7, 2>;
-template class InvariantEstimator<Esg7, 2, kAllFurtherStates>;
-template class InvariantEstimator<Esg7, 2, kOneFurtherHead>;
-template class InvariantEstimator<Esg7, 3>;
 
 }  // namespace trihedron
