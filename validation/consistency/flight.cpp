@@ -80,8 +80,8 @@ Outcome calibrate(const sim::SimulatedPass& flown, double walk_rad_sqrt_s, const
 
 }  // namespace
 
-std::vector<Outcome> fly(const Cell& cell, std::uint64_t seed, const std::vector<std::string>& estimators) {
-  const sim::SimulatedPass flown = sim::simulate(cell.scenario(seed));
+std::vector<Outcome> fly(const Cell& cell, int run, const std::vector<std::string>& estimators) {
+  const sim::SimulatedPass flown = sim::simulate(cell.scenario(run));
   const double walk_rad_sqrt_s = cell.walk_rad_sqrt_s;
   // The bound knows no process noise.
   const ParameterErrors bound_variance =

@@ -23,7 +23,6 @@ struct Outcome {
 };
 
 /// One flight of this cell, seen by each of the estimators named. They are told the true noise.
-[[nodiscard]] std::vector<Outcome> fly(const Cell& cell, std::uint64_t seed,
-                                       const std::vector<std::string>& estimators);
+[[nodiscard]] std::vector<Outcome> fly(const Cell& cell, int run, const std::vector<std::string>& estimators);
 
 }  // namespace trihedron::consistency

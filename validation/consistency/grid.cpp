@@ -11,9 +11,9 @@ std::string Cell::name() const {
                      misalignment_rad / kArcminute, walk_rad_sqrt_s);
 }
 
-Scenario Cell::scenario(std::uint64_t seed) const {
+Scenario Cell::scenario(int run) const {
   Scenario scenario;
-  scenario.seed = seed;
+  scenario.seed = static_cast<std::uint64_t>(number) * 1'000'000 + static_cast<std::uint64_t>(run);
   if (!slews) {
     scenario.attitude.slews = std::vector<Slew>{};
   }
@@ -42,7 +42,8 @@ std::vector<Cell> grid() {
       for (const double drift_rad_s : {1e-7, 1e-6, 1e-5}) {
         for (const double misalignment_arcmin : {1, 30, 60, 300}) {
           for (const double walk_rad_sqrt_s : {0.0, 1e-8, 1e-7}) {
-            cells.push_back({slews, geometry, drift_rad_s, misalignment_arcmin * kArcminute, walk_rad_sqrt_s});
+            cells.push_back({static_cast<int>(cells.size()) + 1, slews, geometry, drift_rad_s,
+                             misalignment_arcmin * kArcminute, walk_rad_sqrt_s});
           }
         }
       }

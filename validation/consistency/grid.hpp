@@ -18,6 +18,7 @@ struct Geometry {
 };
 
 struct Cell {
+  int number = 0;  ///< 1 … 216, in the order of the table
   bool slews = true;
   Geometry geometry;
   double drift_rad_s = 0;       ///< 1-sigma of each coefficient
@@ -26,9 +27,9 @@ struct Cell {
 
   /// "slews/plane-normal/1e-06/30arcmin/1e-08"
   [[nodiscard]] std::string name() const;
-  /// Nine hours, the truth drawn from the seed, clean telemetry, all drift in eq. (1). Its priors are the spread that
-  /// the truth is drawn from.
-  [[nodiscard]] Scenario scenario(std::uint64_t seed) const;
+  /// Nine hours, truth and noise drawn for this cell and this run, 1 …; clean telemetry, all drift in eq. (1). Its
+  /// priors are the spread that the truth is drawn from.
+  [[nodiscard]] Scenario scenario(int run) const;
 };
 
 /// All 216, in the order of the table.

@@ -31,7 +31,7 @@ struct Options {
   std::filesystem::path document;
 };
 
-/// A flight to be made, and the estimators that have not seen it. The seed is the number of the run.
+/// A flight to be made, and the estimators that have not seen it.
 struct Task {
   const Cell& cell;
   int run;
@@ -63,7 +63,7 @@ void fly_all(const std::vector<Task>& tasks, unsigned threads, Results& results)
   const auto work = [&] {
     for (std::size_t i = next++; i < tasks.size(); i = next++) {
       const Task& task = tasks[i];
-      const std::vector<Outcome> outcomes = fly(task.cell, static_cast<std::uint64_t>(task.run), task.estimators);
+      const std::vector<Outcome> outcomes = fly(task.cell, task.run, task.estimators);
       const std::scoped_lock lock(one_at_a_time);
       for (std::size_t k = 0; k < outcomes.size(); ++k) {
         results.add({task.cell.name(), task.run, task.estimators[k]}, outcomes[k]);
