@@ -4,7 +4,7 @@ JOBS ?= $(shell nproc)
 BUILD := build
 SOURCES := $(shell git ls-files '*.cpp' '*.hpp' 2>/dev/null)
 
-.PHONY: help setup build demo test bench validation format lint sanitize coverage install clean
+.PHONY: help setup build demo test bench validation consistency format lint sanitize coverage install clean
 
 help:
 	@echo 'make demo     install what is missing, build, repeat the experiment of the paper, say where the report is'
@@ -12,6 +12,7 @@ help:
 	@echo 'make build    leaves the program at $(BUILD)/trihedron'
 	@echo 'make bench    measure: steps of the cycle, reading, writing and simulating a pass'
 	@echo 'make validation  measure again what docs/validation.md tells'
+	@echo 'make consistency  measure again what docs/consistency.md tells: hours; goes on where it was interrupted'
 	@echo 'make install  into PREFIX (default /usr/local)'
 	@echo 'make setup | format | lint | sanitize | coverage | clean'
 
@@ -46,6 +47,12 @@ coverage: setup
 	ctest --test-dir build-coverage --output-on-failure -R '^core'
 	gcovr --root . --filter 'core/(include|src)/' --exclude-throw-branches --exclude-unreachable-branches \
 	  --fail-under-line 95 --print-summary build-coverage
+
+# The outcomes of flights outlive an interruption, not a change of the program.
+consistency: build
+	@mkdir -p out
+	@if [ $(BUILD)/trihedron_consistency -nt out/consistency.txt ]; then rm -f out/consistency.txt; fi
+	$(BUILD)/trihedron_consistency --resume out/consistency.txt docs/consistency.md
 
 format:
 	clang-format -i $(SOURCES)

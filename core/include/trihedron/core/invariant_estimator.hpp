@@ -193,7 +193,7 @@ class InvariantEstimator {
   bool started_ = false;
 };
 
-// The set that is built; another is one line here and one in the source.
+// The set that is built; another is one line here and one source like invariant_estimator_pair.cpp.
 extern template class InvariantEstimator<Esg7, 2>;
 extern template class InvariantEstimator<Esg7, 2, kAllFurtherStates>;
 extern template class InvariantEstimator<Esg20, 2, kAllFurtherStates>;

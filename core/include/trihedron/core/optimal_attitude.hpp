@@ -87,18 +87,19 @@ template <int N>
   // … Gauss–Newton, whose second step is already below rounding for directions that agree within a degree.
   AttitudeByDirections<N> result;
   result.C_in_c = start.value().C_in_c;
+  Eigen::Matrix3d normal = Eigen::Matrix3d::Zero();
+  for (int k = 0; k < N; ++k) {
+    const Eigen::Matrix3d across = weight[k] * (Eigen::Matrix3d::Identity() - h_c[k] * h_c[k].transpose());
+    normal += across;
+    result.by_directions.template middleCols<3>(3 * k) = across;
+  }
+  const Eigen::Matrix3d inverse = normal.inverse();
+  result.by_directions = inverse * result.by_directions;
   for (int step = 0; step < 3; ++step) {
-    Eigen::Matrix3d normal = Eigen::Matrix3d::Zero();
     Eigen::Vector3d misfit = Eigen::Vector3d::Zero();
     for (int k = 0; k < N; ++k) {
-      const Eigen::Vector3d seen = result.C_in_c.raw().transpose() * h_in[k];
-      const Eigen::Matrix3d across = weight[k] * (Eigen::Matrix3d::Identity() - h_c[k] * h_c[k].transpose());
-      normal += across;
-      misfit += weight[k] * h_c[k].cross(seen);
-      result.by_directions.template middleCols<3>(3 * k) = across;
+      misfit += weight[k] * h_c[k].cross(result.C_in_c.raw().transpose() * h_in[k]);
     }
-    const Eigen::Matrix3d inverse = normal.inverse();
-    result.by_directions = inverse * result.by_directions;
     result.C_in_c = result.C_in_c * Rot<C, C>::exp(Vec<C>::assume(inverse * misfit));
   }
   return result;

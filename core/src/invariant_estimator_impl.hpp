@@ -1,9 +1,14 @@
-#include "trihedron/core/invariant_estimator.hpp"
+#pragma once
+/// Definitions of InvariantEstimator. Each instantiation is a translation unit of its own, since one takes the compiler
+/// half a minute.
 
 #include <Eigen/Cholesky>
 #include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
+
+#include "trihedron/core/innovation.hpp"
+#include "trihedron/core/invariant_estimator.hpp"
 
 namespace trihedron {
 
@@ -479,11 +484,5 @@ auto InvariantEstimator<Base, N, F>::prior_parameter_root() const
   }
   return root;
 }
-
-template class InvariantEstimator<Esg7, 2>;
-template class InvariantEstimator<Esg7, 2, kAllFurtherStates>;
-template class InvariantEstimator<Esg20, 2, kAllFurtherStates>;
-template class InvariantEstimator<Esg7, 3>;
-template class InvariantEstimator<Esg7, 4>;
 
 }  // namespace trihedron

@@ -1,0 +1,28 @@
+#pragma once
+
+#include <array>
+#include <limits>
+#include <string>
+#include <vector>
+
+#include "consistency/grid.hpp"
+
+namespace trihedron::consistency {
+
+inline constexpr std::array<const char*, 2> kEstimators = {"paper", "invariant"};
+inline constexpr int kParameters = 20;  ///< of two gyros, eq. (1) and alignment
+inline constexpr int kInnovations = 4;  ///< of one fix
+
+/// One estimator over one flight.
+struct Outcome {
+  double nees = 0;  ///< of the parameters at the end
+  double nis = 0;   ///< mean over the fixes
+  long fixes = 0;   ///< all but the first, rejected ones as well: there are no outliers
+  /// Mean over the parameters of error² over the variance of parameter_bound(); not a number with process noise.
+  double error_over_bound_square = std::numeric_limits<double>::quiet_NaN();
+};
+
+/// One flight of this cell, seen by each of the estimators named. They are told the true noise.
+[[nodiscard]] std::vector<Outcome> fly(const Cell& cell, int run, const std::vector<std::string>& estimators);
+
+}  // namespace trihedron::consistency

@@ -1,0 +1,122 @@
+// trihedron_consistency: flies the grid and tells how the estimators' covariances hold.
+
+#include <fmt/core.h>
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <atomic>
+#include <exception>
+#include <filesystem>
+#include <mutex>
+#include <regex>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "consistency/band.hpp"
+#include "consistency/flight.hpp"
+#include "consistency/grid.hpp"
+#include "consistency/results.hpp"
+
+namespace {
+
+using namespace trihedron::consistency;
+
+struct Options {
+  int runs = 100;
+  std::string cells;
+  std::vector<std::string> estimators{kEstimators.begin(), kEstimators.end()};
+  unsigned threads = std::max(1U, std::thread::hardware_concurrency());
+  std::filesystem::path resume;
+  std::filesystem::path document;
+};
+
+/// A flight to be made, and the estimators that have not seen it.
+struct Task {
+  const Cell& cell;
+  int run;
+  std::vector<std::string> estimators;
+};
+
+/// Run by run through all cells: what is there after a break makes a table of fewer runs.
+std::vector<Task> missing(const Results& results, const std::vector<Cell>& cells, const Options& options) {
+  std::vector<Task> tasks;
+  for (int run = 1; run <= options.runs; ++run) {
+    for (const Cell& cell : cells) {
+      Task task{cell, run, options.estimators};
+      std::erase_if(task.estimators, [&](const std::string& estimator) {
+        return results.contains({cell.name(), run, estimator});
+      });
+      if (!task.estimators.empty()) {
+        tasks.push_back(task);
+      }
+    }
+  }
+  return tasks;
+}
+
+/// Makes the flights on all threads; which of them makes which does not matter.
+void fly_all(const std::vector<Task>& tasks, unsigned threads, Results& results) {
+  std::atomic<std::size_t> next = 0;
+  std::size_t done = 0;
+  std::mutex one_at_a_time;
+  const auto work = [&] {
+    for (std::size_t i = next++; i < tasks.size(); i = next++) {
+      const Task& task = tasks[i];
+      const std::vector<Outcome> outcomes = fly(task.cell, task.run, task.estimators);
+      const std::scoped_lock lock(one_at_a_time);
+      for (std::size_t k = 0; k < outcomes.size(); ++k) {
+        results.add({task.cell.name(), task.run, task.estimators[k]}, outcomes[k]);
+      }
+      fmt::print(stderr, "\r{} of {} flights", ++done, tasks.size());
+    }
+  };
+  std::vector<std::jthread> workers;
+  for (unsigned i = 0; i < threads; ++i) {
+    workers.emplace_back(work);
+  }
+}
+
+std::string measured(const Options& options) {
+  std::vector<Cell> cells = grid();
+  const std::regex pattern(options.cells);
+  std::erase_if(cells, [&](const Cell& cell) { return !std::regex_search(cell.name(), pattern); });
+  Results results(options.resume);
+  fly_all(missing(results, cells, options), options.threads, results);
+  fmt::print(stderr, "\n");
+  const Band nees = band_of_mean(kParameters, options.runs);
+  return fmt::format(
+      "{} runs per row; 95 % of the means of a consistent estimator's NEES lie in {:.1f} … {:.1f}.\n\n{}", options.runs,
+      nees.low, nees.high, results.table(cells, options.estimators, options.runs));
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  try {
+    Options options;
+    CLI::App program("Flies a grid of simulated passes: NEES, NIS and error over its lower bound, per estimator.");
+    program.add_option("document", options.document, "Write the table into it, not to standard output");
+    program.add_option("--runs", options.runs, "Flights per cell")->check(CLI::PositiveNumber)->capture_default_str();
+    program.add_option("--cells", options.cells, "Only cells with a name like this, e.g. '^steady/.*/300arcmin'");
+    program.add_option("--estimators", options.estimators, "Which")
+        ->check(CLI::IsMember(std::vector<std::string>{kEstimators.begin(), kEstimators.end()}))
+        ->delimiter(',')
+        ->capture_default_str();
+    program.add_option("--threads", options.threads, "How many at once")
+        ->check(CLI::PositiveNumber)
+        ->capture_default_str();
+    program.add_option("--resume", options.resume, "Keep the outcome of each flight in this file, and go on from it");
+    CLI11_PARSE(program, argc, argv);
+    const std::string text = measured(options);
+    if (options.document.empty()) {
+      fmt::print("{}", text);
+    } else {
+      write_between_markers(options.document, text);
+    }
+    return 0;
+  } catch (const std::exception& error) {
+    fmt::print(stderr, "trihedron_consistency: {}\n", error.what());
+    return 1;
+  }
+}

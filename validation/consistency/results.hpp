@@ -1,0 +1,46 @@
+#pragma once
+
+#include <filesystem>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "consistency/flight.hpp"
+
+namespace trihedron::consistency {
+
+/// Which flight, and who looked at it.
+struct Key {
+  std::string cell;
+  int run = 0;
+  std::string estimator;
+
+  auto operator<=>(const Key&) const = default;
+};
+
+/// Outcomes of flights; where a file is given, kept in it as they come, so that a campaign can go on after a break.
+class Results {
+ public:
+  Results() = default;
+  /// Reads what the file holds, if there is one. Throws std::runtime_error where it holds something else.
+  explicit Results(std::filesystem::path file);
+
+  [[nodiscard]] bool contains(const Key& key) const { return outcomes_.contains(key); }
+  /// Throws std::runtime_error where the file cannot be written.
+  void add(const Key& key, const Outcome& outcome);
+
+  /// Markdown: a row per cell; per estimator the means of NEES and NIS over the runs 1 … `runs`, marked where they lie
+  /// outside their bands, and the error over its bound. Needs all those runs.
+  [[nodiscard]] std::string table(const std::vector<Cell>& cells, const std::vector<std::string>& estimators,
+                                  int runs) const;
+
+ private:
+  std::filesystem::path file_;
+  std::map<Key, Outcome> outcomes_;
+};
+
+/// Puts `text` between the lines `<!-- consistency -->` and `<!-- end -->` of the document. Throws std::runtime_error
+/// where it has none, or cannot be written.
+void write_between_markers(const std::filesystem::path& document, const std::string& text);
+
+}  // namespace trihedron::consistency
