@@ -95,6 +95,7 @@ TEST(Esg7, SignsAreThoseOfThePaper) {
 
 RC_GTEST_PROP(Esg7, JacobiansMatchCentralDifferences, ()) {
   const Eigen::Vector3d h = *directions();
+  RC_PRE(Esg7::basis<double>(h).norm() > 0);  // along an axis nothing drifts, and there is nothing to compare
   Coefficients kappa;
   kappa << 1.1, -0.3, 0.8, 2.0, -0.6, 0.9, 1.7;
   // Central differences of step s err by s² times third derivatives (of order 10) and by rounding over s.
