@@ -72,7 +72,8 @@ TEST(InvariantMeasurement, JacobianIsThatOfTheInnovation) {
       test::central_differences<decltype(measured)&, WithAll::Layout::kStates>(measured, State::Zero(), 1e-5);
   const auto m = WithAll::measure(gyros, C_in_c, C_in_c, h_b, Eigen::Matrix3d::Identity(), by_shared, noise);
   test::expect_jacobian(m.H, numerical, 1e-8);
-  test::expect_jacobian(m.H.col(WithAll::Layout::clock_offset()).eval(), numerical.col(WithAll::Layout::clock_offset()).eval(), 1e-6);
+  test::expect_jacobian(m.H.col(WithAll::Layout::clock_offset()).eval(),
+                        numerical.col(WithAll::Layout::clock_offset()).eval(), 1e-6);
   EXPECT_LT(m.y.norm(), 1e-15);
 }
 
