@@ -16,6 +16,6 @@ struct Decision {
 /// Settles each choice that is left to the program. Estimator paper, and passes of more than two gyros, have no further
 /// states; a prior calibration tells them where the pass has one; else they are those with more evidence for than
 /// against.
-[[nodiscard]] Decision decide(const Pass& pass, const CalibrationOptions& options);
+[[nodiscard]] Decision decide(const Pass& pass, const CalibrationOptions& asked);
 
 }  // namespace trihedron::ground
