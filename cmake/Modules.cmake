@@ -8,7 +8,8 @@
 #   makes the Google Test program <module>_test, linked with the module if there is one of that name, and registers its tests as
 #   <module>.<Suite>.<Name>.
 # trihedron_pytest(<name> <file.py>)
-#   registers the tests of a Python file as one test; they find the build directory in TRIHEDRON_BUILD.
+#   registers the tests of a Python file as one test; they find the build directory in TRIHEDRON_BUILD. Those marked `long` are
+#   left out under the sanitizers, where they would take an hour.
 
 set(TRIHEDRON_core_MAY_USE)
 set(TRIHEDRON_records_MAY_USE core)
@@ -58,7 +59,8 @@ function(trihedron_test module)
 endfunction()
 
 function(trihedron_pytest name file)
-  add_test(NAME ${name}.pytest COMMAND ${TRIHEDRON_PYTHON} -m pytest -q -p no:cacheprovider ${file})
+  add_test(NAME ${name}.pytest COMMAND ${TRIHEDRON_PYTHON} -m pytest -q -p no:cacheprovider -o markers=long
+    -m "$<IF:$<BOOL:${TRIHEDRON_SANITIZE}>,not long,>" ${file})
   set_tests_properties(${name}.pytest PROPERTIES TIMEOUT 900
     ENVIRONMENT "TRIHEDRON_BUILD=${PROJECT_BINARY_DIR};PYTHONDONTWRITEBYTECODE=1")
 endfunction()

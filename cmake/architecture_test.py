@@ -35,7 +35,7 @@ def wrong_includes(root, table):
                 if parts[0] == "trihedron":
                     bad = parts[1] != module and parts[1] not in may_use
                 elif module == "core":
-                    bad = parts[0] != "Eigen" and included not in CORE_MAY_INCLUDE
+                    bad = parts[0] != "Eigen" and included not in CORE_MAY_INCLUDE and not (file.parent / included).exists()
                 else:
                     bad = False
                 if bad:

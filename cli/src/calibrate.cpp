@@ -23,14 +23,18 @@ namespace {
 
 std::vector<io::Table> residual_tables(const ground::CalibrationRun& run) {
   io::Table fixes{"fixes", {}, {}};
-  for (const char* component : {"gyro1_1", "gyro1_3", "gyro2_1", "gyro2_2"}) {
+  const std::size_t components = 2 * run.calibration.gyros.size();
+  for (std::size_t i = 0; i < components; ++i) {
+    // The paper numbers its quasi-inertial axes so.
+    const std::string component = fmt::format("gyro{}_{}", i / 2 + 1, components == 4 && i == 1 ? 3 : i % 2 + 1);
     fixes.columns.push_back({fmt::format("innovation_{}", component),
                              "rad",
                              fmt::format("innovation of eq. (3), gyro and component in qi: {}", component),
                              {}});
     fixes.columns.push_back({fmt::format("innovation_{}_sigma", component), "rad", "its 1-sigma by the filter", {}});
   }
-  fixes.columns.push_back({"nis", "1", "normalised innovation squared, 4 degrees of freedom", {}});
+  fixes.columns.push_back(
+      {"nis", "1", fmt::format("normalised innovation squared, {} degrees of freedom", components), {}});
   fixes.columns.push_back({"used", "1", "1 used, 0 rejected", {}});
   for (const ground::FixRecord& fix : run.fixes) {
     fixes.t.push_back(fix.t);
@@ -38,8 +42,8 @@ std::vector<io::Table> residual_tables(const ground::CalibrationRun& run) {
       fixes.columns[2 * i].values.push_back(fix.innovation[i]);
       fixes.columns[2 * i + 1].values.push_back(fix.innovation_sigma[i]);
     }
-    fixes.columns[8].values.push_back(fix.nis);
-    fixes.columns[9].values.push_back(fix.used() ? 1 : 0);
+    fixes.columns[2 * components].values.push_back(fix.nis);
+    fixes.columns[2 * components + 1].values.push_back(fix.used() ? 1 : 0);
   }
 
   io::Table parameters{"parameters", run.parameters.t, {}};

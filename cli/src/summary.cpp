@@ -1,6 +1,7 @@
 #include "summary.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <Eigen/Geometry>
 #include <chrono>
@@ -8,6 +9,7 @@
 #include <iterator>
 #include <numbers>
 
+#include "trihedron/ground/verdict.hpp"
 #include "trihedron/io/error.hpp"
 #include "trihedron/io/time_text.hpp"
 
@@ -165,8 +167,14 @@ std::string calibration_text(const ground::CalibrationRun& run, const std::optio
     fmt::format_to(out, " {} {};", count, name);
   }
   text.back() = '\n';
+  if (!run.gyro_events.empty()) {
+    fmt::format_to(out, "Gyros       {}\n", fmt::join(ground::texts_of(run.gyro_events, calibration.epoch), "; "));
+  }
+  if (const double looks = statistic("angle_looks"); looks > 0) {
+    fmt::format_to(out, "Angles      between the momenta taken {:.0f} times, where no fix could be used\n", looks);
+  }
   fmt::format_to(out, "Residuals   rms");
-  for (int i = 1; i <= 4; ++i) {
+  for (std::size_t i = 1; i <= 2 * calibration.gyros.size(); ++i) {
     fmt::format_to(out, " {:.2f}″", statistic(fmt::format("innovation_{}_rms_rad", i)) / kArcsecond);
   }
   fmt::format_to(out, "; mean NIS {:.3f} ({:.0f} expected)\n", statistic("nis_mean"),

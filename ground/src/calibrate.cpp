@@ -28,12 +28,14 @@ FixRecord record_of(const Report& report) {
   FixRecord record;
   record.t = report.fix.t;
   record.status = report.fix.status;
-  for (std::size_t i = 0; i < record.innovation.size(); ++i) {
-    const auto row = static_cast<Eigen::Index>(i);
-    record.innovation[i] = report.fix.innovation(row);
-    record.innovation_sigma[i] = std::sqrt(report.fix.innovation_covariance(row, row));
+  for (Eigen::Index row = 0; row < report.fix.innovation.size(); ++row) {
+    record.innovation.push_back(report.fix.innovation(row));
+    record.innovation_sigma.push_back(std::sqrt(report.fix.innovation_covariance(row, row)));
   }
   record.nis = report.fix.nis;
+  record.degrees_of_freedom =
+      2 * static_cast<int>(std::count(report.gyros.begin(), report.gyros.end(), GyroState::kUsed));
+  record.jumped = report.fix.jumped;
   record.corrected_navigator = report.corrected;
   return record;
 }
@@ -106,20 +108,29 @@ class Meter {
   std::size_t done_ = 0;
 };
 
+/// So many fixes off in a row, by more than drift can make, are not single outliers.
+constexpr double kLie = 20;
+
 std::map<std::string, double> statistics_of(const std::vector<FixRecord>& fixes) {
   double nis_sum = 0;
   double count = 0;
   double used = 0;
   double outliers = 0;
   double reopened = 0;
-  std::array<double, 4> squares{};
+  double in_a_row = 0;
+  double jumped = 0;
+  double freedom = 0;
+  std::vector<double> squares(fixes.empty() ? 0 : fixes.front().innovation.size());
   for (const FixRecord& fix : fixes) {
     used += fix.used() ? 1 : 0;
     outliers += fix.status == FixStatus::kRejectedByGate ? 1 : 0;
     const bool was_reopened = fix.status == FixStatus::kUsedAfterReopening || fix.status == FixStatus::kRestarted;
     reopened += was_reopened ? 1 : 0;
+    in_a_row = fix.jumped ? in_a_row + 1 : 0;
+    jumped += in_a_row == kLie ? kLie : in_a_row > kLie ? 1 : 0;
     if (fix.status == FixStatus::kUsed) {
       nis_sum += fix.nis;
+      freedom += fix.degrees_of_freedom;
       ++count;
       for (std::size_t i = 0; i < squares.size(); ++i) {
         squares[i] += std::pow(fix.innovation[i], 2);
@@ -130,8 +141,9 @@ std::map<std::string, double> statistics_of(const std::vector<FixRecord>& fixes)
                                            {"fixes_used", used},
                                            {"fixes_rejected_as_outliers", outliers},
                                            {"reopened", reopened},
+                                           {"fixes_off_in_a_row", jumped},
                                            {"nis_count", count},
-                                           {"nis_degrees_of_freedom", 4}};
+                                           {"nis_degrees_of_freedom", count > 0 ? freedom / count : 0}};
   if (count > 0) {
     statistics["nis_mean"] = nis_sum / count;
     for (std::size_t i = 0; i < squares.size(); ++i) {
@@ -249,6 +261,8 @@ CalibrationRun calibrate_with(const Pass& pass, Decision decision, const Progres
   run.evidence = std::move(decision.evidence);
   AngleTrack angle(run);
   Time corrected{};
+  decltype(Cycle<Estimator>::Report::gyros) gyros_before{};
+  double angle_looks = 0;
   const auto on_fix = [&](const typename Cycle<Estimator>::Report& report) {
     run.fixes.push_back(record_of(report));
     ++run.fix_counts[name_of(report.fix.status)];
@@ -278,6 +292,16 @@ CalibrationRun calibrate_with(const Pass& pass, Decision decision, const Progres
   Meter meter(progress, pass.gyro.size());
   replay(pass, *cycle, on_fix, [&](const typename Cycle<Estimator>::Report& report) {
     ++samples[static_cast<std::size_t>(report.sample)];
+    for (int k = 0; k < Estimator::kGyros; ++k) {
+      if (report.gyros[k] != gyros_before[k]) {
+        run.gyro_events.push_back({report.t, k, report.gyros[k]});
+      }
+    }
+    gyros_before = report.gyros;
+    angle_looks += is_used(report.angles.status) ? 1 : 0;
+    if (report.fixes_dropped > 0) {
+      run.fix_counts["rejected: clock set back while it waited"] += report.fixes_dropped;
+    }
     if (cycle->estimator().started() && report.sample == SampleStatus::kUsed) {
       angle.add(report.t, report.angle_residual);
     }
@@ -293,6 +317,7 @@ CalibrationRun calibrate_with(const Pass& pass, Decision decision, const Progres
   }
   run.calibration = result_of(pass, *cycle, run.options.further_states);
   run.calibration.statistics = statistics_of(run.fixes);
+  run.calibration.statistics["angle_looks"] = angle_looks;
   run.calibration.verdict = judge(pass, run);
   return run;
 }

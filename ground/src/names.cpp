@@ -54,4 +54,16 @@ const char* name_of(SampleStatus status) {
   return "unknown";
 }
 
+const char* name_of(GyroState state) {
+  switch (state) {
+    case GyroState::kUsed:
+      return "used again";
+    case GyroState::kStuck:
+      return "stuck";
+    case GyroState::kIsolated:
+      return "left out for good";
+  }
+  return "unknown";
+}
+
 }  // namespace trihedron::ground

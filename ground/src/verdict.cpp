@@ -98,6 +98,37 @@ void judge_rejections(const Statistics& statistics, std::vector<Finding>& findin
   }
 }
 
+void judge_star_tracker(const Statistics& statistics, std::vector<Finding>& findings) {
+  if (const double off = statistic(statistics, "fixes_off_in_a_row"); off > 0) {
+    add(findings, Severity::kWarning, "star-tracker-off",
+        "For a while the star tracker was off by more than any drift can make; it was not believed.",
+        fmt::format("{:.0f} fixes, 20 and more in a row", off),
+        "Look at its telemetry there: a wrong identification, or a head that was moved.");
+  }
+}
+
+void judge_gyros(const Pass& pass, const CalibrationRun& run, std::vector<Finding>& findings) {
+  const auto tell = [&](GyroState state, Severity severity, const char* code, const char* text, const char* cure) {
+    std::vector<GyroEvent> events;
+    std::copy_if(run.gyro_events.begin(), run.gyro_events.end(), std::back_inserter(events),
+                 [&](const GyroEvent& event) { return event.state == state; });
+    if (!events.empty()) {
+      add(findings, severity, code, text, fmt::format("{}", fmt::join(texts_of(events, pass.settings.epoch), "; ")),
+          cure);
+    }
+  };
+  const auto isolated = std::count_if(run.gyro_events.begin(), run.gyro_events.end(),
+                                      [](const GyroEvent& event) { return event.state == GyroState::kIsolated; });
+  const bool enough = static_cast<long>(run.calibration.gyros.size()) - isolated >= 2;
+  tell(GyroState::kIsolated, enough ? Severity::kWarning : Severity::kDoNotUse, "gyro-isolated",
+       enough ? "A gyro alone did not agree with the rest, time after time; the others went on without it."
+              : "A gyro alone did not agree with the rest, time after time; without it there is no pair.",
+       "Look at its telemetry from there on. Its estimates are those of before.");
+  tell(GyroState::kStuck, Severity::kWarning, "gyro-stuck",
+       "Readings of a gyro stood still, not even moved by noise; they were not used.",
+       "Look at the telemetry there: a frozen readout, or the last value repeated in a gap.");
+}
+
 void judge_nis(const Statistics& statistics, const std::string& what_is_wrong, std::vector<Finding>& findings) {
   const double count = statistic(statistics, "nis_count");
   const double freedom = statistic(statistics, "nis_degrees_of_freedom");
@@ -161,13 +192,15 @@ void judge_steadiness(const Pass& pass, const CalibrationRun& run, std::vector<F
     return;
   }
   const Eigen::Vector3d& axis = observability.weakest_axis_c;
+  const bool believes = run.options.estimator == "paper";
   add(findings, Severity::kDoNotUse, "weak-alignment-axis",
-      fmt::format("Steady flight: the axis ({:+.3f}, {:+.3f}, {:+.3f}) in c is fixed in the body and in space, so the "
-                  "alignment of each "
-                  "gyro about it cannot be told from its initial direction. Estimator {} takes noise for information "
-                  "there: do not "
-                  "believe its sigmas about this axis. The attitude does not suffer while the flight stays steady.",
-                  axis.x(), axis.y(), axis.z(), run.options.estimator),
+      fmt::format(
+          "Steady flight: the axis ({:+.3f}, {:+.3f}, {:+.3f}) in c is fixed in the body and in space (the "
+          "orbit normal, where the spacecraft faces the Earth), so the alignment of each gyro about it cannot be "
+          "told from its initial direction. {} The attitude does not suffer while the flight stays steady.",
+          axis.x(), axis.y(), axis.z(),
+          believes ? "Estimator paper takes noise for information there: do not believe its sigmas about this axis."
+                   : "The sigmas say so."),
       fmt::format("about {:.0f}″ at best about this axis from the fixes alone", observability.sigma_rad / kArcsecond),
       "Fly slews about the other axes during the calibration: ten minutes of 10° and more suffice.");
 }
@@ -180,9 +213,14 @@ void judge_unused_sensors(const Pass& pass, const CalibrationRun& run, std::vect
                     used),
         fmt::format("{} gyros in the telemetry", pass.gyro.gyros), "None needed; put the pair you want first.");
   }
-  if (!pass.further_star_trackers.empty()) {
+  const bool second =
+      std::any_of(run.calibration.further.begin(), run.calibration.further.end(),
+                  [](const FurtherEstimate& state) { return state.name.starts_with("star_tracker_2"); });
+  const std::size_t heads = second ? 2 : 1;
+  if (1 + pass.further_star_trackers.size() > heads) {
     add(findings, Severity::kNote, "star-trackers-not-used",
-        fmt::format("Estimator {} works with one star tracker: only the first was used.", run.options.estimator),
+        fmt::format("Estimator {} of {} gyros works with {} star tracker{}: those beyond were not used.",
+                    run.options.estimator, used, heads, second ? "s" : ""),
         fmt::format("{} star trackers in the telemetry", 1 + pass.further_star_trackers.size()), "None needed.");
   }
 }
@@ -198,6 +236,25 @@ void judge_pair(const CalibrationRun& run, std::vector<Finding>& findings) {
 }
 
 }  // namespace
+
+std::vector<std::string> texts_of(const std::vector<GyroEvent>& events, Time epoch) {
+  struct Seen {
+    long times = 0;
+    Time first{};
+  };
+  std::map<std::pair<int, GyroState>, Seen> seen;
+  for (const GyroEvent& event : events) {
+    Seen& its = seen[{event.gyro, event.state}];
+    its.first = its.times++ == 0 ? event.t : its.first;
+  }
+  std::vector<std::string> texts;
+  for (const auto& [what, its] : seen) {
+    const double minutes = to_seconds(its.first - epoch) / 60;
+    texts.push_back(fmt::format("gyro {} {}{} {:.1f} min", what.first + 1, name_of(what.second),
+                                its.times > 1 ? fmt::format(" {} times, first at", its.times) : " at", minutes));
+  }
+  return texts;
+}
 
 AlignmentObservability alignment_observability(const StarTrackerTelemetry& tracker,
                                                const Eigen::Vector3d& tracker_noise_rad, double fix_noise_rad) {
@@ -246,6 +303,8 @@ Verdict judge(const Pass& pass, const CalibrationRun& run) {
   judge_determination(run, findings);
   judge_steadiness(pass, run, findings);
   judge_pair(run, findings);
+  judge_star_tracker(statistics, findings);
+  judge_gyros(pass, run, findings);
   judge_unused_sensors(pass, run, findings);
   return verdict_of(std::move(findings));
 }

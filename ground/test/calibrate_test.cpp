@@ -2,9 +2,11 @@
 
 #include <gmock/gmock.h>
 
+#include <algorithm>
 #include <cmath>
 #include <filesystem>
 #include <numbers>
+#include <vector>
 
 #include "trihedron/core/frames.hpp"
 #include "trihedron/ground/evaluate.hpp"
@@ -28,6 +30,28 @@ const sim::SimulatedPass& two_hours() {
     return sim::simulate(scenario);
   }();
   return simulated;
+}
+
+/// Nothing left to decide, which takes runs of its own.
+CalibrationOptions told() {
+  CalibrationOptions options;
+  options.drift_model = "esg7";
+  options.find_noise = false;
+  FurtherStateOptions& states = options.further_states;
+  states.clock_offset = states.orbital_error = states.wandering_drift = FurtherStateOptions::Choice::kOff;
+  return options;
+}
+
+/// The first minutes of a pass.
+Pass beginning(Pass pass, Duration duration) {
+  const auto cut = [&](std::vector<Time>& t) {
+    t.erase(std::upper_bound(t.begin(), t.end(), pass.settings.epoch + duration), t.end());
+  };
+  cut(pass.gyro.t);
+  pass.gyro.h.resize(3 * static_cast<std::size_t>(pass.gyro.gyros) * pass.gyro.t.size());
+  cut(pass.star_tracker.t);
+  pass.star_tracker.q_in_c.resize(pass.star_tracker.t.size());
+  return pass;
 }
 
 Eigen::Vector3d alignment_error(const Truth::Gyro& truth, const GyroCalibration& estimate) {
@@ -63,7 +87,7 @@ TEST(Calibrate, FindsTheTruthWithinItsSigmas) {
 }
 
 TEST(Calibrate, RecordsEveryFixAndSample) {
-  const auto run = calibrate(two_hours().pass, {});
+  const auto run = calibrate(two_hours().pass, told());
   EXPECT_EQ(run.fixes.size(), two_hours().pass.star_tracker.size());
   EXPECT_EQ(run.samples.at("used"), static_cast<long>(two_hours().pass.gyro.size()));
   EXPECT_EQ(run.fix_counts.at("used"), static_cast<long>(run.fixes.size()) - 1);
@@ -82,10 +106,10 @@ TEST(Calibrate, RecordsEveryFixAndSample) {
 }
 
 TEST(Calibrate, StartsFromAnEarlierCalibration) {
-  const auto first = calibrate(two_hours().pass, {});
+  const auto first = calibrate(two_hours().pass, told());
   Pass pass = two_hours().pass;
   pass.settings.prior = first.calibration;
-  const auto second = calibrate(pass, {});
+  const auto second = calibrate(pass, told());
   // Known beforehand: the navigator is good from the first minute.
   const auto errors = attitude_errors(second.navigation, two_hours().truth.t, two_hours().truth.q_in_c);
   EXPECT_LT(statistics_by_stretch(errors, pass.settings.epoch, std::chrono::minutes(90)).at(0).max_total_rad, 2.9e-4);
@@ -96,13 +120,13 @@ TEST(Calibrate, UsesThePriorsOfThePass) {
   Pass pass = two_hours().pass;
   pass.settings.gyros[1].drift_rad_s["nu12"] = two_hours().truth.gyros[1].drift_rad_s[4].second;
   pass.settings.gyros[1].drift_sigma_rad_s["nu12"] = 1e-12;
-  const auto run = calibrate(pass, {});
+  const auto run = calibrate(pass, told());
   EXPECT_LE(std::sqrt(run.calibration.covariance(14, 14)), 1.001e-12);
   EXPECT_EQ(run.calibration.states[14], "gyro2.nu12");
 }
 
 TEST(Navigate, GivesAnAttitudeForEverySampleAndAHonestSigma) {
-  CalibrationOptions options;
+  CalibrationOptions options = told();
   options.corrections.interval = std::chrono::minutes(30);
   const auto run = navigate(two_hours().pass, options);
   // From when the samples round the first fix are there.
@@ -117,8 +141,8 @@ TEST(Navigate, GivesAnAttitudeForEverySampleAndAHonestSigma) {
 
 TEST(Navigate, HoldsTheParametersItWasGiven) {
   Pass pass = two_hours().pass;
-  pass.settings.prior = calibrate(pass, {}).calibration;
-  CalibrationOptions options;
+  pass.settings.prior = calibrate(pass, told()).calibration;
+  CalibrationOptions options = told();
   options.corrections.when = CorrectionOptions::When::kOnlyFirst;
   options.corrections.take_parameters = false;
   const auto run = navigate(pass, options);
@@ -129,7 +153,7 @@ TEST(Navigate, HoldsTheParametersItWasGiven) {
 
 TEST(Navigate, KnowsHowWrongTheParametersItHoldsMayBe) {
   // Nothing known beforehand, and nothing taken over: minutes of error, under sigmas of minutes.
-  CalibrationOptions options;
+  CalibrationOptions options = told();
   options.corrections.take_parameters = false;
   const auto run = navigate(two_hours().pass, options);
   const auto errors = attitude_errors(run.attitude, two_hours().truth.t, two_hours().truth.q_in_c);
@@ -145,7 +169,7 @@ TEST(Replay, TellsOfFixesAfterTheLastSample) {
   Pass pass = two_hours().pass;
   pass.gyro.t.resize(8 * 3600);
   pass.gyro.h.resize(6 * pass.gyro.t.size());
-  const auto run = calibrate(pass, {});
+  const auto run = calibrate(pass, told());
   EXPECT_EQ(run.fixes.size(), pass.star_tracker.size());
   EXPECT_EQ(run.fix_counts.at("rejected: no gyro samples round it"), 1201);  // from 3600 s on, 7200 s among them
 }
@@ -161,7 +185,7 @@ std::string setup_error(const Pass& pass, const CalibrationOptions& options = {}
 }
 
 TEST(SetupError, NamesWhatCannotWork) {
-  const Pass& good = two_hours().pass;
+  const Pass good = beginning(two_hours().pass, std::chrono::minutes(2));
   CalibrationOptions options;
   options.estimator = "magic";
   EXPECT_THAT(setup_error(good, options), HasSubstr("magic"));
@@ -199,8 +223,8 @@ TEST(SetupError, NamesWhatCannotWork) {
 }
 
 TEST(SetupError, NamesWhatIsWrongWithAnEarlierCalibration) {
-  Pass pass = two_hours().pass;
-  const Calibration good = calibrate(pass, {}).calibration;
+  Pass pass = beginning(two_hours().pass, std::chrono::minutes(20));
+  const Calibration good = calibrate(pass, told()).calibration;
   pass.settings.prior = good;
   pass.settings.prior->gyros.pop_back();
   EXPECT_THAT(setup_error(pass), HasSubstr("1 gyros"));
@@ -300,8 +324,56 @@ TEST(Calibrate, KnowsTheRateOfTheOrbitFromTheAttitude) {
   EXPECT_TRUE(run.calibration.covariance.allFinite());
 }
 
+/// Two hours with three gyros.
+sim::SimulatedPass three_gyros() {
+  Scenario scenario;
+  scenario.seed = 8;
+  scenario.duration = std::chrono::hours(2);
+  scenario.gyros.resize(3, scenario.gyros[0]);
+  scenario.gyros[2].start_direction_c = scenario.gyros[0].start_direction_c.cross(scenario.gyros[1].start_direction_c);
+  for (GyroScenario& gyro : scenario.gyros) {
+    gyro.drift.outside_sigma_rad_s = 0;
+  }
+  return sim::simulate(scenario);
+}
+
+TEST(Calibrate, TakesThreeGyros) {
+  const auto simulated = three_gyros();
+  const auto run = calibrate(simulated.pass, {});
+  EXPECT_EQ(run.calibration.states.size(), 30U);
+  EXPECT_EQ(run.fixes.back().innovation.size(), 6U);
+  EXPECT_EQ(run.calibration.statistics.at("nis_degrees_of_freedom"), 6);
+  EXPECT_NEAR(run.calibration.statistics.at("nis_mean"), 6, 0.3);
+  for (std::size_t k = 0; k < 3; ++k) {
+    const Eigen::Vector3d error = alignment_error(simulated.truth.gyros[k], run.calibration.gyros[k]);
+    const auto row = static_cast<Eigen::Index>(10 * k) + 7;
+    const Eigen::Matrix3d covariance = run.calibration.covariance.block<3, 3>(row, row);
+    EXPECT_LT(error.dot(covariance.llt().solve(error)), 22);  // χ² of 3, once in 15 000
+  }
+  EXPECT_TRUE(run.gyro_events.empty());
+}
+
+TEST(Calibrate, GoesOnWithoutAGyroThatWandersOff) {
+  auto simulated = three_gyros();
+  GyroTelemetry& gyro = simulated.pass.gyro;
+  const std::size_t from = gyro.size() / 2;
+  for (std::size_t i = from; i < gyro.size(); ++i) {  // a degree at once
+    Eigen::Map<Eigen::Vector3d> h_b(&gyro.h[3 * (3 * i + 1)]);
+    h_b = (h_b + 0.017 * h_b.unitOrthogonal()).normalized().eval();
+  }
+  const auto run = calibrate(simulated.pass, {});
+  ASSERT_EQ(run.gyro_events.size(), 1U);
+  EXPECT_EQ(run.gyro_events[0].gyro, 1);
+  EXPECT_EQ(run.gyro_events[0].state, GyroState::kIsolated);
+  EXPECT_LT(run.gyro_events[0].t - gyro.t[from], std::chrono::minutes(1));
+  EXPECT_NEAR(run.calibration.statistics.at("nis_mean"), run.calibration.statistics.at("nis_degrees_of_freedom"), 0.3);
+  EXPECT_EQ(run.fixes.back().status, FixStatus::kUsed);
+  EXPECT_EQ(run.fixes.back().degrees_of_freedom, 4);
+  EXPECT_TRUE(run.calibration.verdict.trustworthy);
+}
+
 TEST(Navigate, CorrectedAtEachFixByTheInvariantErrorIsBetterThanASingleReading) {
-  CalibrationOptions options;
+  CalibrationOptions options = told();
   options.corrections.when = CorrectionOptions::When::kEachFix;
   const auto run = navigate(two_hours().pass, options);
   // From when the samples round the first fix are there.

@@ -163,6 +163,40 @@ TEST(Verdict, TellsOfStarTrackersThatAreNotUsed) {
   const Verdict verdict = judge(pass, good_run());
   EXPECT_THAT(codes(verdict), ElementsAre("star-trackers-not-used"));
   EXPECT_TRUE(verdict.trustworthy);
+  auto run = good_run();
+  run.calibration.further = {{"star_tracker_2_align_x_rad", 0, 1e-6}};
+  EXPECT_THAT(codes(judge(pass, run)), IsEmpty());
+}
+
+TEST(Verdict, FindsAGyroThatWasLeftOut) {
+  auto run = good_run();
+  run.gyro_events = {{Time(std::chrono::minutes(90)), 1, GyroState::kIsolated}};
+  const Verdict of_pair = judge(good_pass(), run);
+  EXPECT_THAT(codes(of_pair), ElementsAre("gyro-isolated"));
+  EXPECT_EQ(of_pair.findings[0].evidence, "gyro 2 left out for good at 90.0 min");
+  EXPECT_FALSE(of_pair.trustworthy);
+  run.calibration.gyros.push_back(run.calibration.gyros[0]);
+  auto pass = good_pass();
+  pass.gyro.gyros = 3;
+  EXPECT_THAT(codes(judge(pass, run)), ElementsAre("gyro-isolated"));
+  EXPECT_TRUE(judge(pass, run).trustworthy);
+}
+
+TEST(Verdict, FindsAGyroThatStoodStill) {
+  auto run = good_run();
+  run.gyro_events = {{Time(std::chrono::minutes(3)), 0, GyroState::kStuck},
+                     {Time(std::chrono::minutes(4)), 0, GyroState::kUsed},
+                     {Time(std::chrono::minutes(5)), 0, GyroState::kStuck}};
+  const Verdict verdict = judge(good_pass(), run);
+  EXPECT_THAT(codes(verdict), ElementsAre("gyro-stuck"));
+  EXPECT_EQ(verdict.findings[0].evidence, "gyro 1 stuck 2 times, first at 3.0 min");
+  EXPECT_TRUE(verdict.trustworthy);
+}
+
+TEST(Verdict, FindsAStarTrackerThatWasOff) {
+  auto run = good_run();
+  run.calibration.statistics["fixes_off_in_a_row"] = 100;
+  EXPECT_THAT(codes(judge(good_pass(), run)), ElementsAre("star-tracker-off"));
 }
 
 TEST(Verdict, FindsABadlyPlacedPair) {

@@ -139,7 +139,7 @@ class Figures {
   /// Per component the used ones with their sigmas, and the ones that the gate rejected.
   [[nodiscard]] json innovations() const {
     json components = json::array();
-    for (std::size_t i = 0; i < kInnovations; ++i) {
+    for (std::size_t i = 0; i < innovations_of(run_); ++i) {
       Series used(2, fix_step_min_);
       Series rejected(1, to_minutes(input_.pass.settings.duration));
       for (const ground::FixRecord& fix : run_.fixes) {
@@ -208,16 +208,17 @@ class Figures {
     if (used.empty()) {
       return {};
     }
-    const boost::math::chi_squared one(kInnovations);
+    const auto freedom = static_cast<double>(innovations_of(run_));
+    const boost::math::chi_squared one(freedom);
     json figure = {{"used", used.drawn(kWide)},
                    {"rejected", rejected.drawn(kWide)},
                    {"reopened", reopened},
-                   {"expected", kInnovations},
+                   {"expected", freedom},
                    {"low", boost::math::quantile(one, 0.025)},
                    {"high", boost::math::quantile(one, 0.975)},
                    {"gate", run_.options.gate_nis}};
     const std::size_t window = std::min<std::size_t>(100, nis.size());
-    const auto sum_freedom = static_cast<double>(kInnovations * window);
+    const auto sum_freedom = freedom * static_cast<double>(window);
     const boost::math::chi_squared sum(sum_freedom);
     Series mean(1, fix_step_min_);
     double total = std::accumulate(nis.begin(), nis.begin() + static_cast<std::ptrdiff_t>(window), 0.0);

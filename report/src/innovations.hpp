@@ -8,14 +8,16 @@
 
 namespace trihedron::report {
 
-/// Components 2–5 of eq. (3).
-inline constexpr std::size_t kInnovations = 4;
+/// Components of eq. (3) from the second on: two per gyro.
+[[nodiscard]] inline std::size_t innovations_of(const ground::CalibrationRun& run) {
+  return 2 * run.calibration.gyros.size();
+}
 
 /// Calls body(component, innovation / sigma) for the fixes that the filter judged and used.
 template <class Body>
 void for_each_normalised(const std::vector<ground::FixRecord>& fixes, Body&& body) {
   for (const ground::FixRecord& fix : fixes) {
-    for (std::size_t i = 0; i < kInnovations && fix.status == FixStatus::kUsed; ++i) {
+    for (std::size_t i = 0; fix.status == FixStatus::kUsed && i < fix.innovation.size(); ++i) {
       if (const double value = fix.innovation[i] / fix.innovation_sigma[i]; std::isfinite(value)) {
         body(i, value);
       }

@@ -182,12 +182,10 @@ json evaluation_of(const ReportInput& input) {
 // ---- Innovations
 
 json innovation_rows(const ReportInput& input) {
-  static constexpr std::array<const char*, kInnovations> kNames = {"gyro 1, first", "gyro 1, second", "gyro 2, first",
-                                                                   "gyro 2, second"};
   struct Sums {
     double count = 0, sum = 0, squares = 0, beyond = 0;
   };
-  std::array<Sums, kInnovations> sums;
+  std::vector<Sums> sums(innovations_of(input.run));
   for_each_normalised(input.run.fixes, [&](std::size_t i, double value) {
     ++sums[i].count;
     sums[i].sum += value;
@@ -195,9 +193,9 @@ json innovation_rows(const ReportInput& input) {
     sums[i].beyond += std::abs(value) > 3 ? 1 : 0;
   });
   json rows = json::array();
-  for (std::size_t i = 0; i < kInnovations && sums[i].count > 0; ++i) {
+  for (std::size_t i = 0; i < sums.size() && sums[i].count > 0; ++i) {
     const double mean = sums[i].sum / sums[i].count;
-    rows.push_back({{"name", kNames[i]},
+    rows.push_back({{"name", fmt::format("gyro {}, {}", i / 2 + 1, i % 2 == 0 ? "first" : "second")},
                     {"mean", signed_number(mean, 3)},
                     {"deviation", number(std::sqrt(sums[i].squares / sums[i].count - mean * mean), 3)},
                     {"beyond", number(100 * sums[i].beyond / sums[i].count, 2)}});

@@ -159,6 +159,9 @@ class Generator {
       const bool first = out_.run.fixes.empty();
       const bool outlier = !first && options_.troubled && uniform() < 0.01;
       const double start = 1 + 20 * std::exp(-seconds(t) / 120);
+      fix.innovation.resize(4);
+      fix.innovation_sigma.resize(4);
+      fix.degrees_of_freedom = 4;
       for (std::size_t i = 0; i < fix.innovation.size(); ++i) {
         fix.innovation_sigma[i] = (5 + 4 * static_cast<double>(i % 2)) * start * kArcsecond_rad;
         fix.innovation[i] = fix.innovation_sigma[i] * normal() + (outlier ? 2 * kDegree_rad * (uniform() - 0.5) : 0);

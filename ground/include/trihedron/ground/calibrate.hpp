@@ -19,13 +19,15 @@
 
 namespace trihedron::ground {
 
-/// One fix: eq. (3), components 2–5, and what was done with it.
+/// One fix: eq. (3) from its second component on, two per gyro, and what was done with it.
 struct FixRecord {
   Time t{};
   FixStatus status = FixStatus::kNone;
-  std::array<double, 4> innovation{};        ///< rad
-  std::array<double, 4> innovation_sigma{};  ///< rad
+  std::vector<double> innovation;        ///< rad
+  std::vector<double> innovation_sigma;  ///< rad
   double nis = 0;
+  int degrees_of_freedom = 0;  ///< of the NIS: two per gyro that could be used
+  bool jumped = false;         ///< its misfit came at once and is more than drift can make
   bool corrected_navigator = false;
 
   [[nodiscard]] bool used() const { return is_used(status); }
@@ -43,6 +45,13 @@ struct Correction {
   Time t{};
   std::vector<GyroCalibration> known_before;  ///< the parameters of before the pass
   std::vector<GyroCalibration> calibrated;    ///< as estimated until then
+};
+
+/// Something that a gyro did.
+struct GyroEvent {
+  Time t{};
+  int gyro = 0;  ///< index
+  GyroState state = GyroState::kUsed;
 };
 
 /// For estimating a kind of further states instead of taking them as zero.
@@ -65,6 +74,7 @@ struct CalibrationRun {
   std::vector<double> angle_residual_min, angle_residual_max;
   std::map<std::string, long> samples;     ///< gyro samples by what was done with them
   std::map<std::string, long> fix_counts;  ///< fixes by what was done with them
+  std::vector<GyroEvent> gyro_events;      ///< changes of a gyro's state
 };
 
 /// What `CalibrationOptions::estimator` and `drift_model` may name.
@@ -110,5 +120,6 @@ struct NavigationRun {
 
 [[nodiscard]] const char* name_of(FixStatus status);
 [[nodiscard]] const char* name_of(SampleStatus status);
+[[nodiscard]] const char* name_of(GyroState state);
 
 }  // namespace trihedron::ground

@@ -9,6 +9,9 @@ namespace trihedron::ground {
 /// Whether the parameters in use fit the pass.
 [[nodiscard]] Verdict judge_navigation(const NavigationRun& run);
 
+/// One for each gyro and state: how often, and when first, in minutes from `epoch`.
+[[nodiscard]] std::vector<std::string> texts_of(const std::vector<GyroEvent>& events, Time epoch);
+
 /// How well an attitude history separates an alignment from an initial direction. Where an axis n is fixed in the body
 /// and in space, an alignment error about n looks like an error of the initial direction about n, whatever the number
 /// of fixes.
