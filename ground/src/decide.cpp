@@ -4,7 +4,9 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <functional>
 #include <future>
+#include <map>
 #include <memory>
 #include <numbers>
 #include <optional>
@@ -139,36 +141,64 @@ class States {
   Eigen::MatrixXd root_;
 };
 
-/// The process noise that makes the pass most likely, not below that of the options: by factors of two, then a parabola
-/// over its logarithm. Two runs at a time.
-double most_likely_walk(const Pass& pass, CalibrationOptions options) {
-  const double least = options.direction_random_walk_rad_sqrt_s;
-  const auto likelihood = [&](double walk) {
-    CalibrationOptions trial = options;
-    trial.direction_random_walk_rad_sqrt_s = walk;
-    return has_further_states(trial) ? Trial<Full>(pass, trial).log_likelihood()
-                                     : Trial<InvariantEstimator<Esg7, 2>>(pass, trial).log_likelihood();
-  };
-  constexpr double kFactor = 2;
-  constexpr int kMost = 10;
-  std::vector<double> log_likelihood;
-  for (int i = 0; i < kMost; i += 2) {
-    const double walk = least * std::pow(kFactor, i);
-    auto next = std::async(std::launch::async, likelihood, kFactor * walk);
-    log_likelihood.push_back(likelihood(walk));
-    log_likelihood.push_back(next.get());
-    if (log_likelihood.back() < *(log_likelihood.end() - 2)) {
-      break;
+/// The log likelihood of a pass under options.
+using Likelihood = std::function<double(const CalibrationOptions&)>;
+
+/// The process noise that makes the pass most likely, not below that of the options: by factors of eight, since where
+/// the model is wrong and the filter has to reopen there is more than one maximum; round the best of them by factors of
+/// two; then a parabola over its logarithm.
+double most_likely_walk(const CalibrationOptions& options, const Likelihood& likelihood) {
+  const auto walk = [&](double i) { return options.direction_random_walk_rad_sqrt_s * std::pow(2, i); };
+  constexpr int kMost = 9;
+  std::map<int, double> found;
+  std::vector<int> next = {0, 3, 6, kMost};
+  int best = 0;
+  while (!next.empty()) {
+    std::vector<std::future<double>> runs;
+    for (const int i : next) {
+      runs.push_back(std::async(std::launch::async, [&, i] {
+        CalibrationOptions trial = options;
+        trial.direction_random_walk_rad_sqrt_s = walk(i);
+        return likelihood(trial);
+      }));
     }
+    for (std::size_t i = 0; i < next.size(); ++i) {
+      found[next[i]] = runs[i].get();
+    }
+    best = std::max_element(found.begin(), found.end(), [](const auto& a, const auto& b) {
+             return a.second < b.second;
+           })->first;
+    next = {best - 1, best + 1};
+    std::erase_if(next, [&](int i) { return i < 0 || i > kMost || found.contains(i); });
   }
-  const auto best = std::max_element(log_likelihood.begin(), log_likelihood.end());
-  const auto i = static_cast<double>(best - log_likelihood.begin());
-  if (best == log_likelihood.begin() || best + 1 == log_likelihood.end()) {
-    return least * std::pow(kFactor, i);
+  if (best == 0 || best == kMost) {
+    return walk(best);
   }
-  const double below = *(best - 1);
-  const double above = *(best + 1);
-  return least * std::pow(kFactor, i + (above - below) / (4 * *best - 2 * below - 2 * above));
+  const double below = found[best - 1];
+  const double above = found[best + 1];
+  return walk(best + (above - below) / (4 * found[best] - 2 * below - 2 * above));
+}
+
+/// The noise of the star tracker that a trial shows, where it is not what was told.
+template <class Estimator>
+std::optional<Eigen::Vector3d> other_star_tracker_noise(const Pass& pass, const Trial<Estimator>& trial) {
+  const Eigen::Vector3d& told = pass.settings.star_tracker_noise_rad;
+  const Eigen::Vector3d found = trial.star_tracker_noise_rad();
+  const bool other = ((found - told).array().abs() > kNotable * told.array()).any();
+  return other ? std::optional(found) : std::nullopt;
+}
+
+/// Only the noise is found: of more than two gyros.
+template <class Estimator>
+CalibrationOptions with_noise_found(const Pass& pass, CalibrationOptions options) {
+  const Trial<Estimator> trial(pass, options);
+  options.find_noise = trial.changes() >= kEnough;
+  if (options.find_noise) {
+    options.star_tracker_noise_rad = other_star_tracker_noise(pass, trial);
+    options.direction_random_walk_rad_sqrt_s = most_likely_walk(
+        options, [&](const CalibrationOptions& trials) { return Trial<Estimator>(pass, trials).log_likelihood(); });
+  }
+  return options;
 }
 
 CalibrationOptions without_further_states(CalibrationOptions options) {
@@ -239,13 +269,23 @@ Decision decide(const Pass& pass, const CalibrationOptions& asked) {
     if (asked.drift_model != kAutoDriftModel) {
       decision.options.drift_model = asked.drift_model;
     }
+    const bool finds = asked.find_noise && asked.estimator == Full::kName && !pass.settings.prior;
+    if (finds && pass.gyro.gyros == 3) {
+      decision.options = with_noise_found<InvariantEstimator<Esg7, 3>>(pass, decision.options);
+    } else if (finds && pass.gyro.gyros == 4) {
+      decision.options = with_noise_found<InvariantEstimator<Esg7, 4>>(pass, decision.options);
+    } else {
+      decision.options.find_noise = false;
+    }
     return decision;
   }
   if (pass.settings.prior) {
     decision.options = as_before(asked, *pass.settings.prior);
+    decision.options.find_noise = false;
     return decision;
   }
   CalibrationOptions& options = decision.options;
+  options.find_noise = false;
   if (options.further_states.wandering_drift == Choice::kAuto) {
     options.further_states.wandering_drift = Choice::kOff;
   }
@@ -258,17 +298,20 @@ Decision decide(const Pass& pass, const CalibrationOptions& asked) {
   Trial<Full> everything(pass, with_everything(options, asked));
   if (!everything.estimator().started()) {
     decision.options = without_further_states(asked);
+    decision.options.find_noise = false;
     return decision;
   }
   if (asked.find_noise && everything.changes() >= kEnough) {
-    const Eigen::Vector3d& told = pass.settings.star_tracker_noise_rad;
-    const Eigen::Vector3d found = everything.star_tracker_noise_rad();
-    if (((found - told).array().abs() > kNotable * told.array()).any()) {
-      options.star_tracker_noise_rad = found;
+    options.find_noise = true;
+    options.star_tracker_noise_rad = other_star_tracker_noise(pass, everything);
+    if (options.star_tracker_noise_rad) {
       everything = Trial<Full>(pass, with_everything(options, asked));
     }
     settle_states(States(everything.estimator()), asked, decision);
-    options.direction_random_walk_rad_sqrt_s = most_likely_walk(pass, options);
+    options.direction_random_walk_rad_sqrt_s = most_likely_walk(options, [&](const CalibrationOptions& trial) {
+      return has_further_states(trial) ? Trial<Full>(pass, trial).log_likelihood()
+                                       : Trial<InvariantEstimator<Esg7, 2>>(pass, trial).log_likelihood();
+    });
     if (options.direction_random_walk_rad_sqrt_s > asked.direction_random_walk_rad_sqrt_s) {
       everything = Trial<Full>(pass, with_everything(options, asked));
     }

@@ -7,7 +7,7 @@
 
 namespace trihedron::ground {
 
-/// The options with nothing left to decide, and on what evidence.
+/// The options with nothing left to decide, `find_noise` saying whether it was found; and on what evidence.
 struct Decision {
   CalibrationOptions options;
   std::vector<Evidence> evidence;  ///< empty where nothing was to be decided
@@ -15,7 +15,8 @@ struct Decision {
 
 /// Settles each choice that is left to the program. Estimator paper, and passes of more than two gyros, have no further
 /// states; a prior calibration tells them where the pass has one; else they are those with more evidence for than
-/// against.
+/// against. The noise is found where it is asked for, by estimator invariant on a pass that is long enough and has no
+/// prior calibration.
 [[nodiscard]] Decision decide(const Pass& pass, const CalibrationOptions& asked);
 
 }  // namespace trihedron::ground

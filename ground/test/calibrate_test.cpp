@@ -353,6 +353,27 @@ TEST(Calibrate, TakesThreeGyros) {
   EXPECT_TRUE(run.gyro_events.empty());
 }
 
+TEST(Calibrate, FindsTheNoiseOfThreeGyros) {
+  Scenario scenario;
+  scenario.seed = 9;
+  scenario.duration = std::chrono::hours(3);
+  scenario.gyros.resize(3, scenario.gyros[0]);
+  scenario.gyros[2].start_direction_c = scenario.gyros[0].start_direction_c.cross(scenario.gyros[1].start_direction_c);
+  scenario.star_tracker.noise_rad *= 1.5;
+  for (GyroScenario& gyro : scenario.gyros) {
+    gyro.drift.outside_sigma_rad_s = 0;
+    gyro.drift.direction_walk_rad_sqrt_s = 3e-8;
+  }
+  Pass pass = sim::simulate(scenario).pass;
+  pass.settings.star_tracker_noise_rad /= 1.5;  // what was promised
+  const auto run = calibrate(pass, {});
+  EXPECT_TRUE(run.options.find_noise);
+  EXPECT_NEAR(run.options.direction_random_walk_rad_sqrt_s, 3e-8, 1e-8);
+  ASSERT_TRUE(run.options.star_tracker_noise_rad.has_value());
+  EXPECT_NEAR(run.options.star_tracker_noise_rad->x(), scenario.star_tracker.noise_rad.x(), 1e-6);
+  EXPECT_NEAR(run.calibration.statistics.at("nis_mean"), 6, 0.3);
+}
+
 TEST(Calibrate, GoesOnWithoutAGyroThatWandersOff) {
   auto simulated = three_gyros();
   GyroTelemetry& gyro = simulated.pass.gyro;
