@@ -155,6 +155,7 @@ double most_likely_walk(const CalibrationOptions& options, const Likelihood& lik
   int best = 0;
   while (!next.empty()) {
     std::vector<std::future<double>> runs;
+    runs.reserve(next.size());
     for (const int i : next) {
       runs.push_back(std::async(std::launch::async, [&, i] {
         CalibrationOptions trial = options;

@@ -305,12 +305,14 @@ json further_of(const ReportInput& input) {
 }
 
 json states_decided(const ReportInput& input) {
+  static const std::map<std::string, std::string> kNames = {{"clock_offset", "Clock offset"},
+                                                            {"orbital_error", "Error at orbital period"},
+                                                            {"drift_outside_eq1", "Drift outside eq. (1)"}};
   json sentences = json::array();
   for (const ground::Evidence& evidence : input.run.evidence) {
-    std::string states = evidence.states;
-    std::replace(states.begin(), states.end(), '_', ' ');
-    sentences.push_back(fmt::format("{}: ln {}, {}.", states, number(evidence.log_bayes_factor, 1),
-                                    evidence.accepted ? "estimated" : "taken as zero"));
+    const auto name = kNames.find(evidence.states);
+    sentences.push_back(fmt::format("{}: {} ({:+.1f}).", name == kNames.end() ? evidence.states : name->second,
+                                    evidence.accepted ? "estimated" : "taken as zero", evidence.log_bayes_factor));
   }
   return sentences;
 }
