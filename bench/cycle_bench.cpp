@@ -4,7 +4,7 @@
 #include <benchmark/benchmark.h>
 
 #include "flight.hpp"
-#include "trihedron/core/cycle.hpp"
+#include "trihedron/core/cycles.hpp"
 
 namespace {
 

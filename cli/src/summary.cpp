@@ -149,7 +149,7 @@ std::string calibration_text(const ground::CalibrationRun& run, const std::optio
   };
   for (const FurtherEstimate& estimate : calibration.further) {
     fmt::format_to(out, "{}  {:<24} {:>+13.4e} {:>12.1e}\n",
-                   &estimate == calibration.further.data() ? "\nStar tracker\n" : "", estimate.name, estimate.value,
+                   &estimate == calibration.further.data() ? "\nFurther states\n" : "", estimate.name, estimate.value,
                    estimate.sigma);
   }
   for (const ground::Evidence& evidence : run.evidence) {
@@ -181,6 +181,11 @@ std::string calibration_text(const ground::CalibrationRun& run, const std::optio
                  statistic("nis_degrees_of_freedom"));
   fmt::format_to(out, "Noise       random walk of each momentum {:.1e} rad/√s, {}",
                  run.options.direction_random_walk_rad_sqrt_s, run.options.find_noise ? "the most likely" : "as told");
+  const FurtherStateOptions& states = run.options.further_states;
+  if (states.wandering_drift == FurtherStateOptions::Choice::kOn) {
+    fmt::format_to(out, "; drift that wanders by {:.1e} rad/s over {:.0f} min", states.wandering_drift_rad_s,
+                   to_seconds(states.wandering_time) / 60);
+  }
   if (const auto& noise = run.options.star_tracker_noise_rad) {
     fmt::format_to(out, "; star tracker {:.1f}″ {:.1f}″ {:.1f}″, which is not what was told", noise->x() / kArcsecond,
                    noise->y() / kArcsecond, noise->z() / kArcsecond);

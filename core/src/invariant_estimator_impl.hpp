@@ -20,6 +20,7 @@ Result<InvariantEstimator<Base, N, F>, SetupFault> InvariantEstimator<Base, N, F
   if ((F.clock_offset && !(setup.clock_offset_sigma_s > 0)) ||
       (F.orbital_error && !(setup.orbital_error_sigma_rad > 0)) ||
       (F.wandering_drift && !(setup.wandering_sigma_rad_s > 0 && setup.wandering_time_s > 0)) ||
+      (F.readout_bias && !(setup.readout_bias_sigma > 0)) ||
       !std::all_of(setup.further_heads.begin(), setup.further_heads.end(),
                    [](const HeadSetup& head) { return head.alignment_sigma_rad > 0; })) {
     return SetupFault::kPriorNotPositiveDefinite;
@@ -36,6 +37,9 @@ Result<InvariantEstimator<Base, N, F>, SetupFault> InvariantEstimator<Base, N, F
   Eigen::Matrix<double, kConstants, kConstants> constants = Eigen::Matrix<double, kConstants, kConstants>::Zero();
   constants.template topLeftCorner<kOwn, kOwn>() = root.value();
   constexpr int kFirst = Layout::kDynamic;
+  if constexpr (F.readout_bias) {
+    constants.diagonal().template segment<3 * N>(Layout::kBiases - kFirst).setConstant(1 / setup.readout_bias_sigma);
+  }
   if constexpr (F.clock_offset) {
     constants(Layout::clock_offset() - kFirst, Layout::clock_offset() - kFirst) = 1 / setup.clock_offset_sigma_s;
   }
@@ -118,10 +122,14 @@ void InvariantEstimator<Base, N, F>::start(const Eigen::Matrix3d& C_in_c, const 
   const Eigen::Matrix3d R_in = C_in_c * R_c * C_in_c.transpose();
   for (int k = 0; k < N; ++k) {
     if (readings.used[k]) {
-      gyros_[k].h_in = (C_in_c * (gyros_[k].C_c_b * readings.h_b[k])).normalized();
+      gyros_[k].h_in = (C_in_c * gyros_[k].in_c(readings.h_b[k])).normalized();
     }
     H.template block<3, 3>(3 * k, Layout::direction(k)).setIdentity();
     H.template block<3, 3>(3 * k, Layout::alignment(k)) = -C_in_c;
+    if constexpr (F.readout_bias) {
+      H.template block<3, 3>(3 * k, Layout::readout_bias(k)) =
+          C_in_c * skew<double>(gyros_[k].in_c(readings.h_b[k])) * gyros_[k].C_c_b;
+    }
     H.template block<3, F.shared()>(3 * k, Layout::kShared) = C_in_c * by_shared;
     for (int j = 0; j < N; ++j) {
       R.template block<3, 3>(3 * k, 3 * j) = R_in;
@@ -154,6 +162,7 @@ auto InvariantEstimator<Base, N, F>::prior_gyros() const -> Gyros {
     gyros[k].drift_rad_s.setZero();
     gyros[k].drift_rad_s.template head<Base::kSize>() = setup_.prior[k].drift_rad_s;
     gyros[k].C_c_b = setup_.prior[k].C_c_b;
+    gyros[k].readout_bias = setup_.prior[k].readout_bias;
   }
   return gyros;
 }
@@ -205,7 +214,7 @@ Eigen::Matrix3d InvariantEstimator<Base, N, F>::fix_noise(int head) const {
 template <class Base, int N, FurtherStates F>
 Eigen::Matrix3d InvariantEstimator<Base, N, F>::fused_attitude(const AttitudeByDirections<N>& by_gyros,
                                                                const Rot<In, C>& by_fix, const Eigen::Matrix3d& R_c,
-                                                               double noise_factor) const {
+                                                               const FixReadings<N>& readings) const {
   const Eigen::Matrix3d C_c_in = by_gyros.C_in_c.raw().transpose();
   Eigen::Matrix<double, 3, Layout::kStates> by_states = Eigen::Matrix<double, 3, Layout::kStates>::Zero();
   Eigen::Matrix3d P = Eigen::Matrix3d::Zero();
@@ -213,7 +222,11 @@ Eigen::Matrix3d InvariantEstimator<Base, N, F>::fused_attitude(const AttitudeByD
     const Eigen::Matrix3d by_phi = by_gyros.by_directions.template middleCols<3>(3 * k);
     by_states.template middleCols<3>(Layout::direction(k)) = by_phi * C_c_in;
     by_states.template middleCols<3>(Layout::alignment(k)) = -by_phi;
-    const double sigma = setup_.readout_noise_rad[k] * noise_factor;
+    if constexpr (F.readout_bias) {
+      by_states.template middleCols<3>(Layout::readout_bias(k)) =
+          by_phi * skew<double>(gyros_[k].in_c(readings.h_b[k])) * gyros_[k].C_c_b;
+    }
+    const double sigma = setup_.readout_noise_rad[k] * readings.noise_factor;
     P += sigma * sigma * by_phi * by_phi.transpose();
   }
   const Eigen::Matrix<double, 3, Layout::kStates> spread = information_.template through_uncertainty<3>(by_states);
@@ -236,9 +249,12 @@ auto InvariantEstimator<Base, N, F>::measure(const Gyros& gyros, const Eigen::Ma
     across.row(0) = h.cross(gyros[(k + 1) % N].h_in).normalized().transpose();
     across.row(1) = h.cross(across.row(0).transpose()).transpose();
     const int row = 2 * k;
-    m.y.template segment<2>(row) = across * h.cross(C_in_c * (gyros[k].C_c_b * h_b[k]));
+    m.y.template segment<2>(row) = across * h.cross(C_in_c * gyros[k].in_c(h_b[k]));
     m.H.template block<2, 3>(row, Layout::direction(k)) = across;
     m.H.template block<2, 3>(row, Layout::alignment(k)) = -across * C_linear;
+    if constexpr (F.readout_bias) {
+      m.H.template block<2, 3>(row, Layout::readout_bias(k)) = across * skew<double>(h) * C_linear * gyros[k].C_c_b;
+    }
     by_fix.template middleRows<2>(row) = across * C_linear;
     m.R.template block<2, 2>(row, row).diagonal().setConstant(readout_noise_rad[k] * readout_noise_rad[k]);
   }
@@ -285,7 +301,7 @@ auto InvariantEstimator<Base, N, F>::correct(const StarFix& fix, const FixReadin
     return report;
   }
   update_to_now(by_gyros.value().C_in_c.raw());
-  const Eigen::Matrix3d C_linear = fused_attitude(by_gyros.value(), C_in_c, R_c, readings.noise_factor);
+  const Eigen::Matrix3d C_linear = fused_attitude(by_gyros.value(), C_in_c, R_c, readings);
   const PerGyro<double, N> noise_rad = reading_noise(C_linear, readings.noise_factor, 1);
   Measurement m = measure(gyros_, C_in_c.raw(), C_linear, readings.h_b, R_c, by_shared, noise_rad);
   leave_out_unused(readings.used, m);
@@ -299,7 +315,8 @@ auto InvariantEstimator<Base, N, F>::correct(const StarFix& fix, const FixReadin
   switch (report.status) {
     case FixStatus::kRejectedByGate:
       // What a turn of them all explains is the star tracker's.
-      if (!angles_agree(measure_angles(by_gyros.value().C_in_c.raw(), readings, 1), readings.used)) {
+      if (report.nis > kPlain * setup_.gate_nis &&
+          !angles_agree(measure_angles(by_gyros.value().C_in_c.raw(), readings, 1), readings.used)) {
         report.odd_gyro = odd_gyro(
             m, readings.used, [this](const Measurement& rest, const GyroMask<N>& used) { return agrees(rest, used); });
       }
@@ -419,7 +436,7 @@ auto InvariantEstimator<Base, N, F>::check_angles(Time t, const FixReadings<N>& 
   report_innovation(information_, white, report);
   if (!angles_agree(m, readings.used)) {
     report.status = FixStatus::kRejectedByGate;
-    if (count(readings.used) > 2) {
+    if (count(readings.used) > 2 && report.nis > kPlain * setup_.gate_nis) {
       report.odd_gyro = odd_gyro(m, readings.used, [this](const Measurement& rest, const GyroMask<N>& used) {
         return angles_agree(rest, used);
       });
@@ -442,6 +459,9 @@ void InvariantEstimator<Base, N, F>::feed_back(const typename Information::Vecto
     if constexpr (F.wandering_drift) {
       gyro.drift_rad_s.template tail<3>() += x.template segment<3>(Layout::wandering(k));
     }
+    if constexpr (F.readout_bias) {
+      gyro.readout_bias += x.template segment<3>(Layout::readout_bias(k));
+    }
     const Eigen::Vector3d delta = x.template segment<3>(Layout::alignment(k));
     gyro.C_c_b =
         Eigen::Quaterniond(Rot<C, C>::exp(Vec<C>::assume(delta)).raw() * gyro.C_c_b).normalized().toRotationMatrix();
@@ -460,8 +480,32 @@ auto InvariantEstimator<Base, N, F>::error_root() const -> ErrorRoot {
       errors.template middleRows<3>(Errors::drift(k) + Base::kSize) = root.template middleRows<3>(Layout::wandering(k));
     }
     errors.template middleRows<3>(Errors::alignment(k)) = root.template middleRows<3>(Layout::alignment(k));
+    if constexpr (F.readout_bias) {
+      errors.template middleRows<3>(Errors::readout_bias(k)) = root.template middleRows<3>(Layout::readout_bias(k));
+    }
   }
   return errors;
+}
+
+template <class Base, int N, FurtherStates F>
+auto InvariantEstimator<Base, N, F>::through_uncertainty(const Eigen::Matrix<double, 3, Errors::kSize>& by_errors) const
+    -> Eigen::Matrix<double, 3, Layout::kStates> {
+  Rows3 by_states = Rows3::Zero();
+  for (int k = 0; k < N; ++k) {
+    by_states.template middleCols<3>(Layout::direction(k)) = by_errors.template middleCols<3>(Errors::direction(k));
+    by_states.template middleCols<Base::kSize>(Layout::drift(k)) =
+        by_errors.template middleCols<Base::kSize>(Errors::drift(k));
+    if constexpr (F.wandering_drift) {
+      by_states.template middleCols<3>(Layout::wandering(k)) =
+          by_errors.template middleCols<3>(Errors::drift(k) + Base::kSize);
+    }
+    by_states.template middleCols<3>(Layout::alignment(k)) = by_errors.template middleCols<3>(Errors::alignment(k));
+    if constexpr (F.readout_bias) {
+      by_states.template middleCols<3>(Layout::readout_bias(k)) =
+          by_errors.template middleCols<3>(Errors::readout_bias(k));
+    }
+  }
+  return information_.template through_uncertainty<3>(by_states);
 }
 
 template <class Base, int N, FurtherStates F>
@@ -480,6 +524,11 @@ auto InvariantEstimator<Base, N, F>::prior_parameter_root() const
       root.template block<3, 3>(row + Base::kSize, Own::kSize + 3 * k)
           .diagonal()
           .setConstant(setup_.wandering_sigma_rad_s);
+    }
+    if constexpr (F.readout_bias) {
+      constexpr int kBiases = Errors::kBiases - Errors::kDirections;
+      root.template bottomRightCorner<kSize - kBiases, kSize - kBiases>().diagonal().setConstant(
+          setup_.readout_bias_sigma);
     }
   }
   return root;

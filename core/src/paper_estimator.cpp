@@ -2,6 +2,7 @@
 
 #include <cmath>
 
+#include "trihedron/core/cycle.hpp"
 #include "trihedron/core/innovation.hpp"
 
 namespace trihedron {
@@ -180,6 +181,19 @@ auto PaperEstimator<Model>::error_root() const -> ErrorRoot {
   return errors;
 }
 
+template <class Model>
+auto PaperEstimator<Model>::through_uncertainty(const Eigen::Matrix<double, 3, Errors::kSize>& by_errors) const
+    -> Eigen::Matrix<double, 3, Layout::kStates> {
+  Eigen::Matrix<double, 3, Layout::kStates> by_states;
+  for (int k = 0; k < kGyros; ++k) {
+    by_states.template middleCols<2>(Layout::direction(k)) =
+        by_errors.template middleCols<3>(Errors::direction(k)) * skew<double>(gyros_[k].h_in) * qi_.tangents[k];
+  }
+  by_states.template rightCols<Layout::kParameters>() = by_errors.template rightCols<Layout::kParameters>();
+  return information_.template through_uncertainty<3>(by_states);
+}
+
 template class PaperEstimator<Esg7>;
+template class Cycle<PaperEstimator<Esg7>>;
 
 }  // namespace trihedron

@@ -1,4 +1,4 @@
-#include "trihedron/core/cycle.hpp"
+#include "trihedron/core/cycles.hpp"
 
 #include <gtest/gtest.h>
 

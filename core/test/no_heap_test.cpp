@@ -8,7 +8,7 @@
 #include <new>
 
 #include "flight.hpp"
-#include "trihedron/core/cycle.hpp"
+#include "trihedron/core/cycles.hpp"
 #include "trihedron/core/invariant_estimator.hpp"
 
 namespace {

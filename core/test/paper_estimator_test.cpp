@@ -7,7 +7,7 @@
 
 #include "flight.hpp"
 #include "numerical_jacobian.hpp"
-#include "trihedron/core/cycle.hpp"
+#include "trihedron/core/cycles.hpp"
 
 namespace trihedron {
 namespace {

@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "flight.hpp"
-#include "trihedron/core/cycle.hpp"
+#include "trihedron/core/cycles.hpp"
 #include "trihedron/core/invariant_estimator.hpp"
 
 namespace trihedron {

@@ -11,11 +11,9 @@
 
 #include "decide.hpp"
 #include "setup.hpp"
-#include "trihedron/core/drift.hpp"
-#include "trihedron/core/invariant_estimator.hpp"
-#include "trihedron/core/paper_estimator.hpp"
 #include "trihedron/ground/replay.hpp"
 #include "trihedron/ground/verdict.hpp"
+#include "with_estimator.hpp"
 
 namespace trihedron::ground {
 namespace {
@@ -186,7 +184,7 @@ class AngleTrack {
   CalibrationRun& run_;
 };
 
-/// The shared states that are on.
+/// The further states that are on, but for wandering drift.
 template <class Estimator>
 std::vector<FurtherEstimate> further_of(const Estimator& estimator, const Pass& pass,
                                         const FurtherStateOptions& states) {
@@ -213,6 +211,14 @@ std::vector<FurtherEstimate> further_of(const Estimator& estimator, const Pass& 
       if (!pass.further_star_trackers.empty()) {
         for (int i = 0; i < 3; ++i) {
           tell(fmt::format("star_tracker_2_align_{}_rad", "xyz"[i]), Layout::head(1) + i);
+        }
+      }
+      if (states.readout_bias == kOn) {
+        for (int k = 0; k < Estimator::kGyros; ++k) {
+          for (int i = 0; i < 3; ++i) {
+            further.push_back({fmt::format("gyro{}_readout_bias_{}_rad", k + 1, "xyz"[i]),
+                               estimator.gyros()[k].readout_bias(i), root.row(Layout::readout_bias(k) + i).norm()});
+          }
         }
       }
     }
@@ -245,8 +251,9 @@ Correction correction_of(const Estimator& estimator, const AttitudeSolution& att
   for (int k = 0; k < Estimator::kGyros; ++k) {
     const auto& calibrated = estimator.gyros()[k];
     auto before = estimator.prior_gyros()[k];
-    // Where the momentum is in the case, seen through the alignment known before.
-    before.h_in = C_in_c * (before.C_c_b * (calibrated.C_c_b.transpose() * (C_in_c.transpose() * calibrated.h_in)));
+    // Where the momentum is in the case, seen through what was known of it before.
+    before.h_in = C_in_c * before.in_c(calibrated.C_c_b.transpose() * (C_in_c.transpose() * calibrated.h_in) +
+                                       calibrated.readout_bias);
     correction.known_before.push_back(to_record<typename Estimator::BaseModel>(before));
     correction.calibrated.push_back(to_record<typename Estimator::BaseModel>(calibrated));
   }
@@ -354,39 +361,6 @@ NavigationRun navigate_with(const Pass& pass, const CalibrationOptions& options,
   }
   run.verdict = judge_navigation(run);
   return run;
-}
-
-/// Calls `body` with the estimator as a type tag. Of what is built, the smallest that has what is asked for.
-template <class Body>
-auto with_estimator(const Pass& pass, const CalibrationOptions& options, Body&& body) {
-  if (std::find(kEstimators.begin(), kEstimators.end(), options.estimator) == kEstimators.end()) {
-    throw SetupError(fmt::format("there is no estimator '{}'", options.estimator),
-                     fmt::format("use one of: {}", fmt::join(kEstimators, ", ")));
-  }
-  const bool esg20 = options.drift_model == Esg20::kModelName;
-  if ((!esg20 && options.drift_model != Esg7::kModelName) ||
-      (esg20 && (options.estimator == "paper" || pass.gyro.gyros > 2))) {
-    throw SetupError(fmt::format("estimator {} of {} gyros has no drift model '{}'", options.estimator, pass.gyro.gyros,
-                                 options.drift_model),
-                     fmt::format("use one of: {}", fmt::join(kDriftModels, ", ")));
-  }
-  if (options.estimator == "paper") {
-    return body.template operator()<PaperEstimator<Esg7>>();
-  }
-  switch (pass.gyro.gyros) {
-    case 3:
-      return body.template operator()<InvariantEstimator<Esg7, 3>>();
-    case 4:
-      return body.template operator()<InvariantEstimator<Esg7, 4>>();
-    default:
-      break;
-  }
-  if (esg20) {
-    return body.template operator()<InvariantEstimator<Esg20, 2, kAllFurtherStates>>();
-  }
-  const bool further = has_further_states(options) || !pass.further_star_trackers.empty();
-  return further ? body.template operator()<InvariantEstimator<Esg7, 2, kAllFurtherStates>>()
-                 : body.template operator()<InvariantEstimator<Esg7, 2>>();
 }
 
 }  // namespace

@@ -10,11 +10,11 @@
 #include <memory>
 #include <numbers>
 #include <optional>
+#include <utility>
 #include <vector>
 
-#include "setup.hpp"
-#include "trihedron/core/invariant_estimator.hpp"
 #include "trihedron/ground/replay.hpp"
+#include "with_estimator.hpp"
 
 namespace trihedron::ground {
 namespace {
@@ -112,6 +112,15 @@ class States {
   [[nodiscard]] double orbital_error() const {
     return of_shared(Full::Layout::orbital_error(), 6, setup().orbital_error_sigma_rad);
   }
+  [[nodiscard]] double readout_bias() const {
+    constexpr int kBiases = 3 * Full::kGyros;
+    Eigen::VectorXd estimate(kBiases);
+    for (int k = 0; k < Full::kGyros; ++k) {
+      estimate.segment<3>(3 * k) = estimator_.gyros()[k].readout_bias;
+    }
+    return log_evidence(estimate, root_.middleRows(Full::Layout::readout_bias(0), kBiases),
+                        Eigen::VectorXd::Constant(kBiases, setup().readout_bias_sigma));
+  }
   /// Of all gyros' coefficients that eq. (1) does not have.
   [[nodiscard]] double drift_outside() const {
     constexpr int kMembers = Esg20::kMembers;
@@ -141,43 +150,99 @@ class States {
   Eigen::MatrixXd root_;
 };
 
-/// The log likelihood of a pass under options.
-using Likelihood = std::function<double(const CalibrationOptions&)>;
+/// Options, and how likely they make the pass.
+struct Likely {
+  CalibrationOptions options;
+  double log_likelihood = 0;
+};
 
-/// The process noise that makes the pass most likely, not below that of the options: by factors of eight, since where
-/// the model is wrong and the filter has to reopen there is more than one maximum; round the best of them by factors of
-/// two; then a parabola over its logarithm.
-double most_likely_walk(const CalibrationOptions& options, const Likelihood& likelihood) {
-  const auto walk = [&](double i) { return options.direction_random_walk_rad_sqrt_s * std::pow(2, i); };
-  constexpr int kMost = 9;
-  std::map<int, double> found;
-  std::vector<int> next = {0, 3, 6, kMost};
-  int best = 0;
-  while (!next.empty()) {
-    std::vector<std::future<double>> runs;
-    runs.reserve(next.size());
-    for (const int i : next) {
-      runs.push_back(std::async(std::launch::async, [&, i] {
-        CalibrationOptions trial = options;
-        trial.direction_random_walk_rad_sqrt_s = walk(i);
-        return likelihood(trial);
-      }));
+/// Goes uphill over options on a grid, each by two numbers.
+class Search {
+ public:
+  using Point = std::pair<int, int>;
+  using At = std::function<CalibrationOptions(double, int)>;
+
+  /// From the best of `starts` to the best of its neighbours, and so on, within the bounds; all included.
+  Search(const Pass& pass, At at, const std::vector<Point>& starts, const Point& lowest, const Point& highest)
+      : pass_(pass), at_(std::move(at)) {
+    look_at(starts);
+    for (std::optional<Point> last; last != best_;) {
+      last = best_;
+      const auto [i, j] = best_;
+      look_at({{std::max(i - 1, lowest.first), j},
+               {std::min(i + 1, highest.first), j},
+               {i, std::max(j - 1, lowest.second)},
+               {i, std::min(j + 1, highest.second)}});
     }
-    for (std::size_t i = 0; i < next.size(); ++i) {
-      found[next[i]] = runs[i].get();
+  }
+
+  /// The best point, its first number by a parabola through its neighbours where it has two.
+  [[nodiscard]] Likely best() const {
+    const auto [i, j] = best_;
+    const double peak = tried_.at(best_);
+    const auto below = tried_.find({i - 1, j});
+    const auto above = tried_.find({i + 1, j});
+    double beside = 0;
+    if (below != tried_.end() && above != tried_.end()) {
+      beside = (above->second - below->second) / (4 * peak - 2 * below->second - 2 * above->second);
     }
-    best = std::max_element(found.begin(), found.end(), [](const auto& a, const auto& b) {
-             return a.second < b.second;
-           })->first;
-    next = {best - 1, best + 1};
-    std::erase_if(next, [&](int i) { return i < 0 || i > kMost || found.contains(i); });
+    return {at_(i + beside, j), peak};
   }
-  if (best == 0 || best == kMost) {
-    return walk(best);
+
+ private:
+  void look_at(const std::vector<Point>& points) {
+    std::map<Point, std::future<double>> runs;
+    for (const Point& point : points) {
+      if (!tried_.contains(point) && !runs.contains(point)) {
+        runs.emplace(point, std::async(std::launch::async, [this, options = at_(point.first, point.second)] {
+                       return with_estimator(pass_, options, [&]<class Estimator>() {
+                         return Trial<Estimator>(pass_, options).log_likelihood();
+                       });
+                     }));
+      }
+    }
+    for (auto& [point, run] : runs) {
+      tried_[point] = run.get();
+    }
+    best_ = std::max_element(tried_.begin(), tried_.end(), [](const auto& a, const auto& b) {
+              return a.second < b.second;
+            })->first;
   }
-  const double below = found[best - 1];
-  const double above = found[best + 1];
-  return walk(best + (above - below) / (4 * found[best] - 2 * below - 2 * above));
+
+  const Pass& pass_;
+  At at_;
+  std::map<Point, double> tried_;
+  Point best_;
+};
+
+/// The process noise that makes the pass most likely, by factors of two above that of the options, and from as many of
+/// them as `starts` says.
+Likely with_most_likely_walk(const Pass& pass, const CalibrationOptions& options,
+                             const std::vector<Search::Point>& starts) {
+  const auto at = [&](double level, int) {
+    CalibrationOptions trial = options;
+    trial.direction_random_walk_rad_sqrt_s *= std::pow(2, level);
+    return trial;
+  };
+  return Search(pass, at, starts, {0, 0}, {9, 0}).best();
+}
+
+/// Where the model is wrong and the filter has to reopen there is more than one maximum.
+const std::vector<Search::Point> kAllLevels = {{0, 0}, {3, 0}, {6, 0}, {9, 0}};
+
+/// Level and correlation time of the drift that wanders which make the pass most likely, by factors of two and three
+/// from those of the options.
+Likely with_most_likely_wandering(const Pass& pass, const CalibrationOptions& options,
+                                  const std::vector<Search::Point>& starts) {
+  const auto at = [&](double level, int time) {
+    CalibrationOptions trial = options;
+    FurtherStateOptions& states = trial.further_states;
+    states.wandering_drift = Choice::kOn;
+    states.wandering_drift_rad_s *= std::pow(2, level);
+    states.wandering_time = from_seconds(to_seconds(states.wandering_time) * std::pow(3, time));
+    return trial;
+  };
+  return Search(pass, at, starts, {-3, -2}, {9, 1}).best();
 }
 
 /// The noise of the star tracker that a trial shows, where it is not what was told.
@@ -190,22 +255,22 @@ std::optional<Eigen::Vector3d> other_star_tracker_noise(const Pass& pass, const 
 }
 
 /// Only the noise is found: of more than two gyros.
-template <class Estimator>
 CalibrationOptions with_noise_found(const Pass& pass, CalibrationOptions options) {
-  const Trial<Estimator> trial(pass, options);
-  options.find_noise = trial.changes() >= kEnough;
-  if (options.find_noise) {
+  return with_estimator(pass, options, [&]<class Estimator>() {
+    const Trial<Estimator> trial(pass, options);
+    options.find_noise = trial.changes() >= kEnough;
+    if (!options.find_noise) {
+      return options;
+    }
     options.star_tracker_noise_rad = other_star_tracker_noise(pass, trial);
-    options.direction_random_walk_rad_sqrt_s = most_likely_walk(
-        options, [&](const CalibrationOptions& trials) { return Trial<Estimator>(pass, trials).log_likelihood(); });
-  }
-  return options;
+    return with_most_likely_walk(pass, options, kAllLevels).options;
+  });
 }
 
 CalibrationOptions without_further_states(CalibrationOptions options) {
   options.drift_model = Esg7::kModelName;
   for (Choice* choice : {&options.further_states.clock_offset, &options.further_states.orbital_error,
-                         &options.further_states.wandering_drift}) {
+                         &options.further_states.wandering_drift, &options.further_states.readout_bias}) {
     *choice = Choice::kOff;
   }
   return options;
@@ -226,6 +291,7 @@ CalibrationOptions as_before(CalibrationOptions options, const Calibration& prio
   settle(states.clock_offset, had("clock_offset"));
   settle(states.orbital_error, had("orbital"));
   settle(states.wandering_drift, false);
+  settle(states.readout_bias, had("gyro1_readout_bias"));
   if (options.drift_model == kAutoDriftModel && !prior.gyros.empty()) {
     options.drift_model = prior.gyros[0].drift_model;
   }
@@ -246,6 +312,7 @@ void settle_states(const States& everything, const CalibrationOptions& asked, De
   };
   choose(&FurtherStateOptions::clock_offset, "clock_offset", everything.clock_offset());
   choose(&FurtherStateOptions::orbital_error, "orbital_error", everything.orbital_error());
+  choose(&FurtherStateOptions::readout_bias, "readout_bias", everything.readout_bias());
   if (asked.drift_model == kAutoDriftModel) {
     const bool outside = settle("drift_outside_eq1", everything.drift_outside());
     decision.options.drift_model = outside ? Esg20::kModelName : Esg7::kModelName;
@@ -254,7 +321,8 @@ void settle_states(const States& everything, const CalibrationOptions& asked, De
 
 /// Everything on that is on or may be.
 CalibrationOptions with_everything(CalibrationOptions options, const CalibrationOptions& asked) {
-  for (const auto choice : {&FurtherStateOptions::clock_offset, &FurtherStateOptions::orbital_error}) {
+  for (const auto choice :
+       {&FurtherStateOptions::clock_offset, &FurtherStateOptions::orbital_error, &FurtherStateOptions::readout_bias}) {
     options.further_states.*choice = asked.further_states.*choice == Choice::kOff ? Choice::kOff : Choice::kOn;
   }
   options.drift_model = asked.drift_model == Esg7::kModelName ? Esg7::kModelName : Esg20::kModelName;
@@ -265,59 +333,82 @@ CalibrationOptions with_everything(CalibrationOptions options, const Calibration
 
 Decision decide(const Pass& pass, const CalibrationOptions& asked) {
   Decision decision{asked, {}};
-  if (asked.estimator != Full::kName || pass.gyro.gyros != Full::kGyros) {
-    decision.options = without_further_states(asked);
+  CalibrationOptions& options = decision.options;
+  options.find_noise = false;
+  const bool invariant = asked.estimator == Full::kName;
+  if (!invariant || pass.gyro.gyros > Full::kGyros) {
+    options = without_further_states(options);
     if (asked.drift_model != kAutoDriftModel) {
-      decision.options.drift_model = asked.drift_model;
+      options.drift_model = asked.drift_model;
     }
-    const bool finds = asked.find_noise && asked.estimator == Full::kName && !pass.settings.prior;
-    if (finds && pass.gyro.gyros == 3) {
-      decision.options = with_noise_found<InvariantEstimator<Esg7, 3>>(pass, decision.options);
-    } else if (finds && pass.gyro.gyros == 4) {
-      decision.options = with_noise_found<InvariantEstimator<Esg7, 4>>(pass, decision.options);
-    } else {
-      decision.options.find_noise = false;
+    if (asked.find_noise && invariant && !pass.settings.prior) {
+      options = with_noise_found(pass, options);
     }
     return decision;
   }
   if (pass.settings.prior) {
-    decision.options = as_before(asked, *pass.settings.prior);
-    decision.options.find_noise = false;
+    options = as_before(options, *pass.settings.prior);
     return decision;
   }
-  CalibrationOptions& options = decision.options;
-  options.find_noise = false;
-  if (options.further_states.wandering_drift == Choice::kAuto) {
+  const bool wandering_is_open = options.further_states.wandering_drift == Choice::kAuto;
+  if (wandering_is_open) {
     options.further_states.wandering_drift = Choice::kOff;
   }
-  const bool states_are_settled = asked.drift_model != kAutoDriftModel &&
-                                  asked.further_states.clock_offset != Choice::kAuto &&
-                                  asked.further_states.orbital_error != Choice::kAuto;
+  const FurtherStateOptions& states = asked.further_states;
+  const bool states_are_settled = asked.drift_model != kAutoDriftModel && states.clock_offset != Choice::kAuto &&
+                                  states.orbital_error != Choice::kAuto && states.readout_bias != Choice::kAuto;
   if (states_are_settled && !asked.find_noise) {
     return decision;
   }
   Trial<Full> everything(pass, with_everything(options, asked));
   if (!everything.estimator().started()) {
-    decision.options = without_further_states(asked);
-    decision.options.find_noise = false;
+    options = without_further_states(options);
     return decision;
   }
-  if (asked.find_noise && everything.changes() >= kEnough) {
-    options.find_noise = true;
-    options.star_tracker_noise_rad = other_star_tracker_noise(pass, everything);
-    if (options.star_tracker_noise_rad) {
-      everything = Trial<Full>(pass, with_everything(options, asked));
-    }
+  options.find_noise = asked.find_noise && everything.changes() >= kEnough;
+  if (!options.find_noise) {
     settle_states(States(everything.estimator()), asked, decision);
-    options.direction_random_walk_rad_sqrt_s = most_likely_walk(options, [&](const CalibrationOptions& trial) {
-      return has_further_states(trial) ? Trial<Full>(pass, trial).log_likelihood()
-                                       : Trial<InvariantEstimator<Esg7, 2>>(pass, trial).log_likelihood();
-    });
-    if (options.direction_random_walk_rad_sqrt_s > asked.direction_random_walk_rad_sqrt_s) {
-      everything = Trial<Full>(pass, with_everything(options, asked));
-    }
+    return decision;
+  }
+  options.star_tracker_noise_rad = other_star_tracker_noise(pass, everything);
+  if (options.star_tracker_noise_rad) {
+    everything = Trial<Full>(pass, with_everything(options, asked));
   }
   settle_states(States(everything.estimator()), asked, decision);
+  const double least_rad_sqrt_s = asked.direction_random_walk_rad_sqrt_s;
+  CalibrationOptions found = with_most_likely_walk(pass, options, kAllLevels).options;
+  if (!(found.direction_random_walk_rad_sqrt_s > least_rad_sqrt_s)) {
+    return decision;
+  }
+  // The states were settled by a noise that is too small: again, by what it is when they are all free.
+  CalibrationOptions free = with_everything(options, asked);
+  const Likely walking = with_most_likely_walk(pass, free, kAllLevels);
+  const double walk_rad_sqrt_s = walking.options.direction_random_walk_rad_sqrt_s;
+  std::optional<Evidence> wandering;
+  if (wandering_is_open && walk_rad_sqrt_s > least_rad_sqrt_s) {
+    // What wanders fast is a random walk of walk² = 2 σ² τ.
+    free.further_states.wandering_drift_rad_s =
+        walk_rad_sqrt_s / std::sqrt(2 * to_seconds(free.further_states.wandering_time));
+    const Likely wanders = with_most_likely_wandering(pass, free, {{0, 0}, {2, 0}, {4, 0}, {6, 0}});
+    const double gain = wanders.log_likelihood - walking.log_likelihood;
+    wandering = Evidence{"wandering_drift", gain, gain > kStrong};
+    free = wandering->accepted ? wanders.options : walking.options;
+  } else {
+    free = walking.options;
+  }
+  everything = Trial<Full>(pass, free);
+  settle_states(States(everything.estimator()), asked, decision);
+  if (wandering && wandering->accepted) {
+    options.further_states.wandering_drift_rad_s = free.further_states.wandering_drift_rad_s;
+    options.further_states.wandering_time = free.further_states.wandering_time;
+    options = with_most_likely_wandering(pass, options, {{0, 0}}).options;
+  } else {
+    const int level = static_cast<int>(std::lround(std::log2(walk_rad_sqrt_s / least_rad_sqrt_s)));
+    options = with_most_likely_walk(pass, options, {{level, 0}}).options;
+  }
+  if (wandering) {
+    decision.evidence.push_back(*wandering);
+  }
   return decision;
 }
 

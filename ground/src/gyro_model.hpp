@@ -24,6 +24,7 @@ template <class Model>
     model.drift_rad_s(static_cast<Eigen::Index>(i)) = gyro.drift_rad_s[i].second;
   }
   model.C_c_b = Rot<C, B<1>>::exp(Vec<C>::assume(gyro.alignment_rotation_vector_rad)).raw();
+  model.readout_bias = gyro.readout_bias;
   model.h_in = gyro.momentum_in;
   return model;
 }
@@ -37,6 +38,7 @@ template <class Base, class Model>
     gyro.drift_rad_s.emplace_back(Base::kNames[i], model.drift_rad_s(static_cast<Eigen::Index>(i)));
   }
   gyro.alignment_rotation_vector_rad = Rot<C, B<1>>::assume(model.C_c_b).log().raw();
+  gyro.readout_bias = model.readout_bias;
   gyro.momentum_in = model.h_in;
   return gyro;
 }

@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "gyro_model.hpp"
-#include "trihedron/core/cycle.hpp"
+#include "trihedron/core/cycles.hpp"
 #include "trihedron/core/drift.hpp"
 #include "trihedron/ground/calibrate.hpp"
 
@@ -101,7 +101,7 @@ void use_calibration(const Calibration& prior, typename Estimator::Setup& setup)
   constexpr auto kOn = FurtherStateOptions::Choice::kOn;
   const FurtherStateOptions& states = options.further_states;
   return options.drift_model != Esg7::kModelName || states.clock_offset == kOn || states.orbital_error == kOn ||
-         states.wandering_drift == kOn;
+         states.wandering_drift == kOn || states.readout_bias == kOn;
 }
 
 /// The rate of the orbit, as the attitude shows it. An attitude that stands still in space does not show it; then that
@@ -117,6 +117,7 @@ void use_further_states(const Pass& pass, const CalibrationOptions& options, typ
   setup.orbital_error_sigma_rad = states.orbital_error == kOn ? 1e-4 : 1e-12;
   setup.wandering_sigma_rad_s = states.wandering_drift == kOn ? states.wandering_drift_rad_s : 1e-15;
   setup.wandering_time_s = to_seconds(states.wandering_time);
+  setup.readout_bias_sigma = states.readout_bias == kOn ? 1e-4 : 1e-12;
   setup.orbital_rate_rad_s = orbital_rate_rad_s(pass.star_tracker);
   setup.orbital_phase_zero = pass.settings.epoch;
   for (std::size_t i = 0; i < std::min(setup.further_heads.size(), pass.settings.further_star_trackers.size()); ++i) {
@@ -153,6 +154,9 @@ typename Estimator::Setup make_setup(const Pass& pass, const CalibrationOptions&
   setup.direction_random_walk_rad_sqrt_s = options.direction_random_walk_rad_sqrt_s;
   setup.gate_nis = options.gate_nis;
   setup.reopen_after_rejections = options.reopen_after_rejections;
+  setup.reopen_after_jump_rejections = options.reopen_after_jump_rejections;
+  setup.student_t_freedom = options.student_t_freedom;
+  setup.angles_after = options.angles_after;
   if constexpr (requires { setup.orbital_rate_rad_s; }) {
     use_further_states<Estimator>(pass, options, setup);
   }
@@ -190,7 +194,7 @@ std::unique_ptr<Cycle<Estimator>> make_cycle(const Pass& pass, const Calibration
         throw SetupError("a noise sigma is not positive",
                          "give positive readout and star-tracker noise, and process noise of zero or more");
       case SetupFault::kGateNotPositive:
-        throw SetupError("the gate or the number of rejections before reopening is not positive",
+        throw SetupError("the gate or a number of rejections before reopening is not positive",
                          "give positive numbers");
     }
   }

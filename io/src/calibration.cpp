@@ -49,6 +49,9 @@ GyroCalibration parse_gyro(const JsonNode& node) {
   if (!(std::abs(gyro.momentum_in.norm() - 1) <= 1e-6)) {
     node.at("momentum_in").refuse("is not a unit vector", "repair it: it is the direction of the angular momentum");
   }
+  if (const auto bias = node.find("readout_bias")) {
+    gyro.readout_bias = bias->vector3();
+  }
   return gyro;
 }
 
@@ -143,6 +146,7 @@ Json gyro_json(const GyroCalibration& gyro) {
   return {{"drift_model", gyro.drift_model},
           {"drift_rad_s", drift},
           {"alignment_rotation_vector_rad", to_json_array(gyro.alignment_rotation_vector_rad)},
+          {"readout_bias", to_json_array(gyro.readout_bias)},
           {"momentum_in", to_json_array(gyro.momentum_in)}};
 }
 

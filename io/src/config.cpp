@@ -37,6 +37,8 @@ int whole_number(const TomlTable& table, const toml::node& node, std::string_vie
   return static_cast<int>(*value);
 }
 
+constexpr std::string_view kNever = "never";
+
 using Choice = FurtherStateOptions::Choice;
 constexpr std::array<std::pair<Choice, const char*>, 3> kChoices = {
     {{Choice::kAuto, "auto"}, {Choice::kOff, "off"}, {Choice::kOn, "on"}}};
@@ -101,7 +103,8 @@ CalibrationOptions read_config(const fs::path& path) {
   }
   if (root.find("filter") != nullptr) {
     const TomlTable filter(root.table_at("filter"), path, "[filter]",
-                           {"noise", "direction_random_walk", "gate_nis", "reopen_after_rejections"});
+                           {"noise", "direction_random_walk", "gate_nis", "student_t_freedom",
+                            "reopen_after_rejections", "reopen_after_jump_rejections", "angles_after"});
     if (const toml::node* node = filter.find("noise")) {
       const std::string noise = filter.text(*node, "noise");
       if (noise != "found" && noise != "told") {
@@ -122,16 +125,35 @@ CalibrationOptions read_config(const fs::path& path) {
     if (const toml::node* node = filter.find("reopen_after_rejections")) {
       options.reopen_after_rejections = whole_number(filter, *node, "reopen_after_rejections");
     }
+    if (const toml::node* node = filter.find("reopen_after_jump_rejections")) {
+      options.reopen_after_jump_rejections = whole_number(filter, *node, "reopen_after_jump_rejections");
+    }
+    if (const toml::node* node = filter.find("student_t_freedom")) {
+      options.student_t_freedom = filter.number(*node, "student_t_freedom");
+      if (!(options.student_t_freedom >= 0)) {
+        filter.refuse(*node, "\"student_t_freedom\" is negative", "give 5 to 20, or 0 for the gate alone");
+      }
+    }
+    if (const toml::node* node = filter.find("angles_after")) {
+      const bool never = filter.text(*node, "angles_after") == kNever;
+      options.angles_after = never ? Duration::max() : quantity(filter, *node, "angles_after", parse_duration);
+      if (!(options.angles_after > Duration::zero())) {
+        filter.refuse(*node, "\"angles_after\" is not positive", "give more than zero, or never");
+      }
+    }
   }
   if (root.find("further_states") != nullptr) {
     const TomlTable further(root.table_at("further_states"), path, "[further_states]",
-                            {"clock_offset", "orbital_error", "wandering_drift", "wandering_time"});
+                            {"clock_offset", "orbital_error", "readout_bias", "wandering_drift", "wandering_time"});
     FurtherStateOptions& states = options.further_states;
     if (const toml::node* node = further.find("clock_offset")) {
       states.clock_offset = choice(further, *node, "clock_offset");
     }
     if (const toml::node* node = further.find("orbital_error")) {
       states.orbital_error = choice(further, *node, "orbital_error");
+    }
+    if (const toml::node* node = further.find("readout_bias")) {
+      states.readout_bias = choice(further, *node, "readout_bias");
     }
     if (const toml::node* node = further.find("wandering_drift")) {
       if (const auto word = choice_of(further.text(*node, "wandering_drift")); word && *word != Choice::kOn) {
@@ -171,19 +193,25 @@ std::string format_config(const CalibrationOptions& options) {
       "noise = \"{}\"  # found: from the pass; told: as set here and in pass.toml\n"
       "direction_random_walk = \"{}\"  # process noise of each momentum, per axis across it\n"
       "gate_nis = {}  # a fix with a larger normalised innovation squared is rejected\n"
+      "student_t_freedom = {}  # 5 to 20: it is used with less weight instead; 0: rejected\n"
       "reopen_after_rejections = {}  # in a row; then the directions are set free and the fix is used\n"
+      "reopen_after_jump_rejections = {}  # the same where they began with a jump that no drift can make\n"
+      "angles_after = \"{}\"  # without a fix, by the angles between the momenta: a duration or never\n"
       "\n"
       "[further_states]  # of estimator invariant\n"
       "clock_offset = \"{}\"  # of the star tracker: auto, on or off\n"
       "orbital_error = \"{}\"  # of the star tracker, at orbital period: auto, on or off\n"
+      "readout_bias = \"{}\"  # of the direction cosines: auto, on or off\n"
       "wandering_drift = \"{}\"  # about each case axis: auto, off, or its 1-sigma\n"
       "wandering_time = \"{}\"  # and its correlation time\n"
       "\n"
       "[corrections]\n"
       "interval = \"{}\"  # of the open-loop navigator: a duration, none or continuous\n",
       options.estimator, options.drift_model, options.find_noise ? "found" : "told",
-      format_random_walk(options.direction_random_walk_rad_sqrt_s), options.gate_nis, options.reopen_after_rejections,
-      name_of(states.clock_offset), name_of(states.orbital_error),
+      format_random_walk(options.direction_random_walk_rad_sqrt_s), options.gate_nis, options.student_t_freedom,
+      options.reopen_after_rejections, options.reopen_after_jump_rejections,
+      options.angles_after == Duration::max() ? std::string(kNever) : format_duration(options.angles_after),
+      name_of(states.clock_offset), name_of(states.orbital_error), name_of(states.readout_bias),
       states.wandering_drift == Choice::kOn ? fmt::format("{}rad/s", states.wandering_drift_rad_s)
                                             : name_of(states.wandering_drift),
       format_duration(states.wandering_time), format_correction_interval(options.corrections));

@@ -267,8 +267,19 @@ json settings_of(const ReportInput& input) {
   put("Noise", options.find_noise ? "found from the pass" : "as told");
   put("Process noise of each momentum",
       fmt::format("{}″ per √h", significant(options.direction_random_walk_rad_sqrt_s * 60 / kArcsecond_rad, 2)));
+  if (options.further_states.wandering_drift == FurtherStateOptions::Choice::kOn) {
+    put("Drift that wanders",
+        fmt::format("{}″/h about each case axis, 1σ, over {}",
+                    significant(options.further_states.wandering_drift_rad_s * 3600 / kArcsecond_rad, 2),
+                    span(options.further_states.wandering_time)));
+  }
   put("Gate", fmt::format("fixes with a NIS above {:.4g} are rejected", options.gate_nis));
-  put("Reopening", fmt::format("after {} rejections in a row", options.reopen_after_rejections));
+  if (options.student_t_freedom > 0) {
+    put("Weight of fixes above the gate",
+        fmt::format("Student's t with {:.3g} degrees of freedom", options.student_t_freedom));
+  }
+  put("Reopening", fmt::format("after {} rejections in a row, {} where they began with a jump",
+                               options.reopen_after_rejections, options.reopen_after_jump_rejections));
   using When = CorrectionOptions::When;
   const CorrectionOptions& corrections = options.corrections;
   put("Navigator corrected", corrections.when == When::kEachFix     ? "at every fix"
@@ -307,7 +318,9 @@ json further_of(const ReportInput& input) {
 json states_decided(const ReportInput& input) {
   static const std::map<std::string, std::string> kNames = {{"clock_offset", "Clock offset"},
                                                             {"orbital_error", "Error at orbital period"},
-                                                            {"drift_outside_eq1", "Drift outside eq. (1)"}};
+                                                            {"drift_outside_eq1", "Drift outside eq. (1)"},
+                                                            {"readout_bias", "Bias of the direction cosines"},
+                                                            {"wandering_drift", "Drift that wanders"}};
   json sentences = json::array();
   for (const ground::Evidence& evidence : input.run.evidence) {
     const auto name = kNames.find(evidence.states);

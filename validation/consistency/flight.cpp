@@ -5,7 +5,7 @@
 #include <memory>
 
 #include "consistency/bound.hpp"
-#include "trihedron/core/cycle.hpp"
+#include "trihedron/core/cycles.hpp"
 #include "trihedron/core/invariant_estimator.hpp"
 #include "trihedron/core/paper_estimator.hpp"
 #include "trihedron/ground/replay.hpp"

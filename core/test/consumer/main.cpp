@@ -1,5 +1,5 @@
 // Another project's flight software: sets up the cycle and feeds it one sample and one fix.
-#include <trihedron/core/cycle.hpp>
+#include <trihedron/core/cycles.hpp>
 #include <trihedron/core/paper_estimator.hpp>
 
 int main() {

@@ -26,16 +26,20 @@ struct ParameterLayout {
 };
 
 /// Errors whose covariance every estimator can give: φ of each momentum (3 components in `in`; along the momentum zero
-/// or without meaning), then the parameters. See Sensitivity for the definition of φ, Δκ and δ.
-template <class Model, int N>
+/// or without meaning), then the parameters, then Δb of each readout where its bias is estimated. See Sensitivity for
+/// the definition of φ, Δκ and δ; bias(true) = bias(est) + Δb.
+template <class Model, int N, bool ReadoutBias = false>
 struct ErrorLayout {
+  static constexpr bool kReadoutBias = ReadoutBias;
   static constexpr int kDirections = 3 * N;
-  static constexpr int kSize = kDirections + ParameterLayout<Model, N>::kSize;
+  static constexpr int kBiases = kDirections + ParameterLayout<Model, N>::kSize;
+  static constexpr int kSize = kBiases + (ReadoutBias ? 3 * N : 0);
   [[nodiscard]] static constexpr int direction(int gyro) { return 3 * gyro; }
   [[nodiscard]] static constexpr int drift(int gyro) { return kDirections + ParameterLayout<Model, N>::drift(gyro); }
   [[nodiscard]] static constexpr int alignment(int gyro) {
     return kDirections + ParameterLayout<Model, N>::alignment(gyro);
   }
+  [[nodiscard]] static constexpr int readout_bias(int gyro) { return kBiases + 3 * gyro; }
 };
 
 enum class SetupFault { kPriorNotPositiveDefinite, kPriorMeanNotUsable, kNoiseNotPositive, kGateNotPositive };
@@ -69,11 +73,11 @@ struct CalibrationSetup {
   /// Without a fix that could be used for longer than this, the angles between the momenta are used alone; or kNever.
   Duration angles_after = std::chrono::minutes(1);
 
-  /// Finite drift coefficients and alignments that are rotations.
+  /// Finite drift coefficients and biases, and alignments that are rotations.
   [[nodiscard]] bool means_are_usable() const {
     return std::all_of(prior.begin(), prior.end(), [](const GyroModel<Model>& gyro) {
       const double off = (gyro.C_c_b * gyro.C_c_b.transpose() - Eigen::Matrix3d::Identity()).norm();
-      return gyro.drift_rad_s.allFinite() && off < 1e-6;
+      return gyro.drift_rad_s.allFinite() && gyro.readout_bias.allFinite() && off < 1e-6;
     });
   }
 

@@ -84,76 +84,22 @@ class Cycle {
   static constexpr int kBufferedSamples = 64;
   static constexpr int kBufferedFixes = 8;
 
-  [[nodiscard]] static Result<Cycle, SetupFault> create(const Setup& setup, const CorrectionPolicy& policy) {
-    const auto estimator = Estimator::create(setup);
-    if (!estimator) {
-      return estimator.fault();
-    }
-    Cycle cycle;
-    cycle.estimator_ = estimator.value();
-    cycle.policy_ = policy;
-    return cycle;
-  }
+  [[nodiscard]] static Result<Cycle, SetupFault> create(const Setup& setup, const CorrectionPolicy& policy);
 
   /// A default one is not set up; it exists for Result only.
   Cycle() = default;
 
   /// One gyro sample: the whole 125 ms step. The navigator moves to it at once; the calibration follows
   /// Estimator::kReach behind, when the samples round a fix are there. At most one fix is dealt with.
-  Report on_gyro(const GyroSample<kGyros>& sample) {
-    Report report;
-    report.t = sample.t;
-    GyroSample<kGyros> screened = sample;
-    report.sample = screen(screened);
-    report.gyros = health_.states();
-    if (report.sample == SampleStatus::kRejectedTooFewGyros) {
-      calibrate_until(screened.t - Estimator::kReach, report);  // what waits for samples waits in vain
-    }
-    if (!is_used(report.sample)) {
-      return report;
-    }
-    report.fixes_dropped = std::exchange(fixes_dropped_, 0);
-    if (navigator_.started() && has_sample()) {
-      predict_navigator(samples_.latest().t, samples_.latest().h_b, screened.t, screened.h_b);
-    }
-    if (behind_ == kBufferedSamples) {  // more samples than the reach was made for: the oldest cannot wait
-      follow(samples_[0].t, samples_[0].h_b);
-      --behind_;
-    }
-    samples_.push(screened);
-    ++behind_;
-    calibrate_until(screened.t - Estimator::kReach, report);
-    report.angle_residual = angle_residual();
-    return report;
-  }
+  Report on_gyro(const GyroSample<kGyros>& sample);
 
   /// One fix. It waits for the gyro samples round it and is reported with the step that has them; without need for them
   /// at once.
-  Report on_fix(const StarFix& fix) {
-    Report report;
-    report.t = fix.t;
-    report.gyros = health_.states();
-    report.fix.t = fix.t;
-    report.fix.status = take_up(fix);
-    if (report.fix.status == FixStatus::kPending) {
-      calibrate_until(samples_.latest().t - Estimator::kReach, report);
-      report.angle_residual = angle_residual();
-    }
-    return report;
-  }
+  Report on_fix(const StarFix& fix);
 
   /// After the last sample: deals with one of the fixes that still wait, with the samples that there are. Status kNone
   /// when none waits.
-  Report flush() {
-    Report report;
-    report.gyros = health_.states();
-    if (fixes_ > 0) {
-      report.t = samples_.latest().t;
-      angles_t_ = Time::max();  // or the fix would wait for them
-      calibrate_until(std::max(report.t, pending_[0].t), report);
-    }
-    return report;
-  }
+  Report flush();
 
   [[nodiscard]] const Estimator& estimator() const { return estimator_; }
   [[nodiscard]] const Navigator<Estimator>& navigator() const { return navigator_; }
@@ -161,10 +107,7 @@ class Cycle {
   [[nodiscard]] Time t() const { return samples_.latest().t; }
 
   /// Open-loop attitude at the latest sample. Needs navigator().started().
-  [[nodiscard]] Result<AttitudeSolution, DirectionsFault> navigation_attitude() const {
-    const FixReadings<kGyros> now = readings_now();
-    return navigator_.attitude_with_covariance(now, estimator_.since_fix(), estimator_.setup());
-  }
+  [[nodiscard]] Result<AttitudeSolution, DirectionsFault> navigation_attitude() const;
 
  private:
   // ---- What comes in
@@ -449,7 +392,7 @@ class Cycle {
                              const GyroMask<kGyros>& used, Directions& h_b) {
     for (int k = 0; k < kGyros; ++k) {
       if (!used[k]) {
-        h_b[k] = gyros[k].C_c_b.transpose() * (C_in_c.transpose() * gyros[k].h_in);
+        h_b[k] = gyros[k].C_c_b.transpose() * (C_in_c.transpose() * gyros[k].h_in) + gyros[k].readout_bias;
       }
     }
   }
@@ -567,10 +510,10 @@ class Cycle {
     Eigen::Vector3d seen = Eigen::Vector3d::Zero();
     for (int k = 0; k < kGyros; ++k) {
       if (used[k]) {
-        const Eigen::Matrix3d& C_c_b = estimator_.gyros()[k].C_c_b;
-        const Eigen::Vector3d h_c = C_c_b * fitted.h_b[k];
+        const auto& gyro = estimator_.gyros()[k];
+        const Eigen::Vector3d h_c = gyro.in_c(fitted.h_b[k]);
         across += Eigen::Matrix3d::Identity() - h_c * h_c.transpose();
-        seen += (C_c_b * fitted.h_b_rate[k]).cross(h_c);
+        seen += (gyro.C_c_b * fitted.h_b_rate[k]).cross(h_c);
       }
     }
     readings.rate_c = across.inverse() * seen;
@@ -600,8 +543,9 @@ class Cycle {
       noise_rad[k] = readings.noise_factor * estimator_.setup().readout_noise_rad[k];
     }
     // Readout noise of a fix at this very sample is counted twice, which only shows at the first fixes.
-    return with_covariance<typename Estimator::DriftModel, kGyros>(attitude.value(), estimator_.error_root(),
-                                                                   estimator_.since_fix(), noise_rad, 0.0);
+    const auto by_errors =
+        attitude_by_errors<Estimator>(attitude.value(), estimator_.gyros(), readings.h_b, estimator_.since_fix());
+    return with_covariance(attitude.value(), estimator_.through_uncertainty(by_errors), noise_rad, 0.0);
   }
 
   /// The navigator's attitude at a time it has passed, within the samples buffered.
@@ -626,7 +570,7 @@ class Cycle {
     }
     const auto& gyros = estimator_.gyros();
     const Directions& h_b = samples_.latest().h_b;
-    return gyros[0].h_in.dot(gyros[1].h_in) - (gyros[0].C_c_b * h_b[0]).dot(gyros[1].C_c_b * h_b[1]);
+    return gyros[0].h_in.dot(gyros[1].h_in) - gyros[0].in_c(h_b[0]).dot(gyros[1].in_c(h_b[1]));
   }
 
   [[nodiscard]] bool has_sample() const { return samples_.size() > 0; }
@@ -655,5 +599,79 @@ class Cycle {
   bool has_suspect_ = false;
   bool start_unconfirmed_ = false;
 };
+
+// Not in the class, so that a cycle whose instantiation is declared (cycles.hpp) is not compiled where it is used.
+
+template <class Estimator>
+Result<Cycle<Estimator>, SetupFault> Cycle<Estimator>::create(const Setup& setup, const CorrectionPolicy& policy) {
+  const auto estimator = Estimator::create(setup);
+  if (!estimator) {
+    return estimator.fault();
+  }
+  Cycle cycle;
+  cycle.estimator_ = estimator.value();
+  cycle.policy_ = policy;
+  return cycle;
+}
+
+template <class Estimator>
+auto Cycle<Estimator>::on_gyro(const GyroSample<kGyros>& sample) -> Report {
+  Report report;
+  report.t = sample.t;
+  GyroSample<kGyros> screened = sample;
+  report.sample = screen(screened);
+  report.gyros = health_.states();
+  if (report.sample == SampleStatus::kRejectedTooFewGyros) {
+    calibrate_until(screened.t - Estimator::kReach, report);  // what waits for samples waits in vain
+  }
+  if (!is_used(report.sample)) {
+    return report;
+  }
+  report.fixes_dropped = std::exchange(fixes_dropped_, 0);
+  if (navigator_.started() && has_sample()) {
+    predict_navigator(samples_.latest().t, samples_.latest().h_b, screened.t, screened.h_b);
+  }
+  if (behind_ == kBufferedSamples) {  // more samples than the reach was made for: the oldest cannot wait
+    follow(samples_[0].t, samples_[0].h_b);
+    --behind_;
+  }
+  samples_.push(screened);
+  ++behind_;
+  calibrate_until(screened.t - Estimator::kReach, report);
+  report.angle_residual = angle_residual();
+  return report;
+}
+
+template <class Estimator>
+auto Cycle<Estimator>::on_fix(const StarFix& fix) -> Report {
+  Report report;
+  report.t = fix.t;
+  report.gyros = health_.states();
+  report.fix.t = fix.t;
+  report.fix.status = take_up(fix);
+  if (report.fix.status == FixStatus::kPending) {
+    calibrate_until(samples_.latest().t - Estimator::kReach, report);
+    report.angle_residual = angle_residual();
+  }
+  return report;
+}
+
+template <class Estimator>
+auto Cycle<Estimator>::flush() -> Report {
+  Report report;
+  report.gyros = health_.states();
+  if (fixes_ > 0) {
+    report.t = samples_.latest().t;
+    angles_t_ = Time::max();  // or the fix would wait for them
+    calibrate_until(std::max(report.t, pending_[0].t), report);
+  }
+  return report;
+}
+
+template <class Estimator>
+Result<AttitudeSolution, DirectionsFault> Cycle<Estimator>::navigation_attitude() const {
+  const FixReadings<kGyros> now = readings_now();
+  return navigator_.attitude_with_covariance(now, estimator_.since_fix(), estimator_.setup());
+}
 
 }  // namespace trihedron

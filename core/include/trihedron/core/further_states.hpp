@@ -12,6 +12,7 @@ struct FurtherStates {
   bool clock_offset = false;     ///< τ of the star trackers: a fix stamped t holds the attitude at t + τ
   bool orbital_error = false;    ///< of the first star tracker: exp([(p_s sin nt + p_c cos nt)×]) in c
   bool wandering_drift = false;  ///< first-order Gauss–Markov drift about the case axes of each gyro
+  bool readout_bias = false;     ///< of the direction cosines of each gyro
   int further_heads = 0;         ///< star trackers beside the first, each with its alignment to it
 
   [[nodiscard]] constexpr int shared() const {
@@ -21,7 +22,7 @@ struct FurtherStates {
 
 /// Everything, of two star trackers. What is not wanted is held by a prior sigma near zero.
 inline constexpr FurtherStates kAllFurtherStates{
-    .clock_offset = true, .orbital_error = true, .wandering_drift = true, .further_heads = 1};
+    .clock_offset = true, .orbital_error = true, .wandering_drift = true, .readout_bias = true, .further_heads = 1};
 
 /// A drift model with three more coefficients: a drift about the case axes, the same wherever the momentum points.
 template <class Base>

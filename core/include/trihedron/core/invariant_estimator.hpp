@@ -27,13 +27,15 @@ struct InvariantLayout {
   static constexpr int kDirections = 3 * N;
   static constexpr int kDynamic = kDirections + (F.wandering_drift ? 3 * N : 0);
   static constexpr int kPerGyro = Base::kSize + 3;
-  static constexpr int kShared = kDynamic + N * kPerGyro;
+  static constexpr int kBiases = kDynamic + N * kPerGyro;
+  static constexpr int kShared = kBiases + (F.readout_bias ? 3 * N : 0);
   static constexpr int kStates = kShared + F.shared();
 
   [[nodiscard]] static constexpr int direction(int gyro) { return 3 * gyro; }
   [[nodiscard]] static constexpr int wandering(int gyro) { return kDirections + 3 * gyro; }
   [[nodiscard]] static constexpr int drift(int gyro) { return kDynamic + gyro * kPerGyro; }
   [[nodiscard]] static constexpr int alignment(int gyro) { return drift(gyro) + Base::kSize; }
+  [[nodiscard]] static constexpr int readout_bias(int gyro) { return kBiases + 3 * gyro; }
   [[nodiscard]] static constexpr int clock_offset() { return kShared; }
   [[nodiscard]] static constexpr int orbital_error() { return kShared + (F.clock_offset ? 1 : 0); }
   /// Of head 1, 2 … beside the first, which is 0.
@@ -58,12 +60,14 @@ struct InvariantSetup : CalibrationSetup<Base, N> {
   Time orbital_phase_zero{};              ///< where nt = 0
   double wandering_sigma_rad_s = 0;       ///< stationary, per axis
   double wandering_time_s = 3600;
+  double readout_bias_sigma = 1e-4;  ///< of each component
 };
 
-/// y_k = h_k × h_et,k = (φ_k − C_in_c δ_k)⊥ + noise; dφ_k/dt = ω × φ_k + C_in_b B Δκ_k + (C_in_c δ_k) × ω. The attitude
-/// in H is not the tracker's but the fused one, so that noise does not pass for information. The terms of second order,
-/// ½ C_in_c δ_k × (φ_k − C_in_c δ_k) and ½ C_in_c δ_k × C_in_b B Δκ_k, count as noise of the size that the present
-/// covariance gives them (docs/adr/0004): early readings do not claim more than the first, wrong values allow.
+/// y_k = h_k × h_et,k = (φ_k − C_in_c δ_k + h_k × C_in_b Δb_k)⊥ + noise; dφ_k/dt = ω × φ_k + C_in_b B Δκ_k + (C_in_c
+/// δ_k) × ω. The attitude in H is not the tracker's but the fused one, so that noise does not pass for information. The
+/// terms of second order, ½ C_in_c δ_k × (φ_k − C_in_c δ_k) and ½ C_in_c δ_k × C_in_b B Δκ_k, count as noise of the
+/// size that the present covariance gives them (docs/adr/0004): early readings do not claim more than the first, wrong
+/// values allow.
 template <class Base, int N, FurtherStates F = FurtherStates{}>
 class InvariantEstimator {
  public:
@@ -81,7 +85,7 @@ class InvariantEstimator {
   using Report = FixReport<kMeasurements>;
   static constexpr int kAngles = 2 * N - 3;  ///< of the components at a fix, those that no common rotation changes
   using AngleReport = FixReport<kAngles>;    ///< its innovation in 1-sigmas of the readings
-  using Errors = ErrorLayout<DriftModel, N>;
+  using Errors = ErrorLayout<DriftModel, N, F.readout_bias>;
   using ErrorRoot = Eigen::Matrix<double, Errors::kSize, Layout::kStates>;
   static constexpr int kHeads = 1 + F.further_heads;
   /// Readings to both sides of a fix that are taken together: fixes every 3 s do not share any.
@@ -111,6 +115,11 @@ class InvariantEstimator {
 
   /// Square root of the covariance of the errors at the last fix, rows as in ErrorLayout. Needs started().
   [[nodiscard]] ErrorRoot error_root() const;
+
+  /// What depends on the errors at the last fix, columns as in ErrorLayout: X Xᵀ of the result X is its covariance.
+  /// Needs started().
+  [[nodiscard]] Eigen::Matrix<double, 3, Layout::kStates> through_uncertainty(
+      const Eigen::Matrix<double, 3, Errors::kSize>& by_errors) const;
 
   /// Prediction of all momenta over one step, attitude and readings of its middle. Needs started().
   void predict(const Eigen::Matrix3d& C_in_c, const Directions& h_b, double dt_s);
@@ -154,6 +163,8 @@ class InvariantEstimator {
  private:
   /// 1-sigma of a direction of which nothing is known.
   static constexpr double kUnknown_rad = 1;
+  /// So many times above the gate a misfit is a fault of a gyro, not of its drift model: that is noticed sooner.
+  static constexpr double kPlain = 4;
   using Rows3 = Eigen::Matrix<double, 3, Layout::kStates>;
   /// Error of a fix by the shared states, c axes: as given = true · exp([e×]).
   [[nodiscard]] FixBySharedStates fix_by_shared(Time t, int head, const Eigen::Vector3d& rate_c) const;
@@ -161,7 +172,7 @@ class InvariantEstimator {
   [[nodiscard]] Eigen::Matrix3d fix_noise(int head) const;
   /// The attitude by gyros and fix together, weighted by what is known of both. Needs the covariance at the fix.
   [[nodiscard]] Eigen::Matrix3d fused_attitude(const AttitudeByDirections<N>& by_gyros, const Rot<In, C>& by_fix,
-                                               const Eigen::Matrix3d& R_c, double noise_factor) const;
+                                               const Eigen::Matrix3d& R_c, const FixReadings<N>& readings) const;
   void start(const Eigen::Matrix3d& C_in_c, const FixReadings<N>& readings, const Eigen::Matrix3d& R_c,
              const FixBySharedStates& by_shared);
   /// 1-sigma per axis of ½ a × b, what the linear model leaves out; a, b: rows of independent errors.
@@ -193,7 +204,7 @@ class InvariantEstimator {
   bool started_ = false;
 };
 
-// The set that is built; another is one line here and one source like invariant_estimator_pair.cpp.
+// The set that is built; see cycles.hpp.
 extern template class InvariantEstimator<Esg7, 2>;
 extern template class InvariantEstimator<Esg7, 2, kAllFurtherStates>;
 extern template class InvariantEstimator<Esg20, 2, kAllFurtherStates>;

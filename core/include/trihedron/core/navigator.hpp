@@ -15,28 +15,43 @@ struct AttitudeSolution {
   Eigen::Matrix3d covariance_rad2 = Eigen::Matrix3d::Zero();
 };
 
-/// Attitude with its covariance: errors at a reference epoch (rows of `errors` as in ErrorLayout), carried by `since`,
-/// plus the readout noise of these readings and a random walk of the directions of `walk_variance_rad2` per axis.
-template <class Model, int N, int Columns>
-[[nodiscard]] AttitudeSolution with_covariance(
-    const AttitudeByDirections<N>& attitude, const Eigen::Matrix<double, ErrorLayout<Model, N>::kSize, Columns>& errors,
-    const PerGyro<Sensitivity<Model>, N>& since, const PerGyro<double, N>& readout_noise_rad,
-    double walk_variance_rad2) {
-  using Errors = ErrorLayout<Model, N>;
-  AttitudeSolution solution;
-  solution.C_in_c = attitude.C_in_c;
-  const Eigen::Matrix3d C_c_in = solution.C_in_c.raw().transpose();
+/// Error of the attitude by readings h_b, c axes, by errors at a reference epoch (columns as in ErrorLayout) carried by
+/// `since`.
+template <class Estimator>
+[[nodiscard]] Eigen::Matrix<double, 3, Estimator::Errors::kSize> attitude_by_errors(
+    const AttitudeByDirections<Estimator::kGyros>& attitude, const typename Estimator::Gyros& gyros,
+    const typename Estimator::Directions& h_b, const typename Estimator::Sensitivities& since) {
+  using Errors = typename Estimator::Errors;
+  constexpr int kDrift = Estimator::DriftModel::kSize;
+  const Eigen::Matrix3d C_c_in = attitude.C_in_c.raw().transpose();
   Eigen::Matrix<double, 3, Errors::kSize> by_errors = Eigen::Matrix<double, 3, Errors::kSize>::Zero();
-  for (int k = 0; k < N; ++k) {
+  for (int k = 0; k < Estimator::kGyros; ++k) {
     const Eigen::Matrix3d by_phi = attitude.by_directions.template middleCols<3>(3 * k);
     const Eigen::Matrix3d by_phi_in = by_phi * C_c_in;
     by_errors.template middleCols<3>(Errors::direction(k)) = by_phi_in * since[k].by_start;
-    by_errors.template middleCols<Model::kSize>(Errors::drift(k)) = by_phi_in * since[k].by_drift;
+    by_errors.template middleCols<kDrift>(Errors::drift(k)) = by_phi_in * since[k].by_drift;
     by_errors.template middleCols<3>(Errors::alignment(k)) = by_phi_in * since[k].by_alignment - by_phi;
+    if constexpr (Errors::kReadoutBias) {
+      by_errors.template middleCols<3>(Errors::readout_bias(k)) =
+          by_phi * skew<double>(gyros[k].in_c(h_b[k])) * gyros[k].C_c_b;
+    }
+  }
+  return by_errors;
+}
+
+/// Attitude with its covariance: `spread` spreadᵀ by errors of what is estimated, plus the readout noise of these
+/// readings and a random walk of the directions of `walk_variance_rad2` per axis.
+template <int N, int Columns>
+[[nodiscard]] AttitudeSolution with_covariance(const AttitudeByDirections<N>& attitude,
+                                               const Eigen::Matrix<double, 3, Columns>& spread,
+                                               const PerGyro<double, N>& readout_noise_rad, double walk_variance_rad2) {
+  AttitudeSolution solution;
+  solution.C_in_c = attitude.C_in_c;
+  for (int k = 0; k < N; ++k) {
+    const Eigen::Matrix3d by_phi = attitude.by_directions.template middleCols<3>(3 * k);
     const double white = readout_noise_rad[k] * readout_noise_rad[k] + walk_variance_rad2;
     solution.covariance_rad2 += white * by_phi * by_phi.transpose();
   }
-  const Eigen::Matrix<double, 3, Columns> spread = by_errors * errors;
   solution.covariance_rad2 += spread * spread.transpose();
   return solution;
 }
@@ -45,7 +60,6 @@ template <class Model, int N, int Columns>
 template <class Estimator>
 class Navigator {
  public:
-  using Model = typename Estimator::DriftModel;
   static constexpr int kGyros = Estimator::kGyros;
 
   [[nodiscard]] bool started() const { return started_; }
@@ -73,10 +87,14 @@ class Navigator {
     errors_.template block<kParameters, kParameters>(Errors::kDirections, 0) = estimator.prior_parameter_root();
     const Eigen::Matrix3d attitude_root = attitude.covariance_rad2.llt().matrixL();
     for (int k = 0; k < kGyros; ++k) {
-      gyros_[k].h_in = (C_in_c * (gyros_[k].C_c_b * h_b[k])).normalized();
-      // φ = C_in_c (δ + ε): h_in was read through the held alignment at the estimated attitude.
-      errors_.template middleRows<3>(Errors::direction(k)) =
-          C_in_c * errors_.template middleRows<3>(Errors::alignment(k));
+      gyros_[k].h_in = (C_in_c * gyros_[k].in_c(h_b[k])).normalized();
+      // φ = C_in_c (δ + ε − h_c × C_c_b Δb): h_in was read through what is held at the estimated attitude.
+      auto phi = errors_.template middleRows<3>(Errors::direction(k));
+      phi = C_in_c * errors_.template middleRows<3>(Errors::alignment(k));
+      if constexpr (Errors::kReadoutBias) {
+        phi -= C_in_c * skew<double>(gyros_[k].in_c(h_b[k])) * gyros_[k].C_c_b *
+               errors_.template middleRows<3>(Errors::readout_bias(k));
+      }
       errors_.template block<3, 3>(Errors::direction(k), kParameters) = C_in_c * attitude_root;
     }
     restart_clock();
@@ -121,8 +139,10 @@ class Navigator {
       noise_rad[k] = readings.noise_factor * setup.readout_noise_rad[k];
     }
     const double walk = setup.direction_random_walk_rad_sqrt_s;
-    return with_covariance<Model, kGyros>(by_directions.value(), errors_, since, noise_rad,
-                                          walk * walk * time_since_correction_s_ + extra_variance_rad2_);
+    const Eigen::Matrix<double, 3, Estimator::ErrorRoot::ColsAtCompileTime> spread =
+        attitude_by_errors<Estimator>(by_directions.value(), gyros_, readings.h_b, since) * errors_;
+    return with_covariance(by_directions.value(), spread, noise_rad,
+                           walk * walk * time_since_correction_s_ + extra_variance_rad2_);
   }
 
  private:

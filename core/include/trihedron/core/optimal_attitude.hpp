@@ -36,7 +36,7 @@ template <class Gyros, int N>
 [[nodiscard]] PerGyro<Eigen::Vector3d, N> in_c(const Gyros& gyros, const PerGyro<Eigen::Vector3d, N>& h_b) {
   PerGyro<Eigen::Vector3d, N> h_c;
   for (int k = 0; k < N; ++k) {
-    h_c[k] = gyros[k].C_c_b * h_b[k];
+    h_c[k] = gyros[k].in_c(h_b[k]);
   }
   return h_c;
 }

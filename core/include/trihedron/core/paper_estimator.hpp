@@ -93,6 +93,9 @@ class PaperEstimator {
 
   /// Square root of the covariance of the errors at the last fix, rows as in ErrorLayout. Needs started().
   [[nodiscard]] ErrorRoot error_root() const;
+  /// What depends on these errors: X Xᵀ of the result X is its covariance. Needs started().
+  [[nodiscard]] Eigen::Matrix<double, 3, Layout::kStates> through_uncertainty(
+      const Eigen::Matrix<double, 3, Errors::kSize>& by_errors) const;
 
   /// The paper's components of direction errors: tangent bases of both momenta in the quasi-inertial frame, in `in`
   /// components.

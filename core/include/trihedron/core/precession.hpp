@@ -10,7 +10,15 @@ template <class Model, class S = double>
 struct GyroModel {
   Vector3<S> h_in = Vector3<S>::UnitX();  ///< direction of the momentum
   typename Model::template Coefficients<S> drift_rad_s = Model::template Coefficients<S>::Zero();  ///< κ
-  Matrix3<S> C_c_b = Matrix3<S>::Identity();  ///< alignment, exp([Λ×])
+  Matrix3<S> C_c_b = Matrix3<S>::Identity();     ///< alignment, exp([Λ×])
+  Vector3<S> readout_bias = Vector3<S>::Zero();  ///< of the direction cosines: h_b is read as h_b + bias
+
+  /// A reading, unit, without what is known of its bias; unit to the first order.
+  [[nodiscard]] Vector3<S> unbiased(const Vector3<S>& h_b) const {
+    return h_b - (readout_bias - h_b * h_b.dot(readout_bias));
+  }
+  /// The same, seen in c.
+  [[nodiscard]] Vector3<S> in_c(const Vector3<S>& h_b) const { return C_c_b * unbiased(h_b); }
 };
 
 /// Linearised effect of three causes on one momentum since a reference epoch:
@@ -33,10 +41,10 @@ struct Sensitivity {
 };
 
 /// Turns one momentum by its drift over `dt_s`, with attitude and reading of the middle of the step (midpoint rule;
-/// exact for constant ω_in). C_in_c: attitude; h_b: direction cosines in the case, unit. Returns ω_in, rad/s.
+/// exact for constant ω_in). C_in_c: attitude; h_b: reading, unit. Returns ω_in, rad/s.
 template <class Model, class S>
 Vector3<S> precess(GyroModel<Model, S>& gyro, const Matrix3<S>& C_in_c, const Vector3<S>& h_b, S dt_s) {
-  const Vector3<S> omega_in = C_in_c * (gyro.C_c_b * Model::template rate<S>(h_b, gyro.drift_rad_s));
+  const Vector3<S> omega_in = C_in_c * (gyro.C_c_b * Model::template rate<S>(gyro.unbiased(h_b), gyro.drift_rad_s));
   gyro.h_in = rotated<S>(gyro.h_in, omega_in * dt_s).normalized();
   return omega_in;
 }
@@ -45,7 +53,8 @@ Vector3<S> precess(GyroModel<Model, S>& gyro, const Matrix3<S>& C_in_c, const Ve
 template <class Model, class S>
 Vector3<S> precess(GyroModel<Model, S>& gyro, Sensitivity<Model, S>& sensitivity, const Matrix3<S>& C_in_c,
                    const Vector3<S>& h_b, S dt_s) {
-  const Eigen::Matrix<S, 3, Model::kSize> basis_in = (C_in_c * gyro.C_c_b) * Model::template basis<S>(h_b);
+  const Eigen::Matrix<S, 3, Model::kSize> basis_in =
+      (C_in_c * gyro.C_c_b) * Model::template basis<S>(gyro.unbiased(h_b));
   const Vector3<S> turn = dt_s * (basis_in * gyro.drift_rad_s);
   gyro.h_in = rotated<S>(gyro.h_in, turn).normalized();
   const Matrix3<S> cross = skew<S>(turn);

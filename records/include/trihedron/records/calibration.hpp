@@ -30,6 +30,7 @@ struct GyroCalibration {
   std::string drift_model;                                  ///< "esg7"
   std::vector<std::pair<std::string, double>> drift_rad_s;  ///< by coefficient name, in the model's order
   Eigen::Vector3d alignment_rotation_vector_rad{0, 0, 0};   ///< Λ: C_c_b = exp([Λ×])
+  Eigen::Vector3d readout_bias{0, 0, 0};                    ///< of the direction cosines: h_b is read as h_b + bias
   Eigen::Vector3d momentum_in{0, 0, 0};                     ///< h_in at `t`, unit
 };
 
@@ -63,7 +64,7 @@ struct Calibration {
   std::vector<std::string> states;
   /// rad/s for drift, rad for alignment: error δ with C_c_b(true) = exp([δ×]) C_c_b(est), c axes.
   Eigen::MatrixXd covariance;
-  std::vector<FurtherEstimate> further;  ///< of the star trackers; empty where not estimated
+  std::vector<FurtherEstimate> further;  ///< empty where none was estimated
   Verdict verdict;
   std::map<std::string, double> statistics;
 };

@@ -26,6 +26,7 @@ struct FurtherStateOptions {
   Choice wandering_drift = Choice::kAuto;  ///< first-order Gauss–Markov, about the case axes of each gyro
   double wandering_drift_rad_s = 1e-8;     ///< its 1-sigma, where on
   Duration wandering_time = std::chrono::hours(1);
+  Choice readout_bias = Choice::kAuto;  ///< of the direction cosines of each gyro
 };
 
 struct CalibrationOptions {
@@ -42,6 +43,14 @@ struct CalibrationOptions {
   double gate_nis = 30;
   /// After so many rejections in a row the directions are set free and the fix is used.
   int reopen_after_rejections = 20;
+  /// The same where the run began with a jump that no drift can make: the star tracker is wrong, or has been turned.
+  int reopen_after_jump_rejections = 400;
+  /// ν of Student's t: a fix above the gate is used with less weight instead of rejected. 0: normal noise, the gate
+  /// alone.
+  double student_t_freedom = 0;
+  /// Without a usable fix for longer than this the angles between the momenta are used alone; Duration::max(): never.
+  /// Of estimator invariant.
+  Duration angles_after = std::chrono::minutes(1);
   FurtherStateOptions further_states;
   CorrectionOptions corrections;
 };
