@@ -148,15 +148,20 @@ def test_effective_config_repeats_the_run(calibrated, tmp_path):
 
 def test_invariant_estimator_with_further_states(tmp_path):
     (tmp_path / "config.toml").write_text(
-        'drift_model = "esg7"\n[further_states]\nclock_offset = "on"\norbital_error = "on"\n'
+        'drift_model = "esg7"\n'
+        '[filter]\nstudent_t_freedom = 8\nreopen_after_jump_rejections = 300\nangles_after = "never"\n'
+        '[further_states]\nclock_offset = "on"\norbital_error = "on"\nreadout_bias = "on"\n'
         'wandering_drift = "1e-9rad/s"\nwandering_time = "30min"\n')
     result = run("calibrate", EXAMPLE, "-o", tmp_path / "out", "--config", tmp_path / "config.toml")
     assert result.returncode == TRUSTWORTHY, result.stderr + result.stdout
     assert "clock_offset_s" in result.stdout
     further = json.loads((tmp_path / "out" / "calibration.json").read_text())["further"]
-    assert len(further) == 7
+    assert len(further) == 7 + 6
     assert abs(further["clock_offset_s"]["value"]) < 4 * further["clock_offset_s"]["sigma"] < 4e-3
-    assert "wandering_time = \"30min\"" in (tmp_path / "out" / "effective-config.toml").read_text()
+    effective = (tmp_path / "out" / "effective-config.toml").read_text()
+    for setting in ('wandering_time = "30min"', "student_t_freedom = 8", "reopen_after_jump_rejections = 300",
+                    'angles_after = "never"', 'readout_bias = "on"'):
+        assert setting in effective
 
 
 def test_json_is_one_document(tmp_path):
@@ -419,7 +424,12 @@ def test_a_field_that_is_no_number_is_named_with_line_and_column(csv_pass):
     ("[filter]\ngate = 3\n", "gate_nis"),
     ("[filter]\ngate_nis = -1\n", "gate_nis"),
     ("[filter]\nreopen_after_rejections = 0.5\n", "reopen_after_rejections"),
+    ("[filter]\nreopen_after_jump_rejections = 0\n", "reopen_after_jump_rejections"),
+    ("[filter]\nstudent_t_freedom = -1.0\n", "student_t_freedom"),
+    ("[filter]\nangles_after = \"0s\"\n", "angles_after"),
+    ("[filter]\nangles_after = 60\n", "angles_after"),
     ("[further_states]\nclock_offset = 1\n", "clock_offset"),
+    ("[further_states]\nreadout_bias = \"1arcsec\"\n", "readout_bias"),
     ("[further_states]\norbital_error = \"perhaps\"\n", "orbital_error"),
     ("[further_states]\nwandering_drift = \"-1e-8rad/s\"\n", "wandering_drift"),
     ("[further_states]\nwandering_time = \"0h\"\n", "wandering_time"),

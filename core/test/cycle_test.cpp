@@ -1,5 +1,3 @@
-#include "trihedron/core/cycles.hpp"
-
 #include <gtest/gtest.h>
 
 #include <limits>
@@ -7,6 +5,7 @@
 #include <vector>
 
 #include "flight.hpp"
+#include "trihedron/core/cycles.hpp"
 
 namespace trihedron {
 namespace {

@@ -62,6 +62,7 @@ TEST(InvariantMeasurement, JacobianIsThatOfTheInnovation) {
       estimate[k].h_in = rotated<double>(gyros[k].h_in, -x.segment<3>(WithAll::Layout::direction(k)));
       const Eigen::Vector3d delta = -x.segment<3>(WithAll::Layout::alignment(k));
       estimate[k].C_c_b = Rot<C, C>::exp(Vec<C>::assume(delta)).raw() * gyros[k].C_c_b;
+      estimate[k].readout_bias = -x.segment<3>(WithAll::Layout::readout_bias(k));
     }
     const Eigen::Vector3d error = by_shared * x.tail<WithAll::kFurther.shared()>();
     const Eigen::Matrix3d given = C_in_c * Rot<C, C>::exp(Vec<C>::assume(error)).raw();
@@ -318,6 +319,58 @@ TEST(InvariantEstimator, FindsTheClockOffsetAndTheErrorAtOrbitalPeriod) {
   EXPECT_LT(root.row(WithAll::Layout::kShared + 1).norm(), 5 * kArcsecond);
 }
 
+TEST(GyroModel, TakesTheBiasOutOfAReading) {
+  GyroModel<Esg7> gyro;
+  gyro.readout_bias = Eigen::Vector3d(3e-5, -5e-5, 8e-5);
+  const Eigen::Vector3d h = Eigen::Vector3d(0.3, -0.6, 0.7).normalized();
+  const Eigen::Vector3d reading = (h + gyro.readout_bias).normalized();
+  EXPECT_LT((gyro.unbiased(reading) - h).norm(), 1e-8);
+  EXPECT_EQ(GyroModel<Esg7>().unbiased(reading), reading);
+}
+
+/// Readouts with these biases.
+void bias(test::Flight& flight, const std::array<Eigen::Vector3d, 2>& biases) {
+  for (auto& sample : flight.samples) {
+    for (int k = 0; k < 2; ++k) {
+      sample.h_b[k] = (sample.h_b[k] + biases[static_cast<std::size_t>(k)]).normalized();
+    }
+  }
+}
+
+TEST(InvariantEstimator, FindsTheBiasOfTheDirectionCosines) {
+  test::Flight flight({.duration_s = 3600});
+  const std::array<Eigen::Vector3d, 2> truth = {Eigen::Vector3d(5e-5, -7e-5, 9e-5), Eigen::Vector3d(-6e-5, 4e-5, 8e-5)};
+  bias(flight, truth);
+  auto setup = nominal<WithAll>();
+  setup.clock_offset_sigma_s = 1e-9;
+  setup.orbital_error_sigma_rad = 1e-12;
+  setup.wandering_sigma_rad_s = 1e-14;
+  const auto cycle = flown<WithAll>(flight, setup);
+  const auto root = cycle->estimator().error_root();
+  Eigen::Matrix<double, 6, 1> error;
+  for (int k = 0; k < 2; ++k) {
+    error.segment<3>(3 * k) = cycle->estimator().gyros()[k].readout_bias - truth[static_cast<std::size_t>(k)];
+  }
+  const Eigen::Matrix<double, 6, WithAll::Layout::kStates> of_bias = root.bottomRows<6>();
+  const Eigen::Matrix<double, 6, 6> covariance = of_bias * of_bias.transpose();
+  EXPECT_LT(error.dot(covariance.llt().solve(error)), 28);        // χ² of 6, once in 10 000
+  EXPECT_LT(covariance.diagonal().cwiseSqrt().minCoeff(), 1e-6);  // of 1e-4 before
+  const auto solution = cycle->navigation_attitude().value();
+  const Eigen::Matrix3d off = flight.C_in_c_at_samples.back().transpose() * solution.C_in_c.raw();
+  const Eigen::Vector3d attitude_error = Rot<C, C>::assume(off).log().raw();
+  EXPECT_LT(attitude_error.norm(), 4 * std::sqrt(solution.covariance_rad2.trace()));
+}
+
+TEST(InvariantEstimator, SeesThroughItsUncertaintyWhatTheWholeRootSays) {
+  const test::Flight flight({.duration_s = 300});
+  const auto cycle = flown<WithAll>(flight, nominal<WithAll>());
+  const auto by_errors = Eigen::Matrix<double, 3, WithAll::Errors::kSize>::Random().eval();
+  const auto through = cycle->estimator().through_uncertainty(by_errors);
+  const auto by_root = (by_errors * cycle->estimator().error_root()).eval();
+  const Eigen::Matrix3d expected = by_root * by_root.transpose();
+  EXPECT_LT((through * through.transpose() - expected).norm(), 1e-12 * expected.norm());
+}
+
 TEST(InvariantEstimator, FindsTheAlignmentOfAFurtherHead) {
   using TwoHeads = WithAll;
   const test::Flight flight({.duration_s = 1800});
@@ -421,8 +474,12 @@ TEST(InvariantEstimator, RefusesSetupsThatCannotWork) {
   setup = nominal<WithAll>();
   setup.prior[0].C_c_b *= 2;
   EXPECT_EQ(WithAll::create(setup).fault(), SetupFault::kPriorMeanNotUsable);
+  setup = nominal<WithAll>();
+  setup.prior[1].readout_bias.y() = std::numeric_limits<double>::infinity();
+  EXPECT_EQ(WithAll::create(setup).fault(), SetupFault::kPriorMeanNotUsable);
+  setup = nominal<WithAll>();
   for (double* further : {&setup.clock_offset_sigma_s, &setup.orbital_error_sigma_rad, &setup.wandering_sigma_rad_s,
-                          &setup.wandering_time_s}) {
+                          &setup.wandering_time_s, &setup.readout_bias_sigma}) {
     setup.prior[0].C_c_b.setIdentity();
     const double good = *further;
     for (const double bad : {0.0, -1.0, std::numeric_limits<double>::quiet_NaN()}) {
@@ -571,6 +628,37 @@ TEST(CycleOfInvariant, TakesSingleReadingsWhereTheBodyIsNoPolynomial) {
   });
   EXPECT_GT(worst, 0);
   EXPECT_LT(worst, 10 * kArcsecond);
+}
+
+TEST(CycleOfInvariant, KnowsWhatTheBiasThatItHoldsMayDo) {
+  // Held: no bias. Nothing else is wrong, so that the error of the attitude is that of the bias, in 20 of its sigmas.
+  double sum = 0;
+  constexpr int kRuns = 60;
+  std::mt19937 random(4);
+  std::normal_distribution<double> normal;
+  for (int run = 1; run <= kRuns; ++run) {
+    test::Flight flight({.duration_s = 60, .seed = static_cast<unsigned>(run)});
+    auto setup = nominal<WithAll>();
+    setup.clock_offset_sigma_s = 1e-9;
+    setup.orbital_error_sigma_rad = 1e-12;
+    setup.readout_bias_sigma = 2e-4;
+    std::array<Eigen::Vector3d, 2> biases;
+    for (auto& b : biases) {
+      b = setup.readout_bias_sigma * Eigen::Vector3d::NullaryExpr([&] { return normal(random); });
+    }
+    bias(flight, biases);
+    for (int k = 0; k < 2; ++k) {
+      setup.prior[k] = flight.truth[k];
+    }
+    setup.prior_covariance *= 1e-8;
+    const auto solution = flown<WithAll>(flight, setup, {.take_parameters = false})->navigation_attitude().value();
+    const Eigen::Vector3d error =
+        Rot<C, C>::assume(Eigen::Matrix3d(flight.C_in_c_at_samples.back().transpose() * solution.C_in_c.raw()))
+            .log()
+            .raw();
+    sum += error.dot(solution.covariance_rad2.llt().solve(error));
+  }
+  EXPECT_NEAR(sum / kRuns, 3, 1);  // 3 ± 0.32
 }
 
 TEST(CycleOfInvariant, HoldsTheParametersOfTheSetup) {

@@ -38,7 +38,8 @@ CalibrationOptions told() {
   options.drift_model = "esg7";
   options.find_noise = false;
   FurtherStateOptions& states = options.further_states;
-  states.clock_offset = states.orbital_error = states.wandering_drift = FurtherStateOptions::Choice::kOff;
+  states.clock_offset = states.orbital_error = states.wandering_drift = states.readout_bias =
+      FurtherStateOptions::Choice::kOff;
   return options;
 }
 
@@ -312,6 +313,47 @@ TEST(Calibrate, DecidesByItselfForClockOffsetAndErrorAtOrbitalPeriod) {
   EXPECT_LT(run.calibration.further[0].sigma, 5e-4);
 }
 
+TEST(Calibrate, FindsTheBiasOfTheReadoutsAndDriftThatWanders) {
+  Scenario scenario;
+  scenario.seed = 7;
+  scenario.duration = std::chrono::hours(4);
+  const Eigen::Vector3d bias = Eigen::Vector3d(10, -15, 20) * kArcsecond;
+  for (GyroScenario& gyro : scenario.gyros) {
+    gyro.drift.outside_sigma_rad_s = 0;
+    gyro.drift.markov_sigma_rad_s = 1e-7;
+    gyro.drift.markov_time_s = 1200;
+    gyro.readout.bias_rad = bias;
+  }
+  const auto simulated = sim::simulate(scenario);
+  const auto run = calibrate(simulated.pass, {});
+  const auto accepted = [&](const char* states) {
+    return std::any_of(run.evidence.begin(), run.evidence.end(),
+                       [&](const Evidence& evidence) { return evidence.states == states && evidence.accepted; });
+  };
+  EXPECT_TRUE(accepted("wandering_drift"));
+  EXPECT_TRUE(accepted("readout_bias"));
+  EXPECT_FALSE(accepted("clock_offset"));
+  EXPECT_FALSE(accepted("orbital_error"));
+  EXPECT_FALSE(accepted("drift_outside_eq1"));
+  const FurtherStateOptions& states = run.options.further_states;
+  EXPECT_EQ(states.wandering_drift, FurtherStateOptions::Choice::kOn);
+  EXPECT_LT(std::abs(std::log(states.wandering_drift_rad_s / 1e-7)), std::log(3.0));
+  EXPECT_NEAR(run.calibration.statistics.at("nis_mean"), 4, 0.15);
+  ASSERT_EQ(run.calibration.further.size(), 6U);
+  EXPECT_EQ(run.calibration.further[4].name, "gyro2_readout_bias_y_rad");
+  for (std::size_t i = 0; i < 6; ++i) {
+    const FurtherEstimate& estimate = run.calibration.further[i];
+    EXPECT_LT(std::abs(estimate.value - bias(static_cast<Eigen::Index>(i % 3))), 4 * estimate.sigma) << estimate.name;
+    EXPECT_EQ(run.calibration.gyros[i / 3].readout_bias(static_cast<Eigen::Index>(i % 3)), estimate.value);
+  }
+  for (std::size_t k = 0; k < 2; ++k) {
+    const Eigen::Vector3d error = alignment_error(simulated.truth.gyros[k], run.calibration.gyros[k]);
+    const Eigen::Matrix3d covariance = run.calibration.covariance.block<3, 3>(static_cast<Eigen::Index>(10 * k) + 7,
+                                                                              static_cast<Eigen::Index>(10 * k) + 7);
+    EXPECT_LT(error.dot(covariance.llt().solve(error)), 22);  // χ² of 3, once in 15 000
+  }
+}
+
 TEST(Calibrate, KnowsTheRateOfTheOrbitFromTheAttitude) {
   // An attitude that stands still in space does not show it; the filter must not fall over that.
   Scenario scenario;
@@ -372,6 +414,19 @@ TEST(Calibrate, FindsTheNoiseOfThreeGyros) {
   ASSERT_TRUE(run.options.star_tracker_noise_rad.has_value());
   EXPECT_NEAR(run.options.star_tracker_noise_rad->x(), scenario.star_tracker.noise_rad.x(), 1e-6);
   EXPECT_NEAR(run.calibration.statistics.at("nis_mean"), 6, 0.3);
+}
+
+TEST(Calibrate, DoesNotPutDownAPoorDriftModelToAGyro) {
+  Scenario scenario;
+  scenario.seed = 10;
+  scenario.duration = std::chrono::hours(3);
+  scenario.gyros.resize(3, scenario.gyros[0]);
+  scenario.gyros[2].start_direction_c = scenario.gyros[0].start_direction_c.cross(scenario.gyros[1].start_direction_c);
+  scenario.gyros[1].drift.outside_sigma_rad_s = 1e-7;
+  const auto run = calibrate(sim::simulate(scenario).pass, told());
+  EXPECT_GT(run.calibration.statistics.at("fixes_rejected_as_outliers"), 20);
+  EXPECT_GT(run.calibration.statistics.at("nis_mean"), 7);
+  EXPECT_TRUE(run.gyro_events.empty());
 }
 
 TEST(Calibrate, GoesOnWithoutAGyroThatWandersOff) {

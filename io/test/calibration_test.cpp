@@ -33,6 +33,7 @@ TEST(CalibrationJson, ComesBackFromAFileWhole) {
     EXPECT_EQ(back.gyros[i].drift_model, "esg7");
     EXPECT_EQ(back.gyros[i].drift_rad_s, calibration.gyros[i].drift_rad_s);
     EXPECT_EQ(back.gyros[i].alignment_rotation_vector_rad, calibration.gyros[i].alignment_rotation_vector_rad);
+    EXPECT_EQ(back.gyros[i].readout_bias, calibration.gyros[i].readout_bias);
     EXPECT_EQ(back.gyros[i].momentum_in, calibration.gyros[i].momentum_in);
   }
   ASSERT_EQ(back.further.size(), 2U);

@@ -160,6 +160,7 @@ Calibration sample_calibration() {
       calibration.states.push_back(fmt::format("gyro{}.align_{}", gyro, axis));
     }
     one.alignment_rotation_vector_rad = {1e-3 / 3, -2e-3 / 7, -0.0};
+    one.readout_bias = Eigen::Vector3d(1e-5, -2e-5, 3e-5 * gyro);
     one.momentum_in = Eigen::Vector3d(1, 2, gyro).normalized();
     calibration.gyros.push_back(one);
   }

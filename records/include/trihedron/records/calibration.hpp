@@ -30,8 +30,8 @@ struct GyroCalibration {
   std::string drift_model;                                  ///< "esg7"
   std::vector<std::pair<std::string, double>> drift_rad_s;  ///< by coefficient name, in the model's order
   Eigen::Vector3d alignment_rotation_vector_rad{0, 0, 0};   ///< Λ: C_c_b = exp([Λ×])
-  Eigen::Vector3d readout_bias{0, 0, 0};                    ///< of the direction cosines: h_b is read as h_b + bias
   Eigen::Vector3d momentum_in{0, 0, 0};                     ///< h_in at `t`, unit
+  Eigen::Vector3d readout_bias{0, 0, 0};                    ///< of the direction cosines: h_b is read as h_b + bias
 };
 
 /// The parts of a state's name, "gyro2.align_x".
