@@ -315,7 +315,7 @@ auto InvariantEstimator<Base, N, F>::correct(const StarFix& fix, const FixReadin
   switch (report.status) {
     case FixStatus::kRejectedByGate:
       // What a turn of them all explains is the star tracker's.
-      if (report.nis > kPlain * setup_.gate_nis &&
+      if (is_fault(report.nis, m.y.norm(), readings.used) &&
           !angles_agree(measure_angles(by_gyros.value().C_in_c.raw(), readings, 1), readings.used)) {
         report.odd_gyro = odd_gyro(
             m, readings.used, [this](const Measurement& rest, const GyroMask<N>& used) { return agrees(rest, used); });
@@ -388,6 +388,11 @@ auto InvariantEstimator<Base, N, F>::measure_angles(const Eigen::Matrix3d& C_in_
 }
 
 template <class Base, int N, FurtherStates F>
+bool InvariantEstimator<Base, N, F>::is_fault(double nis, double misfit_rad, const GyroMask<N>& used) const {
+  return nis > kPlain * setup_.gate_nis && (count(used) > 2 || misfit_rad > kPlainOfTwo_rad);
+}
+
+template <class Base, int N, FurtherStates F>
 bool InvariantEstimator<Base, N, F>::agrees(const Measurement& m, const GyroMask<N>& used) const {
   Report report;
   report_innovation(information_, WhiteMeasurement<Information, kMeasurements>(m.H, m.y, m.R), report);
@@ -436,7 +441,7 @@ auto InvariantEstimator<Base, N, F>::check_angles(Time t, const FixReadings<N>& 
   report_innovation(information_, white, report);
   if (!angles_agree(m, readings.used)) {
     report.status = FixStatus::kRejectedByGate;
-    if (count(readings.used) > 2 && report.nis > kPlain * setup_.gate_nis) {
+    if (count(readings.used) > 2 && is_fault(report.nis, m.y.norm(), readings.used)) {
       report.odd_gyro = odd_gyro(m, readings.used, [this](const Measurement& rest, const GyroMask<N>& used) {
         return angles_agree(rest, used);
       });

@@ -165,6 +165,9 @@ class InvariantEstimator {
   static constexpr double kUnknown_rad = 1;
   /// So many times above the gate a misfit is a fault of a gyro, not of its drift model: that is noticed sooner.
   static constexpr double kPlain = 4;
+  /// Of two gyros the loss of one is that of the attitude. Until a run of rejections reopens the filter, first
+  /// estimates that are wrong by degrees add less than this to the misfit.
+  static constexpr double kPlainOfTwo_rad = 2.9e-3;  // 10′
   using Rows3 = Eigen::Matrix<double, 3, Layout::kStates>;
   /// Error of a fix by the shared states, c axes: as given = true · exp([e×]).
   [[nodiscard]] FixBySharedStates fix_by_shared(Time t, int head, const Eigen::Vector3d& rate_c) const;
@@ -182,6 +185,8 @@ class InvariantEstimator {
   /// By readings alone, at the attitude that they give; for the n-th time in a row.
   [[nodiscard]] Measurement measure_angles(const Eigen::Matrix3d& C_in_c, const FixReadings<N>& readings, int n) const;
   [[nodiscard]] bool angles_agree(const Measurement& m, const GyroMask<N>& used) const;
+  /// Whether a misfit that was rejected is too large for anything but a fault.
+  [[nodiscard]] bool is_fault(double nis, double misfit_rad, const GyroMask<N>& used) const;
   [[nodiscard]] bool agrees(const Measurement& m, const GyroMask<N>& used) const;
   /// The one gyro without which a measurement that does not agree does.
   template <class Agrees>
