@@ -168,6 +168,19 @@ auto InvariantEstimator<Base, N, F>::prior_gyros() const -> Gyros {
 }
 
 template <class Base, int N, FurtherStates F>
+bool InvariantEstimator<Base, N, F>::prior_allows_estimates() const {
+  typename Information::Vector moved = Information::Vector::Zero();
+  for (int k = 0; k < N; ++k) {
+    const auto& before = setup_.prior[k];
+    moved.template segment<Base::kSize>(Layout::drift(k)) =
+        gyros_[k].drift_rad_s.template head<Base::kSize>() - before.drift_rad_s;
+    moved.template segment<3>(Layout::alignment(k)) =
+        Rot<C, C>::assume(Eigen::Matrix3d(gyros_[k].C_c_b * before.C_c_b.transpose())).log().raw();
+  }
+  return (prior_.root() * moved).squaredNorm() <= gate_of_freedom(N * Layout::kPerGyro, setup_.gate_nis, kMeasurements);
+}
+
+template <class Base, int N, FurtherStates F>
 void InvariantEstimator<Base, N, F>::predict(const Eigen::Matrix3d& C_in_c, const Directions& h_b, double dt_s) {
   for (int k = 0; k < N; ++k) {
     precess(gyros_[k], since_fix_[k], C_in_c, h_b[k], dt_s);
@@ -326,7 +339,11 @@ auto InvariantEstimator<Base, N, F>::correct(const StarFix& fix, const FixReadin
       report.status = FixStatus::kUsed;
       break;
     case FixStatus::kRestarted:
-      // Information gathered about a far wrong estimate: begin anew from the present one.
+      // Information gathered about a far wrong estimate: begin anew from the present one, or from what was known.
+      if (!prior_allows_estimates()) {
+        gyros_ = prior_gyros();
+        shared_.setZero();
+      }
       start(C_in_c.raw(), readings, R_c, by_shared);
       report.weight = 1;
       return report;

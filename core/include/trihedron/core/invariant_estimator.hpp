@@ -165,9 +165,9 @@ class InvariantEstimator {
   static constexpr double kUnknown_rad = 1;
   /// So many times above the gate a misfit is a fault of a gyro, not of its drift model: that is noticed sooner.
   static constexpr double kPlain = 4;
-  /// Of two gyros the loss of one is that of the attitude. Until a run of rejections reopens the filter, first
-  /// estimates that are wrong by degrees add less than this to the misfit.
-  static constexpr double kPlainOfTwo_rad = 2.9e-3;  // 10′
+  /// Of two gyros the loss of one is that of the attitude: only for more than an alignment wrong by 5° in a body that
+  /// turns at orbital rate adds to the misfit in the minute until a run of rejections reopens the filter.
+  static constexpr double kPlainOfTwo_rad = 5.8e-3;  // 20′
   using Rows3 = Eigen::Matrix<double, 3, Layout::kStates>;
   /// Error of a fix by the shared states, c axes: as given = true · exp([e×]).
   [[nodiscard]] FixBySharedStates fix_by_shared(Time t, int head, const Eigen::Vector3d& rate_c) const;
@@ -191,6 +191,8 @@ class InvariantEstimator {
   /// The one gyro without which a measurement that does not agree does.
   template <class Agrees>
   [[nodiscard]] static int odd_gyro(const Measurement& m, const GyroMask<N>& used, Agrees&& agrees);
+  /// Whether the prior allows the drift coefficients and alignments that are estimated.
+  [[nodiscard]] bool prior_allows_estimates() const;
   void update_to_now(const Eigen::Matrix3d& C_in_c);
   void feed_back(const typename Information::Vector& x);
 
