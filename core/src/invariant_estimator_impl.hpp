@@ -339,8 +339,10 @@ auto InvariantEstimator<Base, N, F>::correct(const StarFix& fix, const FixReadin
       report.status = FixStatus::kUsed;
       break;
     case FixStatus::kRestarted:
-      // Information gathered about a far wrong estimate: begin anew from the present one, or from what was known.
-      if (!prior_allows_estimates()) {
+      // Information gathered about a far wrong estimate: begin anew from the present one, and where that is no better,
+      // from what was known.
+      begun_from_estimates_ = !begun_from_estimates_ && prior_allows_estimates();
+      if (!begun_from_estimates_) {
         gyros_ = prior_gyros();
         shared_.setZero();
       }

@@ -1,13 +1,17 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/LU>
+#include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <set>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include "consistency/band.hpp"
 #include "consistency/bound.hpp"
+#include "consistency/flight.hpp"
 #include "consistency/grid.hpp"
 #include "trihedron/ground/calibrate.hpp"
 #include "trihedron/sim/simulate.hpp"
@@ -119,6 +123,24 @@ TEST(Bound, IsTheCovarianceOfTheFilterForSmallMisalignments) {
   const ParameterCovariance bound = parameter_bound(flown.pass.settings, flown.truth);
   for (Eigen::Index i = 0; i < bound.rows(); ++i) {
     EXPECT_NEAR(std::sqrt(covariance(i, i) / bound(i, i)), 1, 0.03) << i;
+  }
+}
+
+/// Misalignments of degrees, and drift ten times that of a good gyro: first estimates far enough off that the filter
+/// has to begin anew, once or more.
+TEST(Flights, WithWrongFirstEstimatesAreNotLost) {
+  const std::vector<std::pair<std::string, int>> flights = {{"slews/plane-normal/1e-05/60arcmin/0e+00", 10},
+                                                            {"slews/plane-normal/1e-05/300arcmin/0e+00", 12},
+                                                            {"slews/plane-plane/1e-07/300arcmin/1e-07", 11},
+                                                            {"steady/plane-plane/1e-07/300arcmin/0e+00", 1},
+                                                            {"steady/plane-plane/1e-05/300arcmin/0e+00", 14}};
+  const std::vector<Cell> cells = grid();
+  for (const auto& [name, run] : flights) {
+    const auto cell = std::find_if(cells.begin(), cells.end(), [&](const Cell& c) { return c.name() == name; });
+    ASSERT_NE(cell, cells.end()) << name;
+    const Outcome outcome = fly(*cell, run, {"invariant"}).front();
+    EXPECT_EQ(outcome.fixes, 10800) << name;
+    EXPECT_LT(outcome.nees, 50) << name;  // χ² of 20, once in 5000
   }
 }
 

@@ -67,8 +67,8 @@ struct CalibrationSetup {
   int reopen_after_rejections = 20;
   /// The same where the run began with a misfit that no drift can make: the tracker was wrong, or has been turned.
   int reopen_after_jump_rejections = 400;
-  /// When that happens again within so many fixes, the parameters are what is wrong: the estimates stay, their
-  /// information goes.
+  /// When that happens again within so many fixes, the parameters are what is wrong: their information goes. The
+  /// estimates stay; of estimator invariant not when that has not helped, or the prior excludes them.
   int restart_within_fixes = 200;
   /// Without a fix that could be used for longer than this, the angles between the momenta are used alone; or kNever.
   Duration angles_after = std::chrono::minutes(1);

@@ -208,6 +208,7 @@ class InvariantEstimator {
   double extra_variance_rad2_ = 0;
   int angles_since_fix_ = 0;
   int angle_rejections_in_a_row_ = 0;
+  bool begun_from_estimates_ = false;  ///< at the last restart
   bool started_ = false;
 };
 
