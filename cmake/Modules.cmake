@@ -53,6 +53,8 @@ function(trihedron_test module)
     target_link_libraries(${module}_test PRIVATE trihedron::${module})
   endif()
   target_link_libraries(${module}_test PRIVATE ${arg_LIBRARIES} GTest::gmock GTest::gtest_main rapidcheck trihedron_warnings)
+  # Tests of different files may use the same names.
+  set_target_properties(${module}_test PROPERTIES UNITY_BUILD OFF)
   # The tests themselves need no speed, and compile twice as fast without; what they test is optimised in its own library.
   target_compile_options(${module}_test PRIVATE $<$<CONFIG:Release>:-O1>)
   gtest_discover_tests(${module}_test TEST_PREFIX ${module}. DISCOVERY_TIMEOUT 60 PROPERTIES TIMEOUT 300)

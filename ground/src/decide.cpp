@@ -116,7 +116,8 @@ class States {
     constexpr int kBiases = 3 * Full::kGyros;
     Eigen::VectorXd estimate(kBiases);
     for (int k = 0; k < Full::kGyros; ++k) {
-      estimate.segment<3>(3 * k) = estimator_.gyros()[k].readout_bias;
+      const int row = 3 * k;
+      estimate.segment<3>(row) = estimator_.gyros()[k].readout_bias;
     }
     return log_evidence(estimate, root_.middleRows(Full::Layout::readout_bias(0), kBiases),
                         Eigen::VectorXd::Constant(kBiases, setup().readout_bias_sigma));
