@@ -377,8 +377,7 @@ Decision decide(const Pass& pass, const CalibrationOptions& asked) {
   }
   settle_states(States(everything.estimator()), asked, decision);
   const double least_rad_sqrt_s = asked.direction_random_walk_rad_sqrt_s;
-  CalibrationOptions found = with_most_likely_walk(pass, options, kAllLevels).options;
-  if (!(found.direction_random_walk_rad_sqrt_s > least_rad_sqrt_s)) {
+  if (!(with_most_likely_walk(pass, options, kAllLevels).options.direction_random_walk_rad_sqrt_s > least_rad_sqrt_s)) {
     return decision;
   }
   // The states were settled by a noise that is too small: again, by what it is when they are all free.

@@ -366,18 +366,20 @@ TEST(Calibrate, KnowsTheRateOfTheOrbitFromTheAttitude) {
   EXPECT_TRUE(run.calibration.covariance.allFinite());
 }
 
-/// Two hours with three gyros.
-sim::SimulatedPass three_gyros() {
+/// Three gyros, the third across the others; all drift in eq. (1).
+Scenario scenario_of_three(std::uint64_t seed, Duration duration) {
   Scenario scenario;
-  scenario.seed = 8;
-  scenario.duration = std::chrono::hours(2);
+  scenario.seed = seed;
+  scenario.duration = duration;
   scenario.gyros.resize(3, scenario.gyros[0]);
   scenario.gyros[2].start_direction_c = scenario.gyros[0].start_direction_c.cross(scenario.gyros[1].start_direction_c);
   for (GyroScenario& gyro : scenario.gyros) {
     gyro.drift.outside_sigma_rad_s = 0;
   }
-  return sim::simulate(scenario);
+  return scenario;
 }
+
+sim::SimulatedPass three_gyros() { return sim::simulate(scenario_of_three(8, std::chrono::hours(2))); }
 
 TEST(Calibrate, TakesThreeGyros) {
   const auto simulated = three_gyros();
@@ -396,14 +398,9 @@ TEST(Calibrate, TakesThreeGyros) {
 }
 
 TEST(Calibrate, FindsTheNoiseOfThreeGyros) {
-  Scenario scenario;
-  scenario.seed = 9;
-  scenario.duration = std::chrono::hours(3);
-  scenario.gyros.resize(3, scenario.gyros[0]);
-  scenario.gyros[2].start_direction_c = scenario.gyros[0].start_direction_c.cross(scenario.gyros[1].start_direction_c);
+  Scenario scenario = scenario_of_three(9, std::chrono::hours(3));
   scenario.star_tracker.noise_rad *= 1.5;
   for (GyroScenario& gyro : scenario.gyros) {
-    gyro.drift.outside_sigma_rad_s = 0;
     gyro.drift.direction_walk_rad_sqrt_s = 3e-8;
   }
   Pass pass = sim::simulate(scenario).pass;
@@ -417,11 +414,7 @@ TEST(Calibrate, FindsTheNoiseOfThreeGyros) {
 }
 
 TEST(Calibrate, DoesNotPutDownAPoorDriftModelToAGyro) {
-  Scenario scenario;
-  scenario.seed = 10;
-  scenario.duration = std::chrono::hours(3);
-  scenario.gyros.resize(3, scenario.gyros[0]);
-  scenario.gyros[2].start_direction_c = scenario.gyros[0].start_direction_c.cross(scenario.gyros[1].start_direction_c);
+  Scenario scenario = scenario_of_three(10, std::chrono::hours(3));
   scenario.gyros[1].drift.outside_sigma_rad_s = 1e-7;
   const auto run = calibrate(sim::simulate(scenario).pass, told());
   EXPECT_GT(run.calibration.statistics.at("fixes_rejected_as_outliers"), 20);
