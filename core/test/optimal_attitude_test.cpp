@@ -91,6 +91,19 @@ TEST(OptimalAttitude, NeedsTwoDirectionsApart) {
   EXPECT_EQ(optimal_attitude<kN>(in, in_body(), weights(1, 1, 1)).fault(), DirectionsFault::kMomentaNearlyParallel);
 }
 
+TEST(OptimalAttitude, OfTwoAlikeIsExactHoweverTheyDisagree) {
+  // Both lie in one plane, with one middle.
+  PerGyro<Eigen::Vector3d, 2> in;
+  in[0] = Eigen::Vector3d(0.6, 0.8, 0);
+  in[1] = Eigen::Vector3d(-0.6, 0.8, 0);
+  PerGyro<Eigen::Vector3d, 2> c;
+  c[0] = Eigen::Vector3d(0.8, 0.6, 0);
+  c[1] = Eigen::Vector3d(-0.8, 0.6, 0);
+  PerGyro<double, 2> alike;
+  alike[0] = alike[1] = 1;
+  EXPECT_LT(optimal_attitude<2>(in, c, alike).value().C_in_c.log().norm(), 1e-15);
+}
+
 TEST(OptimalAttitude, OfTwoIsBetterThanTheTrihedron) {
   // Where both are read with the same noise, the trihedron does not use what the second says about q1.
   PerGyro<Eigen::Vector3d, 2> in;

@@ -51,6 +51,20 @@ template <class Gyros, int N = Gyros::size()>
   return h_in;
 }
 
+/// Axes on two directions that treat both alike: their normal, the middle between them, and across it.
+template <class F>
+[[nodiscard]] Result<Rot<F, G>, DirectionsFault> bisecting_axes(const Vec<F>& h1, const Vec<F>& h2) {
+  const auto trihedron = make_trihedron(h1, h2);
+  if (!trihedron) {
+    return trihedron.fault();
+  }
+  Eigen::Matrix3d axes;
+  axes.col(0) = trihedron.value().q1();
+  axes.col(1) = (h1 + h2).raw().normalized();
+  axes.col(2) = axes.col(0).cross(axes.col(1));
+  return Rot<F, G>::assume(axes);
+}
+
 /// Least squares over all directions, Σ w_k |h_in,k − C h_c,k|². Weights: positive where a direction is to be used, 0
 /// where not; at least two used ones must stand further than asin(kMinSine) from one line.
 template <int N>
@@ -74,19 +88,18 @@ template <int N>
   if (!(best >= kMinSine)) {
     return DirectionsFault::kMomentaNearlyParallel;
   }
-  PerGyro<Eigen::Vector3d, 2> pair_in;
-  PerGyro<Eigen::Vector3d, 2> pair_c;
-  pair_in[0] = h_in[first];
-  pair_in[1] = h_in[second];
-  pair_c[0] = h_c[first];
-  pair_c[1] = h_c[second];
-  const auto start = trihedron_attitude(pair_in, pair_c);
-  if (!start) {
-    return start.fault();
+  const auto in = bisecting_axes(Vec<In>::assume(h_in[first]), Vec<In>::assume(h_in[second]));
+  if (!in) {
+    return in.fault();
   }
-  // … Gauss–Newton, whose second step is already below rounding for directions that agree within a degree.
+  const auto c = bisecting_axes(Vec<C>::assume(h_c[first]), Vec<C>::assume(h_c[second]));
+  if (!c) {
+    return c.fault();
+  }
+  // … which of two that count alike is the solution, by Gauss–Newton: each step leaves as much of what was left before
+  // as the directions disagree.
   AttitudeByDirections<N> result;
-  result.C_in_c = start.value().C_in_c;
+  result.C_in_c = in.value() * c.value().inverse();
   Eigen::Matrix3d normal = Eigen::Matrix3d::Zero();
   for (int k = 0; k < N; ++k) {
     const Eigen::Matrix3d across = weight[k] * (Eigen::Matrix3d::Identity() - h_c[k] * h_c[k].transpose());
@@ -95,12 +108,17 @@ template <int N>
   }
   const Eigen::Matrix3d inverse = normal.inverse();
   result.by_directions = inverse * result.by_directions;
+  constexpr double kRounding = 1e-15;
   for (int step = 0; step < 3; ++step) {
     Eigen::Vector3d misfit = Eigen::Vector3d::Zero();
     for (int k = 0; k < N; ++k) {
       misfit += weight[k] * h_c[k].cross(result.C_in_c.raw().transpose() * h_in[k]);
     }
-    result.C_in_c = result.C_in_c * Rot<C, C>::exp(Vec<C>::assume(inverse * misfit));
+    const Eigen::Vector3d towards = inverse * misfit;
+    if (towards.squaredNorm() < kRounding * kRounding) {
+      break;
+    }
+    result.C_in_c = result.C_in_c * Rot<C, C>::exp(Vec<C>::assume(towards));
   }
   return result;
 }
