@@ -35,13 +35,12 @@ bench: build
 validation: build
 	validation/validate.py $(BUILD)/trihedron docs/validation.md
 
-# Without the browser, and without the tests that fly many times for a statistic: they take no path of their own. Counts the
-# lines of core on the way, for `coverage`.
+# Counts the lines of core on the way, for `coverage`.
 sanitize: setup
 	cmake --preset sanitize $(CMAKE_FLAGS)
 	cmake --build build-sanitize --parallel $(JOBS)
 	find build-sanitize -name '*.gcda' -delete
-	ctest --test-dir build-sanitize --output-on-failure --parallel $(JOBS) -E 'report\.(Browser|Samples)|cli\.DemoBrowser|IsConsistent|AreHonest|IsBetterThanTheGate|CostsLittle|ComesNearTheGate|IsCalibratedToAnArcsecond|AttitudeNowIsBetter|AttitudeErrorsAreThoseOfItsCovariance|WithWrongFirstEstimatesAreNotLost'
+	ctest --test-dir build-sanitize --output-on-failure --parallel $(JOBS) -LE long
 
 # Threads race for the counters, which may come out negative; gcovr then leaves that line out.
 coverage: sanitize

@@ -4,12 +4,13 @@
 #
 # trihedron_module(<name> [SOURCES …] [MODULES …] [LIBRARIES …] [PRIVATE_LIBRARIES …])
 #   makes the target trihedron_<name> with the alias trihedron::<name>; MODULES must be allowed by the table below.
-# trihedron_test(<module> <file.cpp>… [LIBRARIES …])
+# trihedron_test(<module> <file.cpp>… [LIBRARIES …] [LONG <Suite.Name>…])
 #   makes the Google Test program <module>_test, linked with the module if there is one of that name, and registers its tests as
-#   <module>.<Suite>.<Name>.
+#   <module>.<Suite>.<Name>; those that match LONG (with * and ?) get the label `long`: they fly many times for a statistic, take no
+#   path of their own, and are left out under the sanitizers, where they would take an hour.
 # trihedron_pytest(<name> <file.py>)
 #   registers the tests of a Python file as one test; they find the build directory in TRIHEDRON_BUILD. Those marked `long` are
-#   left out under the sanitizers, where they would take an hour.
+#   left out under the sanitizers as well.
 
 set(TRIHEDRON_core_MAY_USE)
 set(TRIHEDRON_records_MAY_USE core)
@@ -47,7 +48,7 @@ function(trihedron_test module)
   if(NOT TRIHEDRON_BUILD_TESTS)
     return()
   endif()
-  cmake_parse_arguments(arg "" "" "LIBRARIES" ${ARGN})
+  cmake_parse_arguments(arg "" "" "LIBRARIES;LONG" ${ARGN})
   add_executable(${module}_test ${arg_UNPARSED_ARGUMENTS})
   if(TARGET trihedron::${module})
     target_link_libraries(${module}_test PRIVATE trihedron::${module})
@@ -57,7 +58,12 @@ function(trihedron_test module)
   set_target_properties(${module}_test PROPERTIES UNITY_BUILD OFF)
   # The tests themselves need no speed, and compile twice as fast without; what they test is optimised in its own library.
   target_compile_options(${module}_test PRIVATE $<$<CONFIG:Release>:-O1>)
-  gtest_discover_tests(${module}_test TEST_PREFIX ${module}. DISCOVERY_TIMEOUT 60 PROPERTIES TIMEOUT 300)
+  set(discovery TEST_PREFIX ${module}. DISCOVERY_TIMEOUT 60)
+  string(JOIN ":" long ${arg_LONG})
+  gtest_discover_tests(${module}_test ${discovery} TEST_FILTER "-${long}" PROPERTIES TIMEOUT 300)
+  if(arg_LONG)
+    gtest_discover_tests(${module}_test ${discovery} TEST_FILTER "${long}" TEST_LIST ${module}_long_tests PROPERTIES TIMEOUT 300 LABELS long)
+  endif()
 endfunction()
 
 function(trihedron_pytest name file)

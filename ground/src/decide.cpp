@@ -155,6 +155,7 @@ class States {
 struct Likely {
   CalibrationOptions options;
   double log_likelihood = 0;
+  double gain = 0;  ///< over that of (0, 0)
 };
 
 /// Goes uphill over options on a grid, each by two numbers.
@@ -163,7 +164,8 @@ class Search {
   using Point = std::pair<int, int>;
   using At = std::function<CalibrationOptions(double, int)>;
 
-  /// From the best of `starts` to the best of its neighbours, and so on, within the bounds; all included.
+  /// From the best of `starts`, (0, 0) among them, to the best of its neighbours, and so on, within the bounds; all
+  /// included.
   Search(const Pass& pass, At at, const std::vector<Point>& starts, const Point& lowest, const Point& highest)
       : pass_(pass), at_(std::move(at)) {
     look_at(starts);
@@ -187,7 +189,7 @@ class Search {
     if (below != tried_.end() && above != tried_.end()) {
       beside = (above->second - below->second) / (4 * peak - 2 * below->second - 2 * above->second);
     }
-    return {at_(i + beside, j), peak};
+    return {at_(i + beside, j), peak, peak - tried_.at({0, 0})};
   }
 
  private:
@@ -330,6 +332,40 @@ CalibrationOptions with_everything(CalibrationOptions options, const Calibration
   return options;
 }
 
+/// Where the noise is more than was told the states were settled by one that is too small: again, by what it is when
+/// they are all free, and whether it wanders.
+void decide_beside_noise(const Pass& pass, const CalibrationOptions& asked, bool wandering_is_open,
+                         Decision& decision) {
+  CalibrationOptions& options = decision.options;
+  CalibrationOptions free = with_everything(options, asked);
+  const Likely walking = with_most_likely_walk(pass, free, kAllLevels);
+  const double walk_rad_sqrt_s = walking.options.direction_random_walk_rad_sqrt_s;
+  std::optional<Evidence> wandering;
+  if (wandering_is_open && walking.gain > kStrong) {
+    // What wanders fast is a random walk of walk² = 2 σ² τ.
+    free.further_states.wandering_drift_rad_s =
+        walk_rad_sqrt_s / std::sqrt(2 * to_seconds(free.further_states.wandering_time));
+    const Likely wanders = with_most_likely_wandering(pass, free, {{0, 0}, {2, 0}, {4, 0}, {6, 0}});
+    const double gain = wanders.log_likelihood - walking.log_likelihood;
+    wandering = Evidence{"wandering_drift", gain, gain > kStrong};
+    free = wandering->accepted ? wanders.options : walking.options;
+  } else {
+    free = walking.options;
+  }
+  settle_states(States(Trial<Full>(pass, free).estimator()), asked, decision);
+  if (wandering && wandering->accepted) {
+    options.further_states.wandering_drift_rad_s = free.further_states.wandering_drift_rad_s;
+    options.further_states.wandering_time = free.further_states.wandering_time;
+    options = with_most_likely_wandering(pass, options, {{0, 0}}).options;
+  } else {
+    const double level = std::log2(walk_rad_sqrt_s / options.direction_random_walk_rad_sqrt_s);
+    options = with_most_likely_walk(pass, options, {{0, 0}, {static_cast<int>(std::lround(level)), 0}}).options;
+  }
+  if (wandering) {
+    decision.evidence.push_back(*wandering);
+  }
+}
+
 }  // namespace
 
 Decision decide(const Pass& pass, const CalibrationOptions& asked) {
@@ -376,39 +412,12 @@ Decision decide(const Pass& pass, const CalibrationOptions& asked) {
     everything = Trial<Full>(pass, with_everything(options, asked));
   }
   settle_states(States(everything.estimator()), asked, decision);
-  const double least_rad_sqrt_s = asked.direction_random_walk_rad_sqrt_s;
-  if (!(with_most_likely_walk(pass, options, kAllLevels).options.direction_random_walk_rad_sqrt_s > least_rad_sqrt_s)) {
+  const Likely little = with_most_likely_walk(pass, options, kAllLevels);
+  if (!(little.gain > kStrong)) {
+    options = little.options;
     return decision;
   }
-  // The states were settled by a noise that is too small: again, by what it is when they are all free.
-  CalibrationOptions free = with_everything(options, asked);
-  const Likely walking = with_most_likely_walk(pass, free, kAllLevels);
-  const double walk_rad_sqrt_s = walking.options.direction_random_walk_rad_sqrt_s;
-  std::optional<Evidence> wandering;
-  if (wandering_is_open && walk_rad_sqrt_s > least_rad_sqrt_s) {
-    // What wanders fast is a random walk of walk² = 2 σ² τ.
-    free.further_states.wandering_drift_rad_s =
-        walk_rad_sqrt_s / std::sqrt(2 * to_seconds(free.further_states.wandering_time));
-    const Likely wanders = with_most_likely_wandering(pass, free, {{0, 0}, {2, 0}, {4, 0}, {6, 0}});
-    const double gain = wanders.log_likelihood - walking.log_likelihood;
-    wandering = Evidence{"wandering_drift", gain, gain > kStrong};
-    free = wandering->accepted ? wanders.options : walking.options;
-  } else {
-    free = walking.options;
-  }
-  everything = Trial<Full>(pass, free);
-  settle_states(States(everything.estimator()), asked, decision);
-  if (wandering && wandering->accepted) {
-    options.further_states.wandering_drift_rad_s = free.further_states.wandering_drift_rad_s;
-    options.further_states.wandering_time = free.further_states.wandering_time;
-    options = with_most_likely_wandering(pass, options, {{0, 0}}).options;
-  } else {
-    const int level = static_cast<int>(std::lround(std::log2(walk_rad_sqrt_s / least_rad_sqrt_s)));
-    options = with_most_likely_walk(pass, options, {{level, 0}}).options;
-  }
-  if (wandering) {
-    decision.evidence.push_back(*wandering);
-  }
+  decide_beside_noise(pass, asked, wandering_is_open, decision);
   return decision;
 }
 

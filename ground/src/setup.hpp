@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <map>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -108,6 +109,17 @@ void use_calibration(const Calibration& prior, typename Estimator::Setup& setup)
 /// of a low orbit.
 [[nodiscard]] double orbital_rate_rad_s(const StarTrackerTelemetry& tracker);
 
+/// Prior sigma of each component of a readout bias: the largest that an earlier calibration has left of it.
+[[nodiscard]] inline double readout_bias_sigma(const std::optional<Calibration>& earlier) {
+  double sigma = 0;
+  if (earlier) {
+    for (const FurtherEstimate& state : earlier->further) {
+      sigma = state.name.find("readout_bias") == std::string::npos ? sigma : std::max(sigma, state.sigma);
+    }
+  }
+  return sigma > 0 ? sigma : 1e-4;
+}
+
 /// Prior sigmas of the further states; near zero for those that are off.
 template <class Estimator>
 void use_further_states(const Pass& pass, const CalibrationOptions& options, typename Estimator::Setup& setup) {
@@ -117,7 +129,7 @@ void use_further_states(const Pass& pass, const CalibrationOptions& options, typ
   setup.orbital_error_sigma_rad = states.orbital_error == kOn ? 1e-4 : 1e-12;
   setup.wandering_sigma_rad_s = states.wandering_drift == kOn ? states.wandering_drift_rad_s : 1e-15;
   setup.wandering_time_s = to_seconds(states.wandering_time);
-  setup.readout_bias_sigma = states.readout_bias == kOn ? 1e-4 : 1e-12;
+  setup.readout_bias_sigma = states.readout_bias == kOn ? readout_bias_sigma(pass.settings.prior) : 1e-12;
   setup.orbital_rate_rad_s = orbital_rate_rad_s(pass.star_tracker);
   setup.orbital_phase_zero = pass.settings.epoch;
   for (std::size_t i = 0; i < std::min(setup.further_heads.size(), pass.settings.further_star_trackers.size()); ++i) {

@@ -81,10 +81,21 @@ TEST(Calibrate, FindsTheTruthWithinItsSigmas) {
       EXPECT_LT(std::abs(error(axis)), 4 * std::sqrt(result.covariance(row, row)));
     }
   }
+  EXPECT_EQ(result.estimator, "invariant");
+  EXPECT_TRUE(result.further.empty());
   EXPECT_NEAR(result.statistics.at("nis_mean"), 4, 0.2);
   EXPECT_EQ(result.t, two_hours().pass.gyro.t.back());
   EXPECT_GT(progress.size(), 50U);
   EXPECT_LE(progress.back(), 1);
+}
+
+TEST(Calibrate, SmoothsTheAttitude) {
+  const auto run = calibrate(two_hours().pass, told());
+  const auto errors = attitude_errors(run.attitude, two_hours().truth.t, two_hours().truth.q_in_c);
+  const auto last = statistics_by_stretch(errors, two_hours().pass.settings.epoch, std::chrono::minutes(30)).at(3);
+  // Single readings give 2″.
+  EXPECT_LT(last.rms_rad.maxCoeff(), 1.2 * kArcsecond);
+  EXPECT_NEAR(*last.normalised_square, 1, 0.5);
 }
 
 TEST(Calibrate, RecordsEveryFixAndSample) {
@@ -115,6 +126,24 @@ TEST(Calibrate, StartsFromAnEarlierCalibration) {
   const auto errors = attitude_errors(second.navigation, two_hours().truth.t, two_hours().truth.q_in_c);
   EXPECT_LT(statistics_by_stretch(errors, pass.settings.epoch, std::chrono::minutes(90)).at(0).max_total_rad, 2.9e-4);
   EXPECT_LT(second.calibration.covariance.trace(), first.calibration.covariance.trace());
+}
+
+TEST(Calibrate, KnowsTheReadoutBiasOfAnEarlierCalibration) {
+  CalibrationOptions options = told();
+  options.further_states.readout_bias = FurtherStateOptions::Choice::kOn;
+  const auto first = calibrate(two_hours().pass, options).calibration;
+  Pass pass = beginning(two_hours().pass, std::chrono::minutes(10));
+  pass.settings.prior = first;
+  const auto second = calibrate(pass, options).calibration;
+  double largest = 0;
+  for (const FurtherEstimate& bias : first.further) {
+    largest = std::max(largest, bias.sigma);
+  }
+  EXPECT_LT(largest, 0.5e-4);
+  ASSERT_EQ(second.further.size(), 6U);
+  for (const FurtherEstimate& bias : second.further) {
+    EXPECT_LE(bias.sigma, 1.0001 * largest);
+  }
 }
 
 TEST(Calibrate, UsesThePriorsOfThePass) {
@@ -267,27 +296,6 @@ TEST_P(SamplePass, IsCalibratedToAnArcsecondOrSo) {
   EXPECT_NEAR(run.calibration.statistics.at("nis_mean"), 4, 0.2);
 }
 
-TEST(Calibrate, ByTheInvariantErrorFindsTheTruthAndSmoothsTheAttitude) {
-  CalibrationOptions options;
-  const auto run = calibrate(two_hours().pass, options);
-  EXPECT_EQ(run.calibration.estimator, "invariant");
-  EXPECT_EQ(run.fixes.size(), two_hours().pass.star_tracker.size());
-  EXPECT_NEAR(run.calibration.statistics.at("nis_mean"), 4, 0.2);
-  for (std::size_t k = 0; k < 2; ++k) {
-    const Eigen::Vector3d error = alignment_error(two_hours().truth.gyros[k], run.calibration.gyros[k]);
-    for (int axis = 0; axis < 3; ++axis) {
-      const Eigen::Index row = static_cast<Eigen::Index>(10 * k) + 7 + axis;
-      EXPECT_LT(std::abs(error(axis)), 4 * std::sqrt(run.calibration.covariance(row, row)));
-    }
-  }
-  const auto errors = attitude_errors(run.attitude, two_hours().truth.t, two_hours().truth.q_in_c);
-  const auto last = statistics_by_stretch(errors, two_hours().pass.settings.epoch, std::chrono::minutes(30)).at(3);
-  // Single readings give 2″.
-  EXPECT_LT(last.rms_rad.maxCoeff(), 1.2 * kArcsecond);
-  EXPECT_NEAR(*last.normalised_square, 1, 0.5);
-  EXPECT_TRUE(run.calibration.further.empty());
-}
-
 TEST(Calibrate, DecidesByItselfForClockOffsetAndErrorAtOrbitalPeriod) {
   Scenario scenario;
   scenario.seed = 6;
@@ -311,6 +319,22 @@ TEST(Calibrate, DecidesByItselfForClockOffsetAndErrorAtOrbitalPeriod) {
     EXPECT_LT(std::abs(estimate.value - expected), 4 * estimate.sigma) << estimate.name;
   }
   EXPECT_LT(run.calibration.further[0].sigma, 5e-4);
+}
+
+TEST(Calibrate, DoesNotTakeARandomWalkForDriftThatWanders) {
+  Scenario scenario;
+  scenario.seed = 11;
+  scenario.duration = std::chrono::minutes(55);
+  for (GyroScenario& gyro : scenario.gyros) {
+    gyro.drift.outside_sigma_rad_s = 0;
+    gyro.drift.direction_walk_rad_sqrt_s = 1e-7;
+  }
+  const auto run = calibrate(sim::simulate(scenario).pass, {});
+  ASSERT_FALSE(run.evidence.empty());
+  EXPECT_EQ(run.evidence.back().states, "wandering_drift");
+  EXPECT_FALSE(run.evidence.back().accepted);
+  EXPECT_NEAR(run.options.direction_random_walk_rad_sqrt_s, 1e-7, 0.3e-7);
+  EXPECT_NEAR(run.calibration.statistics.at("nis_mean"), 4, 0.3);
 }
 
 TEST(Calibrate, FindsTheBiasOfTheReadoutsAndDriftThatWanders) {
