@@ -408,7 +408,7 @@ auto InvariantEstimator<Base, N, F>::measure_angles(const Eigen::Matrix3d& C_in_
 
 template <class Base, int N, FurtherStates F>
 bool InvariantEstimator<Base, N, F>::is_fault(double nis, double misfit_rad, const GyroMask<N>& used) const {
-  return nis > kPlain * setup_.gate_nis && (count(used) > 2 || misfit_rad > kPlainOfTwo_rad);
+  return nis > kPlain * setup_.gate_nis && (count(used) > 2 || (gate_.begun_anew() && misfit_rad > kPlainOfTwo_rad));
 }
 
 template <class Base, int N, FurtherStates F>

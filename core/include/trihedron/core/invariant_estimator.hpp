@@ -165,8 +165,9 @@ class InvariantEstimator {
   static constexpr double kUnknown_rad = 1;
   /// So many times above the gate a misfit is a fault of a gyro, not of its drift model: that is noticed sooner.
   static constexpr double kPlain = 4;
-  /// Of two gyros the loss of one is that of the attitude: only for more than an alignment wrong by 5° in a body that
-  /// turns at orbital rate adds to the misfit in the minute until a run of rejections reopens the filter.
+  /// Of two gyros the loss of one is that of the attitude: only when beginning anew has not helped, and for more than
+  /// an alignment wrong by 5° in a body that turns at orbital rate adds to the misfit in the minute until a run of
+  /// rejections reopens the filter.
   static constexpr double kPlainOfTwo_rad = 5.8e-3;  // 20′
   using Rows3 = Eigen::Matrix<double, 3, Layout::kStates>;
   /// Error of a fix by the shared states, c axes: as given = true · exp([e×]).

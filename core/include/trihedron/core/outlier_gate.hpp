@@ -54,6 +54,7 @@ class OutlierGate {
         return FixStatus::kRejectedByGate;
       }
       status = under_suspicion_ > 0 ? FixStatus::kRestarted : FixStatus::kUsedAfterReopening;
+      begun_anew_ = status == FixStatus::kRestarted;
       under_suspicion_ = restart_within_ + 1;
       misfit_rad_ = 0;
     }
@@ -66,6 +67,8 @@ class OutlierGate {
   [[nodiscard]] int rejections_in_a_row() const { return rejections_in_a_row_; }
   /// Whether the present run of rejections is put down to the tracker.
   [[nodiscard]] bool jumped() const { return jumped_; }
+  /// Whether the filter has begun anew so few fixes ago that it is not what is wrong now.
+  [[nodiscard]] bool begun_anew() const { return begun_anew_ && under_suspicion_ > 0; }
 
  private:
   double gate_nis_ = 0;
@@ -76,7 +79,8 @@ class OutlierGate {
   double misfit_rad_ = 0;  ///< of the last fix
   int rejections_in_a_row_ = 0;
   int under_suspicion_ = 0;
-  bool confirmed_ = false;  ///< what the filter rests on has agreed with a fix after it
+  bool begun_anew_ = false;  ///< when suspicion arose last
+  bool confirmed_ = false;   ///< what the filter rests on has agreed with a fix after it
   bool jumped_ = false;
 };
 
