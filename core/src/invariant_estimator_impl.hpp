@@ -66,10 +66,13 @@ Result<InvariantEstimator<Base, N, F>, SetupFault> InvariantEstimator<Base, N, F
 template <class Base, int N, FurtherStates F>
 double InvariantEstimator<Base, N, F>::second_order_rad(const Rows3& a, const Rows3& b) const {
   // E|a × b|² = tr A tr B − tr AB, over the two axes across a momentum.
-  const auto spread_a = information_.template through_uncertainty<3>(a);
-  const auto spread_b = information_.template through_uncertainty<3>(b);
-  const double square =
-      spread_a.squaredNorm() * spread_b.squaredNorm() - (spread_a.transpose() * spread_b).squaredNorm();
+  const auto covariance = [this](const Rows3& rows) -> Eigen::Matrix3d {
+    const Rows3 spread = information_.template through_uncertainty<3>(rows);
+    return spread * spread.transpose();
+  };
+  const Eigen::Matrix3d A = covariance(a);
+  const Eigen::Matrix3d B = covariance(b);
+  const double square = A.trace() * B.trace() - A.cwiseProduct(B).sum();
   return std::sqrt(std::max(square, 0.0) / 8);
 }
 

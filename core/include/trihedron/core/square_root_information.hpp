@@ -94,11 +94,17 @@ class SquareRootInformation {
   template <int M>
   [[nodiscard]] Rows<M> through_uncertainty(const Rows<M>& H) const {
     TRIHEDRON_ASSERT(regular());
-    // Row by row: for so few of them the library's blocked solver spends its time on packing.
-    const auto lower = root_.template leftCols<N>().transpose().template triangularView<Eigen::Lower>();
-    Rows<M> through;
+    // Row by row: for so few of them the library's blocked solver spends its time on packing. A row that begins with
+    // zeros still does afterwards.
+    Rows<M> through = Rows<M>::Zero();
     for (int i = 0; i < M; ++i) {
-      through.row(i) = lower.solve(H.row(i).transpose()).transpose();
+      int first = 0;
+      while (first < N && H(i, first) == S(0)) {
+        ++first;
+      }
+      const int rest = N - first;
+      const auto lower = root_.block(first, first, rest, rest).transpose().template triangularView<Eigen::Lower>();
+      through.row(i).tail(rest) = lower.solve(H.row(i).tail(rest).transpose()).transpose();
     }
     return through;
   }
