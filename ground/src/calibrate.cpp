@@ -227,7 +227,7 @@ std::vector<FurtherEstimate> further_of(const Estimator& estimator, const Pass& 
 }
 
 template <class Estimator>
-Calibration result_of(const Pass& pass, const Cycle<Estimator>& cycle, const FurtherStateOptions& states) {
+Calibration result_of(const Pass& pass, const Cycle<Estimator>& cycle, const CalibrationOptions& options) {
   using Model = typename Estimator::BaseModel;
   Calibration result;
   result.estimator = Estimator::kName;
@@ -236,7 +236,13 @@ Calibration result_of(const Pass& pass, const Cycle<Estimator>& cycle, const Fur
   for (const auto& gyro : cycle.estimator().gyros()) {
     result.gyros.push_back(to_record<Model>(gyro));
   }
+  const FurtherStateOptions& states = options.further_states;
   result.further = further_of(cycle.estimator(), pass, states);
+  result.noise = CalibrationNoise{options.direction_random_walk_rad_sqrt_s, options.star_tracker_noise_rad};
+  if (states.wandering_drift == FurtherStateOptions::Choice::kOn) {
+    result.noise->wandering_drift_rad_s = states.wandering_drift_rad_s;
+    result.noise->wandering_time_s = to_seconds(states.wandering_time);
+  }
   result.states = state_names<Model>(Estimator::kGyros);
   const auto root = parameter_root(cycle.estimator());
   result.covariance = root * root.transpose();
@@ -322,7 +328,7 @@ CalibrationRun calibrate_with(const Pass& pass, Decision decision, const Progres
   if (!cycle->estimator().started()) {
     throw nothing_used(run.fixes);
   }
-  run.calibration = result_of(pass, *cycle, run.options.further_states);
+  run.calibration = result_of(pass, *cycle, run.options);
   run.calibration.statistics = statistics_of(run.fixes);
   run.calibration.statistics["angle_looks"] = angle_looks;
   run.calibration.verdict = judge(pass, run);

@@ -279,6 +279,18 @@ CalibrationOptions without_further_states(CalibrationOptions options) {
   return options;
 }
 
+/// The noise that an earlier calibration went by.
+void use_noise(const CalibrationNoise& noise, CalibrationOptions& options) {
+  options.direction_random_walk_rad_sqrt_s = noise.direction_random_walk_rad_sqrt_s;
+  options.star_tracker_noise_rad = noise.star_tracker_noise_rad;
+  FurtherStateOptions& states = options.further_states;
+  if (noise.wandering_drift_rad_s > 0 && states.wandering_drift == Choice::kAuto) {
+    states.wandering_drift = Choice::kOn;
+    states.wandering_drift_rad_s = noise.wandering_drift_rad_s;
+    states.wandering_time = from_seconds(noise.wandering_time_s);
+  }
+}
+
 /// As in the prior calibration.
 CalibrationOptions as_before(CalibrationOptions options, const Calibration& prior) {
   const auto had = [&](const char* name) {
@@ -373,18 +385,22 @@ Decision decide(const Pass& pass, const CalibrationOptions& asked) {
   CalibrationOptions& options = decision.options;
   options.find_noise = false;
   const bool invariant = asked.estimator == Full::kName;
+  const std::optional<Calibration>& prior = pass.settings.prior;
+  if (prior && prior->noise && asked.find_noise && invariant) {
+    use_noise(*prior->noise, options);
+  }
   if (!invariant || pass.gyro.gyros > Full::kGyros) {
     options = without_further_states(options);
     if (asked.drift_model != kAutoDriftModel) {
       options.drift_model = asked.drift_model;
     }
-    if (asked.find_noise && invariant && !pass.settings.prior) {
+    if (asked.find_noise && invariant && !prior) {
       options = with_noise_found(pass, options);
     }
     return decision;
   }
-  if (pass.settings.prior) {
-    options = as_before(options, *pass.settings.prior);
+  if (prior) {
+    options = as_before(options, *prior);
     return decision;
   }
   const bool wandering_is_open = options.further_states.wandering_drift == Choice::kAuto;

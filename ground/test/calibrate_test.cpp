@@ -146,6 +146,28 @@ TEST(Calibrate, KnowsTheReadoutBiasOfAnEarlierCalibration) {
   }
 }
 
+TEST(Calibrate, GoesByTheNoiseOfAnEarlierCalibration) {
+  Pass pass = beginning(two_hours().pass, std::chrono::minutes(20));
+  Calibration earlier = calibrate(pass, told()).calibration;
+  ASSERT_TRUE(earlier.noise.has_value());
+  EXPECT_EQ(earlier.noise->direction_random_walk_rad_sqrt_s, told().direction_random_walk_rad_sqrt_s);
+  EXPECT_FALSE(earlier.noise->star_tracker_noise_rad.has_value());
+  EXPECT_EQ(earlier.noise->wandering_drift_rad_s, 0);
+  earlier.noise = CalibrationNoise{1e-7, Eigen::Vector3d(1e-5, 2e-5, 1e-4), 3e-8, 1200};
+  pass.settings.prior = earlier;
+  const CalibrationRun run = calibrate(pass, {});
+  EXPECT_EQ(run.options.direction_random_walk_rad_sqrt_s, 1e-7);
+  EXPECT_EQ(run.options.star_tracker_noise_rad, earlier.noise->star_tracker_noise_rad);
+  EXPECT_EQ(run.options.further_states.wandering_drift, FurtherStateOptions::Choice::kOn);
+  EXPECT_EQ(run.options.further_states.wandering_drift_rad_s, 3e-8);
+  EXPECT_EQ(run.calibration.noise->wandering_time_s, 1200);
+  // Not where it is told.
+  CalibrationOptions options;
+  options.find_noise = false;
+  EXPECT_EQ(calibrate(pass, options).options.direction_random_walk_rad_sqrt_s,
+            options.direction_random_walk_rad_sqrt_s);
+}
+
 TEST(Calibrate, UsesThePriorsOfThePass) {
   Pass pass = two_hours().pass;
   pass.settings.gyros[1].drift_rad_s["nu12"] = two_hours().truth.gyros[1].drift_rad_s[4].second;

@@ -108,6 +108,34 @@ Eigen::MatrixXd parse_matrix(const JsonNode& node, std::size_t size) {
   return matrix;
 }
 
+CalibrationNoise parse_noise(const JsonNode& node) {
+  const auto not_negative = [&](const char* name) {
+    const JsonNode value = node.at(name);
+    if (!(value.number() >= 0)) {
+      value.refuse(fmt::format("is {}", value.number()), "a noise is zero or more");
+    }
+    return value.number();
+  };
+  CalibrationNoise noise;
+  noise.direction_random_walk_rad_sqrt_s = not_negative("direction_random_walk_rad_sqrt_s");
+  noise.wandering_drift_rad_s = not_negative("wandering_drift_rad_s");
+  noise.wandering_time_s = not_negative("wandering_time_s");
+  if (const auto star_tracker = node.find("star_tracker_noise_rad")) {
+    noise.star_tracker_noise_rad = star_tracker->vector3();
+  }
+  return noise;
+}
+
+Json noise_json(const CalibrationNoise& noise) {
+  Json json = {{"direction_random_walk_rad_sqrt_s", noise.direction_random_walk_rad_sqrt_s},
+               {"wandering_drift_rad_s", noise.wandering_drift_rad_s},
+               {"wandering_time_s", noise.wandering_time_s}};
+  if (noise.star_tracker_noise_rad) {
+    json["star_tracker_noise_rad"] = to_json_array(*noise.star_tracker_noise_rad);
+  }
+  return json;
+}
+
 Finding parse_finding(const JsonNode& node) {
   Finding finding;
   finding.code = node.at("code").text();
@@ -213,6 +241,9 @@ Calibration parse_calibration(std::string_view text, const std::filesystem::path
       calibration.further.push_back({name, estimate.at("value").number(), estimate.at("sigma").number()});
     }
   }
+  if (const auto noise = root.find("noise")) {
+    calibration.noise = parse_noise(*noise);
+  }
   for (const auto& [name, value] : root.at("statistics").members()) {
     calibration.statistics[name] = value.is_null() ? std::numeric_limits<double>::quiet_NaN() : value.number();
   }
@@ -233,6 +264,8 @@ std::string format_calibration(const Calibration& calibration) {
   for (const FurtherEstimate& estimate : calibration.further) {
     further[estimate.name] = {{"value", estimate.value}, {"sigma", estimate.sigma}};
   }
+  const std::string noise =
+      calibration.noise ? fmt::format(" \"noise\": {},\n", dump(noise_json(*calibration.noise))) : "";
   Json findings = Json::array();
   for (const Finding& finding : calibration.verdict.findings) {
     findings.push_back(finding_json(finding));
@@ -241,12 +274,12 @@ std::string format_calibration(const Calibration& calibration) {
       "{{\"format\": \"{}\", \"version\": {},\n"
       " \"estimator\": {}, \"epoch_tai\": \"{}\", \"t_s\": {},\n"
       " \"gyros\": {},\n"
-      " \"further\": {},\n"
+      " \"further\": {},\n{}"
       " \"covariance\": {{\n  \"states\": {},\n  \"matrix\": {}}},\n"
       " \"verdict\": {{\"trustworthy\": {}, \"findings\": {}}},\n"
       " \"statistics\": {}}}\n",
       kFormat, kVersion, dump(Json(calibration.estimator)), format_epoch(calibration.epoch),
-      dump(Json(to_seconds(calibration.t - calibration.epoch))), lines(gyros), dump(further),
+      dump(Json(to_seconds(calibration.t - calibration.epoch))), lines(gyros), dump(further), noise,
       dump(Json(calibration.states)), lines(matrix), calibration.verdict.trustworthy, lines(findings),
       dump(Json(calibration.statistics)));
 }

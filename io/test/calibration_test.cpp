@@ -43,6 +43,11 @@ TEST(CalibrationJson, ComesBackFromAFileWhole) {
     EXPECT_EQ(estimate.value, written.value);
     EXPECT_EQ(estimate.sigma, written.sigma);
   }
+  ASSERT_TRUE(back.noise.has_value());
+  EXPECT_EQ(back.noise->direction_random_walk_rad_sqrt_s, calibration.noise->direction_random_walk_rad_sqrt_s);
+  EXPECT_EQ(back.noise->star_tracker_noise_rad, calibration.noise->star_tracker_noise_rad);
+  EXPECT_EQ(back.noise->wandering_drift_rad_s, calibration.noise->wandering_drift_rad_s);
+  EXPECT_EQ(back.noise->wandering_time_s, calibration.noise->wandering_time_s);
   EXPECT_EQ(back.states, calibration.states);
   EXPECT_EQ(back.covariance, calibration.covariance);
   EXPECT_FALSE(back.verdict.trustworthy);
@@ -55,6 +60,20 @@ TEST(CalibrationJson, ComesBackFromAFileWhole) {
   EXPECT_EQ(finding.severity, Finding::Severity::kDoNotUse);
   EXPECT_EQ(back.verdict.findings[1].severity, Finding::Severity::kNote);
   EXPECT_EQ(back.statistics, calibration.statistics);
+}
+
+TEST(CalibrationJson, MayBeWithoutNoise) {
+  Calibration calibration = sample_calibration();
+  calibration.noise->star_tracker_noise_rad.reset();
+  EXPECT_FALSE(parse_calibration(format_calibration(calibration), "c.json").noise->star_tracker_noise_rad.has_value());
+  calibration.noise.reset();
+  EXPECT_FALSE(parse_calibration(format_calibration(calibration), "c.json").noise.has_value());
+}
+
+TEST(CalibrationJson, RefusesNoiseBelowZero) {
+  Calibration calibration = sample_calibration();
+  calibration.noise->wandering_drift_rad_s = -1e-7;
+  EXPECT_THAT(refusal_of(format_calibration(calibration)), HasSubstr("noise.wandering_drift_rad_s is -1e-07"));
 }
 
 RC_GTEST_PROP(CalibrationJson, NumbersComeBackBitForBit, (std::uint64_t bits)) {

@@ -165,6 +165,7 @@ Calibration sample_calibration() {
     calibration.gyros.push_back(one);
   }
   calibration.further = {{"clock_offset_s", 1e-2 / 3, 1e-4 / 7}, {"orbital_sine_x_rad", -1e-5 / 3, 1e-6}};
+  calibration.noise = CalibrationNoise{1e-8 / 3, Eigen::Vector3d(1e-5, 2e-5, 1e-4) / 7, 1e-7 / 3, 1200};
   const Eigen::Index n = 20;
   calibration.covariance = Eigen::MatrixXd::Identity(n, n) * (1e-12 / 3);
   calibration.covariance(3, 4) = calibration.covariance(4, 3) = 1e-13 / 7;

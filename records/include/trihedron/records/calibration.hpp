@@ -3,6 +3,7 @@
 
 #include <Eigen/Core>
 #include <map>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -55,6 +56,14 @@ struct FurtherEstimate {
   double sigma = 0;
 };
 
+/// The noise that a calibration went by.
+struct CalibrationNoise {
+  double direction_random_walk_rad_sqrt_s = 0;            ///< of each momentum across itself, per axis
+  std::optional<Eigen::Vector3d> star_tracker_noise_rad;  ///< about c x, y, z, where it was found not to be as told
+  double wandering_drift_rad_s = 0;                       ///< 1-sigma per case axis; 0: none
+  double wandering_time_s = 0;                            ///< its correlation time
+};
+
 struct Calibration {
   std::string estimator;
   Time epoch{};  ///< of the pass
@@ -65,6 +74,7 @@ struct Calibration {
   /// rad/s for drift, rad for alignment: error δ with C_c_b(true) = exp([δ×]) C_c_b(est), c axes.
   Eigen::MatrixXd covariance;
   std::vector<FurtherEstimate> further;  ///< empty where none was estimated
+  std::optional<CalibrationNoise> noise;
   Verdict verdict;
   std::map<std::string, double> statistics;
 };
