@@ -54,6 +54,8 @@ function(trihedron_test module)
     target_link_libraries(${module}_test PRIVATE trihedron::${module})
   endif()
   target_link_libraries(${module}_test PRIVATE ${arg_LIBRARIES} GTest::gmock GTest::gtest_main rapidcheck trihedron_warnings)
+  # Half of the time that a file of tests takes the compiler is that of these.
+  target_precompile_headers(${module}_test PRIVATE <Eigen/Dense> <gmock/gmock.h> <gtest/gtest.h>)
   # Tests of different files may use the same names.
   set_target_properties(${module}_test PROPERTIES UNITY_BUILD OFF)
   # The tests themselves need no speed, and compile twice as fast without; what they test is optimised in its own library.

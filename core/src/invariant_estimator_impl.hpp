@@ -101,7 +101,8 @@ void InvariantEstimator<Base, N, F>::update_to_now(const Eigen::Matrix3d& C_in_c
     B.template block<3, 3>(row, Layout::alignment(k) - Layout::kDynamic) = since_fix_[k].by_alignment;
     L.diagonal().template segment<3>(row).setConstant(sigma);
     if constexpr (F.wandering_drift) {
-      const double kept = std::exp(-time_since_fix_s_ / setup_.wandering_time_s);
+      // Nothing is left of it after a long time; what A⁻¹ takes for that would be rounding.
+      const double kept = std::max(std::exp(-time_since_fix_s_ / setup_.wandering_time_s), 1e-6);
       const int wandering = Layout::wandering(k);
       A.template block<3, 3>(row, wandering) = since_fix_[k].by_drift.template rightCols<3>();
       A.template block<3, 3>(wandering, wandering) = kept * Eigen::Matrix3d::Identity();
@@ -180,7 +181,7 @@ bool InvariantEstimator<Base, N, F>::prior_allows_estimates() const {
     moved.template segment<3>(Layout::alignment(k)) =
         Rot<C, C>::assume(Eigen::Matrix3d(gyros_[k].C_c_b * before.C_c_b.transpose())).log().raw();
   }
-  return (prior_.root() * moved).squaredNorm() <= gate_of_freedom(N * Layout::kPerGyro, setup_.gate_nis, kMeasurements);
+  return (prior_.root() * moved).squaredNorm() <= gate_of_freedom(N * Layout::kPerGyro, setup_.gate_nis);
 }
 
 template <class Base, int N, FurtherStates F>
@@ -324,7 +325,7 @@ auto InvariantEstimator<Base, N, F>::correct(const StarFix& fix, const FixReadin
 
   const WhiteMeasurement<Information, kMeasurements> white(m.H, m.y, m.R);
   report_innovation(information_, white, report);
-  report.status = gate_.judge(report.nis, m.y.norm());
+  report.status = gate_.judge(report.nis, m.y.norm(), 2 * count(readings.used));
   report.rejections_in_a_row = gate_.rejections_in_a_row();
   report.jumped = gate_.jumped();
   report.weight = student_t_weight(setup_.student_t_freedom, report.nis, 2 * count(readings.used));
@@ -353,6 +354,7 @@ auto InvariantEstimator<Base, N, F>::correct(const StarFix& fix, const FixReadin
       report.weight = 1;
       return report;
     case FixStatus::kUsedAfterReopening:
+      begun_from_estimates_ = false;  // long ago: it had helped
       add_direction_variance(m.y.squaredNorm() / kMeasurements);
       update_to_now(C_linear);
       report.weight = 1;
@@ -418,14 +420,14 @@ template <class Base, int N, FurtherStates F>
 bool InvariantEstimator<Base, N, F>::agrees(const Measurement& m, const GyroMask<N>& used) const {
   Report report;
   report_innovation(information_, WhiteMeasurement<Information, kMeasurements>(m.H, m.y, m.R), report);
-  return report.nis <= gate_of_freedom(2 * count(used), setup_.gate_nis, kMeasurements);
+  return report.nis <= gate_of_freedom(2 * count(used), setup_.gate_nis);
 }
 
 template <class Base, int N, FurtherStates F>
 bool InvariantEstimator<Base, N, F>::angles_agree(const Measurement& m, const GyroMask<N>& used) const {
   AngleReport report;
   report_innovation(information_, angles_of(m), report);
-  return report.nis <= gate_of_freedom(2 * count(used) - 3, setup_.gate_nis, kMeasurements);
+  return report.nis <= gate_of_freedom(2 * count(used) - 3, setup_.gate_nis);
 }
 
 template <class Base, int N, FurtherStates F>

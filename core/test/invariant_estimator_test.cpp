@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <limits>
+#include <map>
 #include <memory>
 #include <numbers>
 #include <random>
@@ -659,6 +660,58 @@ TEST(CycleOfInvariant, KnowsWhatTheBiasThatItHoldsMayDo) {
     sum += error.dot(solution.covariance_rad2.llt().solve(error));
   }
   EXPECT_NEAR(sum / kRuns, 3, 1);  // 3 ± 0.32
+}
+
+TEST(CycleOfInvariant, KnowsHowDriftThatWandersGoesOn) {
+  test::Flight flight({.duration_s = 300});
+  auto setup = nominal<WithAll>();
+  for (int k = 0; k < 2; ++k) {
+    setup.prior[k] = flight.truth[k];
+  }
+  setup.prior_covariance *= 1e-8;
+  setup.wandering_sigma_rad_s = 1e-5;
+  setup.wandering_time_s = 100;
+  // By the first fix alone nothing is known of it: the variance of ∫w dt is 2 σ² τ² (x − 1 + exp(−x)), x = t/τ.
+  const auto by_first = flown<WithAll>(flight, setup, {.interval = CorrectionPolicy::kOnlyFirst});
+  const auto& gyros = by_first->navigator().gyros();
+  const auto by_directions = WithAll::attitude(gyros, flight.samples.back().h_b).value().by_directions;
+  const double variance = 2 * 1e-6 * (2 + std::exp(-3));
+  EXPECT_NEAR(
+      by_first->navigation_attitude().value().covariance_rad2.trace() / (by_directions.squaredNorm() * variance), 1,
+      0.1);
+  // What was found of it fades.
+  flight.fixes.resize(50);
+  auto cycle = std::make_unique<Cycle<WithAll>>(
+      Cycle<WithAll>::create(setup, {.interval = CorrectionPolicy::kEveryFix}).value());
+  std::map<double, double> size;
+  test::fly(flight, *cycle, [&](const auto& report) {
+    size[to_seconds(report.t.time_since_epoch())] = cycle->navigator().gyros()[0].drift_rad_s.template tail<3>().norm();
+  });
+  EXPECT_GT(size.at(200), 0);
+  EXPECT_NEAR(size.at(300) / size.at(200), std::exp(-1), 1e-9);
+}
+
+TEST(CycleOfInvariant, ForgetsDriftThatWandersInALongGap) {
+  // Longer than a correlation time by more than a double can hold.
+  test::Flight flight({.duration_s = 300});
+  std::erase_if(flight.samples, [](const auto& sample) {
+    const double t_s = to_seconds(sample.t.time_since_epoch());
+    return t_s > 100 && t_s < 200;
+  });
+  std::erase_if(flight.fixes, [](const StarFix& fix) {
+    const double t_s = to_seconds(fix.t.time_since_epoch());
+    return t_s > 95 && t_s < 205;
+  });
+  auto setup = nominal<WithAll>();
+  setup.wandering_sigma_rad_s = 1e-7;
+  setup.wandering_time_s = 0.1;
+  const auto cycle = flown<WithAll>(flight, setup, {});
+  const Eigen::MatrixXd root = cycle->estimator().error_root();
+  EXPECT_TRUE(root.allFinite());
+  const int row = WithAll::Errors::drift(0) + Esg7::kSize;
+  for (int i = 0; i < 3; ++i) {
+    EXPECT_NEAR(root.row(row + i).norm(), 1e-7, 1e-9);
+  }
 }
 
 TEST(CycleOfInvariant, HoldsTheParametersOfTheSetup) {

@@ -33,16 +33,16 @@ int rejections(OutlierGate& gate, double misfit_rad) {
 
 TEST(GateOfFreedom, IsPassedAsOftenByGoodMeasurements) {
   // χ² quantiles of the probability that 4 degrees of freedom leave above 30: 4.9e-6.
-  EXPECT_DOUBLE_EQ(gate_of_freedom(4, 30, 4), 30);
-  EXPECT_NEAR(gate_of_freedom(1, 30, 4), 20.9, 1.2);
-  EXPECT_NEAR(gate_of_freedom(2, 30, 4), 24.5, 0.6);
-  EXPECT_NEAR(gate_of_freedom(3, 30, 4), 27.4, 0.3);
-  EXPECT_NEAR(gate_of_freedom(6, 30, 4), 34.6, 0.5);
+  EXPECT_DOUBLE_EQ(gate_of_freedom(4, 30), 30);
+  EXPECT_NEAR(gate_of_freedom(1, 30), 20.9, 1.2);
+  EXPECT_NEAR(gate_of_freedom(2, 30), 24.5, 0.6);
+  EXPECT_NEAR(gate_of_freedom(3, 30), 27.4, 0.3);
+  EXPECT_NEAR(gate_of_freedom(6, 30), 34.6, 0.5);
 }
 
 TEST(OutlierGate, RejectsAboveTheGateAndWhatIsNoNumber) {
   OutlierGate gate = make_gate(5, 50);
-  EXPECT_EQ(gate.judge(30, kSmall_rad), FixStatus::kUsed);
+  EXPECT_EQ(gate.judge(29.9, kSmall_rad), FixStatus::kUsed);
   EXPECT_EQ(gate.judge(30.1, kSmall_rad), FixStatus::kRejectedByGate);
   EXPECT_FALSE(gate.jumped());
   constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
@@ -85,6 +85,31 @@ TEST(OutlierGate, WaitsLongerWhereASmallOutlierWentBefore) {
   EXPECT_EQ(gate.judge(4, kSmall_rad), FixStatus::kUsed);
   EXPECT_EQ(gate.judge(100, kSmall_rad), FixStatus::kRejectedByGate);
   EXPECT_EQ(rejections(gate, kLie_rad), 48);
+}
+
+TEST(OutlierGate, DoesNotWaitLongerForAnOutlierInARun) {
+  OutlierGate gate = make_gate(5, 50);
+  EXPECT_EQ(gate.judge(4, kSmall_rad), FixStatus::kUsed);
+  for (const double misfit_rad : {kSmall_rad, kSmall_rad, kLie_rad, kSmall_rad, kSmall_rad, kSmall_rad, kSmall_rad}) {
+    EXPECT_EQ(gate.judge(100, misfit_rad), FixStatus::kRejectedByGate);
+  }
+  EXPECT_EQ(gate.judge(100, kSmall_rad), FixStatus::kUsedAfterReopening);
+}
+
+TEST(OutlierGate, WaitsLongerWhereTheMisfitComesBackNowAndThen) {
+  OutlierGate gate = make_gate(3, 50);
+  EXPECT_EQ(gate.judge(4, kSmall_rad), FixStatus::kUsed);
+  int count = 0;
+  while (gate.judge(100, count % 3 == 0 ? kLie_rad : kSmall_rad) == FixStatus::kRejectedByGate) {
+    ++count;
+  }
+  EXPECT_EQ(count, 49);
+}
+
+TEST(OutlierGate, IsAsWideForEachNumberOfComponents) {
+  OutlierGate gate = make_gate(5, 50);
+  EXPECT_EQ(gate.judge(33, kSmall_rad), FixStatus::kRejectedByGate);
+  EXPECT_EQ(gate.judge(33, kSmall_rad, 6), FixStatus::kUsed);
 }
 
 TEST(OutlierGate, DoesNotTakeWhatDriftMayDoInTheTimeForAJump) {

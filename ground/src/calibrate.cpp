@@ -25,6 +25,7 @@ template <class Report>
 FixRecord record_of(const Report& report) {
   FixRecord record;
   record.t = report.fix.t;
+  record.head = report.fix.head;
   record.status = report.fix.status;
   for (Eigen::Index row = 0; row < report.fix.innovation.size(); ++row) {
     record.innovation.push_back(report.fix.innovation(row));
@@ -372,14 +373,22 @@ NavigationRun navigate_with(const Pass& pass, const CalibrationOptions& options,
 }  // namespace
 
 StarTrackerTelemetry used_fixes(const Pass& pass, const std::vector<FixRecord>& fixes) {
+  // A record comes when the fix is dealt with, which for a good one is later than for a bad one.
+  std::vector<Time> times;
+  for (const FixRecord& fix : fixes) {
+    if (fix.used() && fix.head == 0) {
+      times.push_back(fix.t);
+    }
+  }
+  std::sort(times.begin(), times.end());
   StarTrackerTelemetry used;
-  auto record = fixes.begin();
   for (std::size_t i = 0; i < pass.star_tracker.size(); ++i) {
     const Time t = pass.star_tracker.t[i];
-    record = std::find_if(record, fixes.end(), [&](const FixRecord& r) { return r.t >= t; });
-    if (record != fixes.end() && record->t == t && record->used()) {
+    const Eigen::Quaterniond& q_in_c = pass.star_tracker.q_in_c[i];
+    const bool repeated = !used.t.empty() && used.t.back() == t;
+    if (!repeated && q_in_c.coeffs().allFinite() && std::binary_search(times.begin(), times.end(), t)) {
       used.t.push_back(t);
-      used.q_in_c.push_back(pass.star_tracker.q_in_c[i]);
+      used.q_in_c.push_back(q_in_c);
     }
   }
   return used;

@@ -1,5 +1,7 @@
 #include "decide.hpp"
 
+#include <fmt/format.h>
+
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <array>
@@ -26,6 +28,8 @@ using Full = InvariantEstimator<Esg20, 2, kAllFurtherStates>;
 constexpr double kStrong = 3;
 /// Pairs of fixes that give the noise of the star tracker within some percent.
 constexpr std::size_t kEnough = 1000;
+/// Below it, process noise is lost in the readout: where a search for more begins.
+constexpr double kLeastWalk_rad_sqrt_s = 3e-9;
 /// A difference of the noise that is more than chance.
 constexpr double kNotable = 0.1;
 
@@ -55,6 +59,9 @@ class Trial {
       // An outlier counts as one, however far out it is.
       log_likelihood_ -= std::min(report.fix.nis, gate_nis) / 2 +
                          report.fix.innovation_covariance.llt().matrixLLT().diagonal().array().log().sum();
+      if (report.fix.head != 0) {
+        return;
+      }
       fix = std::lower_bound(fix, pass.star_tracker.t.end(), report.fix.t);
       if (!report.calibrated || fix == pass.star_tracker.t.end() || *fix != report.fix.t) {
         return;
@@ -224,6 +231,7 @@ Likely with_most_likely_walk(const Pass& pass, const CalibrationOptions& options
                              const std::vector<Search::Point>& starts) {
   const auto at = [&](double level, int) {
     CalibrationOptions trial = options;
+    trial.direction_random_walk_rad_sqrt_s = std::max(trial.direction_random_walk_rad_sqrt_s, kLeastWalk_rad_sqrt_s);
     trial.direction_random_walk_rad_sqrt_s *= std::pow(2, level);
     return trial;
   };
@@ -279,9 +287,24 @@ CalibrationOptions without_further_states(CalibrationOptions options) {
   return options;
 }
 
-/// The noise that an earlier calibration went by.
+/// What was asked for must be there.
+void refuse_further_states(const Pass& pass, const CalibrationOptions& asked) {
+  const FurtherStateOptions& states = asked.further_states;
+  for (const auto& [name, choice] :
+       {std::pair{"clock_offset", states.clock_offset}, std::pair{"orbital_error", states.orbital_error},
+        std::pair{"readout_bias", states.readout_bias}, std::pair{"wandering_drift", states.wandering_drift}}) {
+    if (choice == Choice::kOn) {
+      throw SetupError(
+          fmt::format("estimator {} of {} gyros has no state '{}'", asked.estimator, pass.gyro.gyros, name),
+          "set it to off or auto, or use estimator invariant with two gyros");
+    }
+  }
+}
+
+/// The noise that an earlier calibration went by, but for the least that is told.
 void use_noise(const CalibrationNoise& noise, CalibrationOptions& options) {
-  options.direction_random_walk_rad_sqrt_s = noise.direction_random_walk_rad_sqrt_s;
+  options.direction_random_walk_rad_sqrt_s =
+      std::max(options.direction_random_walk_rad_sqrt_s, noise.direction_random_walk_rad_sqrt_s);
   options.star_tracker_noise_rad = noise.star_tracker_noise_rad;
   FurtherStateOptions& states = options.further_states;
   if (noise.wandering_drift_rad_s > 0 && states.wandering_drift == Choice::kAuto) {
@@ -370,7 +393,8 @@ void decide_beside_noise(const Pass& pass, const CalibrationOptions& asked, bool
     options.further_states.wandering_time = free.further_states.wandering_time;
     options = with_most_likely_wandering(pass, options, {{0, 0}}).options;
   } else {
-    const double level = std::log2(walk_rad_sqrt_s / options.direction_random_walk_rad_sqrt_s);
+    const double level =
+        std::log2(walk_rad_sqrt_s / std::max(options.direction_random_walk_rad_sqrt_s, kLeastWalk_rad_sqrt_s));
     options = with_most_likely_walk(pass, options, {{0, 0}, {static_cast<int>(std::lround(level)), 0}}).options;
   }
   if (wandering) {
@@ -390,6 +414,7 @@ Decision decide(const Pass& pass, const CalibrationOptions& asked) {
     use_noise(*prior->noise, options);
   }
   if (!invariant || pass.gyro.gyros > Full::kGyros) {
+    refuse_further_states(pass, asked);
     options = without_further_states(options);
     if (asked.drift_model != kAutoDriftModel) {
       options.drift_model = asked.drift_model;

@@ -41,6 +41,9 @@ double orbital_rate_rad_s(const StarTrackerTelemetry& tracker) {
       rates.push_back(rate);
     }
   }
+  if (rates.empty()) {
+    return rough_rad_s;
+  }
   const auto middle = rates.begin() + static_cast<std::ptrdiff_t>(rates.size() / 2);
   std::nth_element(rates.begin(), middle, rates.end());
   return *middle;

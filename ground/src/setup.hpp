@@ -152,10 +152,10 @@ typename Estimator::Setup make_setup(const Pass& pass, const CalibrationOptions&
   typename Estimator::Setup setup;
   use_settings<Estimator>(settings, setup);
   if (settings.prior) {
-    if (settings.prior->gyros.size() < Estimator::kGyros) {
-      throw SetupError(fmt::format("the earlier calibration has {} gyros; estimator {} needs {}",
-                                   settings.prior->gyros.size(), Estimator::kName, Estimator::kGyros),
-                       "use a calibration of this pair of gyros");
+    if (settings.prior->gyros.size() != static_cast<std::size_t>(pass.gyro.gyros)) {
+      throw SetupError(fmt::format("the earlier calibration has {} gyros; the pass has {}",
+                                   settings.prior->gyros.size(), pass.gyro.gyros),
+                       "use a calibration of these gyros");
     }
     use_calibration<Estimator>(*settings.prior, setup);
   }

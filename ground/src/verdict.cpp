@@ -156,7 +156,7 @@ void judge_nis(const Statistics& statistics, const std::string& what_is_wrong, s
 }
 
 void judge_noise(const Pass& pass, const CalibrationRun& run, std::vector<Finding>& findings) {
-  if (const auto& found = run.options.star_tracker_noise_rad) {
+  if (const auto& found = run.options.star_tracker_noise_rad; found && run.options.find_noise) {
     const Eigen::Vector3d told = pass.settings.star_tracker_noise_rad / kArcsecond;
     const Eigen::Vector3d now = *found / kArcsecond;
     add(findings, Severity::kWarning, "star-tracker-noise",

@@ -161,11 +161,63 @@ TEST(Calibrate, GoesByTheNoiseOfAnEarlierCalibration) {
   EXPECT_EQ(run.options.further_states.wandering_drift, FurtherStateOptions::Choice::kOn);
   EXPECT_EQ(run.options.further_states.wandering_drift_rad_s, 3e-8);
   EXPECT_EQ(run.calibration.noise->wandering_time_s, 1200);
+  // The walk that is told is the least.
+  CalibrationOptions more;
+  more.direction_random_walk_rad_sqrt_s = 2e-7;
+  EXPECT_EQ(calibrate(pass, more).options.direction_random_walk_rad_sqrt_s, 2e-7);
   // Not where it is told.
   CalibrationOptions options;
   options.find_noise = false;
   EXPECT_EQ(calibrate(pass, options).options.direction_random_walk_rad_sqrt_s,
             options.direction_random_walk_rad_sqrt_s);
+}
+
+TEST(Calibrate, WithTwoStarTrackersFindsNoOtherNoiseThanTheirs) {
+  Scenario scenario;
+  scenario.seed = 12;
+  scenario.duration = std::chrono::minutes(55);
+  for (GyroScenario& gyro : scenario.gyros) {
+    gyro.drift.outside_sigma_rad_s = 0;
+  }
+  scenario.further_star_trackers.resize(1, scenario.star_tracker);
+  scenario.further_star_trackers[0].mounting_rotation_vector_rad = Eigen::Vector3d(1.2, 0, 0);
+  const auto run = calibrate(sim::simulate(scenario).pass, {});
+  EXPECT_TRUE(run.options.find_noise);
+  EXPECT_FALSE(run.options.star_tracker_noise_rad.has_value());
+  EXPECT_NEAR(run.calibration.statistics.at("nis_mean"), 4, 0.3);
+}
+
+TEST(Calibrate, TakesAStarTrackerThatSaysNothingForHalfOfThePass) {
+  Pass pass = beginning(two_hours().pass, std::chrono::minutes(20));
+  for (std::size_t i = pass.star_tracker.size() / 2; i < pass.star_tracker.size(); ++i) {
+    pass.star_tracker.q_in_c[i].coeffs().setConstant(std::nan(""));
+  }
+  const auto run = calibrate(pass, told());
+  EXPECT_EQ(used_fixes(pass, run.fixes).size(), pass.star_tracker.size() / 2);
+}
+
+TEST(UsedFixes, AreThoseOfTheFirstStarTrackerInOrderOfTime) {
+  Pass pass;
+  std::vector<FixRecord> fixes;
+  const auto at = [](int s) { return Time(std::chrono::seconds(s)); };
+  for (const int s : {10, 11, 12, 12}) {
+    pass.star_tracker.t.push_back(at(s));
+    pass.star_tracker.q_in_c.push_back(Eigen::Quaterniond::Identity());
+  }
+  pass.star_tracker.q_in_c[1].coeffs().setConstant(std::nan(""));
+  const auto record = [&](int s, int head, FixStatus status) {
+    FixRecord fix;
+    fix.t = at(s);
+    fix.head = head;
+    fix.status = status;
+    fixes.push_back(fix);
+  };
+  record(11, 0, FixStatus::kRejectedNotRotation);  // at once
+  record(12, 0, FixStatus::kRejectedOutOfOrder);
+  record(10, 0, FixStatus::kUsed);
+  record(11, 1, FixStatus::kUsed);
+  record(12, 0, FixStatus::kUsed);
+  EXPECT_THAT(used_fixes(pass, fixes).t, testing::ElementsAre(at(10), at(12)));
 }
 
 TEST(Calibrate, UsesThePriorsOfThePass) {
@@ -250,6 +302,10 @@ TEST(SetupError, NamesWhatCannotWork) {
   options = {};
   options.direction_random_walk_rad_sqrt_s = -1;
   EXPECT_THAT(setup_error(good, options), HasSubstr("noise"));
+  options = {};
+  options.estimator = "paper";
+  options.further_states.clock_offset = FurtherStateOptions::Choice::kOn;
+  EXPECT_THAT(setup_error(good, options), HasSubstr("has no state 'clock_offset'"));
 
   Pass pass = good;
   pass.settings.gyros[0].drift_sigma_rad_s["k7"] = 1;
@@ -279,7 +335,7 @@ TEST(SetupError, NamesWhatIsWrongWithAnEarlierCalibration) {
   const Calibration good = calibrate(pass, told()).calibration;
   pass.settings.prior = good;
   pass.settings.prior->gyros.pop_back();
-  EXPECT_THAT(setup_error(pass), HasSubstr("1 gyros"));
+  EXPECT_THAT(setup_error(pass), HasSubstr("has 1 gyros; the pass has 2"));
   pass.settings.prior = good;
   pass.settings.prior->gyros[1].drift_model = "vsh:3";
   EXPECT_THAT(setup_error(pass), HasSubstr("vsh:3"));

@@ -25,24 +25,32 @@ using Severity = Finding::Severity;
 constexpr std::array kSeverities = {std::pair{Severity::kNote, "note"}, std::pair{Severity::kWarning, "warning"},
                                     std::pair{Severity::kDoNotUse, "do-not-use"}};
 
+/// In the order of the model; empty for one that this program does not know.
+std::vector<std::string_view> coefficients_of(const std::string& drift_model) {
+  if (drift_model == Esg7::kModelName) {
+    return {Esg7::kNames.begin(), Esg7::kNames.end()};
+  }
+  if (drift_model == Esg20::kModelName) {
+    return {Esg20::kNames.begin(), Esg20::kNames.end()};
+  }
+  return {};
+}
+
 GyroCalibration parse_gyro(const JsonNode& node) {
   GyroCalibration gyro;
   gyro.drift_model = node.at("drift_model").text();
   const JsonNode drift = node.at("drift_rad_s");
+  const std::vector<std::string_view> known = coefficients_of(gyro.drift_model);
   for (const auto& [name, value] : drift.members()) {
-    gyro.drift_rad_s.emplace_back(name, value.number());
+    if (known.empty()) {
+      gyro.drift_rad_s.emplace_back(name, value.number());
+    } else if (std::ranges::find(known, name) == known.end()) {
+      drift.refuse(fmt::format("has coefficient {}, not one of {}", in_quotes(name), gyro.drift_model),
+                   suggestion(name, known));
+    }
   }
-  if (gyro.drift_model == Esg7::kModelName) {
-    const std::vector<std::string_view> known(Esg7::kNames.begin(), Esg7::kNames.end());
-    for (const auto& [name, value] : gyro.drift_rad_s) {
-      if (std::ranges::find(known, name) == known.end()) {
-        drift.refuse(fmt::format("has coefficient {}, not one of {}", in_quotes(name), gyro.drift_model),
-                     suggestion(name, known));
-      }
-    }
-    for (const char* name : Esg7::kNames) {
-      static_cast<void>(drift.at(name));
-    }
+  for (const std::string_view name : known) {
+    gyro.drift_rad_s.emplace_back(name, drift.at(std::string(name)).number());
   }
   gyro.alignment_rotation_vector_rad = node.at("alignment_rotation_vector_rad").vector3();
   gyro.momentum_in = node.at("momentum_in").vector3();
@@ -120,8 +128,15 @@ CalibrationNoise parse_noise(const JsonNode& node) {
   noise.direction_random_walk_rad_sqrt_s = not_negative("direction_random_walk_rad_sqrt_s");
   noise.wandering_drift_rad_s = not_negative("wandering_drift_rad_s");
   noise.wandering_time_s = not_negative("wandering_time_s");
+  if (!(noise.wandering_time_s < 1e9) || (noise.wandering_drift_rad_s > 0 && !(noise.wandering_time_s > 0))) {
+    node.at("wandering_time_s")
+        .refuse(fmt::format("is {}", noise.wandering_time_s), "give seconds, above 0 and below 1e9");
+  }
   if (const auto star_tracker = node.find("star_tracker_noise_rad")) {
     noise.star_tracker_noise_rad = star_tracker->vector3();
+    if (!(noise.star_tracker_noise_rad->array() > 0).all()) {
+      star_tracker->refuse("is not positive", "give a 1-sigma about each axis");
+    }
   }
   return noise;
 }

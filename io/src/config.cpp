@@ -185,7 +185,7 @@ CalibrationOptions read_config(const fs::path& path) {
 std::string format_config(const CalibrationOptions& options) {
   const FurtherStateOptions& states = options.further_states;
   return fmt::format(
-      "# Settings in effect. Give this file to --config to repeat the run.\n"
+      "# Settings as given, and the defaults of the others. Give this file to --config to repeat the run.\n"
       "estimator = \"{}\"\n"
       "drift_model = \"{}\"\n"
       "\n"

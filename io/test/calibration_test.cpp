@@ -3,11 +3,13 @@
 #include <gmock/gmock.h>
 #include <rapidcheck/gtest.h>
 
+#include <algorithm>
 #include <bit>
 #include <cmath>
 #include <cstdint>
 
 #include "fixtures.hpp"
+#include "trihedron/core/drift.hpp"
 
 namespace trihedron::io {
 namespace {
@@ -62,6 +64,21 @@ TEST(CalibrationJson, ComesBackFromAFileWhole) {
   EXPECT_EQ(back.statistics, calibration.statistics);
 }
 
+TEST(CalibrationJson, MayHaveItsCoefficientsInAnyOrder) {
+  Calibration calibration = sample_calibration();
+  GyroCalibration& gyro = calibration.gyros[0];
+  gyro.drift_model = Esg20::kModelName;
+  gyro.drift_rad_s.clear();
+  for (const char* name : Esg20::kNames) {
+    gyro.drift_rad_s.emplace_back(name, static_cast<double>(gyro.drift_rad_s.size()));
+  }
+  const auto in_order = gyro.drift_rad_s;
+  std::sort(gyro.drift_rad_s.begin(), gyro.drift_rad_s.end());
+  EXPECT_EQ(parse_calibration(format_calibration(calibration), "c.json").gyros[0].drift_rad_s, in_order);
+  gyro.drift_rad_s.pop_back();
+  EXPECT_THAT(refusal_of(format_calibration(calibration)), HasSubstr("lacks key \"nu31\""));
+}
+
 TEST(CalibrationJson, MayBeWithoutNoise) {
   Calibration calibration = sample_calibration();
   calibration.noise->star_tracker_noise_rad.reset();
@@ -70,10 +87,16 @@ TEST(CalibrationJson, MayBeWithoutNoise) {
   EXPECT_FALSE(parse_calibration(format_calibration(calibration), "c.json").noise.has_value());
 }
 
-TEST(CalibrationJson, RefusesNoiseBelowZero) {
+TEST(CalibrationJson, RefusesNoiseThatIsNone) {
   Calibration calibration = sample_calibration();
   calibration.noise->wandering_drift_rad_s = -1e-7;
   EXPECT_THAT(refusal_of(format_calibration(calibration)), HasSubstr("noise.wandering_drift_rad_s is -1e-07"));
+  for (const double time_s : {0.0, 1e300}) {
+    calibration.noise = CalibrationNoise{0, {}, 1e-7, time_s};
+    EXPECT_THAT(refusal_of(format_calibration(calibration)), HasSubstr("noise.wandering_time_s is"));
+  }
+  calibration.noise = CalibrationNoise{0, Eigen::Vector3d(1e-5, 0, 1e-5), 0, 0};
+  EXPECT_THAT(refusal_of(format_calibration(calibration)), HasSubstr("noise.star_tracker_noise_rad is not positive"));
 }
 
 RC_GTEST_PROP(CalibrationJson, NumbersComeBackBitForBit, (std::uint64_t bits)) {

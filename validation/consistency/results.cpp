@@ -50,11 +50,11 @@ void Results::add(const Key& key, const Outcome& outcome) {
   }
 }
 
-std::string Results::table(const std::vector<Cell>& cells, const std::vector<std::string>& estimators, int runs) const {
+std::string Results::table(const std::vector<Cell>& cells, const std::vector<Column>& columns) const {
   std::string head = "| slews | geometry | drift, rad/s | misalignment | random walk, rad/√s |";
   std::string rule = "| --- | --- | --- | --- | --- |";
-  for (const std::string& estimator : estimators) {
-    head += fmt::format(" NEES, {0} | NIS | error / bound |", estimator);
+  for (const Column& column : columns) {
+    head += fmt::format(" NEES, {0} | NIS | error / bound |", column.estimator);
     rule += " --- | --- | --- |";
   }
   std::string text = head + "\n" + rule + "\n";
@@ -62,7 +62,7 @@ std::string Results::table(const std::vector<Cell>& cells, const std::vector<std
     text += fmt::format("| {} | {} | {:.0e} | {} | {} |", cell.slews ? "slews" : "none", cell.geometry.name,
                         cell.drift_rad_s, angle(cell.misalignment_rad),
                         cell.walk_rad_sqrt_s > 0 ? fmt::format("{:.0e}", cell.walk_rad_sqrt_s) : "0");
-    for (const std::string& estimator : estimators) {
+    for (const auto& [estimator, runs] : columns) {
       Outcome mean;
       mean.error_over_bound_square = 0;
       for (int run = 1; run <= runs; ++run) {

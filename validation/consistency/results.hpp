@@ -18,6 +18,12 @@ struct Key {
   auto operator<=>(const Key&) const = default;
 };
 
+/// What the table tells of one estimator.
+struct Column {
+  std::string estimator;
+  int runs = 0;  ///< flights per cell: 1 … runs
+};
+
 /// Outcomes of flights; where a file is given, kept in it as they come, so that a campaign can go on after a break.
 class Results {
  public:
@@ -29,10 +35,9 @@ class Results {
   /// Throws std::runtime_error where the file cannot be written.
   void add(const Key& key, const Outcome& outcome);
 
-  /// Markdown: a row per cell; per estimator the means of NEES and NIS over the runs 1 … `runs`, marked where they lie
-  /// outside their bands, and the error over its bound. Needs all those runs.
-  [[nodiscard]] std::string table(const std::vector<Cell>& cells, const std::vector<std::string>& estimators,
-                                  int runs) const;
+  /// Markdown: a row per cell; per estimator the means of NEES and NIS over its runs, marked where they lie outside
+  /// their bands, and the error over its bound. Needs all those runs.
+  [[nodiscard]] std::string table(const std::vector<Cell>& cells, const std::vector<Column>& columns) const;
 
  private:
   std::filesystem::path file_;

@@ -55,7 +55,8 @@ struct CalibrationSetup {
   PerGyro<double, N> readout_noise_rad{};                           ///< 1-sigma per direction cosine
   Eigen::Vector3d star_tracker_noise_rad{0, 0, 0};                  ///< 1-sigma about c x, y, z
   double direction_random_walk_rad_sqrt_s = 0;  ///< process noise of each momentum, per axis across it
-  /// A fix with a NIS above this is rejected. χ² of 4 degrees of freedom passes 30 once in 2e5 good fixes.
+  /// A fix with a NIS above this is rejected; χ² of 4 degrees of freedom passes 30 once in 2e5 good fixes. That of a
+  /// pair: of more gyros a gate that good fixes pass as often.
   double gate_nis = 30;
   /// ν of Student's t, or 0 for normal noise. With it a fix above the gate is used with its weight instead of rejected,
   /// unless the star tracker or one gyro is plainly at fault; a run above the gate still reopens.
@@ -110,7 +111,7 @@ enum class FixStatus : std::uint8_t {
   kStarted,              ///< the first fix: sets the directions
   kUsed,                 ///< calibration updated
   kUsedAfterReopening,   ///< used after a run of rejections, with the directions set free
-  kRestarted,            ///< used after another run of rejections soon after: the filter began anew from its estimates
+  kRestarted,            ///< used after another run of rejections soon after: the filter began anew
   kRejectedNotRotation,  ///< quaternion not finite or not unit
   kRejectedOutOfOrder,   ///< repeated, or too late: the calibration has passed its time
   kRejectedNoGyro,       ///< no gyro samples close enough round it
@@ -131,6 +132,7 @@ template <int M>
 struct FixReport {
   FixStatus status = FixStatus::kNone;
   Time t{};
+  int head = 0;                                                                  ///< the star tracker
   Eigen::Matrix<double, M, 1> innovation = Eigen::Matrix<double, M, 1>::Zero();  ///< −z of eq. (3)
   Eigen::Matrix<double, M, M> innovation_covariance = Eigen::Matrix<double, M, M>::Zero();
   double nis = 0;               ///< innovation² over its covariance; M degrees of freedom

@@ -6,6 +6,7 @@
 #include <array>
 #include <chrono>
 #include <cstdint>
+#include <numbers>
 #include <optional>
 #include <utility>
 
@@ -83,6 +84,7 @@ class Cycle {
   static constexpr int kSetBackSamples = 16;
   static constexpr int kBufferedSamples = 64;
   static constexpr int kBufferedFixes = 8;
+  static constexpr double kQuarterOrbit_s = 1300;
 
   [[nodiscard]] static Result<Cycle, SetupFault> create(const Setup& setup, const CorrectionPolicy& policy);
 
@@ -179,6 +181,7 @@ class Cycle {
   /// would otherwise put everything after it out of order.
   [[nodiscard]] bool is_wild(Time t) {
     if (!has_sample() || t - this->t() <= kMaxGap) {
+      has_suspect_ = false;
       return false;
     }
     const bool confirmed = has_suspect_ && t > suspect_t_ && t - suspect_t_ <= kMaxInterpolation;
@@ -255,6 +258,7 @@ class Cycle {
   void correct(const StarFix& fix, Report& report) {
     report.fix = {};
     report.fix.t = fix.t;
+    report.fix.head = fix.head;
     const std::optional<FixReadings<kGyros>> readings = readings_at(fix.t);
     if (count(readings ? readings->used : health_.usable(fix.t, fix.t)) < (estimator_.started() ? 2 : kGyros)) {
       report.fix.status = FixStatus::kRejectedTooFewGyros;
@@ -268,6 +272,7 @@ class Cycle {
     const typename Estimator::Sensitivities stretch = estimator_.since_fix();
     report.fix = estimator_.correct(fix, *readings);
     report.fix.t = fix.t;
+    report.fix.head = fix.head;
     if (report.fix.status == FixStatus::kRejectedGeometry) {
       return;  // the estimator did not move its covariance to this fix
     }
@@ -413,12 +418,13 @@ class Cycle {
   }
 
   /// What the midpoint rule may miss when the body turned far between two samples, rad²: the drift over the step, times
-  /// the turn.
+  /// the turn; over a quarter of an orbit the readings no longer tell how far that was.
   [[nodiscard]] double variance_of_long_step(const Directions& from, const Directions& to, double dt_s) const {
     double largest_rad = 0;
     for (int k = 0; k < kGyros; ++k) {
       const double drift_rad = estimator_.gyros()[k].drift_rad_s.norm() * dt_s;
-      largest_rad = std::max(largest_rad, drift_rad * angle_between<double>(from[k], to[k]));
+      const double turn_rad = dt_s < kQuarterOrbit_s ? angle_between<double>(from[k], to[k]) : std::numbers::pi;
+      largest_rad = std::max(largest_rad, drift_rad * turn_rad);
     }
     return largest_rad * largest_rad;
   }
@@ -648,6 +654,7 @@ auto Cycle<Estimator>::on_fix(const StarFix& fix) -> Report {
   report.t = fix.t;
   report.gyros = health_.states();
   report.fix.t = fix.t;
+  report.fix.head = fix.head;
   report.fix.status = take_up(fix);
   if (report.fix.status == FixStatus::kPending) {
     calibrate_until(samples_.latest().t - Estimator::kReach, report);

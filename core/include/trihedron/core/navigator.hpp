@@ -2,6 +2,9 @@
 /// The open-loop navigator: between astro-corrections the momenta turn by the drift model alone, and they give the
 /// attitude.
 
+#include <algorithm>
+#include <cmath>
+
 #include "trihedron/core/calibration.hpp"
 #include "trihedron/core/fix_readings.hpp"
 #include "trihedron/core/optimal_attitude.hpp"
@@ -56,11 +59,13 @@ template <int N, int Columns>
   return solution;
 }
 
-/// Momenta and parameters in use since the last astro-correction, and what is known of their errors.
+/// Momenta and parameters in use since the last astro-correction, and what is known of their errors. Drift that wanders
+/// fades as first-order Gauss–Markov noise does, and what comes in its place is unknown.
 template <class Estimator>
 class Navigator {
  public:
   static constexpr int kGyros = Estimator::kGyros;
+  static constexpr bool kWanders = int{Estimator::DriftModel::kSize} > int{Estimator::BaseModel::kSize};
 
   [[nodiscard]] bool started() const { return started_; }
   [[nodiscard]] const typename Estimator::Gyros& gyros() const { return gyros_; }
@@ -69,7 +74,7 @@ class Navigator {
   void correct(const Estimator& estimator) {
     gyros_ = estimator.gyros();
     errors_ = estimator.error_root();
-    restart_clock();
+    restart_clock(estimator.setup());
   }
 
   /// Instantaneous astro-correction with the parameters of the set-up held: the directions are those that the held
@@ -97,13 +102,16 @@ class Navigator {
       }
       errors_.template block<3, 3>(Errors::direction(k), kParameters) = C_in_c * attitude_root;
     }
-    restart_clock();
+    restart_clock(estimator.setup());
   }
 
   /// Open-loop prediction over one step; C_in_c and h_b of its middle. Needs started().
   void predict(const Eigen::Matrix3d& C_in_c, const typename Estimator::Directions& h_b, double dt_s) {
     for (int k = 0; k < kGyros; ++k) {
       precess(gyros_[k], C_in_c, h_b[k], dt_s);
+      if constexpr (kWanders) {
+        gyros_[k].drift_rad_s.template tail<3>() *= std::exp(-dt_s / wandering_time_s_);
+      }
     }
     time_since_correction_s_ += dt_s;
   }
@@ -113,9 +121,8 @@ class Navigator {
 
   /// Carries the errors over the stretch between two fixes, for which the estimator has integrated the sensitivities.
   void extend(const typename Estimator::Sensitivities& stretch) {
-    for (int k = 0; k < kGyros; ++k) {
-      since_correction_[k] = since_correction_[k].then(stretch[k]);
-    }
+    since_correction_ = since_correction(stretch);
+    extended_until_s_ = time_since_correction_s_;
   }
 
   /// Attitude by the momenta and these readings. Needs started().
@@ -132,22 +139,48 @@ class Navigator {
     if (!by_directions) {
       return by_directions.fault();
     }
-    typename Estimator::Sensitivities since = since_correction_;
+    const typename Estimator::Sensitivities since = since_correction(since_fix);
     PerGyro<double, kGyros> noise_rad;
     for (int k = 0; k < kGyros; ++k) {
-      since[k] = since[k].then(since_fix[k]);
       noise_rad[k] = readings.noise_factor * setup.readout_noise_rad[k];
     }
     const double walk = setup.direction_random_walk_rad_sqrt_s;
     const Eigen::Matrix<double, 3, Estimator::ErrorRoot::ColsAtCompileTime> spread =
         attitude_by_errors<Estimator>(by_directions.value(), gyros_, readings.h_b, since) * errors_;
     return with_covariance(by_directions.value(), spread, noise_rad,
-                           walk * walk * time_since_correction_s_ + extra_variance_rad2_);
+                           walk * walk * time_since_correction_s_ + extra_variance_rad2_ + wandered_variance_rad2());
   }
 
  private:
-  void restart_clock() {
+  /// The sensitivities since the correction, with those of the stretch after them.
+  [[nodiscard]] typename Estimator::Sensitivities since_correction(
+      const typename Estimator::Sensitivities& stretch) const {
+    typename Estimator::Sensitivities since = since_correction_;
+    for (int k = 0; k < kGyros; ++k) {
+      auto next = stretch[k];
+      if constexpr (kWanders) {
+        next.by_drift.template rightCols<3>() *= std::exp(-extended_until_s_ / wandering_time_s_);
+      }
+      since[k] = since[k].then(next);
+    }
+    return since;
+  }
+
+  /// Of the directions, per axis: by the drift that has come since the correction, ∫w(t) dt less what w(0) lets expect
+  /// of it, σ² τ² (2x − 3 + 4 exp(−x) − exp(−2x)) with x = t/τ.
+  [[nodiscard]] double wandered_variance_rad2() const {
+    const double x = time_since_correction_s_ / wandering_time_s_;
+    const double scale_rad = wandering_sigma_rad_s_ * wandering_time_s_;
+    return scale_rad * scale_rad * std::max(2 * x - 3 + 4 * std::exp(-x) - std::exp(-2 * x), 0.0);
+  }
+
+  void restart_clock(const typename Estimator::Setup& setup) {
+    if constexpr (kWanders) {
+      wandering_sigma_rad_s_ = setup.wandering_sigma_rad_s;
+      wandering_time_s_ = setup.wandering_time_s;
+    }
     since_correction_ = {};
+    extended_until_s_ = 0;
     time_since_correction_s_ = 0;
     extra_variance_rad2_ = 0;
     started_ = true;
@@ -157,6 +190,9 @@ class Navigator {
   typename Estimator::ErrorRoot errors_ = Estimator::ErrorRoot::Zero();
   typename Estimator::Sensitivities since_correction_;
   double time_since_correction_s_ = 0;
+  double extended_until_s_ = 0;
+  double wandering_sigma_rad_s_ = 0;
+  double wandering_time_s_ = 1;
   double extra_variance_rad2_ = 0;
   bool started_ = false;
 };

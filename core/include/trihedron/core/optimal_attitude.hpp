@@ -3,6 +3,7 @@
 /// the first.
 
 #include <Eigen/LU>
+#include <algorithm>
 
 #include "trihedron/core/attitude.hpp"
 #include "trihedron/core/per_gyro.hpp"
@@ -86,7 +87,8 @@ template <int N>
     }
   }
   if (!(best >= kMinSine)) {
-    return DirectionsFault::kMomentaNearlyParallel;
+    const bool too_few = std::count_if(weight.begin(), weight.end(), [](double it) { return it > 0; }) < 2;
+    return too_few ? DirectionsFault::kTooFew : DirectionsFault::kMomentaNearlyParallel;
   }
   const auto in = bisecting_axes(Vec<In>::assume(h_in[first]), Vec<In>::assume(h_in[second]));
   if (!in) {

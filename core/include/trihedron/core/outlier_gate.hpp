@@ -2,17 +2,21 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "trihedron/core/calibration.hpp"
 
 namespace trihedron {
 
-/// The gate that good measurements of `freedom` degrees of freedom pass as often as those of `its_freedom` pass
-/// `gate_nis` (Wilson and Hilferty 1931: the cube root of χ²/n is nearly normal, of mean 1 − 2/9n and variance 2/9n).
-[[nodiscard]] inline double gate_of_freedom(int freedom, double gate_nis, int its_freedom) {
+/// Components of a fix seen by a pair of gyros.
+inline constexpr int kPairComponents = 4;
+
+/// The gate that good measurements of `freedom` components pass as often as those of a pair pass `gate_nis` (Wilson and
+/// Hilferty 1931: the cube root of χ²/n is nearly normal, of mean 1 − 2/9n and variance 2/9n).
+[[nodiscard]] inline double gate_of_freedom(int freedom, double gate_nis) {
   const double variance = 2.0 / (9 * freedom);
-  const double its_variance = 2.0 / (9 * its_freedom);
-  const double sigmas = (std::cbrt(gate_nis / its_freedom) - (1 - its_variance)) / std::sqrt(its_variance);
+  constexpr double kItsVariance = 2.0 / (9 * kPairComponents);
+  const double sigmas = (std::cbrt(gate_nis / kPairComponents) - (1 - kItsVariance)) / std::sqrt(kItsVariance);
   const double root = std::max(1 - variance + sigmas * std::sqrt(variance), 0.0);
   return freedom * root * root * root;
 }
@@ -40,16 +44,15 @@ class OutlierGate {
   void elapse(double dt_s) { since_fix_s_ += dt_s; }
 
   /// kUsed, kRejectedByGate, kUsedAfterReopening or kRestarted: what to do with the fix. `misfit_rad`: the length of
-  /// the innovation.
-  [[nodiscard]] FixStatus judge(double nis, double misfit_rad) {
+  /// the innovation; `freedom`: its components.
+  [[nodiscard]] FixStatus judge(double nis, double misfit_rad, int freedom = kPairComponents) {
     const double largest_rad = kLargestStep_rad + kLargestRate_rad_s * since_fix_s_;
-    const bool jumped_now = !(misfit_rad - misfit_rad_ <= largest_rad);
-    misfit_rad_ = misfit_rad;
+    const double before_rad = std::exchange(misfit_rad_, misfit_rad);
+    const bool jumped_now = !(misfit_rad - before_rad <= largest_rad);
     since_fix_s_ = 0;
     FixStatus status = FixStatus::kUsed;
-    if (!(nis <= gate_nis_)) {
-      // A start that no fix has confirmed yet may itself be what was wrong.
-      jumped_ = jumped_ || (jumped_now && confirmed_);
+    if (!(nis <= gate_of_freedom(freedom, gate_nis_))) {
+      look_for_jump(jumped_now, before_rad, largest_rad);
       if (++rejections_in_a_row_ < (jumped_ ? reopen_after_jump_ : reopen_after_)) {
         return FixStatus::kRejectedByGate;
       }
@@ -71,6 +74,19 @@ class OutlierGate {
   [[nodiscard]] bool begun_anew() const { return begun_anew_ && under_suspicion_ > 0; }
 
  private:
+  /// A start that no fix has confirmed yet may itself be what was wrong. A jump is over, an outlier in a longer run,
+  /// when the misfit has been back where it came from for as long as a run takes.
+  void look_for_jump(bool jumped_now, double before_rad, double largest_rad) {
+    if (jumped_now && confirmed_) {
+      before_jump_rad_ = jumped_ ? before_jump_rad_ : before_rad;
+      jumped_ = true;
+      back_ = 0;
+    } else if (jumped_) {
+      back_ = misfit_rad_ <= before_jump_rad_ + largest_rad ? back_ + 1 : 0;
+      jumped_ = back_ < reopen_after_;
+    }
+  }
+
   double gate_nis_ = 0;
   int reopen_after_ = 0;
   int reopen_after_jump_ = 0;
@@ -82,6 +98,8 @@ class OutlierGate {
   bool begun_anew_ = false;  ///< when suspicion arose last
   bool confirmed_ = false;   ///< what the filter rests on has agreed with a fix after it
   bool jumped_ = false;
+  double before_jump_rad_ = 0;
+  int back_ = 0;  ///< fixes in a row since the jump
 };
 
 }  // namespace trihedron

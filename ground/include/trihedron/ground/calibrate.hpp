@@ -22,6 +22,7 @@ namespace trihedron::ground {
 /// One fix: eq. (3) from its second component on, two per gyro, and what was done with it.
 struct FixRecord {
   Time t{};
+  int head = 0;  ///< the star tracker
   FixStatus status = FixStatus::kNone;
   std::vector<double> innovation;        ///< rad
   std::vector<double> innovation_sigma;  ///< rad

@@ -39,7 +39,8 @@ struct CalibrationOptions {
   double direction_random_walk_rad_sqrt_s = 3e-9;
   /// In place of the figure of the pass, where one was found.
   std::optional<Eigen::Vector3d> star_tracker_noise_rad;
-  /// A fix with a NIS above this is rejected. χ² of 4 degrees of freedom passes 30 once in 2e5 good fixes.
+  /// A fix with a NIS above this is rejected; χ² of 4 degrees of freedom passes 30 once in 2e5 good fixes. That of a
+  /// pair: of more gyros a gate that good fixes pass as often.
   double gate_nis = 30;
   /// After so many rejections in a row the directions are set free and the fix is used.
   int reopen_after_rejections = 20;
