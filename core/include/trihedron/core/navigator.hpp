@@ -157,11 +157,13 @@ class Navigator {
       const typename Estimator::Sensitivities& stretch) const {
     typename Estimator::Sensitivities since = since_correction_;
     for (int k = 0; k < kGyros; ++k) {
-      auto next = stretch[k];
       if constexpr (kWanders) {
-        next.by_drift.template rightCols<3>() *= std::exp(-extended_until_s_ / wandering_time_s_);
+        auto faded = stretch[k];
+        faded.by_drift.template rightCols<3>() *= std::exp(-extended_until_s_ / wandering_time_s_);
+        since[k] = since[k].then(faded);
+      } else {
+        since[k] = since[k].then(stretch[k]);
       }
-      since[k] = since[k].then(next);
     }
     return since;
   }
