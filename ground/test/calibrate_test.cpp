@@ -18,17 +18,19 @@ namespace {
 
 using testing::HasSubstr;
 
-/// Two hours of the paper's experiment, all drift in the model.
+/// The paper's experiment, all drift in eq. (1).
+Scenario scenario_in_eq1(std::uint64_t seed, Duration duration) {
+  Scenario scenario;
+  scenario.seed = seed;
+  scenario.duration = duration;
+  for (GyroScenario& gyro : scenario.gyros) {
+    gyro.drift.outside_sigma_rad_s = 0;
+  }
+  return scenario;
+}
+
 const sim::SimulatedPass& two_hours() {
-  static const sim::SimulatedPass simulated = [] {
-    Scenario scenario;
-    scenario.seed = 5;
-    scenario.duration = std::chrono::hours(2);
-    for (GyroScenario& gyro : scenario.gyros) {
-      gyro.drift.outside_sigma_rad_s = 0;
-    }
-    return sim::simulate(scenario);
-  }();
+  static const sim::SimulatedPass simulated = sim::simulate(scenario_in_eq1(5, std::chrono::hours(2)));
   return simulated;
 }
 
@@ -173,12 +175,7 @@ TEST(Calibrate, GoesByTheNoiseOfAnEarlierCalibration) {
 }
 
 TEST(Calibrate, WithTwoStarTrackersFindsNoOtherNoiseThanTheirs) {
-  Scenario scenario;
-  scenario.seed = 12;
-  scenario.duration = std::chrono::minutes(55);
-  for (GyroScenario& gyro : scenario.gyros) {
-    gyro.drift.outside_sigma_rad_s = 0;
-  }
+  Scenario scenario = scenario_in_eq1(12, std::chrono::minutes(55));
   scenario.further_star_trackers.resize(1, scenario.star_tracker);
   scenario.further_star_trackers[0].mounting_rotation_vector_rad = Eigen::Vector3d(1.2, 0, 0);
   const auto run = calibrate(sim::simulate(scenario).pass, {});
@@ -375,14 +372,9 @@ TEST_P(SamplePass, IsCalibratedToAnArcsecondOrSo) {
 }
 
 TEST(Calibrate, DecidesByItselfForClockOffsetAndErrorAtOrbitalPeriod) {
-  Scenario scenario;
-  scenario.seed = 6;
-  scenario.duration = std::chrono::hours(2);
+  Scenario scenario = scenario_in_eq1(6, std::chrono::hours(2));
   scenario.star_tracker.clock_offset_s = 0.01;
   scenario.star_tracker.orbital_sine_rad = Eigen::Vector3d(6, -5, 8) * kArcsecond;
-  for (GyroScenario& gyro : scenario.gyros) {
-    gyro.drift.outside_sigma_rad_s = 0;
-  }
   const auto simulated = sim::simulate(scenario);
   const auto run = calibrate(simulated.pass, {});
   ASSERT_EQ(run.calibration.further.size(), 7U);
@@ -400,11 +392,8 @@ TEST(Calibrate, DecidesByItselfForClockOffsetAndErrorAtOrbitalPeriod) {
 }
 
 TEST(Calibrate, DoesNotTakeARandomWalkForDriftThatWanders) {
-  Scenario scenario;
-  scenario.seed = 11;
-  scenario.duration = std::chrono::minutes(55);
+  Scenario scenario = scenario_in_eq1(11, std::chrono::minutes(55));
   for (GyroScenario& gyro : scenario.gyros) {
-    gyro.drift.outside_sigma_rad_s = 0;
     gyro.drift.direction_walk_rad_sqrt_s = 1e-7;
   }
   const auto run = calibrate(sim::simulate(scenario).pass, {});
@@ -416,12 +405,9 @@ TEST(Calibrate, DoesNotTakeARandomWalkForDriftThatWanders) {
 }
 
 TEST(Calibrate, FindsTheBiasOfTheReadoutsAndDriftThatWanders) {
-  Scenario scenario;
-  scenario.seed = 7;
-  scenario.duration = std::chrono::hours(4);
+  Scenario scenario = scenario_in_eq1(7, std::chrono::hours(4));
   const Eigen::Vector3d bias = Eigen::Vector3d(10, -15, 20) * kArcsecond;
   for (GyroScenario& gyro : scenario.gyros) {
-    gyro.drift.outside_sigma_rad_s = 0;
     gyro.drift.markov_sigma_rad_s = 1e-7;
     gyro.drift.markov_time_s = 1200;
     gyro.readout.bias_rad = bias;
@@ -470,14 +456,9 @@ TEST(Calibrate, KnowsTheRateOfTheOrbitFromTheAttitude) {
 
 /// Three gyros, the third across the others; all drift in eq. (1).
 Scenario scenario_of_three(std::uint64_t seed, Duration duration) {
-  Scenario scenario;
-  scenario.seed = seed;
-  scenario.duration = duration;
+  Scenario scenario = scenario_in_eq1(seed, duration);
   scenario.gyros.resize(3, scenario.gyros[0]);
   scenario.gyros[2].start_direction_c = scenario.gyros[0].start_direction_c.cross(scenario.gyros[1].start_direction_c);
-  for (GyroScenario& gyro : scenario.gyros) {
-    gyro.drift.outside_sigma_rad_s = 0;
-  }
   return scenario;
 }
 

@@ -2,9 +2,11 @@
 
 #include <fmt/format.h>
 
+#include <array>
 #include <cmath>
 #include <fstream>
 #include <iterator>
+#include <map>
 #include <sstream>
 #include <stdexcept>
 #include <utility>
@@ -58,10 +60,14 @@ std::string Results::table(const std::vector<Cell>& cells, const std::vector<Col
     rule += " --- | --- | --- |";
   }
   std::string text = head + "\n" + rule + "\n";
+  std::map<std::string, std::array<int, 2>> outside;  // per estimator: up to 1°, beyond
+  std::array<int, 2> rows{};
   for (const Cell& cell : cells) {
     text += fmt::format("| {} | {} | {:.0e} | {} | {} |", cell.slews ? "slews" : "none", cell.geometry.name,
                         cell.drift_rad_s, angle(cell.misalignment_rad),
                         cell.walk_rad_sqrt_s > 0 ? fmt::format("{:.0e}", cell.walk_rad_sqrt_s) : "0");
+    const std::size_t far = cell.misalignment_rad > 1.5 * kDegree ? 1 : 0;
+    ++rows[far];
     for (const auto& [estimator, runs] : columns) {
       Outcome mean;
       mean.error_over_bound_square = 0;
@@ -73,13 +79,20 @@ std::string Results::table(const std::vector<Cell>& cells, const std::vector<Col
         mean.error_over_bound_square += outcome.error_over_bound_square / runs;
       }
       mean.nis /= static_cast<double>(mean.fixes);
+      const int side = band_of_mean(kParameters, runs).side(mean.nees);
+      outside[estimator][far] += side != 0 ? 1 : 0;
       const double over_bound = std::sqrt(mean.error_over_bound_square);
-      text += fmt::format(
-          " {} | {} | {} |", marked(fmt::format("{:.1f}", mean.nees), band_of_mean(kParameters, runs).side(mean.nees)),
-          marked(fmt::format("{:.3f}", mean.nis), band_of_mean(kInnovations, mean.fixes).side(mean.nis)),
-          std::isnan(over_bound) ? "" : fmt::format("{:.2f}", over_bound));
+      text +=
+          fmt::format(" {} | {} | {} |", marked(fmt::format("{:.1f}", mean.nees), side),
+                      marked(fmt::format("{:.3f}", mean.nis), band_of_mean(kInnovations, mean.fixes).side(mean.nis)),
+                      std::isnan(over_bound) ? "" : fmt::format("{:.2f}", over_bound));
     }
     text += "\n";
+  }
+  text += "\n";
+  for (const auto& [estimator, count] : outside) {
+    text += fmt::format("NEES, {}: outside its band in {} of {} rows up to 1°, in {} of {} beyond.  \n", estimator,
+                        count[0], rows[0], count[1], rows[1]);
   }
   return text;
 }
