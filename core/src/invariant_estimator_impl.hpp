@@ -2,8 +2,8 @@
 /// Definitions of InvariantEstimator. Each instantiation is a translation unit of its own, since one takes the compiler
 /// half a minute.
 
-#include <Eigen/Cholesky>
-#include <Eigen/QR>
+#include <Eigen/Householder>
+#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 
@@ -66,22 +66,17 @@ Result<InvariantEstimator<Base, N, F>, SetupFault> InvariantEstimator<Base, N, F
 template <class Base, int N, FurtherStates F>
 double InvariantEstimator<Base, N, F>::second_order_rad(const Rows3& a, const Rows3& b) const {
   // E|a × b|² = tr A tr B − tr AB, over the two axes across a momentum.
-  const auto covariance = [this](const Rows3& rows) -> Eigen::Matrix3d {
-    const Rows3 spread = information_.template through_uncertainty<3>(rows);
-    return spread * spread.transpose();
-  };
-  const Eigen::Matrix3d A = covariance(a);
-  const Eigen::Matrix3d B = covariance(b);
+  const Eigen::Matrix3d A = gram(information_.template through_uncertainty<3>(a));
+  const Eigen::Matrix3d B = gram(information_.template through_uncertainty<3>(b));
   const double square = A.trace() * B.trace() - A.cwiseProduct(B).sum();
   return std::sqrt(std::max(square, 0.0) / 8);
 }
 
 template <class Base, int N, FurtherStates F>
 void InvariantEstimator<Base, N, F>::update_to_now(const Eigen::Matrix3d& C_in_c) {
-  using DynamicMatrix = typename Information::DynamicMatrix;
-  DynamicMatrix A = DynamicMatrix::Zero();
+  typename Information::DynamicMatrix A_inverse = Information::DynamicMatrix::Zero();
   typename Information::DynamicByConstants B = Information::DynamicByConstants::Zero();
-  DynamicMatrix L = DynamicMatrix::Zero();
+  typename Information::DynamicVector noise = Information::DynamicVector::Zero();
   const double walk = setup_.direction_random_walk_rad_sqrt_s;
   for (int k = 0; k < N; ++k) {
     const int row = Layout::direction(k);
@@ -95,23 +90,24 @@ void InvariantEstimator<Base, N, F>::update_to_now(const Eigen::Matrix3d& C_in_c
     second_order_rad_[k] += second_order_rad(alignment, drifted);
     const double sigma = std::sqrt(walk * walk * time_since_fix_s_ + extra_variance_rad2_ +
                                    second_order_rad_[k] * second_order_rad_[k] - before * before);
-    A.template block<3, 3>(row, row) = since_fix_[k].by_start;
+    const Eigen::Matrix3d to_start = since_fix_[k].by_start.inverse();
+    A_inverse.template block<3, 3>(row, row) = to_start;
     B.template block<3, Base::kSize>(row, Layout::drift(k) - Layout::kDynamic) =
         since_fix_[k].by_drift.template leftCols<Base::kSize>();
     B.template block<3, 3>(row, Layout::alignment(k) - Layout::kDynamic) = since_fix_[k].by_alignment;
-    L.diagonal().template segment<3>(row).setConstant(sigma);
+    noise.template segment<3>(row).setConstant(sigma);
     if constexpr (F.wandering_drift) {
       // Nothing is left of it after a long time; what A⁻¹ takes for that would be rounding.
       const double kept = std::max(std::exp(-time_since_fix_s_ / setup_.wandering_time_s), 1e-6);
       const int wandering = Layout::wandering(k);
-      A.template block<3, 3>(row, wandering) = since_fix_[k].by_drift.template rightCols<3>();
-      A.template block<3, 3>(wandering, wandering) = kept * Eigen::Matrix3d::Identity();
-      L.diagonal().template segment<3>(wandering).setConstant(setup_.wandering_sigma_rad_s *
-                                                              std::sqrt(1 - kept * kept));
+      A_inverse.template block<3, 3>(row, wandering) =
+          to_start * since_fix_[k].by_drift.template rightCols<3>() * (-1 / kept);
+      A_inverse.template block<3, 3>(wandering, wandering) = 1 / kept * Eigen::Matrix3d::Identity();
+      noise.template segment<3>(wandering).setConstant(setup_.wandering_sigma_rad_s * std::sqrt(1 - kept * kept));
       gyros_[k].drift_rad_s.template tail<3>() *= kept;
     }
   }
-  information_.propagate(A, B, L);
+  information_.propagate(A_inverse, B, noise);
   since_fix_ = {};
   time_since_fix_s_ = 0;
   extra_variance_rad2_ = 0;
@@ -141,10 +137,10 @@ void InvariantEstimator<Base, N, F>::start(const Eigen::Matrix3d& C_in_c, const 
     const double sigma = readings.used[k] ? setup_.readout_noise_rad[k] * readings.noise_factor : kUnknown_rad;
     R.template block<3, 3>(3 * k, 3 * k).diagonal().array() += sigma * sigma;
   }
-  const Eigen::LLT<Eigen::Matrix<double, 3 * N, 3 * N>> factor(R);
   information_ = prior_;
   std::fill(second_order_rad_.begin(), second_order_rad_.end(), 0.0);
-  information_.add_information(Eigen::Matrix<double, 3 * N, Layout::kStates>(factor.matrixL().solve(H)));
+  solve_lower(cholesky_root<3 * N>(R), H);
+  information_.add_information(H);
   since_fix_ = {};
   angles_since_fix_ = 0;
   time_since_fix_s_ = 0;
@@ -246,11 +242,10 @@ Eigen::Matrix3d InvariantEstimator<Base, N, F>::fused_attitude(const AttitudeByD
     const double sigma = setup_.readout_noise_rad[k] * readings.noise_factor;
     P += sigma * sigma * by_phi * by_phi.transpose();
   }
-  const Eigen::Matrix<double, 3, Layout::kStates> spread = information_.template through_uncertainty<3>(by_states);
-  P += spread * spread.transpose();
-  const Eigen::Vector3d apart = (by_gyros.C_in_c.inverse() * by_fix).log().raw();
-  const Eigen::Vector3d towards_fix = P * (P + R_c).llt().solve(apart);
-  return (by_gyros.C_in_c * Rot<C, C>::exp(Vec<C>::assume(towards_fix))).raw();
+  P += gram(information_.template through_uncertainty<3>(by_states));
+  Eigen::Vector3d weighted = (by_gyros.C_in_c.inverse() * by_fix).log().raw();
+  solve_factorized(cholesky_root<3>(P + R_c), weighted);
+  return (by_gyros.C_in_c * Rot<C, C>::exp(Vec<C>::assume(P * weighted))).raw();
 }
 
 template <class Base, int N, FurtherStates F>
@@ -323,7 +318,7 @@ auto InvariantEstimator<Base, N, F>::correct(const StarFix& fix, const FixReadin
   Measurement m = measure(gyros_, C_in_c.raw(), C_linear, readings.h_b, R_c, by_shared, noise_rad);
   leave_out_unused(readings.used, m);
 
-  const WhiteMeasurement<Information, kMeasurements> white(m.H, m.y, m.R);
+  const auto white = whitened<Information, kMeasurements>(m.H, m.y, m.R);
   report_innovation(information_, white, report);
   report.status = gate_.judge(report.nis, m.y.norm(), 2 * count(readings.used));
   report.rejections_in_a_row = gate_.rejections_in_a_row();
@@ -371,16 +366,29 @@ auto InvariantEstimator<Base, N, F>::correct(const StarFix& fix, const FixReadin
 template <class Base, int N, FurtherStates F>
 auto InvariantEstimator<Base, N, F>::angles_of(const Measurement& m) -> WhiteAngles {
   // The rows of H by the alignments are, but for the sign, those by an error of the attitude, common to all. A large
-  // R_c in its place would still be a claim, and 10 000 of them no small one.
-  Eigen::Matrix<double, kMeasurements, 3> by_attitude;
+  // R_c in its place would still be a claim, and 10 000 of them no small one. Reflections that leave the attitude in
+  // three rows only: the others are what is left.
+  Eigen::Matrix<double, kMeasurements, 3 + Layout::kStates + 1> rows;
   for (int k = 0; k < N; ++k) {
-    by_attitude.template middleRows<2>(2 * k) = m.H.template block<2, 3>(2 * k, Layout::alignment(k));
+    rows.template block<2, 3>(2 * k, 0) = m.H.template block<2, 3>(2 * k, Layout::alignment(k));
   }
-  const InnovationCovariance whiten = m.R.diagonal().cwiseSqrt().cwiseInverse().asDiagonal();
-  const Eigen::HouseholderQR<Eigen::Matrix<double, kMeasurements, 3>> qr(whiten * by_attitude);
-  const InnovationCovariance Q = qr.householderQ();
-  const Eigen::Matrix<double, kAngles, kMeasurements> across = Q.template rightCols<kAngles>().transpose() * whiten;
-  return WhiteAngles(across * m.H, across * m.y, Eigen::Matrix<double, kAngles, kAngles>::Identity());
+  rows.template middleCols<Layout::kStates>(3) = m.H;
+  rows.template rightCols<1>() = m.y;
+  rows.array().colwise() /= m.R.diagonal().array().sqrt();
+  Eigen::Matrix<double, rows.ColsAtCompileTime, 1> workspace;
+  for (int j = 0; j < 3; ++j) {
+    const int below = kMeasurements - j;
+    Eigen::Matrix<double, Eigen::Dynamic, 1, 0, kMeasurements, 1> essential(below - 1);
+    double tau = 0;
+    double diagonal = 0;
+    rows.col(j).tail(below).makeHouseholder(essential, tau, diagonal);
+    rows.bottomRows(below).applyHouseholderOnTheLeft(essential, tau, workspace.data());
+  }
+  WhiteAngles white;
+  white.H = rows.template block<kAngles, Layout::kStates>(3, 3);
+  white.y = rows.template bottomRightCorner<kAngles, 1>();
+  white.noise_root.setIdentity();
+  return white;
 }
 
 template <class Base, int N, FurtherStates F>
@@ -419,7 +427,7 @@ bool InvariantEstimator<Base, N, F>::is_fault(double nis, double misfit_rad, con
 template <class Base, int N, FurtherStates F>
 bool InvariantEstimator<Base, N, F>::agrees(const Measurement& m, const GyroMask<N>& used) const {
   Report report;
-  report_innovation(information_, WhiteMeasurement<Information, kMeasurements>(m.H, m.y, m.R), report);
+  report_innovation(information_, whitened<Information, kMeasurements>(m.H, m.y, m.R), report);
   return report.nis <= gate_of_freedom(2 * count(used), setup_.gate_nis);
 }
 
@@ -543,7 +551,7 @@ auto InvariantEstimator<Base, N, F>::prior_parameter_root() const
   constexpr int kSize = Errors::kSize - Errors::kDirections;
   using Own = ParameterLayout<Base, N>;
   Eigen::Matrix<double, kSize, kSize> root = Eigen::Matrix<double, kSize, kSize>::Zero();
-  const Eigen::Matrix<double, Own::kSize, Own::kSize> own = setup_.prior_covariance.llt().matrixL();
+  const Eigen::Matrix<double, Own::kSize, Own::kSize> own = cholesky_root<Own::kSize>(setup_.prior_covariance);
   for (int k = 0; k < N; ++k) {
     const int row = Errors::drift(k) - Errors::kDirections;
     root.template block<Base::kSize, Own::kSize>(row, 0) = own.template middleRows<Base::kSize>(Own::drift(k));

@@ -67,7 +67,7 @@ void PaperEstimator<Model>::update_covariance_to_now(const QuasiInertial& now) {
   const double sigma = std::sqrt(walk * walk * time_since_fix_s_ + extra_variance_rad2_);
   // Component 2 of gyro 2 sees sinθ of an isotropic error across h2.
   const Eigen::Vector4d noise(sigma, sigma, sigma, sigma * now.sine);
-  information_.propagate(by_start, by_parameters, noise.asDiagonal());
+  information_.propagate(by_start.inverse(), by_parameters, noise);
   qi_ = now;
   since_fix_ = {};
   time_since_fix_s_ = 0;
@@ -115,7 +115,7 @@ auto PaperEstimator<Model>::correct(const Eigen::Matrix3d& C_in_c, const Directi
     qi_ = now;
   }
   const Measurement measurement = measure(gyros_, now, C_in_c, h_b, setup_);
-  const WhiteMeasurement<Information, kMeasurements> white(measurement.H, measurement.innovation, measurement.R);
+  const auto white = whitened<Information, kMeasurements>(measurement.H, measurement.innovation, measurement.R);
 
   if (!started_) {
     information_.add_information(white.H);

@@ -23,12 +23,13 @@ Eigen::Matrix<double, R, K> random_matrix(std::mt19937& random) {
 struct Dense {
   Matrix P = Matrix::Zero();
 
-  void propagate(const Filter::DynamicMatrix& A, const Filter::DynamicByConstants& B, const Filter::DynamicMatrix& L) {
+  void propagate(const Filter::DynamicMatrix& A, const Filter::DynamicByConstants& B,
+                 const Filter::DynamicVector& noise) {
     Matrix F = Matrix::Identity();
     F.topLeftCorner<kD, kD>() = A;
     F.topRightCorner<kD, kN - kD>() = B;
     P = F * P * F.transpose();
-    P.topLeftCorner<kD, kD>() += L * L.transpose();
+    P.topLeftCorner<kD, kD>() += noise.cwiseAbs2().asDiagonal();
   }
   Filter::Vector update(const Eigen::Matrix<double, 2, kN>& H, const Eigen::Vector2d& y) {
     const Eigen::Matrix2d S = H * P * H.transpose() + Eigen::Matrix2d::Identity();
@@ -54,9 +55,9 @@ TEST(SquareRootInformation, AgreesWithTheTextbookFilterOverManySteps) {
     const Filter::DynamicMatrix A = Filter::DynamicMatrix::Identity() + 0.1 * random_matrix<kD, kD>(random);
     const Filter::DynamicByConstants B = random_matrix<kD, kN - kD>(random);
     // Without process noise at every other step: a zero noise must not divide by anything.
-    const Filter::DynamicMatrix L = (step % 2) * 0.1 * random_matrix<kD, kD>(random);
-    filter.propagate(A, B, L);
-    dense.propagate(A, B, L);
+    const Filter::DynamicVector noise = (step % 2) * 0.1 * random_matrix<kD, 1>(random).cwiseAbs();
+    filter.propagate(A.inverse(), B, noise);
+    dense.propagate(A, B, noise);
     ASSERT_LT((covariance(filter) - dense.P).norm(), 1e-10 * dense.P.norm()) << step;
     const Eigen::Matrix<double, 2, kN> H = random_matrix<2, kN>(random);
     const Eigen::Matrix<double, 2, kN> through = filter.through_uncertainty<2>(H);
@@ -79,7 +80,7 @@ TEST(SquareRootInformation, UnobservedDirectionStaysUnobservedThroughManySteps) 
     static_cast<void>(filter.update<2>(H, Eigen::Vector2d::Zero()));
     if (step > kN) {
       const Filter::DynamicByConstants B = 0.01 * random_matrix<kD, kN - kD>(random);
-      filter.propagate(Filter::DynamicMatrix::Identity(), B, Filter::DynamicMatrix::Zero());
+      filter.propagate(Filter::DynamicMatrix::Identity(), B, Filter::DynamicVector::Zero());
       null.head<kD>() += B * null.tail<kN - kD>();
     }
     scale = filter.root().norm();

@@ -1,7 +1,6 @@
 #pragma once
 /// What the calibration filters have in common: noise and prior they are set up with, and the report on each fix.
 
-#include <Eigen/Cholesky>
 #include <Eigen/Core>
 #include <algorithm>
 #include <chrono>
@@ -9,6 +8,7 @@
 #include <optional>
 
 #include "trihedron/core/attitude.hpp"
+#include "trihedron/core/cholesky.hpp"
 #include "trihedron/core/per_gyro.hpp"
 #include "trihedron/core/precession.hpp"
 #include "trihedron/core/result.hpp"
@@ -162,14 +162,13 @@ template <int P>
   if (!(sigma.array() > 0).all() || !sigma.allFinite()) {
     return SetupFault::kPriorNotPositiveDefinite;
   }
-  const Eigen::Matrix<double, P, P> correlation =
+  Eigen::Matrix<double, P, P> factor =
       sigma.cwiseInverse().asDiagonal() * covariance * sigma.cwiseInverse().asDiagonal();
-  const Eigen::LLT<Eigen::Matrix<double, P, P>> factor(correlation);
-  if (!(factor.info() == Eigen::Success) || !(factor.matrixLLT().diagonal().array() > 1e-12).all()) {
+  if (!factorize(factor) || !(factor.diagonal().array() > 1e-12).all()) {
     return SetupFault::kPriorNotPositiveDefinite;
   }
   Eigen::Matrix<double, P, P> root = sigma.cwiseInverse().asDiagonal();
-  factor.matrixL().solveInPlace(root);
+  solve_lower(factor, root);
   return root;
 }
 

@@ -1,12 +1,12 @@
 #pragma once
 /// Readings of several samples taken together: the body moves smoothly, the readout noise is white.
 
-#include <Eigen/Cholesky>
 #include <Eigen/Core>
 #include <algorithm>
 #include <array>
 #include <cmath>
 
+#include "trihedron/core/cholesky.hpp"
 #include "trihedron/core/per_gyro.hpp"
 #include "trihedron/core/telemetry.hpp"
 
@@ -59,14 +59,14 @@ template <int N, int Capacity>
   // Time in units of the reach of the samples, so that the normal equations are well conditioned.
   const double reach_s =
       std::max({std::abs(to_seconds(buffer[begin].t - t)), std::abs(to_seconds(buffer[end - 1].t - t)), 1e-9});
-  Eigen::Matrix<double, kTerms, kTerms> normal = Eigen::Matrix<double, kTerms, kTerms>::Identity();
+  Eigen::Matrix<double, kTerms, kTerms> normal = Eigen::Matrix<double, kTerms, kTerms>::Zero();
+  normal.diagonal().tail(kTerms - terms).setOnes();  // what is not fitted stays zero
   Eigen::Matrix<double, kTerms, 3 * N> right = Eigen::Matrix<double, kTerms, 3 * N>::Zero();
-  normal.topLeftCorner(terms, terms).setZero();
   Eigen::Matrix<double, 1, 3 * N> squares = Eigen::Matrix<double, 1, 3 * N>::Zero();
   Eigen::Matrix<double, 1, 3 * N> first;
   for (int i = begin; i < end; ++i) {
     const double x = to_seconds(buffer[i].t - t) / reach_s;
-    const Eigen::Vector4d powers(1, x, terms > 2 ? x * x : 0, terms > 3 ? x * x * x : 0);
+    const Eigen::Vector4d powers(1, terms > 1 ? x : 0, terms > 2 ? x * x : 0, terms > 3 ? x * x * x : 0);
     Eigen::Matrix<double, 1, 3 * N> h;
     for (int k = 0; k < N; ++k) {
       h.template segment<3>(3 * k) = buffer[i].h_b[k].transpose();
@@ -74,14 +74,15 @@ template <int N, int Capacity>
     if (i == begin) {
       first = h;
     }
-    normal.topLeftCorner(terms, terms) += powers.head(terms) * powers.head(terms).transpose();
+    normal += powers * powers.transpose();
     // Differences from the first sample: the sums keep their digits.
     const Eigen::Matrix<double, 1, 3 * N> apart = h - first;
-    right.topRows(terms) += powers.head(terms) * apart;
+    right += powers * apart;
     squares += apart.cwiseAbs2();
   }
-  const Eigen::LLT<Eigen::Matrix<double, kTerms, kTerms>> factor(normal);
-  const Eigen::Matrix<double, kTerms, 3 * N> coefficients = factor.solve(right);
+  const Eigen::Matrix<double, kTerms, kTerms> L = cholesky_root<kTerms>(normal);
+  Eigen::Matrix<double, kTerms, 3 * N> coefficients = right;
+  solve_factorized(L, coefficients);
   squares -= coefficients.cwiseProduct(right).colwise().sum();
   FittedDirections<N> result;
   result.freedom = 2 * (end - begin - terms);
@@ -97,8 +98,9 @@ template <int N, int Capacity>
       result.h_b_rate[k] = rate - result.h_b[k] * result.h_b[k].dot(rate);
     }
   }
-  const Eigen::Vector4d at_zero = factor.solve(Eigen::Vector4d::UnitX());
-  result.noise_factor = std::sqrt(at_zero(0));
+  Eigen::Vector4d at_zero = Eigen::Vector4d::UnitX();
+  solve_lower(L, at_zero);
+  result.noise_factor = at_zero.norm();
   return result;
 }
 

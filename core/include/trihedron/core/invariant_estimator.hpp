@@ -2,7 +2,6 @@
 /// Calibration filter on the invariant error: φ_k of each momentum in `in`, δ_k of each alignment in c. What no
 /// measurement can see stays unseen whatever the estimate is.
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <array>
 #include <chrono>

@@ -55,7 +55,7 @@ template <int N, int Columns>
     const double white = readout_noise_rad[k] * readout_noise_rad[k] + walk_variance_rad2;
     solution.covariance_rad2 += white * by_phi * by_phi.transpose();
   }
-  solution.covariance_rad2 += spread * spread.transpose();
+  solution.covariance_rad2 += gram(spread);
   return solution;
 }
 
@@ -90,7 +90,7 @@ class Navigator {
     const Eigen::Matrix3d& C_in_c = attitude.C_in_c.raw();
     errors_.setZero();
     errors_.template block<kParameters, kParameters>(Errors::kDirections, 0) = estimator.prior_parameter_root();
-    const Eigen::Matrix3d attitude_root = attitude.covariance_rad2.llt().matrixL();
+    const Eigen::Matrix3d attitude_root = cholesky_root<3>(attitude.covariance_rad2);
     for (int k = 0; k < kGyros; ++k) {
       gyros_[k].h_in = (C_in_c * gyros_[k].in_c(h_b[k])).normalized();
       // φ = C_in_c (δ + ε − h_c × C_c_b Δb): h_in was read through what is held at the estimated attitude.

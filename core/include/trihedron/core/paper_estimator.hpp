@@ -75,7 +75,7 @@ class PaperEstimator {
   [[nodiscard]] const Gyros& prior_gyros() const { return setup_.prior; }
   /// A square root of the prior covariance, rows as the parameters in ErrorLayout.
   [[nodiscard]] Eigen::Matrix<double, Layout::kParameters, Layout::kParameters> prior_parameter_root() const {
-    return setup_.prior_covariance.llt().matrixL();
+    return cholesky_root<Layout::kParameters>(setup_.prior_covariance);
   }
 
   /// Prediction of both momenta over one step, attitude and readings of its middle. Needs started().

@@ -3,7 +3,6 @@
 /// Sequential Estimation", 1977; process noise after Dyer and McReynolds, 1969).
 
 #include <Eigen/Core>
-#include <Eigen/LU>
 #include <cmath>
 
 #include "trihedron/core/assert.hpp"
@@ -38,6 +37,13 @@ void rotate_into(Eigen::MatrixBase<Root>& root, Eigen::MatrixBase<Extra>& extra,
   }
 }
 
+/// rows · rowsᵀ: with rows seen through an uncertainty, their covariance. For so few of them the library's blocked
+/// product spends its time on packing, and the compiler's on instantiating it.
+template <class S, int M, int N, int Order>
+[[nodiscard]] Eigen::Matrix<S, M, M> gram(const Eigen::Matrix<S, M, N, Order>& rows) {
+  return rows.lazyProduct(rows.transpose());
+}
+
 /// Estimate errors x ~ (0, (RᵀR)⁻¹) of N states, the first D of which move; the other N − D are constants. R is upper
 /// triangular. A direction without information costs nothing and gains nothing: R times it stays zero to rounding,
 /// whatever the number of steps. The estimate itself is kept by the owner, who adds each correction to it ("feedback"),
@@ -49,6 +55,7 @@ class SquareRootInformation {
   static constexpr int kDynamic = D;
   using Vector = Eigen::Matrix<S, N, 1>;
   using Matrix = Eigen::Matrix<S, N, N>;
+  using DynamicVector = Eigen::Matrix<S, D, 1>;
   using DynamicMatrix = Eigen::Matrix<S, D, D>;
   using DynamicByConstants = Eigen::Matrix<S, D, N - D>;
   template <int M>
@@ -70,27 +77,26 @@ class SquareRootInformation {
     rotate_into(root_, extra, N);
   }
 
-  /// Time update: x_d ← A x_d + B x_c + L w, w ~ (0, I). A must be invertible; L = 0 is allowed.
-  void propagate(const DynamicMatrix& A, const DynamicByConstants& B, const DynamicMatrix& L) {
-    // Rows of R with x_d(before) = A⁻¹ (x_d(after) − B x_c − L w) put in: columns are w, x_d(after), x_c. Then w is
-    // eliminated.
+  /// Time update: x_d ← A x_d + B x_c + w, w of independent components with 1-sigma `noise`, which may be zero.
+  void propagate(const DynamicMatrix& A_inverse, const DynamicByConstants& B, const DynamicVector& noise) {
+    // Rows of R with x_d(before) = A⁻¹ (x_d(after) − B x_c − w) put in: columns are w / noise, x_d(after), x_c. Then
+    // w is eliminated.
     Eigen::Matrix<S, D, D + N> moved;
-    const DynamicMatrix R_d =
-        root_.template topLeftCorner<D, D>().template triangularView<Eigen::Upper>() * A.inverse();
-    moved.template leftCols<D>() = -R_d * L;
+    const DynamicMatrix R_d = root_.template topLeftCorner<D, D>().lazyProduct(A_inverse);
+    moved.template leftCols<D>() = -R_d * noise.asDiagonal();
     moved.template middleCols<D>(D) = R_d;
-    moved.template rightCols<N - D>() = root_.template block<D, N - D>(0, D) - R_d * B;
-    Eigen::Matrix<S, D, D + N, Eigen::RowMajor> noise;
-    noise.setZero();
-    noise.template leftCols<D>().setIdentity();
-    rotate_into(noise, moved, D);
+    moved.template rightCols<N - D>() = root_.template block<D, N - D>(0, D) - R_d.lazyProduct(B);
+    Eigen::Matrix<S, D, D + N, Eigen::RowMajor> white;
+    white.setZero();
+    white.template leftCols<D>().setIdentity();
+    rotate_into(white, moved, D);
     auto top = root_.template topLeftCorner<D, N>();
     auto kept = moved.template rightCols<N>();
     top.setZero();
     rotate_into(top, kept, D);
   }
 
-  /// H R⁻¹: rows of H seen through the present uncertainty; H P Hᵀ is its product with its transpose. Needs regular().
+  /// H R⁻¹: rows of H seen through the present uncertainty; H P Hᵀ is its gram(). Needs regular().
   template <int M>
   [[nodiscard]] Rows<M> through_uncertainty(const Rows<M>& H) const {
     TRIHEDRON_ASSERT(regular());

@@ -1,0 +1,25 @@
+#pragma once
+/// Cholesky factors of small matrices: compiled once for all sizes, since each takes the compiler seconds. Nothing is
+/// allocated.
+
+#include <Eigen/Core>
+
+namespace trihedron {
+
+/// In place: a = L Lᵀ becomes L, zero above the diagonal. False, and `a` of no use, unless it is positive definite.
+[[nodiscard]] bool factorize(Eigen::Ref<Eigen::MatrixXd> a);
+
+/// In place: b becomes L⁻¹ b.
+void solve_lower(const Eigen::Ref<const Eigen::MatrixXd>& L, Eigen::Ref<Eigen::MatrixXd> b);
+
+/// In place: b becomes (L Lᵀ)⁻¹ b.
+void solve_factorized(const Eigen::Ref<const Eigen::MatrixXd>& L, Eigen::Ref<Eigen::MatrixXd> b);
+
+/// L of a = L Lᵀ; `a` must be positive definite.
+template <int M>
+[[nodiscard]] Eigen::Matrix<double, M, M> cholesky_root(Eigen::Matrix<double, M, M> a) {
+  static_cast<void>(factorize(a));
+  return a;
+}
+
+}  // namespace trihedron
