@@ -11,12 +11,12 @@ bool factorize(Eigen::Ref<Eigen::MatrixXd> a) {
 }
 
 void solve_lower(const Eigen::Ref<const Eigen::MatrixXd>& L, Eigen::Ref<Eigen::MatrixXd> b) {
-  L.triangularView<Eigen::Lower>().solveInPlace(b);
+  b = L.triangularView<Eigen::Lower>().solve(b);
 }
 
 void solve_factorized(const Eigen::Ref<const Eigen::MatrixXd>& L, Eigen::Ref<Eigen::MatrixXd> b) {
-  solve_lower(L, b);
-  L.transpose().triangularView<Eigen::Upper>().solveInPlace(b);
+  b = L.triangularView<Eigen::Lower>().solve(b);
+  b = L.transpose().triangularView<Eigen::Upper>().solve(b);
 }
 
 }  // namespace trihedron
