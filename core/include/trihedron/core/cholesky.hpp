@@ -15,7 +15,7 @@ void solve_lower(const Eigen::Ref<const Eigen::MatrixXd>& L, Eigen::Ref<Eigen::M
 /// In place: b becomes (L Lᵀ)⁻¹ b.
 void solve_factorized(const Eigen::Ref<const Eigen::MatrixXd>& L, Eigen::Ref<Eigen::MatrixXd> b);
 
-/// L of a = L Lᵀ; `a` must be positive definite.
+/// L of a = L Lᵀ; of no use unless `a` is positive definite.
 template <int M>
 [[nodiscard]] Eigen::Matrix<double, M, M> cholesky_root(Eigen::Matrix<double, M, M> a) {
   static_cast<void>(factorize(a));

@@ -84,6 +84,7 @@ class Cycle {
   static constexpr int kSetBackSamples = 16;
   static constexpr int kBufferedSamples = 64;
   static constexpr int kBufferedFixes = 8;
+  /// Over a longer step the readings do not tell how far the body turned.
   static constexpr double kQuarterOrbit_s = 1300;
 
   [[nodiscard]] static Result<Cycle, SetupFault> create(const Setup& setup, const CorrectionPolicy& policy);
