@@ -150,9 +150,13 @@ void InvariantEstimator<Base, N, F>::start(const Eigen::Matrix3d& C_in_c, const 
 template <class Base, int N, FurtherStates F>
 auto InvariantEstimator<Base, N, F>::attitude(const Gyros& gyros, const Directions& h_b, const GyroMask<N>& used)
     -> Result<AttitudeByDirections<N>, DirectionsFault> {
-  PerGyro<double, N> weight;
-  std::transform(used.begin(), used.end(), weight.begin(), [](bool it) { return it ? 1.0 : 0.0; });
-  return optimal_attitude<N>(momenta(gyros), in_c(gyros, h_b), weight);
+  return optimal_attitude<N>(momenta(gyros), in_c(gyros, h_b), used);
+}
+
+template <class Base, int N, FurtherStates F>
+auto InvariantEstimator<Base, N, F>::rotation(const Gyros& gyros, const Directions& h_b, const GyroMask<N>& used)
+    -> Result<Rot<In, C>, DirectionsFault> {
+  return optimal_rotation<N>(momenta(gyros), in_c(gyros, h_b), used);
 }
 
 template <class Base, int N, FurtherStates F>
@@ -421,7 +425,9 @@ auto InvariantEstimator<Base, N, F>::measure_angles(const Eigen::Matrix3d& C_in_
 
 template <class Base, int N, FurtherStates F>
 bool InvariantEstimator<Base, N, F>::is_fault(double nis, double misfit_rad, const GyroMask<N>& used) const {
-  return nis > kPlain * setup_.gate_nis && (count(used) > 2 || (gate_.begun_anew() && misfit_rad > kPlainOfTwo_rad));
+  // Estimates from which the filter has begun anew may be what is wrong: next it begins from what was known.
+  const bool last_resort = gate_.begun_anew() && !begun_from_estimates_ && misfit_rad > kPlainOfTwo_rad;
+  return nis > kPlain * setup_.gate_nis && (count(used) > 2 || last_resort);
 }
 
 template <class Base, int N, FurtherStates F>

@@ -83,6 +83,7 @@ TEST(Cycle, CorrectsTheNavigatorAsOftenAsTold) {
   EXPECT_EQ(corrections({.interval = std::chrono::minutes(10)}), 4);  // at 0, 10, 20 and 30 min
   EXPECT_EQ(corrections({.interval = CorrectionPolicy::kOnlyFirst}), 1);
   EXPECT_EQ(corrections({.interval = CorrectionPolicy::kEveryFix}), 601);
+  EXPECT_EQ(corrections({.navigate = false}), 0);
 }
 
 TEST(Cycle, AttitudeImprovesWithTheParametersTakenOver) {

@@ -48,7 +48,7 @@ TEST(FitDirections, FollowsTheBodyAtAnyTimeOfTheWindow) {
     buffer.push(sample(0.125 * i));
   }
   for (const double t_s : {1.375, 1.4, 2.75}) {
-    const auto fit = fit_directions(buffer, 0, 23, at(t_s), 3);
+    const auto fit = fit_directions<2>(buffer, 0, 23, at(t_s), 3);
     const GyroSample<2> truth = sample(t_s);
     const Eigen::Vector3d rate = (sample(t_s + 1e-3).h_b[1] - sample(t_s - 1e-3).h_b[1]) / 2e-3;
     for (int k = 0; k < 2; ++k) {
@@ -73,7 +73,7 @@ TEST(FitDirections, HasTheNoiseItClaims) {
       for (int i = 0; i <= 22; ++i) {
         buffer.push(sample(0.125 * i, kNoise, &random));
       }
-      const auto fit = fit_directions(buffer, 0, 23, at(at_s), degree);
+      const auto fit = fit_directions<2>(buffer, 0, 23, at(at_s), degree);
       const GyroSample<2> truth = sample(at_s);
       claimed = fit.noise_factor * kNoise;
       freedom = fit.freedom;
@@ -91,13 +91,13 @@ TEST(FitDirections, HasTheNoiseItClaims) {
 TEST(FitDirections, TakesALowerDegreeOfFewSamples) {
   Buffer buffer;
   buffer.push(sample(0));
-  const auto one = fit_directions(buffer, 0, 1, at(0), 3);
+  const auto one = fit_directions<2>(buffer, 0, 1, at(0), 3);
   EXPECT_LT((one.h_b[0] - sample(0).h_b[0]).norm(), 1e-15);
   EXPECT_EQ(one.h_b_rate[0].norm(), 0);
   EXPECT_DOUBLE_EQ(one.noise_factor, 1);
   buffer.push(sample(0.125));
   buffer.push(sample(0.25));
-  const auto three = fit_directions(buffer, 0, 3, at(0.125), 3);
+  const auto three = fit_directions<2>(buffer, 0, 3, at(0.125), 3);
   EXPECT_LT(angle_between<double>(three.h_b[0], sample(0.125).h_b[0]), 1e-5);
   EXPECT_NEAR(three.noise_factor, std::sqrt(1.0 / 3), 1e-12);
 }

@@ -31,18 +31,20 @@ Directions in_body(const Eigen::Matrix<double, 3 * kN, 1>& rho = Eigen::Matrix<d
   return h;
 }
 
-PerGyro<double, kN> weights(double w0, double w1, double w2) {
-  PerGyro<double, kN> w;
-  w[0] = w0;
-  w[1] = w1;
-  w[2] = w2;
-  return w;
+constexpr GyroMask<kN> kAll = all_gyros<kN>();
+
+GyroMask<kN> all_but(std::initializer_list<int> gyros) {
+  GyroMask<kN> used = kAll;
+  for (const int k : gyros) {
+    used[k] = false;
+  }
+  return used;
 }
 
 double off(const Rot<In, C>& attitude) { return (kAttitude.inverse() * attitude).log().norm(); }
 
 TEST(OptimalAttitude, IsExactForDirectionsThatAgree) {
-  EXPECT_LT(off(optimal_attitude<kN>(in_space(), in_body(), weights(1, 2, 3)).value().C_in_c), 1e-15);
+  EXPECT_LT(off(optimal_attitude<kN>(in_space(), in_body(), kAll).value().C_in_c), 1e-15);
 }
 
 TEST(OptimalAttitude, IsThatOfTheSingularValueDecomposition) {
@@ -51,24 +53,22 @@ TEST(OptimalAttitude, IsThatOfTheSingularValueDecomposition) {
   rho << 5e-3, -3e-3, 8e-3, -7e-3, 2e-3, 4e-3, 1e-3, 6e-3, -9e-3;
   const Directions in = in_space();
   const Directions c = in_body(rho);
-  const auto w = weights(1, 2, 0.5);
   Eigen::Matrix3d B = Eigen::Matrix3d::Zero();
   for (int k = 0; k < kN; ++k) {
-    B += w[k] * in[k] * c[k].transpose();
+    B += in[k] * c[k].transpose();
   }
   const Eigen::JacobiSVD<Eigen::Matrix3d> svd(B, Eigen::ComputeFullU | Eigen::ComputeFullV);
   const double sign = svd.matrixU().determinant() * svd.matrixV().determinant();
   const Eigen::Matrix3d expected = svd.matrixU() * Eigen::Vector3d(1, 1, sign).asDiagonal() * svd.matrixV().transpose();
   // Three steps of Gauss–Newton: what is left is of the fourth order in the disagreement.
-  EXPECT_LT((optimal_attitude<kN>(in, c, w).value().C_in_c.raw() - expected).norm(), 1e-8);
+  EXPECT_LT((optimal_attitude<kN>(in, c, kAll).value().C_in_c.raw() - expected).norm(), 1e-8);
 }
 
 TEST(OptimalAttitude, ErrorFollowsErrorsOfTheDirections) {
-  const auto w = weights(1, 2, 0.5);
-  const auto solution = optimal_attitude<kN>(in_space(), in_body(), w).value();
+  const auto solution = optimal_attitude<kN>(in_space(), in_body(), kAll).value();
   // True C = est · exp([ε×]), ε = J (C_c_in φ − ρ): a direction read too far by ρ has the true one at −ρ.
   const auto error = [&](const Eigen::Matrix<double, 3 * kN, 1>& rho) {
-    const auto moved = optimal_attitude<kN>(in_space(), in_body(rho), w).value().C_in_c;
+    const auto moved = optimal_attitude<kN>(in_space(), in_body(rho), kAll).value().C_in_c;
     return Eigen::Vector3d((moved.inverse() * solution.C_in_c).log().raw());
   };
   test::expect_jacobian(
@@ -76,18 +76,18 @@ TEST(OptimalAttitude, ErrorFollowsErrorsOfTheDirections) {
       test::central_differences<decltype(error)&, 3 * kN>(error, Eigen::Matrix<double, 3 * kN, 1>::Zero(), 1e-5), 1e-8);
 }
 
-TEST(OptimalAttitude, DoesNotLookAtADirectionWithoutWeight) {
+TEST(OptimalAttitude, DoesNotLookAtADirectionThatIsNotUsed) {
   Directions c = in_body();
   c[1] = rotated<double>(c[1], Eigen::Vector3d(0.5, 0, 0));
-  EXPECT_GT(off(optimal_attitude<kN>(in_space(), c, weights(1, 1, 1)).value().C_in_c), 0.1);
-  EXPECT_LT(off(optimal_attitude<kN>(in_space(), c, weights(1, 0, 1)).value().C_in_c), 1e-15);
+  EXPECT_GT(off(optimal_attitude<kN>(in_space(), c, kAll).value().C_in_c), 0.1);
+  EXPECT_LT(off(optimal_attitude<kN>(in_space(), c, all_but({1})).value().C_in_c), 1e-15);
 }
 
 TEST(OptimalAttitude, NeedsTwoDirectionsApart) {
-  EXPECT_EQ(optimal_attitude<kN>(in_space(), in_body(), weights(1, 0, 0)).fault(), DirectionsFault::kTooFew);
+  EXPECT_EQ(optimal_attitude<kN>(in_space(), in_body(), all_but({1, 2})).fault(), DirectionsFault::kTooFew);
   Directions in = in_space();
   in[2] = in[1] = -in[0];
-  EXPECT_EQ(optimal_attitude<kN>(in, in_body(), weights(1, 1, 1)).fault(), DirectionsFault::kMomentaNearlyParallel);
+  EXPECT_EQ(optimal_attitude<kN>(in, in_body(), kAll).fault(), DirectionsFault::kMomentaNearlyParallel);
 }
 
 TEST(OptimalAttitude, OfTwoAlikeIsExactHoweverTheyDisagree) {
@@ -98,9 +98,7 @@ TEST(OptimalAttitude, OfTwoAlikeIsExactHoweverTheyDisagree) {
   PerGyro<Eigen::Vector3d, 2> c;
   c[0] = Eigen::Vector3d(0.8, 0.6, 0);
   c[1] = Eigen::Vector3d(-0.8, 0.6, 0);
-  PerGyro<double, 2> alike;
-  alike[0] = alike[1] = 1;
-  EXPECT_LT(optimal_attitude<2>(in, c, alike).value().C_in_c.log().norm(), 1e-15);
+  EXPECT_LT(optimal_attitude<2>(in, c, all_gyros<2>()).value().C_in_c.log().norm(), 1e-15);
 }
 
 TEST(OptimalAttitude, OfTwoIsBetterThanTheTrihedron) {
@@ -108,9 +106,7 @@ TEST(OptimalAttitude, OfTwoIsBetterThanTheTrihedron) {
   PerGyro<Eigen::Vector3d, 2> in;
   in[0] = Eigen::Vector3d::UnitX();
   in[1] = Eigen::Vector3d::UnitY();
-  PerGyro<double, 2> alike;
-  alike[0] = alike[1] = 1;
-  const auto optimal = optimal_attitude<2>(in, in, alike).value().by_directions;
+  const auto optimal = optimal_attitude<2>(in, in, all_gyros<2>()).value().by_directions;
   const auto trihedron = trihedron_attitude(in, in).value().by_directions;
   EXPECT_NEAR((optimal * optimal.transpose()).trace(), 2.5, 1e-12);
   EXPECT_NEAR((trihedron * trihedron.transpose()).trace(), 3, 1e-12);

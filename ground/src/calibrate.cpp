@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "decide.hpp"
+#include "refine.hpp"
 #include "setup.hpp"
 #include "trihedron/ground/replay.hpp"
 #include "trihedron/ground/verdict.hpp"
@@ -187,44 +188,42 @@ class AngleTrack {
 
 /// The further states that are on, but for wandering drift.
 template <class Estimator>
-std::vector<FurtherEstimate> further_of(const Estimator& estimator, const Pass& pass,
-                                        const FurtherStateOptions& states) {
+std::vector<FurtherEstimate> further_of(const Estimator& estimator, const FurtherStateOptions& states,
+                                        int further_heads) {
   std::vector<FurtherEstimate> further;
   if constexpr (requires { estimator.shared(); }) {
     if constexpr (Estimator::kFurther.shared() > 0) {
       using Layout = typename Estimator::Layout;
       const auto root = estimator.information().inverse_root();
-      const auto tell = [&](std::string name, int state) {
-        further.push_back({std::move(name), estimator.shared()(state - Layout::kShared), root.row(state).norm()});
+      const std::vector<std::string> names = further_names(states, further_heads, Estimator::kGyros);
+      const auto tell = [&](double value, int state) {
+        further.push_back({names[further.size()], value, root.row(state).norm()});
+      };
+      const auto tell_shared = [&](int first, int size) {
+        for (int state = first; state < first + size; ++state) {
+          tell(estimator.shared()(state - Layout::kShared), state);
+        }
       };
       constexpr auto kOn = FurtherStateOptions::Choice::kOn;
-      if (states.clock_offset == kOn) {
-        tell("clock_offset_s", Layout::clock_offset());
-      }
-      if (states.orbital_error == kOn) {
-        int state = Layout::orbital_error();
-        for (const char* wave : {"sine", "cosine"}) {
-          for (const char axis : {'x', 'y', 'z'}) {
-            tell(fmt::format("orbital_{}_{}_rad", wave, axis), state++);
-          }
-        }
-      }
-      if (!pass.further_star_trackers.empty()) {
-        for (int i = 0; i < 3; ++i) {
-          tell(fmt::format("star_tracker_2_align_{}_rad", "xyz"[i]), Layout::head(1) + i);
-        }
-      }
+      tell_shared(Layout::clock_offset(), states.clock_offset == kOn ? 1 : 0);
+      tell_shared(Layout::orbital_error(), states.orbital_error == kOn ? 6 : 0);
+      tell_shared(Layout::head(1), 3 * further_heads);
       if (states.readout_bias == kOn) {
         for (int k = 0; k < Estimator::kGyros; ++k) {
           for (int i = 0; i < 3; ++i) {
-            further.push_back({fmt::format("gyro{}_readout_bias_{}_rad", k + 1, "xyz"[i]),
-                               estimator.gyros()[k].readout_bias(i), root.row(Layout::readout_bias(k) + i).norm()});
+            tell(estimator.gyros()[k].readout_bias(i), Layout::readout_bias(k) + i);
           }
         }
       }
     }
   }
   return further;
+}
+
+/// Star trackers beside the first that the estimator uses.
+template <class Estimator>
+int further_heads(const Pass& pass) {
+  return std::min(static_cast<int>(pass.further_star_trackers.size()), Cycle<Estimator>::kHeads - 1);
 }
 
 template <class Estimator>
@@ -238,7 +237,7 @@ Calibration result_of(const Pass& pass, const Cycle<Estimator>& cycle, const Cal
     result.gyros.push_back(to_record<Model>(gyro));
   }
   const FurtherStateOptions& states = options.further_states;
-  result.further = further_of(cycle.estimator(), pass, states);
+  result.further = further_of(cycle.estimator(), states, further_heads<Estimator>(pass));
   result.noise = CalibrationNoise{options.direction_random_walk_rad_sqrt_s, options.star_tracker_noise_rad};
   if (states.wandering_drift == FurtherStateOptions::Choice::kOn) {
     result.noise->wandering_drift_rad_s = states.wandering_drift_rad_s;
@@ -269,7 +268,7 @@ Correction correction_of(const Estimator& estimator, const AttitudeSolution& att
 
 template <class Estimator>
 CalibrationRun calibrate_with(const Pass& pass, Decision decision, const Progress& progress) {
-  const auto cycle = make_cycle<Estimator>(pass, decision.options);
+  const auto cycle = make_cycle<Estimator>(pass, decision.options, policy_of(decision.options.corrections));
   CalibrationRun run;
   run.options = std::move(decision.options);
   run.evidence = std::move(decision.evidence);
@@ -277,9 +276,15 @@ CalibrationRun calibrate_with(const Pass& pass, Decision decision, const Progres
   Time corrected{};
   decltype(Cycle<Estimator>::Report::gyros) gyros_before{};
   double angle_looks = 0;
+  const bool batch = run.options.estimator == kBatch;
+  ScreenedPass screened;
+  screened.gyros = Estimator::kGyros;
   const auto on_fix = [&](const typename Cycle<Estimator>::Report& report) {
     run.fixes.push_back(record_of(report));
     ++run.fix_counts[name_of(report.fix.status)];
+    if (batch) {
+      screened.add_fix(report);
+    }
     corrected = report.corrected ? report.fix.t : corrected;
     if (report.fix.used()) {
       run.parameters.t.push_back(report.fix.t);
@@ -304,8 +309,12 @@ CalibrationRun calibrate_with(const Pass& pass, Decision decision, const Progres
   };
   std::array<long, kSampleStatuses> samples{};
   Meter meter(progress, pass.gyro.size());
+  std::size_t sample = 0;
   replay(pass, *cycle, on_fix, [&](const typename Cycle<Estimator>::Report& report) {
     ++samples[static_cast<std::size_t>(report.sample)];
+    if (batch) {
+      screened.add_sample(pass.gyro, sample++, report);
+    }
     for (int k = 0; k < Estimator::kGyros; ++k) {
       if (report.gyros[k] != gyros_before[k]) {
         run.gyro_events.push_back({report.t, k, report.gyros[k]});
@@ -332,13 +341,21 @@ CalibrationRun calibrate_with(const Pass& pass, Decision decision, const Progres
   run.calibration = result_of(pass, *cycle, run.options);
   run.calibration.statistics = statistics_of(run.fixes);
   run.calibration.statistics["angle_looks"] = angle_looks;
+  if constexpr (requires { cycle->estimator().setup().orbital_rate_rad_s; }) {
+    if (batch) {
+      refine(
+          screened,
+          pass_setup<Estimator>(cycle->estimator().setup(), run.options.further_states, further_heads<Estimator>(pass)),
+          run);
+    }
+  }
   run.calibration.verdict = judge(pass, run);
   return run;
 }
 
 template <class Estimator>
 NavigationRun navigate_with(const Pass& pass, const CalibrationOptions& options, const Progress& progress) {
-  const auto cycle = make_cycle<Estimator>(pass, options);
+  const auto cycle = make_cycle<Estimator>(pass, options, policy_of(options.corrections));
   NavigationRun run;
   Time corrected{};
   Meter meter(progress, pass.gyro.size());

@@ -46,12 +46,12 @@ double log_evidence(const Eigen::VectorXd& estimate, const Eigen::MatrixXd& root
 template <class Estimator>
 class Trial {
  public:
-  Trial(const Pass& pass, const CalibrationOptions& options) : cycle_(make_cycle<Estimator>(pass, options)) {
+  Trial(const Pass& pass, const CalibrationOptions& options)
+      : cycle_(make_cycle<Estimator>(pass, options, {.navigate = false})) {
     const auto ignore = [](const auto&) {};
     const double gate_nis = options.gate_nis;
     std::optional<Eigen::Quaterniond> last;
     Time last_t{};
-    auto fix = pass.star_tracker.t.begin();
     const auto on_fix = [&](const typename Cycle<Estimator>::Report& report) {
       if (report.fix.status != FixStatus::kUsed && report.fix.status != FixStatus::kRejectedByGate) {
         return;
@@ -59,16 +59,11 @@ class Trial {
       // An outlier counts as one, however far out it is.
       log_likelihood_ -= std::min(report.fix.nis, gate_nis) / 2 +
                          report.fix.innovation_covariance.llt().matrixLLT().diagonal().array().log().sum();
-      if (report.fix.head != 0) {
+      if (report.fix.head != 0 || !report.calibrated || !report.compared) {
         return;
       }
-      fix = std::lower_bound(fix, pass.star_tracker.t.end(), report.fix.t);
-      if (!report.calibrated || fix == pass.star_tracker.t.end() || *fix != report.fix.t) {
-        return;
-      }
-      const auto i = static_cast<std::size_t>(fix - pass.star_tracker.t.begin());
       const Eigen::Quaterniond apart =
-          report.calibrated->C_in_c.quaternion().conjugate() * pass.star_tracker.q_in_c[i].normalized();
+          report.calibrated->C_in_c.quaternion().conjugate() * report.compared->fix.q_in_c.normalized();
       if (last && report.fix.t - last_t < kClose) {
         const Eigen::Vector3d change = Rot<C, C>::assume(last->conjugate() * apart).log().raw();
         for (int axis = 0; axis < 3; ++axis) {
@@ -408,7 +403,7 @@ Decision decide(const Pass& pass, const CalibrationOptions& asked) {
   Decision decision{asked, {}};
   CalibrationOptions& options = decision.options;
   options.find_noise = false;
-  const bool invariant = asked.estimator == Full::kName;
+  const bool invariant = asked.estimator != "paper";
   const std::optional<Calibration>& prior = pass.settings.prior;
   if (prior && prior->noise && asked.find_noise && invariant) {
     use_noise(*prior->noise, options);

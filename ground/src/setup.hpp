@@ -193,8 +193,9 @@ inline CorrectionPolicy policy_of(const CorrectionOptions& options) {
 }
 
 template <class Estimator>
-std::unique_ptr<Cycle<Estimator>> make_cycle(const Pass& pass, const CalibrationOptions& options) {
-  const auto cycle = Cycle<Estimator>::create(make_setup<Estimator>(pass, options), policy_of(options.corrections));
+std::unique_ptr<Cycle<Estimator>> make_cycle(const Pass& pass, const CalibrationOptions& options,
+                                             const CorrectionPolicy& policy) {
+  const auto cycle = Cycle<Estimator>::create(make_setup<Estimator>(pass, options), policy);
   if (!cycle) {
     switch (cycle.fault()) {
       case SetupFault::kPriorNotPositiveDefinite:

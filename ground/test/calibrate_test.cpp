@@ -8,6 +8,7 @@
 #include <numbers>
 #include <vector>
 
+#include "passes.hpp"
 #include "trihedron/core/frames.hpp"
 #include "trihedron/ground/evaluate.hpp"
 #include "trihedron/io/pass.hpp"
@@ -17,33 +18,6 @@ namespace trihedron::ground {
 namespace {
 
 using testing::HasSubstr;
-
-/// The paper's experiment, all drift in eq. (1).
-Scenario scenario_in_eq1(std::uint64_t seed, Duration duration) {
-  Scenario scenario;
-  scenario.seed = seed;
-  scenario.duration = duration;
-  for (GyroScenario& gyro : scenario.gyros) {
-    gyro.drift.outside_sigma_rad_s = 0;
-  }
-  return scenario;
-}
-
-const sim::SimulatedPass& two_hours() {
-  static const sim::SimulatedPass simulated = sim::simulate(scenario_in_eq1(5, std::chrono::hours(2)));
-  return simulated;
-}
-
-/// Nothing left to decide, which takes runs of its own.
-CalibrationOptions told() {
-  CalibrationOptions options;
-  options.drift_model = "esg7";
-  options.find_noise = false;
-  FurtherStateOptions& states = options.further_states;
-  states.clock_offset = states.orbital_error = states.wandering_drift = states.readout_bias =
-      FurtherStateOptions::Choice::kOff;
-  return options;
-}
 
 /// The first minutes of a pass.
 Pass beginning(Pass pass, Duration duration) {
@@ -55,13 +29,6 @@ Pass beginning(Pass pass, Duration duration) {
   cut(pass.star_tracker.t);
   pass.star_tracker.q_in_c.resize(pass.star_tracker.t.size());
   return pass;
-}
-
-Eigen::Vector3d alignment_error(const Truth::Gyro& truth, const GyroCalibration& estimate) {
-  return (Rot<C, B<1>>::exp(Vec<C>::assume(truth.alignment_rotation_vector_rad)) *
-          Rot<C, B<1>>::exp(Vec<C>::assume(estimate.alignment_rotation_vector_rad)).inverse())
-      .log()
-      .raw();
 }
 
 TEST(Calibrate, FindsTheTruthWithinItsSigmas) {

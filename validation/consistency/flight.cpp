@@ -52,9 +52,7 @@ ParameterErrors errors_of(const Estimator& estimator, const Truth& truth) {
 template <class Estimator>
 Outcome calibrate(const sim::SimulatedPass& flown, double walk_rad_sqrt_s, const ParameterErrors& bound_variance) {
   using OnBoard = Cycle<Estimator>;
-  // The navigator beside the calibration is of no interest here.
-  const auto created =
-      OnBoard::create(setup_of<Estimator>(flown.pass.settings, walk_rad_sqrt_s), {CorrectionPolicy::kOnlyFirst});
+  const auto created = OnBoard::create(setup_of<Estimator>(flown.pass.settings, walk_rad_sqrt_s), {.navigate = false});
   const auto cycle = std::make_unique<OnBoard>(created.value());
   Outcome outcome;
   ground::replay(

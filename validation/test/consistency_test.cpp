@@ -133,7 +133,8 @@ TEST(Flights, WithWrongFirstEstimatesAreNotLost) {
       {"slews/plane-normal/1e-05/60arcmin/0e+00", 10},  {"slews/plane-normal/1e-05/300arcmin/0e+00", 12},
       {"slews/plane-plane/1e-07/300arcmin/1e-07", 11},  {"steady/plane-plane/1e-07/300arcmin/0e+00", 1},
       {"steady/plane-plane/1e-05/300arcmin/0e+00", 14}, {"slews/plane-normal/1e-05/300arcmin/1e-07", 11},
-      {"slews/plane-plane/1e-05/300arcmin/1e-08", 9}};
+      {"slews/plane-plane/1e-05/300arcmin/1e-08", 9},   {"slews/plane-plane/1e-06/300arcmin/0e+00", 45},
+      {"slews/plane-plane/1e-06/300arcmin/0e+00", 52},  {"slews/plane-plane/1e-06/300arcmin/1e-08", 46}};
   const std::vector<Cell> cells = grid();
   for (const auto& [name, run] : flights) {
     const auto cell = std::find_if(cells.begin(), cells.end(), [&](const Cell& c) { return c.name() == name; });

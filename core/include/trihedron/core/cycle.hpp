@@ -39,6 +39,7 @@ struct CorrectionPolicy {
   static constexpr Duration kOnlyFirst = Duration::max();
   Duration interval = std::chrono::minutes(90);
   bool take_parameters = true;  ///< false: the parameters of the set-up are held
+  bool navigate = true;         ///< false: the calibration alone, no navigator beside it
 };
 
 /// Complete for every sample, whatever was wrong with it.
@@ -50,6 +51,8 @@ struct StepReport {
   typename Estimator::Report fix;  ///< of the fix that was dealt with in this step, if any; its time is its own
   int fixes_dropped = 0;           ///< that waited when the clock was set back: nobody knows their time now
   bool corrected = false;          ///< the navigator was corrected at that fix
+  /// That fix and what it was compared with, where the estimator looked at it.
+  std::optional<ComparedFix<Estimator::kGyros>> compared;
   /// Attitude at that fix, used or rejected as an outlier: of the calibration itself, and of the open-loop navigator.
   std::optional<AttitudeSolution> calibrated;
   std::optional<AttitudeSolution> navigated;
@@ -144,7 +147,7 @@ class Cycle {
     }
     // The prediction to it is made with the middle of the step.
     if (estimator_.started() && has_sample() &&
-        !Estimator::attitude(estimator_.gyros(), between(samples_.latest().h_b, sample.h_b, 0.5),
+        !Estimator::rotation(estimator_.gyros(), between(samples_.latest().h_b, sample.h_b, 0.5),
                              used_over(t(), sample.t))) {
       return SampleStatus::kRejectedGeometry;
     }
@@ -279,6 +282,7 @@ class Cycle {
     }
     navigator_.extend(stretch);
     judge(report.fix.odd_gyro, report);
+    report.compared = {fix, *readings};
     report.calibrated = calibration_attitude(*readings);
     if (report.fix.used()) {
       used_fix_t_[fix.head] = fix.t;
@@ -326,6 +330,9 @@ class Cycle {
 
   /// Astro-correction of the navigator at the time of this fix, when it is due; then on to the latest sample.
   void correct_navigator(const FixReadings<kGyros>& readings, Report& report) {
+    if (!policy_.navigate) {
+      return;
+    }
     const Time t = report.fix.t;
     const bool interval_over = policy_.interval != CorrectionPolicy::kOnlyFirst && t - corrected_t_ >= policy_.interval;
     // The fix that started both was contradicted by all the fixes after it: the navigator must not rest on it.
@@ -366,10 +373,10 @@ class Cycle {
     if (estimator_.started() && t > follower_t_) {
       Directions middle = between(follower_h_b_, h_b, 0.5);
       const GyroMask<kGyros> used = used_over(follower_t_, t);
-      if (const auto attitude = Estimator::attitude(estimator_.gyros(), middle, used)) {
-        read_by_others(estimator_.gyros(), attitude.value().C_in_c.raw(), used, middle);
+      if (const auto C_in_c = Estimator::rotation(estimator_.gyros(), middle, used)) {
+        read_by_others(estimator_.gyros(), C_in_c.value().raw(), used, middle);
         const double dt_s = to_seconds(t - follower_t_);
-        estimator_.predict(attitude.value().C_in_c.raw(), middle, dt_s);
+        estimator_.predict(C_in_c.value().raw(), middle, dt_s);
         if (t - follower_t_ > kMaxInterpolation) {
           estimator_.add_direction_variance(variance_of_long_step(follower_h_b_, h_b, dt_s));
         }
@@ -383,10 +390,10 @@ class Cycle {
   void predict_navigator(Time from_t, const Directions& from, Time to_t, const Directions& to) {
     Directions middle = between(from, to, 0.5);
     const GyroMask<kGyros> used = used_over(from_t, to_t);
-    if (const auto attitude = navigator_.attitude(middle, used)) {
-      read_by_others(navigator_.gyros(), attitude.value().C_in_c.raw(), used, middle);
+    if (const auto C_in_c = Estimator::rotation(navigator_.gyros(), middle, used)) {
+      read_by_others(navigator_.gyros(), C_in_c.value().raw(), used, middle);
       const double dt_s = to_seconds(to_t - from_t);
-      navigator_.predict(attitude.value().C_in_c.raw(), middle, dt_s);
+      navigator_.predict(C_in_c.value().raw(), middle, dt_s);
       if (to_t - from_t > kMaxInterpolation) {
         navigator_.add_direction_variance(variance_of_long_step(from, to, dt_s));
       }
@@ -504,7 +511,7 @@ class Cycle {
     if (end - begin < 2 * (degree + 1)) {
       return;
     }
-    const FittedDirections<kGyros> fitted = fit_directions(samples_, begin, end, t, degree);
+    const FittedDirections<kGyros> fitted = fit_directions<kGyros>(samples_, begin, end, t, degree);
     const GyroMask<kGyros> used = health_.usable(samples_[begin].t, samples_[end - 1].t);
     if (count(used) < 2 || !explains(fitted, used)) {
       return;
@@ -560,12 +567,12 @@ class Cycle {
     Navigator<Estimator> past = navigator_;
     Directions middle = between(readings.h_b, samples_.latest().h_b, 0.5);
     const GyroMask<kGyros> used = used_over(t, this->t());
-    const auto attitude = past.attitude(middle, used);
-    if (!attitude) {
+    const auto C_in_c = Estimator::rotation(past.gyros(), middle, used);
+    if (!C_in_c) {
       return std::nullopt;
     }
-    read_by_others(past.gyros(), attitude.value().C_in_c.raw(), used, middle);
-    past.predict(attitude.value().C_in_c.raw(), middle, to_seconds(t - this->t()));
+    read_by_others(past.gyros(), C_in_c.value().raw(), used, middle);
+    past.predict(C_in_c.value().raw(), middle, to_seconds(t - this->t()));
     const auto solution = past.attitude_with_covariance(readings, estimator_.since_fix(), estimator_.setup());
     return solution ? std::optional(solution.value()) : std::nullopt;
   }

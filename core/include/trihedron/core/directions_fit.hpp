@@ -48,28 +48,28 @@ struct FittedDirections {
   int freedom = 0;                       ///< of the residuals of one gyro, two components each
 };
 
-/// Least-squares polynomial in time through the samples of begin … end − 1 of `buffer`, at time t: a cubic where there
+/// Least-squares polynomial in time through the samples begin … end − 1, at time t: a cubic where there
 /// are enough of them, less where not. With weights equal, the noise at the middle of 49 samples falls to 0.21 of a
 /// single one. Needs begin < end.
-template <int N, int Capacity>
-[[nodiscard]] FittedDirections<N> fit_directions(const SampleBuffer<N, Capacity>& buffer, int begin, int end, Time t,
-                                                 int max_degree) {
+/// `samples`: anything whose [i] has `t` and `h_b`.
+template <int N, class Samples>
+[[nodiscard]] FittedDirections<N> fit_directions(const Samples& samples, int begin, int end, Time t, int max_degree) {
   constexpr int kTerms = 4;
   const int terms = std::clamp((end - begin + 2) / 3, 1, std::min(max_degree + 1, kTerms));
   // Time in units of the reach of the samples, so that the normal equations are well conditioned.
   const double reach_s =
-      std::max({std::abs(to_seconds(buffer[begin].t - t)), std::abs(to_seconds(buffer[end - 1].t - t)), 1e-9});
+      std::max({std::abs(to_seconds(samples[begin].t - t)), std::abs(to_seconds(samples[end - 1].t - t)), 1e-9});
   Eigen::Matrix<double, kTerms, kTerms> normal = Eigen::Matrix<double, kTerms, kTerms>::Zero();
   normal.diagonal().tail(kTerms - terms).setOnes();  // what is not fitted stays zero
   Eigen::Matrix<double, kTerms, 3 * N> right = Eigen::Matrix<double, kTerms, 3 * N>::Zero();
   Eigen::Matrix<double, 1, 3 * N> squares = Eigen::Matrix<double, 1, 3 * N>::Zero();
   Eigen::Matrix<double, 1, 3 * N> first;
   for (int i = begin; i < end; ++i) {
-    const double x = to_seconds(buffer[i].t - t) / reach_s;
+    const double x = to_seconds(samples[i].t - t) / reach_s;
     const Eigen::Vector4d powers(1, terms > 1 ? x : 0, terms > 2 ? x * x : 0, terms > 3 ? x * x * x : 0);
     Eigen::Matrix<double, 1, 3 * N> h;
     for (int k = 0; k < N; ++k) {
-      h.template segment<3>(3 * k) = buffer[i].h_b[k].transpose();
+      h.template segment<3>(3 * k) = samples[i].h_b[k].transpose();
     }
     if (i == begin) {
       first = h;

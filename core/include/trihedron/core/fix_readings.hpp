@@ -3,6 +3,7 @@
 #include <Eigen/Core>
 
 #include "trihedron/core/per_gyro.hpp"
+#include "trihedron/core/telemetry.hpp"
 
 namespace trihedron {
 
@@ -13,6 +14,13 @@ struct FixReadings {
   double noise_factor = 1;            ///< 1-sigma of h_b over that of a single reading
   GyroMask<N> used = all_gyros<N>();  ///< the others' readings mean nothing
   Eigen::Vector3d rate_c{0, 0, 0};    ///< of the body relative to `in`, rad/s; zero where one sample does not tell
+};
+
+/// A fix, and the gyros at its time.
+template <int N>
+struct ComparedFix {
+  StarFix fix;
+  FixReadings<N> readings;
 };
 
 }  // namespace trihedron

@@ -106,6 +106,9 @@ class InvariantEstimator {
   /// Least squares, all gyros used alike.
   [[nodiscard]] static Result<AttitudeByDirections<N>, DirectionsFault> attitude(
       const Gyros& gyros, const Directions& h_b, const GyroMask<N>& used = all_gyros<N>());
+  /// The same, only the attitude itself.
+  [[nodiscard]] static Result<Rot<In, C>, DirectionsFault> rotation(const Gyros& gyros, const Directions& h_b,
+                                                                    const GyroMask<N>& used);
   /// What was known before.
   [[nodiscard]] Gyros prior_gyros() const;
   /// A square root of the prior covariance, rows as the parameters in ErrorLayout.
@@ -164,8 +167,8 @@ class InvariantEstimator {
   static constexpr double kUnknown_rad = 1;
   /// So many times above the gate a misfit is a fault of a gyro, not of its drift model: that is noticed sooner.
   static constexpr double kPlain = 4;
-  /// Of two gyros the loss of one is that of the attitude: only when beginning anew has not helped, and for more than
-  /// an alignment wrong by 5° in a body that turns at orbital rate adds to the misfit in the minute until a run of
+  /// Of two gyros the loss of one is that of the attitude: only when no way of beginning anew has helped, and for more
+  /// than an alignment wrong by 5° in a body that turns at orbital rate adds to the misfit in the minute until a run of
   /// rejections reopens the filter.
   static constexpr double kPlainOfTwo_rad = 5.8e-3;  // 20′
   using Rows3 = Eigen::Matrix<double, 3, Layout::kStates>;

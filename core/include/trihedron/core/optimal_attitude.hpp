@@ -1,9 +1,7 @@
 #pragma once
-/// Attitude from N directions with weights: Wahba's problem. The trihedron is its case of two directions that trusts
-/// the first.
+/// Attitude from N directions that count alike: Wahba's problem. The trihedron, of two, trusts the first.
 
 #include <Eigen/LU>
-#include <algorithm>
 
 #include "trihedron/core/attitude.hpp"
 #include "trihedron/core/per_gyro.hpp"
@@ -66,19 +64,37 @@ template <class F>
   return Rot<F, G>::assume(axes);
 }
 
-/// Least squares over all directions, Σ w_k |h_in,k − C h_c,k|². Weights: positive where a direction is to be used, 0
-/// where not; at least two used ones must stand further than asin(kMinSine) from one line.
+/// The normal equations of the attitude by directions h_c: Σ (1 − h_c h_cᵀ) over those used, and its terms; zero where
+/// one is not used.
 template <int N>
-[[nodiscard]] Result<AttitudeByDirections<N>, DirectionsFault> optimal_attitude(const PerGyro<Eigen::Vector3d, N>& h_in,
-                                                                                const PerGyro<Eigen::Vector3d, N>& h_c,
-                                                                                const PerGyro<double, N>& weight) {
+struct WahbaNormal {
+  Eigen::Matrix3d sum = Eigen::Matrix3d::Zero();
+  Eigen::Matrix<double, 3, 3 * N> terms = Eigen::Matrix<double, 3, 3 * N>::Zero();
+
+  WahbaNormal(const PerGyro<Eigen::Vector3d, N>& h_c, const GyroMask<N>& used) {
+    for (int k = 0; k < N; ++k) {
+      if (used[k]) {
+        const Eigen::Matrix3d across = Eigen::Matrix3d::Identity() - h_c[k] * h_c[k].transpose();
+        sum += across;
+        terms.template middleCols<3>(3 * k) = across;
+      }
+    }
+  }
+};
+
+/// C_in_c by least squares over the directions used, Σ |h_in,k − C h_c,k|². At least two of them must stand further
+/// than asin(kMinSine) from one line.
+template <int N>
+[[nodiscard]] Result<Rot<In, C>, DirectionsFault> optimal_rotation(const PerGyro<Eigen::Vector3d, N>& h_in,
+                                                                   const PerGyro<Eigen::Vector3d, N>& h_c,
+                                                                   const GyroMask<N>& used) {
   // From the best placed pair …
   double best = 0;
   int first = 0;
   int second = 1;
   for (int j = 0; j < N; ++j) {
     for (int k = j + 1; k < N; ++k) {
-      const double sine = weight[j] > 0 && weight[k] > 0 ? h_in[j].cross(h_in[k]).norm() : 0;
+      const double sine = used[j] && used[k] ? h_in[j].cross(h_in[k]).norm() : 0;
       if (sine > best) {
         best = sine;
         first = j;
@@ -87,8 +103,7 @@ template <int N>
     }
   }
   if (!(best >= kMinSine)) {
-    const bool too_few = std::count_if(weight.begin(), weight.end(), [](double it) { return it > 0; }) < 2;
-    return too_few ? DirectionsFault::kTooFew : DirectionsFault::kMomentaNearlyParallel;
+    return count(used) < 2 ? DirectionsFault::kTooFew : DirectionsFault::kMomentaNearlyParallel;
   }
   const auto in = bisecting_axes(Vec<In>::assume(h_in[first]), Vec<In>::assume(h_in[second]));
   if (!in) {
@@ -98,31 +113,40 @@ template <int N>
   if (!c) {
     return c.fault();
   }
-  // … which of two that count alike is the solution, by Gauss–Newton: each step leaves as much of what was left before
-  // as the directions disagree.
-  AttitudeByDirections<N> result;
-  result.C_in_c = in.value() * c.value().inverse();
-  Eigen::Matrix3d normal = Eigen::Matrix3d::Zero();
-  for (int k = 0; k < N; ++k) {
-    const Eigen::Matrix3d across = weight[k] * (Eigen::Matrix3d::Identity() - h_c[k] * h_c[k].transpose());
-    normal += across;
-    result.by_directions.template middleCols<3>(3 * k) = across;
-  }
-  const Eigen::Matrix3d inverse = normal.inverse();
-  result.by_directions = inverse * result.by_directions;
-  constexpr double kRounding = 1e-15;
-  for (int step = 0; step < 3; ++step) {
-    Eigen::Vector3d misfit = Eigen::Vector3d::Zero();
-    for (int k = 0; k < N; ++k) {
-      misfit += weight[k] * h_c[k].cross(result.C_in_c.raw().transpose() * h_in[k]);
+  Rot<In, C> C_in_c = in.value() * c.value().inverse();
+  if constexpr (N > 2) {
+    // … which of two that count alike is the solution, by Gauss–Newton: each step leaves as much of what was left
+    // before as the directions disagree.
+    const Eigen::Matrix3d inverse = WahbaNormal<N>(h_c, used).sum.inverse();
+    constexpr double kRounding = 1e-15;
+    for (int step = 0; step < 3; ++step) {
+      Eigen::Vector3d misfit = Eigen::Vector3d::Zero();
+      for (int k = 0; k < N; ++k) {
+        if (used[k]) {
+          misfit += h_c[k].cross(C_in_c.raw().transpose() * h_in[k]);
+        }
+      }
+      const Eigen::Vector3d towards = inverse * misfit;
+      if (towards.squaredNorm() < kRounding * kRounding) {
+        break;
+      }
+      C_in_c = C_in_c * Rot<C, C>::exp(Vec<C>::assume(towards));
     }
-    const Eigen::Vector3d towards = inverse * misfit;
-    if (towards.squaredNorm() < kRounding * kRounding) {
-      break;
-    }
-    result.C_in_c = result.C_in_c * Rot<C, C>::exp(Vec<C>::assume(towards));
   }
-  return result;
+  return C_in_c;
+}
+
+/// optimal_rotation(), and how errors of the directions move it.
+template <int N>
+[[nodiscard]] Result<AttitudeByDirections<N>, DirectionsFault> optimal_attitude(const PerGyro<Eigen::Vector3d, N>& h_in,
+                                                                                const PerGyro<Eigen::Vector3d, N>& h_c,
+                                                                                const GyroMask<N>& used) {
+  const auto C_in_c = optimal_rotation<N>(h_in, h_c, used);
+  if (!C_in_c) {
+    return C_in_c.fault();
+  }
+  const WahbaNormal<N> normal(h_c, used);
+  return AttitudeByDirections<N>{C_in_c.value(), normal.sum.inverse() * normal.terms};
 }
 
 }  // namespace trihedron

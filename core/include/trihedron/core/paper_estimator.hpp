@@ -71,6 +71,15 @@ class PaperEstimator {
     }
     return trihedron_attitude(momenta(gyros), in_c(gyros, h_b));
   }
+  /// The same, only the attitude itself.
+  [[nodiscard]] static Result<Rot<In, C>, DirectionsFault> rotation(const Gyros& gyros, const Directions& h_b,
+                                                                    const GyroMask<kGyros>& used) {
+    const auto by_directions = attitude(gyros, h_b, used);
+    if (!by_directions) {
+      return by_directions.fault();
+    }
+    return by_directions.value().C_in_c;
+  }
   /// What was known before.
   [[nodiscard]] const Gyros& prior_gyros() const { return setup_.prior; }
   /// A square root of the prior covariance, rows as the parameters in ErrorLayout.

@@ -5,6 +5,12 @@
 
 namespace trihedron {
 
+/// A reading, unit, without what is known of its bias; unit to the first order.
+template <class S>
+[[nodiscard]] Vector3<S> without_bias(const Vector3<S>& h_b, const Vector3<S>& bias) {
+  return h_b - (bias - h_b * h_b.dot(bias));
+}
+
 /// What the on-board computer believes of one gyro; inside of the estimators, plain numbers with frames in the names.
 template <class Model, class S = double>
 struct GyroModel {
@@ -13,10 +19,7 @@ struct GyroModel {
   Matrix3<S> C_c_b = Matrix3<S>::Identity();     ///< alignment, exp([Λ×])
   Vector3<S> readout_bias = Vector3<S>::Zero();  ///< of the direction cosines: h_b is read as h_b + bias
 
-  /// A reading, unit, without what is known of its bias; unit to the first order.
-  [[nodiscard]] Vector3<S> unbiased(const Vector3<S>& h_b) const {
-    return h_b - (readout_bias - h_b * h_b.dot(readout_bias));
-  }
+  [[nodiscard]] Vector3<S> unbiased(const Vector3<S>& h_b) const { return without_bias<S>(h_b, readout_bias); }
   /// The same, seen in c.
   [[nodiscard]] Vector3<S> in_c(const Vector3<S>& h_b) const { return C_c_b * unbiased(h_b); }
 };

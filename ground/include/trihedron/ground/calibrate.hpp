@@ -79,7 +79,8 @@ struct CalibrationRun {
 };
 
 /// What `CalibrationOptions::estimator` and `drift_model` may name.
-inline constexpr std::array<const char*, 2> kEstimators = {"invariant", "paper"};
+inline constexpr const char* kBatch = "batch";  ///< estimator invariant, and then least squares over the whole pass
+inline constexpr std::array<const char*, 3> kEstimators = {"invariant", "paper", kBatch};
 inline constexpr const char* kAutoDriftModel = "auto";
 inline constexpr std::array<const char*, 3> kDriftModels = {kAutoDriftModel, "esg7", "esg20"};
 

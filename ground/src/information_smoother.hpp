@@ -1,0 +1,38 @@
+#pragma once
+/// Fixed-interval smoothing with the square root of the information matrix, sizes known at run time (Bierman,
+/// "Factorization Methods for Discrete Sequential Estimation", 1977, chapter X; Dyer and McReynolds, 1969).
+
+#include <Eigen/Core>
+#include <vector>
+
+namespace trihedron::ground {
+
+/// One stage of a linear system of states x = (d, c), of which the constants c are the same in all stages: what is
+/// measured in it, y = H x + unit white noise, and how it goes on, d' = A d + B c + m + noise ∘ w, w unit white.
+struct SmootherStage {
+  Eigen::MatrixXd H;
+  Eigen::VectorXd y;
+  Eigen::MatrixXd A_inverse;
+  Eigen::MatrixXd B;
+  Eigen::VectorXd m;
+  Eigen::VectorXd noise;  ///< 1-sigma, may be zero
+};
+
+/// Estimate of the states of one stage by all measurements; its covariance is root rootᵀ.
+struct SmoothedStage {
+  Eigen::VectorXd x;
+  Eigen::MatrixXd root;
+};
+
+struct SmootherResult {
+  std::vector<SmoothedStage> stages;
+  double residual_square = 0;       ///< of all measurements and of w at the estimate: −2 ln of the largest density
+  double log_root_determinant = 0;  ///< ln |det R|, R the root of the information: of c and all d and w together
+};
+
+/// Estimates all stages. `prior`: rows and right side of what is known before of the first stage, unit noise. Throws
+/// std::invalid_argument where a state stays without any information.
+[[nodiscard]] SmootherResult smooth(const Eigen::MatrixXd& prior, const Eigen::VectorXd& prior_y,
+                                    const std::vector<SmootherStage>& stages);
+
+}  // namespace trihedron::ground

@@ -1,0 +1,449 @@
+#include "pass_problem.hpp"
+
+#include <Eigen/Cholesky>
+#include <Eigen/LU>
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <utility>
+
+#include "trihedron/core/outlier_gate.hpp"
+#include "trihedron/core/precession.hpp"
+
+namespace trihedron::ground {
+namespace {
+
+using Eigen::Matrix3d;
+using Eigen::MatrixXd;
+using Eigen::Vector3d;
+using Eigen::VectorXd;
+
+/// Samples are taken so far apart: the body turns little between them, and their noise is averaged in the end.
+constexpr Duration kStep = std::chrono::seconds(1);
+/// Process noise comes in at so many times.
+constexpr Duration kArc = std::chrono::seconds(60);
+/// As in the cycle: what a sample is from the next where none is missing.
+constexpr Duration kMaxInterpolation = std::chrono::milliseconds(500);
+constexpr double kQuarterOrbit_s = 1300;
+/// 1-sigma of a direction of which nothing is known.
+constexpr double kUnknown_rad = 1;
+
+/// Columns: two unit vectors across h and across each other.
+Eigen::Matrix<double, 3, 2> across(const Vector3d& h) {
+  Eigen::Matrix<double, 3, 2> columns;
+  columns.col(0) = h.unitOrthogonal();
+  columns.col(1) = h.cross(columns.col(0));
+  return columns;
+}
+
+Directions in_c(const PassSolution& solution, const Directions& h_b) {
+  Directions h_c;
+  for (std::size_t k = 0; k < solution.gyros.size(); ++k) {
+    const int gyro = static_cast<int>(k);
+    h_c[gyro] = seen_in_c(solution.gyros[k], h_b[gyro]);
+  }
+  return h_c;
+}
+
+/// Small rotation across `from` that takes it to `to`.
+Vector3d turn(const Vector3d& from, const Vector3d& to) { return from.cross(to); }
+
+}  // namespace
+
+Vector3d seen_in_c(const GyroParameters& gyro, const Vector3d& h_b) {
+  return gyro.C_c_b * without_bias<double>(h_b, gyro.readout_bias);
+}
+
+PassProblem::PassProblem(const ScreenedPass& pass, PassSetup setup)
+    : setup_(std::move(setup)), gyros_(setup_.layout.gyros) {
+  const Time first = pass.fixes.front().fix.t;
+  auto fix = pass.fixes.begin();
+  Time taken = first;
+  const auto add_fixes_until = [&](Time t) {
+    for (; fix != pass.fixes.end() && fix->fix.t <= t; ++fix) {
+      nodes_.push_back({fix->fix.t, fix->h_b, fix->used, &*fix, false});
+      taken = fix->fix.t;
+    }
+  };
+  Time before = first;
+  bool after_gap = false;
+  for (const ScreenedPass::Sample& sample : pass.samples) {
+    if (sample.t <= first) {
+      continue;
+    }
+    add_fixes_until(sample.t);
+    after_gap = after_gap || sample.t - before > kMaxInterpolation;
+    before = sample.t;
+    if (after_gap || sample.t - taken >= kStep) {
+      nodes_.push_back({sample.t, sample.h_b, sample.used, nullptr, std::exchange(after_gap, false)});
+      taken = sample.t;
+    }
+  }
+  add_fixes_until(Time::max());
+  for (std::size_t i = 0; i < nodes_.size(); ++i) {
+    if (arcs_.empty() || nodes_[i].t - nodes_[arcs_.back().begin].t >= kArc) {
+      arcs_.push_back({i, i});
+    }
+    arcs_.back().end = i + 1;
+  }
+}
+
+void PassProblem::begin_arc(const PassSolution& solution, std::size_t arc, Moment& moment) const {
+  moment.arc = arc;
+  moment.t = nodes_[arcs_[arc].begin].t;
+  moment.h_in = solution.arcs[arc].h_in;
+  moment.by.resize(static_cast<std::size_t>(gyros_));
+  for (int k = 0; k < gyros_; ++k) {
+    MomentumBy& by = moment.by[static_cast<std::size_t>(k)];
+    by.direction = across(moment.h_in[k]);
+    by.wandering.setZero();
+    by.drift.setZero(3, setup_.layout.drift_size);
+    by.alignment.setZero();
+  }
+}
+
+void PassProblem::step(const PassSolution& solution, const Node& from, const Node& to, Moment& moment,
+                       double& extra_variance_rad2) const {
+  const double dt_s = to_seconds(to.t - from.t);
+  moment.t = to.t;
+  GyrosUsed used = from.used;
+  Directions middle;
+  for (int k = 0; k < gyros_; ++k) {
+    used[k] = used[k] && to.used[k];
+    middle[k] = used[k] ? (from.h_b[k] + to.h_b[k]).normalized() : Vector3d::UnitX();
+  }
+  const auto attitude = optimal_rotation<kMaxGyros>(moment.h_in, in_c(solution, middle), used);
+  if (!attitude) {
+    extra_variance_rad2 += kUnknown_rad * kUnknown_rad;
+    return;
+  }
+  const Matrix3d C_in_c = attitude.value().raw();
+  double largest_rad = 0;
+  for (int k = 0; k < gyros_; ++k) {
+    const auto index = static_cast<std::size_t>(k);
+    const GyroParameters& gyro = solution.gyros[index];
+    if (!used[k]) {  // its momentum turns all the same: what it would read at the attitude of the others
+      middle[k] = gyro.C_c_b.transpose() * (C_in_c.transpose() * moment.h_in[k]) + gyro.readout_bias;
+    }
+    MomentumBy& by = moment.by[index];
+    const Matrix3d C_in_b = C_in_c * gyro.C_c_b;
+    const DriftFamily::Basis basis = C_in_b * setup_.family.basis(without_bias<double>(middle[k], gyro.readout_bias));
+    const Vector3d turned = dt_s * (basis * gyro.drift_rad_s + C_in_b * solution.arcs[moment.arc].wandering_rad_s[k]);
+    moment.h_in[k] = rotated<double>(moment.h_in[k], turned).normalized();
+    const Matrix3d cross = skew<double>(turned);
+    by.direction += (cross * by.direction).eval();
+    by.wandering += cross * by.wandering + dt_s * C_in_b;
+    by.drift += (cross * by.drift).eval() + dt_s * basis;
+    by.alignment += cross * (by.alignment - C_in_c);
+    if (to.after_gap) {
+      const double seen_rad = dt_s < kQuarterOrbit_s ? angle_between<double>(from.h_b[k], to.h_b[k]) : std::numbers::pi;
+      largest_rad = std::max(largest_rad, turned.norm() * seen_rad);
+    }
+  }
+  extra_variance_rad2 += largest_rad * largest_rad;
+}
+
+PassSolution PassProblem::start(const std::vector<GyroParameters>& gyros) const {
+  PassSolution solution;
+  solution.gyros = gyros;
+  solution.shared.setZero(setup_.layout.size() - setup_.layout.shared());
+  solution.arcs.resize(arcs_.size());
+  for (PassSolution::Arc& arc : solution.arcs) {
+    for (int k = 0; k < kMaxGyros; ++k) {
+      arc.h_in[k] = Vector3d::UnitX();
+      arc.wandering_rad_s[k].setZero();
+    }
+  }
+  const ScreenedPass::Fix& first = *nodes_.front().fix;
+  const Directions h_c = in_c(solution, first.h_b);
+  for (int k = 0; k < gyros_; ++k) {
+    solution.arcs[0].h_in[k] = (first.fix.q_in_c.normalized() * h_c[k]).normalized();
+  }
+  Moment moment;
+  double unused = 0;
+  for (std::size_t arc = 0; arc < arcs_.size(); ++arc) {
+    if (arc > 0) {
+      solution.arcs[arc].h_in = moment.h_in;
+    }
+    begin_arc(solution, arc, moment);
+    for (std::size_t i = arcs_[arc].begin; i + 1 < nodes_.size() && i < arcs_[arc].end; ++i) {
+      step(solution, nodes_[i], nodes_[i + 1], moment, unused);
+    }
+  }
+  return solution;
+}
+
+void PassProblem::go_along(const PassSolution& solution, const std::function<void(const Moment&)>& visit) const {
+  Moment moment;
+  double unused = 0;
+  for (std::size_t arc = 0; arc < arcs_.size(); ++arc) {
+    begin_arc(solution, arc, moment);
+    for (std::size_t i = arcs_[arc].begin; i < arcs_[arc].end; ++i) {
+      if (i > arcs_[arc].begin) {
+        step(solution, nodes_[i - 1], nodes_[i], moment, unused);
+      }
+      moment.fix = nodes_[i].fix;
+      visit(moment);
+    }
+  }
+}
+
+Eigen::Matrix<double, 3, Eigen::Dynamic> PassProblem::fix_by_shared(const ScreenedPass::Fix& fix) const {
+  const PassLayout& layout = setup_.layout;
+  Eigen::Matrix<double, 3, Eigen::Dynamic> by(3, layout.size() - layout.shared());
+  by.setZero();
+  if (layout.clock_offset) {
+    by.col(0) = fix.rate_c;
+  }
+  if (layout.orbital_error && fix.fix.head == 0) {
+    const double phase = setup_.orbital_rate_rad_s * to_seconds(fix.fix.t - setup_.orbital_phase_zero);
+    const int first = layout.orbital() - layout.shared();
+    by.middleCols<3>(first) = std::sin(phase) * Matrix3d::Identity();
+    by.middleCols<3>(first + 3) = std::cos(phase) * Matrix3d::Identity();
+  }
+  if (fix.fix.head > 0) {
+    by.middleCols<3>(layout.head(fix.fix.head) - layout.shared()).setIdentity();
+  }
+  return by;
+}
+
+Result<AttitudeByDirections<kMaxGyros>, DirectionsFault> PassProblem::attitude(const PassSolution& solution,
+                                                                               const Moment& moment,
+                                                                               const Directions& h_b,
+                                                                               const GyrosUsed& used) const {
+  return optimal_attitude<kMaxGyros>(moment.h_in, in_c(solution, h_b), used);
+}
+
+MatrixXd PassProblem::attitude_by_states(const PassSolution& solution, const Moment& moment,
+                                         const AttitudeByDirections<kMaxGyros>& attitude, const Directions& h_b) const {
+  const PassLayout& layout = setup_.layout;
+  const Directions h_c = in_c(solution, h_b);
+  MatrixXd by_states = MatrixXd::Zero(3, layout.size());
+  const Matrix3d C_c_in = attitude.C_in_c.raw().transpose();
+  for (int k = 0; k < gyros_; ++k) {
+    const MomentumBy& by = moment.by[static_cast<std::size_t>(k)];
+    const GyroParameters& gyro = solution.gyros[static_cast<std::size_t>(k)];
+    const Matrix3d by_direction = attitude.by_directions.middleCols<3>(3 * k);
+    const Matrix3d by_phi = by_direction * C_c_in;
+    by_states.middleCols<2>(layout.direction(k)) = by_phi * by.direction;
+    by_states.middleCols(layout.drift(k), layout.drift_size) = by_phi * by.drift;
+    by_states.middleCols<3>(layout.alignment(k)) = by_phi * by.alignment - by_direction;
+    if (layout.wandering_drift) {
+      by_states.middleCols<3>(layout.wandering(k)) = by_phi * by.wandering;
+    }
+    if (layout.readout_bias) {
+      by_states.middleCols<3>(layout.bias(k)) = by_direction * skew<double>(h_c[k]) * gyro.C_c_b;
+    }
+  }
+  return by_states;
+}
+
+PassProblem::FixRows PassProblem::compare(const PassSolution& solution, const Moment& moment) const {
+  const PassLayout& layout = setup_.layout;
+  const ScreenedPass::Fix& fix = *moment.fix;
+  const Eigen::Matrix<double, 3, Eigen::Dynamic> by_shared = fix_by_shared(fix);
+  const Vector3d known_error = by_shared * solution.shared;
+  const Matrix3d C_fix =
+      (Rot<In, C>::assume(fix.fix.q_in_c.normalized()) * Rot<C, C>::exp(-Vec<C>::assume(known_error))).raw();
+  const Directions h_c = in_c(solution, fix.h_b);
+  FixRows rows;
+  const auto by_gyros = optimal_rotation<kMaxGyros>(moment.h_in, h_c, fix.used);
+  if (!by_gyros) {
+    rows.H.setZero(0, layout.size());
+    return rows;
+  }
+  const Matrix3d C_in_c = by_gyros.value().raw();  // without the noise of the fix
+  const int components = 2 * count(fix.used);
+  rows.H.setZero(components, layout.size());
+  rows.y.resize(components);
+  rows.R.setZero(components, components);
+  MatrixXd by_fix(components, 3);
+  int row = 0;
+  for (int k = 0; k < gyros_; ++k) {
+    if (!fix.used[k]) {
+      continue;
+    }
+    const MomentumBy& by = moment.by[static_cast<std::size_t>(k)];
+    const Vector3d& h = moment.h_in[k];
+    const Eigen::Matrix<double, 2, 3> T = across(h).transpose();
+    const Eigen::Matrix<double, 2, 3> by_c = T * C_in_c;
+    rows.y.segment<2>(row) = T * h.cross(C_fix * h_c[k]);
+    rows.H.block<2, 2>(row, layout.direction(k)) = T * by.direction;
+    rows.H.block(row, layout.drift(k), 2, layout.drift_size) = T * by.drift;
+    rows.H.block<2, 3>(row, layout.alignment(k)) = T * by.alignment - by_c;
+    if (layout.wandering_drift) {
+      rows.H.block<2, 3>(row, layout.wandering(k)) = T * by.wandering;
+    }
+    if (layout.readout_bias) {
+      rows.H.block<2, 3>(row, layout.bias(k)) =
+          T * skew<double>(h) * C_in_c * solution.gyros[static_cast<std::size_t>(k)].C_c_b;
+    }
+    by_fix.middleRows<2>(row) = by_c;
+    const double noise_rad = setup_.readout_noise_rad[static_cast<std::size_t>(k)] * fix.noise_factor;
+    rows.R.block<2, 2>(row, row).diagonal().setConstant(noise_rad * noise_rad);
+    row += 2;
+  }
+  rows.H.rightCols(by_shared.cols()) = by_fix * by_shared;
+  rows.R += by_fix * setup_.fix_noise[static_cast<std::size_t>(fix.fix.head)] * by_fix.transpose();
+  return rows;
+}
+
+void PassProblem::add_prior(const PassSolution& solution, Linear& linear) const {
+  const PassLayout& layout = setup_.layout;
+  VectorXd sigma = VectorXd::Constant(layout.size(), kUnknown_rad);
+  VectorXd apart = VectorXd::Zero(layout.size());  // prior mean − solution
+  const int own = layout.drift_size + 3;
+  for (int k = 0; k < gyros_; ++k) {
+    const GyroParameters& prior = setup_.prior[static_cast<std::size_t>(k)];
+    const GyroParameters& gyro = solution.gyros[static_cast<std::size_t>(k)];
+    apart.segment(layout.drift(k), layout.drift_size) = prior.drift_rad_s - gyro.drift_rad_s;
+    apart.segment<3>(layout.alignment(k)) =
+        Rot<C, C>::assume(Matrix3d(prior.C_c_b * gyro.C_c_b.transpose())).log().raw();
+    if (layout.wandering_drift) {
+      sigma.segment<3>(layout.wandering(k)).setConstant(setup_.wandering_sigma_rad_s);
+      apart.segment<3>(layout.wandering(k)) = -solution.arcs[0].wandering_rad_s[k];
+    }
+    if (layout.readout_bias) {
+      sigma.segment<3>(layout.bias(k)).setConstant(setup_.readout_bias_sigma);
+      apart.segment<3>(layout.bias(k)) = prior.readout_bias - gyro.readout_bias;
+    }
+  }
+  apart.tail(solution.shared.size()) = -solution.shared;
+  if (layout.clock_offset) {
+    sigma(layout.clock()) = setup_.clock_offset_sigma_s;
+  }
+  if (layout.orbital_error) {
+    sigma.segment<6>(layout.orbital()).setConstant(setup_.orbital_error_sigma_rad);
+  }
+  for (int head = 1; head <= layout.further_heads; ++head) {
+    sigma.segment<3>(layout.head(head))
+        .setConstant(setup_.head_alignment_sigma_rad[static_cast<std::size_t>(head - 1)]);
+  }
+  linear.prior = sigma.cwiseInverse().asDiagonal();
+  // Nothing is known before of the directions at the start.
+  linear.prior.topLeftCorner(2 * gyros_, 2 * gyros_).setZero();
+  const Eigen::Index size = gyros_ * own;
+  linear.prior.block(layout.drift(0), layout.drift(0), size, size) =
+      setup_.prior_covariance.llt().matrixL().solve(MatrixXd::Identity(size, size));
+  linear.prior_y = linear.prior * apart;
+}
+
+void PassProblem::end_arc(const PassSolution& solution, const Moment& moment, double extra_variance_rad2,
+                          SmootherStage& stage) const {
+  const PassLayout& layout = setup_.layout;
+  const int d = layout.dynamic();
+  MatrixXd A = MatrixXd::Zero(d, d);
+  stage.B.setZero(d, layout.constants());
+  stage.m.setZero(d);
+  stage.noise.setZero(d);
+  const double dt_s = to_seconds(moment.t - nodes_[arcs_[moment.arc].begin].t);
+  const double walk = setup_.direction_random_walk_rad_sqrt_s;
+  const double kept = std::max(std::exp(-dt_s / setup_.wandering_time_s), 1e-6);
+  const PassSolution::Arc& now = solution.arcs[moment.arc];
+  const PassSolution::Arc& next = solution.arcs[moment.arc + 1];
+  for (int k = 0; k < gyros_; ++k) {
+    const MomentumBy& by = moment.by[static_cast<std::size_t>(k)];
+    const Eigen::Matrix<double, 2, 3> T = across(next.h_in[k]).transpose();
+    const int row = layout.direction(k);
+    A.block<2, 2>(row, row) = T * by.direction;
+    stage.B.block(row, layout.drift(k) - d, 2, layout.drift_size) = T * by.drift;
+    stage.B.block<2, 3>(row, layout.alignment(k) - d) = T * by.alignment;
+    stage.m.segment<2>(row) = T * turn(next.h_in[k], moment.h_in[k]);
+    stage.noise.segment<2>(row).setConstant(std::sqrt(walk * walk * dt_s + extra_variance_rad2));
+    if (layout.wandering_drift) {
+      const int wandering = layout.wandering(k);
+      A.block<2, 3>(row, wandering) = T * by.wandering;
+      A.block<3, 3>(wandering, wandering) = kept * Matrix3d::Identity();
+      stage.m.segment<3>(wandering) = kept * now.wandering_rad_s[k] - next.wandering_rad_s[k];
+      stage.noise.segment<3>(wandering).setConstant(setup_.wandering_sigma_rad_s * std::sqrt(1 - kept * kept));
+    }
+  }
+  stage.A_inverse = A.inverse();
+}
+
+PassProblem::Linear PassProblem::linearise(const PassSolution& solution) const {
+  Linear linear;
+  add_prior(solution, linear);
+  linear.stages.resize(arcs_.size());
+  Moment moment;
+  std::vector<FixRows> fixes;
+  std::vector<std::size_t> fixes_until;
+  for (std::size_t arc = 0; arc < arcs_.size(); ++arc) {
+    begin_arc(solution, arc, moment);
+    double extra_variance_rad2 = 0;
+    for (std::size_t i = arcs_[arc].begin; i < arcs_[arc].end; ++i) {
+      moment.fix = nodes_[i].fix;
+      if (moment.fix != nullptr) {
+        FixRows& rows = fixes.emplace_back(compare(solution, moment));
+        const Eigen::LLT<MatrixXd> root(rows.R);
+        root.matrixL().solveInPlace(rows.H);
+        root.matrixL().solveInPlace(rows.y);
+        linear.nis.push_back(rows.y.squaredNorm());
+      }
+      if (i + 1 < nodes_.size()) {
+        step(solution, nodes_[i], nodes_[i + 1], moment, extra_variance_rad2);
+      }
+    }
+    fixes_until.push_back(fixes.size());
+    if (arc + 1 < arcs_.size()) {
+      end_arc(solution, moment, extra_variance_rad2, linear.stages[arc]);
+    } else {
+      linear.stages[arc].m.setZero(setup_.layout.dynamic());
+    }
+  }
+  // Far from the solution all fixes are off: what is far among them is an outlier.
+  double gate = setup_.gate_nis;
+  if (!linear.nis.empty()) {
+    std::vector<double> sorted = linear.nis;
+    const auto middle = sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2);
+    std::nth_element(sorted.begin(), middle, sorted.end());
+    gate *= std::max(*middle / kPairComponents, 1.0);
+  }
+  std::size_t fix = 0;
+  for (std::size_t arc = 0; arc < arcs_.size(); ++arc) {
+    SmootherStage& stage = linear.stages[arc];
+    Eigen::Index size = 0;
+    for (std::size_t i = fix; i < fixes_until[arc]; ++i) {
+      size += fixes[i].y.size();
+    }
+    stage.H.resize(size, setup_.layout.size());
+    stage.y.resize(size);
+    Eigen::Index row = 0;
+    for (; fix < fixes_until[arc]; ++fix) {
+      const FixRows& rows = fixes[fix];
+      // Its pull falls with the third power of the misfit beyond the gate.
+      const double weight = linear.nis[fix] > gate ? gate / linear.nis[fix] : 1;
+      stage.H.middleRows(row, rows.y.size()) = weight * rows.H;
+      stage.y.segment(row, rows.y.size()) = weight * rows.y;
+      row += rows.y.size();
+    }
+  }
+  return linear;
+}
+
+void PassProblem::correct(const SmootherResult& found, PassSolution& solution) const {
+  const PassLayout& layout = setup_.layout;
+  for (std::size_t arc = 0; arc < arcs_.size(); ++arc) {
+    const VectorXd& x = found.stages[arc].x;
+    PassSolution::Arc& its = solution.arcs[arc];
+    for (int k = 0; k < gyros_; ++k) {
+      its.h_in[k] = rotated<double>(its.h_in[k], across(its.h_in[k]) * x.segment<2>(layout.direction(k))).normalized();
+      if (layout.wandering_drift) {
+        its.wandering_rad_s[k] += x.segment<3>(layout.wandering(k));
+      }
+    }
+  }
+  const VectorXd& x = found.stages.back().x;
+  for (int k = 0; k < gyros_; ++k) {
+    GyroParameters& gyro = solution.gyros[static_cast<std::size_t>(k)];
+    gyro.drift_rad_s += x.segment(layout.drift(k), layout.drift_size);
+    gyro.C_c_b = (Rot<C, C>::exp(Vec<C>::assume(Vector3d(x.segment<3>(layout.alignment(k))))).raw() * gyro.C_c_b);
+    gyro.C_c_b = Eigen::Quaterniond(gyro.C_c_b).normalized().toRotationMatrix();
+    if (layout.readout_bias) {
+      gyro.readout_bias += x.segment<3>(layout.bias(k));
+    }
+  }
+  solution.shared += x.tail(solution.shared.size());
+}
+
+}  // namespace trihedron::ground

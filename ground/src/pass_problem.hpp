@@ -1,0 +1,172 @@
+#pragma once
+/// A whole pass as one problem of least squares: the initial directions, the parameters, and where there is process
+/// noise the directions and the wandering drift all along.
+
+#include <Eigen/Core>
+#include <functional>
+#include <optional>
+#include <vector>
+
+#include "drift_family.hpp"
+#include "information_smoother.hpp"
+#include "screened_pass.hpp"
+#include "trihedron/core/optimal_attitude.hpp"
+
+namespace trihedron::ground {
+
+/// What is known of a gyro.
+struct GyroParameters {
+  Eigen::VectorXd drift_rad_s;                          ///< κ
+  Eigen::Matrix3d C_c_b = Eigen::Matrix3d::Identity();  ///< alignment
+  Eigen::Vector3d readout_bias = Eigen::Vector3d::Zero();
+};
+
+/// Which states there are, and where they stand: those that move, then the constants per gyro, then the shared ones.
+/// Directions are two components across each momentum; the rest as in InvariantLayout.
+struct PassLayout {
+  int gyros = 2;
+  int drift_size = 7;
+  bool wandering_drift = false;
+  bool readout_bias = false;
+  bool clock_offset = false;
+  bool orbital_error = false;
+  int further_heads = 0;
+
+  [[nodiscard]] int direction(int gyro) const { return 2 * gyro; }
+  [[nodiscard]] int wandering(int gyro) const { return 2 * gyros + 3 * gyro; }
+  [[nodiscard]] int dynamic() const { return (wandering_drift ? 5 : 2) * gyros; }
+  [[nodiscard]] int drift(int gyro) const { return dynamic() + gyro * (drift_size + 3); }
+  [[nodiscard]] int alignment(int gyro) const { return drift(gyro) + drift_size; }
+  [[nodiscard]] int bias(int gyro) const { return drift(gyros) + 3 * gyro; }
+  [[nodiscard]] int shared() const { return drift(gyros) + (readout_bias ? 3 * gyros : 0); }
+  [[nodiscard]] int clock() const { return shared(); }
+  [[nodiscard]] int orbital() const { return shared() + (clock_offset ? 1 : 0); }
+  /// Of head 1, 2 … beside the first, which is 0.
+  [[nodiscard]] int head(int number) const { return orbital() + (orbital_error ? 6 : 0) + 3 * (number - 1); }
+  [[nodiscard]] int size() const { return head(further_heads + 1); }
+  [[nodiscard]] int constants() const { return size() - dynamic(); }
+};
+
+struct PassSetup {
+  PassLayout layout;
+  DriftFamily family = DriftFamily::of<Esg7>();
+  std::vector<GyroParameters> prior;       ///< means
+  Eigen::MatrixXd prior_covariance;        ///< of κ and δ, gyro by gyro
+  std::vector<double> readout_noise_rad;   ///< per gyro
+  std::vector<Eigen::Matrix3d> fix_noise;  ///< covariance per star tracker, c axes, rad²
+  double readout_bias_sigma = 1e-4;
+  double clock_offset_sigma_s = 0.1;
+  double orbital_error_sigma_rad = 1e-4;
+  std::vector<double> head_alignment_sigma_rad;  ///< of further heads
+  double orbital_rate_rad_s = 1.1e-3;
+  Time orbital_phase_zero{};
+  double direction_random_walk_rad_sqrt_s = 0;
+  double wandering_sigma_rad_s = 0;
+  double wandering_time_s = 3600;
+  double gate_nis = 30;  ///< of a pair; above it a fix counts less
+};
+
+/// Estimates of everything; momenta and wandering drift at the beginning of each arc.
+struct PassSolution {
+  std::vector<GyroParameters> gyros;
+  Eigen::VectorXd shared;  ///< as in PassLayout, from shared() on
+  struct Arc {
+    Directions h_in;
+    Directions wandering_rad_s;  ///< case axes
+  };
+  std::vector<Arc> arcs;
+};
+
+/// How one momentum depends on the states of its arc: φ = by_direction a + by_wandering w + by_drift κ + by_alignment
+/// δ.
+struct MomentumBy {
+  Eigen::Matrix<double, 3, 2> direction;
+  Eigen::Matrix3d wandering;  ///< s
+  DriftFamily::Basis drift;   ///< s
+  Eigen::Matrix3d alignment;
+};
+
+class PassProblem {
+ public:
+  /// Refers to the pass. Needs a fix.
+  PassProblem(const ScreenedPass& pass, PassSetup setup);
+
+  [[nodiscard]] const PassSetup& setup() const { return setup_; }
+  [[nodiscard]] std::size_t arcs() const { return arcs_.size(); }
+
+  /// Momenta along the pass by these parameters, those at its first fix read from it; no wandering drift.
+  [[nodiscard]] PassSolution start(const std::vector<GyroParameters>& gyros) const;
+
+  /// Linearised there; smooth() estimates truth − solution.
+  struct Linear {
+    Eigen::MatrixXd prior;
+    Eigen::VectorXd prior_y;
+    std::vector<SmootherStage> stages;
+    std::vector<double> nis;  ///< per fix, of what is left there
+  };
+  [[nodiscard]] Linear linearise(const PassSolution& solution) const;
+
+  /// Adds what smooth() found.
+  void correct(const SmootherResult& found, PassSolution& solution) const;
+
+  /// One time within an arc.
+  struct Moment {
+    std::size_t arc = 0;
+    Time t{};
+    const ScreenedPass::Fix* fix = nullptr;  ///< there, if any
+    Directions h_in;
+    std::vector<MomentumBy> by;
+  };
+  /// Goes along all samples, thinned, and fixes, in time order.
+  void go_along(const PassSolution& solution, const std::function<void(const Moment&)>& visit) const;
+
+  /// Components that a fix is compared in: how far each momentum read through it is off, by the states of its arc.
+  struct FixRows {
+    Eigen::MatrixXd H;
+    Eigen::VectorXd y;
+    Eigen::MatrixXd R;
+  };
+  [[nodiscard]] FixRows compare(const PassSolution& solution, const Moment& moment) const;
+
+  /// By the momenta and these readings.
+  [[nodiscard]] Result<AttitudeByDirections<kMaxGyros>, DirectionsFault> attitude(const PassSolution& solution,
+                                                                                  const Moment& moment,
+                                                                                  const Directions& h_b,
+                                                                                  const GyrosUsed& used) const;
+  /// How its error, c axes, depends on the states of the arc.
+  [[nodiscard]] Eigen::MatrixXd attitude_by_states(const PassSolution& solution, const Moment& moment,
+                                                   const AttitudeByDirections<kMaxGyros>& attitude,
+                                                   const Directions& h_b) const;
+
+ private:
+  /// Something to go along: a sample or a fix.
+  struct Node {
+    Time t{};
+    Directions h_b;
+    GyrosUsed used{};
+    const ScreenedPass::Fix* fix = nullptr;
+    bool after_gap = false;
+  };
+  struct ArcNodes {
+    std::size_t begin = 0;
+    std::size_t end = 0;  ///< the first node of the next arc, which this one ends at, or that after the last
+  };
+
+  void step(const PassSolution& solution, const Node& from, const Node& to, Moment& moment,
+            double& extra_variance_rad2) const;
+  void begin_arc(const PassSolution& solution, std::size_t arc, Moment& moment) const;
+  [[nodiscard]] Eigen::Matrix<double, 3, Eigen::Dynamic> fix_by_shared(const ScreenedPass::Fix& fix) const;
+  void add_prior(const PassSolution& solution, Linear& linear) const;
+  void end_arc(const PassSolution& solution, const Moment& moment, double extra_variance_rad2,
+               SmootherStage& stage) const;
+
+  PassSetup setup_;
+  int gyros_;
+  std::vector<Node> nodes_;
+  std::vector<ArcNodes> arcs_;
+};
+
+/// What a gyro reads, seen in c.
+[[nodiscard]] Eigen::Vector3d seen_in_c(const GyroParameters& gyro, const Eigen::Vector3d& h_b);
+
+}  // namespace trihedron::ground

@@ -1,0 +1,63 @@
+#pragma once
+/// A calibration taken up by least squares over the whole pass: estimator batch.
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <string>
+#include <vector>
+
+#include "pass_problem.hpp"
+#include "setup.hpp"
+
+namespace trihedron::ground {
+
+/// Of the further states that are on, but for wandering drift; shared ones first, then those of the gyros.
+[[nodiscard]] std::vector<std::string> further_names(const FurtherStateOptions& states, int further_heads, int gyros);
+
+/// The problem that Estimator solves on board, with only those further states that are on.
+template <class Estimator>
+[[nodiscard]] PassSetup pass_setup(const typename Estimator::Setup& from, const FurtherStateOptions& states,
+                                   int further_heads) {
+  constexpr auto kOn = FurtherStateOptions::Choice::kOn;
+  using Base = typename Estimator::BaseModel;
+  PassSetup setup;
+  setup.layout = {.gyros = Estimator::kGyros,
+                  .drift_size = Base::kSize,
+                  .wandering_drift = states.wandering_drift == kOn,
+                  .readout_bias = states.readout_bias == kOn,
+                  .clock_offset = states.clock_offset == kOn,
+                  .orbital_error = states.orbital_error == kOn,
+                  .further_heads = further_heads};
+  setup.family = DriftFamily::of<Base>();
+  for (int k = 0; k < Estimator::kGyros; ++k) {
+    setup.prior.push_back(
+        {from.prior[k].drift_rad_s.template head<Base::kSize>(), from.prior[k].C_c_b, from.prior[k].readout_bias});
+    setup.readout_noise_rad.push_back(from.readout_noise_rad[k]);
+  }
+  setup.prior_covariance = from.prior_covariance;
+  setup.fix_noise.emplace_back(from.star_tracker_noise_rad.cwiseAbs2().asDiagonal());
+  if constexpr (Estimator::kHeads > 1) {
+    for (int i = 0; i < further_heads; ++i) {
+      const HeadSetup& head = from.further_heads[static_cast<std::size_t>(i)];
+      setup.fix_noise.emplace_back(head.C_c_s * head.noise_rad.cwiseAbs2().asDiagonal() * head.C_c_s.transpose());
+      setup.head_alignment_sigma_rad.push_back(head.alignment_sigma_rad);
+    }
+  }
+  setup.readout_bias_sigma = from.readout_bias_sigma;
+  setup.clock_offset_sigma_s = from.clock_offset_sigma_s;
+  setup.orbital_error_sigma_rad = from.orbital_error_sigma_rad;
+  setup.orbital_rate_rad_s = from.orbital_rate_rad_s;
+  setup.orbital_phase_zero = from.orbital_phase_zero;
+  setup.direction_random_walk_rad_sqrt_s = from.direction_random_walk_rad_sqrt_s;
+  setup.wandering_sigma_rad_s = from.wandering_sigma_rad_s;
+  setup.wandering_time_s = from.wandering_time_s;
+  setup.gate_nis = from.gate_nis;
+  return setup;
+}
+
+/// Puts the most likely values and their covariance in place of those of `run`, which was made on board beside
+/// `screened`, and the smoothed attitude in place of that of the filter. Throws SetupError.
+void refine(const ScreenedPass& screened, const PassSetup& setup, CalibrationRun& run);
+
+}  // namespace trihedron::ground

@@ -1,0 +1,75 @@
+#pragma once
+/// What of a pass can be used: samples and fixes as the on-board cycle has screened them.
+
+#include <algorithm>
+#include <vector>
+
+#include "trihedron/core/cycle.hpp"
+#include "trihedron/records/pass.hpp"
+
+namespace trihedron::ground {
+
+inline constexpr int kMaxGyros = 4;
+/// Of the gyros that there are; those beyond are not used.
+using Directions = PerGyro<Eigen::Vector3d, kMaxGyros>;
+using GyrosUsed = GyroMask<kMaxGyros>;
+
+/// In the order of their times.
+struct ScreenedPass {
+  [[nodiscard]] static Directions none() {
+    Directions h_b;
+    std::fill(h_b.begin(), h_b.end(), Eigen::Vector3d::UnitX());
+    return h_b;
+  }
+  struct Sample {
+    Time t{};
+    Directions h_b = none();  ///< unit, where used
+    GyrosUsed used{};
+  };
+  struct Fix {
+    StarFix fix;
+    Directions h_b = none();  ///< by several samples together
+    GyrosUsed used{};
+    double noise_factor = 1;          ///< as of FixReadings
+    Eigen::Vector3d rate_c{0, 0, 0};  ///< of the body relative to `in`, rad/s
+  };
+
+  int gyros = 0;
+  std::vector<Sample> samples;
+  std::vector<Fix> fixes;  ///< used or rejected as outliers; all star trackers
+  bool clock_set_back = false;
+
+  /// The next sample of the pass and what the cycle made of it.
+  template <class Report>
+  void add_sample(const GyroTelemetry& gyro, std::size_t i, const Report& report) {
+    clock_set_back = clock_set_back || report.sample == SampleStatus::kUsedAfterClockSetBack;
+    if (!is_used(report.sample)) {
+      return;
+    }
+    Sample& sample = samples.emplace_back();
+    sample.t = gyro.t[i];
+    for (int k = 0; k < gyros; ++k) {
+      sample.h_b[k] = gyro.direction(i, k).normalized();
+      sample.used[k] = report.gyros[k] == GyroState::kUsed;
+    }
+  }
+
+  /// A fix and what the cycle made of it.
+  template <class Report>
+  void add_fix(const Report& report) {
+    if (!report.compared) {
+      return;
+    }
+    const auto& [star_fix, readings] = *report.compared;
+    Fix& fix = fixes.emplace_back();
+    fix.fix = star_fix;
+    fix.noise_factor = readings.noise_factor;
+    fix.rate_c = readings.rate_c;
+    for (int k = 0; k < gyros; ++k) {
+      fix.h_b[k] = readings.h_b[k];
+      fix.used[k] = readings.used[k];
+    }
+  }
+};
+
+}  // namespace trihedron::ground
