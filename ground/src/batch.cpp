@@ -11,35 +11,36 @@ constexpr int kMostIterations = 12;
 constexpr double kConverged = 0.02;
 
 /// Root mean square of the step of the constants, in their sigmas.
-double step_of_constants(const PassLayout& layout, const SmoothedStage& last) {
-  const Eigen::VectorXd sigma = last.root.bottomRows(layout.constants()).rowwise().norm();
-  const Eigen::VectorXd step = last.x.tail(layout.constants()).cwiseQuotient(sigma);
+double step_of_constants(const PassLayout& layout, const SmootherResult& found) {
+  const Eigen::VectorXd sigma = found.last_root.bottomRows(layout.constants()).rowwise().norm();
+  const Eigen::VectorXd step = found.x.back().tail(layout.constants()).cwiseQuotient(sigma);
   return step.norm() / std::sqrt(static_cast<double>(layout.constants()));
 }
 
 }  // namespace
 
 BatchResult most_likely(const PassProblem& problem, PassSolution first) {
-  const PassLayout& layout = problem.setup().layout;
   BatchResult result;
   result.solution = std::move(first);
-  while (result.iterations < kMostIterations) {
+  while (result.iterations < kMostIterations && !result.converged) {
     ++result.iterations;
-    PassProblem::Linear linear = problem.linearise(result.solution);
-    result.errors = smooth(linear.prior, linear.prior_y, linear.stages);
-    result.nis = std::move(linear.nis);
-    // Of the prior only its own states count; the rows of the directions are empty.
-    const Eigen::Index directions = 2 * layout.gyros;
-    const Eigen::Index rest = layout.size() - directions;
-    const double log_prior_root = linear.prior.bottomRightCorner(rest, rest).diagonal().array().abs().log().sum();
-    result.deviance = result.errors.residual_square + 2 * (result.errors.log_root_determinant - log_prior_root);
+    result.linear = problem.linearise(result.solution);
+    result.errors = smooth(result.linear.prior, result.linear.prior_y, result.linear.stages);
     problem.correct(result.errors, result.solution);
-    result.converged = step_of_constants(layout, result.errors.stages.back()) < kConverged;
-    if (result.converged) {
-      break;
-    }
+    result.converged = step_of_constants(problem.setup().layout, result.errors) < kConverged;
   }
   return result;
+}
+
+double log_likelihood(const PassProblem& problem, const PassSolution& solution, PassProblem::Linear linear,
+                      const ProcessNoise& noise) {
+  const PassLayout& layout = problem.setup().layout;
+  problem.put_noise(solution, noise, linear);
+  const SmootherResult found = smooth(linear.prior, linear.prior_y, linear.stages);
+  // Of the directions at the start nothing is known before; the rest of the prior is triangular.
+  const Eigen::Index rest = layout.size() - 2L * layout.gyros;
+  const double log_prior_root = linear.prior.bottomRightCorner(rest, rest).diagonal().array().abs().log().sum();
+  return log_prior_root - found.log_root_determinant - found.residual_square / 2;
 }
 
 }  // namespace trihedron::ground

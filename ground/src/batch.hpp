@@ -7,15 +7,19 @@ namespace trihedron::ground {
 /// The most likely course of a pass, and what is known of its errors.
 struct BatchResult {
   PassSolution solution;
-  SmootherResult errors;    ///< x is zero to convergence
-  std::vector<double> nis;  ///< per fix, of what is left at the solution
+  PassProblem::Linear linear;  ///< there
+  SmootherResult errors;       ///< x is zero to convergence
   int iterations = 0;
   bool converged = false;
-  double deviance = 0;  ///< −2 ln of the likelihood of the setup's noise and states, up to a constant of the pass
 };
 
 /// Iterates to the most likely solution from `first`: Gauss–Newton over parameters and momenta together, which with
 /// process noise is the iterated fixed-interval smoother.
 [[nodiscard]] BatchResult most_likely(const PassProblem& problem, PassSolution first);
+
+/// ln of the likelihood of the process noise, all states integrated over (Laplace); `linear`: the problem linearised at
+/// the solution. Up to a constant of the pass and the layout.
+[[nodiscard]] double log_likelihood(const PassProblem& problem, const PassSolution& solution,
+                                    PassProblem::Linear linear, const ProcessNoise& noise);
 
 }  // namespace trihedron::ground

@@ -220,12 +220,6 @@ std::vector<FurtherEstimate> further_of(const Estimator& estimator, const Furthe
   return further;
 }
 
-/// Star trackers beside the first that the estimator uses.
-template <class Estimator>
-int further_heads(const Pass& pass) {
-  return std::min(static_cast<int>(pass.further_star_trackers.size()), Cycle<Estimator>::kHeads - 1);
-}
-
 template <class Estimator>
 Calibration result_of(const Pass& pass, const Cycle<Estimator>& cycle, const CalibrationOptions& options) {
   using Model = typename Estimator::BaseModel;
@@ -341,13 +335,11 @@ CalibrationRun calibrate_with(const Pass& pass, Decision decision, const Progres
   run.calibration = result_of(pass, *cycle, run.options);
   run.calibration.statistics = statistics_of(run.fixes);
   run.calibration.statistics["angle_looks"] = angle_looks;
-  if constexpr (requires { cycle->estimator().setup().orbital_rate_rad_s; }) {
-    if (batch) {
-      refine(
-          screened,
-          pass_setup<Estimator>(cycle->estimator().setup(), run.options.further_states, further_heads<Estimator>(pass)),
-          run);
-    }
+  if (batch) {
+    refine(
+        screened,
+        pass_setup<Estimator>(cycle->estimator().setup(), run.options.further_states, further_heads<Estimator>(pass)),
+        run);
   }
   run.calibration.verdict = judge(pass, run);
   return run;

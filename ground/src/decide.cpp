@@ -9,12 +9,13 @@
 #include <functional>
 #include <future>
 #include <map>
-#include <memory>
 #include <numbers>
 #include <optional>
 #include <utility>
 #include <vector>
 
+#include "batch.hpp"
+#include "refine.hpp"
 #include "trihedron/ground/replay.hpp"
 #include "with_estimator.hpp"
 
@@ -22,7 +23,6 @@ namespace trihedron::ground {
 namespace {
 
 using Choice = FurtherStateOptions::Choice;
-using Full = InvariantEstimator<Esg20, 2, kAllFurtherStates>;
 
 /// Odds of 20 to 1.
 constexpr double kStrong = 3;
@@ -42,134 +42,185 @@ double log_evidence(const Eigen::VectorXd& estimate, const Eigen::MatrixXd& root
   return white.squaredNorm() / 2 + covariance.matrixLLT().diagonal().array().log().sum();
 }
 
-/// One run over the pass.
-template <class Estimator>
-class Trial {
- public:
-  Trial(const Pass& pass, const CalibrationOptions& options)
-      : cycle_(make_cycle<Estimator>(pass, options, {.navigate = false})) {
-    const auto ignore = [](const auto&) {};
-    const double gate_nis = options.gate_nis;
-    std::optional<Eigen::Quaterniond> last;
-    Time last_t{};
-    const auto on_fix = [&](const typename Cycle<Estimator>::Report& report) {
-      if (report.fix.status != FixStatus::kUsed && report.fix.status != FixStatus::kRejectedByGate) {
-        return;
-      }
-      // An outlier counts as one, however far out it is.
-      log_likelihood_ -= std::min(report.fix.nis, gate_nis) / 2 +
-                         report.fix.innovation_covariance.llt().matrixLLT().diagonal().array().log().sum();
-      if (report.fix.head != 0 || !report.calibrated || !report.compared) {
-        return;
-      }
-      const Eigen::Quaterniond apart =
-          report.calibrated->C_in_c.quaternion().conjugate() * report.compared->fix.q_in_c.normalized();
-      if (last && report.fix.t - last_t < kClose) {
-        const Eigen::Vector3d change = Rot<C, C>::assume(last->conjugate() * apart).log().raw();
-        for (int axis = 0; axis < 3; ++axis) {
-          changes_rad_[static_cast<std::size_t>(axis)].push_back(std::abs(change(axis)));
-        }
-      }
-      last = apart;
-      last_t = report.fix.t;
-    };
-    replay(pass, *cycle_, on_fix, ignore);
+CalibrationOptions without_further_states(CalibrationOptions options) {
+  options.drift_model = Esg7::kModelName;
+  for (Choice* choice : {&options.further_states.clock_offset, &options.further_states.orbital_error,
+                         &options.further_states.wandering_drift, &options.further_states.readout_bias}) {
+    *choice = Choice::kOff;
   }
+  return options;
+}
 
-  [[nodiscard]] const Estimator& estimator() const { return cycle_->estimator(); }
-  [[nodiscard]] double log_likelihood() const { return log_likelihood_; }
-
-  /// 1-sigma of the first star tracker about c x, y, z, by how its difference from the gyros changes from fix to fix:
-  /// all that is slow cancels, and of outliers only the median feels. Needs changes().
-  [[nodiscard]] Eigen::Vector3d star_tracker_noise_rad() const {
-    constexpr double kMedianOfNormal = 0.6744897501960817;
-    Eigen::Vector3d noise_rad;
-    for (int axis = 0; axis < 3; ++axis) {
-      std::vector<double> changes = changes_rad_[static_cast<std::size_t>(axis)];
-      const auto middle = changes.begin() + static_cast<std::ptrdiff_t>(changes.size() / 2);
-      std::nth_element(changes.begin(), middle, changes.end());
-      noise_rad(axis) = *middle / kMedianOfNormal / std::numbers::sqrt2;
-    }
-    return noise_rad;
-  }
-  [[nodiscard]] std::size_t changes() const { return changes_rad_[0].size(); }
-
- private:
-  static constexpr Duration kClose = std::chrono::seconds(10);  ///< fixes between which nothing slow changes
-
-  std::unique_ptr<Cycle<Estimator>> cycle_;
-  double log_likelihood_ = 0;
-  std::array<std::vector<double>, 3> changes_rad_;
+/// What the smallest cycle makes of the pass, with values to start from.
+struct Screened {
+  ScreenedPass pass;
+  std::vector<GyroCalibration> first;
 };
 
-/// What a run with all further states shows of each.
-class States {
+Screened screen(const Pass& pass, const CalibrationOptions& asked) {
+  const CalibrationOptions options = without_further_states(asked);
+  return with_estimator(pass, options, [&]<class Estimator>() {
+    const auto cycle = make_cycle<Estimator>(pass, options, {.navigate = false});
+    Screened screened;
+    screened.pass.gyros = Estimator::kGyros;
+    std::size_t sample = 0;
+    replay(
+        pass, *cycle, [&](const auto& report) { screened.pass.add_fix(report); },
+        [&](const auto& report) { screened.pass.add_sample(pass.gyro, sample++, report); });
+    for (const auto& gyro : cycle->estimator().gyros()) {
+      screened.first.push_back(to_record<Esg7>(gyro));
+    }
+    return screened;
+  });
+}
+
+/// The whole pass with one choice of states.
+class Trial {
  public:
-  /// Needs estimator.started().
-  explicit States(const Full& estimator) : estimator_(estimator), root_(estimator.information().inverse_root()) {}
+  Trial(const Pass& pass, const Screened& screened, const CalibrationOptions& options)
+      : problem_(screened.pass, setup_of(pass, options)), found_(most_likely(problem_, first_of(screened))) {}
+
+  /// Again, with other noise.
+  void refit(const ProcessNoise& noise) {
+    problem_.set_noise(noise);
+    found_ = most_likely(problem_, std::move(found_.solution));
+  }
+
+  [[nodiscard]] PassProblem::Linear linearised() const { return problem_.linearise(found_.solution); }
+  [[nodiscard]] double log_likelihood(const PassProblem::Linear& linear, const ProcessNoise& noise) const {
+    return ground::log_likelihood(problem_, found_.solution, linear, noise);
+  }
 
   [[nodiscard]] double clock_offset() const {
-    return of_shared(Full::Layout::clock_offset(), 1, setup().clock_offset_sigma_s);
+    return of_shared(layout().clock(), 1, problem_.setup().clock_offset_sigma_s);
   }
   [[nodiscard]] double orbital_error() const {
-    return of_shared(Full::Layout::orbital_error(), 6, setup().orbital_error_sigma_rad);
+    return of_shared(layout().orbital(), 6, problem_.setup().orbital_error_sigma_rad);
   }
   [[nodiscard]] double readout_bias() const {
-    constexpr int kBiases = 3 * Full::kGyros;
-    Eigen::VectorXd estimate(kBiases);
-    for (int k = 0; k < Full::kGyros; ++k) {
+    const int size = 3 * layout().gyros;
+    Eigen::VectorXd estimate(size);
+    for (int k = 0; k < layout().gyros; ++k) {
       const int row = 3 * k;
-      estimate.segment<3>(row) = estimator_.gyros()[k].readout_bias;
+      estimate.segment<3>(row) = gyro(k).readout_bias;
     }
-    return log_evidence(estimate, root_.middleRows(Full::Layout::readout_bias(0), kBiases),
-                        Eigen::VectorXd::Constant(kBiases, setup().readout_bias_sigma));
+    return log_evidence(estimate, found_.errors.last_root.middleRows(layout().bias(0), size),
+                        Eigen::VectorXd::Constant(size, problem_.setup().readout_bias_sigma));
   }
   /// Of all gyros' coefficients that eq. (1) does not have.
   [[nodiscard]] double drift_outside() const {
-    constexpr int kMembers = Esg20::kMembers;
-    Eigen::VectorXd estimate(2 * kMembers);
-    Eigen::VectorXd sigma(2 * kMembers);
-    Eigen::MatrixXd root(2 * kMembers, root_.cols());
-    for (int k = 0; k < 2; ++k) {
-      const int row = k * kMembers;
-      estimate.segment<kMembers>(row) = estimator_.gyros()[k].drift_rad_s.segment<kMembers>(Esg7::kSize);
-      root.middleRows<kMembers>(row) = root_.middleRows<kMembers>(Full::Layout::drift(k) + Esg7::kSize);
-      sigma.segment<kMembers>(row) = setup()
-                                         .prior_covariance.diagonal()
-                                         .segment<kMembers>(Full::Setup::Layout::drift(k) + Esg7::kSize)
-                                         .cwiseSqrt();
+    const int members = layout().drift_size - Esg7::kSize;
+    const int size = layout().gyros * members;
+    Eigen::VectorXd estimate(size);
+    Eigen::VectorXd sigma(size);
+    Eigen::MatrixXd root(size, layout().size());
+    for (int k = 0; k < layout().gyros; ++k) {
+      estimate.segment(k * members, members) = gyro(k).drift_rad_s.tail(members);
+      root.middleRows(k * members, members) =
+          found_.errors.last_root.middleRows(layout().drift(k) + Esg7::kSize, members);
+      sigma.segment(k * members, members) = problem_.setup()
+                                                .prior_covariance.diagonal()
+                                                .segment(layout().drift(k) - layout().drift(0) + Esg7::kSize, members)
+                                                .cwiseSqrt();
     }
     return log_evidence(estimate, root, sigma);
   }
 
- private:
-  [[nodiscard]] const Full::Setup& setup() const { return estimator_.setup(); }
-  [[nodiscard]] double of_shared(int state, int size, double prior_sigma) const {
-    return log_evidence(estimator_.shared().segment(state - Full::Layout::kShared, size), root_.middleRows(state, size),
-                        Eigen::VectorXd::Constant(size, prior_sigma));
+  /// How the difference of the first star tracker from the gyros changes from fix to fix, about c x, y, z: all that is
+  /// slow cancels.
+  [[nodiscard]] std::vector<Eigen::Vector3d> changes_rad() const {
+    constexpr Duration kClose = std::chrono::seconds(10);  // over which nothing slow changes
+    std::vector<Eigen::Vector3d> changes;
+    std::optional<Eigen::Quaterniond> last;
+    Time last_t{};
+    problem_.go_along(found_.solution, [&](const PassProblem::Moment& moment) {
+      if (moment.fix == nullptr || moment.fix->fix.head != 0) {
+        return;
+      }
+      const auto by_gyros = problem_.attitude(found_.solution, moment, moment.fix->h_b, moment.fix->used);
+      if (!by_gyros) {
+        return;
+      }
+      const Eigen::Quaterniond apart =
+          by_gyros.value().C_in_c.quaternion().conjugate() * moment.fix->fix.q_in_c.normalized();
+      if (last && moment.t - last_t < kClose) {
+        changes.emplace_back(Rot<C, C>::assume(last->conjugate() * apart).log().raw());
+      }
+      last = apart;
+      last_t = moment.t;
+    });
+    return changes;
   }
 
-  const Full& estimator_;
-  Eigen::MatrixXd root_;
+ private:
+  static PassSetup setup_of(const Pass& pass, const CalibrationOptions& options) {
+    return with_estimator(pass, options, [&]<class Estimator>() {
+      return pass_setup<Estimator>(make_setup<Estimator>(pass, options), options.further_states,
+                                   further_heads<Estimator>(pass));
+    });
+  }
+  [[nodiscard]] PassSolution first_of(const Screened& screened) const {
+    std::vector<GyroParameters> gyros;
+    for (const GyroCalibration& gyro : screened.first) {
+      GyroParameters parameters = parameters_of(gyro);
+      parameters.drift_rad_s.conservativeResizeLike(Eigen::VectorXd::Zero(layout().drift_size));
+      gyros.push_back(parameters);
+    }
+    return problem_.start(gyros);
+  }
+  [[nodiscard]] const PassLayout& layout() const { return problem_.setup().layout; }
+  [[nodiscard]] const GyroParameters& gyro(int k) const { return found_.solution.gyros[static_cast<std::size_t>(k)]; }
+  [[nodiscard]] double of_shared(int state, int size, double prior_sigma) const {
+    return log_evidence(found_.solution.shared.segment(state - layout().shared(), size),
+                        found_.errors.last_root.middleRows(state, size), Eigen::VectorXd::Constant(size, prior_sigma));
+  }
+
+  PassProblem problem_;
+  BatchResult found_;
 };
 
-/// Options, and how likely they make the pass.
+/// 1-sigma of the star tracker by the changes of a trial: of outliers only the median feels. Needs changes.
+Eigen::Vector3d star_tracker_noise_rad(const std::vector<Eigen::Vector3d>& changes_rad) {
+  constexpr double kMedianOfNormal = 0.6744897501960817;
+  Eigen::Vector3d noise_rad;
+  for (int axis = 0; axis < 3; ++axis) {
+    std::vector<double> changes;
+    for (const Eigen::Vector3d& change : changes_rad) {
+      changes.push_back(std::abs(change(axis)));
+    }
+    const auto middle = changes.begin() + static_cast<std::ptrdiff_t>(changes.size() / 2);
+    std::nth_element(changes.begin(), middle, changes.end());
+    noise_rad(axis) = *middle / kMedianOfNormal / std::numbers::sqrt2;
+  }
+  return noise_rad;
+}
+
+/// The noise of the star tracker that the changes show, where it is not what was told.
+std::optional<Eigen::Vector3d> other_star_tracker_noise(const Pass& pass,
+                                                        const std::vector<Eigen::Vector3d>& changes_rad) {
+  const Eigen::Vector3d& told = pass.settings.star_tracker_noise_rad;
+  const Eigen::Vector3d found = star_tracker_noise_rad(changes_rad);
+  const bool other = ((found - told).array().abs() > kNotable * told.array()).any();
+  return other ? std::optional(found) : std::nullopt;
+}
+
+/// Process noise, and how likely it makes the pass.
 struct Likely {
-  CalibrationOptions options;
+  ProcessNoise noise;
   double log_likelihood = 0;
   double gain = 0;  ///< over that of (0, 0)
 };
 
-/// Goes uphill over options on a grid, each by two numbers.
+/// Goes uphill over process noise on a grid, each by two numbers.
 class Search {
  public:
   using Point = std::pair<int, int>;
-  using At = std::function<CalibrationOptions(double, int)>;
+  using At = std::function<ProcessNoise(double, int)>;
 
   /// From the best of `starts`, (0, 0) among them, to the best of its neighbours, and so on, within the bounds; all
   /// included.
-  Search(const Pass& pass, At at, const std::vector<Point>& starts, const Point& lowest, const Point& highest)
-      : pass_(pass), at_(std::move(at)) {
+  Search(const Trial& trial, At at, const std::vector<Point>& starts, const Point& lowest, const Point& highest)
+      : trial_(trial), linear_(trial.linearised()), at_(std::move(at)) {
     look_at(starts);
     for (std::optional<Point> last; last != best_;) {
       last = best_;
@@ -199,10 +250,8 @@ class Search {
     std::map<Point, std::future<double>> runs;
     for (const Point& point : points) {
       if (!tried_.contains(point) && !runs.contains(point)) {
-        runs.emplace(point, std::async(std::launch::async, [this, options = at_(point.first, point.second)] {
-                       return with_estimator(pass_, options, [&]<class Estimator>() {
-                         return Trial<Estimator>(pass_, options).log_likelihood();
-                       });
+        runs.emplace(point, std::async(std::launch::async, [this, noise = at_(point.first, point.second)] {
+                       return trial_.log_likelihood(linear_, noise);
                      }));
       }
     }
@@ -214,72 +263,50 @@ class Search {
             })->first;
   }
 
-  const Pass& pass_;
+  const Trial& trial_;
+  PassProblem::Linear linear_;
   At at_;
   std::map<Point, double> tried_;
   Point best_;
 };
 
-/// The process noise that makes the pass most likely, by factors of two above that of the options, and from as many of
-/// them as `starts` says.
-Likely with_most_likely_walk(const Pass& pass, const CalibrationOptions& options,
-                             const std::vector<Search::Point>& starts) {
-  const auto at = [&](double level, int) {
-    CalibrationOptions trial = options;
-    trial.direction_random_walk_rad_sqrt_s = std::max(trial.direction_random_walk_rad_sqrt_s, kLeastWalk_rad_sqrt_s);
-    trial.direction_random_walk_rad_sqrt_s *= std::pow(2, level);
-    return trial;
-  };
-  return Search(pass, at, starts, {0, 0}, {9, 0}).best();
-}
-
-/// Where the model is wrong and the filter has to reopen there is more than one maximum.
+/// Where the model is wrong there is more than one maximum.
 const std::vector<Search::Point> kAllLevels = {{0, 0}, {3, 0}, {6, 0}, {9, 0}};
 
-/// Level and correlation time of the drift that wanders which make the pass most likely, by factors of two and three
-/// from those of the options.
-Likely with_most_likely_wandering(const Pass& pass, const CalibrationOptions& options,
-                                  const std::vector<Search::Point>& starts) {
-  const auto at = [&](double level, int time) {
-    CalibrationOptions trial = options;
-    FurtherStateOptions& states = trial.further_states;
-    states.wandering_drift = Choice::kOn;
-    states.wandering_drift_rad_s *= std::pow(2, level);
-    states.wandering_time = from_seconds(to_seconds(states.wandering_time) * std::pow(3, time));
-    return trial;
-  };
-  return Search(pass, at, starts, {-3, -2}, {9, 1}).best();
-}
-
-/// The noise of the star tracker that a trial shows, where it is not what was told.
-template <class Estimator>
-std::optional<Eigen::Vector3d> other_star_tracker_noise(const Pass& pass, const Trial<Estimator>& trial) {
-  const Eigen::Vector3d& told = pass.settings.star_tracker_noise_rad;
-  const Eigen::Vector3d found = trial.star_tracker_noise_rad();
-  const bool other = ((found - told).array().abs() > kNotable * told.array()).any();
-  return other ? std::optional(found) : std::nullopt;
-}
-
-/// Only the noise is found: of more than two gyros.
-CalibrationOptions with_noise_found(const Pass& pass, CalibrationOptions options) {
-  return with_estimator(pass, options, [&]<class Estimator>() {
-    const Trial<Estimator> trial(pass, options);
-    options.find_noise = trial.changes() >= kEnough;
-    if (!options.find_noise) {
-      return options;
+/// The trial with the process noise that makes the pass most likely, and that: outliers are told apart by it.
+Likely settled(Trial& trial, const Search::At& at, const std::vector<Search::Point>& starts,
+               const Search::Point& lowest, const Search::Point& highest) {
+  constexpr int kRounds = 3;
+  Likely likely;
+  for (int round = 0; round < kRounds; ++round) {
+    const double before = likely.noise.direction_random_walk_rad_sqrt_s + likely.noise.wandering_sigma_rad_s;
+    likely = Search(trial, at, starts, lowest, highest).best();
+    trial.refit(likely.noise);
+    const double now = likely.noise.direction_random_walk_rad_sqrt_s + likely.noise.wandering_sigma_rad_s;
+    if (std::abs(now - before) < kNotable * now) {
+      break;
     }
-    options.star_tracker_noise_rad = other_star_tracker_noise(pass, trial);
-    return with_most_likely_walk(pass, options, kAllLevels).options;
-  });
+  }
+  return likely;
 }
 
-CalibrationOptions without_further_states(CalibrationOptions options) {
-  options.drift_model = Esg7::kModelName;
-  for (Choice* choice : {&options.further_states.clock_offset, &options.further_states.orbital_error,
-                         &options.further_states.wandering_drift, &options.further_states.readout_bias}) {
-    *choice = Choice::kOff;
-  }
-  return options;
+/// A random walk, by factors of two above that of the options.
+Likely with_most_likely_walk(Trial& trial, const CalibrationOptions& options) {
+  const double least = std::max(options.direction_random_walk_rad_sqrt_s, kLeastWalk_rad_sqrt_s);
+  return settled(trial, [least](double level, int) { return ProcessNoise{least * std::pow(2, level)}; }, kAllLevels,
+                 {0, 0}, {9, 0});
+}
+
+/// Level and correlation time of the drift that wanders, by factors of two and three from those of the options.
+Likely with_most_likely_wandering(Trial& trial, const CalibrationOptions& options) {
+  const FurtherStateOptions& states = options.further_states;
+  return settled(trial,
+                 [&](double level, int time) {
+                   return ProcessNoise{options.direction_random_walk_rad_sqrt_s,
+                                       states.wandering_drift_rad_s * std::pow(2, level),
+                                       to_seconds(states.wandering_time) * std::pow(3, time)};
+                 },
+                 {{0, 0}, {2, 0}, {4, 0}, {6, 0}}, {-3, -2}, {9, 1});
 }
 
 /// What was asked for must be there.
@@ -332,20 +359,21 @@ CalibrationOptions as_before(CalibrationOptions options, const Calibration& prio
 }
 
 /// Turns the choices that are left open, and the drift model, by what a trial with everything shows.
-void settle_states(const States& everything, const CalibrationOptions& asked, Decision& decision) {
+void settle_states(const Trial& everything, const CalibrationOptions& asked, Decision& decision) {
   decision.evidence.clear();
   const auto settle = [&](const char* states, double log_bayes_factor) {
     decision.evidence.push_back({states, log_bayes_factor, log_bayes_factor > kStrong});
     return decision.evidence.back().accepted;
   };
-  const auto choose = [&](Choice FurtherStateOptions::*choice, const char* states, double log_bayes_factor) {
+  const auto choose = [&](Choice FurtherStateOptions::*choice, const char* states, double (Trial::*evidence)() const) {
     if (asked.further_states.*choice == Choice::kAuto) {
-      decision.options.further_states.*choice = settle(states, log_bayes_factor) ? Choice::kOn : Choice::kOff;
+      const bool on = settle(states, (everything.*evidence)());
+      decision.options.further_states.*choice = on ? Choice::kOn : Choice::kOff;
     }
   };
-  choose(&FurtherStateOptions::clock_offset, "clock_offset", everything.clock_offset());
-  choose(&FurtherStateOptions::orbital_error, "orbital_error", everything.orbital_error());
-  choose(&FurtherStateOptions::readout_bias, "readout_bias", everything.readout_bias());
+  choose(&FurtherStateOptions::clock_offset, "clock_offset", &Trial::clock_offset);
+  choose(&FurtherStateOptions::orbital_error, "orbital_error", &Trial::orbital_error);
+  choose(&FurtherStateOptions::readout_bias, "readout_bias", &Trial::readout_bias);
   if (asked.drift_model == kAutoDriftModel) {
     const bool outside = settle("drift_outside_eq1", everything.drift_outside());
     decision.options.drift_model = outside ? Esg20::kModelName : Esg7::kModelName;
@@ -362,39 +390,80 @@ CalibrationOptions with_everything(CalibrationOptions options, const Calibration
   return options;
 }
 
+/// Puts noise into the options.
+void use(const Likely& likely, bool wanders, CalibrationOptions& options) {
+  if (wanders) {
+    options.further_states.wandering_drift = Choice::kOn;
+    options.further_states.wandering_drift_rad_s = likely.noise.wandering_sigma_rad_s;
+    options.further_states.wandering_time = from_seconds(likely.noise.wandering_time_s);
+  } else {
+    options.direction_random_walk_rad_sqrt_s = likely.noise.direction_random_walk_rad_sqrt_s;
+  }
+}
+
+/// Drift that wanders as fast as this random walk: walk² = 2 σ² τ.
+CalibrationOptions wandering_like(const Likely& walking, CalibrationOptions options) {
+  FurtherStateOptions& states = options.further_states;
+  states.wandering_drift = Choice::kOn;
+  states.wandering_drift_rad_s =
+      walking.noise.direction_random_walk_rad_sqrt_s / std::sqrt(2 * to_seconds(states.wandering_time));
+  return options;
+}
+
 /// Where the noise is more than was told the states were settled by one that is too small: again, by what it is when
 /// they are all free, and whether it wanders.
-void decide_beside_noise(const Pass& pass, const CalibrationOptions& asked, bool wandering_is_open,
-                         Decision& decision) {
+void decide_beside_noise(const Pass& pass, const Screened& screened, const CalibrationOptions& asked,
+                         bool wandering_is_open, Decision& decision) {
   CalibrationOptions& options = decision.options;
-  CalibrationOptions free = with_everything(options, asked);
-  const Likely walking = with_most_likely_walk(pass, free, kAllLevels);
-  const double walk_rad_sqrt_s = walking.options.direction_random_walk_rad_sqrt_s;
+  const CalibrationOptions free = with_everything(options, asked);
+  Trial everything(pass, screened, free);
+  const Likely walking = with_most_likely_walk(everything, free);
   std::optional<Evidence> wandering;
+  CalibrationOptions wandering_options;
   if (wandering_is_open && walking.gain > kStrong) {
-    // What wanders fast is a random walk of walk² = 2 σ² τ.
-    free.further_states.wandering_drift_rad_s =
-        walk_rad_sqrt_s / std::sqrt(2 * to_seconds(free.further_states.wandering_time));
-    const Likely wanders = with_most_likely_wandering(pass, free, {{0, 0}, {2, 0}, {4, 0}, {6, 0}});
+    wandering_options = wandering_like(walking, free);
+    Trial trial(pass, screened, wandering_options);
+    const Likely wanders = with_most_likely_wandering(trial, wandering_options);
     const double gain = wanders.log_likelihood - walking.log_likelihood;
     wandering = Evidence{"wandering_drift", gain, gain > kStrong};
-    free = wandering->accepted ? wanders.options : walking.options;
-  } else {
-    free = walking.options;
+    if (wandering->accepted) {
+      use(wanders, true, wandering_options);
+      everything = std::move(trial);
+    }
   }
-  settle_states(States(Trial<Full>(pass, free).estimator()), asked, decision);
+  settle_states(everything, asked, decision);
   if (wandering && wandering->accepted) {
-    options.further_states.wandering_drift_rad_s = free.further_states.wandering_drift_rad_s;
-    options.further_states.wandering_time = free.further_states.wandering_time;
-    options = with_most_likely_wandering(pass, options, {{0, 0}}).options;
+    options.further_states.wandering_drift = Choice::kOn;
+    options.further_states.wandering_drift_rad_s = wandering_options.further_states.wandering_drift_rad_s;
+    options.further_states.wandering_time = wandering_options.further_states.wandering_time;
+    Trial trial(pass, screened, options);
+    use(with_most_likely_wandering(trial, options), true, options);
   } else {
-    const double level =
-        std::log2(walk_rad_sqrt_s / std::max(options.direction_random_walk_rad_sqrt_s, kLeastWalk_rad_sqrt_s));
-    options = with_most_likely_walk(pass, options, {{0, 0}, {static_cast<int>(std::lround(level)), 0}}).options;
+    Trial trial(pass, screened, options);
+    use(with_most_likely_walk(trial, options), false, options);
   }
   if (wandering) {
     decision.evidence.push_back(*wandering);
   }
+}
+
+/// Only the noise is found: of more than two gyros.
+void find_noise(const Pass& pass, CalibrationOptions& options) {
+  const Screened screened = screen(pass, options);
+  if (screened.pass.fixes.empty()) {
+    return;
+  }
+  Trial trial(pass, screened, options);
+  const std::vector<Eigen::Vector3d> changes = trial.changes_rad();
+  options.find_noise = changes.size() >= kEnough;
+  if (!options.find_noise) {
+    return;
+  }
+  options.star_tracker_noise_rad = other_star_tracker_noise(pass, changes);
+  if (options.star_tracker_noise_rad) {
+    trial = Trial(pass, screened, options);
+  }
+  use(with_most_likely_walk(trial, options), false, options);
 }
 
 }  // namespace
@@ -408,14 +477,14 @@ Decision decide(const Pass& pass, const CalibrationOptions& asked) {
   if (prior && prior->noise && asked.find_noise && invariant) {
     use_noise(*prior->noise, options);
   }
-  if (!invariant || pass.gyro.gyros > Full::kGyros) {
+  if (!invariant || pass.gyro.gyros > 2) {
     refuse_further_states(pass, asked);
     options = without_further_states(options);
     if (asked.drift_model != kAutoDriftModel) {
       options.drift_model = asked.drift_model;
     }
     if (asked.find_noise && invariant && !prior) {
-      options = with_noise_found(pass, options);
+      find_noise(pass, options);
     }
     return decision;
   }
@@ -433,27 +502,30 @@ Decision decide(const Pass& pass, const CalibrationOptions& asked) {
   if (states_are_settled && !asked.find_noise) {
     return decision;
   }
-  Trial<Full> everything(pass, with_everything(options, asked));
-  if (!everything.estimator().started()) {
+  const Screened screened = screen(pass, options);
+  if (screened.pass.fixes.empty()) {
     options = without_further_states(options);
     return decision;
   }
-  options.find_noise = asked.find_noise && everything.changes() >= kEnough;
+  Trial everything(pass, screened, with_everything(options, asked));
+  const std::vector<Eigen::Vector3d> changes = everything.changes_rad();
+  options.find_noise = asked.find_noise && changes.size() >= kEnough;
   if (!options.find_noise) {
-    settle_states(States(everything.estimator()), asked, decision);
+    settle_states(everything, asked, decision);
     return decision;
   }
-  options.star_tracker_noise_rad = other_star_tracker_noise(pass, everything);
+  options.star_tracker_noise_rad = other_star_tracker_noise(pass, changes);
   if (options.star_tracker_noise_rad) {
-    everything = Trial<Full>(pass, with_everything(options, asked));
+    everything = Trial(pass, screened, with_everything(options, asked));
   }
-  settle_states(States(everything.estimator()), asked, decision);
-  const Likely little = with_most_likely_walk(pass, options, kAllLevels);
-  if (!(little.gain > kStrong)) {
-    options = little.options;
-    return decision;
+  settle_states(everything, asked, decision);
+  Trial decided(pass, screened, options);
+  const Likely walking = with_most_likely_walk(decided, options);
+  if (walking.gain > kStrong) {
+    decide_beside_noise(pass, screened, asked, wandering_is_open, decision);
+  } else {
+    use(walking, false, options);
   }
-  decide_beside_noise(pass, asked, wandering_is_open, decision);
   return decision;
 }
 

@@ -14,97 +14,140 @@ using Eigen::MatrixXd;
 using Eigen::Upper;
 using Eigen::VectorXd;
 
-/// The triangle of the rows that `rows` can be rotated into, without those below it. The last column is the right side.
-MatrixXd triangle_of(const MatrixXd& rows, Index wanted) {
-  const Eigen::HouseholderQR<MatrixXd> qr(rows);
-  const Index there = std::min(rows.rows(), rows.cols());
-  MatrixXd triangle = MatrixXd::Zero(wanted, rows.cols());
-  triangle.topRows(std::min(there, wanted)) = qr.matrixQR().topRows(std::min(there, wanted)).triangularView<Upper>();
-  return triangle;
-}
-
-MatrixXd stacked(const MatrixXd& above, const MatrixXd& below) {
-  MatrixXd rows(above.rows() + below.rows(), above.cols());
-  rows << above, below;
-  return rows;
-}
-
-/// w of one step by the states after it: R w + S x' = z with unit noise.
-struct NoiseRows {
-  MatrixXd R;
-  MatrixXd S;
-  VectorXd z;
-};
-
 double log_determinant(const MatrixXd& triangle) { return triangle.diagonal().array().abs().log().sum(); }
+
+/// Rotates rows so that below the first `columns` of them nothing is left in the first `columns` columns.
+void rotate_up(MatrixXd& rows, Index columns) {
+  const Eigen::HouseholderQR<MatrixXd> qr(rows.leftCols(columns));
+  rows.rightCols(rows.cols() - columns).applyOnTheLeft(qr.householderQ().adjoint());
+  rows.leftCols(columns).setZero();
+  rows.topLeftCorner(columns, columns) = qr.matrixQR().topRows(columns).triangularView<Upper>();
+}
+
+/// Rows about the constants alone, with their right side; now and then made into a triangle.
+class Pile {
+ public:
+  explicit Pile(Index columns) : rows_(MatrixXd::Zero(kMost + columns, columns)) {}
+
+  template <class Rows>
+  void add(const Rows& rows) {
+    if (size_ + rows.rows() > rows_.rows()) {
+      rows_.topRows(rows_.cols()) = triangle();
+      size_ = rows_.cols();
+      if (size_ + rows.rows() > rows_.rows()) {
+        rows_.conservativeResize(size_ + rows.rows(), Eigen::NoChange);
+      }
+    }
+    rows_.middleRows(size_, rows.rows()) = rows;
+    size_ += rows.rows();
+  }
+
+  [[nodiscard]] MatrixXd triangle() const { return triangle_of(rows_.topRows(size_)); }
+
+ private:
+  static constexpr Index kMost = 1000;
+  MatrixXd rows_;
+  Index size_ = 0;
+};
 
 }  // namespace
 
+MatrixXd triangle_of(const MatrixXd& rows) {
+  const Index size = rows.cols();
+  MatrixXd triangle = MatrixXd::Zero(size, size);
+  const Index there = std::min(rows.rows(), size);
+  triangle.topRows(there) =
+      Eigen::HouseholderQR<MatrixXd>(rows).matrixQR().topRows(there).template triangularView<Upper>();
+  return triangle;
+}
+
 SmootherResult smooth(const MatrixXd& prior, const VectorXd& prior_y, const std::vector<SmootherStage>& stages) {
   const Index n = prior.cols();
+  const Index d = stages.front().m.size();
+  const Index c = n - d;
   SmootherResult result;
-  // Forward. [R z] holds R x = z + unit noise of the present stage.
-  MatrixXd root(prior.rows(), n + 1);
-  root << prior, prior_y;
-  std::vector<NoiseRows> steps;
+  // Forward. The rows that know of d are kept as its triangle; what they leave over knows of c alone, which does not
+  // move: it waits for the end.
+  Pile pile(c + 1);
+  MatrixXd moving(prior.rows(), n + 1);
+  moving << prior, prior_y;
   for (std::size_t i = 0; i < stages.size(); ++i) {
     const SmootherStage& stage = stages[i];
-    MatrixXd measured(stage.H.rows(), n + 1);
-    measured << stage.H, stage.y;
-    // One row more than there are states: what is left over on the right side is the residual.
-    root = triangle_of(stacked(root, measured), n + 1);
-    result.residual_square += root(n, n) * root(n, n);
-    root.conservativeResize(n, n + 1);
+    MatrixXd rows = MatrixXd::Zero(std::max(moving.rows() + stage.H.rows(), d), n + 1);
+    rows.topRows(moving.rows()) = moving;
+    rows.block(moving.rows(), 0, stage.H.rows(), n) = stage.H;
+    rows.block(moving.rows(), n, stage.H.rows(), 1) = stage.y;
+    rotate_up(rows, d);
+    pile.add(rows.bottomRightCorner(rows.rows() - d, c + 1));
+    moving = rows.topRows(d);
     if (i + 1 == stages.size()) {
       break;
     }
     // With d = A⁻¹ (d' − B c − m − noise w) put in: columns w, d', c, right side; w has unit rows of its own.
-    const Index d = stage.m.size();
-    const MatrixXd R_d = root.leftCols(d) * stage.A_inverse;
-    MatrixXd moved = MatrixXd::Zero(d + n, d + n + 1);
+    const MatrixXd R_d = moving.leftCols(d) * stage.A_inverse;
+    MatrixXd moved = MatrixXd::Zero(2 * d, d + n + 1);
     moved.topLeftCorner(d, d).setIdentity();
-    moved.block(d, 0, n, d) = -R_d * stage.noise.asDiagonal();
-    moved.block(d, d, n, d) = R_d;
-    moved.block(d, 2 * d, n, n - d) = root.middleCols(d, n - d) - R_d * stage.B;
-    moved.bottomRightCorner(n, 1) = root.rightCols(1) + R_d * stage.m;
-    const MatrixXd triangle = triangle_of(moved, d + n);
-    steps.push_back({triangle.topLeftCorner(d, d), triangle.block(0, d, d, n), triangle.topRightCorner(d, 1)});
+    moved.block(d, 0, d, d) = -R_d * stage.noise.asDiagonal();
+    moved.block(d, d, d, d) = R_d;
+    moved.block(d, 2 * d, d, c) = moving.middleCols(d, c) - R_d * stage.B;
+    moved.bottomRightCorner(d, 1) = moving.rightCols(1) + R_d * stage.m;
+    rotate_up(moved, d);
+    result.steps.push_back({moved.topLeftCorner(d, d), moved.block(0, d, d, n), moved.topRightCorner(d, 1)});
     // That of (d, c, w): by those of (w, d', c), of which they are a linear function with the determinant of A⁻¹.
-    result.log_root_determinant += log_determinant(steps.back().R) - std::log(std::abs(stage.A_inverse.determinant()));
-    root = triangle.bottomRightCorner(n, n + 1);
+    result.log_root_determinant +=
+        log_determinant(result.steps.back().R) - std::log(std::abs(stage.A_inverse.determinant()));
+    moving = moved.bottomRightCorner(d, n + 1);
   }
+  const MatrixXd constant = pile.triangle();
+  result.residual_square = constant(c, c) * constant(c, c);
+  MatrixXd root = MatrixXd::Zero(n, n + 1);
+  root.topRows(d) = moving;
+  root.bottomRightCorner(c, c + 1) = constant.topRows(c);
   if (!((root.diagonal().array().abs() > 0).all() && root.allFinite())) {
     throw std::invalid_argument("smoother: a state without any information");
   }
   result.log_root_determinant += log_determinant(root);
+  const auto R = root.leftCols(n).triangularView<Upper>();
+  result.last_root = R.solve(MatrixXd::Identity(n, n));
 
   // Backward.
-  const auto R = root.leftCols(n).triangularView<Upper>();
-  result.stages.resize(stages.size());
-  result.stages.back() = {R.solve(root.col(n)), R.solve(MatrixXd::Identity(n, n))};
-  for (std::size_t i = steps.size(); i-- > 0;) {
+  result.x.resize(stages.size());
+  result.x.back() = R.solve(root.col(n));
+  for (std::size_t i = result.steps.size(); i-- > 0;) {
     const SmootherStage& stage = stages[i];
-    const NoiseRows& step = steps[i];
-    const SmoothedStage& next = result.stages[i + 1];
-    const Index d = stage.m.size();
-    const auto R_w = step.R.triangularView<Upper>();
-    const VectorXd w = R_w.solve(step.z - step.S * next.x);
-    SmoothedStage& now = result.stages[i];
-    now.x = next.x;
-    now.x.head(d) =
-        stage.A_inverse * (next.x.head(d) - stage.B * next.x.tail(n - d) - stage.m - stage.noise.cwiseProduct(w));
-    // Of the errors of x' and of w, which is that of its rows.
-    const MatrixXd w_by_next = -R_w.solve(step.S * next.root);
-    const MatrixXd w_own = R_w.solve(MatrixXd::Identity(d, d));
-    MatrixXd wide(n, n + d);
-    wide.leftCols(n) = next.root;
-    wide.rightCols(d).setZero();
-    wide.topLeftCorner(d, n) = stage.A_inverse * (next.root.topRows(d) - stage.B * next.root.bottomRows(n - d) -
-                                                  stage.noise.asDiagonal() * w_by_next);
-    wide.topRightCorner(d, d) = -stage.A_inverse * stage.noise.asDiagonal() * w_own;
-    now.root = triangle_of(wide.transpose(), n).transpose();
+    const SmootherResult::NoiseRows& step = result.steps[i];
+    const VectorXd& next = result.x[i + 1];
+    const VectorXd w = step.R.triangularView<Upper>().solve(step.z - step.S * next);
+    result.x[i] = next;
+    result.x[i].head(d) =
+        stage.A_inverse * (next.head(d) - stage.B * next.tail(c) - stage.m - stage.noise.cwiseProduct(w));
   }
   return result;
+}
+
+std::vector<MatrixXd> covariance_roots(const SmootherResult& result, const std::vector<SmootherStage>& stages) {
+  const Index n = result.last_root.rows();
+  const Index d = stages.front().m.size();
+  const Index c = n - d;
+  std::vector<MatrixXd> roots(stages.size());
+  roots.back() = result.last_root;
+  for (std::size_t i = result.steps.size(); i-- > 0;) {
+    const SmootherStage& stage = stages[i];
+    const SmootherResult::NoiseRows& step = result.steps[i];
+    const MatrixXd& next = roots[i + 1];
+    // d by the errors of d' and c, the columns of their root, and by those of w, which its rows have on their own. Only
+    // d moves, and only its own columns and those of w have to be put together again.
+    const auto R_w = step.R.triangularView<Upper>();
+    const MatrixXd by_w = stage.A_inverse * stage.noise.asDiagonal();
+    const MatrixXd by_next =
+        stage.A_inverse * (next.topRows(d) - stage.B * next.bottomRows(c)) + by_w * R_w.solve(step.S * next);
+    MatrixXd own(d, 2 * d);
+    own << by_next.leftCols(d), by_w * R_w.solve(MatrixXd::Identity(d, d));
+    roots[i] = next;
+    roots[i].topLeftCorner(d, d) = triangle_of(own.transpose()).transpose();
+    roots[i].topRightCorner(d, c) = by_next.rightCols(c);
+  }
+  return roots;
 }
 
 }  // namespace trihedron::ground

@@ -18,21 +18,31 @@ struct SmootherStage {
   Eigen::VectorXd noise;  ///< 1-sigma, may be zero
 };
 
-/// Estimate of the states of one stage by all measurements; its covariance is root rootᵀ.
-struct SmoothedStage {
-  Eigen::VectorXd x;
-  Eigen::MatrixXd root;
-};
-
 struct SmootherResult {
-  std::vector<SmoothedStage> stages;
+  std::vector<Eigen::VectorXd> x;   ///< estimate of the states of each stage by all measurements
+  Eigen::MatrixXd last_root;        ///< of their covariance in the last stage, root rootᵀ
   double residual_square = 0;       ///< of all measurements and of w at the estimate: −2 ln of the largest density
   double log_root_determinant = 0;  ///< ln |det R|, R the root of the information: of c and all d and w together
+
+  /// w of one step by the states after it: R w + S x' = z with unit noise.
+  struct NoiseRows {
+    Eigen::MatrixXd R;
+    Eigen::MatrixXd S;
+    Eigen::VectorXd z;
+  };
+  std::vector<NoiseRows> steps;
 };
 
 /// Estimates all stages. `prior`: rows and right side of what is known before of the first stage, unit noise. Throws
 /// std::invalid_argument where a state stays without any information.
 [[nodiscard]] SmootherResult smooth(const Eigen::MatrixXd& prior, const Eigen::VectorXd& prior_y,
                                     const std::vector<SmootherStage>& stages);
+
+/// The square triangle whose rows hold what `rows` do, their last columns the right side (Householder).
+[[nodiscard]] Eigen::MatrixXd triangle_of(const Eigen::MatrixXd& rows);
+
+/// Square roots of the covariances of all stages' states by all measurements.
+[[nodiscard]] std::vector<Eigen::MatrixXd> covariance_roots(const SmootherResult& result,
+                                                            const std::vector<SmootherStage>& stages);
 
 }  // namespace trihedron::ground

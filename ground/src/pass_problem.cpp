@@ -21,7 +21,7 @@ using Eigen::VectorXd;
 /// Samples are taken so far apart: the body turns little between them, and their noise is averaged in the end.
 constexpr Duration kStep = std::chrono::seconds(1);
 /// Process noise comes in at so many times.
-constexpr Duration kArc = std::chrono::seconds(60);
+constexpr Duration kArc = std::chrono::seconds(120);
 /// As in the cycle: what a sample is from the next where none is missing.
 constexpr Duration kMaxInterpolation = std::chrono::milliseconds(500);
 constexpr double kQuarterOrbit_s = 1300;
@@ -43,6 +43,18 @@ Directions in_c(const PassSolution& solution, const Directions& h_b) {
     h_c[gyro] = seen_in_c(solution.gyros[k], h_b[gyro]);
   }
   return h_c;
+}
+
+/// The same measurements in no more rows than there are states, and one for what is left over.
+void compress(SmootherStage& stage) {
+  const Eigen::Index states = stage.H.cols();
+  if (stage.H.rows() > states + 1) {
+    MatrixXd rows(stage.H.rows(), states + 1);
+    rows << stage.H, stage.y;
+    const MatrixXd triangle = triangle_of(rows);
+    stage.H = triangle.leftCols(states);
+    stage.y = triangle.col(states);
+  }
 }
 
 /// Small rotation across `from` that takes it to `to`.
@@ -299,10 +311,6 @@ void PassProblem::add_prior(const PassSolution& solution, Linear& linear) const 
     apart.segment(layout.drift(k), layout.drift_size) = prior.drift_rad_s - gyro.drift_rad_s;
     apart.segment<3>(layout.alignment(k)) =
         Rot<C, C>::assume(Matrix3d(prior.C_c_b * gyro.C_c_b.transpose())).log().raw();
-    if (layout.wandering_drift) {
-      sigma.segment<3>(layout.wandering(k)).setConstant(setup_.wandering_sigma_rad_s);
-      apart.segment<3>(layout.wandering(k)) = -solution.arcs[0].wandering_rad_s[k];
-    }
     if (layout.readout_bias) {
       sigma.segment<3>(layout.bias(k)).setConstant(setup_.readout_bias_sigma);
       apart.segment<3>(layout.bias(k)) = prior.readout_bias - gyro.readout_bias;
@@ -329,36 +337,59 @@ void PassProblem::add_prior(const PassSolution& solution, Linear& linear) const 
 }
 
 void PassProblem::end_arc(const PassSolution& solution, const Moment& moment, double extra_variance_rad2,
-                          SmootherStage& stage) const {
+                          Linear& linear) const {
   const PassLayout& layout = setup_.layout;
   const int d = layout.dynamic();
-  MatrixXd A = MatrixXd::Zero(d, d);
+  SmootherStage& stage = linear.stages[moment.arc];
+  Linear::ArcEnd& end = linear.ends.emplace_back();
+  end.A.setZero(d, d);
+  end.duration_s = to_seconds(moment.t - nodes_[arcs_[moment.arc].begin].t);
+  end.extra_variance_rad2 = extra_variance_rad2;
   stage.B.setZero(d, layout.constants());
   stage.m.setZero(d);
-  stage.noise.setZero(d);
-  const double dt_s = to_seconds(moment.t - nodes_[arcs_[moment.arc].begin].t);
-  const double walk = setup_.direction_random_walk_rad_sqrt_s;
-  const double kept = std::max(std::exp(-dt_s / setup_.wandering_time_s), 1e-6);
-  const PassSolution::Arc& now = solution.arcs[moment.arc];
   const PassSolution::Arc& next = solution.arcs[moment.arc + 1];
   for (int k = 0; k < gyros_; ++k) {
     const MomentumBy& by = moment.by[static_cast<std::size_t>(k)];
     const Eigen::Matrix<double, 2, 3> T = across(next.h_in[k]).transpose();
     const int row = layout.direction(k);
-    A.block<2, 2>(row, row) = T * by.direction;
+    end.A.block<2, 2>(row, row) = T * by.direction;
     stage.B.block(row, layout.drift(k) - d, 2, layout.drift_size) = T * by.drift;
     stage.B.block<2, 3>(row, layout.alignment(k) - d) = T * by.alignment;
     stage.m.segment<2>(row) = T * turn(next.h_in[k], moment.h_in[k]);
-    stage.noise.segment<2>(row).setConstant(std::sqrt(walk * walk * dt_s + extra_variance_rad2));
     if (layout.wandering_drift) {
-      const int wandering = layout.wandering(k);
-      A.block<2, 3>(row, wandering) = T * by.wandering;
-      A.block<3, 3>(wandering, wandering) = kept * Matrix3d::Identity();
-      stage.m.segment<3>(wandering) = kept * now.wandering_rad_s[k] - next.wandering_rad_s[k];
-      stage.noise.segment<3>(wandering).setConstant(setup_.wandering_sigma_rad_s * std::sqrt(1 - kept * kept));
+      end.A.block<2, 3>(row, layout.wandering(k)) = T * by.wandering;
     }
   }
-  stage.A_inverse = A.inverse();
+}
+
+void PassProblem::put_noise(const PassSolution& solution, const ProcessNoise& noise, Linear& linear) const {
+  const PassLayout& layout = setup_.layout;
+  const double walk = noise.direction_random_walk_rad_sqrt_s;
+  if (layout.wandering_drift) {
+    for (int k = 0; k < gyros_; ++k) {
+      const int row = layout.wandering(k);
+      linear.prior.block<3, 3>(row, row) = 1 / noise.wandering_sigma_rad_s * Matrix3d::Identity();
+      linear.prior_y.segment<3>(row) = -solution.arcs[0].wandering_rad_s[k] / noise.wandering_sigma_rad_s;
+    }
+  }
+  for (std::size_t arc = 0; arc < linear.ends.size(); ++arc) {
+    Linear::ArcEnd& end = linear.ends[arc];
+    SmootherStage& stage = linear.stages[arc];
+    // Nothing is left of wandering drift after a long time; what A⁻¹ takes for that would be rounding.
+    const double kept = std::max(std::exp(-end.duration_s / noise.wandering_time_s), 1e-6);
+    stage.noise.setZero(layout.dynamic());
+    stage.noise.head(2L * gyros_).setConstant(std::sqrt(walk * walk * end.duration_s + end.extra_variance_rad2));
+    if (layout.wandering_drift) {
+      for (int k = 0; k < gyros_; ++k) {
+        const int row = layout.wandering(k);
+        end.A.block<3, 3>(row, row) = kept * Matrix3d::Identity();
+        stage.m.segment<3>(row) =
+            kept * solution.arcs[arc].wandering_rad_s[k] - solution.arcs[arc + 1].wandering_rad_s[k];
+        stage.noise.segment<3>(row).setConstant(noise.wandering_sigma_rad_s * std::sqrt(1 - kept * kept));
+      }
+    }
+    stage.A_inverse = end.A.inverse();
+  }
 }
 
 PassProblem::Linear PassProblem::linearise(const PassSolution& solution) const {
@@ -367,6 +398,7 @@ PassProblem::Linear PassProblem::linearise(const PassSolution& solution) const {
   linear.stages.resize(arcs_.size());
   Moment moment;
   std::vector<FixRows> fixes;
+  std::vector<double> nis;
   std::vector<std::size_t> fixes_until;
   for (std::size_t arc = 0; arc < arcs_.size(); ++arc) {
     begin_arc(solution, arc, moment);
@@ -378,7 +410,7 @@ PassProblem::Linear PassProblem::linearise(const PassSolution& solution) const {
         const Eigen::LLT<MatrixXd> root(rows.R);
         root.matrixL().solveInPlace(rows.H);
         root.matrixL().solveInPlace(rows.y);
-        linear.nis.push_back(rows.y.squaredNorm());
+        nis.push_back(rows.y.squaredNorm());
       }
       if (i + 1 < nodes_.size()) {
         step(solution, nodes_[i], nodes_[i + 1], moment, extra_variance_rad2);
@@ -386,15 +418,15 @@ PassProblem::Linear PassProblem::linearise(const PassSolution& solution) const {
     }
     fixes_until.push_back(fixes.size());
     if (arc + 1 < arcs_.size()) {
-      end_arc(solution, moment, extra_variance_rad2, linear.stages[arc]);
+      end_arc(solution, moment, extra_variance_rad2, linear);
     } else {
       linear.stages[arc].m.setZero(setup_.layout.dynamic());
     }
   }
   // Far from the solution all fixes are off: what is far among them is an outlier.
   double gate = setup_.gate_nis;
-  if (!linear.nis.empty()) {
-    std::vector<double> sorted = linear.nis;
+  if (!nis.empty()) {
+    std::vector<double> sorted = nis;
     const auto middle = sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2);
     std::nth_element(sorted.begin(), middle, sorted.end());
     gate *= std::max(*middle / kPairComponents, 1.0);
@@ -412,19 +444,21 @@ PassProblem::Linear PassProblem::linearise(const PassSolution& solution) const {
     for (; fix < fixes_until[arc]; ++fix) {
       const FixRows& rows = fixes[fix];
       // Its pull falls with the third power of the misfit beyond the gate.
-      const double weight = linear.nis[fix] > gate ? gate / linear.nis[fix] : 1;
+      const double weight = nis[fix] > gate ? gate / nis[fix] : 1;
       stage.H.middleRows(row, rows.y.size()) = weight * rows.H;
       stage.y.segment(row, rows.y.size()) = weight * rows.y;
       row += rows.y.size();
     }
+    compress(stage);
   }
+  put_noise(solution, setup_.noise, linear);
   return linear;
 }
 
 void PassProblem::correct(const SmootherResult& found, PassSolution& solution) const {
   const PassLayout& layout = setup_.layout;
   for (std::size_t arc = 0; arc < arcs_.size(); ++arc) {
-    const VectorXd& x = found.stages[arc].x;
+    const VectorXd& x = found.x[arc];
     PassSolution::Arc& its = solution.arcs[arc];
     for (int k = 0; k < gyros_; ++k) {
       its.h_in[k] = rotated<double>(its.h_in[k], across(its.h_in[k]) * x.segment<2>(layout.direction(k))).normalized();
@@ -433,7 +467,7 @@ void PassProblem::correct(const SmootherResult& found, PassSolution& solution) c
       }
     }
   }
-  const VectorXd& x = found.stages.back().x;
+  const VectorXd& x = found.x.back();
   for (int k = 0; k < gyros_; ++k) {
     GyroParameters& gyro = solution.gyros[static_cast<std::size_t>(k)];
     gyro.drift_rad_s += x.segment(layout.drift(k), layout.drift_size);

@@ -47,6 +47,13 @@ struct PassLayout {
   [[nodiscard]] int constants() const { return size() - dynamic(); }
 };
 
+/// What moves the momenta beside the drift family.
+struct ProcessNoise {
+  double direction_random_walk_rad_sqrt_s = 0;  ///< per axis across each momentum
+  double wandering_sigma_rad_s = 0;             ///< first-order Gauss–Markov, per case axis, where the layout has it
+  double wandering_time_s = 3600;
+};
+
 struct PassSetup {
   PassLayout layout;
   DriftFamily family = DriftFamily::of<Esg7>();
@@ -60,9 +67,7 @@ struct PassSetup {
   std::vector<double> head_alignment_sigma_rad;  ///< of further heads
   double orbital_rate_rad_s = 1.1e-3;
   Time orbital_phase_zero{};
-  double direction_random_walk_rad_sqrt_s = 0;
-  double wandering_sigma_rad_s = 0;
-  double wandering_time_s = 3600;
+  ProcessNoise noise;
   double gate_nis = 30;  ///< of a pair; above it a fix counts less
 };
 
@@ -92,19 +97,28 @@ class PassProblem {
   PassProblem(const ScreenedPass& pass, PassSetup setup);
 
   [[nodiscard]] const PassSetup& setup() const { return setup_; }
+  void set_noise(const ProcessNoise& noise) { setup_.noise = noise; }
   [[nodiscard]] std::size_t arcs() const { return arcs_.size(); }
 
   /// Momenta along the pass by these parameters, those at its first fix read from it; no wandering drift.
   [[nodiscard]] PassSolution start(const std::vector<GyroParameters>& gyros) const;
 
-  /// Linearised there; smooth() estimates truth − solution.
+  /// Linearised at a solution; smooth() estimates truth − solution.
   struct Linear {
     Eigen::MatrixXd prior;
     Eigen::VectorXd prior_y;
     std::vector<SmootherStage> stages;
-    std::vector<double> nis;  ///< per fix, of what is left there
+    /// What the process noise is put into, arc by arc but for the last.
+    struct ArcEnd {
+      Eigen::MatrixXd A;  ///< without what is kept of the wandering drift
+      double duration_s = 0;
+      double extra_variance_rad2 = 0;  ///< for what steps too long for their readings may have missed
+    };
+    std::vector<ArcEnd> ends;
   };
   [[nodiscard]] Linear linearise(const PassSolution& solution) const;
+  /// The same with other process noise than that of the setup.
+  void put_noise(const PassSolution& solution, const ProcessNoise& noise, Linear& linear) const;
 
   /// Adds what smooth() found.
   void correct(const SmootherResult& found, PassSolution& solution) const;
@@ -157,8 +171,7 @@ class PassProblem {
   void begin_arc(const PassSolution& solution, std::size_t arc, Moment& moment) const;
   [[nodiscard]] Eigen::Matrix<double, 3, Eigen::Dynamic> fix_by_shared(const ScreenedPass::Fix& fix) const;
   void add_prior(const PassSolution& solution, Linear& linear) const;
-  void end_arc(const PassSolution& solution, const Moment& moment, double extra_variance_rad2,
-               SmootherStage& stage) const;
+  void end_arc(const PassSolution& solution, const Moment& moment, double extra_variance_rad2, Linear& linear) const;
 
   PassSetup setup_;
   int gyros_;

@@ -22,17 +22,6 @@ using Eigen::Vector3d;
 constexpr std::array<Duration, 3> kReaches = {std::chrono::milliseconds(3000), std::chrono::milliseconds(1400),
                                               std::chrono::milliseconds(700)};
 
-GyroParameters parameters_of(const GyroCalibration& gyro) {
-  GyroParameters parameters;
-  parameters.drift_rad_s.resize(static_cast<Eigen::Index>(gyro.drift_rad_s.size()));
-  for (std::size_t i = 0; i < gyro.drift_rad_s.size(); ++i) {
-    parameters.drift_rad_s(static_cast<Eigen::Index>(i)) = gyro.drift_rad_s[i].second;
-  }
-  parameters.C_c_b = Rot<C, B<1>>::exp(Vec<C>::assume(gyro.alignment_rotation_vector_rad)).raw();
-  parameters.readout_bias = gyro.readout_bias;
-  return parameters;
-}
-
 /// Readings at any time, by the samples round it together.
 class SmoothReadings {
  public:
@@ -93,6 +82,7 @@ class SmoothReadings {
 
 AttitudeHistory smoothed_attitude(const ScreenedPass& screened, const PassProblem& problem, const BatchResult& result) {
   AttitudeHistory history;
+  const std::vector<MatrixXd> roots = covariance_roots(result.errors, result.linear.stages);
   const SmoothReadings readings(screened, problem.setup().readout_noise_rad);
   problem.go_along(result.solution, [&](const PassProblem::Moment& moment) {
     if (moment.fix == nullptr) {
@@ -103,8 +93,8 @@ AttitudeHistory smoothed_attitude(const ScreenedPass& screened, const PassProble
     if (!attitude) {
       return;
     }
-    const MatrixXd spread = problem.attitude_by_states(result.solution, moment, attitude.value(), at.h_b) *
-                            result.errors.stages[moment.arc].root;
+    const MatrixXd spread =
+        problem.attitude_by_states(result.solution, moment, attitude.value(), at.h_b) * roots[moment.arc];
     Matrix3d covariance_rad2 = spread * spread.transpose();
     for (int k = 0; k < screened.gyros; ++k) {
       const double noise_rad = problem.setup().readout_noise_rad[static_cast<std::size_t>(k)] * at.noise_factor;
@@ -121,7 +111,7 @@ AttitudeHistory smoothed_attitude(const ScreenedPass& screened, const PassProble
 std::vector<FurtherEstimate> further_of(const PassSetup& setup, const BatchResult& result,
                                         const std::vector<std::string>& names) {
   const PassLayout& layout = setup.layout;
-  const MatrixXd& root = result.errors.stages.back().root;
+  const MatrixXd& root = result.errors.last_root;
   std::vector<FurtherEstimate> further;
   const auto tell = [&](double value, int state) {
     further.push_back({names[further.size()], value, root.row(state).norm()});
@@ -140,6 +130,17 @@ std::vector<FurtherEstimate> further_of(const PassSetup& setup, const BatchResul
 }
 
 }  // namespace
+
+GyroParameters parameters_of(const GyroCalibration& gyro) {
+  GyroParameters parameters;
+  parameters.drift_rad_s.resize(static_cast<Eigen::Index>(gyro.drift_rad_s.size()));
+  for (std::size_t i = 0; i < gyro.drift_rad_s.size(); ++i) {
+    parameters.drift_rad_s(static_cast<Eigen::Index>(i)) = gyro.drift_rad_s[i].second;
+  }
+  parameters.C_c_b = Rot<C, B<1>>::exp(Vec<C>::assume(gyro.alignment_rotation_vector_rad)).raw();
+  parameters.readout_bias = gyro.readout_bias;
+  return parameters;
+}
 
 std::vector<std::string> further_names(const FurtherStateOptions& states, int further_heads, int gyros) {
   constexpr auto kOn = FurtherStateOptions::Choice::kOn;
@@ -184,7 +185,7 @@ void refine(const ScreenedPass& screened, const PassSetup& setup, CalibrationRun
 
   const PassLayout& layout = setup.layout;
   const MatrixXd own =
-      result.errors.stages.back().root.middleRows(layout.drift(0), layout.drift(layout.gyros) - layout.drift(0));
+      result.errors.last_root.middleRows(layout.drift(0), layout.drift(layout.gyros) - layout.drift(0));
   calibration.covariance = own * own.transpose();
   PassProblem::Moment last;
   problem.go_along(result.solution, [&](const PassProblem::Moment& moment) { last = moment; });

@@ -12,6 +12,15 @@
 
 namespace trihedron::ground {
 
+/// As the record has them.
+[[nodiscard]] GyroParameters parameters_of(const GyroCalibration& gyro);
+
+/// Star trackers beside the first that the estimator uses.
+template <class Estimator>
+[[nodiscard]] int further_heads(const Pass& pass) {
+  return std::min(static_cast<int>(pass.further_star_trackers.size()), Estimator::kHeads - 1);
+}
+
 /// Of the further states that are on, but for wandering drift; shared ones first, then those of the gyros.
 [[nodiscard]] std::vector<std::string> further_names(const FurtherStateOptions& states, int further_heads, int gyros);
 
@@ -44,14 +53,16 @@ template <class Estimator>
       setup.head_alignment_sigma_rad.push_back(head.alignment_sigma_rad);
     }
   }
-  setup.readout_bias_sigma = from.readout_bias_sigma;
-  setup.clock_offset_sigma_s = from.clock_offset_sigma_s;
-  setup.orbital_error_sigma_rad = from.orbital_error_sigma_rad;
-  setup.orbital_rate_rad_s = from.orbital_rate_rad_s;
-  setup.orbital_phase_zero = from.orbital_phase_zero;
-  setup.direction_random_walk_rad_sqrt_s = from.direction_random_walk_rad_sqrt_s;
-  setup.wandering_sigma_rad_s = from.wandering_sigma_rad_s;
-  setup.wandering_time_s = from.wandering_time_s;
+  setup.noise.direction_random_walk_rad_sqrt_s = from.direction_random_walk_rad_sqrt_s;
+  if constexpr (requires { from.orbital_rate_rad_s; }) {
+    setup.readout_bias_sigma = from.readout_bias_sigma;
+    setup.clock_offset_sigma_s = from.clock_offset_sigma_s;
+    setup.orbital_error_sigma_rad = from.orbital_error_sigma_rad;
+    setup.orbital_rate_rad_s = from.orbital_rate_rad_s;
+    setup.orbital_phase_zero = from.orbital_phase_zero;
+    setup.noise.wandering_sigma_rad_s = from.wandering_sigma_rad_s;
+    setup.noise.wandering_time_s = from.wandering_time_s;
+  }
   setup.gate_nis = from.gate_nis;
   return setup;
 }

@@ -14,7 +14,7 @@ inline constexpr int kMaxGyros = 4;
 using Directions = PerGyro<Eigen::Vector3d, kMaxGyros>;
 using GyrosUsed = GyroMask<kMaxGyros>;
 
-/// In the order of their times.
+/// In the order of their times; where the clock was set back, what came after that.
 struct ScreenedPass {
   [[nodiscard]] static Directions none() {
     Directions h_b;
@@ -42,7 +42,11 @@ struct ScreenedPass {
   /// The next sample of the pass and what the cycle made of it.
   template <class Report>
   void add_sample(const GyroTelemetry& gyro, std::size_t i, const Report& report) {
-    clock_set_back = clock_set_back || report.sample == SampleStatus::kUsedAfterClockSetBack;
+    if (report.sample == SampleStatus::kUsedAfterClockSetBack) {
+      clock_set_back = true;
+      samples.clear();
+      fixes.clear();
+    }
     if (!is_used(report.sample)) {
       return;
     }

@@ -193,7 +193,7 @@ PassSetup full_setup(const sim::SimulatedPass& simulated) {
   setup.prior_covariance.setIdentity(46, 46);
   setup.readout_noise_rad = {1e-5, 1e-5};
   setup.fix_noise.emplace_back(Eigen::Matrix3d::Identity() * 1e-9);
-  setup.wandering_sigma_rad_s = 1e-7;
+  setup.noise.wandering_sigma_rad_s = 1e-7;
   return setup;
 }
 
@@ -217,8 +217,8 @@ TEST(PassProblem, KnowsHowTheMisfitOfAFixDependsOnEachState) {
     const auto moved = [&](double by) {
       PassSolution at = solution;
       SmootherResult found;
-      found.stages.resize(1);
-      found.stages[0].x = by * Eigen::VectorXd::Unit(layout.size(), state);
+      found.x.resize(1);
+      found.x[0] = by * Eigen::VectorXd::Unit(layout.size(), state);
       problem.correct(found, at);
       return misfit(at).y;
     };

@@ -47,7 +47,8 @@ struct System {
 
 /// The same estimates from one dense problem in the first d, all w, and c.
 struct Dense {
-  std::vector<SmoothedStage> stages;  // root: of the covariance, by Cholesky
+  std::vector<VectorXd> x;
+  std::vector<MatrixXd> covariance;
   double residual_square = 0;
   double log_root_determinant = 0;
 
@@ -86,13 +87,13 @@ struct Dense {
     }
     const MatrixXd information = rows.transpose() * rows;
     const Eigen::LLT<MatrixXd> root(information);
-    const VectorXd x = root.solve(rows.transpose() * right);
-    const MatrixXd covariance = information.inverse();
-    residual_square = (right - rows * x).squaredNorm();
+    const VectorXd solution = root.solve(rows.transpose() * right);
+    const MatrixXd inverse = information.inverse();
+    residual_square = (right - rows * solution).squaredNorm();
     log_root_determinant = root.matrixLLT().diagonal().array().log().sum();
     for (std::size_t i = 0; i < system.stages.size(); ++i) {
-      const MatrixXd P = by[i] * covariance * by[i].transpose();
-      stages.push_back({by[i] * x + offset[i], P});
+      x.emplace_back(by[i] * solution + offset[i]);
+      covariance.emplace_back(by[i] * inverse * by[i].transpose());
     }
   }
 };
@@ -100,11 +101,12 @@ struct Dense {
 void expect_equal(const System& system) {
   const SmootherResult result = smooth(system.prior, system.prior_y, system.stages);
   const Dense dense(system);
-  ASSERT_EQ(result.stages.size(), dense.stages.size());
-  for (std::size_t i = 0; i < dense.stages.size(); ++i) {
-    const SmoothedStage& stage = result.stages[i];
-    EXPECT_LT((stage.x - dense.stages[i].x).norm(), 1e-11 * (1 + dense.stages[i].x.norm())) << i;
-    EXPECT_LT((stage.root * stage.root.transpose() - dense.stages[i].root).norm(), 1e-11) << i;
+  const std::vector<MatrixXd> roots = covariance_roots(result, system.stages);
+  ASSERT_EQ(result.x.size(), dense.x.size());
+  ASSERT_EQ(roots.size(), dense.x.size());
+  for (std::size_t i = 0; i < dense.x.size(); ++i) {
+    EXPECT_LT((result.x[i] - dense.x[i]).norm(), 1e-11 * (1 + dense.x[i].norm())) << i;
+    EXPECT_LT((roots[i] * roots[i].transpose() - dense.covariance[i]).norm(), 1e-11) << i;
   }
   EXPECT_NEAR(result.residual_square, dense.residual_square, 1e-10);
   EXPECT_NEAR(result.log_root_determinant, dense.log_root_determinant, 1e-11);
