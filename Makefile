@@ -52,6 +52,8 @@ consistency: build
 	@mkdir -p out
 	@if [ $(BUILD)/trihedron_consistency -nt out/consistency.txt ]; then rm -f out/consistency.txt; fi
 	$(BUILD)/trihedron_consistency --resume out/consistency.txt docs/consistency.md
+	$(BUILD)/trihedron_consistency --resume out/consistency.txt --place batch --estimators invariant,batch --runs 20 \
+	  --cells '^steady/.*/(30|60)arcmin/0e.00$$' docs/consistency.md
 
 format:
 	clang-format -i $(SOURCES)

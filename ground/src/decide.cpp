@@ -290,23 +290,30 @@ Likely settled(Trial& trial, const Search::At& at, const std::vector<Search::Poi
   return likely;
 }
 
-/// A random walk, by factors of two above that of the options.
+/// A random walk, by factors of two above that of the options; drift that wanders as these say.
 Likely with_most_likely_walk(Trial& trial, const CalibrationOptions& options) {
-  const double least = std::max(options.direction_random_walk_rad_sqrt_s, kLeastWalk_rad_sqrt_s);
-  return settled(trial, [least](double level, int) { return ProcessNoise{least * std::pow(2, level)}; }, kAllLevels,
-                 {0, 0}, {9, 0});
+  const ProcessNoise least{std::max(options.direction_random_walk_rad_sqrt_s, kLeastWalk_rad_sqrt_s),
+                           options.further_states.wandering_drift_rad_s,
+                           to_seconds(options.further_states.wandering_time)};
+  const auto at = [least](double level, int) {
+    ProcessNoise noise = least;
+    noise.direction_random_walk_rad_sqrt_s *= std::pow(2, level);
+    return noise;
+  };
+  return settled(trial, at, kAllLevels, {0, 0}, {9, 0});
 }
 
 /// Level and correlation time of the drift that wanders, by factors of two and three from those of the options.
 Likely with_most_likely_wandering(Trial& trial, const CalibrationOptions& options) {
-  const FurtherStateOptions& states = options.further_states;
-  return settled(trial,
-                 [&](double level, int time) {
-                   return ProcessNoise{options.direction_random_walk_rad_sqrt_s,
-                                       states.wandering_drift_rad_s * std::pow(2, level),
-                                       to_seconds(states.wandering_time) * std::pow(3, time)};
-                 },
-                 {{0, 0}, {2, 0}, {4, 0}, {6, 0}}, {-3, -2}, {9, 1});
+  const ProcessNoise told{options.direction_random_walk_rad_sqrt_s, options.further_states.wandering_drift_rad_s,
+                          to_seconds(options.further_states.wandering_time)};
+  const auto at = [told](double level, int time) {
+    ProcessNoise noise = told;
+    noise.wandering_sigma_rad_s *= std::pow(2, level);
+    noise.wandering_time_s *= std::pow(3, time);
+    return noise;
+  };
+  return settled(trial, at, {{0, 0}, {2, 0}, {4, 0}, {6, 0}}, {-3, -2}, {9, 1});
 }
 
 /// What was asked for must be there.

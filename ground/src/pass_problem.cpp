@@ -124,7 +124,20 @@ void PassProblem::step(const PassSolution& solution, const Node& from, const Nod
     used[k] = used[k] && to.used[k];
     middle[k] = used[k] ? (from.h_b[k] + to.h_b[k]).normalized() : Vector3d::UnitX();
   }
-  const auto attitude = optimal_rotation<kMaxGyros>(moment.h_in, in_c(solution, middle), used);
+  // The momenta in the middle of the step: those at its begin would be half a step behind all along.
+  const Directions seen_c = in_c(solution, middle);
+  const auto at_begin = optimal_rotation<kMaxGyros>(moment.h_in, seen_c, used);
+  Directions h_middle = moment.h_in;
+  if (at_begin) {
+    for (int k = 0; k < gyros_; ++k) {
+      const GyroParameters& gyro = solution.gyros[static_cast<std::size_t>(k)];
+      const Vector3d omega_b =
+          setup_.family.basis(without_bias<double>(middle[k], gyro.readout_bias)) * gyro.drift_rad_s +
+          solution.arcs[moment.arc].wandering_rad_s[k];
+      h_middle[k] = rotated<double>(h_middle[k], at_begin.value().raw() * (gyro.C_c_b * omega_b) * (dt_s / 2));
+    }
+  }
+  const auto attitude = optimal_rotation<kMaxGyros>(h_middle, seen_c, used);
   if (!attitude) {
     extra_variance_rad2 += kUnknown_rad * kUnknown_rad;
     return;

@@ -229,7 +229,8 @@ TEST(PassProblem, KnowsHowTheMisfitOfAFixDependsOnEachState) {
   }
 }
 
-/// The flight code's sensitivities, themselves tested against differences, over the same steps.
+/// The flight code's sensitivities, themselves tested against differences, over steps of 125 ms instead of a second.
+/// Half a step behind it would be off by 5e-4 of what the momenta turn.
 TEST(PassProblem, CarriesErrorsAlongAsTheFlightCodeDoes) {
   const ScreenedPass screened = screened_beginning(two_hours(), 8 * 55);
   PassSetup setup = full_setup(two_hours());
@@ -249,33 +250,35 @@ TEST(PassProblem, CarriesErrorsAlongAsTheFlightCodeDoes) {
     gyros[k].C_c_b = prior.C_c_b;
   }
   std::vector<MomentumBy> first;
-  const ScreenedPass::Sample* before = nullptr;
+  std::size_t followed = 0;
   problem.go_along(solution, [&](const PassProblem::Moment& moment) {
-    const auto now = std::find_if(screened.samples.begin(), screened.samples.end(),
-                                  [&](const ScreenedPass::Sample& sample) { return sample.t == moment.t; });
-    if (before == nullptr) {
+    if (first.empty()) {
       first = moment.by;
-    } else {
+    }
+    for (; screened.samples[followed].t < moment.t; ++followed) {
+      const ScreenedPass::Sample& from = screened.samples[followed];
+      const ScreenedPass::Sample& to = screened.samples[followed + 1];
       PerGyro<Eigen::Vector3d, 2> middle;
       for (int k = 0; k < 2; ++k) {
-        middle[k] = (before->h_b[k] + now->h_b[k]).normalized();
+        middle[k] = (from.h_b[k] + to.h_b[k]).normalized();
       }
       const Eigen::Matrix3d C_in_c =
           optimal_rotation<2>(momenta(gyros), in_c(gyros, middle), all_gyros<2>()).value().raw();
       for (int k = 0; k < 2; ++k) {
-        precess(gyros[k], since[k], C_in_c, middle[k], to_seconds(now->t - before->t));
+        precess(gyros[k], since[k], C_in_c, middle[k], to_seconds(to.t - from.t));
       }
     }
-    before = &*now;
+    const auto near = [](const auto& a, const auto& b, double size) { return (a - b).norm() <= 1.5e-4 * size; };
+    const double turned_rad = angle_between<double>(solution.arcs[0].h_in[0], gyros[0].h_in);
+    const double since_s = to_seconds(moment.t - screened.samples.front().t);
     for (std::size_t k = 0; k < 2; ++k) {
       const auto gyro = static_cast<int>(k);
       const MomentumBy& by = moment.by[k];
-      const auto near = [](const auto& a, const auto& b) { return (a - b).norm() <= 1e-12 * (1 + b.norm()); };
-      EXPECT_TRUE(near(moment.h_in[gyro], gyros[gyro].h_in));
-      EXPECT_TRUE(near(by.direction, (since[gyro].by_start * first[k].direction).eval()));
-      EXPECT_TRUE(near(by.drift, since[gyro].by_drift.leftCols<Esg20::kSize>().eval()));
-      EXPECT_TRUE(near(by.wandering, since[gyro].by_drift.rightCols<3>().eval()));
-      EXPECT_TRUE(near(by.alignment, since[gyro].by_alignment));
+      EXPECT_TRUE(near(moment.h_in[gyro], gyros[gyro].h_in, 0.1));
+      EXPECT_TRUE(near(by.direction, (since[gyro].by_start * first[k].direction).eval(), 1 + turned_rad));
+      EXPECT_TRUE(near(by.drift, since[gyro].by_drift.leftCols<Esg20::kSize>().eval(), 10 * since_s));
+      EXPECT_TRUE(near(by.wandering, since[gyro].by_drift.rightCols<3>().eval(), 10 * since_s));
+      EXPECT_TRUE(near(by.alignment, since[gyro].by_alignment, 1));
     }
   });
   EXPECT_GT(since[0].by_alignment.norm(), 0.01);

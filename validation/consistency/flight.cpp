@@ -1,5 +1,6 @@
 #include "consistency/flight.hpp"
 
+#include <Eigen/Cholesky>
 #include <Eigen/QR>
 #include <limits>
 #include <memory>
@@ -8,6 +9,7 @@
 #include "trihedron/core/cycles.hpp"
 #include "trihedron/core/invariant_estimator.hpp"
 #include "trihedron/core/paper_estimator.hpp"
+#include "trihedron/ground/calibrate.hpp"
 #include "trihedron/ground/replay.hpp"
 #include "trihedron/sim/simulate.hpp"
 
@@ -32,19 +34,21 @@ typename Estimator::Setup setup_of(const PassSettings& settings, double walk_rad
   return setup;
 }
 
+void put_errors(const Truth::Gyro& truth, const Eigen::Matrix<double, Esg7::kSize, 1>& kappa_rad_s,
+                const Eigen::Matrix3d& C_c_b, int gyro, ParameterErrors& errors) {
+  for (int i = 0; i < Esg7::kSize; ++i) {
+    errors(Parameters::drift(gyro) + i) = truth.drift_rad_s[static_cast<std::size_t>(i)].second - kappa_rad_s(i);
+  }
+  const auto true_C_c_b = Rot<C, B<1>>::exp(Vec<C>::assume(truth.alignment_rotation_vector_rad));
+  errors.segment<3>(Parameters::alignment(gyro)) = (true_C_c_b * Rot<C, B<1>>::assume(C_c_b).inverse()).log().raw();
+}
+
 template <class Estimator>
 ParameterErrors errors_of(const Estimator& estimator, const Truth& truth) {
   ParameterErrors errors;
   for (int k = 0; k < Estimator::kGyros; ++k) {
-    const Truth::Gyro& true_gyro = truth.gyros[static_cast<std::size_t>(k)];
     const auto& estimate = estimator.gyros()[k];
-    for (int i = 0; i < Esg7::kSize; ++i) {
-      errors(Parameters::drift(k) + i) =
-          true_gyro.drift_rad_s[static_cast<std::size_t>(i)].second - estimate.drift_rad_s(i);
-    }
-    const auto true_C_c_b = Rot<C, B<1>>::exp(Vec<C>::assume(true_gyro.alignment_rotation_vector_rad));
-    errors.segment<3>(Parameters::alignment(k)) =
-        (true_C_c_b * Rot<C, B<1>>::assume(estimate.C_c_b).inverse()).log().raw();
+    put_errors(truth.gyros[static_cast<std::size_t>(k)], estimate.drift_rad_s, estimate.C_c_b, k, errors);
   }
   return errors;
 }
@@ -76,6 +80,39 @@ Outcome calibrate(const sim::SimulatedPass& flown, double walk_rad_sqrt_s, const
   return outcome;
 }
 
+Outcome calibrate_batch(const sim::SimulatedPass& flown, double walk_rad_sqrt_s,
+                        const ParameterErrors& bound_variance) {
+  constexpr auto kOff = FurtherStateOptions::Choice::kOff;
+  CalibrationOptions options;
+  options.estimator = ground::kBatch;
+  options.drift_model = Esg7::kModelName;
+  options.find_noise = false;
+  options.direction_random_walk_rad_sqrt_s = walk_rad_sqrt_s;
+  options.further_states = {kOff, kOff, kOff, 0, {}, kOff};
+  const Calibration calibration = ground::calibrate(flown.pass, options).calibration;
+  ParameterErrors errors;
+  for (int k = 0; k < Parameters::kSize / Parameters::kPerGyro; ++k) {
+    const auto gyro = static_cast<std::size_t>(k);
+    Eigen::Matrix<double, Esg7::kSize, 1> kappa_rad_s;
+    for (std::size_t i = 0; i < Esg7::kSize; ++i) {
+      kappa_rad_s(static_cast<Eigen::Index>(i)) = calibration.gyros[gyro].drift_rad_s[i].second;
+    }
+    const auto C_c_b = Rot<C, B<1>>::exp(Vec<C>::assume(calibration.gyros[gyro].alignment_rotation_vector_rad));
+    put_errors(flown.truth.gyros[gyro], kappa_rad_s, C_c_b.raw(), k, errors);
+  }
+  Outcome outcome;
+  outcome.nis = std::numeric_limits<double>::quiet_NaN();
+  outcome.fixes = static_cast<long>(calibration.statistics.at("nis_count"));
+  // In units of the sigmas: what is known of differences of poorly known parameters is not lost.
+  const ParameterErrors sigma = calibration.covariance.diagonal().cwiseSqrt();
+  const ParameterErrors scaled = errors.cwiseQuotient(sigma);
+  const Eigen::MatrixXd correlation =
+      sigma.cwiseInverse().asDiagonal() * calibration.covariance * sigma.cwiseInverse().asDiagonal();
+  outcome.nees = scaled.dot(correlation.llt().solve(scaled));
+  outcome.error_over_bound_square = errors.cwiseAbs2().cwiseQuotient(bound_variance).mean();
+  return outcome;
+}
+
 }  // namespace
 
 std::vector<Outcome> fly(const Cell& cell, int run, const std::vector<std::string>& estimators) {
@@ -87,9 +124,13 @@ std::vector<Outcome> fly(const Cell& cell, int run, const std::vector<std::strin
                           : ParameterErrors(parameter_bound(flown.pass.settings, flown.truth).diagonal());
   std::vector<Outcome> outcomes;
   for (const std::string& name : estimators) {
-    outcomes.push_back(name == "paper"
-                           ? calibrate<PaperEstimator<Esg7>>(flown, walk_rad_sqrt_s, bound_variance)
-                           : calibrate<InvariantEstimator<Esg7, 2>>(flown, walk_rad_sqrt_s, bound_variance));
+    if (name == "paper") {
+      outcomes.push_back(calibrate<PaperEstimator<Esg7>>(flown, walk_rad_sqrt_s, bound_variance));
+    } else if (name == "invariant") {
+      outcomes.push_back(calibrate<InvariantEstimator<Esg7, 2>>(flown, walk_rad_sqrt_s, bound_variance));
+    } else {
+      outcomes.push_back(calibrate_batch(flown, walk_rad_sqrt_s, bound_variance));
+    }
   }
   return outcomes;
 }

@@ -9,14 +9,14 @@
 
 namespace trihedron::consistency {
 
-inline constexpr std::array<const char*, 2> kEstimators = {"paper", "invariant"};
+inline constexpr std::array<const char*, 3> kEstimators = {"paper", "invariant", "batch"};
 inline constexpr int kParameters = 20;  ///< of two gyros, eq. (1) and alignment
 inline constexpr int kInnovations = 4;  ///< of one fix
 
 /// One estimator over one flight.
 struct Outcome {
   double nees = 0;  ///< of the parameters at the end
-  double nis = 0;   ///< mean over the fixes
+  double nis = 0;   ///< mean over the fixes; not a number of estimator batch, which predicts none
   long fixes = 0;   ///< all but the first, rejected ones as well: there are no outliers
   /// Mean over the parameters of error² over the variance of parameter_bound(); not a number with process noise.
   double error_over_bound_square = std::numeric_limits<double>::quiet_NaN();

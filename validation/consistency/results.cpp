@@ -30,11 +30,12 @@ Results::Results(std::filesystem::path file) : file_(std::move(file)) {
     std::istringstream words(line);
     Key key;
     Outcome outcome;
-    std::string over_bound;  // a stream does not read "nan"
-    if (!(words >> key.cell >> key.run >> key.estimator >> outcome.nees >> outcome.nis >> outcome.fixes >>
-          over_bound)) {
+    std::string nis;  // a stream does not read "nan"
+    std::string over_bound;
+    if (!(words >> key.cell >> key.run >> key.estimator >> outcome.nees >> nis >> outcome.fixes >> over_bound)) {
       throw std::runtime_error(fmt::format("{}: not a result: {}", file_.string(), line));
     }
+    outcome.nis = std::stod(nis);
     outcome.error_over_bound_square = std::stod(over_bound);
     outcomes_[key] = outcome;
   }
@@ -82,10 +83,11 @@ std::string Results::table(const std::vector<Cell>& cells, const std::vector<Col
       const int side = band_of_mean(kParameters, runs).side(mean.nees);
       outside[estimator][far] += side != 0 ? 1 : 0;
       const double over_bound = std::sqrt(mean.error_over_bound_square);
-      text +=
-          fmt::format(" {} | {} | {} |", marked(fmt::format("{:.1f}", mean.nees), side),
-                      marked(fmt::format("{:.3f}", mean.nis), band_of_mean(kInnovations, mean.fixes).side(mean.nis)),
-                      std::isnan(over_bound) ? "" : fmt::format("{:.2f}", over_bound));
+      text += fmt::format(" {} | {} | {} |", marked(fmt::format("{:.1f}", mean.nees), side),
+                          std::isnan(mean.nis) ? ""
+                                               : marked(fmt::format("{:.3f}", mean.nis),
+                                                        band_of_mean(kInnovations, mean.fixes).side(mean.nis)),
+                          std::isnan(over_bound) ? "" : fmt::format("{:.2f}", over_bound));
     }
     text += "\n";
   }
@@ -97,10 +99,10 @@ std::string Results::table(const std::vector<Cell>& cells, const std::vector<Col
   return text;
 }
 
-void write_between_markers(const std::filesystem::path& document, const std::string& text) {
+void write_between_markers(const std::filesystem::path& document, const std::string& place, const std::string& text) {
   std::ifstream input(document);
   std::string page(std::istreambuf_iterator<char>(input), {});
-  const std::string begin = "<!-- consistency -->\n";
+  const std::string begin = fmt::format("<!-- {} -->\n", place);
   const std::size_t from = page.find(begin);
   const std::size_t to = page.find("<!-- end -->", from);
   if (from == std::string::npos || to == std::string::npos) {

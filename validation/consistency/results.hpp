@@ -44,8 +44,8 @@ class Results {
   std::map<Key, Outcome> outcomes_;
 };
 
-/// Puts `text` between the lines `<!-- consistency -->` and `<!-- end -->` of the document. Throws std::runtime_error
-/// where it has none, or cannot be written.
-void write_between_markers(const std::filesystem::path& document, const std::string& text);
+/// Puts `text` between the lines `<!-- place -->` and `<!-- end -->` of the document. Throws std::runtime_error where
+/// it has none, or cannot be written.
+void write_between_markers(const std::filesystem::path& document, const std::string& place, const std::string& text);
 
 }  // namespace trihedron::consistency
