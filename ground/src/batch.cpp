@@ -1,7 +1,10 @@
 #include "batch.hpp"
 
 #include <cmath>
+#include <stdexcept>
 #include <utility>
+
+#include "trihedron/ground/calibrate.hpp"
 
 namespace trihedron::ground {
 namespace {
@@ -9,6 +12,16 @@ namespace {
 constexpr int kMostIterations = 12;
 /// Steps below this part of the sigmas change nothing that anyone could see.
 constexpr double kConverged = 0.02;
+
+SmootherResult smoothed(const PassProblem::Linear& linear) {
+  try {
+    return smooth(linear.prior, linear.prior_y, linear.stages);
+  } catch (const std::invalid_argument&) {
+    throw SetupError("the fixes and samples that can be used do not determine the momenta of all gyros",
+                     "calibrate a part of the pass in which all gyros work, or use estimator invariant with noise = "
+                     "\"told\" and all further states on or off");
+  }
+}
 
 /// Root mean square of the step of the constants, in their sigmas.
 double step_of_constants(const PassLayout& layout, const SmootherResult& found) {
@@ -25,7 +38,7 @@ BatchResult most_likely(const PassProblem& problem, PassSolution first) {
   while (result.iterations < kMostIterations && !result.converged) {
     ++result.iterations;
     result.linear = problem.linearise(result.solution);
-    result.errors = smooth(result.linear.prior, result.linear.prior_y, result.linear.stages);
+    result.errors = smoothed(result.linear);
     problem.correct(result.errors, result.solution);
     result.converged = step_of_constants(problem.setup().layout, result.errors) < kConverged;
   }
@@ -36,11 +49,11 @@ double log_likelihood(const PassProblem& problem, const PassSolution& solution, 
                       const ProcessNoise& noise) {
   const PassLayout& layout = problem.setup().layout;
   problem.put_noise(solution, noise, linear);
-  const SmootherResult found = smooth(linear.prior, linear.prior_y, linear.stages);
+  const SmootherResult found = smoothed(linear);
   // Of the directions at the start nothing is known before; the rest of the prior is triangular.
   const Eigen::Index rest = layout.size() - 2L * layout.gyros;
   const double log_prior_root = linear.prior.bottomRightCorner(rest, rest).diagonal().array().abs().log().sum();
-  return log_prior_root - found.log_root_determinant - found.residual_square / 2;
+  return log_prior_root - found.log_root_determinant - (found.residual_square + linear.outliers_square) / 2;
 }
 
 }  // namespace trihedron::ground

@@ -14,11 +14,12 @@ struct BatchResult {
 };
 
 /// Iterates to the most likely solution from `first`: Gauss–Newton over parameters and momenta together, which with
-/// process noise is the iterated fixed-interval smoother.
+/// process noise is the iterated fixed-interval smoother. Throws SetupError where they are not determined.
 [[nodiscard]] BatchResult most_likely(const PassProblem& problem, PassSolution first);
 
 /// ln of the likelihood of the process noise, all states integrated over (Laplace); `linear`: the problem linearised at
-/// the solution. Up to a constant of the pass and the layout.
+/// the solution. Up to a constant of the pass. Throws
+/// SetupError as most_likely().
 [[nodiscard]] double log_likelihood(const PassProblem& problem, const PassSolution& solution,
                                     PassProblem::Linear linear, const ProcessNoise& noise);
 

@@ -57,8 +57,20 @@ struct Screened {
   std::vector<GyroCalibration> first;
 };
 
+/// Whether what is known before of a gyro names a coefficient that eq. (1) does not have.
+bool knows_of_drift_outside(const PassSettings& settings) {
+  return std::any_of(settings.gyros.begin(), settings.gyros.end(), [](const GyroPrior& prior) {
+    const auto outside = [](const auto& coefficient) { return coefficient.first.find('(') != std::string::npos; };
+    return std::any_of(prior.drift_rad_s.begin(), prior.drift_rad_s.end(), outside) ||
+           std::any_of(prior.drift_sigma_rad_s.begin(), prior.drift_sigma_rad_s.end(), outside);
+  });
+}
+
 Screened screen(const Pass& pass, const CalibrationOptions& asked) {
-  const CalibrationOptions options = without_further_states(asked);
+  CalibrationOptions options = without_further_states(asked);
+  if (asked.drift_model != Esg7::kModelName && knows_of_drift_outside(pass.settings)) {
+    options.drift_model = Esg20::kModelName;
+  }
   return with_estimator(pass, options, [&]<class Estimator>() {
     const auto cycle = make_cycle<Estimator>(pass, options, {.navigate = false});
     Screened screened;
@@ -67,6 +79,7 @@ Screened screen(const Pass& pass, const CalibrationOptions& asked) {
     replay(
         pass, *cycle, [&](const auto& report) { screened.pass.add_fix(report); },
         [&](const auto& report) { screened.pass.add_sample(pass.gyro, sample++, report); });
+    screened.pass.keep_longest();
     for (const auto& gyro : cycle->estimator().gyros()) {
       screened.first.push_back(to_record<Esg7>(gyro));
     }
@@ -109,8 +122,8 @@ class Trial {
   }
   /// Of all gyros' coefficients that eq. (1) does not have.
   [[nodiscard]] double drift_outside() const {
-    const int members = layout().drift_size - Esg7::kSize;
-    const int size = layout().gyros * members;
+    const Eigen::Index members = layout().drift_size - Esg7::kSize;
+    const Eigen::Index size = layout().gyros * members;
     Eigen::VectorXd estimate(size);
     Eigen::VectorXd sigma(size);
     Eigen::MatrixXd root(size, layout().size());
@@ -137,7 +150,7 @@ class Trial {
       if (moment.fix == nullptr || moment.fix->fix.head != 0) {
         return;
       }
-      const auto by_gyros = problem_.attitude(found_.solution, moment, moment.fix->h_b, moment.fix->used);
+      const auto by_gyros = PassProblem::attitude(found_.solution, moment, moment.fix->h_b, moment.fix->used);
       if (!by_gyros) {
         return;
       }
@@ -155,8 +168,8 @@ class Trial {
  private:
   static PassSetup setup_of(const Pass& pass, const CalibrationOptions& options) {
     return with_estimator(pass, options, [&]<class Estimator>() {
-      return pass_setup<Estimator>(make_setup<Estimator>(pass, options), options.further_states,
-                                   further_heads<Estimator>(pass));
+      const auto cycle = make_cycle<Estimator>(pass, options, {.navigate = false});
+      return pass_setup<Estimator>(cycle->estimator().setup(), options.further_states, further_heads<Estimator>(pass));
     });
   }
   [[nodiscard]] PassSolution first_of(const Screened& screened) const {
@@ -184,10 +197,9 @@ Eigen::Vector3d star_tracker_noise_rad(const std::vector<Eigen::Vector3d>& chang
   constexpr double kMedianOfNormal = 0.6744897501960817;
   Eigen::Vector3d noise_rad;
   for (int axis = 0; axis < 3; ++axis) {
-    std::vector<double> changes;
-    for (const Eigen::Vector3d& change : changes_rad) {
-      changes.push_back(std::abs(change(axis)));
-    }
+    std::vector<double> changes(changes_rad.size());
+    std::transform(changes_rad.begin(), changes_rad.end(), changes.begin(),
+                   [axis](const Eigen::Vector3d& change) { return std::abs(change(axis)); });
     const auto middle = changes.begin() + static_cast<std::ptrdiff_t>(changes.size() / 2);
     std::nth_element(changes.begin(), middle, changes.end());
     noise_rad(axis) = *middle / kMedianOfNormal / std::numbers::sqrt2;
@@ -279,11 +291,13 @@ Likely settled(Trial& trial, const Search::At& at, const std::vector<Search::Poi
   constexpr int kRounds = 3;
   Likely likely;
   for (int round = 0; round < kRounds; ++round) {
-    const double before = likely.noise.direction_random_walk_rad_sqrt_s + likely.noise.wandering_sigma_rad_s;
+    const ProcessNoise before = likely.noise;
     likely = Search(trial, at, starts, lowest, highest).best();
     trial.refit(likely.noise);
-    const double now = likely.noise.direction_random_walk_rad_sqrt_s + likely.noise.wandering_sigma_rad_s;
-    if (std::abs(now - before) < kNotable * now) {
+    const auto same = [](double a, double b) { return std::abs(a - b) <= kNotable * b; };
+    if (same(before.direction_random_walk_rad_sqrt_s, likely.noise.direction_random_walk_rad_sqrt_s) &&
+        same(before.wandering_sigma_rad_s, likely.noise.wandering_sigma_rad_s) &&
+        same(before.wandering_time_s, likely.noise.wandering_time_s)) {
       break;
     }
   }
@@ -454,6 +468,17 @@ void decide_beside_noise(const Pass& pass, const Screened& screened, const Calib
   }
 }
 
+/// Nothing to judge by.
+void leave_out_what_is_open(CalibrationOptions& options) {
+  FurtherStateOptions& states = options.further_states;
+  for (Choice* choice : {&states.clock_offset, &states.orbital_error, &states.wandering_drift, &states.readout_bias}) {
+    *choice = *choice == Choice::kAuto ? Choice::kOff : *choice;
+  }
+  if (options.drift_model == kAutoDriftModel) {
+    options.drift_model = Esg7::kModelName;
+  }
+}
+
 /// Only the noise is found: of more than two gyros.
 void find_noise(const Pass& pass, CalibrationOptions& options) {
   const Screened screened = screen(pass, options);
@@ -511,7 +536,7 @@ Decision decide(const Pass& pass, const CalibrationOptions& asked) {
   }
   const Screened screened = screen(pass, options);
   if (screened.pass.fixes.empty()) {
-    options = without_further_states(options);
+    leave_out_what_is_open(options);
     return decision;
   }
   Trial everything(pass, screened, with_everything(options, asked));

@@ -7,6 +7,7 @@
 #include <numbers>
 #include <utility>
 
+#include "trihedron/core/invariant_estimator.hpp"
 #include "trihedron/core/outlier_gate.hpp"
 #include "trihedron/core/precession.hpp"
 
@@ -19,12 +20,10 @@ using Eigen::Vector3d;
 using Eigen::VectorXd;
 
 /// Samples are taken so far apart: the body turns little between them, and their noise is averaged in the end.
-constexpr Duration kStep = std::chrono::seconds(1);
-/// Process noise comes in at so many times.
-constexpr Duration kArc = std::chrono::seconds(120);
-/// As in the cycle: what a sample is from the next where none is missing.
-constexpr Duration kMaxInterpolation = std::chrono::milliseconds(500);
-constexpr double kQuarterOrbit_s = 1300;
+constexpr Duration kSampleStep = std::chrono::seconds(1);
+/// Process noise comes in so often, and after a gap.
+constexpr Duration kArc = std::chrono::seconds(60);
+using OnBoard = Cycle<InvariantEstimator<Esg7, 2>>;
 /// 1-sigma of a direction of which nothing is known.
 constexpr double kUnknown_rad = 1;
 
@@ -36,8 +35,8 @@ Eigen::Matrix<double, 3, 2> across(const Vector3d& h) {
   return columns;
 }
 
-Directions in_c(const PassSolution& solution, const Directions& h_b) {
-  Directions h_c;
+GyroDirections in_c(const PassSolution& solution, const GyroDirections& h_b) {
+  GyroDirections h_c;
   for (std::size_t k = 0; k < solution.gyros.size(); ++k) {
     const int gyro = static_cast<int>(k);
     h_c[gyro] = seen_in_c(solution.gyros[k], h_b[gyro]);
@@ -83,17 +82,17 @@ PassProblem::PassProblem(const ScreenedPass& pass, PassSetup setup)
     if (sample.t <= first) {
       continue;
     }
-    add_fixes_until(sample.t);
-    after_gap = after_gap || sample.t - before > kMaxInterpolation;
+    add_fixes_until(sample.t - Duration{1});  // on its own time after it
+    after_gap = after_gap || sample.t - before > OnBoard::kMaxInterpolation;
     before = sample.t;
-    if (after_gap || sample.t - taken >= kStep) {
+    if (after_gap || sample.t - taken >= kSampleStep) {
       nodes_.push_back({sample.t, sample.h_b, sample.used, nullptr, std::exchange(after_gap, false)});
       taken = sample.t;
     }
   }
   add_fixes_until(Time::max());
   for (std::size_t i = 0; i < nodes_.size(); ++i) {
-    if (arcs_.empty() || nodes_[i].t - nodes_[arcs_.back().begin].t >= kArc) {
+    if (arcs_.empty() || nodes_[i].after_gap || nodes_[i].t - nodes_[arcs_.back().begin].t >= kArc) {
       arcs_.push_back({i, i});
     }
     arcs_.back().end = i + 1;
@@ -118,16 +117,21 @@ void PassProblem::step(const PassSolution& solution, const Node& from, const Nod
                        double& extra_variance_rad2) const {
   const double dt_s = to_seconds(to.t - from.t);
   moment.t = to.t;
-  GyrosUsed used = from.used;
-  Directions middle;
+  // Gyros that can be used at both ends; where those are too few, at its end.
+  GyrosUsed used = to.used;
+  GyrosUsed at_both = to.used;
   for (int k = 0; k < gyros_; ++k) {
-    used[k] = used[k] && to.used[k];
-    middle[k] = used[k] ? (from.h_b[k] + to.h_b[k]).normalized() : Vector3d::UnitX();
+    at_both[k] = from.used[k] && to.used[k];
+  }
+  used = count(at_both) >= 2 ? at_both : used;
+  GyroDirections middle;
+  for (int k = 0; k < gyros_; ++k) {
+    middle[k] = at_both[k] ? (from.h_b[k] + to.h_b[k]).normalized() : used[k] ? to.h_b[k] : Vector3d::UnitX();
   }
   // The momenta in the middle of the step: those at its begin would be half a step behind all along.
-  const Directions seen_c = in_c(solution, middle);
+  const GyroDirections seen_c = in_c(solution, middle);
   const auto at_begin = optimal_rotation<kMaxGyros>(moment.h_in, seen_c, used);
-  Directions h_middle = moment.h_in;
+  GyroDirections h_middle = moment.h_in;
   if (at_begin) {
     for (int k = 0; k < gyros_; ++k) {
       const GyroParameters& gyro = solution.gyros[static_cast<std::size_t>(k)];
@@ -161,7 +165,8 @@ void PassProblem::step(const PassSolution& solution, const Node& from, const Nod
     by.drift += (cross * by.drift).eval() + dt_s * basis;
     by.alignment += cross * (by.alignment - C_in_c);
     if (to.after_gap) {
-      const double seen_rad = dt_s < kQuarterOrbit_s ? angle_between<double>(from.h_b[k], to.h_b[k]) : std::numbers::pi;
+      const double seen_rad =
+          dt_s < OnBoard::kQuarterOrbit_s ? angle_between<double>(from.h_b[k], to.h_b[k]) : std::numbers::pi;
       largest_rad = std::max(largest_rad, turned.norm() * seen_rad);
     }
   }
@@ -180,9 +185,10 @@ PassSolution PassProblem::start(const std::vector<GyroParameters>& gyros) const 
     }
   }
   const ScreenedPass::Fix& first = *nodes_.front().fix;
-  const Directions h_c = in_c(solution, first.h_b);
+  const GyroDirections h_c = in_c(solution, first.h_b);
   for (int k = 0; k < gyros_; ++k) {
-    solution.arcs[0].h_in[k] = (first.fix.q_in_c.normalized() * h_c[k]).normalized();
+    const Vector3d seen = first.used[k] ? h_c[k] : gyros[static_cast<std::size_t>(k)].C_c_b.col(0);  // anywhere
+    solution.arcs[0].h_in[k] = (first.fix.q_in_c.normalized() * seen).normalized();
   }
   Moment moment;
   double unused = 0;
@@ -234,23 +240,24 @@ Eigen::Matrix<double, 3, Eigen::Dynamic> PassProblem::fix_by_shared(const Screen
 
 Result<AttitudeByDirections<kMaxGyros>, DirectionsFault> PassProblem::attitude(const PassSolution& solution,
                                                                                const Moment& moment,
-                                                                               const Directions& h_b,
-                                                                               const GyrosUsed& used) const {
+                                                                               const GyroDirections& h_b,
+                                                                               const GyrosUsed& used) {
   return optimal_attitude<kMaxGyros>(moment.h_in, in_c(solution, h_b), used);
 }
 
 MatrixXd PassProblem::attitude_by_states(const PassSolution& solution, const Moment& moment,
-                                         const AttitudeByDirections<kMaxGyros>& attitude, const Directions& h_b) const {
+                                         const AttitudeByDirections<kMaxGyros>& attitude,
+                                         const GyroDirections& h_b) const {
   const PassLayout& layout = setup_.layout;
-  const Directions h_c = in_c(solution, h_b);
+  const GyroDirections h_c = in_c(solution, h_b);
   MatrixXd by_states = MatrixXd::Zero(3, layout.size());
   const Matrix3d C_c_in = attitude.C_in_c.raw().transpose();
   for (int k = 0; k < gyros_; ++k) {
     const MomentumBy& by = moment.by[static_cast<std::size_t>(k)];
     const GyroParameters& gyro = solution.gyros[static_cast<std::size_t>(k)];
-    const Matrix3d by_direction = attitude.by_directions.middleCols<3>(3 * k);
+    const Matrix3d by_direction = attitude.by_directions.middleCols<3>(3L * k);
     const Matrix3d by_phi = by_direction * C_c_in;
-    by_states.middleCols<2>(layout.direction(k)) = by_phi * by.direction;
+    by_states.middleCols<2>(PassLayout::direction(k)) = by_phi * by.direction;
     by_states.middleCols(layout.drift(k), layout.drift_size) = by_phi * by.drift;
     by_states.middleCols<3>(layout.alignment(k)) = by_phi * by.alignment - by_direction;
     if (layout.wandering_drift) {
@@ -270,7 +277,7 @@ PassProblem::FixRows PassProblem::compare(const PassSolution& solution, const Mo
   const Vector3d known_error = by_shared * solution.shared;
   const Matrix3d C_fix =
       (Rot<In, C>::assume(fix.fix.q_in_c.normalized()) * Rot<C, C>::exp(-Vec<C>::assume(known_error))).raw();
-  const Directions h_c = in_c(solution, fix.h_b);
+  const GyroDirections h_c = in_c(solution, fix.h_b);
   FixRows rows;
   const auto by_gyros = optimal_rotation<kMaxGyros>(moment.h_in, h_c, fix.used);
   if (!by_gyros) {
@@ -293,7 +300,7 @@ PassProblem::FixRows PassProblem::compare(const PassSolution& solution, const Mo
     const Eigen::Matrix<double, 2, 3> T = across(h).transpose();
     const Eigen::Matrix<double, 2, 3> by_c = T * C_in_c;
     rows.y.segment<2>(row) = T * h.cross(C_fix * h_c[k]);
-    rows.H.block<2, 2>(row, layout.direction(k)) = T * by.direction;
+    rows.H.block<2, 2>(row, PassLayout::direction(k)) = T * by.direction;
     rows.H.block(row, layout.drift(k), 2, layout.drift_size) = T * by.drift;
     rows.H.block<2, 3>(row, layout.alignment(k)) = T * by.alignment - by_c;
     if (layout.wandering_drift) {
@@ -341,9 +348,13 @@ void PassProblem::add_prior(const PassSolution& solution, Linear& linear) const 
         .setConstant(setup_.head_alignment_sigma_rad[static_cast<std::size_t>(head - 1)]);
   }
   linear.prior = sigma.cwiseInverse().asDiagonal();
-  // Nothing is known before of the directions at the start.
-  linear.prior.topLeftCorner(2 * gyros_, 2 * gyros_).setZero();
-  const Eigen::Index size = gyros_ * own;
+  // Nothing is known before of the directions at the start, where the first fix shows them.
+  for (int k = 0; k < gyros_; ++k) {
+    if (nodes_.front().fix->used[k]) {
+      linear.prior.middleRows<2>(PassLayout::direction(k)).setZero();
+    }
+  }
+  const Eigen::Index size = static_cast<Eigen::Index>(gyros_) * own;
   linear.prior.block(layout.drift(0), layout.drift(0), size, size) =
       setup_.prior_covariance.llt().matrixL().solve(MatrixXd::Identity(size, size));
   linear.prior_y = linear.prior * apart;
@@ -364,7 +375,7 @@ void PassProblem::end_arc(const PassSolution& solution, const Moment& moment, do
   for (int k = 0; k < gyros_; ++k) {
     const MomentumBy& by = moment.by[static_cast<std::size_t>(k)];
     const Eigen::Matrix<double, 2, 3> T = across(next.h_in[k]).transpose();
-    const int row = layout.direction(k);
+    const int row = PassLayout::direction(k);
     end.A.block<2, 2>(row, row) = T * by.direction;
     stage.B.block(row, layout.drift(k) - d, 2, layout.drift_size) = T * by.drift;
     stage.B.block<2, 3>(row, layout.alignment(k) - d) = T * by.alignment;
@@ -411,7 +422,7 @@ PassProblem::Linear PassProblem::linearise(const PassSolution& solution) const {
   linear.stages.resize(arcs_.size());
   Moment moment;
   std::vector<FixRows> fixes;
-  std::vector<double> nis;
+  std::vector<double> nis_per_component;
   std::vector<std::size_t> fixes_until;
   for (std::size_t arc = 0; arc < arcs_.size(); ++arc) {
     begin_arc(solution, arc, moment);
@@ -423,7 +434,9 @@ PassProblem::Linear PassProblem::linearise(const PassSolution& solution) const {
         const Eigen::LLT<MatrixXd> root(rows.R);
         root.matrixL().solveInPlace(rows.H);
         root.matrixL().solveInPlace(rows.y);
-        nis.push_back(rows.y.squaredNorm());
+        if (rows.y.size() > 0) {
+          nis_per_component.push_back(rows.y.squaredNorm() / static_cast<double>(rows.y.size()));
+        }
       }
       if (i + 1 < nodes_.size()) {
         step(solution, nodes_[i], nodes_[i + 1], moment, extra_variance_rad2);
@@ -437,12 +450,13 @@ PassProblem::Linear PassProblem::linearise(const PassSolution& solution) const {
     }
   }
   // Far from the solution all fixes are off: what is far among them is an outlier.
-  double gate = setup_.gate_nis;
-  if (!nis.empty()) {
-    std::vector<double> sorted = nis;
+  constexpr double kMedianOfFour = 0.84;  // of χ²/n; nearer to 1 for more
+  double scale = 1;
+  std::vector<double> sorted = nis_per_component;
+  if (!sorted.empty()) {
     const auto middle = sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2);
     std::nth_element(sorted.begin(), middle, sorted.end());
-    gate *= std::max(*middle / kPairComponents, 1.0);
+    scale = std::max(*middle / kMedianOfFour, 1.0);
   }
   std::size_t fix = 0;
   for (std::size_t arc = 0; arc < arcs_.size(); ++arc) {
@@ -457,7 +471,10 @@ PassProblem::Linear PassProblem::linearise(const PassSolution& solution) const {
     for (; fix < fixes_until[arc]; ++fix) {
       const FixRows& rows = fixes[fix];
       // Its pull falls with the third power of the misfit beyond the gate.
-      const double weight = nis[fix] > gate ? gate / nis[fix] : 1;
+      const double nis = rows.y.squaredNorm();
+      const double gate = scale * gate_of_freedom(std::max(static_cast<int>(rows.y.size()), 1), setup_.gate_nis);
+      const double weight = nis > gate ? gate / nis : 1;
+      linear.outliers_square += nis > gate ? 2 * gate * (1 - gate / nis) : 0;
       stage.H.middleRows(row, rows.y.size()) = weight * rows.H;
       stage.y.segment(row, rows.y.size()) = weight * rows.y;
       row += rows.y.size();
@@ -474,7 +491,8 @@ void PassProblem::correct(const SmootherResult& found, PassSolution& solution) c
     const VectorXd& x = found.x[arc];
     PassSolution::Arc& its = solution.arcs[arc];
     for (int k = 0; k < gyros_; ++k) {
-      its.h_in[k] = rotated<double>(its.h_in[k], across(its.h_in[k]) * x.segment<2>(layout.direction(k))).normalized();
+      its.h_in[k] =
+          rotated<double>(its.h_in[k], across(its.h_in[k]) * x.segment<2>(PassLayout::direction(k))).normalized();
       if (layout.wandering_drift) {
         its.wandering_rad_s[k] += x.segment<3>(layout.wandering(k));
       }

@@ -22,7 +22,7 @@ struct GyroParameters {
 };
 
 /// Which states there are, and where they stand: those that move, then the constants per gyro, then the shared ones.
-/// Directions are two components across each momentum; the rest as in InvariantLayout.
+/// GyroDirections are two components across each momentum; the rest as in InvariantLayout.
 struct PassLayout {
   int gyros = 2;
   int drift_size = 7;
@@ -32,7 +32,7 @@ struct PassLayout {
   bool orbital_error = false;
   int further_heads = 0;
 
-  [[nodiscard]] int direction(int gyro) const { return 2 * gyro; }
+  [[nodiscard]] static int direction(int gyro) { return 2 * gyro; }
   [[nodiscard]] int wandering(int gyro) const { return 2 * gyros + 3 * gyro; }
   [[nodiscard]] int dynamic() const { return (wandering_drift ? 5 : 2) * gyros; }
   [[nodiscard]] int drift(int gyro) const { return dynamic() + gyro * (drift_size + 3); }
@@ -76,8 +76,8 @@ struct PassSolution {
   std::vector<GyroParameters> gyros;
   Eigen::VectorXd shared;  ///< as in PassLayout, from shared() on
   struct Arc {
-    Directions h_in;
-    Directions wandering_rad_s;  ///< case axes
+    GyroDirections h_in;
+    GyroDirections wandering_rad_s;  ///< case axes
   };
   std::vector<Arc> arcs;
 };
@@ -115,6 +115,9 @@ class PassProblem {
       double extra_variance_rad2 = 0;  ///< for what steps too long for their readings may have missed
     };
     std::vector<ArcEnd> ends;
+    /// What outliers count beyond the squares of their rows, which have less weight: 2 g − g²/s together, s their NIS
+    /// and g the gate, so that a worse one is not more likely.
+    double outliers_square = 0;
   };
   [[nodiscard]] Linear linearise(const PassSolution& solution) const;
   /// The same with other process noise than that of the setup.
@@ -128,7 +131,7 @@ class PassProblem {
     std::size_t arc = 0;
     Time t{};
     const ScreenedPass::Fix* fix = nullptr;  ///< there, if any
-    Directions h_in;
+    GyroDirections h_in;
     std::vector<MomentumBy> by;
   };
   /// Goes along all samples, thinned, and fixes, in time order.
@@ -143,20 +146,20 @@ class PassProblem {
   [[nodiscard]] FixRows compare(const PassSolution& solution, const Moment& moment) const;
 
   /// By the momenta and these readings.
-  [[nodiscard]] Result<AttitudeByDirections<kMaxGyros>, DirectionsFault> attitude(const PassSolution& solution,
-                                                                                  const Moment& moment,
-                                                                                  const Directions& h_b,
-                                                                                  const GyrosUsed& used) const;
+  [[nodiscard]] static Result<AttitudeByDirections<kMaxGyros>, DirectionsFault> attitude(const PassSolution& solution,
+                                                                                         const Moment& moment,
+                                                                                         const GyroDirections& h_b,
+                                                                                         const GyrosUsed& used);
   /// How its error, c axes, depends on the states of the arc.
   [[nodiscard]] Eigen::MatrixXd attitude_by_states(const PassSolution& solution, const Moment& moment,
                                                    const AttitudeByDirections<kMaxGyros>& attitude,
-                                                   const Directions& h_b) const;
+                                                   const GyroDirections& h_b) const;
 
  private:
   /// Something to go along: a sample or a fix.
   struct Node {
     Time t{};
-    Directions h_b;
+    GyroDirections h_b;
     GyrosUsed used{};
     const ScreenedPass::Fix* fix = nullptr;
     bool after_gap = false;

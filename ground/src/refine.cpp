@@ -29,14 +29,14 @@ class SmoothReadings {
       : samples_(pass.samples), gyros_(pass.gyros), noise_rad_(readout_noise_rad) {}
 
   struct At {
-    Directions h_b;
+    GyroDirections h_b;
     GyrosUsed used{};
     double noise_factor = 1;
   };
   /// By what a fix was compared with where no polynomial is what the body did.
   [[nodiscard]] At at(const ScreenedPass::Fix& fix) const {
     for (const Duration reach : kReaches) {
-      if (const auto fitted = fit(fix.fix.t, reach)) {
+      if (const auto fitted = fit(fix, reach)) {
         return *fitted;
       }
     }
@@ -49,7 +49,8 @@ class SmoothReadings {
     [[nodiscard]] const ScreenedPass::Sample& operator[](int i) const { return samples[static_cast<std::size_t>(i)]; }
   };
 
-  [[nodiscard]] std::optional<At> fit(Time t, Duration reach) const {
+  [[nodiscard]] std::optional<At> fit(const ScreenedPass::Fix& fix, Duration reach) const {
+    const Time t = fix.fix.t;
     constexpr int kDegree = 3;
     constexpr int kLeast = 2 * (kDegree + 1);
     const auto before = [](const ScreenedPass::Sample& sample, Time time) { return sample.t < time; };
@@ -65,9 +66,16 @@ class SmoothReadings {
     At at;
     at.h_b = fitted.h_b;
     at.noise_factor = fitted.noise_factor;
+    const auto gap = std::adjacent_find(first, last, [](const auto& a, const auto& b) {
+      return b.t - a.t > Cycle<InvariantEstimator<Esg7, 2>>::kMaxInterpolation;
+    });
+    if (gap != last) {
+      return std::nullopt;
+    }
     for (int k = 0; k < gyros_; ++k) {
       const double sigma_rad = noise_rad_[static_cast<std::size_t>(k)];
-      at.used[k] = std::all_of(first, last, [&](const ScreenedPass::Sample& sample) { return sample.used[k]; });
+      at.used[k] =
+          fix.used[k] && std::all_of(first, last, [&](const ScreenedPass::Sample& sample) { return sample.used[k]; });
       if (at.used[k] && !(fitted.residual_square[k] <= bound * sigma_rad * sigma_rad)) {
         return std::nullopt;
       }
@@ -89,7 +97,7 @@ AttitudeHistory smoothed_attitude(const ScreenedPass& screened, const PassProble
       return;
     }
     const SmoothReadings::At at = readings.at(*moment.fix);
-    const auto attitude = problem.attitude(result.solution, moment, at.h_b, at.used);
+    const auto attitude = PassProblem::attitude(result.solution, moment, at.h_b, at.used);
     if (!attitude) {
       return;
     }
@@ -98,7 +106,7 @@ AttitudeHistory smoothed_attitude(const ScreenedPass& screened, const PassProble
     Matrix3d covariance_rad2 = spread * spread.transpose();
     for (int k = 0; k < screened.gyros; ++k) {
       const double noise_rad = problem.setup().readout_noise_rad[static_cast<std::size_t>(k)] * at.noise_factor;
-      const Matrix3d by_direction = attitude.value().by_directions.middleCols<3>(3 * k);
+      const Matrix3d by_direction = attitude.value().by_directions.middleCols<3>(3L * k);
       covariance_rad2 += noise_rad * noise_rad * by_direction * by_direction.transpose();
     }
     history.t.push_back(moment.t);

@@ -2,6 +2,7 @@
 /// What of a pass can be used: samples and fixes as the on-board cycle has screened them.
 
 #include <algorithm>
+#include <utility>
 #include <vector>
 
 #include "trihedron/core/cycle.hpp"
@@ -11,24 +12,24 @@ namespace trihedron::ground {
 
 inline constexpr int kMaxGyros = 4;
 /// Of the gyros that there are; those beyond are not used.
-using Directions = PerGyro<Eigen::Vector3d, kMaxGyros>;
+using GyroDirections = PerGyro<Eigen::Vector3d, kMaxGyros>;
 using GyrosUsed = GyroMask<kMaxGyros>;
 
-/// In the order of their times; where the clock was set back, what came after that.
+/// In the order of their times; where the clock was set back, the stretch with the most fixes.
 struct ScreenedPass {
-  [[nodiscard]] static Directions none() {
-    Directions h_b;
+  [[nodiscard]] static GyroDirections none() {
+    GyroDirections h_b;
     std::fill(h_b.begin(), h_b.end(), Eigen::Vector3d::UnitX());
     return h_b;
   }
   struct Sample {
     Time t{};
-    Directions h_b = none();  ///< unit, where used
+    GyroDirections h_b = none();  ///< unit, where used
     GyrosUsed used{};
   };
   struct Fix {
     StarFix fix;
-    Directions h_b = none();  ///< by several samples together
+    GyroDirections h_b = none();  ///< by several samples together
     GyrosUsed used{};
     double noise_factor = 1;          ///< as of FixReadings
     Eigen::Vector3d rate_c{0, 0, 0};  ///< of the body relative to `in`, rad/s
@@ -38,12 +39,25 @@ struct ScreenedPass {
   std::vector<Sample> samples;
   std::vector<Fix> fixes;  ///< used or rejected as outliers; all star trackers
   bool clock_set_back = false;
+  std::vector<Sample> longest_samples;  ///< of the stretches before the present one
+  std::vector<Fix> longest_fixes;
+
+  /// After the last sample.
+  void keep_longest() {
+    if (longest_fixes.size() > fixes.size()) {
+      std::swap(samples, longest_samples);
+      std::swap(fixes, longest_fixes);
+    }
+  }
 
   /// The next sample of the pass and what the cycle made of it.
   template <class Report>
   void add_sample(const GyroTelemetry& gyro, std::size_t i, const Report& report) {
     if (report.sample == SampleStatus::kUsedAfterClockSetBack) {
       clock_set_back = true;
+      keep_longest();
+      std::swap(samples, longest_samples);
+      std::swap(fixes, longest_fixes);
       samples.clear();
       fixes.clear();
     }

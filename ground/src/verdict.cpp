@@ -98,6 +98,16 @@ void judge_rejections(const Statistics& statistics, std::vector<Finding>& findin
   }
 }
 
+void judge_batch(const Statistics& statistics, std::vector<Finding>& findings) {
+  const auto converged = statistics.find("batch_converged");
+  if (converged != statistics.end() && converged->second == 0) {
+    add(findings, Severity::kDoNotUse, "batch-not-converged",
+        "Least squares over the whole pass did not settle: its values are those of the last step.",
+        fmt::format("{:.0f} iterations", statistic(statistics, "batch_iterations")),
+        "Use estimator invariant, and look for a model that does not hold over the whole pass.");
+  }
+}
+
 void judge_star_tracker(const Statistics& statistics, std::vector<Finding>& findings) {
   if (const double off = statistic(statistics, "fixes_off_in_a_row"); off > 0) {
     add(findings, Severity::kWarning, "star-tracker-off",
@@ -304,6 +314,7 @@ Verdict judge(const Pass& pass, const CalibrationRun& run) {
   judge_steadiness(pass, run, findings);
   judge_pair(run, findings);
   judge_star_tracker(statistics, findings);
+  judge_batch(statistics, findings);
   judge_gyros(pass, run, findings);
   judge_unused_sensors(pass, run, findings);
   return verdict_of(std::move(findings));

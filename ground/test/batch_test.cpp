@@ -139,6 +139,32 @@ TEST(Batch, DoesNotBelieveOutliers) {
   EXPECT_LT(apart.dot(clean.covariance.llt().solve(apart)), 0.5 * 20);
 }
 
+/// 20 min without samples and fixes, and a fix on the time of the first sample after it: how the body moved is unknown.
+TEST(Batch, KnowsThatAGapOfTheGyrosTellsNothingOfTheDrift) {
+  Pass pass = two_hours().pass;
+  const auto begin = pass.settings.epoch + std::chrono::minutes(40);
+  const auto end = begin + std::chrono::minutes(20);
+  const auto in_gap = [&](Time t) { return t >= begin && t < end; };
+  std::vector<double> h;
+  for (std::size_t i = 0; i < pass.gyro.t.size(); ++i) {
+    if (!in_gap(pass.gyro.t[i])) {
+      h.insert(h.end(), pass.gyro.h.begin() + static_cast<std::ptrdiff_t>(6 * i),
+               pass.gyro.h.begin() + static_cast<std::ptrdiff_t>(6 * i + 6));
+    }
+  }
+  pass.gyro.h = h;
+  std::erase_if(pass.gyro.t, in_gap);
+  std::vector<Eigen::Quaterniond> q_in_c;
+  for (std::size_t i = 0; i < pass.star_tracker.t.size(); ++i) {
+    if (!in_gap(pass.star_tracker.t[i])) {
+      q_in_c.push_back(pass.star_tracker.q_in_c[i]);
+    }
+  }
+  pass.star_tracker.q_in_c = q_in_c;
+  std::erase_if(pass.star_tracker.t, in_gap);
+  EXPECT_LT(nees_of(two_hours().truth, calibrate(pass, batch()).calibration), 45);
+}
+
 TEST(Batch, RefusesAClockThatWasSetBack) {
   Pass pass = two_hours().pass;
   for (std::size_t i = pass.gyro.t.size() / 2; i < pass.gyro.t.size(); ++i) {

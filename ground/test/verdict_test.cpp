@@ -71,6 +71,16 @@ TEST(Verdict, OfAGoodRunIsTrustworthyWithoutFindings) {
   EXPECT_THAT(codes(verdict), IsEmpty());
 }
 
+TEST(Verdict, FindsABatchThatHasNotConverged) {
+  auto run = good_run();
+  run.calibration.statistics["batch_iterations"] = 12;
+  run.calibration.statistics["batch_converged"] = 1;
+  EXPECT_THAT(codes(judge(good_pass(), run)), IsEmpty());
+  run.calibration.statistics["batch_converged"] = 0;
+  EXPECT_THAT(codes(judge(good_pass(), run)), ElementsAre("batch-not-converged"));
+  EXPECT_FALSE(judge(good_pass(), run).trustworthy);
+}
+
 TEST(Verdict, FindsTooFewFixes) {
   auto run = good_run();
   run.calibration.statistics["fixes_used"] = 99;

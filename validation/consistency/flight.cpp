@@ -103,7 +103,7 @@ Outcome calibrate_batch(const sim::SimulatedPass& flown, double walk_rad_sqrt_s,
   Outcome outcome;
   outcome.nis = std::numeric_limits<double>::quiet_NaN();
   outcome.fixes = static_cast<long>(calibration.statistics.at("nis_count"));
-  // In units of the sigmas: what is known of differences of poorly known parameters is not lost.
+  // In units of the sigmas, which differ by ten powers of ten.
   const ParameterErrors sigma = calibration.covariance.diagonal().cwiseSqrt();
   const ParameterErrors scaled = errors.cwiseQuotient(sigma);
   const Eigen::MatrixXd correlation =
