@@ -411,15 +411,14 @@ CalibrationOptions with_everything(CalibrationOptions options, const Calibration
   return options;
 }
 
-/// Puts noise into the options.
-void use(const Likely& likely, bool wanders, CalibrationOptions& options) {
-  if (wanders) {
-    options.further_states.wandering_drift = Choice::kOn;
-    options.further_states.wandering_drift_rad_s = likely.noise.wandering_sigma_rad_s;
-    options.further_states.wandering_time = from_seconds(likely.noise.wandering_time_s);
-  } else {
-    options.direction_random_walk_rad_sqrt_s = likely.noise.direction_random_walk_rad_sqrt_s;
-  }
+void use_walk(const ProcessNoise& noise, CalibrationOptions& options) {
+  options.direction_random_walk_rad_sqrt_s = noise.direction_random_walk_rad_sqrt_s;
+}
+
+void use_wandering(const ProcessNoise& noise, CalibrationOptions& options) {
+  options.further_states.wandering_drift = Choice::kOn;
+  options.further_states.wandering_drift_rad_s = noise.wandering_sigma_rad_s;
+  options.further_states.wandering_time = from_seconds(noise.wandering_time_s);
 }
 
 /// Drift that wanders as fast as this random walk: walk² = 2 σ² τ.
@@ -440,28 +439,27 @@ void decide_beside_noise(const Pass& pass, const Screened& screened, const Calib
   Trial everything(pass, screened, free);
   const Likely walking = with_most_likely_walk(everything, free);
   std::optional<Evidence> wandering;
-  CalibrationOptions wandering_options;
+  std::optional<ProcessNoise> wanders;
   if (wandering_is_open && walking.gain > kStrong) {
-    wandering_options = wandering_like(walking, free);
-    Trial trial(pass, screened, wandering_options);
-    const Likely wanders = with_most_likely_wandering(trial, wandering_options);
-    const double gain = wanders.log_likelihood - walking.log_likelihood;
+    const CalibrationOptions like = wandering_like(walking, free);
+    Trial trial(pass, screened, like);
+    const Likely likely = with_most_likely_wandering(trial, like);
+    const double gain = likely.log_likelihood - walking.log_likelihood;
     wandering = Evidence{"wandering_drift", gain, gain > kStrong};
     if (wandering->accepted) {
-      use(wanders, true, wandering_options);
+      wanders = likely.noise;
       everything = std::move(trial);
     }
   }
   settle_states(everything, asked, decision);
-  if (wandering && wandering->accepted) {
-    options.further_states.wandering_drift = Choice::kOn;
-    options.further_states.wandering_drift_rad_s = wandering_options.further_states.wandering_drift_rad_s;
-    options.further_states.wandering_time = wandering_options.further_states.wandering_time;
-    Trial trial(pass, screened, options);
-    use(with_most_likely_wandering(trial, options), true, options);
+  if (wanders) {
+    use_wandering(*wanders, options);
+  }
+  Trial decided(pass, screened, options);
+  if (wanders) {
+    use_wandering(with_most_likely_wandering(decided, options).noise, options);
   } else {
-    Trial trial(pass, screened, options);
-    use(with_most_likely_walk(trial, options), false, options);
+    use_walk(with_most_likely_walk(decided, options).noise, options);
   }
   if (wandering) {
     decision.evidence.push_back(*wandering);
@@ -495,7 +493,7 @@ void find_noise(const Pass& pass, CalibrationOptions& options) {
   if (options.star_tracker_noise_rad) {
     trial = Trial(pass, screened, options);
   }
-  use(with_most_likely_walk(trial, options), false, options);
+  use_walk(with_most_likely_walk(trial, options).noise, options);
 }
 
 }  // namespace
@@ -556,7 +554,7 @@ Decision decide(const Pass& pass, const CalibrationOptions& asked) {
   if (walking.gain > kStrong) {
     decide_beside_noise(pass, screened, asked, wandering_is_open, decision);
   } else {
-    use(walking, false, options);
+    use_walk(walking.noise, options);
   }
   return decision;
 }

@@ -14,9 +14,9 @@ struct Decision {
 };
 
 /// Settles each choice that is left to the program. Estimator paper, and passes of more than two gyros, have no further
-/// states; a prior calibration tells them where the pass has one; else they are those with more evidence for than
-/// against. The noise is found where it is asked for, by estimator invariant on a pass that is long enough and has no
-/// prior calibration.
+/// states; a prior calibration tells them where the pass has one; else they are those that the pass makes 20 times as
+/// likely as their absence. The noise is found where it is asked for, on a pass that is long enough and has no prior
+/// calibration. Throws SetupError.
 [[nodiscard]] Decision decide(const Pass& pass, const CalibrationOptions& asked);
 
 }  // namespace trihedron::ground

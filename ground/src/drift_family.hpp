@@ -9,7 +9,7 @@ namespace trihedron::ground {
 /// A linear drift family whose size is known at run time: ω_b(h) = B(h) κ, as the models of core/drift.hpp.
 class DriftFamily {
  public:
-  static constexpr int kMaxSize = 128;
+  static constexpr int kMaxSize = Esg20::kSize;
   /// Columns by coefficient; no heap.
   using Basis = Eigen::Matrix<double, 3, Eigen::Dynamic, Eigen::ColMajor, 3, kMaxSize>;
 

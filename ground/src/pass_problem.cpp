@@ -118,12 +118,11 @@ void PassProblem::step(const PassSolution& solution, const Node& from, const Nod
   const double dt_s = to_seconds(to.t - from.t);
   moment.t = to.t;
   // Gyros that can be used at both ends; where those are too few, at its end.
-  GyrosUsed used = to.used;
   GyrosUsed at_both = to.used;
   for (int k = 0; k < gyros_; ++k) {
     at_both[k] = from.used[k] && to.used[k];
   }
-  used = count(at_both) >= 2 ? at_both : used;
+  const GyrosUsed used = count(at_both) >= 2 ? at_both : to.used;
   GyroDirections middle;
   for (int k = 0; k < gyros_; ++k) {
     middle[k] = at_both[k] ? (from.h_b[k] + to.h_b[k]).normalized() : used[k] ? to.h_b[k] : Vector3d::UnitX();
@@ -219,10 +218,9 @@ void PassProblem::go_along(const PassSolution& solution, const std::function<voi
   }
 }
 
-Eigen::Matrix<double, 3, Eigen::Dynamic> PassProblem::fix_by_shared(const ScreenedPass::Fix& fix) const {
+Eigen::Matrix3Xd PassProblem::fix_by_shared(const ScreenedPass::Fix& fix) const {
   const PassLayout& layout = setup_.layout;
-  Eigen::Matrix<double, 3, Eigen::Dynamic> by(3, layout.size() - layout.shared());
-  by.setZero();
+  Eigen::Matrix3Xd by = Eigen::Matrix3Xd::Zero(3, layout.size() - layout.shared());
   if (layout.clock_offset) {
     by.col(0) = fix.rate_c;
   }
@@ -273,7 +271,7 @@ MatrixXd PassProblem::attitude_by_states(const PassSolution& solution, const Mom
 PassProblem::FixRows PassProblem::compare(const PassSolution& solution, const Moment& moment) const {
   const PassLayout& layout = setup_.layout;
   const ScreenedPass::Fix& fix = *moment.fix;
-  const Eigen::Matrix<double, 3, Eigen::Dynamic> by_shared = fix_by_shared(fix);
+  const Eigen::Matrix3Xd by_shared = fix_by_shared(fix);
   const Vector3d known_error = by_shared * solution.shared;
   const Matrix3d C_fix =
       (Rot<In, C>::assume(fix.fix.q_in_c.normalized()) * Rot<C, C>::exp(-Vec<C>::assume(known_error))).raw();

@@ -172,7 +172,7 @@ class PassProblem {
   void step(const PassSolution& solution, const Node& from, const Node& to, Moment& moment,
             double& extra_variance_rad2) const;
   void begin_arc(const PassSolution& solution, std::size_t arc, Moment& moment) const;
-  [[nodiscard]] Eigen::Matrix<double, 3, Eigen::Dynamic> fix_by_shared(const ScreenedPass::Fix& fix) const;
+  [[nodiscard]] Eigen::Matrix3Xd fix_by_shared(const ScreenedPass::Fix& fix) const;
   void add_prior(const PassSolution& solution, Linear& linear) const;
   void end_arc(const PassSolution& solution, const Moment& moment, double extra_variance_rad2, Linear& linear) const;
 

@@ -22,7 +22,7 @@ using Eigen::Vector3d;
 constexpr std::array<Duration, 3> kReaches = {std::chrono::milliseconds(3000), std::chrono::milliseconds(1400),
                                               std::chrono::milliseconds(700)};
 
-/// Readings at any time, by the samples round it together.
+/// Readings at the times of fixes, by the samples round them together.
 class SmoothReadings {
  public:
   SmoothReadings(const ScreenedPass& pass, const std::vector<double>& readout_noise_rad)
@@ -61,17 +61,17 @@ class SmoothReadings {
     if (end - begin < kLeast) {
       return std::nullopt;
     }
-    const auto fitted = fit_directions<kMaxGyros>(Indexed{samples_}, begin, end, t, kDegree);
-    const double bound = fitted.freedom + 5 * std::sqrt(2.0 * fitted.freedom);
-    At at;
-    at.h_b = fitted.h_b;
-    at.noise_factor = fitted.noise_factor;
     const auto gap = std::adjacent_find(first, last, [](const auto& a, const auto& b) {
       return b.t - a.t > Cycle<InvariantEstimator<Esg7, 2>>::kMaxInterpolation;
     });
     if (gap != last) {
       return std::nullopt;
     }
+    const auto fitted = fit_directions<kMaxGyros>(Indexed{samples_}, begin, end, t, kDegree);
+    const double bound = fitted.freedom + 5 * std::sqrt(2.0 * fitted.freedom);
+    At at;
+    at.h_b = fitted.h_b;
+    at.noise_factor = fitted.noise_factor;
     for (int k = 0; k < gyros_; ++k) {
       const double sigma_rad = noise_rad_[static_cast<std::size_t>(k)];
       at.used[k] =
@@ -195,8 +195,11 @@ void refine(const ScreenedPass& screened, const PassSetup& setup, CalibrationRun
   const MatrixXd own =
       result.errors.last_root.middleRows(layout.drift(0), layout.drift(layout.gyros) - layout.drift(0));
   calibration.covariance = own * own.transpose();
-  PassProblem::Moment last;
-  problem.go_along(result.solution, [&](const PassProblem::Moment& moment) { last = moment; });
+  GyroDirections last_h_in;
+  problem.go_along(result.solution, [&](const PassProblem::Moment& moment) {
+    calibration.t = moment.t;
+    last_h_in = moment.h_in;
+  });
   for (int k = 0; k < layout.gyros; ++k) {
     const auto index = static_cast<std::size_t>(k);
     const GyroParameters& found = result.solution.gyros[index];
@@ -206,10 +209,9 @@ void refine(const ScreenedPass& screened, const PassSetup& setup, CalibrationRun
     }
     gyro.alignment_rotation_vector_rad = Rot<C, B<1>>::assume(found.C_c_b).log().raw();
     gyro.readout_bias = found.readout_bias;
-    gyro.momentum_in = last.h_in[k];
+    gyro.momentum_in = last_h_in[k];
   }
   calibration.estimator = kBatch;
-  calibration.t = last.t;
   calibration.further =
       further_of(setup, result, further_names(run.options.further_states, layout.further_heads, layout.gyros));
   calibration.statistics["batch_iterations"] = result.iterations;

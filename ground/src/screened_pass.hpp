@@ -17,19 +17,19 @@ using GyrosUsed = GyroMask<kMaxGyros>;
 
 /// In the order of their times; where the clock was set back, the stretch with the most fixes.
 struct ScreenedPass {
-  [[nodiscard]] static GyroDirections none() {
+  [[nodiscard]] static GyroDirections unread() {
     GyroDirections h_b;
     std::fill(h_b.begin(), h_b.end(), Eigen::Vector3d::UnitX());
     return h_b;
   }
   struct Sample {
     Time t{};
-    GyroDirections h_b = none();  ///< unit, where used
+    GyroDirections h_b = unread();  ///< unit, where used
     GyrosUsed used{};
   };
   struct Fix {
     StarFix fix;
-    GyroDirections h_b = none();  ///< by several samples together
+    GyroDirections h_b = unread();  ///< by several samples together
     GyrosUsed used{};
     double noise_factor = 1;          ///< as of FixReadings
     Eigen::Vector3d rate_c{0, 0, 0};  ///< of the body relative to `in`, rad/s

@@ -251,6 +251,7 @@ TEST(PassProblem, KnowsHowTheMisfitOfAFixDependsOnEachState) {
     // The misfit is H (truth − solution).
     const double step = 1e-6;
     const Eigen::VectorXd numerical = (moved(-step) - moved(step)) / (2 * step);
+    // Terms of second order are of the size of the misfit, which is below 5e-4 rad, times the derivative.
     EXPECT_LT((numerical - H.col(state)).norm(), 1e-3 * (1e-3 + H.col(state).norm())) << state;
   }
 }

@@ -57,7 +57,7 @@ struct GyroEvent {
 
 /// For estimating a kind of further states instead of taking them as zero.
 struct Evidence {
-  std::string states;  ///< "clock_offset", "orbital_error", "drift_outside_eq1"
+  std::string states;  ///< "clock_offset", "orbital_error", "readout_bias", "drift_outside_eq1", "wandering_drift"
   double log_bayes_factor = 0;
   bool accepted = false;
 };
