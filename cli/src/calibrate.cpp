@@ -141,8 +141,9 @@ void add_calibrate(CLI::App& program, const Common& common, int& exit_status) {
   command->add_option("-o,--output", arguments->out, "Directory to write into")->required();
   command->add_option("--estimator", arguments->estimator, "Estimator")
       ->check(CLI::IsMember(std::vector<std::string>(ground::kEstimators.begin(), ground::kEstimators.end())));
-  command->add_option("--drift-model", arguments->drift_model, "Drift model")
-      ->check(CLI::IsMember(std::vector<std::string>(ground::kDriftModels.begin(), ground::kDriftModels.end())));
+  command->add_option("--drift-model", arguments->drift_model, "Drift model")->check([](const std::string& name) {
+    return ground::is_drift_model(name) ? "" : fmt::format("not one of {}", ground::kDriftModels);
+  });
   command->add_option("--config", arguments->config, "Settings (TOML); see effective-config.toml of any run");
   command->callback([&common, &exit_status, arguments] {
     CalibrationOptions options = arguments->config.empty() ? CalibrationOptions{} : io::read_config(arguments->config);

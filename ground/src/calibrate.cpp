@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "decide.hpp"
+#include "gyro_model.hpp"
 #include "refine.hpp"
 #include "setup.hpp"
 #include "trihedron/ground/replay.hpp"
@@ -237,7 +238,7 @@ Calibration result_of(const Pass& pass, const Cycle<Estimator>& cycle, const Cal
     result.noise->wandering_drift_rad_s = states.wandering_drift_rad_s;
     result.noise->wandering_time_s = to_seconds(states.wandering_time);
   }
-  result.states = state_names<Model>(Estimator::kGyros);
+  result.states = state_names(DriftFamily::of<Model>(), Estimator::kGyros);
   const auto root = parameter_root(cycle.estimator());
   result.covariance = root * root.transpose();
   return result;
@@ -336,10 +337,7 @@ CalibrationRun calibrate_with(const Pass& pass, Decision decision, const Progres
   run.calibration.statistics = statistics_of(run.fixes);
   run.calibration.statistics["angle_looks"] = angle_looks;
   if (batch) {
-    refine(
-        screened,
-        pass_setup<Estimator>(cycle->estimator().setup(), run.options.further_states, further_heads<Estimator>(pass)),
-        run);
+    refine(screened, pass_setup<Estimator>(cycle->estimator().setup(), pass, run.options), run);
   }
   run.calibration.verdict = judge(pass, run);
   return run;

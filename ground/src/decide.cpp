@@ -15,6 +15,7 @@
 #include <vector>
 
 #include "batch.hpp"
+#include "gyro_model.hpp"
 #include "refine.hpp"
 #include "trihedron/ground/replay.hpp"
 #include "with_estimator.hpp"
@@ -69,7 +70,7 @@ bool knows_of_drift_outside(const PassSettings& settings) {
 Screened screen(const Pass& pass, const CalibrationOptions& asked) {
   CalibrationOptions options = without_further_states(asked);
   if (asked.drift_model != Esg7::kModelName && knows_of_drift_outside(pass.settings)) {
-    options.drift_model = Esg20::kModelName;
+    options.drift_model = asked.drift_model == kAutoDriftModel ? Esg20::kModelName : asked.drift_model;
   }
   return with_estimator(pass, options, [&]<class Estimator>() {
     const auto cycle = make_cycle<Estimator>(pass, options, {.navigate = false});
@@ -132,7 +133,7 @@ class Trial {
       root.middleRows(k * members, members) =
           found_.errors.last_root.middleRows(layout().drift(k) + Esg7::kSize, members);
       sigma.segment(k * members, members) = problem_.setup()
-                                                .prior_covariance.diagonal()
+                                                .prior.covariance.diagonal()
                                                 .segment(layout().drift(k) - layout().drift(0) + Esg7::kSize, members)
                                                 .cwiseSqrt();
     }
@@ -169,15 +170,13 @@ class Trial {
   static PassSetup setup_of(const Pass& pass, const CalibrationOptions& options) {
     return with_estimator(pass, options, [&]<class Estimator>() {
       const auto cycle = make_cycle<Estimator>(pass, options, {.navigate = false});
-      return pass_setup<Estimator>(cycle->estimator().setup(), options.further_states, further_heads<Estimator>(pass));
+      return pass_setup<Estimator>(cycle->estimator().setup(), pass, options);
     });
   }
   [[nodiscard]] PassSolution first_of(const Screened& screened) const {
     std::vector<GyroParameters> gyros;
     for (const GyroCalibration& gyro : screened.first) {
-      GyroParameters parameters = parameters_of(gyro);
-      parameters.drift_rad_s.conservativeResizeLike(Eigen::VectorXd::Zero(layout().drift_size));
-      gyros.push_back(parameters);
+      gyros.push_back(parameters_of(gyro, problem_.setup().family));
     }
     return problem_.start(gyros);
   }
@@ -373,10 +372,29 @@ CalibrationOptions as_before(CalibrationOptions options, const Calibration& prio
   settle(states.orbital_error, had("orbital"));
   settle(states.wandering_drift, false);
   settle(states.readout_bias, had("gyro1_readout_bias"));
-  if (options.drift_model == kAutoDriftModel && !prior.gyros.empty()) {
-    options.drift_model = prior.gyros[0].drift_model;
-  }
   return options;
+}
+
+/// Throws SetupError where the earlier calibration is of other gyros or of another drift model.
+void refuse_prior_of_others(const Pass& pass, const CalibrationOptions& asked) {
+  const std::optional<Calibration>& prior = pass.settings.prior;
+  if (!prior) {
+    return;
+  }
+  if (prior->gyros.size() != static_cast<std::size_t>(pass.gyro.gyros)) {
+    throw SetupError(
+        fmt::format("the earlier calibration has {} gyros; the pass has {}", prior->gyros.size(), pass.gyro.gyros),
+        "use a calibration of these gyros");
+  }
+  for (std::size_t k = 0; k < prior->gyros.size(); ++k) {
+    const GyroCalibration& gyro = prior->gyros[k];
+    if (gyro.drift_model != asked.drift_model) {
+      throw SetupError(fmt::format("the earlier calibration of gyro {} is of drift model '{}', not {}", k + 1,
+                                   gyro.drift_model, asked.drift_model),
+                       "use a calibration made with the same drift model");
+    }
+    static_cast<void>(family_of(gyro));
+  }
 }
 
 /// Turns the choices that are left open, and the drift model, by what a trial with everything shows.
@@ -407,7 +425,7 @@ CalibrationOptions with_everything(CalibrationOptions options, const Calibration
        {&FurtherStateOptions::clock_offset, &FurtherStateOptions::orbital_error, &FurtherStateOptions::readout_bias}) {
     options.further_states.*choice = asked.further_states.*choice == Choice::kOff ? Choice::kOff : Choice::kOn;
   }
-  options.drift_model = asked.drift_model == Esg7::kModelName ? Esg7::kModelName : Esg20::kModelName;
+  options.drift_model = asked.drift_model == kAutoDriftModel ? Esg20::kModelName : asked.drift_model;
   return options;
 }
 
@@ -498,11 +516,19 @@ void find_noise(const Pass& pass, CalibrationOptions& options) {
 
 }  // namespace
 
-Decision decide(const Pass& pass, const CalibrationOptions& asked) {
+Decision decide(const Pass& pass, const CalibrationOptions& asked_for) {
+  CalibrationOptions asked = asked_for;
+  if (pass.settings.prior && asked.drift_model == kAutoDriftModel) {
+    asked.drift_model = pass.settings.prior->gyros.at(0).drift_model;
+  }
+  if (is_for_whole_pass(asked.drift_model) && asked.estimator == kInvariant) {
+    asked.estimator = kBatch;
+  }
+  refuse_prior_of_others(pass, asked);
   Decision decision{asked, {}};
   CalibrationOptions& options = decision.options;
   options.find_noise = false;
-  const bool invariant = asked.estimator != "paper";
+  const bool invariant = asked.estimator != kPaper;
   const std::optional<Calibration>& prior = pass.settings.prior;
   if (prior && prior->noise && asked.find_noise && invariant) {
     use_noise(*prior->noise, options);

@@ -1,6 +1,9 @@
+#include "drift_family.hpp"
 #include "trihedron/ground/calibrate.hpp"
 
 namespace trihedron::ground {
+
+bool is_drift_model(const std::string& name) { return name == kAutoDriftModel || DriftFamily::named(name).has_value(); }
 
 const char* name_of(FixStatus status) {
   switch (status) {

@@ -5,8 +5,7 @@
 #include <algorithm>
 #include <chrono>
 
-#include "gyro_model.hpp"
-#include "trihedron/core/drift.hpp"
+#include "pass_problem.hpp"
 #include "trihedron/core/optimal_attitude.hpp"
 #include "trihedron/core/precession.hpp"
 #include "trihedron/core/telemetry.hpp"
@@ -59,12 +58,50 @@ class Readings {
   std::size_t next_ = 0;
 };
 
-template <class Model>
-AttitudeHistory fly(const Pass& pass, Time t, const std::vector<GyroCalibration>& records,
-                    const std::vector<Time>& epochs) {
-  PerGyro<GyroModel<Model>, kPair> gyros;
+/// A gyro flown with what is known of it.
+struct Flown {
+  GyroParameters parameters;
+  DriftFamily family;
+};
+
+Directions in_c(const std::vector<Flown>& gyros, const Directions& h_b) {
+  Directions h_c;
   for (int k = 0; k < kPair; ++k) {
-    gyros[k] = to_model<Model>(records[static_cast<std::size_t>(k)]);
+    h_c[k] = seen_in_c(gyros[static_cast<std::size_t>(k)].parameters, h_b[k]);
+  }
+  return h_c;
+}
+
+/// By the midpoint rule, at an attitude and readings of the middle of the step.
+void precess(const std::vector<Flown>& gyros, const Eigen::Matrix3d& C_in_c, const Directions& h_b, double dt_s,
+             Directions& h_in) {
+  for (int k = 0; k < kPair; ++k) {
+    const auto& [parameters, family] = gyros[static_cast<std::size_t>(k)];
+    const Eigen::Vector3d unbiased = without_bias<double>(h_b[k], parameters.readout_bias);
+    const Eigen::Vector3d omega_in = C_in_c * (parameters.C_c_b * (family.basis(unbiased) * parameters.drift_rad_s));
+    h_in[k] = rotated<double>(h_in[k], omega_in * dt_s).normalized();
+  }
+}
+
+CorrectionInterval interval_of(const AttitudeErrors& errors, double limit_rad) {
+  const auto intervals = correction_intervals(errors, limit_rad);
+  return intervals.empty() ? CorrectionInterval{} : intervals.front();
+}
+
+}  // namespace
+
+AttitudeHistory fly_open_loop(const Pass& pass, Time t, const std::vector<GyroCalibration>& records,
+                              const std::vector<Time>& epochs) {
+  if (records.size() < kPair) {
+    throw SetupError("an open loop needs two gyros", "give a calibration of a pair");
+  }
+  std::vector<Flown> gyros;
+  Directions h_in;
+  for (int k = 0; k < kPair; ++k) {
+    const GyroCalibration& record = records[static_cast<std::size_t>(k)];
+    const DriftFamily family = family_of(record);
+    gyros.push_back({parameters_of(record, family), family});
+    h_in[k] = record.momentum_in;
   }
   AttitudeHistory history;
   Readings readings(pass.gyro);
@@ -77,15 +114,12 @@ AttitudeHistory fly(const Pass& pass, Time t, const std::vector<GyroCalibration>
       for (int k = 0; k < kPair && last; ++k) {
         middle[k] = ((*last)[k] + (*h_b)[k]).normalized();
       }
-      if (const auto attitude = trihedron_attitude(momenta(gyros), in_c(gyros, middle))) {
-        const Eigen::Matrix3d& C_in_c = attitude.value().C_in_c.raw();
-        for (int k = 0; k < kPair; ++k) {
-          precess(gyros[k], C_in_c, middle[k], to_seconds(now - last_t));
-        }
+      if (const auto attitude = trihedron_attitude(h_in, in_c(gyros, middle))) {
+        precess(gyros, attitude.value().C_in_c.raw(), middle, to_seconds(now - last_t), h_in);
         last = h_b;
         last_t = now;
       }
-      if (const auto attitude = trihedron_attitude(momenta(gyros), in_c(gyros, *h_b)); attitude && now == *epoch) {
+      if (const auto attitude = trihedron_attitude(h_in, in_c(gyros, *h_b)); attitude && now == *epoch) {
         history.t.push_back(now);
         history.q_in_c.push_back(attitude.value().C_in_c.quaternion());
         history.age_s.push_back(to_seconds(now - t));
@@ -96,29 +130,6 @@ AttitudeHistory fly(const Pass& pass, Time t, const std::vector<GyroCalibration>
     }
   }
   return history;
-}
-
-CorrectionInterval interval_of(const AttitudeErrors& errors, double limit_rad) {
-  const auto intervals = correction_intervals(errors, limit_rad);
-  return intervals.empty() ? CorrectionInterval{} : intervals.front();
-}
-
-}  // namespace
-
-AttitudeHistory fly_open_loop(const Pass& pass, Time t, const std::vector<GyroCalibration>& gyros,
-                              const std::vector<Time>& epochs) {
-  const auto pair_is_of = [&]<class Model>() {
-    return gyros.size() >= kPair && std::all_of(gyros.begin(), gyros.begin() + kPair, is_of_model<Model>);
-  };
-  if (pair_is_of.operator()<Esg7>()) {
-    return fly<Esg7>(pass, t, gyros, epochs);
-  }
-  if (pair_is_of.operator()<Esg20>()) {
-    return fly<Esg20>(pass, t, gyros, epochs);
-  }
-  throw SetupError(
-      fmt::format("an open loop needs two gyros of drift model {} or {}", Esg7::kModelName, Esg20::kModelName),
-      "give a calibration of a pair");
 }
 
 std::vector<OpenLoops> fly_open_loops(const Pass& pass, const CalibrationRun& run, const std::vector<Time>& reference_t,

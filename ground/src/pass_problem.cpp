@@ -324,7 +324,7 @@ void PassProblem::add_prior(const PassSolution& solution, Linear& linear) const 
   VectorXd apart = VectorXd::Zero(layout.size());  // prior mean − solution
   const int own = layout.drift_size + 3;
   for (int k = 0; k < gyros_; ++k) {
-    const GyroParameters& prior = setup_.prior[static_cast<std::size_t>(k)];
+    const GyroParameters& prior = setup_.prior.gyros[static_cast<std::size_t>(k)];
     const GyroParameters& gyro = solution.gyros[static_cast<std::size_t>(k)];
     apart.segment(layout.drift(k), layout.drift_size) = prior.drift_rad_s - gyro.drift_rad_s;
     apart.segment<3>(layout.alignment(k)) =
@@ -354,7 +354,7 @@ void PassProblem::add_prior(const PassSolution& solution, Linear& linear) const 
   }
   const Eigen::Index size = static_cast<Eigen::Index>(gyros_) * own;
   linear.prior.block(layout.drift(0), layout.drift(0), size, size) =
-      setup_.prior_covariance.llt().matrixL().solve(MatrixXd::Identity(size, size));
+      setup_.prior.covariance.llt().matrixL().solve(MatrixXd::Identity(size, size));
   linear.prior_y = linear.prior * apart;
 }
 

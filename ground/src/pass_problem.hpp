@@ -7,19 +7,12 @@
 #include <optional>
 #include <vector>
 
-#include "drift_family.hpp"
 #include "information_smoother.hpp"
+#include "prior.hpp"
 #include "screened_pass.hpp"
 #include "trihedron/core/optimal_attitude.hpp"
 
 namespace trihedron::ground {
-
-/// What is known of a gyro.
-struct GyroParameters {
-  Eigen::VectorXd drift_rad_s;                          ///< κ
-  Eigen::Matrix3d C_c_b = Eigen::Matrix3d::Identity();  ///< alignment
-  Eigen::Vector3d readout_bias = Eigen::Vector3d::Zero();
-};
 
 /// Which states there are, and where they stand: those that move, then the constants per gyro, then the shared ones.
 /// GyroDirections are two components across each momentum; the rest as in InvariantLayout.
@@ -57,8 +50,7 @@ struct ProcessNoise {
 struct PassSetup {
   PassLayout layout;
   DriftFamily family = DriftFamily::of<Esg7>();
-  std::vector<GyroParameters> prior;       ///< means
-  Eigen::MatrixXd prior_covariance;        ///< of κ and δ, gyro by gyro
+  ParameterPrior prior;
   std::vector<double> readout_noise_rad;   ///< per gyro
   std::vector<Eigen::Matrix3d> fix_noise;  ///< covariance per star tracker, c axes, rad²
   double readout_bias_sigma = 1e-4;

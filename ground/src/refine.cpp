@@ -116,6 +116,26 @@ AttitudeHistory smoothed_attitude(const ScreenedPass& screened, const PassProble
   return history;
 }
 
+/// Columns of `to` in place of those of `from`. What was not estimated along the pass is not a number there, with the
+/// sigma of before the pass.
+void rearrange(const std::vector<std::string>& from, const std::vector<std::string>& to, const PassSetup& setup,
+               ParameterHistory& history) {
+  const Eigen::VectorXd prior_sigma = setup.prior.covariance.diagonal().cwiseSqrt();
+  ParameterHistory rearranged{history.t, {}, {}};
+  for (std::size_t row = 0; row < history.t.size(); ++row) {
+    std::vector<double>& value = rearranged.value.emplace_back(to.size(), std::nan(""));
+    std::vector<double>& sigma = rearranged.sigma.emplace_back(prior_sigma.begin(), prior_sigma.end());
+    for (std::size_t column = 0; column < to.size(); ++column) {
+      const auto found = std::find(from.begin(), from.end(), to[column]) - from.begin();
+      if (const auto i = static_cast<std::size_t>(found); i < from.size()) {
+        value[column] = history.value[row][i];
+        sigma[column] = history.sigma[row][i];
+      }
+    }
+  }
+  history = std::move(rearranged);
+}
+
 std::vector<FurtherEstimate> further_of(const PassSetup& setup, const BatchResult& result,
                                         const std::vector<std::string>& names) {
   const PassLayout& layout = setup.layout;
@@ -138,17 +158,6 @@ std::vector<FurtherEstimate> further_of(const PassSetup& setup, const BatchResul
 }
 
 }  // namespace
-
-GyroParameters parameters_of(const GyroCalibration& gyro) {
-  GyroParameters parameters;
-  parameters.drift_rad_s.resize(static_cast<Eigen::Index>(gyro.drift_rad_s.size()));
-  for (std::size_t i = 0; i < gyro.drift_rad_s.size(); ++i) {
-    parameters.drift_rad_s(static_cast<Eigen::Index>(i)) = gyro.drift_rad_s[i].second;
-  }
-  parameters.C_c_b = Rot<C, B<1>>::exp(Vec<C>::assume(gyro.alignment_rotation_vector_rad)).raw();
-  parameters.readout_bias = gyro.readout_bias;
-  return parameters;
-}
 
 std::vector<std::string> further_names(const FurtherStateOptions& states, int further_heads, int gyros) {
   constexpr auto kOn = FurtherStateOptions::Choice::kOn;
@@ -187,7 +196,7 @@ void refine(const ScreenedPass& screened, const PassSetup& setup, CalibrationRun
   Calibration& calibration = run.calibration;
   std::vector<GyroParameters> first;
   for (const GyroCalibration& gyro : calibration.gyros) {
-    first.push_back(parameters_of(gyro));
+    first.push_back(parameters_of(gyro, setup.family));
   }
   BatchResult result = most_likely(problem, problem.start(first));
 
@@ -204,14 +213,19 @@ void refine(const ScreenedPass& screened, const PassSetup& setup, CalibrationRun
     const auto index = static_cast<std::size_t>(k);
     const GyroParameters& found = result.solution.gyros[index];
     GyroCalibration& gyro = calibration.gyros[index];
-    for (std::size_t i = 0; i < gyro.drift_rad_s.size(); ++i) {
-      gyro.drift_rad_s[i].second = found.drift_rad_s(static_cast<Eigen::Index>(i));
+    gyro.drift_model = run.options.drift_model;
+    gyro.drift_rad_s.clear();
+    for (int i = 0; i < layout.drift_size; ++i) {
+      gyro.drift_rad_s.emplace_back(setup.family.names()[static_cast<std::size_t>(i)], found.drift_rad_s(i));
     }
     gyro.alignment_rotation_vector_rad = Rot<C, B<1>>::assume(found.C_c_b).log().raw();
     gyro.readout_bias = found.readout_bias;
     gyro.momentum_in = last_h_in[k];
   }
   calibration.estimator = kBatch;
+  const std::vector<std::string> states = state_names(setup.family, layout.gyros);
+  rearrange(calibration.states, states, setup, run.parameters);
+  calibration.states = states;
   calibration.further =
       further_of(setup, result, further_names(run.options.further_states, layout.further_heads, layout.gyros));
   calibration.statistics["batch_iterations"] = result.iterations;

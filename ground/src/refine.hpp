@@ -12,9 +12,6 @@
 
 namespace trihedron::ground {
 
-/// As the record has them.
-[[nodiscard]] GyroParameters parameters_of(const GyroCalibration& gyro);
-
 /// Star trackers beside the first that the estimator uses.
 template <class Estimator>
 [[nodiscard]] int further_heads(const Pass& pass) {
@@ -24,30 +21,30 @@ template <class Estimator>
 /// Of the further states that are on, but for wandering drift; shared ones first, then those of the gyros.
 [[nodiscard]] std::vector<std::string> further_names(const FurtherStateOptions& states, int further_heads, int gyros);
 
-/// The problem that Estimator solves on board, with only those further states that are on.
+/// The problem that Estimator solves on board, with the drift model asked for and only those further states that are
+/// on. Throws SetupError.
 template <class Estimator>
-[[nodiscard]] PassSetup pass_setup(const typename Estimator::Setup& from, const FurtherStateOptions& states,
-                                   int further_heads) {
+[[nodiscard]] PassSetup pass_setup(const typename Estimator::Setup& from, const Pass& pass,
+                                   const CalibrationOptions& options) {
   constexpr auto kOn = FurtherStateOptions::Choice::kOn;
-  using Base = typename Estimator::BaseModel;
+  const FurtherStateOptions& states = options.further_states;
+  const int heads = further_heads<Estimator>(pass);
   PassSetup setup;
+  setup.family = family_of(options.drift_model);
   setup.layout = {.gyros = Estimator::kGyros,
-                  .drift_size = Base::kSize,
+                  .drift_size = setup.family.size(),
                   .wandering_drift = states.wandering_drift == kOn,
                   .readout_bias = states.readout_bias == kOn,
                   .clock_offset = states.clock_offset == kOn,
                   .orbital_error = states.orbital_error == kOn,
-                  .further_heads = further_heads};
-  setup.family = DriftFamily::of<Base>();
+                  .further_heads = heads};
+  setup.prior = prior_of(pass.settings, Estimator::kGyros, setup.family);
   for (int k = 0; k < Estimator::kGyros; ++k) {
-    setup.prior.push_back(
-        {from.prior[k].drift_rad_s.template head<Base::kSize>(), from.prior[k].C_c_b, from.prior[k].readout_bias});
     setup.readout_noise_rad.push_back(from.readout_noise_rad[k]);
   }
-  setup.prior_covariance = from.prior_covariance;
   setup.fix_noise.emplace_back(from.star_tracker_noise_rad.cwiseAbs2().asDiagonal());
   if constexpr (Estimator::kHeads > 1) {
-    for (int i = 0; i < further_heads; ++i) {
+    for (int i = 0; i < heads; ++i) {
       const HeadSetup& head = from.further_heads[static_cast<std::size_t>(i)];
       setup.fix_noise.emplace_back(head.C_c_s * head.noise_rad.cwiseAbs2().asDiagonal() * head.C_c_s.transpose());
       setup.head_alignment_sigma_rad.push_back(head.alignment_sigma_rad);

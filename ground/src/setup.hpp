@@ -10,92 +10,12 @@
 #include <string>
 #include <vector>
 
-#include "gyro_model.hpp"
+#include "prior.hpp"
 #include "trihedron/core/cycles.hpp"
 #include "trihedron/core/drift.hpp"
 #include "trihedron/ground/calibrate.hpp"
 
 namespace trihedron::ground {
-
-/// Prior sigma of drift outside eq. (1), over that of its coefficients, where the pass does not give it.
-inline constexpr double kOutsideEq1 = 0.05;
-
-template <class Model>
-std::vector<std::string> state_names(int gyros) {
-  std::vector<std::string> names;
-  for (int k = 1; k <= gyros; ++k) {
-    for (const char* coefficient : Model::kNames) {
-      names.push_back(fmt::format("gyro{}.{}", k, coefficient));
-    }
-    for (const char axis : {'x', 'y', 'z'}) {
-      names.push_back(fmt::format("gyro{}.align_{}", k, axis));
-    }
-  }
-  return names;
-}
-
-/// Prior means and sigmas of pass.toml.
-template <class Estimator>
-void use_settings(const PassSettings& settings, typename Estimator::Setup& setup) {
-  using Model = typename Estimator::BaseModel;
-  using Layout = typename Estimator::Setup::Layout;
-  for (int k = 0; k < Estimator::kGyros; ++k) {
-    const GyroPrior& prior = settings.gyros[static_cast<std::size_t>(k)];
-    for (const auto* table : {&prior.drift_rad_s, &prior.drift_sigma_rad_s}) {
-      for (const auto& [name, value] : *table) {
-        if (std::find(Model::kNames.begin(), Model::kNames.end(), name) == Model::kNames.end()) {
-          throw SetupError(fmt::format("the prior of gyro {} names drift coefficient '{}'", k + 1, name),
-                           fmt::format("drift model {} has {}", Model::kModelName, fmt::join(Model::kNames, ", ")));
-        }
-      }
-    }
-    const auto value_or = [](const std::map<std::string, double>& table, const char* name, double otherwise) {
-      const auto found = table.find(name);
-      return found == table.end() ? otherwise : found->second;
-    };
-    Eigen::Matrix<double, Layout::kPerGyro, 1> sigma;
-    for (int i = 0; i < Model::kSize; ++i) {
-      const char* name = Model::kNames[static_cast<std::size_t>(i)];
-      setup.prior[k].drift_rad_s(i) = value_or(prior.drift_rad_s, name, 0);
-      const double common = (i < Esg7::kSize ? 1 : kOutsideEq1) * prior.drift_common_sigma_rad_s;
-      sigma(i) = value_or(prior.drift_sigma_rad_s, name, common);
-    }
-    setup.prior[k].C_c_b = Rot<C, B<1>>::exp(Vec<C>::assume(prior.alignment_rotation_vector_rad)).raw();
-    sigma.template tail<3>() = prior.alignment_sigma_rad;
-    setup.prior_covariance.diagonal().template segment<Layout::kPerGyro>(Layout::drift(k)) = sigma.cwiseAbs2();
-  }
-}
-
-/// Values and covariance of an earlier calibration.
-template <class Estimator>
-void use_calibration(const Calibration& prior, typename Estimator::Setup& setup) {
-  using Model = typename Estimator::BaseModel;
-  const std::vector<std::string> names = state_names<Model>(Estimator::kGyros);
-  std::vector<Eigen::Index> rows;
-  for (const std::string& name : names) {
-    const auto found = std::find(prior.states.begin(), prior.states.end(), name);
-    if (found == prior.states.end()) {
-      throw SetupError(fmt::format("the earlier calibration has no covariance of '{}'", name),
-                       "use a calibration of this pair of gyros");
-    }
-    rows.push_back(found - prior.states.begin());
-  }
-  for (Eigen::Index i = 0; i < setup.prior_covariance.rows(); ++i) {
-    for (Eigen::Index j = 0; j < setup.prior_covariance.cols(); ++j) {
-      setup.prior_covariance(i, j) =
-          prior.covariance(rows[static_cast<std::size_t>(i)], rows[static_cast<std::size_t>(j)]);
-    }
-  }
-  for (int k = 0; k < Estimator::kGyros; ++k) {
-    const GyroCalibration& gyro = prior.gyros[static_cast<std::size_t>(k)];
-    if (!is_of_model<Model>(gyro)) {
-      throw SetupError(fmt::format("the earlier calibration of gyro {} is of drift model '{}', not {}", k + 1,
-                                   gyro.drift_model, Model::kModelName),
-                       "use a calibration made with the same drift model");
-    }
-    setup.prior[k] = to_model<Model>(gyro);
-  }
-}
 
 /// Whether any state is on that the smallest estimator of a pair does not have.
 [[nodiscard]] inline bool has_further_states(const CalibrationOptions& options) {
@@ -149,18 +69,16 @@ typename Estimator::Setup make_setup(const Pass& pass, const CalibrationOptions&
                     std::min<std::size_t>(settings.gyros.size(), static_cast<std::size_t>(pass.gyro.gyros))),
         "give telemetry of a pair");
   }
+  using Model = typename Estimator::BaseModel;
   typename Estimator::Setup setup;
-  use_settings<Estimator>(settings, setup);
-  if (settings.prior) {
-    if (settings.prior->gyros.size() != static_cast<std::size_t>(pass.gyro.gyros)) {
-      throw SetupError(fmt::format("the earlier calibration has {} gyros; the pass has {}",
-                                   settings.prior->gyros.size(), pass.gyro.gyros),
-                       "use a calibration of these gyros");
-    }
-    use_calibration<Estimator>(*settings.prior, setup);
-  }
+  const ParameterPrior prior = prior_of(settings, Estimator::kGyros, DriftFamily::of<Model>());
+  setup.prior_covariance = prior.covariance;
   for (int k = 0; k < Estimator::kGyros; ++k) {
-    setup.readout_noise_rad[k] = settings.gyros[static_cast<std::size_t>(k)].readout_noise_rad;
+    const auto index = static_cast<std::size_t>(k);
+    setup.prior[k].drift_rad_s.template head<Model::kSize>() = prior.gyros[index].drift_rad_s;
+    setup.prior[k].C_c_b = prior.gyros[index].C_c_b;
+    setup.prior[k].readout_bias = prior.gyros[index].readout_bias;
+    setup.readout_noise_rad[k] = settings.gyros[index].readout_noise_rad;
   }
   setup.star_tracker_noise_rad = options.star_tracker_noise_rad.value_or(settings.star_tracker_noise_rad);
   setup.direction_random_walk_rad_sqrt_s = options.direction_random_walk_rad_sqrt_s;

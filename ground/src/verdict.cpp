@@ -202,7 +202,7 @@ void judge_steadiness(const Pass& pass, const CalibrationRun& run, std::vector<F
     return;
   }
   const Eigen::Vector3d& axis = observability.weakest_axis_c;
-  const bool believes = run.options.estimator == "paper";
+  const bool believes = run.options.estimator == kPaper;
   add(findings, Severity::kDoNotUse, "weak-alignment-axis",
       fmt::format(
           "Steady flight: the axis ({:+.3f}, {:+.3f}, {:+.3f}) in c is fixed in the body and in space (the "

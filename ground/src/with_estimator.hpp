@@ -10,6 +10,9 @@
 
 namespace trihedron::ground {
 
+/// Whether a drift model is of the batch alone. It has a smaller one beside it on board.
+[[nodiscard]] inline bool is_for_whole_pass(const std::string& drift_model) { return drift_model.starts_with("vsh:"); }
+
 /// Calls `body` with the estimator as a type tag. Of what is built, the smallest that has what is asked for.
 template <class Body>
 auto with_estimator(const Pass& pass, const CalibrationOptions& options, Body&& body) {
@@ -17,14 +20,14 @@ auto with_estimator(const Pass& pass, const CalibrationOptions& options, Body&& 
     throw SetupError(fmt::format("there is no estimator '{}'", options.estimator),
                      fmt::format("use one of: {}", fmt::join(kEstimators, ", ")));
   }
+  const bool whole_pass = is_for_whole_pass(options.drift_model);
   const bool esg20 = options.drift_model == Esg20::kModelName;
-  if ((!esg20 && options.drift_model != Esg7::kModelName) ||
-      (esg20 && (options.estimator == "paper" || pass.gyro.gyros > 2))) {
+  if ((whole_pass && options.estimator != kBatch) || (esg20 && (options.estimator == kPaper || pass.gyro.gyros > 2))) {
     throw SetupError(fmt::format("estimator {} of {} gyros has no drift model '{}'", options.estimator, pass.gyro.gyros,
                                  options.drift_model),
-                     fmt::format("use one of: {}", fmt::join(kDriftModels, ", ")));
+                     fmt::format("use {}", kDriftModels));
   }
-  if (options.estimator == "paper") {
+  if (options.estimator == kPaper) {
     return body.template operator()<PaperEstimator<Esg7>>();
   }
   switch (pass.gyro.gyros) {
@@ -35,7 +38,7 @@ auto with_estimator(const Pass& pass, const CalibrationOptions& options, Body&& 
     default:
       break;
   }
-  if (esg20) {
+  if (esg20 || (whole_pass && !pass.settings.prior)) {
     return body.template operator()<InvariantEstimator<Esg20, 2, kAllFurtherStates>>();
   }
   const bool further = has_further_states(options) || !pass.further_star_trackers.empty();

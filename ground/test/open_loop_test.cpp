@@ -74,8 +74,10 @@ TEST(OpenLoop, RefusesWhatItCannotFly) {
   const Pass& pass = three_hours().pass;
   const std::vector<Time>& epochs = three_hours().truth.t;
   auto gyros = true_gyros(0);
-  gyros[1].drift_model = "vsh:3";
-  EXPECT_THROW(static_cast<void>(fly_open_loop(pass, epochs[0], gyros, epochs)), SetupError);
+  for (const char* model : {"vsh:3", "vsh:7", "", "vsh:", "vsh:2x"}) {
+    gyros[1].drift_model = model;
+    EXPECT_THROW(static_cast<void>(fly_open_loop(pass, epochs[0], gyros, epochs)), SetupError) << model;
+  }
   gyros.pop_back();
   EXPECT_THROW(static_cast<void>(fly_open_loop(pass, epochs[0], gyros, epochs)), SetupError);
 }

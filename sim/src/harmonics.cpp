@@ -1,37 +1,11 @@
 #include "trihedron/sim/harmonics.hpp"
 
 #include <algorithm>
-#include <numbers>
 #include <utility>
 
 namespace trihedron::sim {
-
-HarmonicTable::HarmonicTable(int max_degree) : max_degree_(max_degree) {
-  if (!(max_degree >= 0 && max_degree <= kMaxDegree)) {
-    throw std::invalid_argument("spherical harmonics: the degree must be 0 … 20");
-  }
-  diagonal_[0] = std::sqrt(0.25 / std::numbers::pi);
-  for (int m = 1; m <= max_degree; ++m) {
-    // The factor √2 of the sines and cosines against the zonal harmonics comes in once, at m = 1.
-    const double ratio = m == 1 ? 3.0 : (2.0 * m + 1) / (2.0 * m);
-    diagonal_[static_cast<std::size_t>(m)] = std::sqrt(ratio) * diagonal_[static_cast<std::size_t>(m) - 1];
-  }
-  for (int l = 1; l <= max_degree; ++l) {
-    for (int m = 0; m < l; ++m) {
-      const double ll = l;
-      const double mm = m;
-      const std::size_t i = index(l, m);
-      up_[i] = std::sqrt((4 * ll * ll - 1) / (ll * ll - mm * mm));
-      if (l > m + 1) {
-        const double k = ll - 1;
-        up_two_[i] = up_[i] * std::sqrt((k * k - mm * mm) / (4 * k * k - 1));
-      }
-      slope_[i] = m == 0 ? std::sqrt(ll * (ll + 1) / 2) : std::sqrt((ll - mm) * (ll + mm + 1));
-    }
-  }
-}
-
 namespace {
+
 int checked_max_degree(const std::vector<DriftHarmonic>& members) {
   int degree = 0;
   for (const DriftHarmonic& member : members) {
@@ -43,6 +17,7 @@ int checked_max_degree(const std::vector<DriftHarmonic>& members) {
   }
   return degree;
 }
+
 }  // namespace
 
 HarmonicField::HarmonicField(std::vector<DriftHarmonic> members)
@@ -69,11 +44,6 @@ std::vector<DriftHarmonic> members_outside_eq1() {
     }
   }
   return members;
-}
-
-std::string name(const DriftHarmonic& member) {
-  const char* potential = member.potential == DriftHarmonic::Potential::kW ? "W(" : "D(";
-  return potential + std::to_string(member.degree) + "," + std::to_string(member.order) + ")";
 }
 
 }  // namespace trihedron::sim

@@ -79,10 +79,13 @@ struct CalibrationRun {
 };
 
 /// What `CalibrationOptions::estimator` and `drift_model` may name.
+inline constexpr const char* kInvariant = "invariant";
+inline constexpr const char* kPaper = "paper";
 inline constexpr const char* kBatch = "batch";  ///< estimator invariant, and then least squares over the whole pass
-inline constexpr std::array<const char*, 3> kEstimators = {"invariant", "paper", kBatch};
+inline constexpr std::array<const char*, 3> kEstimators = {kInvariant, kPaper, kBatch};
 inline constexpr const char* kAutoDriftModel = "auto";
-inline constexpr std::array<const char*, 3> kDriftModels = {kAutoDriftModel, "esg7", "esg20"};
+inline constexpr const char* kDriftModels = "auto, esg7, esg20, or vsh:1 … vsh:6, which are for estimator batch";
+[[nodiscard]] bool is_drift_model(const std::string& name);
 
 /// Called now and then with the fraction done, 0 … 1.
 using Progress = std::function<void(double)>;

@@ -92,6 +92,12 @@ struct DriftHarmonic {
   double amplitude_rad_s = 0;
 };
 
+/// "W(2,-1)".
+[[nodiscard]] inline std::string name(const DriftHarmonic& member) {
+  const char* potential = member.potential == DriftHarmonic::Potential::kW ? "W(" : "D(";
+  return potential + std::to_string(member.degree) + "," + std::to_string(member.order) + ")";
+}
+
 /// How the momentum of a gyro precesses.
 struct DriftScenario {
   /// κ of eq. (1): k0, μ12, μ23, μ31, ν12, ν23, ν31. Without it drawn from the seed, normal, with `prior_sigma_rad_s`.

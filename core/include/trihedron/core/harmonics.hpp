@@ -1,0 +1,123 @@
+#pragma once
+/// Real spherical harmonics and their gradients.
+
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <numbers>
+
+#include "trihedron/core/assert.hpp"
+#include "trihedron/core/frames.hpp"
+
+namespace trihedron {
+
+/// A spherical harmonic and its gradient along the sphere.
+template <class S>
+struct HarmonicValue {
+  S value;
+  Vector3<S> gradient;
+};
+
+/// Real spherical harmonics, orthonormal over the unit sphere, without the Condon–Shortley phase:
+/// Y(l, m) = Q_lm(z) Re (x + iy)^m for m ≥ 0, Q_l|m|(z) Im (x + iy)^|m| for m < 0.
+/// As polynomials in x, y, z they and their gradients have no singularity at the poles.
+class HarmonicTable {
+ public:
+  static constexpr int kMaxDegree = 20;
+
+  /// Needs 0 ≤ max_degree ≤ 20.
+  explicit HarmonicTable(int max_degree) : max_degree_(max_degree) {
+    TRIHEDRON_ASSERT(max_degree >= 0 && max_degree <= kMaxDegree);
+    diagonal_[0] = std::sqrt(0.25 / std::numbers::pi);
+    for (int m = 1; m <= max_degree; ++m) {
+      // The factor √2 of the sines and cosines against the zonal harmonics comes in once, at m = 1.
+      const double ratio = m == 1 ? 3.0 : (2.0 * m + 1) / (2.0 * m);
+      diagonal_[static_cast<std::size_t>(m)] = std::sqrt(ratio) * diagonal_[static_cast<std::size_t>(m) - 1];
+    }
+    for (int l = 1; l <= max_degree; ++l) {
+      for (int m = 0; m < l; ++m) {
+        const double ll = l;
+        const double mm = m;
+        const std::size_t i = index(l, m);
+        up_[i] = std::sqrt((4 * ll * ll - 1) / (ll * ll - mm * mm));
+        if (l > m + 1) {
+          const double k = ll - 1;
+          up_two_[i] = up_[i] * std::sqrt((k * k - mm * mm) / (4 * k * k - 1));
+        }
+        slope_[i] = m == 0 ? std::sqrt(ll * (ll + 1) / 2) : std::sqrt((ll - mm) * (ll + mm + 1));
+      }
+    }
+  }
+
+  /// All harmonics at one direction h, unit.
+  template <class S>
+  class At {
+   public:
+    At(const HarmonicTable& table, const Vector3<S>& h) : table_(table), h_(h) {
+      const int degree = table.max_degree_;
+      re_[0] = S(1);
+      im_[0] = S(0);
+      for (std::size_t m = 1; m <= static_cast<std::size_t>(degree); ++m) {
+        re_[m] = h.x() * re_[m - 1] - h.y() * im_[m - 1];
+        im_[m] = h.x() * im_[m - 1] + h.y() * re_[m - 1];
+      }
+      // By degree, because the orders of one degree do not wait for each other.
+      for (int l = 0; l <= degree; ++l) {
+        for (int m = 0; m < l - 1; ++m) {
+          const std::size_t i = index(l, m);
+          q_[i] = S(table.up_[i]) * h.z() * q_[index(l - 1, m)] - S(table.up_two_[i]) * q_[index(l - 2, m)];
+        }
+        if (l > 0) {
+          q_[index(l, l - 1)] = S(table.up_[index(l, l - 1)]) * h.z() * q_[index(l - 1, l - 1)];
+        }
+        q_[index(l, l)] = S(table.diagonal_[static_cast<std::size_t>(l)]);
+      }
+    }
+
+    [[nodiscard]] HarmonicValue<S> operator()(int degree, int order) const {
+      const auto m = static_cast<std::size_t>(order < 0 ? -order : order);
+      const Vector3<S> slope = polynomial_gradient(degree, order);
+      return {q_[index(degree, static_cast<int>(m))] * (order < 0 ? im_[m] : re_[m]), slope - h_ * h_.dot(slope)};
+    }
+
+    /// Gradient of the polynomial in space; its part along h depends on how the polynomial is written and means
+    /// nothing.
+    [[nodiscard]] Vector3<S> polynomial_gradient(int degree, int order) const {
+      const int m = order < 0 ? -order : order;
+      const auto mu = static_cast<std::size_t>(m);
+      const S dq = m < degree ? S(table_.slope_[index(degree, m)]) * q_[index(degree, m + 1)] : S(0);
+      const S mq = S(m) * q_[index(degree, m)];
+      const S re_below = m > 0 ? re_[mu - 1] : S(0);
+      const S im_below = m > 0 ? im_[mu - 1] : S(0);
+      return order >= 0 ? Vector3<S>(mq * re_below, -mq * im_below, dq * re_[mu])
+                        : Vector3<S>(mq * im_below, mq * re_below, dq * im_[mu]);
+    }
+
+   private:
+    const HarmonicTable& table_;
+    Vector3<S> h_;
+    std::array<S, kMaxDegree + 1> re_;  ///< Re (x + iy)^m
+    std::array<S, kMaxDegree + 1> im_;
+    std::array<S, (kMaxDegree + 1) * (kMaxDegree + 2) / 2> q_;
+  };
+
+  template <class S>
+  [[nodiscard]] At<S> at(const Vector3<S>& h) const {
+    return At<S>(*this, h);
+  }
+
+ private:
+  [[nodiscard]] static constexpr std::size_t index(int degree, int order) {
+    const int number = degree * (degree + 1) / 2 + order;
+    return static_cast<std::size_t>(number);
+  }
+
+  static constexpr std::size_t kSize = (kMaxDegree + 1) * (kMaxDegree + 2) / 2;
+  int max_degree_;
+  std::array<double, kMaxDegree + 1> diagonal_{};  ///< Q_mm, a constant
+  std::array<double, kSize> up_{};                 ///< Q_lm = up z Q_(l−1)m − up_two Q_(l−2)m
+  std::array<double, kSize> up_two_{};
+  std::array<double, kSize> slope_{};  ///< dQ_lm/dz = slope Q_l(m+1)
+};
+
+}  // namespace trihedron
