@@ -337,7 +337,7 @@ CalibrationRun calibrate_with(const Pass& pass, Decision decision, const Progres
   run.calibration.statistics = statistics_of(run.fixes);
   run.calibration.statistics["angle_looks"] = angle_looks;
   if (batch) {
-    refine(screened, pass_setup<Estimator>(cycle->estimator().setup(), pass, run.options), run);
+    refine(screened, pass_setup<Estimator>(cycle->estimator().setup(), pass, run.options), decision.forecasts, run);
   }
   run.calibration.verdict = judge(pass, run);
   return run;

@@ -8,6 +8,7 @@
 #include <cmath>
 #include <functional>
 #include <future>
+#include <limits>
 #include <map>
 #include <numbers>
 #include <optional>
@@ -41,11 +42,31 @@ double log_evidence(const Eigen::VectorXd& estimate, const Eigen::MatrixXd& root
   return white.squaredNorm() / 2 + covariance.matrixLLT().diagonal().array().log().sum();
 }
 
+/// From the smallest on, those that a model contains and that are tried.
+std::vector<std::string> models_up_to(const std::string& model) {
+  std::vector<std::string> models{Esg7::kModelName};
+  for (int degree = 1; is_for_whole_pass(model) && models.back() != model; ++degree) {
+    models.push_back(fmt::format("vsh:{}", degree));
+  }
+  if (models.back() != model) {
+    models.push_back(model);
+  }
+  return models;
+}
+
+/// Over four minutes even a random walk of 1e-7 rad/√s stays below what the fixes of them show: nothing is lost for
+/// decisions, which are then several times as quick.
+PassSetup with_long_arcs(PassSetup setup) {
+  setup.arc = std::chrono::minutes(4);
+  return setup;
+}
+
 /// The whole pass with one choice of states.
 class Trial {
  public:
   Trial(const Pass& pass, const Screened& screened, const CalibrationOptions& options)
-      : problem_(screened.pass, setup_of(pass, options)),
+      : drift_model_(options.drift_model),
+        problem_(screened.pass, with_long_arcs(setup_of(pass, options))),
         found_(most_likely(problem_, first_solution(problem_, screened))) {}
 
   /// Again, with other noise.
@@ -75,23 +96,9 @@ class Trial {
     return log_evidence(estimate, found_.errors.last_root.middleRows(layout().bias(0), size),
                         Eigen::VectorXd::Constant(size, problem_.setup().readout_bias_sigma));
   }
-  /// Of all gyros' coefficients that eq. (1) does not have.
-  [[nodiscard]] double drift_outside() const {
-    const Eigen::Index members = layout().drift_size - Esg7::kSize;
-    const Eigen::Index size = layout().gyros * members;
-    Eigen::VectorXd estimate(size);
-    Eigen::VectorXd sigma(size);
-    Eigen::MatrixXd root(size, layout().size());
-    for (int k = 0; k < layout().gyros; ++k) {
-      estimate.segment(k * members, members) = gyro(k).drift_rad_s.tail(members);
-      root.middleRows(k * members, members) =
-          found_.errors.last_root.middleRows(layout().drift(k) + Esg7::kSize, members);
-      sigma.segment(k * members, members) = problem_.setup()
-                                                .prior.covariance.diagonal()
-                                                .segment(layout().drift(k) - layout().drift(0) + Esg7::kSize, members)
-                                                .cwiseSqrt();
-    }
-    return log_evidence(estimate, root, sigma);
+  /// Of its drift model and those that it contains.
+  [[nodiscard]] std::vector<Forecast> forecasts() const {
+    return ground::forecasts(problem_, found_, models_up_to(drift_model_));
   }
 
   /// How the difference of the first star tracker from the gyros changes from fix to fix, about c x, y, z: all that is
@@ -128,6 +135,7 @@ class Trial {
                         found_.errors.last_root.middleRows(state, size), Eigen::VectorXd::Constant(size, prior_sigma));
   }
 
+  std::string drift_model_;
   PassProblem problem_;
   BatchResult found_;
 };
@@ -338,6 +346,17 @@ void refuse_prior_of_others(const Pass& pass, const CalibrationOptions& asked) {
   }
 }
 
+/// The smallest than which none is strongly more likely; none of none.
+const Forecast* best_of(const std::vector<Forecast>& forecasts) {
+  double most = -std::numeric_limits<double>::infinity();
+  const Forecast* best = nullptr;
+  for (auto forecast = forecasts.rbegin(); forecast != forecasts.rend(); ++forecast) {
+    most = std::max(most, forecast->log_likelihood);
+    best = forecast->log_likelihood >= most - kStrong ? &*forecast : best;
+  }
+  return best;
+}
+
 /// Turns the choices that are left open, and the drift model, by what a trial with everything shows.
 void settle_states(const Trial& everything, const CalibrationOptions& asked, Decision& decision) {
   decision.evidence.clear();
@@ -354,19 +373,22 @@ void settle_states(const Trial& everything, const CalibrationOptions& asked, Dec
   choose(&FurtherStateOptions::clock_offset, "clock_offset", &Trial::clock_offset);
   choose(&FurtherStateOptions::orbital_error, "orbital_error", &Trial::orbital_error);
   choose(&FurtherStateOptions::readout_bias, "readout_bias", &Trial::readout_bias);
+  decision.forecasts = everything.forecasts();
   if (asked.drift_model == kAutoDriftModel) {
-    const bool outside = settle("drift_outside_eq1", everything.drift_outside());
-    decision.options.drift_model = outside ? Esg20::kModelName : Esg7::kModelName;
+    const Forecast* best = best_of(decision.forecasts);
+    settle("drift_outside_eq1", best == nullptr ? 0 : best->log_likelihood - decision.forecasts.front().log_likelihood);
+    decision.options.drift_model = best == nullptr ? Esg7::kModelName : best->drift_model;
   }
 }
 
-/// Everything on that is on or may be.
-CalibrationOptions with_everything(CalibrationOptions options, const CalibrationOptions& asked) {
+/// Everything on that is on or may be, and the largest drift model.
+CalibrationOptions with_everything(CalibrationOptions options, const CalibrationOptions& asked,
+                                   const std::string& largest_model) {
   for (const auto choice :
        {&FurtherStateOptions::clock_offset, &FurtherStateOptions::orbital_error, &FurtherStateOptions::readout_bias}) {
     options.further_states.*choice = asked.further_states.*choice == Choice::kOff ? Choice::kOff : Choice::kOn;
   }
-  options.drift_model = asked.drift_model == kAutoDriftModel ? Esg20::kModelName : asked.drift_model;
+  options.drift_model = largest_model;
   return options;
 }
 
@@ -392,9 +414,9 @@ CalibrationOptions wandering_like(const Likely& walking, CalibrationOptions opti
 /// Where the noise is more than was told the states were settled by one that is too small: again, by what it is when
 /// they are all free, and whether it wanders.
 void decide_beside_noise(const Pass& pass, const Screened& screened, const CalibrationOptions& asked,
-                         bool wandering_is_open, Decision& decision) {
+                         const std::string& largest_model, bool wandering_is_open, Decision& decision) {
   CalibrationOptions& options = decision.options;
-  const CalibrationOptions free = with_everything(options, asked);
+  const CalibrationOptions free = with_everything(options, asked, largest_model);
   Trial everything(pass, screened, free);
   const Likely walking = with_most_likely_walk(everything, free);
   std::optional<Evidence> wandering;
@@ -455,6 +477,56 @@ void find_noise(const Pass& pass, CalibrationOptions& options) {
   use_walk(with_most_likely_walk(trial, options).noise, options);
 }
 
+/// By what the pass itself shows.
+Decision decide_by_pass(const Pass& pass, const Screened& screened, const CalibrationOptions& asked,
+                        const std::string& largest_model) {
+  Decision decision{asked, {}, {}};
+  CalibrationOptions& options = decision.options;
+  const bool wandering_is_open = options.further_states.wandering_drift == Choice::kAuto;
+  if (wandering_is_open) {
+    options.further_states.wandering_drift = Choice::kOff;
+  }
+  Trial everything(pass, screened, with_everything(options, asked, largest_model));
+  const std::vector<Eigen::Vector3d> changes = everything.changes_rad();
+  options.find_noise = asked.find_noise && changes.size() >= kEnough;
+  if (!options.find_noise) {
+    settle_states(everything, asked, decision);
+    return decision;
+  }
+  options.star_tracker_noise_rad = other_star_tracker_noise(pass, changes);
+  if (options.star_tracker_noise_rad) {
+    everything = Trial(pass, screened, with_everything(options, asked, largest_model));
+  }
+  settle_states(everything, asked, decision);
+  Trial decided(pass, screened, options);
+  const Likely walking = with_most_likely_walk(decided, options);
+  if (walking.gain > kStrong) {
+    decide_beside_noise(pass, screened, asked, largest_model, wandering_is_open, decision);
+  } else {
+    use_walk(walking.noise, options);
+  }
+  return decision;
+}
+
+/// The largest drift model that is tried at first.
+std::string largest_to_compare(const CalibrationOptions& asked) {
+  const bool fixed = asked.drift_model != kAutoDriftModel;
+  if (asked.estimator != kBatch || asked.drift_model == Esg20::kModelName) {
+    return fixed ? asked.drift_model : Esg20::kModelName;
+  }
+  return is_for_whole_pass(asked.drift_model) ? std::max(asked.drift_model, std::string("vsh:3")) : "vsh:3";
+}
+
+/// By one degree, where there is one.
+std::optional<std::string> larger_model(const std::string& model) {
+  if (!is_for_whole_pass(model)) {
+    return std::nullopt;
+  }
+  std::string larger = model;
+  ++larger.back();
+  return DriftFamily::named(larger) ? std::optional(larger) : std::nullopt;
+}
+
 }  // namespace
 
 Decision decide(const Pass& pass, const CalibrationOptions& asked_for) {
@@ -466,7 +538,7 @@ Decision decide(const Pass& pass, const CalibrationOptions& asked_for) {
     asked.estimator = kBatch;
   }
   refuse_prior_of_others(pass, asked);
-  Decision decision{asked, {}};
+  Decision decision{asked, {}, {}};
   CalibrationOptions& options = decision.options;
   options.find_noise = false;
   const bool invariant = asked.estimator != kPaper;
@@ -489,14 +561,11 @@ Decision decide(const Pass& pass, const CalibrationOptions& asked_for) {
     options = as_before(options, *prior);
     return decision;
   }
-  const bool wandering_is_open = options.further_states.wandering_drift == Choice::kAuto;
-  if (wandering_is_open) {
-    options.further_states.wandering_drift = Choice::kOff;
-  }
   const FurtherStateOptions& states = asked.further_states;
   const bool states_are_settled = asked.drift_model != kAutoDriftModel && states.clock_offset != Choice::kAuto &&
                                   states.orbital_error != Choice::kAuto && states.readout_bias != Choice::kAuto;
   if (states_are_settled && !asked.find_noise) {
+    leave_out_what_is_open(options);
     return decision;
   }
   const Screened screened = screen(pass, options);
@@ -504,26 +573,15 @@ Decision decide(const Pass& pass, const CalibrationOptions& asked_for) {
     leave_out_what_is_open(options);
     return decision;
   }
-  Trial everything(pass, screened, with_everything(options, asked));
-  const std::vector<Eigen::Vector3d> changes = everything.changes_rad();
-  options.find_noise = asked.find_noise && changes.size() >= kEnough;
-  if (!options.find_noise) {
-    settle_states(everything, asked, decision);
-    return decision;
+  std::string largest_model = largest_to_compare(asked);
+  for (;;) {
+    Decision decided = decide_by_pass(pass, screened, asked, largest_model);
+    const std::optional<std::string> larger = larger_model(largest_model);
+    if (!larger || best_of(decided.forecasts) != &decided.forecasts.back()) {
+      return decided;
+    }
+    largest_model = *larger;
   }
-  options.star_tracker_noise_rad = other_star_tracker_noise(pass, changes);
-  if (options.star_tracker_noise_rad) {
-    everything = Trial(pass, screened, with_everything(options, asked));
-  }
-  settle_states(everything, asked, decision);
-  Trial decided(pass, screened, options);
-  const Likely walking = with_most_likely_walk(decided, options);
-  if (walking.gain > kStrong) {
-    decide_beside_noise(pass, screened, asked, wandering_is_open, decision);
-  } else {
-    use_walk(walking.noise, options);
-  }
-  return decision;
 }
 
 }  // namespace trihedron::ground

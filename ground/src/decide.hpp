@@ -3,6 +3,7 @@
 
 #include <vector>
 
+#include "forecast.hpp"
 #include "trihedron/ground/calibrate.hpp"
 
 namespace trihedron::ground {
@@ -10,7 +11,8 @@ namespace trihedron::ground {
 /// The options with nothing left to decide, `find_noise` saying whether it was found; and on what evidence.
 struct Decision {
   CalibrationOptions options;
-  std::vector<Evidence> evidence;  ///< empty where nothing was to be decided
+  std::vector<Evidence> evidence;   ///< empty where nothing was to be decided
+  std::vector<Forecast> forecasts;  ///< of the drift models that were compared
 };
 
 /// Settles each choice that is left to the program. Estimator paper, and passes of more than two gyros, have no further

@@ -87,10 +87,13 @@ class Forward {
     return {moved.topLeftCorner(d, d), moved.block(0, d, d, n_), moved.topRightCorner(d, 1)};
   }
 
-  /// Triangle of (d, c), right side last.
-  [[nodiscard]] const MatrixXd& moving() const { return moving_; }
-  /// Triangle of what is known of c alone, whatever d is; right side last.
-  [[nodiscard]] MatrixXd of_constants() const { return pile_.triangle(); }
+  /// Of (d, c), right side last; the rows of c know of it whatever d is.
+  [[nodiscard]] MatrixXd triangle() const {
+    MatrixXd triangle = MatrixXd::Zero(n_ + 1, n_ + 1);
+    triangle.topRows(d_) = moving_;
+    triangle.bottomRightCorner(n_ - d_ + 1, n_ - d_ + 1) = pile_.triangle();
+    return triangle;
+  }
 
  private:
   Index n_;
@@ -126,11 +129,9 @@ SmootherResult smooth(const MatrixXd& prior, const VectorXd& prior_y, const std:
     result.log_root_determinant +=
         log_determinant(result.steps.back().R) - std::log(std::abs(stages[i].A_inverse.determinant()));
   }
-  const MatrixXd constant = forward.of_constants();
-  result.residual_square = constant(c, c) * constant(c, c);
-  MatrixXd root = MatrixXd::Zero(n, n + 1);
-  root.topRows(d) = forward.moving();
-  root.bottomRightCorner(c, c + 1) = constant.topRows(c);
+  const MatrixXd triangle = forward.triangle();
+  result.residual_square = triangle(n, n) * triangle(n, n);
+  const auto root = triangle.topRows(n);
   if (!((root.diagonal().array().abs() > 0).all() && root.allFinite())) {
     throw std::invalid_argument("smoother: a state without any information");
   }
@@ -153,12 +154,10 @@ SmootherResult smooth(const MatrixXd& prior, const VectorXd& prior_y, const std:
   return result;
 }
 
-std::vector<MatrixXd> information_on_constants(const MatrixXd& prior, const std::vector<SmootherStage>& stages,
-                                               const std::vector<std::size_t>& after) {
-  const Index d = stages.front().m.size();
-  const Index c = prior.cols() - d;
-  Forward forward(prior, VectorXd::Zero(prior.rows()), d);
-  std::vector<MatrixXd> roots;
+std::vector<MatrixXd> triangles_after(const MatrixXd& prior, const VectorXd& prior_y,
+                                      const std::vector<SmootherStage>& stages, const std::vector<std::size_t>& after) {
+  Forward forward(prior, prior_y, stages.front().m.size());
+  std::vector<MatrixXd> triangles;
   std::size_t i = 0;
   for (const std::size_t last : after) {
     for (; i <= last; ++i) {
@@ -167,7 +166,18 @@ std::vector<MatrixXd> information_on_constants(const MatrixXd& prior, const std:
       }
       forward.measure(stages[i]);
     }
-    roots.emplace_back(forward.of_constants().topLeftCorner(c, c));
+    triangles.push_back(forward.triangle());
+  }
+  return triangles;
+}
+
+std::vector<MatrixXd> information_on_constants(const MatrixXd& prior, const std::vector<SmootherStage>& stages,
+                                               const std::vector<std::size_t>& after) {
+  const Index d = stages.front().m.size();
+  const Index c = prior.cols() - d;
+  std::vector<MatrixXd> roots;
+  for (const MatrixXd& triangle : triangles_after(prior, VectorXd::Zero(prior.rows()), stages, after)) {
+    roots.emplace_back(triangle.block(d, d, c, c));
   }
   return roots;
 }

@@ -38,6 +38,12 @@ struct SmootherResult {
 [[nodiscard]] SmootherResult smooth(const Eigen::MatrixXd& prior, const Eigen::VectorXd& prior_y,
                                     const std::vector<SmootherStage>& stages);
 
+/// Triangles of what prior and measurements up to the end of each stage of `after` (increasing) know of its states,
+/// right side last; what no states explain is in the corner.
+[[nodiscard]] std::vector<Eigen::MatrixXd> triangles_after(const Eigen::MatrixXd& prior, const Eigen::VectorXd& prior_y,
+                                                           const std::vector<SmootherStage>& stages,
+                                                           const std::vector<std::size_t>& after);
+
 /// Triangular roots of the information on the constants by the measurements up to the end of each stage of `after`
 /// (increasing), whatever the states that move are. `prior`: rows of what is known of these before, unit noise.
 [[nodiscard]] std::vector<Eigen::MatrixXd> information_on_constants(const Eigen::MatrixXd& prior,

@@ -21,8 +21,6 @@ using Eigen::VectorXd;
 
 /// Samples are taken so far apart: the body turns little between them, and their noise is averaged in the end.
 constexpr Duration kSampleStep = std::chrono::seconds(1);
-/// Process noise comes in so often, and after a gap.
-constexpr Duration kArc = std::chrono::seconds(60);
 using OnBoard = Cycle<InvariantEstimator<Esg7, 2>>;
 /// 1-sigma of a direction of which nothing is known.
 constexpr double kUnknown_rad = 1;
@@ -92,7 +90,7 @@ PassProblem::PassProblem(const ScreenedPass& pass, PassSetup setup)
   }
   add_fixes_until(Time::max());
   for (std::size_t i = 0; i < nodes_.size(); ++i) {
-    if (arcs_.empty() || nodes_[i].after_gap || nodes_[i].t - nodes_[arcs_.back().begin].t >= kArc) {
+    if (arcs_.empty() || nodes_[i].after_gap || nodes_[i].t - nodes_[arcs_.back().begin].t >= setup_.arc) {
       arcs_.push_back({i, i});
     }
     arcs_.back().end = i + 1;
@@ -483,6 +481,17 @@ PassProblem::Linear PassProblem::linearise(const PassSolution& solution) const {
   return linear;
 }
 
+GyroParameters PassProblem::corrected(GyroParameters parameters, int gyro, const VectorXd& x) const {
+  const PassLayout& layout = setup_.layout;
+  parameters.drift_rad_s += x.segment(layout.drift(gyro), layout.drift_size);
+  const Matrix3d turn = Rot<C, C>::exp(Vec<C>::assume(Vector3d(x.segment<3>(layout.alignment(gyro))))).raw();
+  parameters.C_c_b = Eigen::Quaterniond(turn * parameters.C_c_b).normalized().toRotationMatrix();
+  if (layout.readout_bias) {
+    parameters.readout_bias += x.segment<3>(layout.bias(gyro));
+  }
+  return parameters;
+}
+
 void PassProblem::correct(const SmootherResult& found, PassSolution& solution) const {
   const PassLayout& layout = setup_.layout;
   for (std::size_t arc = 0; arc < arcs_.size(); ++arc) {
@@ -499,12 +508,7 @@ void PassProblem::correct(const SmootherResult& found, PassSolution& solution) c
   const VectorXd& x = found.x.back();
   for (int k = 0; k < gyros_; ++k) {
     GyroParameters& gyro = solution.gyros[static_cast<std::size_t>(k)];
-    gyro.drift_rad_s += x.segment(layout.drift(k), layout.drift_size);
-    gyro.C_c_b = (Rot<C, C>::exp(Vec<C>::assume(Vector3d(x.segment<3>(layout.alignment(k))))).raw() * gyro.C_c_b);
-    gyro.C_c_b = Eigen::Quaterniond(gyro.C_c_b).normalized().toRotationMatrix();
-    if (layout.readout_bias) {
-      gyro.readout_bias += x.segment<3>(layout.bias(k));
-    }
+    gyro = corrected(gyro, k, x);
   }
   solution.shared += x.tail(solution.shared.size());
 }

@@ -3,6 +3,7 @@
 /// noise the directions and the wandering drift all along.
 
 #include <Eigen/Core>
+#include <chrono>
 #include <functional>
 #include <optional>
 #include <vector>
@@ -61,6 +62,8 @@ struct PassSetup {
   Time orbital_phase_zero{};
   ProcessNoise noise;
   double gate_nis = 30;  ///< of a pair; above it a fix counts less
+  /// Process noise comes in so often, and after a gap.
+  Duration arc = std::chrono::seconds(60);
 };
 
 /// Estimates of everything; momenta and wandering drift at the beginning of each arc.
@@ -115,6 +118,10 @@ class PassProblem {
   /// The same with other process noise than that of the setup.
   void put_noise(const PassSolution& solution, const ProcessNoise& noise, Linear& linear) const;
 
+  [[nodiscard]] Time begin_of(std::size_t arc) const { return nodes_[arcs_[arc].begin].t; }
+
+  /// What is known of a gyro, with its part of truth − solution added.
+  [[nodiscard]] GyroParameters corrected(GyroParameters parameters, int gyro, const Eigen::VectorXd& x) const;
   /// Adds what smooth() found.
   void correct(const SmootherResult& found, PassSolution& solution) const;
 

@@ -91,6 +91,17 @@ GyroParameters parameters_of(const GyroCalibration& gyro, const DriftFamily& fam
   return parameters;
 }
 
+GyroCalibration record_of(const GyroParameters& parameters, const std::string& drift_model, const DriftFamily& family) {
+  GyroCalibration record;
+  record.drift_model = drift_model;
+  for (int i = 0; i < family.size(); ++i) {
+    record.drift_rad_s.emplace_back(family.names()[static_cast<std::size_t>(i)], parameters.drift_rad_s(i));
+  }
+  record.alignment_rotation_vector_rad = Rot<C, B<1>>::assume(parameters.C_c_b).log().raw();
+  record.readout_bias = parameters.readout_bias;
+  return record;
+}
+
 std::vector<std::string> state_names(const DriftFamily& family, int gyros) {
   std::vector<std::string> names;
   for (int k = 1; k <= gyros; ++k) {

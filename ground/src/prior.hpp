@@ -25,6 +25,10 @@ struct GyroParameters {
 /// As the record has them; coefficients that it does not have are zero.
 [[nodiscard]] GyroParameters parameters_of(const GyroCalibration& gyro, const DriftFamily& family);
 
+/// Without a momentum.
+[[nodiscard]] GyroCalibration record_of(const GyroParameters& parameters, const std::string& drift_model,
+                                        const DriftFamily& family);
+
 struct ParameterPrior {
   std::vector<GyroParameters> gyros;  ///< means
   Eigen::MatrixXd covariance;         ///< of κ and δ, gyro by gyro

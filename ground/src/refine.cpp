@@ -88,8 +88,10 @@ class SmoothReadings {
   const std::vector<double>& noise_rad_;
 };
 
-AttitudeHistory smoothed_attitude(const ScreenedPass& screened, const PassProblem& problem, const BatchResult& result) {
-  AttitudeHistory history;
+SmoothedCourse smoothed_course(const ScreenedPass& screened, const PassProblem& problem, const BatchResult& result) {
+  SmoothedCourse course;
+  course.readings.gyros = screened.gyros;
+  AttitudeHistory& history = course.attitude;
   const std::vector<MatrixXd> roots = covariance_roots(result.errors, result.linear.stages);
   const SmoothReadings readings(screened, problem.setup().readout_noise_rad);
   problem.go_along(result.solution, [&](const PassProblem::Moment& moment) {
@@ -112,8 +114,14 @@ AttitudeHistory smoothed_attitude(const ScreenedPass& screened, const PassProble
     history.t.push_back(moment.t);
     history.q_in_c.push_back(attitude.value().C_in_c.quaternion());
     history.sigma_rad.emplace_back(covariance_rad2.diagonal().cwiseSqrt());
+    course.readings.t.push_back(moment.t);
+    for (int k = 0; k < screened.gyros; ++k) {
+      const Vector3d h_b = result.solution.gyros[static_cast<std::size_t>(k)].C_c_b.transpose() *
+                           (attitude.value().C_in_c.raw().transpose() * moment.h_in[k]);
+      course.readings.h.insert(course.readings.h.end(), h_b.begin(), h_b.end());
+    }
   });
-  return history;
+  return course;
 }
 
 /// Columns of `to` in place of those of `from`. What was not estimated along the pass is not a number there, with the
@@ -187,7 +195,8 @@ std::vector<std::string> further_names(const FurtherStateOptions& states, int fu
   return names;
 }
 
-void refine(const ScreenedPass& screened, const PassSetup& setup, CalibrationRun& run) {
+void refine(const ScreenedPass& screened, const PassSetup& setup, const std::vector<Forecast>& forecasts,
+            CalibrationRun& run) {
   if (screened.clock_set_back) {
     throw SetupError("the clock of the telemetry was set back within the pass: how its parts lie in time is unknown",
                      "calibrate the parts apart, or use estimator invariant");
@@ -213,13 +222,7 @@ void refine(const ScreenedPass& screened, const PassSetup& setup, CalibrationRun
     const auto index = static_cast<std::size_t>(k);
     const GyroParameters& found = result.solution.gyros[index];
     GyroCalibration& gyro = calibration.gyros[index];
-    gyro.drift_model = run.options.drift_model;
-    gyro.drift_rad_s.clear();
-    for (int i = 0; i < layout.drift_size; ++i) {
-      gyro.drift_rad_s.emplace_back(setup.family.names()[static_cast<std::size_t>(i)], found.drift_rad_s(i));
-    }
-    gyro.alignment_rotation_vector_rad = Rot<C, B<1>>::assume(found.C_c_b).log().raw();
-    gyro.readout_bias = found.readout_bias;
+    gyro = record_of(found, run.options.drift_model, setup.family);
     gyro.momentum_in = last_h_in[k];
   }
   calibration.estimator = kBatch;
@@ -230,7 +233,9 @@ void refine(const ScreenedPass& screened, const PassSetup& setup, CalibrationRun
       further_of(setup, result, further_names(run.options.further_states, layout.further_heads, layout.gyros));
   calibration.statistics["batch_iterations"] = result.iterations;
   calibration.statistics["batch_converged"] = result.converged ? 1 : 0;
-  run.attitude = smoothed_attitude(screened, problem, result);
+  SmoothedCourse course = smoothed_course(screened, problem, result);
+  run.drift_models = flown(forecasts, course);
+  run.attitude = std::move(course.attitude);
 }
 
 }  // namespace trihedron::ground

@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "forecast.hpp"
 #include "pass_problem.hpp"
 #include "setup.hpp"
 
@@ -65,7 +66,8 @@ template <class Estimator>
 }
 
 /// Puts the most likely values and their covariance in place of those of `run`, which was made on board beside
-/// `screened`, and the smoothed attitude in place of that of the filter. Throws SetupError.
-void refine(const ScreenedPass& screened, const PassSetup& setup, CalibrationRun& run);
+/// `screened`, the smoothed attitude in place of that of the filter, and flies the forecasts. Throws SetupError.
+void refine(const ScreenedPass& screened, const PassSetup& setup, const std::vector<Forecast>& forecasts,
+            CalibrationRun& run);
 
 }  // namespace trihedron::ground

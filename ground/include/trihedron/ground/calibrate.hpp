@@ -62,10 +62,19 @@ struct Evidence {
   bool accepted = false;
 };
 
+/// A drift model, fitted to the beginning of the pass and judged by what comes next. Of estimator batch.
+struct DriftModelForecast {
+  std::string drift_model;
+  int coefficients = 0;          ///< of each gyro
+  double log_likelihood = 0;     ///< of the rest of the pass, part by part; above that of the smallest model
+  double open_loop_rms_rad = 0;  ///< attitude error, flown open loop over the next part
+};
+
 struct CalibrationRun {
-  CalibrationOptions options;      ///< as decided
-  std::vector<Evidence> evidence;  ///< of what was left to the program to decide
-  Calibration calibration;         ///< with verdict and statistics
+  CalibrationOptions options;                    ///< as decided
+  std::vector<Evidence> evidence;                ///< of what was left to the program to decide
+  std::vector<DriftModelForecast> drift_models;  ///< that were compared, smallest first
+  Calibration calibration;                       ///< with verdict and statistics
   std::vector<FixRecord> fixes;
   ParameterHistory parameters;
   std::vector<Correction> corrections;  ///< at the first used fix, and then every 90 min
