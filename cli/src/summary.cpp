@@ -157,6 +157,12 @@ std::string calibration_text(const ground::CalibrationRun& run, const std::optio
                    &evidence == run.evidence.data() ? "\nEvidence\n" : "", evidence.states, evidence.log_bayes_factor,
                    evidence.accepted ? "estimated" : "taken as zero");
   }
+  for (const ground::DriftModelForecast& model : run.drift_models) {
+    fmt::format_to(out, "{}  {:<8} {:>4} coefficients, forecast error {:>9}, ln likelihood {:>+10.1f}{}\n",
+                   &model == run.drift_models.data() ? "\nDrift models, by forecasts of the rest of the pass\n" : "",
+                   model.drift_model, model.coefficients, angle_text(model.open_loop_rms_rad), model.log_likelihood,
+                   model.drift_model == calibration.gyros[0].drift_model ? ", used" : "");
+  }
   text += "\nFixes      ";
   for (const auto& [name, count] : run.fix_counts) {
     fmt::format_to(out, " {} {};", count, name);
@@ -319,7 +325,21 @@ nlohmann::ordered_json course_json(const ground::CalibrationRun& run, const Cour
   for (const ground::OpenLoops& loops : course.open_loops) {
     pairs.push_back(loops.intervals);
   }
-  return {{"convergence",
+  nlohmann::ordered_json models = nlohmann::ordered_json::array();
+  for (const ground::DriftModelForecast& model : run.drift_models) {
+    models.push_back({{"drift_model", model.drift_model},
+                      {"coefficients", model.coefficients},
+                      {"log_likelihood", model.log_likelihood},
+                      {"open_loop_rms_rad", model.open_loop_rms_rad}});
+  }
+  nlohmann::ordered_json evidence = nlohmann::ordered_json::array();
+  for (const ground::Evidence& its : run.evidence) {
+    evidence.push_back(
+        {{"states", its.states}, {"log_bayes_factor", its.log_bayes_factor}, {"accepted", its.accepted}});
+  }
+  return {{"evidence", evidence},
+          {"drift_models", models},
+          {"convergence",
            {{"alignment_s", seconds(ground::settled(run, course.convergence, true))},
             {"drift_s", seconds(ground::settled(run, course.convergence, false))},
             {"states", states}}},

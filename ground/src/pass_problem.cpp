@@ -19,8 +19,6 @@ using Eigen::MatrixXd;
 using Eigen::Vector3d;
 using Eigen::VectorXd;
 
-/// Samples are taken so far apart: the body turns little between them, and their noise is averaged in the end.
-constexpr Duration kSampleStep = std::chrono::seconds(1);
 using OnBoard = Cycle<InvariantEstimator<Esg7, 2>>;
 /// 1-sigma of a direction of which nothing is known.
 constexpr double kUnknown_rad = 1;
@@ -83,7 +81,7 @@ PassProblem::PassProblem(const ScreenedPass& pass, PassSetup setup)
     add_fixes_until(sample.t - Duration{1});  // on its own time after it
     after_gap = after_gap || sample.t - before > OnBoard::kMaxInterpolation;
     before = sample.t;
-    if (after_gap || sample.t - taken >= kSampleStep) {
+    if (after_gap || sample.t - taken >= setup_.sample_step) {
       nodes_.push_back({sample.t, sample.h_b, sample.used, nullptr, std::exchange(after_gap, false)});
       taken = sample.t;
     }

@@ -384,6 +384,27 @@ const FIGURES = {
     return { traces, layout };
   },
 
+  drift_models(data, look) {
+    const { colour } = look;
+    const models = data.drift_models;
+    const layout = baseLayout(look, 300);
+    const x = models.map((m) => m.coefficients);
+    layout.xaxis = { ...axisStyle(colour), title: axisTitle("coefficients of each gyro", 8), tickvals: x, ticktext: models.map((m) => `${m.coefficients}<br>${m.name}`) };
+    layout.yaxis = { ...axisStyle(colour), title: axisTitle("forecast error, ″", 6), rangemode: "tozero" };
+    layout.margin = { ...layout.margin, b: 66 };
+    const hovertemplate = "%{customdata[0]}: %{y:.3~g}″, ln likelihood %{customdata[1]:+.1f}<extra></extra>";
+    const marker = (used) => ({ size: used ? 13 : 8, color: used ? colour.vermillion : colour.blue });
+    const traces = [
+      { ...line(x, models.map((m) => m.error), panel(0), { line: { color: colour.blue } }), hoverinfo: "skip" },
+      ...[false, true].map((used) => {
+        const own = models.filter((m) => m.used === used);
+        return { x: own.map((m) => m.coefficients), y: own.map((m) => m.error), mode: "markers", marker: marker(used), name: used ? "used" : "compared",
+          showlegend: own.length > 0, customdata: own.map((m) => [m.name, m.gain]), hovertemplate };
+      }),
+    ];
+    return { traces, layout };
+  },
+
   correlation(data, look) {
     const { colour } = look;
     const { names, values } = data.correlation;

@@ -51,6 +51,7 @@ class Figures {
     put("innovations", innovations());
     put("histogram", histogram());
     put("nis", nis());
+    put("drift_models", drift_models());
     put("correlation", correlation());
     put("tracks", tracks());
     put("angle", angle());
@@ -233,6 +234,18 @@ class Figures {
     figure["mean_low"] = boost::math::quantile(sum, 0.025) / static_cast<double>(window);
     figure["mean_high"] = boost::math::quantile(sum, 0.975) / static_cast<double>(window);
     return figure;
+  }
+
+  [[nodiscard]] json drift_models() const {
+    json models = json::array();
+    for (const ground::DriftModelForecast& model : run_.drift_models) {
+      models.push_back({{"name", model.drift_model},
+                        {"coefficients", model.coefficients},
+                        {"gain", std::round(model.log_likelihood * 10) / 10},
+                        {"error", rounded(model.open_loop_rms_rad / kArcsecond_rad, 3)},
+                        {"used", model.drift_model == run_.calibration.gyros[0].drift_model}});
+    }
+    return models;
   }
 
   [[nodiscard]] json correlation() const {

@@ -330,6 +330,18 @@ json states_decided(const ReportInput& input) {
   return sentences;
 }
 
+json drift_model_rows(const ground::CalibrationRun& run) {
+  json rows = json::array();
+  for (const ground::DriftModelForecast& model : run.drift_models) {
+    rows.push_back({{"name", model.drift_model},
+                    {"used", model.drift_model == run.calibration.gyros[0].drift_model},
+                    {"coefficients", model.coefficients},
+                    {"error", significant(model.open_loop_rms_rad / kArcsecond_rad, 3)},
+                    {"gain", fmt::format("{:+.1f}", model.log_likelihood)}});
+  }
+  return rows;
+}
+
 json statistics_rows(const std::map<std::string, double>& statistics) {
   json rows = json::array();
   for (const auto& [name, value] : statistics) {
@@ -360,6 +372,7 @@ json table_values(const ReportInput& input, const std::vector<Parameter>& parame
                  {"gyros", gyros_of(input, parameters)},
                  {"has_truth", input.truth != nullptr},
                  {"coefficients", coefficients_of(parameters)},
+                 {"drift_models", drift_model_rows(input.run)},
                  {"correlations", strongest_correlations(input, parameters)},
                  {"evaluation", evaluation_of(input)},
                  {"innovation_rows", innovation_rows(input)},
