@@ -15,9 +15,7 @@
 #include <vector>
 
 #include "batch.hpp"
-#include "refine.hpp"
-#include "trihedron/ground/replay.hpp"
-#include "with_estimator.hpp"
+#include "screen.hpp"
 
 namespace trihedron::ground {
 namespace {
@@ -42,56 +40,12 @@ double log_evidence(const Eigen::VectorXd& estimate, const Eigen::MatrixXd& root
   return white.squaredNorm() / 2 + covariance.matrixLLT().diagonal().array().log().sum();
 }
 
-CalibrationOptions without_further_states(CalibrationOptions options) {
-  options.drift_model = Esg7::kModelName;
-  for (Choice* choice : {&options.further_states.clock_offset, &options.further_states.orbital_error,
-                         &options.further_states.wandering_drift, &options.further_states.readout_bias}) {
-    *choice = Choice::kOff;
-  }
-  return options;
-}
-
-/// What the smallest cycle makes of the pass, with values to start from.
-struct Screened {
-  ScreenedPass pass;
-  std::vector<GyroCalibration> first;
-};
-
-/// Whether what is known before of a gyro names a coefficient that eq. (1) does not have.
-bool knows_of_drift_outside(const PassSettings& settings) {
-  return std::any_of(settings.gyros.begin(), settings.gyros.end(), [](const GyroPrior& prior) {
-    const auto outside = [](const auto& coefficient) { return coefficient.first.find('(') != std::string::npos; };
-    return std::any_of(prior.drift_rad_s.begin(), prior.drift_rad_s.end(), outside) ||
-           std::any_of(prior.drift_sigma_rad_s.begin(), prior.drift_sigma_rad_s.end(), outside);
-  });
-}
-
-Screened screen(const Pass& pass, const CalibrationOptions& asked) {
-  CalibrationOptions options = without_further_states(asked);
-  if (asked.drift_model != Esg7::kModelName && knows_of_drift_outside(pass.settings)) {
-    options.drift_model = Esg20::kModelName;
-  }
-  return with_estimator(pass, options, [&]<class Estimator>() {
-    const auto cycle = make_cycle<Estimator>(pass, options, {.navigate = false});
-    Screened screened;
-    screened.pass.gyros = Estimator::kGyros;
-    std::size_t sample = 0;
-    replay(
-        pass, *cycle, [&](const auto& report) { screened.pass.add_fix(report); },
-        [&](const auto& report) { screened.pass.add_sample(pass.gyro, sample++, report); });
-    screened.pass.keep_longest();
-    for (const auto& gyro : cycle->estimator().gyros()) {
-      screened.first.push_back(to_record<Esg7>(gyro));
-    }
-    return screened;
-  });
-}
-
 /// The whole pass with one choice of states.
 class Trial {
  public:
   Trial(const Pass& pass, const Screened& screened, const CalibrationOptions& options)
-      : problem_(screened.pass, setup_of(pass, options)), found_(most_likely(problem_, first_of(screened))) {}
+      : problem_(screened.pass, setup_of(pass, options)),
+        found_(most_likely(problem_, first_solution(problem_, screened))) {}
 
   /// Again, with other noise.
   void refit(const ProcessNoise& noise) {
@@ -166,21 +120,6 @@ class Trial {
   }
 
  private:
-  static PassSetup setup_of(const Pass& pass, const CalibrationOptions& options) {
-    return with_estimator(pass, options, [&]<class Estimator>() {
-      const auto cycle = make_cycle<Estimator>(pass, options, {.navigate = false});
-      return pass_setup<Estimator>(cycle->estimator().setup(), options.further_states, further_heads<Estimator>(pass));
-    });
-  }
-  [[nodiscard]] PassSolution first_of(const Screened& screened) const {
-    std::vector<GyroParameters> gyros;
-    for (const GyroCalibration& gyro : screened.first) {
-      GyroParameters parameters = parameters_of(gyro);
-      parameters.drift_rad_s.conservativeResizeLike(Eigen::VectorXd::Zero(layout().drift_size));
-      gyros.push_back(parameters);
-    }
-    return problem_.start(gyros);
-  }
   [[nodiscard]] const PassLayout& layout() const { return problem_.setup().layout; }
   [[nodiscard]] const GyroParameters& gyro(int k) const { return found_.solution.gyros[static_cast<std::size_t>(k)]; }
   [[nodiscard]] double of_shared(int state, int size, double prior_sigma) const {

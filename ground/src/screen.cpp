@@ -1,0 +1,71 @@
+#include "screen.hpp"
+
+#include <algorithm>
+
+#include "refine.hpp"
+#include "trihedron/ground/replay.hpp"
+#include "with_estimator.hpp"
+
+namespace trihedron::ground {
+namespace {
+
+/// Whether what is known before of a gyro names a coefficient that eq. (1) does not have.
+bool knows_of_drift_outside(const PassSettings& settings) {
+  return std::any_of(settings.gyros.begin(), settings.gyros.end(), [](const GyroPrior& prior) {
+    const auto outside = [](const auto& coefficient) { return coefficient.first.find('(') != std::string::npos; };
+    return std::any_of(prior.drift_rad_s.begin(), prior.drift_rad_s.end(), outside) ||
+           std::any_of(prior.drift_sigma_rad_s.begin(), prior.drift_sigma_rad_s.end(), outside);
+  });
+}
+
+}  // namespace
+
+CalibrationOptions without_further_states(CalibrationOptions options) {
+  options.drift_model = Esg7::kModelName;
+  for (FurtherStateOptions::Choice* choice :
+       {&options.further_states.clock_offset, &options.further_states.orbital_error,
+        &options.further_states.wandering_drift, &options.further_states.readout_bias}) {
+    *choice = FurtherStateOptions::Choice::kOff;
+  }
+  return options;
+}
+
+Screened screen(const Pass& pass, const CalibrationOptions& asked) {
+  CalibrationOptions options = without_further_states(asked);
+  if (asked.drift_model != Esg7::kModelName && knows_of_drift_outside(pass.settings)) {
+    options.drift_model = Esg20::kModelName;
+  }
+  return with_estimator(pass, options, [&]<class Estimator>() {
+    const auto cycle = make_cycle<Estimator>(pass, options, {.navigate = false});
+    Screened screened;
+    screened.pass.gyros = Estimator::kGyros;
+    std::size_t sample = 0;
+    replay(
+        pass, *cycle, [&](const auto& report) { screened.pass.add_fix(report); },
+        [&](const auto& report) { screened.pass.add_sample(pass.gyro, sample++, report); });
+    screened.pass.keep_longest();
+    for (const auto& gyro : cycle->estimator().gyros()) {
+      screened.first.push_back(to_record<Esg7>(gyro));
+    }
+    return screened;
+  });
+}
+
+PassSetup setup_of(const Pass& pass, const CalibrationOptions& options) {
+  return with_estimator(pass, options, [&]<class Estimator>() {
+    const auto cycle = make_cycle<Estimator>(pass, options, {.navigate = false});
+    return pass_setup<Estimator>(cycle->estimator().setup(), options.further_states, further_heads<Estimator>(pass));
+  });
+}
+
+PassSolution first_solution(const PassProblem& problem, const Screened& screened) {
+  std::vector<GyroParameters> gyros;
+  for (const GyroCalibration& gyro : screened.first) {
+    GyroParameters parameters = parameters_of(gyro);
+    parameters.drift_rad_s.conservativeResizeLike(Eigen::VectorXd::Zero(problem.setup().layout.drift_size));
+    gyros.push_back(parameters);
+  }
+  return problem.start(gyros);
+}
+
+}  // namespace trihedron::ground
