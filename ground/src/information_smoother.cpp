@@ -50,6 +50,55 @@ class Pile {
   Index size_ = 0;
 };
 
+/// The rows that know of d are kept as its triangle; what they leave over knows of c alone, which does not move: it
+/// waits for the end.
+class Forward {
+ public:
+  Forward(const MatrixXd& prior, const VectorXd& prior_y, Index d)
+      : n_(prior.cols()), d_(d), pile_(n_ - d + 1), moving_(prior.rows(), n_ + 1) {
+    moving_ << prior, prior_y;
+  }
+
+  void measure(const SmootherStage& stage) {
+    const Index c = n_ - d_;
+    MatrixXd rows = MatrixXd::Zero(std::max(moving_.rows() + stage.H.rows(), d_), n_ + 1);
+    rows.topRows(moving_.rows()) = moving_;
+    rows.block(moving_.rows(), 0, stage.H.rows(), n_) = stage.H;
+    rows.block(moving_.rows(), n_, stage.H.rows(), 1) = stage.y;
+    rotate_up(rows, d_);
+    pile_.add(rows.bottomRightCorner(rows.rows() - d_, c + 1));
+    moving_ = rows.topRows(d_);
+  }
+
+  /// On to the next stage; gives what is left of w.
+  SmootherResult::NoiseRows move(const SmootherStage& stage) {
+    const Index d = d_;
+    const Index c = n_ - d;
+    // With d = A⁻¹ (d' − B c − m − noise w) put in: columns w, d', c, right side; w has unit rows of its own.
+    const MatrixXd R_d = moving_.leftCols(d) * stage.A_inverse;
+    MatrixXd moved = MatrixXd::Zero(2 * d, d + n_ + 1);
+    moved.topLeftCorner(d, d).setIdentity();
+    moved.block(d, 0, d, d) = -R_d * stage.noise.asDiagonal();
+    moved.block(d, d, d, d) = R_d;
+    moved.block(d, 2 * d, d, c) = moving_.middleCols(d, c) - R_d * stage.B;
+    moved.bottomRightCorner(d, 1) = moving_.rightCols(1) + R_d * stage.m;
+    rotate_up(moved, d);
+    moving_ = moved.bottomRightCorner(d, n_ + 1);
+    return {moved.topLeftCorner(d, d), moved.block(0, d, d, n_), moved.topRightCorner(d, 1)};
+  }
+
+  /// Triangle of (d, c), right side last.
+  [[nodiscard]] const MatrixXd& moving() const { return moving_; }
+  /// Triangle of what is known of c alone, whatever d is; right side last.
+  [[nodiscard]] MatrixXd of_constants() const { return pile_.triangle(); }
+
+ private:
+  Index n_;
+  Index d_;
+  Pile pile_;
+  MatrixXd moving_;
+};
+
 }  // namespace
 
 MatrixXd triangle_of(const MatrixXd& rows) {
@@ -66,42 +115,21 @@ SmootherResult smooth(const MatrixXd& prior, const VectorXd& prior_y, const std:
   const Index d = stages.front().m.size();
   const Index c = n - d;
   SmootherResult result;
-  // Forward. The rows that know of d are kept as its triangle; what they leave over knows of c alone, which does not
-  // move: it waits for the end.
-  Pile pile(c + 1);
-  MatrixXd moving(prior.rows(), n + 1);
-  moving << prior, prior_y;
+  Forward forward(prior, prior_y, d);
   for (std::size_t i = 0; i < stages.size(); ++i) {
-    const SmootherStage& stage = stages[i];
-    MatrixXd rows = MatrixXd::Zero(std::max(moving.rows() + stage.H.rows(), d), n + 1);
-    rows.topRows(moving.rows()) = moving;
-    rows.block(moving.rows(), 0, stage.H.rows(), n) = stage.H;
-    rows.block(moving.rows(), n, stage.H.rows(), 1) = stage.y;
-    rotate_up(rows, d);
-    pile.add(rows.bottomRightCorner(rows.rows() - d, c + 1));
-    moving = rows.topRows(d);
+    forward.measure(stages[i]);
     if (i + 1 == stages.size()) {
       break;
     }
-    // With d = A⁻¹ (d' − B c − m − noise w) put in: columns w, d', c, right side; w has unit rows of its own.
-    const MatrixXd R_d = moving.leftCols(d) * stage.A_inverse;
-    MatrixXd moved = MatrixXd::Zero(2 * d, d + n + 1);
-    moved.topLeftCorner(d, d).setIdentity();
-    moved.block(d, 0, d, d) = -R_d * stage.noise.asDiagonal();
-    moved.block(d, d, d, d) = R_d;
-    moved.block(d, 2 * d, d, c) = moving.middleCols(d, c) - R_d * stage.B;
-    moved.bottomRightCorner(d, 1) = moving.rightCols(1) + R_d * stage.m;
-    rotate_up(moved, d);
-    result.steps.push_back({moved.topLeftCorner(d, d), moved.block(0, d, d, n), moved.topRightCorner(d, 1)});
+    result.steps.push_back(forward.move(stages[i]));
     // That of (d, c, w): by those of (w, d', c), of which they are a linear function with the determinant of A⁻¹.
     result.log_root_determinant +=
-        log_determinant(result.steps.back().R) - std::log(std::abs(stage.A_inverse.determinant()));
-    moving = moved.bottomRightCorner(d, n + 1);
+        log_determinant(result.steps.back().R) - std::log(std::abs(stages[i].A_inverse.determinant()));
   }
-  const MatrixXd constant = pile.triangle();
+  const MatrixXd constant = forward.of_constants();
   result.residual_square = constant(c, c) * constant(c, c);
   MatrixXd root = MatrixXd::Zero(n, n + 1);
-  root.topRows(d) = moving;
+  root.topRows(d) = forward.moving();
   root.bottomRightCorner(c, c + 1) = constant.topRows(c);
   if (!((root.diagonal().array().abs() > 0).all() && root.allFinite())) {
     throw std::invalid_argument("smoother: a state without any information");
@@ -123,6 +151,25 @@ SmootherResult smooth(const MatrixXd& prior, const VectorXd& prior_y, const std:
         stage.A_inverse * (next.head(d) - stage.B * next.tail(c) - stage.m - stage.noise.cwiseProduct(w));
   }
   return result;
+}
+
+std::vector<MatrixXd> information_on_constants(const MatrixXd& prior, const std::vector<SmootherStage>& stages,
+                                               const std::vector<std::size_t>& after) {
+  const Index d = stages.front().m.size();
+  const Index c = prior.cols() - d;
+  Forward forward(prior, VectorXd::Zero(prior.rows()), d);
+  std::vector<MatrixXd> roots;
+  std::size_t i = 0;
+  for (const std::size_t last : after) {
+    for (; i <= last; ++i) {
+      if (i > 0) {
+        forward.move(stages[i - 1]);
+      }
+      forward.measure(stages[i]);
+    }
+    roots.emplace_back(forward.of_constants().topLeftCorner(c, c));
+  }
+  return roots;
 }
 
 std::vector<MatrixXd> covariance_roots(const SmootherResult& result, const std::vector<SmootherStage>& stages) {

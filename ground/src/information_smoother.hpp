@@ -38,6 +38,12 @@ struct SmootherResult {
 [[nodiscard]] SmootherResult smooth(const Eigen::MatrixXd& prior, const Eigen::VectorXd& prior_y,
                                     const std::vector<SmootherStage>& stages);
 
+/// Triangular roots of the information on the constants by the measurements up to the end of each stage of `after`
+/// (increasing), whatever the states that move are. `prior`: rows of what is known of these before, unit noise.
+[[nodiscard]] std::vector<Eigen::MatrixXd> information_on_constants(const Eigen::MatrixXd& prior,
+                                                                    const std::vector<SmootherStage>& stages,
+                                                                    const std::vector<std::size_t>& after);
+
 /// The square triangle whose rows hold what `rows` do, their last columns the right side (Householder).
 [[nodiscard]] Eigen::MatrixXd triangle_of(const Eigen::MatrixXd& rows);
 

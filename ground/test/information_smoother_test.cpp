@@ -122,6 +122,21 @@ TEST(InformationSmoother, WithoutProcessNoiseIsLeastSquares) {
   expect_equal(System(7, 0.5, 0));
 }
 
+TEST(InformationSmoother, KnowsTheInformationOnConstantsAtEachStage) {
+  System system(7, 0.5, 0.3);
+  system.prior.rightCols(kConstants).setZero();
+  const std::vector<std::size_t> after = {0, 3, 6};
+  const std::vector<MatrixXd> roots = information_on_constants(system.prior, system.stages, after);
+  ASSERT_EQ(roots.size(), after.size());
+  for (std::size_t i = 0; i < after.size(); ++i) {
+    System until = system;
+    until.stages.resize(after[i] + 1);
+    const MatrixXd covariance = Dense(until).covariance.back().bottomRightCorner(kConstants, kConstants);
+    const MatrixXd information = roots[i].transpose() * roots[i];
+    EXPECT_LT((information * covariance - MatrixXd::Identity(kConstants, kConstants)).norm(), 1e-9);
+  }
+}
+
 TEST(InformationSmoother, RefusesWhatNothingIsKnownOf) {
   System system(3, 0.5, 0.3);
   system.prior.col(4).setZero();
