@@ -7,17 +7,21 @@
 #include <filesystem>
 #include <iterator>
 #include <memory>
+#include <optional>
+#include <stdexcept>
 #include <string>
 
+#include "advice.hpp"
 #include "commands.hpp"
+#include "progress.hpp"
 #include "steps.hpp"
 #include "summary.hpp"
 #include "trihedron/ground/calibrate.hpp"
 #include "trihedron/io/config.hpp"
 #include "trihedron/io/error.hpp"
 #include "trihedron/io/pass.hpp"
+#include "trihedron/io/quantity.hpp"
 #include "trihedron/io/scenario.hpp"
-#include "trihedron/sim/simulate.hpp"
 
 namespace trihedron::cli {
 namespace {
@@ -73,7 +77,7 @@ std::string combinations_text(const Observability& observability) {
                    angle_text(combination.attitude_error_rad), combination.text);
   }
   if (observability.is_harmful()) {
-    text += "  → Fly slews during the calibration, about other axes than those named: ten minutes of 10° suffice.\n";
+    text += "  → Fly slews during the calibration, about other axes than those named; --advise finds the best.\n";
   }
   return text;
 }
@@ -122,24 +126,58 @@ nlohmann::ordered_json observability_json(const Observability& observability, Ti
 
 bool is_scenario(const std::filesystem::path& path) { return path.extension() == ".toml"; }
 
-Pass read_or_simulate(const std::string& path) {
-  return is_scenario(path) ? simulated_by(io::read_scenario(path), path).pass : io::read_pass(path).pass;
+void print(const nlohmann::ordered_json& json, const std::string& text, const Common& common) {
+  if (common.json) {
+    fmt::print("{}\n", json.dump(1));
+  } else if (!common.quiet) {
+    fmt::print("{}", text);
+  }
+}
+
+/// Calls `work` and turns what it finds wrong into a refusal of this file.
+template <class Work>
+auto refusing(const std::string& path, const Work& work) {
+  try {
+    return work();
+  } catch (const ground::SetupError& error) {
+    throw io::InputRefused(path, {}, error.what(), error.cure());
+  } catch (const std::invalid_argument& error) {
+    throw io::InputRefused(path, {}, error.what(), "correct the scenario");
+  }
 }
 
 ExitStatus observe_pass(const std::string& path, const CalibrationOptions& options, const Common& common) {
-  const Pass pass = read_or_simulate(path);
-  Observability observability;
-  try {
-    observability = ground::observe(pass, options);
-  } catch (const ground::SetupError& error) {
-    throw io::InputRefused(path, {}, error.what(), error.cure());
-  }
-  if (common.json) {
-    fmt::print("{}\n", observability_json(observability, pass.settings.epoch).dump(1));
-  } else if (!common.quiet) {
-    fmt::print("{}", observability_text(observability, pass.settings.epoch));
-  }
+  const Pass pass = is_scenario(path) ? simulated_by(io::read_scenario(path), path).pass : io::read_pass(path).pass;
+  const Observability observability = refusing(path, [&] { return ground::observe(pass, options); });
+  const Time epoch = pass.settings.epoch;
+  print(observability_json(observability, epoch), observability_text(observability, epoch), common);
   return observability.is_harmful() ? kDoNotUse : kTrustworthy;
+}
+
+ExitStatus advise_for(const std::string& path, const CalibrationOptions& options, const plan::SlewLimits& limits,
+                      int confirming_runs, const Common& common) {
+  if (!is_scenario(path)) {
+    throw io::UsageError(
+        "--advise needs a scenario; for a pass, give its attitude to one: calibrate PASS -o OUT, then "
+        "reference = \"recorded\" and recorded = \"attitude.csv\" in [attitude]");
+  }
+  const Scenario scenario = io::read_scenario(path);
+  const plan::Advice advice = refusing(path, [&] {
+    const ProgressBar bar("advise", common.quiet);
+    return plan::advise(scenario, options, limits, {}, bar.meter());
+  });
+  std::optional<plan::Confirmation> confirmation;
+  if (confirming_runs > 0) {
+    const ProgressBar bar("confirm", common.quiet);
+    confirmation = plan::confirm(advice.scenario, advice.formerly_weak(), advice.after, confirming_runs, bar.meter());
+  }
+  nlohmann::ordered_json json = observability_json(advice.before, scenario.epoch);
+  json["advice"] = advice_json(advice, confirmation);
+  print(json,
+        observability_text(advice.before, scenario.epoch) + advice_text(advice) +
+            (confirmation ? confirmation_text(*confirmation) : ""),
+        common);
+  return advice.after.is_harmful() ? kDoNotUse : kTrustworthy;
 }
 
 }  // namespace
@@ -148,16 +186,44 @@ void add_observe(CLI::App& program, const Common& common, int& exit_status) {
   struct Arguments {
     std::string path;
     std::string config;
+    std::string max_rate;
+    std::string max_angle = "30deg";
+    std::string manoeuvre_time = "10min";
+    int slews = 4;
+    bool advise = false;
+    int confirming_runs = 0;
   };
   auto arguments = std::make_shared<Arguments>();
   CLI::App* command = program.add_subcommand("observe", "Say what a pass can tell of the parameters, and what not");
   command->add_option("PASS|SCENARIO.toml", arguments->path, "Directory or NetCDF file; or a scenario to be simulated")
       ->required();
   command->add_option("--config", arguments->config, "Settings (TOML); see effective-config.toml of any run");
+  CLI::Option* advise =
+      command->add_flag("--advise", arguments->advise, "Search the slews that calibrate best; of a scenario");
+  const auto limit = [&](const char* name, auto& value, const char* what) {
+    return command->add_option(name, value, what)->needs(advise);
+  };
+  limit("--max-rate", arguments->max_rate, "Of these slews, instead of max_slew_rate of the scenario");
+  limit("--max-angle", arguments->max_angle, "Of these slews")->capture_default_str();
+  limit("--slews", arguments->slews, "At most so many")->check(CLI::PositiveNumber)->capture_default_str();
+  limit("--manoeuvre-time", arguments->manoeuvre_time, "Of all slews together, turns and holds")->capture_default_str();
+  limit("--confirm", arguments->confirming_runs, "Simulate and calibrate so many flights with these slews")
+      ->check(CLI::PositiveNumber);
   command->callback([&common, &exit_status, arguments] {
     const CalibrationOptions options =
         arguments->config.empty() ? CalibrationOptions{} : io::read_config(arguments->config);
-    exit_status = observe_pass(arguments->path, options, common);
+    if (!arguments->advise) {
+      exit_status = observe_pass(arguments->path, options, common);
+      return;
+    }
+    plan::SlewLimits limits;
+    if (!arguments->max_rate.empty()) {
+      limits.max_rate_rad_s = io::parse_rate_rad_s(arguments->max_rate);
+    }
+    limits.max_angle_rad = io::parse_angle_rad(arguments->max_angle);
+    limits.slews = arguments->slews;
+    limits.manoeuvre_time = io::parse_duration(arguments->manoeuvre_time);
+    exit_status = advise_for(arguments->path, options, limits, arguments->confirming_runs, common);
   });
 }
 

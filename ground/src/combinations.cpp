@@ -5,6 +5,7 @@
 
 #include <Eigen/QR>
 #include <Eigen/SVD>
+#include <algorithm>
 #include <cmath>
 
 #include "trihedron/records/calibration.hpp"
@@ -92,6 +93,12 @@ std::string ParameterBlocks::in_words(const Eigen::VectorXd& direction, const Ei
     }
   }
   return text;
+}
+
+bool ParameterBlocks::is_alignment(const Eigen::VectorXd& direction) const {
+  return std::all_of(blocks_.begin(), blocks_.end(), [&](const Block& block) {
+    return block.is_alignment || direction(block.rows).squaredNorm() < kNamed;
+  });
 }
 
 }  // namespace trihedron::ground

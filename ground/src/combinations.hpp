@@ -27,6 +27,9 @@ class ParameterBlocks {
   [[nodiscard]] std::string in_words(const Eigen::VectorXd& direction, const Eigen::VectorXd& prior_sigma,
                                      const BodyRotation& rotation) const;
 
+  /// Whether only alignments would be named.
+  [[nodiscard]] bool is_alignment(const Eigen::VectorXd& direction) const;
+
  private:
   struct Block {
     std::string name;

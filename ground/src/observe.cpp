@@ -151,7 +151,8 @@ std::vector<Combination> weak_combinations(const MatrixXd& scaled_root, const Ma
     const VectorXd direction = columns.col(i);
     const double s = (scaled_root * direction).norm();
     const double error_rad = std::sqrt(direction.dot(scaled_metric * direction) / (1 + s * s));
-    combinations.push_back({blocks.in_words(direction, prior_sigma, rotation), direction, s, error_rad,
+    combinations.push_back({blocks.in_words(direction, prior_sigma, rotation), direction,
+                            blocks.is_alignment(direction), s, error_rad,
                             s < Observability::kUnobservable && error_rad > tolerable_rad});
   }
   const auto rank = [](const Combination& combination) {
@@ -162,7 +163,52 @@ std::vector<Combination> weak_combinations(const MatrixXd& scaled_root, const Ma
   return combinations;
 }
 
+/// Nothing is screened: samples and fixes of the first heads, in the order of their times.
+ScreenedPass as_it_is(const Pass& pass, int gyros, int heads) {
+  ScreenedPass screened;
+  screened.gyros = gyros;
+  for (std::size_t i = 0; i < pass.gyro.size(); ++i) {
+    ScreenedPass::Sample& sample = screened.samples.emplace_back();
+    sample.t = pass.gyro.t[i];
+    for (int k = 0; k < gyros; ++k) {
+      sample.h_b[k] = pass.gyro.direction(i, k).normalized();
+      sample.used[k] = true;
+    }
+  }
+  for (int head = 0; head < heads; ++head) {
+    const StarTrackerTelemetry& fixes =
+        head == 0 ? pass.star_tracker : pass.further_star_trackers[static_cast<std::size_t>(head - 1)];
+    for (std::size_t i = 0; i < fixes.size(); ++i) {
+      const auto sample = std::lower_bound(screened.samples.begin(), screened.samples.end(), fixes.t[i],
+                                           [](const ScreenedPass::Sample& s, Time t) { return s.t < t; });
+      if (sample == screened.samples.end()) {
+        break;
+      }
+      ScreenedPass::Fix& fix = screened.fixes.emplace_back();
+      fix.fix = {fixes.t[i], fixes.q_in_c[i], head};
+      fix.h_b = sample->h_b;
+      fix.used = sample->used;
+      if (i > 0) {
+        fix.rate_c = Rot<C, C>::assume(fixes.q_in_c[i - 1].conjugate() * fixes.q_in_c[i]).log().raw() /
+                     to_seconds(fixes.t[i] - fixes.t[i - 1]);
+      }
+    }
+  }
+  std::stable_sort(screened.fixes.begin(), screened.fixes.end(),
+                   [](const auto& a, const auto& b) { return a.fix.t < b.fix.t; });
+  return screened;
+}
+
+SetupError no_fix() { return {"no fix could be used", "look at the telemetry with `trihedron inspect`"}; }
+
 }  // namespace
+
+double sigma_along(const Combination& combination, const Observability& observability,
+                   const Eigen::MatrixXd& covariance) {
+  const VectorXd by_parameter = combination.direction.cwiseQuotient(observability.prior_sigma);
+  const double size = combination.direction.cwiseProduct(observability.prior_sigma).norm();
+  return size * std::sqrt(by_parameter.dot(covariance * by_parameter));
+}
 
 bool Observability::is_harmful() const {
   return std::any_of(weak.begin(), weak.end(), [](const Combination& combination) { return combination.is_harmful; });
@@ -172,7 +218,7 @@ Observability observe(const Pass& pass, const CalibrationOptions& asked, const M
   const CalibrationOptions options = decide(pass, asked).options;
   const Screened screened = screen(pass, options);
   if (screened.pass.fixes.empty()) {
-    throw SetupError("no fix could be used", "look at the telemetry with `trihedron inspect`");
+    throw no_fix();
   }
   const PassProblem problem(screened.pass, setup_of(pass, options));
   const BatchResult found = most_likely(problem, first_solution(problem, screened));
@@ -182,6 +228,8 @@ Observability observe(const Pass& pass, const CalibrationOptions& asked, const M
   const MatrixXd prior_root = linear.prior.bottomRightCorner(constants, constants);
 
   Observability result;
+  result.options = options;
+  result.options.find_noise = false;
   result.parameters = names_of_constants(pass, options, layout);
   result.prior_sigma = sigmas(prior_root, MatrixXd::Zero(1, constants));
   const std::vector<std::size_t> ends = ends_of_parts(linear.stages.size());
@@ -213,6 +261,20 @@ Observability observe(const Pass& pass, const CalibrationOptions& asked, const M
   result.weak = weak_combinations(scaled_root, scaled_metric, ParameterBlocks(result.parameters), result.prior_sigma,
                                   mean_rotation(screened.pass.fixes), mission.tolerable_rad);
   return result;
+}
+
+Eigen::MatrixXd predicted_covariance(const Pass& exact, const CalibrationOptions& options) {
+  const PassSetup setup = setup_of(exact, options);
+  const ScreenedPass screened = as_it_is(exact, setup.layout.gyros, 1 + setup.layout.further_heads);
+  if (screened.fixes.empty()) {
+    throw no_fix();
+  }
+  const PassProblem problem(screened, setup);
+  const PassProblem::Linear linear = problem.linearise(problem.start(setup.prior));
+  const Index constants = setup.layout.constants();
+  const MatrixXd prior_root = linear.prior.bottomRightCorner(constants, constants);
+  const MatrixXd root = covariance_root(prior_root, measured(linear, constants, {linear.stages.size() - 1}).back());
+  return root * root.transpose();
 }
 
 }  // namespace trihedron::ground

@@ -24,6 +24,7 @@ struct Mission {
 struct Combination {
   std::string text;               ///< "gyro 1 alignment about the orbit normal, against its initial direction"
   Eigen::VectorXd direction;      ///< unit, by parameter, each in its prior sigma
+  bool is_alignment = false;      ///< nothing else takes part with a tenth of the square
   double singular_value = 0;      ///< prior sigma over that by the measurements alone
   double attitude_error_rad = 0;  ///< what it adds to Observability::attitude_error_rad, rms
   /// Unobservable, and its part of the attitude error is more than the mission can bear.
@@ -33,6 +34,7 @@ struct Combination {
 /// What the measurements say of the constants of the problem, for one linearisation. Matrices have one column or row
 /// per parameter.
 struct Observability {
+  CalibrationOptions options;           ///< as decided
   std::vector<std::string> parameters;  ///< as Calibration::states, then further states
   Eigen::VectorXd prior_sigma;          ///< rad/s, rad, or that of the further state
   Eigen::VectorXd sigma;                ///< by prior and measurements
@@ -71,5 +73,14 @@ struct Observability {
 /// Linearised at the most likely solution; with options left open by what decide() makes of the pass. Throws
 /// SetupError.
 [[nodiscard]] Observability observe(const Pass& pass, const CalibrationOptions& options, const Mission& mission = {});
+
+/// 1-sigma of a combination, rad or rad/s, where this is the covariance of the parameters.
+[[nodiscard]] double sigma_along(const Combination& combination, const Observability& observability,
+                                 const Eigen::MatrixXd& covariance);
+
+/// Covariance of the parameters, as Observability::covariance, that a calibration of a flight will have. `exact`: what
+/// the prior says, without noise; its settings tell the noise that it will have, that of the gyros for all readings
+/// that are taken together at a fix. `options`: nothing is left to decide. Throws SetupError.
+[[nodiscard]] Eigen::MatrixXd predicted_covariance(const Pass& exact, const CalibrationOptions& options);
 
 }  // namespace trihedron::ground
