@@ -1,6 +1,6 @@
 # One way to make a module, so that the dependency directions cannot be got wrong by accident.
 #
-#   cli → report, io, ground, sim → records → core
+#   cli → report, plan → ground, sim; io → records → core
 #
 # trihedron_module(<name> [SOURCES …] [MODULES …] [LIBRARIES …] [PRIVATE_LIBRARIES …])
 #   makes the target trihedron_<name> with the alias trihedron::<name>; MODULES must be allowed by the table below.
@@ -17,8 +17,9 @@ set(TRIHEDRON_records_MAY_USE core)
 set(TRIHEDRON_sim_MAY_USE core records)
 set(TRIHEDRON_io_MAY_USE core records)
 set(TRIHEDRON_ground_MAY_USE core records)
+set(TRIHEDRON_plan_MAY_USE core records sim ground)
 set(TRIHEDRON_report_MAY_USE core records ground)
-set(TRIHEDRON_cli_MAY_USE core records sim io ground report)
+set(TRIHEDRON_cli_MAY_USE core records sim io ground plan report)
 
 function(trihedron_module name)
   cmake_parse_arguments(arg "" "" "SOURCES;MODULES;LIBRARIES;PRIVATE_LIBRARIES" ${ARGN})

@@ -1,5 +1,3 @@
-#include "trihedron/sim/simulate.hpp"
-
 #include <fmt/core.h>
 
 #include <algorithm>
@@ -22,7 +20,9 @@ struct SimulateArguments {
   std::string pass;
 };
 
-sim::SimulatedPass simulated(const Scenario& scenario, const std::string& name) {
+}  // namespace
+
+sim::SimulatedPass simulated_by(const Scenario& scenario, const std::string& name) {
   try {
     return sim::simulate(scenario);
   } catch (const std::invalid_argument& error) {
@@ -30,11 +30,9 @@ sim::SimulatedPass simulated(const Scenario& scenario, const std::string& name) 
   }
 }
 
-}  // namespace
-
 void simulate_pass(const Scenario& scenario, const std::string& name, const std::filesystem::path& pass,
                    const Common& common) {
-  const sim::SimulatedPass result = simulated(scenario, name);
+  const sim::SimulatedPass result = simulated_by(scenario, name);
   // A readout in steps needs no finer ones in the file.
   io::PassFormat format;
   double step = scenario.gyros.front().readout.quantum_rad;

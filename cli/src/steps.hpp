@@ -8,10 +8,12 @@
 #include "commands.hpp"
 #include "trihedron/records/options.hpp"
 #include "trihedron/records/scenario.hpp"
+#include "trihedron/sim/simulate.hpp"
 
 namespace trihedron::cli {
 
 /// `name`: of the scenario, for a refusal.
+[[nodiscard]] sim::SimulatedPass simulated_by(const Scenario& scenario, const std::string& name);
 void simulate_pass(const Scenario& scenario, const std::string& name, const std::filesystem::path& pass,
                    const Common& common);
 

@@ -22,12 +22,6 @@ constexpr Duration kStretch = std::chrono::minutes(90);
 
 double minutes(Duration d) { return to_seconds(d) / 60; }
 
-/// An angle in the unit that suits its size.
-std::string angle_text(double rad) {
-  return std::abs(rad) < 100 * kArcsecond ? fmt::format("{:.2f}″", rad / kArcsecond)
-                                          : fmt::format("{:.2f}′", rad / kArcminute);
-}
-
 nlohmann::ordered_json axes_json(const Eigen::Vector3d& rad) {
   return {{"roll_rad", rad.x()}, {"pitch_rad", rad.y()}, {"heading_rad", rad.z()}};
 }
@@ -50,6 +44,11 @@ nlohmann::ordered_json interval_json(const ground::CorrectionInterval& interval)
 }
 
 }  // namespace
+
+std::string angle_text(double rad) {
+  return std::abs(rad) < 100 * kArcsecond ? fmt::format("{:.2f}″", rad / kArcsecond)
+                                          : fmt::format("{:.2f}′", rad / kArcminute);
+}
 
 std::optional<Truth> read_truth_of(const std::filesystem::path& path, const Pass& pass) {
   std::optional<Truth> truth = io::read_truth(path);

@@ -48,6 +48,9 @@ struct Course {
   double limit_rad = 0;
 };
 
+/// An angle in the unit that suits its size.
+[[nodiscard]] std::string angle_text(double rad);
+
 [[nodiscard]] std::string pass_text(const io::LoadedPass& loaded);
 [[nodiscard]] std::string verdict_text(const Verdict& verdict);
 [[nodiscard]] std::string calibration_text(const ground::CalibrationRun& run, const std::optional<Truth>& truth);

@@ -71,6 +71,23 @@ AttitudeErrors attitude_errors(const AttitudeHistory& solution, const std::vecto
   return errors;
 }
 
+Eigen::VectorXd parameter_errors(const Truth& truth, const Calibration& calibration) {
+  Eigen::VectorXd errors(calibration.covariance.rows());
+  Eigen::Index row = 0;
+  for (std::size_t k = 0; k < calibration.gyros.size(); ++k) {
+    const GyroCalibration& gyro = calibration.gyros[k];
+    for (const auto& [name, value] : gyro.drift_rad_s) {
+      errors(row++) = truth.gyros[k].drift(name).value_or(0) - value;
+    }
+    errors.segment<3>(row) = (Rot<C, B<1>>::exp(Vec<C>::assume(truth.gyros[k].alignment_rotation_vector_rad)) *
+                              Rot<C, B<1>>::exp(Vec<C>::assume(gyro.alignment_rotation_vector_rad)).inverse())
+                                 .log()
+                                 .raw();
+    row += 3;
+  }
+  return errors;
+}
+
 ErrorStatistics statistics(const AttitudeErrors& errors) { return statistics_of(errors, 0, errors.t.size()); }
 
 std::vector<ErrorStatistics> statistics_by_stretch(const AttitudeErrors& errors, Time start, Duration length) {

@@ -212,11 +212,11 @@ PassSetup full_setup(const sim::SimulatedPass& simulated) {
                   .orbital_error = true};
   setup.family = DriftFamily::of<Esg20>();
   for (const Truth::Gyro& gyro : simulated.truth.gyros) {
-    GyroParameters& prior = setup.prior.emplace_back();
+    GyroParameters& prior = setup.prior.gyros.emplace_back();
     prior.drift_rad_s = Eigen::VectorXd::LinSpaced(Esg20::kSize, -1e-6, 1e-6);
     prior.C_c_b = Rot<C, B<1>>::exp(Vec<C>::assume(gyro.alignment_rotation_vector_rad)).raw();
   }
-  setup.prior_covariance.setIdentity(46, 46);
+  setup.prior.covariance.setIdentity(46, 46);
   setup.readout_noise_rad = {1e-5, 1e-5};
   setup.fix_noise.emplace_back(Eigen::Matrix3d::Identity() * 1e-9);
   setup.noise.wandering_sigma_rad_s = 1e-7;
@@ -230,7 +230,7 @@ TEST(PassProblem, KnowsHowTheMisfitOfAFixDependsOnEachState) {
   const PassProblem problem(screened, full_setup(two_hours()));
   ASSERT_EQ(problem.arcs(), 1U);
   const PassLayout& layout = problem.setup().layout;
-  const PassSolution solution = problem.start(problem.setup().prior);
+  const PassSolution solution = problem.start(problem.setup().prior.gyros);
   const auto misfit = [&](const PassSolution& at) {
     PassProblem::FixRows rows;
     problem.go_along(at, [&](const PassProblem::Moment& moment) {
@@ -261,16 +261,16 @@ TEST(PassProblem, KnowsHowTheMisfitOfAFixDependsOnEachState) {
 TEST(PassProblem, CarriesErrorsAlongAsTheFlightCodeDoes) {
   const ScreenedPass screened = screened_beginning(two_hours(), 8 * 55);
   PassSetup setup = full_setup(two_hours());
-  for (GyroParameters& gyro : setup.prior) {
+  for (GyroParameters& gyro : setup.prior.gyros) {
     gyro.drift_rad_s *= 1000;  // momenta turn by degrees
   }
   const PassProblem problem(screened, setup);
-  const PassSolution solution = problem.start(setup.prior);
+  const PassSolution solution = problem.start(setup.prior.gyros);
   using Model = WithCaseDrift<Esg20>;
   PerGyro<GyroModel<Model>, 2> gyros;
   PerGyro<Sensitivity<Model>, 2> since;
   for (int k = 0; k < 2; ++k) {
-    const GyroParameters& prior = setup.prior[static_cast<std::size_t>(k)];
+    const GyroParameters& prior = setup.prior.gyros[static_cast<std::size_t>(k)];
     gyros[k].h_in = solution.arcs[0].h_in[k];
     gyros[k].drift_rad_s.setZero();
     gyros[k].drift_rad_s.head<Esg20::kSize>() = prior.drift_rad_s;

@@ -21,6 +21,10 @@ struct AttitudeErrors {
 [[nodiscard]] AttitudeErrors attitude_errors(const AttitudeHistory& solution, const std::vector<Time>& reference_t,
                                              const std::vector<Eigen::Quaterniond>& reference_q_in_c);
 
+/// Of a calibration, truth − estimate in the order of Calibration::states: rad/s, and δ of C_c_b(true) = exp([δ×])
+/// C_c_b(est), c axes. Drift that the truth does not name is taken as none.
+[[nodiscard]] Eigen::VectorXd parameter_errors(const Truth& truth, const Calibration& calibration);
+
 struct ErrorStatistics {
   Time from{};
   Time to{};

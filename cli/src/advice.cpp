@@ -1,0 +1,114 @@
+#include "advice.hpp"
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <iterator>
+
+#include "summary.hpp"
+#include "trihedron/core/time.hpp"
+#include "trihedron/io/quantity.hpp"
+
+namespace trihedron::cli {
+namespace {
+
+std::string sigma_text(const ground::Combination& combination, double sigma) {
+  return combination.is_alignment ? angle_text(sigma) : fmt::format("{:.1e} rad/s", sigma);
+}
+
+std::string slew_toml(const Slew& slew) {
+  std::string text = fmt::format("{{begin = \"{}\"", io::format_duration(from_seconds(slew.begin_s)));
+  for (const auto& [axis, angle_rad] :
+       {std::pair{"roll", slew.roll_rad}, std::pair{"pitch", slew.pitch_rad}, std::pair{"yaw", slew.yaw_rad}}) {
+    if (angle_rad != 0) {
+      text += fmt::format(", {} = \"{}\"", axis, io::format_angle(angle_rad));
+    }
+  }
+  return text + "}";
+}
+
+struct Gain {
+  ground::Combination combination;
+  double before = 0;
+  double after = 0;
+};
+
+std::vector<Gain> gains(const plan::Advice& advice) {
+  std::vector<Gain> all;
+  for (const ground::Combination& combination : advice.formerly_weak()) {
+    all.push_back({combination, sigma_along(combination, advice.before, advice.before.covariance),
+                   sigma_along(combination, advice.before, advice.after.covariance)});
+  }
+  return all;
+}
+
+}  // namespace
+
+std::string advice_text(const plan::Advice& advice) {
+  std::string text = fmt::format(
+      "\nAdvice      {} slew{}, there and back; in the scenario\n\n[attitude]\nmax_slew_rate = \"{}\"\nslews = [\n",
+      advice.slews().size() / 2, advice.slews().size() == 2 ? "" : "s",
+      io::format_rate(advice.scenario.attitude.max_slew_rate_rad_s));
+  auto out = std::back_inserter(text);
+  for (const Slew& slew : advice.slews()) {
+    fmt::format_to(out, "  {},\n", slew_toml(slew));
+  }
+  const auto row = [&](const std::string& before, const std::string& after, double times, const std::string& what) {
+    fmt::format_to(out, "  {:>14} {:>14} {:>8.0f} times   {}\n", before, after, times, what);
+  };
+  fmt::format_to(out, "]\n\n  {:>14} {:>14} {:>14}\n", "1σ as it is", "with slews", "better");
+  const double before_rad = advice.before.attitude_error_rad;
+  const double after_rad = advice.after.attitude_error_rad;
+  row(angle_text(before_rad), angle_text(after_rad), before_rad / after_rad, "attitude, as above");
+  for (const Gain& gain : gains(advice)) {
+    row(sigma_text(gain.combination, gain.before), sigma_text(gain.combination, gain.after), gain.before / gain.after,
+        gain.combination.text);
+  }
+  return text;
+}
+
+std::string confirmation_text(const plan::Confirmation& confirmation) {
+  std::string text = fmt::format(
+      "\nConfirmed   by {} simulated flights with the slews, calibrated by estimator batch\n  {:>14} {:>14}\n",
+      confirmation.runs, "predicted 1σ", "simulated");
+  auto out = std::back_inserter(text);
+  for (const plan::Confirmation::Along& along : confirmation.along) {
+    fmt::format_to(out, "  {:>14} {:>14}   {}\n", sigma_text(along.combination, along.predicted),
+                   sigma_text(along.combination, along.simulated), along.combination.text);
+  }
+  const double chance = 2 * std::sqrt(2.0 * confirmation.parameters / confirmation.runs);
+  fmt::format_to(out, "  simulated over predicted {:.2f}; mean NEES {:.1f} (expected {} ± {:.1f})\n",
+                 confirmation.ratio, confirmation.nees, confirmation.parameters, chance);
+  return text;
+}
+
+nlohmann::ordered_json advice_json(const plan::Advice& advice, const std::optional<plan::Confirmation>& confirmation) {
+  nlohmann::ordered_json json = {
+      {"max_slew_rate_rad_s", advice.scenario.attitude.max_slew_rate_rad_s},
+      {"slews", nlohmann::ordered_json::array()},
+      {"attitude_error_rad",
+       {{"before", advice.before.attitude_error_rad}, {"after", advice.after.attitude_error_rad}}},
+      {"combinations", nlohmann::ordered_json::array()}};
+  for (const Slew& slew : advice.slews()) {
+    json["slews"].push_back({{"begin_s", slew.begin_s},
+                             {"roll_rad", slew.roll_rad},
+                             {"pitch_rad", slew.pitch_rad},
+                             {"yaw_rad", slew.yaw_rad}});
+  }
+  for (const Gain& gain : gains(advice)) {
+    json["combinations"].push_back(
+        {{"text", gain.combination.text}, {"sigma_before", gain.before}, {"sigma_after", gain.after}});
+  }
+  if (confirmation) {
+    for (std::size_t i = 0; i < confirmation->along.size(); ++i) {
+      json["combinations"][i]["sigma_simulated"] = confirmation->along[i].simulated;
+    }
+    json["confirmation"] = {{"runs", confirmation->runs},
+                            {"simulated_over_predicted", confirmation->ratio},
+                            {"nees", confirmation->nees},
+                            {"parameters", confirmation->parameters}};
+  }
+  return json;
+}
+
+}  // namespace trihedron::cli

@@ -1,0 +1,230 @@
+#include "trihedron/ground/observe.hpp"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <array>
+#include <filesystem>
+#include <iterator>
+#include <memory>
+#include <optional>
+#include <stdexcept>
+#include <string>
+
+#include "advice.hpp"
+#include "commands.hpp"
+#include "progress.hpp"
+#include "steps.hpp"
+#include "summary.hpp"
+#include "trihedron/ground/calibrate.hpp"
+#include "trihedron/io/config.hpp"
+#include "trihedron/io/error.hpp"
+#include "trihedron/io/pass.hpp"
+#include "trihedron/io/quantity.hpp"
+#include "trihedron/io/scenario.hpp"
+
+namespace trihedron::cli {
+namespace {
+
+using ground::Observability;
+
+bool is_alignment(const std::string& parameter) { return parameter.find(".align_") != std::string::npos; }
+
+std::string sigma_text(const std::string& parameter, double sigma) {
+  return is_alignment(parameter) ? angle_text(sigma) : fmt::format("{:.1e}", sigma);
+}
+
+/// Rows: sigma of each parameter before the pass, after parts of it, after all.
+std::string sigmas_text(const Observability& observability, Time epoch) {
+  const std::size_t times = observability.t.size();
+  const std::array<std::size_t, 4> shown = {0, times / 4, times / 2, times - 1};
+  std::string text = fmt::format("\n1σ after     {:>14}", "known before");
+  auto out = std::back_inserter(text);
+  for (const std::size_t i : shown) {
+    fmt::format_to(out, " {:>9.0f} min", to_seconds(observability.t[i] - epoch) / 60);
+  }
+  text += observability.angle_gain.size() > 0 ? "   z1 adds\n" : "\n";
+  for (std::size_t i = 0; i < observability.parameters.size(); ++i) {
+    const std::string& name = observability.parameters[i];
+    const auto row = static_cast<Eigen::Index>(i);
+    fmt::format_to(out, "  {:<22} {:>11}", name, sigma_text(name, observability.prior_sigma(row)));
+    for (const std::size_t time : shown) {
+      fmt::format_to(out, "   {:>10}", sigma_text(name, observability.sigma_until[time](row)));
+    }
+    if (observability.angle_gain.size() > 0) {
+      fmt::format_to(out, "   {:>6.2f}×", observability.angle_gain(row));
+    }
+    text += '\n';
+  }
+  return text;
+}
+
+std::string combinations_text(const Observability& observability) {
+  std::string text;
+  auto out = std::back_inserter(text);
+  bool said_unobservable = false;
+  bool said_weak = false;
+  for (const ground::Combination& combination : observability.weak) {
+    const bool unobservable = combination.singular_value < Observability::kUnobservable;
+    bool& said = unobservable ? said_unobservable : said_weak;
+    if (!said) {
+      fmt::format_to(out, "\n{}: known from the data alone by less than {:.0f} times what was known before\n",
+                     unobservable ? "Unobservable" : "Weak",
+                     unobservable ? Observability::kUnobservable : Observability::kWeak);
+      said = true;
+    }
+    fmt::format_to(out, "  {:>8.3g} times, attitude {:>8}   {}\n", combination.singular_value,
+                   angle_text(combination.attitude_error_rad), combination.text);
+  }
+  if (observability.is_harmful()) {
+    text += "  → Fly slews during the calibration, about other axes than those named; --advise finds the best.\n";
+  }
+  return text;
+}
+
+std::string observability_text(const Observability& observability, Time epoch) {
+  const Eigen::VectorXd& s = observability.singular_values;
+  return fmt::format(
+      "Observable  {} of {} parameters, priors removed; prior 1σ over that by the data alone: {:.2g} … {:.2g}\n"
+      "Attitude    {} rms per axis by what the parameters leave, between corrections and slewing\n{}{}",
+      observability.rank, s.size(), s(0), s(s.size() - 1), angle_text(observability.attitude_error_rad),
+      sigmas_text(observability, epoch), combinations_text(observability));
+}
+
+nlohmann::ordered_json observability_json(const Observability& observability, Time epoch) {
+  nlohmann::ordered_json json = {{"rank", observability.rank},
+                                 {"singular_values", std::vector<double>(observability.singular_values.begin(),
+                                                                         observability.singular_values.end())},
+                                 {"attitude_error_rad", observability.attitude_error_rad},
+                                 {"t_s", nlohmann::ordered_json::array()}};
+  for (const Time t : observability.t) {
+    json["t_s"].push_back(to_seconds(t - epoch));
+  }
+  for (std::size_t i = 0; i < observability.parameters.size(); ++i) {
+    const auto row = static_cast<Eigen::Index>(i);
+    nlohmann::ordered_json parameter = {{"name", observability.parameters[i]},
+                                        {"prior_sigma", observability.prior_sigma(row)},
+                                        {"sigma", observability.sigma(row)}};
+    for (const Eigen::VectorXd& sigma : observability.sigma_until) {
+      parameter["sigma_until"].push_back(sigma(row));
+    }
+    if (observability.angle_gain.size() > 0) {
+      parameter["angle_gain"] = observability.angle_gain(row);
+    }
+    json["parameters"].push_back(parameter);
+  }
+  json["combinations"] = nlohmann::ordered_json::array();
+  for (const ground::Combination& combination : observability.weak) {
+    json["combinations"].push_back({{"text", combination.text},
+                                    {"singular_value", combination.singular_value},
+                                    {"attitude_error_rad", combination.attitude_error_rad},
+                                    {"unobservable", combination.singular_value < Observability::kUnobservable},
+                                    {"harmful", combination.is_harmful}});
+  }
+  return json;
+}
+
+bool is_scenario(const std::filesystem::path& path) { return path.extension() == ".toml"; }
+
+void print(const nlohmann::ordered_json& json, const std::string& text, const Common& common) {
+  if (common.json) {
+    fmt::print("{}\n", json.dump(1));
+  } else if (!common.quiet) {
+    fmt::print("{}", text);
+  }
+}
+
+/// Calls `work` and turns what it finds wrong into a refusal of this file.
+template <class Work>
+auto refusing(const std::string& path, const Work& work) {
+  try {
+    return work();
+  } catch (const ground::SetupError& error) {
+    throw io::InputRefused(path, {}, error.what(), error.cure());
+  } catch (const std::invalid_argument& error) {
+    throw io::InputRefused(path, {}, error.what(), "correct the scenario");
+  }
+}
+
+ExitStatus observe_pass(const std::string& path, const CalibrationOptions& options, const Common& common) {
+  const Pass pass = is_scenario(path) ? simulated_by(io::read_scenario(path), path).pass : io::read_pass(path).pass;
+  const Observability observability = refusing(path, [&] { return ground::observe(pass, options); });
+  const Time epoch = pass.settings.epoch;
+  print(observability_json(observability, epoch), observability_text(observability, epoch), common);
+  return observability.is_harmful() ? kDoNotUse : kTrustworthy;
+}
+
+ExitStatus advise_for(const std::string& path, const CalibrationOptions& options, const plan::SlewLimits& limits,
+                      int confirming_runs, const Common& common) {
+  if (!is_scenario(path)) {
+    throw io::UsageError(
+        "--advise needs a scenario; for a pass, give its attitude to one: calibrate PASS -o OUT, then "
+        "reference = \"recorded\" and recorded = \"attitude.csv\" in [attitude]");
+  }
+  const Scenario scenario = io::read_scenario(path);
+  const plan::Advice advice = refusing(path, [&] {
+    const ProgressBar bar("advise", common.quiet);
+    return plan::advise(scenario, options, limits, {}, bar.meter());
+  });
+  std::optional<plan::Confirmation> confirmation;
+  if (confirming_runs > 0) {
+    const ProgressBar bar("confirm", common.quiet);
+    confirmation = plan::confirm(advice.scenario, advice.formerly_weak(), advice.after, confirming_runs, bar.meter());
+  }
+  nlohmann::ordered_json json = observability_json(advice.before, scenario.epoch);
+  json["advice"] = advice_json(advice, confirmation);
+  print(json,
+        observability_text(advice.before, scenario.epoch) + advice_text(advice) +
+            (confirmation ? confirmation_text(*confirmation) : ""),
+        common);
+  return advice.after.is_harmful() ? kDoNotUse : kTrustworthy;
+}
+
+}  // namespace
+
+void add_observe(CLI::App& program, const Common& common, int& exit_status) {
+  struct Arguments {
+    std::string path;
+    std::string config;
+    std::string max_rate;
+    std::string max_angle = "30deg";
+    std::string manoeuvre_time = "10min";
+    int slews = 4;
+    bool advise = false;
+    int confirming_runs = 0;
+  };
+  auto arguments = std::make_shared<Arguments>();
+  CLI::App* command = program.add_subcommand("observe", "Say what a pass can tell of the parameters, and what not");
+  command->add_option("PASS|SCENARIO.toml", arguments->path, "Directory or NetCDF file; or a scenario to be simulated")
+      ->required();
+  command->add_option("--config", arguments->config, "Settings (TOML); see effective-config.toml of any run");
+  CLI::Option* advise =
+      command->add_flag("--advise", arguments->advise, "Search the slews that calibrate best; of a scenario");
+  const auto limit = [&](const char* name, auto& value, const char* what) {
+    return command->add_option(name, value, what)->needs(advise);
+  };
+  limit("--max-rate", arguments->max_rate, "Of these slews, instead of max_slew_rate of the scenario");
+  limit("--max-angle", arguments->max_angle, "Of these slews")->capture_default_str();
+  limit("--slews", arguments->slews, "At most so many")->check(CLI::PositiveNumber)->capture_default_str();
+  limit("--manoeuvre-time", arguments->manoeuvre_time, "Of all slews together, turns and holds")->capture_default_str();
+  limit("--confirm", arguments->confirming_runs, "Simulate and calibrate so many flights with these slews")
+      ->check(CLI::PositiveNumber);
+  command->callback([&common, &exit_status, arguments] {
+    const CalibrationOptions options =
+        arguments->config.empty() ? CalibrationOptions{} : io::read_config(arguments->config);
+    if (!arguments->advise) {
+      exit_status = observe_pass(arguments->path, options, common);
+      return;
+    }
+    plan::SlewLimits limits;
+    if (!arguments->max_rate.empty()) {
+      limits.max_rate_rad_s = io::parse_rate_rad_s(arguments->max_rate);
+    }
+    limits.max_angle_rad = io::parse_angle_rad(arguments->max_angle);
+    limits.slews = arguments->slews;
+    limits.manoeuvre_time = io::parse_duration(arguments->manoeuvre_time);
+    exit_status = advise_for(arguments->path, options, limits, arguments->confirming_runs, common);
+  });
+}
+
+}  // namespace trihedron::cli

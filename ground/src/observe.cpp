@@ -1,0 +1,279 @@
+#include "trihedron/ground/observe.hpp"
+
+#include <Eigen/QR>
+#include <Eigen/SVD>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <utility>
+
+#include "angle_row.hpp"
+#include "attitude_metric.hpp"
+#include "batch.hpp"
+#include "combinations.hpp"
+#include "decide.hpp"
+#include "refine.hpp"
+#include "screen.hpp"
+#include "with_estimator.hpp"
+
+namespace trihedron::ground {
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+constexpr std::size_t kTimes = 20;
+
+/// In the order of PassLayout.
+std::vector<std::string> names_of_constants(const PassSetup& setup, const CalibrationOptions& options) {
+  const PassLayout& layout = setup.layout;
+  std::vector<std::string> names = state_names(setup.family, layout.gyros);
+  std::vector<std::string> further = further_names(options.further_states, layout.further_heads, layout.gyros);
+  const std::ptrdiff_t shared = layout.size() - layout.shared();
+  std::rotate(further.begin(), further.begin() + shared, further.end());
+  names.insert(names.end(), further.begin(), further.end());
+  return names;
+}
+
+/// Roots of the information by the measurements alone, at these stages.
+std::vector<MatrixXd> measured(const PassProblem::Linear& linear, Index constants,
+                               const std::vector<std::size_t>& after) {
+  MatrixXd prior = linear.prior;
+  prior.rightCols(constants).setZero();
+  return information_on_constants(prior, linear.stages, after);
+}
+
+/// A square root of the covariance by both, root rootᵀ.
+MatrixXd covariance_root(const MatrixXd& prior_root, const MatrixXd& measured_root) {
+  const Index size = prior_root.cols();
+  MatrixXd rows(prior_root.rows() + measured_root.rows(), size);
+  rows << prior_root, measured_root;
+  return triangle_of(rows).triangularView<Eigen::Upper>().solve(MatrixXd::Identity(size, size));
+}
+
+VectorXd sigmas(const MatrixXd& prior_root, const MatrixXd& measured_root) {
+  return covariance_root(prior_root, measured_root).rowwise().norm();
+}
+
+BodyRotation mean_rotation(const std::vector<ScreenedPass::Fix>& fixes) {
+  constexpr double kLowOrbit_rad_s = 1.1e-3;
+  Eigen::Vector3d rate_c = Eigen::Vector3d::Zero();
+  for (const ScreenedPass::Fix& fix : fixes) {
+    rate_c += fix.rate_c / static_cast<double>(fixes.size());
+  }
+  BodyRotation rotation;
+  if (rate_c.norm() > 0.1 * kLowOrbit_rad_s) {
+    rotation.axis_c = rate_c.normalized();
+    rotation.is_orbital = std::abs(rate_c.norm() / kLowOrbit_rad_s - 1) < 0.3;
+  }
+  return rotation;
+}
+
+/// As if at each fix only one reading were used.
+ScreenedPass with_single_readings(ScreenedPass pass) {
+  for (ScreenedPass::Fix& fix : pass.fixes) {
+    fix.noise_factor = 1;
+  }
+  return pass;
+}
+
+/// Adds the angle between the momenta at the samples between fixes.
+void add_angles(const PassProblem& problem, const ScreenedPass& pass, const PassSolution& solution,
+                Duration gyro_period, PassProblem::Linear& linear) {
+  const PassLayout& layout = problem.setup().layout;
+  const double noise_rad = std::hypot(problem.setup().readout_noise_rad[0], problem.setup().readout_noise_rad[1]);
+  auto sample = pass.samples.begin();
+  Time before = pass.samples.front().t;
+  std::vector<Eigen::RowVectorXd> rows;
+  std::size_t arc = 0;
+  const auto close_arc = [&] {
+    SmootherStage& stage = linear.stages[arc];
+    const Index there = stage.H.rows();
+    stage.H.conservativeResize(there + static_cast<Index>(rows.size()), Eigen::NoChange);
+    stage.y.conservativeResize(stage.H.rows());
+    stage.y.tail(static_cast<Index>(rows.size())).setZero();
+    for (std::size_t i = 0; i < rows.size(); ++i) {
+      stage.H.row(there + static_cast<Index>(i)) = rows[i];
+    }
+    rows.clear();
+  };
+  problem.go_along(solution, [&](const PassProblem::Moment& moment) {
+    if (moment.arc != arc) {
+      close_arc();
+      arc = moment.arc;
+    }
+    sample = std::lower_bound(sample, pass.samples.end(), moment.t,
+                              [](const ScreenedPass::Sample& s, Time t) { return s.t < t; });
+    if (moment.fix == nullptr && sample != pass.samples.end() && sample->used[0] && sample->used[1]) {
+      // It stands for those since the last one.
+      const double samples = std::max(std::round(to_seconds(moment.t - before) / to_seconds(gyro_period)), 1.0);
+      const AngleRow row = angle_row(layout, solution, moment, sample->h_b);
+      rows.emplace_back(row.by_states * (std::sqrt(samples) / (row.noise_factor * noise_rad)));
+    }
+    before = moment.t;
+  });
+  close_arc();
+}
+
+VectorXd angle_gain(const Pass& pass, const Screened& screened, const PassSetup& setup, const PassSolution& solution) {
+  const Index constants = setup.layout.constants();
+  const ScreenedPass single = with_single_readings(screened.pass);
+  const PassProblem problem(single, setup);
+  PassProblem::Linear linear = problem.linearise(solution);
+  const MatrixXd prior_root = linear.prior.bottomRightCorner(constants, constants);
+  const std::vector<std::size_t> last = {linear.stages.size() - 1};
+  const VectorXd without = sigmas(prior_root, measured(linear, constants, last).back());
+  add_angles(problem, single, solution, pass.settings.gyro_period, linear);
+  return without.cwiseQuotient(sigmas(prior_root, measured(linear, constants, last).back()));
+}
+
+/// The last stage of each of kTimes parts of the pass.
+std::vector<std::size_t> ends_of_parts(std::size_t stages) {
+  std::vector<std::size_t> ends;
+  const std::size_t parts = std::min(kTimes, stages);
+  for (std::size_t i = 1; i <= parts; ++i) {
+    ends.push_back(i * stages / parts - 1);
+  }
+  return ends;
+}
+
+/// The combinations that are weak, the unobservable and then the most harmful ones first.
+std::vector<Combination> weak_combinations(const MatrixXd& scaled_root, const MatrixXd& scaled_metric,
+                                           const ParameterBlocks& blocks, const VectorXd& prior_sigma,
+                                           const BodyRotation& rotation, double tolerable_rad) {
+  const Eigen::JacobiSVD<MatrixXd> svd(scaled_root, Eigen::ComputeFullV);
+  const Index weak = (svd.singularValues().array() < Observability::kWeak).count();
+  const MatrixXd columns = blocks.separated(svd.matrixV().rightCols(weak));
+  std::vector<Combination> combinations;
+  for (Index i = 0; i < weak; ++i) {
+    const VectorXd direction = columns.col(i);
+    const double s = (scaled_root * direction).norm();
+    const double error_rad = std::sqrt(direction.dot(scaled_metric * direction) / (1 + s * s));
+    combinations.push_back({blocks.in_words(direction, prior_sigma, rotation), direction,
+                            blocks.is_alignment(direction), s, error_rad,
+                            s < Observability::kUnobservable && error_rad > tolerable_rad});
+  }
+  const auto rank = [](const Combination& combination) {
+    return std::pair(combination.singular_value >= Observability::kUnobservable, -combination.attitude_error_rad);
+  };
+  std::sort(combinations.begin(), combinations.end(),
+            [&](const Combination& a, const Combination& b) { return rank(a) < rank(b); });
+  return combinations;
+}
+
+/// Nothing is screened: samples and fixes of the first heads, in the order of their times.
+ScreenedPass as_it_is(const Pass& pass, int gyros, int heads) {
+  ScreenedPass screened;
+  screened.gyros = gyros;
+  for (std::size_t i = 0; i < pass.gyro.size(); ++i) {
+    ScreenedPass::Sample& sample = screened.samples.emplace_back();
+    sample.t = pass.gyro.t[i];
+    for (int k = 0; k < gyros; ++k) {
+      sample.h_b[k] = pass.gyro.direction(i, k).normalized();
+      sample.used[k] = true;
+    }
+  }
+  for (int head = 0; head < heads; ++head) {
+    const StarTrackerTelemetry& fixes =
+        head == 0 ? pass.star_tracker : pass.further_star_trackers[static_cast<std::size_t>(head - 1)];
+    for (std::size_t i = 0; i < fixes.size(); ++i) {
+      const auto sample = std::lower_bound(screened.samples.begin(), screened.samples.end(), fixes.t[i],
+                                           [](const ScreenedPass::Sample& s, Time t) { return s.t < t; });
+      if (sample == screened.samples.end()) {
+        break;
+      }
+      ScreenedPass::Fix& fix = screened.fixes.emplace_back();
+      fix.fix = {fixes.t[i], fixes.q_in_c[i], head};
+      fix.h_b = sample->h_b;
+      fix.used = sample->used;
+      if (i > 0) {
+        fix.rate_c = Rot<C, C>::assume(fixes.q_in_c[i - 1].conjugate() * fixes.q_in_c[i]).log().raw() /
+                     to_seconds(fixes.t[i] - fixes.t[i - 1]);
+      }
+    }
+  }
+  std::stable_sort(screened.fixes.begin(), screened.fixes.end(),
+                   [](const auto& a, const auto& b) { return a.fix.t < b.fix.t; });
+  return screened;
+}
+
+SetupError no_fix() { return {"no fix could be used", "look at the telemetry with `trihedron inspect`"}; }
+
+}  // namespace
+
+double sigma_along(const Combination& combination, const Observability& observability,
+                   const Eigen::MatrixXd& covariance) {
+  const VectorXd by_parameter = combination.direction.cwiseQuotient(observability.prior_sigma);
+  const double size = combination.direction.cwiseProduct(observability.prior_sigma).norm();
+  return size * std::sqrt(by_parameter.dot(covariance * by_parameter));
+}
+
+bool Observability::is_harmful() const {
+  return std::any_of(weak.begin(), weak.end(), [](const Combination& combination) { return combination.is_harmful; });
+}
+
+Observability observe(const Pass& pass, const CalibrationOptions& asked, const Mission& mission) {
+  const CalibrationOptions options = decide(pass, asked).options;
+  const Screened screened = screen(pass, options);
+  if (screened.pass.fixes.empty()) {
+    throw no_fix();
+  }
+  const PassProblem problem(screened.pass, setup_of(pass, options));
+  const BatchResult found = most_likely(problem, first_solution(problem, screened));
+  const PassLayout& layout = problem.setup().layout;
+  const Index constants = layout.constants();
+  const PassProblem::Linear& linear = found.linear;
+  const MatrixXd prior_root = linear.prior.bottomRightCorner(constants, constants);
+
+  Observability result;
+  result.options = options;
+  result.options.find_noise = false;
+  result.parameters = names_of_constants(problem.setup(), options);
+  result.prior_sigma = sigmas(prior_root, MatrixXd::Zero(1, constants));
+  const std::vector<std::size_t> ends = ends_of_parts(linear.stages.size());
+  const std::vector<MatrixXd> roots = measured(linear, constants, ends);
+  for (const MatrixXd& root : roots) {
+    result.sigma_until.push_back(sigmas(prior_root, root));
+  }
+  problem.go_along(found.solution, [&, part = std::size_t{0}](const PassProblem::Moment& moment) mutable {
+    part += moment.arc > ends[part] ? 1U : 0U;
+    result.t.resize(part + 1);
+    result.t[part] = moment.t;
+  });
+  const MatrixXd root = covariance_root(prior_root, roots.back());
+  result.covariance = root * root.transpose();
+  result.sigma = result.sigma_until.back();
+  if (layout.gyros == 2) {
+    result.angle_gain = angle_gain(pass, screened, problem.setup(), found.solution);
+  }
+
+  const MatrixXd scaled_root = roots.back() * result.prior_sigma.asDiagonal();
+  result.singular_values = Eigen::JacobiSVD<MatrixXd>(scaled_root).singularValues();
+  const double rounding =
+      result.singular_values(0) * static_cast<double>(constants) * std::numeric_limits<double>::epsilon();
+  result.rank = (result.singular_values.array() > rounding).count();
+  result.attitude_metric = attitude_metric(problem, found.solution, linear, mission);
+  result.attitude_error_rad = std::sqrt((result.attitude_metric * result.covariance).trace());
+  const MatrixXd scaled_metric =
+      result.prior_sigma.asDiagonal() * result.attitude_metric * result.prior_sigma.asDiagonal();
+  result.weak = weak_combinations(scaled_root, scaled_metric, ParameterBlocks(result.parameters), result.prior_sigma,
+                                  mean_rotation(screened.pass.fixes), mission.tolerable_rad);
+  return result;
+}
+
+Eigen::MatrixXd predicted_covariance(const Pass& exact, const CalibrationOptions& options) {
+  const PassSetup setup = setup_of(exact, options);
+  const ScreenedPass screened = as_it_is(exact, setup.layout.gyros, 1 + setup.layout.further_heads);
+  if (screened.fixes.empty()) {
+    throw no_fix();
+  }
+  const PassProblem problem(screened, setup);
+  const PassProblem::Linear linear = problem.linearise(problem.start(setup.prior.gyros));
+  const Index constants = setup.layout.constants();
+  const MatrixXd prior_root = linear.prior.bottomRightCorner(constants, constants);
+  const MatrixXd root = covariance_root(prior_root, measured(linear, constants, {linear.stages.size() - 1}).back());
+  return root * root.transpose();
+}
+
+}  // namespace trihedron::ground

@@ -1,0 +1,210 @@
+#include "trihedron/plan/advise.hpp"
+
+#include <fmt/format.h>
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <iterator>
+#include <limits>
+#include <numbers>
+
+#include "design_flight.hpp"
+#include "on_all_cores.hpp"
+#include "trihedron/sim/attitude.hpp"
+#include "trihedron/sim/simulate.hpp"
+
+namespace trihedron::plan {
+namespace {
+
+using ground::SetupError;
+
+/// There, hold and back, in one part of the time for manoeuvres.
+struct Excursion {
+  Eigen::Vector3d axis_c = Eigen::Vector3d::UnitX();
+  double part_of_angle = 1;  ///< of the largest that there is time for; its sign is that of the turn
+  double begin_s = 0;
+};
+using Plan = std::vector<Excursion>;
+
+/// Corners, edges and faces of a cube, one of each two opposite ones.
+std::vector<Eigen::Vector3d> axes() {
+  std::vector<Eigen::Vector3d> all;
+  for (int number = 14; number < 27; ++number) {
+    all.emplace_back(Eigen::Vector3d(number / 9 - 1, number / 3 % 3 - 1, number % 3 - 1).normalized());
+  }
+  return all;
+}
+
+constexpr std::array<double, 6> kPartsOfAngle = {1, -1, 0.75, -0.75, 0.5, -0.5};
+constexpr int kTimes = 9;
+/// After these nothing changes that matters.
+constexpr int kRounds = 2;
+/// One more slew must make the mean square smaller than this part of it.
+constexpr double kWorthwhile = 0.95;
+
+/// Angles in tenths of a degree, not larger than they were but for rounding.
+double rounded_rad(double angle_rad) {
+  const double tenths = std::trunc(std::abs(angle_rad) / kDegree * 10 + 1e-6);
+  return tenths > 0 ? std::copysign(tenths / 10 * kDegree, angle_rad) : 0;
+}
+
+/// Rz(yaw) Ry(pitch) Rx(roll) of a turn.
+Slew slew_to(double begin_s, const Eigen::Vector3d& axis_c, double angle_rad) {
+  const Eigen::Matrix3d turn = Eigen::AngleAxisd(angle_rad, axis_c).toRotationMatrix();
+  return {begin_s, rounded_rad(std::atan2(turn(2, 1), turn(2, 2))), rounded_rad(-std::asin(turn(2, 0))),
+          rounded_rad(std::atan2(turn(1, 0), turn(0, 0)))};
+}
+
+class Search {
+ public:
+  Search(const Scenario& scenario, const ground::Observability& steady, const SlewLimits& limits,
+         const ground::Progress& progress)
+      : flight_(scenario, steady.options),
+        metric_(steady.attitude_metric),
+        attitude_(scenario.attitude),
+        duration_s_(to_seconds(scenario.duration)),
+        limits_(limits),
+        progress_(progress) {}
+
+  [[nodiscard]] std::vector<Slew> best() {
+    Plan plan;
+    Plan best;
+    double least = std::numeric_limits<double>::infinity();
+    for (int slews = 1; slews <= limits_.slews; ++slews) {
+      plan.push_back({.begin_s = free_times(plan, plan.size()).front()});
+      for (int round = 0; round < kRounds; ++round) {
+        for (std::size_t i = 0; i < plan.size(); ++i) {
+          exchange(plan, i);
+        }
+      }
+      const double mean_square = errors({plan}).front();
+      if (!(mean_square < kWorthwhile * least)) {
+        break;
+      }
+      least = mean_square;
+      best = plan;
+    }
+    return slews_of(best);
+  }
+
+ private:
+  [[nodiscard]] double share_s(std::size_t excursions) const {
+    return to_seconds(limits_.manoeuvre_time) / static_cast<double>(excursions);
+  }
+  [[nodiscard]] double turn_s(double angle_rad) const {
+    return sim::turn_duration_s(angle_rad, attitude_.max_slew_rate_rad_s, attitude_.max_slew_acceleration_rad_s2);
+  }
+  /// There is time to go there and come back, and as much again to stay.
+  [[nodiscard]] double largest_rad(std::size_t excursions) const {
+    const double whole_s = 2 * turn_s(limits_.max_angle_rad);
+    const double part = std::min(share_s(excursions) / whole_s, 1.0);
+    // A turn at the limit of acceleration takes the root of its angle.
+    return limits_.max_angle_rad * part * part;
+  }
+
+  [[nodiscard]] std::vector<Slew> slews_of(Plan plan) const {
+    std::sort(plan.begin(), plan.end(), [](const Excursion& a, const Excursion& b) { return a.begin_s < b.begin_s; });
+    std::vector<Slew> slews;
+    for (const Excursion& excursion : plan) {
+      const double angle_rad = excursion.part_of_angle * largest_rad(plan.size());
+      slews.push_back(slew_to(excursion.begin_s, excursion.axis_c, angle_rad));
+      slews.push_back({.begin_s = std::floor(excursion.begin_s + share_s(plan.size()) - turn_s(angle_rad))});
+    }
+    return slews;
+  }
+
+  /// Where an excursion may begin beside the others.
+  [[nodiscard]] std::vector<double> free_times(const Plan& plan, std::size_t excursion) const {
+    const double share = share_s(std::max(plan.size(), excursion + 1));
+    std::vector<double> times;
+    for (int i = 0; i < kTimes; ++i) {
+      const double begin_s = std::floor((i + 0.5) / kTimes * (duration_s_ - share));
+      bool is_free = true;
+      for (std::size_t other = 0; other < plan.size(); ++other) {
+        is_free = is_free && (other == excursion || std::abs(plan[other].begin_s - begin_s) >= share);
+      }
+      if (is_free) {
+        times.push_back(begin_s);
+      }
+    }
+    return times;
+  }
+
+  /// Axis, angle and time of one excursion, one after the other, the best while all else stays.
+  void exchange(Plan& plan, std::size_t excursion) {
+    std::vector<Plan> candidates{plan};
+    const auto vary = [&](const auto& values, const auto member) {
+      candidates.assign(1, plan);
+      for (const auto& value : values) {
+        candidates.push_back(plan);
+        candidates.back()[excursion].*member = value;
+      }
+      const std::vector<double> squares = errors(candidates);
+      plan = candidates[static_cast<std::size_t>(std::min_element(squares.begin(), squares.end()) - squares.begin())];
+    };
+    vary(axes(), &Excursion::axis_c);
+    vary(kPartsOfAngle, &Excursion::part_of_angle);
+    vary(free_times(plan, excursion), &Excursion::begin_s);
+  }
+
+  /// Mean square of the attitude error after each.
+  [[nodiscard]] std::vector<double> errors(const std::vector<Plan>& plans) {
+    const std::vector<double> squares = on_all_cores(
+        plans.size(), [&](std::size_t i) { return (metric_ * flight_.covariance_after(slews_of(plans[i]))).trace(); });
+    done_ += plans.size();
+    if (progress_) {
+      const double all = kRounds * limits_.slews * (limits_.slews + 1) / 2.0 * (14 + 7 + 10);
+      progress_(std::min(static_cast<double>(done_) / all, 1.0));
+    }
+    return squares;
+  }
+
+  DesignFlight flight_;
+  const Eigen::MatrixXd& metric_;
+  const AttitudeScenario& attitude_;
+  double duration_s_;
+  const SlewLimits& limits_;
+  const ground::Progress& progress_;
+  std::size_t done_ = 0;
+};
+
+void check(const Scenario& scenario, const SlewLimits& limits) {
+  const auto* slews = std::get_if<std::vector<Slew>>(&scenario.attitude.slews);
+  if (slews == nullptr || !slews->empty()) {
+    throw SetupError("the scenario has slews of its own",
+                     "set slews = \"none\" in [attitude]: advice begins with that");
+  }
+  if (!(limits.max_angle_rad > 0 && limits.max_rate_rad_s.value_or(1) > 0 && limits.slews > 0 &&
+        limits.manoeuvre_time > Duration::zero())) {
+    throw SetupError("a limit of the slews is not positive", "give positive rate, angle, number and time");
+  }
+  if (kTimes * limits.manoeuvre_time > scenario.duration) {
+    throw SetupError("there is no room for the slews",
+                     fmt::format("give less than a {}th of the flight to them", kTimes));
+  }
+}
+
+}  // namespace
+
+std::vector<ground::Combination> Advice::formerly_weak() const {
+  std::vector<ground::Combination> harmful;
+  std::copy_if(before.weak.begin(), before.weak.end(), std::back_inserter(harmful),
+               [](const ground::Combination& combination) { return combination.is_harmful; });
+  return harmful.empty() ? before.weak : harmful;
+}
+
+Advice advise(const Scenario& scenario, const CalibrationOptions& options, const SlewLimits& limits,
+              const ground::Mission& mission, const ground::Progress& progress) {
+  check(scenario, limits);
+  Advice advice{scenario, {}, {}};
+  AttitudeScenario& attitude = advice.scenario.attitude;
+  attitude.max_slew_rate_rad_s = limits.max_rate_rad_s.value_or(attitude.max_slew_rate_rad_s);
+  advice.before = ground::observe(sim::simulate(scenario).pass, options, mission);
+  attitude.slews = Search(advice.scenario, advice.before, limits, progress).best();
+  advice.after = ground::observe(sim::simulate(advice.scenario).pass, advice.before.options, mission);
+  return advice;
+}
+
+}  // namespace trihedron::plan

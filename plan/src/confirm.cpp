@@ -1,0 +1,87 @@
+#include "trihedron/plan/confirm.hpp"
+
+#include <Eigen/Cholesky>
+#include <cmath>
+#include <mutex>
+#include <utility>
+
+#include "on_all_cores.hpp"
+#include "trihedron/ground/evaluate.hpp"
+#include "trihedron/sim/random.hpp"
+#include "trihedron/sim/simulate.hpp"
+
+namespace trihedron::plan {
+namespace {
+
+/// With another seed, and what is unknown drawn from what is known before.
+Scenario drawn(Scenario scenario, std::uint64_t run) {
+  scenario.seed += 1 + run;
+  for (std::size_t k = 0; k < scenario.gyros.size(); ++k) {
+    GyroScenario& gyro = scenario.gyros[k];
+    gyro.misalignment_rad =
+        gyro.alignment_prior_sigma_rad * sim::Stream(scenario.seed, sim::Source::kMisalignment, k).normal3();
+    gyro.drift.kappa_rad_s.reset();
+  }
+  return scenario;
+}
+
+struct Outcome {
+  Eigen::VectorXd errors;
+  double nees = 0;
+};
+
+Outcome fly(const Scenario& scenario, const CalibrationOptions& options) {
+  const sim::SimulatedPass flown = sim::simulate(scenario);
+  const Calibration calibration = ground::calibrate(flown.pass, options).calibration;
+  Outcome outcome{ground::parameter_errors(flown.truth, calibration)};
+  // In units of the sigmas, which differ by ten powers of ten.
+  const Eigen::VectorXd sigma = calibration.covariance.diagonal().cwiseSqrt();
+  const Eigen::MatrixXd correlation =
+      sigma.cwiseInverse().asDiagonal() * calibration.covariance * sigma.cwiseInverse().asDiagonal();
+  const Eigen::VectorXd scaled = outcome.errors.cwiseQuotient(sigma);
+  outcome.nees = scaled.dot(correlation.llt().solve(scaled));
+  return outcome;
+}
+
+}  // namespace
+
+Confirmation confirm(const Scenario& scenario, const std::vector<ground::Combination>& combinations,
+                     const ground::Observability& predicted, int runs, const ground::Progress& progress) {
+  CalibrationOptions options = predicted.options;
+  options.estimator = ground::kBatch;
+  std::mutex one_at_a_time;
+  double done = 0;
+  const std::vector<Outcome> outcomes = on_all_cores(static_cast<std::size_t>(runs), [&](std::size_t run) {
+    Outcome outcome = fly(drawn(scenario, run), options);
+    const std::scoped_lock lock(one_at_a_time);
+    done += 1;
+    if (progress) {
+      progress(done / runs);
+    }
+    return outcome;
+  });
+
+  Confirmation confirmation;
+  confirmation.runs = runs;
+  for (const Outcome& outcome : outcomes) {
+    confirmation.nees += outcome.nees / runs;
+    confirmation.parameters = static_cast<int>(outcome.errors.size());
+  }
+  double square = 0;
+  for (const ground::Combination& combination : combinations) {
+    // Further states come after those of the gyros, and have no truth here.
+    Eigen::MatrixXd scatter = Eigen::MatrixXd::Zero(predicted.covariance.rows(), predicted.covariance.cols());
+    for (const Outcome& outcome : outcomes) {
+      scatter.topLeftCorner(outcome.errors.size(), outcome.errors.size()) +=
+          outcome.errors * outcome.errors.transpose() / runs;
+    }
+    const Confirmation::Along along{combination, sigma_along(combination, predicted, predicted.covariance),
+                                    sigma_along(combination, predicted, scatter)};
+    square += std::pow(along.simulated / along.predicted, 2) / static_cast<double>(combinations.size());
+    confirmation.along.push_back(along);
+  }
+  confirmation.ratio = std::sqrt(square);
+  return confirmation;
+}
+
+}  // namespace trihedron::plan

@@ -1,0 +1,31 @@
+#pragma once
+
+#include <algorithm>
+#include <atomic>
+#include <cstddef>
+#include <future>
+#include <thread>
+#include <vector>
+
+namespace trihedron::plan {
+
+/// The results of work(0) … work(count − 1), as many at once as there are cores. Throws what they throw.
+template <class Work>
+auto on_all_cores(std::size_t count, const Work& work) {
+  std::vector<decltype(work(std::size_t{0}))> results(count);
+  std::atomic<std::size_t> next = 0;
+  std::vector<std::future<void>> workers;
+  for (std::size_t i = 0; i < std::min<std::size_t>(count, std::max(std::thread::hardware_concurrency(), 1U)); ++i) {
+    workers.push_back(std::async(std::launch::async, [&] {
+      for (std::size_t task = next++; task < count; task = next++) {
+        results[task] = work(task);
+      }
+    }));
+  }
+  for (std::future<void>& worker : workers) {
+    worker.get();
+  }
+  return results;
+}
+
+}  // namespace trihedron::plan
