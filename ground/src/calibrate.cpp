@@ -220,6 +220,21 @@ std::vector<FurtherEstimate> further_of(const Estimator& estimator, const Furthe
   return further;
 }
 
+/// The prior as a calibration: values and covariance.
+template <class Estimator>
+Calibration known_before(const Pass& pass, const typename Estimator::Setup& setup) {
+  using Model = typename Estimator::BaseModel;
+  Calibration before;
+  before.estimator = Estimator::kName;
+  before.epoch = before.t = pass.settings.epoch;
+  for (const auto& gyro : setup.prior) {
+    before.gyros.push_back(to_record<Model>(gyro));
+  }
+  before.states = state_names<Model>(Estimator::kGyros);
+  before.covariance = setup.prior_covariance;
+  return before;
+}
+
 template <class Estimator>
 Calibration result_of(const Pass& pass, const Cycle<Estimator>& cycle, const CalibrationOptions& options) {
   using Model = typename Estimator::BaseModel;
@@ -332,6 +347,7 @@ CalibrationRun calibrate_with(const Pass& pass, Decision decision, const Progres
   if (!cycle->estimator().started()) {
     throw nothing_used(run.fixes);
   }
+  run.known_before = known_before<Estimator>(pass, cycle->estimator().setup());
   run.calibration = result_of(pass, *cycle, run.options);
   run.calibration.statistics = statistics_of(run.fixes);
   run.calibration.statistics["angle_looks"] = angle_looks;

@@ -65,6 +65,7 @@ struct Evidence {
 struct CalibrationRun {
   CalibrationOptions options;      ///< as decided
   std::vector<Evidence> evidence;  ///< of what was left to the program to decide
+  Calibration known_before;        ///< values and covariance before the pass; states as in `calibration`
   Calibration calibration;         ///< with verdict and statistics
   std::vector<FixRecord> fixes;
   ParameterHistory parameters;
