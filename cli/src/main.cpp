@@ -34,6 +34,7 @@ int main(int argc, char** argv) {
     cli::add_calibrate(program, common, exit_status);
     cli::add_navigate(program, common, exit_status);
     cli::add_evaluate(program, common, exit_status);
+    cli::add_history(program, common, exit_status);
     cli::add_demo(program, common, exit_status);
     try {
       program.parse(argc, argv);
