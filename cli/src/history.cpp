@@ -6,7 +6,6 @@
 #include <cmath>
 #include <iterator>
 #include <memory>
-#include <numbers>
 #include <string>
 #include <vector>
 
@@ -17,6 +16,7 @@
 #include "trihedron/io/catalogue.hpp"
 #include "trihedron/io/error.hpp"
 #include "trihedron/io/time_text.hpp"
+#include "trihedron/records/scenario.hpp"
 #include "trihedron/report/history.hpp"
 
 namespace trihedron::cli {
@@ -25,8 +25,6 @@ namespace {
 using Catalogue = std::vector<CatalogueEntry>;
 
 constexpr double kMicroradian = 1e-6;
-constexpr double kArcsecond = std::numbers::pi / 180 / 3600;
-constexpr double kArcminute = 60 * kArcsecond;
 
 struct Unit {
   double value = kMicroradian;

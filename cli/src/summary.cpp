@@ -7,17 +7,15 @@
 #include <chrono>
 #include <cmath>
 #include <iterator>
-#include <numbers>
 
 #include "trihedron/ground/verdict.hpp"
 #include "trihedron/io/error.hpp"
 #include "trihedron/io/time_text.hpp"
+#include "trihedron/records/scenario.hpp"
 
 namespace trihedron::cli {
 namespace {
 
-constexpr double kArcsecond = std::numbers::pi / 180 / 3600;
-constexpr double kArcminute = 60 * kArcsecond;
 constexpr Duration kStretch = std::chrono::minutes(90);
 
 double minutes(Duration d) { return to_seconds(d) / 60; }
@@ -268,7 +266,7 @@ std::string evaluation_text(const Evaluation& evaluation, Time epoch, const std:
 }
 
 std::string passes_text(const std::vector<ground::PassAlone>& passes) {
-  std::string text = fmt::format("Passes      {} of one start-up; each with those before:\n", passes.size());
+  std::string text = fmt::format("Passes      {}, taken for one start-up; each beside those before:\n", passes.size());
   for (const ground::PassAlone& pass : passes) {
     const Calibration& calibration = pass.run.calibration;
     auto out = std::back_inserter(text);

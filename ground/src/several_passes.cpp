@@ -96,10 +96,12 @@ std::vector<std::string> lasting_faults(const Verdict& verdict) {
 
 void judge_pass(const PassAlone& pass, std::vector<Finding>& findings) {
   if (!pass.coefficients.holds()) {
-    findings.push_back({"coefficients-moved",
-                        fmt::format("The drift coefficients of {} are not those of the passes before.", pass.name),
-                        pass.coefficients.text(), "These passes are not of one start-up: calibrate them apart.",
-                        Severity::kDoNotUse});
+    findings.push_back(
+        {"coefficients-moved",
+         fmt::format("The drift coefficients of {} are not those of the passes before.", pass.name),
+         pass.coefficients.text(),
+         "These passes are not of one start-up: calibrate them apart. Where they are, use estimator batch.",
+         Severity::kDoNotUse});
   }
   if (!pass.alignments.holds()) {
     findings.push_back({"alignment-moved",
@@ -121,10 +123,12 @@ bool has_weak_axis(const PassAlone& pass) {
 }
 
 /// Of the last pass from those before, by what each pass is.
-Verdict judge_together(Verdict verdict, const std::vector<PassAlone>& passes) {
+Verdict judge_together(const Verdict& last, const std::vector<PassAlone>& passes) {
+  Verdict verdict;
   for (const PassAlone& pass : passes) {
     judge_pass(pass, verdict.findings);
   }
+  verdict.findings.insert(verdict.findings.end(), last.findings.begin(), last.findings.end());
   if (!std::ranges::all_of(passes, has_weak_axis)) {
     std::erase_if(verdict.findings, [](const Finding& finding) { return finding.code == kWeakAxis; });
   }
