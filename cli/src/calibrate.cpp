@@ -1,7 +1,10 @@
 #include <fmt/core.h>
 
+#include <algorithm>
 #include <filesystem>
+#include <map>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -9,13 +12,16 @@
 #include "progress.hpp"
 #include "steps.hpp"
 #include "summary.hpp"
+#include "trihedron/ground/several_passes.hpp"
 #include "trihedron/io/atomic_file.hpp"
 #include "trihedron/io/attitude.hpp"
 #include "trihedron/io/calibration.hpp"
+#include "trihedron/io/catalogue.hpp"
 #include "trihedron/io/config.hpp"
 #include "trihedron/io/error.hpp"
 #include "trihedron/io/quantity.hpp"
 #include "trihedron/io/residuals.hpp"
+#include "trihedron/io/time_text.hpp"
 #include "trihedron/report/report.hpp"
 
 namespace trihedron::cli {
@@ -68,76 +74,173 @@ std::vector<io::Table> residual_tables(const ground::CalibrationRun& run) {
   return {fixes, parameters, angle};
 }
 
-}  // namespace
+/// A pass in the order of the command.
+struct NamedPass {
+  std::filesystem::path path;
+  std::string name;  ///< of its directory or file; numbered where several have the same
+  io::LoadedPass loaded;
+};
 
-ExitStatus calibrate_pass(const std::filesystem::path& pass, const CalibrationOptions& options,
-                          const std::filesystem::path& out, const Common& common) {
-  const io::LoadedPass loaded = io::read_pass(pass);
-  ground::CalibrationRun result;
-  try {
-    const ProgressBar bar("calibrate", common.quiet);
-    result = ground::calibrate(loaded.pass, options, bar.meter());
-  } catch (const ground::SetupError& error) {
-    throw io::InputRefused(pass, {}, error.what(), error.cure());
+std::string stem_of(const std::filesystem::path& path) {
+  const std::filesystem::path whole = path.lexically_normal();
+  return (whole.has_filename() ? whole : whole.parent_path()).stem().string();
+}
+
+/// In the order of their epochs.
+std::vector<NamedPass> read_passes(const std::vector<std::string>& paths) {
+  std::vector<NamedPass> passes;
+  std::map<std::string, int> seen;
+  for (const std::string& path : paths) {
+    const std::string stem = stem_of(path);
+    const int same = ++seen[stem];
+    passes.push_back({path, same == 1 ? stem : fmt::format("{}-{}", stem, same), io::read_pass(path)});
   }
-  const Time epoch = loaded.pass.settings.epoch;
-  const auto truth = read_truth_of(pass, loaded.pass);
-  const double limit_rad = io::parse_angle_rad("5arcmin");
-  const Reference reference = reference_of(truth, ground::used_fixes(loaded.pass, result.fixes), loaded.pass);
-  const Evaluation navigation = evaluate(result.navigation, reference, epoch, limit_rad);
-  const Evaluation attitude = evaluate(result.attitude, reference, epoch, limit_rad);
-  const Course course{ground::convergence(result, truth ? &*truth : nullptr),
-                      ground::fly_open_loops(loaded.pass, result, reference.t, reference.q_in_c, limit_rad), limit_rad};
+  std::ranges::stable_sort(passes, {}, [](const NamedPass& pass) { return pass.loaded.pass.settings.epoch; });
+  return passes;
+}
 
+/// A calibration measured against the best reference that there is. Refers to its parts.
+struct Outcome {
+  const io::LoadedPass& loaded;
+  const ground::CalibrationRun& run;
+  std::optional<Truth> truth;
+  Evaluation navigation;
+  Evaluation attitude;
+  Course course;
+};
+
+Outcome outcome_of(const NamedPass& pass, const ground::CalibrationRun& run) {
+  const double limit_rad = io::parse_angle_rad("5arcmin");
+  const Time epoch = pass.loaded.pass.settings.epoch;
+  Outcome outcome{pass.loaded, run, read_truth_of(pass.path, pass.loaded.pass), {}, {}, {}};
+  const Reference reference =
+      reference_of(outcome.truth, ground::used_fixes(pass.loaded.pass, run.fixes), pass.loaded.pass);
+  outcome.navigation = evaluate(run.navigation, reference, epoch, limit_rad);
+  outcome.attitude = evaluate(run.attitude, reference, epoch, limit_rad);
+  outcome.course = {ground::convergence(run, outcome.truth ? &*outcome.truth : nullptr),
+                    ground::fly_open_loops(pass.loaded.pass, run, reference.t, reference.q_in_c, limit_rad), limit_rad};
+  return outcome;
+}
+
+void write_outcome(const std::filesystem::path& out, const Outcome& outcome, const CalibrationOptions& options) {
+  const Time epoch = outcome.run.calibration.epoch;
   io::make_directory(out);
-  io::write_calibration(out / "calibration.json", result.calibration);
-  io::write_attitude(out / "attitude.csv", epoch, result.attitude);
-  io::write_residuals(out / "residuals.nc", epoch, residual_tables(result));
+  io::write_calibration(out / "calibration.json", outcome.run.calibration);
+  io::write_attitude(out / "attitude.csv", epoch, outcome.run.attitude);
+  if (outcome.run.definitive_attitude.size() > 0) {
+    io::write_attitude(out / "definitive-attitude.csv", epoch, outcome.run.definitive_attitude);
+  }
+  io::write_residuals(out / "residuals.nc", epoch, residual_tables(outcome.run));
   io::write_file(out / "effective-config.toml", io::format_config(options));
 
-  report::ReportInput input{loaded.pass, result, truth ? &*truth : nullptr, {}, {}};
-  input.evaluation =
-      report::Evaluation{"the " + reference.name, navigation.errors, attitude.errors, course.open_loops, limit_rad};
-  for (const io::Defect& defect : loaded.defects) {
+  report::ReportInput input{outcome.loaded.pass, outcome.run, outcome.truth ? &*outcome.truth : nullptr, {}, {}};
+  input.evaluation = report::Evaluation{"the " + outcome.navigation.reference, outcome.navigation.errors,
+                                        outcome.attitude.errors, outcome.course.open_loops, outcome.course.limit_rad};
+  for (const io::Defect& defect : outcome.loaded.defects) {
     input.telemetry_notes.push_back(defect.text());
   }
   io::write_file(out / "report.html", report::render(input));
+}
+
+nlohmann::ordered_json outcome_json(const Outcome& outcome) {
+  const Time epoch = outcome.run.calibration.epoch;
+  nlohmann::ordered_json json = {
+      {"pass", pass_json(outcome.loaded)},
+      {"calibration", nlohmann::ordered_json::parse(io::format_calibration(outcome.run.calibration))},
+      {"fixes", outcome.run.fix_counts},
+      {"samples", outcome.run.samples},
+      {"navigation", evaluation_json(outcome.navigation, epoch)},
+      {"attitude", evaluation_json(outcome.attitude, epoch)}};
+  json.update(course_json(outcome.run, outcome.course));
+  return json;
+}
+
+std::string outcome_text(const Outcome& outcome, const CorrectionOptions& corrections) {
+  const Time epoch = outcome.run.calibration.epoch;
+  return fmt::format(
+      "{}{}{}{}\n{}\n{}\n", pass_text(outcome.loaded), verdict_text(outcome.run.calibration.verdict),
+      calibration_text(outcome.run, outcome.truth), course_text(outcome.run, outcome.course),
+      evaluation_text(outcome.navigation, epoch,
+                      "Navigator, correction interval " + io::format_correction_interval(corrections) + ","),
+      evaluation_text(outcome.attitude, epoch, "Attitude of the calibration itself"));
+}
+
+/// Each pass, and then the combination where there are several.
+std::vector<CatalogueEntry> catalogue_entries(const std::vector<NamedPass>& passes,
+                                              const ground::SeveralPasses& calibrated) {
+  const PassSettings& first = passes.front().loaded.pass.settings;
+  const std::string start_up = calibrated.start_up().empty() ? io::format_epoch(first.epoch) : calibrated.start_up();
+  std::vector<CatalogueEntry> entries;
+  for (const ground::PassAlone& pass : calibrated.passes()) {
+    entries.push_back({first.spacecraft, pass.name, start_up, 1, pass.run.calibration});
+  }
+  if (passes.size() > 1) {
+    entries.push_back({first.spacecraft, passes.back().name, start_up, static_cast<int>(passes.size()),
+                       calibrated.combined().calibration});
+  }
+  return entries;
+}
+
+ground::SeveralPasses calibrate_in_order(const std::vector<NamedPass>& passes, const CalibrationOptions& options,
+                                         bool quiet) {
+  ground::SeveralPasses calibrated(options);
+  for (const NamedPass& pass : passes) {
+    try {
+      const ProgressBar bar("calibrate", quiet);
+      calibrated.add(pass.name, pass.loaded.pass, bar.meter());
+    } catch (const ground::SetupError& error) {
+      throw io::InputRefused(pass.path, {}, error.what(), error.cure());
+    }
+  }
+  return calibrated;
+}
+
+}  // namespace
+
+ExitStatus calibrate_passes(const std::vector<std::string>& paths, const CalibrationOptions& options,
+                            const std::filesystem::path& out, const std::optional<std::filesystem::path>& catalogue,
+                            const Common& common) {
+  const std::vector<NamedPass> passes = read_passes(paths);
+  const ground::SeveralPasses calibrated = calibrate_in_order(passes, options, common.quiet);
+  const bool several = passes.size() > 1;
+  for (std::size_t i = 0; several && i < passes.size(); ++i) {
+    write_outcome(out / passes[i].name, outcome_of(passes[i], calibrated.passes()[i].run), options);
+  }
+  const Outcome outcome = outcome_of(passes.back(), calibrated.combined());
+  write_outcome(out, outcome, options);
+  if (catalogue) {
+    io::add_to_catalogue(*catalogue, catalogue_entries(passes, calibrated));
+  }
 
   if (common.json) {
-    nlohmann::ordered_json json = {
-        {"pass", pass_json(loaded)},
-        {"calibration", nlohmann::ordered_json::parse(io::format_calibration(result.calibration))},
-        {"fixes", result.fix_counts},
-        {"samples", result.samples},
-        {"navigation", evaluation_json(navigation, epoch)},
-        {"attitude", evaluation_json(attitude, epoch)}};
-    json.update(course_json(result, course));
+    nlohmann::ordered_json json = outcome_json(outcome);
+    if (several) {
+      json["passes"] = passes_json(calibrated.passes());
+    }
     fmt::print("{}\n", json.dump(1));
   } else if (!common.quiet) {
-    fmt::print(
-        "{}{}{}{}\n{}\n{}\nWritten     {}: calibration.json attitude.csv residuals.nc report.html "
-        "effective-config.toml\n",
-        pass_text(loaded), verdict_text(result.calibration.verdict), calibration_text(result, truth),
-        course_text(result, course),
-        evaluation_text(navigation, epoch,
-                        "Navigator, correction interval " + io::format_correction_interval(options.corrections) + ","),
-        evaluation_text(attitude, epoch, "Attitude of the calibration itself"), out.string());
+    fmt::print("{}{}Written     {}: calibration.json attitude.csv residuals.nc report.html effective-config.toml\n",
+               several ? passes_text(calibrated.passes()) : "", outcome_text(outcome, options.corrections),
+               out.string());
   }
-  return result.calibration.verdict.trustworthy ? kTrustworthy : kDoNotUse;
+  return outcome.run.calibration.verdict.trustworthy ? kTrustworthy : kDoNotUse;
 }
 
 void add_calibrate(CLI::App& program, const Common& common, int& exit_status) {
   struct Arguments {
-    std::string pass;
+    std::vector<std::string> passes;
     std::string out;
     std::string estimator;
     std::string drift_model;
     std::string config;
+    std::string catalogue;
+    bool definitive = false;
   };
   auto arguments = std::make_shared<Arguments>();
   CLI::App* command =
       program.add_subcommand("calibrate", "Calibrate drift and alignment of the gyros against the star tracker");
-  command->add_option("PASS", arguments->pass, "Directory or NetCDF file")->required();
+  command->add_option("PASS", arguments->passes, "Directory or NetCDF file; several of one start of the rotors")
+      ->required();
   command->add_option("-o,--output", arguments->out, "Directory to write into")->required();
   command->add_option("--estimator", arguments->estimator, "Estimator")
       ->check(CLI::IsMember(std::vector<std::string>(ground::kEstimators.begin(), ground::kEstimators.end())));
@@ -145,6 +248,9 @@ void add_calibrate(CLI::App& program, const Common& common, int& exit_status) {
     return ground::is_drift_model(name) ? "" : fmt::format("not one of {}", ground::kDriftModels);
   });
   command->add_option("--config", arguments->config, "Settings (TOML); see effective-config.toml of any run");
+  command->add_flag("--definitive", arguments->definitive,
+                    "Write definitive-attitude.csv as well: at each gyro sample, by estimator batch");
+  command->add_option("--catalogue", arguments->catalogue, "Database to add the calibrations to; see history");
   command->callback([&common, &exit_status, arguments] {
     CalibrationOptions options = arguments->config.empty() ? CalibrationOptions{} : io::read_config(arguments->config);
     if (!arguments->estimator.empty()) {
@@ -153,7 +259,13 @@ void add_calibrate(CLI::App& program, const Common& common, int& exit_status) {
     if (!arguments->drift_model.empty()) {
       options.drift_model = arguments->drift_model;
     }
-    exit_status = calibrate_pass(arguments->pass, options, arguments->out, common);
+    if (arguments->definitive) {
+      options.estimator = ground::kBatch;
+      options.definitive_attitude = true;
+    }
+    const auto catalogue =
+        arguments->catalogue.empty() ? std::nullopt : std::optional(std::filesystem::path(arguments->catalogue));
+    exit_status = calibrate_passes(arguments->passes, options, arguments->out, catalogue, common);
   });
 }
 

@@ -19,6 +19,7 @@ void add_calibrate(CLI::App& program, const Common& common, int& exit_status);
 void add_navigate(CLI::App& program, const Common& common, int& exit_status);
 void add_evaluate(CLI::App& program, const Common& common, int& exit_status);
 void add_observe(CLI::App& program, const Common& common, int& exit_status);
+void add_history(CLI::App& program, const Common& common, int& exit_status);
 void add_demo(CLI::App& program, const Common& common, int& exit_status);
 
 }  // namespace trihedron::cli

@@ -2,6 +2,7 @@
 
 #include <filesystem>
 #include <memory>
+#include <optional>
 #include <string>
 
 #include "commands.hpp"
@@ -25,7 +26,7 @@ ExitStatus run_demo(const std::filesystem::path& out, const Common& common) {
   io::make_directory(out);
   io::write_file(out / "scenario.toml", kScenario);
   simulate_pass(io::read_scenario(out / "scenario.toml"), "scenario.toml", out / "pass.nc", silent);
-  const ExitStatus calibrated = calibrate_pass(out / "pass.nc", {}, out, common);
+  const ExitStatus calibrated = calibrate_passes({out / "pass.nc"}, {}, out, std::nullopt, common);
   // The calibration's verdict is the one that counts: this is the same filter on the same pass.
   static_cast<void>(navigate_pass(out / "pass.nc", std::nullopt, {}, out / "navigation.csv", silent));
   if (!common.quiet && !common.json) {

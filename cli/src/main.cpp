@@ -35,6 +35,7 @@ int main(int argc, char** argv) {
     cli::add_navigate(program, common, exit_status);
     cli::add_evaluate(program, common, exit_status);
     cli::add_observe(program, common, exit_status);
+    cli::add_history(program, common, exit_status);
     cli::add_demo(program, common, exit_status);
     try {
       program.parse(argc, argv);

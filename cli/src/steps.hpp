@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "commands.hpp"
 #include "trihedron/records/options.hpp"
@@ -17,9 +18,11 @@ namespace trihedron::cli {
 void simulate_pass(const Scenario& scenario, const std::string& name, const std::filesystem::path& pass,
                    const Common& common);
 
-/// Writes calibration.json, attitude.csv, residuals.nc, report.html and effective-config.toml into `out`.
-[[nodiscard]] ExitStatus calibrate_pass(const std::filesystem::path& pass, const CalibrationOptions& options,
-                                        const std::filesystem::path& out, const Common& common);
+/// Writes calibration.json, attitude.csv, residuals.nc, report.html and effective-config.toml into `out`: of several
+/// passes those of the combination, and those of each pass alone into a directory of its name there.
+[[nodiscard]] ExitStatus calibrate_passes(const std::vector<std::string>& paths, const CalibrationOptions& options,
+                                          const std::filesystem::path& out,
+                                          const std::optional<std::filesystem::path>& catalogue, const Common& common);
 
 /// `calibration`: a file whose values replace those known before the pass.
 [[nodiscard]] ExitStatus navigate_pass(const std::filesystem::path& pass,

@@ -7,17 +7,15 @@
 #include <chrono>
 #include <cmath>
 #include <iterator>
-#include <numbers>
 
 #include "trihedron/ground/verdict.hpp"
 #include "trihedron/io/error.hpp"
 #include "trihedron/io/time_text.hpp"
+#include "trihedron/records/scenario.hpp"
 
 namespace trihedron::cli {
 namespace {
 
-constexpr double kArcsecond = std::numbers::pi / 180 / 3600;
-constexpr double kArcminute = 60 * kArcsecond;
 constexpr Duration kStretch = std::chrono::minutes(90);
 
 double minutes(Duration d) { return to_seconds(d) / 60; }
@@ -98,11 +96,15 @@ std::string pass_text(const io::LoadedPass& loaded) {
   return text;
 }
 
+std::string finding_text(const Finding& finding) {
+  return fmt::format("  {:<20}{}\n{:22}{}\n{:22}→ {}\n", finding.code, finding.text, "", finding.evidence, "",
+                     finding.cure);
+}
+
 std::string verdict_text(const Verdict& verdict) {
   std::string text = fmt::format("Verdict     {}\n", verdict.trustworthy ? "trustworthy" : "DO NOT USE");
   for (const Finding& finding : verdict.findings) {
-    fmt::format_to(std::back_inserter(text), "  {:<20}{}\n{:22}{}\n{:22}→ {}\n", finding.code, finding.text, "",
-                   finding.evidence, "", finding.cure);
+    text += finding_text(finding);
   }
   return text;
 }
@@ -268,6 +270,43 @@ std::string evaluation_text(const Evaluation& evaluation, Time epoch, const std:
   return text;
 }
 
+std::string passes_text(const std::vector<ground::PassAlone>& passes) {
+  std::string text = fmt::format("Passes      {}, taken for one start-up; each beside those before:\n", passes.size());
+  for (const ground::PassAlone& pass : passes) {
+    const Calibration& calibration = pass.run.calibration;
+    auto out = std::back_inserter(text);
+    fmt::format_to(out, "  {:<16} {}  {}\n", pass.name, io::format_epoch(calibration.epoch),
+                   calibration.verdict.trustworthy ? "trustworthy alone" : "alone not to be used");
+    if (&pass != passes.data()) {
+      fmt::format_to(out, "    coefficients   {}\n    alignments     {}\n", pass.coefficients.text(),
+                     pass.alignments.text());
+    }
+  }
+  return text + "The last pass, from those before:\n";
+}
+
+nlohmann::ordered_json agreement_json(const ground::Agreement& agreement) {
+  return {{"chi_square", agreement.chi_square},
+          {"degrees_of_freedom", agreement.degrees_of_freedom},
+          {"limit", agreement.limit},
+          {"holds", agreement.holds()}};
+}
+
+nlohmann::ordered_json passes_json(const std::vector<ground::PassAlone>& passes) {
+  nlohmann::ordered_json json = nlohmann::ordered_json::array();
+  for (const ground::PassAlone& pass : passes) {
+    const Calibration& calibration = pass.run.calibration;
+    json.push_back({{"name", pass.name},
+                    {"epoch_tai", io::format_epoch(calibration.epoch)},
+                    {"verdict", verdict_json(calibration.verdict)}});
+    if (&pass != passes.data()) {
+      json.back()["coefficients"] = agreement_json(pass.coefficients);
+      json.back()["alignments"] = agreement_json(pass.alignments);
+    }
+  }
+  return json;
+}
+
 nlohmann::ordered_json pass_json(const io::LoadedPass& loaded) {
   const PassSettings& settings = loaded.pass.settings;
   nlohmann::ordered_json json = {
@@ -287,13 +326,17 @@ nlohmann::ordered_json pass_json(const io::LoadedPass& loaded) {
   return json;
 }
 
-nlohmann::ordered_json verdict_json(const Verdict& verdict) {
-  nlohmann::ordered_json json = {{"trustworthy", verdict.trustworthy}, {"findings", nlohmann::ordered_json::array()}};
-  for (const Finding& finding : verdict.findings) {
-    json["findings"].push_back(
+nlohmann::ordered_json findings_json(const std::vector<Finding>& findings) {
+  nlohmann::ordered_json json = nlohmann::ordered_json::array();
+  for (const Finding& finding : findings) {
+    json.push_back(
         {{"code", finding.code}, {"text", finding.text}, {"evidence", finding.evidence}, {"cure", finding.cure}});
   }
   return json;
+}
+
+nlohmann::ordered_json verdict_json(const Verdict& verdict) {
+  return {{"trustworthy", verdict.trustworthy}, {"findings", findings_json(verdict.findings)}};
 }
 
 nlohmann::ordered_json extension_json(const std::vector<ground::IntervalPair>& pairs,

@@ -11,6 +11,7 @@
 #include "trihedron/ground/convergence.hpp"
 #include "trihedron/ground/evaluate.hpp"
 #include "trihedron/ground/open_loop.hpp"
+#include "trihedron/ground/several_passes.hpp"
 #include "trihedron/io/pass.hpp"
 
 namespace trihedron::cli {
@@ -52,12 +53,19 @@ struct Course {
 [[nodiscard]] std::string angle_text(double rad);
 
 [[nodiscard]] std::string pass_text(const io::LoadedPass& loaded);
+[[nodiscard]] std::string finding_text(const Finding& finding);
 [[nodiscard]] std::string verdict_text(const Verdict& verdict);
 [[nodiscard]] std::string calibration_text(const ground::CalibrationRun& run, const std::optional<Truth>& truth);
 [[nodiscard]] std::string course_text(const ground::CalibrationRun& run, const Course& course);
 [[nodiscard]] std::string evaluation_text(const Evaluation& evaluation, Time epoch, const std::string& title);
 
+/// Of several passes: each alone, and whether it agrees with those before.
+[[nodiscard]] std::string passes_text(const std::vector<ground::PassAlone>& passes);
+[[nodiscard]] nlohmann::ordered_json passes_json(const std::vector<ground::PassAlone>& passes);
+[[nodiscard]] nlohmann::ordered_json agreement_json(const ground::Agreement& agreement);
+
 [[nodiscard]] nlohmann::ordered_json pass_json(const io::LoadedPass& loaded);
+[[nodiscard]] nlohmann::ordered_json findings_json(const std::vector<Finding>& findings);
 [[nodiscard]] nlohmann::ordered_json verdict_json(const Verdict& verdict);
 [[nodiscard]] nlohmann::ordered_json course_json(const ground::CalibrationRun& run, const Course& course);
 [[nodiscard]] nlohmann::ordered_json extension_json(const std::vector<ground::IntervalPair>& pairs,

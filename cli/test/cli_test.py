@@ -289,7 +289,7 @@ def test_evaluation_without_truth_is_against_the_star_tracker(csv_pass, tmp_path
 def test_installed_help_names_every_command():
     result = run("--help")
     assert result.returncode == 0
-    for command in ("inspect", "calibrate", "navigate", "evaluate"):
+    for command in ("inspect", "calibrate", "navigate", "evaluate", "history"):
         assert command in result.stdout
     assert run("--version").stdout.strip()
 
@@ -302,6 +302,141 @@ def test_settings_give_the_correction_interval_unless_the_option_does(tmp_path):
     assert len(navigate_and_evaluate(tmp_path, "--online", "--config", config, "--correction-interval", "none")["corrections"]) == 1
 
 
+# Several passes, and the catalogue.
+
+COEFFICIENTS = ("k0", "mu12", "mu23", "mu31", "nu12", "nu23", "nu31")
+TOLD = """
+drift_model = "esg7"
+[filter]
+noise = "told"
+[further_states]
+clock_offset = "off"
+orbital_error = "off"
+readout_bias = "off"
+wandering_drift = "off"
+"""
+
+
+def pass_of_start_up(directory, name, day, hour, start_up=None):
+    """100 min of gyros that are aligned alike on every day, with the drift coefficients of that day."""
+    gyro = """
+[[gyro.unit]]
+start_direction_c = {}
+misalignment = ["{}arcmin", "-9arcmin", "4arcmin"]
+[gyro.unit.drift]
+kappa = {{{}}}
+"""
+    units = [gyro.format(direction, 11 + unit, ", ".join(f'{c} = "{(day + 7 * unit + 3 * i) % 11 - 5}e-7rad/s"' for i, c in enumerate(COEFFICIENTS)))
+             for unit, direction in enumerate(("[0.995, 0.087, 0.045]", "[0.14, 0.985, 0.094]"))]
+    (directory / "scenario.toml").write_text(f"""
+[scenario]
+seed = {100 * day + hour}
+epoch_tai = "2009-05-{day:02}T{hour:02}:00:00"
+duration = "100min"
+[gyro.drift]
+outside_sigma = "0rad/s"
+""" + "".join(units))
+    path = directory / name
+    result = run("--quiet", "simulate", directory / "scenario.toml", "-o", path)
+    assert result.returncode == TRUSTWORTHY, result.stderr
+    if start_up:
+        toml = path / "pass.toml"
+        toml.write_text(toml.read_text().replace("[gyro]\n", f'[gyro]\nstart_up = "{start_up}"\n'))
+    return path
+
+
+@pytest.fixture(scope="session")
+def start_ups(tmp_path_factory):
+    """Two passes of one start-up, one of the next, their settings, and a catalogue of all."""
+    directory = tmp_path_factory.mktemp("start-ups")
+    first, second = (pass_of_start_up(directory, f"{name}.nc", 20, hour) for name, hour in (("first", 0), ("second", 9)))
+    third = pass_of_start_up(directory, "third", 23, 0, start_up="of the 23rd")
+    (directory / "told.toml").write_text(TOLD)
+    options = ("--config", directory / "told.toml", "--catalogue", directory / "catalogue.db", "--json")
+    results = [run("calibrate", second, first, "-o", directory / "both", *options), run("calibrate", third, "-o", directory / "3", *options)]
+    for result in results:
+        assert result.returncode == TRUSTWORTHY, result.stderr + result.stdout
+    return directory, json.loads(results[0].stdout)
+
+
+def sigmas(calibration):
+    return [row[i] ** 0.5 for i, row in enumerate(calibration["covariance"]["matrix"])]
+
+
+def test_passes_of_one_start_up_are_combined_in_the_order_of_time(start_ups):
+    directory, outcome = start_ups
+    assert [p["name"] for p in outcome["passes"]] == ["first", "second"]
+    assert "coefficients" not in outcome["passes"][0]
+    assert outcome["passes"][1]["coefficients"]["holds"] and outcome["passes"][1]["alignments"]["holds"]
+    results = ["attitude.csv", "calibration.json", "effective-config.toml", "report.html", "residuals.nc"]
+    assert sorted(f.name for f in (directory / "both").iterdir()) == sorted(results + ["first", "second"])
+    combined = json.loads((directory / "both" / "calibration.json").read_text())
+    assert combined["epoch_tai"] == "2009-05-20T09:00:00"
+    for name in ("first", "second"):
+        assert sorted(f.name for f in (directory / "both" / name).iterdir()) == results
+        alone = json.loads((directory / "both" / name / "calibration.json").read_text())
+        assert all(both < one for both, one in zip(sigmas(combined), sigmas(alone)))
+
+
+def test_passes_of_two_start_ups_are_not_to_be_used_together(start_ups, tmp_path):
+    directory, _ = start_ups
+    result = run("calibrate", directory / "first.nc", directory / "third", "-o", tmp_path / "out", "--config", directory / "told.toml")
+    assert result.returncode == DO_NOT_USE
+    assert "coefficients-moved" in result.stdout and "alignment-moved" not in result.stdout
+    assert "The drift coefficients of third are not those of the passes before." in result.stdout
+
+
+def test_passes_of_the_same_name_get_directories_of_their_own(start_ups, tmp_path):
+    directory, _ = start_ups
+    os.makedirs(tmp_path / "other")
+    os.symlink(directory / "second.nc", tmp_path / "other" / "first.nc")
+    result = run("--quiet", "calibrate", directory / "first.nc", tmp_path / "other" / "first.nc", "-o", tmp_path / "out",
+                 "--config", directory / "told.toml")
+    assert result.returncode == TRUSTWORTHY, result.stderr
+    assert (tmp_path / "out" / "first" / "calibration.json").exists() and (tmp_path / "out" / "first-2" / "calibration.json").exists()
+
+
+def test_passes_that_overlap_are_refused_with_the_pass_and_the_reason(start_ups, tmp_path):
+    directory, _ = start_ups
+    refused(run("calibrate", directory / "first.nc", directory / "first.nc", "-o", tmp_path / "out", "--config", directory / "told.toml"),
+            INPUT_REFUSED, "first.nc", "begins before the one before it ends")
+    assert not (tmp_path / "out").exists()
+
+
+def test_history_compares_start_ups(start_ups, tmp_path):
+    directory, _ = start_ups
+    history = json.loads(run("--json", "history", directory / "catalogue.db").stdout)
+    assert [(c["pass"], c["passes"], c["start_up"]) for c in history["calibrations"]] == [
+        ("first", 1, "2009-05-20T00:00:00"), ("second", 1, "2009-05-20T00:00:00"), ("second", 2, "2009-05-20T00:00:00"),
+        ("third", 1, "of the 23rd")]
+    change, = history["changes"]
+    assert (change["from"], change["to"]) == ("2009-05-20T00:00:00", "of the 23rd")
+    assert not change["coefficients"]["holds"] and change["alignments"]["holds"]
+    assert len(history["spreads"]) == 20 and history["findings"] == []
+    result = run("history", directory / "catalogue.db", "-o", tmp_path / "history.html")
+    assert result.returncode == TRUSTWORTHY, result.stderr
+    for words in ("4 of Resurs-DK1, 2 start-ups", "Gyro 2, alignment", "From start-up 2009-05-20T00:00:00 to of the 23rd", "next 1σ"):
+        assert words in result.stdout
+    assert "figure-align_z" in (tmp_path / "history.html").read_text()
+
+
+def test_a_file_that_is_no_catalogue_is_refused_and_left_alone(start_ups, tmp_path):
+    directory, _ = start_ups
+    other = tmp_path / "notes.txt"
+    other.write_text("not a database " * 100)
+    refused(run("history", other), INPUT_REFUSED, "notes.txt", "no database")
+    refused(run("history", tmp_path / "nowhere.db"), INPUT_REFUSED, "nowhere.db", "no such catalogue")
+    refused(run("calibrate", directory / "third", "-o", tmp_path / "out", "--config", directory / "told.toml", "--catalogue", other),
+            INPUT_REFUSED, "notes.txt")
+    assert other.read_text() == "not a database " * 100
+
+
+def test_a_catalogue_that_cannot_be_written_is_a_machine_failure(start_ups, tmp_path):
+    directory, _ = start_ups
+    refused(run("calibrate", directory / "third", "-o", tmp_path / "out", "--config", directory / "told.toml", "--catalogue",
+                tmp_path / "missing" / "c.db"), MACHINE_FAILED, "c.db", "check that the directory is there")
+
+
 # Wrong usage.
 
 
@@ -309,6 +444,7 @@ def test_settings_give_the_correction_interval_unless_the_option_does(tmp_path):
     ((), "subcommand"),
     (("nonsense",), "subcommand"),
     (("calibrate", EXAMPLE), "--output"),
+    (("history",), "CATALOGUE"),
     (("calibrate", EXAMPLE, "-o", "x", "--estimator", "magic"), "magic"),
     (("navigate", EXAMPLE, "-o", "x"), "--online"),
     (("navigate", EXAMPLE, "-o", "x", "--online", "--calibration", "y"), "--online"),

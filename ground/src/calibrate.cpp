@@ -221,6 +221,21 @@ std::vector<FurtherEstimate> further_of(const Estimator& estimator, const Furthe
   return further;
 }
 
+/// The prior as a calibration: values and covariance.
+Calibration known_before(const Pass& pass, int gyros, const CalibrationOptions& options) {
+  const DriftFamily family = family_of(options.drift_model);
+  const ParameterPrior prior = prior_of(pass.settings, gyros, family);
+  Calibration before;
+  before.estimator = options.estimator;
+  before.epoch = before.t = pass.settings.epoch;
+  for (const GyroParameters& gyro : prior.gyros) {
+    before.gyros.push_back(record_of(gyro, options.drift_model, family));
+  }
+  before.states = state_names(family, gyros);
+  before.covariance = prior.covariance;
+  return before;
+}
+
 template <class Estimator>
 Calibration result_of(const Pass& pass, const Cycle<Estimator>& cycle, const CalibrationOptions& options) {
   using Model = typename Estimator::BaseModel;
@@ -276,7 +291,6 @@ CalibrationRun calibrate_with(const Pass& pass, Decision decision, const Progres
   screened.gyros = Estimator::kGyros;
   const auto on_fix = [&](const typename Cycle<Estimator>::Report& report) {
     run.fixes.push_back(record_of(report));
-    ++run.fix_counts[name_of(report.fix.status)];
     if (batch) {
       screened.add_fix(report);
     }
@@ -333,12 +347,16 @@ CalibrationRun calibrate_with(const Pass& pass, Decision decision, const Progres
   if (!cycle->estimator().started()) {
     throw nothing_used(run.fixes);
   }
+  run.known_before = known_before(pass, Estimator::kGyros, run.options);
   run.calibration = result_of(pass, *cycle, run.options);
-  run.calibration.statistics = statistics_of(run.fixes);
-  run.calibration.statistics["angle_looks"] = angle_looks;
   if (batch) {
     refine(screened, pass_setup<Estimator>(cycle->estimator().setup(), pass, run.options), decision.forecasts, run);
   }
+  for (const FixRecord& fix : run.fixes) {
+    ++run.fix_counts[name_of(fix.status)];
+  }
+  run.calibration.statistics.merge(statistics_of(run.fixes));
+  run.calibration.statistics["angle_looks"] = angle_looks;
   run.calibration.verdict = judge(pass, run);
   return run;
 }

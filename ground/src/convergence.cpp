@@ -17,16 +17,15 @@ std::optional<double> true_value(const Truth& truth, const StateName& state) {
   return gyro.drift(state.parameter);
 }
 
-double final_sigma(const CalibrationRun& run, std::size_t row) {
+double sigma_of(const Calibration& calibration, std::size_t row) {
   const auto i = static_cast<Eigen::Index>(row);
-  return std::sqrt(run.calibration.covariance(i, i));
+  return std::sqrt(calibration.covariance(i, i));
 }
 
 }  // namespace
 
 bool is_determined(const CalibrationRun& run, std::size_t row) {
-  // The first fix tells nothing of the parameters: its sigmas are those of the prior.
-  return !run.parameters.sigma.empty() && final_sigma(run, row) <= 0.5 * run.parameters.sigma.front()[row];
+  return sigma_of(run.calibration, row) <= 0.5 * sigma_of(run.known_before, row);
 }
 
 std::size_t settled_from(const std::vector<double>& error, double tolerance) {
@@ -50,7 +49,7 @@ std::vector<Convergence> convergence(const CalibrationRun& run, const Truth* tru
       error.push_back(row[i] - reference.value_or(history.value.back()[i]));
     }
     result[i].determined = is_determined(run, i);
-    const double tolerance = std::max(3 * final_sigma(run, i), 0.1 * std::abs(error.front()));
+    const double tolerance = std::max(3 * sigma_of(run.calibration, i), 0.1 * std::abs(error.front()));
     const std::size_t from = settled_from(error, tolerance);
     if (from < error.size()) {
       result[i].settled = history.t[from] - calibration.epoch;

@@ -97,6 +97,15 @@ class Trial {
     return log_evidence(estimate, found_.errors.last_root.middleRows(layout().bias(0), size),
                         Eigen::VectorXd::Constant(size, problem_.setup().readout_bias_sigma));
   }
+  [[nodiscard]] double coefficient_change() const {
+    const int size = Esg7::kSize * layout().gyros;
+    Eigen::VectorXd estimate(size);
+    for (int k = 0; k < layout().gyros; ++k) {
+      estimate.segment<Esg7::kSize>(k * Esg7::kSize) = gyro(k).change_rad_s;
+    }
+    return log_evidence(estimate, found_.errors.last_root.middleRows(layout().change(0), size),
+                        Eigen::VectorXd::Constant(size, problem_.setup().coefficient_change_sigma_rad_s));
+  }
   /// Of its drift model and those that it contains.
   [[nodiscard]] std::vector<Forecast> forecasts() const {
     return ground::forecasts(problem_, found_, models_up_to(drift_model_));
@@ -284,7 +293,8 @@ void refuse_further_states(const Pass& pass, const CalibrationOptions& asked) {
   const FurtherStateOptions& states = asked.further_states;
   for (const auto& [name, choice] :
        {std::pair{"clock_offset", states.clock_offset}, std::pair{"orbital_error", states.orbital_error},
-        std::pair{"readout_bias", states.readout_bias}, std::pair{"wandering_drift", states.wandering_drift}}) {
+        std::pair{"readout_bias", states.readout_bias}, std::pair{"wandering_drift", states.wandering_drift},
+        std::pair{"coefficient_change", states.coefficient_change}}) {
     if (choice == Choice::kOn) {
       throw SetupError(
           fmt::format("estimator {} of {} gyros has no state '{}'", asked.estimator, pass.gyro.gyros, name),
@@ -322,6 +332,7 @@ CalibrationOptions as_before(CalibrationOptions options, const Calibration& prio
   settle(states.orbital_error, had("orbital"));
   settle(states.wandering_drift, false);
   settle(states.readout_bias, had("gyro1_readout_bias"));
+  settle(states.coefficient_change, false);
   return options;
 }
 
@@ -374,6 +385,7 @@ void settle_states(const Trial& everything, const CalibrationOptions& asked, Dec
   choose(&FurtherStateOptions::clock_offset, "clock_offset", &Trial::clock_offset);
   choose(&FurtherStateOptions::orbital_error, "orbital_error", &Trial::orbital_error);
   choose(&FurtherStateOptions::readout_bias, "readout_bias", &Trial::readout_bias);
+  choose(&FurtherStateOptions::coefficient_change, "coefficient_change", &Trial::coefficient_change);
   decision.forecasts = everything.forecasts();
   if (asked.drift_model == kAutoDriftModel) {
     const Forecast* best = best_of(decision.forecasts);
@@ -385,8 +397,8 @@ void settle_states(const Trial& everything, const CalibrationOptions& asked, Dec
 /// Everything on that is on or may be, and the largest drift model.
 CalibrationOptions with_everything(CalibrationOptions options, const CalibrationOptions& asked,
                                    const std::string& largest_model) {
-  for (const auto choice :
-       {&FurtherStateOptions::clock_offset, &FurtherStateOptions::orbital_error, &FurtherStateOptions::readout_bias}) {
+  for (const auto choice : {&FurtherStateOptions::clock_offset, &FurtherStateOptions::orbital_error,
+                            &FurtherStateOptions::readout_bias, &FurtherStateOptions::coefficient_change}) {
     options.further_states.*choice = asked.further_states.*choice == Choice::kOff ? Choice::kOff : Choice::kOn;
   }
   options.drift_model = largest_model;
@@ -448,10 +460,20 @@ void decide_beside_noise(const Pass& pass, const Screened& screened, const Calib
   }
 }
 
+/// It is seen over a whole pass only. Throws SetupError where it was asked for.
+void leave_out_coefficient_change(CalibrationOptions& options) {
+  if (options.further_states.coefficient_change == Choice::kOn) {
+    throw SetupError(fmt::format("estimator {} has no state 'coefficient_change'", options.estimator),
+                     "set it to off or auto, or use estimator batch");
+  }
+  options.further_states.coefficient_change = Choice::kOff;
+}
+
 /// Nothing to judge by.
 void leave_out_what_is_open(CalibrationOptions& options) {
   FurtherStateOptions& states = options.further_states;
-  for (Choice* choice : {&states.clock_offset, &states.orbital_error, &states.wandering_drift, &states.readout_bias}) {
+  for (Choice* choice : {&states.clock_offset, &states.orbital_error, &states.wandering_drift, &states.readout_bias,
+                         &states.coefficient_change}) {
     *choice = *choice == Choice::kAuto ? Choice::kOff : *choice;
   }
   if (options.drift_model == kAutoDriftModel) {
@@ -538,6 +560,9 @@ Decision decide(const Pass& pass, const CalibrationOptions& asked_for) {
   if (is_for_whole_pass(asked.drift_model) && asked.estimator == kInvariant) {
     asked.estimator = kBatch;
   }
+  if (asked.estimator != kBatch) {
+    leave_out_coefficient_change(asked);
+  }
   refuse_prior_of_others(pass, asked);
   Decision decision{asked, {}, {}};
   CalibrationOptions& options = decision.options;
@@ -564,7 +589,8 @@ Decision decide(const Pass& pass, const CalibrationOptions& asked_for) {
   }
   const FurtherStateOptions& states = asked.further_states;
   const bool states_are_settled = asked.drift_model != kAutoDriftModel && states.clock_offset != Choice::kAuto &&
-                                  states.orbital_error != Choice::kAuto && states.readout_bias != Choice::kAuto;
+                                  states.orbital_error != Choice::kAuto && states.readout_bias != Choice::kAuto &&
+                                  states.coefficient_change != Choice::kAuto;
   if (states_are_settled && !asked.find_noise) {
     leave_out_what_is_open(options);
     return decision;

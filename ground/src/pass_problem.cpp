@@ -52,6 +52,13 @@ void compress(SmootherStage& stage) {
   }
 }
 
+/// κ with so much of its change.
+VectorXd drift_at(const GyroParameters& gyro, double part) {
+  VectorXd drift_rad_s = gyro.drift_rad_s;
+  drift_rad_s.head<Esg7::kSize>() += part * gyro.change_rad_s;
+  return drift_rad_s;
+}
+
 /// Small rotation across `from` that takes it to `to`.
 Vector3d turn(const Vector3d& from, const Vector3d& to) { return from.cross(to); }
 
@@ -81,7 +88,7 @@ PassProblem::PassProblem(const ScreenedPass& pass, PassSetup setup)
     add_fixes_until(sample.t - Duration{1});  // on its own time after it
     after_gap = after_gap || sample.t - before > OnBoard::kMaxInterpolation;
     before = sample.t;
-    if (after_gap || sample.t - taken >= setup_.sample_step) {
+    if (after_gap || sample.t - taken >= setup_.sample_step || &sample == &pass.samples.back()) {
       nodes_.push_back({sample.t, sample.h_b, sample.used, nullptr, std::exchange(after_gap, false)});
       taken = sample.t;
     }
@@ -95,6 +102,10 @@ PassProblem::PassProblem(const ScreenedPass& pass, PassSetup setup)
   }
 }
 
+double PassProblem::part_of_change(Time t) const {
+  return to_seconds(t - nodes_.back().t) / to_seconds(nodes_.back().t - nodes_.front().t);
+}
+
 void PassProblem::begin_arc(const PassSolution& solution, std::size_t arc, Moment& moment) const {
   moment.arc = arc;
   moment.t = nodes_[arcs_[arc].begin].t;
@@ -105,6 +116,7 @@ void PassProblem::begin_arc(const PassSolution& solution, std::size_t arc, Momen
     by.direction = across(moment.h_in[k]);
     by.wandering.setZero();
     by.drift.setZero(3, setup_.layout.drift_size);
+    by.change.setZero();
     by.alignment.setZero();
   }
 }
@@ -112,6 +124,7 @@ void PassProblem::begin_arc(const PassSolution& solution, std::size_t arc, Momen
 void PassProblem::step(const PassSolution& solution, const Node& from, const Node& to, Moment& moment,
                        double& extra_variance_rad2) const {
   const double dt_s = to_seconds(to.t - from.t);
+  const double part = part_of_change(from.t + (to.t - from.t) / 2);
   moment.t = to.t;
   // Gyros that can be used at both ends; where those are too few, at its end.
   GyrosUsed at_both = to.used;
@@ -131,7 +144,7 @@ void PassProblem::step(const PassSolution& solution, const Node& from, const Nod
     for (int k = 0; k < gyros_; ++k) {
       const GyroParameters& gyro = solution.gyros[static_cast<std::size_t>(k)];
       const Vector3d omega_b =
-          setup_.family.basis(without_bias<double>(middle[k], gyro.readout_bias)) * gyro.drift_rad_s +
+          setup_.family.basis(without_bias<double>(middle[k], gyro.readout_bias)) * drift_at(gyro, part) +
           solution.arcs[moment.arc].wandering_rad_s[k];
       h_middle[k] = rotated<double>(h_middle[k], at_begin.value().raw() * (gyro.C_c_b * omega_b) * (dt_s / 2));
     }
@@ -152,12 +165,14 @@ void PassProblem::step(const PassSolution& solution, const Node& from, const Nod
     MomentumBy& by = moment.by[index];
     const Matrix3d C_in_b = C_in_c * gyro.C_c_b;
     const DriftFamily::Basis basis = C_in_b * setup_.family.basis(without_bias<double>(middle[k], gyro.readout_bias));
-    const Vector3d turned = dt_s * (basis * gyro.drift_rad_s + C_in_b * solution.arcs[moment.arc].wandering_rad_s[k]);
+    const Vector3d turned =
+        dt_s * (basis * drift_at(gyro, part) + C_in_b * solution.arcs[moment.arc].wandering_rad_s[k]);
     moment.h_in[k] = rotated<double>(moment.h_in[k], turned).normalized();
     const Matrix3d cross = skew<double>(turned);
     by.direction += (cross * by.direction).eval();
     by.wandering += cross * by.wandering + dt_s * C_in_b;
     by.drift += (cross * by.drift).eval() + dt_s * basis;
+    by.change += cross * by.change + dt_s * part * basis.leftCols<Esg7::kSize>();
     by.alignment += cross * (by.alignment - C_in_c);
     if (to.after_gap) {
       const double seen_rad =
@@ -257,6 +272,9 @@ MatrixXd PassProblem::attitude_by_states(const PassSolution& solution, const Mom
     if (layout.wandering_drift) {
       by_states.middleCols<3>(layout.wandering(k)) = by_phi * by.wandering;
     }
+    if (layout.coefficient_change) {
+      by_states.middleCols<Esg7::kSize>(layout.change(k)) = by_phi * by.change;
+    }
     if (layout.readout_bias) {
       by_states.middleCols<3>(layout.bias(k)) = by_direction * skew<double>(h_c[k]) * gyro.C_c_b;
     }
@@ -300,6 +318,9 @@ PassProblem::FixRows PassProblem::compare(const PassSolution& solution, const Mo
     if (layout.wandering_drift) {
       rows.H.block<2, 3>(row, layout.wandering(k)) = T * by.wandering;
     }
+    if (layout.coefficient_change) {
+      rows.H.block<2, Esg7::kSize>(row, layout.change(k)) = T * by.change;
+    }
     if (layout.readout_bias) {
       rows.H.block<2, 3>(row, layout.bias(k)) =
           T * skew<double>(h) * C_in_c * solution.gyros[static_cast<std::size_t>(k)].C_c_b;
@@ -312,6 +333,11 @@ PassProblem::FixRows PassProblem::compare(const PassSolution& solution, const Mo
   rows.H.rightCols(by_shared.cols()) = by_fix * by_shared;
   rows.R += by_fix * setup_.fix_noise[static_cast<std::size_t>(fix.fix.head)] * by_fix.transpose();
   return rows;
+}
+
+bool PassProblem::is_outlier(const FixRows& rows) const {
+  return rows.y.dot(rows.R.llt().solve(rows.y)) >
+         gate_of_freedom(std::max(static_cast<int>(rows.y.size()), 1), setup_.gate_nis);
 }
 
 void PassProblem::add_prior(const PassSolution& solution, Linear& linear) const {
@@ -328,6 +354,10 @@ void PassProblem::add_prior(const PassSolution& solution, Linear& linear) const 
     if (layout.readout_bias) {
       sigma.segment<3>(layout.bias(k)).setConstant(setup_.readout_bias_sigma);
       apart.segment<3>(layout.bias(k)) = prior.readout_bias - gyro.readout_bias;
+    }
+    if (layout.coefficient_change) {
+      sigma.segment<Esg7::kSize>(layout.change(k)).setConstant(setup_.coefficient_change_sigma_rad_s);
+      apart.segment<Esg7::kSize>(layout.change(k)) = prior.change_rad_s - gyro.change_rad_s;
     }
   }
   apart.tail(solution.shared.size()) = -solution.shared;
@@ -373,6 +403,9 @@ void PassProblem::end_arc(const PassSolution& solution, const Moment& moment, do
     end.A.block<2, 2>(row, row) = T * by.direction;
     stage.B.block(row, layout.drift(k) - d, 2, layout.drift_size) = T * by.drift;
     stage.B.block<2, 3>(row, layout.alignment(k) - d) = T * by.alignment;
+    if (layout.coefficient_change) {
+      stage.B.block<2, Esg7::kSize>(row, layout.change(k) - d) = T * by.change;
+    }
     stage.m.segment<2>(row) = T * turn(next.h_in[k], moment.h_in[k]);
     if (layout.wandering_drift) {
       end.A.block<2, 3>(row, layout.wandering(k)) = T * by.wandering;
@@ -486,6 +519,9 @@ GyroParameters PassProblem::corrected(GyroParameters parameters, int gyro, const
   parameters.C_c_b = Eigen::Quaterniond(turn * parameters.C_c_b).normalized().toRotationMatrix();
   if (layout.readout_bias) {
     parameters.readout_bias += x.segment<3>(layout.bias(gyro));
+  }
+  if (layout.coefficient_change) {
+    parameters.change_rad_s += x.segment<Esg7::kSize>(layout.change(gyro));
   }
   return parameters;
 }

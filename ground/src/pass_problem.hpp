@@ -22,6 +22,7 @@ struct PassLayout {
   int drift_size = 7;
   bool wandering_drift = false;
   bool readout_bias = false;
+  bool coefficient_change = false;
   bool clock_offset = false;
   bool orbital_error = false;
   int further_heads = 0;
@@ -32,7 +33,8 @@ struct PassLayout {
   [[nodiscard]] int drift(int gyro) const { return dynamic() + gyro * (drift_size + 3); }
   [[nodiscard]] int alignment(int gyro) const { return drift(gyro) + drift_size; }
   [[nodiscard]] int bias(int gyro) const { return drift(gyros) + 3 * gyro; }
-  [[nodiscard]] int shared() const { return drift(gyros) + (readout_bias ? 3 * gyros : 0); }
+  [[nodiscard]] int change(int gyro) const { return bias(readout_bias ? gyros : 0) + Esg7::kSize * gyro; }
+  [[nodiscard]] int shared() const { return change(coefficient_change ? gyros : 0); }
   [[nodiscard]] int clock() const { return shared(); }
   [[nodiscard]] int orbital() const { return shared() + (clock_offset ? 1 : 0); }
   /// Of head 1, 2 … beside the first, which is 0.
@@ -55,6 +57,7 @@ struct PassSetup {
   std::vector<double> readout_noise_rad;   ///< per gyro
   std::vector<Eigen::Matrix3d> fix_noise;  ///< covariance per star tracker, c axes, rad²
   double readout_bias_sigma = 1e-4;
+  double coefficient_change_sigma_rad_s = 1e-7;  ///< over the pass
   double clock_offset_sigma_s = 0.1;
   double orbital_error_sigma_rad = 1e-4;
   std::vector<double> head_alignment_sigma_rad;  ///< of further heads
@@ -79,12 +82,13 @@ struct PassSolution {
   std::vector<Arc> arcs;
 };
 
-/// How one momentum depends on the states of its arc: φ = by_direction a + by_wandering w + by_drift κ + by_alignment
-/// δ.
+/// How one momentum depends on the states of its arc: φ = by_direction a + by_wandering w + by_drift κ + by_change
+/// Δ + by_alignment δ.
 struct MomentumBy {
   Eigen::Matrix<double, 3, 2> direction;
-  Eigen::Matrix3d wandering;  ///< s
-  DriftFamily::Basis drift;   ///< s
+  Eigen::Matrix3d wandering;                     ///< s
+  DriftFamily::Basis drift;                      ///< s
+  Eigen::Matrix<double, 3, Esg7::kSize> change;  ///< s
   Eigen::Matrix3d alignment;
 };
 
@@ -146,6 +150,9 @@ class PassProblem {
   };
   [[nodiscard]] FixRows compare(const PassSolution& solution, const Moment& moment) const;
 
+  /// Whether it counts less than it would by its noise.
+  [[nodiscard]] bool is_outlier(const FixRows& rows) const;
+
   /// By the momenta and these readings.
   [[nodiscard]] static Result<AttitudeByDirections<kMaxGyros>, DirectionsFault> attitude(const PassSolution& solution,
                                                                                          const Moment& moment,
@@ -172,6 +179,8 @@ class PassProblem {
 
   void step(const PassSolution& solution, const Node& from, const Node& to, Moment& moment,
             double& extra_variance_rad2) const;
+  /// Of the coefficient change: −1 at the begin of the pass, 0 at its end.
+  [[nodiscard]] double part_of_change(Time t) const;
   void begin_arc(const PassSolution& solution, std::size_t arc, Moment& moment) const;
   [[nodiscard]] Eigen::Matrix3Xd fix_by_shared(const ScreenedPass::Fix& fix) const;
   void add_prior(const PassSolution& solution, Linear& linear) const;

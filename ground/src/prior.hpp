@@ -20,6 +20,8 @@ struct GyroParameters {
   Eigen::VectorXd drift_rad_s;                          ///< κ
   Eigen::Matrix3d C_c_b = Eigen::Matrix3d::Identity();  ///< alignment
   Eigen::Vector3d readout_bias = Eigen::Vector3d::Zero();
+  /// Of the coefficients of eq. (1), evenly over the pass; κ is that of its end.
+  Eigen::Matrix<double, Esg7::kSize, 1> change_rad_s = Eigen::Matrix<double, Esg7::kSize, 1>::Zero();
 };
 
 /// As the record has them; coefficients that it does not have are zero.

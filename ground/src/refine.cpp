@@ -1,9 +1,12 @@
 #include "refine.hpp"
 
+#include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <array>
 #include <chrono>
 #include <cmath>
+#include <map>
 #include <optional>
 #include <utility>
 
@@ -22,7 +25,7 @@ using Eigen::Vector3d;
 constexpr std::array<Duration, 3> kReaches = {std::chrono::milliseconds(3000), std::chrono::milliseconds(1400),
                                               std::chrono::milliseconds(700)};
 
-/// Readings at the times of fixes, by the samples round them together.
+/// Readings at any time, by the samples round it together.
 class SmoothReadings {
  public:
   SmoothReadings(const ScreenedPass& pass, const std::vector<double>& readout_noise_rad)
@@ -33,14 +36,14 @@ class SmoothReadings {
     GyrosUsed used{};
     double noise_factor = 1;
   };
-  /// By what a fix was compared with where no polynomial is what the body did.
-  [[nodiscard]] At at(const ScreenedPass::Fix& fix) const {
+  /// `otherwise` where no polynomial is what the body did; of the gyros that it uses.
+  [[nodiscard]] At at(Time t, const At& otherwise) const {
     for (const Duration reach : kReaches) {
-      if (const auto fitted = fit(fix, reach)) {
+      if (const auto fitted = fit(t, otherwise.used, reach)) {
         return *fitted;
       }
     }
-    return {fix.h_b, fix.used, fix.noise_factor};
+    return otherwise;
   }
 
  private:
@@ -49,8 +52,7 @@ class SmoothReadings {
     [[nodiscard]] const ScreenedPass::Sample& operator[](int i) const { return samples[static_cast<std::size_t>(i)]; }
   };
 
-  [[nodiscard]] std::optional<At> fit(const ScreenedPass::Fix& fix, Duration reach) const {
-    const Time t = fix.fix.t;
+  [[nodiscard]] std::optional<At> fit(Time t, const GyrosUsed& used, Duration reach) const {
     constexpr int kDegree = 3;
     constexpr int kLeast = 2 * (kDegree + 1);
     const auto before = [](const ScreenedPass::Sample& sample, Time time) { return sample.t < time; };
@@ -75,7 +77,7 @@ class SmoothReadings {
     for (int k = 0; k < gyros_; ++k) {
       const double sigma_rad = noise_rad_[static_cast<std::size_t>(k)];
       at.used[k] =
-          fix.used[k] && std::all_of(first, last, [&](const ScreenedPass::Sample& sample) { return sample.used[k]; });
+          used[k] && std::all_of(first, last, [&](const ScreenedPass::Sample& sample) { return sample.used[k]; });
       if (at.used[k] && !(fitted.residual_square[k] <= bound * sigma_rad * sigma_rad)) {
         return std::nullopt;
       }
@@ -88,40 +90,169 @@ class SmoothReadings {
   const std::vector<double>& noise_rad_;
 };
 
-SmoothedCourse smoothed_course(const ScreenedPass& screened, const PassProblem& problem, const BatchResult& result) {
+/// Attitude by the smoothed momenta.
+class SmoothedAttitude {
+ public:
+  /// `roots`: of the covariance, arc by arc. Refers to all of them.
+  SmoothedAttitude(const ScreenedPass& screened, const PassProblem& problem, const PassSolution& solution,
+                   const std::vector<MatrixXd>& roots)
+      : problem_(problem), solution_(solution), roots_(roots), readings_(screened, problem.setup().readout_noise_rad) {}
+
+  struct At {
+    Rot<In, C> C_in_c;
+    Vector3d sigma_rad;
+  };
+  /// `otherwise` as of SmoothReadings. Nothing where the directions give no attitude.
+  [[nodiscard]] std::optional<At> at(const PassProblem::Moment& moment, const SmoothReadings::At& otherwise) const {
+    const SmoothReadings::At reading = readings_.at(moment.t, otherwise);
+    const auto attitude = PassProblem::attitude(solution_, moment, reading.h_b, reading.used);
+    if (!attitude) {
+      return std::nullopt;
+    }
+    const MatrixXd spread =
+        problem_.attitude_by_states(solution_, moment, attitude.value(), reading.h_b) * roots_[moment.arc];
+    Vector3d variance_rad2 = spread.rowwise().squaredNorm();
+    for (int k = 0; k < problem_.setup().layout.gyros; ++k) {
+      const double noise_rad = problem_.setup().readout_noise_rad[static_cast<std::size_t>(k)] * reading.noise_factor;
+      variance_rad2 +=
+          noise_rad * noise_rad * attitude.value().by_directions.middleCols<3>(3L * k).rowwise().squaredNorm();
+    }
+    return At{attitude.value().C_in_c, variance_rad2.cwiseSqrt()};
+  }
+
+ private:
+  const PassProblem& problem_;
+  const PassSolution& solution_;
+  const std::vector<MatrixXd>& roots_;
+  SmoothReadings readings_;
+};
+
+void append(const SmoothedAttitude::At& attitude, Time t, AttitudeHistory& history) {
+  history.t.push_back(t);
+  history.q_in_c.push_back(attitude.C_in_c.quaternion());
+  history.sigma_rad.push_back(attitude.sigma_rad);
+}
+
+SmoothedCourse smoothed_course(const PassProblem& problem, const PassSolution& solution,
+                               const SmoothedAttitude& smoothed) {
   SmoothedCourse course;
-  course.readings.gyros = screened.gyros;
-  AttitudeHistory& history = course.attitude;
-  const std::vector<MatrixXd> roots = covariance_roots(result.errors, result.linear.stages);
-  const SmoothReadings readings(screened, problem.setup().readout_noise_rad);
-  problem.go_along(result.solution, [&](const PassProblem::Moment& moment) {
+  const int gyros = problem.setup().layout.gyros;
+  course.readings.gyros = gyros;
+  problem.go_along(solution, [&](const PassProblem::Moment& moment) {
     if (moment.fix == nullptr) {
       return;
     }
-    const SmoothReadings::At at = readings.at(*moment.fix);
-    const auto attitude = PassProblem::attitude(result.solution, moment, at.h_b, at.used);
+    const auto attitude = smoothed.at(moment, {moment.fix->h_b, moment.fix->used, moment.fix->noise_factor});
     if (!attitude) {
       return;
     }
-    const MatrixXd spread =
-        problem.attitude_by_states(result.solution, moment, attitude.value(), at.h_b) * roots[moment.arc];
-    Matrix3d covariance_rad2 = spread * spread.transpose();
-    for (int k = 0; k < screened.gyros; ++k) {
-      const double noise_rad = problem.setup().readout_noise_rad[static_cast<std::size_t>(k)] * at.noise_factor;
-      const Matrix3d by_direction = attitude.value().by_directions.middleCols<3>(3L * k);
-      covariance_rad2 += noise_rad * noise_rad * by_direction * by_direction.transpose();
-    }
-    history.t.push_back(moment.t);
-    history.q_in_c.push_back(attitude.value().C_in_c.quaternion());
-    history.sigma_rad.emplace_back(covariance_rad2.diagonal().cwiseSqrt());
+    append(*attitude, moment.t, course.attitude);
     course.readings.t.push_back(moment.t);
-    for (int k = 0; k < screened.gyros; ++k) {
-      const Vector3d h_b = result.solution.gyros[static_cast<std::size_t>(k)].C_c_b.transpose() *
-                           (attitude.value().C_in_c.raw().transpose() * moment.h_in[k]);
+    for (int k = 0; k < gyros; ++k) {
+      const Vector3d h_b = solution.gyros[static_cast<std::size_t>(k)].C_c_b.transpose() *
+                           (attitude->C_in_c.raw().transpose() * moment.h_in[k]);
       course.readings.h.insert(course.readings.h.end(), h_b.begin(), h_b.end());
     }
   });
   return course;
+}
+
+/// At each gyro sample after the first fix.
+AttitudeHistory definitive_attitude(const ScreenedPass& screened, const PassProblem& problem,
+                                    const PassSolution& solution, const SmoothedAttitude& smoothed) {
+  AttitudeHistory history;
+  auto sample = screened.samples.begin();
+  std::optional<PassProblem::Moment> before;
+  problem.go_along(solution, [&](const PassProblem::Moment& moment) {
+    PassProblem::Moment between = moment;
+    for (; sample != screened.samples.end() && sample->t <= moment.t; ++sample) {
+      if (!before || sample->t <= before->t) {
+        continue;
+      }
+      // From node to node a momentum turns by a fraction of an arcsecond.
+      const double part = to_seconds(sample->t - before->t) / to_seconds(moment.t - before->t);
+      between.t = sample->t;
+      for (int k = 0; k < screened.gyros; ++k) {
+        between.h_in[k] = (before->h_in[k] + part * (moment.h_in[k] - before->h_in[k])).normalized();
+      }
+      if (const auto attitude = smoothed.at(between, {sample->h_b, sample->used, 1})) {
+        append(*attitude, sample->t, history);
+      }
+    }
+    before = moment;
+  });
+  return history;
+}
+
+/// What is left of each fix when the whole pass is smoothed, in place of what it was off on board.
+void use_residuals(const PassProblem& problem, const PassSolution& solution, const std::vector<MatrixXd>& roots,
+                   std::vector<FixRecord>& fixes) {
+  std::map<std::pair<Time, int>, FixRecord*> compared;
+  for (FixRecord& fix : fixes) {
+    if (fix.used() || fix.status == FixStatus::kRejectedByGate) {
+      compared[{fix.t, fix.head}] = &fix;
+    }
+  }
+  problem.go_along(solution, [&](const PassProblem::Moment& moment) {
+    const auto found = moment.fix == nullptr ? compared.end() : compared.find({moment.t, moment.fix->fix.head});
+    if (found == compared.end()) {
+      return;
+    }
+    const PassProblem::FixRows rows = problem.compare(solution, moment);
+    if (rows.y.size() == 0) {
+      return;
+    }
+    FixRecord& fix = *found->second;
+    MatrixXd covariance = rows.R;
+    fix.status = FixStatus::kRejectedByGate;
+    if (!problem.is_outlier(rows)) {
+      fix.status = FixStatus::kUsed;
+      const MatrixXd spread = rows.H * roots[moment.arc];
+      covariance -= spread * spread.transpose();
+    }
+    fix.nis = rows.y.dot(covariance.ldlt().solve(rows.y));
+    fix.degrees_of_freedom = static_cast<int>(rows.y.size());
+    std::fill(fix.innovation.begin(), fix.innovation.end(), 0);
+    std::fill(fix.innovation_sigma.begin(), fix.innovation_sigma.end(), 0);
+    Eigen::Index row = 0;
+    for (int k = 0; k < problem.setup().layout.gyros; ++k) {
+      for (int i = 2 * k; moment.fix->used[k] && i < 2 * k + 2; ++i, ++row) {
+        fix.innovation[static_cast<std::size_t>(i)] = rows.y(row);
+        fix.innovation_sigma[static_cast<std::size_t>(i)] = std::sqrt(covariance(row, row));
+      }
+    }
+  });
+}
+
+/// How far the constants by the first half of the pass are off those by all of it: their difference has the covariance
+/// by which the second half makes them better known. Only what it halves at least counts.
+void compare_halves(const BatchResult& result, const PassLayout& layout, std::map<std::string, double>& statistics) {
+  constexpr double kLeast = 0.5;
+  const PassProblem::Linear& linear = result.linear;
+  const std::size_t half = linear.stages.size() / 2;
+  if (half == 0) {
+    return;
+  }
+  const Eigen::Index c = layout.constants();
+  const MatrixXd triangle = triangles_after(linear.prior, linear.prior_y, linear.stages, {half - 1}).front();
+  const auto R = triangle.block(layout.dynamic(), layout.dynamic(), c, c).triangularView<Eigen::Upper>();
+  // In units of what is known after the first half: the whole has covariance `rest` there.
+  const Eigen::VectorXd first = triangle.block(layout.dynamic(), layout.size(), c, 1);
+  const MatrixXd known = R * MatrixXd(result.errors.last_root.bottomRows(c));
+  const Eigen::VectorXd whole = R * Eigen::VectorXd(result.errors.x.back().tail(c));
+  const Eigen::SelfAdjointEigenSolver<MatrixXd> rest(known * known.transpose());
+  double square = 0;
+  int freedom = 0;
+  for (Eigen::Index i = 0; i < c; ++i) {
+    const double gained = 1 - rest.eigenvalues()(i);
+    if (gained > kLeast) {
+      const double off = rest.eigenvectors().col(i).dot(first - whole);
+      square += off * off / gained;
+      ++freedom;
+    }
+  }
+  statistics["halves_chi_square"] = square;
+  statistics["halves_degrees_of_freedom"] = freedom;
 }
 
 /// Columns of `to` in place of those of `from`. What was not estimated along the pass is not a number there, with the
@@ -162,6 +293,13 @@ std::vector<FurtherEstimate> further_of(const PassSetup& setup, const BatchResul
       }
     }
   }
+  if (layout.coefficient_change) {
+    for (int k = 0; k < layout.gyros; ++k) {
+      for (int i = 0; i < Esg7::kSize; ++i) {
+        tell(result.solution.gyros[static_cast<std::size_t>(k)].change_rad_s(i), layout.change(k) + i);
+      }
+    }
+  }
   return further;
 }
 
@@ -189,6 +327,13 @@ std::vector<std::string> further_names(const FurtherStateOptions& states, int fu
     for (int k = 1; k <= gyros; ++k) {
       for (const char axis : {'x', 'y', 'z'}) {
         names.push_back(fmt::format("gyro{}_readout_bias_{}_rad", k, axis));
+      }
+    }
+  }
+  if (states.coefficient_change == kOn) {
+    for (int k = 1; k <= gyros; ++k) {
+      for (const char* coefficient : Esg7::kNames) {
+        names.push_back(fmt::format("gyro{}_{}_change_rad_s", k, coefficient));
       }
     }
   }
@@ -231,11 +376,18 @@ void refine(const ScreenedPass& screened, const PassSetup& setup, const std::vec
   calibration.states = states;
   calibration.further =
       further_of(setup, result, further_names(run.options.further_states, layout.further_heads, layout.gyros));
+  compare_halves(result, layout, calibration.statistics);
   calibration.statistics["batch_iterations"] = result.iterations;
   calibration.statistics["batch_converged"] = result.converged ? 1 : 0;
-  SmoothedCourse course = smoothed_course(screened, problem, result);
+  const std::vector<MatrixXd> roots = covariance_roots(result.errors, result.linear.stages);
+  use_residuals(problem, result.solution, roots, run.fixes);
+  const SmoothedAttitude smoothed(screened, problem, result.solution, roots);
+  SmoothedCourse course = smoothed_course(problem, result.solution, smoothed);
   run.drift_models = flown(forecasts, course);
   run.attitude = std::move(course.attitude);
+  if (run.options.definitive_attitude) {
+    run.definitive_attitude = definitive_attitude(screened, problem, result.solution, smoothed);
+  }
 }
 
 }  // namespace trihedron::ground

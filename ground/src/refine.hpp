@@ -13,6 +13,9 @@
 
 namespace trihedron::ground {
 
+/// Prior sigma of the change of a coefficient over a pass, over that of the coefficient.
+inline constexpr double kChangeOfCoefficients = 0.05;
+
 /// Star trackers beside the first that the estimator uses.
 template <class Estimator>
 [[nodiscard]] int further_heads(const Pass& pass) {
@@ -36,6 +39,7 @@ template <class Estimator>
                   .drift_size = setup.family.size(),
                   .wandering_drift = states.wandering_drift == kOn,
                   .readout_bias = states.readout_bias == kOn,
+                  .coefficient_change = states.coefficient_change == kOn,
                   .clock_offset = states.clock_offset == kOn,
                   .orbital_error = states.orbital_error == kOn,
                   .further_heads = heads};
@@ -61,6 +65,7 @@ template <class Estimator>
     setup.noise.wandering_sigma_rad_s = from.wandering_sigma_rad_s;
     setup.noise.wandering_time_s = from.wandering_time_s;
   }
+  setup.coefficient_change_sigma_rad_s = kChangeOfCoefficients * pass.settings.gyros[0].drift_common_sigma_rad_s;
   setup.gate_nis = from.gate_nis;
   return setup;
 }

@@ -25,7 +25,8 @@ CalibrationOptions without_further_states(CalibrationOptions options) {
   options.drift_model = Esg7::kModelName;
   for (FurtherStateOptions::Choice* choice :
        {&options.further_states.clock_offset, &options.further_states.orbital_error,
-        &options.further_states.wandering_drift, &options.further_states.readout_bias}) {
+        &options.further_states.wandering_drift, &options.further_states.readout_bias,
+        &options.further_states.coefficient_change}) {
     *choice = FurtherStateOptions::Choice::kOff;
   }
   return options;

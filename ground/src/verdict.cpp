@@ -12,9 +12,11 @@
 #include <numbers>
 #include <utility>
 
+#include "setup.hpp"
 #include "trihedron/core/frames.hpp"
 #include "trihedron/core/telemetry.hpp"
 #include "trihedron/ground/convergence.hpp"
+#include "whiteness.hpp"
 
 namespace trihedron::ground {
 namespace {
@@ -165,6 +167,138 @@ void judge_nis(const Statistics& statistics, const std::string& what_is_wrong, s
             : "Correct the noise figures in pass.toml.");
 }
 
+/// The chance that a good pass is found fault with.
+constexpr double kOneIn = 1e-5;
+/// Below these what is left in the innovations harms nothing.
+constexpr double kCorrelated = 0.05;
+constexpr double kLineInSigmas = 0.1;
+
+bool is_chance(double square, int degrees_of_freedom) {
+  return degrees_of_freedom == 0 ||
+         square <= boost::math::quantile(boost::math::complement(boost::math::chi_squared(degrees_of_freedom), kOneIn));
+}
+
+void judge_whiteness(const Pass& pass, const CalibrationRun& run, std::vector<Finding>& findings) {
+  const Whiteness found = whiteness(run.fixes, orbital_rate_rad_s(pass.star_tracker));
+  constexpr const char* kCure =
+      "Look for drift or a star-tracker error that the model does not have: more of [further_states], a larger drift "
+      "model, estimator batch.";
+  if (std::abs(found.largest_correlation) > kCorrelated &&
+      !is_chance(found.correlation_square, found.degrees_of_freedom)) {
+    add(findings, Severity::kWarning, "innovations-not-white",
+        "Fixes that follow each other are off alike: something is left in them that the model does not have, and its "
+        "sigmas are too small.",
+        fmt::format("autocorrelation up to {:+.3f}; N Σ r² {:.0f} of {} degrees of freedom", found.largest_correlation,
+                    found.correlation_square, found.degrees_of_freedom),
+        kCure);
+  }
+  for (const Whiteness::Line& line : found.lines) {
+    if (line.amplitude > kLineInSigmas && !is_chance(2 * line.power, line.degrees_of_freedom)) {
+      add(findings, Severity::kWarning, "orbital-line",
+          fmt::format("The innovations have a line at {} the orbital rate.", line.multiple == 1 ? "" : "twice"),
+          fmt::format("amplitude up to {:.2f} sigma; twice the power {:.0f} of {} degrees of freedom", line.amplitude,
+                      2 * line.power, line.degrees_of_freedom),
+          kCure);
+    }
+  }
+}
+
+void judge_halves(const Statistics& statistics, std::vector<Finding>& findings) {
+  const double square = statistic(statistics, "halves_chi_square");
+  const auto freedom = static_cast<int>(statistic(statistics, "halves_degrees_of_freedom"));
+  if (!is_chance(square, freedom)) {
+    add(findings, Severity::kDoNotUse, "halves-disagree",
+        "The first half of the pass gives other parameters than the whole: they moved, or the model is incomplete.",
+        fmt::format("chi-square {:.0f} of {} degrees of freedom", square, freedom),
+        "Let the coefficients change (coefficient_change = \"on\" in [further_states]), give more process noise, or "
+        "calibrate a shorter pass.");
+  }
+}
+
+/// A model that is this much less likely than another is wrong, as ln.
+constexpr double kClearly = 10;
+
+void judge_drift_model(const CalibrationRun& run, std::vector<Finding>& findings) {
+  const auto& models = run.drift_models;
+  const auto used = std::find_if(models.begin(), models.end(), [&](const DriftModelForecast& model) {
+    return model.drift_model == run.calibration.gyros[0].drift_model;
+  });
+  if (used == models.end()) {
+    return;
+  }
+  const auto likelier = [](const DriftModelForecast& a, const DriftModelForecast& b) {
+    return a.log_likelihood < b.log_likelihood;
+  };
+  const auto evidence = [&](const DriftModelForecast& better) {
+    return fmt::format("{} is more likely by a factor of e^{:.0f}; forecast error {:.1f}″ in place of {:.1f}″",
+                       better.drift_model, better.log_likelihood - used->log_likelihood,
+                       better.open_loop_rms_rad / kArcsecond, used->open_loop_rms_rad / kArcsecond);
+  };
+  const auto larger = std::max_element(used, models.end(), likelier);
+  if (larger->log_likelihood > used->log_likelihood + kClearly) {
+    add(findings, Severity::kDoNotUse, "drift-model-too-small",
+        "The gyros drift in a way that the drift model does not contain; its coefficients and sigmas are wrong.",
+        evidence(*larger), fmt::format("Use drift model {}, or auto.", larger->drift_model));
+  }
+  const auto smaller = std::max_element(models.begin(), std::next(used), likelier);
+  if (smaller->log_likelihood > used->log_likelihood + kClearly) {
+    add(findings, Severity::kWarning, "drift-model-too-large",
+        "The drift model has coefficients that the pass does not support: they add their own error to what comes next.",
+        evidence(*smaller), fmt::format("Use drift model {}, or auto.", smaller->drift_model));
+  }
+  if (used + 1 == models.end() && models.size() > 1 && used->drift_model == kLargestDriftModel) {
+    add(findings, Severity::kWarning, "drift-model-at-its-limit",
+        "Even the largest drift model is not clearly enough: there may be drift of still higher degree.",
+        evidence(*std::prev(used)),
+        "Do not trust single coefficients; the forecast error says what the attitude suffers.");
+  }
+}
+
+void judge_change(const CalibrationRun& run, std::vector<Finding>& findings) {
+  std::string names;
+  for (const FurtherEstimate& state : run.calibration.further) {
+    if (state.name.ends_with("_change_rad_s") && std::abs(state.value) > 3 * state.sigma) {
+      names +=
+          fmt::format("{}{} {:+.2e} ± {:.0e} rad/s", names.empty() ? "" : ", ", state.name, state.value, state.sigma);
+    }
+  }
+  if (!names.empty()) {
+    add(findings, Severity::kWarning, "coefficients-changed",
+        "Drift coefficients changed over the pass; those given are of its end, and may go on changing.", names,
+        "Calibrate again soon: the rotors may still be warming up.");
+  }
+}
+
+void judge_star_tracker_errors(const CalibrationRun& run, std::vector<Finding>& findings) {
+  constexpr double kSure = 5;
+  double clock_s = 0;
+  double orbital_rad = 0;
+  double sureness = 0;
+  for (const FurtherEstimate& state : run.calibration.further) {
+    if (std::abs(state.value) < kSure * state.sigma) {
+      continue;
+    }
+    if (state.name == "clock_offset_s") {
+      clock_s = state.value;
+    } else if (state.name.starts_with("orbital_") && std::abs(state.value) > std::abs(orbital_rad)) {
+      orbital_rad = state.value;
+      sureness = std::abs(state.value / state.sigma);
+    }
+  }
+  if (clock_s != 0) {
+    add(findings, Severity::kNote, "clock-offset-found",
+        "The clock of the star tracker is off; the calibration has taken account of it.",
+        fmt::format("fixes hold the attitude {:+.2f} ms after their stamp", 1e3 * clock_s),
+        "Correct the time stamps of the star tracker.");
+  }
+  if (orbital_rad != 0) {
+    add(findings, Severity::kNote, "orbital-error-found",
+        "The star tracker has an error at orbital period; the calibration has taken account of it.",
+        fmt::format("largest component {:.1f}″, {:.0f} sigmas", orbital_rad / kArcsecond, sureness),
+        "None needed; look for what warms its mounting.");
+  }
+}
+
 void judge_noise(const Pass& pass, const CalibrationRun& run, std::vector<Finding>& findings) {
   if (const auto& found = run.options.star_tracker_noise_rad; found && run.options.find_noise) {
     const Eigen::Vector3d told = pass.settings.star_tracker_noise_rad / kArcsecond;
@@ -310,6 +444,11 @@ Verdict judge(const Pass& pass, const CalibrationRun& run) {
   judge_rejections(statistics, findings);
   judge_nis(statistics, "its model is incomplete or the noise is understated", findings);
   judge_noise(pass, run, findings);
+  judge_whiteness(pass, run, findings);
+  judge_halves(statistics, findings);
+  judge_drift_model(run, findings);
+  judge_change(run, findings);
+  judge_star_tracker_errors(run, findings);
   judge_determination(run, findings);
   judge_steadiness(pass, run, findings);
   judge_pair(run, findings);

@@ -25,26 +25,6 @@ CalibrationOptions batch() {
   return options;
 }
 
-/// Parameters' errors, in the order of Calibration::states.
-Eigen::VectorXd errors_of(const Truth& truth, const Calibration& calibration) {
-  Eigen::VectorXd errors(calibration.covariance.rows());
-  const auto per_gyro = errors.size() / static_cast<Eigen::Index>(calibration.gyros.size());
-  for (std::size_t k = 0; k < calibration.gyros.size(); ++k) {
-    auto own = errors.segment(static_cast<Eigen::Index>(k) * per_gyro, per_gyro);
-    for (std::size_t i = 0; i < calibration.gyros[k].drift_rad_s.size(); ++i) {
-      own(static_cast<Eigen::Index>(i)) =
-          truth.gyros[k].drift_rad_s[i].second - calibration.gyros[k].drift_rad_s[i].second;
-    }
-    own.tail<3>() = alignment_error(truth.gyros[k], calibration.gyros[k]);
-  }
-  return errors;
-}
-
-double nees_of(const Truth& truth, const Calibration& calibration) {
-  const Eigen::VectorXd errors = errors_of(truth, calibration);
-  return errors.dot(calibration.covariance.llt().solve(errors));
-}
-
 TEST(Batch, FindsTheTruthWithinItsSigmasAndSmoothsTheAttitude) {
   const auto run = calibrate(two_hours().pass, batch());
   EXPECT_EQ(run.calibration.estimator, "batch");

@@ -1,6 +1,8 @@
 #pragma once
 /// Simulated passes that several tests look at, and what they ask of a calibration.
 
+#include <Eigen/Cholesky>
+
 #include "trihedron/core/frames.hpp"
 #include "trihedron/records/calibration.hpp"
 #include "trihedron/records/options.hpp"
@@ -41,6 +43,26 @@ inline Eigen::Vector3d alignment_error(const Truth::Gyro& truth, const GyroCalib
           Rot<C, B<1>>::exp(Vec<C>::assume(estimate.alignment_rotation_vector_rad)).inverse())
       .log()
       .raw();
+}
+
+/// Parameters' errors, in the order of Calibration::states.
+inline Eigen::VectorXd errors_of(const Truth& truth, const Calibration& calibration) {
+  Eigen::VectorXd errors(calibration.covariance.rows());
+  const auto per_gyro = errors.size() / static_cast<Eigen::Index>(calibration.gyros.size());
+  for (std::size_t k = 0; k < calibration.gyros.size(); ++k) {
+    auto own = errors.segment(static_cast<Eigen::Index>(k) * per_gyro, per_gyro);
+    for (std::size_t i = 0; i < calibration.gyros[k].drift_rad_s.size(); ++i) {
+      own(static_cast<Eigen::Index>(i)) =
+          truth.gyros[k].drift_rad_s[i].second - calibration.gyros[k].drift_rad_s[i].second;
+    }
+    own.tail<3>() = alignment_error(truth.gyros[k], calibration.gyros[k]);
+  }
+  return errors;
+}
+
+inline double nees_of(const Truth& truth, const Calibration& calibration) {
+  const Eigen::VectorXd errors = errors_of(truth, calibration);
+  return errors.dot(calibration.covariance.llt().solve(errors));
 }
 
 }  // namespace trihedron::ground

@@ -143,8 +143,9 @@ CalibrationOptions read_config(const fs::path& path) {
     }
   }
   if (root.find("further_states") != nullptr) {
-    const TomlTable further(root.table_at("further_states"), path, "[further_states]",
-                            {"clock_offset", "orbital_error", "readout_bias", "wandering_drift", "wandering_time"});
+    const TomlTable further(
+        root.table_at("further_states"), path, "[further_states]",
+        {"clock_offset", "orbital_error", "readout_bias", "coefficient_change", "wandering_drift", "wandering_time"});
     FurtherStateOptions& states = options.further_states;
     if (const toml::node* node = further.find("clock_offset")) {
       states.clock_offset = choice(further, *node, "clock_offset");
@@ -154,6 +155,9 @@ CalibrationOptions read_config(const fs::path& path) {
     }
     if (const toml::node* node = further.find("readout_bias")) {
       states.readout_bias = choice(further, *node, "readout_bias");
+    }
+    if (const toml::node* node = further.find("coefficient_change")) {
+      states.coefficient_change = choice(further, *node, "coefficient_change");
     }
     if (const toml::node* node = further.find("wandering_drift")) {
       if (const auto word = choice_of(further.text(*node, "wandering_drift")); word && *word != Choice::kOn) {
@@ -198,10 +202,11 @@ std::string format_config(const CalibrationOptions& options) {
       "reopen_after_jump_rejections = {}  # the same where they began with a jump that no drift can make\n"
       "angles_after = \"{}\"  # without a fix, by the angles between the momenta: a duration or never\n"
       "\n"
-      "[further_states]  # of estimator invariant\n"
+      "[further_states]  # of estimators invariant and batch\n"
       "clock_offset = \"{}\"  # of the star tracker: auto, on or off\n"
       "orbital_error = \"{}\"  # of the star tracker, at orbital period: auto, on or off\n"
       "readout_bias = \"{}\"  # of the direction cosines: auto, on or off\n"
+      "coefficient_change = \"{}\"  # of eq. (1), evenly over the pass, by estimator batch: auto, on or off\n"
       "wandering_drift = \"{}\"  # about each case axis: auto, off, or its 1-sigma\n"
       "wandering_time = \"{}\"  # and its correlation time\n"
       "\n"
@@ -212,6 +217,7 @@ std::string format_config(const CalibrationOptions& options) {
       options.reopen_after_rejections, options.reopen_after_jump_rejections,
       options.angles_after == Duration::max() ? std::string(kNever) : format_duration(options.angles_after),
       name_of(states.clock_offset), name_of(states.orbital_error), name_of(states.readout_bias),
+      name_of(states.coefficient_change),
       states.wandering_drift == Choice::kOn ? fmt::format("{}rad/s", states.wandering_drift_rad_s)
                                             : name_of(states.wandering_drift),
       format_duration(states.wandering_time), format_correction_interval(options.corrections));

@@ -22,6 +22,7 @@ constexpr double kLongestPass_s = 1e9;  // keeps every time far from the end of 
 
 constexpr std::string_view kHeadNoise = "noise_rad";
 constexpr std::string_view kMounting = "mounting_rotation_vector_rad";
+constexpr std::string_view kStartUp = "start_up";
 constexpr std::string_view kNoise = "readout_noise_rad";
 constexpr std::string_view kDrift = "drift_prior_rad_s";
 constexpr std::string_view kDriftSigma = "drift_prior_sigma_rad_s";
@@ -213,7 +214,7 @@ PassSettings parse_pass_toml(std::string_view text, const fs::path& file, const 
   const TomlTable root = root_table(document, file);
   const TomlTable pass = pass_table(root, file);
   const TomlTable gyro(root.table_at("gyro"), file, "[gyro]",
-                       {"period_s", kNoise, kDriftSigma, kAlignmentSigma, "unit"});
+                       {"period_s", kStartUp, kNoise, kDriftSigma, kAlignmentSigma, "unit"});
   const TomlTable star_tracker(root.table_at("star_tracker"), file, "[star_tracker]",
                                {"period_s", kHeadNoise, "further"});
 
@@ -230,6 +231,9 @@ PassSettings parse_pass_toml(std::string_view text, const fs::path& file, const 
   settings.star_tracker_noise_rad = star_tracker.three_positive(star_tracker.at(kHeadNoise), kHeadNoise);
   settings.further_star_trackers = read_further_star_trackers(star_tracker, file);
   settings.gyros = read_gyros(gyro, file, gyros);
+  if (const toml::node* start_up = gyro.find(kStartUp)) {
+    settings.start_up = gyro.text(*start_up, kStartUp);
+  }
 
   const bool at_root = root.find("prior") != nullptr;
   const TomlTable& holder = at_root ? root : pass;
@@ -260,9 +264,11 @@ std::string format_pass_toml(const PassSettings& settings, std::string_view prio
   if (!prior_file.empty()) {
     text += fmt::format("prior = \"{}\"\n", prior_file);
   }
-  text += fmt::format("\n[gyro]\nperiod_s = {}\n{} = {}  # 1-sigma per direction cosine\n{} = {}\n{} = {}\n",
-                      format_seconds(settings.gyro_period), kNoise, common.readout_noise_rad, kDriftSigma,
-                      common.drift_common_sigma_rad_s, kAlignmentSigma, format_sigmas(common.alignment_sigma_rad));
+  text +=
+      fmt::format("\n[gyro]\n{}period_s = {}\n{} = {}  # 1-sigma per direction cosine\n{} = {}\n{} = {}\n",
+                  settings.start_up.empty() ? "" : fmt::format("{} = {}\n", kStartUp, format_text(settings.start_up)),
+                  format_seconds(settings.gyro_period), kNoise, common.readout_noise_rad, kDriftSigma,
+                  common.drift_common_sigma_rad_s, kAlignmentSigma, format_sigmas(common.alignment_sigma_rad));
   if (std::ranges::any_of(settings.gyros, [&](const GyroPrior& gyro) { return differs(gyro, common); })) {
     for (const GyroPrior& gyro : settings.gyros) {
       text += format_unit(gyro, common);

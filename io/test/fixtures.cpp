@@ -194,6 +194,7 @@ void expect_same_pass(const Pass& a, const Pass& b, double h_tolerance, double q
   const PassSettings& s = a.settings;
   const PassSettings& r = b.settings;
   EXPECT_EQ(s.spacecraft, r.spacecraft);
+  EXPECT_EQ(s.start_up, r.start_up);
   EXPECT_EQ(s.epoch, r.epoch);
   EXPECT_EQ(s.duration, r.duration);
   EXPECT_EQ(s.gyro_period, r.gyro_period);

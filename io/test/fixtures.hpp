@@ -2,8 +2,10 @@
 /// A small clean pass to spoil, in every format, and help to look at refusals.
 
 #include <gtest/gtest.h>
+#include <sys/resource.h>
 
 #include <Eigen/Core>
+#include <csignal>
 #include <filesystem>
 #include <string>
 #include <string_view>
@@ -30,6 +32,27 @@ class TemporaryDirectory {
 
  private:
   std::filesystem::path path_;
+};
+
+/// Makes every file of this process end at `bytes`, as a full disk would.
+class FileSizeLimit {
+ public:
+  explicit FileSizeLimit(rlim_t bytes) {
+    old_handler_ = std::signal(SIGXFSZ, SIG_IGN);
+    ::getrlimit(RLIMIT_FSIZE, &old_);
+    const rlimit limit{bytes, old_.rlim_max};
+    ::setrlimit(RLIMIT_FSIZE, &limit);
+  }
+  FileSizeLimit(const FileSizeLimit&) = delete;
+  FileSizeLimit& operator=(const FileSizeLimit&) = delete;
+  ~FileSizeLimit() {
+    ::setrlimit(RLIMIT_FSIZE, &old_);
+    std::signal(SIGXFSZ, old_handler_);
+  }
+
+ private:
+  rlimit old_{};
+  void (*old_handler_)(int) = SIG_DFL;
 };
 
 void write_text(const std::filesystem::path& file, std::string_view text);

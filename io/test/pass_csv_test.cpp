@@ -179,6 +179,7 @@ TEST_F(PassCsv, WrittenPassIsReadBackToTheLastDecimal) {
   Pass pass = read_pass(directory_.path()).pass;
   pass.gyro.h[5] = std::nan("");
   pass.settings.spacecraft = "Odd \"name\" \\ in\nTOML";
+  pass.settings.start_up = "the \"third\"";
   GyroPrior& prior = pass.settings.gyros[1];
   prior.drift_rad_s = {{"k0", 1e-6 / 3}, {"nu31", -2e-7}};
   prior.drift_sigma_rad_s = {{"k0", 1e-8}};

@@ -73,6 +73,13 @@ TEST_F(PassToml, PriorIsReadBesideTheFileFromEitherPlace) {
   }
 }
 
+TEST_F(PassToml, MayNameTheStartUpOfTheRotors) {
+  EXPECT_EQ(read_with(toml_).start_up, "");
+  EXPECT_EQ(read_with(replaced(toml_, "[gyro]", "[gyro]\nstart_up = \"2009-05-20\"")).start_up, "2009-05-20");
+  EXPECT_THAT(refusal_with(replaced(toml_, "[gyro]", "[gyro]\nstart_up = 2009-05-20")),
+              HasSubstr("\"start_up\" is a date or time; make it a string"));
+}
+
 TEST_F(PassToml, RefusesBadPriors) {
   EXPECT_THAT(refusal_with("prior = \"none.json\"\n" + toml_), HasSubstr("none.json: cannot be opened"));
   write_calibration(directory_ / "earlier.json", sample_calibration());

@@ -6,9 +6,11 @@
 namespace trihedron::report::assets {
 
 extern const std::string_view kPage;
+extern const std::string_view kHistory;
 extern const std::string_view kStyle;
 extern const std::string_view kFigures;
 extern const std::string_view kSphere;
+extern const std::string_view kTrend;
 extern const std::string_view kReport;
 extern const std::string_view kPlotly;
 

@@ -74,7 +74,7 @@ std::vector<Parameter> parameters_of(const ReportInput& input) {
     parameter.is_alignment = name.is_alignment;
     const auto row = static_cast<Eigen::Index>(i);
     parameter.sigma = std::sqrt(calibration.covariance(row, row));
-    parameter.first_sigma = input.run.parameters.t.empty() ? parameter.sigma : input.run.parameters.sigma.front()[i];
+    parameter.first_sigma = std::sqrt(input.run.known_before.covariance(row, row));
     parameter.is_determined = convergence[i].determined;
     if (convergence[i].settled) {
       parameter.converged_min = to_minutes(*convergence[i].settled);

@@ -18,7 +18,7 @@ struct Parameter {
   bool is_alignment = false;
   double value = 0;           ///< rad/s; alignment: component of the rotation vector, rad
   double sigma = 0;           ///< rad/s or rad
-  double first_sigma = 0;     ///< before the data: of the first row of the history
+  double first_sigma = 0;     ///< before the data
   bool is_determined = true;  ///< the data say more of it than was known before
   std::optional<double> truth;
   /// Estimate minus truth; alignment: −δ of C_c_b(true) = exp([δ×]) C_c_b(est).

@@ -302,15 +302,22 @@ json settings_of(const ReportInput& input) {
 /// The states beside alignment and drift.
 json further_of(const ReportInput& input) {
   json rows = json::array();
+  struct Unit {
+    std::string ending;
+    double size;
+    const char* text;
+  };
+  static const std::array<Unit, 3> kUnits = {
+      {{"_rad_s", 1e-9, "10⁻⁹ rad/s"}, {"_s", 1e-3, "ms"}, {"_rad", kArcsecond_rad, "″"}}};
   for (const FurtherEstimate& estimate : input.run.calibration.further) {
-    const bool is_time = estimate.name.ends_with("_s");
-    const double unit = is_time ? 1e-3 : kArcsecond_rad;
-    std::string name = estimate.name.substr(0, estimate.name.rfind('_'));
+    const Unit& unit =
+        *std::ranges::find_if(kUnits, [&](const Unit& its) { return estimate.name.ends_with(its.ending); });
+    std::string name = estimate.name.substr(0, estimate.name.size() - unit.ending.size());
     std::replace(name.begin(), name.end(), '_', ' ');
     rows.push_back({{"name", name},
-                    {"value", number(estimate.value / unit, 2)},
-                    {"sigma", significant(estimate.sigma / unit, 2)},
-                    {"unit", is_time ? "ms" : "″"}});
+                    {"value", number(estimate.value / unit.size, 2)},
+                    {"sigma", significant(estimate.sigma / unit.size, 2)},
+                    {"unit", unit.text}});
   }
   return rows;
 }
@@ -320,6 +327,7 @@ json states_decided(const ReportInput& input) {
                                                             {"orbital_error", "Error at orbital period"},
                                                             {"drift_outside_eq1", "Drift outside eq. (1)"},
                                                             {"readout_bias", "Bias of the direction cosines"},
+                                                            {"coefficient_change", "Change of the coefficients"},
                                                             {"wandering_drift", "Drift that wanders"}};
   json sentences = json::array();
   for (const ground::Evidence& evidence : input.run.evidence) {

@@ -46,15 +46,9 @@ json verdict_of(const Verdict& verdict) {
                    [](const Finding& a, const Finding& b) { return a.severity > b.severity; });
   const long warnings = std::count_if(findings.begin(), findings.end(),
                                       [](const Finding& f) { return f.severity == Severity::kWarning; });
-  json result = {{"findings", json::array()}, {"to_do", json::array()}};
+  json result = {{"findings", findings_of(findings)}, {"to_do", json::array()}};
   std::set<std::string> cures;
   for (const Finding& finding : findings) {
-    result["findings"].push_back({{"style", style_of(finding.severity)},
-                                  {"word", word_of(finding.severity)},
-                                  {"code", finding.code},
-                                  {"text", finding.text},
-                                  {"evidence", finding.evidence},
-                                  {"cure", finding.cure}});
     if (finding.severity != Severity::kNote && !finding.cure.empty() && cures.insert(finding.cure).second) {
       result["to_do"].push_back(finding.cure);
     }
@@ -222,6 +216,19 @@ json rejected_of(const std::map<std::string, long>& counts, const std::string& o
 }
 
 }  // namespace
+
+json findings_of(const std::vector<Finding>& findings) {
+  json list = json::array();
+  for (const Finding& finding : findings) {
+    list.push_back({{"style", style_of(finding.severity)},
+                    {"word", word_of(finding.severity)},
+                    {"code", finding.code},
+                    {"text", finding.text},
+                    {"evidence", finding.evidence},
+                    {"cure", finding.cure}});
+  }
+  return list;
+}
 
 json verdict_values(const ReportInput& input, const std::vector<Parameter>& parameters) {
   json numbers = json::array();

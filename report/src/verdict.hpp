@@ -9,6 +9,9 @@
 
 namespace trihedron::report {
 
+/// Each with its word and style.
+[[nodiscard]] nlohmann::json findings_of(const std::vector<Finding>& findings);
+
 /// verdict, numbers, undetermined, rejected.
 [[nodiscard]] nlohmann::json verdict_values(const ReportInput& input, const std::vector<Parameter>& parameters);
 

@@ -31,6 +31,17 @@ for (const name of ["good.html", "troubled.html", "alone.html"]) {
     }));
 }
 
+test("a history draws each parameter of each gyro, on a screen and on paper", () =>
+  openAndRead("history.html", { width: 768 }, async (page, complaints) => {
+    const points = await page.evaluate(() => [...document.querySelectorAll('figure[data-figure="trend"] .plot')].map(({ data }) =>
+      data.flatMap(({ y }) => y).filter((v) => v !== null).length));
+    assert.deepEqual(points, [...Array(7).fill(18), 1, ...Array(3).fill(18)]);
+    assert.ok((await overflow(page)) <= 0, `wider by ${await overflow(page)} pixels`);
+    await page.screenshot({ path: path.join(directory, "history.png"), fullPage: true });
+    await page.pdf({ path: path.join(directory, "history.pdf"), preferCSSPageSize: true, printBackground: true });
+    assert.deepEqual(complaints, []);
+  }));
+
 test("nine hours open in a small multiple of what the plotting library alone takes", async () => {
   // The least of three: whatever else the machine does only adds.
   const leastOpeningOf = async (name) => {

@@ -4,6 +4,7 @@
 #include <fstream>
 
 #include "synthetic_run.hpp"
+#include "trihedron/report/history.hpp"
 
 int main(int argc, char** argv) {
   using namespace trihedron;
@@ -17,7 +18,11 @@ int main(int argc, char** argv) {
     std::ofstream(directory / name, std::ios::binary) << render(input);
   };
 
-  write("good.html", test::synthetic_run({}).judged());
+  const test::SyntheticRun good = test::synthetic_run({});
+  write("good.html", good.judged());
+  const auto catalogue = test::synthetic_catalogue(good.run.calibration);
+  std::ofstream(directory / "history.html", std::ios::binary)
+      << render_history(catalogue, ground::compare_start_ups(catalogue));
 
   const Finding not_determined{
       "not-determined", "The data do not determine gyro2.nu12. Its value and sigma are those of the prior.",

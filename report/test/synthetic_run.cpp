@@ -269,6 +269,8 @@ class Generator {
         calibration.covariance(i, j) = rho * sigma[static_cast<std::size_t>(i)] * sigma[static_cast<std::size_t>(j)];
       }
     }
+    const std::vector<double>& sigma_before = out_.run.parameters.sigma.front();
+    out_.run.known_before.covariance = Eigen::VectorXd::Map(sigma_before.data(), states).cwiseAbs2().asDiagonal();
     calibration.statistics = {{"fixes", static_cast<double>(out_.run.fixes.size())}, {"nis_degrees_of_freedom", 4}};
   }
 
@@ -282,5 +284,42 @@ class Generator {
 }  // namespace
 
 SyntheticRun synthetic_run(const SyntheticOptions& options) { return Generator(options).make(); }
+
+std::vector<CatalogueEntry> synthetic_catalogue(const Calibration& like) {
+  constexpr double kBetweenStartUps_rad_s = 1e-6;
+  std::mt19937_64 random(2);
+  std::normal_distribution<double> normal;
+  std::vector<CatalogueEntry> catalogue;
+  for (int start_up = 0; start_up < 3; ++start_up) {
+    const double moved = kBetweenStartUps_rad_s * normal(random);
+    for (const int passes : {1, 1, 2}) {
+      CatalogueEntry entry{"Resurs-DK1", "pass-" + std::to_string(catalogue.size()),
+                           "2009-0" + std::to_string(start_up + 1) + "-20", passes, like};
+      Calibration& calibration = entry.calibration;
+      calibration.epoch += std::chrono::hours(24) * (60 * start_up + static_cast<int>(catalogue.size()));
+      calibration.t = calibration.epoch + (like.t - like.epoch);
+      calibration.covariance = Eigen::MatrixXd(like.covariance.diagonal().asDiagonal()) / passes;
+      calibration.verdict.trustworthy = !catalogue.empty();
+      Eigen::Index state = 0;
+      for (GyroCalibration& gyro : calibration.gyros) {
+        for (auto& [name, value] : gyro.drift_rad_s) {
+          value += moved + std::sqrt(calibration.covariance(state, state)) * normal(random);
+          ++state;
+        }
+        for (double& component : gyro.alignment_rotation_vector_rad) {
+          component += std::sqrt(calibration.covariance(state, state)) * normal(random);
+          ++state;
+        }
+      }
+      catalogue.push_back(entry);
+    }
+  }
+  catalogue.back().calibration.gyros[0].drift_rad_s.emplace_back("W(1,0)", 1e-8);
+  catalogue.back().calibration.states.push_back("gyro1.W(1,0)");
+  const Eigen::Index states = like.covariance.rows() + 1;
+  catalogue.back().calibration.covariance.conservativeResizeLike(
+      Eigen::MatrixXd(Eigen::VectorXd::Constant(states, 1e-18).asDiagonal()));
+  return catalogue;
+}
 
 }  // namespace trihedron::report::test

@@ -3,7 +3,9 @@
 
 #include <chrono>
 #include <string>
+#include <vector>
 
+#include "trihedron/records/catalogue.hpp"
 #include "trihedron/report/report.hpp"
 
 namespace trihedron::report::test {
@@ -30,5 +32,9 @@ struct SyntheticRun {
 
 /// The same options give the same run.
 [[nodiscard]] SyntheticRun synthetic_run(const SyntheticOptions& options);
+
+/// Two passes and their combination of each of three start-ups; the first pass is not trustworthy, and the last
+/// start-up has other drift coefficients beside those of the run.
+[[nodiscard]] std::vector<CatalogueEntry> synthetic_catalogue(const Calibration& like);
 
 }  // namespace trihedron::report::test

@@ -57,7 +57,8 @@ struct GyroEvent {
 
 /// For estimating a kind of further states instead of taking them as zero.
 struct Evidence {
-  std::string states;  ///< "clock_offset", "orbital_error", "readout_bias", "drift_outside_eq1", "wandering_drift"
+  std::string states;  ///< "clock_offset", "orbital_error", "readout_bias", "coefficient_change", "drift_outside_eq1",
+                       ///< "wandering_drift"
   double log_bayes_factor = 0;
   bool accepted = false;
 };
@@ -74,11 +75,13 @@ struct CalibrationRun {
   CalibrationOptions options;                    ///< as decided
   std::vector<Evidence> evidence;                ///< of what was left to the program to decide
   std::vector<DriftModelForecast> drift_models;  ///< that were compared, smallest first
+  Calibration known_before;                      ///< values and covariance before the pass; states as in `calibration`
   Calibration calibration;                       ///< with verdict and statistics
   std::vector<FixRecord> fixes;
   ParameterHistory parameters;
   std::vector<Correction> corrections;  ///< at the first used fix, and then every 90 min
   AttitudeHistory attitude;             ///< of the calibration itself, at the fixes' epochs
+  AttitudeHistory definitive_attitude;  ///< at each gyro sample, where it was asked for
   AttitudeHistory navigation;           ///< of the open-loop navigator at the fixes' epochs
   std::vector<Time> angle_t;            ///< z1 of eq. (3), decimated by min/max
   std::vector<double> angle_residual_min, angle_residual_max;
@@ -94,6 +97,7 @@ inline constexpr const char* kBatch = "batch";  ///< estimator invariant, and th
 inline constexpr std::array<const char*, 3> kEstimators = {kInvariant, kPaper, kBatch};
 inline constexpr const char* kAutoDriftModel = "auto";
 inline constexpr const char* kDriftModels = "auto, esg7, esg20, or vsh:1 … vsh:6, which are for estimator batch";
+inline constexpr const char* kLargestDriftModel = "vsh:6";
 [[nodiscard]] bool is_drift_model(const std::string& name);
 
 /// Called now and then with the fraction done, 0 … 1.

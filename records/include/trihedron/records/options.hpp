@@ -27,6 +27,8 @@ struct FurtherStateOptions {
   double wandering_drift_rad_s = 1e-8;     ///< its 1-sigma, where on
   Duration wandering_time = std::chrono::hours(1);
   Choice readout_bias = Choice::kAuto;  ///< of the direction cosines of each gyro
+  /// Of the coefficients of eq. (1), evenly over the pass. Of estimator batch.
+  Choice coefficient_change = Choice::kAuto;
 };
 
 struct CalibrationOptions {
@@ -54,6 +56,7 @@ struct CalibrationOptions {
   Duration angles_after = std::chrono::minutes(1);
   FurtherStateOptions further_states;
   CorrectionOptions corrections;
+  bool definitive_attitude = false;  ///< of estimator batch: the smoothed attitude at each gyro sample as well
 };
 
 }  // namespace trihedron

@@ -41,6 +41,7 @@ struct PassSettings {
   Eigen::Vector3d star_tracker_noise_rad{0, 0, 0};  ///< of the first head, 1-sigma about c x, y, z
   std::vector<FurtherStarTracker> further_star_trackers;
   std::vector<GyroPrior> gyros;
+  std::string start_up;  ///< of the rotors, "2009-05-20"; empty where it is not told
   std::optional<Calibration>
       prior;  ///< an earlier calibration: replaces drift and alignment of `gyros`, with its covariance
 };

@@ -1,0 +1,23 @@
+#pragma once
+/// The catalogue of the calibrations of one spacecraft: an SQLite database of version 1. Table `calibration` has a row
+/// each, `parameter` its values and sigmas, `finding` the codes of its verdict; `calibration.json` is the whole of it,
+/// and what is read back.
+
+#include <filesystem>
+#include <span>
+#include <vector>
+
+#include "trihedron/records/catalogue.hpp"
+
+namespace trihedron::io {
+
+/// Adds all or none; makes the catalogue where there is none. A calibration of the same epoch, t, estimator, drift
+/// model and number of passes is replaced. Throws InputRefused for a file that is no catalogue, a damaged or newer one,
+/// or one of another spacecraft; MachineFailed when it cannot be written.
+void add_to_catalogue(const std::filesystem::path& file, std::span<const CatalogueEntry> entries);
+
+/// In the order of epoch, and then t and number of passes. Throws as add_to_catalogue, and InputRefused where there is
+/// none.
+[[nodiscard]] std::vector<CatalogueEntry> read_catalogue(const std::filesystem::path& file);
+
+}  // namespace trihedron::io

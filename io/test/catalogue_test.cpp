@@ -1,0 +1,160 @@
+#include "trihedron/io/catalogue.hpp"
+
+#include <gmock/gmock.h>
+
+#include "fixtures.hpp"
+#include "sqlite.hpp"
+#include "trihedron/io/calibration.hpp"
+
+namespace trihedron::io {
+namespace {
+
+using testing::ElementsAre;
+using testing::HasSubstr;
+using testing::SizeIs;
+
+CatalogueEntry sample_entry(const char* pass = "pass-a", int passes = 1) {
+  return {"Resurs-DK1", pass, "2009-05-20", passes, sample_calibration()};
+}
+
+class Catalogue : public testing::Test {
+ protected:
+  void add(const CatalogueEntry& entry) const { add_to_catalogue(file_, {&entry, 1}); }
+  void execute(const char* statement) const {
+    SqliteDatabase(file_, SqliteDatabase::Access::kWrite).execute(statement);
+  }
+  [[nodiscard]] std::int64_t count(const char* table) const {
+    return SqliteDatabase(file_, SqliteDatabase::Access::kRead).number(std::string("SELECT count(*) FROM ") + table);
+  }
+  /// Of reading and of adding, which must be the same.
+  [[nodiscard]] std::string refusal_of_both() const {
+    const std::string of_reading = refusal([&] { static_cast<void>(read_catalogue(file_)); });
+    EXPECT_EQ(refusal([&] { add(sample_entry()); }), of_reading);
+    return of_reading;
+  }
+
+  TemporaryDirectory directory_;
+  std::filesystem::path file_ = directory_ / "catalogue.db";
+};
+
+TEST_F(Catalogue, GivesBackWhatWasAdded) {
+  add(sample_entry());
+  const auto entries = read_catalogue(file_);
+  ASSERT_THAT(entries, SizeIs(1));
+  EXPECT_EQ(entries[0].spacecraft, "Resurs-DK1");
+  EXPECT_EQ(entries[0].pass, "pass-a");
+  EXPECT_EQ(entries[0].start_up, "2009-05-20");
+  EXPECT_EQ(entries[0].passes, 1);
+  EXPECT_EQ(format_calibration(entries[0].calibration), format_calibration(sample_calibration()));
+  EXPECT_THAT(directory_.names(), ElementsAre("catalogue.db"));
+}
+
+TEST_F(Catalogue, AnswersQuestionsOfOtherPrograms) {
+  add(sample_entry());
+  EXPECT_EQ(count("calibration WHERE epoch_tai = '2009-05-20T00:00:00' AND t_s = 32400.125 AND NOT trustworthy "
+                  "AND estimator = 'invariant' AND drift_model = 'esg7'"),
+            1);
+  EXPECT_EQ(count("parameter"), 20);
+  EXPECT_EQ(count("parameter WHERE state = 'gyro2.k0' AND abs(value - 2e-6 / 3) < 1e-20 AND sigma > 5.7e-7"), 1);
+  EXPECT_EQ(count("parameter WHERE state = 'gyro1.align_y' AND abs(value + 2e-3 / 7) < 1e-15"), 1);
+  EXPECT_EQ(count("finding WHERE code = 'nis-out-of-bounds'"), 1);
+}
+
+TEST_F(Catalogue, ReplacesTheSameCalibrationAndKeepsOthers) {
+  add(sample_entry("old name"));
+  CatalogueEntry later = sample_entry("later");
+  later.calibration.epoch += std::chrono::hours(24);
+  later.calibration.t += std::chrono::hours(24);
+  CatalogueEntry of_two = sample_entry("of two", 2);
+  CatalogueEntry other = sample_entry("batch");
+  other.calibration.estimator = "batch";
+  const std::vector<CatalogueEntry> entries = {later, of_two, other};
+  add_to_catalogue(file_, entries);
+  add(sample_entry("new name"));
+  std::vector<std::string> passes;
+  for (const CatalogueEntry& entry : read_catalogue(file_)) {
+    passes.push_back(entry.pass);
+  }
+  EXPECT_THAT(passes, ElementsAre("batch", "new name", "of two", "later"));
+  EXPECT_EQ(count("parameter"), 4 * 20);
+  EXPECT_EQ(count("finding"), 4 * 2);
+}
+
+TEST_F(Catalogue, AddsAllOrNone) {
+  add(sample_entry());
+  CatalogueEntry stranger = sample_entry("stranger");
+  stranger.spacecraft = "another";
+  const std::vector<CatalogueEntry> entries = {sample_entry("of two", 2), stranger};
+  EXPECT_THAT(refusal([&] { add_to_catalogue(file_, entries); }),
+              HasSubstr("is of spacecraft \"Resurs-DK1\", not \"another\"; give each spacecraft"));
+  EXPECT_THAT(read_catalogue(file_), SizeIs(1));
+}
+
+TEST_F(Catalogue, RefusesToReadWhereThereIsNone) {
+  EXPECT_THAT(refusal([&] { static_cast<void>(read_catalogue(file_)); }), HasSubstr("there is no such catalogue"));
+  EXPECT_THAT(directory_.names(), testing::IsEmpty());
+}
+
+TEST_F(Catalogue, RefusesAFileThatIsNoDatabase) {
+  write_text(file_, "t_s,h1_x\n" + std::string(1000, '0'));
+  EXPECT_THAT(refusal_of_both(), HasSubstr("catalogue.db: is damaged or no database: "));
+  EXPECT_THAT(read_text(file_), HasSubstr("t_s,h1_x"));
+}
+
+TEST_F(Catalogue, RefusesTheDatabaseOfAnotherProgram) {
+  execute("CREATE TABLE songs (name TEXT)");
+  EXPECT_THAT(refusal_of_both(), HasSubstr("is a database, but no catalogue of calibrations"));
+  EXPECT_EQ(count("sqlite_schema"), 1);
+}
+
+TEST_F(Catalogue, RefusesANewerVersion) {
+  add(sample_entry());
+  execute("PRAGMA user_version = 2");
+  EXPECT_THAT(refusal_of_both(), HasSubstr("is a catalogue of version 2, this program reads 1"));
+}
+
+TEST_F(Catalogue, RefusesADamagedOne) {
+  add(sample_entry());
+  std::filesystem::resize_file(file_, std::filesystem::file_size(file_) / 2);
+  EXPECT_THAT(refusal_of_both(), HasSubstr("is damaged"));
+}
+
+TEST_F(Catalogue, RefusesACalibrationThatIsNone) {
+  add(sample_entry());
+  execute("UPDATE calibration SET json = replace(json, 'estimator', 'guess')");
+  EXPECT_THAT(refusal([&] { static_cast<void>(read_catalogue(file_)); }),
+              HasSubstr("catalogue.db: calibration 1: lacks key \"estimator\""));
+}
+
+TEST_F(Catalogue, RefusesOneWithoutItsTables) {
+  add(sample_entry());
+  execute("DROP TABLE calibration");
+  EXPECT_THAT(refusal_of_both(), HasSubstr("no such table"));
+}
+
+TEST_F(Catalogue, FailsWhereTheDirectoryIsMissingOrTheNameIsThatOfADirectory) {
+  const CatalogueEntry entry = sample_entry();
+  EXPECT_THROW(add_to_catalogue(directory_ / "none/c.db", {&entry, 1}), MachineFailed);
+  EXPECT_THROW(add_to_catalogue(directory_.path(), {&entry, 1}), MachineFailed);
+  EXPECT_THROW(static_cast<void>(read_catalogue(directory_.path())), MachineFailed);
+}
+
+TEST_F(Catalogue, StaysAsItWasWhenTheDiskIsFull) {
+  add(sample_entry());
+  {
+    const FileSizeLimit limit(std::filesystem::file_size(file_));
+    EXPECT_THROW(add(sample_entry("of two", 2)), MachineFailed);
+  }
+  EXPECT_THAT(read_catalogue(file_), SizeIs(1));
+  EXPECT_THAT(directory_.names(), ElementsAre("catalogue.db"));
+}
+
+TEST_F(Catalogue, WaitsForNoOtherProgramForever) {
+  add(sample_entry());
+  SqliteDatabase other(file_, SqliteDatabase::Access::kWrite);
+  other.execute("BEGIN EXCLUSIVE");
+  EXPECT_THROW(add(sample_entry()), MachineFailed);
+}
+
+}  // namespace
+}  // namespace trihedron::io

@@ -1,0 +1,195 @@
+#include "trihedron/report/history.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <set>
+#include <utility>
+
+#include "assets.hpp"
+#include "html.hpp"
+#include "parameters.hpp"
+#include "units.hpp"
+#include "verdict.hpp"
+#include "wording.hpp"
+
+namespace trihedron::report {
+namespace {
+
+using nlohmann::json;
+using Catalogue = std::vector<CatalogueEntry>;
+
+/// That an alignment is drawn from, rad: its mean over the start-ups, or the first value.
+double reference_of(const std::string& state, const Catalogue& catalogue, const ground::History& history) {
+  const auto spread = std::ranges::find(history.spreads, state, &ground::Spread::state);
+  if (spread != history.spreads.end()) {
+    return spread->mean;
+  }
+  const auto first = std::ranges::find_if(
+      catalogue, [&](const auto& entry) { return !std::isnan(ground::value_of(entry.calibration, state)); });
+  return ground::value_of(first->calibration, state);
+}
+
+/// Drift in 10⁻⁶ rad/s; alignment in ″ from its reference. NaN, in JSON null, where a calibration does not have the
+/// state.
+json trend_of(const std::string& state, const Catalogue& catalogue, const ground::History& history) {
+  const StateName name(state);
+  const double unit = name.is_alignment ? kArcsecond_rad : kMicroradian;
+  const double zero = name.is_alignment ? reference_of(state, catalogue, history) : 0;
+  json value = json::array();
+  json sigma = json::array();
+  for (const CatalogueEntry& entry : catalogue) {
+    value.push_back((ground::value_of(entry.calibration, state) - zero) / unit);
+    sigma.push_back(ground::sigma_of(entry.calibration, state) / unit);
+  }
+  json trend = {{"gyro", name.gyro + 1},
+                {"name", name.parameter},
+                {"symbol", symbol_of(name.parameter)},
+                {"value", value},
+                {"sigma", sigma}};
+  if (name.is_alignment) {
+    trend["from"] = signed_number(zero / kArcminute_rad, 3);
+  }
+  return trend;
+}
+
+json figure_data(const Catalogue& catalogue, const ground::History& history) {
+  json calibrations = json::array();
+  for (const CatalogueEntry& entry : catalogue) {
+    calibrations.push_back({{"epoch", calendar(entry.calibration.epoch)},
+                            {"pass", entry.pass},
+                            {"passes", entry.passes},
+                            {"start_up", entry.start_up},
+                            {"trustworthy", entry.calibration.verdict.trustworthy}});
+  }
+  json trends = json::array();
+  for (const std::string& state : ground::states_of(catalogue)) {
+    trends.push_back(trend_of(state, catalogue, history));
+  }
+  return {{"calibrations", calibrations}, {"trends", trends}};
+}
+
+json calibration_rows(const Catalogue& catalogue) {
+  json rows = json::array();
+  for (const CatalogueEntry& entry : catalogue) {
+    const Verdict& verdict = entry.calibration.verdict;
+    json codes = json::array();
+    for (const Finding& finding : verdict.findings) {
+      codes.push_back(finding.code);
+    }
+    rows.push_back({{"number", rows.size() + 1},
+                    {"epoch", calendar(entry.calibration.epoch)},
+                    {"start_up", entry.start_up},
+                    {"pass", entry.pass},
+                    {"passes", entry.passes},
+                    {"estimator", entry.calibration.estimator},
+                    {"model", entry.calibration.gyros.front().drift_model},
+                    {"trustworthy", verdict.trustworthy},
+                    {"codes", codes}});
+  }
+  return rows;
+}
+
+/// Once each, for the figures.
+json names_of(const Catalogue& catalogue, bool alignments) {
+  json names = json::array();
+  std::set<std::string> seen;
+  for (const std::string& state : ground::states_of(catalogue)) {
+    const StateName name(state);
+    if (name.is_alignment == alignments && seen.insert(name.parameter).second) {
+      names.push_back({{"name", name.parameter}, {"symbol", symbol_of(name.parameter)}});
+    }
+  }
+  return names;
+}
+
+std::string full_symbol_of(const std::string& state) {
+  const StateName name(state);
+  return fmt::format("{}, gyro {}", symbol_of(name.parameter), name.gyro + 1);
+}
+
+json agreement_of(const ground::Agreement& agreement) {
+  return {{"chi_square", significant(agreement.chi_square, 3)},
+          {"freedom", agreement.degrees_of_freedom},
+          {"limit", significant(agreement.limit, 3)},
+          {"changed", !agreement.holds()}};
+}
+
+json change_rows(const ground::History& history) {
+  json rows = json::array();
+  for (const ground::StartUpChange& change : history.changes) {
+    const auto greatest = std::ranges::max_element(
+        change.parameters, {}, [](const ground::ParameterChange& one) { return std::abs(one.change / one.sigma); });
+    rows.push_back({{"from", change.from},
+                    {"to", change.to},
+                    {"coefficients", agreement_of(change.coefficients)},
+                    {"alignments", agreement_of(change.alignments)},
+                    {"greatest", greatest == change.parameters.end()
+                                     ? "—"
+                                     : fmt::format("{}: {} σ", full_symbol_of(greatest->state),
+                                                   signed_number(greatest->change / greatest->sigma, 1))}});
+  }
+  return rows;
+}
+
+/// Coefficients, and alignments in units of their own.
+json spread_tables(const ground::History& history) {
+  json tables = json::array();
+  for (const bool alignments : {false, true}) {
+    const double unit = alignments ? kArcminute_rad : kMicroradian;
+    const double sigma_unit = alignments ? kArcsecond_rad : kMicroradian;
+    json rows = json::array();
+    for (const ground::Spread& spread : history.spreads) {
+      if (StateName(spread.state).is_alignment == alignments) {
+        rows.push_back({{"symbol", full_symbol_of(spread.state)},
+                        {"start_ups", spread.start_ups},
+                        {"mean", signed_number(spread.mean / unit, decimals_for(spread.next_sigma / unit))},
+                        {"deviation", significant(spread.deviation / sigma_unit, 2)},
+                        {"next", significant(spread.next_sigma / sigma_unit, 2)}});
+      }
+    }
+    tables.push_back({{"what", alignments ? "Alignment" : "Coefficient"},
+                      {"unit", alignments ? "′" : "10⁻⁶ rad/s"},
+                      {"sigma_unit", alignments ? "″" : "10⁻⁶ rad/s"},
+                      {"rows", rows}});
+  }
+  return tables;
+}
+
+json facts_of(const Catalogue& catalogue, const ground::History& history) {
+  const auto fact = [](const char* name, std::string value) -> json {
+    return {{"name", name}, {"value", std::move(value)}};
+  };
+  json facts = {fact("Calibrations", std::to_string(catalogue.size())),
+                fact("Start-ups to be compared", std::to_string(history.start_ups.size()))};
+  if (!catalogue.empty()) {
+    facts.push_back(fact("First pass", calendar(catalogue.front().calibration.epoch)));
+    facts.push_back(fact("Last pass", calendar(catalogue.back().calibration.epoch)));
+  }
+  return facts;
+}
+
+}  // namespace
+
+std::string render_history(const Catalogue& catalogue, const ground::History& history) {
+  const json changes = change_rows(history);
+  const json values = {
+      {"spacecraft", catalogue.empty() ? "Empty catalogue" : catalogue.front().spacecraft},
+      {"facts", facts_of(catalogue, history)},
+      {"calibrations", calibration_rows(catalogue)},
+      {"coefficients", names_of(catalogue, false)},
+      {"alignments", names_of(catalogue, true)},
+      {"has_changes", !changes.empty()},
+      {"changes", changes},
+      {"spreads", spread_tables(history)},
+      {"findings", findings_of(history.findings)},
+      {"style", assets::kStyle},
+      {"plotly", assets::kPlotly},
+      {"script", std::string(assets::kFigures) + std::string(assets::kTrend) + std::string(assets::kReport)},
+      {"data", script_safe(figure_data(catalogue, history))},
+      {"version", TRIHEDRON_VERSION}};
+  return fill_in(assets::kHistory, values);
+}
+
+}  // namespace trihedron::report
