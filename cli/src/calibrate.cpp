@@ -74,7 +74,7 @@ std::vector<io::Table> residual_tables(const ground::CalibrationRun& run) {
   return {fixes, parameters, angle};
 }
 
-/// A pass in the order of the command.
+/// One of the passes of a command.
 struct NamedPass {
   std::filesystem::path path;
   std::string name;  ///< of its directory or file; numbered where several have the same

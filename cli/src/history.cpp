@@ -37,7 +37,7 @@ Unit unit_of(const std::string& state) { return StateName(state).is_alignment ? 
 /// With the decimals of two digits of sigma.
 std::string estimate_text(double value, double sigma, const Unit& unit) {
   const auto decimals = [](double shown) {
-    return std::clamp(1 - static_cast<int>(std::floor(std::log10(shown))), 0, 9);
+    return shown > 0 ? std::clamp(1 - static_cast<int>(std::floor(std::log10(shown))), 0, 9) : 3;
   };
   return fmt::format("{:+.{}f} ±{:.{}f}", value / unit.value, decimals(sigma / unit.value), sigma / unit.sigma,
                      decimals(sigma / unit.sigma));

@@ -69,6 +69,7 @@ std::vector<std::string> common_states(const Calibration& a, const Calibration& 
 
 std::vector<Eigen::Index> rows_of(const Calibration& calibration, const std::vector<std::string>& states) {
   std::vector<Eigen::Index> rows;
+  rows.reserve(states.size());
   for (const std::string& state : states) {
     rows.push_back(std::ranges::find(calibration.states, state) - calibration.states.begin());
   }

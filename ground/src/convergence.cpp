@@ -17,7 +17,7 @@ std::optional<double> true_value(const Truth& truth, const StateName& state) {
   return gyro.drift(state.parameter);
 }
 
-double sigma_of(const Calibration& calibration, std::size_t row) {
+double sigma_in_row(const Calibration& calibration, std::size_t row) {
   const auto i = static_cast<Eigen::Index>(row);
   return std::sqrt(calibration.covariance(i, i));
 }
@@ -25,7 +25,7 @@ double sigma_of(const Calibration& calibration, std::size_t row) {
 }  // namespace
 
 bool is_determined(const CalibrationRun& run, std::size_t row) {
-  return sigma_of(run.calibration, row) <= 0.5 * sigma_of(run.known_before, row);
+  return sigma_in_row(run.calibration, row) <= 0.5 * sigma_in_row(run.known_before, row);
 }
 
 std::size_t settled_from(const std::vector<double>& error, double tolerance) {
@@ -49,7 +49,7 @@ std::vector<Convergence> convergence(const CalibrationRun& run, const Truth* tru
       error.push_back(row[i] - reference.value_or(history.value.back()[i]));
     }
     result[i].determined = is_determined(run, i);
-    const double tolerance = std::max(3 * sigma_of(run.calibration, i), 0.1 * std::abs(error.front()));
+    const double tolerance = std::max(3 * sigma_in_row(run.calibration, i), 0.1 * std::abs(error.front()));
     const std::size_t from = settled_from(error, tolerance);
     if (from < error.size()) {
       result[i].settled = history.t[from] - calibration.epoch;

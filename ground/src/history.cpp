@@ -24,6 +24,7 @@ std::vector<StartUp> start_ups_of(const std::vector<CatalogueEntry>& catalogue) 
     }
   }
   std::vector<StartUp> start_ups;
+  start_ups.reserve(best.size());
   for (const auto& [name, entry] : best) {
     start_ups.push_back({name, &entry->calibration});
   }
@@ -109,7 +110,7 @@ History compare_start_ups(const std::vector<CatalogueEntry>& catalogue) {
 }
 
 Spread spread_of(const std::vector<double>& values, const std::vector<double>& sigmas) {
-  const Eigen::Index count = static_cast<Eigen::Index>(values.size());
+  const auto count = static_cast<Eigen::Index>(values.size());
   const Eigen::ArrayXd x = Eigen::ArrayXd::Map(values.data(), count);
   const Eigen::ArrayXd own = Eigen::ArrayXd::Map(sigmas.data(), count).square();
   const auto weights = [&](double variance) { return Eigen::ArrayXd((own + variance).inverse()); };
