@@ -159,6 +159,119 @@ TEST(Batch, RefusesAClockThatWasSetBack) {
   }
 }
 
+TEST(Batch, GivesTheAttitudeAtEachSample) {
+  const auto& [pass, truth, events] = two_hours();
+  CalibrationOptions options = batch();
+  options.definitive_attitude = true;
+  const AttitudeHistory attitude = calibrate(pass, options).definitive_attitude;
+  ASSERT_EQ(attitude.t, std::vector<Time>(pass.gyro.t.begin() + 1, pass.gyro.t.end()));
+  const auto all = statistics(attitude_errors(attitude, truth.t, truth.q_in_c));
+  EXPECT_GT(all.count, 2000U);
+  EXPECT_LT(all.rms_rad.maxCoeff(), 0.8 * kArcsecond);
+  EXPECT_NEAR(*all.normalised_square, 1, 0.5);  // the part of the parameters is one draw, the same all along
+  // Between the truth's epochs the attitude is as smooth as the body moves.
+  double roughness = 0;
+  for (std::size_t i = 2; i < 10000; ++i) {
+    const auto turn = [&](std::size_t from) {
+      return Rot<C, C>::assume(attitude.q_in_c[from].conjugate() * attitude.q_in_c[from + 1]).log().raw();
+    };
+    roughness = std::max(roughness, (turn(i - 1) - turn(i - 2)).norm());
+  }
+  // A step of 1″, or the slews' 0.02°/s² over 125 ms each, twice.
+  EXPECT_LT(roughness, 1 * kArcsecond + 2 * 3.5e-4 * 0.125 * 0.125);
+}
+
+TEST(Batch, FindsTheDriftModelThatForecastsBest) {
+  Scenario scenario = scenario_in_eq1(12, std::chrono::hours(3));
+  CalibrationOptions options = batch();
+  options.drift_model = "auto";
+  const auto plain = calibrate(sim::simulate(scenario).pass, options);
+  EXPECT_EQ(plain.calibration.gyros[0].drift_model, "esg7");
+  ASSERT_EQ(plain.drift_models.size(), 4U);  // and vsh:1, 2, 3
+  EXPECT_EQ(plain.drift_models[0].log_likelihood, 0);
+  EXPECT_LT(plain.drift_models[3].log_likelihood, 0);
+
+  const auto codes = [](const CalibrationRun& run) {
+    std::vector<std::string> all;
+    for (const Finding& finding : run.calibration.verdict.findings) {
+      all.push_back(finding.code);
+    }
+    return all;
+  };
+  EXPECT_THAT(codes(plain), testing::Not(testing::Contains(testing::HasSubstr("drift-model"))));
+  for (GyroScenario& gyro : scenario.gyros) {
+    gyro.drift.harmonics = {{DriftHarmonic::Potential::kW, 1, -1, 3e-7}, {DriftHarmonic::Potential::kD, 1, 1, -2e-7}};
+  }
+  const auto simulated = sim::simulate(scenario);
+  const auto run = calibrate(simulated.pass, options);
+  EXPECT_EQ(run.calibration.gyros[0].drift_model, "vsh:1");
+  ASSERT_GE(run.drift_models.size(), 4U);
+  EXPECT_GT(run.drift_models[1].log_likelihood, 100);
+  EXPECT_LT(run.drift_models[1].open_loop_rms_rad, run.drift_models[0].open_loop_rms_rad / 3);
+  for (std::size_t k = 0; k < 2; ++k) {
+    EXPECT_LT(alignment_error(simulated.truth.gyros[k], run.calibration.gyros[k]).norm(), 5 * kArcsecond);
+  }
+  options.drift_model = "esg7";
+  EXPECT_THAT(codes(calibrate(simulated.pass, options)), testing::Contains("drift-model-too-small"));
+}
+
+TEST(Batch, FindsThatCoefficientsChange) {
+  Scenario scenario = scenario_in_eq1(13, std::chrono::hours(3));
+  for (GyroScenario& gyro : scenario.gyros) {
+    gyro.drift.kappa_rad_s = {1e-6, 1e-6, -1e-6, 0.5e-6, 1e-6, -1e-6, 1e-6};
+    gyro.drift.warm_up_fraction = 0.1;
+    gyro.drift.warm_up_time_s = 6 * 3600;  // nearly even over the pass
+  }
+  const auto simulated = sim::simulate(scenario);
+  CalibrationOptions options = batch();
+  options.further_states.coefficient_change = FurtherStateOptions::Choice::kAuto;
+  const auto run = calibrate(simulated.pass, options);
+  ASSERT_EQ(run.calibration.further.size(), 14U);
+  EXPECT_EQ(run.calibration.further[0].name, "gyro1_k0_change_rad_s");
+  // From 1 + 0.1 to 1 + 0.1 exp(−1/2): what stands in the calibration is of the end.
+  const double change = 0.1 * (std::exp(-0.5) - 1);
+  const double at_end = 1 + 0.1 * std::exp(-0.5);
+  int known = 0;
+  for (std::size_t i = 0; i < 14; ++i) {
+    const FurtherEstimate& estimate = run.calibration.further[i];
+    const auto& [name, value] = run.calibration.gyros[i / 7].drift_rad_s[i % 7];
+    const double kappa = *simulated.truth.gyros[i / 7].drift(name);
+    // Of the second order of the exponential 1e-3 κ is left, and takes its part in what is hardly seen.
+    EXPECT_NEAR(estimate.value, change * kappa, 4 * estimate.sigma + 3e-9) << estimate.name;
+    known += std::abs(estimate.value) > 3 * estimate.sigma ? 1 : 0;
+    if (estimate.sigma < 1e-8) {
+      EXPECT_NEAR(value, at_end * kappa, 2e-8) << name;
+    }
+  }
+  EXPECT_GT(known, 2);
+  EXPECT_THAT(run.calibration.verdict.findings,
+              testing::Contains(testing::Field(&Finding::code, "coefficients-changed")));
+
+  const auto steady = calibrate(two_hours().pass, options);
+  EXPECT_TRUE(steady.calibration.further.empty());
+  options.estimator = "invariant";
+  EXPECT_TRUE(calibrate(two_hours().pass, options).calibration.further.empty());
+  options.further_states.coefficient_change = FurtherStateOptions::Choice::kOn;
+  EXPECT_THROW((void)calibrate(two_hours().pass, options), SetupError);
+}
+
+TEST(Batch, ComparesTheHalvesOfThePass) {
+  CalibrationOptions options = batch();
+  const auto good = calibrate(two_hours().pass, options).calibration.statistics;
+  const double freedom = good.at("halves_degrees_of_freedom");
+  EXPECT_GE(freedom, 10);
+  EXPECT_LT(good.at("halves_chi_square"), freedom + 4 * std::sqrt(2 * freedom));
+  Scenario scenario = scenario_in_eq1(14, std::chrono::hours(2));
+  for (GyroScenario& gyro : scenario.gyros) {
+    gyro.drift.warm_up_fraction = 0.1;
+    gyro.drift.warm_up_time_s = 3600;
+  }
+  const auto moving = calibrate(sim::simulate(scenario).pass, options).calibration;
+  EXPECT_GT(moving.statistics.at("halves_chi_square"), 1000);
+  EXPECT_FALSE(moving.verdict.trustworthy);
+  EXPECT_THAT(moving.verdict.findings, testing::Contains(testing::Field(&Finding::code, "halves-disagree")));
+}
+
 /// Samples and fixes of the beginning of a pass, all used.
 ScreenedPass screened_beginning(const sim::SimulatedPass& simulated, std::size_t samples) {
   ScreenedPass screened;
@@ -188,6 +301,7 @@ PassSetup full_setup(const sim::SimulatedPass& simulated) {
                   .drift_size = Esg20::kSize,
                   .wandering_drift = true,
                   .readout_bias = true,
+                  .coefficient_change = true,
                   .clock_offset = true,
                   .orbital_error = true};
   setup.family = DriftFamily::of<Esg20>();

@@ -33,7 +33,7 @@ inline CalibrationOptions told() {
   options.find_noise = false;
   FurtherStateOptions& states = options.further_states;
   states.clock_offset = states.orbital_error = states.wandering_drift = states.readout_bias =
-      FurtherStateOptions::Choice::kOff;
+      states.coefficient_change = FurtherStateOptions::Choice::kOff;
   return options;
 }
 

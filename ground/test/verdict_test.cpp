@@ -2,7 +2,9 @@
 
 #include <gmock/gmock.h>
 
+#include <array>
 #include <cmath>
+#include <random>
 
 #include "trihedron/core/frames.hpp"
 
@@ -79,6 +81,73 @@ TEST(Verdict, FindsABatchThatHasNotConverged) {
   run.calibration.statistics["batch_converged"] = 0;
   EXPECT_THAT(codes(judge(good_pass(), run)), ElementsAre("batch-not-converged"));
   EXPECT_FALSE(judge(good_pass(), run).trustworthy);
+}
+
+/// Innovations of one gyro with this in them beside unit white noise, in sigmas.
+CalibrationRun with_innovations(double correlation, double line) {
+  auto run = good_run();
+  std::mt19937_64 random(7);
+  std::normal_distribution<double> normal;
+  std::array<double, 2> last{};
+  for (FixRecord& fix : run.fixes) {
+    fix.innovation_sigma = {1e-5, 1e-5};
+    for (double& z : last) {
+      z = correlation * z + std::sqrt(1 - correlation * correlation) * normal(random);
+    }
+    // The rate of the flight.
+    const double wave = line * std::sin(1.1e-3 * to_seconds(fix.t.time_since_epoch()));
+    fix.innovation = {1e-5 * (last[0] + wave), 1e-5 * last[1]};
+  }
+  return run;
+}
+
+TEST(Verdict, FindsInnovationsThatAreNotWhite) {
+  EXPECT_THAT(codes(judge(good_pass(), with_innovations(0, 0))), IsEmpty());
+  EXPECT_THAT(codes(judge(good_pass(), with_innovations(0.3, 0))), Contains("innovations-not-white"));
+  EXPECT_THAT(codes(judge(good_pass(), with_innovations(-0.3, 0))), Contains("innovations-not-white"));
+}
+
+TEST(Verdict, FindsALineAtTheOrbitalRate) {
+  EXPECT_THAT(codes(judge(good_pass(), with_innovations(0, 0.02))), IsEmpty());
+  EXPECT_THAT(codes(judge(good_pass(), with_innovations(0, 0.2))), ElementsAre("orbital-line"));
+}
+
+TEST(Verdict, FindsHalvesThatDisagree) {
+  auto run = good_run();
+  run.calibration.statistics["halves_degrees_of_freedom"] = 18;
+  run.calibration.statistics["halves_chi_square"] = 40;
+  EXPECT_THAT(codes(judge(good_pass(), run)), IsEmpty());
+  run.calibration.statistics["halves_chi_square"] = 60;  // chance of 2e-6
+  EXPECT_THAT(codes(judge(good_pass(), run)), ElementsAre("halves-disagree"));
+  EXPECT_FALSE(judge(good_pass(), run).trustworthy);
+}
+
+TEST(Verdict, FindsADriftModelThatIsTooSmallOrTooLarge) {
+  auto run = good_run();
+  run.drift_models = {{"esg7", 7, 0, 1e-4}, {"vsh:1", 13, 5, 2e-5}, {"vsh:2", 19, -8, 3e-5}};
+  for (const char* model : {"esg7", "vsh:1", "esg20"}) {
+    run.calibration.gyros[0].drift_model = model;
+    EXPECT_THAT(codes(judge(good_pass(), run)), IsEmpty()) << model;
+  }
+  run.calibration.gyros[0].drift_model = "vsh:2";
+  EXPECT_THAT(codes(judge(good_pass(), run)), ElementsAre("drift-model-too-large"));
+  EXPECT_TRUE(judge(good_pass(), run).trustworthy);
+  run.drift_models[1].log_likelihood = 500;
+  run.calibration.gyros[0].drift_model = "esg7";
+  EXPECT_THAT(codes(judge(good_pass(), run)), ElementsAre("drift-model-too-small"));
+  EXPECT_FALSE(judge(good_pass(), run).trustworthy);
+  run.drift_models.push_back({kLargestDriftModel, 96, 900, 1e-5});
+  run.calibration.gyros[0].drift_model = kLargestDriftModel;
+  EXPECT_THAT(codes(judge(good_pass(), run)), ElementsAre("drift-model-at-its-limit"));
+}
+
+TEST(Verdict, TellsOfErrorsOfTheStarTrackerThatWereFound) {
+  auto run = good_run();
+  run.calibration.further = {{"clock_offset_s", 1e-4, 1e-4}, {"orbital_sine_x_rad", 1e-5, 4e-6}};
+  EXPECT_THAT(codes(judge(good_pass(), run)), IsEmpty());
+  run.calibration.further = {{"clock_offset_s", -1e-2, 1e-4}, {"orbital_sine_x_rad", 1e-5, 1e-6}};
+  EXPECT_THAT(codes(judge(good_pass(), run)), ElementsAre("clock-offset-found", "orbital-error-found"));
+  EXPECT_TRUE(judge(good_pass(), run).trustworthy);
 }
 
 TEST(Verdict, FindsTooFewFixes) {
