@@ -75,6 +75,38 @@ TEST(Observability, PredictsTheSigmasOfTheBatch) {
   }
 }
 
+/// All fixes of ten minutes without process noise as one dense problem, from which the directions at the start are
+/// eliminated.
+TEST(Observability, IsThatOfTheDenseProblem) {
+  const Pass pass = sim::simulate(scenario_in_eq1(6, std::chrono::minutes(10))).pass;
+  CalibrationOptions options = told();
+  options.direction_random_walk_rad_sqrt_s = 0;
+  const Screened screened = screen(pass, options);
+  const PassProblem problem(screened.pass, setup_of(pass, options));
+  const PassProblem::Linear linear = problem.linearise(first_solution(problem, screened));
+  const Eigen::Index n = linear.prior.cols();
+  const Eigen::Index d = problem.setup().layout.dynamic();
+  Eigen::MatrixXd by_first = Eigen::MatrixXd::Identity(n, n);  // of the states of an arc
+  Eigen::MatrixXd information = Eigen::MatrixXd::Zero(n, n);
+  for (std::size_t arc = 0; arc < linear.stages.size(); ++arc) {
+    const Eigen::MatrixXd rows = linear.stages[arc].H * by_first;
+    information += rows.transpose() * rows;
+    if (arc < linear.ends.size()) {
+      by_first.topRows(d) =
+          (linear.ends[arc].A * by_first.topRows(d) + linear.stages[arc].B * by_first.bottomRows(n - d)).eval();
+    }
+  }
+  const Eigen::MatrixXd marginal = information.bottomRightCorner(n - d, n - d) -
+                                   information.bottomLeftCorner(n - d, d) * information.topLeftCorner(d, d).llt().solve(
+                                                                                information.topRightCorner(d, n - d));
+  Eigen::MatrixXd prior = linear.prior;
+  prior.rightCols(n - d).setZero();
+  const Eigen::MatrixXd root = information_on_constants(prior, linear.stages, {linear.stages.size() - 1}).back();
+  // In units in which the diagonal is one: normal equations lose half of the digits.
+  const Eigen::VectorXd unit = marginal.diagonal().cwiseSqrt().cwiseInverse();
+  EXPECT_LT((unit.asDiagonal() * (root.transpose() * root - marginal) * unit.asDiagonal()).norm(), 1e-6);
+}
+
 TEST(Observability, GrowsWithTime) {
   const Observability& observability = in_steady_flight();
   ASSERT_EQ(observability.t.size(), observability.sigma_until.size());
