@@ -233,6 +233,7 @@ TEST(ParameterBlocks, SayWhichCombination) {
   EXPECT_EQ(words({1, 0, 1, 0, 0, 0}),
             "gyro 1 drift k0, with gyro 1 alignment about (+1.00, +0.00, +0.00) in c, against its initial direction");
   EXPECT_EQ(words({0, 0, 0, 0.1, 0, 1}), "clock_offset_s");
+  EXPECT_EQ(words({0.3, 0.3, 0, 0, 0, 1}), "gyro 1 drift k0, mu12, with clock_offset_s");
 }
 
 }  // namespace
