@@ -155,6 +155,25 @@ TEST(Observability, NamesFurtherStates) {
   EXPECT_NEAR(observability.prior_sigma(46), 1e-4, 1e-9);
 }
 
+TEST(Observability, KnowsTheOrbitNormalByTheFixesOfEstimatorPaperAsWell) {
+  CalibrationOptions options = told();
+  options.estimator = "paper";
+  const Pass pass = sim::simulate(steady(std::chrono::minutes(60))).pass;
+  EXPECT_THAT(unobservable(observe(pass, options)), testing::Contains(testing::HasSubstr("the orbit normal")));
+}
+
+/// An attitude that stands still in space: each alignment can be turned about any axis.
+TEST(Observability, OfAnInertialAttitudeLacksAllAlignments) {
+  Scenario scenario = steady(std::chrono::minutes(60));
+  scenario.attitude.reference = AttitudeScenario::Reference::kInertial;
+  const auto texts = unobservable(observe(sim::simulate(scenario).pass, told()));
+  EXPECT_GE(
+      std::count_if(texts.begin(), texts.end(), [](const auto& text) { return text.find("alignment") != text.npos; }),
+      4);
+  EXPECT_THAT(texts, testing::Not(testing::Contains(testing::HasSubstr("turns about"))));
+  EXPECT_THAT(texts, testing::Not(testing::Contains(testing::HasSubstr("orbit normal"))));
+}
+
 TEST(Observability, OfMoreThanTwoGyrosSaysNothingOfTheirAngle) {
   Scenario scenario = scenario_in_eq1(4, std::chrono::minutes(10));
   scenario.gyros.push_back(scenario.gyros[0]);
