@@ -77,7 +77,9 @@ std::string combinations_text(const Observability& observability) {
                    angle_text(combination.attitude_error_rad), combination.text);
   }
   if (observability.is_harmful()) {
-    text += "  → Fly slews during the calibration, about other axes than those named; --advise finds the best.\n";
+    text +=
+        "  → Fly slews during the calibration, about other axes than those named; for a scenario --advise finds the "
+        "best.\n";
   }
   return text;
 }
@@ -169,7 +171,9 @@ ExitStatus advise_for(const std::string& path, const CalibrationOptions& options
   std::optional<plan::Confirmation> confirmation;
   if (confirming_runs > 0) {
     const ProgressBar bar("confirm", common.quiet);
-    confirmation = plan::confirm(advice.scenario, advice.formerly_weak(), advice.after, confirming_runs, bar.meter());
+    confirmation = refusing(path, [&] {
+      return plan::confirm(advice.scenario, advice.formerly_weak(), advice.after, confirming_runs, bar.meter());
+    });
   }
   nlohmann::ordered_json json = observability_json(advice.before, scenario.epoch);
   json["advice"] = advice_json(advice, confirmation);

@@ -626,3 +626,102 @@ def test_a_truth_of_another_number_of_gyros_is_refused(csv_pass):
 
 def test_a_read_only_directory_is_a_machine_failure():
     refused(run("calibrate", EXAMPLE, "-o", "/proc/trihedron", "--estimator", "paper"), MACHINE_FAILED, "/proc/trihedron")
+
+
+# Eighty minutes without a slew, both momenta near the orbit plane, and the simplest calibration of it.
+STEADY = """
+[scenario]
+seed = 2
+duration = "80min"
+[attitude]
+slews = {slews}
+[gyro.drift]
+outside_sigma = "0rad/s"
+[[gyro.unit]]
+start_direction_c = [0.995, 0.085, 0.043]
+[[gyro.unit]]
+start_direction_c = [0.050, 0.124, 0.991]
+"""
+TOLD = """
+drift_model = "esg7"
+[filter]
+noise = "told"
+[further_states]
+clock_offset = "off"
+orbital_error = "off"
+readout_bias = "off"
+wandering_drift = "off"
+"""
+
+
+@pytest.fixture
+def observe(tmp_path):
+    """Runs `observe` on the steady flight, with these slews, or on something else."""
+
+    def go(*arguments, slews='"none"', of=None):
+        (tmp_path / "told.toml").write_text(TOLD)
+        (tmp_path / "steady.toml").write_text(STEADY.replace("{slews}", slews))
+        return run("observe", of or tmp_path / "steady.toml", "--config", tmp_path / "told.toml", *arguments)
+
+    return go
+
+
+def test_observe_names_what_steady_flight_cannot_tell(observe):
+    result = observe()
+    assert result.returncode == DO_NOT_USE
+    assert "Unobservable" in result.stdout and "z1 adds" in result.stdout and "--advise" in result.stdout
+    for gyro in (1, 2):
+        assert f"gyro {gyro} alignment about the orbit normal, against its initial direction" in result.stdout
+    result = observe("--json")
+    assert result.returncode == DO_NOT_USE
+    summary = json.loads(result.stdout)
+    assert [c["harmful"] for c in summary["combinations"] if c["unobservable"]] == [True, True]
+    assert summary["rank"] == len(summary["parameters"]) == 20
+    for parameter in summary["parameters"]:
+        assert parameter["sigma"] == parameter["sigma_until"][-1] < parameter["prior_sigma"]
+        assert parameter["angle_gain"] >= 1
+    assert len(summary["t_s"]) == len(summary["parameters"][0]["sigma_until"]) == 20
+    assert summary["t_s"][-1] == 4800
+    result = observe("--quiet")
+    assert (result.returncode, result.stdout) == (DO_NOT_USE, "")
+
+
+def test_observe_finds_nothing_missing_in_a_pass_with_slews(observe):
+    result = observe(of=EXAMPLE)
+    assert result.returncode == TRUSTWORTHY
+    assert "Unobservable" not in result.stdout
+
+
+def test_advice_can_be_pasted_and_is_confirmed(observe):
+    result = observe("--advise", "--slews", "1", "--manoeuvre-time", "8min", "--max-angle", "20deg", "--max-rate", "0.4deg/s",
+                     "--confirm", "2")
+    assert result.returncode == TRUSTWORTHY
+    assert "by 2 simulated flights" in result.stdout
+    assert 'max_slew_rate = "0.4deg/s"' in result.stdout
+    slews = result.stdout.split("slews = ")[1].split("]")[0] + "]"
+    assert observe(slews=slews).returncode == TRUSTWORTHY
+
+    result = observe("--json", "--advise", "--slews", "1", "--manoeuvre-time", "8min", "--confirm", "2")
+    assert result.returncode == TRUSTWORTHY
+    advice = json.loads(result.stdout)["advice"]
+    assert len(advice["slews"]) == 2
+    assert advice["attitude_error_rad"]["after"] < advice["attitude_error_rad"]["before"] / 100
+    assert len(advice["combinations"]) == 2
+    for combination in advice["combinations"]:
+        assert combination["sigma_after"] < combination["sigma_before"] / 100
+        assert combination["sigma_simulated"] > 0
+    assert advice["confirmation"]["runs"] == 2
+
+
+def test_observe_refuses(observe, tmp_path):
+    refused(observe("--advise", of=EXAMPLE), WRONG_USAGE, "scenario", "recorded")
+    refused(observe("--confirm", "2"), WRONG_USAGE, "--advise")
+    refused(observe("--advise", "--max-angle", "30"), WRONG_USAGE, "unit")
+    refused(observe("--advise", "--slews", "0"), WRONG_USAGE, "--slews")
+    refused(observe("--advise", slews='[{begin = "10min", roll = "5deg"}]'), INPUT_REFUSED, "slews of its own", "none")
+    refused(observe("--advise", "--manoeuvre-time", "1h"), INPUT_REFUSED, "no room")
+    refused(observe(of=tmp_path / "nothing"), INPUT_REFUSED, "nothing")
+    refused(observe(of=tmp_path / "nothing.toml"), INPUT_REFUSED, "nothing.toml")
+    (tmp_path / "blind.toml").write_text(STEADY.replace("{slews}", '"none"') + '[star_tracker]\ndropout_probability = 1\n')
+    refused(observe(of=tmp_path / "blind.toml"), INPUT_REFUSED, "no fix")
+    refused(observe("--advise", of=tmp_path / "blind.toml"), INPUT_REFUSED, "no fix")

@@ -84,8 +84,9 @@ std::string ParameterBlocks::in_words(const Eigen::VectorXd& direction, const Ei
       text += " about " + axis_name(axis_c, rotation) + ", against its initial direction";
     } else if (!block.parameters.empty()) {
       std::vector<std::string> named;
+      const double least = std::min(kNamed, own.cwiseAbs2().maxCoeff());
       for (Eigen::Index i = 0; i < own.size(); ++i) {
-        if (own(i) * own(i) >= kNamed) {
+        if (own(i) * own(i) >= least) {
           named.push_back(block.parameters[static_cast<std::size_t>(i)]);
         }
       }

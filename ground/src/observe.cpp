@@ -58,14 +58,23 @@ VectorXd sigmas(const MatrixXd& prior_root, const MatrixXd& measured_root) {
 
 BodyRotation mean_rotation(const std::vector<ScreenedPass::Fix>& fixes) {
   constexpr double kLowOrbit_rad_s = 1.1e-3;
-  Eigen::Vector3d rate_c = Eigen::Vector3d::Zero();
-  for (const ScreenedPass::Fix& fix : fixes) {
-    rate_c += fix.rate_c / static_cast<double>(fixes.size());
+  constexpr double kClose_s = 60;
+  Eigen::Vector3d turned_c = Eigen::Vector3d::Zero();
+  double time_s = 0;
+  for (std::size_t i = 1; i < fixes.size(); ++i) {
+    const StarFix& before = fixes[i - 1].fix;
+    const StarFix& after = fixes[i].fix;
+    const double step_s = to_seconds(after.t - before.t);
+    if (step_s < kClose_s && before.head == after.head) {
+      turned_c += Rot<C, C>::assume((before.q_in_c.conjugate() * after.q_in_c).normalized()).log().raw();
+      time_s += step_s;
+    }
   }
+  const double rate_rad_s = time_s > 0 ? turned_c.norm() / time_s : 0;
   BodyRotation rotation;
-  if (rate_c.norm() > 0.1 * kLowOrbit_rad_s) {
-    rotation.axis_c = rate_c.normalized();
-    rotation.is_orbital = std::abs(rate_c.norm() / kLowOrbit_rad_s - 1) < 0.3;
+  if (rate_rad_s > 0.1 * kLowOrbit_rad_s) {
+    rotation.axis_c = turned_c.normalized();
+    rotation.is_orbital = std::abs(rate_rad_s / kLowOrbit_rad_s - 1) < 0.3;
   }
   return rotation;
 }

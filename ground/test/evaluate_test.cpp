@@ -143,5 +143,22 @@ TEST(Extension, PairsCorrectionsOfTheSameTime) {
   EXPECT_EQ(pairs[1].calibrated.corrected, at(seconds(5400)));
 }
 
+TEST(ParameterErrors, AreTruthLessEstimate) {
+  Truth truth;
+  truth.gyros.resize(1);
+  truth.gyros[0].drift_rad_s = {{"k0", 3e-6}};
+  truth.gyros[0].alignment_rotation_vector_rad = {1e-3, 0, 0};
+  Calibration calibration;
+  GyroCalibration& gyro = calibration.gyros.emplace_back();
+  gyro.drift_rad_s = {{"k0", 1e-6}, {"D(k0)", 1e-9}};
+  gyro.alignment_rotation_vector_rad = {0, 0, 2e-3};
+  calibration.covariance.setIdentity(5, 5);
+  const Eigen::VectorXd errors = parameter_errors(truth, calibration);
+  EXPECT_NEAR(errors(0), 2e-6, 1e-18);
+  EXPECT_EQ(errors(1), -1e-9);
+  // Second order: half of the product of the two rotations.
+  EXPECT_LT((errors.tail<3>() - Eigen::Vector3d(1e-3, 0, -2e-3)).norm(), 1.1e-6);
+}
+
 }  // namespace
 }  // namespace trihedron::ground

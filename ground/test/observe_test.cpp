@@ -75,6 +75,38 @@ TEST(Observability, PredictsTheSigmasOfTheBatch) {
   }
 }
 
+/// All fixes of ten minutes without process noise as one dense problem, from which the directions at the start are
+/// eliminated.
+TEST(Observability, IsThatOfTheDenseProblem) {
+  const Pass pass = sim::simulate(scenario_in_eq1(6, std::chrono::minutes(10))).pass;
+  CalibrationOptions options = told();
+  options.direction_random_walk_rad_sqrt_s = 0;
+  const Screened screened = screen(pass, options);
+  const PassProblem problem(screened.pass, setup_of(pass, options));
+  const PassProblem::Linear linear = problem.linearise(first_solution(problem, screened));
+  const Eigen::Index n = linear.prior.cols();
+  const Eigen::Index d = problem.setup().layout.dynamic();
+  Eigen::MatrixXd by_first = Eigen::MatrixXd::Identity(n, n);  // of the states of an arc
+  Eigen::MatrixXd information = Eigen::MatrixXd::Zero(n, n);
+  for (std::size_t arc = 0; arc < linear.stages.size(); ++arc) {
+    const Eigen::MatrixXd rows = linear.stages[arc].H * by_first;
+    information += rows.transpose() * rows;
+    if (arc < linear.ends.size()) {
+      by_first.topRows(d) =
+          (linear.ends[arc].A * by_first.topRows(d) + linear.stages[arc].B * by_first.bottomRows(n - d)).eval();
+    }
+  }
+  const Eigen::MatrixXd marginal = information.bottomRightCorner(n - d, n - d) -
+                                   information.bottomLeftCorner(n - d, d) * information.topLeftCorner(d, d).llt().solve(
+                                                                                information.topRightCorner(d, n - d));
+  Eigen::MatrixXd prior = linear.prior;
+  prior.rightCols(n - d).setZero();
+  const Eigen::MatrixXd root = information_on_constants(prior, linear.stages, {linear.stages.size() - 1}).back();
+  // In units in which the diagonal is one: normal equations lose half of the digits.
+  const Eigen::VectorXd unit = marginal.diagonal().cwiseSqrt().cwiseInverse();
+  EXPECT_LT((unit.asDiagonal() * (root.transpose() * root - marginal) * unit.asDiagonal()).norm(), 1e-6);
+}
+
 TEST(Observability, GrowsWithTime) {
   const Observability& observability = in_steady_flight();
   ASSERT_EQ(observability.t.size(), observability.sigma_until.size());
@@ -121,6 +153,25 @@ TEST(Observability, NamesFurtherStates) {
   EXPECT_EQ(observability.parameters[46], "gyro1_readout_bias_x_rad");
   EXPECT_NEAR(observability.prior_sigma(52), 0.1, 1e-9);
   EXPECT_NEAR(observability.prior_sigma(46), 1e-4, 1e-9);
+}
+
+TEST(Observability, KnowsTheOrbitNormalByTheFixesOfEstimatorPaperAsWell) {
+  CalibrationOptions options = told();
+  options.estimator = "paper";
+  const Pass pass = sim::simulate(steady(std::chrono::minutes(60))).pass;
+  EXPECT_THAT(unobservable(observe(pass, options)), testing::Contains(testing::HasSubstr("the orbit normal")));
+}
+
+/// An attitude that stands still in space: each alignment can be turned about any axis.
+TEST(Observability, OfAnInertialAttitudeLacksAllAlignments) {
+  Scenario scenario = steady(std::chrono::minutes(60));
+  scenario.attitude.reference = AttitudeScenario::Reference::kInertial;
+  const auto texts = unobservable(observe(sim::simulate(scenario).pass, told()));
+  EXPECT_GE(
+      std::count_if(texts.begin(), texts.end(), [](const auto& text) { return text.find("alignment") != text.npos; }),
+      4);
+  EXPECT_THAT(texts, testing::Not(testing::Contains(testing::HasSubstr("turns about"))));
+  EXPECT_THAT(texts, testing::Not(testing::Contains(testing::HasSubstr("orbit normal"))));
 }
 
 TEST(Observability, OfMoreThanTwoGyrosSaysNothingOfTheirAngle) {
@@ -201,6 +252,7 @@ TEST(ParameterBlocks, SayWhichCombination) {
   EXPECT_EQ(words({1, 0, 1, 0, 0, 0}),
             "gyro 1 drift k0, with gyro 1 alignment about (+1.00, +0.00, +0.00) in c, against its initial direction");
   EXPECT_EQ(words({0, 0, 0, 0.1, 0, 1}), "clock_offset_s");
+  EXPECT_EQ(words({0.3, 0.3, 0, 0, 0, 1}), "gyro 1 drift k0, mu12, with clock_offset_s");
 }
 
 }  // namespace

@@ -1,7 +1,5 @@
 #include "trihedron/plan/advise.hpp"
 
-#include <fmt/format.h>
-
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <array>
@@ -73,7 +71,11 @@ class Search {
     Plan best;
     double least = std::numeric_limits<double>::infinity();
     for (int slews = 1; slews <= limits_.slews; ++slews) {
-      plan.push_back({.begin_s = free_times(plan, plan.size()).front()});
+      const std::vector<double> times = free_times(plan, plan.size());
+      if (times.empty()) {
+        break;
+      }
+      plan.push_back({.begin_s = times.front()});
       for (int round = 0; round < kRounds; ++round) {
         for (std::size_t i = 0; i < plan.size(); ++i) {
           exchange(plan, i);
@@ -96,10 +98,10 @@ class Search {
   [[nodiscard]] double turn_s(double angle_rad) const {
     return sim::turn_duration_s(angle_rad, attitude_.max_slew_rate_rad_s, attitude_.max_slew_acceleration_rad_s2);
   }
-  /// There is time to go there and come back, and as much again to stay.
+  /// There is time to go there and come back, times in whole seconds.
   [[nodiscard]] double largest_rad(std::size_t excursions) const {
     const double whole_s = 2 * turn_s(limits_.max_angle_rad);
-    const double part = std::min(share_s(excursions) / whole_s, 1.0);
+    const double part = std::clamp((share_s(excursions) - 1) / whole_s, 0.0, 1.0);
     // A turn at the limit of acceleration takes the root of its angle.
     return limits_.max_angle_rad * part * part;
   }
@@ -134,9 +136,8 @@ class Search {
 
   /// Axis, angle and time of one excursion, one after the other, the best while all else stays.
   void exchange(Plan& plan, std::size_t excursion) {
-    std::vector<Plan> candidates{plan};
     const auto vary = [&](const auto& values, const auto member) {
-      candidates.assign(1, plan);
+      std::vector<Plan> candidates{plan};
       for (const auto& value : values) {
         candidates.push_back(plan);
         candidates.back()[excursion].*member = value;
@@ -180,9 +181,8 @@ void check(const Scenario& scenario, const SlewLimits& limits) {
         limits.manoeuvre_time > Duration::zero())) {
     throw SetupError("a limit of the slews is not positive", "give positive rate, angle, number and time");
   }
-  if (kTimes * limits.manoeuvre_time > scenario.duration) {
-    throw SetupError("there is no room for the slews",
-                     fmt::format("give less than a {}th of the flight to them", kTimes));
+  if (2 * limits.manoeuvre_time > scenario.duration) {
+    throw SetupError("there is no room for the slews", "give less than half of the flight to them");
   }
 }
 

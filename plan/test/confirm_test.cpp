@@ -1,0 +1,69 @@
+// Whether simulated flights bear out what was predicted.
+
+#include "trihedron/plan/confirm.hpp"
+
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <cmath>
+#include <stdexcept>
+
+#include "flights.hpp"
+#include "on_all_cores.hpp"
+#include "trihedron/sim/simulate.hpp"
+
+namespace trihedron::plan {
+namespace {
+
+/// Twelve flights of an hour with one slew. The mean square of 2 × 12 errors in their sigmas is χ² of 24 over 24; the
+/// NEES of 12 runs χ² of 240 over 12; both within their 0.1 % and 99.9 %.
+TEST(Confirmation, AgreesWithThePrediction) {
+  Scenario scenario = steady_flight();
+  scenario.duration = std::chrono::hours(1);
+  const auto without = ground::observe(sim::simulate(scenario).pass, told());
+  scenario.attitude.slews = std::vector<Slew>{{.begin_s = 600, .yaw_rad = 30 * kDegree}, {.begin_s = 1000}};
+  const auto predicted = ground::observe(sim::simulate(scenario).pass, told());
+  std::vector<ground::Combination> harmful;
+  for (const ground::Combination& combination : without.weak) {
+    if (combination.is_harmful) {
+      harmful.push_back(combination);
+    }
+  }
+  ASSERT_EQ(harmful.size(), 2U);
+  double last = 0;
+  const Confirmation confirmation =
+      confirm(scenario, harmful, predicted, 12, [&](double fraction) { last = fraction; });
+  EXPECT_EQ(last, 1);
+  EXPECT_EQ(confirmation.runs, 12);
+  EXPECT_EQ(confirmation.parameters, 20);
+  EXPECT_GT(confirmation.ratio * confirmation.ratio, 8.1 / 24);
+  EXPECT_LT(confirmation.ratio * confirmation.ratio, 51.2 / 24);
+  EXPECT_GT(confirmation.nees, 177.9 / 12);
+  EXPECT_LT(confirmation.nees, 313.4 / 12);
+  ASSERT_EQ(confirmation.along.size(), 2U);
+  for (const Confirmation::Along& along : confirmation.along) {
+    EXPECT_LT(along.predicted, sigma_along(along.combination, without, without.covariance) / 20);
+  }
+}
+
+TEST(OnAllCores, GivesTheResultsInTheirOrder) {
+  const std::vector<double> squares = on_all_cores(100, [](std::size_t i) { return static_cast<double>(i * i); });
+  ASSERT_EQ(squares.size(), 100U);
+  for (std::size_t i = 0; i < squares.size(); ++i) {
+    EXPECT_EQ(squares[i], static_cast<double>(i * i));
+  }
+  EXPECT_TRUE(on_all_cores(0, [](std::size_t) { return 0; }).empty());
+}
+
+TEST(OnAllCores, ThrowsWhatTheWorkThrows) {
+  const auto work = [](std::size_t i) {
+    if (i == 3) {
+      throw std::invalid_argument("three");
+    }
+    return i;
+  };
+  EXPECT_THROW((void)on_all_cores(10, work), std::invalid_argument);
+}
+
+}  // namespace
+}  // namespace trihedron::plan

@@ -70,9 +70,9 @@ struct Observability {
   static constexpr double kWeak = 100;
 };
 
-/// Linearised at the most likely solution; with options left open by what decide() makes of the pass. Throws
+/// Linearised at the most likely solution; what the options leave open is decided as calibrate() does. Throws
 /// SetupError.
-[[nodiscard]] Observability observe(const Pass& pass, const CalibrationOptions& options, const Mission& mission = {});
+[[nodiscard]] Observability observe(const Pass& pass, const CalibrationOptions& asked, const Mission& mission = {});
 
 /// 1-sigma of a combination, rad or rad/s, where this is the covariance of the parameters.
 [[nodiscard]] double sigma_along(const Combination& combination, const Observability& observability,
