@@ -10,8 +10,6 @@ namespace trihedron::ground {
 namespace {
 
 constexpr int kMostIterations = 12;
-/// Steps below this part of the sigmas change nothing that anyone could see.
-constexpr double kConverged = 0.02;
 
 SmootherResult smoothed(const PassProblem::Linear& linear) {
   try {
@@ -32,15 +30,16 @@ double step_of_constants(const PassLayout& layout, const SmootherResult& found) 
 
 }  // namespace
 
-BatchResult most_likely(const PassProblem& problem, PassSolution first) {
+BatchResult most_likely(const PassProblem& problem, PassSolution first, double converged) {
   BatchResult result;
   result.solution = std::move(first);
   while (result.iterations < kMostIterations && !result.converged) {
     ++result.iterations;
-    result.linear = problem.linearise(result.solution);
+    result.before = result.solution;
+    result.linear = problem.linearise(result.before);
     result.errors = smoothed(result.linear);
     problem.correct(result.errors, result.solution);
-    result.converged = step_of_constants(problem.setup().layout, result.errors) < kConverged;
+    result.converged = step_of_constants(problem.setup().layout, result.errors) < converged;
   }
   return result;
 }

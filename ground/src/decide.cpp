@@ -54,6 +54,9 @@ std::vector<std::string> models_up_to(const std::string& model) {
   return models;
 }
 
+/// Of the constants, in their sigmas: decisions need no more.
+constexpr double kNearEnough = 0.2;
+
 /// What decisions need, in a fraction of the time: over four minutes even a random walk of 1e-7 rad/√s stays below what
 /// the fixes in them show, and over three seconds the body turns by a degree or so.
 PassSetup coarse(PassSetup setup) {
@@ -68,17 +71,17 @@ class Trial {
   Trial(const Pass& pass, const Screened& screened, const CalibrationOptions& options)
       : drift_model_(options.drift_model),
         problem_(screened.pass, coarse(setup_of(pass, options))),
-        found_(most_likely(problem_, first_solution(problem_, screened))) {}
+        found_(most_likely(problem_, first_solution(problem_, screened), kNearEnough)) {}
 
   /// Again, with other noise.
   void refit(const ProcessNoise& noise) {
     problem_.set_noise(noise);
-    found_ = most_likely(problem_, std::move(found_.solution));
+    found_ = most_likely(problem_, std::move(found_.solution), kNearEnough);
   }
 
-  [[nodiscard]] PassProblem::Linear linearised() const { return problem_.linearise(found_.solution); }
+  [[nodiscard]] const PassProblem::Linear& linear() const { return found_.linear; }
   [[nodiscard]] double log_likelihood(const PassProblem::Linear& linear, const ProcessNoise& noise) const {
-    return ground::log_likelihood(problem_, found_.solution, linear, noise);
+    return ground::log_likelihood(problem_, found_.before, linear, noise);
   }
 
   [[nodiscard]] double clock_offset() const {
@@ -190,7 +193,7 @@ class Search {
   /// From the best of `starts`, (0, 0) among them, to the best of its neighbours, and so on, within the bounds; all
   /// included.
   Search(const Trial& trial, At at, const std::vector<Point>& starts, const Point& lowest, const Point& highest)
-      : trial_(trial), linear_(trial.linearised()), at_(std::move(at)) {
+      : trial_(trial), linear_(trial.linear()), at_(std::move(at)) {
     look_at(starts);
     for (std::optional<Point> last; last != best_;) {
       last = best_;
@@ -533,11 +536,12 @@ Decision decide_by_pass(const Pass& pass, const Screened& screened, const Calibr
 
 /// The largest drift model that is tried at first.
 std::string largest_to_compare(const CalibrationOptions& asked) {
+  const std::string kFirst = "vsh:2";
   const bool fixed = asked.drift_model != kAutoDriftModel;
   if (asked.estimator != kBatch || asked.drift_model == Esg20::kModelName) {
     return fixed ? asked.drift_model : Esg20::kModelName;
   }
-  return is_for_whole_pass(asked.drift_model) ? std::max(asked.drift_model, std::string("vsh:3")) : "vsh:3";
+  return is_for_whole_pass(asked.drift_model) ? std::max(asked.drift_model, kFirst) : kFirst;
 }
 
 /// By one degree, where there is one.

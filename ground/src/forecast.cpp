@@ -116,11 +116,11 @@ std::vector<Forecast> forecasts(const PassProblem& problem, const BatchResult& f
   for (std::size_t part = kLearning; part <= kParts; ++part) {
     ends.push_back(part * problem.arcs() / kParts - 1);
   }
-  const PassProblem::Linear linear = problem.linearise(found.solution);
+  const PassProblem::Linear& linear = found.linear;
   const std::vector<MatrixXd> triangles = triangles_after(linear.prior, linear.prior_y, linear.stages, ends);
   std::vector<Forecast> all;
   for (const std::string& model : models) {
-    all.push_back(forecast(problem, found.solution, model, triangles, ends));
+    all.push_back(forecast(problem, found.before, model, triangles, ends));
   }
   return all;
 }

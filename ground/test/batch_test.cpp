@@ -169,16 +169,15 @@ TEST(Batch, GivesTheAttitudeAtEachSample) {
   EXPECT_GT(all.count, 2000U);
   EXPECT_LT(all.rms_rad.maxCoeff(), 0.8 * kArcsecond);
   EXPECT_NEAR(*all.normalised_square, 1, 0.5);  // the part of the parameters is one draw, the same all along
-  // Between the truth's epochs the attitude is as smooth as the body moves.
-  double roughness = 0;
-  for (std::size_t i = 2; i < 10000; ++i) {
+  // Between the truth's epochs as well: second differences of single readings would have √6 of 2″.
+  double square = 0;
+  for (std::size_t i = 2; i < attitude.size(); ++i) {
     const auto turn = [&](std::size_t from) {
       return Rot<C, C>::assume(attitude.q_in_c[from].conjugate() * attitude.q_in_c[from + 1]).log().raw();
     };
-    roughness = std::max(roughness, (turn(i - 1) - turn(i - 2)).norm());
+    square += (turn(i - 1) - turn(i - 2)).squaredNorm() / (3.0 * static_cast<double>(attitude.size()));
   }
-  // A step of 1″, or the slews' 0.02°/s² over 125 ms each, twice.
-  EXPECT_LT(roughness, 1 * kArcsecond + 2 * 3.5e-4 * 0.125 * 0.125);
+  EXPECT_LT(std::sqrt(square), 0.5 * kArcsecond);
 }
 
 TEST(Batch, FindsTheDriftModelThatForecastsBest) {
@@ -187,9 +186,9 @@ TEST(Batch, FindsTheDriftModelThatForecastsBest) {
   options.drift_model = "auto";
   const auto plain = calibrate(sim::simulate(scenario).pass, options);
   EXPECT_EQ(plain.calibration.gyros[0].drift_model, "esg7");
-  ASSERT_EQ(plain.drift_models.size(), 4U);  // and vsh:1, 2, 3
+  ASSERT_EQ(plain.drift_models.size(), 3U);  // and vsh:1, vsh:2
   EXPECT_EQ(plain.drift_models[0].log_likelihood, 0);
-  EXPECT_LT(plain.drift_models[3].log_likelihood, 0);
+  EXPECT_LT(plain.drift_models[2].log_likelihood, 0);
 
   const auto codes = [](const CalibrationRun& run) {
     std::vector<std::string> all;
@@ -205,13 +204,14 @@ TEST(Batch, FindsTheDriftModelThatForecastsBest) {
   const auto simulated = sim::simulate(scenario);
   const auto run = calibrate(simulated.pass, options);
   EXPECT_EQ(run.calibration.gyros[0].drift_model, "vsh:1");
-  ASSERT_GE(run.drift_models.size(), 4U);
+  ASSERT_GE(run.drift_models.size(), 3U);
   EXPECT_GT(run.drift_models[1].log_likelihood, 100);
   EXPECT_LT(run.drift_models[1].open_loop_rms_rad, run.drift_models[0].open_loop_rms_rad / 3);
   for (std::size_t k = 0; k < 2; ++k) {
     EXPECT_LT(alignment_error(simulated.truth.gyros[k], run.calibration.gyros[k]).norm(), 5 * kArcsecond);
   }
   options.drift_model = "esg7";
+  options.find_noise = true;
   EXPECT_THAT(codes(calibrate(simulated.pass, options)), testing::Contains("drift-model-too-small"));
 }
 
@@ -228,9 +228,8 @@ TEST(Batch, FindsThatCoefficientsChange) {
   const auto run = calibrate(simulated.pass, options);
   ASSERT_EQ(run.calibration.further.size(), 14U);
   EXPECT_EQ(run.calibration.further[0].name, "gyro1_k0_change_rad_s");
-  // From 1 + 0.1 to 1 + 0.1 exp(−1/2): what stands in the calibration is of the end.
-  const double change = 0.1 * (std::exp(-0.5) - 1);
-  const double at_end = 1 + 0.1 * std::exp(-0.5);
+  // From 1 + 0.1 to 1 + 0.1 exp(−1/2); the truth and the calibration are of the end.
+  const double change = 0.1 * (std::exp(-0.5) - 1) / (1 + 0.1 * std::exp(-0.5));
   int known = 0;
   for (std::size_t i = 0; i < 14; ++i) {
     const FurtherEstimate& estimate = run.calibration.further[i];
@@ -240,7 +239,7 @@ TEST(Batch, FindsThatCoefficientsChange) {
     EXPECT_NEAR(estimate.value, change * kappa, 4 * estimate.sigma + 3e-9) << estimate.name;
     known += std::abs(estimate.value) > 3 * estimate.sigma ? 1 : 0;
     if (estimate.sigma < 1e-8) {
-      EXPECT_NEAR(value, at_end * kappa, 2e-8) << name;
+      EXPECT_NEAR(value, kappa, 2e-8) << name;
     }
   }
   EXPECT_GT(known, 2);
