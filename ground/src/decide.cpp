@@ -57,11 +57,12 @@ std::vector<std::string> models_up_to(const std::string& model) {
 /// Of the constants, in their sigmas: decisions need no more.
 constexpr double kNearEnough = 0.2;
 
-/// What decisions need, in a fraction of the time: over four minutes even a random walk of 1e-7 rad/√s stays below what
-/// the fixes in them show, and over three seconds the body turns by a degree or so.
+/// What decisions need, in a fraction of the time: over two minutes even a random walk of 1e-7 rad/√s, or drift of
+/// 1e-7 rad/s that wanders in 20 minutes, stays below what the fixes in them show, and over three seconds the body turns
+/// by a degree or so.
 PassSetup coarse(PassSetup setup) {
   setup.sample_step = std::chrono::seconds(3);
-  setup.arc = std::chrono::minutes(4);
+  setup.arc = std::chrono::minutes(2);
   return setup;
 }
 
