@@ -198,7 +198,7 @@ void add_combinations(const MatrixXd& scaled_root, const BodyRotation& rotation,
       const VectorXd direction = columns.col(i);
       const double s = (scaled_root * direction).norm();
       const double error_rad = std::sqrt(direction.dot(scaled_metric * direction) / (1 + s * s));
-      result.weak.push_back({blocks.in_words(direction, result.prior_sigma, rotation), direction,
+      result.weak.push_back({blocks.in_words(direction, result.prior_sigma, rotation), blocks.named(direction),
                              blocks.is_alignment(direction), s, error_rad,
                              s < Observability::kUnobservable && error_rad > tolerable_rad});
     }

@@ -251,6 +251,15 @@ TEST(ParameterBlocks, SeparateWhatOneBlockHolds) {
   EXPECT_NEAR((separated.transpose() * separated - Eigen::Matrix2d::Identity()).norm(), 0, 1e-12);
 }
 
+TEST(ParameterBlocks, GiveTheDirectionOfWhatTheyName) {
+  const ParameterBlocks blocks({"gyro1.k0", "gyro1.align_x", "gyro1.align_y", "gyro1.align_z", "clock_offset_s"});
+  Eigen::VectorXd direction(5);
+  direction << 0.2, 0.6, 0, 0.8, 0.1;
+  Eigen::VectorXd expected(5);
+  expected << 0, 0.6, 0, 0.8, 0;
+  EXPECT_LT((blocks.named(direction) - expected).norm(), 1e-12);
+}
+
 TEST(ParameterBlocks, SayWhichCombination) {
   const ParameterBlocks blocks(
       {"gyro1.k0", "gyro1.mu12", "gyro1.align_x", "gyro1.align_y", "gyro1.align_z", "clock_offset_s"});
