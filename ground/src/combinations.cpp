@@ -96,6 +96,15 @@ std::string ParameterBlocks::in_words(const Eigen::VectorXd& direction, const Ei
   return text;
 }
 
+Eigen::VectorXd ParameterBlocks::named(Eigen::VectorXd direction) const {
+  for (const Block& block : blocks_) {
+    if (direction(block.rows).squaredNorm() < kNamed) {
+      direction(block.rows).setZero();
+    }
+  }
+  return direction.normalized();
+}
+
 bool ParameterBlocks::is_alignment(const Eigen::VectorXd& direction) const {
   return std::all_of(blocks_.begin(), blocks_.end(), [&](const Block& block) {
     return block.is_alignment || direction(block.rows).squaredNorm() < kNamed;

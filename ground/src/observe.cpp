@@ -147,28 +147,63 @@ std::vector<std::size_t> ends_of_parts(std::size_t stages) {
   return ends;
 }
 
-/// The combinations that are weak, the unobservable and then the most harmful ones first.
-std::vector<Combination> weak_combinations(const MatrixXd& scaled_root, const MatrixXd& scaled_metric,
-                                           const ParameterBlocks& blocks, const VectorXd& prior_sigma,
-                                           const BodyRotation& rotation, double tolerable_rad) {
-  const Eigen::JacobiSVD<MatrixXd> svd(scaled_root, Eigen::ComputeFullV);
-  const Index weak = (svd.singularValues().array() < Observability::kWeak).count();
-  const MatrixXd columns = blocks.separated(svd.matrixV().rightCols(weak));
-  std::vector<Combination> combinations;
-  for (Index i = 0; i < weak; ++i) {
-    const VectorXd direction = columns.col(i);
-    const double s = (scaled_root * direction).norm();
-    const double error_rad = std::sqrt(direction.dot(scaled_metric * direction) / (1 + s * s));
-    combinations.push_back({blocks.in_words(direction, prior_sigma, rotation), direction,
-                            blocks.is_alignment(direction), s, error_rad,
-                            s < Observability::kUnobservable && error_rad > tolerable_rad});
+/// What makes one linearisation of the pass.
+struct Linearised {
+  const PassProblem& problem;
+  const BatchResult& found;
+  MatrixXd prior_root;
+
+  [[nodiscard]] Index constants() const { return prior_root.cols(); }
+};
+
+/// Sigmas by the measurements until the end of each part of the pass; gives the root of the information by all.
+MatrixXd add_course(const Linearised& at, Observability& result) {
+  const PassProblem::Linear& linear = at.found.linear;
+  const std::vector<std::size_t> ends = ends_of_parts(linear.stages.size());
+  const std::vector<MatrixXd> roots = measured(linear, at.constants(), ends);
+  for (const MatrixXd& root : roots) {
+    result.sigma_until.push_back(sigmas(at.prior_root, root));
   }
-  const auto rank = [](const Combination& combination) {
-    return std::pair(combination.singular_value >= Observability::kUnobservable, -combination.attitude_error_rad);
-  };
-  std::sort(combinations.begin(), combinations.end(),
-            [&](const Combination& a, const Combination& b) { return rank(a) < rank(b); });
-  return combinations;
+  at.problem.go_along(at.found.solution, [&, part = std::size_t{0}](const PassProblem::Moment& moment) mutable {
+    part += moment.arc > ends[part] ? 1U : 0U;
+    result.t.resize(part + 1);
+    result.t[part] = moment.t;
+  });
+  const MatrixXd root = covariance_root(at.prior_root, roots.back());
+  result.covariance = root * root.transpose();
+  result.sigma = result.sigma_until.back();
+  return roots.back();
+}
+
+/// Names what is weak. `scaled_root`: of the information by the measurements, in units of the prior sigmas.
+void add_combinations(const MatrixXd& scaled_root, const BodyRotation& rotation, double tolerable_rad,
+                      Observability& result) {
+  const Eigen::JacobiSVD<MatrixXd> svd(scaled_root, Eigen::ComputeFullV);
+  const VectorXd& values = svd.singularValues();
+  result.singular_values = values;
+  const double rounding = values(0) * static_cast<double>(values.size()) * std::numeric_limits<double>::epsilon();
+  result.rank = (values.array() > rounding).count();
+  const MatrixXd scaled_metric =
+      result.prior_sigma.asDiagonal() * result.attitude_metric * result.prior_sigma.asDiagonal();
+  const ParameterBlocks blocks(result.parameters);
+  // Each kind apart: turned together, an unobservable combination could hide between weak ones.
+  const Index unobservable = (values.array() < Observability::kUnobservable).count();
+  const Index weak = (values.array() < Observability::kWeak).count() - unobservable;
+  for (const auto& [first, size] :
+       {std::pair{values.size() - unobservable, unobservable}, std::pair{values.size() - unobservable - weak, weak}}) {
+    const MatrixXd columns = blocks.separated(svd.matrixV().middleCols(first, size));
+    const auto begin = static_cast<std::ptrdiff_t>(result.weak.size());
+    for (Index i = 0; i < size; ++i) {
+      const VectorXd direction = columns.col(i);
+      const double s = (scaled_root * direction).norm();
+      const double error_rad = std::sqrt(direction.dot(scaled_metric * direction) / (1 + s * s));
+      result.weak.push_back({blocks.in_words(direction, result.prior_sigma, rotation), blocks.named(direction),
+                             blocks.is_alignment(direction), s, error_rad,
+                             s < Observability::kUnobservable && error_rad > tolerable_rad});
+    }
+    std::sort(result.weak.begin() + begin, result.weak.end(),
+              [](const Combination& a, const Combination& b) { return a.attitude_error_rad > b.attitude_error_rad; });
+  }
 }
 
 /// Nothing is screened: samples and fixes of the first heads, in the order of their times.
@@ -231,43 +266,21 @@ Observability observe(const Pass& pass, const CalibrationOptions& asked, const M
   const PassProblem problem(screened.pass, setup_of(pass, options));
   const BatchResult found = most_likely(problem, first_solution(problem, screened));
   const PassLayout& layout = problem.setup().layout;
-  const Index constants = layout.constants();
-  const PassProblem::Linear& linear = found.linear;
-  const MatrixXd prior_root = linear.prior.bottomRightCorner(constants, constants);
+  const Linearised at{problem, found, found.linear.prior.bottomRightCorner(layout.constants(), layout.constants())};
 
   Observability result;
   result.options = options;
   result.options.find_noise = false;
   result.parameters = names_of_constants(problem.setup(), options);
-  result.prior_sigma = sigmas(prior_root, MatrixXd::Zero(1, constants));
-  const std::vector<std::size_t> ends = ends_of_parts(linear.stages.size());
-  const std::vector<MatrixXd> roots = measured(linear, constants, ends);
-  for (const MatrixXd& root : roots) {
-    result.sigma_until.push_back(sigmas(prior_root, root));
-  }
-  problem.go_along(found.solution, [&, part = std::size_t{0}](const PassProblem::Moment& moment) mutable {
-    part += moment.arc > ends[part] ? 1U : 0U;
-    result.t.resize(part + 1);
-    result.t[part] = moment.t;
-  });
-  const MatrixXd root = covariance_root(prior_root, roots.back());
-  result.covariance = root * root.transpose();
-  result.sigma = result.sigma_until.back();
+  result.prior_sigma = sigmas(at.prior_root, MatrixXd::Zero(1, at.constants()));
+  const MatrixXd root = add_course(at, result);
   if (layout.gyros == 2) {
     result.angle_gain = angle_gain(pass, screened, problem.setup(), found.solution);
   }
-
-  const MatrixXd scaled_root = roots.back() * result.prior_sigma.asDiagonal();
-  result.singular_values = Eigen::JacobiSVD<MatrixXd>(scaled_root).singularValues();
-  const double rounding =
-      result.singular_values(0) * static_cast<double>(constants) * std::numeric_limits<double>::epsilon();
-  result.rank = (result.singular_values.array() > rounding).count();
-  result.attitude_metric = attitude_metric(problem, found.solution, linear, mission);
+  result.attitude_metric = attitude_metric(problem, found.solution, found.linear, mission);
   result.attitude_error_rad = std::sqrt((result.attitude_metric * result.covariance).trace());
-  const MatrixXd scaled_metric =
-      result.prior_sigma.asDiagonal() * result.attitude_metric * result.prior_sigma.asDiagonal();
-  result.weak = weak_combinations(scaled_root, scaled_metric, ParameterBlocks(result.parameters), result.prior_sigma,
-                                  mean_rotation(screened.pass.fixes), mission.tolerable_rad);
+  add_combinations(root * result.prior_sigma.asDiagonal(), mean_rotation(screened.pass.fixes), mission.tolerable_rad,
+                   result);
   return result;
 }
 

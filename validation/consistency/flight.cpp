@@ -88,7 +88,9 @@ Outcome calibrate_batch(const sim::SimulatedPass& flown, double walk_rad_sqrt_s,
   options.drift_model = Esg7::kModelName;
   options.find_noise = false;
   options.direction_random_walk_rad_sqrt_s = walk_rad_sqrt_s;
-  options.further_states = {kOff, kOff, kOff, 0, {}, kOff};
+  FurtherStateOptions& states = options.further_states;
+  states.clock_offset = states.orbital_error = states.wandering_drift = states.readout_bias =
+      states.coefficient_change = kOff;
   const Calibration calibration = ground::calibrate(flown.pass, options).calibration;
   ParameterErrors errors;
   for (int k = 0; k < Parameters::kSize / Parameters::kPerGyro; ++k) {

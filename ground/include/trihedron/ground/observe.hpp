@@ -23,7 +23,7 @@ struct Mission {
 /// Parameters that only move together.
 struct Combination {
   std::string text;               ///< "gyro 1 alignment about the orbit normal, against its initial direction"
-  Eigen::VectorXd direction;      ///< unit, by parameter, each in its prior sigma
+  Eigen::VectorXd direction;      ///< of what is named, unit, by parameter, each in its prior sigma
   bool is_alignment = false;      ///< nothing else takes part with a tenth of the square
   double singular_value = 0;      ///< prior sigma over that by the measurements alone
   double attitude_error_rad = 0;  ///< what it adds to Observability::attitude_error_rad, rms
