@@ -428,6 +428,11 @@ CalibrationRun calibrate(const Pass& pass, const CalibrationOptions& options, co
 
 NavigationRun navigate(const Pass& pass, const CalibrationOptions& options, const Progress& progress) {
   const CalibrationOptions decided = decide(pass, options).options;
+  if (is_for_whole_pass(decided.drift_model)) {
+    throw SetupError(fmt::format("the navigator on board has no drift model '{}'", decided.drift_model),
+                     "navigate by a calibration with --drift-model esg20, or take the attitude that calibrate "
+                     "--definitive writes");
+  }
   return with_estimator(pass, decided,
                         [&]<class Estimator>() { return navigate_with<Estimator>(pass, decided, progress); });
 }

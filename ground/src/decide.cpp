@@ -58,8 +58,8 @@ std::vector<std::string> models_up_to(const std::string& model) {
 constexpr double kNearEnough = 0.2;
 
 /// What decisions need, in a fraction of the time: over two minutes even a random walk of 1e-7 rad/√s, or drift of
-/// 1e-7 rad/s that wanders in 20 minutes, stays below what the fixes in them show, and over three seconds the body turns
-/// by a degree or so.
+/// 1e-7 rad/s that wanders in 20 minutes, stays below what the fixes in them show, and over three seconds the body
+/// turns by a degree or so.
 PassSetup coarse(PassSetup setup) {
   setup.sample_step = std::chrono::seconds(3);
   setup.arc = std::chrono::minutes(2);
@@ -429,19 +429,27 @@ CalibrationOptions wandering_like(const Likely& walking, CalibrationOptions opti
 }
 
 /// Where the noise is more than was told the states were settled by one that is too small: again, by what it is when
-/// they are all free, and whether it wanders.
+/// they are all free, and whether it wanders. `everything`: with the noise as told; `walk`: the noise of what was
+/// settled.
 void decide_beside_noise(const Pass& pass, const Screened& screened, const CalibrationOptions& asked,
-                         const std::string& largest_model, bool wandering_is_open, Decision& decision) {
+                         const std::string& largest_model, bool wandering_is_open, Trial everything, const Likely& walk,
+                         Decision& decision) {
   CalibrationOptions& options = decision.options;
   const CalibrationOptions free = with_everything(options, asked, largest_model);
-  Trial everything(pass, screened, free);
+  const CalibrationOptions like = wandering_like(walk, free);
+  std::future<std::pair<Trial, Likely>> wandering_trial;
+  if (wandering_is_open) {
+    wandering_trial = std::async(std::launch::async, [&] {
+      Trial trial(pass, screened, like);
+      const Likely likely = with_most_likely_wandering(trial, like);
+      return std::pair(std::move(trial), likely);
+    });
+  }
   const Likely walking = with_most_likely_walk(everything, free);
   std::optional<Evidence> wandering;
   std::optional<ProcessNoise> wanders;
   if (wandering_is_open && walking.gain > kStrong) {
-    const CalibrationOptions like = wandering_like(walking, free);
-    Trial trial(pass, screened, like);
-    const Likely likely = with_most_likely_wandering(trial, like);
+    auto [trial, likely] = wandering_trial.get();
     const double gain = likely.log_likelihood - walking.log_likelihood;
     wandering = Evidence{"wandering_drift", gain, gain > kStrong};
     if (wandering->accepted) {
@@ -528,7 +536,8 @@ Decision decide_by_pass(const Pass& pass, const Screened& screened, const Calibr
   Trial decided(pass, screened, options);
   const Likely walking = with_most_likely_walk(decided, options);
   if (walking.gain > kStrong) {
-    decide_beside_noise(pass, screened, asked, largest_model, wandering_is_open, decision);
+    decide_beside_noise(pass, screened, asked, largest_model, wandering_is_open, std::move(everything), walking,
+                        decision);
   } else {
     use_walk(walking.noise, options);
   }

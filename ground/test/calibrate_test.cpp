@@ -294,6 +294,22 @@ TEST(SetupError, NamesWhatCannotWork) {
   EXPECT_THROW(static_cast<void>(navigate(pass, {})), SetupError);
 }
 
+TEST(SetupError, NamesADriftModelThatIsForTheWholePass) {
+  Pass pass = beginning(two_hours().pass, std::chrono::minutes(20));
+  CalibrationOptions options = told();
+  options.drift_model = "vsh:1";
+  const Calibration calibration = calibrate(pass, options).calibration;
+  EXPECT_EQ(calibration.estimator, "batch");
+  options.estimator = "paper";
+  EXPECT_THAT(setup_error(pass, options), HasSubstr("vsh:1"));
+  pass.settings.prior = calibration;
+  options = told();
+  options.drift_model = "auto";
+  const CalibrationRun next = calibrate(pass, options);
+  EXPECT_EQ(next.calibration.gyros[0].drift_model, "vsh:1");
+  EXPECT_THROW(static_cast<void>(navigate(pass, {})), SetupError);
+}
+
 TEST(SetupError, NamesWhatIsWrongWithAnEarlierCalibration) {
   Pass pass = beginning(two_hours().pass, std::chrono::minutes(20));
   const Calibration good = calibrate(pass, told()).calibration;
