@@ -112,6 +112,26 @@ def calibrated(tmp_path_factory):
     return out, result.stdout
 
 
+@pytest.mark.long
+def test_a_drift_model_for_the_whole_pass_is_calibrated_reported_and_kept_from_navigation(tmp_path):
+    out = tmp_path / "out"
+    result = run("calibrate", EXAMPLE, "-o", out, "--drift-model", "vsh:2", "--definitive", "--json")
+    assert result.returncode in (TRUSTWORTHY, DO_NOT_USE), result.stderr
+    outcome = json.loads(result.stdout)
+    models = outcome["drift_models"]
+    assert [model["drift_model"] for model in models] == ["esg7", "vsh:1", "vsh:2"]
+    assert [model["coefficients"] for model in models] == [7, 13, 19]
+    assert models[2]["log_likelihood"] < 0 == models[0]["log_likelihood"]  # all drift is in eq. (1)
+    assert [finding["code"] for finding in outcome["calibration"]["verdict"]["findings"]] == ["drift-model-too-large"]
+    gyro = json.loads((out / "calibration.json").read_text())["gyros"][0]
+    assert gyro["drift_model"] == "vsh:2" and list(gyro["drift_rad_s"])[:8] == [*COEFFICIENTS, "W(1,-1)"]
+    assert 'data-figure="drift_models"' in (out / "report.html").read_text()
+    with open(out / "definitive-attitude.csv") as file:
+        assert sum(1 for _ in file) == 1 + 270 * 60 * 8  # the first fix is on the first sample
+    refused(run("navigate", EXAMPLE, "-o", tmp_path / "a.csv", "--calibration", out / "calibration.json"), INPUT_REFUSED,
+            "vsh:2", "--definitive")
+
+
 def test_calibrate_writes_what_is_pinned(calibrated):
     out, _ = calibrated
     assert sorted(f.name for f in out.iterdir()) == ["attitude.csv", "calibration.json", "effective-config.toml", "report.html",
@@ -446,6 +466,7 @@ def test_a_catalogue_that_cannot_be_written_is_a_machine_failure(start_ups, tmp_
     (("calibrate", EXAMPLE), "--output"),
     (("history",), "CATALOGUE"),
     (("calibrate", EXAMPLE, "-o", "x", "--estimator", "magic"), "magic"),
+    (("calibrate", EXAMPLE, "-o", "x", "--drift-model", "vsh:7"), "vsh:6"),
     (("navigate", EXAMPLE, "-o", "x"), "--online"),
     (("navigate", EXAMPLE, "-o", "x", "--online", "--calibration", "y"), "--online"),
     (("navigate", EXAMPLE, "-o", "x", "--online", "--correction-interval", "90"), "unit"),
