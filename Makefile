@@ -54,6 +54,8 @@ consistency: build
 	$(BUILD)/trihedron_consistency --resume out/consistency.txt docs/consistency.md
 	$(BUILD)/trihedron_consistency --resume out/consistency.txt --place batch --estimators invariant,batch --runs 20 \
 	  --cells '^steady/.*/(30|60)arcmin/0e.00$$' docs/consistency.md
+	$(BUILD)/trihedron_consistency --resume out/consistency.txt --place batch100 --estimators invariant,batch --runs 100 \
+	  --cells '/plane-plane/1e-06/30arcmin/0e.00$$' docs/consistency.md
 
 format:
 	clang-format -i $(SOURCES)
