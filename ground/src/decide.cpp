@@ -105,7 +105,8 @@ class Trial {
     const int size = Esg7::kSize * layout().gyros;
     Eigen::VectorXd estimate(size);
     for (int k = 0; k < layout().gyros; ++k) {
-      estimate.segment<Esg7::kSize>(k * Esg7::kSize) = gyro(k).change_rad_s;
+      const int row = Esg7::kSize * k;
+      estimate.segment<Esg7::kSize>(row) = gyro(k).change_rad_s;
     }
     return log_evidence(estimate, found_.errors.last_root.middleRows(layout().change(0), size),
                         Eigen::VectorXd::Constant(size, problem_.setup().coefficient_change_sigma_rad_s));
