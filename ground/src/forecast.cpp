@@ -119,6 +119,7 @@ std::vector<Forecast> forecasts(const PassProblem& problem, const BatchResult& f
   const PassProblem::Linear& linear = found.linear;
   const std::vector<MatrixXd> triangles = triangles_after(linear.prior, linear.prior_y, linear.stages, ends);
   std::vector<Forecast> all;
+  all.reserve(models.size());
   for (const std::string& model : models) {
     all.push_back(forecast(problem, found.before, model, triangles, ends));
   }

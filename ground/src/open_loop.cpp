@@ -90,17 +90,17 @@ CorrectionInterval interval_of(const AttitudeErrors& errors, double limit_rad) {
 
 }  // namespace
 
-AttitudeHistory fly_open_loop(const Pass& pass, Time t, const std::vector<GyroCalibration>& records,
+AttitudeHistory fly_open_loop(const Pass& pass, Time t, const std::vector<GyroCalibration>& gyros,
                               const std::vector<Time>& epochs) {
-  if (records.size() < kPair) {
+  if (gyros.size() < kPair) {
     throw SetupError("an open loop needs two gyros", "give a calibration of a pair");
   }
-  std::vector<Flown> gyros;
+  std::vector<Flown> flown;
   Directions h_in;
   for (int k = 0; k < kPair; ++k) {
-    const GyroCalibration& record = records[static_cast<std::size_t>(k)];
+    const GyroCalibration& record = gyros[static_cast<std::size_t>(k)];
     const DriftFamily family = family_of(record);
-    gyros.push_back({parameters_of(record, family), family});
+    flown.push_back({parameters_of(record, family), family});
     h_in[k] = record.momentum_in;
   }
   AttitudeHistory history;
@@ -114,12 +114,12 @@ AttitudeHistory fly_open_loop(const Pass& pass, Time t, const std::vector<GyroCa
       for (int k = 0; k < kPair && last; ++k) {
         middle[k] = ((*last)[k] + (*h_b)[k]).normalized();
       }
-      if (const auto attitude = trihedron_attitude(h_in, in_c(gyros, middle))) {
-        precess(gyros, attitude.value().C_in_c.raw(), middle, to_seconds(now - last_t), h_in);
+      if (const auto attitude = trihedron_attitude(h_in, in_c(flown, middle))) {
+        precess(flown, attitude.value().C_in_c.raw(), middle, to_seconds(now - last_t), h_in);
         last = h_b;
         last_t = now;
       }
-      if (const auto attitude = trihedron_attitude(h_in, in_c(gyros, *h_b)); attitude && now == *epoch) {
+      if (const auto attitude = trihedron_attitude(h_in, in_c(flown, *h_b)); attitude && now == *epoch) {
         history.t.push_back(now);
         history.q_in_c.push_back(attitude.value().C_in_c.quaternion());
         history.age_s.push_back(to_seconds(now - t));

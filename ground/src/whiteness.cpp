@@ -26,7 +26,8 @@ std::vector<Series> series_of(const std::vector<FixRecord>& fixes) {
       }
     }
   }
-  std::erase_if(all, [](const Series& series) { return series.z.size() <= 10 * Whiteness::kLags; });
+  constexpr std::size_t kFew = 100;  // ten times the lags
+  std::erase_if(all, [](const Series& series) { return series.z.size() <= kFew; });
   return all;
 }
 
