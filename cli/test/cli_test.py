@@ -42,6 +42,20 @@ outside_sigma = "0rad/s"
 """)
 
 
+# Nothing left to decide, which takes runs of its own.
+TOLD = """
+drift_model = "esg7"
+[filter]
+noise = "told"
+[further_states]
+clock_offset = "off"
+orbital_error = "off"
+readout_bias = "off"
+coefficient_change = "off"
+wandering_drift = "off"
+"""
+
+
 def refused(result, status, *words):
     """One line on stderr that holds the words, nothing on stdout, the status."""
     assert result.returncode == status, result.stderr
@@ -127,7 +141,7 @@ def test_a_drift_model_for_the_whole_pass_is_calibrated_reported_and_kept_from_n
     assert gyro["drift_model"] == "vsh:2" and list(gyro["drift_rad_s"])[:8] == [*COEFFICIENTS, "W(1,-1)"]
     assert 'data-figure="drift_models"' in (out / "report.html").read_text()
     with open(out / "definitive-attitude.csv") as file:
-        assert sum(1 for _ in file) == 1 + 270 * 60 * 8  # the first fix is on the first sample
+        assert sum(1 for _ in file) == 2 + 270 * 60 * 8  # a header, and a sample at both ends
     refused(run("navigate", EXAMPLE, "-o", tmp_path / "a.csv", "--calibration", out / "calibration.json"), INPUT_REFUSED,
             "vsh:2", "--definitive")
 
@@ -325,16 +339,6 @@ def test_settings_give_the_correction_interval_unless_the_option_does(tmp_path):
 # Several passes, and the catalogue.
 
 COEFFICIENTS = ("k0", "mu12", "mu23", "mu31", "nu12", "nu23", "nu31")
-TOLD = """
-drift_model = "esg7"
-[filter]
-noise = "told"
-[further_states]
-clock_offset = "off"
-orbital_error = "off"
-readout_bias = "off"
-wandering_drift = "off"
-"""
 
 
 def pass_of_start_up(directory, name, day, hour, start_up=None):
@@ -662,16 +666,6 @@ outside_sigma = "0rad/s"
 start_direction_c = [0.995, 0.085, 0.043]
 [[gyro.unit]]
 start_direction_c = [0.050, 0.124, 0.991]
-"""
-TOLD = """
-drift_model = "esg7"
-[filter]
-noise = "told"
-[further_states]
-clock_offset = "off"
-orbital_error = "off"
-readout_bias = "off"
-wandering_drift = "off"
 """
 
 

@@ -61,11 +61,9 @@ void compress(std::vector<SmootherStage>& stages) {
   first.wait();
 }
 
-/// κ with so much of its change.
-VectorXd drift_at(const GyroParameters& gyro, double part) {
-  VectorXd drift_rad_s = gyro.drift_rad_s;
-  drift_rad_s.head<Esg7::kSize>() += part * gyro.change_rad_s;
-  return drift_rad_s;
+/// ω_b by κ with so much of its change.
+Vector3d rate(const DriftFamily::Basis& basis, const GyroParameters& gyro, double part) {
+  return basis * gyro.drift_rad_s + part * (basis.leftCols<Esg7::kSize>() * gyro.change_rad_s);
 }
 
 /// Small rotation across `from` that takes it to `to`.
@@ -153,7 +151,7 @@ void PassProblem::step(const PassSolution& solution, const Node& from, const Nod
     for (int k = 0; k < gyros_; ++k) {
       const GyroParameters& gyro = solution.gyros[static_cast<std::size_t>(k)];
       const Vector3d omega_b =
-          setup_.family.basis(without_bias<double>(middle[k], gyro.readout_bias)) * drift_at(gyro, part) +
+          rate(setup_.family.basis(without_bias<double>(middle[k], gyro.readout_bias)), gyro, part) +
           solution.arcs[moment.arc].wandering_rad_s[k];
       h_middle[k] = rotated<double>(h_middle[k], at_begin.value().raw() * (gyro.C_c_b * omega_b) * (dt_s / 2));
     }
@@ -174,8 +172,7 @@ void PassProblem::step(const PassSolution& solution, const Node& from, const Nod
     MomentumBy& by = moment.by[index];
     const Matrix3d C_in_b = C_in_c * gyro.C_c_b;
     const DriftFamily::Basis basis = C_in_b * setup_.family.basis(without_bias<double>(middle[k], gyro.readout_bias));
-    const Vector3d turned =
-        dt_s * (basis * drift_at(gyro, part) + C_in_b * solution.arcs[moment.arc].wandering_rad_s[k]);
+    const Vector3d turned = dt_s * (rate(basis, gyro, part) + C_in_b * solution.arcs[moment.arc].wandering_rad_s[k]);
     moment.h_in[k] = rotated<double>(moment.h_in[k], turned).normalized();
     const Matrix3d cross = skew<double>(turned);
     by.direction += (cross * by.direction).eval();

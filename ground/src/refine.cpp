@@ -157,22 +157,19 @@ SmoothedCourse smoothed_course(const PassProblem& problem, const PassSolution& s
   return course;
 }
 
-/// At each gyro sample after the first fix.
+/// At each gyro sample from the first fix on.
 AttitudeHistory definitive_attitude(const ScreenedPass& screened, const PassProblem& problem,
                                     const PassSolution& solution, const SmoothedAttitude& smoothed) {
   AttitudeHistory history;
-  auto sample = screened.samples.begin();
+  auto sample = std::ranges::lower_bound(screened.samples, problem.begin_of(0), {}, &ScreenedPass::Sample::t);
   std::optional<PassProblem::Moment> before;
   problem.go_along(solution, [&](const PassProblem::Moment& moment) {
     PassProblem::Moment between = moment;
     for (; sample != screened.samples.end() && sample->t <= moment.t; ++sample) {
-      if (!before || sample->t <= before->t) {
-        continue;
-      }
-      // From node to node a momentum turns by a fraction of an arcsecond.
-      const double part = to_seconds(sample->t - before->t) / to_seconds(moment.t - before->t);
       between.t = sample->t;
-      for (int k = 0; k < screened.gyros; ++k) {
+      // From node to node a momentum turns by a fraction of an arcsecond.
+      for (int k = 0; before && k < screened.gyros; ++k) {
+        const double part = to_seconds(sample->t - before->t) / to_seconds(moment.t - before->t);
         between.h_in[k] = (before->h_in[k] + part * (moment.h_in[k] - before->h_in[k])).normalized();
       }
       if (const auto attitude = smoothed.at(between, {sample->h_b, sample->used, 1})) {

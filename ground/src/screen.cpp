@@ -23,12 +23,7 @@ bool knows_of_drift_outside(const PassSettings& settings) {
 
 CalibrationOptions without_further_states(CalibrationOptions options) {
   options.drift_model = Esg7::kModelName;
-  for (FurtherStateOptions::Choice* choice :
-       {&options.further_states.clock_offset, &options.further_states.orbital_error,
-        &options.further_states.wandering_drift, &options.further_states.readout_bias,
-        &options.further_states.coefficient_change}) {
-    *choice = FurtherStateOptions::Choice::kOff;
-  }
+  options.further_states = FurtherStateOptions::none();
   return options;
 }
 

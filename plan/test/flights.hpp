@@ -24,9 +24,7 @@ inline CalibrationOptions told() {
   CalibrationOptions options;
   options.drift_model = "esg7";
   options.find_noise = false;
-  FurtherStateOptions& states = options.further_states;
-  states.clock_offset = states.orbital_error = states.wandering_drift = states.readout_bias =
-      FurtherStateOptions::Choice::kOff;
+  options.further_states = FurtherStateOptions::none();
   return options;
 }
 

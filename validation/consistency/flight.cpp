@@ -82,15 +82,12 @@ Outcome calibrate(const sim::SimulatedPass& flown, double walk_rad_sqrt_s, const
 
 Outcome calibrate_batch(const sim::SimulatedPass& flown, double walk_rad_sqrt_s,
                         const ParameterErrors& bound_variance) {
-  constexpr auto kOff = FurtherStateOptions::Choice::kOff;
   CalibrationOptions options;
   options.estimator = ground::kBatch;
   options.drift_model = Esg7::kModelName;
   options.find_noise = false;
   options.direction_random_walk_rad_sqrt_s = walk_rad_sqrt_s;
-  FurtherStateOptions& states = options.further_states;
-  states.clock_offset = states.orbital_error = states.wandering_drift = states.readout_bias =
-      states.coefficient_change = kOff;
+  options.further_states = FurtherStateOptions::none();
   const Calibration calibration = ground::calibrate(flown.pass, options).calibration;
   ParameterErrors errors;
   for (int k = 0; k < Parameters::kSize / Parameters::kPerGyro; ++k) {

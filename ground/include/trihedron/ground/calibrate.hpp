@@ -19,7 +19,8 @@
 
 namespace trihedron::ground {
 
-/// One fix: eq. (3) from its second component on, two per gyro, and what was done with it.
+/// One fix: eq. (3) from its second component on, two per gyro, and what was done with it. Of estimator batch: what is
+/// left of it when the whole pass is smoothed, along two axes across each momentum.
 struct FixRecord {
   Time t{};
   int head = 0;  ///< the star tracker

@@ -29,6 +29,13 @@ struct FurtherStateOptions {
   Choice readout_bias = Choice::kAuto;  ///< of the direction cosines of each gyro
   /// Of the coefficients of eq. (1), evenly over the pass. Of estimator batch.
   Choice coefficient_change = Choice::kAuto;
+
+  [[nodiscard]] static FurtherStateOptions none() {
+    FurtherStateOptions states;
+    states.clock_offset = states.orbital_error = states.wandering_drift = states.readout_bias =
+        states.coefficient_change = Choice::kOff;
+    return states;
+  }
 };
 
 struct CalibrationOptions {
