@@ -30,14 +30,15 @@ namespace {
 std::vector<io::Table> residual_tables(const ground::CalibrationRun& run) {
   io::Table fixes{"fixes", {}, {}};
   const std::size_t components = 2 * run.calibration.gyros.size();
+  const char* innovation = run.calibration.estimator == ground::kBatch
+                               ? "what the smoothed pass leaves of the fix, gyro and component across its momentum"
+                               : "innovation of eq. (3), gyro and component in qi";
   for (std::size_t i = 0; i < components; ++i) {
     // The paper numbers its quasi-inertial axes so.
     const std::string component = fmt::format("gyro{}_{}", i / 2 + 1, components == 4 && i == 1 ? 3 : i % 2 + 1);
-    fixes.columns.push_back({fmt::format("innovation_{}", component),
-                             "rad",
-                             fmt::format("innovation of eq. (3), gyro and component in qi: {}", component),
-                             {}});
-    fixes.columns.push_back({fmt::format("innovation_{}_sigma", component), "rad", "its 1-sigma by the filter", {}});
+    fixes.columns.push_back(
+        {fmt::format("innovation_{}", component), "rad", fmt::format("{}: {}", innovation, component), {}});
+    fixes.columns.push_back({fmt::format("innovation_{}_sigma", component), "rad", "its 1-sigma", {}});
   }
   fixes.columns.push_back(
       {"nis", "1", fmt::format("normalised innovation squared, {} degrees of freedom", components), {}});
@@ -201,6 +202,9 @@ ExitStatus calibrate_passes(const std::vector<std::string>& paths, const Calibra
                             const std::filesystem::path& out, const std::optional<std::filesystem::path>& catalogue,
                             const Common& common) {
   const std::vector<NamedPass> passes = read_passes(paths);
+  if (catalogue) {
+    io::expect_catalogue_of(passes.front().loaded.pass.settings.spacecraft, *catalogue);
+  }
   const ground::SeveralPasses calibrated = calibrate_in_order(passes, options, common.quiet);
   const bool several = passes.size() > 1;
   for (std::size_t i = 0; several && i < passes.size(); ++i) {
@@ -219,9 +223,9 @@ ExitStatus calibrate_passes(const std::vector<std::string>& paths, const Calibra
     }
     fmt::print("{}\n", json.dump(1));
   } else if (!common.quiet) {
-    fmt::print("{}{}Written     {}: calibration.json attitude.csv residuals.nc report.html effective-config.toml\n",
+    fmt::print("{}{}Written     {}: calibration.json attitude.csv {}residuals.nc report.html effective-config.toml\n",
                several ? passes_text(calibrated.passes()) : "", outcome_text(outcome, options.corrections),
-               out.string());
+               out.string(), options.definitive_attitude ? "definitive-attitude.csv " : "");
   }
   return outcome.run.calibration.verdict.trustworthy ? kTrustworthy : kDoNotUse;
 }

@@ -452,6 +452,7 @@ def test_a_file_that_is_no_catalogue_is_refused_and_left_alone(start_ups, tmp_pa
     refused(run("history", tmp_path / "nowhere.db"), INPUT_REFUSED, "nowhere.db", "no such catalogue")
     refused(run("calibrate", directory / "third", "-o", tmp_path / "out", "--config", directory / "told.toml", "--catalogue", other),
             INPUT_REFUSED, "notes.txt")
+    assert not (tmp_path / "out").exists()
     assert other.read_text() == "not a database " * 100
 
 

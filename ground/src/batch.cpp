@@ -50,8 +50,10 @@ double log_likelihood(const PassProblem& problem, const PassSolution& solution, 
   problem.put_noise(solution, noise, linear);
   const SmootherResult found = smoothed(linear);
   // Of the directions at the start nothing is known before; the rest of the prior is triangular.
-  const Eigen::Index rest = layout.size() - 2L * layout.gyros;
-  const double log_prior_root = linear.prior.bottomRightCorner(rest, rest).diagonal().array().abs().log().sum();
+  const Eigen::Index directions = 2L * layout.gyros;
+  const Eigen::Index rest = layout.size() - directions;
+  const double log_prior_root =
+      linear.prior.block(directions, directions, rest, rest).diagonal().array().abs().log().sum();
   return log_prior_root - found.log_root_determinant - (found.residual_square + linear.outliers_square) / 2;
 }
 

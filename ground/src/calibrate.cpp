@@ -6,11 +6,13 @@
 #include <boost/math/distributions/chi_squared.hpp>
 #include <chrono>
 #include <cmath>
+#include <future>
 #include <memory>
 #include <utility>
 
 #include "decide.hpp"
 #include "gyro_model.hpp"
+#include "pass_setup.hpp"
 #include "refine.hpp"
 #include "setup.hpp"
 #include "trihedron/ground/replay.hpp"
@@ -20,6 +22,8 @@
 namespace trihedron::ground {
 namespace {
 
+/// Between rows of the parameter history: the square root of the whole covariance is most of what a fix costs.
+constexpr Duration kWatchedParameters = std::chrono::seconds(10);
 /// Between the paper's corrections.
 constexpr Duration kWatchedCorrections = std::chrono::minutes(90);
 
@@ -286,16 +290,22 @@ CalibrationRun calibrate_with(const Pass& pass, Decision decision, const Progres
   Time corrected{};
   decltype(Cycle<Estimator>::Report::gyros) gyros_before{};
   double angle_looks = 0;
-  const bool batch = run.options.estimator == kBatch;
-  ScreenedPass screened;
-  screened.gyros = Estimator::kGyros;
+  // On a core of its own.
+  std::future<Refinement> refinement;
+  if (run.options.estimator == kBatch) {
+    if (!decision.screened) {
+      decision.screened = screen(pass, run.options);
+    }
+    const PassSetup setup = pass_setup<Estimator>(cycle->estimator().setup(), pass, run.options);
+    refinement = std::async(std::launch::async, [&decision, &run, setup] {
+      return Refinement(*decision.screened, setup, run.options, decision.forecasts);
+    });
+  }
   const auto on_fix = [&](const typename Cycle<Estimator>::Report& report) {
     run.fixes.push_back(record_of(report));
-    if (batch) {
-      screened.add_fix(report);
-    }
     corrected = report.corrected ? report.fix.t : corrected;
-    if (report.fix.used()) {
+    if (report.fix.used() &&
+        (run.parameters.t.empty() || report.fix.t - run.parameters.t.back() >= kWatchedParameters)) {
       run.parameters.t.push_back(report.fix.t);
       run.parameters.value.push_back(parameter_values(cycle->estimator()));
       const auto root = parameter_root(cycle->estimator());
@@ -318,12 +328,8 @@ CalibrationRun calibrate_with(const Pass& pass, Decision decision, const Progres
   };
   std::array<long, kSampleStatuses> samples{};
   Meter meter(progress, pass.gyro.size());
-  std::size_t sample = 0;
   replay(pass, *cycle, on_fix, [&](const typename Cycle<Estimator>::Report& report) {
     ++samples[static_cast<std::size_t>(report.sample)];
-    if (batch) {
-      screened.add_sample(pass.gyro, sample++, report);
-    }
     for (int k = 0; k < Estimator::kGyros; ++k) {
       if (report.gyros[k] != gyros_before[k]) {
         run.gyro_events.push_back({report.t, k, report.gyros[k]});
@@ -349,8 +355,8 @@ CalibrationRun calibrate_with(const Pass& pass, Decision decision, const Progres
   }
   run.known_before = known_before(pass, Estimator::kGyros, run.options);
   run.calibration = result_of(pass, *cycle, run.options);
-  if (batch) {
-    refine(screened, pass_setup<Estimator>(cycle->estimator().setup(), pass, run.options), decision.forecasts, run);
+  if (refinement.valid()) {
+    refinement.get().put_into(run);
   }
   for (const FixRecord& fix : run.fixes) {
     ++run.fix_counts[name_of(fix.status)];

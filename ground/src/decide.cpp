@@ -16,7 +16,6 @@
 #include <vector>
 
 #include "batch.hpp"
-#include "screen.hpp"
 #include "with_estimator.hpp"
 
 namespace trihedron::ground {
@@ -57,12 +56,10 @@ std::vector<std::string> models_up_to(const std::string& model) {
 /// Of the constants, in their sigmas: decisions need no more.
 constexpr double kNearEnough = 0.2;
 
-/// What decisions need, in a fraction of the time: over two minutes even a random walk of 1e-7 rad/√s, or drift of
-/// 1e-7 rad/s that wanders in 20 minutes, stays below what the fixes in them show, and over three seconds the body
-/// turns by a degree or so.
+/// What decisions need, in a fraction of the time: over some seconds the body turns by some degrees at most.
 PassSetup coarse(PassSetup setup) {
   setup.sample_step = std::chrono::seconds(3);
-  setup.arc = std::chrono::minutes(2);
+  setup.fixes_together = std::chrono::seconds(10);
   return setup;
 }
 
@@ -196,6 +193,7 @@ class Search {
   /// included.
   Search(const Trial& trial, At at, const std::vector<Point>& starts, const Point& lowest, const Point& highest)
       : trial_(trial), linear_(trial.linear()), at_(std::move(at)) {
+    gather_constants(linear_.prior, linear_.prior_y, linear_.stages);
     look_at(starts);
     for (std::optional<Point> last; last != best_;) {
       last = best_;
@@ -280,8 +278,11 @@ Likely with_most_likely_walk(Trial& trial, const CalibrationOptions& options) {
   return settled(trial, at, kAllLevels, {0, 0}, {9, 0});
 }
 
-/// Level and correlation time of the drift that wanders, by factors of two and three from those of the options.
+/// Level and correlation time of the drift that wanders, by factors of two and three from those of the options: from
+/// what is longer than some arcs, or it would be a random walk, to what is shorter than a pass.
 Likely with_most_likely_wandering(Trial& trial, const CalibrationOptions& options) {
+  constexpr double kShortest_s = 400;
+  constexpr double kLongest_s = 3 * 3600;
   const ProcessNoise told{options.direction_random_walk_rad_sqrt_s, options.further_states.wandering_drift_rad_s,
                           to_seconds(options.further_states.wandering_time)};
   const auto at = [told](double level, int time) {
@@ -290,7 +291,12 @@ Likely with_most_likely_wandering(Trial& trial, const CalibrationOptions& option
     noise.wandering_time_s *= std::pow(3, time);
     return noise;
   };
-  return settled(trial, at, {{0, 0}, {2, 0}, {4, 0}, {6, 0}}, {-3, -2}, {9, 1});
+  const auto times_within = [&](double limit_s) {
+    return static_cast<int>(std::floor(std::abs(std::log(told.wandering_time_s / limit_s)) / std::log(3.0) + 1e-6));
+  };
+  const int shorter = told.wandering_time_s > kShortest_s ? times_within(kShortest_s) : 0;
+  const int longer = told.wandering_time_s < kLongest_s ? times_within(kLongest_s) : 0;
+  return settled(trial, at, {{0, 0}, {2, 0}, {4, 0}, {6, 0}}, {-3, -shorter}, {9, longer});
 }
 
 /// What was asked for must be there.
@@ -495,11 +501,7 @@ void leave_out_what_is_open(CalibrationOptions& options) {
 }
 
 /// Only the noise is found: of more than two gyros.
-void find_noise(const Pass& pass, CalibrationOptions& options) {
-  const Screened screened = screen(pass, options);
-  if (screened.pass.fixes.empty()) {
-    return;
-  }
+void find_noise(const Pass& pass, const Screened& screened, CalibrationOptions& options) {
   Trial trial(pass, screened, options);
   const std::vector<Eigen::Vector3d> changes = trial.changes_rad();
   options.find_noise = changes.size() >= kEnough;
@@ -516,7 +518,7 @@ void find_noise(const Pass& pass, CalibrationOptions& options) {
 /// By what the pass itself shows.
 Decision decide_by_pass(const Pass& pass, const Screened& screened, const CalibrationOptions& asked,
                         const std::string& largest_model) {
-  Decision decision{asked, {}, {}};
+  Decision decision{asked, {}, {}, {}};
   CalibrationOptions& options = decision.options;
   const bool wandering_is_open = options.further_states.wandering_drift == Choice::kAuto;
   if (wandering_is_open) {
@@ -579,7 +581,7 @@ Decision decide(const Pass& pass, const CalibrationOptions& asked_for) {
     leave_out_coefficient_change(asked);
   }
   refuse_prior_of_others(pass, asked);
-  Decision decision{asked, {}, {}};
+  Decision decision{asked, {}, {}, {}};
   CalibrationOptions& options = decision.options;
   options.find_noise = false;
   const bool invariant = asked.estimator != kPaper;
@@ -594,7 +596,10 @@ Decision decide(const Pass& pass, const CalibrationOptions& asked_for) {
       options.drift_model = asked.drift_model;
     }
     if (asked.find_noise && invariant && !prior) {
-      find_noise(pass, options);
+      decision.screened = screen(pass, options);
+      if (!decision.screened->pass.fixes.empty()) {
+        find_noise(pass, *decision.screened, options);
+      }
     }
     return decision;
   }
@@ -610,7 +615,7 @@ Decision decide(const Pass& pass, const CalibrationOptions& asked_for) {
     leave_out_what_is_open(options);
     return decision;
   }
-  const Screened screened = screen(pass, options);
+  Screened screened = screen(pass, options);
   if (screened.pass.fixes.empty()) {
     leave_out_what_is_open(options);
     return decision;
@@ -620,6 +625,7 @@ Decision decide(const Pass& pass, const CalibrationOptions& asked_for) {
     Decision decided = decide_by_pass(pass, screened, asked, largest_model);
     const std::optional<std::string> larger = larger_model(largest_model);
     if (!larger || best_of(decided.forecasts) != &decided.forecasts.back()) {
+      decided.screened = std::move(screened);
       return decided;
     }
     largest_model = *larger;

@@ -1,9 +1,11 @@
 #pragma once
 /// What a pass gives evidence of beside alignment and eq. (1).
 
+#include <optional>
 #include <vector>
 
 #include "forecast.hpp"
+#include "screen.hpp"
 #include "trihedron/ground/calibrate.hpp"
 
 namespace trihedron::ground {
@@ -11,8 +13,9 @@ namespace trihedron::ground {
 /// The options with nothing left to decide, `find_noise` saying whether it was found; and on what evidence.
 struct Decision {
   CalibrationOptions options;
-  std::vector<Evidence> evidence;   ///< empty where nothing was to be decided
-  std::vector<Forecast> forecasts;  ///< of the drift models that were compared
+  std::vector<Evidence> evidence;    ///< empty where nothing was to be decided
+  std::vector<Forecast> forecasts;   ///< of the drift models that were compared
+  std::optional<Screened> screened;  ///< what it was decided by, where the pass was looked at
 };
 
 /// Settles each choice that is left to the program. Estimator paper, and passes of more than two gyros, have no further

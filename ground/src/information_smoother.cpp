@@ -154,6 +154,28 @@ SmootherResult smooth(const MatrixXd& prior, const VectorXd& prior_y, const std:
   return result;
 }
 
+void gather_constants(MatrixXd& prior, VectorXd& prior_y, std::vector<SmootherStage>& stages) {
+  const Index n = prior.cols();
+  const Index d = stages.front().m.size();
+  Pile pile(n - d + 1);
+  for (SmootherStage& stage : stages) {
+    if (stage.H.rows() > d) {
+      MatrixXd rows(stage.H.rows(), n + 1);
+      rows << stage.H, stage.y;
+      rotate_up(rows, d);
+      pile.add(rows.bottomRightCorner(rows.rows() - d, n - d + 1));
+      stage.H = rows.topLeftCorner(d, n);
+      stage.y = rows.topRightCorner(d, 1);
+    }
+  }
+  const MatrixXd constants = pile.triangle();
+  const Index before = prior.rows();
+  prior.conservativeResize(before + constants.rows(), n);
+  prior.bottomRows(constants.rows()) << MatrixXd::Zero(constants.rows(), d), constants.leftCols(n - d);
+  prior_y.conservativeResize(prior.rows());
+  prior_y.tail(constants.rows()) = constants.rightCols(1);
+}
+
 std::vector<MatrixXd> triangles_after(const MatrixXd& prior, const VectorXd& prior_y,
                                       const std::vector<SmootherStage>& stages, const std::vector<std::size_t>& after) {
   Forward forward(prior, prior_y, stages.front().m.size());

@@ -12,7 +12,7 @@
 #include "batch.hpp"
 #include "combinations.hpp"
 #include "decide.hpp"
-#include "refine.hpp"
+#include "pass_setup.hpp"
 #include "screen.hpp"
 #include "with_estimator.hpp"
 
@@ -258,8 +258,9 @@ bool Observability::is_harmful() const {
 }
 
 Observability observe(const Pass& pass, const CalibrationOptions& asked, const Mission& mission) {
-  const CalibrationOptions options = decide(pass, asked).options;
-  const Screened screened = screen(pass, options);
+  Decision decision = decide(pass, asked);
+  const CalibrationOptions& options = decision.options;
+  const Screened screened = decision.screened ? std::move(*decision.screened) : screen(pass, options);
   if (screened.pass.fixes.empty()) {
     throw no_fix();
   }

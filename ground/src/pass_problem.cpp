@@ -4,7 +4,6 @@
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
-#include <future>
 #include <numbers>
 #include <utility>
 
@@ -42,7 +41,7 @@ GyroDirections in_c(const PassSolution& solution, const GyroDirections& h_b) {
 }
 
 /// The same measurements in no more rows than there are states, and one for what is left over.
-void compress_stage(SmootherStage& stage) {
+void compress(SmootherStage& stage) {
   const Eigen::Index states = stage.H.cols();
   if (stage.H.rows() > states + 1) {
     MatrixXd rows(stage.H.rows(), states + 1);
@@ -53,13 +52,50 @@ void compress_stage(SmootherStage& stage) {
   }
 }
 
-/// On two cores: of decisions it is a third of the work.
-void compress(std::vector<SmootherStage>& stages) {
-  const auto middle = stages.begin() + static_cast<std::ptrdiff_t>(stages.size() / 2);
-  const auto first = std::async(std::launch::async, [&] { std::for_each(stages.begin(), middle, compress_stage); });
-  std::for_each(middle, stages.end(), compress_stage);
-  first.wait();
-}
+/// White rows of fixes, those in a row that are near as one: their mean, by their weights.
+class Together {
+ public:
+  explicit Together(Duration reach) : reach_(reach) {}
+
+  void add(const ScreenedPass::Fix& fix, const PassProblem::FixRows& rows, double weight) {
+    const bool first = sums_.empty() || fix.fix.t - sums_.back().t >= reach_ || sums_.back().head != fix.fix.head ||
+                       !std::equal(fix.used.begin(), fix.used.end(), sums_.back().used.begin());
+    Sum& sum = first ? sums_.emplace_back() : sums_.back();
+    const double square = weight * weight;
+    if (first) {
+      sum = {fix.fix.t, fix.fix.head, fix.used, square, square * rows.H, square * rows.y};
+      size_ += rows.y.size();
+      return;
+    }
+    sum.weight += square;
+    sum.H += square * rows.H;
+    sum.y += square * rows.y;
+  }
+
+  void put_into(SmootherStage& stage, Eigen::Index states) const {
+    stage.H.resize(size_, states);
+    stage.y.resize(size_);
+    Eigen::Index row = 0;
+    for (const Sum& sum : sums_) {
+      stage.H.middleRows(row, sum.y.size()) = sum.H / std::sqrt(sum.weight);
+      stage.y.segment(row, sum.y.size()) = sum.y / std::sqrt(sum.weight);
+      row += sum.y.size();
+    }
+  }
+
+ private:
+  struct Sum {
+    Time t{};  ///< of the first
+    int head = 0;
+    GyrosUsed used{};
+    double weight = 0;
+    MatrixXd H;
+    VectorXd y;
+  };
+  Duration reach_;
+  std::vector<Sum> sums_;
+  Eigen::Index size_ = 0;
+};
 
 /// ω_b by κ with so much of its change.
 Vector3d rate(const DriftFamily::Basis& basis, const GyroParameters& gyro, double part) {
@@ -95,7 +131,8 @@ PassProblem::PassProblem(const ScreenedPass& pass, PassSetup setup)
     add_fixes_until(sample.t - Duration{1});  // on its own time after it
     after_gap = after_gap || sample.t - before > OnBoard::kMaxInterpolation;
     before = sample.t;
-    if (after_gap || sample.t - taken >= setup_.sample_step || &sample == &pass.samples.back()) {
+    const bool fix_follows = fix != pass.fixes.end() && fix->fix.t - sample.t < setup_.sample_step / 2;
+    if (after_gap || (sample.t - taken >= setup_.sample_step && !fix_follows) || &sample == &pass.samples.back()) {
       nodes_.push_back({sample.t, sample.h_b, sample.used, nullptr, std::exchange(after_gap, false)});
       taken = sample.t;
     }
@@ -454,7 +491,7 @@ PassProblem::Linear PassProblem::linearise(const PassSolution& solution) const {
   add_prior(solution, linear);
   linear.stages.resize(arcs_.size());
   Moment moment;
-  std::vector<FixRows> fixes;
+  std::vector<std::pair<const ScreenedPass::Fix*, FixRows>> fixes;
   std::vector<double> nis_per_component;
   std::vector<std::size_t> fixes_until;
   for (std::size_t arc = 0; arc < arcs_.size(); ++arc) {
@@ -463,7 +500,7 @@ PassProblem::Linear PassProblem::linearise(const PassSolution& solution) const {
     for (std::size_t i = arcs_[arc].begin; i < arcs_[arc].end; ++i) {
       moment.fix = nodes_[i].fix;
       if (moment.fix != nullptr) {
-        FixRows& rows = fixes.emplace_back(compare(solution, moment));
+        FixRows& rows = fixes.emplace_back(moment.fix, compare(solution, moment)).second;
         const Eigen::LLT<MatrixXd> root(rows.R);
         root.matrixL().solveInPlace(rows.H);
         root.matrixL().solveInPlace(rows.y);
@@ -493,27 +530,21 @@ PassProblem::Linear PassProblem::linearise(const PassSolution& solution) const {
   }
   std::size_t fix = 0;
   for (std::size_t arc = 0; arc < arcs_.size(); ++arc) {
-    SmootherStage& stage = linear.stages[arc];
-    Eigen::Index size = 0;
-    for (std::size_t i = fix; i < fixes_until[arc]; ++i) {
-      size += fixes[i].y.size();
-    }
-    stage.H.resize(size, setup_.layout.size());
-    stage.y.resize(size);
-    Eigen::Index row = 0;
+    Together together(setup_.fixes_together);
     for (; fix < fixes_until[arc]; ++fix) {
-      const FixRows& rows = fixes[fix];
+      const auto& [its, rows] = fixes[fix];
+      if (rows.y.size() == 0) {
+        continue;
+      }
       // Its pull falls with the third power of the misfit beyond the gate.
       const double nis = rows.y.squaredNorm();
-      const double gate = scale * gate_of_freedom(std::max(static_cast<int>(rows.y.size()), 1), setup_.gate_nis);
-      const double weight = nis > gate ? gate / nis : 1;
+      const double gate = scale * gate_of_freedom(static_cast<int>(rows.y.size()), setup_.gate_nis);
       linear.outliers_square += nis > gate ? 2 * gate * (1 - gate / nis) : 0;
-      stage.H.middleRows(row, rows.y.size()) = weight * rows.H;
-      stage.y.segment(row, rows.y.size()) = weight * rows.y;
-      row += rows.y.size();
+      together.add(*its, rows, nis > gate ? gate / nis : 1);
     }
+    together.put_into(linear.stages[arc], setup_.layout.size());
   }
-  compress(linear.stages);
+  std::for_each(linear.stages.begin(), linear.stages.end(), compress);
   put_noise(solution, setup_.noise, linear);
   return linear;
 }

@@ -67,6 +67,8 @@ struct PassSetup {
   double gate_nis = 30;  ///< of a pair; above it a fix counts less
   /// Samples are taken so far apart: the body turns little between them, and their noise is averaged in the end.
   Duration sample_step = std::chrono::seconds(1);
+  /// Fixes nearer than this count as one: what they show together, without what changes among them.
+  Duration fixes_together{};
   /// Process noise comes in so often, and after a gap.
   Duration arc = std::chrono::seconds(60);
 };

@@ -3,183 +3,17 @@
 #include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
 #include <algorithm>
-#include <array>
-#include <chrono>
 #include <cmath>
 #include <map>
-#include <optional>
 #include <utility>
 
-#include "batch.hpp"
-#include "trihedron/core/directions_fit.hpp"
-#include "trihedron/core/optimal_attitude.hpp"
+#include "pass_setup.hpp"
+#include "smoothed_attitude.hpp"
 
 namespace trihedron::ground {
 namespace {
 
-using Eigen::Matrix3d;
 using Eigen::MatrixXd;
-using Eigen::Vector3d;
-
-/// The body moves like a cubic over some seconds to both sides; where it does not, over less.
-constexpr std::array<Duration, 3> kReaches = {std::chrono::milliseconds(3000), std::chrono::milliseconds(1400),
-                                              std::chrono::milliseconds(700)};
-
-/// Readings at any time, by the samples round it together.
-class SmoothReadings {
- public:
-  SmoothReadings(const ScreenedPass& pass, const std::vector<double>& readout_noise_rad)
-      : samples_(pass.samples), gyros_(pass.gyros), noise_rad_(readout_noise_rad) {}
-
-  struct At {
-    GyroDirections h_b;
-    GyrosUsed used{};
-    double noise_factor = 1;
-  };
-  /// `otherwise` where no polynomial is what the body did; of the gyros that it uses.
-  [[nodiscard]] At at(Time t, const At& otherwise) const {
-    for (const Duration reach : kReaches) {
-      if (const auto fitted = fit(t, otherwise.used, reach)) {
-        return *fitted;
-      }
-    }
-    return otherwise;
-  }
-
- private:
-  struct Indexed {
-    const std::vector<ScreenedPass::Sample>& samples;
-    [[nodiscard]] const ScreenedPass::Sample& operator[](int i) const { return samples[static_cast<std::size_t>(i)]; }
-  };
-
-  [[nodiscard]] std::optional<At> fit(Time t, const GyrosUsed& used, Duration reach) const {
-    constexpr int kDegree = 3;
-    constexpr int kLeast = 2 * (kDegree + 1);
-    const auto before = [](const ScreenedPass::Sample& sample, Time time) { return sample.t < time; };
-    const auto first = std::lower_bound(samples_.begin(), samples_.end(), t - reach, before);
-    const auto last = std::lower_bound(first, samples_.end(), t + reach + Duration{1}, before);
-    const auto begin = static_cast<int>(first - samples_.begin());
-    const auto end = static_cast<int>(last - samples_.begin());
-    if (end - begin < kLeast) {
-      return std::nullopt;
-    }
-    const auto gap = std::adjacent_find(first, last, [](const auto& a, const auto& b) {
-      return b.t - a.t > Cycle<InvariantEstimator<Esg7, 2>>::kMaxInterpolation;
-    });
-    if (gap != last) {
-      return std::nullopt;
-    }
-    const auto fitted = fit_directions<kMaxGyros>(Indexed{samples_}, begin, end, t, kDegree);
-    const double bound = fitted.freedom + 5 * std::sqrt(2.0 * fitted.freedom);
-    At at;
-    at.h_b = fitted.h_b;
-    at.noise_factor = fitted.noise_factor;
-    for (int k = 0; k < gyros_; ++k) {
-      const double sigma_rad = noise_rad_[static_cast<std::size_t>(k)];
-      at.used[k] =
-          used[k] && std::all_of(first, last, [&](const ScreenedPass::Sample& sample) { return sample.used[k]; });
-      if (at.used[k] && !(fitted.residual_square[k] <= bound * sigma_rad * sigma_rad)) {
-        return std::nullopt;
-      }
-    }
-    return count(at.used) >= 2 ? std::optional(at) : std::nullopt;
-  }
-
-  const std::vector<ScreenedPass::Sample>& samples_;
-  int gyros_;
-  const std::vector<double>& noise_rad_;
-};
-
-/// Attitude by the smoothed momenta.
-class SmoothedAttitude {
- public:
-  /// `roots`: of the covariance, arc by arc. Refers to all of them.
-  SmoothedAttitude(const ScreenedPass& screened, const PassProblem& problem, const PassSolution& solution,
-                   const std::vector<MatrixXd>& roots)
-      : problem_(problem), solution_(solution), roots_(roots), readings_(screened, problem.setup().readout_noise_rad) {}
-
-  struct At {
-    Rot<In, C> C_in_c;
-    Vector3d sigma_rad;
-  };
-  /// `otherwise` as of SmoothReadings. Nothing where the directions give no attitude.
-  [[nodiscard]] std::optional<At> at(const PassProblem::Moment& moment, const SmoothReadings::At& otherwise) const {
-    const SmoothReadings::At reading = readings_.at(moment.t, otherwise);
-    const auto attitude = PassProblem::attitude(solution_, moment, reading.h_b, reading.used);
-    if (!attitude) {
-      return std::nullopt;
-    }
-    const MatrixXd spread =
-        problem_.attitude_by_states(solution_, moment, attitude.value(), reading.h_b) * roots_[moment.arc];
-    Vector3d variance_rad2 = spread.rowwise().squaredNorm();
-    for (int k = 0; k < problem_.setup().layout.gyros; ++k) {
-      const double noise_rad = problem_.setup().readout_noise_rad[static_cast<std::size_t>(k)] * reading.noise_factor;
-      variance_rad2 +=
-          noise_rad * noise_rad * attitude.value().by_directions.middleCols<3>(3L * k).rowwise().squaredNorm();
-    }
-    return At{attitude.value().C_in_c, variance_rad2.cwiseSqrt()};
-  }
-
- private:
-  const PassProblem& problem_;
-  const PassSolution& solution_;
-  const std::vector<MatrixXd>& roots_;
-  SmoothReadings readings_;
-};
-
-void append(const SmoothedAttitude::At& attitude, Time t, AttitudeHistory& history) {
-  history.t.push_back(t);
-  history.q_in_c.push_back(attitude.C_in_c.quaternion());
-  history.sigma_rad.push_back(attitude.sigma_rad);
-}
-
-SmoothedCourse smoothed_course(const PassProblem& problem, const PassSolution& solution,
-                               const SmoothedAttitude& smoothed) {
-  SmoothedCourse course;
-  const int gyros = problem.setup().layout.gyros;
-  course.readings.gyros = gyros;
-  problem.go_along(solution, [&](const PassProblem::Moment& moment) {
-    if (moment.fix == nullptr) {
-      return;
-    }
-    const auto attitude = smoothed.at(moment, {moment.fix->h_b, moment.fix->used, moment.fix->noise_factor});
-    if (!attitude) {
-      return;
-    }
-    append(*attitude, moment.t, course.attitude);
-    course.readings.t.push_back(moment.t);
-    for (int k = 0; k < gyros; ++k) {
-      const Vector3d h_b = solution.gyros[static_cast<std::size_t>(k)].C_c_b.transpose() *
-                           (attitude->C_in_c.raw().transpose() * moment.h_in[k]);
-      course.readings.h.insert(course.readings.h.end(), h_b.begin(), h_b.end());
-    }
-  });
-  return course;
-}
-
-/// At each gyro sample from the first fix on.
-AttitudeHistory definitive_attitude(const ScreenedPass& screened, const PassProblem& problem,
-                                    const PassSolution& solution, const SmoothedAttitude& smoothed) {
-  AttitudeHistory history;
-  auto sample = std::ranges::lower_bound(screened.samples, problem.begin_of(0), {}, &ScreenedPass::Sample::t);
-  std::optional<PassProblem::Moment> before;
-  problem.go_along(solution, [&](const PassProblem::Moment& moment) {
-    PassProblem::Moment between = moment;
-    for (; sample != screened.samples.end() && sample->t <= moment.t; ++sample) {
-      between.t = sample->t;
-      // From node to node a momentum turns by a fraction of an arcsecond.
-      for (int k = 0; before && k < screened.gyros; ++k) {
-        const double part = to_seconds(sample->t - before->t) / to_seconds(moment.t - before->t);
-        between.h_in[k] = (before->h_in[k] + part * (moment.h_in[k] - before->h_in[k])).normalized();
-      }
-      if (const auto attitude = smoothed.at(between, {sample->h_b, sample->used, 1})) {
-        append(*attitude, sample->t, history);
-      }
-    }
-    before = moment;
-  });
-  return history;
-}
 
 /// What is left of each fix when the whole pass is smoothed, in place of what it was off on board.
 void use_residuals(const PassProblem& problem, const PassSolution& solution, const std::vector<MatrixXd>& roots,
@@ -300,71 +134,50 @@ std::vector<FurtherEstimate> further_of(const PassSetup& setup, const BatchResul
   return further;
 }
 
-}  // namespace
-
-std::vector<std::string> further_names(const FurtherStateOptions& states, int further_heads, int gyros) {
-  constexpr auto kOn = FurtherStateOptions::Choice::kOn;
-  std::vector<std::string> names;
-  if (states.clock_offset == kOn) {
-    names.emplace_back("clock_offset_s");
+/// Throws SetupError where nothing can be made of it.
+const Screened& usable(const Screened& screened) {
+  if (screened.pass.fixes.empty()) {
+    throw SetupError("no fix could be compared with the gyros", "look at the telemetry with `trihedron inspect`");
   }
-  if (states.orbital_error == kOn) {
-    for (const char* wave : {"sine", "cosine"}) {
-      for (const char axis : {'x', 'y', 'z'}) {
-        names.push_back(fmt::format("orbital_{}_{}_rad", wave, axis));
-      }
-    }
-  }
-  for (int head = 1; head <= further_heads; ++head) {
-    for (const char axis : {'x', 'y', 'z'}) {
-      names.push_back(fmt::format("star_tracker_{}_align_{}_rad", head + 1, axis));
-    }
-  }
-  if (states.readout_bias == kOn) {
-    for (int k = 1; k <= gyros; ++k) {
-      for (const char axis : {'x', 'y', 'z'}) {
-        names.push_back(fmt::format("gyro{}_readout_bias_{}_rad", k, axis));
-      }
-    }
-  }
-  if (states.coefficient_change == kOn) {
-    for (int k = 1; k <= gyros; ++k) {
-      for (const char* coefficient : Esg7::kNames) {
-        names.push_back(fmt::format("gyro{}_{}_change_rad_s", k, coefficient));
-      }
-    }
-  }
-  return names;
-}
-
-void refine(const ScreenedPass& screened, const PassSetup& setup, const std::vector<Forecast>& forecasts,
-            CalibrationRun& run) {
-  if (screened.clock_set_back) {
+  if (screened.pass.clock_set_back) {
     throw SetupError("the clock of the telemetry was set back within the pass: how its parts lie in time is unknown",
                      "calibrate the parts apart, or use estimator invariant");
   }
-  const PassProblem problem(screened, setup);
-  Calibration& calibration = run.calibration;
-  std::vector<GyroParameters> first;
-  for (const GyroCalibration& gyro : calibration.gyros) {
-    first.push_back(parameters_of(gyro, setup.family));
-  }
-  BatchResult result = most_likely(problem, problem.start(first));
+  return screened;
+}
 
+}  // namespace
+
+Refinement::Refinement(const Screened& screened, PassSetup setup, const CalibrationOptions& options,
+                       const std::vector<Forecast>& forecasts)
+    : problem_(usable(screened).pass, std::move(setup)),
+      options_(options),
+      result_(most_likely(problem_, first_solution(problem_, screened))),
+      roots_(covariance_roots(result_.errors, result_.linear.stages)) {
+  const SmoothedAttitude smoothed(screened.pass, problem_, result_.solution, roots_);
+  course_ = smoothed.course();
+  drift_models_ = flown(forecasts, course_);
+  if (options.definitive_attitude) {
+    definitive_attitude_ = smoothed.definitive();
+  }
+}
+
+void Refinement::put_into(CalibrationRun& run) && {
+  const PassSetup& setup = problem_.setup();
   const PassLayout& layout = setup.layout;
+  Calibration& calibration = run.calibration;
   const MatrixXd own =
-      result.errors.last_root.middleRows(layout.drift(0), layout.drift(layout.gyros) - layout.drift(0));
+      result_.errors.last_root.middleRows(layout.drift(0), layout.drift(layout.gyros) - layout.drift(0));
   calibration.covariance = own * own.transpose();
   GyroDirections last_h_in;
-  problem.go_along(result.solution, [&](const PassProblem::Moment& moment) {
+  problem_.go_along(result_.solution, [&](const PassProblem::Moment& moment) {
     calibration.t = moment.t;
     last_h_in = moment.h_in;
   });
   for (int k = 0; k < layout.gyros; ++k) {
     const auto index = static_cast<std::size_t>(k);
-    const GyroParameters& found = result.solution.gyros[index];
     GyroCalibration& gyro = calibration.gyros[index];
-    gyro = record_of(found, run.options.drift_model, setup.family);
+    gyro = record_of(result_.solution.gyros[index], options_.drift_model, setup.family);
     gyro.momentum_in = last_h_in[k];
   }
   calibration.estimator = kBatch;
@@ -372,19 +185,14 @@ void refine(const ScreenedPass& screened, const PassSetup& setup, const std::vec
   rearrange(calibration.states, states, setup, run.parameters);
   calibration.states = states;
   calibration.further =
-      further_of(setup, result, further_names(run.options.further_states, layout.further_heads, layout.gyros));
-  compare_halves(result, layout, calibration.statistics);
-  calibration.statistics["batch_iterations"] = result.iterations;
-  calibration.statistics["batch_converged"] = result.converged ? 1 : 0;
-  const std::vector<MatrixXd> roots = covariance_roots(result.errors, result.linear.stages);
-  use_residuals(problem, result.solution, roots, run.fixes);
-  const SmoothedAttitude smoothed(screened, problem, result.solution, roots);
-  SmoothedCourse course = smoothed_course(problem, result.solution, smoothed);
-  run.drift_models = flown(forecasts, course);
-  run.attitude = std::move(course.attitude);
-  if (run.options.definitive_attitude) {
-    run.definitive_attitude = definitive_attitude(screened, problem, result.solution, smoothed);
-  }
+      further_of(setup, result_, further_names(options_.further_states, layout.further_heads, layout.gyros));
+  compare_halves(result_, layout, calibration.statistics);
+  calibration.statistics["batch_iterations"] = result_.iterations;
+  calibration.statistics["batch_converged"] = result_.converged ? 1 : 0;
+  use_residuals(problem_, result_.solution, roots_, run.fixes);
+  run.drift_models = std::move(drift_models_);
+  run.attitude = std::move(course_.attitude);
+  run.definitive_attitude = std::move(definitive_attitude_);
 }
 
 }  // namespace trihedron::ground

@@ -3,7 +3,7 @@
 #include <algorithm>
 
 #include "gyro_model.hpp"
-#include "refine.hpp"
+#include "pass_setup.hpp"
 #include "trihedron/ground/replay.hpp"
 #include "with_estimator.hpp"
 

@@ -349,6 +349,23 @@ TEST(PassProblem, KnowsHowTheMisfitOfAFixDependsOnEachState) {
   }
 }
 
+TEST(PassProblem, LosesLittleByFixesTakenTogether) {
+  const ScreenedPass screened = screened_beginning(two_hours(), 8 * 55);
+  const auto normal_equations = [&](Duration fixes_together) {
+    PassSetup setup = full_setup(two_hours());
+    setup.fixes_together = fixes_together;
+    const PassProblem problem(screened, setup);
+    const SmootherStage stage = problem.linearise(problem.start(setup.prior.gyros)).stages.front();
+    return std::pair(Eigen::MatrixXd(stage.H.transpose() * stage.H), Eigen::VectorXd(stage.H.transpose() * stage.y));
+  };
+  const auto [apart, apart_y] = normal_equations({});
+  const auto [together, together_y] = normal_equations(std::chrono::seconds(10));
+  EXPECT_LT(together.trace(), apart.trace());
+  // What drift does grows with the time, whose spread within 10 s is 1 % of its square over a minute.
+  EXPECT_LT((together - apart).norm(), 0.02 * apart.norm());
+  EXPECT_LT((together_y - apart_y).norm(), 0.02 * apart_y.norm());
+}
+
 /// The flight code's sensitivities, themselves tested against differences, over steps of 125 ms instead of a second.
 /// Half a step behind it would be off by 5e-4 of what the momenta turn.
 TEST(PassProblem, CarriesErrorsAlongAsTheFlightCodeDoes) {

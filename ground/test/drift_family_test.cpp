@@ -5,6 +5,7 @@
 #include <Eigen/QR>
 
 #include "trihedron/core/drift.hpp"
+#include "trihedron/ground/calibrate.hpp"
 #include "trihedron/sim/harmonics.hpp"
 #include "trihedron/sim/random.hpp"
 
@@ -49,6 +50,11 @@ TEST(DriftFamily, IsCompleteWithoutSayingAnythingTwice) {
     EXPECT_EQ(family.size(), sizes[static_cast<std::size_t>(degree - 1)]);
     EXPECT_EQ(across_the_sphere(family).colPivHouseholderQr().rank(), family.size());
   }
+}
+
+TEST(DriftFamily, GoesUpToTheLargestModel) {
+  EXPECT_EQ(kLargestDriftModel, "vsh:" + std::to_string(DriftFamily::kMaxDegree));
+  EXPECT_FALSE(DriftFamily::named("vsh:" + std::to_string(DriftFamily::kMaxDegree + 1)));
 }
 
 TEST(DriftFamily, IsThatOfTheSimulator) {

@@ -122,6 +122,21 @@ TEST(InformationSmoother, WithoutProcessNoiseIsLeastSquares) {
   expect_equal(System(7, 0.5, 0));
 }
 
+TEST(InformationSmoother, IsTheSameWithTheConstantsGathered) {
+  System system(7, 0.5, 0.3);
+  const SmootherResult apart = smooth(system.prior, system.prior_y, system.stages);
+  gather_constants(system.prior, system.prior_y, system.stages);
+  for (const SmootherStage& stage : system.stages) {
+    EXPECT_LE(stage.H.rows(), kDynamic);
+  }
+  const SmootherResult gathered = smooth(system.prior, system.prior_y, system.stages);
+  for (std::size_t i = 0; i < apart.x.size(); ++i) {
+    EXPECT_LT((apart.x[i] - gathered.x[i]).norm(), 1e-12) << i;
+  }
+  EXPECT_NEAR(gathered.residual_square, apart.residual_square, 1e-12);
+  EXPECT_NEAR(gathered.log_root_determinant, apart.log_root_determinant, 1e-12);
+}
+
 TEST(InformationSmoother, KnowsTheInformationOnConstantsAtEachStage) {
   System system(7, 0.5, 0.3);
   system.prior.rightCols(kConstants).setZero();

@@ -69,13 +69,17 @@ void make_tables(SqliteDatabase& database) {
   database.execute(fmt::format("PRAGMA application_id = {}; PRAGMA user_version = {}", kApplicationId, kSchemaVersion));
 }
 
-void check_spacecraft(SqliteDatabase& database, const fs::path& file, const CatalogueEntry& entry) {
+bool is_empty(SqliteDatabase& database) {
+  return database.number("SELECT count(*) FROM sqlite_schema") == 0 && database.number("PRAGMA application_id") == 0;
+}
+
+void check_spacecraft(SqliteDatabase& database, const fs::path& file, const std::string& spacecraft) {
   SqliteStatement other(database, "SELECT spacecraft FROM calibration WHERE spacecraft <> ? LIMIT 1");
-  other.bind(0, entry.spacecraft);
+  other.bind(0, spacecraft);
   if (other.step()) {
-    throw InputRefused(
-        file, {}, fmt::format("is of spacecraft {}, not {}", in_quotes(other.text(0)), in_quotes(entry.spacecraft)),
-        "give each spacecraft a catalogue of its own");
+    throw InputRefused(file, {},
+                       fmt::format("is of spacecraft {}, not {}", in_quotes(other.text(0)), in_quotes(spacecraft)),
+                       "give each spacecraft a catalogue of its own");
   }
 }
 
@@ -132,15 +136,27 @@ void add_entry(SqliteDatabase& database, const CatalogueEntry& entry) {
 
 }  // namespace
 
+void expect_catalogue_of(const std::string& spacecraft, const fs::path& file) {
+  std::error_code ignored;
+  if (!fs::exists(file, ignored)) {
+    return;
+  }
+  SqliteDatabase database(file, SqliteDatabase::Access::kRead);
+  if (!is_empty(database)) {
+    check_catalogue(database, file);
+    check_spacecraft(database, file, spacecraft);
+  }
+}
+
 void add_to_catalogue(const fs::path& file, std::span<const CatalogueEntry> entries) {
   SqliteDatabase database(file, SqliteDatabase::Access::kWrite);
   database.execute("PRAGMA foreign_keys = ON; BEGIN IMMEDIATE");
-  if (database.number("SELECT count(*) FROM sqlite_schema") == 0 && database.number("PRAGMA application_id") == 0) {
+  if (is_empty(database)) {
     make_tables(database);
   }
   check_catalogue(database, file);
   for (const CatalogueEntry& entry : entries) {
-    check_spacecraft(database, file, entry);
+    check_spacecraft(database, file, entry.spacecraft);
     add_entry(database, entry);
   }
   database.execute("COMMIT");

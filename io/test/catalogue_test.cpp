@@ -26,10 +26,11 @@ class Catalogue : public testing::Test {
   [[nodiscard]] std::int64_t count(const char* table) const {
     return SqliteDatabase(file_, SqliteDatabase::Access::kRead).number(std::string("SELECT count(*) FROM ") + table);
   }
-  /// Of reading and of adding, which must be the same.
-  [[nodiscard]] std::string refusal_of_both() const {
+  /// Of reading, of adding and of asking before, which must be the same.
+  [[nodiscard]] std::string refusal_of_all() const {
     const std::string of_reading = refusal([&] { static_cast<void>(read_catalogue(file_)); });
     EXPECT_EQ(refusal([&] { add(sample_entry()); }), of_reading);
+    EXPECT_EQ(refusal([&] { expect_catalogue_of("Resurs-DK1", file_); }), of_reading);
     return of_reading;
   }
 
@@ -90,6 +91,16 @@ TEST_F(Catalogue, AddsAllOrNone) {
   EXPECT_THAT(read_catalogue(file_), SizeIs(1));
 }
 
+TEST_F(Catalogue, IsAskedBeforeThereIsSomethingToAdd) {
+  expect_catalogue_of("Resurs-DK1", file_);
+  EXPECT_THAT(directory_.names(), testing::IsEmpty());
+  write_text(file_, "");
+  expect_catalogue_of("Resurs-DK1", file_);
+  add(sample_entry());
+  expect_catalogue_of("Resurs-DK1", file_);
+  EXPECT_THAT(refusal([&] { expect_catalogue_of("another", file_); }), HasSubstr("not \"another\""));
+}
+
 TEST_F(Catalogue, RefusesToReadWhereThereIsNone) {
   EXPECT_THAT(refusal([&] { static_cast<void>(read_catalogue(file_)); }), HasSubstr("there is no such catalogue"));
   EXPECT_THAT(directory_.names(), testing::IsEmpty());
@@ -97,26 +108,26 @@ TEST_F(Catalogue, RefusesToReadWhereThereIsNone) {
 
 TEST_F(Catalogue, RefusesAFileThatIsNoDatabase) {
   write_text(file_, "t_s,h1_x\n" + std::string(1000, '0'));
-  EXPECT_THAT(refusal_of_both(), HasSubstr("catalogue.db: is damaged or no database: "));
+  EXPECT_THAT(refusal_of_all(), HasSubstr("catalogue.db: is damaged or no database: "));
   EXPECT_THAT(read_text(file_), HasSubstr("t_s,h1_x"));
 }
 
 TEST_F(Catalogue, RefusesTheDatabaseOfAnotherProgram) {
   execute("CREATE TABLE songs (name TEXT)");
-  EXPECT_THAT(refusal_of_both(), HasSubstr("is a database, but no catalogue of calibrations"));
+  EXPECT_THAT(refusal_of_all(), HasSubstr("is a database, but no catalogue of calibrations"));
   EXPECT_EQ(count("sqlite_schema"), 1);
 }
 
 TEST_F(Catalogue, RefusesANewerVersion) {
   add(sample_entry());
   execute("PRAGMA user_version = 2");
-  EXPECT_THAT(refusal_of_both(), HasSubstr("is a catalogue of version 2, this program reads 1"));
+  EXPECT_THAT(refusal_of_all(), HasSubstr("is a catalogue of version 2, this program reads 1"));
 }
 
 TEST_F(Catalogue, RefusesADamagedOne) {
   add(sample_entry());
   std::filesystem::resize_file(file_, std::filesystem::file_size(file_) / 2);
-  EXPECT_THAT(refusal_of_both(), HasSubstr("is damaged"));
+  EXPECT_THAT(refusal_of_all(), HasSubstr("is damaged"));
 }
 
 TEST_F(Catalogue, RefusesACalibrationThatIsNone) {
@@ -129,7 +140,7 @@ TEST_F(Catalogue, RefusesACalibrationThatIsNone) {
 TEST_F(Catalogue, RefusesOneWithoutItsTables) {
   add(sample_entry());
   execute("DROP TABLE calibration");
-  EXPECT_THAT(refusal_of_both(), HasSubstr("no such table"));
+  EXPECT_THAT(refusal_of_all(), HasSubstr("no such table"));
 }
 
 TEST_F(Catalogue, FailsWhereTheDirectoryIsMissingOrTheNameIsThatOfADirectory) {

@@ -5,6 +5,7 @@
 
 namespace trihedron::report::assets {
 
+extern const std::string_view kDocument;
 extern const std::string_view kPage;
 extern const std::string_view kHistory;
 extern const std::string_view kStyle;

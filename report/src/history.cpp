@@ -8,7 +8,7 @@
 #include <utility>
 
 #include "assets.hpp"
-#include "html.hpp"
+#include "document.hpp"
 #include "parameters.hpp"
 #include "units.hpp"
 #include "verdict.hpp"
@@ -174,22 +174,23 @@ json facts_of(const Catalogue& catalogue, const ground::History& history) {
 
 std::string render_history(const Catalogue& catalogue, const ground::History& history) {
   const json changes = change_rows(history);
-  const json values = {
-      {"spacecraft", catalogue.empty() ? "Empty catalogue" : catalogue.front().spacecraft},
-      {"facts", facts_of(catalogue, history)},
-      {"calibrations", calibration_rows(catalogue)},
-      {"coefficients", names_of(catalogue, false)},
-      {"alignments", names_of(catalogue, true)},
-      {"has_changes", !changes.empty()},
-      {"changes", changes},
-      {"spreads", spread_tables(history)},
-      {"findings", findings_of(history.findings)},
-      {"style", assets::kStyle},
-      {"plotly", assets::kPlotly},
-      {"script", std::string(assets::kFigures) + std::string(assets::kTrend) + std::string(assets::kReport)},
-      {"data", script_safe(figure_data(catalogue, history))},
-      {"version", TRIHEDRON_VERSION}};
-  return fill_in(assets::kHistory, values);
+  json values = {{"spacecraft", catalogue.empty() ? "Empty catalogue" : catalogue.front().spacecraft},
+                 {"facts", facts_of(catalogue, history)},
+                 {"calibrations", calibration_rows(catalogue)},
+                 {"coefficients", names_of(catalogue, false)},
+                 {"alignments", names_of(catalogue, true)},
+                 {"has_changes", !changes.empty()},
+                 {"changes", changes},
+                 {"spreads", spread_tables(history)},
+                 {"findings", findings_of(history.findings)}};
+  return html_of({.title = "History of gyro calibrations",
+                  .kind = "History of gyro calibrations",
+                  .first_section = "start-ups",
+                  .reading_notes = "Sigmas are one standard deviation.",
+                  .content = assets::kHistory,
+                  .script = std::string(assets::kFigures) + std::string(assets::kTrend) + std::string(assets::kReport),
+                  .figures = figure_data(catalogue, history)},
+                 std::move(values));
 }
 
 }  // namespace trihedron::report

@@ -1,8 +1,10 @@
 #include "trihedron/report/report.hpp"
 
+#include <utility>
+
 #include "assets.hpp"
+#include "document.hpp"
 #include "figures.hpp"
-#include "html.hpp"
 #include "parameters.hpp"
 #include "tables.hpp"
 #include "verdict.hpp"
@@ -17,12 +19,17 @@ std::string render(const ReportInput& input) {
   for (const auto& [name, data] : figures.items()) {
     values["draws_" + name] = true;
   }
-  values["style"] = assets::kStyle;
-  values["plotly"] = assets::kPlotly;
-  values["script"] = std::string(assets::kFigures) + std::string(assets::kSphere) + std::string(assets::kReport);
-  values["data"] = script_safe(figures);
-  values["version"] = TRIHEDRON_VERSION;
-  return fill_in(assets::kPage, values);
+  return html_of(
+      {.title = "Gyro calibration",
+       .kind = "Gyro calibration report",
+       .first_section = "verdict",
+       .reading_notes = "Time runs in minutes from the start of the pass. Sigmas are one standard deviation. Lines are "
+                        "thinned for drawing so that the least and greatest value of every moment are kept; nothing is "
+                        "skipped.",
+       .content = assets::kPage,
+       .script = std::string(assets::kFigures) + std::string(assets::kSphere) + std::string(assets::kReport),
+       .figures = figures},
+      std::move(values));
 }
 
 }  // namespace trihedron::report

@@ -35,7 +35,8 @@ struct FixRecord {
   [[nodiscard]] bool used() const { return is_used(status); }
 };
 
-/// Estimates after each fix, for the figures of the paper: one row per used fix, columns as in Calibration::states.
+/// Estimates along the pass, for the figures of the paper: a row after a used fix every 10 s, columns as in
+/// Calibration::states.
 struct ParameterHistory {
   std::vector<Time> t;
   std::vector<std::vector<double>> value;  ///< [row][state]; alignment as rotation vector, rad; drift rad/s

@@ -5,6 +5,7 @@
 
 #include <filesystem>
 #include <span>
+#include <string>
 #include <vector>
 
 #include "trihedron/records/catalogue.hpp"
@@ -15,6 +16,9 @@ namespace trihedron::io {
 /// model and number of passes is replaced. Throws InputRefused for a file that is no catalogue, a damaged or newer one,
 /// or one of another spacecraft; MachineFailed when it cannot be written.
 void add_to_catalogue(const std::filesystem::path& file, std::span<const CatalogueEntry> entries);
+
+/// Whether add_to_catalogue would take this file, asked before there is something to add. Throws as it does.
+void expect_catalogue_of(const std::string& spacecraft, const std::filesystem::path& file);
 
 /// In the order of epoch, and then t and number of passes. Throws as add_to_catalogue, and InputRefused where there is
 /// none.
