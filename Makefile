@@ -49,6 +49,7 @@ coverage: sanitize
 
 CONSISTENCY = $(BUILD)/trihedron_consistency --resume out/consistency.txt
 WHOLE_PASS = --estimators invariant,batch
+STEADY = '^steady/.*/(30|60)arcmin/0e.00$$'
 ONE_GEOMETRY = '/plane-plane/1e-06/30arcmin/(0e.00|1e-08)$$'
 GEOMETRIES = '/1e-06/30arcmin/(0e.00|1e-08)$$'
 
@@ -57,11 +58,12 @@ consistency: build
 	@mkdir -p out
 	@if [ $(BUILD)/trihedron_consistency -nt out/consistency.txt ]; then rm -f out/consistency.txt; fi
 	$(CONSISTENCY) docs/consistency.md
-	$(CONSISTENCY) $(WHOLE_PASS) --runs 20 --cells '^steady/.*/(30|60)arcmin/0e.00$$' --place batch docs/consistency.md
+	$(CONSISTENCY) $(WHOLE_PASS) --runs 20 --cells $(STEADY) --place batch docs/consistency.md
 	$(CONSISTENCY) $(WHOLE_PASS) --cells $(ONE_GEOMETRY) --place batch100 docs/consistency.md
 	$(CONSISTENCY) $(WHOLE_PASS) --cells $(ONE_GEOMETRY) --table observable --place observable100 docs/consistency.md
 	$(CONSISTENCY) $(WHOLE_PASS) --runs 30 --cells $(GEOMETRIES) --table observable --place observable docs/consistency.md
 	$(CONSISTENCY) $(WHOLE_PASS) --runs 30 --cells $(GEOMETRIES) --table agreement --place agreement docs/consistency.md
+	$(CONSISTENCY) $(WHOLE_PASS) --runs 20 --cells $(STEADY) --table agreement --place agreement20 docs/consistency.md
 
 format:
 	clang-format -i $(SOURCES)
