@@ -47,15 +47,23 @@ coverage: sanitize
 	gcovr --gcov-ignore-parse-errors --root . --filter 'core/(include|src)/' --exclude-throw-branches --exclude-unreachable-branches \
 	  --fail-under-line 95 --print-summary build-sanitize/core
 
+CONSISTENCY = $(BUILD)/trihedron_consistency --resume out/consistency.txt
+WHOLE_PASS = --estimators invariant,batch
+STEADY = '^steady/.*/(30|60)arcmin/0e.00$$'
+ONE_GEOMETRY = '/plane-plane/1e-06/30arcmin/(0e.00|1e-08)$$'
+GEOMETRIES = '/1e-06/30arcmin/(0e.00|1e-08)$$'
+
 # The outcomes of flights outlive an interruption, not a change of the program.
 consistency: build
 	@mkdir -p out
 	@if [ $(BUILD)/trihedron_consistency -nt out/consistency.txt ]; then rm -f out/consistency.txt; fi
-	$(BUILD)/trihedron_consistency --resume out/consistency.txt docs/consistency.md
-	$(BUILD)/trihedron_consistency --resume out/consistency.txt --place batch --estimators invariant,batch --runs 20 \
-	  --cells '^steady/.*/(30|60)arcmin/0e.00$$' docs/consistency.md
-	$(BUILD)/trihedron_consistency --resume out/consistency.txt --place batch100 --estimators invariant,batch --runs 100 \
-	  --cells '/plane-plane/1e-06/30arcmin/0e.00$$' docs/consistency.md
+	$(CONSISTENCY) docs/consistency.md
+	$(CONSISTENCY) $(WHOLE_PASS) --runs 20 --cells $(STEADY) --place batch docs/consistency.md
+	$(CONSISTENCY) $(WHOLE_PASS) --cells $(ONE_GEOMETRY) --place batch100 docs/consistency.md
+	$(CONSISTENCY) $(WHOLE_PASS) --cells $(ONE_GEOMETRY) --table observable --place observable100 docs/consistency.md
+	$(CONSISTENCY) $(WHOLE_PASS) --runs 30 --cells $(GEOMETRIES) --table observable --place observable docs/consistency.md
+	$(CONSISTENCY) $(WHOLE_PASS) --runs 30 --cells $(GEOMETRIES) --table agreement --place agreement docs/consistency.md
+	$(CONSISTENCY) $(WHOLE_PASS) --runs 20 --cells $(STEADY) --table agreement --place agreement20 docs/consistency.md
 
 format:
 	clang-format -i $(SOURCES)

@@ -4,7 +4,7 @@
 
 namespace trihedron::consistency {
 
-Band band_of_mean(int freedom, long count) {
+Band band_of_mean(double freedom, long count) {
   const auto n = static_cast<double>(count);
   const boost::math::chi_squared sum(freedom * n);
   return {quantile(sum, 0.025) / n, quantile(sum, 0.975) / n};

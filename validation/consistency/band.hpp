@@ -11,7 +11,7 @@ struct Band {
   [[nodiscard]] int side(double value) const { return value < low ? -1 : value <= high ? 0 : 1; }
 };
 
-/// Where 95 % of the means of `count` independent values lie, each χ² of `freedom` degrees.
-[[nodiscard]] Band band_of_mean(int freedom, long count);
+/// Where 95 % of the means of `count` independent values lie, each χ², of `freedom` degrees on the average.
+[[nodiscard]] Band band_of_mean(double freedom, long count);
 
 }  // namespace trihedron::consistency

@@ -1,11 +1,13 @@
 #include "consistency/flight.hpp"
 
-#include <Eigen/Cholesky>
 #include <Eigen/QR>
+#include <algorithm>
 #include <limits>
 #include <memory>
+#include <optional>
 
 #include "consistency/bound.hpp"
+#include "consistency/statistics.hpp"
 #include "trihedron/core/cycles.hpp"
 #include "trihedron/core/invariant_estimator.hpp"
 #include "trihedron/core/paper_estimator.hpp"
@@ -16,18 +18,34 @@
 namespace trihedron::consistency {
 namespace {
 
-using ParameterErrors = Eigen::Matrix<double, Parameters::kSize, 1>;
+constexpr int kGyros = 2;
+
+/// What an estimator made of a flight.
+struct Estimate {
+  ParameterErrors errors;          ///< truth less estimate
+  ParameterCovariance covariance;  ///< as it claims
+  double nees = 0;
+  double nis = 0;
+  long fixes = 0;
+};
+
+ParameterCovariance prior_covariance(const PassSettings& settings) {
+  ParameterErrors variance;
+  for (int k = 0; k < kGyros; ++k) {
+    const GyroPrior& prior = settings.gyros[static_cast<std::size_t>(k)];
+    variance.segment<Esg7::kSize>(Parameters::drift(k))
+        .setConstant(prior.drift_common_sigma_rad_s * prior.drift_common_sigma_rad_s);
+    variance.segment<3>(Parameters::alignment(k)) = prior.alignment_sigma_rad.cwiseAbs2();
+  }
+  return variance.asDiagonal();
+}
 
 template <class Estimator>
 typename Estimator::Setup setup_of(const PassSettings& settings, double walk_rad_sqrt_s) {
   typename Estimator::Setup setup;
-  for (int k = 0; k < Estimator::kGyros; ++k) {
-    const GyroPrior& prior = settings.gyros[static_cast<std::size_t>(k)];
-    auto variance = setup.prior_covariance.diagonal();
-    variance.template segment<Esg7::kSize>(Parameters::drift(k))
-        .setConstant(prior.drift_common_sigma_rad_s * prior.drift_common_sigma_rad_s);
-    variance.template segment<3>(Parameters::alignment(k)) = prior.alignment_sigma_rad.cwiseAbs2();
-    setup.readout_noise_rad[k] = prior.readout_noise_rad;
+  setup.prior_covariance = prior_covariance(settings);
+  for (int k = 0; k < kGyros; ++k) {
+    setup.readout_noise_rad[k] = settings.gyros[static_cast<std::size_t>(k)].readout_noise_rad;
   }
   setup.star_tracker_noise_rad = settings.star_tracker_noise_rad;
   setup.direction_random_walk_rad_sqrt_s = walk_rad_sqrt_s;
@@ -46,7 +64,7 @@ void put_errors(const Truth::Gyro& truth, const Eigen::Matrix<double, Esg7::kSiz
 template <class Estimator>
 ParameterErrors errors_of(const Estimator& estimator, const Truth& truth) {
   ParameterErrors errors;
-  for (int k = 0; k < Estimator::kGyros; ++k) {
+  for (int k = 0; k < kGyros; ++k) {
     const auto& estimate = estimator.gyros()[k];
     put_errors(truth.gyros[static_cast<std::size_t>(k)], estimate.drift_rad_s, estimate.C_c_b, k, errors);
   }
@@ -54,34 +72,33 @@ ParameterErrors errors_of(const Estimator& estimator, const Truth& truth) {
 }
 
 template <class Estimator>
-Outcome calibrate(const sim::SimulatedPass& flown, double walk_rad_sqrt_s, const ParameterErrors& bound_variance) {
+Estimate by_filter(const sim::SimulatedPass& flown, double walk_rad_sqrt_s) {
   using OnBoard = Cycle<Estimator>;
   const auto created = OnBoard::create(setup_of<Estimator>(flown.pass.settings, walk_rad_sqrt_s), {.navigate = false});
   const auto cycle = std::make_unique<OnBoard>(created.value());
-  Outcome outcome;
+  Estimate estimate;
   ground::replay(
       flown.pass, *cycle,
       [&](const auto& report) {
         const FixStatus status = report.fix.status;
         if (status == FixStatus::kRejectedByGate || (is_used(status) && status != FixStatus::kStarted)) {
-          outcome.nis += report.fix.nis;
-          ++outcome.fixes;
+          estimate.nis += report.fix.nis;
+          ++estimate.fixes;
         }
       },
       [](const auto&) {});
-  outcome.nis /= static_cast<double>(outcome.fixes);
+  estimate.nis /= static_cast<double>(estimate.fixes);
 
-  const ParameterErrors errors = errors_of(cycle->estimator(), flown.truth);
+  estimate.errors = errors_of(cycle->estimator(), flown.truth);
   // P = root rootᵀ = RᵀR; P itself would lose what is known of differences of poorly known parameters.
   const Eigen::MatrixXd root = cycle->estimator().error_root().template bottomRows<Parameters::kSize>();
   const Eigen::MatrixXd R = root.transpose().householderQr().matrixQR().topRows<Parameters::kSize>();
-  outcome.nees = R.transpose().triangularView<Eigen::Lower>().solve(errors).squaredNorm();
-  outcome.error_over_bound_square = errors.cwiseAbs2().cwiseQuotient(bound_variance).mean();
-  return outcome;
+  estimate.nees = R.transpose().triangularView<Eigen::Lower>().solve(estimate.errors).squaredNorm();
+  estimate.covariance = root * root.transpose();
+  return estimate;
 }
 
-Outcome calibrate_batch(const sim::SimulatedPass& flown, double walk_rad_sqrt_s,
-                        const ParameterErrors& bound_variance) {
+Estimate by_batch(const sim::SimulatedPass& flown, double walk_rad_sqrt_s) {
   CalibrationOptions options;
   options.estimator = ground::kBatch;
   options.drift_model = Esg7::kModelName;
@@ -89,27 +106,21 @@ Outcome calibrate_batch(const sim::SimulatedPass& flown, double walk_rad_sqrt_s,
   options.direction_random_walk_rad_sqrt_s = walk_rad_sqrt_s;
   options.further_states = FurtherStateOptions::none();
   const Calibration calibration = ground::calibrate(flown.pass, options).calibration;
-  ParameterErrors errors;
-  for (int k = 0; k < Parameters::kSize / Parameters::kPerGyro; ++k) {
+  Estimate estimate;
+  for (int k = 0; k < kGyros; ++k) {
     const auto gyro = static_cast<std::size_t>(k);
     Eigen::Matrix<double, Esg7::kSize, 1> kappa_rad_s;
     for (std::size_t i = 0; i < Esg7::kSize; ++i) {
       kappa_rad_s(static_cast<Eigen::Index>(i)) = calibration.gyros[gyro].drift_rad_s[i].second;
     }
     const auto C_c_b = Rot<C, B<1>>::exp(Vec<C>::assume(calibration.gyros[gyro].alignment_rotation_vector_rad));
-    put_errors(flown.truth.gyros[gyro], kappa_rad_s, C_c_b.raw(), k, errors);
+    put_errors(flown.truth.gyros[gyro], kappa_rad_s, C_c_b.raw(), k, estimate.errors);
   }
-  Outcome outcome;
-  outcome.nis = std::numeric_limits<double>::quiet_NaN();
-  outcome.fixes = static_cast<long>(calibration.statistics.at("nis_count"));
-  // In units of the sigmas, which differ by ten powers of ten.
-  const ParameterErrors sigma = calibration.covariance.diagonal().cwiseSqrt();
-  const ParameterErrors scaled = errors.cwiseQuotient(sigma);
-  const Eigen::MatrixXd correlation =
-      sigma.cwiseInverse().asDiagonal() * calibration.covariance * sigma.cwiseInverse().asDiagonal();
-  outcome.nees = scaled.dot(correlation.llt().solve(scaled));
-  outcome.error_over_bound_square = errors.cwiseAbs2().cwiseQuotient(bound_variance).mean();
-  return outcome;
+  estimate.covariance = calibration.covariance;
+  estimate.nis = calibration.statistics.at("nis_mean");
+  estimate.fixes = static_cast<long>(calibration.statistics.at("nis_count"));
+  estimate.nees = nees(estimate.errors, estimate.covariance);
+  return estimate;
 }
 
 }  // namespace
@@ -117,18 +128,37 @@ Outcome calibrate_batch(const sim::SimulatedPass& flown, double walk_rad_sqrt_s,
 std::vector<Outcome> fly(const Cell& cell, int run, const std::vector<std::string>& estimators) {
   const sim::SimulatedPass flown = sim::simulate(cell.scenario(run));
   const double walk_rad_sqrt_s = cell.walk_rad_sqrt_s;
+  const ParameterCovariance prior = prior_covariance(flown.pass.settings);
   // The bound knows no process noise.
   const ParameterErrors bound_variance =
       walk_rad_sqrt_s > 0 ? ParameterErrors::Constant(std::numeric_limits<double>::quiet_NaN())
                           : ParameterErrors(parameter_bound(flown.pass.settings, flown.truth).diagonal());
+  const auto outcome_of = [&](const Estimate& estimate) {
+    Outcome outcome;
+    outcome.nees = estimate.nees;
+    outcome.observable = observable_nees(estimate.errors, estimate.covariance, prior);
+    outcome.nis = estimate.nis;
+    outcome.fixes = estimate.fixes;
+    outcome.error_over_bound_square = estimate.errors.cwiseAbs2().cwiseQuotient(bound_variance).mean();
+    return outcome;
+  };
+  std::optional<Estimate> invariant;  // estimator batch is compared with it
+  if (std::ranges::any_of(estimators, [](const std::string& name) { return name != "paper"; })) {
+    invariant = by_filter<InvariantEstimator<Esg7, kGyros>>(flown, walk_rad_sqrt_s);
+  }
   std::vector<Outcome> outcomes;
   for (const std::string& name : estimators) {
     if (name == "paper") {
-      outcomes.push_back(calibrate<PaperEstimator<Esg7>>(flown, walk_rad_sqrt_s, bound_variance));
+      outcomes.push_back(outcome_of(by_filter<PaperEstimator<Esg7>>(flown, walk_rad_sqrt_s)));
     } else if (name == "invariant") {
-      outcomes.push_back(calibrate<InvariantEstimator<Esg7, 2>>(flown, walk_rad_sqrt_s, bound_variance));
+      outcomes.push_back(outcome_of(*invariant));
     } else {
-      outcomes.push_back(calibrate_batch(flown, walk_rad_sqrt_s, bound_variance));
+      const Estimate batch = by_batch(flown, walk_rad_sqrt_s);
+      Outcome& outcome = outcomes.emplace_back(outcome_of(batch));
+      // The errors are small rotations of the truth: what they differ by is what the estimates differ by.
+      const ParameterErrors difference = batch.errors - invariant->errors;
+      outcome.by_parameter = difference_by_parameter(difference, invariant->covariance, batch.covariance);
+      outcome.by_combination = difference_by_combination(difference, invariant->covariance, batch.covariance);
     }
   }
   return outcomes;

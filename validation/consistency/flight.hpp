@@ -1,11 +1,11 @@
 #pragma once
 
 #include <array>
-#include <limits>
 #include <string>
 #include <vector>
 
 #include "consistency/grid.hpp"
+#include "consistency/statistics.hpp"
 
 namespace trihedron::consistency {
 
@@ -16,10 +16,14 @@ inline constexpr int kInnovations = 4;  ///< of one fix
 /// One estimator over one flight.
 struct Outcome {
   double nees = 0;  ///< of the parameters at the end
-  double nis = 0;   ///< mean over the fixes; not a number of estimator batch, which predicts none
-  long fixes = 0;   ///< all but the first, rejected ones as well: there are no outliers
+  Nees observable;  ///< of what the flight made observable of them
+  double nis = 0;   ///< mean over the fixes; of estimator batch of what is left of them when the pass is smoothed
+  long fixes = 0;   ///< all but the first, rejected ones as well: there are no outliers; of estimator batch all used
   /// Mean over the parameters of error² over the variance of parameter_bound(); not a number with process noise.
-  double error_over_bound_square = std::numeric_limits<double>::quiet_NaN();
+  double error_over_bound_square = 0;
+  /// Of estimator batch: how estimator invariant differs from it. Otherwise zero.
+  Difference by_parameter;
+  Difference by_combination;
 };
 
 /// One flight of this cell, seen by each of the estimators named. They are told the true noise.

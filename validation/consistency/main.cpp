@@ -22,6 +22,10 @@ namespace {
 
 using namespace trihedron::consistency;
 
+constexpr const char* kEstimatorsTable = "estimators";
+constexpr const char* kObservableTable = "observable";
+constexpr const char* kAgreementTable = "agreement";
+
 struct Options {
   int runs = 100;
   int paper_runs = 20;  // it is far enough off to be seen by fewer
@@ -31,6 +35,7 @@ struct Options {
   std::filesystem::path resume;
   std::filesystem::path document;
   std::string place = "consistency";
+  std::string table = kEstimatorsTable;
 };
 
 /// A flight to be made, and the estimators that have not seen it.
@@ -41,6 +46,9 @@ struct Task {
 };
 
 std::vector<Column> columns_of(const Options& options) {
+  if (options.table == kAgreementTable) {
+    return {{"batch", options.runs}};
+  }
   std::vector<Column> columns;
   for (const std::string& estimator : options.estimators) {
     columns.push_back({estimator, estimator == "paper" ? std::min(options.runs, options.paper_runs) : options.runs});
@@ -98,14 +106,21 @@ std::string measured(const Options& options) {
   const std::vector<Column> columns = columns_of(options);
   fly_all(missing(results, cells, columns, options.runs), options.threads, results);
   fmt::print(stderr, "\n");
+  if (options.table == kAgreementTable) {
+    return fmt::format("{} runs per row.\n\n", options.runs) + results.agreement_table(cells, options.runs);
+  }
+  const bool observable = options.table == kObservableTable;
   std::string text;
   for (const auto& [estimator, runs] : columns) {
-    const Band nees = band_of_mean(kParameters, runs);
-    text += fmt::format(
-        "{}: {} runs per row; 95 % of the means of a consistent estimator's NEES lie in {:.1f} … {:.1f}.  \n",
-        estimator, runs, nees.low, nees.high);
+    text += fmt::format("{}: {} runs per row", estimator, runs);
+    if (!observable) {
+      const Band nees = band_of_mean(kParameters, runs);
+      text += fmt::format("; 95 % of the means of a consistent estimator's NEES lie in {:.1f} … {:.1f}", nees.low,
+                          nees.high);
+    }
+    text += ".  \n";
   }
-  return text + "\n" + results.table(cells, columns);
+  return text + "\n" + (observable ? results.observable_table(cells, columns) : results.table(cells, columns));
 }
 
 }  // namespace
@@ -113,9 +128,17 @@ std::string measured(const Options& options) {
 int main(int argc, char** argv) {
   try {
     Options options;
-    CLI::App program("Flies a grid of simulated passes: NEES, NIS and error over its lower bound, per estimator.");
+    CLI::App program(
+        "Flies a grid of simulated passes: whether the estimators' covariances hold, how good they are, and "
+        "whether they agree.");
     program.add_option("document", options.document, "Write the table into it, not to standard output");
     program.add_option("--place", options.place, "Of the table in the document")->capture_default_str();
+    program
+        .add_option("--table", options.table,
+                    "estimators: NEES, NIS, error over bound; observable: NEES of what the flights make observable; "
+                    "agreement: of estimators invariant and batch")
+        ->check(CLI::IsMember({kEstimatorsTable, kObservableTable, kAgreementTable}))
+        ->capture_default_str();
     program.add_option("--runs", options.runs, "Flights per cell")->check(CLI::PositiveNumber)->capture_default_str();
     program.add_option("--paper-runs", options.paper_runs, "Those of them that estimator paper sees")
         ->check(CLI::PositiveNumber)

@@ -38,8 +38,15 @@ class Results {
   /// Markdown: a row per cell; per estimator the means of NEES and NIS over its runs, marked where they lie outside
   /// their bands, and the error over its bound. Needs all those runs.
   [[nodiscard]] std::string table(const std::vector<Cell>& cells, const std::vector<Column>& columns) const;
+  /// The same of the NEES of what the flights made observable: its mean, that of its degrees of freedom, its band.
+  [[nodiscard]] std::string observable_table(const std::vector<Cell>& cells, const std::vector<Column>& columns) const;
+  /// How estimators invariant and batch differ over runs 1 … `runs` of each cell.
+  [[nodiscard]] std::string agreement_table(const std::vector<Cell>& cells, int runs) const;
 
  private:
+  /// Means over the runs; of the NIS over the fixes.
+  [[nodiscard]] Outcome mean_of(const Cell& cell, const Column& column) const;
+
   std::filesystem::path file_;
   std::map<Key, Outcome> outcomes_;
 };

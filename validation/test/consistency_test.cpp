@@ -1,10 +1,15 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/LU>
+#include <Eigen/QR>
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <filesystem>
+#include <fstream>
+#include <random>
 #include <set>
+#include <stdexcept>
 #include <string>
 #include <utility>
 #include <vector>
@@ -13,6 +18,8 @@
 #include "consistency/bound.hpp"
 #include "consistency/flight.hpp"
 #include "consistency/grid.hpp"
+#include "consistency/results.hpp"
+#include "consistency/statistics.hpp"
 #include "trihedron/ground/calibrate.hpp"
 #include "trihedron/sim/simulate.hpp"
 
@@ -39,6 +46,12 @@ TEST(Band, TellsTheSideAndDoesNotTakeNaNForInside) {
   EXPECT_EQ(band.side(2), 0);
   EXPECT_EQ(band.side(2.5), 1);
   EXPECT_EQ(band.side(std::nan("")), 1);
+}
+
+TEST(Band, OfDifferentFreedomsIsThatOfTheirSum) {
+  const Band band = band_of_mean(18.5, 2);
+  EXPECT_NEAR(band.low, 22.106 / 2, 1e-3);
+  EXPECT_NEAR(band.high, 55.668 / 2, 1e-3);
 }
 
 TEST(Grid, HasEachOf216CellsOnce) {
@@ -126,6 +139,153 @@ TEST(Bound, IsTheCovarianceOfTheFilterForSmallMisalignments) {
   }
 }
 
+/// An estimator whose covariance is known: combinations of the parameters, oblique in all of them, with these variances
+/// in units of their prior ones.
+struct KnownEstimator {
+  explicit KnownEstimator(const ParameterErrors& variances) {
+    prior_sigma.setConstant(1e-6);
+    for (int k = 0; k < 2; ++k) {
+      prior_sigma.segment<3>(Parameters::alignment(k)).setConstant(5e-3);
+    }
+    prior = prior_sigma.cwiseAbs2().asDiagonal();
+    Eigen::HouseholderQR<ParameterCovariance> oblique(ParameterCovariance::NullaryExpr([&] { return normal(random); }));
+    root = prior_sigma.asDiagonal() * ParameterCovariance(oblique.householderQ()) *
+           ParameterCovariance(variances.cwiseSqrt().asDiagonal());
+    covariance = root * root.transpose();
+  }
+
+  /// Of each combination, in its 1-sigma.
+  ParameterErrors draw() {
+    return ParameterErrors::NullaryExpr([&] { return normal(random); });
+  }
+
+  std::mt19937_64 random{2};
+  std::normal_distribution<double> normal;
+  ParameterErrors prior_sigma;
+  ParameterCovariance prior;
+  ParameterCovariance root;  ///< a column per combination
+  ParameterCovariance covariance;
+};
+
+/// Variance of a combination over its prior one, whose prior sigma is `ratio` of that by the measurements alone.
+double share(double ratio) { return 1 / (1 + ratio * ratio); }
+
+TEST(ObservableNees, OfDrawnErrorsIsTheSquareOfWhatWasDrawn) {
+  ParameterErrors variances = ParameterErrors::Constant(1e-9);
+  variances.head<3>() << 1, share(9.9), share(10.1);
+  KnownEstimator estimator(variances);
+  constexpr int kRuns = 1000;
+  double mean = 0;
+  for (int run = 0; run < kRuns; ++run) {
+    const ParameterErrors drawn = estimator.draw();
+    const Nees nees = observable_nees(estimator.root * drawn, estimator.covariance, estimator.prior);
+    ASSERT_EQ(nees.freedom, 18);
+    ASSERT_NEAR(nees.value, drawn.tail<18>().squaredNorm(), 1e-4 * nees.value);  // 1e-16 of the prior in 1e-9 of it
+    mean += nees.value / kRuns;
+  }
+  EXPECT_EQ(band_of_mean(18, kRuns).side(mean), 0) << mean;
+}
+
+TEST(ObservableNees, DoesNotCountWhatStaysAtItsPrior) {
+  ParameterErrors variances = ParameterErrors::Constant(1e-6);
+  variances(5) = 1;
+  KnownEstimator estimator(variances);
+  const ParameterErrors errors = estimator.root * estimator.draw();
+  const Nees nees = observable_nees(errors, estimator.covariance, estimator.prior);
+  const Nees far_off = observable_nees(errors + 100 * estimator.root.col(5), estimator.covariance, estimator.prior);
+  EXPECT_EQ(nees.freedom, 19);
+  EXPECT_NEAR(far_off.value, nees.value, 1e-6 * nees.value);
+}
+
+TEST(ObservableNees, IsNothingBeforeTheFlight) {
+  KnownEstimator estimator(ParameterErrors::Ones());
+  const Nees nees = observable_nees(estimator.root * estimator.draw(), estimator.covariance, estimator.prior);
+  EXPECT_EQ(nees.freedom, 0);
+  EXPECT_EQ(nees.value, 0);
+}
+
+TEST(Difference, OfEqualEstimatesIsZero) {
+  const KnownEstimator estimator(ParameterErrors::LinSpaced(1e-9, 1e-2));
+  for (const auto& difference_of : {difference_by_parameter, difference_by_combination}) {
+    const Difference none = difference_of(ParameterErrors::Zero(), estimator.covariance, estimator.covariance);
+    EXPECT_EQ(none.square, 0);
+    EXPECT_NEAR(none.variance_ratio, 1, 1e-6);
+    EXPECT_TRUE(agrees(none));
+  }
+}
+
+TEST(Difference, ByParameterIsInItsSigmas) {
+  const KnownEstimator estimator(ParameterErrors::LinSpaced(1e-9, 1e-2));
+  ParameterErrors sigma = estimator.covariance.diagonal().cwiseSqrt();
+  sigma.head<10>() *= -2;
+  const Difference difference = difference_by_parameter(sigma, 9 * estimator.covariance, estimator.covariance);
+  EXPECT_NEAR(difference.square, (4 + 1) / 2.0, 1e-9);
+  EXPECT_NEAR(difference.variance_ratio, 9, 1e-9);
+}
+
+/// One that no parameter shows by itself counts as much as any other.
+TEST(Difference, ByCombinationSeesEachCombination) {
+  const KnownEstimator estimator(ParameterErrors::LinSpaced(1e-9, 1e-2));
+  const ParameterErrors best_known = estimator.root.col(0);
+  const ParameterCovariance less_known =
+      estimator.covariance + 40 * best_known * best_known.transpose();  // 41 times the variance
+  const Difference hidden = difference_by_parameter(3 * best_known, less_known, estimator.covariance);
+  const Difference seen = difference_by_combination(3 * best_known, less_known, estimator.covariance);
+  EXPECT_LT(hidden.square, 1e-5);
+  EXPECT_LT(hidden.variance_ratio, 1 + 1e-4);
+  EXPECT_NEAR(seen.square, 9.0 / 20, 1e-6);
+  EXPECT_NEAR(seen.variance_ratio, (19 + 41) / 20.0, 1e-6);
+}
+
+TEST(Difference, MayBeAThirdOfASigmaBesideWhatTheFirstSaysToKnowLess) {
+  EXPECT_TRUE(agrees({0.11, 1}));
+  EXPECT_FALSE(agrees({0.12, 1}));
+  EXPECT_TRUE(agrees({0.11 + 2, 3}));
+  EXPECT_FALSE(agrees({0.12 + 2, 3}));
+  EXPECT_FALSE(agrees({0.12, 0.9}));
+  EXPECT_FALSE(agrees({std::nan(""), 1}));
+}
+
+std::vector<Cell> first_cell() { return {grid().front()}; }
+
+TEST(Results, ComeBackFromTheFile) {
+  const std::filesystem::path file = std::filesystem::path(testing::TempDir()) / "consistency_results.txt";
+  std::filesystem::remove(file);
+  const std::string cell = first_cell().front().name();
+  Outcome outcome;
+  outcome.nees = 21;
+  outcome.observable = {17.5, 18};
+  outcome.nis = 4.001;
+  outcome.fixes = 10800;
+  outcome.error_over_bound_square = std::nan("");
+  outcome.by_parameter = {0.04, 1.21};
+  outcome.by_combination = {0.09, 1.44};
+  Results written(file);
+  written.add({cell, 1, "batch"}, outcome);
+  const Results read(file);
+  ASSERT_TRUE(read.contains({cell, 1, "batch"}));
+  EXPECT_EQ(read.table(first_cell(), {{"batch", 1}}), written.table(first_cell(), {{"batch", 1}}));
+  EXPECT_EQ(read.observable_table(first_cell(), {{"batch", 1}}),
+            written.observable_table(first_cell(), {{"batch", 1}}));
+  EXPECT_NE(read.observable_table(first_cell(), {{"batch", 1}}).find("| 17.5 | 18.00 | 8.2 … 31.5 |"),
+            std::string::npos);
+  EXPECT_NE(read.agreement_table(first_cell(), 1).find("| 0.20 | 1.100 | 0.30 | 1.200 |"), std::string::npos);
+
+  std::ofstream(file, std::ios::app) << cell << " 2 batch 10800 21 what\n";
+  EXPECT_THROW(Results{file}, std::runtime_error);
+}
+
+TEST(Results, TellWhichEstimatesDoNotAgree) {
+  Results results;
+  Outcome outcome;
+  outcome.by_parameter = {0.1, 1};
+  outcome.by_combination = {0.5, 1.1};
+  results.add({first_cell().front().name(), 1, "batch"}, outcome);
+  const std::string table = results.agreement_table(first_cell(), 1);
+  EXPECT_NE(table.find("| 0.32 | 1.000 | 0.71 ↑ | 1.049 |"), std::string::npos) << table;
+  EXPECT_NE(table.find("by parameter 0, by combination 1 of 1 rows"), std::string::npos) << table;
+}
+
 /// Misalignments of degrees, and drift ten times that of a good gyro: first estimates far enough off that the filter
 /// has to begin anew, once or more.
 TEST(Flights, WithWrongFirstEstimatesAreNotLost) {
@@ -142,6 +302,20 @@ TEST(Flights, WithWrongFirstEstimatesAreNotLost) {
     const Outcome outcome = fly(*cell, run, {"invariant"}).front();
     EXPECT_EQ(outcome.fixes, 10800) << name;
     EXPECT_LT(outcome.nees, 50) << name;  // χ² of 20, once in 5000
+  }
+}
+
+TEST(Flights, OfFilterAndBatchAgree) {
+  const std::vector<Cell> cells = grid();
+  const auto cell = std::find_if(cells.begin(), cells.end(),
+                                 [](const Cell& c) { return c.name() == "steady/plane-plane/1e-06/30arcmin/0e+00"; });
+  ASSERT_NE(cell, cells.end());
+  const std::vector<Outcome> outcomes = fly(*cell, 1, {"invariant", "batch"});
+  EXPECT_TRUE(agrees(outcomes[1].by_parameter));
+  EXPECT_TRUE(agrees(outcomes[1].by_combination));
+  for (const Outcome& outcome : outcomes) {
+    EXPECT_EQ(outcome.observable.freedom, 18);  // about the orbit normal the alignment of neither gyro
+    EXPECT_EQ(band_of_mean(kInnovations, outcome.fixes).side(outcome.nis), 0) << outcome.nis;
   }
 }
 
