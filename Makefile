@@ -15,6 +15,8 @@ help:
 	@echo 'make consistency  measure again what docs/consistency.md tells: hours; goes on where it was interrupted'
 	@echo 'make install  into PREFIX (default /usr/local)'
 	@echo 'make setup | format | lint | sanitize | coverage | clean'
+	@echo 'Files are compiled in units of twelve, which halves the time of a whole build. Who edits them is served sooner with'
+	@echo 'CMAKE_FLAGS=-DCMAKE_UNITY_BUILD=OFF, which compiles each on its own.'
 
 setup:
 	@cmake/setup.sh
@@ -68,11 +70,11 @@ consistency: build
 format:
 	clang-format -i $(SOURCES)
 
-# One translation unit per module: clang-tidy reads Eigen once for each instead of once for each file.
+# In units of several files: clang-tidy reads Eigen once for each unit instead of once for each file.
 lint: setup
 	clang-format --dry-run --Werror $(SOURCES)
-	cmake -S . -B build-lint -G Ninja -DTRIHEDRON_BUILD_TESTS=OFF -DCMAKE_UNITY_BUILD=ON -DCMAKE_UNITY_BUILD_BATCH_SIZE=0
-	find build-lint -name 'unity_*.cxx' | xargs -P $(JOBS) -n 1 clang-tidy --quiet -p build-lint
+	cmake --preset lint
+	find build-lint -name 'unity_*.cxx' | sort | xargs -P $(JOBS) -n 1 clang-tidy --quiet -p build-lint
 
 install: build
 	cmake --install $(BUILD) $(if $(PREFIX),--prefix $(PREFIX))

@@ -1,7 +1,6 @@
 #include <gtest/gtest.h>
 
 #include <limits>
-#include <numbers>
 #include <vector>
 
 #include "flight.hpp"
@@ -12,7 +11,6 @@ namespace {
 
 using Estimator = PaperEstimator<Esg7>;
 using OnBoard = Cycle<Estimator>;
-constexpr double kArcsecond = std::numbers::pi / 180 / 3600;
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 
 OnBoard make_cycle(const CorrectionPolicy& policy = {}) {
@@ -69,7 +67,7 @@ TEST(Cycle, FixesBetweenSamplesCalibrateAsWellAsFixesOnThem) {
       worst = std::max(worst, angle_between<double>(cycle.estimator().gyros()[k].h_in, flight.truth[k].h_in));
     }
   }
-  EXPECT_LT(worst, 0.5 * kArcsecond);
+  EXPECT_LT(worst, 0.5 * test::kArcsecond);
 }
 
 TEST(Cycle, CorrectsTheNavigatorAsOftenAsTold) {
@@ -92,8 +90,8 @@ TEST(Cycle, AttitudeImprovesWithTheParametersTakenOver) {
   auto taken = make_cycle({.interval = std::chrono::minutes(20)});
   test::fly(flight, held, [](const auto&) {});
   test::fly(flight, taken, [](const auto&) {});
-  EXPECT_GT(attitude_error(held, flight), 300 * kArcsecond);
-  EXPECT_LT(attitude_error(taken, flight), 20 * kArcsecond);
+  EXPECT_GT(attitude_error(held, flight), 300 * test::kArcsecond);
+  EXPECT_LT(attitude_error(taken, flight), 20 * test::kArcsecond);
   // …and the covariance knows in both: its 3-sigma holds the error.
   for (const OnBoard* cycle : {&held, &taken}) {
     EXPECT_LT(attitude_error(*cycle, flight),
@@ -202,7 +200,7 @@ TEST(Cycle, NavigatorDoesNotRestOnAFirstFixThatAllOthersContradict) {
     Log log;
     test::fly(flight, cycle, std::ref(log));
     EXPECT_EQ(log.corrections, 2);
-    EXPECT_LT(attitude_error(cycle, flight), 120 * kArcsecond);
+    EXPECT_LT(attitude_error(cycle, flight), 120 * test::kArcsecond);
   }
 }
 
@@ -258,7 +256,7 @@ TEST(Cycle, BridgesAGapOfTheGyrosAndWidensItsUncertainty) {
   EXPECT_GT(sigma_after, sigma_before);
   EXPECT_EQ(log.count(FixStatus::kRejectedByGate), 0);
   EXPECT_GE(log.count(FixStatus::kRejectedNoGyro), 99);
-  EXPECT_LT(angle_between<double>(cycle.estimator().gyros()[0].h_in, flight.truth[0].h_in), 2 * kArcsecond);
+  EXPECT_LT(angle_between<double>(cycle.estimator().gyros()[0].h_in, flight.truth[0].h_in), 2 * test::kArcsecond);
 }
 
 TEST(Cycle, RejectsOutliersAndKeepsTheGoodFixes) {
@@ -279,7 +277,7 @@ TEST(Cycle, RejectsOutliersAndKeepsTheGoodFixes) {
 TEST(Cycle, ReopensWhenTheModelHasLostTheMomenta) {
   test::Flight flight({.duration_s = 1800});
   // The tracker is turned in its mount by 2′ for good: no single fix is at fault.
-  const Eigen::Quaterniond jump(Eigen::AngleAxisd(120 * kArcsecond, Eigen::Vector3d::UnitX()));
+  const Eigen::Quaterniond jump(Eigen::AngleAxisd(120 * test::kArcsecond, Eigen::Vector3d::UnitX()));
   for (std::size_t i = 300; i < flight.fixes.size(); ++i) {
     flight.fixes[i].q_in_c = flight.fixes[i].q_in_c * jump;
   }
@@ -308,7 +306,7 @@ TEST(Cycle, StartsAnewWhenItsInformationIsAboutAFarWrongEstimate) {
     for (int k = 0; k < 2; ++k) {
       const Eigen::Matrix3d off = flight.truth[k].C_c_b * cycle.estimator().gyros()[k].C_c_b.transpose();
       // A hundredth of what it is without the restart; the early linearisation still costs some arcseconds.
-      EXPECT_LT((Rot<C, C>::assume(off).log().norm()), 30 * kArcsecond) << seed;
+      EXPECT_LT((Rot<C, C>::assume(off).log().norm()), 30 * test::kArcsecond) << seed;
     }
   }
   EXPECT_GT(restarts, 0);

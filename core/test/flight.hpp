@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 #include <random>
 #include <vector>
 
@@ -12,6 +13,8 @@
 #include "trihedron/core/telemetry.hpp"
 
 namespace trihedron::test {
+
+inline constexpr double kArcsecond = std::numbers::pi / 180 / 3600;
 
 struct FlightPlan {
   double duration_s = 1800;

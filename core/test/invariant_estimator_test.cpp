@@ -18,11 +18,10 @@
 namespace trihedron {
 namespace {
 
-using Estimator = InvariantEstimator<Esg7, 2>;
+using Invariant = InvariantEstimator<Esg7, 2>;
 using WithAll = InvariantEstimator<Esg7, 2, kAllFurtherStates>;
-constexpr double kArcsecond = std::numbers::pi / 180 / 3600;
 
-template <class E = Estimator>
+template <class E = Invariant>
 typename E::Setup nominal() {
   typename E::Setup setup;
   static_cast<CalibrationSetup<Esg7, 2>&>(setup) = test::nominal_setup();
@@ -81,7 +80,7 @@ TEST(InvariantMeasurement, JacobianIsThatOfTheInnovation) {
 
 TEST(InvariantMeasurement, NoiseIsThatOfFixAndReadouts) {
   const test::Flight flight({.duration_s = 3, .noise = 0});
-  Estimator::Gyros gyros = flight.truth;
+  Invariant::Gyros gyros = flight.truth;
   const Eigen::Matrix3d C_in_c = flight.C_in_c_at_samples.back();
   Eigen::Matrix3d R_c;
   R_c << 4, 1, 0, 1, 9, 2, 0, 2, 25;
@@ -89,19 +88,19 @@ TEST(InvariantMeasurement, NoiseIsThatOfFixAndReadouts) {
   sigma[0] = 1.5;
   sigma[1] = 0.5;
   const auto at = [&](const Eigen::Matrix<double, 9, 1>& cause) {
-    Estimator::Directions h_b = flight.samples.back().h_b;
+    Invariant::Directions h_b = flight.samples.back().h_b;
     for (int k = 0; k < 2; ++k) {
       h_b[k] += cause.segment<3>(3 + 3 * k);
     }
     const Eigen::Matrix3d given = C_in_c * Rot<C, C>::exp(Vec<C>::assume(Eigen::Vector3d(cause.head<3>()))).raw();
-    return Estimator::measure(gyros, given, C_in_c, h_b, R_c, {}, sigma).y;
+    return Invariant::measure(gyros, given, C_in_c, h_b, R_c, {}, sigma).y;
   };
   const auto by_cause = test::central_differences<decltype(at)&, 9>(at, Eigen::Matrix<double, 9, 1>::Zero(), 1e-5);
   Eigen::Matrix<double, 9, 9> causes = Eigen::Matrix<double, 9, 9>::Zero();
   causes.topLeftCorner<3, 3>() = R_c;
   causes.diagonal().tail<6>() << 2.25, 2.25, 2.25, 0.25, 0.25, 0.25;
   const Eigen::Matrix4d expected = by_cause * causes * by_cause.transpose();
-  test::expect_jacobian(Estimator::measure(gyros, C_in_c, C_in_c, flight.samples.back().h_b, R_c, {}, sigma).R,
+  test::expect_jacobian(Invariant::measure(gyros, C_in_c, C_in_c, flight.samples.back().h_b, R_c, {}, sigma).R,
                         expected, 1e-6);
 }
 
@@ -116,7 +115,7 @@ TEST(InvariantEstimator, GainsNothingAboutTheAxisOfASteadyTurnInTenThousandSteps
     setup.prior[k].drift_rad_s << 1e-5, -2e-5, 1e-5, 3e-5, -1e-5, 2e-5, 1e-5;
     setup.prior[k].C_c_b = Rot<C, B<1>>::exp(Vec<C>::assume(vector())).raw();
   }
-  auto estimator = Estimator::create(setup).value();
+  auto estimator = Invariant::create(setup).value();
   const Eigen::Vector3d n = vector().normalized();
   const Eigen::Matrix3d first = Rot<In, C>::exp(Vec<In>::assume(vector())).raw();
   Eigen::Matrix3d C_in_c = first;
@@ -134,9 +133,9 @@ TEST(InvariantEstimator, GainsNothingAboutTheAxisOfASteadyTurnInTenThousandSteps
 
   // Of one gyro alone, φ = n and δ = C_c_in n change no measurement of it, whatever the other does.
   const auto information_about = [&](int gyro) {
-    Estimator::Information::Vector v = Estimator::Information::Vector::Zero();
-    v.segment<3>(Estimator::Layout::direction(gyro)) = n;
-    v.segment<3>(Estimator::Layout::alignment(gyro)) = first.transpose() * n;
+    Invariant::Information::Vector v = Invariant::Information::Vector::Zero();
+    v.segment<3>(Invariant::Layout::direction(gyro)) = n;
+    v.segment<3>(Invariant::Layout::alignment(gyro)) = first.transpose() * n;
     return (estimator.information().root() * v).squaredNorm();
   };
   const double before[2] = {information_about(0), information_about(1)};
@@ -153,22 +152,22 @@ TEST(InvariantEstimator, GainsNothingAboutTheAxisOfASteadyTurnInTenThousandSteps
     EXPECT_NEAR(information_about(k) / before[k], 1, 1e-6) << k;
   }
   // About another axis there is plenty.
-  Estimator::Information::Vector other = Estimator::Information::Vector::Zero();
-  other.segment<3>(Estimator::Layout::alignment(0)) = first.transpose() * n.unitOrthogonal();
-  other.segment<3>(Estimator::Layout::direction(0)) = n.unitOrthogonal();
+  Invariant::Information::Vector other = Invariant::Information::Vector::Zero();
+  other.segment<3>(Invariant::Layout::alignment(0)) = first.transpose() * n.unitOrthogonal();
+  other.segment<3>(Invariant::Layout::direction(0)) = n.unitOrthogonal();
   EXPECT_GT((estimator.information().root() * other).squaredNorm(), 1e6 * before[0]);
 }
 
-struct Outcome {
+struct MeanOutcome {
   double nees = 0;
   double nis = 0;
   double rejected = 0;
 };
 
 /// Means over flights whose priors are drawn about the truth.
-template <class E = Estimator>
-Outcome fly_many(int runs, double alignment_sigma_rad, const test::FlightPlan& plan) {
-  Outcome mean;
+template <class E = Invariant>
+MeanOutcome fly_many(int runs, double alignment_sigma_rad, const test::FlightPlan& plan) {
+  MeanOutcome mean;
   double fixes = 0;
   for (int run = 1; run <= runs; ++run) {
     test::FlightPlan own = plan;
@@ -214,18 +213,18 @@ Outcome fly_many(int runs, double alignment_sigma_rad, const test::FlightPlan& p
 double nees_band(int runs) { return 3.29 * std::sqrt(40.0 / runs); }
 
 TEST(InvariantEstimator, IsConsistentWithSlewsAndHalfADegree) {
-  const Outcome mean = fly_many(20, 8e-3, {.duration_s = 1800});
+  const MeanOutcome mean = fly_many(20, 8e-3, {.duration_s = 1800});
   EXPECT_NEAR(mean.nees, 20, nees_band(20));
   EXPECT_NEAR(mean.nis, 4, 0.06);  // 3.29·√(8/12000) = 0.085 for independent ones
 }
 
 TEST(InvariantEstimator, IsConsistentFromFiveDegrees) {
-  const Outcome mean = fly_many(20, 0.087, {.duration_s = 1800});
+  const MeanOutcome mean = fly_many(20, 0.087, {.duration_s = 1800});
   EXPECT_NEAR(mean.nees, 20, nees_band(20));
 }
 
 TEST(InvariantEstimator, IsConsistentInSteadyFlight) {
-  const Outcome mean = fly_many(20, 8e-3, {.duration_s = 1800, .slews_rad = 0});
+  const MeanOutcome mean = fly_many(20, 8e-3, {.duration_s = 1800, .slews_rad = 0});
   EXPECT_NEAR(mean.nees, 20, nees_band(20));
   EXPECT_NEAR(mean.nis, 4, 0.085);
 }
@@ -248,8 +247,8 @@ TEST(InvariantEstimator, DoesNotDependOnTheInertialFrame) {
   for (StarFix& fix : turned.fixes) {
     fix.q_in_c = q * fix.q_in_c;
   }
-  const auto a = flown<Estimator>(flight, nominal());
-  const auto b = flown<Estimator>(turned, nominal());
+  const auto a = flown<Invariant>(flight, nominal());
+  const auto b = flown<Invariant>(turned, nominal());
   for (int k = 0; k < 2; ++k) {
     EXPECT_LT(alignment_error(a->estimator().gyros()[k], b->estimator().gyros()[k]).norm(), 1e-11);
     EXPECT_LT((a->estimator().gyros()[k].drift_rad_s - b->estimator().gyros()[k].drift_rad_s).norm(), 1e-14);
@@ -262,8 +261,8 @@ TEST(InvariantEstimator, DoesNotDependOnTheNumbersOfTheGyros) {
   for (auto& sample : swapped.samples) {
     std::swap(sample.h_b[0], sample.h_b[1]);
   }
-  const auto a = flown<Estimator>(flight, nominal());
-  const auto b = flown<Estimator>(swapped, nominal());
+  const auto a = flown<Invariant>(flight, nominal());
+  const auto b = flown<Invariant>(swapped, nominal());
   for (int k = 0; k < 2; ++k) {
     EXPECT_LT(alignment_error(a->estimator().gyros()[k], b->estimator().gyros()[1 - k]).norm(), 1e-11);
     EXPECT_LT((a->estimator().gyros()[k].drift_rad_s - b->estimator().gyros()[1 - k].drift_rad_s).norm(), 1e-14);
@@ -272,7 +271,7 @@ TEST(InvariantEstimator, DoesNotDependOnTheNumbersOfTheGyros) {
 
 TEST(InvariantEstimator, AStepInTwoHalvesIsTheStep) {
   const test::Flight flight({.duration_s = 60});
-  auto whole = Estimator::create(nominal()).value();
+  auto whole = Invariant::create(nominal()).value();
   FixReadings<2> readings;
   readings.h_b = flight.samples[0].h_b;
   ASSERT_EQ(whole.correct(flight.fixes[0], readings).status, FixStatus::kStarted);
@@ -317,7 +316,7 @@ TEST(InvariantEstimator, FindsTheClockOffsetAndTheErrorAtOrbitalPeriod) {
     EXPECT_LT(std::abs(shared(i) - truth(i)), 4 * sigma) << i;
   }
   EXPECT_LT(root.row(WithAll::Layout::kShared).norm(), 1e-3);
-  EXPECT_LT(root.row(WithAll::Layout::kShared + 1).norm(), 5 * kArcsecond);
+  EXPECT_LT(root.row(WithAll::Layout::kShared + 1).norm(), 5 * test::kArcsecond);
 }
 
 TEST(GyroModel, TakesTheBiasOutOfAReading) {
@@ -418,7 +417,7 @@ TEST(InvariantEstimator, FindsTheAlignmentOfAFurtherHead) {
     const double sigma = root.row(state).norm();
     const double found = cycle->estimator().shared()(state - TwoHeads::Layout::kShared);
     EXPECT_LT(std::abs(found - misalignment(axis)), 4 * sigma);
-    EXPECT_LT(sigma, 2 * kArcsecond);
+    EXPECT_LT(sigma, 2 * test::kArcsecond);
   }
 }
 
@@ -457,7 +456,7 @@ TEST(InvariantEstimator, OfThreeGyrosIsBetterThanOfTwo) {
   const auto three = cycle->navigation_attitude().value();
   EXPECT_LT(error(three).norm(), 4 * std::sqrt(three.covariance_rad2.trace()));
   EXPECT_LT(alignment_error(GyroModel<Esg7>{}, cycle->estimator().gyros()[2]).norm(), 1e-4);
-  const auto of_two = flown<Estimator>(pair, nominal())->navigation_attitude().value();
+  const auto of_two = flown<Invariant>(pair, nominal())->navigation_attitude().value();
   EXPECT_LT(three.covariance_rad2.trace(), of_two.covariance_rad2.trace());
 }
 
@@ -502,7 +501,7 @@ TEST(InvariantEstimator, RejectsOutliersReopensAndBeginsAnew) {
   jump(50, 51, 0.01);     // one outlier
   jump(100, 400, 0.001);  // the tracker turns for good, and again soon
   jump(150, 400, 0.001);
-  auto cycle = std::make_unique<Cycle<Estimator>>(Cycle<Estimator>::create(nominal(), {}).value());
+  auto cycle = std::make_unique<Cycle<Invariant>>(Cycle<Invariant>::create(nominal(), {}).value());
   std::vector<FixStatus> statuses;
   test::fly(flight, *cycle, [&](const auto& report) {
     if (report.fix.status != FixStatus::kNone && report.fix.status != FixStatus::kPending) {
@@ -517,7 +516,7 @@ TEST(InvariantEstimator, RejectsOutliersReopensAndBeginsAnew) {
 }
 
 TEST(InvariantEstimator, RefusesParallelMomenta) {
-  auto estimator = Estimator::create(nominal()).value();
+  auto estimator = Invariant::create(nominal()).value();
   FixReadings<2> readings;
   readings.h_b[0] = readings.h_b[1] = Eigen::Vector3d::UnitX();
   EXPECT_EQ(estimator.correct({}, readings).status, FixStatus::kRejectedGeometry);
@@ -536,7 +535,7 @@ TEST(CycleOfInvariant, AttitudeNowIsBetterThanASingleReadingAndHonest) {
   constexpr int kRuns = 12;
   for (unsigned seed = 1; seed <= kRuns; ++seed) {
     const test::Flight flight({.duration_s = 3600, .seed = seed});
-    const auto cycle = flown<Estimator>(flight, nominal(), {.interval = CorrectionPolicy::kEveryFix});
+    const auto cycle = flown<Invariant>(flight, nominal(), {.interval = CorrectionPolicy::kEveryFix});
     const auto solution = cycle->navigation_attitude().value();
     const Eigen::Vector3d error =
         Rot<C, C>::assume(Eigen::Matrix3d(flight.C_in_c_at_samples.back().transpose() * solution.C_in_c.raw()))
@@ -545,13 +544,13 @@ TEST(CycleOfInvariant, AttitudeNowIsBetterThanASingleReadingAndHonest) {
     square += error.squaredNorm() / (3 * kRuns);
     normalised += error.dot(solution.covariance_rad2.llt().solve(error)) / kRuns;
   }
-  EXPECT_LT(std::sqrt(square), 1.8 * kArcsecond);  // a single reading: 2″ and what is not yet calibrated
+  EXPECT_LT(std::sqrt(square), 1.8 * test::kArcsecond);  // a single reading: 2″ and what is not yet calibrated
   EXPECT_NEAR(normalised, 3, 3.29 * std::sqrt(6.0 / kRuns));
 }
 
 TEST(CycleOfInvariant, TakesFixesLateAndOutOfTurnOnce) {
   const test::Flight flight({.duration_s = 60});
-  auto cycle = std::make_unique<Cycle<Estimator>>(Cycle<Estimator>::create(nominal(), {}).value());
+  auto cycle = std::make_unique<Cycle<Invariant>>(Cycle<Invariant>::create(nominal(), {}).value());
   std::vector<std::pair<Time, FixStatus>> dealt;
   const auto note = [&](const auto& report) {
     if (report.fix.status != FixStatus::kNone && report.fix.status != FixStatus::kPending) {
@@ -578,20 +577,20 @@ TEST(CycleOfInvariant, TakesFixesLateAndOutOfTurnOnce) {
 
 TEST(CycleOfInvariant, RefusesFixesOfUnknownStarTrackersAndMoreThanCanWait) {
   const test::Flight flight({.duration_s = 60});
-  auto cycle = std::make_unique<Cycle<Estimator>>(Cycle<Estimator>::create(nominal(), {}).value());
+  auto cycle = std::make_unique<Cycle<Invariant>>(Cycle<Invariant>::create(nominal(), {}).value());
   cycle->on_gyro(flight.samples[0]);
   StarFix fix = flight.fixes[0];
   fix.head = 1;
   EXPECT_EQ(cycle->on_fix(fix).fix.status, FixStatus::kRejectedUnknownHead);
   fix.head = 0;
-  for (int i = 0; i < Cycle<Estimator>::kBufferedFixes; ++i) {
+  for (int i = 0; i < Cycle<Invariant>::kBufferedFixes; ++i) {
     fix.t += std::chrono::milliseconds(1);
     EXPECT_EQ(cycle->on_fix(fix).fix.status, FixStatus::kPending);
   }
   fix.t += std::chrono::milliseconds(1);
   EXPECT_EQ(cycle->on_fix(fix).fix.status, FixStatus::kRejectedBacklog);
   // At the end without a sample after them they cannot be interpolated; none is forgotten.
-  for (int i = 0; i < Cycle<Estimator>::kBufferedFixes; ++i) {
+  for (int i = 0; i < Cycle<Invariant>::kBufferedFixes; ++i) {
     EXPECT_EQ(cycle->flush().fix.status, FixStatus::kRejectedNoGyro);
   }
   EXPECT_EQ(cycle->flush().fix.status, FixStatus::kNone);
@@ -618,7 +617,7 @@ TEST(CycleOfInvariant, TakesSingleReadingsWhereTheBodyIsNoPolynomial) {
     jerked(C_in_c, to_seconds(fix.t.time_since_epoch()));
     fix.q_in_c = Eigen::Quaterniond(C_in_c);
   }
-  auto cycle = std::make_unique<Cycle<Estimator>>(Cycle<Estimator>::create(nominal(), {}).value());
+  auto cycle = std::make_unique<Cycle<Invariant>>(Cycle<Invariant>::create(nominal(), {}).value());
   double worst = 0;
   test::fly(flight, *cycle, [&](const auto& report) {
     if (report.calibrated && report.fix.t > Time(std::chrono::seconds(100))) {
@@ -628,7 +627,7 @@ TEST(CycleOfInvariant, TakesSingleReadingsWhereTheBodyIsNoPolynomial) {
     }
   });
   EXPECT_GT(worst, 0);
-  EXPECT_LT(worst, 10 * kArcsecond);
+  EXPECT_LT(worst, 10 * test::kArcsecond);
 }
 
 TEST(CycleOfInvariant, KnowsWhatTheBiasThatItHoldsMayDo) {

@@ -9,8 +9,8 @@
 namespace trihedron {
 namespace {
 
-constexpr int kN = 3;
-using Directions = PerGyro<Eigen::Vector3d, kN>;
+constexpr int kGyros = 3;
+using Directions = PerGyro<Eigen::Vector3d, kGyros>;
 
 const Rot<In, C> kAttitude = Rot<In, C>::exp(Vec<In>::assume(1, -2, 0.5));
 
@@ -23,18 +23,18 @@ Directions in_space() {
 }
 
 /// As seen in c, each turned by ρ_k from where it should be.
-Directions in_body(const Eigen::Matrix<double, 3 * kN, 1>& rho = Eigen::Matrix<double, 3 * kN, 1>::Zero()) {
+Directions in_body(const Eigen::Matrix<double, 3 * kGyros, 1>& rho = Eigen::Matrix<double, 3 * kGyros, 1>::Zero()) {
   Directions h = in_space();
-  for (int k = 0; k < kN; ++k) {
+  for (int k = 0; k < kGyros; ++k) {
     h[k] = rotated<double>(kAttitude.raw().transpose() * h[k], Eigen::Vector3d(rho.segment<3>(3 * k)));
   }
   return h;
 }
 
-constexpr GyroMask<kN> kAll = all_gyros<kN>();
+constexpr GyroMask<kGyros> kAll = all_gyros<kGyros>();
 
-GyroMask<kN> all_but(std::initializer_list<int> gyros) {
-  GyroMask<kN> used = kAll;
+GyroMask<kGyros> all_but(std::initializer_list<int> gyros) {
+  GyroMask<kGyros> used = kAll;
   for (const int k : gyros) {
     used[k] = false;
   }
@@ -44,50 +44,51 @@ GyroMask<kN> all_but(std::initializer_list<int> gyros) {
 double off(const Rot<In, C>& attitude) { return (kAttitude.inverse() * attitude).log().norm(); }
 
 TEST(OptimalAttitude, IsExactForDirectionsThatAgree) {
-  EXPECT_LT(off(optimal_attitude<kN>(in_space(), in_body(), kAll).value().C_in_c), 1e-15);
+  EXPECT_LT(off(optimal_attitude<kGyros>(in_space(), in_body(), kAll).value().C_in_c), 1e-15);
 }
 
 TEST(OptimalAttitude, IsThatOfTheSingularValueDecomposition) {
   // Markley's solution of Wahba's problem, for directions that disagree by half a degree.
-  Eigen::Matrix<double, 3 * kN, 1> rho;
+  Eigen::Matrix<double, 3 * kGyros, 1> rho;
   rho << 5e-3, -3e-3, 8e-3, -7e-3, 2e-3, 4e-3, 1e-3, 6e-3, -9e-3;
   const Directions in = in_space();
   const Directions c = in_body(rho);
   Eigen::Matrix3d B = Eigen::Matrix3d::Zero();
-  for (int k = 0; k < kN; ++k) {
+  for (int k = 0; k < kGyros; ++k) {
     B += in[k] * c[k].transpose();
   }
   const Eigen::JacobiSVD<Eigen::Matrix3d> svd(B, Eigen::ComputeFullU | Eigen::ComputeFullV);
   const double sign = svd.matrixU().determinant() * svd.matrixV().determinant();
   const Eigen::Matrix3d expected = svd.matrixU() * Eigen::Vector3d(1, 1, sign).asDiagonal() * svd.matrixV().transpose();
   // Three steps of Gauss–Newton: what is left is of the fourth order in the disagreement.
-  EXPECT_LT((optimal_attitude<kN>(in, c, kAll).value().C_in_c.raw() - expected).norm(), 1e-8);
+  EXPECT_LT((optimal_attitude<kGyros>(in, c, kAll).value().C_in_c.raw() - expected).norm(), 1e-8);
 }
 
 TEST(OptimalAttitude, ErrorFollowsErrorsOfTheDirections) {
-  const auto solution = optimal_attitude<kN>(in_space(), in_body(), kAll).value();
+  const auto solution = optimal_attitude<kGyros>(in_space(), in_body(), kAll).value();
   // True C = est · exp([ε×]), ε = J (C_c_in φ − ρ): a direction read too far by ρ has the true one at −ρ.
-  const auto error = [&](const Eigen::Matrix<double, 3 * kN, 1>& rho) {
-    const auto moved = optimal_attitude<kN>(in_space(), in_body(rho), kAll).value().C_in_c;
+  const auto error = [&](const Eigen::Matrix<double, 3 * kGyros, 1>& rho) {
+    const auto moved = optimal_attitude<kGyros>(in_space(), in_body(rho), kAll).value().C_in_c;
     return Eigen::Vector3d((moved.inverse() * solution.C_in_c).log().raw());
   };
-  test::expect_jacobian(
-      solution.by_directions,
-      test::central_differences<decltype(error)&, 3 * kN>(error, Eigen::Matrix<double, 3 * kN, 1>::Zero(), 1e-5), 1e-8);
+  test::expect_jacobian(solution.by_directions,
+                        test::central_differences<decltype(error)&, 3 * kGyros>(
+                            error, Eigen::Matrix<double, 3 * kGyros, 1>::Zero(), 1e-5),
+                        1e-8);
 }
 
 TEST(OptimalAttitude, DoesNotLookAtADirectionThatIsNotUsed) {
   Directions c = in_body();
   c[1] = rotated<double>(c[1], Eigen::Vector3d(0.5, 0, 0));
-  EXPECT_GT(off(optimal_attitude<kN>(in_space(), c, kAll).value().C_in_c), 0.1);
-  EXPECT_LT(off(optimal_attitude<kN>(in_space(), c, all_but({1})).value().C_in_c), 1e-15);
+  EXPECT_GT(off(optimal_attitude<kGyros>(in_space(), c, kAll).value().C_in_c), 0.1);
+  EXPECT_LT(off(optimal_attitude<kGyros>(in_space(), c, all_but({1})).value().C_in_c), 1e-15);
 }
 
 TEST(OptimalAttitude, NeedsTwoDirectionsApart) {
-  EXPECT_EQ(optimal_attitude<kN>(in_space(), in_body(), all_but({1, 2})).fault(), DirectionsFault::kTooFew);
+  EXPECT_EQ(optimal_attitude<kGyros>(in_space(), in_body(), all_but({1, 2})).fault(), DirectionsFault::kTooFew);
   Directions in = in_space();
   in[2] = in[1] = -in[0];
-  EXPECT_EQ(optimal_attitude<kN>(in, in_body(), kAll).fault(), DirectionsFault::kMomentaNearlyParallel);
+  EXPECT_EQ(optimal_attitude<kGyros>(in, in_body(), kAll).fault(), DirectionsFault::kMomentaNearlyParallel);
 }
 
 TEST(OptimalAttitude, OfTwoAlikeIsExactHoweverTheyDisagree) {

@@ -45,8 +45,8 @@ TEST(OutlierGate, RejectsAboveTheGateAndWhatIsNoNumber) {
   EXPECT_EQ(gate.judge(29.9, kSmall_rad), FixStatus::kUsed);
   EXPECT_EQ(gate.judge(30.1, kSmall_rad), FixStatus::kRejectedByGate);
   EXPECT_FALSE(gate.jumped());
-  constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
-  EXPECT_EQ(gate.judge(kNaN, kNaN), FixStatus::kRejectedByGate);
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_EQ(gate.judge(nan, nan), FixStatus::kRejectedByGate);
   EXPECT_TRUE(gate.jumped());
   EXPECT_EQ(gate.rejections_in_a_row(), 2);
   EXPECT_EQ(gate.judge(3, kSmall_rad), FixStatus::kUsed);

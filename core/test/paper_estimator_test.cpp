@@ -3,7 +3,6 @@
 #include <gtest/gtest.h>
 
 #include <limits>
-#include <numbers>
 
 #include "flight.hpp"
 #include "numerical_jacobian.hpp"
@@ -12,19 +11,17 @@
 namespace trihedron {
 namespace {
 
-using Estimator = PaperEstimator<Esg7>;
-using Layout = Estimator::Layout;
-constexpr double kArcsecond = std::numbers::pi / 180 / 3600;
+using Paper = PaperEstimator<Esg7>;
 
 // The paper's state vector, in its order.
-static_assert(Layout::kStates == 24);
-static_assert(Layout::direction(1) == 2 && Layout::drift(0) == 4 && Layout::alignment(0) == 11 &&
-              Layout::drift(1) == 14 && Layout::alignment(1) == 21);
+static_assert(Paper::Layout::kStates == 24);
+static_assert(Paper::Layout::direction(1) == 2 && Paper::Layout::drift(0) == 4 && Paper::Layout::alignment(0) == 11 &&
+              Paper::Layout::drift(1) == 14 && Paper::Layout::alignment(1) == 21);
 
 /// Model and readings of one moment with misalignments, off by a little from each other so that no innovation is zero.
 struct Moment {
-  Estimator::Gyros gyros;
-  Estimator::Directions h_b;
+  Paper::Gyros gyros;
+  Paper::Directions h_b;
   Eigen::Matrix3d C_in_c = test::Flight::attitude(700, 0.5);
   Moment() {
     const test::Flight flight({.duration_s = 1});
@@ -40,37 +37,37 @@ struct Moment {
 
 TEST(PaperMeasurement, MatchesCentralDifferencesOfEquation3) {
   const Moment moment;
-  const auto qi = Estimator::quasi_inertial(moment.trihedron());
+  const auto qi = Paper::quasi_inertial(moment.trihedron());
   const auto setup = test::nominal_setup();
   // What the innovation would be if the truth differed from the model by x: model wrong by −x.
   const auto innovation = [&](const Eigen::Matrix<double, 24, 1>& x) {
-    Estimator::Gyros g = moment.gyros;
+    Paper::Gyros g = moment.gyros;
     for (int k = 0; k < 2; ++k) {
-      const Eigen::Vector3d dh = qi.tangents[k] * x.segment<2>(Layout::direction(k));
+      const Eigen::Vector3d dh = qi.tangents[k] * x.segment<2>(Paper::Layout::direction(k));
       g[k].h_in = rotated<double>(g[k].h_in, g[k].h_in.cross(-dh));
-      g[k].drift_rad_s -= x.segment<7>(Layout::drift(k));
-      g[k].C_c_b = Rot<C, C>::exp(Vec<C>::assume(-x.segment<3>(Layout::alignment(k)))).raw() * g[k].C_c_b;
+      g[k].drift_rad_s -= x.segment<7>(Paper::Layout::drift(k));
+      g[k].C_c_b = Rot<C, C>::exp(Vec<C>::assume(-x.segment<3>(Paper::Layout::alignment(k)))).raw() * g[k].C_c_b;
     }
-    return Estimator::measure(g, qi, moment.C_in_c, moment.h_b, setup).innovation;
+    return Paper::measure(g, qi, moment.C_in_c, moment.h_b, setup).innovation;
   };
   const auto numerical =
       test::central_differences<decltype(innovation)&, 24>(innovation, Eigen::Matrix<double, 24, 1>::Zero(), 1e-5);
-  test::expect_jacobian(Estimator::measure(moment.gyros, qi, moment.C_in_c, moment.h_b, setup).H, numerical, 1e-8);
+  test::expect_jacobian(Paper::measure(moment.gyros, qi, moment.C_in_c, moment.h_b, setup).H, numerical, 1e-8);
 }
 
 TEST(PaperMeasurement, NoiseIsThatOfTrackerAndReadouts) {
   const Moment moment;
-  const auto qi = Estimator::quasi_inertial(moment.trihedron());
+  const auto qi = Paper::quasi_inertial(moment.trihedron());
   auto setup = test::nominal_setup();
   setup.readout_noise_rad[1] = 3e-6;  // unequal, so that a mix-up shows
   // Causes: tracker rotation about c, then readout errors of gyro 1 and 2; each of its own sigma.
   const auto innovation = [&](const Eigen::Matrix<double, 9, 1>& cause) {
     const Eigen::Matrix3d C_in_c = moment.C_in_c * Rot<C, C>::exp(Vec<C>::assume(cause.head<3>())).raw();
-    Estimator::Directions h_b;
+    Paper::Directions h_b;
     for (int k = 0; k < 2; ++k) {
       h_b[k] = (moment.h_b[k] + cause.segment<3>(3 + 3 * k)).normalized();
     }
-    return Estimator::measure(moment.gyros, qi, C_in_c, h_b, setup).innovation;
+    return Paper::measure(moment.gyros, qi, C_in_c, h_b, setup).innovation;
   };
   Eigen::Matrix<double, 9, 1> sigma;
   sigma << setup.star_tracker_noise_rad, Eigen::Vector3d::Constant(setup.readout_noise_rad[0]),
@@ -78,7 +75,7 @@ TEST(PaperMeasurement, NoiseIsThatOfTrackerAndReadouts) {
   const Eigen::Matrix<double, 4, 9> by_cause =
       test::central_differences<decltype(innovation)&, 9>(innovation, Eigen::Matrix<double, 9, 1>::Zero(), 1e-5);
   const Eigen::Matrix4d expected = by_cause * sigma.cwiseAbs2().asDiagonal() * by_cause.transpose();
-  test::expect_jacobian(Estimator::measure(moment.gyros, qi, moment.C_in_c, moment.h_b, setup).R, expected, 1e-7);
+  test::expect_jacobian(Paper::measure(moment.gyros, qi, moment.C_in_c, moment.h_b, setup).R, expected, 1e-7);
 }
 
 TEST(PaperMeasurement, AngleIsAFunctionOfTheOtherFour) {
@@ -88,8 +85,8 @@ TEST(PaperMeasurement, AngleIsAFunctionOfTheOtherFour) {
     moment.h_b[k] = (moment.h_b[k] + Eigen::Vector3d(3e-5, -2e-5, 4e-5) * (k + 1)).normalized();
   }
   const auto t = moment.trihedron();
-  const auto qi = Estimator::quasi_inertial(t);
-  const auto y = Estimator::measure(moment.gyros, qi, moment.C_in_c, moment.h_b, test::nominal_setup()).innovation;
+  const auto qi = Paper::quasi_inertial(t);
+  const auto y = Paper::measure(moment.gyros, qi, moment.C_in_c, moment.h_b, test::nominal_setup()).innovation;
   const double z1 = moment.gyros[0].h_in.dot(moment.gyros[1].h_in) -
                     (moment.gyros[0].C_c_b * moment.h_b[0]).dot(moment.gyros[1].C_c_b * moment.h_b[1]);
   const Eigen::Vector3d d1 = qi.tangents[0] * y.head<2>();
@@ -101,42 +98,42 @@ TEST(PaperMeasurement, AngleIsAFunctionOfTheOtherFour) {
 
 TEST(PaperEstimator, RefusesSetupsThatCannotWork) {
   auto setup = test::nominal_setup();
-  EXPECT_TRUE(Estimator::create(setup).ok());
+  EXPECT_TRUE(Paper::create(setup).ok());
   setup.prior_covariance(3, 3) = 0;
-  EXPECT_EQ(Estimator::create(setup).fault(), SetupFault::kPriorNotPositiveDefinite);
+  EXPECT_EQ(Paper::create(setup).fault(), SetupFault::kPriorNotPositiveDefinite);
   setup = test::nominal_setup();
   setup.prior_covariance(3, 3) = std::numeric_limits<double>::quiet_NaN();
-  EXPECT_EQ(Estimator::create(setup).fault(), SetupFault::kPriorNotPositiveDefinite);
+  EXPECT_EQ(Paper::create(setup).fault(), SetupFault::kPriorNotPositiveDefinite);
   setup = test::nominal_setup();
   setup.prior_covariance(0, 1) = setup.prior_covariance(1, 0) = 4.1e-12;  // correlation above one
-  EXPECT_EQ(Estimator::create(setup).fault(), SetupFault::kPriorNotPositiveDefinite);
+  EXPECT_EQ(Paper::create(setup).fault(), SetupFault::kPriorNotPositiveDefinite);
   setup = test::nominal_setup();
   setup.readout_noise_rad[1] = 0;
-  EXPECT_EQ(Estimator::create(setup).fault(), SetupFault::kNoiseNotPositive);
+  EXPECT_EQ(Paper::create(setup).fault(), SetupFault::kNoiseNotPositive);
   setup = test::nominal_setup();
   setup.star_tracker_noise_rad(2) = std::numeric_limits<double>::quiet_NaN();
-  EXPECT_EQ(Estimator::create(setup).fault(), SetupFault::kNoiseNotPositive);
+  EXPECT_EQ(Paper::create(setup).fault(), SetupFault::kNoiseNotPositive);
   setup = test::nominal_setup();
   setup.direction_random_walk_rad_sqrt_s = -1e-9;
-  EXPECT_EQ(Estimator::create(setup).fault(), SetupFault::kNoiseNotPositive);
+  EXPECT_EQ(Paper::create(setup).fault(), SetupFault::kNoiseNotPositive);
   setup = test::nominal_setup();
   setup.star_tracker_noise_rad(0) = std::numeric_limits<double>::infinity();
-  EXPECT_EQ(Estimator::create(setup).fault(), SetupFault::kNoiseNotPositive);
+  EXPECT_EQ(Paper::create(setup).fault(), SetupFault::kNoiseNotPositive);
   setup = test::nominal_setup();
   setup.prior[0].drift_rad_s(2) = std::numeric_limits<double>::quiet_NaN();
-  EXPECT_EQ(Estimator::create(setup).fault(), SetupFault::kPriorMeanNotUsable);
+  EXPECT_EQ(Paper::create(setup).fault(), SetupFault::kPriorMeanNotUsable);
   setup = test::nominal_setup();
   setup.prior[1].C_c_b *= 1.001;
-  EXPECT_EQ(Estimator::create(setup).fault(), SetupFault::kPriorMeanNotUsable);
+  EXPECT_EQ(Paper::create(setup).fault(), SetupFault::kPriorMeanNotUsable);
   setup = test::nominal_setup();
   setup.gate_nis = 0;
-  EXPECT_EQ(Estimator::create(setup).fault(), SetupFault::kGateNotPositive);
+  EXPECT_EQ(Paper::create(setup).fault(), SetupFault::kGateNotPositive);
   setup = test::nominal_setup();
   setup.reopen_after_rejections = 0;
-  EXPECT_EQ(Estimator::create(setup).fault(), SetupFault::kGateNotPositive);
+  EXPECT_EQ(Paper::create(setup).fault(), SetupFault::kGateNotPositive);
   setup = test::nominal_setup();
   setup.reopen_after_jump_rejections = 0;
-  EXPECT_EQ(Estimator::create(setup).fault(), SetupFault::kGateNotPositive);
+  EXPECT_EQ(Paper::create(setup).fault(), SetupFault::kGateNotPositive);
 }
 
 /// Rotation vector by which the estimated alignment is off, rad.
@@ -147,12 +144,12 @@ Eigen::Vector3d alignment_error(const GyroModel<Esg7>& truth, const GyroModel<Es
 TEST(PaperEstimator, ConvergesToTheTruthWithoutNoise) {
   // Told of the nominal noise, given none: what is left is the error of the linearisation and of the prior.
   const test::Flight flight({.duration_s = 5400, .noise = 0});
-  auto cycle = Cycle<Estimator>::create(test::nominal_setup(), {}).value();
+  auto cycle = Cycle<Paper>::create(test::nominal_setup(), {}).value();
   test::fly(flight, cycle, [](const auto&) {});
   for (int k = 0; k < 2; ++k) {
     const auto& estimate = cycle.estimator().gyros()[k];
-    EXPECT_LT(alignment_error(flight.truth[k], estimate).norm(), 0.5 * kArcsecond);
-    EXPECT_LT(angle_between<double>(flight.truth[k].h_in, estimate.h_in), 0.5 * kArcsecond);
+    EXPECT_LT(alignment_error(flight.truth[k], estimate).norm(), 0.5 * test::kArcsecond);
+    EXPECT_LT(angle_between<double>(flight.truth[k].h_in, estimate.h_in), 0.5 * test::kArcsecond);
     EXPECT_LT((flight.truth[k].drift_rad_s - estimate.drift_rad_s).norm(), 0.05 * flight.truth[k].drift_rad_s.norm());
   }
 }
@@ -179,7 +176,7 @@ TEST(PaperEstimator, IsConsistentWithSlewsAndMisalignmentsOfMinutes) {
       const Eigen::Vector3d delta = kAlignmentSigma_rad * Eigen::Vector3d::NullaryExpr([&] { return normal(random); });
       setup.prior[k].C_c_b = Rot<C, C>::exp(Vec<C>::assume(delta)).raw() * flight.truth[k].C_c_b;
     }
-    auto cycle = Cycle<Estimator>::create(setup, {}).value();
+    auto cycle = Cycle<Paper>::create(setup, {}).value();
     test::fly(flight, cycle, [&](const auto& report) {
       if (report.fix.status == FixStatus::kUsed) {
         nis += report.fix.nis;

@@ -17,12 +17,11 @@
 namespace trihedron {
 namespace {
 
-constexpr double kArcsecond = std::numbers::pi / 180 / 3600;
 constexpr double kDegree = std::numbers::pi / 180;
 
 /// As nominal_setup(), for any estimator of a pair.
 template <class Estimator>
-typename Estimator::Setup nominal() {
+typename Estimator::Setup nominal_setup_of() {
   typename Estimator::Setup setup;
   static_cast<CalibrationSetup<Esg7, 2>&>(setup) = test::nominal_setup();
   return setup;
@@ -84,7 +83,7 @@ TYPED_TEST(LyingTracker, IsNotBelievedForMinutes) {
   for (const std::size_t length : {std::size_t{40}, std::size_t{200}}) {  // 2 and 10 min
     test::Flight flight({.duration_s = 2700});
     turn_fixes(flight, kFirst, kFirst + length, 3 * kDegree);
-    auto cycle = make_cycle<TypeParam>(nominal<TypeParam>());
+    auto cycle = make_cycle<TypeParam>(nominal_setup_of<TypeParam>());
     const auto fixes = fly(flight, *cycle);
     EXPECT_EQ(count(fixes, FixStatus::kRejectedByGate), static_cast<long>(length));
     EXPECT_EQ(count(fixes, FixStatus::kUsed), static_cast<long>(flight.fixes.size() - length) - 1);
@@ -93,9 +92,9 @@ TYPED_TEST(LyingTracker, IsNotBelievedForMinutes) {
     // As if there had been no fixes at all in that time.
     test::Flight gap({.duration_s = 2700});
     gap.fixes.erase(gap.fixes.begin() + kFirst, gap.fixes.begin() + kFirst + static_cast<long>(length));
-    auto other = make_cycle<TypeParam>(nominal<TypeParam>());
+    auto other = make_cycle<TypeParam>(nominal_setup_of<TypeParam>());
     fly(gap, *other);
-    EXPECT_LT(momentum_error(*cycle, flight), momentum_error(*other, gap) + 0.05 * kArcsecond);
+    EXPECT_LT(momentum_error(*cycle, flight), momentum_error(*other, gap) + 0.05 * test::kArcsecond);
   }
 }
 
@@ -103,7 +102,7 @@ TYPED_TEST(LyingTracker, IsBelievedInTheEnd) {
   // Turned in its mount for good, by more than drift can make: not locked out.
   test::Flight flight({.duration_s = 2700});
   turn_fixes(flight, 300, flight.fixes.size(), kDegree);
-  auto cycle = make_cycle<TypeParam>(nominal<TypeParam>());
+  auto cycle = make_cycle<TypeParam>(nominal_setup_of<TypeParam>());
   const auto fixes = fly(flight, *cycle);
   EXPECT_EQ(std::count_if(fixes.begin(), fixes.end(), [](const auto& report) { return report.fix.jumped; }), 399);
   EXPECT_EQ(fixes[300 + 399].fix.status, FixStatus::kUsedAfterReopening);
@@ -116,7 +115,7 @@ TYPED_TEST(LyingTracker, IsNotTakenForOneWhenTheModelGoesWrongStepByStep) {
   for (std::size_t i = 300; i < flight.fixes.size(); ++i) {
     turn_fixes(flight, i, i + 1, std::min(1e-5 * 3 * static_cast<double>(i - 300), 2e-3));
   }
-  auto cycle = make_cycle<TypeParam>(nominal<TypeParam>());
+  auto cycle = make_cycle<TypeParam>(nominal_setup_of<TypeParam>());
   const auto fixes = fly(flight, *cycle);
   EXPECT_GE(count(fixes, FixStatus::kUsedAfterReopening), 1);
   int longest = 0;
@@ -130,11 +129,11 @@ TYPED_TEST(LyingTracker, IsNotTakenForOneWhenTheModelGoesWrongStepByStep) {
 TYPED_TEST(LyingTracker, OfTheFirstFixOnlyIsOutvotedByThoseAfterIt) {
   test::Flight flight({.duration_s = 1800});
   turn_fixes(flight, 0, 1, 3 * kDegree);
-  auto cycle = make_cycle<TypeParam>(nominal<TypeParam>());
+  auto cycle = make_cycle<TypeParam>(nominal_setup_of<TypeParam>());
   const auto fixes = fly(flight, *cycle);
   EXPECT_EQ(count(fixes, FixStatus::kRejectedByGate), 19);
   EXPECT_EQ(count(fixes, FixStatus::kUsedAfterReopening), 1);
-  EXPECT_LT(momentum_error(*cycle, flight), 60 * kArcsecond);
+  EXPECT_LT(momentum_error(*cycle, flight), 60 * test::kArcsecond);
 }
 
 // ---- Without a star tracker: the angles between the momenta
@@ -143,7 +142,7 @@ using Pair = InvariantEstimator<Esg7, 2>;
 
 /// Priors drawn about the truth.
 Pair::Setup drawn_setup(const test::Flight& flight, unsigned seed, double alignment_sigma_rad) {
-  auto setup = nominal<Pair>();
+  auto setup = nominal_setup_of<Pair>();
   std::mt19937 random(seed + 1000);
   std::normal_distribution<double> normal;
   for (int k = 0; k < 2; ++k) {
@@ -299,12 +298,12 @@ void expect_nothing_of_common_turns(const typename InvariantEstimator<Esg7, N>::
 }
 
 TEST(AnglesWithoutFixes, SayNothingOfWhatTurnsAllMomenta) {
-  expect_nothing_of_common_turns<2>(nominal<Pair>());
+  expect_nothing_of_common_turns<2>(nominal_setup_of<Pair>());
   expect_nothing_of_common_turns<3>(triple_setup());
 }
 
 TEST(AnglesWithoutFixes, ShowAGyroThatHasJumped) {
-  Started<2> s(nominal<Pair>());
+  Started<2> s(nominal_setup_of<Pair>());
   const Eigen::Vector3d other = s.readings.h_b[1];
   s.readings.h_b[0] = (s.readings.h_b[0] + 1e-3 * other).normalized();
   const auto before = s.estimator.gyros()[0].h_in;
@@ -324,7 +323,7 @@ TEST(AnglesWithoutFixes, ShareNoSamplesWithFixes) {
     std::erase_if(flight.fixes, [&](const StarFix& fix) {
       return fix.t > Time(std::chrono::seconds(60)) && fix.t < Time(std::chrono::seconds(back_s));
     });
-    auto cycle = make_cycle<Pair>(nominal<Pair>());
+    auto cycle = make_cycle<Pair>(nominal_setup_of<Pair>());
     std::vector<Time> looks;
     std::vector<Time> fixes;
     test::fly(flight, *cycle, [&](const auto& report) {
@@ -354,7 +353,7 @@ TEST(AnglesWithoutFixes, GoOnOverAGapOfTheGyros) {
   test::Flight flight({.duration_s = 900});
   flight.fixes.resize(60);  // until 3 min
   flight.samples.erase(flight.samples.begin() + 8 * 400, flight.samples.begin() + 8 * 600);
-  auto cycle = make_cycle<Pair>(nominal<Pair>());
+  auto cycle = make_cycle<Pair>(nominal_setup_of<Pair>());
   std::vector<Time> looks;
   test::fly(flight, *cycle, [&](const auto& report) {
     if (report.angles.status != FixStatus::kNone) {
@@ -420,7 +419,7 @@ void wander_off(Samples& samples, int gyro, double from_s, double acceleration_r
 }
 
 /// What a flight with a failing gyro came to.
-struct Outcome {
+struct GyroOutcome {
   long too_few = 0;        ///< samples rejected
   long too_few_fixes = 0;  ///< fixes rejected
   long used = 0;           ///< fixes
@@ -430,8 +429,9 @@ struct Outcome {
 };
 
 template <class Estimator, class Samples>
-Outcome outcome(const Samples& samples, const test::Flight& truth, Cycle<Estimator>& cycle, int gyro, double from_s) {
-  Outcome sum;
+GyroOutcome outcome(const Samples& samples, const test::Flight& truth, Cycle<Estimator>& cycle, int gyro,
+                    double from_s) {
+  GyroOutcome sum;
   fly(samples, truth.fixes, cycle, [&](const auto& report) {
     sum.too_few += report.sample == SampleStatus::kRejectedTooFewGyros;
     sum.too_few_fixes += report.fix.status == FixStatus::kRejectedTooFewGyros;
@@ -460,13 +460,13 @@ auto every_fix(const typename Estimator::Setup& setup) {
 TEST(StuckGyro, OfThreeIsLeftOutWhileItIsStuck) {
   Flight3 flight({.duration_s = 2400});
   auto good = every_fix<Triple>(triple_setup());
-  const Outcome without = outcome(flight.samples, flight.pair, *good, 2, 900);
+  const GyroOutcome without = outcome(flight.samples, flight.pair, *good, 2, 900);
   EXPECT_EQ(without.first_not_used_s, 0);
   for (const int gyro : {0, 2}) {
     Flight3 stuck = flight;
     stick(stuck.samples, gyro, 900, 1500);
     auto cycle = every_fix<Triple>(triple_setup());
-    const Outcome with = outcome(stuck.samples, flight.pair, *cycle, gyro, 900);
+    const GyroOutcome with = outcome(stuck.samples, flight.pair, *cycle, gyro, 900);
     EXPECT_NEAR(with.first_not_used_s, 902, 0.2);
     EXPECT_EQ(with.too_few + with.too_few_fixes, 0);
     EXPECT_LE(with.rejected, 2);  // those of the seconds before it is known
@@ -475,8 +475,8 @@ TEST(StuckGyro, OfThreeIsLeftOutWhileItIsStuck) {
     // Used again, and no worse for it at the end.
     EXPECT_EQ(cycle->on_gyro(stuck.samples.back()).gyros[gyro], GyroState::kUsed);
     const auto& gyros = cycle->estimator().gyros();
-    EXPECT_LT(angle_between<double>(gyros[0].h_in, flight.pair.truth[0].h_in), 5 * kArcsecond);
-    EXPECT_LT(angle_between<double>(gyros[2].h_in, flight.third_in), 5 * kArcsecond);
+    EXPECT_LT(angle_between<double>(gyros[0].h_in, flight.pair.truth[0].h_in), 5 * test::kArcsecond);
+    EXPECT_LT(angle_between<double>(gyros[2].h_in, flight.third_in), 5 * test::kArcsecond);
   }
 }
 
@@ -501,26 +501,26 @@ TEST(StuckGyro, OfAPairStopsItUntilItLivesAgain) {
   const test::Flight flight({.duration_s = 2400});
   test::Flight stuck = flight;
   stick(stuck.samples, 1, 900, 1200);
-  auto cycle = every_fix<Pair>(nominal<Pair>());
-  const Outcome sum = outcome(stuck.samples, flight, *cycle, 1, 1200);
+  auto cycle = every_fix<Pair>(nominal_setup_of<Pair>());
+  const GyroOutcome sum = outcome(stuck.samples, flight, *cycle, 1, 1200);
   EXPECT_NEAR(static_cast<double>(sum.too_few), 8 * 298, 8);
   EXPECT_NEAR(static_cast<double>(sum.too_few_fixes), 100, 2);
   EXPECT_GE(sum.used, 801 - 103);
   EXPECT_LE(sum.rejected, 2);
-  EXPECT_LT(momentum_error(*cycle, flight), 2 * kArcsecond);
-  EXPECT_LT(sum.worst_rad, 60 * kArcsecond);
+  EXPECT_LT(momentum_error(*cycle, flight), 2 * test::kArcsecond);
+  EXPECT_LT(sum.worst_rad, 60 * test::kArcsecond);
 }
 
 TEST(WanderingGyro, OfThreeIsIsolatedAndTheOthersGoOn) {
   Flight3 flight({.duration_s = 2400});
   auto good = every_fix<Triple>(triple_setup());
-  const Outcome without = outcome(flight.samples, flight.pair, *good, 0, 900);
+  const GyroOutcome without = outcome(flight.samples, flight.pair, *good, 0, 900);
   EXPECT_EQ(without.first_not_used_s, 0);
   for (const int gyro : {0, 1, 2}) {
     Flight3 failing = flight;
     wander_off(failing.samples, gyro, 900, 1e-7);
     auto cycle = every_fix<Triple>(triple_setup());
-    const Outcome with = outcome(failing.samples, flight.pair, *cycle, gyro, 900);
+    const GyroOutcome with = outcome(failing.samples, flight.pair, *cycle, gyro, 900);
     EXPECT_GT(with.first_not_used_s, 900);
     EXPECT_LT(with.first_not_used_s, 1200) << gyro;
     for (int other = 0; other < 3; ++other) {
@@ -528,7 +528,7 @@ TEST(WanderingGyro, OfThreeIsIsolatedAndTheOthersGoOn) {
                 other == gyro ? GyroState::kIsolated : GyroState::kUsed);
     }
     EXPECT_LT(with.rejected, 30);
-    EXPECT_LT(with.worst_rad, 60 * kArcsecond) << gyro;
+    EXPECT_LT(with.worst_rad, 60 * test::kArcsecond) << gyro;
   }
 }
 
@@ -537,7 +537,7 @@ TEST(WanderingGyro, OfThreeIsFoundWithoutAStarTrackerToo) {
   flight.pair.fixes.resize(600);
   wander_off(flight.samples, 1, 2000, 1e-7);
   auto cycle = every_fix<Triple>(triple_setup());
-  const Outcome sum = outcome(flight.samples, flight.pair, *cycle, 1, 2000);
+  const GyroOutcome sum = outcome(flight.samples, flight.pair, *cycle, 1, 2000);
   EXPECT_GT(sum.first_not_used_s, 2000);
   EXPECT_LT(sum.first_not_used_s, 2200);
   EXPECT_EQ(cycle->on_gyro(flight.samples.back()).gyros[0], GyroState::kUsed);
@@ -548,7 +548,7 @@ TEST(WanderingGyro, OfAPairStopsItForGood) {
   for (const int gyro : {0, 1}) {
     test::Flight flight({.duration_s = 2400});
     wander_off(flight.samples, gyro, 900, 1e-6);
-    auto cycle = every_fix<Pair>(nominal<Pair>());
+    auto cycle = every_fix<Pair>(nominal_setup_of<Pair>());
     long after = 0;
     SampleStatus last{};
     PerGyro<GyroState, 2> states{};
@@ -578,7 +578,7 @@ TEST(WanderingGyro, IsNotSuspectedWhenTheStarTrackerIsAtFault) {
           flight.fixes[i].q_in_c * Eigen::Quaterniond(Eigen::AngleAxisd(angle_rad, axis.normalized()));
     }
   }
-  auto cycle = make_cycle<Pair>(nominal<Pair>());
+  auto cycle = make_cycle<Pair>(nominal_setup_of<Pair>());
   for (const auto& report : fly(flight, *cycle)) {
     EXPECT_EQ(report.fix.odd_gyro, kNoGyro);
   }
@@ -619,7 +619,7 @@ Spread with_outliers(const Outliers& outliers, double student_t_freedom) {
                                                  Eigen::Vector3d(normal(random), normal(random), normal(random)));
       flight.fixes[i].q_in_c = flight.fixes[i].q_in_c * Rot<C, C>::exp(Vec<C>::assume(error)).quaternion();
     }
-    auto setup = nominal<Estimator>();
+    auto setup = nominal_setup_of<Estimator>();
     setup.student_t_freedom = student_t_freedom;
     auto cycle = make_cycle<Estimator>(setup);
     for (const auto& report : fly(flight, *cycle)) {
@@ -669,19 +669,19 @@ TEST(StudentTOfInvariant, ComesNearTheGateWithFewFarOutliers) {
 TYPED_TEST(StudentT, DoesNotBelieveALieEither) {
   test::Flight flight({.duration_s = 2100});
   turn_fixes(flight, 300, 500, 3 * kDegree);
-  auto setup = nominal<TypeParam>();
+  auto setup = nominal_setup_of<TypeParam>();
   setup.student_t_freedom = 5;
   auto cycle = make_cycle<TypeParam>(setup);
   const auto fixes = fly(flight, *cycle);
   EXPECT_EQ(count(fixes, FixStatus::kRejectedByGate), 200);
   EXPECT_EQ(fixes.back().fix.status, FixStatus::kUsed);
-  EXPECT_LT(momentum_error(*cycle, flight), 8 * kArcsecond);
+  EXPECT_LT(momentum_error(*cycle, flight), 8 * test::kArcsecond);
 }
 
 TYPED_TEST(StudentT, ReopensAsTheGateDoes) {
   test::Flight flight({.duration_s = 1800});
-  turn_fixes(flight, 300, flight.fixes.size(), 120 * kArcsecond);
-  auto setup = nominal<TypeParam>();
+  turn_fixes(flight, 300, flight.fixes.size(), 120 * test::kArcsecond);
+  auto setup = nominal_setup_of<TypeParam>();
   setup.student_t_freedom = 5;
   auto cycle = make_cycle<TypeParam>(setup);
   const auto fixes = fly(flight, *cycle);
@@ -724,7 +724,7 @@ TYPED_TEST(ClockSetBack, IsTakenOverAfterSixteenSamples) {
     for (auto& fix : set_back.fixes) {
       fix.t -= fix.t > from ? from_seconds(back_s) : Duration::zero();
     }
-    auto cycle = make_cycle<TypeParam>(nominal<TypeParam>());
+    auto cycle = make_cycle<TypeParam>(nominal_setup_of<TypeParam>());
     long rejected = 0;
     long taken_over = 0;
     long used = 0;
@@ -746,15 +746,15 @@ TYPED_TEST(ClockSetBack, IsTakenOverAfterSixteenSamples) {
     EXPECT_EQ(taken_over, 1);
     EXPECT_GE(used, 598);
     // Two seconds of drift are not predicted: 1″ at the most.
-    EXPECT_LT(momentum_error(*cycle, flight), 3 * kArcsecond);
+    EXPECT_LT(momentum_error(*cycle, flight), 3 * test::kArcsecond);
   }
 }
 
 TYPED_TEST(ClockSetBack, IsNotBelievedOfSamplesThatComeLate) {
   // A block of old samples among the present ones, and a few that go backwards.
   const test::Flight flight({.duration_s = 600});
-  auto cycle = make_cycle<TypeParam>(nominal<TypeParam>());
-  auto plain = make_cycle<TypeParam>(nominal<TypeParam>());
+  auto cycle = make_cycle<TypeParam>(nominal_setup_of<TypeParam>());
+  auto plain = make_cycle<TypeParam>(nominal_setup_of<TypeParam>());
   std::size_t fix = 0;
   for (std::size_t i = 0; i < flight.samples.size(); ++i) {
     EXPECT_EQ(cycle->on_gyro(flight.samples[i]).sample, SampleStatus::kUsed);
@@ -775,7 +775,7 @@ TYPED_TEST(ClockSetBack, IsNotBelievedOfSamplesThatComeLate) {
 
 TEST(ClockSetBackOfInvariant, TellsOfTheFixesThatWaited) {
   const test::Flight flight({.duration_s = 60});
-  auto cycle = make_cycle<Pair>(nominal<Pair>());
+  auto cycle = make_cycle<Pair>(nominal_setup_of<Pair>());
   for (std::size_t i = 0; i <= 24 * 5; ++i) {
     cycle->on_gyro(flight.samples[i]);
   }

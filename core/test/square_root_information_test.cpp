@@ -8,9 +8,9 @@
 namespace trihedron {
 namespace {
 
-constexpr int kN = 7;
-constexpr int kD = 3;
-using Filter = SquareRootInformation<kN, kD>;
+constexpr int kStates = 7;
+constexpr int kDynamic = 3;
+using Filter = SquareRootInformation<kStates, kDynamic>;
 using Matrix = Filter::Matrix;
 
 template <int R, int K>
@@ -26,14 +26,14 @@ struct Dense {
   void propagate(const Filter::DynamicMatrix& A, const Filter::DynamicByConstants& B,
                  const Filter::DynamicVector& noise) {
     Matrix F = Matrix::Identity();
-    F.topLeftCorner<kD, kD>() = A;
-    F.topRightCorner<kD, kN - kD>() = B;
+    F.topLeftCorner<kDynamic, kDynamic>() = A;
+    F.topRightCorner<kDynamic, kStates - kDynamic>() = B;
     P = F * P * F.transpose();
-    P.topLeftCorner<kD, kD>() += noise.cwiseAbs2().asDiagonal();
+    P.topLeftCorner<kDynamic, kDynamic>() += noise.cwiseAbs2().asDiagonal();
   }
-  Filter::Vector update(const Eigen::Matrix<double, 2, kN>& H, const Eigen::Vector2d& y) {
+  Filter::Vector update(const Eigen::Matrix<double, 2, kStates>& H, const Eigen::Vector2d& y) {
     const Eigen::Matrix2d S = H * P * H.transpose() + Eigen::Matrix2d::Identity();
-    const Eigen::Matrix<double, kN, 2> K = P * H.transpose() * S.inverse();
+    const Eigen::Matrix<double, kStates, 2> K = P * H.transpose() * S.inverse();
     const Filter::Vector x = K * y;
     P = (Matrix::Identity() - K * H) * P;
     return x;
@@ -46,21 +46,21 @@ TEST(SquareRootInformation, AgreesWithTheTextbookFilterOverManySteps) {
   std::mt19937 random(1);
   Filter filter;
   filter.add_prior_of_constants(Eigen::Matrix4d::Identity() * 0.5);
-  const Eigen::Matrix<double, kD, kN> all = Eigen::Matrix<double, kD, kN>::Identity();
-  static_cast<void>(filter.update<kD>(all, Eigen::Vector3d::Zero()));
+  const Eigen::Matrix<double, kDynamic, kStates> all = Eigen::Matrix<double, kDynamic, kStates>::Identity();
+  static_cast<void>(filter.update<kDynamic>(all, Eigen::Vector3d::Zero()));
   Dense dense;
   dense.P.diagonal() << 1, 1, 1, 4, 4, 4, 4;
   EXPECT_LT((covariance(filter) - dense.P).norm(), 1e-14);
   for (int step = 0; step < 200; ++step) {
-    const Filter::DynamicMatrix A = Filter::DynamicMatrix::Identity() + 0.1 * random_matrix<kD, kD>(random);
-    const Filter::DynamicByConstants B = random_matrix<kD, kN - kD>(random);
+    const Filter::DynamicMatrix A = Filter::DynamicMatrix::Identity() + 0.1 * random_matrix<kDynamic, kDynamic>(random);
+    const Filter::DynamicByConstants B = random_matrix<kDynamic, kStates - kDynamic>(random);
     // Without process noise at every other step: a zero noise must not divide by anything.
-    const Filter::DynamicVector noise = (step % 2) * 0.1 * random_matrix<kD, 1>(random).cwiseAbs();
+    const Filter::DynamicVector noise = (step % 2) * 0.1 * random_matrix<kDynamic, 1>(random).cwiseAbs();
     filter.propagate(A.inverse(), B, noise);
     dense.propagate(A, B, noise);
     ASSERT_LT((covariance(filter) - dense.P).norm(), 1e-10 * dense.P.norm()) << step;
-    const Eigen::Matrix<double, 2, kN> H = random_matrix<2, kN>(random);
-    const Eigen::Matrix<double, 2, kN> through = filter.through_uncertainty<2>(H);
+    const Eigen::Matrix<double, 2, kStates> H = random_matrix<2, kStates>(random);
+    const Eigen::Matrix<double, 2, kStates> through = filter.through_uncertainty<2>(H);
     ASSERT_LT((through * through.transpose() - H * dense.P * H.transpose()).norm(), 1e-10 * dense.P.norm());
     const Eigen::Vector2d y = random_matrix<2, 1>(random);
     ASSERT_LT((filter.update<2>(H, y) - dense.update(H, y)).norm(), 1e-9) << step;
@@ -71,17 +71,17 @@ TEST(SquareRootInformation, AgreesWithTheTextbookFilterOverManySteps) {
 TEST(SquareRootInformation, UnobservedDirectionStaysUnobservedThroughManySteps) {
   std::mt19937 random(2);
   Filter filter;  // no prior at all
-  Filter::Vector null = random_matrix<kN, 1>(random).normalized();
+  Filter::Vector null = random_matrix<kStates, 1>(random).normalized();
   double scale = 0;
   for (int step = 0; step < 10'000; ++step) {
     // Measurements that do not see `null`, then dynamics that carry it along.
-    Eigen::Matrix<double, 2, kN> H = random_matrix<2, kN>(random);
+    Eigen::Matrix<double, 2, kStates> H = random_matrix<2, kStates>(random);
     H -= H * null * null.transpose() / null.squaredNorm();
     static_cast<void>(filter.update<2>(H, Eigen::Vector2d::Zero()));
-    if (step > kN) {
-      const Filter::DynamicByConstants B = 0.01 * random_matrix<kD, kN - kD>(random);
+    if (step > kStates) {
+      const Filter::DynamicByConstants B = 0.01 * random_matrix<kDynamic, kStates - kDynamic>(random);
       filter.propagate(Filter::DynamicMatrix::Identity(), B, Filter::DynamicVector::Zero());
-      null.head<kD>() += B * null.tail<kN - kD>();
+      null.head<kDynamic>() += B * null.tail<kStates - kDynamic>();
     }
     scale = filter.root().norm();
   }
@@ -94,7 +94,8 @@ TEST(SquareRootInformation, IsRegularOnlyOnceEveryStateIsKnown) {
   EXPECT_FALSE(filter.regular());
   filter.add_prior_of_constants(Eigen::Matrix4d::Identity());
   EXPECT_FALSE(filter.regular());
-  static_cast<void>(filter.update<kD>(Eigen::Matrix<double, kD, kN>::Identity(), Eigen::Vector3d::Zero()));
+  static_cast<void>(
+      filter.update<kDynamic>(Eigen::Matrix<double, kDynamic, kStates>::Identity(), Eigen::Vector3d::Zero()));
   EXPECT_TRUE(filter.regular());
 }
 

@@ -7,6 +7,7 @@
 #include <Eigen/Core>
 #include <csignal>
 #include <filesystem>
+#include <limits>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -17,6 +18,8 @@
 #include "trihedron/records/pass.hpp"
 
 namespace trihedron::io {
+
+inline constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 
 /// A directory that is gone with its content at the end of the test.
 class TemporaryDirectory {

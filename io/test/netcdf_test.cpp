@@ -14,8 +14,6 @@ namespace {
 
 using testing::HasSubstr;
 
-constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
-
 class PassNetcdf : public testing::Test {
  protected:
   PassNetcdf() { raw_.save_netcdf(file()); }

@@ -18,8 +18,6 @@ using testing::HasSubstr;
 using testing::IsEmpty;
 using Kind = Defect::Kind;
 
-constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
-
 /// Every claim holds in both formats: the rows go through a file of the format that is the parameter.
 class Screening : public testing::TestWithParam<std::string> {
  protected:

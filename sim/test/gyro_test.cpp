@@ -15,7 +15,7 @@ using Eigen::Vector3d;
 using test::Sequence;
 
 constexpr double kStep_s = 0.125;
-constexpr Duration kPeriod = std::chrono::milliseconds{125};
+constexpr Duration kGyroPeriod = std::chrono::milliseconds{125};
 constexpr std::size_t kSamples = 100'000;
 
 /// Two directions across h.
@@ -29,12 +29,12 @@ const Vec<Case> kDirection = Vec<Case>::assume(0.6, -0.3, 0.8).normalized();
 
 std::vector<Vector3d> readings(const ReadoutScenario& scenario, std::vector<Event>* events = nullptr,
                                std::uint64_t seed = 1, int gyro = 0, std::size_t n = kSamples) {
-  Readout readout(scenario, kPeriod, seed, gyro);
+  Readout readout(scenario, kGyroPeriod, seed, gyro);
   std::vector<Event> ignored;
   std::vector<Vector3d> result;
   for (std::size_t i = 0; i < n; ++i) {
     result.push_back(
-        readout.read(Time{} + kPeriod * static_cast<std::int64_t>(i), kDirection, events ? *events : ignored));
+        readout.read(Time{} + kGyroPeriod * static_cast<std::int64_t>(i), kDirection, events ? *events : ignored));
   }
   return result;
 }

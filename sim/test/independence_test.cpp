@@ -177,7 +177,7 @@ void expect_apart(const std::vector<std::pair<std::string, Sequence>>& faults) {
 }
 
 TEST(Independence, FaultsOfTheReadoutStrikeApart) {
-  constexpr std::size_t kSamples = 100'000;
+  constexpr std::size_t kReadings = 100'000;
   constexpr Duration kPeriod = std::chrono::milliseconds{125};
   ReadoutScenario scenario;
   scenario.dropout_probability = kProbability;
@@ -186,13 +186,13 @@ TEST(Independence, FaultsOfTheReadoutStrikeApart) {
   for (const int gyro : {0, 1}) {
     Readout readout(scenario, kPeriod, 1, gyro);
     std::vector<Event> events;
-    for (std::size_t i = 0; i < kSamples; ++i) {
+    for (std::size_t i = 0; i < kReadings; ++i) {
       static_cast<void>(
           readout.read(Time{} + kPeriod * static_cast<std::int64_t>(i), Vec<Case>::assume(0.6, 0, 0.8), events));
     }
     for (const auto& [name, fault] :
          {std::pair("dropout ", Fault::kReadoutDropout), std::pair("spike ", Fault::kReadoutSpike)}) {
-      faults.emplace_back(name + std::to_string(gyro), strikes(events, fault, gyro, Time{}, kPeriod, kSamples));
+      faults.emplace_back(name + std::to_string(gyro), strikes(events, fault, gyro, Time{}, kPeriod, kReadings));
     }
   }
   expect_apart(faults);

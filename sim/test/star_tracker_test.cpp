@@ -17,7 +17,7 @@ using test::Sequence;
 
 const Time kEpoch = Scenario{}.epoch;
 constexpr Duration kDuration = std::chrono::hours{9};
-constexpr Duration kPeriod = std::chrono::seconds{3};
+constexpr Duration kFixPeriod = std::chrono::seconds{3};
 constexpr double kDuration_s = 32400;
 constexpr std::size_t kFixes = 10801;
 
@@ -35,7 +35,7 @@ class StarTracker : public testing::Test {
 
   StarTrackerTelemetry fixes(const StarTrackerScenario& head, std::uint64_t seed = 7) {
     events_.clear();
-    return simulate_fixes(head, {attitude_, orbit_, sky_}, kEpoch, kDuration, kPeriod, seed, events_);
+    return simulate_fixes(head, {attitude_, orbit_, sky_}, kEpoch, kDuration, kFixPeriod, seed, events_);
   }
   double t_s(Time t) const { return to_seconds(t - kEpoch); }
 
@@ -112,7 +112,7 @@ TEST_F(StarTracker, NoiseOfAFurtherHeadIsAboutItsOwnAxesAndIndependent) {
   head.mounting_rotation_vector_rad = {std::numbers::pi / 2, 0, 0};  // its boresight along −c_y
   head.misalignment_rad = {1e-3, -2e-3, 3e-3};
   const std::vector<Vector3d> first = errors(fixes({}));
-  const auto second = simulate_fixes(head, {attitude_, orbit_, sky_}, kEpoch, kDuration, kPeriod, 7, events_, 1);
+  const auto second = simulate_fixes(head, {attitude_, orbit_, sky_}, kEpoch, kDuration, kFixPeriod, 7, events_, 1);
   std::vector<Vector3d> e;
   for (std::size_t i = 0; i < second.size(); ++i) {
     const Rot<In, C> expected = attitude_.at(t_s(second.t[i])) * Rot<C, C>::exp(Vec<C>::assume(head.misalignment_rad));
@@ -132,7 +132,7 @@ TEST_F(InertialStarTracker, ExclusionAnglesOfAFurtherHeadAreFromItsOwnBoresight)
   const std::size_t of_the_first = fixes(head).size();
   head.mounting_rotation_vector_rad = {std::numbers::pi, 0,
                                        0};  // the other way: sees the Earth when the first does not
-  const auto second = simulate_fixes(head, {attitude_, orbit_, sky_}, kEpoch, kDuration, kPeriod, 7, events_, 1);
+  const auto second = simulate_fixes(head, {attitude_, orbit_, sky_}, kEpoch, kDuration, kFixPeriod, 7, events_, 1);
   EXPECT_GT(of_the_first, kFixes / 4);
   EXPECT_LT(of_the_first, kFixes);
   EXPECT_GT(of_the_first + second.size(), kFixes / 2);
@@ -288,7 +288,7 @@ TEST_F(InertialStarTracker, EarthBlindsOncePerRevolution) {
   std::size_t passages = 0;
   for (std::size_t i = 0; i < events_.size(); ++i) {
     ASSERT_EQ(events_[i].fault, Fault::kFixEarthBlinded);
-    passages += i == 0 || events_[i].t - events_[i - 1].t > kPeriod ? 1U : 0U;
+    passages += i == 0 || events_[i].t - events_[i - 1].t > kFixPeriod ? 1U : 0U;
     const Vector3d to_earth = -orbit_.at(t_s(events_[i].t)).position_m.raw();
     const double limb = std::asin(kEarthRadius_m / to_earth.norm());
     ASSERT_LT(angle_between<double>(Vector3d::UnitZ(), to_earth), limb + 20 * kDegree);
