@@ -2,20 +2,17 @@
 
 #include <fmt/format.h>
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <functional>
 #include <future>
 #include <limits>
-#include <map>
 #include <numbers>
 #include <optional>
 #include <utility>
 #include <vector>
 
-#include "batch.hpp"
+#include "noise_search.hpp"
 #include "with_estimator.hpp"
 
 namespace trihedron::ground {
@@ -27,130 +24,6 @@ using Choice = FurtherStateOptions::Choice;
 constexpr double kStrong = 3;
 /// Pairs of fixes that give the noise of the star tracker within some percent.
 constexpr std::size_t kEnough = 1000;
-/// Below it, process noise is lost in the readout: where a search for more begins.
-constexpr double kLeastWalk_rad_sqrt_s = 3e-9;
-/// A difference of the noise that is more than chance.
-constexpr double kNotable = 0.1;
-
-/// ln of the Bayes factor for states being free instead of zero (Savage and Dickey): the density of zero before over
-/// that after. `root`: a square root of their covariance now.
-double log_evidence(const Eigen::VectorXd& estimate, const Eigen::MatrixXd& root, const Eigen::VectorXd& prior_sigma) {
-  const Eigen::MatrixXd scaled = prior_sigma.cwiseInverse().asDiagonal() * root;
-  const Eigen::LLT<Eigen::MatrixXd> covariance(scaled * scaled.transpose());
-  const Eigen::VectorXd white = covariance.matrixL().solve(estimate.cwiseQuotient(prior_sigma));
-  return white.squaredNorm() / 2 + covariance.matrixLLT().diagonal().array().log().sum();
-}
-
-/// From the smallest on, those that a model contains and that are tried.
-std::vector<std::string> models_up_to(const std::string& model) {
-  std::vector<std::string> models{Esg7::kModelName};
-  for (int degree = 1; is_for_whole_pass(model) && models.back() != model; ++degree) {
-    models.push_back(fmt::format("vsh:{}", degree));
-  }
-  if (models.back() != model) {
-    models.push_back(model);
-  }
-  return models;
-}
-
-/// Of the constants, in their sigmas: decisions need no more.
-constexpr double kNearEnough = 0.2;
-
-/// What decisions need, in a fraction of the time: over some seconds the body turns by some degrees at most.
-PassSetup coarse(PassSetup setup) {
-  setup.sample_step = std::chrono::seconds(3);
-  setup.fixes_together = std::chrono::seconds(10);
-  return setup;
-}
-
-/// The whole pass with one choice of states.
-class Trial {
- public:
-  Trial(const Pass& pass, const Screened& screened, const CalibrationOptions& options)
-      : drift_model_(options.drift_model),
-        problem_(screened.pass, coarse(setup_of(pass, options))),
-        found_(most_likely(problem_, first_solution(problem_, screened), kNearEnough)) {}
-
-  /// Again, with other noise.
-  void refit(const ProcessNoise& noise) {
-    problem_.set_noise(noise);
-    found_ = most_likely(problem_, std::move(found_.solution), kNearEnough);
-  }
-
-  [[nodiscard]] const PassProblem::Linear& linear() const { return found_.linear; }
-  [[nodiscard]] double log_likelihood(const PassProblem::Linear& linear, const ProcessNoise& noise) const {
-    return ground::log_likelihood(problem_, found_.before, linear, noise);
-  }
-
-  [[nodiscard]] double clock_offset() const {
-    return of_shared(layout().clock(), 1, problem_.setup().clock_offset_sigma_s);
-  }
-  [[nodiscard]] double orbital_error() const {
-    return of_shared(layout().orbital(), 6, problem_.setup().orbital_error_sigma_rad);
-  }
-  [[nodiscard]] double readout_bias() const {
-    const int size = 3 * layout().gyros;
-    Eigen::VectorXd estimate(size);
-    for (int k = 0; k < layout().gyros; ++k) {
-      const int row = 3 * k;
-      estimate.segment<3>(row) = gyro(k).readout_bias;
-    }
-    return log_evidence(estimate, found_.errors.last_root.middleRows(layout().bias(0), size),
-                        Eigen::VectorXd::Constant(size, problem_.setup().readout_bias_sigma));
-  }
-  [[nodiscard]] double coefficient_change() const {
-    const int size = Esg7::kSize * layout().gyros;
-    Eigen::VectorXd estimate(size);
-    for (int k = 0; k < layout().gyros; ++k) {
-      const int row = Esg7::kSize * k;
-      estimate.segment<Esg7::kSize>(row) = gyro(k).change_rad_s;
-    }
-    return log_evidence(estimate, found_.errors.last_root.middleRows(layout().change(0), size),
-                        Eigen::VectorXd::Constant(size, problem_.setup().coefficient_change_sigma_rad_s));
-  }
-  /// Of its drift model and those that it contains.
-  [[nodiscard]] std::vector<Forecast> forecasts() const {
-    return ground::forecasts(problem_, found_, models_up_to(drift_model_));
-  }
-
-  /// How the difference of the first star tracker from the gyros changes from fix to fix, about c x, y, z: all that is
-  /// slow cancels.
-  [[nodiscard]] std::vector<Eigen::Vector3d> changes_rad() const {
-    constexpr Duration kClose = std::chrono::seconds(10);  // over which nothing slow changes
-    std::vector<Eigen::Vector3d> changes;
-    std::optional<Eigen::Quaterniond> last;
-    Time last_t{};
-    problem_.go_along(found_.solution, [&](const PassProblem::Moment& moment) {
-      if (moment.fix == nullptr || moment.fix->fix.head != 0) {
-        return;
-      }
-      const auto by_gyros = PassProblem::attitude(found_.solution, moment, moment.fix->h_b, moment.fix->used);
-      if (!by_gyros) {
-        return;
-      }
-      const Eigen::Quaterniond apart =
-          by_gyros.value().C_in_c.quaternion().conjugate() * moment.fix->fix.q_in_c.normalized();
-      if (last && moment.t - last_t < kClose) {
-        changes.emplace_back(Rot<C, C>::assume(last->conjugate() * apart).log().raw());
-      }
-      last = apart;
-      last_t = moment.t;
-    });
-    return changes;
-  }
-
- private:
-  [[nodiscard]] const PassLayout& layout() const { return problem_.setup().layout; }
-  [[nodiscard]] const GyroParameters& gyro(int k) const { return found_.solution.gyros[static_cast<std::size_t>(k)]; }
-  [[nodiscard]] double of_shared(int state, int size, double prior_sigma) const {
-    return log_evidence(found_.solution.shared.segment(state - layout().shared(), size),
-                        found_.errors.last_root.middleRows(state, size), Eigen::VectorXd::Constant(size, prior_sigma));
-  }
-
-  std::string drift_model_;
-  PassProblem problem_;
-  BatchResult found_;
-};
 
 /// 1-sigma of the star tracker by the changes of a trial: of outliers only the median feels. Needs changes.
 Eigen::Vector3d star_tracker_noise_rad(const std::vector<Eigen::Vector3d>& changes_rad) {
@@ -174,129 +47,6 @@ std::optional<Eigen::Vector3d> other_star_tracker_noise(const Pass& pass,
   const Eigen::Vector3d found = star_tracker_noise_rad(changes_rad);
   const bool other = ((found - told).array().abs() > kNotable * told.array()).any();
   return other ? std::optional(found) : std::nullopt;
-}
-
-/// Process noise, and how likely it makes the pass.
-struct Likely {
-  ProcessNoise noise;
-  double log_likelihood = 0;
-  double gain = 0;  ///< over that of (0, 0)
-};
-
-/// Goes uphill over process noise on a grid, each by two numbers.
-class Search {
- public:
-  using Point = std::pair<int, int>;
-  using At = std::function<ProcessNoise(double, int)>;
-
-  /// From the best of `starts`, (0, 0) among them, to the best of its neighbours, and so on, within the bounds; all
-  /// included.
-  Search(const Trial& trial, At at, const std::vector<Point>& starts, const Point& lowest, const Point& highest)
-      : trial_(trial), linear_(trial.linear()), at_(std::move(at)) {
-    gather_constants(linear_.prior, linear_.prior_y, linear_.stages);
-    look_at(starts);
-    for (std::optional<Point> last; last != best_;) {
-      last = best_;
-      const auto [i, j] = best_;
-      look_at({{std::max(i - 1, lowest.first), j},
-               {std::min(i + 1, highest.first), j},
-               {i, std::max(j - 1, lowest.second)},
-               {i, std::min(j + 1, highest.second)}});
-    }
-  }
-
-  /// The best point, its first number by a parabola through its neighbours where it has two.
-  [[nodiscard]] Likely best() const {
-    const auto [i, j] = best_;
-    const double peak = tried_.at(best_);
-    const auto below = tried_.find({i - 1, j});
-    const auto above = tried_.find({i + 1, j});
-    double beside = 0;
-    if (below != tried_.end() && above != tried_.end()) {
-      beside = (above->second - below->second) / (4 * peak - 2 * below->second - 2 * above->second);
-    }
-    return {at_(i + beside, j), peak, peak - tried_.at({0, 0})};
-  }
-
- private:
-  void look_at(const std::vector<Point>& points) {
-    std::map<Point, std::future<double>> runs;
-    for (const Point& point : points) {
-      if (!tried_.contains(point) && !runs.contains(point)) {
-        runs.emplace(point, std::async(std::launch::async, [this, noise = at_(point.first, point.second)] {
-                       return trial_.log_likelihood(linear_, noise);
-                     }));
-      }
-    }
-    for (auto& [point, run] : runs) {
-      tried_[point] = run.get();
-    }
-    best_ = std::max_element(tried_.begin(), tried_.end(), [](const auto& a, const auto& b) {
-              return a.second < b.second;
-            })->first;
-  }
-
-  const Trial& trial_;
-  PassProblem::Linear linear_;
-  At at_;
-  std::map<Point, double> tried_;
-  Point best_;
-};
-
-/// Where the model is wrong there is more than one maximum.
-const std::vector<Search::Point> kAllLevels = {{0, 0}, {3, 0}, {6, 0}, {9, 0}};
-
-/// The trial with the process noise that makes the pass most likely, and that: outliers are told apart by it.
-Likely settled(Trial& trial, const Search::At& at, const std::vector<Search::Point>& starts,
-               const Search::Point& lowest, const Search::Point& highest) {
-  constexpr int kRounds = 3;
-  Likely likely;
-  for (int round = 0; round < kRounds; ++round) {
-    const ProcessNoise before = likely.noise;
-    likely = Search(trial, at, starts, lowest, highest).best();
-    trial.refit(likely.noise);
-    const auto same = [](double a, double b) { return std::abs(a - b) <= kNotable * b; };
-    if (same(before.direction_random_walk_rad_sqrt_s, likely.noise.direction_random_walk_rad_sqrt_s) &&
-        same(before.wandering_sigma_rad_s, likely.noise.wandering_sigma_rad_s) &&
-        same(before.wandering_time_s, likely.noise.wandering_time_s)) {
-      break;
-    }
-  }
-  return likely;
-}
-
-/// A random walk, by factors of two above that of the options; drift that wanders as these say.
-Likely with_most_likely_walk(Trial& trial, const CalibrationOptions& options) {
-  const ProcessNoise least{std::max(options.direction_random_walk_rad_sqrt_s, kLeastWalk_rad_sqrt_s),
-                           options.further_states.wandering_drift_rad_s,
-                           to_seconds(options.further_states.wandering_time)};
-  const auto at = [least](double level, int) {
-    ProcessNoise noise = least;
-    noise.direction_random_walk_rad_sqrt_s *= std::pow(2, level);
-    return noise;
-  };
-  return settled(trial, at, kAllLevels, {0, 0}, {9, 0});
-}
-
-/// Level and correlation time of the drift that wanders, by factors of two and three from those of the options: from
-/// what is longer than some arcs, or it would be a random walk, to what is shorter than a pass.
-Likely with_most_likely_wandering(Trial& trial, const CalibrationOptions& options) {
-  constexpr double kShortest_s = 400;
-  constexpr double kLongest_s = 3 * 3600;
-  const ProcessNoise told{options.direction_random_walk_rad_sqrt_s, options.further_states.wandering_drift_rad_s,
-                          to_seconds(options.further_states.wandering_time)};
-  const auto at = [told](double level, int time) {
-    ProcessNoise noise = told;
-    noise.wandering_sigma_rad_s *= std::pow(2, level);
-    noise.wandering_time_s *= std::pow(3, time);
-    return noise;
-  };
-  const auto times_within = [&](double limit_s) {
-    return static_cast<int>(std::floor(std::abs(std::log(told.wandering_time_s / limit_s)) / std::log(3.0) + 1e-6));
-  };
-  const int shorter = told.wandering_time_s > kShortest_s ? times_within(kShortest_s) : 0;
-  const int longer = told.wandering_time_s < kLongest_s ? times_within(kLongest_s) : 0;
-  return settled(trial, at, {{0, 0}, {2, 0}, {4, 0}, {6, 0}}, {-3, -shorter}, {9, longer});
 }
 
 /// What was asked for must be there.

@@ -13,8 +13,6 @@ namespace {
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
 
-constexpr int kGyros = 2;
-
 // Unknowns of one gyro: the initial direction by two components across it, κ, δ.
 constexpr int kDrift = 2;
 constexpr int kAlignment = kDrift + Esg7::kSize;

@@ -8,7 +8,8 @@
 
 namespace trihedron::consistency {
 
-using Parameters = ParameterLayout<Esg7, 2>;
+inline constexpr int kGyros = 2;
+using Parameters = ParameterLayout<Esg7, kGyros>;
 using ParameterCovariance = Eigen::Matrix<double, Parameters::kSize, Parameters::kSize>;
 
 /// Bayesian Cramér–Rao bound of the parameters of two gyros without process noise, rad/s and rad: the inverse of the

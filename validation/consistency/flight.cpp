@@ -18,8 +18,6 @@
 namespace trihedron::consistency {
 namespace {
 
-constexpr int kGyros = 2;
-
 /// What an estimator made of a flight.
 struct Estimate {
   ParameterErrors errors;          ///< truth less estimate
