@@ -15,7 +15,7 @@ help:
 	@echo 'make consistency  measure again what docs/consistency.md tells: hours; goes on where it was interrupted'
 	@echo 'make install  into PREFIX (default /usr/local)'
 	@echo 'make setup | format | lint | sanitize | coverage | clean'
-	@echo 'Files are compiled in units of twelve, which halves the time of a whole build. Who edits them is served sooner with'
+	@echo 'Files are compiled in units of twelve, which makes a whole build shorter. Who edits one is served sooner with'
 	@echo 'CMAKE_FLAGS=-DCMAKE_UNITY_BUILD=OFF, which compiles each on its own.'
 
 setup:
