@@ -18,7 +18,7 @@
 namespace trihedron::consistency {
 namespace {
 
-std::string marked(std::string value, int side) { return value + (side < 0 ? " ↓" : side > 0 ? " ↑" : ""); }
+std::string marked(const std::string& value, int side) { return value + (side < 0 ? " ↓" : side > 0 ? " ↑" : ""); }
 
 std::string angle(double rad) {
   return rad < kDegree ? fmt::format("{:.0f}′", rad / kArcminute) : fmt::format("{:.0f}°", rad / kDegree);

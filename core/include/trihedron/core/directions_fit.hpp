@@ -48,10 +48,9 @@ struct FittedDirections {
   int freedom = 0;                       ///< of the residuals of one gyro, two components each
 };
 
-/// Least-squares polynomial in time through the samples begin … end − 1, at time t: a cubic where there
-/// are enough of them, less where not. With weights equal, the noise at the middle of 49 samples falls to 0.21 of a
-/// single one. Needs begin < end.
-/// `samples`: anything whose [i] has `t` and `h_b`.
+/// Least-squares polynomial in time through the samples begin … end − 1, at time t: a cubic where there are enough of
+/// them, less where not. With weights equal, the noise at the middle of 49 samples falls to 0.21 of a single one. Needs
+/// begin < end. `samples`: anything whose [i] has `t` and `h_b`.
 template <int N, class Samples>
 [[nodiscard]] FittedDirections<N> fit_directions(const Samples& samples, int begin, int end, Time t, int max_degree) {
   constexpr int kTerms = 4;
