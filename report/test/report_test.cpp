@@ -122,7 +122,7 @@ TEST(Report, ListsTheSimulatedDriftOutsideTheModelInOneSentence) {
   run.truth.gyros[0].unmodelled_rad_s = {{"W(1,0)", 1e-8}, {"D(2,1)", -2.5e-9}};
   run.truth.gyros[1].unmodelled_rad_s.clear();
   const std::string html = render(run.judged());
-  const std::string sentence = "Simulated drift outside the model, 10⁻⁶ rad/s: W(1,0) +0.0100, D(2,1) −0.0025.";
+  const std::string sentence = "Simulated drift beside eq. (1), 10⁻⁶ rad/s: W(1,0) +0.0100, D(2,1) −0.0025.";
   EXPECT_NE(html.find(sentence), std::string::npos);
   EXPECT_EQ(html.find("Simulated drift outside", html.find(sentence) + 1), std::string::npos);
 }
