@@ -30,9 +30,10 @@ namespace {
 std::vector<io::Table> residual_tables(const ground::CalibrationRun& run) {
   io::Table fixes{"fixes", {}, {}};
   const std::size_t components = 2 * run.calibration.gyros.size();
-  const char* innovation = run.calibration.estimator == ground::kBatch
-                               ? "what the smoothed pass leaves of the fix, gyro and component across its momentum"
-                               : "innovation of eq. (3), gyro and component in qi";
+  const char* innovation =
+      run.calibration.estimator == ground::kBatch
+          ? "what the smoothed pass leaves of a fix that it compares, gyro and component across its momentum"
+          : "innovation of eq. (3), gyro and component in qi";
   for (std::size_t i = 0; i < components; ++i) {
     // The paper numbers its quasi-inertial axes so.
     const std::string component = fmt::format("gyro{}_{}", i / 2 + 1, components == 4 && i == 1 ? 3 : i % 2 + 1);

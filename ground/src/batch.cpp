@@ -49,12 +49,13 @@ double log_likelihood(const PassProblem& problem, const PassSolution& solution, 
   const PassLayout& layout = problem.setup().layout;
   problem.put_noise(solution, noise, linear);
   const SmootherResult found = smoothed(linear);
-  // Of the directions at the start nothing is known before; the rest of the prior is triangular.
+  // Of the directions at the start nothing is known before; the rest of the prior is triangular. What
+  // gather_constants() has put there is below it.
   const Eigen::Index directions = 2L * layout.gyros;
   const Eigen::Index rest = layout.size() - directions;
   const double log_prior_root =
       linear.prior.block(directions, directions, rest, rest).diagonal().array().abs().log().sum();
-  return log_prior_root - found.log_root_determinant - (found.residual_square + linear.outliers_square) / 2;
+  return log_prior_root - found.log_root_determinant - (found.residual_square + linear.beside_square) / 2;
 }
 
 }  // namespace trihedron::ground

@@ -22,8 +22,6 @@
 namespace trihedron::ground {
 namespace {
 
-/// Between rows of the parameter history: the square root of the whole covariance is most of what a fix costs.
-constexpr Duration kWatchedParameters = std::chrono::seconds(10);
 /// Between the paper's corrections.
 constexpr Duration kWatchedCorrections = std::chrono::minutes(90);
 
@@ -305,7 +303,7 @@ CalibrationRun calibrate_with(const Pass& pass, Decision decision, const Progres
     run.fixes.push_back(record_of(report));
     corrected = report.corrected ? report.fix.t : corrected;
     if (report.fix.used() &&
-        (run.parameters.t.empty() || report.fix.t - run.parameters.t.back() >= kWatchedParameters)) {
+        (run.parameters.t.empty() || report.fix.t - run.parameters.t.back() >= ParameterHistory::kStep)) {
       run.parameters.t.push_back(report.fix.t);
       run.parameters.value.push_back(parameter_values(cycle->estimator()));
       const auto root = parameter_root(cycle->estimator());

@@ -346,9 +346,10 @@ Decision decide(const Pass& pass, const CalibrationOptions& asked_for) {
       options.drift_model = asked.drift_model;
     }
     if (asked.find_noise && invariant && !prior) {
-      decision.screened = screen(pass, options);
-      if (!decision.screened->pass.fixes.empty()) {
-        find_noise(pass, *decision.screened, options);
+      // Not kept: which gyro is at fault is to be judged by the noise found.
+      const Screened screened = screen(pass, options);
+      if (!screened.pass.fixes.empty()) {
+        find_noise(pass, screened, options);
       }
     }
     return decision;

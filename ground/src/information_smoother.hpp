@@ -38,8 +38,8 @@ struct SmootherResult {
 [[nodiscard]] SmootherResult smooth(const Eigen::MatrixXd& prior, const Eigen::VectorXd& prior_y,
                                     const std::vector<SmootherStage>& stages);
 
-/// Moves what the stages tell of the constants alone to the prior, once, where smooth() is to follow with this noise
-/// and that: it is most of the rows, and no noise changes it.
+/// Moves what the stages tell of the constants alone to the prior, below the rows that are there, for smooth() to
+/// follow with this noise and that: it is most of the rows, and no noise changes it.
 void gather_constants(Eigen::MatrixXd& prior, Eigen::VectorXd& prior_y, std::vector<SmootherStage>& stages);
 
 /// Triangles of what prior and measurements up to the end of each stage of `after` (increasing) know of its states,

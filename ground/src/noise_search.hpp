@@ -21,9 +21,9 @@ struct Likely {
 /// refitted with it.
 [[nodiscard]] Likely with_most_likely_walk(Trial& trial, const CalibrationOptions& options);
 
-/// Level and correlation time of the drift that wanders, by factors of two and three from those of the options: from
-/// what is longer than some arcs, or it would be a random walk, to what is shorter than a pass. Leaves the trial
-/// refitted with it.
+/// Level and correlation time of the drift that wanders, by factors of two and three from those of the options. The
+/// time stays between 400 s, some arcs, below which it would be a random walk, and 3 h, or is that of the options.
+/// Leaves the trial refitted with it.
 [[nodiscard]] Likely with_most_likely_wandering(Trial& trial, const CalibrationOptions& options);
 
 }  // namespace trihedron::ground

@@ -62,6 +62,7 @@ class Together {
                        !std::equal(fix.used.begin(), fix.used.end(), sums_.back().used.begin());
     Sum& sum = first ? sums_.emplace_back() : sums_.back();
     const double square = weight * weight;
+    square_ += square * rows.y.squaredNorm();
     if (first) {
       sum = {fix.fix.t, fix.fix.head, fix.used, square, square * rows.H, square * rows.y};
       size_ += rows.y.size();
@@ -72,7 +73,8 @@ class Together {
     sum.y += square * rows.y;
   }
 
-  void put_into(SmootherStage& stage, Eigen::Index states) const {
+  /// Returns what of the squares is not in the rows: the scatter about the means.
+  [[nodiscard]] double put_into(SmootherStage& stage, Eigen::Index states) const {
     stage.H.resize(size_, states);
     stage.y.resize(size_);
     Eigen::Index row = 0;
@@ -81,6 +83,7 @@ class Together {
       stage.y.segment(row, sum.y.size()) = sum.y / std::sqrt(sum.weight);
       row += sum.y.size();
     }
+    return square_ - stage.y.squaredNorm();
   }
 
  private:
@@ -95,6 +98,7 @@ class Together {
   Duration reach_;
   std::vector<Sum> sums_;
   Eigen::Index size_ = 0;
+  double square_ = 0;
 };
 
 /// ω_b by κ with so much of its change.
@@ -539,10 +543,10 @@ PassProblem::Linear PassProblem::linearise(const PassSolution& solution) const {
       // Its pull falls with the third power of the misfit beyond the gate.
       const double nis = rows.y.squaredNorm();
       const double gate = scale * gate_of_freedom(static_cast<int>(rows.y.size()), setup_.gate_nis);
-      linear.outliers_square += nis > gate ? 2 * gate * (1 - gate / nis) : 0;
+      linear.beside_square += nis > gate ? 2 * gate * (1 - gate / nis) : 0;
       together.add(*its, rows, nis > gate ? gate / nis : 1);
     }
-    together.put_into(linear.stages[arc], setup_.layout.size());
+    linear.beside_square += together.put_into(linear.stages[arc], setup_.layout.size());
   }
   std::for_each(linear.stages.begin(), linear.stages.end(), compress);
   put_noise(solution, setup_.noise, linear);

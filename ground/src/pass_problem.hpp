@@ -65,7 +65,8 @@ struct PassSetup {
   Time orbital_phase_zero{};
   ProcessNoise noise;
   double gate_nis = 30;  ///< of a pair; above it a fix counts less
-  /// Samples are taken so far apart: the body turns little between them, and their noise is averaged in the end.
+  /// Samples are taken so far apart, or up to half as much again before a fix: the body turns little between them, and
+  /// their noise is averaged in the end.
   Duration sample_step = std::chrono::seconds(1);
   /// Fixes nearer than this count as one: what they show together, without what changes among them.
   Duration fixes_together{};
@@ -118,9 +119,10 @@ class PassProblem {
       double extra_variance_rad2 = 0;  ///< for what steps too long for their readings may have missed
     };
     std::vector<ArcEnd> ends;
-    /// What outliers count beyond the squares of their rows, which have less weight: 2 g − g²/s together, s their NIS
-    /// and g the gate, so that a worse one is not more likely.
-    double outliers_square = 0;
+    /// What counts beyond the squares of the rows: the scatter of fixes that count as one, and of outliers, whose rows
+    /// have less weight, so much that they are 2 g − g²/s together, s their NIS and g the gate: a worse one is not more
+    /// likely.
+    double beside_square = 0;
   };
   [[nodiscard]] Linear linearise(const PassSolution& solution) const;
   /// The same with other process noise than that of the setup.

@@ -29,7 +29,8 @@ CalibrationOptions without_further_states(CalibrationOptions options) {
 
 Screened screen(const Pass& pass, const CalibrationOptions& asked) {
   CalibrationOptions options = without_further_states(asked);
-  if (asked.drift_model != Esg7::kModelName && knows_of_drift_outside(pass.settings)) {
+  const bool has_prior_of_esg20 = pass.settings.prior && asked.drift_model == Esg20::kModelName;
+  if (has_prior_of_esg20 || (asked.drift_model != Esg7::kModelName && knows_of_drift_outside(pass.settings))) {
     options.drift_model = asked.drift_model == kAutoDriftModel ? Esg20::kModelName : asked.drift_model;
   }
   return with_estimator(pass, options, [&]<class Estimator>() {

@@ -68,7 +68,7 @@ class Figures {
     for (std::size_t column = 0; column < parameters_.size() && !history.t.empty(); ++column) {
       const Parameter& parameter = parameters_[column];
       const double unit = parameter.is_alignment ? kArcminute_rad : kMicroradian;
-      Series series(2, fix_step_min_);
+      Series series(2, fix_step_min_ + to_minutes(ground::ParameterHistory::kStep));
       for (std::size_t row = 0; row < history.t.size(); ++row) {
         series.add(minutes(history.t[row]), {history.value[row][column] / unit, history.sigma[row][column] / unit});
       }

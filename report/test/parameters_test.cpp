@@ -4,6 +4,7 @@
 
 #include <cmath>
 
+#include "figures.hpp"
 #include "synthetic_run.hpp"
 #include "units.hpp"
 
@@ -46,6 +47,15 @@ TEST_F(ParametersOfARun, ClaimNoErrorWithoutTruth) {
   for (const Parameter& parameter : parameters_of(run.alone())) {
     EXPECT_FALSE(parameter.truth);
     EXPECT_FALSE(parameter.error);
+  }
+}
+
+TEST_F(ParametersOfARun, AreDrawnWithoutGapsWhereFixesComeFasterThanRows) {
+  run.pass.settings.star_tracker_period = std::chrono::milliseconds(100);
+  const ReportInput input = run.judged();
+  const nlohmann::json figure = figure_data(input, parameters_of(input)).at("parameters").at("gyro1.k0");
+  for (const nlohmann::json& value : figure.at("y").at(0)) {
+    EXPECT_TRUE(value.is_number());
   }
 }
 

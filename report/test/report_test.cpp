@@ -124,7 +124,7 @@ TEST(Report, ListsTheSimulatedDriftOutsideTheModelInOneSentence) {
   const std::string html = render(run.judged());
   const std::string sentence = "Simulated drift beside eq. (1), 10⁻⁶ rad/s: W(1,0) +0.0100, D(2,1) −0.0025.";
   EXPECT_NE(html.find(sentence), std::string::npos);
-  EXPECT_EQ(html.find("Simulated drift outside", html.find(sentence) + 1), std::string::npos);
+  EXPECT_EQ(html.find("Simulated drift beside", html.find(sentence) + 1), std::string::npos);
 }
 
 TEST(Report, GivesTheExtensionOfTheCorrectionInterval) {

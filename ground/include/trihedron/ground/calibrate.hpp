@@ -35,9 +35,10 @@ struct FixRecord {
   [[nodiscard]] bool used() const { return is_used(status); }
 };
 
-/// Estimates along the pass, for the figures of the paper: a row after a used fix every 10 s, columns as in
-/// Calibration::states.
+/// Estimates along the pass, for the figures of the paper: rows after used fixes, those nearer than kStep to the last
+/// one left out; columns as in Calibration::states.
 struct ParameterHistory {
+  static constexpr Duration kStep = std::chrono::seconds(10);
   std::vector<Time> t;
   std::vector<std::vector<double>> value;  ///< [row][state]; alignment as rotation vector, rad; drift rad/s
   std::vector<std::vector<double>> sigma;
