@@ -2,6 +2,7 @@
 SHELL := bash
 JOBS ?= $(shell nproc)
 BUILD := build
+LINT_TOOLS := build-lint/tools
 SOURCES := $(shell git ls-files '*.cpp' '*.hpp' 2>/dev/null)
 
 .PHONY: help setup build demo test bench validation consistency format lint sanitize coverage install clean
@@ -67,14 +68,21 @@ consistency: build
 	$(CONSISTENCY) $(WHOLE_PASS) --runs 30 --cells $(GEOMETRIES) --table agreement --place agreement docs/consistency.md
 	$(CONSISTENCY) $(WHOLE_PASS) --runs 20 --cells $(STEADY) --table agreement --place agreement20 docs/consistency.md
 
-format:
-	clang-format -i $(SOURCES)
+format: $(LINT_TOOLS)/installed
+	@$(LINT_TOOLS)/bin/clang-format -i $(SOURCES)
+
+# Of one version everywhere; clang-tidy of Debian 12 runs each check over all that the headers of others contain, and takes four times as long.
+$(LINT_TOOLS)/installed: cmake/lint-requirements.txt | setup
+	python3 -m venv $(LINT_TOOLS)
+	$(LINT_TOOLS)/bin/pip install --quiet --disable-pip-version-check --requirement $<
+	touch $@
 
 # In units of several files: clang-tidy reads Eigen once for each unit instead of once for each file.
-lint: setup
-	clang-format --dry-run --Werror $(SOURCES)
+lint: $(LINT_TOOLS)/installed
+	@$(LINT_TOOLS)/bin/clang-format --dry-run --Werror $(SOURCES)
 	cmake --preset lint
-	find build-lint -name 'unity_*.cxx' | sort | xargs -P $(JOBS) -n 1 clang-tidy --quiet -p build-lint
+	sed -n 's/^ *"file": "\(.*\/\(Unity\|src\)\/.*\)".*/\1/p' build-lint/compile_commands.json | \
+	  xargs -P $(JOBS) -n 1 $(LINT_TOOLS)/bin/clang-tidy --quiet -p build-lint
 
 install: build
 	cmake --install $(BUILD) $(if $(PREFIX),--prefix $(PREFIX))

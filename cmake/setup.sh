@@ -7,8 +7,8 @@ packages=(
   libeigen3-dev libhdf5-dev libcli11-dev libtomlplusplus-dev libfmt-dev nlohmann-json3-dev libnetcdf-dev libfast-float-dev libsqlite3-dev
   libboost-dev libboost-math-dev liberfa-dev pkg-config nodejs npm
   libgtest-dev libgmock-dev librapidcheck-dev libbenchmark-dev
-  clang-format clang-tidy gcovr chromium-headless-shell
-  python3 python3-pytest python3-xarray python3-h5netcdf
+  gcovr chromium-headless-shell
+  python3 python3-venv python3-pytest python3-xarray python3-h5netcdf
 )
 
 missing=()

@@ -409,13 +409,13 @@ StarTrackerTelemetry used_fixes(const Pass& pass, const std::vector<FixRecord>& 
       times.push_back(fix.t);
     }
   }
-  std::sort(times.begin(), times.end());
+  std::ranges::sort(times);
   StarTrackerTelemetry used;
   for (std::size_t i = 0; i < pass.star_tracker.size(); ++i) {
     const Time t = pass.star_tracker.t[i];
     const Eigen::Quaterniond& q_in_c = pass.star_tracker.q_in_c[i];
     const bool repeated = !used.t.empty() && used.t.back() == t;
-    if (!repeated && q_in_c.coeffs().allFinite() && std::binary_search(times.begin(), times.end(), t)) {
+    if (!repeated && q_in_c.coeffs().allFinite() && std::ranges::binary_search(times, t)) {
       used.t.push_back(t);
       used.q_in_c.push_back(q_in_c);
     }
@@ -425,7 +425,7 @@ StarTrackerTelemetry used_fixes(const Pass& pass, const std::vector<FixRecord>& 
 
 CalibrationRun calibrate(const Pass& pass, const CalibrationOptions& options, const Progress& progress) {
   Decision decision = decide(pass, options);
-  return with_estimator(pass, decision.options, [&]<class Estimator>() {
+  return with_estimator(pass, decision.options, [&]<class Estimator> {
     return calibrate_with<Estimator>(pass, std::move(decision), progress);
   });
 }
@@ -438,7 +438,7 @@ NavigationRun navigate(const Pass& pass, const CalibrationOptions& options, cons
                      "--definitive writes");
   }
   return with_estimator(pass, decided,
-                        [&]<class Estimator>() { return navigate_with<Estimator>(pass, decided, progress); });
+                        [&]<class Estimator> { return navigate_with<Estimator>(pass, decided, progress); });
 }
 
 }  // namespace trihedron::ground

@@ -106,9 +106,8 @@ Eigen::VectorXd ParameterBlocks::named(Eigen::VectorXd direction) const {
 }
 
 bool ParameterBlocks::is_alignment(const Eigen::VectorXd& direction) const {
-  return std::all_of(blocks_.begin(), blocks_.end(), [&](const Block& block) {
-    return block.is_alignment || direction(block.rows).squaredNorm() < kNamed;
-  });
+  return std::ranges::all_of(
+      blocks_, [&](const Block& block) { return block.is_alignment || direction(block.rows).squaredNorm() < kNamed; });
 }
 
 }  // namespace trihedron::ground

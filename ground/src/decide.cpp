@@ -31,8 +31,8 @@ Eigen::Vector3d star_tracker_noise_rad(const std::vector<Eigen::Vector3d>& chang
   Eigen::Vector3d noise_rad;
   for (int axis = 0; axis < 3; ++axis) {
     std::vector<double> changes(changes_rad.size());
-    std::transform(changes_rad.begin(), changes_rad.end(), changes.begin(),
-                   [axis](const Eigen::Vector3d& change) { return std::abs(change(axis)); });
+    std::ranges::transform(changes_rad, changes.begin(),
+                           [axis](const Eigen::Vector3d& change) { return std::abs(change(axis)); });
     const auto middle = changes.begin() + static_cast<std::ptrdiff_t>(changes.size() / 2);
     std::nth_element(changes.begin(), middle, changes.end());
     noise_rad(axis) = *middle / kMedianOfNormal / std::numbers::sqrt2;
@@ -80,8 +80,8 @@ void use_noise(const CalibrationNoise& noise, CalibrationOptions& options) {
 /// As in the prior calibration.
 CalibrationOptions as_before(CalibrationOptions options, const Calibration& prior) {
   const auto had = [&](const char* name) {
-    return std::any_of(prior.further.begin(), prior.further.end(),
-                       [&](const FurtherEstimate& state) { return state.name.starts_with(name); });
+    return std::ranges::any_of(prior.further,
+                               [&](const FurtherEstimate& state) { return state.name.starts_with(name); });
   };
   const auto settle = [](Choice& choice, bool on) {
     if (choice == Choice::kAuto) {

@@ -60,9 +60,7 @@ class Search {
     for (auto& [point, run] : runs) {
       tried_[point] = run.get();
     }
-    best_ = std::max_element(tried_.begin(), tried_.end(), [](const auto& a, const auto& b) {
-              return a.second < b.second;
-            })->first;
+    best_ = std::ranges::max_element(tried_, [](const auto& a, const auto& b) { return a.second < b.second; })->first;
   }
 
   const Trial& trial_;

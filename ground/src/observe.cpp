@@ -31,7 +31,7 @@ std::vector<std::string> names_of_constants(const PassSetup& setup, const Calibr
   std::vector<std::string> names = state_names(setup.family, layout.gyros);
   std::vector<std::string> further = further_names(options.further_states, layout.further_heads, layout.gyros);
   const std::ptrdiff_t shared = layout.size() - layout.shared();
-  std::rotate(further.begin(), further.begin() + shared, further.end());
+  std::ranges::rotate(further, further.begin() + shared);
   names.insert(names.end(), further.begin(), further.end());
   return names;
 }
@@ -222,8 +222,7 @@ ScreenedPass as_it_is(const Pass& pass, int gyros, int heads) {
     const StarTrackerTelemetry& fixes =
         head == 0 ? pass.star_tracker : pass.further_star_trackers[static_cast<std::size_t>(head - 1)];
     for (std::size_t i = 0; i < fixes.size(); ++i) {
-      const auto sample = std::lower_bound(screened.samples.begin(), screened.samples.end(), fixes.t[i],
-                                           [](const ScreenedPass::Sample& s, Time t) { return s.t < t; });
+      const auto sample = std::ranges::lower_bound(screened.samples, fixes.t[i], {}, &ScreenedPass::Sample::t);
       if (sample == screened.samples.end()) {
         break;
       }
@@ -237,8 +236,7 @@ ScreenedPass as_it_is(const Pass& pass, int gyros, int heads) {
       }
     }
   }
-  std::stable_sort(screened.fixes.begin(), screened.fixes.end(),
-                   [](const auto& a, const auto& b) { return a.fix.t < b.fix.t; });
+  std::ranges::stable_sort(screened.fixes, [](const auto& a, const auto& b) { return a.fix.t < b.fix.t; });
   return screened;
 }
 
@@ -254,7 +252,7 @@ double sigma_along(const Combination& combination, const Observability& observab
 }
 
 bool Observability::is_harmful() const {
-  return std::any_of(weak.begin(), weak.end(), [](const Combination& combination) { return combination.is_harmful; });
+  return std::ranges::any_of(weak, [](const Combination& combination) { return combination.is_harmful; });
 }
 
 Observability observe(const Pass& pass, const CalibrationOptions& asked, const Mission& mission) {

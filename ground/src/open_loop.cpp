@@ -107,7 +107,7 @@ AttitudeHistory fly_open_loop(const Pass& pass, Time t, const std::vector<GyroCa
   Readings readings(pass.gyro);
   std::optional<Directions> last = readings.at(t);
   Time last_t = t;
-  auto epoch = std::lower_bound(epochs.begin(), epochs.end(), t);
+  auto epoch = std::ranges::lower_bound(epochs, t);
   for (Time now = t; epoch != epochs.end(); now = std::min(now + kStep, *epoch)) {
     if (const std::optional<Directions> h_b = readings.at(now)) {
       Directions middle = *h_b;
@@ -125,7 +125,10 @@ AttitudeHistory fly_open_loop(const Pass& pass, Time t, const std::vector<GyroCa
         history.age_s.push_back(to_seconds(now - t));
       }
     }
-    if (now == *epoch && ++epoch == epochs.end()) {
+    if (now == *epoch) {
+      ++epoch;
+    }
+    if (epoch == epochs.end()) {
       break;
     }
   }

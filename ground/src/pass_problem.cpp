@@ -548,7 +548,7 @@ PassProblem::Linear PassProblem::linearise(const PassSolution& solution) const {
     }
     linear.beside_square += together.put_into(linear.stages[arc], setup_.layout.size());
   }
-  std::for_each(linear.stages.begin(), linear.stages.end(), compress);
+  std::ranges::for_each(linear.stages, compress);
   put_noise(solution, setup_.noise, linear);
   return linear;
 }

@@ -43,8 +43,8 @@ void use_residuals(const PassProblem& problem, const PassSolution& solution, con
     }
     fix.nis = rows.y.dot(covariance.ldlt().solve(rows.y));
     fix.degrees_of_freedom = static_cast<int>(rows.y.size());
-    std::fill(fix.innovation.begin(), fix.innovation.end(), 0);
-    std::fill(fix.innovation_sigma.begin(), fix.innovation_sigma.end(), 0);
+    std::ranges::fill(fix.innovation, 0);
+    std::ranges::fill(fix.innovation_sigma, 0);
     Eigen::Index row = 0;
     for (int k = 0; k < problem.setup().layout.gyros; ++k) {
       for (int i = 2 * k; moment.fix->used[k] && i < 2 * k + 2; ++i, ++row) {
@@ -96,7 +96,7 @@ void rearrange(const std::vector<std::string>& from, const std::vector<std::stri
     std::vector<double>& value = rearranged.value.emplace_back(to.size(), std::nan(""));
     std::vector<double>& sigma = rearranged.sigma.emplace_back(prior_sigma.begin(), prior_sigma.end());
     for (std::size_t column = 0; column < to.size(); ++column) {
-      const auto found = std::find(from.begin(), from.end(), to[column]) - from.begin();
+      const auto found = std::ranges::find(from, to[column]) - from.begin();
       if (const auto i = static_cast<std::size_t>(found); i < from.size()) {
         value[column] = history.value[row][i];
         sigma[column] = history.sigma[row][i];
@@ -135,7 +135,7 @@ std::vector<FurtherEstimate> further_of(const PassSetup& setup, const BatchResul
 }
 
 /// Throws SetupError where nothing can be made of it.
-const Screened& usable(const Screened& screened) {
+PassProblem problem_of(const Screened& screened, PassSetup setup) {
   if (screened.pass.fixes.empty()) {
     throw SetupError("no fix could be compared with the gyros", "look at the telemetry with `trihedron inspect`");
   }
@@ -143,14 +143,14 @@ const Screened& usable(const Screened& screened) {
     throw SetupError("the clock of the telemetry was set back within the pass: how its parts lie in time is unknown",
                      "calibrate the parts apart, or use estimator invariant");
   }
-  return screened;
+  return {screened.pass, std::move(setup)};
 }
 
 }  // namespace
 
 Refinement::Refinement(const Screened& screened, PassSetup setup, const CalibrationOptions& options,
                        const std::vector<Forecast>& forecasts)
-    : problem_(usable(screened).pass, std::move(setup)),
+    : problem_(problem_of(screened, std::move(setup))),
       options_(options),
       result_(most_likely(problem_, first_solution(problem_, screened))),
       roots_(covariance_roots(result_.errors, result_.linear.stages)) {

@@ -12,10 +12,9 @@ namespace {
 
 /// Whether what is known before of a gyro names a coefficient that eq. (1) does not have.
 bool knows_of_drift_outside(const PassSettings& settings) {
-  return std::any_of(settings.gyros.begin(), settings.gyros.end(), [](const GyroPrior& prior) {
+  return std::ranges::any_of(settings.gyros, [](const GyroPrior& prior) {
     const auto outside = [](const auto& coefficient) { return coefficient.first.find('(') != std::string::npos; };
-    return std::any_of(prior.drift_rad_s.begin(), prior.drift_rad_s.end(), outside) ||
-           std::any_of(prior.drift_sigma_rad_s.begin(), prior.drift_sigma_rad_s.end(), outside);
+    return std::ranges::any_of(prior.drift_rad_s, outside) || std::ranges::any_of(prior.drift_sigma_rad_s, outside);
   });
 }
 
@@ -33,7 +32,7 @@ Screened screen(const Pass& pass, const CalibrationOptions& asked) {
   if (has_prior_of_esg20 || (asked.drift_model != Esg7::kModelName && knows_of_drift_outside(pass.settings))) {
     options.drift_model = asked.drift_model == kAutoDriftModel ? Esg20::kModelName : asked.drift_model;
   }
-  return with_estimator(pass, options, [&]<class Estimator>() {
+  return with_estimator(pass, options, [&]<class Estimator> {
     const auto cycle = make_cycle<Estimator>(pass, options, {.navigate = false});
     Screened screened;
     screened.pass.gyros = Estimator::kGyros;
@@ -50,7 +49,7 @@ Screened screen(const Pass& pass, const CalibrationOptions& asked) {
 }
 
 PassSetup setup_of(const Pass& pass, const CalibrationOptions& options) {
-  return with_estimator(pass, options, [&]<class Estimator>() {
+  return with_estimator(pass, options, [&]<class Estimator> {
     const auto cycle = make_cycle<Estimator>(pass, options, {.navigate = false});
     return pass_setup<Estimator>(cycle->estimator().setup(), pass, options);
   });

@@ -19,7 +19,7 @@ using GyrosUsed = GyroMask<kMaxGyros>;
 struct ScreenedPass {
   [[nodiscard]] static GyroDirections unread() {
     GyroDirections h_b;
-    std::fill(h_b.begin(), h_b.end(), Eigen::Vector3d::UnitX());
+    std::ranges::fill(h_b, Eigen::Vector3d::UnitX());
     return h_b;
   }
   struct Sample {

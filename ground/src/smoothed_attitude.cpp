@@ -39,9 +39,8 @@ SmoothReadings::At SmoothReadings::at(Time t, const At& otherwise) const {
 std::optional<SmoothReadings::At> SmoothReadings::fit(Time t, const GyrosUsed& used, Duration reach) const {
   constexpr int kDegree = 3;
   constexpr int kLeast = 2 * (kDegree + 1);
-  const auto before = [](const ScreenedPass::Sample& sample, Time time) { return sample.t < time; };
-  const auto first = std::lower_bound(samples_.begin(), samples_.end(), t - reach, before);
-  const auto last = std::lower_bound(first, samples_.end(), t + reach + Duration{1}, before);
+  const auto first = std::ranges::lower_bound(samples_, t - reach, {}, &ScreenedPass::Sample::t);
+  const auto last = std::ranges::upper_bound(first, samples_.end(), t + reach, {}, &ScreenedPass::Sample::t);
   const auto begin = static_cast<int>(first - samples_.begin());
   const auto end = static_cast<int>(last - samples_.begin());
   if (end - begin < kLeast) {

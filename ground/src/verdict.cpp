@@ -58,8 +58,8 @@ void add(std::vector<Finding>& findings, Severity severity, std::string code, st
 Verdict verdict_of(std::vector<Finding> findings) {
   Verdict verdict;
   verdict.findings = std::move(findings);
-  verdict.trustworthy = std::none_of(verdict.findings.begin(), verdict.findings.end(),
-                                     [](const Finding& f) { return f.severity == Severity::kDoNotUse; });
+  verdict.trustworthy =
+      std::ranges::none_of(verdict.findings, [](const Finding& f) { return f.severity == Severity::kDoNotUse; });
   return verdict;
 }
 
@@ -122,8 +122,8 @@ void judge_star_tracker(const Statistics& statistics, std::vector<Finding>& find
 void judge_gyros(const Pass& pass, const CalibrationRun& run, std::vector<Finding>& findings) {
   const auto tell = [&](GyroState state, Severity severity, const char* code, const char* text, const char* cure) {
     std::vector<GyroEvent> events;
-    std::copy_if(run.gyro_events.begin(), run.gyro_events.end(), std::back_inserter(events),
-                 [&](const GyroEvent& event) { return event.state == state; });
+    std::ranges::copy_if(run.gyro_events, std::back_inserter(events),
+                         [&](const GyroEvent& event) { return event.state == state; });
     if (!events.empty()) {
       add(findings, severity, code, text, fmt::format("{}", fmt::join(texts_of(events, pass.settings.epoch), "; ")),
           cure);
@@ -220,7 +220,7 @@ constexpr double kClearly = 10;
 
 void judge_drift_model(const CalibrationRun& run, std::vector<Finding>& findings) {
   const auto& models = run.drift_models;
-  const auto used = std::find_if(models.begin(), models.end(), [&](const DriftModelForecast& model) {
+  const auto used = std::ranges::find_if(models, [&](const DriftModelForecast& model) {
     return model.drift_model == run.calibration.gyros[0].drift_model;
   });
   if (used == models.end()) {
@@ -357,9 +357,8 @@ void judge_unused_sensors(const Pass& pass, const CalibrationRun& run, std::vect
                     used),
         fmt::format("{} gyros in the telemetry", pass.gyro.gyros), "None needed; put the pair you want first.");
   }
-  const bool second =
-      std::any_of(run.calibration.further.begin(), run.calibration.further.end(),
-                  [](const FurtherEstimate& state) { return state.name.starts_with("star_tracker_2"); });
+  const bool second = std::ranges::any_of(
+      run.calibration.further, [](const FurtherEstimate& state) { return state.name.starts_with("star_tracker_2"); });
   const std::size_t heads = second ? 2 : 1;
   if (1 + pass.further_star_trackers.size() > heads) {
     add(findings, Severity::kNote, "star-trackers-not-used",

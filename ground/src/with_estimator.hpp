@@ -16,7 +16,7 @@ namespace trihedron::ground {
 /// Calls `body` with the estimator as a type tag. Of what is built, the smallest that has what is asked for.
 template <class Body>
 auto with_estimator(const Pass& pass, const CalibrationOptions& options, Body&& body) {
-  if (std::find(kEstimators.begin(), kEstimators.end(), options.estimator) == kEstimators.end()) {
+  if (std::ranges::find(kEstimators, options.estimator) == kEstimators.end()) {
     throw SetupError(fmt::format("there is no estimator '{}'", options.estimator),
                      fmt::format("use one of: {}", fmt::join(kEstimators, ", ")));
   }

@@ -44,11 +44,11 @@ constexpr std::array<std::pair<Choice, const char*>, 3> kChoices = {
     {{Choice::kAuto, "auto"}, {Choice::kOff, "off"}, {Choice::kOn, "on"}}};
 
 const char* name_of(Choice choice) {
-  return std::find_if(kChoices.begin(), kChoices.end(), [&](const auto& c) { return c.first == choice; })->second;
+  return std::ranges::find_if(kChoices, [&](const auto& c) { return c.first == choice; })->second;
 }
 
 std::optional<Choice> choice_of(std::string_view text) {
-  const auto found = std::find_if(kChoices.begin(), kChoices.end(), [&](const auto& c) { return c.second == text; });
+  const auto found = std::ranges::find_if(kChoices, [&](const auto& c) { return c.second == text; });
   return found == kChoices.end() ? std::nullopt : std::optional(found->first);
 }
 

@@ -155,11 +155,14 @@ struct NormTallies {
       case Norm::kGood:
         return;
       case Norm::kMissing:
-        return missing.add(row);
+        missing.add(row);
+        return;
       case Norm::kZero:
-        return zero.add(row);
+        zero.add(row);
+        return;
       case Norm::kWrong:
-        return wrong.add(row);
+        wrong.add(row);
+        return;
     }
   }
   void report(std::vector<Defect>& defects) {

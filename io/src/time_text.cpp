@@ -19,9 +19,10 @@ constexpr std::chrono::sys_days kTaiOrigin = std::chrono::year(1958) / 1 / 1;
 
 /// Takes exactly `digits` decimal digits off the head; −1 when they are not there.
 int take_number(std::string_view& text, std::size_t digits) {
+  const std::string_view number = text.substr(0, digits);
   int value = 0;
-  const char* end = text.data() + std::min(digits, text.size());
-  if (text.empty() || text.front() == '-' || std::from_chars(text.data(), end, value).ptr != text.data() + digits) {
+  const auto read = std::from_chars(number.data(), number.data() + number.size(), value);
+  if (number.size() < digits || number.front() == '-' || read.ptr != number.data() + digits) {
     return -1;
   }
   text.remove_prefix(digits);

@@ -14,7 +14,7 @@ Position position_of(const toml::source_region& region) {
   return {static_cast<std::int64_t>(region.begin.line), static_cast<std::int64_t>(region.begin.column)};
 }
 
-std::string type_of(const toml::node& node) {
+std::string_view type_of(const toml::node& node) {
   switch (node.type()) {
     case toml::node_type::table:
       return "a table";

@@ -30,7 +30,8 @@ using Plan = std::vector<Excursion>;
 std::vector<Eigen::Vector3d> axes() {
   std::vector<Eigen::Vector3d> all;
   for (int number = 14; number < 27; ++number) {
-    all.emplace_back(Eigen::Vector3d(number / 9 - 1, number / 3 % 3 - 1, number % 3 - 1).normalized());
+    const Eigen::Vector3i towards(number / 9 - 1, number / 3 % 3 - 1, number % 3 - 1);
+    all.emplace_back(towards.cast<double>().normalized());
   }
   return all;
 }
@@ -107,7 +108,7 @@ class Search {
   }
 
   [[nodiscard]] std::vector<Slew> slews_of(Plan plan) const {
-    std::sort(plan.begin(), plan.end(), [](const Excursion& a, const Excursion& b) { return a.begin_s < b.begin_s; });
+    std::ranges::sort(plan, [](const Excursion& a, const Excursion& b) { return a.begin_s < b.begin_s; });
     std::vector<Slew> slews;
     for (const Excursion& excursion : plan) {
       const double angle_rad = excursion.part_of_angle * largest_rad(plan.size());
@@ -143,7 +144,7 @@ class Search {
         candidates.back()[excursion].*member = value;
       }
       const std::vector<double> squares = errors(candidates);
-      plan = candidates[static_cast<std::size_t>(std::min_element(squares.begin(), squares.end()) - squares.begin())];
+      plan = candidates[static_cast<std::size_t>(std::ranges::min_element(squares) - squares.begin())];
     };
     vary(axes(), &Excursion::axis_c);
     vary(kPartsOfAngle, &Excursion::part_of_angle);
@@ -190,8 +191,8 @@ void check(const Scenario& scenario, const SlewLimits& limits) {
 
 std::vector<ground::Combination> Advice::formerly_weak() const {
   std::vector<ground::Combination> harmful;
-  std::copy_if(before.weak.begin(), before.weak.end(), std::back_inserter(harmful),
-               [](const ground::Combination& combination) { return combination.is_harmful; });
+  std::ranges::copy_if(before.weak, std::back_inserter(harmful),
+                       [](const ground::Combination& combination) { return combination.is_harmful; });
   return harmful.empty() ? before.weak : harmful;
 }
 

@@ -49,7 +49,7 @@ class Template {
         return;
       }
       rest_.remove_prefix(open);
-      const bool raw = rest_.substr(0, 3) == "{{{";
+      const bool raw = rest_.starts_with("{{{");
       const std::string_view closing = raw ? "}}}" : "}}";
       const std::size_t close = rest_.find(closing);
       if (close == std::string_view::npos) {

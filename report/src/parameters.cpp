@@ -11,7 +11,7 @@ namespace trihedron::report {
 namespace {
 
 const double* find(const std::vector<std::pair<std::string, double>>& table, const std::string& name) {
-  const auto found = std::find_if(table.begin(), table.end(), [&](const auto& entry) { return entry.first == name; });
+  const auto found = std::ranges::find_if(table, [&](const auto& entry) { return entry.first == name; });
   return found == table.end() ? nullptr : &found->second;
 }
 
@@ -35,9 +35,9 @@ void set_value_and_truth(const ReportInput& input, Parameter& parameter) {
   }
   const double* value = find(gyro.drift_rad_s, parameter.name);
   parameter.value = value == nullptr ? std::nan("") : *value;
-  if (const auto truth = has_truth ? input.truth->gyros[parameter.gyro].drift(parameter.name) : std::nullopt) {
-    parameter.truth = *truth;
-    parameter.error = parameter.value - *truth;
+  parameter.truth = has_truth ? input.truth->gyros[parameter.gyro].drift(parameter.name) : std::nullopt;
+  if (parameter.truth) {
+    parameter.error = parameter.value - *parameter.truth;
   }
 }
 

@@ -83,7 +83,7 @@ json gyros_of(const ReportInput& input, const std::vector<Parameter>& parameters
 json coefficients_of(const std::vector<Parameter>& parameters) {
   const std::map<std::string, std::string> in_paper = {{"k0", "Fig. 5"}, {"mu31", "Fig. 6"}, {"nu31", "Fig. 7"}};
   const bool any_in_paper =
-      std::any_of(parameters.begin(), parameters.end(), [&](const Parameter& p) { return in_paper.contains(p.name); });
+      std::ranges::any_of(parameters, [&](const Parameter& p) { return in_paper.contains(p.name); });
   json list = json::array();
   std::set<std::string> seen;
   for (const Parameter& parameter : parameters) {
@@ -115,8 +115,7 @@ json strongest_correlations(const ReportInput& input, const std::vector<Paramete
       }
     }
   }
-  std::stable_sort(pairs.begin(), pairs.end(),
-                   [](const Pair& a, const Pair& b) { return std::abs(a.rho) > std::abs(b.rho); });
+  std::ranges::stable_sort(pairs, [](const Pair& a, const Pair& b) { return std::abs(a.rho) > std::abs(b.rho); });
   pairs.resize(std::min<std::size_t>(pairs.size(), 6));
   json list = json::array();
   for (const Pair& pair : pairs) {
@@ -233,7 +232,7 @@ void find_gaps(const char* sensor, const std::vector<Time>& t, Duration longest_
     }
     last = next;
   };
-  std::for_each(t.begin(), t.end(), step_to);
+  std::ranges::for_each(t, step_to);
   step_to(settings.epoch + settings.duration);
 }
 
@@ -243,7 +242,7 @@ void put_gaps(const ReportInput& input, json& values) {
   find_gaps("gyros", input.pass.gyro.t, std::max<Duration>(8 * settings.gyro_period, std::chrono::seconds(1)), settings,
             gaps);
   find_gaps("star tracker", input.pass.star_tracker.t, 10 * settings.star_tracker_period, settings, gaps);
-  std::stable_sort(gaps.begin(), gaps.end(), [](const Gap& a, const Gap& b) { return a.length > b.length; });
+  std::ranges::stable_sort(gaps, [](const Gap& a, const Gap& b) { return a.length > b.length; });
   constexpr std::size_t kShown = 12;
   values["gaps"] = json::array();
   for (const Gap& gap : gaps) {
@@ -313,7 +312,7 @@ json further_of(const ReportInput& input) {
     const Unit& unit =
         *std::ranges::find_if(kUnits, [&](const Unit& its) { return estimate.name.ends_with(its.ending); });
     std::string name = estimate.name.substr(0, estimate.name.size() - unit.ending.size());
-    std::replace(name.begin(), name.end(), '_', ' ');
+    std::ranges::replace(name, '_', ' ');
     rows.push_back({{"name", name},
                     {"value", number(estimate.value / unit.size, 2)},
                     {"sigma", significant(estimate.sigma / unit.size, 2)},

@@ -42,8 +42,7 @@ const char* style_of(Severity severity) {
 
 json verdict_of(const Verdict& verdict) {
   std::vector<Finding> findings = verdict.findings;
-  std::stable_sort(findings.begin(), findings.end(),
-                   [](const Finding& a, const Finding& b) { return a.severity > b.severity; });
+  std::ranges::stable_sort(findings, [](const Finding& a, const Finding& b) { return a.severity > b.severity; });
   const long warnings = std::count_if(findings.begin(), findings.end(),
                                       [](const Finding& f) { return f.severity == Severity::kWarning; });
   json result = {{"findings", findings_of(findings)}, {"to_do", json::array()}};

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <numbers>
 #include <stdexcept>
 
 namespace trihedron::sim {
@@ -82,7 +83,7 @@ Rot<In, C> yaw_steered_attitude(const OrbitState& state) {
 double turn_duration_s(double angle_rad, double max_rate_rad_s, double max_acceleration_rad_s2) {
   const double angle = std::abs(angle_rad);
   return std::max(15.0 / 8.0 * angle / max_rate_rad_s,
-                  std::sqrt(10.0 / std::sqrt(3.0) * angle / max_acceleration_rad_s2));
+                  std::sqrt(10.0 / std::numbers::sqrt3 * angle / max_acceleration_rad_s2));
 }
 
 Quaterniond slew_target(const Slew& slew) {
@@ -109,8 +110,7 @@ SlewPlan::SlewPlan(const std::vector<Slew>& slews, double max_rate_rad_s, double
 }
 
 Quaterniond SlewPlan::at(double t_s) const {
-  const auto after = std::upper_bound(turns_.begin(), turns_.end(), t_s,
-                                      [](double t, const Turn& candidate) { return t < candidate.begin_s; });
+  const auto after = std::ranges::upper_bound(turns_, t_s, {}, &Turn::begin_s);
   if (after == turns_.begin()) {
     return Quaterniond::Identity();
   }

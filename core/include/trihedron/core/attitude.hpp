@@ -31,7 +31,7 @@ template <class F, class S>
   const Vector3<S> normal = h1.raw().cross(h2.raw());
   const S length1 = h1.raw().norm();
   const S length2 = h2.raw().norm();
-  if (!(length1 * length2 > S(0)) || !((normal.array() - normal.array() == S(0)).all())) {
+  if (!(length1 * length2 > S(0)) || !(normal.array() - normal.array() == S(0)).all()) {
     return DirectionsFault::kNotFinite;
   }
   const S area = normal.norm();

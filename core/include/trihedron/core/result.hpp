@@ -9,8 +9,8 @@ template <class T, class Fault>
 class [[nodiscard]] Result {
  public:
   // Implicit on purpose: `return value;` and `return Fault::kName;` read as what they are.
-  Result(const T& value) : value_(value), ok_(true) {}  // NOLINT(google-explicit-constructor)
-  Result(Fault fault) : fault_(fault) {}                // NOLINT(google-explicit-constructor)
+  Result(const T& value) : value_(value), ok_(true) {}  // NOLINT(misc-explicit-constructor)
+  Result(Fault fault) : fault_(fault) {}                // NOLINT(misc-explicit-constructor)
 
   [[nodiscard]] bool ok() const { return ok_; }
   [[nodiscard]] explicit operator bool() const { return ok_; }

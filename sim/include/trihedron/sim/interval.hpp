@@ -12,7 +12,7 @@ namespace trihedron::sim {
 /// since: from the start of the pass. Compared in whole nanoseconds: seconds in floating point would lose samples at
 /// the edges.
 [[nodiscard]] inline bool within(const std::vector<Interval>& intervals, Duration since) {
-  return std::any_of(intervals.begin(), intervals.end(), [since](const Interval& interval) {
+  return std::ranges::any_of(intervals, [since](const Interval& interval) {
     return since >= from_seconds(interval.begin_s) && since < from_seconds(interval.end_s);
   });
 }
