@@ -9,6 +9,7 @@
 #include "trihedron/core/directions_fit.hpp"
 #include "trihedron/core/invariant_estimator.hpp"
 #include "trihedron/core/optimal_attitude.hpp"
+#include "trihedron/ground/on_all_cores.hpp"
 
 namespace trihedron::ground {
 namespace {
@@ -115,26 +116,41 @@ SmoothedCourse SmoothedAttitude::course() const {
   return course;
 }
 
-AttitudeHistory SmoothedAttitude::definitive() const {
+AttitudeHistory SmoothedAttitude::between(const PassProblem::Moment& from, const PassProblem::Moment& to) const {
   AttitudeHistory history;
-  auto sample = std::ranges::lower_bound(screened_.samples, problem_.begin_of(0), {}, &ScreenedPass::Sample::t);
-  std::optional<PassProblem::Moment> before;
-  problem_.go_along(solution_, [&](const PassProblem::Moment& moment) {
-    PassProblem::Moment between = moment;
-    for (; sample != screened_.samples.end() && sample->t <= moment.t; ++sample) {
-      between.t = sample->t;
-      // From node to node a momentum turns by a fraction of an arcsecond.
-      for (int k = 0; before && k < screened_.gyros; ++k) {
-        const double part = to_seconds(sample->t - before->t) / to_seconds(moment.t - before->t);
-        between.h_in[k] = (before->h_in[k] + part * (moment.h_in[k] - before->h_in[k])).normalized();
-      }
-      if (const auto attitude = at(between, {sample->h_b, sample->used, 1})) {
-        append(*attitude, sample->t, history);
-      }
+  PassProblem::Moment moment = to;
+  const auto first = std::ranges::upper_bound(screened_.samples, from.t, {}, &ScreenedPass::Sample::t);
+  for (auto sample = first; sample != screened_.samples.end() && sample->t <= to.t; ++sample) {
+    moment.t = sample->t;
+    // From node to node a momentum turns by a fraction of an arcsecond.
+    const double part = to_seconds(sample->t - from.t) / to_seconds(to.t - from.t);
+    for (int k = 0; k < screened_.gyros; ++k) {
+      moment.h_in[k] = (from.h_in[k] + part * (to.h_in[k] - from.h_in[k])).normalized();
     }
-    before = moment;
-  });
+    if (const auto attitude = at(moment, {sample->h_b, sample->used, 1})) {
+      append(*attitude, sample->t, history);
+    }
+  }
   return history;
+}
+
+AttitudeHistory SmoothedAttitude::definitive() const {
+  std::vector<PassProblem::Moment> nodes;
+  problem_.go_along(solution_, [&](const PassProblem::Moment& moment) {
+    if (nodes.empty()) {  // a sample at the first node counts as after it
+      nodes.push_back(moment);
+      nodes.back().t -= Duration{1};
+    }
+    nodes.push_back(moment);
+  });
+  const auto parts = on_all_cores(nodes.size() - 1, [&](std::size_t i) { return between(nodes[i], nodes[i + 1]); });
+  AttitudeHistory whole;
+  for (const AttitudeHistory& part : parts) {
+    whole.t.insert(whole.t.end(), part.t.begin(), part.t.end());
+    whole.q_in_c.insert(whole.q_in_c.end(), part.q_in_c.begin(), part.q_in_c.end());
+    whole.sigma_rad.insert(whole.sigma_rad.end(), part.sigma_rad.begin(), part.sigma_rad.end());
+  }
+  return whole;
 }
 
 }  // namespace trihedron::ground

@@ -57,6 +57,8 @@ class SmoothedAttitude {
   };
   /// `otherwise` as of SmoothReadings. Nothing where the directions give no attitude.
   [[nodiscard]] std::optional<At> at(const PassProblem::Moment& moment, const SmoothReadings::At& otherwise) const;
+  /// At the samples after `from`, a node, up to and with `to`, the next one.
+  [[nodiscard]] AttitudeHistory between(const PassProblem::Moment& from, const PassProblem::Moment& to) const;
   static void append(const At& attitude, Time t, AttitudeHistory& history);
 
   const ScreenedPass& screened_;

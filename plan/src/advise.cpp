@@ -9,7 +9,7 @@
 #include <numbers>
 
 #include "design_flight.hpp"
-#include "on_all_cores.hpp"
+#include "trihedron/ground/on_all_cores.hpp"
 #include "trihedron/sim/attitude.hpp"
 #include "trihedron/sim/simulate.hpp"
 
@@ -153,7 +153,7 @@ class Search {
 
   /// Mean square of the attitude error after each.
   [[nodiscard]] std::vector<double> errors(const std::vector<Plan>& plans) {
-    const std::vector<double> squares = on_all_cores(
+    const std::vector<double> squares = ground::on_all_cores(
         plans.size(), [&](std::size_t i) { return (metric_ * flight_.covariance_after(slews_of(plans[i]))).trace(); });
     done_ += plans.size();
     if (progress_) {

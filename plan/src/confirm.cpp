@@ -5,8 +5,8 @@
 #include <mutex>
 #include <utility>
 
-#include "on_all_cores.hpp"
 #include "trihedron/ground/evaluate.hpp"
+#include "trihedron/ground/on_all_cores.hpp"
 #include "trihedron/sim/random.hpp"
 #include "trihedron/sim/simulate.hpp"
 
@@ -51,7 +51,7 @@ Confirmation confirm(const Scenario& scenario, const std::vector<ground::Combina
   options.estimator = ground::kBatch;
   std::mutex one_at_a_time;
   double done = 0;
-  const std::vector<Outcome> outcomes = on_all_cores(static_cast<std::size_t>(runs), [&](std::size_t run) {
+  const std::vector<Outcome> outcomes = ground::on_all_cores(static_cast<std::size_t>(runs), [&](std::size_t run) {
     Outcome outcome = fly(drawn(scenario, run), options);
     const std::scoped_lock lock(one_at_a_time);
     done += 1;

@@ -4,12 +4,9 @@
 
 #include <gtest/gtest.h>
 
-#include <atomic>
 #include <cmath>
-#include <stdexcept>
 
 #include "flights.hpp"
-#include "on_all_cores.hpp"
 #include "trihedron/sim/simulate.hpp"
 
 namespace trihedron::plan {
@@ -44,25 +41,6 @@ TEST(Confirmation, AgreesWithThePrediction) {
   for (const Confirmation::Along& along : confirmation.along) {
     EXPECT_LT(along.predicted, sigma_along(along.combination, without, without.covariance) / 20);
   }
-}
-
-TEST(OnAllCores, GivesTheResultsInTheirOrder) {
-  const std::vector<double> squares = on_all_cores(100, [](std::size_t i) { return static_cast<double>(i * i); });
-  ASSERT_EQ(squares.size(), 100U);
-  for (std::size_t i = 0; i < squares.size(); ++i) {
-    EXPECT_EQ(squares[i], static_cast<double>(i * i));
-  }
-  EXPECT_TRUE(on_all_cores(0, [](std::size_t) { return 0; }).empty());
-}
-
-TEST(OnAllCores, ThrowsWhatTheWorkThrows) {
-  const auto work = [](std::size_t i) {
-    if (i == 3) {
-      throw std::invalid_argument("three");
-    }
-    return i;
-  };
-  EXPECT_THROW((void)on_all_cores(10, work), std::invalid_argument);
 }
 
 }  // namespace

@@ -7,7 +7,7 @@
 #include <thread>
 #include <vector>
 
-namespace trihedron::plan {
+namespace trihedron::ground {
 
 /// The results of work(0) … work(count − 1), as many at once as there are cores. Throws what they throw.
 template <class Work>
@@ -28,4 +28,4 @@ auto on_all_cores(std::size_t count, const Work& work) {
   return results;
 }
 
-}  // namespace trihedron::plan
+}  // namespace trihedron::ground
