@@ -49,6 +49,7 @@ std::vector<Convergence> convergence(const CalibrationRun& run, const Truth* tru
       error.push_back(row[i] - reference.value_or(history.value.back()[i]));
     }
     result[i].determined = is_determined(run, i);
+    result[i].followed = std::isfinite(history.value.back()[i]);
     const double tolerance = std::max(3 * sigma_in_row(run.calibration, i), 0.1 * std::abs(error.front()));
     const std::size_t from = settled_from(error, tolerance);
     if (from < error.size()) {
@@ -62,7 +63,8 @@ std::optional<Duration> settled(const CalibrationRun& run, const std::vector<Con
                                 bool alignments) {
   std::optional<Duration> last;
   for (std::size_t i = 0; i < parameters.size(); ++i) {
-    if (!parameters[i].determined || StateName(run.calibration.states[i]).is_alignment != alignments) {
+    if (!parameters[i].determined || !parameters[i].followed ||
+        StateName(run.calibration.states[i]).is_alignment != alignments) {
       continue;
     }
     if (!parameters[i].settled) {

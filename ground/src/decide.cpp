@@ -375,7 +375,8 @@ Decision decide(const Pass& pass, const CalibrationOptions& asked_for) {
   for (;;) {
     Decision decided = decide_by_pass(pass, screened, asked, largest_model);
     const std::optional<std::string> larger = larger_model(largest_model);
-    if (!larger || best_of(decided.forecasts) != &decided.forecasts.back()) {
+    // None where the pass is too short for any.
+    if (!larger || decided.forecasts.empty() || best_of(decided.forecasts) != &decided.forecasts.back()) {
       decided.screened = std::move(screened);
       return decided;
     }

@@ -4,6 +4,7 @@
 #include <array>
 #include <chrono>
 #include <cmath>
+#include <iterator>
 
 #include "trihedron/core/cycle.hpp"
 #include "trihedron/core/directions_fit.hpp"
@@ -135,21 +136,29 @@ AttitudeHistory SmoothedAttitude::between(const PassProblem::Moment& from, const
 }
 
 AttitudeHistory SmoothedAttitude::definitive() const {
+  constexpr std::size_t kTogether = 1000;  // a node takes some kilobytes
+  AttitudeHistory whole;
   std::vector<PassProblem::Moment> nodes;
+  const auto take = [&] {
+    const auto parts = on_all_cores(nodes.size() - 1, [&](std::size_t i) { return between(nodes[i], nodes[i + 1]); });
+    for (const AttitudeHistory& part : parts) {
+      whole.t.insert(whole.t.end(), part.t.begin(), part.t.end());
+      whole.q_in_c.insert(whole.q_in_c.end(), part.q_in_c.begin(), part.q_in_c.end());
+      whole.sigma_rad.insert(whole.sigma_rad.end(), part.sigma_rad.begin(), part.sigma_rad.end());
+    }
+    nodes.erase(nodes.begin(), std::prev(nodes.end()));
+  };
   problem_.go_along(solution_, [&](const PassProblem::Moment& moment) {
     if (nodes.empty()) {  // a sample at the first node counts as after it
       nodes.push_back(moment);
       nodes.back().t -= Duration{1};
     }
     nodes.push_back(moment);
+    if (nodes.size() > kTogether) {
+      take();
+    }
   });
-  const auto parts = on_all_cores(nodes.size() - 1, [&](std::size_t i) { return between(nodes[i], nodes[i + 1]); });
-  AttitudeHistory whole;
-  for (const AttitudeHistory& part : parts) {
-    whole.t.insert(whole.t.end(), part.t.begin(), part.t.end());
-    whole.q_in_c.insert(whole.q_in_c.end(), part.q_in_c.begin(), part.q_in_c.end());
-    whole.sigma_rad.insert(whole.sigma_rad.end(), part.sigma_rad.begin(), part.sigma_rad.end());
-  }
+  take();
   return whole;
 }
 

@@ -180,6 +180,14 @@ TEST(Batch, GivesTheAttitudeAtEachSample) {
   EXPECT_LT(std::sqrt(square), 0.5 * kArcsecond);
 }
 
+TEST(Batch, TakesAPassThatIsTooShortForForecasts) {
+  CalibrationOptions options;
+  options.estimator = "batch";
+  const auto run = calibrate(sim::simulate(scenario_in_eq1(12, std::chrono::minutes(4))).pass, options);
+  EXPECT_EQ(run.calibration.gyros[0].drift_model, "esg7");
+  EXPECT_TRUE(run.drift_models.empty());
+}
+
 TEST(Batch, FindsTheDriftModelThatForecastsBest) {
   Scenario scenario = scenario_in_eq1(12, std::chrono::hours(3));
   CalibrationOptions options = batch();

@@ -66,6 +66,20 @@ TEST(Convergence, OfAKindIsThatOfItsLastDeterminedParameter) {
   EXPECT_EQ(settled(run, parameters, false), std::nullopt);
 }
 
+TEST(Convergence, IsNotThatOfAParameterThatTheCycleDoesNotEstimate) {
+  CalibrationRun run = three_parameters();
+  run.calibration.states[1] = "gyro1.W(3,1)";
+  run.calibration.covariance(1, 1) = 0.01;
+  for (std::vector<double>& row : run.parameters.value) {
+    row[1] = std::nan("");
+  }
+  const auto parameters = convergence(run, nullptr);
+  EXPECT_TRUE(parameters[1].determined);
+  EXPECT_FALSE(parameters[1].followed);
+  EXPECT_TRUE(parameters[0].followed);
+  EXPECT_EQ(settled(run, parameters, false), minutes(20));
+}
+
 TEST(Convergence, IsUnknownWithoutAHistory) {
   CalibrationRun run = three_parameters();
   run.parameters = {};

@@ -10,6 +10,7 @@
 
 #include "decimate.hpp"
 #include "innovations.hpp"
+#include "trihedron/core/outlier_gate.hpp"
 #include "trihedron/core/telemetry.hpp"
 #include "units.hpp"
 
@@ -217,7 +218,7 @@ class Figures {
                    {"expected", freedom},
                    {"low", boost::math::quantile(one, 0.025)},
                    {"high", boost::math::quantile(one, 0.975)},
-                   {"gate", run_.options.gate_nis}};
+                   {"gate", gate_of_freedom(static_cast<int>(freedom), run_.options.gate_nis)}};
     const std::size_t window = std::min<std::size_t>(100, nis.size());
     const auto sum_freedom = freedom * static_cast<double>(window);
     const boost::math::chi_squared sum(sum_freedom);

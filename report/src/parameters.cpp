@@ -76,6 +76,7 @@ std::vector<Parameter> parameters_of(const ReportInput& input) {
     parameter.sigma = std::sqrt(calibration.covariance(row, row));
     parameter.first_sigma = std::sqrt(input.run.known_before.covariance(row, row));
     parameter.is_determined = convergence[i].determined;
+    parameter.is_followed = convergence[i].followed;
     if (convergence[i].settled) {
       parameter.converged_min = to_minutes(*convergence[i].settled);
     }

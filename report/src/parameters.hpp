@@ -20,6 +20,7 @@ struct Parameter {
   double sigma = 0;           ///< rad/s or rad
   double first_sigma = 0;     ///< before the data
   bool is_determined = true;  ///< the data say more of it than was known before
+  bool is_followed = true;    ///< the on-board cycle, whose course is shown, estimates it
   std::optional<double> truth;
   /// Estimate minus truth; alignment: −δ of C_c_b(true) = exp([δ×]) C_c_b(est).
   std::optional<double> error;

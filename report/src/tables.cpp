@@ -10,6 +10,7 @@
 #include <set>
 
 #include "innovations.hpp"
+#include "trihedron/core/outlier_gate.hpp"
 #include "units.hpp"
 #include "wording.hpp"
 
@@ -29,7 +30,7 @@ json row_of(const Parameter& parameter) {
       {"undetermined", !parameter.is_determined},
       {"shrunk", parameter.first_sigma > 0 ? significant(100 * parameter.sigma / parameter.first_sigma, 2) : "—"},
       {"converged", parameter.converged_min ? number(*parameter.converged_min, 0) : "not yet"}};
-  if (!parameter.is_determined) {
+  if (!parameter.is_determined || !parameter.is_followed) {
     row["converged"] = "—";
   }
   const auto put = [&](const std::string& suffix, double unit, double sigma_unit, double error_unit) {
@@ -272,7 +273,8 @@ json settings_of(const ReportInput& input) {
                     significant(options.further_states.wandering_drift_rad_s * 3600 / kArcsecond_rad, 2),
                     span(options.further_states.wandering_time)));
   }
-  put("Gate", fmt::format("fixes with a NIS above {:.4g} are rejected", options.gate_nis));
+  put("Gate", fmt::format("fixes with a NIS above {:.4g} are rejected",
+                          gate_of_freedom(static_cast<int>(innovations_of(input.run)), options.gate_nis)));
   if (options.student_t_freedom > 0) {
     put("Weight of fixes above the gate",
         fmt::format("Student's t with {:.3g} degrees of freedom", options.student_t_freedom));

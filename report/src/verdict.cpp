@@ -84,11 +84,18 @@ std::vector<ground::ErrorStatistics> whole_stretches(const ReportInput& input, c
   return stretches;
 }
 
+/// "minutes 450–540"
+std::string minutes_of(const ReportInput& input, const ground::ErrorStatistics& stretch) {
+  const auto minute = [&](Time t) { return number(to_minutes(t - input.pass.settings.epoch), 0); };
+  return "minutes " + minute(stretch.from) + "–" + minute(stretch.to);
+}
+
 json attitude_number(const ReportInput& input) {
   if (input.evaluation && !input.evaluation->attitude.t.empty()) {
     const auto stretches = whole_stretches(input, input.evaluation->attitude);
     return figure_of_merit("Attitude error while calibrating", of_axes(stretches.back().rms_rad, kArcsecond_rad), "″",
-                           "roll / pitch / heading, rms in the last 90 min against " + input.evaluation->reference);
+                           "roll / pitch / heading, rms in " + minutes_of(input, stretches.back()) + " against " +
+                               input.evaluation->reference);
   }
   if (!input.run.attitude.sigma_rad.empty()) {
     return figure_of_merit("Attitude at the end", of_axes(input.run.attitude.sigma_rad.back(), kArcsecond_rad), "″",
@@ -101,14 +108,19 @@ json navigation_number(const ReportInput& input) {
   if (!input.evaluation || input.evaluation->navigation.t.empty()) {
     return nullptr;
   }
-  const auto stretches = whole_stretches(input, input.evaluation->navigation);
+  const ground::AttitudeErrors& errors = input.evaluation->navigation;
+  const auto stretches = whole_stretches(input, errors);
   const auto greatest = [](const ground::ErrorStatistics& stretch) {
     return significant(stretch.max_total_rad / kArcminute_rad, 2);
   };
   const std::string name = "Greatest error between corrections";
-  return stretches.size() == 1 ? figure_of_merit(name, greatest(stretches.front()), "′", "open loop, total angle")
-                               : figure_of_merit(name, greatest(stretches.front()) + " → " + greatest(stretches.back()),
-                                                 "′", "open loop, total angle: in the first and in the last 90 min");
+  if (stretches.size() == 1) {
+    const auto all = ground::statistics_by_stretch(errors, input.pass.settings.epoch, Duration::max());
+    return figure_of_merit(name, greatest(all.front()), "′", "open loop, total angle");
+  }
+  return figure_of_merit(name, greatest(stretches.front()) + " → " + greatest(stretches.back()), "′",
+                         "open loop, total angle: in " + minutes_of(input, stretches.front()) + " and in " +
+                             minutes_of(input, stretches.back()));
 }
 
 json alignment_number(const std::vector<Parameter>& parameters) {
@@ -137,7 +149,7 @@ json convergence_number(const std::vector<Parameter>& parameters, bool alignment
   std::vector<std::string> off;
   std::size_t count = 0;
   for (const Parameter& parameter : parameters) {
-    if (parameter.is_alignment != alignment || !parameter.is_determined) {
+    if (parameter.is_alignment != alignment || !parameter.is_determined || !parameter.is_followed) {
       continue;
     }
     ++count;
@@ -188,9 +200,12 @@ json nis_number(const ReportInput& input) {
       ++count;
     }
   }
-  return count == 0 ? json(nullptr)
-                    : figure_of_merit("Mean NIS of the fixes", number(sum / count, 2), "",
-                                      "4 is expected: below, the noise is overstated; above, the model is incomplete");
+  return count == 0
+             ? json(nullptr)
+             : figure_of_merit("Mean NIS of the fixes", number(sum / count, 2), "",
+                               fmt::format("{:.3g} is expected: below, the noise is overstated; above, the model "
+                                           "is incomplete",
+                                           input.run.calibration.statistics.at("nis_degrees_of_freedom")));
 }
 
 json undetermined_of(const std::vector<Parameter>& parameters) {

@@ -67,6 +67,16 @@ TEST(Report, EscapesFindingsAndNotes) {
   EXPECT_THAT(html, HasSubstr("&lt;n&gt;"));
 }
 
+TEST(Report, ExpectsTheNisOfAsManyGyrosAsThereAre) {
+  test::SyntheticRun run = short_run();
+  run.run.calibration.statistics["nis_degrees_of_freedom"] = 6;
+  EXPECT_THAT(render(run.judged()), HasSubstr("6 is expected"));
+}
+
+TEST(Report, SaysOfWhichMinutesItsErrorsAre) {
+  EXPECT_THAT(render(nine_hours().judged()), HasSubstr("rms in minutes 450–540 against"));
+}
+
 TEST(Report, SaysFirstWhetherTheResultCanBeTrusted) {
   test::SyntheticRun run = short_run();
   EXPECT_THAT(render(run.judged()), HasSubstr("<p class=\"word\">Trustworthy</p>"));

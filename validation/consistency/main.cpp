@@ -7,6 +7,7 @@
 #include <atomic>
 #include <exception>
 #include <filesystem>
+#include <future>
 #include <mutex>
 #include <regex>
 #include <string>
@@ -92,9 +93,12 @@ void fly_all(const std::vector<Task>& tasks, unsigned threads, Results& results)
       fmt::print(stderr, "\r{} of {} flights", ++done, tasks.size());
     }
   };
-  std::vector<std::jthread> workers;
+  std::vector<std::future<void>> workers;
   for (unsigned i = 0; i < threads; ++i) {
-    workers.emplace_back(work);
+    workers.push_back(std::async(std::launch::async, work));
+  }
+  for (std::future<void>& worker : workers) {
+    worker.get();  // throws what the work threw
   }
 }
 

@@ -16,6 +16,7 @@ namespace trihedron::ground {
 
 struct Convergence {
   bool determined = false;  ///< otherwise there is nothing to settle to
+  bool followed = true;     ///< otherwise the on-board cycle, whose course this is, does not estimate it
   /// Since the pass epoch: after it the error stays within 3 final sigmas or 10 % of its first value, whichever is
   /// larger. Absent where it is outside at the end.
   std::optional<Duration> settled;
@@ -24,8 +25,8 @@ struct Convergence {
 /// One per row of Calibration::states; error against `truth`, or else against the final value.
 [[nodiscard]] std::vector<Convergence> convergence(const CalibrationRun& run, const Truth* truth);
 
-/// Of the determined alignments, or else drift coefficients: when the last one settled. Absent where one has not, or
-/// none is determined.
+/// Of the determined and followed alignments, or else drift coefficients: when the last one settled. Absent where one
+/// has not, or there is none.
 [[nodiscard]] std::optional<Duration> settled(const CalibrationRun& run, const std::vector<Convergence>& parameters,
                                               bool alignments);
 
