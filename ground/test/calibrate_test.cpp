@@ -7,6 +7,7 @@
 #include <filesystem>
 #include <iterator>
 #include <numbers>
+#include <ostream>
 #include <string>
 #include <vector>
 
@@ -360,6 +361,9 @@ TEST_P(SamplePass, IsCalibratedToAnArcsecondOrSo) {
 struct SampleWithModel {
   const char* pass;
   const char* drift_model;
+  friend std::ostream& operator<<(std::ostream& out, const SampleWithModel& sample) {
+    return out << sample.pass << " by " << sample.drift_model;
+  }
 };
 class EachSamplePass : public testing::TestWithParam<SampleWithModel> {};
 
