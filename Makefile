@@ -71,8 +71,7 @@ consistency: build
 format: $(LINT_TOOLS)/installed
 	@$(LINT_TOOLS)/bin/clang-format -i $(SOURCES)
 
-# Of one version everywhere. That clang-tidy of Debian 12 runs each check over all that the headers of others contain, and takes
-# four times as long.
+# Of one version everywhere. That clang-tidy of Debian 12 runs each check over all that the headers of others contain.
 $(LINT_TOOLS)/installed: cmake/lint-requirements.txt | setup
 	python3 -m venv $(LINT_TOOLS)
 	$(LINT_TOOLS)/bin/pip install --quiet --disable-pip-version-check --requirement $<

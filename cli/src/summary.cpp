@@ -187,7 +187,7 @@ std::string calibration_text(const ground::CalibrationRun& run, const std::optio
   fmt::format_to(out, "; mean NIS {:.3f} ({:.0f} expected)\n", statistic("nis_mean"),
                  statistic("nis_degrees_of_freedom"));
   fmt::format_to(out, "Noise       random walk of each momentum {:.1e} rad/√s, {}",
-                 run.options.direction_random_walk_rad_sqrt_s, run.options.find_noise ? "the most likely" : "as told");
+                 run.options.direction_random_walk_rad_sqrt_s, run.options.find_noise ? "the most likely" : "as given");
   const FurtherStateOptions& states = run.options.further_states;
   if (states.wandering_drift == FurtherStateOptions::Choice::kOn) {
     fmt::format_to(out, "; drift that wanders by {:.1e} rad/s over {:.0f} min", states.wandering_drift_rad_s,

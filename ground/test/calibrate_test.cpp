@@ -5,15 +5,11 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
-#include <iterator>
 #include <numbers>
-#include <ostream>
-#include <string>
 #include <vector>
 
 #include "passes.hpp"
 #include "trihedron/core/frames.hpp"
-#include "trihedron/ground/agreement.hpp"
 #include "trihedron/ground/evaluate.hpp"
 #include "trihedron/io/pass.hpp"
 #include "trihedron/sim/simulate.hpp"
@@ -356,50 +352,6 @@ TEST_P(SamplePass, IsCalibratedToAnArcsecondOrSo) {
     EXPECT_LT(std::sqrt(error2 / size2), 0.03);
   }
   EXPECT_NEAR(run.calibration.statistics.at("nis_mean"), 4, 0.2);
-}
-
-struct SampleWithModel {
-  const char* pass;
-  const char* drift_model;
-  friend std::ostream& operator<<(std::ostream& out, const SampleWithModel& sample) {
-    return out << sample.pass << " by " << sample.drift_model;
-  }
-};
-class EachSamplePass : public testing::TestWithParam<SampleWithModel> {};
-
-INSTANTIATE_TEST_SUITE_P(WithTheModelItAsksFor, EachSamplePass,
-                         testing::Values(SampleWithModel{"pass-a", "esg7"}, SampleWithModel{"pass-b", "esg7"},
-                                         SampleWithModel{"pass-c", "esg20"}, SampleWithModel{"pass-d", "esg7"}),
-                         [](const auto& name) { return std::string(1, name.param.pass[5]); });
-
-/// Apart by no more than the filter says to know less, and a third of a sigma of the batch, by which its errors are 5 %
-/// larger: each linearises at values of its own, and has a noise of second order or not.
-TEST_P(EachSamplePass, FilterAndBatchAgree) {
-  const std::filesystem::path path = std::filesystem::path(TRIHEDRON_SAMPLE_PASSES) / GetParam().pass;
-  if (!std::filesystem::exists(path)) {
-    GTEST_SKIP() << "no sample passes here";
-  }
-  const Pass pass = io::read_pass(path).pass;
-  CalibrationOptions options;
-  options.drift_model = GetParam().drift_model;
-  const Calibration by_filter = calibrate(pass, options).calibration;
-  options.estimator = "batch";
-  const Calibration by_batch = calibrate(pass, options).calibration;
-  EXPECT_EQ(by_filter.states, by_batch.states);
-
-  std::vector<std::string> states = common_states(by_batch, by_filter, false);
-  std::ranges::copy(common_states(by_batch, by_filter, true), std::back_inserter(states));
-  const Eigen::VectorXd apart = difference(by_batch, by_filter, states);
-  double apart_square = 0;
-  double known_less = 0;
-  for (Eigen::Index i = 0; i < apart.size(); ++i) {
-    const std::string& state = states[static_cast<std::size_t>(i)];
-    const double variance = std::pow(sigma_of(by_batch, state), 2);
-    apart_square += std::pow(apart(i), 2) / variance;
-    known_less += std::pow(sigma_of(by_filter, state), 2) / variance - 1;
-  }
-  const auto size = static_cast<double>(apart.size());
-  EXPECT_LT(apart_square / size, 1.0 / 9 + std::max(known_less / size, 0.0));
 }
 
 TEST(Calibrate, DecidesByItselfForClockOffsetAndErrorAtOrbitalPeriod) {

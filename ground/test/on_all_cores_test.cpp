@@ -27,5 +27,16 @@ TEST(OnAllCores, ThrowsWhatTheWorkThrows) {
   EXPECT_THROW((void)on_all_cores(10, work), std::invalid_argument);
 }
 
+TEST(OnAllCores, BeginsNoMoreAfterAFailure) {
+  int begun = 0;
+  const auto work = [&](std::size_t i) {
+    ++begun;
+    throw std::invalid_argument("at once");
+    return i;
+  };
+  EXPECT_THROW((void)on_all_cores(10, work, 1), std::invalid_argument);
+  EXPECT_EQ(begun, 1);
+}
+
 }  // namespace
 }  // namespace trihedron::ground

@@ -264,7 +264,7 @@ json settings_of(const ReportInput& input) {
   };
   put("Estimator", input.run.calibration.estimator);
   put("Drift model", options.drift_model);
-  put("Noise", options.find_noise ? "found from the pass" : "as told");
+  put("Noise", options.find_noise ? "found from the pass" : "given, by settings or an earlier calibration");
   put("Process noise of each momentum",
       fmt::format("{}″ per √h", significant(options.direction_random_walk_rad_sqrt_s * 60 / kArcsecond_rad, 2)));
   if (options.further_states.wandering_drift == FurtherStateOptions::Choice::kOn) {

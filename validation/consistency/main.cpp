@@ -4,10 +4,8 @@
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
-#include <atomic>
 #include <exception>
 #include <filesystem>
-#include <future>
 #include <mutex>
 #include <regex>
 #include <string>
@@ -18,6 +16,7 @@
 #include "consistency/flight.hpp"
 #include "consistency/grid.hpp"
 #include "consistency/results.hpp"
+#include "trihedron/ground/on_all_cores.hpp"
 
 namespace {
 
@@ -79,27 +78,19 @@ std::vector<Task> missing(const Results& results, const std::vector<Cell>& cells
 
 /// Makes the flights on all threads; which of them makes which does not matter.
 void fly_all(const std::vector<Task>& tasks, unsigned threads, Results& results) {
-  std::atomic<std::size_t> next = 0;
   std::size_t done = 0;
   std::mutex one_at_a_time;
-  const auto work = [&] {
-    for (std::size_t i = next++; i < tasks.size(); i = next++) {
-      const Task& task = tasks[i];
-      const std::vector<Outcome> outcomes = fly(task.cell, task.run, task.estimators);
-      const std::scoped_lock lock(one_at_a_time);
-      for (std::size_t k = 0; k < outcomes.size(); ++k) {
-        results.add({task.cell.name(), task.run, task.estimators[k]}, outcomes[k]);
-      }
-      fmt::print(stderr, "\r{} of {} flights", ++done, tasks.size());
+  const auto work = [&](std::size_t i) {
+    const Task& task = tasks[i];
+    const std::vector<Outcome> outcomes = fly(task.cell, task.run, task.estimators);
+    const std::scoped_lock lock(one_at_a_time);
+    for (std::size_t k = 0; k < outcomes.size(); ++k) {
+      results.add({task.cell.name(), task.run, task.estimators[k]}, outcomes[k]);
     }
+    fmt::print(stderr, "\r{} of {} flights", ++done, tasks.size());
+    return i;
   };
-  std::vector<std::future<void>> workers;
-  for (unsigned i = 0; i < threads; ++i) {
-    workers.push_back(std::async(std::launch::async, work));
-  }
-  for (std::future<void>& worker : workers) {
-    worker.get();  // throws what the work threw
-  }
+  (void)ground::on_all_cores(tasks.size(), work, threads);
 }
 
 std::string measured(const Options& options) {
