@@ -1,7 +1,5 @@
 #include "invariant_estimator_impl.hpp"
-#include "trihedron/core/cycle.hpp"
 
 namespace trihedron {
-template class InvariantEstimator<Esg7, 2>;
-template class Cycle<InvariantEstimator<Esg7, 2>>;
+template class InvariantEstimator<kPairCapacity>;
 }  // namespace trihedron

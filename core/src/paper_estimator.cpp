@@ -1,32 +1,61 @@
 #include "trihedron/core/paper_estimator.hpp"
 
+#include <Eigen/LU>
 #include <cmath>
 
-#include "trihedron/core/cycle.hpp"
-#include "trihedron/core/innovation.hpp"
+#include "trihedron/core/cholesky.hpp"
 
 namespace trihedron {
 
-template <class Model>
-Result<PaperEstimator<Model>, SetupFault> PaperEstimator<Model>::create(const Setup& setup) {
+std::optional<SetupFault> PaperEstimator::set_up(const CalibrationSetup& setup, const Gyros& prior,
+                                                 const Eigen::Ref<const Eigen::MatrixXd>& covariance) {
+  if (!(setup.layout == Layout{})) {
+    return SetupFault::kTooLarge;
+  }
   if (const auto fault = setup.fault()) {
-    return *fault;
+    return fault;
   }
-  const auto root = information_root<Layout::kParameters>(setup.prior_covariance);
-  if (!root) {
-    return root.fault();
+  if (!means_are_usable(prior, setup.layout)) {
+    return SetupFault::kPriorMeanNotUsable;
   }
-  PaperEstimator estimator;
-  estimator.setup_ = setup;
-  estimator.gyros_ = setup.prior;
-  estimator.gate_ = OutlierGate(setup);
-  estimator.prior_.add_prior_of_constants(root.value());
-  estimator.information_ = estimator.prior_;
-  return estimator;
+  constexpr int kFirst = States::kDynamic;
+  constexpr int kParameters = States::kSize - kFirst;
+  Information information;
+  information.reset(States::kSize, kFirst);
+  const RowsView R = information.root();
+  if (!information_root(covariance, {&R(kFirst, kFirst), kParameters, kParameters, R.stride})) {
+    return SetupFault::kPriorNotPositiveDefinite;
+  }
+  setup_ = setup;
+  drift_ = DriftModel(setup.layout.drift_model, setup.layout.further);
+  prior_gyros_ = gyros_ = prior;
+  gate_ = OutlierGate(setup);
+  information_ = prior_ = information;
+  since_fix_ = {};
+  time_since_fix_s_ = 0;
+  extra_variance_rad2_ = 0;
+  started_ = false;
+  return std::nullopt;
 }
 
-template <class Model>
-auto PaperEstimator<Model>::quasi_inertial(const Trihedron<In>& t) -> QuasiInertial {
+Result<AttitudeByDirections, DirectionsFault> PaperEstimator::attitude(const Gyros& gyros, const Directions& h_b,
+                                                                       const GyroMask& used) const {
+  if (count(used) < kGyros) {
+    return DirectionsFault::kTooFew;
+  }
+  return trihedron_attitude(momenta(gyros, kGyros), in_c(gyros, kGyros, h_b));
+}
+
+Result<Rot<In, C>, DirectionsFault> PaperEstimator::rotation(const Gyros& gyros, const Directions& h_b,
+                                                             const GyroMask& used) const {
+  const auto by_directions = attitude(gyros, h_b, used);
+  if (!by_directions) {
+    return by_directions.fault();
+  }
+  return by_directions.value().C_in_c;
+}
+
+auto PaperEstimator::quasi_inertial(const Trihedron<In>& t) -> QuasiInertial {
   QuasiInertial qi;
   qi.components[0] << t.q1().transpose(), t.q3().transpose();
   qi.tangents[0] << t.q1(), t.q3();
@@ -37,30 +66,29 @@ auto PaperEstimator<Model>::quasi_inertial(const Trihedron<In>& t) -> QuasiInert
   return qi;
 }
 
-template <class Model>
-void PaperEstimator<Model>::predict(const Eigen::Matrix3d& C_in_c, const Directions& h_b, double dt_s) {
+void PaperEstimator::predict(const Eigen::Matrix3d& C_in_c, const Directions& h_b, Time /*t*/, double dt_s) {
   for (int k = 0; k < kGyros; ++k) {
-    precess(gyros_[k], since_fix_[k], C_in_c, h_b[k], dt_s);
+    precess(gyros_[k], since_fix_[k], drift_, C_in_c, h_b[k], 0, dt_s);
   }
   time_since_fix_s_ += dt_s;
   gate_.elapse(dt_s);
 }
 
-template <class Model>
-void PaperEstimator<Model>::update_covariance_to_now(const QuasiInertial& now) {
+void PaperEstimator::update_covariance_to_now(const QuasiInertial& now) {
   // Δh = φ × h carries the sensitivities, which are in φ, to the paper's components.
-  typename Information::DynamicMatrix by_start = Information::DynamicMatrix::Zero();
-  typename Information::DynamicByConstants by_parameters = Information::DynamicByConstants::Zero();
+  Eigen::Matrix4d by_start = Eigen::Matrix4d::Zero();
+  Information::DynamicByConstants by_parameters =
+      Information::DynamicByConstants::Zero(States::kDynamic, States::kSize - States::kDynamic);
   for (int k = 0; k < kGyros; ++k) {
     const Eigen::Matrix3d cross_h = skew<double>(gyros_[k].h_in);
     const Eigen::Matrix<double, 2, 3> components_of_phi = -now.components[k] * cross_h;
     const Eigen::Vector3d h_before = since_fix_[k].by_start.transpose() * gyros_[k].h_in;
-    const int row = Layout::direction(k);
-    by_start.template block<2, 2>(row, row) =
+    const int row = States::direction(k);
+    by_start.block<2, 2>(row, row) =
         components_of_phi * since_fix_[k].by_start * skew<double>(h_before) * qi_.tangents[k];
-    by_parameters.template block<2, Model::kSize>(row, Layout::drift(k) - Layout::kDynamic) =
-        components_of_phi * since_fix_[k].by_drift;
-    by_parameters.template block<2, 3>(row, Layout::alignment(k) - Layout::kDynamic) =
+    by_parameters.block<2, Esg7::kSize>(row, States::drift(k) - States::kDynamic) =
+        components_of_phi.lazyProduct(since_fix_[k].by_drift.first(Esg7::kSize));
+    by_parameters.block<2, 3>(row, States::alignment(k) - States::kDynamic) =
         components_of_phi * since_fix_[k].by_alignment;
   }
   const double walk = setup_.direction_random_walk_rad_sqrt_s;
@@ -74,33 +102,34 @@ void PaperEstimator<Model>::update_covariance_to_now(const QuasiInertial& now) {
   extra_variance_rad2_ = 0;
 }
 
-template <class Model>
-auto PaperEstimator<Model>::measure(const Gyros& gyros, const QuasiInertial& qi, const Eigen::Matrix3d& C_in_c,
-                                    const Directions& h_b, const Setup& setup) -> Measurement {
+auto PaperEstimator::measure(const Gyros& gyros, const QuasiInertial& qi, const Eigen::Matrix3d& C_in_c,
+                             const Directions& h_b, const CalibrationSetup& setup) -> Measurement {
   // y = Δh − (C_in_c δ) × h + noise
   Measurement measurement;
   Eigen::Matrix<double, kMeasurements, 3 + 3 * kGyros> noise =
       Eigen::Matrix<double, kMeasurements, 3 + 3 * kGyros>::Zero();
   for (int k = 0; k < kGyros; ++k) {
-    const int row = Layout::direction(k);
+    const int row = States::direction(k);
     const Eigen::Vector3d reference_in = C_in_c * (gyros[k].C_c_b * h_b[k]);
     const Eigen::Matrix<double, 2, 3> cross_h = qi.components[k] * skew<double>(reference_in);
-    measurement.innovation.template segment<2>(row) = qi.components[k] * (reference_in - gyros[k].h_in);
-    measurement.H.template block<2, 2>(row, row).setIdentity();
-    measurement.H.template block<2, 3>(row, Layout::alignment(k)) = cross_h * C_in_c;
-    noise.template block<2, 3>(row, 0) = cross_h * C_in_c * setup.star_tracker_noise_rad.asDiagonal();
-    noise.template block<2, 3>(row, 3 + 3 * k) = setup.readout_noise_rad[k] * cross_h;
+    measurement.innovation.segment<2>(row) = qi.components[k] * (reference_in - gyros[k].h_in);
+    measurement.H.block<2, 2>(row, row).setIdentity();
+    measurement.H.block<2, 3>(row, States::alignment(k)) = cross_h * C_in_c;
+    noise.block<2, 3>(row, 0) = cross_h * C_in_c * setup.star_trackers[0].noise_rad.asDiagonal();
+    noise.block<2, 3>(row, 3 + 3 * k) = setup.readout_noise_rad[k] * cross_h;
   }
   measurement.R = noise * noise.transpose();
   return measurement;
 }
 
-template <class Model>
-auto PaperEstimator<Model>::correct(const Eigen::Matrix3d& C_in_c, const Directions& h_b) -> Report {
-  Report report;
+FixReport PaperEstimator::correct(const StarFix& fix, const FixReadings& readings) {
+  FixReport report;
+  report.t = fix.t;
+  report.head = fix.head;
+  const Eigen::Matrix3d C_in_c = fix.q_in_c.normalized().toRotationMatrix();
   if (!started_) {
     for (int k = 0; k < kGyros; ++k) {
-      gyros_[k].h_in = C_in_c * (gyros_[k].C_c_b * h_b[k]);
+      gyros_[k].h_in = C_in_c * (gyros_[k].C_c_b * readings.h_b[k]);
     }
   }
   const auto trihedron = make_trihedron(Vec<In>::assume(gyros_[0].h_in), Vec<In>::assume(gyros_[1].h_in));
@@ -114,17 +143,29 @@ auto PaperEstimator<Model>::correct(const Eigen::Matrix3d& C_in_c, const Directi
   } else {
     qi_ = now;
   }
-  const Measurement measurement = measure(gyros_, now, C_in_c, h_b, setup_);
-  const auto white = whitened<Information, kMeasurements>(measurement.H, measurement.innovation, measurement.R);
+  const Measurement measurement = measure(gyros_, now, C_in_c, readings.h_b, setup_);
+  ComparedRows<kMaxStates> rows(kMeasurements, kMaxStates + 1);
+  rows << measurement.H, measurement.innovation;
+  ComponentCovariance L = measurement.R;
+  whiten(L, rows_of(rows));
 
   if (!started_) {
-    information_.add_information(white.H);
+    information_.add_information({rows.data(), kMeasurements, kMaxStates, kMaxStates + 1});
     started_ = true;
     report.status = FixStatus::kStarted;
     return report;
   }
 
-  report_innovation(information_, white, report);
+  ComparedRows<kMaxStates> through = rows;
+  information_.see_through_uncertainty({through.data(), kMeasurements, kMaxStates, kMaxStates + 1});
+  const Eigen::Matrix<double, kMeasurements, kMaxStates> H = through.leftCols<kMaxStates>();
+  const Eigen::Matrix4d covariance = Eigen::Matrix4d::Identity() + H.lazyProduct(H.transpose());
+  Eigen::Vector4d normalized = rows.col(kMaxStates);
+  solve_lower(cholesky_root<kMeasurements>(covariance), normalized);
+  report.nis = normalized.squaredNorm();
+  report.innovation = measurement.innovation;
+  const Eigen::Matrix4d root = L;
+  report.innovation_covariance = root * covariance * root.transpose();
   report.status = gate_.judge(report.nis, measurement.innovation.norm());
   report.rejections_in_a_row = gate_.rejections_in_a_row();
   report.jumped = gate_.jumped();
@@ -149,51 +190,55 @@ auto PaperEstimator<Model>::correct(const Eigen::Matrix3d& C_in_c, const Directi
     default:
       break;
   }
-  const double root_weight = std::sqrt(report.weight);
-  feed_back(information_.template update<kMeasurements>(root_weight * white.H, root_weight * white.y));
+  rows *= std::sqrt(report.weight);
+  feed_back(information_.update(rows_of(rows)));
   return report;
 }
 
-template <class Model>
-void PaperEstimator<Model>::feed_back(const typename Information::Vector& correction) {
+void PaperEstimator::feed_back(const Information::Vector& correction) {
   for (int k = 0; k < kGyros; ++k) {
-    GyroModel<Model>& gyro = gyros_[k];
-    const Eigen::Vector3d direction_error = qi_.tangents[k] * correction.template segment<2>(Layout::direction(k));
-    const Eigen::Vector3d alignment_error = correction.template segment<3>(Layout::alignment(k));
+    Gyro& gyro = gyros_[k];
+    const Eigen::Vector3d direction_error = qi_.tangents[k] * correction.segment<2>(States::direction(k));
+    const Eigen::Vector3d alignment_error = correction.segment<3>(States::alignment(k));
     gyro.h_in = rotated<double>(gyro.h_in, gyro.h_in.cross(direction_error)).normalized();
-    gyro.drift_rad_s += correction.template segment<Model::kSize>(Layout::drift(k));
-    // Through the quaternion, so that rounding cannot pile up in the matrix over months of fixes.
-    gyro.C_c_b = Eigen::Quaterniond(Rot<C, C>::exp(Vec<C>::assume(alignment_error)).raw() * gyro.C_c_b)
-                     .normalized()
-                     .toRotationMatrix();
+    gyro.drift_rad_s += correction.segment<Esg7::kSize>(States::drift(k));
+    gyro.C_c_b = turned(gyro.C_c_b, alignment_error);
   }
 }
 
-template <class Model>
-auto PaperEstimator<Model>::error_root() const -> ErrorRoot {
-  const typename Information::Matrix root = information_.inverse_root();
-  ErrorRoot errors;
+void PaperEstimator::error_root(RowsView root) const {
+  Eigen::Matrix<double, kMaxStates, kMaxStates, Eigen::RowMajor> inverse;
+  information_.inverse_root(rows_of(inverse));
+  const Layout errors = error_layout();
+  Eigen::Matrix<double, kMaxErrors, kMaxStates, Eigen::RowMajor> rows;
   for (int k = 0; k < kGyros; ++k) {
-    errors.template middleRows<3>(Errors::direction(k)) =
-        skew<double>(gyros_[k].h_in) * qi_.tangents[k] * root.template middleRows<2>(Layout::direction(k));
+    rows.middleRows<3>(errors.direction(k)) =
+        skew<double>(gyros_[k].h_in) * qi_.tangents[k] * inverse.middleRows<2>(States::direction(k));
   }
-  errors.template bottomRows<Layout::kParameters>() = root.template bottomRows<Layout::kParameters>();
-  return errors;
+  rows.bottomRows(errors.parameters()) = inverse.bottomRows(errors.parameters());
+  for (int i = 0; i < root.rows; ++i) {
+    for (int j = 0; j < kMaxStates; ++j) {
+      root(i, j) = rows(i, j);
+    }
+  }
 }
 
-template <class Model>
-auto PaperEstimator<Model>::through_uncertainty(const Eigen::Matrix<double, 3, Errors::kSize>& by_errors) const
-    -> Eigen::Matrix<double, 3, Layout::kStates> {
-  Eigen::Matrix<double, 3, Layout::kStates> by_states;
+void PaperEstimator::prior_error_root(RowsView root) const {
+  constexpr int kFirst = States::kDynamic;
+  const ConstRowsView R = prior_.root();
+  invert_triangle({&R(kFirst, kFirst), kMaxStates - kFirst, kMaxStates - kFirst, R.stride}, root);
+}
+
+Eigen::Matrix3d PaperEstimator::covariance_of_errors(const Rows3& by_errors) const {
+  const Layout errors = error_layout();
+  StateRows3<kMaxStates> rows(3, kMaxStates);
   for (int k = 0; k < kGyros; ++k) {
-    by_states.template middleCols<2>(Layout::direction(k)) =
-        by_errors.template middleCols<3>(Errors::direction(k)) * skew<double>(gyros_[k].h_in) * qi_.tangents[k];
+    rows.middleCols<2>(States::direction(k)) =
+        by_errors.middleCols<3>(errors.direction(k)) * skew<double>(gyros_[k].h_in) * qi_.tangents[k];
   }
-  by_states.template rightCols<Layout::kParameters>() = by_errors.template rightCols<Layout::kParameters>();
-  return information_.template through_uncertainty<3>(by_states);
+  rows.rightCols(errors.parameters()) = by_errors.rightCols(errors.parameters());
+  information_.see_through_uncertainty(rows_of(rows));
+  return gram<kMaxStates>(rows);
 }
-
-template class PaperEstimator<Esg7>;
-template class Cycle<PaperEstimator<Esg7>>;
 
 }  // namespace trihedron

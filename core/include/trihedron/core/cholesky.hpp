@@ -4,6 +4,8 @@
 
 #include <Eigen/Core>
 
+#include "trihedron/core/rows_view.hpp"
+
 namespace trihedron {
 
 /// In place: a = L Lᵀ becomes L, zero above the diagonal. False, and `a` of no use, unless it is positive definite.
@@ -14,6 +16,14 @@ void solve_lower(const Eigen::Ref<const Eigen::MatrixXd>& L, Eigen::Ref<Eigen::M
 
 /// In place: b becomes (L Lᵀ)⁻¹ b.
 void solve_factorized(const Eigen::Ref<const Eigen::MatrixXd>& L, Eigen::Ref<Eigen::MatrixXd> b);
+
+/// In place: rows b become L⁻¹ b.
+void solve_lower(const Eigen::Ref<const Eigen::MatrixXd>& L, RowsView b);
+
+/// The upper triangular root of the information in `covariance`, of which the lower triangle is looked at: rootᵀ root =
+/// covariance⁻¹. `root` is square and of the same size; below the diagonal it is left as it is. False, and `root` of no
+/// use, unless the covariance is positive definite and finite.
+[[nodiscard]] bool information_root(const Eigen::Ref<const Eigen::MatrixXd>& covariance, RowsView root);
 
 /// L of a = L Lᵀ; of no use unless `a` is positive definite.
 template <int M>

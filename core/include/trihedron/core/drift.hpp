@@ -3,19 +3,23 @@
 
 #include <Eigen/Core>
 #include <array>
+#include <cstddef>
+#include <cstdint>
 
+#include "trihedron/core/columns.hpp"
+#include "trihedron/core/drift_model.hpp"
 #include "trihedron/core/frames.hpp"
+#include "trihedron/core/harmonics.hpp"
+#include "trihedron/core/layout.hpp"
 
 namespace trihedron {
 
 /// Eq. (1): seven members of the drift family, ω_b(h) = B(h) κ.
 /// κ = (k0, μ12, μ23, μ31, ν12, ν23, ν31), rad/s. Only the part of ω across h moves the momentum.
-/// A drift model is a type with this interface: a linear family with its Jacobians.
 struct Esg7 {
   static constexpr int kSize = 7;
   enum Index : int { kK0, kMu12, kMu23, kMu31, kNu12, kNu23, kNu31 };
   static constexpr std::array<const char*, kSize> kNames = {"k0", "mu12", "mu23", "mu31", "nu12", "nu23", "nu31"};
-  static constexpr const char* kModelName = "esg7";
 
   template <class S>
   using Coefficients = Eigen::Matrix<S, kSize, 1>;
@@ -79,64 +83,47 @@ struct Esg7 {
   }
 };
 
-/// Eq. (1) and thirteen more members of −∇W + h × ∇D (mathematics, Helmholtz–Hodge): what it lacks of degree 1 and 2,
-/// and D of Σh⁴/4, of which it has W alone (k0), while it has both of its other shapes of higher degree. Named by
-/// degree and order of the real spherical harmonic, unit mean square over 4π. Degree 1 of W stands still in the case.
-struct Esg20 {
-  static constexpr int kQuadratic = 6;  ///< members of degree 1 and 2, of W and of D each
-  static constexpr int kMembers = 2 * kQuadratic + 1;
-  static constexpr int kSize = Esg7::kSize + kMembers;
-  static constexpr std::array<const char*, kSize> kNames = {
-      "k0",      "mu12",    "mu23",   "mu31",    "nu12",   "nu23",   "nu31",    "W(1,-1)", "W(1,0)", "W(1,1)",
-      "W(2,-2)", "W(2,-1)", "W(2,1)", "D(1,-1)", "D(1,0)", "D(1,1)", "D(2,-2)", "D(2,-1)", "D(2,1)", "D(k0)"};
-  static constexpr const char* kModelName = "esg20";
+/// Which potential of ω = −∇W + h × ∇D a member belongs to, or that it is one of eq. (1).
+enum class DriftPotential : std::uint8_t { kEq1, kW, kD, kCubicD };
 
-  template <class S>
-  using Coefficients = Eigen::Matrix<S, kSize, 1>;
-  template <class S>
-  using Basis = Eigen::Matrix<S, 3, kSize>;
+/// One member of the drift family: the coefficient of eq. (1) of that number; the real spherical harmonic of that
+/// degree and order in W or D, orthonormal over the sphere; or Σh⁴/4 in D, of which eq. (1) has W alone (k0).
+struct DriftMember {
+  DriftPotential potential = DriftPotential::kEq1;
+  std::int8_t degree = 0;
+  std::int8_t order = 0;   ///< −degree … degree
+  std::int8_t number = 0;  ///< of eq. (1): as in Esg7::Index
+};
 
-  /// B(h) as of Esg7. What points along h is left in, since it moves nothing.
-  template <class S>
-  [[nodiscard]] static Basis<S> basis(const Vector3<S>& h) {
-    const Eigen::Matrix<S, 3, kQuadratic> slopes = gradients<S>(h);
-    const Matrix3<S> cross = skew<S>(h);
-    Basis<S> b;
-    b << Esg7::basis<S>(h), -slopes, cross * slopes, cross * cube<S>(h);
-    return b;
-  }
+/// Drift of one gyro as a table of columns: ω_b = B(h) κ, κ the coefficients of the members of the model; then, where
+/// the layout has them, the drift that wanders, about the case axes, and the change of the coefficients of eq. (1).
+class DriftModel {
+ public:
+  static constexpr int kMaxMembers = vsh(DriftModelId::kMaxDegree).size();
 
-  /// ω_b(h) = B(h) κ, rad/s, case axes.
-  template <class S>
-  [[nodiscard]] static Vector3<S> rate(const Vector3<S>& h, const Coefficients<S>& kappa) {
-    const Eigen::Matrix<S, 3, kQuadratic> slopes = gradients<S>(h);
-    return Esg7::rate<S>(h, kappa.template head<Esg7::kSize>()) -
-           slopes * kappa.template segment<kQuadratic>(Esg7::kSize) +
-           h.cross(slopes * kappa.template segment<kQuadratic>(Esg7::kSize + kQuadratic) +
-                   cube<S>(h) * kappa(kSize - 1));
-  }
+  DriftModel() : DriftModel(kEsg7, {}) {}
+  DriftModel(DriftModelId id, const FurtherStates& further);
+
+  /// Members of the model, columns of all.
+  [[nodiscard]] int size() const { return size_; }
+  [[nodiscard]] int columns() const { return size_ + (wandering_ ? 3 : 0) + (change_ ? Esg7::kSize : 0); }
+  [[nodiscard]] const DriftMember& member(int i) const { return members_[static_cast<std::size_t>(i)]; }
+
+  /// The columns at a direction h in case axes, unit. `part_of_change`: how much of the change there has been. What
+  /// points along h moves nothing and is left in.
+  void basis(const Eigen::Vector3d& h, double part_of_change, ColumnsView B) const;
+
+  /// ω_b(h), rad/s, case axes, by a gyro's coefficients of all columns.
+  [[nodiscard]] Eigen::Vector3d rate(const Eigen::Vector3d& h, double part_of_change, const double* coefficients) const;
 
  private:
-  /// ∇Σh⁴/4
-  template <class S>
-  [[nodiscard]] static Vector3<S> cube(const Vector3<S>& h) {
-    return h.cwiseProduct(h).cwiseProduct(h);
-  }
+  void add(DriftPotential potential, int degree, int order);
 
-  /// Of the harmonics (1, −1), (1, 0), (1, 1), (2, −2), (2, −1), (2, 1).
-  template <class S>
-  [[nodiscard]] static Eigen::Matrix<S, 3, kQuadratic> gradients(const Vector3<S>& h) {
-    const S one(0.48860251190291992);  // √(3/4π)
-    const S two(1.0925484305920792);   // √(15/4π)
-    const S zero(0);
-    Eigen::Matrix<S, 3, kQuadratic> g;
-    // clang-format off
-    g << zero, zero, one,  two * h(1), zero,       two * h(2),
-         one,  zero, zero, two * h(0), two * h(2), zero,
-         zero, one,  zero, zero,       two * h(1), two * h(0);
-    // clang-format on
-    return g;
-  }
+  std::array<DriftMember, kMaxMembers> members_{};
+  HarmonicTableOf<DriftModelId::kMaxDegree> harmonics_;
+  int size_ = Esg7::kSize;
+  bool wandering_ = false;
+  bool change_ = false;
 };
 
 }  // namespace trihedron

@@ -8,19 +8,17 @@
 namespace trihedron {
 
 /// What a fix is compared with: the gyros at its time, by one sample or by several.
-template <int N>
 struct FixReadings {
-  PerGyro<Eigen::Vector3d, N> h_b;    ///< unit, each in its case axes
-  double noise_factor = 1;            ///< 1-sigma of h_b over that of a single reading
-  GyroMask<N> used = all_gyros<N>();  ///< the others' readings mean nothing
-  Eigen::Vector3d rate_c{0, 0, 0};    ///< of the body relative to `in`, rad/s; zero where one sample does not tell
+  Directions h_b;                   ///< unit, each in its case axes
+  double noise_factor = 1;          ///< 1-sigma of h_b over that of a single reading
+  GyroMask used{};                  ///< the others' readings mean nothing
+  Eigen::Vector3d rate_c{0, 0, 0};  ///< of the body relative to `in`, rad/s; zero where one sample does not tell
 };
 
 /// A fix, and the gyros at its time.
-template <int N>
 struct ComparedFix {
   StarFix fix;
-  FixReadings<N> readings;
+  FixReadings readings;
 };
 
 }  // namespace trihedron

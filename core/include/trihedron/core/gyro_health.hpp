@@ -1,33 +1,32 @@
 #pragma once
 /// Which gyros are to be believed, and when.
 
-#include <cstdint>
+#include <Eigen/Core>
+#include <chrono>
 
 #include "trihedron/core/per_gyro.hpp"
+#include "trihedron/core/status.hpp"
 #include "trihedron/core/telemetry.hpp"
 
 namespace trihedron {
 
-enum class GyroState : std::uint8_t {
-  kUsed,
-  kStuck,     ///< its readings do not change, not even by noise; used again when they do
-  kIsolated,  ///< left out for good: time after time it alone did not agree with the rest
-};
-
 /// Readings that stand still, and verdicts at fixes that were rejected.
-template <int N>
 class GyroHealth {
  public:
-  /// A live reading has noise: two alike may be chance or coarse telemetry, 2 s of them are not.
+  /// A live reading has noise: two alike may be chance or coarse telemetry, so many of them over a second are not.
   static constexpr int kStuckSamples = 16;
+  static constexpr Duration kStuckTime = std::chrono::seconds(1);
   /// In a row, all naming the same gyro.
   static constexpr int kVerdicts = 5;
   /// Stuck times closer together than this are taken for one.
   static constexpr Duration kMemory = std::chrono::seconds(10);
 
+  GyroHealth() = default;
+  explicit GyroHealth(int gyros) : gyros_(gyros) {}
+
   /// In the order of time.
-  void look_at(const GyroSample<N>& sample) {
-    for (int k = 0; k < N; ++k) {
+  void look_at(const GyroSample& sample) {
+    for (int k = 0; k < gyros_; ++k) {
       Readings& its = readings_[k];
       const Eigen::Vector3d& h_b = sample.h_b[k];
       if (its.alike > 0 && (h_b == its.last || (!h_b.allFinite() && !its.last.allFinite()))) {
@@ -37,7 +36,8 @@ class GyroHealth {
         its.since = sample.t;
         its.last = h_b;
       }
-      if (its.alike >= kStuckSamples) {
+      its.stuck = its.alike >= kStuckSamples && sample.t - its.since >= kStuckTime;
+      if (its.stuck) {
         if (!(its.stuck_from <= its.since && its.since - its.stuck_until <= kMemory)) {
           its.stuck_from = its.since;
         }
@@ -56,20 +56,20 @@ class GyroHealth {
   }
 
   /// Those whose readings can be used from `from` to `to`, both included.
-  [[nodiscard]] GyroMask<N> usable(Time from, Time to) const {
-    GyroMask<N> mask;
-    for (int k = 0; k < N; ++k) {
+  [[nodiscard]] GyroMask usable(Time from, Time to) const {
+    GyroMask mask;
+    for (int k = 0; k < gyros_; ++k) {
       mask[k] = !isolated_[k] && !(readings_[k].stuck_from <= to && from <= readings_[k].stuck_until);
     }
     return mask;
   }
 
-  [[nodiscard]] PerGyro<GyroState, N> states() const {
-    PerGyro<GyroState, N> states;
-    for (int k = 0; k < N; ++k) {
-      states[k] = isolated_[k]                          ? GyroState::kIsolated
-                  : readings_[k].alike >= kStuckSamples ? GyroState::kStuck
-                                                        : GyroState::kUsed;
+  [[nodiscard]] PerGyro<GyroState> states() const {
+    PerGyro<GyroState> states;
+    for (int k = 0; k < gyros_; ++k) {
+      states[k] = isolated_[k]         ? GyroState::kIsolated
+                  : readings_[k].stuck ? GyroState::kStuck
+                                       : GyroState::kUsed;
     }
     return states;
   }
@@ -87,13 +87,15 @@ class GyroHealth {
   struct Readings {
     Eigen::Vector3d last = Eigen::Vector3d::Zero();
     int alike = 0;  ///< in a row
+    bool stuck = false;
     Time since{};   ///< of the first of them
     Time stuck_from = Time::max();
     Time stuck_until = Time::min();
   };
 
-  PerGyro<Readings, N> readings_;
-  PerGyro<bool, N> isolated_{};
+  int gyros_ = 0;
+  PerGyro<Readings> readings_;
+  GyroMask isolated_{};
   int suspect_ = kNoGyro;
   int verdicts_ = 0;
 };

@@ -21,12 +21,16 @@ struct HarmonicValue {
 /// Real spherical harmonics, orthonormal over the unit sphere, without the Condon–Shortley phase:
 /// Y(l, m) = Q_lm(z) Re (x + iy)^m for m ≥ 0, Q_l|m|(z) Im (x + iy)^|m| for m < 0.
 /// As polynomials in x, y, z they and their gradients have no singularity at the poles.
-class HarmonicTable {
+/// There is room for those up to degree Max.
+template <int Max>
+class HarmonicTableOf {
  public:
-  static constexpr int kMaxDegree = 20;
+  static constexpr int kMaxDegree = Max;
+  static constexpr std::size_t kOrders = Max + 1;
+  static constexpr std::size_t kSize = kOrders * (kOrders + 1) / 2;
 
-  /// Needs 0 ≤ max_degree ≤ 20.
-  explicit HarmonicTable(int max_degree) : max_degree_(max_degree) {
+  /// Needs 0 ≤ max_degree ≤ kMaxDegree.
+  explicit HarmonicTableOf(int max_degree) : max_degree_(max_degree) {
     TRIHEDRON_ASSERT(max_degree >= 0 && max_degree <= kMaxDegree);
     diagonal_[0] = std::sqrt(0.25 / std::numbers::pi);
     for (int m = 1; m <= max_degree; ++m) {
@@ -53,7 +57,7 @@ class HarmonicTable {
   template <class S>
   class At {
    public:
-    At(const HarmonicTable& table, const Vector3<S>& h) : table_(table), h_(h) {
+    At(const HarmonicTableOf& table, const Vector3<S>& h) : table_(table), h_(h) {
       const int degree = table.max_degree_;
       re_[0] = S(1);
       im_[0] = S(0);
@@ -94,11 +98,11 @@ class HarmonicTable {
     }
 
    private:
-    const HarmonicTable& table_;
+    const HarmonicTableOf& table_;
     Vector3<S> h_;
-    std::array<S, kMaxDegree + 1> re_;  ///< Re (x + iy)^m
-    std::array<S, kMaxDegree + 1> im_;
-    std::array<S, (kMaxDegree + 1) * (kMaxDegree + 2) / 2> q_;
+    std::array<S, kOrders> re_;  ///< Re (x + iy)^m
+    std::array<S, kOrders> im_;
+    std::array<S, kSize> q_;
   };
 
   template <class S>
@@ -112,12 +116,13 @@ class HarmonicTable {
     return static_cast<std::size_t>(number);
   }
 
-  static constexpr std::size_t kSize = (kMaxDegree + 1) * (kMaxDegree + 2) / 2;
   int max_degree_;
-  std::array<double, kMaxDegree + 1> diagonal_{};  ///< Q_mm, a constant
+  std::array<double, kOrders> diagonal_{};  ///< Q_mm, a constant
   std::array<double, kSize> up_{};                 ///< Q_lm = up z Q_(l−1)m − up_two Q_(l−2)m
   std::array<double, kSize> up_two_{};
   std::array<double, kSize> slope_{};  ///< dQ_lm/dz = slope Q_l(m+1)
 };
+
+using HarmonicTable = HarmonicTableOf<20>;
 
 }  // namespace trihedron

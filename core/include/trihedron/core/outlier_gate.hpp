@@ -1,10 +1,7 @@
 #pragma once
 
-#include <algorithm>
-#include <cmath>
-#include <utility>
-
-#include "trihedron/core/calibration.hpp"
+#include "trihedron/core/setup.hpp"
+#include "trihedron/core/status.hpp"
 
 namespace trihedron {
 
@@ -13,13 +10,7 @@ inline constexpr int kPairComponents = 4;
 
 /// The gate that good measurements of `freedom` components pass as often as those of a pair pass `gate_nis` (Wilson and
 /// Hilferty 1931: the cube root of χ²/n is nearly normal, of mean 1 − 2/9n and variance 2/9n).
-[[nodiscard]] inline double gate_of_freedom(int freedom, double gate_nis) {
-  const double variance = 2.0 / (9 * freedom);
-  constexpr double kItsVariance = 2.0 / (9 * kPairComponents);
-  const double sigmas = (std::cbrt(gate_nis / kPairComponents) - (1 - kItsVariance)) / std::sqrt(kItsVariance);
-  const double root = std::max(1 - variance + sigmas * std::sqrt(variance), 0.0);
-  return freedom * root * root * root;
-}
+[[nodiscard]] double gate_of_freedom(int freedom, double gate_nis);
 
 /// Rejects fixes whose NIS is above a gate, and cannot lock out good ones: after a run of rejections the model was
 /// wrong, not the tracker, and the directions are set free; when that happens again soon, the filter begins anew. Where
@@ -33,8 +24,7 @@ class OutlierGate {
   static constexpr double kLargestRate_rad_s = 1e-5;
 
   OutlierGate() = default;
-  template <class Model, int N>
-  explicit OutlierGate(const CalibrationSetup<Model, N>& setup)
+  explicit OutlierGate(const CalibrationSetup& setup)
       : gate_nis_(setup.gate_nis),
         reopen_after_(setup.reopen_after_rejections),
         reopen_after_jump_(setup.reopen_after_jump_rejections),
@@ -45,28 +35,7 @@ class OutlierGate {
 
   /// kUsed, kRejectedByGate, kUsedAfterReopening or kRestarted: what to do with the fix. `misfit_rad`: the length of
   /// the innovation; `freedom`: its components.
-  [[nodiscard]] FixStatus judge(double nis, double misfit_rad, int freedom = kPairComponents) {
-    const double largest_rad = kLargestStep_rad + kLargestRate_rad_s * since_fix_s_;
-    const double before_rad = std::exchange(misfit_rad_, misfit_rad);
-    const bool jumped_now = !(misfit_rad - before_rad <= largest_rad);
-    since_fix_s_ = 0;
-    FixStatus status = FixStatus::kUsed;
-    if (!(nis <= gate_of_freedom(freedom, gate_nis_))) {
-      look_for_jump(jumped_now, before_rad, largest_rad);
-      if (++rejections_in_a_row_ < (jumped_ ? reopen_after_jump_ : reopen_after_)) {
-        return FixStatus::kRejectedByGate;
-      }
-      status = under_suspicion_ > 0 ? FixStatus::kRestarted : FixStatus::kUsedAfterReopening;
-      begun_anew_ = status == FixStatus::kRestarted;
-      under_suspicion_ = restart_within_ + 1;
-      misfit_rad_ = 0;
-    }
-    confirmed_ = status == FixStatus::kUsed;
-    jumped_ = false;
-    rejections_in_a_row_ = 0;
-    under_suspicion_ = std::max(under_suspicion_ - 1, 0);
-    return status;
-  }
+  [[nodiscard]] FixStatus judge(double nis, double misfit_rad, int freedom = kPairComponents);
   [[nodiscard]] int rejections_in_a_row() const { return rejections_in_a_row_; }
   /// Whether the present run of rejections is put down to the tracker.
   [[nodiscard]] bool jumped() const { return jumped_; }
@@ -76,16 +45,7 @@ class OutlierGate {
  private:
   /// A start that no fix has confirmed yet may itself be what was wrong. A jump is over, an outlier in a longer run,
   /// when the misfit has been back where it came from for as long as a run takes.
-  void look_for_jump(bool jumped_now, double before_rad, double largest_rad) {
-    if (jumped_now && confirmed_) {
-      before_jump_rad_ = jumped_ ? before_jump_rad_ : before_rad;
-      jumped_ = true;
-      back_ = 0;
-    } else if (jumped_) {
-      back_ = misfit_rad_ <= before_jump_rad_ + largest_rad ? back_ + 1 : 0;
-      jumped_ = back_ < reopen_after_;
-    }
-  }
+  void look_for_jump(bool jumped_now, double before_rad, double largest_rad);
 
   double gate_nis_ = 0;
   int reopen_after_ = 0;

@@ -1,15 +1,20 @@
 #pragma once
 
+#include <Eigen/Core>
 #include <array>
 #include <cstddef>
 
 namespace trihedron {
 
-/// One T for each of N gyros, indexed by int as Eigen's blocks are; gyro 1 has index 0.
-template <class T, int N>
+/// Gyros that a spacecraft may have.
+inline constexpr int kMaxGyros = 4;
+
+/// One T for each gyro, indexed by int as Eigen's blocks are; gyro 1 has index 0. How many of them there are is told by
+/// the Layout; N is the room for them.
+template <class T, int N = kMaxGyros>
 class PerGyro {
  public:
-  [[nodiscard]] static constexpr int size() { return N; }
+  [[nodiscard]] static constexpr int capacity() { return N; }
   [[nodiscard]] constexpr T& operator[](int gyro) { return items_[static_cast<std::size_t>(gyro)]; }
   [[nodiscard]] constexpr const T& operator[](int gyro) const { return items_[static_cast<std::size_t>(gyro)]; }
   [[nodiscard]] constexpr auto begin() { return items_.begin(); }
@@ -21,29 +26,38 @@ class PerGyro {
   std::array<T, static_cast<std::size_t>(N)> items_{};
 };
 
-/// Which of N gyros are used.
-template <int N>
-using GyroMask = PerGyro<bool, N>;
+/// One direction for each gyro; those of gyros that there are not mean nothing.
+using Directions = PerGyro<Eigen::Vector3d>;
+
+/// Which gyros are used.
+using GyroMask = PerGyro<bool>;
 
 /// Where the number of a gyro stands, none.
 inline constexpr int kNoGyro = -1;
 
-template <int N>
-[[nodiscard]] constexpr GyroMask<N> all_gyros() {
-  GyroMask<N> mask;
-  for (bool& used : mask) {
-    used = true;
+/// The first `gyros` of them.
+[[nodiscard]] constexpr GyroMask all_gyros(int gyros) {
+  GyroMask mask;
+  for (int k = 0; k < gyros; ++k) {
+    mask[k] = true;
   }
   return mask;
 }
 
-template <int N>
-[[nodiscard]] constexpr int count(const GyroMask<N>& mask) {
+[[nodiscard]] constexpr int count(const GyroMask& mask) {
   int used = 0;
   for (const bool it : mask) {
     used += it ? 1 : 0;
   }
   return used;
+}
+
+[[nodiscard]] constexpr GyroMask both(const GyroMask& a, const GyroMask& b) {
+  GyroMask mask;
+  for (int k = 0; k < kMaxGyros; ++k) {
+    mask[k] = a[k] && b[k];
+  }
+  return mask;
 }
 
 }  // namespace trihedron

@@ -1,70 +1,111 @@
 #pragma once
-/// Prediction of the momenta: dh_in/dt = ω_in × h_in, ω_in = C_in_b ω_b(h_b), and its linearised sensitivities.
+/// Prediction of the momenta: dh_in/dt = ω_in × h_in, ω_in = C_in_b ω_b(h_b), and its linearised sensitivities
+/// (docs/mathematics.md, section 6).
 
+#include <Eigen/Core>
+
+#include "trihedron/core/columns.hpp"
+#include "trihedron/core/drift.hpp"
 #include "trihedron/core/frames.hpp"
+#include "trihedron/core/per_gyro.hpp"
 
 namespace trihedron {
 
 /// A reading, unit, without what is known of its bias; unit to the first order.
-template <class S>
-[[nodiscard]] Vector3<S> without_bias(const Vector3<S>& h_b, const Vector3<S>& bias) {
+[[nodiscard]] inline Eigen::Vector3d without_bias(const Eigen::Vector3d& h_b, const Eigen::Vector3d& bias) {
   return h_b - (bias - h_b * h_b.dot(bias));
 }
 
-/// What the on-board computer believes of one gyro; inside of the estimators, plain numbers with frames in the names.
-template <class Model, class S = double>
+/// What is believed of one gyro; inside of the estimators, plain numbers with frames in the names. There is room for
+/// Max drift columns.
+template <int Max>
 struct GyroModel {
-  Vector3<S> h_in = Vector3<S>::UnitX();  ///< direction of the momentum
-  typename Model::template Coefficients<S> drift_rad_s = Model::template Coefficients<S>::Zero();  ///< κ
-  Matrix3<S> C_c_b = Matrix3<S>::Identity();     ///< alignment, exp([Λ×])
-  Vector3<S> readout_bias = Vector3<S>::Zero();  ///< of the direction cosines: h_b is read as h_b + bias
+  using Coefficients = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, Max, 1>;
 
-  [[nodiscard]] Vector3<S> unbiased(const Vector3<S>& h_b) const { return without_bias<S>(h_b, readout_bias); }
+  Eigen::Vector3d h_in = Eigen::Vector3d::UnitX();  ///< direction of the momentum
+  /// Of all columns of the drift model: κ; the drift that wanders; the change of the coefficients of eq. (1).
+  Coefficients drift_rad_s = Coefficients::Zero(Layout::kEq1 <= Max ? Layout::kEq1 : Max);
+  Eigen::Matrix3d C_c_b = Eigen::Matrix3d::Identity();     ///< alignment, exp([Λ×])
+  Eigen::Vector3d readout_bias = Eigen::Vector3d::Zero();  ///< of the direction cosines: h_b is read as h_b + bias
+
+  [[nodiscard]] Eigen::Vector3d unbiased(const Eigen::Vector3d& h_b) const { return without_bias(h_b, readout_bias); }
   /// The same, seen in c.
-  [[nodiscard]] Vector3<S> in_c(const Vector3<S>& h_b) const { return C_c_b * unbiased(h_b); }
+  [[nodiscard]] Eigen::Vector3d in_c(const Eigen::Vector3d& h_b) const { return C_c_b * unbiased(h_b); }
 };
 
 /// Linearised effect of three causes on one momentum since a reference epoch:
 /// φ(t) = by_start φ(t0) + by_drift Δκ + by_alignment δ, with h(true) = exp([φ×]) h(est), φ in `in`;
-/// κ(true) = κ(est) + Δκ; C_c_b(true) = exp([δ×]) C_c_b(est), δ in c.
-template <class Model, class S = double>
+/// κ(true) = κ(est) + Δκ, all columns of the drift model; C_c_b(true) = exp([δ×]) C_c_b(est), δ in c.
+template <int Max>
 struct Sensitivity {
-  Matrix3<S> by_start = Matrix3<S>::Identity();
-  Eigen::Matrix<S, 3, Model::kSize> by_drift = Eigen::Matrix<S, 3, Model::kSize>::Zero();  ///< s
-  Matrix3<S> by_alignment = Matrix3<S>::Zero();
+  Eigen::Matrix3d by_start = Eigen::Matrix3d::Identity();
+  Columns<Max> by_drift;  ///< s
+  Eigen::Matrix3d by_alignment = Eigen::Matrix3d::Zero();
 
   /// The same over this stretch followed by `next`.
-  [[nodiscard]] Sensitivity then(const Sensitivity& next) const {
+  [[nodiscard]] Sensitivity then(const Sensitivity& next, int columns) const {
     Sensitivity both;
     both.by_start = next.by_start * by_start;
-    both.by_drift = next.by_start * by_drift + next.by_drift;
+    both.by_drift.first(columns) =
+        next.by_start.lazyProduct(by_drift.first(columns)) + next.by_drift.first(columns);
     both.by_alignment = next.by_start * by_alignment + next.by_alignment;
     return both;
   }
 };
 
+/// by_drift ← by_drift + turn × by_drift + dt_C_in_b · basis, column by column; all of the same size.
+void advance_by_drift(ColumnsView by_drift, ColumnsView basis, const Eigen::Matrix3d& dt_C_in_b,
+                      const Eigen::Vector3d& turn);
+
 /// Turns one momentum by its drift over `dt_s`, with attitude and reading of the middle of the step (midpoint rule;
-/// exact for constant ω_in). C_in_c: attitude; h_b: reading, unit. Returns ω_in, rad/s.
-template <class Model, class S>
-Vector3<S> precess(GyroModel<Model, S>& gyro, const Matrix3<S>& C_in_c, const Vector3<S>& h_b, S dt_s) {
-  const Vector3<S> omega_in = C_in_c * (gyro.C_c_b * Model::template rate<S>(gyro.unbiased(h_b), gyro.drift_rad_s));
-  gyro.h_in = rotated<S>(gyro.h_in, omega_in * dt_s).normalized();
-  return omega_in;
+/// exact for constant ω_in). C_in_c: attitude; h_b: reading, unit; part_of_change: as of DriftModel.
+template <int Max>
+void precess(GyroModel<Max>& gyro, const DriftModel& drift, const Eigen::Matrix3d& C_in_c, const Eigen::Vector3d& h_b,
+             double part_of_change, double dt_s) {
+  const Eigen::Vector3d omega_b = drift.rate(gyro.unbiased(h_b), part_of_change, gyro.drift_rad_s.data());
+  const Eigen::Vector3d omega_in = C_in_c * (gyro.C_c_b * omega_b);
+  gyro.h_in = rotated<double>(gyro.h_in, omega_in * dt_s).normalized();
 }
 
-/// precess(), and the sensitivities beside it: dφ/dt = ω × φ + C_in_b B Δκ + (C_in_c δ) × ω.
-template <class Model, class S>
-Vector3<S> precess(GyroModel<Model, S>& gyro, Sensitivity<Model, S>& sensitivity, const Matrix3<S>& C_in_c,
-                   const Vector3<S>& h_b, S dt_s) {
-  const Eigen::Matrix<S, 3, Model::kSize> basis_in =
-      (C_in_c * gyro.C_c_b) * Model::template basis<S>(gyro.unbiased(h_b));
-  const Vector3<S> turn = dt_s * (basis_in * gyro.drift_rad_s);
-  gyro.h_in = rotated<S>(gyro.h_in, turn).normalized();
-  const Matrix3<S> cross = skew<S>(turn);
+/// precess(), and the sensitivities beside it: dφ/dt = ω × φ + C_in_b B Δκ + (C_in_c δ) × ω. Returns the rotation that
+/// the momentum made, rad.
+template <int Max>
+Eigen::Vector3d precess(GyroModel<Max>& gyro, Sensitivity<Max>& sensitivity, const DriftModel& drift,
+                        const Eigen::Matrix3d& C_in_c, const Eigen::Vector3d& h_b, double part_of_change, double dt_s) {
+  Columns<Max> columns;
+  const int size = drift.columns();
+  drift.basis(gyro.unbiased(h_b), part_of_change, columns.view(size));
+  const Eigen::Matrix3d dt_C_in_b = dt_s * (C_in_c * gyro.C_c_b);
+  const Eigen::Vector3d turn = dt_C_in_b * columns.first(size).lazyProduct(gyro.drift_rad_s);
+  gyro.h_in = rotated<double>(gyro.h_in, turn).normalized();
+  const Eigen::Matrix3d cross = skew<double>(turn);
   sensitivity.by_start += cross * sensitivity.by_start;
-  sensitivity.by_drift += cross * sensitivity.by_drift + dt_s * basis_in;
+  advance_by_drift(sensitivity.by_drift.view(size), columns.view(size), dt_C_in_b, turn);
   sensitivity.by_alignment += cross * (sensitivity.by_alignment - C_in_c);
-  return turn / dt_s;
+  return turn;
 }
+
+/// exp([δ×]) C_c_b, through the quaternion, so that rounding cannot accumulate in the matrix over months of fixes.
+[[nodiscard]] Eigen::Matrix3d turned(const Eigen::Matrix3d& C_c_b, const Eigen::Vector3d& delta);
+
+/// First-order Gauss–Markov process.
+struct GaussMarkov {
+  double sigma = 0;  ///< stationary
+  double time_s = 3600;
+
+  /// What is left of a value after dt_s. Nothing after a long time; what the inverse of a transition takes for that
+  /// would be rounding.
+  [[nodiscard]] double kept(double dt_s) const;
+  /// 1-sigma of what has come in its place.
+  [[nodiscard]] double noise(double kept) const;
+};
+
+/// Over a longer step the readings do not tell how far the body turned.
+inline constexpr double kQuarterOrbit_s = 1300;
+
+/// What the midpoint rule may miss in a step in which the body turned far between two samples, rad: the drift over the
+/// step, times the turn that the readings from and to show.
+[[nodiscard]] double missed_by_long_step_rad(double drift_rad, const Eigen::Vector3d& from, const Eigen::Vector3d& to,
+                                             double dt_s);
 
 }  // namespace trihedron

@@ -1,148 +1,157 @@
 #pragma once
 /// Linear estimation with the square root of the information matrix (Bierman, "Factorization Methods for Discrete
-/// Sequential Estimation", 1977; process noise after Dyer and McReynolds, 1969).
+/// Sequential Estimation", 1977; process noise after Dyer and McReynolds, 1969). Sizes are known at run time, storage is
+/// of fixed capacity; the work is done by plain loops, compiled once.
 
 #include <Eigen/Core>
-#include <cmath>
+#include <array>
+#include <cstddef>
 
 #include "trihedron/core/assert.hpp"
+#include "trihedron/core/rows_view.hpp"
 
 namespace trihedron {
 
 /// Rotates the rows of `extra` into the upper triangular rows of `root` (Householder), column by column; the first
-/// `columns` columns of `extra` become zero. rootᵀ root + extraᵀ extra is unchanged. Rows of `root` may be zero (no
-/// information yet).
-template <class Root, class Extra>
-void rotate_into(Eigen::MatrixBase<Root>& root, Eigen::MatrixBase<Extra>& extra, int columns) {
-  using S = typename Root::Scalar;
-  using std::sqrt;
-  for (int j = 0; j < columns; ++j) {
-    const S below = extra.col(j).squaredNorm();
-    if (!(below > S(0))) {
-      continue;
-    }
-    const S diagonal = root(j, j);
-    const S norm = sqrt(diagonal * diagonal + below);
-    const S alpha = diagonal > S(0) ? -norm : norm;
-    const S v0 = diagonal - alpha;
-    const S beta = S(-1) / (alpha * v0);
-    const Eigen::Matrix<S, Extra::RowsAtCompileTime, 1> v = extra.col(j);
-    for (int k = j + 1; k < root.cols(); ++k) {
-      const S s = beta * (v0 * root(j, k) + v.dot(extra.col(k)));
-      root(j, k) -= v0 * s;
-      extra.col(k) -= s * v;
-    }
-    root(j, j) = alpha;
-    extra.col(j).setZero();
-  }
-}
+/// `eliminated` columns of `extra` become zero, those of `root` a triangle. rootᵀ root + extraᵀ extra is unchanged. Rows
+/// of `root` may be zero (no information yet). Both have the same number of columns.
+void rotate_into(RowsView root, RowsView extra, int eliminated);
 
-/// rows · rowsᵀ: with rows seen through an uncertainty, their covariance. For so few of them the library's blocked
-/// product spends its time on packing, and the compiler's on instantiating it.
-template <class S, int M, int N, int Order>
-[[nodiscard]] Eigen::Matrix<S, M, M> gram(const Eigen::Matrix<S, M, N, Order>& rows) {
-  return rows.lazyProduct(rows.transpose());
-}
+/// Reflections that make the first `columns` columns of `rows` upper triangular.
+void triangularise(RowsView rows, int columns);
 
-/// Estimate errors x ~ (0, (RᵀR)⁻¹) of N states, the first D of which move; the other N − D are constants. R is upper
+/// In place: each row becomes row · R⁻¹, R the upper triangle of `root`. A row that begins with zeros still does
+/// afterwards.
+void solve_rows(ConstRowsView root, RowsView rows);
+
+/// The first rows of the inverse of the upper triangle of `root`, as many as `inverse` has; zero below the diagonal.
+void invert_triangle(ConstRowsView root, RowsView inverse);
+
+/// product = a · b, all of them apart in memory.
+void multiply(ConstRowsView a, ConstRowsView b, RowsView product);
+
+/// Estimate errors x ~ (0, (RᵀR)⁻¹) of states, the first `dynamic` of which move; the others are constants. R is upper
 /// triangular. A direction without information costs nothing and gains nothing: R times it stays zero to rounding,
 /// whatever the number of steps. The estimate itself is kept by the owner, who adds each correction to it ("feedback"),
-/// so that the mean of x is always zero.
-template <int N, int D, class S = double>
+/// so that the mean of x is always zero. There is room for Max states, of which at most kMaxDynamic move.
+template <int Max, int MaxDynamic>
 class SquareRootInformation {
  public:
-  static constexpr int kStates = N;
-  static constexpr int kDynamic = D;
-  using Vector = Eigen::Matrix<S, N, 1>;
-  using Matrix = Eigen::Matrix<S, N, N>;
-  using DynamicVector = Eigen::Matrix<S, D, 1>;
-  using DynamicMatrix = Eigen::Matrix<S, D, D>;
-  using DynamicByConstants = Eigen::Matrix<S, D, N - D>;
-  template <int M>
-  using Rows = Eigen::Matrix<S, M, N, M == 1 ? Eigen::RowMajor : Eigen::ColMajor>;
+  using Vector = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, Max, 1>;
+  using DynamicVector = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, MaxDynamic, 1>;
+  using DynamicMatrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor, MaxDynamic, MaxDynamic>;
+  using DynamicByConstants = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor, MaxDynamic, Max>;
 
-  /// Adds the prior of the constants: `root` with rootᵀ root their information matrix, of any shape.
-  void add_prior_of_constants(const Eigen::Matrix<S, N - D, N - D>& root) {
-    Eigen::Matrix<S, N - D, N + 1> extra;
-    extra.setZero();
-    extra.template block<N - D, N - D>(0, D) = root;
-    rotate_into(root_, extra, N);
+  /// Forgets all information.
+  void reset(int states, int dynamic) {
+    states_ = states;
+    dynamic_ = dynamic;
+    data_.fill(0);
   }
 
-  /// Adds information rows about any states: unit white noise = rows · x.
-  template <int M>
-  void add_information(const Rows<M>& rows) {
-    Eigen::Matrix<S, M, N + 1> extra = Eigen::Matrix<S, M, N + 1>::Zero();
-    extra.template leftCols<N>() = rows;
-    rotate_into(root_, extra, N);
-  }
+  [[nodiscard]] int states() const { return states_; }
+  [[nodiscard]] int dynamic() const { return dynamic_; }
+
+  /// R, upper triangular, in place.
+  [[nodiscard]] RowsView root() { return {data_.data(), states_, states_, states_ + 1}; }
+  [[nodiscard]] ConstRowsView root() const { return {data_.data(), states_, states_, states_ + 1}; }
+
+  /// Adds information rows about the states, `rows` of so many: unit white noise = rows · x. `rows` is used up.
+  void add_information(RowsView rows) { rotate_into(root(), rows, states_); }
 
   /// Time update: x_d ← A x_d + B x_c + w, w of independent components with 1-sigma `noise`, which may be zero.
   void propagate(const DynamicMatrix& A_inverse, const DynamicByConstants& B, const DynamicVector& noise) {
     // Rows of R with x_d(before) = A⁻¹ (x_d(after) − B x_c − w) put in: columns are w / noise, x_d(after), x_c. Then
     // w is eliminated.
-    Eigen::Matrix<S, D, D + N> moved;
-    const DynamicMatrix R_d = root_.template topLeftCorner<D, D>().lazyProduct(A_inverse);
-    moved.template leftCols<D>() = -R_d * noise.asDiagonal();
-    moved.template middleCols<D>(D) = R_d;
-    moved.template rightCols<N - D>() = root_.template block<D, N - D>(0, D) - R_d.lazyProduct(B);
-    Eigen::Matrix<S, D, D + N, Eigen::RowMajor> white;
-    white.setZero();
-    white.template leftCols<D>().setIdentity();
-    rotate_into(white, moved, D);
-    auto top = root_.template topLeftCorner<D, N>();
-    auto kept = moved.template rightCols<N>();
-    top.setZero();
-    rotate_into(top, kept, D);
-  }
-
-  /// H R⁻¹: rows of H seen through the present uncertainty; H P Hᵀ is its gram(). Needs regular().
-  template <int M>
-  [[nodiscard]] Rows<M> through_uncertainty(const Rows<M>& H) const {
-    TRIHEDRON_ASSERT(regular());
-    // Row by row: for so few of them the library's blocked solver spends its time on packing. A row that begins with
-    // zeros still does afterwards.
-    Rows<M> through = Rows<M>::Zero();
-    for (int i = 0; i < M; ++i) {
-      int first = 0;
-      while (first < N && H(i, first) == S(0)) {
-        ++first;
+    const int d = dynamic_;
+    const int c = states_ - d;
+    Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor, MaxDynamic, MaxDynamic + Max> moved(
+        d, d + states_);
+    for (int i = 0; i < d; ++i) {
+      const double* R = root().row(i);
+      for (int j = 0; j < d; ++j) {
+        double sum = 0;
+        for (int k = i; k < d; ++k) {
+          sum += R[k] * A_inverse(k, j);
+        }
+        moved(i, d + j) = sum;
+        moved(i, j) = -sum * noise(j);
       }
-      const int rest = N - first;
-      const auto lower = root_.block(first, first, rest, rest).transpose().template triangularView<Eigen::Lower>();
-      through.row(i).tail(rest) = lower.solve(H.row(i).tail(rest).transpose()).transpose();
+      double* constants = &moved(i, d) + d;
+      for (int j = 0; j < c; ++j) {
+        constants[j] = R[d + j];
+      }
+      for (int k = 0; k < d; ++k) {
+        const double by = moved(i, d + k);
+        const double* row = B.data() + static_cast<std::ptrdiff_t>(k) * c;
+        for (int j = 0; j < c; ++j) {
+          constants[j] -= by * row[j];
+        }
+      }
     }
-    return through;
+    Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor, MaxDynamic, MaxDynamic + Max> white(
+        d, d + states_);
+    white.setZero();
+    white.leftCols(d).setIdentity();
+    rotate_into(rows_of(white), rows_of(moved), d);
+    for (int i = 0; i < d; ++i) {
+      double* R = root().row(i);
+      for (int j = 0; j < states_; ++j) {
+        R[j] = 0;
+      }
+    }
+    rotate_into({data_.data(), d, states_, states_ + 1}, {moved.data() + d, d, states_, d + states_}, d);
   }
 
-  /// Measurement update with `H` and `y`, y = H x + unit white noise. Returns the correction, to be fed back; not
-  /// finite unless regular() after it.
-  template <int M>
-  [[nodiscard]] Vector update(const Rows<M>& H, const Eigen::Matrix<S, M, 1>& y) {
-    Eigen::Matrix<S, M, N + 1> extra;
-    extra.template leftCols<N>() = H;
-    extra.col(N) = y;
-    rotate_into(root_, extra, N);
-    const Vector x = root_.template leftCols<N>().template triangularView<Eigen::Upper>().solve(root_.col(N));
-    root_.col(N).setZero();
+  /// In place: rows of H become H R⁻¹, seen through the present uncertainty: H P Hᵀ is the product of the result with
+  /// its transpose. Needs regular().
+  void see_through_uncertainty(RowsView H) const {
+    TRIHEDRON_ASSERT(regular());
+    solve_rows(root(), H);
+  }
+
+  /// Measurement update with rows (H, y), y = H x + unit white noise, which are used up; y is the last column. Returns
+  /// the correction, to be fed back; not finite unless regular() after it.
+  [[nodiscard]] Vector update(RowsView rows) {
+    RowsView whole{data_.data(), states_, states_ + 1, states_ + 1};
+    rotate_into(whole, rows, states_);
+    Vector x(states_);
+    for (int i = states_ - 1; i >= 0; --i) {
+      const double* R = whole.row(i);
+      double sum = R[states_];
+      for (int j = i + 1; j < states_; ++j) {
+        sum -= R[j] * x(j);
+      }
+      x(i) = sum / R[i];
+    }
+    for (int i = 0; i < states_; ++i) {
+      whole(i, states_) = 0;
+    }
     return x;
   }
 
-  /// R⁻¹, a square root of the covariance: P = R⁻¹ R⁻ᵀ. Needs regular().
-  [[nodiscard]] Matrix inverse_root() const {
+  /// R⁻¹, a square root of the covariance, P = R⁻¹ R⁻ᵀ, into `inverse`: its first rows, as many as it has. Needs
+  /// regular().
+  void inverse_root(RowsView inverse) const {
     TRIHEDRON_ASSERT(regular());
-    return root_.template leftCols<N>().template triangularView<Eigen::Upper>().solve(Matrix::Identity());
+    invert_triangle(root(), inverse);
   }
 
-  /// R, upper triangular.
-  [[nodiscard]] Matrix root() const { return root_.template leftCols<N>(); }
-
   /// Whether each state has information, so that a covariance exists.
-  [[nodiscard]] bool regular() const { return (root_.diagonal().array() != S(0)).all(); }
+  [[nodiscard]] bool regular() const {
+    for (int i = 0; i < states_; ++i) {
+      if (!(root()(i, i) != 0)) {
+        return false;
+      }
+    }
+    return true;
+  }
 
  private:
+  int states_ = 0;
+  int dynamic_ = 0;
   // R, and right of it z of R x = z, which is zero except within update().
-  Eigen::Matrix<S, N, N + 1, Eigen::RowMajor> root_ = Eigen::Matrix<S, N, N + 1, Eigen::RowMajor>::Zero();
+  std::array<double, static_cast<std::size_t>(Max) * (Max + 1)> data_{};
 };
 
 }  // namespace trihedron

@@ -1,5 +1,5 @@
 #pragma once
-/// What enters the on-board cycle: raw telemetry, in time order.
+/// What enters the on-board step: raw telemetry, in time order.
 
 #include <Eigen/Core>
 #include <Eigen/Geometry>
@@ -9,15 +9,17 @@
 
 namespace trihedron {
 
+/// Star trackers that a spacecraft may have.
+inline constexpr int kMaxStarTrackers = 4;
+
 /// A direction or quaternion further than this from unit length is not believed. Readout noise moves a norm by a tenth
 /// of it at most.
 inline constexpr double kNormTolerance = 1e-3;
 
-/// Direction cosines of the N momenta, each in its own case axes; as telemetered, not normalised.
-template <int N>
+/// Direction cosines of the momenta, each in its own case axes; as telemetered, not normalised.
 struct GyroSample {
   Time t{};
-  PerGyro<Eigen::Vector3d, N> h_b;
+  Directions h_b;
 };
 
 /// Star-tracker fix q_in_c, Hamilton; as telemetered, of either sign.

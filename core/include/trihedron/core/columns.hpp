@@ -1,0 +1,46 @@
+#pragma once
+/// Vectors side by side, as many as a gyro's drift has columns: three rows in storage of fixed capacity.
+
+#include <Eigen/Core>
+#include <array>
+#include <cstddef>
+
+namespace trihedron {
+
+/// 3 × columns; row i begins at data + i · stride. The rows are padded with zeros to a multiple of kPad, so that loops
+/// over them have no remainder.
+struct ColumnsView {
+  static constexpr int kPad = 4;
+  double* data = nullptr;
+  int stride = 0;
+  int columns = 0;
+
+  [[nodiscard]] double* row(int i) const { return data + static_cast<std::ptrdiff_t>(i) * stride; }
+  void set_column(int column, const Eigen::Vector3d& v) const {
+    row(0)[column] = v.x();
+    row(1)[column] = v.y();
+    row(2)[column] = v.z();
+  }
+  [[nodiscard]] static constexpr int padded(int columns) { return (columns + kPad - 1) / kPad * kPad; }
+};
+
+template <int Max>
+class Columns {
+ public:
+  static constexpr int kStride = ColumnsView::padded(Max);
+  using Matrix = Eigen::Matrix<double, 3, Eigen::Dynamic, Eigen::RowMajor, 3, Max>;
+
+  [[nodiscard]] ColumnsView view(int columns) { return {data_.data(), kStride, columns}; }
+  /// The first `columns` of them.
+  [[nodiscard]] auto first(int columns) const {
+    return Eigen::Map<const Matrix, 0, Eigen::OuterStride<>>(data_.data(), 3, columns, Eigen::OuterStride<>(kStride));
+  }
+  [[nodiscard]] auto first(int columns) {
+    return Eigen::Map<Matrix, 0, Eigen::OuterStride<>>(data_.data(), 3, columns, Eigen::OuterStride<>(kStride));
+  }
+
+ private:
+  std::array<double, static_cast<std::size_t>(3 * kStride)> data_{};
+};
+
+}  // namespace trihedron

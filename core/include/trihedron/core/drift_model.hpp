@@ -1,0 +1,41 @@
+#pragma once
+/// Names a drift model.
+
+#include <cstdint>
+
+namespace trihedron {
+
+/// A linear drift family, ω_b(h) = B(h) κ (docs/mathematics.md, section 3).
+struct DriftModelId {
+  enum class Family : std::uint8_t {
+    kEsg7,   ///< eq. (1)
+    kEsg20,  ///< eq. (1), the rest of degrees 1 and 2, and the other potential of k0
+    kVsh,    ///< eq. (1) and all vector spherical harmonics up to `degree` that it does not contain
+  };
+  static constexpr int kMaxDegree = 6;
+
+  Family family = Family::kEsg7;
+  std::uint8_t degree = 0;  ///< of kVsh, 1 … kMaxDegree; 0 otherwise
+
+  friend constexpr bool operator==(const DriftModelId&, const DriftModelId&) = default;
+
+  /// Coefficients of one gyro.
+  [[nodiscard]] constexpr int size() const {
+    constexpr int kEq1 = 7;
+    if (family == Family::kVsh) {
+      // W and D of each degree; eq. (1) has 4 of degree 2, 2 of degree 3 and 1 of degree 4.
+      const int contained = (degree >= 2 ? 4 : 0) + (degree >= 3 ? 2 : 0) + (degree >= 4 ? 1 : 0);
+      return kEq1 + 2 * degree * (degree + 2) - contained;
+    }
+    return family == Family::kEsg20 ? 20 : kEq1;
+  }
+};
+
+inline constexpr DriftModelId kEsg7{};
+inline constexpr DriftModelId kEsg20{DriftModelId::Family::kEsg20, 0};
+/// 1 ≤ degree ≤ DriftModelId::kMaxDegree.
+[[nodiscard]] constexpr DriftModelId vsh(int degree) {
+  return {DriftModelId::Family::kVsh, static_cast<std::uint8_t>(degree)};
+}
+
+}  // namespace trihedron

@@ -1,0 +1,47 @@
+#pragma once
+/// What is told of each fix.
+
+#include <Eigen/Core>
+
+#include "trihedron/core/layout.hpp"
+#include "trihedron/core/status.hpp"
+#include "trihedron/core/time.hpp"
+
+namespace trihedron {
+
+/// Eq. (3), components 2–5, at one fix, and what was done with it: two components for each gyro of the layout, zero for
+/// those that could not be used.
+struct FixReport {
+  using Innovation = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, kMaxComponents, 1>;
+  using Covariance = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, kMaxComponents, kMaxComponents>;
+
+  FixStatus status = FixStatus::kNone;
+  Time t{};
+  int head = 0;           ///< the star tracker
+  Innovation innovation;  ///< −z of eq. (3); empty where the fix was not compared
+  Covariance innovation_covariance;
+  double nis = 0;               ///< innovation² over its covariance; as many degrees of freedom as components
+  double weight = 1;            ///< its noise was taken for 1/√weight of the nominal; 1 without Student's t
+  int rejections_in_a_row = 0;  ///< or, with Student's t, fixes above the gate
+  bool jumped = false;          ///< the misfit came at once and is more than drift can make: put down to the star tracker
+  int odd_gyro = kNoGyro;  ///< index of the gyro that alone, and not the star tracker, explains why it was rejected
+
+  [[nodiscard]] bool used() const { return is_used(status); }
+};
+
+/// A look at the angles between the momenta alone.
+struct AngleReport {
+  FixStatus status = FixStatus::kNone;
+  Time t{};
+  double nis = 0;  ///< 2 n − 3 degrees of freedom, n gyros used
+  int rejections_in_a_row = 0;
+  int odd_gyro = kNoGyro;  ///< as of FixReport
+};
+
+/// Weight of an innovation when its noise is not normal but Student's t with ν degrees of freedom: of normal noise with
+/// covariance R/w, w ~ Γ(ν/2, ν/2), the mean of w given an innovation of M components is (ν + M)/(ν + NIS). One step,
+/// at the NIS before the update: R is nearly all of its covariance once the filter has settled, and before that too
+/// large a weight is the safe side. Never above 1: what agrees too well is chance. ν = 0: always 1.
+[[nodiscard]] double student_t_weight(double freedom, double nis, int components);
+
+}  // namespace trihedron

@@ -1,0 +1,68 @@
+#pragma once
+/// What of the telemetry is let in: the clock, readings that can be believed, and fixes that wait for their readings.
+
+#include <array>
+#include <chrono>
+#include <optional>
+
+#include "trihedron/core/gyro_health.hpp"
+#include "trihedron/core/setup.hpp"
+#include "trihedron/core/status.hpp"
+#include "trihedron/core/telemetry.hpp"
+
+namespace trihedron {
+
+class Intake {
+ public:
+  /// A sample further ahead is believed only when the next one confirms it.
+  static constexpr Duration kMaxGap = std::chrono::hours(1);
+  /// Samples behind the present time, as many in a row, set it back.
+  static constexpr int kSetBackSamples = 16;
+  /// Fixes of 20 Hz wait for the readings to both sides of them.
+  static constexpr int kMaxWaitingFixes = 40;
+
+  Intake() = default;
+  explicit Intake(const CalibrationSetup& setup);
+
+  enum class Clock : std::uint8_t { kRunsOn, kOutOfOrder, kSetBack };
+  /// What a sample of time `t` says about the clock; `latest`: of the last sample that was let in.
+  [[nodiscard]] Clock look_at_clock(Time t, const std::optional<Time>& latest);
+
+  /// Screens the readings of a sample whose time is right, and makes them unit.
+  [[nodiscard]] SampleStatus screen(GyroSample& sample);
+
+  /// Puts a fix among those that wait, in the order of their times. `taken_until`: fixes before it are too late.
+  [[nodiscard]] FixStatus take_up(const StarFix& fix, const std::optional<Time>& latest, Time taken_until);
+  [[nodiscard]] int waiting() const { return waiting_; }
+  /// The next fix; needs one that waits.
+  [[nodiscard]] const StarFix& next_fix() const { return fixes_[0]; }
+  [[nodiscard]] StarFix take_next_fix();
+  /// The estimator has used a fix.
+  void mark_used(const StarFix& fix) { used_fix_t_[static_cast<std::size_t>(fix.head)] = fix.t; }
+
+  /// The clock has been set back to `t`. Returns the number of fixes that waited: nobody knows their time now.
+  int set_clock(Time t);
+
+  [[nodiscard]] GyroHealth& health() { return health_; }
+  [[nodiscard]] const GyroHealth& health() const { return health_; }
+  /// Gyros that can be used at both ends of a step; where those are too few, at its end.
+  [[nodiscard]] GyroMask used_over(Time from, Time to) const;
+
+ private:
+  [[nodiscard]] bool is_set_back(Time t);
+  [[nodiscard]] bool is_wild(Time t, Time latest);
+
+  int gyros_ = 0;
+  int star_trackers_ = 0;
+  Duration max_interpolation_{};
+  GyroHealth health_;
+  std::array<StarFix, kMaxWaitingFixes + 1> fixes_{};
+  int waiting_ = 0;
+  std::array<std::optional<Time>, kMaxStarTrackers> used_fix_t_;
+  int behind_present_ = 0;  ///< samples in a row
+  Time behind_present_t_{};
+  Time suspect_t_{};
+  bool has_suspect_ = false;
+};
+
+}  // namespace trihedron

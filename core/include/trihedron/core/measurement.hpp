@@ -1,0 +1,172 @@
+#pragma once
+/// What a fix is compared with, its noise, and how both depend on the states: the same for the filter and for the batch
+/// (docs/mathematics.md, section 7).
+
+#include <Eigen/Core>
+
+#include "trihedron/core/fix_readings.hpp"
+#include "trihedron/core/layout.hpp"
+#include "trihedron/core/optimal_attitude.hpp"
+#include "trihedron/core/setup.hpp"
+#include "trihedron/core/square_root_information.hpp"
+
+namespace trihedron {
+
+/// Error of a fix, c axes, by the shared states: as given = true · exp([e×]). 3 × layout.shared_size().
+using FixBySharedStates = Eigen::Matrix<double, 3, Eigen::Dynamic, 0, 3, kMaxSharedStates>;
+using SharedStates = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, kMaxSharedStates, 1>;
+
+/// rate_c: of the body relative to `in`, rad/s.
+[[nodiscard]] FixBySharedStates fix_by_shared_states(const CalibrationSetup& setup, const StarFix& fix,
+                                                     const Eigen::Vector3d& rate_c);
+
+/// Covariance of a fix's noise, c axes, rad².
+[[nodiscard]] Eigen::Matrix3d fix_noise(const CalibrationSetup& setup, int head);
+
+/// The fix without what is known of its error.
+[[nodiscard]] Rot<In, C> corrected(const StarFix& fix, const FixBySharedStates& by_shared, const SharedStates& shared);
+
+/// One gyro's part of a comparison: the two components of y = h × h_et across h, the first along h × (h of the next
+/// gyro), and how they change with φ (in), with the fix's error and −δ (c), and with the readout bias.
+struct GyroComparison {
+  Eigen::Vector2d y;
+  Eigen::Matrix<double, 2, 3> by_phi;
+  Eigen::Matrix<double, 2, 3> by_fix;
+  Eigen::Matrix<double, 2, 3> by_bias;
+};
+
+struct FixComparison {
+  GyroMask used{};
+  PerGyro<GyroComparison> gyros;
+  FixBySharedStates by_shared;
+
+  [[nodiscard]] int components() const { return 2 * count(used); }
+};
+
+/// y_k = h_k × h_et,k = (φ_k − C_in_c δ_k + h_k × C_in_b Δb_k)⊥ + noise of each gyro used. C_in_c: the fix, for y;
+/// C_linear: the attitude to linearise at, with less noise. Of `gyros`, as many as the layout has, the members of
+/// GyroModel are needed.
+template <class Gyros>
+[[nodiscard]] FixComparison compare(const Layout& layout, const Gyros& gyros, const Eigen::Matrix3d& C_in_c,
+                                    const Eigen::Matrix3d& C_linear, const Directions& h_b, const GyroMask& used,
+                                    const FixBySharedStates& by_shared) {
+  FixComparison comparison;
+  comparison.used = used;
+  comparison.by_shared = by_shared;
+  for (int k = 0; k < layout.gyros; ++k) {
+    if (!used[k]) {
+      continue;
+    }
+    const Eigen::Vector3d& h = gyros[k].h_in;
+    const Eigen::Vector3d& next = gyros[(k + 1) % layout.gyros].h_in;
+    GyroComparison& its = comparison.gyros[k];
+    its.by_phi.row(0) = h.cross(next).normalized().transpose();
+    its.by_phi.row(1) = h.cross(its.by_phi.row(0).transpose()).transpose();
+    its.by_fix = its.by_phi * C_linear;
+    its.y = its.by_phi * h.cross(C_in_c * gyros[k].in_c(h_b[k]));
+    if (layout.further.readout_bias) {
+      its.by_bias = its.by_phi * skew<double>(h) * C_linear * gyros[k].C_c_b;
+    }
+  }
+  return comparison;
+}
+
+/// Covariance of the noise of a comparison: the fix's error is common to all components, each readout's to its own two.
+using ComponentCovariance =
+    Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, kMaxComponents, kMaxComponents>;
+[[nodiscard]] ComponentCovariance noise_of(const FixComparison& comparison, const Eigen::Matrix3d& R_c,
+                                           const PerGyro<double>& readout_noise_rad);
+
+/// Rows about the states, and right of them what they are compared with; room for kMaxComponents rows and Max states.
+template <int Max>
+using ComparedRows =
+    Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor, kMaxComponents, Max + 1>;
+/// Three rows about the states.
+template <int Max>
+using StateRows3 = Eigen::Matrix<double, 3, Eigen::Dynamic, Eigen::RowMajor, 3, Max>;
+
+/// In place: R becomes its Cholesky factor L, and the rows L⁻¹ times themselves, of unit white noise.
+void whiten(ComponentCovariance& R, RowsView rows);
+
+/// Puts m times the columns of a gyro's drift where the layout has them.
+template <class M, class Rows>
+void put_drift_columns(const Layout& layout, int gyro, const M& m, Rows&& rows) {
+  rows.middleCols(layout.drift(gyro), layout.drift_size()) = m.leftCols(layout.drift_size());
+  if (layout.further.wandering_drift) {
+    rows.middleCols(layout.wandering(gyro), 3) = m.middleCols(layout.wandering_column(), 3);
+  }
+  if (layout.further.coefficient_change) {
+    rows.middleCols(layout.change(gyro), Layout::kEq1) = m.middleCols(layout.change_column(), Layout::kEq1);
+  }
+}
+
+/// The comparison as rows (H, y) about the states at its time.
+template <int Max>
+[[nodiscard]] ComparedRows<Max> rows_about_states_now(const Layout& layout, const FixComparison& comparison) {
+  ComparedRows<Max> rows(comparison.components(), layout.size() + 1);
+  rows.setZero();
+  int row = 0;
+  for (int k = 0; k < layout.gyros; ++k) {
+    if (!comparison.used[k]) {
+      continue;
+    }
+    const GyroComparison& its = comparison.gyros[k];
+    auto H = rows.template middleRows<2>(row);
+    H.template middleCols<3>(layout.direction(k)) = its.by_phi;
+    H.template middleCols<3>(layout.alignment(k)) = -its.by_fix;
+    if (layout.further.readout_bias) {
+      H.template middleCols<3>(layout.readout_bias(k)) = its.by_bias;
+    }
+    H.middleCols(layout.shared(), layout.shared_size()) = its.by_fix.lazyProduct(comparison.by_shared);
+    H.col(layout.size()) = its.y;
+    row += 2;
+  }
+  return rows;
+}
+
+/// Error of the attitude by these readings, c axes, by the states now, all three components of each direction; zero for
+/// the shared ones.
+template <int Max, class Gyros>
+[[nodiscard]] StateRows3<Max> attitude_by_states_now(const Layout& layout, const AttitudeByDirections& attitude,
+                                                     const Gyros& gyros, const Directions& h_b) {
+  StateRows3<Max> rows(3, layout.size());
+  rows.setZero();
+  const Eigen::Matrix3d C_c_in = attitude.C_in_c.raw().transpose();
+  for (int k = 0; k < layout.gyros; ++k) {
+    const Eigen::Matrix3d by_phi = attitude.by_direction(k);
+    rows.template middleCols<3>(layout.direction(k)) = by_phi * C_c_in;
+    rows.template middleCols<3>(layout.alignment(k)) = -by_phi;
+    if (layout.further.readout_bias) {
+      rows.template middleCols<3>(layout.readout_bias(k)) =
+          by_phi * skew<double>(gyros[k].in_c(h_b[k])) * gyros[k].C_c_b;
+    }
+  }
+  return rows;
+}
+
+/// In place: rows about the states now become rows about those at the beginning of a stretch, for which `since` has the
+/// sensitivities.
+template <class Rows, class Sensitivities>
+void carry_back(const Layout& layout, const Sensitivities& since, Rows& rows) {
+  for (int k = 0; k < layout.gyros; ++k) {
+    const Eigen::Matrix<double, Rows::RowsAtCompileTime, 3, 0, Rows::MaxRowsAtCompileTime, 3> by_phi =
+        rows.template middleCols<3>(layout.direction(k));
+    put_drift_columns(layout, k, by_phi.lazyProduct(since[k].by_drift.first(layout.drift_columns())).eval(), rows);
+    rows.template middleCols<3>(layout.alignment(k)) += by_phi * since[k].by_alignment;
+    rows.template middleCols<3>(layout.direction(k)) = by_phi * since[k].by_start;
+  }
+}
+
+/// Covariance of an attitude by `spread`, spread · spreadᵀ of the errors of what is estimated, plus the readout noise
+/// and a random walk of the directions of `walk_variance_rad2` per axis.
+[[nodiscard]] AttitudeSolution with_covariance(const AttitudeByDirections& attitude, const Eigen::Matrix3d& spread_square,
+                                               const PerGyro<double>& readout_noise_rad, int gyros,
+                                               double walk_variance_rad2);
+
+/// rows · rowsᵀ.
+template <int Max>
+[[nodiscard]] Eigen::Matrix3d gram(const StateRows3<Max>& rows) {
+  return rows.lazyProduct(rows.transpose());
+}
+
+}  // namespace trihedron

@@ -1,0 +1,153 @@
+#pragma once
+/// The on-board step: gyro samples and fixes in, in time order; calibration and attitude out. One object, no heap, no
+/// exceptions.
+
+#include <chrono>
+#include <optional>
+
+#include "trihedron/core/fix_report.hpp"
+#include "trihedron/core/intake.hpp"
+#include "trihedron/core/invariant_estimator.hpp"
+#include "trihedron/core/navigator.hpp"
+#include "trihedron/core/paper_estimator.hpp"
+#include "trihedron/core/readings.hpp"
+#include "trihedron/core/schedule.hpp"
+#include "trihedron/core/status.hpp"
+
+namespace trihedron {
+
+/// Astro-corrections of the navigator.
+struct CorrectionPolicy {
+  static constexpr Duration kEveryFix = Duration::zero();
+  static constexpr Duration kOnlyFirst = Duration::max();
+  Duration interval = std::chrono::minutes(90);
+  bool take_parameters = true;  ///< false: the parameters of the set-up are held
+  bool navigate = true;         ///< false: the calibration alone, no navigator beside it
+};
+
+/// Complete for every event, whatever was wrong with it.
+struct StepReport {
+  Time t{};
+  SampleStatus sample = SampleStatus::kUsed;
+  PerGyro<GyroState> gyros{};  ///< after this step
+  FixReport fix;               ///< of the fix that was dealt with in this step, if any; its time is its own
+  bool more_due = false;       ///< another fix can be dealt with now: carry_on() does
+  int fixes_dropped = 0;       ///< that waited when the clock was set back: nobody knows their time now
+  bool corrected = false;      ///< the navigator was corrected at that fix
+  /// That fix and what it was compared with, where the estimator looked at it.
+  std::optional<ComparedFix> compared;
+  /// Attitude at that fix, used or rejected as an outlier: of the calibration itself, and of the open-loop navigator.
+  std::optional<AttitudeSolution> calibrated;
+  std::optional<AttitudeSolution> navigated;
+  /// Of the angles between the momenta, where they were looked at in this step because no fix could be used for long:
+  /// the integrity of the gyros without a star tracker, and of use to the calibration. Its time is its own.
+  AngleReport angles;
+  /// z1 of eq. (3), cosθ predicted minus cosθ measured: the integrity of the pair, without a star tracker. Zero before
+  /// the start, and where one of the two cannot be used.
+  double angle_residual = 0;
+};
+
+template <class Estimator>
+class OnBoard {
+ public:
+  using Gyros = typename Estimator::Gyros;
+
+  /// Makes it ready; as of the estimator's set_up().
+  [[nodiscard]] std::optional<SetupFault> set_up(const CalibrationSetup& setup, const Gyros& prior,
+                                                 const Eigen::Ref<const Eigen::MatrixXd>& covariance,
+                                                 const CorrectionPolicy& policy);
+
+  /// One gyro sample. The navigator moves to it at once; the calibration follows some samples behind, when those round
+  /// a fix are there. At most one fix is dealt with.
+  StepReport on_gyro(const GyroSample& sample);
+
+  /// One fix. It waits for the gyro samples round it and is reported with the step that has them; without need for them
+  /// at once.
+  StepReport on_fix(const StarFix& fix);
+
+  /// Deals with the next of the fixes whose samples are there. Status kNone when there is none.
+  StepReport carry_on();
+
+  /// After the last sample: deals with one of the fixes that still wait, with the samples that there are. Status kNone
+  /// when none waits.
+  StepReport flush();
+
+  [[nodiscard]] const Estimator& estimator() const { return estimator_; }
+  [[nodiscard]] const Navigator<Estimator>& navigator() const { return navigator_; }
+  /// Time of the latest sample used; needs one.
+  [[nodiscard]] Time t() const { return readings_.latest_t(); }
+
+  /// Open-loop attitude at the latest sample. Needs navigator().started().
+  [[nodiscard]] Result<AttitudeSolution, DirectionsFault> navigation_attitude() const {
+    return navigator_.attitude(estimator_, readings_.now(estimator_.setup(), intake_.health(), estimator_.gyros()));
+  }
+
+ private:
+  /// A step between two times, with the middle of its readings.
+  struct Step {
+    Time from_t{};
+    Time to_t{};
+    Directions from;
+    Directions to;
+    Directions middle;
+    GyroMask used{};
+    [[nodiscard]] double dt_s() const { return to_seconds(to_t - from_t); }
+  };
+  [[nodiscard]] Step step(Time from_t, const Directions& from, Time to_t, const Directions& to) const;
+  /// Attitude in the middle of a step by these gyros; what those that are not used would read is put in.
+  [[nodiscard]] std::optional<Eigen::Matrix3d> attitude_of(const Gyros& gyros, Step& step) const;
+  [[nodiscard]] double variance_of_long_step(const Step& step) const;
+
+  [[nodiscard]] SampleStatus let_in(GyroSample& sample);
+  void set_clock(Time t);
+  void calibrate_until(Time limit, StepReport& report);
+  void correct(const StarFix& fix, StepReport& report);
+  void look_at_angles(StepReport& report);
+  void use_angles(Time t, const FixReadings& readings, StepReport& report);
+  void judge(int odd_gyro, StepReport& report);
+  void correct_navigator(const FixReadings& readings, StepReport& report);
+  void navigate(Time from_t, const Directions& from, Time to_t, const Directions& to);
+  void follow(Time t, const Directions& h_b);
+  void follow_next_sample();
+  [[nodiscard]] std::optional<FixReadings> readings_at(Time t) const {
+    return readings_.at(t, estimator_.setup(), intake_.health(), estimator_.gyros());
+  }
+  [[nodiscard]] std::optional<AttitudeSolution> calibrated(const FixReadings& readings) const;
+  [[nodiscard]] std::optional<AttitudeSolution> navigated_before(Time t, const FixReadings& readings) const;
+  [[nodiscard]] double angle_residual() const;
+  [[nodiscard]] int gyros() const { return estimator_.layout().gyros; }
+  [[nodiscard]] Duration reach() const {
+    return Estimator::kTakesSamplesTogether ? estimator_.setup().reach() : Duration::zero();
+  }
+  /// Of the oldest sample that the estimator has not yet followed, if any.
+  [[nodiscard]] Time next_sample_t() const {
+    return behind_ > 0 ? readings_.time(readings_.size() - behind_) : Time::max();
+  }
+  [[nodiscard]] Time next_fix_t() const { return intake_.waiting() > 0 ? intake_.next_fix().t : Time::max(); }
+
+  Intake intake_;
+  Readings<Gyros::capacity()> readings_;
+  Schedule schedule_;
+  Estimator estimator_;
+  Navigator<Estimator> navigator_;
+  CorrectionPolicy policy_;
+  int behind_ = 0;  ///< samples that the estimator has not yet followed
+  Time follower_t_{};
+  Directions follower_h_b_;
+  Time corrected_t_{};
+  int fixes_dropped_ = 0;        ///< not yet told
+  bool clock_set_back_ = false;  ///< and no sample used since
+  bool start_unconfirmed_ = false;
+};
+
+/// The flight computer's: two gyros with eq. (1), one star tracker.
+using PairOnBoard = OnBoard<InvariantEstimator<kPairCapacity>>;
+/// The ground's: every layout.
+using FullOnBoard = OnBoard<InvariantEstimator<kFullCapacity>>;
+
+// Those that are built.
+extern template class OnBoard<InvariantEstimator<kPairCapacity>>;
+extern template class OnBoard<InvariantEstimator<kFullCapacity>>;
+extern template class OnBoard<PaperEstimator>;
+
+}  // namespace trihedron

@@ -1,0 +1,171 @@
+#pragma once
+/// The latest gyro samples, and what the gyros read at any time between them.
+
+#include <array>
+#include <chrono>
+#include <cstddef>
+#include <optional>
+
+#include "trihedron/core/directions_fit.hpp"
+#include "trihedron/core/fix_readings.hpp"
+#include "trihedron/core/gyro_health.hpp"
+#include "trihedron/core/setup.hpp"
+#include "trihedron/core/telemetry.hpp"
+
+namespace trihedron {
+
+/// Between two readings, of `gyros` gyros.
+[[nodiscard]] Directions between(const Directions& a, const Directions& b, double fraction, int gyros);
+
+/// Samples as they come, screened and of unit length; the oldest falls out. Bounded in time and in number: those that
+/// come sooner than kMinSpacing after the last one are not taken. kCapacity of them, kGyros directions each.
+template <int kGyros>
+class Readings {
+ public:
+  static constexpr int kCapacity = 80;
+  /// All samples that the angles between the momenta wait for, 6 s, have room.
+  static constexpr Duration kMinSpacing = std::chrono::milliseconds(75);
+
+  Readings() = default;
+  /// `together`: whether samples round a time are taken together, or only the two next to it.
+  Readings(const CalibrationSetup& setup, bool together)
+      : gyros_(setup.layout.gyros),
+        max_interpolation_(setup.max_interpolation()),
+        reach_(together ? setup.reach() : Duration::zero()),
+        recent_(together ? setup.recent() : Duration::zero()) {}
+
+  [[nodiscard]] int size() const { return size_; }
+  [[nodiscard]] bool full() const { return size_ == kCapacity; }
+  /// i = 0 is the oldest.
+  [[nodiscard]] Time time(int i) const { return at(i).t; }
+  [[nodiscard]] Directions directions(int i) const {
+    const Stored& stored = at(i);
+    Directions h_b;
+    for (int k = 0; k < gyros_; ++k) {
+      h_b[k] = stored.h_b[k];
+    }
+    return h_b;
+  }
+  /// Of the latest sample; needs one.
+  [[nodiscard]] Time latest_t() const { return time(size_ - 1); }
+  [[nodiscard]] std::optional<Time> latest() const { return size_ > 0 ? std::optional(latest_t()) : std::nullopt; }
+  [[nodiscard]] Directions latest_directions() const { return directions(size_ - 1); }
+
+  /// Whether a sample comes sooner than there is room for.
+  [[nodiscard]] bool too_soon(Time t) const { return size_ > 0 && t - latest_t() < kMinSpacing; }
+
+  void push(const GyroSample& sample) {
+    if (full()) {
+      first_ = (first_ + 1) % kCapacity;
+      --size_;
+    }
+    Stored& stored = samples_[index(size_)];
+    stored.t = sample.t;
+    for (int k = 0; k < gyros_; ++k) {
+      stored.h_b[k] = sample.h_b[k];
+    }
+    ++size_;
+  }
+  void clear() { size_ = 0; }
+
+  /// Index of the first sample after `t`.
+  [[nodiscard]] int first_after(Time t) const {
+    int i = size_;
+    while (i > 0 && time(i - 1) > t) {
+      --i;
+    }
+    return i;
+  }
+
+  /// Readings at `t`, by a cubic through the samples round it, or between the two next to it; nothing where there are
+  /// none close enough. `gyros`: what is believed of them, for the rate.
+  template <class Gyros>
+  [[nodiscard]] std::optional<FixReadings> at(Time t, const CalibrationSetup& setup, const GyroHealth& health,
+                                              const Gyros& gyros) const {
+    const int after = first_after(t);
+    if (after == 0) {
+      return std::nullopt;
+    }
+    FixReadings readings;
+    const Time before_t = time(after - 1);
+    if (before_t == t) {
+      readings.used = health.usable(before_t, t);
+      readings.h_b = directions(after - 1);
+    } else if (after < size_ && time(after) - before_t <= max_interpolation_) {
+      const Time next_t = time(after);
+      readings.used = health.usable(before_t, next_t);
+      readings.h_b = between(directions(after - 1), directions(after),
+                             to_seconds(t - before_t) / to_seconds(next_t - before_t), gyros_);
+    } else {
+      return std::nullopt;
+    }
+    fit(t, reach_, after, 3, setup, health, gyros, readings);
+    return readings;
+  }
+
+  /// Readings at the latest sample; needs one.
+  template <class Gyros>
+  [[nodiscard]] FixReadings now(const CalibrationSetup& setup, const GyroHealth& health, const Gyros& gyros) const {
+    FixReadings readings;
+    readings.used = health.usable(latest_t(), latest_t());
+    readings.h_b = latest_directions();
+    fit(latest_t(), recent_, size_, 2, setup, health, gyros, readings);
+    return readings;
+  }
+
+ private:
+  struct Stored {
+    Time t{};
+    PerGyro<Eigen::Vector3d, kGyros> h_b;
+  };
+  [[nodiscard]] std::size_t index(int i) const { return static_cast<std::size_t>((first_ + i) % kCapacity); }
+  [[nodiscard]] const Stored& at(int i) const { return samples_[index(i)]; }
+
+  /// Takes the samples within `reach` to both sides of `t` together, if they are more than a polynomial needs and it
+  /// explains them; `after`: the first of them after `t`.
+  template <class Gyros>
+  void fit(Time t, Duration reach, int after, int degree, const CalibrationSetup& setup, const GyroHealth& health,
+           const Gyros& gyros, FixReadings& readings) const {
+    const auto adjacent = [&](int i) { return time(i + 1) - time(i) <= max_interpolation_; };
+    int begin = after - 1;
+    while (begin > 0 && t - time(begin - 1) <= reach && adjacent(begin - 1)) {
+      --begin;
+    }
+    int end = after;
+    while (end < size_ && time(end) - t <= reach && adjacent(end - 1)) {
+      ++end;
+    }
+    if (end - begin < DirectionsFit::least_samples(degree)) {
+      return;
+    }
+    DirectionsFit fit(t, time(begin), time(end - 1), end - begin, degree, gyros_);
+    for (int i = begin; i < end; ++i) {
+      fit.add(time(i), directions(i));
+    }
+    const FittedDirections fitted = fit.solve();
+    const GyroMask used = health.usable(time(begin), time(end - 1));
+    if (count(used) < 2 || !fitted.explains(used, setup.readout_noise_rad)) {
+      return;
+    }
+    readings.used = used;
+    readings.h_b = fitted.h_b;
+    readings.noise_factor = fitted.noise_factor;
+    Directions h_c;
+    Directions h_c_rate;
+    for (int k = 0; k < gyros_; ++k) {
+      h_c[k] = gyros[k].in_c(fitted.h_b[k]);
+      h_c_rate[k] = gyros[k].C_c_b * fitted.h_b_rate[k];
+    }
+    readings.rate_c = rate_by_directions(h_c, h_c_rate, used);
+  }
+
+  int gyros_ = 0;
+  Duration max_interpolation_{};
+  Duration reach_{};   ///< to both sides of a time
+  Duration recent_{};  ///< up to the latest sample
+  std::array<Stored, static_cast<std::size_t>(kCapacity)> samples_{};
+  int first_ = 0;
+  int size_ = 0;
+};
+
+}  // namespace trihedron

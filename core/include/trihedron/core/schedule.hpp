@@ -1,0 +1,67 @@
+#pragma once
+/// What the calibration does next: it follows the samples some seconds behind, so that the readings to both sides of a
+/// fix are there, and looks at the angles between the momenta where no fix could be used for long.
+
+#include <algorithm>
+#include <chrono>
+#include <cstdint>
+
+#include "trihedron/core/time.hpp"
+
+namespace trihedron {
+
+class Schedule {
+ public:
+  /// Without fixes the angles between the momenta are looked at so often; no two times share samples.
+  static constexpr Duration kAngleInterval = std::chrono::seconds(3);
+
+  Schedule() = default;
+  /// `reach`: readings so far to both sides of a fix are taken together. `angles_after`: without a usable fix for so
+  /// long the angles are looked at; Duration::max(): never.
+  Schedule(Duration reach, Duration angles_after) : reach_(reach), angles_after_(angles_after) {}
+
+  enum class Next : std::uint8_t { kNothing, kSample, kFix, kAngles };
+  /// The earliest of what is to be done until `limit`: the next sample is to be followed, or the next fix dealt with, at
+  /// these times, Time::max() where there is none; or the angles are to be looked at.
+  [[nodiscard]] Next next(Time limit, Time sample_t, Time fix_t) const {
+    // A fix that would share samples with the angles goes before them; they wait until none can come any more.
+    if (sample_t != Time::max() && angles_t_ < sample_t && angles_t_ <= fix_t - 2 * reach_) {
+      return angles_t_ > limit - 2 * reach_ ? Next::kNothing : Next::kAngles;
+    }
+    if (fix_t < sample_t && fix_t <= limit) {
+      return Next::kFix;
+    }
+    return sample_t <= limit ? Next::kSample : Next::kNothing;
+  }
+
+  [[nodiscard]] Time angles_t() const { return angles_t_; }
+  /// A fix before it is too late: passed, or its samples are used.
+  [[nodiscard]] Time taken_until() const { return taken_until_; }
+
+  void followed_to(Time t) { taken_until_ = std::max(taken_until_, t); }
+  void fix_used(Time t) {
+    if (angles_after_ != Duration::max()) {
+      angles_t_ = t + angles_after_;
+    }
+  }
+  void angles_used(Time t) {
+    taken_until_ = t + 2 * reach_;
+    angles_t_ = t + std::max(kAngleInterval, 2 * reach_);
+  }
+  /// Not before `t`: there are no readings.
+  void put_angles_off(Time t) { angles_t_ = t; }
+  void no_angles() { angles_t_ = Time::max(); }
+  /// The clock has been set back by −shift.
+  void set_clock(Duration shift) {
+    angles_t_ = angles_t_ == Time::max() ? angles_t_ : angles_t_ + shift;
+    taken_until_ = Time::min();
+  }
+
+ private:
+  Duration reach_{};
+  Duration angles_after_ = Duration::max();
+  Time angles_t_ = Time::max();
+  Time taken_until_ = Time::min();
+};
+
+}  // namespace trihedron

@@ -1,0 +1,106 @@
+#pragma once
+/// What the calibration filters are set up with.
+
+#include <Eigen/Core>
+#include <array>
+#include <chrono>
+#include <cstdint>
+#include <optional>
+
+#include "trihedron/core/layout.hpp"
+#include "trihedron/core/precession.hpp"
+#include "trihedron/core/time.hpp"
+
+namespace trihedron {
+
+enum class SetupFault : std::uint8_t {
+  kTooLarge,  ///< the layout needs more room than there is, or has states that this estimator cannot have
+  kPriorNotPositiveDefinite,
+  kPriorMeanNotUsable,
+  kNoiseNotPositive,
+  kGateNotPositive,
+};
+
+/// A star tracker as the filter knows it.
+struct StarTrackerSetup {
+  Eigen::Vector3d noise_rad{1e-4, 1e-4, 1e-4};          ///< 1-sigma about its own axes s
+  Eigen::Matrix3d C_c_s = Eigen::Matrix3d::Identity();  ///< as designed; c are the axes of the first
+  double alignment_sigma_rad = 1e-2;                    ///< of those beside the first, per axis
+  Duration period{};  ///< of its fixes; 0 where it is not told. Fixes that share gyro samples are counted by it.
+};
+
+struct CalibrationSetup {
+  static constexpr Duration kNever = Duration::max();
+
+  Layout layout;
+  PerGyro<double> readout_noise_rad{};  ///< 1-sigma per direction cosine
+  std::array<StarTrackerSetup, kMaxStarTrackers> star_trackers{};
+  Duration gyro_period = std::chrono::milliseconds(125);
+  double direction_random_walk_rad_sqrt_s = 0;  ///< process noise of each momentum, per axis across it
+
+  // Of the further states, where the layout has them.
+  GaussMarkov wandering_drift;  ///< rad/s per case axis
+  double readout_bias_sigma = 1e-4;               ///< of each component
+  double coefficient_change_sigma_rad_s = 1e-7;   ///< over change_time_s
+  double change_time_s = 32400;
+  Time no_change_at{};  ///< the coefficients stand for this time
+  double clock_offset_sigma_s = 0.1;
+  double orbital_error_sigma_rad = 1e-4;  ///< of each component of p_s and p_c
+  double orbital_rate_rad_s = 1.1e-3;     ///< n
+  Time orbital_phase_zero{};              ///< where nt = 0
+
+  /// A fix with a NIS above this is rejected; χ² of 4 degrees of freedom passes 30 once in 2e5 good fixes. That of a
+  /// pair: of more gyros a gate that good fixes pass as often.
+  double gate_nis = 30;
+  /// ν of Student's t, or 0 for normal noise. With it a fix above the gate is used with its weight instead of rejected,
+  /// unless the star tracker or one gyro is plainly at fault; a run above the gate still reopens.
+  /// Better where many fixes are a few times too noisy; few far outliers the gate alone keeps out no worse, and the
+  /// paper's filter better. Between 5 and 20.
+  double student_t_freedom = 0;
+  /// After so many rejections in a row the directions are set free by the size of the misfit and the fix is used: the
+  /// model was wrong, not the tracker.
+  int reopen_after_rejections = 20;
+  /// The same where the run began with a misfit that no drift can make: the tracker was wrong, or has been turned.
+  int reopen_after_jump_rejections = 400;
+  /// When that happens again within so many fixes, the parameters are what is wrong: their information goes. The
+  /// estimates stay; of estimator invariant not when that has not helped, or the prior excludes them.
+  int restart_within_fixes = 200;
+  /// Without a fix that could be used for longer than this, the angles between the momenta are used alone; or kNever.
+  Duration angles_after = std::chrono::minutes(1);
+
+  /// What keeps it from working, beside the prior.
+  [[nodiscard]] std::optional<SetupFault> fault() const;
+
+  /// How much of the change of the coefficients there has been at `t`.
+  [[nodiscard]] double part_of_change(Time t) const { return to_seconds(t - no_change_at) / change_time_s; }
+
+  /// A step between samples further apart than this is a long one, over which readings are not interpolated; the
+  /// body's acceleration over it is below the readout noise.
+  [[nodiscard]] Duration max_interpolation() const;
+  /// Readings to both sides of a fix that are taken together: fixes every 3 s do not share any. Of slow gyros more, so
+  /// that there are enough for a polynomial.
+  [[nodiscard]] Duration reach() const;
+  /// Samples that are taken together for the attitude now.
+  [[nodiscard]] Duration recent() const;
+  /// How many fixes of this star tracker share a gyro sample, at least 1: so much larger is the variance that a sample's
+  /// noise has in each of them, so that all of them together do not count it more than once.
+  [[nodiscard]] double fixes_sharing_a_sample(int head) const;
+};
+
+/// Whether these prior means can be used: finite drift coefficients and biases, and alignments that are rotations.
+template <class Gyros>
+[[nodiscard]] bool means_are_usable(const Gyros& prior, const Layout& layout) {
+  for (int k = 0; k < layout.gyros; ++k) {
+    const double off = (prior[k].C_c_b * prior[k].C_c_b.transpose() - Eigen::Matrix3d::Identity()).norm();
+    if (prior[k].drift_rad_s.size() != layout.drift_columns() || !prior[k].drift_rad_s.allFinite() ||
+        !prior[k].readout_bias.allFinite() || !(off < 1e-6)) {
+      return false;
+    }
+  }
+  return true;
+}
+
+/// 1-sigma of one further state before anything is measured; `state`: from layout.readout_bias(0) on. rad, rad/s or s.
+[[nodiscard]] double prior_sigma_of_further_state(const CalibrationSetup& setup, int state);
+
+}  // namespace trihedron

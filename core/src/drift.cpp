@@ -1,0 +1,122 @@
+#include "trihedron/core/drift.hpp"
+
+namespace trihedron {
+namespace {
+
+/// W and D of Σ a_i h_i²/2 and of h1 h2 h3, and of degree 4 the W of Σ h⁴/4, which is made of (4, 0) and (4, 4).
+constexpr bool is_in_eq1(DriftPotential potential, int degree, int order) {
+  return (degree == 2 && (order == 0 || order == 2)) || (degree == 3 && order == -2) ||
+         (degree == 4 && order == 0 && potential == DriftPotential::kW);
+}
+
+constexpr int max_degree_of(DriftModelId id) {
+  constexpr int kEsg20Degree = 2;
+  return id.family == DriftModelId::Family::kVsh ? id.degree : id.family == DriftModelId::Family::kEsg20 ? kEsg20Degree : 0;
+}
+
+}  // namespace
+
+DriftModel::DriftModel(DriftModelId id, const FurtherStates& further)
+    : harmonics_(max_degree_of(id)), wandering_(further.wandering_drift), change_(further.coefficient_change) {
+  size_ = 0;
+  for (int number = 0; number < Esg7::kSize; ++number) {
+    members_[static_cast<std::size_t>(size_++)].number = static_cast<std::int8_t>(number);
+  }
+  const int max_degree = max_degree_of(id);
+  const auto add_degrees = [&](int from, int to, DriftPotential potential) {
+    for (int degree = from; degree <= to; ++degree) {
+      for (int order = -degree; order <= degree; ++order) {
+        if (!is_in_eq1(potential, degree, order)) {
+          add(potential, degree, order);
+        }
+      }
+    }
+  };
+  if (id.family == DriftModelId::Family::kEsg20) {  // W before D
+    add_degrees(1, max_degree, DriftPotential::kW);
+    add_degrees(1, max_degree, DriftPotential::kD);
+    add(DriftPotential::kCubicD, 4, 0);
+  } else {  // degree by degree
+    for (int degree = 1; degree <= max_degree; ++degree) {
+      add_degrees(degree, degree, DriftPotential::kW);
+      add_degrees(degree, degree, DriftPotential::kD);
+    }
+  }
+  TRIHEDRON_ASSERT(size_ == id.size());
+}
+
+void DriftModel::add(DriftPotential potential, int degree, int order) {
+  members_[static_cast<std::size_t>(size_++)] = {potential, static_cast<std::int8_t>(degree),
+                                                 static_cast<std::int8_t>(order), 0};
+}
+
+void DriftModel::basis(const Eigen::Vector3d& h, double part_of_change, ColumnsView B) const {
+  const Eigen::Matrix<double, 3, Esg7::kSize> eq1 = Esg7::basis<double>(h);
+  for (int i = 0; i < 3; ++i) {
+    double* row = B.row(i);
+    for (int j = 0; j < Esg7::kSize; ++j) {
+      row[j] = eq1(i, j);
+    }
+  }
+  if (size_ > Esg7::kSize) {
+    const auto harmonics = harmonics_.at<double>(h);
+    for (int i = Esg7::kSize; i < size_; ++i) {
+      const DriftMember& its = member(i);
+      switch (its.potential) {
+        case DriftPotential::kW:
+          B.set_column(i, -harmonics.polynomial_gradient(its.degree, its.order));
+          break;
+        case DriftPotential::kD:
+          B.set_column(i, h.cross(harmonics.polynomial_gradient(its.degree, its.order)));
+          break;
+        default:
+          B.set_column(i, h.cross(h.cwiseProduct(h).cwiseProduct(h)));
+          break;
+      }
+    }
+  }
+  int column = size_;
+  if (wandering_) {
+    for (int i = 0; i < 3; ++i) {
+      B.set_column(column++, Eigen::Vector3d::Unit(i));
+    }
+  }
+  if (change_) {
+    for (int i = 0; i < Esg7::kSize; ++i) {
+      B.set_column(column++, part_of_change * eq1.col(i));
+    }
+  }
+}
+
+Eigen::Vector3d DriftModel::rate(const Eigen::Vector3d& h, double part_of_change, const double* coefficients) const {
+  using Eq1 = Esg7::Coefficients<double>;
+  Eq1 kappa = Eigen::Map<const Eq1>(coefficients);
+  int column = size_;
+  Eigen::Vector3d wandering = Eigen::Vector3d::Zero();
+  if (wandering_) {
+    wandering = Eigen::Map<const Eigen::Vector3d>(coefficients + column);
+    column += 3;
+  }
+  if (change_) {
+    kappa += part_of_change * Eigen::Map<const Eq1>(coefficients + column);
+  }
+  Eigen::Vector3d rate = Esg7::rate<double>(h, kappa) + wandering;
+  if (size_ > Esg7::kSize) {
+    const auto harmonics = harmonics_.at<double>(h);
+    Eigen::Vector3d w = Eigen::Vector3d::Zero();
+    Eigen::Vector3d d = Eigen::Vector3d::Zero();
+    for (int i = Esg7::kSize; i < size_; ++i) {
+      const DriftMember& its = member(i);
+      if (its.potential == DriftPotential::kCubicD) {
+        d += coefficients[i] * h.cwiseProduct(h).cwiseProduct(h);
+      } else {
+        (its.potential == DriftPotential::kW ? w : d) +=
+            coefficients[i] * harmonics.polynomial_gradient(its.degree, its.order);
+      }
+    }
+    rate += h.cross(d) - w;
+  }
+  return rate;
+}
+
+}  // namespace trihedron

@@ -1,7 +1,0 @@
-#include "invariant_estimator_impl.hpp"
-#include "trihedron/core/cycle.hpp"
-
-namespace trihedron {
-template class InvariantEstimator<Esg7, 3>;
-template class Cycle<InvariantEstimator<Esg7, 3>>;
-}  // namespace trihedron

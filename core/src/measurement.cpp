@@ -1,0 +1,76 @@
+#include "trihedron/core/measurement.hpp"
+
+#include <cmath>
+
+#include "trihedron/core/cholesky.hpp"
+
+namespace trihedron {
+
+FixBySharedStates fix_by_shared_states(const CalibrationSetup& setup, const StarFix& fix,
+                                       const Eigen::Vector3d& rate_c) {
+  const Layout& layout = setup.layout;
+  FixBySharedStates by = FixBySharedStates::Zero(3, layout.shared_size());
+  if (layout.further.clock_offset) {
+    by.col(layout.clock_offset() - layout.shared()) = rate_c;
+  }
+  if (layout.further.orbital_error && fix.head == 0) {
+    const double phase = setup.orbital_rate_rad_s * to_seconds(fix.t - setup.orbital_phase_zero);
+    const int first = layout.orbital_error() - layout.shared();
+    by.middleCols<3>(first) = std::sin(phase) * Eigen::Matrix3d::Identity();
+    by.middleCols<3>(first + 3) = std::cos(phase) * Eigen::Matrix3d::Identity();
+  }
+  if (fix.head > 0) {
+    by.middleCols<3>(layout.star_tracker(fix.head) - layout.shared()).setIdentity();
+  }
+  return by;
+}
+
+Eigen::Matrix3d fix_noise(const CalibrationSetup& setup, int head) {
+  const StarTrackerSetup& its = setup.star_trackers[static_cast<std::size_t>(head)];
+  const Eigen::Matrix3d root = its.C_c_s * its.noise_rad.asDiagonal();
+  return root * root.transpose();
+}
+
+Rot<In, C> corrected(const StarFix& fix, const FixBySharedStates& by_shared, const SharedStates& shared) {
+  const Eigen::Vector3d known_error = by_shared.lazyProduct(shared);
+  return Rot<In, C>::assume(fix.q_in_c.normalized()) * Rot<C, C>::exp(-Vec<C>::assume(known_error));
+}
+
+ComponentCovariance noise_of(const FixComparison& comparison, const Eigen::Matrix3d& R_c,
+                             const PerGyro<double>& readout_noise_rad) {
+  const int components = comparison.components();
+  ComponentCovariance R(components, components);
+  Eigen::Matrix<double, Eigen::Dynamic, 3, 0, kMaxComponents, 3> by_fix(components, 3);
+  Eigen::Matrix<double, Eigen::Dynamic, 1, 0, kMaxComponents, 1> white(components);
+  int row = 0;
+  for (int k = 0; k < kMaxGyros; ++k) {
+    if (comparison.used[k]) {
+      by_fix.middleRows<2>(row) = comparison.gyros[k].by_fix;
+      white.segment<2>(row).setConstant(readout_noise_rad[k] * readout_noise_rad[k]);
+      row += 2;
+    }
+  }
+  R = (by_fix * R_c).lazyProduct(by_fix.transpose());
+  R.diagonal() += white;
+  return R;
+}
+
+void whiten(ComponentCovariance& R, RowsView rows) {
+  static_cast<void>(factorize(R));
+  solve_lower(R, rows);
+}
+
+AttitudeSolution with_covariance(const AttitudeByDirections& attitude, const Eigen::Matrix3d& spread_square,
+                                 const PerGyro<double>& readout_noise_rad, int gyros, double walk_variance_rad2) {
+  AttitudeSolution solution;
+  solution.C_in_c = attitude.C_in_c;
+  for (int k = 0; k < gyros; ++k) {
+    const Eigen::Matrix3d by_phi = attitude.by_direction(k);
+    const double white = readout_noise_rad[k] * readout_noise_rad[k] + walk_variance_rad2;
+    solution.covariance_rad2 += white * by_phi * by_phi.transpose();
+  }
+  solution.covariance_rad2 += spread_square;
+  return solution;
+}
+
+}  // namespace trihedron

@@ -1,0 +1,84 @@
+#include "trihedron/core/setup.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "trihedron/core/directions_fit.hpp"
+#include "trihedron/core/fix_report.hpp"
+
+namespace trihedron {
+
+std::optional<SetupFault> CalibrationSetup::fault() const {
+  for (int k = 0; k < layout.gyros; ++k) {
+    if (!(readout_noise_rad[k] > 0 && readout_noise_rad[k] < 1)) {
+      return SetupFault::kNoiseNotPositive;
+    }
+  }
+  for (int head = 0; head < layout.star_trackers; ++head) {
+    const StarTrackerSetup& its = star_trackers[static_cast<std::size_t>(head)];
+    if (!(its.noise_rad.array() > 0).all() || !its.noise_rad.allFinite()) {
+      return SetupFault::kNoiseNotPositive;
+    }
+  }
+  if (!(direction_random_walk_rad_sqrt_s >= 0) || !(gyro_period > Duration::zero())) {
+    return SetupFault::kNoiseNotPositive;
+  }
+  if (!(gate_nis > 0) || !(student_t_freedom >= 0) || !(reopen_after_rejections > 0) ||
+      !(reopen_after_jump_rejections > 0)) {
+    return SetupFault::kGateNotPositive;
+  }
+  if (layout.further.wandering_drift && !(wandering_drift.sigma > 0 && wandering_drift.time_s > 0)) {
+    return SetupFault::kPriorNotPositiveDefinite;
+  }
+  for (int state = layout.readout_bias(0); state < layout.size(); ++state) {
+    if (!(prior_sigma_of_further_state(*this, state) > 0)) {
+      return SetupFault::kPriorNotPositiveDefinite;
+    }
+  }
+  return std::nullopt;
+}
+
+Duration CalibrationSetup::max_interpolation() const {
+  constexpr Duration kLeast = std::chrono::milliseconds(500);
+  return std::max(kLeast, gyro_period * 5 / 2);
+}
+
+Duration CalibrationSetup::reach() const {
+  constexpr Duration kLeast = std::chrono::milliseconds(1400);
+  constexpr int kCubic = 3;
+  return std::max(kLeast, gyro_period * (DirectionsFit::least_samples(kCubic) / 2));
+}
+
+Duration CalibrationSetup::recent() const {
+  constexpr Duration kLeast = std::chrono::milliseconds(2500);
+  constexpr int kQuadratic = 2;
+  return std::max(kLeast, gyro_period * DirectionsFit::least_samples(kQuadratic));
+}
+
+double CalibrationSetup::fixes_sharing_a_sample(int head) const {
+  const Duration period = star_trackers[static_cast<std::size_t>(head)].period;
+  return period > Duration::zero() ? std::max(2 * to_seconds(reach()) / to_seconds(period), 1.0) : 1.0;
+}
+
+double prior_sigma_of_further_state(const CalibrationSetup& setup, int state) {
+  const Layout& layout = setup.layout;
+  if (state < layout.change(0)) {
+    return setup.readout_bias_sigma;
+  }
+  if (state < layout.shared()) {
+    return setup.coefficient_change_sigma_rad_s;
+  }
+  if (state < layout.orbital_error()) {
+    return setup.clock_offset_sigma_s;
+  }
+  if (state < layout.star_tracker(1)) {
+    return setup.orbital_error_sigma_rad;
+  }
+  return setup.star_trackers[static_cast<std::size_t>(1 + (state - layout.star_tracker(1)) / 3)].alignment_sigma_rad;
+}
+
+double student_t_weight(double freedom, double nis, int components) {
+  return freedom > 0 ? std::min((freedom + components) / (freedom + nis), 1.0) : 1.0;
+}
+
+}  // namespace trihedron

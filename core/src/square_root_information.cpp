@@ -1,0 +1,122 @@
+#include "trihedron/core/square_root_information.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+
+#include "trihedron/core/assert.hpp"
+
+namespace trihedron {
+namespace {
+
+/// One Householder reflection of row `r` and M rows below each other, all columns from 1 on; v: the M entries of the
+/// first column.
+template <std::size_t M>
+void reflect(double* __restrict r, double* const (&rows)[M], const double (&v)[M], double v0, double beta, int columns) {
+#pragma GCC ivdep  // the rows do not overlap
+  for (int k = 1; k < columns; ++k) {
+    double s = v0 * r[k];
+    for (std::size_t i = 0; i < M; ++i) {
+      s += v[i] * rows[i][k];
+    }
+    s *= beta;
+    r[k] -= v0 * s;
+    for (std::size_t i = 0; i < M; ++i) {
+      rows[i][k] -= v[i] * s;
+    }
+  }
+}
+
+template <std::size_t M>
+void rotate_rows_into(RowsView root, RowsView extra, int eliminated) {
+  for (int j = 0; j < eliminated; ++j) {
+    double v[M];
+    double* rows[M];
+    double below = 0;
+    for (std::size_t i = 0; i < M; ++i) {
+      rows[i] = extra.row(static_cast<int>(i)) + j;
+      v[i] = *rows[i];
+      below += v[i] * v[i];
+    }
+    if (!(below > 0)) {
+      continue;
+    }
+    double* r = root.row(j) + j;
+    const double norm = std::sqrt(*r * *r + below);
+    const double alpha = *r > 0 ? -norm : norm;
+    const double v0 = *r - alpha;
+    reflect<M>(r, rows, v, v0, -1 / (alpha * v0), root.columns - j);
+    *r = alpha;
+    for (double* row : rows) {
+      *row = 0;
+    }
+  }
+}
+
+}  // namespace
+
+void rotate_into(RowsView root, RowsView extra, int eliminated) {
+  TRIHEDRON_ASSERT(root.columns == extra.columns && eliminated <= root.rows && eliminated <= root.columns);
+  constexpr int kAtOnce = 8;
+  for (int first = 0; first < extra.rows; first += kAtOnce) {
+    const RowsView some{extra.row(first), std::min(extra.rows - first, kAtOnce), extra.columns, extra.stride};
+    switch (some.rows) {
+      case 1: rotate_rows_into<1>(root, some, eliminated); break;
+      case 2: rotate_rows_into<2>(root, some, eliminated); break;
+      case 3: rotate_rows_into<3>(root, some, eliminated); break;
+      case 4: rotate_rows_into<4>(root, some, eliminated); break;
+      case 5: rotate_rows_into<5>(root, some, eliminated); break;
+      case 6: rotate_rows_into<6>(root, some, eliminated); break;
+      case 7: rotate_rows_into<7>(root, some, eliminated); break;
+      default: rotate_rows_into<8>(root, some, eliminated); break;
+    }
+  }
+}
+
+void triangularise(RowsView rows, int columns) {
+  for (int j = 0; j < columns && j + 1 < rows.rows; ++j) {
+    const int rest = rows.columns - j;
+    rotate_into({rows.row(j) + j, 1, rest, rows.stride}, {rows.row(j + 1) + j, rows.rows - j - 1, rest, rows.stride}, 1);
+  }
+}
+
+void solve_rows(ConstRowsView root, RowsView rows) {
+  for (int i = 0; i < rows.rows; ++i) {
+    double* __restrict x = rows.row(i);
+    for (int j = 0; j < root.rows; ++j) {
+      if (x[j] == 0) {
+        continue;
+      }
+      const double* __restrict R = root.row(j);
+      const double value = x[j] /= R[j];
+      for (int k = j + 1; k < root.rows; ++k) {
+        x[k] -= value * R[k];
+      }
+    }
+  }
+}
+
+void multiply(ConstRowsView a, ConstRowsView b, RowsView product) {
+  for (int i = 0; i < product.rows; ++i) {
+    double* __restrict row = product.row(i);
+    std::fill(row, row + product.columns, 0.0);
+    for (int k = 0; k < b.rows; ++k) {
+      const double by = a(i, k);
+      const double* __restrict its = b.row(k);
+      for (int j = 0; j < product.columns; ++j) {
+        row[j] += by * its[j];
+      }
+    }
+  }
+}
+
+void invert_triangle(ConstRowsView root, RowsView inverse) {
+  for (int i = 0; i < inverse.rows; ++i) {
+    double* row = inverse.row(i);
+    std::fill(row, row + root.rows, 0.0);
+    row[i] = 1;
+  }
+  solve_rows(root, inverse);
+}
+
+}  // namespace trihedron
