@@ -472,18 +472,10 @@ void InvariantEstimator<kCapacity>::update(const Compared& white, double root_we
     Gyro& gyro = gyros_[k];
     gyro.h_in =
         rotated<double>(gyro.h_in, Eigen::Vector3d(x.template segment<3>(layout.direction(k)))).normalized();
-    gyro.drift_rad_s.head(layout.drift_size()) += x.segment(layout.drift(k), layout.drift_size());
     if (layout.further.wandering_drift) {
       gyro.drift_rad_s.template segment<3>(layout.wandering_column()) += x.template segment<3>(layout.wandering(k));
     }
-    if (layout.further.coefficient_change) {
-      gyro.drift_rad_s.template segment<Layout::kEq1>(layout.change_column()) +=
-          x.template segment<Layout::kEq1>(layout.change(k));
-    }
-    if (layout.further.readout_bias) {
-      gyro.readout_bias += x.template segment<3>(layout.readout_bias(k));
-    }
-    gyro.C_c_b = turned(gyro.C_c_b, Eigen::Vector3d(x.template segment<3>(layout.alignment(k))));
+    add_parameter_errors(layout, k, x, gyro);
   }
   shared_ += x.tail(layout.shared_size());
 }

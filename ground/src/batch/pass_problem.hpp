@@ -9,62 +9,23 @@
 #include <vector>
 
 #include "batch/information_smoother.hpp"
-#include "model/prior.hpp"
+#include "model/gyro.hpp"
 #include "onboard/screened_pass.hpp"
-#include "trihedron/core/optimal_attitude.hpp"
+#include "trihedron/core/measurement.hpp"
+#include "trihedron/core/precession.hpp"
+#include "trihedron/core/setup.hpp"
 
 namespace trihedron::ground {
 
-/// Which states there are, and where they stand: those that move, then the constants per gyro, then the shared ones.
-/// GyroDirections are two components across each momentum; the rest as in InvariantLayout.
-struct PassLayout {
-  int gyros = 2;
-  int drift_size = 7;
-  bool wandering_drift = false;
-  bool readout_bias = false;
-  bool coefficient_change = false;
-  bool clock_offset = false;
-  bool orbital_error = false;
-  int further_heads = 0;
-
-  [[nodiscard]] static int direction(int gyro) { return 2 * gyro; }
-  [[nodiscard]] int wandering(int gyro) const { return 2 * gyros + 3 * gyro; }
-  [[nodiscard]] int dynamic() const { return (wandering_drift ? 5 : 2) * gyros; }
-  [[nodiscard]] int drift(int gyro) const { return dynamic() + gyro * (drift_size + 3); }
-  [[nodiscard]] int alignment(int gyro) const { return drift(gyro) + drift_size; }
-  [[nodiscard]] int bias(int gyro) const { return drift(gyros) + 3 * gyro; }
-  [[nodiscard]] int change(int gyro) const { return bias(readout_bias ? gyros : 0) + Esg7::kSize * gyro; }
-  [[nodiscard]] int shared() const { return change(coefficient_change ? gyros : 0); }
-  [[nodiscard]] int clock() const { return shared(); }
-  [[nodiscard]] int orbital() const { return shared() + (clock_offset ? 1 : 0); }
-  /// Of head 1, 2 … beside the first, which is 0.
-  [[nodiscard]] int head(int number) const { return orbital() + (orbital_error ? 6 : 0) + 3 * (number - 1); }
-  [[nodiscard]] int size() const { return head(further_heads + 1); }
-  [[nodiscard]] int constants() const { return size() - dynamic(); }
-};
-
-/// What moves the momenta beside the drift family.
+/// What moves the momenta beside the drift model.
 struct ProcessNoise {
   double direction_random_walk_rad_sqrt_s = 0;  ///< per axis across each momentum
-  double wandering_sigma_rad_s = 0;             ///< first-order Gauss–Markov, per case axis, where the layout has it
-  double wandering_time_s = 3600;
+  GaussMarkov wandering_drift;                  ///< per case axis, where the layout has it
 };
 
 struct PassSetup {
-  PassLayout layout;
-  DriftFamily family = DriftFamily::of<Esg7>();
-  ParameterPrior prior;
-  std::vector<double> readout_noise_rad;   ///< per gyro
-  std::vector<Eigen::Matrix3d> fix_noise;  ///< covariance per star tracker, c axes, rad²
-  double readout_bias_sigma = 1e-4;
-  double coefficient_change_sigma_rad_s = 1e-7;  ///< over the pass
-  double clock_offset_sigma_s = 0.1;
-  double orbital_error_sigma_rad = 1e-4;
-  std::vector<double> head_alignment_sigma_rad;  ///< of further heads
-  double orbital_rate_rad_s = 1.1e-3;
-  Time orbital_phase_zero{};
-  ProcessNoise noise;
-  double gate_nis = 30;  ///< of a pair; above it a fix counts less
+  CalibrationSetup on_board;  ///< what the estimator on board is set up with; its layout has 3 components a direction
+  Prior prior;
   /// Samples are taken so far apart, or up to half as much again before a fix: the body turns little between them, and
   /// their noise is averaged in the end.
   Duration sample_step = std::chrono::seconds(1);
@@ -72,27 +33,28 @@ struct PassSetup {
   Duration fixes_together{};
   /// Process noise comes in so often, and after a gap.
   Duration arc = std::chrono::seconds(60);
+
+  /// The states of the batch: of each direction's error two components across the momentum, so that all of them have
+  /// information; the rest as on board.
+  [[nodiscard]] Layout layout() const {
+    Layout layout = on_board.layout;
+    layout.direction_size = 2;
+    return layout;
+  }
+  [[nodiscard]] ProcessNoise noise() const {
+    return {on_board.direction_random_walk_rad_sqrt_s, on_board.wandering_drift};
+  }
 };
 
 /// Estimates of everything; momenta and wandering drift at the beginning of each arc.
 struct PassSolution {
-  std::vector<GyroParameters> gyros;
-  Eigen::VectorXd shared;  ///< as in PassLayout, from shared() on
+  Gyros gyros;          ///< their momenta mean nothing
+  SharedStates shared;  ///< as in the layout
   struct Arc {
-    GyroDirections h_in;
-    GyroDirections wandering_rad_s;  ///< case axes
+    Directions h_in;
+    Directions wandering_rad_s;  ///< case axes
   };
   std::vector<Arc> arcs;
-};
-
-/// How one momentum depends on the states of its arc: φ = by_direction a + by_wandering w + by_drift κ + by_change
-/// Δ + by_alignment δ.
-struct MomentumBy {
-  Eigen::Matrix<double, 3, 2> direction;
-  Eigen::Matrix3d wandering;                     ///< s
-  DriftFamily::Basis drift;                      ///< s
-  Eigen::Matrix<double, 3, Esg7::kSize> change;  ///< s
-  Eigen::Matrix3d alignment;
 };
 
 class PassProblem {
@@ -101,11 +63,15 @@ class PassProblem {
   PassProblem(const ScreenedPass& pass, PassSetup setup);
 
   [[nodiscard]] const PassSetup& setup() const { return setup_; }
-  void set_noise(const ProcessNoise& noise) { setup_.noise = noise; }
+  [[nodiscard]] const Layout& layout() const { return layout_; }
+  void set_noise(const ProcessNoise& noise) {
+    setup_.on_board.direction_random_walk_rad_sqrt_s = noise.direction_random_walk_rad_sqrt_s;
+    setup_.on_board.wandering_drift = noise.wandering_drift;
+  }
   [[nodiscard]] std::size_t arcs() const { return arcs_.size(); }
 
   /// Momenta along the pass by these parameters, those at its first fix read from it; no wandering drift.
-  [[nodiscard]] PassSolution start(const std::vector<GyroParameters>& gyros) const;
+  [[nodiscard]] PassSolution start(const Gyros& gyros) const;
 
   /// Linearised at a solution; smooth() estimates truth − solution.
   struct Linear {
@@ -122,7 +88,7 @@ class PassProblem {
     /// What counts beyond the squares of the rows: the scatter of fixes that count as one, and of outliers, whose rows
     /// have less weight, so much that they are 2 g − g²/s together, s their NIS and g the gate: a worse one is not more
     /// likely.
-    double beside_square = 0;
+    double beyond_squares = 0;
   };
   [[nodiscard]] Linear linearise(const PassSolution& solution) const;
   /// The same with other process noise than that of the setup.
@@ -130,8 +96,6 @@ class PassProblem {
 
   [[nodiscard]] Time begin_of(std::size_t arc) const { return nodes_[arcs_[arc].begin].t; }
 
-  /// What is known of a gyro, with its part of truth − solution added.
-  [[nodiscard]] GyroParameters corrected(GyroParameters parameters, int gyro, const Eigen::VectorXd& x) const;
   /// Adds what smooth() found.
   void correct(const SmootherResult& found, PassSolution& solution) const;
 
@@ -140,8 +104,9 @@ class PassProblem {
     std::size_t arc = 0;
     Time t{};
     const ScreenedPass::Fix* fix = nullptr;  ///< there, if any
-    GyroDirections h_in;
-    std::vector<MomentumBy> by;
+    Gyros gyros;  ///< as believed, with the momenta of this time and the wandering drift of the arc
+    PerGyro<Sensitivity<kMaxDriftColumns>> since;     ///< the beginning of the arc
+    PerGyro<Eigen::Matrix<double, 3, 2>> directions;  ///< there: φ by the two components across the momentum
   };
   /// Goes along all samples, thinned, and fixes, in time order.
   void go_along(const PassSolution& solution, const std::function<void(const Moment&)>& visit) const;
@@ -158,21 +123,18 @@ class PassProblem {
   [[nodiscard]] bool is_outlier(const FixRows& rows) const;
 
   /// By the momenta and these readings.
-  [[nodiscard]] static Result<AttitudeByDirections<kMaxGyros>, DirectionsFault> attitude(const PassSolution& solution,
-                                                                                         const Moment& moment,
-                                                                                         const GyroDirections& h_b,
-                                                                                         const GyrosUsed& used);
+  [[nodiscard]] Result<AttitudeByDirections, DirectionsFault> attitude(const Moment& moment, const Directions& h_b,
+                                                                       const GyroMask& used) const;
   /// How its error, c axes, depends on the states of the arc.
-  [[nodiscard]] Eigen::MatrixXd attitude_by_states(const PassSolution& solution, const Moment& moment,
-                                                   const AttitudeByDirections<kMaxGyros>& attitude,
-                                                   const GyroDirections& h_b) const;
+  [[nodiscard]] Eigen::MatrixXd attitude_by_states(const Moment& moment, const AttitudeByDirections& attitude,
+                                                   const Directions& h_b) const;
 
  private:
   /// Something to go along: a sample or a fix.
   struct Node {
     Time t{};
-    GyroDirections h_b;
-    GyrosUsed used{};
+    Directions h_b;
+    GyroMask used{};
     const ScreenedPass::Fix* fix = nullptr;
     bool after_gap = false;
   };
@@ -181,16 +143,17 @@ class PassProblem {
     std::size_t end = 0;  ///< the first node of the next arc, which this one ends at, or that after the last
   };
 
-  void step(const PassSolution& solution, const Node& from, const Node& to, Moment& moment,
-            double& extra_variance_rad2) const;
-  /// Of the coefficient change: −1 at the begin of the pass, 0 at its end.
-  [[nodiscard]] double part_of_change(Time t) const;
+  void step(const Node& from, const Node& to, Moment& moment, double& extra_variance_rad2) const;
   void begin_arc(const PassSolution& solution, std::size_t arc, Moment& moment) const;
-  [[nodiscard]] Eigen::Matrix3Xd fix_by_shared(const ScreenedPass::Fix& fix) const;
+  /// Rows about the states at a moment, three components of each direction, as rows about those of its arc.
+  template <class Rows>
+  [[nodiscard]] Eigen::MatrixXd by_states_of_arc(const Moment& moment, Rows rows) const;
   void add_prior(const PassSolution& solution, Linear& linear) const;
   void end_arc(const PassSolution& solution, const Moment& moment, double extra_variance_rad2, Linear& linear) const;
 
   PassSetup setup_;
+  Layout layout_;
+  DriftModel drift_;
   int gyros_;
   std::vector<Node> nodes_;
   std::vector<ArcNodes> arcs_;

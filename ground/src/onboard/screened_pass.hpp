@@ -5,32 +5,27 @@
 #include <utility>
 #include <vector>
 
-#include "trihedron/core/cycle.hpp"
+#include "trihedron/core/on_board.hpp"
 #include "trihedron/records/pass.hpp"
 
 namespace trihedron::ground {
 
-inline constexpr int kMaxGyros = 4;
-/// Of the gyros that there are; those beyond are not used.
-using GyroDirections = PerGyro<Eigen::Vector3d, kMaxGyros>;
-using GyrosUsed = GyroMask<kMaxGyros>;
-
 /// In the order of their times; where the clock was set back, the stretch with the most fixes.
 struct ScreenedPass {
-  [[nodiscard]] static GyroDirections unread() {
-    GyroDirections h_b;
+  [[nodiscard]] static Directions unread() {
+    Directions h_b;
     std::ranges::fill(h_b, Eigen::Vector3d::UnitX());
     return h_b;
   }
   struct Sample {
     Time t{};
-    GyroDirections h_b = unread();  ///< unit, where used
-    GyrosUsed used{};
+    Directions h_b = unread();  ///< unit, where used
+    GyroMask used{};
   };
   struct Fix {
     StarFix fix;
-    GyroDirections h_b = unread();  ///< by several samples together
-    GyrosUsed used{};
+    Directions h_b = unread();  ///< by several samples together
+    GyroMask used{};
     double noise_factor = 1;          ///< as of FixReadings
     Eigen::Vector3d rate_c{0, 0, 0};  ///< of the body relative to `in`, rad/s
   };
@@ -51,8 +46,7 @@ struct ScreenedPass {
   }
 
   /// The next sample of the pass and what the cycle made of it.
-  template <class Report>
-  void add_sample(const GyroTelemetry& gyro, std::size_t i, const Report& report) {
+  void add_sample(const GyroSample& its, const StepReport& report) {
     if (report.sample == SampleStatus::kUsedAfterClockSetBack) {
       clock_set_back = true;
       keep_longest();
@@ -65,16 +59,15 @@ struct ScreenedPass {
       return;
     }
     Sample& sample = samples.emplace_back();
-    sample.t = gyro.t[i];
+    sample.t = its.t;
     for (int k = 0; k < gyros; ++k) {
-      sample.h_b[k] = gyro.direction(i, k).normalized();
+      sample.h_b[k] = its.h_b[k].normalized();
       sample.used[k] = report.gyros[k] == GyroState::kUsed;
     }
   }
 
   /// A fix and what the cycle made of it.
-  template <class Report>
-  void add_fix(const Report& report) {
+  void add_fix(const StepReport& report) {
     if (!report.compared) {
       return;
     }
