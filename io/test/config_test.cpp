@@ -10,14 +10,14 @@ namespace {
 using testing::HasSubstr;
 using Choice = FurtherStateOptions::Choice;
 
-CalibrationOptions read_back(const std::string& text) {
+CalibrationOptions read_config_text(const std::string& text) {
   const TemporaryDirectory directory;
   write_text(directory / "config.toml", text);
   return read_config(directory / "config.toml");
 }
 
-std::string refusal_of(const std::string& text) {
-  return refusal([&] { static_cast<void>(read_back(text)); });
+std::string refused_config(const std::string& text) {
+  return refusal([&] { static_cast<void>(read_config_text(text)); });
 }
 
 TEST(Config, ComesBackWithEachFurtherState) {
@@ -28,12 +28,12 @@ TEST(Config, ComesBackWithEachFurtherState) {
     CalibrationOptions options;
     options.further_states[row.state] = Choice::kOn;
     const std::string text = format_config(options);
-    const FurtherStateOptions states = read_back(text).further_states;
+    const FurtherStateOptions states = read_config_text(text).further_states;
     for (const FurtherStateRow& other : kFurtherStates) {
       EXPECT_EQ(states[other.state], other.state == row.state ? Choice::kOn : Choice::kAuto) << text;
     }
     options.further_states[row.state] = Choice::kOff;
-    EXPECT_EQ(read_back(format_config(options)).further_states[row.state], Choice::kOff);
+    EXPECT_EQ(read_config_text(format_config(options)).further_states[row.state], Choice::kOff);
   }
 }
 
@@ -41,25 +41,25 @@ TEST(Config, ComesBackWithEachEstimatorAndDriftModel) {
   for (const EstimatorRow& row : kEstimators) {
     CalibrationOptions options;
     options.estimator = row.estimator;
-    EXPECT_EQ(read_back(format_config(options)).estimator, row.estimator);
-    EXPECT_FALSE(read_back(format_config(options)).drift_model.has_value());
+    EXPECT_EQ(read_config_text(format_config(options)).estimator, row.estimator);
+    EXPECT_FALSE(read_config_text(format_config(options)).drift_model.has_value());
   }
   for (const DriftModelId& model : {kEsg7, kEsg20, vsh(3)}) {
     CalibrationOptions options;
     options.drift_model = model;
-    EXPECT_EQ(read_back(format_config(options)).drift_model, model);
+    EXPECT_EQ(read_config_text(format_config(options)).drift_model, model);
   }
 }
 
 TEST(Config, RefusesNamesThatThereAreNot) {
-  EXPECT_THAT(refusal_of("estimator = \"magic\"\n"),
+  EXPECT_THAT(refused_config("estimator = \"magic\"\n"),
               HasSubstr("there is no estimator \"magic\"; use one of: invariant, paper, batch"));
-  EXPECT_THAT(refusal_of("drift_model = \"vsh:9\"\n"),
+  EXPECT_THAT(refused_config("drift_model = \"vsh:9\"\n"),
               HasSubstr("there is no drift model \"vsh:9\"; use auto, esg7, esg20, or vsh:1 … vsh:6"));
-  EXPECT_THAT(refusal_of("[further_states]\nclock_ofset = \"on\"\n"), HasSubstr("did you mean \"clock_offset\"?"));
-  EXPECT_THAT(refusal_of("[further_states]\nreadout_bias = \"maybe\"\n"),
+  EXPECT_THAT(refused_config("[further_states]\nclock_ofset = \"on\"\n"), HasSubstr("did you mean \"clock_offset\"?"));
+  EXPECT_THAT(refused_config("[further_states]\nreadout_bias = \"maybe\"\n"),
               HasSubstr("\"readout_bias\" is neither auto nor on nor off"));
-  EXPECT_THAT(refusal_of("[further_states]\nwandering_drift = \"-1e-8rad/s\"\n"),
+  EXPECT_THAT(refused_config("[further_states]\nwandering_drift = \"-1e-8rad/s\"\n"),
               HasSubstr("\"wandering_drift\" is not positive"));
 }
 
