@@ -6,6 +6,7 @@
 
 #include "consistency/grid.hpp"
 #include "consistency/statistics.hpp"
+#include "trihedron/ground/model/names.hpp"
 
 namespace trihedron::consistency {
 

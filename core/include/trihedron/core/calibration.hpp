@@ -4,7 +4,6 @@
 #include <Eigen/Core>
 #include <algorithm>
 #include <chrono>
-#include <cstdint>
 #include <optional>
 
 #include "trihedron/core/attitude.hpp"
@@ -12,6 +11,7 @@
 #include "trihedron/core/per_gyro.hpp"
 #include "trihedron/core/precession.hpp"
 #include "trihedron/core/result.hpp"
+#include "trihedron/core/status.hpp"
 #include "trihedron/core/time.hpp"
 
 namespace trihedron {
@@ -104,28 +104,6 @@ struct CalibrationSetup {
                        [](double noise) { return noise > 0 && noise < 1; });
   }
 };
-
-enum class FixStatus : std::uint8_t {
-  kNone,                 ///< no fix was due
-  kPending,              ///< held until the gyro samples round it are there
-  kStarted,              ///< the first fix: sets the directions
-  kUsed,                 ///< calibration updated
-  kUsedAfterReopening,   ///< used after a run of rejections, with the directions set free
-  kRestarted,            ///< used after another run of rejections soon after: the filter began anew
-  kRejectedNotRotation,  ///< quaternion not finite or not unit
-  kRejectedOutOfOrder,   ///< repeated, or too late: the calibration has passed its time
-  kRejectedNoGyro,       ///< no gyro samples close enough round it
-  kRejectedUnknownHead,  ///< of a star tracker that the estimator does not have
-  kRejectedBacklog,      ///< more fixes are waiting than there is room for
-  kRejectedGeometry,     ///< momenta nearly parallel
-  kRejectedTooFewGyros,  ///< fewer than two gyros can be used, or at the start not all; the step's report names them
-  kRejectedByGate,       ///< NIS above the gate
-};
-
-[[nodiscard]] constexpr bool is_used(FixStatus status) {
-  return status == FixStatus::kStarted || status == FixStatus::kUsed || status == FixStatus::kUsedAfterReopening ||
-         status == FixStatus::kRestarted;
-}
 
 /// Eq. (3), components 2–5, at one fix, and what was done with it.
 template <int M>

@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <array>
 #include <chrono>
-#include <cstdint>
 #include <numbers>
 #include <optional>
 #include <utility>
@@ -14,24 +13,10 @@
 #include "trihedron/core/fix_readings.hpp"
 #include "trihedron/core/gyro_health.hpp"
 #include "trihedron/core/navigator.hpp"
+#include "trihedron/core/status.hpp"
 #include "trihedron/core/telemetry.hpp"
 
 namespace trihedron {
-
-enum class SampleStatus : std::uint8_t {
-  kUsed,
-  kRejectedNotDirection,   ///< a reading is not finite or not unit
-  kRejectedOutOfOrder,     ///< not later than the sample before it, or alone more than an hour ahead
-  kRejectedGeometry,       ///< momenta nearly parallel
-  kRejectedTooFewGyros,    ///< fewer than two gyros can be used; the report names them
-  kUsedAfterClockSetBack,  ///< used, the first since the clock of the telemetry was set back: nothing is predicted over
-                           ///< that
-};
-inline constexpr std::size_t kSampleStatuses = 6;
-
-[[nodiscard]] constexpr bool is_used(SampleStatus status) {
-  return status == SampleStatus::kUsed || status == SampleStatus::kUsedAfterClockSetBack;
-}
 
 /// Astro-corrections of the navigator.
 struct CorrectionPolicy {

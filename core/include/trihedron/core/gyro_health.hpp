@@ -1,18 +1,11 @@
 #pragma once
 /// Which gyros are to be believed, and when.
 
-#include <cstdint>
-
 #include "trihedron/core/per_gyro.hpp"
+#include "trihedron/core/status.hpp"
 #include "trihedron/core/telemetry.hpp"
 
 namespace trihedron {
-
-enum class GyroState : std::uint8_t {
-  kUsed,
-  kStuck,     ///< its readings do not change, not even by noise; used again when they do
-  kIsolated,  ///< left out for good: time after time it alone did not agree with the rest
-};
 
 /// Readings that stand still, and verdicts at fixes that were rejected.
 template <int N>

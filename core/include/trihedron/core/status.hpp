@@ -1,0 +1,52 @@
+#pragma once
+/// What was done with a gyro sample, with a fix and with a gyro.
+
+#include <cstddef>
+#include <cstdint>
+
+namespace trihedron {
+
+enum class SampleStatus : std::uint8_t {
+  kUsed,
+  kRejectedNotDirection,   ///< a reading is not finite or not unit
+  kRejectedOutOfOrder,     ///< not later than the sample before it, or alone more than an hour ahead
+  kRejectedGeometry,       ///< momenta nearly parallel
+  kRejectedTooFewGyros,    ///< fewer than two gyros can be used; the report names them
+  kUsedAfterClockSetBack,  ///< used, the first since the clock of the telemetry was set back: nothing is predicted over
+                           ///< that
+};
+inline constexpr std::size_t kSampleStatuses = 6;
+
+[[nodiscard]] constexpr bool is_used(SampleStatus status) {
+  return status == SampleStatus::kUsed || status == SampleStatus::kUsedAfterClockSetBack;
+}
+
+enum class FixStatus : std::uint8_t {
+  kNone,                 ///< no fix was due
+  kPending,              ///< held until the gyro samples round it are there
+  kStarted,              ///< the first fix: sets the directions
+  kUsed,                 ///< calibration updated
+  kUsedAfterReopening,   ///< used after a run of rejections, with the directions set free
+  kRestarted,            ///< used after another run of rejections soon after: the filter began anew
+  kRejectedNotRotation,  ///< quaternion not finite or not unit
+  kRejectedOutOfOrder,   ///< repeated, or too late: the calibration has passed its time
+  kRejectedNoGyro,       ///< no gyro samples close enough round it
+  kRejectedUnknownHead,  ///< of a star tracker that the estimator does not have
+  kRejectedBacklog,      ///< more fixes are waiting than there is room for
+  kRejectedGeometry,     ///< momenta nearly parallel
+  kRejectedTooFewGyros,  ///< fewer than two gyros can be used, or at the start not all; the step's report names them
+  kRejectedByGate,       ///< NIS above the gate
+};
+
+[[nodiscard]] constexpr bool is_used(FixStatus status) {
+  return status == FixStatus::kStarted || status == FixStatus::kUsed || status == FixStatus::kUsedAfterReopening ||
+         status == FixStatus::kRestarted;
+}
+
+enum class GyroState : std::uint8_t {
+  kUsed,
+  kStuck,     ///< its readings do not change, not even by noise; used again when they do
+  kIsolated,  ///< left out for good: time after time it alone did not agree with the rest
+};
+
+}  // namespace trihedron
