@@ -14,7 +14,6 @@
 #include "summary.hpp"
 #include "trihedron/ground/calibrate/several_passes.hpp"
 #include "trihedron/ground/evaluate/used_fixes.hpp"
-#include "trihedron/ground/model/names.hpp"
 #include "trihedron/ground/model/setup_error.hpp"
 #include "trihedron/io/atomic_file.hpp"
 #include "trihedron/io/attitude.hpp"

@@ -10,7 +10,6 @@
 
 #include "trihedron/core/frames.hpp"
 #include "trihedron/ground/judge/verdict.hpp"
-#include "trihedron/ground/model/names.hpp"
 #include "trihedron/io/error.hpp"
 #include "trihedron/io/time_text.hpp"
 #include "trihedron/records/scenario.hpp"

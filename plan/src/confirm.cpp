@@ -7,7 +7,6 @@
 
 #include "trihedron/ground/calibrate/calibrate.hpp"
 #include "trihedron/ground/evaluate/evaluate.hpp"
-#include "trihedron/ground/model/names.hpp"
 #include "trihedron/ground/tasks/on_all_cores.hpp"
 #include "trihedron/sim/random.hpp"
 #include "trihedron/sim/simulate.hpp"

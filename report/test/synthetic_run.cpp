@@ -7,7 +7,6 @@
 #include <numbers>
 #include <random>
 
-#include "trihedron/ground/model/names.hpp"
 #include "trihedron/records/run.hpp"
 #include "units.hpp"
 

@@ -12,7 +12,6 @@
 #include "trihedron/core/invariant_estimator.hpp"
 #include "trihedron/core/paper_estimator.hpp"
 #include "trihedron/ground/calibrate/calibrate.hpp"
-#include "trihedron/ground/model/names.hpp"
 #include "trihedron/ground/onboard/replay.hpp"
 #include "trihedron/sim/simulate.hpp"
 

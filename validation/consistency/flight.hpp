@@ -6,7 +6,6 @@
 
 #include "consistency/grid.hpp"
 #include "consistency/statistics.hpp"
-#include "trihedron/ground/model/names.hpp"
 
 namespace trihedron::consistency {
 

@@ -16,7 +16,6 @@
 #include "consistency/flight.hpp"
 #include "consistency/grid.hpp"
 #include "consistency/results.hpp"
-#include "trihedron/ground/model/names.hpp"
 #include "trihedron/ground/tasks/on_all_cores.hpp"
 
 namespace {

@@ -14,7 +14,6 @@
 #include "consistency/statistics.hpp"
 #include "trihedron/ground/calibrate/calibrate.hpp"
 #include "trihedron/ground/judge/agreement.hpp"
-#include "trihedron/ground/model/names.hpp"
 #include "trihedron/io/pass.hpp"
 
 namespace trihedron::consistency {

@@ -6,39 +6,21 @@
 
 namespace trihedron::ground {
 
-std::vector<std::string> further_names(const FurtherStateOptions& states, int further_heads, int gyros) {
-  constexpr auto kOn = FurtherStateOptions::Choice::kOn;
-  std::vector<std::string> names;
-  if (states.clock_offset == kOn) {
-    names.emplace_back("clock_offset_s");
-  }
-  if (states.orbital_error == kOn) {
-    for (const char* wave : {"sine", "cosine"}) {
-      for (const char axis : {'x', 'y', 'z'}) {
-        names.push_back(fmt::format("orbital_{}_{}_rad", wave, axis));
+std::vector<ParameterId> further_parameters(const FurtherStateOptions& states, int further_heads, int gyros) {
+  using Owner = FurtherStateRow::Owner;
+  std::vector<ParameterId> parameters;
+  for (const FurtherStateRow& row : kFurtherStates) {
+    const bool is_there = row.owner == Owner::kFurtherStarTracker || states.is_on(row.state);
+    // The first star tracker has none of its own.
+    const int begin = row.owner == Owner::kFurtherStarTracker ? 1 : 0;
+    const int end = row.owner == Owner::kFurtherStarTracker ? 1 + further_heads : row.owner == Owner::kGyro ? gyros : 1;
+    for (int owner = begin; is_there && owner < end; ++owner) {
+      for (int component = 0; component < static_cast<int>(row.components.size()); ++component) {
+        parameters.push_back(ParameterId::further(row.state, static_cast<std::size_t>(owner), component));
       }
     }
   }
-  for (int head = 1; head <= further_heads; ++head) {
-    for (const char axis : {'x', 'y', 'z'}) {
-      names.push_back(fmt::format("star_tracker_{}_align_{}_rad", head + 1, axis));
-    }
-  }
-  if (states.readout_bias == kOn) {
-    for (int k = 1; k <= gyros; ++k) {
-      for (const char axis : {'x', 'y', 'z'}) {
-        names.push_back(fmt::format("gyro{}_readout_bias_{}_rad", k, axis));
-      }
-    }
-  }
-  if (states.coefficient_change == kOn) {
-    for (int k = 1; k <= gyros; ++k) {
-      for (const char* coefficient : Esg7::kNames) {
-        names.push_back(fmt::format("gyro{}_{}_change_rad_s", k, coefficient));
-      }
-    }
-  }
-  return names;
+  return parameters;
 }
 
 PassSetup setup_of(const Pass& pass, const CalibrationOptions& options) {

@@ -2,7 +2,6 @@
 /// From an estimator and options to the problem that the whole pass poses.
 
 #include <algorithm>
-#include <string>
 #include <vector>
 
 #include "batch/pass_problem.hpp"
@@ -11,9 +10,6 @@
 
 namespace trihedron::ground {
 
-/// Prior sigma of the change of a coefficient over a pass, over that of the coefficient.
-inline constexpr double kChangeOfCoefficients = 0.05;
-
 /// Star trackers beside the first that the estimator uses.
 template <class Estimator>
 [[nodiscard]] int further_heads(const Pass& pass) {
@@ -21,25 +17,25 @@ template <class Estimator>
 }
 
 /// Of the further states that are on, but for wandering drift; shared ones first, then those of the gyros.
-[[nodiscard]] std::vector<std::string> further_names(const FurtherStateOptions& states, int further_heads, int gyros);
+[[nodiscard]] std::vector<ParameterId> further_parameters(const FurtherStateOptions& states, int further_heads,
+                                                          int gyros);
 
 /// The problem that Estimator solves on board, with the drift model asked for and only those further states that are
 /// on. Throws SetupError.
 template <class Estimator>
 [[nodiscard]] PassSetup pass_setup(const typename Estimator::Setup& from, const Pass& pass,
                                    const CalibrationOptions& options) {
-  constexpr auto kOn = FurtherStateOptions::Choice::kOn;
   const FurtherStateOptions& states = options.further_states;
   const int heads = further_heads<Estimator>(pass);
   PassSetup setup;
-  setup.family = family_of(options.drift_model);
+  setup.family = family_of(decided_drift_model(options));
   setup.layout = {.gyros = Estimator::kGyros,
                   .drift_size = setup.family.size(),
-                  .wandering_drift = states.wandering_drift == kOn,
-                  .readout_bias = states.readout_bias == kOn,
-                  .coefficient_change = states.coefficient_change == kOn,
-                  .clock_offset = states.clock_offset == kOn,
-                  .orbital_error = states.orbital_error == kOn,
+                  .wandering_drift = states.is_on(FurtherState::kWanderingDrift),
+                  .readout_bias = states.is_on(FurtherState::kReadoutBias),
+                  .coefficient_change = states.is_on(FurtherState::kCoefficientChange),
+                  .clock_offset = states.is_on(FurtherState::kClockOffset),
+                  .orbital_error = states.is_on(FurtherState::kOrbitalError),
                   .further_heads = heads};
   setup.prior = prior_of(pass.settings, Estimator::kGyros, setup.family);
   for (int k = 0; k < Estimator::kGyros; ++k) {
@@ -63,7 +59,8 @@ template <class Estimator>
     setup.noise.wandering_sigma_rad_s = from.wandering_sigma_rad_s;
     setup.noise.wandering_time_s = from.wandering_time_s;
   }
-  setup.coefficient_change_sigma_rad_s = kChangeOfCoefficients * pass.settings.gyros[0].drift_common_sigma_rad_s;
+  setup.coefficient_change_sigma_rad_s =
+      row_of(FurtherState::kCoefficientChange).prior_sigma * pass.settings.gyros[0].drift_common_sigma_rad_s;
   setup.gate_nis = from.gate_nis;
   return setup;
 }

@@ -9,7 +9,6 @@
 
 #include "batch/pass_setup.hpp"
 #include "batch/smoothed_attitude.hpp"
-#include "trihedron/ground/model/names.hpp"
 #include "trihedron/ground/model/setup_error.hpp"
 
 namespace trihedron::ground {
@@ -59,7 +58,7 @@ void use_residuals(const PassProblem& problem, const PassSolution& solution, con
 
 /// How far the constants by the first half of the pass are off those by all of it: their difference has the covariance
 /// by which the second half makes them better known. Only what it halves at least counts.
-void compare_halves(const BatchResult& result, const PassLayout& layout, std::map<std::string, double>& statistics) {
+void compare_halves(const BatchResult& result, const PassLayout& layout, Statistics& statistics) {
   constexpr double kLeast = 0.5;
   const PassProblem::Linear& linear = result.linear;
   const std::size_t half = linear.stages.size() / 2;
@@ -84,13 +83,13 @@ void compare_halves(const BatchResult& result, const PassLayout& layout, std::ma
       ++freedom;
     }
   }
-  statistics["halves_chi_square"] = square;
-  statistics["halves_degrees_of_freedom"] = freedom;
+  statistics.halves_chi_square = square;
+  statistics.halves_degrees_of_freedom = freedom;
 }
 
 /// Columns of `to` in place of those of `from`. What was not estimated along the pass is not a number there, with the
 /// sigma of before the pass.
-void rearrange(const std::vector<std::string>& from, const std::vector<std::string>& to, const PassSetup& setup,
+void rearrange(const std::vector<ParameterId>& from, const std::vector<ParameterId>& to, const PassSetup& setup,
                ParameterHistory& history) {
   const Eigen::VectorXd prior_sigma = setup.prior.covariance.diagonal().cwiseSqrt();
   ParameterHistory rearranged{history.t, {}, {}};
@@ -109,12 +108,12 @@ void rearrange(const std::vector<std::string>& from, const std::vector<std::stri
 }
 
 std::vector<FurtherEstimate> further_of(const PassSetup& setup, const BatchResult& result,
-                                        const std::vector<std::string>& names) {
+                                        const std::vector<ParameterId>& parameters) {
   const PassLayout& layout = setup.layout;
   const MatrixXd& root = result.errors.last_root;
   std::vector<FurtherEstimate> further;
   const auto tell = [&](double value, int state) {
-    further.push_back({names[further.size()], value, root.row(state).norm()});
+    further.push_back({parameters[further.size()], value, root.row(state).norm()});
   };
   for (int i = layout.shared(); i < layout.size(); ++i) {
     tell(result.solution.shared(i - layout.shared()), i);
@@ -177,18 +176,19 @@ void Refinement::put_into(CalibrationRun& run) && {
   for (int k = 0; k < layout.gyros; ++k) {
     const auto index = static_cast<std::size_t>(k);
     GyroCalibration& gyro = calibration.gyros[index];
-    gyro = record_of(result_.solution.gyros[index], options_.drift_model, setup.family);
+    gyro = record_of(result_.solution.gyros[index], setup.family);
     gyro.momentum_in = last_h_in[k];
   }
-  calibration.estimator = kBatch;
-  const std::vector<std::string> states = state_names(setup.family, layout.gyros);
+  calibration.estimator = Estimator::kBatch;
+  const std::vector<ParameterId> states =
+      drift_and_alignment(setup.family.model(), static_cast<std::size_t>(layout.gyros));
   rearrange(calibration.states, states, setup, run.parameters);
   calibration.states = states;
   calibration.further =
-      further_of(setup, result_, further_names(options_.further_states, layout.further_heads, layout.gyros));
+      further_of(setup, result_, further_parameters(options_.further_states, layout.further_heads, layout.gyros));
   compare_halves(result_, layout, calibration.statistics);
-  calibration.statistics["batch_iterations"] = result_.iterations;
-  calibration.statistics["batch_converged"] = result_.converged ? 1 : 0;
+  calibration.statistics.batch_iterations = result_.iterations;
+  calibration.statistics.batch_converged = result_.converged;
   use_residuals(problem_, result_.solution, roots_, run.fixes);
   run.attitude = std::move(course_.attitude);
   run.definitive_attitude = std::move(definitive_attitude_);

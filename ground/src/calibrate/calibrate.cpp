@@ -17,7 +17,6 @@
 #include "onboard/setup.hpp"
 #include "onboard/with_estimator.hpp"
 #include "trihedron/ground/judge/verdict.hpp"
-#include "trihedron/ground/model/names.hpp"
 #include "trihedron/ground/model/setup_error.hpp"
 #include "trihedron/ground/onboard/replay.hpp"
 #include "trihedron/records/progress.hpp"
@@ -47,7 +46,7 @@ FixRecord record_of(const Report& report) {
   return record;
 }
 
-/// Estimates in the order of state_names().
+/// Estimates in the order of drift_and_alignment().
 template <class Estimator>
 std::vector<double> parameter_values(const Estimator& estimator) {
   std::vector<double> values;
@@ -59,7 +58,7 @@ std::vector<double> parameter_values(const Estimator& estimator) {
   return values;
 }
 
-/// Square root of the covariance of the parameters, rows in the order of state_names().
+/// Square root of the covariance of the parameters, rows in the order of drift_and_alignment().
 template <class Estimator>
 auto parameter_root(const Estimator& estimator) {
   using Base = typename Estimator::BaseModel;
@@ -116,45 +115,37 @@ class Meter {
 };
 
 /// So many fixes off in a row, by more than drift can make, are not single outliers.
-constexpr double kLie = 20;
+constexpr long kLie = 20;
 
-std::map<std::string, double> statistics_of(const std::vector<FixRecord>& fixes) {
+Statistics statistics_of(const std::vector<FixRecord>& fixes) {
+  Statistics statistics;
   double nis_sum = 0;
-  double count = 0;
-  double used = 0;
-  double outliers = 0;
-  double reopened = 0;
-  double in_a_row = 0;
-  double jumped = 0;
+  long in_a_row = 0;
   double freedom = 0;
   std::vector<double> squares(fixes.empty() ? 0 : fixes.front().innovation.size());
   for (const FixRecord& fix : fixes) {
-    used += fix.used() ? 1 : 0;
-    outliers += fix.status == FixStatus::kRejectedByGate ? 1 : 0;
+    statistics.fixes_used += fix.used() ? 1 : 0;
+    statistics.fixes_rejected_as_outliers += fix.status == FixStatus::kRejectedByGate ? 1 : 0;
     const bool was_reopened = fix.status == FixStatus::kUsedAfterReopening || fix.status == FixStatus::kRestarted;
-    reopened += was_reopened ? 1 : 0;
+    statistics.reopened += was_reopened ? 1 : 0;
     in_a_row = fix.jumped ? in_a_row + 1 : 0;
-    jumped += in_a_row == kLie ? kLie : in_a_row > kLie ? 1 : 0;
+    statistics.fixes_off_in_a_row += in_a_row == kLie ? kLie : in_a_row > kLie ? 1 : 0;
     if (fix.status == FixStatus::kUsed) {
       nis_sum += fix.nis;
       freedom += fix.degrees_of_freedom;
-      ++count;
+      ++statistics.nis_count;
       for (std::size_t i = 0; i < squares.size(); ++i) {
         squares[i] += std::pow(fix.innovation[i], 2);
       }
     }
   }
-  std::map<std::string, double> statistics{{"fixes", static_cast<double>(fixes.size())},
-                                           {"fixes_used", used},
-                                           {"fixes_rejected_as_outliers", outliers},
-                                           {"reopened", reopened},
-                                           {"fixes_off_in_a_row", jumped},
-                                           {"nis_count", count},
-                                           {"nis_degrees_of_freedom", count > 0 ? freedom / count : 0}};
-  if (count > 0) {
-    statistics["nis_mean"] = nis_sum / count;
-    for (std::size_t i = 0; i < squares.size(); ++i) {
-      statistics[fmt::format("innovation_{}_rms_rad", i + 1)] = std::sqrt(squares[i] / count);
+  statistics.fixes = static_cast<long>(fixes.size());
+  if (statistics.nis_count > 0) {
+    const auto count = static_cast<double>(statistics.nis_count);
+    statistics.nis_degrees_of_freedom = freedom / count;
+    statistics.nis_mean = nis_sum / count;
+    for (const double square : squares) {
+      statistics.innovation_rms_rad.push_back(std::sqrt(square / count));
     }
   }
   return statistics;
@@ -162,13 +153,13 @@ std::map<std::string, double> statistics_of(const std::vector<FixRecord>& fixes)
 
 /// No fix started the filter: says what became of them.
 SetupError nothing_used(const std::vector<FixRecord>& fixes) {
-  std::map<std::string, long> counts;
+  FixCounts counts;
   for (const FixRecord& fix : fixes) {
-    ++counts[name_of(fix.status)];
+    ++counts[fix.status];
   }
   std::string what_became;
-  for (const auto& [name, count] : counts) {
-    what_became += fmt::format("{}{} {}", what_became.empty() ? "" : ", ", count, name);
+  for (const NamedCount& its : named_counts(counts)) {
+    what_became += fmt::format("{}{} {}", what_became.empty() ? "" : ", ", its.count, its.name);
   }
   return {fmt::format("no fix could be used to start from ({})", what_became.empty() ? "there is none" : what_became),
           "look at the telemetry with `trihedron inspect`"};
@@ -202,9 +193,9 @@ std::vector<FurtherEstimate> further_of(const Estimator& estimator, const Furthe
     if constexpr (Estimator::kFurther.shared() > 0) {
       using Layout = typename Estimator::Layout;
       const auto root = estimator.information().inverse_root();
-      const std::vector<std::string> names = further_names(states, further_heads, Estimator::kGyros);
+      const std::vector<ParameterId> parameters = further_parameters(states, further_heads, Estimator::kGyros);
       const auto tell = [&](double value, int state) {
-        further.push_back({names[further.size()], value, root.row(state).norm()});
+        further.push_back({parameters[further.size()], value, root.row(state).norm()});
       };
       const auto tell_shared = [&](int first, int size) {
         for (int state = first; state < first + size; ++state) {
@@ -229,15 +220,15 @@ std::vector<FurtherEstimate> further_of(const Estimator& estimator, const Furthe
 
 /// The prior as a calibration: values and covariance.
 Calibration known_before(const Pass& pass, int gyros, const CalibrationOptions& options) {
-  const DriftFamily family = family_of(options.drift_model);
+  const DriftFamily family = family_of(decided_drift_model(options));
   const ParameterPrior prior = prior_of(pass.settings, gyros, family);
   Calibration before;
   before.estimator = options.estimator;
   before.epoch = before.t = pass.settings.epoch;
   for (const GyroParameters& gyro : prior.gyros) {
-    before.gyros.push_back(record_of(gyro, options.drift_model, family));
+    before.gyros.push_back(record_of(gyro, family));
   }
-  before.states = state_names(family, gyros);
+  before.states = drift_and_alignment(family.model(), static_cast<std::size_t>(gyros));
   before.covariance = prior.covariance;
   return before;
 }
@@ -259,7 +250,7 @@ Calibration result_of(const Pass& pass, const Cycle<Estimator>& cycle, const Cal
     result.noise->wandering_drift_rad_s = states.wandering_drift_rad_s;
     result.noise->wandering_time_s = to_seconds(states.wandering_time);
   }
-  result.states = state_names(DriftFamily::of<Model>(), Estimator::kGyros);
+  result.states = drift_and_alignment(result.gyros.front().drift_model, result.gyros.size());
   const auto root = parameter_root(cycle.estimator());
   result.covariance = root * root.transpose();
   return result;

@@ -14,7 +14,6 @@
 
 #include "choose/noise_search.hpp"
 #include "model/prior.hpp"
-#include "trihedron/ground/model/names.hpp"
 #include "trihedron/ground/model/setup_error.hpp"
 
 namespace trihedron::ground {

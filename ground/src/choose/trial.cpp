@@ -7,7 +7,6 @@
 #include <optional>
 
 #include "batch/pass_setup.hpp"
-#include "trihedron/ground/model/names.hpp"
 
 namespace trihedron::ground {
 namespace {

@@ -18,7 +18,6 @@
 #include "trihedron/core/telemetry.hpp"
 #include "trihedron/ground/evaluate/convergence.hpp"
 #include "trihedron/ground/evaluate/used_fixes.hpp"
-#include "trihedron/ground/model/names.hpp"
 
 namespace trihedron::ground {
 namespace {

@@ -2,7 +2,6 @@
 /// What is known of the gyros before a pass.
 
 #include <Eigen/Core>
-#include <string>
 #include <vector>
 
 #include "model/drift_family.hpp"
@@ -10,9 +9,9 @@
 
 namespace trihedron::ground {
 
-/// Throws SetupError where there is none of that name.
-[[nodiscard]] DriftFamily family_of(const std::string& drift_model);
-/// Throws SetupError where the record does not have just the coefficients of its model, in their order.
+/// Throws SetupError where the degree is not that of any.
+[[nodiscard]] DriftFamily family_of(const DriftModelId& drift_model);
+/// Throws SetupError where the record does not have as many coefficients as its model.
 [[nodiscard]] DriftFamily family_of(const GyroCalibration& gyro);
 
 /// What is known of a gyro.
@@ -31,16 +30,12 @@ struct GyroParameters {
 [[nodiscard]] GyroParameters parameters_of(const GyroCalibration& gyro, const DriftFamily& family);
 
 /// Without a momentum.
-[[nodiscard]] GyroCalibration record_of(const GyroParameters& parameters, const std::string& drift_model,
-                                        const DriftFamily& family);
+[[nodiscard]] GyroCalibration record_of(const GyroParameters& parameters, const DriftFamily& family);
 
 struct ParameterPrior {
   std::vector<GyroParameters> gyros;  ///< means
   Eigen::MatrixXd covariance;         ///< of κ and δ, gyro by gyro
 };
-
-/// "gyro1.k0" … "gyro1.align_z", "gyro2.k0" …
-[[nodiscard]] std::vector<std::string> state_names(const DriftFamily& family, int gyros);
 
 /// Of the first so many gyros, by what pass.toml says of each, or else by the earlier calibration that it names.
 /// Throws SetupError where that says less than the family needs, or speaks of coefficients that the family does not

@@ -18,12 +18,20 @@
 
 namespace trihedron::ground {
 
+/// Of options in which nothing is left to decide. Throws SetupError where the drift model is.
+[[nodiscard]] inline DriftModelId decided_drift_model(const CalibrationOptions& options) {
+  if (!options.drift_model) {
+    throw SetupError("the drift model is left open", fmt::format("use {}", drift_model_choices()));
+  }
+  return *options.drift_model;
+}
+
 /// Whether any state is on that the smallest estimator of a pair does not have.
 [[nodiscard]] inline bool has_further_states(const CalibrationOptions& options) {
-  constexpr auto kOn = FurtherStateOptions::Choice::kOn;
   const FurtherStateOptions& states = options.further_states;
-  return options.drift_model != Esg7::kModelName || states.clock_offset == kOn || states.orbital_error == kOn ||
-         states.wandering_drift == kOn || states.readout_bias == kOn;
+  return options.drift_model != kEsg7 || states.is_on(FurtherState::kClockOffset) ||
+         states.is_on(FurtherState::kOrbitalError) || states.is_on(FurtherState::kWanderingDrift) ||
+         states.is_on(FurtherState::kReadoutBias);
 }
 
 /// Prior sigma of each component of a readout bias: the largest that an earlier calibration has left of it.
@@ -31,22 +39,22 @@ namespace trihedron::ground {
   double sigma = 0;
   if (earlier) {
     for (const FurtherEstimate& state : earlier->further) {
-      sigma = state.name.find("readout_bias") == std::string::npos ? sigma : std::max(sigma, state.sigma);
+      sigma = state.parameter.is_further(FurtherState::kReadoutBias) ? std::max(sigma, state.sigma) : sigma;
     }
   }
-  return sigma > 0 ? sigma : 1e-4;
+  return sigma > 0 ? sigma : row_of(FurtherState::kReadoutBias).prior_sigma;
 }
 
 /// Prior sigmas of the further states; near zero for those that are off.
 template <class Estimator>
 void use_further_states(const Pass& pass, const CalibrationOptions& options, typename Estimator::Setup& setup) {
-  constexpr auto kOn = FurtherStateOptions::Choice::kOn;
   const FurtherStateOptions& states = options.further_states;
-  setup.clock_offset_sigma_s = states.clock_offset == kOn ? 0.1 : 1e-9;
-  setup.orbital_error_sigma_rad = states.orbital_error == kOn ? 1e-4 : 1e-12;
-  setup.wandering_sigma_rad_s = states.wandering_drift == kOn ? states.wandering_drift_rad_s : 1e-15;
+  const auto sigma = [&](FurtherState state, double off) { return states.is_on(state) ? row_of(state).prior_sigma : off; };
+  setup.clock_offset_sigma_s = sigma(FurtherState::kClockOffset, 1e-9);
+  setup.orbital_error_sigma_rad = sigma(FurtherState::kOrbitalError, 1e-12);
+  setup.wandering_sigma_rad_s = states.is_on(FurtherState::kWanderingDrift) ? states.wandering_drift_rad_s : 1e-15;
   setup.wandering_time_s = to_seconds(states.wandering_time);
-  setup.readout_bias_sigma = states.readout_bias == kOn ? readout_bias_sigma(pass.settings.prior) : 1e-12;
+  setup.readout_bias_sigma = states.is_on(FurtherState::kReadoutBias) ? readout_bias_sigma(pass.settings.prior) : 1e-12;
   setup.orbital_rate_rad_s = orbital_rate_rad_s(pass.star_tracker);
   setup.orbital_phase_zero = pass.settings.epoch;
   for (std::size_t i = 0; i < std::min(setup.further_heads.size(), pass.settings.further_star_trackers.size()); ++i) {

@@ -2,12 +2,8 @@
 /// From options to the estimator that they name.
 
 #include <fmt/format.h>
-#include <fmt/ranges.h>
-
-#include <algorithm>
 
 #include "onboard/setup.hpp"
-#include "trihedron/ground/model/names.hpp"
 #include "trihedron/ground/model/setup_error.hpp"
 
 namespace trihedron::ground {
@@ -15,18 +11,16 @@ namespace trihedron::ground {
 /// Calls `body` with the estimator as a type tag. Of what is built, the smallest that has what is asked for.
 template <class Body>
 auto with_estimator(const Pass& pass, const CalibrationOptions& options, Body&& body) {
-  if (std::ranges::find(kEstimators, options.estimator) == kEstimators.end()) {
-    throw SetupError(fmt::format("there is no estimator '{}'", options.estimator),
-                     fmt::format("use one of: {}", fmt::join(kEstimators, ", ")));
+  const DriftModelId drift_model = decided_drift_model(options);
+  const bool is_paper = options.estimator == Estimator::kPaper;
+  const bool whole_pass = is_for_whole_pass(drift_model);
+  const bool esg20 = drift_model == kEsg20;
+  if ((whole_pass && options.estimator != Estimator::kBatch) || (esg20 && (is_paper || pass.gyro.gyros > 2))) {
+    throw SetupError(fmt::format("estimator {} of {} gyros has no drift model '{}'", name_of(options.estimator),
+                                 pass.gyro.gyros, name_of(drift_model)),
+                     fmt::format("use {}, {}", kAutoDriftModel, drift_model_choices()));
   }
-  const bool whole_pass = is_for_whole_pass(options.drift_model);
-  const bool esg20 = options.drift_model == Esg20::kModelName;
-  if ((whole_pass && options.estimator != kBatch) || (esg20 && (options.estimator == kPaper || pass.gyro.gyros > 2))) {
-    throw SetupError(fmt::format("estimator {} of {} gyros has no drift model '{}'", options.estimator, pass.gyro.gyros,
-                                 options.drift_model),
-                     fmt::format("use {}", kDriftModels));
-  }
-  if (options.estimator == kPaper) {
+  if (is_paper) {
     return body.template operator()<PaperEstimator<Esg7>>();
   }
   switch (pass.gyro.gyros) {

@@ -9,7 +9,6 @@
 #include <vector>
 
 #include "passes.hpp"
-#include "trihedron/ground/model/names.hpp"
 #include "trihedron/ground/model/setup_error.hpp"
 
 namespace trihedron::ground {

@@ -7,7 +7,6 @@
 #include <random>
 
 #include "trihedron/core/frames.hpp"
-#include "trihedron/ground/model/names.hpp"
 
 namespace trihedron::ground {
 namespace {

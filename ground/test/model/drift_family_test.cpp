@@ -5,7 +5,6 @@
 #include <Eigen/QR>
 
 #include "trihedron/core/drift.hpp"
-#include "trihedron/ground/model/names.hpp"
 #include "trihedron/sim/harmonics.hpp"
 #include "trihedron/sim/random.hpp"
 

@@ -16,7 +16,6 @@
 #include "onboard/screen.hpp"
 #include "passes.hpp"
 #include "trihedron/ground/calibrate/calibrate.hpp"
-#include "trihedron/ground/model/names.hpp"
 #include "trihedron/ground/model/setup_error.hpp"
 
 namespace trihedron::ground {

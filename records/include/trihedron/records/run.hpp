@@ -2,15 +2,16 @@
 /// Everything that was seen on the way when a pass was calibrated or navigated.
 
 #include <chrono>
-#include <map>
 #include <optional>
-#include <string>
+#include <string_view>
 #include <vector>
 
 #include "trihedron/core/status.hpp"
 #include "trihedron/records/calibration.hpp"
 #include "trihedron/records/options.hpp"
 #include "trihedron/records/pass.hpp"
+#include "trihedron/records/statistics.hpp"
+#include "trihedron/records/status.hpp"
 
 namespace trihedron {
 
@@ -55,16 +56,19 @@ struct GyroEvent {
 
 /// For estimating a kind of further states instead of taking them as zero.
 struct Evidence {
-  std::string states;  ///< "clock_offset", "orbital_error", "readout_bias", "coefficient_change", "drift_outside_eq1",
-                       ///< "wandering_drift"
+  std::optional<FurtherState> state;  ///< without it: the coefficients that eq. (1) does not have
   double log_bayes_factor = 0;
   bool accepted = false;
+
+  /// For programs: the key of the further state, or "drift_outside_eq1".
+  [[nodiscard]] std::string_view key() const { return state ? row_of(*state).key : "drift_outside_eq1"; }
+  /// For people.
+  [[nodiscard]] std::string_view label() const { return state ? row_of(*state).label : "Drift outside eq. (1)"; }
 };
 
 /// A drift model, fitted to the beginning of the pass and judged by what comes next. Of estimator batch.
 struct DriftModelForecast {
-  std::string drift_model;
-  int coefficients = 0;          ///< of each gyro
+  DriftModelId drift_model;
   double log_likelihood = 0;     ///< of the rest of the pass, part by part; above that of the smallest model
   double open_loop_rms_rad = 0;  ///< attitude error, flown open loop over the next part
 };
@@ -83,15 +87,15 @@ struct CalibrationRun {
   AttitudeHistory navigation;           ///< of the open-loop navigator at the fixes' epochs
   std::vector<Time> angle_t;            ///< z1 of eq. (3), decimated by min/max
   std::vector<double> angle_residual_min, angle_residual_max;
-  std::map<std::string, long> samples;     ///< gyro samples by what was done with them
-  std::map<std::string, long> fix_counts;  ///< fixes by what was done with them
-  std::vector<GyroEvent> gyro_events;      ///< changes of a gyro's state
+  SampleCounts samples;                ///< gyro samples by what was done with them
+  FixCounts fix_counts;                ///< fixes by what was done with them
+  std::vector<GyroEvent> gyro_events;  ///< changes of a gyro's state
 };
 
 struct NavigationRun {
   AttitudeHistory attitude;  ///< at every gyro sample used
   std::vector<FixRecord> fixes;
-  std::map<std::string, double> statistics;
+  Statistics statistics;
   /// Where parameters are held: (estimated − held)ᵀ P⁻¹ (estimated − held), P the covariance they were given with, and
   /// its 99.9 % limit.
   std::optional<double> held_parameters_misfit;
