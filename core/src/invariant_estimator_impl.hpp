@@ -52,6 +52,12 @@ std::optional<SetupFault> InvariantEstimator<kCapacity>::set_up(const Calibratio
 }
 
 template <Capacity kCapacity>
+double InvariantEstimator<kCapacity>::sharing_factor(const StarFix& fix) const {
+  const std::optional<Time>& last = used_fix_t_[static_cast<std::size_t>(fix.head)];
+  return last && *last < fix.t ? std::sqrt(setup_.fixes_sharing_a_sample(fix.t - *last)) : 1;
+}
+
+template <Capacity kCapacity>
 void InvariantEstimator<kCapacity>::begin_stretch() {
   since_fix_ = {};
   time_since_fix_s_ = 0;
@@ -353,7 +359,7 @@ FixReport InvariantEstimator<kCapacity>::correct(const StarFix& fix, const FixRe
   report.t = fix.t;
   report.head = fix.head;
   FixReadings readings = readings_at_fix;
-  readings.noise_factor *= std::sqrt(setup_.fixes_sharing_a_sample(fix.head));
+  readings.noise_factor *= sharing_factor(fix);
   const FixBySharedStates by_shared = fix_by_shared_states(setup_, fix, readings.rate_c);
   const Rot<In, C> C_in_c = corrected(fix, by_shared, shared_);
   const Eigen::Matrix3d R_c = fix_noise(setup_, fix.head);
@@ -361,6 +367,8 @@ FixReport InvariantEstimator<kCapacity>::correct(const StarFix& fix, const FixRe
   if (!started_) {
     start(C_in_c.raw(), readings, R_c, by_shared);
     started_ = attitude(gyros_, readings.h_b, all_gyros(layout().gyros)).ok();
+    used_fix_t_ = {};
+    used_fix_t_[static_cast<std::size_t>(fix.head)] = fix.t;
     report.status = started_ ? FixStatus::kStarted : FixStatus::kRejectedGeometry;
     return report;
   }
@@ -425,6 +433,7 @@ FixReport InvariantEstimator<kCapacity>::correct(const StarFix& fix, const FixRe
       break;
   }
   angles_since_fix_ = 0;
+  used_fix_t_[static_cast<std::size_t>(fix.head)] = fix.t;
   update(white.rows, std::sqrt(report.weight));
   return report;
 }

@@ -11,29 +11,14 @@ namespace {
 using Family = DriftModelId::Family;
 using Member = DriftCoefficient::Member;
 
-constexpr std::string_view kCubeDName = Esg20::kNames.back();
+constexpr std::string_view kCubeDName = "D(k0)";
 /// As of DriftHarmonic.
 constexpr int kLargestHarmonic = 20;
 
 const DriftModelRow& row_of(Family family) { return kDriftModels[static_cast<std::size_t>(family)]; }
 
-/// W and D of Σ a_i h_i²/2 and of h1 h2 h3, and of degree 4 the W of Σ h⁴/4, which is made of (4, 0) and (4, 4).
-bool is_in_eq1(Member member, int degree, int order) {
-  return (degree == 2 && (order == 0 || order == 2)) || (degree == 3 && order == -2) ||
-         (degree == 4 && order == 0 && member == Member::kW);
-}
-
 DriftCoefficient harmonic(Member member, int degree, int order) {
   return {member, static_cast<std::int8_t>(degree), static_cast<std::int8_t>(order)};
-}
-
-/// Appends those of one degree that eq. (1) does not contain.
-void add_degree(Member member, int degree, std::vector<DriftCoefficient>& coefficients) {
-  for (int order = -degree; order <= degree; ++order) {
-    if (!is_in_eq1(member, degree, order)) {
-      coefficients.push_back(harmonic(member, degree, order));
-    }
-  }
 }
 
 /// All of `text` as a number; nothing for anything else, "+1" and "01" among it.
@@ -67,32 +52,15 @@ std::optional<DriftModelId> drift_model_named(std::string_view name) {
 }
 
 std::string drift_model_choices() {
-  return name_of(kEsg7) + ", " + name_of(kEsg20) + ", or " + name_of(vsh(1)) + " … " + name_of(kLargestDriftModel) +
-         ", which are for estimator batch";
+  return name_of(kEsg7) + ", " + name_of(kEsg20) + ", or " + name_of(vsh(1)) + " … " + name_of(kLargestDriftModel);
 }
 
 std::vector<DriftCoefficient> coefficients_of(const DriftModelId& model) {
+  const DriftModel table(model, {});
   std::vector<DriftCoefficient> coefficients;
-  coefficients.reserve(static_cast<std::size_t>(model.size()));
-  for (int i = 0; i < Esg7::kSize; ++i) {
-    coefficients.push_back(DriftCoefficient::of_eq1(i));
-  }
-  switch (model.family) {
-    case Family::kEsg7:
-      break;
-    case Family::kEsg20:
-      for (const Member member : {Member::kW, Member::kD}) {
-        add_degree(member, 1, coefficients);
-        add_degree(member, 2, coefficients);
-      }
-      coefficients.push_back({Member::kCubeD, 0, 0});
-      break;
-    case Family::kVsh:
-      for (int degree = 1; degree <= model.degree; ++degree) {
-        add_degree(Member::kW, degree, coefficients);
-        add_degree(Member::kD, degree, coefficients);
-      }
-      break;
+  coefficients.reserve(static_cast<std::size_t>(table.size()));
+  for (int i = 0; i < table.size(); ++i) {
+    coefficients.push_back(table.member(i));
   }
   return coefficients;
 }

@@ -280,7 +280,7 @@ PassProblem::FixRows PassProblem::compare(const PassSolution& solution, const Mo
   rows.y = about_now.col(setup.layout.size());
   rows.H = by_states_of_arc(moment, about_now);
   PerGyro<double> noise_rad;
-  const double sharing = std::sqrt(setup.fixes_sharing_a_sample(fix.fix.head));
+  const double sharing = std::sqrt(setup.fixes_sharing_a_sample(fix.since_last));
   for (int k = 0; k < gyros_; ++k) {
     noise_rad[k] = setup.readout_noise_rad[k] * fix.noise_factor * sharing;
   }

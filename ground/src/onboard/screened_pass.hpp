@@ -28,6 +28,7 @@ struct ScreenedPass {
     GyroMask used{};
     double noise_factor = 1;          ///< as of FixReadings
     Eigen::Vector3d rate_c{0, 0, 0};  ///< of the body relative to `in`, rad/s
+    Duration since_last = Duration::max();  ///< fix of the same star tracker
   };
 
   int gyros = 0;
@@ -76,6 +77,9 @@ struct ScreenedPass {
     fix.fix = star_fix;
     fix.noise_factor = readings.noise_factor;
     fix.rate_c = readings.rate_c;
+    const auto last = std::find_if(std::next(fixes.rbegin()), fixes.rend(),
+                                   [&](const Fix& other) { return other.fix.head == star_fix.head; });
+    fix.since_last = last != fixes.rend() && last->fix.t < star_fix.t ? star_fix.t - last->fix.t : Duration::max();
     for (int k = 0; k < gyros; ++k) {
       fix.h_b[k] = readings.h_b[k];
       fix.used[k] = readings.used[k];

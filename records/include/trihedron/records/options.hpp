@@ -56,6 +56,8 @@ struct CalibrationOptions {
   double direction_random_walk_rad_sqrt_s = 3e-9;
   /// In place of the figure of the pass, where one was found.
   std::optional<Eigen::Vector3d> star_tracker_noise_rad;
+  /// Of the error of the star tracker at orbital period, where it is known; without it that of a low orbit.
+  std::optional<double> orbital_rate_rad_s;
   /// A fix with a NIS above this is rejected; χ² of 4 degrees of freedom passes 30 once in 2e5 good fixes. That of a
   /// pair: of more gyros a gate that good fixes pass as often.
   double gate_nis = 30;

@@ -33,6 +33,7 @@ inline constexpr std::array<StatusRow<FixStatus>, kFixStatuses> kFixStatusRows =
 }};
 
 inline constexpr std::array<StatusRow<SampleStatus>, kSampleStatuses> kSampleStatusRows = {{
+    {SampleStatus::kNone, "none"},
     {SampleStatus::kUsed, "used"},
     {SampleStatus::kRejectedNotDirection, "rejected: not a direction"},
     {SampleStatus::kRejectedOutOfOrder, "rejected: out of order"},
