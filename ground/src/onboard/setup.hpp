@@ -49,7 +49,9 @@ namespace trihedron::ground {
 template <class Estimator>
 void use_further_states(const Pass& pass, const CalibrationOptions& options, typename Estimator::Setup& setup) {
   const FurtherStateOptions& states = options.further_states;
-  const auto sigma = [&](FurtherState state, double off) { return states.is_on(state) ? row_of(state).prior_sigma : off; };
+  const auto sigma = [&](FurtherState state, double off) {
+    return states.is_on(state) ? row_of(state).prior_sigma : off;
+  };
   setup.clock_offset_sigma_s = sigma(FurtherState::kClockOffset, 1e-9);
   setup.orbital_error_sigma_rad = sigma(FurtherState::kOrbitalError, 1e-12);
   setup.wandering_sigma_rad_s = states.is_on(FurtherState::kWanderingDrift) ? states.wandering_drift_rad_s : 1e-15;
