@@ -117,8 +117,8 @@ class Meter {
 /// So many fixes off in a row, by more than drift can make, are not single outliers.
 constexpr long kLie = 20;
 
-Statistics statistics_of(const std::vector<FixRecord>& fixes) {
-  Statistics statistics;
+/// Those of the fixes; `statistics` has none of these yet.
+void add_statistics(const std::vector<FixRecord>& fixes, Statistics& statistics) {
   double nis_sum = 0;
   long in_a_row = 0;
   double freedom = 0;
@@ -148,7 +148,6 @@ Statistics statistics_of(const std::vector<FixRecord>& fixes) {
       statistics.innovation_rms_rad.push_back(std::sqrt(square / count));
     }
   }
-  return statistics;
 }
 
 /// No fix started the filter: says what became of them.
@@ -202,11 +201,11 @@ std::vector<FurtherEstimate> further_of(const Estimator& estimator, const Furthe
           tell(estimator.shared()(state - Layout::kShared), state);
         }
       };
-      constexpr auto kOn = FurtherStateOptions::Choice::kOn;
-      tell_shared(Layout::clock_offset(), states.clock_offset == kOn ? 1 : 0);
-      tell_shared(Layout::orbital_error(), states.orbital_error == kOn ? 6 : 0);
+      const auto size = [&](FurtherState state) { return states.is_on(state) ? row_of(state).size : 0; };
+      tell_shared(Layout::clock_offset(), size(FurtherState::kClockOffset));
+      tell_shared(Layout::orbital_error(), size(FurtherState::kOrbitalError));
       tell_shared(Layout::head(1), 3 * further_heads);
-      if (states.readout_bias == kOn) {
+      if (states.is_on(FurtherState::kReadoutBias)) {
         for (int k = 0; k < Estimator::kGyros; ++k) {
           for (int i = 0; i < 3; ++i) {
             tell(estimator.gyros()[k].readout_bias(i), Layout::readout_bias(k) + i);
@@ -237,7 +236,9 @@ template <class Estimator>
 Calibration result_of(const Pass& pass, const Cycle<Estimator>& cycle, const CalibrationOptions& options) {
   using Model = typename Estimator::BaseModel;
   Calibration result;
-  result.estimator = Estimator::kName;
+  // Of estimator batch until the smoothed values are put in place of these.
+  using Name = trihedron::Estimator;
+  result.estimator = options.estimator == Name::kPaper ? Name::kPaper : Name::kInvariant;
   result.epoch = pass.settings.epoch;
   result.t = cycle.t();
   for (const auto& gyro : cycle.estimator().gyros()) {
@@ -246,7 +247,7 @@ Calibration result_of(const Pass& pass, const Cycle<Estimator>& cycle, const Cal
   const FurtherStateOptions& states = options.further_states;
   result.further = further_of(cycle.estimator(), states, further_heads<Estimator>(pass));
   result.noise = CalibrationNoise{options.direction_random_walk_rad_sqrt_s, options.star_tracker_noise_rad};
-  if (states.wandering_drift == FurtherStateOptions::Choice::kOn) {
+  if (states.is_on(FurtherState::kWanderingDrift)) {
     result.noise->wandering_drift_rad_s = states.wandering_drift_rad_s;
     result.noise->wandering_time_s = to_seconds(states.wandering_time);
   }
@@ -282,14 +283,14 @@ CalibrationRun calibrate_with(const Pass& pass, Decision decision, const Progres
   AngleTrack angle(run);
   Time corrected{};
   decltype(Cycle<Estimator>::Report::gyros) gyros_before{};
-  double angle_looks = 0;
+  long angle_looks = 0;
   // On a core of its own.
   struct Smoothed {
     Refinement refinement;
     std::vector<DriftModelForecast> drift_models;
   };
   std::future<Smoothed> smoothed;
-  if (run.options.estimator == kBatch) {
+  if (run.options.estimator == trihedron::Estimator::kBatch) {
     if (!decision.screened) {
       decision.screened = screen(pass, run.options);
     }
@@ -325,10 +326,9 @@ CalibrationRun calibrate_with(const Pass& pass, Decision decision, const Progres
       run.navigation.age_s.push_back(to_seconds(report.fix.t - corrected));
     }
   };
-  std::array<long, kSampleStatuses> samples{};
   Meter meter(progress, pass.gyro.size());
   replay(pass, *cycle, on_fix, [&](const typename Cycle<Estimator>::Report& report) {
-    ++samples[static_cast<std::size_t>(report.sample)];
+    ++run.samples[report.sample];
     for (int k = 0; k < Estimator::kGyros; ++k) {
       if (report.gyros[k] != gyros_before[k]) {
         run.gyro_events.push_back({report.t, k, report.gyros[k]});
@@ -336,19 +336,12 @@ CalibrationRun calibrate_with(const Pass& pass, Decision decision, const Progres
     }
     gyros_before = report.gyros;
     angle_looks += is_used(report.angles.status) ? 1 : 0;
-    if (report.fixes_dropped > 0) {
-      run.fix_counts["rejected: clock set back while it waited"] += report.fixes_dropped;
-    }
+    run.fix_counts.lost_to_clock += report.fixes_dropped;
     if (cycle->estimator().started() && report.sample == SampleStatus::kUsed) {
       angle.add(report.t, report.angle_residual);
     }
     meter.step();
   });
-  for (std::size_t i = 0; i < samples.size(); ++i) {
-    if (samples[i] > 0) {
-      run.samples[name_of(static_cast<SampleStatus>(i))] = samples[i];
-    }
-  }
   if (!cycle->estimator().started()) {
     throw nothing_used(run.fixes);
   }
@@ -360,10 +353,10 @@ CalibrationRun calibrate_with(const Pass& pass, Decision decision, const Progres
     std::move(refinement).put_into(run);
   }
   for (const FixRecord& fix : run.fixes) {
-    ++run.fix_counts[name_of(fix.status)];
+    ++run.fix_counts[fix.status];
   }
-  run.calibration.statistics.merge(statistics_of(run.fixes));
-  run.calibration.statistics["angle_looks"] = angle_looks;
+  add_statistics(run.fixes, run.calibration.statistics);
+  run.calibration.statistics.angle_looks = angle_looks;
   run.calibration.verdict = judge(pass, run);
   return run;
 }
@@ -393,7 +386,7 @@ NavigationRun navigate_with(const Pass& pass, const CalibrationOptions& options,
   if (run.attitude.t.empty()) {
     throw nothing_used(run.fixes);
   }
-  run.statistics = statistics_of(run.fixes);
+  add_statistics(run.fixes, run.statistics);
   if (!options.corrections.take_parameters) {
     run.held_parameters_misfit = misfit(cycle->estimator());
     run.misfit_limit = boost::math::quantile(boost::math::chi_squared(Estimator::Setup::Layout::kSize), 0.999);
@@ -413,8 +406,8 @@ CalibrationRun calibrate(const Pass& pass, const CalibrationOptions& options, co
 
 NavigationRun navigate(const Pass& pass, const CalibrationOptions& options, const Progress& progress) {
   const CalibrationOptions decided = decide(pass, options).options;
-  if (is_for_whole_pass(decided.drift_model)) {
-    throw SetupError(fmt::format("the navigator on board has no drift model '{}'", decided.drift_model),
+  if (const DriftModelId model = decided_drift_model(decided); is_for_whole_pass(model)) {
+    throw SetupError(fmt::format("the navigator on board has no drift model '{}'", name_of(model)),
                      "navigate by a calibration with --drift-model esg20, or take the attitude that calibrate "
                      "--definitive writes");
   }

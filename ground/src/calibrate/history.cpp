@@ -37,7 +37,7 @@ StartUpChange change_of(const StartUp& from, const StartUp& to) {
   const Calibration& b = *to.calibration;
   StartUpChange change{from.name, to.name, {}, {}, {}};
   for (const bool alignments : {false, true}) {
-    const std::vector<std::string> states = common_states(a, b, alignments);
+    const std::vector<ParameterId> states = common_states(a, b, alignments);
     const Eigen::VectorXd moved = difference(a, b, states);
     const auto rows_a = rows_of(a, states);
     const auto rows_b = rows_of(b, states);
@@ -50,9 +50,9 @@ StartUpChange change_of(const StartUp& from, const StartUp& to) {
   return change;
 }
 
-std::vector<Spread> spreads_of(const std::vector<StartUp>& start_ups, const std::vector<std::string>& states) {
+std::vector<Spread> spreads_of(const std::vector<StartUp>& start_ups, const std::vector<ParameterId>& states) {
   std::vector<Spread> spreads;
-  for (const std::string& state : states) {
+  for (const ParameterId& state : states) {
     std::vector<double> values;
     std::vector<double> sigmas;
     for (const StartUp& start_up : start_ups) {
@@ -74,12 +74,11 @@ std::vector<Finding> findings_of(const std::vector<StartUpChange>& changes) {
   std::vector<Finding> findings;
   for (const StartUpChange& change : changes) {
     if (!change.alignments.holds()) {
-      findings.push_back({"alignment-moved",
+      findings.push_back({FindingCode::kAlignmentMoved,
                           fmt::format("From start-up {} to {} the alignments changed, which a start does not explain.",
                                       change.from, change.to),
                           change.alignments.text(),
-                          "Look for what turned a gyro or the star tracker, or for sigmas that are too small.",
-                          Finding::Severity::kWarning});
+                          "Look for what turned a gyro or the star tracker, or for sigmas that are too small."});
     }
   }
   return findings;
@@ -87,12 +86,12 @@ std::vector<Finding> findings_of(const std::vector<StartUpChange>& changes) {
 
 }  // namespace
 
-std::vector<std::string> states_of(const std::vector<CatalogueEntry>& catalogue) {
-  std::vector<std::string> states;
-  std::set<std::string> seen;
+std::vector<ParameterId> states_of(const std::vector<CatalogueEntry>& catalogue) {
+  std::vector<ParameterId> states;
+  std::set<ParameterId> seen;
   for (const CatalogueEntry& entry : catalogue) {
-    std::ranges::copy_if(entry.calibration.states, std::back_inserter(states), [&](const std::string& state) {
-      return state.starts_with("gyro") && seen.insert(state).second;
+    std::ranges::copy_if(entry.calibration.states, std::back_inserter(states), [&](const ParameterId& state) {
+      return (state.is_drift() || state.is_alignment()) && seen.insert(state).second;
     });
   }
   return states;

@@ -19,7 +19,7 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 using Severity = Finding::Severity;
 
-constexpr const char* kWeakAxis = "weak-alignment-axis";
+constexpr FindingCode kWeakAxis = FindingCode::kWeakAlignmentAxis;
 
 bool same_mounting(const FurtherStarTracker& a, const FurtherStarTracker& b) {
   return a.mounting_rotation_vector_rad == b.mounting_rotation_vector_rad;
@@ -86,11 +86,11 @@ Comparison compare(const CalibrationRun& earlier, const CalibrationRun& later) {
 }
 
 /// Codes of what forbids the use of a pass alone and stays true of the passes together.
-std::vector<std::string> lasting_faults(const Verdict& verdict) {
-  std::vector<std::string> codes;
+std::vector<std::string_view> lasting_faults(const Verdict& verdict) {
+  std::vector<std::string_view> codes;
   for (const Finding& finding : verdict.findings) {
     if (finding.severity == Severity::kDoNotUse && finding.code != kWeakAxis) {
-      codes.push_back(finding.code);
+      codes.push_back(name_of(finding.code));
     }
   }
   return codes;
@@ -99,21 +99,21 @@ std::vector<std::string> lasting_faults(const Verdict& verdict) {
 void judge_pass(const PassAlone& pass, std::vector<Finding>& findings) {
   if (!pass.coefficients.holds()) {
     findings.push_back(
-        {"coefficients-moved",
+        {FindingCode::kCoefficientsMoved,
          fmt::format("The drift coefficients of {} are not those of the passes before.", pass.name),
          pass.coefficients.text(),
          "These passes are not of one start-up: calibrate them apart. Where they are, use estimator batch.",
          Severity::kDoNotUse});
   }
   if (!pass.alignments.holds()) {
-    findings.push_back({"alignment-moved",
+    findings.push_back({FindingCode::kAlignmentMoved,
                         fmt::format("The alignments of {} are not those of the passes before.", pass.name),
                         pass.alignments.text(),
                         "Look for what turned a gyro or the star tracker between the passes; calibrate them apart.",
                         Severity::kDoNotUse});
   }
   if (const auto faults = lasting_faults(pass.run.calibration.verdict); !faults.empty()) {
-    findings.push_back({"pass-not-trustworthy", fmt::format("{} alone is not to be used.", pass.name),
+    findings.push_back({FindingCode::kPassNotTrustworthy, fmt::format("{} alone is not to be used.", pass.name),
                         fmt::format("{}", fmt::join(faults, ", ")), "Leave it out, or cure what its own report tells.",
                         Severity::kDoNotUse});
   }

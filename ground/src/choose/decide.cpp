@@ -21,6 +21,10 @@ namespace {
 
 using Choice = FurtherStateOptions::Choice;
 
+/// Whose evidence a trial with everything shows. That of wandering drift comes with the search for the noise.
+constexpr std::array kJudgedByTrial = {FurtherState::kClockOffset, FurtherState::kOrbitalError,
+                                       FurtherState::kReadoutBias, FurtherState::kCoefficientChange};
+
 /// Odds of 20 to 1.
 constexpr double kStrong = 3;
 /// Pairs of fixes that give the noise of the star tracker within some percent.
@@ -53,13 +57,10 @@ std::optional<Eigen::Vector3d> other_star_tracker_noise(const Pass& pass,
 /// What was asked for must be there.
 void refuse_further_states(const Pass& pass, const CalibrationOptions& asked) {
   const FurtherStateOptions& states = asked.further_states;
-  for (const auto& [name, choice] :
-       {std::pair{"clock_offset", states.clock_offset}, std::pair{"orbital_error", states.orbital_error},
-        std::pair{"readout_bias", states.readout_bias}, std::pair{"wandering_drift", states.wandering_drift},
-        std::pair{"coefficient_change", states.coefficient_change}}) {
-    if (choice == Choice::kOn) {
+  for (const FurtherStateRow& row : kFurtherStates) {
+    if (states.is_on(row.state)) {
       throw SetupError(
-          fmt::format("estimator {} of {} gyros has no state '{}'", asked.estimator, pass.gyro.gyros, name),
+          fmt::format("estimator {} of {} gyros has no state '{}'", name_of(asked.estimator), pass.gyro.gyros, row.key),
           "set it to off or auto, or use estimator invariant with two gyros");
     }
   }
@@ -71,8 +72,8 @@ void use_noise(const CalibrationNoise& noise, CalibrationOptions& options) {
       std::max(options.direction_random_walk_rad_sqrt_s, noise.direction_random_walk_rad_sqrt_s);
   options.star_tracker_noise_rad = noise.star_tracker_noise_rad;
   FurtherStateOptions& states = options.further_states;
-  if (noise.wandering_drift_rad_s > 0 && states.wandering_drift == Choice::kAuto) {
-    states.wandering_drift = Choice::kOn;
+  if (noise.wandering_drift_rad_s > 0 && states[FurtherState::kWanderingDrift] == Choice::kAuto) {
+    states[FurtherState::kWanderingDrift] = Choice::kOn;
     states.wandering_drift_rad_s = noise.wandering_drift_rad_s;
     states.wandering_time = from_seconds(noise.wandering_time_s);
   }
@@ -80,21 +81,16 @@ void use_noise(const CalibrationNoise& noise, CalibrationOptions& options) {
 
 /// As in the prior calibration.
 CalibrationOptions as_before(CalibrationOptions options, const Calibration& prior) {
-  const auto had = [&](const char* name) {
-    return std::ranges::any_of(prior.further,
-                               [&](const FurtherEstimate& state) { return state.name.starts_with(name); });
-  };
-  const auto settle = [](Choice& choice, bool on) {
-    if (choice == Choice::kAuto) {
+  for (const FurtherStateRow& row : kFurtherStates) {
+    // How the coefficients changed over an earlier pass says nothing of this one.
+    const bool lasts = row.state != FurtherState::kCoefficientChange;
+    const bool on = lasts && std::ranges::any_of(prior.further, [&](const FurtherEstimate& estimate) {
+                      return estimate.parameter.is_further(row.state);
+                    });
+    if (Choice& choice = options.further_states[row.state]; choice == Choice::kAuto) {
       choice = on ? Choice::kOn : Choice::kOff;
     }
-  };
-  FurtherStateOptions& states = options.further_states;
-  settle(states.clock_offset, had("clock_offset"));
-  settle(states.orbital_error, had("orbital"));
-  settle(states.wandering_drift, false);
-  settle(states.readout_bias, had("gyro1_readout_bias"));
-  settle(states.coefficient_change, false);
+  }
   return options;
 }
 
@@ -111,9 +107,9 @@ void refuse_prior_of_others(const Pass& pass, const CalibrationOptions& asked) {
   }
   for (std::size_t k = 0; k < prior->gyros.size(); ++k) {
     const GyroCalibration& gyro = prior->gyros[k];
-    if (gyro.drift_model != asked.drift_model) {
+    if (asked.drift_model && gyro.drift_model != *asked.drift_model) {
       throw SetupError(fmt::format("the earlier calibration of gyro {} is of drift model '{}', not {}", k + 1,
-                                   gyro.drift_model, asked.drift_model),
+                                   name_of(gyro.drift_model), name_of(*asked.drift_model)),
                        "use a calibration made with the same drift model");
     }
     static_cast<void>(family_of(gyro));
@@ -134,34 +130,29 @@ const Forecast* best_of(const std::vector<Forecast>& forecasts) {
 /// Turns the choices that are left open, and the drift model, by what a trial with everything shows.
 void settle_states(const Trial& everything, const CalibrationOptions& asked, Decision& decision) {
   decision.evidence.clear();
-  const auto settle = [&](const char* states, double log_bayes_factor) {
-    decision.evidence.push_back({states, log_bayes_factor, log_bayes_factor > kStrong});
+  const auto settle = [&](std::optional<FurtherState> state, double log_bayes_factor) {
+    decision.evidence.push_back({state, log_bayes_factor, log_bayes_factor > kStrong});
     return decision.evidence.back().accepted;
   };
-  const auto choose = [&](Choice FurtherStateOptions::*choice, const char* states, double (Trial::*evidence)() const) {
-    if (asked.further_states.*choice == Choice::kAuto) {
-      const bool on = settle(states, (everything.*evidence)());
-      decision.options.further_states.*choice = on ? Choice::kOn : Choice::kOff;
+  for (const FurtherState state : kJudgedByTrial) {
+    if (asked.further_states[state] == Choice::kAuto) {
+      const bool on = settle(state, everything.log_evidence(state));
+      decision.options.further_states[state] = on ? Choice::kOn : Choice::kOff;
     }
-  };
-  choose(&FurtherStateOptions::clock_offset, "clock_offset", &Trial::clock_offset);
-  choose(&FurtherStateOptions::orbital_error, "orbital_error", &Trial::orbital_error);
-  choose(&FurtherStateOptions::readout_bias, "readout_bias", &Trial::readout_bias);
-  choose(&FurtherStateOptions::coefficient_change, "coefficient_change", &Trial::coefficient_change);
+  }
   decision.forecasts = everything.forecasts();
-  if (asked.drift_model == kAutoDriftModel) {
+  if (!asked.drift_model) {
     const Forecast* best = best_of(decision.forecasts);
-    settle("drift_outside_eq1", best == nullptr ? 0 : best->log_likelihood - decision.forecasts.front().log_likelihood);
-    decision.options.drift_model = best == nullptr ? Esg7::kModelName : best->drift_model;
+    settle({}, best == nullptr ? 0 : best->log_likelihood - decision.forecasts.front().log_likelihood);
+    decision.options.drift_model = best == nullptr ? kEsg7 : best->drift_model;
   }
 }
 
 /// Everything on that is on or may be, and the largest drift model.
 CalibrationOptions with_everything(CalibrationOptions options, const CalibrationOptions& asked,
-                                   const std::string& largest_model) {
-  for (const auto choice : {&FurtherStateOptions::clock_offset, &FurtherStateOptions::orbital_error,
-                            &FurtherStateOptions::readout_bias, &FurtherStateOptions::coefficient_change}) {
-    options.further_states.*choice = asked.further_states.*choice == Choice::kOff ? Choice::kOff : Choice::kOn;
+                                   const DriftModelId& largest_model) {
+  for (const FurtherState state : kJudgedByTrial) {
+    options.further_states[state] = asked.further_states[state] == Choice::kOff ? Choice::kOff : Choice::kOn;
   }
   options.drift_model = largest_model;
   return options;
@@ -172,7 +163,7 @@ void use_walk(const ProcessNoise& noise, CalibrationOptions& options) {
 }
 
 void use_wandering(const ProcessNoise& noise, CalibrationOptions& options) {
-  options.further_states.wandering_drift = Choice::kOn;
+  options.further_states[FurtherState::kWanderingDrift] = Choice::kOn;
   options.further_states.wandering_drift_rad_s = noise.wandering_sigma_rad_s;
   options.further_states.wandering_time = from_seconds(noise.wandering_time_s);
 }
@@ -180,7 +171,7 @@ void use_wandering(const ProcessNoise& noise, CalibrationOptions& options) {
 /// Drift that wanders as fast as this random walk: walk² = 2 σ² τ.
 CalibrationOptions wandering_like(const Likely& walking, CalibrationOptions options) {
   FurtherStateOptions& states = options.further_states;
-  states.wandering_drift = Choice::kOn;
+  states[FurtherState::kWanderingDrift] = Choice::kOn;
   states.wandering_drift_rad_s =
       walking.noise.direction_random_walk_rad_sqrt_s / std::sqrt(2 * to_seconds(states.wandering_time));
   return options;
@@ -190,8 +181,8 @@ CalibrationOptions wandering_like(const Likely& walking, CalibrationOptions opti
 /// they are all free, and whether it wanders. `everything`: with the noise as told; `walk`: the noise of what was
 /// settled.
 void decide_beside_noise(const Pass& pass, const Screened& screened, const CalibrationOptions& asked,
-                         const std::string& largest_model, bool wandering_is_open, Trial everything, const Likely& walk,
-                         Decision& decision) {
+                         const DriftModelId& largest_model, bool wandering_is_open, Trial everything,
+                         const Likely& walk, Decision& decision) {
   CalibrationOptions& options = decision.options;
   const CalibrationOptions free = with_everything(options, asked, largest_model);
   const CalibrationOptions like = wandering_like(walk, free);
@@ -209,7 +200,7 @@ void decide_beside_noise(const Pass& pass, const Screened& screened, const Calib
   if (wandering_is_open && walking.gain > kStrong) {
     auto [trial, likely] = wandering_trial.get();
     const double gain = likely.log_likelihood - walking.log_likelihood;
-    wandering = Evidence{"wandering_drift", gain, gain > kStrong};
+    wandering = Evidence{FurtherState::kWanderingDrift, gain, gain > kStrong};
     if (wandering->accepted) {
       wanders = likely.noise;
       everything = std::move(trial);
@@ -232,23 +223,22 @@ void decide_beside_noise(const Pass& pass, const Screened& screened, const Calib
 
 /// It is seen over a whole pass only. Throws SetupError where it was asked for.
 void leave_out_coefficient_change(CalibrationOptions& options) {
-  if (options.further_states.coefficient_change == Choice::kOn) {
-    throw SetupError(fmt::format("estimator {} has no state 'coefficient_change'", options.estimator),
+  Choice& choice = options.further_states[FurtherState::kCoefficientChange];
+  if (choice == Choice::kOn) {
+    throw SetupError(fmt::format("estimator {} has no state '{}'", name_of(options.estimator),
+                                 row_of(FurtherState::kCoefficientChange).key),
                      "set it to off or auto, or use estimator batch");
   }
-  options.further_states.coefficient_change = Choice::kOff;
+  choice = Choice::kOff;
 }
 
 /// Nothing to judge by.
 void leave_out_what_is_open(CalibrationOptions& options) {
-  FurtherStateOptions& states = options.further_states;
-  for (Choice* choice : {&states.clock_offset, &states.orbital_error, &states.wandering_drift, &states.readout_bias,
-                         &states.coefficient_change}) {
-    *choice = *choice == Choice::kAuto ? Choice::kOff : *choice;
+  for (const FurtherStateRow& row : kFurtherStates) {
+    Choice& choice = options.further_states[row.state];
+    choice = choice == Choice::kAuto ? Choice::kOff : choice;
   }
-  if (options.drift_model == kAutoDriftModel) {
-    options.drift_model = Esg7::kModelName;
-  }
+  options.drift_model = options.drift_model.value_or(kEsg7);
 }
 
 /// Only the noise is found: of more than two gyros.
@@ -268,12 +258,12 @@ void find_noise(const Pass& pass, const Screened& screened, CalibrationOptions& 
 
 /// By what the pass itself shows.
 Decision decide_by_pass(const Pass& pass, const Screened& screened, const CalibrationOptions& asked,
-                        const std::string& largest_model) {
+                        const DriftModelId& largest_model) {
   Decision decision{asked, {}, {}, {}};
   CalibrationOptions& options = decision.options;
-  const bool wandering_is_open = options.further_states.wandering_drift == Choice::kAuto;
+  const bool wandering_is_open = options.further_states[FurtherState::kWanderingDrift] == Choice::kAuto;
   if (wandering_is_open) {
-    options.further_states.wandering_drift = Choice::kOff;
+    options.further_states[FurtherState::kWanderingDrift] = Choice::kOff;
   }
   Trial everything(pass, screened, with_everything(options, asked, largest_model));
   const std::vector<Eigen::Vector3d> changes = everything.changes_rad();
@@ -299,43 +289,39 @@ Decision decide_by_pass(const Pass& pass, const Screened& screened, const Calibr
 }
 
 /// The largest drift model that is tried at first.
-std::string largest_to_compare(const CalibrationOptions& asked) {
-  const std::string kFirst = "vsh:2";
-  const bool fixed = asked.drift_model != kAutoDriftModel;
-  if (asked.estimator != kBatch || asked.drift_model == Esg20::kModelName) {
-    return fixed ? asked.drift_model : Esg20::kModelName;
+DriftModelId largest_to_compare(const CalibrationOptions& asked) {
+  constexpr int kFirstDegree = 2;
+  if (asked.estimator != Estimator::kBatch || asked.drift_model == kEsg20) {
+    return asked.drift_model.value_or(kEsg20);
   }
-  return is_for_whole_pass(asked.drift_model) ? std::max(asked.drift_model, kFirst) : kFirst;
+  const bool is_vsh = asked.drift_model && is_for_whole_pass(*asked.drift_model);
+  return vsh(is_vsh ? std::max(int{asked.drift_model->degree}, kFirstDegree) : kFirstDegree);
 }
 
 /// By one degree, where there is one.
-std::optional<std::string> larger_model(const std::string& model) {
-  if (!is_for_whole_pass(model)) {
-    return std::nullopt;
-  }
-  std::string larger = model;
-  ++larger.back();
-  return DriftFamily::named(larger) ? std::optional(larger) : std::nullopt;
+std::optional<DriftModelId> larger_model(const DriftModelId& model) {
+  const bool is_there = is_for_whole_pass(model) && model.degree < DriftFamily::kMaxDegree;
+  return is_there ? std::optional(vsh(model.degree + 1)) : std::nullopt;
 }
 
 }  // namespace
 
 Decision decide(const Pass& pass, const CalibrationOptions& asked_for) {
   CalibrationOptions asked = asked_for;
-  if (pass.settings.prior && asked.drift_model == kAutoDriftModel) {
+  if (pass.settings.prior && !asked.drift_model) {
     asked.drift_model = pass.settings.prior->gyros.at(0).drift_model;
   }
-  if (is_for_whole_pass(asked.drift_model) && asked.estimator == kInvariant) {
-    asked.estimator = kBatch;
+  if (asked.drift_model && is_for_whole_pass(*asked.drift_model) && asked.estimator == Estimator::kInvariant) {
+    asked.estimator = Estimator::kBatch;
   }
-  if (asked.estimator != kBatch) {
+  if (asked.estimator != Estimator::kBatch) {
     leave_out_coefficient_change(asked);
   }
   refuse_prior_of_others(pass, asked);
   Decision decision{asked, {}, {}, {}};
   CalibrationOptions& options = decision.options;
   options.find_noise = false;
-  const bool invariant = asked.estimator != kPaper;
+  const bool invariant = asked.estimator != Estimator::kPaper;
   const std::optional<Calibration>& prior = pass.settings.prior;
   if (prior && prior->noise && asked.find_noise && invariant) {
     use_noise(*prior->noise, options);
@@ -343,7 +329,7 @@ Decision decide(const Pass& pass, const CalibrationOptions& asked_for) {
   if (!invariant || pass.gyro.gyros > 2) {
     refuse_further_states(pass, asked);
     options = without_further_states(options);
-    if (asked.drift_model != kAutoDriftModel) {
+    if (asked.drift_model) {
       options.drift_model = asked.drift_model;
     }
     if (asked.find_noise && invariant && !prior) {
@@ -359,10 +345,9 @@ Decision decide(const Pass& pass, const CalibrationOptions& asked_for) {
     options = as_before(options, *prior);
     return decision;
   }
-  const FurtherStateOptions& states = asked.further_states;
-  const bool states_are_settled = asked.drift_model != kAutoDriftModel && states.clock_offset != Choice::kAuto &&
-                                  states.orbital_error != Choice::kAuto && states.readout_bias != Choice::kAuto &&
-                                  states.coefficient_change != Choice::kAuto;
+  const bool states_are_settled = asked.drift_model && std::ranges::none_of(kJudgedByTrial, [&](FurtherState state) {
+                                    return asked.further_states[state] == Choice::kAuto;
+                                  });
   if (states_are_settled && !asked.find_noise) {
     leave_out_what_is_open(options);
     return decision;
@@ -372,10 +357,10 @@ Decision decide(const Pass& pass, const CalibrationOptions& asked_for) {
     leave_out_what_is_open(options);
     return decision;
   }
-  std::string largest_model = largest_to_compare(asked);
+  DriftModelId largest_model = largest_to_compare(asked);
   for (;;) {
     Decision decided = decide_by_pass(pass, screened, asked, largest_model);
-    const std::optional<std::string> larger = larger_model(largest_model);
+    const std::optional<DriftModelId> larger = larger_model(largest_model);
     // None where the pass is too short for any.
     if (!larger || decided.forecasts.empty() || best_of(decided.forecasts) != &decided.forecasts.back()) {
       decided.screened = std::move(screened);

@@ -52,10 +52,10 @@ Restricted restricted(const MatrixXd& triangle, const std::vector<bool>& kept, c
   return result;
 }
 
-Forecast forecast(const PassProblem& problem, const PassSolution& solution, const std::string& model,
+Forecast forecast(const PassProblem& problem, const PassSolution& solution, const DriftModelId& model,
                   const std::vector<MatrixXd>& triangles, const std::vector<std::size_t>& ends) {
   const PassLayout& layout = problem.setup().layout;
-  const std::vector<std::string>& names = problem.setup().family.names();
+  const std::vector<DriftCoefficient>& coefficients = problem.setup().family.coefficients();
   const DriftFamily family = family_of(model);
   std::vector<bool> kept(static_cast<std::size_t>(layout.size()), true);
   VectorXd value = VectorXd::Zero(layout.size());
@@ -63,11 +63,12 @@ Forecast forecast(const PassProblem& problem, const PassSolution& solution, cons
     for (int i = 0; i < layout.drift_size; ++i) {
       const int state = layout.drift(k) + i;
       kept[static_cast<std::size_t>(state)] =
-          std::ranges::find(family.names(), names[static_cast<std::size_t>(i)]) != family.names().end();
+          std::ranges::find(family.coefficients(), coefficients[static_cast<std::size_t>(i)]) !=
+          family.coefficients().end();
       value(state) = solution.gyros[static_cast<std::size_t>(k)].drift_rad_s(i);
     }
   }
-  Forecast result{model, family.size(), 0, {}};
+  Forecast result{model, 0, {}};
   for (std::size_t part = 0; part < ends.size(); ++part) {
     const Restricted known = restricted(triangles[part], kept, value);
     if (part + 1 == ends.size()) {
@@ -82,8 +83,8 @@ Forecast forecast(const PassProblem& problem, const PassSolution& solution, cons
           fit.gyros.emplace_back(problem.corrected(solution.gyros[static_cast<std::size_t>(k)], k, known.x));
       VectorXd own(family.size());
       for (int i = 0; i < family.size(); ++i) {
-        own(i) =
-            gyro.drift_rad_s(std::ranges::find(names, family.names()[static_cast<std::size_t>(i)]) - names.begin());
+        const auto found = std::ranges::find(coefficients, family.coefficients()[static_cast<std::size_t>(i)]);
+        own(i) = gyro.drift_rad_s(found - coefficients.begin());
       }
       gyro.drift_rad_s = own;
     }
@@ -97,7 +98,7 @@ std::vector<GyroCalibration> records_of(const Forecast& forecast, const Forecast
   const DriftFamily family = family_of(forecast.drift_model);
   std::vector<GyroCalibration> records;
   for (std::size_t k = 0; k < fit.gyros.size(); ++k) {
-    GyroCalibration& record = records.emplace_back(record_of(fit.gyros[k], forecast.drift_model, family));
+    GyroCalibration& record = records.emplace_back(record_of(fit.gyros[k], family));
     record.readout_bias.setZero();
     record.momentum_in =
         course.attitude.q_in_c[at] * (fit.gyros[k].C_c_b * course.readings.direction(at, static_cast<int>(k)));
@@ -108,7 +109,7 @@ std::vector<GyroCalibration> records_of(const Forecast& forecast, const Forecast
 }  // namespace
 
 std::vector<Forecast> forecasts(const PassProblem& problem, const BatchResult& found,
-                                const std::vector<std::string>& models) {
+                                const std::vector<DriftModelId>& models) {
   if (problem.arcs() < kParts) {
     return {};
   }
@@ -120,7 +121,7 @@ std::vector<Forecast> forecasts(const PassProblem& problem, const BatchResult& f
   const std::vector<MatrixXd> triangles = triangles_after(linear.prior, linear.prior_y, linear.stages, ends);
   std::vector<Forecast> all;
   all.reserve(models.size());
-  for (const std::string& model : models) {
+  for (const DriftModelId& model : models) {
     all.push_back(forecast(problem, found.before, model, triangles, ends));
   }
   return all;
@@ -150,8 +151,7 @@ std::vector<DriftModelForecast> flown(const std::vector<Forecast>& forecasts, co
         ++count;
       }
     }
-    all.push_back({forecast.drift_model, forecast.coefficients,
-                   forecast.log_likelihood - forecasts.front().log_likelihood,
+    all.push_back({forecast.drift_model, forecast.log_likelihood - forecasts.front().log_likelihood,
                    std::sqrt(square / std::max(count, 1.0))});
   }
   return all;

@@ -1,7 +1,6 @@
 #pragma once
 /// How well drift models say what comes next: each fitted to the beginning of a pass, and judged by the rest.
 
-#include <string>
 #include <vector>
 
 #include "batch/batch.hpp"
@@ -11,8 +10,7 @@
 namespace trihedron::ground {
 
 struct Forecast {
-  std::string drift_model;
-  int coefficients = 0;  ///< of each gyro
+  DriftModelId drift_model;
   /// ln of the likelihood of each part of the pass by the parts before it, but for the first ones; up to a constant
   /// that the models share.
   double log_likelihood = 0;
@@ -26,7 +24,7 @@ struct Forecast {
 /// Of these drift models, all of which the problem's contains, in this order; the problem taken as linear about its
 /// solution. Empty where it has too few arcs to have parts.
 [[nodiscard]] std::vector<Forecast> forecasts(const PassProblem& problem, const BatchResult& found,
-                                              const std::vector<std::string>& models);
+                                              const std::vector<DriftModelId>& models);
 
 /// Flies the fits open loop, each until the next one, over the smoothed pass.
 [[nodiscard]] std::vector<DriftModelForecast> flown(const std::vector<Forecast>& forecasts,

@@ -13,7 +13,8 @@ namespace {
 
 /// ln of the Bayes factor for states being free instead of zero (Savage and Dickey): the density of zero before over
 /// that after. `root`: a square root of their covariance now.
-double log_evidence(const Eigen::VectorXd& estimate, const Eigen::MatrixXd& root, const Eigen::VectorXd& prior_sigma) {
+double log_bayes_factor(const Eigen::VectorXd& estimate, const Eigen::MatrixXd& root,
+                        const Eigen::VectorXd& prior_sigma) {
   const Eigen::MatrixXd scaled = prior_sigma.cwiseInverse().asDiagonal() * root;
   const Eigen::LLT<Eigen::MatrixXd> covariance(scaled * scaled.transpose());
   const Eigen::VectorXd white = covariance.matrixL().solve(estimate.cwiseQuotient(prior_sigma));
@@ -21,10 +22,10 @@ double log_evidence(const Eigen::VectorXd& estimate, const Eigen::MatrixXd& root
 }
 
 /// From the smallest on, those that a model contains and that are tried.
-std::vector<std::string> models_up_to(const std::string& model) {
-  std::vector<std::string> models{Esg7::kModelName};
-  for (int degree = 1; is_for_whole_pass(model) && models.back() != model; ++degree) {
-    models.push_back(fmt::format("vsh:{}", degree));
+std::vector<DriftModelId> models_up_to(const DriftModelId& model) {
+  std::vector<DriftModelId> models{kEsg7};
+  for (int degree = 1; is_for_whole_pass(model) && degree <= model.degree; ++degree) {
+    models.push_back(vsh(degree));
   }
   if (models.back() != model) {
     models.push_back(model);
@@ -45,7 +46,7 @@ PassSetup coarse(PassSetup setup) {
 }  // namespace
 
 Trial::Trial(const Pass& pass, const Screened& screened, const CalibrationOptions& options)
-    : drift_model_(options.drift_model),
+    : drift_model_(decided_drift_model(options)),
       problem_(screened.pass, coarse(setup_of(pass, options))),
       found_(most_likely(problem_, first_solution(problem_, screened), kNearEnough)) {}
 
@@ -54,32 +55,43 @@ void Trial::refit(const ProcessNoise& noise) {
   found_ = most_likely(problem_, std::move(found_.solution), kNearEnough);
 }
 
-double Trial::clock_offset() const { return of_shared(layout().clock(), 1, problem_.setup().clock_offset_sigma_s); }
-
-double Trial::orbital_error() const {
-  return of_shared(layout().orbital(), 6, problem_.setup().orbital_error_sigma_rad);
+double Trial::log_evidence(FurtherState state) const {
+  switch (state) {
+    case FurtherState::kClockOffset:
+      return of_shared(layout().clock(), row_of(state).size, problem_.setup().clock_offset_sigma_s);
+    case FurtherState::kOrbitalError:
+      return of_shared(layout().orbital(), row_of(state).size, problem_.setup().orbital_error_sigma_rad);
+    case FurtherState::kReadoutBias:
+      return of_readout_bias();
+    case FurtherState::kCoefficientChange:
+      return of_coefficient_change();
+    case FurtherState::kStarTrackerAlignment:
+    case FurtherState::kWanderingDrift:
+      break;
+  }
+  return 0;
 }
 
-double Trial::readout_bias() const {
+double Trial::of_readout_bias() const {
   const int size = 3 * layout().gyros;
   Eigen::VectorXd estimate(size);
   for (int k = 0; k < layout().gyros; ++k) {
     const int row = 3 * k;
     estimate.segment<3>(row) = gyro(k).readout_bias;
   }
-  return log_evidence(estimate, found_.errors.last_root.middleRows(layout().bias(0), size),
-                      Eigen::VectorXd::Constant(size, problem_.setup().readout_bias_sigma));
+  return log_bayes_factor(estimate, found_.errors.last_root.middleRows(layout().bias(0), size),
+                          Eigen::VectorXd::Constant(size, problem_.setup().readout_bias_sigma));
 }
 
-double Trial::coefficient_change() const {
+double Trial::of_coefficient_change() const {
   const int size = Esg7::kSize * layout().gyros;
   Eigen::VectorXd estimate(size);
   for (int k = 0; k < layout().gyros; ++k) {
     const int row = Esg7::kSize * k;
     estimate.segment<Esg7::kSize>(row) = gyro(k).change_rad_s;
   }
-  return log_evidence(estimate, found_.errors.last_root.middleRows(layout().change(0), size),
-                      Eigen::VectorXd::Constant(size, problem_.setup().coefficient_change_sigma_rad_s));
+  return log_bayes_factor(estimate, found_.errors.last_root.middleRows(layout().change(0), size),
+                          Eigen::VectorXd::Constant(size, problem_.setup().coefficient_change_sigma_rad_s));
 }
 
 std::vector<Forecast> Trial::forecasts() const {
@@ -111,8 +123,9 @@ std::vector<Eigen::Vector3d> Trial::changes_rad() const {
 }
 
 double Trial::of_shared(int state, int size, double prior_sigma) const {
-  return log_evidence(found_.solution.shared.segment(state - layout().shared(), size),
-                      found_.errors.last_root.middleRows(state, size), Eigen::VectorXd::Constant(size, prior_sigma));
+  return log_bayes_factor(found_.solution.shared.segment(state - layout().shared(), size),
+                          found_.errors.last_root.middleRows(state, size),
+                          Eigen::VectorXd::Constant(size, prior_sigma));
 }
 
 }  // namespace trihedron::ground

@@ -2,7 +2,6 @@
 /// What a pass says about a choice of states, in a fraction of the time of a calibration: what decisions are made by.
 
 #include <Eigen/Core>
-#include <string>
 #include <vector>
 
 #include "batch/batch.hpp"
@@ -27,10 +26,9 @@ class Trial {
     return ground::log_likelihood(problem_, found_.before, linear, noise);
   }
 
-  [[nodiscard]] double clock_offset() const;
-  [[nodiscard]] double orbital_error() const;
-  [[nodiscard]] double readout_bias() const;
-  [[nodiscard]] double coefficient_change() const;
+  /// ln of the Bayes factor of these states, which the trial must have; of kWanderingDrift and kStarTrackerAlignment a
+  /// trial tells none.
+  [[nodiscard]] double log_evidence(FurtherState state) const;
   /// Of its drift model and those that it contains.
   [[nodiscard]] std::vector<Forecast> forecasts() const;
 
@@ -42,8 +40,10 @@ class Trial {
   [[nodiscard]] const PassLayout& layout() const { return problem_.setup().layout; }
   [[nodiscard]] const GyroParameters& gyro(int k) const { return found_.solution.gyros[static_cast<std::size_t>(k)]; }
   [[nodiscard]] double of_shared(int state, int size, double prior_sigma) const;
+  [[nodiscard]] double of_readout_bias() const;
+  [[nodiscard]] double of_coefficient_change() const;
 
-  std::string drift_model_;
+  DriftModelId drift_model_;
   PassProblem problem_;
   BatchResult found_;
 };

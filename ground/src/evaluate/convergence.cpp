@@ -3,19 +3,10 @@
 #include <algorithm>
 #include <cmath>
 
+#include "trihedron/ground/evaluate/evaluate.hpp"
+
 namespace trihedron::ground {
 namespace {
-
-std::optional<double> true_value(const Truth& truth, const StateName& state) {
-  if (state.gyro >= truth.gyros.size()) {
-    return std::nullopt;
-  }
-  const Truth::Gyro& gyro = truth.gyros[state.gyro];
-  if (state.is_alignment) {
-    return gyro.alignment_rotation_vector_rad(state.alignment_axis);
-  }
-  return gyro.drift(state.parameter);
-}
 
 double sigma_in_row(const Calibration& calibration, std::size_t row) {
   const auto i = static_cast<Eigen::Index>(row);
@@ -41,8 +32,7 @@ std::vector<Convergence> convergence(const CalibrationRun& run, const Truth* tru
   const ParameterHistory& history = run.parameters;
   std::vector<Convergence> result(calibration.states.size());
   for (std::size_t i = 0; i < result.size() && !history.t.empty(); ++i) {
-    const std::optional<double> reference =
-        truth == nullptr ? std::nullopt : true_value(*truth, StateName(calibration.states[i]));
+    const std::optional<double> reference = truth == nullptr ? std::nullopt : true_value(*truth, calibration.states[i]);
     std::vector<double> error;
     error.reserve(history.t.size());
     for (const std::vector<double>& row : history.value) {
@@ -64,7 +54,7 @@ std::optional<Duration> settled(const CalibrationRun& run, const std::vector<Con
   std::optional<Duration> last;
   for (std::size_t i = 0; i < parameters.size(); ++i) {
     if (!parameters[i].determined || !parameters[i].followed ||
-        StateName(run.calibration.states[i]).is_alignment != alignments) {
+        run.calibration.states[i].is_alignment() != alignments) {
       continue;
     }
     if (!parameters[i].settled) {

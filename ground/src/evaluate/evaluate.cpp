@@ -71,19 +71,35 @@ AttitudeErrors attitude_errors(const AttitudeHistory& solution, const std::vecto
   return errors;
 }
 
-Eigen::VectorXd parameter_errors(const Truth& truth, const Calibration& calibration) {
-  Eigen::VectorXd errors(calibration.covariance.rows());
-  Eigen::Index row = 0;
-  for (std::size_t k = 0; k < calibration.gyros.size(); ++k) {
-    const GyroCalibration& gyro = calibration.gyros[k];
-    for (const auto& [name, value] : gyro.drift_rad_s) {
-      errors(row++) = truth.gyros[k].drift(name).value_or(0) - value;
-    }
-    errors.segment<3>(row) = (Rot<C, B<1>>::exp(Vec<C>::assume(truth.gyros[k].alignment_rotation_vector_rad)) *
-                              Rot<C, B<1>>::exp(Vec<C>::assume(gyro.alignment_rotation_vector_rad)).inverse())
+std::optional<double> true_value(const Truth& truth, const ParameterId& parameter) {
+  if (parameter.kind == ParameterId::Kind::kFurtherState || parameter.gyro() >= truth.gyros.size()) {
+    return std::nullopt;
+  }
+  const Truth::Gyro& gyro = truth.gyros[parameter.gyro()];
+  return parameter.is_alignment() ? gyro.alignment_rotation_vector_rad(parameter.component)
+                                  : gyro.drift(parameter.coefficient);
+}
+
+Eigen::VectorXd estimate_minus_truth(const Calibration& calibration, const Truth& truth, UnnamedDrift unnamed) {
+  constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
+  const auto C_c_b = [](const Eigen::Vector3d& rotation_vector_rad) {
+    return Rot<C, B<1>>::exp(Vec<C>::assume(rotation_vector_rad));
+  };
+  Eigen::VectorXd errors(static_cast<Eigen::Index>(calibration.states.size()));
+  for (Eigen::Index i = 0; i < errors.size(); ++i) {
+    const ParameterId& state = calibration.states[static_cast<std::size_t>(i)];
+    const std::size_t k = state.gyro();
+    const std::optional<double> true_one = true_value(truth, state);
+    if (state.is_alignment()) {
+      errors(i) = true_one ? (C_c_b(calibration.gyros[k].alignment_rotation_vector_rad) *
+                              C_c_b(truth.gyros[k].alignment_rotation_vector_rad).inverse())
                                  .log()
-                                 .raw();
-    row += 3;
+                                 .raw()(state.component)
+                           : kNone;
+    } else {
+      const bool is_known = true_one || (unnamed == UnnamedDrift::kIsZero && k < truth.gyros.size());
+      errors(i) = is_known ? value_of(calibration, state) - true_one.value_or(0) : kNone;
+    }
   }
   return errors;
 }

@@ -8,14 +8,11 @@
 #include <boost/math/distributions/chi_squared.hpp>
 #include <cmath>
 #include <iterator>
-#include <limits>
 
 #include "trihedron/core/frames.hpp"
 
 namespace trihedron::ground {
 namespace {
-
-constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
 
 Agreement agreement_of(double chi_square, int degrees_of_freedom) {
   Agreement result{chi_square, degrees_of_freedom, 0};
@@ -58,49 +55,21 @@ Agreement agreement_within(const Eigen::VectorXd& difference, const Eigen::Matri
   return agreement_of(chi_square, known);
 }
 
-std::vector<std::string> common_states(const Calibration& a, const Calibration& b, bool alignments) {
-  std::vector<std::string> common;
-  std::ranges::copy_if(a.states, std::back_inserter(common), [&](const std::string& state) {
-    return state.starts_with("gyro") && StateName(state).is_alignment == alignments &&
+std::vector<ParameterId> common_states(const Calibration& a, const Calibration& b, bool alignments) {
+  std::vector<ParameterId> common;
+  std::ranges::copy_if(a.states, std::back_inserter(common), [&](const ParameterId& state) {
+    return (alignments ? state.is_alignment() : state.is_drift()) &&
            std::ranges::find(b.states, state) != b.states.end();
   });
   return common;
 }
 
-std::vector<Eigen::Index> rows_of(const Calibration& calibration, const std::vector<std::string>& states) {
-  std::vector<Eigen::Index> rows;
-  rows.reserve(states.size());
-  for (const std::string& state : states) {
-    rows.push_back(std::ranges::find(calibration.states, state) - calibration.states.begin());
-  }
-  return rows;
-}
-
-double value_of(const Calibration& calibration, const std::string& state) {
-  const StateName name(state);
-  if (name.gyro >= calibration.gyros.size()) {
-    return kNone;
-  }
-  const GyroCalibration& gyro = calibration.gyros[name.gyro];
-  if (name.is_alignment) {
-    return gyro.alignment_rotation_vector_rad(name.alignment_axis);
-  }
-  const auto found = std::ranges::find(gyro.drift_rad_s, name.parameter, [](const auto& c) { return c.first; });
-  return found == gyro.drift_rad_s.end() ? kNone : found->second;
-}
-
-double sigma_of(const Calibration& calibration, const std::string& state) {
-  const Eigen::Index row = rows_of(calibration, {state}).front();
-  return row < calibration.covariance.rows() ? std::sqrt(calibration.covariance(row, row)) : kNone;
-}
-
-Eigen::VectorXd difference(const Calibration& from, const Calibration& to, const std::vector<std::string>& states) {
+Eigen::VectorXd difference(const Calibration& from, const Calibration& to, const std::vector<ParameterId>& states) {
   Eigen::VectorXd result(static_cast<Eigen::Index>(states.size()));
   for (Eigen::Index i = 0; i < result.size(); ++i) {
-    const std::string& state = states[static_cast<std::size_t>(i)];
-    const StateName name(state);
-    result(i) = name.is_alignment
-                    ? (C_c_b(to, name.gyro) * C_c_b(from, name.gyro).inverse()).log().raw()(name.alignment_axis)
+    const ParameterId& state = states[static_cast<std::size_t>(i)];
+    result(i) = state.is_alignment()
+                    ? (C_c_b(to, state.gyro()) * C_c_b(from, state.gyro()).inverse()).log().raw()(state.component)
                     : value_of(to, state) - value_of(from, state);
   }
   return result;

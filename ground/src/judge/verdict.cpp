@@ -44,16 +44,8 @@ constexpr double kBadlyPlacedSine = 0.5;
 /// The paper: alignment settles within one orbit.
 constexpr double kOneOrbit_s = 90 * 60;
 
-using Statistics = std::map<std::string, double>;
-
-double statistic(const Statistics& statistics, const char* name) {
-  const auto found = statistics.find(name);
-  return found == statistics.end() ? 0 : found->second;
-}
-
-void add(std::vector<Finding>& findings, Severity severity, std::string code, std::string text, std::string evidence,
-         std::string cure) {
-  findings.push_back({std::move(code), std::move(text), std::move(evidence), std::move(cure), severity});
+void add(std::vector<Finding>& findings, FindingCode code, std::string text, std::string evidence, std::string cure) {
+  findings.push_back({code, std::move(text), std::move(evidence), std::move(cure)});
 }
 
 Verdict verdict_of(std::vector<Finding> findings) {
@@ -65,11 +57,10 @@ Verdict verdict_of(std::vector<Finding> findings) {
 }
 
 void judge_number_of_fixes(const Statistics& statistics, std::vector<Finding>& findings) {
-  const double used = statistic(statistics, "fixes_used");
-  if (used < 100) {
-    add(findings, Severity::kDoNotUse, "too-few-fixes",
-        fmt::format("Only {:.0f} star-tracker fixes could be used.", used),
-        fmt::format("{:.0f} fixes in the telemetry", statistic(statistics, "fixes")),
+  if (statistics.fixes_used < 100) {
+    add(findings, FindingCode::kTooFewFixes,
+        fmt::format("Only {} star-tracker fixes could be used.", statistics.fixes_used),
+        fmt::format("{} fixes in the telemetry", statistics.fixes),
         "Calibrate on a longer pass, or find out why the fixes were rejected.");
   }
 }
@@ -77,7 +68,7 @@ void judge_number_of_fixes(const Statistics& statistics, std::vector<Finding>& f
 void judge_length(const Pass& pass, std::vector<Finding>& findings) {
   const double span_s = to_seconds(pass.gyro.t.back() - pass.gyro.t.front());
   if (span_s < kOneOrbit_s) {
-    add(findings, Severity::kWarning, "short-pass",
+    add(findings, FindingCode::kShortPass,
         "The pass is shorter than one orbit: alignment and drift coefficients are not yet told apart.",
         fmt::format("{:.1f} min of telemetry", span_s / 60),
         "Alignment takes about one orbit, drift coefficients two to three.");
@@ -85,70 +76,76 @@ void judge_length(const Pass& pass, std::vector<Finding>& findings) {
 }
 
 void judge_rejections(const Statistics& statistics, std::vector<Finding>& findings) {
-  const double outliers = statistic(statistics, "fixes_rejected_as_outliers");
-  const double fixes = statistic(statistics, "fixes");
+  const auto outliers = static_cast<double>(statistics.fixes_rejected_as_outliers);
+  const auto fixes = static_cast<double>(statistics.fixes);
   if (outliers > kManyRejected * fixes) {
-    add(findings, outliers > kMostlyRejected * fixes ? Severity::kDoNotUse : Severity::kWarning, "many-rejected",
+    add(findings, FindingCode::kManyRejected,
         fmt::format("{:.1f} % of the fixes were rejected as outliers.", 100 * outliers / fixes),
         fmt::format("{:.0f} of {:.0f}", outliers, fixes),
         "This is seldom the tracker alone: look for a clock offset, a wrong noise figure or drift outside the model.");
+    if (outliers > kMostlyRejected * fixes) {
+      findings.back().severity = Severity::kDoNotUse;
+    }
   }
-  if (const double reopened = statistic(statistics, "reopened"); reopened > 0) {
-    add(findings, Severity::kWarning, "reopened",
+  if (statistics.reopened > 0) {
+    add(findings, FindingCode::kReopened,
         "The filter lost the momenta and had to set them free: the model did not hold between fixes.",
-        fmt::format("{:.0f} time(s), each after a run of rejections", reopened),
+        fmt::format("{} time(s), each after a run of rejections", statistics.reopened),
         "Raise the process noise, or look there for a gap, a jump of the tracker or drift outside the model.");
   }
 }
 
 void judge_batch(const Statistics& statistics, std::vector<Finding>& findings) {
-  const auto converged = statistics.find("batch_converged");
-  if (converged != statistics.end() && converged->second == 0) {
-    add(findings, Severity::kDoNotUse, "batch-not-converged",
+  if (!statistics.batch_converged.value_or(true)) {
+    add(findings, FindingCode::kBatchNotConverged,
         "Least squares over the whole pass did not settle: its values are those of the last step.",
-        fmt::format("{:.0f} iterations", statistic(statistics, "batch_iterations")),
+        fmt::format("{} iterations", statistics.batch_iterations.value_or(0)),
         "Use estimator invariant, and look for a model that does not hold over the whole pass.");
   }
 }
 
 void judge_star_tracker(const Statistics& statistics, std::vector<Finding>& findings) {
-  if (const double off = statistic(statistics, "fixes_off_in_a_row"); off > 0) {
-    add(findings, Severity::kWarning, "star-tracker-off",
+  if (statistics.fixes_off_in_a_row > 0) {
+    add(findings, FindingCode::kStarTrackerOff,
         "For a while the star tracker was off by more than any drift can make; it was not believed.",
-        fmt::format("{:.0f} fixes, 20 and more in a row", off),
+        fmt::format("{} fixes, 20 and more in a row", statistics.fixes_off_in_a_row),
         "Look at its telemetry there: a wrong identification, or a head that was moved.");
   }
 }
 
 void judge_gyros(const Pass& pass, const CalibrationRun& run, std::vector<Finding>& findings) {
-  const auto tell = [&](GyroState state, Severity severity, const char* code, const char* text, const char* cure) {
+  const auto tell = [&](GyroState state, FindingCode code, const char* text, const char* cure) {
     std::vector<GyroEvent> events;
     std::ranges::copy_if(run.gyro_events, std::back_inserter(events),
                          [&](const GyroEvent& event) { return event.state == state; });
     if (!events.empty()) {
-      add(findings, severity, code, text, fmt::format("{}", fmt::join(texts_of(events, pass.settings.epoch), "; ")),
-          cure);
+      add(findings, code, text, fmt::format("{}", fmt::join(texts_of(events, pass.settings.epoch), "; ")), cure);
     }
+    return !events.empty();
   };
   const auto isolated = std::count_if(run.gyro_events.begin(), run.gyro_events.end(),
                                       [](const GyroEvent& event) { return event.state == GyroState::kIsolated; });
   const bool enough = static_cast<long>(run.calibration.gyros.size()) - isolated >= 2;
-  tell(GyroState::kIsolated, enough ? Severity::kWarning : Severity::kDoNotUse, "gyro-isolated",
-       enough ? "A gyro alone did not agree with the rest, time after time; the others went on without it."
-              : "A gyro alone did not agree with the rest, time after time; without it there is no pair.",
-       "Look at its telemetry from there on. Its estimates are those of before.");
-  tell(GyroState::kStuck, Severity::kWarning, "gyro-stuck",
+  const bool told =
+      tell(GyroState::kIsolated, FindingCode::kGyroIsolated,
+           enough ? "A gyro alone did not agree with the rest, time after time; the others went on without it."
+                  : "A gyro alone did not agree with the rest, time after time; without it there is no pair.",
+           "Look at its telemetry from there on. Its estimates are those of before.");
+  if (told && !enough) {
+    findings.back().severity = Severity::kDoNotUse;
+  }
+  tell(GyroState::kStuck, FindingCode::kGyroStuck,
        "Readings of a gyro stood still, not even moved by noise; they were not used.",
        "Look at the telemetry there: a frozen readout, or the last value repeated in a gap.");
 }
 
 void judge_nis(const Statistics& statistics, const std::string& what_is_wrong, std::vector<Finding>& findings) {
-  const double count = statistic(statistics, "nis_count");
-  const double freedom = statistic(statistics, "nis_degrees_of_freedom");
-  if (count < 1) {
+  if (statistics.nis_count < 1 || !statistics.nis_mean) {
     return;
   }
-  const double nis = statistic(statistics, "nis_mean");
+  const auto count = static_cast<double>(statistics.nis_count);
+  const double freedom = statistics.nis_degrees_of_freedom;
+  const double nis = *statistics.nis_mean;
   const boost::math::chi_squared sum(freedom * count);
   const double low = boost::math::quantile(sum, 0.0005) / count;
   const double high = boost::math::quantile(boost::math::complement(sum, 0.0005)) / count;
@@ -157,7 +154,7 @@ void judge_nis(const Statistics& statistics, const std::string& what_is_wrong, s
   }
   const bool above = nis > freedom;
   const bool wrong = nis > freedom * (1 + kNisWrong) || nis < freedom * (1 - kNisWrong);
-  add(findings, wrong ? Severity::kDoNotUse : Severity::kWarning, "nis-out-of-bounds",
+  add(findings, FindingCode::kNisOutOfBounds,
       above ? "The fixes scatter more than the filter expects: " + what_is_wrong + ", and its sigmas are too small."
             : "The fixes scatter less than the filter expects: the noise is overstated, and its sigmas are too large.",
       fmt::format("mean NIS {:.3f} over {:.0f} fixes; 99.9 % of consistent filters lie in {:.3f} … {:.3f}", nis, count,
@@ -166,6 +163,9 @@ void judge_nis(const Statistics& statistics, const std::string& what_is_wrong, s
               "noise figures or "
               "raise the process noise."
             : "Correct the noise figures in pass.toml.");
+  if (wrong) {
+    findings.back().severity = Severity::kDoNotUse;
+  }
 }
 
 /// The chance that a good pass is found fault with.
@@ -186,7 +186,7 @@ void judge_whiteness(const Pass& pass, const CalibrationRun& run, std::vector<Fi
       "model, estimator batch.";
   if (std::abs(found.largest_correlation) > kCorrelated &&
       !is_chance(found.correlation_square, found.degrees_of_freedom)) {
-    add(findings, Severity::kWarning, "innovations-not-white",
+    add(findings, FindingCode::kInnovationsNotWhite,
         "Fixes that follow each other are off alike: something is left in them that the model does not have, and its "
         "sigmas are too small.",
         fmt::format("autocorrelation up to {:+.3f}; N Σ r² {:.0f} of {} degrees of freedom", found.largest_correlation,
@@ -195,7 +195,7 @@ void judge_whiteness(const Pass& pass, const CalibrationRun& run, std::vector<Fi
   }
   for (const Whiteness::Line& line : found.lines) {
     if (line.amplitude > kLineInSigmas && !is_chance(2 * line.power, line.degrees_of_freedom)) {
-      add(findings, Severity::kWarning, "orbital-line",
+      add(findings, FindingCode::kOrbitalLine,
           fmt::format("The innovations have a line at {} the orbital rate.", line.multiple == 1 ? "" : "twice"),
           fmt::format("amplitude up to {:.2f} sigma; twice the power {:.0f} of {} degrees of freedom", line.amplitude,
                       2 * line.power, line.degrees_of_freedom),
@@ -205,10 +205,10 @@ void judge_whiteness(const Pass& pass, const CalibrationRun& run, std::vector<Fi
 }
 
 void judge_halves(const Statistics& statistics, std::vector<Finding>& findings) {
-  const double square = statistic(statistics, "halves_chi_square");
-  const auto freedom = static_cast<int>(statistic(statistics, "halves_degrees_of_freedom"));
+  const double square = statistics.halves_chi_square.value_or(0);
+  const int freedom = statistics.halves_degrees_of_freedom.value_or(0);
   if (!is_chance(square, freedom)) {
-    add(findings, Severity::kDoNotUse, "halves-disagree",
+    add(findings, FindingCode::kHalvesDisagree,
         "The first half of the pass gives other parameters than the whole: they moved, or the model is incomplete.",
         fmt::format("chi-square {:.0f} of {} degrees of freedom", square, freedom),
         "Let the coefficients change (coefficient_change = \"on\" in [further_states]), give more process noise, or "
@@ -232,23 +232,23 @@ void judge_drift_model(const CalibrationRun& run, std::vector<Finding>& findings
   };
   const auto evidence = [&](const DriftModelForecast& better) {
     return fmt::format("{} is more likely by a factor of e^{:.0f}; forecast error {:.1f}″ in place of {:.1f}″",
-                       better.drift_model, better.log_likelihood - used->log_likelihood,
+                       name_of(better.drift_model), better.log_likelihood - used->log_likelihood,
                        better.open_loop_rms_rad / kArcsecond, used->open_loop_rms_rad / kArcsecond);
   };
   const auto larger = std::max_element(used, models.end(), likelier);
   if (larger->log_likelihood > used->log_likelihood + kClearly) {
-    add(findings, Severity::kDoNotUse, "drift-model-too-small",
+    add(findings, FindingCode::kDriftModelTooSmall,
         "The gyros drift in a way that the drift model does not contain; its coefficients and sigmas are wrong.",
-        evidence(*larger), fmt::format("Use drift model {}, or auto.", larger->drift_model));
+        evidence(*larger), fmt::format("Use drift model {}, or {}.", name_of(larger->drift_model), kAutoDriftModel));
   }
   const auto smaller = std::max_element(models.begin(), std::next(used), likelier);
   if (smaller->log_likelihood > used->log_likelihood + kClearly) {
-    add(findings, Severity::kWarning, "drift-model-too-large",
+    add(findings, FindingCode::kDriftModelTooLarge,
         "The drift model has coefficients that the pass does not support: they add their own error to what comes next.",
-        evidence(*smaller), fmt::format("Use drift model {}, or auto.", smaller->drift_model));
+        evidence(*smaller), fmt::format("Use drift model {}, or {}.", name_of(smaller->drift_model), kAutoDriftModel));
   }
   if (used + 1 == models.end() && models.size() > 1 && used->drift_model == kLargestDriftModel) {
-    add(findings, Severity::kWarning, "drift-model-at-its-limit",
+    add(findings, FindingCode::kDriftModelAtItsLimit,
         "Even the largest drift model is not clearly enough: there may be drift of still higher degree.",
         evidence(*std::prev(used)),
         "Do not trust single coefficients; the forecast error says what the attitude suffers.");
@@ -258,13 +258,13 @@ void judge_drift_model(const CalibrationRun& run, std::vector<Finding>& findings
 void judge_change(const CalibrationRun& run, std::vector<Finding>& findings) {
   std::string names;
   for (const FurtherEstimate& state : run.calibration.further) {
-    if (state.name.ends_with("_change_rad_s") && std::abs(state.value) > 3 * state.sigma) {
-      names +=
-          fmt::format("{}{} {:+.2e} ± {:.0e} rad/s", names.empty() ? "" : ", ", state.name, state.value, state.sigma);
+    if (state.parameter.is_further(FurtherState::kCoefficientChange) && std::abs(state.value) > 3 * state.sigma) {
+      names += fmt::format("{}{} {:+.2e} ± {:.0e} rad/s", names.empty() ? "" : ", ", name_of(state.parameter),
+                           state.value, state.sigma);
     }
   }
   if (!names.empty()) {
-    add(findings, Severity::kWarning, "coefficients-changed",
+    add(findings, FindingCode::kCoefficientsChanged,
         "Drift coefficients changed over the pass; those given are of its end, and may go on changing.", names,
         "Calibrate again soon: the rotors may still be warming up.");
   }
@@ -279,21 +279,22 @@ void judge_star_tracker_errors(const CalibrationRun& run, std::vector<Finding>& 
     if (std::abs(state.value) < kSure * state.sigma) {
       continue;
     }
-    if (state.name == "clock_offset_s") {
+    if (state.parameter.is_further(FurtherState::kClockOffset)) {
       clock_s = state.value;
-    } else if (state.name.starts_with("orbital_") && std::abs(state.value) > std::abs(orbital_rad)) {
+    } else if (state.parameter.is_further(FurtherState::kOrbitalError) &&
+               std::abs(state.value) > std::abs(orbital_rad)) {
       orbital_rad = state.value;
       sureness = std::abs(state.value / state.sigma);
     }
   }
   if (clock_s != 0) {
-    add(findings, Severity::kNote, "clock-offset-found",
+    add(findings, FindingCode::kClockOffsetFound,
         "The clock of the star tracker is off; the calibration has taken account of it.",
         fmt::format("fixes hold the attitude {:+.2f} ms after their stamp", 1e3 * clock_s),
         "Correct the time stamps of the star tracker.");
   }
   if (orbital_rad != 0) {
-    add(findings, Severity::kNote, "orbital-error-found",
+    add(findings, FindingCode::kOrbitalErrorFound,
         "The star tracker has an error at orbital period; the calibration has taken account of it.",
         fmt::format("largest component {:.1f}″, {:.0f} sigmas", orbital_rad / kArcsecond, sureness),
         "None needed; look for what warms its mounting.");
@@ -304,7 +305,7 @@ void judge_noise(const Pass& pass, const CalibrationRun& run, std::vector<Findin
   if (const auto& found = run.options.star_tracker_noise_rad; found && run.options.find_noise) {
     const Eigen::Vector3d told = pass.settings.star_tracker_noise_rad / kArcsecond;
     const Eigen::Vector3d now = *found / kArcsecond;
-    add(findings, Severity::kWarning, "star-tracker-noise",
+    add(findings, FindingCode::kStarTrackerNoise,
         "The fixes scatter otherwise than pass.toml says; the noise found was used.",
         fmt::format("{:.1f}″ {:.1f}″ {:.1f}″ found, {:.1f}″ {:.1f}″ {:.1f}″ told", now.x(), now.y(), now.z(), told.x(),
                     told.y(), told.z()),
@@ -316,13 +317,14 @@ void judge_determination(const CalibrationRun& run, std::vector<Finding>& findin
   std::string names;
   for (std::size_t i = 0; i < run.calibration.states.size(); ++i) {
     // A member outside eq. (1) is taken on so that the others do not suffer; alone it need not be known.
-    const bool outside = StateName(run.calibration.states[i]).parameter.find('(') != std::string::npos;
+    const ParameterId& state = run.calibration.states[i];
+    const bool outside = state.is_drift() && !state.coefficient.is_in_eq1();
     if (!outside && !is_determined(run, i)) {
-      names += (names.empty() ? "" : ", ") + run.calibration.states[i];
+      names += (names.empty() ? "" : ", ") + name_of(state);
     }
   }
   if (!names.empty()) {
-    add(findings, Severity::kWarning, "not-determined",
+    add(findings, FindingCode::kNotDetermined,
         "The data do not determine " + names + "; value and sigma are about those of the prior.",
         "posterior sigma above half of the prior sigma", "Calibrate on a longer pass, with slews.");
   }
@@ -337,8 +339,8 @@ void judge_steadiness(const Pass& pass, const CalibrationRun& run, std::vector<F
     return;
   }
   const Eigen::Vector3d& axis = observability.weakest_axis_c;
-  const bool believes = run.options.estimator == kPaper;
-  add(findings, Severity::kDoNotUse, "weak-alignment-axis",
+  const bool believes = run.options.estimator == Estimator::kPaper;
+  add(findings, FindingCode::kWeakAlignmentAxis,
       fmt::format(
           "Steady flight: the axis ({:+.3f}, {:+.3f}, {:+.3f}) in c is fixed in the body and in space (the "
           "orbit normal, where the spacecraft faces the Earth), so the alignment of each gyro about it cannot be "
@@ -353,18 +355,19 @@ void judge_steadiness(const Pass& pass, const CalibrationRun& run, std::vector<F
 void judge_unused_sensors(const Pass& pass, const CalibrationRun& run, std::vector<Finding>& findings) {
   const auto used = static_cast<int>(run.calibration.gyros.size());
   if (pass.gyro.gyros > used) {
-    add(findings, Severity::kNote, "gyros-not-used",
-        fmt::format("Estimator {} works on a pair: gyros beyond the first {} were not used.", run.options.estimator,
-                    used),
+    add(findings, FindingCode::kGyrosNotUsed,
+        fmt::format("Estimator {} works on a pair: gyros beyond the first {} were not used.",
+                    name_of(run.options.estimator), used),
         fmt::format("{} gyros in the telemetry", pass.gyro.gyros), "None needed; put the pair you want first.");
   }
-  const bool second = std::ranges::any_of(
-      run.calibration.further, [](const FurtherEstimate& state) { return state.name.starts_with("star_tracker_2"); });
+  const bool second = std::ranges::any_of(run.calibration.further, [](const FurtherEstimate& state) {
+    return state.parameter.is_further(FurtherState::kStarTrackerAlignment);
+  });
   const std::size_t heads = second ? 2 : 1;
   if (1 + pass.further_star_trackers.size() > heads) {
-    add(findings, Severity::kNote, "star-trackers-not-used",
+    add(findings, FindingCode::kStarTrackersNotUsed,
         fmt::format("Estimator {} of {} gyros works with {} star tracker{}: those beyond were not used.",
-                    run.options.estimator, used, heads, second ? "s" : ""),
+                    name_of(run.options.estimator), used, heads, second ? "s" : ""),
         fmt::format("{} star trackers in the telemetry", 1 + pass.further_star_trackers.size()), "None needed.");
   }
 }
@@ -372,7 +375,7 @@ void judge_unused_sensors(const Pass& pass, const CalibrationRun& run, std::vect
 void judge_pair(const CalibrationRun& run, std::vector<Finding>& findings) {
   const auto angle = angle_between<double>(run.calibration.gyros[0].momentum_in, run.calibration.gyros[1].momentum_in);
   if (std::sin(angle) < kBadlyPlacedSine) {
-    add(findings, Severity::kWarning, "pair-badly-placed",
+    add(findings, FindingCode::kPairBadlyPlaced,
         "The momenta lie within 30° of one line: the attitude about them is worse than the readout by 1/sinθ.",
         fmt::format("angle {:.1f}°, factor {:.1f}", angle * 180 / std::numbers::pi, 1 / std::sin(angle)),
         "Start one rotor along another axis.");
@@ -462,7 +465,7 @@ Verdict judge(const Pass& pass, const CalibrationRun& run) {
 Verdict judge_navigation(const NavigationRun& run) {
   std::vector<Finding> findings;
   if (run.held_parameters_misfit && *run.held_parameters_misfit > run.misfit_limit) {
-    add(findings, Severity::kDoNotUse, "calibration-does-not-fit",
+    add(findings, FindingCode::kCalibrationDoesNotFit,
         "The parameters held do not fit this pass: the calibration that ran along moved away from them by more than "
         "their sigmas allow.",
         fmt::format("misfit {:.0f} (squared, in sigmas); 99.9 % of fitting calibrations lie below {:.0f}",

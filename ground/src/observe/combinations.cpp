@@ -30,21 +30,19 @@ std::string axis_name(const Eigen::Vector3d& axis_c, const BodyRotation& rotatio
 
 }  // namespace
 
-ParameterBlocks::ParameterBlocks(const std::vector<std::string>& parameters) {
+ParameterBlocks::ParameterBlocks(const std::vector<ParameterId>& parameters) {
   for (std::size_t i = 0; i < parameters.size(); ++i) {
-    Block block{parameters[i], false, {}, {}};
-    const bool of_a_gyro = parameters[i].find('.') != std::string::npos;
-    if (of_a_gyro) {
-      const StateName state(parameters[i]);
-      block.name = fmt::format("gyro {} {}", state.gyro + 1, state.is_alignment ? "alignment" : "drift");
-      block.is_alignment = state.is_alignment;
+    const ParameterId& parameter = parameters[i];
+    Block block{name_of(parameter), parameter.is_alignment(), {}, {}};
+    if (parameter.is_alignment() || parameter.is_drift()) {
+      block.name = fmt::format("gyro {} {}", parameter.gyro() + 1, parameter.is_alignment() ? "alignment" : "drift");
     }
     if (blocks_.empty() || blocks_.back().name != block.name) {
       blocks_.push_back(block);
     }
     blocks_.back().rows.push_back(static_cast<Eigen::Index>(i));
-    if (of_a_gyro && !block.is_alignment) {
-      blocks_.back().parameters.push_back(StateName(parameters[i]).parameter);
+    if (parameter.is_drift()) {
+      blocks_.back().parameters.push_back(short_name_of(parameter));
     }
   }
 }

@@ -5,6 +5,8 @@
 #include <string>
 #include <vector>
 
+#include "trihedron/records/parameter_id.hpp"
+
 namespace trihedron::ground {
 
 /// What the body turns about in the mean; zero where it does not turn.
@@ -15,8 +17,8 @@ struct BodyRotation {
 
 class ParameterBlocks {
  public:
-  /// `parameters`: "gyro1.k0", "gyro1.align_x" …, or names of further states, each of which is a block of its own.
-  explicit ParameterBlocks(const std::vector<std::string>& parameters);
+  /// The drift coefficients of a gyro are a block, so are its alignments; each further state is one of its own.
+  explicit ParameterBlocks(const std::vector<ParameterId>& parameters);
 
   /// Other orthonormal columns of the same space, the first of them as nearly within one block as there is any, the
   /// second the same of what is left, and so on. `space`: one row per parameter.

@@ -27,14 +27,15 @@ using Eigen::VectorXd;
 constexpr std::size_t kTimes = 20;
 
 /// In the order of PassLayout.
-std::vector<std::string> names_of_constants(const PassSetup& setup, const CalibrationOptions& options) {
+std::vector<ParameterId> constants_of(const PassSetup& setup, const CalibrationOptions& options) {
   const PassLayout& layout = setup.layout;
-  std::vector<std::string> names = state_names(setup.family, layout.gyros);
-  std::vector<std::string> further = further_names(options.further_states, layout.further_heads, layout.gyros);
+  std::vector<ParameterId> constants =
+      drift_and_alignment(setup.family.model(), static_cast<std::size_t>(layout.gyros));
+  std::vector<ParameterId> further = further_parameters(options.further_states, layout.further_heads, layout.gyros);
   const std::ptrdiff_t shared = layout.size() - layout.shared();
   std::ranges::rotate(further, further.begin() + shared);
-  names.insert(names.end(), further.begin(), further.end());
-  return names;
+  constants.insert(constants.end(), further.begin(), further.end());
+  return constants;
 }
 
 /// Roots of the information by the measurements alone, at these stages.
@@ -271,7 +272,7 @@ Observability observe(const Pass& pass, const CalibrationOptions& asked, const M
   Observability result;
   result.options = options;
   result.options.find_noise = false;
-  result.parameters = names_of_constants(problem.setup(), options);
+  result.parameters = constants_of(problem.setup(), options);
   result.prior_sigma = sigmas(at.prior_root, MatrixXd::Zero(1, at.constants()));
   const MatrixXd root = add_course(at, result);
   if (layout.gyros == 2) {

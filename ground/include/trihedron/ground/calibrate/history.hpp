@@ -17,7 +17,7 @@ struct StartUp {
 };
 
 struct ParameterChange {
-  std::string state;
+  ParameterId state;
   double change = 0;  ///< rad/s, or rad about c x, y, z
   double sigma = 0;
 };
@@ -34,7 +34,7 @@ struct StartUpChange {
 
 /// A parameter over the start-ups that have it: normal about one mean, each seen with its own sigma.
 struct Spread {
-  std::string state;
+  ParameterId state;
   int start_ups = 0;
   double mean = 0;        ///< weighted; rad/s or rad
   double deviation = 0;   ///< between start-ups, without what their own sigmas explain
@@ -52,7 +52,7 @@ struct History {
 [[nodiscard]] History compare_start_ups(const std::vector<CatalogueEntry>& catalogue);
 
 /// Drift coefficients and alignments that any calibration has, once each, in their order.
-[[nodiscard]] std::vector<std::string> states_of(const std::vector<CatalogueEntry>& catalogue);
+[[nodiscard]] std::vector<ParameterId> states_of(const std::vector<CatalogueEntry>& catalogue);
 
 /// Mean and deviation between start-ups by R. C. Paule and J. Mandel, J. Res. NBS 87 (1982) 377: the deviation is such
 /// that the squared distances from the weighted mean, over deviation² + sigma², sum to one less than their number; zero

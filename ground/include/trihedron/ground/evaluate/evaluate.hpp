@@ -2,6 +2,7 @@
 /// Attitude error against a reference: roll, pitch, heading; per stretch of time; after each correction.
 
 #include <Eigen/Core>
+#include <cstdint>
 #include <optional>
 #include <vector>
 
@@ -9,8 +10,8 @@
 
 namespace trihedron::ground {
 
-/// Errors at the epochs common to both, within half a millisecond: the rotation vector of C_in_c(ref)ᵀ
-/// C_in_c(solution), c axes.
+/// Errors, solution − reference, at the epochs common to both, within half a millisecond: e of C_in_c(solution) =
+/// C_in_c(ref) exp([e×]), c axes.
 struct AttitudeErrors {
   std::vector<Time> t;
   std::vector<Eigen::Vector3d> error_rad;  ///< x roll, y pitch, z heading
@@ -21,9 +22,17 @@ struct AttitudeErrors {
 [[nodiscard]] AttitudeErrors attitude_errors(const AttitudeHistory& solution, const std::vector<Time>& reference_t,
                                              const std::vector<Eigen::Quaterniond>& reference_q_in_c);
 
-/// Of a calibration, truth − estimate in the order of Calibration::states: rad/s, and δ of C_c_b(true) = exp([δ×])
-/// C_c_b(est), c axes. Drift that the truth does not name is taken as none.
-[[nodiscard]] Eigen::VectorXd parameter_errors(const Truth& truth, const Calibration& calibration);
+/// Of a drift coefficient, rad/s, or an alignment, component of the rotation vector, rad; nothing where the truth does
+/// not tell.
+[[nodiscard]] std::optional<double> true_value(const Truth& truth, const ParameterId& parameter);
+
+/// Drift coefficients that the truth does not name.
+enum class UnnamedDrift : std::uint8_t { kIsUnknown, kIsZero };
+
+/// The errors of a calibration, in the order of Calibration::states: estimate − truth of drift, rad/s; of alignment,
+/// rad, the small rotation vector δ of C_c_b(est) = exp([δ×]) C_c_b(true), c axes. NaN where the truth does not tell.
+[[nodiscard]] Eigen::VectorXd estimate_minus_truth(const Calibration& calibration, const Truth& truth,
+                                                   UnnamedDrift unnamed = UnnamedDrift::kIsUnknown);
 
 struct ErrorStatistics {
   Time from{};

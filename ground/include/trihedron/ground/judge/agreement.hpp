@@ -27,19 +27,10 @@ struct Agreement {
                                          const Eigen::MatrixXd& scale);
 
 /// The states of a drift coefficient or alignment that both calibrations have, in the order of the first.
-[[nodiscard]] std::vector<std::string> common_states(const Calibration& a, const Calibration& b, bool alignments);
-
-/// Where `states` stand in Calibration::states, which must have them.
-[[nodiscard]] std::vector<Eigen::Index> rows_of(const Calibration& calibration, const std::vector<std::string>& states);
-
-/// Of a state: drift rad/s, alignment component of the rotation vector, rad. NaN where the calibration does not have
-/// it.
-[[nodiscard]] double value_of(const Calibration& calibration, const std::string& state);
-/// 1-sigma of a state; NaN where the calibration does not have it.
-[[nodiscard]] double sigma_of(const Calibration& calibration, const std::string& state);
+[[nodiscard]] std::vector<ParameterId> common_states(const Calibration& a, const Calibration& b, bool alignments);
 
 /// `to` less `from`, one per state: drift rad/s; alignment δ of C_c_b(to) = exp([δ×]) C_c_b(from), rad, c axes.
 [[nodiscard]] Eigen::VectorXd difference(const Calibration& from, const Calibration& to,
-                                         const std::vector<std::string>& states);
+                                         const std::vector<ParameterId>& states);
 
 }  // namespace trihedron::ground

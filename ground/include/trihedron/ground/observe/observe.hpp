@@ -35,7 +35,7 @@ struct Combination {
 /// per parameter.
 struct Observability {
   CalibrationOptions options;           ///< as decided
-  std::vector<std::string> parameters;  ///< as Calibration::states, then further states
+  std::vector<ParameterId> parameters;  ///< as Calibration::states, then further states
   Eigen::VectorXd prior_sigma;          ///< rad/s, rad, or that of the further state
   Eigen::VectorXd sigma;                ///< by prior and measurements
   Eigen::MatrixXd covariance;           ///< the same
