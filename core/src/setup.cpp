@@ -38,7 +38,7 @@ std::optional<SetupFault> CalibrationSetup::fault() const {
   return std::nullopt;
 }
 
-Duration CalibrationSetup::max_interpolation() const {
+Duration max_interpolation(Duration gyro_period) {
   constexpr Duration kLeast = std::chrono::milliseconds(500);
   return std::max(kLeast, gyro_period * 5 / 2);
 }

@@ -3,7 +3,7 @@
 #include <cmath>
 
 #include "trihedron/core/directions_fit.hpp"
-#include "trihedron/core/invariant_estimator.hpp"
+#include "trihedron/core/setup.hpp"
 #include "trihedron/ground/observe/observe.hpp"
 #include "trihedron/sim/simulate.hpp"
 
@@ -13,19 +13,20 @@ namespace {
 constexpr int kTogether = 4;
 /// 1-sigma of four together over that of one.
 constexpr double kLessNoise = 0.5;
-using OnBoard = InvariantEstimator<Esg7, 2>;
 
 /// 1-sigma of the readings round a fix, taken together as on board, over that of one.
 double noise_of_readings_together(Duration gyro_period) {
-  SampleBuffer<1, 512> samples;
-  for (Time t{-(OnBoard::kReach / gyro_period) * gyro_period}; t <= Time{OnBoard::kReach}; t += gyro_period) {
-    GyroSample<1> sample;
-    sample.t = t;
-    sample.h_b[0] = Eigen::Vector3d::UnitX();
-    samples.push(sample);
-  }
+  CalibrationSetup setup;
+  setup.gyro_period = gyro_period;
+  const auto reach = static_cast<int>(setup.reach() / gyro_period);
   constexpr int kCubic = 3;
-  return fit_directions<1>(samples, 0, samples.size(), Time{}, kCubic).noise_factor;
+  DirectionsFit fit(Time{}, Time{-reach * gyro_period}, Time{reach * gyro_period}, 2 * reach + 1, kCubic, 1);
+  Directions h_b;
+  h_b[0] = Eigen::Vector3d::UnitX();
+  for (int i = -reach; i <= reach; ++i) {
+    fit.add(Time{i * gyro_period}, h_b);
+  }
+  return fit.solve().noise_factor;
 }
 
 StarTrackerScenario without_errors(const StarTrackerScenario& head) {
@@ -72,7 +73,7 @@ DesignFlight::DesignFlight(const Scenario& scenario, const CalibrationOptions& o
   }
   scenario_.star_tracker_period *= kTogether;
   // What is further apart is a gap.
-  if (kTogether * scenario.gyro_period <= std::chrono::milliseconds(500)) {
+  if (kTogether * scenario.gyro_period <= max_interpolation(scenario.gyro_period)) {
     scenario_.gyro_period *= kTogether;
   }
 }

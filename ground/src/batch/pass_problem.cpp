@@ -191,14 +191,13 @@ void PassProblem::step(const Node& from, const Node& to, Moment& moment, double&
   extra_variance_rad2 += largest_rad * largest_rad;
 }
 
-template <class Rows>
 MatrixXd PassProblem::by_states_of_arc(const Moment& moment, Rows rows) const {
   const Layout& on_board = setup_.on_board.layout;
   carry_back(on_board, moment.since, rows);
   MatrixXd by_states(rows.rows(), layout_.size());
   for (int k = 0; k < gyros_; ++k) {
     by_states.middleCols<2>(layout_.direction(k)) =
-        rows.template middleCols<3>(on_board.direction(k)).lazyProduct(moment.directions[k]);
+        rows.middleCols<3>(on_board.direction(k)).lazyProduct(moment.directions[k]);
   }
   const int rest = layout_.size() - layout_.direction(gyros_);
   by_states.rightCols(rest) = rows.middleCols(on_board.direction(gyros_), rest);
@@ -339,7 +338,6 @@ void PassProblem::end_arc(const PassSolution& solution, const Moment& moment, do
   end.extra_variance_rad2 = extra_variance_rad2;
   stage.m.setZero(d);
   const PassSolution::Arc& next = solution.arcs[moment.arc + 1];
-  using Rows = ComparedRows<kFullCapacity.states>;
   Rows rows = Rows::Zero(2L * gyros_, on_board.size());
   for (int k = 0; k < gyros_; ++k) {
     const Eigen::Matrix<double, 2, 3> T = across(next.h_in[k]).transpose();

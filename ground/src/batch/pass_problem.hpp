@@ -125,7 +125,10 @@ class PassProblem {
   /// By the momenta and these readings.
   [[nodiscard]] Result<AttitudeByDirections, DirectionsFault> attitude(const Moment& moment, const Directions& h_b,
                                                                        const GyroMask& used) const;
-  /// How its error, c axes, depends on the states of the arc.
+  /// Rows about the states at a moment, as on board, as rows about those of its arc.
+  using Rows = ComparedRows<kFullCapacity.states>;
+  [[nodiscard]] Eigen::MatrixXd by_states_of_arc(const Moment& moment, Rows rows) const;
+  /// How the error of an attitude, c axes, depends on the states of the arc.
   [[nodiscard]] Eigen::MatrixXd attitude_by_states(const Moment& moment, const AttitudeByDirections& attitude,
                                                    const Directions& h_b) const;
 
@@ -145,9 +148,6 @@ class PassProblem {
 
   void step(const Node& from, const Node& to, Moment& moment, double& extra_variance_rad2) const;
   void begin_arc(const PassSolution& solution, std::size_t arc, Moment& moment) const;
-  /// Rows about the states at a moment, three components of each direction, as rows about those of its arc.
-  template <class Rows>
-  [[nodiscard]] Eigen::MatrixXd by_states_of_arc(const Moment& moment, Rows rows) const;
   void add_prior(const PassSolution& solution, Linear& linear) const;
   void end_arc(const PassSolution& solution, const Moment& moment, double extra_variance_rad2, Linear& linear) const;
 

@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "choose/noise_search.hpp"
+#include "model/orbital_rate.hpp"
 #include "model/prior.hpp"
 #include "trihedron/ground/model/setup_error.hpp"
 
@@ -54,18 +55,6 @@ std::optional<Eigen::Vector3d> other_star_tracker_noise(const Pass& pass,
   return other ? std::optional(found) : std::nullopt;
 }
 
-/// What was asked for must be there.
-void refuse_further_states(const Pass& pass, const CalibrationOptions& asked) {
-  const FurtherStateOptions& states = asked.further_states;
-  for (const FurtherStateRow& row : kFurtherStates) {
-    if (states.is_on(row.state)) {
-      throw SetupError(
-          fmt::format("estimator {} of {} gyros has no state '{}'", name_of(asked.estimator), pass.gyro.gyros, row.key),
-          "set it to off or auto, or use estimator invariant with two gyros");
-    }
-  }
-}
-
 /// The noise that an earlier calibration went by, but for the least that is told.
 void use_noise(const CalibrationNoise& noise, CalibrationOptions& options) {
   options.direction_random_walk_rad_sqrt_s =
@@ -95,14 +84,14 @@ CalibrationOptions as_before(CalibrationOptions options, const Calibration& prio
 }
 
 /// Throws SetupError where the earlier calibration is of other gyros or of another drift model.
-void refuse_prior_of_others(const Pass& pass, const CalibrationOptions& asked) {
-  const std::optional<Calibration>& prior = pass.settings.prior;
+void refuse_prior_of_others(const PassSettings& settings, const CalibrationOptions& asked) {
+  const std::optional<Calibration>& prior = settings.prior;
   if (!prior) {
     return;
   }
-  if (prior->gyros.size() != static_cast<std::size_t>(pass.gyro.gyros)) {
+  if (prior->gyros.size() != settings.gyros.size()) {
     throw SetupError(
-        fmt::format("the earlier calibration has {} gyros; the pass has {}", prior->gyros.size(), pass.gyro.gyros),
+        fmt::format("the earlier calibration has {} gyros; the pass has {}", prior->gyros.size(), settings.gyros.size()),
         "use a calibration of these gyros");
   }
   for (std::size_t k = 0; k < prior->gyros.size(); ++k) {
@@ -112,7 +101,7 @@ void refuse_prior_of_others(const Pass& pass, const CalibrationOptions& asked) {
                                    name_of(gyro.drift_model), name_of(*asked.drift_model)),
                        "use a calibration made with the same drift model");
     }
-    static_cast<void>(family_of(gyro));
+    refuse_incomplete(gyro);
   }
 }
 
@@ -164,12 +153,12 @@ void use_walk(const ProcessNoise& noise, CalibrationOptions& options) {
 
 void use_wandering(const ProcessNoise& noise, CalibrationOptions& options) {
   options.further_states[FurtherState::kWanderingDrift] = Choice::kOn;
-  options.further_states.wandering_drift_rad_s = noise.wandering_sigma_rad_s;
-  options.further_states.wandering_time = from_seconds(noise.wandering_time_s);
+  options.further_states.wandering_drift_rad_s = noise.wandering_drift.sigma;
+  options.further_states.wandering_time = from_seconds(noise.wandering_drift.time_s);
 }
 
 /// Drift that wanders as fast as this random walk: walk² = 2 σ² τ.
-CalibrationOptions wandering_like(const Likely& walking, CalibrationOptions options) {
+CalibrationOptions wandering_like(const NoiseFit& walking, CalibrationOptions options) {
   FurtherStateOptions& states = options.further_states;
   states[FurtherState::kWanderingDrift] = Choice::kOn;
   states.wandering_drift_rad_s =
@@ -182,19 +171,19 @@ CalibrationOptions wandering_like(const Likely& walking, CalibrationOptions opti
 /// settled.
 void decide_beside_noise(const Pass& pass, const Screened& screened, const CalibrationOptions& asked,
                          const DriftModelId& largest_model, bool wandering_is_open, Trial everything,
-                         const Likely& walk, Decision& decision) {
+                         const NoiseFit& walk, Decision& decision) {
   CalibrationOptions& options = decision.options;
   const CalibrationOptions free = with_everything(options, asked, largest_model);
   const CalibrationOptions like = wandering_like(walk, free);
-  std::future<std::pair<Trial, Likely>> wandering_trial;
+  std::future<std::pair<Trial, NoiseFit>> wandering_trial;
   if (wandering_is_open) {
     wandering_trial = std::async(std::launch::async, [&] {
       Trial trial(pass, screened, like);
-      const Likely likely = with_most_likely_wandering(trial, like);
+      const NoiseFit likely = with_most_likely_wandering(trial, like);
       return std::pair(std::move(trial), likely);
     });
   }
-  const Likely walking = with_most_likely_walk(everything, free);
+  const NoiseFit walking = with_most_likely_walk(everything, free);
   std::optional<Evidence> wandering;
   std::optional<ProcessNoise> wanders;
   if (wandering_is_open && walking.gain > kStrong) {
@@ -221,17 +210,6 @@ void decide_beside_noise(const Pass& pass, const Screened& screened, const Calib
   }
 }
 
-/// It is seen over a whole pass only. Throws SetupError where it was asked for.
-void leave_out_coefficient_change(CalibrationOptions& options) {
-  Choice& choice = options.further_states[FurtherState::kCoefficientChange];
-  if (choice == Choice::kOn) {
-    throw SetupError(fmt::format("estimator {} has no state '{}'", name_of(options.estimator),
-                                 row_of(FurtherState::kCoefficientChange).key),
-                     "set it to off or auto, or use estimator batch");
-  }
-  choice = Choice::kOff;
-}
-
 /// Nothing to judge by.
 void leave_out_what_is_open(CalibrationOptions& options) {
   for (const FurtherStateRow& row : kFurtherStates) {
@@ -239,21 +217,6 @@ void leave_out_what_is_open(CalibrationOptions& options) {
     choice = choice == Choice::kAuto ? Choice::kOff : choice;
   }
   options.drift_model = options.drift_model.value_or(kEsg7);
-}
-
-/// Only the noise is found: of more than two gyros.
-void find_noise(const Pass& pass, const Screened& screened, CalibrationOptions& options) {
-  Trial trial(pass, screened, options);
-  const std::vector<Eigen::Vector3d> changes = trial.changes_rad();
-  options.find_noise = changes.size() >= kEnough;
-  if (!options.find_noise) {
-    return;
-  }
-  options.star_tracker_noise_rad = other_star_tracker_noise(pass, changes);
-  if (options.star_tracker_noise_rad) {
-    trial = Trial(pass, screened, options);
-  }
-  use_walk(with_most_likely_walk(trial, options).noise, options);
 }
 
 /// By what the pass itself shows.
@@ -278,7 +241,7 @@ Decision decide_by_pass(const Pass& pass, const Screened& screened, const Calibr
   }
   settle_states(everything, asked, decision);
   Trial decided(pass, screened, options);
-  const Likely walking = with_most_likely_walk(decided, options);
+  const NoiseFit walking = with_most_likely_walk(decided, options);
   if (walking.gain > kStrong) {
     decide_beside_noise(pass, screened, asked, largest_model, wandering_is_open, std::move(everything), walking,
                         decision);
@@ -294,57 +257,65 @@ DriftModelId largest_to_compare(const CalibrationOptions& asked) {
   if (asked.estimator != Estimator::kBatch || asked.drift_model == kEsg20) {
     return asked.drift_model.value_or(kEsg20);
   }
-  const bool is_vsh = asked.drift_model && is_for_whole_pass(*asked.drift_model);
+  const bool is_vsh = asked.drift_model && asked.drift_model->family == DriftModelId::Family::kVsh;
   return vsh(is_vsh ? std::max(int{asked.drift_model->degree}, kFirstDegree) : kFirstDegree);
 }
 
 /// By one degree, where there is one.
 std::optional<DriftModelId> larger_model(const DriftModelId& model) {
-  const bool is_there = is_for_whole_pass(model) && model.degree < DriftFamily::kMaxDegree;
+  const bool is_there = model.family == DriftModelId::Family::kVsh && model.degree < DriftModelId::kMaxDegree;
   return is_there ? std::optional(vsh(model.degree + 1)) : std::nullopt;
+}
+
+/// Estimator paper has nothing to choose; how the coefficients change over a pass is looked for in the whole of it only.
+void settle_by_estimator(CalibrationOptions& asked) {
+  if (asked.estimator == Estimator::kPaper) {
+    asked.drift_model = asked.drift_model.value_or(kEsg7);
+    leave_out_what_is_open(asked);
+    asked.find_noise = false;
+  } else if (asked.estimator == Estimator::kInvariant) {
+    Choice& choice = asked.further_states[FurtherState::kCoefficientChange];
+    choice = choice == Choice::kAuto ? Choice::kOff : choice;
+  }
 }
 
 }  // namespace
 
+CalibrationOptions settled_before(const PassSettings& settings, CalibrationOptions options) {
+  const std::optional<Calibration>& prior = settings.prior;
+  if (prior && !options.drift_model) {
+    options.drift_model = prior->gyros.at(0).drift_model;
+  }
+  settle_by_estimator(options);
+  refuse_prior_of_others(settings, options);
+  if (prior && options.estimator != Estimator::kPaper) {
+    if (prior->noise && options.find_noise) {
+      use_noise(*prior->noise, options);
+    }
+    options = as_before(options, *prior);
+  }
+  options.find_noise = false;
+  leave_out_what_is_open(options);
+  return options;
+}
+
 Decision decide(const Pass& pass, const CalibrationOptions& asked_for) {
   CalibrationOptions asked = asked_for;
-  if (pass.settings.prior && !asked.drift_model) {
-    asked.drift_model = pass.settings.prior->gyros.at(0).drift_model;
+  if (pass.gyro.gyros < static_cast<int>(pass.settings.gyros.size())) {
+    throw SetupError(fmt::format("the telemetry has {} gyros; the settings speak of {}", pass.gyro.gyros,
+                                 pass.settings.gyros.size()),
+                     "give the telemetry of all of them, or the settings of those that there are");
   }
-  if (asked.drift_model && is_for_whole_pass(*asked.drift_model) && asked.estimator == Estimator::kInvariant) {
-    asked.estimator = Estimator::kBatch;
+  if (!asked.orbital_rate_rad_s) {
+    asked.orbital_rate_rad_s = orbital_rate_rad_s(pass.star_tracker);
   }
-  if (asked.estimator != Estimator::kBatch) {
-    leave_out_coefficient_change(asked);
+  settle_by_estimator(asked);
+  if (pass.settings.prior || asked.estimator == Estimator::kPaper) {
+    return {settled_before(pass.settings, asked), {}, {}, {}};
   }
-  refuse_prior_of_others(pass, asked);
   Decision decision{asked, {}, {}, {}};
   CalibrationOptions& options = decision.options;
   options.find_noise = false;
-  const bool invariant = asked.estimator != Estimator::kPaper;
-  const std::optional<Calibration>& prior = pass.settings.prior;
-  if (prior && prior->noise && asked.find_noise && invariant) {
-    use_noise(*prior->noise, options);
-  }
-  if (!invariant || pass.gyro.gyros > 2) {
-    refuse_further_states(pass, asked);
-    options = without_further_states(options);
-    if (asked.drift_model) {
-      options.drift_model = asked.drift_model;
-    }
-    if (asked.find_noise && invariant && !prior) {
-      // Not kept: which gyro is at fault is to be judged by the noise found.
-      const Screened screened = screen(pass, options);
-      if (!screened.pass.fixes.empty()) {
-        find_noise(pass, screened, options);
-      }
-    }
-    return decision;
-  }
-  if (prior) {
-    options = as_before(options, *prior);
-    return decision;
-  }
   const bool states_are_settled = asked.drift_model && std::ranges::none_of(kJudgedByTrial, [&](FurtherState state) {
                                     return asked.further_states[state] == Choice::kAuto;
                                   });
@@ -363,7 +334,9 @@ Decision decide(const Pass& pass, const CalibrationOptions& asked_for) {
     const std::optional<DriftModelId> larger = larger_model(largest_model);
     // None where the pass is too short for any.
     if (!larger || decided.forecasts.empty() || best_of(decided.forecasts) != &decided.forecasts.back()) {
-      decided.screened = std::move(screened);
+      if (pass.settings.gyros.size() == 2) {  // which of more gyros is at fault is judged by the noise found
+        decided.screened = std::move(screened);
+      }
       return decided;
     }
     largest_model = *larger;

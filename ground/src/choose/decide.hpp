@@ -18,10 +18,14 @@ struct Decision {
   std::optional<Screened> screened;  ///< what it was decided by, where the pass was looked at
 };
 
-/// Settles each choice that is left to the program. Estimator paper, and passes of more than two gyros, have no further
-/// states; a prior calibration tells them where the pass has one; else they are those that the pass makes 20 times as
-/// likely as their absence. The noise is found where it is asked for, on a pass that is long enough and has no prior
-/// calibration. Throws SetupError.
+/// Settles each choice that is left to the program by the whole pass. Estimator paper has no further states; a prior
+/// calibration tells them where the pass has one; else they are those that the pass makes 20 times as likely as their
+/// absence. The noise is found where it is asked for, on a pass that is long enough and has no prior calibration. Throws
+/// SetupError.
 [[nodiscard]] Decision decide(const Pass& pass, const CalibrationOptions& asked);
+
+/// Settles the same before the first event, as on board: by the earlier calibration, or else nothing that is open is
+/// there. Throws SetupError.
+[[nodiscard]] CalibrationOptions settled_before(const PassSettings& settings, CalibrationOptions options);
 
 }  // namespace trihedron::ground

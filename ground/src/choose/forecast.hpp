@@ -16,7 +16,7 @@ struct Forecast {
   double log_likelihood = 0;
   struct Fit {
     Time until{};
-    std::vector<GyroParameters> gyros;
+    std::vector<GyroCalibration> gyros;  ///< without momenta
   };
   std::vector<Fit> fits;  ///< to the parts before each forecast
 };

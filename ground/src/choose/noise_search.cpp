@@ -35,7 +35,7 @@ class Search {
   }
 
   /// The best point, its first number by a parabola through its neighbours where it has two.
-  [[nodiscard]] Likely best() const {
+  [[nodiscard]] NoiseFit best() const {
     const auto [i, j] = best_;
     const double peak = tried_.at(best_);
     const auto below = tried_.find({i - 1, j});
@@ -70,22 +70,26 @@ class Search {
   Point best_;
 };
 
+GaussMarkov wandering_of(const CalibrationOptions& options) {
+  return {options.further_states.wandering_drift_rad_s, to_seconds(options.further_states.wandering_time)};
+}
+
 /// Where the model is wrong there is more than one maximum.
 const std::vector<Search::Point> kAllLevels = {{0, 0}, {3, 0}, {6, 0}, {9, 0}};
 
 /// The trial with the process noise that makes the pass most likely, and that: outliers are told apart by it.
-Likely settled(Trial& trial, const Search::At& at, const std::vector<Search::Point>& starts,
+NoiseFit settled(Trial& trial, const Search::At& at, const std::vector<Search::Point>& starts,
                const Search::Point& lowest, const Search::Point& highest) {
   constexpr int kRounds = 3;
-  Likely likely;
+  NoiseFit likely;
   for (int round = 0; round < kRounds; ++round) {
     const ProcessNoise before = likely.noise;
     likely = Search(trial, at, starts, lowest, highest).best();
     trial.refit(likely.noise);
     const auto same = [](double a, double b) { return std::abs(a - b) <= kNotable * b; };
     if (same(before.direction_random_walk_rad_sqrt_s, likely.noise.direction_random_walk_rad_sqrt_s) &&
-        same(before.wandering_sigma_rad_s, likely.noise.wandering_sigma_rad_s) &&
-        same(before.wandering_time_s, likely.noise.wandering_time_s)) {
+        same(before.wandering_drift.sigma, likely.noise.wandering_drift.sigma) &&
+        same(before.wandering_drift.time_s, likely.noise.wandering_drift.time_s)) {
       break;
     }
   }
@@ -94,10 +98,9 @@ Likely settled(Trial& trial, const Search::At& at, const std::vector<Search::Poi
 
 }  // namespace
 
-Likely with_most_likely_walk(Trial& trial, const CalibrationOptions& options) {
+NoiseFit with_most_likely_walk(Trial& trial, const CalibrationOptions& options) {
   const ProcessNoise least{std::max(options.direction_random_walk_rad_sqrt_s, kLeastWalk_rad_sqrt_s),
-                           options.further_states.wandering_drift_rad_s,
-                           to_seconds(options.further_states.wandering_time)};
+                           wandering_of(options)};
   const auto at = [least](double level, int) {
     ProcessNoise noise = least;
     noise.direction_random_walk_rad_sqrt_s *= std::pow(2, level);
@@ -106,22 +109,21 @@ Likely with_most_likely_walk(Trial& trial, const CalibrationOptions& options) {
   return settled(trial, at, kAllLevels, {0, 0}, {9, 0});
 }
 
-Likely with_most_likely_wandering(Trial& trial, const CalibrationOptions& options) {
+NoiseFit with_most_likely_wandering(Trial& trial, const CalibrationOptions& options) {
   constexpr double kShortest_s = 400;
   constexpr double kLongest_s = 3 * 3600;
-  const ProcessNoise told{options.direction_random_walk_rad_sqrt_s, options.further_states.wandering_drift_rad_s,
-                          to_seconds(options.further_states.wandering_time)};
+  const ProcessNoise told{options.direction_random_walk_rad_sqrt_s, wandering_of(options)};
   const auto at = [told](double level, int time) {
     ProcessNoise noise = told;
-    noise.wandering_sigma_rad_s *= std::pow(2, level);
-    noise.wandering_time_s *= std::pow(3, time);
+    noise.wandering_drift.sigma *= std::pow(2, level);
+    noise.wandering_drift.time_s *= std::pow(3, time);
     return noise;
   };
   const auto times_within = [&](double limit_s) {
-    return static_cast<int>(std::floor(std::abs(std::log(told.wandering_time_s / limit_s)) / std::log(3.0) + 1e-6));
+    return static_cast<int>(std::floor(std::abs(std::log(told.wandering_drift.time_s / limit_s)) / std::log(3.0) + 1e-6));
   };
-  const int shorter = told.wandering_time_s > kShortest_s ? times_within(kShortest_s) : 0;
-  const int longer = told.wandering_time_s < kLongest_s ? times_within(kLongest_s) : 0;
+  const int shorter = told.wandering_drift.time_s > kShortest_s ? times_within(kShortest_s) : 0;
+  const int longer = told.wandering_drift.time_s < kLongest_s ? times_within(kLongest_s) : 0;
   return settled(trial, at, {{0, 0}, {2, 0}, {4, 0}, {6, 0}}, {-3, -shorter}, {9, longer});
 }
 

@@ -26,8 +26,7 @@ class Trial {
     return ground::log_likelihood(problem_, found_.before, linear, noise);
   }
 
-  /// ln of the Bayes factor of these states, which the trial must have; of kWanderingDrift and kStarTrackerAlignment a
-  /// trial tells none.
+  /// ln of the Bayes factor of these states, which the trial must have; not of drift that wanders.
   [[nodiscard]] double log_evidence(FurtherState state) const;
   /// Of its drift model and those that it contains.
   [[nodiscard]] std::vector<Forecast> forecasts() const;
@@ -37,12 +36,6 @@ class Trial {
   [[nodiscard]] std::vector<Eigen::Vector3d> changes_rad() const;
 
  private:
-  [[nodiscard]] const PassLayout& layout() const { return problem_.setup().layout; }
-  [[nodiscard]] const GyroParameters& gyro(int k) const { return found_.solution.gyros[static_cast<std::size_t>(k)]; }
-  [[nodiscard]] double of_shared(int state, int size, double prior_sigma) const;
-  [[nodiscard]] double of_readout_bias() const;
-  [[nodiscard]] double of_coefficient_change() const;
-
   DriftModelId drift_model_;
   PassProblem problem_;
   BatchResult found_;

@@ -175,4 +175,18 @@ int state_of(const Layout& layout, const ParameterId& parameter) {
   return first + parameter.component;
 }
 
+double value_of(const Layout& layout, const Gyros& gyros, const SharedStates& shared, const ParameterId& parameter) {
+  const Gyro& gyro = gyros[parameter.owner];
+  switch (parameter.further_state) {
+    case FurtherState::kReadoutBias:
+      return gyro.readout_bias(parameter.component);
+    case FurtherState::kCoefficientChange:
+      return gyro.drift_rad_s(layout.change_column() + parameter.component);
+    case FurtherState::kWanderingDrift:
+      return gyro.drift_rad_s(layout.wandering_column() + parameter.component);
+    default:
+      return shared(state_of(layout, parameter) - layout.shared());
+  }
+}
+
 }  // namespace trihedron::ground

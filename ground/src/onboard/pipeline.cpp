@@ -200,17 +200,8 @@ Calibration Pipeline::calibration() const {
     Roots all(layout().size(), layout().size());
     estimator.error_root(rows_of(all));
     for (const ParameterId& parameter : further_parameters(layout())) {
-      const int state = state_of(layout(), parameter);
-      const Gyro& gyro = gyros[parameter.owner];
-      double value = 0;
-      if (parameter.is_further(FurtherState::kReadoutBias)) {
-        value = gyro.readout_bias(parameter.component);
-      } else if (parameter.is_further(FurtherState::kCoefficientChange)) {
-        value = gyro.drift_rad_s(layout().change_column() + parameter.component);
-      } else {
-        value = estimator.shared()(state - layout().shared());
-      }
-      result.further.push_back({parameter, value, all.row(state).norm()});
+      result.further.push_back({parameter, value_of(layout(), gyros, estimator.shared(), parameter),
+                                all.row(state_of(layout(), parameter)).norm()});
     }
   }
   return result;

@@ -2,10 +2,12 @@
 /// What of a pass can be used: samples and fixes as the on-board cycle has screened them.
 
 #include <algorithm>
+#include <iterator>
 #include <utility>
 #include <vector>
 
-#include "trihedron/core/on_board.hpp"
+#include "trihedron/core/step_report.hpp"
+#include "trihedron/core/telemetry.hpp"
 #include "trihedron/records/pass.hpp"
 
 namespace trihedron::ground {
@@ -46,7 +48,7 @@ struct ScreenedPass {
     }
   }
 
-  /// The next sample of the pass and what the cycle made of it.
+  /// The next sample of the pass and what was made of it on board.
   void add_sample(const GyroSample& its, const StepReport& report) {
     if (report.sample == SampleStatus::kUsedAfterClockSetBack) {
       clock_set_back = true;
@@ -67,7 +69,7 @@ struct ScreenedPass {
     }
   }
 
-  /// A fix and what the cycle made of it.
+  /// A fix and what was made of it on board.
   void add_fix(const StepReport& report) {
     if (!report.compared) {
       return;

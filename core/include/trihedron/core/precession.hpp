@@ -11,11 +11,6 @@
 
 namespace trihedron {
 
-/// A reading, unit, without what is known of its bias; unit to the first order.
-[[nodiscard]] inline Eigen::Vector3d without_bias(const Eigen::Vector3d& h_b, const Eigen::Vector3d& bias) {
-  return h_b - (bias - h_b * h_b.dot(bias));
-}
-
 /// What is believed of one gyro; inside of the estimators, plain numbers with frames in the names. There is room for
 /// Max drift columns.
 template <int Max>

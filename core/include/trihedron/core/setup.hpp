@@ -28,6 +28,10 @@ struct StarTrackerSetup {
   double alignment_sigma_rad = 1e-2;                    ///< of those beside the first, per axis
 };
 
+/// A step between samples further apart than this is a long one, over which readings are not interpolated; the body's
+/// acceleration over it is below the readout noise.
+[[nodiscard]] Duration max_interpolation(Duration gyro_period);
+
 struct CalibrationSetup {
   static constexpr Duration kNever = Duration::max();
 
@@ -73,9 +77,7 @@ struct CalibrationSetup {
   /// How much of the change of the coefficients there has been at `t`.
   [[nodiscard]] double part_of_change(Time t) const { return to_seconds(t - no_change_at) / change_time_s; }
 
-  /// A step between samples further apart than this is a long one, over which readings are not interpolated; the
-  /// body's acceleration over it is below the readout noise.
-  [[nodiscard]] Duration max_interpolation() const;
+  [[nodiscard]] Duration max_interpolation() const { return trihedron::max_interpolation(gyro_period); }
   /// Readings to both sides of a fix that are taken together: fixes every 3 s do not share any. Of slow gyros more, so
   /// that there are enough for a polynomial.
   [[nodiscard]] Duration reach() const;

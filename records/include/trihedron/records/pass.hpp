@@ -9,6 +9,7 @@
 #include <utility>
 #include <vector>
 
+#include "trihedron/core/telemetry.hpp"
 #include "trihedron/core/time.hpp"
 #include "trihedron/records/calibration.hpp"
 
@@ -58,6 +59,16 @@ struct GyroTelemetry {
     return {p[0], p[1], p[2]};
   }
 };
+
+/// One sample of it.
+[[nodiscard]] inline GyroSample sample_of(const GyroTelemetry& telemetry, std::size_t i) {
+  GyroSample sample;
+  sample.t = telemetry.t[i];
+  for (int k = 0; k < std::min(telemetry.gyros, kMaxGyros); ++k) {
+    sample.h_b[k] = telemetry.direction(i, k);
+  }
+  return sample;
+}
 
 /// Fixes as telemetered: q_in_c, Hamilton; not normalised, of either sign, may hold NaN. Times strictly increase.
 struct StarTrackerTelemetry {
