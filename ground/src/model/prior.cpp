@@ -80,6 +80,10 @@ DriftFamily family_of(const GyroCalibration& gyro) {
   return family;
 }
 
+Eigen::Vector3d seen_in_c(const GyroParameters& gyro, const Eigen::Vector3d& h_b) {
+  return gyro.C_c_b * without_bias<double>(h_b, gyro.readout_bias);
+}
+
 GyroParameters parameters_of(const GyroCalibration& gyro, const DriftFamily& family) {
   GyroParameters parameters;
   parameters.drift_rad_s.setZero(family.size());
