@@ -34,7 +34,7 @@ std::vector<io::Table> residual_tables(const CalibrationRun& run) {
   io::Table fixes{"fixes", {}, {}};
   const std::size_t components = 2 * run.calibration.gyros.size();
   const char* innovation =
-      run.calibration.estimator == ground::kBatch
+      run.calibration.estimator == Estimator::kBatch
           ? "what the smoothed pass leaves of a fix that it compares, gyro and component across its momentum"
           : "innovation of eq. (3), gyro and component in qi";
   for (std::size_t i = 0; i < components; ++i) {
@@ -59,17 +59,17 @@ std::vector<io::Table> residual_tables(const CalibrationRun& run) {
 
   io::Table parameters{"parameters", run.parameters.t, {}};
   for (std::size_t i = 0; i < run.calibration.states.size(); ++i) {
-    const std::string& state = run.calibration.states[i];
-    std::string name = state;
-    name[name.find('.')] = '_';
-    const char* unit = state.find("align") == std::string::npos ? "rad s-1" : "rad";
+    const ParameterId& state = run.calibration.states[i];
+    std::string name = name_of(state);
+    std::ranges::replace(name, '.', '_');
+    const char* unit = state.is_alignment() ? "rad" : "rad s-1";
     std::vector<double> value;
     std::vector<double> sigma;
     for (std::size_t row = 0; row < run.parameters.t.size(); ++row) {
       value.push_back(run.parameters.value[row][i]);
       sigma.push_back(run.parameters.sigma[row][i]);
     }
-    parameters.columns.push_back({name, unit, "estimate of " + state + " after the fix", std::move(value)});
+    parameters.columns.push_back({name, unit, "estimate of " + name_of(state) + " after the fix", std::move(value)});
     parameters.columns.push_back({name + "_sigma", unit, "its 1-sigma", std::move(sigma)});
   }
 
@@ -147,13 +147,21 @@ void write_outcome(const std::filesystem::path& out, const Outcome& outcome, con
   io::write_file(out / "report.html", report::render(input));
 }
 
+nlohmann::ordered_json counts_json(const std::vector<NamedCount>& counts) {
+  nlohmann::ordered_json json = nlohmann::ordered_json::object();
+  for (const NamedCount& its : counts) {
+    json[std::string(its.name)] = its.count;
+  }
+  return json;
+}
+
 nlohmann::ordered_json outcome_json(const Outcome& outcome) {
   const Time epoch = outcome.run.calibration.epoch;
   nlohmann::ordered_json json = {
       {"pass", pass_json(outcome.loaded)},
       {"calibration", nlohmann::ordered_json::parse(io::format_calibration(outcome.run.calibration))},
-      {"fixes", outcome.run.fix_counts},
-      {"samples", outcome.run.samples},
+      {"fixes", counts_json(named_counts(outcome.run.fix_counts))},
+      {"samples", counts_json(named_counts(outcome.run.samples))},
       {"navigation", evaluation_json(outcome.navigation, epoch)},
       {"attitude", evaluation_json(outcome.attitude, epoch)}};
   json.update(course_json(outcome.run, outcome.course));
@@ -198,6 +206,14 @@ ground::SeveralPasses calibrate_in_order(const std::vector<NamedPass>& passes, c
     }
   }
   return calibrated;
+}
+
+std::vector<std::string> estimator_names() {
+  std::vector<std::string> names;
+  for (const EstimatorRow& row : kEstimators) {
+    names.emplace_back(row.name);
+  }
+  return names;
 }
 
 }  // namespace
@@ -250,10 +266,11 @@ void add_calibrate(CLI::App& program, const Common& common, int& exit_status) {
   command->add_option("PASS", arguments->passes, "Directory or NetCDF file; several of one start of the rotors")
       ->required();
   command->add_option("-o,--output", arguments->out, "Directory to write into")->required();
-  command->add_option("--estimator", arguments->estimator, "Estimator")
-      ->check(CLI::IsMember(std::vector<std::string>(ground::kEstimators.begin(), ground::kEstimators.end())));
+  command->add_option("--estimator", arguments->estimator, "Estimator")->check(CLI::IsMember(estimator_names()));
   command->add_option("--drift-model", arguments->drift_model, "Drift model")->check([](const std::string& name) {
-    return ground::is_drift_model(name) ? "" : fmt::format("not one of {}", ground::kDriftModels);
+    return name == kAutoDriftModel || drift_model_named(name)
+               ? ""
+               : fmt::format("not one of {}, {}", kAutoDriftModel, drift_model_choices());
   });
   command->add_option("--config", arguments->config, "Settings (TOML); see effective-config.toml of any run");
   command->add_flag("--definitive", arguments->definitive,
@@ -262,13 +279,13 @@ void add_calibrate(CLI::App& program, const Common& common, int& exit_status) {
   command->callback([&common, &exit_status, arguments] {
     CalibrationOptions options = arguments->config.empty() ? CalibrationOptions{} : io::read_config(arguments->config);
     if (!arguments->estimator.empty()) {
-      options.estimator = arguments->estimator;
+      options.estimator = estimator_named(arguments->estimator).value();
     }
     if (!arguments->drift_model.empty()) {
-      options.drift_model = arguments->drift_model;
+      options.drift_model = drift_model_named(arguments->drift_model);
     }
     if (arguments->definitive) {
-      options.estimator = ground::kBatch;
+      options.estimator = Estimator::kBatch;
       options.definitive_attitude = true;
     }
     const auto catalogue =

@@ -41,7 +41,7 @@ ExitStatus navigate_pass(const std::filesystem::path& pass, const std::optional<
   if (common.json) {
     nlohmann::ordered_json json = {{"pass", pass_json(loaded)},
                                    {"verdict", verdict_json(result.verdict)},
-                                   {"statistics", result.statistics},
+                                   {"statistics", statistics_json(result.statistics)},
                                    {"evaluation", evaluation_json(evaluation, epoch)}};
     fmt::print("{}\n", json.dump(1));
   } else if (!common.quiet) {

@@ -25,7 +25,7 @@ nlohmann::ordered_json axes_json(const Eigen::Vector3d& rad) {
   return {{"roll_rad", rad.x()}, {"pitch_rad", rad.y()}, {"heading_rad", rad.z()}};
 }
 
-nlohmann::ordered_json statistics_json(const ground::ErrorStatistics& s, Time epoch) {
+nlohmann::ordered_json errors_json(const ground::ErrorStatistics& s, Time epoch) {
   nlohmann::ordered_json json = {
       {"from_s", to_seconds(s.from - epoch)}, {"to_s", to_seconds(s.to - epoch)}, {"epochs", s.count},
       {"rms", axes_json(s.rms_rad)},          {"max", axes_json(s.max_rad)},      {"max_total_rad", s.max_total_rad}};
@@ -98,7 +98,7 @@ std::string pass_text(const io::LoadedPass& loaded) {
 }
 
 std::string finding_text(const Finding& finding) {
-  return fmt::format("  {:<20}{}\n{:22}{}\n{:22}→ {}\n", finding.code, finding.text, "", finding.evidence, "",
+  return fmt::format("  {:<20}{}\n{:22}{}\n{:22}→ {}\n", name_of(finding.code), finding.text, "", finding.evidence, "",
                      finding.cure);
 }
 
@@ -114,83 +114,73 @@ std::string calibration_text(const CalibrationRun& run, const std::optional<Trut
   std::string text;
   auto out = std::back_inserter(text);
   const Calibration& calibration = run.calibration;
+  const Eigen::VectorXd errors = truth ? ground::estimate_minus_truth(calibration, *truth) : Eigen::VectorXd();
   Eigen::Index state = 0;
   for (std::size_t k = 0; k < calibration.gyros.size(); ++k) {
     const GyroCalibration& gyro = calibration.gyros[k];
-    fmt::format_to(out, "\nGyro {}      {:>18} {:>12}{}\n", k + 1, "value", "1σ", truth ? "         error" : "");
+    fmt::format_to(out, "\nGyro {}      {:>18} {:>12}{}\n", k + 1, "value", "1σ", truth ? "   est. − true" : "");
     const auto sigma = [&] { return std::sqrt(calibration.covariance(state, state)); };
+    const std::vector<std::string> names = coefficient_names(gyro.drift_model);
     for (std::size_t i = 0; i < gyro.drift_rad_s.size(); ++i, ++state) {
-      const auto& [name, value] = gyro.drift_rad_s[i];
-      fmt::format_to(out, "  {:<8} {:>+13.4e} rad/s {:>12.1e}", name, value, sigma());
-      if (const auto true_value = truth ? truth->gyros[k].drift(name) : std::nullopt) {
-        fmt::format_to(out, " {:>+13.1e}", *true_value - value);
+      fmt::format_to(out, "  {:<8} {:>+13.4e} rad/s {:>12.1e}", names[i], gyro.drift_rad_s[i], sigma());
+      if (truth && std::isfinite(errors(state))) {
+        fmt::format_to(out, " {:>+13.1e}", errors(state));
       }
       text += '\n';
     }
     const Eigen::Vector3d lambda = gyro.alignment_rotation_vector_rad;
-    Eigen::Vector3d error = Eigen::Vector3d::Zero();
-    if (truth) {
-      // C_c_b(true) = exp([δ×]) C_c_b(est)
-      error = (Rot<C, B<1>>::exp(Vec<C>::assume(truth->gyros[k].alignment_rotation_vector_rad)) *
-               Rot<C, B<1>>::exp(Vec<C>::assume(lambda)).inverse())
-                  .log()
-                  .raw();
-    }
     for (int axis = 0; axis < 3; ++axis, ++state) {
       fmt::format_to(out, "  align_{:<2} {:>+13.4f} ′     {:>11.2f}″", std::string(1, "xyz"[axis]),
                      lambda(axis) / kArcminute, sigma() / kArcsecond);
       if (truth) {
-        fmt::format_to(out, " {:>+12.2f}″", error(axis) / kArcsecond);
+        fmt::format_to(out, " {:>+12.2f}″", errors(state) / kArcsecond);
       }
       text += '\n';
     }
   }
-  const auto statistic = [&](const std::string& name) {
-    const auto found = calibration.statistics.find(name);
-    return found == calibration.statistics.end() ? std::nan("") : found->second;
-  };
+  const Statistics& statistics = calibration.statistics;
   for (const FurtherEstimate& estimate : calibration.further) {
     fmt::format_to(out, "{}  {:<24} {:>+13.4e} {:>12.1e}\n",
-                   &estimate == calibration.further.data() ? "\nFurther states\n" : "", estimate.name, estimate.value,
-                   estimate.sigma);
+                   &estimate == calibration.further.data() ? "\nFurther states\n" : "", name_of(estimate.parameter),
+                   estimate.value, estimate.sigma);
   }
   for (const Evidence& evidence : run.evidence) {
     fmt::format_to(out, "{}  {:<24} ln Bayes factor {:>+9.1f}: {}\n",
-                   &evidence == run.evidence.data() ? "\nEvidence\n" : "", evidence.states, evidence.log_bayes_factor,
+                   &evidence == run.evidence.data() ? "\nEvidence\n" : "", evidence.key(), evidence.log_bayes_factor,
                    evidence.accepted ? "estimated" : "taken as zero");
   }
   for (const DriftModelForecast& model : run.drift_models) {
     fmt::format_to(out, "{}  {:<8} {:>4} coefficients, forecast error {:>9}, ln likelihood {:>+10.1f}{}\n",
                    &model == run.drift_models.data() ? "\nDrift models, by forecasts of the rest of the pass\n" : "",
-                   model.drift_model, model.coefficients, angle_text(model.open_loop_rms_rad), model.log_likelihood,
-                   model.drift_model == calibration.gyros[0].drift_model ? ", used" : "");
+                   name_of(model.drift_model), model.drift_model.size(), angle_text(model.open_loop_rms_rad),
+                   model.log_likelihood, model.drift_model == calibration.gyros[0].drift_model ? ", used" : "");
   }
   text += "\nFixes      ";
-  for (const auto& [name, count] : run.fix_counts) {
-    fmt::format_to(out, " {} {};", count, name);
+  for (const NamedCount& its : named_counts(run.fix_counts)) {
+    fmt::format_to(out, " {} {};", its.count, its.name);
   }
   text.back() = '\n';
   text += "Samples    ";
-  for (const auto& [name, count] : run.samples) {
-    fmt::format_to(out, " {} {};", count, name);
+  for (const NamedCount& its : named_counts(run.samples)) {
+    fmt::format_to(out, " {} {};", its.count, its.name);
   }
   text.back() = '\n';
   if (!run.gyro_events.empty()) {
     fmt::format_to(out, "Gyros       {}\n", fmt::join(ground::texts_of(run.gyro_events, calibration.epoch), "; "));
   }
-  if (const double looks = statistic("angle_looks"); looks > 0) {
-    fmt::format_to(out, "Angles      between the momenta taken {:.0f} times, where no fix could be used\n", looks);
+  if (const long looks = statistics.angle_looks.value_or(0); looks > 0) {
+    fmt::format_to(out, "Angles      between the momenta taken {} times, where no fix could be used\n", looks);
   }
   fmt::format_to(out, "Residuals   rms");
-  for (std::size_t i = 1; i <= 2 * calibration.gyros.size(); ++i) {
-    fmt::format_to(out, " {:.2f}″", statistic(fmt::format("innovation_{}_rms_rad", i)) / kArcsecond);
+  for (const double rms_rad : statistics.innovation_rms_rad) {
+    fmt::format_to(out, " {:.2f}″", rms_rad / kArcsecond);
   }
-  fmt::format_to(out, "; mean NIS {:.3f} ({:.0f} expected)\n", statistic("nis_mean"),
-                 statistic("nis_degrees_of_freedom"));
+  fmt::format_to(out, "; mean NIS {:.3f} ({:.0f} expected)\n", statistics.nis_mean.value_or(std::nan("")),
+                 statistics.nis_degrees_of_freedom);
   fmt::format_to(out, "Noise       random walk of each momentum {:.1e} rad/√s, {}",
                  run.options.direction_random_walk_rad_sqrt_s, run.options.find_noise ? "the most likely" : "as given");
   const FurtherStateOptions& states = run.options.further_states;
-  if (states.wandering_drift == FurtherStateOptions::Choice::kOn) {
+  if (states.is_on(FurtherState::kWanderingDrift)) {
     fmt::format_to(out, "; drift that wanders by {:.1e} rad/s over {:.0f} min", states.wandering_drift_rad_s,
                    to_seconds(states.wandering_time) / 60);
   }
@@ -308,6 +298,14 @@ nlohmann::ordered_json passes_json(const std::vector<ground::PassAlone>& passes)
   return json;
 }
 
+nlohmann::ordered_json statistics_json(const Statistics& statistics) {
+  nlohmann::ordered_json json = nlohmann::ordered_json::object();
+  for (const auto& [name, value] : named_values(statistics)) {
+    json[name] = value;
+  }
+  return json;
+}
+
 nlohmann::ordered_json pass_json(const io::LoadedPass& loaded) {
   const PassSettings& settings = loaded.pass.settings;
   nlohmann::ordered_json json = {
@@ -330,8 +328,10 @@ nlohmann::ordered_json pass_json(const io::LoadedPass& loaded) {
 nlohmann::ordered_json findings_json(const std::vector<Finding>& findings) {
   nlohmann::ordered_json json = nlohmann::ordered_json::array();
   for (const Finding& finding : findings) {
-    json.push_back(
-        {{"code", finding.code}, {"text", finding.text}, {"evidence", finding.evidence}, {"cure", finding.cure}});
+    json.push_back({{"code", name_of(finding.code)},
+                    {"text", finding.text},
+                    {"evidence", finding.evidence},
+                    {"cure", finding.cure}});
   }
   return json;
 }
@@ -361,8 +361,8 @@ nlohmann::ordered_json course_json(const CalibrationRun& run, const Course& cour
   };
   nlohmann::ordered_json states;
   for (std::size_t i = 0; i < course.convergence.size(); ++i) {
-    states[run.calibration.states[i]] = {{"determined", course.convergence[i].determined},
-                                         {"settled_s", seconds(course.convergence[i].settled)}};
+    states[name_of(run.calibration.states[i])] = {{"determined", course.convergence[i].determined},
+                                                  {"settled_s", seconds(course.convergence[i].settled)}};
   }
   std::vector<ground::IntervalPair> pairs;
   for (const ground::OpenLoops& loops : course.open_loops) {
@@ -370,15 +370,14 @@ nlohmann::ordered_json course_json(const CalibrationRun& run, const Course& cour
   }
   nlohmann::ordered_json models = nlohmann::ordered_json::array();
   for (const DriftModelForecast& model : run.drift_models) {
-    models.push_back({{"drift_model", model.drift_model},
-                      {"coefficients", model.coefficients},
+    models.push_back({{"drift_model", name_of(model.drift_model)},
+                      {"coefficients", model.drift_model.size()},
                       {"log_likelihood", model.log_likelihood},
                       {"open_loop_rms_rad", model.open_loop_rms_rad}});
   }
   nlohmann::ordered_json evidence = nlohmann::ordered_json::array();
   for (const Evidence& its : run.evidence) {
-    evidence.push_back(
-        {{"states", its.states}, {"log_bayes_factor", its.log_bayes_factor}, {"accepted", its.accepted}});
+    evidence.push_back({{"states", its.key()}, {"log_bayes_factor", its.log_bayes_factor}, {"accepted", its.accepted}});
   }
   return {{"evidence", evidence},
           {"drift_models", models},
@@ -391,12 +390,12 @@ nlohmann::ordered_json course_json(const CalibrationRun& run, const Course& cour
 
 nlohmann::ordered_json evaluation_json(const Evaluation& evaluation, Time epoch) {
   nlohmann::ordered_json json = {{"reference", evaluation.reference},
-                                 {"whole", statistics_json(evaluation.whole, epoch)},
+                                 {"whole", errors_json(evaluation.whole, epoch)},
                                  {"per_90_min", nlohmann::ordered_json::array()},
                                  {"limit_rad", evaluation.limit_rad},
                                  {"corrections", nlohmann::ordered_json::array()}};
   for (const auto& s : evaluation.stretches) {
-    json["per_90_min"].push_back(statistics_json(s, epoch));
+    json["per_90_min"].push_back(errors_json(s, epoch));
   }
   for (const auto& interval : evaluation.intervals) {
     nlohmann::ordered_json item = {{"t_s", to_seconds(interval.corrected - epoch)}};

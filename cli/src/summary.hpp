@@ -64,6 +64,7 @@ struct Course {
 [[nodiscard]] nlohmann::ordered_json passes_json(const std::vector<ground::PassAlone>& passes);
 [[nodiscard]] nlohmann::ordered_json agreement_json(const ground::Agreement& agreement);
 
+[[nodiscard]] nlohmann::ordered_json statistics_json(const Statistics& statistics);
 [[nodiscard]] nlohmann::ordered_json pass_json(const io::LoadedPass& loaded);
 [[nodiscard]] nlohmann::ordered_json findings_json(const std::vector<Finding>& findings);
 [[nodiscard]] nlohmann::ordered_json verdict_json(const Verdict& verdict);

@@ -27,14 +27,14 @@ Scenario drawn(Scenario scenario, std::uint64_t run) {
 }
 
 struct Outcome {
-  Eigen::VectorXd errors;
+  Eigen::VectorXd errors;  ///< estimate − truth
   double nees = 0;
 };
 
 Outcome fly(const Scenario& scenario, const CalibrationOptions& options) {
   const sim::SimulatedPass flown = sim::simulate(scenario);
   const Calibration calibration = ground::calibrate(flown.pass, options).calibration;
-  Outcome outcome{ground::parameter_errors(flown.truth, calibration)};
+  Outcome outcome{ground::estimate_minus_truth(calibration, flown.truth, ground::UnnamedDrift::kIsZero)};
   // In units of the sigmas, which differ by ten powers of ten.
   const Eigen::VectorXd sigma = calibration.covariance.diagonal().cwiseSqrt();
   const Eigen::MatrixXd correlation =
@@ -49,7 +49,7 @@ Outcome fly(const Scenario& scenario, const CalibrationOptions& options) {
 Confirmation confirm(const Scenario& scenario, const std::vector<ground::Combination>& combinations,
                      const ground::Observability& predicted, int runs, const Progress& progress) {
   CalibrationOptions options = predicted.options;
-  options.estimator = ground::kBatch;
+  options.estimator = Estimator::kBatch;
   std::mutex one_at_a_time;
   double done = 0;
   const std::vector<Outcome> outcomes = ground::on_all_cores(static_cast<std::size_t>(runs), [&](std::size_t run) {

@@ -69,14 +69,14 @@ class Figures {
     const ParameterHistory& history = run_.parameters;
     for (std::size_t column = 0; column < parameters_.size() && !history.t.empty(); ++column) {
       const Parameter& parameter = parameters_[column];
-      const double unit = parameter.is_alignment ? kArcminute_rad : kMicroradian;
+      const double unit = parameter.id.is_alignment() ? kArcminute_rad : kMicroradian;
       Series series(2, fix_step_min_ + to_minutes(ParameterHistory::kStep));
       for (std::size_t row = 0; row < history.t.size(); ++row) {
         series.add(minutes(history.t[row]), {history.value[row][column] / unit, history.sigma[row][column] / unit});
       }
       json figure = series.drawn(kHalf);
-      figure["gyro"] = parameter.gyro + 1;
-      figure["name"] = parameter.name;
+      figure["gyro"] = parameter.id.gyro() + 1;
+      figure["name"] = short_name_of(parameter.id);
       figure["symbol"] = parameter.symbol;
       figure["final"] = parameter.value / unit;
       figure["final_sigma"] = parameter.sigma / unit;
@@ -86,7 +86,7 @@ class Figures {
       if (parameter.converged_min) {
         figure["converged"] = *parameter.converged_min;
       }
-      figures[parameter.state] = std::move(figure);
+      figures[name_of(parameter.id)] = std::move(figure);
     }
     return figures;
   }
@@ -241,8 +241,8 @@ class Figures {
   [[nodiscard]] json drift_models() const {
     json models = json::array();
     for (const DriftModelForecast& model : run_.drift_models) {
-      models.push_back({{"name", model.drift_model},
-                        {"coefficients", model.coefficients},
+      models.push_back({{"name", name_of(model.drift_model)},
+                        {"coefficients", model.drift_model.size()},
                         {"gain", std::round(model.log_likelihood * 10) / 10},
                         {"error", rounded(model.open_loop_rms_rad / kArcsecond_rad, 3)},
                         {"used", model.drift_model == run_.calibration.gyros[0].drift_model}});
@@ -255,7 +255,7 @@ class Figures {
     json rows = json::array();
     const Eigen::MatrixXd& covariance = run_.calibration.covariance;
     for (std::size_t i = 0; i < parameters_.size(); ++i) {
-      names.push_back({{"gyro", parameters_[i].gyro + 1}, {"symbol", parameters_[i].symbol}});
+      names.push_back({{"gyro", parameters_[i].id.gyro() + 1}, {"symbol", parameters_[i].symbol}});
       json row = json::array();
       for (std::size_t j = 0; j < parameters_.size(); ++j) {
         const double rho = covariance(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j)) /

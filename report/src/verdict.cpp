@@ -129,7 +129,7 @@ json alignment_number(const std::vector<Parameter>& parameters) {
   double worst_error = 0;
   bool has_error = false;
   for (const Parameter& parameter : parameters) {
-    if (parameter.is_alignment) {
+    if (parameter.id.is_alignment()) {
       worst_sigma = std::max(worst_sigma, parameter.sigma);
       has_error = has_error || parameter.error;
       worst_error = std::max(worst_error, std::abs(parameter.error.value_or(0)));
@@ -150,7 +150,7 @@ json convergence_number(const std::vector<Parameter>& parameters, bool alignment
   std::vector<std::string> off;
   std::size_t count = 0;
   for (const Parameter& parameter : parameters) {
-    if (parameter.is_alignment != alignment || !parameter.is_determined || !parameter.is_followed) {
+    if (parameter.id.is_alignment() != alignment || !parameter.is_determined || !parameter.is_followed) {
       continue;
     }
     ++count;
@@ -206,7 +206,7 @@ json nis_number(const ReportInput& input) {
              : figure_of_merit("Mean NIS of the fixes", number(sum / count, 2), "",
                                fmt::format("{:.3g} is expected: below, the noise is overstated; above, the model "
                                            "is incomplete",
-                                           input.run.calibration.statistics.at("nis_degrees_of_freedom")));
+                                           input.run.calibration.statistics.nis_degrees_of_freedom));
 }
 
 json undetermined_of(const std::vector<Parameter>& parameters) {
@@ -220,11 +220,11 @@ json undetermined_of(const std::vector<Parameter>& parameters) {
   return list;
 }
 
-json rejected_of(const std::map<std::string, long>& counts, const std::string& one, const std::string& many) {
+json rejected_of(const std::vector<NamedCount>& counts, const std::string& one, const std::string& many) {
   json list = json::array();
-  for (const auto& [name, count] : counts) {
-    if (name.starts_with("rejected") && count > 0) {
-      list.push_back(counted(count, one, many) + " " + name);
+  for (const NamedCount& its : counts) {
+    if (its.is_rejected) {
+      list.push_back(fmt::format("{} {}", counted(its.count, one, many), its.name));
     }
   }
   return list;
@@ -237,7 +237,7 @@ json findings_of(const std::vector<Finding>& findings) {
   for (const Finding& finding : findings) {
     list.push_back({{"style", style_of(finding.severity)},
                     {"word", word_of(finding.severity)},
-                    {"code", finding.code},
+                    {"code", name_of(finding.code)},
                     {"text", finding.text},
                     {"evidence", finding.evidence},
                     {"cure", finding.cure}});
@@ -254,8 +254,8 @@ json verdict_values(const ReportInput& input, const std::vector<Parameter>& para
       numbers.push_back(std::move(merit));
     }
   }
-  json rejected = rejected_of(input.run.fix_counts, "fix", "fixes");
-  for (json& line : rejected_of(input.run.samples, "gyro sample", "gyro samples")) {
+  json rejected = rejected_of(named_counts(input.run.fix_counts), "fix", "fixes");
+  for (json& line : rejected_of(named_counts(input.run.samples), "gyro sample", "gyro samples")) {
     rejected.push_back(std::move(line));
   }
   return {{"verdict", verdict_of(input.run.calibration.verdict)},

@@ -30,13 +30,22 @@ struct Options {
   int runs = 100;
   int paper_runs = 20;  // it is far enough off to be seen by fewer
   std::string cells;
-  std::vector<std::string> estimators{"paper", "invariant"};
+  std::vector<std::string> estimators{std::string(name_of(Estimator::kPaper)),
+                                      std::string(name_of(Estimator::kInvariant))};
   unsigned threads = std::max(1U, std::thread::hardware_concurrency());
   std::filesystem::path resume;
   std::filesystem::path document;
   std::string place = "consistency";
   std::string table = kEstimatorsTable;
 };
+
+std::vector<std::string> estimator_names() {
+  std::vector<std::string> names;
+  for (const EstimatorRow& row : kEstimators) {
+    names.emplace_back(row.name);
+  }
+  return names;
+}
 
 /// A flight to be made, and the estimators that have not seen it.
 struct Task {
@@ -47,11 +56,12 @@ struct Task {
 
 std::vector<Column> columns_of(const Options& options) {
   if (options.table == kAgreementTable) {
-    return {{"batch", options.runs}};
+    return {{std::string(name_of(Estimator::kBatch)), options.runs}};
   }
   std::vector<Column> columns;
   for (const std::string& estimator : options.estimators) {
-    columns.push_back({estimator, estimator == "paper" ? std::min(options.runs, options.paper_runs) : options.runs});
+    const bool is_paper = estimator_named(estimator) == Estimator::kPaper;
+    columns.push_back({estimator, is_paper ? std::min(options.runs, options.paper_runs) : options.runs});
   }
   return columns;
 }
@@ -82,7 +92,11 @@ void fly_all(const std::vector<Task>& tasks, unsigned threads, Results& results)
   std::mutex one_at_a_time;
   const auto work = [&](std::size_t i) {
     const Task& task = tasks[i];
-    const std::vector<Outcome> outcomes = fly(task.cell, task.run, task.estimators);
+    std::vector<Estimator> estimators;
+    for (const std::string& name : task.estimators) {
+      estimators.push_back(estimator_named(name).value());
+    }
+    const std::vector<Outcome> outcomes = fly(task.cell, task.run, estimators);
     const std::scoped_lock lock(one_at_a_time);
     for (std::size_t k = 0; k < outcomes.size(); ++k) {
       results.add({task.cell.name(), task.run, task.estimators[k]}, outcomes[k]);
@@ -140,7 +154,7 @@ int main(int argc, char** argv) {
         ->capture_default_str();
     program.add_option("--cells", options.cells, "Only cells with a name like this, e.g. '^steady/.*/300arcmin'");
     program.add_option("--estimators", options.estimators, "Which")
-        ->check(CLI::IsMember(std::vector<std::string>{kEstimators.begin(), kEstimators.end()}))
+        ->check(CLI::IsMember(estimator_names()))
         ->delimiter(',')
         ->capture_default_str();
     program.add_option("--threads", options.threads, "How many at once")

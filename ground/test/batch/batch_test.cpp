@@ -23,14 +23,14 @@ namespace {
 
 CalibrationOptions batch() {
   CalibrationOptions options = told();
-  options.estimator = "batch";
+  options.estimator = Estimator::kBatch;
   return options;
 }
 
 TEST(Batch, FindsTheTruthWithinItsSigmasAndSmoothsTheAttitude) {
   const auto run = calibrate(two_hours().pass, batch());
-  EXPECT_EQ(run.calibration.estimator, "batch");
-  EXPECT_EQ(run.calibration.statistics.at("batch_converged"), 1);
+  EXPECT_EQ(run.calibration.estimator, Estimator::kBatch);
+  EXPECT_TRUE(run.calibration.statistics.batch_converged.value());
   EXPECT_LT(nees_of(two_hours().truth, run.calibration), 45);  // χ² of 20, once in 1000
   EXPECT_EQ(run.calibration.t, two_hours().pass.gyro.t.back());
   for (std::size_t k = 0; k < 2; ++k) {
@@ -54,13 +54,14 @@ TEST(Batch, AgreesWithTheFilter) {
     const auto by_filter = calibrate(simulated.pass, told()).calibration;
     const auto by_batch = calibrate(simulated.pass, batch()).calibration;
     const Eigen::LLT<Eigen::MatrixXd> covariance(by_filter.covariance);
-    const Eigen::VectorXd apart = errors_of(simulated.truth, by_filter) - errors_of(simulated.truth, by_batch);
+    const Eigen::VectorXd apart =
+        estimate_minus_truth(by_filter, simulated.truth) - estimate_minus_truth(by_batch, simulated.truth);
     apart_square += apart.dot(covariance.solve(apart));
     expected += static_cast<double>(apart.size()) - covariance.solve(by_batch.covariance).trace();
     for (Eigen::Index i = 0; i < apart.size(); ++i) {
       const double ratio = std::sqrt(by_filter.covariance(i, i) / by_batch.covariance(i, i));
-      EXPECT_GT(ratio, 0.99) << by_batch.states[static_cast<std::size_t>(i)];
-      EXPECT_LT(ratio, 1.25) << by_batch.states[static_cast<std::size_t>(i)];
+      EXPECT_GT(ratio, 0.99) << name_of(by_batch.states[static_cast<std::size_t>(i)]);
+      EXPECT_LT(ratio, 1.25) << name_of(by_batch.states[static_cast<std::size_t>(i)]);
     }
   }
   EXPECT_GT(expected, 0);
@@ -76,7 +77,7 @@ TEST(Batch, ConvergesFromTenDegrees) {
   }
   const auto simulated = sim::simulate(scenario);
   const auto run = calibrate(simulated.pass, batch());
-  EXPECT_EQ(run.calibration.statistics.at("batch_converged"), 1);
+  EXPECT_TRUE(run.calibration.statistics.batch_converged.value());
   EXPECT_LT(nees_of(simulated.truth, run.calibration), 45);
 }
 
@@ -96,17 +97,19 @@ TEST(Batch, TakesThreeGyrosTwoStarTrackersAndFurtherStates) {
   scenario.further_star_trackers[0].misalignment_rad = Eigen::Vector3d(1e-3, -2e-3, 1e-3);
   simulated = sim::simulate(scenario);
   CalibrationOptions options = batch();
-  options.further_states.clock_offset = options.further_states.orbital_error = options.further_states.wandering_drift =
-      options.further_states.readout_bias = FurtherStateOptions::Choice::kOn;
+  for (const FurtherState state : {FurtherState::kClockOffset, FurtherState::kOrbitalError,
+                                   FurtherState::kWanderingDrift, FurtherState::kReadoutBias}) {
+    options.further_states[state] = FurtherStateOptions::Choice::kOn;
+  }
   run = calibrate(simulated.pass, options);
   ASSERT_EQ(run.calibration.further.size(), 1 + 6 + 3 + 6U);
   EXPECT_LT(nees_of(simulated.truth, run.calibration), 45);
   for (const FurtherEstimate& estimate : run.calibration.further) {
-    const bool head = estimate.name.starts_with("star_tracker_2_align_");
-    const double expected = estimate.name == "clock_offset_s" ? 0.01
-                            : head                            ? (estimate.name.ends_with("y_rad") ? -2e-3 : 1e-3)
-                                                              : 0;
-    EXPECT_LT(std::abs(estimate.value - expected), 4 * estimate.sigma) << estimate.name;
+    const bool head = estimate.parameter.is_further(FurtherState::kStarTrackerAlignment);
+    const double expected = estimate.parameter.is_further(FurtherState::kClockOffset) ? 0.01
+                            : head ? (estimate.parameter.component == 1 ? -2e-3 : 1e-3)
+                                   : 0;
+    EXPECT_LT(std::abs(estimate.value - expected), 4 * estimate.sigma) << name_of(estimate.parameter);
   }
 }
 
@@ -117,7 +120,8 @@ TEST(Batch, DoesNotBelieveOutliers) {
   const auto simulated = sim::simulate(scenario);
   const auto dirty = calibrate(simulated.pass, batch()).calibration;
   EXPECT_LT(nees_of(simulated.truth, dirty), 45);
-  const Eigen::VectorXd apart = errors_of(simulated.truth, clean) - errors_of(simulated.truth, dirty);
+  const Eigen::VectorXd apart =
+      estimate_minus_truth(clean, simulated.truth) - estimate_minus_truth(dirty, simulated.truth);
   EXPECT_LT(apart.dot(clean.covariance.llt().solve(apart)), 0.5 * 20);
 }
 
@@ -184,18 +188,18 @@ TEST(Batch, GivesTheAttitudeAtEachSample) {
 
 TEST(Batch, TakesAPassThatIsTooShortForForecasts) {
   CalibrationOptions options;
-  options.estimator = "batch";
+  options.estimator = Estimator::kBatch;
   const auto run = calibrate(sim::simulate(scenario_in_eq1(12, std::chrono::minutes(4))).pass, options);
-  EXPECT_EQ(run.calibration.gyros[0].drift_model, "esg7");
+  EXPECT_EQ(run.calibration.gyros[0].drift_model, kEsg7);
   EXPECT_TRUE(run.drift_models.empty());
 }
 
 TEST(Batch, FindsTheDriftModelThatForecastsBest) {
   Scenario scenario = scenario_in_eq1(12, std::chrono::hours(3));
   CalibrationOptions options = batch();
-  options.drift_model = "auto";
+  options.drift_model.reset();
   const auto plain = calibrate(sim::simulate(scenario).pass, options);
-  EXPECT_EQ(plain.calibration.gyros[0].drift_model, "esg7");
+  EXPECT_EQ(plain.calibration.gyros[0].drift_model, kEsg7);
   ASSERT_EQ(plain.drift_models.size(), 3U);  // and vsh:1, vsh:2
   EXPECT_EQ(plain.drift_models[0].log_likelihood, 0);
   EXPECT_LT(plain.drift_models[2].log_likelihood, 0);
@@ -203,7 +207,7 @@ TEST(Batch, FindsTheDriftModelThatForecastsBest) {
   const auto codes = [](const CalibrationRun& run) {
     std::vector<std::string> all;
     for (const Finding& finding : run.calibration.verdict.findings) {
-      all.push_back(finding.code);
+      all.emplace_back(name_of(finding.code));
     }
     return all;
   };
@@ -213,14 +217,14 @@ TEST(Batch, FindsTheDriftModelThatForecastsBest) {
   }
   const auto simulated = sim::simulate(scenario);
   const auto run = calibrate(simulated.pass, options);
-  EXPECT_EQ(run.calibration.gyros[0].drift_model, "vsh:1");
+  EXPECT_EQ(run.calibration.gyros[0].drift_model, vsh(1));
   ASSERT_GE(run.drift_models.size(), 3U);
   EXPECT_GT(run.drift_models[1].log_likelihood, 100);
   EXPECT_LT(run.drift_models[1].open_loop_rms_rad, run.drift_models[0].open_loop_rms_rad / 3);
   for (std::size_t k = 0; k < 2; ++k) {
-    EXPECT_LT(alignment_error(simulated.truth.gyros[k], run.calibration.gyros[k]).norm(), 5 * kArcsecond);
+    EXPECT_LT(alignment_error(run.calibration, simulated.truth, k).norm(), 5 * kArcsecond);
   }
-  options.drift_model = "esg7";
+  options.drift_model = kEsg7;
   options.find_noise = true;
   EXPECT_THAT(codes(calibrate(simulated.pass, options)), testing::Contains("drift-model-too-small"));
 }
@@ -234,51 +238,51 @@ TEST(Batch, FindsThatCoefficientsChange) {
   }
   const auto simulated = sim::simulate(scenario);
   CalibrationOptions options = batch();
-  options.further_states.coefficient_change = FurtherStateOptions::Choice::kAuto;
+  options.further_states[FurtherState::kCoefficientChange] = FurtherStateOptions::Choice::kAuto;
   const auto run = calibrate(simulated.pass, options);
   ASSERT_EQ(run.calibration.further.size(), 14U);
-  EXPECT_EQ(run.calibration.further[0].name, "gyro1_k0_change_rad_s");
+  EXPECT_EQ(name_of(run.calibration.further[0].parameter), "gyro1_k0_change_rad_s");
   // From 1 + 0.1 to 1 + 0.1 exp(−1/2); the truth and the calibration are of the end.
   const double change = 0.1 * (std::exp(-0.5) - 1) / (1 + 0.1 * std::exp(-0.5));
   int known = 0;
   for (std::size_t i = 0; i < 14; ++i) {
     const FurtherEstimate& estimate = run.calibration.further[i];
-    const auto& [name, value] = run.calibration.gyros[i / 7].drift_rad_s[i % 7];
-    const double kappa = *simulated.truth.gyros[i / 7].drift(name);
+    const double value = run.calibration.gyros[i / 7].drift_rad_s[i % 7];
+    const double kappa = *simulated.truth.gyros[i / 7].drift(DriftCoefficient::of_eq1(static_cast<int>(i % 7)));
     // Of the second order of the exponential 1e-3 κ is left, and takes its part in what is hardly seen.
-    EXPECT_NEAR(estimate.value, change * kappa, 4 * estimate.sigma + 3e-9) << estimate.name;
+    EXPECT_NEAR(estimate.value, change * kappa, 4 * estimate.sigma + 3e-9) << name_of(estimate.parameter);
     known += std::abs(estimate.value) > 3 * estimate.sigma ? 1 : 0;
     if (estimate.sigma < 1e-8) {
-      EXPECT_NEAR(value, kappa, 2e-8) << name;
+      EXPECT_NEAR(value, kappa, 2e-8) << i;
     }
   }
   EXPECT_GT(known, 2);
   EXPECT_THAT(run.calibration.verdict.findings,
-              testing::Contains(testing::Field(&Finding::code, "coefficients-changed")));
+              testing::Contains(testing::Field(&Finding::code, FindingCode::kCoefficientsChanged)));
 
   const auto steady = calibrate(two_hours().pass, options);
   EXPECT_TRUE(steady.calibration.further.empty());
-  options.estimator = "invariant";
+  options.estimator = Estimator::kInvariant;
   EXPECT_TRUE(calibrate(two_hours().pass, options).calibration.further.empty());
-  options.further_states.coefficient_change = FurtherStateOptions::Choice::kOn;
+  options.further_states[FurtherState::kCoefficientChange] = FurtherStateOptions::Choice::kOn;
   EXPECT_THROW((void)calibrate(two_hours().pass, options), SetupError);
 }
 
 TEST(Batch, ComparesTheHalvesOfThePass) {
   CalibrationOptions options = batch();
   const auto good = calibrate(two_hours().pass, options).calibration.statistics;
-  const double freedom = good.at("halves_degrees_of_freedom");
+  const double freedom = good.halves_degrees_of_freedom.value();
   EXPECT_GE(freedom, 10);
-  EXPECT_LT(good.at("halves_chi_square"), freedom + 4 * std::sqrt(2 * freedom));
+  EXPECT_LT(good.halves_chi_square.value(), freedom + 4 * std::sqrt(2 * freedom));
   Scenario scenario = scenario_in_eq1(14, std::chrono::hours(2));
   for (GyroScenario& gyro : scenario.gyros) {
     gyro.drift.warm_up_fraction = 0.1;
     gyro.drift.warm_up_time_s = 3600;
   }
   const auto moving = calibrate(sim::simulate(scenario).pass, options).calibration;
-  EXPECT_GT(moving.statistics.at("halves_chi_square"), 1000);
+  EXPECT_GT(moving.statistics.halves_chi_square.value(), 1000);
   EXPECT_FALSE(moving.verdict.trustworthy);
-  EXPECT_THAT(moving.verdict.findings, testing::Contains(testing::Field(&Finding::code, "halves-disagree")));
+  EXPECT_THAT(moving.verdict.findings, testing::Contains(testing::Field(&Finding::code, FindingCode::kHalvesDisagree)));
 }
 
 /// Samples and fixes of the beginning of a pass, all used.
