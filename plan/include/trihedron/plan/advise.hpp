@@ -13,6 +13,7 @@
 
 namespace trihedron::plan {
 
+/// What the spacecraft can do, and how much of the flight may be given to calibration.
 struct SlewLimits {
   std::optional<double> max_rate_rad_s;                ///< or that of the scenario
   double max_angle_rad = 30 * kDegree;                 ///< of each slew from the reference attitude
@@ -20,6 +21,7 @@ struct SlewLimits {
   Duration manoeuvre_time = std::chrono::minutes(10);  ///< of all together, turns and holds
 };
 
+/// The slews found, and what the flight tells of the parameters without and with them.
 struct Advice {
   Scenario scenario;  ///< with the slews
   ground::Observability before;

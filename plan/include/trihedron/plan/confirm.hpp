@@ -12,6 +12,7 @@ namespace trihedron::plan {
 
 /// Errors of calibrations along combinations of the parameters.
 struct Confirmation {
+  /// One combination: its predicted and its simulated error.
   struct Along {
     ground::Combination combination;
     double predicted = 0;  ///< 1-sigma, rad or rad/s

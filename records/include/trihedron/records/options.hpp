@@ -38,6 +38,7 @@ struct FurtherStateOptions {
   }
 };
 
+/// All settings of a calibration; the defaults are those of the program.
 struct CalibrationOptions {
   std::string estimator = "invariant";
   std::string drift_model = "auto";  ///< "esg7", "esg20", or the one that the pass gives evidence of

@@ -32,6 +32,7 @@ struct FurtherStarTracker {
   double alignment_prior_sigma_rad = 0;  ///< of m, per axis
 };
 
+/// What pass.toml says: when and how the telemetry was taken, and what is known before.
 struct PassSettings {
   std::string spacecraft;
   Time epoch{};
@@ -67,6 +68,7 @@ struct StarTrackerTelemetry {
   [[nodiscard]] std::size_t size() const { return t.size(); }
 };
 
+/// Settings and telemetry of one pass.
 struct Pass {
   PassSettings settings;
   GyroTelemetry gyro;
@@ -76,6 +78,7 @@ struct Pass {
 
 /// What a simulator knows. Never part of a Pass, so that no estimator can read it.
 struct Truth {
+  /// Constants of one gyro.
   struct Gyro {
     std::vector<std::pair<std::string, double>> drift_rad_s;       ///< coefficients of eq. (1)
     std::vector<std::pair<std::string, double>> unmodelled_rad_s;  ///< drift outside eq. (1), by name

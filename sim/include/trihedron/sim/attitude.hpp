@@ -31,6 +31,7 @@ class SlewPlan {
   /// q_reference_c.
   [[nodiscard]] Eigen::Quaterniond at(double t_s) const;
 
+  /// One turn about a fixed axis, at rest at both ends.
   struct Turn {
     double begin_s;
     double end_s;

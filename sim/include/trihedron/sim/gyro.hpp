@@ -72,6 +72,7 @@ class Readout {
   Stream stuck_;
 };
 
+/// One gyro in flight: its momentum turns by its drift as the body turns about it.
 class Gyro {
  public:
   /// At the start of the pass, with the body at C_in_c. Throws std::invalid_argument for a start direction of no

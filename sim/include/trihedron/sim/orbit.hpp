@@ -6,12 +6,13 @@
 
 namespace trihedron::sim {
 
-/// WGS 84 / EGM96: gravitational parameter, equatorial radius, J2, rate of rotation.
-inline constexpr double kEarthGravity_m3_s2 = 3.986004418e14;
-inline constexpr double kEarthRadius_m = 6378137.0;
-inline constexpr double kEarthJ2 = 1.08262668e-3;
-inline constexpr double kEarthRate_rad_s = 7.292115e-5;
+// WGS 84 / EGM96.
+inline constexpr double kEarthGravity_m3_s2 = 3.986004418e14;  ///< gravitational parameter
+inline constexpr double kEarthRadius_m = 6378137.0;            ///< equatorial
+inline constexpr double kEarthJ2 = 1.08262668e-3;              ///< oblateness of the gravity field, 1
+inline constexpr double kEarthRate_rad_s = 7.292115e-5;        ///< rotation
 
+/// Position and velocity at one time.
 struct OrbitState {
   Vec<In> position_m;    ///< from the Earth's centre
   Vec<In> velocity_m_s;  ///< relative to the Earth's centre

@@ -9,6 +9,7 @@
 
 namespace trihedron::sim {
 
+/// What simulate() makes: telemetry, the truth behind it, and the faults that were put into it.
 struct SimulatedPass {
   Pass pass;
   /// At every epoch of a fix, whether there is one or not. Drift coefficients as they are at the end of the pass;

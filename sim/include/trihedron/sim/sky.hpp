@@ -8,6 +8,7 @@
 
 namespace trihedron::sim {
 
+/// Sun and Earth at one time.
 struct SkyState {
   Vec<In> sun_m;               ///< from the Earth's centre
   Vec<In> earth_velocity_m_s;  ///< of the Earth's centre, relative to the solar system's barycentre
