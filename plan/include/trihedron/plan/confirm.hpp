@@ -1,5 +1,5 @@
 #pragma once
-/// Whether simulated flights bear out what was predicted.
+/// Monte Carlo check of a prediction: simulated flights, and how large the errors of their calibrations are.
 
 #include <string>
 #include <vector>
