@@ -12,20 +12,20 @@
 namespace trihedron::io {
 
 /// Settings and tables as the format holds them, before any screening.
-struct RawPass {
+struct UnscreenedPass {
   PassSettings settings;
   Series gyro;                        ///< columns h1_x, h1_y, h1_z, h2_x …
   std::vector<Series> star_trackers;  ///< columns q_x, q_y, q_z, q_w; the first head, then the further ones
 };
 
 /// A directory with pass.toml, gyro.csv and star_tracker.csv.
-[[nodiscard]] RawPass read_raw_directory(const std::filesystem::path& path);
+[[nodiscard]] UnscreenedPass read_raw_directory(const std::filesystem::path& path);
 /// A NetCDF-4 file with the same variables.
-[[nodiscard]] RawPass read_raw_netcdf(const std::filesystem::path& path);
+[[nodiscard]] UnscreenedPass read_raw_netcdf(const std::filesystem::path& path);
 
 struct InputFormat {
   bool (*recognises)(const std::filesystem::path& path);  ///< whether a path that exists is to be read by this format
-  RawPass (*read)(const std::filesystem::path& path);     ///< throws InputRefused, MachineFailed
+  UnscreenedPass (*read)(const std::filesystem::path& path);  ///< throws InputRefused, MachineFailed
 };
 
 /// The first that recognises a path reads it; the last one takes whatever is left.

@@ -239,11 +239,11 @@ std::optional<Truth> read_truth_directory(const fs::path& directory) {
 
 }  // namespace
 
-RawPass read_raw_directory(const fs::path& directory) {
+UnscreenedPass read_raw_directory(const fs::path& directory) {
   const fs::path settings_file = directory / kSettingsFile;
   const TextFile settings(settings_file);
   Series gyro = read_csv(directory / kGyroFile, gyro_columns);
-  RawPass raw;
+  UnscreenedPass raw;
   raw.settings = parse_pass_toml(settings.text(), settings_file, directory, gyros_of(gyro));
   raw.gyro = std::move(gyro);
   for (std::size_t head = 0; head <= raw.settings.further_star_trackers.size(); ++head) {
@@ -252,11 +252,11 @@ RawPass read_raw_directory(const fs::path& directory) {
   return raw;
 }
 
-RawPass read_raw_netcdf(const fs::path& file) {
+UnscreenedPass read_raw_netcdf(const fs::path& file) {
   const NetcdfReader reader(file);
   const std::string settings_text = required_attribute(reader, file, "", kSettingsAttribute);
   const Time epoch = parse_pass_epoch(settings_text, inside(file, kSettingsAttribute));
-  RawPass raw;
+  UnscreenedPass raw;
   raw.gyro = reader.read_group(kGyroGroup, epoch, gyro_columns);
   raw.settings =
       parse_pass_toml(settings_text, inside(file, kSettingsAttribute), file.parent_path(), gyros_of(raw.gyro));
@@ -273,7 +273,7 @@ RawPass read_raw_netcdf(const fs::path& file) {
 LoadedPass read_pass(const fs::path& path) {
   check_there(path);
   const auto format = std::ranges::find_if(kInputFormats, [&](const InputFormat& f) { return f.recognises(path); });
-  RawPass raw = format->read(path);
+  UnscreenedPass raw = format->read(path);
   LoadedPass loaded;
   loaded.pass.gyro = screen_gyro(std::move(raw.gyro), raw.settings, loaded.defects);
   for (std::size_t head = 0; head < raw.star_trackers.size(); ++head) {
