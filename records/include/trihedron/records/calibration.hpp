@@ -22,13 +22,11 @@ struct Finding {
   Severity severity = Severity::kWarning;
 };
 
-/// Whether the result may be used, and everything that a user must know of it.
 struct Verdict {
   bool trustworthy = false;
   std::vector<Finding> findings;
 };
 
-/// What a calibration found of one gyro.
 struct GyroCalibration {
   std::string drift_model;                                  ///< "esg7"
   std::vector<std::pair<std::string, double>> drift_rad_s;  ///< by coefficient name, in the model's order
