@@ -5,7 +5,7 @@ BUILD := build
 LINT_TOOLS := build-lint/tools
 SOURCES := $(shell git ls-files '*.cpp' '*.hpp' 2>/dev/null)
 
-.PHONY: help setup build demo test bench validation consistency format lint sanitize coverage install clean
+.PHONY: help setup build demo test bench validation consistency docs format lint sanitize coverage install clean
 
 help:
 	@echo 'make demo     install what is missing, build, repeat the experiment of the paper, say where the report is'
@@ -14,6 +14,7 @@ help:
 	@echo 'make bench    measure: steps of the cycle, reading, writing and simulating a pass'
 	@echo 'make validation  measure again what docs/validation.md tells'
 	@echo 'make consistency  measure again what docs/consistency.md tells: hours; goes on where it was interrupted'
+	@echo 'make docs     reference of the interfaces and all documents as web pages: out/docs/html/index.html'
 	@echo 'make install  into PREFIX (default /usr/local)'
 	@echo 'make setup | format | lint | sanitize | coverage | clean'
 	@echo 'Files are compiled in units of twelve, which makes a whole build shorter. Who edits one is served sooner with'
@@ -67,6 +68,14 @@ consistency: build
 	$(CONSISTENCY) $(WHOLE_PASS) --runs 30 --cells $(GEOMETRIES) --table observable --place observable docs/consistency.md
 	$(CONSISTENCY) $(WHOLE_PASS) --runs 30 --cells $(GEOMETRIES) --table agreement --place agreement docs/consistency.md
 	$(CONSISTENCY) $(WHOLE_PASS) --runs 20 --cells $(STEADY) --table agreement --place agreement20 docs/consistency.md
+
+# Fails on each warning but those of members and constants that have no comment of their own; see docs/Doxyfile.
+docs:
+	@cmake/setup.sh docs
+	@mkdir -p out/docs
+	doxygen docs/Doxyfile
+	@! grep -vE 'Member .* (of (struct|class)|\((variable|typedef)\) of namespace) .* is not documented' out/docs/warnings.txt
+	@echo 'out/docs/html/index.html'
 
 format: $(LINT_TOOLS)/installed
 	@$(LINT_TOOLS)/bin/clang-format -i $(SOURCES)

@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Installs what is missing on Debian 12; does nothing, quickly, when nothing is.
+# Installs what is missing on Debian 12; does nothing, quickly, when nothing is. With the argument `docs`: what `make docs` needs.
 set -euo pipefail
 
 packages=(
@@ -10,6 +10,9 @@ packages=(
   gcovr chromium-headless-shell
   python3 python3-venv python3-pytest python3-xarray python3-h5netcdf
 )
+if [ "${1:-}" = docs ]; then
+  packages=(doxygen)
+fi
 
 missing=()
 for package in "${packages[@]}"; do

@@ -2,10 +2,12 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <system_error>
 #include <utility>
 
 #include "csv.hpp"
+#include "input_formats.hpp"
 #include "netcdf_file.hpp"
 #include "pass_toml.hpp"
 #include "screening.hpp"
@@ -55,27 +57,7 @@ void check_there(const fs::path& path) {
   }
 }
 
-/// Settings and tables as the format holds them, before any judgement.
-struct RawPass {
-  PassSettings settings;
-  Series gyro;
-  std::vector<Series> star_trackers;  ///< the first head, then the further ones
-};
-
 int gyros_of(const Series& gyro) { return static_cast<int>(gyro.columns.size() / 3); }
-
-RawPass read_raw_directory(const fs::path& directory) {
-  const fs::path settings_file = directory / kSettingsFile;
-  const TextFile settings(settings_file);
-  Series gyro = read_csv(directory / kGyroFile, gyro_columns);
-  RawPass raw;
-  raw.settings = parse_pass_toml(settings.text(), settings_file, directory, gyros_of(gyro));
-  raw.gyro = std::move(gyro);
-  for (std::size_t head = 0; head <= raw.settings.further_star_trackers.size(); ++head) {
-    raw.star_trackers.push_back(read_csv(directory / (star_tracker_name(head) + ".csv"), star_tracker_columns));
-  }
-  return raw;
-}
 
 std::string required_attribute(const NetcdfReader& reader, const fs::path& file, const char* group, const char* name) {
   std::optional<std::string> text = reader.text_attribute(group, name);
@@ -84,24 +66,6 @@ std::string required_attribute(const NetcdfReader& reader, const fs::path& file,
                        "write it as `trihedron simulate` does");
   }
   return *std::move(text);
-}
-
-RawPass read_raw_netcdf(const fs::path& file) {
-  const NetcdfReader reader(file);
-  const std::string settings_text = required_attribute(reader, file, "", kSettingsAttribute);
-  const Time epoch = parse_pass_epoch(settings_text, inside(file, kSettingsAttribute));
-  RawPass raw;
-  raw.gyro = reader.read_group(kGyroGroup, epoch, gyro_columns);
-  raw.settings =
-      parse_pass_toml(settings_text, inside(file, kSettingsAttribute), file.parent_path(), gyros_of(raw.gyro));
-  for (std::size_t head = 0; head <= raw.settings.further_star_trackers.size(); ++head) {
-    raw.star_trackers.push_back(reader.read_group(star_tracker_name(head), epoch, star_tracker_columns));
-  }
-  if (const auto prior = reader.text_attribute("", kPriorAttribute)) {
-    raw.settings.prior = parse_calibration(*prior, inside(file, kPriorAttribute));
-    check_prior(*raw.settings.prior, inside(file, kPriorAttribute), gyros_of(raw.gyro));
-  }
-  return raw;
 }
 
 /// One row per line, each column with its number of decimals.
@@ -275,9 +239,41 @@ std::optional<Truth> read_truth_directory(const fs::path& directory) {
 
 }  // namespace
 
+UnscreenedPass read_raw_directory(const fs::path& directory) {
+  const fs::path settings_file = directory / kSettingsFile;
+  const TextFile settings(settings_file);
+  Series gyro = read_csv(directory / kGyroFile, gyro_columns);
+  UnscreenedPass raw;
+  raw.settings = parse_pass_toml(settings.text(), settings_file, directory, gyros_of(gyro));
+  raw.gyro = std::move(gyro);
+  for (std::size_t head = 0; head <= raw.settings.further_star_trackers.size(); ++head) {
+    raw.star_trackers.push_back(read_csv(directory / (star_tracker_name(head) + ".csv"), star_tracker_columns));
+  }
+  return raw;
+}
+
+UnscreenedPass read_raw_netcdf(const fs::path& file) {
+  const NetcdfReader reader(file);
+  const std::string settings_text = required_attribute(reader, file, "", kSettingsAttribute);
+  const Time epoch = parse_pass_epoch(settings_text, inside(file, kSettingsAttribute));
+  UnscreenedPass raw;
+  raw.gyro = reader.read_group(kGyroGroup, epoch, gyro_columns);
+  raw.settings =
+      parse_pass_toml(settings_text, inside(file, kSettingsAttribute), file.parent_path(), gyros_of(raw.gyro));
+  for (std::size_t head = 0; head <= raw.settings.further_star_trackers.size(); ++head) {
+    raw.star_trackers.push_back(reader.read_group(star_tracker_name(head), epoch, star_tracker_columns));
+  }
+  if (const auto prior = reader.text_attribute("", kPriorAttribute)) {
+    raw.settings.prior = parse_calibration(*prior, inside(file, kPriorAttribute));
+    check_prior(*raw.settings.prior, inside(file, kPriorAttribute), gyros_of(raw.gyro));
+  }
+  return raw;
+}
+
 LoadedPass read_pass(const fs::path& path) {
   check_there(path);
-  RawPass raw = fs::is_directory(path) ? read_raw_directory(path) : read_raw_netcdf(path);
+  const auto format = std::ranges::find_if(kInputFormats, [&](const InputFormat& f) { return f.recognises(path); });
+  UnscreenedPass raw = format->read(path);
   LoadedPass loaded;
   loaded.pass.gyro = screen_gyro(std::move(raw.gyro), raw.settings, loaded.defects);
   for (std::size_t head = 0; head < raw.star_trackers.size(); ++head) {

@@ -14,7 +14,7 @@
 namespace trihedron::plan {
 namespace {
 
-/// With another seed, and what is unknown drawn from what is known before.
+/// The scenario with another seed, and with alignments and coefficients drawn from their priors.
 Scenario drawn(Scenario scenario, std::uint64_t run) {
   scenario.seed += 1 + run;
   for (std::size_t k = 0; k < scenario.gyros.size(); ++k) {
@@ -35,7 +35,7 @@ Outcome fly(const Scenario& scenario, const CalibrationOptions& options) {
   const sim::SimulatedPass flown = sim::simulate(scenario);
   const Calibration calibration = ground::calibrate(flown.pass, options).calibration;
   Outcome outcome{ground::estimate_minus_truth(calibration, flown.truth, ground::UnnamedDrift::kIsZero)};
-  // In units of the sigmas, which differ by ten powers of ten.
+  // Scaled by the sigmas, which differ by ten orders of magnitude.
   const Eigen::VectorXd sigma = calibration.covariance.diagonal().cwiseSqrt();
   const Eigen::MatrixXd correlation =
       sigma.cwiseInverse().asDiagonal() * calibration.covariance * sigma.cwiseInverse().asDiagonal();
@@ -70,7 +70,8 @@ Confirmation confirm(const Scenario& scenario, const std::vector<ground::Combina
   }
   double square = 0;
   for (const ground::Combination& combination : combinations) {
-    // Further states come after those of the gyros, and have no truth here.
+    // Further states stand after the parameters of the gyros; their truth is not known here, so their errors count as
+    // zero.
     Eigen::MatrixXd scatter = Eigen::MatrixXd::Zero(predicted.covariance.rows(), predicted.covariance.cols());
     for (const Outcome& outcome : outcomes) {
       scatter.topLeftCorner(outcome.errors.size(), outcome.errors.size()) +=

@@ -52,6 +52,7 @@ struct Defect {
 /// Stable, for programs: "missing-time", "time-outside-pass" …
 [[nodiscard]] const char* name_of(Defect::Kind kind);
 
+/// A pass as read, and what was wrong with its telemetry.
 struct LoadedPass {
   Pass pass;
   std::vector<Defect> defects;
@@ -64,6 +65,7 @@ struct LoadedPass {
 /// The truth of a simulated pass; nullopt when there is none. Throws as read_pass, also for any flaw in it.
 [[nodiscard]] std::optional<Truth> read_truth(const std::filesystem::path& path);
 
+/// How exactly a pass is written.
 struct PassFormat {
   /// Step of the packed direction cosines in NetCDF; the error is at most half of it. CSV has nine decimals always.
   double direction_step = 5e-10;

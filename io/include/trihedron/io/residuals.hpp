@@ -10,6 +10,7 @@
 
 namespace trihedron::io {
 
+/// One variable of a table.
 struct Column {
   std::string name;   ///< of the variable; NetCDF allows letters, digits and _
   std::string units;  ///< UDUNITS: "1", "rad", "arcsec"
@@ -17,6 +18,7 @@ struct Column {
   std::vector<double> values;  ///< one per time; NaN where there is none
 };
 
+/// One group of the file: columns over common times.
 struct Table {
   std::string group;
   std::vector<Time> t;

@@ -1,5 +1,5 @@
 #pragma once
-/// Whether simulated flights bear out what was predicted.
+/// Monte Carlo check of a prediction: simulated flights, and how large the errors of their calibrations are.
 
 #include <string>
 #include <vector>
@@ -12,6 +12,7 @@ namespace trihedron::plan {
 
 /// Errors of calibrations along combinations of the parameters.
 struct Confirmation {
+  /// One combination: its predicted and its simulated error.
   struct Along {
     ground::Combination combination;
     double predicted = 0;  ///< 1-sigma, rad or rad/s

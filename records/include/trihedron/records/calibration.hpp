@@ -37,6 +37,7 @@ struct CalibrationNoise {
   double wandering_time_s = 0;                            ///< its correlation time
 };
 
+/// The result of a calibration: parameters of all gyros, their covariance, verdict, statistics.
 struct Calibration {
   Estimator estimator = Estimator::kInvariant;
   Time epoch{};  ///< of the pass

@@ -7,6 +7,7 @@
 
 namespace trihedron {
 
+/// One calibration in a catalogue, and what it belongs to.
 struct CatalogueEntry {
   std::string spacecraft;
   std::string pass;      ///< its name; of the last one where the calibration combines several

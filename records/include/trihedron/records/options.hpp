@@ -46,6 +46,7 @@ struct FurtherStateOptions {
   std::array<Choice, kFurtherStateCount> choices_{};
 };
 
+/// All settings of a calibration; the defaults are those of the program.
 struct CalibrationOptions {
   Estimator estimator = Estimator::kInvariant;
   std::optional<DriftModelId> drift_model;  ///< without it the one that the pass gives evidence of

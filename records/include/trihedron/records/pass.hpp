@@ -33,6 +33,7 @@ struct FurtherStarTracker {
   double alignment_prior_sigma_rad = 0;  ///< of m, per axis
 };
 
+/// What pass.toml says: when and how the telemetry was taken, and what is known before.
 struct PassSettings {
   std::string spacecraft;
   Time epoch{};
@@ -78,6 +79,7 @@ struct StarTrackerTelemetry {
   [[nodiscard]] std::size_t size() const { return t.size(); }
 };
 
+/// Settings and telemetry of one pass.
 struct Pass {
   PassSettings settings;
   GyroTelemetry gyro;
@@ -87,6 +89,7 @@ struct Pass {
 
 /// What a simulator knows. Never part of a Pass, so that no estimator can read it.
 struct Truth {
+  /// Constants of one gyro.
   struct Gyro {
     std::vector<std::pair<DriftCoefficient, double>> drift_rad_s;  ///< of eq. (1)
     /// Drift outside eq. (1), each by the name that the simulator gave it; those of a DriftCoefficient have its name.

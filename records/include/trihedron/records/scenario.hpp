@@ -19,9 +19,9 @@
 
 namespace trihedron {
 
-inline constexpr double kDegree = std::numbers::pi / 180;
-inline constexpr double kArcminute = kDegree / 60;
-inline constexpr double kArcsecond = kDegree / 3600;
+inline constexpr double kDegree = std::numbers::pi / 180;  ///< rad
+inline constexpr double kArcminute = kDegree / 60;         ///< rad
+inline constexpr double kArcsecond = kDegree / 3600;       ///< rad
 
 /// A stretch of the pass, seconds from its start; holds begin_s, not end_s.
 struct Interval {
@@ -63,6 +63,7 @@ struct AttitudeSample {
   Eigen::Quaterniond q_in_c = Eigen::Quaterniond::Identity();
 };
 
+/// How the spacecraft is pointed: a reference attitude, slews from it, jitter on top.
 struct AttitudeScenario {
   enum class Reference {
     kOrbital,     ///< z up along the radius, y orbit normal (r × v), x along track
@@ -131,6 +132,7 @@ struct ReadoutScenario {
   double stuck_s = 2;
 };
 
+/// One gyro: where its momentum points at the start, how it is mounted, how it drifts, how it is read.
 struct GyroScenario {
   Eigen::Vector3d start_direction_c{0.995, 0.087, 0.045};  ///< of the momentum, c axes, at the start; any length but 0
   Eigen::Vector3d mounting_rotation_vector_rad{0, 0, 0};  ///< as designed and known: C_c_b = exp([m×]) exp([mounting×])
@@ -179,6 +181,7 @@ struct StarTrackerScenario {
   double wrong_sign_probability = 0;  ///< −q in place of q
 };
 
+/// A whole pass to be simulated.
 struct Scenario {
   std::string spacecraft = "Resurs-DK1";
   std::uint64_t seed = 0;
