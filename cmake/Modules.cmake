@@ -21,6 +21,17 @@ set(TRIHEDRON_plan_MAY_USE core records sim ground)
 set(TRIHEDRON_report_MAY_USE core records ground)
 set(TRIHEDRON_cli_MAY_USE core records sim io ground plan report)
 
+# Within ground, from room to room.
+set(TRIHEDRON_ground_tasks_MAY_USE)
+set(TRIHEDRON_ground_model_MAY_USE)
+set(TRIHEDRON_ground_evaluate_MAY_USE model)
+set(TRIHEDRON_ground_onboard_MAY_USE tasks model)
+set(TRIHEDRON_ground_batch_MAY_USE tasks model onboard)
+set(TRIHEDRON_ground_choose_MAY_USE tasks model evaluate onboard batch)
+set(TRIHEDRON_ground_judge_MAY_USE model evaluate)
+set(TRIHEDRON_ground_observe_MAY_USE tasks model onboard batch choose)
+set(TRIHEDRON_ground_calibrate_MAY_USE tasks model evaluate onboard batch choose judge)
+
 function(trihedron_module name)
   cmake_parse_arguments(arg "" "" "SOURCES;MODULES;LIBRARIES;PRIVATE_LIBRARIES" ${ARGN})
   set(target trihedron_${name})

@@ -1,4 +1,5 @@
-"""The dependency directions of cmake/Modules.cmake hold in what the sources include and in what the targets link.
+"""The dependency directions of cmake/Modules.cmake hold in what the sources include and in what the targets link: between modules,
+and between the rooms of ground.
 
 Run by CTest: python3 -m pytest architecture_test.py, with TRIHEDRON_BUILD naming the build directory.
 """
@@ -15,9 +16,17 @@ CORE_MAY_INCLUDE = {"array", "algorithm", "chrono", "cmath", "cstddef", "cstdint
                     "type_traits", "utility"}
 
 
-def allowed():
-    rows = re.findall(r"set\(TRIHEDRON_(\w+)_MAY_USE ?([\w ]*)\)", MODULES_CMAKE.read_text())
+def table_of(prefix):
+    rows = re.findall(rf"set\({prefix}_([a-z]+)_MAY_USE ?([\w ]*)\)", MODULES_CMAKE.read_text())
     return {name: set(uses.split()) for name, uses in rows}
+
+
+def allowed():
+    return table_of("TRIHEDRON")
+
+
+def allowed_rooms():
+    return table_of("TRIHEDRON_ground")
 
 
 def includes(file):
@@ -43,6 +52,34 @@ def wrong_includes(root, table):
     return wrong
 
 
+def room_of(path):
+    """Of a path below src/ or include/trihedron/ground/: the folder that it begins with."""
+    parts = pathlib.PurePath(path).parts
+    return parts[0] if len(parts) > 1 else None
+
+
+def wrong_rooms(ground, table):
+    """What lies in no room, and what includes a room that its own may not use. Tests may use all."""
+    wrong = []
+    for base in (ground / "src", ground / "include" / "trihedron" / "ground"):
+        for file in sorted(base.glob("**/*.?pp")):
+            room = room_of(file.relative_to(base))
+            name = file.relative_to(ground)
+            if room not in table:
+                wrong.append(f"{name} lies in no room")
+                continue
+            for included in includes(file):
+                if included.startswith("trihedron/ground/"):
+                    other = room_of(included.removeprefix("trihedron/ground/"))
+                elif (ground / "src" / included).exists():
+                    other = room_of(included)
+                else:
+                    continue
+                if other != room and other not in table[room]:
+                    wrong.append(f"{name} includes {included}")
+    return wrong
+
+
 def wrong_links(dot, table):
     names = dict(re.findall(r'"(node\d+)" \[ label = "([^"\\]+)', dot))
     wrong = []
@@ -53,11 +90,7 @@ def wrong_links(dot, table):
     return wrong
 
 
-def test_table_is_read_and_acyclic():
-    table = allowed()
-    assert {"core", "records", "sim", "io", "ground", "plan", "report", "cli"} == set(table)
-    assert table["core"] == set()
-
+def assert_acyclic(table):
     def reach(module):
         found = set(table[module])
         for used in table[module]:
@@ -67,8 +100,26 @@ def test_table_is_read_and_acyclic():
     assert all(module not in reach(module) for module in table)
 
 
+def test_table_is_read_and_acyclic():
+    table = allowed()
+    assert {"core", "records", "sim", "io", "ground", "plan", "report", "cli"} == set(table)
+    assert table["core"] == set()
+    assert_acyclic(table)
+
+
+def test_table_of_rooms_is_read_and_acyclic():
+    table = allowed_rooms()
+    assert {room.name for room in (ROOT / "ground" / "src").iterdir()} <= set(table)
+    assert table["model"] == set()
+    assert_acyclic(table)
+
+
 def test_sources_include_only_what_their_module_may_use():
     assert wrong_includes(ROOT, allowed()) == []
+
+
+def test_rooms_of_ground_include_only_what_they_may_use():
+    assert wrong_rooms(ROOT / "ground", allowed_rooms()) == []
 
 
 def test_targets_link_only_what_their_module_may_use(tmp_path):
@@ -83,10 +134,26 @@ def test_a_planted_include_is_found(tmp_path):
     for module in allowed():
         (tmp_path / module / "src").mkdir(parents=True)
     (tmp_path / "core" / "src" / "a.cpp").write_text('#include <vector>\n#include <cmath>\n#include "trihedron/io/pass.hpp"\n')
-    (tmp_path / "sim" / "src" / "b.cpp").write_text('#include "trihedron/core/time.hpp"\n#include "trihedron/ground/verdict.hpp"\n')
+    (tmp_path / "sim" / "src" / "b.cpp").write_text('#include "trihedron/core/time.hpp"\n#include "trihedron/ground/judge/verdict.hpp"\n')
     assert wrong_includes(tmp_path, allowed()) == ["core/src/a.cpp includes vector",
                                                    "core/src/a.cpp includes trihedron/io/pass.hpp",
-                                                   "sim/src/b.cpp includes trihedron/ground/verdict.hpp"]
+                                                   "sim/src/b.cpp includes trihedron/ground/judge/verdict.hpp"]
+
+
+def test_a_planted_include_of_another_room_is_found(tmp_path):
+    headers = tmp_path / "include" / "trihedron" / "ground" / "judge"
+    headers.mkdir(parents=True)
+    (headers / "verdict.hpp").write_text('#include "trihedron/ground/calibrate/calibrate.hpp"\n')
+    for room, text in (("batch", '#include "choose/decide.hpp"\n#include "model/prior.hpp"\n#include "batch/refine.hpp"\n'),
+                       ("choose", '#include "batch/batch.hpp"\n'), ("model", "")):
+        (tmp_path / "src" / room).mkdir(parents=True)
+        for name in ("batch", "decide", "prior", "refine"):
+            (tmp_path / "src" / room / f"{name}.hpp").write_text("")
+        (tmp_path / "src" / room / "a.cpp").write_text(text)
+    (tmp_path / "src" / "flat.cpp").write_text("")
+    assert wrong_rooms(tmp_path, allowed_rooms()) == [
+        "src/batch/a.cpp includes choose/decide.hpp", "src/flat.cpp lies in no room",
+        "include/trihedron/ground/judge/verdict.hpp includes trihedron/ground/calibrate/calibrate.hpp"]
 
 
 def test_a_planted_link_is_found():

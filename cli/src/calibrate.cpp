@@ -12,7 +12,9 @@
 #include "progress.hpp"
 #include "steps.hpp"
 #include "summary.hpp"
-#include "trihedron/ground/several_passes.hpp"
+#include "trihedron/ground/calibrate/several_passes.hpp"
+#include "trihedron/ground/evaluate/used_fixes.hpp"
+#include "trihedron/ground/model/setup_error.hpp"
 #include "trihedron/io/atomic_file.hpp"
 #include "trihedron/io/attitude.hpp"
 #include "trihedron/io/calibration.hpp"
@@ -22,12 +24,13 @@
 #include "trihedron/io/quantity.hpp"
 #include "trihedron/io/residuals.hpp"
 #include "trihedron/io/time_text.hpp"
+#include "trihedron/records/run.hpp"
 #include "trihedron/report/report.hpp"
 
 namespace trihedron::cli {
 namespace {
 
-std::vector<io::Table> residual_tables(const ground::CalibrationRun& run) {
+std::vector<io::Table> residual_tables(const CalibrationRun& run) {
   io::Table fixes{"fixes", {}, {}};
   const std::size_t components = 2 * run.calibration.gyros.size();
   const char* innovation =
@@ -44,7 +47,7 @@ std::vector<io::Table> residual_tables(const ground::CalibrationRun& run) {
   fixes.columns.push_back(
       {"nis", "1", fmt::format("normalised innovation squared, {} degrees of freedom", components), {}});
   fixes.columns.push_back({"used", "1", "1 used, 0 rejected", {}});
-  for (const ground::FixRecord& fix : run.fixes) {
+  for (const FixRecord& fix : run.fixes) {
     fixes.t.push_back(fix.t);
     for (std::size_t i = 0; i < fix.innovation.size(); ++i) {
       fixes.columns[2 * i].values.push_back(fix.innovation[i]);
@@ -104,14 +107,14 @@ std::vector<NamedPass> read_passes(const std::vector<std::string>& paths) {
 /// A calibration measured against the best reference that there is. Refers to its parts.
 struct Outcome {
   const io::LoadedPass& loaded;
-  const ground::CalibrationRun& run;
+  const CalibrationRun& run;
   std::optional<Truth> truth;
   Evaluation navigation;
   Evaluation attitude;
   Course course;
 };
 
-Outcome outcome_of(const NamedPass& pass, const ground::CalibrationRun& run) {
+Outcome outcome_of(const NamedPass& pass, const CalibrationRun& run) {
   const double limit_rad = io::parse_angle_rad("5arcmin");
   const Time epoch = pass.loaded.pass.settings.epoch;
   Outcome outcome{pass.loaded, run, read_truth_of(pass.path, pass.loaded.pass), {}, {}, {}};

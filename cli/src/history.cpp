@@ -1,4 +1,4 @@
-#include "trihedron/ground/history.hpp"
+#include "trihedron/ground/calibrate/history.hpp"
 
 #include <fmt/format.h>
 

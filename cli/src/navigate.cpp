@@ -7,11 +7,15 @@
 #include "progress.hpp"
 #include "steps.hpp"
 #include "summary.hpp"
+#include "trihedron/ground/calibrate/calibrate.hpp"
+#include "trihedron/ground/evaluate/used_fixes.hpp"
+#include "trihedron/ground/model/setup_error.hpp"
 #include "trihedron/io/attitude.hpp"
 #include "trihedron/io/calibration.hpp"
 #include "trihedron/io/config.hpp"
 #include "trihedron/io/error.hpp"
 #include "trihedron/io/quantity.hpp"
+#include "trihedron/records/run.hpp"
 
 namespace trihedron::cli {
 
@@ -22,7 +26,7 @@ ExitStatus navigate_pass(const std::filesystem::path& pass, const std::optional<
   if (calibration) {
     loaded.pass.settings.prior = io::read_calibration(*calibration);
   }
-  ground::NavigationRun result;
+  NavigationRun result;
   try {
     const ProgressBar bar("navigate", common.quiet);
     result = ground::navigate(loaded.pass, options, bar.meter());

@@ -1,4 +1,4 @@
-#include "trihedron/ground/observe.hpp"
+#include "trihedron/ground/observe/observe.hpp"
 
 #include <fmt/core.h>
 
@@ -16,7 +16,7 @@
 #include "progress.hpp"
 #include "steps.hpp"
 #include "summary.hpp"
-#include "trihedron/ground/calibrate.hpp"
+#include "trihedron/ground/model/setup_error.hpp"
 #include "trihedron/io/config.hpp"
 #include "trihedron/io/error.hpp"
 #include "trihedron/io/pass.hpp"

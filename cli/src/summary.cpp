@@ -8,7 +8,8 @@
 #include <cmath>
 #include <iterator>
 
-#include "trihedron/ground/verdict.hpp"
+#include "trihedron/core/frames.hpp"
+#include "trihedron/ground/judge/verdict.hpp"
 #include "trihedron/io/error.hpp"
 #include "trihedron/io/time_text.hpp"
 #include "trihedron/records/scenario.hpp"
@@ -109,7 +110,7 @@ std::string verdict_text(const Verdict& verdict) {
   return text;
 }
 
-std::string calibration_text(const ground::CalibrationRun& run, const std::optional<Truth>& truth) {
+std::string calibration_text(const CalibrationRun& run, const std::optional<Truth>& truth) {
   std::string text;
   auto out = std::back_inserter(text);
   const Calibration& calibration = run.calibration;
@@ -153,12 +154,12 @@ std::string calibration_text(const ground::CalibrationRun& run, const std::optio
                    &estimate == calibration.further.data() ? "\nFurther states\n" : "", estimate.name, estimate.value,
                    estimate.sigma);
   }
-  for (const ground::Evidence& evidence : run.evidence) {
+  for (const Evidence& evidence : run.evidence) {
     fmt::format_to(out, "{}  {:<24} ln Bayes factor {:>+9.1f}: {}\n",
                    &evidence == run.evidence.data() ? "\nEvidence\n" : "", evidence.states, evidence.log_bayes_factor,
                    evidence.accepted ? "estimated" : "taken as zero");
   }
-  for (const ground::DriftModelForecast& model : run.drift_models) {
+  for (const DriftModelForecast& model : run.drift_models) {
     fmt::format_to(out, "{}  {:<8} {:>4} coefficients, forecast error {:>9}, ln likelihood {:>+10.1f}{}\n",
                    &model == run.drift_models.data() ? "\nDrift models, by forecasts of the rest of the pass\n" : "",
                    model.drift_model, model.coefficients, angle_text(model.open_loop_rms_rad), model.log_likelihood,
@@ -206,7 +207,7 @@ std::string extension_text(const std::optional<ground::Extension>& extension) {
                    : "none measured";
 }
 
-std::string course_text(const ground::CalibrationRun& run, const Course& course) {
+std::string course_text(const CalibrationRun& run, const Course& course) {
   const auto settled = [&](bool alignments) {
     const auto time = ground::settled(run, course.convergence, alignments);
     return time ? fmt::format("after {:.0f} min", minutes(*time)) : "not yet";
@@ -354,7 +355,7 @@ nlohmann::ordered_json extension_json(const std::vector<ground::IntervalPair>& p
   return json;
 }
 
-nlohmann::ordered_json course_json(const ground::CalibrationRun& run, const Course& course) {
+nlohmann::ordered_json course_json(const CalibrationRun& run, const Course& course) {
   const auto seconds = [](const std::optional<Duration>& time) {
     return time ? nlohmann::ordered_json(to_seconds(*time)) : nlohmann::ordered_json(nullptr);
   };
@@ -368,14 +369,14 @@ nlohmann::ordered_json course_json(const ground::CalibrationRun& run, const Cour
     pairs.push_back(loops.intervals);
   }
   nlohmann::ordered_json models = nlohmann::ordered_json::array();
-  for (const ground::DriftModelForecast& model : run.drift_models) {
+  for (const DriftModelForecast& model : run.drift_models) {
     models.push_back({{"drift_model", model.drift_model},
                       {"coefficients", model.coefficients},
                       {"log_likelihood", model.log_likelihood},
                       {"open_loop_rms_rad", model.open_loop_rms_rad}});
   }
   nlohmann::ordered_json evidence = nlohmann::ordered_json::array();
-  for (const ground::Evidence& its : run.evidence) {
+  for (const Evidence& its : run.evidence) {
     evidence.push_back(
         {{"states", its.states}, {"log_bayes_factor", its.log_bayes_factor}, {"accepted", its.accepted}});
   }

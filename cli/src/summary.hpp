@@ -7,12 +7,12 @@
 #include <string>
 #include <vector>
 
-#include "trihedron/ground/calibrate.hpp"
-#include "trihedron/ground/convergence.hpp"
-#include "trihedron/ground/evaluate.hpp"
-#include "trihedron/ground/open_loop.hpp"
-#include "trihedron/ground/several_passes.hpp"
+#include "trihedron/ground/calibrate/several_passes.hpp"
+#include "trihedron/ground/evaluate/convergence.hpp"
+#include "trihedron/ground/evaluate/evaluate.hpp"
+#include "trihedron/ground/evaluate/open_loop.hpp"
 #include "trihedron/io/pass.hpp"
+#include "trihedron/records/run.hpp"
 
 namespace trihedron::cli {
 
@@ -55,8 +55,8 @@ struct Course {
 [[nodiscard]] std::string pass_text(const io::LoadedPass& loaded);
 [[nodiscard]] std::string finding_text(const Finding& finding);
 [[nodiscard]] std::string verdict_text(const Verdict& verdict);
-[[nodiscard]] std::string calibration_text(const ground::CalibrationRun& run, const std::optional<Truth>& truth);
-[[nodiscard]] std::string course_text(const ground::CalibrationRun& run, const Course& course);
+[[nodiscard]] std::string calibration_text(const CalibrationRun& run, const std::optional<Truth>& truth);
+[[nodiscard]] std::string course_text(const CalibrationRun& run, const Course& course);
 [[nodiscard]] std::string evaluation_text(const Evaluation& evaluation, Time epoch, const std::string& title);
 
 /// Of several passes: each alone, and whether it agrees with those before.
@@ -67,7 +67,7 @@ struct Course {
 [[nodiscard]] nlohmann::ordered_json pass_json(const io::LoadedPass& loaded);
 [[nodiscard]] nlohmann::ordered_json findings_json(const std::vector<Finding>& findings);
 [[nodiscard]] nlohmann::ordered_json verdict_json(const Verdict& verdict);
-[[nodiscard]] nlohmann::ordered_json course_json(const ground::CalibrationRun& run, const Course& course);
+[[nodiscard]] nlohmann::ordered_json course_json(const CalibrationRun& run, const Course& course);
 [[nodiscard]] nlohmann::ordered_json extension_json(const std::vector<ground::IntervalPair>& pairs,
                                                     const std::optional<ground::Extension>& median, Time epoch);
 /// "≥ 36 times", "none measured"

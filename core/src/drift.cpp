@@ -3,10 +3,12 @@
 namespace trihedron {
 namespace {
 
+using Member = DriftCoefficient::Member;
+
 /// W and D of Σ a_i h_i²/2 and of h1 h2 h3, and of degree 4 the W of Σ h⁴/4, which is made of (4, 0) and (4, 4).
-constexpr bool is_in_eq1(DriftPotential potential, int degree, int order) {
+constexpr bool is_in_eq1(Member potential, int degree, int order) {
   return (degree == 2 && (order == 0 || order == 2)) || (degree == 3 && order == -2) ||
-         (degree == 4 && order == 0 && potential == DriftPotential::kW);
+         (degree == 4 && order == 0 && potential == Member::kW);
 }
 
 constexpr int max_degree_of(DriftModelId id) {
@@ -20,10 +22,10 @@ DriftModel::DriftModel(DriftModelId id, const FurtherStates& further)
     : harmonics_(max_degree_of(id)), wandering_(further.wandering_drift), change_(further.coefficient_change) {
   size_ = 0;
   for (int number = 0; number < Esg7::kSize; ++number) {
-    members_[static_cast<std::size_t>(size_++)].number = static_cast<std::int8_t>(number);
+    members_[static_cast<std::size_t>(size_++)] = DriftCoefficient::of_eq1(number);
   }
   const int max_degree = max_degree_of(id);
-  const auto add_degrees = [&](int from, int to, DriftPotential potential) {
+  const auto add_degrees = [&](int from, int to, Member potential) {
     for (int degree = from; degree <= to; ++degree) {
       for (int order = -degree; order <= degree; ++order) {
         if (!is_in_eq1(potential, degree, order)) {
@@ -33,21 +35,21 @@ DriftModel::DriftModel(DriftModelId id, const FurtherStates& further)
     }
   };
   if (id.family == DriftModelId::Family::kEsg20) {  // W before D
-    add_degrees(1, max_degree, DriftPotential::kW);
-    add_degrees(1, max_degree, DriftPotential::kD);
-    add(DriftPotential::kCubicD, 4, 0);
+    add_degrees(1, max_degree, Member::kW);
+    add_degrees(1, max_degree, Member::kD);
+    add(Member::kCubeD, 4, 0);
   } else {  // degree by degree
     for (int degree = 1; degree <= max_degree; ++degree) {
-      add_degrees(degree, degree, DriftPotential::kW);
-      add_degrees(degree, degree, DriftPotential::kD);
+      add_degrees(degree, degree, Member::kW);
+      add_degrees(degree, degree, Member::kD);
     }
   }
   TRIHEDRON_ASSERT(size_ == id.size());
 }
 
-void DriftModel::add(DriftPotential potential, int degree, int order) {
+void DriftModel::add(Member potential, int degree, int order) {
   members_[static_cast<std::size_t>(size_++)] = {potential, static_cast<std::int8_t>(degree),
-                                                 static_cast<std::int8_t>(order), 0};
+                                                 static_cast<std::int8_t>(order)};
 }
 
 void DriftModel::basis(const Eigen::Vector3d& h, double part_of_change, ColumnsView B) const {
@@ -61,12 +63,12 @@ void DriftModel::basis(const Eigen::Vector3d& h, double part_of_change, ColumnsV
   if (size_ > Esg7::kSize) {
     const auto harmonics = harmonics_.at<double>(h);
     for (int i = Esg7::kSize; i < size_; ++i) {
-      const DriftMember& its = member(i);
-      switch (its.potential) {
-        case DriftPotential::kW:
+      const DriftCoefficient& its = member(i);
+      switch (its.member) {
+        case Member::kW:
           B.set_column(i, -harmonics.polynomial_gradient(its.degree, its.order));
           break;
-        case DriftPotential::kD:
+        case Member::kD:
           B.set_column(i, h.cross(harmonics.polynomial_gradient(its.degree, its.order)));
           break;
         default:
@@ -106,11 +108,11 @@ Eigen::Vector3d DriftModel::rate(const Eigen::Vector3d& h, double part_of_change
     Eigen::Vector3d w = Eigen::Vector3d::Zero();
     Eigen::Vector3d d = Eigen::Vector3d::Zero();
     for (int i = Esg7::kSize; i < size_; ++i) {
-      const DriftMember& its = member(i);
-      if (its.potential == DriftPotential::kCubicD) {
+      const DriftCoefficient& its = member(i);
+      if (its.member == Member::kCubeD) {
         d += coefficients[i] * h.cwiseProduct(h).cwiseProduct(h);
       } else {
-        (its.potential == DriftPotential::kW ? w : d) +=
+        (its.member == Member::kW ? w : d) +=
             coefficients[i] * harmonics.polynomial_gradient(its.degree, its.order);
       }
     }

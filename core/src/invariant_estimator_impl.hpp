@@ -52,6 +52,12 @@ std::optional<SetupFault> InvariantEstimator<kCapacity>::set_up(const Calibratio
 }
 
 template <Capacity kCapacity>
+double InvariantEstimator<kCapacity>::sharing_factor(const StarFix& fix) const {
+  const std::optional<Time>& last = used_fix_t_[static_cast<std::size_t>(fix.head)];
+  return last && *last < fix.t ? std::sqrt(setup_.fixes_sharing_a_sample(fix.t - *last)) : 1;
+}
+
+template <Capacity kCapacity>
 void InvariantEstimator<kCapacity>::begin_stretch() {
   since_fix_ = {};
   time_since_fix_s_ = 0;
@@ -353,7 +359,7 @@ FixReport InvariantEstimator<kCapacity>::correct(const StarFix& fix, const FixRe
   report.t = fix.t;
   report.head = fix.head;
   FixReadings readings = readings_at_fix;
-  readings.noise_factor *= std::sqrt(setup_.fixes_sharing_a_sample(fix.head));
+  readings.noise_factor *= sharing_factor(fix);
   const FixBySharedStates by_shared = fix_by_shared_states(setup_, fix, readings.rate_c);
   const Rot<In, C> C_in_c = corrected(fix, by_shared, shared_);
   const Eigen::Matrix3d R_c = fix_noise(setup_, fix.head);
@@ -361,6 +367,8 @@ FixReport InvariantEstimator<kCapacity>::correct(const StarFix& fix, const FixRe
   if (!started_) {
     start(C_in_c.raw(), readings, R_c, by_shared);
     started_ = attitude(gyros_, readings.h_b, all_gyros(layout().gyros)).ok();
+    used_fix_t_ = {};
+    used_fix_t_[static_cast<std::size_t>(fix.head)] = fix.t;
     report.status = started_ ? FixStatus::kStarted : FixStatus::kRejectedGeometry;
     return report;
   }
@@ -425,6 +433,7 @@ FixReport InvariantEstimator<kCapacity>::correct(const StarFix& fix, const FixRe
       break;
   }
   angles_since_fix_ = 0;
+  used_fix_t_[static_cast<std::size_t>(fix.head)] = fix.t;
   update(white.rows, std::sqrt(report.weight));
   return report;
 }
@@ -472,18 +481,10 @@ void InvariantEstimator<kCapacity>::update(const Compared& white, double root_we
     Gyro& gyro = gyros_[k];
     gyro.h_in =
         rotated<double>(gyro.h_in, Eigen::Vector3d(x.template segment<3>(layout.direction(k)))).normalized();
-    gyro.drift_rad_s.head(layout.drift_size()) += x.segment(layout.drift(k), layout.drift_size());
     if (layout.further.wandering_drift) {
       gyro.drift_rad_s.template segment<3>(layout.wandering_column()) += x.template segment<3>(layout.wandering(k));
     }
-    if (layout.further.coefficient_change) {
-      gyro.drift_rad_s.template segment<Layout::kEq1>(layout.change_column()) +=
-          x.template segment<Layout::kEq1>(layout.change(k));
-    }
-    if (layout.further.readout_bias) {
-      gyro.readout_bias += x.template segment<3>(layout.readout_bias(k));
-    }
-    gyro.C_c_b = turned(gyro.C_c_b, Eigen::Vector3d(x.template segment<3>(layout.alignment(k))));
+    add_parameter_errors(layout, k, x, gyro);
   }
   shared_ += x.tail(layout.shared_size());
 }

@@ -55,9 +55,8 @@ Duration CalibrationSetup::recent() const {
   return std::max(kLeast, gyro_period * DirectionsFit::least_samples(kQuadratic));
 }
 
-double CalibrationSetup::fixes_sharing_a_sample(int head) const {
-  const Duration period = star_trackers[static_cast<std::size_t>(head)].period;
-  return period > Duration::zero() ? std::max(2 * to_seconds(reach()) / to_seconds(period), 1.0) : 1.0;
+double CalibrationSetup::fixes_sharing_a_sample(Duration since_the_last_fix) const {
+  return std::max(2 * to_seconds(reach()) / to_seconds(since_the_last_fix), 1.0);
 }
 
 double prior_sigma_of_further_state(const CalibrationSetup& setup, int state) {

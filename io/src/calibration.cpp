@@ -3,14 +3,12 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <array>
 #include <charconv>
 #include <cmath>
 #include <limits>
 
 #include "json_node.hpp"
 #include "text_file.hpp"
-#include "trihedron/core/drift.hpp"
 #include "trihedron/io/atomic_file.hpp"
 #include "trihedron/io/time_text.hpp"
 #include "wording.hpp"
@@ -21,36 +19,39 @@ namespace {
 constexpr const char* kFormat = "trihedron-calibration";
 constexpr int kVersion = 1;
 
-using Severity = Finding::Severity;
-constexpr std::array kSeverities = {std::pair{Severity::kNote, "note"}, std::pair{Severity::kWarning, "warning"},
-                                    std::pair{Severity::kDoNotUse, "do-not-use"}};
+DriftModelId parse_drift_model(const JsonNode& node) {
+  const std::string name = node.text();
+  const std::optional<DriftModelId> model = drift_model_named(name);
+  if (!model) {
+    node.refuse(fmt::format("is {}, no drift model", in_quotes(name)), fmt::format("give {}", drift_model_choices()));
+  }
+  return *model;
+}
 
-/// In the order of the model; empty for one that this program does not know.
-std::vector<std::string_view> coefficients_of(const std::string& drift_model) {
-  if (drift_model == Esg7::kModelName) {
-    return {Esg7::kNames.begin(), Esg7::kNames.end()};
+Estimator parse_estimator(const JsonNode& node) {
+  const std::string name = node.text();
+  const std::optional<Estimator> estimator = estimator_named(name);
+  if (!estimator) {
+    node.refuse(fmt::format("is {}, no estimator", in_quotes(name)),
+                fmt::format("give one of: {}", estimator_choices()));
   }
-  if (drift_model == Esg20::kModelName) {
-    return {Esg20::kNames.begin(), Esg20::kNames.end()};
-  }
-  return {};
+  return *estimator;
 }
 
 GyroCalibration parse_gyro(const JsonNode& node) {
   GyroCalibration gyro;
-  gyro.drift_model = node.at("drift_model").text();
+  gyro.drift_model = parse_drift_model(node.at("drift_model"));
   const JsonNode drift = node.at("drift_rad_s");
-  const std::vector<std::string_view> known = coefficients_of(gyro.drift_model);
+  const std::vector<std::string> names = coefficient_names(gyro.drift_model);
+  const std::vector<std::string_view> known(names.begin(), names.end());
   for (const auto& [name, value] : drift.members()) {
-    if (known.empty()) {
-      gyro.drift_rad_s.emplace_back(name, value.number());
-    } else if (std::ranges::find(known, name) == known.end()) {
-      drift.refuse(fmt::format("has coefficient {}, not one of {}", in_quotes(name), gyro.drift_model),
+    if (std::ranges::find(known, name) == known.end()) {
+      drift.refuse(fmt::format("has coefficient {}, not one of {}", in_quotes(name), name_of(gyro.drift_model)),
                    suggestion(name, known));
     }
   }
-  for (const std::string_view name : known) {
-    gyro.drift_rad_s.emplace_back(name, drift.at(std::string(name)).number());
+  for (const std::string& name : names) {
+    gyro.drift_rad_s.push_back(drift.at(name).number());
   }
   gyro.alignment_rotation_vector_rad = node.at("alignment_rotation_vector_rad").vector3();
   gyro.momentum_in = node.at("momentum_in").vector3();
@@ -64,8 +65,7 @@ GyroCalibration parse_gyro(const JsonNode& node) {
 }
 
 /// A state "gyroN.…" must name a gyro and be there once; other states may be added.
-void check_states(const JsonNode& node, const Calibration& calibration) {
-  const auto& states = calibration.states;
+void check_states(const JsonNode& node, const std::vector<std::string>& states, std::size_t gyros) {
   for (auto state = states.begin(); state != states.end(); ++state) {
     if (std::find(states.begin(), state, *state) != state) {
       node.refuse(fmt::format("names {} twice", in_quotes(*state)), "each row of the matrix needs its own name");
@@ -74,11 +74,9 @@ void check_states(const JsonNode& node, const Calibration& calibration) {
     if (state->starts_with(kPrefix)) {
       std::size_t number = 0;
       const auto [end, fault] = std::from_chars(state->data() + kPrefix.size(), state->data() + state->size(), number);
-      if (fault != std::errc() || end == state->data() + state->size() || *end != '.' || number < 1 ||
-          number > calibration.gyros.size()) {
-        node.refuse(
-            fmt::format("names {}, which is not of any of the {} gyros", in_quotes(*state), calibration.gyros.size()),
-            "name states like \"gyro1.k0\" or \"gyro2.align_x\"");
+      if (fault != std::errc() || end == state->data() + state->size() || *end != '.' || number < 1 || number > gyros) {
+        node.refuse(fmt::format("names {}, which is not of any of the {} gyros", in_quotes(*state), gyros),
+                    "name states like \"gyro1.k0\" or \"gyro2.align_x\"");
       }
     }
   }
@@ -114,6 +112,25 @@ Eigen::MatrixXd parse_matrix(const JsonNode& node, std::size_t size) {
     }
   }
   return matrix;
+}
+
+/// States and covariance. States that this program does not know are left out: what is left is still the covariance of
+/// the others.
+void parse_covariance(const JsonNode& node, Calibration& calibration) {
+  std::vector<std::string> names;
+  for (const JsonNode& state : node.at("states").elements()) {
+    names.push_back(state.text());
+  }
+  check_states(node.at("states"), names, calibration.gyros.size());
+  const Eigen::MatrixXd matrix = parse_matrix(node.at("matrix"), names.size());
+  std::vector<Eigen::Index> rows;
+  for (std::size_t i = 0; i < names.size(); ++i) {
+    if (const std::optional<ParameterId> state = parameter_named(names[i])) {
+      calibration.states.push_back(*state);
+      rows.push_back(static_cast<Eigen::Index>(i));
+    }
+  }
+  calibration.covariance = matrix(rows, rows);
 }
 
 CalibrationNoise parse_noise(const JsonNode& node) {
@@ -153,7 +170,7 @@ Json noise_json(const CalibrationNoise& noise) {
 
 Finding parse_finding(const JsonNode& node) {
   Finding finding;
-  finding.code = node.at("code").text();
+  finding.code = finding_code_named(node.at("code").text());
   finding.text = node.at("text").text();
   if (const auto evidence = node.find("evidence")) {
     finding.evidence = evidence->text();
@@ -161,32 +178,34 @@ Finding parse_finding(const JsonNode& node) {
   if (const auto cure = node.find("cure")) {
     finding.cure = cure->text();
   }
+  finding.severity = FindingSeverity::kWarning;
   if (const auto severity = node.find("severity")) {
     const std::string name = severity->text();
-    const auto found = std::ranges::find(kSeverities, name, [](const auto& s) { return std::string_view(s.second); });
-    if (found == kSeverities.end()) {
+    const auto* const found = std::ranges::find(kFindingSeverities, name, &FindingSeverityRow::name);
+    if (found == kFindingSeverities.end()) {
       severity->refuse(fmt::format("is {}", in_quotes(name)), "it must be note, warning or do-not-use");
     }
-    finding.severity = found->first;
+    finding.severity = found->severity;
   }
   return finding;
 }
 
 Json finding_json(const Finding& finding) {
-  const auto severity = std::ranges::find(kSeverities, finding.severity, [](const auto& s) { return s.first; });
-  return {{"code", finding.code},
+  const auto* const severity = std::ranges::find(kFindingSeverities, finding.severity, &FindingSeverityRow::severity);
+  return {{"code", name_of(finding.code)},
           {"text", finding.text},
           {"evidence", finding.evidence},
           {"cure", finding.cure},
-          {"severity", severity->second}};
+          {"severity", severity->name}};
 }
 
 Json gyro_json(const GyroCalibration& gyro) {
   Json drift = Json::object();
-  for (const auto& [name, value] : gyro.drift_rad_s) {
-    drift[name] = value;
+  const std::vector<std::string> names = coefficient_names(gyro.drift_model);
+  for (std::size_t i = 0; i < gyro.drift_rad_s.size(); ++i) {
+    drift[names.at(i)] = gyro.drift_rad_s[i];
   }
-  return {{"drift_model", gyro.drift_model},
+  return {{"drift_model", name_of(gyro.drift_model)},
           {"drift_rad_s", drift},
           {"alignment_rotation_vector_rad", to_json_array(gyro.alignment_rotation_vector_rad)},
           {"readout_bias", to_json_array(gyro.readout_bias)},
@@ -220,7 +239,7 @@ Calibration parse_calibration(std::string_view text, const std::filesystem::path
     root.at("version").refuse(fmt::format("is {}", version), fmt::format("this program reads version {}", kVersion));
   }
   Calibration calibration;
-  calibration.estimator = root.at("estimator").text();
+  calibration.estimator = parse_estimator(root.at("estimator"));
   const std::string epoch = root.at("epoch_tai").text();
   const std::optional<Time> parsed_epoch = parse_epoch(epoch);
   if (!parsed_epoch) {
@@ -240,12 +259,7 @@ Calibration parse_calibration(std::string_view text, const std::filesystem::path
   if (calibration.gyros.empty()) {
     root.at("gyros").refuse("is empty", "give one element per gyro");
   }
-  const JsonNode covariance = root.at("covariance");
-  for (const JsonNode& state : covariance.at("states").elements()) {
-    calibration.states.push_back(state.text());
-  }
-  check_states(covariance.at("states"), calibration);
-  calibration.covariance = parse_matrix(covariance.at("matrix"), calibration.states.size());
+  parse_covariance(root.at("covariance"), calibration);
   const JsonNode verdict = root.at("verdict");
   calibration.verdict.trustworthy = verdict.at("trustworthy").boolean();
   for (const JsonNode& finding : verdict.at("findings").elements()) {
@@ -253,14 +267,19 @@ Calibration parse_calibration(std::string_view text, const std::filesystem::path
   }
   if (const auto further = root.find("further")) {
     for (const auto& [name, estimate] : further->members()) {
-      calibration.further.push_back({name, estimate.at("value").number(), estimate.at("sigma").number()});
+      const double value = estimate.at("value").number();
+      const double sigma = estimate.at("sigma").number();
+      if (const std::optional<ParameterId> parameter = parameter_named(name)) {
+        calibration.further.push_back({*parameter, value, sigma});
+      }
     }
   }
   if (const auto noise = root.find("noise")) {
     calibration.noise = parse_noise(*noise);
   }
   for (const auto& [name, value] : root.at("statistics").members()) {
-    calibration.statistics[name] = value.is_null() ? std::numeric_limits<double>::quiet_NaN() : value.number();
+    set_value(calibration.statistics, name,
+              value.is_null() ? std::numeric_limits<double>::quiet_NaN() : value.number());
   }
   return calibration;
 }
@@ -277,7 +296,15 @@ std::string format_calibration(const Calibration& calibration) {
   }
   Json further = Json::object();
   for (const FurtherEstimate& estimate : calibration.further) {
-    further[estimate.name] = {{"value", estimate.value}, {"sigma", estimate.sigma}};
+    further[name_of(estimate.parameter)] = {{"value", estimate.value}, {"sigma", estimate.sigma}};
+  }
+  Json states = Json::array();
+  for (const ParameterId& state : calibration.states) {
+    states.push_back(name_of(state));
+  }
+  Json statistics = Json::object();
+  for (const auto& [name, value] : named_values(calibration.statistics)) {
+    statistics[name] = value;
   }
   const std::string noise =
       calibration.noise ? fmt::format(" \"noise\": {},\n", dump(noise_json(*calibration.noise))) : "";
@@ -293,10 +320,9 @@ std::string format_calibration(const Calibration& calibration) {
       " \"covariance\": {{\n  \"states\": {},\n  \"matrix\": {}}},\n"
       " \"verdict\": {{\"trustworthy\": {}, \"findings\": {}}},\n"
       " \"statistics\": {}}}\n",
-      kFormat, kVersion, dump(Json(calibration.estimator)), format_epoch(calibration.epoch),
-      dump(Json(to_seconds(calibration.t - calibration.epoch))), lines(gyros), dump(further), noise,
-      dump(Json(calibration.states)), lines(matrix), calibration.verdict.trustworthy, lines(findings),
-      dump(Json(calibration.statistics)));
+      kFormat, kVersion, dump(Json(name_of(calibration.estimator))), format_epoch(calibration.epoch),
+      dump(Json(to_seconds(calibration.t - calibration.epoch))), lines(gyros), dump(further), noise, dump(states),
+      lines(matrix), calibration.verdict.trustworthy, lines(findings), dump(statistics));
 }
 
 void write_calibration(const std::filesystem::path& path, const Calibration& calibration) {

@@ -85,23 +85,14 @@ void check_spacecraft(SqliteDatabase& database, const fs::path& file, const std:
 
 void add_parameters(SqliteDatabase& database, std::int64_t row, const Calibration& calibration) {
   SqliteStatement insert(database, "INSERT INTO parameter VALUES (?, ?, ?, ?)");
-  std::size_t state = 0;
-  const auto add = [&](double value) {
-    const auto index = static_cast<Eigen::Index>(state);
+  for (std::size_t i = 0; i < calibration.states.size(); ++i) {
+    const auto index = static_cast<Eigen::Index>(i);
     insert.bind(0, row);
-    insert.bind(1, calibration.states[state++]);
-    insert.bind(2, value);
+    insert.bind(1, name_of(calibration.states[i]));
+    insert.bind(2, value_of(calibration, calibration.states[i]));
     insert.bind(3, std::sqrt(calibration.covariance(index, index)));
     insert.step();
     insert.reset();
-  };
-  for (const GyroCalibration& gyro : calibration.gyros) {
-    for (const auto& [name, value] : gyro.drift_rad_s) {
-      add(value);
-    }
-    for (const double component : gyro.alignment_rotation_vector_rad) {
-      add(component);
-    }
   }
 }
 
@@ -109,7 +100,7 @@ void add_findings(SqliteDatabase& database, std::int64_t row, const Verdict& ver
   SqliteStatement insert(database, "INSERT INTO finding VALUES (?, ?)");
   for (const Finding& finding : verdict.findings) {
     insert.bind(0, row);
-    insert.bind(1, finding.code);
+    insert.bind(1, name_of(finding.code));
     insert.step();
     insert.reset();
   }
@@ -124,8 +115,8 @@ void add_entry(SqliteDatabase& database, const CatalogueEntry& entry) {
   insert.bind(3, std::int64_t{entry.passes});
   insert.bind(4, format_epoch(calibration.epoch));
   insert.bind(5, to_seconds(calibration.t - calibration.epoch));
-  insert.bind(6, calibration.estimator);
-  insert.bind(7, calibration.gyros.front().drift_model);
+  insert.bind(6, name_of(calibration.estimator));
+  insert.bind(7, name_of(calibration.gyros.front().drift_model));
   insert.bind(8, std::int64_t{calibration.verdict.trustworthy ? 1 : 0});
   insert.bind(9, format_calibration(calibration));
   insert.step();

@@ -10,6 +10,7 @@
 #include "text_file.hpp"
 #include "toml_table.hpp"
 #include "trihedron/io/quantity.hpp"
+#include "wording.hpp"
 
 namespace trihedron::io {
 namespace {
@@ -38,6 +39,7 @@ int whole_number(const TomlTable& table, const toml::node& node, std::string_vie
 }
 
 constexpr std::string_view kNever = "never";
+constexpr std::string_view kWanderingTime = "wandering_time";
 
 using Choice = FurtherStateOptions::Choice;
 constexpr std::array<std::pair<Choice, const char*>, 3> kChoices = {
@@ -58,6 +60,35 @@ Choice choice(const TomlTable& table, const toml::node& node, std::string_view k
     table.refuse(node, fmt::format("\"{}\" is neither auto nor on nor off", key), "write one of them");
   }
   return *chosen;
+}
+
+/// Of [further_states].
+std::vector<std::string_view> further_state_keys() {
+  std::vector<std::string_view> keys;
+  for (const FurtherStateRow& row : kFurtherStates) {
+    if (!row.key.empty()) {
+      keys.push_back(row.key);
+    }
+  }
+  keys.push_back(kWanderingTime);
+  return keys;
+}
+
+/// The lines of [further_states].
+std::string format_further_states(const FurtherStateOptions& states) {
+  std::string text;
+  for (const FurtherStateRow& row : kFurtherStates) {
+    if (row.key.empty()) {
+      continue;
+    }
+    const bool has_size = row.state == FurtherState::kWanderingDrift;
+    text += fmt::format("{} = \"{}\"  # {}: {}\n", row.key,
+                        has_size && states.is_on(row.state) ? fmt::format("{}rad/s", states.wandering_drift_rad_s)
+                                                            : name_of(states[row.state]),
+                        row.about, has_size ? "auto, off, or its 1-sigma" : "auto, on or off");
+  }
+  return text + fmt::format("{} = \"{}\"  # and its correlation time\n", kWanderingTime,
+                            format_duration(states.wandering_time));
 }
 
 }  // namespace
@@ -96,10 +127,20 @@ CalibrationOptions read_config(const fs::path& path) {
                        {"estimator", "drift_model", "filter", "further_states", "corrections"});
   CalibrationOptions options;
   if (const toml::node* node = root.find("estimator")) {
-    options.estimator = root.text(*node, "estimator");
+    const std::optional<Estimator> estimator = estimator_named(root.text(*node, "estimator"));
+    if (!estimator) {
+      root.refuse(*node, fmt::format("there is no estimator {}", in_quotes(root.text(*node, "estimator"))),
+                  fmt::format("use one of: {}", estimator_choices()));
+    }
+    options.estimator = *estimator;
   }
   if (const toml::node* node = root.find("drift_model")) {
-    options.drift_model = root.text(*node, "drift_model");
+    const std::string name = root.text(*node, "drift_model");
+    options.drift_model = drift_model_named(name);
+    if (!options.drift_model && name != kAutoDriftModel) {
+      root.refuse(*node, fmt::format("there is no drift model {}", in_quotes(name)),
+                  fmt::format("use {}, {}", kAutoDriftModel, drift_model_choices()));
+    }
   }
   if (root.find("filter") != nullptr) {
     const TomlTable filter(root.table_at("filter"), path, "[filter]",
@@ -143,37 +184,29 @@ CalibrationOptions read_config(const fs::path& path) {
     }
   }
   if (root.find("further_states") != nullptr) {
-    const TomlTable further(
-        root.table_at("further_states"), path, "[further_states]",
-        {"clock_offset", "orbital_error", "readout_bias", "coefficient_change", "wandering_drift", "wandering_time"});
+    const TomlTable further(root.table_at("further_states"), path, "[further_states]", further_state_keys());
     FurtherStateOptions& states = options.further_states;
-    if (const toml::node* node = further.find("clock_offset")) {
-      states.clock_offset = choice(further, *node, "clock_offset");
-    }
-    if (const toml::node* node = further.find("orbital_error")) {
-      states.orbital_error = choice(further, *node, "orbital_error");
-    }
-    if (const toml::node* node = further.find("readout_bias")) {
-      states.readout_bias = choice(further, *node, "readout_bias");
-    }
-    if (const toml::node* node = further.find("coefficient_change")) {
-      states.coefficient_change = choice(further, *node, "coefficient_change");
-    }
-    if (const toml::node* node = further.find("wandering_drift")) {
-      if (const auto word = choice_of(further.text(*node, "wandering_drift")); word && *word != Choice::kOn) {
-        states.wandering_drift = *word;
+    for (const FurtherStateRow& row : kFurtherStates) {
+      const toml::node* node = row.key.empty() ? nullptr : further.find(row.key);
+      if (node == nullptr) {
+        continue;
+      }
+      if (row.state != FurtherState::kWanderingDrift) {
+        states[row.state] = choice(further, *node, row.key);
+      } else if (const auto word = choice_of(further.text(*node, row.key)); word && *word != Choice::kOn) {
+        states[row.state] = *word;
       } else {
-        states.wandering_drift = Choice::kOn;
-        states.wandering_drift_rad_s = quantity(further, *node, "wandering_drift", parse_rate_rad_s);
+        states[row.state] = Choice::kOn;
+        states.wandering_drift_rad_s = quantity(further, *node, row.key, parse_rate_rad_s);
         if (!(states.wandering_drift_rad_s > 0)) {
-          further.refuse(*node, "\"wandering_drift\" is not positive", "give auto, off, or more than zero");
+          further.refuse(*node, fmt::format("\"{}\" is not positive", row.key), "give auto, off, or more than zero");
         }
       }
     }
-    if (const toml::node* node = further.find("wandering_time")) {
-      states.wandering_time = quantity(further, *node, "wandering_time", parse_duration);
+    if (const toml::node* node = further.find(kWanderingTime)) {
+      states.wandering_time = quantity(further, *node, kWanderingTime, parse_duration);
       if (!(states.wandering_time > Duration::zero())) {
-        further.refuse(*node, "\"wandering_time\" is not positive", "give more than zero");
+        further.refuse(*node, fmt::format("\"{}\" is not positive", kWanderingTime), "give more than zero");
       }
     }
   }
@@ -187,7 +220,6 @@ CalibrationOptions read_config(const fs::path& path) {
 }
 
 std::string format_config(const CalibrationOptions& options) {
-  const FurtherStateOptions& states = options.further_states;
   return fmt::format(
       "# Settings as given, and the defaults of the others. Give this file to --config to repeat the run.\n"
       "estimator = \"{}\"\n"
@@ -203,24 +235,16 @@ std::string format_config(const CalibrationOptions& options) {
       "angles_after = \"{}\"  # without a fix, by the angles between the momenta: a duration or never\n"
       "\n"
       "[further_states]  # of estimators invariant and batch\n"
-      "clock_offset = \"{}\"  # of the star tracker: auto, on or off\n"
-      "orbital_error = \"{}\"  # of the star tracker, at orbital period: auto, on or off\n"
-      "readout_bias = \"{}\"  # of the direction cosines: auto, on or off\n"
-      "coefficient_change = \"{}\"  # of eq. (1), evenly over the pass, by estimator batch: auto, on or off\n"
-      "wandering_drift = \"{}\"  # about each case axis: auto, off, or its 1-sigma\n"
-      "wandering_time = \"{}\"  # and its correlation time\n"
+      "{}"
       "\n"
       "[corrections]\n"
       "interval = \"{}\"  # of the open-loop navigator: a duration, none or continuous\n",
-      options.estimator, options.drift_model, options.find_noise ? "found" : "told",
-      format_random_walk(options.direction_random_walk_rad_sqrt_s), options.gate_nis, options.student_t_freedom,
-      options.reopen_after_rejections, options.reopen_after_jump_rejections,
+      name_of(options.estimator), options.drift_model ? name_of(*options.drift_model) : std::string(kAutoDriftModel),
+      options.find_noise ? "found" : "told", format_random_walk(options.direction_random_walk_rad_sqrt_s),
+      options.gate_nis, options.student_t_freedom, options.reopen_after_rejections,
+      options.reopen_after_jump_rejections,
       options.angles_after == Duration::max() ? std::string(kNever) : format_duration(options.angles_after),
-      name_of(states.clock_offset), name_of(states.orbital_error), name_of(states.readout_bias),
-      name_of(states.coefficient_change),
-      states.wandering_drift == Choice::kOn ? fmt::format("{}rad/s", states.wandering_drift_rad_s)
-                                            : name_of(states.wandering_drift),
-      format_duration(states.wandering_time), format_correction_interval(options.corrections));
+      format_further_states(options.further_states), format_correction_interval(options.corrections));
 }
 
 }  // namespace trihedron::io

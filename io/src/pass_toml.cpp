@@ -57,14 +57,15 @@ Time parse_epoch_node(const TomlTable& table, std::string_view key) {
 }
 
 /// A table by drift coefficient; `positive` where the values are sigmas.
-std::map<std::string, double> by_coefficient(const TomlTable& parent, const toml::node& node, std::string_view key,
-                                             const fs::path& file, bool positive) {
+std::map<DriftCoefficient, double> by_coefficient(const TomlTable& parent, const toml::node& node, std::string_view key,
+                                                  const fs::path& file, bool positive) {
   const std::vector<std::string_view> known(Esg7::kNames.begin(), Esg7::kNames.end());
   const TomlTable table(parent.as_table(node, key), file, std::string(key), known);
-  std::map<std::string, double> values;
-  for (const char* name : Esg7::kNames) {
+  std::map<DriftCoefficient, double> values;
+  for (int i = 0; i < Esg7::kSize; ++i) {
+    const char* name = Esg7::kNames.at(static_cast<std::size_t>(i));
     if (const toml::node* value = table.find(name)) {
-      values[name] = positive ? table.positive(*value, name) : table.number(*value, name);
+      values[DriftCoefficient::of_eq1(i)] = positive ? table.positive(*value, name) : table.number(*value, name);
     }
   }
   return values;
@@ -167,10 +168,10 @@ std::string format_text(const std::string& text) {
   return stream.str();
 }
 
-std::string format_map(const std::map<std::string, double>& values) {
+std::string format_map(const std::map<DriftCoefficient, double>& values) {
   std::string text;
-  for (const auto& [name, value] : values) {
-    text += fmt::format("{}{} = {}", text.empty() ? "" : ", ", name, value);
+  for (const auto& [coefficient, value] : values) {
+    text += fmt::format("{}{} = {}", text.empty() ? "" : ", ", name_of(coefficient), value);
   }
   return "{" + text + "}";
 }
@@ -185,10 +186,10 @@ std::string format_unit(const GyroPrior& gyro, const GyroPrior& common) {
     return text + fmt::format("{} = {}\n", kDriftSigma, gyro.drift_common_sigma_rad_s);
   }
   // What a table leaves out has the sigma of [gyro]: where this gyro's own differs, name it for each coefficient.
-  std::map<std::string, double> sigmas = gyro.drift_sigma_rad_s;
+  std::map<DriftCoefficient, double> sigmas = gyro.drift_sigma_rad_s;
   if (gyro.drift_common_sigma_rad_s != common.drift_common_sigma_rad_s) {
-    for (const char* name : Esg7::kNames) {
-      sigmas.emplace(name, gyro.drift_common_sigma_rad_s);
+    for (const DriftCoefficient& coefficient : coefficients_of(kEsg7)) {
+      sigmas.emplace(coefficient, gyro.drift_common_sigma_rad_s);
     }
   }
   return text + fmt::format("{} = {}\n", kDriftSigma, format_map(sigmas));

@@ -42,7 +42,7 @@ Truth::Gyro parse_truth_of_gyro(const JsonNode& node) {
                  "give seven numbers: k0 mu12 mu23 mu31 nu12 nu23 nu31");
   }
   for (std::size_t i = 0; i < coefficients.size(); ++i) {
-    gyro.drift_rad_s.emplace_back(Esg7::kNames[i], coefficients[i]);
+    gyro.drift_rad_s.emplace_back(DriftCoefficient::of_eq1(static_cast<int>(i)), coefficients[i]);
   }
   gyro.alignment_rotation_vector_rad = node.at("lambda_rad").vector3();
   const std::vector<double> unmodelled = node.at("unmodelled_rad_s").numbers();
@@ -55,9 +55,8 @@ Truth::Gyro parse_truth_of_gyro(const JsonNode& node) {
 
 Json gyro_json(const Truth::Gyro& gyro) {
   Json drift = Json::array();
-  for (const char* name : Esg7::kNames) {
-    const auto found = std::ranges::find(gyro.drift_rad_s, name, [](const auto& c) { return c.first; });
-    drift.push_back(found == gyro.drift_rad_s.end() ? 0.0 : found->second);
+  for (int i = 0; i < Esg7::kSize; ++i) {
+    drift.push_back(gyro.drift(DriftCoefficient::of_eq1(i)).value_or(0.0));
   }
   Json names = Json::array();
   Json values = Json::array();

@@ -7,6 +7,8 @@
 #include <numeric>
 #include <vector>
 
+#include "trihedron/records/estimator.hpp"
+
 namespace trihedron::io {
 namespace {
 
@@ -55,6 +57,14 @@ std::string suggestion(std::string_view unknown, std::span<const std::string_vie
     return fmt::format("known here: {}", fmt::join(known, ", "));
   }
   return fmt::format("did you mean \"{}\"?", *nearest);
+}
+
+std::string estimator_choices() {
+  std::string text;
+  for (const EstimatorRow& row : kEstimators) {
+    text += fmt::format("{}{}", text.empty() ? "" : ", ", row.name);
+  }
+  return text;
 }
 
 }  // namespace trihedron::io

@@ -17,4 +17,7 @@ namespace trihedron::io {
 /// (its unit suffix is missing) is nearest.
 [[nodiscard]] std::string suggestion(std::string_view unknown, std::span<const std::string_view> known);
 
+/// "invariant, paper, batch"
+[[nodiscard]] std::string estimator_choices();
+
 }  // namespace trihedron::io

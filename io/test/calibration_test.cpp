@@ -1,5 +1,6 @@
 #include "trihedron/io/calibration.hpp"
 
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <rapidcheck/gtest.h>
 
@@ -32,7 +33,7 @@ TEST(CalibrationJson, ComesBackFromAFileWhole) {
   EXPECT_EQ(back.t, calibration.t);
   ASSERT_EQ(back.gyros.size(), 2U);
   for (std::size_t i = 0; i < 2; ++i) {
-    EXPECT_EQ(back.gyros[i].drift_model, "esg7");
+    EXPECT_EQ(back.gyros[i].drift_model, kEsg7);
     EXPECT_EQ(back.gyros[i].drift_rad_s, calibration.gyros[i].drift_rad_s);
     EXPECT_EQ(back.gyros[i].alignment_rotation_vector_rad, calibration.gyros[i].alignment_rotation_vector_rad);
     EXPECT_EQ(back.gyros[i].readout_bias, calibration.gyros[i].readout_bias);
@@ -40,8 +41,9 @@ TEST(CalibrationJson, ComesBackFromAFileWhole) {
   }
   ASSERT_EQ(back.further.size(), 2U);
   for (const FurtherEstimate& estimate : back.further) {
-    const FurtherEstimate& written = calibration.further[estimate.name == "clock_offset_s" ? 0 : 1];
-    EXPECT_EQ(estimate.name, written.name);
+    const FurtherEstimate& written =
+        calibration.further[estimate.parameter.is_further(FurtherState::kClockOffset) ? 0 : 1];
+    EXPECT_EQ(estimate.parameter, written.parameter);
     EXPECT_EQ(estimate.value, written.value);
     EXPECT_EQ(estimate.sigma, written.sigma);
   }
@@ -55,28 +57,47 @@ TEST(CalibrationJson, ComesBackFromAFileWhole) {
   EXPECT_FALSE(back.verdict.trustworthy);
   ASSERT_EQ(back.verdict.findings.size(), 2U);
   const Finding& finding = back.verdict.findings[0];
-  EXPECT_EQ(finding.code, "nis-out-of-bounds");
+  EXPECT_EQ(finding.code, FindingCode::kNisOutOfBounds);
   EXPECT_EQ(finding.text, "The innovations are \"too large\".");
   EXPECT_EQ(finding.evidence, "4.7 instead of 4");
   EXPECT_EQ(finding.cure, "add harmonics");
   EXPECT_EQ(finding.severity, Finding::Severity::kDoNotUse);
   EXPECT_EQ(back.verdict.findings[1].severity, Finding::Severity::kNote);
-  EXPECT_EQ(back.statistics, calibration.statistics);
+  EXPECT_EQ(named_values(back.statistics), named_values(calibration.statistics));
 }
 
 TEST(CalibrationJson, MayHaveItsCoefficientsInAnyOrder) {
-  Calibration calibration = sample_calibration();
-  GyroCalibration& gyro = calibration.gyros[0];
-  gyro.drift_model = Esg20::kModelName;
-  gyro.drift_rad_s.clear();
-  for (const char* name : Esg20::kNames) {
-    gyro.drift_rad_s.emplace_back(name, static_cast<double>(gyro.drift_rad_s.size()));
+  const Calibration calibration = sample_calibration();
+  const auto& in_order = calibration.gyros[0].drift_rad_s;
+  const std::string text = format_calibration(calibration);
+  const std::string first = fmt::format("\"k0\":{},\"mu12\":{}", in_order[0], in_order[1]);
+  const std::string turned = fmt::format("\"mu12\":{},\"k0\":{}", in_order[1], in_order[0]);
+  EXPECT_EQ(parse_calibration(replaced(text, first, turned), "c.json").gyros[0].drift_rad_s, in_order);
+}
+
+TEST(CalibrationJson, KnowsTheCoefficientsOfEachDriftModel) {
+  for (const DriftModelId& model : {kEsg7, kEsg20, vsh(1), kLargestDriftModel}) {
+    Calibration calibration = sample_calibration();
+    GyroCalibration& gyro = calibration.gyros[0];
+    gyro.drift_model = model;
+    gyro.drift_rad_s.clear();
+    for (int i = 0; i < model.size(); ++i) {
+      gyro.drift_rad_s.push_back(1e-6 * (i + 1));
+    }
+    const GyroCalibration back = parse_calibration(format_calibration(calibration), "c.json").gyros[0];
+    EXPECT_EQ(back.drift_model, model);
+    EXPECT_EQ(back.drift_rad_s, gyro.drift_rad_s);
+    gyro.drift_rad_s.pop_back();
+    EXPECT_THAT(refusal_of(format_calibration(calibration)),
+                HasSubstr(fmt::format("lacks key \"{}\"", coefficient_names(model).back())));
   }
-  const auto in_order = gyro.drift_rad_s;
-  std::sort(gyro.drift_rad_s.begin(), gyro.drift_rad_s.end());
-  EXPECT_EQ(parse_calibration(format_calibration(calibration), "c.json").gyros[0].drift_rad_s, in_order);
-  gyro.drift_rad_s.pop_back();
-  EXPECT_THAT(refusal_of(format_calibration(calibration)), HasSubstr("lacks key \"nu31\""));
+}
+
+TEST(CalibrationJson, RefusesDriftModelsAndEstimatorsThatThereAreNot) {
+  EXPECT_THAT(refusal_of(replaced(sample_text(), "\"esg7\"", "\"vsh:9\"")),
+              HasSubstr("gyros[0].drift_model is \"vsh:9\", no drift model; give esg7, esg20, or vsh:1"));
+  EXPECT_THAT(refusal_of(replaced(sample_text(), "\"invariant\"", "\"magic\"")),
+              HasSubstr("estimator is \"magic\", no estimator; give one of: invariant, paper, batch"));
 }
 
 TEST(CalibrationJson, MayBeWithoutNoise) {
@@ -103,16 +124,16 @@ RC_GTEST_PROP(CalibrationJson, NumbersComeBackBitForBit, (std::uint64_t bits)) {
   const auto value = std::bit_cast<double>(bits);
   RC_PRE(std::isfinite(value));
   Calibration calibration = sample_calibration();
-  calibration.gyros[0].drift_rad_s[2].second = value;
+  calibration.gyros[0].drift_rad_s[2] = value;
   const Calibration back = parse_calibration(format_calibration(calibration), "c.json");
-  RC_ASSERT(std::bit_cast<std::uint64_t>(back.gyros[0].drift_rad_s[2].second) == bits);
+  RC_ASSERT(std::bit_cast<std::uint64_t>(back.gyros[0].drift_rad_s[2]) == bits);
 }
 
 TEST(CalibrationJson, StatisticWithoutAValueBecomesNullAndNan) {
   Calibration calibration = sample_calibration();
-  calibration.statistics = {{"nees", std::nan("")}};
-  EXPECT_THAT(format_calibration(calibration), HasSubstr("\"nees\":null"));
-  EXPECT_TRUE(std::isnan(parse_calibration(format_calibration(calibration), "c.json").statistics.at("nees")));
+  calibration.statistics.nis_mean = std::nan("");
+  EXPECT_THAT(format_calibration(calibration), HasSubstr("\"nis_mean\":null"));
+  EXPECT_TRUE(std::isnan(parse_calibration(format_calibration(calibration), "c.json").statistics.nis_mean.value()));
 }
 
 TEST(CalibrationJson, TextThatIsNoUtf8DoesNotCostTheFile) {
@@ -121,10 +142,25 @@ TEST(CalibrationJson, TextThatIsNoUtf8DoesNotCostTheFile) {
   EXPECT_THAT(parse_calibration(format_calibration(calibration), "c.json").verdict.findings[0].text, HasSubstr("bad "));
 }
 
-TEST(CalibrationJson, FurtherKeysAndStatesOfOtherThingsAreFine) {
+TEST(CalibrationJson, WhatThisProgramDoesNotKnowIsLeftOut) {
   std::string text = replaced(sample_text(), "{\"format\"", "{\"made_by\": \"x\", \"format\"");
-  text = replaced(text, "\"gyro2.align_z\"", "\"tracker.clock_offset_s\"");
-  EXPECT_EQ(refusal_of(text), "");
+  text = replaced(text, "\"gyro1.nu12\"", "\"tracker.heat\"");
+  text = replaced(text, "\"clock_offset_s\"", "\"clock_rate\"");
+  text = replaced(text, "\"nis_mean\"", "\"pi_third\"");
+  text = replaced(text, "\"nis-out-of-bounds\"", "\"from-the-future\"");
+  const Calibration whole = sample_calibration();
+  const Calibration left = parse_calibration(text, "c.json");
+  ASSERT_EQ(left.states.size(), 19U);
+  EXPECT_TRUE(std::isnan(sigma_of(left, ParameterId::drift(0, DriftCoefficient::of_eq1(Esg7::kNu12)))));
+  // Of mu31 and alignment x of gyro 1, which stand before and after it.
+  EXPECT_EQ(left.states[3], whole.states[3]);
+  EXPECT_EQ(left.states[4], whole.states[5]);
+  EXPECT_EQ(left.covariance(3, 3), whole.covariance(3, 3));
+  EXPECT_EQ(left.covariance(3, 4), whole.covariance(3, 5));
+  EXPECT_EQ(left.further.size(), 1U);
+  EXPECT_FALSE(left.statistics.nis_mean.has_value());
+  EXPECT_EQ(left.verdict.findings[0].code, FindingCode::kOther);
+  EXPECT_EQ(left.verdict.findings[0].text, whole.verdict.findings[0].text);
 }
 
 TEST(CalibrationJson, RefusesSyntaxErrorWithItsPlace) {

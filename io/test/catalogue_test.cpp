@@ -68,7 +68,7 @@ TEST_F(Catalogue, ReplacesTheSameCalibrationAndKeepsOthers) {
   later.calibration.t += std::chrono::hours(24);
   CatalogueEntry of_two = sample_entry("of two", 2);
   CatalogueEntry other = sample_entry("batch");
-  other.calibration.estimator = "batch";
+  other.calibration.estimator = Estimator::kBatch;
   const std::vector<CatalogueEntry> entries = {later, of_two, other};
   add_to_catalogue(file_, entries);
   add(sample_entry("new name"));

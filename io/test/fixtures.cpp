@@ -126,7 +126,7 @@ Truth clean_truth() {
   for (int gyro = 0; gyro < 2; ++gyro) {
     Truth::Gyro parameters;
     for (int i = 0; i < Esg7::kSize; ++i) {
-      parameters.drift_rad_s.emplace_back(Esg7::kNames.at(static_cast<std::size_t>(i)), 1e-7 / 3 * (i + 1 + 10 * gyro));
+      parameters.drift_rad_s.emplace_back(DriftCoefficient::of_eq1(i), 1e-7 / 3 * (i + 1 + 10 * gyro));
     }
     parameters.unmodelled_rad_s = {{"w20", 1e-9 / 7}, {"w21", -1e-8}};
     parameters.alignment_rotation_vector_rad = {1e-3, -2e-3, 1e-3 / 3};
@@ -145,36 +145,34 @@ Truth clean_truth() {
 
 Calibration sample_calibration() {
   Calibration calibration;
-  calibration.estimator = "invariant";
+  calibration.estimator = Estimator::kInvariant;
   calibration.epoch = Time(std::chrono::sys_days(std::chrono::year(2009) / 5 / 20) -
                            std::chrono::sys_days(std::chrono::year(1958) / 1 / 1));
   calibration.t = calibration.epoch + from_seconds(32400.125);
   for (int gyro = 1; gyro <= 2; ++gyro) {
     GyroCalibration one;
-    one.drift_model = "esg7";
-    for (const char* name : Esg7::kNames) {
-      one.drift_rad_s.emplace_back(name, 1e-6 / (3.0 + static_cast<double>(one.drift_rad_s.size())) * gyro);
-      calibration.states.push_back(fmt::format("gyro{}.{}", gyro, name));
-    }
-    for (const char axis : {'x', 'y', 'z'}) {
-      calibration.states.push_back(fmt::format("gyro{}.align_{}", gyro, axis));
+    for (int i = 0; i < Esg7::kSize; ++i) {
+      one.drift_rad_s.push_back(1e-6 / (3.0 + i) * gyro);
     }
     one.alignment_rotation_vector_rad = {1e-3 / 3, -2e-3 / 7, -0.0};
     one.readout_bias = Eigen::Vector3d(1e-5, -2e-5, 3e-5 * gyro);
     one.momentum_in = Eigen::Vector3d(1, 2, gyro).normalized();
     calibration.gyros.push_back(one);
   }
-  calibration.further = {{"clock_offset_s", 1e-2 / 3, 1e-4 / 7}, {"orbital_sine_x_rad", -1e-5 / 3, 1e-6}};
+  calibration.states = drift_and_alignment(kEsg7, 2);
+  calibration.further = {{ParameterId::further(FurtherState::kClockOffset, 0, 0), 1e-2 / 3, 1e-4 / 7},
+                         {ParameterId::further(FurtherState::kOrbitalError, 0, 0), -1e-5 / 3, 1e-6}};
   calibration.noise = CalibrationNoise{1e-8 / 3, Eigen::Vector3d(1e-5, 2e-5, 1e-4) / 7, 1e-7 / 3, 1200};
   const Eigen::Index n = 20;
   calibration.covariance = Eigen::MatrixXd::Identity(n, n) * (1e-12 / 3);
   calibration.covariance(3, 4) = calibration.covariance(4, 3) = 1e-13 / 7;
   calibration.verdict.trustworthy = false;
   calibration.verdict.findings = {
-      {"nis-out-of-bounds", "The innovations are \"too large\".", "4.7 instead of 4", "add harmonics",
+      {FindingCode::kNisOutOfBounds, "The innovations are \"too large\".", "4.7 instead of 4", "add harmonics",
        Finding::Severity::kDoNotUse},
-      {"null-direction", "One direction is not determined.", "", "slew", Finding::Severity::kNote}};
-  calibration.statistics = {{"nis_mean", 4.7}, {"fixes", 10800}, {"pi_third", M_PI / 3}};
+      {FindingCode::kNotDetermined, "One direction is not determined.", "", "slew", Finding::Severity::kNote}};
+  calibration.statistics.nis_mean = M_PI / 3;
+  calibration.statistics.fixes = 10800;
   return calibration;
 }
 

@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "fixtures.hpp"
+#include "trihedron/core/drift.hpp"
 #include "trihedron/io/pass.hpp"
 
 namespace trihedron::io {
@@ -181,8 +182,8 @@ TEST_F(PassCsv, WrittenPassIsReadBackToTheLastDecimal) {
   pass.settings.spacecraft = "Odd \"name\" \\ in\nTOML";
   pass.settings.start_up = "the \"third\"";
   GyroPrior& prior = pass.settings.gyros[1];
-  prior.drift_rad_s = {{"k0", 1e-6 / 3}, {"nu31", -2e-7}};
-  prior.drift_sigma_rad_s = {{"k0", 1e-8}};
+  prior.drift_rad_s = {{DriftCoefficient::of_eq1(Esg7::kK0), 1e-6 / 3}, {DriftCoefficient::of_eq1(Esg7::kNu31), -2e-7}};
+  prior.drift_sigma_rad_s = {{DriftCoefficient::of_eq1(Esg7::kK0), 1e-8}};
   prior.alignment_rotation_vector_rad = {1e-3, -2e-3 / 3, 0};
   prior.alignment_sigma_rad = {1e-4, 2e-4, 3e-4};
   pass.settings.prior = sample_calibration();

@@ -2,6 +2,7 @@
 #include <gmock/gmock.h>
 
 #include "fixtures.hpp"
+#include "trihedron/core/drift.hpp"
 #include "trihedron/io/calibration.hpp"
 #include "trihedron/io/pass.hpp"
 
@@ -51,8 +52,9 @@ drift_prior_sigma_rad_s = 5e-8
 alignment_prior_sigma_rad = 1e-5
 )");
   const GyroPrior& first = settings.gyros[0];
-  EXPECT_EQ(first.drift_rad_s, (std::map<std::string, double>{{"k0", 1e-6}, {"nu31", -2e-7}}));
-  EXPECT_EQ(first.drift_sigma_rad_s, (std::map<std::string, double>{{"k0", 1e-8}}));
+  EXPECT_EQ(first.drift_rad_s, (std::map<DriftCoefficient, double>{{DriftCoefficient::of_eq1(Esg7::kK0), 1e-6},
+                                                                   {DriftCoefficient::of_eq1(Esg7::kNu31), -2e-7}}));
+  EXPECT_EQ(first.drift_sigma_rad_s, (std::map<DriftCoefficient, double>{{DriftCoefficient::of_eq1(Esg7::kK0), 1e-8}}));
   EXPECT_EQ(first.drift_common_sigma_rad_s, 2e-6);
   EXPECT_EQ(first.alignment_rotation_vector_rad, Eigen::Vector3d(1e-3, 0, -1e-3));
   EXPECT_EQ(first.alignment_sigma_rad, Eigen::Vector3d(1e-4, 2e-4, 3e-4));

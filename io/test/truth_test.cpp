@@ -1,6 +1,7 @@
 #include <gmock/gmock.h>
 
 #include "fixtures.hpp"
+#include "trihedron/core/drift.hpp"
 #include "trihedron/io/pass.hpp"
 
 namespace trihedron::io {
@@ -32,7 +33,7 @@ TEST_F(TruthFiles, AreRead) {
   const auto truth = read_truth(directory_.path());
   ASSERT_TRUE(truth.has_value());
   ASSERT_EQ(truth->gyros.size(), 2U);
-  EXPECT_EQ(truth->gyros[0].drift_rad_s[4], (std::pair<std::string, double>("nu12", 5e-6)));
+  EXPECT_EQ(truth->gyros[0].drift_rad_s[4], (std::pair(DriftCoefficient::of_eq1(Esg7::kNu12), 5e-6)));
   EXPECT_EQ(truth->gyros[0].alignment_rotation_vector_rad, Eigen::Vector3d(1e-3, 2e-3, 3e-3));
   EXPECT_EQ(truth->gyros[0].unmodelled_rad_s.size(), 1U);
   EXPECT_EQ(truth->t[1] - truth->t[0], std::chrono::seconds(3));

@@ -9,7 +9,8 @@
 #include <numbers>
 
 #include "design_flight.hpp"
-#include "trihedron/ground/on_all_cores.hpp"
+#include "trihedron/ground/model/setup_error.hpp"
+#include "trihedron/ground/tasks/on_all_cores.hpp"
 #include "trihedron/sim/attitude.hpp"
 #include "trihedron/sim/simulate.hpp"
 
@@ -59,7 +60,7 @@ Slew slew_to(double begin_s, const Eigen::Vector3d& axis_c, double angle_rad) {
 class Search {
  public:
   Search(const Scenario& scenario, const ground::Observability& steady, const SlewLimits& limits,
-         const ground::Progress& progress)
+         const Progress& progress)
       : flight_(scenario, steady.options),
         metric_(steady.attitude_metric),
         attitude_(scenario.attitude),
@@ -168,7 +169,7 @@ class Search {
   const AttitudeScenario& attitude_;
   double duration_s_;
   const SlewLimits& limits_;
-  const ground::Progress& progress_;
+  const Progress& progress_;
   std::size_t done_ = 0;
 };
 
@@ -197,7 +198,7 @@ std::vector<ground::Combination> Advice::formerly_weak() const {
 }
 
 Advice advise(const Scenario& scenario, const CalibrationOptions& options, const SlewLimits& limits,
-              const ground::Mission& mission, const ground::Progress& progress) {
+              const ground::Mission& mission, const Progress& progress) {
   check(scenario, limits);
   Advice advice{scenario, {}, {}};
   AttitudeScenario& attitude = advice.scenario.attitude;

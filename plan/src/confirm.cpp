@@ -5,8 +5,9 @@
 #include <mutex>
 #include <utility>
 
-#include "trihedron/ground/evaluate.hpp"
-#include "trihedron/ground/on_all_cores.hpp"
+#include "trihedron/ground/calibrate/calibrate.hpp"
+#include "trihedron/ground/evaluate/evaluate.hpp"
+#include "trihedron/ground/tasks/on_all_cores.hpp"
 #include "trihedron/sim/random.hpp"
 #include "trihedron/sim/simulate.hpp"
 
@@ -46,7 +47,7 @@ Outcome fly(const Scenario& scenario, const CalibrationOptions& options) {
 }  // namespace
 
 Confirmation confirm(const Scenario& scenario, const std::vector<ground::Combination>& combinations,
-                     const ground::Observability& predicted, int runs, const ground::Progress& progress) {
+                     const ground::Observability& predicted, int runs, const Progress& progress) {
   CalibrationOptions options = predicted.options;
   options.estimator = ground::kBatch;
   std::mutex one_at_a_time;

@@ -4,7 +4,7 @@
 
 #include "trihedron/core/directions_fit.hpp"
 #include "trihedron/core/invariant_estimator.hpp"
-#include "trihedron/ground/observe.hpp"
+#include "trihedron/ground/observe/observe.hpp"
 #include "trihedron/sim/simulate.hpp"
 
 namespace trihedron::plan {

@@ -11,6 +11,7 @@
 
 #include "design_flight.hpp"
 #include "flights.hpp"
+#include "trihedron/ground/model/setup_error.hpp"
 #include "trihedron/sim/attitude.hpp"
 #include "trihedron/sim/random.hpp"
 #include "trihedron/sim/simulate.hpp"

@@ -12,6 +12,7 @@
 #include "innovations.hpp"
 #include "trihedron/core/outlier_gate.hpp"
 #include "trihedron/core/telemetry.hpp"
+#include "trihedron/records/run.hpp"
 #include "units.hpp"
 
 namespace trihedron::report {
@@ -65,11 +66,11 @@ class Figures {
 
   [[nodiscard]] json parameters() const {
     json figures = json::object();
-    const ground::ParameterHistory& history = run_.parameters;
+    const ParameterHistory& history = run_.parameters;
     for (std::size_t column = 0; column < parameters_.size() && !history.t.empty(); ++column) {
       const Parameter& parameter = parameters_[column];
       const double unit = parameter.is_alignment ? kArcminute_rad : kMicroradian;
-      Series series(2, fix_step_min_ + to_minutes(ground::ParameterHistory::kStep));
+      Series series(2, fix_step_min_ + to_minutes(ParameterHistory::kStep));
       for (std::size_t row = 0; row < history.t.size(); ++row) {
         series.add(minutes(history.t[row]), {history.value[row][column] / unit, history.sigma[row][column] / unit});
       }
@@ -92,7 +93,7 @@ class Figures {
 
   [[nodiscard]] json corrections() const {
     json times = json::array();
-    for (const ground::FixRecord& fix : run_.fixes) {
+    for (const FixRecord& fix : run_.fixes) {
       if (fix.corrected_navigator) {
         times.push_back(rounded(minutes(fix.t), 6));
       }
@@ -144,7 +145,7 @@ class Figures {
     for (std::size_t i = 0; i < innovations_of(run_); ++i) {
       Series used(2, fix_step_min_);
       Series rejected(1, to_minutes(input_.pass.settings.duration));
-      for (const ground::FixRecord& fix : run_.fixes) {
+      for (const FixRecord& fix : run_.fixes) {
         if (fix.status == FixStatus::kUsed) {
           used.add(minutes(fix.t), {fix.innovation[i] / kArcsecond_rad, fix.innovation_sigma[i] / kArcsecond_rad});
         } else if (fix.status == FixStatus::kRejectedByGate) {
@@ -196,7 +197,7 @@ class Figures {
     std::vector<double> t;
     std::vector<double> nis;
     json reopened = json::array();
-    for (const ground::FixRecord& fix : run_.fixes) {
+    for (const FixRecord& fix : run_.fixes) {
       if (fix.status == FixStatus::kUsed) {
         used.add(minutes(fix.t), {fix.nis});
         t.push_back(minutes(fix.t));
@@ -239,7 +240,7 @@ class Figures {
 
   [[nodiscard]] json drift_models() const {
     json models = json::array();
-    for (const ground::DriftModelForecast& model : run_.drift_models) {
+    for (const DriftModelForecast& model : run_.drift_models) {
       models.push_back({{"name", model.drift_model},
                         {"coefficients", model.coefficients},
                         {"gain", std::round(model.log_likelihood * 10) / 10},
@@ -316,7 +317,7 @@ class Figures {
       ++gyro[good ? 0 : 1][bin_of(input_.pass.gyro.t[i])];
     }
     std::array<Counts, 3> fixes{none, none, none};  // used, rejected by the gate, rejected for another reason
-    for (const ground::FixRecord& fix : run_.fixes) {
+    for (const FixRecord& fix : run_.fixes) {
       const bool by_gate = fix.status == FixStatus::kRejectedByGate;
       ++fixes[fix.used() ? 0 : by_gate ? 1 : 2][bin_of(fix.t)];
     }
@@ -337,7 +338,7 @@ class Figures {
   }
 
   const ReportInput& input_;
-  const ground::CalibrationRun& run_;
+  const CalibrationRun& run_;
   const std::vector<Parameter>& parameters_;
   double fix_step_min_;
 };

@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "trihedron/core/frames.hpp"
-#include "trihedron/ground/convergence.hpp"
+#include "trihedron/ground/evaluate/convergence.hpp"
 #include "units.hpp"
 
 namespace trihedron::report {

@@ -11,6 +11,7 @@
 
 #include "innovations.hpp"
 #include "trihedron/core/outlier_gate.hpp"
+#include "trihedron/records/run.hpp"
 #include "units.hpp"
 #include "wording.hpp"
 
@@ -331,7 +332,7 @@ json states_decided(const ReportInput& input) {
                                                             {"coefficient_change", "Change of the coefficients"},
                                                             {"wandering_drift", "Drift that wanders"}};
   json sentences = json::array();
-  for (const ground::Evidence& evidence : input.run.evidence) {
+  for (const Evidence& evidence : input.run.evidence) {
     const auto name = kNames.find(evidence.states);
     sentences.push_back(fmt::format("{}: {} ({:+.1f}).", name == kNames.end() ? evidence.states : name->second,
                                     evidence.accepted ? "estimated" : "taken as zero", evidence.log_bayes_factor));
@@ -339,9 +340,9 @@ json states_decided(const ReportInput& input) {
   return sentences;
 }
 
-json drift_model_rows(const ground::CalibrationRun& run) {
+json drift_model_rows(const CalibrationRun& run) {
   json rows = json::array();
-  for (const ground::DriftModelForecast& model : run.drift_models) {
+  for (const DriftModelForecast& model : run.drift_models) {
     rows.push_back({{"name", model.drift_model},
                     {"used", model.drift_model == run.calibration.gyros[0].drift_model},
                     {"coefficients", model.coefficients},

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <set>
 
+#include "trihedron/records/run.hpp"
 #include "units.hpp"
 #include "wording.hpp"
 
@@ -194,7 +195,7 @@ json extension_number(const ReportInput& input) {
 json nis_number(const ReportInput& input) {
   double sum = 0;
   double count = 0;
-  for (const ground::FixRecord& fix : input.run.fixes) {
+  for (const FixRecord& fix : input.run.fixes) {
     if (fix.status == FixStatus::kUsed) {
       sum += fix.nis;
       ++count;

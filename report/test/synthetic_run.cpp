@@ -7,6 +7,7 @@
 #include <numbers>
 #include <random>
 
+#include "trihedron/records/run.hpp"
 #include "units.hpp"
 
 namespace trihedron::report::test {
@@ -123,7 +124,7 @@ class Generator {
   }
 
   void make_parameters() {
-    ground::ParameterHistory& history = out_.run.parameters;
+    ParameterHistory& history = out_.run.parameters;
     constexpr std::size_t kStates = kGyros * kPerGyro;
     std::array<double, kStates> wander{};
     for (const Time t : out_.pass.star_tracker.t) {
@@ -154,7 +155,7 @@ class Generator {
   void make_fixes() {
     double corrected_s = -1e9;
     for (const Time t : out_.pass.star_tracker.t) {
-      ground::FixRecord fix;
+      FixRecord fix;
       fix.t = t;
       const bool first = out_.run.fixes.empty();
       const bool outlier = !first && options_.troubled && uniform() < 0.01;
@@ -182,7 +183,7 @@ class Generator {
     evaluation.reference = "the simulated truth";
     evaluation.limit_rad = 5 * kArcminute_rad;
     double corrected_s = 0;
-    for (const ground::FixRecord& fix : out_.run.fixes) {
+    for (const FixRecord& fix : out_.run.fixes) {
       const double t_s = seconds(fix.t);
       corrected_s = fix.corrected_navigator ? t_s : corrected_s;
       const double age_s = t_s - corrected_s;
@@ -229,7 +230,7 @@ class Generator {
   }
 
   void make_angle() {
-    for (const ground::FixRecord& fix : out_.run.fixes) {
+    for (const FixRecord& fix : out_.run.fixes) {
       const double middle = 4e-6 * std::exp(-seconds(fix.t) / 2500) * std::sin(kRate_rad_s * seconds(fix.t));
       out_.run.angle_t.push_back(fix.t);
       out_.run.angle_residual_min.push_back(middle - 1.4e-5 * (1.5 + 0.3 * normal()));

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "trihedron/records/catalogue.hpp"
+#include "trihedron/records/run.hpp"
 #include "trihedron/report/report.hpp"
 
 namespace trihedron::report::test {
@@ -21,7 +22,7 @@ struct SyntheticOptions {
 struct SyntheticRun {
   Pass pass;
   Truth truth;
-  ground::CalibrationRun run;
+  CalibrationRun run;
   Evaluation evaluation;
 
   /// With truth and evaluation.

@@ -148,7 +148,7 @@ void Gyro::advance(double t_s, double step_s, const Rot<In, C>& middle, const Ro
 Truth::Gyro Gyro::truth() const {
   Truth::Gyro truth;
   for (int i = 0; i < Esg7::kSize; ++i) {
-    truth.drift_rad_s.emplace_back(Esg7::kNames[static_cast<std::size_t>(i)], drift_.kappa_rad_s()(i));
+    truth.drift_rad_s.emplace_back(DriftCoefficient::of_eq1(i), drift_.kappa_rad_s()(i));
   }
   for (const DriftHarmonic& member : drift_.outside().members()) {
     truth.unmodelled_rad_s.emplace_back(name(member), member.amplitude_rad_s);

@@ -7,6 +7,7 @@
 #include <thread>
 
 #include "statistics.hpp"
+#include "trihedron/core/drift.hpp"
 #include "trihedron/core/frames.hpp"
 
 namespace trihedron::sim {
@@ -58,8 +59,8 @@ TEST(Simulate, DefaultIsThePapersExperiment) {
     EXPECT_NEAR(gyro.alignment_rotation_vector_rad.norm(), 30 * kArcminute, 1e-12);
     EXPECT_EQ(gyro.unmodelled_rad_s.size(), 12U);
     ASSERT_EQ(gyro.drift_rad_s.size(), 7U);
-    EXPECT_EQ(gyro.drift_rad_s[0].first, "k0");
-    EXPECT_EQ(gyro.drift_rad_s[6].first, "nu31");
+    EXPECT_EQ(gyro.drift_rad_s[0].first, DriftCoefficient::of_eq1(Esg7::kK0));
+    EXPECT_EQ(gyro.drift_rad_s[6].first, DriftCoefficient::of_eq1(Esg7::kNu31));
   }
 }
 

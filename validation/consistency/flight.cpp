@@ -11,8 +11,8 @@
 #include "trihedron/core/cycles.hpp"
 #include "trihedron/core/invariant_estimator.hpp"
 #include "trihedron/core/paper_estimator.hpp"
-#include "trihedron/ground/calibrate.hpp"
-#include "trihedron/ground/replay.hpp"
+#include "trihedron/ground/calibrate/calibrate.hpp"
+#include "trihedron/ground/onboard/replay.hpp"
 #include "trihedron/sim/simulate.hpp"
 
 namespace trihedron::consistency {

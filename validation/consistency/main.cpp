@@ -16,7 +16,7 @@
 #include "consistency/flight.hpp"
 #include "consistency/grid.hpp"
 #include "consistency/results.hpp"
-#include "trihedron/ground/on_all_cores.hpp"
+#include "trihedron/ground/tasks/on_all_cores.hpp"
 
 namespace {
 
@@ -90,7 +90,7 @@ void fly_all(const std::vector<Task>& tasks, unsigned threads, Results& results)
     fmt::print(stderr, "\r{} of {} flights", ++done, tasks.size());
     return i;
   };
-  (void)ground::on_all_cores(tasks.size(), work, threads);
+  (void)trihedron::ground::on_all_cores(tasks.size(), work, threads);
 }
 
 std::string measured(const Options& options) {

@@ -4,8 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "trihedron/ground/agreement.hpp"
-#include "trihedron/ground/observe.hpp"
+#include "trihedron/ground/judge/agreement.hpp"
+#include "trihedron/ground/observe/observe.hpp"
 
 namespace trihedron::consistency {
 namespace {

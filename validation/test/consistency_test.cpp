@@ -20,7 +20,7 @@
 #include "consistency/grid.hpp"
 #include "consistency/results.hpp"
 #include "consistency/statistics.hpp"
-#include "trihedron/ground/calibrate.hpp"
+#include "trihedron/ground/calibrate/calibrate.hpp"
 #include "trihedron/sim/simulate.hpp"
 
 namespace trihedron::consistency {

@@ -12,8 +12,8 @@
 #include <vector>
 
 #include "consistency/statistics.hpp"
-#include "trihedron/ground/agreement.hpp"
-#include "trihedron/ground/calibrate.hpp"
+#include "trihedron/ground/calibrate/calibrate.hpp"
+#include "trihedron/ground/judge/agreement.hpp"
 #include "trihedron/io/pass.hpp"
 
 namespace trihedron::consistency {

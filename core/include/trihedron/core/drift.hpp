@@ -83,18 +83,6 @@ struct Esg7 {
   }
 };
 
-/// Which potential of ω = −∇W + h × ∇D a member belongs to, or that it is one of eq. (1).
-enum class DriftPotential : std::uint8_t { kEq1, kW, kD, kCubicD };
-
-/// One member of the drift family: the coefficient of eq. (1) of that number; the real spherical harmonic of that
-/// degree and order in W or D, orthonormal over the sphere; or Σh⁴/4 in D, of which eq. (1) has W alone (k0).
-struct DriftMember {
-  DriftPotential potential = DriftPotential::kEq1;
-  std::int8_t degree = 0;
-  std::int8_t order = 0;   ///< −degree … degree
-  std::int8_t number = 0;  ///< of eq. (1): as in Esg7::Index
-};
-
 /// Drift of one gyro as a table of columns: ω_b = B(h) κ, κ the coefficients of the members of the model; then, where
 /// the layout has them, the drift that wanders, about the case axes, and the change of the coefficients of eq. (1).
 class DriftModel {
@@ -104,10 +92,11 @@ class DriftModel {
   DriftModel() : DriftModel(kEsg7, {}) {}
   DriftModel(DriftModelId id, const FurtherStates& further);
 
-  /// Members of the model, columns of all.
+  /// The coefficients of the model; with all that follows them.
   [[nodiscard]] int size() const { return size_; }
   [[nodiscard]] int columns() const { return size_ + (wandering_ ? 3 : 0) + (change_ ? Esg7::kSize : 0); }
-  [[nodiscard]] const DriftMember& member(int i) const { return members_[static_cast<std::size_t>(i)]; }
+  /// Which member of the family column i is; i < size().
+  [[nodiscard]] const DriftCoefficient& member(int i) const { return members_[static_cast<std::size_t>(i)]; }
 
   /// The columns at a direction h in case axes, unit. `part_of_change`: how much of the change there has been. What
   /// points along h moves nothing and is left in.
@@ -117,9 +106,9 @@ class DriftModel {
   [[nodiscard]] Eigen::Vector3d rate(const Eigen::Vector3d& h, double part_of_change, const double* coefficients) const;
 
  private:
-  void add(DriftPotential potential, int degree, int order);
+  void add(DriftCoefficient::Member member, int degree, int order);
 
-  std::array<DriftMember, kMaxMembers> members_{};
+  std::array<DriftCoefficient, kMaxMembers> members_{};
   HarmonicTableOf<DriftModelId::kMaxDegree> harmonics_;
   int size_ = Esg7::kSize;
   bool wandering_ = false;

@@ -1,6 +1,7 @@
 #pragma once
-/// Names a drift model.
+/// Which drift model is meant, and which of its coefficients, as values.
 
+#include <compare>
 #include <cstdint>
 
 namespace trihedron {
@@ -37,5 +38,26 @@ inline constexpr DriftModelId kEsg20{DriftModelId::Family::kEsg20, 0};
 [[nodiscard]] constexpr DriftModelId vsh(int degree) {
   return {DriftModelId::Family::kVsh, static_cast<std::uint8_t>(degree)};
 }
+
+/// The amplitude of one member of the drift family, rad/s.
+struct DriftCoefficient {
+  enum class Member : std::uint8_t {
+    kEq1,    ///< a member of eq. (1); `degree` says which: the index of Esg7
+    kCubeD,  ///< h × ∇D with D = Σh⁴/4, of which eq. (1) has the W as k0
+    kW,      ///< −∇W, W a real spherical harmonic of `degree` and `order`
+    kD,      ///< h × ∇D, likewise
+  };
+  Member member = Member::kEq1;
+  std::int8_t degree = 0;
+  std::int8_t order = 0;
+
+  friend constexpr auto operator<=>(const DriftCoefficient& a, const DriftCoefficient& b) = default;
+
+  [[nodiscard]] constexpr bool is_in_eq1() const { return member == Member::kEq1; }
+  /// By its place in eq. (1), 0 … 6.
+  [[nodiscard]] static constexpr DriftCoefficient of_eq1(int index) {
+    return {Member::kEq1, static_cast<std::int8_t>(index), 0};
+  }
+};
 
 }  // namespace trihedron

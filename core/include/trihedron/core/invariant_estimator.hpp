@@ -3,7 +3,7 @@
 /// measurement can see stays unseen whatever the estimate is.
 
 #include <Eigen/Core>
-#include <chrono>
+#include <array>
 #include <optional>
 
 #include "trihedron/core/drift.hpp"
@@ -141,6 +141,8 @@ class InvariantEstimator {
   void update_to_now(const Eigen::Matrix3d& C_in_c);
   void update(const Compared& rows, double root_weight);
   void begin_stretch();
+  /// Of the readout noise, over that of readings which no other fix of this star tracker shares.
+  [[nodiscard]] double sharing_factor(const StarFix& fix) const;
 
   CalibrationSetup setup_;
   DriftModel drift_;
@@ -151,6 +153,7 @@ class InvariantEstimator {
   Information information_;
   Information prior_;  ///< without anything of the directions
   OutlierGate gate_;
+  std::array<std::optional<Time>, kMaxStarTrackers> used_fix_t_;
   PerGyro<double> second_order_rad_{};  ///< 1-sigma of what the linear model has left out since the start
   double time_since_fix_s_ = 0;
   double extra_variance_rad2_ = 0;

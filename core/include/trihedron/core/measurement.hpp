@@ -157,6 +157,20 @@ void carry_back(const Layout& layout, const Sensitivities& since, Rows& rows) {
   }
 }
 
+/// Adds a gyro's part of errors x, rows as in the layout, to what is believed of its parameters; the momentum and the
+/// drift that wanders are left to the caller.
+template <class Vector, class Gyro>
+void add_parameter_errors(const Layout& layout, int gyro, const Vector& x, Gyro& its) {
+  its.drift_rad_s.head(layout.drift_size()) += x.segment(layout.drift(gyro), layout.drift_size());
+  if (layout.further.coefficient_change) {
+    its.drift_rad_s.segment(layout.change_column(), Layout::kEq1) += x.segment(layout.change(gyro), Layout::kEq1);
+  }
+  if (layout.further.readout_bias) {
+    its.readout_bias += x.segment(layout.readout_bias(gyro), 3);
+  }
+  its.C_c_b = turned(its.C_c_b, Eigen::Vector3d(x.segment(layout.alignment(gyro), 3)));
+}
+
 /// Covariance of an attitude by `spread`, spread · spreadᵀ of the errors of what is estimated, plus the readout noise
 /// and a random walk of the directions of `walk_variance_rad2` per axis.
 [[nodiscard]] AttitudeSolution with_covariance(const AttitudeByDirections& attitude, const Eigen::Matrix3d& spread_square,

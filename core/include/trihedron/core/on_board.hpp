@@ -5,47 +5,15 @@
 #include <chrono>
 #include <optional>
 
-#include "trihedron/core/fix_report.hpp"
 #include "trihedron/core/intake.hpp"
 #include "trihedron/core/invariant_estimator.hpp"
 #include "trihedron/core/navigator.hpp"
 #include "trihedron/core/paper_estimator.hpp"
 #include "trihedron/core/readings.hpp"
 #include "trihedron/core/schedule.hpp"
-#include "trihedron/core/status.hpp"
+#include "trihedron/core/step_report.hpp"
 
 namespace trihedron {
-
-/// Astro-corrections of the navigator.
-struct CorrectionPolicy {
-  static constexpr Duration kEveryFix = Duration::zero();
-  static constexpr Duration kOnlyFirst = Duration::max();
-  Duration interval = std::chrono::minutes(90);
-  bool take_parameters = true;  ///< false: the parameters of the set-up are held
-  bool navigate = true;         ///< false: the calibration alone, no navigator beside it
-};
-
-/// Complete for every event, whatever was wrong with it.
-struct StepReport {
-  Time t{};
-  SampleStatus sample = SampleStatus::kUsed;
-  PerGyro<GyroState> gyros{};  ///< after this step
-  FixReport fix;               ///< of the fix that was dealt with in this step, if any; its time is its own
-  bool more_due = false;       ///< another fix can be dealt with now: carry_on() does
-  int fixes_dropped = 0;       ///< that waited when the clock was set back: nobody knows their time now
-  bool corrected = false;      ///< the navigator was corrected at that fix
-  /// That fix and what it was compared with, where the estimator looked at it.
-  std::optional<ComparedFix> compared;
-  /// Attitude at that fix, used or rejected as an outlier: of the calibration itself, and of the open-loop navigator.
-  std::optional<AttitudeSolution> calibrated;
-  std::optional<AttitudeSolution> navigated;
-  /// Of the angles between the momenta, where they were looked at in this step because no fix could be used for long:
-  /// the integrity of the gyros without a star tracker, and of use to the calibration. Its time is its own.
-  AngleReport angles;
-  /// z1 of eq. (3), cosθ predicted minus cosθ measured: the integrity of the pair, without a star tracker. Zero before
-  /// the start, and where one of the two cannot be used.
-  double angle_residual = 0;
-};
 
 template <class Estimator>
 class OnBoard {

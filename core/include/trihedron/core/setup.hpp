@@ -26,7 +26,6 @@ struct StarTrackerSetup {
   Eigen::Vector3d noise_rad{1e-4, 1e-4, 1e-4};          ///< 1-sigma about its own axes s
   Eigen::Matrix3d C_c_s = Eigen::Matrix3d::Identity();  ///< as designed; c are the axes of the first
   double alignment_sigma_rad = 1e-2;                    ///< of those beside the first, per axis
-  Duration period{};  ///< of its fixes; 0 where it is not told. Fixes that share gyro samples are counted by it.
 };
 
 struct CalibrationSetup {
@@ -82,9 +81,9 @@ struct CalibrationSetup {
   [[nodiscard]] Duration reach() const;
   /// Samples that are taken together for the attitude now.
   [[nodiscard]] Duration recent() const;
-  /// How many fixes of this star tracker share a gyro sample, at least 1: so much larger is the variance that a sample's
-  /// noise has in each of them, so that all of them together do not count it more than once.
-  [[nodiscard]] double fixes_sharing_a_sample(int head) const;
+  /// How many fixes of a star tracker share a gyro sample, at least 1, when they come so fast: so much larger is the
+  /// variance that a sample's noise has in each of them, so that all of them together do not count it more than once.
+  [[nodiscard]] double fixes_sharing_a_sample(Duration since_the_last_fix) const;
 };
 
 /// Whether these prior means can be used: finite drift coefficients and biases, and alignments that are rotations.

@@ -7,6 +7,7 @@
 namespace trihedron {
 
 enum class SampleStatus : std::uint8_t {
+  kNone,  ///< no sample in this step
   kUsed,
   kRejectedNotDirection,   ///< a reading is not finite or not unit
   kRejectedOutOfOrder,     ///< not later than the sample before it, or alone more than an hour ahead
@@ -16,7 +17,7 @@ enum class SampleStatus : std::uint8_t {
                            ///< that
   kThinned,                ///< good, but sooner after the sample before it than there is room for: not used
 };
-inline constexpr std::size_t kSampleStatuses = 7;
+inline constexpr std::size_t kSampleStatuses = 8;
 
 [[nodiscard]] constexpr bool is_used(SampleStatus status) {
   return status == SampleStatus::kUsed || status == SampleStatus::kUsedAfterClockSetBack;

@@ -6,9 +6,9 @@
 #include <optional>
 #include <vector>
 
-#include "trihedron/ground/calibrate.hpp"
-#include "trihedron/ground/observe.hpp"
+#include "trihedron/ground/observe/observe.hpp"
 #include "trihedron/records/options.hpp"
+#include "trihedron/records/progress.hpp"
 #include "trihedron/records/scenario.hpp"
 
 namespace trihedron::plan {
@@ -35,6 +35,6 @@ struct Advice {
 /// 1995), on the linear information of a flight without noise. Before and after are those of simulated flights. The
 /// scenario must have no slews of its own. Throws ground::SetupError.
 [[nodiscard]] Advice advise(const Scenario& scenario, const CalibrationOptions& options, const SlewLimits& limits,
-                            const ground::Mission& mission = {}, const ground::Progress& progress = {});
+                            const ground::Mission& mission = {}, const Progress& progress = {});
 
 }  // namespace trihedron::plan

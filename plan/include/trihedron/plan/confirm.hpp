@@ -4,8 +4,8 @@
 #include <string>
 #include <vector>
 
-#include "trihedron/ground/calibrate.hpp"
-#include "trihedron/ground/observe.hpp"
+#include "trihedron/ground/observe/observe.hpp"
+#include "trihedron/records/progress.hpp"
 #include "trihedron/records/scenario.hpp"
 
 namespace trihedron::plan {
@@ -27,7 +27,6 @@ struct Confirmation {
 /// Flies the scenario with other seeds, alignments and drift drawn from what is known before, and calibrates each by
 /// estimator batch. `combinations` and `predicted`: of a flight, with options decided. Throws ground::SetupError.
 [[nodiscard]] Confirmation confirm(const Scenario& scenario, const std::vector<ground::Combination>& combinations,
-                                   const ground::Observability& predicted, int runs,
-                                   const ground::Progress& progress = {});
+                                   const ground::Observability& predicted, int runs, const Progress& progress = {});
 
 }  // namespace trihedron::plan

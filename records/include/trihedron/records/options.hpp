@@ -2,11 +2,15 @@
 /// What a user may set for a calibration; the effective values are written beside each result.
 
 #include <Eigen/Core>
+#include <array>
 #include <chrono>
+#include <cstdint>
 #include <optional>
-#include <string>
 
+#include "trihedron/core/drift_model.hpp"
 #include "trihedron/core/time.hpp"
+#include "trihedron/records/estimator.hpp"
+#include "trihedron/records/further_state.hpp"
 
 namespace trihedron {
 
@@ -18,29 +22,33 @@ struct CorrectionOptions {
   bool take_parameters = true;                   ///< false: the parameters known before the pass are held
 };
 
-/// What estimator invariant estimates beside alignment and eq. (1). kAuto: whatever the pass gives evidence of.
+/// What estimators invariant and batch estimate beside alignment and eq. (1). kAuto: whatever the pass gives evidence
+/// of. The alignments of further star trackers are estimated where the pass has such; for them nothing is chosen here.
 struct FurtherStateOptions {
-  enum class Choice { kAuto, kOff, kOn };
-  Choice clock_offset = Choice::kAuto;     ///< of the star trackers
-  Choice orbital_error = Choice::kAuto;    ///< of the first star tracker, at orbital period
-  Choice wandering_drift = Choice::kAuto;  ///< first-order Gauss–Markov, about the case axes of each gyro
-  double wandering_drift_rad_s = 1e-8;     ///< its 1-sigma, where on
+  enum class Choice : std::uint8_t { kAuto, kOff, kOn };
+
+  double wandering_drift_rad_s = 1e-8;  ///< 1-sigma of the wandering drift, where on
   Duration wandering_time = std::chrono::hours(1);
-  Choice readout_bias = Choice::kAuto;  ///< of the direction cosines of each gyro
-  /// Of the coefficients of eq. (1), evenly over the pass. Of estimator batch.
-  Choice coefficient_change = Choice::kAuto;
+
+  [[nodiscard]] constexpr Choice& operator[](FurtherState state) { return choices_[static_cast<std::size_t>(state)]; }
+  [[nodiscard]] constexpr Choice operator[](FurtherState state) const {
+    return choices_[static_cast<std::size_t>(state)];
+  }
+  [[nodiscard]] constexpr bool is_on(FurtherState state) const { return (*this)[state] == Choice::kOn; }
 
   [[nodiscard]] static FurtherStateOptions none() {
     FurtherStateOptions states;
-    states.clock_offset = states.orbital_error = states.wandering_drift = states.readout_bias =
-        states.coefficient_change = Choice::kOff;
+    states.choices_.fill(Choice::kOff);
     return states;
   }
+
+ private:
+  std::array<Choice, kFurtherStateCount> choices_{};
 };
 
 struct CalibrationOptions {
-  std::string estimator = "invariant";
-  std::string drift_model = "auto";  ///< "esg7", "esg20", or the one that the pass gives evidence of
+  Estimator estimator = Estimator::kInvariant;
+  std::optional<DriftModelId> drift_model;  ///< without it the one that the pass gives evidence of
   /// Whether estimator invariant finds the noise from a pass that is long enough, instead of believing what it is told.
   bool find_noise = true;
   /// Process noise of each momentum across itself; where it is found, the least that is taken. The default is small
@@ -48,6 +56,8 @@ struct CalibrationOptions {
   double direction_random_walk_rad_sqrt_s = 3e-9;
   /// In place of the figure of the pass, where one was found.
   std::optional<Eigen::Vector3d> star_tracker_noise_rad;
+  /// Of the error of the star tracker at orbital period, where it is known; without it that of a low orbit.
+  std::optional<double> orbital_rate_rad_s;
   /// A fix with a NIS above this is rejected; χ² of 4 degrees of freedom passes 30 once in 2e5 good fixes. That of a
   /// pair: of more gyros a gate that good fixes pass as often.
   double gate_nis = 30;

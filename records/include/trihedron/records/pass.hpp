@@ -3,10 +3,10 @@
 
 #include <Eigen/Core>
 #include <Eigen/Geometry>
-#include <algorithm>
 #include <map>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "trihedron/core/time.hpp"
@@ -16,9 +16,9 @@ namespace trihedron {
 
 /// What is known of one gyro before the pass: prior means and 1-sigma.
 struct GyroPrior {
-  double readout_noise_rad = 0;                     ///< per direction cosine
-  std::map<std::string, double> drift_rad_s;        ///< by coefficient; missing means 0
-  std::map<std::string, double> drift_sigma_rad_s;  ///< by coefficient; missing means the common sigma
+  double readout_noise_rad = 0;                          ///< per direction cosine
+  std::map<DriftCoefficient, double> drift_rad_s;        ///< missing means 0
+  std::map<DriftCoefficient, double> drift_sigma_rad_s;  ///< missing means the common sigma
   double drift_common_sigma_rad_s = 0;
   Eigen::Vector3d alignment_rotation_vector_rad{0, 0, 0};
   Eigen::Vector3d alignment_sigma_rad{0, 0, 0};
@@ -77,20 +77,13 @@ struct Pass {
 /// What a simulator knows. Never part of a Pass, so that no estimator can read it.
 struct Truth {
   struct Gyro {
-    std::vector<std::pair<std::string, double>> drift_rad_s;       ///< coefficients of eq. (1)
-    std::vector<std::pair<std::string, double>> unmodelled_rad_s;  ///< drift outside eq. (1), by name
+    std::vector<std::pair<DriftCoefficient, double>> drift_rad_s;  ///< of eq. (1)
+    /// Drift outside eq. (1), each by the name that the simulator gave it; those of a DriftCoefficient have its name.
+    std::vector<std::pair<std::string, double>> unmodelled_rad_s;
     Eigen::Vector3d alignment_rotation_vector_rad{0, 0, 0};
 
-    /// Of eq. (1) or outside it, by name; nothing where the simulator did not tell.
-    [[nodiscard]] std::optional<double> drift(const std::string& name) const {
-      for (const auto* list : {&drift_rad_s, &unmodelled_rad_s}) {
-        const auto found = std::ranges::find(*list, name, [](const auto& c) { return c.first; });
-        if (found != list->end()) {
-          return found->second;
-        }
-      }
-      return std::nullopt;
-    }
+    /// Of eq. (1) or outside it; nothing where the simulator did not tell.
+    [[nodiscard]] std::optional<double> drift(const DriftCoefficient& coefficient) const;
   };
   /// Errors of a head that do not change at random; C_c_s as in FurtherStarTracker.
   struct StarTracker {

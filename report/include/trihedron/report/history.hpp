@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "trihedron/ground/history.hpp"
+#include "trihedron/ground/calibrate/history.hpp"
 #include "trihedron/records/catalogue.hpp"
 
 namespace trihedron::report {

@@ -5,10 +5,10 @@
 #include <string>
 #include <vector>
 
-#include "trihedron/ground/calibrate.hpp"
-#include "trihedron/ground/evaluate.hpp"
-#include "trihedron/ground/open_loop.hpp"
+#include "trihedron/ground/evaluate/evaluate.hpp"
+#include "trihedron/ground/evaluate/open_loop.hpp"
 #include "trihedron/records/pass.hpp"
+#include "trihedron/records/run.hpp"
 
 namespace trihedron::report {
 
@@ -24,7 +24,7 @@ struct Evaluation {
 /// Refers to its parts; they must outlive it. Sections whose data are absent or empty are left out of the report.
 struct ReportInput {
   const Pass& pass;
-  const ground::CalibrationRun& run;
+  const CalibrationRun& run;
   const Truth* truth = nullptr;
   std::vector<std::string> telemetry_notes;  ///< what was wrong with the telemetry as read, one sentence each
   std::optional<Evaluation> evaluation;

@@ -1,0 +1,34 @@
+#pragma once
+/// How long the attitude holds without the star tracker: open loops from the astro-corrections of a calibration to the
+/// end of the pass.
+
+#include <optional>
+#include <vector>
+
+#include "trihedron/ground/evaluate/evaluate.hpp"
+#include "trihedron/records/run.hpp"
+
+namespace trihedron::ground {
+
+/// Attitude at those of `epochs` (increasing) from t on where there are gyro readings, by the momenta and parameters
+/// that `gyros` hold at t. No astro-correction after it. Throws SetupError for gyros of an unknown drift model.
+[[nodiscard]] AttitudeHistory fly_open_loop(const Pass& pass, Time t, const std::vector<GyroCalibration>& gyros,
+                                            const std::vector<Time>& epochs);
+
+/// Both open loops from one of the corrections of a calibration to the end of the pass.
+struct OpenLoops {
+  AttitudeErrors known_before;
+  AttitudeErrors calibrated;
+  IntervalPair intervals;
+};
+
+/// From each of the run's corrections, against a reference attitude.
+[[nodiscard]] std::vector<OpenLoops> fly_open_loops(const Pass& pass, const CalibrationRun& run,
+                                                    const std::vector<Time>& reference_t,
+                                                    const std::vector<Eigen::Quaterniond>& reference_q_in_c,
+                                                    double limit_rad);
+
+/// Over the corrections from the second on: at the first nothing is calibrated yet.
+[[nodiscard]] std::optional<Extension> median_extension(const std::vector<OpenLoops>& loops);
+
+}  // namespace trihedron::ground

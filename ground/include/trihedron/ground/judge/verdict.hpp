@@ -1,0 +1,29 @@
+#pragma once
+
+#include "trihedron/records/run.hpp"
+
+namespace trihedron::ground {
+
+/// What a user must know before he uses the result: findings with evidence and cure, and one word, trustworthy or not.
+[[nodiscard]] Verdict judge(const Pass& pass, const CalibrationRun& run);
+/// Whether the parameters in use fit the pass.
+[[nodiscard]] Verdict judge_navigation(const NavigationRun& run);
+
+/// One for each gyro and state: how often, and when first, in minutes from `epoch`.
+[[nodiscard]] std::vector<std::string> texts_of(const std::vector<GyroEvent>& events, Time epoch);
+
+/// How well an attitude history separates an alignment from an initial direction. Where an axis n is fixed in the body
+/// and in space, an alignment error about n looks like an error of the initial direction about n, whatever the number
+/// of fixes.
+struct AlignmentObservability {
+  Eigen::Vector3d weakest_axis_c{0, 0, 0};  ///< unit: the body axis that moved least in space
+  double sigma_rad =
+      0;  ///< of the alignment about that axis from the fixes alone, at best; infinite where it never moved
+};
+/// From the scatter of C_in_c within stretches of ten minutes; what moves more slowly than that is not told from drift.
+/// `tracker_noise_rad`: 1-sigma about c x, y, z; `fix_noise_rad`: of a fix about the best axis.
+[[nodiscard]] AlignmentObservability alignment_observability(const StarTrackerTelemetry& tracker,
+                                                             const Eigen::Vector3d& tracker_noise_rad,
+                                                             double fix_noise_rad);
+
+}  // namespace trihedron::ground

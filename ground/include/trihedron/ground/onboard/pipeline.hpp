@@ -1,0 +1,65 @@
+#pragma once
+/// The on-board step on the ground: events in, one by one, in the order in which they came; reports out.
+
+#include <Eigen/Core>
+#include <memory>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "trihedron/core/layout.hpp"
+#include "trihedron/core/step_report.hpp"
+#include "trihedron/core/telemetry.hpp"
+#include "trihedron/records/calibration.hpp"
+#include "trihedron/records/options.hpp"
+#include "trihedron/records/pass.hpp"
+
+namespace trihedron::ground {
+
+/// Everything that it does is told in its reports; it looks at nothing but the events that it was given.
+class Pipeline {
+ public:
+  /// Of options in which nothing is left to decide. `navigate`: whether there is a navigator beside the calibration.
+  /// Throws SetupError.
+  Pipeline(const PassSettings& settings, const CalibrationOptions& options, bool navigate = true);
+  Pipeline(Pipeline&&) noexcept;
+  Pipeline& operator=(Pipeline&&) noexcept;
+  ~Pipeline();
+
+  /// What was done at this event; valid until the next one. A fix is reported when it is dealt with, which for a good one
+  /// is some samples later.
+  std::span<const StepReport> feed(const GyroSample& sample);
+  std::span<const StepReport> feed(const StarFix& fix);
+  /// After the last event: deals with the fixes that still wait.
+  std::span<const StepReport> finish();
+
+  [[nodiscard]] const PassSettings& settings() const { return settings_; }
+  [[nodiscard]] const CalibrationOptions& options() const { return options_; }
+  [[nodiscard]] const Layout& layout() const;
+
+  /// Whether a fix has started the calibration.
+  [[nodiscard]] bool started() const;
+  /// Values and covariance as of the latest sample; without verdict and statistics. Needs started().
+  [[nodiscard]] Calibration calibration() const;
+  /// The gyros of calibration(), and those of before the pass; momenta as of the latest sample.
+  [[nodiscard]] std::vector<GyroCalibration> gyros() const;
+  [[nodiscard]] std::vector<GyroCalibration> gyros_before() const;
+  /// 1-sigma of each state of calibration(). Needs started().
+  [[nodiscard]] Eigen::VectorXd state_sigmas() const;
+  /// (estimated − prior)ᵀ P⁻¹ (estimated − prior) of κ and δ, P the covariance of the prior.
+  [[nodiscard]] double squared_distance_from_prior() const;
+
+  /// Open-loop attitude at the latest sample; nothing where there is none yet.
+  [[nodiscard]] std::optional<AttitudeSolution> navigation_attitude() const;
+
+ private:
+  struct Program;
+  [[nodiscard]] double part_of_change() const;
+
+  PassSettings settings_;
+  CalibrationOptions options_;
+  std::unique_ptr<Program> program_;
+  std::vector<StepReport> reports_;
+};
+
+}  // namespace trihedron::ground

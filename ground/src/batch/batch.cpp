@@ -1,0 +1,61 @@
+#include "batch/batch.hpp"
+
+#include <cmath>
+#include <stdexcept>
+#include <utility>
+
+#include "trihedron/ground/model/setup_error.hpp"
+
+namespace trihedron::ground {
+namespace {
+
+constexpr int kMostIterations = 12;
+
+SmootherResult smoothed(const PassProblem::Linear& linear) {
+  try {
+    return smooth(linear.prior, linear.prior_y, linear.stages);
+  } catch (const std::invalid_argument&) {
+    throw SetupError("the fixes and samples that can be used do not determine the momenta of all gyros",
+                     "calibrate a part of the pass in which all gyros work, or use estimator invariant with noise = "
+                     "\"told\" and all further states on or off");
+  }
+}
+
+/// Root mean square of the step of the constants, in their sigmas.
+double step_of_constants(const PassLayout& layout, const SmootherResult& found) {
+  const Eigen::VectorXd sigma = found.last_root.bottomRows(layout.constants()).rowwise().norm();
+  const Eigen::VectorXd step = found.x.back().tail(layout.constants()).cwiseQuotient(sigma);
+  return step.norm() / std::sqrt(static_cast<double>(layout.constants()));
+}
+
+}  // namespace
+
+BatchResult most_likely(const PassProblem& problem, PassSolution first, double converged) {
+  BatchResult result;
+  result.solution = std::move(first);
+  while (result.iterations < kMostIterations && !result.converged) {
+    ++result.iterations;
+    result.before = result.solution;
+    result.linear = problem.linearise(result.before);
+    result.errors = smoothed(result.linear);
+    problem.correct(result.errors, result.solution);
+    result.converged = step_of_constants(problem.setup().layout, result.errors) < converged;
+  }
+  return result;
+}
+
+double log_likelihood(const PassProblem& problem, const PassSolution& solution, PassProblem::Linear linear,
+                      const ProcessNoise& noise) {
+  const PassLayout& layout = problem.setup().layout;
+  problem.put_noise(solution, noise, linear);
+  const SmootherResult found = smoothed(linear);
+  // Of the directions at the start nothing is known before; the rest of the prior is triangular. What
+  // gather_constants() has put there is below it.
+  const Eigen::Index directions = 2L * layout.gyros;
+  const Eigen::Index rest = layout.size() - directions;
+  const double log_prior_root =
+      linear.prior.block(directions, directions, rest, rest).diagonal().array().abs().log().sum();
+  return log_prior_root - found.log_root_determinant - (found.residual_square + linear.beside_square) / 2;
+}
+
+}  // namespace trihedron::ground

@@ -1,0 +1,27 @@
+#pragma once
+
+#include "batch/pass_problem.hpp"
+
+namespace trihedron::ground {
+
+/// The most likely course of a pass, and what is known of its errors.
+struct BatchResult {
+  PassSolution solution;
+  PassSolution before;         ///< the last step
+  PassProblem::Linear linear;  ///< there
+  SmootherResult errors;       ///< of that; x is the last step
+  int iterations = 0;
+  bool converged = false;
+};
+
+/// Iterates to the most likely solution from `first`: Gauss–Newton over parameters and momenta together, which with
+/// process noise is the iterated fixed-interval smoother. Converged is when the constants step by less than `converged`
+/// of their sigmas. Throws SetupError where they are not determined.
+[[nodiscard]] BatchResult most_likely(const PassProblem& problem, PassSolution first, double converged = 0.02);
+
+/// ln of the likelihood of the process noise, all states integrated over (Laplace); `linear`: the problem linearised
+/// near the solution. Up to a constant of the pass. Throws SetupError as most_likely().
+[[nodiscard]] double log_likelihood(const PassProblem& problem, const PassSolution& solution,
+                                    PassProblem::Linear linear, const ProcessNoise& noise);
+
+}  // namespace trihedron::ground

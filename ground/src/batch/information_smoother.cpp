@@ -1,0 +1,232 @@
+#include "batch/information_smoother.hpp"
+
+#include <Eigen/LU>
+#include <Eigen/QR>
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+
+namespace trihedron::ground {
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::Upper;
+using Eigen::VectorXd;
+
+double log_determinant(const MatrixXd& triangle) { return triangle.diagonal().array().abs().log().sum(); }
+
+/// Rotates rows so that below the first `columns` of them nothing is left in the first `columns` columns.
+void rotate_up(MatrixXd& rows, Index columns) {
+  const Eigen::HouseholderQR<MatrixXd> qr(rows.leftCols(columns));
+  rows.rightCols(rows.cols() - columns).applyOnTheLeft(qr.householderQ().adjoint());
+  rows.leftCols(columns).setZero();
+  rows.topLeftCorner(columns, columns) = qr.matrixQR().topRows(columns).triangularView<Upper>();
+}
+
+/// Rows about the constants alone, with their right side; now and then made into a triangle.
+class Pile {
+ public:
+  explicit Pile(Index columns) : rows_(MatrixXd::Zero(kMost + columns, columns)) {}
+
+  template <class Rows>
+  void add(const Rows& rows) {
+    if (size_ + rows.rows() > rows_.rows()) {
+      rows_.topRows(rows_.cols()) = triangle();
+      size_ = rows_.cols();
+      if (size_ + rows.rows() > rows_.rows()) {
+        rows_.conservativeResize(size_ + rows.rows(), Eigen::NoChange);
+      }
+    }
+    rows_.middleRows(size_, rows.rows()) = rows;
+    size_ += rows.rows();
+  }
+
+  [[nodiscard]] MatrixXd triangle() const { return triangle_of(rows_.topRows(size_)); }
+
+ private:
+  static constexpr Index kMost = 1000;
+  MatrixXd rows_;
+  Index size_ = 0;
+};
+
+/// The rows that know of d are kept as its triangle; what they leave over knows of c alone, which does not move: it
+/// waits for the end.
+class Forward {
+ public:
+  Forward(const MatrixXd& prior, const VectorXd& prior_y, Index d)
+      : n_(prior.cols()), d_(d), pile_(n_ - d + 1), moving_(prior.rows(), n_ + 1) {
+    moving_ << prior, prior_y;
+  }
+
+  void measure(const SmootherStage& stage) {
+    const Index c = n_ - d_;
+    MatrixXd rows = MatrixXd::Zero(std::max(moving_.rows() + stage.H.rows(), d_), n_ + 1);
+    rows.topRows(moving_.rows()) = moving_;
+    rows.block(moving_.rows(), 0, stage.H.rows(), n_) = stage.H;
+    rows.block(moving_.rows(), n_, stage.H.rows(), 1) = stage.y;
+    rotate_up(rows, d_);
+    pile_.add(rows.bottomRightCorner(rows.rows() - d_, c + 1));
+    moving_ = rows.topRows(d_);
+  }
+
+  /// On to the next stage; gives what is left of w.
+  SmootherResult::NoiseRows move(const SmootherStage& stage) {
+    const Index d = d_;
+    const Index c = n_ - d;
+    // With d = A⁻¹ (d' − B c − m − noise w) put in: columns w, d', c, right side; w has unit rows of its own.
+    const MatrixXd R_d = moving_.leftCols(d) * stage.A_inverse;
+    MatrixXd moved = MatrixXd::Zero(2 * d, d + n_ + 1);
+    moved.topLeftCorner(d, d).setIdentity();
+    moved.block(d, 0, d, d) = -R_d * stage.noise.asDiagonal();
+    moved.block(d, d, d, d) = R_d;
+    moved.block(d, 2 * d, d, c) = moving_.middleCols(d, c) - R_d * stage.B;
+    moved.bottomRightCorner(d, 1) = moving_.rightCols(1) + R_d * stage.m;
+    rotate_up(moved, d);
+    moving_ = moved.bottomRightCorner(d, n_ + 1);
+    return {moved.topLeftCorner(d, d), moved.block(0, d, d, n_), moved.topRightCorner(d, 1)};
+  }
+
+  /// Of (d, c), right side last; the rows of c know of it whatever d is.
+  [[nodiscard]] MatrixXd triangle() const {
+    MatrixXd triangle = MatrixXd::Zero(n_ + 1, n_ + 1);
+    triangle.topRows(d_) = moving_;
+    triangle.bottomRightCorner(n_ - d_ + 1, n_ - d_ + 1) = pile_.triangle();
+    return triangle;
+  }
+
+ private:
+  Index n_;
+  Index d_;
+  Pile pile_;
+  MatrixXd moving_;
+};
+
+}  // namespace
+
+MatrixXd triangle_of(const MatrixXd& rows) {
+  const Index size = rows.cols();
+  MatrixXd triangle = MatrixXd::Zero(size, size);
+  const Index there = std::min(rows.rows(), size);
+  triangle.topRows(there) =
+      Eigen::HouseholderQR<MatrixXd>(rows).matrixQR().topRows(there).template triangularView<Upper>();
+  return triangle;
+}
+
+SmootherResult smooth(const MatrixXd& prior, const VectorXd& prior_y, const std::vector<SmootherStage>& stages) {
+  const Index n = prior.cols();
+  const Index d = stages.front().m.size();
+  const Index c = n - d;
+  SmootherResult result;
+  Forward forward(prior, prior_y, d);
+  for (std::size_t i = 0; i < stages.size(); ++i) {
+    forward.measure(stages[i]);
+    if (i + 1 == stages.size()) {
+      break;
+    }
+    result.steps.push_back(forward.move(stages[i]));
+    // That of (d, c, w): by those of (w, d', c), of which they are a linear function with the determinant of A⁻¹.
+    result.log_root_determinant +=
+        log_determinant(result.steps.back().R) - std::log(std::abs(stages[i].A_inverse.determinant()));
+  }
+  const MatrixXd triangle = forward.triangle();
+  result.residual_square = triangle(n, n) * triangle(n, n);
+  const auto root = triangle.topRows(n);
+  if (!((root.diagonal().array().abs() > 0).all() && root.allFinite())) {
+    throw std::invalid_argument("smoother: a state without any information");
+  }
+  result.log_root_determinant += log_determinant(root);
+  const auto R = root.leftCols(n).triangularView<Upper>();
+  result.last_root = R.solve(MatrixXd::Identity(n, n));
+
+  // Backward.
+  result.x.resize(stages.size());
+  result.x.back() = R.solve(root.col(n));
+  for (std::size_t i = result.steps.size(); i-- > 0;) {
+    const SmootherStage& stage = stages[i];
+    const SmootherResult::NoiseRows& step = result.steps[i];
+    const VectorXd& next = result.x[i + 1];
+    const VectorXd w = step.R.triangularView<Upper>().solve(step.z - step.S * next);
+    result.x[i] = next;
+    result.x[i].head(d) =
+        stage.A_inverse * (next.head(d) - stage.B * next.tail(c) - stage.m - stage.noise.cwiseProduct(w));
+  }
+  return result;
+}
+
+void gather_constants(MatrixXd& prior, VectorXd& prior_y, std::vector<SmootherStage>& stages) {
+  const Index n = prior.cols();
+  const Index d = stages.front().m.size();
+  Pile pile(n - d + 1);
+  for (SmootherStage& stage : stages) {
+    if (stage.H.rows() > d) {
+      MatrixXd rows(stage.H.rows(), n + 1);
+      rows << stage.H, stage.y;
+      rotate_up(rows, d);
+      pile.add(rows.bottomRightCorner(rows.rows() - d, n - d + 1));
+      stage.H = rows.topLeftCorner(d, n);
+      stage.y = rows.topRightCorner(d, 1);
+    }
+  }
+  const MatrixXd constants = pile.triangle();
+  const Index before = prior.rows();
+  prior.conservativeResize(before + constants.rows(), n);
+  prior.bottomRows(constants.rows()) << MatrixXd::Zero(constants.rows(), d), constants.leftCols(n - d);
+  prior_y.conservativeResize(prior.rows());
+  prior_y.tail(constants.rows()) = constants.rightCols(1);
+}
+
+std::vector<MatrixXd> triangles_after(const MatrixXd& prior, const VectorXd& prior_y,
+                                      const std::vector<SmootherStage>& stages, const std::vector<std::size_t>& after) {
+  Forward forward(prior, prior_y, stages.front().m.size());
+  std::vector<MatrixXd> triangles;
+  std::size_t i = 0;
+  for (const std::size_t last : after) {
+    for (; i <= last; ++i) {
+      if (i > 0) {
+        forward.move(stages[i - 1]);
+      }
+      forward.measure(stages[i]);
+    }
+    triangles.push_back(forward.triangle());
+  }
+  return triangles;
+}
+
+std::vector<MatrixXd> information_on_constants(const MatrixXd& prior, const std::vector<SmootherStage>& stages,
+                                               const std::vector<std::size_t>& after) {
+  const Index d = stages.front().m.size();
+  const Index c = prior.cols() - d;
+  std::vector<MatrixXd> roots;
+  for (const MatrixXd& triangle : triangles_after(prior, VectorXd::Zero(prior.rows()), stages, after)) {
+    roots.emplace_back(triangle.block(d, d, c, c));
+  }
+  return roots;
+}
+
+std::vector<MatrixXd> covariance_roots(const SmootherResult& result, const std::vector<SmootherStage>& stages) {
+  const Index n = result.last_root.rows();
+  const Index d = stages.front().m.size();
+  const Index c = n - d;
+  std::vector<MatrixXd> roots(stages.size());
+  roots.back() = result.last_root;
+  for (std::size_t i = result.steps.size(); i-- > 0;) {
+    const SmootherStage& stage = stages[i];
+    const SmootherResult::NoiseRows& step = result.steps[i];
+    const MatrixXd& next = roots[i + 1];
+    // d by the errors of d' and c, the columns of their root, and by those of w, which its rows have on their own. Only
+    // d moves, and only its own columns and those of w have to be put together again.
+    const auto R_w = step.R.triangularView<Upper>();
+    const MatrixXd by_w = stage.A_inverse * stage.noise.asDiagonal();
+    const MatrixXd by_next =
+        stage.A_inverse * (next.topRows(d) - stage.B * next.bottomRows(c)) + by_w * R_w.solve(step.S * next);
+    MatrixXd own(d, 2 * d);
+    own << by_next.leftCols(d), by_w * R_w.solve(MatrixXd::Identity(d, d));
+    roots[i] = next;
+    roots[i].topLeftCorner(d, d) = triangle_of(own.transpose()).transpose();
+    roots[i].topRightCorner(d, c) = by_next.rightCols(c);
+  }
+  return roots;
+}
+
+}  // namespace trihedron::ground

@@ -1,0 +1,467 @@
+#include "batch/pass_problem.hpp"
+
+#include <Eigen/Cholesky>
+#include <Eigen/LU>
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <utility>
+
+#include "trihedron/core/outlier_gate.hpp"
+
+namespace trihedron::ground {
+namespace {
+
+using Eigen::Matrix3d;
+using Eigen::MatrixXd;
+using Eigen::Vector3d;
+using Eigen::VectorXd;
+
+/// 1-sigma of a direction of which nothing is known.
+constexpr double kUnknown_rad = 1;
+
+/// Columns: two unit vectors across h and across each other.
+Eigen::Matrix<double, 3, 2> across(const Vector3d& h) {
+  Eigen::Matrix<double, 3, 2> columns;
+  columns.col(0) = h.unitOrthogonal();
+  columns.col(1) = h.cross(columns.col(0));
+  return columns;
+}
+
+/// The same measurements in no more rows than there are states, and one for what is left over.
+void compress(SmootherStage& stage) {
+  const Eigen::Index states = stage.H.cols();
+  if (stage.H.rows() > states + 1) {
+    MatrixXd rows(stage.H.rows(), states + 1);
+    rows << stage.H, stage.y;
+    const MatrixXd triangle = triangle_of(rows);
+    stage.H = triangle.leftCols(states);
+    stage.y = triangle.col(states);
+  }
+}
+
+/// White rows of fixes, those in a row that are near as one: their mean, by their weights.
+class NearbyFixes {
+ public:
+  explicit NearbyFixes(Duration reach) : reach_(reach) {}
+
+  void add(const ScreenedPass::Fix& fix, const PassProblem::FixRows& rows, double weight) {
+    const bool first = sums_.empty() || fix.fix.t - sums_.back().t >= reach_ || sums_.back().head != fix.fix.head ||
+                       !std::equal(fix.used.begin(), fix.used.end(), sums_.back().used.begin());
+    Sum& sum = first ? sums_.emplace_back() : sums_.back();
+    const double square = weight * weight;
+    square_ += square * rows.y.squaredNorm();
+    if (first) {
+      sum = {fix.fix.t, fix.fix.head, fix.used, square, square * rows.H, square * rows.y};
+      size_ += rows.y.size();
+      return;
+    }
+    sum.weight += square;
+    sum.H += square * rows.H;
+    sum.y += square * rows.y;
+  }
+
+  /// Returns what of the squares is not in the rows: the scatter about the means.
+  [[nodiscard]] double put_into(SmootherStage& stage, Eigen::Index states) const {
+    stage.H.resize(size_, states);
+    stage.y.resize(size_);
+    Eigen::Index row = 0;
+    for (const Sum& sum : sums_) {
+      stage.H.middleRows(row, sum.y.size()) = sum.H / std::sqrt(sum.weight);
+      stage.y.segment(row, sum.y.size()) = sum.y / std::sqrt(sum.weight);
+      row += sum.y.size();
+    }
+    return square_ - stage.y.squaredNorm();
+  }
+
+ private:
+  struct Sum {
+    Time t{};  ///< of the first
+    int head = 0;
+    GyroMask used{};
+    double weight = 0;
+    MatrixXd H;
+    VectorXd y;
+  };
+  Duration reach_;
+  std::vector<Sum> sums_;
+  Eigen::Index size_ = 0;
+  double square_ = 0;
+};
+
+/// Small rotation across `from` that takes it to `to`.
+Vector3d turn(const Vector3d& from, const Vector3d& to) { return from.cross(to); }
+
+}  // namespace
+
+PassProblem::PassProblem(const ScreenedPass& pass, PassSetup setup)
+    : setup_(std::move(setup)),
+      layout_(setup_.layout()),
+      drift_(layout_.drift_model, layout_.further),
+      gyros_(layout_.gyros) {
+  const Time first = pass.fixes.front().fix.t;
+  auto fix = pass.fixes.begin();
+  Time taken = first;
+  const auto add_fixes_until = [&](Time t) {
+    for (; fix != pass.fixes.end() && fix->fix.t <= t; ++fix) {
+      nodes_.push_back({fix->fix.t, fix->h_b, fix->used, &*fix, false});
+      taken = fix->fix.t;
+    }
+  };
+  Time before = first;
+  bool after_gap = false;
+  for (const ScreenedPass::Sample& sample : pass.samples) {
+    if (sample.t <= first) {
+      continue;
+    }
+    add_fixes_until(sample.t - Duration{1});  // on its own time after it
+    after_gap = after_gap || sample.t - before > setup_.on_board.max_interpolation();
+    before = sample.t;
+    const bool fix_follows = fix != pass.fixes.end() && fix->fix.t - sample.t < setup_.sample_step / 2;
+    if (after_gap || (sample.t - taken >= setup_.sample_step && !fix_follows) || &sample == &pass.samples.back()) {
+      nodes_.push_back({sample.t, sample.h_b, sample.used, nullptr, std::exchange(after_gap, false)});
+      taken = sample.t;
+    }
+  }
+  add_fixes_until(Time::max());
+  // The coefficients stand for the end of the pass, and change by so much over it.
+  setup_.on_board.no_change_at = nodes_.back().t;
+  setup_.on_board.change_time_s = to_seconds(nodes_.back().t - nodes_.front().t);
+  for (std::size_t i = 0; i < nodes_.size(); ++i) {
+    if (arcs_.empty() || nodes_[i].after_gap || nodes_[i].t - nodes_[arcs_.back().begin].t >= setup_.arc) {
+      arcs_.push_back({i, i});
+    }
+    arcs_.back().end = i + 1;
+  }
+}
+
+void PassProblem::begin_arc(const PassSolution& solution, std::size_t arc, Moment& moment) const {
+  moment.arc = arc;
+  moment.t = nodes_[arcs_[arc].begin].t;
+  moment.gyros = solution.gyros;
+  moment.since = {};
+  for (int k = 0; k < gyros_; ++k) {
+    Gyro& gyro = moment.gyros[k];
+    gyro.h_in = solution.arcs[arc].h_in[k];
+    if (layout_.further.wandering_drift) {
+      gyro.drift_rad_s.segment<3>(layout_.wandering_column()) = solution.arcs[arc].wandering_rad_s[k];
+    }
+    moment.directions[k] = across(gyro.h_in);
+  }
+}
+
+void PassProblem::step(const Node& from, const Node& to, Moment& moment, double& extra_variance_rad2) const {
+  const double dt_s = to_seconds(to.t - from.t);
+  const double part = setup_.on_board.part_of_change(from.t + (to.t - from.t) / 2);
+  moment.t = to.t;
+  // Gyros that can be used at both ends; where those are too few, at its end.
+  const GyroMask at_both = both(from.used, to.used);
+  const GyroMask used = count(at_both) >= 2 ? at_both : to.used;
+  Directions middle;
+  for (int k = 0; k < gyros_; ++k) {
+    middle[k] = at_both[k] ? (from.h_b[k] + to.h_b[k]).normalized() : used[k] ? to.h_b[k] : Vector3d::UnitX();
+  }
+  // The momenta in the middle of the step: those at its begin would be half a step behind all along.
+  const Directions seen_c = in_c(moment.gyros, gyros_, middle);
+  Directions h_middle = momenta(moment.gyros, gyros_);
+  if (const auto at_begin = optimal_rotation(h_middle, seen_c, used)) {
+    for (int k = 0; k < gyros_; ++k) {
+      const Gyro& gyro = moment.gyros[k];
+      const Vector3d omega_b = drift_.rate(gyro.unbiased(middle[k]), part, gyro.drift_rad_s.data());
+      h_middle[k] = rotated<double>(h_middle[k], at_begin.value().raw() * (gyro.C_c_b * omega_b) * (dt_s / 2));
+    }
+  }
+  const auto attitude = optimal_rotation(h_middle, seen_c, used);
+  if (!attitude) {
+    extra_variance_rad2 += kUnknown_rad * kUnknown_rad;
+    return;
+  }
+  const Matrix3d C_in_c = attitude.value().raw();
+  double largest_rad = 0;
+  for (int k = 0; k < gyros_; ++k) {
+    Gyro& gyro = moment.gyros[k];
+    if (!used[k]) {  // its momentum turns all the same: what it would read at the attitude of the others
+      middle[k] = gyro.C_c_b.transpose() * (C_in_c.transpose() * gyro.h_in) + gyro.readout_bias;
+    }
+    const Vector3d turned = precess(gyro, moment.since[k], drift_, C_in_c, middle[k], part, dt_s);
+    if (to.after_gap) {
+      largest_rad = std::max(largest_rad, missed_by_long_step_rad(turned.norm(), from.h_b[k], to.h_b[k], dt_s));
+    }
+  }
+  extra_variance_rad2 += largest_rad * largest_rad;
+}
+
+template <class Rows>
+MatrixXd PassProblem::by_states_of_arc(const Moment& moment, Rows rows) const {
+  const Layout& on_board = setup_.on_board.layout;
+  carry_back(on_board, moment.since, rows);
+  MatrixXd by_states(rows.rows(), layout_.size());
+  for (int k = 0; k < gyros_; ++k) {
+    by_states.middleCols<2>(layout_.direction(k)) =
+        rows.template middleCols<3>(on_board.direction(k)).lazyProduct(moment.directions[k]);
+  }
+  const int rest = layout_.size() - layout_.direction(gyros_);
+  by_states.rightCols(rest) = rows.middleCols(on_board.direction(gyros_), rest);
+  return by_states;
+}
+
+PassSolution PassProblem::start(const Gyros& gyros) const {
+  PassSolution solution;
+  solution.gyros = gyros;
+  solution.shared.setZero(layout_.shared_size());
+  solution.arcs.resize(arcs_.size());
+  for (PassSolution::Arc& arc : solution.arcs) {
+    for (int k = 0; k < kMaxGyros; ++k) {
+      arc.h_in[k] = Vector3d::UnitX();
+      arc.wandering_rad_s[k].setZero();
+    }
+  }
+  const ScreenedPass::Fix& first = *nodes_.front().fix;
+  const Directions h_c = in_c(solution.gyros, gyros_, first.h_b);
+  for (int k = 0; k < gyros_; ++k) {
+    const Vector3d seen = first.used[k] ? h_c[k] : gyros[k].C_c_b.col(0);  // anywhere
+    solution.arcs[0].h_in[k] = (first.fix.q_in_c.normalized() * seen).normalized();
+  }
+  Moment moment;
+  double unused = 0;
+  for (std::size_t arc = 0; arc < arcs_.size(); ++arc) {
+    if (arc > 0) {
+      solution.arcs[arc].h_in = momenta(moment.gyros, gyros_);
+    }
+    begin_arc(solution, arc, moment);
+    for (std::size_t i = arcs_[arc].begin; i + 1 < nodes_.size() && i < arcs_[arc].end; ++i) {
+      step(nodes_[i], nodes_[i + 1], moment, unused);
+    }
+  }
+  return solution;
+}
+
+void PassProblem::go_along(const PassSolution& solution, const std::function<void(const Moment&)>& visit) const {
+  Moment moment;
+  double unused = 0;
+  for (std::size_t arc = 0; arc < arcs_.size(); ++arc) {
+    begin_arc(solution, arc, moment);
+    for (std::size_t i = arcs_[arc].begin; i < arcs_[arc].end; ++i) {
+      if (i > arcs_[arc].begin) {
+        step(nodes_[i - 1], nodes_[i], moment, unused);
+      }
+      moment.fix = nodes_[i].fix;
+      visit(moment);
+    }
+  }
+}
+
+Result<AttitudeByDirections, DirectionsFault> PassProblem::attitude(const Moment& moment, const Directions& h_b,
+                                                                    const GyroMask& used) const {
+  return optimal_attitude(momenta(moment.gyros, gyros_), in_c(moment.gyros, gyros_, h_b), used);
+}
+
+MatrixXd PassProblem::attitude_by_states(const Moment& moment, const AttitudeByDirections& attitude,
+                                         const Directions& h_b) const {
+  return by_states_of_arc(
+      moment, attitude_by_states_now<kFullCapacity.states>(setup_.on_board.layout, attitude, moment.gyros, h_b));
+}
+
+PassProblem::FixRows PassProblem::compare(const PassSolution& solution, const Moment& moment) const {
+  const ScreenedPass::Fix& fix = *moment.fix;
+  const CalibrationSetup& setup = setup_.on_board;
+  FixRows rows;
+  const auto by_gyros = optimal_rotation(momenta(moment.gyros, gyros_), in_c(moment.gyros, gyros_, fix.h_b), fix.used);
+  if (!by_gyros) {
+    rows.H.setZero(0, layout_.size());
+    return rows;
+  }
+  const FixBySharedStates by_shared = fix_by_shared_states(setup, fix.fix, fix.rate_c);
+  const Rot<In, C> C_fix = corrected(fix.fix, by_shared, solution.shared);
+  // Linearised at the attitude by the gyros, which has no noise of the fix.
+  const FixComparison comparison = trihedron::compare(setup.layout, moment.gyros, C_fix.raw(), by_gyros.value().raw(),
+                                                      fix.h_b, fix.used, by_shared);
+  const auto about_now = rows_about_states_now<kFullCapacity.states>(setup.layout, comparison);
+  rows.y = about_now.col(setup.layout.size());
+  rows.H = by_states_of_arc(moment, about_now);
+  PerGyro<double> noise_rad;
+  const double sharing = std::sqrt(setup.fixes_sharing_a_sample(fix.since_last));
+  for (int k = 0; k < gyros_; ++k) {
+    noise_rad[k] = setup.readout_noise_rad[k] * fix.noise_factor * sharing;
+  }
+  rows.R = noise_of(comparison, fix_noise(setup, fix.fix.head), noise_rad);
+  return rows;
+}
+
+bool PassProblem::is_outlier(const FixRows& rows) const {
+  return rows.y.dot(rows.R.llt().solve(rows.y)) >
+         gate_of_freedom(std::max(static_cast<int>(rows.y.size()), 1), setup_.on_board.gate_nis);
+}
+
+void PassProblem::add_prior(const PassSolution& solution, Linear& linear) const {
+  const CalibrationSetup& setup = setup_.on_board;
+  const int fewer = setup.layout.dynamic() - layout_.dynamic();  // of the states that move
+  VectorXd sigma = VectorXd::Constant(layout_.size(), kUnknown_rad);
+  for (int state = layout_.readout_bias(0); state < layout_.size(); ++state) {
+    sigma(state) = prior_sigma_of_further_state(setup, state + fewer);
+  }
+  VectorXd apart = VectorXd::Zero(layout_.size());  // prior mean − solution
+  for (int k = 0; k < gyros_; ++k) {
+    const Gyro& prior = setup_.prior.gyros[k];
+    const Gyro& gyro = solution.gyros[k];
+    const Gyro::Coefficients drift = prior.drift_rad_s - gyro.drift_rad_s;
+    apart.segment(layout_.drift(k), layout_.drift_size()) = drift.head(layout_.drift_size());
+    apart.segment<3>(layout_.alignment(k)) =
+        Rot<C, C>::assume(Matrix3d(prior.C_c_b * gyro.C_c_b.transpose())).log().raw();
+    if (layout_.further.readout_bias) {
+      apart.segment<3>(layout_.readout_bias(k)) = prior.readout_bias - gyro.readout_bias;
+    }
+    if (layout_.further.coefficient_change) {
+      apart.segment<Layout::kEq1>(layout_.change(k)) = drift.segment<Layout::kEq1>(layout_.change_column());
+    }
+  }
+  apart.tail(solution.shared.size()) = -solution.shared;
+  linear.prior = sigma.cwiseInverse().asDiagonal();
+  // Nothing is known before of the directions at the start, where the first fix shows them.
+  for (int k = 0; k < gyros_; ++k) {
+    if (nodes_.front().fix->used[k]) {
+      linear.prior.middleRows<2>(layout_.direction(k)).setZero();
+    }
+  }
+  const int size = layout_.parameters();
+  linear.prior.block(layout_.drift(0), layout_.drift(0), size, size) =
+      setup_.prior.covariance.llt().matrixL().solve(MatrixXd::Identity(size, size));
+  linear.prior_y = linear.prior * apart;
+}
+
+void PassProblem::end_arc(const PassSolution& solution, const Moment& moment, double extra_variance_rad2,
+                          Linear& linear) const {
+  const Layout& on_board = setup_.on_board.layout;
+  const int d = layout_.dynamic();
+  SmootherStage& stage = linear.stages[moment.arc];
+  Linear::ArcEnd& end = linear.ends.emplace_back();
+  end.duration_s = to_seconds(moment.t - nodes_[arcs_[moment.arc].begin].t);
+  end.extra_variance_rad2 = extra_variance_rad2;
+  stage.m.setZero(d);
+  const PassSolution::Arc& next = solution.arcs[moment.arc + 1];
+  using Rows = ComparedRows<kFullCapacity.states>;
+  Rows rows = Rows::Zero(2L * gyros_, on_board.size());
+  for (int k = 0; k < gyros_; ++k) {
+    const Eigen::Matrix<double, 2, 3> T = across(next.h_in[k]).transpose();
+    const int row = layout_.direction(k);
+    rows.block<2, 3>(row, on_board.direction(k)) = T;
+    stage.m.segment<2>(row) = T * turn(next.h_in[k], moment.gyros[k].h_in);
+  }
+  const MatrixXd by_states = by_states_of_arc(moment, rows);
+  end.A.setZero(d, d);
+  end.A.topRows(2L * gyros_) = by_states.leftCols(d);
+  stage.B.setZero(d, layout_.constants());
+  stage.B.topRows(2L * gyros_) = by_states.rightCols(layout_.constants());
+}
+
+void PassProblem::put_noise(const PassSolution& solution, const ProcessNoise& noise, Linear& linear) const {
+  const double walk = noise.direction_random_walk_rad_sqrt_s;
+  if (layout_.further.wandering_drift) {
+    for (int k = 0; k < gyros_; ++k) {
+      const int row = layout_.wandering(k);
+      linear.prior.block<3, 3>(row, row) = 1 / noise.wandering_drift.sigma * Matrix3d::Identity();
+      linear.prior_y.segment<3>(row) = -solution.arcs[0].wandering_rad_s[k] / noise.wandering_drift.sigma;
+    }
+  }
+  for (std::size_t arc = 0; arc < linear.ends.size(); ++arc) {
+    Linear::ArcEnd& end = linear.ends[arc];
+    SmootherStage& stage = linear.stages[arc];
+    const double kept = noise.wandering_drift.kept(end.duration_s);
+    stage.noise.setZero(layout_.dynamic());
+    stage.noise.head(2L * gyros_).setConstant(std::sqrt(walk * walk * end.duration_s + end.extra_variance_rad2));
+    if (layout_.further.wandering_drift) {
+      for (int k = 0; k < gyros_; ++k) {
+        const int row = layout_.wandering(k);
+        end.A.block<3, 3>(row, row) = kept * Matrix3d::Identity();
+        stage.m.segment<3>(row) =
+            kept * solution.arcs[arc].wandering_rad_s[k] - solution.arcs[arc + 1].wandering_rad_s[k];
+        stage.noise.segment<3>(row).setConstant(noise.wandering_drift.noise(kept));
+      }
+    }
+    stage.A_inverse = end.A.inverse();
+  }
+}
+
+PassProblem::Linear PassProblem::linearise(const PassSolution& solution) const {
+  Linear linear;
+  add_prior(solution, linear);
+  linear.stages.resize(arcs_.size());
+  Moment moment;
+  std::vector<std::pair<const ScreenedPass::Fix*, FixRows>> fixes;
+  std::vector<double> nis_per_component;
+  std::vector<std::size_t> fixes_until;
+  for (std::size_t arc = 0; arc < arcs_.size(); ++arc) {
+    begin_arc(solution, arc, moment);
+    double extra_variance_rad2 = 0;
+    for (std::size_t i = arcs_[arc].begin; i < arcs_[arc].end; ++i) {
+      moment.fix = nodes_[i].fix;
+      if (moment.fix != nullptr) {
+        FixRows& rows = fixes.emplace_back(moment.fix, compare(solution, moment)).second;
+        const Eigen::LLT<MatrixXd> root(rows.R);
+        root.matrixL().solveInPlace(rows.H);
+        root.matrixL().solveInPlace(rows.y);
+        if (rows.y.size() > 0) {
+          nis_per_component.push_back(rows.y.squaredNorm() / static_cast<double>(rows.y.size()));
+        }
+      }
+      if (i + 1 < nodes_.size()) {
+        step(nodes_[i], nodes_[i + 1], moment, extra_variance_rad2);
+      }
+    }
+    fixes_until.push_back(fixes.size());
+    if (arc + 1 < arcs_.size()) {
+      end_arc(solution, moment, extra_variance_rad2, linear);
+    } else {
+      linear.stages[arc].m.setZero(layout_.dynamic());
+    }
+  }
+  // Far from the solution all fixes are off: what is far among them is an outlier.
+  constexpr double kMedianOfFour = 0.84;  // of χ²/n; nearer to 1 for more
+  double scale = 1;
+  std::vector<double> sorted = nis_per_component;
+  if (!sorted.empty()) {
+    const auto middle = sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2);
+    std::nth_element(sorted.begin(), middle, sorted.end());
+    scale = std::max(*middle / kMedianOfFour, 1.0);
+  }
+  std::size_t fix = 0;
+  for (std::size_t arc = 0; arc < arcs_.size(); ++arc) {
+    NearbyFixes nearby(setup_.fixes_together);
+    for (; fix < fixes_until[arc]; ++fix) {
+      const auto& [its, rows] = fixes[fix];
+      if (rows.y.size() == 0) {
+        continue;
+      }
+      // Its pull falls with the third power of the misfit beyond the gate.
+      const double nis = rows.y.squaredNorm();
+      const double gate = scale * gate_of_freedom(static_cast<int>(rows.y.size()), setup_.on_board.gate_nis);
+      linear.beyond_squares += nis > gate ? 2 * gate * (1 - gate / nis) : 0;
+      nearby.add(*its, rows, nis > gate ? gate / nis : 1);
+    }
+    linear.beyond_squares += nearby.put_into(linear.stages[arc], layout_.size());
+  }
+  std::ranges::for_each(linear.stages, compress);
+  put_noise(solution, setup_.noise(), linear);
+  return linear;
+}
+
+void PassProblem::correct(const SmootherResult& found, PassSolution& solution) const {
+  for (std::size_t arc = 0; arc < arcs_.size(); ++arc) {
+    const VectorXd& x = found.x[arc];
+    PassSolution::Arc& its = solution.arcs[arc];
+    for (int k = 0; k < gyros_; ++k) {
+      its.h_in[k] =
+          rotated<double>(its.h_in[k], across(its.h_in[k]) * x.segment<2>(layout_.direction(k))).normalized();
+      if (layout_.further.wandering_drift) {
+        its.wandering_rad_s[k] += x.segment<3>(layout_.wandering(k));
+      }
+    }
+  }
+  const VectorXd& x = found.x.back();
+  for (int k = 0; k < gyros_; ++k) {
+    add_parameter_errors(layout_, k, x, solution.gyros[k]);
+  }
+  solution.shared += x.tail(solution.shared.size());
+}
+
+}  // namespace trihedron::ground

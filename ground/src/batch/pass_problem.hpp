@@ -1,0 +1,162 @@
+#pragma once
+/// A whole pass as one problem of least squares: the initial directions, the parameters, and where there is process
+/// noise the directions and the wandering drift all along.
+
+#include <Eigen/Core>
+#include <chrono>
+#include <functional>
+#include <optional>
+#include <vector>
+
+#include "batch/information_smoother.hpp"
+#include "model/gyro.hpp"
+#include "onboard/screened_pass.hpp"
+#include "trihedron/core/measurement.hpp"
+#include "trihedron/core/precession.hpp"
+#include "trihedron/core/setup.hpp"
+
+namespace trihedron::ground {
+
+/// What moves the momenta beside the drift model.
+struct ProcessNoise {
+  double direction_random_walk_rad_sqrt_s = 0;  ///< per axis across each momentum
+  GaussMarkov wandering_drift;                  ///< per case axis, where the layout has it
+};
+
+struct PassSetup {
+  CalibrationSetup on_board;  ///< what the estimator on board is set up with; its layout has 3 components a direction
+  Prior prior;
+  /// Samples are taken so far apart, or up to half as much again before a fix: the body turns little between them, and
+  /// their noise is averaged in the end.
+  Duration sample_step = std::chrono::seconds(1);
+  /// Fixes nearer than this count as one: what they show together, without what changes among them.
+  Duration fixes_together{};
+  /// Process noise comes in so often, and after a gap.
+  Duration arc = std::chrono::seconds(60);
+
+  /// The states of the batch: of each direction's error two components across the momentum, so that all of them have
+  /// information; the rest as on board.
+  [[nodiscard]] Layout layout() const {
+    Layout layout = on_board.layout;
+    layout.direction_size = 2;
+    return layout;
+  }
+  [[nodiscard]] ProcessNoise noise() const {
+    return {on_board.direction_random_walk_rad_sqrt_s, on_board.wandering_drift};
+  }
+};
+
+/// Estimates of everything; momenta and wandering drift at the beginning of each arc.
+struct PassSolution {
+  Gyros gyros;          ///< their momenta mean nothing
+  SharedStates shared;  ///< as in the layout
+  struct Arc {
+    Directions h_in;
+    Directions wandering_rad_s;  ///< case axes
+  };
+  std::vector<Arc> arcs;
+};
+
+class PassProblem {
+ public:
+  /// Refers to the pass. Needs a fix.
+  PassProblem(const ScreenedPass& pass, PassSetup setup);
+
+  [[nodiscard]] const PassSetup& setup() const { return setup_; }
+  [[nodiscard]] const Layout& layout() const { return layout_; }
+  void set_noise(const ProcessNoise& noise) {
+    setup_.on_board.direction_random_walk_rad_sqrt_s = noise.direction_random_walk_rad_sqrt_s;
+    setup_.on_board.wandering_drift = noise.wandering_drift;
+  }
+  [[nodiscard]] std::size_t arcs() const { return arcs_.size(); }
+
+  /// Momenta along the pass by these parameters, those at its first fix read from it; no wandering drift.
+  [[nodiscard]] PassSolution start(const Gyros& gyros) const;
+
+  /// Linearised at a solution; smooth() estimates truth − solution.
+  struct Linear {
+    Eigen::MatrixXd prior;
+    Eigen::VectorXd prior_y;
+    std::vector<SmootherStage> stages;
+    /// What the process noise is put into, arc by arc but for the last.
+    struct ArcEnd {
+      Eigen::MatrixXd A;  ///< without what is kept of the wandering drift
+      double duration_s = 0;
+      double extra_variance_rad2 = 0;  ///< for what steps too long for their readings may have missed
+    };
+    std::vector<ArcEnd> ends;
+    /// What counts beyond the squares of the rows: the scatter of fixes that count as one, and of outliers, whose rows
+    /// have less weight, so much that they are 2 g − g²/s together, s their NIS and g the gate: a worse one is not more
+    /// likely.
+    double beyond_squares = 0;
+  };
+  [[nodiscard]] Linear linearise(const PassSolution& solution) const;
+  /// The same with other process noise than that of the setup.
+  void put_noise(const PassSolution& solution, const ProcessNoise& noise, Linear& linear) const;
+
+  [[nodiscard]] Time begin_of(std::size_t arc) const { return nodes_[arcs_[arc].begin].t; }
+
+  /// Adds what smooth() found.
+  void correct(const SmootherResult& found, PassSolution& solution) const;
+
+  /// One time within an arc.
+  struct Moment {
+    std::size_t arc = 0;
+    Time t{};
+    const ScreenedPass::Fix* fix = nullptr;  ///< there, if any
+    Gyros gyros;  ///< as believed, with the momenta of this time and the wandering drift of the arc
+    PerGyro<Sensitivity<kMaxDriftColumns>> since;     ///< the beginning of the arc
+    PerGyro<Eigen::Matrix<double, 3, 2>> directions;  ///< there: φ by the two components across the momentum
+  };
+  /// Goes along all samples, thinned, and fixes, in time order.
+  void go_along(const PassSolution& solution, const std::function<void(const Moment&)>& visit) const;
+
+  /// Components that a fix is compared in: how far each momentum read through it is off, by the states of its arc.
+  struct FixRows {
+    Eigen::MatrixXd H;
+    Eigen::VectorXd y;
+    Eigen::MatrixXd R;
+  };
+  [[nodiscard]] FixRows compare(const PassSolution& solution, const Moment& moment) const;
+
+  /// Whether it counts less than it would by its noise.
+  [[nodiscard]] bool is_outlier(const FixRows& rows) const;
+
+  /// By the momenta and these readings.
+  [[nodiscard]] Result<AttitudeByDirections, DirectionsFault> attitude(const Moment& moment, const Directions& h_b,
+                                                                       const GyroMask& used) const;
+  /// How its error, c axes, depends on the states of the arc.
+  [[nodiscard]] Eigen::MatrixXd attitude_by_states(const Moment& moment, const AttitudeByDirections& attitude,
+                                                   const Directions& h_b) const;
+
+ private:
+  /// Something to go along: a sample or a fix.
+  struct Node {
+    Time t{};
+    Directions h_b;
+    GyroMask used{};
+    const ScreenedPass::Fix* fix = nullptr;
+    bool after_gap = false;
+  };
+  struct ArcNodes {
+    std::size_t begin = 0;
+    std::size_t end = 0;  ///< the first node of the next arc, which this one ends at, or that after the last
+  };
+
+  void step(const Node& from, const Node& to, Moment& moment, double& extra_variance_rad2) const;
+  void begin_arc(const PassSolution& solution, std::size_t arc, Moment& moment) const;
+  /// Rows about the states at a moment, three components of each direction, as rows about those of its arc.
+  template <class Rows>
+  [[nodiscard]] Eigen::MatrixXd by_states_of_arc(const Moment& moment, Rows rows) const;
+  void add_prior(const PassSolution& solution, Linear& linear) const;
+  void end_arc(const PassSolution& solution, const Moment& moment, double extra_variance_rad2, Linear& linear) const;
+
+  PassSetup setup_;
+  Layout layout_;
+  DriftModel drift_;
+  int gyros_;
+  std::vector<Node> nodes_;
+  std::vector<ArcNodes> arcs_;
+};
+
+}  // namespace trihedron::ground

@@ -1,0 +1,197 @@
+#include "batch/refine.hpp"
+
+#include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <utility>
+
+#include "batch/pass_setup.hpp"
+#include "batch/smoothed_attitude.hpp"
+#include "trihedron/ground/model/setup_error.hpp"
+
+namespace trihedron::ground {
+namespace {
+
+using Eigen::MatrixXd;
+
+/// What is left of each fix when the whole pass is smoothed, in place of what it was off on board.
+void use_residuals(const PassProblem& problem, const PassSolution& solution, const std::vector<MatrixXd>& roots,
+                   std::vector<FixRecord>& fixes) {
+  std::map<std::pair<Time, int>, FixRecord*> compared;
+  for (FixRecord& fix : fixes) {
+    if (fix.used() || fix.status == FixStatus::kRejectedByGate) {
+      compared[{fix.t, fix.head}] = &fix;
+    }
+  }
+  problem.go_along(solution, [&](const PassProblem::Moment& moment) {
+    const auto found = moment.fix == nullptr ? compared.end() : compared.find({moment.t, moment.fix->fix.head});
+    if (found == compared.end()) {
+      return;
+    }
+    const PassProblem::FixRows rows = problem.compare(solution, moment);
+    if (rows.y.size() == 0) {
+      return;
+    }
+    FixRecord& fix = *found->second;
+    MatrixXd covariance = rows.R;
+    fix.status = FixStatus::kRejectedByGate;
+    if (!problem.is_outlier(rows)) {
+      fix.status = FixStatus::kUsed;
+      const MatrixXd spread = rows.H * roots[moment.arc];
+      covariance -= spread * spread.transpose();
+    }
+    fix.nis = rows.y.dot(covariance.ldlt().solve(rows.y));
+    fix.degrees_of_freedom = static_cast<int>(rows.y.size());
+    std::ranges::fill(fix.innovation, 0);
+    std::ranges::fill(fix.innovation_sigma, 0);
+    Eigen::Index row = 0;
+    for (int k = 0; k < problem.setup().layout.gyros; ++k) {
+      for (int i = 2 * k; moment.fix->used[k] && i < 2 * k + 2; ++i, ++row) {
+        fix.innovation[static_cast<std::size_t>(i)] = rows.y(row);
+        fix.innovation_sigma[static_cast<std::size_t>(i)] = std::sqrt(covariance(row, row));
+      }
+    }
+  });
+}
+
+/// How far the constants by the first half of the pass are off those by all of it: their difference has the covariance
+/// by which the second half makes them better known. Only what it halves at least counts.
+void compare_halves(const BatchResult& result, const PassLayout& layout, Statistics& statistics) {
+  constexpr double kLeast = 0.5;
+  const PassProblem::Linear& linear = result.linear;
+  const std::size_t half = linear.stages.size() / 2;
+  if (half == 0) {
+    return;
+  }
+  const Eigen::Index c = layout.constants();
+  const MatrixXd triangle = triangles_after(linear.prior, linear.prior_y, linear.stages, {half - 1}).front();
+  const auto R = triangle.block(layout.dynamic(), layout.dynamic(), c, c).triangularView<Eigen::Upper>();
+  // In units of what is known after the first half: the whole has covariance `rest` there.
+  const Eigen::VectorXd first = triangle.block(layout.dynamic(), layout.size(), c, 1);
+  const MatrixXd known = R * MatrixXd(result.errors.last_root.bottomRows(c));
+  const Eigen::VectorXd whole = R * Eigen::VectorXd(result.errors.x.back().tail(c));
+  const Eigen::SelfAdjointEigenSolver<MatrixXd> rest(known * known.transpose());
+  double square = 0;
+  int freedom = 0;
+  for (Eigen::Index i = 0; i < c; ++i) {
+    const double gained = 1 - rest.eigenvalues()(i);
+    if (gained > kLeast) {
+      const double off = rest.eigenvectors().col(i).dot(first - whole);
+      square += off * off / gained;
+      ++freedom;
+    }
+  }
+  statistics.halves_chi_square = square;
+  statistics.halves_degrees_of_freedom = freedom;
+}
+
+/// Columns of `to` in place of those of `from`. What was not estimated along the pass is not a number there, with the
+/// sigma of before the pass.
+void rearrange(const std::vector<ParameterId>& from, const std::vector<ParameterId>& to, const PassSetup& setup,
+               ParameterHistory& history) {
+  const Eigen::VectorXd prior_sigma = setup.prior.covariance.diagonal().cwiseSqrt();
+  ParameterHistory rearranged{history.t, {}, {}};
+  for (std::size_t row = 0; row < history.t.size(); ++row) {
+    std::vector<double>& value = rearranged.value.emplace_back(to.size(), std::nan(""));
+    std::vector<double>& sigma = rearranged.sigma.emplace_back(prior_sigma.begin(), prior_sigma.end());
+    for (std::size_t column = 0; column < to.size(); ++column) {
+      const auto found = std::ranges::find(from, to[column]) - from.begin();
+      if (const auto i = static_cast<std::size_t>(found); i < from.size()) {
+        value[column] = history.value[row][i];
+        sigma[column] = history.sigma[row][i];
+      }
+    }
+  }
+  history = std::move(rearranged);
+}
+
+std::vector<FurtherEstimate> further_of(const PassSetup& setup, const BatchResult& result,
+                                        const std::vector<ParameterId>& parameters) {
+  const PassLayout& layout = setup.layout;
+  const MatrixXd& root = result.errors.last_root;
+  std::vector<FurtherEstimate> further;
+  const auto tell = [&](double value, int state) {
+    further.push_back({parameters[further.size()], value, root.row(state).norm()});
+  };
+  for (int i = layout.shared(); i < layout.size(); ++i) {
+    tell(result.solution.shared(i - layout.shared()), i);
+  }
+  if (layout.readout_bias) {
+    for (int k = 0; k < layout.gyros; ++k) {
+      for (int i = 0; i < 3; ++i) {
+        tell(result.solution.gyros[static_cast<std::size_t>(k)].readout_bias(i), layout.bias(k) + i);
+      }
+    }
+  }
+  if (layout.coefficient_change) {
+    for (int k = 0; k < layout.gyros; ++k) {
+      for (int i = 0; i < Esg7::kSize; ++i) {
+        tell(result.solution.gyros[static_cast<std::size_t>(k)].change_rad_s(i), layout.change(k) + i);
+      }
+    }
+  }
+  return further;
+}
+
+/// Throws SetupError where nothing can be made of it.
+PassProblem problem_of(const Screened& screened, PassSetup setup) {
+  if (screened.pass.fixes.empty()) {
+    throw SetupError("no fix could be compared with the gyros", "look at the telemetry with `trihedron inspect`");
+  }
+  if (screened.pass.clock_set_back) {
+    throw SetupError("the clock of the telemetry was set back within the pass: how its parts lie in time is unknown",
+                     "calibrate the parts apart, or use estimator invariant");
+  }
+  return {screened.pass, std::move(setup)};
+}
+
+}  // namespace
+
+Refinement::Refinement(const Screened& screened, PassSetup setup, const CalibrationOptions& options)
+    : problem_(problem_of(screened, std::move(setup))),
+      options_(options),
+      result_(most_likely(problem_, first_solution(problem_, screened))),
+      roots_(covariance_roots(result_.errors, result_.linear.stages)) {
+  const SmoothedAttitude smoothed(screened.pass, problem_, result_.solution, roots_);
+  course_ = smoothed.course();
+  if (options.definitive_attitude) {
+    definitive_attitude_ = smoothed.definitive();
+  }
+}
+
+void Refinement::put_into(CalibrationRun& run) && {
+  const PassSetup& setup = problem_.setup();
+  const PassLayout& layout = setup.layout;
+  Calibration& calibration = run.calibration;
+  const MatrixXd own =
+      result_.errors.last_root.middleRows(layout.drift(0), layout.drift(layout.gyros) - layout.drift(0));
+  calibration.covariance = own * own.transpose();
+  GyroDirections last_h_in;
+  problem_.go_along(result_.solution, [&](const PassProblem::Moment& moment) {
+    calibration.t = moment.t;
+    last_h_in = moment.h_in;
+  });
+  for (int k = 0; k < layout.gyros; ++k) {
+    const auto index = static_cast<std::size_t>(k);
+    GyroCalibration& gyro = calibration.gyros[index];
+    gyro = record_of(result_.solution.gyros[index], setup.family);
+    gyro.momentum_in = last_h_in[k];
+  }
+  calibration.estimator = Estimator::kBatch;
+  const std::vector<ParameterId> states =
+      drift_and_alignment(setup.family.model(), static_cast<std::size_t>(layout.gyros));
+  rearrange(calibration.states, states, setup, run.parameters);
+  calibration.states = states;
+  calibration.further =
+      further_of(setup, result_, further_parameters(options_.further_states, layout.further_heads, layout.gyros));
+  compare_halves(result_, layout, calibration.statistics);
+  calibration.statistics.batch_iterations = result_.iterations;
+  calibration.statistics.batch_converged = result_.converged;
+  use_residuals(problem_, result_.solution, roots_, run.fixes);
+  run.attitude = std::move(course_.attitude);
+  run.definitive_attitude = std::move(definitive_attitude_);
+}
+
+}  // namespace trihedron::ground

@@ -1,0 +1,35 @@
+#pragma once
+/// A calibration taken up by least squares over the whole pass: estimator batch.
+
+#include <vector>
+
+#include "batch/batch.hpp"
+#include "batch/smoothed_attitude.hpp"
+#include "onboard/screen.hpp"
+#include "trihedron/records/run.hpp"
+
+namespace trihedron::ground {
+
+/// The whole pass by least squares, beside what the on-board cycle makes of it.
+class Refinement {
+ public:
+  /// Works it out. Refers to `screened` and the options. Throws SetupError.
+  Refinement(const Screened& screened, PassSetup setup, const CalibrationOptions& options);
+
+  /// What the smoothed pass shows at the fixes.
+  [[nodiscard]] const SmoothedCourse& course() const { return course_; }
+
+  /// Puts the most likely values and their covariance in place of those of `run`, which was made on board, and the
+  /// smoothed attitude and residuals in place of those of the filter.
+  void put_into(CalibrationRun& run) &&;
+
+ private:
+  PassProblem problem_;
+  const CalibrationOptions& options_;
+  BatchResult result_;
+  std::vector<Eigen::MatrixXd> roots_;
+  SmoothedCourse course_;
+  AttitudeHistory definitive_attitude_;
+};
+
+}  // namespace trihedron::ground

@@ -1,0 +1,165 @@
+#include "batch/smoothed_attitude.hpp"
+
+#include <algorithm>
+#include <array>
+#include <chrono>
+#include <cmath>
+#include <iterator>
+
+#include "trihedron/core/cycle.hpp"
+#include "trihedron/core/directions_fit.hpp"
+#include "trihedron/core/invariant_estimator.hpp"
+#include "trihedron/core/optimal_attitude.hpp"
+#include "trihedron/ground/tasks/on_all_cores.hpp"
+
+namespace trihedron::ground {
+namespace {
+
+using Eigen::MatrixXd;
+using Eigen::Vector3d;
+
+/// The body moves like a cubic over some seconds to both sides; where it does not, over less.
+constexpr std::array<Duration, 3> kReaches = {std::chrono::milliseconds(3000), std::chrono::milliseconds(1400),
+                                              std::chrono::milliseconds(700)};
+
+struct Indexed {
+  const std::vector<ScreenedPass::Sample>& samples;
+  [[nodiscard]] const ScreenedPass::Sample& operator[](int i) const { return samples[static_cast<std::size_t>(i)]; }
+};
+
+}  // namespace
+
+SmoothReadings::At SmoothReadings::at(Time t, const At& otherwise) const {
+  for (const Duration reach : kReaches) {
+    if (const auto fitted = fit(t, otherwise.used, reach)) {
+      return *fitted;
+    }
+  }
+  return otherwise;
+}
+
+std::optional<SmoothReadings::At> SmoothReadings::fit(Time t, const GyrosUsed& used, Duration reach) const {
+  constexpr int kDegree = 3;
+  constexpr int kLeast = 2 * (kDegree + 1);
+  const auto first = std::ranges::lower_bound(samples_, t - reach, {}, &ScreenedPass::Sample::t);
+  const auto last = std::ranges::upper_bound(first, samples_.end(), t + reach, {}, &ScreenedPass::Sample::t);
+  const auto begin = static_cast<int>(first - samples_.begin());
+  const auto end = static_cast<int>(last - samples_.begin());
+  if (end - begin < kLeast) {
+    return std::nullopt;
+  }
+  const auto gap = std::adjacent_find(first, last, [](const auto& a, const auto& b) {
+    return b.t - a.t > Cycle<InvariantEstimator<Esg7, 2>>::kMaxInterpolation;
+  });
+  if (gap != last) {
+    return std::nullopt;
+  }
+  const auto fitted = fit_directions<kMaxGyros>(Indexed{samples_}, begin, end, t, kDegree);
+  const double bound = fitted.freedom + 5 * std::sqrt(2.0 * fitted.freedom);
+  At at;
+  at.h_b = fitted.h_b;
+  at.noise_factor = fitted.noise_factor;
+  for (int k = 0; k < gyros_; ++k) {
+    const double sigma_rad = noise_rad_[static_cast<std::size_t>(k)];
+    at.used[k] =
+        used[k] && std::all_of(first, last, [&](const ScreenedPass::Sample& sample) { return sample.used[k]; });
+    if (at.used[k] && !(fitted.residual_square[k] <= bound * sigma_rad * sigma_rad)) {
+      return std::nullopt;
+    }
+  }
+  return count(at.used) >= 2 ? std::optional(at) : std::nullopt;
+}
+
+std::optional<SmoothedAttitude::At> SmoothedAttitude::at(const PassProblem::Moment& moment,
+                                                         const SmoothReadings::At& otherwise) const {
+  const SmoothReadings::At reading = readings_.at(moment.t, otherwise);
+  const auto attitude = PassProblem::attitude(solution_, moment, reading.h_b, reading.used);
+  if (!attitude) {
+    return std::nullopt;
+  }
+  const MatrixXd spread =
+      problem_.attitude_by_states(solution_, moment, attitude.value(), reading.h_b) * roots_[moment.arc];
+  Vector3d variance_rad2 = spread.rowwise().squaredNorm();
+  for (int k = 0; k < problem_.setup().layout.gyros; ++k) {
+    const double noise_rad = problem_.setup().readout_noise_rad[static_cast<std::size_t>(k)] * reading.noise_factor;
+    variance_rad2 +=
+        noise_rad * noise_rad * attitude.value().by_directions.middleCols<3>(3L * k).rowwise().squaredNorm();
+  }
+  return At{attitude.value().C_in_c, variance_rad2.cwiseSqrt()};
+}
+
+void SmoothedAttitude::append(const At& attitude, Time t, AttitudeHistory& history) {
+  history.t.push_back(t);
+  history.q_in_c.push_back(attitude.C_in_c.quaternion());
+  history.sigma_rad.push_back(attitude.sigma_rad);
+}
+
+SmoothedCourse SmoothedAttitude::course() const {
+  SmoothedCourse course;
+  const int gyros = problem_.setup().layout.gyros;
+  course.readings.gyros = gyros;
+  problem_.go_along(solution_, [&](const PassProblem::Moment& moment) {
+    if (moment.fix == nullptr) {
+      return;
+    }
+    const auto attitude = at(moment, {moment.fix->h_b, moment.fix->used, moment.fix->noise_factor});
+    if (!attitude) {
+      return;
+    }
+    append(*attitude, moment.t, course.attitude);
+    course.readings.t.push_back(moment.t);
+    for (int k = 0; k < gyros; ++k) {
+      const Vector3d h_b = solution_.gyros[static_cast<std::size_t>(k)].C_c_b.transpose() *
+                           (attitude->C_in_c.raw().transpose() * moment.h_in[k]);
+      course.readings.h.insert(course.readings.h.end(), h_b.begin(), h_b.end());
+    }
+  });
+  return course;
+}
+
+AttitudeHistory SmoothedAttitude::between(const PassProblem::Moment& from, const PassProblem::Moment& to) const {
+  AttitudeHistory history;
+  PassProblem::Moment moment = to;
+  const auto first = std::ranges::upper_bound(screened_.samples, from.t, {}, &ScreenedPass::Sample::t);
+  for (auto sample = first; sample != screened_.samples.end() && sample->t <= to.t; ++sample) {
+    moment.t = sample->t;
+    // From node to node a momentum turns by a fraction of an arcsecond.
+    const double part = to_seconds(sample->t - from.t) / to_seconds(to.t - from.t);
+    for (int k = 0; k < screened_.gyros; ++k) {
+      moment.h_in[k] = (from.h_in[k] + part * (to.h_in[k] - from.h_in[k])).normalized();
+    }
+    if (const auto attitude = at(moment, {sample->h_b, sample->used, 1})) {
+      append(*attitude, sample->t, history);
+    }
+  }
+  return history;
+}
+
+AttitudeHistory SmoothedAttitude::definitive() const {
+  constexpr std::size_t kTogether = 1000;  // a node takes some kilobytes
+  AttitudeHistory whole;
+  std::vector<PassProblem::Moment> nodes;
+  const auto take = [&] {
+    const auto parts = on_all_cores(nodes.size() - 1, [&](std::size_t i) { return between(nodes[i], nodes[i + 1]); });
+    for (const AttitudeHistory& part : parts) {
+      whole.t.insert(whole.t.end(), part.t.begin(), part.t.end());
+      whole.q_in_c.insert(whole.q_in_c.end(), part.q_in_c.begin(), part.q_in_c.end());
+      whole.sigma_rad.insert(whole.sigma_rad.end(), part.sigma_rad.begin(), part.sigma_rad.end());
+    }
+    nodes.erase(nodes.begin(), std::prev(nodes.end()));
+  };
+  problem_.go_along(solution_, [&](const PassProblem::Moment& moment) {
+    if (nodes.empty()) {  // a sample at the first node counts as after it
+      nodes.push_back(moment);
+      nodes.back().t -= Duration{1};
+    }
+    nodes.push_back(moment);
+    if (nodes.size() > kTogether) {
+      take();
+    }
+  });
+  take();
+  return whole;
+}
+
+}  // namespace trihedron::ground

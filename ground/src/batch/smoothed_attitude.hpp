@@ -1,0 +1,76 @@
+#pragma once
+/// Attitude by all gyro samples and fixes of a pass.
+
+#include <Eigen/Core>
+#include <optional>
+#include <vector>
+
+#include "batch/pass_problem.hpp"
+
+namespace trihedron::ground {
+
+/// Readings at any time, by the samples round it together.
+class SmoothReadings {
+ public:
+  /// Refers to both.
+  SmoothReadings(const ScreenedPass& pass, const std::vector<double>& readout_noise_rad)
+      : samples_(pass.samples), gyros_(pass.gyros), noise_rad_(readout_noise_rad) {}
+
+  struct At {
+    GyroDirections h_b;
+    GyrosUsed used{};
+    double noise_factor = 1;
+  };
+  /// `otherwise` where no polynomial is what the body did; of the gyros that it uses.
+  [[nodiscard]] At at(Time t, const At& otherwise) const;
+
+ private:
+  [[nodiscard]] std::optional<At> fit(Time t, const GyrosUsed& used, Duration reach) const;
+
+  const std::vector<ScreenedPass::Sample>& samples_;
+  int gyros_;
+  const std::vector<double>& noise_rad_;
+};
+
+/// What the smoothed pass shows at the fixes.
+struct SmoothedCourse {
+  AttitudeHistory attitude;
+  GyroTelemetry readings;  ///< of gyros without noise and bias
+};
+
+/// Attitude by the smoothed momenta.
+class SmoothedAttitude {
+ public:
+  /// `roots`: of the covariance, arc by arc. Refers to all of them.
+  SmoothedAttitude(const ScreenedPass& screened, const PassProblem& problem, const PassSolution& solution,
+                   const std::vector<Eigen::MatrixXd>& roots)
+      : screened_(screened),
+        problem_(problem),
+        solution_(solution),
+        roots_(roots),
+        readings_(screened, problem.setup().readout_noise_rad) {}
+
+  /// At the fixes.
+  [[nodiscard]] SmoothedCourse course() const;
+  /// At each gyro sample from the first fix on.
+  [[nodiscard]] AttitudeHistory definitive() const;
+
+ private:
+  struct At {
+    Rot<In, C> C_in_c;
+    Eigen::Vector3d sigma_rad;
+  };
+  /// `otherwise` as of SmoothReadings. Nothing where the directions give no attitude.
+  [[nodiscard]] std::optional<At> at(const PassProblem::Moment& moment, const SmoothReadings::At& otherwise) const;
+  /// At the samples after `from`, a node, up to and with `to`, the next one.
+  [[nodiscard]] AttitudeHistory between(const PassProblem::Moment& from, const PassProblem::Moment& to) const;
+  static void append(const At& attitude, Time t, AttitudeHistory& history);
+
+  const ScreenedPass& screened_;
+  const PassProblem& problem_;
+  const PassSolution& solution_;
+  const std::vector<Eigen::MatrixXd>& roots_;
+  SmoothReadings readings_;
+};
+
+}  // namespace trihedron::ground

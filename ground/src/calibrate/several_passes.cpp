@@ -1,0 +1,174 @@
+#include "trihedron/ground/calibrate/several_passes.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <utility>
+
+#include "trihedron/ground/calibrate/calibrate.hpp"
+#include "trihedron/ground/judge/verdict.hpp"
+#include "trihedron/ground/model/setup_error.hpp"
+
+namespace trihedron::ground {
+namespace {
+
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+using Severity = Finding::Severity;
+
+constexpr FindingCode kWeakAxis = FindingCode::kWeakAlignmentAxis;
+
+bool same_mounting(const FurtherStarTracker& a, const FurtherStarTracker& b) {
+  return a.mounting_rotation_vector_rad == b.mounting_rotation_vector_rad;
+}
+
+void refuse_stranger(const PassSettings& last, const PassSettings& next, const std::string& start_up) {
+  constexpr const char* kApart = "calibrate it apart";
+  if (next.spacecraft != last.spacecraft) {
+    throw SetupError(fmt::format("the pass is of {}, the one before of {}", next.spacecraft, last.spacecraft), kApart);
+  }
+  if (next.epoch < last.epoch + last.duration) {
+    throw SetupError("the pass begins before the one before it ends", "give passes that do not overlap, each once");
+  }
+  if (next.gyros.size() != last.gyros.size()) {
+    throw SetupError(fmt::format("the pass has {} gyros, the one before {}", next.gyros.size(), last.gyros.size()),
+                     kApart);
+  }
+  if (!std::ranges::equal(next.further_star_trackers, last.further_star_trackers, same_mounting)) {
+    throw SetupError("the pass is of other star trackers, or of other mountings, than the one before", kApart);
+  }
+  if (!start_up.empty() && !next.start_up.empty() && next.start_up != start_up) {
+    throw SetupError(fmt::format("the pass is of start-up '{}', the ones before of '{}'", next.start_up, start_up),
+                     "calibrate each start-up apart: drift coefficients change at every start of a rotor");
+  }
+}
+
+/// What the data alone say: the estimate and `shift`, with this covariance; very large where they say nothing.
+struct Likelihood {
+  VectorXd shift;
+  MatrixXd covariance;
+};
+
+Likelihood likelihood_of(const Calibration& before, const Calibration& after) {
+  // What the data add to the prior below this part of it is taken for this part.
+  constexpr double kLeast = 1e-6;
+  // Where P0 is one, P has eigenvalues λ of 0 to 1, and the inverse of P⁻¹ − P0⁻¹ has λ / (1 − λ).
+  const Eigen::LLT<MatrixXd> prior(before.covariance);
+  const MatrixXd root = prior.matrixL();
+  const MatrixXd half = prior.matrixL().solve(after.covariance);
+  const Eigen::SelfAdjointEigenSolver<MatrixXd> left(prior.matrixL().solve(half.transpose()));
+  const Eigen::ArrayXd part = left.eigenvalues();
+  const VectorXd variance = part / (1 - part).max(kLeast);
+  const MatrixXd spread = root * left.eigenvectors() * variance.asDiagonal() * left.eigenvectors().transpose();
+  return {spread * prior.matrixL().solve(difference(before, after, after.states)), spread * root.transpose()};
+}
+
+struct Comparison {
+  Agreement coefficients;
+  Agreement alignments;
+};
+
+/// `earlier`: the calibration of the passes before.
+Comparison compare(const CalibrationRun& earlier, const CalibrationRun& later) {
+  const Likelihood a = likelihood_of(earlier.known_before, earlier.calibration);
+  const Likelihood b = likelihood_of(later.known_before, later.calibration);
+  const VectorXd moved =
+      difference(earlier.calibration, later.calibration, later.calibration.states) + b.shift - a.shift;
+  const MatrixXd covariance = a.covariance + b.covariance;
+  const auto among = [&](bool alignments) {
+    const auto rows = rows_of(later.calibration, common_states(later.calibration, earlier.calibration, alignments));
+    return agreement_within(moved(rows), covariance(rows, rows), earlier.known_before.covariance(rows, rows));
+  };
+  return {among(false), among(true)};
+}
+
+/// Codes of what forbids the use of a pass alone and stays true of the passes together.
+std::vector<std::string_view> lasting_faults(const Verdict& verdict) {
+  std::vector<std::string_view> codes;
+  for (const Finding& finding : verdict.findings) {
+    if (finding.severity == Severity::kDoNotUse && finding.code != kWeakAxis) {
+      codes.push_back(name_of(finding.code));
+    }
+  }
+  return codes;
+}
+
+void judge_pass(const PassAlone& pass, std::vector<Finding>& findings) {
+  if (!pass.coefficients.holds()) {
+    findings.push_back(
+        {FindingCode::kCoefficientsMoved,
+         fmt::format("The drift coefficients of {} are not those of the passes before.", pass.name),
+         pass.coefficients.text(),
+         "These passes are not of one start-up: calibrate them apart. Where they are, use estimator batch.",
+         Severity::kDoNotUse});
+  }
+  if (!pass.alignments.holds()) {
+    findings.push_back({FindingCode::kAlignmentMoved,
+                        fmt::format("The alignments of {} are not those of the passes before.", pass.name),
+                        pass.alignments.text(),
+                        "Look for what turned a gyro or the star tracker between the passes; calibrate them apart.",
+                        Severity::kDoNotUse});
+  }
+  if (const auto faults = lasting_faults(pass.run.calibration.verdict); !faults.empty()) {
+    findings.push_back({FindingCode::kPassNotTrustworthy, fmt::format("{} alone is not to be used.", pass.name),
+                        fmt::format("{}", fmt::join(faults, ", ")), "Leave it out, or cure what its own report tells.",
+                        Severity::kDoNotUse});
+  }
+}
+
+bool has_weak_axis(const PassAlone& pass) {
+  return std::ranges::any_of(pass.run.calibration.verdict.findings,
+                             [](const Finding& finding) { return finding.code == kWeakAxis; });
+}
+
+/// Of the last pass from those before, by what each pass is.
+Verdict judge_together(const Verdict& last, const std::vector<PassAlone>& passes) {
+  Verdict verdict;
+  for (const PassAlone& pass : passes) {
+    judge_pass(pass, verdict.findings);
+  }
+  verdict.findings.insert(verdict.findings.end(), last.findings.begin(), last.findings.end());
+  if (!std::ranges::all_of(passes, has_weak_axis)) {
+    std::erase_if(verdict.findings, [](const Finding& finding) { return finding.code == kWeakAxis; });
+  }
+  verdict.trustworthy = std::ranges::none_of(
+      verdict.findings, [](const Finding& finding) { return finding.severity == Severity::kDoNotUse; });
+  return verdict;
+}
+
+}  // namespace
+
+void SeveralPasses::combine(const Pass& pass, const CalibrationOptions& options, const Progress& progress) {
+  Pass next = pass;
+  next.settings.prior = combined_.calibration;
+  CalibrationRun together = calibrate(next, options, progress);
+  together.known_before = std::move(combined_.known_before);
+  together.calibration.verdict = judge_together(judge(next, together), passes_);
+  combined_ = std::move(together);
+}
+
+const PassAlone& SeveralPasses::add(const std::string& name, const Pass& pass, const Progress& progress) {
+  CalibrationOptions options = options_;
+  if (!passes_.empty()) {
+    refuse_stranger(last_, pass.settings, start_up_);
+    // One start of the rotors has one drift model.
+    options.drift_model = combined_.options.drift_model;
+  }
+  PassAlone& added = passes_.emplace_back(PassAlone{name, calibrate(pass, options, progress), {}, {}});
+  if (passes_.size() == 1) {
+    combined_ = added.run;
+  } else {
+    const Comparison found = compare(combined_, added.run);
+    added.coefficients = found.coefficients;
+    added.alignments = found.alignments;
+    combine(pass, options, progress);
+  }
+  last_ = pass.settings;
+  start_up_ = start_up_.empty() ? pass.settings.start_up : start_up_;
+  return added;
+}
+
+}  // namespace trihedron::ground

@@ -1,0 +1,27 @@
+#pragma once
+/// What a pass gives evidence of beside alignment and eq. (1).
+
+#include <optional>
+#include <vector>
+
+#include "choose/forecast.hpp"
+#include "onboard/screen.hpp"
+#include "trihedron/records/run.hpp"
+
+namespace trihedron::ground {
+
+/// The options with nothing left to decide, `find_noise` saying whether it was found; and on what evidence.
+struct Decision {
+  CalibrationOptions options;
+  std::vector<Evidence> evidence;    ///< empty where nothing was to be decided
+  std::vector<Forecast> forecasts;   ///< of the drift models that were compared
+  std::optional<Screened> screened;  ///< what it was decided by, where the pass was looked at
+};
+
+/// Settles each choice that is left to the program. Estimator paper, and passes of more than two gyros, have no further
+/// states; a prior calibration tells them where the pass has one; else they are those that the pass makes 20 times as
+/// likely as their absence. The noise is found where it is asked for, on a pass that is long enough and has no prior
+/// calibration. Throws SetupError.
+[[nodiscard]] Decision decide(const Pass& pass, const CalibrationOptions& asked);
+
+}  // namespace trihedron::ground

@@ -1,0 +1,33 @@
+#pragma once
+/// How well drift models say what comes next: each fitted to the beginning of a pass, and judged by the rest.
+
+#include <vector>
+
+#include "batch/batch.hpp"
+#include "batch/smoothed_attitude.hpp"
+#include "trihedron/records/run.hpp"
+
+namespace trihedron::ground {
+
+struct Forecast {
+  DriftModelId drift_model;
+  /// ln of the likelihood of each part of the pass by the parts before it, but for the first ones; up to a constant
+  /// that the models share.
+  double log_likelihood = 0;
+  struct Fit {
+    Time until{};
+    std::vector<GyroParameters> gyros;
+  };
+  std::vector<Fit> fits;  ///< to the parts before each forecast
+};
+
+/// Of these drift models, all of which the problem's contains, in this order; the problem taken as linear about its
+/// solution. Empty where it has too few arcs to have parts.
+[[nodiscard]] std::vector<Forecast> forecasts(const PassProblem& problem, const BatchResult& found,
+                                              const std::vector<DriftModelId>& models);
+
+/// Flies the fits open loop, each until the next one, over the smoothed pass.
+[[nodiscard]] std::vector<DriftModelForecast> flown(const std::vector<Forecast>& forecasts,
+                                                    const SmoothedCourse& course);
+
+}  // namespace trihedron::ground

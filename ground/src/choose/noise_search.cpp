@@ -1,0 +1,128 @@
+#include "choose/noise_search.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <future>
+#include <map>
+#include <optional>
+#include <utility>
+#include <vector>
+
+namespace trihedron::ground {
+namespace {
+
+/// Goes uphill over process noise on a grid, each by two numbers.
+class Search {
+ public:
+  using Point = std::pair<int, int>;
+  using At = std::function<ProcessNoise(double, int)>;
+
+  /// From the best of `starts`, (0, 0) among them, to the best of its neighbours, and so on, within the bounds; all
+  /// included.
+  Search(const Trial& trial, At at, const std::vector<Point>& starts, const Point& lowest, const Point& highest)
+      : trial_(trial), linear_(trial.linear()), at_(std::move(at)) {
+    gather_constants(linear_.prior, linear_.prior_y, linear_.stages);
+    look_at(starts);
+    for (std::optional<Point> last; last != best_;) {
+      last = best_;
+      const auto [i, j] = best_;
+      look_at({{std::max(i - 1, lowest.first), j},
+               {std::min(i + 1, highest.first), j},
+               {i, std::max(j - 1, lowest.second)},
+               {i, std::min(j + 1, highest.second)}});
+    }
+  }
+
+  /// The best point, its first number by a parabola through its neighbours where it has two.
+  [[nodiscard]] Likely best() const {
+    const auto [i, j] = best_;
+    const double peak = tried_.at(best_);
+    const auto below = tried_.find({i - 1, j});
+    const auto above = tried_.find({i + 1, j});
+    double beside = 0;
+    if (below != tried_.end() && above != tried_.end()) {
+      beside = (above->second - below->second) / (4 * peak - 2 * below->second - 2 * above->second);
+    }
+    return {at_(i + beside, j), peak, peak - tried_.at({0, 0})};
+  }
+
+ private:
+  void look_at(const std::vector<Point>& points) {
+    std::map<Point, std::future<double>> runs;
+    for (const Point& point : points) {
+      if (!tried_.contains(point) && !runs.contains(point)) {
+        runs.emplace(point, std::async(std::launch::async, [this, noise = at_(point.first, point.second)] {
+                       return trial_.log_likelihood(linear_, noise);
+                     }));
+      }
+    }
+    for (auto& [point, run] : runs) {
+      tried_[point] = run.get();
+    }
+    best_ = std::ranges::max_element(tried_, [](const auto& a, const auto& b) { return a.second < b.second; })->first;
+  }
+
+  const Trial& trial_;
+  PassProblem::Linear linear_;
+  At at_;
+  std::map<Point, double> tried_;
+  Point best_;
+};
+
+/// Where the model is wrong there is more than one maximum.
+const std::vector<Search::Point> kAllLevels = {{0, 0}, {3, 0}, {6, 0}, {9, 0}};
+
+/// The trial with the process noise that makes the pass most likely, and that: outliers are told apart by it.
+Likely settled(Trial& trial, const Search::At& at, const std::vector<Search::Point>& starts,
+               const Search::Point& lowest, const Search::Point& highest) {
+  constexpr int kRounds = 3;
+  Likely likely;
+  for (int round = 0; round < kRounds; ++round) {
+    const ProcessNoise before = likely.noise;
+    likely = Search(trial, at, starts, lowest, highest).best();
+    trial.refit(likely.noise);
+    const auto same = [](double a, double b) { return std::abs(a - b) <= kNotable * b; };
+    if (same(before.direction_random_walk_rad_sqrt_s, likely.noise.direction_random_walk_rad_sqrt_s) &&
+        same(before.wandering_sigma_rad_s, likely.noise.wandering_sigma_rad_s) &&
+        same(before.wandering_time_s, likely.noise.wandering_time_s)) {
+      break;
+    }
+  }
+  return likely;
+}
+
+}  // namespace
+
+Likely with_most_likely_walk(Trial& trial, const CalibrationOptions& options) {
+  const ProcessNoise least{std::max(options.direction_random_walk_rad_sqrt_s, kLeastWalk_rad_sqrt_s),
+                           options.further_states.wandering_drift_rad_s,
+                           to_seconds(options.further_states.wandering_time)};
+  const auto at = [least](double level, int) {
+    ProcessNoise noise = least;
+    noise.direction_random_walk_rad_sqrt_s *= std::pow(2, level);
+    return noise;
+  };
+  return settled(trial, at, kAllLevels, {0, 0}, {9, 0});
+}
+
+Likely with_most_likely_wandering(Trial& trial, const CalibrationOptions& options) {
+  constexpr double kShortest_s = 400;
+  constexpr double kLongest_s = 3 * 3600;
+  const ProcessNoise told{options.direction_random_walk_rad_sqrt_s, options.further_states.wandering_drift_rad_s,
+                          to_seconds(options.further_states.wandering_time)};
+  const auto at = [told](double level, int time) {
+    ProcessNoise noise = told;
+    noise.wandering_sigma_rad_s *= std::pow(2, level);
+    noise.wandering_time_s *= std::pow(3, time);
+    return noise;
+  };
+  const auto times_within = [&](double limit_s) {
+    return static_cast<int>(std::floor(std::abs(std::log(told.wandering_time_s / limit_s)) / std::log(3.0) + 1e-6));
+  };
+  const int shorter = told.wandering_time_s > kShortest_s ? times_within(kShortest_s) : 0;
+  const int longer = told.wandering_time_s < kLongest_s ? times_within(kLongest_s) : 0;
+  return settled(trial, at, {{0, 0}, {2, 0}, {4, 0}, {6, 0}}, {-3, -shorter}, {9, longer});
+}
+
+}  // namespace trihedron::ground

@@ -1,0 +1,51 @@
+#pragma once
+/// What a pass says about a choice of states, in a fraction of the time of a calibration: what decisions are made by.
+
+#include <Eigen/Core>
+#include <vector>
+
+#include "batch/batch.hpp"
+#include "choose/forecast.hpp"
+#include "onboard/screen.hpp"
+
+namespace trihedron::ground {
+
+/// The whole pass with one choice of states. Further states are judged by ln of the Bayes factor for their being free
+/// instead of zero.
+class Trial {
+ public:
+  /// Refers to `screened`, which needs a fix. Throws SetupError.
+  Trial(const Pass& pass, const Screened& screened, const CalibrationOptions& options);
+
+  /// Again, with other noise.
+  void refit(const ProcessNoise& noise);
+
+  [[nodiscard]] const PassProblem::Linear& linear() const { return found_.linear; }
+  /// `linear`: that of linear(), however its rows are put together.
+  [[nodiscard]] double log_likelihood(const PassProblem::Linear& linear, const ProcessNoise& noise) const {
+    return ground::log_likelihood(problem_, found_.before, linear, noise);
+  }
+
+  /// ln of the Bayes factor of these states, which the trial must have; of kWanderingDrift and kStarTrackerAlignment a
+  /// trial tells none.
+  [[nodiscard]] double log_evidence(FurtherState state) const;
+  /// Of its drift model and those that it contains.
+  [[nodiscard]] std::vector<Forecast> forecasts() const;
+
+  /// How the difference of the first star tracker from the gyros changes from fix to fix, about c x, y, z: all that is
+  /// slow cancels.
+  [[nodiscard]] std::vector<Eigen::Vector3d> changes_rad() const;
+
+ private:
+  [[nodiscard]] const PassLayout& layout() const { return problem_.setup().layout; }
+  [[nodiscard]] const GyroParameters& gyro(int k) const { return found_.solution.gyros[static_cast<std::size_t>(k)]; }
+  [[nodiscard]] double of_shared(int state, int size, double prior_sigma) const;
+  [[nodiscard]] double of_readout_bias() const;
+  [[nodiscard]] double of_coefficient_change() const;
+
+  DriftModelId drift_model_;
+  PassProblem problem_;
+  BatchResult found_;
+};
+
+}  // namespace trihedron::ground

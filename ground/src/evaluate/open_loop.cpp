@@ -1,0 +1,163 @@
+#include "trihedron/ground/evaluate/open_loop.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <chrono>
+
+#include "model/prior.hpp"
+#include "trihedron/core/optimal_attitude.hpp"
+#include "trihedron/core/precession.hpp"
+#include "trihedron/core/telemetry.hpp"
+#include "trihedron/ground/model/setup_error.hpp"
+
+namespace trihedron::ground {
+namespace {
+
+constexpr int kPair = 2;
+using Directions = PerGyro<Eigen::Vector3d, kPair>;
+
+/// The drift turns by nanoradians over such a step: the midpoint rule loses nothing even in a slew.
+constexpr Duration kStep = std::chrono::seconds(3);
+/// The body's acceleration over it is below the readout noise.
+constexpr Duration kMaxInterpolation = std::chrono::milliseconds(500);
+
+/// Directions at any time, interpolated between samples; asked for in ascending order.
+class Readings {
+ public:
+  explicit Readings(const GyroTelemetry& telemetry) : telemetry_(telemetry) {}
+
+  /// Nothing in a gap, or where a sample is no direction.
+  [[nodiscard]] std::optional<Directions> at(Time t) {
+    const auto& times = telemetry_.t;
+    while (next_ < times.size() && times[next_] < t) {
+      ++next_;
+    }
+    if (next_ == times.size()) {
+      return std::nullopt;
+    }
+    const std::size_t before = times[next_] == t || next_ == 0 ? next_ : next_ - 1;
+    const Duration apart = times[next_] - times[before];
+    if (times[before] > t || apart > kMaxInterpolation) {
+      return std::nullopt;
+    }
+    const double fraction = apart == Duration::zero() ? 0 : to_seconds(t - times[before]) / to_seconds(apart);
+    Directions h_b;
+    for (int k = 0; k < kPair; ++k) {
+      const Eigen::Vector3d first = telemetry_.direction(before, k);
+      const Eigen::Vector3d second = telemetry_.direction(next_, k);
+      if (!nearly_unit(first.norm()) || !nearly_unit(second.norm())) {
+        return std::nullopt;
+      }
+      h_b[k] = ((1 - fraction) * first + fraction * second).normalized();
+    }
+    return h_b;
+  }
+
+ private:
+  const GyroTelemetry& telemetry_;
+  std::size_t next_ = 0;
+};
+
+/// A gyro flown with what is known of it.
+struct Flown {
+  GyroParameters parameters;
+  DriftFamily family;
+};
+
+Directions in_c(const std::vector<Flown>& gyros, const Directions& h_b) {
+  Directions h_c;
+  for (int k = 0; k < kPair; ++k) {
+    h_c[k] = seen_in_c(gyros[static_cast<std::size_t>(k)].parameters, h_b[k]);
+  }
+  return h_c;
+}
+
+/// By the midpoint rule, at an attitude and readings of the middle of the step.
+void precess(const std::vector<Flown>& gyros, const Eigen::Matrix3d& C_in_c, const Directions& h_b, double dt_s,
+             Directions& h_in) {
+  for (int k = 0; k < kPair; ++k) {
+    const auto& [parameters, family] = gyros[static_cast<std::size_t>(k)];
+    const Eigen::Vector3d unbiased = without_bias<double>(h_b[k], parameters.readout_bias);
+    const Eigen::Vector3d omega_in = C_in_c * (parameters.C_c_b * (family.basis(unbiased) * parameters.drift_rad_s));
+    h_in[k] = rotated<double>(h_in[k], omega_in * dt_s).normalized();
+  }
+}
+
+CorrectionInterval interval_of(const AttitudeErrors& errors, double limit_rad) {
+  const auto intervals = correction_intervals(errors, limit_rad);
+  return intervals.empty() ? CorrectionInterval{} : intervals.front();
+}
+
+}  // namespace
+
+AttitudeHistory fly_open_loop(const Pass& pass, Time t, const std::vector<GyroCalibration>& gyros,
+                              const std::vector<Time>& epochs) {
+  if (gyros.size() < kPair) {
+    throw SetupError("an open loop needs two gyros", "give a calibration of a pair");
+  }
+  std::vector<Flown> flown;
+  Directions h_in;
+  for (int k = 0; k < kPair; ++k) {
+    const GyroCalibration& record = gyros[static_cast<std::size_t>(k)];
+    const DriftFamily family = family_of(record);
+    flown.push_back({parameters_of(record, family), family});
+    h_in[k] = record.momentum_in;
+  }
+  AttitudeHistory history;
+  Readings readings(pass.gyro);
+  std::optional<Directions> last = readings.at(t);
+  Time last_t = t;
+  auto epoch = std::ranges::lower_bound(epochs, t);
+  for (Time now = t; epoch != epochs.end(); now = std::min(now + kStep, *epoch)) {
+    if (const std::optional<Directions> h_b = readings.at(now)) {
+      Directions middle = *h_b;
+      for (int k = 0; k < kPair && last; ++k) {
+        middle[k] = ((*last)[k] + (*h_b)[k]).normalized();
+      }
+      if (const auto attitude = trihedron_attitude(h_in, in_c(flown, middle))) {
+        precess(flown, attitude.value().C_in_c.raw(), middle, to_seconds(now - last_t), h_in);
+        last = h_b;
+        last_t = now;
+      }
+      if (const auto attitude = trihedron_attitude(h_in, in_c(flown, *h_b)); attitude && now == *epoch) {
+        history.t.push_back(now);
+        history.q_in_c.push_back(attitude.value().C_in_c.quaternion());
+        history.age_s.push_back(to_seconds(now - t));
+      }
+    }
+    if (now == *epoch) {
+      ++epoch;
+    }
+    if (epoch == epochs.end()) {
+      break;
+    }
+  }
+  return history;
+}
+
+std::vector<OpenLoops> fly_open_loops(const Pass& pass, const CalibrationRun& run, const std::vector<Time>& reference_t,
+                                      const std::vector<Eigen::Quaterniond>& reference_q_in_c, double limit_rad) {
+  const auto errors_of = [&](Time t, const std::vector<GyroCalibration>& gyros) {
+    return attitude_errors(fly_open_loop(pass, t, gyros, reference_t), reference_t, reference_q_in_c);
+  };
+  std::vector<OpenLoops> all;
+  for (const Correction& correction : run.corrections) {
+    OpenLoops loops;
+    loops.known_before = errors_of(correction.t, correction.known_before);
+    loops.calibrated = errors_of(correction.t, correction.calibrated);
+    loops.intervals = {interval_of(loops.known_before, limit_rad), interval_of(loops.calibrated, limit_rad)};
+    all.push_back(std::move(loops));
+  }
+  return all;
+}
+
+std::optional<Extension> median_extension(const std::vector<OpenLoops>& loops) {
+  std::vector<IntervalPair> pairs;
+  for (std::size_t i = 1; i < loops.size(); ++i) {
+    pairs.push_back(loops[i].intervals);
+  }
+  return median_extension(pairs);
+}
+
+}  // namespace trihedron::ground

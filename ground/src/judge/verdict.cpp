@@ -1,0 +1,480 @@
+#include "trihedron/ground/judge/verdict.hpp"
+
+#include <fmt/format.h>
+
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <boost/math/distributions/chi_squared.hpp>
+#include <chrono>
+#include <cmath>
+#include <limits>
+#include <map>
+#include <numbers>
+#include <utility>
+
+#include "judge/whiteness.hpp"
+#include "model/orbital_rate.hpp"
+#include "trihedron/core/frames.hpp"
+#include "trihedron/core/telemetry.hpp"
+#include "trihedron/ground/evaluate/convergence.hpp"
+#include "trihedron/ground/evaluate/used_fixes.hpp"
+
+namespace trihedron::ground {
+namespace {
+
+using Severity = Finding::Severity;
+
+constexpr double kArcsecond = std::numbers::pi / 180 / 3600;
+
+/// A mean NIS off its expectation by more than this part says that the noise is not what the filter was told, whatever
+/// the number of fixes; its sigmas are then off by half of it.
+constexpr double kNisTolerance = 0.025;
+/// …and by more than this, that the model is wrong: the error hides in the parameters.
+constexpr double kNisWrong = 0.25;
+/// Two nominal alignment accuracies of the system.
+constexpr double kWeakAlignment_rad = 20 * kArcsecond;
+/// A drift of a few degrees per day, of a gyro or of the orbit plane, is below the noise over this time; over longer
+/// ones it can stand in for an alignment.
+constexpr Duration kDriftStretch = std::chrono::minutes(10);
+/// One in five: the filter then lives on a selection of its own.
+constexpr double kMostlyRejected = 0.2;
+/// One in twenty.
+constexpr double kManyRejected = 0.05;
+constexpr double kBadlyPlacedSine = 0.5;
+/// The paper: alignment settles within one orbit.
+constexpr double kOneOrbit_s = 90 * 60;
+
+void add(std::vector<Finding>& findings, FindingCode code, std::string text, std::string evidence, std::string cure) {
+  findings.push_back({code, std::move(text), std::move(evidence), std::move(cure)});
+}
+
+Verdict verdict_of(std::vector<Finding> findings) {
+  Verdict verdict;
+  verdict.findings = std::move(findings);
+  verdict.trustworthy =
+      std::ranges::none_of(verdict.findings, [](const Finding& f) { return f.severity == Severity::kDoNotUse; });
+  return verdict;
+}
+
+void judge_number_of_fixes(const Statistics& statistics, std::vector<Finding>& findings) {
+  if (statistics.fixes_used < 100) {
+    add(findings, FindingCode::kTooFewFixes,
+        fmt::format("Only {} star-tracker fixes could be used.", statistics.fixes_used),
+        fmt::format("{} fixes in the telemetry", statistics.fixes),
+        "Calibrate on a longer pass, or find out why the fixes were rejected.");
+  }
+}
+
+void judge_length(const Pass& pass, std::vector<Finding>& findings) {
+  const double span_s = to_seconds(pass.gyro.t.back() - pass.gyro.t.front());
+  if (span_s < kOneOrbit_s) {
+    add(findings, FindingCode::kShortPass,
+        "The pass is shorter than one orbit: alignment and drift coefficients are not yet told apart.",
+        fmt::format("{:.1f} min of telemetry", span_s / 60),
+        "Alignment takes about one orbit, drift coefficients two to three.");
+  }
+}
+
+void judge_rejections(const Statistics& statistics, std::vector<Finding>& findings) {
+  const auto outliers = static_cast<double>(statistics.fixes_rejected_as_outliers);
+  const auto fixes = static_cast<double>(statistics.fixes);
+  if (outliers > kManyRejected * fixes) {
+    add(findings, FindingCode::kManyRejected,
+        fmt::format("{:.1f} % of the fixes were rejected as outliers.", 100 * outliers / fixes),
+        fmt::format("{:.0f} of {:.0f}", outliers, fixes),
+        "This is seldom the tracker alone: look for a clock offset, a wrong noise figure or drift outside the model.");
+    if (outliers > kMostlyRejected * fixes) {
+      findings.back().severity = Severity::kDoNotUse;
+    }
+  }
+  if (statistics.reopened > 0) {
+    add(findings, FindingCode::kReopened,
+        "The filter lost the momenta and had to set them free: the model did not hold between fixes.",
+        fmt::format("{} time(s), each after a run of rejections", statistics.reopened),
+        "Raise the process noise, or look there for a gap, a jump of the tracker or drift outside the model.");
+  }
+}
+
+void judge_batch(const Statistics& statistics, std::vector<Finding>& findings) {
+  if (!statistics.batch_converged.value_or(true)) {
+    add(findings, FindingCode::kBatchNotConverged,
+        "Least squares over the whole pass did not settle: its values are those of the last step.",
+        fmt::format("{} iterations", statistics.batch_iterations.value_or(0)),
+        "Use estimator invariant, and look for a model that does not hold over the whole pass.");
+  }
+}
+
+void judge_star_tracker(const Statistics& statistics, std::vector<Finding>& findings) {
+  if (statistics.fixes_off_in_a_row > 0) {
+    add(findings, FindingCode::kStarTrackerOff,
+        "For a while the star tracker was off by more than any drift can make; it was not believed.",
+        fmt::format("{} fixes, 20 and more in a row", statistics.fixes_off_in_a_row),
+        "Look at its telemetry there: a wrong identification, or a head that was moved.");
+  }
+}
+
+void judge_gyros(const Pass& pass, const CalibrationRun& run, std::vector<Finding>& findings) {
+  const auto tell = [&](GyroState state, FindingCode code, const char* text, const char* cure) {
+    std::vector<GyroEvent> events;
+    std::ranges::copy_if(run.gyro_events, std::back_inserter(events),
+                         [&](const GyroEvent& event) { return event.state == state; });
+    if (!events.empty()) {
+      add(findings, code, text, fmt::format("{}", fmt::join(texts_of(events, pass.settings.epoch), "; ")), cure);
+    }
+    return !events.empty();
+  };
+  const auto isolated = std::count_if(run.gyro_events.begin(), run.gyro_events.end(),
+                                      [](const GyroEvent& event) { return event.state == GyroState::kIsolated; });
+  const bool enough = static_cast<long>(run.calibration.gyros.size()) - isolated >= 2;
+  const bool told =
+      tell(GyroState::kIsolated, FindingCode::kGyroIsolated,
+           enough ? "A gyro alone did not agree with the rest, time after time; the others went on without it."
+                  : "A gyro alone did not agree with the rest, time after time; without it there is no pair.",
+           "Look at its telemetry from there on. Its estimates are those of before.");
+  if (told && !enough) {
+    findings.back().severity = Severity::kDoNotUse;
+  }
+  tell(GyroState::kStuck, FindingCode::kGyroStuck,
+       "Readings of a gyro stood still, not even moved by noise; they were not used.",
+       "Look at the telemetry there: a frozen readout, or the last value repeated in a gap.");
+}
+
+void judge_nis(const Statistics& statistics, const std::string& what_is_wrong, std::vector<Finding>& findings) {
+  if (statistics.nis_count < 1 || !statistics.nis_mean) {
+    return;
+  }
+  const auto count = static_cast<double>(statistics.nis_count);
+  const double freedom = statistics.nis_degrees_of_freedom;
+  const double nis = *statistics.nis_mean;
+  const boost::math::chi_squared sum(freedom * count);
+  const double low = boost::math::quantile(sum, 0.0005) / count;
+  const double high = boost::math::quantile(boost::math::complement(sum, 0.0005)) / count;
+  if (nis >= std::min(low, freedom * (1 - kNisTolerance)) && nis <= std::max(high, freedom * (1 + kNisTolerance))) {
+    return;
+  }
+  const bool above = nis > freedom;
+  const bool wrong = nis > freedom * (1 + kNisWrong) || nis < freedom * (1 - kNisWrong);
+  add(findings, FindingCode::kNisOutOfBounds,
+      above ? "The fixes scatter more than the filter expects: " + what_is_wrong + ", and its sigmas are too small."
+            : "The fixes scatter less than the filter expects: the noise is overstated, and its sigmas are too large.",
+      fmt::format("mean NIS {:.3f} over {:.0f} fixes; 99.9 % of consistent filters lie in {:.3f} … {:.3f}", nis, count,
+                  low, high),
+      above ? "Look for a tracker clock offset, an error at orbital period or drift outside the model; correct the "
+              "noise figures or "
+              "raise the process noise."
+            : "Correct the noise figures in pass.toml.");
+  if (wrong) {
+    findings.back().severity = Severity::kDoNotUse;
+  }
+}
+
+/// The chance that a good pass is found fault with.
+constexpr double kOneIn = 1e-5;
+/// Below these what is left in the innovations harms nothing.
+constexpr double kCorrelated = 0.05;
+constexpr double kLineInSigmas = 0.1;
+
+bool is_chance(double square, int degrees_of_freedom) {
+  return degrees_of_freedom == 0 ||
+         square <= boost::math::quantile(boost::math::complement(boost::math::chi_squared(degrees_of_freedom), kOneIn));
+}
+
+void judge_whiteness(const Pass& pass, const CalibrationRun& run, std::vector<Finding>& findings) {
+  const Whiteness found = whiteness(run.fixes, orbital_rate_rad_s(pass.star_tracker));
+  constexpr const char* kCure =
+      "Look for drift or a star-tracker error that the model does not have: more of [further_states], a larger drift "
+      "model, estimator batch.";
+  if (std::abs(found.largest_correlation) > kCorrelated &&
+      !is_chance(found.correlation_square, found.degrees_of_freedom)) {
+    add(findings, FindingCode::kInnovationsNotWhite,
+        "Fixes that follow each other are off alike: something is left in them that the model does not have, and its "
+        "sigmas are too small.",
+        fmt::format("autocorrelation up to {:+.3f}; N Σ r² {:.0f} of {} degrees of freedom", found.largest_correlation,
+                    found.correlation_square, found.degrees_of_freedom),
+        kCure);
+  }
+  for (const Whiteness::Line& line : found.lines) {
+    if (line.amplitude > kLineInSigmas && !is_chance(2 * line.power, line.degrees_of_freedom)) {
+      add(findings, FindingCode::kOrbitalLine,
+          fmt::format("The innovations have a line at {} the orbital rate.", line.multiple == 1 ? "" : "twice"),
+          fmt::format("amplitude up to {:.2f} sigma; twice the power {:.0f} of {} degrees of freedom", line.amplitude,
+                      2 * line.power, line.degrees_of_freedom),
+          kCure);
+    }
+  }
+}
+
+void judge_halves(const Statistics& statistics, std::vector<Finding>& findings) {
+  const double square = statistics.halves_chi_square.value_or(0);
+  const int freedom = statistics.halves_degrees_of_freedom.value_or(0);
+  if (!is_chance(square, freedom)) {
+    add(findings, FindingCode::kHalvesDisagree,
+        "The first half of the pass gives other parameters than the whole: they moved, or the model is incomplete.",
+        fmt::format("chi-square {:.0f} of {} degrees of freedom", square, freedom),
+        "Let the coefficients change (coefficient_change = \"on\" in [further_states]), give more process noise, or "
+        "calibrate a shorter pass.");
+  }
+}
+
+/// A model that is this much less likely than another is wrong, as ln.
+constexpr double kClearly = 10;
+
+void judge_drift_model(const CalibrationRun& run, std::vector<Finding>& findings) {
+  const auto& models = run.drift_models;
+  const auto used = std::ranges::find_if(models, [&](const DriftModelForecast& model) {
+    return model.drift_model == run.calibration.gyros[0].drift_model;
+  });
+  if (used == models.end()) {
+    return;
+  }
+  const auto likelier = [](const DriftModelForecast& a, const DriftModelForecast& b) {
+    return a.log_likelihood < b.log_likelihood;
+  };
+  const auto evidence = [&](const DriftModelForecast& better) {
+    return fmt::format("{} is more likely by a factor of e^{:.0f}; forecast error {:.1f}″ in place of {:.1f}″",
+                       name_of(better.drift_model), better.log_likelihood - used->log_likelihood,
+                       better.open_loop_rms_rad / kArcsecond, used->open_loop_rms_rad / kArcsecond);
+  };
+  const auto larger = std::max_element(used, models.end(), likelier);
+  if (larger->log_likelihood > used->log_likelihood + kClearly) {
+    add(findings, FindingCode::kDriftModelTooSmall,
+        "The gyros drift in a way that the drift model does not contain; its coefficients and sigmas are wrong.",
+        evidence(*larger), fmt::format("Use drift model {}, or {}.", name_of(larger->drift_model), kAutoDriftModel));
+  }
+  const auto smaller = std::max_element(models.begin(), std::next(used), likelier);
+  if (smaller->log_likelihood > used->log_likelihood + kClearly) {
+    add(findings, FindingCode::kDriftModelTooLarge,
+        "The drift model has coefficients that the pass does not support: they add their own error to what comes next.",
+        evidence(*smaller), fmt::format("Use drift model {}, or {}.", name_of(smaller->drift_model), kAutoDriftModel));
+  }
+  if (used + 1 == models.end() && models.size() > 1 && used->drift_model == kLargestDriftModel) {
+    add(findings, FindingCode::kDriftModelAtItsLimit,
+        "Even the largest drift model is not clearly enough: there may be drift of still higher degree.",
+        evidence(*std::prev(used)),
+        "Do not trust single coefficients; the forecast error says what the attitude suffers.");
+  }
+}
+
+void judge_change(const CalibrationRun& run, std::vector<Finding>& findings) {
+  std::string names;
+  for (const FurtherEstimate& state : run.calibration.further) {
+    if (state.parameter.is_further(FurtherState::kCoefficientChange) && std::abs(state.value) > 3 * state.sigma) {
+      names += fmt::format("{}{} {:+.2e} ± {:.0e} rad/s", names.empty() ? "" : ", ", name_of(state.parameter),
+                           state.value, state.sigma);
+    }
+  }
+  if (!names.empty()) {
+    add(findings, FindingCode::kCoefficientsChanged,
+        "Drift coefficients changed over the pass; those given are of its end, and may go on changing.", names,
+        "Calibrate again soon: the rotors may still be warming up.");
+  }
+}
+
+void judge_star_tracker_errors(const CalibrationRun& run, std::vector<Finding>& findings) {
+  constexpr double kSure = 5;
+  double clock_s = 0;
+  double orbital_rad = 0;
+  double sureness = 0;
+  for (const FurtherEstimate& state : run.calibration.further) {
+    if (std::abs(state.value) < kSure * state.sigma) {
+      continue;
+    }
+    if (state.parameter.is_further(FurtherState::kClockOffset)) {
+      clock_s = state.value;
+    } else if (state.parameter.is_further(FurtherState::kOrbitalError) &&
+               std::abs(state.value) > std::abs(orbital_rad)) {
+      orbital_rad = state.value;
+      sureness = std::abs(state.value / state.sigma);
+    }
+  }
+  if (clock_s != 0) {
+    add(findings, FindingCode::kClockOffsetFound,
+        "The clock of the star tracker is off; the calibration has taken account of it.",
+        fmt::format("fixes hold the attitude {:+.2f} ms after their stamp", 1e3 * clock_s),
+        "Correct the time stamps of the star tracker.");
+  }
+  if (orbital_rad != 0) {
+    add(findings, FindingCode::kOrbitalErrorFound,
+        "The star tracker has an error at orbital period; the calibration has taken account of it.",
+        fmt::format("largest component {:.1f}″, {:.0f} sigmas", orbital_rad / kArcsecond, sureness),
+        "None needed; look for what warms its mounting.");
+  }
+}
+
+void judge_noise(const Pass& pass, const CalibrationRun& run, std::vector<Finding>& findings) {
+  if (const auto& found = run.options.star_tracker_noise_rad; found && run.options.find_noise) {
+    const Eigen::Vector3d told = pass.settings.star_tracker_noise_rad / kArcsecond;
+    const Eigen::Vector3d now = *found / kArcsecond;
+    add(findings, FindingCode::kStarTrackerNoise,
+        "The fixes scatter otherwise than pass.toml says; the noise found was used.",
+        fmt::format("{:.1f}″ {:.1f}″ {:.1f}″ found, {:.1f}″ {:.1f}″ {:.1f}″ told", now.x(), now.y(), now.z(), told.x(),
+                    told.y(), told.z()),
+        "Correct the noise figures of the star tracker in pass.toml.");
+  }
+}
+
+void judge_determination(const CalibrationRun& run, std::vector<Finding>& findings) {
+  std::string names;
+  for (std::size_t i = 0; i < run.calibration.states.size(); ++i) {
+    // A member outside eq. (1) is taken on so that the others do not suffer; alone it need not be known.
+    const ParameterId& state = run.calibration.states[i];
+    const bool outside = state.is_drift() && !state.coefficient.is_in_eq1();
+    if (!outside && !is_determined(run, i)) {
+      names += (names.empty() ? "" : ", ") + name_of(state);
+    }
+  }
+  if (!names.empty()) {
+    add(findings, FindingCode::kNotDetermined,
+        "The data do not determine " + names + "; value and sigma are about those of the prior.",
+        "posterior sigma above half of the prior sigma", "Calibrate on a longer pass, with slews.");
+  }
+}
+
+void judge_steadiness(const Pass& pass, const CalibrationRun& run, std::vector<Finding>& findings) {
+  // Outliers would seem to move a steady axis.
+  const StarTrackerTelemetry used = used_fixes(pass, run.fixes);
+  const Eigen::Vector3d& noise = pass.settings.star_tracker_noise_rad;
+  const auto observability = alignment_observability(used, noise, noise.minCoeff());
+  if (observability.sigma_rad <= kWeakAlignment_rad) {
+    return;
+  }
+  const Eigen::Vector3d& axis = observability.weakest_axis_c;
+  const bool believes = run.options.estimator == Estimator::kPaper;
+  add(findings, FindingCode::kWeakAlignmentAxis,
+      fmt::format(
+          "Steady flight: the axis ({:+.3f}, {:+.3f}, {:+.3f}) in c is fixed in the body and in space (the "
+          "orbit normal, where the spacecraft faces the Earth), so the alignment of each gyro about it cannot be "
+          "told from its initial direction. {} The attitude does not suffer while the flight stays steady.",
+          axis.x(), axis.y(), axis.z(),
+          believes ? "Estimator paper takes noise for information there: do not believe its sigmas about this axis."
+                   : "The sigmas say so."),
+      fmt::format("about {:.0f}″ at best about this axis from the fixes alone", observability.sigma_rad / kArcsecond),
+      "Fly slews about the other axes during the calibration: ten minutes of 10° and more suffice.");
+}
+
+void judge_unused_sensors(const Pass& pass, const CalibrationRun& run, std::vector<Finding>& findings) {
+  const auto used = static_cast<int>(run.calibration.gyros.size());
+  if (pass.gyro.gyros > used) {
+    add(findings, FindingCode::kGyrosNotUsed,
+        fmt::format("Estimator {} works on a pair: gyros beyond the first {} were not used.",
+                    name_of(run.options.estimator), used),
+        fmt::format("{} gyros in the telemetry", pass.gyro.gyros), "None needed; put the pair you want first.");
+  }
+  const bool second = std::ranges::any_of(run.calibration.further, [](const FurtherEstimate& state) {
+    return state.parameter.is_further(FurtherState::kStarTrackerAlignment);
+  });
+  const std::size_t heads = second ? 2 : 1;
+  if (1 + pass.further_star_trackers.size() > heads) {
+    add(findings, FindingCode::kStarTrackersNotUsed,
+        fmt::format("Estimator {} of {} gyros works with {} star tracker{}: those beyond were not used.",
+                    name_of(run.options.estimator), used, heads, second ? "s" : ""),
+        fmt::format("{} star trackers in the telemetry", 1 + pass.further_star_trackers.size()), "None needed.");
+  }
+}
+
+void judge_pair(const CalibrationRun& run, std::vector<Finding>& findings) {
+  const auto angle = angle_between<double>(run.calibration.gyros[0].momentum_in, run.calibration.gyros[1].momentum_in);
+  if (std::sin(angle) < kBadlyPlacedSine) {
+    add(findings, FindingCode::kPairBadlyPlaced,
+        "The momenta lie within 30° of one line: the attitude about them is worse than the readout by 1/sinθ.",
+        fmt::format("angle {:.1f}°, factor {:.1f}", angle * 180 / std::numbers::pi, 1 / std::sin(angle)),
+        "Start one rotor along another axis.");
+  }
+}
+
+}  // namespace
+
+std::vector<std::string> texts_of(const std::vector<GyroEvent>& events, Time epoch) {
+  struct Seen {
+    long times = 0;
+    Time first{};
+  };
+  std::map<std::pair<int, GyroState>, Seen> seen;
+  for (const GyroEvent& event : events) {
+    Seen& its = seen[{event.gyro, event.state}];
+    its.first = its.times++ == 0 ? event.t : its.first;
+  }
+  std::vector<std::string> texts;
+  for (const auto& [what, its] : seen) {
+    const double minutes = to_seconds(its.first - epoch) / 60;
+    texts.push_back(fmt::format("gyro {} {}{} {:.1f} min", what.first + 1, name_of(what.second),
+                                its.times > 1 ? fmt::format(" {} times, first at", its.times) : " at", minutes));
+  }
+  return texts;
+}
+
+AlignmentObservability alignment_observability(const StarTrackerTelemetry& tracker,
+                                               const Eigen::Vector3d& tracker_noise_rad, double fix_noise_rad) {
+  // With a free direction φ in each stretch, fixes y = φ − C δ leave Σ (C − mean C)ᵀ (C − mean C) of information on δ.
+  Eigen::Matrix3d information = Eigen::Matrix3d::Zero();
+  Eigen::Matrix3d sum = Eigen::Matrix3d::Zero();
+  double count = 0;
+  double total = 0;
+  const auto close_stretch = [&] {
+    if (count > 0) {
+      information += count * Eigen::Matrix3d::Identity() - sum.transpose() * sum / count;
+    }
+    total += count;
+    sum.setZero();
+    count = 0;
+  };
+  for (std::size_t i = 0; i < tracker.size(); ++i) {
+    if (i > 0 &&
+        (tracker.t[i] - tracker.t.front()) / kDriftStretch != (tracker.t[i - 1] - tracker.t.front()) / kDriftStretch) {
+      close_stretch();
+    }
+    if (nearly_unit(tracker.q_in_c[i].norm())) {
+      sum += tracker.q_in_c[i].normalized().toRotationMatrix();
+      ++count;
+    }
+  }
+  close_stretch();
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(information);
+  AlignmentObservability result;
+  result.weakest_axis_c = solver.eigenvectors().col(0);
+  // The tracker's own noise makes a steady axis seem to move.
+  const double noise =
+      total * (tracker_noise_rad.cwiseAbs2().array() * (1 - result.weakest_axis_c.array().square())).sum();
+  result.sigma_rad = fix_noise_rad / std::sqrt(std::max(solver.eigenvalues()(0) - noise, 0.0));
+  return result;
+}
+
+Verdict judge(const Pass& pass, const CalibrationRun& run) {
+  std::vector<Finding> findings;
+  const Statistics& statistics = run.calibration.statistics;
+  judge_number_of_fixes(statistics, findings);
+  judge_length(pass, findings);
+  judge_rejections(statistics, findings);
+  judge_nis(statistics, "its model is incomplete or the noise is understated", findings);
+  judge_noise(pass, run, findings);
+  judge_whiteness(pass, run, findings);
+  judge_halves(statistics, findings);
+  judge_drift_model(run, findings);
+  judge_change(run, findings);
+  judge_star_tracker_errors(run, findings);
+  judge_determination(run, findings);
+  judge_steadiness(pass, run, findings);
+  judge_pair(run, findings);
+  judge_star_tracker(statistics, findings);
+  judge_batch(statistics, findings);
+  judge_gyros(pass, run, findings);
+  judge_unused_sensors(pass, run, findings);
+  return verdict_of(std::move(findings));
+}
+
+Verdict judge_navigation(const NavigationRun& run) {
+  std::vector<Finding> findings;
+  if (run.held_parameters_misfit && *run.held_parameters_misfit > run.misfit_limit) {
+    add(findings, FindingCode::kCalibrationDoesNotFit,
+        "The parameters held do not fit this pass: the calibration that ran along moved away from them by more than "
+        "their sigmas allow.",
+        fmt::format("misfit {:.0f} (squared, in sigmas); 99.9 % of fitting calibrations lie below {:.0f}",
+                    *run.held_parameters_misfit, run.misfit_limit),
+        "Calibrate anew; drift coefficients change at every start of a rotor.");
+  }
+  judge_rejections(run.statistics, findings);
+  judge_nis(run.statistics, "the calibration in use does not fit this pass, or the model is incomplete", findings);
+  return verdict_of(std::move(findings));
+}
+
+}  // namespace trihedron::ground

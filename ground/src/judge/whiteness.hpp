@@ -1,0 +1,31 @@
+#pragma once
+/// What innovations show that are not white.
+
+#include <vector>
+
+#include "trihedron/records/run.hpp"
+
+namespace trihedron::ground {
+
+/// Over all components of the innovations of the first star tracker, each in its sigma.
+struct Whiteness {
+  /// Autocorrelation of fixes 1 … kLags apart: N Σ r² is χ² of so many degrees of freedom where they are white.
+  double correlation_square = 0;
+  int degrees_of_freedom = 0;
+  double largest_correlation = 0;
+
+  /// At a multiple of the orbital rate. Twice the power is χ² of `degrees_of_freedom` where there is no line.
+  struct Line {
+    int multiple = 1;
+    double power = 0;  ///< Σ |Σ z exp(−i n t)|² / N
+    int degrees_of_freedom = 0;
+    double amplitude = 0;  ///< of the strongest component, in its sigma
+  };
+  std::vector<Line> lines;
+
+  static constexpr int kLags = 10;
+};
+
+[[nodiscard]] Whiteness whiteness(const std::vector<FixRecord>& fixes, double orbital_rate_rad_s);
+
+}  // namespace trihedron::ground

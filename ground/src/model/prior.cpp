@@ -1,0 +1,136 @@
+#include "model/prior.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "trihedron/ground/model/setup_error.hpp"
+#include "trihedron/records/drift_models.hpp"
+
+namespace trihedron::ground {
+namespace {
+
+/// Prior sigma of a coefficient by that of those of eq. (1): further members are taken to be smaller, of each degree
+/// from 2 on the more so the faster they change with h, so that each moves the momentum alike. Of esg20 all alike.
+double prior_factor(const DriftModelId& model, const DriftCoefficient& coefficient) {
+  constexpr double kOutsideEq1 = 0.05;
+  if (coefficient.is_in_eq1()) {
+    return 1;
+  }
+  const int degree = model == kEsg20 ? 2 : std::max<int>(coefficient.degree, 2);
+  return kOutsideEq1 * std::sqrt(6.0 / (degree * (degree + 1)));
+}
+
+/// Puts means, and sigmas of κ and δ.
+void put_prior(const GyroPrior& prior, int number, const Layout& layout, Gyro& mean, Eigen::Ref<Eigen::VectorXd> sigma) {
+  const std::vector<DriftCoefficient> coefficients = coefficients_of(layout.drift_model);
+  for (const auto* table : {&prior.drift_rad_s, &prior.drift_sigma_rad_s}) {
+    for (const auto& [coefficient, value] : *table) {
+      if (std::ranges::find(coefficients, coefficient) == coefficients.end()) {
+        throw SetupError(fmt::format("the prior of gyro {} names drift coefficient '{}'", number, name_of(coefficient)),
+                         fmt::format("the drift model has {}", fmt::join(coefficient_names(layout.drift_model), ", ")));
+      }
+    }
+  }
+  const auto value_or = [](const std::map<DriftCoefficient, double>& table, const DriftCoefficient& coefficient,
+                           double otherwise) {
+    const auto found = table.find(coefficient);
+    return found == table.end() ? otherwise : found->second;
+  };
+  mean.drift_rad_s.setZero(layout.drift_columns());
+  for (int i = 0; i < layout.drift_size(); ++i) {
+    const DriftCoefficient& coefficient = coefficients[static_cast<std::size_t>(i)];
+    mean.drift_rad_s(i) = value_or(prior.drift_rad_s, coefficient, 0);
+    sigma(i) = value_or(prior.drift_sigma_rad_s, coefficient,
+                        prior_factor(layout.drift_model, coefficient) * prior.drift_common_sigma_rad_s);
+  }
+  mean.C_c_b = Rot<C, B<1>>::exp(Vec<C>::assume(prior.alignment_rotation_vector_rad)).raw();
+  sigma.tail<3>() = prior.alignment_sigma_rad;
+}
+
+Prior prior_of_calibration(const Calibration& earlier, const Layout& layout) {
+  Prior prior;
+  std::vector<Eigen::Index> rows;
+  for (const ParameterId& state : drift_and_alignment(layout.drift_model, static_cast<std::size_t>(layout.gyros))) {
+    const auto found = std::ranges::find(earlier.states, state);
+    if (found == earlier.states.end()) {
+      throw SetupError(fmt::format("the earlier calibration has no covariance of '{}'", name_of(state)),
+                       "use a calibration of these gyros, made with the same drift model");
+    }
+    rows.push_back(found - earlier.states.begin());
+  }
+  prior.covariance = earlier.covariance(rows, rows);
+  for (int k = 0; k < layout.gyros; ++k) {
+    prior.gyros[k] = gyro_of(earlier.gyros[static_cast<std::size_t>(k)], layout);
+  }
+  return prior;
+}
+
+}  // namespace
+
+void refuse_unknown(const DriftModelId& drift_model) {
+  const bool has_degree = drift_model.family == DriftModelId::Family::kVsh;
+  if (has_degree && (drift_model.degree < 1 || drift_model.degree > DriftModelId::kMaxDegree)) {
+    throw SetupError(fmt::format("there is no drift model '{}'", name_of(drift_model)),
+                     fmt::format("use {}, {}", kAutoDriftModel, drift_model_choices()));
+  }
+}
+
+void refuse_incomplete(const GyroCalibration& gyro) {
+  refuse_unknown(gyro.drift_model);
+  if (gyro.drift_rad_s.size() != static_cast<std::size_t>(gyro.drift_model.size())) {
+    throw SetupError(fmt::format("a gyro's coefficients are not those of drift model {}", name_of(gyro.drift_model)),
+                     fmt::format("give {}", fmt::join(coefficient_names(gyro.drift_model), ", ")));
+  }
+}
+
+Gyro gyro_of(const GyroCalibration& record, const Layout& layout) {
+  Gyro gyro;
+  gyro.drift_rad_s.setZero(layout.drift_columns());
+  const std::vector<DriftCoefficient> own = coefficients_of(record.drift_model);
+  const std::vector<DriftCoefficient> wanted = coefficients_of(layout.drift_model);
+  for (std::size_t i = 0; i < wanted.size(); ++i) {
+    const auto index = static_cast<std::size_t>(std::ranges::find(own, wanted[i]) - own.begin());
+    gyro.drift_rad_s(static_cast<Eigen::Index>(i)) = index < record.drift_rad_s.size() ? record.drift_rad_s[index] : 0;
+  }
+  gyro.h_in = record.momentum_in;
+  gyro.C_c_b = Rot<C, B<1>>::exp(Vec<C>::assume(record.alignment_rotation_vector_rad)).raw();
+  gyro.readout_bias = record.readout_bias;
+  return gyro;
+}
+
+GyroCalibration record_of(const Gyro& gyro, const Layout& layout, double part_of_change) {
+  GyroCalibration record;
+  record.drift_model = layout.drift_model;
+  Eigen::VectorXd drift = gyro.drift_rad_s.head(layout.drift_size());
+  if (layout.further.coefficient_change) {
+    drift.head<Layout::kEq1>() += part_of_change * gyro.drift_rad_s.segment<Layout::kEq1>(layout.change_column());
+  }
+  record.drift_rad_s.assign(drift.begin(), drift.end());
+  record.alignment_rotation_vector_rad = Rot<C, B<1>>::assume(gyro.C_c_b).log().raw();
+  record.readout_bias = gyro.readout_bias;
+  record.momentum_in = gyro.h_in;
+  return record;
+}
+
+Prior prior_of(const PassSettings& settings, const Layout& layout) {
+  if (settings.prior) {
+    return prior_of_calibration(*settings.prior, layout);
+  }
+  Prior prior;
+  Eigen::VectorXd sigma(layout.parameters());
+  const int own = layout.drift_size() + 3;
+  for (int k = 0; k < layout.gyros; ++k) {
+    put_prior(settings.gyros[static_cast<std::size_t>(k)], k + 1, layout, prior.gyros[k],
+              sigma.segment(static_cast<Eigen::Index>(k) * own, own));
+  }
+  prior.covariance = sigma.cwiseAbs2().asDiagonal();
+  return prior;
+}
+
+}  // namespace trihedron::ground

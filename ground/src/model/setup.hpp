@@ -1,0 +1,28 @@
+#pragma once
+/// From settings and options to what an estimator is set up with: the same for the on-board step and the batch.
+
+#include <vector>
+
+#include "trihedron/core/setup.hpp"
+#include "trihedron/core/step_report.hpp"
+#include "trihedron/records/options.hpp"
+#include "trihedron/records/parameter_id.hpp"
+#include "trihedron/records/pass.hpp"
+
+namespace trihedron::ground {
+
+/// The states that decided options ask for, of a spacecraft with these gyros and star trackers. Throws SetupError where
+/// something is left open in the options, or the estimator cannot have it.
+[[nodiscard]] Layout layout_of(const PassSettings& settings, const CalibrationOptions& options);
+
+/// Noise, priors of the further states, gates; the layout is layout_of().
+[[nodiscard]] CalibrationSetup setup_of(const PassSettings& settings, const CalibrationOptions& options);
+
+[[nodiscard]] CorrectionPolicy policy_of(const CorrectionOptions& options);
+
+/// The components of the further states that a layout has and a calibration tells of, in the order of calibration.json.
+[[nodiscard]] std::vector<ParameterId> further_parameters(const Layout& layout);
+/// Where a component of a further state stands in the layout, which must have it.
+[[nodiscard]] int state_of(const Layout& layout, const ParameterId& parameter);
+
+}  // namespace trihedron::ground

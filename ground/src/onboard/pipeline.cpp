@@ -1,0 +1,243 @@
+#include "trihedron/ground/onboard/pipeline.hpp"
+
+#include <Eigen/Cholesky>
+#include <utility>
+#include <variant>
+
+#include "model/prior.hpp"
+#include "model/setup.hpp"
+#include "trihedron/core/on_board.hpp"
+#include "trihedron/ground/model/setup_error.hpp"
+
+namespace trihedron::ground {
+namespace {
+
+using Roots = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+
+SetupError error_of(SetupFault fault) {
+  switch (fault) {
+    case SetupFault::kPriorNotPositiveDefinite:
+      return {"the prior covariance is not positive definite",
+              "give each parameter a prior sigma above zero, and correlations below one"};
+    case SetupFault::kPriorMeanNotUsable:
+      return {"a prior mean is not finite, or an alignment is not a rotation", "correct the prior"};
+    case SetupFault::kNoiseNotPositive:
+      return {"a noise sigma is not positive",
+              "give positive readout and star-tracker noise, and process noise of zero or more"};
+    case SetupFault::kGateNotPositive:
+      return {"the gate or a number of rejections before reopening is not positive", "give positive numbers"};
+    case SetupFault::kTooLarge:
+      break;
+  }
+  return {"there are more states than there is room for", "use fewer gyros, or a smaller drift model"};
+}
+
+/// With the room of another model, as many columns.
+template <class To, class From>
+To with_room(const From& from, const Layout& layout) {
+  To to;
+  for (int k = 0; k < layout.gyros; ++k) {
+    to[k].h_in = from[k].h_in;
+    to[k].drift_rad_s = from[k].drift_rad_s;
+    to[k].C_c_b = from[k].C_c_b;
+    to[k].readout_bias = from[k].readout_bias;
+  }
+  return to;
+}
+
+}  // namespace
+
+struct Pipeline::Program {
+  using Paper = OnBoard<PaperEstimator>;
+  std::variant<std::unique_ptr<FullOnBoard>, std::unique_ptr<Paper>> on_board;
+  Layout layout;
+  Prior prior;
+
+  template <class Body>
+  auto visit(Body&& body) const {
+    return std::visit([&](const auto& its) { return body(*its); }, on_board);
+  }
+
+  template <class Type>
+  void set_up(const CalibrationSetup& setup, const CorrectionPolicy& policy) {
+    auto its = std::make_unique<Type>();
+    if (const auto fault =
+            its->set_up(setup, with_room<typename Type::Gyros>(prior.gyros, layout), prior.covariance, policy)) {
+      throw error_of(*fault);
+    }
+    on_board = std::move(its);
+  }
+
+  [[nodiscard]] Gyros gyros() const {
+    return visit([&](const auto& its) { return with_room<Gyros>(its.estimator().gyros(), layout); });
+  }
+
+  /// Of the errors of the states before the shared ones, root rootᵀ their covariance.
+  [[nodiscard]] Roots error_root() const {
+    return visit([&](const auto& its) {
+      Roots root(its.estimator().error_layout().shared(), its.estimator().states());
+      its.estimator().error_root(rows_of(root));
+      return root;
+    });
+  }
+
+  /// The same of κ and δ, the coefficients as they are when so much of their change has been.
+  [[nodiscard]] Roots parameter_root(double part_of_change) const {
+    const Roots errors = error_root();
+    Roots root = errors.middleRows(layout.drift(0), layout.parameters());
+    if (layout.further.coefficient_change) {
+      for (int k = 0; k < layout.gyros; ++k) {
+        root.middleRows(layout.drift(k) - layout.drift(0), Layout::kEq1) +=
+            part_of_change * errors.middleRows(layout.change(k), Layout::kEq1);
+      }
+    }
+    return root;
+  }
+};
+
+Pipeline::Pipeline(const PassSettings& settings, const CalibrationOptions& options, bool navigate)
+    : settings_(settings), options_(options), program_(std::make_unique<Program>()) {
+  const CalibrationSetup setup = setup_of(settings, options);
+  program_->layout = setup.layout;
+  program_->prior = prior_of(settings, setup.layout);
+  CorrectionPolicy policy = policy_of(options.corrections);
+  policy.navigate = navigate;
+  if (options.estimator == Estimator::kPaper) {
+    program_->set_up<Program::Paper>(setup, policy);
+  } else {
+    program_->set_up<FullOnBoard>(setup, policy);
+  }
+}
+
+Pipeline::Pipeline(Pipeline&&) noexcept = default;
+Pipeline& Pipeline::operator=(Pipeline&&) noexcept = default;
+Pipeline::~Pipeline() = default;
+
+std::span<const StepReport> Pipeline::feed(const GyroSample& sample) {
+  reports_.clear();
+  std::visit(
+      [&](auto& its) {
+        reports_.push_back(its->on_gyro(sample));
+        while (reports_.back().more_due) {
+          reports_.push_back(its->carry_on());
+        }
+      },
+      program_->on_board);
+  return reports_;
+}
+
+std::span<const StepReport> Pipeline::feed(const StarFix& fix) {
+  reports_.clear();
+  std::visit(
+      [&](auto& its) {
+        reports_.push_back(its->on_fix(fix));
+        while (reports_.back().more_due) {
+          reports_.push_back(its->carry_on());
+        }
+      },
+      program_->on_board);
+  return reports_;
+}
+
+std::span<const StepReport> Pipeline::finish() {
+  reports_.clear();
+  std::visit(
+      [&](auto& its) {
+        for (StepReport report = its->flush(); report.fix.status != FixStatus::kNone; report = its->flush()) {
+          reports_.push_back(report);
+        }
+      },
+      program_->on_board);
+  return reports_;
+}
+
+const Layout& Pipeline::layout() const { return program_->layout; }
+
+bool Pipeline::started() const {
+  return program_->visit([](const auto& its) { return its.estimator().started(); });
+}
+
+double Pipeline::part_of_change() const {
+  return program_->visit([](const auto& its) { return its.estimator().setup().part_of_change(its.t()); });
+}
+
+std::vector<GyroCalibration> Pipeline::gyros() const {
+  std::vector<GyroCalibration> records;
+  const Gyros gyros = program_->gyros();
+  for (int k = 0; k < layout().gyros; ++k) {
+    records.push_back(record_of(gyros[k], layout(), part_of_change()));
+  }
+  return records;
+}
+
+std::vector<GyroCalibration> Pipeline::gyros_before() const {
+  std::vector<GyroCalibration> records;
+  for (int k = 0; k < layout().gyros; ++k) {
+    records.push_back(record_of(program_->prior.gyros[k], layout(), 0));
+  }
+  return records;
+}
+
+Eigen::VectorXd Pipeline::state_sigmas() const { return program_->parameter_root(part_of_change()).rowwise().norm(); }
+
+Calibration Pipeline::calibration() const {
+  Calibration result;
+  result.estimator = options_.estimator;
+  result.epoch = settings_.epoch;
+  result.t = program_->visit([](const auto& its) { return its.t(); });
+  result.gyros = gyros();
+  result.states = drift_and_alignment(layout().drift_model, static_cast<std::size_t>(layout().gyros));
+  const Roots root = program_->parameter_root(part_of_change());
+  result.covariance = root * root.transpose();
+  result.noise = CalibrationNoise{options_.direction_random_walk_rad_sqrt_s, options_.star_tracker_noise_rad};
+  if (layout().further.wandering_drift) {
+    result.noise->wandering_drift_rad_s = options_.further_states.wandering_drift_rad_s;
+    result.noise->wandering_time_s = to_seconds(options_.further_states.wandering_time);
+  }
+  if (const auto* full = std::get_if<std::unique_ptr<FullOnBoard>>(&program_->on_board)) {
+    const auto& estimator = (*full)->estimator();
+    const Gyros gyros = program_->gyros();
+    Roots all(layout().size(), layout().size());
+    estimator.error_root(rows_of(all));
+    for (const ParameterId& parameter : further_parameters(layout())) {
+      const int state = state_of(layout(), parameter);
+      const Gyro& gyro = gyros[parameter.owner];
+      double value = 0;
+      if (parameter.is_further(FurtherState::kReadoutBias)) {
+        value = gyro.readout_bias(parameter.component);
+      } else if (parameter.is_further(FurtherState::kCoefficientChange)) {
+        value = gyro.drift_rad_s(layout().change_column() + parameter.component);
+      } else {
+        value = estimator.shared()(state - layout().shared());
+      }
+      result.further.push_back({parameter, value, all.row(state).norm()});
+    }
+  }
+  return result;
+}
+
+double Pipeline::squared_distance_from_prior() const {
+  const Gyros gyros = program_->gyros();
+  Eigen::VectorXd moved(layout().parameters());
+  for (int k = 0; k < layout().gyros; ++k) {
+    const Gyro& held = program_->prior.gyros[k];
+    const int row = layout().drift(k) - layout().drift(0);
+    moved.segment(row, layout().drift_size()) =
+        gyros[k].drift_rad_s.head(layout().drift_size()) - held.drift_rad_s.head(layout().drift_size());
+    moved.segment<3>(row + layout().drift_size()) =
+        Rot<C, C>::assume(Eigen::Matrix3d(gyros[k].C_c_b * held.C_c_b.transpose())).log().raw();
+  }
+  return moved.dot(program_->prior.covariance.llt().solve(moved));
+}
+
+std::optional<AttitudeSolution> Pipeline::navigation_attitude() const {
+  return program_->visit([](const auto& its) -> std::optional<AttitudeSolution> {
+    if (!its.navigator().started()) {
+      return std::nullopt;
+    }
+    const auto solution = its.navigation_attitude();
+    return solution ? std::optional(solution.value()) : std::nullopt;
+  });
+}
+
+}  // namespace trihedron::ground

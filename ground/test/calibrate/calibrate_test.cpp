@@ -1,0 +1,525 @@
+#include "trihedron/ground/calibrate/calibrate.hpp"
+
+#include <gmock/gmock.h>
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <numbers>
+#include <vector>
+
+#include "passes.hpp"
+#include "trihedron/core/frames.hpp"
+#include "trihedron/ground/evaluate/evaluate.hpp"
+#include "trihedron/ground/evaluate/used_fixes.hpp"
+#include "trihedron/ground/model/setup_error.hpp"
+#include "trihedron/io/pass.hpp"
+#include "trihedron/records/run.hpp"
+#include "trihedron/sim/simulate.hpp"
+
+namespace trihedron::ground {
+namespace {
+
+using testing::HasSubstr;
+
+/// The first minutes of a pass.
+Pass beginning(Pass pass, Duration duration) {
+  const auto cut = [&](std::vector<Time>& t) {
+    t.erase(std::upper_bound(t.begin(), t.end(), pass.settings.epoch + duration), t.end());
+  };
+  cut(pass.gyro.t);
+  pass.gyro.h.resize(3 * static_cast<std::size_t>(pass.gyro.gyros) * pass.gyro.t.size());
+  cut(pass.star_tracker.t);
+  pass.star_tracker.q_in_c.resize(pass.star_tracker.t.size());
+  return pass;
+}
+
+TEST(Calibrate, FindsTheTruthWithinItsSigmas) {
+  std::vector<double> progress;
+  const auto run = calibrate(two_hours().pass, {}, [&](double fraction) { progress.push_back(fraction); });
+  const Calibration& result = run.calibration;
+  ASSERT_EQ(result.states.size(), 20U);
+  EXPECT_EQ(result.states[9], "gyro1.align_z");
+  Eigen::Index row = 0;
+  for (std::size_t k = 0; k < 2; ++k) {
+    const Truth::Gyro& truth = two_hours().truth.gyros[k];
+    for (std::size_t i = 0; i < 7; ++i, ++row) {
+      EXPECT_EQ(result.gyros[k].drift_rad_s[i].first, truth.drift_rad_s[i].first);
+      EXPECT_LT(std::abs(result.gyros[k].drift_rad_s[i].second - truth.drift_rad_s[i].second),
+                4 * std::sqrt(result.covariance(row, row)));
+    }
+    const Eigen::Vector3d error = alignment_error(truth, result.gyros[k]);
+    for (int axis = 0; axis < 3; ++axis, ++row) {
+      EXPECT_LT(std::abs(error(axis)), 4 * std::sqrt(result.covariance(row, row)));
+    }
+  }
+  EXPECT_EQ(result.estimator, "invariant");
+  EXPECT_TRUE(result.further.empty());
+  EXPECT_NEAR(result.statistics.at("nis_mean"), 4, 0.2);
+  EXPECT_EQ(result.t, two_hours().pass.gyro.t.back());
+  EXPECT_GT(progress.size(), 50U);
+  EXPECT_LE(progress.back(), 1);
+}
+
+TEST(Calibrate, SmoothsTheAttitude) {
+  const auto run = calibrate(two_hours().pass, told());
+  const auto errors = attitude_errors(run.attitude, two_hours().truth.t, two_hours().truth.q_in_c);
+  const auto last = statistics_by_stretch(errors, two_hours().pass.settings.epoch, std::chrono::minutes(30)).at(3);
+  // Single readings give 2″.
+  EXPECT_LT(last.rms_rad.maxCoeff(), 1.2 * kArcsecond);
+  EXPECT_NEAR(*last.normalised_square, 1, 0.5);
+}
+
+TEST(Calibrate, RecordsEveryFixAndSample) {
+  const auto run = calibrate(two_hours().pass, told());
+  EXPECT_EQ(run.fixes.size(), two_hours().pass.star_tracker.size());
+  EXPECT_EQ(run.samples.at("used"), static_cast<long>(two_hours().pass.gyro.size()));
+  EXPECT_EQ(run.fix_counts.at("used"), static_cast<long>(run.fixes.size()) - 1);
+  EXPECT_EQ(run.parameters.t.size(), (run.fixes.size() + 3) / 4);  // each fourth is 12 s after the last
+  EXPECT_EQ(run.attitude.size(), run.fixes.size());
+  EXPECT_EQ(run.navigation.age_s.size(), run.fixes.size());
+  EXPECT_GE(run.angle_t.size(), run.fixes.size() - 1);
+  EXPECT_EQ(
+      std::count_if(run.fixes.begin(), run.fixes.end(), [](const FixRecord& fix) { return fix.corrected_navigator; }),
+      2);
+  // After the correction at 90 min the open loop holds an arcminute.
+  const auto errors = attitude_errors(run.navigation, two_hours().truth.t, two_hours().truth.q_in_c);
+  EXPECT_LT(
+      statistics_by_stretch(errors, two_hours().pass.settings.epoch, std::chrono::minutes(90)).at(1).max_total_rad,
+      2.9e-4);
+}
+
+TEST(Calibrate, StartsFromAnEarlierCalibration) {
+  const auto first = calibrate(two_hours().pass, told());
+  Pass pass = two_hours().pass;
+  pass.settings.prior = first.calibration;
+  const auto second = calibrate(pass, told());
+  // Known beforehand: the navigator is good from the first minute.
+  const auto errors = attitude_errors(second.navigation, two_hours().truth.t, two_hours().truth.q_in_c);
+  EXPECT_LT(statistics_by_stretch(errors, pass.settings.epoch, std::chrono::minutes(90)).at(0).max_total_rad, 2.9e-4);
+  EXPECT_LT(second.calibration.covariance.trace(), first.calibration.covariance.trace());
+}
+
+TEST(Calibrate, KnowsTheReadoutBiasOfAnEarlierCalibration) {
+  CalibrationOptions options = told();
+  options.further_states.readout_bias = FurtherStateOptions::Choice::kOn;
+  const auto first = calibrate(two_hours().pass, options).calibration;
+  Pass pass = beginning(two_hours().pass, std::chrono::minutes(10));
+  pass.settings.prior = first;
+  const auto second = calibrate(pass, options).calibration;
+  double largest = 0;
+  for (const FurtherEstimate& bias : first.further) {
+    largest = std::max(largest, bias.sigma);
+  }
+  EXPECT_LT(largest, 0.5e-4);
+  ASSERT_EQ(second.further.size(), 6U);
+  for (const FurtherEstimate& bias : second.further) {
+    EXPECT_LE(bias.sigma, 1.0001 * largest);
+  }
+}
+
+TEST(Calibrate, GoesByTheNoiseOfAnEarlierCalibration) {
+  Pass pass = beginning(two_hours().pass, std::chrono::minutes(20));
+  Calibration earlier = calibrate(pass, told()).calibration;
+  ASSERT_TRUE(earlier.noise.has_value());
+  EXPECT_EQ(earlier.noise->direction_random_walk_rad_sqrt_s, told().direction_random_walk_rad_sqrt_s);
+  EXPECT_FALSE(earlier.noise->star_tracker_noise_rad.has_value());
+  EXPECT_EQ(earlier.noise->wandering_drift_rad_s, 0);
+  earlier.noise = CalibrationNoise{1e-7, Eigen::Vector3d(1e-5, 2e-5, 1e-4), 3e-8, 1200};
+  pass.settings.prior = earlier;
+  const CalibrationRun run = calibrate(pass, {});
+  EXPECT_EQ(run.options.direction_random_walk_rad_sqrt_s, 1e-7);
+  EXPECT_EQ(run.options.star_tracker_noise_rad, earlier.noise->star_tracker_noise_rad);
+  EXPECT_EQ(run.options.further_states.wandering_drift, FurtherStateOptions::Choice::kOn);
+  EXPECT_EQ(run.options.further_states.wandering_drift_rad_s, 3e-8);
+  EXPECT_EQ(run.calibration.noise->wandering_time_s, 1200);
+  // The walk that is told is the least.
+  CalibrationOptions more;
+  more.direction_random_walk_rad_sqrt_s = 2e-7;
+  EXPECT_EQ(calibrate(pass, more).options.direction_random_walk_rad_sqrt_s, 2e-7);
+  // Not where it is told.
+  CalibrationOptions options;
+  options.find_noise = false;
+  EXPECT_EQ(calibrate(pass, options).options.direction_random_walk_rad_sqrt_s,
+            options.direction_random_walk_rad_sqrt_s);
+}
+
+TEST(Calibrate, WithTwoStarTrackersFindsNoOtherNoiseThanTheirs) {
+  Scenario scenario = scenario_in_eq1(12, std::chrono::minutes(55));
+  scenario.further_star_trackers.resize(1, scenario.star_tracker);
+  scenario.further_star_trackers[0].mounting_rotation_vector_rad = Eigen::Vector3d(1.2, 0, 0);
+  const auto run = calibrate(sim::simulate(scenario).pass, {});
+  EXPECT_TRUE(run.options.find_noise);
+  EXPECT_FALSE(run.options.star_tracker_noise_rad.has_value());
+  EXPECT_NEAR(run.calibration.statistics.at("nis_mean"), 4, 0.3);
+}
+
+TEST(Calibrate, TakesAStarTrackerThatSaysNothingForHalfOfThePass) {
+  Pass pass = beginning(two_hours().pass, std::chrono::minutes(20));
+  for (std::size_t i = pass.star_tracker.size() / 2; i < pass.star_tracker.size(); ++i) {
+    pass.star_tracker.q_in_c[i].coeffs().setConstant(std::nan(""));
+  }
+  const auto run = calibrate(pass, told());
+  EXPECT_EQ(used_fixes(pass, run.fixes).size(), pass.star_tracker.size() / 2);
+}
+
+TEST(UsedFixes, AreThoseOfTheFirstStarTrackerInOrderOfTime) {
+  Pass pass;
+  std::vector<FixRecord> fixes;
+  const auto at = [](int s) { return Time(std::chrono::seconds(s)); };
+  for (const int s : {10, 11, 12, 12}) {
+    pass.star_tracker.t.push_back(at(s));
+    pass.star_tracker.q_in_c.push_back(Eigen::Quaterniond::Identity());
+  }
+  pass.star_tracker.q_in_c[1].coeffs().setConstant(std::nan(""));
+  const auto record = [&](int s, int head, FixStatus status) {
+    FixRecord fix;
+    fix.t = at(s);
+    fix.head = head;
+    fix.status = status;
+    fixes.push_back(fix);
+  };
+  record(11, 0, FixStatus::kRejectedNotRotation);  // at once
+  record(12, 0, FixStatus::kRejectedOutOfOrder);
+  record(10, 0, FixStatus::kUsed);
+  record(11, 1, FixStatus::kUsed);
+  record(12, 0, FixStatus::kUsed);
+  EXPECT_THAT(used_fixes(pass, fixes).t, testing::ElementsAre(at(10), at(12)));
+}
+
+TEST(Calibrate, UsesThePriorsOfThePass) {
+  Pass pass = two_hours().pass;
+  pass.settings.gyros[1].drift_rad_s["nu12"] = two_hours().truth.gyros[1].drift_rad_s[4].second;
+  pass.settings.gyros[1].drift_sigma_rad_s["nu12"] = 1e-12;
+  const auto run = calibrate(pass, told());
+  EXPECT_LE(std::sqrt(run.calibration.covariance(14, 14)), 1.001e-12);
+  EXPECT_EQ(run.calibration.states[14], "gyro2.nu12");
+}
+
+TEST(Navigate, GivesAnAttitudeForEverySampleAndAHonestSigma) {
+  CalibrationOptions options = told();
+  options.corrections.interval = std::chrono::minutes(30);
+  const auto run = navigate(two_hours().pass, options);
+  // From when the samples round the first fix are there.
+  EXPECT_GT(run.attitude.size(), two_hours().pass.gyro.size() - 20);
+  EXPECT_TRUE(run.verdict.trustworthy);
+  const auto errors = attitude_errors(run.attitude, two_hours().truth.t, two_hours().truth.q_in_c);
+  // The last half hour: 600 epochs whose readout noise is independent; parameters are shared, hence the wide band.
+  EXPECT_NEAR(
+      *statistics_by_stretch(errors, two_hours().pass.settings.epoch, std::chrono::minutes(30)).at(3).normalised_square,
+      1, 0.5);
+}
+
+TEST(Navigate, HoldsTheParametersItWasGiven) {
+  Pass pass = two_hours().pass;
+  pass.settings.prior = calibrate(pass, told()).calibration;
+  CalibrationOptions options = told();
+  options.corrections.when = CorrectionOptions::When::kOnlyFirst;
+  options.corrections.take_parameters = false;
+  const auto run = navigate(pass, options);
+  EXPECT_NEAR(run.attitude.age_s.back(), 7200, 0.2);
+  const auto errors = attitude_errors(run.attitude, two_hours().truth.t, two_hours().truth.q_in_c);
+  EXPECT_LT(statistics(errors).max_total_rad, 5e-4);
+}
+
+TEST(Navigate, KnowsHowWrongTheParametersItHoldsMayBe) {
+  // Nothing known beforehand, and nothing taken over: minutes of error, under sigmas of minutes.
+  CalibrationOptions options = told();
+  options.corrections.take_parameters = false;
+  const auto run = navigate(two_hours().pass, options);
+  const auto errors = attitude_errors(run.attitude, two_hours().truth.t, two_hours().truth.q_in_c);
+  const auto whole = statistics(errors);
+  EXPECT_GT(whole.max_total_rad, 1e-3);
+  // One draw of the parameters for the whole pass: the mean square is about one, within a factor of several.
+  EXPECT_LT(*whole.normalised_square, 4);
+  ASSERT_TRUE(run.held_parameters_misfit.has_value());
+  EXPECT_LT(*run.held_parameters_misfit, run.misfit_limit);  // the truth is a draw from the prior
+}
+
+TEST(Replay, TellsOfFixesAfterTheLastSample) {
+  Pass pass = two_hours().pass;
+  pass.gyro.t.resize(8 * 3600);
+  pass.gyro.h.resize(6 * pass.gyro.t.size());
+  const auto run = calibrate(pass, told());
+  EXPECT_EQ(run.fixes.size(), pass.star_tracker.size());
+  EXPECT_EQ(run.fix_counts.at("rejected: no gyro samples round it"), 1201);  // from 3600 s on, 7200 s among them
+}
+
+std::string setup_error(const Pass& pass, const CalibrationOptions& options = {}) {
+  try {
+    static_cast<void>(calibrate(pass, options));
+  } catch (const SetupError& error) {
+    EXPECT_FALSE(error.cure().empty());
+    return error.what();
+  }
+  return "no error";
+}
+
+TEST(SetupError, NamesWhatCannotWork) {
+  const Pass good = beginning(two_hours().pass, std::chrono::minutes(2));
+  CalibrationOptions options;
+  options.estimator = "magic";
+  EXPECT_THAT(setup_error(good, options), HasSubstr("magic"));
+  options = {};
+  options.drift_model = "vsh:9";
+  EXPECT_THAT(setup_error(good, options), HasSubstr("vsh:9"));
+  options = {};
+  options.gate_nis = 0;
+  EXPECT_THAT(setup_error(good, options), HasSubstr("gate"));
+  options = {};
+  options.direction_random_walk_rad_sqrt_s = -1;
+  EXPECT_THAT(setup_error(good, options), HasSubstr("noise"));
+  options = {};
+  options.estimator = "paper";
+  options.further_states.clock_offset = FurtherStateOptions::Choice::kOn;
+  EXPECT_THAT(setup_error(good, options), HasSubstr("has no state 'clock_offset'"));
+
+  Pass pass = good;
+  pass.settings.gyros[0].drift_sigma_rad_s["k7"] = 1;
+  EXPECT_THAT(setup_error(pass), HasSubstr("k7"));
+  pass = good;
+  pass.settings.gyros[1].drift_common_sigma_rad_s = 0;
+  EXPECT_THAT(setup_error(pass), HasSubstr("positive definite"));
+  pass = good;
+  pass.settings.gyros[0].drift_rad_s["k0"] = std::nan("");
+  EXPECT_THAT(setup_error(pass), HasSubstr("mean"));
+  pass = good;
+  pass.settings.gyros.pop_back();
+  EXPECT_THAT(setup_error(pass), HasSubstr("needs 2 gyros"));
+  pass = good;
+  pass.star_tracker = {};
+  EXPECT_THAT(setup_error(pass), HasSubstr("no fix could be used"));
+  for (std::size_t i = 0; i < pass.gyro.size(); ++i) {
+    std::copy_n(&pass.gyro.h[6 * i], 3, &pass.gyro.h[6 * i + 3]);
+  }
+  pass.star_tracker = good.star_tracker;
+  EXPECT_THAT(setup_error(pass), HasSubstr("parallel"));
+  EXPECT_THROW(static_cast<void>(navigate(pass, {})), SetupError);
+}
+
+TEST(SetupError, NamesADriftModelThatIsForTheWholePass) {
+  Pass pass = beginning(two_hours().pass, std::chrono::minutes(20));
+  CalibrationOptions options = told();
+  options.drift_model = "vsh:1";
+  const Calibration calibration = calibrate(pass, options).calibration;
+  EXPECT_EQ(calibration.estimator, "batch");
+  options.estimator = "paper";
+  EXPECT_THAT(setup_error(pass, options), HasSubstr("vsh:1"));
+  pass.settings.prior = calibration;
+  options = told();
+  options.drift_model = "auto";
+  const CalibrationRun next = calibrate(pass, options);
+  EXPECT_EQ(next.calibration.gyros[0].drift_model, "vsh:1");
+  EXPECT_THROW(static_cast<void>(navigate(pass, {})), SetupError);
+}
+
+TEST(SetupError, NamesWhatIsWrongWithAnEarlierCalibration) {
+  Pass pass = beginning(two_hours().pass, std::chrono::minutes(20));
+  const Calibration good = calibrate(pass, told()).calibration;
+  pass.settings.prior = good;
+  pass.settings.prior->gyros.pop_back();
+  EXPECT_THAT(setup_error(pass), HasSubstr("has 1 gyros; the pass has 2"));
+  pass.settings.prior = good;
+  pass.settings.prior->gyros[1].drift_model = "vsh:3";
+  EXPECT_THAT(setup_error(pass), HasSubstr("vsh:3"));
+  pass.settings.prior = good;
+  pass.settings.prior->states[3] = "gyro1.heat";
+  EXPECT_THAT(setup_error(pass), HasSubstr("gyro1.mu31"));
+  pass.settings.prior = good;
+  pass.settings.prior->covariance.setZero();
+  EXPECT_THAT(setup_error(pass), HasSubstr("positive definite"));
+}
+
+/// Passes made by an independent generator; no part of the product.
+class SamplePass : public testing::TestWithParam<const char*> {};
+
+INSTANTIATE_TEST_SUITE_P(WithSlews, SamplePass, testing::Values("pass-a", "pass-d"),
+                         [](const auto& name) { return std::string(1, name.param[5]); });
+
+TEST_P(SamplePass, IsCalibratedToAnArcsecondOrSo) {
+  const std::filesystem::path path = std::filesystem::path(TRIHEDRON_SAMPLE_PASSES) / GetParam();
+  if (!std::filesystem::exists(path)) {
+    GTEST_SKIP() << "no sample passes here";
+  }
+  constexpr double kArcsecond = std::numbers::pi / 180 / 3600;
+  const auto run = calibrate(io::read_pass(path).pass, {});
+  const Truth truth = io::read_truth(path).value();
+  for (std::size_t k = 0; k < 2; ++k) {
+    EXPECT_LT(alignment_error(truth.gyros[k], run.calibration.gyros[k]).norm(), 1.5 * kArcsecond);
+    double error2 = 0;
+    double size2 = 0;
+    for (std::size_t i = 0; i < 7; ++i) {
+      error2 += std::pow(truth.gyros[k].drift_rad_s[i].second - run.calibration.gyros[k].drift_rad_s[i].second, 2);
+      size2 += std::pow(truth.gyros[k].drift_rad_s[i].second, 2);
+    }
+    EXPECT_LT(std::sqrt(error2 / size2), 0.03);
+  }
+  EXPECT_NEAR(run.calibration.statistics.at("nis_mean"), 4, 0.2);
+}
+
+TEST(Calibrate, DecidesByItselfForClockOffsetAndErrorAtOrbitalPeriod) {
+  Scenario scenario = scenario_in_eq1(6, std::chrono::hours(2));
+  scenario.star_tracker.clock_offset_s = 0.01;
+  scenario.star_tracker.orbital_sine_rad = Eigen::Vector3d(6, -5, 8) * kArcsecond;
+  const auto simulated = sim::simulate(scenario);
+  const auto run = calibrate(simulated.pass, {});
+  ASSERT_EQ(run.calibration.further.size(), 7U);
+  EXPECT_EQ(run.calibration.gyros[0].drift_model, "esg7");
+  const Truth::StarTracker& truth = simulated.truth.star_trackers[0];
+  for (const FurtherEstimate& estimate : run.calibration.further) {
+    const double expected = estimate.name == "clock_offset_s"       ? truth.clock_offset_s
+                            : estimate.name == "orbital_sine_x_rad" ? truth.orbital_sine_rad.x()
+                            : estimate.name == "orbital_sine_y_rad" ? truth.orbital_sine_rad.y()
+                            : estimate.name == "orbital_sine_z_rad" ? truth.orbital_sine_rad.z()
+                                                                    : 0;
+    EXPECT_LT(std::abs(estimate.value - expected), 4 * estimate.sigma) << estimate.name;
+  }
+  EXPECT_LT(run.calibration.further[0].sigma, 5e-4);
+}
+
+TEST(Calibrate, DoesNotTakeARandomWalkForDriftThatWanders) {
+  Scenario scenario = scenario_in_eq1(11, std::chrono::minutes(55));
+  for (GyroScenario& gyro : scenario.gyros) {
+    gyro.drift.direction_walk_rad_sqrt_s = 1e-7;
+  }
+  const auto run = calibrate(sim::simulate(scenario).pass, {});
+  ASSERT_FALSE(run.evidence.empty());
+  EXPECT_EQ(run.evidence.back().states, "wandering_drift");
+  EXPECT_FALSE(run.evidence.back().accepted);
+  EXPECT_NEAR(run.options.direction_random_walk_rad_sqrt_s, 1e-7, 0.3e-7);
+  EXPECT_NEAR(run.calibration.statistics.at("nis_mean"), 4, 0.3);
+}
+
+TEST(Calibrate, FindsTheBiasOfTheReadoutsAndDriftThatWanders) {
+  Scenario scenario = scenario_in_eq1(7, std::chrono::hours(4));
+  const Eigen::Vector3d bias = Eigen::Vector3d(10, -15, 20) * kArcsecond;
+  for (GyroScenario& gyro : scenario.gyros) {
+    gyro.drift.markov_sigma_rad_s = 1e-7;
+    gyro.drift.markov_time_s = 1200;
+    gyro.readout.bias_rad = bias;
+  }
+  const auto simulated = sim::simulate(scenario);
+  const auto run = calibrate(simulated.pass, {});
+  const auto accepted = [&](const char* states) {
+    return std::any_of(run.evidence.begin(), run.evidence.end(),
+                       [&](const Evidence& evidence) { return evidence.states == states && evidence.accepted; });
+  };
+  EXPECT_TRUE(accepted("wandering_drift"));
+  EXPECT_TRUE(accepted("readout_bias"));
+  EXPECT_FALSE(accepted("clock_offset"));
+  EXPECT_FALSE(accepted("orbital_error"));
+  EXPECT_FALSE(accepted("drift_outside_eq1"));
+  const FurtherStateOptions& states = run.options.further_states;
+  EXPECT_EQ(states.wandering_drift, FurtherStateOptions::Choice::kOn);
+  EXPECT_LT(std::abs(std::log(states.wandering_drift_rad_s / 1e-7)), std::log(3.0));
+  EXPECT_NEAR(run.calibration.statistics.at("nis_mean"), 4, 0.15);
+  ASSERT_EQ(run.calibration.further.size(), 6U);
+  EXPECT_EQ(run.calibration.further[4].name, "gyro2_readout_bias_y_rad");
+  for (std::size_t i = 0; i < 6; ++i) {
+    const FurtherEstimate& estimate = run.calibration.further[i];
+    EXPECT_LT(std::abs(estimate.value - bias(static_cast<Eigen::Index>(i % 3))), 4 * estimate.sigma) << estimate.name;
+    EXPECT_EQ(run.calibration.gyros[i / 3].readout_bias(static_cast<Eigen::Index>(i % 3)), estimate.value);
+  }
+  for (std::size_t k = 0; k < 2; ++k) {
+    const Eigen::Vector3d error = alignment_error(simulated.truth.gyros[k], run.calibration.gyros[k]);
+    const Eigen::Matrix3d covariance = run.calibration.covariance.block<3, 3>(static_cast<Eigen::Index>(10 * k) + 7,
+                                                                              static_cast<Eigen::Index>(10 * k) + 7);
+    EXPECT_LT(error.dot(covariance.llt().solve(error)), 22);  // χ² of 3, once in 15 000
+  }
+}
+
+TEST(Calibrate, KnowsTheRateOfTheOrbitFromTheAttitude) {
+  // An attitude that stands still in space does not show it; the filter must not fall over that.
+  Scenario scenario;
+  scenario.duration = std::chrono::minutes(30);
+  scenario.attitude.reference = AttitudeScenario::Reference::kInertial;
+  CalibrationOptions options;
+  options.further_states.clock_offset = options.further_states.orbital_error = FurtherStateOptions::Choice::kOn;
+  const auto run = calibrate(sim::simulate(scenario).pass, options);
+  EXPECT_EQ(run.calibration.further.size(), 7U);
+  EXPECT_TRUE(run.calibration.covariance.allFinite());
+}
+
+/// Three gyros, the third across the others; all drift in eq. (1).
+Scenario scenario_of_three(std::uint64_t seed, Duration duration) {
+  Scenario scenario = scenario_in_eq1(seed, duration);
+  scenario.gyros.resize(3, scenario.gyros[0]);
+  scenario.gyros[2].start_direction_c = scenario.gyros[0].start_direction_c.cross(scenario.gyros[1].start_direction_c);
+  return scenario;
+}
+
+sim::SimulatedPass three_gyros() { return sim::simulate(scenario_of_three(8, std::chrono::hours(2))); }
+
+TEST(Calibrate, TakesThreeGyros) {
+  const auto simulated = three_gyros();
+  const auto run = calibrate(simulated.pass, {});
+  EXPECT_EQ(run.calibration.states.size(), 30U);
+  EXPECT_EQ(run.fixes.back().innovation.size(), 6U);
+  EXPECT_EQ(run.calibration.statistics.at("nis_degrees_of_freedom"), 6);
+  EXPECT_NEAR(run.calibration.statistics.at("nis_mean"), 6, 0.3);
+  for (std::size_t k = 0; k < 3; ++k) {
+    const Eigen::Vector3d error = alignment_error(simulated.truth.gyros[k], run.calibration.gyros[k]);
+    const auto row = static_cast<Eigen::Index>(10 * k) + 7;
+    const Eigen::Matrix3d covariance = run.calibration.covariance.block<3, 3>(row, row);
+    EXPECT_LT(error.dot(covariance.llt().solve(error)), 22);  // χ² of 3, once in 15 000
+  }
+  EXPECT_TRUE(run.gyro_events.empty());
+}
+
+TEST(Calibrate, FindsTheNoiseOfThreeGyros) {
+  Scenario scenario = scenario_of_three(9, std::chrono::hours(3));
+  scenario.star_tracker.noise_rad *= 1.5;
+  for (GyroScenario& gyro : scenario.gyros) {
+    gyro.drift.direction_walk_rad_sqrt_s = 3e-8;
+  }
+  Pass pass = sim::simulate(scenario).pass;
+  pass.settings.star_tracker_noise_rad /= 1.5;  // what was promised
+  const auto run = calibrate(pass, {});
+  EXPECT_TRUE(run.options.find_noise);
+  EXPECT_NEAR(run.options.direction_random_walk_rad_sqrt_s, 3e-8, 1e-8);
+  ASSERT_TRUE(run.options.star_tracker_noise_rad.has_value());
+  EXPECT_NEAR(run.options.star_tracker_noise_rad->x(), scenario.star_tracker.noise_rad.x(), 1e-6);
+  EXPECT_NEAR(run.calibration.statistics.at("nis_mean"), 6, 0.3);
+}
+
+TEST(Calibrate, DoesNotPutDownAPoorDriftModelToAGyro) {
+  Scenario scenario = scenario_of_three(10, std::chrono::hours(3));
+  scenario.gyros[1].drift.outside_sigma_rad_s = 1e-7;
+  const auto run = calibrate(sim::simulate(scenario).pass, told());
+  EXPECT_GT(run.calibration.statistics.at("fixes_rejected_as_outliers"), 20);
+  EXPECT_GT(run.calibration.statistics.at("nis_mean"), 7);
+  EXPECT_TRUE(run.gyro_events.empty());
+}
+
+TEST(Calibrate, GoesOnWithoutAGyroThatWandersOff) {
+  auto simulated = three_gyros();
+  GyroTelemetry& gyro = simulated.pass.gyro;
+  const std::size_t from = gyro.size() / 2;
+  for (std::size_t i = from; i < gyro.size(); ++i) {  // a degree at once
+    Eigen::Map<Eigen::Vector3d> h_b(&gyro.h[3 * (3 * i + 1)]);
+    h_b = (h_b + 0.017 * h_b.unitOrthogonal()).normalized().eval();
+  }
+  const auto run = calibrate(simulated.pass, {});
+  ASSERT_EQ(run.gyro_events.size(), 1U);
+  EXPECT_EQ(run.gyro_events[0].gyro, 1);
+  EXPECT_EQ(run.gyro_events[0].state, GyroState::kIsolated);
+  EXPECT_LT(run.gyro_events[0].t - gyro.t[from], std::chrono::minutes(1));
+  EXPECT_NEAR(run.calibration.statistics.at("nis_mean"), run.calibration.statistics.at("nis_degrees_of_freedom"), 0.3);
+  EXPECT_EQ(run.fixes.back().status, FixStatus::kUsed);
+  EXPECT_EQ(run.fixes.back().degrees_of_freedom, 4);
+  EXPECT_TRUE(run.calibration.verdict.trustworthy);
+}
+
+TEST(Navigate, CorrectedAtEachFixByTheInvariantErrorIsBetterThanASingleReading) {
+  CalibrationOptions options = told();
+  options.corrections.when = CorrectionOptions::When::kEachFix;
+  const auto run = navigate(two_hours().pass, options);
+  // From when the samples round the first fix are there.
+  EXPECT_GT(run.attitude.size(), two_hours().pass.gyro.size() - 20);
+  const auto errors = attitude_errors(run.attitude, two_hours().truth.t, two_hours().truth.q_in_c);
+  const auto last = statistics_by_stretch(errors, two_hours().pass.settings.epoch, std::chrono::minutes(30)).at(3);
+  EXPECT_LT(last.rms_rad.maxCoeff(), 1.7 * kArcsecond);
+}
+
+}  // namespace
+}  // namespace trihedron::ground

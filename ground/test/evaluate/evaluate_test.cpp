@@ -1,0 +1,164 @@
+#include "trihedron/ground/evaluate/evaluate.hpp"
+
+#include <gtest/gtest.h>
+
+#include <chrono>
+#include <limits>
+
+namespace trihedron::ground {
+namespace {
+
+using std::chrono::milliseconds;
+using std::chrono::minutes;
+using std::chrono::seconds;
+
+Time at(Duration since) { return Time(since); }
+
+Eigen::Quaterniond turned(const Eigen::Quaterniond& q, const Eigen::Vector3d& by_c) {
+  return q * Eigen::Quaterniond(Eigen::AngleAxisd(by_c.norm(), by_c.normalized()));
+}
+
+const Eigen::Quaterniond kAttitude(Eigen::AngleAxisd(2.0, Eigen::Vector3d(1, 2, 3).normalized()));
+
+TEST(AttitudeErrors, AreRotationsFromReferenceToSolutionInBodyAxes) {
+  const Eigen::Vector3d error(1e-5, -2e-5, 3e-5);
+  AttitudeHistory solution;
+  solution.t = {at(seconds(1))};
+  solution.q_in_c = {turned(kAttitude, error)};
+  Eigen::Quaterniond flipped = kAttitude;
+  flipped.coeffs() *= -1;  // the sign of a quaternion means nothing
+  const auto errors = attitude_errors(solution, {at(seconds(1))}, {flipped});
+  ASSERT_EQ(errors.t.size(), 1U);
+  EXPECT_LT((errors.error_rad[0] - error).norm(), 1e-14);
+  EXPECT_TRUE(errors.sigma_rad.empty());
+}
+
+TEST(AttitudeErrors, MatchEpochsWithinHalfAMillisecond) {
+  AttitudeHistory solution;
+  for (const int ms : {0, 125, 3000, 3125, 6001, 9000}) {
+    solution.t.push_back(at(milliseconds(ms)));
+    solution.q_in_c.push_back(kAttitude);
+    solution.sigma_rad.emplace_back(1e-5, 1e-5, 1e-5);
+    solution.age_s.push_back(ms / 1000.0);
+  }
+  const std::vector<Time> reference = {at(Duration(400'000)), at(seconds(3)), at(seconds(6)), at(seconds(12))};
+  const auto errors = attitude_errors(solution, reference, std::vector<Eigen::Quaterniond>(4, kAttitude));
+  ASSERT_EQ(errors.t.size(), 2U);
+  EXPECT_EQ(errors.t[1], at(seconds(3)));
+  EXPECT_EQ(errors.sigma_rad.size(), 2U);
+  EXPECT_EQ(errors.age_s[1], 3);
+}
+
+TEST(AttitudeErrors, PassOverReferencesThatAreNoRotation) {
+  AttitudeHistory solution;
+  solution.t = {at(seconds(0)), at(seconds(3))};
+  solution.q_in_c = {kAttitude, kAttitude};
+  Eigen::Quaterniond bad;
+  bad.coeffs().setConstant(std::numeric_limits<double>::quiet_NaN());
+  EXPECT_EQ(attitude_errors(solution, solution.t, {bad, kAttitude}).t, std::vector<Time>{at(seconds(3))});
+}
+
+AttitudeErrors ramp() {
+  // Total error grows by 1e-5 rad per minute after each correction, at 0 and 30 min.
+  AttitudeErrors errors;
+  for (int minute = 0; minute < 60; ++minute) {
+    errors.t.push_back(at(minutes(minute)));
+    errors.error_rad.emplace_back(0, 0, 1e-5 * (minute % 30));
+    errors.sigma_rad.emplace_back(1, 1, 1e-5 * (minute % 30) + 1e-9);
+    errors.age_s.push_back(60.0 * (minute % 30));
+  }
+  return errors;
+}
+
+TEST(ErrorStatistics, SumUpTheWholeAndEachStretch) {
+  const auto errors = ramp();
+  const auto whole = statistics(errors);
+  EXPECT_EQ(whole.count, 60U);
+  EXPECT_DOUBLE_EQ(whole.max_rad.z(), 2.9e-4);
+  EXPECT_DOUBLE_EQ(whole.max_total_rad, 2.9e-4);
+  EXPECT_EQ(whole.rms_rad.x(), 0);
+  // rms of 0 … 29: √(29·59/6)
+  EXPECT_NEAR(whole.rms_rad.z(), 1e-5 * std::sqrt(29.0 * 59 / 6), 1e-15);
+  EXPECT_NEAR(*whole.normalised_square, 29.0 / 30 / 3, 1e-3);
+  const auto stretches = statistics_by_stretch(errors, at(minutes(-10)), minutes(30));
+  ASSERT_EQ(stretches.size(), 3U);
+  EXPECT_EQ(stretches[0].count, 20U);
+  EXPECT_EQ(stretches[1].from, at(minutes(20)));
+  EXPECT_EQ(stretches[1].to, at(minutes(49)));
+}
+
+TEST(ErrorStatistics, OfNothingAreEmpty) {
+  const auto nothing = statistics({});
+  EXPECT_EQ(nothing.count, 0U);
+  EXPECT_FALSE(nothing.normalised_square);
+  EXPECT_TRUE(statistics_by_stretch({}, at(minutes(0)), minutes(30)).empty());
+}
+
+TEST(CorrectionIntervals, LastUntilTheErrorFirstPassesTheLimit) {
+  const auto intervals = correction_intervals(ramp(), 1.05e-4);
+  ASSERT_EQ(intervals.size(), 2U);
+  EXPECT_EQ(intervals[1].corrected, at(minutes(30)));
+  EXPECT_EQ(intervals[1].observed, minutes(29));
+  EXPECT_EQ(intervals[1].passed, minutes(11));
+  EXPECT_DOUBLE_EQ(intervals[1].max_total_rad, 2.9e-4);
+  for (const auto& interval : correction_intervals(ramp(), 1)) {
+    EXPECT_FALSE(interval.passed);
+  }
+}
+
+TEST(CorrectionIntervals, AreUnknownWithoutAges) {
+  auto errors = ramp();
+  errors.age_s.clear();
+  EXPECT_TRUE(correction_intervals(errors, 1e-4).empty());
+}
+
+IntervalPair pair(std::optional<Duration> before, std::optional<Duration> after, Duration watched = minutes(100)) {
+  return {{at(seconds(0)), watched, before, 0}, {at(seconds(0)), watched, after, 0}};
+}
+
+TEST(Extension, IsTheRatioOfTheIntervals) {
+  EXPECT_EQ(pair(minutes(5), minutes(20)).extension(), 4);
+  EXPECT_EQ(pair(minutes(5), std::nullopt).extension(), 20);
+  EXPECT_EQ(pair(std::nullopt, minutes(20)).extension(), std::nullopt);
+  EXPECT_EQ(pair(minutes(5), std::nullopt, Duration::zero()).extension(), std::nullopt);
+  EXPECT_EQ(pair(Duration::zero(), minutes(1)).extension(), 60);
+}
+
+TEST(Extension, OfSeveralIsTheirMedianAndALowerBoundWhereOneThatBearsOnItIs) {
+  EXPECT_FALSE(median_extension(std::vector<IntervalPair>{}).has_value());
+  const auto exact =
+      median_extension({pair(minutes(5), minutes(20)), pair(minutes(5), std::nullopt), pair(minutes(5), minutes(10))});
+  EXPECT_EQ(exact->factor, 4);
+  EXPECT_FALSE(exact->is_lower_bound);
+  const auto bound =
+      median_extension({pair(minutes(5), minutes(20)), pair(minutes(50), std::nullopt), pair(minutes(5), minutes(30))});
+  EXPECT_EQ(bound->factor, 4);
+  EXPECT_TRUE(bound->is_lower_bound);
+}
+
+TEST(Extension, PairsCorrectionsOfTheSameTime) {
+  const auto corrected = [](int s) { return CorrectionInterval{at(seconds(s)), minutes(10), {}, 0}; };
+  const auto pairs = paired({corrected(0), corrected(5400)}, {corrected(1), corrected(900), corrected(5400)});
+  ASSERT_EQ(pairs.size(), 2U);
+  EXPECT_EQ(pairs[1].calibrated.corrected, at(seconds(5400)));
+}
+
+TEST(ParameterErrors, AreTruthLessEstimate) {
+  Truth truth;
+  truth.gyros.resize(1);
+  truth.gyros[0].drift_rad_s = {{"k0", 3e-6}};
+  truth.gyros[0].alignment_rotation_vector_rad = {1e-3, 0, 0};
+  Calibration calibration;
+  GyroCalibration& gyro = calibration.gyros.emplace_back();
+  gyro.drift_rad_s = {{"k0", 1e-6}, {"D(k0)", 1e-9}};
+  gyro.alignment_rotation_vector_rad = {0, 0, 2e-3};
+  calibration.covariance.setIdentity(5, 5);
+  const Eigen::VectorXd errors = parameter_errors(truth, calibration);
+  EXPECT_NEAR(errors(0), 2e-6, 1e-18);
+  EXPECT_EQ(errors(1), -1e-9);
+  // Second order: half of the product of the two rotations.
+  EXPECT_LT((errors.tail<3>() - Eigen::Vector3d(1e-3, 0, -2e-3)).norm(), 1.1e-6);
+}
+
+}  // namespace
+}  // namespace trihedron::ground

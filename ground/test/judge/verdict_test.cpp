@@ -1,0 +1,332 @@
+#include "trihedron/ground/judge/verdict.hpp"
+
+#include <gmock/gmock.h>
+
+#include <array>
+#include <cmath>
+#include <random>
+
+#include "trihedron/core/frames.hpp"
+
+namespace trihedron::ground {
+namespace {
+
+using testing::Contains;
+using testing::ElementsAre;
+using testing::IsEmpty;
+using testing::Not;
+
+const Eigen::Vector3d kNoise_rad{1.45e-5, 1.45e-5, 9.7e-5};
+
+/// Three hours of fixes in orbital flight, with rolls of `slew_rad`.
+StarTrackerTelemetry flight(double slew_rad) {
+  StarTrackerTelemetry tracker;
+  for (int i = 0; i <= 3600; ++i) {
+    const double t_s = 3.0 * i;
+    const auto turn = [](double x, double y, double z) { return Rot<C, C>::exp(Vec<C>::assume(x, y, z)); };
+    tracker.t.push_back(Time(from_seconds(t_s)));
+    tracker.q_in_c.push_back((turn(0, 1.1e-3 * t_s, 0) * turn(slew_rad * std::sin(t_s / 97), 0, 0)).quaternion());
+  }
+  return tracker;
+}
+
+Pass good_pass() {
+  Pass pass;
+  pass.settings.star_tracker_noise_rad = kNoise_rad;
+  pass.star_tracker = flight(0.5);
+  pass.gyro.gyros = 2;
+  pass.gyro.t = {pass.star_tracker.t.front(), pass.star_tracker.t.back()};
+  return pass;
+}
+
+CalibrationRun good_run() {
+  CalibrationRun run;
+  run.calibration.gyros.resize(2);
+  run.calibration.gyros[0].momentum_in = {1, 0, 0};
+  run.calibration.gyros[1].momentum_in = {0, 1, 0};
+  run.calibration.states = {"gyro1.k0", "gyro1.align_x"};
+  run.calibration.covariance = Eigen::Vector2d(1e-18, 1e-12).asDiagonal();
+  run.known_before.covariance = Eigen::Vector2d(2e-6, 8.7e-3).cwiseAbs2().asDiagonal();
+  for (int i = 0; i <= 3600; ++i) {
+    FixRecord& fix = run.fixes.emplace_back();
+    fix.t = Time(std::chrono::seconds(3 * i));
+    fix.status = FixStatus::kUsed;
+  }
+  run.calibration.statistics = {
+      {"fixes", 3601},     {"fixes_used", 3601}, {"fixes_rejected_as_outliers", 0}, {"reopened", 0},
+      {"nis_count", 3600}, {"nis_mean", 4.02},   {"nis_degrees_of_freedom", 4}};
+  return run;
+}
+
+std::vector<std::string> codes(const Verdict& verdict) {
+  std::vector<std::string> all;
+  for (const Finding& finding : verdict.findings) {
+    all.push_back(finding.code);
+    EXPECT_FALSE(finding.text.empty() || finding.evidence.empty() || finding.cure.empty()) << finding.code;
+  }
+  return all;
+}
+
+TEST(Verdict, OfAGoodRunIsTrustworthyWithoutFindings) {
+  const Verdict verdict = judge(good_pass(), good_run());
+  EXPECT_TRUE(verdict.trustworthy);
+  EXPECT_THAT(codes(verdict), IsEmpty());
+}
+
+TEST(Verdict, FindsABatchThatHasNotConverged) {
+  auto run = good_run();
+  run.calibration.statistics["batch_iterations"] = 12;
+  run.calibration.statistics["batch_converged"] = 1;
+  EXPECT_THAT(codes(judge(good_pass(), run)), IsEmpty());
+  run.calibration.statistics["batch_converged"] = 0;
+  EXPECT_THAT(codes(judge(good_pass(), run)), ElementsAre("batch-not-converged"));
+  EXPECT_FALSE(judge(good_pass(), run).trustworthy);
+}
+
+/// Innovations of one gyro with this in them beside unit white noise, in sigmas.
+CalibrationRun with_innovations(double correlation, double line) {
+  auto run = good_run();
+  std::mt19937_64 random(7);
+  std::normal_distribution<double> normal;
+  std::array<double, 2> last{};
+  for (FixRecord& fix : run.fixes) {
+    fix.innovation_sigma = {1e-5, 1e-5};
+    for (double& z : last) {
+      z = correlation * z + std::sqrt(1 - correlation * correlation) * normal(random);
+    }
+    // The rate of the flight.
+    const double wave = line * std::sin(1.1e-3 * to_seconds(fix.t.time_since_epoch()));
+    fix.innovation = {1e-5 * (last[0] + wave), 1e-5 * last[1]};
+  }
+  return run;
+}
+
+TEST(Verdict, FindsInnovationsThatAreNotWhite) {
+  EXPECT_THAT(codes(judge(good_pass(), with_innovations(0, 0))), IsEmpty());
+  EXPECT_THAT(codes(judge(good_pass(), with_innovations(0.3, 0))), Contains("innovations-not-white"));
+  EXPECT_THAT(codes(judge(good_pass(), with_innovations(-0.3, 0))), Contains("innovations-not-white"));
+}
+
+TEST(Verdict, FindsALineAtTheOrbitalRate) {
+  EXPECT_THAT(codes(judge(good_pass(), with_innovations(0, 0.02))), IsEmpty());
+  EXPECT_THAT(codes(judge(good_pass(), with_innovations(0, 0.2))), ElementsAre("orbital-line"));
+}
+
+TEST(Verdict, FindsHalvesThatDisagree) {
+  auto run = good_run();
+  run.calibration.statistics["halves_degrees_of_freedom"] = 18;
+  run.calibration.statistics["halves_chi_square"] = 40;
+  EXPECT_THAT(codes(judge(good_pass(), run)), IsEmpty());
+  run.calibration.statistics["halves_chi_square"] = 60;  // chance of 2e-6
+  EXPECT_THAT(codes(judge(good_pass(), run)), ElementsAre("halves-disagree"));
+  EXPECT_FALSE(judge(good_pass(), run).trustworthy);
+}
+
+TEST(Verdict, FindsADriftModelThatIsTooSmallOrTooLarge) {
+  auto run = good_run();
+  run.drift_models = {{"esg7", 7, 0, 1e-4}, {"vsh:1", 13, 5, 2e-5}, {"vsh:2", 19, -8, 3e-5}};
+  for (const char* model : {"esg7", "vsh:1", "esg20"}) {
+    run.calibration.gyros[0].drift_model = model;
+    EXPECT_THAT(codes(judge(good_pass(), run)), IsEmpty()) << model;
+  }
+  run.calibration.gyros[0].drift_model = "vsh:2";
+  EXPECT_THAT(codes(judge(good_pass(), run)), ElementsAre("drift-model-too-large"));
+  EXPECT_TRUE(judge(good_pass(), run).trustworthy);
+  run.drift_models[1].log_likelihood = 500;
+  run.calibration.gyros[0].drift_model = "esg7";
+  EXPECT_THAT(codes(judge(good_pass(), run)), ElementsAre("drift-model-too-small"));
+  EXPECT_FALSE(judge(good_pass(), run).trustworthy);
+  run.drift_models.push_back({kLargestDriftModel, 96, 900, 1e-5});
+  run.calibration.gyros[0].drift_model = kLargestDriftModel;
+  EXPECT_THAT(codes(judge(good_pass(), run)), ElementsAre("drift-model-at-its-limit"));
+}
+
+TEST(Verdict, TellsOfErrorsOfTheStarTrackerThatWereFound) {
+  auto run = good_run();
+  run.calibration.further = {{"clock_offset_s", 1e-4, 1e-4}, {"orbital_sine_x_rad", 1e-5, 4e-6}};
+  EXPECT_THAT(codes(judge(good_pass(), run)), IsEmpty());
+  run.calibration.further = {{"clock_offset_s", -1e-2, 1e-4}, {"orbital_sine_x_rad", 1e-5, 1e-6}};
+  EXPECT_THAT(codes(judge(good_pass(), run)), ElementsAre("clock-offset-found", "orbital-error-found"));
+  EXPECT_TRUE(judge(good_pass(), run).trustworthy);
+}
+
+TEST(Verdict, FindsTooFewFixes) {
+  auto run = good_run();
+  run.calibration.statistics["fixes_used"] = 99;
+  EXPECT_THAT(codes(judge(good_pass(), run)), ElementsAre("too-few-fixes"));
+  EXPECT_FALSE(judge(good_pass(), run).trustworthy);
+}
+
+TEST(Verdict, FindsAPassShorterThanAnOrbit) {
+  auto pass = good_pass();
+  pass.gyro.t.back() = pass.gyro.t.front() + std::chrono::minutes(89);
+  EXPECT_THAT(codes(judge(pass, good_run())), ElementsAre("short-pass"));
+  EXPECT_TRUE(judge(pass, good_run()).trustworthy);
+}
+
+TEST(Verdict, FindsManyRejections) {
+  auto run = good_run();
+  run.calibration.statistics["fixes_rejected_as_outliers"] = 170;
+  EXPECT_THAT(codes(judge(good_pass(), run)), IsEmpty());  // under one in twenty
+  run.calibration.statistics["fixes_rejected_as_outliers"] = 200;
+  EXPECT_THAT(codes(judge(good_pass(), run)), ElementsAre("many-rejected"));
+  EXPECT_TRUE(judge(good_pass(), run).trustworthy);
+  run.calibration.statistics["fixes_rejected_as_outliers"] = 2000;
+  EXPECT_FALSE(judge(good_pass(), run).trustworthy);
+}
+
+TEST(Verdict, FindsThatTheFilterWasReopened) {
+  auto run = good_run();
+  run.calibration.statistics["reopened"] = 1;
+  EXPECT_THAT(codes(judge(good_pass(), run)), ElementsAre("reopened"));
+}
+
+TEST(Verdict, FindsNisOutOfBoundsOnBothSides) {
+  auto run = good_run();
+  for (const auto& [nis, trustworthy] :
+       {std::pair(4.4, true), std::pair(5.1, false), std::pair(3.5, true), std::pair(2.9, false)}) {
+    run.calibration.statistics["nis_mean"] = nis;
+    const Verdict verdict = judge(good_pass(), run);
+    EXPECT_THAT(codes(verdict), ElementsAre("nis-out-of-bounds")) << nis;
+    EXPECT_EQ(verdict.trustworthy, trustworthy) << nis;
+  }
+  // Few fixes scatter more: the same mean is then no finding.
+  run.calibration.statistics["nis_mean"] = 4.4;
+  run.calibration.statistics["nis_count"] = 120;
+  EXPECT_THAT(codes(judge(good_pass(), run)), IsEmpty());
+  run.calibration.statistics["nis_count"] = 0;
+  EXPECT_THAT(codes(judge(good_pass(), run)), Not(Contains("nis-out-of-bounds")));
+}
+
+TEST(Verdict, NamesTheParametersThatTheDataDoNotDetermine) {
+  auto run = good_run();
+  run.calibration.covariance(1, 1) = 5e-3 * 5e-3;
+  const Verdict verdict = judge(good_pass(), run);
+  EXPECT_THAT(codes(verdict), ElementsAre("not-determined"));
+  EXPECT_NE(verdict.findings[0].text.find("gyro1.align_x"), std::string::npos);
+  EXPECT_EQ(verdict.findings[0].text.find("gyro1.k0"), std::string::npos);
+}
+
+TEST(Verdict, FindsSteadyFlightAndNamesItsAxis) {
+  auto pass = good_pass();
+  pass.star_tracker = flight(0);
+  const Verdict verdict = judge(pass, good_run());
+  EXPECT_THAT(codes(verdict), ElementsAre("weak-alignment-axis"));
+  EXPECT_NE(verdict.findings[0].text.find("+1.000"), std::string::npos);
+  EXPECT_FALSE(verdict.trustworthy);
+}
+
+TEST(Verdict, FindsSteadyFlightBehindRejectedOutliers) {
+  auto pass = good_pass();
+  pass.star_tracker = flight(0);
+  auto run = good_run();
+  for (std::size_t i = 50; i < run.fixes.size(); i += 100) {
+    pass.star_tracker.q_in_c[i] =
+        pass.star_tracker.q_in_c[i] * Rot<C, C>::exp(Vec<C>::assume(0.03, 0, 0.01)).quaternion();
+    run.fixes[i].status = FixStatus::kRejectedByGate;
+  }
+  EXPECT_THAT(codes(judge(pass, run)), ElementsAre("weak-alignment-axis"));
+}
+
+TEST(Verdict, TellsOfGyrosThatAreNotUsed) {
+  auto pass = good_pass();
+  pass.gyro.gyros = 3;
+  const Verdict verdict = judge(pass, good_run());
+  EXPECT_THAT(codes(verdict), ElementsAre("gyros-not-used"));
+  EXPECT_TRUE(verdict.trustworthy);
+}
+
+TEST(Verdict, TellsOfStarTrackersThatAreNotUsed) {
+  auto pass = good_pass();
+  pass.further_star_trackers.push_back(pass.star_tracker);
+  const Verdict verdict = judge(pass, good_run());
+  EXPECT_THAT(codes(verdict), ElementsAre("star-trackers-not-used"));
+  EXPECT_TRUE(verdict.trustworthy);
+  auto run = good_run();
+  run.calibration.further = {{"star_tracker_2_align_x_rad", 0, 1e-6}};
+  EXPECT_THAT(codes(judge(pass, run)), IsEmpty());
+}
+
+TEST(Verdict, FindsAGyroThatWasLeftOut) {
+  auto run = good_run();
+  run.gyro_events = {{Time(std::chrono::minutes(90)), 1, GyroState::kIsolated}};
+  const Verdict of_pair = judge(good_pass(), run);
+  EXPECT_THAT(codes(of_pair), ElementsAre("gyro-isolated"));
+  EXPECT_EQ(of_pair.findings[0].evidence, "gyro 2 left out for good at 90.0 min");
+  EXPECT_FALSE(of_pair.trustworthy);
+  run.calibration.gyros.push_back(run.calibration.gyros[0]);
+  auto pass = good_pass();
+  pass.gyro.gyros = 3;
+  EXPECT_THAT(codes(judge(pass, run)), ElementsAre("gyro-isolated"));
+  EXPECT_TRUE(judge(pass, run).trustworthy);
+}
+
+TEST(Verdict, FindsAGyroThatStoodStill) {
+  auto run = good_run();
+  run.gyro_events = {{Time(std::chrono::minutes(3)), 0, GyroState::kStuck},
+                     {Time(std::chrono::minutes(4)), 0, GyroState::kUsed},
+                     {Time(std::chrono::minutes(5)), 0, GyroState::kStuck}};
+  const Verdict verdict = judge(good_pass(), run);
+  EXPECT_THAT(codes(verdict), ElementsAre("gyro-stuck"));
+  EXPECT_EQ(verdict.findings[0].evidence, "gyro 1 stuck 2 times, first at 3.0 min");
+  EXPECT_TRUE(verdict.trustworthy);
+}
+
+TEST(Verdict, FindsAStarTrackerThatWasOff) {
+  auto run = good_run();
+  run.calibration.statistics["fixes_off_in_a_row"] = 100;
+  EXPECT_THAT(codes(judge(good_pass(), run)), ElementsAre("star-tracker-off"));
+}
+
+TEST(Verdict, FindsABadlyPlacedPair) {
+  auto run = good_run();
+  run.calibration.gyros[1].momentum_in = {std::cos(0.5), std::sin(0.5), 0};
+  EXPECT_THAT(codes(judge(good_pass(), run)), ElementsAre("pair-badly-placed"));
+  run.calibration.gyros[1].momentum_in = {-std::cos(0.5), std::sin(0.5), 0};
+  EXPECT_THAT(codes(judge(good_pass(), run)), ElementsAre("pair-badly-placed"));
+}
+
+TEST(Verdict, OfANavigationSaysWhetherTheParametersFit) {
+  NavigationRun run;
+  run.statistics = good_run().calibration.statistics;
+  EXPECT_TRUE(judge_navigation(run).trustworthy);
+  run.misfit_limit = 45;
+  run.held_parameters_misfit = 30;
+  EXPECT_TRUE(judge_navigation(run).trustworthy);
+  run.held_parameters_misfit = 60;
+  EXPECT_THAT(codes(judge_navigation(run)), ElementsAre("calibration-does-not-fit"));
+  EXPECT_FALSE(judge_navigation(run).trustworthy);
+  run.held_parameters_misfit.reset();
+  run.statistics["nis_mean"] = 40;
+  EXPECT_THAT(codes(judge_navigation(run)), ElementsAre("nis-out-of-bounds"));
+  EXPECT_FALSE(judge_navigation(run).trustworthy);
+}
+
+TEST(AlignmentObservability, IsNilWhereTheAxisNeverMoves) {
+  const auto steady = alignment_observability(flight(0), {0, 0, 0}, 1.45e-5);
+  EXPECT_NEAR(std::abs(steady.weakest_axis_c.y()), 1, 1e-6);
+  EXPECT_GT(steady.sigma_rad, 1e-3);  // infinite but for rounding
+}
+
+TEST(AlignmentObservability, DoesNotTakeTheNoiseOfTheTrackerForMotion) {
+  auto tracker = flight(0);
+  // A deterministic error of the size of the noise, alternating.
+  for (std::size_t i = 0; i < tracker.size(); ++i) {
+    const Eigen::Vector3d error = (i % 2 == 0 ? 1 : -1) * kNoise_rad;
+    tracker.q_in_c[i] = tracker.q_in_c[i] * Rot<C, C>::exp(Vec<C>::assume(error)).quaternion();
+  }
+  EXPECT_LT(alignment_observability(tracker, {0, 0, 0}, 1.45e-5).sigma_rad, 5e-3);
+  EXPECT_GT(alignment_observability(tracker, kNoise_rad, 1.45e-5).sigma_rad, 5e-3);
+}
+
+TEST(AlignmentObservability, PassesOverWhatIsNoRotation) {
+  auto tracker = flight(0.5);
+  const double clean = alignment_observability(tracker, kNoise_rad, 1.45e-5).sigma_rad;
+  EXPECT_LT(clean, 2e-6);  // 0.4″: slews of 30°
+  tracker.q_in_c[100].coeffs().setZero();
+  tracker.q_in_c[101].coeffs().setConstant(std::nan(""));
+  EXPECT_NEAR(alignment_observability(tracker, kNoise_rad, 1.45e-5).sigma_rad, clean, 1e-2 * clean);
+}
+
+}  // namespace
+}  // namespace trihedron::ground

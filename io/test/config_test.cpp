@@ -1,0 +1,67 @@
+#include "trihedron/io/config.hpp"
+
+#include <gmock/gmock.h>
+
+#include "fixtures.hpp"
+
+namespace trihedron::io {
+namespace {
+
+using testing::HasSubstr;
+using Choice = FurtherStateOptions::Choice;
+
+CalibrationOptions read_config_text(const std::string& text) {
+  const TemporaryDirectory directory;
+  write_text(directory / "config.toml", text);
+  return read_config(directory / "config.toml");
+}
+
+std::string refused_config(const std::string& text) {
+  return refusal([&] { static_cast<void>(read_config_text(text)); });
+}
+
+TEST(Config, ComesBackWithEachFurtherState) {
+  for (const FurtherStateRow& row : kFurtherStates) {
+    if (row.key.empty()) {
+      continue;
+    }
+    CalibrationOptions options;
+    options.further_states[row.state] = Choice::kOn;
+    const std::string text = format_config(options);
+    const FurtherStateOptions states = read_config_text(text).further_states;
+    for (const FurtherStateRow& other : kFurtherStates) {
+      EXPECT_EQ(states[other.state], other.state == row.state ? Choice::kOn : Choice::kAuto) << text;
+    }
+    options.further_states[row.state] = Choice::kOff;
+    EXPECT_EQ(read_config_text(format_config(options)).further_states[row.state], Choice::kOff);
+  }
+}
+
+TEST(Config, ComesBackWithEachEstimatorAndDriftModel) {
+  for (const EstimatorRow& row : kEstimators) {
+    CalibrationOptions options;
+    options.estimator = row.estimator;
+    EXPECT_EQ(read_config_text(format_config(options)).estimator, row.estimator);
+    EXPECT_FALSE(read_config_text(format_config(options)).drift_model.has_value());
+  }
+  for (const DriftModelId& model : {kEsg7, kEsg20, vsh(3)}) {
+    CalibrationOptions options;
+    options.drift_model = model;
+    EXPECT_EQ(read_config_text(format_config(options)).drift_model, model);
+  }
+}
+
+TEST(Config, RefusesNamesThatThereAreNot) {
+  EXPECT_THAT(refused_config("estimator = \"magic\"\n"),
+              HasSubstr("there is no estimator \"magic\"; use one of: invariant, paper, batch"));
+  EXPECT_THAT(refused_config("drift_model = \"vsh:9\"\n"),
+              HasSubstr("there is no drift model \"vsh:9\"; use auto, esg7, esg20, or vsh:1 … vsh:6"));
+  EXPECT_THAT(refused_config("[further_states]\nclock_ofset = \"on\"\n"), HasSubstr("did you mean \"clock_offset\"?"));
+  EXPECT_THAT(refused_config("[further_states]\nreadout_bias = \"maybe\"\n"),
+              HasSubstr("\"readout_bias\" is neither auto nor on nor off"));
+  EXPECT_THAT(refused_config("[further_states]\nwandering_drift = \"-1e-8rad/s\"\n"),
+              HasSubstr("\"wandering_drift\" is not positive"));
+}
+
+}  // namespace
+}  // namespace trihedron::io

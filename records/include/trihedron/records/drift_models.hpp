@@ -1,0 +1,46 @@
+#pragma once
+/// The drift models by name, and their coefficients. A coefficient is the same in each model that has it.
+
+#include <array>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "trihedron/core/drift_model.hpp"
+
+namespace trihedron {
+
+struct DriftModelRow {
+  DriftModelId::Family family;
+  std::string_view name;  ///< in settings, in calibration.json and for people; the degree comes after it
+  int largest_degree;     ///< 0 where the model has none
+};
+
+inline constexpr std::array<DriftModelRow, 3> kDriftModels = {{{DriftModelId::Family::kEsg7, "esg7", 0},
+                                                               {DriftModelId::Family::kEsg20, "esg20", 0},
+                                                               {DriftModelId::Family::kVsh, "vsh:", DriftModelId::kMaxDegree}}};
+
+inline constexpr DriftModelId kLargestDriftModel = vsh(DriftModelId::kMaxDegree);
+
+/// In settings in place of a name: the model that the pass gives evidence of.
+inline constexpr std::string_view kAutoDriftModel = "auto";
+
+/// "esg7", "vsh:2"
+[[nodiscard]] std::string name_of(const DriftModelId& model);
+/// Nothing for another name, or a degree that there is not.
+[[nodiscard]] std::optional<DriftModelId> drift_model_named(std::string_view name);
+/// For messages: "esg7, esg20, or vsh:1 … vsh:6, which are for estimator batch"
+[[nodiscard]] std::string drift_model_choices();
+
+/// In the model's order, that of `drift_rad_s` in GyroCalibration; those of eq. (1) come first.
+[[nodiscard]] std::vector<DriftCoefficient> coefficients_of(const DriftModelId& model);
+
+/// "k0", "W(1,-1)"
+[[nodiscard]] std::string name_of(const DriftCoefficient& coefficient);
+/// Of degrees up to that of the simulator, 20; nothing for another name.
+[[nodiscard]] std::optional<DriftCoefficient> drift_coefficient_named(std::string_view name);
+/// In the model's order.
+[[nodiscard]] std::vector<std::string> coefficient_names(const DriftModelId& model);
+
+}  // namespace trihedron

@@ -1,0 +1,120 @@
+#pragma once
+/// What a user of a result must know.
+
+#include <algorithm>
+#include <array>
+#include <cstdint>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+namespace trihedron {
+
+enum class FindingCode : std::uint8_t {
+  kTooFewFixes,
+  kShortPass,
+  kManyRejected,
+  kReopened,
+  kBatchNotConverged,
+  kStarTrackerOff,
+  kGyroIsolated,
+  kGyroStuck,
+  kNisOutOfBounds,
+  kInnovationsNotWhite,
+  kOrbitalLine,
+  kHalvesDisagree,
+  kDriftModelTooSmall,
+  kDriftModelTooLarge,
+  kDriftModelAtItsLimit,
+  kCoefficientsChanged,
+  kClockOffsetFound,
+  kOrbitalErrorFound,
+  kStarTrackerNoise,
+  kNotDetermined,
+  kWeakAlignmentAxis,
+  kGyrosNotUsed,
+  kStarTrackersNotUsed,
+  kPairBadlyPlaced,
+  kCalibrationDoesNotFit,
+  kAlignmentMoved,
+  kCoefficientsMoved,
+  kPassNotTrustworthy,
+  kOther,  ///< of a file, from a program that knows more
+};
+
+enum class FindingSeverity : std::uint8_t { kNote, kWarning, kDoNotUse };
+
+struct FindingSeverityRow {
+  FindingSeverity severity;
+  std::string_view name;  ///< in calibration.json
+};
+inline constexpr std::array<FindingSeverityRow, 3> kFindingSeverities = {{{FindingSeverity::kNote, "note"},
+                                                                          {FindingSeverity::kWarning, "warning"},
+                                                                          {FindingSeverity::kDoNotUse, "do-not-use"}}};
+
+struct FindingRow {
+  FindingCode code;
+  std::string_view name;     ///< stable, for programs
+  FindingSeverity severity;  ///< where the one who finds it does not say otherwise
+};
+inline constexpr std::array<FindingRow, 29> kFindings = {{
+    {FindingCode::kTooFewFixes, "too-few-fixes", FindingSeverity::kDoNotUse},
+    {FindingCode::kShortPass, "short-pass", FindingSeverity::kWarning},
+    {FindingCode::kManyRejected, "many-rejected", FindingSeverity::kWarning},
+    {FindingCode::kReopened, "reopened", FindingSeverity::kWarning},
+    {FindingCode::kBatchNotConverged, "batch-not-converged", FindingSeverity::kDoNotUse},
+    {FindingCode::kStarTrackerOff, "star-tracker-off", FindingSeverity::kWarning},
+    {FindingCode::kGyroIsolated, "gyro-isolated", FindingSeverity::kWarning},
+    {FindingCode::kGyroStuck, "gyro-stuck", FindingSeverity::kWarning},
+    {FindingCode::kNisOutOfBounds, "nis-out-of-bounds", FindingSeverity::kWarning},
+    {FindingCode::kInnovationsNotWhite, "innovations-not-white", FindingSeverity::kWarning},
+    {FindingCode::kOrbitalLine, "orbital-line", FindingSeverity::kWarning},
+    {FindingCode::kHalvesDisagree, "halves-disagree", FindingSeverity::kDoNotUse},
+    {FindingCode::kDriftModelTooSmall, "drift-model-too-small", FindingSeverity::kDoNotUse},
+    {FindingCode::kDriftModelTooLarge, "drift-model-too-large", FindingSeverity::kWarning},
+    {FindingCode::kDriftModelAtItsLimit, "drift-model-at-its-limit", FindingSeverity::kWarning},
+    {FindingCode::kCoefficientsChanged, "coefficients-changed", FindingSeverity::kWarning},
+    {FindingCode::kClockOffsetFound, "clock-offset-found", FindingSeverity::kNote},
+    {FindingCode::kOrbitalErrorFound, "orbital-error-found", FindingSeverity::kNote},
+    {FindingCode::kStarTrackerNoise, "star-tracker-noise", FindingSeverity::kWarning},
+    {FindingCode::kNotDetermined, "not-determined", FindingSeverity::kWarning},
+    {FindingCode::kWeakAlignmentAxis, "weak-alignment-axis", FindingSeverity::kDoNotUse},
+    {FindingCode::kGyrosNotUsed, "gyros-not-used", FindingSeverity::kNote},
+    {FindingCode::kStarTrackersNotUsed, "star-trackers-not-used", FindingSeverity::kNote},
+    {FindingCode::kPairBadlyPlaced, "pair-badly-placed", FindingSeverity::kWarning},
+    {FindingCode::kCalibrationDoesNotFit, "calibration-does-not-fit", FindingSeverity::kDoNotUse},
+    {FindingCode::kAlignmentMoved, "alignment-moved", FindingSeverity::kWarning},
+    {FindingCode::kCoefficientsMoved, "coefficients-moved", FindingSeverity::kDoNotUse},
+    {FindingCode::kPassNotTrustworthy, "pass-not-trustworthy", FindingSeverity::kDoNotUse},
+    {FindingCode::kOther, "other", FindingSeverity::kWarning},
+}};
+
+[[nodiscard]] constexpr const FindingRow& row_of(FindingCode code) { return kFindings[static_cast<std::size_t>(code)]; }
+[[nodiscard]] constexpr std::string_view name_of(FindingCode code) { return row_of(code).name; }
+/// kOther for a name that this program does not know.
+[[nodiscard]] constexpr FindingCode finding_code_named(std::string_view name) {
+  const auto* const row = std::ranges::find(kFindings, name, &FindingRow::name);
+  return row == kFindings.end() ? FindingCode::kOther : row->code;
+}
+
+/// One thing that a user of the result must know.
+struct Finding {
+  using Severity = FindingSeverity;
+  FindingCode code = FindingCode::kOther;
+  std::string text;      ///< for people: what was seen
+  std::string evidence;  ///< the numbers behind it
+  std::string cure;      ///< what to do about it
+  Severity severity = row_of(code).severity;
+};
+
+struct Verdict {
+  bool trustworthy = false;
+  std::vector<Finding> findings;
+
+  [[nodiscard]] bool has(FindingCode code) const {
+    return std::ranges::find(findings, code, &Finding::code) != findings.end();
+  }
+};
+
+}  // namespace trihedron

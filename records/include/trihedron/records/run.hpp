@@ -1,0 +1,106 @@
+#pragma once
+/// Everything that was seen on the way when a pass was calibrated or navigated.
+
+#include <chrono>
+#include <optional>
+#include <string_view>
+#include <vector>
+
+#include "trihedron/core/status.hpp"
+#include "trihedron/records/calibration.hpp"
+#include "trihedron/records/options.hpp"
+#include "trihedron/records/pass.hpp"
+#include "trihedron/records/statistics.hpp"
+#include "trihedron/records/status.hpp"
+
+namespace trihedron {
+
+/// One fix: eq. (3) from its second component on, two per gyro, and what was done with it. Of estimator batch: what is
+/// left of it when the whole pass is smoothed, along two axes across each momentum.
+struct FixRecord {
+  Time t{};
+  int head = 0;  ///< the star tracker
+  FixStatus status = FixStatus::kNone;
+  std::vector<double> innovation;        ///< rad
+  std::vector<double> innovation_sigma;  ///< rad
+  double nis = 0;
+  int degrees_of_freedom = 0;  ///< of the NIS: two per gyro that could be used
+  bool jumped = false;         ///< its misfit came at once and is more than drift can make
+  bool corrected_navigator = false;
+
+  [[nodiscard]] bool used() const { return is_used(status); }
+};
+
+/// Estimates along the pass, for the figures of the paper: rows after used fixes, those nearer than kStep to the last
+/// one left out; columns as in Calibration::states.
+struct ParameterHistory {
+  static constexpr Duration kStep = std::chrono::seconds(10);
+  std::vector<Time> t;
+  std::vector<std::vector<double>> value;  ///< [row][state]; alignment as rotation vector, rad; drift rad/s
+  std::vector<std::vector<double>> sigma;
+};
+
+/// What a navigator could start from at an astro-correction; momentum_in of both is that of `t`.
+struct Correction {
+  Time t{};
+  std::vector<GyroCalibration> known_before;  ///< the parameters of before the pass
+  std::vector<GyroCalibration> calibrated;    ///< as estimated until then
+};
+
+/// Something that a gyro did.
+struct GyroEvent {
+  Time t{};
+  int gyro = 0;  ///< index
+  GyroState state = GyroState::kUsed;
+};
+
+/// For estimating a kind of further states instead of taking them as zero.
+struct Evidence {
+  std::optional<FurtherState> state;  ///< without it: the coefficients that eq. (1) does not have
+  double log_bayes_factor = 0;
+  bool accepted = false;
+
+  /// For programs: the key of the further state, or "drift_outside_eq1".
+  [[nodiscard]] std::string_view key() const { return state ? row_of(*state).key : "drift_outside_eq1"; }
+  /// For people.
+  [[nodiscard]] std::string_view label() const { return state ? row_of(*state).label : "Drift outside eq. (1)"; }
+};
+
+/// A drift model, fitted to the beginning of the pass and judged by what comes next. Of estimator batch.
+struct DriftModelForecast {
+  DriftModelId drift_model;
+  double log_likelihood = 0;     ///< of the rest of the pass, part by part; above that of the smallest model
+  double open_loop_rms_rad = 0;  ///< attitude error, flown open loop over the next part
+};
+
+struct CalibrationRun {
+  CalibrationOptions options;                    ///< as decided
+  std::vector<Evidence> evidence;                ///< of what was left to the program to decide
+  std::vector<DriftModelForecast> drift_models;  ///< that were compared, smallest first
+  Calibration known_before;                      ///< values and covariance before the pass; states as in `calibration`
+  Calibration calibration;                       ///< with verdict and statistics
+  std::vector<FixRecord> fixes;
+  ParameterHistory parameters;
+  std::vector<Correction> corrections;  ///< at the first used fix, and then every 90 min
+  AttitudeHistory attitude;             ///< of the calibration itself, at the fixes' epochs
+  AttitudeHistory definitive_attitude;  ///< at each gyro sample, where it was asked for
+  AttitudeHistory navigation;           ///< of the open-loop navigator at the fixes' epochs
+  std::vector<Time> angle_t;            ///< z1 of eq. (3), decimated by min/max
+  std::vector<double> angle_residual_min, angle_residual_max;
+  SampleCounts samples;                ///< gyro samples by what was done with them
+  FixCounts fix_counts;                ///< fixes by what was done with them
+  std::vector<GyroEvent> gyro_events;  ///< changes of a gyro's state
+};
+
+struct NavigationRun {
+  AttitudeHistory attitude;  ///< at every gyro sample used
+  std::vector<FixRecord> fixes;
+  Statistics statistics;
+  /// Where parameters are held: (estimated − held)ᵀ P⁻¹ (estimated − held), P the covariance they were given with, and
+  /// its 99.9 % limit.
+  std::optional<double> held_parameters_misfit;
+  double misfit_limit = 0;
+  Verdict verdict;
+};
+
+}  // namespace trihedron

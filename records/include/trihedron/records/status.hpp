@@ -1,0 +1,92 @@
+#pragma once
+/// What was done with samples, fixes and gyros: names and counts.
+
+#include <array>
+#include <string_view>
+#include <vector>
+
+#include "trihedron/core/status.hpp"
+
+namespace trihedron {
+
+template <class Status>
+struct StatusRow {
+  Status status;
+  std::string_view name;  ///< for people, and of a count
+};
+
+inline constexpr std::array<StatusRow<FixStatus>, kFixStatuses> kFixStatusRows = {{
+    {FixStatus::kNone, "none"},
+    {FixStatus::kPending, "pending"},
+    {FixStatus::kStarted, "started the filter"},
+    {FixStatus::kUsed, "used"},
+    {FixStatus::kUsedAfterReopening, "used after reopening"},
+    {FixStatus::kRestarted, "used, filter restarted"},
+    {FixStatus::kRejectedNotRotation, "rejected: not a rotation"},
+    {FixStatus::kRejectedOutOfOrder, "rejected: out of order"},
+    {FixStatus::kRejectedNoGyro, "rejected: no gyro samples round it"},
+    {FixStatus::kRejectedUnknownHead, "rejected: of an unknown star tracker"},
+    {FixStatus::kRejectedBacklog, "rejected: too many waiting"},
+    {FixStatus::kRejectedGeometry, "rejected: momenta nearly parallel"},
+    {FixStatus::kRejectedTooFewGyros, "rejected: too few gyros can be used"},
+    {FixStatus::kRejectedByGate, "rejected: outlier"},
+}};
+
+inline constexpr std::array<StatusRow<SampleStatus>, kSampleStatuses> kSampleStatusRows = {{
+    {SampleStatus::kNone, "none"},
+    {SampleStatus::kUsed, "used"},
+    {SampleStatus::kRejectedNotDirection, "rejected: not a direction"},
+    {SampleStatus::kRejectedOutOfOrder, "rejected: out of order"},
+    {SampleStatus::kRejectedGeometry, "rejected: momenta nearly parallel"},
+    {SampleStatus::kRejectedTooFewGyros, "rejected: too few gyros can be used"},
+    {SampleStatus::kUsedAfterClockSetBack, "used after the clock was set back"},
+    {SampleStatus::kThinned, "thinned: more per second than are used"},
+}};
+
+inline constexpr std::array<StatusRow<GyroState>, kGyroStates> kGyroStateRows = {{
+    {GyroState::kUsed, "used again"},
+    {GyroState::kStuck, "stuck"},
+    {GyroState::kIsolated, "left out for good"},
+}};
+
+[[nodiscard]] constexpr std::string_view name_of(FixStatus status) {
+  return kFixStatusRows[static_cast<std::size_t>(status)].name;
+}
+[[nodiscard]] constexpr std::string_view name_of(SampleStatus status) {
+  return kSampleStatusRows[static_cast<std::size_t>(status)].name;
+}
+[[nodiscard]] constexpr std::string_view name_of(GyroState state) {
+  return kGyroStateRows[static_cast<std::size_t>(state)].name;
+}
+
+[[nodiscard]] constexpr bool is_rejected(FixStatus status) { return status >= FixStatus::kRejectedNotRotation; }
+[[nodiscard]] constexpr bool is_rejected(SampleStatus status) { return !is_used(status); }
+
+/// How many there were of each status.
+template <class Status, std::size_t Size>
+class CountsByStatus {
+ public:
+  [[nodiscard]] constexpr long& operator[](Status status) { return counts_[static_cast<std::size_t>(status)]; }
+  [[nodiscard]] constexpr long operator[](Status status) const { return counts_[static_cast<std::size_t>(status)]; }
+
+ private:
+  std::array<long, Size> counts_{};
+};
+
+using SampleCounts = CountsByStatus<SampleStatus, kSampleStatusRows.size()>;
+
+struct FixCounts : CountsByStatus<FixStatus, kFixStatusRows.size()> {
+  long lost_to_clock = 0;  ///< that waited when the clock was set back: nobody knows their time
+};
+
+struct NamedCount {
+  std::string_view name;
+  long count = 0;
+  bool is_rejected = false;
+};
+
+/// Those that are not zero, in the order of their names.
+[[nodiscard]] std::vector<NamedCount> named_counts(const SampleCounts& counts);
+[[nodiscard]] std::vector<NamedCount> named_counts(const FixCounts& counts);
+
+}  // namespace trihedron
