@@ -3,6 +3,11 @@
 #include <gtest/gtest.h>
 #include <rapidcheck/gtest.h>
 
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
 #include "numerical_jacobian.hpp"
 
 namespace trihedron {
@@ -105,6 +110,131 @@ RC_GTEST_PROP(Esg7, JacobiansMatchCentralDifferences, ()) {
   test::expect_jacobian(
       Esg7::basis<double>(h),
       test::central_differences([&](const Coefficients& k) { return Esg7::rate<double>(h, k); }, kappa, 1e-3), 1e-11);
+}
+
+// ---- The models as tables of members
+
+const DriftModelId kModels[] = {kEsg7, kEsg20, vsh(1), vsh(2), vsh(3), vsh(4), vsh(5), vsh(6)};
+
+Eigen::MatrixXd basis_of(const DriftModel& model, const Eigen::Vector3d& h, double part_of_change = 0) {
+  Columns<kMaxDriftColumns> columns;
+  model.basis(h, part_of_change, columns.view(model.columns()));
+  return columns.first(model.columns());
+}
+
+Eigen::VectorXd some_coefficients(int size) {
+  Eigen::VectorXd kappa(size);
+  for (int i = 0; i < size; ++i) {
+    kappa(i) = std::sin(1.0 + i);
+  }
+  return kappa;
+}
+
+/// Directions that no symmetry of the harmonics picks out.
+std::vector<Eigen::Vector3d> some_directions(int count) {
+  std::vector<Eigen::Vector3d> directions;
+  for (int i = 0; i < count; ++i) {
+    const double z = -1 + (2 * i + 1.0) / count;
+    const double angle = 2.4 * i;
+    directions.emplace_back(std::sqrt(1 - z * z) * std::cos(angle), std::sqrt(1 - z * z) * std::sin(angle), z);
+  }
+  return directions;
+}
+
+TEST(DriftModel, BeginsWithEquation1) {
+  for (const DriftModelId id : kModels) {
+    const DriftModel model(id, {});
+    ASSERT_EQ(model.size(), id.size());
+    for (int i = 0; i < Esg7::kSize; ++i) {
+      EXPECT_EQ(model.member(i).potential, DriftPotential::kEq1);
+      EXPECT_EQ(model.member(i).number, i);
+    }
+    for (const Eigen::Vector3d& h : some_directions(5)) {
+      EXPECT_EQ(basis_of(model, h).leftCols(Esg7::kSize), Esg7::basis<double>(h));
+    }
+  }
+}
+
+TEST(DriftModel, RateIsTheBasisTimesTheCoefficients) {
+  for (const DriftModelId id : kModels) {
+    for (int further = 0; further < 4; ++further) {
+      const DriftModel model(id, {.wandering_drift = (further & 1) != 0, .coefficient_change = (further & 2) != 0});
+      const Eigen::VectorXd kappa = some_coefficients(model.columns());
+      for (const Eigen::Vector3d& h : some_directions(7)) {
+        const Eigen::Vector3d rate = model.rate(h, 0.3, kappa.data());
+        EXPECT_LT((rate - basis_of(model, h, 0.3) * kappa).norm(), 1e-13 * rate.norm()) << model.columns();
+      }
+    }
+  }
+}
+
+TEST(DriftModel, HasTheDriftThatWandersAndTheChangeBehindItsMembers) {
+  const DriftModel model(vsh(2), {.wandering_drift = true, .coefficient_change = true});
+  const Eigen::Vector3d h = Eigen::Vector3d(0.3, -0.5, 0.7).normalized();
+  const Eigen::MatrixXd basis = basis_of(model, h, 0.25);
+  ASSERT_EQ(basis.cols(), vsh(2).size() + 3 + Esg7::kSize);
+  EXPECT_EQ(basis.middleCols<3>(vsh(2).size()), Eigen::Matrix3d::Identity());
+  EXPECT_EQ(basis.rightCols(Esg7::kSize), 0.25 * Esg7::basis<double>(h));
+}
+
+TEST(DriftModel, MembersAreThoseOfTheirPotentials) {
+  // ω = −∇W + h × ∇D: against central differences of the harmonics along the sphere.
+  const HarmonicTable harmonics(DriftModelId::kMaxDegree);
+  for (const DriftModelId id : {kEsg20, vsh(6)}) {
+    const DriftModel model(id, {});
+    for (const Eigen::Vector3d& h : some_directions(5)) {
+      const Eigen::MatrixXd basis = basis_of(model, h);
+      for (int i = Esg7::kSize; i < model.size(); ++i) {
+        const DriftMember& its = model.member(i);
+        const auto potential = [&](const Eigen::Vector3d& turn) {
+          const Eigen::Vector3d there = rotated<double>(h, turn);
+          const double value = its.potential == DriftPotential::kCubicD
+                                   ? there.array().pow(4).sum() / 4
+                                   : harmonics.at<double>(there)(its.degree, its.order).value;
+          return Eigen::Matrix<double, 1, 1>(value);
+        };
+        // Turned by v, h moves by v × h: the derivative by v is h × ∇.
+        const Eigen::Vector3d h_cross_gradient =
+            test::central_differences(potential, Eigen::Vector3d(0, 0, 0), 1e-5).transpose();
+        const Eigen::Vector3d expected =
+            its.potential == DriftPotential::kW ? h.cross(h_cross_gradient) : Eigen::Vector3d(h_cross_gradient);
+        const double size = std::max(basis.col(i).norm(), 1.0);
+        EXPECT_LT((across(h) * basis.col(i) - expected).norm(), 1e-8 * size) << model.size() << " " << i;
+      }
+    }
+  }
+}
+
+TEST(DriftModel, MembersAreIndependent) {
+  // Over the sphere no member is a sum of others, so that each can be estimated.
+  for (const DriftModelId id : kModels) {
+    const DriftModel model(id, {});
+    Eigen::MatrixXd gram = Eigen::MatrixXd::Zero(model.size(), model.size());
+    for (const Eigen::Vector3d& h : some_directions(400)) {
+      const Eigen::MatrixXd moves = across(h) * basis_of(model, h);
+      gram += moves.transpose() * moves;
+    }
+    const Eigen::VectorXd scale = gram.diagonal().cwiseSqrt().cwiseInverse();
+    const Eigen::VectorXd eigenvalues =
+        Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(scale.asDiagonal() * gram * scale.asDiagonal()).eigenvalues();
+    EXPECT_GT(eigenvalues.minCoeff(), 1e-3) << model.size();
+  }
+}
+
+TEST(DriftModel, OfHigherDegreeHasAllMembersOfTheLower) {
+  for (int degree = 2; degree <= DriftModelId::kMaxDegree; ++degree) {
+    const DriftModel greater(vsh(degree), {});
+    const DriftModel lower(vsh(degree - 1), {});
+    for (int i = 0; i < lower.size(); ++i) {
+      bool found = false;
+      for (int j = 0; j < greater.size() && !found; ++j) {
+        const DriftMember& a = lower.member(i);
+        const DriftMember& b = greater.member(j);
+        found = a.potential == b.potential && a.degree == b.degree && a.order == b.order && a.number == b.number;
+      }
+      EXPECT_TRUE(found) << degree << " " << i;
+    }
+  }
 }
 
 }  // namespace

@@ -1,20 +1,23 @@
 #pragma once
 /// A small flight for the tests of core: orbital rotation with rolls and pitches, two gyros that drift by eq. (1). The
 /// simulator proper is a module above core; this one only has to be independent of the code under test where it
-/// matters, and exact.
+/// matters, and exact. And what most tests do with the on-board step.
 
-#include <algorithm>
-#include <cmath>
+#include <Eigen/Core>
+#include <functional>
+#include <memory>
 #include <numbers>
-#include <random>
 #include <vector>
 
-#include "trihedron/core/paper_estimator.hpp"
-#include "trihedron/core/telemetry.hpp"
+#include "trihedron/core/on_board.hpp"
 
 namespace trihedron::test {
 
 inline constexpr double kArcsecond = std::numbers::pi / 180 / 3600;
+
+using PairEstimator = InvariantEstimator<kPairCapacity>;
+using FullEstimator = InvariantEstimator<kFullCapacity>;
+using PairGyros = PairEstimator::Gyros;
 
 struct FlightPlan {
   double duration_s = 1800;
@@ -30,90 +33,167 @@ struct Flight {
   static constexpr double kReadout_rad = 9.7e-6;
   static inline const Eigen::Vector3d kTracker_rad{1.45e-5, 1.45e-5, 9.7e-5};
 
-  PerGyro<GyroModel<Esg7>, 2> truth;  ///< momenta at the end
-  std::vector<GyroSample<2>> samples;
+  PairGyros truth;  ///< momenta at the end
+  std::vector<GyroSample> samples;
   std::vector<StarFix> fixes;
   std::vector<Eigen::Matrix3d> C_in_c_at_samples;
 
-  [[nodiscard]] static Eigen::Matrix3d attitude(double t_s, double slews_rad, double steady_until_s = 0) {
-    const auto turn = [](double x, double y, double z) { return Rot<C, C>::exp(Vec<C>::assume(x, y, z)).raw(); };
-    const double slewing_s = std::max(t_s - steady_until_s, 0.0);
-    const double roll = slews_rad * std::sin(slewing_s / 97);
-    const double pitch = slews_rad / 3 * std::sin(slewing_s / 151);
-    return Rot<In, C>::exp(Vec<In>::assume(0.3, -0.2, 0.9)).raw() * turn(0, 1.1e-3 * t_s, 0) * turn(roll, 0, 0) *
-           turn(0, pitch, 0);
+  explicit Flight(const FlightPlan& plan);
+
+  [[nodiscard]] static Eigen::Matrix3d attitude(double t_s, double slews_rad, double steady_until_s = 0);
+};
+
+/// Samples of a pair, and a third gyro's in a case without misalignment, whose rotor does not drift from `h_in`.
+[[nodiscard]] std::vector<GyroSample> with_third_gyro(const Flight& pair, const Eigen::Vector3d& h_in, unsigned seed);
+
+/// exp([v×]) for a rotation vector, rad.
+[[nodiscard]] Eigen::Matrix3d turn(const Eigen::Vector3d& v);
+[[nodiscard]] Eigen::Matrix3d turn(double x, double y, double z);
+/// The rotation vector of a rotation, rad.
+[[nodiscard]] Eigen::Vector3d rotation_vector(const Eigen::Matrix3d& C);
+/// Error of an attitude, c axes, rad: estimate = truth · exp([error×]).
+[[nodiscard]] Eigen::Vector3d attitude_error(const Eigen::Matrix3d& truth, const AttitudeSolution& estimate);
+/// (error/σ)² over all components.
+[[nodiscard]] double normalised_square(const Eigen::VectorXd& error, const Eigen::MatrixXd& covariance);
+
+/// Noise and policies of the nominal mission.
+[[nodiscard]] CalibrationSetup nominal_setup(const Layout& layout = {});
+/// Priors of the nominal mission: 30′ of alignment, 2e-6 rad/s of each coefficient.
+[[nodiscard]] Eigen::MatrixXd nominal_covariance(const Layout& layout);
+
+/// All that an estimator is set up with: at first the nominal mission's, with means of zero.
+template <class Estimator>
+struct Given {
+  CalibrationSetup setup;
+  typename Estimator::Gyros prior;
+  Eigen::MatrixXd covariance;
+
+  explicit Given(const Layout& layout = {}) : setup(nominal_setup(layout)), covariance(nominal_covariance(layout)) {
+    for (auto& gyro : prior) {
+      gyro.drift_rad_s.setZero(layout.drift_columns());
+    }
   }
 
-  explicit Flight(const FlightPlan& plan) {
-    truth[0].h_in = Eigen::Vector3d(0.51, 0.59, 0.63).normalized();
-    truth[1].h_in = Eigen::Vector3d(-0.72, 0.49, 0.49).normalized();
-    truth[0].drift_rad_s << -2.0e-6, -3.8e-7, -4.7e-8, -1.2e-6, 1.8e-6, 7.0e-7, -7.8e-7;
-    truth[1].drift_rad_s << 4.4e-8, 1.4e-7, -1.3e-7, -1.3e-6, 1.5e-6, 9.3e-7, 1.8e-6;
-    truth[0].C_c_b =
-        Rot<C, B<1>>::exp(Vec<C>::assume(plan.misalignment * Eigen::Vector3d(2.4e-3, -4.2e-3, -7.3e-3))).raw();
-    truth[1].C_c_b =
-        Rot<C, B<2>>::exp(Vec<C>::assume(plan.misalignment * Eigen::Vector3d(4.0e-3, -2.0e-3, -7.5e-3))).raw();
-    std::mt19937 random(plan.seed);
-    std::normal_distribution<double> normal;
-    const auto white = [&] { return Eigen::Vector3d(normal(random), normal(random), normal(random)); };
-
-    constexpr double kPeriod_s = 0.125;
-    const int count = static_cast<int>(plan.duration_s / kPeriod_s);
-    double next_fix_s = plan.fix_offset_s;
-    for (int i = 0; i <= count; ++i) {
-      const double t_s = i * kPeriod_s;
-      const Eigen::Matrix3d C_in_c = attitude(t_s, plan.slews_rad, plan.steady_until_s);
-      GyroSample<2> sample;
-      sample.t = Time(from_seconds(t_s));
-      for (int k = 0; k < 2; ++k) {
-        sample.h_b[k] =
-            truth[k].C_c_b.transpose() * C_in_c.transpose() * truth[k].h_in + plan.noise * kReadout_rad * white();
-      }
-      samples.push_back(sample);
-      C_in_c_at_samples.push_back(C_in_c);
-      for (; next_fix_s < t_s + kPeriod_s && next_fix_s <= plan.duration_s; next_fix_s += 3) {
-        const Eigen::Vector3d error = plan.noise * kTracker_rad.cwiseProduct(white());
-        const Eigen::Matrix3d measured =
-            attitude(next_fix_s, plan.slews_rad, plan.steady_until_s) * Rot<C, C>::exp(Vec<C>::assume(error)).raw();
-        fixes.push_back({Time(from_seconds(next_fix_s)), Eigen::Quaterniond(measured)});
-      }
-      if (i == count) {
-        break;
-      }
-      for (int k = 0; k < 2; ++k) {
-        const Eigen::Matrix3d middle = attitude(t_s + kPeriod_s / 2, plan.slews_rad, plan.steady_until_s);
-        precess(truth[k], middle, Eigen::Vector3d(truth[k].C_c_b.transpose() * middle.transpose() * truth[k].h_in),
-                kPeriod_s);
-      }
+  /// The same 1-sigma for each axis of all alignments.
+  void set_alignment_sigma(double sigma_rad) {
+    const Layout& layout = setup.layout;
+    for (int k = 0; k < layout.gyros; ++k) {
+      covariance.diagonal().segment<3>(layout.alignment(k) - layout.dynamic()).setConstant(sigma_rad * sigma_rad);
     }
+  }
+  /// Means as the truth of a flight.
+  void know(const PairGyros& truth) {
+    for (int k = 0; k < PairGyros::capacity(); ++k) {
+      prior[k].drift_rad_s.template head<Esg7::kSize>() = truth[k].drift_rad_s;
+      prior[k].C_c_b = truth[k].C_c_b;
+    }
+  }
+  [[nodiscard]] std::optional<SetupFault> fault() const {
+    return std::make_unique<Estimator>()->set_up(setup, prior, covariance);
+  }
+  [[nodiscard]] std::unique_ptr<Estimator> estimator() const {
+    auto made = std::make_unique<Estimator>();
+    TRIHEDRON_ASSERT(!made->set_up(setup, prior, covariance));
+    return made;
+  }
+  [[nodiscard]] std::unique_ptr<OnBoard<Estimator>> on_board(const CorrectionPolicy& policy = {}) const {
+    auto made = std::make_unique<OnBoard<Estimator>>();
+    TRIHEDRON_ASSERT(!made->set_up(setup, prior, covariance, policy));
+    return made;
   }
 };
 
-/// Priors of the nominal mission: 30′ of alignment, 2e-6 rad/s of each coefficient.
-inline CalibrationSetup<Esg7, 2> nominal_setup() {
-  CalibrationSetup<Esg7, 2> setup;
-  for (int k = 0; k < 2; ++k) {
-    setup.prior_covariance.diagonal().segment<7>(10 * k).setConstant(4e-12);
-    setup.prior_covariance.diagonal().segment<3>(10 * k + 7).setConstant(7.6e-5);
-    setup.readout_noise_rad[k] = Flight::kReadout_rad;
+using PairGiven = Given<PairEstimator>;
+using FullGiven = Given<FullEstimator>;
+using PaperGiven = Given<PaperEstimator>;
+
+/// Means that are drawn about the truth of a flight, with these 1-sigmas.
+void draw_means(const PairGyros& truth, unsigned seed, double alignment_sigma_rad, PairGyros& means);
+
+using OnReport = std::function<void(const StepReport&)>;
+inline const OnReport kIgnore = [](const StepReport&) {};
+
+/// Feeds samples and fixes to the on-board step in time order; calls on_report for every report.
+template <class OnBoard>
+void fly(const std::vector<GyroSample>& samples, const std::vector<StarFix>& fixes, OnBoard& on_board,
+         const OnReport& on_report = kIgnore) {
+  std::size_t fix = 0;
+  for (const GyroSample& sample : samples) {
+    for (; fix < fixes.size() && fixes[fix].t < sample.t; ++fix) {
+      on_report(on_board.on_fix(fixes[fix]));
+    }
+    on_report(on_board.on_gyro(sample));
+    for (; fix < fixes.size() && fixes[fix].t == sample.t; ++fix) {
+      on_report(on_board.on_fix(fixes[fix]));
+    }
   }
-  setup.star_tracker_noise_rad = Flight::kTracker_rad;
-  return setup;
+}
+template <class OnBoard>
+void fly(const Flight& flight, OnBoard& on_board, const OnReport& on_report = kIgnore) {
+  fly(flight.samples, flight.fixes, on_board, on_report);
 }
 
-/// Feeds a flight to a cycle in time order; calls on_report for every report.
-template <class Cycle, class OnReport>
-void fly(const Flight& flight, Cycle& cycle, OnReport&& on_report) {
-  std::size_t fix = 0;
-  for (const auto& sample : flight.samples) {
-    for (; fix < flight.fixes.size() && flight.fixes[fix].t < sample.t; ++fix) {
-      on_report(cycle.on_fix(flight.fixes[fix]));
-    }
-    on_report(cycle.on_gyro(sample));
-    for (; fix < flight.fixes.size() && flight.fixes[fix].t == sample.t; ++fix) {
-      on_report(cycle.on_fix(flight.fixes[fix]));
-    }
+/// Deals with the fixes that still wait.
+template <class OnBoard>
+void flush(OnBoard& on_board, const OnReport& on_report = kIgnore) {
+  for (StepReport report = on_board.flush(); report.fix.status != FixStatus::kNone; report = on_board.flush()) {
+    on_report(report);
   }
+}
+
+/// The whole flight.
+template <class Estimator>
+std::unique_ptr<OnBoard<Estimator>> flown(const Flight& flight, const Given<Estimator>& given,
+                                          const CorrectionPolicy& policy = {}) {
+  auto on_board = given.on_board(policy);
+  fly(flight, *on_board);
+  flush(*on_board);
+  return on_board;
+}
+
+/// Square root of the covariance of the errors at the last fix, rows as in error_layout().
+template <class Estimator>
+Eigen::MatrixXd error_root(const Estimator& estimator) {
+  Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> root(estimator.error_layout().shared(),
+                                                                              estimator.states());
+  estimator.error_root(rows_of(root));
+  return root;
+}
+/// The same of all states.
+template <class Estimator>
+Eigen::MatrixXd state_root(const Estimator& estimator) {
+  Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> root(estimator.states(), estimator.states());
+  estimator.information().inverse_root(rows_of(root));
+  return root;
+}
+
+/// |R v|²: the information about the states along v.
+template <class Estimator>
+double information_along(const Estimator& estimator, const Eigen::VectorXd& v) {
+  const ConstRowsView R = estimator.information().root();
+  double square = 0;
+  for (int i = 0; i < R.rows; ++i) {
+    const double sum = Eigen::Map<const Eigen::VectorXd>(R.row(i), R.columns).dot(v);
+    square += sum * sum;
+  }
+  return square;
+}
+
+/// Errors of the parameters of a pair with eq. (1), truth − estimate, in the order of the layout.
+template <class Gyros>
+Eigen::VectorXd parameter_errors(const PairGyros& truth, const Gyros& estimates) {
+  Eigen::VectorXd errors(20);
+  for (int k = 0; k < 2; ++k) {
+    errors.segment<7>(10 * k) = truth[k].drift_rad_s - estimates[k].drift_rad_s.template head<Esg7::kSize>();
+    errors.segment<3>(10 * k + 7) = rotation_vector(truth[k].C_c_b * estimates[k].C_c_b.transpose());
+  }
+  return errors;
+}
+/// Normalised estimation error squared of those.
+template <class Estimator>
+double parameter_nees(const PairGyros& truth, const Estimator& estimator) {
+  const Eigen::MatrixXd root = error_root(estimator).middleRows(estimator.error_layout().drift(0), 20);
+  return normalised_square(parameter_errors(truth, estimator.gyros()), root * root.transpose());
 }
 
 }  // namespace trihedron::test

@@ -1,4 +1,4 @@
-// Linked with counting malloc and operator new: after its construction, the cycle allocates nothing.
+// Linked with counting malloc and operator new: the on-board step allocates nothing, from its set-up on.
 
 #include <gtest/gtest.h>
 
@@ -8,8 +8,6 @@
 #include <new>
 
 #include "flight.hpp"
-#include "trihedron/core/cycles.hpp"
-#include "trihedron/core/invariant_estimator.hpp"
 
 namespace {
 
@@ -51,35 +49,73 @@ TEST(Allocations, AreCounted) {
   std::free(q);
 }
 
-/// Every way through a step: outliers up to reopening, bad samples, bad fixes.
+/// Every way through a step: outliers up to reopening, bad samples, bad fixes, a gyro that stands still, angles without
+/// fixes, a clock that is set back.
 template <class Estimator>
-void expect_no_allocations(const typename Estimator::Setup& setup) {
+void expect_no_allocations(const test::Given<Estimator>& given) {
   test::Flight flight({.duration_s = 600, .fix_offset_s = 0.05});
+  const int gyros = given.setup.layout.gyros;
+  if (gyros > 2) {
+    flight.samples = test::with_third_gyro(flight, Eigen::Vector3d(0.1, -0.8, 0.6).normalized(), 1);
+  }
+  for (std::size_t i = 0; i < flight.samples.size() && gyros > 3; ++i) {
+    flight.samples[i].h_b[3] = -(flight.samples[i].h_b[1] + flight.samples[i].h_b[2]).normalized();
+  }
   for (std::size_t i = 100; i < 125; ++i) {
     flight.fixes[i].q_in_c =
         flight.fixes[i].q_in_c * Eigen::Quaterniond(Eigen::AngleAxisd(0.001, Eigen::Vector3d::UnitX()));
   }
   flight.samples[77].h_b[0].setZero();
   flight.fixes[33].q_in_c.coeffs().setZero();
-  auto cycle = std::make_unique<Cycle<Estimator>>(
-      Cycle<Estimator>::create(setup, {.interval = std::chrono::minutes(1)}).value());
-  const long before = allocations;
+  for (std::size_t i = 3900; i < 3930; ++i) {
+    flight.samples[i].h_b[gyros - 1] = flight.samples[3900].h_b[gyros - 1];
+  }
+  for (std::size_t i = 4700; i < flight.samples.size(); ++i) {
+    flight.samples[i].t -= std::chrono::seconds(100);
+  }
+  std::erase_if(flight.fixes, [](const StarFix& fix) {
+    return fix.t > Time(std::chrono::seconds(200)) && fix.t < Time(std::chrono::seconds(290));
+  });
+  const int star_trackers = given.setup.layout.star_trackers;
+  for (std::size_t i = 0; i < flight.fixes.size(); ++i) {
+    flight.fixes[i].head = static_cast<int>(i) % star_trackers;
+  }
+  const auto on_board = std::make_unique<OnBoard<Estimator>>();
   double used = 0;
-  test::fly(flight, *cycle, [&](const auto& report) { used += report.fix.used(); });
-  const auto solution = cycle->navigation_attitude();
+  double angles = 0;
+  bool reopened = false;
+  bool set_back = false;
+  const test::OnReport note = [&](const StepReport& report) {
+    used += report.fix.used();
+    reopened = reopened || report.fix.status == FixStatus::kUsedAfterReopening;
+    angles += report.angles.status != FixStatus::kNone;
+    set_back = set_back || report.sample == SampleStatus::kUsedAfterClockSetBack;
+  };
+  const long before = allocations;
+  EXPECT_EQ(on_board->set_up(given.setup, given.prior, given.covariance, {.interval = std::chrono::minutes(1)}),
+            std::nullopt);
+  test::fly(flight, *on_board, note);
+  static_cast<void>(on_board->carry_on());
+  test::flush(*on_board, note);
+  const auto solution = on_board->navigation_attitude();
   EXPECT_EQ(allocations, before);
   EXPECT_TRUE(solution.ok());
-  EXPECT_GT(used, 150);
+  EXPECT_GT(used, 120);
+  EXPECT_TRUE(reopened);
+  EXPECT_TRUE(set_back);
+  EXPECT_EQ(angles > 0, Estimator::kUsesAngles);
 }
 
-TEST(Cycle, OfThePaperAllocatesNothingInAnyStep) { expect_no_allocations<PaperEstimator<Esg7>>(test::nominal_setup()); }
+TEST(OnBoard, OfThePaperAllocatesNothing) { expect_no_allocations<PaperEstimator>(test::PaperGiven()); }
 
-TEST(Cycle, OfTheInvariantErrorAllocatesNothingInAnyStep) {
-  using Estimator = InvariantEstimator<Esg7, 2, kAllFurtherStates>;
-  Estimator::Setup setup;
-  static_cast<CalibrationSetup<Esg7, 2>&>(setup) = test::nominal_setup();
-  setup.wandering_sigma_rad_s = 1e-8;
-  expect_no_allocations<Estimator>(setup);
+TEST(OnBoard, OfAPairAllocatesNothing) { expect_no_allocations<test::PairEstimator>(test::PairGiven()); }
+
+TEST(OnBoard, WithEverythingAllocatesNothing) {
+  for (const Layout& layout : {Layout{.further = kAllFurtherStates, .star_trackers = 2}, kLargestLayout}) {
+    test::FullGiven given(layout);
+    given.setup.wandering_drift.sigma = 1e-8;
+    expect_no_allocations<test::FullEstimator>(given);
+  }
 }
 
 }  // namespace

@@ -11,12 +11,14 @@ template <class F, int N>
 auto central_differences(F&& f, const Eigen::Matrix<double, N, 1>& x, double step) {
   using Value = decltype(f(x));
   Eigen::Matrix<double, Value::RowsAtCompileTime, N> j;
-  for (int i = 0; i < N; ++i) {
+  for (Eigen::Index i = 0; i < x.size(); ++i) {
     Eigen::Matrix<double, N, 1> up = x;
     Eigen::Matrix<double, N, 1> down = x;
     up(i) += step;
     down(i) -= step;
-    j.col(i) = (f(up) - f(down)) / (up(i) - down(i));
+    const Value difference = f(up) - f(down);
+    j.resize(difference.size(), x.size());
+    j.col(i) = difference / (up(i) - down(i));
   }
   return j;
 }

@@ -4,8 +4,6 @@
 
 #include <limits>
 
-#include "trihedron/core/drift.hpp"
-
 namespace trihedron {
 namespace {
 
@@ -13,7 +11,7 @@ constexpr double kSmall_rad = 1e-3;
 constexpr double kLie_rad = 0.05;
 
 OutlierGate make_gate(int reopen_after, int reopen_after_jump) {
-  CalibrationSetup<Esg7, 2> setup;
+  CalibrationSetup setup;
   setup.gate_nis = 30;
   setup.reopen_after_rejections = reopen_after;
   setup.reopen_after_jump_rejections = reopen_after_jump;

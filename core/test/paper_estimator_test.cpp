@@ -6,22 +6,22 @@
 
 #include "flight.hpp"
 #include "numerical_jacobian.hpp"
-#include "trihedron/core/cycles.hpp"
 
 namespace trihedron {
 namespace {
 
-using Paper = PaperEstimator<Esg7>;
+using Paper = PaperEstimator;
+using test::PaperGiven;
 
 // The paper's state vector, in its order.
-static_assert(Paper::Layout::kStates == 24);
-static_assert(Paper::Layout::direction(1) == 2 && Paper::Layout::drift(0) == 4 && Paper::Layout::alignment(0) == 11 &&
-              Paper::Layout::drift(1) == 14 && Paper::Layout::alignment(1) == 21);
+static_assert(Paper::States::kSize == 24);
+static_assert(Paper::States::direction(1) == 2 && Paper::States::drift(0) == 4 && Paper::States::alignment(0) == 11 &&
+              Paper::States::drift(1) == 14 && Paper::States::alignment(1) == 21);
 
 /// Model and readings of one moment with misalignments, off by a little from each other so that no innovation is zero.
 struct Moment {
   Paper::Gyros gyros;
-  Paper::Directions h_b;
+  Directions h_b;
   Eigen::Matrix3d C_in_c = test::Flight::attitude(700, 0.5);
   Moment() {
     const test::Flight flight({.duration_s = 1});
@@ -43,10 +43,10 @@ TEST(PaperMeasurement, MatchesCentralDifferencesOfEquation3) {
   const auto innovation = [&](const Eigen::Matrix<double, 24, 1>& x) {
     Paper::Gyros g = moment.gyros;
     for (int k = 0; k < 2; ++k) {
-      const Eigen::Vector3d dh = qi.tangents[k] * x.segment<2>(Paper::Layout::direction(k));
+      const Eigen::Vector3d dh = qi.tangents[k] * x.segment<2>(Paper::States::direction(k));
       g[k].h_in = rotated<double>(g[k].h_in, g[k].h_in.cross(-dh));
-      g[k].drift_rad_s -= x.segment<7>(Paper::Layout::drift(k));
-      g[k].C_c_b = Rot<C, C>::exp(Vec<C>::assume(-x.segment<3>(Paper::Layout::alignment(k)))).raw() * g[k].C_c_b;
+      g[k].drift_rad_s -= x.segment<7>(Paper::States::drift(k));
+      g[k].C_c_b = Rot<C, C>::exp(Vec<C>::assume(-x.segment<3>(Paper::States::alignment(k)))).raw() * g[k].C_c_b;
     }
     return Paper::measure(g, qi, moment.C_in_c, moment.h_b, setup).innovation;
   };
@@ -63,14 +63,14 @@ TEST(PaperMeasurement, NoiseIsThatOfTrackerAndReadouts) {
   // Causes: tracker rotation about c, then readout errors of gyro 1 and 2; each of its own sigma.
   const auto innovation = [&](const Eigen::Matrix<double, 9, 1>& cause) {
     const Eigen::Matrix3d C_in_c = moment.C_in_c * Rot<C, C>::exp(Vec<C>::assume(cause.head<3>())).raw();
-    Paper::Directions h_b;
+    Directions h_b;
     for (int k = 0; k < 2; ++k) {
       h_b[k] = (moment.h_b[k] + cause.segment<3>(3 + 3 * k)).normalized();
     }
     return Paper::measure(moment.gyros, qi, C_in_c, h_b, setup).innovation;
   };
   Eigen::Matrix<double, 9, 1> sigma;
-  sigma << setup.star_tracker_noise_rad, Eigen::Vector3d::Constant(setup.readout_noise_rad[0]),
+  sigma << setup.star_trackers[0].noise_rad, Eigen::Vector3d::Constant(setup.readout_noise_rad[0]),
       Eigen::Vector3d::Constant(setup.readout_noise_rad[1]);
   const Eigen::Matrix<double, 4, 9> by_cause =
       test::central_differences<decltype(innovation)&, 9>(innovation, Eigen::Matrix<double, 9, 1>::Zero(), 1e-5);
@@ -97,60 +97,51 @@ TEST(PaperMeasurement, AngleIsAFunctionOfTheOtherFour) {
 }
 
 TEST(PaperEstimator, RefusesSetupsThatCannotWork) {
-  auto setup = test::nominal_setup();
-  EXPECT_TRUE(Paper::create(setup).ok());
-  setup.prior_covariance(3, 3) = 0;
-  EXPECT_EQ(Paper::create(setup).fault(), SetupFault::kPriorNotPositiveDefinite);
-  setup = test::nominal_setup();
-  setup.prior_covariance(3, 3) = std::numeric_limits<double>::quiet_NaN();
-  EXPECT_EQ(Paper::create(setup).fault(), SetupFault::kPriorNotPositiveDefinite);
-  setup = test::nominal_setup();
-  setup.prior_covariance(0, 1) = setup.prior_covariance(1, 0) = 4.1e-12;  // correlation above one
-  EXPECT_EQ(Paper::create(setup).fault(), SetupFault::kPriorNotPositiveDefinite);
-  setup = test::nominal_setup();
-  setup.readout_noise_rad[1] = 0;
-  EXPECT_EQ(Paper::create(setup).fault(), SetupFault::kNoiseNotPositive);
-  setup = test::nominal_setup();
-  setup.star_tracker_noise_rad(2) = std::numeric_limits<double>::quiet_NaN();
-  EXPECT_EQ(Paper::create(setup).fault(), SetupFault::kNoiseNotPositive);
-  setup = test::nominal_setup();
-  setup.direction_random_walk_rad_sqrt_s = -1e-9;
-  EXPECT_EQ(Paper::create(setup).fault(), SetupFault::kNoiseNotPositive);
-  setup = test::nominal_setup();
-  setup.star_tracker_noise_rad(0) = std::numeric_limits<double>::infinity();
-  EXPECT_EQ(Paper::create(setup).fault(), SetupFault::kNoiseNotPositive);
-  setup = test::nominal_setup();
-  setup.prior[0].drift_rad_s(2) = std::numeric_limits<double>::quiet_NaN();
-  EXPECT_EQ(Paper::create(setup).fault(), SetupFault::kPriorMeanNotUsable);
-  setup = test::nominal_setup();
-  setup.prior[1].C_c_b *= 1.001;
-  EXPECT_EQ(Paper::create(setup).fault(), SetupFault::kPriorMeanNotUsable);
-  setup = test::nominal_setup();
-  setup.gate_nis = 0;
-  EXPECT_EQ(Paper::create(setup).fault(), SetupFault::kGateNotPositive);
-  setup = test::nominal_setup();
-  setup.reopen_after_rejections = 0;
-  EXPECT_EQ(Paper::create(setup).fault(), SetupFault::kGateNotPositive);
-  setup = test::nominal_setup();
-  setup.reopen_after_jump_rejections = 0;
-  EXPECT_EQ(Paper::create(setup).fault(), SetupFault::kGateNotPositive);
-}
-
-/// Rotation vector by which the estimated alignment is off, rad.
-Eigen::Vector3d alignment_error(const GyroModel<Esg7>& truth, const GyroModel<Esg7>& estimate) {
-  return Rot<C, C>::assume(Eigen::Matrix3d(truth.C_c_b * estimate.C_c_b.transpose())).log().raw();
+  constexpr double kNoNumber = std::numeric_limits<double>::quiet_NaN();
+  const auto fault_of = [](auto&& spoil) {
+    PaperGiven given;
+    spoil(given);
+    return given.fault();
+  };
+  EXPECT_EQ(fault_of([](PaperGiven&) {}), std::nullopt);
+  using Fault = SetupFault;
+  EXPECT_EQ(fault_of([](PaperGiven& g) { g.covariance(3, 3) = 0; }), Fault::kPriorNotPositiveDefinite);
+  EXPECT_EQ(fault_of([](PaperGiven& g) { g.covariance(3, 3) = kNoNumber; }), Fault::kPriorNotPositiveDefinite);
+  EXPECT_EQ(
+      fault_of([](PaperGiven& g) { g.covariance(0, 1) = g.covariance(1, 0) = 4.1e-12; }),  // correlation above one
+      Fault::kPriorNotPositiveDefinite);
+  EXPECT_EQ(fault_of([](PaperGiven& g) { g.covariance.conservativeResize(19, 19); }), Fault::kPriorNotPositiveDefinite);
+  EXPECT_EQ(fault_of([](PaperGiven& g) { g.setup.readout_noise_rad[1] = 0; }), Fault::kNoiseNotPositive);
+  EXPECT_EQ(fault_of([](PaperGiven& g) { g.setup.star_trackers[0].noise_rad(2) = kNoNumber; }),
+            Fault::kNoiseNotPositive);
+  EXPECT_EQ(fault_of([](PaperGiven& g) { g.setup.direction_random_walk_rad_sqrt_s = -1e-9; }),
+            Fault::kNoiseNotPositive);
+  EXPECT_EQ(
+      fault_of([](PaperGiven& g) { g.setup.star_trackers[0].noise_rad(0) = std::numeric_limits<double>::infinity(); }),
+      Fault::kNoiseNotPositive);
+  EXPECT_EQ(fault_of([](PaperGiven& g) { g.prior[0].drift_rad_s(2) = kNoNumber; }), Fault::kPriorMeanNotUsable);
+  EXPECT_EQ(fault_of([](PaperGiven& g) { g.prior[1].C_c_b *= 1.001; }), Fault::kPriorMeanNotUsable);
+  EXPECT_EQ(fault_of([](PaperGiven& g) { g.setup.gate_nis = 0; }), Fault::kGateNotPositive);
+  EXPECT_EQ(fault_of([](PaperGiven& g) { g.setup.reopen_after_rejections = 0; }), Fault::kGateNotPositive);
+  EXPECT_EQ(fault_of([](PaperGiven& g) { g.setup.reopen_after_jump_rejections = 0; }), Fault::kGateNotPositive);
+  // It has one layout.
+  EXPECT_EQ(fault_of([](PaperGiven& g) { g.setup.layout.gyros = 3; }), Fault::kTooLarge);
+  EXPECT_EQ(fault_of([](PaperGiven& g) { g.setup.layout.drift_model = vsh(1); }), Fault::kTooLarge);
+  EXPECT_EQ(fault_of([](PaperGiven& g) { g.setup.layout.further.clock_offset = true; }), Fault::kTooLarge);
+  EXPECT_EQ(fault_of([](PaperGiven& g) { g.setup.layout.star_trackers = 2; }), Fault::kTooLarge);
 }
 
 TEST(PaperEstimator, ConvergesToTheTruthWithoutNoise) {
   // Told of the nominal noise, given none: what is left is the error of the linearisation and of the prior.
   const test::Flight flight({.duration_s = 5400, .noise = 0});
-  auto cycle = Cycle<Paper>::create(test::nominal_setup(), {}).value();
-  test::fly(flight, cycle, [](const auto&) {});
+  const auto on_board = PaperGiven().on_board();
+  test::fly(flight, *on_board);
+  const Eigen::VectorXd errors = test::parameter_errors(flight.truth, on_board->estimator().gyros());
   for (int k = 0; k < 2; ++k) {
-    const auto& estimate = cycle.estimator().gyros()[k];
-    EXPECT_LT(alignment_error(flight.truth[k], estimate).norm(), 0.5 * test::kArcsecond);
-    EXPECT_LT(angle_between<double>(flight.truth[k].h_in, estimate.h_in), 0.5 * test::kArcsecond);
-    EXPECT_LT((flight.truth[k].drift_rad_s - estimate.drift_rad_s).norm(), 0.05 * flight.truth[k].drift_rad_s.norm());
+    EXPECT_LT(errors.segment<3>(10 * k + 7).norm(), 0.5 * test::kArcsecond);
+    EXPECT_LT(angle_between<double>(flight.truth[k].h_in, on_board->estimator().gyros()[k].h_in),
+              0.5 * test::kArcsecond);
+    EXPECT_LT(errors.segment<7>(10 * k).norm(), 0.05 * flight.truth[k].drift_rad_s.norm());
   }
 }
 
@@ -165,32 +156,18 @@ TEST(PaperEstimator, IsConsistentWithSlewsAndMisalignmentsOfMinutes) {
   double fixes = 0;
   for (unsigned seed = 1; seed <= kRuns; ++seed) {
     const test::Flight flight({.duration_s = 3600, .seed = seed});
-    auto setup = test::nominal_setup();
     // Truth must be a draw from the prior; the flight's is fixed, so the prior mean is drawn about it.
-    std::mt19937 random(seed + 1000);
-    std::normal_distribution<double> normal;
-    for (int k = 0; k < 2; ++k) {
-      setup.prior[k].drift_rad_s =
-          flight.truth[k].drift_rad_s + 2e-6 * Esg7::Coefficients<double>::NullaryExpr([&] { return normal(random); });
-      setup.prior_covariance.diagonal().segment<3>(10 * k + 7).setConstant(kAlignmentSigma_rad * kAlignmentSigma_rad);
-      const Eigen::Vector3d delta = kAlignmentSigma_rad * Eigen::Vector3d::NullaryExpr([&] { return normal(random); });
-      setup.prior[k].C_c_b = Rot<C, C>::exp(Vec<C>::assume(delta)).raw() * flight.truth[k].C_c_b;
-    }
-    auto cycle = Cycle<Paper>::create(setup, {}).value();
-    test::fly(flight, cycle, [&](const auto& report) {
+    PaperGiven given;
+    given.set_alignment_sigma(kAlignmentSigma_rad);
+    test::draw_means(flight.truth, seed, kAlignmentSigma_rad, given.prior);
+    const auto on_board = given.on_board();
+    test::fly(flight, *on_board, [&](const StepReport& report) {
       if (report.fix.status == FixStatus::kUsed) {
         nis += report.fix.nis;
         ++fixes;
       }
     });
-    Eigen::Matrix<double, 20, 1> error;
-    for (int k = 0; k < 2; ++k) {
-      const auto& estimate = cycle.estimator().gyros()[k];
-      error.segment<7>(10 * k) = flight.truth[k].drift_rad_s - estimate.drift_rad_s;
-      error.segment<3>(10 * k + 7) = alignment_error(flight.truth[k], estimate);
-    }
-    const auto root = cycle.estimator().error_root().bottomRows<20>().eval();
-    nees += error.dot((root * root.transpose()).llt().solve(error)) / kRuns;
+    nees += test::parameter_nees(flight.truth, on_board->estimator()) / kRuns;
   }
   EXPECT_NEAR(nees, 20, 3.29 * std::sqrt(2.0 * 20 / kRuns));
   EXPECT_NEAR(nis / fixes, 4, 3.29 * std::sqrt(8 / fixes));

@@ -11,46 +11,37 @@
 #include <vector>
 
 #include "flight.hpp"
-#include "trihedron/core/cycles.hpp"
-#include "trihedron/core/invariant_estimator.hpp"
 
 namespace trihedron {
 namespace {
 
 constexpr double kDegree = std::numbers::pi / 180;
 
-/// As nominal_setup(), for any estimator of a pair.
-template <class Estimator>
-typename Estimator::Setup nominal_setup_of() {
-  typename Estimator::Setup setup;
-  static_cast<CalibrationSetup<Esg7, 2>&>(setup) = test::nominal_setup();
-  return setup;
-}
+using Pair = test::PairEstimator;
+using Full = test::FullEstimator;
 
 template <class Estimator>
-std::unique_ptr<Cycle<Estimator>> make_cycle(const typename Estimator::Setup& setup) {
-  return std::make_unique<Cycle<Estimator>>(Cycle<Estimator>::create(setup, {}).value());
+std::unique_ptr<OnBoard<Estimator>> make_on_board(const test::Given<Estimator>& given = test::Given<Estimator>()) {
+  return given.on_board();
 }
 
 /// What was done with each fix.
-template <class Cycle>
-std::vector<typename Cycle::Report> fly(const test::Flight& flight, Cycle& cycle) {
-  std::vector<typename Cycle::Report> fixes;
-  const auto note = [&](const auto& report) {
+template <class OnBoard>
+std::vector<StepReport> fly_fixes(const test::Flight& flight, OnBoard& on_board) {
+  std::vector<StepReport> fixes;
+  const auto note = [&](const StepReport& report) {
     if (report.fix.status != FixStatus::kNone && report.fix.status != FixStatus::kPending) {
       fixes.push_back(report);
     }
   };
-  test::fly(flight, cycle, note);
-  for (auto report = cycle.flush(); report.fix.status != FixStatus::kNone; report = cycle.flush()) {
-    note(report);
-  }
+  test::fly(flight, on_board, note);
+  test::flush(on_board, note);
   return fixes;
 }
 
-template <class Report>
-long count(const std::vector<Report>& fixes, FixStatus status) {
-  return std::count_if(fixes.begin(), fixes.end(), [&](const Report& report) { return report.fix.status == status; });
+long count(const std::vector<StepReport>& fixes, FixStatus status) {
+  return std::count_if(fixes.begin(), fixes.end(),
+                       [&](const StepReport& report) { return report.fix.status == status; });
 }
 
 /// Turns the fixes of an interval by an angle about x.
@@ -62,11 +53,11 @@ void turn_fixes(test::Flight& flight, std::size_t begin, std::size_t end, double
 }
 
 /// Largest error of the momenta at the end, rad.
-template <class Cycle>
-double momentum_error(const Cycle& cycle, const test::Flight& flight) {
+template <class OnBoard>
+double momentum_error(const OnBoard& on_board, const test::Flight& flight) {
   double worst = 0;
   for (int k = 0; k < 2; ++k) {
-    worst = std::max(worst, angle_between<double>(cycle.estimator().gyros()[k].h_in, flight.truth[k].h_in));
+    worst = std::max(worst, angle_between<double>(on_board.estimator().gyros()[k].h_in, flight.truth[k].h_in));
   }
   return worst;
 }
@@ -75,7 +66,7 @@ double momentum_error(const Cycle& cycle, const test::Flight& flight) {
 
 template <class Estimator>
 class LyingTracker : public testing::Test {};
-using Estimators = testing::Types<PaperEstimator<Esg7>, InvariantEstimator<Esg7, 2>>;
+using Estimators = testing::Types<PaperEstimator, Pair>;
 TYPED_TEST_SUITE(LyingTracker, Estimators);
 
 TYPED_TEST(LyingTracker, IsNotBelievedForMinutes) {
@@ -83,8 +74,8 @@ TYPED_TEST(LyingTracker, IsNotBelievedForMinutes) {
   for (const std::size_t length : {std::size_t{40}, std::size_t{200}}) {  // 2 and 10 min
     test::Flight flight({.duration_s = 2700});
     turn_fixes(flight, kFirst, kFirst + length, 3 * kDegree);
-    auto cycle = make_cycle<TypeParam>(nominal_setup_of<TypeParam>());
-    const auto fixes = fly(flight, *cycle);
+    const auto on_board = make_on_board<TypeParam>();
+    const auto fixes = fly_fixes(flight, *on_board);
     EXPECT_EQ(count(fixes, FixStatus::kRejectedByGate), static_cast<long>(length));
     EXPECT_EQ(count(fixes, FixStatus::kUsed), static_cast<long>(flight.fixes.size() - length) - 1);
     EXPECT_TRUE(fixes[kFirst + length - 1].fix.jumped);
@@ -92,9 +83,9 @@ TYPED_TEST(LyingTracker, IsNotBelievedForMinutes) {
     // As if there had been no fixes at all in that time.
     test::Flight gap({.duration_s = 2700});
     gap.fixes.erase(gap.fixes.begin() + kFirst, gap.fixes.begin() + kFirst + static_cast<long>(length));
-    auto other = make_cycle<TypeParam>(nominal_setup_of<TypeParam>());
-    fly(gap, *other);
-    EXPECT_LT(momentum_error(*cycle, flight), momentum_error(*other, gap) + 0.05 * test::kArcsecond);
+    const auto other = make_on_board<TypeParam>();
+    fly_fixes(gap, *other);
+    EXPECT_LT(momentum_error(*on_board, flight), momentum_error(*other, gap) + 0.05 * test::kArcsecond);
   }
 }
 
@@ -102,9 +93,9 @@ TYPED_TEST(LyingTracker, IsBelievedInTheEnd) {
   // Turned in its mount for good, by more than drift can make: not locked out.
   test::Flight flight({.duration_s = 2700});
   turn_fixes(flight, 300, flight.fixes.size(), kDegree);
-  auto cycle = make_cycle<TypeParam>(nominal_setup_of<TypeParam>());
-  const auto fixes = fly(flight, *cycle);
-  EXPECT_EQ(std::count_if(fixes.begin(), fixes.end(), [](const auto& report) { return report.fix.jumped; }), 399);
+  const auto on_board = make_on_board<TypeParam>();
+  const auto fixes = fly_fixes(flight, *on_board);
+  EXPECT_EQ(std::count_if(fixes.begin(), fixes.end(), [](const StepReport& report) { return report.fix.jumped; }), 399);
   EXPECT_EQ(fixes[300 + 399].fix.status, FixStatus::kUsedAfterReopening);
   EXPECT_EQ(fixes.back().fix.status, FixStatus::kUsed);
 }
@@ -115,11 +106,11 @@ TYPED_TEST(LyingTracker, IsNotTakenForOneWhenTheModelGoesWrongStepByStep) {
   for (std::size_t i = 300; i < flight.fixes.size(); ++i) {
     turn_fixes(flight, i, i + 1, std::min(1e-5 * 3 * static_cast<double>(i - 300), 2e-3));
   }
-  auto cycle = make_cycle<TypeParam>(nominal_setup_of<TypeParam>());
-  const auto fixes = fly(flight, *cycle);
+  const auto on_board = make_on_board<TypeParam>();
+  const auto fixes = fly_fixes(flight, *on_board);
   EXPECT_GE(count(fixes, FixStatus::kUsedAfterReopening), 1);
   int longest = 0;
-  for (const auto& report : fixes) {
+  for (const StepReport& report : fixes) {
     longest = std::max(longest, report.fix.rejections_in_a_row);
   }
   EXPECT_EQ(longest, 19);
@@ -129,31 +120,14 @@ TYPED_TEST(LyingTracker, IsNotTakenForOneWhenTheModelGoesWrongStepByStep) {
 TYPED_TEST(LyingTracker, OfTheFirstFixOnlyIsOutvotedByThoseAfterIt) {
   test::Flight flight({.duration_s = 1800});
   turn_fixes(flight, 0, 1, 3 * kDegree);
-  auto cycle = make_cycle<TypeParam>(nominal_setup_of<TypeParam>());
-  const auto fixes = fly(flight, *cycle);
+  const auto on_board = make_on_board<TypeParam>();
+  const auto fixes = fly_fixes(flight, *on_board);
   EXPECT_EQ(count(fixes, FixStatus::kRejectedByGate), 19);
   EXPECT_EQ(count(fixes, FixStatus::kUsedAfterReopening), 1);
-  EXPECT_LT(momentum_error(*cycle, flight), 60 * test::kArcsecond);
+  EXPECT_LT(momentum_error(*on_board, flight), 60 * test::kArcsecond);
 }
 
 // ---- Without a star tracker: the angles between the momenta
-
-using Pair = InvariantEstimator<Esg7, 2>;
-
-/// Priors drawn about the truth.
-Pair::Setup drawn_setup(const test::Flight& flight, unsigned seed, double alignment_sigma_rad) {
-  auto setup = nominal_setup_of<Pair>();
-  std::mt19937 random(seed + 1000);
-  std::normal_distribution<double> normal;
-  for (int k = 0; k < 2; ++k) {
-    setup.prior[k].drift_rad_s =
-        flight.truth[k].drift_rad_s + 2e-6 * Esg7::Coefficients<double>::NullaryExpr([&] { return normal(random); });
-    const Eigen::Vector3d delta = alignment_sigma_rad * Eigen::Vector3d::NullaryExpr([&] { return normal(random); });
-    setup.prior[k].C_c_b = Rot<C, C>::exp(Vec<C>::assume(delta)).raw() * flight.truth[k].C_c_b;
-    setup.prior_covariance.diagonal().segment<3>(10 * k + 7).setConstant(alignment_sigma_rad * alignment_sigma_rad);
-  }
-  return setup;
-}
 
 /// After the last sample: errors of momenta and parameters over flights, with and without the angles.
 struct Bridged {
@@ -172,41 +146,32 @@ Bridged bridge(int runs, const test::FlightPlan& plan, double last_fix_s, double
     own.seed = static_cast<unsigned>(run);
     test::Flight flight(own);
     flight.fixes.resize(static_cast<std::size_t>(last_fix_s / 3) + 1);
-    auto setup = drawn_setup(flight, own.seed, alignment_sigma_rad);
-    setup.angles_after = use_angles ? std::chrono::minutes(1) : Pair::Setup::kNever;
-    const auto cycle = make_cycle<Pair>(setup);
-    test::fly(flight, *cycle, [&](const auto& report) {
+    test::PairGiven given;
+    given.set_alignment_sigma(alignment_sigma_rad);
+    test::draw_means(flight.truth, own.seed, alignment_sigma_rad, given.prior);
+    given.setup.angles_after = use_angles ? std::chrono::minutes(1) : CalibrationSetup::kNever;
+    const auto on_board = make_on_board(given);
+    test::fly(flight, *on_board, [&](const StepReport& report) {
       mean.looked += report.angles.status == FixStatus::kUsed;
       mean.rejected += report.angles.status == FixStatus::kRejectedByGate;
     });
     // The estimator stands some seconds before the end; the momenta turn by thousandths of an arcsecond in them.
-    const auto& gyros = cycle->estimator().gyros();
-    const auto& since = cycle->estimator().since_fix();
-    const Pair::ErrorRoot root = cycle->estimator().error_root();
+    const Pair& estimator = on_board->estimator();
+    const auto& gyros = estimator.gyros();
+    const Layout& layout = estimator.layout();
     const Eigen::Vector3d n = gyros[0].h_in.cross(gyros[1].h_in).normalized();
-    Eigen::Matrix<double, 1, Pair::ErrorRoot::ColsAtCompileTime> spread;
-    spread.setZero();
-    Eigen::Matrix<double, 20, 1> error;
-    Eigen::Matrix<double, 20, Pair::ErrorRoot::ColsAtCompileTime> parameters;
-    for (int k = 0; k < 2; ++k) {
-      const double sign = k == 0 ? 1 : -1;
-      const auto drift = root.middleRows<7>(Pair::Errors::drift(k));
-      const auto alignment = root.middleRows<3>(Pair::Errors::alignment(k));
-      spread += sign * n.transpose() *
-                (since[k].by_start * root.middleRows<3>(Pair::Errors::direction(k)) + since[k].by_drift * drift +
-                 since[k].by_alignment * alignment);
-      error.segment<7>(10 * k) = flight.truth[k].drift_rad_s - gyros[k].drift_rad_s;
-      error.segment<3>(10 * k + 7) =
-          Rot<C, C>::assume(Eigen::Matrix3d(flight.truth[k].C_c_b * gyros[k].C_c_b.transpose())).log().raw();
-      parameters.middleRows<7>(10 * k) = drift;
-      parameters.middleRows<3>(10 * k + 7) = alignment;
+    Pair::Rows3 by_errors = Pair::Rows3::Zero(3, layout.size());
+    for (int k = 0; k < layout.gyros; ++k) {
+      by_errors.row(0).segment<3>(layout.direction(k)) = (k == 0 ? 1 : -1) * n.transpose();
     }
+    carry_back(layout, estimator.since_fix(), by_errors);
+    const double variance = estimator.covariance_of_errors(by_errors)(0, 0);
     const double off = angle_between<double>(gyros[0].h_in, gyros[1].h_in) -
                        angle_between<double>(flight.truth[0].h_in, flight.truth[1].h_in);
     mean.angle_square += off * off / runs;
-    mean.angle_variance += spread.squaredNorm() / runs;
-    mean.angle_nees += off * off / spread.squaredNorm() / runs;
-    mean.nees += error.dot((parameters * parameters.transpose()).llt().solve(error)) / runs;
+    mean.angle_variance += variance / runs;
+    mean.angle_nees += off * off / variance / runs;
+    mean.nees += test::parameter_nees(flight.truth, estimator) / runs;
   }
   return mean;
 }
@@ -234,86 +199,74 @@ TEST(AnglesWithoutFixes, AreHonestInSteadyFlightWithHalfADegree) {
 }
 
 /// An estimator that has just been started, and readings that agree with it.
-template <int N>
+template <class Estimator>
 struct Started {
-  using Estimator = InvariantEstimator<Esg7, N>;
-  Estimator estimator;
-  Eigen::Matrix3d C_in_c = Rot<In, C>::exp(Vec<In>::assume(0.3, -0.2, 0.9)).raw();
-  FixReadings<N> readings;
+  std::unique_ptr<Estimator> estimator;
+  Eigen::Matrix3d C_in_c = test::turn(0.3, -0.2, 0.9);
+  FixReadings readings;
 
-  explicit Started(const typename Estimator::Setup& setup) : estimator(Estimator::create(setup).value()) {
+  explicit Started(const Layout& layout = {}) : estimator(test::Given<Estimator>(layout).estimator()) {
     const Eigen::Vector3d h_c[] = {{0.8, 0.1, 0.6}, {-0.1, 0.9, 0.4}, {0.5, -0.6, 0.7}};
-    for (int k = 0; k < N; ++k) {
-      readings.h_b[k] = setup.prior[k].C_c_b.transpose() * h_c[k].normalized();
+    readings.used = all_gyros(layout.gyros);
+    for (int k = 0; k < layout.gyros; ++k) {
+      readings.h_b[k] = h_c[k].normalized();
     }
-    EXPECT_EQ(estimator.correct({Time{}, Eigen::Quaterniond(C_in_c)}, readings).status, FixStatus::kStarted);
+    EXPECT_EQ(estimator->correct({Time{}, Eigen::Quaterniond(C_in_c)}, readings).status, FixStatus::kStarted);
   }
 };
 
-InvariantEstimator<Esg7, 3>::Setup triple_setup() {
-  InvariantEstimator<Esg7, 3>::Setup setup;
-  const auto two = test::nominal_setup();
-  setup.star_tracker_noise_rad = two.star_tracker_noise_rad;
-  for (int k = 0; k < 3; ++k) {
-    setup.readout_noise_rad[k] = two.readout_noise_rad[0];
-    setup.prior_covariance.block<10, 10>(10 * k, 10 * k) = two.prior_covariance.block<10, 10>(0, 0);
-  }
-  return setup;
-}
+/// Three gyros with eq. (1).
+const Layout kThree{.gyros = 3};
 
-template <int N>
-void expect_nothing_of_common_turns(const typename InvariantEstimator<Esg7, N>::Setup& setup) {
-  using Estimator = InvariantEstimator<Esg7, N>;
-  using Layout = typename Estimator::Layout;
-  Started<N> s(setup);
-  const auto information_of = [&](const typename Estimator::Information::Vector& v) {
-    return (s.estimator.information().root() * v).squaredNorm();
-  };
+template <class Estimator>
+void expect_nothing_of_common_turns(const Layout& layout) {
+  Started<Estimator> s(layout);
+  Estimator& estimator = *s.estimator;
   // A turn of all directions, of all alignments, and of one gyro's direction and alignment together.
-  typename Estimator::Information::Vector unseen[3];
+  Eigen::VectorXd unseen[3];
   const Eigen::Vector3d n = Eigen::Vector3d(1, 2, 3).normalized();
   for (auto& v : unseen) {
-    v.setZero();
+    v.setZero(layout.size());
   }
-  for (int k = 0; k < N; ++k) {
-    unseen[0].template segment<3>(Layout::direction(k)) = n;
-    unseen[1].template segment<3>(Layout::alignment(k)) = n;
+  for (int k = 0; k < layout.gyros; ++k) {
+    unseen[0].segment<3>(layout.direction(k)) = n;
+    unseen[1].segment<3>(layout.alignment(k)) = n;
   }
-  unseen[2].template segment<3>(Layout::direction(0)) = n;
-  unseen[2].template segment<3>(Layout::alignment(0)) = s.C_in_c.transpose() * n;
-  typename Estimator::Information::Vector seen = Estimator::Information::Vector::Zero();
-  seen.template segment<3>(Layout::direction(0)) =
-      s.estimator.gyros()[0].h_in.cross(s.estimator.gyros()[1].h_in).normalized();
+  unseen[2].segment<3>(layout.direction(0)) = n;
+  unseen[2].segment<3>(layout.alignment(0)) = s.C_in_c.transpose() * n;
+  Eigen::VectorXd seen = Eigen::VectorXd::Zero(layout.size());
+  seen.segment<3>(layout.direction(0)) = estimator.gyros()[0].h_in.cross(estimator.gyros()[1].h_in).normalized();
+  const auto information_of = [&](const Eigen::VectorXd& v) { return test::information_along(estimator, v); };
   const double before[] = {information_of(unseen[0]), information_of(unseen[1]), information_of(unseen[2])};
   const double seen_before = information_of(seen);
   constexpr int kLooks = 1000;
   for (int i = 1; i <= kLooks; ++i) {
-    ASSERT_EQ(s.estimator.check_angles(Time(std::chrono::seconds(3 * i)), s.readings).status, FixStatus::kUsed);
+    ASSERT_EQ(estimator.check_angles(Time(std::chrono::seconds(3 * i)), s.readings).status, FixStatus::kUsed);
   }
   for (int i = 0; i < 3; ++i) {
     EXPECT_NEAR(information_of(unseen[i]) / before[i], 1, 1e-9) << i;
   }
-  const double sigma_rad = setup.readout_noise_rad[0];
+  const double sigma_rad = estimator.setup().readout_noise_rad[0];
   EXPECT_GT(information_of(seen) - seen_before, 1 / (sigma_rad * sigma_rad));
 }
 
 TEST(AnglesWithoutFixes, SayNothingOfWhatTurnsAllMomenta) {
-  expect_nothing_of_common_turns<2>(nominal_setup_of<Pair>());
-  expect_nothing_of_common_turns<3>(triple_setup());
+  expect_nothing_of_common_turns<Pair>({});
+  expect_nothing_of_common_turns<Full>(kThree);
 }
 
 TEST(AnglesWithoutFixes, ShowAGyroThatHasJumped) {
-  Started<2> s(nominal_setup_of<Pair>());
+  Started<Pair> s;
   const Eigen::Vector3d other = s.readings.h_b[1];
   s.readings.h_b[0] = (s.readings.h_b[0] + 1e-3 * other).normalized();
-  const auto before = s.estimator.gyros()[0].h_in;
+  const auto before = s.estimator->gyros()[0].h_in;
   for (int i = 1; i <= 30; ++i) {  // never believed, however often
-    const auto report = s.estimator.check_angles(Time(std::chrono::seconds(3 * i)), s.readings);
+    const auto report = s.estimator->check_angles(Time(std::chrono::seconds(3 * i)), s.readings);
     EXPECT_EQ(report.status, FixStatus::kRejectedByGate);
     EXPECT_EQ(report.rejections_in_a_row, i);
     EXPECT_GT(report.nis, 21);
   }
-  EXPECT_EQ(s.estimator.gyros()[0].h_in, before);
+  EXPECT_EQ(s.estimator->gyros()[0].h_in, before);
 }
 
 TEST(AnglesWithoutFixes, ShareNoSamplesWithFixes) {
@@ -323,10 +276,10 @@ TEST(AnglesWithoutFixes, ShareNoSamplesWithFixes) {
     std::erase_if(flight.fixes, [&](const StarFix& fix) {
       return fix.t > Time(std::chrono::seconds(60)) && fix.t < Time(std::chrono::seconds(back_s));
     });
-    auto cycle = make_cycle<Pair>(nominal_setup_of<Pair>());
+    const auto on_board = make_on_board<Pair>();
     std::vector<Time> looks;
     std::vector<Time> fixes;
-    test::fly(flight, *cycle, [&](const auto& report) {
+    test::fly(flight, *on_board, [&](const StepReport& report) {
       if (report.angles.status != FixStatus::kNone) {
         EXPECT_EQ(report.angles.status, FixStatus::kUsed);
         looks.push_back(report.angles.t);
@@ -335,16 +288,17 @@ TEST(AnglesWithoutFixes, ShareNoSamplesWithFixes) {
         fixes.push_back(report.fix.t);
       }
     });
+    const Duration reach = on_board->estimator().setup().reach();
     ASSERT_GE(looks.size(), 9U);
     EXPECT_EQ(looks.front(), flight.fixes[19].t + std::chrono::minutes(1));
     EXPECT_GE(fixes.size(), flight.fixes.size() - 1);  // none is lost but the last, which waits
     for (const Time look : looks) {
       for (const Time fix : fixes) {
-        EXPECT_GE(std::max(look - fix, fix - look), 2 * Pair::kReach);
+        EXPECT_GE(std::max(look - fix, fix - look), 2 * reach);
       }
     }
     for (std::size_t i = 1; i < looks.size(); ++i) {
-      EXPECT_GE(looks[i] - looks[i - 1], 2 * Pair::kReach);
+      EXPECT_GE(looks[i] - looks[i - 1], 2 * reach);
     }
   }
 }
@@ -353,9 +307,9 @@ TEST(AnglesWithoutFixes, GoOnOverAGapOfTheGyros) {
   test::Flight flight({.duration_s = 900});
   flight.fixes.resize(60);  // until 3 min
   flight.samples.erase(flight.samples.begin() + 8 * 400, flight.samples.begin() + 8 * 600);
-  auto cycle = make_cycle<Pair>(nominal_setup_of<Pair>());
+  const auto on_board = make_on_board<Pair>();
   std::vector<Time> looks;
-  test::fly(flight, *cycle, [&](const auto& report) {
+  test::fly(flight, *on_board, [&](const StepReport& report) {
     if (report.angles.status != FixStatus::kNone) {
       EXPECT_EQ(report.angles.status, FixStatus::kUsed);
       looks.push_back(report.angles.t);
@@ -367,41 +321,17 @@ TEST(AnglesWithoutFixes, GoOnOverAGapOfTheGyros) {
 
 // ---- Gyros that fail
 
-using Triple = InvariantEstimator<Esg7, 3>;
-
 /// A pair's flight with a third gyro of a rotor that does not drift.
 struct Flight3 {
-  explicit Flight3(const test::FlightPlan& plan) : pair(plan) {
-    std::mt19937 random(plan.seed + 77);
-    std::normal_distribution<double> normal;
-    for (std::size_t i = 0; i < pair.samples.size(); ++i) {
-      GyroSample<3>& sample = samples.emplace_back();
-      sample.t = pair.samples[i].t;
-      sample.h_b[0] = pair.samples[i].h_b[0];
-      sample.h_b[1] = pair.samples[i].h_b[1];
-      sample.h_b[2] = pair.C_in_c_at_samples[i].transpose() * third_in +
-                      test::Flight::kReadout_rad * Eigen::Vector3d(normal(random), normal(random), normal(random));
-    }
-  }
+  explicit Flight3(const test::FlightPlan& plan)
+      : pair(plan), samples(test::with_third_gyro(pair, third_in, plan.seed + 77)) {}
   Eigen::Vector3d third_in = Eigen::Vector3d(0.1, -0.8, 0.6).normalized();
   test::Flight pair;
-  std::vector<GyroSample<3>> samples;
+  std::vector<GyroSample> samples;
 };
 
-template <class Samples, class Cycle, class OnReport>
-void fly(const Samples& samples, const std::vector<StarFix>& fixes, Cycle& cycle, OnReport&& on_report) {
-  std::size_t fix = 0;
-  for (const auto& sample : samples) {
-    on_report(cycle.on_gyro(sample));
-    for (; fix < fixes.size() && fixes[fix].t <= sample.t; ++fix) {
-      on_report(cycle.on_fix(fixes[fix]));
-    }
-  }
-}
-
 /// Readings of one gyro stand still over an interval, in s.
-template <class Samples>
-void stick(Samples& samples, int gyro, double from_s, double to_s) {
+void stick(std::vector<GyroSample>& samples, int gyro, double from_s, double to_s) {
   const auto at = [](double t_s) { return static_cast<std::size_t>(8 * t_s); };
   for (std::size_t i = at(from_s); i < at(to_s); ++i) {
     samples[i].h_b[gyro] = samples[at(from_s)].h_b[gyro];
@@ -409,8 +339,7 @@ void stick(Samples& samples, int gyro, double from_s, double to_s) {
 }
 
 /// The rotor slows down and its momentum wanders off, about an axis of its case, faster and faster.
-template <class Samples>
-void wander_off(Samples& samples, int gyro, double from_s, double acceleration_rad_s2) {
+void wander_off(std::vector<GyroSample>& samples, int gyro, double from_s, double acceleration_rad_s2) {
   for (std::size_t i = static_cast<std::size_t>(8 * from_s); i < samples.size(); ++i) {
     const double age_s = static_cast<double>(i) / 8 - from_s;
     const Eigen::Vector3d turn = acceleration_rad_s2 * age_s * age_s / 2 * Eigen::Vector3d(0.3, 0.5, 0.8);
@@ -428,11 +357,11 @@ struct GyroOutcome {
   double worst_rad = 0;  ///< error of the navigator's attitude from 3 s after the failure on
 };
 
-template <class Estimator, class Samples>
-GyroOutcome outcome(const Samples& samples, const test::Flight& truth, Cycle<Estimator>& cycle, int gyro,
-                    double from_s) {
+template <class Estimator>
+GyroOutcome outcome(const std::vector<GyroSample>& samples, const test::Flight& truth, OnBoard<Estimator>& on_board,
+                    int gyro, double from_s) {
   GyroOutcome sum;
-  fly(samples, truth.fixes, cycle, [&](const auto& report) {
+  test::fly(samples, truth.fixes, on_board, [&](const StepReport& report) {
     sum.too_few += report.sample == SampleStatus::kRejectedTooFewGyros;
     sum.too_few_fixes += report.fix.status == FixStatus::kRejectedTooFewGyros;
     sum.used += report.fix.used();
@@ -443,38 +372,37 @@ GyroOutcome outcome(const Samples& samples, const test::Flight& truth, Cycle<Est
     }
     if (report.fix.status == FixStatus::kNone && report.sample == SampleStatus::kUsed && t_s > from_s + 3) {
       const auto i = static_cast<std::size_t>(8 * t_s + 0.5);
-      const Eigen::Matrix3d off =
-          truth.C_in_c_at_samples[i].transpose() * cycle.navigation_attitude().value().C_in_c.raw();
-      sum.worst_rad = std::max(sum.worst_rad, Rot<C, C>::assume(off).log().norm());
+      const AttitudeSolution now = on_board.navigation_attitude().value();
+      sum.worst_rad = std::max(sum.worst_rad, test::attitude_error(truth.C_in_c_at_samples[i], now).norm());
     }
   });
   return sum;
 }
 
+/// The navigator is corrected at every fix.
 template <class Estimator>
-auto every_fix(const typename Estimator::Setup& setup) {
-  return std::make_unique<Cycle<Estimator>>(
-      Cycle<Estimator>::create(setup, {.interval = CorrectionPolicy::kEveryFix}).value());
+std::unique_ptr<OnBoard<Estimator>> every_fix(const Layout& layout = {}) {
+  return test::Given<Estimator>(layout).on_board({.interval = CorrectionPolicy::kEveryFix});
 }
 
 TEST(StuckGyro, OfThreeIsLeftOutWhileItIsStuck) {
   Flight3 flight({.duration_s = 2400});
-  auto good = every_fix<Triple>(triple_setup());
+  const auto good = every_fix<Full>(kThree);
   const GyroOutcome without = outcome(flight.samples, flight.pair, *good, 2, 900);
   EXPECT_EQ(without.first_not_used_s, 0);
   for (const int gyro : {0, 2}) {
     Flight3 stuck = flight;
     stick(stuck.samples, gyro, 900, 1500);
-    auto cycle = every_fix<Triple>(triple_setup());
-    const GyroOutcome with = outcome(stuck.samples, flight.pair, *cycle, gyro, 900);
+    const auto on_board = every_fix<Full>(kThree);
+    const GyroOutcome with = outcome(stuck.samples, flight.pair, *on_board, gyro, 900);
     EXPECT_NEAR(with.first_not_used_s, 902, 0.2);
     EXPECT_EQ(with.too_few + with.too_few_fixes, 0);
     EXPECT_LE(with.rejected, 2);  // those of the seconds before it is known
     EXPECT_GE(with.used, without.used - 2);
     EXPECT_LT(with.worst_rad, 3 * without.worst_rad);
     // Used again, and no worse for it at the end.
-    EXPECT_EQ(cycle->on_gyro(stuck.samples.back()).gyros[gyro], GyroState::kUsed);
-    const auto& gyros = cycle->estimator().gyros();
+    EXPECT_EQ(on_board->on_gyro(stuck.samples.back()).gyros[gyro], GyroState::kUsed);
+    const auto& gyros = on_board->estimator().gyros();
     EXPECT_LT(angle_between<double>(gyros[0].h_in, flight.pair.truth[0].h_in), 5 * test::kArcsecond);
     EXPECT_LT(angle_between<double>(gyros[2].h_in, flight.third_in), 5 * test::kArcsecond);
   }
@@ -485,46 +413,46 @@ TEST(StuckGyro, WithoutADirectionIsLeftOutToo) {
   for (std::size_t i = 8 * 300; i < flight.samples.size(); ++i) {
     flight.samples[i].h_b[1].setZero();
   }
-  auto cycle = every_fix<Triple>(triple_setup());
+  const auto on_board = every_fix<Full>(kThree);
   long not_direction = 0;
   long used = 0;
-  fly(flight.samples, flight.pair.fixes, *cycle, [&](const auto& report) {
+  test::fly(flight.samples, flight.pair.fixes, *on_board, [&](const StepReport& report) {
     not_direction += report.sample == SampleStatus::kRejectedNotDirection;
     used += report.fix.used();
   });
   EXPECT_EQ(not_direction, 15);  // the sixteenth is known for what it is
   EXPECT_GE(used, 298);
-  EXPECT_TRUE(cycle->navigation_attitude().ok());
+  EXPECT_TRUE(on_board->navigation_attitude().ok());
 }
 
 TEST(StuckGyro, OfAPairStopsItUntilItLivesAgain) {
   const test::Flight flight({.duration_s = 2400});
   test::Flight stuck = flight;
   stick(stuck.samples, 1, 900, 1200);
-  auto cycle = every_fix<Pair>(nominal_setup_of<Pair>());
-  const GyroOutcome sum = outcome(stuck.samples, flight, *cycle, 1, 1200);
+  const auto on_board = every_fix<Pair>();
+  const GyroOutcome sum = outcome(stuck.samples, flight, *on_board, 1, 1200);
   EXPECT_NEAR(static_cast<double>(sum.too_few), 8 * 298, 8);
   EXPECT_NEAR(static_cast<double>(sum.too_few_fixes), 100, 2);
   EXPECT_GE(sum.used, 801 - 103);
   EXPECT_LE(sum.rejected, 2);
-  EXPECT_LT(momentum_error(*cycle, flight), 2 * test::kArcsecond);
+  EXPECT_LT(momentum_error(*on_board, flight), 2 * test::kArcsecond);
   EXPECT_LT(sum.worst_rad, 60 * test::kArcsecond);
 }
 
 TEST(WanderingGyro, OfThreeIsIsolatedAndTheOthersGoOn) {
   Flight3 flight({.duration_s = 2400});
-  auto good = every_fix<Triple>(triple_setup());
+  const auto good = every_fix<Full>(kThree);
   const GyroOutcome without = outcome(flight.samples, flight.pair, *good, 0, 900);
   EXPECT_EQ(without.first_not_used_s, 0);
   for (const int gyro : {0, 1, 2}) {
     Flight3 failing = flight;
     wander_off(failing.samples, gyro, 900, 1e-7);
-    auto cycle = every_fix<Triple>(triple_setup());
-    const GyroOutcome with = outcome(failing.samples, flight.pair, *cycle, gyro, 900);
+    const auto on_board = every_fix<Full>(kThree);
+    const GyroOutcome with = outcome(failing.samples, flight.pair, *on_board, gyro, 900);
     EXPECT_GT(with.first_not_used_s, 900);
     EXPECT_LT(with.first_not_used_s, 1200) << gyro;
     for (int other = 0; other < 3; ++other) {
-      EXPECT_EQ(cycle->on_gyro(failing.samples.back()).gyros[other],
+      EXPECT_EQ(on_board->on_gyro(failing.samples.back()).gyros[other],
                 other == gyro ? GyroState::kIsolated : GyroState::kUsed);
     }
     EXPECT_LT(with.rejected, 30);
@@ -536,23 +464,23 @@ TEST(WanderingGyro, OfThreeIsFoundWithoutAStarTrackerToo) {
   Flight3 flight({.duration_s = 3000});
   flight.pair.fixes.resize(600);
   wander_off(flight.samples, 1, 2000, 1e-7);
-  auto cycle = every_fix<Triple>(triple_setup());
-  const GyroOutcome sum = outcome(flight.samples, flight.pair, *cycle, 1, 2000);
+  const auto on_board = every_fix<Full>(kThree);
+  const GyroOutcome sum = outcome(flight.samples, flight.pair, *on_board, 1, 2000);
   EXPECT_GT(sum.first_not_used_s, 2000);
   EXPECT_LT(sum.first_not_used_s, 2200);
-  EXPECT_EQ(cycle->on_gyro(flight.samples.back()).gyros[0], GyroState::kUsed);
-  EXPECT_EQ(cycle->on_gyro(flight.samples.back()).gyros[2], GyroState::kUsed);
+  EXPECT_EQ(on_board->on_gyro(flight.samples.back()).gyros[0], GyroState::kUsed);
+  EXPECT_EQ(on_board->on_gyro(flight.samples.back()).gyros[2], GyroState::kUsed);
 }
 
 TEST(WanderingGyro, OfAPairStopsItForGood) {
   for (const int gyro : {0, 1}) {
     test::Flight flight({.duration_s = 2400});
     wander_off(flight.samples, gyro, 900, 1e-6);
-    auto cycle = every_fix<Pair>(nominal_setup_of<Pair>());
+    const auto on_board = every_fix<Pair>();
     long after = 0;
     SampleStatus last{};
-    PerGyro<GyroState, 2> states{};
-    test::fly(flight, *cycle, [&](const auto& report) {
+    PerGyro<GyroState> states{};
+    test::fly(flight, *on_board, [&](const StepReport& report) {
       states = report.gyros;
       if (report.fix.status == FixStatus::kNone) {
         last = report.sample;
@@ -578,8 +506,8 @@ TEST(WanderingGyro, IsNotSuspectedWhenTheStarTrackerIsAtFault) {
           flight.fixes[i].q_in_c * Eigen::Quaterniond(Eigen::AngleAxisd(angle_rad, axis.normalized()));
     }
   }
-  auto cycle = make_cycle<Pair>(nominal_setup_of<Pair>());
-  for (const auto& report : fly(flight, *cycle)) {
+  const auto on_board = make_on_board<Pair>();
+  for (const StepReport& report : fly_fixes(flight, *on_board)) {
     EXPECT_EQ(report.fix.odd_gyro, kNoGyro);
   }
 }
@@ -617,20 +545,21 @@ Spread with_outliers(const Outliers& outliers, double student_t_freedom) {
       const double factor = uniform(random) < outliers.share ? size : 0;
       const Eigen::Vector3d error = factor * test::Flight::kTracker_rad.cwiseProduct(
                                                  Eigen::Vector3d(normal(random), normal(random), normal(random)));
-      flight.fixes[i].q_in_c = flight.fixes[i].q_in_c * Rot<C, C>::exp(Vec<C>::assume(error)).quaternion();
+      flight.fixes[i].q_in_c = flight.fixes[i].q_in_c * Eigen::Quaterniond(test::turn(error));
     }
-    auto setup = nominal_setup_of<Estimator>();
-    setup.student_t_freedom = student_t_freedom;
-    auto cycle = make_cycle<Estimator>(setup);
-    for (const auto& report : fly(flight, *cycle)) {
+    test::Given<Estimator> given;
+    given.setup.student_t_freedom = student_t_freedom;
+    const auto on_board = make_on_board(given);
+    for (const StepReport& report : fly_fixes(flight, *on_board)) {
       mean.least_weight = std::min(mean.least_weight, report.fix.weight);
       mean.rejected += report.fix.status == FixStatus::kRejectedByGate;
     }
-    const auto root = cycle->estimator().error_root();
-    for (int k = 0; k < 2; ++k) {
-      const Eigen::Matrix3d off = flight.truth[k].C_c_b * cycle->estimator().gyros()[k].C_c_b.transpose();
-      mean.square += Rot<C, C>::assume(off).log().raw().squaredNorm() / kRuns;
-      mean.variance += root.template middleRows<3>(Estimator::Errors::alignment(k)).squaredNorm() / kRuns;
+    const Eigen::MatrixXd root = test::error_root(on_board->estimator());
+    const Layout layout = on_board->estimator().error_layout();
+    const Eigen::VectorXd errors = test::parameter_errors(flight.truth, on_board->estimator().gyros());
+    for (int k = 0; k < layout.gyros; ++k) {
+      mean.square += errors.segment<3>(layout.alignment(k) - layout.drift(0)).squaredNorm() / kRuns;
+      mean.variance += root.middleRows<3>(layout.alignment(k)).squaredNorm() / kRuns;
     }
   }
   return mean;
@@ -669,22 +598,22 @@ TEST(StudentTOfInvariant, ComesNearTheGateWithFewFarOutliers) {
 TYPED_TEST(StudentT, DoesNotBelieveALieEither) {
   test::Flight flight({.duration_s = 2100});
   turn_fixes(flight, 300, 500, 3 * kDegree);
-  auto setup = nominal_setup_of<TypeParam>();
-  setup.student_t_freedom = 5;
-  auto cycle = make_cycle<TypeParam>(setup);
-  const auto fixes = fly(flight, *cycle);
+  test::Given<TypeParam> given;
+  given.setup.student_t_freedom = 5;
+  const auto on_board = make_on_board(given);
+  const auto fixes = fly_fixes(flight, *on_board);
   EXPECT_EQ(count(fixes, FixStatus::kRejectedByGate), 200);
   EXPECT_EQ(fixes.back().fix.status, FixStatus::kUsed);
-  EXPECT_LT(momentum_error(*cycle, flight), 8 * test::kArcsecond);
+  EXPECT_LT(momentum_error(*on_board, flight), 8 * test::kArcsecond);
 }
 
 TYPED_TEST(StudentT, ReopensAsTheGateDoes) {
   test::Flight flight({.duration_s = 1800});
   turn_fixes(flight, 300, flight.fixes.size(), 120 * test::kArcsecond);
-  auto setup = nominal_setup_of<TypeParam>();
-  setup.student_t_freedom = 5;
-  auto cycle = make_cycle<TypeParam>(setup);
-  const auto fixes = fly(flight, *cycle);
+  test::Given<TypeParam> given;
+  given.setup.student_t_freedom = 5;
+  const auto on_board = make_on_board(given);
+  const auto fixes = fly_fixes(flight, *on_board);
   EXPECT_EQ(count(fixes, FixStatus::kUsedAfterReopening), 1);
 }
 
@@ -724,13 +653,13 @@ TYPED_TEST(ClockSetBack, IsTakenOverAfterSixteenSamples) {
     for (auto& fix : set_back.fixes) {
       fix.t -= fix.t > from ? from_seconds(back_s) : Duration::zero();
     }
-    auto cycle = make_cycle<TypeParam>(nominal_setup_of<TypeParam>());
+    const auto on_board = make_on_board<TypeParam>();
     long rejected = 0;
     long taken_over = 0;
     long used = 0;
     std::size_t fix = 0;
     for (std::size_t i = 0; i < flight.samples.size(); ++i) {
-      const auto report = cycle->on_gyro(set_back.samples[i]);
+      const StepReport report = on_board->on_gyro(set_back.samples[i]);
       rejected += report.sample == SampleStatus::kRejectedOutOfOrder;
       taken_over += report.sample == SampleStatus::kUsedAfterClockSetBack;
       used += report.fix.used();
@@ -739,53 +668,53 @@ TYPED_TEST(ClockSetBack, IsTakenOverAfterSixteenSamples) {
         EXPECT_EQ(report.t, set_back.samples[i].t);
       }
       for (; fix < flight.fixes.size() && flight.fixes[fix].t == flight.samples[i].t; ++fix) {
-        used += cycle->on_fix(set_back.fixes[fix]).fix.used();
+        used += on_board->on_fix(set_back.fixes[fix]).fix.used();
       }
     }
     EXPECT_EQ(rejected, 15);
     EXPECT_EQ(taken_over, 1);
     EXPECT_GE(used, 598);
     // Two seconds of drift are not predicted: 1″ at the most.
-    EXPECT_LT(momentum_error(*cycle, flight), 3 * test::kArcsecond);
+    EXPECT_LT(momentum_error(*on_board, flight), 3 * test::kArcsecond);
   }
 }
 
 TYPED_TEST(ClockSetBack, IsNotBelievedOfSamplesThatComeLate) {
   // A block of old samples among the present ones, and a few that go backwards.
   const test::Flight flight({.duration_s = 600});
-  auto cycle = make_cycle<TypeParam>(nominal_setup_of<TypeParam>());
-  auto plain = make_cycle<TypeParam>(nominal_setup_of<TypeParam>());
+  const auto on_board = make_on_board<TypeParam>();
+  const auto plain = make_on_board<TypeParam>();
   std::size_t fix = 0;
   for (std::size_t i = 0; i < flight.samples.size(); ++i) {
-    EXPECT_EQ(cycle->on_gyro(flight.samples[i]).sample, SampleStatus::kUsed);
+    EXPECT_EQ(on_board->on_gyro(flight.samples[i]).sample, SampleStatus::kUsed);
     plain->on_gyro(flight.samples[i]);
     if (i > 2000) {
-      EXPECT_EQ(cycle->on_gyro(flight.samples[i - 1000]).sample, SampleStatus::kRejectedOutOfOrder);
+      EXPECT_EQ(on_board->on_gyro(flight.samples[i - 1000]).sample, SampleStatus::kRejectedOutOfOrder);
     }
     for (std::size_t j = 0; i == 1000 && j < 100; ++j) {
-      EXPECT_EQ(cycle->on_gyro(flight.samples[900 - j]).sample, SampleStatus::kRejectedOutOfOrder);
+      EXPECT_EQ(on_board->on_gyro(flight.samples[900 - j]).sample, SampleStatus::kRejectedOutOfOrder);
     }
     for (; fix < flight.fixes.size() && flight.fixes[fix].t == flight.samples[i].t; ++fix) {
-      cycle->on_fix(flight.fixes[fix]);
+      on_board->on_fix(flight.fixes[fix]);
       plain->on_fix(flight.fixes[fix]);
     }
   }
-  EXPECT_EQ(cycle->estimator().gyros()[0].drift_rad_s, plain->estimator().gyros()[0].drift_rad_s);
+  EXPECT_EQ(on_board->estimator().gyros()[0].drift_rad_s, plain->estimator().gyros()[0].drift_rad_s);
 }
 
 TEST(ClockSetBackOfInvariant, TellsOfTheFixesThatWaited) {
   const test::Flight flight({.duration_s = 60});
-  auto cycle = make_cycle<Pair>(nominal_setup_of<Pair>());
+  const auto on_board = make_on_board<Pair>();
   for (std::size_t i = 0; i <= 24 * 5; ++i) {
-    cycle->on_gyro(flight.samples[i]);
+    on_board->on_gyro(flight.samples[i]);
   }
-  EXPECT_EQ(cycle->on_fix(flight.fixes[5]).fix.status, FixStatus::kPending);
+  EXPECT_EQ(on_board->on_fix(flight.fixes[5]).fix.status, FixStatus::kPending);
   int dropped = 0;
   for (std::size_t i = 0; i < 24; ++i) {
-    dropped += cycle->on_gyro(flight.samples[i]).fixes_dropped;
+    dropped += on_board->on_gyro(flight.samples[i]).fixes_dropped;
   }
   EXPECT_EQ(dropped, 1);
-  EXPECT_EQ(cycle->flush().fix.status, FixStatus::kNone);
+  EXPECT_EQ(on_board->flush().fix.status, FixStatus::kNone);
 }
 
 }  // namespace

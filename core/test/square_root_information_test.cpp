@@ -10,107 +10,193 @@ namespace {
 
 constexpr int kStates = 7;
 constexpr int kDynamic = 3;
-using Filter = SquareRootInformation<kStates, kDynamic>;
-using Matrix = Filter::Matrix;
+/// There is room for more than what is in use: the work must not depend on it.
+using Filter = SquareRootInformation<kStates + 5, kDynamic + 2>;
+using Matrix = Eigen::MatrixXd;
+using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 
-template <int R, int K>
-Eigen::Matrix<double, R, K> random_matrix(std::mt19937& random) {
+Matrix random_matrix(int rows, int columns, std::mt19937& random) {
   std::uniform_real_distribution<double> uniform(-1, 1);
-  return Eigen::Matrix<double, R, K>::NullaryExpr([&] { return uniform(random); });
+  return Matrix::NullaryExpr(rows, columns, [&] { return uniform(random); });
+}
+
+Filter empty() {
+  Filter filter;
+  filter.reset(kStates, kDynamic);
+  return filter;
+}
+
+Matrix root(const Filter& filter) {
+  Matrix R(filter.states(), filter.states());
+  for (int i = 0; i < filter.states(); ++i) {
+    for (int j = 0; j < filter.states(); ++j) {
+      R(i, j) = filter.root()(i, j);
+    }
+  }
+  return R;
+}
+
+template <class F>
+RowMajor inverse_root(const F& filter) {
+  RowMajor inverse(filter.states(), filter.states());
+  filter.inverse_root(rows_of(inverse));
+  return inverse;
+}
+
+template <class F>
+Matrix covariance(const F& filter) {
+  return inverse_root(filter) * inverse_root(filter).transpose();
+}
+
+template <class F>
+void add_information(F& filter, RowMajor rows) {
+  filter.add_information(rows_of(rows));
+}
+
+template <class F>
+Eigen::VectorXd update(F& filter, const Matrix& H, const Eigen::VectorXd& y) {
+  RowMajor rows(H.rows(), H.cols() + 1);
+  rows << H, y;
+  return filter.update(rows_of(rows));
 }
 
 /// The textbook Kalman filter with a full covariance, beside the filter under test.
 struct Dense {
-  Matrix P = Matrix::Zero();
+  Matrix P = Matrix::Zero(kStates, kStates);
 
-  void propagate(const Filter::DynamicMatrix& A, const Filter::DynamicByConstants& B,
-                 const Filter::DynamicVector& noise) {
-    Matrix F = Matrix::Identity();
-    F.topLeftCorner<kDynamic, kDynamic>() = A;
-    F.topRightCorner<kDynamic, kStates - kDynamic>() = B;
+  void propagate(const Matrix& A, const Matrix& B, const Eigen::VectorXd& noise) {
+    Matrix F = Matrix::Identity(kStates, kStates);
+    F.topLeftCorner(kDynamic, kDynamic) = A;
+    F.topRightCorner(kDynamic, kStates - kDynamic) = B;
     P = F * P * F.transpose();
-    P.topLeftCorner<kDynamic, kDynamic>() += noise.cwiseAbs2().asDiagonal();
+    P.topLeftCorner(kDynamic, kDynamic) += noise.cwiseAbs2().asDiagonal();
   }
-  Filter::Vector update(const Eigen::Matrix<double, 2, kStates>& H, const Eigen::Vector2d& y) {
+  Eigen::VectorXd update(const Matrix& H, const Eigen::Vector2d& y) {
     const Eigen::Matrix2d S = H * P * H.transpose() + Eigen::Matrix2d::Identity();
-    const Eigen::Matrix<double, kStates, 2> K = P * H.transpose() * S.inverse();
-    const Filter::Vector x = K * y;
-    P = (Matrix::Identity() - K * H) * P;
+    const Matrix K = P * H.transpose() * S.inverse();
+    const Eigen::VectorXd x = K * y;
+    P = ((Matrix::Identity(kStates, kStates) - K * H) * P).eval();
     return x;
   }
 };
 
-Matrix covariance(const Filter& filter) { return filter.inverse_root() * filter.inverse_root().transpose(); }
-
 TEST(SquareRootInformation, AgreesWithTheTextbookFilterOverManySteps) {
   std::mt19937 random(1);
-  Filter filter;
-  filter.add_prior_of_constants(Eigen::Matrix4d::Identity() * 0.5);
-  const Eigen::Matrix<double, kDynamic, kStates> all = Eigen::Matrix<double, kDynamic, kStates>::Identity();
-  static_cast<void>(filter.update<kDynamic>(all, Eigen::Vector3d::Zero()));
+  Filter filter = empty();
+  RowMajor prior = RowMajor::Identity(kStates, kStates);
+  prior.diagonal().tail(kStates - kDynamic).setConstant(0.5);
+  add_information(filter, prior);
   Dense dense;
   dense.P.diagonal() << 1, 1, 1, 4, 4, 4, 4;
   EXPECT_LT((covariance(filter) - dense.P).norm(), 1e-14);
   for (int step = 0; step < 200; ++step) {
-    const Filter::DynamicMatrix A = Filter::DynamicMatrix::Identity() + 0.1 * random_matrix<kDynamic, kDynamic>(random);
-    const Filter::DynamicByConstants B = random_matrix<kDynamic, kStates - kDynamic>(random);
+    const Matrix A = Matrix::Identity(kDynamic, kDynamic) + 0.1 * random_matrix(kDynamic, kDynamic, random);
+    const Matrix B = random_matrix(kDynamic, kStates - kDynamic, random);
     // Without process noise at every other step: a zero noise must not divide by anything.
-    const Filter::DynamicVector noise = (step % 2) * 0.1 * random_matrix<kDynamic, 1>(random).cwiseAbs();
+    const Eigen::VectorXd noise = (step % 2) * 0.1 * random_matrix(kDynamic, 1, random).cwiseAbs();
     filter.propagate(A.inverse(), B, noise);
     dense.propagate(A, B, noise);
     ASSERT_LT((covariance(filter) - dense.P).norm(), 1e-10 * dense.P.norm()) << step;
-    const Eigen::Matrix<double, 2, kStates> H = random_matrix<2, kStates>(random);
-    const Eigen::Matrix<double, 2, kStates> through = filter.through_uncertainty<2>(H);
+    const Matrix H = random_matrix(2, kStates, random);
+    RowMajor through = H;
+    filter.see_through_uncertainty(rows_of(through));
     ASSERT_LT((through * through.transpose() - H * dense.P * H.transpose()).norm(), 1e-10 * dense.P.norm());
-    const Eigen::Vector2d y = random_matrix<2, 1>(random);
-    ASSERT_LT((filter.update<2>(H, y) - dense.update(H, y)).norm(), 1e-9) << step;
+    const Eigen::Vector2d y = random_matrix(2, 1, random);
+    ASSERT_LT((update(filter, H, y) - dense.update(H, y)).norm(), 1e-9) << step;
     ASSERT_LT((covariance(filter) - dense.P).norm(), 1e-10 * dense.P.norm()) << step;
   }
+}
+
+TEST(SquareRootInformation, GivesTheFirstRowsOfItsInverse) {
+  std::mt19937 random(5);
+  Filter filter = empty();
+  add_information(filter, random_matrix(kStates + 2, kStates, random));
+  RowMajor first(4, kStates);
+  filter.inverse_root(rows_of(first));
+  EXPECT_EQ(first, inverse_root(filter).topRows(4));
+  EXPECT_LT((inverse_root(filter) * root(filter) - Matrix::Identity(kStates, kStates)).norm(), 1e-12);
 }
 
 TEST(SquareRootInformation, UnobservedDirectionStaysUnobservedThroughManySteps) {
   std::mt19937 random(2);
-  Filter filter;  // no prior at all
-  Filter::Vector null = random_matrix<kStates, 1>(random).normalized();
+  Filter filter = empty();  // no prior at all
+  Eigen::VectorXd null = random_matrix(kStates, 1, random).normalized();
   double scale = 0;
   for (int step = 0; step < 10'000; ++step) {
     // Measurements that do not see `null`, then dynamics that carry it along.
-    Eigen::Matrix<double, 2, kStates> H = random_matrix<2, kStates>(random);
-    H -= H * null * null.transpose() / null.squaredNorm();
-    static_cast<void>(filter.update<2>(H, Eigen::Vector2d::Zero()));
+    Matrix H = random_matrix(2, kStates, random);
+    H -= (H * null * null.transpose() / null.squaredNorm()).eval();
+    static_cast<void>(update(filter, H, Eigen::Vector2d::Zero()));
     if (step > kStates) {
-      const Filter::DynamicByConstants B = 0.01 * random_matrix<kDynamic, kStates - kDynamic>(random);
-      filter.propagate(Filter::DynamicMatrix::Identity(), B, Filter::DynamicVector::Zero());
-      null.head<kDynamic>() += B * null.tail<kStates - kDynamic>();
+      const Matrix B = 0.01 * random_matrix(kDynamic, kStates - kDynamic, random);
+      filter.propagate(Matrix::Identity(kDynamic, kDynamic), B, Eigen::VectorXd::Zero(kDynamic));
+      null.head(kDynamic) += B * null.tail(kStates - kDynamic);
     }
-    scale = filter.root().norm();
+    scale = root(filter).norm();
   }
   // 10⁴ orthogonal steps, each with its rounding: far below one rounding per step in sum.
-  EXPECT_LT((filter.root() * null).norm(), 1e-13 * scale * null.norm());
+  EXPECT_LT((root(filter) * null).norm(), 1e-13 * scale * null.norm());
 }
 
 TEST(SquareRootInformation, IsRegularOnlyOnceEveryStateIsKnown) {
-  Filter filter;
+  Filter filter = empty();
   EXPECT_FALSE(filter.regular());
-  filter.add_prior_of_constants(Eigen::Matrix4d::Identity());
+  const RowMajor all = RowMajor::Identity(kStates, kStates);
+  add_information(filter, all.bottomRows(kStates - kDynamic));
   EXPECT_FALSE(filter.regular());
-  static_cast<void>(
-      filter.update<kDynamic>(Eigen::Matrix<double, kDynamic, kStates>::Identity(), Eigen::Vector3d::Zero()));
+  add_information(filter, all.topRows(kDynamic));
   EXPECT_TRUE(filter.regular());
+  filter.reset(kStates, kDynamic);
+  EXPECT_FALSE(filter.regular());
 }
 
 TEST(SquareRootInformation, SurvivesFirstFixesThatBreakAFullCovariance) {
   // Direction and alignment fully correlated, leverage of 1e7: a full covariance turns indefinite, this one cannot.
   SquareRootInformation<2, 1> filter;
-  filter.add_prior_of_constants(Eigen::Matrix<double, 1, 1>(1e-4));
+  filter.reset(2, 1);
+  add_information(filter, Eigen::RowVector2d(0, 1e-4));
   for (int step = 0; step < 1000; ++step) {
-    Eigen::Matrix<double, 1, 2, Eigen::RowMajor> H(1e8, -1e8 * (1 + 1e-9 * step));
-    const Eigen::Vector2d x = filter.update<1>(H, Eigen::Matrix<double, 1, 1>(0.5));
-    ASSERT_TRUE(x.allFinite());
-    const Eigen::Matrix2d root = filter.inverse_root();
-    ASSERT_TRUE(root.allFinite());
-    ASSERT_GT((root * root.transpose()).diagonal().minCoeff(), 0);
+    const Eigen::RowVector2d H(1e8, -1e8 * (1 + 1e-9 * step));
+    ASSERT_TRUE(update(filter, H, Eigen::VectorXd::Constant(1, 0.5)).allFinite());
+    ASSERT_TRUE(inverse_root(filter).allFinite());
+    ASSERT_GT(covariance(filter).diagonal().minCoeff(), 0);
   }
+}
+
+TEST(Triangularise, LeavesAllInformationInTheFirstRows) {
+  std::mt19937 random(3);
+  for (const int columns : {1, 3, 5}) {
+    const RowMajor before = random_matrix(6, 8, random);
+    RowMajor rows = before;
+    triangularise(rows_of(rows), columns);
+    EXPECT_LT((rows.transpose() * rows - before.transpose() * before).norm(), 1e-13) << columns;
+    for (int j = 0; j < columns; ++j) {
+      EXPECT_LT(rows.col(j).tail(5 - j).norm(), 1e-14) << columns;
+    }
+  }
+}
+
+TEST(RotateInto, TakesAnyNumberOfRows) {
+  std::mt19937 random(4);
+  for (int count = 1; count <= 20; ++count) {
+    const RowMajor rows = random_matrix(count, kStates, random);
+    RowMajor R = RowMajor::Identity(kStates, kStates);
+    const Matrix expected = R.transpose() * R + rows.transpose() * rows;
+    RowMajor extra = rows;
+    rotate_into(rows_of(R), rows_of(extra), kStates);
+    EXPECT_LT((R.transpose() * R - expected).norm(), 1e-13 * expected.norm()) << count;
+    EXPECT_TRUE(R.isUpperTriangular(1e-15)) << count;
+    EXPECT_EQ(extra.norm(), 0) << count;
+  }
+}
+
+TEST(Multiply, IsTheProduct) {
+  std::mt19937 random(6);
+  const RowMajor a = random_matrix(3, 7, random);
+  const RowMajor b = random_matrix(7, 9, random);
+  RowMajor product = RowMajor::Constant(3, 9, 7.0);
+  multiply(view_of(a), view_of(b), rows_of(product));
+  EXPECT_LT((product - a * b).norm(), 1e-14);
 }
 
 }  // namespace

@@ -1,24 +1,21 @@
-// Another project's flight software: sets up the cycle and feeds it one sample and one fix.
-#include <trihedron/core/cycles.hpp>
-#include <trihedron/core/paper_estimator.hpp>
+// Another project's flight software: sets up the on-board step and feeds it one sample and one fix.
+#include <trihedron/core/on_board.hpp>
 
 int main() {
   using namespace trihedron;
-  using OnBoard = Cycle<PaperEstimator<Esg7>>;
-  OnBoard::Setup setup;
-  setup.prior_covariance.diagonal().setConstant(1e-6);
-  setup.star_tracker_noise_rad.setConstant(1e-5);
-  for (double& noise : setup.readout_noise_rad) {
-    noise = 1e-5;
-  }
-  auto cycle = OnBoard::create(setup, {});
-  if (!cycle) {
+  CalibrationSetup setup;
+  setup.star_trackers[0].noise_rad.setConstant(1e-5);
+  setup.readout_noise_rad[0] = setup.readout_noise_rad[1] = 1e-5;
+  const PairOnBoard::Gyros prior;
+  const int parameters = setup.layout.parameters();
+  PairOnBoard on_board;
+  if (on_board.set_up(setup, prior, 1e-6 * Eigen::MatrixXd::Identity(parameters, parameters), {})) {
     return 1;
   }
-  OnBoard on_board = cycle.value();
-  GyroSample<2> sample;
+  GyroSample sample;
   sample.h_b[0] = Eigen::Vector3d::UnitX();
   sample.h_b[1] = Eigen::Vector3d::UnitY();
   on_board.on_gyro(sample);
-  return on_board.on_fix({sample.t, Eigen::Quaterniond::Identity()}).fix.status == FixStatus::kStarted ? 0 : 2;
+  on_board.on_fix({sample.t, Eigen::Quaterniond::Identity()});
+  return on_board.flush().fix.status == FixStatus::kStarted ? 0 : 2;
 }

@@ -26,8 +26,8 @@ struct Layout {
   static constexpr int kEq1 = 7;  ///< coefficients of eq. (1), the first ones of each drift model
 
   int gyros = 2;
-  DriftModelId drift_model;
-  FurtherStates further;
+  DriftModelId drift_model{};
+  FurtherStates further{};
   int star_trackers = 1;
   /// Components of the error of a direction: 3 in `in`, of which that along the momentum means nothing, or 2 across it.
   int direction_size = 3;

@@ -9,6 +9,7 @@
 #include "trihedron/core/directions_fit.hpp"
 #include "trihedron/core/fix_readings.hpp"
 #include "trihedron/core/gyro_health.hpp"
+#include "trihedron/core/optimal_attitude.hpp"
 #include "trihedron/core/setup.hpp"
 #include "trihedron/core/telemetry.hpp"
 

@@ -1,0 +1,176 @@
+#include "trihedron/core/readings.hpp"
+
+#include <gtest/gtest.h>
+
+#include "trihedron/core/frames.hpp"
+
+namespace trihedron {
+namespace {
+
+using PairReadings = Readings<2>;
+
+constexpr double kReadingNoise_rad = 1e-5;
+
+Time time_at(double t_s) { return Time(from_seconds(t_s)); }
+
+CalibrationSetup buffer_setup() {
+  CalibrationSetup setup;
+  setup.readout_noise_rad[0] = setup.readout_noise_rad[1] = kReadingNoise_rad;
+  return setup;
+}
+
+/// Momenta of a body that turns evenly about z.
+constexpr double kRate_rad_s = 0.02;
+GyroSample turning_sample(double t_s) {
+  GyroSample s;
+  s.t = time_at(t_s);
+  s.h_b[0] = rotated<double>(Eigen::Vector3d(0.6, 0, 0.8), Eigen::Vector3d(0, 0, -kRate_rad_s * t_s));
+  s.h_b[1] = rotated<double>(Eigen::Vector3d(0, 1, 0), Eigen::Vector3d(0, 0, -kRate_rad_s * t_s));
+  return s;
+}
+
+/// Samples, the health of their gyros, and gyros whose axes are those of the body.
+struct SomeReadings {
+  explicit SomeReadings(bool together = true) : readings(buffer_setup(), together) {}
+  PairReadings readings;
+  GyroHealth health{2};
+  PerGyro<GyroModel<7>, 2> gyros;
+
+  void push(double t_s) {
+    const GyroSample s = turning_sample(t_s);
+    health.look_at(s);
+    readings.push(s);
+  }
+  [[nodiscard]] std::optional<FixReadings> at_time(double t_s) const {
+    return readings.at(time_at(t_s), buffer_setup(), health, gyros);
+  }
+};
+
+double readings_off(const Directions& h_b, double t_s) {
+  const GyroSample truth = turning_sample(t_s);
+  return std::max(angle_between<double>(h_b[0], truth.h_b[0]), angle_between<double>(h_b[1], truth.h_b[1]));
+}
+
+TEST(Readings, KeepTheLatest) {
+  SomeReadings buffer;
+  EXPECT_EQ(buffer.readings.size(), 0);
+  EXPECT_FALSE(buffer.readings.latest());
+  for (int i = 0; i < PairReadings::kCapacity + 3; ++i) {
+    EXPECT_EQ(buffer.readings.full(), i >= PairReadings::kCapacity);
+    buffer.push(i);
+  }
+  ASSERT_EQ(buffer.readings.size(), PairReadings::kCapacity);
+  EXPECT_EQ(buffer.readings.time(0), time_at(3));
+  EXPECT_EQ(buffer.readings.latest_t(), time_at(PairReadings::kCapacity + 2));
+  EXPECT_EQ(readings_off(buffer.readings.directions(4), 7), 0);
+  EXPECT_EQ(buffer.readings.first_after(time_at(7)), 5);
+  EXPECT_EQ(buffer.readings.first_after(time_at(7.5)), 5);
+  EXPECT_EQ(buffer.readings.first_after(time_at(1)), 0);
+  EXPECT_EQ(buffer.readings.first_after(time_at(1e3)), PairReadings::kCapacity);
+  buffer.readings.clear();
+  EXPECT_EQ(buffer.readings.size(), 0);
+}
+
+TEST(Readings, HaveNoRoomForSamplesThatComeTooSoon) {
+  SomeReadings buffer;
+  EXPECT_FALSE(buffer.readings.too_soon(time_at(0)));
+  buffer.push(0);
+  EXPECT_TRUE(buffer.readings.too_soon(time_at(0.07)));
+  EXPECT_FALSE(buffer.readings.too_soon(time_at(0.075)));
+  // What the angles between the momenta wait for: twice the reach to both sides, and the samples of half a fix more.
+  EXPECT_GE(PairReadings::kMinSpacing * PairReadings::kCapacity, std::chrono::seconds(6));
+}
+
+TEST(Readings, AreThoseOfASampleOrBetweenTwo) {
+  SomeReadings buffer(false);
+  for (int i = 0; i <= 40; ++i) {
+    buffer.push(0.125 * i);
+  }
+  const auto on_one = buffer.at_time(2.5);
+  ASSERT_TRUE(on_one);
+  EXPECT_EQ(readings_off(on_one->h_b, 2.5), 0);
+  const auto between_two = buffer.at_time(2.55);
+  ASSERT_TRUE(between_two);
+  EXPECT_LT(readings_off(between_two->h_b, 2.55), 1e-6);  // an arc of 2.5e-3 rad against its chord
+  for (const auto& readings : {*on_one, *between_two}) {
+    EXPECT_EQ(readings.noise_factor, 1);
+    EXPECT_EQ(readings.rate_c.norm(), 0);
+    EXPECT_EQ(count(readings.used), 2);
+  }
+  const FixReadings now = buffer.readings.now(buffer_setup(), buffer.health, buffer.gyros);
+  EXPECT_EQ(readings_off(now.h_b, 5), 0);
+  EXPECT_EQ(now.noise_factor, 1);
+}
+
+TEST(Readings, TakeTheSamplesRoundATimeTogether) {
+  SomeReadings buffer;
+  for (int i = 0; i <= 40; ++i) {
+    buffer.push(0.125 * i);
+  }
+  const Eigen::Vector3d rate_c(0, 0, kRate_rad_s);
+  const auto readings = buffer.at_time(2.55);
+  ASSERT_TRUE(readings);
+  EXPECT_LT(readings_off(readings->h_b, 2.55), 1e-8);
+  EXPECT_NEAR(readings->noise_factor, 0.32, 0.02);  // of 22 samples, a cubic: 3/2 of 1/√22
+  EXPECT_LT((readings->rate_c - rate_c).norm(), 1e-6);
+  const FixReadings now = buffer.readings.now(buffer_setup(), buffer.health, buffer.gyros);
+  EXPECT_LT(readings_off(now.h_b, 5), 1e-6);  // a parabola leaves the third power of an arc of 0.05 rad
+  EXPECT_LT(now.noise_factor, 0.7);
+  EXPECT_LT((now.rate_c - rate_c).norm(), 1e-4);
+}
+
+TEST(Readings, AreNotThoseOverAGap) {
+  SomeReadings buffer;
+  for (int i = 0; i <= 80; ++i) {
+    if (i <= 20 || i >= 60) {
+      buffer.push(0.125 * i);
+    }
+  }
+  EXPECT_FALSE(buffer.at_time(-0.1));  // before the first
+  EXPECT_FALSE(buffer.at_time(4));     // in the gap
+  EXPECT_FALSE(buffer.at_time(10.1));  // after the last
+  // Beside it only the samples of the same side are taken.
+  const auto beside = buffer.at_time(7.5);
+  ASSERT_TRUE(beside);
+  EXPECT_LT(readings_off(beside->h_b, 7.5), 1e-7);
+}
+
+TEST(Readings, AreSingleWhereNoPolynomialExplainsThem) {
+  SomeReadings buffer;
+  for (int i = 0; i <= 40; ++i) {
+    GyroSample s = turning_sample(0.125 * i);
+    s.h_b[0] = rotated<double>(s.h_b[0], Eigen::Vector3d(0, (i % 2) * 1e-3, 0));
+    buffer.readings.push(s);
+  }
+  const auto readings = buffer.at_time(2.5);
+  ASSERT_TRUE(readings);
+  EXPECT_EQ(readings->noise_factor, 1);
+  EXPECT_EQ(readings_off(readings->h_b, 2.5), 0);
+}
+
+TEST(Readings, OfAStuckGyroAreNotUsed) {
+  SomeReadings buffer;
+  for (int i = 0; i <= 40; ++i) {
+    GyroSample s = turning_sample(0.125 * i);
+    s.h_b[1] = Eigen::Vector3d::UnitY();
+    buffer.health.look_at(s);
+    buffer.readings.push(s);
+  }
+  const auto readings = buffer.at_time(2.5);
+  ASSERT_TRUE(readings);
+  EXPECT_TRUE(readings->used[0]);
+  EXPECT_FALSE(readings->used[1]);
+}
+
+TEST(Between, GoesFromOneDirectionToTheOther) {
+  const Directions a = turning_sample(0).h_b;
+  const Directions b = turning_sample(5).h_b;
+  for (const double fraction : {0.0, 0.3, 1.0}) {
+    const Directions h = between(a, b, fraction, 2);
+    EXPECT_NEAR(h[0].norm(), 1, 1e-15);
+    EXPECT_NEAR(angle_between<double>(h[1], a[1]), 0.1 * fraction, 1e-4);
+  }
+}
+
+}  // namespace
+}  // namespace trihedron
