@@ -3,7 +3,7 @@
 cmake_path(GET PASS PARENT_PATH parent)
 file(MAKE_DIRECTORY ${parent})
 foreach(pass IN ITEMS ${PASS} ${PASS}.nc)
-  if(PROGRAM IS_NEWER_THAN ${pass} OR SCENARIO IS_NEWER_THAN ${pass})
+  if(${PROGRAM} IS_NEWER_THAN ${pass} OR ${SCENARIO} IS_NEWER_THAN ${pass})
     execute_process(COMMAND ${PROGRAM} --quiet simulate ${SCENARIO} -o ${pass} COMMAND_ERROR_IS_FATAL ANY)
   endif()
 endforeach()
