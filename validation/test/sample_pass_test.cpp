@@ -1,17 +1,16 @@
-// Filter and batch on passes made by an independent generator; no part of the product.
+// Filter and batch on passes of each kind.
 
 #include <gtest/gtest.h>
 
 #include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
-#include <filesystem>
 #include <iterator>
-#include <ostream>
 #include <string>
 #include <vector>
 
 #include "consistency/statistics.hpp"
+#include "sample_passes.hpp"
 #include "trihedron/ground/calibrate/calibrate.hpp"
 #include "trihedron/ground/judge/agreement.hpp"
 #include "trihedron/io/pass.hpp"
@@ -19,28 +18,19 @@
 namespace trihedron::consistency {
 namespace {
 
-struct SampleWithModel {
-  const char* pass;
-  DriftModelId drift_model;
-  friend std::ostream& operator<<(std::ostream& out, const SampleWithModel& sample) {
-    return out << sample.pass << " by " << name_of(sample.drift_model);
-  }
-};
-class SamplePass : public testing::TestWithParam<SampleWithModel> {};
+class SamplePass : public testing::TestWithParam<PassOfKind> {};
 
 INSTANTIATE_TEST_SUITE_P(WithTheModelItAsksFor, SamplePass,
-                         testing::Values(SampleWithModel{"pass-a", kEsg7}, SampleWithModel{"pass-b", kEsg7},
-                                         SampleWithModel{"pass-c", kEsg20}, SampleWithModel{"pass-d", kEsg7}),
-                         [](const auto& name) { return std::string(1, name.param.pass[5]); });
+                         testing::ValuesIn(sample_passes({PassKind::kNominal, PassKind::kSteadyFlight, PassKind::kDirty,
+                                                          PassKind::kYawManoeuvre})),
+                         [](const auto& pass) { return pass.param.identifier(); });
+
+DriftModelId drift_model_for(PassKind kind) { return kind == PassKind::kDirty ? kEsg20 : kEsg7; }
 
 TEST_P(SamplePass, FilterAndBatchAgree) {
-  const std::filesystem::path path = std::filesystem::path(TRIHEDRON_SAMPLE_PASSES) / GetParam().pass;
-  if (!std::filesystem::exists(path)) {
-    GTEST_SKIP() << "no sample passes here";
-  }
-  const Pass pass = io::read_pass(path).pass;
+  const Pass pass = io::read_pass(GetParam().path).pass;
   CalibrationOptions options;
-  options.drift_model = GetParam().drift_model;
+  options.drift_model = drift_model_for(GetParam().kind);
   const Calibration by_filter = ground::calibrate(pass, options).calibration;
   options.estimator = Estimator::kBatch;
   const Calibration by_batch = ground::calibrate(pass, options).calibration;

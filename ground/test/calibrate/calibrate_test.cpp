@@ -4,8 +4,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <filesystem>
-#include <numbers>
 #include <vector>
 
 #include "named.hpp"
@@ -326,33 +324,6 @@ TEST(SetupError, NamesWhatIsWrongWithAnEarlierCalibration) {
   pass.settings.prior = good;
   pass.settings.prior->covariance.setZero();
   EXPECT_THAT(setup_error(pass), HasSubstr("positive definite"));
-}
-
-/// Passes made by an independent generator; no part of the product.
-class SamplePass : public testing::TestWithParam<const char*> {};
-
-INSTANTIATE_TEST_SUITE_P(WithSlews, SamplePass, testing::Values("pass-a", "pass-d"),
-                         [](const auto& name) { return std::string(1, name.param[5]); });
-
-TEST_P(SamplePass, IsCalibratedToAnArcsecondOrSo) {
-  const std::filesystem::path path = std::filesystem::path(TRIHEDRON_SAMPLE_PASSES) / GetParam();
-  if (!std::filesystem::exists(path)) {
-    GTEST_SKIP() << "no sample passes here";
-  }
-  constexpr double kArcsecond = std::numbers::pi / 180 / 3600;
-  const auto run = calibrate(io::read_pass(path).pass, {});
-  const Truth truth = io::read_truth(path).value();
-  for (std::size_t k = 0; k < 2; ++k) {
-    EXPECT_LT(alignment_error(run.calibration, truth, k).norm(), 1.5 * kArcsecond);
-    double error2 = 0;
-    double size2 = 0;
-    for (std::size_t i = 0; i < 7; ++i) {
-      error2 += std::pow(run.calibration.gyros[k].drift_rad_s[i] - truth.gyros[k].drift_rad_s[i].second, 2);
-      size2 += std::pow(truth.gyros[k].drift_rad_s[i].second, 2);
-    }
-    EXPECT_LT(std::sqrt(error2 / size2), 0.03);
-  }
-  EXPECT_NEAR(run.calibration.statistics.nis_mean.value(), 4, 0.2);
 }
 
 TEST(Calibrate, DecidesByItselfForClockOffsetAndErrorAtOrbitalPeriod) {
