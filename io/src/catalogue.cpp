@@ -106,12 +106,12 @@ void add_findings(SqliteDatabase& database, std::int64_t row, const Verdict& ver
   }
 }
 
-void add_entry(SqliteDatabase& database, const CatalogueEntry& entry) {
+void add_entry(SqliteDatabase& database, const CatalogueEntry& entry, const std::string& start_up) {
   const Calibration& calibration = entry.calibration;
   SqliteStatement insert(database, "INSERT OR REPLACE INTO calibration VALUES (NULL, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)");
   insert.bind(0, entry.spacecraft);
   insert.bind(1, entry.pass);
-  insert.bind(2, entry.start_up);
+  insert.bind(2, start_up);
   insert.bind(3, std::int64_t{entry.passes});
   insert.bind(4, format_epoch(calibration.epoch));
   insert.bind(5, to_seconds(calibration.t - calibration.epoch));
@@ -148,7 +148,8 @@ void add_to_catalogue(const fs::path& file, std::span<const CatalogueEntry> entr
   check_catalogue(database, file);
   for (const CatalogueEntry& entry : entries) {
     check_spacecraft(database, file, entry.spacecraft);
-    add_entry(database, entry);
+    add_entry(database, entry,
+              entry.start_up.empty() ? format_epoch(entries.front().calibration.epoch) : entry.start_up);
   }
   database.execute("COMMIT");
 }

@@ -28,8 +28,7 @@ constexpr std::size_t kTimes = 20;
 
 /// In the order of the layout.
 std::vector<ParameterId> constants_of(const Layout& layout) {
-  std::vector<ParameterId> constants =
-      drift_and_alignment(layout.drift_model, static_cast<std::size_t>(layout.gyros));
+  std::vector<ParameterId> constants = drift_and_alignment(layout.drift_model, static_cast<std::size_t>(layout.gyros));
   std::vector<ParameterId> further = further_parameters(layout);
   std::ranges::sort(further, {}, [&](const ParameterId& parameter) { return state_of(layout, parameter); });
   constants.insert(constants.end(), further.begin(), further.end());
@@ -197,9 +196,10 @@ void add_combinations(const MatrixXd& scaled_root, const BodyRotation& rotation,
       const VectorXd direction = columns.col(i);
       const double s = (scaled_root * direction).norm();
       const double error_rad = std::sqrt(direction.dot(scaled_metric * direction) / (1 + s * s));
+      const bool is_unobservable = s < Observability::kUnobservable;
       result.weak.push_back({blocks.in_words(direction, result.prior_sigma, rotation), blocks.named(direction),
-                             blocks.is_alignment(direction), s, error_rad,
-                             s < Observability::kUnobservable && error_rad > tolerable_rad});
+                             blocks.is_alignment(direction), s, error_rad, is_unobservable,
+                             is_unobservable && error_rad > tolerable_rad});
     }
     std::sort(result.weak.begin() + begin, result.weak.end(),
               [](const Combination& a, const Combination& b) { return a.attitude_error_rad > b.attitude_error_rad; });
