@@ -10,6 +10,7 @@
 #include "trihedron/core/invariant_estimator.hpp"
 #include "trihedron/core/outlier_gate.hpp"
 #include "trihedron/core/precession.hpp"
+#include "trihedron/records/stop.hpp"
 
 namespace trihedron::ground {
 namespace {
@@ -261,6 +262,7 @@ void PassProblem::go_along(const PassSolution& solution, const std::function<voi
   Moment moment;
   double unused = 0;
   for (std::size_t arc = 0; arc < arcs_.size(); ++arc) {
+    check_stop();
     begin_arc(solution, arc, moment);
     for (std::size_t i = arcs_[arc].begin; i < arcs_[arc].end; ++i) {
       if (i > arcs_[arc].begin) {
@@ -495,6 +497,7 @@ PassProblem::Linear PassProblem::linearise(const PassSolution& solution) const {
   std::vector<double> nis_per_component;
   std::vector<std::size_t> fixes_until;
   for (std::size_t arc = 0; arc < arcs_.size(); ++arc) {
+    check_stop();
     begin_arc(solution, arc, moment);
     double extra_variance_rad2 = 0;
     for (std::size_t i = arcs_[arc].begin; i < arcs_[arc].end; ++i) {
@@ -530,6 +533,7 @@ PassProblem::Linear PassProblem::linearise(const PassSolution& solution) const {
   }
   std::size_t fix = 0;
   for (std::size_t arc = 0; arc < arcs_.size(); ++arc) {
+    check_stop();
     Together together(setup_.fixes_together);
     for (; fix < fixes_until[arc]; ++fix) {
       const auto& [its, rows] = fixes[fix];

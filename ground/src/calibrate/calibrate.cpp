@@ -6,7 +6,6 @@
 #include <boost/math/distributions/chi_squared.hpp>
 #include <chrono>
 #include <cmath>
-#include <future>
 #include <memory>
 #include <utility>
 
@@ -20,6 +19,7 @@
 #include "trihedron/ground/model/names.hpp"
 #include "trihedron/ground/model/setup_error.hpp"
 #include "trihedron/ground/onboard/replay.hpp"
+#include "trihedron/ground/tasks/on_all_cores.hpp"
 #include "trihedron/records/progress.hpp"
 #include "trihedron/records/run.hpp"
 
@@ -292,23 +292,15 @@ CalibrationRun calibrate_with(const Pass& pass, Decision decision, const Progres
   Time corrected{};
   decltype(Cycle<Estimator>::Report::gyros) gyros_before{};
   double angle_looks = 0;
-  // On a core of its own.
-  struct Smoothed {
-    Refinement refinement;
-    std::vector<DriftModelForecast> drift_models;
-  };
-  std::future<Smoothed> smoothed;
-  if (run.options.estimator == kBatch) {
+  std::optional<Refinement> refinement;
+  std::vector<DriftModelForecast> drift_models;
+  const auto refine = [&, setup = pass_setup<Estimator>(cycle->estimator().setup(), pass, run.options)] {
     if (!decision.screened) {
       decision.screened = screen(pass, run.options);
     }
-    const PassSetup setup = pass_setup<Estimator>(cycle->estimator().setup(), pass, run.options);
-    smoothed = std::async(std::launch::async, [&decision, &run, setup] {
-      Refinement refinement(*decision.screened, setup, run.options);
-      std::vector<DriftModelForecast> drift_models = flown(decision.forecasts, refinement.course());
-      return Smoothed{std::move(refinement), std::move(drift_models)};
-    });
-  }
+    refinement.emplace(*decision.screened, setup, run.options);
+    drift_models = flown(decision.forecasts, refinement->course());
+  };
   const auto on_fix = [&](const typename Cycle<Estimator>::Report& report) {
     run.fixes.push_back(record_of(report));
     corrected = report.corrected ? report.fix.t : corrected;
@@ -336,7 +328,7 @@ CalibrationRun calibrate_with(const Pass& pass, Decision decision, const Progres
   };
   std::array<long, kSampleStatuses> samples{};
   Meter meter(progress, pass.gyro.size());
-  replay(pass, *cycle, on_fix, [&](const typename Cycle<Estimator>::Report& report) {
+  const auto on_sample = [&](const typename Cycle<Estimator>::Report& report) {
     ++samples[static_cast<std::size_t>(report.sample)];
     for (int k = 0; k < Estimator::kGyros; ++k) {
       if (report.gyros[k] != gyros_before[k]) {
@@ -352,21 +344,28 @@ CalibrationRun calibrate_with(const Pass& pass, Decision decision, const Progres
       angle.add(report.t, report.angle_residual);
     }
     meter.step();
-  });
+  };
+  const auto on_board = [&] {
+    replay(pass, *cycle, on_fix, on_sample);
+    if (!cycle->estimator().started()) {
+      throw nothing_used(run.fixes);
+    }
+  };
+  if (run.options.estimator == kBatch) {
+    side_by_side(on_board, refine);
+  } else {
+    on_board();
+  }
   for (std::size_t i = 0; i < samples.size(); ++i) {
     if (samples[i] > 0) {
       run.samples[name_of(static_cast<SampleStatus>(i))] = samples[i];
     }
   }
-  if (!cycle->estimator().started()) {
-    throw nothing_used(run.fixes);
-  }
   run.known_before = known_before(pass, Estimator::kGyros, run.options);
   run.calibration = result_of(pass, *cycle, run.options);
-  if (smoothed.valid()) {
-    auto [refinement, drift_models] = smoothed.get();
+  if (refinement) {
     run.drift_models = std::move(drift_models);
-    std::move(refinement).put_into(run);
+    std::move(*refinement).put_into(run);
   }
   for (const FixRecord& fix : run.fixes) {
     ++run.fix_counts[name_of(fix.status)];

@@ -16,6 +16,7 @@
 #include "model/prior.hpp"
 #include "trihedron/ground/model/names.hpp"
 #include "trihedron/ground/model/setup_error.hpp"
+#include "trihedron/ground/tasks/on_all_cores.hpp"
 
 namespace trihedron::ground {
 namespace {
@@ -196,19 +197,23 @@ void decide_beside_noise(const Pass& pass, const Screened& screened, const Calib
   CalibrationOptions& options = decision.options;
   const CalibrationOptions free = with_everything(options, asked, largest_model);
   const CalibrationOptions like = wandering_like(walk, free);
-  std::future<std::pair<Trial, Likely>> wandering_trial;
-  if (wandering_is_open) {
-    wandering_trial = std::async(std::launch::async, [&] {
-      Trial trial(pass, screened, like);
-      const Likely likely = with_most_likely_wandering(trial, like);
-      return std::pair(std::move(trial), likely);
-    });
-  }
-  const Likely walking = with_most_likely_walk(everything, free);
+  // Looked at only where the walk is worth it: before that, nobody asks whether it failed.
+  std::packaged_task<std::pair<Trial, Likely>()> try_wandering([&] {
+    Trial trial(pass, screened, like);
+    const Likely likely = with_most_likely_wandering(trial, like);
+    return std::pair(std::move(trial), likely);
+  });
+  Likely walking;
+  side_by_side([&] { walking = with_most_likely_walk(everything, free); },
+               [&] {
+                 if (wandering_is_open) {
+                   try_wandering();
+                 }
+               });
   std::optional<Evidence> wandering;
   std::optional<ProcessNoise> wanders;
   if (wandering_is_open && walking.gain > kStrong) {
-    auto [trial, likely] = wandering_trial.get();
+    auto [trial, likely] = try_wandering.get_future().get();
     const double gain = likely.log_likelihood - walking.log_likelihood;
     wandering = Evidence{"wandering_drift", gain, gain > kStrong};
     if (wandering->accepted) {

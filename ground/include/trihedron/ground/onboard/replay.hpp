@@ -7,12 +7,13 @@
 #include "trihedron/core/status.hpp"
 #include "trihedron/core/telemetry.hpp"
 #include "trihedron/records/pass.hpp"
+#include "trihedron/records/stop.hpp"
 
 namespace trihedron::ground {
 
 /// Feeds a pass to the on-board cycle in time order: a fix on the time of a gyro sample comes after it. Calls
 /// on_fix(report) when what was done with a fix is known, and on_sample(report) after each sample and the fixes on its
-/// time. Gyros and star trackers beyond those of the cycle are not used.
+/// time. Gyros and star trackers beyond those of the cycle are not used. Can be stopped.
 template <class Cycle, class OnFix, class OnSample>
 void replay(const Pass& pass, Cycle& cycle, OnFix&& on_fix, OnSample&& on_sample) {
   using Report = typename Cycle::Report;
@@ -36,6 +37,7 @@ void replay(const Pass& pass, Cycle& cycle, OnFix&& on_fix, OnSample&& on_sample
     }
   };
   for (std::size_t i = 0; i < pass.gyro.size(); ++i) {
+    check_stop();
     GyroSample<Cycle::kGyros> sample;
     sample.t = pass.gyro.t[i];
     for (int k = 0; k < Cycle::kGyros; ++k) {
