@@ -16,6 +16,7 @@
 #include "model/orbital_rate.hpp"
 #include "model/prior.hpp"
 #include "trihedron/ground/model/setup_error.hpp"
+#include "trihedron/ground/tasks/on_all_cores.hpp"
 
 namespace trihedron::ground {
 namespace {
@@ -175,19 +176,23 @@ void decide_beside_noise(const Pass& pass, const Screened& screened, const Calib
   CalibrationOptions& options = decision.options;
   const CalibrationOptions free = with_everything(options, asked, largest_model);
   const CalibrationOptions like = wandering_like(walk, free);
-  std::future<std::pair<Trial, NoiseFit>> wandering_trial;
-  if (wandering_is_open) {
-    wandering_trial = std::async(std::launch::async, [&] {
-      Trial trial(pass, screened, like);
-      const NoiseFit likely = with_most_likely_wandering(trial, like);
-      return std::pair(std::move(trial), likely);
-    });
-  }
-  const NoiseFit walking = with_most_likely_walk(everything, free);
+  // Looked at only where the walk is worth it: before that, nobody asks whether it failed.
+  std::packaged_task<std::pair<Trial, NoiseFit>()> try_wandering([&] {
+    Trial trial(pass, screened, like);
+    const NoiseFit likely = with_most_likely_wandering(trial, like);
+    return std::pair(std::move(trial), likely);
+  });
+  NoiseFit walking;
+  side_by_side([&] { walking = with_most_likely_walk(everything, free); },
+               [&] {
+                 if (wandering_is_open) {
+                   try_wandering();
+                 }
+               });
   std::optional<Evidence> wandering;
   std::optional<ProcessNoise> wanders;
   if (wandering_is_open && walking.gain > kStrong) {
-    auto [trial, likely] = wandering_trial.get();
+    auto [trial, likely] = try_wandering.get_future().get();
     const double gain = likely.log_likelihood - walking.log_likelihood;
     wandering = Evidence{FurtherState::kWanderingDrift, gain, gain > kStrong};
     if (wandering->accepted) {
