@@ -272,6 +272,16 @@ std::optional<DriftModelId> larger_model(const DriftModelId& model) {
   return is_there ? std::optional(vsh(model.degree + 1)) : std::nullopt;
 }
 
+/// What star trackers and rotors usually have, with priors that allow for its being absent.
+CalibrationOptions with_what_is_usual(CalibrationOptions options) {
+  options.drift_model = options.drift_model.value_or(kEsg20);
+  for (const FurtherState state : {FurtherState::kClockOffset, FurtherState::kOrbitalError}) {
+    Choice& choice = options.further_states[state];
+    choice = choice == Choice::kAuto ? Choice::kOn : choice;
+  }
+  return options;
+}
+
 /// Estimator paper has nothing to choose; how the coefficients change over a pass is looked for in the whole of it only.
 void settle_by_estimator(CalibrationOptions& asked) {
   if (asked.estimator == Estimator::kPaper) {
@@ -293,11 +303,11 @@ CalibrationOptions settled_before(const PassSettings& settings, CalibrationOptio
   }
   settle_by_estimator(options);
   refuse_prior_of_others(settings, options);
-  if (prior && options.estimator != Estimator::kPaper) {
-    if (prior->noise && options.find_noise) {
+  if (options.estimator != Estimator::kPaper) {
+    if (prior && prior->noise && options.find_noise) {
       use_noise(*prior->noise, options);
     }
-    options = as_before(options, *prior);
+    options = prior ? as_before(options, *prior) : with_what_is_usual(options);
   }
   options.find_noise = false;
   leave_out_what_is_open(options);
