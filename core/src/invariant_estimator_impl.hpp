@@ -33,7 +33,7 @@ std::optional<SetupFault> InvariantEstimator<kCapacity>::set_up(const Calibratio
   for (int i = layout.direction(layout.gyros); i < layout.dynamic(); ++i) {
     R(i, i) = 1 / setup.wandering_drift.sigma;
   }
-  for (int i = layout.readout_bias(0); i < layout.size(); ++i) {
+  for (int i = layout.readout(0); i < layout.size(); ++i) {
     R(i, i) = 1 / prior_sigma_of_further_state(setup, i);
   }
   setup_ = setup;
@@ -148,10 +148,8 @@ void InvariantEstimator<kCapacity>::start(const Eigen::Matrix3d& C_in_c, const F
     }
     H.template block<3, 3>(row, layout.direction(k)).setIdentity();
     H.template block<3, 3>(row, layout.alignment(k)) = -C_in_c;
-    if (layout.further.readout_bias) {
-      H.template block<3, 3>(row, layout.readout_bias(k)) =
-          C_in_c * skew<double>(gyros_[k].in_c(readings.h_b[k])) * gyros_[k].C_c_b;
-    }
+    H.block(row, layout.readout(k), 3, layout.readout_size()) =
+        by_readout_errors(layout, C_in_c * skew<double>(gyros_[k].in_c(readings.h_b[k])), gyros_[k], readings.h_b[k]);
     H.block(row, layout.shared(), 3, layout.shared_size()) = C_in_c.lazyProduct(by_shared);
     for (int j = 0; j < layout.gyros; ++j) {
       R.template block<3, 3>(row, 3 * j) = R_in;
@@ -329,8 +327,8 @@ namespace detail {
 }
 
 /// Two components for each gyro of the layout.
-inline void report_innovation(const Layout& layout, const FixComparison& comparison, const ComponentCovariance& covariance,
-                              FixReport& report) {
+inline void report_innovation(const Layout& layout, const FixComparison& comparison,
+                              const ComponentCovariance& covariance, FixReport& report) {
   const int size = 2 * layout.gyros;
   report.innovation.setZero(size);
   report.innovation_covariance.setZero(size, size);
@@ -397,9 +395,8 @@ FixReport InvariantEstimator<kCapacity>::correct(const StarFix& fix, const FixRe
       if (is_fault(report.nis, misfit_rad, count(readings.used))) {
         const Eigen::Matrix3d& C_by_gyros = by_gyros.value().C_in_c.raw();
         const PerGyro<double> angle_noise_rad = reading_noise(C_by_gyros, readings.noise_factor, 1);
-        const FixComparison angles =
-            compare(layout(), gyros_, C_by_gyros, C_by_gyros, readings.h_b, readings.used,
-                    FixBySharedStates::Zero(3, layout().shared_size()));
+        const FixComparison angles = compare(layout(), gyros_, C_by_gyros, C_by_gyros, readings.h_b, readings.used,
+                                             FixBySharedStates::Zero(3, layout().shared_size()));
         const int freedom = angles.components() - 3;
         if (!(angles_of(angles, angle_noise_rad).nis <= gate_of_freedom(freedom, setup_.gate_nis))) {
           report.odd_gyro = odd_gyro(comparison, [&](const FixComparison& rest) {
@@ -450,9 +447,8 @@ AngleReport InvariantEstimator<kCapacity>::check_angles(Time t, const FixReading
   const Eigen::Matrix3d& C_in_c = by_gyros.value().C_in_c.raw();
   update_to_now(C_in_c);
   const PerGyro<double> noise_rad = reading_noise(C_in_c, readings.noise_factor, ++angles_since_fix_);
-  const FixComparison comparison =
-      compare(layout(), gyros_, C_in_c, C_in_c, readings.h_b, readings.used,
-              FixBySharedStates::Zero(3, layout().shared_size()));
+  const FixComparison comparison = compare(layout(), gyros_, C_in_c, C_in_c, readings.h_b, readings.used,
+                                           FixBySharedStates::Zero(3, layout().shared_size()));
   const White white = angles_of(comparison, noise_rad);
   report.nis = white.nis;
   if (!(white.nis <= gate_of_freedom(comparison.components() - 3, setup_.gate_nis))) {
@@ -479,8 +475,7 @@ void InvariantEstimator<kCapacity>::update(const Compared& white, double root_we
   const Layout& layout = setup_.layout;
   for (int k = 0; k < layout.gyros; ++k) {
     Gyro& gyro = gyros_[k];
-    gyro.h_in =
-        rotated<double>(gyro.h_in, Eigen::Vector3d(x.template segment<3>(layout.direction(k)))).normalized();
+    gyro.h_in = rotated<double>(gyro.h_in, Eigen::Vector3d(x.template segment<3>(layout.direction(k)))).normalized();
     if (layout.further.wandering_drift) {
       gyro.drift_rad_s.template segment<3>(layout.wandering_column()) += x.template segment<3>(layout.wandering(k));
     }

@@ -290,7 +290,7 @@ std::optional<Eigen::Matrix3d> OnBoard<Estimator>::attitude_of(const Gyros& gyro
   const Eigen::Matrix3d C = C_in_c.value().raw();
   for (int k = 0; k < this->gyros(); ++k) {
     if (!step.used[k]) {  // its momentum turns all the same
-      step.middle[k] = gyros[k].C_c_b.transpose() * (C.transpose() * gyros[k].h_in) + gyros[k].readout_bias;
+      step.middle[k] = gyros[k].reading_of(C.transpose() * gyros[k].h_in);
     }
   }
   return C;
@@ -371,8 +371,7 @@ std::optional<AttitudeSolution> OnBoard<Estimator>::navigated_before(Time t, con
   if (!C_in_c) {
     return std::nullopt;
   }
-  const auto solution =
-      navigator_.attitude_before(estimator_, readings, *C_in_c, back.middle, this->t(), back.dt_s());
+  const auto solution = navigator_.attitude_before(estimator_, readings, *C_in_c, back.middle, this->t(), back.dt_s());
   return solution ? std::optional(solution.value()) : std::nullopt;
 }
 
@@ -418,10 +417,8 @@ void Navigator<Estimator>::correct_directions(const Estimator& estimator, const 
     // φ = C_in_c (δ + ε − h_c × C_c_b Δb): h_in was read through what is held at the estimated attitude.
     auto phi = errors.template middleRows<3>(layout.direction(k));
     phi = C_in_c.lazyProduct(errors.template middleRows<3>(layout.alignment(k)));
-    if (layout.further.readout_bias) {
-      const Eigen::Matrix3d by_bias = C_in_c * skew<double>(gyros_[k].in_c(h_b[k])) * gyros_[k].C_c_b;
-      phi -= by_bias.lazyProduct(errors.template middleRows<3>(layout.readout_bias(k)));
-    }
+    phi -= by_readout_errors(layout, C_in_c * skew<double>(gyros_[k].in_c(h_b[k])), gyros_[k], h_b[k])
+               .lazyProduct(errors.middleRows(layout.readout(k), layout.readout_size()));
     phi.template leftCols<kAttitude>() = C_in_c * attitude_root;
   }
   restart_clock();
@@ -514,13 +511,16 @@ Result<AttitudeSolution, DirectionsFault> Navigator<Estimator>::attitude(const E
     const double scale_rad = setup.wandering_drift.sigma * setup.wandering_drift.time_s;
     variance_rad2 += scale_rad * scale_rad * std::max(2 * x - 3 + 4 * std::exp(-x) - std::exp(-2 * x), 0.0);
   }
-  return with_covariance(by_directions.value(), gram<Estimator::kMaxStates>(spread), noise_rad, layout.gyros, variance_rad2);
+  return with_covariance(by_directions.value(), gram<Estimator::kMaxStates>(spread), noise_rad, layout.gyros,
+                         variance_rad2);
 }
 
 template <class Estimator>
-Result<AttitudeSolution, DirectionsFault> Navigator<Estimator>::attitude_before(
-    const Estimator& estimator, const FixReadings& readings, const Eigen::Matrix3d& C_in_c, const Directions& h_b,
-    Time t, double back_s) const {
+Result<AttitudeSolution, DirectionsFault> Navigator<Estimator>::attitude_before(const Estimator& estimator,
+                                                                                const FixReadings& readings,
+                                                                                const Eigen::Matrix3d& C_in_c,
+                                                                                const Directions& h_b, Time t,
+                                                                                double back_s) const {
   Gyros past = gyros_;
   precess_all(estimator, C_in_c, h_b, t, -back_s, past);
   return attitude(estimator, past, readings, time_since_correction_s_ - back_s);

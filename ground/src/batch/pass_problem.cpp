@@ -167,7 +167,7 @@ void PassProblem::step(const Node& from, const Node& to, Moment& moment, double&
   if (const auto at_begin = optimal_rotation(h_middle, seen_c, used)) {
     for (int k = 0; k < gyros_; ++k) {
       const Gyro& gyro = moment.gyros[k];
-      const Vector3d omega_b = drift_.rate(gyro.unbiased(middle[k]), part, gyro.drift_rad_s.data());
+      const Vector3d omega_b = drift_.rate(gyro.corrected(middle[k]), part, gyro.drift_rad_s.data());
       h_middle[k] = rotated<double>(h_middle[k], at_begin.value().raw() * (gyro.C_c_b * omega_b) * (dt_s / 2));
     }
   }
@@ -181,7 +181,7 @@ void PassProblem::step(const Node& from, const Node& to, Moment& moment, double&
   for (int k = 0; k < gyros_; ++k) {
     Gyro& gyro = moment.gyros[k];
     if (!used[k]) {  // its momentum turns all the same: what it would read at the attitude of the others
-      middle[k] = gyro.C_c_b.transpose() * (C_in_c.transpose() * gyro.h_in) + gyro.readout_bias;
+      middle[k] = gyro.reading_of(C_in_c.transpose() * gyro.h_in);
     }
     const Vector3d turned = precess(gyro, moment.since[k], drift_, C_in_c, middle[k], part, dt_s);
     if (to.after_gap) {
@@ -273,8 +273,8 @@ PassProblem::FixRows PassProblem::compare(const PassSolution& solution, const Mo
   const FixBySharedStates by_shared = fix_by_shared_states(setup, fix.fix, fix.rate_c);
   const Rot<In, C> C_fix = corrected(fix.fix, by_shared, solution.shared);
   // Linearised at the attitude by the gyros, which has no noise of the fix.
-  const FixComparison comparison = trihedron::compare(setup.layout, moment.gyros, C_fix.raw(), by_gyros.value().raw(),
-                                                      fix.h_b, fix.used, by_shared);
+  const FixComparison comparison =
+      trihedron::compare(setup.layout, moment.gyros, C_fix.raw(), by_gyros.value().raw(), fix.h_b, fix.used, by_shared);
   const auto about_now = rows_about_states_now<kFullCapacity.states>(setup.layout, comparison);
   rows.y = about_now.col(setup.layout.size());
   rows.H = by_states_of_arc(moment, about_now);
@@ -296,7 +296,7 @@ void PassProblem::add_prior(const PassSolution& solution, Linear& linear) const 
   const CalibrationSetup& setup = setup_.on_board;
   const int fewer = setup.layout.dynamic() - layout_.dynamic();  // of the states that move
   VectorXd sigma = VectorXd::Constant(layout_.size(), kUnknown_rad);
-  for (int state = layout_.readout_bias(0); state < layout_.size(); ++state) {
+  for (int state = layout_.readout(0); state < layout_.size(); ++state) {
     sigma(state) = prior_sigma_of_further_state(setup, state + fewer);
   }
   VectorXd apart = VectorXd::Zero(layout_.size());  // prior mean − solution
@@ -307,9 +307,7 @@ void PassProblem::add_prior(const PassSolution& solution, Linear& linear) const 
     apart.segment(layout_.drift(k), layout_.drift_size()) = drift.head(layout_.drift_size());
     apart.segment<3>(layout_.alignment(k)) =
         Rot<C, C>::assume(Matrix3d(prior.C_c_b * gyro.C_c_b.transpose())).log().raw();
-    if (layout_.further.readout_bias) {
-      apart.segment<3>(layout_.readout_bias(k)) = prior.readout_bias - gyro.readout_bias;
-    }
+    apart.segment(layout_.readout(k), layout_.readout_size()) = prior.errors(layout_) - gyro.errors(layout_);
     if (layout_.further.coefficient_change) {
       apart.segment<Layout::kEq1>(layout_.change(k)) = drift.segment<Layout::kEq1>(layout_.change_column());
     }
@@ -448,8 +446,7 @@ void PassProblem::correct(const SmootherResult& found, PassSolution& solution) c
     const VectorXd& x = found.x[arc];
     PassSolution::Arc& its = solution.arcs[arc];
     for (int k = 0; k < gyros_; ++k) {
-      its.h_in[k] =
-          rotated<double>(its.h_in[k], across(its.h_in[k]) * x.segment<2>(layout_.direction(k))).normalized();
+      its.h_in[k] = rotated<double>(its.h_in[k], across(its.h_in[k]) * x.segment<2>(layout_.direction(k))).normalized();
       if (layout_.further.wandering_drift) {
         its.wandering_rad_s[k] += x.segment<3>(layout_.wandering(k));
       }

@@ -22,9 +22,11 @@ namespace {
 
 using Choice = FurtherStateOptions::Choice;
 
-/// Whose evidence a trial with everything shows. That of wandering drift comes with the search for the noise.
-constexpr std::array kJudgedByTrial = {FurtherState::kClockOffset, FurtherState::kOrbitalError,
-                                       FurtherState::kReadoutBias, FurtherState::kCoefficientChange};
+/// Whether a trial with everything shows the evidence of a state: of those that are a choice all but the wandering
+/// drift, which the search for the noise decides.
+bool is_judged_by_trial(const FurtherStateRow& row) {
+  return !row.key.empty() && row.state != FurtherState::kWanderingDrift;
+}
 
 /// Odds of 20 to 1.
 constexpr double kStrong = 3;
@@ -90,9 +92,9 @@ void refuse_prior_of_others(const PassSettings& settings, const CalibrationOptio
     return;
   }
   if (prior->gyros.size() != settings.gyros.size()) {
-    throw SetupError(
-        fmt::format("the earlier calibration has {} gyros; the pass has {}", prior->gyros.size(), settings.gyros.size()),
-        "use a calibration of these gyros");
+    throw SetupError(fmt::format("the earlier calibration has {} gyros; the pass has {}", prior->gyros.size(),
+                                 settings.gyros.size()),
+                     "use a calibration of these gyros");
   }
   for (std::size_t k = 0; k < prior->gyros.size(); ++k) {
     const GyroCalibration& gyro = prior->gyros[k];
@@ -123,10 +125,10 @@ void settle_states(const Trial& everything, const CalibrationOptions& asked, Dec
     decision.evidence.push_back({state, log_bayes_factor, log_bayes_factor > kStrong});
     return decision.evidence.back().accepted;
   };
-  for (const FurtherState state : kJudgedByTrial) {
-    if (asked.further_states[state] == Choice::kAuto) {
-      const bool on = settle(state, everything.log_evidence(state));
-      decision.options.further_states[state] = on ? Choice::kOn : Choice::kOff;
+  for (const FurtherStateRow& row : kFurtherStates) {
+    if (is_judged_by_trial(row) && asked.further_states[row.state] == Choice::kAuto) {
+      const bool on = settle(row.state, everything.log_evidence(row.state));
+      decision.options.further_states[row.state] = on ? Choice::kOn : Choice::kOff;
     }
   }
   decision.forecasts = everything.forecasts();
@@ -140,8 +142,10 @@ void settle_states(const Trial& everything, const CalibrationOptions& asked, Dec
 /// Everything on that is on or may be, and the largest drift model.
 CalibrationOptions with_everything(CalibrationOptions options, const CalibrationOptions& asked,
                                    const DriftModelId& largest_model) {
-  for (const FurtherState state : kJudgedByTrial) {
-    options.further_states[state] = asked.further_states[state] == Choice::kOff ? Choice::kOff : Choice::kOn;
+  for (const FurtherStateRow& row : kFurtherStates) {
+    if (is_judged_by_trial(row)) {
+      options.further_states[row.state] = asked.further_states[row.state] == Choice::kOff ? Choice::kOff : Choice::kOn;
+    }
   }
   options.drift_model = largest_model;
   return options;
@@ -267,7 +271,8 @@ std::optional<DriftModelId> larger_model(const DriftModelId& model) {
   return is_there ? std::optional(vsh(model.degree + 1)) : std::nullopt;
 }
 
-/// Estimator paper has nothing to choose; how the coefficients change over a pass is looked for in the whole of it only.
+/// Estimator paper has nothing to choose; how the coefficients change over a pass is looked for in the whole of it
+/// only.
 void settle_by_estimator(CalibrationOptions& asked) {
   if (asked.estimator == Estimator::kPaper) {
     asked.drift_model = asked.drift_model.value_or(kEsg7);
@@ -316,9 +321,10 @@ Decision decide(const Pass& pass, const CalibrationOptions& asked_for) {
   Decision decision{asked, {}, {}, {}};
   CalibrationOptions& options = decision.options;
   options.find_noise = false;
-  const bool states_are_settled = asked.drift_model && std::ranges::none_of(kJudgedByTrial, [&](FurtherState state) {
-                                    return asked.further_states[state] == Choice::kAuto;
-                                  });
+  const bool states_are_settled =
+      asked.drift_model && std::ranges::none_of(kFurtherStates, [&](const FurtherStateRow& row) {
+        return is_judged_by_trial(row) && asked.further_states[row.state] == Choice::kAuto;
+      });
   if (states_are_settled && !asked.find_noise) {
     leave_out_what_is_open(options);
     return decision;

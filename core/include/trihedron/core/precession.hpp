@@ -7,6 +7,7 @@
 #include "trihedron/core/columns.hpp"
 #include "trihedron/core/drift.hpp"
 #include "trihedron/core/frames.hpp"
+#include "trihedron/core/gyro_readout.hpp"
 #include "trihedron/core/per_gyro.hpp"
 
 namespace trihedron {
@@ -14,18 +15,12 @@ namespace trihedron {
 /// What is believed of one gyro; inside of the estimators, plain numbers with frames in the names. There is room for
 /// Max drift columns.
 template <int Max>
-struct GyroModel {
+struct GyroModel : GyroReadout {
   using Coefficients = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, Max, 1>;
 
   Eigen::Vector3d h_in = Eigen::Vector3d::UnitX();  ///< direction of the momentum
   /// Of all columns of the drift model: κ; the drift that wanders; the change of the coefficients of eq. (1).
   Coefficients drift_rad_s = Coefficients::Zero(Layout::kEq1 <= Max ? Layout::kEq1 : Max);
-  Eigen::Matrix3d C_c_b = Eigen::Matrix3d::Identity();     ///< alignment, exp([Λ×])
-  Eigen::Vector3d readout_bias = Eigen::Vector3d::Zero();  ///< of the direction cosines: h_b is read as h_b + bias
-
-  [[nodiscard]] Eigen::Vector3d unbiased(const Eigen::Vector3d& h_b) const { return without_bias(h_b, readout_bias); }
-  /// The same, seen in c.
-  [[nodiscard]] Eigen::Vector3d in_c(const Eigen::Vector3d& h_b) const { return C_c_b * unbiased(h_b); }
 };
 
 /// Linearised effect of three causes on one momentum since a reference epoch:
@@ -41,8 +36,7 @@ struct Sensitivity {
   [[nodiscard]] Sensitivity then(const Sensitivity& next, int columns) const {
     Sensitivity both;
     both.by_start = next.by_start * by_start;
-    both.by_drift.first(columns) =
-        next.by_start.lazyProduct(by_drift.first(columns)) + next.by_drift.first(columns);
+    both.by_drift.first(columns) = next.by_start.lazyProduct(by_drift.first(columns)) + next.by_drift.first(columns);
     both.by_alignment = next.by_start * by_alignment + next.by_alignment;
     return both;
   }
@@ -57,7 +51,7 @@ void advance_by_drift(ColumnsView by_drift, ColumnsView basis, const Eigen::Matr
 template <int Max>
 void precess(GyroModel<Max>& gyro, const DriftModel& drift, const Eigen::Matrix3d& C_in_c, const Eigen::Vector3d& h_b,
              double part_of_change, double dt_s) {
-  const Eigen::Vector3d omega_b = drift.rate(gyro.unbiased(h_b), part_of_change, gyro.drift_rad_s.data());
+  const Eigen::Vector3d omega_b = drift.rate(gyro.corrected(h_b), part_of_change, gyro.drift_rad_s.data());
   const Eigen::Vector3d omega_in = C_in_c * (gyro.C_c_b * omega_b);
   gyro.h_in = rotated<double>(gyro.h_in, omega_in * dt_s).normalized();
 }
@@ -69,7 +63,7 @@ Eigen::Vector3d precess(GyroModel<Max>& gyro, Sensitivity<Max>& sensitivity, con
                         const Eigen::Matrix3d& C_in_c, const Eigen::Vector3d& h_b, double part_of_change, double dt_s) {
   Columns<Max> columns;
   const int size = drift.columns();
-  drift.basis(gyro.unbiased(h_b), part_of_change, columns.view(size));
+  drift.basis(gyro.corrected(h_b), part_of_change, columns.view(size));
   const Eigen::Matrix3d dt_C_in_b = dt_s * (C_in_c * gyro.C_c_b);
   const Eigen::Vector3d turn = dt_C_in_b * columns.first(size).lazyProduct(gyro.drift_rad_s);
   gyro.h_in = rotated<double>(gyro.h_in, turn).normalized();

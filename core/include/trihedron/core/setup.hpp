@@ -32,6 +32,28 @@ struct StarTrackerSetup {
 /// acceleration over it is below the readout noise.
 [[nodiscard]] Duration max_interpolation(Duration gyro_period);
 
+/// One T for each kind of further states.
+template <class T>
+class PerFurtherState {
+ public:
+  [[nodiscard]] constexpr T& operator[](FurtherState state) { return items_[static_cast<std::size_t>(state)]; }
+  [[nodiscard]] constexpr const T& operator[](FurtherState state) const {
+    return items_[static_cast<std::size_t>(state)];
+  }
+
+ private:
+  std::array<T, kFurtherStateCount> items_{};
+};
+
+[[nodiscard]] constexpr PerFurtherState<double> default_further_sigmas() {
+  PerFurtherState<double> sigmas;
+  for (const FurtherStateKind& kind : kFurtherStateKinds) {
+    sigmas[kind.state] = kind.prior_sigma;
+  }
+  return sigmas;
+}
+
+/// What a calibration filter is set up with.
 struct CalibrationSetup {
   static constexpr Duration kNever = Duration::max();
 
@@ -43,14 +65,12 @@ struct CalibrationSetup {
 
   // Of the further states, where the layout has them.
   GaussMarkov wandering_drift;  ///< rad/s per case axis
-  double readout_bias_sigma = 1e-4;               ///< of each component
-  double coefficient_change_sigma_rad_s = 1e-7;   ///< over change_time_s
+  /// 1-sigma of each component before anything is measured, rad, rad/s or s; of the change over change_time_s.
+  PerFurtherState<double> further_sigma = default_further_sigmas();
   double change_time_s = 32400;
-  Time no_change_at{};  ///< the coefficients stand for this time
-  double clock_offset_sigma_s = 0.1;
-  double orbital_error_sigma_rad = 1e-4;  ///< of each component of p_s and p_c
-  double orbital_rate_rad_s = 1.1e-3;     ///< n
-  Time orbital_phase_zero{};              ///< where nt = 0
+  Time no_change_at{};                 ///< the coefficients stand for this time
+  double orbital_rate_rad_s = 1.1e-3;  ///< n
+  Time orbital_phase_zero{};           ///< where nt = 0
 
   /// A fix with a NIS above this is rejected; χ² of 4 degrees of freedom passes 30 once in 2e5 good fixes. That of a
   /// pair: of more gyros a gate that good fixes pass as often.
@@ -94,14 +114,15 @@ template <class Gyros>
   for (int k = 0; k < layout.gyros; ++k) {
     const double off = (prior[k].C_c_b * prior[k].C_c_b.transpose() - Eigen::Matrix3d::Identity()).norm();
     if (prior[k].drift_rad_s.size() != layout.drift_columns() || !prior[k].drift_rad_s.allFinite() ||
-        !prior[k].readout_bias.allFinite() || !(off < 1e-6)) {
+        !prior[k].errors(layout).allFinite() || !(off < 1e-6)) {
       return false;
     }
   }
   return true;
 }
 
-/// 1-sigma of one further state before anything is measured; `state`: from layout.readout_bias(0) on. rad, rad/s or s.
+/// 1-sigma of one further state before anything is measured, rad, rad/s or s. `state`: its position, from
+/// layout.readout(0) on.
 [[nodiscard]] double prior_sigma_of_further_state(const CalibrationSetup& setup, int state);
 
 }  // namespace trihedron

@@ -9,9 +9,6 @@
 
 namespace trihedron {
 
-/// Star trackers that a spacecraft may have.
-inline constexpr int kMaxStarTrackers = 4;
-
 /// A direction or quaternion further than this from unit length is not believed. Readout noise moves a norm by a tenth
 /// of it at most.
 inline constexpr double kNormTolerance = 1e-3;
