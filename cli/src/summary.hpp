@@ -19,7 +19,7 @@ namespace trihedron::cli {
 /// The truth of a pass, if it has one. Refuses one of another number of gyros.
 [[nodiscard]] std::optional<Truth> read_truth_of(const std::filesystem::path& path, const Pass& pass);
 
-/// The best attitude that there is to compare with.
+/// The reference attitude: the truth where there is one, else the star-tracker fixes used.
 struct Reference {
   std::string name;  ///< "truth" or "star tracker"
   std::vector<Time> t;

@@ -99,7 +99,8 @@ void InvariantEstimator<kCapacity>::update_to_now(const Eigen::Matrix3d& C_in_c)
     const auto& since = since_fix_[k];
     const auto by_drift = since.by_drift.first(columns);
     const int row = layout.direction(k);
-    // An error that keeps its sign as long as the estimates are what they are: its sigma grows, not its variance.
+    // This error keeps its sign until the estimates change, so its sigma adds up, not its variance
+    // (docs/mathematics.md, section 8).
     Rows3 rows = Rows3::Zero(3, layout.size());
     rows.template middleCols<3>(layout.alignment(k)) = C_in_c;
     const Eigen::Matrix3d alignment = covariance_of(rows);
@@ -266,8 +267,9 @@ auto InvariantEstimator<kCapacity>::whitened(const FixComparison& comparison, co
 template <Capacity kCapacity>
 auto InvariantEstimator<kCapacity>::angles_of(const FixComparison& comparison, const PerGyro<double>& noise_rad) const
     -> White {
-  // An error of the attitude is common to all components. A large R_c in its place would still be a claim, and 10 000
-  // of them no small one. Reflections leave the attitude in three rows only: the others are what is left.
+  // An error of the attitude is common to all components. A very large R_c instead would still add some information on
+  // the attitude, which thousands of updates sum up. Reflections leave the attitude in three rows only: the others are
+  // what is left.
   const int components = comparison.components();
   const int columns = layout().size() + 1;
   Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor, kMaxComponents, 3 + kMaxStates + 1> rows(
@@ -290,7 +292,7 @@ auto InvariantEstimator<kCapacity>::angles_of(const FixComparison& comparison, c
 
 template <Capacity kCapacity>
 bool InvariantEstimator<kCapacity>::is_fault(double nis, double misfit_rad, int used) const {
-  // Estimates from which the filter has begun anew may be what is wrong: next it begins from what was known.
+  // After a restart from the estimates these may be wrong: first try a restart from the prior.
   const bool last_resort = gate_.begun_anew() && !begun_from_estimates_ && misfit_rad > kFaultOfTwo_rad;
   return nis > kFaultOverGate * setup_.gate_nis && (used > 2 || last_resort);
 }
@@ -391,7 +393,7 @@ FixReport InvariantEstimator<kCapacity>::correct(const StarFix& fix, const FixRe
   report.weight = student_t_weight(setup_.student_t_freedom, report.nis, comparison.components());
   switch (report.status) {
     case FixStatus::kRejectedByGate:
-      // What a turn of them all explains is the star tracker's.
+      // A misfit that a common rotation of all momenta explains is attributed to the star tracker.
       if (is_fault(report.nis, misfit_rad, count(readings.used))) {
         const Eigen::Matrix3d& C_by_gyros = by_gyros.value().C_in_c.raw();
         const PerGyro<double> angle_noise_rad = reading_noise(C_by_gyros, readings.noise_factor, 1);
@@ -421,7 +423,7 @@ FixReport InvariantEstimator<kCapacity>::correct(const StarFix& fix, const FixRe
       report.weight = 1;
       return report;
     case FixStatus::kUsedAfterReopening:
-      begun_from_estimates_ = false;  // long ago: it had helped
+      begun_from_estimates_ = false;  // the last restart was long ago, so it had helped
       add_direction_variance(misfit_rad * misfit_rad / (2 * layout().gyros));
       update_to_now(C_linear);
       report.weight = 1;

@@ -36,7 +36,7 @@ StepReport OnBoard<Estimator>::on_gyro(const GyroSample& sample) {
   report.sample = let_in(screened);
   report.gyros = intake_.health().states();
   if (report.sample == SampleStatus::kRejectedTooFewGyros) {
-    calibrate_until(sample.t - reach(), report);  // what waits for samples waits in vain
+    calibrate_until(sample.t - reach(), report);  // fixes that wait for samples get none; deal with them now
   }
   if (!is_used(report.sample)) {
     return report;
@@ -138,7 +138,7 @@ void OnBoard<Estimator>::set_clock(Time t) {
 
 // ---- Calibration
 
-/// The estimator over the samples and fixes until `limit`, in time order; stops before a second fix.
+/// Processes samples and fixes up to `limit` in time order; stops before a second fix (one per step).
 template <class Estimator>
 void OnBoard<Estimator>::calibrate_until(Time limit, StepReport& report) {
   bool dealt_with_one = false;
@@ -198,7 +198,7 @@ void OnBoard<Estimator>::correct(const StarFix& fix, StepReport& report) {
     correct_navigator(*readings, report);
     schedule_.fix_used(fix.t);
   } else if (fix.t >= schedule_.angles_t()) {
-    use_angles(fix.t, *readings, report);  // these samples are free, and the step has come so far
+    use_angles(fix.t, *readings, report);  // this fix was rejected, so its readings may be used for the angles
   }
   if (navigator_.started() && !report.corrected) {
     report.navigated = navigated_before(fix.t, *readings);
@@ -246,7 +246,7 @@ void OnBoard<Estimator>::correct_navigator(const FixReadings& readings, StepRepo
   }
   const Time t = report.fix.t;
   const bool interval_over = policy_.interval != CorrectionPolicy::kOnlyFirst && t - corrected_t_ >= policy_.interval;
-  // The fix that started both was contradicted by all the fixes after it: the navigator must not rest on it.
+  // All later fixes contradicted the one that started filter and navigator: the navigator must be corrected again.
   const bool start_was_wrong = start_unconfirmed_ && report.fix.status == FixStatus::kUsedAfterReopening;
   start_unconfirmed_ = report.fix.status == FixStatus::kStarted;
   if (navigator_.started() && !interval_over && !start_was_wrong) {

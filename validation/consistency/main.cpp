@@ -47,7 +47,7 @@ std::vector<std::string> estimator_names() {
   return names;
 }
 
-/// A flight to be made, and the estimators that have not seen it.
+/// A flight still to be simulated, and the estimators to run on it.
 struct Task {
   const Cell& cell;
   int run;
@@ -66,7 +66,7 @@ std::vector<Column> columns_of(const Options& options) {
   return columns;
 }
 
-/// Run by run through all cells: what is there after a break makes a table of fewer runs.
+/// Ordered by run, then by cell, so that an interrupted campaign leaves a complete table of fewer runs.
 std::vector<Task> missing(const Results& results, const std::vector<Cell>& cells, const std::vector<Column>& columns,
                           int runs) {
   std::vector<Task> tasks;

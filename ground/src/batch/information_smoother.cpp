@@ -24,7 +24,7 @@ void rotate_up(MatrixXd& rows, Index columns) {
   rows.topLeftCorner(columns, columns) = qr.matrixQR().topRows(columns).triangularView<Upper>();
 }
 
-/// Rows about the constants alone, with their right side; now and then made into a triangle.
+/// Rows about the constants alone, with right side; compressed to a triangle whenever the buffer is full.
 class Pile {
  public:
   explicit Pile(Index columns) : rows_(MatrixXd::Zero(kMost + columns, columns)) {}
@@ -50,8 +50,8 @@ class Pile {
   Index size_ = 0;
 };
 
-/// The rows that know of d are kept as its triangle; what they leave over knows of c alone, which does not move: it
-/// waits for the end.
+/// The rows that know of d are kept as its triangle; the rest are about c alone, which is constant, and are kept until
+/// the end.
 class Forward {
  public:
   Forward(const MatrixXd& prior, const VectorXd& prior_y, Index d)

@@ -40,7 +40,7 @@ void compress(SmootherStage& stage) {
   }
 }
 
-/// White rows of fixes, those in a row that are near as one: their mean, by their weights.
+/// Collects whitened rows of fixes; consecutive fixes closer than `reach` are replaced by their weighted mean.
 class NearbyFixes {
  public:
   explicit NearbyFixes(Duration reach) : reach_(reach) {}
@@ -61,7 +61,7 @@ class NearbyFixes {
     sum.y += square * rows.y;
   }
 
-  /// Returns what of the squares is not in the rows: the scatter about the means.
+  /// Writes the rows; returns the sum of squares about the means, which the rows do not contain.
   [[nodiscard]] double put_into(SmootherStage& stage, Eigen::Index states) const {
     stage.H.resize(size_, states);
     stage.y.resize(size_);
@@ -411,7 +411,7 @@ PassProblem::Linear PassProblem::linearise(const PassSolution& solution) const {
       linear.stages[arc].m.setZero(layout_.dynamic());
     }
   }
-  // Far from the solution all fixes are off: what is far among them is an outlier.
+  // Far from the solution all fixes have large misfits: outliers are those far above the median.
   constexpr double kMedianOfFour = 0.84;  // of χ²/n; nearer to 1 for more
   double scale = 1;
   std::vector<double> sorted = nis_per_component;

@@ -26,12 +26,12 @@ struct ProcessNoise {
 struct PassSetup {
   CalibrationSetup on_board;  ///< what the estimator on board is set up with; its layout has 3 components a direction
   Prior prior;
-  /// Samples are taken so far apart, or up to half as much again before a fix: the body turns little between them, and
+  /// Step of the prediction, up to half as long again before a fix; between the samples used the body turns little, and
   /// their noise is averaged in the end.
   Duration sample_step = std::chrono::seconds(1);
-  /// Fixes nearer than this count as one: what they show together, without what changes among them.
+  /// Fixes closer in time than this are merged into one; their differences are lost.
   Duration fixes_together{};
-  /// Process noise comes in so often, and after a gap.
+  /// Length of an arc; process noise is added at its end, and after a gap.
   Duration arc = std::chrono::seconds(60);
 
   /// The states of the batch: of each direction's error two components across the momentum, so that all of them have
@@ -85,9 +85,9 @@ class PassProblem {
       double extra_variance_rad2 = 0;  ///< for what steps too long for their readings may have missed
     };
     std::vector<ArcEnd> ends;
-    /// What counts beyond the squares of the rows: the scatter of fixes that count as one, and of outliers, whose rows
-    /// have less weight, so much that they are 2 g − g²/s together, s their NIS and g the gate: a worse one is not more
-    /// likely.
+    /// Part of the cost that the rows do not contain: the scatter of merged fixes about their means, and for outliers,
+    /// whose rows have less weight, so much that they are 2 g − g²/s together, s their NIS and g the gate: a worse one
+    /// is not more likely.
     double beyond_squares = 0;
   };
   [[nodiscard]] Linear linearise(const PassSolution& solution) const;

@@ -21,7 +21,7 @@ class SmoothReadings {
     GyroMask used{};
     double noise_factor = 1;
   };
-  /// `otherwise` where no polynomial is what the body did; of the gyros that it uses.
+  /// Returns `otherwise` where no polynomial fits; only the gyros that it uses are fitted.
   [[nodiscard]] At at(Time t, const At& otherwise) const;
 
  private:

@@ -33,7 +33,7 @@ constexpr double kStrong = 3;
 /// Pairs of fixes that give the noise of the star tracker within some percent.
 constexpr std::size_t kEnough = 1000;
 
-/// 1-sigma of the star tracker by the changes of a trial: of outliers only the median feels. Needs changes.
+/// 1-sigma of the star tracker by the changes of a trial: robust by the median. Needs changes.
 Eigen::Vector3d star_tracker_noise_rad(const std::vector<Eigen::Vector3d>& changes_rad) {
   constexpr double kMedianOfNormal = 0.6744897501960817;
   Eigen::Vector3d noise_rad;
@@ -107,7 +107,7 @@ void refuse_prior_of_others(const PassSettings& settings, const CalibrationOptio
   }
 }
 
-/// The smallest than which none is strongly more likely; none of none.
+/// The smallest model such that no larger one is more likely by kLogOddsToAccept; nullptr of an empty list.
 const Forecast* best_of(const std::vector<Forecast>& forecasts) {
   double most = -std::numeric_limits<double>::infinity();
   const Forecast* best = nullptr;
@@ -118,7 +118,7 @@ const Forecast* best_of(const std::vector<Forecast>& forecasts) {
   return best;
 }
 
-/// Turns the choices that are left open, and the drift model, by what a trial with everything shows.
+/// Decides the open choices and the drift model by the evidence of a trial with all states free.
 void settle_states(const Trial& everything, const CalibrationOptions& asked, Decision& decision) {
   decision.evidence.clear();
   const auto settle = [&](std::optional<FurtherState> state, double log_bayes_factor) {
@@ -139,7 +139,7 @@ void settle_states(const Trial& everything, const CalibrationOptions& asked, Dec
   }
 }
 
-/// Everything on that is on or may be, and the largest drift model.
+/// The options with every state free that is on or open, and with the largest drift model.
 CalibrationOptions with_everything(CalibrationOptions options, const CalibrationOptions& asked,
                                    const DriftModelId& largest_model) {
   for (const FurtherStateRow& row : kFurtherStates) {
@@ -170,9 +170,9 @@ CalibrationOptions wandering_like(const NoiseFit& walking, CalibrationOptions op
   return options;
 }
 
-/// Where the noise is more than was told the states were settled by one that is too small: again, by what it is when
-/// they are all free, and whether it wanders. `everything`: with the noise as told; `walk`: the noise of what was
-/// settled.
+/// The noise is larger than given, so the states were decided with too small a noise: decide again, with the noise
+/// found when they are all free, and whether it wanders. `everything`: with the noise as told; `walk`: the noise of
+/// what was settled.
 void decide_beside_noise(const Pass& pass, const Screened& screened, const CalibrationOptions& asked,
                          const DriftModelId& largest_model, bool wandering_is_open, Trial everything,
                          const NoiseFit& walk, Decision& decision) {
@@ -214,7 +214,7 @@ void decide_beside_noise(const Pass& pass, const Screened& screened, const Calib
   }
 }
 
-/// Nothing to judge by.
+/// There are no usable fixes to decide by: what is open is off.
 void leave_out_what_is_open(CalibrationOptions& options) {
   for (const FurtherStateRow& row : kFurtherStates) {
     Choice& choice = options.further_states[row.state];

@@ -74,12 +74,12 @@ GaussMarkov wandering_of(const CalibrationOptions& options) {
   return {options.further_states.wandering_drift_rad_s, to_seconds(options.further_states.wandering_time)};
 }
 
-/// Where the model is wrong there is more than one maximum.
+/// Starting levels; several, because with an incomplete model the likelihood has more than one maximum.
 const std::vector<Search::Point> kAllLevels = {{0, 0}, {3, 0}, {6, 0}, {9, 0}};
 
-/// The trial with the process noise that makes the pass most likely, and that: outliers are told apart by it.
+/// Alternates the search for the noise and a refit with it, because the noise decides which fixes are outliers.
 NoiseFit settled(Trial& trial, const Search::At& at, const std::vector<Search::Point>& starts,
-               const Search::Point& lowest, const Search::Point& highest) {
+                 const Search::Point& lowest, const Search::Point& highest) {
   constexpr int kRounds = 3;
   NoiseFit likely;
   for (int round = 0; round < kRounds; ++round) {
@@ -120,7 +120,8 @@ NoiseFit with_most_likely_wandering(Trial& trial, const CalibrationOptions& opti
     return noise;
   };
   const auto times_within = [&](double limit_s) {
-    return static_cast<int>(std::floor(std::abs(std::log(told.wandering_drift.time_s / limit_s)) / std::log(3.0) + 1e-6));
+    return static_cast<int>(
+        std::floor(std::abs(std::log(told.wandering_drift.time_s / limit_s)) / std::log(3.0) + 1e-6));
   };
   const int shorter = told.wandering_drift.time_s > kShortest_s ? times_within(kShortest_s) : 0;
   const int longer = told.wandering_drift.time_s < kLongest_s ? times_within(kLongest_s) : 0;

@@ -7,7 +7,7 @@ namespace trihedron::ground {
 
 /// Below it, process noise is lost in the readout: where a search for more begins.
 inline constexpr double kLeastWalk_rad_sqrt_s = 3e-9;
-/// A relative difference of noise that is more than chance.
+/// Relative difference below which two noise levels count as equal.
 inline constexpr double kNotable = 0.1;
 
 /// Process noise, and how likely it makes the pass.

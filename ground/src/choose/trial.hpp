@@ -1,5 +1,5 @@
 #pragma once
-/// What a pass says about a choice of states, in a fraction of the time of a calibration: what decisions are made by.
+/// A quick fit of a pass with one choice of states, by which the choices are compared.
 
 #include <Eigen/Core>
 #include <vector>

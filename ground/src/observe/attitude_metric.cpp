@@ -57,7 +57,7 @@ MatrixXd attitude_metric(const PassProblem& problem, const PassSolution& solutio
       return;
     }
     if (!started || moment.t - corrected >= mission.correction_interval) {
-      // The momenta are set so that the fix does not disagree.
+      // At a correction the momenta are set such that the residual of the fix is zero.
       const MatrixXd H = problem.compare(solution, moment).H;
       if (H.rows() < directions) {
         return;

@@ -13,7 +13,7 @@
 namespace trihedron::ground {
 namespace {
 
-/// What takes part with less than a tenth of the square is not named.
+/// Least squared share of a block in a combination for it to be named.
 constexpr double kNamed = 0.1;
 /// Axes within 15° have the same name.
 constexpr double kSameAxis = 0.966;

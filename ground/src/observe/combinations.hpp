@@ -1,5 +1,5 @@
 #pragma once
-/// Combinations of parameters, found and told in words.
+/// Weakly determined combinations of parameters: separation into blocks and description in words.
 
 #include <Eigen/Core>
 #include <string>

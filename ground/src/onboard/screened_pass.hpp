@@ -1,5 +1,5 @@
 #pragma once
-/// What of a pass can be used: samples and fixes as the on-board cycle has screened them.
+/// The usable samples and fixes of a pass, as screened by the on-board cycle.
 
 #include <algorithm>
 #include <iterator>
@@ -28,8 +28,8 @@ struct ScreenedPass {
     StarFix fix;
     Directions h_b = unread();  ///< by several samples together
     GyroMask used{};
-    double noise_factor = 1;          ///< as of FixReadings
-    Eigen::Vector3d rate_c{0, 0, 0};  ///< of the body relative to `in`, rad/s
+    double noise_factor = 1;                ///< as of FixReadings
+    Eigen::Vector3d rate_c{0, 0, 0};        ///< of the body relative to `in`, rad/s
     Duration since_last = Duration::max();  ///< fix of the same star tracker
   };
 

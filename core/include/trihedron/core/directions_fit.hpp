@@ -8,7 +8,7 @@
 
 namespace trihedron {
 
-/// Directions at one time, c or case axes as the samples, and how they change.
+/// Fitted directions and their rates at one time, in the axes of the samples.
 struct FittedDirections {
   Directions h_b;                   ///< unit
   Directions h_b_rate;              ///< 1/s, across h_b

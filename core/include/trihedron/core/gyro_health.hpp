@@ -1,5 +1,5 @@
 #pragma once
-/// Which gyros are to be believed, and when.
+/// Which gyros can be used, and over which times: detection of stuck readings and isolation of faulty gyros.
 
 #include <Eigen/Core>
 #include <chrono>
@@ -10,15 +10,15 @@
 
 namespace trihedron {
 
-/// Readings that stand still, and verdicts at fixes that were rejected.
+/// State of each gyro from repeated readings and from the fault suspicions of rejected fixes.
 class GyroHealth {
  public:
   /// A live reading has noise: two alike may be chance or coarse telemetry, so many of them over a second are not.
   static constexpr int kStuckSamples = 16;
   static constexpr Duration kStuckTime = std::chrono::seconds(1);
-  /// In a row, all naming the same gyro.
+  /// Consecutive suspicions of the same gyro after which it is isolated.
   static constexpr int kVerdicts = 5;
-  /// Stuck times closer together than this are taken for one.
+  /// Stuck stretches closer than this are merged.
   static constexpr Duration kMemory = std::chrono::seconds(10);
 
   GyroHealth() = default;
@@ -67,9 +67,7 @@ class GyroHealth {
   [[nodiscard]] PerGyro<GyroState> states() const {
     PerGyro<GyroState> states;
     for (int k = 0; k < gyros_; ++k) {
-      states[k] = isolated_[k]         ? GyroState::kIsolated
-                  : readings_[k].stuck ? GyroState::kStuck
-                                       : GyroState::kUsed;
+      states[k] = isolated_[k] ? GyroState::kIsolated : readings_[k].stuck ? GyroState::kStuck : GyroState::kUsed;
     }
     return states;
   }
@@ -88,7 +86,7 @@ class GyroHealth {
     Eigen::Vector3d last = Eigen::Vector3d::Zero();
     int alike = 0;  ///< in a row
     bool stuck = false;
-    Time since{};   ///< of the first of them
+    Time since{};  ///< of the first of them
     Time stuck_from = Time::max();
     Time stuck_until = Time::min();
   };

@@ -14,7 +14,7 @@ namespace trihedron {
 
 class Intake {
  public:
-  /// A sample further ahead is believed only when the next one confirms it.
+  /// A time step larger than this is accepted only when the next sample confirms it.
   static constexpr Duration kMaxGap = std::chrono::hours(1);
   /// Samples behind the present time, as many in a row, set it back.
   static constexpr int kSetBackSamples = 16;

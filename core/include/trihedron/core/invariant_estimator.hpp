@@ -1,6 +1,6 @@
 #pragma once
-/// Calibration filter on the invariant error: φ_k of each momentum in `in`, δ_k of each alignment in c. What no
-/// measurement can see stays unseen whatever the estimate is.
+/// Calibration filter on the invariant error: φ_k of each momentum in `in`, δ_k of each alignment in c. Directions that
+/// no measurement observes gain no information, wherever the estimate stands.
 
 #include <Eigen/Core>
 #include <array>
@@ -23,8 +23,8 @@ namespace trihedron {
 /// y_k = h_k × h_et,k = (φ_k − C_in_c δ_k + h_k × C_in_b Δb_k)⊥ + noise; dφ_k/dt = ω × φ_k + C_in_b B Δκ_k + (C_in_c
 /// δ_k) × ω. The attitude in H is not the tracker's but the fused one, so that noise does not pass for information. The
 /// terms of second order, ½ C_in_c δ_k × (φ_k − C_in_c δ_k) and ½ C_in_c δ_k × C_in_b B Δκ_k, count as noise of the
-/// size that the present covariance gives them (docs/adr/0004): early readings do not claim more than the first, wrong
-/// values allow.
+/// size that the present covariance gives them (docs/adr/0004): so that early measurements are not weighted more than
+/// their linearisation about the first, wrong values allows.
 ///
 /// Which states there are is told by the layout of the set-up; kCapacity is the room for them. One plain object, no
 /// heap.
@@ -90,8 +90,8 @@ class InvariantEstimator {
 
   /// The first fix starts the filter, each further one updates it.
   [[nodiscard]] FixReport correct(const StarFix& fix, const FixReadings& readings);
-  /// Update without a fix: by the angles between the momenta, which the readings give without the attitude. Says
-  /// nothing of it, nor of anything that turns all momenta alike. Never reopens: that is for the fixes. Needs
+  /// Update without a fix: by the angles between the momenta, which the readings give without the attitude. It gives no
+  /// information about the attitude or anything that rotates all momenta alike, and never reopens the filter. Needs
   /// started().
   [[nodiscard]] AngleReport check_angles(Time t, const FixReadings& readings);
 
@@ -99,8 +99,8 @@ class InvariantEstimator {
   using Compared = ComparedRows<kMaxStates>;
   /// A comparison as rows about the states, and how its innovation lies in what is expected of it.
   struct White {
-    Compared rows;           ///< (H, y), unit white noise
-    ComponentCovariance L;   ///< y of the comparison itself is L times that of the rows
+    Compared rows;                   ///< (H, y), unit white noise
+    ComponentCovariance L;           ///< y of the comparison itself is L times that of the rows
     ComponentCovariance covariance;  ///< of y in `rows`: 1 + H P Hᵀ
     double nis = 0;
   };
@@ -109,9 +109,9 @@ class InvariantEstimator {
   static constexpr double kUnknown_rad = 1;
   /// NIS above this multiple of the gate is a fault of a gyro, not of its drift model: a wrong model is noticed sooner.
   static constexpr double kFaultOverGate = 4;
-  /// Of two gyros the loss of one is that of the attitude: only when no way of beginning anew has helped, and for more
-  /// than an alignment wrong by 5° in a body that turns at orbital rate adds to the misfit in the minute until a run of
-  /// rejections reopens the filter.
+  /// With only two gyros, isolating one loses the attitude: done only after a restart from the prior has not helped,
+  /// and for a misfit larger than an alignment wrong by 5° in a body that turns at orbital rate adds to the misfit in
+  /// the minute until a run of rejections reopens the filter.
   static constexpr double kFaultOfTwo_rad = 5.8e-3;  // 20′
 
   [[nodiscard]] Eigen::Matrix3d covariance_of(Rows3 by_states) const;

@@ -12,14 +12,15 @@ inline constexpr int kPairComponents = 4;
 /// Hilferty 1931: the cube root of χ²/n is nearly normal, of mean 1 − 2/9n and variance 2/9n).
 [[nodiscard]] double gate_of_freedom(int freedom, double gate_nis);
 
-/// Rejects fixes whose NIS is above a gate, and cannot lock out good ones: after a run of rejections the model was
-/// wrong, not the tracker, and the directions are set free; when that happens again soon, the filter begins anew. Where
-/// the misfit has jumped by what no momentum can, the tracker is wrong and the run may be much longer.
+/// Rejects fixes whose NIS is above a gate, without locking out good ones: after a run of rejections the model is taken
+/// to be wrong, not the tracker, and the directions are set free; when that happens again soon, the filter begins anew.
+/// Where Where the misfit has jumped by more than a momentum can drift, the star tracker is taken to be wrong, and the
+/// run may be much longer.
 class OutlierGate {
  public:
-  /// What a wrong model may add to the misfit from one fix to the next: at once, with an alignment wrong by ten
-  /// degrees in a slew of 1°/s, and in time, ten times the drift of a good gyro, or an alignment wrong by half a degree
-  /// in a body that turns at orbital rate.
+  /// Largest change of the misfit from one fix to the next that a wrong model can cause: immediate part (alignment
+  /// wrong by ten degrees in a slew of 1°/s, and in time, ten times the drift of a good gyro, or an alignment wrong by
+  /// half a degree in a body that turns at orbital rate.
   static constexpr double kLargestStep_rad = 8.7e-3;  // 30′
   static constexpr double kLargestRate_rad_s = 1e-5;
 
@@ -43,8 +44,8 @@ class OutlierGate {
   [[nodiscard]] bool begun_anew() const { return begun_anew_ && under_suspicion_ > 0; }
 
  private:
-  /// A start that no fix has confirmed yet may itself be what was wrong. A jump is over, an outlier in a longer run,
-  /// when the misfit has been back where it came from for as long as a run takes.
+  /// A jump counts only after the start has been confirmed by a fix. It is over when the misfit has been back where it
+  /// came from for as long as a run takes.
   void look_for_jump(bool jumped_now, double before_rad, double largest_rad);
 
   double gate_nis_ = 0;

@@ -32,7 +32,7 @@ using Directions = PerGyro<Eigen::Vector3d>;
 /// Which gyros are used.
 using GyroMask = PerGyro<bool>;
 
-/// Where the number of a gyro stands, none.
+/// Index that means "no gyro".
 inline constexpr int kNoGyro = -1;
 
 /// The first `gyros` of them.

@@ -89,7 +89,7 @@ struct GaussMarkov {
   [[nodiscard]] double noise(double kept) const;
 };
 
-/// Over a longer step the readings do not tell how far the body turned.
+/// Longest step over which the change of the readings tells how far the body turned.
 inline constexpr double kQuarterOrbit_s = 1300;
 
 /// What the midpoint rule may miss in a step in which the body turned far between two samples, rad: the drift over the

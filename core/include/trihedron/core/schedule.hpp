@@ -12,7 +12,7 @@ namespace trihedron {
 
 class Schedule {
  public:
-  /// Without fixes the angles between the momenta are looked at so often; no two times share samples.
+  /// Interval of angle updates in an outage of fixes; successive updates share no samples.
   static constexpr Duration kAngleInterval = std::chrono::seconds(3);
 
   Schedule() = default;
@@ -21,10 +21,11 @@ class Schedule {
   Schedule(Duration reach, Duration angles_after) : reach_(reach), angles_after_(angles_after) {}
 
   enum class Next : std::uint8_t { kNothing, kSample, kFix, kAngles };
-  /// The earliest of what is to be done until `limit`: the next sample is to be followed, or the next fix dealt with, at
-  /// these times, Time::max() where there is none; or the angles are to be looked at.
+  /// The earliest of what is to be done until `limit`: the next sample is to be followed, or the next fix dealt with,
+  /// at these times, Time::max() where there is none; or the angles are to be looked at.
   [[nodiscard]] Next next(Time limit, Time sample_t, Time fix_t) const {
-    // A fix that would share samples with the angles goes before them; they wait until none can come any more.
+    // A fix whose readings overlap those of an angle update has priority; the update waits until no such fix can
+    // arrive.
     if (sample_t != Time::max() && angles_t_ < sample_t && angles_t_ <= fix_t - 2 * reach_) {
       return angles_t_ > limit - 2 * reach_ ? Next::kNothing : Next::kAngles;
     }

@@ -76,17 +76,19 @@ struct CalibrationSetup {
   /// pair: of more gyros a gate that good fixes pass as often.
   double gate_nis = 30;
   /// ν of Student's t, or 0 for normal noise. With it a fix above the gate is used with its weight instead of rejected,
-  /// unless the star tracker or one gyro is plainly at fault; a run above the gate still reopens.
-  /// Better where many fixes are a few times too noisy; few far outliers the gate alone keeps out no worse, and the
-  /// paper's filter better. Between 5 and 20.
+  /// unless the misfit is attributed to the star tracker or to one gyro; a run of fixes above the gate still reopens
+  /// the directions. Better than the gate where many fixes are a few times noisier than specified; against few large
+  /// outliers the gate alone is as good, and paper's filter better. Between 5 and 20.
   double student_t_freedom = 0;
-  /// After so many rejections in a row the directions are set free by the size of the misfit and the fix is used: the
-  /// model was wrong, not the tracker.
+  /// Consecutive rejections after which the direction covariance is widened by the size of the misfit and the fix is
+  /// used: the model was wrong, not the tracker.
   int reopen_after_rejections = 20;
-  /// The same where the run began with a misfit that no drift can make: the tracker was wrong, or has been turned.
+  /// The same where the run of rejections began with a jump larger than drift can cause: the star tracker gave wrong
+  /// fixes, or has been moved.
   int reopen_after_jump_rejections = 400;
-  /// When that happens again within so many fixes, the parameters are what is wrong: their information goes. The
-  /// estimates stay; of estimator invariant not when that has not helped, or the prior excludes them.
+  /// When the filter reopens twice within this number of fixes, the parameters are wrong: it restarts, dropping the
+  /// information gathered. The estimates are kept; estimator invariant returns to the prior means where keeping them
+  /// has not helped or the prior excludes them.
   int restart_within_fixes = 200;
   /// Without a fix that could be used for longer than this, the angles between the momenta are used alone; or kNever.
   Duration angles_after = std::chrono::minutes(1);

@@ -10,12 +10,13 @@ enum class SampleStatus : std::uint8_t {
   kNone,  ///< no sample in this step
   kUsed,
   kRejectedNotDirection,   ///< a reading is not finite or not unit
-  kRejectedOutOfOrder,     ///< not later than the sample before it, or alone more than an hour ahead
+  kRejectedOutOfOrder,     ///< not later than the sample before it, or more than an hour ahead and not confirmed by the
+                           ///< next sample
   kRejectedGeometry,       ///< momenta nearly parallel
   kRejectedTooFewGyros,    ///< fewer than two gyros can be used; the report names them
-  kUsedAfterClockSetBack,  ///< used, the first since the clock of the telemetry was set back: nothing is predicted over
-                           ///< that
-  kThinned,                ///< good, but sooner after the sample before it than there is room for: not used
+  kUsedAfterClockSetBack,  ///< first sample used after the telemetry clock was set back: no prediction is made across
+                           ///< the jump that
+  kThinned,  ///< good, but sooner after the sample before it than there is room for: not used
 };
 inline constexpr std::size_t kSampleStatuses = 8;
 

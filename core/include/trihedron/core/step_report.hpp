@@ -27,8 +27,8 @@ struct StepReport {
   PerGyro<GyroState> gyros{};  ///< after this step
   FixReport fix;               ///< of the fix that was dealt with in this step, if any; its time is its own
   bool more_due = false;       ///< another fix can be dealt with now: carry_on() does
-  int fixes_dropped = 0;       ///< that waited when the clock was set back: nobody knows their time now
-  bool corrected = false;      ///< the navigator was corrected at that fix
+  int fixes_dropped = 0;   ///< fixes discarded because the clock was set back while they waited: their time is unknown
+  bool corrected = false;  ///< the navigator was corrected at that fix
   /// That fix and what it was compared with, where the estimator looked at it.
   std::optional<ComparedFix> compared;
   /// Attitude at that fix, used or rejected as an outlier: of the calibration itself, and of the open-loop navigator.

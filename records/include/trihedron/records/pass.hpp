@@ -96,7 +96,7 @@ struct Truth {
     std::vector<std::pair<std::string, double>> unmodelled_rad_s;
     Eigen::Vector3d alignment_rotation_vector_rad{0, 0, 0};
 
-    /// Of eq. (1) or outside it; nothing where the simulator did not tell.
+    /// Of eq. (1) or outside it; nothing where the simulator does not give it.
     [[nodiscard]] std::optional<double> drift(const DriftCoefficient& coefficient) const;
   };
   /// Errors of a head that do not change at random; C_c_s as in FurtherStarTracker.

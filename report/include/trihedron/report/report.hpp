@@ -12,7 +12,7 @@
 
 namespace trihedron::report {
 
-/// What the attitude of a run is compared with, and how far off it was.
+/// Reference of the attitude evaluation, and the errors against it.
 struct Evaluation {
   std::string reference;  ///< in words, as in "the error against …": "the simulated truth", "the star tracker"
   ground::AttitudeErrors navigation;          ///< of CalibrationRun::navigation

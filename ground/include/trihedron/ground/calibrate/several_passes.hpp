@@ -1,6 +1,6 @@
 #pragma once
-/// Several passes of one start of the rotors: what one leaves is what the next begins from, and each is asked whether
-/// it agrees with those before.
+/// Several passes of one start of the rotors: the result of one is the prior of the next, and each is tested for
+/// whether it agrees with those before.
 
 #include <string>
 #include <utility>

@@ -4,7 +4,8 @@
 
 namespace trihedron::ground {
 
-/// What a user must know before he uses the result: findings with evidence and cure, and one word, trustworthy or not.
+/// What a user must know before he uses the result: findings with evidence and cure, and whether the result may be
+/// used.
 [[nodiscard]] Verdict judge(const Pass& pass, const CalibrationRun& run);
 /// Whether the parameters in use fit the pass.
 [[nodiscard]] Verdict judge_navigation(const NavigationRun& run);
