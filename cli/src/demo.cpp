@@ -23,7 +23,7 @@ constexpr const char* kScenario =
 
 ExitStatus run_demo(const std::filesystem::path& out, const Common& common) {
   const Common silent{.quiet = true, .json = false};
-  io::make_directory(out);
+  const io::MadeDirectory made(out);
   io::write_file(out / "scenario.toml", kScenario);
   simulate_pass(io::read_scenario(out / "scenario.toml"), "scenario.toml", out / "pass.nc", silent);
   const ExitStatus calibrated = calibrate_passes({out / "pass.nc"}, {}, out, std::nullopt, common);

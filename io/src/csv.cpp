@@ -7,6 +7,7 @@
 #include <limits>
 
 #include "text_file.hpp"
+#include "trihedron/records/stop.hpp"
 #include "wording.hpp"
 
 namespace trihedron::io {
@@ -133,6 +134,7 @@ Series read_csv(const fs::path& file, ChooseRules choose) {
   }
   std::vector<double> row(width);
   while (p < end) {
+    check_stop();
     const char* const line = p;
     double t_s = 0;
     for (std::size_t i = 0; i < fields; ++i) {

@@ -16,7 +16,9 @@
 #include "consistency/flight.hpp"
 #include "consistency/grid.hpp"
 #include "consistency/results.hpp"
+#include "stop_on_signals.hpp"
 #include "trihedron/ground/tasks/on_all_cores.hpp"
+#include "trihedron/records/stop.hpp"
 
 namespace {
 
@@ -90,7 +92,7 @@ std::vector<Task> missing(const Results& results, const std::vector<Cell>& cells
 void fly_all(const std::vector<Task>& tasks, unsigned threads, Results& results) {
   std::size_t done = 0;
   std::mutex one_at_a_time;
-  const auto work = [&](std::size_t i) {
+  const auto fly_one = [&](std::size_t i) {
     const Task& task = tasks[i];
     std::vector<Estimator> estimators;
     for (const std::string& name : task.estimators) {
@@ -102,9 +104,9 @@ void fly_all(const std::vector<Task>& tasks, unsigned threads, Results& results)
       results.add({task.cell.name(), task.run, task.estimators[k]}, outcomes[k]);
     }
     fmt::print(stderr, "\r{} of {} flights", ++done, tasks.size());
-    return i;
   };
-  (void)trihedron::ground::on_all_cores(tasks.size(), work, threads);
+  using namespace trihedron::ground;
+  with_cores(threads, [&] { for_each_on_all_cores(tasks.size(), fly_one); });
 }
 
 std::string measured(const Options& options) {
@@ -132,9 +134,7 @@ std::string measured(const Options& options) {
   return text + "\n" + (observable ? results.observable_table(cells, columns) : results.table(cells, columns));
 }
 
-}  // namespace
-
-int main(int argc, char** argv) {
+int run(int argc, char** argv) {
   try {
     Options options;
     CLI::App program(
@@ -169,8 +169,16 @@ int main(int argc, char** argv) {
       write_between_markers(options.document, options.place, text);
     }
     return 0;
+  } catch (const trihedron::Stopped&) {
+    throw;
   } catch (const std::exception& error) {
     fmt::print(stderr, "trihedron_consistency: {}\n", error.what());
     return 1;
   }
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  return trihedron::cli::stopped_by_signals([argc, argv] { return run(argc, argv); });
 }

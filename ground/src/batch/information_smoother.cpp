@@ -6,6 +6,8 @@
 #include <cmath>
 #include <stdexcept>
 
+#include "trihedron/records/stop.hpp"
+
 namespace trihedron::ground {
 namespace {
 
@@ -60,6 +62,7 @@ class Forward {
   }
 
   void measure(const SmootherStage& stage) {
+    check_stop();
     const Index c = n_ - d_;
     MatrixXd rows = MatrixXd::Zero(std::max(moving_.rows() + stage.H.rows(), d_), n_ + 1);
     rows.topRows(moving_.rows()) = moving_;
@@ -159,6 +162,7 @@ void gather_constants(MatrixXd& prior, VectorXd& prior_y, std::vector<SmootherSt
   const Index d = stages.front().m.size();
   Pile pile(n - d + 1);
   for (SmootherStage& stage : stages) {
+    check_stop();
     if (stage.H.rows() > d) {
       MatrixXd rows(stage.H.rows(), n + 1);
       rows << stage.H, stage.y;
@@ -211,6 +215,7 @@ std::vector<MatrixXd> covariance_roots(const SmootherResult& result, const std::
   std::vector<MatrixXd> roots(stages.size());
   roots.back() = result.last_root;
   for (std::size_t i = result.steps.size(); i-- > 0;) {
+    check_stop();
     const SmootherStage& stage = stages[i];
     const SmootherResult::NoiseRows& step = result.steps[i];
     const MatrixXd& next = roots[i + 1];

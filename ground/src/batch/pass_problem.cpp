@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "trihedron/core/outlier_gate.hpp"
+#include "trihedron/records/stop.hpp"
 
 namespace trihedron::ground {
 namespace {
@@ -239,6 +240,7 @@ void PassProblem::go_along(const PassSolution& solution, const std::function<voi
   Moment moment;
   double unused = 0;
   for (std::size_t arc = 0; arc < arcs_.size(); ++arc) {
+    check_stop();
     begin_arc(solution, arc, moment);
     for (std::size_t i = arcs_[arc].begin; i < arcs_[arc].end; ++i) {
       if (i > arcs_[arc].begin) {
@@ -387,6 +389,7 @@ PassProblem::Linear PassProblem::linearise(const PassSolution& solution) const {
   std::vector<double> nis_per_component;
   std::vector<std::size_t> fixes_until;
   for (std::size_t arc = 0; arc < arcs_.size(); ++arc) {
+    check_stop();
     begin_arc(solution, arc, moment);
     double extra_variance_rad2 = 0;
     for (std::size_t i = arcs_[arc].begin; i < arcs_[arc].end; ++i) {
@@ -422,6 +425,7 @@ PassProblem::Linear PassProblem::linearise(const PassSolution& solution) const {
   }
   std::size_t fix = 0;
   for (std::size_t arc = 0; arc < arcs_.size(); ++arc) {
+    check_stop();
     NearbyFixes nearby(setup_.fixes_together);
     for (; fix < fixes_until[arc]; ++fix) {
       const auto& [its, rows] = fixes[fix];

@@ -16,6 +16,7 @@
 #include "model/orbital_rate.hpp"
 #include "model/prior.hpp"
 #include "trihedron/ground/model/setup_error.hpp"
+#include "trihedron/ground/tasks/on_all_cores.hpp"
 
 namespace trihedron::ground {
 namespace {
@@ -179,19 +180,23 @@ void decide_beside_noise(const Pass& pass, const Screened& screened, const Calib
   CalibrationOptions& options = decision.options;
   const CalibrationOptions free = with_everything(options, asked, largest_model);
   const CalibrationOptions like = wandering_like(walk, free);
-  std::future<std::pair<Trial, NoiseFit>> wandering_trial;
-  if (wandering_is_open) {
-    wandering_trial = std::async(std::launch::async, [&] {
-      Trial trial(pass, screened, like);
-      const NoiseFit likely = with_most_likely_wandering(trial, like);
-      return std::pair(std::move(trial), likely);
-    });
-  }
-  const NoiseFit walking = with_most_likely_walk(everything, free);
+  // Looked at only where the walk is worth it: before that, nobody asks whether it failed.
+  std::packaged_task<std::pair<Trial, NoiseFit>()> try_wandering([&] {
+    Trial trial(pass, screened, like);
+    const NoiseFit likely = with_most_likely_wandering(trial, like);
+    return std::pair(std::move(trial), likely);
+  });
+  NoiseFit walking;
+  side_by_side([&] { walking = with_most_likely_walk(everything, free); },
+               [&] {
+                 if (wandering_is_open) {
+                   try_wandering();
+                 }
+               });
   std::optional<Evidence> wandering;
   std::optional<ProcessNoise> wanders;
   if (wandering_is_open && walking.gain > kStrong) {
-    auto [trial, likely] = wandering_trial.get();
+    auto [trial, likely] = try_wandering.get_future().get();
     const double gain = likely.log_likelihood - walking.log_likelihood;
     wandering = Evidence{FurtherState::kWanderingDrift, gain, gain > kStrong};
     if (wandering->accepted) {
@@ -271,8 +276,17 @@ std::optional<DriftModelId> larger_model(const DriftModelId& model) {
   return is_there ? std::optional(vsh(model.degree + 1)) : std::nullopt;
 }
 
-/// Estimator paper has nothing to choose; how the coefficients change over a pass is looked for in the whole of it
-/// only.
+/// What star trackers and rotors usually have, with priors that allow for its being absent.
+CalibrationOptions with_what_is_usual(CalibrationOptions options) {
+  options.drift_model = options.drift_model.value_or(kEsg20);
+  for (const FurtherState state : {FurtherState::kClockOffset, FurtherState::kOrbitalError}) {
+    Choice& choice = options.further_states[state];
+    choice = choice == Choice::kAuto ? Choice::kOn : choice;
+  }
+  return options;
+}
+
+/// Estimator paper has nothing to choose; the change of the coefficients is searched for by a whole pass only.
 void settle_by_estimator(CalibrationOptions& asked) {
   if (asked.estimator == Estimator::kPaper) {
     asked.drift_model = asked.drift_model.value_or(kEsg7);
@@ -293,11 +307,11 @@ CalibrationOptions settled_before(const PassSettings& settings, CalibrationOptio
   }
   settle_by_estimator(options);
   refuse_prior_of_others(settings, options);
-  if (prior && options.estimator != Estimator::kPaper) {
-    if (prior->noise && options.find_noise) {
+  if (options.estimator != Estimator::kPaper) {
+    if (prior && prior->noise && options.find_noise) {
       use_noise(*prior->noise, options);
     }
-    options = as_before(options, *prior);
+    options = prior ? as_before(options, *prior) : with_what_is_usual(options);
   }
   options.find_noise = false;
   leave_out_what_is_open(options);

@@ -24,8 +24,9 @@ struct Decision {
 /// SetupError.
 [[nodiscard]] Decision decide(const Pass& pass, const CalibrationOptions& asked);
 
-/// Settles the same before the first event, as on board: by the earlier calibration, or else nothing that is open is
-/// there. Throws SetupError.
+/// Settles the same before the first event, as on board: by the earlier calibration, or else drift model esg20, clock
+/// offset and error at orbital period, with priors that allow for their absence. The noise is that of the options.
+/// Throws SetupError.
 [[nodiscard]] CalibrationOptions settled_before(const PassSettings& settings, CalibrationOptions options);
 
 }  // namespace trihedron::ground

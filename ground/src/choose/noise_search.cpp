@@ -3,11 +3,13 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
-#include <future>
+#include <iterator>
 #include <map>
 #include <optional>
 #include <utility>
 #include <vector>
+
+#include "trihedron/ground/tasks/on_all_cores.hpp"
 
 namespace trihedron::ground {
 namespace {
@@ -49,16 +51,14 @@ class Search {
 
  private:
   void look_at(const std::vector<Point>& points) {
-    std::map<Point, std::future<double>> runs;
-    for (const Point& point : points) {
-      if (!tried_.contains(point) && !runs.contains(point)) {
-        runs.emplace(point, std::async(std::launch::async, [this, noise = at_(point.first, point.second)] {
-                       return trial_.log_likelihood(linear_, noise);
-                     }));
-      }
-    }
-    for (auto& [point, run] : runs) {
-      tried_[point] = run.get();
+    std::vector<Point> untried;
+    std::ranges::copy_if(points, std::back_inserter(untried),
+                         [this](const Point& point) { return !tried_.contains(point); });
+    const std::vector<double> found = on_all_cores(untried.size(), [&](std::size_t i) {
+      return trial_.log_likelihood(linear_, at_(untried[i].first, untried[i].second));
+    });
+    for (std::size_t i = 0; i < untried.size(); ++i) {
+      tried_[untried[i]] = found[i];
     }
     best_ = std::ranges::max_element(tried_, [](const auto& a, const auto& b) { return a.second < b.second; })->first;
   }

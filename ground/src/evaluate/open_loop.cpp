@@ -11,6 +11,7 @@
 #include "trihedron/core/setup.hpp"
 #include "trihedron/core/telemetry.hpp"
 #include "trihedron/ground/model/setup_error.hpp"
+#include "trihedron/records/stop.hpp"
 
 namespace trihedron::ground {
 namespace {
@@ -105,6 +106,7 @@ AttitudeHistory fly_open_loop(const Pass& pass, Time t, const std::vector<GyroCa
   Time last_t = t;
   auto epoch = std::ranges::lower_bound(epochs, t);
   for (Time now = t; epoch != epochs.end(); now = std::min(now + kStep, *epoch)) {
+    check_stop();
     if (const std::optional<Directions> h_b = readings.at(now)) {
       Directions middle = *h_b;
       for (int k = 0; k < kPair && last; ++k) {

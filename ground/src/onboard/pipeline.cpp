@@ -113,23 +113,20 @@ Pipeline& Pipeline::operator=(Pipeline&&) noexcept = default;
 Pipeline::~Pipeline() = default;
 
 std::span<const StepReport> Pipeline::feed(const GyroSample& sample) {
-  reports_.clear();
-  std::visit(
-      [&](auto& its) {
-        reports_.push_back(its->on_gyro(sample));
-        while (reports_.back().more_due) {
-          reports_.push_back(its->carry_on());
-        }
-      },
-      program_->on_board);
-  return reports_;
+  return report_all([&](auto& its) { return its.on_gyro(sample); });
 }
 
 std::span<const StepReport> Pipeline::feed(const StarFix& fix) {
+  return report_all([&](auto& its) { return its.on_fix(fix); });
+}
+
+// A step deals with one fix at most: goes on while another is due.
+template <class Step>
+std::span<const StepReport> Pipeline::report_all(const Step& step) {
   reports_.clear();
   std::visit(
       [&](auto& its) {
-        reports_.push_back(its->on_fix(fix));
+        reports_.push_back(step(*its));
         while (reports_.back().more_due) {
           reports_.push_back(its->carry_on());
         }

@@ -54,6 +54,8 @@ class Pipeline {
 
  private:
   struct Program;
+  template <class Step>
+  [[nodiscard]] std::span<const StepReport> report_all(const Step& step);
   [[nodiscard]] double part_of_change() const;
 
   PassSettings settings_;

@@ -6,12 +6,13 @@
 #include <vector>
 
 #include "trihedron/ground/onboard/pipeline.hpp"
+#include "trihedron/records/stop.hpp"
 
 namespace trihedron::ground {
 
 /// Feeds a pass to a pipeline as the spacecraft would have: in time order, a fix on the time of a gyro sample after it.
 /// Calls tell(report, sample) for each report, with the latest sample that was fed. Gyros and star trackers beyond those
-/// of the pipeline's layout are not used.
+/// of the pipeline's layout are not used. Can be stopped.
 template <class Tell>
 void replay(const Pass& pass, Pipeline& pipeline, Tell&& tell) {
   std::vector<const StarTrackerTelemetry*> heads{&pass.star_tracker};
@@ -32,6 +33,7 @@ void replay(const Pass& pass, Pipeline& pipeline, Tell&& tell) {
     }
   };
   for (std::size_t i = 0; i < pass.gyro.size(); ++i) {
+    check_stop();
     sample = sample_of(pass.gyro, i);
     feed_fixes([&](Time t) { return t < sample.t; });
     for (const StepReport& report : pipeline.feed(sample)) {
