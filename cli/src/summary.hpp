@@ -37,7 +37,7 @@ struct Evaluation {
   ground::ErrorStatistics whole;
   std::vector<ground::ErrorStatistics> stretches;  ///< of 90 min from the pass epoch
   double limit_rad = 0;
-  std::vector<ground::CorrectionInterval> intervals;  ///< empty where the attitude does not tell its corrections
+  std::vector<ground::CorrectionInterval> intervals;  ///< empty where the file does not give the corrections
 };
 [[nodiscard]] Evaluation evaluate(const AttitudeHistory& attitude, const Reference& reference, Time epoch,
                                   double limit_rad);

@@ -46,7 +46,7 @@ std::optional<SetupFault> InvariantEstimator<kCapacity>::set_up(const Calibratio
   begin_stretch();
   angles_since_fix_ = 0;
   angle_rejections_in_a_row_ = 0;
-  begun_from_estimates_ = false;
+  restarted_from_estimates_ = false;
   started_ = false;
   return std::nullopt;
 }
@@ -226,7 +226,7 @@ template <Capacity kCapacity>
 PerGyro<double> InvariantEstimator<kCapacity>::reading_noise(const Eigen::Matrix3d& C_linear, double noise_factor,
                                                              int n) const {
   PerGyro<double> noise_rad = readout_noise(noise_factor);
-  // Without a fix between them they keep their sign: n readings must not average them away.
+  // Without a fix between them these errors keep their sign: n readings must not average them away.
   const double in_a_row = std::sqrt(static_cast<double>(n));
   for (int k = 0; k < layout().gyros; ++k) {
     Rows3 rows = Rows3::Zero(3, layout().size());
@@ -293,8 +293,9 @@ auto InvariantEstimator<kCapacity>::angles_of(const FixComparison& comparison, c
 template <Capacity kCapacity>
 bool InvariantEstimator<kCapacity>::is_fault(double nis, double misfit_rad, int used) const {
   // After a restart from the estimates these may be wrong: first try a restart from the prior.
-  const bool last_resort = gate_.begun_anew() && !begun_from_estimates_ && misfit_rad > kFaultOfTwo_rad;
-  return nis > kFaultOverGate * setup_.gate_nis && (used > 2 || last_resort);
+  const bool last_resort =
+      gate_.restarted_recently() && !restarted_from_estimates_ && misfit_rad > kFaultMisfitOfPair_rad;
+  return nis > kFaultGateRatio * setup_.gate_nis && (used > 2 || last_resort);
 }
 
 template <Capacity kCapacity>
@@ -309,7 +310,7 @@ int InvariantEstimator<kCapacity>::odd_gyro(const FixComparison& comparison, Agr
     others.used[k] = false;
     if (agrees(others)) {
       if (odd != kNoGyro) {
-        return kNoGyro;  // either may be
+        return kNoGyro;  // more than one candidate: ambiguous
       }
       odd = k;
     }
@@ -412,10 +413,10 @@ FixReport InvariantEstimator<kCapacity>::correct(const StarFix& fix, const FixRe
       report.status = FixStatus::kUsed;
       break;
     case FixStatus::kRestarted:
-      // Information gathered about a far wrong estimate: begin anew from the present one, and where that is no better,
-      // from what was known.
-      begun_from_estimates_ = !begun_from_estimates_ && prior_allows_estimates();
-      if (!begun_from_estimates_) {
+      // The information was gathered about estimates that are far off: restart from the present ones, and where that is
+      // no better, from the prior.
+      restarted_from_estimates_ = !restarted_from_estimates_ && prior_allows_estimates();
+      if (!restarted_from_estimates_) {
         gyros_ = prior_gyros_;
         shared_.setZero();
       }
@@ -423,7 +424,7 @@ FixReport InvariantEstimator<kCapacity>::correct(const StarFix& fix, const FixRe
       report.weight = 1;
       return report;
     case FixStatus::kUsedAfterReopening:
-      begun_from_estimates_ = false;  // the last restart was long ago, so it had helped
+      restarted_from_estimates_ = false;  // the last restart was long ago, so it had helped
       add_direction_variance(misfit_rad * misfit_rad / (2 * layout().gyros));
       update_to_now(C_linear);
       report.weight = 1;

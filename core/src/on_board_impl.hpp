@@ -46,7 +46,7 @@ StepReport OnBoard<Estimator>::on_gyro(const GyroSample& sample) {
     navigate(readings_.latest_t(), readings_.latest_directions(), screened.t, screened.h_b);
   }
   if (behind_ == readings_.size() && readings_.full()) {
-    follow_next_sample();  // more than there is room for: the oldest cannot wait
+    follow_next_sample();  // buffer full: the oldest sample is processed before its time
   }
   readings_.push(screened);
   ++behind_;
@@ -87,7 +87,7 @@ StepReport OnBoard<Estimator>::flush() {
   report.gyros = intake_.health().states();
   if (intake_.waiting() > 0) {
     report.t = readings_.latest_t();
-    schedule_.no_angles();  // or the fix would wait for them
+    schedule_.no_angles();  // otherwise the fix would wait for them
     calibrate_until(std::max(report.t, intake_.next_fix().t), report);
   }
   return report;
@@ -121,7 +121,7 @@ SampleStatus OnBoard<Estimator>::let_in(GyroSample& sample) {
   return std::exchange(clock_set_back_, false) ? SampleStatus::kUsedAfterClockSetBack : SampleStatus::kUsed;
 }
 
-/// Begins a new time at `t`. The estimates stay as they are at the last sample: how long the jump took is unknown.
+/// Restarts the time at `t`. The estimates stay as they are at the last sample: how long the jump took is unknown.
 template <class Estimator>
 void OnBoard<Estimator>::set_clock(Time t) {
   while (behind_ > 0) {
@@ -210,7 +210,7 @@ template <class Estimator>
 void OnBoard<Estimator>::look_at_angles(StepReport& report) {
   const Time t = std::max(schedule_.angles_t(), follower_t_);
   const std::optional<FixReadings> readings = readings_at(t);
-  if (!readings || count(readings->used) < 2) {  // a gap of the gyros: on where they are back
+  if (!readings || count(readings->used) < 2) {  // a gap of the gyros: continue where they are back
     schedule_.put_angles_off(next_sample_t() + reach());
     return;
   }
@@ -506,7 +506,7 @@ Result<AttitudeSolution, DirectionsFault> Navigator<Estimator>::attitude(const E
   const double walk = setup.direction_random_walk_rad_sqrt_s;
   double variance_rad2 = walk * walk * time_since_correction_s + extra_variance_rad2_;
   if (layout.further.wandering_drift) {
-    // By the drift that has come since the correction, ∫w(t) dt less what w(0) lets expect of it.
+    // Variance of ∫w(t) dt given w(0): docs/mathematics.md, section 10.
     const double x = time_since_correction_s / setup.wandering_drift.time_s;
     const double scale_rad = setup.wandering_drift.sigma * setup.wandering_drift.time_s;
     variance_rad2 += scale_rad * scale_rad * std::max(2 * x - 3 + 4 * std::exp(-x) - std::exp(-2 * x), 0.0);

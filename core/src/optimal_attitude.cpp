@@ -5,7 +5,7 @@
 namespace trihedron {
 namespace {
 
-/// Axes on two directions that treat both alike: their normal, the middle between them, and across it.
+/// Axes on two directions in which both have equal weight: their normal, the bisector, and the third.
 template <class F>
 Result<Rot<F, G>, DirectionsFault> bisecting_axes(const Vec<F>& h1, const Vec<F>& h2) {
   const auto trihedron = make_trihedron(h1, h2);
@@ -33,8 +33,8 @@ Eigen::Matrix3d sum_across(const Directions& h_c, const GyroMask& used) {
   return sum;
 }
 
-/// From a solution for two of the directions to that for all by Gauss–Newton: each step leaves as much of what was left
-/// before as the directions disagree.
+/// From the solution for two of the directions to that for all by Gauss–Newton. Each step multiplies the remaining
+/// error by about the size of the disagreement of the directions.
 Rot<In, C> refined(Rot<In, C> C_in_c, const Directions& h_in, const Directions& h_c, const GyroMask& used) {
   const Eigen::Matrix3d inverse = sum_across(h_c, used).inverse();
   constexpr double kRounding = 1e-15;
@@ -72,7 +72,7 @@ Result<AttitudeByDirections, DirectionsFault> trihedron_attitude(const Direction
 
 Result<Rot<In, C>, DirectionsFault> optimal_rotation(const Directions& h_in, const Directions& h_c,
                                                      const GyroMask& used) {
-  // From the best placed pair: of two that count alike it is the solution.
+  // Starts from the pair nearest to a right angle; with two gyros that is the solution.
   double best = 0;
   int first = 0;
   int second = 1;

@@ -17,7 +17,7 @@ struct ColumnName {
   Position position;
 };
 
-/// The columns that a table must and may have beside `t_s`.
+/// The columns that a table must and may have in addition to `t_s`.
 struct ColumnRules {
   std::vector<std::string> required;
   std::vector<std::string> optional;

@@ -1,4 +1,4 @@
-// trihedron_consistency: flies the grid and tells how the estimators' covariances hold.
+// trihedron_consistency: simulates a grid of flights and tabulates whether the estimators' covariances are consistent.
 
 #include <fmt/core.h>
 
@@ -30,7 +30,7 @@ constexpr const char* kAgreementTable = "agreement";
 
 struct Options {
   int runs = 100;
-  int paper_runs = 20;  // it is far enough off to be seen by fewer
+  int paper_runs = 20;  // fewer runs suffice: its NEES is far from consistent
   std::string cells;
   std::vector<std::string> estimators{std::string(name_of(Estimator::kPaper)),
                                       std::string(name_of(Estimator::kInvariant))};

@@ -55,7 +55,7 @@ double log_likelihood(const PassProblem& problem, const PassSolution& solution, 
   const Eigen::Index rest = layout.size() - directions;
   const double log_prior_root =
       linear.prior.block(directions, directions, rest, rest).diagonal().array().abs().log().sum();
-  return log_prior_root - found.log_root_determinant - (found.residual_square + linear.beyond_squares) / 2;
+  return log_prior_root - found.log_root_determinant - (found.residual_square + linear.cost_outside_rows) / 2;
 }
 
 }  // namespace trihedron::ground

@@ -42,9 +42,9 @@ void compress(SmootherStage& stage) {
 }
 
 /// Collects whitened rows of fixes; consecutive fixes closer than `reach` are replaced by their weighted mean.
-class NearbyFixes {
+class FixMerger {
  public:
-  explicit NearbyFixes(Duration reach) : reach_(reach) {}
+  explicit FixMerger(Duration reach) : reach_(reach) {}
 
   void add(const ScreenedPass::Fix& fix, const PassProblem::FixRows& rows, double weight) {
     const bool first = sums_.empty() || fix.fix.t - sums_.back().t >= reach_ || sums_.back().head != fix.fix.head ||
@@ -426,7 +426,7 @@ PassProblem::Linear PassProblem::linearise(const PassSolution& solution) const {
   std::size_t fix = 0;
   for (std::size_t arc = 0; arc < arcs_.size(); ++arc) {
     check_stop();
-    NearbyFixes nearby(setup_.fixes_together);
+    FixMerger nearby(setup_.fixes_together);
     for (; fix < fixes_until[arc]; ++fix) {
       const auto& [its, rows] = fixes[fix];
       if (rows.y.size() == 0) {
@@ -435,10 +435,10 @@ PassProblem::Linear PassProblem::linearise(const PassSolution& solution) const {
       // Its pull falls with the third power of the misfit beyond the gate.
       const double nis = rows.y.squaredNorm();
       const double gate = scale * gate_of_freedom(static_cast<int>(rows.y.size()), setup_.on_board.gate_nis);
-      linear.beyond_squares += nis > gate ? 2 * gate * (1 - gate / nis) : 0;
+      linear.cost_outside_rows += nis > gate ? 2 * gate * (1 - gate / nis) : 0;
       nearby.add(*its, rows, nis > gate ? gate / nis : 1);
     }
-    linear.beyond_squares += nearby.put_into(linear.stages[arc], layout_.size());
+    linear.cost_outside_rows += nearby.put_into(linear.stages[arc], layout_.size());
   }
   std::ranges::for_each(linear.stages, compress);
   put_noise(solution, setup_.noise(), linear);

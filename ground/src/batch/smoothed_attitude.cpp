@@ -126,7 +126,7 @@ AttitudeHistory SmoothedAttitude::between(const PassProblem::Moment& from, const
 }
 
 AttitudeHistory SmoothedAttitude::definitive() const {
-  constexpr std::size_t kTogether = 1000;  // a node takes some kilobytes
+  constexpr std::size_t kNodesAtOnce = 1000;  // a node takes some kilobytes
   AttitudeHistory whole;
   std::vector<PassProblem::Moment> nodes;
   const auto take = [&] {
@@ -144,7 +144,7 @@ AttitudeHistory SmoothedAttitude::definitive() const {
       nodes.back().t -= Duration{1};
     }
     nodes.push_back(moment);
-    if (nodes.size() > kTogether) {
+    if (nodes.size() > kNodesAtOnce) {
       take();
     }
   });

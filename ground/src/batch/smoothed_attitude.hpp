@@ -9,7 +9,7 @@
 
 namespace trihedron::ground {
 
-/// Readings at any time, by the samples round it together.
+/// Readings at any time, by a polynomial through the samples around it.
 class SmoothReadings {
  public:
   /// Refers to both.

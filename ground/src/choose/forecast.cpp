@@ -15,7 +15,7 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
 constexpr std::size_t kParts = 6;
-/// Parts used for the first fit, which are not forecast.
+/// Parts at the beginning that are only fitted, not forecast.
 constexpr std::size_t kLearning = 2;
 
 /// What is known of the states of a smaller model: those that it does not have are zero.

@@ -169,14 +169,14 @@ void judge_nis(const Statistics& statistics, const std::string& what_is_wrong, s
 }
 
 /// Probability of a false alarm on a good pass.
-constexpr double kOneIn = 1e-5;
+constexpr double kFalseAlarm = 1e-5;
 /// Correlations and lines below these limits do no harm, however significant.
 constexpr double kCorrelated = 0.05;
 constexpr double kLineInSigmas = 0.1;
 
 bool is_chance(double square, int degrees_of_freedom) {
-  return degrees_of_freedom == 0 ||
-         square <= boost::math::quantile(boost::math::complement(boost::math::chi_squared(degrees_of_freedom), kOneIn));
+  return degrees_of_freedom == 0 || square <= boost::math::quantile(boost::math::complement(
+                                                  boost::math::chi_squared(degrees_of_freedom), kFalseAlarm));
 }
 
 void judge_whiteness(const Pass& pass, const CalibrationRun& run, std::vector<Finding>& findings) {
@@ -217,7 +217,7 @@ void judge_halves(const Statistics& statistics, std::vector<Finding>& findings) 
 }
 
 /// A model that is this much less likely than another is wrong, as ln.
-constexpr double kClearly = 10;
+constexpr double kLogOddsOfWrongModel = 10;
 
 void judge_drift_model(const CalibrationRun& run, std::vector<Finding>& findings) {
   const auto& models = run.drift_models;
@@ -236,13 +236,13 @@ void judge_drift_model(const CalibrationRun& run, std::vector<Finding>& findings
                        better.open_loop_rms_rad / kArcsecond, used->open_loop_rms_rad / kArcsecond);
   };
   const auto larger = std::max_element(used, models.end(), likelier);
-  if (larger->log_likelihood > used->log_likelihood + kClearly) {
+  if (larger->log_likelihood > used->log_likelihood + kLogOddsOfWrongModel) {
     add(findings, FindingCode::kDriftModelTooSmall,
         "The gyros drift in a way that the drift model does not contain; its coefficients and sigmas are wrong.",
         evidence(*larger), fmt::format("Use drift model {}, or {}.", name_of(larger->drift_model), kAutoDriftModel));
   }
   const auto smaller = std::max_element(models.begin(), std::next(used), likelier);
-  if (smaller->log_likelihood > used->log_likelihood + kClearly) {
+  if (smaller->log_likelihood > used->log_likelihood + kLogOddsOfWrongModel) {
     add(findings, FindingCode::kDriftModelTooLarge,
         "The drift model has coefficients that the pass does not support: they add their own error to what comes next.",
         evidence(*smaller), fmt::format("Use drift model {}, or {}.", name_of(smaller->drift_model), kAutoDriftModel));
@@ -271,12 +271,12 @@ void judge_change(const CalibrationRun& run, std::vector<Finding>& findings) {
 }
 
 void judge_star_tracker_errors(const CalibrationRun& run, std::vector<Finding>& findings) {
-  constexpr double kSure = 5;
+  constexpr double kSigmasToReport = 5;
   double clock_s = 0;
   double orbital_rad = 0;
   double sureness = 0;
   for (const FurtherEstimate& state : run.calibration.further) {
-    if (std::abs(state.value) < kSure * state.sigma) {
+    if (std::abs(state.value) < kSigmasToReport * state.sigma) {
       continue;
     }
     if (state.parameter.is_further(FurtherState::kClockOffset)) {

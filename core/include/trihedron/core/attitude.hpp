@@ -55,7 +55,7 @@ template <class S>
 
 /// Error of the attitude, true C_in_c = exp([ε×]) est with ε in the axes of F, by the errors of the two directions: ε =
 /// J (ρ1, ρ2), ρ_k: small rotation from the estimated to the true direction k in the frame F, minus that in the other
-/// frame the other side. 3 × 6. Columns along each direction are zero. Its size grows with 1/sinθ.
+/// frame. 3 × 6. Columns along each direction are zero. Its size grows with 1/sinθ.
 template <class F, class S>
 [[nodiscard]] Eigen::Matrix<S, 3, 6> attitude_by_directions(const Trihedron<F, S>& t) {
   const Vector3<S> q1 = t.q1();

@@ -1,5 +1,5 @@
 #pragma once
-/// Readings of several samples taken together: the body moves smoothly, the readout noise is white.
+/// Polynomials through the readings of several samples: the body moves smoothly, the readout noise is white.
 
 #include <Eigen/Core>
 

@@ -1,5 +1,5 @@
 #pragma once
-/// What is told of each fix.
+/// What the estimator reports of each fix.
 
 #include <Eigen/Core>
 
@@ -23,14 +23,15 @@ struct FixReport {
   double nis = 0;               ///< innovation² over its covariance; as many degrees of freedom as components
   double weight = 1;            ///< the noise was assumed 1/√weight times the nominal one; 1 without Student's t
   int rejections_in_a_row = 0;  ///< or, with Student's t, fixes above the gate
-  bool jumped =
-      false;  ///< the misfit appeared within one fix and is larger than drift can cause: attributed to the star tracker
-  int odd_gyro = kNoGyro;  ///< index of the gyro that alone, and not the star tracker, explains why it was rejected
+  /// The misfit appeared within one fix and is larger than drift can cause: attributed to the star tracker.
+  bool jumped = false;
+  /// Index of the one gyro without which all others agree with the fix, where a fault of it explains the rejection.
+  int odd_gyro = kNoGyro;
 
   [[nodiscard]] bool used() const { return is_used(status); }
 };
 
-/// A look at the angles between the momenta alone.
+/// Report on one update by the angles between the momenta alone.
 struct AngleReport {
   FixStatus status = FixStatus::kNone;
   Time t{};

@@ -13,7 +13,8 @@ namespace trihedron {
 /// State of each gyro from repeated readings and from the fault suspicions of rejected fixes.
 class GyroHealth {
  public:
-  /// A live reading has noise: two alike may be chance or coarse telemetry, so many of them over a second are not.
+  /// Identical consecutive samples, and the time over which they came, that mean a stuck gyro: a live reading has
+  /// noise, and so many equal values are no chance even in coarse telemetry.
   static constexpr int kStuckSamples = 16;
   static constexpr Duration kStuckTime = std::chrono::seconds(1);
   /// Consecutive suspicions of the same gyro after which it is isolated.
@@ -24,7 +25,7 @@ class GyroHealth {
   GyroHealth() = default;
   explicit GyroHealth(int gyros) : gyros_(gyros) {}
 
-  /// In the order of time.
+  /// Takes the next sample; in time order.
   void look_at(const GyroSample& sample) {
     for (int k = 0; k < gyros_; ++k) {
       Readings& its = readings_[k];
@@ -46,7 +47,8 @@ class GyroHealth {
     }
   }
 
-  /// A fix, or a look at the angles: `odd_gyro` alone does not agree with the rest, or it is kNoGyro.
+  /// Takes the result of a fix, or of an update by the angles: the gyro that alone does not agree with the rest, or
+  /// kNoGyro.
   void judge(int odd_gyro) {
     verdicts_ = odd_gyro == suspect_ ? verdicts_ + 1 : 1;
     suspect_ = odd_gyro;
@@ -72,7 +74,7 @@ class GyroHealth {
     return states;
   }
 
-  /// The clock has been set: `t` is now.
+  /// The clock has been set back; `t` is the time now.
   void set_clock(Time t) {
     for (Readings& its : readings_) {
       its.since = t;

@@ -23,7 +23,7 @@ using SharedStates = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, kMaxSharedState
 /// Covariance of a fix's noise, c axes, rad².
 [[nodiscard]] Eigen::Matrix3d fix_noise(const CalibrationSetup& setup, int head);
 
-/// The fix without what is known of its error.
+/// The fix with the estimate of its error taken off.
 [[nodiscard]] Rot<In, C> corrected(const StarFix& fix, const FixBySharedStates& by_shared, const SharedStates& shared);
 
 /// One gyro's part of a comparison: the two components of y = h × h_et across h, the first along h × (h of the next
@@ -160,7 +160,7 @@ void carry_back(const Layout& layout, const Sensitivities& since, Rows& rows) {
   }
 }
 
-/// Adds a gyro's part of errors x, rows as in the layout, to what is believed of its parameters; the momentum and the
+/// Adds a gyro's part of errors x, rows as in the layout, to the estimates of its parameters; the momentum and the
 /// drift that wanders are left to the caller.
 template <class Vector, class Gyro>
 void add_parameter_errors(const Layout& layout, int gyro, const Vector& x, Gyro& its) {

@@ -12,8 +12,7 @@
 
 namespace trihedron {
 
-/// What is believed of one gyro; inside of the estimators, plain numbers with frames in the names. There is room for
-/// Max drift columns.
+/// Estimates of one gyro, as plain numbers with frames in the names. There is room for Max drift columns.
 template <int Max>
 struct GyroModel : GyroReadout {
   using Coefficients = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, Max, 1>;
@@ -82,18 +81,17 @@ struct GaussMarkov {
   double sigma = 0;  ///< stationary
   double time_s = 3600;
 
-  /// What is left of a value after dt_s. Nothing after a long time; what the inverse of a transition takes for that
-  /// would be rounding.
+  /// The fraction of a value that is left after dt_s; not below 1e-6, since its inverse stands in the transition.
   [[nodiscard]] double kept(double dt_s) const;
-  /// 1-sigma of what has come in its place.
+  /// 1-sigma of the noise that has come in its place.
   [[nodiscard]] double noise(double kept) const;
 };
 
 /// Longest step over which the change of the readings tells how far the body turned.
 inline constexpr double kQuarterOrbit_s = 1300;
 
-/// What the midpoint rule may miss in a step in which the body turned far between two samples, rad: the drift over the
-/// step, times the turn that the readings from and to show.
+/// Largest error of the midpoint rule, rad, in a step in which the body turned far between two samples: the drift over
+/// the step times the turn between the readings `from` and `to`.
 [[nodiscard]] double missed_by_long_step_rad(double drift_rad, const Eigen::Vector3d& from, const Eigen::Vector3d& to,
                                              double dt_s);
 

@@ -25,7 +25,7 @@ enum class SetupFault : std::uint8_t {
 struct StarTrackerSetup {
   Eigen::Vector3d noise_rad{1e-4, 1e-4, 1e-4};          ///< 1-sigma about its own axes s
   Eigen::Matrix3d C_c_s = Eigen::Matrix3d::Identity();  ///< as designed; c are the axes of the first
-  double alignment_sigma_rad = 1e-2;                    ///< of those beside the first, per axis
+  double alignment_sigma_rad = 1e-2;                    ///< of a star tracker other than the first, per axis
 };
 
 /// A step between samples further apart than this is a long one, over which readings are not interpolated; the body's
@@ -78,7 +78,7 @@ struct CalibrationSetup {
   /// ν of Student's t, or 0 for normal noise. With it a fix above the gate is used with its weight instead of rejected,
   /// unless the misfit is attributed to the star tracker or to one gyro; a run of fixes above the gate still reopens
   /// the directions. Better than the gate where many fixes are a few times noisier than specified; against few large
-  /// outliers the gate alone is as good, and paper's filter better. Between 5 and 20.
+  /// outliers the gate alone is as good, and for the paper's filter better. Between 5 and 20.
   double student_t_freedom = 0;
   /// Consecutive rejections after which the direction covariance is widened by the size of the misfit and the fix is
   /// used: the model was wrong, not the tracker.
@@ -93,20 +93,21 @@ struct CalibrationSetup {
   /// Without a fix that could be used for longer than this, the angles between the momenta are used alone; or kNever.
   Duration angles_after = std::chrono::minutes(1);
 
-  /// What keeps it from working, beside the prior.
+  /// The first fault of the settings; the prior is checked by the estimator.
   [[nodiscard]] std::optional<SetupFault> fault() const;
 
-  /// How much of the change of the coefficients there has been at `t`.
+  /// The fraction of the change of the coefficients that has taken place at `t`.
   [[nodiscard]] double part_of_change(Time t) const { return to_seconds(t - no_change_at) / change_time_s; }
 
   [[nodiscard]] Duration max_interpolation() const { return trihedron::max_interpolation(gyro_period); }
-  /// Readings to both sides of a fix that are taken together: fixes every 3 s do not share any. Of slow gyros more, so
-  /// that there are enough for a polynomial.
+  /// How far to both sides of a fix readings are fitted together: at one fix every 3 s no reading is shared. For slow
+  /// gyros further, so that there are enough readings for the polynomial.
   [[nodiscard]] Duration reach() const;
-  /// Samples that are taken together for the attitude now.
+  /// How far back samples are fitted together for the attitude now.
   [[nodiscard]] Duration recent() const;
-  /// How many fixes of a star tracker share a gyro sample, at least 1, when they come so fast: so much larger is the
-  /// variance that a sample's noise has in each of them, so that all of them together do not count it more than once.
+  /// Number of fixes of a star tracker that share a gyro sample at this interval, at least 1. The readout variance of
+  /// each is multiplied by it, so that together they do not count the noise of a sample as if it were independent in
+  /// each.
   [[nodiscard]] double fixes_sharing_a_sample(Duration since_the_last_fix) const;
 };
 

@@ -56,7 +56,7 @@ class SquareRootInformation {
   [[nodiscard]] RowsView root() { return {data_.data(), states_, states_, states_ + 1}; }
   [[nodiscard]] ConstRowsView root() const { return {data_.data(), states_, states_, states_ + 1}; }
 
-  /// Adds information rows about the states, `rows` of so many: unit white noise = rows · x. `rows` is used up.
+  /// Adds rows of information, unit white noise = rows · x. `rows` is overwritten.
   void add_information(RowsView rows) { rotate_into(root(), rows, states_); }
 
   /// Time update: x_d ← A x_d + B x_c + w, w of independent components with 1-sigma `noise`, which may be zero.

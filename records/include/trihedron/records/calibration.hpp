@@ -32,8 +32,8 @@ struct FurtherEstimate {
 /// The noise levels that a calibration used.
 struct CalibrationNoise {
   double direction_random_walk_rad_sqrt_s = 0;  ///< of each momentum across itself, per axis
-  std::optional<Eigen::Vector3d>
-      star_tracker_noise_rad;        ///< about c x, y, z, where it was found to differ from the setting
+  /// About c x, y, z, where it was found to differ from the setting.
+  std::optional<Eigen::Vector3d> star_tracker_noise_rad;
   double wandering_drift_rad_s = 0;  ///< 1-sigma per case axis; 0: none
   double wandering_time_s = 0;       ///< its correlation time
 };

@@ -21,7 +21,7 @@ struct FurtherStateRow {
   /// there or not.
   std::string_view key;
   std::string_view label;  ///< for people, as the begin of a sentence
-  std::string_view about;  ///< for people, beside the key in the settings
+  std::string_view about;  ///< for people, after the key in the settings
   Unit unit;
   /// In calibration.json, each with its unit at the end; after the owner's name where that is not the pass. None where
   /// the values are not given, since they do not last.

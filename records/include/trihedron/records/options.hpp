@@ -22,8 +22,8 @@ struct CorrectionOptions {
   bool take_parameters = true;                   ///< false: the parameters known before the pass are held
 };
 
-/// What estimators invariant and batch estimate beside alignment and eq. (1). kAuto: decided by the evidence of the
-/// pass. The alignments of further star trackers are estimated where the pass has such; for them nothing is chosen
+/// What estimators invariant and batch estimate in addition to alignment and eq. (1). kAuto: decided by the evidence of
+/// the pass. The alignments of further star trackers are estimated where the pass has such; for them nothing is chosen
 /// here.
 struct FurtherStateOptions {
   enum class Choice : std::uint8_t { kAuto, kOff, kOn };
@@ -63,9 +63,10 @@ struct CalibrationOptions {
   /// A fix with a NIS above this is rejected; χ² of 4 degrees of freedom passes 30 once in 2e5 good fixes. That of a
   /// pair: of more gyros a gate that good fixes pass as often.
   double gate_nis = 30;
-  /// After so many rejections in a row the directions are set free and the fix is used.
+  /// Consecutive rejections after which the directions are reopened and the fix is used.
   int reopen_after_rejections = 20;
-  /// The same where the run began with a jump that no drift can make: the star tracker is wrong, or has been turned.
+  /// The same where the run began with a jump larger than drift can cause: the star tracker gave wrong fixes, or has
+  /// been moved.
   int reopen_after_jump_rejections = 400;
   /// ν of Student's t: a fix above the gate is used with less weight instead of rejected. 0: normal noise, the gate
   /// alone.

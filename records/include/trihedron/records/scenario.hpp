@@ -140,7 +140,7 @@ struct GyroScenario {
   /// `misalignment_magnitude_rad`.
   std::optional<Eigen::Vector3d> misalignment_rad{};
   double misalignment_magnitude_rad = 30 * kArcminute;
-  double alignment_prior_sigma_rad = 30 * kArcminute;  ///< what the estimator is told, per axis
+  double alignment_prior_sigma_rad = 30 * kArcminute;  ///< given to the estimator, per axis
   DriftScenario drift{};
   ReadoutScenario readout{};
 };
@@ -151,7 +151,7 @@ struct StarTrackerScenario {
   // Of further heads only: C_c_s = exp([misalignment×]) exp([mounting×]).
   Eigen::Vector3d mounting_rotation_vector_rad{0, 0, 0};
   Eigen::Vector3d misalignment_rad{0, 0, 0};      ///< c axes
-  double alignment_prior_sigma_rad = kArcminute;  ///< what the estimator is told of it, per axis
+  double alignment_prior_sigma_rad = kArcminute;  ///< given to the estimator, per axis
 
   Eigen::Vector3d noise_rad{3 * kArcsecond, 3 * kArcsecond, 20 * kArcsecond};  ///< white, about s x, y, z
   double clock_offset_s = 0;

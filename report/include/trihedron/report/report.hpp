@@ -18,7 +18,7 @@ struct Evaluation {
   ground::AttitudeErrors navigation;          ///< of CalibrationRun::navigation
   ground::AttitudeErrors attitude;            ///< of CalibrationRun::attitude
   std::vector<ground::OpenLoops> open_loops;  ///< from the run's corrections; may be empty
-  double limit_rad = 0;                       ///< that their intervals stand for
+  double limit_rad = 0;                       ///< error limit of the correction intervals
 };
 
 /// Refers to its parts; they must outlive it. Sections whose data are absent or empty are left out of the report.
