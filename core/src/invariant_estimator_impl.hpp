@@ -59,7 +59,9 @@ double InvariantEstimator<kCapacity>::sharing_factor(const StarFix& fix) const {
 
 template <Capacity kCapacity>
 void InvariantEstimator<kCapacity>::begin_stretch() {
-  since_fix_ = {};
+  for (int k = 0; k < layout().gyros; ++k) {
+    since_fix_[k].begin(layout().drift_columns());
+  }
   time_since_fix_s_ = 0;
   extra_variance_rad2_ = 0;
 }

@@ -392,7 +392,7 @@ template <class Estimator>
 void Navigator<Estimator>::correct(const Estimator& estimator) {
   gyros_ = estimator.gyros();
   estimator.error_root(new_errors(estimator.error_layout().shared(), estimator.states()));
-  restart_clock();
+  restart_clock(estimator.layout());
 }
 
 template <class Estimator>
@@ -421,7 +421,7 @@ void Navigator<Estimator>::correct_directions(const Estimator& estimator, const 
                .lazyProduct(errors.middleRows(layout.readout(k), layout.readout_size()));
     phi.template leftCols<kAttitude>() = C_in_c * attitude_root;
   }
-  restart_clock();
+  restart_clock(layout);
 }
 
 template <class Estimator>
@@ -434,8 +434,10 @@ RowsView Navigator<Estimator>::new_errors(int rows, int columns) {
 }
 
 template <class Estimator>
-void Navigator<Estimator>::restart_clock() {
-  since_correction_ = {};
+void Navigator<Estimator>::restart_clock(const Layout& layout) {
+  for (int k = 0; k < layout.gyros; ++k) {
+    since_correction_[k].begin(layout.drift_columns());
+  }
   extended_until_s_ = 0;
   time_since_correction_s_ = 0;
   extra_variance_rad2_ = 0;
@@ -464,24 +466,24 @@ void Navigator<Estimator>::predict(const Estimator& estimator, const Eigen::Matr
 }
 
 template <class Estimator>
-auto Navigator<Estimator>::since_correction(const Estimator& estimator, const Sensitivities& stretch) const
-    -> Sensitivities {
+void Navigator<Estimator>::append(const Estimator& estimator, const Sensitivities& stretch,
+                                  Sensitivities& since) const {
   const Layout& layout = estimator.layout();
-  Sensitivities since = since_correction_;
   for (int k = 0; k < layout.gyros; ++k) {
-    auto faded = stretch[k];
     if (layout.further.wandering_drift) {
+      auto faded = stretch[k];
       faded.by_drift.first(layout.drift_columns()).template middleCols<3>(layout.wandering_column()) *=
           std::exp(-extended_until_s_ / estimator.setup().wandering_drift.time_s);
+      since[k].append(faded, layout.drift_columns());
+    } else {
+      since[k].append(stretch[k], layout.drift_columns());
     }
-    since[k] = since[k].then(faded, layout.drift_columns());
   }
-  return since;
 }
 
 template <class Estimator>
 void Navigator<Estimator>::extend(const Estimator& estimator, const Sensitivities& stretch) {
-  since_correction_ = since_correction(estimator, stretch);
+  append(estimator, stretch, since_correction_);
   extended_until_s_ = time_since_correction_s_;
 }
 
@@ -496,7 +498,9 @@ Result<AttitudeSolution, DirectionsFault> Navigator<Estimator>::attitude(const E
   const Layout layout = estimator.error_layout();
   const CalibrationSetup& setup = estimator.setup();
   auto rows = attitude_by_states_now<Estimator::kMaxErrors>(layout, by_directions.value(), gyros, readings.h_b);
-  carry_back(layout, since_correction(estimator, estimator.since_fix()), rows);
+  Sensitivities since = since_correction_;
+  append(estimator, estimator.since_fix(), since);
+  carry_back(layout, since, rows);
   StateRows3<Estimator::kMaxStates> spread(3, error_columns_);
   multiply(view_of(rows), {errors_.data(), error_rows_, error_columns_, error_columns_}, rows_of(spread));
   PerGyro<double> noise_rad;

@@ -25,6 +25,8 @@ struct AttitudeSolution {
 /// The trihedron on the first two directions, and errors by theirs. docs/mathematics.md, section 5; paper Fig. 4.
 [[nodiscard]] Result<AttitudeByDirections, DirectionsFault> trihedron_attitude(const Directions& h_in,
                                                                                const Directions& h_c);
+/// The same, only the attitude itself.
+[[nodiscard]] Result<Rot<In, C>, DirectionsFault> trihedron_rotation(const Directions& h_in, const Directions& h_c);
 
 /// Readings h_b of the first `count` gyros, seen in c.
 template <class Gyros>

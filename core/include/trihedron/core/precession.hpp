@@ -28,16 +28,21 @@ struct GyroModel : GyroReadout {
 template <int Max>
 struct Sensitivity {
   Eigen::Matrix3d by_start = Eigen::Matrix3d::Identity();
-  Columns<Max> by_drift;  ///< s
+  Columns<Max> by_drift = Columns<Max>::zero();  ///< s
   Eigen::Matrix3d by_alignment = Eigen::Matrix3d::Zero();
 
-  /// The same over this stretch followed by `next`.
-  [[nodiscard]] Sensitivity then(const Sensitivity& next, int columns) const {
-    Sensitivity both;
-    both.by_start = next.by_start * by_start;
-    both.by_drift.first(columns) = next.by_start.lazyProduct(by_drift.first(columns)) + next.by_drift.first(columns);
-    both.by_alignment = next.by_start * by_alignment + next.by_alignment;
-    return both;
+  /// At the reference epoch: nothing has moved yet.
+  void begin(int columns) {
+    by_start.setIdentity();
+    by_drift.view(columns).set_zero();
+    by_alignment.setZero();
+  }
+  /// Makes it that of this stretch followed by `next`.
+  void append(const Sensitivity& next, int columns) {
+    by_start = (next.by_start * by_start).eval();
+    by_drift.first(columns) =
+        (next.by_start.lazyProduct(by_drift.first(columns)) + next.by_drift.first(columns)).eval();
+    by_alignment = (next.by_start * by_alignment + next.by_alignment).eval();
   }
 };
 
@@ -64,12 +69,12 @@ Eigen::Vector3d precess(GyroModel<Max>& gyro, Sensitivity<Max>& sensitivity, con
   const int size = drift.columns();
   drift.basis(gyro.corrected(h_b), part_of_change, columns.view(size));
   const Eigen::Matrix3d dt_C_in_b = dt_s * (C_in_c * gyro.C_c_b);
-  const Eigen::Vector3d turn = dt_C_in_b * columns.first(size).lazyProduct(gyro.drift_rad_s);
+  const Eigen::Vector3d turn = dt_C_in_b * columns.view(size).times(gyro.drift_rad_s.data());
   gyro.h_in = rotated<double>(gyro.h_in, turn).normalized();
   const Eigen::Matrix3d cross = skew<double>(turn);
   sensitivity.by_start += cross * sensitivity.by_start;
-  advance_by_drift(sensitivity.by_drift.view(size), columns.view(size), dt_C_in_b, turn);
   sensitivity.by_alignment += cross * (sensitivity.by_alignment - C_in_c);
+  advance_by_drift(sensitivity.by_drift.view(size), columns.view(size), dt_C_in_b, turn);
   return turn;
 }
 
