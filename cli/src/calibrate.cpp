@@ -104,7 +104,7 @@ std::vector<NamedPass> read_passes(const std::vector<std::string>& paths) {
   return passes;
 }
 
-/// A calibration measured against the best reference that there is. Refers to its parts.
+/// A calibration with its evaluation against the truth or the star tracker. Holds references.
 struct Outcome {
   const io::LoadedPass& loaded;
   const CalibrationRun& run;

@@ -13,7 +13,7 @@
 namespace trihedron::cli {
 namespace {
 
-/// Everything that it does not say is a default, and the defaults are the paper's experiment.
+/// Scenario of the demonstration: what it leaves out has its default, and the defaults are the paper's experiment.
 constexpr const char* kScenario =
     "# The paper's experiment: nine hours, 30′ of misalignment, unknown drift coefficients, and a drift that eq. (1) "
     "does\n"

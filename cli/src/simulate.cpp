@@ -33,7 +33,7 @@ sim::SimulatedPass simulated_by(const Scenario& scenario, const std::string& nam
 void simulate_pass(const Scenario& scenario, const std::string& name, const std::filesystem::path& pass,
                    const Common& common) {
   const sim::SimulatedPass result = simulated_by(scenario, name);
-  // A readout in steps needs no finer ones in the file.
+  // A quantised readout needs no finer step in the file.
   io::PassFormat format;
   double step = scenario.gyros.front().readout.quantum_rad;
   for (const GyroScenario& gyro : scenario.gyros) {

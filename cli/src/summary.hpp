@@ -19,7 +19,7 @@ namespace trihedron::cli {
 /// The truth of a pass, if it has one. Refuses one of another number of gyros.
 [[nodiscard]] std::optional<Truth> read_truth_of(const std::filesystem::path& path, const Pass& pass);
 
-/// The best attitude that there is to compare with.
+/// The reference attitude: the truth where there is one, else the star-tracker fixes used.
 struct Reference {
   std::string name;  ///< "truth" or "star tracker"
   std::vector<Time> t;
@@ -37,7 +37,7 @@ struct Evaluation {
   ground::ErrorStatistics whole;
   std::vector<ground::ErrorStatistics> stretches;  ///< of 90 min from the pass epoch
   double limit_rad = 0;
-  std::vector<ground::CorrectionInterval> intervals;  ///< empty where the attitude does not tell its corrections
+  std::vector<ground::CorrectionInterval> intervals;  ///< empty where the file does not give the corrections
 };
 [[nodiscard]] Evaluation evaluate(const AttitudeHistory& attitude, const Reference& reference, Time epoch,
                                   double limit_rad);

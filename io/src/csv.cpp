@@ -22,8 +22,8 @@ const char* skip_blanks(const char* p) {
   return p;
 }
 
-/// One number, NaN for an empty field. Returns where the field ends, nullptr when it holds no number.
-/// The text must go on to a '\n'.
+/// One number, NaN for an empty field. Returns where the field ends, nullptr when it holds no number. The text must be
+/// terminated by '\n'.
 const char* parse_field(const char* p, const char* end, double& value) {
   p = skip_blanks(p);
   const char* digits = *p == '+' && p[1] != '-' ? p + 1 : p;

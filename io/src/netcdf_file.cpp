@@ -46,8 +46,8 @@ bool worth_deflating(const std::vector<double>& values, double lsb) {
   return change < kSteps * lsb * static_cast<double>(values.size());
 }
 
-/// HDF5 below NetCDF tidies up at the end of a program, and crashes there when a full disk kept it from closing a file.
-/// All files of ours are closed by then. To be called before anything else of either library.
+/// The exit handler of HDF5 crashes when a full disk has kept it from closing a file, so it is switched off. All files
+/// of ours are closed by then. To be called before anything else of either library.
 void prepare_library() { [[maybe_unused]] static const herr_t once = H5dont_atexit(); }
 
 }  // namespace

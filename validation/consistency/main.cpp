@@ -1,4 +1,4 @@
-// trihedron_consistency: flies the grid and tells how the estimators' covariances hold.
+// trihedron_consistency: simulates a grid of flights and tabulates whether the estimators' covariances are consistent.
 
 #include <fmt/core.h>
 
@@ -30,7 +30,7 @@ constexpr const char* kAgreementTable = "agreement";
 
 struct Options {
   int runs = 100;
-  int paper_runs = 20;  // it is far enough off to be seen by fewer
+  int paper_runs = 20;  // fewer runs suffice: its NEES is far from consistent
   std::string cells;
   std::vector<std::string> estimators{std::string(name_of(Estimator::kPaper)),
                                       std::string(name_of(Estimator::kInvariant))};
@@ -49,7 +49,7 @@ std::vector<std::string> estimator_names() {
   return names;
 }
 
-/// A flight to be made, and the estimators that have not seen it.
+/// A flight still to be simulated, and the estimators to run on it.
 struct Task {
   const Cell& cell;
   int run;
@@ -68,7 +68,7 @@ std::vector<Column> columns_of(const Options& options) {
   return columns;
 }
 
-/// Run by run through all cells: what is there after a break makes a table of fewer runs.
+/// Ordered by run, then by cell, so that an interrupted campaign leaves a complete table of fewer runs.
 std::vector<Task> missing(const Results& results, const std::vector<Cell>& cells, const std::vector<Column>& columns,
                           int runs) {
   std::vector<Task> tasks;

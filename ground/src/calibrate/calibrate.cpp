@@ -25,9 +25,9 @@ namespace trihedron::ground {
 namespace {
 
 /// Reports progress about a hundred times over a pass.
-class Meter {
+class ProgressMeter {
  public:
-  Meter(const Progress& progress, std::size_t steps)
+  ProgressMeter(const Progress& progress, std::size_t steps)
       : progress_(progress), steps_(steps), every_(std::max<std::size_t>(steps / 100, 1)) {}
   void step(const StepReport& report) {
     if (report.sample == SampleStatus::kNone) {
@@ -76,7 +76,7 @@ Calibration known_before(const PassSettings& settings, const CalibrationOptions&
 }
 
 /// Beside the batch runs what flies, with a drift model that it has room for and without what only a whole pass shows.
-CalibrationOptions beside_the_batch(const PassSettings& settings, CalibrationOptions options) {
+CalibrationOptions options_of_on_board_run(const PassSettings& settings, CalibrationOptions options) {
   options.estimator = Estimator::kInvariant;
   options.further_states[FurtherState::kCoefficientChange] = FurtherStateOptions::Choice::kOff;
   if (options.drift_model && options.drift_model->family == DriftModelId::Family::kVsh && !settings.prior) {
@@ -106,9 +106,10 @@ Smoothed smooth(const Pass& pass, Decision& decision) {
 CalibrationRun calibrate(const Pass& pass, const CalibrationOptions& options, const Progress& progress) {
   Decision decision = decide(pass, options);
   const bool by_batch = decision.options.estimator == Estimator::kBatch;
-  Pipeline pipeline(pass.settings, by_batch ? beside_the_batch(pass.settings, decision.options) : decision.options);
+  Pipeline pipeline(pass.settings,
+                    by_batch ? options_of_on_board_run(pass.settings, decision.options) : decision.options);
   Recorder recorder;
-  Meter meter(progress, pass.gyro.size());
+  ProgressMeter meter(progress, pass.gyro.size());
   const auto on_board = [&] {
     replay(pass, pipeline, [&](const StepReport& report, const GyroSample& /*sample*/) {
       recorder.add(report, pipeline);
@@ -146,7 +147,7 @@ CalibrationRun calibrate(const Pass& pass, const CalibrationOptions& options, co
 NavigationRun navigate(const Pass& pass, const CalibrationOptions& options, const Progress& progress) {
   Pipeline pipeline(pass.settings, settled_before(pass.settings, options));
   NavigationRecorder recorder;
-  Meter meter(progress, pass.gyro.size());
+  ProgressMeter meter(progress, pass.gyro.size());
   replay(pass, pipeline, [&](const StepReport& report, const GyroSample& /*sample*/) {
     recorder.add(report, pipeline);
     meter.step(report);

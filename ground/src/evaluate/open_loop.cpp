@@ -61,13 +61,13 @@ class Readings {
 };
 
 /// A gyro flown with what is known of it.
-struct Flown {
+struct OpenLoopGyro {
   Gyro gyro;
   DriftModel drift;
 };
 
 struct Pair {
-  std::vector<Flown> gyros;
+  std::vector<OpenLoopGyro> gyros;
 
   [[nodiscard]] Result<AttitudeByDirections, DirectionsFault> attitude(const Directions& h_b) const {
     Directions h_in;

@@ -37,10 +37,9 @@ template <class To, class From>
 To with_room(const From& from, const Layout& layout) {
   To to;
   for (int k = 0; k < layout.gyros; ++k) {
+    static_cast<GyroReadout&>(to[k]) = from[k];
     to[k].h_in = from[k].h_in;
     to[k].drift_rad_s = from[k].drift_rad_s;
-    to[k].C_c_b = from[k].C_c_b;
-    to[k].readout_bias = from[k].readout_bias;
   }
   return to;
 }

@@ -1,13 +1,13 @@
 #pragma once
-/// Files, and directories of files, that appear whole or not at all.
+/// Files, and directories of files, that are written completely or not at all.
 
 #include <filesystem>
 #include <string_view>
 
 namespace trihedron::io {
 
-/// A file written under a temporary name beside its target and renamed onto it by commit(); without commit() nothing
-/// stays. A target that is not a regular file (a pipe, /dev/null) is written straight. Every failure throws
+/// A file written under a temporary name beside its target and renamed onto it by commit(); without commit() it is
+/// removed. A target that is not a regular file (a pipe, /dev/null) is written straight. Every failure throws
 /// MachineFailed.
 class AtomicFile {
  public:
@@ -21,7 +21,7 @@ class AtomicFile {
   /// The name to write under, for a library that opens the file itself; the target where that is written straight.
   [[nodiscard]] const std::filesystem::path& temporary() const { return temporary_; }
   void write(std::string_view content);
-  /// Brings the content to the disk, then renames. The object is done afterwards.
+  /// Brings the content to the disk, then renames. The object must not be used afterwards.
   void commit();
 
  private:

@@ -20,7 +20,8 @@ struct Place {
   double t_s = 0;           ///< as the file has it; NaN where it has none
 };
 
-/// One kind of dirt in one table, with its count and first places. Nothing is left out of a Pass without one.
+/// One kind of defect in one table, with its count and first places. Every row that is left out of a Pass is counted in
+/// one.
 struct Defect {
   enum class Kind {
     kMissingTime,      ///< left out

@@ -12,13 +12,13 @@
 
 namespace trihedron::report {
 
-/// What the attitude of a run is compared with, and how far off it was.
+/// Reference of the attitude evaluation, and the errors against it.
 struct Evaluation {
   std::string reference;  ///< in words, as in "the error against …": "the simulated truth", "the star tracker"
   ground::AttitudeErrors navigation;          ///< of CalibrationRun::navigation
   ground::AttitudeErrors attitude;            ///< of CalibrationRun::attitude
   std::vector<ground::OpenLoops> open_loops;  ///< from the run's corrections; may be empty
-  double limit_rad = 0;                       ///< that their intervals stand for
+  double limit_rad = 0;                       ///< error limit of the correction intervals
 };
 
 /// Refers to its parts; they must outlive it. Sections whose data are absent or empty are left out of the report.
