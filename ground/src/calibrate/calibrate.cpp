@@ -90,9 +90,12 @@ struct Smoothed {
   std::vector<DriftModelForecast> drift_models;
 };
 
-Smoothed smooth(const Pass& pass, const Decision& decision) {
-  const Screened screened = decision.screened ? *decision.screened : screen(pass, decision.options);
-  Refinement refinement(screened, pass_setup(pass.settings, decision.options), decision.options);
+/// `decision` keeps what was screened, which the result refers to.
+Smoothed smooth(const Pass& pass, Decision& decision) {
+  if (!decision.screened) {
+    decision.screened = screen(pass, decision.options);
+  }
+  Refinement refinement(*decision.screened, pass_setup(pass.settings, decision.options), decision.options);
   std::vector<DriftModelForecast> drift_models = flown(decision.forecasts, refinement.course());
   return {std::move(refinement), std::move(drift_models)};
 }
@@ -100,7 +103,7 @@ Smoothed smooth(const Pass& pass, const Decision& decision) {
 }  // namespace
 
 CalibrationRun calibrate(const Pass& pass, const CalibrationOptions& options, const Progress& progress) {
-  const Decision decision = decide(pass, options);
+  Decision decision = decide(pass, options);
   const bool by_batch = decision.options.estimator == Estimator::kBatch;
   std::future<Smoothed> smoothed;  // on a core of its own
   if (by_batch) {
