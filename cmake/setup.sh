@@ -4,8 +4,8 @@ set -euo pipefail
 
 packages=(
   build-essential cmake ninja-build git ca-certificates
-  libeigen3-dev libhdf5-dev libcli11-dev libtomlplusplus-dev libfmt-dev nlohmann-json3-dev libnetcdf-dev libfast-float-dev libsqlite3-dev
-  libboost-dev libboost-math-dev liberfa-dev pkg-config nodejs npm
+  libeigen3-dev libhdf5-dev libcli11-dev libtomlplusplus-dev libfmt-dev nlohmann-json3-dev libnetcdf-dev libfast-float-dev libsqlitecpp-dev
+  libtbb-dev libboost-dev libboost-math-dev liberfa-dev pkg-config nodejs npm
   libgtest-dev libgmock-dev librapidcheck-dev libbenchmark-dev
   gcovr chromium-headless-shell
   python3 python3-venv python3-pytest python3-xarray python3-h5netcdf

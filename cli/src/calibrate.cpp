@@ -27,7 +27,7 @@
 namespace trihedron::cli {
 namespace {
 
-/// A calibration of a pass, and how it went. Refers to its parts.
+/// A calibration of a pass with its evaluation. Holds references.
 struct Outcome {
   const io::NamedPass& pass;
   const CalibrationRun& run;
@@ -40,7 +40,7 @@ Outcome outcome_of(const io::NamedPass& pass, const CalibrationRun& run) {
 
 void write_outcome(const std::filesystem::path& out, const Outcome& outcome, const CalibrationOptions& options) {
   const Time epoch = outcome.run.calibration.epoch;
-  io::make_directory(out);
+  const io::MadeDirectory made(out);
   io::write_calibration(out / "calibration.json", outcome.run.calibration);
   io::write_attitude(out / "attitude.csv", epoch, outcome.run.attitude);
   if (outcome.run.definitive_attitude.size() > 0) {
@@ -121,11 +121,13 @@ ExitStatus calibrate_passes(const std::vector<std::string>& paths, const Calibra
   }
   const ground::SeveralPasses calibrated = calibrate_in_order(passes, options, common.quiet);
   const bool several = passes.size() > 1;
+  io::StagedDirectory staged(out);
   for (std::size_t i = 0; several && i < passes.size(); ++i) {
-    write_outcome(out / passes[i].name, outcome_of(passes[i], calibrated.passes()[i].run), options);
+    write_outcome(staged.path() / passes[i].name, outcome_of(passes[i], calibrated.passes()[i].run), options);
   }
   const Outcome outcome = outcome_of(passes.back(), calibrated.combined());
-  write_outcome(out, outcome, options);
+  write_outcome(staged.path(), outcome, options);
+  staged.commit();
   if (catalogue) {
     io::add_to_catalogue(*catalogue, calibrated.catalogue_entries());
   }

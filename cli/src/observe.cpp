@@ -133,7 +133,7 @@ void print(const nlohmann::ordered_json& json, const std::string& text, const Co
   }
 }
 
-/// Calls `work` and turns what it finds wrong into a refusal of this file.
+/// Calls `work` and reports its errors as errors of this input file.
 template <class Work>
 auto refusing(const std::string& path, const Work& work) {
   try {

@@ -88,6 +88,7 @@ void DriftModel::basis(const Eigen::Vector3d& h, double part_of_change, ColumnsV
       B.set_column(column++, part_of_change * eq1.col(i));
     }
   }
+  B.pad();
 }
 
 Eigen::Vector3d DriftModel::rate(const Eigen::Vector3d& h, double part_of_change, const double* coefficients) const {

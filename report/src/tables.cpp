@@ -327,7 +327,7 @@ ShownUnit shown_unit(Unit unit) {
   return {"_rad_s", 1e-9, "10⁻⁹ rad/s"};
 }
 
-/// The states beside alignment and drift.
+/// The states other than alignment and drift.
 json further_of(const ReportInput& input) {
   json rows = json::array();
   for (const FurtherEstimate& estimate : input.run.calibration.further) {

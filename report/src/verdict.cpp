@@ -75,7 +75,7 @@ json figure_of_merit(const std::string& name, const std::string& value, const st
   return {{"name", name}, {"value", value}, {"unit", unit}, {"note", note}};
 }
 
-/// Statistics per 90 min, without the rest of a stretch that the end of the pass cut short.
+/// Statistics per 90 min; an incomplete last interval is left out.
 std::vector<ground::ErrorStatistics> whole_stretches(const ground::AttitudeEvaluation& evaluation) {
   auto stretches = evaluation.stretches;
   while (stretches.size() > 1 && stretches.back().to - stretches.back().from < ground::kEvaluatedStretch / 2) {

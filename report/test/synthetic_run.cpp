@@ -204,8 +204,8 @@ class Generator {
       out_.run.attitude.sigma_rad.push_back(sigma_rad);
     }
     const auto evaluated = [&](ground::AttitudeErrors errors) {
-      return ground::summed_up(std::move(errors), ground::ReferenceKind::kTruth, out_.pass.settings.epoch,
-                               ground::kAttitudeLimit_rad);
+      return ground::summarised(std::move(errors), ground::ReferenceKind::kTruth, out_.pass.settings.epoch,
+                                ground::kAttitudeLimit_rad);
     };
     out_.evaluation.navigation = evaluated(std::move(navigation));
     out_.evaluation.attitude = evaluated(std::move(calibrating));

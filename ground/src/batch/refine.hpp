@@ -10,7 +10,7 @@
 
 namespace trihedron::ground {
 
-/// The whole pass by least squares, beside what the on-board step makes of it.
+/// The whole pass by least squares; its results replace those of the on-board step.
 class Refinement {
  public:
   /// Works it out. Refers to `screened`. Throws SetupError.

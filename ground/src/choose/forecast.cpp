@@ -15,7 +15,7 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
 constexpr std::size_t kParts = 6;
-/// Of them the first are not forecast: two in six have to show what the coefficients are.
+/// Parts at the beginning that are only fitted, not forecast.
 constexpr std::size_t kLearning = 2;
 
 /// What is known of the states of a smaller model: those that it does not have are zero.
@@ -142,9 +142,9 @@ std::vector<DriftModelForecast> flown(const std::vector<Forecast>& forecasts, co
         continue;
       }
       const auto at = static_cast<std::size_t>(from - times.begin());
-      const AttitudeErrors errors = attitude_errors(
-          fly_open_loop(pass, epochs.front(), records_of(forecast.fits[i], course, at), epochs), times,
-          course.attitude.q_in_c);
+      const AttitudeErrors errors =
+          attitude_errors(fly_open_loop(pass, epochs.front(), records_of(forecast.fits[i], course, at), epochs), times,
+                          course.attitude.q_in_c);
       for (const Eigen::Vector3d& error : errors.error_rad) {
         square += error.squaredNorm();
         ++count;

@@ -34,10 +34,10 @@ std::vector<DriftModelId> models_up_to(const DriftModelId& model) {
   return models;
 }
 
-/// Of the constants, in their sigmas: decisions need no more.
+/// Convergence limit of the constants in sigmas: enough for a decision.
 constexpr double kNearEnough = 0.2;
 
-/// What decisions need, in a fraction of the time: over some seconds the body turns by some degrees at most.
+/// Coarser steps, for speed: over some seconds the body turns by some degrees at most.
 PassSetup coarse(PassSetup setup) {
   setup.sample_step = std::chrono::seconds(3);
   setup.fixes_together = std::chrono::seconds(10);

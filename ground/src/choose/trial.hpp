@@ -1,5 +1,5 @@
 #pragma once
-/// What a pass says about a choice of states, in a fraction of the time of a calibration: what decisions are made by.
+/// A quick fit of a pass with one choice of states, by which the choices are compared.
 
 #include <Eigen/Core>
 #include <vector>
@@ -21,7 +21,7 @@ class Trial {
   void refit(const ProcessNoise& noise);
 
   [[nodiscard]] const PassProblem::Linear& linear() const { return found_.linear; }
-  /// `linear`: that of linear(), however its rows are put together.
+  /// `linear`: that of linear(), also after gather_constants().
   [[nodiscard]] double log_likelihood(const PassProblem::Linear& linear, const ProcessNoise& noise) const {
     return ground::log_likelihood(problem_, found_.before, linear, noise);
   }
@@ -31,7 +31,7 @@ class Trial {
   /// Of its drift model and those that it contains.
   [[nodiscard]] std::vector<Forecast> forecasts() const;
 
-  /// How the difference of the first star tracker from the gyros changes from fix to fix, about c x, y, z: all that is
+  /// Change of the difference between the first star tracker and the gyros from fix to fix, about c x, y, z: everything
   /// slow cancels.
   [[nodiscard]] std::vector<Eigen::Vector3d> changes_rad() const;
 

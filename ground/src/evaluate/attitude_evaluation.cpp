@@ -19,10 +19,10 @@ AttitudeEvaluation evaluate_against(const Reference& reference, const AttitudeHi
   for (Eigen::Vector3d& sigma : errors.sigma_rad) {
     sigma = (sigma.cwiseAbs2() + reference.sigma_rad.cwiseAbs2()).cwiseSqrt();
   }
-  return summed_up(std::move(errors), reference.kind, epoch, limit_rad);
+  return summarised(std::move(errors), reference.kind, epoch, limit_rad);
 }
 
-AttitudeEvaluation summed_up(AttitudeErrors errors, ReferenceKind reference, Time epoch, double limit_rad) {
+AttitudeEvaluation summarised(AttitudeErrors errors, ReferenceKind reference, Time epoch, double limit_rad) {
   AttitudeEvaluation result;
   result.reference = reference;
   result.errors = std::move(errors);

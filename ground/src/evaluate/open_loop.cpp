@@ -11,6 +11,7 @@
 #include "trihedron/core/setup.hpp"
 #include "trihedron/core/telemetry.hpp"
 #include "trihedron/ground/model/setup_error.hpp"
+#include "trihedron/records/stop.hpp"
 
 namespace trihedron::ground {
 namespace {
@@ -60,13 +61,13 @@ class Readings {
 };
 
 /// A gyro flown with what is known of it.
-struct Flown {
+struct OpenLoopGyro {
   Gyro gyro;
   DriftModel drift;
 };
 
 struct Pair {
-  std::vector<Flown> gyros;
+  std::vector<OpenLoopGyro> gyros;
 
   [[nodiscard]] Result<AttitudeByDirections, DirectionsFault> attitude(const Directions& h_b) const {
     Directions h_in;
@@ -105,6 +106,7 @@ AttitudeHistory fly_open_loop(const Pass& pass, Time t, const std::vector<GyroCa
   Time last_t = t;
   auto epoch = std::ranges::lower_bound(epochs, t);
   for (Time now = t; epoch != epochs.end(); now = std::min(now + kStep, *epoch)) {
+    check_stop();
     if (const std::optional<Directions> h_b = readings.at(now)) {
       Directions middle = *h_b;
       for (int k = 0; k < kPair && last; ++k) {

@@ -1,5 +1,5 @@
 #pragma once
-/// The best attitude that there is to compare with.
+/// The attitude that an estimate is compared with.
 
 #include <Eigen/Geometry>
 #include <vector>

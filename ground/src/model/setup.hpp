@@ -22,7 +22,7 @@ namespace trihedron::ground {
 
 [[nodiscard]] CorrectionPolicy policy_of(const CorrectionOptions& options);
 
-/// The components of the further states that a layout has and a calibration tells of, in the order of calibration.json.
+/// The components of the further states that a layout has and calibration.json lists, in its order.
 [[nodiscard]] std::vector<ParameterId> further_parameters(const Layout& layout);
 /// Where a component of a further state stands in the layout, which must have it, and its value.
 [[nodiscard]] int state_of(const Layout& layout, const ParameterId& parameter);

@@ -114,7 +114,7 @@ void add_angles(const PassProblem& problem, const ScreenedPass& pass, const Pass
     sample = std::lower_bound(sample, pass.samples.end(), moment.t,
                               [](const ScreenedPass::Sample& s, Time t) { return s.t < t; });
     if (moment.fix == nullptr && sample != pass.samples.end() && sample->used[0] && sample->used[1]) {
-      // It stands for those since the last one.
+      // One row represents all samples since the last one.
       const double samples = std::max(std::round(to_seconds(moment.t - before) / to_seconds(gyro_period)), 1.0);
       const AngleRow row = angle_row(problem, moment, sample->h_b);
       rows.emplace_back(row.by_states * (std::sqrt(samples) / (row.noise_factor * noise_rad)));
@@ -146,7 +146,7 @@ std::vector<std::size_t> ends_of_parts(std::size_t stages) {
   return ends;
 }
 
-/// What makes one linearisation of the pass.
+/// A pass linearised at its solution.
 struct Linearised {
   const PassProblem& problem;
   const BatchResult& found;

@@ -1,5 +1,5 @@
 #pragma once
-/// What of a pass can be used, as the smallest on-board layout finds it.
+/// Screening of a pass: its usable samples and fixes, by the on-board step with the smallest layout.
 
 #include <vector>
 
@@ -8,7 +8,7 @@
 
 namespace trihedron::ground {
 
-/// What the smallest layout makes of a pass, with values to start from.
+/// Samples and fixes that the on-board step accepted, and its estimates as starting values.
 struct Screened {
   ScreenedPass pass;
   std::vector<GyroCalibration> first;

@@ -162,6 +162,29 @@ TEST(SeveralPasses, KnowTheAlignmentInSteadyFlightByThePassWithSlews) {
   EXPECT_TRUE(verdict.trustworthy);
 }
 
+TEST(SeveralPasses, GoIntoACatalogueEachAloneAndTogether) {
+  SeveralPasses passes(told());
+  passes.add("first", two_hours().pass);
+  ASSERT_EQ(passes.catalogue_entries().size(), 1U);
+  EXPECT_EQ(passes.catalogue_entries()[0].passes, 1);
+  EXPECT_EQ(passes.catalogue_entries()[0].start_up, "");
+  Pass second = of_the_same_start_up().pass;
+  second.settings.start_up = "May";
+  passes.add("second", second);
+  const std::vector<CatalogueEntry> entries = passes.catalogue_entries();
+  ASSERT_EQ(entries.size(), 3U);
+  EXPECT_EQ(entries[1].pass, "second");
+  EXPECT_EQ(entries[1].passes, 1);
+  EXPECT_EQ(entries[1].calibration.covariance, passes.passes()[1].run.calibration.covariance);
+  EXPECT_EQ(entries[2].pass, "second");
+  EXPECT_EQ(entries[2].passes, 2);
+  EXPECT_EQ(entries[2].calibration.covariance, passes.combined().calibration.covariance);
+  for (const CatalogueEntry& entry : entries) {
+    EXPECT_EQ(entry.spacecraft, "Resurs-DK1");
+    EXPECT_EQ(entry.start_up, "May");
+  }
+}
+
 TEST(SeveralPasses, RefuseAPassThatDoesNotBelong) {
   const Pass& good = of_the_same_start_up().pass;
   Pass second = good;

@@ -14,6 +14,7 @@ namespace {
 
 using testing::Contains;
 using testing::ElementsAre;
+using testing::HasSubstr;
 using testing::IsEmpty;
 using testing::Not;
 
@@ -330,6 +331,38 @@ TEST(AlignmentObservability, PassesOverWhatIsNoRotation) {
   tracker.q_in_c[100].coeffs().setZero();
   tracker.q_in_c[101].coeffs().setConstant(std::nan(""));
   EXPECT_NEAR(alignment_observability(tracker, kNoise_rad, 1.45e-5).sigma_rad, clean, 1e-2 * clean);
+}
+
+TEST(Verdict, TellsOfGyroSamplesThatWereLeftOutBecauseTheyCameTooFast) {
+  auto run = good_run();
+  auto pass = good_pass();
+  pass.settings.gyro_period = std::chrono::milliseconds(20);
+  run.samples[SampleStatus::kUsed] = 2;
+  EXPECT_THAT(codes(judge(pass, run)), IsEmpty());
+  run.samples[SampleStatus::kThinned] = 1;
+  const Verdict verdict = judge(pass, run);
+  EXPECT_THAT(codes(verdict), ElementsAre("gyro-samples-thinned"));
+  EXPECT_TRUE(verdict.trustworthy);
+  EXPECT_EQ(verdict.findings[0].severity, FindingSeverity::kNote);
+  EXPECT_THAT(verdict.findings[0].text, HasSubstr("up to 13 samples per second are used"));
+  EXPECT_EQ(verdict.findings[0].evidence, "1 of 2 samples left out; sampled every 0.02 s");
+}
+
+TEST(Verdict, FindsGyroSamplesThatAreFarApart) {
+  auto pass = good_pass();
+  pass.settings.gyro_period = std::chrono::milliseconds(350);
+  EXPECT_THAT(codes(judge(pass, good_run())), IsEmpty());
+  pass.settings.gyro_period = std::chrono::milliseconds(351);
+  EXPECT_THAT(codes(judge(pass, good_run())), ElementsAre("gyro-samples-far-apart"));
+  pass.settings.gyro_period = std::chrono::seconds(1);
+  const Verdict verdict = judge(pass, good_run());
+  EXPECT_TRUE(verdict.trustworthy);
+  EXPECT_EQ(verdict.findings[0].severity, FindingSeverity::kWarning);
+  EXPECT_EQ(verdict.findings[0].evidence, "sampled every 1 s, so that a cubic is fitted over ±4 s instead of ±1.4 s");
+  EXPECT_EQ(verdict.findings[0].cure, "Sample the gyros every 0.35 s or more often.");
+  auto by_paper = good_run();
+  by_paper.options.estimator = Estimator::kPaper;
+  EXPECT_EQ(judge(pass, by_paper).findings[0].evidence, "interpolated between samples 1 s apart");
 }
 
 }  // namespace

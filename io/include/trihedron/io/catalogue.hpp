@@ -18,8 +18,8 @@ namespace trihedron::io {
 /// when it cannot be written.
 void add_to_catalogue(const std::filesystem::path& file, std::span<const CatalogueEntry> entries);
 
-/// Whether what is there, if anything, is a catalogue of this spacecraft: asked before there is something to add.
-/// Throws InputRefused as add_to_catalogue.
+/// Checks, before a long calculation, that the file is absent or a catalogue of this spacecraft. Throws InputRefused as
+/// add_to_catalogue.
 void expect_catalogue_of(const std::string& spacecraft, const std::filesystem::path& file);
 
 /// In the order of epoch, and then t and number of passes. Throws as add_to_catalogue, and InputRefused where there is

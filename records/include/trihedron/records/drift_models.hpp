@@ -17,9 +17,10 @@ struct DriftModelRow {
   int largest_degree;     ///< 0 where the model has none
 };
 
-inline constexpr std::array<DriftModelRow, 3> kDriftModels = {{{DriftModelId::Family::kEsg7, "esg7", 0},
-                                                               {DriftModelId::Family::kEsg20, "esg20", 0},
-                                                               {DriftModelId::Family::kVsh, "vsh:", DriftModelId::kMaxDegree}}};
+inline constexpr std::array<DriftModelRow, 3> kDriftModels = {
+    {{DriftModelId::Family::kEsg7, "esg7", 0},
+     {DriftModelId::Family::kEsg20, "esg20", 0},
+     {DriftModelId::Family::kVsh, "vsh:", DriftModelId::kMaxDegree}}};
 
 inline constexpr DriftModelId kLargestDriftModel = vsh(DriftModelId::kMaxDegree);
 
@@ -30,7 +31,7 @@ inline constexpr std::string_view kAutoDriftModel = "auto";
 [[nodiscard]] std::string name_of(const DriftModelId& model);
 /// Nothing for another name, or a degree that there is not.
 [[nodiscard]] std::optional<DriftModelId> drift_model_named(std::string_view name);
-/// For messages: "esg7, esg20, or vsh:1 … vsh:6, which are for estimator batch"
+/// For messages: "esg7, esg20, or vsh:1 … vsh:6"
 [[nodiscard]] std::string drift_model_choices();
 
 /// In the model's order, that of `drift_rad_s` in GyroCalibration; those of eq. (1) come first.

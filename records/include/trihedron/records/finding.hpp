@@ -20,6 +20,8 @@ enum class FindingCode : std::uint8_t {
   kStarTrackerOff,
   kGyroIsolated,
   kGyroStuck,
+  kGyroSamplesThinned,
+  kGyroSamplesFarApart,
   kNisOutOfBounds,
   kInnovationsNotWhite,
   kOrbitalLine,
@@ -58,7 +60,7 @@ struct FindingRow {
   std::string_view name;     ///< stable, for programs
   FindingSeverity severity;  ///< where the one who finds it does not say otherwise
 };
-inline constexpr std::array<FindingRow, 29> kFindings = {{
+inline constexpr std::array<FindingRow, 31> kFindings = {{
     {FindingCode::kTooFewFixes, "too-few-fixes", FindingSeverity::kDoNotUse},
     {FindingCode::kShortPass, "short-pass", FindingSeverity::kWarning},
     {FindingCode::kManyRejected, "many-rejected", FindingSeverity::kWarning},
@@ -67,6 +69,8 @@ inline constexpr std::array<FindingRow, 29> kFindings = {{
     {FindingCode::kStarTrackerOff, "star-tracker-off", FindingSeverity::kWarning},
     {FindingCode::kGyroIsolated, "gyro-isolated", FindingSeverity::kWarning},
     {FindingCode::kGyroStuck, "gyro-stuck", FindingSeverity::kWarning},
+    {FindingCode::kGyroSamplesThinned, "gyro-samples-thinned", FindingSeverity::kNote},
+    {FindingCode::kGyroSamplesFarApart, "gyro-samples-far-apart", FindingSeverity::kWarning},
     {FindingCode::kNisOutOfBounds, "nis-out-of-bounds", FindingSeverity::kWarning},
     {FindingCode::kInnovationsNotWhite, "innovations-not-white", FindingSeverity::kWarning},
     {FindingCode::kOrbitalLine, "orbital-line", FindingSeverity::kWarning},

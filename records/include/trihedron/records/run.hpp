@@ -1,5 +1,5 @@
 #pragma once
-/// Everything that was seen on the way when a pass was calibrated or navigated.
+/// Everything that a calibration or navigation of a pass records.
 
 #include <chrono>
 #include <optional>
@@ -47,7 +47,7 @@ struct Correction {
   std::vector<GyroCalibration> calibrated;    ///< as estimated until then
 };
 
-/// Something that a gyro did.
+/// A change of the state of a gyro.
 struct GyroEvent {
   Time t{};
   int gyro = 0;  ///< index

@@ -15,7 +15,7 @@ struct Statistics {
   long fixes_rejected_as_outliers = 0;
   /// In a run of 20 and more that were off, each by more than drift can make.
   long fixes_off_in_a_row = 0;
-  long reopened = 0;                       ///< how often the filter set the momenta free, or began anew
+  long reopened = 0;                       ///< how often the filter reopened the directions, or restarted
   long nis_count = 0;                      ///< fixes that the mean NIS is over
   double nis_degrees_of_freedom = 0;       ///< their mean
   std::optional<double> nis_mean;          ///< where there are any

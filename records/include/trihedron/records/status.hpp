@@ -76,7 +76,7 @@ class CountsByStatus {
 using SampleCounts = CountsByStatus<SampleStatus, kSampleStatusRows.size()>;
 
 struct FixCounts : CountsByStatus<FixStatus, kFixStatusRows.size()> {
-  long lost_to_clock = 0;  ///< that waited when the clock was set back: nobody knows their time
+  long lost_to_clock = 0;  ///< discarded because the clock was set back while they waited
 };
 
 struct NamedCount {

@@ -10,7 +10,7 @@
 
 namespace trihedron::ground {
 
-/// What stands for a start of the rotors: of its trustworthy calibrations that of most passes, and of these the latest.
+/// The calibration that represents a start-up: of the trustworthy ones that of most passes; of several such the latest.
 struct StartUp {
   std::string name;
   const Calibration* calibration = nullptr;  ///< of the catalogue, which must outlive it

@@ -1,5 +1,5 @@
 #pragma once
-/// An attitude measured against the best reference that a pass has.
+/// The errors of an attitude: against the truth where a pass has one, else against the star tracker.
 
 #include <chrono>
 #include <cstdint>
@@ -13,7 +13,7 @@
 
 namespace trihedron::ground {
 
-/// What an attitude is compared with: the truth where there is one, or else fixes of the first star tracker.
+/// The reference attitude: the truth where there is one, else fixes of the first star tracker.
 enum class ReferenceKind : std::uint8_t { kTruth, kStarTracker };
 
 /// "truth", "star tracker"
@@ -24,8 +24,8 @@ enum class ReferenceKind : std::uint8_t { kTruth, kStarTracker };
 /// Attitude error that ends a correction interval, unless the user says otherwise: 5′.
 inline constexpr double kAttitudeLimit_rad = 5 * kArcminute;
 
-/// Over stretches of this length from the epoch of the pass, the correction interval of the paper, errors are summed
-/// up.
+/// Length of the intervals, counted from the epoch of the pass, over which errors are summarised: the correction
+/// interval of the paper.
 inline constexpr Duration kEvaluatedStretch = std::chrono::minutes(90);
 
 /// Errors of an attitude against a reference. The sigmas are those of the difference: of the attitude and, where fixes
@@ -36,14 +36,14 @@ struct AttitudeEvaluation {
   ErrorStatistics whole;
   std::vector<ErrorStatistics> stretches;  ///< of kEvaluatedStretch
   double limit_rad = kAttitudeLimit_rad;
-  std::vector<CorrectionInterval> intervals;  ///< empty where the attitude does not tell its corrections
+  std::vector<CorrectionInterval> intervals;  ///< empty where the times of corrections are unknown
 };
 
-/// Sums up errors. `epoch`: of the pass.
-[[nodiscard]] AttitudeEvaluation summed_up(AttitudeErrors errors, ReferenceKind reference, Time epoch,
-                                           double limit_rad);
+/// Statistics and correction intervals of errors. `epoch`: of the pass.
+[[nodiscard]] AttitudeEvaluation summarised(AttitudeErrors errors, ReferenceKind reference, Time epoch,
+                                            double limit_rad);
 
-/// An attitude from wherever, against the truth, which may be null, or else against all fixes.
+/// An attitude of whatever origin, against the truth, which may be null, or else against all fixes.
 [[nodiscard]] AttitudeEvaluation evaluate_attitude(const Pass& pass, const AttitudeHistory& attitude,
                                                    const Truth* truth, double limit_rad = kAttitudeLimit_rad);
 

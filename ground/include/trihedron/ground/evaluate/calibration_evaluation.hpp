@@ -1,6 +1,6 @@
 #pragma once
-/// How a calibration went: its attitudes and parameters against the best reference that there is, when its parameters
-/// settled, and how long the attitude holds with them.
+/// Evaluation of a calibration: the errors of its attitudes and parameters, when its parameters settled, and how long
+/// the attitude stays within a limit without corrections.
 
 #include <Eigen/Core>
 #include <optional>
@@ -20,7 +20,7 @@ struct CalibrationEvaluation {
   std::vector<Convergence> convergence;   ///< by row of Calibration::states
   std::optional<Duration> drift_settled;  ///< as settled() has it
   std::optional<Duration> alignment_settled;
-  double limit_rad = kAttitudeLimit_rad;  ///< that the intervals stand for
+  double limit_rad = kAttitudeLimit_rad;  ///< error limit of the correction intervals
   std::vector<OpenLoops> open_loops;      ///< from each of the run's corrections
   IntervalExtension extension;            ///< by the open loops; the median from the second correction on
 };

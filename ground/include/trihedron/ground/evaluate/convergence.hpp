@@ -16,7 +16,7 @@ namespace trihedron::ground {
 
 struct Convergence {
   bool determined = false;  ///< otherwise there is nothing to settle to
-  bool followed = true;     ///< otherwise the on-board cycle, whose course this is, does not estimate it
+  bool followed = true;     ///< false where the on-board step, whose course this is, does not estimate it
   /// Since the pass epoch: after it the error stays within 3 final sigmas or 10 % of its first value, whichever is
   /// larger. Absent where it is outside at the end.
   std::optional<Duration> settled;

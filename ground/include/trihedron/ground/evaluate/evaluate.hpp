@@ -74,7 +74,8 @@ struct IntervalPair {
 /// Extension of the correction interval (the paper claims 3–5): the median over corrections.
 struct Extension {
   double factor = 0;
-  bool is_lower_bound = false;  ///< a correction that bears on the median outlasted the time it was watched
+  /// A correction that determines the median was still within the limit at the end of the data.
+  bool is_lower_bound = false;
 };
 /// Absent where no pair has one.
 [[nodiscard]] std::optional<Extension> median_extension(const std::vector<IntervalPair>& pairs);
