@@ -242,6 +242,17 @@ PerGyro<double> InvariantEstimator<kCapacity>::reading_noise(const Eigen::Matrix
 }
 
 template <Capacity kCapacity>
+Eigen::Matrix3d InvariantEstimator<kCapacity>::misalignment_of(const StarFix& fix,
+                                                               const FixBySharedStates& by_shared) const {
+  if (fix.head == 0) {
+    return Eigen::Matrix3d::Zero();  // its axes are c
+  }
+  Rows3 rows = Rows3::Zero(3, layout().size());
+  rows.rightCols(layout().shared_size()) = by_shared;
+  return covariance_of(rows);
+}
+
+template <Capacity kCapacity>
 void InvariantEstimator<kCapacity>::put_innovation(White& white) const {
   const int components = static_cast<int>(white.rows.rows());
   Compared through = white.rows;
@@ -331,8 +342,8 @@ namespace detail {
 }
 
 /// Two components for each gyro of the layout.
-inline void report_innovation(const Layout& layout, const FixComparison& comparison, const ComponentCovariance& covariance,
-                              FixReport& report) {
+inline void report_innovation(const Layout& layout, const FixComparison& comparison,
+                              const ComponentCovariance& covariance, FixReport& report) {
   const int size = 2 * layout.gyros;
   report.innovation.setZero(size);
   report.innovation_covariance.setZero(size, size);
@@ -379,8 +390,13 @@ FixReport InvariantEstimator<kCapacity>::correct(const StarFix& fix, const FixRe
     return report;
   }
   update_to_now(by_gyros.value().C_in_c.raw());
-  const Eigen::Matrix3d C_linear = fused_attitude(by_gyros.value(), C_in_c, R_c, readings);
-  const PerGyro<double> noise_rad = reading_noise(C_linear, readings.noise_factor, 1);
+  const Eigen::Matrix3d misalignment = misalignment_of(fix, by_shared);
+  const Eigen::Matrix3d C_linear = fused_attitude(by_gyros.value(), C_in_c, R_c + misalignment, readings);
+  PerGyro<double> noise_rad = reading_noise(C_linear, readings.noise_factor, 1);
+  // Of the second order, and not normal: three times its sigma costs nothing but the weight of the first such fix.
+  for (double& its : noise_rad) {
+    its = std::hypot(its, 3 * second_order_rad(misalignment, misalignment));
+  }
   const FixComparison comparison =
       compare(layout(), gyros_, C_in_c.raw(), C_linear, readings.h_b, readings.used, by_shared);
   White white = whitened(comparison, R_c, noise_rad);
@@ -399,9 +415,8 @@ FixReport InvariantEstimator<kCapacity>::correct(const StarFix& fix, const FixRe
       if (is_fault(report.nis, misfit_rad, count(readings.used))) {
         const Eigen::Matrix3d& C_by_gyros = by_gyros.value().C_in_c.raw();
         const PerGyro<double> angle_noise_rad = reading_noise(C_by_gyros, readings.noise_factor, 1);
-        const FixComparison angles =
-            compare(layout(), gyros_, C_by_gyros, C_by_gyros, readings.h_b, readings.used,
-                    FixBySharedStates::Zero(3, layout().shared_size()));
+        const FixComparison angles = compare(layout(), gyros_, C_by_gyros, C_by_gyros, readings.h_b, readings.used,
+                                             FixBySharedStates::Zero(3, layout().shared_size()));
         const int freedom = angles.components() - 3;
         if (!(angles_of(angles, angle_noise_rad).nis <= gate_of_freedom(freedom, setup_.gate_nis))) {
           report.odd_gyro = odd_gyro(comparison, [&](const FixComparison& rest) {
@@ -452,9 +467,8 @@ AngleReport InvariantEstimator<kCapacity>::check_angles(Time t, const FixReading
   const Eigen::Matrix3d& C_in_c = by_gyros.value().C_in_c.raw();
   update_to_now(C_in_c);
   const PerGyro<double> noise_rad = reading_noise(C_in_c, readings.noise_factor, ++angles_since_fix_);
-  const FixComparison comparison =
-      compare(layout(), gyros_, C_in_c, C_in_c, readings.h_b, readings.used,
-              FixBySharedStates::Zero(3, layout().shared_size()));
+  const FixComparison comparison = compare(layout(), gyros_, C_in_c, C_in_c, readings.h_b, readings.used,
+                                           FixBySharedStates::Zero(3, layout().shared_size()));
   const White white = angles_of(comparison, noise_rad);
   report.nis = white.nis;
   if (!(white.nis <= gate_of_freedom(comparison.components() - 3, setup_.gate_nis))) {
@@ -481,8 +495,7 @@ void InvariantEstimator<kCapacity>::update(const Compared& white, double root_we
   const Layout& layout = setup_.layout;
   for (int k = 0; k < layout.gyros; ++k) {
     Gyro& gyro = gyros_[k];
-    gyro.h_in =
-        rotated<double>(gyro.h_in, Eigen::Vector3d(x.template segment<3>(layout.direction(k)))).normalized();
+    gyro.h_in = rotated<double>(gyro.h_in, Eigen::Vector3d(x.template segment<3>(layout.direction(k)))).normalized();
     if (layout.further.wandering_drift) {
       gyro.drift_rad_s.template segment<3>(layout.wandering_column()) += x.template segment<3>(layout.wandering(k));
     }

@@ -99,8 +99,8 @@ class InvariantEstimator {
   using Compared = ComparedRows<kMaxStates>;
   /// A comparison as rows about the states, and how its innovation lies in what is expected of it.
   struct White {
-    Compared rows;           ///< (H, y), unit white noise
-    ComponentCovariance L;   ///< y of the comparison itself is L times that of the rows
+    Compared rows;                   ///< (H, y), unit white noise
+    ComponentCovariance L;           ///< y of the comparison itself is L times that of the rows
     ComponentCovariance covariance;  ///< of y in `rows`: 1 + H P Hᵀ
     double nis = 0;
   };
@@ -126,6 +126,9 @@ class InvariantEstimator {
   [[nodiscard]] PerGyro<double> readout_noise(double noise_factor) const;
   /// The same with what the linear model leaves out, here for the n-th time in a row.
   [[nodiscard]] PerGyro<double> reading_noise(const Eigen::Matrix3d& C_linear, double noise_factor, int n) const;
+  /// Covariance of what is not known of the error of a further star tracker's fix, noise apart: its first fix finds its
+  /// alignment, and until then it is no attitude to linearise at.
+  [[nodiscard]] Eigen::Matrix3d misalignment_of(const StarFix& fix, const FixBySharedStates& by_shared) const;
   [[nodiscard]] White whitened(const FixComparison& comparison, const Eigen::Matrix3d& R_c,
                                const PerGyro<double>& noise_rad) const;
   /// What is left of a comparison, with the noise of the readings alone, when the attitude is eliminated.
