@@ -130,6 +130,7 @@ inline constexpr std::array<FurtherStateKind, kFurtherStateCount> kFurtherStateK
      &Layout::wandering, 0},
 }};
 
+/// Its row in the table.
 [[nodiscard]] constexpr const FurtherStateKind& kind_of(FurtherState state) {
   return kFurtherStateKinds[static_cast<std::size_t>(state)];
 }

@@ -35,6 +35,7 @@ struct GyroComparison {
   Eigen::Matrix<double, 2, Eigen::Dynamic, 0, 2, GyroReadout::kMaxErrors> by_readout;
 };
 
+/// A fix compared with the momenta, gyro by gyro.
 struct FixComparison {
   GyroMask used{};
   PerGyro<GyroComparison> gyros;
@@ -80,8 +81,10 @@ template <class Gyros>
   return comparison;
 }
 
-/// Covariance of the noise of a comparison: the fix's error is common to all components, each readout's to its own two.
+/// Covariance of the components of a comparison.
 using ComponentCovariance = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, kMaxComponents, kMaxComponents>;
+/// Of the noise of a comparison: the fix's error is common to all components, each readout's to its own two. R_c:
+/// covariance of the fix, c axes, rad²; readout_noise_rad: of the readings that it is compared with.
 [[nodiscard]] ComponentCovariance noise_of(const FixComparison& comparison, const Eigen::Matrix3d& R_c,
                                            const PerGyro<double>& readout_noise_rad);
 
