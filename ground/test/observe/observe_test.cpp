@@ -99,10 +99,10 @@ TEST(Observability, IsThatOfTheDenseProblem) {
   CalibrationOptions options = told();
   options.direction_random_walk_rad_sqrt_s = 0;
   const Screened screened = screen(pass, options);
-  const PassProblem problem(screened.pass, setup_of(pass, options));
+  const PassProblem problem(screened.pass, pass_setup(pass.settings, options));
   const PassProblem::Linear linear = problem.linearise(first_solution(problem, screened));
   const Eigen::Index n = linear.prior.cols();
-  const Eigen::Index d = problem.setup().layout.dynamic();
+  const Eigen::Index d = problem.layout().dynamic();
   Eigen::MatrixXd by_first = Eigen::MatrixXd::Identity(n, n);  // of the states of an arc
   Eigen::MatrixXd information = Eigen::MatrixXd::Zero(n, n);
   for (std::size_t arc = 0; arc < linear.stages.size(); ++arc) {
@@ -214,14 +214,14 @@ TEST(AngleRow, IsTheDerivativeOfZ1) {
   options.further_states[FurtherState::kWanderingDrift] = options.further_states[FurtherState::kReadoutBias] =
       FurtherStateOptions::Choice::kOn;
   const Screened screened = screen(pass, options);
-  const PassProblem problem(screened.pass, setup_of(pass, options));
-  const PassLayout& layout = problem.setup().layout;
+  const PassProblem problem(screened.pass, pass_setup(pass.settings, options));
+  const Layout& layout = problem.layout();
   const PassSolution solution = first_solution(problem, screened);
   const ScreenedPass::Sample& last = screened.pass.samples.back();
   const auto row_at = [&](const PassSolution& at) {
     AngleRow row;
     problem.go_along(at, [&](const PassProblem::Moment& moment) {
-      row = moment.t == last.t ? angle_row(layout, at, moment, last.h_b) : row;
+      row = moment.t == last.t ? angle_row(problem, moment, last.h_b) : row;
     });
     return row;
   };
