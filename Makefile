@@ -11,7 +11,7 @@ help:
 	@echo 'make demo     install what is missing, build, repeat the experiment of the paper, say where the report is'
 	@echo 'make test     build and run all tests'
 	@echo 'make build    leaves the program at $(BUILD)/trihedron'
-	@echo 'make bench    measure: steps of the cycle, reading, writing and simulating a pass'
+	@echo 'make bench    measure: the on-board step, reading, writing and simulating a pass'
 	@echo 'make validation  measure again what docs/validation.md tells'
 	@echo 'make consistency  measure again what docs/consistency.md tells: hours; goes on where it was interrupted'
 	@echo 'make docs     reference of the interfaces and all documents as web pages: out/docs/html/index.html'
