@@ -63,12 +63,11 @@ std::string combinations_text(const Observability& observability) {
   bool said_unobservable = false;
   bool said_weak = false;
   for (const ground::Combination& combination : observability.weak) {
-    const bool unobservable = combination.singular_value < Observability::kUnobservable;
-    bool& said = unobservable ? said_unobservable : said_weak;
+    bool& said = combination.is_unobservable ? said_unobservable : said_weak;
     if (!said) {
       fmt::format_to(out, "\n{}: known from the data alone by less than {:.0f} times what was known before\n",
-                     unobservable ? "Unobservable" : "Weak",
-                     unobservable ? Observability::kUnobservable : Observability::kWeak);
+                     combination.is_unobservable ? "Unobservable" : "Weak",
+                     combination.is_unobservable ? Observability::kUnobservable : Observability::kWeak);
       said = true;
     }
     fmt::format_to(out, "  {:>8.3g} times, attitude {:>8}   {}\n", combination.singular_value,
@@ -118,7 +117,7 @@ nlohmann::ordered_json observability_json(const Observability& observability, Ti
     json["combinations"].push_back({{"text", combination.text},
                                     {"singular_value", combination.singular_value},
                                     {"attitude_error_rad", combination.attitude_error_rad},
-                                    {"unobservable", combination.singular_value < Observability::kUnobservable},
+                                    {"unobservable", combination.is_unobservable},
                                     {"harmful", combination.is_harmful}});
   }
   return json;

@@ -137,10 +137,10 @@ void add_findings(SQLite::Database& database, std::int64_t row, const Verdict& v
   }
 }
 
-void add_entry(SQLite::Database& database, const CatalogueEntry& entry) {
+void add_entry(SQLite::Database& database, const CatalogueEntry& entry, const std::string& start_up) {
   const Calibration& calibration = entry.calibration;
   SQLite::Statement insert(database, "INSERT OR REPLACE INTO calibration VALUES (NULL, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)");
-  SQLite::bind(insert, entry.spacecraft, entry.pass, entry.start_up, entry.passes, format_epoch(calibration.epoch),
+  SQLite::bind(insert, entry.spacecraft, entry.pass, start_up, entry.passes, format_epoch(calibration.epoch),
                to_seconds(calibration.t - calibration.epoch), std::string(name_of(calibration.estimator)),
                name_of(calibration.gyros.front().drift_model), calibration.verdict.trustworthy ? 1 : 0,
                format_calibration(calibration));
@@ -177,7 +177,8 @@ void add_to_catalogue(const fs::path& file, std::span<const CatalogueEntry> entr
     check_catalogue(database, file);
     for (const CatalogueEntry& entry : entries) {
       check_spacecraft(database, file, entry.spacecraft);
-      add_entry(database, entry);
+      add_entry(database, entry,
+                entry.start_up.empty() ? format_epoch(entries.front().calibration.epoch) : entry.start_up);
     }
     transaction.commit();
   });

@@ -280,6 +280,16 @@ std::optional<Truth> read_truth(const fs::path& path) {
   return fs::is_directory(path) ? read_truth_directory(path) : read_truth_netcdf(path);
 }
 
+PassFormat format_for(const Scenario& scenario) {
+  PassFormat format;
+  double step = scenario.gyros.front().readout.quantum_rad;
+  for (const GyroScenario& gyro : scenario.gyros) {
+    step = std::min(step, gyro.readout.quantum_rad);
+  }
+  format.direction_step = std::max(step, format.direction_step);
+  return format;
+}
+
 void write_pass(const fs::path& path, const Pass& pass, const Truth* truth, const PassFormat& format) {
   if (is_netcdf_name(path)) {
     write_netcdf(path, pass, truth, format);

@@ -3,6 +3,9 @@
 #include <SQLiteCpp/SQLiteCpp.h>
 #include <gmock/gmock.h>
 
+#include <chrono>
+#include <vector>
+
 #include "fixtures.hpp"
 #include "trihedron/io/calibration.hpp"
 
@@ -48,6 +51,17 @@ TEST_F(Catalogue, GivesBackWhatWasAdded) {
   EXPECT_EQ(entries[0].passes, 1);
   EXPECT_EQ(format_calibration(entries[0].calibration), format_calibration(sample_calibration()));
   EXPECT_THAT(directory_.names(), ElementsAre("catalogue.db"));
+}
+
+TEST_F(Catalogue, NamesAStartUpThatHasNoNameByTheEpochOfItsFirstPass) {
+  std::vector<CatalogueEntry> entries = {sample_entry("first"), sample_entry("second", 2)};
+  for (CatalogueEntry& entry : entries) {
+    entry.start_up.clear();
+  }
+  entries[1].calibration.epoch += std::chrono::hours(9);
+  entries[1].calibration.t += std::chrono::hours(9);
+  add_to_catalogue(file_, entries);
+  EXPECT_THAT(read_catalogue(file_), testing::Each(testing::Field(&CatalogueEntry::start_up, "2009-05-20T00:00:00")));
 }
 
 TEST_F(Catalogue, AnswersQuestionsOfOtherPrograms) {

@@ -46,9 +46,9 @@ class Figures {
     };
     put("parameters", parameters());
     put("corrections", corrections());
-    if (input_.evaluation) {
-      put("navigation", errors(input_.evaluation->navigation, kArcminute_rad));
-      put("attitude", errors(input_.evaluation->attitude, kArcsecond_rad));
+    if (input_.evaluation != nullptr) {
+      put("navigation", errors(input_.evaluation->navigation.errors, kArcminute_rad));
+      put("attitude", errors(input_.evaluation->attitude.errors, kArcsecond_rad));
       put("open_loops", open_loops());
     }
     put("innovations", innovations());

@@ -196,9 +196,10 @@ void add_combinations(const MatrixXd& scaled_root, const BodyRotation& rotation,
       const VectorXd direction = columns.col(i);
       const double s = (scaled_root * direction).norm();
       const double error_rad = std::sqrt(direction.dot(scaled_metric * direction) / (1 + s * s));
+      const bool is_unobservable = s < Observability::kUnobservable;
       result.weak.push_back({blocks.in_words(direction, result.prior_sigma, rotation), blocks.named(direction),
-                             blocks.is_alignment(direction), s, error_rad,
-                             s < Observability::kUnobservable && error_rad > tolerable_rad});
+                             blocks.is_alignment(direction), s, error_rad, is_unobservable,
+                             is_unobservable && error_rad > tolerable_rad});
     }
     std::sort(result.weak.begin() + begin, result.weak.end(),
               [](const Combination& a, const Combination& b) { return a.attitude_error_rad > b.attitude_error_rad; });

@@ -13,8 +13,9 @@
 namespace trihedron::io {
 
 /// Adds all or none; makes the catalogue where there is none. A calibration of the same epoch, t, estimator, drift
-/// model and number of passes is replaced. Throws InputRefused for a file that is no catalogue, a damaged or newer one,
-/// or one of another spacecraft; MachineFailed when it cannot be written.
+/// model and number of passes is replaced. A start-up without a name gets that of the epoch of the first entry. Throws
+/// InputRefused for a file that is no catalogue, a damaged or newer one, or one of another spacecraft; MachineFailed
+/// when it cannot be written.
 void add_to_catalogue(const std::filesystem::path& file, std::span<const CatalogueEntry> entries);
 
 /// Checks, before a long calculation, that the file is absent or a catalogue of this spacecraft. Throws InputRefused as

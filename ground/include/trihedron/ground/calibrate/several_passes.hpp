@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "trihedron/ground/judge/agreement.hpp"
+#include "trihedron/records/catalogue.hpp"
 #include "trihedron/records/progress.hpp"
 #include "trihedron/records/run.hpp"
 
@@ -38,6 +39,8 @@ class SeveralPasses {
   [[nodiscard]] const CalibrationRun& combined() const { return combined_; }
   /// That the passes name; empty where none does.
   [[nodiscard]] const std::string& start_up() const { return start_up_; }
+  /// For a catalogue: each pass alone, and where there are several the last one from all those before.
+  [[nodiscard]] std::vector<CatalogueEntry> catalogue_entries() const;
 
  private:
   void combine(const Pass& pass, const CalibrationOptions& options, const Progress& progress);

@@ -27,6 +27,7 @@ struct Combination {
   bool is_alignment = false;      ///< nothing else takes part with a tenth of the square
   double singular_value = 0;      ///< prior sigma over that by the measurements alone
   double attitude_error_rad = 0;  ///< what it adds to Observability::attitude_error_rad, rms
+  bool is_unobservable = false;   ///< below Observability::kUnobservable
   /// Unobservable, and its part of the attitude error is more than the mission can bear.
   bool is_harmful = false;
 };
