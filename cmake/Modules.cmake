@@ -4,10 +4,11 @@
 #
 # trihedron_module(<name> [SOURCES …] [MODULES …] [LIBRARIES …] [PRIVATE_LIBRARIES …])
 #   makes the target trihedron_<name> with the alias trihedron::<name>; MODULES must be allowed by the table below.
-# trihedron_test(<module> <file.cpp>… [LIBRARIES …] [LONG <Suite.Name>…])
+# trihedron_test(<module> <file.cpp>… [LIBRARIES …] [LONG <Suite.Name>…] [SAMPLE_PASSES <Suite.Name>…])
 #   makes the Google Test program <module>_test, linked with the module if there is one of that name, and registers its tests as
 #   <module>.<Suite>.<Name>; those that match LONG (with * and ?) get the label `long`: they fly many times for a statistic, take no
-#   path of their own, and are left out under the sanitizers, where they would take an hour.
+#   path of their own, and are left out under the sanitizers, where they would take an hour. Those that match SAMPLE_PASSES are long
+#   as well, and CTest makes the passes of validation/passes before them.
 # trihedron_pytest(<name> <file.py>)
 #   registers the tests of a Python file as one test; they find the build directory in TRIHEDRON_BUILD. Those marked `long` are
 #   left out under the sanitizers as well.
@@ -60,7 +61,7 @@ function(trihedron_test module)
   if(NOT TRIHEDRON_BUILD_TESTS)
     return()
   endif()
-  cmake_parse_arguments(arg "" "" "LIBRARIES;LONG" ${ARGN})
+  cmake_parse_arguments(arg "" "" "LIBRARIES;LONG;SAMPLE_PASSES" ${ARGN})
   add_executable(${module}_test ${arg_UNPARSED_ARGUMENTS})
   if(TARGET trihedron::${module})
     target_link_libraries(${module}_test PRIVATE trihedron::${module})
@@ -72,9 +73,15 @@ function(trihedron_test module)
   target_compile_options(${module}_test PRIVATE $<$<CONFIG:Release>:-O1>)
   set(discovery TEST_PREFIX ${module}. DISCOVERY_TIMEOUT 60)
   string(JOIN ":" long ${arg_LONG})
-  gtest_discover_tests(${module}_test ${discovery} TEST_FILTER "-${long}" PROPERTIES TIMEOUT 300)
+  string(JOIN ":" on_passes ${arg_SAMPLE_PASSES})
+  gtest_discover_tests(${module}_test ${discovery} TEST_FILTER "-${long}:${on_passes}" PROPERTIES TIMEOUT 300)
   if(arg_LONG)
     gtest_discover_tests(${module}_test ${discovery} TEST_FILTER "${long}" TEST_LIST ${module}_long_tests PROPERTIES TIMEOUT 300 LABELS long)
+  endif()
+  if(arg_SAMPLE_PASSES)
+    target_link_libraries(${module}_test PRIVATE trihedron_sample_passes)
+    gtest_discover_tests(${module}_test ${discovery} TEST_FILTER "${on_passes}" TEST_LIST ${module}_tests_on_passes
+      PROPERTIES TIMEOUT 300 LABELS long FIXTURES_REQUIRED sample_passes)
   endif()
 endfunction()
 

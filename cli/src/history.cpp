@@ -26,16 +26,18 @@ using Catalogue = std::vector<CatalogueEntry>;
 
 constexpr double kMicroradian = 1e-6;
 
-struct Unit {
+struct ShownUnit {
   double value = kMicroradian;
   double sigma = kMicroradian;
 };
 
 /// Drift in 1e-6 rad/s; alignment in ′, its sigma in ″.
-Unit unit_of(const std::string& state) { return StateName(state).is_alignment ? Unit{kArcminute, kArcsecond} : Unit{}; }
+ShownUnit unit_of(const ParameterId& state) {
+  return state.is_alignment() ? ShownUnit{kArcminute, kArcsecond} : ShownUnit{};
+}
 
-/// With the decimals of two digits of sigma.
-std::string estimate_text(double value, double sigma, const Unit& unit) {
+/// Rounded so that sigma shows two significant digits.
+std::string estimate_text(double value, double sigma, const ShownUnit& unit) {
   const auto decimals = [](double shown) {
     return shown > 0 ? std::clamp(1 - static_cast<int>(std::floor(std::log10(shown))), 0, 9) : 3;
   };
@@ -50,28 +52,27 @@ std::string calibrations_text(const Catalogue& catalogue) {
     const CatalogueEntry& entry = catalogue[i];
     const Calibration& calibration = entry.calibration;
     fmt::format_to(std::back_inserter(text), "  {:>3}  {:<19}  {:<19}  {:<16} {:>6}  {:<10} {:<6} {}\n", i + 1,
-                   io::format_epoch(calibration.epoch), entry.start_up, entry.pass, entry.passes, calibration.estimator,
-                   calibration.gyros.front().drift_model,
+                   io::format_epoch(calibration.epoch), entry.start_up, entry.pass, entry.passes,
+                   name_of(calibration.estimator), name_of(calibration.gyros.front().drift_model),
                    calibration.verdict.trustworthy ? "trustworthy" : "DO NOT USE");
   }
   return text;
 }
 
 /// One row per calibration.
-std::string states_text(const Catalogue& catalogue, const std::string& title, const std::vector<std::string>& states) {
+std::string states_text(const Catalogue& catalogue, const std::string& title, const std::vector<ParameterId>& states) {
   std::string text = "\n" + title + "\n    #";
   auto out = std::back_inserter(text);
-  for (const std::string& state : states) {
-    fmt::format_to(out, " {:>17}", StateName(state).parameter);
+  for (const ParameterId& state : states) {
+    fmt::format_to(out, " {:>17}", short_name_of(state));
   }
   for (std::size_t i = 0; i < catalogue.size(); ++i) {
     const Calibration& calibration = catalogue[i].calibration;
     fmt::format_to(out, "\n  {:>3}", i + 1);
-    for (const std::string& state : states) {
-      const double sigma = ground::sigma_of(calibration, state);
-      fmt::format_to(
-          out, " {:>17}",
-          std::isnan(sigma) ? "" : estimate_text(ground::value_of(calibration, state), sigma, unit_of(state)));
+    for (const ParameterId& state : states) {
+      const double sigma = sigma_of(calibration, state);
+      fmt::format_to(out, " {:>17}",
+                     std::isnan(sigma) ? "" : estimate_text(value_of(calibration, state), sigma, unit_of(state)));
     }
   }
   return text + "\n";
@@ -82,11 +83,9 @@ std::string gyro_text(const Catalogue& catalogue, std::size_t gyro) {
   constexpr std::size_t kColumns = 7;
   std::string text;
   for (const bool alignments : {false, true}) {
-    std::vector<std::string> states = ground::states_of(catalogue);
-    std::erase_if(states, [&](const std::string& state) {
-      const StateName name(state);
-      return name.gyro != gyro || name.is_alignment != alignments;
-    });
+    std::vector<ParameterId> states = ground::states_of(catalogue);
+    std::erase_if(states,
+                  [&](const ParameterId& state) { return state.gyro() != gyro || state.is_alignment() != alignments; });
     for (std::size_t from = 0; from < states.size(); from += kColumns) {
       const std::size_t to = std::min(from + kColumns, states.size());
       text += states_text(
@@ -107,10 +106,10 @@ std::string changes_text(const ground::History& history) {
                    change.to, change.coefficients.holds() ? "the same" : "changed", change.coefficients.text(),
                    change.alignments.holds() ? "the same" : "CHANGED", change.alignments.text());
     for (const ground::ParameterChange& parameter : change.parameters) {
-      const Unit unit = unit_of(parameter.state);
-      fmt::format_to(out, "  {:<14} {:>20} {:<10} {:>+9.1f} σ\n", parameter.state,
+      const ShownUnit unit = unit_of(parameter.state);
+      fmt::format_to(out, "  {:<14} {:>20} {:<10} {:>+9.1f} σ\n", name_of(parameter.state),
                      estimate_text(parameter.change, parameter.sigma, {unit.sigma, unit.sigma}),
-                     StateName(parameter.state).is_alignment ? "″" : "1e-6 rad/s", parameter.change / parameter.sigma);
+                     parameter.state.is_alignment() ? "″" : "1e-6 rad/s", parameter.change / parameter.sigma);
     }
   }
   return text;
@@ -124,10 +123,10 @@ std::string spreads_text(const ground::History& history) {
       fmt::format("\nSpread over {} start-ups, and what is known before the next\n  {:<14} {:>14} {:>14} {:>14}\n",
                   history.start_ups.size(), "", "mean", "spread 1σ", "next 1σ");
   for (const ground::Spread& spread : history.spreads) {
-    const Unit unit = unit_of(spread.state);
-    fmt::format_to(std::back_inserter(text), "  {:<14} {:>+14.4f} {:>14.4f} {:>14.4f}  {}\n", spread.state,
+    const ShownUnit unit = unit_of(spread.state);
+    fmt::format_to(std::back_inserter(text), "  {:<14} {:>+14.4f} {:>14.4f} {:>14.4f}  {}\n", name_of(spread.state),
                    spread.mean / unit.value, spread.deviation / unit.sigma, spread.next_sigma / unit.sigma,
-                   StateName(spread.state).is_alignment ? "′, 1σ in ″" : "1e-6 rad/s");
+                   spread.state.is_alignment() ? "′, 1σ in ″" : "1e-6 rad/s");
   }
   return text;
 }
@@ -169,7 +168,7 @@ nlohmann::ordered_json history_json(const Catalogue& catalogue, const ground::Hi
   for (const ground::StartUpChange& change : history.changes) {
     nlohmann::ordered_json parameters;
     for (const ground::ParameterChange& parameter : change.parameters) {
-      parameters[parameter.state] = {{"change", parameter.change}, {"sigma", parameter.sigma}};
+      parameters[name_of(parameter.state)] = {{"change", parameter.change}, {"sigma", parameter.sigma}};
     }
     json["changes"].push_back({{"from", change.from},
                                {"to", change.to},
@@ -178,7 +177,7 @@ nlohmann::ordered_json history_json(const Catalogue& catalogue, const ground::Hi
                                {"parameters", parameters}});
   }
   for (const ground::Spread& spread : history.spreads) {
-    json["spreads"].push_back({{"state", spread.state},
+    json["spreads"].push_back({{"state", name_of(spread.state)},
                                {"start_ups", spread.start_ups},
                                {"mean", spread.mean},
                                {"deviation", spread.deviation},

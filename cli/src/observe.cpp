@@ -28,10 +28,8 @@ namespace {
 
 using ground::Observability;
 
-bool is_alignment(const std::string& parameter) { return parameter.find(".align_") != std::string::npos; }
-
-std::string sigma_text(const std::string& parameter, double sigma) {
-  return is_alignment(parameter) ? angle_text(sigma) : fmt::format("{:.1e}", sigma);
+std::string sigma_text(const ParameterId& parameter, double sigma) {
+  return parameter.is_alignment() ? angle_text(sigma) : fmt::format("{:.1e}", sigma);
 }
 
 /// Rows: sigma of each parameter before the pass, after parts of it, after all.
@@ -45,11 +43,11 @@ std::string sigmas_text(const Observability& observability, Time epoch) {
   }
   text += observability.angle_gain.size() > 0 ? "   z1 adds\n" : "\n";
   for (std::size_t i = 0; i < observability.parameters.size(); ++i) {
-    const std::string& name = observability.parameters[i];
+    const ParameterId& parameter = observability.parameters[i];
     const auto row = static_cast<Eigen::Index>(i);
-    fmt::format_to(out, "  {:<22} {:>11}", name, sigma_text(name, observability.prior_sigma(row)));
+    fmt::format_to(out, "  {:<22} {:>11}", name_of(parameter), sigma_text(parameter, observability.prior_sigma(row)));
     for (const std::size_t time : shown) {
-      fmt::format_to(out, "   {:>10}", sigma_text(name, observability.sigma_until[time](row)));
+      fmt::format_to(out, "   {:>10}", sigma_text(parameter, observability.sigma_until[time](row)));
     }
     if (observability.angle_gain.size() > 0) {
       fmt::format_to(out, "   {:>6.2f}×", observability.angle_gain(row));
@@ -65,12 +63,11 @@ std::string combinations_text(const Observability& observability) {
   bool said_unobservable = false;
   bool said_weak = false;
   for (const ground::Combination& combination : observability.weak) {
-    const bool unobservable = combination.singular_value < Observability::kUnobservable;
-    bool& said = unobservable ? said_unobservable : said_weak;
+    bool& said = combination.is_unobservable ? said_unobservable : said_weak;
     if (!said) {
       fmt::format_to(out, "\n{}: known from the data alone by less than {:.0f} times what was known before\n",
-                     unobservable ? "Unobservable" : "Weak",
-                     unobservable ? Observability::kUnobservable : Observability::kWeak);
+                     combination.is_unobservable ? "Unobservable" : "Weak",
+                     combination.is_unobservable ? Observability::kUnobservable : Observability::kWeak);
       said = true;
     }
     fmt::format_to(out, "  {:>8.3g} times, attitude {:>8}   {}\n", combination.singular_value,
@@ -104,7 +101,7 @@ nlohmann::ordered_json observability_json(const Observability& observability, Ti
   }
   for (std::size_t i = 0; i < observability.parameters.size(); ++i) {
     const auto row = static_cast<Eigen::Index>(i);
-    nlohmann::ordered_json parameter = {{"name", observability.parameters[i]},
+    nlohmann::ordered_json parameter = {{"name", name_of(observability.parameters[i])},
                                         {"prior_sigma", observability.prior_sigma(row)},
                                         {"sigma", observability.sigma(row)}};
     for (const Eigen::VectorXd& sigma : observability.sigma_until) {
@@ -120,7 +117,7 @@ nlohmann::ordered_json observability_json(const Observability& observability, Ti
     json["combinations"].push_back({{"text", combination.text},
                                     {"singular_value", combination.singular_value},
                                     {"attitude_error_rad", combination.attitude_error_rad},
-                                    {"unobservable", combination.singular_value < Observability::kUnobservable},
+                                    {"unobservable", combination.is_unobservable},
                                     {"harmful", combination.is_harmful}});
   }
   return json;
@@ -136,7 +133,7 @@ void print(const nlohmann::ordered_json& json, const std::string& text, const Co
   }
 }
 
-/// Calls `work` and turns what it finds wrong into a refusal of this file.
+/// Calls `work` and reports its errors as errors of this input file.
 template <class Work>
 auto refusing(const std::string& path, const Work& work) {
   try {

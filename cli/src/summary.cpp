@@ -3,21 +3,15 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
-#include <Eigen/Geometry>
-#include <chrono>
 #include <cmath>
 #include <iterator>
 
-#include "trihedron/core/frames.hpp"
 #include "trihedron/ground/judge/verdict.hpp"
-#include "trihedron/io/error.hpp"
 #include "trihedron/io/time_text.hpp"
 #include "trihedron/records/scenario.hpp"
 
 namespace trihedron::cli {
 namespace {
-
-constexpr Duration kStretch = std::chrono::minutes(90);
 
 double minutes(Duration d) { return to_seconds(d) / 60; }
 
@@ -25,7 +19,7 @@ nlohmann::ordered_json axes_json(const Eigen::Vector3d& rad) {
   return {{"roll_rad", rad.x()}, {"pitch_rad", rad.y()}, {"heading_rad", rad.z()}};
 }
 
-nlohmann::ordered_json statistics_json(const ground::ErrorStatistics& s, Time epoch) {
+nlohmann::ordered_json errors_json(const ground::ErrorStatistics& s, Time epoch) {
   nlohmann::ordered_json json = {
       {"from_s", to_seconds(s.from - epoch)}, {"to_s", to_seconds(s.to - epoch)}, {"epochs", s.count},
       {"rms", axes_json(s.rms_rad)},          {"max", axes_json(s.max_rad)},      {"max_total_rad", s.max_total_rad}};
@@ -49,35 +43,6 @@ std::string angle_text(double rad) {
                                           : fmt::format("{:.2f}′", rad / kArcminute);
 }
 
-std::optional<Truth> read_truth_of(const std::filesystem::path& path, const Pass& pass) {
-  std::optional<Truth> truth = io::read_truth(path);
-  if (truth && truth->gyros.size() != static_cast<std::size_t>(pass.gyro.gyros)) {
-    throw io::InputRefused(
-        path, {}, fmt::format("the truth has {} gyros, the telemetry {}", truth->gyros.size(), pass.gyro.gyros),
-        "give the truth of this pass, or none");
-  }
-  return truth;
-}
-
-Reference reference_of(const std::optional<Truth>& truth, const StarTrackerTelemetry& fixes, const Pass& pass) {
-  return truth ? Reference{"truth", truth->t, truth->q_in_c, Eigen::Vector3d::Zero()}
-               : Reference{"star tracker", fixes.t, fixes.q_in_c, pass.settings.star_tracker_noise_rad};
-}
-
-Evaluation evaluate(const AttitudeHistory& attitude, const Reference& reference, Time epoch, double limit_rad) {
-  Evaluation result;
-  result.reference = reference.name;
-  result.errors = ground::attitude_errors(attitude, reference.t, reference.q_in_c);
-  for (Eigen::Vector3d& sigma : result.errors.sigma_rad) {
-    sigma = (sigma.cwiseAbs2() + reference.sigma_rad.cwiseAbs2()).cwiseSqrt();
-  }
-  result.whole = ground::statistics(result.errors);
-  result.stretches = ground::statistics_by_stretch(result.errors, epoch, kStretch);
-  result.limit_rad = limit_rad;
-  result.intervals = ground::correction_intervals(result.errors, limit_rad);
-  return result;
-}
-
 std::string pass_text(const io::LoadedPass& loaded) {
   const PassSettings& settings = loaded.pass.settings;
   std::string text;
@@ -98,7 +63,7 @@ std::string pass_text(const io::LoadedPass& loaded) {
 }
 
 std::string finding_text(const Finding& finding) {
-  return fmt::format("  {:<20}{}\n{:22}{}\n{:22}→ {}\n", finding.code, finding.text, "", finding.evidence, "",
+  return fmt::format("  {:<20}{}\n{:22}{}\n{:22}→ {}\n", name_of(finding.code), finding.text, "", finding.evidence, "",
                      finding.cure);
 }
 
@@ -110,87 +75,77 @@ std::string verdict_text(const Verdict& verdict) {
   return text;
 }
 
-std::string calibration_text(const CalibrationRun& run, const std::optional<Truth>& truth) {
+std::string calibration_text(const CalibrationRun& run, const Eigen::VectorXd& estimate_minus_truth) {
   std::string text;
   auto out = std::back_inserter(text);
   const Calibration& calibration = run.calibration;
+  const bool has_truth = estimate_minus_truth.size() > 0;
   Eigen::Index state = 0;
   for (std::size_t k = 0; k < calibration.gyros.size(); ++k) {
     const GyroCalibration& gyro = calibration.gyros[k];
-    fmt::format_to(out, "\nGyro {}      {:>18} {:>12}{}\n", k + 1, "value", "1σ", truth ? "         error" : "");
-    const auto sigma = [&] { return std::sqrt(calibration.covariance(state, state)); };
+    fmt::format_to(out, "\nGyro {}      {:>18} {:>12}{}\n", k + 1, "value", "1σ", has_truth ? "   est. − true" : "");
+    const auto sigma = [&] { return sigma_of(calibration, calibration.states[static_cast<std::size_t>(state)]); };
+    const std::vector<std::string> names = coefficient_names(gyro.drift_model);
     for (std::size_t i = 0; i < gyro.drift_rad_s.size(); ++i, ++state) {
-      const auto& [name, value] = gyro.drift_rad_s[i];
-      fmt::format_to(out, "  {:<8} {:>+13.4e} rad/s {:>12.1e}", name, value, sigma());
-      if (const auto true_value = truth ? truth->gyros[k].drift(name) : std::nullopt) {
-        fmt::format_to(out, " {:>+13.1e}", *true_value - value);
+      fmt::format_to(out, "  {:<8} {:>+13.4e} rad/s {:>12.1e}", names[i], gyro.drift_rad_s[i], sigma());
+      if (has_truth && std::isfinite(estimate_minus_truth(state))) {
+        fmt::format_to(out, " {:>+13.1e}", estimate_minus_truth(state));
       }
       text += '\n';
     }
     const Eigen::Vector3d lambda = gyro.alignment_rotation_vector_rad;
-    Eigen::Vector3d error = Eigen::Vector3d::Zero();
-    if (truth) {
-      // C_c_b(true) = exp([δ×]) C_c_b(est)
-      error = (Rot<C, B<1>>::exp(Vec<C>::assume(truth->gyros[k].alignment_rotation_vector_rad)) *
-               Rot<C, B<1>>::exp(Vec<C>::assume(lambda)).inverse())
-                  .log()
-                  .raw();
-    }
     for (int axis = 0; axis < 3; ++axis, ++state) {
       fmt::format_to(out, "  align_{:<2} {:>+13.4f} ′     {:>11.2f}″", std::string(1, "xyz"[axis]),
                      lambda(axis) / kArcminute, sigma() / kArcsecond);
-      if (truth) {
-        fmt::format_to(out, " {:>+12.2f}″", error(axis) / kArcsecond);
+      if (has_truth) {
+        fmt::format_to(out, " {:>+12.2f}″", estimate_minus_truth(state) / kArcsecond);
       }
       text += '\n';
     }
   }
-  const auto statistic = [&](const std::string& name) {
-    const auto found = calibration.statistics.find(name);
-    return found == calibration.statistics.end() ? std::nan("") : found->second;
-  };
+  const Statistics& statistics = calibration.statistics;
   for (const FurtherEstimate& estimate : calibration.further) {
     fmt::format_to(out, "{}  {:<24} {:>+13.4e} {:>12.1e}\n",
-                   &estimate == calibration.further.data() ? "\nFurther states\n" : "", estimate.name, estimate.value,
-                   estimate.sigma);
+                   &estimate == calibration.further.data() ? "\nFurther states\n" : "", name_of(estimate.parameter),
+                   estimate.value, estimate.sigma);
   }
   for (const Evidence& evidence : run.evidence) {
     fmt::format_to(out, "{}  {:<24} ln Bayes factor {:>+9.1f}: {}\n",
-                   &evidence == run.evidence.data() ? "\nEvidence\n" : "", evidence.states, evidence.log_bayes_factor,
+                   &evidence == run.evidence.data() ? "\nEvidence\n" : "", evidence.key(), evidence.log_bayes_factor,
                    evidence.accepted ? "estimated" : "taken as zero");
   }
   for (const DriftModelForecast& model : run.drift_models) {
     fmt::format_to(out, "{}  {:<8} {:>4} coefficients, forecast error {:>9}, ln likelihood {:>+10.1f}{}\n",
                    &model == run.drift_models.data() ? "\nDrift models, by forecasts of the rest of the pass\n" : "",
-                   model.drift_model, model.coefficients, angle_text(model.open_loop_rms_rad), model.log_likelihood,
-                   model.drift_model == calibration.gyros[0].drift_model ? ", used" : "");
+                   name_of(model.drift_model), model.drift_model.size(), angle_text(model.open_loop_rms_rad),
+                   model.log_likelihood, model.drift_model == calibration.gyros[0].drift_model ? ", used" : "");
   }
   text += "\nFixes      ";
-  for (const auto& [name, count] : run.fix_counts) {
-    fmt::format_to(out, " {} {};", count, name);
+  for (const NamedCount& its : named_counts(run.fix_counts)) {
+    fmt::format_to(out, " {} {};", its.count, its.name);
   }
   text.back() = '\n';
   text += "Samples    ";
-  for (const auto& [name, count] : run.samples) {
-    fmt::format_to(out, " {} {};", count, name);
+  for (const NamedCount& its : named_counts(run.samples)) {
+    fmt::format_to(out, " {} {};", its.count, its.name);
   }
   text.back() = '\n';
   if (!run.gyro_events.empty()) {
     fmt::format_to(out, "Gyros       {}\n", fmt::join(ground::texts_of(run.gyro_events, calibration.epoch), "; "));
   }
-  if (const double looks = statistic("angle_looks"); looks > 0) {
-    fmt::format_to(out, "Angles      between the momenta taken {:.0f} times, where no fix could be used\n", looks);
+  if (const long looks = statistics.angle_looks.value_or(0); looks > 0) {
+    fmt::format_to(out, "Angles      between the momenta taken {} times, where no fix could be used\n", looks);
   }
   fmt::format_to(out, "Residuals   rms");
-  for (std::size_t i = 1; i <= 2 * calibration.gyros.size(); ++i) {
-    fmt::format_to(out, " {:.2f}″", statistic(fmt::format("innovation_{}_rms_rad", i)) / kArcsecond);
+  for (const double rms_rad : statistics.innovation_rms_rad) {
+    fmt::format_to(out, " {:.2f}″", rms_rad / kArcsecond);
   }
-  fmt::format_to(out, "; mean NIS {:.3f} ({:.0f} expected)\n", statistic("nis_mean"),
-                 statistic("nis_degrees_of_freedom"));
+  fmt::format_to(out, "; mean NIS {:.3f} ({:.0f} expected)\n", statistics.nis_mean.value_or(std::nan("")),
+                 statistics.nis_degrees_of_freedom);
   fmt::format_to(out, "Noise       random walk of each momentum {:.1e} rad/√s, {}",
                  run.options.direction_random_walk_rad_sqrt_s, run.options.find_noise ? "the most likely" : "as given");
   const FurtherStateOptions& states = run.options.further_states;
-  if (states.wandering_drift == FurtherStateOptions::Choice::kOn) {
+  if (states.is_on(FurtherState::kWanderingDrift)) {
     fmt::format_to(out, "; drift that wanders by {:.1e} rad/s over {:.0f} min", states.wandering_drift_rad_s,
                    to_seconds(states.wandering_time) / 60);
   }
@@ -207,25 +162,24 @@ std::string extension_text(const std::optional<ground::Extension>& extension) {
                    : "none measured";
 }
 
-std::string course_text(const CalibrationRun& run, const Course& course) {
-  const auto settled = [&](bool alignments) {
-    const auto time = ground::settled(run, course.convergence, alignments);
+std::string course_text(const CalibrationRun& run, const ground::CalibrationEvaluation& evaluation) {
+  const auto settled = [](const std::optional<Duration>& time) {
     return time ? fmt::format("after {:.0f} min", minutes(*time)) : "not yet";
   };
   std::string text = fmt::format("Settled     alignment {}, drift coefficients {} (the paper: 90, 200–300)\n",
-                                 settled(true), settled(false));
-  if (course.open_loops.empty()) {
+                                 settled(evaluation.alignment_settled), settled(evaluation.drift_settled));
+  if (evaluation.extension.pairs.empty()) {
     return text;
   }
   auto out = std::back_inserter(text);
   fmt::format_to(out, "\nOpen loop until the error passes {}, from a correction with\n  {:>13} {:>14} {:>14} {:>12}\n",
-                 angle_text(course.limit_rad), "at, min", "known before", "calibrated", "extended");
+                 angle_text(evaluation.limit_rad), "at, min", "known before", "calibrated", "extended");
   const auto interval = [](const ground::CorrectionInterval& i) {
     return i.passed ? fmt::format("{:.1f} min", minutes(*i.passed)) : fmt::format("> {:.0f} min", minutes(i.observed));
   };
-  for (const ground::OpenLoops& loops : course.open_loops) {
-    const auto& [before, after] = loops.intervals;
-    const auto factor = loops.intervals.extension();
+  for (const ground::IntervalPair& pair : evaluation.extension.pairs) {
+    const auto& [before, after] = pair;
+    const auto factor = pair.extension();
     if (after.observed > Duration::zero()) {
       fmt::format_to(out, "  {:>13.0f} {:>14} {:>14} {:>12}\n", minutes(after.corrected - run.calibration.epoch),
                      interval(before), interval(after),
@@ -233,13 +187,14 @@ std::string course_text(const CalibrationRun& run, const Course& course) {
     }
   }
   fmt::format_to(out, "  correction interval extended {} (the paper: 3–5)\n",
-                 extension_text(ground::median_extension(course.open_loops)));
+                 extension_text(evaluation.extension.median));
   return text;
 }
 
-std::string evaluation_text(const Evaluation& evaluation, Time epoch, const std::string& title) {
-  std::string text = fmt::format("{} against the {}{}\n", title, evaluation.reference,
-                                 evaluation.reference == "truth" ? "" : ", whose errors are in the figures");
+std::string evaluation_text(const ground::AttitudeEvaluation& evaluation, Time epoch, const std::string& title) {
+  std::string text =
+      fmt::format("{} against the {}{}\n", title, name_of(evaluation.reference),
+                  evaluation.reference == ground::ReferenceKind::kTruth ? "" : ", whose errors are in the figures");
   auto out = std::back_inserter(text);
   if (evaluation.errors.t.empty()) {
     return text + "  no common epochs\n";
@@ -308,6 +263,14 @@ nlohmann::ordered_json passes_json(const std::vector<ground::PassAlone>& passes)
   return json;
 }
 
+nlohmann::ordered_json statistics_json(const Statistics& statistics) {
+  nlohmann::ordered_json json = nlohmann::ordered_json::object();
+  for (const auto& [name, value] : named_values(statistics)) {
+    json[name] = value;
+  }
+  return json;
+}
+
 nlohmann::ordered_json pass_json(const io::LoadedPass& loaded) {
   const PassSettings& settings = loaded.pass.settings;
   nlohmann::ordered_json json = {
@@ -330,8 +293,10 @@ nlohmann::ordered_json pass_json(const io::LoadedPass& loaded) {
 nlohmann::ordered_json findings_json(const std::vector<Finding>& findings) {
   nlohmann::ordered_json json = nlohmann::ordered_json::array();
   for (const Finding& finding : findings) {
-    json.push_back(
-        {{"code", finding.code}, {"text", finding.text}, {"evidence", finding.evidence}, {"cure", finding.cure}});
+    json.push_back({{"code", name_of(finding.code)},
+                    {"text", finding.text},
+                    {"evidence", finding.evidence},
+                    {"cure", finding.cure}});
   }
   return json;
 }
@@ -340,63 +305,57 @@ nlohmann::ordered_json verdict_json(const Verdict& verdict) {
   return {{"trustworthy", verdict.trustworthy}, {"findings", findings_json(verdict.findings)}};
 }
 
-nlohmann::ordered_json extension_json(const std::vector<ground::IntervalPair>& pairs,
-                                      const std::optional<ground::Extension>& median, Time epoch) {
+nlohmann::ordered_json extension_json(const ground::IntervalExtension& extension, Time epoch) {
   nlohmann::ordered_json json = {{"corrections", nlohmann::ordered_json::array()}, {"factor", nullptr}};
-  for (const ground::IntervalPair& pair : pairs) {
+  for (const ground::IntervalPair& pair : extension.pairs) {
     json["corrections"].push_back({{"t_s", to_seconds(pair.calibrated.corrected - epoch)},
                                    {"known_before", interval_json(pair.known_before)},
                                    {"calibrated", interval_json(pair.calibrated)}});
   }
-  if (median) {
-    json["factor"] = median->factor;
-    json["is_lower_bound"] = median->is_lower_bound;
+  if (extension.median) {
+    json["factor"] = extension.median->factor;
+    json["is_lower_bound"] = extension.median->is_lower_bound;
   }
   return json;
 }
 
-nlohmann::ordered_json course_json(const CalibrationRun& run, const Course& course) {
+nlohmann::ordered_json course_json(const CalibrationRun& run, const ground::CalibrationEvaluation& evaluation) {
   const auto seconds = [](const std::optional<Duration>& time) {
     return time ? nlohmann::ordered_json(to_seconds(*time)) : nlohmann::ordered_json(nullptr);
   };
   nlohmann::ordered_json states;
-  for (std::size_t i = 0; i < course.convergence.size(); ++i) {
-    states[run.calibration.states[i]] = {{"determined", course.convergence[i].determined},
-                                         {"settled_s", seconds(course.convergence[i].settled)}};
-  }
-  std::vector<ground::IntervalPair> pairs;
-  for (const ground::OpenLoops& loops : course.open_loops) {
-    pairs.push_back(loops.intervals);
+  for (std::size_t i = 0; i < evaluation.convergence.size(); ++i) {
+    states[name_of(run.calibration.states[i])] = {{"determined", evaluation.convergence[i].determined},
+                                                  {"settled_s", seconds(evaluation.convergence[i].settled)}};
   }
   nlohmann::ordered_json models = nlohmann::ordered_json::array();
   for (const DriftModelForecast& model : run.drift_models) {
-    models.push_back({{"drift_model", model.drift_model},
-                      {"coefficients", model.coefficients},
+    models.push_back({{"drift_model", name_of(model.drift_model)},
+                      {"coefficients", model.drift_model.size()},
                       {"log_likelihood", model.log_likelihood},
                       {"open_loop_rms_rad", model.open_loop_rms_rad}});
   }
   nlohmann::ordered_json evidence = nlohmann::ordered_json::array();
   for (const Evidence& its : run.evidence) {
-    evidence.push_back(
-        {{"states", its.states}, {"log_bayes_factor", its.log_bayes_factor}, {"accepted", its.accepted}});
+    evidence.push_back({{"states", its.key()}, {"log_bayes_factor", its.log_bayes_factor}, {"accepted", its.accepted}});
   }
   return {{"evidence", evidence},
           {"drift_models", models},
           {"convergence",
-           {{"alignment_s", seconds(ground::settled(run, course.convergence, true))},
-            {"drift_s", seconds(ground::settled(run, course.convergence, false))},
+           {{"alignment_s", seconds(evaluation.alignment_settled)},
+            {"drift_s", seconds(evaluation.drift_settled)},
             {"states", states}}},
-          {"extension", extension_json(pairs, ground::median_extension(course.open_loops), run.calibration.epoch)}};
+          {"extension", extension_json(evaluation.extension, run.calibration.epoch)}};
 }
 
-nlohmann::ordered_json evaluation_json(const Evaluation& evaluation, Time epoch) {
-  nlohmann::ordered_json json = {{"reference", evaluation.reference},
-                                 {"whole", statistics_json(evaluation.whole, epoch)},
+nlohmann::ordered_json evaluation_json(const ground::AttitudeEvaluation& evaluation, Time epoch) {
+  nlohmann::ordered_json json = {{"reference", name_of(evaluation.reference)},
+                                 {"whole", errors_json(evaluation.whole, epoch)},
                                  {"per_90_min", nlohmann::ordered_json::array()},
                                  {"limit_rad", evaluation.limit_rad},
                                  {"corrections", nlohmann::ordered_json::array()}};
   for (const auto& s : evaluation.stretches) {
-    json["per_90_min"].push_back(statistics_json(s, epoch));
+    json["per_90_min"].push_back(errors_json(s, epoch));
   }
   for (const auto& interval : evaluation.intervals) {
     nlohmann::ordered_json item = {{"t_s", to_seconds(interval.corrected - epoch)}};

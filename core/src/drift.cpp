@@ -37,7 +37,7 @@ DriftModel::DriftModel(DriftModelId id, const FurtherStates& further)
   if (id.family == DriftModelId::Family::kEsg20) {  // W before D
     add_degrees(1, max_degree, Member::kW);
     add_degrees(1, max_degree, Member::kD);
-    add(Member::kCubeD, 4, 0);
+    add(Member::kCubeD, 0, 0);
   } else {  // degree by degree
     for (int degree = 1; degree <= max_degree; ++degree) {
       add_degrees(degree, degree, Member::kW);

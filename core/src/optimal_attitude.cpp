@@ -6,7 +6,7 @@
 namespace trihedron {
 namespace {
 
-/// Axes on two directions that treat both alike: their normal, the middle between them, and across it.
+/// Axes on two directions in which both have equal weight: their normal, the bisector, and the third.
 Result<Eigen::Matrix3d, DirectionsFault> bisecting_axes(const Eigen::Vector3d& h1, const Eigen::Vector3d& h2) {
   const Eigen::Vector3d normal = h1.cross(h2);
   const double area_square = normal.squaredNorm();
@@ -24,11 +24,12 @@ Result<Eigen::Matrix3d, DirectionsFault> bisecting_axes(const Eigen::Vector3d& h
   return axes;
 }
 
-/// Of those used, the two that stand best: where two count alike, their axes are the solution.
+/// Two of the directions; the solution for two is exact.
 struct Pair {
   int first = 0;
   int second = 1;
 };
+/// Of those used, the two nearest to a right angle.
 Pair best_pair(const Directions& h_in, const GyroMask& used) {
   Pair best;
   double largest = -1;
@@ -43,6 +44,7 @@ Pair best_pair(const Directions& h_in, const GyroMask& used) {
   }
   return best;
 }
+/// The first two of those used.
 Pair the_two(const GyroMask& used) {
   Pair two{kMaxGyros, kMaxGyros};
   for (int k = kMaxGyros - 1; k >= 0; --k) {
@@ -67,8 +69,8 @@ Eigen::Matrix3d sum_across(const Directions& h_c, const GyroMask& used) {
   return sum;
 }
 
-/// From a solution for two of the directions to that for all by Gauss–Newton: each step leaves as much of what was left
-/// before as the directions disagree.
+/// From the solution for two of the directions to that for all by Gauss–Newton. Each step multiplies the remaining
+/// error by about the size of the disagreement of the directions.
 Rot<In, C> refined(Rot<In, C> C_in_c, const Directions& h_in, const Directions& h_c, const GyroMask& used) {
   const Eigen::Matrix3d inverse = sum_across(h_c, used).inverse();
   constexpr double kRounding = 1e-15;

@@ -177,7 +177,7 @@ FixReport PaperEstimator::correct(const StarFix& fix, const FixReadings& reading
       report.status = FixStatus::kUsed;
       break;
     case FixStatus::kRestarted:
-      // Information gathered about a far wrong estimate: linearise anew about the present one.
+      // The information was gathered about estimates that are far off: linearise again about the present ones.
       information_ = prior_;
       report.weight = 1;
       break;

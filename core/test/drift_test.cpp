@@ -40,7 +40,7 @@ Coefficients differences(int first, const Eigen::Vector3d& a) {
 
 const Eigen::Vector3d kA(0.7, -1.3, 0.4);
 
-// The structure of eq. (1): mathematics, "Drift model". Tolerances are some roundings of numbers near one.
+// The structure of eq. (1): docs/mathematics.md, section 3. Tolerances are some roundings of numbers near one.
 RC_GTEST_PROP(Esg7Identity, K0IsTheGradientOfTheFourthPowers, ()) {
   const Eigen::Vector3d h = *directions();
   const Eigen::Vector3d gradient = h.array().cube();

@@ -4,6 +4,7 @@
 #include <Eigen/Cholesky>
 
 #include "trihedron/core/frames.hpp"
+#include "trihedron/ground/evaluate/evaluate.hpp"
 #include "trihedron/records/calibration.hpp"
 #include "trihedron/records/options.hpp"
 #include "trihedron/sim/simulate.hpp"
@@ -29,37 +30,21 @@ inline const sim::SimulatedPass& two_hours() {
 /// Nothing left to decide, which takes runs of its own.
 inline CalibrationOptions told() {
   CalibrationOptions options;
-  options.drift_model = "esg7";
+  options.drift_model = kEsg7;
   options.find_noise = false;
   options.further_states = FurtherStateOptions::none();
   return options;
 }
 
-/// δ, rad, c axes.
-inline Eigen::Vector3d alignment_error(const Truth::Gyro& truth, const GyroCalibration& estimate) {
-  return (Rot<C, B<1>>::exp(Vec<C>::assume(truth.alignment_rotation_vector_rad)) *
-          Rot<C, B<1>>::exp(Vec<C>::assume(estimate.alignment_rotation_vector_rad)).inverse())
-      .log()
-      .raw();
-}
-
-/// Parameters' errors, in the order of Calibration::states.
-inline Eigen::VectorXd errors_of(const Truth& truth, const Calibration& calibration) {
-  Eigen::VectorXd errors(calibration.covariance.rows());
-  const auto per_gyro = errors.size() / static_cast<Eigen::Index>(calibration.gyros.size());
-  for (std::size_t k = 0; k < calibration.gyros.size(); ++k) {
-    auto own = errors.segment(static_cast<Eigen::Index>(k) * per_gyro, per_gyro);
-    for (std::size_t i = 0; i < calibration.gyros[k].drift_rad_s.size(); ++i) {
-      own(static_cast<Eigen::Index>(i)) =
-          truth.gyros[k].drift_rad_s[i].second - calibration.gyros[k].drift_rad_s[i].second;
-    }
-    own.tail<3>() = alignment_error(truth.gyros[k], calibration.gyros[k]);
-  }
-  return errors;
+/// That of one gyro in estimate_minus_truth(): δ, rad, c axes.
+inline Eigen::Vector3d alignment_error(const Calibration& calibration, const Truth& truth, std::size_t gyro) {
+  const Eigen::VectorXd errors = estimate_minus_truth(calibration, truth);
+  return errors(rows_of(calibration, {ParameterId::alignment(gyro, 0), ParameterId::alignment(gyro, 1),
+                                      ParameterId::alignment(gyro, 2)}));
 }
 
 inline double nees_of(const Truth& truth, const Calibration& calibration) {
-  const Eigen::VectorXd errors = errors_of(truth, calibration);
+  const Eigen::VectorXd errors = estimate_minus_truth(calibration, truth);
   return errors.dot(calibration.covariance.llt().solve(errors));
 }
 

@@ -2,10 +2,12 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <system_error>
 #include <utility>
 
 #include "csv.hpp"
+#include "input_formats.hpp"
 #include "netcdf_file.hpp"
 #include "pass_toml.hpp"
 #include "screening.hpp"
@@ -13,6 +15,7 @@
 #include "trihedron/io/atomic_file.hpp"
 #include "trihedron/io/calibration.hpp"
 #include "trihedron/io/time_text.hpp"
+#include "trihedron/records/stop.hpp"
 #include "truth.hpp"
 
 namespace trihedron::io {
@@ -55,27 +58,7 @@ void check_there(const fs::path& path) {
   }
 }
 
-/// Settings and tables as the format holds them, before any judgement.
-struct RawPass {
-  PassSettings settings;
-  Series gyro;
-  std::vector<Series> star_trackers;  ///< the first head, then the further ones
-};
-
 int gyros_of(const Series& gyro) { return static_cast<int>(gyro.columns.size() / 3); }
-
-RawPass read_raw_directory(const fs::path& directory) {
-  const fs::path settings_file = directory / kSettingsFile;
-  const TextFile settings(settings_file);
-  Series gyro = read_csv(directory / kGyroFile, gyro_columns);
-  RawPass raw;
-  raw.settings = parse_pass_toml(settings.text(), settings_file, directory, gyros_of(gyro));
-  raw.gyro = std::move(gyro);
-  for (std::size_t head = 0; head <= raw.settings.further_star_trackers.size(); ++head) {
-    raw.star_trackers.push_back(read_csv(directory / (star_tracker_name(head) + ".csv"), star_tracker_columns));
-  }
-  return raw;
-}
 
 std::string required_attribute(const NetcdfReader& reader, const fs::path& file, const char* group, const char* name) {
   std::optional<std::string> text = reader.text_attribute(group, name);
@@ -86,30 +69,13 @@ std::string required_attribute(const NetcdfReader& reader, const fs::path& file,
   return *std::move(text);
 }
 
-RawPass read_raw_netcdf(const fs::path& file) {
-  const NetcdfReader reader(file);
-  const std::string settings_text = required_attribute(reader, file, "", kSettingsAttribute);
-  const Time epoch = parse_pass_epoch(settings_text, inside(file, kSettingsAttribute));
-  RawPass raw;
-  raw.gyro = reader.read_group(kGyroGroup, epoch, gyro_columns);
-  raw.settings =
-      parse_pass_toml(settings_text, inside(file, kSettingsAttribute), file.parent_path(), gyros_of(raw.gyro));
-  for (std::size_t head = 0; head <= raw.settings.further_star_trackers.size(); ++head) {
-    raw.star_trackers.push_back(reader.read_group(star_tracker_name(head), epoch, star_tracker_columns));
-  }
-  if (const auto prior = reader.text_attribute("", kPriorAttribute)) {
-    raw.settings.prior = parse_calibration(*prior, inside(file, kPriorAttribute));
-    check_prior(*raw.settings.prior, inside(file, kPriorAttribute), gyros_of(raw.gyro));
-  }
-  return raw;
-}
-
 /// One row per line, each column with its number of decimals.
 void append_rows(fmt::memory_buffer& out, Time epoch, const std::vector<Time>& t, const std::vector<double>& values,
                  int decimals) {
   const std::size_t width = t.empty() ? 0 : values.size() / t.size();
   out.reserve(t.size() * (12 + width * static_cast<std::size_t>(decimals + 4)));
   for (std::size_t i = 0; i < t.size(); ++i) {
+    check_stop();
     fmt::format_to(fmt::appender(out), "{}", format_seconds(t[i] - epoch));
     for (std::size_t j = 0; j < width; ++j) {
       fmt::format_to(fmt::appender(out), ",{:.{}f}", values[i * width + j], decimals);
@@ -162,40 +128,28 @@ void write_directory(const fs::path& directory, const Pass& pass, const Truth* t
   constexpr int kFixDecimals = 10;
   constexpr int kTruthDecimals = 12;
   const Time epoch = pass.settings.epoch;
-  const bool created = make_directory(directory);
-  std::error_code fault;
-  try {
-    std::vector<AtomicFile> files;
-    const auto add = [&](const std::string& name, const std::string& text) {
-      files.emplace_back(directory / name).write(text);
-    };
-    add(kSettingsFile, format_pass_toml(pass.settings, pass.settings.prior ? kPriorFile : ""));
-    add(kGyroFile, csv_text(epoch, direction_names(pass.gyro.gyros), pass.gyro.t, pass.gyro.h, kGyroDecimals));
-    for (std::size_t head = 0; head <= pass.further_star_trackers.size(); ++head) {
-      const StarTrackerTelemetry& fixes = star_tracker_of(pass, head);
-      add(star_tracker_name(head) + ".csv",
-          csv_text(epoch, kQuaternionNames, fixes.t, quaternion_values(fixes.q_in_c), kFixDecimals));
-    }
-    if (pass.settings.prior) {
-      add(kPriorFile, format_calibration(*pass.settings.prior));
-    }
-    if (truth != nullptr) {
-      add(kTruthFile, csv_text(epoch, truth_names(*truth), truth->t, truth_values(*truth), kTruthDecimals));
-      add(kTruthParametersFile, format_truth_parameters(*truth));
-    }
-    for (AtomicFile& file : files) {
-      file.commit();
-    }
-  } catch (...) {
-    if (created) {
-      fs::remove(directory, fault);  // only when it is empty again
-    }
-    throw;
+  StagedDirectory staged(directory);
+  const auto add = [&](const std::string& name, const std::string& text) { write_file(staged.path() / name, text); };
+  add(kSettingsFile, format_pass_toml(pass.settings, pass.settings.prior ? kPriorFile : ""));
+  add(kGyroFile, csv_text(epoch, direction_names(pass.gyro.gyros), pass.gyro.t, pass.gyro.h, kGyroDecimals));
+  for (std::size_t head = 0; head <= pass.further_star_trackers.size(); ++head) {
+    const StarTrackerTelemetry& fixes = star_tracker_of(pass, head);
+    add(star_tracker_name(head) + ".csv",
+        csv_text(epoch, kQuaternionNames, fixes.t, quaternion_values(fixes.q_in_c), kFixDecimals));
   }
+  if (pass.settings.prior) {
+    add(kPriorFile, format_calibration(*pass.settings.prior));
+  }
+  if (truth != nullptr) {
+    add(kTruthFile, csv_text(epoch, truth_names(*truth), truth->t, truth_values(*truth), kTruthDecimals));
+    add(kTruthParametersFile, format_truth_parameters(*truth));
+  }
+  staged.commit();
   if (truth == nullptr) {
     // The truth of the pass that was here before is not that of this one.
-    fs::remove(directory / kTruthFile, fault);
-    fs::remove(directory / kTruthParametersFile, fault);
+    std::error_code ignored;
+    fs::remove(directory / kTruthFile, ignored);
+    fs::remove(directory / kTruthParametersFile, ignored);
   }
 }
 
@@ -275,9 +229,41 @@ std::optional<Truth> read_truth_directory(const fs::path& directory) {
 
 }  // namespace
 
+UnscreenedPass read_raw_directory(const fs::path& directory) {
+  const fs::path settings_file = directory / kSettingsFile;
+  const TextFile settings(settings_file);
+  Series gyro = read_csv(directory / kGyroFile, gyro_columns);
+  UnscreenedPass raw;
+  raw.settings = parse_pass_toml(settings.text(), settings_file, directory, gyros_of(gyro));
+  raw.gyro = std::move(gyro);
+  for (std::size_t head = 0; head <= raw.settings.further_star_trackers.size(); ++head) {
+    raw.star_trackers.push_back(read_csv(directory / (star_tracker_name(head) + ".csv"), star_tracker_columns));
+  }
+  return raw;
+}
+
+UnscreenedPass read_raw_netcdf(const fs::path& file) {
+  const NetcdfReader reader(file);
+  const std::string settings_text = required_attribute(reader, file, "", kSettingsAttribute);
+  const Time epoch = parse_pass_epoch(settings_text, inside(file, kSettingsAttribute));
+  UnscreenedPass raw;
+  raw.gyro = reader.read_group(kGyroGroup, epoch, gyro_columns);
+  raw.settings =
+      parse_pass_toml(settings_text, inside(file, kSettingsAttribute), file.parent_path(), gyros_of(raw.gyro));
+  for (std::size_t head = 0; head <= raw.settings.further_star_trackers.size(); ++head) {
+    raw.star_trackers.push_back(reader.read_group(star_tracker_name(head), epoch, star_tracker_columns));
+  }
+  if (const auto prior = reader.text_attribute("", kPriorAttribute)) {
+    raw.settings.prior = parse_calibration(*prior, inside(file, kPriorAttribute));
+    check_prior(*raw.settings.prior, inside(file, kPriorAttribute), gyros_of(raw.gyro));
+  }
+  return raw;
+}
+
 LoadedPass read_pass(const fs::path& path) {
   check_there(path);
-  RawPass raw = fs::is_directory(path) ? read_raw_directory(path) : read_raw_netcdf(path);
+  const auto format = std::ranges::find_if(kInputFormats, [&](const InputFormat& f) { return f.recognises(path); });
+  UnscreenedPass raw = format->read(path);
   LoadedPass loaded;
   loaded.pass.gyro = screen_gyro(std::move(raw.gyro), raw.settings, loaded.defects);
   for (std::size_t head = 0; head < raw.star_trackers.size(); ++head) {
@@ -292,6 +278,16 @@ LoadedPass read_pass(const fs::path& path) {
 std::optional<Truth> read_truth(const fs::path& path) {
   check_there(path);
   return fs::is_directory(path) ? read_truth_directory(path) : read_truth_netcdf(path);
+}
+
+PassFormat format_for(const Scenario& scenario) {
+  PassFormat format;
+  double step = scenario.gyros.front().readout.quantum_rad;
+  for (const GyroScenario& gyro : scenario.gyros) {
+    step = std::min(step, gyro.readout.quantum_rad);
+  }
+  format.direction_step = std::max(step, format.direction_step);
+  return format;
 }
 
 void write_pass(const fs::path& path, const Pass& pass, const Truth* truth, const PassFormat& format) {

@@ -19,15 +19,15 @@ namespace {
 
 using ground::SetupError;
 
-/// There, hold and back, in one part of the time for manoeuvres.
+/// A slew to an attitude, a hold there and the slew back. All excursions share the manoeuvre time equally.
 struct Excursion {
   Eigen::Vector3d axis_c = Eigen::Vector3d::UnitX();
-  double part_of_angle = 1;  ///< of the largest that there is time for; its sign is that of the turn
+  double part_of_angle = 1;  ///< of the largest angle for which there is time; the sign is that of the turn
   double begin_s = 0;
 };
 using Plan = std::vector<Excursion>;
 
-/// Corners, edges and faces of a cube, one of each two opposite ones.
+/// Axes through the corners, the middles of the edges and of the faces of a cube: 13, one of each opposite pair.
 std::vector<Eigen::Vector3d> axes() {
   std::vector<Eigen::Vector3d> all;
   for (int number = 14; number < 27; ++number) {
@@ -39,18 +39,18 @@ std::vector<Eigen::Vector3d> axes() {
 
 constexpr std::array<double, 6> kPartsOfAngle = {1, -1, 0.75, -0.75, 0.5, -0.5};
 constexpr int kTimes = 9;
-/// After these nothing changes that matters.
+/// Rounds of coordinate exchange; further ones improve the result by nothing that matters.
 constexpr int kRounds = 2;
-/// One more slew must make the mean square smaller than this part of it.
-constexpr double kWorthwhile = 0.95;
+/// One more slew is accepted when it brings the mean square error below this fraction of that without it.
+constexpr double kLargestErrorRatio = 0.95;
 
-/// Angles in tenths of a degree, not larger than they were but for rounding.
+/// Rounded towards zero to tenths of a degree, so that a limit stays kept.
 double rounded_rad(double angle_rad) {
   const double tenths = std::trunc(std::abs(angle_rad) / kDegree * 10 + 1e-6);
   return tenths > 0 ? std::copysign(tenths / 10 * kDegree, angle_rad) : 0;
 }
 
-/// Rz(yaw) Ry(pitch) Rx(roll) of a turn.
+/// The slew to the attitude that is turned about an axis, as Rz(yaw) Ry(pitch) Rx(roll).
 Slew slew_to(double begin_s, const Eigen::Vector3d& axis_c, double angle_rad) {
   const Eigen::Matrix3d turn = Eigen::AngleAxisd(angle_rad, axis_c).toRotationMatrix();
   return {begin_s, rounded_rad(std::atan2(turn(2, 1), turn(2, 2))), rounded_rad(-std::asin(turn(2, 0))),
@@ -84,7 +84,7 @@ class Search {
         }
       }
       const double mean_square = errors({plan}).front();
-      if (!(mean_square < kWorthwhile * least)) {
+      if (!(mean_square < kLargestErrorRatio * least)) {
         break;
       }
       least = mean_square;
@@ -94,17 +94,18 @@ class Search {
   }
 
  private:
+  /// Time that each of so many excursions has.
   [[nodiscard]] double share_s(std::size_t excursions) const {
     return to_seconds(limits_.manoeuvre_time) / static_cast<double>(excursions);
   }
   [[nodiscard]] double turn_s(double angle_rad) const {
     return sim::turn_duration_s(angle_rad, attitude_.max_slew_rate_rad_s, attitude_.max_slew_acceleration_rad_s2);
   }
-  /// There is time to go there and come back, times in whole seconds.
+  /// Largest angle from which there is time to come back; times are in whole seconds.
   [[nodiscard]] double largest_rad(std::size_t excursions) const {
     const double whole_s = 2 * turn_s(limits_.max_angle_rad);
     const double part = std::clamp((share_s(excursions) - 1) / whole_s, 0.0, 1.0);
-    // A turn at the limit of acceleration takes the root of its angle.
+    // The time of a turn that is limited by acceleration grows with the root of its angle.
     return limits_.max_angle_rad * part * part;
   }
 
@@ -119,7 +120,7 @@ class Search {
     return slews;
   }
 
-  /// Where an excursion may begin beside the others.
+  /// Times at which an excursion may begin without touching the others.
   [[nodiscard]] std::vector<double> free_times(const Plan& plan, std::size_t excursion) const {
     const double share = share_s(std::max(plan.size(), excursion + 1));
     std::vector<double> times;
@@ -136,7 +137,8 @@ class Search {
     return times;
   }
 
-  /// Axis, angle and time of one excursion, one after the other, the best while all else stays.
+  /// Coordinate exchange: axis, angle and time of one excursion, one after the other, each set to the best of its
+  /// values while everything else stays.
   void exchange(Plan& plan, std::size_t excursion) {
     const auto vary = [&](const auto& values, const auto member) {
       std::vector<Plan> candidates{plan};
@@ -152,7 +154,7 @@ class Search {
     vary(free_times(plan, excursion), &Excursion::begin_s);
   }
 
-  /// Mean square of the attitude error after each.
+  /// Mean square of the attitude error that each plan leaves.
   [[nodiscard]] std::vector<double> errors(const std::vector<Plan>& plans) {
     const std::vector<double> squares = ground::on_all_cores(
         plans.size(), [&](std::size_t i) { return (metric_ * flight_.covariance_after(slews_of(plans[i]))).trace(); });
@@ -195,6 +197,15 @@ std::vector<ground::Combination> Advice::formerly_weak() const {
   std::ranges::copy_if(before.weak, std::back_inserter(harmful),
                        [](const ground::Combination& combination) { return combination.is_harmful; });
   return harmful.empty() ? before.weak : harmful;
+}
+
+std::vector<Advice::Gain> Advice::gains() const {
+  std::vector<Gain> all;
+  for (const ground::Combination& combination : formerly_weak()) {
+    all.push_back({combination, sigma_along(combination, before, before.covariance),
+                   sigma_along(combination, before, after.covariance)});
+  }
+  return all;
 }
 
 Advice advise(const Scenario& scenario, const CalibrationOptions& options, const SlewLimits& limits,

@@ -14,7 +14,7 @@
 namespace trihedron::plan {
 namespace {
 
-/// With another seed, and what is unknown drawn from what is known before.
+/// The scenario with another seed, and with alignments and coefficients drawn from their priors.
 Scenario drawn(Scenario scenario, std::uint64_t run) {
   scenario.seed += 1 + run;
   for (std::size_t k = 0; k < scenario.gyros.size(); ++k) {
@@ -27,15 +27,15 @@ Scenario drawn(Scenario scenario, std::uint64_t run) {
 }
 
 struct Outcome {
-  Eigen::VectorXd errors;
+  Eigen::VectorXd errors;  ///< estimate − truth
   double nees = 0;
 };
 
 Outcome fly(const Scenario& scenario, const CalibrationOptions& options) {
   const sim::SimulatedPass flown = sim::simulate(scenario);
   const Calibration calibration = ground::calibrate(flown.pass, options).calibration;
-  Outcome outcome{ground::parameter_errors(flown.truth, calibration)};
-  // In units of the sigmas, which differ by ten powers of ten.
+  Outcome outcome{ground::estimate_minus_truth(calibration, flown.truth, ground::UnnamedDrift::kIsZero)};
+  // Scaled by the sigmas, which differ by ten orders of magnitude.
   const Eigen::VectorXd sigma = calibration.covariance.diagonal().cwiseSqrt();
   const Eigen::MatrixXd correlation =
       sigma.cwiseInverse().asDiagonal() * calibration.covariance * sigma.cwiseInverse().asDiagonal();
@@ -49,7 +49,7 @@ Outcome fly(const Scenario& scenario, const CalibrationOptions& options) {
 Confirmation confirm(const Scenario& scenario, const std::vector<ground::Combination>& combinations,
                      const ground::Observability& predicted, int runs, const Progress& progress) {
   CalibrationOptions options = predicted.options;
-  options.estimator = ground::kBatch;
+  options.estimator = Estimator::kBatch;
   std::mutex one_at_a_time;
   double done = 0;
   const std::vector<Outcome> outcomes = ground::on_all_cores(static_cast<std::size_t>(runs), [&](std::size_t run) {
@@ -70,7 +70,8 @@ Confirmation confirm(const Scenario& scenario, const std::vector<ground::Combina
   }
   double square = 0;
   for (const ground::Combination& combination : combinations) {
-    // Further states come after those of the gyros, and have no truth here.
+    // Further states stand after the parameters of the gyros; their truth is not known here, so their errors count as
+    // zero.
     Eigen::MatrixXd scatter = Eigen::MatrixXd::Zero(predicted.covariance.rows(), predicted.covariance.cols());
     for (const Outcome& outcome : outcomes) {
       scatter.topLeftCorner(outcome.errors.size(), outcome.errors.size()) +=

@@ -3,29 +3,31 @@
 #include <cmath>
 
 #include "trihedron/core/directions_fit.hpp"
-#include "trihedron/core/invariant_estimator.hpp"
+#include "trihedron/core/setup.hpp"
 #include "trihedron/ground/observe/observe.hpp"
 #include "trihedron/sim/simulate.hpp"
 
 namespace trihedron::plan {
 namespace {
 
-constexpr int kTogether = 4;
-/// 1-sigma of four together over that of one.
-constexpr double kLessNoise = 0.5;
-using OnBoard = InvariantEstimator<Esg7, 2>;
+/// Samples, and fixes, that one stands for.
+constexpr int kGroup = 4;
+/// 1-sigma of the mean of a group over that of one.
+constexpr double kNoiseOfGroup = 0.5;
 
-/// 1-sigma of the readings round a fix, taken together as on board, over that of one.
-double noise_of_readings_together(Duration gyro_period) {
-  SampleBuffer<1, 512> samples;
-  for (Time t{-(OnBoard::kReach / gyro_period) * gyro_period}; t <= Time{OnBoard::kReach}; t += gyro_period) {
-    GyroSample<1> sample;
-    sample.t = t;
-    sample.h_b[0] = Eigen::Vector3d::UnitX();
-    samples.push(sample);
-  }
+/// 1-sigma of the direction that is fitted through the readings around a fix, as on board, over that of one reading.
+double noise_of_fitted_reading(Duration gyro_period) {
+  CalibrationSetup setup;
+  setup.gyro_period = gyro_period;
+  const auto reach = static_cast<int>(setup.reach() / gyro_period);
   constexpr int kCubic = 3;
-  return fit_directions<1>(samples, 0, samples.size(), Time{}, kCubic).noise_factor;
+  DirectionsFit fit(Time{}, Time{-reach * gyro_period}, Time{reach * gyro_period}, 2 * reach + 1, kCubic, 1);
+  Directions h_b;
+  h_b[0] = Eigen::Vector3d::UnitX();
+  for (int i = -reach; i <= reach; ++i) {
+    fit.add(Time{i * gyro_period}, h_b);
+  }
+  return fit.solve().noise_factor;
 }
 
 StarTrackerScenario without_errors(const StarTrackerScenario& head) {
@@ -56,24 +58,24 @@ GyroScenario without_errors(const GyroScenario& gyro) {
 
 DesignFlight::DesignFlight(const Scenario& scenario, const CalibrationOptions& options)
     : scenario_(scenario), options_(options) {
-  const double of_readings = kLessNoise * noise_of_readings_together(scenario.gyro_period);
+  const double of_readings = kNoiseOfGroup * noise_of_fitted_reading(scenario.gyro_period);
   for (GyroScenario& gyro : scenario_.gyros) {
     readout_noise_rad_.push_back(of_readings * gyro.readout.noise_rad);
     gyro = without_errors(gyro);
   }
-  fix_noise_rad_.emplace_back(kLessNoise * scenario.star_tracker.noise_rad);
+  fix_noise_rad_.emplace_back(kNoiseOfGroup * scenario.star_tracker.noise_rad);
   scenario_.star_tracker = without_errors(scenario.star_tracker);
   for (StarTrackerScenario& head : scenario_.further_star_trackers) {
-    fix_noise_rad_.emplace_back(kLessNoise * head.noise_rad);
+    fix_noise_rad_.emplace_back(kNoiseOfGroup * head.noise_rad);
     head = without_errors(head);
   }
   if (options_.star_tracker_noise_rad) {
-    *options_.star_tracker_noise_rad *= kLessNoise;
+    *options_.star_tracker_noise_rad *= kNoiseOfGroup;
   }
-  scenario_.star_tracker_period *= kTogether;
-  // What is further apart is a gap.
-  if (kTogether * scenario.gyro_period <= std::chrono::milliseconds(500)) {
-    scenario_.gyro_period *= kTogether;
+  scenario_.star_tracker_period *= kGroup;
+  // Samples further apart would count as gaps.
+  if (kGroup * scenario.gyro_period <= max_interpolation(scenario.gyro_period)) {
+    scenario_.gyro_period *= kGroup;
   }
 }
 

@@ -6,8 +6,8 @@
 
 namespace trihedron::plan {
 
-/// A flight that ground::predicted_covariance() takes: no noise, no drift, no misalignment, and of all samples and
-/// fixes every fourth, with the noise of four together.
+/// The simplified flight by which candidate slews are compared (ground::predicted_covariance()): telemetry without
+/// noise, drift or misalignment; of samples and fixes only every fourth, each with the noise of the mean of four.
 class DesignFlight {
  public:
   DesignFlight(const Scenario& scenario, const CalibrationOptions& options);

@@ -29,8 +29,8 @@ const Advice& advised() {
   return advice;
 }
 
-/// The search goes by a flight without noise, of every fourth sample and fix: what differs is how much the body happens
-/// to jitter at the fixes.
+/// The search uses a flight without noise, of every fourth sample and fix; the difference is how the body jitters at
+/// the fixes that are used.
 TEST(DesignFlight, KnowsTheCovarianceOfASimulatedFlight) {
   const ground::Observability observed = advised().after;
   const DesignFlight flight(advised().scenario, observed.options);
@@ -47,6 +47,11 @@ TEST(Advice, MakesTheUnobservableObservable) {
   for (const ground::Combination& combination : advised().formerly_weak()) {
     EXPECT_GT(sigma_along(combination, advised().before, advised().before.covariance),
               100 * sigma_along(combination, advised().before, advised().after.covariance));
+  }
+  ASSERT_EQ(advised().gains().size(), 2U);
+  for (const Advice::Gain& gain : advised().gains()) {
+    EXPECT_GT(gain.sigma_before, 100 * gain.sigma_after) << gain.combination.text;
+    EXPECT_TRUE(gain.combination.is_unobservable);
   }
 }
 
@@ -68,7 +73,7 @@ TEST(Advice, StaysWithinTheLimits) {
   EXPECT_LT(turns.back().end_s, to_seconds(steady_flight().duration));
 }
 
-/// Of the same limits: one slew or two, any axis, the whole angle, any time.
+/// Random slews within the same limits: one or two, of any axis and time, by the whole angle.
 TEST(Advice, BeatsRandomSlews) {
   const DesignFlight flight(advised().scenario, advised().before.options);
   const auto mean_square = [&](const std::vector<Slew>& slews) {

@@ -22,7 +22,7 @@ inline Scenario steady_flight() {
 /// Nothing left to decide, which takes runs of its own.
 inline CalibrationOptions told() {
   CalibrationOptions options;
-  options.drift_model = "esg7";
+  options.drift_model = kEsg7;
   options.find_noise = false;
   options.further_states = FurtherStateOptions::none();
   return options;

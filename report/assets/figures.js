@@ -1,6 +1,6 @@
 "use strict";
-// What each figure shows: functions of the data and of how it is to look, which give traces and layout for Plotly.
-// `look`: {width, colour: names of the style sheet → colours, detail: whether enlarged, print: whether for paper}.
+// One function per figure: from the data and from how it is to look to traces and layout for Plotly.
+// `look`: {width, colour: colours by their names in the style sheet, detail: whether enlarged, print: whether for paper}.
 
 const AXES = ["roll", "pitch", "heading"];
 const DASHES = ["solid", "dash", "dot"];
@@ -14,7 +14,7 @@ function faded(hex, alpha) {
 const axisColours = (colour) => [colour.blue, colour.vermillion, colour.green];
 const gyroColour = (colour, gyro) => [colour.blue, colour.vermillion, colour.green, colour.purple][(gyro - 1) % 4];
 
-/** Names of the axes of panel `i`: those of traces, and the keys of the layout. */
+/** Plotly's names of the axes of panel `i`: xaxis and yaxis for traces, xkey and ykey for the layout. */
 function panel(i) {
   const n = i === 0 ? "" : String(i + 1);
   return { xaxis: `x${n}`, yaxis: `y${n}`, xkey: `xaxis${n}`, ykey: `yaxis${n}` };
@@ -58,7 +58,7 @@ function panels(look, { rows, columns, titles = [], units = [], rowHeight = 220,
   return layout;
 }
 
-/** Multiples of 90 min for a long pass: the corrections of the paper, about an orbit. */
+/** Distance of the ticks in minutes; for a long pass multiples of 90 min, the correction interval of the paper (one orbit). */
 function timeTick(duration, width) {
   const most = Math.max(2, width / 70);
   return [1, 2, 5, 10, 15, 30, 90, 180, 360, 720, 1440].find((tick) => duration / tick <= most) ?? duration / most;
@@ -236,7 +236,7 @@ const FIGURES = {
     const traces = cells.map(({ axis, view }, i) => {
       const { t, y } = data.navigation[axis];
       if (view) {
-        // What remains once the calibration has been taken over: from the second correction on.
+        // The scale is that of the error after the calibrated parameters have been taken over: from the second correction on.
         const half = 1.15 * greatest(t, y[0], corrections[1] + 0.1) || 1;
         layout[panel(i).ykey].range = [-half, half];
       }
@@ -291,7 +291,7 @@ const FIGURES = {
       hovertemplate: `%{x:.1f} min after: %{y:.3~g}″<extra>corrected at ${Math.round(corrected)} min, ${kind}</extra>` });
     const traces = loops.flatMap(({ corrected, known_before, calibrated }, i) => [
       drawn(known_before, corrected, "known before", { color: faded(colour.vermillion, 0.8), dash: "dash", width: 1 }),
-      // At the first nothing is calibrated yet. The later the correction, the fuller the colour.
+      // At the first correction nothing is calibrated yet. Later corrections have a stronger colour.
       ...(i === 0 ? [] : [drawn(calibrated, corrected, "calibrated",
         { color: faded(colour.blue, 0.35 + (0.65 * i) / (loops.length - 1)), width: 1.6 })]),
     ]);
@@ -317,7 +317,7 @@ const FIGURES = {
       layout[axes.ykey].range = [-half, half];
       const edge = { color: colour.ink, width: 1.2, dash: "dash" };
       return [
-        // A line, not points: of points only the least and greatest would be left, and look like two clouds.
+        // Drawn as a line: decimation keeps only the least and greatest values, which as points would look like two clouds.
         line(used.t, used.y[0], axes, { name: "used", legendgroup: "u", showlegend: i === 0, line: { color: c, width: 0.8 },
           hovertemplate: `%{x:.2f} min: %{y:.3~g}″<extra></extra>` }),
         line(used.t, bound, axes, { hoverinfo: "skip", name: "± 3σ", legendgroup: "s", showlegend: i === 0, line: edge }),
@@ -496,7 +496,7 @@ const FIGURES = {
 const axesOf = ({ xaxis, yaxis }) => ({ xaxis, yaxis });
 const reference = (parameter) => (parameter.truth === undefined ? "final value" : "truth");
 
-/** From when the scale of an enlarged figure holds: a parameter has converged and is known nearly as well as at the end. */
+/** Time from which on an enlarged figure is scaled to the data: the parameter has converged and its sigma is nearly the final one. */
 function lateFrom(p, data) {
   const known = p.y[1].findIndex((sigma) => sigma !== null && sigma <= 2.5 * p.final_sigma);
   return Math.min(Math.max(p.converged ?? 0, p.t[Math.max(known, 0)]), 0.8 * data.duration_min);
@@ -508,7 +508,7 @@ function at(t, values, from) {
   return i < 0 ? [] : [values[i]];
 }
 
-/** What the estimate does, its final band and the truth; the prior's band is often too wide to be shown. */
+/** Range of values to show: the course of the estimate, its final band and the truth; the prior's band is often too wide. */
 function valueRange(p, value, sigma) {
   const shown = value.filter((v) => v !== null);
   const low = Math.min(...shown, p.final - 3 * p.final_sigma, p.truth ?? p.final);
@@ -522,7 +522,7 @@ const spread = (ranges) => [Math.min(...ranges.map((r) => r[0])), Math.max(...ra
 
 const legendOnly = (name, style) => ({ x: [null], y: [null], mode: "lines", name, showlegend: true, hoverinfo: "skip", line: style });
 
-/** Crosses; what lies beyond the panel stands at its edge as a triangle and tells its value. */
+/** Crosses; values outside the panel are drawn at its edge as triangles, which show the value on hovering. */
 function rejectedMarks(t, values, axes, colour, low, high, unit, showlegend) {
   const shown = values.map((v) => Math.min(high, Math.max(low, v)));
   return {

@@ -17,7 +17,7 @@
     const read = (name) => style.getPropertyValue(`--${name}`).trim();
     return { ...Object.fromEntries(COLOURS.map((name) => [name, full(read(name))])), sans: read("sans") };
   }
-  /** "#fff" as "#ffffff": minifiers shorten, and the figures take colours apart. */
+  /** "#fff" as "#ffffff": minifiers shorten colours, and the figures read the red, green and blue from six digits. */
   function full(hex) {
     return hex.length === 4 ? `#${[...hex.slice(1)].map((digit) => digit + digit).join("")}` : hex;
   }
@@ -85,7 +85,7 @@
     }
   }
   if (choice) {
-    // A reload may bring back ticks.
+    // After a reload the browser may restore ticked boxes.
     applyChoice();
     choice.addEventListener("change", () => { applyChoice(); redraw(); });
     document.getElementById("all-coefficients").addEventListener("click", () => {
@@ -112,7 +112,7 @@
   });
   document.getElementById("print").addEventListener("click", () => print());
 
-  // ---- Where in the contents the reader is
+  // ---- Mark the section that is being read in the table of contents
 
   const links = new Map([...document.querySelectorAll(".contents a")].map((link) => [link.hash.slice(1), link]));
   const reading = new IntersectionObserver((entries) => {

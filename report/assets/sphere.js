@@ -22,7 +22,7 @@ class Sphere {
   /** `track`: {t, y: [x, y, z]} with null as gap. */
   constructor(parent, track, gyro) {
     this.track = track;
-    // Seen from where the track lies, a little from above.
+    // The first view is towards the middle of the track, from a little above.
     const mean = track.y.map((axis) => axis.reduce((sum, v) => sum + (v ?? 0), 0));
     this.longitude = (Math.atan2(mean[1], mean[0]) * 180) / Math.PI + 25;
     this.latitude = 25;

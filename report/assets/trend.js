@@ -39,7 +39,7 @@ const KINDS = [
   { name: "not to be used", symbol: "x-thin", size: 8, holds: ({ trustworthy }) => !trustworthy },
 ];
 
-/** Every other start-up is shaded; as much of its name stands in it as there is room for. */
+/** Every other start-up is shaded and labelled with as much of its name as there is room for. */
 function startUpBands(calibrations, { xaxis, yaxis }, width, colour) {
   const letters = (from, to) => Math.floor((0.8 * width * (to - from)) / calibrations.length / 6.5);
   const bands = [];
@@ -54,7 +54,7 @@ function startUpBands(calibrations, { xaxis, yaxis }, width, colour) {
   }));
 }
 
-/** The values, with room for the sigmas that are usual and the names above; a longer bar is cut off. */
+/** Range of values with room for the usual sigmas and for the names above; longer error bars are cut off. */
 function trendRange(value, sigma) {
   const shown = value.filter((v) => v !== null);
   const sigmas = sigma.filter((s) => s !== null).sort((a, b) => a - b);

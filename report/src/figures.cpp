@@ -20,12 +20,13 @@ namespace {
 
 using nlohmann::json;
 
-/// Stretches of time that a figure tells apart: about the pixels of a figure across the page, or of one in two columns.
+/// Number of time bins of a decimated series: about the width in pixels of a figure across the page, or of one in two
+/// columns.
 constexpr std::size_t kWide = 700;
 constexpr std::size_t kHalf = 350;
 constexpr std::size_t kTrack = 1500;
 
-/// A gap of a line is a hole of more fixes than a few lost ones.
+/// Number of missing fixes from which on a line is interrupted.
 constexpr double kFixesOfGap = 10;
 
 class Figures {
@@ -45,9 +46,9 @@ class Figures {
     };
     put("parameters", parameters());
     put("corrections", corrections());
-    if (input_.evaluation) {
-      put("navigation", errors(input_.evaluation->navigation, kArcminute_rad));
-      put("attitude", errors(input_.evaluation->attitude, kArcsecond_rad));
+    if (input_.evaluation != nullptr) {
+      put("navigation", errors(input_.evaluation->navigation.errors, kArcminute_rad));
+      put("attitude", errors(input_.evaluation->attitude.errors, kArcsecond_rad));
       put("open_loops", open_loops());
     }
     put("innovations", innovations());
@@ -69,14 +70,14 @@ class Figures {
     const ParameterHistory& history = run_.parameters;
     for (std::size_t column = 0; column < parameters_.size() && !history.t.empty(); ++column) {
       const Parameter& parameter = parameters_[column];
-      const double unit = parameter.is_alignment ? kArcminute_rad : kMicroradian;
+      const double unit = parameter.id.is_alignment() ? kArcminute_rad : kMicroradian;
       Series series(2, fix_step_min_ + to_minutes(ParameterHistory::kStep));
       for (std::size_t row = 0; row < history.t.size(); ++row) {
         series.add(minutes(history.t[row]), {history.value[row][column] / unit, history.sigma[row][column] / unit});
       }
       json figure = series.drawn(kHalf);
-      figure["gyro"] = parameter.gyro + 1;
-      figure["name"] = parameter.name;
+      figure["gyro"] = parameter.id.gyro() + 1;
+      figure["name"] = short_name_of(parameter.id);
       figure["symbol"] = parameter.symbol;
       figure["final"] = parameter.value / unit;
       figure["final_sigma"] = parameter.sigma / unit;
@@ -86,7 +87,7 @@ class Figures {
       if (parameter.converged_min) {
         figure["converged"] = *parameter.converged_min;
       }
-      figures[parameter.state] = std::move(figure);
+      figures[name_of(parameter.id)] = std::move(figure);
     }
     return figures;
   }
@@ -241,8 +242,8 @@ class Figures {
   [[nodiscard]] json drift_models() const {
     json models = json::array();
     for (const DriftModelForecast& model : run_.drift_models) {
-      models.push_back({{"name", model.drift_model},
-                        {"coefficients", model.coefficients},
+      models.push_back({{"name", name_of(model.drift_model)},
+                        {"coefficients", model.drift_model.size()},
                         {"gain", std::round(model.log_likelihood * 10) / 10},
                         {"error", rounded(model.open_loop_rms_rad / kArcsecond_rad, 3)},
                         {"used", model.drift_model == run_.calibration.gyros[0].drift_model}});
@@ -255,7 +256,7 @@ class Figures {
     json rows = json::array();
     const Eigen::MatrixXd& covariance = run_.calibration.covariance;
     for (std::size_t i = 0; i < parameters_.size(); ++i) {
-      names.push_back({{"gyro", parameters_[i].gyro + 1}, {"symbol", parameters_[i].symbol}});
+      names.push_back({{"gyro", parameters_[i].id.gyro() + 1}, {"symbol", parameters_[i].symbol}});
       json row = json::array();
       for (std::size_t j = 0; j < parameters_.size(); ++j) {
         const double rho = covariance(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j)) /
@@ -293,7 +294,7 @@ class Figures {
     return series.empty() ? json{} : series.drawn(kWide);
   }
 
-  /// Per stretch of time what came and what was done with it, in parts of what should have come.
+  /// Per time bin the fraction of expected samples and fixes that came, by what was done with them.
   [[nodiscard]] json telemetry() const {
     const PassSettings& settings = input_.pass.settings;
     const double duration_min = to_minutes(settings.duration);

@@ -20,35 +20,35 @@ namespace {
 using nlohmann::json;
 using Catalogue = std::vector<CatalogueEntry>;
 
-/// That an alignment is drawn from, rad: its mean over the start-ups, or the first value.
-double reference_of(const std::string& state, const Catalogue& catalogue, const ground::History& history) {
+/// Reference value that is subtracted from an alignment in the figure, rad: its mean over the start-ups, or the first
+/// value.
+double reference_of(const ParameterId& state, const Catalogue& catalogue, const ground::History& history) {
   const auto spread = std::ranges::find(history.spreads, state, &ground::Spread::state);
   if (spread != history.spreads.end()) {
     return spread->mean;
   }
   const auto first = std::ranges::find_if(
-      catalogue, [&](const auto& entry) { return !std::isnan(ground::value_of(entry.calibration, state)); });
-  return ground::value_of(first->calibration, state);
+      catalogue, [&](const auto& entry) { return !std::isnan(value_of(entry.calibration, state)); });
+  return value_of(first->calibration, state);
 }
 
 /// Drift in 10⁻⁶ rad/s; alignment in ″ from its reference. NaN, in JSON null, where a calibration does not have the
 /// state.
-json trend_of(const std::string& state, const Catalogue& catalogue, const ground::History& history) {
-  const StateName name(state);
-  const double unit = name.is_alignment ? kArcsecond_rad : kMicroradian;
-  const double zero = name.is_alignment ? reference_of(state, catalogue, history) : 0;
+json trend_of(const ParameterId& state, const Catalogue& catalogue, const ground::History& history) {
+  const double unit = state.is_alignment() ? kArcsecond_rad : kMicroradian;
+  const double zero = state.is_alignment() ? reference_of(state, catalogue, history) : 0;
   json value = json::array();
   json sigma = json::array();
   for (const CatalogueEntry& entry : catalogue) {
-    value.push_back((ground::value_of(entry.calibration, state) - zero) / unit);
-    sigma.push_back(ground::sigma_of(entry.calibration, state) / unit);
+    value.push_back((value_of(entry.calibration, state) - zero) / unit);
+    sigma.push_back(sigma_of(entry.calibration, state) / unit);
   }
-  json trend = {{"gyro", name.gyro + 1},
-                {"name", name.parameter},
-                {"symbol", symbol_of(name.parameter)},
+  json trend = {{"gyro", state.gyro() + 1},
+                {"name", short_name_of(state)},
+                {"symbol", symbol_of(state)},
                 {"value", value},
                 {"sigma", sigma}};
-  if (name.is_alignment) {
+  if (state.is_alignment()) {
     trend["from"] = signed_number(zero / kArcminute_rad, 3);
   }
   return trend;
@@ -64,7 +64,7 @@ json figure_data(const Catalogue& catalogue, const ground::History& history) {
                             {"trustworthy", entry.calibration.verdict.trustworthy}});
   }
   json trends = json::array();
-  for (const std::string& state : ground::states_of(catalogue)) {
+  for (const ParameterId& state : ground::states_of(catalogue)) {
     trends.push_back(trend_of(state, catalogue, history));
   }
   return {{"calibrations", calibrations}, {"trends", trends}};
@@ -76,15 +76,15 @@ json calibration_rows(const Catalogue& catalogue) {
     const Verdict& verdict = entry.calibration.verdict;
     json codes = json::array();
     for (const Finding& finding : verdict.findings) {
-      codes.push_back(finding.code);
+      codes.push_back(name_of(finding.code));
     }
     rows.push_back({{"number", rows.size() + 1},
                     {"epoch", calendar(entry.calibration.epoch)},
                     {"start_up", entry.start_up},
                     {"pass", entry.pass},
                     {"passes", entry.passes},
-                    {"estimator", entry.calibration.estimator},
-                    {"model", entry.calibration.gyros.front().drift_model},
+                    {"estimator", name_of(entry.calibration.estimator)},
+                    {"model", name_of(entry.calibration.gyros.front().drift_model)},
                     {"trustworthy", verdict.trustworthy},
                     {"codes", codes}});
   }
@@ -95,18 +95,16 @@ json calibration_rows(const Catalogue& catalogue) {
 json names_of(const Catalogue& catalogue, bool alignments) {
   json names = json::array();
   std::set<std::string> seen;
-  for (const std::string& state : ground::states_of(catalogue)) {
-    const StateName name(state);
-    if (name.is_alignment == alignments && seen.insert(name.parameter).second) {
-      names.push_back({{"name", name.parameter}, {"symbol", symbol_of(name.parameter)}});
+  for (const ParameterId& state : ground::states_of(catalogue)) {
+    if (state.is_alignment() == alignments && seen.insert(short_name_of(state)).second) {
+      names.push_back({{"name", short_name_of(state)}, {"symbol", symbol_of(state)}});
     }
   }
   return names;
 }
 
-std::string full_symbol_of(const std::string& state) {
-  const StateName name(state);
-  return fmt::format("{}, gyro {}", symbol_of(name.parameter), name.gyro + 1);
+std::string full_symbol_of(const ParameterId& state) {
+  return fmt::format("{}, gyro {}", symbol_of(state), state.gyro() + 1);
 }
 
 json agreement_of(const ground::Agreement& agreement) {
@@ -141,7 +139,7 @@ json spread_tables(const ground::History& history) {
     const double sigma_unit = alignments ? kArcsecond_rad : kMicroradian;
     json rows = json::array();
     for (const ground::Spread& spread : history.spreads) {
-      if (StateName(spread.state).is_alignment == alignments) {
+      if (spread.state.is_alignment() == alignments) {
         rows.push_back({{"symbol", full_symbol_of(spread.state)},
                         {"start_ups", spread.start_ups},
                         {"mean", signed_number(spread.mean / unit, decimals_for(spread.next_sigma / unit))},

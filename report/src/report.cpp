@@ -23,7 +23,8 @@ std::string render(const ReportInput& input) {
       {.title = "Gyro calibration",
        .kind = "Gyro calibration report",
        .first_section = "verdict",
-       .reading_notes = "Time runs in minutes from the start of the pass. Sigmas are one standard deviation. Lines are "
+       .reading_notes = "Time runs in minutes from the start of the pass. Sigmas are one standard deviation. An "
+                        "error is the estimate less what it is compared with. Lines are "
                         "thinned for drawing so that the least and greatest value of every moment are kept; nothing is "
                         "skipped.",
        .content = assets::kPage,

@@ -10,6 +10,7 @@
 #include <set>
 
 #include "innovations.hpp"
+#include "trihedron/core/drift.hpp"
 #include "trihedron/core/outlier_gate.hpp"
 #include "trihedron/records/run.hpp"
 #include "units.hpp"
@@ -27,7 +28,7 @@ constexpr std::array<const char*, 3> kAxes = {"roll", "pitch", "heading"};
 json row_of(const Parameter& parameter) {
   json row = {
       {"symbol", parameter.symbol},
-      {"name", parameter.name},
+      {"name", short_name_of(parameter.id)},
       {"undetermined", !parameter.is_determined},
       {"shrunk", parameter.first_sigma > 0 ? significant(100 * parameter.sigma / parameter.first_sigma, 2) : "—"},
       {"converged", parameter.converged_min ? number(*parameter.converged_min, 0) : "not yet"}};
@@ -43,7 +44,7 @@ json row_of(const Parameter& parameter) {
         parameter.error ? signed_number(*parameter.error / error_unit, decimals_for(parameter.sigma / error_unit))
                         : "—";
   };
-  if (parameter.is_alignment) {
+  if (parameter.id.is_alignment()) {
     put("", kArcminute_rad, kArcsecond_rad, kArcsecond_rad);
   } else {
     put("", kMicroradian, kMicroradian, kMicroradian);
@@ -59,13 +60,13 @@ json gyros_of(const ReportInput& input, const std::vector<Parameter>& parameters
   json gyros = json::array();
   for (std::size_t k = 0; k < input.run.calibration.gyros.size(); ++k) {
     json gyro = {{"number", k + 1},
-                 {"model", input.run.calibration.gyros[k].drift_model},
+                 {"model", name_of(input.run.calibration.gyros[k].drift_model)},
                  {"drift", json::array()},
                  {"alignment", json::array()},
                  {"unmodelled", ""}};
     for (const Parameter& parameter : parameters) {
-      if (parameter.gyro == k) {
-        gyro[parameter.is_alignment ? "alignment" : "drift"].push_back(row_of(parameter));
+      if (parameter.id.gyro() == k) {
+        gyro[parameter.id.is_alignment() ? "alignment" : "drift"].push_back(row_of(parameter));
       }
     }
     if (input.truth != nullptr && k < input.truth->gyros.size()) {
@@ -83,18 +84,20 @@ json gyros_of(const ReportInput& input, const std::vector<Parameter>& parameters
 /// The drift coefficients of any gyro, once each, for the choice of figures. Those of the paper's Figs 5–7 are shown
 /// first.
 json coefficients_of(const std::vector<Parameter>& parameters) {
-  const std::map<std::string, std::string> in_paper = {{"k0", "Fig. 5"}, {"mu31", "Fig. 6"}, {"nu31", "Fig. 7"}};
-  const bool any_in_paper =
-      std::ranges::any_of(parameters, [&](const Parameter& p) { return in_paper.contains(p.name); });
+  const std::map<DriftCoefficient, std::string> in_paper = {{DriftCoefficient::of_eq1(Esg7::kK0), "Fig. 5"},
+                                                            {DriftCoefficient::of_eq1(Esg7::kMu31), "Fig. 6"},
+                                                            {DriftCoefficient::of_eq1(Esg7::kNu31), "Fig. 7"}};
+  const bool any_in_paper = std::ranges::any_of(
+      parameters, [&](const Parameter& p) { return p.id.is_drift() && in_paper.contains(p.id.coefficient); });
   json list = json::array();
-  std::set<std::string> seen;
+  std::set<DriftCoefficient> seen;
   for (const Parameter& parameter : parameters) {
-    if (parameter.is_alignment || !seen.insert(parameter.name).second) {
+    if (!parameter.id.is_drift() || !seen.insert(parameter.id.coefficient).second) {
       continue;
     }
-    const auto figure = in_paper.find(parameter.name);
+    const auto figure = in_paper.find(parameter.id.coefficient);
     const bool shown = any_in_paper ? figure != in_paper.end() : list.size() < 3;
-    list.push_back({{"name", parameter.name},
+    list.push_back({{"name", short_name_of(parameter.id)},
                     {"symbol", parameter.symbol},
                     {"paper", figure == in_paper.end() ? "" : figure->second},
                     {"shown", shown}});
@@ -128,9 +131,9 @@ json strongest_correlations(const ReportInput& input, const std::vector<Paramete
 
 // ---- Attitude
 
-json stretches_of(const ReportInput& input, const ground::AttitudeErrors& errors, double unit) {
+json stretches_of(const ReportInput& input, const ground::AttitudeEvaluation& evaluation, double unit) {
   json rows = json::array();
-  for (const auto& stretch : ground::statistics_by_stretch(errors, input.pass.settings.epoch, kStretch)) {
+  for (const ground::ErrorStatistics& stretch : evaluation.stretches) {
     if (stretch.to == stretch.from) {  // the pass ends on the first epoch of the next stretch
       continue;
     }
@@ -153,12 +156,12 @@ json open_loop_rows(const ReportInput& input) {
     return interval.passed ? number(to_minutes(*interval.passed), 1) : "> " + number(to_minutes(interval.observed), 0);
   };
   json rows = json::array();
-  for (const ground::OpenLoops& loops : input.evaluation->open_loops) {
-    const auto& [before, after] = loops.intervals;
+  for (const ground::IntervalPair& pair : input.evaluation->extension.pairs) {
+    const auto& [before, after] = pair;
     if (after.observed == Duration::zero()) {  // corrected at the end of the pass
       continue;
     }
-    const auto extension = loops.intervals.extension();
+    const auto extension = pair.extension();
     rows.push_back({{"corrected", number(to_minutes(after.corrected - input.pass.settings.epoch), 0)},
                     {"before", in_words(before)},
                     {"after", in_words(after)},
@@ -169,11 +172,12 @@ json open_loop_rows(const ReportInput& input) {
 }
 
 json evaluation_of(const ReportInput& input) {
-  if (!input.evaluation || (input.evaluation->navigation.t.empty() && input.evaluation->attitude.t.empty())) {
+  if (input.evaluation == nullptr ||
+      (input.evaluation->navigation.errors.t.empty() && input.evaluation->attitude.errors.t.empty())) {
     return nullptr;
   }
-  const Evaluation& evaluation = *input.evaluation;
-  return {{"reference", evaluation.reference},
+  const ground::CalibrationEvaluation& evaluation = *input.evaluation;
+  return {{"reference", reference_in_words(evaluation.attitude)},
           {"navigation", stretches_of(input, evaluation.navigation, kArcminute_rad)},
           {"attitude", stretches_of(input, evaluation.attitude, kArcsecond_rad)},
           {"open_loops", open_loop_rows(input)},
@@ -206,13 +210,13 @@ json innovation_rows(const ReportInput& input) {
 
 // ---- Telemetry
 
-json counts_of(const std::map<std::string, long>& counts) {
+json counts_of(const std::vector<NamedCount>& counts) {
   json rows = json::array();
   long total = 0;
-  for (const auto& [name, count] : counts) {
-    total += count;
+  for (const NamedCount& its : counts) {
+    total += its.count;
   }
-  for (const auto& [name, count] : counts) {
+  for (const auto& [name, count, is_rejected] : counts) {
     const double percent = 100 * static_cast<double>(count) / static_cast<double>(total);
     rows.push_back({{"name", name}, {"count", number(static_cast<double>(count), 0)}, {"percent", number(percent, 2)}});
   }
@@ -257,19 +261,23 @@ void put_gaps(const ReportInput& input, json& values) {
   values["more_gaps"] = gaps.size() > kShown ? std::to_string(gaps.size() - kShown) : "";
 }
 
+std::string drift_model_of(const CalibrationOptions& options) {
+  return options.drift_model ? name_of(*options.drift_model) : std::string(kAutoDriftModel);
+}
+
 json settings_of(const ReportInput& input) {
   const CalibrationOptions& options = input.run.options;
   json rows = json::array();
   const auto put = [&](const std::string& name, const std::string& value) {
     rows.push_back({{"name", name}, {"value", value}});
   };
-  put("Estimator", input.run.calibration.estimator);
-  put("Drift model", options.drift_model);
+  put("Estimator", std::string(name_of(input.run.calibration.estimator)));
+  put("Drift model", drift_model_of(options));
   put("Noise", options.find_noise ? "found from the pass" : "given, by settings or an earlier calibration");
   put("Process noise of each momentum",
       fmt::format("{}″ per √h", significant(options.direction_random_walk_rad_sqrt_s * 60 / kArcsecond_rad, 2)));
-  if (options.further_states.wandering_drift == FurtherStateOptions::Choice::kOn) {
-    put("Drift that wanders",
+  if (options.further_states.is_on(FurtherState::kWanderingDrift)) {
+    put(std::string(row_of(FurtherState::kWanderingDrift).label),
         fmt::format("{}″/h about each case axis, 1σ, over {}",
                     significant(options.further_states.wandering_drift_rad_s * 3600 / kArcsecond_rad, 2),
                     span(options.further_states.wandering_time)));
@@ -301,20 +309,31 @@ json settings_of(const ReportInput& input) {
   return rows;
 }
 
-/// The states beside alignment and drift.
+/// How a further state is shown.
+struct ShownUnit {
+  std::string_view ending;  ///< of its name
+  double size;
+  const char* text;
+};
+ShownUnit shown_unit(Unit unit) {
+  switch (unit) {
+    case Unit::kSecond:
+      return {"_s", 1e-3, "ms"};
+    case Unit::kRadian:
+      return {"_rad", kArcsecond_rad, "″"};
+    case Unit::kRadianPerSecond:
+      break;
+  }
+  return {"_rad_s", 1e-9, "10⁻⁹ rad/s"};
+}
+
+/// The states other than alignment and drift.
 json further_of(const ReportInput& input) {
   json rows = json::array();
-  struct Unit {
-    std::string ending;
-    double size;
-    const char* text;
-  };
-  static const std::array<Unit, 3> kUnits = {
-      {{"_rad_s", 1e-9, "10⁻⁹ rad/s"}, {"_s", 1e-3, "ms"}, {"_rad", kArcsecond_rad, "″"}}};
   for (const FurtherEstimate& estimate : input.run.calibration.further) {
-    const Unit& unit =
-        *std::ranges::find_if(kUnits, [&](const Unit& its) { return estimate.name.ends_with(its.ending); });
-    std::string name = estimate.name.substr(0, estimate.name.size() - unit.ending.size());
+    const ShownUnit unit = shown_unit(estimate.parameter.unit());
+    std::string name = name_of(estimate.parameter);
+    name.resize(name.size() - (name.ends_with(unit.ending) ? unit.ending.size() : 0));
     std::ranges::replace(name, '_', ' ');
     rows.push_back({{"name", name},
                     {"value", number(estimate.value / unit.size, 2)},
@@ -325,16 +344,9 @@ json further_of(const ReportInput& input) {
 }
 
 json states_decided(const ReportInput& input) {
-  static const std::map<std::string, std::string> kNames = {{"clock_offset", "Clock offset"},
-                                                            {"orbital_error", "Error at orbital period"},
-                                                            {"drift_outside_eq1", "Drift outside eq. (1)"},
-                                                            {"readout_bias", "Bias of the direction cosines"},
-                                                            {"coefficient_change", "Change of the coefficients"},
-                                                            {"wandering_drift", "Drift that wanders"}};
   json sentences = json::array();
   for (const Evidence& evidence : input.run.evidence) {
-    const auto name = kNames.find(evidence.states);
-    sentences.push_back(fmt::format("{}: {} ({:+.1f}).", name == kNames.end() ? evidence.states : name->second,
+    sentences.push_back(fmt::format("{}: {} ({:+.1f}).", evidence.label(),
                                     evidence.accepted ? "estimated" : "taken as zero", evidence.log_bayes_factor));
   }
   return sentences;
@@ -343,18 +355,18 @@ json states_decided(const ReportInput& input) {
 json drift_model_rows(const CalibrationRun& run) {
   json rows = json::array();
   for (const DriftModelForecast& model : run.drift_models) {
-    rows.push_back({{"name", model.drift_model},
+    rows.push_back({{"name", name_of(model.drift_model)},
                     {"used", model.drift_model == run.calibration.gyros[0].drift_model},
-                    {"coefficients", model.coefficients},
+                    {"coefficients", model.drift_model.size()},
                     {"error", significant(model.open_loop_rms_rad / kArcsecond_rad, 3)},
                     {"gain", fmt::format("{:+.1f}", model.log_likelihood)}});
   }
   return rows;
 }
 
-json statistics_rows(const std::map<std::string, double>& statistics) {
+json statistics_rows(const Statistics& statistics) {
   json rows = json::array();
-  for (const auto& [name, value] : statistics) {
+  for (const auto& [name, value] : named_values(statistics)) {
     rows.push_back({{"name", name}, {"value", fmt::format("{:.6g}", value)}});
   }
   return rows;
@@ -369,8 +381,8 @@ json facts_of(const ReportInput& input) {
           fact("Gyros", fmt::format("{}, {} samples", input.pass.gyro.gyros,
                                     number(static_cast<double>(input.pass.gyro.size()), 0))),
           fact("Star tracker", counted(static_cast<long>(input.pass.star_tracker.size()), "fix", "fixes")),
-          fact("Estimator",
-               fmt::format("{}, drift model {}", input.run.calibration.estimator, input.run.options.drift_model))};
+          fact("Estimator", fmt::format("{}, drift model {}", name_of(input.run.calibration.estimator),
+                                        drift_model_of(input.run.options)))};
 }
 
 }  // namespace
@@ -386,8 +398,8 @@ json table_values(const ReportInput& input, const std::vector<Parameter>& parame
                  {"correlations", strongest_correlations(input, parameters)},
                  {"evaluation", evaluation_of(input)},
                  {"innovation_rows", innovation_rows(input)},
-                 {"fix_counts", counts_of(input.run.fix_counts)},
-                 {"sample_counts", counts_of(input.run.samples)},
+                 {"fix_counts", counts_of(named_counts(input.run.fix_counts))},
+                 {"sample_counts", counts_of(named_counts(input.run.samples))},
                  {"telemetry_notes", input.telemetry_notes},
                  {"further", further_of(input)},
                  {"states_decided", states_decided(input)},

@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <set>
 
@@ -77,9 +76,9 @@ json figure_of_merit(const std::string& name, const std::string& value, const st
 }
 
 /// Statistics per 90 min, without the rest of a stretch that the end of the pass cut short.
-std::vector<ground::ErrorStatistics> whole_stretches(const ReportInput& input, const ground::AttitudeErrors& errors) {
-  auto stretches = ground::statistics_by_stretch(errors, input.pass.settings.epoch, kStretch);
-  while (stretches.size() > 1 && stretches.back().to - stretches.back().from < kStretch / 2) {
+std::vector<ground::ErrorStatistics> whole_stretches(const ground::AttitudeEvaluation& evaluation) {
+  auto stretches = evaluation.stretches;
+  while (stretches.size() > 1 && stretches.back().to - stretches.back().from < ground::kEvaluatedStretch / 2) {
     stretches.pop_back();
   }
   return stretches;
@@ -92,11 +91,11 @@ std::string minutes_of(const ReportInput& input, const ground::ErrorStatistics& 
 }
 
 json attitude_number(const ReportInput& input) {
-  if (input.evaluation && !input.evaluation->attitude.t.empty()) {
-    const auto stretches = whole_stretches(input, input.evaluation->attitude);
+  if (input.evaluation != nullptr && !input.evaluation->attitude.errors.t.empty()) {
+    const auto stretches = whole_stretches(input.evaluation->attitude);
     return figure_of_merit("Attitude error while calibrating", of_axes(stretches.back().rms_rad, kArcsecond_rad), "″",
                            "roll / pitch / heading, rms in " + minutes_of(input, stretches.back()) + " against " +
-                               input.evaluation->reference);
+                               reference_in_words(input.evaluation->attitude));
   }
   if (!input.run.attitude.sigma_rad.empty()) {
     return figure_of_merit("Attitude at the end", of_axes(input.run.attitude.sigma_rad.back(), kArcsecond_rad), "″",
@@ -106,18 +105,16 @@ json attitude_number(const ReportInput& input) {
 }
 
 json navigation_number(const ReportInput& input) {
-  if (!input.evaluation || input.evaluation->navigation.t.empty()) {
+  if (input.evaluation == nullptr || input.evaluation->navigation.errors.t.empty()) {
     return nullptr;
   }
-  const ground::AttitudeErrors& errors = input.evaluation->navigation;
-  const auto stretches = whole_stretches(input, errors);
+  const auto stretches = whole_stretches(input.evaluation->navigation);
   const auto greatest = [](const ground::ErrorStatistics& stretch) {
     return significant(stretch.max_total_rad / kArcminute_rad, 2);
   };
   const std::string name = "Greatest error between corrections";
   if (stretches.size() == 1) {
-    const auto all = ground::statistics_by_stretch(errors, input.pass.settings.epoch, Duration::max());
-    return figure_of_merit(name, greatest(all.front()), "′", "open loop, total angle");
+    return figure_of_merit(name, greatest(input.evaluation->navigation.whole), "′", "open loop, total angle");
   }
   return figure_of_merit(name, greatest(stretches.front()) + " → " + greatest(stretches.back()), "′",
                          "open loop, total angle: in " + minutes_of(input, stretches.front()) + " and in " +
@@ -129,7 +126,7 @@ json alignment_number(const std::vector<Parameter>& parameters) {
   double worst_error = 0;
   bool has_error = false;
   for (const Parameter& parameter : parameters) {
-    if (parameter.is_alignment) {
+    if (parameter.id.is_alignment()) {
       worst_sigma = std::max(worst_sigma, parameter.sigma);
       has_error = has_error || parameter.error;
       worst_error = std::max(worst_error, std::abs(parameter.error.value_or(0)));
@@ -150,7 +147,7 @@ json convergence_number(const std::vector<Parameter>& parameters, bool alignment
   std::vector<std::string> off;
   std::size_t count = 0;
   for (const Parameter& parameter : parameters) {
-    if (parameter.is_alignment != alignment || !parameter.is_determined || !parameter.is_followed) {
+    if (parameter.id.is_alignment() != alignment || !parameter.is_determined || !parameter.is_followed) {
       continue;
     }
     ++count;
@@ -176,10 +173,10 @@ json convergence_number(const std::vector<Parameter>& parameters, bool alignment
 }
 
 json extension_number(const ReportInput& input) {
-  if (!input.evaluation) {
+  if (input.evaluation == nullptr) {
     return nullptr;
   }
-  const auto extension = ground::median_extension(input.evaluation->open_loops);
+  const auto& extension = input.evaluation->extension.median;
   if (!extension) {
     return nullptr;
   }
@@ -206,7 +203,7 @@ json nis_number(const ReportInput& input) {
              : figure_of_merit("Mean NIS of the fixes", number(sum / count, 2), "",
                                fmt::format("{:.3g} is expected: below, the noise is overstated; above, the model "
                                            "is incomplete",
-                                           input.run.calibration.statistics.at("nis_degrees_of_freedom")));
+                                           input.run.calibration.statistics.nis_degrees_of_freedom));
 }
 
 json undetermined_of(const std::vector<Parameter>& parameters) {
@@ -220,11 +217,11 @@ json undetermined_of(const std::vector<Parameter>& parameters) {
   return list;
 }
 
-json rejected_of(const std::map<std::string, long>& counts, const std::string& one, const std::string& many) {
+json rejected_of(const std::vector<NamedCount>& counts, const std::string& one, const std::string& many) {
   json list = json::array();
-  for (const auto& [name, count] : counts) {
-    if (name.starts_with("rejected") && count > 0) {
-      list.push_back(counted(count, one, many) + " " + name);
+  for (const NamedCount& its : counts) {
+    if (its.is_rejected) {
+      list.push_back(fmt::format("{} {}", counted(its.count, one, many), its.name));
     }
   }
   return list;
@@ -237,7 +234,7 @@ json findings_of(const std::vector<Finding>& findings) {
   for (const Finding& finding : findings) {
     list.push_back({{"style", style_of(finding.severity)},
                     {"word", word_of(finding.severity)},
-                    {"code", finding.code},
+                    {"code", name_of(finding.code)},
                     {"text", finding.text},
                     {"evidence", finding.evidence},
                     {"cure", finding.cure}});
@@ -254,8 +251,8 @@ json verdict_values(const ReportInput& input, const std::vector<Parameter>& para
       numbers.push_back(std::move(merit));
     }
   }
-  json rejected = rejected_of(input.run.fix_counts, "fix", "fixes");
-  for (json& line : rejected_of(input.run.samples, "gyro sample", "gyro samples")) {
+  json rejected = rejected_of(named_counts(input.run.fix_counts), "fix", "fixes");
+  for (json& line : rejected_of(named_counts(input.run.samples), "gyro sample", "gyro samples")) {
     rejected.push_back(std::move(line));
   }
   return {{"verdict", verdict_of(input.run.calibration.verdict)},

@@ -40,7 +40,7 @@ TEST(HistoryReport, HoldsEachParameterOfEachCalibration) {
   const Calibration& last = catalogue().back().calibration;
   const json& k0 = data["trends"][0];
   EXPECT_EQ(k0["symbol"], "k₀");
-  EXPECT_NEAR(k0["value"][8].get<double>(), last.gyros[0].drift_rad_s[0].second / 1e-6, 1e-9);
+  EXPECT_NEAR(k0["value"][8].get<double>(), last.gyros[0].drift_rad_s[0] / 1e-6, 1e-9);
   EXPECT_NEAR(k0["sigma"][8].get<double>(), std::sqrt(last.covariance(0, 0)) / 1e-6, 1e-9);
 }
 
@@ -55,7 +55,7 @@ TEST(HistoryReport, DrawsAlignmentsFromTheirMean) {
   const auto history = ground::compare_start_ups(catalogue());
   const json align_x = data_of(rendered(catalogue()))["trends"][7];
   EXPECT_EQ(align_x["name"], "align_x");
-  const auto mean = std::ranges::find(history.spreads, "gyro1.align_x", &ground::Spread::state)->mean;
+  const auto mean = std::ranges::find(history.spreads, ParameterId::alignment(0, 0), &ground::Spread::state)->mean;
   EXPECT_NEAR(align_x["value"][8].get<double>(),
               (catalogue().back().calibration.gyros[0].alignment_rotation_vector_rad.x() - mean) / 4.8481368e-6, 1e-3);
 }

@@ -25,9 +25,9 @@ int main(int argc, char** argv) {
       << render_history(catalogue, ground::compare_start_ups(catalogue));
 
   const Finding not_determined{
-      "not-determined", "The data do not determine gyro2.nu12. Its value and sigma are those of the prior.",
+      FindingCode::kNotDetermined, "The data do not determine gyro2.nu12. Its value and sigma are those of the prior.",
       "posterior sigma above half of the prior sigma", "Fly slews during the calibration, or a longer pass."};
-  const Finding rejected{"many-rejected", "1.0 % of the fixes were rejected as outliers.", "101 of 9770",
+  const Finding rejected{FindingCode::kManyRejected, "1.0 % of the fixes were rejected as outliers.", "101 of 9770",
                          "Look for a clock offset or a wrong noise figure.", Finding::Severity::kNote};
   const test::SyntheticRun troubled =
       test::synthetic_run({.troubled = true, .verdict = {true, {not_determined, rejected}}});
@@ -36,7 +36,7 @@ int main(int argc, char** argv) {
                                     "star_tracker.csv: the last line is cut short; it was left out."};
   write("troubled.html", troubled_input);
 
-  const Finding wrong{"nis-out-of-bounds",
+  const Finding wrong{FindingCode::kNisOutOfBounds,
                       "The fixes scatter more than the filter expects: its model is incomplete or the noise is "
                       "understated, and its sigmas are too small.",
                       "mean NIS 7.512 over 10800 fixes; 99.9 % of consistent filters lie in 3.911 … 4.090",

@@ -57,11 +57,11 @@ TEST(Report, IsNotBrokenByTheNameOfTheSpacecraft) {
 
 TEST(Report, EscapesFindingsAndNotes) {
   test::SyntheticRun run = short_run();
-  run.run.calibration.verdict.findings.push_back({"<c>", "<t>", "<e>", "<u>"});
+  run.run.calibration.verdict.findings.push_back({FindingCode::kShortPass, "<t>", "<e>", "<u>"});
   ReportInput input = run.judged();
   input.telemetry_notes = {"<n>"};
   const std::string html = render(input);
-  for (const char* tag : {"<c>", "<t>", "<e>", "<u>", "<n>"}) {
+  for (const char* tag : {"<t>", "<e>", "<u>", "<n>"}) {
     EXPECT_THAT(html, Not(HasSubstr(tag)));
   }
   EXPECT_THAT(html, HasSubstr("&lt;n&gt;"));
@@ -69,7 +69,7 @@ TEST(Report, EscapesFindingsAndNotes) {
 
 TEST(Report, ExpectsTheNisOfAsManyGyrosAsThereAre) {
   test::SyntheticRun run = short_run();
-  run.run.calibration.statistics["nis_degrees_of_freedom"] = 6;
+  run.run.calibration.statistics.nis_degrees_of_freedom = 6;
   EXPECT_THAT(render(run.judged()), HasSubstr("6 is expected"));
 }
 
@@ -80,9 +80,9 @@ TEST(Report, SaysOfWhichMinutesItsErrorsAre) {
 TEST(Report, SaysFirstWhetherTheResultCanBeTrusted) {
   test::SyntheticRun run = short_run();
   EXPECT_THAT(render(run.judged()), HasSubstr("<p class=\"word\">Trustworthy</p>"));
-  run.run.calibration.verdict.findings = {{"a", "weak", "", "cure A"}};
+  run.run.calibration.verdict.findings = {{FindingCode::kShortPass, "weak", "", "cure A"}};
   EXPECT_THAT(render(run.judged()), HasSubstr("<p class=\"word\">Trustworthy, with 1 warning</p>"));
-  run.run.calibration.verdict = {false, {{"b", "broken", "", "cure B", Finding::Severity::kDoNotUse}}};
+  run.run.calibration.verdict = {false, {{FindingCode::kTooFewFixes, "broken", "", "cure B"}}};
   const std::string html = render(run.judged());
   EXPECT_THAT(html, HasSubstr("<p class=\"word\">Do not use</p>"));
   EXPECT_THAT(html, HasSubstr("<li>cure B</li>"));
@@ -91,10 +91,9 @@ TEST(Report, SaysFirstWhetherTheResultCanBeTrusted) {
 TEST(Report, PutsTheWorstFindingFirst) {
   test::SyntheticRun run = short_run();
   run.run.calibration.verdict = {
-      false,
-      {{"mild", "mild", "", "", Finding::Severity::kNote}, {"grave", "grave", "", "", Finding::Severity::kDoNotUse}}};
+      false, {{FindingCode::kGyrosNotUsed, "mild", "", ""}, {FindingCode::kTooFewFixes, "grave", "", ""}}};
   const std::string html = render(run.judged());
-  EXPECT_LT(html.find("<code>grave"), html.find("<code>mild"));
+  EXPECT_LT(html.find("<code>too-few-fixes"), html.find("<code>gyros-not-used"));
   EXPECT_THAT(html, HasSubstr("<p class=\"lead\">grave</p>"));
 }
 
@@ -151,8 +150,9 @@ TEST(Report, GivesALowerBoundWhereTheLimitIsNotPassedAnyMore) {
   const auto interval = [&](std::optional<Duration> passed) {
     return ground::CorrectionInterval{start + minutes(90), minutes(90), passed, 0};
   };
-  run.evaluation.open_loops.resize(2);
-  run.evaluation.open_loops[1].intervals = {interval(minutes(20)), interval({})};
+  ground::IntervalExtension& extension = run.evaluation.extension;
+  extension.pairs = {{interval(minutes(20)), interval({})}};
+  extension.median = ground::median_extension(extension.pairs);
   const std::string html = render(run.judged());
   EXPECT_THAT(html, HasSubstr("<strong>≥ 4.5<span class=\"unit\"> ×</span></strong>"));
   EXPECT_THAT(html, HasSubstr("<td>20.0</td><td>&gt; 90</td><td>≥ 4.5</td>"));

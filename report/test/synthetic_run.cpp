@@ -6,7 +6,9 @@
 #include <limits>
 #include <numbers>
 #include <random>
+#include <utility>
 
+#include "trihedron/core/drift.hpp"
 #include "trihedron/records/run.hpp"
 #include "units.hpp"
 
@@ -16,8 +18,8 @@ namespace {
 constexpr int kGyros = 2;
 constexpr double kOrbit_s = 5640;
 constexpr double kRate_rad_s = 2 * std::numbers::pi / kOrbit_s;
-constexpr std::array<const char*, 7> kCoefficients = {"k0", "mu12", "mu23", "mu31", "nu12", "nu23", "nu31"};
-constexpr std::size_t kPerGyro = kCoefficients.size() + 3;
+constexpr std::size_t kCoefficients = Esg7::kSize;
+constexpr std::size_t kPerGyro = kCoefficients + 3;
 
 class Generator {
  public:
@@ -62,8 +64,8 @@ class Generator {
   void make_truth() {
     for (int k = 0; k < kGyros; ++k) {
       Truth::Gyro gyro;
-      for (const char* name : kCoefficients) {
-        gyro.drift_rad_s.emplace_back(name, 2e-6 * normal());
+      for (const DriftCoefficient& coefficient : coefficients_of(kEsg7)) {
+        gyro.drift_rad_s.emplace_back(coefficient, 2e-6 * normal());
       }
       gyro.alignment_rotation_vector_rad =
           Eigen::Vector3d(normal(), normal(), normal()).normalized() * 30 * kArcminute_rad;
@@ -102,10 +104,8 @@ class Generator {
         }
       }
     }
-    out_.run.samples["used"] = good;
-    if (bad > 0) {
-      out_.run.samples["rejected: not a direction"] = bad;
-    }
+    out_.run.samples[SampleStatus::kUsed] = good;
+    out_.run.samples[SampleStatus::kRejectedNotDirection] = bad;
     for (long i = 0; i < options_.duration / out_.pass.settings.star_tracker_period; ++i) {
       const double t_s = static_cast<double>(i) * 3;
       if (!in_outage(t_s) && !(options_.troubled && uniform() < 0.02)) {
@@ -118,9 +118,8 @@ class Generator {
   [[nodiscard]] double truth_of(std::size_t column) const {
     const Truth::Gyro& gyro = out_.truth.gyros[column / kPerGyro];
     const std::size_t i = column % kPerGyro;
-    return i < kCoefficients.size()
-               ? gyro.drift_rad_s[i].second
-               : gyro.alignment_rotation_vector_rad(static_cast<Eigen::Index>(i - kCoefficients.size()));
+    return i < kCoefficients ? gyro.drift_rad_s[i].second
+                             : gyro.alignment_rotation_vector_rad(static_cast<Eigen::Index>(i - kCoefficients));
   }
 
   void make_parameters() {
@@ -134,7 +133,7 @@ class Generator {
       std::vector<double>& sigma = history.sigma.emplace_back();
       for (std::size_t column = 0; column < kStates; ++column) {
         const std::size_t i = column % kPerGyro;
-        const bool alignment = i >= kCoefficients.size();
+        const bool alignment = i >= kCoefficients;
         const bool unknown = options_.troubled && column == kPerGyro + 4;
         const double first = alignment ? 30 * kArcminute_rad : 2e-6;
         const double last = unknown     ? 0.8 * first
@@ -173,44 +172,49 @@ class Generator {
         fix.corrected_navigator = true;
         corrected_s = seconds(t);
       }
-      ++out_.run.fix_counts[ground::name_of(fix.status)];
+      ++out_.run.fix_counts[fix.status];
       out_.run.fixes.push_back(fix);
     }
   }
 
   void make_attitude() {
-    Evaluation& evaluation = out_.evaluation;
-    evaluation.reference = "the simulated truth";
-    evaluation.limit_rad = 5 * kArcminute_rad;
+    ground::AttitudeErrors navigation;
+    ground::AttitudeErrors calibrating;
     double corrected_s = 0;
     for (const FixRecord& fix : out_.run.fixes) {
       const double t_s = seconds(fix.t);
       corrected_s = fix.corrected_navigator ? t_s : corrected_s;
       const double age_s = t_s - corrected_s;
       const double size = (13 * std::exp(-corrected_s / 4000) + 0.35) * kArcminute_rad * age_s / 5400;
-      evaluation.navigation.t.push_back(fix.t);
-      evaluation.navigation.error_rad.emplace_back(size * std::sin(kRate_rad_s * t_s),
-                                                   size * (0.3 + 0.2 * std::cos(kRate_rad_s * t_s)),
-                                                   size * std::cos(kRate_rad_s * t_s));
-      evaluation.navigation.error_rad.back() += Eigen::Vector3d(normal(), normal(), normal()) * kArcsecond_rad;
-      evaluation.navigation.sigma_rad.emplace_back(Eigen::Vector3d::Constant(size + kArcsecond_rad));
-      evaluation.navigation.age_s.push_back(age_s);
+      navigation.t.push_back(fix.t);
+      navigation.error_rad.emplace_back(size * std::sin(kRate_rad_s * t_s),
+                                        size * (0.3 + 0.2 * std::cos(kRate_rad_s * t_s)),
+                                        size * std::cos(kRate_rad_s * t_s));
+      navigation.error_rad.back() += Eigen::Vector3d(normal(), normal(), normal()) * kArcsecond_rad;
+      navigation.sigma_rad.emplace_back(Eigen::Vector3d::Constant(size + kArcsecond_rad));
+      navigation.age_s.push_back(age_s);
 
       const Eigen::Vector3d sigma_rad =
           Eigen::Vector3d(1.5, 1.4, 2.2) * (1 + 12 * std::exp(-t_s / 900)) * kArcsecond_rad;
-      evaluation.attitude.t.push_back(fix.t);
-      evaluation.attitude.error_rad.emplace_back(sigma_rad.cwiseProduct(Eigen::Vector3d(normal(), normal(), normal())));
-      evaluation.attitude.sigma_rad.push_back(sigma_rad);
+      calibrating.t.push_back(fix.t);
+      calibrating.error_rad.emplace_back(sigma_rad.cwiseProduct(Eigen::Vector3d(normal(), normal(), normal())));
+      calibrating.sigma_rad.push_back(sigma_rad);
       out_.run.attitude.t.push_back(fix.t);
       out_.run.attitude.q_in_c.push_back(attitude(t_s));
       out_.run.attitude.sigma_rad.push_back(sigma_rad);
     }
+    const auto evaluated = [&](ground::AttitudeErrors errors) {
+      return ground::summed_up(std::move(errors), ground::ReferenceKind::kTruth, out_.pass.settings.epoch,
+                               ground::kAttitudeLimit_rad);
+    };
+    out_.evaluation.navigation = evaluated(std::move(navigation));
+    out_.evaluation.attitude = evaluated(std::move(calibrating));
     make_open_loops();
   }
 
   /// The error grows as a share of the time since the correction, the smaller the later the correction.
   void make_open_loops() {
-    auto& evaluation = out_.evaluation;
+    ground::CalibrationEvaluation& evaluation = out_.evaluation;
     const double end_s = seconds(out_.run.fixes.back().t);
     for (double from_s = 0; from_s <= end_s; from_s += 5400) {
       const auto grown = [&](double rad_per_s) {
@@ -226,7 +230,9 @@ class Generator {
       loops.intervals = {ground::correction_intervals(loops.known_before, evaluation.limit_rad).front(),
                          ground::correction_intervals(loops.calibrated, evaluation.limit_rad).front()};
       evaluation.open_loops.push_back(loops);
+      evaluation.extension.pairs.push_back(loops.intervals);
     }
+    evaluation.extension.median = ground::median_extension(evaluation.open_loops);
   }
 
   void make_angle() {
@@ -248,18 +254,15 @@ class Generator {
     const std::vector<double>& sigma = out_.run.parameters.sigma.back();
     for (std::size_t k = 0; k < kGyros; ++k) {
       GyroCalibration gyro;
-      gyro.drift_model = out_.run.options.drift_model;
-      for (std::size_t i = 0; i < kCoefficients.size(); ++i) {
-        gyro.drift_rad_s.emplace_back(kCoefficients[i], value[k * kPerGyro + i]);
-        calibration.states.push_back("gyro" + std::to_string(k + 1) + "." + kCoefficients[i]);
+      for (std::size_t i = 0; i < kCoefficients; ++i) {
+        gyro.drift_rad_s.push_back(value[k * kPerGyro + i]);
       }
       for (int axis = 0; axis < 3; ++axis) {
-        gyro.alignment_rotation_vector_rad(axis) =
-            value[k * kPerGyro + kCoefficients.size() + static_cast<std::size_t>(axis)];
-        calibration.states.push_back("gyro" + std::to_string(k + 1) + ".align_" + "xyz"[axis]);
+        gyro.alignment_rotation_vector_rad(axis) = value[k * kPerGyro + kCoefficients + static_cast<std::size_t>(axis)];
       }
       calibration.gyros.push_back(gyro);
     }
+    calibration.states = drift_and_alignment(kEsg7, kGyros);
     const auto states = static_cast<Eigen::Index>(sigma.size());
     calibration.covariance.resize(states, states);
     for (Eigen::Index i = 0; i < states; ++i) {
@@ -272,7 +275,8 @@ class Generator {
     }
     const std::vector<double>& sigma_before = out_.run.parameters.sigma.front();
     out_.run.known_before.covariance = Eigen::VectorXd::Map(sigma_before.data(), states).cwiseAbs2().asDiagonal();
-    calibration.statistics = {{"fixes", static_cast<double>(out_.run.fixes.size())}, {"nis_degrees_of_freedom", 4}};
+    calibration.statistics.fixes = static_cast<long>(out_.run.fixes.size());
+    calibration.statistics.nis_degrees_of_freedom = 4;
   }
 
   const SyntheticOptions& options_;
@@ -303,7 +307,7 @@ std::vector<CatalogueEntry> synthetic_catalogue(const Calibration& like) {
       calibration.verdict.trustworthy = !catalogue.empty();
       Eigen::Index state = 0;
       for (GyroCalibration& gyro : calibration.gyros) {
-        for (auto& [name, value] : gyro.drift_rad_s) {
+        for (double& value : gyro.drift_rad_s) {
           value += moved + std::sqrt(calibration.covariance(state, state)) * normal(random);
           ++state;
         }
@@ -315,8 +319,11 @@ std::vector<CatalogueEntry> synthetic_catalogue(const Calibration& like) {
       catalogue.push_back(entry);
     }
   }
-  catalogue.back().calibration.gyros[0].drift_rad_s.emplace_back("W(1,0)", 1e-8);
-  catalogue.back().calibration.states.push_back("gyro1.W(1,0)");
+  // The last one has a coefficient that the others do not have.
+  GyroCalibration& gyro = catalogue.back().calibration.gyros[0];
+  gyro.drift_model = kEsg20;
+  gyro.drift_rad_s.resize(static_cast<std::size_t>(kEsg20.size()), 1e-8);
+  catalogue.back().calibration.states.push_back(parameter_named("gyro1.W(1,0)").value());
   const Eigen::Index states = like.covariance.rows() + 1;
   catalogue.back().calibration.covariance.conservativeResizeLike(
       Eigen::MatrixXd(Eigen::VectorXd::Constant(states, 1e-18).asDiagonal()));

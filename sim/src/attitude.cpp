@@ -6,6 +6,8 @@
 #include <numbers>
 #include <stdexcept>
 
+#include "trihedron/records/stop.hpp"
+
 namespace trihedron::sim {
 namespace {
 
@@ -20,8 +22,8 @@ Rot<In, C> from_axes(const Vector3d& x, const Vector3d& y, const Vector3d& z) {
   return Rot<In, C>::assume(m);
 }
 
-/// The reference attitude as samples for a spline. The spline is several times faster than the formulas, which at 8 Hz
-/// matters.
+/// The reference attitude as samples for a spline, which is several times faster than the formulas: it is evaluated at
+/// each step of 8 Hz.
 std::vector<AttitudeSample> reference_samples(const AttitudeScenario& scenario, const Ephemeris& ephemeris,
                                               double begin_s, double end_s) {
   using Reference = AttitudeScenario::Reference;
@@ -34,14 +36,16 @@ std::vector<AttitudeSample> reference_samples(const AttitudeScenario& scenario, 
     case Reference::kYawSteered:
       break;
   }
-  // In a low orbit a cubic spline through samples 2 s apart is off by (5/384) (n/2 · 2 s)⁴ ≈ 2e-14 rad. What the
-  // natural ends add, 1e-7 rad, falls by 3.7 from sample to sample and is gone after 20.
+  // In a low orbit the error of a cubic spline through samples 2 s apart is (5/384) (n/2 · 2 s)⁴ ≈ 2e-14 rad. The
+  // natural boundary conditions add 1e-7 rad at the ends, which falls by a factor of 3.7 per sample: a margin of 20
+  // samples keeps it out of the pass.
   constexpr double kSpacing_s = 2;
   constexpr double kMargin_s = 20 * kSpacing_s;
   const auto attitude = scenario.reference == Reference::kOrbital ? orbital_attitude : yaw_steered_attitude;
   const auto intervals = static_cast<int>(std::ceil((end_s - begin_s + 2 * kMargin_s) / kSpacing_s));
   std::vector<AttitudeSample> samples;
   for (int i = 0; i <= intervals; ++i) {
+    check_stop();
     const double t = begin_s - kMargin_s + i * kSpacing_s;
     samples.push_back({t, attitude(ephemeris.at(t)).quaternion()});
   }
@@ -52,7 +56,8 @@ std::vector<AttitudeSample> reference_samples(const AttitudeScenario& scenario, 
 Quaterniond turn(const Vector3d& rotation_vector_rad) {
   const Vector3d half = rotation_vector_rad / 2;
   const double x = half.squaredNorm();
-  // Series of cos and sin(x)/x where they are exact to rounding, x³/5040 < 1e-16: jitter comes here at every step.
+  // Series of cos and sin(x)/x where they are exact to rounding, x³/5040 < 1e-16. Jitter, evaluated at every step,
+  // takes this branch.
   if (x < 5e-5) {
     const double sinc = 1 + x * (-1.0 / 6 + x / 120);
     return {1 + x * (-1.0 / 2 + x * (1.0 / 24 - x / 720)), sinc * half.x(), sinc * half.y(), sinc * half.z()};
@@ -156,6 +161,7 @@ SmoothNoise::SmoothNoise(double bandwidth_hz, double begin_s, double end_s, Stre
   const auto intervals = static_cast<std::size_t>(std::ceil((end_s - begin_s) * knots_per_s_)) + 1;
   coefficients_.resize(intervals + 5);
   for (Vector3d& c : coefficients_) {
+    check_stop();
     c = to_unit_variance * random.normal3();
   }
 }
@@ -235,7 +241,8 @@ Quaterniond AttitudeSpline::at(double t_s) const {
 AttitudeProgramme::AttitudeProgramme(const AttitudeScenario& scenario, const Ephemeris& ephemeris, std::uint64_t seed,
                                      double begin_s, double end_s)
     : reference_(reference_samples(scenario, ephemeris, begin_s, end_s)), jitter_rad_(scenario.jitter_rad) {
-  // A recording may end with the pass: the rate is asked for a little beyond, where the spline still holds.
+  // A recording may end with the pass. The body rate is evaluated a little beyond the end, where the spline still
+  // holds.
   constexpr double kSlack_s = 0.2;
   if (!(reference_.begin_s() <= begin_s + kSlack_s && reference_.end_s() >= end_s - kSlack_s)) {
     throw std::invalid_argument("recorded attitude: must cover " + std::to_string(begin_s) + " … " +

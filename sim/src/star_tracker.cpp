@@ -6,6 +6,7 @@
 #include <cmath>
 #include <optional>
 
+#include "trihedron/records/stop.hpp"
 #include "trihedron/sim/interval.hpp"
 #include "trihedron/sim/random.hpp"
 
@@ -15,7 +16,8 @@ namespace {
 using Eigen::Quaterniond;
 using Eigen::Vector3d;
 
-/// The error that belongs to the stars in the field: Gauss–Markov in the angle that the field has moved.
+/// The error that depends on which stars are in the field of view: Gauss–Markov in the angle by which the field has
+/// moved over the sky.
 class FieldError {
  public:
   FieldError(const StarTrackerScenario& head, Stream random) : head_(head), random_(random), unit_(random_.normal3()) {}
@@ -32,7 +34,7 @@ class FieldError {
   Vector3d unit_;
 };
 
-/// What of the attitude and the sky keeps the head from a fix now, if anything.
+/// The fault that keeps the head from giving a fix at this attitude and time, if any.
 std::optional<Fault> obstacle(const StarTrackerScenario& head, const StarTrackerView& view, const Rot<C, Head>& C_c_s,
                               double t_s) {
   if (std::isfinite(head.max_rate_rad_s) && !(view.attitude.rate(t_s).norm() <= head.max_rate_rad_s)) {
@@ -60,9 +62,9 @@ Vec<Head> aberration_error(const Rot<In, Head>& C_in_s, const Vec<In>& velocity_
   Vector3d star = C_in_s.raw().col(2);
   Vector3d beta = velocity_m_s.raw() / ERFA_CMPS;
   Vector3d seen;
-  // The Sun's potential moves a star by 0.4 mas at most: left out by a distance of 1e9 au.
+  // The Sun's gravity moves a star by 0.4 mas at most. It is left out by giving a distance of 1e9 au from the Sun.
   eraAb(star.data(), beta.data(), 1e9, std::sqrt(1 - beta.squaredNorm()), seen.data());
-  // The head reports the attitude in which its catalogue would look like this: turned against the stars' displacement.
+  // The head reports the attitude at which its catalogue would be seen like this: turned against the displacement.
   return C_in_s.inverse() * Vec<In>::assume(-star.cross(seen));
 }
 
@@ -83,12 +85,13 @@ StarTrackerTelemetry simulate_fixes(const StarTrackerScenario& head, const StarT
   StarTrackerTelemetry fixes;
   Quaterniond previous = Quaterniond::Identity();
   for (Duration since{0}; since <= duration; since += period) {
+    check_stop();
     const Time t = epoch + since;
     const double t_s = to_seconds(since) + head.clock_offset_s - head.latency_s;
     const double phase = n * to_seconds(since);
 
-    // Every random number of a fix is drawn whether it is used or not, so that one fault leaves the rest of the pass as
-    // it was.
+    // Every random number of a fix is drawn whether it is used or not, so that switching a fault on changes no other
+    // fix.
     Vector3d error = head.noise_rad.cwiseProduct(noise.normal3());
     error += head.orbital_sine_rad * std::sin(phase) + head.orbital_cosine_rad * std::cos(phase);
     if (!head.field_error_rad.isZero(0)) {

@@ -140,7 +140,7 @@ TEST(Harmonics, RefuseWhatDoesNotExist) {
   EXPECT_THROW(HarmonicField({{Potential::kD, 21, 0, 1e-7}}), std::invalid_argument);
 }
 
-// The structure of eq. (1): docs on the drift model, section 3.
+// The structure of eq. (1): docs/mathematics.md, section 3.
 
 Vector3d eq1(const Vector3d& h, const Esg7::Coefficients<double>& kappa) { return Esg7::rate<double>(h, kappa); }
 

@@ -1,4 +1,4 @@
-// Cross-check against the sample passes of an independent generator, where they are at hand.
+// The simulator against passes in files: its own, and where it is at hand that of an independent generator.
 
 #include <gtest/gtest.h>
 
@@ -6,6 +6,7 @@
 #include <fstream>
 #include <sstream>
 
+#include "sample_passes.hpp"
 #include "statistics.hpp"
 #include "trihedron/sim/simulate.hpp"
 
@@ -49,11 +50,13 @@ std::vector<Row> json_arrays(const std::filesystem::path& file, const std::strin
   return arrays;
 }
 
-TEST(SamplePass, OurGyrosOnItsAttitudeRepeatItsMomentaAndReadings) {
-  const std::filesystem::path pass = std::filesystem::path(TRIHEDRON_SAMPLE_PASSES) / "pass-a";
-  if (!std::filesystem::exists(pass)) {
-    GTEST_SKIP() << "no sample passes here";
-  }
+class SamplePass : public testing::TestWithParam<PassOfKind> {};
+
+INSTANTIATE_TEST_SUITE_P(WithAllDriftInEq1, SamplePass, testing::ValuesIn(sample_passes({PassKind::kNominal})),
+                         [](const auto& pass) { return pass.param.identifier(); });
+
+TEST_P(SamplePass, GyrosOnItsAttitudeRepeatItsMomentaAndReadings) {
+  const std::filesystem::path& pass = GetParam().path;
   const std::vector<Row> truth = read_csv(pass / "truth.csv");
   const std::vector<Row> telemetry = read_csv(pass / "gyro.csv");
   const std::vector<Row> kappa = json_arrays(pass / "truth.json", "drift_rad_s");
@@ -84,8 +87,8 @@ TEST(SamplePass, OurGyrosOnItsAttitudeRepeatItsMomentaAndReadings) {
     for (std::size_t gyro = 0; gyro < 2; ++gyro) {
       const Vector3d ours(&result.truth.h_in[(fix * 2 + gyro) * 3]);
       const Vector3d theirs(&truth[fix][5 + 3 * gyro]);
-      // Their truth has 12 digits; 0.002″ of the hundreds of arc minutes travelled is left to their integration and to
-      // our spline through 3 s in slews.
+      // The truth has 12 digits; 0.002″ of the hundreds of arc minutes travelled is left to another integration and to
+      // the spline through 3 s in slews.
       ASSERT_LT((ours - theirs).norm(), 1e-8) << truth[fix][0] << " s, gyro " << gyro;
 
       const Vector3d h = result.pass.gyro.direction(fix * 24, static_cast<int>(gyro));

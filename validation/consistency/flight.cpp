@@ -12,15 +12,16 @@
 #include "trihedron/core/invariant_estimator.hpp"
 #include "trihedron/core/paper_estimator.hpp"
 #include "trihedron/ground/calibrate/calibrate.hpp"
+#include "trihedron/ground/evaluate/evaluate.hpp"
 #include "trihedron/ground/onboard/replay.hpp"
 #include "trihedron/sim/simulate.hpp"
 
 namespace trihedron::consistency {
 namespace {
 
-/// What an estimator made of a flight.
+/// Result of one estimator on one flight.
 struct Estimate {
-  ParameterErrors errors;          ///< truth less estimate
+  ParameterErrors errors;          ///< estimate − truth
   ParameterCovariance covariance;  ///< as it claims
   double nees = 0;
   double nis = 0;
@@ -50,23 +51,17 @@ typename Estimator::Setup setup_of(const PassSettings& settings, double walk_rad
   return setup;
 }
 
-void put_errors(const Truth::Gyro& truth, const Eigen::Matrix<double, Esg7::kSize, 1>& kappa_rad_s,
-                const Eigen::Matrix3d& C_c_b, int gyro, ParameterErrors& errors) {
-  for (int i = 0; i < Esg7::kSize; ++i) {
-    errors(Parameters::drift(gyro) + i) = truth.drift_rad_s[static_cast<std::size_t>(i)].second - kappa_rad_s(i);
-  }
-  const auto true_C_c_b = Rot<C, B<1>>::exp(Vec<C>::assume(truth.alignment_rotation_vector_rad));
-  errors.segment<3>(Parameters::alignment(gyro)) = (true_C_c_b * Rot<C, B<1>>::assume(C_c_b).inverse()).log().raw();
-}
-
+/// Estimate − truth.
 template <class Estimator>
 ParameterErrors errors_of(const Estimator& estimator, const Truth& truth) {
-  ParameterErrors errors;
-  for (int k = 0; k < kGyros; ++k) {
-    const auto& estimate = estimator.gyros()[k];
-    put_errors(truth.gyros[static_cast<std::size_t>(k)], estimate.drift_rad_s, estimate.C_c_b, k, errors);
+  Calibration calibration;
+  for (const auto& gyro : estimator.gyros()) {
+    GyroCalibration& record = calibration.gyros.emplace_back();
+    record.drift_rad_s.assign(gyro.drift_rad_s.begin(), gyro.drift_rad_s.end());
+    record.alignment_rotation_vector_rad = Rot<C, B<1>>::assume(gyro.C_c_b).log().raw();
   }
-  return errors;
+  calibration.states = drift_and_alignment(kEsg7, calibration.gyros.size());
+  return ground::estimate_minus_truth(calibration, truth);
 }
 
 template <class Estimator>
@@ -98,32 +93,24 @@ Estimate by_filter(const sim::SimulatedPass& flown, double walk_rad_sqrt_s) {
 
 Estimate by_batch(const sim::SimulatedPass& flown, double walk_rad_sqrt_s) {
   CalibrationOptions options;
-  options.estimator = ground::kBatch;
-  options.drift_model = Esg7::kModelName;
+  options.estimator = Estimator::kBatch;
+  options.drift_model = kEsg7;
   options.find_noise = false;
   options.direction_random_walk_rad_sqrt_s = walk_rad_sqrt_s;
   options.further_states = FurtherStateOptions::none();
   const Calibration calibration = ground::calibrate(flown.pass, options).calibration;
   Estimate estimate;
-  for (int k = 0; k < kGyros; ++k) {
-    const auto gyro = static_cast<std::size_t>(k);
-    Eigen::Matrix<double, Esg7::kSize, 1> kappa_rad_s;
-    for (std::size_t i = 0; i < Esg7::kSize; ++i) {
-      kappa_rad_s(static_cast<Eigen::Index>(i)) = calibration.gyros[gyro].drift_rad_s[i].second;
-    }
-    const auto C_c_b = Rot<C, B<1>>::exp(Vec<C>::assume(calibration.gyros[gyro].alignment_rotation_vector_rad));
-    put_errors(flown.truth.gyros[gyro], kappa_rad_s, C_c_b.raw(), k, estimate.errors);
-  }
+  estimate.errors = ground::estimate_minus_truth(calibration, flown.truth);
   estimate.covariance = calibration.covariance;
-  estimate.nis = calibration.statistics.at("nis_mean");
-  estimate.fixes = static_cast<long>(calibration.statistics.at("nis_count"));
+  estimate.nis = calibration.statistics.nis_mean.value();
+  estimate.fixes = calibration.statistics.nis_count;
   estimate.nees = nees(estimate.errors, estimate.covariance);
   return estimate;
 }
 
 }  // namespace
 
-std::vector<Outcome> fly(const Cell& cell, int run, const std::vector<std::string>& estimators) {
+std::vector<Outcome> fly(const Cell& cell, int run, const std::vector<Estimator>& estimators) {
   const sim::SimulatedPass flown = sim::simulate(cell.scenario(run));
   const double walk_rad_sqrt_s = cell.walk_rad_sqrt_s;
   const ParameterCovariance prior = prior_covariance(flown.pass.settings);
@@ -141,14 +128,14 @@ std::vector<Outcome> fly(const Cell& cell, int run, const std::vector<std::strin
     return outcome;
   };
   std::optional<Estimate> invariant;  // estimator batch is compared with it
-  if (std::ranges::any_of(estimators, [](const std::string& name) { return name != "paper"; })) {
+  if (std::ranges::any_of(estimators, [](Estimator estimator) { return estimator != Estimator::kPaper; })) {
     invariant = by_filter<InvariantEstimator<Esg7, kGyros>>(flown, walk_rad_sqrt_s);
   }
   std::vector<Outcome> outcomes;
-  for (const std::string& name : estimators) {
-    if (name == "paper") {
+  for (const Estimator estimator : estimators) {
+    if (estimator == Estimator::kPaper) {
       outcomes.push_back(outcome_of(by_filter<PaperEstimator<Esg7>>(flown, walk_rad_sqrt_s)));
-    } else if (name == "invariant") {
+    } else if (estimator == Estimator::kInvariant) {
       outcomes.push_back(outcome_of(*invariant));
     } else {
       const Estimate batch = by_batch(flown, walk_rad_sqrt_s);

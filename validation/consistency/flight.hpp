@@ -1,15 +1,14 @@
 #pragma once
 
 #include <array>
-#include <string>
 #include <vector>
 
 #include "consistency/grid.hpp"
 #include "consistency/statistics.hpp"
+#include "trihedron/records/estimator.hpp"
 
 namespace trihedron::consistency {
 
-inline constexpr std::array<const char*, 3> kEstimators = {"paper", "invariant", "batch"};
 inline constexpr int kParameters = 20;  ///< of two gyros, eq. (1) and alignment
 inline constexpr int kInnovations = 4;  ///< of one fix
 
@@ -26,7 +25,7 @@ struct Outcome {
   Difference by_combination;
 };
 
-/// One flight of this cell, seen by each of the estimators named. They are told the true noise.
-[[nodiscard]] std::vector<Outcome> fly(const Cell& cell, int run, const std::vector<std::string>& estimators);
+/// One flight of this cell, calibrated by each of the estimators named, which are given the true noise.
+[[nodiscard]] std::vector<Outcome> fly(const Cell& cell, int run, const std::vector<Estimator>& estimators);
 
 }  // namespace trihedron::consistency

@@ -1,4 +1,4 @@
-// trihedron_consistency: flies the grid and tells how the estimators' covariances hold.
+// trihedron_consistency: simulates a grid of flights and tabulates whether the estimators' covariances are consistent.
 
 #include <fmt/core.h>
 
@@ -16,7 +16,9 @@
 #include "consistency/flight.hpp"
 #include "consistency/grid.hpp"
 #include "consistency/results.hpp"
+#include "stop_on_signals.hpp"
 #include "trihedron/ground/tasks/on_all_cores.hpp"
+#include "trihedron/records/stop.hpp"
 
 namespace {
 
@@ -28,9 +30,10 @@ constexpr const char* kAgreementTable = "agreement";
 
 struct Options {
   int runs = 100;
-  int paper_runs = 20;  // it is far enough off to be seen by fewer
+  int paper_runs = 20;  // fewer runs suffice: its NEES is far from consistent
   std::string cells;
-  std::vector<std::string> estimators{"paper", "invariant"};
+  std::vector<std::string> estimators{std::string(name_of(Estimator::kPaper)),
+                                      std::string(name_of(Estimator::kInvariant))};
   unsigned threads = std::max(1U, std::thread::hardware_concurrency());
   std::filesystem::path resume;
   std::filesystem::path document;
@@ -38,7 +41,15 @@ struct Options {
   std::string table = kEstimatorsTable;
 };
 
-/// A flight to be made, and the estimators that have not seen it.
+std::vector<std::string> estimator_names() {
+  std::vector<std::string> names;
+  for (const EstimatorRow& row : kEstimators) {
+    names.emplace_back(row.name);
+  }
+  return names;
+}
+
+/// A flight still to be simulated, and the estimators to run on it.
 struct Task {
   const Cell& cell;
   int run;
@@ -47,16 +58,17 @@ struct Task {
 
 std::vector<Column> columns_of(const Options& options) {
   if (options.table == kAgreementTable) {
-    return {{"batch", options.runs}};
+    return {{std::string(name_of(Estimator::kBatch)), options.runs}};
   }
   std::vector<Column> columns;
   for (const std::string& estimator : options.estimators) {
-    columns.push_back({estimator, estimator == "paper" ? std::min(options.runs, options.paper_runs) : options.runs});
+    const bool is_paper = estimator_named(estimator) == Estimator::kPaper;
+    columns.push_back({estimator, is_paper ? std::min(options.runs, options.paper_runs) : options.runs});
   }
   return columns;
 }
 
-/// Run by run through all cells: what is there after a break makes a table of fewer runs.
+/// Ordered by run, then by cell, so that an interrupted campaign leaves a complete table of fewer runs.
 std::vector<Task> missing(const Results& results, const std::vector<Cell>& cells, const std::vector<Column>& columns,
                           int runs) {
   std::vector<Task> tasks;
@@ -80,17 +92,21 @@ std::vector<Task> missing(const Results& results, const std::vector<Cell>& cells
 void fly_all(const std::vector<Task>& tasks, unsigned threads, Results& results) {
   std::size_t done = 0;
   std::mutex one_at_a_time;
-  const auto work = [&](std::size_t i) {
+  const auto fly_one = [&](std::size_t i) {
     const Task& task = tasks[i];
-    const std::vector<Outcome> outcomes = fly(task.cell, task.run, task.estimators);
+    std::vector<Estimator> estimators;
+    for (const std::string& name : task.estimators) {
+      estimators.push_back(estimator_named(name).value());
+    }
+    const std::vector<Outcome> outcomes = fly(task.cell, task.run, estimators);
     const std::scoped_lock lock(one_at_a_time);
     for (std::size_t k = 0; k < outcomes.size(); ++k) {
       results.add({task.cell.name(), task.run, task.estimators[k]}, outcomes[k]);
     }
     fmt::print(stderr, "\r{} of {} flights", ++done, tasks.size());
-    return i;
   };
-  (void)trihedron::ground::on_all_cores(tasks.size(), work, threads);
+  using namespace trihedron::ground;
+  with_cores(threads, [&] { for_each_on_all_cores(tasks.size(), fly_one); });
 }
 
 std::string measured(const Options& options) {
@@ -118,9 +134,7 @@ std::string measured(const Options& options) {
   return text + "\n" + (observable ? results.observable_table(cells, columns) : results.table(cells, columns));
 }
 
-}  // namespace
-
-int main(int argc, char** argv) {
+int run(int argc, char** argv) {
   try {
     Options options;
     CLI::App program(
@@ -140,7 +154,7 @@ int main(int argc, char** argv) {
         ->capture_default_str();
     program.add_option("--cells", options.cells, "Only cells with a name like this, e.g. '^steady/.*/300arcmin'");
     program.add_option("--estimators", options.estimators, "Which")
-        ->check(CLI::IsMember(std::vector<std::string>{kEstimators.begin(), kEstimators.end()}))
+        ->check(CLI::IsMember(estimator_names()))
         ->delimiter(',')
         ->capture_default_str();
     program.add_option("--threads", options.threads, "How many at once")
@@ -155,8 +169,16 @@ int main(int argc, char** argv) {
       write_between_markers(options.document, options.place, text);
     }
     return 0;
+  } catch (const trihedron::Stopped&) {
+    throw;
   } catch (const std::exception& error) {
     fmt::print(stderr, "trihedron_consistency: {}\n", error.what());
     return 1;
   }
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  return trihedron::cli::stopped_by_signals([argc, argv] { return run(argc, argv); });
 }

@@ -130,7 +130,7 @@ TEST(Bound, IsTheCovarianceOfTheFilterForSmallMisalignments) {
   scenario.duration = std::chrono::hours(2);
   const sim::SimulatedPass flown = sim::simulate(scenario);
   CalibrationOptions options;
-  options.estimator = "invariant";
+  options.estimator = Estimator::kInvariant;
   options.direction_random_walk_rad_sqrt_s = 0;
   const Eigen::MatrixXd covariance = ground::calibrate(flown.pass, options).calibration.covariance;
   const ParameterCovariance bound = parameter_bound(flown.pass.settings, flown.truth);
@@ -299,7 +299,7 @@ TEST(Flights, WithWrongFirstEstimatesAreNotLost) {
   for (const auto& [name, run] : flights) {
     const auto cell = std::find_if(cells.begin(), cells.end(), [&](const Cell& c) { return c.name() == name; });
     ASSERT_NE(cell, cells.end()) << name;
-    const Outcome outcome = fly(*cell, run, {"invariant"}).front();
+    const Outcome outcome = fly(*cell, run, {Estimator::kInvariant}).front();
     EXPECT_EQ(outcome.fixes, 10800) << name;
     EXPECT_LT(outcome.nees, 50) << name;  // χ² of 20, once in 5000
   }
@@ -310,7 +310,7 @@ TEST(Flights, OfFilterAndBatchAgree) {
   const auto cell = std::find_if(cells.begin(), cells.end(),
                                  [](const Cell& c) { return c.name() == "steady/plane-plane/1e-06/30arcmin/0e+00"; });
   ASSERT_NE(cell, cells.end());
-  const std::vector<Outcome> outcomes = fly(*cell, 1, {"invariant", "batch"});
+  const std::vector<Outcome> outcomes = fly(*cell, 1, {Estimator::kInvariant, Estimator::kBatch});
   EXPECT_TRUE(agrees(outcomes[1].by_parameter));
   EXPECT_TRUE(agrees(outcomes[1].by_combination));
   for (const Outcome& outcome : outcomes) {

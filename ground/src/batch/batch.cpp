@@ -22,7 +22,7 @@ SmootherResult smoothed(const PassProblem::Linear& linear) {
 }
 
 /// Root mean square of the step of the constants, in their sigmas.
-double step_of_constants(const PassLayout& layout, const SmootherResult& found) {
+double step_of_constants(const Layout& layout, const SmootherResult& found) {
   const Eigen::VectorXd sigma = found.last_root.bottomRows(layout.constants()).rowwise().norm();
   const Eigen::VectorXd step = found.x.back().tail(layout.constants()).cwiseQuotient(sigma);
   return step.norm() / std::sqrt(static_cast<double>(layout.constants()));
@@ -39,23 +39,23 @@ BatchResult most_likely(const PassProblem& problem, PassSolution first, double c
     result.linear = problem.linearise(result.before);
     result.errors = smoothed(result.linear);
     problem.correct(result.errors, result.solution);
-    result.converged = step_of_constants(problem.setup().layout, result.errors) < converged;
+    result.converged = step_of_constants(problem.layout(), result.errors) < converged;
   }
   return result;
 }
 
 double log_likelihood(const PassProblem& problem, const PassSolution& solution, PassProblem::Linear linear,
                       const ProcessNoise& noise) {
-  const PassLayout& layout = problem.setup().layout;
+  const Layout& layout = problem.layout();
   problem.put_noise(solution, noise, linear);
   const SmootherResult found = smoothed(linear);
-  // Of the directions at the start nothing is known before; the rest of the prior is triangular. What
-  // gather_constants() has put there is below it.
+  // Of the directions at the start nothing is known before; the rest of the prior is triangular. Rows that
+  // gather_constants() has added stand below that triangle.
   const Eigen::Index directions = 2L * layout.gyros;
   const Eigen::Index rest = layout.size() - directions;
   const double log_prior_root =
       linear.prior.block(directions, directions, rest, rest).diagonal().array().abs().log().sum();
-  return log_prior_root - found.log_root_determinant - (found.residual_square + linear.beside_square) / 2;
+  return log_prior_root - found.log_root_determinant - (found.residual_square + linear.cost_outside_rows) / 2;
 }
 
 }  // namespace trihedron::ground

@@ -38,12 +38,13 @@ struct SmootherResult {
 [[nodiscard]] SmootherResult smooth(const Eigen::MatrixXd& prior, const Eigen::VectorXd& prior_y,
                                     const std::vector<SmootherStage>& stages);
 
-/// Moves what the stages tell of the constants alone to the prior, below the rows that are there, for smooth() to
-/// follow with this noise and that: it is most of the rows, and no noise changes it.
+/// Moves the rows of the stages that are about the constants alone to the prior, below the rows that are there. They
+/// are most of all rows, and do not depend on the noise: smooth() can then be called with different noise in a fraction
+/// of the time.
 void gather_constants(Eigen::MatrixXd& prior, Eigen::VectorXd& prior_y, std::vector<SmootherStage>& stages);
 
-/// Triangles of what prior and measurements up to the end of each stage of `after` (increasing) know of its states,
-/// right side last; what no states explain is in the corner.
+/// Triangles of the information of prior and measurements up to the end of each stage of `after` (increasing) on its
+/// states, right side last; the corner holds the residual.
 [[nodiscard]] std::vector<Eigen::MatrixXd> triangles_after(const Eigen::MatrixXd& prior, const Eigen::VectorXd& prior_y,
                                                            const std::vector<SmootherStage>& stages,
                                                            const std::vector<std::size_t>& after);

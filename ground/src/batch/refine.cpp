@@ -8,6 +8,8 @@
 #include <utility>
 
 #include "batch/pass_setup.hpp"
+#include "model/prior.hpp"
+#include "model/setup.hpp"
 #include "batch/smoothed_attitude.hpp"
 #include "trihedron/ground/model/setup_error.hpp"
 
@@ -47,7 +49,7 @@ void use_residuals(const PassProblem& problem, const PassSolution& solution, con
     std::ranges::fill(fix.innovation, 0);
     std::ranges::fill(fix.innovation_sigma, 0);
     Eigen::Index row = 0;
-    for (int k = 0; k < problem.setup().layout.gyros; ++k) {
+    for (int k = 0; k < problem.layout().gyros; ++k) {
       for (int i = 2 * k; moment.fix->used[k] && i < 2 * k + 2; ++i, ++row) {
         fix.innovation[static_cast<std::size_t>(i)] = rows.y(row);
         fix.innovation_sigma[static_cast<std::size_t>(i)] = std::sqrt(covariance(row, row));
@@ -58,7 +60,7 @@ void use_residuals(const PassProblem& problem, const PassSolution& solution, con
 
 /// How far the constants by the first half of the pass are off those by all of it: their difference has the covariance
 /// by which the second half makes them better known. Only what it halves at least counts.
-void compare_halves(const BatchResult& result, const PassLayout& layout, Statistics& statistics) {
+void compare_halves(const BatchResult& result, const Layout& layout, Statistics& statistics) {
   constexpr double kLeast = 0.5;
   const PassProblem::Linear& linear = result.linear;
   const std::size_t half = linear.stages.size() / 2;
@@ -107,30 +109,11 @@ void rearrange(const std::vector<ParameterId>& from, const std::vector<Parameter
   history = std::move(rearranged);
 }
 
-std::vector<FurtherEstimate> further_of(const PassSetup& setup, const BatchResult& result,
-                                        const std::vector<ParameterId>& parameters) {
-  const PassLayout& layout = setup.layout;
-  const MatrixXd& root = result.errors.last_root;
+std::vector<FurtherEstimate> further_of(const Layout& layout, const BatchResult& result) {
   std::vector<FurtherEstimate> further;
-  const auto tell = [&](double value, int state) {
-    further.push_back({parameters[further.size()], value, root.row(state).norm()});
-  };
-  for (int i = layout.shared(); i < layout.size(); ++i) {
-    tell(result.solution.shared(i - layout.shared()), i);
-  }
-  if (layout.readout_bias) {
-    for (int k = 0; k < layout.gyros; ++k) {
-      for (int i = 0; i < 3; ++i) {
-        tell(result.solution.gyros[static_cast<std::size_t>(k)].readout_bias(i), layout.bias(k) + i);
-      }
-    }
-  }
-  if (layout.coefficient_change) {
-    for (int k = 0; k < layout.gyros; ++k) {
-      for (int i = 0; i < Esg7::kSize; ++i) {
-        tell(result.solution.gyros[static_cast<std::size_t>(k)].change_rad_s(i), layout.change(k) + i);
-      }
-    }
+  for (const ParameterId& parameter : further_parameters(layout)) {
+    further.push_back({parameter, value_of(layout, result.solution.gyros, result.solution.shared, parameter),
+                       result.errors.last_root.row(state_of(layout, parameter)).norm()});
   }
   return further;
 }
@@ -151,7 +134,6 @@ PassProblem problem_of(const Screened& screened, PassSetup setup) {
 
 Refinement::Refinement(const Screened& screened, PassSetup setup, const CalibrationOptions& options)
     : problem_(problem_of(screened, std::move(setup))),
-      options_(options),
       result_(most_likely(problem_, first_solution(problem_, screened))),
       roots_(covariance_roots(result_.errors, result_.linear.stages)) {
   const SmoothedAttitude smoothed(screened.pass, problem_, result_.solution, roots_);
@@ -162,30 +144,28 @@ Refinement::Refinement(const Screened& screened, PassSetup setup, const Calibrat
 }
 
 void Refinement::put_into(CalibrationRun& run) && {
-  const PassSetup& setup = problem_.setup();
-  const PassLayout& layout = setup.layout;
+  const Layout& layout = problem_.layout();
   Calibration& calibration = run.calibration;
-  const MatrixXd own =
-      result_.errors.last_root.middleRows(layout.drift(0), layout.drift(layout.gyros) - layout.drift(0));
+  const MatrixXd own = result_.errors.last_root.middleRows(layout.drift(0), layout.parameters());
   calibration.covariance = own * own.transpose();
-  GyroDirections last_h_in;
   problem_.go_along(result_.solution, [&](const PassProblem::Moment& moment) {
     calibration.t = moment.t;
-    last_h_in = moment.h_in;
+    for (int k = 0; k < layout.gyros; ++k) {
+      calibration.gyros[static_cast<std::size_t>(k)].momentum_in = moment.gyros[k].h_in;
+    }
   });
   for (int k = 0; k < layout.gyros; ++k) {
-    const auto index = static_cast<std::size_t>(k);
-    GyroCalibration& gyro = calibration.gyros[index];
-    gyro = record_of(result_.solution.gyros[index], setup.family);
-    gyro.momentum_in = last_h_in[k];
+    GyroCalibration& gyro = calibration.gyros[static_cast<std::size_t>(k)];
+    const Eigen::Vector3d momentum_in = gyro.momentum_in;
+    gyro = record_of(result_.solution.gyros[k], layout, 0);  // the coefficients stand for the end of the pass
+    gyro.momentum_in = momentum_in;
   }
   calibration.estimator = Estimator::kBatch;
   const std::vector<ParameterId> states =
-      drift_and_alignment(setup.family.model(), static_cast<std::size_t>(layout.gyros));
-  rearrange(calibration.states, states, setup, run.parameters);
+      drift_and_alignment(layout.drift_model, static_cast<std::size_t>(layout.gyros));
+  rearrange(calibration.states, states, problem_.setup(), run.parameters);
   calibration.states = states;
-  calibration.further =
-      further_of(setup, result_, further_parameters(options_.further_states, layout.further_heads, layout.gyros));
+  calibration.further = further_of(layout, result_);
   compare_halves(result_, layout, calibration.statistics);
   calibration.statistics.batch_iterations = result_.iterations;
   calibration.statistics.batch_converged = result_.converged;

@@ -10,10 +10,10 @@
 
 namespace trihedron::ground {
 
-/// The whole pass by least squares, beside what the on-board cycle makes of it.
+/// The whole pass by least squares; its results replace those of the on-board step.
 class Refinement {
  public:
-  /// Works it out. Refers to `screened` and the options. Throws SetupError.
+  /// Works it out. Refers to `screened`. Throws SetupError.
   Refinement(const Screened& screened, PassSetup setup, const CalibrationOptions& options);
 
   /// What the smoothed pass shows at the fixes.
@@ -25,7 +25,6 @@ class Refinement {
 
  private:
   PassProblem problem_;
-  const CalibrationOptions& options_;
   BatchResult result_;
   std::vector<Eigen::MatrixXd> roots_;
   SmoothedCourse course_;

@@ -6,9 +6,7 @@
 #include <cmath>
 #include <iterator>
 
-#include "trihedron/core/cycle.hpp"
 #include "trihedron/core/directions_fit.hpp"
-#include "trihedron/core/invariant_estimator.hpp"
 #include "trihedron/core/optimal_attitude.hpp"
 #include "trihedron/ground/tasks/on_all_cores.hpp"
 
@@ -18,14 +16,10 @@ namespace {
 using Eigen::MatrixXd;
 using Eigen::Vector3d;
 
-/// The body moves like a cubic over some seconds to both sides; where it does not, over less.
+/// Half-widths of the fit, longest first; a shorter one is taken where the body does not move like a cubic over a
+/// longer.
 constexpr std::array<Duration, 3> kReaches = {std::chrono::milliseconds(3000), std::chrono::milliseconds(1400),
                                               std::chrono::milliseconds(700)};
-
-struct Indexed {
-  const std::vector<ScreenedPass::Sample>& samples;
-  [[nodiscard]] const ScreenedPass::Sample& operator[](int i) const { return samples[static_cast<std::size_t>(i)]; }
-};
 
 }  // namespace
 
@@ -38,34 +32,32 @@ SmoothReadings::At SmoothReadings::at(Time t, const At& otherwise) const {
   return otherwise;
 }
 
-std::optional<SmoothReadings::At> SmoothReadings::fit(Time t, const GyrosUsed& used, Duration reach) const {
+std::optional<SmoothReadings::At> SmoothReadings::fit(Time t, const GyroMask& used, Duration reach) const {
   constexpr int kDegree = 3;
-  constexpr int kLeast = 2 * (kDegree + 1);
+  constexpr int kLeast = DirectionsFit::least_samples(kDegree);
   const auto first = std::ranges::lower_bound(samples_, t - reach, {}, &ScreenedPass::Sample::t);
   const auto last = std::ranges::upper_bound(first, samples_.end(), t + reach, {}, &ScreenedPass::Sample::t);
-  const auto begin = static_cast<int>(first - samples_.begin());
-  const auto end = static_cast<int>(last - samples_.begin());
-  if (end - begin < kLeast) {
+  const auto size = static_cast<int>(last - first);
+  if (size < kLeast) {
     return std::nullopt;
   }
-  const auto gap = std::adjacent_find(first, last, [](const auto& a, const auto& b) {
-    return b.t - a.t > Cycle<InvariantEstimator<Esg7, 2>>::kMaxInterpolation;
-  });
+  const auto gap = std::adjacent_find(
+      first, last, [&](const auto& a, const auto& b) { return b.t - a.t > setup_.max_interpolation(); });
   if (gap != last) {
     return std::nullopt;
   }
-  const auto fitted = fit_directions<kMaxGyros>(Indexed{samples_}, begin, end, t, kDegree);
-  const double bound = fitted.freedom + 5 * std::sqrt(2.0 * fitted.freedom);
+  DirectionsFit fit(t, first->t, std::prev(last)->t, size, kDegree, gyros_);
+  std::for_each(first, last, [&](const ScreenedPass::Sample& sample) { fit.add(sample.t, sample.h_b); });
+  const FittedDirections fitted = fit.solve();
   At at;
   at.h_b = fitted.h_b;
   at.noise_factor = fitted.noise_factor;
   for (int k = 0; k < gyros_; ++k) {
-    const double sigma_rad = noise_rad_[static_cast<std::size_t>(k)];
     at.used[k] =
         used[k] && std::all_of(first, last, [&](const ScreenedPass::Sample& sample) { return sample.used[k]; });
-    if (at.used[k] && !(fitted.residual_square[k] <= bound * sigma_rad * sigma_rad)) {
-      return std::nullopt;
-    }
+  }
+  if (!fitted.explains(at.used, setup_.readout_noise_rad)) {
+    return std::nullopt;
   }
   return count(at.used) >= 2 ? std::optional(at) : std::nullopt;
 }
@@ -73,17 +65,15 @@ std::optional<SmoothReadings::At> SmoothReadings::fit(Time t, const GyrosUsed& u
 std::optional<SmoothedAttitude::At> SmoothedAttitude::at(const PassProblem::Moment& moment,
                                                          const SmoothReadings::At& otherwise) const {
   const SmoothReadings::At reading = readings_.at(moment.t, otherwise);
-  const auto attitude = PassProblem::attitude(solution_, moment, reading.h_b, reading.used);
+  const auto attitude = problem_.attitude(moment, reading.h_b, reading.used);
   if (!attitude) {
     return std::nullopt;
   }
-  const MatrixXd spread =
-      problem_.attitude_by_states(solution_, moment, attitude.value(), reading.h_b) * roots_[moment.arc];
+  const MatrixXd spread = problem_.attitude_by_states(moment, attitude.value(), reading.h_b) * roots_[moment.arc];
   Vector3d variance_rad2 = spread.rowwise().squaredNorm();
-  for (int k = 0; k < problem_.setup().layout.gyros; ++k) {
-    const double noise_rad = problem_.setup().readout_noise_rad[static_cast<std::size_t>(k)] * reading.noise_factor;
-    variance_rad2 +=
-        noise_rad * noise_rad * attitude.value().by_directions.middleCols<3>(3L * k).rowwise().squaredNorm();
+  for (int k = 0; k < problem_.layout().gyros; ++k) {
+    const double noise_rad = problem_.setup().on_board.readout_noise_rad[k] * reading.noise_factor;
+    variance_rad2 += noise_rad * noise_rad * attitude.value().by_direction(k).rowwise().squaredNorm();
   }
   return At{attitude.value().C_in_c, variance_rad2.cwiseSqrt()};
 }
@@ -96,7 +86,7 @@ void SmoothedAttitude::append(const At& attitude, Time t, AttitudeHistory& histo
 
 SmoothedCourse SmoothedAttitude::course() const {
   SmoothedCourse course;
-  const int gyros = problem_.setup().layout.gyros;
+  const int gyros = problem_.layout().gyros;
   course.readings.gyros = gyros;
   problem_.go_along(solution_, [&](const PassProblem::Moment& moment) {
     if (moment.fix == nullptr) {
@@ -109,8 +99,8 @@ SmoothedCourse SmoothedAttitude::course() const {
     append(*attitude, moment.t, course.attitude);
     course.readings.t.push_back(moment.t);
     for (int k = 0; k < gyros; ++k) {
-      const Vector3d h_b = solution_.gyros[static_cast<std::size_t>(k)].C_c_b.transpose() *
-                           (attitude->C_in_c.raw().transpose() * moment.h_in[k]);
+      const Vector3d h_b =
+          moment.gyros[k].C_c_b.transpose() * (attitude->C_in_c.raw().transpose() * moment.gyros[k].h_in);
       course.readings.h.insert(course.readings.h.end(), h_b.begin(), h_b.end());
     }
   });
@@ -126,7 +116,7 @@ AttitudeHistory SmoothedAttitude::between(const PassProblem::Moment& from, const
     // From node to node a momentum turns by a fraction of an arcsecond.
     const double part = to_seconds(sample->t - from.t) / to_seconds(to.t - from.t);
     for (int k = 0; k < screened_.gyros; ++k) {
-      moment.h_in[k] = (from.h_in[k] + part * (to.h_in[k] - from.h_in[k])).normalized();
+      moment.gyros[k].h_in = (from.gyros[k].h_in + part * (to.gyros[k].h_in - from.gyros[k].h_in)).normalized();
     }
     if (const auto attitude = at(moment, {sample->h_b, sample->used, 1})) {
       append(*attitude, sample->t, history);
@@ -136,7 +126,7 @@ AttitudeHistory SmoothedAttitude::between(const PassProblem::Moment& from, const
 }
 
 AttitudeHistory SmoothedAttitude::definitive() const {
-  constexpr std::size_t kTogether = 1000;  // a node takes some kilobytes
+  constexpr std::size_t kNodesAtOnce = 1000;  // a node takes some kilobytes
   AttitudeHistory whole;
   std::vector<PassProblem::Moment> nodes;
   const auto take = [&] {
@@ -154,7 +144,7 @@ AttitudeHistory SmoothedAttitude::definitive() const {
       nodes.back().t -= Duration{1};
     }
     nodes.push_back(moment);
-    if (nodes.size() > kTogether) {
+    if (nodes.size() > kNodesAtOnce) {
       take();
     }
   });

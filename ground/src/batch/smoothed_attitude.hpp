@@ -9,27 +9,27 @@
 
 namespace trihedron::ground {
 
-/// Readings at any time, by the samples round it together.
+/// Readings at any time, by a polynomial through the samples around it.
 class SmoothReadings {
  public:
   /// Refers to both.
-  SmoothReadings(const ScreenedPass& pass, const std::vector<double>& readout_noise_rad)
-      : samples_(pass.samples), gyros_(pass.gyros), noise_rad_(readout_noise_rad) {}
+  SmoothReadings(const ScreenedPass& pass, const CalibrationSetup& setup)
+      : samples_(pass.samples), gyros_(pass.gyros), setup_(setup) {}
 
   struct At {
-    GyroDirections h_b;
-    GyrosUsed used{};
+    Directions h_b;
+    GyroMask used{};
     double noise_factor = 1;
   };
-  /// `otherwise` where no polynomial is what the body did; of the gyros that it uses.
+  /// Returns `otherwise` where no polynomial fits; only the gyros that it uses are fitted.
   [[nodiscard]] At at(Time t, const At& otherwise) const;
 
  private:
-  [[nodiscard]] std::optional<At> fit(Time t, const GyrosUsed& used, Duration reach) const;
+  [[nodiscard]] std::optional<At> fit(Time t, const GyroMask& used, Duration reach) const;
 
   const std::vector<ScreenedPass::Sample>& samples_;
   int gyros_;
-  const std::vector<double>& noise_rad_;
+  const CalibrationSetup& setup_;
 };
 
 /// What the smoothed pass shows at the fixes.
@@ -48,7 +48,7 @@ class SmoothedAttitude {
         problem_(problem),
         solution_(solution),
         roots_(roots),
-        readings_(screened, problem.setup().readout_noise_rad) {}
+        readings_(screened, problem.setup().on_board) {}
 
   /// At the fixes.
   [[nodiscard]] SmoothedCourse course() const;

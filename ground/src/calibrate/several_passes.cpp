@@ -171,4 +171,16 @@ const PassAlone& SeveralPasses::add(const std::string& name, const Pass& pass, c
   return added;
 }
 
+std::vector<CatalogueEntry> SeveralPasses::catalogue_entries() const {
+  std::vector<CatalogueEntry> entries;
+  for (const PassAlone& pass : passes_) {
+    entries.push_back({last_.spacecraft, pass.name, start_up_, 1, pass.run.calibration});
+  }
+  if (passes_.size() > 1) {
+    entries.push_back(
+        {last_.spacecraft, passes_.back().name, start_up_, static_cast<int>(passes_.size()), combined_.calibration});
+  }
+  return entries;
+}
+
 }  // namespace trihedron::ground

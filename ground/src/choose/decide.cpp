@@ -13,24 +13,28 @@
 #include <vector>
 
 #include "choose/noise_search.hpp"
+#include "model/orbital_rate.hpp"
 #include "model/prior.hpp"
 #include "trihedron/ground/model/setup_error.hpp"
+#include "trihedron/ground/tasks/on_all_cores.hpp"
 
 namespace trihedron::ground {
 namespace {
 
 using Choice = FurtherStateOptions::Choice;
 
-/// Whose evidence a trial with everything shows. That of wandering drift comes with the search for the noise.
-constexpr std::array kJudgedByTrial = {FurtherState::kClockOffset, FurtherState::kOrbitalError,
-                                       FurtherState::kReadoutBias, FurtherState::kCoefficientChange};
+/// Whether a trial with everything shows the evidence of a state: of those that are a choice all but the wandering
+/// drift, which the search for the noise decides.
+bool is_judged_by_trial(const FurtherStateRow& row) {
+  return !row.key.empty() && row.state != FurtherState::kWanderingDrift;
+}
 
 /// Odds of 20 to 1.
-constexpr double kStrong = 3;
+constexpr double kLogOddsToAccept = 3;
 /// Pairs of fixes that give the noise of the star tracker within some percent.
-constexpr std::size_t kEnough = 1000;
+constexpr std::size_t kLeastFixPairs = 1000;
 
-/// 1-sigma of the star tracker by the changes of a trial: of outliers only the median feels. Needs changes.
+/// 1-sigma of the star tracker by the changes of a trial; the median makes it robust against outliers. Needs changes.
 Eigen::Vector3d star_tracker_noise_rad(const std::vector<Eigen::Vector3d>& changes_rad) {
   constexpr double kMedianOfNormal = 0.6744897501960817;
   Eigen::Vector3d noise_rad;
@@ -45,28 +49,16 @@ Eigen::Vector3d star_tracker_noise_rad(const std::vector<Eigen::Vector3d>& chang
   return noise_rad;
 }
 
-/// The noise of the star tracker that the changes show, where it is not what was told.
+/// The noise of the star tracker that the changes show, where it differs from the settings.
 std::optional<Eigen::Vector3d> other_star_tracker_noise(const Pass& pass,
                                                         const std::vector<Eigen::Vector3d>& changes_rad) {
-  const Eigen::Vector3d& told = pass.settings.star_tracker_noise_rad;
+  const Eigen::Vector3d& given = pass.settings.star_tracker_noise_rad;
   const Eigen::Vector3d found = star_tracker_noise_rad(changes_rad);
-  const bool other = ((found - told).array().abs() > kNotable * told.array()).any();
+  const bool other = ((found - given).array().abs() > kNoiseTolerance * given.array()).any();
   return other ? std::optional(found) : std::nullopt;
 }
 
-/// What was asked for must be there.
-void refuse_further_states(const Pass& pass, const CalibrationOptions& asked) {
-  const FurtherStateOptions& states = asked.further_states;
-  for (const FurtherStateRow& row : kFurtherStates) {
-    if (states.is_on(row.state)) {
-      throw SetupError(
-          fmt::format("estimator {} of {} gyros has no state '{}'", name_of(asked.estimator), pass.gyro.gyros, row.key),
-          "set it to off or auto, or use estimator invariant with two gyros");
-    }
-  }
-}
-
-/// The noise that an earlier calibration went by, but for the least that is told.
+/// Takes the noise that an earlier calibration used, but not less than the settings say.
 void use_noise(const CalibrationNoise& noise, CalibrationOptions& options) {
   options.direction_random_walk_rad_sqrt_s =
       std::max(options.direction_random_walk_rad_sqrt_s, noise.direction_random_walk_rad_sqrt_s);
@@ -95,15 +87,15 @@ CalibrationOptions as_before(CalibrationOptions options, const Calibration& prio
 }
 
 /// Throws SetupError where the earlier calibration is of other gyros or of another drift model.
-void refuse_prior_of_others(const Pass& pass, const CalibrationOptions& asked) {
-  const std::optional<Calibration>& prior = pass.settings.prior;
+void refuse_prior_of_others(const PassSettings& settings, const CalibrationOptions& asked) {
+  const std::optional<Calibration>& prior = settings.prior;
   if (!prior) {
     return;
   }
-  if (prior->gyros.size() != static_cast<std::size_t>(pass.gyro.gyros)) {
-    throw SetupError(
-        fmt::format("the earlier calibration has {} gyros; the pass has {}", prior->gyros.size(), pass.gyro.gyros),
-        "use a calibration of these gyros");
+  if (prior->gyros.size() != settings.gyros.size()) {
+    throw SetupError(fmt::format("the earlier calibration has {} gyros; the pass has {}", prior->gyros.size(),
+                                 settings.gyros.size()),
+                     "use a calibration of these gyros");
   }
   for (std::size_t k = 0; k < prior->gyros.size(); ++k) {
     const GyroCalibration& gyro = prior->gyros[k];
@@ -112,32 +104,32 @@ void refuse_prior_of_others(const Pass& pass, const CalibrationOptions& asked) {
                                    name_of(gyro.drift_model), name_of(*asked.drift_model)),
                        "use a calibration made with the same drift model");
     }
-    static_cast<void>(family_of(gyro));
+    refuse_incomplete(gyro);
   }
 }
 
-/// The smallest than which none is strongly more likely; none of none.
+/// The smallest model such that no larger one is more likely by kLogOddsToAccept; nullptr of an empty list.
 const Forecast* best_of(const std::vector<Forecast>& forecasts) {
   double most = -std::numeric_limits<double>::infinity();
   const Forecast* best = nullptr;
   for (auto forecast = forecasts.rbegin(); forecast != forecasts.rend(); ++forecast) {
     most = std::max(most, forecast->log_likelihood);
-    best = forecast->log_likelihood >= most - kStrong ? &*forecast : best;
+    best = forecast->log_likelihood >= most - kLogOddsToAccept ? &*forecast : best;
   }
   return best;
 }
 
-/// Turns the choices that are left open, and the drift model, by what a trial with everything shows.
+/// Decides the open choices and the drift model by the evidence of a trial with all states free.
 void settle_states(const Trial& everything, const CalibrationOptions& asked, Decision& decision) {
   decision.evidence.clear();
   const auto settle = [&](std::optional<FurtherState> state, double log_bayes_factor) {
-    decision.evidence.push_back({state, log_bayes_factor, log_bayes_factor > kStrong});
+    decision.evidence.push_back({state, log_bayes_factor, log_bayes_factor > kLogOddsToAccept});
     return decision.evidence.back().accepted;
   };
-  for (const FurtherState state : kJudgedByTrial) {
-    if (asked.further_states[state] == Choice::kAuto) {
-      const bool on = settle(state, everything.log_evidence(state));
-      decision.options.further_states[state] = on ? Choice::kOn : Choice::kOff;
+  for (const FurtherStateRow& row : kFurtherStates) {
+    if (is_judged_by_trial(row) && asked.further_states[row.state] == Choice::kAuto) {
+      const bool on = settle(row.state, everything.log_evidence(row.state));
+      decision.options.further_states[row.state] = on ? Choice::kOn : Choice::kOff;
     }
   }
   decision.forecasts = everything.forecasts();
@@ -148,11 +140,13 @@ void settle_states(const Trial& everything, const CalibrationOptions& asked, Dec
   }
 }
 
-/// Everything on that is on or may be, and the largest drift model.
+/// The options with every state free that is on or open, and with the largest drift model.
 CalibrationOptions with_everything(CalibrationOptions options, const CalibrationOptions& asked,
                                    const DriftModelId& largest_model) {
-  for (const FurtherState state : kJudgedByTrial) {
-    options.further_states[state] = asked.further_states[state] == Choice::kOff ? Choice::kOff : Choice::kOn;
+  for (const FurtherStateRow& row : kFurtherStates) {
+    if (is_judged_by_trial(row)) {
+      options.further_states[row.state] = asked.further_states[row.state] == Choice::kOff ? Choice::kOff : Choice::kOn;
+    }
   }
   options.drift_model = largest_model;
   return options;
@@ -164,12 +158,12 @@ void use_walk(const ProcessNoise& noise, CalibrationOptions& options) {
 
 void use_wandering(const ProcessNoise& noise, CalibrationOptions& options) {
   options.further_states[FurtherState::kWanderingDrift] = Choice::kOn;
-  options.further_states.wandering_drift_rad_s = noise.wandering_sigma_rad_s;
-  options.further_states.wandering_time = from_seconds(noise.wandering_time_s);
+  options.further_states.wandering_drift_rad_s = noise.wandering_drift.sigma;
+  options.further_states.wandering_time = from_seconds(noise.wandering_drift.time_s);
 }
 
 /// Drift that wanders as fast as this random walk: walk² = 2 σ² τ.
-CalibrationOptions wandering_like(const Likely& walking, CalibrationOptions options) {
+CalibrationOptions wandering_like(const NoiseFit& walking, CalibrationOptions options) {
   FurtherStateOptions& states = options.further_states;
   states[FurtherState::kWanderingDrift] = Choice::kOn;
   states.wandering_drift_rad_s =
@@ -177,30 +171,34 @@ CalibrationOptions wandering_like(const Likely& walking, CalibrationOptions opti
   return options;
 }
 
-/// Where the noise is more than was told the states were settled by one that is too small: again, by what it is when
-/// they are all free, and whether it wanders. `everything`: with the noise as told; `walk`: the noise of what was
-/// settled.
-void decide_beside_noise(const Pass& pass, const Screened& screened, const CalibrationOptions& asked,
-                         const DriftModelId& largest_model, bool wandering_is_open, Trial everything,
-                         const Likely& walk, Decision& decision) {
+/// The noise is larger than the settings say, so the states were decided with too small a noise. Decides again, with
+/// the noise found while all states are free, and decides whether the drift wanders. `everything`: the trial with all
+/// states free and the noise of the settings; `walk`: the noise found with the states decided first.
+void decide_again_with_more_noise(const Pass& pass, const Screened& screened, const CalibrationOptions& asked,
+                                  const DriftModelId& largest_model, bool wandering_is_open, Trial everything,
+                                  const NoiseFit& walk, Decision& decision) {
   CalibrationOptions& options = decision.options;
   const CalibrationOptions free = with_everything(options, asked, largest_model);
   const CalibrationOptions like = wandering_like(walk, free);
-  std::future<std::pair<Trial, Likely>> wandering_trial;
-  if (wandering_is_open) {
-    wandering_trial = std::async(std::launch::async, [&] {
-      Trial trial(pass, screened, like);
-      const Likely likely = with_most_likely_wandering(trial, like);
-      return std::pair(std::move(trial), likely);
-    });
-  }
-  const Likely walking = with_most_likely_walk(everything, free);
+  // Looked at only where the walk is worth it: before that, nobody asks whether it failed.
+  std::packaged_task<std::pair<Trial, NoiseFit>()> try_wandering([&] {
+    Trial trial(pass, screened, like);
+    const NoiseFit likely = with_most_likely_wandering(trial, like);
+    return std::pair(std::move(trial), likely);
+  });
+  NoiseFit walking;
+  side_by_side([&] { walking = with_most_likely_walk(everything, free); },
+               [&] {
+                 if (wandering_is_open) {
+                   try_wandering();
+                 }
+               });
   std::optional<Evidence> wandering;
   std::optional<ProcessNoise> wanders;
-  if (wandering_is_open && walking.gain > kStrong) {
-    auto [trial, likely] = wandering_trial.get();
+  if (wandering_is_open && walking.gain > kLogOddsToAccept) {
+    auto [trial, likely] = try_wandering.get_future().get();
     const double gain = likely.log_likelihood - walking.log_likelihood;
-    wandering = Evidence{FurtherState::kWanderingDrift, gain, gain > kStrong};
+    wandering = Evidence{FurtherState::kWanderingDrift, gain, gain > kLogOddsToAccept};
     if (wandering->accepted) {
       wanders = likely.noise;
       everything = std::move(trial);
@@ -221,39 +219,13 @@ void decide_beside_noise(const Pass& pass, const Screened& screened, const Calib
   }
 }
 
-/// It is seen over a whole pass only. Throws SetupError where it was asked for.
-void leave_out_coefficient_change(CalibrationOptions& options) {
-  Choice& choice = options.further_states[FurtherState::kCoefficientChange];
-  if (choice == Choice::kOn) {
-    throw SetupError(fmt::format("estimator {} has no state '{}'", name_of(options.estimator),
-                                 row_of(FurtherState::kCoefficientChange).key),
-                     "set it to off or auto, or use estimator batch");
-  }
-  choice = Choice::kOff;
-}
-
-/// Nothing to judge by.
+/// There are no usable fixes to decide by: what is open is off.
 void leave_out_what_is_open(CalibrationOptions& options) {
   for (const FurtherStateRow& row : kFurtherStates) {
     Choice& choice = options.further_states[row.state];
     choice = choice == Choice::kAuto ? Choice::kOff : choice;
   }
   options.drift_model = options.drift_model.value_or(kEsg7);
-}
-
-/// Only the noise is found: of more than two gyros.
-void find_noise(const Pass& pass, const Screened& screened, CalibrationOptions& options) {
-  Trial trial(pass, screened, options);
-  const std::vector<Eigen::Vector3d> changes = trial.changes_rad();
-  options.find_noise = changes.size() >= kEnough;
-  if (!options.find_noise) {
-    return;
-  }
-  options.star_tracker_noise_rad = other_star_tracker_noise(pass, changes);
-  if (options.star_tracker_noise_rad) {
-    trial = Trial(pass, screened, options);
-  }
-  use_walk(with_most_likely_walk(trial, options).noise, options);
 }
 
 /// By what the pass itself shows.
@@ -267,7 +239,7 @@ Decision decide_by_pass(const Pass& pass, const Screened& screened, const Calibr
   }
   Trial everything(pass, screened, with_everything(options, asked, largest_model));
   const std::vector<Eigen::Vector3d> changes = everything.changes_rad();
-  options.find_noise = asked.find_noise && changes.size() >= kEnough;
+  options.find_noise = asked.find_noise && changes.size() >= kLeastFixPairs;
   if (!options.find_noise) {
     settle_states(everything, asked, decision);
     return decision;
@@ -278,10 +250,10 @@ Decision decide_by_pass(const Pass& pass, const Screened& screened, const Calibr
   }
   settle_states(everything, asked, decision);
   Trial decided(pass, screened, options);
-  const Likely walking = with_most_likely_walk(decided, options);
-  if (walking.gain > kStrong) {
-    decide_beside_noise(pass, screened, asked, largest_model, wandering_is_open, std::move(everything), walking,
-                        decision);
+  const NoiseFit walking = with_most_likely_walk(decided, options);
+  if (walking.gain > kLogOddsToAccept) {
+    decide_again_with_more_noise(pass, screened, asked, largest_model, wandering_is_open, std::move(everything),
+                                 walking, decision);
   } else {
     use_walk(walking.noise, options);
   }
@@ -294,60 +266,79 @@ DriftModelId largest_to_compare(const CalibrationOptions& asked) {
   if (asked.estimator != Estimator::kBatch || asked.drift_model == kEsg20) {
     return asked.drift_model.value_or(kEsg20);
   }
-  const bool is_vsh = asked.drift_model && is_for_whole_pass(*asked.drift_model);
+  const bool is_vsh = asked.drift_model && asked.drift_model->family == DriftModelId::Family::kVsh;
   return vsh(is_vsh ? std::max(int{asked.drift_model->degree}, kFirstDegree) : kFirstDegree);
 }
 
 /// By one degree, where there is one.
 std::optional<DriftModelId> larger_model(const DriftModelId& model) {
-  const bool is_there = is_for_whole_pass(model) && model.degree < DriftFamily::kMaxDegree;
+  const bool is_there = model.family == DriftModelId::Family::kVsh && model.degree < DriftModelId::kMaxDegree;
   return is_there ? std::optional(vsh(model.degree + 1)) : std::nullopt;
+}
+
+/// Turns on what star trackers and rotors usually have; the priors allow for its absence.
+CalibrationOptions with_usual_states(CalibrationOptions options) {
+  options.drift_model = options.drift_model.value_or(kEsg20);
+  for (const FurtherState state : {FurtherState::kClockOffset, FurtherState::kOrbitalError}) {
+    Choice& choice = options.further_states[state];
+    choice = choice == Choice::kAuto ? Choice::kOn : choice;
+  }
+  return options;
+}
+
+/// Estimator paper has nothing to choose; the change of the coefficients is searched for by a whole pass only.
+void settle_by_estimator(CalibrationOptions& asked) {
+  if (asked.estimator == Estimator::kPaper) {
+    asked.drift_model = asked.drift_model.value_or(kEsg7);
+    leave_out_what_is_open(asked);
+    asked.find_noise = false;
+  } else if (asked.estimator == Estimator::kInvariant) {
+    Choice& choice = asked.further_states[FurtherState::kCoefficientChange];
+    choice = choice == Choice::kAuto ? Choice::kOff : choice;
+  }
 }
 
 }  // namespace
 
+CalibrationOptions settled_before(const PassSettings& settings, CalibrationOptions options) {
+  const std::optional<Calibration>& prior = settings.prior;
+  if (prior && !options.drift_model) {
+    options.drift_model = prior->gyros.at(0).drift_model;
+  }
+  settle_by_estimator(options);
+  refuse_prior_of_others(settings, options);
+  if (options.estimator != Estimator::kPaper) {
+    if (prior && prior->noise && options.find_noise) {
+      use_noise(*prior->noise, options);
+    }
+    options = prior ? as_before(options, *prior) : with_usual_states(options);
+  }
+  options.find_noise = false;
+  leave_out_what_is_open(options);
+  return options;
+}
+
 Decision decide(const Pass& pass, const CalibrationOptions& asked_for) {
   CalibrationOptions asked = asked_for;
-  if (pass.settings.prior && !asked.drift_model) {
-    asked.drift_model = pass.settings.prior->gyros.at(0).drift_model;
+  if (pass.gyro.gyros < static_cast<int>(pass.settings.gyros.size())) {
+    throw SetupError(fmt::format("the telemetry has {} gyros; the settings speak of {}", pass.gyro.gyros,
+                                 pass.settings.gyros.size()),
+                     "give the telemetry of all of them, or the settings of those that there are");
   }
-  if (asked.drift_model && is_for_whole_pass(*asked.drift_model) && asked.estimator == Estimator::kInvariant) {
-    asked.estimator = Estimator::kBatch;
+  if (!asked.orbital_rate_rad_s) {
+    asked.orbital_rate_rad_s = orbital_rate_rad_s(pass.star_tracker);
   }
-  if (asked.estimator != Estimator::kBatch) {
-    leave_out_coefficient_change(asked);
+  settle_by_estimator(asked);
+  if (pass.settings.prior || asked.estimator == Estimator::kPaper) {
+    return {settled_before(pass.settings, asked), {}, {}, {}};
   }
-  refuse_prior_of_others(pass, asked);
   Decision decision{asked, {}, {}, {}};
   CalibrationOptions& options = decision.options;
   options.find_noise = false;
-  const bool invariant = asked.estimator != Estimator::kPaper;
-  const std::optional<Calibration>& prior = pass.settings.prior;
-  if (prior && prior->noise && asked.find_noise && invariant) {
-    use_noise(*prior->noise, options);
-  }
-  if (!invariant || pass.gyro.gyros > 2) {
-    refuse_further_states(pass, asked);
-    options = without_further_states(options);
-    if (asked.drift_model) {
-      options.drift_model = asked.drift_model;
-    }
-    if (asked.find_noise && invariant && !prior) {
-      // Not kept: which gyro is at fault is to be judged by the noise found.
-      const Screened screened = screen(pass, options);
-      if (!screened.pass.fixes.empty()) {
-        find_noise(pass, screened, options);
-      }
-    }
-    return decision;
-  }
-  if (prior) {
-    options = as_before(options, *prior);
-    return decision;
-  }
-  const bool states_are_settled = asked.drift_model && std::ranges::none_of(kJudgedByTrial, [&](FurtherState state) {
-                                    return asked.further_states[state] == Choice::kAuto;
-                                  });
+  const bool states_are_settled =
+      asked.drift_model && std::ranges::none_of(kFurtherStates, [&](const FurtherStateRow& row) {
+        return is_judged_by_trial(row) && asked.further_states[row.state] == Choice::kAuto;
+      });
   if (states_are_settled && !asked.find_noise) {
     leave_out_what_is_open(options);
     return decision;
@@ -363,7 +354,9 @@ Decision decide(const Pass& pass, const CalibrationOptions& asked_for) {
     const std::optional<DriftModelId> larger = larger_model(largest_model);
     // None where the pass is too short for any.
     if (!larger || decided.forecasts.empty() || best_of(decided.forecasts) != &decided.forecasts.back()) {
-      decided.screened = std::move(screened);
+      if (pass.settings.gyros.size() == 2) {  // which of more gyros is at fault is judged by the noise found
+        decided.screened = std::move(screened);
+      }
       return decided;
     }
     largest_model = *larger;

@@ -1,5 +1,5 @@
 #pragma once
-/// What a pass gives evidence of beside alignment and eq. (1).
+/// Which states beyond alignment and eq. (1), and which noise, a pass gives evidence of.
 
 #include <optional>
 #include <vector>
@@ -15,13 +15,18 @@ struct Decision {
   CalibrationOptions options;
   std::vector<Evidence> evidence;    ///< empty where nothing was to be decided
   std::vector<Forecast> forecasts;   ///< of the drift models that were compared
-  std::optional<Screened> screened;  ///< what it was decided by, where the pass was looked at
+  std::optional<Screened> screened;  ///< the screened pass by which it was decided, where it was
 };
 
-/// Settles each choice that is left to the program. Estimator paper, and passes of more than two gyros, have no further
-/// states; a prior calibration tells them where the pass has one; else they are those that the pass makes 20 times as
-/// likely as their absence. The noise is found where it is asked for, on a pass that is long enough and has no prior
-/// calibration. Throws SetupError.
+/// Settles each choice that is left to the program by the whole pass. Estimator paper has no further states; a prior
+/// calibration tells them where the pass has one; else they are those that the pass makes 20 times as likely as their
+/// absence. The noise is found where it is asked for, on a pass that is long enough and has no prior calibration.
+/// Throws SetupError.
 [[nodiscard]] Decision decide(const Pass& pass, const CalibrationOptions& asked);
+
+/// Settles the same before the first event, as on board: by the earlier calibration, or else drift model esg20, clock
+/// offset and error at orbital period, with priors that allow for their absence. The noise is that of the options.
+/// Throws SetupError.
+[[nodiscard]] CalibrationOptions settled_before(const PassSettings& settings, CalibrationOptions options);
 
 }  // namespace trihedron::ground

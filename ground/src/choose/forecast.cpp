@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "model/prior.hpp"
 #include "trihedron/ground/evaluate/evaluate.hpp"
 #include "trihedron/ground/evaluate/open_loop.hpp"
 
@@ -14,7 +15,7 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
 constexpr std::size_t kParts = 6;
-/// Of them the first are not forecast: two in six have to show what the coefficients are.
+/// Parts at the beginning that are only fitted, not forecast.
 constexpr std::size_t kLearning = 2;
 
 /// What is known of the states of a smaller model: those that it does not have are zero.
@@ -54,18 +55,17 @@ Restricted restricted(const MatrixXd& triangle, const std::vector<bool>& kept, c
 
 Forecast forecast(const PassProblem& problem, const PassSolution& solution, const DriftModelId& model,
                   const std::vector<MatrixXd>& triangles, const std::vector<std::size_t>& ends) {
-  const PassLayout& layout = problem.setup().layout;
-  const std::vector<DriftCoefficient>& coefficients = problem.setup().family.coefficients();
-  const DriftFamily family = family_of(model);
+  const Layout& layout = problem.layout();
+  const std::vector<DriftCoefficient> coefficients = coefficients_of(layout.drift_model);
+  const std::vector<DriftCoefficient> smaller = coefficients_of(model);
   std::vector<bool> kept(static_cast<std::size_t>(layout.size()), true);
   VectorXd value = VectorXd::Zero(layout.size());
   for (int k = 0; k < layout.gyros; ++k) {
-    for (int i = 0; i < layout.drift_size; ++i) {
+    for (int i = 0; i < layout.drift_size(); ++i) {
       const int state = layout.drift(k) + i;
       kept[static_cast<std::size_t>(state)] =
-          std::ranges::find(family.coefficients(), coefficients[static_cast<std::size_t>(i)]) !=
-          family.coefficients().end();
-      value(state) = solution.gyros[static_cast<std::size_t>(k)].drift_rad_s(i);
+          std::ranges::find(smaller, coefficients[static_cast<std::size_t>(i)]) != smaller.end();
+      value(state) = solution.gyros[k].drift_rad_s(i);
     }
   }
   Forecast result{model, 0, {}};
@@ -79,29 +79,28 @@ Forecast forecast(const PassProblem& problem, const PassSolution& solution, cons
     Forecast::Fit& fit = result.fits.emplace_back();
     fit.until = problem.begin_of(ends[part] + 1);
     for (int k = 0; k < layout.gyros; ++k) {
-      GyroParameters& gyro =
-          fit.gyros.emplace_back(problem.corrected(solution.gyros[static_cast<std::size_t>(k)], k, known.x));
-      VectorXd own(family.size());
-      for (int i = 0; i < family.size(); ++i) {
-        const auto found = std::ranges::find(coefficients, family.coefficients()[static_cast<std::size_t>(i)]);
-        own(i) = gyro.drift_rad_s(found - coefficients.begin());
+      Gyro gyro = solution.gyros[k];
+      add_parameter_errors(layout, k, known.x, gyro);
+      Gyro own = gyro;
+      own.drift_rad_s.resize(static_cast<Index>(smaller.size()));
+      for (std::size_t i = 0; i < smaller.size(); ++i) {
+        const auto found = std::ranges::find(coefficients, smaller[i]);
+        own.drift_rad_s(static_cast<Index>(i)) = gyro.drift_rad_s(found - coefficients.begin());
       }
-      gyro.drift_rad_s = own;
+      fit.gyros.push_back(record_of(own, Layout{.gyros = layout.gyros, .drift_model = model}, 0));
     }
   }
   return result;
 }
 
 /// Of the fit, as if it were set right by the smoothed attitude at one fix.
-std::vector<GyroCalibration> records_of(const Forecast& forecast, const Forecast::Fit& fit,
-                                        const SmoothedCourse& course, std::size_t at) {
-  const DriftFamily family = family_of(forecast.drift_model);
-  std::vector<GyroCalibration> records;
-  for (std::size_t k = 0; k < fit.gyros.size(); ++k) {
-    GyroCalibration& record = records.emplace_back(record_of(fit.gyros[k], family));
-    record.readout_bias.setZero();
-    record.momentum_in =
-        course.attitude.q_in_c[at] * (fit.gyros[k].C_c_b * course.readings.direction(at, static_cast<int>(k)));
+std::vector<GyroCalibration> records_of(const Forecast::Fit& fit, const SmoothedCourse& course, std::size_t at) {
+  std::vector<GyroCalibration> records = fit.gyros;
+  for (std::size_t k = 0; k < records.size(); ++k) {
+    const auto C_c_b = Rot<C, B<1>>::exp(Vec<C>::assume(records[k].alignment_rotation_vector_rad));
+    records[k].readout_bias.setZero();
+    records[k].momentum_in =
+        course.attitude.q_in_c[at] * (C_c_b.raw() * course.readings.direction(at, static_cast<int>(k)));
   }
   return records;
 }
@@ -143,9 +142,9 @@ std::vector<DriftModelForecast> flown(const std::vector<Forecast>& forecasts, co
         continue;
       }
       const auto at = static_cast<std::size_t>(from - times.begin());
-      const AttitudeErrors errors = attitude_errors(
-          fly_open_loop(pass, epochs.front(), records_of(forecast, forecast.fits[i], course, at), epochs), times,
-          course.attitude.q_in_c);
+      const AttitudeErrors errors =
+          attitude_errors(fly_open_loop(pass, epochs.front(), records_of(forecast.fits[i], course, at), epochs), times,
+                          course.attitude.q_in_c);
       for (const Eigen::Vector3d& error : errors.error_rad) {
         square += error.squaredNorm();
         ++count;

@@ -1,5 +1,5 @@
 #pragma once
-/// How well drift models say what comes next: each fitted to the beginning of a pass, and judged by the rest.
+/// Comparison of drift models by prediction: each is fitted to the beginning of a pass and scored on the rest.
 
 #include <vector>
 
@@ -16,7 +16,7 @@ struct Forecast {
   double log_likelihood = 0;
   struct Fit {
     Time until{};
-    std::vector<GyroParameters> gyros;
+    std::vector<GyroCalibration> gyros;  ///< without momenta
   };
   std::vector<Fit> fits;  ///< to the parts before each forecast
 };

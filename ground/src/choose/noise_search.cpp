@@ -3,11 +3,13 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
-#include <future>
+#include <iterator>
 #include <map>
 #include <optional>
 #include <utility>
 #include <vector>
+
+#include "trihedron/ground/tasks/on_all_cores.hpp"
 
 namespace trihedron::ground {
 namespace {
@@ -35,7 +37,7 @@ class Search {
   }
 
   /// The best point, its first number by a parabola through its neighbours where it has two.
-  [[nodiscard]] Likely best() const {
+  [[nodiscard]] NoiseFit best() const {
     const auto [i, j] = best_;
     const double peak = tried_.at(best_);
     const auto below = tried_.find({i - 1, j});
@@ -49,16 +51,14 @@ class Search {
 
  private:
   void look_at(const std::vector<Point>& points) {
-    std::map<Point, std::future<double>> runs;
-    for (const Point& point : points) {
-      if (!tried_.contains(point) && !runs.contains(point)) {
-        runs.emplace(point, std::async(std::launch::async, [this, noise = at_(point.first, point.second)] {
-                       return trial_.log_likelihood(linear_, noise);
-                     }));
-      }
-    }
-    for (auto& [point, run] : runs) {
-      tried_[point] = run.get();
+    std::vector<Point> untried;
+    std::ranges::copy_if(points, std::back_inserter(untried),
+                         [this](const Point& point) { return !tried_.contains(point); });
+    const std::vector<double> found = on_all_cores(untried.size(), [&](std::size_t i) {
+      return trial_.log_likelihood(linear_, at_(untried[i].first, untried[i].second));
+    });
+    for (std::size_t i = 0; i < untried.size(); ++i) {
+      tried_[untried[i]] = found[i];
     }
     best_ = std::ranges::max_element(tried_, [](const auto& a, const auto& b) { return a.second < b.second; })->first;
   }
@@ -70,22 +70,26 @@ class Search {
   Point best_;
 };
 
-/// Where the model is wrong there is more than one maximum.
+GaussMarkov wandering_of(const CalibrationOptions& options) {
+  return {options.further_states.wandering_drift_rad_s, to_seconds(options.further_states.wandering_time)};
+}
+
+/// Starting levels; several, because with an incomplete model the likelihood has more than one maximum.
 const std::vector<Search::Point> kAllLevels = {{0, 0}, {3, 0}, {6, 0}, {9, 0}};
 
-/// The trial with the process noise that makes the pass most likely, and that: outliers are told apart by it.
-Likely settled(Trial& trial, const Search::At& at, const std::vector<Search::Point>& starts,
-               const Search::Point& lowest, const Search::Point& highest) {
+/// Alternates the search for the noise and a refit with it, because the noise decides which fixes are outliers.
+NoiseFit converge(Trial& trial, const Search::At& at, const std::vector<Search::Point>& starts,
+                  const Search::Point& lowest, const Search::Point& highest) {
   constexpr int kRounds = 3;
-  Likely likely;
+  NoiseFit likely;
   for (int round = 0; round < kRounds; ++round) {
     const ProcessNoise before = likely.noise;
     likely = Search(trial, at, starts, lowest, highest).best();
     trial.refit(likely.noise);
-    const auto same = [](double a, double b) { return std::abs(a - b) <= kNotable * b; };
+    const auto same = [](double a, double b) { return std::abs(a - b) <= kNoiseTolerance * b; };
     if (same(before.direction_random_walk_rad_sqrt_s, likely.noise.direction_random_walk_rad_sqrt_s) &&
-        same(before.wandering_sigma_rad_s, likely.noise.wandering_sigma_rad_s) &&
-        same(before.wandering_time_s, likely.noise.wandering_time_s)) {
+        same(before.wandering_drift.sigma, likely.noise.wandering_drift.sigma) &&
+        same(before.wandering_drift.time_s, likely.noise.wandering_drift.time_s)) {
       break;
     }
   }
@@ -94,35 +98,34 @@ Likely settled(Trial& trial, const Search::At& at, const std::vector<Search::Poi
 
 }  // namespace
 
-Likely with_most_likely_walk(Trial& trial, const CalibrationOptions& options) {
+NoiseFit with_most_likely_walk(Trial& trial, const CalibrationOptions& options) {
   const ProcessNoise least{std::max(options.direction_random_walk_rad_sqrt_s, kLeastWalk_rad_sqrt_s),
-                           options.further_states.wandering_drift_rad_s,
-                           to_seconds(options.further_states.wandering_time)};
+                           wandering_of(options)};
   const auto at = [least](double level, int) {
     ProcessNoise noise = least;
     noise.direction_random_walk_rad_sqrt_s *= std::pow(2, level);
     return noise;
   };
-  return settled(trial, at, kAllLevels, {0, 0}, {9, 0});
+  return converge(trial, at, kAllLevels, {0, 0}, {9, 0});
 }
 
-Likely with_most_likely_wandering(Trial& trial, const CalibrationOptions& options) {
+NoiseFit with_most_likely_wandering(Trial& trial, const CalibrationOptions& options) {
   constexpr double kShortest_s = 400;
   constexpr double kLongest_s = 3 * 3600;
-  const ProcessNoise told{options.direction_random_walk_rad_sqrt_s, options.further_states.wandering_drift_rad_s,
-                          to_seconds(options.further_states.wandering_time)};
-  const auto at = [told](double level, int time) {
-    ProcessNoise noise = told;
-    noise.wandering_sigma_rad_s *= std::pow(2, level);
-    noise.wandering_time_s *= std::pow(3, time);
+  const ProcessNoise given{options.direction_random_walk_rad_sqrt_s, wandering_of(options)};
+  const auto at = [given](double level, int time) {
+    ProcessNoise noise = given;
+    noise.wandering_drift.sigma *= std::pow(2, level);
+    noise.wandering_drift.time_s *= std::pow(3, time);
     return noise;
   };
   const auto times_within = [&](double limit_s) {
-    return static_cast<int>(std::floor(std::abs(std::log(told.wandering_time_s / limit_s)) / std::log(3.0) + 1e-6));
+    return static_cast<int>(
+        std::floor(std::abs(std::log(given.wandering_drift.time_s / limit_s)) / std::log(3.0) + 1e-6));
   };
-  const int shorter = told.wandering_time_s > kShortest_s ? times_within(kShortest_s) : 0;
-  const int longer = told.wandering_time_s < kLongest_s ? times_within(kLongest_s) : 0;
-  return settled(trial, at, {{0, 0}, {2, 0}, {4, 0}, {6, 0}}, {-3, -shorter}, {9, longer});
+  const int shorter = given.wandering_drift.time_s > kShortest_s ? times_within(kShortest_s) : 0;
+  const int longer = given.wandering_drift.time_s < kLongest_s ? times_within(kLongest_s) : 0;
+  return converge(trial, at, {{0, 0}, {2, 0}, {4, 0}, {6, 0}}, {-3, -shorter}, {9, longer});
 }
 
 }  // namespace trihedron::ground

@@ -7,6 +7,7 @@
 #include <optional>
 
 #include "batch/pass_setup.hpp"
+#include "model/setup.hpp"
 
 namespace trihedron::ground {
 namespace {
@@ -24,7 +25,7 @@ double log_bayes_factor(const Eigen::VectorXd& estimate, const Eigen::MatrixXd& 
 /// From the smallest on, those that a model contains and that are tried.
 std::vector<DriftModelId> models_up_to(const DriftModelId& model) {
   std::vector<DriftModelId> models{kEsg7};
-  for (int degree = 1; is_for_whole_pass(model) && degree <= model.degree; ++degree) {
+  for (int degree = 1; degree <= model.degree; ++degree) {
     models.push_back(vsh(degree));
   }
   if (models.back() != model) {
@@ -33,10 +34,10 @@ std::vector<DriftModelId> models_up_to(const DriftModelId& model) {
   return models;
 }
 
-/// Of the constants, in their sigmas: decisions need no more.
+/// Convergence limit of the constants in sigmas: enough for a decision.
 constexpr double kNearEnough = 0.2;
 
-/// What decisions need, in a fraction of the time: over some seconds the body turns by some degrees at most.
+/// Coarser steps, for speed: over some seconds the body turns by some degrees at most.
 PassSetup coarse(PassSetup setup) {
   setup.sample_step = std::chrono::seconds(3);
   setup.fixes_together = std::chrono::seconds(10);
@@ -46,8 +47,8 @@ PassSetup coarse(PassSetup setup) {
 }  // namespace
 
 Trial::Trial(const Pass& pass, const Screened& screened, const CalibrationOptions& options)
-    : drift_model_(decided_drift_model(options)),
-      problem_(screened.pass, coarse(setup_of(pass, options))),
+    : drift_model_(*options.drift_model),
+      problem_(screened.pass, coarse(pass_setup(pass.settings, options))),
       found_(most_likely(problem_, first_solution(problem_, screened), kNearEnough)) {}
 
 void Trial::refit(const ProcessNoise& noise) {
@@ -56,42 +57,22 @@ void Trial::refit(const ProcessNoise& noise) {
 }
 
 double Trial::log_evidence(FurtherState state) const {
-  switch (state) {
-    case FurtherState::kClockOffset:
-      return of_shared(layout().clock(), row_of(state).size, problem_.setup().clock_offset_sigma_s);
-    case FurtherState::kOrbitalError:
-      return of_shared(layout().orbital(), row_of(state).size, problem_.setup().orbital_error_sigma_rad);
-    case FurtherState::kReadoutBias:
-      return of_readout_bias();
-    case FurtherState::kCoefficientChange:
-      return of_coefficient_change();
-    case FurtherState::kStarTrackerAlignment:
-    case FurtherState::kWanderingDrift:
-      break;
+  std::vector<int> rows;
+  std::vector<double> values;
+  std::vector<double> sigmas;
+  const Layout& layout = problem_.layout();
+  const CalibrationSetup& setup = problem_.setup().on_board;
+  for (const ParameterId& parameter : further_parameters(layout)) {
+    if (parameter.is_further(state)) {
+      rows.push_back(state_of(layout, parameter));
+      values.push_back(value_of(layout, found_.solution.gyros, found_.solution.shared, parameter));
+      sigmas.push_back(prior_sigma_of_further_state(setup, state_of(setup.layout, parameter)));
+    }
   }
-  return 0;
-}
-
-double Trial::of_readout_bias() const {
-  const int size = 3 * layout().gyros;
-  Eigen::VectorXd estimate(size);
-  for (int k = 0; k < layout().gyros; ++k) {
-    const int row = 3 * k;
-    estimate.segment<3>(row) = gyro(k).readout_bias;
-  }
-  return log_bayes_factor(estimate, found_.errors.last_root.middleRows(layout().bias(0), size),
-                          Eigen::VectorXd::Constant(size, problem_.setup().readout_bias_sigma));
-}
-
-double Trial::of_coefficient_change() const {
-  const int size = Esg7::kSize * layout().gyros;
-  Eigen::VectorXd estimate(size);
-  for (int k = 0; k < layout().gyros; ++k) {
-    const int row = Esg7::kSize * k;
-    estimate.segment<Esg7::kSize>(row) = gyro(k).change_rad_s;
-  }
-  return log_bayes_factor(estimate, found_.errors.last_root.middleRows(layout().change(0), size),
-                          Eigen::VectorXd::Constant(size, problem_.setup().coefficient_change_sigma_rad_s));
+  const auto vector = [](const std::vector<double>& numbers) {
+    return Eigen::VectorXd(Eigen::VectorXd::Map(numbers.data(), static_cast<Eigen::Index>(numbers.size())));
+  };
+  return log_bayes_factor(vector(values), found_.errors.last_root(rows, Eigen::all), vector(sigmas));
 }
 
 std::vector<Forecast> Trial::forecasts() const {
@@ -107,7 +88,7 @@ std::vector<Eigen::Vector3d> Trial::changes_rad() const {
     if (moment.fix == nullptr || moment.fix->fix.head != 0) {
       return;
     }
-    const auto by_gyros = PassProblem::attitude(found_.solution, moment, moment.fix->h_b, moment.fix->used);
+    const auto by_gyros = problem_.attitude(moment, moment.fix->h_b, moment.fix->used);
     if (!by_gyros) {
       return;
     }
@@ -120,12 +101,6 @@ std::vector<Eigen::Vector3d> Trial::changes_rad() const {
     last_t = moment.t;
   });
   return changes;
-}
-
-double Trial::of_shared(int state, int size, double prior_sigma) const {
-  return log_bayes_factor(found_.solution.shared.segment(state - layout().shared(), size),
-                          found_.errors.last_root.middleRows(state, size),
-                          Eigen::VectorXd::Constant(size, prior_sigma));
 }
 
 }  // namespace trihedron::ground

@@ -8,24 +8,24 @@
 #include "model/prior.hpp"
 #include "trihedron/core/optimal_attitude.hpp"
 #include "trihedron/core/precession.hpp"
+#include "trihedron/core/setup.hpp"
 #include "trihedron/core/telemetry.hpp"
 #include "trihedron/ground/model/setup_error.hpp"
+#include "trihedron/records/stop.hpp"
 
 namespace trihedron::ground {
 namespace {
 
 constexpr int kPair = 2;
-using Directions = PerGyro<Eigen::Vector3d, kPair>;
 
 /// The drift turns by nanoradians over such a step: the midpoint rule loses nothing even in a slew.
 constexpr Duration kStep = std::chrono::seconds(3);
-/// The body's acceleration over it is below the readout noise.
-constexpr Duration kMaxInterpolation = std::chrono::milliseconds(500);
 
 /// Directions at any time, interpolated between samples; asked for in ascending order.
 class Readings {
  public:
-  explicit Readings(const GyroTelemetry& telemetry) : telemetry_(telemetry) {}
+  Readings(const GyroTelemetry& telemetry, Duration max_interpolation)
+      : telemetry_(telemetry), max_interpolation_(max_interpolation) {}
 
   /// Nothing in a gap, or where a sample is no direction.
   [[nodiscard]] std::optional<Directions> at(Time t) {
@@ -38,7 +38,7 @@ class Readings {
     }
     const std::size_t before = times[next_] == t || next_ == 0 ? next_ : next_ - 1;
     const Duration apart = times[next_] - times[before];
-    if (times[before] > t || apart > kMaxInterpolation) {
+    if (times[before] > t || apart > max_interpolation_) {
       return std::nullopt;
     }
     const double fraction = apart == Duration::zero() ? 0 : to_seconds(t - times[before]) / to_seconds(apart);
@@ -56,33 +56,30 @@ class Readings {
 
  private:
   const GyroTelemetry& telemetry_;
+  Duration max_interpolation_;
   std::size_t next_ = 0;
 };
 
 /// A gyro flown with what is known of it.
-struct Flown {
-  GyroParameters parameters;
-  DriftFamily family;
+struct OpenLoopGyro {
+  Gyro gyro;
+  DriftModel drift;
 };
 
-Directions in_c(const std::vector<Flown>& gyros, const Directions& h_b) {
-  Directions h_c;
-  for (int k = 0; k < kPair; ++k) {
-    h_c[k] = seen_in_c(gyros[static_cast<std::size_t>(k)].parameters, h_b[k]);
-  }
-  return h_c;
-}
+struct Pair {
+  std::vector<OpenLoopGyro> gyros;
 
-/// By the midpoint rule, at an attitude and readings of the middle of the step.
-void precess(const std::vector<Flown>& gyros, const Eigen::Matrix3d& C_in_c, const Directions& h_b, double dt_s,
-             Directions& h_in) {
-  for (int k = 0; k < kPair; ++k) {
-    const auto& [parameters, family] = gyros[static_cast<std::size_t>(k)];
-    const Eigen::Vector3d unbiased = without_bias<double>(h_b[k], parameters.readout_bias);
-    const Eigen::Vector3d omega_in = C_in_c * (parameters.C_c_b * (family.basis(unbiased) * parameters.drift_rad_s));
-    h_in[k] = rotated<double>(h_in[k], omega_in * dt_s).normalized();
+  [[nodiscard]] Result<AttitudeByDirections, DirectionsFault> attitude(const Directions& h_b) const {
+    Directions h_in;
+    Directions h_c;
+    for (int k = 0; k < kPair; ++k) {
+      const Gyro& gyro = gyros[static_cast<std::size_t>(k)].gyro;
+      h_in[k] = gyro.h_in;
+      h_c[k] = gyro.in_c(h_b[k]);
+    }
+    return trihedron_attitude(h_in, h_c);
   }
-}
+};
 
 CorrectionInterval interval_of(const AttitudeErrors& errors, double limit_rad) {
   const auto intervals = correction_intervals(errors, limit_rad);
@@ -96,31 +93,34 @@ AttitudeHistory fly_open_loop(const Pass& pass, Time t, const std::vector<GyroCa
   if (gyros.size() < kPair) {
     throw SetupError("an open loop needs two gyros", "give a calibration of a pair");
   }
-  std::vector<Flown> flown;
-  Directions h_in;
+  Pair flown;
   for (int k = 0; k < kPair; ++k) {
     const GyroCalibration& record = gyros[static_cast<std::size_t>(k)];
-    const DriftFamily family = family_of(record);
-    flown.push_back({parameters_of(record, family), family});
-    h_in[k] = record.momentum_in;
+    refuse_incomplete(record);
+    const Layout layout{.drift_model = record.drift_model};
+    flown.gyros.push_back({gyro_of(record, layout), DriftModel(layout.drift_model, layout.further)});
   }
   AttitudeHistory history;
-  Readings readings(pass.gyro);
+  Readings readings(pass.gyro, max_interpolation(pass.settings.gyro_period));
   std::optional<Directions> last = readings.at(t);
   Time last_t = t;
   auto epoch = std::ranges::lower_bound(epochs, t);
   for (Time now = t; epoch != epochs.end(); now = std::min(now + kStep, *epoch)) {
+    check_stop();
     if (const std::optional<Directions> h_b = readings.at(now)) {
       Directions middle = *h_b;
       for (int k = 0; k < kPair && last; ++k) {
         middle[k] = ((*last)[k] + (*h_b)[k]).normalized();
       }
-      if (const auto attitude = trihedron_attitude(h_in, in_c(flown, middle))) {
-        precess(flown, attitude.value().C_in_c.raw(), middle, to_seconds(now - last_t), h_in);
+      if (const auto attitude = flown.attitude(middle)) {
+        for (int k = 0; k < kPair; ++k) {
+          auto& [gyro, drift] = flown.gyros[static_cast<std::size_t>(k)];
+          precess(gyro, drift, attitude.value().C_in_c.raw(), middle[k], 0, to_seconds(now - last_t));
+        }
         last = h_b;
         last_t = now;
       }
-      if (const auto attitude = trihedron_attitude(h_in, in_c(flown, *h_b)); attitude && now == *epoch) {
+      if (const auto attitude = flown.attitude(*h_b); attitude && now == *epoch) {
         history.t.push_back(now);
         history.q_in_c.push_back(attitude.value().C_in_c.quaternion());
         history.age_s.push_back(to_seconds(now - t));

@@ -26,17 +26,17 @@ using Severity = Finding::Severity;
 
 constexpr double kArcsecond = std::numbers::pi / 180 / 3600;
 
-/// A mean NIS off its expectation by more than this part says that the noise is not what the filter was told, whatever
-/// the number of fixes; its sigmas are then off by half of it.
+/// Relative deviation of the mean NIS from its expectation above which the noise settings are wrong, whatever the
+/// number of fixes; its sigmas are then off by half of it.
 constexpr double kNisTolerance = 0.025;
-/// …and by more than this, that the model is wrong: the error hides in the parameters.
+/// … and by more than this part, that the model is wrong; the error is then absorbed by the parameters.
 constexpr double kNisWrong = 0.25;
 /// Two nominal alignment accuracies of the system.
 constexpr double kWeakAlignment_rad = 20 * kArcsecond;
 /// A drift of a few degrees per day, of a gyro or of the orbit plane, is below the noise over this time; over longer
 /// ones it can stand in for an alignment.
 constexpr Duration kDriftStretch = std::chrono::minutes(10);
-/// One in five: the filter then lives on a selection of its own.
+/// Fraction of rejected fixes above which the result rests on a selection that the filter has made itself.
 constexpr double kMostlyRejected = 0.2;
 /// One in twenty.
 constexpr double kManyRejected = 0.05;
@@ -168,15 +168,15 @@ void judge_nis(const Statistics& statistics, const std::string& what_is_wrong, s
   }
 }
 
-/// The chance that a good pass is found fault with.
-constexpr double kOneIn = 1e-5;
-/// Below these what is left in the innovations harms nothing.
+/// Probability of a false alarm on a good pass.
+constexpr double kFalseAlarm = 1e-5;
+/// Correlations and lines below these limits do no harm, however significant.
 constexpr double kCorrelated = 0.05;
 constexpr double kLineInSigmas = 0.1;
 
 bool is_chance(double square, int degrees_of_freedom) {
-  return degrees_of_freedom == 0 ||
-         square <= boost::math::quantile(boost::math::complement(boost::math::chi_squared(degrees_of_freedom), kOneIn));
+  return degrees_of_freedom == 0 || square <= boost::math::quantile(boost::math::complement(
+                                                  boost::math::chi_squared(degrees_of_freedom), kFalseAlarm));
 }
 
 void judge_whiteness(const Pass& pass, const CalibrationRun& run, std::vector<Finding>& findings) {
@@ -217,7 +217,7 @@ void judge_halves(const Statistics& statistics, std::vector<Finding>& findings) 
 }
 
 /// A model that is this much less likely than another is wrong, as ln.
-constexpr double kClearly = 10;
+constexpr double kLogOddsOfWrongModel = 10;
 
 void judge_drift_model(const CalibrationRun& run, std::vector<Finding>& findings) {
   const auto& models = run.drift_models;
@@ -236,13 +236,13 @@ void judge_drift_model(const CalibrationRun& run, std::vector<Finding>& findings
                        better.open_loop_rms_rad / kArcsecond, used->open_loop_rms_rad / kArcsecond);
   };
   const auto larger = std::max_element(used, models.end(), likelier);
-  if (larger->log_likelihood > used->log_likelihood + kClearly) {
+  if (larger->log_likelihood > used->log_likelihood + kLogOddsOfWrongModel) {
     add(findings, FindingCode::kDriftModelTooSmall,
         "The gyros drift in a way that the drift model does not contain; its coefficients and sigmas are wrong.",
         evidence(*larger), fmt::format("Use drift model {}, or {}.", name_of(larger->drift_model), kAutoDriftModel));
   }
   const auto smaller = std::max_element(models.begin(), std::next(used), likelier);
-  if (smaller->log_likelihood > used->log_likelihood + kClearly) {
+  if (smaller->log_likelihood > used->log_likelihood + kLogOddsOfWrongModel) {
     add(findings, FindingCode::kDriftModelTooLarge,
         "The drift model has coefficients that the pass does not support: they add their own error to what comes next.",
         evidence(*smaller), fmt::format("Use drift model {}, or {}.", name_of(smaller->drift_model), kAutoDriftModel));
@@ -271,12 +271,12 @@ void judge_change(const CalibrationRun& run, std::vector<Finding>& findings) {
 }
 
 void judge_star_tracker_errors(const CalibrationRun& run, std::vector<Finding>& findings) {
-  constexpr double kSure = 5;
+  constexpr double kSigmasToReport = 5;
   double clock_s = 0;
   double orbital_rad = 0;
   double sureness = 0;
   for (const FurtherEstimate& state : run.calibration.further) {
-    if (std::abs(state.value) < kSure * state.sigma) {
+    if (std::abs(state.value) < kSigmasToReport * state.sigma) {
       continue;
     }
     if (state.parameter.is_further(FurtherState::kClockOffset)) {
@@ -316,7 +316,7 @@ void judge_noise(const Pass& pass, const CalibrationRun& run, std::vector<Findin
 void judge_determination(const CalibrationRun& run, std::vector<Finding>& findings) {
   std::string names;
   for (std::size_t i = 0; i < run.calibration.states.size(); ++i) {
-    // A member outside eq. (1) is taken on so that the others do not suffer; alone it need not be known.
+    // Members outside eq. (1) are estimated to protect the others; they need not be determined themselves.
     const ParameterId& state = run.calibration.states[i];
     const bool outside = state.is_drift() && !state.coefficient.is_in_eq1();
     if (!outside && !is_determined(run, i)) {

@@ -3,6 +3,8 @@
 
 #include <vector>
 
+#include "model/gyro.hpp"
+#include "trihedron/core/measurement.hpp"
 #include "trihedron/core/setup.hpp"
 #include "trihedron/core/step_report.hpp"
 #include "trihedron/records/options.hpp"
@@ -20,9 +22,11 @@ namespace trihedron::ground {
 
 [[nodiscard]] CorrectionPolicy policy_of(const CorrectionOptions& options);
 
-/// The components of the further states that a layout has and a calibration tells of, in the order of calibration.json.
+/// The components of the further states that a layout has and calibration.json lists, in its order.
 [[nodiscard]] std::vector<ParameterId> further_parameters(const Layout& layout);
-/// Where a component of a further state stands in the layout, which must have it.
+/// Where a component of a further state stands in the layout, which must have it, and its value.
 [[nodiscard]] int state_of(const Layout& layout, const ParameterId& parameter);
+[[nodiscard]] double value_of(const Layout& layout, const Gyros& gyros, const SharedStates& shared,
+                              const ParameterId& parameter);
 
 }  // namespace trihedron::ground

@@ -26,12 +26,10 @@ std::array<Matrix3d, 4> slews(const Mission& mission) {
 }
 
 /// Readings after the body has turned from c to c', C_c_c'.
-GyroDirections read_after(const Matrix3d& slew, const std::vector<GyroParameters>& gyros, const GyroDirections& h_b) {
-  GyroDirections turned = h_b;
-  for (std::size_t k = 0; k < gyros.size(); ++k) {
-    const auto gyro = static_cast<int>(k);
-    turned[gyro] =
-        gyros[k].C_c_b.transpose() * (slew.transpose() * seen_in_c(gyros[k], h_b[gyro])) + gyros[k].readout_bias;
+Directions read_after(const Matrix3d& slew, const Gyros& gyros, int count, const Directions& h_b) {
+  Directions turned = h_b;
+  for (int k = 0; k < count; ++k) {
+    turned[k] = gyros[k].reading_of(slew.transpose() * gyros[k].in_c(h_b[k]));
   }
   return turned;
 }
@@ -40,7 +38,7 @@ GyroDirections read_after(const Matrix3d& slew, const std::vector<GyroParameters
 
 MatrixXd attitude_metric(const PassProblem& problem, const PassSolution& solution, const PassProblem::Linear& linear,
                          const Mission& mission) {
-  const PassLayout& layout = problem.setup().layout;
+  const Layout& layout = problem.layout();
   const Eigen::Index directions = 2L * layout.gyros;
   const std::array<Matrix3d, 4> turns = slews(mission);
   MatrixXd sum = MatrixXd::Zero(layout.constants(), layout.constants());
@@ -59,7 +57,7 @@ MatrixXd attitude_metric(const PassProblem& problem, const PassSolution& solutio
       return;
     }
     if (!started || moment.t - corrected >= mission.correction_interval) {
-      // The momenta are set so that the fix does not disagree.
+      // At a correction the momenta are set such that the residual of the fix is zero.
       const MatrixXd H = problem.compare(solution, moment).H;
       if (H.rows() < directions) {
         return;
@@ -71,9 +69,9 @@ MatrixXd attitude_metric(const PassProblem& problem, const PassSolution& solutio
     }
     looked_at = arc;
     for (const Matrix3d& turn : turns) {
-      const GyroDirections h_b = read_after(turn, solution.gyros, moment.fix->h_b);
-      if (const auto attitude = PassProblem::attitude(solution, moment, h_b, moment.fix->used)) {
-        const MatrixXd by_states = problem.attitude_by_states(solution, moment, attitude.value(), h_b);
+      const Directions h_b = read_after(turn, moment.gyros, layout.gyros, moment.fix->h_b);
+      if (const auto attitude = problem.attitude(moment, h_b, moment.fix->used)) {
+        const MatrixXd by_states = problem.attitude_by_states(moment, attitude.value(), h_b);
         const MatrixXd error =
             by_states.leftCols(layout.dynamic()) * by_constants + by_states.rightCols(layout.constants());
         sum.noalias() += error.transpose() * error;

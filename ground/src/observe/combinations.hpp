@@ -1,5 +1,5 @@
 #pragma once
-/// Combinations of parameters, found and told in words.
+/// Weakly determined combinations of parameters: separation into blocks and description in words.
 
 #include <Eigen/Core>
 #include <string>
@@ -29,7 +29,7 @@ class ParameterBlocks {
   [[nodiscard]] std::string in_words(const Eigen::VectorXd& direction, const Eigen::VectorXd& prior_sigma,
                                      const BodyRotation& rotation) const;
 
-  /// The part of a direction that in_words() tells of, unit.
+  /// The part of a direction that in_words() names, unit.
   [[nodiscard]] Eigen::VectorXd named(Eigen::VectorXd direction) const;
 
   /// Whether only alignments would be named.

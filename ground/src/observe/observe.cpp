@@ -10,11 +10,11 @@
 #include "batch/batch.hpp"
 #include "batch/pass_setup.hpp"
 #include "choose/decide.hpp"
+#include "model/setup.hpp"
 #include "observe/angle_row.hpp"
 #include "observe/attitude_metric.hpp"
 #include "observe/combinations.hpp"
 #include "onboard/screen.hpp"
-#include "onboard/with_estimator.hpp"
 #include "trihedron/ground/model/setup_error.hpp"
 
 namespace trihedron::ground {
@@ -26,14 +26,11 @@ using Eigen::VectorXd;
 
 constexpr std::size_t kTimes = 20;
 
-/// In the order of PassLayout.
-std::vector<ParameterId> constants_of(const PassSetup& setup, const CalibrationOptions& options) {
-  const PassLayout& layout = setup.layout;
-  std::vector<ParameterId> constants =
-      drift_and_alignment(setup.family.model(), static_cast<std::size_t>(layout.gyros));
-  std::vector<ParameterId> further = further_parameters(options.further_states, layout.further_heads, layout.gyros);
-  const std::ptrdiff_t shared = layout.size() - layout.shared();
-  std::ranges::rotate(further, further.begin() + shared);
+/// In the order of the layout.
+std::vector<ParameterId> constants_of(const Layout& layout) {
+  std::vector<ParameterId> constants = drift_and_alignment(layout.drift_model, static_cast<std::size_t>(layout.gyros));
+  std::vector<ParameterId> further = further_parameters(layout);
+  std::ranges::sort(further, {}, [&](const ParameterId& parameter) { return state_of(layout, parameter); });
   constants.insert(constants.end(), further.begin(), further.end());
   return constants;
 }
@@ -92,8 +89,8 @@ ScreenedPass with_single_readings(ScreenedPass pass) {
 /// Adds the angle between the momenta at the samples between fixes.
 void add_angles(const PassProblem& problem, const ScreenedPass& pass, const PassSolution& solution,
                 Duration gyro_period, PassProblem::Linear& linear) {
-  const PassLayout& layout = problem.setup().layout;
-  const double noise_rad = std::hypot(problem.setup().readout_noise_rad[0], problem.setup().readout_noise_rad[1]);
+  const PerGyro<double>& readout_noise_rad = problem.setup().on_board.readout_noise_rad;
+  const double noise_rad = std::hypot(readout_noise_rad[0], readout_noise_rad[1]);
   auto sample = pass.samples.begin();
   Time before = pass.samples.front().t;
   std::vector<Eigen::RowVectorXd> rows;
@@ -117,9 +114,9 @@ void add_angles(const PassProblem& problem, const ScreenedPass& pass, const Pass
     sample = std::lower_bound(sample, pass.samples.end(), moment.t,
                               [](const ScreenedPass::Sample& s, Time t) { return s.t < t; });
     if (moment.fix == nullptr && sample != pass.samples.end() && sample->used[0] && sample->used[1]) {
-      // It stands for those since the last one.
+      // One row represents all samples since the last one.
       const double samples = std::max(std::round(to_seconds(moment.t - before) / to_seconds(gyro_period)), 1.0);
-      const AngleRow row = angle_row(layout, solution, moment, sample->h_b);
+      const AngleRow row = angle_row(problem, moment, sample->h_b);
       rows.emplace_back(row.by_states * (std::sqrt(samples) / (row.noise_factor * noise_rad)));
     }
     before = moment.t;
@@ -128,7 +125,7 @@ void add_angles(const PassProblem& problem, const ScreenedPass& pass, const Pass
 }
 
 VectorXd angle_gain(const Pass& pass, const Screened& screened, const PassSetup& setup, const PassSolution& solution) {
-  const Index constants = setup.layout.constants();
+  const Index constants = setup.layout().constants();
   const ScreenedPass single = with_single_readings(screened.pass);
   const PassProblem problem(single, setup);
   PassProblem::Linear linear = problem.linearise(solution);
@@ -149,7 +146,7 @@ std::vector<std::size_t> ends_of_parts(std::size_t stages) {
   return ends;
 }
 
-/// What makes one linearisation of the pass.
+/// A pass linearised at its solution.
 struct Linearised {
   const PassProblem& problem;
   const BatchResult& found;
@@ -199,9 +196,10 @@ void add_combinations(const MatrixXd& scaled_root, const BodyRotation& rotation,
       const VectorXd direction = columns.col(i);
       const double s = (scaled_root * direction).norm();
       const double error_rad = std::sqrt(direction.dot(scaled_metric * direction) / (1 + s * s));
+      const bool is_unobservable = s < Observability::kUnobservable;
       result.weak.push_back({blocks.in_words(direction, result.prior_sigma, rotation), blocks.named(direction),
-                             blocks.is_alignment(direction), s, error_rad,
-                             s < Observability::kUnobservable && error_rad > tolerable_rad});
+                             blocks.is_alignment(direction), s, error_rad, is_unobservable,
+                             is_unobservable && error_rad > tolerable_rad});
     }
     std::sort(result.weak.begin() + begin, result.weak.end(),
               [](const Combination& a, const Combination& b) { return a.attitude_error_rad > b.attitude_error_rad; });
@@ -264,15 +262,15 @@ Observability observe(const Pass& pass, const CalibrationOptions& asked, const M
   if (screened.pass.fixes.empty()) {
     throw no_fix();
   }
-  const PassProblem problem(screened.pass, setup_of(pass, options));
+  const PassProblem problem(screened.pass, pass_setup(pass.settings, options));
   const BatchResult found = most_likely(problem, first_solution(problem, screened));
-  const PassLayout& layout = problem.setup().layout;
+  const Layout& layout = problem.layout();
   const Linearised at{problem, found, found.linear.prior.bottomRightCorner(layout.constants(), layout.constants())};
 
   Observability result;
   result.options = options;
   result.options.find_noise = false;
-  result.parameters = constants_of(problem.setup(), options);
+  result.parameters = constants_of(layout);
   result.prior_sigma = sigmas(at.prior_root, MatrixXd::Zero(1, at.constants()));
   const MatrixXd root = add_course(at, result);
   if (layout.gyros == 2) {
@@ -286,14 +284,14 @@ Observability observe(const Pass& pass, const CalibrationOptions& asked, const M
 }
 
 Eigen::MatrixXd predicted_covariance(const Pass& exact, const CalibrationOptions& options) {
-  const PassSetup setup = setup_of(exact, options);
-  const ScreenedPass screened = as_it_is(exact, setup.layout.gyros, 1 + setup.layout.further_heads);
+  const PassSetup setup = pass_setup(exact.settings, options);
+  const ScreenedPass screened = as_it_is(exact, setup.layout().gyros, setup.layout().star_trackers);
   if (screened.fixes.empty()) {
     throw no_fix();
   }
   const PassProblem problem(screened, setup);
   const PassProblem::Linear linear = problem.linearise(problem.start(setup.prior.gyros));
-  const Index constants = setup.layout.constants();
+  const Index constants = setup.layout().constants();
   const MatrixXd prior_root = linear.prior.bottomRightCorner(constants, constants);
   const MatrixXd root = covariance_root(prior_root, measured(linear, constants, {linear.stages.size() - 1}).back());
   return root * root.transpose();

@@ -37,10 +37,9 @@ template <class To, class From>
 To with_room(const From& from, const Layout& layout) {
   To to;
   for (int k = 0; k < layout.gyros; ++k) {
+    static_cast<GyroReadout&>(to[k]) = from[k];
     to[k].h_in = from[k].h_in;
     to[k].drift_rad_s = from[k].drift_rad_s;
-    to[k].C_c_b = from[k].C_c_b;
-    to[k].readout_bias = from[k].readout_bias;
   }
   return to;
 }
@@ -114,23 +113,20 @@ Pipeline& Pipeline::operator=(Pipeline&&) noexcept = default;
 Pipeline::~Pipeline() = default;
 
 std::span<const StepReport> Pipeline::feed(const GyroSample& sample) {
-  reports_.clear();
-  std::visit(
-      [&](auto& its) {
-        reports_.push_back(its->on_gyro(sample));
-        while (reports_.back().more_due) {
-          reports_.push_back(its->carry_on());
-        }
-      },
-      program_->on_board);
-  return reports_;
+  return report_all([&](auto& its) { return its.on_gyro(sample); });
 }
 
 std::span<const StepReport> Pipeline::feed(const StarFix& fix) {
+  return report_all([&](auto& its) { return its.on_fix(fix); });
+}
+
+// A step deals with one fix at most: goes on while another is due.
+template <class Step>
+std::span<const StepReport> Pipeline::report_all(const Step& step) {
   reports_.clear();
   std::visit(
       [&](auto& its) {
-        reports_.push_back(its->on_fix(fix));
+        reports_.push_back(step(*its));
         while (reports_.back().more_due) {
           reports_.push_back(its->carry_on());
         }
@@ -200,17 +196,8 @@ Calibration Pipeline::calibration() const {
     Roots all(layout().size(), layout().size());
     estimator.error_root(rows_of(all));
     for (const ParameterId& parameter : further_parameters(layout())) {
-      const int state = state_of(layout(), parameter);
-      const Gyro& gyro = gyros[parameter.owner];
-      double value = 0;
-      if (parameter.is_further(FurtherState::kReadoutBias)) {
-        value = gyro.readout_bias(parameter.component);
-      } else if (parameter.is_further(FurtherState::kCoefficientChange)) {
-        value = gyro.drift_rad_s(layout().change_column() + parameter.component);
-      } else {
-        value = estimator.shared()(state - layout().shared());
-      }
-      result.further.push_back({parameter, value, all.row(state).norm()});
+      result.further.push_back({parameter, value_of(layout(), gyros, estimator.shared(), parameter),
+                                all.row(state_of(layout(), parameter)).norm()});
     }
   }
   return result;

@@ -2,9 +2,6 @@
 
 #include <algorithm>
 
-#include "model/gyro_model.hpp"
-#include "onboard/setup.hpp"
-#include "onboard/with_estimator.hpp"
 #include "trihedron/ground/onboard/replay.hpp"
 
 namespace trihedron::ground {
@@ -28,24 +25,20 @@ CalibrationOptions without_further_states(CalibrationOptions options) {
 
 Screened screen(const Pass& pass, const CalibrationOptions& asked) {
   CalibrationOptions options = without_further_states(asked);
-  const bool has_prior_of_esg20 = pass.settings.prior && asked.drift_model == kEsg20;
-  if (has_prior_of_esg20 || (asked.drift_model != kEsg7 && knows_of_drift_outside(pass.settings))) {
+  const bool prior_has_more = pass.settings.prior && asked.drift_model && asked.drift_model != kEsg7;
+  if (prior_has_more || (asked.drift_model != kEsg7 && knows_of_drift_outside(pass.settings))) {
     options.drift_model = asked.drift_model.value_or(kEsg20);
   }
-  return with_estimator(pass, options, [&]<class Estimator> {
-    const auto cycle = make_cycle<Estimator>(pass, options, {.navigate = false});
-    Screened screened;
-    screened.pass.gyros = Estimator::kGyros;
-    std::size_t sample = 0;
-    replay(
-        pass, *cycle, [&](const auto& report) { screened.pass.add_fix(report); },
-        [&](const auto& report) { screened.pass.add_sample(pass.gyro, sample++, report); });
-    screened.pass.keep_longest();
-    for (const auto& gyro : cycle->estimator().gyros()) {
-      screened.first.push_back(to_record<Esg7>(gyro));
-    }
-    return screened;
+  Pipeline pipeline(pass.settings, options, false);
+  Screened screened;
+  screened.pass.gyros = pipeline.layout().gyros;
+  replay(pass, pipeline, [&](const StepReport& report, const GyroSample& sample) {
+    screened.pass.add_fix(report);
+    screened.pass.add_sample(sample, report);
   });
+  screened.pass.keep_longest();
+  screened.first = pipeline.gyros();
+  return screened;
 }
 
 }  // namespace trihedron::ground

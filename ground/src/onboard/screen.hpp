@@ -1,5 +1,5 @@
 #pragma once
-/// What of a pass can be used, as the smallest cycle finds it.
+/// Screening of a pass: its usable samples and fixes, by the on-board step with the smallest layout.
 
 #include <vector>
 
@@ -8,16 +8,16 @@
 
 namespace trihedron::ground {
 
-/// What the smallest cycle makes of a pass, with values to start from.
+/// Samples and fixes that the on-board step accepted, and its estimates as starting values.
 struct Screened {
   ScreenedPass pass;
   std::vector<GyroCalibration> first;
 };
 
-/// Runs the pass through the smallest cycle that knows its prior. Throws SetupError.
+/// Runs the pass through the smallest layout that knows its prior. Throws SetupError.
 [[nodiscard]] Screened screen(const Pass& pass, const CalibrationOptions& asked);
 
-/// Options of the smallest cycle, no further states.
+/// Options of the smallest layout: eq. (1), no further states.
 [[nodiscard]] CalibrationOptions without_further_states(CalibrationOptions options);
 
 }  // namespace trihedron::ground

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <random>
 
+#include "named.hpp"
 #include "trihedron/records/scenario.hpp"
 
 namespace trihedron::ground {
@@ -21,9 +22,9 @@ CatalogueEntry entry(const char* start_up, int at_h, double k0_rad_s, double ali
   Calibration& calibration = result.calibration;
   calibration.epoch = calibration.t = Time(hours(at_h));
   calibration.gyros.resize(1);
-  calibration.gyros[0].drift_rad_s = {{"k0", k0_rad_s}};
+  calibration.gyros[0].drift_rad_s = {k0_rad_s};
   calibration.gyros[0].alignment_rotation_vector_rad = {align_x_rad, 0, 0};
-  calibration.states = {"gyro1.k0", "gyro1.align_x"};
+  calibration.states = parameters({"gyro1.k0", "gyro1.align_x"});
   calibration.covariance = Eigen::Vector2d(1e-9, kArcsecond).cwiseAbs2().asDiagonal();
   calibration.verdict.trustworthy = true;
   return result;
@@ -68,13 +69,13 @@ TEST(History, FindsAnAlignmentThatMovedAtAStart) {
   // 5σ of the difference.
   const History history = compare_start_ups({entry("a", 1, 1e-6, 0), entry("b", 20, 9e-6, 7.1 * kArcsecond)});
   ASSERT_THAT(history.findings, SizeIs(1));
-  EXPECT_EQ(history.findings[0].code, "alignment-moved");
+  EXPECT_EQ(history.findings[0].code, FindingCode::kAlignmentMoved);
   EXPECT_FALSE(history.changes[0].coefficients.holds());
 }
 
 TEST(History, ComparesOnlyWhatBothStartUpsHave) {
   std::vector<CatalogueEntry> catalogue = {entry("a", 1, 1e-6, 0), entry("b", 2, 1e-6, 0)};
-  catalogue[1].calibration.states = {"gyro1.W(1,0)", "star_tracker_2.x"};
+  catalogue[1].calibration.states = parameters({"gyro1.W(1,0)", "star_tracker_2_align_x_rad"});
   const History history = compare_start_ups(catalogue);
   EXPECT_THAT(history.changes[0].parameters, IsEmpty());
   EXPECT_TRUE(history.changes[0].coefficients.holds());

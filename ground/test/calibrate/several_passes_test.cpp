@@ -48,7 +48,7 @@ SeveralPasses after_two_hours_and(const Pass& second) {
   return passes;
 }
 
-auto has_finding(const char* code) { return Contains(Field(&Finding::code, code)); }
+auto has_finding(FindingCode code) { return Contains(Field(&Finding::code, code)); }
 
 std::string refusal_of(const Pass& second) {
   SeveralPasses passes(told());
@@ -75,8 +75,8 @@ TEST(SeveralPasses, OfOneStartUpAgreeAndAreBetterThanOne) {
   EXPECT_LT(nees_of(two_hours().truth, combined), 45);  // χ² of 20, once in 1000
   for (const PassAlone& pass : passes.passes()) {
     EXPECT_LT(nees_of(two_hours().truth, pass.run.calibration), 45);
-    for (const std::string& state : combined.states) {
-      EXPECT_LT(sigma_of(combined, state), sigma_of(pass.run.calibration, state)) << state;
+    for (const ParameterId& state : combined.states) {
+      EXPECT_LT(sigma_of(combined, state), sigma_of(pass.run.calibration, state)) << name_of(state);
     }
   }
   // The prior counts once. That each pass is linearised about its own estimate is far below a tenth.
@@ -86,7 +86,7 @@ TEST(SeveralPasses, OfOneStartUpAgreeAndAreBetterThanOne) {
   EXPECT_NEAR((information * combined.covariance).trace() / 20, 1, 0.1);
   EXPECT_TRUE(combined.verdict.trustworthy);
   // The second pass alone would leave the parameters as it found them, within a factor of two.
-  EXPECT_THAT(combined.verdict.findings, Not(has_finding("not-determined")));
+  EXPECT_THAT(combined.verdict.findings, Not(has_finding(FindingCode::kNotDetermined)));
 }
 
 TEST(SeveralPasses, OfTwoStartUpsAreNotToBeUsedTogether) {
@@ -97,8 +97,8 @@ TEST(SeveralPasses, OfTwoStartUpsAreNotToBeUsedTogether) {
   const SeveralPasses passes = after_two_hours_and(sim::simulate(other).pass);
   EXPECT_FALSE(passes.passes().at(1).coefficients.holds());
   EXPECT_TRUE(passes.passes()[1].alignments.holds());
-  EXPECT_THAT(passes.combined().calibration.verdict.findings, has_finding("coefficients-moved"));
-  EXPECT_THAT(passes.combined().calibration.verdict.findings, Not(has_finding("alignment-moved")));
+  EXPECT_THAT(passes.combined().calibration.verdict.findings, has_finding(FindingCode::kCoefficientsMoved));
+  EXPECT_THAT(passes.combined().calibration.verdict.findings, Not(has_finding(FindingCode::kAlignmentMoved)));
   EXPECT_FALSE(passes.combined().calibration.verdict.trustworthy);
 }
 
@@ -108,13 +108,13 @@ TEST(SeveralPasses, TellAnAlignmentThatMovedBetweenThem) {
   const SeveralPasses passes = after_two_hours_and(sim::simulate(turned).pass);
   EXPECT_TRUE(passes.passes().at(1).coefficients.holds());
   EXPECT_FALSE(passes.passes()[1].alignments.holds());
-  EXPECT_THAT(passes.combined().calibration.verdict.findings, has_finding("alignment-moved"));
+  EXPECT_THAT(passes.combined().calibration.verdict.findings, has_finding(FindingCode::kAlignmentMoved));
 }
 
 TEST(SeveralPasses, OfOneStartUpDisagreeNoMoreThanChance) {
   // The covariance of estimator invariant is too small for some passes as short as these.
   CalibrationOptions options = told();
-  options.estimator = kBatch;
+  options.estimator = Estimator::kBatch;
   Agreement sum;
   for (std::uint64_t pair = 0; pair < 8; ++pair) {
     const auto first = sim::simulate(scenario_in_eq1(100 + pair, hours(2)));
@@ -125,8 +125,8 @@ TEST(SeveralPasses, OfOneStartUpDisagreeNoMoreThanChance) {
     for (std::size_t k = 0; k < 2; ++k) {
       GyroPrior& prior = second.pass.settings.gyros[k];
       prior.drift_common_sigma_rad_s = 3e-7;
-      for (const auto& [name, value] : first.truth.gyros[k].drift_rad_s) {
-        prior.drift_rad_s[name] = value + 3e-7;
+      for (const auto& [coefficient, value] : first.truth.gyros[k].drift_rad_s) {
+        prior.drift_rad_s[coefficient] = value + 3e-7;
       }
     }
     const PassAlone& alone = passes.add("second", second.pass);
@@ -147,7 +147,7 @@ TEST(SeveralPasses, KeepTheFaultOfAPassThatIsNotToBeUsedAlone) {
   noisy.settings.star_tracker_noise_rad /= 3;  // the fixes scatter far more than told
   passes.add("noisy", noisy);
   passes.add("second", of_the_same_start_up().pass);
-  EXPECT_THAT(passes.combined().calibration.verdict.findings, has_finding("pass-not-trustworthy"));
+  EXPECT_THAT(passes.combined().calibration.verdict.findings, has_finding(FindingCode::kPassNotTrustworthy));
   EXPECT_FALSE(passes.combined().calibration.verdict.trustworthy);
 }
 
@@ -155,10 +155,10 @@ TEST(SeveralPasses, KnowTheAlignmentInSteadyFlightByThePassWithSlews) {
   Scenario steady = with_gyros_of(two_hours().truth, 6, hours(9));
   steady.attitude.slews = std::vector<Slew>{};
   const SeveralPasses passes = after_two_hours_and(sim::simulate(steady).pass);
-  EXPECT_THAT(passes.passes().at(1).run.calibration.verdict.findings, has_finding("weak-alignment-axis"));
+  EXPECT_THAT(passes.passes().at(1).run.calibration.verdict.findings, has_finding(FindingCode::kWeakAlignmentAxis));
   const Verdict& verdict = passes.combined().calibration.verdict;
-  EXPECT_THAT(verdict.findings, Not(has_finding("weak-alignment-axis")));
-  EXPECT_THAT(verdict.findings, Not(has_finding("pass-not-trustworthy")));
+  EXPECT_THAT(verdict.findings, Not(has_finding(FindingCode::kWeakAlignmentAxis)));
+  EXPECT_THAT(verdict.findings, Not(has_finding(FindingCode::kPassNotTrustworthy)));
   EXPECT_TRUE(verdict.trustworthy);
 }
 

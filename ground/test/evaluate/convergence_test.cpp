@@ -5,6 +5,8 @@
 #include <chrono>
 #include <cmath>
 
+#include "named.hpp"
+
 namespace trihedron::ground {
 namespace {
 
@@ -22,7 +24,7 @@ TEST(SettledFrom, DoesNotTakeNaNForSettled) { EXPECT_EQ(settled_from({0, std::na
 /// Of one gyro: k0 settles, nu12 stays at its prior, align_y ends off.
 CalibrationRun three_parameters() {
   CalibrationRun run;
-  run.calibration.states = {"gyro1.k0", "gyro1.nu12", "gyro1.align_y"};
+  run.calibration.states = parameters({"gyro1.k0", "gyro1.nu12", "gyro1.align_y"});
   run.calibration.covariance = Eigen::Vector3d(0.01, 0.9, 0.1).cwiseAbs2().asDiagonal();
   run.known_before.covariance = Eigen::Matrix3d::Identity();
   const auto add = [&](int at_min, std::vector<double> value, std::vector<double> sigma) {
@@ -48,7 +50,7 @@ TEST(Convergence, IsReachedWithinThreeSigmasOrATenthOfTheFirstError) {
 TEST(Convergence, IsAgainstTheTruthWhereItIsKnown) {
   Truth truth;
   truth.gyros.resize(1);
-  truth.gyros[0].drift_rad_s = {{"nu12", 0}, {"k0", 1.9}};
+  truth.gyros[0].drift_rad_s = {{coefficient("nu12"), 0}, {coefficient("k0"), 1.9}};
   truth.gyros[0].alignment_rotation_vector_rad = {9, 2, 9};
   const auto parameters = convergence(three_parameters(), &truth);
   EXPECT_EQ(parameters[0].settled, minutes(20));
@@ -68,7 +70,7 @@ TEST(Convergence, OfAKindIsThatOfItsLastDeterminedParameter) {
 
 TEST(Convergence, IsNotThatOfAParameterThatTheCycleDoesNotEstimate) {
   CalibrationRun run = three_parameters();
-  run.calibration.states[1] = "gyro1.W(3,1)";
+  run.calibration.states[1] = parameter("gyro1.W(3,1)");
   run.calibration.covariance(1, 1) = 0.01;
   for (std::vector<double>& row : run.parameters.value) {
     row[1] = std::nan("");

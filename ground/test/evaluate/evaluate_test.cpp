@@ -5,6 +5,9 @@
 #include <chrono>
 #include <limits>
 
+#include "named.hpp"
+#include "trihedron/core/frames.hpp"
+
 namespace trihedron::ground {
 namespace {
 
@@ -143,21 +146,55 @@ TEST(Extension, PairsCorrectionsOfTheSameTime) {
   EXPECT_EQ(pairs[1].calibrated.corrected, at(seconds(5400)));
 }
 
-TEST(ParameterErrors, AreTruthLessEstimate) {
+TEST(ParameterErrors, AreEstimateLessTruth) {
   Truth truth;
   truth.gyros.resize(1);
-  truth.gyros[0].drift_rad_s = {{"k0", 3e-6}};
+  truth.gyros[0].drift_rad_s = {{coefficient("k0"), 3e-6}};
+  truth.gyros[0].unmodelled_rad_s = {{"W(1,0)", 4e-9}};
   truth.gyros[0].alignment_rotation_vector_rad = {1e-3, 0, 0};
   Calibration calibration;
   GyroCalibration& gyro = calibration.gyros.emplace_back();
-  gyro.drift_rad_s = {{"k0", 1e-6}, {"D(k0)", 1e-9}};
+  gyro.drift_model = kEsg20;
+  gyro.drift_rad_s.resize(20);
+  gyro.drift_rad_s[0] = 1e-6;
+  gyro.drift_rad_s[8] = 5e-9;   // W(1,0)
+  gyro.drift_rad_s[19] = 1e-9;  // D(k0)
   gyro.alignment_rotation_vector_rad = {0, 0, 2e-3};
-  calibration.covariance.setIdentity(5, 5);
-  const Eigen::VectorXd errors = parameter_errors(truth, calibration);
-  EXPECT_NEAR(errors(0), 2e-6, 1e-18);
-  EXPECT_EQ(errors(1), -1e-9);
+  calibration.states = parameters(
+      {"gyro1.k0", "gyro1.align_x", "gyro1.align_y", "gyro1.align_z", "gyro1.D(k0)", "gyro1.W(1,0)", "gyro2.k0"});
+  const Eigen::VectorXd errors = estimate_minus_truth(calibration, truth);
+  ASSERT_EQ(errors.size(), 7);
+  EXPECT_NEAR(errors(0), -2e-6, 1e-18);
   // Second order: half of the product of the two rotations.
-  EXPECT_LT((errors.tail<3>() - Eigen::Vector3d(1e-3, 0, -2e-3)).norm(), 1.1e-6);
+  EXPECT_LT((errors.segment<3>(1) - Eigen::Vector3d(-1e-3, 0, 2e-3)).norm(), 1.1e-6);
+  EXPECT_TRUE(std::isnan(errors(4)));
+  EXPECT_NEAR(errors(5), 1e-9, 1e-21);
+  EXPECT_TRUE(std::isnan(errors(6)));
+  EXPECT_EQ(estimate_minus_truth(calibration, truth, UnnamedDrift::kIsZero)(4), 1e-9);
+}
+
+TEST(ParameterErrors, AreTheRotationFromTheTrueAlignmentToTheEstimate) {
+  const auto C_c_b = [](const Eigen::Vector3d& v) { return Rot<C, B<1>>::exp(Vec<C>::assume(v)); };
+  Truth truth;
+  truth.gyros.resize(1);
+  truth.gyros[0].alignment_rotation_vector_rad = {0.3, -0.2, 0.5};
+  const Eigen::Vector3d delta(0.01, 0.02, -0.03);
+  Calibration calibration;
+  calibration.gyros.resize(1);
+  calibration.gyros[0].alignment_rotation_vector_rad =
+      (Rot<C, C>::exp(Vec<C>::assume(delta)) * C_c_b(truth.gyros[0].alignment_rotation_vector_rad)).log().raw();
+  calibration.states = parameters({"gyro1.align_x", "gyro1.align_y", "gyro1.align_z"});
+  EXPECT_LT((estimate_minus_truth(calibration, truth) - delta).norm(), 1e-12);
+}
+
+TEST(AttitudeErrors, AreSolutionLessReference) {
+  AttitudeHistory solution;
+  solution.t = {at(seconds(0))};
+  solution.q_in_c = {Eigen::Quaterniond(Eigen::AngleAxisd(0.3, Eigen::Vector3d::UnitZ())) *
+                     Eigen::Quaterniond(Eigen::AngleAxisd(0.01, Eigen::Vector3d::UnitX()))};
+  const auto errors =
+      attitude_errors(solution, solution.t, {Eigen::Quaterniond(Eigen::AngleAxisd(0.3, Eigen::Vector3d::UnitZ()))});
+  EXPECT_LT((errors.error_rad.at(0) - Eigen::Vector3d(0.01, 0, 0)).norm(), 1e-12);
 }
 
 }  // namespace

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <random>
 
+#include "named.hpp"
 #include "trihedron/core/frames.hpp"
 
 namespace trihedron::ground {
@@ -44,7 +45,7 @@ CalibrationRun good_run() {
   run.calibration.gyros.resize(2);
   run.calibration.gyros[0].momentum_in = {1, 0, 0};
   run.calibration.gyros[1].momentum_in = {0, 1, 0};
-  run.calibration.states = {"gyro1.k0", "gyro1.align_x"};
+  run.calibration.states = parameters({"gyro1.k0", "gyro1.align_x"});
   run.calibration.covariance = Eigen::Vector2d(1e-18, 1e-12).asDiagonal();
   run.known_before.covariance = Eigen::Vector2d(2e-6, 8.7e-3).cwiseAbs2().asDiagonal();
   for (int i = 0; i <= 3600; ++i) {
@@ -52,17 +53,20 @@ CalibrationRun good_run() {
     fix.t = Time(std::chrono::seconds(3 * i));
     fix.status = FixStatus::kUsed;
   }
-  run.calibration.statistics = {
-      {"fixes", 3601},     {"fixes_used", 3601}, {"fixes_rejected_as_outliers", 0}, {"reopened", 0},
-      {"nis_count", 3600}, {"nis_mean", 4.02},   {"nis_degrees_of_freedom", 4}};
+  Statistics& statistics = run.calibration.statistics;
+  statistics.fixes = 3601;
+  statistics.fixes_used = 3601;
+  statistics.nis_count = 3600;
+  statistics.nis_mean = 4.02;
+  statistics.nis_degrees_of_freedom = 4;
   return run;
 }
 
 std::vector<std::string> codes(const Verdict& verdict) {
   std::vector<std::string> all;
   for (const Finding& finding : verdict.findings) {
-    all.push_back(finding.code);
-    EXPECT_FALSE(finding.text.empty() || finding.evidence.empty() || finding.cure.empty()) << finding.code;
+    all.emplace_back(name_of(finding.code));
+    EXPECT_FALSE(finding.text.empty() || finding.evidence.empty() || finding.cure.empty()) << name_of(finding.code);
   }
   return all;
 }
@@ -75,10 +79,10 @@ TEST(Verdict, OfAGoodRunIsTrustworthyWithoutFindings) {
 
 TEST(Verdict, FindsABatchThatHasNotConverged) {
   auto run = good_run();
-  run.calibration.statistics["batch_iterations"] = 12;
-  run.calibration.statistics["batch_converged"] = 1;
+  run.calibration.statistics.batch_iterations = 12;
+  run.calibration.statistics.batch_converged = true;
   EXPECT_THAT(codes(judge(good_pass(), run)), IsEmpty());
-  run.calibration.statistics["batch_converged"] = 0;
+  run.calibration.statistics.batch_converged = false;
   EXPECT_THAT(codes(judge(good_pass(), run)), ElementsAre("batch-not-converged"));
   EXPECT_FALSE(judge(good_pass(), run).trustworthy);
 }
@@ -114,45 +118,45 @@ TEST(Verdict, FindsALineAtTheOrbitalRate) {
 
 TEST(Verdict, FindsHalvesThatDisagree) {
   auto run = good_run();
-  run.calibration.statistics["halves_degrees_of_freedom"] = 18;
-  run.calibration.statistics["halves_chi_square"] = 40;
+  run.calibration.statistics.halves_degrees_of_freedom = 18;
+  run.calibration.statistics.halves_chi_square = 40;
   EXPECT_THAT(codes(judge(good_pass(), run)), IsEmpty());
-  run.calibration.statistics["halves_chi_square"] = 60;  // chance of 2e-6
+  run.calibration.statistics.halves_chi_square = 60;  // chance of 2e-6
   EXPECT_THAT(codes(judge(good_pass(), run)), ElementsAre("halves-disagree"));
   EXPECT_FALSE(judge(good_pass(), run).trustworthy);
 }
 
 TEST(Verdict, FindsADriftModelThatIsTooSmallOrTooLarge) {
   auto run = good_run();
-  run.drift_models = {{"esg7", 7, 0, 1e-4}, {"vsh:1", 13, 5, 2e-5}, {"vsh:2", 19, -8, 3e-5}};
-  for (const char* model : {"esg7", "vsh:1", "esg20"}) {
+  run.drift_models = {{kEsg7, 0, 1e-4}, {vsh(1), 5, 2e-5}, {vsh(2), -8, 3e-5}};
+  for (const DriftModelId& model : {kEsg7, vsh(1), kEsg20}) {
     run.calibration.gyros[0].drift_model = model;
-    EXPECT_THAT(codes(judge(good_pass(), run)), IsEmpty()) << model;
+    EXPECT_THAT(codes(judge(good_pass(), run)), IsEmpty()) << name_of(model);
   }
-  run.calibration.gyros[0].drift_model = "vsh:2";
+  run.calibration.gyros[0].drift_model = vsh(2);
   EXPECT_THAT(codes(judge(good_pass(), run)), ElementsAre("drift-model-too-large"));
   EXPECT_TRUE(judge(good_pass(), run).trustworthy);
   run.drift_models[1].log_likelihood = 500;
-  run.calibration.gyros[0].drift_model = "esg7";
+  run.calibration.gyros[0].drift_model = kEsg7;
   EXPECT_THAT(codes(judge(good_pass(), run)), ElementsAre("drift-model-too-small"));
   EXPECT_FALSE(judge(good_pass(), run).trustworthy);
-  run.drift_models.push_back({kLargestDriftModel, 96, 900, 1e-5});
+  run.drift_models.push_back({kLargestDriftModel, 900, 1e-5});
   run.calibration.gyros[0].drift_model = kLargestDriftModel;
   EXPECT_THAT(codes(judge(good_pass(), run)), ElementsAre("drift-model-at-its-limit"));
 }
 
 TEST(Verdict, TellsOfErrorsOfTheStarTrackerThatWereFound) {
   auto run = good_run();
-  run.calibration.further = {{"clock_offset_s", 1e-4, 1e-4}, {"orbital_sine_x_rad", 1e-5, 4e-6}};
+  run.calibration.further = {{parameter("clock_offset_s"), 1e-4, 1e-4}, {parameter("orbital_sine_x_rad"), 1e-5, 4e-6}};
   EXPECT_THAT(codes(judge(good_pass(), run)), IsEmpty());
-  run.calibration.further = {{"clock_offset_s", -1e-2, 1e-4}, {"orbital_sine_x_rad", 1e-5, 1e-6}};
+  run.calibration.further = {{parameter("clock_offset_s"), -1e-2, 1e-4}, {parameter("orbital_sine_x_rad"), 1e-5, 1e-6}};
   EXPECT_THAT(codes(judge(good_pass(), run)), ElementsAre("clock-offset-found", "orbital-error-found"));
   EXPECT_TRUE(judge(good_pass(), run).trustworthy);
 }
 
 TEST(Verdict, FindsTooFewFixes) {
   auto run = good_run();
-  run.calibration.statistics["fixes_used"] = 99;
+  run.calibration.statistics.fixes_used = 99;
   EXPECT_THAT(codes(judge(good_pass(), run)), ElementsAre("too-few-fixes"));
   EXPECT_FALSE(judge(good_pass(), run).trustworthy);
 }
@@ -166,18 +170,18 @@ TEST(Verdict, FindsAPassShorterThanAnOrbit) {
 
 TEST(Verdict, FindsManyRejections) {
   auto run = good_run();
-  run.calibration.statistics["fixes_rejected_as_outliers"] = 170;
+  run.calibration.statistics.fixes_rejected_as_outliers = 170;
   EXPECT_THAT(codes(judge(good_pass(), run)), IsEmpty());  // under one in twenty
-  run.calibration.statistics["fixes_rejected_as_outliers"] = 200;
+  run.calibration.statistics.fixes_rejected_as_outliers = 200;
   EXPECT_THAT(codes(judge(good_pass(), run)), ElementsAre("many-rejected"));
   EXPECT_TRUE(judge(good_pass(), run).trustworthy);
-  run.calibration.statistics["fixes_rejected_as_outliers"] = 2000;
+  run.calibration.statistics.fixes_rejected_as_outliers = 2000;
   EXPECT_FALSE(judge(good_pass(), run).trustworthy);
 }
 
 TEST(Verdict, FindsThatTheFilterWasReopened) {
   auto run = good_run();
-  run.calibration.statistics["reopened"] = 1;
+  run.calibration.statistics.reopened = 1;
   EXPECT_THAT(codes(judge(good_pass(), run)), ElementsAre("reopened"));
 }
 
@@ -185,16 +189,16 @@ TEST(Verdict, FindsNisOutOfBoundsOnBothSides) {
   auto run = good_run();
   for (const auto& [nis, trustworthy] :
        {std::pair(4.4, true), std::pair(5.1, false), std::pair(3.5, true), std::pair(2.9, false)}) {
-    run.calibration.statistics["nis_mean"] = nis;
+    run.calibration.statistics.nis_mean = nis;
     const Verdict verdict = judge(good_pass(), run);
     EXPECT_THAT(codes(verdict), ElementsAre("nis-out-of-bounds")) << nis;
     EXPECT_EQ(verdict.trustworthy, trustworthy) << nis;
   }
   // Few fixes scatter more: the same mean is then no finding.
-  run.calibration.statistics["nis_mean"] = 4.4;
-  run.calibration.statistics["nis_count"] = 120;
+  run.calibration.statistics.nis_mean = 4.4;
+  run.calibration.statistics.nis_count = 120;
   EXPECT_THAT(codes(judge(good_pass(), run)), IsEmpty());
-  run.calibration.statistics["nis_count"] = 0;
+  run.calibration.statistics.nis_count = 0;
   EXPECT_THAT(codes(judge(good_pass(), run)), Not(Contains("nis-out-of-bounds")));
 }
 
@@ -243,7 +247,7 @@ TEST(Verdict, TellsOfStarTrackersThatAreNotUsed) {
   EXPECT_THAT(codes(verdict), ElementsAre("star-trackers-not-used"));
   EXPECT_TRUE(verdict.trustworthy);
   auto run = good_run();
-  run.calibration.further = {{"star_tracker_2_align_x_rad", 0, 1e-6}};
+  run.calibration.further = {{parameter("star_tracker_2_align_x_rad"), 0, 1e-6}};
   EXPECT_THAT(codes(judge(pass, run)), IsEmpty());
 }
 
@@ -274,7 +278,7 @@ TEST(Verdict, FindsAGyroThatStoodStill) {
 
 TEST(Verdict, FindsAStarTrackerThatWasOff) {
   auto run = good_run();
-  run.calibration.statistics["fixes_off_in_a_row"] = 100;
+  run.calibration.statistics.fixes_off_in_a_row = 100;
   EXPECT_THAT(codes(judge(good_pass(), run)), ElementsAre("star-tracker-off"));
 }
 
@@ -297,7 +301,7 @@ TEST(Verdict, OfANavigationSaysWhetherTheParametersFit) {
   EXPECT_THAT(codes(judge_navigation(run)), ElementsAre("calibration-does-not-fit"));
   EXPECT_FALSE(judge_navigation(run).trustworthy);
   run.held_parameters_misfit.reset();
-  run.statistics["nis_mean"] = 40;
+  run.statistics.nis_mean = 40;
   EXPECT_THAT(codes(judge_navigation(run)), ElementsAre("nis-out-of-bounds"));
   EXPECT_FALSE(judge_navigation(run).trustworthy);
 }

@@ -11,6 +11,7 @@
 #include <numbers>
 
 #include "batch/pass_setup.hpp"
+#include "named.hpp"
 #include "observe/angle_row.hpp"
 #include "observe/combinations.hpp"
 #include "onboard/screen.hpp"
@@ -82,12 +83,12 @@ TEST(Observability, CountsWhatIsWeak) {
 /// batch, which has it from the start. They are linearised apart by the last step of the iteration.
 TEST(Observability, PredictsTheSigmasOfTheBatch) {
   CalibrationOptions options = told();
-  options.estimator = kBatch;
+  options.estimator = Estimator::kBatch;
   const Calibration calibration = calibrate(two_hours().pass, options).calibration;
   ASSERT_EQ(with_slews().parameters, calibration.states);
   for (Eigen::Index i = 0; i < calibration.covariance.rows(); ++i) {
     EXPECT_NEAR(with_slews().sigma(i) / std::sqrt(calibration.covariance(i, i)), 1, 2e-3)
-        << calibration.states[static_cast<std::size_t>(i)];
+        << name_of(calibration.states[static_cast<std::size_t>(i)]);
   }
 }
 
@@ -98,10 +99,10 @@ TEST(Observability, IsThatOfTheDenseProblem) {
   CalibrationOptions options = told();
   options.direction_random_walk_rad_sqrt_s = 0;
   const Screened screened = screen(pass, options);
-  const PassProblem problem(screened.pass, setup_of(pass, options));
+  const PassProblem problem(screened.pass, pass_setup(pass.settings, options));
   const PassProblem::Linear linear = problem.linearise(first_solution(problem, screened));
   const Eigen::Index n = linear.prior.cols();
-  const Eigen::Index d = problem.setup().layout.dynamic();
+  const Eigen::Index d = problem.layout().dynamic();
   Eigen::MatrixXd by_first = Eigen::MatrixXd::Identity(n, n);  // of the states of an arc
   Eigen::MatrixXd information = Eigen::MatrixXd::Zero(n, n);
   for (std::size_t arc = 0; arc < linear.stages.size(); ++arc) {
@@ -160,20 +161,21 @@ TEST(Observability, CountsTheErrorOfTheAttitudeWhileTheSatelliteSlews) {
 
 TEST(Observability, NamesFurtherStates) {
   CalibrationOptions options = told();
-  options.drift_model = "esg20";
-  options.further_states.clock_offset = options.further_states.readout_bias = FurtherStateOptions::Choice::kOn;
+  options.drift_model = kEsg20;
+  options.further_states[FurtherState::kClockOffset] = options.further_states[FurtherState::kReadoutBias] =
+      FurtherStateOptions::Choice::kOn;
   const Observability observability =
       observe(sim::simulate(scenario_in_eq1(4, std::chrono::minutes(30))).pass, options);
   EXPECT_EQ(observability.parameters.size(), 2 * 23 + 6 + 1U);
-  EXPECT_EQ(observability.parameters.back(), "clock_offset_s");
-  EXPECT_EQ(observability.parameters[46], "gyro1_readout_bias_x_rad");
+  EXPECT_EQ(observability.parameters.back(), parameter("clock_offset_s"));
+  EXPECT_EQ(observability.parameters[46], parameter("gyro1_readout_bias_x_rad"));
   EXPECT_NEAR(observability.prior_sigma(52), 0.1, 1e-9);
   EXPECT_NEAR(observability.prior_sigma(46), 1e-4, 1e-9);
 }
 
 TEST(Observability, KnowsTheOrbitNormalByTheFixesOfEstimatorPaperAsWell) {
   CalibrationOptions options = told();
-  options.estimator = "paper";
+  options.estimator = Estimator::kPaper;
   const Pass pass = sim::simulate(steady(std::chrono::minutes(60))).pass;
   EXPECT_THAT(unobservable(observe(pass, options)), testing::Contains(testing::HasSubstr("the orbit normal")));
 }
@@ -209,16 +211,17 @@ TEST(Observability, RefusesAPassWithoutFixes) {
 TEST(AngleRow, IsTheDerivativeOfZ1) {
   const Pass pass = sim::simulate(scenario_in_eq1(3, std::chrono::minutes(3))).pass;
   CalibrationOptions options = told();
-  options.further_states.wandering_drift = options.further_states.readout_bias = FurtherStateOptions::Choice::kOn;
+  options.further_states[FurtherState::kWanderingDrift] = options.further_states[FurtherState::kReadoutBias] =
+      FurtherStateOptions::Choice::kOn;
   const Screened screened = screen(pass, options);
-  const PassProblem problem(screened.pass, setup_of(pass, options));
-  const PassLayout& layout = problem.setup().layout;
+  const PassProblem problem(screened.pass, pass_setup(pass.settings, options));
+  const Layout& layout = problem.layout();
   const PassSolution solution = first_solution(problem, screened);
   const ScreenedPass::Sample& last = screened.pass.samples.back();
   const auto row_at = [&](const PassSolution& at) {
     AngleRow row;
     problem.go_along(at, [&](const PassProblem::Moment& moment) {
-      row = moment.t == last.t ? angle_row(layout, at, moment, last.h_b) : row;
+      row = moment.t == last.t ? angle_row(problem, moment, last.h_b) : row;
     });
     return row;
   };
@@ -242,7 +245,7 @@ TEST(AngleRow, IsTheDerivativeOfZ1) {
 }
 
 TEST(ParameterBlocks, SeparateWhatOneBlockHolds) {
-  const ParameterBlocks blocks({"gyro1.k0", "gyro1.align_x", "gyro1.align_y", "gyro1.align_z", "gyro2.k0"});
+  const ParameterBlocks blocks(parameters({"gyro1.k0", "gyro1.align_x", "gyro1.align_y", "gyro1.align_z", "gyro2.k0"}));
   Eigen::MatrixXd space = Eigen::MatrixXd::Zero(5, 2);
   space.col(0) << 0, 0, 1, 0, 1;
   space.col(1) << 0, 0, 1, 0, -1;
@@ -254,7 +257,8 @@ TEST(ParameterBlocks, SeparateWhatOneBlockHolds) {
 }
 
 TEST(ParameterBlocks, GiveTheDirectionOfWhatTheyName) {
-  const ParameterBlocks blocks({"gyro1.k0", "gyro1.align_x", "gyro1.align_y", "gyro1.align_z", "clock_offset_s"});
+  const ParameterBlocks blocks(
+      parameters({"gyro1.k0", "gyro1.align_x", "gyro1.align_y", "gyro1.align_z", "clock_offset_s"}));
   Eigen::VectorXd direction(5);
   direction << 0.2, 0.6, 0, 0.8, 0.1;
   Eigen::VectorXd expected(5);
@@ -264,7 +268,7 @@ TEST(ParameterBlocks, GiveTheDirectionOfWhatTheyName) {
 
 TEST(ParameterBlocks, SayWhichCombination) {
   const ParameterBlocks blocks(
-      {"gyro1.k0", "gyro1.mu12", "gyro1.align_x", "gyro1.align_y", "gyro1.align_z", "clock_offset_s"});
+      parameters({"gyro1.k0", "gyro1.mu12", "gyro1.align_x", "gyro1.align_y", "gyro1.align_z", "clock_offset_s"}));
   const Eigen::VectorXd sigma = Eigen::VectorXd::Ones(6);
   const auto words = [&](std::initializer_list<double> direction, const BodyRotation& rotation = {}) {
     return blocks.in_words(Eigen::Map<const Eigen::VectorXd>(direction.begin(), 6).normalized(), sigma, rotation);

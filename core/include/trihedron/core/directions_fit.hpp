@@ -1,5 +1,5 @@
 #pragma once
-/// Readings of several samples taken together: the body moves smoothly, the readout noise is white.
+/// Polynomials through the readings of several samples: the body moves smoothly, the readout noise is white.
 
 #include <Eigen/Core>
 
@@ -8,7 +8,7 @@
 
 namespace trihedron {
 
-/// Directions at one time, c or case axes as the samples, and how they change.
+/// Fitted directions and their rates at one time, in the axes of the samples.
 struct FittedDirections {
   Directions h_b;                   ///< unit
   Directions h_b_rate;              ///< 1/s, across h_b

@@ -12,8 +12,8 @@
 
 namespace trihedron {
 
-/// Momenta and parameters in use since the last astro-correction, and what is known of their errors. Drift that wanders
-/// fades as first-order Gauss–Markov noise does, and what comes in its place is unknown.
+/// Momenta and parameters in use since the last astro-correction, and what is known of their errors. The estimate of
+/// the Gauss–Markov drift decays with its correlation time; the variance of what replaces it is added.
 template <class Estimator>
 class Navigator {
  public:

@@ -1,5 +1,6 @@
 #pragma once
-/// Attitude from N directions that count alike: Wahba's problem. The trihedron, of two, trusts the first.
+/// Attitude from N equally weighted directions (Wahba's problem), and the trihedron, which takes the first of two as
+/// reference.
 
 #include "trihedron/core/attitude.hpp"
 #include "trihedron/core/per_gyro.hpp"
@@ -21,7 +22,7 @@ struct AttitudeSolution {
   Eigen::Matrix3d covariance_rad2 = Eigen::Matrix3d::Zero();
 };
 
-/// The trihedron on the first two directions, and errors by theirs. Eq. of section 5, paper Fig. 4.
+/// The trihedron on the first two directions, and errors by theirs. docs/mathematics.md, section 5; paper Fig. 4.
 [[nodiscard]] Result<AttitudeByDirections, DirectionsFault> trihedron_attitude(const Directions& h_in,
                                                                                const Directions& h_c);
 /// The same, only the attitude itself.

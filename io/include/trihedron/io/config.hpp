@@ -18,6 +18,7 @@ namespace trihedron::io {
 
 /// `90min`, `none` or `continuous`. Throws UsageError.
 [[nodiscard]] CorrectionOptions parse_correction_interval(std::string_view text);
+/// The text that parse_correction_interval() reads back to the same.
 [[nodiscard]] std::string format_correction_interval(const CorrectionOptions& corrections);
 
 }  // namespace trihedron::io

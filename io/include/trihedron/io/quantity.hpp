@@ -25,9 +25,13 @@ namespace trihedron::io {
 /// A pure number, finite.
 [[nodiscard]] double parse_number(std::string_view text);
 
+/// In the largest unit of which it is a whole multiple, as `90min`.
 [[nodiscard]] std::string format_duration(Duration duration);
+/// As `5arcmin`.
 [[nodiscard]] std::string format_angle(double rad);
+/// As `0.1deg/h`.
 [[nodiscard]] std::string format_rate(double rad_s);
+/// As `1e-8rad/s^0.5`.
 [[nodiscard]] std::string format_random_walk(double rad_sqrt_s);
 
 }  // namespace trihedron::io

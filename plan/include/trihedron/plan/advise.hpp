@@ -1,5 +1,5 @@
 #pragma once
-/// Slews that calibrate best.
+/// Advice on the slews from which the calibration learns most.
 
 #include <Eigen/Core>
 #include <chrono>
@@ -13,21 +13,31 @@
 
 namespace trihedron::plan {
 
+/// What the spacecraft can do, and how much of the flight may be given to calibration.
 struct SlewLimits {
-  std::optional<double> max_rate_rad_s;                ///< or that of the scenario
+  std::optional<double> max_rate_rad_s;                ///< where absent, the limit of the scenario
   double max_angle_rad = 30 * kDegree;                 ///< of each slew from the reference attitude
-  int slews = 4;                                       ///< at most, each there and back
-  Duration manoeuvre_time = std::chrono::minutes(10);  ///< of all together, turns and holds
+  int slews = 4;                                       ///< largest number; each goes to an attitude and back
+  Duration manoeuvre_time = std::chrono::minutes(10);  ///< of all slews together, turns and holds
 };
 
+/// The slews found, and what the flight tells of the parameters without and with them.
 struct Advice {
   Scenario scenario;  ///< with the slews
   ground::Observability before;
   ground::Observability after;
 
   [[nodiscard]] const std::vector<Slew>& slews() const { return std::get<std::vector<Slew>>(scenario.attitude.slews); }
-  /// The combinations that are harmful without the slews; where none is, all that are weak.
+  /// The combinations of parameters that do harm without the slews; where none does, all weak ones.
   [[nodiscard]] std::vector<ground::Combination> formerly_weak() const;
+
+  /// One of these, and its 1-sigma, rad or rad/s.
+  struct Gain {
+    ground::Combination combination;
+    double sigma_before = 0;
+    double sigma_after = 0;
+  };
+  [[nodiscard]] std::vector<Gain> gains() const;
 };
 
 /// Searches the slews that leave the least attitude error (Observability::attitude_metric): one more slew at a time

@@ -9,6 +9,7 @@
 #include <utility>
 #include <vector>
 
+#include "trihedron/core/telemetry.hpp"
 #include "trihedron/core/time.hpp"
 #include "trihedron/records/calibration.hpp"
 
@@ -24,7 +25,7 @@ struct GyroPrior {
   Eigen::Vector3d alignment_sigma_rad{0, 0, 0};
 };
 
-/// A star-tracker head beside the first. The first head's axes are c; the axes s of this one are turned from them:
+/// A star-tracker head other than the first. The first head's axes are c; the axes s of this one are turned from them:
 /// C_c_s = exp([m×]) exp([mounting×]), m unknown. It is telemetered as q_in_c, C_in_s exp([mounting×])ᵀ.
 struct FurtherStarTracker {
   Eigen::Vector3d noise_rad{0, 0, 0};  ///< 1-sigma about s x, y, z
@@ -32,6 +33,7 @@ struct FurtherStarTracker {
   double alignment_prior_sigma_rad = 0;  ///< of m, per axis
 };
 
+/// What pass.toml says: when and how the telemetry was taken, and what is known before.
 struct PassSettings {
   std::string spacecraft;
   Time epoch{};
@@ -41,7 +43,7 @@ struct PassSettings {
   Eigen::Vector3d star_tracker_noise_rad{0, 0, 0};  ///< of the first head, 1-sigma about c x, y, z
   std::vector<FurtherStarTracker> further_star_trackers;
   std::vector<GyroPrior> gyros;
-  std::string start_up;  ///< of the rotors, "2009-05-20"; empty where it is not told
+  std::string start_up;  ///< of the rotors, "2009-05-20"; empty where it is not given
   std::optional<Calibration>
       prior;  ///< an earlier calibration: replaces drift and alignment of `gyros`, with its covariance
 };
@@ -59,6 +61,16 @@ struct GyroTelemetry {
   }
 };
 
+/// One sample of it.
+[[nodiscard]] inline GyroSample sample_of(const GyroTelemetry& telemetry, std::size_t i) {
+  GyroSample sample;
+  sample.t = telemetry.t[i];
+  for (int k = 0; k < std::min(telemetry.gyros, kMaxGyros); ++k) {
+    sample.h_b[k] = telemetry.direction(i, k);
+  }
+  return sample;
+}
+
 /// Fixes as telemetered: q_in_c, Hamilton; not normalised, of either sign, may hold NaN. Times strictly increase.
 struct StarTrackerTelemetry {
   std::vector<Time> t;
@@ -67,6 +79,7 @@ struct StarTrackerTelemetry {
   [[nodiscard]] std::size_t size() const { return t.size(); }
 };
 
+/// Settings and telemetry of one pass.
 struct Pass {
   PassSettings settings;
   GyroTelemetry gyro;
@@ -76,13 +89,14 @@ struct Pass {
 
 /// What a simulator knows. Never part of a Pass, so that no estimator can read it.
 struct Truth {
+  /// Constants of one gyro.
   struct Gyro {
     std::vector<std::pair<DriftCoefficient, double>> drift_rad_s;  ///< of eq. (1)
     /// Drift outside eq. (1), each by the name that the simulator gave it; those of a DriftCoefficient have its name.
     std::vector<std::pair<std::string, double>> unmodelled_rad_s;
     Eigen::Vector3d alignment_rotation_vector_rad{0, 0, 0};
 
-    /// Of eq. (1) or outside it; nothing where the simulator did not tell.
+    /// Of eq. (1) or outside it; nothing where the simulator does not give it.
     [[nodiscard]] std::optional<double> drift(const DriftCoefficient& coefficient) const;
   };
   /// Errors of a head that do not change at random; C_c_s as in FurtherStarTracker.
@@ -93,8 +107,8 @@ struct Truth {
     Eigen::Vector3d misalignment_rad{0, 0, 0};  ///< m, c axes
   };
   std::vector<Gyro> gyros;
-  std::vector<StarTracker> star_trackers;  ///< empty where the simulator did not tell
-  double orbital_rate_rad_s = 0;           ///< n; 0 where the simulator did not tell
+  std::vector<StarTracker> star_trackers;  ///< empty where the simulator does not give it
+  double orbital_rate_rad_s = 0;           ///< n; 0 where the simulator does not give it
   std::vector<Time> t;
   std::vector<Eigen::Quaterniond> q_in_c;
   std::vector<double> h_in;  ///< sample-major: h_in[(sample * gyros + gyro) * 3 + axis]

@@ -1,5 +1,5 @@
 #pragma once
-/// What the spacecraft's attitude does: a reference attitude, slews from it, jitter on top.
+/// The attitude of the spacecraft over time: a reference attitude, slews away from it and back, jitter on top.
 
 #include <Eigen/Core>
 #include <Eigen/Geometry>
@@ -19,8 +19,8 @@ namespace trihedron::sim {
 /// moves along x in an image. The Earth's axis is taken along in_z: precession since 2000 is left out.
 [[nodiscard]] Rot<In, C> yaw_steered_attitude(const OrbitState& state);
 
-/// Offsets from the reference attitude. Each turn is about one fixed axis and rest to rest, its angle a polynomial of
-/// degree 5 in time: rate and acceleration are continuous.
+/// Offsets from the reference attitude. Each turn is about one fixed axis, begins and ends at rest, and its angle is a
+/// polynomial of degree 5 in time: rate and acceleration are continuous.
 class SlewPlan {
  public:
   SlewPlan() = default;
@@ -31,6 +31,7 @@ class SlewPlan {
   /// q_reference_c.
   [[nodiscard]] Eigen::Quaterniond at(double t_s) const;
 
+  /// One turn about a fixed axis, at rest at both ends.
   struct Turn {
     double begin_s;
     double end_s;
@@ -72,11 +73,11 @@ class SmoothNoise {
 /// Recorded attitude, twice differentiable: a natural cubic spline of the quaternion's components, normalised.
 class AttitudeSpline {
  public:
-  /// Signs of the samples are free. Throws std::invalid_argument for fewer than two samples, times that do not
-  /// increase, or neighbours 90° apart and more.
+  /// The sign of each sample's quaternion is arbitrary. Throws std::invalid_argument for fewer than two samples, times
+  /// that do not increase, or neighbours 90° apart and more.
   explicit AttitudeSpline(const std::vector<AttitudeSample>& samples);
 
-  /// q_in_c; its sign is that of the first sample carried on.
+  /// q_in_c. Its sign is continuous in time, beginning with that of the first sample.
   [[nodiscard]] Eigen::Quaterniond at(double t_s) const;
   [[nodiscard]] double begin_s() const { return t_s_.front(); }
   [[nodiscard]] double end_s() const { return t_s_.back(); }

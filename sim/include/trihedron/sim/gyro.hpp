@@ -14,17 +14,17 @@
 
 namespace trihedron::sim {
 
-/// Case axes of the gyro at hand, whichever its number.
+/// Case axes of the gyro that is being simulated; here its number does not matter.
 using Case = B<0>;
 
-/// ω_b of a momentum in case axes, with what changes in time. Random parts are constant over a step and drawn at its
-/// start.
+/// Drift of one gyro: ω_b as a function of the direction of the momentum in case axes, with its changes in time. Random
+/// parts are drawn at the start of each step and constant over it.
 class Drift {
  public:
   /// Throws std::invalid_argument for a harmonic that does not exist.
   Drift(const DriftScenario& scenario, std::uint64_t seed, std::uint64_t gyro);
 
-  /// To the step that begins at t_s and lasts step_s.
+  /// Moves on to the step that begins at t_s and lasts step_s: draws its random parts.
   void next_step(double t_s, double step_s);
 
   /// ω_b(h), rad/s, during the step. h: unit.
@@ -42,7 +42,7 @@ class Drift {
 
  private:
   DriftScenario scenario_;
-  Esg7::Coefficients<double> kappa_rad_s_;  ///< before warm-up
+  Esg7::Coefficients<double> kappa_rad_s_;  ///< without the warm-up term
   Esg7::Coefficients<double> kappa_now_rad_s_;
   HarmonicField field_;
   Vector3<double> markov_rad_s_ = Vector3<double>::Zero();
@@ -52,7 +52,7 @@ class Drift {
   Stream markov_random_;
 };
 
-/// What telemetry makes of a direction.
+/// The readout of one gyro: scale error, bias, noise, quantisation and faults between the true direction and telemetry.
 class Readout {
  public:
   Readout(const ReadoutScenario& scenario, Duration sample_period, std::uint64_t seed, int gyro);
@@ -72,6 +72,7 @@ class Readout {
   Stream stuck_;
 };
 
+/// One gyro in flight: its momentum turns by its drift as the body turns about it.
 class Gyro {
  public:
   /// At the start of the pass, with the body at C_in_c. Throws std::invalid_argument for a start direction of no

@@ -21,7 +21,7 @@ class HarmonicField {
   /// ω_b(h), rad/s, case axes, across h. h: unit.
   template <class S>
   [[nodiscard]] Vector3<S> rate(const Vector3<S>& h) const {
-    // Apart, so that the usual case of no members costs nothing.
+    // sum() is a function of its own, so that the usual case of no members costs nothing.
     return members_.empty() ? Vector3<S>(Vector3<S>::Zero()) : sum(h);
   }
 
@@ -42,7 +42,7 @@ class HarmonicField {
     return h * h.dot(w) - w + h.cross(d);
   }
 
-  /// What the members of one degree and one |order| add up to, so that each polynomial is taken once.
+  /// The members of one degree and one |order| together, so that each polynomial is evaluated once.
   struct Term {
     int degree;
     int order;                  ///< not negative

@@ -6,29 +6,31 @@
 
 namespace trihedron::sim {
 
-/// WGS 84 / EGM96: gravitational parameter, equatorial radius, J2, rate of rotation.
-inline constexpr double kEarthGravity_m3_s2 = 3.986004418e14;
-inline constexpr double kEarthRadius_m = 6378137.0;
-inline constexpr double kEarthJ2 = 1.08262668e-3;
-inline constexpr double kEarthRate_rad_s = 7.292115e-5;
+// WGS 84 / EGM96.
+inline constexpr double kEarthGravity_m3_s2 = 3.986004418e14;  ///< gravitational parameter
+inline constexpr double kEarthRadius_m = 6378137.0;            ///< equatorial
+inline constexpr double kEarthJ2 = 1.08262668e-3;              ///< oblateness of the gravity field, 1
+inline constexpr double kEarthRate_rad_s = 7.292115e-5;        ///< rotation
 
+/// Position and velocity at one time.
 struct OrbitState {
   Vec<In> position_m;    ///< from the Earth's centre
   Vec<In> velocity_m_s;  ///< relative to the Earth's centre
 };
 
-/// The seam for other sources of position (CCSDS OEM, two-line elements). Seconds from the start of the pass.
+/// Interface to a source of position; others than KeplerJ2 may follow (CCSDS OEM, two-line elements). Times are seconds
+/// from the start of the pass.
 class Ephemeris {
  public:
   virtual ~Ephemeris() = default;
   [[nodiscard]] virtual OrbitState at(double t_s) const = 0;
-  /// Mean rate of the argument of latitude, the n of what repeats every revolution.
+  /// Mean rate n of the argument of latitude: the rate of everything that repeats every revolution.
   [[nodiscard]] virtual double mean_rate_rad_s() const = 0;
 };
 
 /// Kepler's motion on an ellipse whose node, perigee and mean anomaly run at the secular rates of J2, first order
-/// (Vallado, Fundamentals of Astrodynamics, 9.6). The velocity is that of the ellipse of the moment, so that r × v is
-/// its normal.
+/// (Vallado, Fundamentals of Astrodynamics, 9.6). The velocity is that on the osculating ellipse, so that r × v is its
+/// normal.
 class KeplerJ2 final : public Ephemeris {
  public:
   /// Throws std::invalid_argument unless 0 < perigee ≤ apogee.

@@ -10,7 +10,7 @@
 
 namespace trihedron::sim {
 
-/// What a stream is for. The numbers are part of every pass ever made from a seed: add, never renumber.
+/// What a random stream is for. The numbers decide which pass a seed gives: add new ones, never renumber.
 enum class Source : std::uint64_t {
   kKappa = 1,
   kMisalignment,
@@ -43,9 +43,10 @@ enum class Source : std::uint64_t {
 /// xoshiro256++ 1.0 (Blackman, Vigna 2019), period 2²⁵⁶ − 1, seeded by splitmix64 as its authors ask.
 class Stream {
  public:
-  /// The stream of one source of one thing (gyro `index`, head `index`, …).
+  /// The stream of one source in one sensor (gyro `index`, star-tracker head `index`, …).
   Stream(std::uint64_t seed, Source source, std::uint64_t index = 0) {
-    // Each part is mixed before the next comes in, so that neither neighbours nor sums of the three collide.
+    // Each part is mixed before the next is added, so that neighbouring seeds, or equal sums of the three, give
+    // different streams.
     std::uint64_t key = seed;
     key = splitmix64(key) ^ static_cast<std::uint64_t>(source);
     key = splitmix64(key) ^ index;
@@ -66,7 +67,7 @@ class Stream {
     return result;
   }
 
-  /// Even in [0, 1), 53 bits.
+  /// Uniform in [0, 1), 53 bits.
   [[nodiscard]] double uniform() { return static_cast<double>(bits() >> 11) * 0x1p-53; }
   [[nodiscard]] double uniform(double low, double high) { return low + (high - low) * uniform(); }
   [[nodiscard]] bool happens(double probability) { return uniform() < probability; }
@@ -98,7 +99,7 @@ class Stream {
     return {x, y, normal()};
   }
 
-  /// Unit vector, even over the sphere (Archimedes: its z is even in −1 … 1).
+  /// Unit vector, uniform over the sphere (its z is uniform in −1 … 1, by Archimedes).
   [[nodiscard]] Eigen::Vector3d direction() {
     const double z = uniform(-1, 1);
     const double azimuth = uniform(0, 2 * std::numbers::pi);

@@ -9,10 +9,11 @@
 
 namespace trihedron::sim {
 
+/// What simulate() makes: telemetry, the truth behind it, and the faults that were put into it.
 struct SimulatedPass {
   Pass pass;
-  /// At every epoch of a fix, whether there is one or not. Drift coefficients as they are at the end of the pass;
-  /// `unmodelled_rad_s` holds the amplitudes of orthonormal harmonics, "W(1,0)".
+  /// At every epoch at which a fix is due, whether there is one or not. Drift coefficients as they are at the end of
+  /// the pass; `unmodelled_rad_s` holds the amplitudes of orthonormal harmonics, "W(1,0)".
   Truth truth;
   std::vector<Event>
       events;  ///< what was done to the telemetry; gyros' first, then the star tracker's, each in time order

@@ -8,12 +8,14 @@
 
 namespace trihedron::sim {
 
+/// Sun and Earth at one time.
 struct SkyState {
   Vec<In> sun_m;               ///< from the Earth's centre
   Vec<In> earth_velocity_m_s;  ///< of the Earth's centre, relative to the solar system's barycentre
 };
 
-/// The ephemeris, tabulated every hour and linear between: the Earth's velocity bends by less than 2 mm/s in an hour.
+/// The ephemeris, tabulated every hour and linear between: over an hour the Earth's velocity departs from a straight
+/// line by less than 2 mm/s.
 class Sky {
  public:
   /// For the times epoch + begin_s … epoch + end_s. Accurate for 1900 … 2100.

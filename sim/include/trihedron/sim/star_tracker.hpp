@@ -12,10 +12,10 @@
 
 namespace trihedron::sim {
 
-/// Axes s of the head at hand, whichever its number; c for the first.
+/// Axes s of the head that is being simulated; those of the first head are c.
 struct Head {};
 
-/// Everything outside the head that a fix depends on.
+/// What a fix depends on outside the head.
 struct StarTrackerView {
   const AttitudeProgramme& attitude;
   const Ephemeris& ephemeris;
@@ -23,13 +23,14 @@ struct StarTrackerView {
 };
 
 /// Fixes at the start of the pass and every `period` up to and with `duration`. Faults are appended to `events`.
-/// Signs of q follow on from one fix to the next, but for the wrong ones.
+/// The sign of q is continuous from fix to fix, except where the fault kFixWrongSign turns it.
 [[nodiscard]] StarTrackerTelemetry simulate_fixes(const StarTrackerScenario& head, const StarTrackerView& view,
                                                   Time epoch, Duration duration, Duration period, std::uint64_t seed,
                                                   std::vector<Event>& events, int head_number = 0);
 
-/// The small rotation e of a fix C_in_s exp([e×]) that takes the stars where aberration shows them: first and higher
-/// orders of the velocity, as they move the boresight. velocity_m_s: of the spacecraft in the solar system.
+/// Uncorrected aberration as an error e of a fix C_in_s exp([e×]): the rotation by which aberration displaces a star on
+/// the boresight, by the relativistic formula. velocity_m_s: of the spacecraft relative to the barycentre of the solar
+/// system.
 [[nodiscard]] Vec<Head> aberration_error(const Rot<In, Head>& C_in_s, const Vec<In>& velocity_m_s);
 
 }  // namespace trihedron::sim

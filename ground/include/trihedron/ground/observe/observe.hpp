@@ -27,6 +27,7 @@ struct Combination {
   bool is_alignment = false;      ///< nothing else takes part with a tenth of the square
   double singular_value = 0;      ///< prior sigma over that by the measurements alone
   double attitude_error_rad = 0;  ///< what it adds to Observability::attitude_error_rad, rms
+  bool is_unobservable = false;   ///< below Observability::kUnobservable
   /// Unobservable, and its part of the attitude error is more than the mission can bear.
   bool is_harmful = false;
 };
@@ -63,8 +64,9 @@ struct Observability {
 
   [[nodiscard]] bool is_harmful() const;  ///< whether any combination is
 
-  /// Below it the data add less than a digit to what was known. Not 1: the jitter of the body and the turning of the
-  /// orbit plane show even what steady flight hides, but with a sigma of minutes of arc.
+  /// Singular value below which a combination is unobservable: the data improve the prior sigma by a factor of less
+  /// than ten. The limit is not 1, because the jitter of the body and the turning of the orbit plane show even what
+  /// steady flight hides, but with a sigma of minutes of arc.
   static constexpr double kUnobservable = 10;
   /// … less than two digits.
   static constexpr double kWeak = 100;

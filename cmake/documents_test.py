@@ -1,0 +1,31 @@
+"""What the documents say of the sources is there.
+
+Run by CTest: python3 -m pytest documents_test.py.
+"""
+import pathlib
+import re
+
+import pytest
+
+ROOT = pathlib.Path(__file__).resolve().parent.parent
+DOCUMENTS = ["docs/mathematics.md", "docs/architecture.md", "CONTRIBUTING.md"]
+FOLDERS = ["core", "records", "sim", "io", "ground", "plan", "report", "cli", "flight", "python", "bench", "validation", "examples", "docs",
+           "cmake", ".ci"]
+
+
+def paths_named(text):
+    """What stands in backticks and begins with a folder of the repository, but for patterns such as `src/<name>.cpp`."""
+    quoted = re.findall(r"`([^`\s]+)`", text)
+    return [path for path in quoted if path.split("/")[0] in FOLDERS and "/" in path and not re.search(r"[<>*{}…]", path)]
+
+
+@pytest.mark.parametrize("document", DOCUMENTS)
+def test_paths_that_a_document_names_exist(document):
+    paths = paths_named((ROOT / document).read_text())
+    assert len(paths) > 5
+    assert [path for path in paths if not (ROOT / path).exists()] == []
+
+
+def test_paths_are_found_in_text():
+    text = "See `core/include/a.hpp` (`docs/adr/`), `io/src/<format>.cpp`, `h_b`, `C_in_c`, `a/b`, and `cmake --preset x`."
+    assert paths_named(text) == ["core/include/a.hpp", "docs/adr/"]

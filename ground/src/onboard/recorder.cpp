@@ -1,0 +1,181 @@
+#include "trihedron/ground/onboard/recorder.hpp"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <utility>
+
+#include "trihedron/core/frames.hpp"
+
+namespace trihedron::ground {
+namespace {
+
+/// Between the paper's corrections.
+constexpr Duration kWatchedCorrections = std::chrono::minutes(90);
+/// Consecutive fixes attributed to the star tracker from which on they are no single outliers.
+constexpr long kJumpLength = 20;
+
+void append(AttitudeHistory& history, Time t, const AttitudeSolution& solution) {
+  history.t.push_back(t);
+  history.q_in_c.push_back(solution.C_in_c.quaternion());
+  history.sigma_rad.emplace_back(solution.covariance_rad2.diagonal().cwiseSqrt());
+}
+
+/// Estimates in the order of drift_and_alignment().
+std::vector<double> parameter_values(const std::vector<GyroCalibration>& gyros) {
+  std::vector<double> values;
+  for (const GyroCalibration& gyro : gyros) {
+    values.insert(values.end(), gyro.drift_rad_s.begin(), gyro.drift_rad_s.end());
+    const Eigen::Vector3d& lambda = gyro.alignment_rotation_vector_rad;
+    values.insert(values.end(), lambda.begin(), lambda.end());
+  }
+  return values;
+}
+
+Eigen::Matrix3d alignment_of(const GyroCalibration& gyro) {
+  return Rot<C, B<1>>::exp(Vec<C>::assume(gyro.alignment_rotation_vector_rad)).raw();
+}
+
+Correction correction_of(const Pipeline& pipeline, const AttitudeSolution& attitude, Time t) {
+  Correction correction{t, pipeline.gyros_before(), pipeline.gyros()};
+  const Eigen::Matrix3d& C_in_c = attitude.C_in_c.raw();
+  for (std::size_t k = 0; k < correction.calibrated.size(); ++k) {
+    const GyroCalibration& calibrated = correction.calibrated[k];
+    GyroCalibration& before = correction.known_before[k];
+    // The momentum as read through the prior parameters at this attitude.
+    const Eigen::Vector3d h_b =
+        alignment_of(calibrated).transpose() * (C_in_c.transpose() * calibrated.momentum_in) + calibrated.readout_bias;
+    before.momentum_in = C_in_c * (alignment_of(before) * without_bias(h_b, before.readout_bias));
+  }
+  return correction;
+}
+
+}  // namespace
+
+FixRecord record_of(const StepReport& report, int gyros) {
+  FixRecord record;
+  record.t = report.fix.t;
+  record.head = report.fix.head;
+  record.status = report.fix.status;
+  const Eigen::Index size = 2L * gyros;
+  const bool compared = report.fix.innovation.size() == size;
+  for (Eigen::Index row = 0; row < size; ++row) {
+    record.innovation.push_back(compared ? report.fix.innovation(row) : 0);
+    record.innovation_sigma.push_back(compared ? std::sqrt(report.fix.innovation_covariance(row, row)) : 0);
+  }
+  record.nis = report.fix.nis;
+  record.degrees_of_freedom =
+      2 * static_cast<int>(std::count(report.gyros.begin(), report.gyros.begin() + gyros, GyroState::kUsed));
+  record.jumped = report.fix.jumped;
+  record.corrected_navigator = report.corrected;
+  return record;
+}
+
+void add_statistics(const std::vector<FixRecord>& fixes, Statistics& statistics) {
+  double nis_sum = 0;
+  long in_a_row = 0;
+  double freedom = 0;
+  std::vector<double> squares(fixes.empty() ? 0 : fixes.front().innovation.size());
+  for (const FixRecord& fix : fixes) {
+    statistics.fixes_used += fix.used() ? 1 : 0;
+    statistics.fixes_rejected_as_outliers += fix.status == FixStatus::kRejectedByGate ? 1 : 0;
+    const bool was_reopened = fix.status == FixStatus::kUsedAfterReopening || fix.status == FixStatus::kRestarted;
+    statistics.reopened += was_reopened ? 1 : 0;
+    in_a_row = fix.jumped ? in_a_row + 1 : 0;
+    statistics.fixes_off_in_a_row += in_a_row == kJumpLength ? kJumpLength : in_a_row > kJumpLength ? 1 : 0;
+    if (fix.status == FixStatus::kUsed) {
+      nis_sum += fix.nis;
+      freedom += fix.degrees_of_freedom;
+      ++statistics.nis_count;
+      for (std::size_t i = 0; i < squares.size(); ++i) {
+        squares[i] += std::pow(fix.innovation[i], 2);
+      }
+    }
+  }
+  statistics.fixes = static_cast<long>(fixes.size());
+  if (statistics.nis_count > 0) {
+    const auto count = static_cast<double>(statistics.nis_count);
+    statistics.nis_degrees_of_freedom = freedom / count;
+    statistics.nis_mean = nis_sum / count;
+    for (const double square : squares) {
+      statistics.innovation_rms_rad.push_back(std::sqrt(square / count));
+    }
+  }
+}
+
+void Recorder::add(const StepReport& report, const Pipeline& pipeline) {
+  if (report.fix.status != FixStatus::kNone && report.fix.status != FixStatus::kPending) {
+    add_fix(report, pipeline);
+  }
+  if (report.sample != SampleStatus::kNone) {
+    add_sample(report, pipeline);
+  }
+}
+
+void Recorder::add_fix(const StepReport& report, const Pipeline& pipeline) {
+  run_.fixes.push_back(record_of(report, pipeline.layout().gyros));
+  corrected_ = report.corrected ? report.fix.t : corrected_;
+  ParameterHistory& parameters = run_.parameters;
+  if (report.fix.used() && (parameters.t.empty() || report.fix.t - parameters.t.back() >= ParameterHistory::kStep)) {
+    parameters.t.push_back(report.fix.t);
+    parameters.value.push_back(parameter_values(pipeline.gyros()));
+    const Eigen::VectorXd sigmas = pipeline.state_sigmas();
+    parameters.sigma.emplace_back(sigmas.begin(), sigmas.end());
+  }
+  if (report.fix.used() && report.calibrated &&
+      (run_.corrections.empty() || report.fix.t - run_.corrections.back().t >= kWatchedCorrections)) {
+    run_.corrections.push_back(correction_of(pipeline, *report.calibrated, report.fix.t));
+  }
+  if (report.calibrated) {
+    append(run_.attitude, report.fix.t, *report.calibrated);
+  }
+  if (report.navigated) {
+    append(run_.navigation, report.fix.t, *report.navigated);
+    run_.navigation.age_s.push_back(to_seconds(report.fix.t - corrected_));
+  }
+}
+
+void Recorder::add_sample(const StepReport& report, const Pipeline& pipeline) {
+  ++run_.samples[report.sample];
+  for (int k = 0; k < pipeline.layout().gyros; ++k) {
+    if (report.gyros[k] != gyros_before_[k]) {
+      run_.gyro_events.push_back({report.t, k, report.gyros[k]});
+    }
+  }
+  gyros_before_ = report.gyros;
+  long& angle_looks =
+      run_.calibration.statistics.angle_looks.emplace(run_.calibration.statistics.angle_looks.value_or(0));
+  angle_looks += is_used(report.angles.status) ? 1 : 0;
+  run_.fix_counts.lost_to_clock += report.fixes_dropped;
+  if (pipeline.started() && report.sample == SampleStatus::kUsed) {
+    add_angle(report.t, report.angle_residual);
+  }
+}
+
+// Keeps the extremes of z1 over each stretch of 3 s.
+void Recorder::add_angle(Time t, double residual) {
+  if (run_.angle_t.empty() || t - run_.angle_t.back() >= std::chrono::seconds(3)) {
+    run_.angle_t.push_back(t);
+    run_.angle_residual_min.push_back(residual);
+    run_.angle_residual_max.push_back(residual);
+    return;
+  }
+  run_.angle_residual_min.back() = std::min(run_.angle_residual_min.back(), residual);
+  run_.angle_residual_max.back() = std::max(run_.angle_residual_max.back(), residual);
+}
+
+void NavigationRecorder::add(const StepReport& report, const Pipeline& pipeline) {
+  if (report.fix.status != FixStatus::kNone && report.fix.status != FixStatus::kPending) {
+    run_.fixes.push_back(record_of(report, pipeline.layout().gyros));
+    corrected_ = report.corrected ? report.fix.t : corrected_;
+  }
+  if (report.sample != SampleStatus::kUsed) {
+    return;
+  }
+  if (const std::optional<AttitudeSolution> solution = pipeline.navigation_attitude()) {
+    append(run_.attitude, report.t, *solution);
+    run_.attitude.age_s.push_back(to_seconds(report.t - corrected_));
+  }
+}
+
+}  // namespace trihedron::ground

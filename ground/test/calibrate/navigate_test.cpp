@@ -1,0 +1,171 @@
+// navigate() is what flies: it knows nothing of what comes later in the pass.
+
+#include <gtest/gtest.h>
+
+#include <chrono>
+#include <cmath>
+#include <cstring>
+#include <limits>
+#include <vector>
+
+#include "passes.hpp"
+#include "trihedron/ground/calibrate/calibrate.hpp"
+#include "trihedron/records/run.hpp"
+
+namespace trihedron::ground {
+namespace {
+
+using std::chrono::minutes;
+using std::chrono::seconds;
+
+/// What has come down until the gyro sample of this number, the last one: fixes until its time.
+Pass until_sample(const Pass& pass, std::size_t samples) {
+  Pass cut = pass;
+  cut.gyro.t.resize(samples);
+  cut.gyro.h.resize(3 * static_cast<std::size_t>(pass.gyro.gyros) * samples);
+  const auto cut_fixes = [&](StarTrackerTelemetry& tracker) {
+    std::size_t fixes = 0;
+    for (const Time t : cut.gyro.t) {
+      while (fixes < tracker.size() && tracker.t[fixes] <= t) {
+        ++fixes;
+      }
+    }
+    tracker.t.resize(fixes);
+    tracker.q_in_c.resize(fixes);
+  };
+  cut_fixes(cut.star_tracker);
+  for (StarTrackerTelemetry& tracker : cut.further_star_trackers) {
+    cut_fixes(tracker);
+  }
+  return cut;
+}
+
+bool same_bits(double a, double b) { return std::memcmp(&a, &b, sizeof a) == 0; }
+
+template <class A, class B>
+bool all_same_bits(const A& a, const B& b) {
+  for (Eigen::Index i = 0; i < a.size(); ++i) {
+    if (!same_bits(a(i), b(i))) {
+      return false;
+    }
+  }
+  return true;
+}
+
+/// That the cut pass gives all rows that the whole one has until the last sample of the cut, the same to the bit.
+void expect_beginning(const NavigationRun& whole, const NavigationRun& beginning, Time last) {
+  const AttitudeHistory& all = whole.attitude;
+  const AttitudeHistory& some = beginning.attitude;
+  ASSERT_GT(some.size(), 0U);
+  ASSERT_LE(some.size(), all.size());
+  // The next row is of a sample that the cut does not have.
+  EXPECT_EQ(some.t.back(), last);
+  EXPECT_TRUE(some.size() == all.size() || all.t[some.size()] > last);
+  for (std::size_t i = 0; i < some.size(); ++i) {
+    ASSERT_EQ(some.t[i], all.t[i]) << i;
+    ASSERT_TRUE(all_same_bits(some.q_in_c[i].coeffs(), all.q_in_c[i].coeffs())) << i;
+    ASSERT_TRUE(all_same_bits(some.sigma_rad[i], all.sigma_rad[i])) << i;
+    ASSERT_TRUE(same_bits(some.age_s[i], all.age_s[i])) << i;
+  }
+  // Fixes likewise, but for those that still waited for samples at the cut.
+  constexpr std::size_t kWaiting = 8;
+  ASSERT_LE(beginning.fixes.size(), whole.fixes.size());
+  for (std::size_t i = 0; i + kWaiting < beginning.fixes.size(); ++i) {
+    ASSERT_EQ(beginning.fixes[i].t, whole.fixes[i].t);
+    ASSERT_EQ(beginning.fixes[i].status, whole.fixes[i].status);
+    ASSERT_TRUE(same_bits(beginning.fixes[i].nis, whole.fixes[i].nis)) << i;
+  }
+}
+
+void expect_causal(const Pass& pass, const CalibrationOptions& options, const std::vector<Duration>& cuts) {
+  const NavigationRun whole = navigate(pass, options);
+  for (const Duration cut : cuts) {
+    SCOPED_TRACE(to_seconds(cut));
+    const auto samples = static_cast<std::size_t>(
+        std::ranges::upper_bound(pass.gyro.t, pass.settings.epoch + cut) - pass.gyro.t.begin());
+    const Pass beginning = until_sample(pass, samples);
+    expect_beginning(whole, navigate(beginning, options), beginning.gyro.t.back());
+  }
+}
+
+const std::vector<Duration>& cuts() {
+  static const std::vector<Duration> all = {seconds(30), seconds(601), minutes(31), minutes(75),
+                                            minutes(91) + std::chrono::milliseconds(1500)};
+  return all;
+}
+
+/// Everything that a pass may suffer from.
+Scenario dirty(Duration duration) {
+  Scenario scenario;
+  scenario.seed = 3;
+  scenario.duration = duration;
+  for (GyroScenario& gyro : scenario.gyros) {
+    gyro.drift.outside_sigma_rad_s = 5e-8;
+    gyro.drift.direction_walk_rad_sqrt_s = 2e-8;
+    gyro.drift.markov_sigma_rad_s = 2e-8;
+    gyro.readout.quantum_rad = 0.5 * kArcsecond;
+    gyro.readout.dropout_probability = 1e-3;
+    gyro.readout.spike_probability = 1e-4;
+    gyro.readout.stuck_probability = 1e-4;
+  }
+  scenario.gyro_gaps = {{2400, 2520}};
+  scenario.star_tracker.noise_rad *= 1.5;
+  scenario.star_tracker.clock_offset_s = 0.01;
+  scenario.star_tracker.orbital_sine_rad = Eigen::Vector3d(5, -4, 8) * kArcsecond;
+  scenario.star_tracker.outages = {{3600, 4400}};
+  scenario.star_tracker.dropout_probability = 0.02;
+  scenario.star_tracker.outlier_probability = 0.05;
+  return scenario;
+}
+
+TEST(Navigate, IsCausal) { expect_causal(two_hours().pass, {}, cuts()); }
+
+TEST(Navigate, IsCausalOnADirtyPass) {
+  Pass pass = sim::simulate(dirty(std::chrono::hours(2))).pass;
+  pass.settings.star_tracker_noise_rad /= 1.5;  // what was promised
+  expect_causal(pass, {}, cuts());
+  CalibrationOptions options;
+  options.corrections.when = CorrectionOptions::When::kEachFix;
+  options.student_t_freedom = 8;
+  expect_causal(pass, options, cuts());
+}
+
+TEST(Navigate, IsCausalAcrossALossOfTheStarTrackerAndOfAGyro) {
+  Scenario scenario = dirty(std::chrono::hours(2));
+  scenario.gyros.resize(3, scenario.gyros[0]);
+  scenario.gyros[2].start_direction_c = {0.1, 0.2, 1};
+  scenario.further_star_trackers.resize(1, scenario.star_tracker);
+  scenario.further_star_trackers[0].mounting_rotation_vector_rad = Eigen::Vector3d(1.2, 0, 0);
+  Pass pass = sim::simulate(scenario).pass;
+  for (std::size_t i = pass.gyro.size() / 3; i < pass.gyro.size(); ++i) {  // a degree at once
+    Eigen::Map<Eigen::Vector3d> h_b(&pass.gyro.h[3 * (3 * i + 1)]);
+    h_b = (h_b + 0.017 * h_b.unitOrthogonal()).normalized().eval();
+  }
+  expect_causal(pass, {}, cuts());
+}
+
+TEST(Navigate, IsCausalAfterAnEarlierCalibration) {
+  CalibrationOptions options = told();
+  options.drift_model = vsh(1);
+  options.further_states[FurtherState::kReadoutBias] = FurtherStateOptions::Choice::kOn;
+  Pass pass = two_hours().pass;
+  pass.settings.prior = calibrate(pass, options).calibration;
+  pass.settings.prior->noise = CalibrationNoise{1e-8, Eigen::Vector3d(2e-5, 2e-5, 1e-4), 3e-8, 1200};
+  expect_causal(pass, {}, {seconds(45), minutes(50)});
+}
+
+/// The whole pass asks for more than the navigator takes: what it does is not decided by it.
+TEST(Navigate, DoesNotTakeWhatOnlyTheWholePassShows) {
+  Scenario scenario = scenario_in_eq1(6, std::chrono::minutes(40));
+  scenario.star_tracker.clock_offset_s = 0.05;
+  const Pass pass = sim::simulate(scenario).pass;
+  CalibrationOptions options;
+  EXPECT_TRUE(calibrate(pass, options).options.further_states.is_on(FurtherState::kClockOffset));
+  const NavigationRun by_default = navigate(pass, options);
+  const NavigationRun without = navigate(pass, told());
+  ASSERT_EQ(by_default.attitude.size(), without.attitude.size());
+  EXPECT_TRUE(all_same_bits(by_default.attitude.q_in_c.back().coeffs(), without.attitude.q_in_c.back().coeffs()));
+}
+
+}  // namespace
+}  // namespace trihedron::ground
