@@ -33,8 +33,8 @@ constexpr double kNisTolerance = 0.025;
 constexpr double kNisWrong = 0.25;
 /// Two nominal alignment accuracies of the system.
 constexpr double kWeakAlignment_rad = 20 * kArcsecond;
-/// A drift of a few degrees per day, of a gyro or of the orbit plane, is below the noise over this time; over longer
-/// ones it can stand in for an alignment.
+/// Over this time a drift of a few degrees per day, of a gyro or of the orbit plane, is below the noise; over longer
+/// times it can be mistaken for an alignment.
 constexpr Duration kDriftStretch = std::chrono::minutes(10);
 /// Fraction of rejected fixes above which the result rests on a selection that the filter has made itself.
 constexpr double kMostlyRejected = 0.2;
@@ -216,7 +216,7 @@ void judge_halves(const Statistics& statistics, std::vector<Finding>& findings) 
   }
 }
 
-/// A model that is this much less likely than another is wrong, as ln.
+/// Log of the odds from which on a model counts as wrong against another.
 constexpr double kLogOddsOfWrongModel = 10;
 
 void judge_drift_model(const CalibrationRun& run, std::vector<Finding>& findings) {
@@ -331,7 +331,7 @@ void judge_determination(const CalibrationRun& run, std::vector<Finding>& findin
 }
 
 void judge_steadiness(const Pass& pass, const CalibrationRun& run, std::vector<Finding>& findings) {
-  // Outliers would seem to move a steady axis.
+  // Outliers are left out: they would seem to move a steady axis.
   const StarTrackerTelemetry used = used_fixes(pass, run.fixes);
   const Eigen::Vector3d& noise = pass.settings.star_tracker_noise_rad;
   const auto observability = alignment_observability(used, noise, noise.minCoeff());

@@ -1,5 +1,5 @@
 #pragma once
-/// What innovations show that are not white.
+/// Tests whether innovations are white.
 
 #include <vector>
 
