@@ -41,11 +41,11 @@ class Search {
     const double peak = tried_.at(best_);
     const auto below = tried_.find({i - 1, j});
     const auto above = tried_.find({i + 1, j});
-    double beside = 0;
+    double offset = 0;
     if (below != tried_.end() && above != tried_.end()) {
-      beside = (above->second - below->second) / (4 * peak - 2 * below->second - 2 * above->second);
+      offset = (above->second - below->second) / (4 * peak - 2 * below->second - 2 * above->second);
     }
-    return {at_(i + beside, j), peak, peak - tried_.at({0, 0})};
+    return {at_(i + offset, j), peak, peak - tried_.at({0, 0})};
   }
 
  private:

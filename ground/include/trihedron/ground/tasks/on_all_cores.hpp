@@ -28,7 +28,7 @@ auto on_all_cores(std::size_t count, const Work& work) {
 /// throws, or else what the second throws.
 void side_by_side(const std::function<void()>& first, const std::function<void()>& second);
 
-/// Calls work(), which uses at most so many threads.
+/// Calls work(), which uses at most `cores` threads.
 void with_cores(unsigned cores, const std::function<void()>& work);
 
 }  // namespace trihedron::ground
