@@ -30,8 +30,8 @@ Pass nine_hours() {
   pass.gyro.gyros = 2;
   for (const auto& sample : flight.samples) {
     pass.gyro.t.push_back(pass.settings.epoch + sample.t.time_since_epoch());
-    for (const auto& h : sample.h_b) {
-      pass.gyro.h.insert(pass.gyro.h.end(), h.begin(), h.end());
+    for (int k = 0; k < pass.gyro.gyros; ++k) {
+      pass.gyro.h.insert(pass.gyro.h.end(), sample.h_b[k].begin(), sample.h_b[k].end());
     }
   }
   for (const auto& fix : flight.fixes) {

@@ -19,7 +19,6 @@ def paths_named(text):
     return [path for path in quoted if path.split("/")[0] in FOLDERS and "/" in path and not re.search(r"[<>*{}…]", path)]
 
 
-@pytest.mark.skip(reason="the documents name files of a layout that is not here yet")
 @pytest.mark.parametrize("document", DOCUMENTS)
 def test_paths_that_a_document_names_exist(document):
     paths = paths_named((ROOT / document).read_text())

@@ -2,7 +2,6 @@
 
 #include <fmt/format.h>
 
-#include <cmath>
 #include <iterator>
 
 #include "summary.hpp"
@@ -27,21 +26,6 @@ std::string slew_toml(const Slew& slew) {
   return text + "}";
 }
 
-struct Gain {
-  ground::Combination combination;
-  double before = 0;
-  double after = 0;
-};
-
-std::vector<Gain> gains(const plan::Advice& advice) {
-  std::vector<Gain> all;
-  for (const ground::Combination& combination : advice.formerly_weak()) {
-    all.push_back({combination, sigma_along(combination, advice.before, advice.before.covariance),
-                   sigma_along(combination, advice.before, advice.after.covariance)});
-  }
-  return all;
-}
-
 }  // namespace
 
 std::string advice_text(const plan::Advice& advice) {
@@ -60,9 +44,9 @@ std::string advice_text(const plan::Advice& advice) {
   const double before_rad = advice.before.attitude_error_rad;
   const double after_rad = advice.after.attitude_error_rad;
   row(angle_text(before_rad), angle_text(after_rad), before_rad / after_rad, "attitude, as above");
-  for (const Gain& gain : gains(advice)) {
-    row(sigma_text(gain.combination, gain.before), sigma_text(gain.combination, gain.after), gain.before / gain.after,
-        gain.combination.text);
+  for (const plan::Advice::Gain& gain : advice.gains()) {
+    row(sigma_text(gain.combination, gain.sigma_before), sigma_text(gain.combination, gain.sigma_after),
+        gain.sigma_before / gain.sigma_after, gain.combination.text);
   }
   return text;
 }
@@ -76,9 +60,8 @@ std::string confirmation_text(const plan::Confirmation& confirmation) {
     fmt::format_to(out, "  {:>14} {:>14}   {}\n", sigma_text(along.combination, along.predicted),
                    sigma_text(along.combination, along.simulated), along.combination.text);
   }
-  const double chance = 2 * std::sqrt(2.0 * confirmation.parameters / confirmation.runs);
   fmt::format_to(out, "  simulated over predicted {:.2f}; mean NEES {:.1f} (expected {} ± {:.1f})\n",
-                 confirmation.ratio, confirmation.nees, confirmation.parameters, chance);
+                 confirmation.ratio, confirmation.nees, confirmation.parameters, confirmation.nees_tolerance());
   return text;
 }
 
@@ -95,9 +78,9 @@ nlohmann::ordered_json advice_json(const plan::Advice& advice, const std::option
                              {"pitch_rad", slew.pitch_rad},
                              {"yaw_rad", slew.yaw_rad}});
   }
-  for (const Gain& gain : gains(advice)) {
+  for (const plan::Advice::Gain& gain : advice.gains()) {
     json["combinations"].push_back(
-        {{"text", gain.combination.text}, {"sigma_before", gain.before}, {"sigma_after", gain.after}});
+        {{"text", gain.combination.text}, {"sigma_before", gain.sigma_before}, {"sigma_after", gain.sigma_after}});
   }
   if (confirmation) {
     for (std::size_t i = 0; i < confirmation->along.size(); ++i) {

@@ -13,7 +13,7 @@
 namespace trihedron::cli {
 namespace {
 
-/// Everything that it does not say is a default, and the defaults are the paper's experiment.
+/// Scenario of the demonstration: what it leaves out has its default, and the defaults are the paper's experiment.
 constexpr const char* kScenario =
     "# The paper's experiment: nine hours, 30′ of misalignment, unknown drift coefficients, and a drift that eq. (1) "
     "does\n"
@@ -23,7 +23,7 @@ constexpr const char* kScenario =
 
 ExitStatus run_demo(const std::filesystem::path& out, const Common& common) {
   const Common silent{.quiet = true, .json = false};
-  io::make_directory(out);
+  const io::MadeDirectory made(out);
   io::write_file(out / "scenario.toml", kScenario);
   simulate_pass(io::read_scenario(out / "scenario.toml"), "scenario.toml", out / "pass.nc", silent);
   const ExitStatus calibrated = calibrate_passes({out / "pass.nc"}, {}, out, std::nullopt, common);

@@ -1,13 +1,15 @@
 #include <fmt/core.h>
 
 #include <memory>
+#include <optional>
 #include <string>
-#include <vector>
 
 #include "commands.hpp"
 #include "summary.hpp"
+#include "trihedron/ground/evaluate/attitude_evaluation.hpp"
 #include "trihedron/io/attitude.hpp"
 #include "trihedron/io/error.hpp"
+#include "trihedron/io/named_pass.hpp"
 #include "trihedron/io/quantity.hpp"
 
 namespace trihedron::cli {
@@ -17,7 +19,7 @@ void add_evaluate(CLI::App& program, const Common& common, int& exit_status) {
     std::string pass;
     std::string attitude;
     std::string before;
-    std::string limit = "5arcmin";
+    std::string limit = io::format_angle(ground::kAttitudeLimit_rad);
   };
   auto arguments = std::make_shared<Arguments>();
   CLI::App* command =
@@ -30,35 +32,34 @@ void add_evaluate(CLI::App& program, const Common& common, int& exit_status) {
   command->add_option("--limit", arguments->limit, "Error that ends a correction interval")->capture_default_str();
   command->callback([&common, &exit_status, arguments] {
     const double limit_rad = io::parse_angle_rad(arguments->limit);
-    const io::LoadedPass loaded = io::read_pass(arguments->pass);
-    const auto truth = read_truth_of(arguments->pass, loaded.pass);
-    const Time epoch = loaded.pass.settings.epoch;
-    const Reference reference = reference_of(truth, loaded.pass.star_tracker, loaded.pass);
+    const io::NamedPass pass = io::read_named_pass(arguments->pass);
+    const Time epoch = pass.pass().settings.epoch;
     const auto evaluation_of = [&](const std::string& file) {
-      Evaluation evaluation = evaluate(io::read_attitude(file, epoch), reference, epoch, limit_rad);
+      ground::AttitudeEvaluation evaluation =
+          ground::evaluate_attitude(pass.pass(), io::read_attitude(file, epoch), pass.truth_or_null(), limit_rad);
       if (evaluation.errors.t.empty()) {
-        throw io::InputRefused(file, {},
-                               "it has no epoch in common with the " + reference.name + " of " + arguments->pass,
-                               "give an attitude of this pass");
+        throw io::InputRefused(
+            file, {},
+            fmt::format("it has no epoch in common with the {} of {}", name_of(evaluation.reference), arguments->pass),
+            "give an attitude of this pass");
       }
       return evaluation;
     };
-    const Evaluation evaluation = evaluation_of(arguments->attitude);
-    std::vector<ground::IntervalPair> pairs;
+    const ground::AttitudeEvaluation evaluation = evaluation_of(arguments->attitude);
+    std::optional<ground::IntervalExtension> extension;
     if (!arguments->before.empty()) {
-      pairs = ground::paired(evaluation_of(arguments->before).intervals, evaluation.intervals);
+      extension = ground::extension_between(evaluation_of(arguments->before), evaluation);
     }
-    const auto extension = ground::median_extension(pairs);
     if (common.json) {
       nlohmann::ordered_json json = evaluation_json(evaluation, epoch);
-      if (!arguments->before.empty()) {
-        json["extension"] = extension_json(pairs, extension, epoch);
+      if (extension) {
+        json["extension"] = extension_json(*extension, epoch);
       }
       fmt::print("{}\n", json.dump(1));
     } else if (!common.quiet) {
       fmt::print("{}", evaluation_text(evaluation, epoch, "Attitude error"));
-      if (!arguments->before.empty()) {
-        fmt::print("  correction interval extended {}\n", extension_text(extension));
+      if (extension) {
+        fmt::print("  correction interval extended {}\n", extension_text(extension->median));
       }
     }
     exit_status = kTrustworthy;

@@ -36,7 +36,7 @@ ShownUnit unit_of(const ParameterId& state) {
   return state.is_alignment() ? ShownUnit{kArcminute, kArcsecond} : ShownUnit{};
 }
 
-/// With the decimals of two digits of sigma.
+/// Rounded so that sigma shows two significant digits.
 std::string estimate_text(double value, double sigma, const ShownUnit& unit) {
   const auto decimals = [](double shown) {
     return shown > 0 ? std::clamp(1 - static_cast<int>(std::floor(std::log10(shown))), 0, 9) : 3;

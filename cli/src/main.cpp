@@ -5,18 +5,19 @@
 #include <new>
 
 #include "commands.hpp"
+#include "stop_on_signals.hpp"
 #include "trihedron/io/error.hpp"
+#include "trihedron/records/stop.hpp"
 
 namespace {
 
 int fail(int status, const char* message) {
+  trihedron::check_stop();  // what failed may have failed by that alone
   fmt::print(stderr, "trihedron: {}\n", message);
   return status;
 }
 
-}  // namespace
-
-int main(int argc, char** argv) {
+int run(int argc, char** argv) {
   namespace cli = trihedron::cli;
   namespace io = trihedron::io;
   int exit_status = cli::kWrongUsage;
@@ -57,7 +58,15 @@ int main(int argc, char** argv) {
     return fail(cli::kMachineFailed, error.what());
   } catch (const std::bad_alloc&) {
     return fail(cli::kMachineFailed, "out of memory; free some, or use a shorter pass");
+  } catch (const trihedron::Stopped&) {
+    throw;
   } catch (const std::exception& error) {
     return fail(cli::kMachineFailed, error.what());
   }
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  return trihedron::cli::stopped_by_signals([argc, argv] { return run(argc, argv); });
 }

@@ -8,13 +8,13 @@
 #include "steps.hpp"
 #include "summary.hpp"
 #include "trihedron/ground/calibrate/calibrate.hpp"
-#include "trihedron/ground/evaluate/used_fixes.hpp"
+#include "trihedron/ground/evaluate/attitude_evaluation.hpp"
 #include "trihedron/ground/model/setup_error.hpp"
 #include "trihedron/io/attitude.hpp"
 #include "trihedron/io/calibration.hpp"
 #include "trihedron/io/config.hpp"
 #include "trihedron/io/error.hpp"
-#include "trihedron/io/quantity.hpp"
+#include "trihedron/io/named_pass.hpp"
 #include "trihedron/records/run.hpp"
 
 namespace trihedron::cli {
@@ -22,7 +22,8 @@ namespace trihedron::cli {
 ExitStatus navigate_pass(const std::filesystem::path& pass, const std::optional<std::filesystem::path>& calibration,
                          const CalibrationOptions& options, const std::filesystem::path& attitude,
                          const Common& common) {
-  io::LoadedPass loaded = io::read_pass(pass);
+  io::NamedPass named = io::read_named_pass(pass);
+  io::LoadedPass& loaded = named.loaded;
   if (calibration) {
     loaded.pass.settings.prior = io::read_calibration(*calibration);
   }
@@ -35,9 +36,7 @@ ExitStatus navigate_pass(const std::filesystem::path& pass, const std::optional<
   }
   const Time epoch = loaded.pass.settings.epoch;
   io::write_attitude(attitude, epoch, result.attitude);
-  const Reference reference =
-      reference_of(read_truth_of(pass, loaded.pass), ground::used_fixes(loaded.pass, result.fixes), loaded.pass);
-  const Evaluation evaluation = evaluate(result.attitude, reference, epoch, io::parse_angle_rad("5arcmin"));
+  const ground::AttitudeEvaluation evaluation = ground::evaluate_navigation(loaded.pass, result, named.truth_or_null());
   if (common.json) {
     nlohmann::ordered_json json = {{"pass", pass_json(loaded)},
                                    {"verdict", verdict_json(result.verdict)},

@@ -63,12 +63,11 @@ std::string combinations_text(const Observability& observability) {
   bool said_unobservable = false;
   bool said_weak = false;
   for (const ground::Combination& combination : observability.weak) {
-    const bool unobservable = combination.singular_value < Observability::kUnobservable;
-    bool& said = unobservable ? said_unobservable : said_weak;
+    bool& said = combination.is_unobservable ? said_unobservable : said_weak;
     if (!said) {
       fmt::format_to(out, "\n{}: known from the data alone by less than {:.0f} times what was known before\n",
-                     unobservable ? "Unobservable" : "Weak",
-                     unobservable ? Observability::kUnobservable : Observability::kWeak);
+                     combination.is_unobservable ? "Unobservable" : "Weak",
+                     combination.is_unobservable ? Observability::kUnobservable : Observability::kWeak);
       said = true;
     }
     fmt::format_to(out, "  {:>8.3g} times, attitude {:>8}   {}\n", combination.singular_value,
@@ -118,7 +117,7 @@ nlohmann::ordered_json observability_json(const Observability& observability, Ti
     json["combinations"].push_back({{"text", combination.text},
                                     {"singular_value", combination.singular_value},
                                     {"attitude_error_rad", combination.attitude_error_rad},
-                                    {"unobservable", combination.singular_value < Observability::kUnobservable},
+                                    {"unobservable", combination.is_unobservable},
                                     {"harmful", combination.is_harmful}});
   }
   return json;
@@ -134,7 +133,7 @@ void print(const nlohmann::ordered_json& json, const std::string& text, const Co
   }
 }
 
-/// Calls `work` and turns what it finds wrong into a refusal of this file.
+/// Calls `work` and reports its errors as errors of this input file.
 template <class Work>
 auto refusing(const std::string& path, const Work& work) {
   try {
@@ -207,9 +206,9 @@ void add_observe(CLI::App& program, const Common& common, int& exit_status) {
   };
   limit("--max-rate", arguments->max_rate, "Of these slews, instead of max_slew_rate of the scenario");
   limit("--max-angle", arguments->max_angle, "Of these slews")->capture_default_str();
-  limit("--slews", arguments->slews, "At most so many")->check(CLI::PositiveNumber)->capture_default_str();
+  limit("--slews", arguments->slews, "Largest number of slews")->check(CLI::PositiveNumber)->capture_default_str();
   limit("--manoeuvre-time", arguments->manoeuvre_time, "Of all slews together, turns and holds")->capture_default_str();
-  limit("--confirm", arguments->confirming_runs, "Simulate and calibrate so many flights with these slews")
+  limit("--confirm", arguments->confirming_runs, "Number of flights with these slews to simulate and calibrate")
       ->check(CLI::PositiveNumber);
   command->callback([&common, &exit_status, arguments] {
     const CalibrationOptions options =

@@ -1,6 +1,5 @@
 #include <fmt/core.h>
 
-#include <algorithm>
 #include <memory>
 #include <stdexcept>
 #include <string>
@@ -33,14 +32,7 @@ sim::SimulatedPass simulated_by(const Scenario& scenario, const std::string& nam
 void simulate_pass(const Scenario& scenario, const std::string& name, const std::filesystem::path& pass,
                    const Common& common) {
   const sim::SimulatedPass result = simulated_by(scenario, name);
-  // A readout in steps needs no finer ones in the file.
-  io::PassFormat format;
-  double step = scenario.gyros.front().readout.quantum_rad;
-  for (const GyroScenario& gyro : scenario.gyros) {
-    step = std::min(step, gyro.readout.quantum_rad);
-  }
-  format.direction_step = std::max(step, format.direction_step);
-  io::write_pass(pass, result.pass, &result.truth, format);
+  io::write_pass(pass, result.pass, &result.truth, io::format_for(scenario));
   if (common.json) {
     fmt::print("{}\n", pass_json({result.pass, {}}).dump(1));
   } else if (!common.quiet) {

@@ -1,5 +1,5 @@
 #pragma once
-/// What commands and the demonstration have in common: each reads its files, does its work, writes and prints.
+/// Work that the commands and the demonstration share.
 
 #include <filesystem>
 #include <optional>

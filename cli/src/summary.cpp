@@ -3,21 +3,15 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
-#include <Eigen/Geometry>
-#include <chrono>
 #include <cmath>
 #include <iterator>
 
-#include "trihedron/core/frames.hpp"
 #include "trihedron/ground/judge/verdict.hpp"
-#include "trihedron/io/error.hpp"
 #include "trihedron/io/time_text.hpp"
 #include "trihedron/records/scenario.hpp"
 
 namespace trihedron::cli {
 namespace {
-
-constexpr Duration kStretch = std::chrono::minutes(90);
 
 double minutes(Duration d) { return to_seconds(d) / 60; }
 
@@ -47,35 +41,6 @@ nlohmann::ordered_json interval_json(const ground::CorrectionInterval& interval)
 std::string angle_text(double rad) {
   return std::abs(rad) < 100 * kArcsecond ? fmt::format("{:.2f}″", rad / kArcsecond)
                                           : fmt::format("{:.2f}′", rad / kArcminute);
-}
-
-std::optional<Truth> read_truth_of(const std::filesystem::path& path, const Pass& pass) {
-  std::optional<Truth> truth = io::read_truth(path);
-  if (truth && truth->gyros.size() != static_cast<std::size_t>(pass.gyro.gyros)) {
-    throw io::InputRefused(
-        path, {}, fmt::format("the truth has {} gyros, the telemetry {}", truth->gyros.size(), pass.gyro.gyros),
-        "give the truth of this pass, or none");
-  }
-  return truth;
-}
-
-Reference reference_of(const std::optional<Truth>& truth, const StarTrackerTelemetry& fixes, const Pass& pass) {
-  return truth ? Reference{"truth", truth->t, truth->q_in_c, Eigen::Vector3d::Zero()}
-               : Reference{"star tracker", fixes.t, fixes.q_in_c, pass.settings.star_tracker_noise_rad};
-}
-
-Evaluation evaluate(const AttitudeHistory& attitude, const Reference& reference, Time epoch, double limit_rad) {
-  Evaluation result;
-  result.reference = reference.name;
-  result.errors = ground::attitude_errors(attitude, reference.t, reference.q_in_c);
-  for (Eigen::Vector3d& sigma : result.errors.sigma_rad) {
-    sigma = (sigma.cwiseAbs2() + reference.sigma_rad.cwiseAbs2()).cwiseSqrt();
-  }
-  result.whole = ground::statistics(result.errors);
-  result.stretches = ground::statistics_by_stretch(result.errors, epoch, kStretch);
-  result.limit_rad = limit_rad;
-  result.intervals = ground::correction_intervals(result.errors, limit_rad);
-  return result;
 }
 
 std::string pass_text(const io::LoadedPass& loaded) {
@@ -110,21 +75,21 @@ std::string verdict_text(const Verdict& verdict) {
   return text;
 }
 
-std::string calibration_text(const CalibrationRun& run, const std::optional<Truth>& truth) {
+std::string calibration_text(const CalibrationRun& run, const Eigen::VectorXd& estimate_minus_truth) {
   std::string text;
   auto out = std::back_inserter(text);
   const Calibration& calibration = run.calibration;
-  const Eigen::VectorXd errors = truth ? ground::estimate_minus_truth(calibration, *truth) : Eigen::VectorXd();
+  const bool has_truth = estimate_minus_truth.size() > 0;
   Eigen::Index state = 0;
   for (std::size_t k = 0; k < calibration.gyros.size(); ++k) {
     const GyroCalibration& gyro = calibration.gyros[k];
-    fmt::format_to(out, "\nGyro {}      {:>18} {:>12}{}\n", k + 1, "value", "1σ", truth ? "   est. − true" : "");
-    const auto sigma = [&] { return std::sqrt(calibration.covariance(state, state)); };
+    fmt::format_to(out, "\nGyro {}      {:>18} {:>12}{}\n", k + 1, "value", "1σ", has_truth ? "   est. − true" : "");
+    const auto sigma = [&] { return sigma_of(calibration, calibration.states[static_cast<std::size_t>(state)]); };
     const std::vector<std::string> names = coefficient_names(gyro.drift_model);
     for (std::size_t i = 0; i < gyro.drift_rad_s.size(); ++i, ++state) {
       fmt::format_to(out, "  {:<8} {:>+13.4e} rad/s {:>12.1e}", names[i], gyro.drift_rad_s[i], sigma());
-      if (truth && std::isfinite(errors(state))) {
-        fmt::format_to(out, " {:>+13.1e}", errors(state));
+      if (has_truth && std::isfinite(estimate_minus_truth(state))) {
+        fmt::format_to(out, " {:>+13.1e}", estimate_minus_truth(state));
       }
       text += '\n';
     }
@@ -132,8 +97,8 @@ std::string calibration_text(const CalibrationRun& run, const std::optional<Trut
     for (int axis = 0; axis < 3; ++axis, ++state) {
       fmt::format_to(out, "  align_{:<2} {:>+13.4f} ′     {:>11.2f}″", std::string(1, "xyz"[axis]),
                      lambda(axis) / kArcminute, sigma() / kArcsecond);
-      if (truth) {
-        fmt::format_to(out, " {:>+12.2f}″", errors(state) / kArcsecond);
+      if (has_truth) {
+        fmt::format_to(out, " {:>+12.2f}″", estimate_minus_truth(state) / kArcsecond);
       }
       text += '\n';
     }
@@ -185,7 +150,7 @@ std::string calibration_text(const CalibrationRun& run, const std::optional<Trut
                    to_seconds(states.wandering_time) / 60);
   }
   if (const auto& noise = run.options.star_tracker_noise_rad) {
-    fmt::format_to(out, "; star tracker {:.1f}″ {:.1f}″ {:.1f}″, which is not what was told", noise->x() / kArcsecond,
+    fmt::format_to(out, "; star tracker {:.1f}″ {:.1f}″ {:.1f}″, not as in pass.toml", noise->x() / kArcsecond,
                    noise->y() / kArcsecond, noise->z() / kArcsecond);
   }
   text += '\n';
@@ -197,25 +162,24 @@ std::string extension_text(const std::optional<ground::Extension>& extension) {
                    : "none measured";
 }
 
-std::string course_text(const CalibrationRun& run, const Course& course) {
-  const auto settled = [&](bool alignments) {
-    const auto time = ground::settled(run, course.convergence, alignments);
+std::string course_text(const CalibrationRun& run, const ground::CalibrationEvaluation& evaluation) {
+  const auto settled = [](const std::optional<Duration>& time) {
     return time ? fmt::format("after {:.0f} min", minutes(*time)) : "not yet";
   };
   std::string text = fmt::format("Settled     alignment {}, drift coefficients {} (the paper: 90, 200–300)\n",
-                                 settled(true), settled(false));
-  if (course.open_loops.empty()) {
+                                 settled(evaluation.alignment_settled), settled(evaluation.drift_settled));
+  if (evaluation.extension.pairs.empty()) {
     return text;
   }
   auto out = std::back_inserter(text);
   fmt::format_to(out, "\nOpen loop until the error passes {}, from a correction with\n  {:>13} {:>14} {:>14} {:>12}\n",
-                 angle_text(course.limit_rad), "at, min", "known before", "calibrated", "extended");
+                 angle_text(evaluation.limit_rad), "at, min", "known before", "calibrated", "extended");
   const auto interval = [](const ground::CorrectionInterval& i) {
     return i.passed ? fmt::format("{:.1f} min", minutes(*i.passed)) : fmt::format("> {:.0f} min", minutes(i.observed));
   };
-  for (const ground::OpenLoops& loops : course.open_loops) {
-    const auto& [before, after] = loops.intervals;
-    const auto factor = loops.intervals.extension();
+  for (const ground::IntervalPair& pair : evaluation.extension.pairs) {
+    const auto& [before, after] = pair;
+    const auto factor = pair.extension();
     if (after.observed > Duration::zero()) {
       fmt::format_to(out, "  {:>13.0f} {:>14} {:>14} {:>12}\n", minutes(after.corrected - run.calibration.epoch),
                      interval(before), interval(after),
@@ -223,13 +187,14 @@ std::string course_text(const CalibrationRun& run, const Course& course) {
     }
   }
   fmt::format_to(out, "  correction interval extended {} (the paper: 3–5)\n",
-                 extension_text(ground::median_extension(course.open_loops)));
+                 extension_text(evaluation.extension.median));
   return text;
 }
 
-std::string evaluation_text(const Evaluation& evaluation, Time epoch, const std::string& title) {
-  std::string text = fmt::format("{} against the {}{}\n", title, evaluation.reference,
-                                 evaluation.reference == "truth" ? "" : ", whose errors are in the figures");
+std::string evaluation_text(const ground::AttitudeEvaluation& evaluation, Time epoch, const std::string& title) {
+  std::string text =
+      fmt::format("{} against the {}{}\n", title, name_of(evaluation.reference),
+                  evaluation.reference == ground::ReferenceKind::kTruth ? "" : ", whose errors are in the figures");
   auto out = std::back_inserter(text);
   if (evaluation.errors.t.empty()) {
     return text + "  no common epochs\n";
@@ -262,7 +227,8 @@ std::string evaluation_text(const Evaluation& evaluation, Time epoch, const std:
 }
 
 std::string passes_text(const std::vector<ground::PassAlone>& passes) {
-  std::string text = fmt::format("Passes      {}, taken for one start-up; each beside those before:\n", passes.size());
+  std::string text =
+      fmt::format("Passes      {}, taken for one start-up; each compared with those before:\n", passes.size());
   for (const ground::PassAlone& pass : passes) {
     const Calibration& calibration = pass.run.calibration;
     auto out = std::back_inserter(text);
@@ -340,33 +306,28 @@ nlohmann::ordered_json verdict_json(const Verdict& verdict) {
   return {{"trustworthy", verdict.trustworthy}, {"findings", findings_json(verdict.findings)}};
 }
 
-nlohmann::ordered_json extension_json(const std::vector<ground::IntervalPair>& pairs,
-                                      const std::optional<ground::Extension>& median, Time epoch) {
+nlohmann::ordered_json extension_json(const ground::IntervalExtension& extension, Time epoch) {
   nlohmann::ordered_json json = {{"corrections", nlohmann::ordered_json::array()}, {"factor", nullptr}};
-  for (const ground::IntervalPair& pair : pairs) {
+  for (const ground::IntervalPair& pair : extension.pairs) {
     json["corrections"].push_back({{"t_s", to_seconds(pair.calibrated.corrected - epoch)},
                                    {"known_before", interval_json(pair.known_before)},
                                    {"calibrated", interval_json(pair.calibrated)}});
   }
-  if (median) {
-    json["factor"] = median->factor;
-    json["is_lower_bound"] = median->is_lower_bound;
+  if (extension.median) {
+    json["factor"] = extension.median->factor;
+    json["is_lower_bound"] = extension.median->is_lower_bound;
   }
   return json;
 }
 
-nlohmann::ordered_json course_json(const CalibrationRun& run, const Course& course) {
+nlohmann::ordered_json course_json(const CalibrationRun& run, const ground::CalibrationEvaluation& evaluation) {
   const auto seconds = [](const std::optional<Duration>& time) {
     return time ? nlohmann::ordered_json(to_seconds(*time)) : nlohmann::ordered_json(nullptr);
   };
   nlohmann::ordered_json states;
-  for (std::size_t i = 0; i < course.convergence.size(); ++i) {
-    states[name_of(run.calibration.states[i])] = {{"determined", course.convergence[i].determined},
-                                                  {"settled_s", seconds(course.convergence[i].settled)}};
-  }
-  std::vector<ground::IntervalPair> pairs;
-  for (const ground::OpenLoops& loops : course.open_loops) {
-    pairs.push_back(loops.intervals);
+  for (std::size_t i = 0; i < evaluation.convergence.size(); ++i) {
+    states[name_of(run.calibration.states[i])] = {{"determined", evaluation.convergence[i].determined},
+                                                  {"settled_s", seconds(evaluation.convergence[i].settled)}};
   }
   nlohmann::ordered_json models = nlohmann::ordered_json::array();
   for (const DriftModelForecast& model : run.drift_models) {
@@ -382,14 +343,14 @@ nlohmann::ordered_json course_json(const CalibrationRun& run, const Course& cour
   return {{"evidence", evidence},
           {"drift_models", models},
           {"convergence",
-           {{"alignment_s", seconds(ground::settled(run, course.convergence, true))},
-            {"drift_s", seconds(ground::settled(run, course.convergence, false))},
+           {{"alignment_s", seconds(evaluation.alignment_settled)},
+            {"drift_s", seconds(evaluation.drift_settled)},
             {"states", states}}},
-          {"extension", extension_json(pairs, ground::median_extension(course.open_loops), run.calibration.epoch)}};
+          {"extension", extension_json(evaluation.extension, run.calibration.epoch)}};
 }
 
-nlohmann::ordered_json evaluation_json(const Evaluation& evaluation, Time epoch) {
-  nlohmann::ordered_json json = {{"reference", evaluation.reference},
+nlohmann::ordered_json evaluation_json(const ground::AttitudeEvaluation& evaluation, Time epoch) {
+  nlohmann::ordered_json json = {{"reference", name_of(evaluation.reference)},
                                  {"whole", errors_json(evaluation.whole, epoch)},
                                  {"per_90_min", nlohmann::ordered_json::array()},
                                  {"limit_rad", evaluation.limit_rad},

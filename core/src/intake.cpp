@@ -22,7 +22,7 @@ Intake::Clock Intake::look_at_clock(Time t, const std::optional<Time>& latest) {
   return latest && is_wild(t, *latest) ? Clock::kOutOfOrder : Clock::kRunsOn;
 }
 
-// Whether the samples behind the present time are so many, and run so well forward among themselves, that theirs is the
+// Whether enough consecutive samples behind the present time increase regularly, so that their time is taken as the
 // time now: without it all would be out of order until the old time is reached again.
 bool Intake::is_set_back(Time t) {
   const bool runs_on = behind_present_ > 0 && t > behind_present_t_ && t - behind_present_t_ <= max_interpolation_;
@@ -31,8 +31,8 @@ bool Intake::is_set_back(Time t) {
   return behind_present_ >= kSetBackSamples;
 }
 
-// Whether a time lies so far ahead that it needs a second one beside it to be believed: a single wild time stamp would
-// otherwise put everything after it out of order.
+// Whether a time stamp lies so far ahead that a second one must confirm it: a single corrupt time stamp would otherwise
+// put everything after it out of order.
 bool Intake::is_wild(Time t, Time latest) {
   if (t - latest <= kMaxGap) {
     has_suspect_ = false;

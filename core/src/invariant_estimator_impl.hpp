@@ -33,7 +33,7 @@ std::optional<SetupFault> InvariantEstimator<kCapacity>::set_up(const Calibratio
   for (int i = layout.direction(layout.gyros); i < layout.dynamic(); ++i) {
     R(i, i) = 1 / setup.wandering_drift.sigma;
   }
-  for (int i = layout.readout_bias(0); i < layout.size(); ++i) {
+  for (int i = layout.readout(0); i < layout.size(); ++i) {
     R(i, i) = 1 / prior_sigma_of_further_state(setup, i);
   }
   setup_ = setup;
@@ -46,7 +46,7 @@ std::optional<SetupFault> InvariantEstimator<kCapacity>::set_up(const Calibratio
   begin_stretch();
   angles_since_fix_ = 0;
   angle_rejections_in_a_row_ = 0;
-  begun_from_estimates_ = false;
+  restarted_from_estimates_ = false;
   started_ = false;
   return std::nullopt;
 }
@@ -59,7 +59,9 @@ double InvariantEstimator<kCapacity>::sharing_factor(const StarFix& fix) const {
 
 template <Capacity kCapacity>
 void InvariantEstimator<kCapacity>::begin_stretch() {
-  since_fix_ = {};
+  for (int k = 0; k < layout().gyros; ++k) {
+    since_fix_[k].begin(layout().drift_columns());
+  }
   time_since_fix_s_ = 0;
   extra_variance_rad2_ = 0;
 }
@@ -99,7 +101,8 @@ void InvariantEstimator<kCapacity>::update_to_now(const Eigen::Matrix3d& C_in_c)
     const auto& since = since_fix_[k];
     const auto by_drift = since.by_drift.first(columns);
     const int row = layout.direction(k);
-    // An error that keeps its sign as long as the estimates are what they are: its sigma grows, not its variance.
+    // This error keeps its sign until the estimates change, so its sigma adds up, not its variance
+    // (docs/mathematics.md, section 8).
     Rows3 rows = Rows3::Zero(3, layout.size());
     rows.template middleCols<3>(layout.alignment(k)) = C_in_c;
     const Eigen::Matrix3d alignment = covariance_of(rows);
@@ -148,10 +151,8 @@ void InvariantEstimator<kCapacity>::start(const Eigen::Matrix3d& C_in_c, const F
     }
     H.template block<3, 3>(row, layout.direction(k)).setIdentity();
     H.template block<3, 3>(row, layout.alignment(k)) = -C_in_c;
-    if (layout.further.readout_bias) {
-      H.template block<3, 3>(row, layout.readout_bias(k)) =
-          C_in_c * skew<double>(gyros_[k].in_c(readings.h_b[k])) * gyros_[k].C_c_b;
-    }
+    H.block(row, layout.readout(k), 3, layout.readout_size()) =
+        by_readout_errors(layout, C_in_c * skew<double>(gyros_[k].in_c(readings.h_b[k])), gyros_[k], readings.h_b[k]);
     H.block(row, layout.shared(), 3, layout.shared_size()) = C_in_c.lazyProduct(by_shared);
     for (int j = 0; j < layout.gyros; ++j) {
       R.template block<3, 3>(row, 3 * j) = R_in;
@@ -227,7 +228,7 @@ template <Capacity kCapacity>
 PerGyro<double> InvariantEstimator<kCapacity>::reading_noise(const Eigen::Matrix3d& C_linear, double noise_factor,
                                                              int n) const {
   PerGyro<double> noise_rad = readout_noise(noise_factor);
-  // Without a fix between them they keep their sign: n readings must not average them away.
+  // Without a fix between them these errors keep their sign: n readings must not average them away.
   const double in_a_row = std::sqrt(static_cast<double>(n));
   for (int k = 0; k < layout().gyros; ++k) {
     Rows3 rows = Rows3::Zero(3, layout().size());
@@ -237,6 +238,17 @@ PerGyro<double> InvariantEstimator<kCapacity>::reading_noise(const Eigen::Matrix
     noise_rad[k] = std::hypot(noise_rad[k], in_a_row * second_order_rad(alignment, covariance_of(rows)));
   }
   return noise_rad;
+}
+
+template <Capacity kCapacity>
+Eigen::Matrix3d InvariantEstimator<kCapacity>::misalignment_of(const StarFix& fix,
+                                                               const FixBySharedStates& by_shared) const {
+  if (fix.head == 0) {
+    return Eigen::Matrix3d::Zero();  // its axes are c
+  }
+  Rows3 rows = Rows3::Zero(3, layout().size());
+  rows.rightCols(layout().shared_size()) = by_shared;
+  return covariance_of(rows);
 }
 
 template <Capacity kCapacity>
@@ -268,8 +280,9 @@ auto InvariantEstimator<kCapacity>::whitened(const FixComparison& comparison, co
 template <Capacity kCapacity>
 auto InvariantEstimator<kCapacity>::angles_of(const FixComparison& comparison, const PerGyro<double>& noise_rad) const
     -> White {
-  // An error of the attitude is common to all components. A large R_c in its place would still be a claim, and 10 000
-  // of them no small one. Reflections leave the attitude in three rows only: the others are what is left.
+  // An error of the attitude is common to all components. A very large R_c instead would still add some information on
+  // the attitude, which thousands of updates sum up. Reflections leave the attitude in three rows only: the others are
+  // what is left.
   const int components = comparison.components();
   const int columns = layout().size() + 1;
   Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor, kMaxComponents, 3 + kMaxStates + 1> rows(
@@ -292,9 +305,10 @@ auto InvariantEstimator<kCapacity>::angles_of(const FixComparison& comparison, c
 
 template <Capacity kCapacity>
 bool InvariantEstimator<kCapacity>::is_fault(double nis, double misfit_rad, int used) const {
-  // Estimates from which the filter has begun anew may be what is wrong: next it begins from what was known.
-  const bool last_resort = gate_.begun_anew() && !begun_from_estimates_ && misfit_rad > kFaultOfTwo_rad;
-  return nis > kFaultOverGate * setup_.gate_nis && (used > 2 || last_resort);
+  // After a restart from the estimates these may be wrong: first try a restart from the prior.
+  const bool last_resort =
+      gate_.restarted_recently() && !restarted_from_estimates_ && misfit_rad > kFaultMisfitOfPair_rad;
+  return nis > kFaultGateRatio * setup_.gate_nis && (used > 2 || last_resort);
 }
 
 template <Capacity kCapacity>
@@ -309,7 +323,7 @@ int InvariantEstimator<kCapacity>::odd_gyro(const FixComparison& comparison, Agr
     others.used[k] = false;
     if (agrees(others)) {
       if (odd != kNoGyro) {
-        return kNoGyro;  // either may be
+        return kNoGyro;  // more than one candidate: ambiguous
       }
       odd = k;
     }
@@ -329,8 +343,8 @@ namespace detail {
 }
 
 /// Two components for each gyro of the layout.
-inline void report_innovation(const Layout& layout, const FixComparison& comparison, const ComponentCovariance& covariance,
-                              FixReport& report) {
+inline void report_innovation(const Layout& layout, const FixComparison& comparison,
+                              const ComponentCovariance& covariance, FixReport& report) {
   const int size = 2 * layout.gyros;
   report.innovation.setZero(size);
   report.innovation_covariance.setZero(size, size);
@@ -377,8 +391,13 @@ FixReport InvariantEstimator<kCapacity>::correct(const StarFix& fix, const FixRe
     return report;
   }
   update_to_now(by_gyros.value().C_in_c.raw());
-  const Eigen::Matrix3d C_linear = fused_attitude(by_gyros.value(), C_in_c, R_c, readings);
-  const PerGyro<double> noise_rad = reading_noise(C_linear, readings.noise_factor, 1);
+  const Eigen::Matrix3d misalignment = misalignment_of(fix, by_shared);
+  const Eigen::Matrix3d C_linear = fused_attitude(by_gyros.value(), C_in_c, R_c + misalignment, readings);
+  PerGyro<double> noise_rad = reading_noise(C_linear, readings.noise_factor, 1);
+  // Of the second order, and not normal: three times its sigma costs nothing but the weight of the first such fix.
+  for (double& its : noise_rad) {
+    its = std::hypot(its, 3 * second_order_rad(misalignment, misalignment));
+  }
   const FixComparison comparison =
       compare(layout(), gyros_, C_in_c.raw(), C_linear, readings.h_b, readings.used, by_shared);
   White white = whitened(comparison, R_c, noise_rad);
@@ -393,13 +412,12 @@ FixReport InvariantEstimator<kCapacity>::correct(const StarFix& fix, const FixRe
   report.weight = student_t_weight(setup_.student_t_freedom, report.nis, comparison.components());
   switch (report.status) {
     case FixStatus::kRejectedByGate:
-      // What a turn of them all explains is the star tracker's.
+      // A misfit that a common rotation of all momenta explains is attributed to the star tracker.
       if (is_fault(report.nis, misfit_rad, count(readings.used))) {
         const Eigen::Matrix3d& C_by_gyros = by_gyros.value().C_in_c.raw();
         const PerGyro<double> angle_noise_rad = reading_noise(C_by_gyros, readings.noise_factor, 1);
-        const FixComparison angles =
-            compare(layout(), gyros_, C_by_gyros, C_by_gyros, readings.h_b, readings.used,
-                    FixBySharedStates::Zero(3, layout().shared_size()));
+        const FixComparison angles = compare(layout(), gyros_, C_by_gyros, C_by_gyros, readings.h_b, readings.used,
+                                             FixBySharedStates::Zero(3, layout().shared_size()));
         const int freedom = angles.components() - 3;
         if (!(angles_of(angles, angle_noise_rad).nis <= gate_of_freedom(freedom, setup_.gate_nis))) {
           report.odd_gyro = odd_gyro(comparison, [&](const FixComparison& rest) {
@@ -413,10 +431,10 @@ FixReport InvariantEstimator<kCapacity>::correct(const StarFix& fix, const FixRe
       report.status = FixStatus::kUsed;
       break;
     case FixStatus::kRestarted:
-      // Information gathered about a far wrong estimate: begin anew from the present one, and where that is no better,
-      // from what was known.
-      begun_from_estimates_ = !begun_from_estimates_ && prior_allows_estimates();
-      if (!begun_from_estimates_) {
+      // The information was gathered about estimates that are far off: restart from the present ones, and where that is
+      // no better, from the prior.
+      restarted_from_estimates_ = !restarted_from_estimates_ && prior_allows_estimates();
+      if (!restarted_from_estimates_) {
         gyros_ = prior_gyros_;
         shared_.setZero();
       }
@@ -424,7 +442,7 @@ FixReport InvariantEstimator<kCapacity>::correct(const StarFix& fix, const FixRe
       report.weight = 1;
       return report;
     case FixStatus::kUsedAfterReopening:
-      begun_from_estimates_ = false;  // long ago: it had helped
+      restarted_from_estimates_ = false;  // the last restart was long ago, so it had helped
       add_direction_variance(misfit_rad * misfit_rad / (2 * layout().gyros));
       update_to_now(C_linear);
       report.weight = 1;
@@ -450,9 +468,8 @@ AngleReport InvariantEstimator<kCapacity>::check_angles(Time t, const FixReading
   const Eigen::Matrix3d& C_in_c = by_gyros.value().C_in_c.raw();
   update_to_now(C_in_c);
   const PerGyro<double> noise_rad = reading_noise(C_in_c, readings.noise_factor, ++angles_since_fix_);
-  const FixComparison comparison =
-      compare(layout(), gyros_, C_in_c, C_in_c, readings.h_b, readings.used,
-              FixBySharedStates::Zero(3, layout().shared_size()));
+  const FixComparison comparison = compare(layout(), gyros_, C_in_c, C_in_c, readings.h_b, readings.used,
+                                           FixBySharedStates::Zero(3, layout().shared_size()));
   const White white = angles_of(comparison, noise_rad);
   report.nis = white.nis;
   if (!(white.nis <= gate_of_freedom(comparison.components() - 3, setup_.gate_nis))) {
@@ -479,8 +496,7 @@ void InvariantEstimator<kCapacity>::update(const Compared& white, double root_we
   const Layout& layout = setup_.layout;
   for (int k = 0; k < layout.gyros; ++k) {
     Gyro& gyro = gyros_[k];
-    gyro.h_in =
-        rotated<double>(gyro.h_in, Eigen::Vector3d(x.template segment<3>(layout.direction(k)))).normalized();
+    gyro.h_in = rotated<double>(gyro.h_in, Eigen::Vector3d(x.template segment<3>(layout.direction(k)))).normalized();
     if (layout.further.wandering_drift) {
       gyro.drift_rad_s.template segment<3>(layout.wandering_column()) += x.template segment<3>(layout.wandering(k));
     }

@@ -36,7 +36,7 @@ StepReport OnBoard<Estimator>::on_gyro(const GyroSample& sample) {
   report.sample = let_in(screened);
   report.gyros = intake_.health().states();
   if (report.sample == SampleStatus::kRejectedTooFewGyros) {
-    calibrate_until(sample.t - reach(), report);  // what waits for samples waits in vain
+    calibrate_until(sample.t - reach(), report);  // fixes that wait for samples get none; deal with them now
   }
   if (!is_used(report.sample)) {
     return report;
@@ -46,7 +46,7 @@ StepReport OnBoard<Estimator>::on_gyro(const GyroSample& sample) {
     navigate(readings_.latest_t(), readings_.latest_directions(), screened.t, screened.h_b);
   }
   if (behind_ == readings_.size() && readings_.full()) {
-    follow_next_sample();  // more than there is room for: the oldest cannot wait
+    follow_next_sample();  // buffer full: the oldest sample is processed before its time
   }
   readings_.push(screened);
   ++behind_;
@@ -87,7 +87,7 @@ StepReport OnBoard<Estimator>::flush() {
   report.gyros = intake_.health().states();
   if (intake_.waiting() > 0) {
     report.t = readings_.latest_t();
-    schedule_.no_angles();  // or the fix would wait for them
+    schedule_.no_angles();  // otherwise the fix would wait for them
     calibrate_until(std::max(report.t, intake_.next_fix().t), report);
   }
   return report;
@@ -121,7 +121,7 @@ SampleStatus OnBoard<Estimator>::let_in(GyroSample& sample) {
   return std::exchange(clock_set_back_, false) ? SampleStatus::kUsedAfterClockSetBack : SampleStatus::kUsed;
 }
 
-/// Begins a new time at `t`. The estimates stay as they are at the last sample: how long the jump took is unknown.
+/// Restarts the time at `t`. The estimates stay as they are at the last sample: how long the jump took is unknown.
 template <class Estimator>
 void OnBoard<Estimator>::set_clock(Time t) {
   while (behind_ > 0) {
@@ -138,7 +138,7 @@ void OnBoard<Estimator>::set_clock(Time t) {
 
 // ---- Calibration
 
-/// The estimator over the samples and fixes until `limit`, in time order; stops before a second fix.
+/// Processes samples and fixes up to `limit` in time order; stops before a second fix (one per step).
 template <class Estimator>
 void OnBoard<Estimator>::calibrate_until(Time limit, StepReport& report) {
   bool dealt_with_one = false;
@@ -198,7 +198,7 @@ void OnBoard<Estimator>::correct(const StarFix& fix, StepReport& report) {
     correct_navigator(*readings, report);
     schedule_.fix_used(fix.t);
   } else if (fix.t >= schedule_.angles_t()) {
-    use_angles(fix.t, *readings, report);  // these samples are free, and the step has come so far
+    use_angles(fix.t, *readings, report);  // this fix was rejected, so its readings may be used for the angles
   }
   if (navigator_.started() && !report.corrected) {
     report.navigated = navigated_before(fix.t, *readings);
@@ -210,7 +210,7 @@ template <class Estimator>
 void OnBoard<Estimator>::look_at_angles(StepReport& report) {
   const Time t = std::max(schedule_.angles_t(), follower_t_);
   const std::optional<FixReadings> readings = readings_at(t);
-  if (!readings || count(readings->used) < 2) {  // a gap of the gyros: on where they are back
+  if (!readings || count(readings->used) < 2) {  // a gap of the gyros: continue where they are back
     schedule_.put_angles_off(next_sample_t() + reach());
     return;
   }
@@ -246,7 +246,7 @@ void OnBoard<Estimator>::correct_navigator(const FixReadings& readings, StepRepo
   }
   const Time t = report.fix.t;
   const bool interval_over = policy_.interval != CorrectionPolicy::kOnlyFirst && t - corrected_t_ >= policy_.interval;
-  // The fix that started both was contradicted by all the fixes after it: the navigator must not rest on it.
+  // All later fixes contradicted the one that started filter and navigator: the navigator must be corrected again.
   const bool start_was_wrong = start_unconfirmed_ && report.fix.status == FixStatus::kUsedAfterReopening;
   start_unconfirmed_ = report.fix.status == FixStatus::kStarted;
   if (navigator_.started() && !interval_over && !start_was_wrong) {
@@ -290,7 +290,7 @@ std::optional<Eigen::Matrix3d> OnBoard<Estimator>::attitude_of(const Gyros& gyro
   const Eigen::Matrix3d C = C_in_c.value().raw();
   for (int k = 0; k < this->gyros(); ++k) {
     if (!step.used[k]) {  // its momentum turns all the same
-      step.middle[k] = gyros[k].C_c_b.transpose() * (C.transpose() * gyros[k].h_in) + gyros[k].readout_bias;
+      step.middle[k] = gyros[k].reading_of(C.transpose() * gyros[k].h_in);
     }
   }
   return C;
@@ -371,8 +371,7 @@ std::optional<AttitudeSolution> OnBoard<Estimator>::navigated_before(Time t, con
   if (!C_in_c) {
     return std::nullopt;
   }
-  const auto solution =
-      navigator_.attitude_before(estimator_, readings, *C_in_c, back.middle, this->t(), back.dt_s());
+  const auto solution = navigator_.attitude_before(estimator_, readings, *C_in_c, back.middle, this->t(), back.dt_s());
   return solution ? std::optional(solution.value()) : std::nullopt;
 }
 
@@ -393,7 +392,7 @@ template <class Estimator>
 void Navigator<Estimator>::correct(const Estimator& estimator) {
   gyros_ = estimator.gyros();
   estimator.error_root(new_errors(estimator.error_layout().shared(), estimator.states()));
-  restart_clock();
+  restart_clock(estimator.layout());
 }
 
 template <class Estimator>
@@ -418,13 +417,11 @@ void Navigator<Estimator>::correct_directions(const Estimator& estimator, const 
     // φ = C_in_c (δ + ε − h_c × C_c_b Δb): h_in was read through what is held at the estimated attitude.
     auto phi = errors.template middleRows<3>(layout.direction(k));
     phi = C_in_c.lazyProduct(errors.template middleRows<3>(layout.alignment(k)));
-    if (layout.further.readout_bias) {
-      const Eigen::Matrix3d by_bias = C_in_c * skew<double>(gyros_[k].in_c(h_b[k])) * gyros_[k].C_c_b;
-      phi -= by_bias.lazyProduct(errors.template middleRows<3>(layout.readout_bias(k)));
-    }
+    phi -= by_readout_errors(layout, C_in_c * skew<double>(gyros_[k].in_c(h_b[k])), gyros_[k], h_b[k])
+               .lazyProduct(errors.middleRows(layout.readout(k), layout.readout_size()));
     phi.template leftCols<kAttitude>() = C_in_c * attitude_root;
   }
-  restart_clock();
+  restart_clock(layout);
 }
 
 template <class Estimator>
@@ -437,8 +434,10 @@ RowsView Navigator<Estimator>::new_errors(int rows, int columns) {
 }
 
 template <class Estimator>
-void Navigator<Estimator>::restart_clock() {
-  since_correction_ = {};
+void Navigator<Estimator>::restart_clock(const Layout& layout) {
+  for (int k = 0; k < layout.gyros; ++k) {
+    since_correction_[k].begin(layout.drift_columns());
+  }
   extended_until_s_ = 0;
   time_since_correction_s_ = 0;
   extra_variance_rad2_ = 0;
@@ -467,24 +466,24 @@ void Navigator<Estimator>::predict(const Estimator& estimator, const Eigen::Matr
 }
 
 template <class Estimator>
-auto Navigator<Estimator>::since_correction(const Estimator& estimator, const Sensitivities& stretch) const
-    -> Sensitivities {
+void Navigator<Estimator>::append(const Estimator& estimator, const Sensitivities& stretch,
+                                  Sensitivities& since) const {
   const Layout& layout = estimator.layout();
-  Sensitivities since = since_correction_;
   for (int k = 0; k < layout.gyros; ++k) {
-    auto faded = stretch[k];
     if (layout.further.wandering_drift) {
+      auto faded = stretch[k];
       faded.by_drift.first(layout.drift_columns()).template middleCols<3>(layout.wandering_column()) *=
           std::exp(-extended_until_s_ / estimator.setup().wandering_drift.time_s);
+      since[k].append(faded, layout.drift_columns());
+    } else {
+      since[k].append(stretch[k], layout.drift_columns());
     }
-    since[k] = since[k].then(faded, layout.drift_columns());
   }
-  return since;
 }
 
 template <class Estimator>
 void Navigator<Estimator>::extend(const Estimator& estimator, const Sensitivities& stretch) {
-  since_correction_ = since_correction(estimator, stretch);
+  append(estimator, stretch, since_correction_);
   extended_until_s_ = time_since_correction_s_;
 }
 
@@ -499,7 +498,9 @@ Result<AttitudeSolution, DirectionsFault> Navigator<Estimator>::attitude(const E
   const Layout layout = estimator.error_layout();
   const CalibrationSetup& setup = estimator.setup();
   auto rows = attitude_by_states_now<Estimator::kMaxErrors>(layout, by_directions.value(), gyros, readings.h_b);
-  carry_back(layout, since_correction(estimator, estimator.since_fix()), rows);
+  Sensitivities since = since_correction_;
+  append(estimator, estimator.since_fix(), since);
+  carry_back(layout, since, rows);
   StateRows3<Estimator::kMaxStates> spread(3, error_columns_);
   multiply(view_of(rows), {errors_.data(), error_rows_, error_columns_, error_columns_}, rows_of(spread));
   PerGyro<double> noise_rad;
@@ -509,18 +510,21 @@ Result<AttitudeSolution, DirectionsFault> Navigator<Estimator>::attitude(const E
   const double walk = setup.direction_random_walk_rad_sqrt_s;
   double variance_rad2 = walk * walk * time_since_correction_s + extra_variance_rad2_;
   if (layout.further.wandering_drift) {
-    // By the drift that has come since the correction, ∫w(t) dt less what w(0) lets expect of it.
+    // Variance of ∫w(t) dt given w(0): docs/mathematics.md, section 10.
     const double x = time_since_correction_s / setup.wandering_drift.time_s;
     const double scale_rad = setup.wandering_drift.sigma * setup.wandering_drift.time_s;
     variance_rad2 += scale_rad * scale_rad * std::max(2 * x - 3 + 4 * std::exp(-x) - std::exp(-2 * x), 0.0);
   }
-  return with_covariance(by_directions.value(), gram<Estimator::kMaxStates>(spread), noise_rad, layout.gyros, variance_rad2);
+  return with_covariance(by_directions.value(), gram<Estimator::kMaxStates>(spread), noise_rad, layout.gyros,
+                         variance_rad2);
 }
 
 template <class Estimator>
-Result<AttitudeSolution, DirectionsFault> Navigator<Estimator>::attitude_before(
-    const Estimator& estimator, const FixReadings& readings, const Eigen::Matrix3d& C_in_c, const Directions& h_b,
-    Time t, double back_s) const {
+Result<AttitudeSolution, DirectionsFault> Navigator<Estimator>::attitude_before(const Estimator& estimator,
+                                                                                const FixReadings& readings,
+                                                                                const Eigen::Matrix3d& C_in_c,
+                                                                                const Directions& h_b, Time t,
+                                                                                double back_s) const {
   Gyros past = gyros_;
   precess_all(estimator, C_in_c, h_b, t, -back_s, past);
   return attitude(estimator, past, readings, time_since_correction_s_ - back_s);

@@ -1,22 +1,58 @@
 #include "trihedron/core/optimal_attitude.hpp"
 
 #include <Eigen/LU>
+#include <cmath>
 
 namespace trihedron {
 namespace {
 
-/// Axes on two directions that treat both alike: their normal, the middle between them, and across it.
-template <class F>
-Result<Rot<F, G>, DirectionsFault> bisecting_axes(const Vec<F>& h1, const Vec<F>& h2) {
-  const auto trihedron = make_trihedron(h1, h2);
-  if (!trihedron) {
-    return trihedron.fault();
+/// Axes on two directions in which both have equal weight: their normal, the bisector, and the third.
+Result<Eigen::Matrix3d, DirectionsFault> bisecting_axes(const Eigen::Vector3d& h1, const Eigen::Vector3d& h2) {
+  const Eigen::Vector3d normal = h1.cross(h2);
+  const double area_square = normal.squaredNorm();
+  const double lengths_square = h1.squaredNorm() * h2.squaredNorm();
+  if (!(area_square >= kMinSine * kMinSine * lengths_square)) {
+    return std::isfinite(area_square) ? DirectionsFault::kMomentaNearlyParallel : DirectionsFault::kNotFinite;
+  }
+  if (!(lengths_square > 0)) {
+    return DirectionsFault::kNotFinite;
   }
   Eigen::Matrix3d axes;
-  axes.col(0) = trihedron.value().q1();
-  axes.col(1) = (h1 + h2).raw().normalized();
+  axes.col(0) = normal / std::sqrt(area_square);
+  axes.col(1) = (h1 + h2).normalized();
   axes.col(2) = axes.col(0).cross(axes.col(1));
-  return Rot<F, G>::assume(axes);
+  return axes;
+}
+
+/// Two of the directions; the solution for two is exact.
+struct Pair {
+  int first = 0;
+  int second = 1;
+};
+/// Of those used, the two nearest to a right angle.
+Pair best_pair(const Directions& h_in, const GyroMask& used) {
+  Pair best;
+  double largest = -1;
+  for (int j = 0; j < kMaxGyros; ++j) {
+    for (int k = j + 1; used[j] && k < kMaxGyros; ++k) {
+      const double area_square = used[k] ? h_in[j].cross(h_in[k]).squaredNorm() : -1;
+      if (area_square > largest) {
+        largest = area_square;
+        best = {j, k};
+      }
+    }
+  }
+  return best;
+}
+/// The first two of those used.
+Pair the_two(const GyroMask& used) {
+  Pair two{kMaxGyros, kMaxGyros};
+  for (int k = kMaxGyros - 1; k >= 0; --k) {
+    if (used[k]) {
+      two = {k, two.first};
+    }
+  }
+  return two;
 }
 
 /// 1 − h hᵀ.
@@ -33,8 +69,8 @@ Eigen::Matrix3d sum_across(const Directions& h_c, const GyroMask& used) {
   return sum;
 }
 
-/// From a solution for two of the directions to that for all by Gauss–Newton: each step leaves as much of what was left
-/// before as the directions disagree.
+/// From the solution for two of the directions to that for all by Gauss–Newton. Each step multiplies the remaining
+/// error by about the size of the disagreement of the directions.
 Rot<In, C> refined(Rot<In, C> C_in_c, const Directions& h_in, const Directions& h_c, const GyroMask& used) {
   const Eigen::Matrix3d inverse = sum_across(h_c, used).inverse();
   constexpr double kRounding = 1e-15;
@@ -57,6 +93,17 @@ Rot<In, C> refined(Rot<In, C> C_in_c, const Directions& h_in, const Directions& 
 }  // namespace
 
 Result<AttitudeByDirections, DirectionsFault> trihedron_attitude(const Directions& h_in, const Directions& h_c) {
+  const auto rotation = trihedron_rotation(h_in, h_c);
+  if (!rotation) {
+    return rotation.fault();
+  }
+  AttitudeByDirections by_directions{rotation.value()};
+  const auto c = make_trihedron(Vec<C>::assume(h_c[0]), Vec<C>::assume(h_c[1]));
+  by_directions.by_directions.leftCols<6>() = attitude_by_directions(c.value());
+  return by_directions;
+}
+
+Result<Rot<In, C>, DirectionsFault> trihedron_rotation(const Directions& h_in, const Directions& h_c) {
   const auto in = make_trihedron(Vec<In>::assume(h_in[0]), Vec<In>::assume(h_in[1]));
   if (!in) {
     return in.fault();
@@ -65,40 +112,26 @@ Result<AttitudeByDirections, DirectionsFault> trihedron_attitude(const Direction
   if (!c) {
     return c.fault();
   }
-  AttitudeByDirections by_directions{attitude(in.value(), c.value())};
-  by_directions.by_directions.leftCols<6>() = attitude_by_directions(c.value());
-  return by_directions;
+  return attitude(in.value(), c.value());
 }
 
 Result<Rot<In, C>, DirectionsFault> optimal_rotation(const Directions& h_in, const Directions& h_c,
                                                      const GyroMask& used) {
-  // From the best placed pair: of two that count alike it is the solution.
-  double best = 0;
-  int first = 0;
-  int second = 1;
-  for (int j = 0; j < kMaxGyros; ++j) {
-    for (int k = j + 1; used[j] && k < kMaxGyros; ++k) {
-      const double sine = used[k] ? h_in[j].cross(h_in[k]).norm() : 0;
-      if (sine > best) {
-        best = sine;
-        first = j;
-        second = k;
-      }
-    }
+  const int directions = count(used);
+  if (directions < 2) {
+    return DirectionsFault::kTooFew;
   }
-  if (!(best >= kMinSine)) {
-    return count(used) < 2 ? DirectionsFault::kTooFew : DirectionsFault::kMomentaNearlyParallel;
-  }
-  const auto in = bisecting_axes(Vec<In>::assume(h_in[first]), Vec<In>::assume(h_in[second]));
+  const auto [first, second] = directions == 2 ? the_two(used) : best_pair(h_in, used);
+  const auto in = bisecting_axes(h_in[first], h_in[second]);
   if (!in) {
     return in.fault();
   }
-  const auto c = bisecting_axes(Vec<C>::assume(h_c[first]), Vec<C>::assume(h_c[second]));
+  const auto c = bisecting_axes(h_c[first], h_c[second]);
   if (!c) {
     return c.fault();
   }
-  const Rot<In, C> by_pair = in.value() * c.value().inverse();
-  return count(used) > 2 ? refined(by_pair, h_in, h_c, used) : by_pair;
+  const Rot<In, C> by_pair = Rot<In, C>::assume(Eigen::Matrix3d(in.value() * c.value().transpose()));
+  return directions > 2 ? refined(by_pair, h_in, h_c, used) : by_pair;
 }
 
 Result<AttitudeByDirections, DirectionsFault> optimal_attitude(const Directions& h_in, const Directions& h_c,

@@ -26,7 +26,7 @@ FixStatus OutlierGate::judge(double nis, double misfit_rad, int freedom) {
       return FixStatus::kRejectedByGate;
     }
     status = under_suspicion_ > 0 ? FixStatus::kRestarted : FixStatus::kUsedAfterReopening;
-    begun_anew_ = status == FixStatus::kRestarted;
+    restarted_ = status == FixStatus::kRestarted;
     under_suspicion_ = restart_within_ + 1;
     misfit_rad_ = 0;
   }

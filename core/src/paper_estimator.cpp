@@ -48,11 +48,10 @@ Result<AttitudeByDirections, DirectionsFault> PaperEstimator::attitude(const Gyr
 
 Result<Rot<In, C>, DirectionsFault> PaperEstimator::rotation(const Gyros& gyros, const Directions& h_b,
                                                              const GyroMask& used) const {
-  const auto by_directions = attitude(gyros, h_b, used);
-  if (!by_directions) {
-    return by_directions.fault();
+  if (count(used) < kGyros) {
+    return DirectionsFault::kTooFew;
   }
-  return by_directions.value().C_in_c;
+  return trihedron_rotation(momenta(gyros, kGyros), in_c(gyros, kGyros, h_b));
 }
 
 auto PaperEstimator::quasi_inertial(const Trihedron<In>& t) -> QuasiInertial {
@@ -178,7 +177,7 @@ FixReport PaperEstimator::correct(const StarFix& fix, const FixReadings& reading
       report.status = FixStatus::kUsed;
       break;
     case FixStatus::kRestarted:
-      // Information gathered about a far wrong estimate: linearise anew about the present one.
+      // The information was gathered about estimates that are far off: linearise again about the present ones.
       information_ = prior_;
       report.weight = 1;
       break;

@@ -30,7 +30,7 @@ std::optional<SetupFault> CalibrationSetup::fault() const {
   if (layout.further.wandering_drift && !(wandering_drift.sigma > 0 && wandering_drift.time_s > 0)) {
     return SetupFault::kPriorNotPositiveDefinite;
   }
-  for (int state = layout.readout_bias(0); state < layout.size(); ++state) {
+  for (int state = layout.readout(0); state < layout.size(); ++state) {
     if (!(prior_sigma_of_further_state(*this, state) > 0)) {
       return SetupFault::kPriorNotPositiveDefinite;
     }
@@ -61,19 +61,18 @@ double CalibrationSetup::fixes_sharing_a_sample(Duration since_the_last_fix) con
 
 double prior_sigma_of_further_state(const CalibrationSetup& setup, int state) {
   const Layout& layout = setup.layout;
-  if (state < layout.change(0)) {
-    return setup.readout_bias_sigma;
+  for (const FurtherStateKind& kind : kFurtherStateKinds) {
+    const Layout::Owners owners = layout.owners(kind.state);
+    for (int owner = owners.begin; layout.has(kind.state) && owner < owners.end; ++owner) {
+      const int first = layout.first(kind.state, owner);
+      if (first <= state && state < first + kind.size) {
+        return kind.state == FurtherState::kStarTrackerAlignment
+                   ? setup.star_trackers[static_cast<std::size_t>(owner)].alignment_sigma_rad
+                   : setup.further_sigma[kind.state];
+      }
+    }
   }
-  if (state < layout.shared()) {
-    return setup.coefficient_change_sigma_rad_s;
-  }
-  if (state < layout.orbital_error()) {
-    return setup.clock_offset_sigma_s;
-  }
-  if (state < layout.star_tracker(1)) {
-    return setup.orbital_error_sigma_rad;
-  }
-  return setup.star_trackers[static_cast<std::size_t>(1 + (state - layout.star_tracker(1)) / 3)].alignment_sigma_rad;
+  return 0;
 }
 
 double student_t_weight(double freedom, double nis, int components) {

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <iterator>
 
 #include "trihedron/core/assert.hpp"
 
@@ -12,7 +13,8 @@ namespace {
 /// One Householder reflection of row `r` and M rows below each other, all columns from 1 on; v: the M entries of the
 /// first column.
 template <std::size_t M>
-void reflect(double* __restrict r, double* const (&rows)[M], const double (&v)[M], double v0, double beta, int columns) {
+void reflect(double* __restrict r, double* const (&rows)[M], const double (&v)[M], double v0, double beta,
+             int columns) {
 #pragma GCC ivdep  // the rows do not overlap
   for (int k = 1; k < columns; ++k) {
     double s = v0 * r[k];
@@ -61,14 +63,30 @@ void rotate_into(RowsView root, RowsView extra, int eliminated) {
   for (int first = 0; first < extra.rows; first += kAtOnce) {
     const RowsView some{extra.row(first), std::min(extra.rows - first, kAtOnce), extra.columns, extra.stride};
     switch (some.rows) {
-      case 1: rotate_rows_into<1>(root, some, eliminated); break;
-      case 2: rotate_rows_into<2>(root, some, eliminated); break;
-      case 3: rotate_rows_into<3>(root, some, eliminated); break;
-      case 4: rotate_rows_into<4>(root, some, eliminated); break;
-      case 5: rotate_rows_into<5>(root, some, eliminated); break;
-      case 6: rotate_rows_into<6>(root, some, eliminated); break;
-      case 7: rotate_rows_into<7>(root, some, eliminated); break;
-      default: rotate_rows_into<8>(root, some, eliminated); break;
+      case 1:
+        rotate_rows_into<1>(root, some, eliminated);
+        break;
+      case 2:
+        rotate_rows_into<2>(root, some, eliminated);
+        break;
+      case 3:
+        rotate_rows_into<3>(root, some, eliminated);
+        break;
+      case 4:
+        rotate_rows_into<4>(root, some, eliminated);
+        break;
+      case 5:
+        rotate_rows_into<5>(root, some, eliminated);
+        break;
+      case 6:
+        rotate_rows_into<6>(root, some, eliminated);
+        break;
+      case 7:
+        rotate_rows_into<7>(root, some, eliminated);
+        break;
+      default:
+        rotate_rows_into<8>(root, some, eliminated);
+        break;
     }
   }
 }
@@ -76,22 +94,57 @@ void rotate_into(RowsView root, RowsView extra, int eliminated) {
 void triangularise(RowsView rows, int columns) {
   for (int j = 0; j < columns && j + 1 < rows.rows; ++j) {
     const int rest = rows.columns - j;
-    rotate_into({rows.row(j) + j, 1, rest, rows.stride}, {rows.row(j + 1) + j, rows.rows - j - 1, rest, rows.stride}, 1);
+    rotate_into({rows.row(j) + j, 1, rest, rows.stride}, {rows.row(j + 1) + j, rows.rows - j - 1, rest, rows.stride},
+                1);
   }
 }
 
+namespace {
+
+/// solve_rows() of M rows, side by side.
+template <std::size_t M>
+void solve_rows_together(ConstRowsView root, RowsView rows) {
+  double* x[M];
+  for (std::size_t i = 0; i < M; ++i) {
+    x[i] = rows.row(static_cast<int>(i));
+  }
+  for (int j = 0; j < root.rows; ++j) {
+    if (std::all_of(std::begin(x), std::end(x), [&](const double* row) { return row[j] == 0; })) {
+      continue;
+    }
+    const double* __restrict R = root.row(j);
+    double value[M];
+    for (std::size_t i = 0; i < M; ++i) {
+      value[i] = x[i][j] /= R[j];
+    }
+#pragma GCC ivdep  // the rows do not overlap
+    for (int k = j + 1; k < root.rows; ++k) {
+      for (std::size_t i = 0; i < M; ++i) {
+        x[i][k] -= value[i] * R[k];
+      }
+    }
+  }
+}
+
+}  // namespace
+
 void solve_rows(ConstRowsView root, RowsView rows) {
-  for (int i = 0; i < rows.rows; ++i) {
-    double* __restrict x = rows.row(i);
-    for (int j = 0; j < root.rows; ++j) {
-      if (x[j] == 0) {
-        continue;
-      }
-      const double* __restrict R = root.row(j);
-      const double value = x[j] /= R[j];
-      for (int k = j + 1; k < root.rows; ++k) {
-        x[k] -= value * R[k];
-      }
+  constexpr int kAtOnce = 4;
+  for (int first = 0; first < rows.rows; first += kAtOnce) {
+    const RowsView some{rows.row(first), std::min(rows.rows - first, kAtOnce), rows.columns, rows.stride};
+    switch (some.rows) {
+      case 1:
+        solve_rows_together<1>(root, some);
+        break;
+      case 2:
+        solve_rows_together<2>(root, some);
+        break;
+      case 3:
+        solve_rows_together<3>(root, some);
+        break;
+      default:
+        solve_rows_together<4>(root, some);
+        break;
     }
   }
 }

@@ -40,7 +40,7 @@ Coefficients differences(int first, const Eigen::Vector3d& a) {
 
 const Eigen::Vector3d kA(0.7, -1.3, 0.4);
 
-// The structure of eq. (1): mathematics, "Drift model". Tolerances are some roundings of numbers near one.
+// The structure of eq. (1): docs/mathematics.md, section 3. Tolerances are some roundings of numbers near one.
 RC_GTEST_PROP(Esg7Identity, K0IsTheGradientOfTheFourthPowers, ()) {
   const Eigen::Vector3d h = *directions();
   const Eigen::Vector3d gradient = h.array().cube();
@@ -146,8 +146,7 @@ TEST(DriftModel, BeginsWithEquation1) {
     const DriftModel model(id, {});
     ASSERT_EQ(model.size(), id.size());
     for (int i = 0; i < Esg7::kSize; ++i) {
-      EXPECT_EQ(model.member(i).potential, DriftPotential::kEq1);
-      EXPECT_EQ(model.member(i).number, i);
+      EXPECT_EQ(model.member(i), DriftCoefficient::of_eq1(i));
     }
     for (const Eigen::Vector3d& h : some_directions(5)) {
       EXPECT_EQ(basis_of(model, h).leftCols(Esg7::kSize), Esg7::basis<double>(h));
@@ -185,10 +184,10 @@ TEST(DriftModel, MembersAreThoseOfTheirPotentials) {
     for (const Eigen::Vector3d& h : some_directions(5)) {
       const Eigen::MatrixXd basis = basis_of(model, h);
       for (int i = Esg7::kSize; i < model.size(); ++i) {
-        const DriftMember& its = model.member(i);
+        const DriftCoefficient& its = model.member(i);
         const auto potential = [&](const Eigen::Vector3d& turn) {
           const Eigen::Vector3d there = rotated<double>(h, turn);
-          const double value = its.potential == DriftPotential::kCubicD
+          const double value = its.member == DriftCoefficient::Member::kCubeD
                                    ? there.array().pow(4).sum() / 4
                                    : harmonics.at<double>(there)(its.degree, its.order).value;
           return Eigen::Matrix<double, 1, 1>(value);
@@ -197,7 +196,7 @@ TEST(DriftModel, MembersAreThoseOfTheirPotentials) {
         const Eigen::Vector3d h_cross_gradient =
             test::central_differences(potential, Eigen::Vector3d(0, 0, 0), 1e-5).transpose();
         const Eigen::Vector3d expected =
-            its.potential == DriftPotential::kW ? h.cross(h_cross_gradient) : Eigen::Vector3d(h_cross_gradient);
+            its.member == DriftCoefficient::Member::kW ? h.cross(h_cross_gradient) : Eigen::Vector3d(h_cross_gradient);
         const double size = std::max(basis.col(i).norm(), 1.0);
         EXPECT_LT((across(h) * basis.col(i) - expected).norm(), 1e-8 * size) << model.size() << " " << i;
       }
@@ -228,9 +227,7 @@ TEST(DriftModel, OfHigherDegreeHasAllMembersOfTheLower) {
     for (int i = 0; i < lower.size(); ++i) {
       bool found = false;
       for (int j = 0; j < greater.size() && !found; ++j) {
-        const DriftMember& a = lower.member(i);
-        const DriftMember& b = greater.member(j);
-        found = a.potential == b.potential && a.degree == b.degree && a.order == b.order && a.number == b.number;
+        found = lower.member(i) == greater.member(j);
       }
       EXPECT_TRUE(found) << degree << " " << i;
     }

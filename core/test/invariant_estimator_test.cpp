@@ -221,8 +221,8 @@ TEST(GyroModel, TakesTheBiasOutOfAReading) {
   gyro.readout_bias = Eigen::Vector3d(3e-5, -5e-5, 8e-5);
   const Eigen::Vector3d h = Eigen::Vector3d(0.3, -0.6, 0.7).normalized();
   const Eigen::Vector3d reading = (h + gyro.readout_bias).normalized();
-  EXPECT_LT((gyro.unbiased(reading) - h).norm(), 1e-8);
-  EXPECT_EQ(GyroModel<Esg7::kSize>().unbiased(reading), reading);
+  EXPECT_LT((gyro.corrected(reading) - h).norm(), 1e-8);
+  EXPECT_EQ(GyroModel<Esg7::kSize>().corrected(reading), reading);
 }
 
 /// Readouts with these biases.
@@ -464,10 +464,11 @@ TEST(OnBoardOfInvariant, KnowsWhatTheBiasThatItHoldsMayDo) {
   for (int run = 1; run <= kRuns; ++run) {
     test::Flight flight({.duration_s = 60, .seed = static_cast<unsigned>(run)});
     FullGiven given({.further = {.readout_bias = true}});
-    given.setup.readout_bias_sigma = 2e-4;
+    given.setup.further_sigma[FurtherState::kReadoutBias] = 2e-4;
     std::array<Eigen::Vector3d, 2> biases;
     for (auto& b : biases) {
-      b = given.setup.readout_bias_sigma * Eigen::Vector3d::NullaryExpr([&] { return normal(random); });
+      b = given.setup.further_sigma[FurtherState::kReadoutBias] *
+          Eigen::Vector3d::NullaryExpr([&] { return normal(random); });
     }
     bias(flight, biases);
     given.know(flight.truth);

@@ -145,7 +145,8 @@ TEST(Sensitivity, OfTwoStretchesIsTheirChain) {
     const Eigen::Vector3d h_b = C_in_c.transpose() * g.h_in;
     precess(g, i < 2000 ? first : second, kEq1, C_in_c, h_b, 0, 0.125);
   }
-  const Sensitivities chained = first.then(second, kColumns);
+  Sensitivities chained = first;
+  chained.append(second, kColumns);
   EXPECT_LT((chained.by_start - whole.by_start).norm(), 1e-13);
   EXPECT_LT((chained.by_drift.first(kColumns) - whole.by_drift.first(kColumns)).norm(),
             1e-12 * whole.by_drift.first(kColumns).norm());

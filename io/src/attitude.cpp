@@ -9,6 +9,7 @@
 #include "csv.hpp"
 #include "trihedron/io/atomic_file.hpp"
 #include "trihedron/io/time_text.hpp"
+#include "trihedron/records/stop.hpp"
 
 namespace trihedron::io {
 namespace {
@@ -78,6 +79,7 @@ void write_attitude(const std::filesystem::path& path, Time epoch, const Attitud
   fmt::format_to(fmt::appender(out), "t_s,q_x,q_y,q_z,q_w{}{}\n",
                  has_sigma ? ",sigma_x_rad,sigma_y_rad,sigma_z_rad" : "", has_age ? ",age_s" : "");
   for (std::size_t i = 0; i < attitude.size(); ++i) {
+    check_stop();
     const Eigen::Quaterniond& q = attitude.q_in_c[i];
     fmt::format_to(fmt::appender(out), "{},{:.12f},{:.12f},{:.12f},{:.12f}", format_seconds(attitude.t[i] - epoch),
                    q.x(), q.y(), q.z(), q.w());

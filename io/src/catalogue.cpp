@@ -1,11 +1,13 @@
 #include "trihedron/io/catalogue.hpp"
 
+#include <SQLiteCpp/SQLiteCpp.h>
+#include <SQLiteCpp/VariadicBind.h>
 #include <fmt/format.h>
+#include <sqlite3.h>
 
 #include <cmath>
 #include <system_error>
 
-#include "sqlite.hpp"
 #include "trihedron/io/calibration.hpp"
 #include "trihedron/io/error.hpp"
 #include "trihedron/io/time_text.hpp"
@@ -46,81 +48,104 @@ CREATE TABLE finding (
 ) STRICT;
 )";
 
+SQLite::Database opened(const fs::path& file, int access) {
+  constexpr int kPatience_ms = 2000;  // for another program that writes
+  // A relative name could be one that means something else to SQLite, ":memory:".
+  return {fs::absolute(file).string(), access, kPatience_ms};
+}
+
+/// Calls `work` and turns the faults of SQLite into those of this module: InputRefused for a file that is no whole
+/// database, MachineFailed when the disk fails or another program holds the file.
+template <class Work>
+auto told_of(const fs::path& file, const Work& work) {
+  try {
+    return work();
+  } catch (const SQLite::Exception& fault) {
+    switch (fault.getErrorCode() & 0xff) {  // the primary code
+      case SQLITE_NOTADB:
+      case SQLITE_CORRUPT:
+      case SQLITE_ERROR:
+        throw InputRefused(file, {}, fmt::format("is damaged or no database: {}", fault.what()),
+                           "restore it from a copy, or give the name of a new one");
+      default:
+        throw MachineFailed(
+            file, fmt::format("cannot be read or written: {}", fault.what()),
+            "check that the directory is there and may be written, that the disk has room, and that no other program "
+            "holds the file");
+    }
+  }
+}
+
+/// Of a statement with one number as result, such as a PRAGMA.
+std::int64_t number(SQLite::Database& database, const std::string& query) {
+  return database.execAndGet(query).getInt64();
+}
+
 /// Refuses what is not a whole catalogue that this program can read.
-void check_catalogue(SqliteDatabase& database, const fs::path& file) {
-  SqliteStatement check(database, "PRAGMA quick_check(1)");
-  check.step();
-  if (const std::string found = check.text(0); found != "ok") {
+void check_catalogue(SQLite::Database& database, const fs::path& file) {
+  if (const std::string found = database.execAndGet("PRAGMA quick_check(1)").getString(); found != "ok") {
     throw InputRefused(file, {}, fmt::format("is damaged: {}", found), "restore it from a copy");
   }
-  if (database.number("PRAGMA application_id") != kApplicationId) {
+  if (number(database, "PRAGMA application_id") != kApplicationId) {
     throw InputRefused(file, {}, "is a database, but no catalogue of calibrations",
                        "give a catalogue that `trihedron calibrate --catalogue` wrote, or the name of a new one");
   }
-  if (const std::int64_t version = database.number("PRAGMA user_version"); version != kSchemaVersion) {
+  if (const std::int64_t version = number(database, "PRAGMA user_version"); version != kSchemaVersion) {
     throw InputRefused(file, {},
                        fmt::format("is a catalogue of version {}, this program reads {}", version, kSchemaVersion),
                        "use the program that wrote it, or a newer one");
   }
 }
 
-void make_tables(SqliteDatabase& database) {
-  database.execute(kSchema);
-  database.execute(fmt::format("PRAGMA application_id = {}; PRAGMA user_version = {}", kApplicationId, kSchemaVersion));
+void make_tables(SQLite::Database& database) {
+  database.exec(kSchema);
+  database.exec(fmt::format("PRAGMA application_id = {}; PRAGMA user_version = {}", kApplicationId, kSchemaVersion));
 }
 
-bool is_empty(SqliteDatabase& database) {
-  return database.number("SELECT count(*) FROM sqlite_schema") == 0 && database.number("PRAGMA application_id") == 0;
+bool is_empty(SQLite::Database& database) {
+  return number(database, "SELECT count(*) FROM sqlite_schema") == 0 && number(database, "PRAGMA application_id") == 0;
 }
 
-void check_spacecraft(SqliteDatabase& database, const fs::path& file, const std::string& spacecraft) {
-  SqliteStatement other(database, "SELECT spacecraft FROM calibration WHERE spacecraft <> ? LIMIT 1");
-  other.bind(0, spacecraft);
-  if (other.step()) {
-    throw InputRefused(file, {},
-                       fmt::format("is of spacecraft {}, not {}", in_quotes(other.text(0)), in_quotes(spacecraft)),
-                       "give each spacecraft a catalogue of its own");
+void check_spacecraft(SQLite::Database& database, const fs::path& file, const std::string& spacecraft) {
+  SQLite::Statement other(database, "SELECT spacecraft FROM calibration WHERE spacecraft <> ? LIMIT 1");
+  other.bind(1, spacecraft);
+  if (other.executeStep()) {
+    throw InputRefused(
+        file, {},
+        fmt::format("is of spacecraft {}, not {}", in_quotes(other.getColumn(0).getString()), in_quotes(spacecraft)),
+        "give each spacecraft a catalogue of its own");
   }
 }
 
-void add_parameters(SqliteDatabase& database, std::int64_t row, const Calibration& calibration) {
-  SqliteStatement insert(database, "INSERT INTO parameter VALUES (?, ?, ?, ?)");
+void add_parameters(SQLite::Database& database, std::int64_t row, const Calibration& calibration) {
+  SQLite::Statement insert(database, "INSERT INTO parameter VALUES (?, ?, ?, ?)");
   for (std::size_t i = 0; i < calibration.states.size(); ++i) {
     const auto index = static_cast<Eigen::Index>(i);
-    insert.bind(0, row);
-    insert.bind(1, name_of(calibration.states[i]));
-    insert.bind(2, value_of(calibration, calibration.states[i]));
-    insert.bind(3, std::sqrt(calibration.covariance(index, index)));
-    insert.step();
     insert.reset();
+    SQLite::bind(insert, row, name_of(calibration.states[i]), value_of(calibration, calibration.states[i]),
+                 std::sqrt(calibration.covariance(index, index)));
+    insert.exec();
   }
 }
 
-void add_findings(SqliteDatabase& database, std::int64_t row, const Verdict& verdict) {
-  SqliteStatement insert(database, "INSERT INTO finding VALUES (?, ?)");
+void add_findings(SQLite::Database& database, std::int64_t row, const Verdict& verdict) {
+  SQLite::Statement insert(database, "INSERT INTO finding VALUES (?, ?)");
   for (const Finding& finding : verdict.findings) {
-    insert.bind(0, row);
-    insert.bind(1, name_of(finding.code));
-    insert.step();
     insert.reset();
+    SQLite::bind(insert, row, std::string(name_of(finding.code)));
+    insert.exec();
   }
 }
 
-void add_entry(SqliteDatabase& database, const CatalogueEntry& entry) {
+void add_entry(SQLite::Database& database, const CatalogueEntry& entry, const std::string& start_up) {
   const Calibration& calibration = entry.calibration;
-  SqliteStatement insert(database, "INSERT OR REPLACE INTO calibration VALUES (NULL, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)");
-  insert.bind(0, entry.spacecraft);
-  insert.bind(1, entry.pass);
-  insert.bind(2, entry.start_up);
-  insert.bind(3, std::int64_t{entry.passes});
-  insert.bind(4, format_epoch(calibration.epoch));
-  insert.bind(5, to_seconds(calibration.t - calibration.epoch));
-  insert.bind(6, name_of(calibration.estimator));
-  insert.bind(7, name_of(calibration.gyros.front().drift_model));
-  insert.bind(8, std::int64_t{calibration.verdict.trustworthy ? 1 : 0});
-  insert.bind(9, format_calibration(calibration));
-  insert.step();
-  const std::int64_t row = database.last_row();
+  SQLite::Statement insert(database, "INSERT OR REPLACE INTO calibration VALUES (NULL, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)");
+  SQLite::bind(insert, entry.spacecraft, entry.pass, start_up, entry.passes, format_epoch(calibration.epoch),
+               to_seconds(calibration.t - calibration.epoch), std::string(name_of(calibration.estimator)),
+               name_of(calibration.gyros.front().drift_model), calibration.verdict.trustworthy ? 1 : 0,
+               format_calibration(calibration));
+  insert.exec();
+  const std::int64_t row = database.getLastInsertRowid();
   add_parameters(database, row, calibration);
   add_findings(database, row, calibration.verdict);
 }
@@ -132,25 +157,31 @@ void expect_catalogue_of(const std::string& spacecraft, const fs::path& file) {
   if (!fs::exists(file, ignored)) {
     return;
   }
-  SqliteDatabase database(file, SqliteDatabase::Access::kRead);
-  if (!is_empty(database)) {
-    check_catalogue(database, file);
-    check_spacecraft(database, file, spacecraft);
-  }
+  told_of(file, [&] {
+    SQLite::Database database = opened(file, SQLite::OPEN_READONLY);
+    if (!is_empty(database)) {
+      check_catalogue(database, file);
+      check_spacecraft(database, file, spacecraft);
+    }
+  });
 }
 
 void add_to_catalogue(const fs::path& file, std::span<const CatalogueEntry> entries) {
-  SqliteDatabase database(file, SqliteDatabase::Access::kWrite);
-  database.execute("PRAGMA foreign_keys = ON; BEGIN IMMEDIATE");
-  if (is_empty(database)) {
-    make_tables(database);
-  }
-  check_catalogue(database, file);
-  for (const CatalogueEntry& entry : entries) {
-    check_spacecraft(database, file, entry.spacecraft);
-    add_entry(database, entry);
-  }
-  database.execute("COMMIT");
+  told_of(file, [&] {
+    SQLite::Database database = opened(file, SQLite::OPEN_READWRITE | SQLite::OPEN_CREATE);
+    database.exec("PRAGMA foreign_keys = ON");
+    SQLite::Transaction transaction(database, SQLite::TransactionBehavior::IMMEDIATE);
+    if (is_empty(database)) {
+      make_tables(database);
+    }
+    check_catalogue(database, file);
+    for (const CatalogueEntry& entry : entries) {
+      check_spacecraft(database, file, entry.spacecraft);
+      add_entry(database, entry,
+                entry.start_up.empty() ? format_epoch(entries.front().calibration.epoch) : entry.start_up);
+    }
+    transaction.commit();
+  });
 }
 
 std::vector<CatalogueEntry> read_catalogue(const fs::path& file) {
@@ -158,18 +189,20 @@ std::vector<CatalogueEntry> read_catalogue(const fs::path& file) {
   if (!fs::exists(file, ignored)) {
     throw InputRefused(file, {}, "there is no such catalogue", "make one with `trihedron calibrate --catalogue`");
   }
-  SqliteDatabase database(file, SqliteDatabase::Access::kRead);
-  check_catalogue(database, file);
-  SqliteStatement rows(database,
-                       "SELECT id, spacecraft, pass, start_up, passes, json FROM calibration "
-                       "ORDER BY epoch_tai, t_s, passes, estimator, drift_model");
-  std::vector<CatalogueEntry> entries;
-  while (rows.step()) {
-    const fs::path place = fmt::format("{}: calibration {}", file.string(), rows.number(0));
-    entries.push_back({rows.text(1), rows.text(2), rows.text(3), static_cast<int>(rows.number(4)),
-                       parse_calibration(rows.text(5), place)});
-  }
-  return entries;
+  return told_of(file, [&] {
+    SQLite::Database database = opened(file, SQLite::OPEN_READONLY);
+    check_catalogue(database, file);
+    SQLite::Statement rows(database,
+                           "SELECT id, spacecraft, pass, start_up, passes, json FROM calibration "
+                           "ORDER BY epoch_tai, t_s, passes, estimator, drift_model");
+    const auto text = [&](int column) { return rows.getColumn(column).getString(); };
+    std::vector<CatalogueEntry> entries;
+    while (rows.executeStep()) {
+      const fs::path place = fmt::format("{}: calibration {}", file.string(), rows.getColumn(0).getInt64());
+      entries.push_back({text(1), text(2), text(3), rows.getColumn(4).getInt(), parse_calibration(text(5), place)});
+    }
+    return entries;
+  });
 }
 
 }  // namespace trihedron::io

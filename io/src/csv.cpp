@@ -7,6 +7,7 @@
 #include <limits>
 
 #include "text_file.hpp"
+#include "trihedron/records/stop.hpp"
 #include "wording.hpp"
 
 namespace trihedron::io {
@@ -21,8 +22,8 @@ const char* skip_blanks(const char* p) {
   return p;
 }
 
-/// One number, NaN for an empty field. Returns where the field ends, nullptr when it holds no number.
-/// The text must go on to a '\n'.
+/// One number, NaN for an empty field. Returns where the field ends, nullptr when it holds no number. The text must be
+/// terminated by '\n'.
 const char* parse_field(const char* p, const char* end, double& value) {
   p = skip_blanks(p);
   const char* digits = *p == '+' && p[1] != '-' ? p + 1 : p;
@@ -133,6 +134,7 @@ Series read_csv(const fs::path& file, ChooseRules choose) {
   }
   std::vector<double> row(width);
   while (p < end) {
+    check_stop();
     const char* const line = p;
     double t_s = 0;
     for (std::size_t i = 0; i < fields; ++i) {

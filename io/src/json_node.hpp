@@ -48,7 +48,7 @@ class JsonNode {
   std::string path_;
 };
 
-/// The text on one line. What is no UTF-8 is replaced: a message must not cost the file.
+/// The text on one line. Invalid UTF-8 is replaced, so that a bad message cannot prevent the file from being written.
 [[nodiscard]] std::string dump(const Json& value);
 
 /// Three numbers as an array.

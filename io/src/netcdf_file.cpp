@@ -13,6 +13,7 @@
 
 #include "trihedron/io/atomic_file.hpp"
 #include "trihedron/io/time_text.hpp"
+#include "trihedron/records/stop.hpp"
 #include "wording.hpp"
 
 namespace trihedron::io {
@@ -45,8 +46,8 @@ bool worth_deflating(const std::vector<double>& values, double lsb) {
   return change < kSteps * lsb * static_cast<double>(values.size());
 }
 
-/// HDF5 below NetCDF tidies up at the end of a program, and crashes there when a full disk kept it from closing a file.
-/// All files of ours are closed by then. To be called before anything else of either library.
+/// The exit handler of HDF5 crashes when a full disk has kept it from closing a file, so it is switched off. All files
+/// of ours are closed by then. To be called before anything else of either library.
 void prepare_library() { [[maybe_unused]] static const herr_t once = H5dont_atexit(); }
 
 }  // namespace
@@ -182,6 +183,7 @@ Series NetcdfReader::read_group(const std::string& group, Time epoch, ChooseRule
   series.values.resize(rows * width);
   std::vector<double> column(rows);
   for (std::size_t i = 0; i < present.size(); ++i) {
+    check_stop();
     int dimensions = 0;
     int first = -1;
     nc_type type = NC_NAT;
@@ -231,7 +233,7 @@ NetcdfWriter::~NetcdfWriter() {
 
 void NetcdfWriter::check(int status) const {
   if (status != NC_NOERR) {
-    throw MachineFailed(path_, fmt::format("cannot be written: {}", nc_strerror(status)),
+    throw MachineFailed(unstaged(path_), fmt::format("cannot be written: {}", nc_strerror(status)),
                         "check that the directory may be written and that the disk has room");
   }
 }
@@ -282,6 +284,7 @@ void NetcdfWriter::write_group(const std::string& group, Time epoch, std::span<c
   check(nc_put_var_double(id, time_variable, time.values.data()));
 
   for (const PackedColumn& column : columns) {
+    check_stop();
     const bool packed = fits(column.values, column.lsb);
     const int variable = define(id, dimension, column, packed, column.lsb);
     check(nc_put_att_text(id, variable, "coordinates", 3, kTimeColumn));

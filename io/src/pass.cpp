@@ -15,6 +15,7 @@
 #include "trihedron/io/atomic_file.hpp"
 #include "trihedron/io/calibration.hpp"
 #include "trihedron/io/time_text.hpp"
+#include "trihedron/records/stop.hpp"
 #include "truth.hpp"
 
 namespace trihedron::io {
@@ -74,6 +75,7 @@ void append_rows(fmt::memory_buffer& out, Time epoch, const std::vector<Time>& t
   const std::size_t width = t.empty() ? 0 : values.size() / t.size();
   out.reserve(t.size() * (12 + width * static_cast<std::size_t>(decimals + 4)));
   for (std::size_t i = 0; i < t.size(); ++i) {
+    check_stop();
     fmt::format_to(fmt::appender(out), "{}", format_seconds(t[i] - epoch));
     for (std::size_t j = 0; j < width; ++j) {
       fmt::format_to(fmt::appender(out), ",{:.{}f}", values[i * width + j], decimals);
@@ -126,40 +128,28 @@ void write_directory(const fs::path& directory, const Pass& pass, const Truth* t
   constexpr int kFixDecimals = 10;
   constexpr int kTruthDecimals = 12;
   const Time epoch = pass.settings.epoch;
-  const bool created = make_directory(directory);
-  std::error_code fault;
-  try {
-    std::vector<AtomicFile> files;
-    const auto add = [&](const std::string& name, const std::string& text) {
-      files.emplace_back(directory / name).write(text);
-    };
-    add(kSettingsFile, format_pass_toml(pass.settings, pass.settings.prior ? kPriorFile : ""));
-    add(kGyroFile, csv_text(epoch, direction_names(pass.gyro.gyros), pass.gyro.t, pass.gyro.h, kGyroDecimals));
-    for (std::size_t head = 0; head <= pass.further_star_trackers.size(); ++head) {
-      const StarTrackerTelemetry& fixes = star_tracker_of(pass, head);
-      add(star_tracker_name(head) + ".csv",
-          csv_text(epoch, kQuaternionNames, fixes.t, quaternion_values(fixes.q_in_c), kFixDecimals));
-    }
-    if (pass.settings.prior) {
-      add(kPriorFile, format_calibration(*pass.settings.prior));
-    }
-    if (truth != nullptr) {
-      add(kTruthFile, csv_text(epoch, truth_names(*truth), truth->t, truth_values(*truth), kTruthDecimals));
-      add(kTruthParametersFile, format_truth_parameters(*truth));
-    }
-    for (AtomicFile& file : files) {
-      file.commit();
-    }
-  } catch (...) {
-    if (created) {
-      fs::remove(directory, fault);  // only when it is empty again
-    }
-    throw;
+  StagedDirectory staged(directory);
+  const auto add = [&](const std::string& name, const std::string& text) { write_file(staged.path() / name, text); };
+  add(kSettingsFile, format_pass_toml(pass.settings, pass.settings.prior ? kPriorFile : ""));
+  add(kGyroFile, csv_text(epoch, direction_names(pass.gyro.gyros), pass.gyro.t, pass.gyro.h, kGyroDecimals));
+  for (std::size_t head = 0; head <= pass.further_star_trackers.size(); ++head) {
+    const StarTrackerTelemetry& fixes = star_tracker_of(pass, head);
+    add(star_tracker_name(head) + ".csv",
+        csv_text(epoch, kQuaternionNames, fixes.t, quaternion_values(fixes.q_in_c), kFixDecimals));
   }
+  if (pass.settings.prior) {
+    add(kPriorFile, format_calibration(*pass.settings.prior));
+  }
+  if (truth != nullptr) {
+    add(kTruthFile, csv_text(epoch, truth_names(*truth), truth->t, truth_values(*truth), kTruthDecimals));
+    add(kTruthParametersFile, format_truth_parameters(*truth));
+  }
+  staged.commit();
   if (truth == nullptr) {
     // The truth of the pass that was here before is not that of this one.
-    fs::remove(directory / kTruthFile, fault);
-    fs::remove(directory / kTruthParametersFile, fault);
+    std::error_code ignored;
+    fs::remove(directory / kTruthFile, ignored);
+    fs::remove(directory / kTruthParametersFile, ignored);
   }
 }
 
@@ -288,6 +278,16 @@ LoadedPass read_pass(const fs::path& path) {
 std::optional<Truth> read_truth(const fs::path& path) {
   check_there(path);
   return fs::is_directory(path) ? read_truth_directory(path) : read_truth_netcdf(path);
+}
+
+PassFormat format_for(const Scenario& scenario) {
+  PassFormat format;
+  double step = scenario.gyros.front().readout.quantum_rad;
+  for (const GyroScenario& gyro : scenario.gyros) {
+    step = std::min(step, gyro.readout.quantum_rad);
+  }
+  format.direction_step = std::max(step, format.direction_step);
+  return format;
 }
 
 void write_pass(const fs::path& path, const Pass& pass, const Truth* truth, const PassFormat& format) {

@@ -154,7 +154,7 @@ std::string format_sigmas(const Eigen::Vector3d& v) {
   return v.x() == v.y() && v.x() == v.z() ? fmt::to_string(v.x()) : format_three(v);
 }
 
-/// Whether a gyro needs a part of its own beside [gyro], which says what the first gyro has in common with the others.
+/// Whether a gyro needs its own [[gyro.unit]] because it differs from the common values in [gyro].
 bool differs(const GyroPrior& gyro, const GyroPrior& common) {
   return !gyro.drift_rad_s.empty() || !gyro.drift_sigma_rad_s.empty() ||
          !gyro.alignment_rotation_vector_rad.isZero(0) || gyro.readout_noise_rad != common.readout_noise_rad ||

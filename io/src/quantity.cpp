@@ -35,7 +35,7 @@ constexpr std::array kRates = {Unit{"deg/h", kDegree / 3600}, Unit{"deg/s", kDeg
 constexpr std::array kRandomWalks = {Unit{"deg/h^0.5", kDegree / 60}, Unit{"deg/s^0.5", kDegree},
                                      Unit{"arcsec/s^0.5", kArcSecond}, Unit{"rad/s^0.5", 1}};
 
-/// What a text should have been, for its refusal.
+/// Description of the accepted texts, for the error message.
 struct Kind {
   std::string_view name;
   std::span<const Unit> units;

@@ -363,7 +363,7 @@ Fields head_fields(StarTrackerScenario& head, const fs::path& file) {
           pure("wrong_sign_probability", head.wrong_sign_probability)};
 }
 
-/// What [star_tracker] says of all heads, and [[star_tracker.further]] of each beside the first.
+/// What [star_tracker] says of all heads, and [[star_tracker.further]] of each other than the first.
 void read_star_trackers(const toml::table& table, const fs::path& file, Scenario& scenario) {
   const toml::node* further = table.get("further");
   if (further != nullptr && (further->as_array() == nullptr || !further->as_array()->is_array_of_tables())) {

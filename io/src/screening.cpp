@@ -234,7 +234,7 @@ std::vector<std::size_t> longest_increasing(const std::vector<Time>& t, std::vec
   if (std::ranges::adjacent_find(rows, not_increasing) == rows.end()) {
     return rows;
   }
-  // Longest increasing subsequence by patience sorting: one wild time stamp costs one row, not all that follow it.
+  // Longest increasing subsequence by patience sorting: one corrupt time stamp costs one row, not all that follow it.
   constexpr std::size_t kNone = std::numeric_limits<std::size_t>::max();
   std::vector<std::size_t> tails;  // tails[n]: the row with the earliest time that ends n + 1 increasing ones
   std::vector<std::size_t> previous(t.size(), kNone);

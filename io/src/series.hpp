@@ -17,14 +17,14 @@ struct ColumnName {
   Position position;
 };
 
-/// The columns that a table must and may have beside `t_s`.
+/// The columns that a table must and may have in addition to `t_s`.
 struct ColumnRules {
   std::vector<std::string> required;
   std::vector<std::string> optional;
   bool others_allowed = false;  ///< others are skipped, else refused
 };
 
-/// Rules may depend on what is there: the number of gyros is read off the columns.
+/// Rules may depend on the columns present: these give the number of gyros.
 using ChooseRules = ColumnRules (*)(const std::filesystem::path& file, std::span<const ColumnName> present);
 
 ColumnRules gyro_columns(const std::filesystem::path& file, std::span<const ColumnName> present);
@@ -35,7 +35,7 @@ ColumnRules attitude_columns(const std::filesystem::path& file, std::span<const 
 /// "h1_x", "h1_y", "h1_z", "h2_x" …
 [[nodiscard]] std::vector<std::string> direction_names(int gyros);
 
-/// Rows as they stand in the file: nothing is left out, times may be anything.
+/// Rows exactly as in the file: nothing is left out, and times need not increase.
 struct Series {
   std::filesystem::path file;
   std::string name;                  ///< for people: "gyro.csv", "group gyro"

@@ -9,6 +9,7 @@
 #include <system_error>
 
 #include "trihedron/io/error.hpp"
+#include "trihedron/records/stop.hpp"
 
 namespace trihedron::io {
 namespace {
@@ -43,9 +44,10 @@ TextFile::TextFile(const std::filesystem::path& path) {
     throw InputRefused(path, {}, "is not a regular file", "give the name of a file");
   }
   const auto expected = static_cast<std::size_t>(status.st_size);
-  // Read, not mapped: a mapped file that another program cuts would end this one by a signal.
+  // Read, not memory-mapped: if another program truncates a mapped file, access ends this one by a signal.
   bytes_ = std::make_unique_for_overwrite<char[]>(expected + 1);
   while (size_ < expected) {
+    check_stop();
     const ssize_t got = ::read(file.number, &bytes_[size_], expected - size_);
     if (got == 0) {
       break;

@@ -7,6 +7,7 @@
 #include "trihedron/io/attitude.hpp"
 #include "trihedron/io/calibration.hpp"
 #include "trihedron/io/residuals.hpp"
+#include "trihedron/records/stop.hpp"
 
 namespace trihedron::io {
 namespace {
@@ -120,13 +121,88 @@ TEST(AtomicFile, NothingStaysOfAnyFileWhenTheDiskIsFull) {
   EXPECT_EQ(read_text(directory / "calibration.json"), "old");
 }
 
-TEST(MakeDirectory, SaysWhetherItWasThereAndRefusesTheNameOfAFile) {
+TEST(MadeDirectory, GoesAgainWithThoseAboveItWhereNothingHasBeenPutIntoThem) {
   const TemporaryDirectory directory;
-  EXPECT_TRUE(make_directory(directory / "a/b"));
-  EXPECT_FALSE(make_directory(directory / "a/b"));
+  std::filesystem::create_directory(directory / "old");
+  for (const char* name : {"old", "old/a/b", "new/a/", "new"}) {
+    const MadeDirectory made(directory / name);
+    EXPECT_TRUE(std::filesystem::is_directory(directory / name));
+  }
+  EXPECT_THAT(directory.names(), ElementsAre("old"));
+  {
+    const MadeDirectory made(directory / "new/a/b");
+    write_text(directory / "new/file", "x");
+  }
+  EXPECT_FALSE(std::filesystem::exists(directory / "new/a"));
+  EXPECT_TRUE(std::filesystem::exists(directory / "new/file"));
+}
+
+TEST(MadeDirectory, RefusesTheNameOfAFile) {
+  const TemporaryDirectory directory;
   write_text(directory / "file", "x");
-  EXPECT_THROW(make_directory(directory / "file"), MachineFailed);
-  EXPECT_THROW(make_directory(directory / "file/a"), MachineFailed);
+  EXPECT_THROW(MadeDirectory(directory / "file"), MachineFailed);
+  EXPECT_THROW(MadeDirectory(directory / "file/a"), MachineFailed);
+  EXPECT_THAT(directory.names(), ElementsAre("file"));
+}
+
+TEST(StagedDirectory, ShowsItsFilesOnlyAtCommitAndKeepsOthers) {
+  const TemporaryDirectory directory;
+  std::filesystem::create_directory(directory / "out");
+  write_text(directory / "out/a.txt", "old");
+  write_text(directory / "out/other.txt", "other");
+  {
+    StagedDirectory staged(directory / "out");
+    write_file(staged.path() / "a.txt", "new");
+    std::filesystem::create_directory(staged.path() / "below");
+    write_file(staged.path() / "below/b.txt", "new");
+    EXPECT_EQ(read_text(directory / "out/a.txt"), "old");
+    staged.commit();
+  }
+  EXPECT_EQ(read_text(directory / "out/a.txt"), "new");
+  EXPECT_EQ(read_text(directory / "out/below/b.txt"), "new");
+  EXPECT_EQ(read_text(directory / "out/other.txt"), "other");
+  EXPECT_EQ(std::distance(std::filesystem::directory_iterator(directory / "out"), {}), 3);
+}
+
+TEST(StagedDirectory, LeavesNothingWithoutCommit) {
+  const TemporaryDirectory directory;
+  {
+    const StagedDirectory staged(directory / "out/below");
+    write_file(staged.path() / "a.txt", "new");
+  }
+  EXPECT_THAT(directory.names(), IsEmpty());
+}
+
+TEST(StagedDirectory, NamesThePlaceOfAFileThatCannotBeWritten) {
+  const TemporaryDirectory directory;
+  StagedDirectory staged(directory / "out");
+  EXPECT_EQ(unstaged(staged.path() / "below/a.txt"), directory / "out/below/a.txt");
+  const std::string text(2000, 'x');
+  {
+    const FileSizeLimit limit(1000);
+    EXPECT_THAT([&] { write_file(staged.path() / "a.txt", text); },
+                testing::ThrowsMessage<MachineFailed>(
+                    testing::StartsWith((directory / "out/a.txt").string() + ": cannot be written")));
+  }
+  std::filesystem::create_directories(directory / "out/b.txt");
+  write_file(staged.path() / "b.txt", text);
+  EXPECT_THAT([&] { staged.commit(); }, testing::ThrowsMessage<MachineFailed>(testing::StartsWith(
+                                            (directory / "out/b.txt").string() + ": cannot be written")));
+}
+
+TEST(AtomicFile, LeavesNothingWhereItIsStopped) {
+  const TemporaryDirectory directory;
+  const RawPass raw = clean_pass();
+  raw.save_directory(directory / "in");
+  const Pass pass = read_pass(directory / "in").pass;
+  std::filesystem::remove_all(directory / "in");
+  StopRequest request;
+  request.make();
+  const StopScope scope(&request);
+  EXPECT_THROW(write_file(directory / "a.txt", "x"), Stopped);
+  EXPECT_THROW(write_pass(directory / "out", pass, nullptr), Stopped);
+  EXPECT_THROW(write_pass(directory / "out.nc", pass, nullptr), Stopped);
+  EXPECT_THAT(directory.names(), IsEmpty());
 }
 
 TEST(AtomicFile, NetcdfIsNotWrittenOverADeviceNorWithoutADirectory) {

@@ -1,9 +1,12 @@
 #include "trihedron/io/catalogue.hpp"
 
+#include <SQLiteCpp/SQLiteCpp.h>
 #include <gmock/gmock.h>
 
+#include <chrono>
+#include <vector>
+
 #include "fixtures.hpp"
-#include "sqlite.hpp"
 #include "trihedron/io/calibration.hpp"
 
 namespace trihedron::io {
@@ -21,10 +24,10 @@ class Catalogue : public testing::Test {
  protected:
   void add(const CatalogueEntry& entry) const { add_to_catalogue(file_, {&entry, 1}); }
   void execute(const char* statement) const {
-    SqliteDatabase(file_, SqliteDatabase::Access::kWrite).execute(statement);
+    SQLite::Database(file_.string(), SQLite::OPEN_READWRITE | SQLite::OPEN_CREATE).exec(statement);
   }
   [[nodiscard]] std::int64_t count(const char* table) const {
-    return SqliteDatabase(file_, SqliteDatabase::Access::kRead).number(std::string("SELECT count(*) FROM ") + table);
+    return SQLite::Database(file_.string()).execAndGet(std::string("SELECT count(*) FROM ") + table).getInt64();
   }
   /// Of reading, of adding and of asking before, which must be the same.
   [[nodiscard]] std::string refusal_of_all() const {
@@ -48,6 +51,17 @@ TEST_F(Catalogue, GivesBackWhatWasAdded) {
   EXPECT_EQ(entries[0].passes, 1);
   EXPECT_EQ(format_calibration(entries[0].calibration), format_calibration(sample_calibration()));
   EXPECT_THAT(directory_.names(), ElementsAre("catalogue.db"));
+}
+
+TEST_F(Catalogue, NamesAStartUpThatHasNoNameByTheEpochOfItsFirstPass) {
+  std::vector<CatalogueEntry> entries = {sample_entry("first"), sample_entry("second", 2)};
+  for (CatalogueEntry& entry : entries) {
+    entry.start_up.clear();
+  }
+  entries[1].calibration.epoch += std::chrono::hours(9);
+  entries[1].calibration.t += std::chrono::hours(9);
+  add_to_catalogue(file_, entries);
+  EXPECT_THAT(read_catalogue(file_), testing::Each(testing::Field(&CatalogueEntry::start_up, "2009-05-20T00:00:00")));
 }
 
 TEST_F(Catalogue, AnswersQuestionsOfOtherPrograms) {
@@ -162,8 +176,8 @@ TEST_F(Catalogue, StaysAsItWasWhenTheDiskIsFull) {
 
 TEST_F(Catalogue, WaitsForNoOtherProgramForever) {
   add(sample_entry());
-  SqliteDatabase other(file_, SqliteDatabase::Access::kWrite);
-  other.execute("BEGIN EXCLUSIVE");
+  SQLite::Database other(file_.string(), SQLite::OPEN_READWRITE);
+  other.exec("BEGIN EXCLUSIVE");
   EXPECT_THROW(add(sample_entry()), MachineFailed);
 }
 

@@ -199,6 +199,15 @@ std::vector<ground::Combination> Advice::formerly_weak() const {
   return harmful.empty() ? before.weak : harmful;
 }
 
+std::vector<Advice::Gain> Advice::gains() const {
+  std::vector<Gain> all;
+  for (const ground::Combination& combination : formerly_weak()) {
+    all.push_back({combination, sigma_along(combination, before, before.covariance),
+                   sigma_along(combination, before, after.covariance)});
+  }
+  return all;
+}
+
 Advice advise(const Scenario& scenario, const CalibrationOptions& options, const SlewLimits& limits,
               const ground::Mission& mission, const Progress& progress) {
   check(scenario, limits);

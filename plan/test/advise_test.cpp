@@ -48,6 +48,11 @@ TEST(Advice, MakesTheUnobservableObservable) {
     EXPECT_GT(sigma_along(combination, advised().before, advised().before.covariance),
               100 * sigma_along(combination, advised().before, advised().after.covariance));
   }
+  ASSERT_EQ(advised().gains().size(), 2U);
+  for (const Advice::Gain& gain : advised().gains()) {
+    EXPECT_GT(gain.sigma_before, 100 * gain.sigma_after) << gain.combination.text;
+    EXPECT_TRUE(gain.combination.is_unobservable);
+  }
 }
 
 TEST(Advice, StaysWithinTheLimits) {

@@ -7,7 +7,7 @@ namespace trihedron {
 namespace {
 
 using Kind = ParameterId::Kind;
-using Owner = FurtherStateRow::Owner;
+using Owner = FurtherStateKind::Owner;
 
 constexpr std::string_view kAlignment = "align_";
 constexpr std::string_view kAxes = "xyz";
@@ -62,8 +62,8 @@ std::optional<ParameterId> further_named(std::string_view name) {
   for (const FurtherStateRow& row : kFurtherStates) {
     std::size_t owner = 0;
     std::string_view component = name;
-    if (row.owner != Owner::kPass) {
-      const std::optional<Numbered>& found = row.owner == Owner::kGyro ? of_a_gyro : of_a_head;
+    if (const Owner owned_by = kind_of(row.state).owner; owned_by != Owner::kPass) {
+      const std::optional<Numbered>& found = owned_by == Owner::kGyro ? of_a_gyro : of_a_head;
       if (!found || !found->rest.starts_with('_')) {
         continue;
       }
@@ -115,7 +115,7 @@ std::string name_of(const ParameterId& parameter) {
   const std::string component = parameter.component < row.components.size()
                                     ? std::string(row.components[parameter.component])
                                     : std::string(row.key) + "_" + std::to_string(parameter.component + 1);
-  return owner_name(row.owner, number) + component;
+  return owner_name(kind_of(row.state).owner, number) + component;
 }
 
 std::optional<ParameterId> parameter_named(std::string_view name) {

@@ -1,5 +1,5 @@
 #pragma once
-/// What stands round every page: head, masthead, footer, scripts.
+/// The frame of every page: head, masthead, footer, scripts.
 
 #include <nlohmann/json.hpp>
 #include <string>

@@ -20,12 +20,13 @@ namespace {
 
 using nlohmann::json;
 
-/// Stretches of time that a figure tells apart: about the pixels of a figure across the page, or of one in two columns.
+/// Number of time bins of a decimated series: about the width in pixels of a figure across the page, or of one in two
+/// columns.
 constexpr std::size_t kWide = 700;
 constexpr std::size_t kHalf = 350;
 constexpr std::size_t kTrack = 1500;
 
-/// A gap of a line is a hole of more fixes than a few lost ones.
+/// Number of missing fixes from which on a line is interrupted.
 constexpr double kFixesOfGap = 10;
 
 class Figures {
@@ -45,9 +46,9 @@ class Figures {
     };
     put("parameters", parameters());
     put("corrections", corrections());
-    if (input_.evaluation) {
-      put("navigation", errors(input_.evaluation->navigation, kArcminute_rad));
-      put("attitude", errors(input_.evaluation->attitude, kArcsecond_rad));
+    if (input_.evaluation != nullptr) {
+      put("navigation", errors(input_.evaluation->navigation.errors, kArcminute_rad));
+      put("attitude", errors(input_.evaluation->attitude.errors, kArcsecond_rad));
       put("open_loops", open_loops());
     }
     put("innovations", innovations());
@@ -293,7 +294,7 @@ class Figures {
     return series.empty() ? json{} : series.drawn(kWide);
   }
 
-  /// Per stretch of time what came and what was done with it, in parts of what should have come.
+  /// Per time bin the fraction of expected samples and fixes that came, by what was done with them.
   [[nodiscard]] json telemetry() const {
     const PassSettings& settings = input_.pass.settings;
     const double duration_min = to_minutes(settings.duration);

@@ -20,7 +20,8 @@ namespace {
 using nlohmann::json;
 using Catalogue = std::vector<CatalogueEntry>;
 
-/// That an alignment is drawn from, rad: its mean over the start-ups, or the first value.
+/// Reference value that is subtracted from an alignment in the figure, rad: its mean over the start-ups, or the first
+/// value.
 double reference_of(const ParameterId& state, const Catalogue& catalogue, const ground::History& history) {
   const auto spread = std::ranges::find(history.spreads, state, &ground::Spread::state);
   if (spread != history.spreads.end()) {

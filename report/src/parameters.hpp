@@ -15,9 +15,9 @@ struct Parameter {
   std::string symbol;         ///< "k₀", "Λx"
   double value = 0;           ///< rad/s; alignment: component of the rotation vector, rad
   double sigma = 0;           ///< rad/s or rad
-  double first_sigma = 0;     ///< before the data
+  double first_sigma = 0;     ///< of the prior
   bool is_determined = true;  ///< the data say more of it than was known before
-  bool is_followed = true;    ///< the on-board cycle, whose course is shown, estimates it
+  bool is_followed = true;    ///< the on-board step, whose course is shown, estimates it
   std::optional<double> truth;
   std::optional<double> error;          ///< estimate − truth, as ground::estimate_minus_truth()
   std::optional<double> converged_min;  ///< as ground::Convergence::settled

@@ -131,9 +131,9 @@ json strongest_correlations(const ReportInput& input, const std::vector<Paramete
 
 // ---- Attitude
 
-json stretches_of(const ReportInput& input, const ground::AttitudeErrors& errors, double unit) {
+json stretches_of(const ReportInput& input, const ground::AttitudeEvaluation& evaluation, double unit) {
   json rows = json::array();
-  for (const auto& stretch : ground::statistics_by_stretch(errors, input.pass.settings.epoch, kStretch)) {
+  for (const ground::ErrorStatistics& stretch : evaluation.stretches) {
     if (stretch.to == stretch.from) {  // the pass ends on the first epoch of the next stretch
       continue;
     }
@@ -156,12 +156,12 @@ json open_loop_rows(const ReportInput& input) {
     return interval.passed ? number(to_minutes(*interval.passed), 1) : "> " + number(to_minutes(interval.observed), 0);
   };
   json rows = json::array();
-  for (const ground::OpenLoops& loops : input.evaluation->open_loops) {
-    const auto& [before, after] = loops.intervals;
+  for (const ground::IntervalPair& pair : input.evaluation->extension.pairs) {
+    const auto& [before, after] = pair;
     if (after.observed == Duration::zero()) {  // corrected at the end of the pass
       continue;
     }
-    const auto extension = loops.intervals.extension();
+    const auto extension = pair.extension();
     rows.push_back({{"corrected", number(to_minutes(after.corrected - input.pass.settings.epoch), 0)},
                     {"before", in_words(before)},
                     {"after", in_words(after)},
@@ -172,11 +172,12 @@ json open_loop_rows(const ReportInput& input) {
 }
 
 json evaluation_of(const ReportInput& input) {
-  if (!input.evaluation || (input.evaluation->navigation.t.empty() && input.evaluation->attitude.t.empty())) {
+  if (input.evaluation == nullptr ||
+      (input.evaluation->navigation.errors.t.empty() && input.evaluation->attitude.errors.t.empty())) {
     return nullptr;
   }
-  const Evaluation& evaluation = *input.evaluation;
-  return {{"reference", evaluation.reference},
+  const ground::CalibrationEvaluation& evaluation = *input.evaluation;
+  return {{"reference", reference_in_words(evaluation.attitude)},
           {"navigation", stretches_of(input, evaluation.navigation, kArcminute_rad)},
           {"attitude", stretches_of(input, evaluation.attitude, kArcsecond_rad)},
           {"open_loops", open_loop_rows(input)},
@@ -303,7 +304,7 @@ json settings_of(const ReportInput& input) {
     put("Star-tracker noise found",
         of_axes(*options.star_tracker_noise_rad, kArcsecond_rad) + " ″ about roll / pitch / heading, 1σ");
   }
-  put(options.star_tracker_noise_rad ? "Star-tracker noise told" : "Star-tracker noise",
+  put(options.star_tracker_noise_rad ? "Star-tracker noise by pass.toml" : "Star-tracker noise",
       of_axes(input.pass.settings.star_tracker_noise_rad, kArcsecond_rad) + " ″ about roll / pitch / heading, 1σ");
   return rows;
 }
@@ -326,7 +327,7 @@ ShownUnit shown_unit(Unit unit) {
   return {"_rad_s", 1e-9, "10⁻⁹ rad/s"};
 }
 
-/// The states beside alignment and drift.
+/// The states other than alignment and drift.
 json further_of(const ReportInput& input) {
   json rows = json::array();
   for (const FurtherEstimate& estimate : input.run.calibration.further) {

@@ -10,7 +10,8 @@
 namespace trihedron::report {
 
 /// spacecraft, facts, gyros, has_truth, coefficients, correlations, evaluation, innovation_rows, fix_counts,
-/// sample_counts, gaps, telemetry_notes, settings, statistics; has_… for lists that a section hangs on.
+/// sample_counts, gaps, telemetry_notes, settings, statistics; has_…: whether the list that a section shows is not
+/// empty.
 [[nodiscard]] nlohmann::json table_values(const ReportInput& input, const std::vector<Parameter>& parameters);
 
 }  // namespace trihedron::report

@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <set>
 
@@ -77,9 +76,9 @@ json figure_of_merit(const std::string& name, const std::string& value, const st
 }
 
 /// Statistics per 90 min, without the rest of a stretch that the end of the pass cut short.
-std::vector<ground::ErrorStatistics> whole_stretches(const ReportInput& input, const ground::AttitudeErrors& errors) {
-  auto stretches = ground::statistics_by_stretch(errors, input.pass.settings.epoch, kStretch);
-  while (stretches.size() > 1 && stretches.back().to - stretches.back().from < kStretch / 2) {
+std::vector<ground::ErrorStatistics> whole_stretches(const ground::AttitudeEvaluation& evaluation) {
+  auto stretches = evaluation.stretches;
+  while (stretches.size() > 1 && stretches.back().to - stretches.back().from < ground::kEvaluatedStretch / 2) {
     stretches.pop_back();
   }
   return stretches;
@@ -92,11 +91,11 @@ std::string minutes_of(const ReportInput& input, const ground::ErrorStatistics& 
 }
 
 json attitude_number(const ReportInput& input) {
-  if (input.evaluation && !input.evaluation->attitude.t.empty()) {
-    const auto stretches = whole_stretches(input, input.evaluation->attitude);
+  if (input.evaluation != nullptr && !input.evaluation->attitude.errors.t.empty()) {
+    const auto stretches = whole_stretches(input.evaluation->attitude);
     return figure_of_merit("Attitude error while calibrating", of_axes(stretches.back().rms_rad, kArcsecond_rad), "″",
                            "roll / pitch / heading, rms in " + minutes_of(input, stretches.back()) + " against " +
-                               input.evaluation->reference);
+                               reference_in_words(input.evaluation->attitude));
   }
   if (!input.run.attitude.sigma_rad.empty()) {
     return figure_of_merit("Attitude at the end", of_axes(input.run.attitude.sigma_rad.back(), kArcsecond_rad), "″",
@@ -106,18 +105,16 @@ json attitude_number(const ReportInput& input) {
 }
 
 json navigation_number(const ReportInput& input) {
-  if (!input.evaluation || input.evaluation->navigation.t.empty()) {
+  if (input.evaluation == nullptr || input.evaluation->navigation.errors.t.empty()) {
     return nullptr;
   }
-  const ground::AttitudeErrors& errors = input.evaluation->navigation;
-  const auto stretches = whole_stretches(input, errors);
+  const auto stretches = whole_stretches(input.evaluation->navigation);
   const auto greatest = [](const ground::ErrorStatistics& stretch) {
     return significant(stretch.max_total_rad / kArcminute_rad, 2);
   };
   const std::string name = "Greatest error between corrections";
   if (stretches.size() == 1) {
-    const auto all = ground::statistics_by_stretch(errors, input.pass.settings.epoch, Duration::max());
-    return figure_of_merit(name, greatest(all.front()), "′", "open loop, total angle");
+    return figure_of_merit(name, greatest(input.evaluation->navigation.whole), "′", "open loop, total angle");
   }
   return figure_of_merit(name, greatest(stretches.front()) + " → " + greatest(stretches.back()), "′",
                          "open loop, total angle: in " + minutes_of(input, stretches.front()) + " and in " +
@@ -176,10 +173,10 @@ json convergence_number(const std::vector<Parameter>& parameters, bool alignment
 }
 
 json extension_number(const ReportInput& input) {
-  if (!input.evaluation) {
+  if (input.evaluation == nullptr) {
     return nullptr;
   }
-  const auto extension = ground::median_extension(input.evaluation->open_loops);
+  const auto& extension = input.evaluation->extension.median;
   if (!extension) {
     return nullptr;
   }

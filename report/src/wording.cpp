@@ -75,4 +75,8 @@ std::string span(Duration d) {
   return minutes < 120 ? fmt::format("{} min", minutes) : fmt::format("{} h {:02} min", minutes / 60, minutes % 60);
 }
 
+std::string reference_in_words(const ground::AttitudeEvaluation& evaluation) {
+  return fmt::format("the {}", name_of(evaluation.reference));
+}
+
 }  // namespace trihedron::report

@@ -5,6 +5,7 @@
 #include <string>
 
 #include "trihedron/core/time.hpp"
+#include "trihedron/ground/evaluate/attitude_evaluation.hpp"
 
 namespace trihedron::report {
 
@@ -31,5 +32,8 @@ namespace trihedron::report {
 
 /// "9 h 00 min", "42 min", "12 s"
 [[nodiscard]] std::string span(Duration d);
+
+/// "the truth", "the star tracker"
+[[nodiscard]] std::string reference_in_words(const ground::AttitudeEvaluation& evaluation);
 
 }  // namespace trihedron::report

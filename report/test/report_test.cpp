@@ -150,8 +150,9 @@ TEST(Report, GivesALowerBoundWhereTheLimitIsNotPassedAnyMore) {
   const auto interval = [&](std::optional<Duration> passed) {
     return ground::CorrectionInterval{start + minutes(90), minutes(90), passed, 0};
   };
-  run.evaluation.open_loops.resize(2);
-  run.evaluation.open_loops[1].intervals = {interval(minutes(20)), interval({})};
+  ground::IntervalExtension& extension = run.evaluation.extension;
+  extension.pairs = {{interval(minutes(20)), interval({})}};
+  extension.median = ground::median_extension(extension.pairs);
   const std::string html = render(run.judged());
   EXPECT_THAT(html, HasSubstr("<strong>≥ 4.5<span class=\"unit\"> ×</span></strong>"));
   EXPECT_THAT(html, HasSubstr("<td>20.0</td><td>&gt; 90</td><td>≥ 4.5</td>"));

@@ -6,6 +6,7 @@
 #include <limits>
 #include <numbers>
 #include <random>
+#include <utility>
 
 #include "trihedron/core/drift.hpp"
 #include "trihedron/records/run.hpp"
@@ -177,38 +178,43 @@ class Generator {
   }
 
   void make_attitude() {
-    Evaluation& evaluation = out_.evaluation;
-    evaluation.reference = "the simulated truth";
-    evaluation.limit_rad = 5 * kArcminute_rad;
+    ground::AttitudeErrors navigation;
+    ground::AttitudeErrors calibrating;
     double corrected_s = 0;
     for (const FixRecord& fix : out_.run.fixes) {
       const double t_s = seconds(fix.t);
       corrected_s = fix.corrected_navigator ? t_s : corrected_s;
       const double age_s = t_s - corrected_s;
       const double size = (13 * std::exp(-corrected_s / 4000) + 0.35) * kArcminute_rad * age_s / 5400;
-      evaluation.navigation.t.push_back(fix.t);
-      evaluation.navigation.error_rad.emplace_back(size * std::sin(kRate_rad_s * t_s),
-                                                   size * (0.3 + 0.2 * std::cos(kRate_rad_s * t_s)),
-                                                   size * std::cos(kRate_rad_s * t_s));
-      evaluation.navigation.error_rad.back() += Eigen::Vector3d(normal(), normal(), normal()) * kArcsecond_rad;
-      evaluation.navigation.sigma_rad.emplace_back(Eigen::Vector3d::Constant(size + kArcsecond_rad));
-      evaluation.navigation.age_s.push_back(age_s);
+      navigation.t.push_back(fix.t);
+      navigation.error_rad.emplace_back(size * std::sin(kRate_rad_s * t_s),
+                                        size * (0.3 + 0.2 * std::cos(kRate_rad_s * t_s)),
+                                        size * std::cos(kRate_rad_s * t_s));
+      navigation.error_rad.back() += Eigen::Vector3d(normal(), normal(), normal()) * kArcsecond_rad;
+      navigation.sigma_rad.emplace_back(Eigen::Vector3d::Constant(size + kArcsecond_rad));
+      navigation.age_s.push_back(age_s);
 
       const Eigen::Vector3d sigma_rad =
           Eigen::Vector3d(1.5, 1.4, 2.2) * (1 + 12 * std::exp(-t_s / 900)) * kArcsecond_rad;
-      evaluation.attitude.t.push_back(fix.t);
-      evaluation.attitude.error_rad.emplace_back(sigma_rad.cwiseProduct(Eigen::Vector3d(normal(), normal(), normal())));
-      evaluation.attitude.sigma_rad.push_back(sigma_rad);
+      calibrating.t.push_back(fix.t);
+      calibrating.error_rad.emplace_back(sigma_rad.cwiseProduct(Eigen::Vector3d(normal(), normal(), normal())));
+      calibrating.sigma_rad.push_back(sigma_rad);
       out_.run.attitude.t.push_back(fix.t);
       out_.run.attitude.q_in_c.push_back(attitude(t_s));
       out_.run.attitude.sigma_rad.push_back(sigma_rad);
     }
+    const auto evaluated = [&](ground::AttitudeErrors errors) {
+      return ground::summed_up(std::move(errors), ground::ReferenceKind::kTruth, out_.pass.settings.epoch,
+                               ground::kAttitudeLimit_rad);
+    };
+    out_.evaluation.navigation = evaluated(std::move(navigation));
+    out_.evaluation.attitude = evaluated(std::move(calibrating));
     make_open_loops();
   }
 
   /// The error grows as a share of the time since the correction, the smaller the later the correction.
   void make_open_loops() {
-    auto& evaluation = out_.evaluation;
+    ground::CalibrationEvaluation& evaluation = out_.evaluation;
     const double end_s = seconds(out_.run.fixes.back().t);
     for (double from_s = 0; from_s <= end_s; from_s += 5400) {
       const auto grown = [&](double rad_per_s) {
@@ -224,7 +230,9 @@ class Generator {
       loops.intervals = {ground::correction_intervals(loops.known_before, evaluation.limit_rad).front(),
                          ground::correction_intervals(loops.calibrated, evaluation.limit_rad).front()};
       evaluation.open_loops.push_back(loops);
+      evaluation.extension.pairs.push_back(loops.intervals);
     }
+    evaluation.extension.median = ground::median_extension(evaluation.open_loops);
   }
 
   void make_angle() {

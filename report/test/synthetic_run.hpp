@@ -23,12 +23,12 @@ struct SyntheticRun {
   Pass pass;
   Truth truth;
   CalibrationRun run;
-  Evaluation evaluation;
+  ground::CalibrationEvaluation evaluation;
 
   /// With truth and evaluation.
-  [[nodiscard]] ReportInput judged() const { return {pass, run, &truth, {}, evaluation}; }
+  [[nodiscard]] ReportInput judged() const { return {pass, run, &truth, {}, &evaluation}; }
   /// As after a real pass.
-  [[nodiscard]] ReportInput alone() const { return {pass, run, nullptr, {}, std::nullopt}; }
+  [[nodiscard]] ReportInput alone() const { return {pass, run, nullptr, {}, nullptr}; }
 };
 
 /// The same options give the same run.

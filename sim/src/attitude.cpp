@@ -6,6 +6,8 @@
 #include <numbers>
 #include <stdexcept>
 
+#include "trihedron/records/stop.hpp"
+
 namespace trihedron::sim {
 namespace {
 
@@ -43,6 +45,7 @@ std::vector<AttitudeSample> reference_samples(const AttitudeScenario& scenario, 
   const auto intervals = static_cast<int>(std::ceil((end_s - begin_s + 2 * kMargin_s) / kSpacing_s));
   std::vector<AttitudeSample> samples;
   for (int i = 0; i <= intervals; ++i) {
+    check_stop();
     const double t = begin_s - kMargin_s + i * kSpacing_s;
     samples.push_back({t, attitude(ephemeris.at(t)).quaternion()});
   }
@@ -158,6 +161,7 @@ SmoothNoise::SmoothNoise(double bandwidth_hz, double begin_s, double end_s, Stre
   const auto intervals = static_cast<std::size_t>(std::ceil((end_s - begin_s) * knots_per_s_)) + 1;
   coefficients_.resize(intervals + 5);
   for (Vector3d& c : coefficients_) {
+    check_stop();
     c = to_unit_variance * random.normal3();
   }
 }

@@ -5,6 +5,7 @@
 #include <stdexcept>
 #include <string>
 
+#include "trihedron/records/stop.hpp"
 #include "trihedron/sim/attitude.hpp"
 #include "trihedron/sim/gyro.hpp"
 #include "trihedron/sim/interval.hpp"
@@ -151,6 +152,7 @@ SimulatedPass simulate(const Scenario& scenario) {
   telemetry.h.reserve(samples * gyros.size() * 3);
 
   for (Duration since{0};; since += scenario.gyro_period) {
+    check_stop();
     const Time t = scenario.epoch + since;
     const double t_s = to_seconds(since);
     if (since % scenario.star_tracker_period == Duration{0}) {

@@ -7,6 +7,8 @@
 #include <chrono>
 #include <cmath>
 
+#include "trihedron/records/stop.hpp"
+
 namespace trihedron::sim {
 namespace {
 
@@ -30,6 +32,7 @@ SkyState sky_at(Time epoch, double t_s) {
 Sky::Sky(Time epoch, double begin_s, double end_s) : begin_s_(begin_s) {
   const auto intervals = static_cast<int>(std::ceil((end_s - begin_s) / kSpacing_s)) + 1;
   for (int i = 0; i <= intervals; ++i) {
+    check_stop();
     table_.push_back(sky_at(epoch, begin_s + i * kSpacing_s));
   }
 }

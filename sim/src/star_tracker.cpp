@@ -6,6 +6,7 @@
 #include <cmath>
 #include <optional>
 
+#include "trihedron/records/stop.hpp"
 #include "trihedron/sim/interval.hpp"
 #include "trihedron/sim/random.hpp"
 
@@ -84,6 +85,7 @@ StarTrackerTelemetry simulate_fixes(const StarTrackerScenario& head, const StarT
   StarTrackerTelemetry fixes;
   Quaterniond previous = Quaterniond::Identity();
   for (Duration since{0}; since <= duration; since += period) {
+    check_stop();
     const Time t = epoch + since;
     const double t_s = to_seconds(since) + head.clock_offset_s - head.latency_s;
     const double phase = n * to_seconds(since);

@@ -15,7 +15,7 @@ using ParameterCovariance = Eigen::Matrix<double, Parameters::kSize, Parameters:
 /// Bayesian Cramér–Rao bound of the parameters of two gyros without process noise, rad/s and rad: the inverse of the
 /// information of priors and fixes, linearised at the truth. Independent of the estimators: own integration of the
 /// sensitivities along the true motion, normal equations. A fix has the star tracker's noise and, of the readings round
-/// it that the invariant estimator takes together, the noise of a cubic through them.
+/// it that the invariant estimator fits, the noise of a cubic through them.
 [[nodiscard]] ParameterCovariance parameter_bound(const PassSettings& settings, const Truth& truth);
 
 }  // namespace trihedron::consistency

@@ -19,7 +19,7 @@
 namespace trihedron::consistency {
 namespace {
 
-/// What an estimator made of a flight.
+/// Result of one estimator on one flight.
 struct Estimate {
   ParameterErrors errors;          ///< estimate − truth
   ParameterCovariance covariance;  ///< as it claims

@@ -25,7 +25,7 @@ struct Outcome {
   Difference by_combination;
 };
 
-/// One flight of this cell, seen by each of the estimators named. They are told the true noise.
+/// One flight of this cell, calibrated by each of the estimators named, which are given the true noise.
 [[nodiscard]] std::vector<Outcome> fly(const Cell& cell, int run, const std::vector<Estimator>& estimators);
 
 }  // namespace trihedron::consistency

@@ -22,7 +22,7 @@ struct Cell {
   bool slews = true;
   Geometry geometry;
   double drift_rad_s = 0;       ///< 1-sigma of each coefficient
-  double misalignment_rad = 0;  ///< length of the rotation vector; even in direction
+  double misalignment_rad = 0;  ///< length of the rotation vector; its direction is uniformly distributed
   double walk_rad_sqrt_s = 0;   ///< of each momentum, per axis: the process noise
 
   /// "slews/plane-normal/1e-06/30arcmin/1e-08"

@@ -1,4 +1,4 @@
-// trihedron_consistency: flies the grid and tells how the estimators' covariances hold.
+// trihedron_consistency: simulates a grid of flights and tabulates whether the estimators' covariances are consistent.
 
 #include <fmt/core.h>
 
@@ -16,7 +16,9 @@
 #include "consistency/flight.hpp"
 #include "consistency/grid.hpp"
 #include "consistency/results.hpp"
+#include "stop_on_signals.hpp"
 #include "trihedron/ground/tasks/on_all_cores.hpp"
+#include "trihedron/records/stop.hpp"
 
 namespace {
 
@@ -28,7 +30,7 @@ constexpr const char* kAgreementTable = "agreement";
 
 struct Options {
   int runs = 100;
-  int paper_runs = 20;  // it is far enough off to be seen by fewer
+  int paper_runs = 20;  // fewer runs suffice: its NEES is far from consistent
   std::string cells;
   std::vector<std::string> estimators{std::string(name_of(Estimator::kPaper)),
                                       std::string(name_of(Estimator::kInvariant))};
@@ -47,7 +49,7 @@ std::vector<std::string> estimator_names() {
   return names;
 }
 
-/// A flight to be made, and the estimators that have not seen it.
+/// A flight still to be simulated, and the estimators to run on it.
 struct Task {
   const Cell& cell;
   int run;
@@ -66,7 +68,7 @@ std::vector<Column> columns_of(const Options& options) {
   return columns;
 }
 
-/// Run by run through all cells: what is there after a break makes a table of fewer runs.
+/// Ordered by run, then by cell, so that an interrupted campaign leaves a complete table of fewer runs.
 std::vector<Task> missing(const Results& results, const std::vector<Cell>& cells, const std::vector<Column>& columns,
                           int runs) {
   std::vector<Task> tasks;
@@ -90,7 +92,7 @@ std::vector<Task> missing(const Results& results, const std::vector<Cell>& cells
 void fly_all(const std::vector<Task>& tasks, unsigned threads, Results& results) {
   std::size_t done = 0;
   std::mutex one_at_a_time;
-  const auto work = [&](std::size_t i) {
+  const auto fly_one = [&](std::size_t i) {
     const Task& task = tasks[i];
     std::vector<Estimator> estimators;
     for (const std::string& name : task.estimators) {
@@ -102,9 +104,9 @@ void fly_all(const std::vector<Task>& tasks, unsigned threads, Results& results)
       results.add({task.cell.name(), task.run, task.estimators[k]}, outcomes[k]);
     }
     fmt::print(stderr, "\r{} of {} flights", ++done, tasks.size());
-    return i;
   };
-  (void)trihedron::ground::on_all_cores(tasks.size(), work, threads);
+  using namespace trihedron::ground;
+  with_cores(threads, [&] { for_each_on_all_cores(tasks.size(), fly_one); });
 }
 
 std::string measured(const Options& options) {
@@ -132,9 +134,7 @@ std::string measured(const Options& options) {
   return text + "\n" + (observable ? results.observable_table(cells, columns) : results.table(cells, columns));
 }
 
-}  // namespace
-
-int main(int argc, char** argv) {
+int run(int argc, char** argv) {
   try {
     Options options;
     CLI::App program(
@@ -169,8 +169,16 @@ int main(int argc, char** argv) {
       write_between_markers(options.document, options.place, text);
     }
     return 0;
+  } catch (const trihedron::Stopped&) {
+    throw;
   } catch (const std::exception& error) {
     fmt::print(stderr, "trihedron_consistency: {}\n", error.what());
     return 1;
   }
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  return trihedron::cli::stopped_by_signals([argc, argv] { return run(argc, argv); });
 }

@@ -9,7 +9,7 @@
 
 namespace trihedron::consistency {
 
-/// Which flight, and who looked at it.
+/// Key of an outcome: flight and estimator.
 struct Key {
   std::string cell;
   int run = 0;
@@ -18,7 +18,7 @@ struct Key {
   auto operator<=>(const Key&) const = default;
 };
 
-/// What the table tells of one estimator.
+/// Columns of the table for one estimator.
 struct Column {
   std::string estimator;
   int runs = 0;  ///< flights per cell: 1 … runs

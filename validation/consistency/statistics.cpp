@@ -10,7 +10,7 @@
 namespace trihedron::consistency {
 namespace {
 
-/// In units of the sigmas, which differ by ten powers of ten.
+/// Scaled by the sigmas, which differ by ten orders of magnitude.
 struct Scaled {
   explicit Scaled(const ParameterCovariance& covariance)
       : unit(covariance.diagonal().cwiseSqrt().cwiseInverse()),

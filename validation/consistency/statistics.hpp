@@ -37,8 +37,8 @@ struct Difference {
 [[nodiscard]] Difference difference_by_combination(const ParameterErrors& difference, const ParameterCovariance& first,
                                                    const ParameterCovariance& second);
 
-/// Whether the first differs by no more than it says to know less, and a third of a sigma beside that, which makes its
-/// errors larger by 5 %.
+/// Whether the difference is explained by the larger covariance of the first, with a tolerance of a third of a sigma,
+/// which makes its errors larger by 5 %.
 [[nodiscard]] bool agrees(const Difference& difference);
 
 }  // namespace trihedron::consistency

@@ -16,9 +16,9 @@ namespace trihedron {
 enum class PassKind {
   kNominal,            ///< slews, all drift in eq. (1)
   kSteadyFlight,       ///< no slew: the alignment about the orbit normal cannot be observed
-  kDirty,              ///< outliers, a gap, clock offset of 10 ms, error at orbital period, drift beside eq. (1)
+  kDirty,              ///< outliers, a gap, clock offset of 10 ms, error at orbital period, drift outside eq. (1)
   kYawManoeuvre,       ///< steady flight of a large spacecraft, turned round once
-  kDriftOfHighDegree,  ///< drift of degrees up to 6 beside eq. (1)
+  kDriftOfHighDegree,  ///< drift of degrees up to 6 outside eq. (1)
 };
 
 struct PassOfKind {

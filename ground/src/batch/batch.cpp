@@ -49,13 +49,13 @@ double log_likelihood(const PassProblem& problem, const PassSolution& solution, 
   const Layout& layout = problem.layout();
   problem.put_noise(solution, noise, linear);
   const SmootherResult found = smoothed(linear);
-  // Of the directions at the start nothing is known before; the rest of the prior is triangular. What
-  // gather_constants() has put there is below it.
+  // Of the directions at the start nothing is known before; the rest of the prior is triangular. Rows that
+  // gather_constants() has added stand below that triangle.
   const Eigen::Index directions = 2L * layout.gyros;
   const Eigen::Index rest = layout.size() - directions;
   const double log_prior_root =
       linear.prior.block(directions, directions, rest, rest).diagonal().array().abs().log().sum();
-  return log_prior_root - found.log_root_determinant - (found.residual_square + linear.beyond_squares) / 2;
+  return log_prior_root - found.log_root_determinant - (found.residual_square + linear.cost_outside_rows) / 2;
 }
 
 }  // namespace trihedron::ground

@@ -6,6 +6,8 @@
 #include <cmath>
 #include <stdexcept>
 
+#include "trihedron/records/stop.hpp"
+
 namespace trihedron::ground {
 namespace {
 
@@ -16,7 +18,7 @@ using Eigen::VectorXd;
 
 double log_determinant(const MatrixXd& triangle) { return triangle.diagonal().array().abs().log().sum(); }
 
-/// Rotates rows so that below the first `columns` of them nothing is left in the first `columns` columns.
+/// Rotates rows (Householder) so that in the first `columns` columns only an upper triangle remains.
 void rotate_up(MatrixXd& rows, Index columns) {
   const Eigen::HouseholderQR<MatrixXd> qr(rows.leftCols(columns));
   rows.rightCols(rows.cols() - columns).applyOnTheLeft(qr.householderQ().adjoint());
@@ -24,10 +26,10 @@ void rotate_up(MatrixXd& rows, Index columns) {
   rows.topLeftCorner(columns, columns) = qr.matrixQR().topRows(columns).triangularView<Upper>();
 }
 
-/// Rows about the constants alone, with their right side; now and then made into a triangle.
-class Pile {
+/// Rows about the constants alone, with right side; compressed to a triangle whenever the buffer is full.
+class ConstantRows {
  public:
-  explicit Pile(Index columns) : rows_(MatrixXd::Zero(kMost + columns, columns)) {}
+  explicit ConstantRows(Index columns) : rows_(MatrixXd::Zero(kBufferedRows + columns, columns)) {}
 
   template <class Rows>
   void add(const Rows& rows) {
@@ -45,32 +47,33 @@ class Pile {
   [[nodiscard]] MatrixXd triangle() const { return triangle_of(rows_.topRows(size_)); }
 
  private:
-  static constexpr Index kMost = 1000;
+  static constexpr Index kBufferedRows = 1000;
   MatrixXd rows_;
   Index size_ = 0;
 };
 
-/// The rows that know of d are kept as its triangle; what they leave over knows of c alone, which does not move: it
-/// waits for the end.
+/// Forward pass. The rows about d are kept as a triangle; the rest are about c alone, which is constant, and are kept
+/// until the end.
 class Forward {
  public:
   Forward(const MatrixXd& prior, const VectorXd& prior_y, Index d)
-      : n_(prior.cols()), d_(d), pile_(n_ - d + 1), moving_(prior.rows(), n_ + 1) {
+      : n_(prior.cols()), d_(d), constant_rows_(n_ - d + 1), moving_(prior.rows(), n_ + 1) {
     moving_ << prior, prior_y;
   }
 
   void measure(const SmootherStage& stage) {
+    check_stop();
     const Index c = n_ - d_;
     MatrixXd rows = MatrixXd::Zero(std::max(moving_.rows() + stage.H.rows(), d_), n_ + 1);
     rows.topRows(moving_.rows()) = moving_;
     rows.block(moving_.rows(), 0, stage.H.rows(), n_) = stage.H;
     rows.block(moving_.rows(), n_, stage.H.rows(), 1) = stage.y;
     rotate_up(rows, d_);
-    pile_.add(rows.bottomRightCorner(rows.rows() - d_, c + 1));
+    constant_rows_.add(rows.bottomRightCorner(rows.rows() - d_, c + 1));
     moving_ = rows.topRows(d_);
   }
 
-  /// On to the next stage; gives what is left of w.
+  /// Time update to the next stage; returns the rows about w.
   SmootherResult::NoiseRows move(const SmootherStage& stage) {
     const Index d = d_;
     const Index c = n_ - d;
@@ -87,18 +90,18 @@ class Forward {
     return {moved.topLeftCorner(d, d), moved.block(0, d, d, n_), moved.topRightCorner(d, 1)};
   }
 
-  /// Of (d, c), right side last; the rows of c know of it whatever d is.
+  /// Triangle about (d, c), right side last; its rows about c hold whatever d is.
   [[nodiscard]] MatrixXd triangle() const {
     MatrixXd triangle = MatrixXd::Zero(n_ + 1, n_ + 1);
     triangle.topRows(d_) = moving_;
-    triangle.bottomRightCorner(n_ - d_ + 1, n_ - d_ + 1) = pile_.triangle();
+    triangle.bottomRightCorner(n_ - d_ + 1, n_ - d_ + 1) = constant_rows_.triangle();
     return triangle;
   }
 
  private:
   Index n_;
   Index d_;
-  Pile pile_;
+  ConstantRows constant_rows_;
   MatrixXd moving_;
 };
 
@@ -125,7 +128,7 @@ SmootherResult smooth(const MatrixXd& prior, const VectorXd& prior_y, const std:
       break;
     }
     result.steps.push_back(forward.move(stages[i]));
-    // That of (d, c, w): by those of (w, d', c), of which they are a linear function with the determinant of A⁻¹.
+    // The determinant for (d, c, w) is that for (w, d', c) over |det A⁻¹|, the determinant of the change of variables.
     result.log_root_determinant +=
         log_determinant(result.steps.back().R) - std::log(std::abs(stages[i].A_inverse.determinant()));
   }
@@ -157,18 +160,19 @@ SmootherResult smooth(const MatrixXd& prior, const VectorXd& prior_y, const std:
 void gather_constants(MatrixXd& prior, VectorXd& prior_y, std::vector<SmootherStage>& stages) {
   const Index n = prior.cols();
   const Index d = stages.front().m.size();
-  Pile pile(n - d + 1);
+  ConstantRows constant_rows(n - d + 1);
   for (SmootherStage& stage : stages) {
+    check_stop();
     if (stage.H.rows() > d) {
       MatrixXd rows(stage.H.rows(), n + 1);
       rows << stage.H, stage.y;
       rotate_up(rows, d);
-      pile.add(rows.bottomRightCorner(rows.rows() - d, n - d + 1));
+      constant_rows.add(rows.bottomRightCorner(rows.rows() - d, n - d + 1));
       stage.H = rows.topLeftCorner(d, n);
       stage.y = rows.topRightCorner(d, 1);
     }
   }
-  const MatrixXd constants = pile.triangle();
+  const MatrixXd constants = constant_rows.triangle();
   const Index before = prior.rows();
   prior.conservativeResize(before + constants.rows(), n);
   prior.bottomRows(constants.rows()) << MatrixXd::Zero(constants.rows(), d), constants.leftCols(n - d);
@@ -211,6 +215,7 @@ std::vector<MatrixXd> covariance_roots(const SmootherResult& result, const std::
   std::vector<MatrixXd> roots(stages.size());
   roots.back() = result.last_root;
   for (std::size_t i = result.steps.size(); i-- > 0;) {
+    check_stop();
     const SmootherStage& stage = stages[i];
     const SmootherResult::NoiseRows& step = result.steps[i];
     const MatrixXd& next = roots[i + 1];

@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "trihedron/core/outlier_gate.hpp"
+#include "trihedron/records/stop.hpp"
 
 namespace trihedron::ground {
 namespace {
@@ -28,7 +29,7 @@ Eigen::Matrix<double, 3, 2> across(const Vector3d& h) {
   return columns;
 }
 
-/// The same measurements in no more rows than there are states, and one for what is left over.
+/// Reduces the rows of a stage to a triangle: no more rows than states, and one for the residual.
 void compress(SmootherStage& stage) {
   const Eigen::Index states = stage.H.cols();
   if (stage.H.rows() > states + 1) {
@@ -40,10 +41,10 @@ void compress(SmootherStage& stage) {
   }
 }
 
-/// White rows of fixes, those in a row that are near as one: their mean, by their weights.
-class NearbyFixes {
+/// Collects whitened rows of fixes; consecutive fixes closer than `reach` are replaced by their weighted mean.
+class FixMerger {
  public:
-  explicit NearbyFixes(Duration reach) : reach_(reach) {}
+  explicit FixMerger(Duration reach) : reach_(reach) {}
 
   void add(const ScreenedPass::Fix& fix, const PassProblem::FixRows& rows, double weight) {
     const bool first = sums_.empty() || fix.fix.t - sums_.back().t >= reach_ || sums_.back().head != fix.fix.head ||
@@ -61,7 +62,7 @@ class NearbyFixes {
     sum.y += square * rows.y;
   }
 
-  /// Returns what of the squares is not in the rows: the scatter about the means.
+  /// Writes the rows; returns the sum of squares about the means, which the rows do not contain.
   [[nodiscard]] double put_into(SmootherStage& stage, Eigen::Index states) const {
     stage.H.resize(size_, states);
     stage.y.resize(size_);
@@ -89,7 +90,7 @@ class NearbyFixes {
   double square_ = 0;
 };
 
-/// Small rotation across `from` that takes it to `to`.
+/// Small rotation, across `from`, that turns it into `to`.
 Vector3d turn(const Vector3d& from, const Vector3d& to) { return from.cross(to); }
 
 }  // namespace
@@ -124,7 +125,7 @@ PassProblem::PassProblem(const ScreenedPass& pass, PassSetup setup)
     }
   }
   add_fixes_until(Time::max());
-  // The coefficients stand for the end of the pass, and change by so much over it.
+  // The coefficients are those of the end of the pass; their change is that over the whole pass.
   setup_.on_board.no_change_at = nodes_.back().t;
   setup_.on_board.change_time_s = to_seconds(nodes_.back().t - nodes_.front().t);
   for (std::size_t i = 0; i < nodes_.size(); ++i) {
@@ -161,13 +162,13 @@ void PassProblem::step(const Node& from, const Node& to, Moment& moment, double&
   for (int k = 0; k < gyros_; ++k) {
     middle[k] = at_both[k] ? (from.h_b[k] + to.h_b[k]).normalized() : used[k] ? to.h_b[k] : Vector3d::UnitX();
   }
-  // The momenta in the middle of the step: those at its begin would be half a step behind all along.
+  // The momenta in the middle of the step; those at its begin would be half a step of drift behind.
   const Directions seen_c = in_c(moment.gyros, gyros_, middle);
   Directions h_middle = momenta(moment.gyros, gyros_);
   if (const auto at_begin = optimal_rotation(h_middle, seen_c, used)) {
     for (int k = 0; k < gyros_; ++k) {
       const Gyro& gyro = moment.gyros[k];
-      const Vector3d omega_b = drift_.rate(gyro.unbiased(middle[k]), part, gyro.drift_rad_s.data());
+      const Vector3d omega_b = drift_.rate(gyro.corrected(middle[k]), part, gyro.drift_rad_s.data());
       h_middle[k] = rotated<double>(h_middle[k], at_begin.value().raw() * (gyro.C_c_b * omega_b) * (dt_s / 2));
     }
   }
@@ -181,7 +182,7 @@ void PassProblem::step(const Node& from, const Node& to, Moment& moment, double&
   for (int k = 0; k < gyros_; ++k) {
     Gyro& gyro = moment.gyros[k];
     if (!used[k]) {  // its momentum turns all the same: what it would read at the attitude of the others
-      middle[k] = gyro.C_c_b.transpose() * (C_in_c.transpose() * gyro.h_in) + gyro.readout_bias;
+      middle[k] = gyro.reading_of(C_in_c.transpose() * gyro.h_in);
     }
     const Vector3d turned = precess(gyro, moment.since[k], drift_, C_in_c, middle[k], part, dt_s);
     if (to.after_gap) {
@@ -239,6 +240,7 @@ void PassProblem::go_along(const PassSolution& solution, const std::function<voi
   Moment moment;
   double unused = 0;
   for (std::size_t arc = 0; arc < arcs_.size(); ++arc) {
+    check_stop();
     begin_arc(solution, arc, moment);
     for (std::size_t i = arcs_[arc].begin; i < arcs_[arc].end; ++i) {
       if (i > arcs_[arc].begin) {
@@ -273,8 +275,8 @@ PassProblem::FixRows PassProblem::compare(const PassSolution& solution, const Mo
   const FixBySharedStates by_shared = fix_by_shared_states(setup, fix.fix, fix.rate_c);
   const Rot<In, C> C_fix = corrected(fix.fix, by_shared, solution.shared);
   // Linearised at the attitude by the gyros, which has no noise of the fix.
-  const FixComparison comparison = trihedron::compare(setup.layout, moment.gyros, C_fix.raw(), by_gyros.value().raw(),
-                                                      fix.h_b, fix.used, by_shared);
+  const FixComparison comparison =
+      trihedron::compare(setup.layout, moment.gyros, C_fix.raw(), by_gyros.value().raw(), fix.h_b, fix.used, by_shared);
   const auto about_now = rows_about_states_now<kFullCapacity.states>(setup.layout, comparison);
   rows.y = about_now.col(setup.layout.size());
   rows.H = by_states_of_arc(moment, about_now);
@@ -296,7 +298,7 @@ void PassProblem::add_prior(const PassSolution& solution, Linear& linear) const 
   const CalibrationSetup& setup = setup_.on_board;
   const int fewer = setup.layout.dynamic() - layout_.dynamic();  // of the states that move
   VectorXd sigma = VectorXd::Constant(layout_.size(), kUnknown_rad);
-  for (int state = layout_.readout_bias(0); state < layout_.size(); ++state) {
+  for (int state = layout_.readout(0); state < layout_.size(); ++state) {
     sigma(state) = prior_sigma_of_further_state(setup, state + fewer);
   }
   VectorXd apart = VectorXd::Zero(layout_.size());  // prior mean − solution
@@ -307,9 +309,7 @@ void PassProblem::add_prior(const PassSolution& solution, Linear& linear) const 
     apart.segment(layout_.drift(k), layout_.drift_size()) = drift.head(layout_.drift_size());
     apart.segment<3>(layout_.alignment(k)) =
         Rot<C, C>::assume(Matrix3d(prior.C_c_b * gyro.C_c_b.transpose())).log().raw();
-    if (layout_.further.readout_bias) {
-      apart.segment<3>(layout_.readout_bias(k)) = prior.readout_bias - gyro.readout_bias;
-    }
+    apart.segment(layout_.readout(k), layout_.readout_size()) = prior.errors(layout_) - gyro.errors(layout_);
     if (layout_.further.coefficient_change) {
       apart.segment<Layout::kEq1>(layout_.change(k)) = drift.segment<Layout::kEq1>(layout_.change_column());
     }
@@ -389,6 +389,7 @@ PassProblem::Linear PassProblem::linearise(const PassSolution& solution) const {
   std::vector<double> nis_per_component;
   std::vector<std::size_t> fixes_until;
   for (std::size_t arc = 0; arc < arcs_.size(); ++arc) {
+    check_stop();
     begin_arc(solution, arc, moment);
     double extra_variance_rad2 = 0;
     for (std::size_t i = arcs_[arc].begin; i < arcs_[arc].end; ++i) {
@@ -413,7 +414,7 @@ PassProblem::Linear PassProblem::linearise(const PassSolution& solution) const {
       linear.stages[arc].m.setZero(layout_.dynamic());
     }
   }
-  // Far from the solution all fixes are off: what is far among them is an outlier.
+  // Far from the solution all fixes have large misfits: outliers are those far above the median.
   constexpr double kMedianOfFour = 0.84;  // of χ²/n; nearer to 1 for more
   double scale = 1;
   std::vector<double> sorted = nis_per_component;
@@ -424,19 +425,20 @@ PassProblem::Linear PassProblem::linearise(const PassSolution& solution) const {
   }
   std::size_t fix = 0;
   for (std::size_t arc = 0; arc < arcs_.size(); ++arc) {
-    NearbyFixes nearby(setup_.fixes_together);
+    check_stop();
+    FixMerger nearby(setup_.fixes_together);
     for (; fix < fixes_until[arc]; ++fix) {
       const auto& [its, rows] = fixes[fix];
       if (rows.y.size() == 0) {
         continue;
       }
-      // Its pull falls with the third power of the misfit beyond the gate.
+      // Its influence falls with the third power of the misfit beyond the gate.
       const double nis = rows.y.squaredNorm();
       const double gate = scale * gate_of_freedom(static_cast<int>(rows.y.size()), setup_.on_board.gate_nis);
-      linear.beyond_squares += nis > gate ? 2 * gate * (1 - gate / nis) : 0;
+      linear.cost_outside_rows += nis > gate ? 2 * gate * (1 - gate / nis) : 0;
       nearby.add(*its, rows, nis > gate ? gate / nis : 1);
     }
-    linear.beyond_squares += nearby.put_into(linear.stages[arc], layout_.size());
+    linear.cost_outside_rows += nearby.put_into(linear.stages[arc], layout_.size());
   }
   std::ranges::for_each(linear.stages, compress);
   put_noise(solution, setup_.noise(), linear);
@@ -448,8 +450,7 @@ void PassProblem::correct(const SmootherResult& found, PassSolution& solution) c
     const VectorXd& x = found.x[arc];
     PassSolution::Arc& its = solution.arcs[arc];
     for (int k = 0; k < gyros_; ++k) {
-      its.h_in[k] =
-          rotated<double>(its.h_in[k], across(its.h_in[k]) * x.segment<2>(layout_.direction(k))).normalized();
+      its.h_in[k] = rotated<double>(its.h_in[k], across(its.h_in[k]) * x.segment<2>(layout_.direction(k))).normalized();
       if (layout_.further.wandering_drift) {
         its.wandering_rad_s[k] += x.segment<3>(layout_.wandering(k));
       }

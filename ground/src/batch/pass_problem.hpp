@@ -1,6 +1,6 @@
 #pragma once
 /// A whole pass as one problem of least squares: the initial directions, the parameters, and where there is process
-/// noise the directions and the wandering drift all along.
+/// noise the directions and the wandering drift at the beginning of each arc.
 
 #include <Eigen/Core>
 #include <chrono>
@@ -17,7 +17,7 @@
 
 namespace trihedron::ground {
 
-/// What moves the momenta beside the drift model.
+/// What moves the momenta in addition to the drift model.
 struct ProcessNoise {
   double direction_random_walk_rad_sqrt_s = 0;  ///< per axis across each momentum
   GaussMarkov wandering_drift;                  ///< per case axis, where the layout has it
@@ -26,12 +26,12 @@ struct ProcessNoise {
 struct PassSetup {
   CalibrationSetup on_board;  ///< what the estimator on board is set up with; its layout has 3 components a direction
   Prior prior;
-  /// Samples are taken so far apart, or up to half as much again before a fix: the body turns little between them, and
+  /// Step of the prediction, up to half as long again before a fix; between the samples used the body turns little, and
   /// their noise is averaged in the end.
   Duration sample_step = std::chrono::seconds(1);
-  /// Fixes nearer than this count as one: what they show together, without what changes among them.
+  /// Fixes closer in time than this are merged into one; their differences are lost.
   Duration fixes_together{};
-  /// Process noise comes in so often, and after a gap.
+  /// Length of an arc; process noise is added at its end, and after a gap.
   Duration arc = std::chrono::seconds(60);
 
   /// The states of the batch: of each direction's error two components across the momentum, so that all of them have
@@ -46,7 +46,7 @@ struct PassSetup {
   }
 };
 
-/// Estimates of everything; momenta and wandering drift at the beginning of each arc.
+/// Estimates of all states; momenta and wandering drift at the beginning of each arc.
 struct PassSolution {
   Gyros gyros;          ///< their momenta mean nothing
   SharedStates shared;  ///< as in the layout
@@ -59,7 +59,7 @@ struct PassSolution {
 
 class PassProblem {
  public:
-  /// Refers to the pass. Needs a fix.
+  /// Keeps a reference to the pass, which needs a fix.
   PassProblem(const ScreenedPass& pass, PassSetup setup);
 
   [[nodiscard]] const PassSetup& setup() const { return setup_; }
@@ -78,17 +78,17 @@ class PassProblem {
     Eigen::MatrixXd prior;
     Eigen::VectorXd prior_y;
     std::vector<SmootherStage> stages;
-    /// What the process noise is put into, arc by arc but for the last.
+    /// Transition over each arc but the last, to which the process noise is added.
     struct ArcEnd {
       Eigen::MatrixXd A;  ///< without what is kept of the wandering drift
       double duration_s = 0;
       double extra_variance_rad2 = 0;  ///< for what steps too long for their readings may have missed
     };
     std::vector<ArcEnd> ends;
-    /// What counts beyond the squares of the rows: the scatter of fixes that count as one, and of outliers, whose rows
-    /// have less weight, so much that they are 2 g − g²/s together, s their NIS and g the gate: a worse one is not more
-    /// likely.
-    double beyond_squares = 0;
+    /// Part of the cost that the rows do not contain: the scatter of merged fixes about their means, and for outliers 2
+    /// g (1 − g/s) with s their NIS and g the gate, so that the cost of one is 2 g − g²/s (docs/mathematics.md, section
+    /// 12).
+    double cost_outside_rows = 0;
   };
   [[nodiscard]] Linear linearise(const PassSolution& solution) const;
   /// The same with other process noise than that of the setup.
@@ -96,22 +96,23 @@ class PassProblem {
 
   [[nodiscard]] Time begin_of(std::size_t arc) const { return nodes_[arcs_[arc].begin].t; }
 
-  /// Adds what smooth() found.
+  /// Adds the corrections that smooth() found.
   void correct(const SmootherResult& found, PassSolution& solution) const;
 
-  /// One time within an arc.
+  /// The state of the solution at one time of the pass, within an arc.
   struct Moment {
     std::size_t arc = 0;
     Time t{};
     const ScreenedPass::Fix* fix = nullptr;  ///< there, if any
-    Gyros gyros;  ///< as believed, with the momenta of this time and the wandering drift of the arc
+    Gyros gyros;  ///< estimates, with the momenta of this time and the wandering drift of the arc
     PerGyro<Sensitivity<kMaxDriftColumns>> since;     ///< the beginning of the arc
     PerGyro<Eigen::Matrix<double, 3, 2>> directions;  ///< there: φ by the two components across the momentum
   };
-  /// Goes along all samples, thinned, and fixes, in time order.
+  /// Visits all samples that are used, and all fixes, in time order.
   void go_along(const PassSolution& solution, const std::function<void(const Moment&)>& visit) const;
 
-  /// Components that a fix is compared in: how far each momentum read through it is off, by the states of its arc.
+  /// A fix compared with the momenta: components of the misfit, their noise, and their derivative by the states of its
+  /// arc.
   struct FixRows {
     Eigen::MatrixXd H;
     Eigen::VectorXd y;
@@ -119,7 +120,7 @@ class PassProblem {
   };
   [[nodiscard]] FixRows compare(const PassSolution& solution, const Moment& moment) const;
 
-  /// Whether it counts less than it would by its noise.
+  /// Whether its weight is reduced because it is beyond the gate.
   [[nodiscard]] bool is_outlier(const FixRows& rows) const;
 
   /// By the momenta and these readings.
@@ -128,12 +129,12 @@ class PassProblem {
   /// Rows about the states at a moment, as on board, as rows about those of its arc.
   using Rows = ComparedRows<kFullCapacity.states>;
   [[nodiscard]] Eigen::MatrixXd by_states_of_arc(const Moment& moment, Rows rows) const;
-  /// How the error of an attitude, c axes, depends on the states of the arc.
+  /// Derivative of the error of an attitude, c axes, by the states of the arc.
   [[nodiscard]] Eigen::MatrixXd attitude_by_states(const Moment& moment, const AttitudeByDirections& attitude,
                                                    const Directions& h_b) const;
 
  private:
-  /// Something to go along: a sample or a fix.
+  /// A sample or a fix.
   struct Node {
     Time t{};
     Directions h_b;

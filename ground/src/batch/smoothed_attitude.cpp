@@ -16,7 +16,7 @@ namespace {
 using Eigen::MatrixXd;
 using Eigen::Vector3d;
 
-/// The body moves like a cubic over some seconds to both sides; where it does not, over less.
+/// Half-widths of the fit, longest first; a shorter one is taken where a cubic does not fit over a longer one.
 constexpr std::array<Duration, 3> kReaches = {std::chrono::milliseconds(3000), std::chrono::milliseconds(1400),
                                               std::chrono::milliseconds(700)};
 
@@ -68,13 +68,11 @@ std::optional<SmoothedAttitude::At> SmoothedAttitude::at(const PassProblem::Mome
   if (!attitude) {
     return std::nullopt;
   }
-  const MatrixXd spread =
-      problem_.attitude_by_states(moment, attitude.value(), reading.h_b) * roots_[moment.arc];
+  const MatrixXd spread = problem_.attitude_by_states(moment, attitude.value(), reading.h_b) * roots_[moment.arc];
   Vector3d variance_rad2 = spread.rowwise().squaredNorm();
   for (int k = 0; k < problem_.layout().gyros; ++k) {
     const double noise_rad = problem_.setup().on_board.readout_noise_rad[k] * reading.noise_factor;
-    variance_rad2 +=
-        noise_rad * noise_rad * attitude.value().by_direction(k).rowwise().squaredNorm();
+    variance_rad2 += noise_rad * noise_rad * attitude.value().by_direction(k).rowwise().squaredNorm();
   }
   return At{attitude.value().C_in_c, variance_rad2.cwiseSqrt()};
 }
@@ -100,8 +98,8 @@ SmoothedCourse SmoothedAttitude::course() const {
     append(*attitude, moment.t, course.attitude);
     course.readings.t.push_back(moment.t);
     for (int k = 0; k < gyros; ++k) {
-      const Vector3d h_b = moment.gyros[k].C_c_b.transpose() *
-                           (attitude->C_in_c.raw().transpose() * moment.gyros[k].h_in);
+      const Vector3d h_b =
+          moment.gyros[k].C_c_b.transpose() * (attitude->C_in_c.raw().transpose() * moment.gyros[k].h_in);
       course.readings.h.insert(course.readings.h.end(), h_b.begin(), h_b.end());
     }
   });
@@ -127,7 +125,7 @@ AttitudeHistory SmoothedAttitude::between(const PassProblem::Moment& from, const
 }
 
 AttitudeHistory SmoothedAttitude::definitive() const {
-  constexpr std::size_t kTogether = 1000;  // a node takes some kilobytes
+  constexpr std::size_t kNodesAtOnce = 1000;  // a node takes some kilobytes
   AttitudeHistory whole;
   std::vector<PassProblem::Moment> nodes;
   const auto take = [&] {
@@ -145,7 +143,7 @@ AttitudeHistory SmoothedAttitude::definitive() const {
       nodes.back().t -= Duration{1};
     }
     nodes.push_back(moment);
-    if (nodes.size() > kTogether) {
+    if (nodes.size() > kNodesAtOnce) {
       take();
     }
   });

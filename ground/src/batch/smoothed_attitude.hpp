@@ -9,7 +9,7 @@
 
 namespace trihedron::ground {
 
-/// Readings at any time, by the samples round it together.
+/// Readings at any time, by a polynomial through the samples around it.
 class SmoothReadings {
  public:
   /// Refers to both.
@@ -21,7 +21,7 @@ class SmoothReadings {
     GyroMask used{};
     double noise_factor = 1;
   };
-  /// `otherwise` where no polynomial is what the body did; of the gyros that it uses.
+  /// Returns `otherwise` where no polynomial fits; only the gyros that it uses are fitted.
   [[nodiscard]] At at(Time t, const At& otherwise) const;
 
  private:

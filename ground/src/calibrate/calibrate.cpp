@@ -4,7 +4,7 @@
 
 #include <boost/math/distributions/chi_squared.hpp>
 #include <cmath>
-#include <future>
+#include <optional>
 #include <utility>
 
 #include "batch/pass_setup.hpp"
@@ -17,6 +17,7 @@
 #include "trihedron/ground/onboard/pipeline.hpp"
 #include "trihedron/ground/onboard/recorder.hpp"
 #include "trihedron/ground/onboard/replay.hpp"
+#include "trihedron/ground/tasks/on_all_cores.hpp"
 #include "trihedron/records/progress.hpp"
 #include "trihedron/records/run.hpp"
 
@@ -24,9 +25,9 @@ namespace trihedron::ground {
 namespace {
 
 /// Reports progress about a hundred times over a pass.
-class Meter {
+class ProgressMeter {
  public:
-  Meter(const Progress& progress, std::size_t steps)
+  ProgressMeter(const Progress& progress, std::size_t steps)
       : progress_(progress), steps_(steps), every_(std::max<std::size_t>(steps / 100, 1)) {}
   void step(const StepReport& report) {
     if (report.sample == SampleStatus::kNone) {
@@ -44,7 +45,7 @@ class Meter {
   std::size_t done_ = 0;
 };
 
-/// No fix started the filter: says what became of them.
+/// The error that no fix started the filter; says what became of the fixes.
 SetupError nothing_used(const std::vector<FixRecord>& fixes) {
   FixCounts counts;
   for (const FixRecord& fix : fixes) {
@@ -74,8 +75,9 @@ Calibration known_before(const PassSettings& settings, const CalibrationOptions&
   return before;
 }
 
-/// Beside the batch runs what flies, with a drift model that it has room for and without what only a whole pass shows.
-CalibrationOptions beside_the_batch(const PassSettings& settings, CalibrationOptions options) {
+/// Options of the on-board run at the time of the batch: without what only a whole pass shows, and with esg20 in place
+/// of a larger drift model.
+CalibrationOptions options_of_on_board_run(const PassSettings& settings, CalibrationOptions options) {
   options.estimator = Estimator::kInvariant;
   options.further_states[FurtherState::kCoefficientChange] = FurtherStateOptions::Choice::kOff;
   if (options.drift_model && options.drift_model->family == DriftModelId::Family::kVsh && !settings.prior) {
@@ -84,13 +86,13 @@ CalibrationOptions beside_the_batch(const PassSettings& settings, CalibrationOpt
   return options;
 }
 
-/// The batch, and how the drift models that were compared fly over what it found.
+/// The batch, and the open-loop errors of the drift models that were compared.
 struct Smoothed {
   Refinement refinement;
   std::vector<DriftModelForecast> drift_models;
 };
 
-/// `decision` keeps what was screened, which the result refers to.
+/// `decision` keeps the screened pass, to which the result refers.
 Smoothed smooth(const Pass& pass, Decision& decision) {
   if (!decision.screened) {
     decision.screened = screen(pass, decision.options);
@@ -105,31 +107,35 @@ Smoothed smooth(const Pass& pass, Decision& decision) {
 CalibrationRun calibrate(const Pass& pass, const CalibrationOptions& options, const Progress& progress) {
   Decision decision = decide(pass, options);
   const bool by_batch = decision.options.estimator == Estimator::kBatch;
-  std::future<Smoothed> smoothed;  // on a core of its own
-  if (by_batch) {
-    smoothed = std::async(std::launch::async, [&] { return smooth(pass, decision); });
-  }
-  Pipeline pipeline(pass.settings, by_batch ? beside_the_batch(pass.settings, decision.options) : decision.options);
+  Pipeline pipeline(pass.settings,
+                    by_batch ? options_of_on_board_run(pass.settings, decision.options) : decision.options);
   Recorder recorder;
-  Meter meter(progress, pass.gyro.size());
-  replay(pass, pipeline, [&](const StepReport& report, const GyroSample& /*sample*/) {
-    recorder.add(report, pipeline);
-    meter.step(report);
-  });
-  CalibrationRun run = std::move(recorder).take();
-  if (!pipeline.started()) {
-    throw nothing_used(run.fixes);
+  ProgressMeter meter(progress, pass.gyro.size());
+  const auto on_board = [&] {
+    replay(pass, pipeline, [&](const StepReport& report, const GyroSample& /*sample*/) {
+      recorder.add(report, pipeline);
+      meter.step(report);
+    });
+    if (!pipeline.started()) {
+      throw nothing_used(recorder.run().fixes);
+    }
+  };
+  std::optional<Smoothed> smoothed;
+  if (by_batch) {
+    side_by_side(on_board, [&] { smoothed.emplace(smooth(pass, decision)); });
+  } else {
+    on_board();
   }
+  CalibrationRun run = std::move(recorder).take();
   run.options = decision.options;
   run.evidence = decision.evidence;
   run.known_before = known_before(pass.settings, decision.options);
   const Statistics recorded = run.calibration.statistics;
   run.calibration = pipeline.calibration();
   run.calibration.statistics = recorded;
-  if (by_batch) {
-    Smoothed found = smoothed.get();
-    run.drift_models = std::move(found.drift_models);
-    std::move(found.refinement).put_into(run);
+  if (smoothed) {
+    run.drift_models = std::move(smoothed->drift_models);
+    std::move(smoothed->refinement).put_into(run);
   }
   for (const FixRecord& fix : run.fixes) {
     ++run.fix_counts[fix.status];
@@ -142,7 +148,7 @@ CalibrationRun calibrate(const Pass& pass, const CalibrationOptions& options, co
 NavigationRun navigate(const Pass& pass, const CalibrationOptions& options, const Progress& progress) {
   Pipeline pipeline(pass.settings, settled_before(pass.settings, options));
   NavigationRecorder recorder;
-  Meter meter(progress, pass.gyro.size());
+  ProgressMeter meter(progress, pass.gyro.size());
   replay(pass, pipeline, [&](const StepReport& report, const GyroSample& /*sample*/) {
     recorder.add(report, pipeline);
     meter.step(report);

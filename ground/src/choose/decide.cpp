@@ -16,22 +16,25 @@
 #include "model/orbital_rate.hpp"
 #include "model/prior.hpp"
 #include "trihedron/ground/model/setup_error.hpp"
+#include "trihedron/ground/tasks/on_all_cores.hpp"
 
 namespace trihedron::ground {
 namespace {
 
 using Choice = FurtherStateOptions::Choice;
 
-/// Whose evidence a trial with everything shows. That of wandering drift comes with the search for the noise.
-constexpr std::array kJudgedByTrial = {FurtherState::kClockOffset, FurtherState::kOrbitalError,
-                                       FurtherState::kReadoutBias, FurtherState::kCoefficientChange};
+/// Whether a trial with everything shows the evidence of a state: of those that are a choice all but the wandering
+/// drift, which the search for the noise decides.
+bool is_judged_by_trial(const FurtherStateRow& row) {
+  return !row.key.empty() && row.state != FurtherState::kWanderingDrift;
+}
 
-/// Odds of 20 to 1.
-constexpr double kStrong = 3;
-/// Pairs of fixes that give the noise of the star tracker within some percent.
-constexpr std::size_t kEnough = 1000;
+/// Log of the odds, 20 to 1, from which on a state or model is accepted.
+constexpr double kLogOddsToAccept = 3;
+/// Smallest number of pairs of fixes from which the noise of the star tracker is estimated, to some percent.
+constexpr std::size_t kLeastFixPairs = 1000;
 
-/// 1-sigma of the star tracker by the changes of a trial: of outliers only the median feels. Needs changes.
+/// 1-sigma of the star tracker by the changes of a trial; the median makes it robust against outliers. Needs changes.
 Eigen::Vector3d star_tracker_noise_rad(const std::vector<Eigen::Vector3d>& changes_rad) {
   constexpr double kMedianOfNormal = 0.6744897501960817;
   Eigen::Vector3d noise_rad;
@@ -46,16 +49,16 @@ Eigen::Vector3d star_tracker_noise_rad(const std::vector<Eigen::Vector3d>& chang
   return noise_rad;
 }
 
-/// The noise of the star tracker that the changes show, where it is not what was told.
+/// The noise of the star tracker that the changes show, where it differs from the settings.
 std::optional<Eigen::Vector3d> other_star_tracker_noise(const Pass& pass,
                                                         const std::vector<Eigen::Vector3d>& changes_rad) {
-  const Eigen::Vector3d& told = pass.settings.star_tracker_noise_rad;
+  const Eigen::Vector3d& given = pass.settings.star_tracker_noise_rad;
   const Eigen::Vector3d found = star_tracker_noise_rad(changes_rad);
-  const bool other = ((found - told).array().abs() > kNotable * told.array()).any();
+  const bool other = ((found - given).array().abs() > kNoiseTolerance * given.array()).any();
   return other ? std::optional(found) : std::nullopt;
 }
 
-/// The noise that an earlier calibration went by, but for the least that is told.
+/// Takes the noise that an earlier calibration used, but not less than the settings say.
 void use_noise(const CalibrationNoise& noise, CalibrationOptions& options) {
   options.direction_random_walk_rad_sqrt_s =
       std::max(options.direction_random_walk_rad_sqrt_s, noise.direction_random_walk_rad_sqrt_s);
@@ -68,7 +71,7 @@ void use_noise(const CalibrationNoise& noise, CalibrationOptions& options) {
   }
 }
 
-/// As in the prior calibration.
+/// Settles open choices as the prior calibration has them.
 CalibrationOptions as_before(CalibrationOptions options, const Calibration& prior) {
   for (const FurtherStateRow& row : kFurtherStates) {
     // How the coefficients changed over an earlier pass says nothing of this one.
@@ -90,9 +93,9 @@ void refuse_prior_of_others(const PassSettings& settings, const CalibrationOptio
     return;
   }
   if (prior->gyros.size() != settings.gyros.size()) {
-    throw SetupError(
-        fmt::format("the earlier calibration has {} gyros; the pass has {}", prior->gyros.size(), settings.gyros.size()),
-        "use a calibration of these gyros");
+    throw SetupError(fmt::format("the earlier calibration has {} gyros; the pass has {}", prior->gyros.size(),
+                                 settings.gyros.size()),
+                     "use a calibration of these gyros");
   }
   for (std::size_t k = 0; k < prior->gyros.size(); ++k) {
     const GyroCalibration& gyro = prior->gyros[k];
@@ -105,28 +108,28 @@ void refuse_prior_of_others(const PassSettings& settings, const CalibrationOptio
   }
 }
 
-/// The smallest than which none is strongly more likely; none of none.
+/// The smallest model such that no larger one is more likely by kLogOddsToAccept; nullptr of an empty list.
 const Forecast* best_of(const std::vector<Forecast>& forecasts) {
   double most = -std::numeric_limits<double>::infinity();
   const Forecast* best = nullptr;
   for (auto forecast = forecasts.rbegin(); forecast != forecasts.rend(); ++forecast) {
     most = std::max(most, forecast->log_likelihood);
-    best = forecast->log_likelihood >= most - kStrong ? &*forecast : best;
+    best = forecast->log_likelihood >= most - kLogOddsToAccept ? &*forecast : best;
   }
   return best;
 }
 
-/// Turns the choices that are left open, and the drift model, by what a trial with everything shows.
+/// Decides the open choices and the drift model by the evidence of a trial with all states free.
 void settle_states(const Trial& everything, const CalibrationOptions& asked, Decision& decision) {
   decision.evidence.clear();
   const auto settle = [&](std::optional<FurtherState> state, double log_bayes_factor) {
-    decision.evidence.push_back({state, log_bayes_factor, log_bayes_factor > kStrong});
+    decision.evidence.push_back({state, log_bayes_factor, log_bayes_factor > kLogOddsToAccept});
     return decision.evidence.back().accepted;
   };
-  for (const FurtherState state : kJudgedByTrial) {
-    if (asked.further_states[state] == Choice::kAuto) {
-      const bool on = settle(state, everything.log_evidence(state));
-      decision.options.further_states[state] = on ? Choice::kOn : Choice::kOff;
+  for (const FurtherStateRow& row : kFurtherStates) {
+    if (is_judged_by_trial(row) && asked.further_states[row.state] == Choice::kAuto) {
+      const bool on = settle(row.state, everything.log_evidence(row.state));
+      decision.options.further_states[row.state] = on ? Choice::kOn : Choice::kOff;
     }
   }
   decision.forecasts = everything.forecasts();
@@ -137,11 +140,13 @@ void settle_states(const Trial& everything, const CalibrationOptions& asked, Dec
   }
 }
 
-/// Everything on that is on or may be, and the largest drift model.
+/// The options with every state free that is on or open, and with the largest drift model.
 CalibrationOptions with_everything(CalibrationOptions options, const CalibrationOptions& asked,
                                    const DriftModelId& largest_model) {
-  for (const FurtherState state : kJudgedByTrial) {
-    options.further_states[state] = asked.further_states[state] == Choice::kOff ? Choice::kOff : Choice::kOn;
+  for (const FurtherStateRow& row : kFurtherStates) {
+    if (is_judged_by_trial(row)) {
+      options.further_states[row.state] = asked.further_states[row.state] == Choice::kOff ? Choice::kOff : Choice::kOn;
+    }
   }
   options.drift_model = largest_model;
   return options;
@@ -166,30 +171,34 @@ CalibrationOptions wandering_like(const NoiseFit& walking, CalibrationOptions op
   return options;
 }
 
-/// Where the noise is more than was told the states were settled by one that is too small: again, by what it is when
-/// they are all free, and whether it wanders. `everything`: with the noise as told; `walk`: the noise of what was
-/// settled.
-void decide_beside_noise(const Pass& pass, const Screened& screened, const CalibrationOptions& asked,
-                         const DriftModelId& largest_model, bool wandering_is_open, Trial everything,
-                         const NoiseFit& walk, Decision& decision) {
+/// The noise is larger than the settings say, so the states were decided with too small a noise. Decides again, with
+/// the noise found while all states are free, and decides whether the drift wanders. `everything`: the trial with all
+/// states free and the noise of the settings; `walk`: the noise found with the states decided first.
+void decide_again_with_more_noise(const Pass& pass, const Screened& screened, const CalibrationOptions& asked,
+                                  const DriftModelId& largest_model, bool wandering_is_open, Trial everything,
+                                  const NoiseFit& walk, Decision& decision) {
   CalibrationOptions& options = decision.options;
   const CalibrationOptions free = with_everything(options, asked, largest_model);
   const CalibrationOptions like = wandering_like(walk, free);
-  std::future<std::pair<Trial, NoiseFit>> wandering_trial;
-  if (wandering_is_open) {
-    wandering_trial = std::async(std::launch::async, [&] {
-      Trial trial(pass, screened, like);
-      const NoiseFit likely = with_most_likely_wandering(trial, like);
-      return std::pair(std::move(trial), likely);
-    });
-  }
-  const NoiseFit walking = with_most_likely_walk(everything, free);
+  // Waited for only where a walk was accepted; otherwise it does not matter whether the trial failed.
+  std::packaged_task<std::pair<Trial, NoiseFit>()> try_wandering([&] {
+    Trial trial(pass, screened, like);
+    const NoiseFit likely = with_most_likely_wandering(trial, like);
+    return std::pair(std::move(trial), likely);
+  });
+  NoiseFit walking;
+  side_by_side([&] { walking = with_most_likely_walk(everything, free); },
+               [&] {
+                 if (wandering_is_open) {
+                   try_wandering();
+                 }
+               });
   std::optional<Evidence> wandering;
   std::optional<ProcessNoise> wanders;
-  if (wandering_is_open && walking.gain > kStrong) {
-    auto [trial, likely] = wandering_trial.get();
+  if (wandering_is_open && walking.gain > kLogOddsToAccept) {
+    auto [trial, likely] = try_wandering.get_future().get();
     const double gain = likely.log_likelihood - walking.log_likelihood;
-    wandering = Evidence{FurtherState::kWanderingDrift, gain, gain > kStrong};
+    wandering = Evidence{FurtherState::kWanderingDrift, gain, gain > kLogOddsToAccept};
     if (wandering->accepted) {
       wanders = likely.noise;
       everything = std::move(trial);
@@ -210,7 +219,7 @@ void decide_beside_noise(const Pass& pass, const Screened& screened, const Calib
   }
 }
 
-/// Nothing to judge by.
+/// There are no usable fixes to decide by: what is open is off.
 void leave_out_what_is_open(CalibrationOptions& options) {
   for (const FurtherStateRow& row : kFurtherStates) {
     Choice& choice = options.further_states[row.state];
@@ -219,7 +228,7 @@ void leave_out_what_is_open(CalibrationOptions& options) {
   options.drift_model = options.drift_model.value_or(kEsg7);
 }
 
-/// By what the pass itself shows.
+/// Decides by the data of the pass.
 Decision decide_by_pass(const Pass& pass, const Screened& screened, const CalibrationOptions& asked,
                         const DriftModelId& largest_model) {
   Decision decision{asked, {}, {}, {}};
@@ -230,7 +239,7 @@ Decision decide_by_pass(const Pass& pass, const Screened& screened, const Calibr
   }
   Trial everything(pass, screened, with_everything(options, asked, largest_model));
   const std::vector<Eigen::Vector3d> changes = everything.changes_rad();
-  options.find_noise = asked.find_noise && changes.size() >= kEnough;
+  options.find_noise = asked.find_noise && changes.size() >= kLeastFixPairs;
   if (!options.find_noise) {
     settle_states(everything, asked, decision);
     return decision;
@@ -242,9 +251,9 @@ Decision decide_by_pass(const Pass& pass, const Screened& screened, const Calibr
   settle_states(everything, asked, decision);
   Trial decided(pass, screened, options);
   const NoiseFit walking = with_most_likely_walk(decided, options);
-  if (walking.gain > kStrong) {
-    decide_beside_noise(pass, screened, asked, largest_model, wandering_is_open, std::move(everything), walking,
-                        decision);
+  if (walking.gain > kLogOddsToAccept) {
+    decide_again_with_more_noise(pass, screened, asked, largest_model, wandering_is_open, std::move(everything),
+                                 walking, decision);
   } else {
     use_walk(walking.noise, options);
   }
@@ -261,13 +270,23 @@ DriftModelId largest_to_compare(const CalibrationOptions& asked) {
   return vsh(is_vsh ? std::max(int{asked.drift_model->degree}, kFirstDegree) : kFirstDegree);
 }
 
-/// By one degree, where there is one.
+/// The model of one degree more, where there is one.
 std::optional<DriftModelId> larger_model(const DriftModelId& model) {
   const bool is_there = model.family == DriftModelId::Family::kVsh && model.degree < DriftModelId::kMaxDegree;
   return is_there ? std::optional(vsh(model.degree + 1)) : std::nullopt;
 }
 
-/// Estimator paper has nothing to choose; how the coefficients change over a pass is looked for in the whole of it only.
+/// Turns on what star trackers and rotors usually have; the priors allow for its absence.
+CalibrationOptions with_usual_states(CalibrationOptions options) {
+  options.drift_model = options.drift_model.value_or(kEsg20);
+  for (const FurtherState state : {FurtherState::kClockOffset, FurtherState::kOrbitalError}) {
+    Choice& choice = options.further_states[state];
+    choice = choice == Choice::kAuto ? Choice::kOn : choice;
+  }
+  return options;
+}
+
+/// Estimator paper has nothing to choose; the change of the coefficients is searched for by a whole pass only.
 void settle_by_estimator(CalibrationOptions& asked) {
   if (asked.estimator == Estimator::kPaper) {
     asked.drift_model = asked.drift_model.value_or(kEsg7);
@@ -288,11 +307,11 @@ CalibrationOptions settled_before(const PassSettings& settings, CalibrationOptio
   }
   settle_by_estimator(options);
   refuse_prior_of_others(settings, options);
-  if (prior && options.estimator != Estimator::kPaper) {
-    if (prior->noise && options.find_noise) {
+  if (options.estimator != Estimator::kPaper) {
+    if (prior && prior->noise && options.find_noise) {
       use_noise(*prior->noise, options);
     }
-    options = as_before(options, *prior);
+    options = prior ? as_before(options, *prior) : with_usual_states(options);
   }
   options.find_noise = false;
   leave_out_what_is_open(options);
@@ -316,9 +335,10 @@ Decision decide(const Pass& pass, const CalibrationOptions& asked_for) {
   Decision decision{asked, {}, {}, {}};
   CalibrationOptions& options = decision.options;
   options.find_noise = false;
-  const bool states_are_settled = asked.drift_model && std::ranges::none_of(kJudgedByTrial, [&](FurtherState state) {
-                                    return asked.further_states[state] == Choice::kAuto;
-                                  });
+  const bool states_are_settled =
+      asked.drift_model && std::ranges::none_of(kFurtherStates, [&](const FurtherStateRow& row) {
+        return is_judged_by_trial(row) && asked.further_states[row.state] == Choice::kAuto;
+      });
   if (states_are_settled && !asked.find_noise) {
     leave_out_what_is_open(options);
     return decision;
@@ -332,7 +352,7 @@ Decision decide(const Pass& pass, const CalibrationOptions& asked_for) {
   for (;;) {
     Decision decided = decide_by_pass(pass, screened, asked, largest_model);
     const std::optional<DriftModelId> larger = larger_model(largest_model);
-    // None where the pass is too short for any.
+    // There are no forecasts where the pass is too short.
     if (!larger || decided.forecasts.empty() || best_of(decided.forecasts) != &decided.forecasts.back()) {
       if (pass.settings.gyros.size() == 2) {  // which of more gyros is at fault is judged by the noise found
         decided.screened = std::move(screened);

@@ -3,23 +3,24 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
-#include <future>
+#include <iterator>
 #include <map>
 #include <optional>
 #include <utility>
 #include <vector>
 
+#include "trihedron/ground/tasks/on_all_cores.hpp"
+
 namespace trihedron::ground {
 namespace {
 
-/// Goes uphill over process noise on a grid, each by two numbers.
+/// Search for the largest likelihood over a grid of process noise, two integers per point.
 class Search {
  public:
   using Point = std::pair<int, int>;
   using At = std::function<ProcessNoise(double, int)>;
 
-  /// From the best of `starts`, (0, 0) among them, to the best of its neighbours, and so on, within the bounds; all
-  /// included.
+  /// Goes from the best of `starts`, which contains (0, 0), to the best of its neighbours and so on, within the bounds.
   Search(const Trial& trial, At at, const std::vector<Point>& starts, const Point& lowest, const Point& highest)
       : trial_(trial), linear_(trial.linear()), at_(std::move(at)) {
     gather_constants(linear_.prior, linear_.prior_y, linear_.stages);
@@ -40,25 +41,23 @@ class Search {
     const double peak = tried_.at(best_);
     const auto below = tried_.find({i - 1, j});
     const auto above = tried_.find({i + 1, j});
-    double beside = 0;
+    double offset = 0;
     if (below != tried_.end() && above != tried_.end()) {
-      beside = (above->second - below->second) / (4 * peak - 2 * below->second - 2 * above->second);
+      offset = (above->second - below->second) / (4 * peak - 2 * below->second - 2 * above->second);
     }
-    return {at_(i + beside, j), peak, peak - tried_.at({0, 0})};
+    return {at_(i + offset, j), peak, peak - tried_.at({0, 0})};
   }
 
  private:
   void look_at(const std::vector<Point>& points) {
-    std::map<Point, std::future<double>> runs;
-    for (const Point& point : points) {
-      if (!tried_.contains(point) && !runs.contains(point)) {
-        runs.emplace(point, std::async(std::launch::async, [this, noise = at_(point.first, point.second)] {
-                       return trial_.log_likelihood(linear_, noise);
-                     }));
-      }
-    }
-    for (auto& [point, run] : runs) {
-      tried_[point] = run.get();
+    std::vector<Point> untried;
+    std::ranges::copy_if(points, std::back_inserter(untried),
+                         [this](const Point& point) { return !tried_.contains(point); });
+    const std::vector<double> found = on_all_cores(untried.size(), [&](std::size_t i) {
+      return trial_.log_likelihood(linear_, at_(untried[i].first, untried[i].second));
+    });
+    for (std::size_t i = 0; i < untried.size(); ++i) {
+      tried_[untried[i]] = found[i];
     }
     best_ = std::ranges::max_element(tried_, [](const auto& a, const auto& b) { return a.second < b.second; })->first;
   }
@@ -74,19 +73,19 @@ GaussMarkov wandering_of(const CalibrationOptions& options) {
   return {options.further_states.wandering_drift_rad_s, to_seconds(options.further_states.wandering_time)};
 }
 
-/// Where the model is wrong there is more than one maximum.
+/// Starting levels; several, because with an incomplete model the likelihood has more than one maximum.
 const std::vector<Search::Point> kAllLevels = {{0, 0}, {3, 0}, {6, 0}, {9, 0}};
 
-/// The trial with the process noise that makes the pass most likely, and that: outliers are told apart by it.
-NoiseFit settled(Trial& trial, const Search::At& at, const std::vector<Search::Point>& starts,
-               const Search::Point& lowest, const Search::Point& highest) {
+/// Alternates the search for the noise and a refit with it, because the noise decides which fixes are outliers.
+NoiseFit converge(Trial& trial, const Search::At& at, const std::vector<Search::Point>& starts,
+                  const Search::Point& lowest, const Search::Point& highest) {
   constexpr int kRounds = 3;
   NoiseFit likely;
   for (int round = 0; round < kRounds; ++round) {
     const ProcessNoise before = likely.noise;
     likely = Search(trial, at, starts, lowest, highest).best();
     trial.refit(likely.noise);
-    const auto same = [](double a, double b) { return std::abs(a - b) <= kNotable * b; };
+    const auto same = [](double a, double b) { return std::abs(a - b) <= kNoiseTolerance * b; };
     if (same(before.direction_random_walk_rad_sqrt_s, likely.noise.direction_random_walk_rad_sqrt_s) &&
         same(before.wandering_drift.sigma, likely.noise.wandering_drift.sigma) &&
         same(before.wandering_drift.time_s, likely.noise.wandering_drift.time_s)) {
@@ -106,25 +105,26 @@ NoiseFit with_most_likely_walk(Trial& trial, const CalibrationOptions& options) 
     noise.direction_random_walk_rad_sqrt_s *= std::pow(2, level);
     return noise;
   };
-  return settled(trial, at, kAllLevels, {0, 0}, {9, 0});
+  return converge(trial, at, kAllLevels, {0, 0}, {9, 0});
 }
 
 NoiseFit with_most_likely_wandering(Trial& trial, const CalibrationOptions& options) {
   constexpr double kShortest_s = 400;
   constexpr double kLongest_s = 3 * 3600;
-  const ProcessNoise told{options.direction_random_walk_rad_sqrt_s, wandering_of(options)};
-  const auto at = [told](double level, int time) {
-    ProcessNoise noise = told;
+  const ProcessNoise given{options.direction_random_walk_rad_sqrt_s, wandering_of(options)};
+  const auto at = [given](double level, int time) {
+    ProcessNoise noise = given;
     noise.wandering_drift.sigma *= std::pow(2, level);
     noise.wandering_drift.time_s *= std::pow(3, time);
     return noise;
   };
   const auto times_within = [&](double limit_s) {
-    return static_cast<int>(std::floor(std::abs(std::log(told.wandering_drift.time_s / limit_s)) / std::log(3.0) + 1e-6));
+    return static_cast<int>(
+        std::floor(std::abs(std::log(given.wandering_drift.time_s / limit_s)) / std::log(3.0) + 1e-6));
   };
-  const int shorter = told.wandering_drift.time_s > kShortest_s ? times_within(kShortest_s) : 0;
-  const int longer = told.wandering_drift.time_s < kLongest_s ? times_within(kLongest_s) : 0;
-  return settled(trial, at, {{0, 0}, {2, 0}, {4, 0}, {6, 0}}, {-3, -shorter}, {9, longer});
+  const int shorter = given.wandering_drift.time_s > kShortest_s ? times_within(kShortest_s) : 0;
+  const int longer = given.wandering_drift.time_s < kLongest_s ? times_within(kLongest_s) : 0;
+  return converge(trial, at, {{0, 0}, {2, 0}, {4, 0}, {6, 0}}, {-3, -shorter}, {9, longer});
 }
 
 }  // namespace trihedron::ground

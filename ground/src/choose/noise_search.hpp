@@ -5,16 +5,16 @@
 
 namespace trihedron::ground {
 
-/// Below it, process noise is lost in the readout: where a search for more begins.
+/// Process noise below this is lost in the readout noise; a search begins here.
 inline constexpr double kLeastWalk_rad_sqrt_s = 3e-9;
-/// A relative difference of noise that is more than chance.
-inline constexpr double kNotable = 0.1;
+/// Relative difference below which two noise levels count as equal.
+inline constexpr double kNoiseTolerance = 0.1;
 
 /// Process noise, and how likely it makes the pass.
 struct NoiseFit {
   ProcessNoise noise;
   double log_likelihood = 0;
-  double gain = 0;  ///< over that of (0, 0)
+  double gain = 0;  ///< log likelihood over that of the starting point of the grid
 };
 
 /// A random walk, by factors of two above that of the options; drift that wanders as these say. Leaves the trial

@@ -1,5 +1,5 @@
 #pragma once
-/// What a pass says about a choice of states, in a fraction of the time of a calibration: what decisions are made by.
+/// A quick fit of a pass with one choice of states, by which the choices are compared.
 
 #include <Eigen/Core>
 #include <vector>
@@ -17,21 +17,21 @@ class Trial {
   /// Refers to `screened`, which needs a fix. Throws SetupError.
   Trial(const Pass& pass, const Screened& screened, const CalibrationOptions& options);
 
-  /// Again, with other noise.
+  /// Fits again, with other noise.
   void refit(const ProcessNoise& noise);
 
   [[nodiscard]] const PassProblem::Linear& linear() const { return found_.linear; }
-  /// `linear`: that of linear(), however its rows are put together.
+  /// `linear`: that of linear(), also after gather_constants().
   [[nodiscard]] double log_likelihood(const PassProblem::Linear& linear, const ProcessNoise& noise) const {
     return ground::log_likelihood(problem_, found_.before, linear, noise);
   }
 
   /// ln of the Bayes factor of these states, which the trial must have; not of drift that wanders.
   [[nodiscard]] double log_evidence(FurtherState state) const;
-  /// Of its drift model and those that it contains.
+  /// Forecasts by its drift model and those that it contains.
   [[nodiscard]] std::vector<Forecast> forecasts() const;
 
-  /// How the difference of the first star tracker from the gyros changes from fix to fix, about c x, y, z: all that is
+  /// Change of the difference between the first star tracker and the gyros from fix to fix, about c x, y, z: everything
   /// slow cancels.
   [[nodiscard]] std::vector<Eigen::Vector3d> changes_rad() const;
 

@@ -11,13 +11,14 @@
 #include "trihedron/core/setup.hpp"
 #include "trihedron/core/telemetry.hpp"
 #include "trihedron/ground/model/setup_error.hpp"
+#include "trihedron/records/stop.hpp"
 
 namespace trihedron::ground {
 namespace {
 
 constexpr int kPair = 2;
 
-/// The drift turns by nanoradians over such a step: the midpoint rule loses nothing even in a slew.
+/// Step of the integration. The drift turns by nanoradians over it: the midpoint rule loses nothing even in a slew.
 constexpr Duration kStep = std::chrono::seconds(3);
 
 /// Directions at any time, interpolated between samples; asked for in ascending order.
@@ -59,14 +60,14 @@ class Readings {
   std::size_t next_ = 0;
 };
 
-/// A gyro flown with what is known of it.
-struct Flown {
+/// A gyro propagated with given parameters.
+struct OpenLoopGyro {
   Gyro gyro;
   DriftModel drift;
 };
 
 struct Pair {
-  std::vector<Flown> gyros;
+  std::vector<OpenLoopGyro> gyros;
 
   [[nodiscard]] Result<AttitudeByDirections, DirectionsFault> attitude(const Directions& h_b) const {
     Directions h_in;
@@ -105,6 +106,7 @@ AttitudeHistory fly_open_loop(const Pass& pass, Time t, const std::vector<GyroCa
   Time last_t = t;
   auto epoch = std::ranges::lower_bound(epochs, t);
   for (Time now = t; epoch != epochs.end(); now = std::min(now + kStep, *epoch)) {
+    check_stop();
     if (const std::optional<Directions> h_b = readings.at(now)) {
       Directions middle = *h_b;
       for (int k = 0; k < kPair && last; ++k) {

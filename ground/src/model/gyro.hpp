@@ -7,11 +7,11 @@
 
 namespace trihedron::ground {
 
-/// What is believed of one gyro: momentum, drift columns as in the layout, alignment, readout bias.
+/// Estimates of one gyro: momentum, drift columns as in the layout, alignment, errors of the readout.
 using Gyro = GyroModel<kMaxDriftColumns>;
 using Gyros = PerGyro<Gyro>;
 
-/// What is known of the gyros before a pass; the momenta mean nothing.
+/// Prior of the gyros; their momenta have no meaning.
 struct Prior {
   Gyros gyros;                 ///< means
   Eigen::MatrixXd covariance;  ///< of κ and δ, gyro by gyro

@@ -13,15 +13,18 @@
 namespace trihedron::ground {
 namespace {
 
-/// The largest sigma that an earlier calibration has left of any component, or else that of the table.
-double prior_sigma(FurtherState state, const std::optional<Calibration>& earlier) {
+/// Prior sigma of the change of a coefficient over a pass, as a fraction of that of the coefficient.
+constexpr double kChangeSigma = 0.05;
+
+/// The largest sigma of a component of the bias that an earlier calibration has left; 0 without it.
+double bias_sigma_before(const std::optional<Calibration>& earlier) {
   double sigma = 0;
-  if (earlier && state == FurtherState::kReadoutBias) {
+  if (earlier) {
     for (const FurtherEstimate& estimate : earlier->further) {
-      sigma = estimate.parameter.is_further(state) ? std::max(sigma, estimate.sigma) : sigma;
+      sigma = estimate.parameter.is_further(FurtherState::kReadoutBias) ? std::max(sigma, estimate.sigma) : sigma;
     }
   }
-  return sigma > 0 ? sigma : row_of(state).prior_sigma;
+  return sigma;
 }
 
 }  // namespace
@@ -43,11 +46,11 @@ Layout layout_of(const PassSettings& settings, const CalibrationOptions& options
   const FurtherStateOptions& states = options.further_states;
   Layout layout;
   layout.drift_model = *options.drift_model;
-  layout.further = {.wandering_drift = states.is_on(FurtherState::kWanderingDrift),
-                    .readout_bias = states.is_on(FurtherState::kReadoutBias),
-                    .coefficient_change = states.is_on(FurtherState::kCoefficientChange),
-                    .clock_offset = states.is_on(FurtherState::kClockOffset),
-                    .orbital_error = states.is_on(FurtherState::kOrbitalError)};
+  for (const FurtherStateKind& kind : kFurtherStateKinds) {
+    if (kind.flag != nullptr) {
+      layout.further.*kind.flag = states.is_on(kind.state);
+    }
+  }
   if (options.estimator == Estimator::kPaper) {  // of two gyros and one star tracker, whatever else there is
     if (!(layout == Layout{})) {
       throw SetupError("estimator paper has eq. (1) alone, and no further states",
@@ -81,15 +84,14 @@ CalibrationSetup setup_of(const PassSettings& settings, const CalibrationOptions
 
   const FurtherStateOptions& states = options.further_states;
   setup.wandering_drift = {states.wandering_drift_rad_s, to_seconds(states.wandering_time)};
-  setup.readout_bias_sigma = prior_sigma(FurtherState::kReadoutBias, settings.prior);
-  setup.coefficient_change_sigma_rad_s =
-      prior_sigma(FurtherState::kCoefficientChange, settings.prior) * settings.gyros[0].drift_common_sigma_rad_s;
+  if (const double sigma = bias_sigma_before(settings.prior); sigma > 0) {
+    setup.further_sigma[FurtherState::kReadoutBias] = sigma;
+  }
+  setup.further_sigma[FurtherState::kCoefficientChange] = kChangeSigma * settings.gyros[0].drift_common_sigma_rad_s;
   setup.no_change_at = settings.epoch;
   if (settings.duration > Duration::zero()) {
     setup.change_time_s = to_seconds(settings.duration);
   }
-  setup.clock_offset_sigma_s = prior_sigma(FurtherState::kClockOffset, settings.prior);
-  setup.orbital_error_sigma_rad = prior_sigma(FurtherState::kOrbitalError, settings.prior);
   setup.orbital_rate_rad_s = options.orbital_rate_rad_s.value_or(setup.orbital_rate_rad_s);
   setup.orbital_phase_zero = settings.epoch;
 
@@ -119,33 +121,14 @@ CorrectionPolicy policy_of(const CorrectionOptions& options) {
 }
 
 std::vector<ParameterId> further_parameters(const Layout& layout) {
-  using Owner = FurtherStateRow::Owner;
-  const auto is_there = [&](FurtherState state) {
-    switch (state) {
-      case FurtherState::kClockOffset:
-        return layout.further.clock_offset;
-      case FurtherState::kOrbitalError:
-        return layout.further.orbital_error;
-      case FurtherState::kStarTrackerAlignment:
-        return layout.star_trackers > 1;
-      case FurtherState::kReadoutBias:
-        return layout.further.readout_bias;
-      case FurtherState::kCoefficientChange:
-        return layout.further.coefficient_change;
-      case FurtherState::kWanderingDrift:
-        break;
-    }
-    return false;  // does not last
-  };
   std::vector<ParameterId> parameters;
   for (const FurtherStateRow& row : kFurtherStates) {
-    // The first star tracker has no alignment of its own.
-    const int begin = row.owner == Owner::kFurtherStarTracker ? 1 : 0;
-    const int end = row.owner == Owner::kFurtherStarTracker ? layout.star_trackers
-                    : row.owner == Owner::kGyro             ? layout.gyros
-                                                            : 1;
-    for (int owner = begin; is_there(row.state) && owner < end; ++owner) {
-      for (int component = 0; component < row.size; ++component) {
+    if (!layout.has(row.state) || row.components.empty()) {  // not there, or does not last
+      continue;
+    }
+    const Layout::Owners owners = layout.owners(row.state);
+    for (int owner = owners.begin; owner < owners.end; ++owner) {
+      for (int component = 0; component < kind_of(row.state).size; ++component) {
         parameters.push_back(ParameterId::further(row.state, static_cast<std::size_t>(owner), component));
       }
     }
@@ -154,39 +137,20 @@ std::vector<ParameterId> further_parameters(const Layout& layout) {
 }
 
 int state_of(const Layout& layout, const ParameterId& parameter) {
-  const int owner = parameter.owner;
-  const int first = [&] {
-    switch (parameter.further_state) {
-      case FurtherState::kClockOffset:
-        return layout.clock_offset();
-      case FurtherState::kOrbitalError:
-        return layout.orbital_error();
-      case FurtherState::kStarTrackerAlignment:
-        return layout.star_tracker(owner);
-      case FurtherState::kReadoutBias:
-        return layout.readout_bias(owner);
-      case FurtherState::kCoefficientChange:
-        return layout.change(owner);
-      case FurtherState::kWanderingDrift:
-        break;
-    }
-    return layout.wandering(owner);
-  }();
-  return first + parameter.component;
+  return layout.first(parameter.further_state, parameter.owner) + parameter.component;
 }
 
 double value_of(const Layout& layout, const Gyros& gyros, const SharedStates& shared, const ParameterId& parameter) {
   const Gyro& gyro = gyros[parameter.owner];
-  switch (parameter.further_state) {
-    case FurtherState::kReadoutBias:
-      return gyro.readout_bias(parameter.component);
-    case FurtherState::kCoefficientChange:
-      return gyro.drift_rad_s(layout.change_column() + parameter.component);
-    case FurtherState::kWanderingDrift:
-      return gyro.drift_rad_s(layout.wandering_column() + parameter.component);
-    default:
-      return shared(state_of(layout, parameter) - layout.shared());
+  const int state = state_of(layout, parameter);
+  if (parameter.further_state == FurtherState::kWanderingDrift) {
+    return gyro.drift_rad_s(layout.wandering_column() + parameter.component);
   }
+  if (state < layout.change(0)) {
+    return gyro.errors(layout)(state - layout.readout(parameter.owner));
+  }
+  return state < layout.shared() ? gyro.drift_rad_s(layout.change_column() + parameter.component)
+                                 : shared(state - layout.shared());
 }
 
 }  // namespace trihedron::ground

@@ -13,11 +13,9 @@ AngleRow angle_row(const PassProblem& problem, const PassProblem::Moment& moment
     const double sign = k == 0 ? 1 : -1;
     row.middleCols<3>(layout.direction(k)) = sign * normal_in.transpose();
     row.middleCols<3>(layout.alignment(k)) = -sign * normal_c.transpose();
-    if (layout.further.readout_bias) {
-      const Eigen::Vector3d& other = h_c[1 - k];
-      row.middleCols<3>(layout.readout_bias(k)) =
-          (other - h_c[k] * h_c[k].dot(other)).transpose() * gyros[k].C_c_b;
-    }
+    const Eigen::Vector3d& other = h_c[1 - k];
+    const Eigen::RowVector3d by_reading = (other - h_c[k] * h_c[k].dot(other)).transpose();
+    row.middleCols(layout.readout(k), layout.readout_size()) = by_readout_errors(layout, by_reading, gyros[k], h_b[k]);
   }
   return {gyros[0].h_in.dot(gyros[1].h_in) - h_c[0].dot(h_c[1]), problem.by_states_of_arc(moment, row),
           normal_c.norm()};

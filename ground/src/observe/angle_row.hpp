@@ -9,7 +9,7 @@ namespace trihedron::ground {
 struct AngleRow {
   double z1 = 0;
   Eigen::RowVectorXd by_states;
-  double noise_factor = 0;  ///< 1-sigma of z1 over that of a direction cosine of both together
+  double noise_factor = 0;  ///< 1-sigma of z1 over the root sum square of the direction-cosine sigmas of the two gyros
 };
 [[nodiscard]] AngleRow angle_row(const PassProblem& problem, const PassProblem::Moment& moment, const Directions& h_b);
 

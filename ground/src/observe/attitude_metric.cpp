@@ -15,7 +15,7 @@ namespace {
 using Eigen::Matrix3d;
 using Eigen::MatrixXd;
 
-/// Gauss's points, of equal weight, for angles that are evenly distributed within the limits: exact to the third power.
+/// Gauss points of equal weight for angles that are uniformly distributed within the limits: exact to the third power.
 std::array<Matrix3d, 4> slews(const Mission& mission) {
   const double roll = mission.max_roll_rad * std::numbers::inv_sqrt3;
   const double pitch = mission.max_pitch_rad * std::numbers::inv_sqrt3;
@@ -29,7 +29,7 @@ std::array<Matrix3d, 4> slews(const Mission& mission) {
 Directions read_after(const Matrix3d& slew, const Gyros& gyros, int count, const Directions& h_b) {
   Directions turned = h_b;
   for (int k = 0; k < count; ++k) {
-    turned[k] = gyros[k].C_c_b.transpose() * (slew.transpose() * gyros[k].in_c(h_b[k])) + gyros[k].readout_bias;
+    turned[k] = gyros[k].reading_of(slew.transpose() * gyros[k].in_c(h_b[k]));
   }
   return turned;
 }
@@ -57,7 +57,7 @@ MatrixXd attitude_metric(const PassProblem& problem, const PassSolution& solutio
       return;
     }
     if (!started || moment.t - corrected >= mission.correction_interval) {
-      // The momenta are set so that the fix does not disagree.
+      // At a correction the momenta are set such that the residual of the fix is zero.
       const MatrixXd H = problem.compare(solution, moment).H;
       if (H.rows() < directions) {
         return;

@@ -13,8 +13,8 @@
 namespace trihedron::ground {
 namespace {
 
-/// What takes part with less than a tenth of the square is not named.
-constexpr double kNamed = 0.1;
+/// Least squared share of a block in a combination for it to be named.
+constexpr double kLeastShareNamed = 0.1;
 /// Axes within 15° have the same name.
 constexpr double kSameAxis = 0.966;
 
@@ -73,7 +73,7 @@ std::string ParameterBlocks::in_words(const Eigen::VectorXd& direction, const Ei
   std::string text;
   for (const Block& block : blocks_) {
     const Eigen::VectorXd own = direction(block.rows);
-    if (own.squaredNorm() < kNamed) {
+    if (own.squaredNorm() < kLeastShareNamed) {
       continue;
     }
     text += (text.empty() ? "" : ", with ") + block.name;
@@ -82,7 +82,7 @@ std::string ParameterBlocks::in_words(const Eigen::VectorXd& direction, const Ei
       text += " about " + axis_name(axis_c, rotation) + ", against its initial direction";
     } else if (!block.parameters.empty()) {
       std::vector<std::string> named;
-      const double least = std::min(kNamed, own.cwiseAbs2().maxCoeff());
+      const double least = std::min(kLeastShareNamed, own.cwiseAbs2().maxCoeff());
       for (Eigen::Index i = 0; i < own.size(); ++i) {
         if (own(i) * own(i) >= least) {
           named.push_back(block.parameters[static_cast<std::size_t>(i)]);
@@ -96,7 +96,7 @@ std::string ParameterBlocks::in_words(const Eigen::VectorXd& direction, const Ei
 
 Eigen::VectorXd ParameterBlocks::named(Eigen::VectorXd direction) const {
   for (const Block& block : blocks_) {
-    if (direction(block.rows).squaredNorm() < kNamed) {
+    if (direction(block.rows).squaredNorm() < kLeastShareNamed) {
       direction(block.rows).setZero();
     }
   }
@@ -104,8 +104,9 @@ Eigen::VectorXd ParameterBlocks::named(Eigen::VectorXd direction) const {
 }
 
 bool ParameterBlocks::is_alignment(const Eigen::VectorXd& direction) const {
-  return std::ranges::all_of(
-      blocks_, [&](const Block& block) { return block.is_alignment || direction(block.rows).squaredNorm() < kNamed; });
+  return std::ranges::all_of(blocks_, [&](const Block& block) {
+    return block.is_alignment || direction(block.rows).squaredNorm() < kLeastShareNamed;
+  });
 }
 
 }  // namespace trihedron::ground

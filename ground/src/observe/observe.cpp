@@ -28,8 +28,7 @@ constexpr std::size_t kTimes = 20;
 
 /// In the order of the layout.
 std::vector<ParameterId> constants_of(const Layout& layout) {
-  std::vector<ParameterId> constants =
-      drift_and_alignment(layout.drift_model, static_cast<std::size_t>(layout.gyros));
+  std::vector<ParameterId> constants = drift_and_alignment(layout.drift_model, static_cast<std::size_t>(layout.gyros));
   std::vector<ParameterId> further = further_parameters(layout);
   std::ranges::sort(further, {}, [&](const ParameterId& parameter) { return state_of(layout, parameter); });
   constants.insert(constants.end(), further.begin(), further.end());
@@ -79,7 +78,7 @@ BodyRotation mean_rotation(const std::vector<ScreenedPass::Fix>& fixes) {
   return rotation;
 }
 
-/// As if at each fix only one reading were used.
+/// The problem as if only one reading were used at each fix.
 ScreenedPass with_single_readings(ScreenedPass pass) {
   for (ScreenedPass::Fix& fix : pass.fixes) {
     fix.noise_factor = 1;
@@ -115,7 +114,7 @@ void add_angles(const PassProblem& problem, const ScreenedPass& pass, const Pass
     sample = std::lower_bound(sample, pass.samples.end(), moment.t,
                               [](const ScreenedPass::Sample& s, Time t) { return s.t < t; });
     if (moment.fix == nullptr && sample != pass.samples.end() && sample->used[0] && sample->used[1]) {
-      // It stands for those since the last one.
+      // One row represents all samples since the last one.
       const double samples = std::max(std::round(to_seconds(moment.t - before) / to_seconds(gyro_period)), 1.0);
       const AngleRow row = angle_row(problem, moment, sample->h_b);
       rows.emplace_back(row.by_states * (std::sqrt(samples) / (row.noise_factor * noise_rad)));
@@ -147,7 +146,7 @@ std::vector<std::size_t> ends_of_parts(std::size_t stages) {
   return ends;
 }
 
-/// What makes one linearisation of the pass.
+/// A pass linearised at its solution.
 struct Linearised {
   const PassProblem& problem;
   const BatchResult& found;
@@ -175,7 +174,7 @@ MatrixXd add_course(const Linearised& at, Observability& result) {
   return roots.back();
 }
 
-/// Names what is weak. `scaled_root`: of the information by the measurements, in units of the prior sigmas.
+/// Lists the weak combinations. `scaled_root`: of the information by the measurements, in units of the prior sigmas.
 void add_combinations(const MatrixXd& scaled_root, const BodyRotation& rotation, double tolerable_rad,
                       Observability& result) {
   const Eigen::JacobiSVD<MatrixXd> svd(scaled_root, Eigen::ComputeFullV);
@@ -186,7 +185,7 @@ void add_combinations(const MatrixXd& scaled_root, const BodyRotation& rotation,
   const MatrixXd scaled_metric =
       result.prior_sigma.asDiagonal() * result.attitude_metric * result.prior_sigma.asDiagonal();
   const ParameterBlocks blocks(result.parameters);
-  // Each kind apart: turned together, an unobservable combination could hide between weak ones.
+  // Each kind separately: rotated together, an unobservable combination could be spread over weak ones.
   const Index unobservable = (values.array() < Observability::kUnobservable).count();
   const Index weak = (values.array() < Observability::kWeak).count() - unobservable;
   for (const auto& [first, size] :
@@ -197,16 +196,17 @@ void add_combinations(const MatrixXd& scaled_root, const BodyRotation& rotation,
       const VectorXd direction = columns.col(i);
       const double s = (scaled_root * direction).norm();
       const double error_rad = std::sqrt(direction.dot(scaled_metric * direction) / (1 + s * s));
+      const bool is_unobservable = s < Observability::kUnobservable;
       result.weak.push_back({blocks.in_words(direction, result.prior_sigma, rotation), blocks.named(direction),
-                             blocks.is_alignment(direction), s, error_rad,
-                             s < Observability::kUnobservable && error_rad > tolerable_rad});
+                             blocks.is_alignment(direction), s, error_rad, is_unobservable,
+                             is_unobservable && error_rad > tolerable_rad});
     }
     std::sort(result.weak.begin() + begin, result.weak.end(),
               [](const Combination& a, const Combination& b) { return a.attitude_error_rad > b.attitude_error_rad; });
   }
 }
 
-/// Nothing is screened: samples and fixes of the first heads, in the order of their times.
+/// A pass without faults as if it had been screened: its samples and fixes, in the order of their times.
 ScreenedPass as_it_is(const Pass& pass, int gyros, int heads) {
   ScreenedPass screened;
   screened.gyros = gyros;

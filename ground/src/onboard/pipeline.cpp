@@ -32,15 +32,14 @@ SetupError error_of(SetupFault fault) {
   return {"there are more states than there is room for", "use fewer gyros, or a smaller drift model"};
 }
 
-/// With the room of another model, as many columns.
+/// Copies gyros into storage of another capacity.
 template <class To, class From>
 To with_room(const From& from, const Layout& layout) {
   To to;
   for (int k = 0; k < layout.gyros; ++k) {
+    static_cast<GyroReadout&>(to[k]) = from[k];
     to[k].h_in = from[k].h_in;
     to[k].drift_rad_s = from[k].drift_rad_s;
-    to[k].C_c_b = from[k].C_c_b;
-    to[k].readout_bias = from[k].readout_bias;
   }
   return to;
 }
@@ -81,7 +80,7 @@ struct Pipeline::Program {
     });
   }
 
-  /// The same of κ and δ, the coefficients as they are when so much of their change has been.
+  /// The same of κ and δ, with the coefficients at the time when this fraction of their change has taken place.
   [[nodiscard]] Roots parameter_root(double part_of_change) const {
     const Roots errors = error_root();
     Roots root = errors.middleRows(layout.drift(0), layout.parameters());
@@ -114,23 +113,20 @@ Pipeline& Pipeline::operator=(Pipeline&&) noexcept = default;
 Pipeline::~Pipeline() = default;
 
 std::span<const StepReport> Pipeline::feed(const GyroSample& sample) {
-  reports_.clear();
-  std::visit(
-      [&](auto& its) {
-        reports_.push_back(its->on_gyro(sample));
-        while (reports_.back().more_due) {
-          reports_.push_back(its->carry_on());
-        }
-      },
-      program_->on_board);
-  return reports_;
+  return report_all([&](auto& its) { return its.on_gyro(sample); });
 }
 
 std::span<const StepReport> Pipeline::feed(const StarFix& fix) {
+  return report_all([&](auto& its) { return its.on_fix(fix); });
+}
+
+// A step deals with one fix at most: goes on while another is due.
+template <class Step>
+std::span<const StepReport> Pipeline::report_all(const Step& step) {
   reports_.clear();
   std::visit(
       [&](auto& its) {
-        reports_.push_back(its->on_fix(fix));
+        reports_.push_back(step(*its));
         while (reports_.back().more_due) {
           reports_.push_back(its->carry_on());
         }

@@ -10,9 +10,9 @@
 namespace trihedron::ground {
 namespace {
 
-/// Between the paper's corrections.
+/// Time between recorded corrections: the correction interval of the paper.
 constexpr Duration kWatchedCorrections = std::chrono::minutes(90);
-/// So many fixes off in a row, by more than drift can make, are not single outliers.
+/// Consecutive fixes attributed to the star tracker from which on they are no single outliers.
 constexpr long kJumpLength = 20;
 
 void append(AttitudeHistory& history, Time t, const AttitudeSolution& solution) {
@@ -42,7 +42,7 @@ Correction correction_of(const Pipeline& pipeline, const AttitudeSolution& attit
   for (std::size_t k = 0; k < correction.calibrated.size(); ++k) {
     const GyroCalibration& calibrated = correction.calibrated[k];
     GyroCalibration& before = correction.known_before[k];
-    // Where the momentum is in the case, seen through what was known of it before.
+    // The momentum as read through the prior parameters at this attitude.
     const Eigen::Vector3d h_b =
         alignment_of(calibrated).transpose() * (C_in_c.transpose() * calibrated.momentum_in) + calibrated.readout_bias;
     before.momentum_in = C_in_c * (alignment_of(before) * without_bias(h_b, before.readout_bias));
@@ -143,7 +143,8 @@ void Recorder::add_sample(const StepReport& report, const Pipeline& pipeline) {
     }
   }
   gyros_before_ = report.gyros;
-  long& angle_looks = run_.calibration.statistics.angle_looks.emplace(run_.calibration.statistics.angle_looks.value_or(0));
+  long& angle_looks =
+      run_.calibration.statistics.angle_looks.emplace(run_.calibration.statistics.angle_looks.value_or(0));
   angle_looks += is_used(report.angles.status) ? 1 : 0;
   run_.fix_counts.lost_to_clock += report.fixes_dropped;
   if (pipeline.started() && report.sample == SampleStatus::kUsed) {

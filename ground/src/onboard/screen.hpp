@@ -1,5 +1,5 @@
 #pragma once
-/// What of a pass can be used, as the smallest on-board layout finds it.
+/// Screening of a pass: its usable samples and fixes, by the on-board step with the smallest layout.
 
 #include <vector>
 
@@ -8,13 +8,13 @@
 
 namespace trihedron::ground {
 
-/// What the smallest layout makes of a pass, with values to start from.
+/// Samples and fixes that the on-board step accepted, and its estimates as starting values.
 struct Screened {
   ScreenedPass pass;
   std::vector<GyroCalibration> first;
 };
 
-/// Runs the pass through the smallest layout that knows its prior. Throws SetupError.
+/// Runs the pass through the on-board step with the smallest layout that its prior allows. Throws SetupError.
 [[nodiscard]] Screened screen(const Pass& pass, const CalibrationOptions& asked);
 
 /// Options of the smallest layout: eq. (1), no further states.

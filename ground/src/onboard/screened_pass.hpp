@@ -1,5 +1,5 @@
 #pragma once
-/// What of a pass can be used: samples and fixes as the on-board cycle has screened them.
+/// The usable samples and fixes of a pass, as screened by the on-board step.
 
 #include <algorithm>
 #include <iterator>
@@ -26,10 +26,10 @@ struct ScreenedPass {
   };
   struct Fix {
     StarFix fix;
-    Directions h_b = unread();  ///< by several samples together
+    Directions h_b = unread();  ///< fitted through several samples
     GyroMask used{};
-    double noise_factor = 1;          ///< as of FixReadings
-    Eigen::Vector3d rate_c{0, 0, 0};  ///< of the body relative to `in`, rad/s
+    double noise_factor = 1;                ///< as of FixReadings
+    Eigen::Vector3d rate_c{0, 0, 0};        ///< of the body relative to `in`, rad/s
     Duration since_last = Duration::max();  ///< fix of the same star tracker
   };
 
@@ -48,7 +48,7 @@ struct ScreenedPass {
     }
   }
 
-  /// The next sample of the pass and what was made of it on board.
+  /// The next sample of the pass and the report on it.
   void add_sample(const GyroSample& its, const StepReport& report) {
     if (report.sample == SampleStatus::kUsedAfterClockSetBack) {
       clock_set_back = true;
@@ -69,7 +69,7 @@ struct ScreenedPass {
     }
   }
 
-  /// A fix and what was made of it on board.
+  /// A fix, by the report on it.
   void add_fix(const StepReport& report) {
     if (!report.compared) {
       return;

@@ -1,14 +1,16 @@
 #pragma once
-/// The gyro trihedron and the attitude it gives (mathematics: "Trihedron and attitude", paper Fig. 4).
+/// The gyro trihedron and the attitude it gives (docs/mathematics.md, section 5; paper Fig. 4).
 
 #include "trihedron/core/frames.hpp"
 #include "trihedron/core/result.hpp"
 
 namespace trihedron {
 
+/// Why directions give no attitude.
 enum class DirectionsFault { kNotFinite, kMomentaNearlyParallel, kTooFew };
 
-/// Momenta closer than asin(kMinSine) = 2.9° to one line give no attitude: errors about them grow 20 times.
+/// Pairs of momenta within asin(kMinSine) = 2.9° of being parallel or antiparallel give no attitude: errors about them
+/// would be amplified 20 times.
 inline constexpr double kMinSine = 0.05;
 
 /// The trihedron q1 q2 q3 on two momenta, seen from frame F: q2 = h1 (reference gyro), q1 = h1×h2 / |h1×h2|, q3 =
@@ -52,9 +54,9 @@ template <class S>
   return in.C_f_g * c.C_f_g.inverse();
 }
 
-/// Error of the attitude, true C_in_c = exp([ε×]) est with ε in the axes of F, by the errors of the two directions:
-/// ε = J (ρ1, ρ2), ρ_k the small rotation from the believed to the true direction k where `t` stands, minus the same on
-/// the other side. 3 × 6. Columns along each direction are zero. Its size grows with 1/sinθ.
+/// Error of the attitude, true C_in_c = exp([ε×]) est with ε in the axes of F, by the errors of the two directions: ε =
+/// J (ρ1, ρ2), ρ_k: small rotation from the estimated to the true direction k in the frame F, minus that in the other
+/// frame. 3 × 6. Columns along each direction are zero. Its size grows with 1/sinθ.
 template <class F, class S>
 [[nodiscard]] Eigen::Matrix<S, 3, 6> attitude_by_directions(const Trihedron<F, S>& t) {
   const Vector3<S> q1 = t.q1();

@@ -20,7 +20,7 @@ void solve_factorized(const Eigen::Ref<const Eigen::MatrixXd>& L, Eigen::Ref<Eig
 /// In place: rows b become L⁻¹ b.
 void solve_lower(const Eigen::Ref<const Eigen::MatrixXd>& L, RowsView b);
 
-/// The upper triangular root of the information in `covariance`, of which the lower triangle is looked at: rootᵀ root =
+/// The upper triangular root of the inverse of `covariance`, of which the lower triangle is used: rootᵀ root =
 /// covariance⁻¹. `root` is square and of the same size; below the diagonal it is left as it is. False, and `root` of no
 /// use, unless the covariance is positive definite and finite.
 [[nodiscard]] bool information_root(const Eigen::Ref<const Eigen::MatrixXd>& covariance, RowsView root);

@@ -2,6 +2,7 @@
 /// Vectors side by side, as many as a gyro's drift has columns: three rows in storage of fixed capacity.
 
 #include <Eigen/Core>
+#include <algorithm>
 #include <array>
 #include <cstddef>
 
@@ -22,14 +23,40 @@ struct ColumnsView {
     row(2)[column] = v.z();
   }
   [[nodiscard]] static constexpr int padded(int columns) { return (columns + kPad - 1) / kPad * kPad; }
+  void set_zero() const {
+    for (int i = 0; i < 3; ++i) {
+      std::fill(row(i), row(i) + padded(columns), 0.0);
+    }
+  }
+  void pad() const {
+    for (int i = 0; i < 3; ++i) {
+      std::fill(row(i) + columns, row(i) + padded(columns), 0.0);
+    }
+  }
+  /// The sum of the columns, each times its coefficient.
+  [[nodiscard]] Eigen::Vector3d times(const double* factors) const {
+    Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+    for (int j = 0; j < columns; ++j) {
+      for (int i = 0; i < 3; ++i) {
+        sum(i) += row(i)[j] * factors[j];
+      }
+    }
+    return sum;
+  }
 };
 
+/// Left as they are in memory unless made by zero().
 template <int Max>
 class Columns {
  public:
   static constexpr int kStride = ColumnsView::padded(Max);
   using Matrix = Eigen::Matrix<double, 3, Eigen::Dynamic, Eigen::RowMajor, 3, Max>;
 
+  [[nodiscard]] static Columns zero() {
+    Columns columns;
+    columns.data_.fill(0);
+    return columns;
+  }
   [[nodiscard]] ColumnsView view(int columns) { return {data_.data(), kStride, columns}; }
   /// The first `columns` of them.
   [[nodiscard]] auto first(int columns) const {
@@ -40,7 +67,7 @@ class Columns {
   }
 
  private:
-  std::array<double, static_cast<std::size_t>(3 * kStride)> data_{};
+  std::array<double, static_cast<std::size_t>(3 * kStride)> data_;
 };
 
 }  // namespace trihedron

@@ -1,5 +1,5 @@
 #pragma once
-/// Readings of several samples taken together: the body moves smoothly, the readout noise is white.
+/// Polynomials through the readings of several samples: the body moves smoothly, the readout noise is white.
 
 #include <Eigen/Core>
 
@@ -8,7 +8,7 @@
 
 namespace trihedron {
 
-/// Directions at one time, c or case axes as the samples, and how they change.
+/// Fitted directions and their rates at one time, in the axes of the samples.
 struct FittedDirections {
   Directions h_b;                   ///< unit
   Directions h_b_rate;              ///< 1/s, across h_b
@@ -24,7 +24,7 @@ struct FittedDirections {
 /// where not. With weights equal, the noise at the middle of 49 samples falls to 0.21 of a single one.
 class DirectionsFit {
  public:
-  /// Fewer samples than these are not more than a polynomial of this degree needs.
+  /// The smallest number of samples that a polynomial of this degree is fitted to.
   [[nodiscard]] static constexpr int least_samples(int degree) { return 2 * (degree + 1); }
 
   /// Of `samples` samples, the first and the last of them at these times; of the first `gyros` gyros.

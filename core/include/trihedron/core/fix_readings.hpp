@@ -7,12 +7,12 @@
 
 namespace trihedron {
 
-/// What a fix is compared with: the gyros at its time, by one sample or by several.
+/// Readings of the gyros at the time of a fix, by one sample or by several.
 struct FixReadings {
   Directions h_b;                   ///< unit, each in its case axes
   double noise_factor = 1;          ///< 1-sigma of h_b over that of a single reading
-  GyroMask used{};                  ///< the others' readings mean nothing
-  Eigen::Vector3d rate_c{0, 0, 0};  ///< of the body relative to `in`, rad/s; zero where one sample does not tell
+  GyroMask used{};                  ///< the readings of the others have no meaning
+  Eigen::Vector3d rate_c{0, 0, 0};  ///< of the body relative to `in`, rad/s; zero where there is only one sample
 };
 
 /// A fix, and the gyros at its time.

@@ -1,5 +1,5 @@
 #pragma once
-/// What is told of each fix.
+/// What the estimator reports of each fix.
 
 #include <Eigen/Core>
 
@@ -21,15 +21,17 @@ struct FixReport {
   Innovation innovation;  ///< −z of eq. (3); empty where the fix was not compared
   Covariance innovation_covariance;
   double nis = 0;               ///< innovation² over its covariance; as many degrees of freedom as components
-  double weight = 1;            ///< its noise was taken for 1/√weight of the nominal; 1 without Student's t
+  double weight = 1;            ///< the noise was assumed 1/√weight times the nominal one; 1 without Student's t
   int rejections_in_a_row = 0;  ///< or, with Student's t, fixes above the gate
-  bool jumped = false;          ///< the misfit came at once and is more than drift can make: put down to the star tracker
-  int odd_gyro = kNoGyro;  ///< index of the gyro that alone, and not the star tracker, explains why it was rejected
+  /// The misfit appeared within one fix and is larger than drift can cause: attributed to the star tracker.
+  bool jumped = false;
+  /// Index of the one gyro without which all others agree with the fix, where a fault of it explains the rejection.
+  int odd_gyro = kNoGyro;
 
   [[nodiscard]] bool used() const { return is_used(status); }
 };
 
-/// A look at the angles between the momenta alone.
+/// Report on one update by the angles between the momenta alone.
 struct AngleReport {
   FixStatus status = FixStatus::kNone;
   Time t{};
@@ -41,7 +43,7 @@ struct AngleReport {
 /// Weight of an innovation when its noise is not normal but Student's t with ν degrees of freedom: of normal noise with
 /// covariance R/w, w ~ Γ(ν/2, ν/2), the mean of w given an innovation of M components is (ν + M)/(ν + NIS). One step,
 /// at the NIS before the update: R is nearly all of its covariance once the filter has settled, and before that too
-/// large a weight is the safe side. Never above 1: what agrees too well is chance. ν = 0: always 1.
+/// large a weight is safe. Limited to 1: better agreement than expected is chance. ν = 0: always 1.
 [[nodiscard]] double student_t_weight(double freedom, double nis, int components);
 
 }  // namespace trihedron

@@ -149,7 +149,7 @@ class Rot {
   Raw raw_;
 };
 
-/// A reading, unit, without what is known of its bias; unit to the first order.
+/// A unit reading with its estimated bias removed; of unit length to first order.
 [[nodiscard]] inline Eigen::Vector3d without_bias(const Eigen::Vector3d& h_b, const Eigen::Vector3d& bias) {
   return h_b - (bias - h_b * h_b.dot(bias));
 }

@@ -1,5 +1,5 @@
 #pragma once
-/// Which gyros are to be believed, and when.
+/// Which gyros can be used, and over which times: detection of stuck readings and isolation of faulty gyros.
 
 #include <Eigen/Core>
 #include <chrono>
@@ -10,21 +10,22 @@
 
 namespace trihedron {
 
-/// Readings that stand still, and verdicts at fixes that were rejected.
+/// State of each gyro from repeated readings and from the fault suspicions of rejected fixes.
 class GyroHealth {
  public:
-  /// A live reading has noise: two alike may be chance or coarse telemetry, so many of them over a second are not.
+  /// Identical consecutive samples, and the time over which they came, that mean a stuck gyro: a live reading has
+  /// noise, and so many equal values are no chance even in coarse telemetry.
   static constexpr int kStuckSamples = 16;
   static constexpr Duration kStuckTime = std::chrono::seconds(1);
-  /// In a row, all naming the same gyro.
+  /// Consecutive suspicions of the same gyro after which it is isolated.
   static constexpr int kVerdicts = 5;
-  /// Stuck times closer together than this are taken for one.
+  /// Stuck stretches closer than this are merged.
   static constexpr Duration kMemory = std::chrono::seconds(10);
 
   GyroHealth() = default;
   explicit GyroHealth(int gyros) : gyros_(gyros) {}
 
-  /// In the order of time.
+  /// Takes the next sample; in time order.
   void look_at(const GyroSample& sample) {
     for (int k = 0; k < gyros_; ++k) {
       Readings& its = readings_[k];
@@ -46,7 +47,8 @@ class GyroHealth {
     }
   }
 
-  /// A fix, or a look at the angles: `odd_gyro` alone does not agree with the rest, or it is kNoGyro.
+  /// Takes the result of a fix, or of an update by the angles: the gyro that alone does not agree with the rest, or
+  /// kNoGyro.
   void judge(int odd_gyro) {
     verdicts_ = odd_gyro == suspect_ ? verdicts_ + 1 : 1;
     suspect_ = odd_gyro;
@@ -67,14 +69,12 @@ class GyroHealth {
   [[nodiscard]] PerGyro<GyroState> states() const {
     PerGyro<GyroState> states;
     for (int k = 0; k < gyros_; ++k) {
-      states[k] = isolated_[k]         ? GyroState::kIsolated
-                  : readings_[k].stuck ? GyroState::kStuck
-                                       : GyroState::kUsed;
+      states[k] = isolated_[k] ? GyroState::kIsolated : readings_[k].stuck ? GyroState::kStuck : GyroState::kUsed;
     }
     return states;
   }
 
-  /// The clock has been set: `t` is now.
+  /// The clock has been set back; `t` is the time now.
   void set_clock(Time t) {
     for (Readings& its : readings_) {
       its.since = t;
@@ -88,7 +88,7 @@ class GyroHealth {
     Eigen::Vector3d last = Eigen::Vector3d::Zero();
     int alike = 0;  ///< in a row
     bool stuck = false;
-    Time since{};   ///< of the first of them
+    Time since{};  ///< of the first of them
     Time stuck_from = Time::max();
     Time stuck_until = Time::min();
   };

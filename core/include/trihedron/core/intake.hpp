@@ -1,5 +1,6 @@
 #pragma once
-/// What of the telemetry is let in: the clock, readings that can be believed, and fixes that wait for their readings.
+/// What enters the on-board step: checks of the clock and of the readings, and the queue of fixes that wait for their
+/// readings.
 
 #include <array>
 #include <chrono>
@@ -12,23 +13,24 @@
 
 namespace trihedron {
 
+/// Decides what of the telemetry is used, and keeps fixes until their readings are there.
 class Intake {
  public:
-  /// A sample further ahead is believed only when the next one confirms it.
+  /// A time step larger than this is accepted only when the next sample confirms it.
   static constexpr Duration kMaxGap = std::chrono::hours(1);
-  /// Samples behind the present time, as many in a row, set it back.
+  /// Consecutive samples behind the present time after which the clock is taken to have been set back.
   static constexpr int kSetBackSamples = 16;
-  /// Fixes of 20 Hz wait for the readings to both sides of them.
+  /// Room for fixes at 20 Hz, each of which waits for the readings after it.
   static constexpr int kMaxWaitingFixes = 40;
 
   Intake() = default;
   explicit Intake(const CalibrationSetup& setup);
 
   enum class Clock : std::uint8_t { kRunsOn, kOutOfOrder, kSetBack };
-  /// What a sample of time `t` says about the clock; `latest`: of the last sample that was let in.
+  /// Checks the clock by the time `t` of a sample; `latest`: time of the last sample accepted.
   [[nodiscard]] Clock look_at_clock(Time t, const std::optional<Time>& latest);
 
-  /// Screens the readings of a sample whose time is right, and makes them unit.
+  /// Checks the readings of a sample whose time has been accepted, and normalises them.
   [[nodiscard]] SampleStatus screen(GyroSample& sample);
 
   /// Puts a fix among those that wait, in the order of their times. `taken_until`: fixes before it are too late.
@@ -40,7 +42,8 @@ class Intake {
   /// The estimator has used a fix.
   void mark_used(const StarFix& fix) { used_fix_t_[static_cast<std::size_t>(fix.head)] = fix.t; }
 
-  /// The clock has been set back to `t`. Returns the number of fixes that waited: nobody knows their time now.
+  /// The clock has been set back to `t`. Discards the fixes that wait, since their time is unknown now, and returns
+  /// their number.
   int set_clock(Time t);
 
   [[nodiscard]] GyroHealth& health() { return health_; }

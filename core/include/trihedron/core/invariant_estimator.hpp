@@ -1,6 +1,6 @@
 #pragma once
-/// Calibration filter on the invariant error: φ_k of each momentum in `in`, δ_k of each alignment in c. What no
-/// measurement can see stays unseen whatever the estimate is.
+/// Calibration filter on the invariant error: φ_k of each momentum in `in`, δ_k of each alignment in c. Directions that
+/// no measurement observes gain no information, wherever the estimate stands.
 
 #include <Eigen/Core>
 #include <array>
@@ -23,10 +23,10 @@ namespace trihedron {
 /// y_k = h_k × h_et,k = (φ_k − C_in_c δ_k + h_k × C_in_b Δb_k)⊥ + noise; dφ_k/dt = ω × φ_k + C_in_b B Δκ_k + (C_in_c
 /// δ_k) × ω. The attitude in H is not the tracker's but the fused one, so that noise does not pass for information. The
 /// terms of second order, ½ C_in_c δ_k × (φ_k − C_in_c δ_k) and ½ C_in_c δ_k × C_in_b B Δκ_k, count as noise of the
-/// size that the present covariance gives them (docs/adr/0004): early readings do not claim more than the first, wrong
-/// values allow.
+/// size that the present covariance gives them (docs/adr/0004), so that early measurements are not weighted more than
+/// their linearisation about the first, wrong values allows.
 ///
-/// Which states there are is told by the layout of the set-up; kCapacity is the room for them. One plain object, no
+/// Which states there are is given by the layout of the set-up; kCapacity is the room for them. One plain object, no
 /// heap.
 template <Capacity kCapacity>
 class InvariantEstimator {
@@ -44,7 +44,7 @@ class InvariantEstimator {
   using Rows3 = StateRows3<kMaxStates>;
 
   /// Makes it ready. `prior`: means of drift coefficients, alignments, biases; the momenta come from the first fix.
-  /// `covariance`: of κ and δ, gyro by gyro, rad/s and rad, positive definite; its lower triangle is looked at. Nothing
+  /// `covariance`: of κ and δ, gyro by gyro, rad/s and rad, positive definite; only its lower triangle is used. Nothing
   /// is changed where there is a fault.
   [[nodiscard]] std::optional<SetupFault> set_up(const CalibrationSetup& setup, const Gyros& prior,
                                                  const Eigen::Ref<const Eigen::MatrixXd>& covariance);
@@ -53,19 +53,19 @@ class InvariantEstimator {
   [[nodiscard]] const CalibrationSetup& setup() const { return setup_; }
   [[nodiscard]] const Layout& layout() const { return setup_.layout; }
   [[nodiscard]] int states() const { return layout().size(); }
-  /// The states that errors are told in: those before layout().shared().
+  /// The states in which errors are given: those before layout().shared().
   [[nodiscard]] Layout error_layout() const { return setup_.layout; }
   [[nodiscard]] const DriftModel& drift() const { return drift_; }
   [[nodiscard]] const Gyros& gyros() const { return gyros_; }
   /// Estimates of the shared states, in the order of the layout.
   [[nodiscard]] const SharedStates& shared() const { return shared_; }
-  /// Effect of the errors at the last fix on the present directions.
+  /// How errors at the last fix have changed the present directions.
   [[nodiscard]] const Sensitivities& since_fix() const { return since_fix_; }
   [[nodiscard]] const Information& information() const { return information_; }
-  /// What was known before.
+  /// Prior means.
   [[nodiscard]] const Gyros& prior_gyros() const { return prior_gyros_; }
 
-  /// Least squares, all gyros used alike.
+  /// Least squares, all gyros that are used weighted equally.
   [[nodiscard]] Result<AttitudeByDirections, DirectionsFault> attitude(const Gyros& gyros, const Directions& h_b,
                                                                        const GyroMask& used) const {
     return optimal_attitude(momenta(gyros, layout().gyros), in_c(gyros, layout().gyros, h_b), used);
@@ -90,29 +90,30 @@ class InvariantEstimator {
 
   /// The first fix starts the filter, each further one updates it.
   [[nodiscard]] FixReport correct(const StarFix& fix, const FixReadings& readings);
-  /// Update without a fix: by the angles between the momenta, which the readings give without the attitude. Says
-  /// nothing of it, nor of anything that turns all momenta alike. Never reopens: that is for the fixes. Needs
+  /// Update without a fix: by the angles between the momenta, which the readings give without the attitude. It gives no
+  /// information about the attitude or anything that rotates all momenta alike, and never reopens the filter. Needs
   /// started().
   [[nodiscard]] AngleReport check_angles(Time t, const FixReadings& readings);
 
  private:
   using Compared = ComparedRows<kMaxStates>;
-  /// A comparison as rows about the states, and how its innovation lies in what is expected of it.
+  /// A comparison as whitened rows about the states, with its innovation covariance and NIS.
   struct White {
-    Compared rows;           ///< (H, y), unit white noise
-    ComponentCovariance L;   ///< y of the comparison itself is L times that of the rows
+    Compared rows;                   ///< (H, y), unit white noise
+    ComponentCovariance L;           ///< y of the comparison itself is L times that of the rows
     ComponentCovariance covariance;  ///< of y in `rows`: 1 + H P Hᵀ
     double nis = 0;
   };
 
   /// 1-sigma of a direction of which nothing is known.
   static constexpr double kUnknown_rad = 1;
-  /// NIS above this multiple of the gate is a fault of a gyro, not of its drift model: a wrong model is noticed sooner.
-  static constexpr double kFaultOverGate = 4;
-  /// Of two gyros the loss of one is that of the attitude: only when no way of beginning anew has helped, and for more
-  /// than an alignment wrong by 5° in a body that turns at orbital rate adds to the misfit in the minute until a run of
-  /// rejections reopens the filter.
-  static constexpr double kFaultOfTwo_rad = 5.8e-3;  // 20′
+  /// NIS above this multiple of the gate indicates a gyro fault; errors of the drift model lead to a reopening well
+  /// before that.
+  static constexpr double kFaultGateRatio = 4;
+  /// With only two gyros, isolating one loses the attitude: done only after a restart from the prior has not helped,
+  /// and for a misfit larger than an alignment wrong by 5° in a body that turns at orbital rate adds to the misfit in
+  /// the minute until a run of rejections reopens the filter.
+  static constexpr double kFaultMisfitOfPair_rad = 5.8e-3;  // 20′
 
   [[nodiscard]] Eigen::Matrix3d covariance_of(Rows3 by_states) const;
   /// The attitude by gyros and fix together, weighted by what is known of both. Needs the covariance at the fix.
@@ -120,20 +121,25 @@ class InvariantEstimator {
                                                const Eigen::Matrix3d& R_c, const FixReadings& readings) const;
   void start(const Eigen::Matrix3d& C_in_c, const FixReadings& readings, const Eigen::Matrix3d& R_c,
              const FixBySharedStates& by_shared);
-  /// 1-sigma per axis of ½ a × b, what the linear model leaves out, by the covariances of a and b.
+  /// 1-sigma per axis of the second-order term ½ a × b, which the linear model leaves out, by the covariances of a and
+  /// b.
   [[nodiscard]] static double second_order_rad(const Eigen::Matrix3d& A, const Eigen::Matrix3d& B);
-  /// 1-sigma of the readings, each of which is shared by so many fixes.
+  /// 1-sigma of the readings, `noise_factor` times that of a single one.
   [[nodiscard]] PerGyro<double> readout_noise(double noise_factor) const;
-  /// The same with what the linear model leaves out, here for the n-th time in a row.
+  /// The same with the second-order term; n: consecutive measurements without a fix between them.
   [[nodiscard]] PerGyro<double> reading_noise(const Eigen::Matrix3d& C_linear, double noise_factor, int n) const;
+  /// Covariance of what is not known of the error of a further star tracker's fix, noise apart: its first fix finds its
+  /// alignment, and until then it is no attitude to linearise at.
+  [[nodiscard]] Eigen::Matrix3d misalignment_of(const StarFix& fix, const FixBySharedStates& by_shared) const;
   [[nodiscard]] White whitened(const FixComparison& comparison, const Eigen::Matrix3d& R_c,
                                const PerGyro<double>& noise_rad) const;
-  /// What is left of a comparison, with the noise of the readings alone, when the attitude is eliminated.
+  /// A comparison with the attitude eliminated and the noise of the readings alone: what the angles between the momenta
+  /// show.
   [[nodiscard]] White angles_of(const FixComparison& comparison, const PerGyro<double>& noise_rad) const;
   void put_innovation(White& white) const;
-  /// Whether a misfit that was rejected is too large for anything but a fault.
+  /// Whether a rejected misfit is so large that only a gyro fault explains it.
   [[nodiscard]] bool is_fault(double nis, double misfit_rad, int used) const;
-  /// The one gyro without which a comparison that does not agree does.
+  /// The one gyro whose removal makes a disagreeing comparison agree; kNoGyro where none or several do.
   template <class Agrees>
   [[nodiscard]] static int odd_gyro(const FixComparison& comparison, Agrees&& agrees);
   /// Whether the prior allows the drift coefficients and alignments that are estimated.
@@ -141,7 +147,8 @@ class InvariantEstimator {
   void update_to_now(const Eigen::Matrix3d& C_in_c);
   void update(const Compared& rows, double root_weight);
   void begin_stretch();
-  /// Of the readout noise, over that of readings which no other fix of this star tracker shares.
+  /// Factor on the readout noise because other fixes of this star tracker share its samples (docs/mathematics.md,
+  /// section 2).
   [[nodiscard]] double sharing_factor(const StarFix& fix) const;
 
   CalibrationSetup setup_;
@@ -154,12 +161,13 @@ class InvariantEstimator {
   Information prior_;  ///< without anything of the directions
   OutlierGate gate_;
   std::array<std::optional<Time>, kMaxStarTrackers> used_fix_t_;
-  PerGyro<double> second_order_rad_{};  ///< 1-sigma of what the linear model has left out since the start
+  PerGyro<double>
+      second_order_rad_{};  ///< 1-sigma of the second-order terms left out of the prediction since the start
   double time_since_fix_s_ = 0;
   double extra_variance_rad2_ = 0;
   int angles_since_fix_ = 0;
   int angle_rejections_in_a_row_ = 0;
-  bool begun_from_estimates_ = false;  ///< at the last restart
+  bool restarted_from_estimates_ = false;  ///< at the last restart
   bool started_ = false;
 };
 

@@ -1,20 +1,37 @@
 #pragma once
-/// Which states an estimator has, and where each of them stands. The one place that knows.
+/// Which states an estimator has, and the position of each; the only place where this is defined.
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
 
 #include "trihedron/core/drift_model.hpp"
 #include "trihedron/core/per_gyro.hpp"
-#include "trihedron/core/telemetry.hpp"
 
 namespace trihedron {
 
-/// What may be estimated beside directions, drift coefficients, alignments, and the alignments of star trackers beside
-/// the first.
+/// Star trackers that a spacecraft may have.
+inline constexpr int kMaxStarTrackers = 4;
+
+/// The kinds of states that may be estimated in addition to directions, drift coefficients and alignments, in the order
+/// of calibration.json.
+enum class FurtherState : std::uint8_t {
+  kClockOffset,           ///< τ of the star trackers: a fix stamped t holds the attitude at t + τ
+  kOrbitalError,          ///< of the first star tracker: exp([(p_s sin nt + p_c cos nt)×]) in c
+  kStarTrackerAlignment,  ///< of the star trackers other than the first; always there for those of the layout
+  kReadoutBias,           ///< of the direction cosines of each gyro
+  kCoefficientChange,     ///< of the coefficients of eq. (1) of each gyro, linear in time
+  kWanderingDrift,        ///< first-order Gauss–Markov drift about the case axes of each gyro
+};
+inline constexpr std::size_t kFurtherStateCount = 6;
+
+/// Which of them are estimated; alignments of star trackers are not a choice.
 struct FurtherStates {
-  bool wandering_drift = false;     ///< first-order Gauss–Markov drift about the case axes of each gyro
-  bool readout_bias = false;        ///< of the direction cosines of each gyro
-  bool coefficient_change = false;  ///< of the coefficients of eq. (1), evenly in time
-  bool clock_offset = false;        ///< τ of the star trackers: a fix stamped t holds the attitude at t + τ
-  bool orbital_error = false;       ///< of the first star tracker: exp([(p_s sin nt + p_c cos nt)×]) in c
+  bool wandering_drift = false;
+  bool readout_bias = false;
+  bool coefficient_change = false;
+  bool clock_offset = false;
+  bool orbital_error = false;
 
   friend constexpr bool operator==(const FurtherStates&, const FurtherStates&) = default;
 };
@@ -29,14 +46,15 @@ struct Layout {
   DriftModelId drift_model{};
   FurtherStates further{};
   int star_trackers = 1;
-  /// Components of the error of a direction: 3 in `in`, of which that along the momentum means nothing, or 2 across it.
+  /// Components of the error of a direction: 3 in `in`, of which that along the momentum has no effect of its own, or 2
+  /// across it.
   int direction_size = 3;
 
   friend constexpr bool operator==(const Layout&, const Layout&) = default;
 
   /// κ of one gyro.
   [[nodiscard]] constexpr int drift_size() const { return drift_model.size(); }
-  /// All that its drift is linear in: κ, the drift that wanders, the change of the coefficients of eq. (1).
+  /// Columns of its drift: κ, then the drift that wanders, then the change of the coefficients of eq. (1).
   [[nodiscard]] constexpr int drift_columns() const {
     return drift_size() + (further.wandering_drift ? 3 : 0) + (further.coefficient_change ? kEq1 : 0);
   }
@@ -49,15 +67,18 @@ struct Layout {
   [[nodiscard]] constexpr int dynamic() const { return wandering(further.wandering_drift ? gyros : 0); }
   [[nodiscard]] constexpr int drift(int gyro) const { return dynamic() + gyro * (drift_size() + 3); }
   [[nodiscard]] constexpr int alignment(int gyro) const { return drift(gyro) + drift_size(); }
-  [[nodiscard]] constexpr int readout_bias(int gyro) const { return drift(gyros) + 3 * gyro; }
-  [[nodiscard]] constexpr int change(int gyro) const {
-    return readout_bias(further.readout_bias ? gyros : 0) + kEq1 * gyro;
-  }
+  /// The errors of the direction cosines of one gyro, those that GyroReadout knows; so far the bias alone.
+  [[nodiscard]] constexpr int readout_size() const { return further.readout_bias ? 3 : 0; }
+  [[nodiscard]] constexpr int readout(int gyro) const { return drift(gyros) + readout_size() * gyro; }
+  [[nodiscard]] constexpr int readout_bias(int gyro) const { return readout(gyro); }
+  [[nodiscard]] constexpr int change(int gyro) const { return readout(gyros) + kEq1 * gyro; }
   /// The first state that the gyros share; those before it are the errors that move an attitude by the gyros.
   [[nodiscard]] constexpr int shared() const { return change(further.coefficient_change ? gyros : 0); }
-  [[nodiscard]] constexpr int clock_offset() const { return shared(); }
-  [[nodiscard]] constexpr int orbital_error() const { return shared() + (further.clock_offset ? 1 : 0); }
-  /// Alignment of star tracker 1, 2 … beside the first, which is 0.
+  [[nodiscard]] constexpr int clock_offset(int /*of the pass*/ = 0) const { return shared(); }
+  [[nodiscard]] constexpr int orbital_error(int /*of the pass*/ = 0) const {
+    return shared() + (further.clock_offset ? 1 : 0);
+  }
+  /// Alignment of star tracker 1, 2 …; the first, 0, has none, since its axes are c.
   [[nodiscard]] constexpr int star_tracker(int head) const {
     return orbital_error() + (further.orbital_error ? 6 : 0) + 3 * (head - 1);
   }
@@ -66,9 +87,75 @@ struct Layout {
   [[nodiscard]] constexpr int shared_size() const { return size() - shared(); }
   /// κ and δ of all gyros: what calibration.json lists.
   [[nodiscard]] constexpr int parameters() const { return drift(gyros) - dynamic(); }
+
+  /// Whether states of this kind are there.
+  [[nodiscard]] constexpr bool has(FurtherState state) const;
+  /// Who has a set of components of its own: gyros or star trackers from `begin` up to `end`, or 0 for the whole pass.
+  struct Owners {
+    int begin = 0;
+    int end = 1;
+  };
+  [[nodiscard]] constexpr Owners owners(FurtherState state) const;
+  /// Position of the first component that an owner has.
+  [[nodiscard]] constexpr int first(FurtherState state, int owner) const;
 };
 
-/// The room that an estimator has: no Layout needs more than the one it is made for.
+/// What the library has to know of a kind of further states.
+struct FurtherStateKind {
+  /// What has a set of the components of its own.
+  enum class Owner : std::uint8_t { kPass, kGyro, kFurtherStarTracker };
+
+  FurtherState state;
+  bool FurtherStates::*flag;  ///< null: not a choice
+  Owner owner;
+  int size;                         ///< components of each owner
+  int (Layout::*first)(int) const;  ///< position of those of an owner
+  /// Default 1-sigma of each component before anything is measured, in rad, rad/s or s. 0: CalibrationSetup has a
+  /// member of its own for it.
+  double prior_sigma;
+};
+
+/// One row for each kind, in the order of FurtherState.
+inline constexpr std::array<FurtherStateKind, kFurtherStateCount> kFurtherStateKinds = {{
+    {FurtherState::kClockOffset, &FurtherStates::clock_offset, FurtherStateKind::Owner::kPass, 1, &Layout::clock_offset,
+     0.1},
+    {FurtherState::kOrbitalError, &FurtherStates::orbital_error, FurtherStateKind::Owner::kPass, 6,
+     &Layout::orbital_error, 1e-4},
+    {FurtherState::kStarTrackerAlignment, nullptr, FurtherStateKind::Owner::kFurtherStarTracker, 3,
+     &Layout::star_tracker, 0},
+    {FurtherState::kReadoutBias, &FurtherStates::readout_bias, FurtherStateKind::Owner::kGyro, 3, &Layout::readout_bias,
+     1e-4},
+    {FurtherState::kCoefficientChange, &FurtherStates::coefficient_change, FurtherStateKind::Owner::kGyro, Layout::kEq1,
+     &Layout::change, 1e-7},
+    {FurtherState::kWanderingDrift, &FurtherStates::wandering_drift, FurtherStateKind::Owner::kGyro, 3,
+     &Layout::wandering, 0},
+}};
+
+/// Its row in the table.
+[[nodiscard]] constexpr const FurtherStateKind& kind_of(FurtherState state) {
+  return kFurtherStateKinds[static_cast<std::size_t>(state)];
+}
+
+constexpr bool Layout::has(FurtherState state) const {
+  const FurtherStateKind& kind = kind_of(state);
+  return kind.flag == nullptr ? star_trackers > 1 : further.*kind.flag;
+}
+
+constexpr auto Layout::owners(FurtherState state) const -> Owners {
+  switch (kind_of(state).owner) {
+    case FurtherStateKind::Owner::kGyro:
+      return {0, gyros};
+    case FurtherStateKind::Owner::kFurtherStarTracker:
+      return {1, star_trackers};
+    case FurtherStateKind::Owner::kPass:
+      break;
+  }
+  return {};
+}
+
+constexpr int Layout::first(FurtherState state, int owner) const { return (this->*kind_of(state).first)(owner); }
+
+/// Storage of an estimator: enough for every layout that has no more of anything than the largest one it is made for.
 struct Capacity {
   int gyros = 0;
   int drift_columns = 0;

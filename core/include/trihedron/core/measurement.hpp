@@ -23,18 +23,19 @@ using SharedStates = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, kMaxSharedState
 /// Covariance of a fix's noise, c axes, rad².
 [[nodiscard]] Eigen::Matrix3d fix_noise(const CalibrationSetup& setup, int head);
 
-/// The fix without what is known of its error.
+/// The fix with the estimate of its error taken off.
 [[nodiscard]] Rot<In, C> corrected(const StarFix& fix, const FixBySharedStates& by_shared, const SharedStates& shared);
 
 /// One gyro's part of a comparison: the two components of y = h × h_et across h, the first along h × (h of the next
-/// gyro), and how they change with φ (in), with the fix's error and −δ (c), and with the readout bias.
+/// gyro), and how they change with φ (in), with the fix's error and −δ (c), and with the errors of the readout.
 struct GyroComparison {
   Eigen::Vector2d y;
   Eigen::Matrix<double, 2, 3> by_phi;
   Eigen::Matrix<double, 2, 3> by_fix;
-  Eigen::Matrix<double, 2, 3> by_bias;
+  Eigen::Matrix<double, 2, Eigen::Dynamic, 0, 2, GyroReadout::kMaxErrors> by_readout;
 };
 
+/// A fix compared with the momenta, gyro by gyro.
 struct FixComparison {
   GyroMask used{};
   PerGyro<GyroComparison> gyros;
@@ -42,6 +43,18 @@ struct FixComparison {
 
   [[nodiscard]] int components() const { return 2 * count(used); }
 };
+
+/// by_reading, whose columns are components of a reading in c, as columns about the errors of the readout.
+template <class Derived>
+[[nodiscard]] auto by_readout_errors(const Layout& layout, const Eigen::MatrixBase<Derived>& by_reading,
+                                     const GyroReadout& gyro, const Eigen::Vector3d& h_b) {
+  using ByCase = Eigen::Matrix<double, Derived::RowsAtCompileTime, 3>;
+  constexpr int kRows = Derived::RowsAtCompileTime;
+  using ByErrors = Eigen::Matrix<double, kRows, Eigen::Dynamic, kRows == 1 ? Eigen::RowMajor : Eigen::ColMajor, kRows,
+                                 GyroReadout::kMaxErrors>;
+  const ByCase by_case = by_reading * gyro.C_c_b;
+  return ByErrors(by_case.lazyProduct(GyroReadout::by_errors(layout, h_b)));
+}
 
 /// y_k = h_k × h_et,k = (φ_k − C_in_c δ_k + h_k × C_in_b Δb_k)⊥ + noise of each gyro used. C_in_c: the fix, for y;
 /// C_linear: the attitude to linearise at, with less noise. Of `gyros`, as many as the layout has, the members of
@@ -64,23 +77,21 @@ template <class Gyros>
     its.by_phi.row(1) = h.cross(its.by_phi.row(0).transpose()).transpose();
     its.by_fix = its.by_phi * C_linear;
     its.y = its.by_phi * h.cross(C_in_c * gyros[k].in_c(h_b[k]));
-    if (layout.further.readout_bias) {
-      its.by_bias = its.by_phi * skew<double>(h) * C_linear * gyros[k].C_c_b;
-    }
+    its.by_readout = by_readout_errors(layout, its.by_phi * skew<double>(h) * C_linear, gyros[k], h_b[k]);
   }
   return comparison;
 }
 
-/// Covariance of the noise of a comparison: the fix's error is common to all components, each readout's to its own two.
-using ComponentCovariance =
-    Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, kMaxComponents, kMaxComponents>;
+/// Covariance of the components of a comparison.
+using ComponentCovariance = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, kMaxComponents, kMaxComponents>;
+/// Of the noise of a comparison: the fix's error is common to all components, each readout's to its own two. R_c:
+/// covariance of the fix, c axes, rad²; readout_noise_rad: of the readings that it is compared with.
 [[nodiscard]] ComponentCovariance noise_of(const FixComparison& comparison, const Eigen::Matrix3d& R_c,
                                            const PerGyro<double>& readout_noise_rad);
 
 /// Rows about the states, and right of them what they are compared with; room for kMaxComponents rows and Max states.
 template <int Max>
-using ComparedRows =
-    Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor, kMaxComponents, Max + 1>;
+using ComparedRows = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor, kMaxComponents, Max + 1>;
 /// Three rows about the states.
 template <int Max>
 using StateRows3 = Eigen::Matrix<double, 3, Eigen::Dynamic, Eigen::RowMajor, 3, Max>;
@@ -114,9 +125,7 @@ template <int Max>
     auto H = rows.template middleRows<2>(row);
     H.template middleCols<3>(layout.direction(k)) = its.by_phi;
     H.template middleCols<3>(layout.alignment(k)) = -its.by_fix;
-    if (layout.further.readout_bias) {
-      H.template middleCols<3>(layout.readout_bias(k)) = its.by_bias;
-    }
+    H.middleCols(layout.readout(k), layout.readout_size()) = its.by_readout;
     H.middleCols(layout.shared(), layout.shared_size()) = its.by_fix.lazyProduct(comparison.by_shared);
     H.col(layout.size()) = its.y;
     row += 2;
@@ -136,10 +145,8 @@ template <int Max, class Gyros>
     const Eigen::Matrix3d by_phi = attitude.by_direction(k);
     rows.template middleCols<3>(layout.direction(k)) = by_phi * C_c_in;
     rows.template middleCols<3>(layout.alignment(k)) = -by_phi;
-    if (layout.further.readout_bias) {
-      rows.template middleCols<3>(layout.readout_bias(k)) =
-          by_phi * skew<double>(gyros[k].in_c(h_b[k])) * gyros[k].C_c_b;
-    }
+    rows.middleCols(layout.readout(k), layout.readout_size()) =
+        by_readout_errors(layout, by_phi * skew<double>(gyros[k].in_c(h_b[k])), gyros[k], h_b[k]);
   }
   return rows;
 }
@@ -157,7 +164,7 @@ void carry_back(const Layout& layout, const Sensitivities& since, Rows& rows) {
   }
 }
 
-/// Adds a gyro's part of errors x, rows as in the layout, to what is believed of its parameters; the momentum and the
+/// Adds a gyro's part of errors x, rows as in the layout, to the estimates of its parameters; the momentum and the
 /// drift that wanders are left to the caller.
 template <class Vector, class Gyro>
 void add_parameter_errors(const Layout& layout, int gyro, const Vector& x, Gyro& its) {
@@ -165,15 +172,14 @@ void add_parameter_errors(const Layout& layout, int gyro, const Vector& x, Gyro&
   if (layout.further.coefficient_change) {
     its.drift_rad_s.segment(layout.change_column(), Layout::kEq1) += x.segment(layout.change(gyro), Layout::kEq1);
   }
-  if (layout.further.readout_bias) {
-    its.readout_bias += x.segment(layout.readout_bias(gyro), 3);
-  }
+  its.add_errors(layout, x.segment(layout.readout(gyro), layout.readout_size()));
   its.C_c_b = turned(its.C_c_b, Eigen::Vector3d(x.segment(layout.alignment(gyro), 3)));
 }
 
 /// Covariance of an attitude by `spread`, spread · spreadᵀ of the errors of what is estimated, plus the readout noise
 /// and a random walk of the directions of `walk_variance_rad2` per axis.
-[[nodiscard]] AttitudeSolution with_covariance(const AttitudeByDirections& attitude, const Eigen::Matrix3d& spread_square,
+[[nodiscard]] AttitudeSolution with_covariance(const AttitudeByDirections& attitude,
+                                               const Eigen::Matrix3d& spread_square,
                                                const PerGyro<double>& readout_noise_rad, int gyros,
                                                double walk_variance_rad2);
 

@@ -12,8 +12,8 @@
 
 namespace trihedron {
 
-/// Momenta and parameters in use since the last astro-correction, and what is known of their errors. Drift that wanders
-/// fades as first-order Gauss–Markov noise does, and what comes in its place is unknown.
+/// Momenta and parameters in use since the last astro-correction, and what is known of their errors. The estimate of
+/// the Gauss–Markov drift decays with its correlation time; the variance of what replaces it is added.
 template <class Estimator>
 class Navigator {
  public:
@@ -36,7 +36,7 @@ class Navigator {
   /// Widens the directions: `variance_rad2` per axis, as the estimator's.
   void add_direction_variance(double variance_rad2) { extra_variance_rad2_ += variance_rad2; }
 
-  /// Carries the errors over the stretch between two fixes, for which the estimator has integrated the sensitivities.
+  /// Carries the errors over the stretch between two fixes, by the sensitivities that the estimator has integrated.
   void extend(const Estimator& estimator, const Sensitivities& stretch);
 
   /// Attitude by the momenta and these readings, with its covariance. Needs started().
@@ -58,11 +58,11 @@ class Navigator {
                                                                    double time_since_correction_s) const;
   void precess_all(const Estimator& estimator, const Eigen::Matrix3d& C_in_c, const Directions& h_b, Time t,
                    double dt_s, Gyros& gyros) const;
-  /// The sensitivities since the correction, with those of the stretch after them.
-  [[nodiscard]] Sensitivities since_correction(const Estimator& estimator, const Sensitivities& stretch) const;
-  /// Room for the errors, all zero.
+  /// The sensitivities of the stretch after `since`, those since the correction.
+  void append(const Estimator& estimator, const Sensitivities& stretch, Sensitivities& since) const;
+  /// Storage of the errors, set to zero.
   [[nodiscard]] RowsView new_errors(int rows, int columns);
-  void restart_clock();
+  void restart_clock(const Layout& layout);
 
   Gyros gyros_;
   /// Root of the covariance of the errors at the correction, rows as in error_layout(), one after the other.

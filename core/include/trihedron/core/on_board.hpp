@@ -15,6 +15,7 @@
 
 namespace trihedron {
 
+/// Intake, readings, schedule, estimator and navigator put together: fed event by event, it reports on each.
 template <class Estimator>
 class OnBoard {
  public:
@@ -99,12 +100,12 @@ class OnBoard {
   Estimator estimator_;
   Navigator<Estimator> navigator_;
   CorrectionPolicy policy_;
-  int behind_ = 0;  ///< samples that the estimator has not yet followed
+  int behind_ = 0;  ///< samples to which the estimator has not yet been taken
   Time follower_t_{};
   Directions follower_h_b_;
   Time corrected_t_{};
-  int fixes_dropped_ = 0;        ///< not yet told
-  bool clock_set_back_ = false;  ///< and no sample used since
+  int fixes_dropped_ = 0;        ///< not yet reported
+  bool clock_set_back_ = false;  ///< no sample has been used since
   bool start_unconfirmed_ = false;
 };
 

@@ -1,5 +1,6 @@
 #pragma once
-/// Attitude from N directions that count alike: Wahba's problem. The trihedron, of two, trusts the first.
+/// Attitude from N equally weighted directions (Wahba's problem), and the trihedron, which takes the first of two as
+/// reference.
 
 #include "trihedron/core/attitude.hpp"
 #include "trihedron/core/per_gyro.hpp"
@@ -21,9 +22,11 @@ struct AttitudeSolution {
   Eigen::Matrix3d covariance_rad2 = Eigen::Matrix3d::Zero();
 };
 
-/// The trihedron on the first two directions, and errors by theirs. Eq. of section 5, paper Fig. 4.
+/// The trihedron on the first two directions, and errors by theirs. docs/mathematics.md, section 5; paper Fig. 4.
 [[nodiscard]] Result<AttitudeByDirections, DirectionsFault> trihedron_attitude(const Directions& h_in,
                                                                                const Directions& h_c);
+/// The same, only the attitude itself.
+[[nodiscard]] Result<Rot<In, C>, DirectionsFault> trihedron_rotation(const Directions& h_in, const Directions& h_c);
 
 /// Readings h_b of the first `count` gyros, seen in c.
 template <class Gyros>
@@ -55,8 +58,9 @@ template <class Gyros>
                                                                              const Directions& h_c,
                                                                              const GyroMask& used);
 
-/// Rate of the body relative to `in`, rad/s, by directions h_c that stand still in `in` and their rates: ḣ_c = −ω × h_c,
-/// each sees ω across itself. Of those used, at least two.
-[[nodiscard]] Eigen::Vector3d rate_by_directions(const Directions& h_c, const Directions& h_c_rate, const GyroMask& used);
+/// Rate of the body relative to `in`, rad/s, by directions h_c that stand still in `in` and their rates: ḣ_c = −ω ×
+/// h_c, each sees ω across itself. Of those used, at least two.
+[[nodiscard]] Eigen::Vector3d rate_by_directions(const Directions& h_c, const Directions& h_c_rate,
+                                                 const GyroMask& used);
 
 }  // namespace trihedron

@@ -12,14 +12,15 @@ inline constexpr int kPairComponents = 4;
 /// Hilferty 1931: the cube root of χ²/n is nearly normal, of mean 1 − 2/9n and variance 2/9n).
 [[nodiscard]] double gate_of_freedom(int freedom, double gate_nis);
 
-/// Rejects fixes whose NIS is above a gate, and cannot lock out good ones: after a run of rejections the model was
-/// wrong, not the tracker, and the directions are set free; when that happens again soon, the filter begins anew. Where
-/// the misfit has jumped by what no momentum can, the tracker is wrong and the run may be much longer.
+/// Rejects fixes whose NIS is above a gate, without locking out good ones: after a run of rejections the model is taken
+/// to be wrong, not the tracker, and the directions are reopened (their covariance is widened); when that happens again
+/// soon, the filter restarts. Where the misfit has jumped by more than a momentum can drift, the star tracker is taken
+/// to be wrong, and the run may be much longer.
 class OutlierGate {
  public:
-  /// What a wrong model may add to the misfit from one fix to the next: at once, with an alignment wrong by ten
-  /// degrees in a slew of 1°/s, and in time, ten times the drift of a good gyro, or an alignment wrong by half a degree
-  /// in a body that turns at orbital rate.
+  /// Largest change of the misfit from one fix to the next that a wrong model can cause: at once, by an alignment wrong
+  /// by ten degrees in a slew of 1°/s; and with time, by ten times the drift of a good gyro, or by an alignment wrong
+  /// by half a degree in a body that turns at orbital rate.
   static constexpr double kLargestStep_rad = 8.7e-3;  // 30′
   static constexpr double kLargestRate_rad_s = 1e-5;
 
@@ -30,7 +31,7 @@ class OutlierGate {
         reopen_after_jump_(setup.reopen_after_jump_rejections),
         restart_within_(setup.restart_within_fixes) {}
 
-  /// The time that goes by between the fixes.
+  /// Adds to the time since the last fix.
   void elapse(double dt_s) { since_fix_s_ += dt_s; }
 
   /// kUsed, kRejectedByGate, kUsedAfterReopening or kRestarted: what to do with the fix. `misfit_rad`: the length of
@@ -39,12 +40,12 @@ class OutlierGate {
   [[nodiscard]] int rejections_in_a_row() const { return rejections_in_a_row_; }
   /// Whether the present run of rejections is put down to the tracker.
   [[nodiscard]] bool jumped() const { return jumped_; }
-  /// Whether the filter has begun anew so few fixes ago that it is not what is wrong now.
-  [[nodiscard]] bool begun_anew() const { return begun_anew_ && under_suspicion_ > 0; }
+  /// Whether the filter has restarted so few fixes ago that the model cannot be what is wrong now.
+  [[nodiscard]] bool restarted_recently() const { return restarted_ && under_suspicion_ > 0; }
 
  private:
-  /// A start that no fix has confirmed yet may itself be what was wrong. A jump is over, an outlier in a longer run,
-  /// when the misfit has been back where it came from for as long as a run takes.
+  /// A jump counts only after the start has been confirmed by a fix. It is over when the misfit has been back where it
+  /// came from for as long as a run takes.
   void look_for_jump(bool jumped_now, double before_rad, double largest_rad);
 
   double gate_nis_ = 0;
@@ -55,8 +56,8 @@ class OutlierGate {
   double misfit_rad_ = 0;  ///< of the last fix
   int rejections_in_a_row_ = 0;
   int under_suspicion_ = 0;
-  bool begun_anew_ = false;  ///< when suspicion arose last
-  bool confirmed_ = false;   ///< what the filter rests on has agreed with a fix after it
+  bool restarted_ = false;  ///< when suspicion arose last
+  bool confirmed_ = false;  ///< what the filter rests on has agreed with a fix after it
   bool jumped_ = false;
   double before_jump_rad_ = 0;
   int back_ = 0;  ///< fixes in a row since the jump

@@ -9,8 +9,8 @@ namespace trihedron {
 /// Gyros that a spacecraft may have.
 inline constexpr int kMaxGyros = 4;
 
-/// One T for each gyro, indexed by int as Eigen's blocks are; gyro 1 has index 0. How many of them there are is told by
-/// the Layout; N is the room for them.
+/// One T for each gyro, indexed by int as Eigen's blocks are; gyro 1 has index 0. The number of gyros is in the Layout;
+/// N is the room for them.
 template <class T, int N = kMaxGyros>
 class PerGyro {
  public:
@@ -26,13 +26,13 @@ class PerGyro {
   std::array<T, static_cast<std::size_t>(N)> items_{};
 };
 
-/// One direction for each gyro; those of gyros that there are not mean nothing.
+/// One direction for each gyro; elements beyond the number of gyros have no meaning.
 using Directions = PerGyro<Eigen::Vector3d>;
 
 /// Which gyros are used.
 using GyroMask = PerGyro<bool>;
 
-/// Where the number of a gyro stands, none.
+/// Index that means "no gyro".
 inline constexpr int kNoGyro = -1;
 
 /// The first `gyros` of them.

@@ -7,25 +7,19 @@
 #include "trihedron/core/columns.hpp"
 #include "trihedron/core/drift.hpp"
 #include "trihedron/core/frames.hpp"
+#include "trihedron/core/gyro_readout.hpp"
 #include "trihedron/core/per_gyro.hpp"
 
 namespace trihedron {
 
-/// What is believed of one gyro; inside of the estimators, plain numbers with frames in the names. There is room for
-/// Max drift columns.
+/// Estimates of one gyro, as plain numbers with frames in the names. There is room for Max drift columns.
 template <int Max>
-struct GyroModel {
+struct GyroModel : GyroReadout {
   using Coefficients = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, Max, 1>;
 
   Eigen::Vector3d h_in = Eigen::Vector3d::UnitX();  ///< direction of the momentum
   /// Of all columns of the drift model: κ; the drift that wanders; the change of the coefficients of eq. (1).
   Coefficients drift_rad_s = Coefficients::Zero(Layout::kEq1 <= Max ? Layout::kEq1 : Max);
-  Eigen::Matrix3d C_c_b = Eigen::Matrix3d::Identity();     ///< alignment, exp([Λ×])
-  Eigen::Vector3d readout_bias = Eigen::Vector3d::Zero();  ///< of the direction cosines: h_b is read as h_b + bias
-
-  [[nodiscard]] Eigen::Vector3d unbiased(const Eigen::Vector3d& h_b) const { return without_bias(h_b, readout_bias); }
-  /// The same, seen in c.
-  [[nodiscard]] Eigen::Vector3d in_c(const Eigen::Vector3d& h_b) const { return C_c_b * unbiased(h_b); }
 };
 
 /// Linearised effect of three causes on one momentum since a reference epoch:
@@ -34,17 +28,21 @@ struct GyroModel {
 template <int Max>
 struct Sensitivity {
   Eigen::Matrix3d by_start = Eigen::Matrix3d::Identity();
-  Columns<Max> by_drift;  ///< s
+  Columns<Max> by_drift = Columns<Max>::zero();  ///< s
   Eigen::Matrix3d by_alignment = Eigen::Matrix3d::Zero();
 
-  /// The same over this stretch followed by `next`.
-  [[nodiscard]] Sensitivity then(const Sensitivity& next, int columns) const {
-    Sensitivity both;
-    both.by_start = next.by_start * by_start;
-    both.by_drift.first(columns) =
-        next.by_start.lazyProduct(by_drift.first(columns)) + next.by_drift.first(columns);
-    both.by_alignment = next.by_start * by_alignment + next.by_alignment;
-    return both;
+  /// At the reference epoch: nothing has moved yet.
+  void begin(int columns) {
+    by_start.setIdentity();
+    by_drift.view(columns).set_zero();
+    by_alignment.setZero();
+  }
+  /// Makes it that of this stretch followed by `next`.
+  void append(const Sensitivity& next, int columns) {
+    by_start = (next.by_start * by_start).eval();
+    by_drift.first(columns) =
+        (next.by_start.lazyProduct(by_drift.first(columns)) + next.by_drift.first(columns)).eval();
+    by_alignment = (next.by_start * by_alignment + next.by_alignment).eval();
   }
 };
 
@@ -57,7 +55,7 @@ void advance_by_drift(ColumnsView by_drift, ColumnsView basis, const Eigen::Matr
 template <int Max>
 void precess(GyroModel<Max>& gyro, const DriftModel& drift, const Eigen::Matrix3d& C_in_c, const Eigen::Vector3d& h_b,
              double part_of_change, double dt_s) {
-  const Eigen::Vector3d omega_b = drift.rate(gyro.unbiased(h_b), part_of_change, gyro.drift_rad_s.data());
+  const Eigen::Vector3d omega_b = drift.rate(gyro.corrected(h_b), part_of_change, gyro.drift_rad_s.data());
   const Eigen::Vector3d omega_in = C_in_c * (gyro.C_c_b * omega_b);
   gyro.h_in = rotated<double>(gyro.h_in, omega_in * dt_s).normalized();
 }
@@ -69,14 +67,14 @@ Eigen::Vector3d precess(GyroModel<Max>& gyro, Sensitivity<Max>& sensitivity, con
                         const Eigen::Matrix3d& C_in_c, const Eigen::Vector3d& h_b, double part_of_change, double dt_s) {
   Columns<Max> columns;
   const int size = drift.columns();
-  drift.basis(gyro.unbiased(h_b), part_of_change, columns.view(size));
+  drift.basis(gyro.corrected(h_b), part_of_change, columns.view(size));
   const Eigen::Matrix3d dt_C_in_b = dt_s * (C_in_c * gyro.C_c_b);
-  const Eigen::Vector3d turn = dt_C_in_b * columns.first(size).lazyProduct(gyro.drift_rad_s);
+  const Eigen::Vector3d turn = dt_C_in_b * columns.view(size).times(gyro.drift_rad_s.data());
   gyro.h_in = rotated<double>(gyro.h_in, turn).normalized();
   const Eigen::Matrix3d cross = skew<double>(turn);
   sensitivity.by_start += cross * sensitivity.by_start;
-  advance_by_drift(sensitivity.by_drift.view(size), columns.view(size), dt_C_in_b, turn);
   sensitivity.by_alignment += cross * (sensitivity.by_alignment - C_in_c);
+  advance_by_drift(sensitivity.by_drift.view(size), columns.view(size), dt_C_in_b, turn);
   return turn;
 }
 
@@ -88,18 +86,17 @@ struct GaussMarkov {
   double sigma = 0;  ///< stationary
   double time_s = 3600;
 
-  /// What is left of a value after dt_s. Nothing after a long time; what the inverse of a transition takes for that
-  /// would be rounding.
+  /// The fraction of a value that is left after dt_s; not below 1e-6, since its inverse stands in the transition.
   [[nodiscard]] double kept(double dt_s) const;
-  /// 1-sigma of what has come in its place.
+  /// 1-sigma of the noise that has come in its place.
   [[nodiscard]] double noise(double kept) const;
 };
 
-/// Over a longer step the readings do not tell how far the body turned.
+/// Longest step over which the change of the readings tells how far the body turned.
 inline constexpr double kQuarterOrbit_s = 1300;
 
-/// What the midpoint rule may miss in a step in which the body turned far between two samples, rad: the drift over the
-/// step, times the turn that the readings from and to show.
+/// Largest error of the midpoint rule, rad, in a step in which the body turned far between two samples: the drift over
+/// the step times the turn between the readings `from` and `to`.
 [[nodiscard]] double missed_by_long_step_rad(double drift_rad, const Eigen::Vector3d& from, const Eigen::Vector3d& to,
                                              double dt_s);
 

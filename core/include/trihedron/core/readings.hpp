@@ -18,17 +18,18 @@ namespace trihedron {
 /// Between two readings, of `gyros` gyros.
 [[nodiscard]] Directions between(const Directions& a, const Directions& b, double fraction, int gyros);
 
-/// Samples as they come, screened and of unit length; the oldest falls out. Bounded in time and in number: those that
-/// come sooner than kMinSpacing after the last one are not taken. kCapacity of them, kGyros directions each.
+/// Buffer of the latest kCapacity samples, screened and of unit length, kGyros directions each; the oldest is dropped.
+/// Samples that come less than kMinSpacing after the last one are not taken, so that the buffer covers the time that is
+/// needed at any rate.
 template <int kGyros>
 class Readings {
  public:
   static constexpr int kCapacity = 80;
-  /// All samples that the angles between the momenta wait for, 6 s, have room.
+  /// 80 of these are 6 s, the longest time that the angles between the momenta wait.
   static constexpr Duration kMinSpacing = std::chrono::milliseconds(75);
 
   Readings() = default;
-  /// `together`: whether samples round a time are taken together, or only the two next to it.
+  /// `together`: whether all samples around a time are fitted, or only the two next to it interpolated.
   Readings(const CalibrationSetup& setup, bool together)
       : gyros_(setup.layout.gyros),
         max_interpolation_(setup.max_interpolation()),
@@ -79,7 +80,7 @@ class Readings {
   }
 
   /// Readings at `t`, by a cubic through the samples round it, or between the two next to it; nothing where there are
-  /// none close enough. `gyros`: what is believed of them, for the rate.
+  /// none close enough. `gyros`: their estimates, for the rate of the body.
   template <class Gyros>
   [[nodiscard]] std::optional<FixReadings> at(Time t, const CalibrationSetup& setup, const GyroHealth& health,
                                               const Gyros& gyros) const {
@@ -122,7 +123,7 @@ class Readings {
   [[nodiscard]] std::size_t index(int i) const { return static_cast<std::size_t>((first_ + i) % kCapacity); }
   [[nodiscard]] const Stored& at(int i) const { return samples_[index(i)]; }
 
-  /// Takes the samples within `reach` to both sides of `t` together, if they are more than a polynomial needs and it
+  /// Fits a polynomial to the samples within `reach` to both sides of `t`, if they are more than it needs and it
   /// explains them; `after`: the first of them after `t`.
   template <class Gyros>
   void fit(Time t, Duration reach, int after, int degree, const CalibrationSetup& setup, const GyroHealth& health,

@@ -1,6 +1,6 @@
 #pragma once
-/// What the calibration does next: it follows the samples some seconds behind, so that the readings to both sides of a
-/// fix are there, and looks at the angles between the momenta where no fix could be used for long.
+/// What the calibration does next. It follows the samples some seconds behind, so that the readings to both sides of a
+/// fix are there, and updates by the angles between the momenta where no fix could be used for long.
 
 #include <algorithm>
 #include <chrono>
@@ -10,21 +10,23 @@
 
 namespace trihedron {
 
+/// Times of what is due.
 class Schedule {
  public:
-  /// Without fixes the angles between the momenta are looked at so often; no two times share samples.
+  /// Interval of angle updates in an outage of fixes; successive updates share no samples.
   static constexpr Duration kAngleInterval = std::chrono::seconds(3);
 
   Schedule() = default;
-  /// `reach`: readings so far to both sides of a fix are taken together. `angles_after`: without a usable fix for so
-  /// long the angles are looked at; Duration::max(): never.
+  /// `reach`: how far to both sides of a fix readings are fitted. `angles_after`: time without a usable fix after which
+  /// the angles are used; Duration::max(): never.
   Schedule(Duration reach, Duration angles_after) : reach_(reach), angles_after_(angles_after) {}
 
   enum class Next : std::uint8_t { kNothing, kSample, kFix, kAngles };
-  /// The earliest of what is to be done until `limit`: the next sample is to be followed, or the next fix dealt with, at
-  /// these times, Time::max() where there is none; or the angles are to be looked at.
+  /// The earliest thing to do until `limit`: follow the next sample, deal with the next fix, at these times
+  /// (Time::max() where there is none), or update by the angles.
   [[nodiscard]] Next next(Time limit, Time sample_t, Time fix_t) const {
-    // A fix that would share samples with the angles goes before them; they wait until none can come any more.
+    // A fix whose readings overlap those of an angle update has priority; the update waits until no such fix can
+    // arrive.
     if (sample_t != Time::max() && angles_t_ < sample_t && angles_t_ <= fix_t - 2 * reach_) {
       return angles_t_ > limit - 2 * reach_ ? Next::kNothing : Next::kAngles;
     }
@@ -35,7 +37,7 @@ class Schedule {
   }
 
   [[nodiscard]] Time angles_t() const { return angles_t_; }
-  /// A fix before it is too late: passed, or its samples are used.
+  /// Fixes earlier than this come too late: the calibration has passed them, or their readings have been used.
   [[nodiscard]] Time taken_until() const { return taken_until_; }
 
   void followed_to(Time t) { taken_until_ = std::max(taken_until_, t); }

@@ -13,6 +13,7 @@
 
 namespace trihedron {
 
+/// What is wrong with a set-up.
 enum class SetupFault : std::uint8_t {
   kTooLarge,  ///< the layout needs more room than there is, or has states that this estimator cannot have
   kPriorNotPositiveDefinite,
@@ -25,13 +26,36 @@ enum class SetupFault : std::uint8_t {
 struct StarTrackerSetup {
   Eigen::Vector3d noise_rad{1e-4, 1e-4, 1e-4};          ///< 1-sigma about its own axes s
   Eigen::Matrix3d C_c_s = Eigen::Matrix3d::Identity();  ///< as designed; c are the axes of the first
-  double alignment_sigma_rad = 1e-2;                    ///< of those beside the first, per axis
+  double alignment_sigma_rad = 1e-2;                    ///< of a star tracker other than the first, per axis
 };
 
 /// A step between samples further apart than this is a long one, over which readings are not interpolated; the body's
 /// acceleration over it is below the readout noise.
 [[nodiscard]] Duration max_interpolation(Duration gyro_period);
 
+/// One T for each kind of further states.
+template <class T>
+class PerFurtherState {
+ public:
+  [[nodiscard]] constexpr T& operator[](FurtherState state) { return items_[static_cast<std::size_t>(state)]; }
+  [[nodiscard]] constexpr const T& operator[](FurtherState state) const {
+    return items_[static_cast<std::size_t>(state)];
+  }
+
+ private:
+  std::array<T, kFurtherStateCount> items_{};
+};
+
+/// The prior sigmas of kFurtherStateKinds.
+[[nodiscard]] constexpr PerFurtherState<double> default_further_sigmas() {
+  PerFurtherState<double> sigmas;
+  for (const FurtherStateKind& kind : kFurtherStateKinds) {
+    sigmas[kind.state] = kind.prior_sigma;
+  }
+  return sigmas;
+}
+
+/// What a calibration filter is set up with.
 struct CalibrationSetup {
   static constexpr Duration kNever = Duration::max();
 
@@ -43,48 +67,49 @@ struct CalibrationSetup {
 
   // Of the further states, where the layout has them.
   GaussMarkov wandering_drift;  ///< rad/s per case axis
-  double readout_bias_sigma = 1e-4;               ///< of each component
-  double coefficient_change_sigma_rad_s = 1e-7;   ///< over change_time_s
+  /// 1-sigma of each component before anything is measured, rad, rad/s or s; of the change over change_time_s.
+  PerFurtherState<double> further_sigma = default_further_sigmas();
   double change_time_s = 32400;
-  Time no_change_at{};  ///< the coefficients stand for this time
-  double clock_offset_sigma_s = 0.1;
-  double orbital_error_sigma_rad = 1e-4;  ///< of each component of p_s and p_c
-  double orbital_rate_rad_s = 1.1e-3;     ///< n
-  Time orbital_phase_zero{};              ///< where nt = 0
+  Time no_change_at{};                 ///< the coefficients stand for this time
+  double orbital_rate_rad_s = 1.1e-3;  ///< n
+  Time orbital_phase_zero{};           ///< where nt = 0
 
   /// A fix with a NIS above this is rejected; χ² of 4 degrees of freedom passes 30 once in 2e5 good fixes. That of a
   /// pair: of more gyros a gate that good fixes pass as often.
   double gate_nis = 30;
   /// ν of Student's t, or 0 for normal noise. With it a fix above the gate is used with its weight instead of rejected,
-  /// unless the star tracker or one gyro is plainly at fault; a run above the gate still reopens.
-  /// Better where many fixes are a few times too noisy; few far outliers the gate alone keeps out no worse, and the
-  /// paper's filter better. Between 5 and 20.
+  /// unless the misfit is attributed to the star tracker or to one gyro; a run of fixes above the gate still reopens
+  /// the directions. Better than the gate where many fixes are a few times noisier than specified; against few large
+  /// outliers the gate alone is as good, and for the paper's filter better. Between 5 and 20.
   double student_t_freedom = 0;
-  /// After so many rejections in a row the directions are set free by the size of the misfit and the fix is used: the
-  /// model was wrong, not the tracker.
+  /// Consecutive rejections after which the direction covariance is widened by the size of the misfit and the fix is
+  /// used: the model was wrong, not the tracker.
   int reopen_after_rejections = 20;
-  /// The same where the run began with a misfit that no drift can make: the tracker was wrong, or has been turned.
+  /// The same where the run of rejections began with a jump larger than drift can cause: the star tracker gave wrong
+  /// fixes, or has been moved.
   int reopen_after_jump_rejections = 400;
-  /// When that happens again within so many fixes, the parameters are what is wrong: their information goes. The
-  /// estimates stay; of estimator invariant not when that has not helped, or the prior excludes them.
+  /// When the filter reopens twice within this number of fixes, the parameters are wrong: it restarts, dropping the
+  /// information gathered. The estimates are kept; estimator invariant returns to the prior means where keeping them
+  /// has not helped or the prior excludes them.
   int restart_within_fixes = 200;
   /// Without a fix that could be used for longer than this, the angles between the momenta are used alone; or kNever.
   Duration angles_after = std::chrono::minutes(1);
 
-  /// What keeps it from working, beside the prior.
+  /// The first fault of the settings; the prior is checked by the estimator.
   [[nodiscard]] std::optional<SetupFault> fault() const;
 
-  /// How much of the change of the coefficients there has been at `t`.
+  /// The fraction of the change of the coefficients that has taken place at `t`.
   [[nodiscard]] double part_of_change(Time t) const { return to_seconds(t - no_change_at) / change_time_s; }
 
   [[nodiscard]] Duration max_interpolation() const { return trihedron::max_interpolation(gyro_period); }
-  /// Readings to both sides of a fix that are taken together: fixes every 3 s do not share any. Of slow gyros more, so
-  /// that there are enough for a polynomial.
+  /// How far to both sides of a fix readings are fitted together: at one fix every 3 s no reading is shared. For slow
+  /// gyros further, so that there are enough readings for the polynomial.
   [[nodiscard]] Duration reach() const;
-  /// Samples that are taken together for the attitude now.
+  /// How far back samples are fitted together for the attitude now.
   [[nodiscard]] Duration recent() const;
-  /// How many fixes of a star tracker share a gyro sample, at least 1, when they come so fast: so much larger is the
-  /// variance that a sample's noise has in each of them, so that all of them together do not count it more than once.
+  /// Number of fixes of a star tracker that share a gyro sample at this interval, at least 1. The readout variance of
+  /// each is multiplied by it, so that together they do not count the noise of a sample as if it were independent in
+  /// each.
   [[nodiscard]] double fixes_sharing_a_sample(Duration since_the_last_fix) const;
 };
 
@@ -94,14 +119,15 @@ template <class Gyros>
   for (int k = 0; k < layout.gyros; ++k) {
     const double off = (prior[k].C_c_b * prior[k].C_c_b.transpose() - Eigen::Matrix3d::Identity()).norm();
     if (prior[k].drift_rad_s.size() != layout.drift_columns() || !prior[k].drift_rad_s.allFinite() ||
-        !prior[k].readout_bias.allFinite() || !(off < 1e-6)) {
+        !prior[k].errors(layout).allFinite() || !(off < 1e-6)) {
       return false;
     }
   }
   return true;
 }
 
-/// 1-sigma of one further state before anything is measured; `state`: from layout.readout_bias(0) on. rad, rad/s or s.
+/// 1-sigma of one further state before anything is measured, rad, rad/s or s. `state`: its position, from
+/// layout.readout(0) on.
 [[nodiscard]] double prior_sigma_of_further_state(const CalibrationSetup& setup, int state);
 
 }  // namespace trihedron

@@ -1,7 +1,7 @@
 #pragma once
 /// Linear estimation with the square root of the information matrix (Bierman, "Factorization Methods for Discrete
-/// Sequential Estimation", 1977; process noise after Dyer and McReynolds, 1969). Sizes are known at run time, storage is
-/// of fixed capacity; the work is done by plain loops, compiled once.
+/// Sequential Estimation", 1977; process noise after Dyer and McReynolds, 1969). Sizes are known at run time, storage
+/// is of fixed capacity; the work is done by plain loops, compiled once.
 
 #include <Eigen/Core>
 #include <array>
@@ -13,8 +13,8 @@
 namespace trihedron {
 
 /// Rotates the rows of `extra` into the upper triangular rows of `root` (Householder), column by column; the first
-/// `eliminated` columns of `extra` become zero, those of `root` a triangle. rootᵀ root + extraᵀ extra is unchanged. Rows
-/// of `root` may be zero (no information yet). Both have the same number of columns.
+/// `eliminated` columns of `extra` become zero, those of `root` a triangle. rootᵀ root + extraᵀ extra is unchanged.
+/// Rows of `root` may be zero (no information yet). Both have the same number of columns.
 void rotate_into(RowsView root, RowsView extra, int eliminated);
 
 /// Reflections that make the first `columns` columns of `rows` upper triangular.
@@ -31,9 +31,9 @@ void invert_triangle(ConstRowsView root, RowsView inverse);
 void multiply(ConstRowsView a, ConstRowsView b, RowsView product);
 
 /// Estimate errors x ~ (0, (RᵀR)⁻¹) of states, the first `dynamic` of which move; the others are constants. R is upper
-/// triangular. A direction without information costs nothing and gains nothing: R times it stays zero to rounding,
-/// whatever the number of steps. The estimate itself is kept by the owner, who adds each correction to it ("feedback"),
-/// so that the mean of x is always zero. There is room for Max states, of which at most kMaxDynamic move.
+/// triangular. A direction without information stays without: R times it remains zero to rounding, whatever the number
+/// of steps. The estimate itself is kept by the owner, who adds each correction to it ("feedback"), so that the mean of
+/// x is always zero. There is room for Max states, of which at most kMaxDynamic move.
 template <int Max, int MaxDynamic>
 class SquareRootInformation {
  public:
@@ -56,7 +56,7 @@ class SquareRootInformation {
   [[nodiscard]] RowsView root() { return {data_.data(), states_, states_, states_ + 1}; }
   [[nodiscard]] ConstRowsView root() const { return {data_.data(), states_, states_, states_ + 1}; }
 
-  /// Adds information rows about the states, `rows` of so many: unit white noise = rows · x. `rows` is used up.
+  /// Adds rows of information, unit white noise = rows · x. `rows` is overwritten.
   void add_information(RowsView rows) { rotate_into(root(), rows, states_); }
 
   /// Time update: x_d ← A x_d + B x_c + w, w of independent components with 1-sigma `noise`, which may be zero.

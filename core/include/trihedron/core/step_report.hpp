@@ -1,5 +1,5 @@
 #pragma once
-/// What the on-board step tells of each event, and when it corrects the navigator.
+/// What the on-board step reports of each event, and when it corrects the navigator.
 
 #include <chrono>
 #include <optional>
@@ -17,25 +17,25 @@ struct CorrectionPolicy {
   static constexpr Duration kOnlyFirst = Duration::max();
   Duration interval = std::chrono::minutes(90);
   bool take_parameters = true;  ///< false: the parameters of the set-up are held
-  bool navigate = true;         ///< false: the calibration alone, no navigator beside it
+  bool navigate = true;         ///< false: the calibration alone, without a navigator
 };
 
-/// Complete for every event, whatever was wrong with it.
+/// Report on one event; every member is valid, whatever was wrong with the event.
 struct StepReport {
   Time t{};
   SampleStatus sample = SampleStatus::kNone;
   PerGyro<GyroState> gyros{};  ///< after this step
   FixReport fix;               ///< of the fix that was dealt with in this step, if any; its time is its own
   bool more_due = false;       ///< another fix can be dealt with now: carry_on() does
-  int fixes_dropped = 0;       ///< that waited when the clock was set back: nobody knows their time now
-  bool corrected = false;      ///< the navigator was corrected at that fix
-  /// That fix and what it was compared with, where the estimator looked at it.
+  int fixes_dropped = 0;   ///< fixes discarded because the clock was set back while they waited: their time is unknown
+  bool corrected = false;  ///< the navigator was corrected at that fix
+  /// That fix and the readings it was compared with, where it was compared.
   std::optional<ComparedFix> compared;
   /// Attitude at that fix, used or rejected as an outlier: of the calibration itself, and of the open-loop navigator.
   std::optional<AttitudeSolution> calibrated;
   std::optional<AttitudeSolution> navigated;
-  /// Of the angles between the momenta, where they were looked at in this step because no fix could be used for long:
-  /// the integrity of the gyros without a star tracker, and of use to the calibration. Its time is its own.
+  /// Of an update by the angles between the momenta, made in this step because no fix could be used for long: it checks
+  /// the gyros without a star tracker, and keeps the calibration going. Its time is its own.
   AngleReport angles;
   /// z1 of eq. (3), cosθ predicted minus cosθ measured: the integrity of the pair, without a star tracker. Zero before
   /// the start, and where one of the two cannot be used.

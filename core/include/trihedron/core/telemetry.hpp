@@ -9,11 +9,8 @@
 
 namespace trihedron {
 
-/// Star trackers that a spacecraft may have.
-inline constexpr int kMaxStarTrackers = 4;
-
-/// A direction or quaternion further than this from unit length is not believed. Readout noise moves a norm by a tenth
-/// of it at most.
+/// A direction or quaternion whose length differs from 1 by more than this is rejected. Readout noise moves a norm by a
+/// tenth of it at most.
 inline constexpr double kNormTolerance = 1e-3;
 
 /// Direction cosines of the momenta, each in its own case axes; as telemetered, not normalised.

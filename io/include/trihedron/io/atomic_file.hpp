@@ -1,13 +1,13 @@
 #pragma once
-/// Files that appear whole or not at all.
+/// Files, and directories of files, that are written completely or not at all.
 
 #include <filesystem>
 #include <string_view>
 
 namespace trihedron::io {
 
-/// A file written under a temporary name beside its target and renamed onto it by commit(); without commit() nothing
-/// stays. A target that is not a regular file (a pipe, /dev/null) is written straight. Every failure throws
+/// A file written under a temporary name beside its target and renamed onto it by commit(); without commit() it is
+/// removed. A target that is not a regular file (a pipe, /dev/null) is written straight. Every failure throws
 /// MachineFailed.
 class AtomicFile {
  public:
@@ -21,7 +21,7 @@ class AtomicFile {
   /// The name to write under, for a library that opens the file itself; the target where that is written straight.
   [[nodiscard]] const std::filesystem::path& temporary() const { return temporary_; }
   void write(std::string_view content);
-  /// Brings the content to the disk, then renames. The object is done afterwards.
+  /// Brings the content to the disk, then renames. The object must not be used afterwards.
   void commit();
 
  private:
@@ -34,8 +34,41 @@ class AtomicFile {
   bool pending_ = true;
 };
 
-/// Makes the directory and those above it; true when it was not there. Throws MachineFailed.
-bool make_directory(const std::filesystem::path& directory);
+/// Makes a directory and those above it; those that are still empty go again with the object. Throws MachineFailed.
+class MadeDirectory {
+ public:
+  explicit MadeDirectory(std::filesystem::path directory);
+  MadeDirectory(const MadeDirectory&) = delete;
+  MadeDirectory& operator=(const MadeDirectory&) = delete;
+  ~MadeDirectory();
+
+ private:
+  std::filesystem::path directory_;
+  int made_ = 0;  ///< of it and those above
+};
+
+/// A directory whose files appear together: they are written under path(), a hidden directory within it, and moved to
+/// their places by commit(), beside what is there; without commit() nothing stays. Every failure throws MachineFailed.
+class StagedDirectory {
+ public:
+  explicit StagedDirectory(std::filesystem::path target);
+  StagedDirectory(const StagedDirectory&) = delete;
+  StagedDirectory& operator=(const StagedDirectory&) = delete;
+  ~StagedDirectory();
+
+  [[nodiscard]] const std::filesystem::path& path() const { return path_; }
+  void commit();
+
+ private:
+  void move_from(const std::filesystem::path& staged, const std::filesystem::path& target) const;
+
+  std::filesystem::path target_;
+  MadeDirectory made_;
+  std::filesystem::path path_;
+};
+
+/// The file that a user knows of by a path that may lie in a StagedDirectory.
+[[nodiscard]] std::filesystem::path unstaged(const std::filesystem::path& path);
 
 /// One text, all or nothing.
 void write_file(const std::filesystem::path& path, std::string_view content);

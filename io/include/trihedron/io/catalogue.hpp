@@ -13,12 +13,13 @@
 namespace trihedron::io {
 
 /// Adds all or none; makes the catalogue where there is none. A calibration of the same epoch, t, estimator, drift
-/// model and number of passes is replaced. Throws InputRefused for a file that is no catalogue, a damaged or newer one,
-/// or one of another spacecraft; MachineFailed when it cannot be written.
+/// model and number of passes is replaced. A start-up without a name gets that of the epoch of the first entry. Throws
+/// InputRefused for a file that is no catalogue, a damaged or newer one, or one of another spacecraft; MachineFailed
+/// when it cannot be written.
 void add_to_catalogue(const std::filesystem::path& file, std::span<const CatalogueEntry> entries);
 
-/// Whether what is there, if anything, is a catalogue of this spacecraft: asked before there is something to add.
-/// Throws InputRefused as add_to_catalogue.
+/// Checks, before a long calculation, that the file is absent or a catalogue of this spacecraft. Throws InputRefused as
+/// add_to_catalogue.
 void expect_catalogue_of(const std::string& spacecraft, const std::filesystem::path& file);
 
 /// In the order of epoch, and then t and number of passes. Throws as add_to_catalogue, and InputRefused where there is

@@ -10,6 +10,7 @@
 
 #include "trihedron/core/time.hpp"
 #include "trihedron/records/pass.hpp"
+#include "trihedron/records/scenario.hpp"
 
 namespace trihedron::io {
 
@@ -20,7 +21,8 @@ struct Place {
   double t_s = 0;           ///< as the file has it; NaN where it has none
 };
 
-/// One kind of dirt in one table, with its count and first places. Nothing is left out of a Pass without one.
+/// One kind of defect in one table, with its count and first places. Every row that is left out of a Pass is counted in
+/// one.
 struct Defect {
   enum class Kind {
     kMissingTime,      ///< left out
@@ -70,6 +72,9 @@ struct PassFormat {
   /// Step of the packed direction cosines in NetCDF; the error is at most half of it. CSV has nine decimals always.
   double direction_step = 5e-10;
 };
+
+/// As exact as the readout of these gyros: one that reads in steps needs no finer ones in the file.
+[[nodiscard]] PassFormat format_for(const Scenario& scenario);
 
 /// Writes a pass: NetCDF-4 when the name ends in .nc, else a directory, replacing the pass that is there with its
 /// truth. `truth` may be null. The prior calibration goes along. Throws MachineFailed when it cannot be written; then

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "trihedron/core/time.hpp"
+#include "trihedron/records/run.hpp"
 
 namespace trihedron::io {
 
@@ -24,6 +25,10 @@ struct Table {
   std::vector<Time> t;
   std::vector<Column> columns;
 };
+
+/// Those of a calibration: what each fix left and what was done with it, the estimates along the pass, and the residual
+/// of the angle between the momenta.
+[[nodiscard]] std::vector<Table> residual_tables(const CalibrationRun& run);
 
 /// `xarray.open_dataset(path, group=...)` reads each table. Columns must be as long as their `t`
 /// (std::invalid_argument). Throws MachineFailed when the file cannot be written; then nothing stays.

@@ -30,6 +30,14 @@ struct Advice {
   [[nodiscard]] const std::vector<Slew>& slews() const { return std::get<std::vector<Slew>>(scenario.attitude.slews); }
   /// The combinations of parameters that do harm without the slews; where none does, all weak ones.
   [[nodiscard]] std::vector<ground::Combination> formerly_weak() const;
+
+  /// One of these, and its 1-sigma, rad or rad/s.
+  struct Gain {
+    ground::Combination combination;
+    double sigma_before = 0;
+    double sigma_after = 0;
+  };
+  [[nodiscard]] std::vector<Gain> gains() const;
 };
 
 /// Searches the slews that leave the least attitude error (Observability::attitude_metric): one more slew at a time

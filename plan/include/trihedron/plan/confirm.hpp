@@ -1,6 +1,7 @@
 #pragma once
 /// Monte Carlo check of a prediction: simulated flights, and how large the errors of their calibrations are.
 
+#include <cmath>
 #include <string>
 #include <vector>
 
@@ -23,6 +24,9 @@ struct Confirmation {
   int runs = 0;
   double nees = 0;  ///< mean, of all parameters
   int parameters = 0;
+
+  /// Two standard deviations of the mean NEES of so many runs, where the calibrations are consistent.
+  [[nodiscard]] double nees_tolerance() const { return 2 * std::sqrt(2.0 * parameters / runs); }
 };
 
 /// Flies the scenario with other seeds, alignments and drift drawn from what is known before, and calibrates each by

@@ -14,6 +14,7 @@
 
 namespace trihedron {
 
+/// The parameters of one gyro, and its momentum.
 struct GyroCalibration {
   DriftModelId drift_model;
   std::vector<double> drift_rad_s;                         ///< by coefficient, in the order of coefficients_of()
@@ -29,12 +30,13 @@ struct FurtherEstimate {
   double sigma = 0;
 };
 
-/// The noise that a calibration went by.
+/// The noise levels that a calibration used.
 struct CalibrationNoise {
-  double direction_random_walk_rad_sqrt_s = 0;            ///< of each momentum across itself, per axis
-  std::optional<Eigen::Vector3d> star_tracker_noise_rad;  ///< about c x, y, z, where it was found not to be as told
-  double wandering_drift_rad_s = 0;                       ///< 1-sigma per case axis; 0: none
-  double wandering_time_s = 0;                            ///< its correlation time
+  double direction_random_walk_rad_sqrt_s = 0;  ///< of each momentum across itself, per axis
+  /// About c x, y, z, where it was found to differ from the setting.
+  std::optional<Eigen::Vector3d> star_tracker_noise_rad;
+  double wandering_drift_rad_s = 0;  ///< 1-sigma per case axis; 0: none
+  double wandering_time_s = 0;       ///< its correlation time
 };
 
 /// The result of a calibration: parameters of all gyros, their covariance, verdict, statistics.

@@ -11,7 +11,7 @@ namespace trihedron {
 struct CatalogueEntry {
   std::string spacecraft;
   std::string pass;      ///< its name; of the last one where the calibration combines several
-  std::string start_up;  ///< of the rotors: drift coefficients are those of one start
+  std::string start_up;  ///< of the rotors: drift coefficients are those of one start; empty where it has no name
   int passes = 1;        ///< that the calibration combines
   Calibration calibration;
 };

@@ -1,8 +1,8 @@
 #pragma once
 /// The drift models by name, and their coefficients. A coefficient is the same in each model that has it.
 
-#include <array>
 #include <optional>
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -11,15 +11,15 @@
 
 namespace trihedron {
 
+/// One family of drift models, as users name it.
 struct DriftModelRow {
   DriftModelId::Family family;
   std::string_view name;  ///< in settings, in calibration.json and for people; the degree comes after it
   int largest_degree;     ///< 0 where the model has none
 };
 
-inline constexpr std::array<DriftModelRow, 3> kDriftModels = {{{DriftModelId::Family::kEsg7, "esg7", 0},
-                                                               {DriftModelId::Family::kEsg20, "esg20", 0},
-                                                               {DriftModelId::Family::kVsh, "vsh:", DriftModelId::kMaxDegree}}};
+/// One row for each, in the order of DriftModelId::Family.
+[[nodiscard]] std::span<const DriftModelRow> drift_models();
 
 inline constexpr DriftModelId kLargestDriftModel = vsh(DriftModelId::kMaxDegree);
 
@@ -30,7 +30,7 @@ inline constexpr std::string_view kAutoDriftModel = "auto";
 [[nodiscard]] std::string name_of(const DriftModelId& model);
 /// Nothing for another name, or a degree that there is not.
 [[nodiscard]] std::optional<DriftModelId> drift_model_named(std::string_view name);
-/// For messages: "esg7, esg20, or vsh:1 … vsh:6, which are for estimator batch"
+/// For messages: "esg7, esg20, or vsh:1 … vsh:6"
 [[nodiscard]] std::string drift_model_choices();
 
 /// In the model's order, that of `drift_rad_s` in GyroCalibration; those of eq. (1) come first.

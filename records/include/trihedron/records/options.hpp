@@ -22,8 +22,9 @@ struct CorrectionOptions {
   bool take_parameters = true;                   ///< false: the parameters known before the pass are held
 };
 
-/// What estimators invariant and batch estimate beside alignment and eq. (1). kAuto: whatever the pass gives evidence
-/// of. The alignments of further star trackers are estimated where the pass has such; for them nothing is chosen here.
+/// What estimators invariant and batch estimate in addition to alignment and eq. (1). kAuto: decided by the evidence of
+/// the pass. The alignments of further star trackers are estimated where the pass has such; for them nothing is chosen
+/// here.
 struct FurtherStateOptions {
   enum class Choice : std::uint8_t { kAuto, kOff, kOn };
 
@@ -50,21 +51,22 @@ struct FurtherStateOptions {
 struct CalibrationOptions {
   Estimator estimator = Estimator::kInvariant;
   std::optional<DriftModelId> drift_model;  ///< without it the one that the pass gives evidence of
-  /// Whether estimator invariant finds the noise from a pass that is long enough, instead of believing what it is told.
+  /// Whether the noise is estimated from a pass that is long enough, instead of taken from the settings.
   bool find_noise = true;
-  /// Process noise of each momentum across itself; where it is found, the least that is taken. The default is small
-  /// against the readout, and lets go of 0.1″ in 9 h.
+  /// Process noise of each momentum, per axis across it; where the noise is found from the pass, its lower limit. The
+  /// default is small against the readout noise: 0.1″ in 9 h.
   double direction_random_walk_rad_sqrt_s = 3e-9;
-  /// In place of the figure of the pass, where one was found.
+  /// Replaces the value in the pass settings, where one was estimated.
   std::optional<Eigen::Vector3d> star_tracker_noise_rad;
   /// Of the error of the star tracker at orbital period, where it is known; without it that of a low orbit.
   std::optional<double> orbital_rate_rad_s;
   /// A fix with a NIS above this is rejected; χ² of 4 degrees of freedom passes 30 once in 2e5 good fixes. That of a
   /// pair: of more gyros a gate that good fixes pass as often.
   double gate_nis = 30;
-  /// After so many rejections in a row the directions are set free and the fix is used.
+  /// Consecutive rejections after which the directions are reopened and the fix is used.
   int reopen_after_rejections = 20;
-  /// The same where the run began with a jump that no drift can make: the star tracker is wrong, or has been turned.
+  /// The same where the run began with a jump larger than drift can cause: the star tracker gave wrong fixes, or has
+  /// been moved.
   int reopen_after_jump_rejections = 400;
   /// ν of Student's t: a fix above the gate is used with less weight instead of rejected. 0: normal noise, the gate
   /// alone.

@@ -18,8 +18,8 @@ struct ParameterId {
   enum class Kind : std::uint8_t { kDrift, kAlignment, kFurtherState };
 
   Kind kind = Kind::kDrift;
-  /// Of a gyro from 0. Of a further star tracker likewise: 0 is the first, whose axes are c, so that those beside it
-  /// begin with 1. 0 for a further state of the pass.
+  /// Of a gyro from 0. Of a further star tracker from 1: 0 is the first, whose axes are c. 0 for a further state of the
+  /// pass.
   std::uint8_t owner = 0;
   DriftCoefficient coefficient{};                           ///< of kDrift
   std::uint8_t component = 0;                               ///< axis of kAlignment, component of kFurtherState; from 0
@@ -52,7 +52,8 @@ struct ParameterId {
   }
 };
 
-/// The drift coefficients and alignments of so many gyros, gyro by gyro: the rows of a covariance in calibration.json.
+/// The drift coefficients and alignments of this number of gyros, gyro by gyro: the rows of a covariance in
+/// calibration.json.
 [[nodiscard]] std::vector<ParameterId> drift_and_alignment(const DriftModelId& model, std::size_t gyros);
 
 /// As in calibration.json: "gyro1.k0", "gyro2.align_x", "clock_offset_s", "star_tracker_2_align_x_rad".

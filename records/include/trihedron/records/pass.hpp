@@ -25,7 +25,7 @@ struct GyroPrior {
   Eigen::Vector3d alignment_sigma_rad{0, 0, 0};
 };
 
-/// A star-tracker head beside the first. The first head's axes are c; the axes s of this one are turned from them:
+/// A star-tracker head other than the first. The first head's axes are c; the axes s of this one are turned from them:
 /// C_c_s = exp([m×]) exp([mounting×]), m unknown. It is telemetered as q_in_c, C_in_s exp([mounting×])ᵀ.
 struct FurtherStarTracker {
   Eigen::Vector3d noise_rad{0, 0, 0};  ///< 1-sigma about s x, y, z
@@ -43,7 +43,7 @@ struct PassSettings {
   Eigen::Vector3d star_tracker_noise_rad{0, 0, 0};  ///< of the first head, 1-sigma about c x, y, z
   std::vector<FurtherStarTracker> further_star_trackers;
   std::vector<GyroPrior> gyros;
-  std::string start_up;  ///< of the rotors, "2009-05-20"; empty where it is not told
+  std::string start_up;  ///< of the rotors, "2009-05-20"; empty where it is not given
   std::optional<Calibration>
       prior;  ///< an earlier calibration: replaces drift and alignment of `gyros`, with its covariance
 };
@@ -96,7 +96,7 @@ struct Truth {
     std::vector<std::pair<std::string, double>> unmodelled_rad_s;
     Eigen::Vector3d alignment_rotation_vector_rad{0, 0, 0};
 
-    /// Of eq. (1) or outside it; nothing where the simulator did not tell.
+    /// Of eq. (1) or outside it; nothing where the simulator does not give it.
     [[nodiscard]] std::optional<double> drift(const DriftCoefficient& coefficient) const;
   };
   /// Errors of a head that do not change at random; C_c_s as in FurtherStarTracker.
@@ -107,8 +107,8 @@ struct Truth {
     Eigen::Vector3d misalignment_rad{0, 0, 0};  ///< m, c axes
   };
   std::vector<Gyro> gyros;
-  std::vector<StarTracker> star_trackers;  ///< empty where the simulator did not tell
-  double orbital_rate_rad_s = 0;           ///< n; 0 where the simulator did not tell
+  std::vector<StarTracker> star_trackers;  ///< empty where the simulator does not give it
+  double orbital_rate_rad_s = 0;           ///< n; 0 where the simulator does not give it
   std::vector<Time> t;
   std::vector<Eigen::Quaterniond> q_in_c;
   std::vector<double> h_in;  ///< sample-major: h_in[(sample * gyros + gyro) * 3 + axis]

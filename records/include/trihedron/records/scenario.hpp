@@ -1,7 +1,7 @@
 #pragma once
 /// What a simulated pass is made of. The defaults are the paper's experiment: nine hours of Resurs-DK1, two gyros at 8
 /// Hz, a fix every 3 s, 30′ of misalignment, unknown drift coefficients. SI units, angles in radians, sigmas 1-sigma.
-/// Frames: docs/notation.md. A field of probability is per sample or per fix; zero switches its fault off.
+/// Frames: docs/notation.md. Probabilities are per sample or per fix; zero switches the fault off.
 
 #include <Eigen/Core>
 #include <Eigen/Geometry>
@@ -48,7 +48,7 @@ struct Slew {
   double yaw_rad = 0;
 };
 
-/// Slews drawn from the seed: to a target drawn evenly within the limits, a dwell there, back to the reference
+/// Slews drawn from the seed: to a target uniformly distributed within the limits, a dwell there, back to the reference
 /// attitude.
 struct ImagingProgramme {
   double max_roll_rad = 30 * kDegree;
@@ -80,7 +80,7 @@ struct AttitudeScenario {
   double max_slew_acceleration_rad_s2 = 0.02 * kDegree;
 
   double jitter_rad = 20 * kArcsecond;  ///< 1-sigma about each c axis
-  double jitter_bandwidth_hz = 0.02;    ///< half-power; far above it there is nothing
+  double jitter_bandwidth_hz = 0.02;    ///< half-power; far above it the spectrum is zero
 };
 
 /// One member of the drift family ω = −∇W + h × ∇D on the unit sphere of h in case axes, W or D = amplitude × Y(degree,
@@ -103,16 +103,16 @@ struct DriftHarmonic {
 struct DriftScenario {
   /// κ of eq. (1): k0, μ12, μ23, μ31, ν12, ν23, ν31. Without it drawn from the seed, normal, with `prior_sigma_rad_s`.
   std::optional<std::array<double, 7>> kappa_rad_s{};
-  double prior_sigma_rad_s = 2e-6;  ///< what the estimator is told of each coefficient
+  double prior_sigma_rad_s = 2e-6;  ///< prior sigma that the estimator is given for each coefficient
 
   std::vector<DriftHarmonic> harmonics{};  ///< drift that eq. (1) does not contain
   /// Amplitude, 1-sigma, of further members drawn from the seed: all of degree 1 and 2 that eq. (1) does not contain.
   double outside_sigma_rad_s = 1e-8;
 
-  double coefficient_walk_rad_s_sqrt_s = 0;  ///< each κ wanders: rad/s per √s
+  double coefficient_walk_rad_s_sqrt_s = 0;  ///< random walk of each κ: rad/s per √s
   double warm_up_fraction = 0;               ///< κ(t) = κ (1 + fraction exp(−t / warm_up_time_s))
   double warm_up_time_s = 3600;
-  double direction_walk_rad_sqrt_s = 0;  ///< the momentum wanders about each case axis: rad per √s
+  double direction_walk_rad_sqrt_s = 0;  ///< random walk of the momentum about each case axis: rad per √s
   double markov_sigma_rad_s = 0;  ///< first-order Gauss–Markov drift about each case axis, stationary from the start
   double markov_time_s = 3600;
 };
@@ -136,10 +136,11 @@ struct ReadoutScenario {
 struct GyroScenario {
   Eigen::Vector3d start_direction_c{0.995, 0.087, 0.045};  ///< of the momentum, c axes, at the start; any length but 0
   Eigen::Vector3d mounting_rotation_vector_rad{0, 0, 0};  ///< as designed and known: C_c_b = exp([m×]) exp([mounting×])
-  /// m, c axes. Without it drawn from the seed: even in direction, of the length `misalignment_magnitude_rad`.
+  /// m, c axes. Without it drawn from the seed: uniformly distributed direction, of the length
+  /// `misalignment_magnitude_rad`.
   std::optional<Eigen::Vector3d> misalignment_rad{};
   double misalignment_magnitude_rad = 30 * kArcminute;
-  double alignment_prior_sigma_rad = 30 * kArcminute;  ///< what the estimator is told, per axis
+  double alignment_prior_sigma_rad = 30 * kArcminute;  ///< given to the estimator, per axis
   DriftScenario drift{};
   ReadoutScenario readout{};
 };
@@ -150,7 +151,7 @@ struct StarTrackerScenario {
   // Of further heads only: C_c_s = exp([misalignment×]) exp([mounting×]).
   Eigen::Vector3d mounting_rotation_vector_rad{0, 0, 0};
   Eigen::Vector3d misalignment_rad{0, 0, 0};      ///< c axes
-  double alignment_prior_sigma_rad = kArcminute;  ///< what the estimator is told of it, per axis
+  double alignment_prior_sigma_rad = kArcminute;  ///< given to the estimator, per axis
 
   Eigen::Vector3d noise_rad{3 * kArcsecond, 3 * kArcsecond, 20 * kArcsecond};  ///< white, about s x, y, z
   double clock_offset_s = 0;
@@ -161,7 +162,7 @@ struct StarTrackerScenario {
   Eigen::Vector3d orbital_sine_rad{0, 0, 0};
   Eigen::Vector3d orbital_cosine_rad{0, 0, 0};
 
-  /// Error that belongs to the place of the stars in the field of view: changes as the field moves over the sky by
+  /// Error that depends on where the stars stand in the field of view: decorrelates as the field moves over the sky by
   /// `field_correlation_rad`, frozen when the attitude is inertial.
   Eigen::Vector3d field_error_rad{0, 0, 0};
   double field_correlation_rad = 2 * kDegree;
@@ -176,7 +177,7 @@ struct StarTrackerScenario {
 
   std::vector<Interval> outages{};
   double dropout_probability = 0;  ///< the fix is missing
-  double outlier_probability = 0;  ///< off by a rotation of random axis and an angle even in 0 … outlier_rad
+  double outlier_probability = 0;  ///< rotated about a random axis by an angle uniform in 0 … outlier_rad
   double outlier_rad = 2 * kDegree;
   double wrong_sign_probability = 0;  ///< −q in place of q
 };

@@ -1,5 +1,5 @@
 #pragma once
-/// A pass through the on-board cycle: calibration, navigation.
+/// Calibration and navigation of a pass.
 
 #include "trihedron/records/options.hpp"
 #include "trihedron/records/pass.hpp"

@@ -1,12 +1,13 @@
 #pragma once
-/// Several passes of one start of the rotors: what one leaves is what the next begins from, and each is asked whether
-/// it agrees with those before.
+/// Several passes of one start of the rotors: the result of one is the prior of the next, and each is tested for
+/// whether it agrees with those before.
 
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "trihedron/ground/judge/agreement.hpp"
+#include "trihedron/records/catalogue.hpp"
 #include "trihedron/records/progress.hpp"
 #include "trihedron/records/run.hpp"
 
@@ -20,10 +21,10 @@ struct PassAlone {
   Agreement alignments;
 };
 
-/// By the data of the new pass alone and of the passes before alone: what each was told before is taken out.
-/// The likelihood of a calibration with estimate x and covariance P from a prior x0, P0 has the information P⁻¹ − P0⁻¹
-/// and its greatest value at x + (P⁻¹ − P0⁻¹)⁻¹ P0⁻¹ (x − x0). Compared are the directions in which the difference is
-/// better known than the prior of the passes before.
+/// By the data of the new pass alone and of the passes before alone: the priors of both are taken out. The likelihood
+/// of a calibration with estimate x and covariance P from a prior x0, P0 has the information P⁻¹ − P0⁻¹ and its
+/// greatest value at x + (P⁻¹ − P0⁻¹)⁻¹ P0⁻¹ (x − x0). Compared are the directions in which the difference is better
+/// known than the prior of the passes before.
 class SeveralPasses {
  public:
   explicit SeveralPasses(CalibrationOptions options) : options_(std::move(options)) {}
@@ -38,6 +39,8 @@ class SeveralPasses {
   [[nodiscard]] const CalibrationRun& combined() const { return combined_; }
   /// That the passes name; empty where none does.
   [[nodiscard]] const std::string& start_up() const { return start_up_; }
+  /// For a catalogue: each pass alone, and where there are several the last one from all those before.
+  [[nodiscard]] std::vector<CatalogueEntry> catalogue_entries() const;
 
  private:
   void combine(const Pass& pass, const CalibrationOptions& options, const Progress& progress);

@@ -14,9 +14,10 @@ namespace trihedron::ground {
 /// Whether the data say more of the parameter in this row of Calibration::states than was known before.
 [[nodiscard]] bool is_determined(const CalibrationRun& run, std::size_t row);
 
+/// When one parameter converged.
 struct Convergence {
   bool determined = false;  ///< otherwise there is nothing to settle to
-  bool followed = true;     ///< otherwise the on-board cycle, whose course this is, does not estimate it
+  bool followed = true;     ///< false where the on-board step, whose course this is, does not estimate it
   /// Since the pass epoch: after it the error stays within 3 final sigmas or 10 % of its first value, whichever is
   /// larger. Absent where it is outside at the end.
   std::optional<Duration> settled;

@@ -4,7 +4,7 @@
 
 namespace trihedron::ground {
 
-/// What a user must know before he uses the result: findings with evidence and cure, and one word, trustworthy or not.
+/// Findings with evidence and cure, and whether the result may be used.
 [[nodiscard]] Verdict judge(const Pass& pass, const CalibrationRun& run);
 /// Whether the parameters in use fit the pass.
 [[nodiscard]] Verdict judge_navigation(const NavigationRun& run);
@@ -20,8 +20,8 @@ struct AlignmentObservability {
   double sigma_rad =
       0;  ///< of the alignment about that axis from the fixes alone, at best; infinite where it never moved
 };
-/// From the scatter of C_in_c within stretches of ten minutes; what moves more slowly than that is not told from drift.
-/// `tracker_noise_rad`: 1-sigma about c x, y, z; `fix_noise_rad`: of a fix about the best axis.
+/// From the scatter of C_in_c within stretches of ten minutes; what moves more slowly than that cannot be separated
+/// from drift. `tracker_noise_rad`: 1-sigma about c x, y, z; `fix_noise_rad`: of a fix about the best axis.
 [[nodiscard]] AlignmentObservability alignment_observability(const StarTrackerTelemetry& tracker,
                                                              const Eigen::Vector3d& tracker_noise_rad,
                                                              double fix_noise_rad);

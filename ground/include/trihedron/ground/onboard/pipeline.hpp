@@ -16,18 +16,17 @@
 
 namespace trihedron::ground {
 
-/// Everything that it does is told in its reports; it looks at nothing but the events that it was given.
+/// Everything that it does is in its reports. Its results depend on nothing but the events that it was given.
 class Pipeline {
  public:
-  /// Of options in which nothing is left to decide. `navigate`: whether there is a navigator beside the calibration.
-  /// Throws SetupError.
+  /// Needs options in which nothing is left to decide. `navigate`: whether a navigator runs as well. Throws SetupError.
   Pipeline(const PassSettings& settings, const CalibrationOptions& options, bool navigate = true);
   Pipeline(Pipeline&&) noexcept;
   Pipeline& operator=(Pipeline&&) noexcept;
   ~Pipeline();
 
-  /// What was done at this event; valid until the next one. A fix is reported when it is dealt with, which for a good one
-  /// is some samples later.
+  /// What was done at this event; valid until the next one. A fix is reported when it is dealt with, which for a good
+  /// one is some samples later.
   std::span<const StepReport> feed(const GyroSample& sample);
   std::span<const StepReport> feed(const StarFix& fix);
   /// After the last event: deals with the fixes that still wait.
@@ -54,6 +53,8 @@ class Pipeline {
 
  private:
   struct Program;
+  template <class Step>
+  [[nodiscard]] std::span<const StepReport> report_all(const Step& step);
   [[nodiscard]] double part_of_change() const;
 
   PassSettings settings_;

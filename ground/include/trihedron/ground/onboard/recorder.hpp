@@ -1,5 +1,5 @@
 #pragma once
-/// What the reports of a pipeline add up to.
+/// Collects the reports of a pipeline.
 
 #include <optional>
 #include <vector>
@@ -9,7 +9,7 @@
 
 namespace trihedron::ground {
 
-/// One fix of a spacecraft with so many gyros.
+/// The record of one fix; `gyros`: their number.
 [[nodiscard]] FixRecord record_of(const StepReport& report, int gyros);
 /// Of fixes; what is not about fixes is left as it is.
 void add_statistics(const std::vector<FixRecord>& fixes, Statistics& statistics);

@@ -1,0 +1,147 @@
+"""A command that is interrupted ends at once, by the signal, and leaves nothing half-written. Run by CTest with TRIHEDRON_BUILD naming
+the build directory."""
+import os
+import pathlib
+import signal
+import subprocess
+import time
+
+import pytest
+
+BUILD = pathlib.Path(os.environ["TRIHEDRON_BUILD"])
+PROGRAM = BUILD / "trihedron"
+CONSISTENCY = BUILD / "trihedron_consistency"
+SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+# A tenth of a second where nothing else runs.
+LIMIT_S = 2
+
+TOLD = """
+drift_model = "esg7"
+[filter]
+noise = "told"
+[further_states]
+clock_offset = "off"
+orbital_error = "off"
+readout_bias = "off"
+coefficient_change = "off"
+wandering_drift = "off"
+"""
+
+
+def begin(*command):
+    return subprocess.Popen(list(map(str, command)), stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+
+
+def stop(process, with_signal):
+    """Seconds until it ends."""
+    process.send_signal(with_signal)
+    sent = time.monotonic()
+    process.communicate(timeout=60)
+    return time.monotonic() - sent
+
+
+def files_below(directory):
+    return sorted(str(path.relative_to(directory)) for path in directory.rglob("*"))
+
+
+def simulated(directory, hours):
+    (directory / "scenario.toml").write_text(f'[scenario]\nseed = 3\nduration = "{60 * hours}min"\n')
+    subprocess.run([str(PROGRAM), "--quiet", "simulate", directory / "scenario.toml", "-o", directory / "pass.nc"], check=True)
+    return directory / "pass.nc"
+
+
+@pytest.fixture(scope="module")
+def day(tmp_path_factory):
+    return simulated(tmp_path_factory.mktemp("day"), 24)
+
+
+@pytest.fixture(scope="module")
+def two_hours(tmp_path_factory):
+    return simulated(tmp_path_factory.mktemp("two_hours"), 2)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("with_signal", SIGNALS)
+@pytest.mark.parametrize("after_s", [0.02, 0.3, 1, 2.5, 5])
+def test_calibration_of_a_day_ends_at_once(day, tmp_path, with_signal, after_s):
+    process = begin(PROGRAM, "calibrate", day, "-o", tmp_path / "above" / "out", "--estimator", "batch", "--definitive")
+    time.sleep(after_s)
+    assert process.poll() is None, process.communicate()
+    assert stop(process, with_signal) < LIMIT_S
+    assert process.returncode == -with_signal
+    assert files_below(tmp_path) == []
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("arguments", [
+    ("navigate", "{pass}", "-o", "{out}/attitude.csv", "--online"),
+    ("simulate", "{scenario}", "-o", "{out}/again"),
+    ("simulate", "{scenario}", "-o", "{out}/again.nc"),
+    ("observe", "{steady}", "--advise", "--confirm", "100"),
+])
+def test_other_long_commands_end_at_once(day, tmp_path, arguments):
+    out = tmp_path / "out"
+    steady = tmp_path / "steady.toml"
+    steady.write_text('[scenario]\nseed = 2\nduration = "80min"\n[attitude]\nslews = "none"\n')
+    names = {"pass": day, "scenario": day.parent / "scenario.toml", "steady": steady, "out": out}
+    for after_s, with_signal in ((0.1, signal.SIGTERM), (0.4, signal.SIGINT), *([(6, signal.SIGINT)] if "observe" in arguments else [])):
+        out.mkdir(exist_ok=True)
+        process = begin(PROGRAM, *(argument.format(**names) for argument in arguments))
+        time.sleep(after_s)
+        assert process.poll() is None, process.communicate()
+        assert stop(process, with_signal) < LIMIT_S
+        assert process.returncode == -with_signal
+        assert files_below(out) == []
+
+
+def test_whenever_it_is_interrupted_all_files_are_there_or_none(two_hours, tmp_path):
+    (tmp_path / "told.toml").write_text(TOLD)
+    arguments = (PROGRAM, "calibrate", two_hours, "--config", tmp_path / "told.toml", "-o")
+    began = time.monotonic()
+    subprocess.run([*map(str, arguments), str(tmp_path / "whole")], check=False, capture_output=True)
+    needs_s = time.monotonic() - began
+    whole = files_below(tmp_path / "whole")
+    assert "report.html" in whole
+    for moment in range(12):
+        out = tmp_path / f"out{moment}"
+        process = begin(*arguments, out)
+        time.sleep(needs_s * (moment + 0.5) / 11)
+        stop(process, SIGNALS[moment % 2])
+        assert process.returncode in (-SIGNALS[moment % 2], 0, 1)
+        assert process.returncode < 0 or files_below(out) == whole
+        assert not out.exists() or files_below(out) == whole
+
+
+def test_files_of_an_earlier_run_stay_as_they_were(two_hours, tmp_path):
+    out = tmp_path / "out"
+    out.mkdir()
+    (out / "calibration.json").write_text("earlier")
+    process = begin(PROGRAM, "calibrate", two_hours, "-o", out, "--estimator", "batch")
+    time.sleep(0.2)
+    assert process.poll() is None, process.communicate()
+    stop(process, signal.SIGINT)
+    assert process.returncode == -signal.SIGINT
+    assert files_below(tmp_path) == ["out", "out/calibration.json"]
+    assert (out / "calibration.json").read_text() == "earlier"
+
+
+def test_a_signal_that_is_ignored_stays_ignored(two_hours, tmp_path):
+    (tmp_path / "told.toml").write_text(TOLD)
+    process = subprocess.Popen(
+        [str(PROGRAM), "--quiet", "calibrate", str(two_hours), "-o", str(tmp_path / "out"), "--config", str(tmp_path / "told.toml")],
+        preexec_fn=lambda: signal.signal(signal.SIGHUP, signal.SIG_IGN))
+    time.sleep(0.1)
+    process.send_signal(signal.SIGHUP)
+    assert process.wait(timeout=60) in (0, 1)
+    assert (tmp_path / "out" / "report.html").exists()
+
+
+@pytest.mark.long
+@pytest.mark.skipif(not CONSISTENCY.exists(), reason="not built: TRIHEDRON_BUILD_BENCH is off")
+def test_the_grid_of_flights_ends_at_once(tmp_path):
+    for after_s, with_signal in ((0.1, signal.SIGTERM), (2, signal.SIGINT)):
+        process = begin(CONSISTENCY, "--runs", 100)
+        time.sleep(after_s)
+        assert process.poll() is None, process.communicate()
+        assert stop(process, with_signal) < LIMIT_S
+        assert process.returncode == -with_signal

@@ -1,0 +1,82 @@
+#include "trihedron/io/named_pass.hpp"
+
+#include <gmock/gmock.h>
+
+#include <string>
+#include <vector>
+
+#include "fixtures.hpp"
+
+namespace trihedron::io {
+namespace {
+
+using testing::ElementsAre;
+using testing::HasSubstr;
+
+class NamedPasses : public testing::Test {
+ protected:
+  /// The clean pass, begun at this hour.
+  void save(const char* name, const char* hour) const {
+    RawPass pass = clean_pass();
+    pass.toml = replaced(pass.toml, "T00:00:00", std::string("T") + hour + ":00:00");
+    std::filesystem::create_directories((directory_ / name).parent_path());
+    if (std::string(name).ends_with(".nc")) {
+      pass.save_netcdf(directory_ / name);
+    } else {
+      pass.save_directory(directory_ / name);
+    }
+  }
+  [[nodiscard]] std::vector<std::string> names_of(const std::vector<std::string>& paths) const {
+    std::vector<std::string> whole;
+    for (const std::string& path : paths) {
+      whole.push_back((directory_ / path.c_str()).string());
+    }
+    std::vector<std::string> names;
+    for (const NamedPass& pass : read_passes(whole)) {
+      names.push_back(pass.name);
+    }
+    return names;
+  }
+  TemporaryDirectory directory_;
+};
+
+TEST_F(NamedPasses, AreNamedByTheirFilesAndComeInTheOrderOfTheirEpochs) {
+  save("late.nc", "12");
+  save("early", "03");
+  EXPECT_THAT(names_of({"late.nc", "early/"}), ElementsAre("early", "late"));
+}
+
+TEST_F(NamedPasses, OfTheSameNameAreNumberedAsTheyWereGiven) {
+  save("a/pass.nc", "12");
+  save("b/pass", "03");
+  EXPECT_THAT(names_of({"a/pass.nc", "b/pass"}), ElementsAre("pass-2", "pass"));
+}
+
+TEST_F(NamedPasses, HaveATruthOnlyWhereThereIsOne) {
+  save("pass", "00");
+  const NamedPass without = read_named_pass(directory_ / "pass");
+  EXPECT_EQ(without.truth_or_null(), nullptr);
+  const Truth truth = clean_truth();
+  write_pass(directory_ / "with.nc", without.pass(), &truth);
+  const NamedPass with = read_named_pass(directory_ / "with.nc");
+  ASSERT_NE(with.truth_or_null(), nullptr);
+  EXPECT_EQ(with.truth_or_null()->gyros.size(), 2U);
+}
+
+TEST_F(NamedPasses, RefuseATruthOfAnotherNumberOfGyros) {
+  save("pass", "00");
+  const Pass pass = read_pass(directory_ / "pass").pass;
+  Truth truth = clean_truth();
+  truth.gyros.push_back(truth.gyros.back());
+  std::vector<double> h_in;
+  for (std::size_t i = 0; i < truth.t.size(); ++i) {
+    h_in.insert(h_in.end(), {1, 0, 0, 0, 1, 0, 0, 0, 1});
+  }
+  truth.h_in = h_in;
+  write_pass(directory_ / "three.nc", pass, &truth);
+  EXPECT_THAT(refusal([&] { static_cast<void>(read_named_pass(directory_ / "three.nc")); }),
+              HasSubstr("the truth has 3 gyros, the telemetry 2"));
+}
+
+}  // namespace
+}  // namespace trihedron::io
