@@ -5,13 +5,14 @@ BUILD := build
 LINT_TOOLS := build-lint/tools
 SOURCES := $(shell git ls-files '*.cpp' '*.hpp' 2>/dev/null)
 
-.PHONY: help setup build demo test bench validation consistency docs format lint sanitize coverage install clean
+.PHONY: help setup build everything demo test bench validation consistency docs format lint sanitize coverage install clean
 
 help:
 	@echo 'make demo     install what is missing, build, repeat the experiment of the paper, say where the report is'
 	@echo 'make test     build and run all tests'
-	@echo 'make build    leaves the program at $(BUILD)/trihedron'
-	@echo 'make bench    measure: steps of the cycle, reading, writing and simulating a pass'
+	@echo 'make build    the program alone, at $(BUILD)/trihedron'
+	@echo 'make everything  with tests and benches'
+	@echo 'make bench    measure: the on-board step, reading, writing and simulating a pass'
 	@echo 'make validation  measure again what docs/validation.md tells'
 	@echo 'make consistency  measure again what docs/consistency.md tells: hours; goes on where it was interrupted'
 	@echo 'make docs     reference of the interfaces and all documents as web pages: out/docs/html/index.html'
@@ -23,24 +24,32 @@ help:
 setup:
 	@cmake/setup.sh
 
-build: setup
+# The program alone. A build directory that has tests keeps them.
+build:
+	@cmake/setup.sh program
+	cmake $(if $(wildcard $(BUILD)/CMakeCache.txt),$(BUILD),--preset program) $(CMAKE_FLAGS)
+	cmake --build $(BUILD) --parallel $(JOBS) --target trihedron
+
+everything:
+	@cmake/setup.sh program tests
 	cmake --preset release $(CMAKE_FLAGS)
 	cmake --build $(BUILD) --parallel $(JOBS)
 
 demo: build
 	$(BUILD)/trihedron demo -o out/demo
 
-test: build
+test: everything
 	ctest --test-dir $(BUILD) --output-on-failure --parallel $(JOBS)
 
-bench: build
+bench: everything
 	$(BUILD)/trihedron_bench
 
-validation: build
+validation: everything
 	validation/validate.py $(BUILD)/trihedron docs/validation.md
 
 # Counts the lines of core on the way, for `coverage`.
-sanitize: setup
+sanitize:
+	@cmake/setup.sh program tests
 	cmake --preset sanitize $(CMAKE_FLAGS)
 	cmake --build build-sanitize --parallel $(JOBS)
 	find build-sanitize -name '*.gcda' -delete
@@ -58,7 +67,7 @@ ONE_GEOMETRY = '/plane-plane/1e-06/30arcmin/(0e.00|1e-08)$$'
 GEOMETRIES = '/1e-06/30arcmin/(0e.00|1e-08)$$'
 
 # The outcomes of flights outlive an interruption, not a change of the program.
-consistency: build
+consistency: everything
 	@mkdir -p out
 	@if [ $(BUILD)/trihedron_consistency -nt out/consistency.txt ]; then rm -f out/consistency.txt; fi
 	$(CONSISTENCY) docs/consistency.md
@@ -81,13 +90,15 @@ format: $(LINT_TOOLS)/installed
 	@$(LINT_TOOLS)/bin/clang-format -i $(SOURCES)
 
 # Of one version everywhere. That clang-tidy of Debian 12 runs each check over all that the headers of others contain.
-$(LINT_TOOLS)/installed: cmake/lint-requirements.txt | setup
+$(LINT_TOOLS)/installed: cmake/lint-requirements.txt
+	@cmake/setup.sh lint
 	python3 -m venv $(LINT_TOOLS)
 	$(LINT_TOOLS)/bin/pip install --quiet --disable-pip-version-check --requirement $<
 	touch $@
 
 # In units of several files: clang-tidy reads Eigen once for each unit instead of once for each file.
 lint: $(LINT_TOOLS)/installed
+	@cmake/setup.sh program
 	@$(LINT_TOOLS)/bin/clang-format --dry-run --Werror $(SOURCES)
 	cmake --preset lint
 	sed -n 's/^ *"file": "\(.*\/\(Unity\|src\)\/.*\)".*/\1/p' build-lint/compile_commands.json | \

@@ -1,18 +1,29 @@
 #!/usr/bin/env bash
-# Installs what is missing on Debian 12; does nothing, quickly, when nothing is. With the argument `docs`: what `make docs` needs.
+# cmake/setup.sh [GROUP…]: installs what is missing of these groups on Debian 12, of program, tests and lint where none is named; does
+# nothing, quickly, when nothing is.
 set -euo pipefail
 
-packages=(
-  build-essential cmake ninja-build git ca-certificates
+program=(
+  g++ cmake ninja-build pkg-config
   libeigen3-dev libhdf5-dev libcli11-dev libtomlplusplus-dev libfmt-dev nlohmann-json3-dev libnetcdf-dev libfast-float-dev libsqlitecpp-dev
-  libtbb-dev libboost-dev libboost-math-dev liberfa-dev pkg-config nodejs npm
-  libgtest-dev libgmock-dev librapidcheck-dev libbenchmark-dev
-  gcovr chromium-headless-shell
-  python3 python3-venv python3-pytest python3-xarray python3-h5netcdf
+  libtbb-dev libboost-dev liberfa-dev nodejs npm ca-certificates
 )
-if [ "${1:-}" = docs ]; then
-  packages=(doxygen)
-fi
+# Tests, their coverage, benches, validation.
+tests=(
+  libgtest-dev libgmock-dev librapidcheck-dev libbenchmark-dev
+  chromium-headless-shell
+  gcovr python3 python3-pytest python3-xarray python3-h5netcdf
+)
+docs=(doxygen)
+lint=(git ca-certificates python3 python3-venv)
+
+packages=()
+for name in ${*:-program tests lint}; do
+  case $name in
+    program|tests|lint|docs) declare -n members=$name && packages+=("${members[@]}") ;;
+    *) echo "setup: no group \"$name\"; there are program, tests, lint, docs" >&2; exit 2 ;;
+  esac
+done
 
 missing=()
 for package in "${packages[@]}"; do
@@ -35,4 +46,5 @@ if [ "$(id -u)" -ne 0 ]; then
 fi
 echo "setup: installing ${missing[*]}"
 "${sudo[@]}" apt-get update -qq
-"${sudo[@]}" env DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends "${missing[@]}" >/dev/null
+"${sudo[@]}" env DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends \
+  "${missing[@]}" >/dev/null

@@ -241,6 +241,17 @@ PerGyro<double> InvariantEstimator<kCapacity>::reading_noise(const Eigen::Matrix
 }
 
 template <Capacity kCapacity>
+Eigen::Matrix3d InvariantEstimator<kCapacity>::misalignment_of(const StarFix& fix,
+                                                               const FixBySharedStates& by_shared) const {
+  if (fix.head == 0) {
+    return Eigen::Matrix3d::Zero();  // its axes are c
+  }
+  Rows3 rows = Rows3::Zero(3, layout().size());
+  rows.rightCols(layout().shared_size()) = by_shared;
+  return covariance_of(rows);
+}
+
+template <Capacity kCapacity>
 void InvariantEstimator<kCapacity>::put_innovation(White& white) const {
   const int components = static_cast<int>(white.rows.rows());
   Compared through = white.rows;
@@ -380,8 +391,13 @@ FixReport InvariantEstimator<kCapacity>::correct(const StarFix& fix, const FixRe
     return report;
   }
   update_to_now(by_gyros.value().C_in_c.raw());
-  const Eigen::Matrix3d C_linear = fused_attitude(by_gyros.value(), C_in_c, R_c, readings);
-  const PerGyro<double> noise_rad = reading_noise(C_linear, readings.noise_factor, 1);
+  const Eigen::Matrix3d misalignment = misalignment_of(fix, by_shared);
+  const Eigen::Matrix3d C_linear = fused_attitude(by_gyros.value(), C_in_c, R_c + misalignment, readings);
+  PerGyro<double> noise_rad = reading_noise(C_linear, readings.noise_factor, 1);
+  // Of the second order, and not normal: three times its sigma costs nothing but the weight of the first such fix.
+  for (double& its : noise_rad) {
+    its = std::hypot(its, 3 * second_order_rad(misalignment, misalignment));
+  }
   const FixComparison comparison =
       compare(layout(), gyros_, C_in_c.raw(), C_linear, readings.h_b, readings.used, by_shared);
   White white = whitened(comparison, R_c, noise_rad);

@@ -1,6 +1,7 @@
 #include "trihedron/records/drift_models.hpp"
 
 #include <algorithm>
+#include <array>
 #include <charconv>
 
 #include "trihedron/core/drift.hpp"
@@ -10,6 +11,12 @@ namespace {
 
 using Family = DriftModelId::Family;
 using Member = DriftCoefficient::Member;
+
+constexpr std::array<DriftModelRow, 3> kDriftModels = {{
+    {Family::kEsg7, "esg7", 0},
+    {Family::kEsg20, "esg20", 0},
+    {Family::kVsh, "vsh:", DriftModelId::kMaxDegree},
+}};
 
 constexpr std::string_view kCubeDName = "D(k0)";
 /// As of DriftHarmonic.
@@ -30,6 +37,8 @@ std::optional<int> whole_number(std::string_view text) {
 }
 
 }  // namespace
+
+std::span<const DriftModelRow> drift_models() { return kDriftModels; }
 
 std::string name_of(const DriftModelId& model) {
   const DriftModelRow& row = row_of(model.family);
@@ -52,7 +61,13 @@ std::optional<DriftModelId> drift_model_named(std::string_view name) {
 }
 
 std::string drift_model_choices() {
-  return name_of(kEsg7) + ", " + name_of(kEsg20) + ", or " + name_of(vsh(1)) + " … " + name_of(kLargestDriftModel);
+  std::string choices;
+  for (const DriftModelRow& row : kDriftModels) {
+    const std::string name(row.name);
+    choices += choices.empty() ? "" : row.family == kDriftModels.back().family ? ", or " : ", ";
+    choices += row.largest_degree == 0 ? name : name + "1 … " + name + std::to_string(row.largest_degree);
+  }
+  return choices;
 }
 
 std::vector<DriftCoefficient> coefficients_of(const DriftModelId& model) {

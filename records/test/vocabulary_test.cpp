@@ -32,8 +32,8 @@ TEST(Vocabulary, RowsStandWhereTheirValuesSay) {
   for (std::size_t i = 0; i < kFindings.size(); ++i) {
     EXPECT_EQ(static_cast<std::size_t>(kFindings[i].code), i);
   }
-  for (std::size_t i = 0; i < kDriftModels.size(); ++i) {
-    EXPECT_EQ(static_cast<std::size_t>(kDriftModels[i].family), i);
+  for (std::size_t i = 0; i < drift_models().size(); ++i) {
+    EXPECT_EQ(static_cast<std::size_t>(drift_models()[i].family), i);
   }
 }
 
@@ -64,6 +64,7 @@ TEST(Vocabulary, DriftModelsComeBackFromTheirNames) {
     EXPECT_EQ(drift_model_named(name_of(model)), model) << name_of(model);
   }
   EXPECT_EQ(name_of(kLargestDriftModel), "vsh:6");
+  EXPECT_EQ(drift_model_choices(), "esg7, esg20, or vsh:1 … vsh:6");
   for (const char* name : {"", "auto", "esg", "esg70", "vsh", "vsh:", "vsh:0", "vsh:7", "vsh:01", "vsh:+1", "vsh:1 ",
                            "vsh:-1", "vsh:1x"}) {
     EXPECT_FALSE(drift_model_named(name).has_value()) << name;

@@ -322,7 +322,7 @@ std::vector<CatalogueEntry> synthetic_catalogue(const Calibration& like) {
   // The last one has a coefficient that the others do not have.
   GyroCalibration& gyro = catalogue.back().calibration.gyros[0];
   gyro.drift_model = kEsg20;
-  gyro.drift_rad_s.resize(Esg20::kSize, 1e-8);
+  gyro.drift_rad_s.resize(static_cast<std::size_t>(kEsg20.size()), 1e-8);
   catalogue.back().calibration.states.push_back(parameter_named("gyro1.W(1,0)").value());
   const Eigen::Index states = like.covariance.rows() + 1;
   catalogue.back().calibration.covariance.conservativeResizeLike(

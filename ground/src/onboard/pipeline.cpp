@@ -32,7 +32,7 @@ SetupError error_of(SetupFault fault) {
   return {"there are more states than there is room for", "use fewer gyros, or a smaller drift model"};
 }
 
-/// With the room of another model, as many columns.
+/// Copies gyros into storage of another capacity.
 template <class To, class From>
 To with_room(const From& from, const Layout& layout) {
   To to;
@@ -80,7 +80,7 @@ struct Pipeline::Program {
     });
   }
 
-  /// The same of κ and δ, the coefficients as they are when so much of their change has been.
+  /// The same of κ and δ, with the coefficients at the time when this fraction of their change has taken place.
   [[nodiscard]] Roots parameter_root(double part_of_change) const {
     const Roots errors = error_root();
     Roots root = errors.middleRows(layout.drift(0), layout.parameters());

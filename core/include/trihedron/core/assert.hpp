@@ -15,5 +15,6 @@ namespace detail {
 
 }  // namespace trihedron
 
+/// Ends in the handler, in all builds, unless the expression is true.
 #define TRIHEDRON_ASSERT(expression) \
   ((expression) ? static_cast<void>(0) : ::trihedron::detail::assertion_failed(#expression, __FILE__, __LINE__))

@@ -6,6 +6,7 @@
 
 namespace trihedron {
 
+/// Why directions give no attitude.
 enum class DirectionsFault { kNotFinite, kMomentaNearlyParallel, kTooFew };
 
 /// Pairs of momenta within asin(kMinSine) = 2.9° of being parallel or antiparallel give no attitude: errors about them

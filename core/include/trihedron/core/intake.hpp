@@ -13,6 +13,7 @@
 
 namespace trihedron {
 
+/// Decides what of the telemetry is used, and keeps fixes until their readings are there.
 class Intake {
  public:
   /// A time step larger than this is accepted only when the next sample confirms it.

@@ -128,6 +128,9 @@ class InvariantEstimator {
   [[nodiscard]] PerGyro<double> readout_noise(double noise_factor) const;
   /// The same with the second-order term; n: consecutive measurements without a fix between them.
   [[nodiscard]] PerGyro<double> reading_noise(const Eigen::Matrix3d& C_linear, double noise_factor, int n) const;
+  /// Covariance of what is not known of the error of a further star tracker's fix, noise apart: its first fix finds its
+  /// alignment, and until then it is no attitude to linearise at.
+  [[nodiscard]] Eigen::Matrix3d misalignment_of(const StarFix& fix, const FixBySharedStates& by_shared) const;
   [[nodiscard]] White whitened(const FixComparison& comparison, const Eigen::Matrix3d& R_c,
                                const PerGyro<double>& noise_rad) const;
   /// A comparison with the attitude eliminated and the noise of the readings alone: what the angles between the momenta

@@ -35,6 +35,7 @@ struct GyroComparison {
   Eigen::Matrix<double, 2, Eigen::Dynamic, 0, 2, GyroReadout::kMaxErrors> by_readout;
 };
 
+/// A fix compared with the momenta, gyro by gyro.
 struct FixComparison {
   GyroMask used{};
   PerGyro<GyroComparison> gyros;
@@ -48,7 +49,8 @@ template <class Derived>
 [[nodiscard]] auto by_readout_errors(const Layout& layout, const Eigen::MatrixBase<Derived>& by_reading,
                                      const GyroReadout& gyro, const Eigen::Vector3d& h_b) {
   using ByCase = Eigen::Matrix<double, Derived::RowsAtCompileTime, 3>;
-  using ByErrors = Eigen::Matrix<double, Derived::RowsAtCompileTime, Eigen::Dynamic, 0, Derived::RowsAtCompileTime,
+  constexpr int kRows = Derived::RowsAtCompileTime;
+  using ByErrors = Eigen::Matrix<double, kRows, Eigen::Dynamic, kRows == 1 ? Eigen::RowMajor : Eigen::ColMajor, kRows,
                                  GyroReadout::kMaxErrors>;
   const ByCase by_case = by_reading * gyro.C_c_b;
   return ByErrors(by_case.lazyProduct(GyroReadout::by_errors(layout, h_b)));
@@ -80,8 +82,10 @@ template <class Gyros>
   return comparison;
 }
 
-/// Covariance of the noise of a comparison: the fix's error is common to all components, each readout's to its own two.
+/// Covariance of the components of a comparison.
 using ComponentCovariance = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, kMaxComponents, kMaxComponents>;
+/// Of the noise of a comparison: the fix's error is common to all components, each readout's to its own two. R_c:
+/// covariance of the fix, c axes, rad²; readout_noise_rad: of the readings that it is compared with.
 [[nodiscard]] ComponentCovariance noise_of(const FixComparison& comparison, const Eigen::Matrix3d& R_c,
                                            const PerGyro<double>& readout_noise_rad);
 

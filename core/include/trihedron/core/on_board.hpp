@@ -15,6 +15,7 @@
 
 namespace trihedron {
 
+/// Intake, readings, schedule, estimator and navigator put together: fed event by event, it reports on each.
 template <class Estimator>
 class OnBoard {
  public:

@@ -10,6 +10,7 @@
 
 namespace trihedron {
 
+/// Times of what is due.
 class Schedule {
  public:
   /// Interval of angle updates in an outage of fixes; successive updates share no samples.

@@ -13,6 +13,7 @@
 
 namespace trihedron {
 
+/// What is wrong with a set-up.
 enum class SetupFault : std::uint8_t {
   kTooLarge,  ///< the layout needs more room than there is, or has states that this estimator cannot have
   kPriorNotPositiveDefinite,
@@ -45,6 +46,7 @@ class PerFurtherState {
   std::array<T, kFurtherStateCount> items_{};
 };
 
+/// The prior sigmas of kFurtherStateKinds.
 [[nodiscard]] constexpr PerFurtherState<double> default_further_sigmas() {
   PerFurtherState<double> sigmas;
   for (const FurtherStateKind& kind : kFurtherStateKinds) {

@@ -6,6 +6,7 @@
 
 namespace trihedron {
 
+/// What was done with a gyro sample.
 enum class SampleStatus : std::uint8_t {
   kNone,  ///< no sample in this step
   kUsed,
@@ -20,16 +21,18 @@ enum class SampleStatus : std::uint8_t {
 };
 inline constexpr std::size_t kSampleStatuses = 8;
 
+/// Whether the sample took part in the estimation.
 [[nodiscard]] constexpr bool is_used(SampleStatus status) {
   return status == SampleStatus::kUsed || status == SampleStatus::kUsedAfterClockSetBack;
 }
 
+/// What was done with a fix.
 enum class FixStatus : std::uint8_t {
   kNone,                 ///< no fix was due
   kPending,              ///< held until the gyro samples round it are there
   kStarted,              ///< the first fix: sets the directions
   kUsed,                 ///< calibration updated
-  kUsedAfterReopening,   ///< used after a run of rejections, with the directions set free
+  kUsedAfterReopening,   ///< used after a run of rejections, with the directions reopened
   kRestarted,            ///< used after another run of rejections soon after: the filter restarted
   kRejectedNotRotation,  ///< quaternion not finite or not unit
   kRejectedOutOfOrder,   ///< repeated, or too late: the calibration has passed its time
@@ -42,11 +45,13 @@ enum class FixStatus : std::uint8_t {
 };
 inline constexpr std::size_t kFixStatuses = 14;
 
+/// Whether the fix took part in the estimation.
 [[nodiscard]] constexpr bool is_used(FixStatus status) {
   return status == FixStatus::kStarted || status == FixStatus::kUsed || status == FixStatus::kUsedAfterReopening ||
          status == FixStatus::kRestarted;
 }
 
+/// Whether a gyro is used.
 enum class GyroState : std::uint8_t {
   kUsed,
   kStuck,     ///< its readings do not change, not even by noise; used again when they do

@@ -14,6 +14,7 @@
 
 namespace trihedron {
 
+/// The parameters of one gyro, and its momentum.
 struct GyroCalibration {
   DriftModelId drift_model;
   std::vector<double> drift_rad_s;                         ///< by coefficient, in the order of coefficients_of()

@@ -1,8 +1,8 @@
 #pragma once
 /// The drift models by name, and their coefficients. A coefficient is the same in each model that has it.
 
-#include <array>
 #include <optional>
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -11,16 +11,15 @@
 
 namespace trihedron {
 
+/// One family of drift models, as users name it.
 struct DriftModelRow {
   DriftModelId::Family family;
   std::string_view name;  ///< in settings, in calibration.json and for people; the degree comes after it
   int largest_degree;     ///< 0 where the model has none
 };
 
-inline constexpr std::array<DriftModelRow, 3> kDriftModels = {
-    {{DriftModelId::Family::kEsg7, "esg7", 0},
-     {DriftModelId::Family::kEsg20, "esg20", 0},
-     {DriftModelId::Family::kVsh, "vsh:", DriftModelId::kMaxDegree}}};
+/// One row for each, in the order of DriftModelId::Family.
+[[nodiscard]] std::span<const DriftModelRow> drift_models();
 
 inline constexpr DriftModelId kLargestDriftModel = vsh(DriftModelId::kMaxDegree);
 

@@ -9,12 +9,14 @@
 
 namespace trihedron {
 
+/// How a calibration is made.
 enum class Estimator : std::uint8_t {
   kInvariant,
   kPaper,
   kBatch,  ///< kInvariant, and then least squares over the whole pass
 };
 
+/// An estimator and its name.
 struct EstimatorRow {
   Estimator estimator;
   std::string_view name;  ///< in settings, in calibration.json and for people
@@ -23,6 +25,7 @@ struct EstimatorRow {
 inline constexpr std::array<EstimatorRow, 3> kEstimators = {
     {{Estimator::kInvariant, "invariant"}, {Estimator::kPaper, "paper"}, {Estimator::kBatch, "batch"}}};
 
+/// Its name in the table.
 [[nodiscard]] constexpr std::string_view name_of(Estimator estimator) {
   return std::ranges::find(kEstimators, estimator, &EstimatorRow::estimator)->name;
 }

@@ -11,6 +11,7 @@
 
 namespace trihedron {
 
+/// What a finding says; the names are in kFindings.
 enum class FindingCode : std::uint8_t {
   kTooFewFixes,
   kShortPass,
@@ -45,8 +46,10 @@ enum class FindingCode : std::uint8_t {
   kOther,  ///< of a file, from a program that knows more
 };
 
+/// What follows from a finding: nothing, care, or that the result must not be used.
 enum class FindingSeverity : std::uint8_t { kNote, kWarning, kDoNotUse };
 
+/// A severity and its name.
 struct FindingSeverityRow {
   FindingSeverity severity;
   std::string_view name;  ///< in calibration.json
@@ -55,6 +58,7 @@ inline constexpr std::array<FindingSeverityRow, 3> kFindingSeverities = {{{Findi
                                                                           {FindingSeverity::kWarning, "warning"},
                                                                           {FindingSeverity::kDoNotUse, "do-not-use"}}};
 
+/// A finding, its name and its usual severity.
 struct FindingRow {
   FindingCode code;
   std::string_view name;     ///< stable, for programs
@@ -94,7 +98,9 @@ inline constexpr std::array<FindingRow, 31> kFindings = {{
     {FindingCode::kOther, "other", FindingSeverity::kWarning},
 }};
 
+/// Its row in the table.
 [[nodiscard]] constexpr const FindingRow& row_of(FindingCode code) { return kFindings[static_cast<std::size_t>(code)]; }
+/// Its name in the table.
 [[nodiscard]] constexpr std::string_view name_of(FindingCode code) { return row_of(code).name; }
 /// kOther for a name that this program does not know.
 [[nodiscard]] constexpr FindingCode finding_code_named(std::string_view name) {
@@ -112,6 +118,7 @@ struct Finding {
   Severity severity = row_of(code).severity;
 };
 
+/// Whether a result may be used, and everything that was found.
 struct Verdict {
   bool trustworthy = false;
   std::vector<Finding> findings;

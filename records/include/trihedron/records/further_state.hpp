@@ -63,6 +63,7 @@ inline constexpr std::array<FurtherStateRow, kFurtherStateCount> kFurtherStates 
      {}},
 }};
 
+/// Its row in the table.
 [[nodiscard]] constexpr const FurtherStateRow& row_of(FurtherState state) {
   return kFurtherStates[static_cast<std::size_t>(state)];
 }

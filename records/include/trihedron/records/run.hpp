@@ -73,6 +73,7 @@ struct DriftModelForecast {
   double open_loop_rms_rad = 0;  ///< attitude error, flown open loop over the next part
 };
 
+/// A calibration of a pass, and everything that was recorded on the way.
 struct CalibrationRun {
   CalibrationOptions options;                    ///< as decided
   std::vector<Evidence> evidence;                ///< of what was left to the program to decide
@@ -92,6 +93,7 @@ struct CalibrationRun {
   std::vector<GyroEvent> gyro_events;  ///< changes of a gyro's state
 };
 
+/// The attitude of a pass by the open-loop navigator, and how well the parameters in use fitted.
 struct NavigationRun {
   AttitudeHistory attitude;  ///< at every gyro sample used
   std::vector<FixRecord> fixes;

@@ -9,11 +9,12 @@
 
 namespace trihedron {
 
+/// Numbers that judge a calibration.
 struct Statistics {
   long fixes = 0;  ///< in the telemetry
   long fixes_used = 0;
   long fixes_rejected_as_outliers = 0;
-  /// In a run of 20 and more that were off, each by more than drift can make.
+  /// In runs of 20 and more whose misfits are larger than drift can cause.
   long fixes_off_in_a_row = 0;
   long reopened = 0;                       ///< how often the filter reopened the directions, or restarted
   long nis_count = 0;                      ///< fixes that the mean NIS is over
@@ -26,12 +27,12 @@ struct Statistics {
   // Of estimator batch.
   std::optional<int> batch_iterations;
   std::optional<bool> batch_converged;
-  std::optional<double>
-      halves_chi_square;  ///< of the constants by the first half of the pass against those by all of it
+  /// Of the constants by the first half of the pass against those by all of it.
+  std::optional<double> halves_chi_square;
   std::optional<int> halves_degrees_of_freedom;
 };
 
-/// Those that are there, as calibration.json has them: in the order of their names.
+/// Those that have a value, as calibration.json has them: in the order of their names.
 [[nodiscard]] std::vector<std::pair<std::string, double>> named_values(const Statistics& statistics);
 
 /// Sets one by its name in calibration.json; does nothing for a name that this program does not know. A value that is

@@ -9,6 +9,7 @@
 
 namespace trihedron {
 
+/// A status and its name.
 template <class Status>
 struct StatusRow {
   Status status;
@@ -49,17 +50,22 @@ inline constexpr std::array<StatusRow<GyroState>, kGyroStates> kGyroStateRows = 
     {GyroState::kIsolated, "left out for good"},
 }};
 
+/// Its name in the table.
 [[nodiscard]] constexpr std::string_view name_of(FixStatus status) {
   return kFixStatusRows[static_cast<std::size_t>(status)].name;
 }
+/// Its name in the table.
 [[nodiscard]] constexpr std::string_view name_of(SampleStatus status) {
   return kSampleStatusRows[static_cast<std::size_t>(status)].name;
 }
+/// Its name in the table.
 [[nodiscard]] constexpr std::string_view name_of(GyroState state) {
   return kGyroStateRows[static_cast<std::size_t>(state)].name;
 }
 
+/// Whether it was not used, for whatever reason; not of kNone and kPending.
 [[nodiscard]] constexpr bool is_rejected(FixStatus status) { return status >= FixStatus::kRejectedNotRotation; }
+/// Whether it was not used, for whatever reason.
 [[nodiscard]] constexpr bool is_rejected(SampleStatus status) { return !is_used(status); }
 
 /// How many there were of each status.
@@ -75,10 +81,12 @@ class CountsByStatus {
 
 using SampleCounts = CountsByStatus<SampleStatus, kSampleStatusRows.size()>;
 
+/// How many fixes there were of each status.
 struct FixCounts : CountsByStatus<FixStatus, kFixStatusRows.size()> {
   long lost_to_clock = 0;  ///< discarded because the clock was set back while they waited
 };
 
+/// A count with the name of what is counted.
 struct NamedCount {
   std::string_view name;
   long count = 0;
@@ -87,6 +95,7 @@ struct NamedCount {
 
 /// Those that are not zero, in the order of their names.
 [[nodiscard]] std::vector<NamedCount> named_counts(const SampleCounts& counts);
+/// The same of fixes.
 [[nodiscard]] std::vector<NamedCount> named_counts(const FixCounts& counts);
 
 }  // namespace trihedron

@@ -16,6 +16,7 @@ struct StartUp {
   const Calibration* calibration = nullptr;  ///< of the catalogue, which must outlive it
 };
 
+/// Change of one parameter between two start-ups.
 struct ParameterChange {
   ParameterId state;
   double change = 0;  ///< rad/s, or rad about c x, y, z
@@ -41,6 +42,7 @@ struct Spread {
   double next_sigma = 0;  ///< of the next start-up about the mean: deviation and uncertainty of the mean
 };
 
+/// Calibrations of a spacecraft compared from start-up to start-up.
 struct History {
   std::vector<StartUp> start_ups;      ///< in the order of their epochs
   std::vector<StartUpChange> changes;  ///< between neighbours

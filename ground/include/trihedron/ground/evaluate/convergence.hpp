@@ -14,6 +14,7 @@ namespace trihedron::ground {
 /// Whether the data say more of the parameter in this row of Calibration::states than was known before.
 [[nodiscard]] bool is_determined(const CalibrationRun& run, std::size_t row);
 
+/// When one parameter converged.
 struct Convergence {
   bool determined = false;  ///< otherwise there is nothing to settle to
   bool followed = true;     ///< false where the on-board step, whose course this is, does not estimate it

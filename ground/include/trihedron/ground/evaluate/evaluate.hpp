@@ -19,21 +19,24 @@ struct AttitudeErrors {
   std::vector<double> age_s;               ///< time since the last astro-correction; empty where unknown
 };
 
+/// Errors of `solution` against a reference attitude given at times `reference_t`.
 [[nodiscard]] AttitudeErrors attitude_errors(const AttitudeHistory& solution, const std::vector<Time>& reference_t,
                                              const std::vector<Eigen::Quaterniond>& reference_q_in_c);
 
 /// Of a drift coefficient, rad/s, or an alignment, component of the rotation vector, rad; nothing where the truth does
-/// not tell.
+/// not give it.
 [[nodiscard]] std::optional<double> true_value(const Truth& truth, const ParameterId& parameter);
 
 /// Drift coefficients that the truth does not name.
 enum class UnnamedDrift : std::uint8_t { kIsUnknown, kIsZero };
 
 /// The errors of a calibration, in the order of Calibration::states: estimate − truth of drift, rad/s; of alignment,
-/// rad, the small rotation vector δ of C_c_b(est) = exp([δ×]) C_c_b(true), c axes. NaN where the truth does not tell.
+/// rad, the small rotation vector δ of C_c_b(est) = exp([δ×]) C_c_b(true), c axes. NaN where the truth does not give
+/// it.
 [[nodiscard]] Eigen::VectorXd estimate_minus_truth(const Calibration& calibration, const Truth& truth,
                                                    UnnamedDrift unnamed = UnnamedDrift::kIsUnknown);
 
+/// Errors over a stretch of time.
 struct ErrorStatistics {
   Time from{};
   Time to{};
@@ -45,8 +48,9 @@ struct ErrorStatistics {
   std::optional<double> normalised_square;
 };
 
-/// Over the whole, and over consecutive stretches of `length` from the first epoch's pass epoch `start`.
+/// Over the whole.
 [[nodiscard]] ErrorStatistics statistics(const AttitudeErrors& errors);
+/// Over consecutive stretches of `length` from `start` on.
 [[nodiscard]] std::vector<ErrorStatistics> statistics_by_stretch(const AttitudeErrors& errors, Time start,
                                                                  Duration length);
 
@@ -58,7 +62,7 @@ struct CorrectionInterval {
   std::optional<Duration> passed;  ///< when the limit was passed
   double max_total_rad = 0;
 };
-/// Empty where `errors` does not know the ages.
+/// Empty where `errors` has no ages.
 [[nodiscard]] std::vector<CorrectionInterval> correction_intervals(const AttitudeErrors& errors, double limit_rad);
 
 /// The same astro-correction with the parameters known before a calibration, and with those calibrated.

@@ -9,6 +9,7 @@
 
 namespace trihedron::ground {
 
+/// The result of a comparison.
 struct Agreement {
   double chi_square = 0;       ///< of the difference by its covariance
   int degrees_of_freedom = 0;  ///< directions compared; 0 where nothing could be
