@@ -164,13 +164,47 @@ def test_calibrate_writes_what_is_pinned(calibrated):
     assert header.startswith("t_s,q_x,q_y,q_z,q_w,sigma_x_rad,sigma_y_rad,sigma_z_rad")
 
 
-def test_calibrate_finds_the_truth_of_the_example(calibrated):
-    _, text = calibrated
+def alignment_errors_arcsec(text):
+    """Estimate less truth, and sigma, of each component that the text of `calibrate` lists."""
     rows = [line.split() for line in text.splitlines() if line.strip().startswith("align_")]
     assert len(rows) == 6
-    for row in rows:  # name, value, ′, sigma″, error″
-        assert abs(float(row[4].rstrip("″"))) < 4 * float(row[3].rstrip("″"))
-        assert float(row[3].rstrip("″")) < 5
+    return [(float(row[4].rstrip("″")), float(row[3].rstrip("″"))) for row in rows]  # name, value, ′, sigma″, error″
+
+
+def test_calibrate_finds_the_truth_of_the_example(calibrated):
+    _, text = calibrated
+    for error, sigma in alignment_errors_arcsec(text):
+        assert abs(error) < 4 * sigma < 4 * 5
+
+
+# One hour, all drift in eq. (1), and gyros sampled at this period.
+OF_A_RATE = """
+[scenario]
+seed = 11
+duration = "60min"
+[gyro]
+period = "{period}"
+[gyro.drift]
+outside_sigma = "0rad/s"
+"""
+
+
+@pytest.mark.parametrize("period, told, evidence", [
+    ("1s", ["gyro-samples-far-apart"], "sampled every 1 s"),
+    ("125ms", [], ""),
+    ("20ms", ["gyro-samples-thinned"], "135000 of 180001 samples left out"),
+])
+def test_gyros_of_any_rate_are_calibrated_and_a_limit_is_told(tmp_path, period, told, evidence):
+    rated = simulated(OF_A_RATE.format(period=period))
+    (tmp_path / "told.toml").write_text(TOLD)
+    result = run("calibrate", rated, "-o", tmp_path / "out", "--config", tmp_path / "told.toml")
+    assert result.returncode == TRUSTWORTHY, result.stdout + result.stderr
+    for error, sigma in alignment_errors_arcsec(result.stdout):
+        assert abs(error) < 4 * sigma < 4 * 30
+    findings = json.loads((tmp_path / "out" / "calibration.json").read_text())["verdict"]["findings"]
+    of_rate = [finding for finding in findings if finding["code"].startswith("gyro-samples-")]
+    assert [finding["code"] for finding in of_rate] == told
+    assert all(evidence in finding["evidence"] for finding in of_rate)
 
 
 def test_effective_config_repeats_the_run(calibrated, tmp_path):
