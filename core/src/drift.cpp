@@ -49,8 +49,8 @@ DriftModel::DriftModel(DriftModelId id, const FurtherStates& further)
   TRIHEDRON_ASSERT(size_ == id.size());
 }
 
-void DriftModel::add(Member potential, int degree, int order) {
-  members_[static_cast<std::size_t>(size_++)] = {potential, static_cast<std::int8_t>(degree),
+void DriftModel::add(Member member, int degree, int order) {
+  members_[static_cast<std::size_t>(size_++)] = {member, static_cast<std::int8_t>(degree),
                                                  static_cast<std::int8_t>(order)};
 }
 

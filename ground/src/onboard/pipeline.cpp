@@ -37,7 +37,9 @@ template <class To, class From>
 To with_room(const From& from, const Layout& layout) {
   To to;
   for (int k = 0; k < layout.gyros; ++k) {
-    static_cast<GyroReadout&>(to[k]) = from[k];
+    GyroReadout& readout = to[k];
+    const GyroReadout& its = from[k];
+    readout = its;
     to[k].h_in = from[k].h_in;
     to[k].drift_rad_s = from[k].drift_rad_s;
   }
