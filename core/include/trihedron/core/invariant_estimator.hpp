@@ -34,6 +34,7 @@ class InvariantEstimator {
   static constexpr int kMaxStates = kCapacity.states;
   static constexpr int kMaxDynamic = 6 * kCapacity.gyros;
   static constexpr int kMaxErrors = kMaxStates;
+  static constexpr int kStarTrackers = kCapacity.star_trackers;  ///< at most
   static constexpr bool kUsesAngles = true;
   static constexpr bool kTakesSamplesTogether = true;
   using Gyro = GyroModel<kCapacity.drift_columns>;

@@ -34,10 +34,11 @@ class PaperEstimator {
     [[nodiscard]] static constexpr int alignment(int gyro) { return drift(gyro) + Esg7::kSize; }
   };
   static constexpr int kGyros = 2;
+  static constexpr int kStarTrackers = 1;
   static constexpr int kMaxStates = States::kSize;
   static constexpr int kMaxErrors = Layout{}.size();
   static constexpr int kMeasurements = 4;
-  static constexpr bool kUsesAngles = false;           ///< the angle is shown by StepReport::angle_residual only
+  static constexpr bool kUsesAngles = false;            ///< the angle is shown by StepReport::angle_residual only
   static constexpr bool kTakesSamplesTogether = false;  ///< a fix is compared with a single sample
   using Gyro = GyroModel<Esg7::kSize>;
   using Gyros = PerGyro<Gyro, kGyros>;
