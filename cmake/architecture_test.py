@@ -12,7 +12,7 @@ ROOT = pathlib.Path(__file__).resolve().parent.parent
 MODULES_CMAKE = ROOT / "cmake" / "Modules.cmake"
 
 # core flies: what needs a heap, exceptions, streams, files, threads or a clock does not belong there.
-CORE_MAY_INCLUDE = {"array", "algorithm", "chrono", "cmath", "cstddef", "cstdint", "cstdlib", "limits", "numbers", "optional",
+CORE_MAY_INCLUDE = {"array", "algorithm", "chrono", "cmath", "compare", "cstddef", "cstdint", "cstdlib", "iterator", "limits", "numbers", "optional",
                     "type_traits", "utility"}
 
 

@@ -206,9 +206,9 @@ void add_observe(CLI::App& program, const Common& common, int& exit_status) {
   };
   limit("--max-rate", arguments->max_rate, "Of these slews, instead of max_slew_rate of the scenario");
   limit("--max-angle", arguments->max_angle, "Of these slews")->capture_default_str();
-  limit("--slews", arguments->slews, "At most so many")->check(CLI::PositiveNumber)->capture_default_str();
+  limit("--slews", arguments->slews, "Largest number of slews")->check(CLI::PositiveNumber)->capture_default_str();
   limit("--manoeuvre-time", arguments->manoeuvre_time, "Of all slews together, turns and holds")->capture_default_str();
-  limit("--confirm", arguments->confirming_runs, "Simulate and calibrate so many flights with these slews")
+  limit("--confirm", arguments->confirming_runs, "Number of flights with these slews to simulate and calibrate")
       ->check(CLI::PositiveNumber);
   command->callback([&common, &exit_status, arguments] {
     const CalibrationOptions options =

@@ -150,7 +150,7 @@ std::string calibration_text(const CalibrationRun& run, const Eigen::VectorXd& e
                    to_seconds(states.wandering_time) / 60);
   }
   if (const auto& noise = run.options.star_tracker_noise_rad) {
-    fmt::format_to(out, "; star tracker {:.1f}″ {:.1f}″ {:.1f}″, which is not what was told", noise->x() / kArcsecond,
+    fmt::format_to(out, "; star tracker {:.1f}″ {:.1f}″ {:.1f}″, not as in pass.toml", noise->x() / kArcsecond,
                    noise->y() / kArcsecond, noise->z() / kArcsecond);
   }
   text += '\n';
@@ -227,7 +227,8 @@ std::string evaluation_text(const ground::AttitudeEvaluation& evaluation, Time e
 }
 
 std::string passes_text(const std::vector<ground::PassAlone>& passes) {
-  std::string text = fmt::format("Passes      {}, taken for one start-up; each beside those before:\n", passes.size());
+  std::string text =
+      fmt::format("Passes      {}, taken for one start-up; each compared with those before:\n", passes.size());
   for (const ground::PassAlone& pass : passes) {
     const Calibration& calibration = pass.run.calibration;
     auto out = std::back_inserter(text);

@@ -50,10 +50,10 @@ FittedDirections DirectionsFit::solve() const {
   FittedDirections result;
   result.freedom = 2 * (samples_ - terms_);
   for (int k = 0; k < gyros_; ++k) {
-    const auto its = coefficients.middleCols<3>(3 * k);
+    const auto its = coefficients.middleCols<3>(3L * k);
     const Eigen::Vector3d h = first_[k] + its.row(0).transpose();
     const double norm = h.norm();
-    const double square = squares_.segment<3>(3 * k).sum() - its.cwiseProduct(right_.middleCols<3>(3 * k)).sum();
+    const double square = squares_.segment<3>(3L * k).sum() - its.cwiseProduct(right_.middleCols<3>(3L * k)).sum();
     result.residual_square[k] = std::max(square, 0.0);
     result.h_b[k] = h / norm;
     result.h_b_rate[k].setZero();

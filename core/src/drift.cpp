@@ -13,7 +13,9 @@ constexpr bool is_in_eq1(Member potential, int degree, int order) {
 
 constexpr int max_degree_of(DriftModelId id) {
   constexpr int kEsg20Degree = 2;
-  return id.family == DriftModelId::Family::kVsh ? id.degree : id.family == DriftModelId::Family::kEsg20 ? kEsg20Degree : 0;
+  return id.family == DriftModelId::Family::kVsh     ? id.degree
+         : id.family == DriftModelId::Family::kEsg20 ? kEsg20Degree
+                                                     : 0;
 }
 
 }  // namespace
@@ -47,8 +49,8 @@ DriftModel::DriftModel(DriftModelId id, const FurtherStates& further)
   TRIHEDRON_ASSERT(size_ == id.size());
 }
 
-void DriftModel::add(Member potential, int degree, int order) {
-  members_[static_cast<std::size_t>(size_++)] = {potential, static_cast<std::int8_t>(degree),
+void DriftModel::add(Member member, int degree, int order) {
+  members_[static_cast<std::size_t>(size_++)] = {member, static_cast<std::int8_t>(degree),
                                                  static_cast<std::int8_t>(order)};
 }
 
@@ -113,8 +115,7 @@ Eigen::Vector3d DriftModel::rate(const Eigen::Vector3d& h, double part_of_change
       if (its.member == Member::kCubeD) {
         d += coefficients[i] * h.cwiseProduct(h).cwiseProduct(h);
       } else {
-        (its.member == Member::kW ? w : d) +=
-            coefficients[i] * harmonics.polynomial_gradient(its.degree, its.order);
+        (its.member == Member::kW ? w : d) += coefficients[i] * harmonics.polynomial_gradient(its.degree, its.order);
       }
     }
     rate += h.cross(d) - w;

@@ -161,7 +161,7 @@ void InvariantEstimator<kCapacity>::start(const Eigen::Matrix3d& C_in_c, const F
     R.template block<3, 3>(row, row).diagonal().array() += sigma * sigma;
   }
   information_ = prior_;
-  std::fill(second_order_rad_.begin(), second_order_rad_.end(), 0.0);
+  std::ranges::fill(second_order_rad_, 0.0);
   static_cast<void>(factorize(R));
   solve_lower(R, rows_of(H));
   information_.add_information(rows_of(H));
@@ -367,11 +367,12 @@ inline void report_innovation(const Layout& layout, const FixComparison& compari
     if (!comparison.used[k]) {
       continue;
     }
-    report.innovation.template segment<2>(2 * k) = comparison.gyros[k].y;
+    report.innovation.template segment<2>(2L * k) = comparison.gyros[k].y;
     int column = 0;
     for (int j = 0; j < layout.gyros; ++j) {
       if (comparison.used[j]) {
-        report.innovation_covariance.template block<2, 2>(2 * k, 2 * j) = covariance.template block<2, 2>(row, column);
+        report.innovation_covariance.template block<2, 2>(2L * k, 2L * j) =
+            covariance.template block<2, 2>(row, column);
         column += 2;
       }
     }

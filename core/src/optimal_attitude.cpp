@@ -144,7 +144,7 @@ Result<AttitudeByDirections, DirectionsFault> optimal_attitude(const Directions&
   const Eigen::Matrix3d inverse = sum_across(h_c, used).inverse();
   for (int k = 0; k < kMaxGyros; ++k) {
     if (used[k]) {
-      attitude.by_directions.middleCols<3>(3 * k) = inverse * across(h_c[k]);
+      attitude.by_directions.middleCols<3>(3L * k) = inverse * across(h_c[k]);
     }
   }
   return attitude;

@@ -39,7 +39,7 @@ std::optional<SetupFault> PaperEstimator::set_up(const CalibrationSetup& setup, 
 }
 
 Result<AttitudeByDirections, DirectionsFault> PaperEstimator::attitude(const Gyros& gyros, const Directions& h_b,
-                                                                       const GyroMask& used) const {
+                                                                       const GyroMask& used) {
   if (count(used) < kGyros) {
     return DirectionsFault::kTooFew;
   }
@@ -47,7 +47,7 @@ Result<AttitudeByDirections, DirectionsFault> PaperEstimator::attitude(const Gyr
 }
 
 Result<Rot<In, C>, DirectionsFault> PaperEstimator::rotation(const Gyros& gyros, const Directions& h_b,
-                                                             const GyroMask& used) const {
+                                                             const GyroMask& used) {
   if (count(used) < kGyros) {
     return DirectionsFault::kTooFew;
   }

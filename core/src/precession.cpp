@@ -23,7 +23,9 @@ void advance_by_drift(ColumnsView by_drift, ColumnsView basis, const Eigen::Matr
   const double m10 = m(1, 0), m11 = m(1, 1), m12 = m(1, 2);
   const double m20 = m(2, 0), m21 = m(2, 1), m22 = m(2, 2);
   const int columns = ColumnsView::padded(by_drift.columns);
+#ifndef __clang__
 #pragma GCC ivdep  // the rows do not overlap
+#endif
   for (int i = 0; i < columns; ++i) {
     const double px = x[i];
     const double py = y[i];

@@ -15,7 +15,9 @@ namespace {
 template <std::size_t M>
 void reflect(double* __restrict r, double* const (&rows)[M], const double (&v)[M], double v0, double beta,
              int columns) {
+#ifndef __clang__
 #pragma GCC ivdep  // the rows do not overlap
+#endif
   for (int k = 1; k < columns; ++k) {
     double s = v0 * r[k];
     for (std::size_t i = 0; i < M; ++i) {
@@ -117,7 +119,9 @@ void solve_rows_together(ConstRowsView root, RowsView rows) {
     for (std::size_t i = 0; i < M; ++i) {
       value[i] = x[i][j] /= R[j];
     }
+#ifndef __clang__
 #pragma GCC ivdep  // the rows do not overlap
+#endif
     for (int k = j + 1; k < root.rows; ++k) {
       for (std::size_t i = 0; i < M; ++i) {
         x[i][k] -= value[i] * R[k];

@@ -1,5 +1,6 @@
 #include <gtest/gtest.h>
 
+#include <cstdio>
 #include <limits>
 #include <vector>
 
@@ -41,6 +42,23 @@ TEST(OnBoard, RefusesTheSetupsThatItsEstimatorRefuses) {
   EXPECT_EQ(on_board.set_up(given.setup, given.prior, given.covariance, {}), std::nullopt);
   given.setup.gate_nis = -1;
   EXPECT_EQ(on_board.set_up(given.setup, given.prior, given.covariance, {}), SetupFault::kGateNotPositive);
+}
+
+template <Capacity kCapacity>
+std::size_t size_of_on_board(const char* layout) {
+  const std::size_t bytes = sizeof(OnBoard<InvariantEstimator<kCapacity>>);
+  std::printf("%-60s %4d states %8zu bytes\n", layout, kCapacity.states, bytes);
+  return bytes;
+}
+
+TEST(OnBoard, OfAPairWithEquation1FitsInto32KiB) {
+  EXPECT_LE(size_of_on_board<kPairCapacity>("2 gyros, eq. (1)"), 32U * 1024);
+  size_of_on_board<Capacity::of({.further = kAllFurtherStates})>("2 gyros, eq. (1), all further states");
+  size_of_on_board<Capacity::of({.gyros = 4, .further = kAllFurtherStates, .star_trackers = 2})>(
+      "4 gyros, eq. (1), all further states, 2 star trackers");
+  size_of_on_board<Capacity::of({.gyros = 3, .drift_model = kEsg20, .further = kAllFurtherStates})>(
+      "3 gyros, esg20, all further states");
+  size_of_on_board<kFullCapacity>("4 gyros, vsh:6, all further states, 4 star trackers");
 }
 
 TEST(OnBoard, GivesNoAngleResidualBeforeTheFirstFix) {

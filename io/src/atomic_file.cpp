@@ -37,7 +37,7 @@ void synchronise(const fs::path& directory) {
   }
 }
 
-/// The directory and so many with those above it, up to the first that is not empty.
+/// Removes up to `count` directories, from this one upwards, as long as they are empty.
 void remove_empty(fs::path directory, int count) {
   std::error_code fault;
   directory = directory.has_filename() ? directory : directory.parent_path();

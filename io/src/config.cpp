@@ -230,7 +230,7 @@ std::string format_config(const CalibrationOptions& options) {
       "direction_random_walk = \"{}\"  # process noise of each momentum, per axis across it\n"
       "gate_nis = {}  # a fix with a larger normalised innovation squared is rejected\n"
       "student_t_freedom = {}  # 5 to 20: it is used with less weight instead; 0: rejected\n"
-      "reopen_after_rejections = {}  # in a row; then the directions are set free and the fix is used\n"
+      "reopen_after_rejections = {}  # in a row; then the directions are reopened and the fix is used\n"
       "reopen_after_jump_rejections = {}  # the same where they began with a jump that no drift can make\n"
       "angles_after = \"{}\"  # without a fix, by the angles between the momenta: a duration or never\n"
       "\n"

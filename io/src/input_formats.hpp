@@ -19,9 +19,9 @@ struct UnscreenedPass {
 };
 
 /// A directory with pass.toml, gyro.csv and star_tracker.csv.
-[[nodiscard]] UnscreenedPass read_raw_directory(const std::filesystem::path& path);
+[[nodiscard]] UnscreenedPass read_raw_directory(const std::filesystem::path& directory);
 /// A NetCDF-4 file with the same variables.
-[[nodiscard]] UnscreenedPass read_raw_netcdf(const std::filesystem::path& path);
+[[nodiscard]] UnscreenedPass read_raw_netcdf(const std::filesystem::path& file);
 
 struct InputFormat {
   bool (*recognises)(const std::filesystem::path& path);  ///< whether a path that exists is to be read by this format

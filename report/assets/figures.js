@@ -379,7 +379,7 @@ const FIGURES = {
     ];
     if (n.reopened.length > 0) {
       for (const t of n.reopened) layout.shapes.push(moment(t, one, colour.green), moment(t, mean, colour.green));
-      traces.push(legendOnly("momenta set free", { color: colour.green, dash: "dot", width: 1 }));
+      traces.push(legendOnly("directions reopened", { color: colour.green, dash: "dot", width: 1 }));
     }
     return { traces, layout };
   },

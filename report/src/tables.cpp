@@ -304,7 +304,7 @@ json settings_of(const ReportInput& input) {
     put("Star-tracker noise found",
         of_axes(*options.star_tracker_noise_rad, kArcsecond_rad) + " ″ about roll / pitch / heading, 1σ");
   }
-  put(options.star_tracker_noise_rad ? "Star-tracker noise told" : "Star-tracker noise",
+  put(options.star_tracker_noise_rad ? "Star-tracker noise by pass.toml" : "Star-tracker noise",
       of_axes(input.pass.settings.star_tracker_noise_rad, kArcsecond_rad) + " ″ about roll / pitch / heading, 1σ");
   return rows;
 }

@@ -5,7 +5,8 @@
 #include <array>
 #include <cmath>
 
-#include "trihedron/core/invariant_estimator.hpp"
+#include "trihedron/core/drift.hpp"
+#include "trihedron/core/setup.hpp"
 
 namespace trihedron::consistency {
 namespace {
@@ -95,7 +96,9 @@ ParameterCovariance parameter_bound(const PassSettings& settings, const Truth& t
     information.block<2, 2>(first, first).setZero();
     gyros.emplace_back(truth.gyros[k], momentum(0, k));
   }
-  const Duration reach = InvariantEstimator<Esg7, kGyros>::kReach;
+  CalibrationSetup setup;
+  setup.gyro_period = settings.gyro_period;
+  const Duration reach = setup.reach();
   const double fitted = noise_of_cubic(static_cast<double>(reach / settings.gyro_period));
 
   for (std::size_t i = 0; i < truth.t.size(); ++i) {

@@ -2,14 +2,20 @@
 
 #include <Eigen/Core>
 
-#include "trihedron/core/calibration.hpp"
-#include "trihedron/core/drift.hpp"
+#include "trihedron/core/layout.hpp"
 #include "trihedron/records/pass.hpp"
 
 namespace trihedron::consistency {
 
 inline constexpr int kGyros = 2;
-using Parameters = ParameterLayout<Esg7, kGyros>;
+/// Where the parameters stand that a calibration of two gyros by eq. (1) lists.
+struct Parameters {
+  static constexpr Layout kLayout{.gyros = kGyros};
+  static constexpr int kSize = kLayout.parameters();
+  static constexpr int kPerGyro = kSize / kGyros;
+  [[nodiscard]] static constexpr int drift(int gyro) { return kLayout.drift(gyro) - kLayout.drift(0); }
+  [[nodiscard]] static constexpr int alignment(int gyro) { return kLayout.alignment(gyro) - kLayout.drift(0); }
+};
 using ParameterCovariance = Eigen::Matrix<double, Parameters::kSize, Parameters::kSize>;
 
 /// Bayesian Cramér–Rao bound of the parameters of two gyros without process noise, rad/s and rad: the inverse of the

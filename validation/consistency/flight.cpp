@@ -1,18 +1,15 @@
 #include "consistency/flight.hpp"
 
-#include <Eigen/QR>
 #include <algorithm>
 #include <limits>
-#include <memory>
 #include <optional>
 
 #include "consistency/bound.hpp"
 #include "consistency/statistics.hpp"
-#include "trihedron/core/cycles.hpp"
-#include "trihedron/core/invariant_estimator.hpp"
-#include "trihedron/core/paper_estimator.hpp"
+#include "trihedron/core/drift.hpp"
 #include "trihedron/ground/calibrate/calibrate.hpp"
 #include "trihedron/ground/evaluate/evaluate.hpp"
+#include "trihedron/ground/onboard/pipeline.hpp"
 #include "trihedron/ground/onboard/replay.hpp"
 #include "trihedron/sim/simulate.hpp"
 
@@ -39,66 +36,38 @@ ParameterCovariance prior_covariance(const PassSettings& settings) {
   return variance.asDiagonal();
 }
 
-template <class Estimator>
-typename Estimator::Setup setup_of(const PassSettings& settings, double walk_rad_sqrt_s) {
-  typename Estimator::Setup setup;
-  setup.prior_covariance = prior_covariance(settings);
-  for (int k = 0; k < kGyros; ++k) {
-    setup.readout_noise_rad[k] = settings.gyros[static_cast<std::size_t>(k)].readout_noise_rad;
-  }
-  setup.star_tracker_noise_rad = settings.star_tracker_noise_rad;
-  setup.direction_random_walk_rad_sqrt_s = walk_rad_sqrt_s;
-  return setup;
-}
-
-/// Estimate − truth.
-template <class Estimator>
-ParameterErrors errors_of(const Estimator& estimator, const Truth& truth) {
-  Calibration calibration;
-  for (const auto& gyro : estimator.gyros()) {
-    GyroCalibration& record = calibration.gyros.emplace_back();
-    record.drift_rad_s.assign(gyro.drift_rad_s.begin(), gyro.drift_rad_s.end());
-    record.alignment_rotation_vector_rad = Rot<C, B<1>>::assume(gyro.C_c_b).log().raw();
-  }
-  calibration.states = drift_and_alignment(kEsg7, calibration.gyros.size());
-  return ground::estimate_minus_truth(calibration, truth);
-}
-
-template <class Estimator>
-Estimate by_filter(const sim::SimulatedPass& flown, double walk_rad_sqrt_s) {
-  using OnBoard = Cycle<Estimator>;
-  const auto created = OnBoard::create(setup_of<Estimator>(flown.pass.settings, walk_rad_sqrt_s), {.navigate = false});
-  const auto cycle = std::make_unique<OnBoard>(created.value());
-  Estimate estimate;
-  ground::replay(
-      flown.pass, *cycle,
-      [&](const auto& report) {
-        const FixStatus status = report.fix.status;
-        if (status == FixStatus::kRejectedByGate || (is_used(status) && status != FixStatus::kStarted)) {
-          estimate.nis += report.fix.nis;
-          ++estimate.fixes;
-        }
-      },
-      [](const auto&) {});
-  estimate.nis /= static_cast<double>(estimate.fixes);
-
-  estimate.errors = errors_of(cycle->estimator(), flown.truth);
-  // P = root rootᵀ = RᵀR; P itself would lose what is known of differences of poorly known parameters.
-  const Eigen::MatrixXd root = cycle->estimator().error_root().template bottomRows<Parameters::kSize>();
-  const Eigen::MatrixXd R = root.transpose().householderQr().matrixQR().topRows<Parameters::kSize>();
-  estimate.nees = R.transpose().triangularView<Eigen::Lower>().solve(estimate.errors).squaredNorm();
-  estimate.covariance = root * root.transpose();
-  return estimate;
-}
-
-Estimate by_batch(const sim::SimulatedPass& flown, double walk_rad_sqrt_s) {
+/// Nothing is left to decide; the noise is told.
+CalibrationOptions options_of(Estimator estimator, double walk_rad_sqrt_s) {
   CalibrationOptions options;
-  options.estimator = Estimator::kBatch;
+  options.estimator = estimator;
   options.drift_model = kEsg7;
   options.find_noise = false;
   options.direction_random_walk_rad_sqrt_s = walk_rad_sqrt_s;
   options.further_states = FurtherStateOptions::none();
-  const Calibration calibration = ground::calibrate(flown.pass, options).calibration;
+  return options;
+}
+
+Estimate by_filter(const sim::SimulatedPass& flown, Estimator estimator, double walk_rad_sqrt_s) {
+  ground::Pipeline pipeline(flown.pass.settings, options_of(estimator, walk_rad_sqrt_s), false);
+  Estimate estimate;
+  ground::replay(flown.pass, pipeline, [&](const StepReport& report, const GyroSample& /*sample*/) {
+    const FixStatus status = report.fix.status;
+    if (status == FixStatus::kRejectedByGate || (is_used(status) && status != FixStatus::kStarted)) {
+      estimate.nis += report.fix.nis;
+      ++estimate.fixes;
+    }
+  });
+  estimate.nis /= static_cast<double>(estimate.fixes);
+  const Calibration calibration = pipeline.calibration();
+  estimate.errors = ground::estimate_minus_truth(calibration, flown.truth);
+  estimate.covariance = calibration.covariance;
+  estimate.nees = nees(estimate.errors, estimate.covariance);
+  return estimate;
+}
+
+Estimate by_batch(const sim::SimulatedPass& flown, double walk_rad_sqrt_s) {
+  const Calibration calibration =
+      ground::calibrate(flown.pass, options_of(Estimator::kBatch, walk_rad_sqrt_s)).calibration;
   Estimate estimate;
   estimate.errors = ground::estimate_minus_truth(calibration, flown.truth);
   estimate.covariance = calibration.covariance;
@@ -129,12 +98,12 @@ std::vector<Outcome> fly(const Cell& cell, int run, const std::vector<Estimator>
   };
   std::optional<Estimate> invariant;  // estimator batch is compared with it
   if (std::ranges::any_of(estimators, [](Estimator estimator) { return estimator != Estimator::kPaper; })) {
-    invariant = by_filter<InvariantEstimator<Esg7, kGyros>>(flown, walk_rad_sqrt_s);
+    invariant = by_filter(flown, Estimator::kInvariant, walk_rad_sqrt_s);
   }
   std::vector<Outcome> outcomes;
   for (const Estimator estimator : estimators) {
     if (estimator == Estimator::kPaper) {
-      outcomes.push_back(outcome_of(by_filter<PaperEstimator<Esg7>>(flown, walk_rad_sqrt_s)));
+      outcomes.push_back(outcome_of(by_filter(flown, Estimator::kPaper, walk_rad_sqrt_s)));
     } else if (estimator == Estimator::kInvariant) {
       outcomes.push_back(outcome_of(*invariant));
     } else {

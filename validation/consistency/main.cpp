@@ -23,6 +23,7 @@
 namespace {
 
 using namespace trihedron::consistency;
+using namespace trihedron;
 
 constexpr const char* kEstimatorsTable = "estimators";
 constexpr const char* kObservableTable = "observable";

@@ -20,6 +20,7 @@
 #include "consistency/grid.hpp"
 #include "consistency/results.hpp"
 #include "consistency/statistics.hpp"
+#include "trihedron/core/drift.hpp"
 #include "trihedron/ground/calibrate/calibrate.hpp"
 #include "trihedron/sim/simulate.hpp"
 

@@ -4,7 +4,7 @@
 
 namespace trihedron::ground {
 
-/// The most likely course of a pass, and what is known of its errors.
+/// The most likely solution of a pass, and the covariance of its errors.
 struct BatchResult {
   PassSolution solution;
   PassSolution before;         ///< the last step

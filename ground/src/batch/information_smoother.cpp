@@ -18,7 +18,7 @@ using Eigen::VectorXd;
 
 double log_determinant(const MatrixXd& triangle) { return triangle.diagonal().array().abs().log().sum(); }
 
-/// Rotates rows so that below the first `columns` of them nothing is left in the first `columns` columns.
+/// Rotates rows (Householder) so that in the first `columns` columns only an upper triangle remains.
 void rotate_up(MatrixXd& rows, Index columns) {
   const Eigen::HouseholderQR<MatrixXd> qr(rows.leftCols(columns));
   rows.rightCols(rows.cols() - columns).applyOnTheLeft(qr.householderQ().adjoint());
@@ -52,8 +52,8 @@ class ConstantRows {
   Index size_ = 0;
 };
 
-/// The rows that know of d are kept as its triangle; the rest are about c alone, which is constant, and are kept until
-/// the end.
+/// Forward pass. The rows about d are kept as a triangle; the rest are about c alone, which is constant, and are kept
+/// until the end.
 class Forward {
  public:
   Forward(const MatrixXd& prior, const VectorXd& prior_y, Index d)
@@ -73,7 +73,7 @@ class Forward {
     moving_ = rows.topRows(d_);
   }
 
-  /// On to the next stage; gives what is left of w.
+  /// Time update to the next stage; returns the rows about w.
   SmootherResult::NoiseRows move(const SmootherStage& stage) {
     const Index d = d_;
     const Index c = n_ - d;
@@ -90,7 +90,7 @@ class Forward {
     return {moved.topLeftCorner(d, d), moved.block(0, d, d, n_), moved.topRightCorner(d, 1)};
   }
 
-  /// Of (d, c), right side last; the rows of c know of it whatever d is.
+  /// Triangle about (d, c), right side last; its rows about c hold whatever d is.
   [[nodiscard]] MatrixXd triangle() const {
     MatrixXd triangle = MatrixXd::Zero(n_ + 1, n_ + 1);
     triangle.topRows(d_) = moving_;
@@ -128,7 +128,7 @@ SmootherResult smooth(const MatrixXd& prior, const VectorXd& prior_y, const std:
       break;
     }
     result.steps.push_back(forward.move(stages[i]));
-    // That of (d, c, w): by those of (w, d', c), of which they are a linear function with the determinant of A⁻¹.
+    // The determinant for (d, c, w) is that for (w, d', c) over |det A⁻¹|, the determinant of the change of variables.
     result.log_root_determinant +=
         log_determinant(result.steps.back().R) - std::log(std::abs(stages[i].A_inverse.determinant()));
   }

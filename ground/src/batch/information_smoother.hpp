@@ -33,8 +33,8 @@ struct SmootherResult {
   std::vector<NoiseRows> steps;
 };
 
-/// Estimates all stages. `prior`: rows and right side of what is known before of the first stage, unit noise. Throws
-/// std::invalid_argument where a state stays without any information.
+/// Estimates all stages. `prior`: rows and right side of the prior of the first stage, unit noise. Throws
+/// std::invalid_argument where a state has no information.
 [[nodiscard]] SmootherResult smooth(const Eigen::MatrixXd& prior, const Eigen::VectorXd& prior_y,
                                     const std::vector<SmootherStage>& stages);
 
@@ -50,12 +50,12 @@ void gather_constants(Eigen::MatrixXd& prior, Eigen::VectorXd& prior_y, std::vec
                                                            const std::vector<std::size_t>& after);
 
 /// Triangular roots of the information on the constants by the measurements up to the end of each stage of `after`
-/// (increasing), whatever the states that move are. `prior`: rows of what is known of these before, unit noise.
+/// (increasing), with the states that move eliminated. `prior`: rows of the prior of these, unit noise.
 [[nodiscard]] std::vector<Eigen::MatrixXd> information_on_constants(const Eigen::MatrixXd& prior,
                                                                     const std::vector<SmootherStage>& stages,
                                                                     const std::vector<std::size_t>& after);
 
-/// The square triangle whose rows hold what `rows` do, their last columns the right side (Householder).
+/// The square triangle with the same information as `rows`, the last column of both being the right side (Householder).
 [[nodiscard]] Eigen::MatrixXd triangle_of(const Eigen::MatrixXd& rows);
 
 /// Square roots of the covariances of all stages' states by all measurements.

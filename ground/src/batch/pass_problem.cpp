@@ -29,7 +29,7 @@ Eigen::Matrix<double, 3, 2> across(const Vector3d& h) {
   return columns;
 }
 
-/// The same measurements in no more rows than there are states, and one for what is left over.
+/// Reduces the rows of a stage to a triangle: no more rows than states, and one for the residual.
 void compress(SmootherStage& stage) {
   const Eigen::Index states = stage.H.cols();
   if (stage.H.rows() > states + 1) {
@@ -90,7 +90,7 @@ class FixMerger {
   double square_ = 0;
 };
 
-/// Small rotation across `from` that takes it to `to`.
+/// Small rotation, across `from`, that turns it into `to`.
 Vector3d turn(const Vector3d& from, const Vector3d& to) { return from.cross(to); }
 
 }  // namespace
@@ -125,7 +125,7 @@ PassProblem::PassProblem(const ScreenedPass& pass, PassSetup setup)
     }
   }
   add_fixes_until(Time::max());
-  // The coefficients stand for the end of the pass, and change by so much over it.
+  // The coefficients are those of the end of the pass; their change is that over the whole pass.
   setup_.on_board.no_change_at = nodes_.back().t;
   setup_.on_board.change_time_s = to_seconds(nodes_.back().t - nodes_.front().t);
   for (std::size_t i = 0; i < nodes_.size(); ++i) {
@@ -162,7 +162,7 @@ void PassProblem::step(const Node& from, const Node& to, Moment& moment, double&
   for (int k = 0; k < gyros_; ++k) {
     middle[k] = at_both[k] ? (from.h_b[k] + to.h_b[k]).normalized() : used[k] ? to.h_b[k] : Vector3d::UnitX();
   }
-  // The momenta in the middle of the step: those at its begin would be half a step behind all along.
+  // The momenta in the middle of the step; those at its begin would be half a step of drift behind.
   const Directions seen_c = in_c(moment.gyros, gyros_, middle);
   Directions h_middle = momenta(moment.gyros, gyros_);
   if (const auto at_begin = optimal_rotation(h_middle, seen_c, used)) {
@@ -432,7 +432,7 @@ PassProblem::Linear PassProblem::linearise(const PassSolution& solution) const {
       if (rows.y.size() == 0) {
         continue;
       }
-      // Its pull falls with the third power of the misfit beyond the gate.
+      // Its influence falls with the third power of the misfit beyond the gate.
       const double nis = rows.y.squaredNorm();
       const double gate = scale * gate_of_freedom(static_cast<int>(rows.y.size()), setup_.on_board.gate_nis);
       linear.cost_outside_rows += nis > gate ? 2 * gate * (1 - gate / nis) : 0;

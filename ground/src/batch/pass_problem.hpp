@@ -1,6 +1,6 @@
 #pragma once
 /// A whole pass as one problem of least squares: the initial directions, the parameters, and where there is process
-/// noise the directions and the wandering drift all along.
+/// noise the directions and the wandering drift at the beginning of each arc.
 
 #include <Eigen/Core>
 #include <chrono>
@@ -59,7 +59,7 @@ struct PassSolution {
 
 class PassProblem {
  public:
-  /// Refers to the pass. Needs a fix.
+  /// Keeps a reference to the pass, which needs a fix.
   PassProblem(const ScreenedPass& pass, PassSetup setup);
 
   [[nodiscard]] const PassSetup& setup() const { return setup_; }
@@ -78,7 +78,7 @@ class PassProblem {
     Eigen::MatrixXd prior;
     Eigen::VectorXd prior_y;
     std::vector<SmootherStage> stages;
-    /// What the process noise is put into, arc by arc but for the last.
+    /// Transition over each arc but the last, to which the process noise is added.
     struct ArcEnd {
       Eigen::MatrixXd A;  ///< without what is kept of the wandering drift
       double duration_s = 0;
@@ -99,7 +99,7 @@ class PassProblem {
   /// Adds the corrections that smooth() found.
   void correct(const SmootherResult& found, PassSolution& solution) const;
 
-  /// One time within an arc.
+  /// The state of the solution at one time of the pass, within an arc.
   struct Moment {
     std::size_t arc = 0;
     Time t{};
@@ -108,7 +108,7 @@ class PassProblem {
     PerGyro<Sensitivity<kMaxDriftColumns>> since;     ///< the beginning of the arc
     PerGyro<Eigen::Matrix<double, 3, 2>> directions;  ///< there: φ by the two components across the momentum
   };
-  /// Goes along all samples, thinned, and fixes, in time order.
+  /// Visits all samples that are used, and all fixes, in time order.
   void go_along(const PassSolution& solution, const std::function<void(const Moment&)>& visit) const;
 
   /// A fix compared with the momenta: components of the misfit, their noise, and their derivative by the states of its
@@ -120,7 +120,7 @@ class PassProblem {
   };
   [[nodiscard]] FixRows compare(const PassSolution& solution, const Moment& moment) const;
 
-  /// Whether it counts less than it would by its noise.
+  /// Whether its weight is reduced because it is beyond the gate.
   [[nodiscard]] bool is_outlier(const FixRows& rows) const;
 
   /// By the momenta and these readings.
@@ -129,7 +129,7 @@ class PassProblem {
   /// Rows about the states at a moment, as on board, as rows about those of its arc.
   using Rows = ComparedRows<kFullCapacity.states>;
   [[nodiscard]] Eigen::MatrixXd by_states_of_arc(const Moment& moment, Rows rows) const;
-  /// How the error of an attitude, c axes, depends on the states of the arc.
+  /// Derivative of the error of an attitude, c axes, by the states of the arc.
   [[nodiscard]] Eigen::MatrixXd attitude_by_states(const Moment& moment, const AttitudeByDirections& attitude,
                                                    const Directions& h_b) const;
 

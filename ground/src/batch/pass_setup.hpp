@@ -1,5 +1,5 @@
 #pragma once
-/// From settings and options to the problem that the whole pass poses.
+/// From settings and options to the least-squares problem of a pass.
 
 #include "batch/pass_problem.hpp"
 #include "onboard/screen.hpp"
@@ -7,10 +7,10 @@
 
 namespace trihedron::ground {
 
-/// The problem that these options pose; nothing is left to decide in them. Throws SetupError.
+/// The set-up for options in which nothing is left to decide. Throws SetupError.
 [[nodiscard]] PassSetup pass_setup(const PassSettings& settings, const CalibrationOptions& options);
 
-/// Where the iteration to the most likely solution begins.
+/// The starting point of the iteration.
 [[nodiscard]] PassSolution first_solution(const PassProblem& problem, const Screened& screened);
 
 }  // namespace trihedron::ground

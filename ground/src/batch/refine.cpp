@@ -8,9 +8,9 @@
 #include <utility>
 
 #include "batch/pass_setup.hpp"
+#include "batch/smoothed_attitude.hpp"
 #include "model/prior.hpp"
 #include "model/setup.hpp"
-#include "batch/smoothed_attitude.hpp"
 #include "trihedron/ground/model/setup_error.hpp"
 
 namespace trihedron::ground {
@@ -18,7 +18,7 @@ namespace {
 
 using Eigen::MatrixXd;
 
-/// What is left of each fix when the whole pass is smoothed, in place of what it was off on board.
+/// Replaces the innovation of each fix by its residual after smoothing.
 void use_residuals(const PassProblem& problem, const PassSolution& solution, const std::vector<MatrixXd>& roots,
                    std::vector<FixRecord>& fixes) {
   std::map<std::pair<Time, int>, FixRecord*> compared;
@@ -58,8 +58,8 @@ void use_residuals(const PassProblem& problem, const PassSolution& solution, con
   });
 }
 
-/// How far the constants by the first half of the pass are off those by all of it: their difference has the covariance
-/// by which the second half makes them better known. Only what it halves at least counts.
+/// Compares the constants by the first half of the pass with those by all of it (docs/mathematics.md, section 12). Only
+/// directions in which the second half at least halves the variance count.
 void compare_halves(const BatchResult& result, const Layout& layout, Statistics& statistics) {
   constexpr double kLeast = 0.5;
   const PassProblem::Linear& linear = result.linear;
@@ -70,7 +70,7 @@ void compare_halves(const BatchResult& result, const Layout& layout, Statistics&
   const Eigen::Index c = layout.constants();
   const MatrixXd triangle = triangles_after(linear.prior, linear.prior_y, linear.stages, {half - 1}).front();
   const auto R = triangle.block(layout.dynamic(), layout.dynamic(), c, c).triangularView<Eigen::Upper>();
-  // In units of what is known after the first half: the whole has covariance `rest` there.
+  // In units of the sigmas after the first half; in these the covariance by the whole pass is `rest`.
   const Eigen::VectorXd first = triangle.block(layout.dynamic(), layout.size(), c, 1);
   const MatrixXd known = R * MatrixXd(result.errors.last_root.bottomRows(c));
   const Eigen::VectorXd whole = R * Eigen::VectorXd(result.errors.x.back().tail(c));
@@ -89,8 +89,8 @@ void compare_halves(const BatchResult& result, const Layout& layout, Statistics&
   statistics.halves_degrees_of_freedom = freedom;
 }
 
-/// Columns of `to` in place of those of `from`. What was not estimated along the pass is not a number there, with the
-/// sigma of before the pass.
+/// Rearranges the columns from the states `from` to the states `to`. A state that was not estimated along the pass gets
+/// NaN with its prior sigma.
 void rearrange(const std::vector<ParameterId>& from, const std::vector<ParameterId>& to, const PassSetup& setup,
                ParameterHistory& history) {
   const Eigen::VectorXd prior_sigma = setup.prior.covariance.diagonal().cwiseSqrt();
@@ -118,7 +118,7 @@ std::vector<FurtherEstimate> further_of(const Layout& layout, const BatchResult&
   return further;
 }
 
-/// Throws SetupError where nothing can be made of it.
+/// The problem of a screened pass. Throws SetupError where it has no solution.
 PassProblem problem_of(const Screened& screened, PassSetup setup) {
   if (screened.pass.fixes.empty()) {
     throw SetupError("no fix could be compared with the gyros", "look at the telemetry with `trihedron inspect`");

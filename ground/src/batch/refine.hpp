@@ -1,5 +1,5 @@
 #pragma once
-/// A calibration taken up by least squares over the whole pass: estimator batch.
+/// Estimator batch: a calibration refined by least squares over the whole pass.
 
 #include <vector>
 
@@ -13,7 +13,7 @@ namespace trihedron::ground {
 /// The whole pass by least squares; its results replace those of the on-board step.
 class Refinement {
  public:
-  /// Works it out. Refers to `screened`. Throws SetupError.
+  /// Solves the problem. Keeps a reference to `screened`. Throws SetupError.
   Refinement(const Screened& screened, PassSetup setup, const CalibrationOptions& options);
 
   /// What the smoothed pass shows at the fixes.

@@ -16,8 +16,7 @@ namespace {
 using Eigen::MatrixXd;
 using Eigen::Vector3d;
 
-/// Half-widths of the fit, longest first; a shorter one is taken where the body does not move like a cubic over a
-/// longer.
+/// Half-widths of the fit, longest first; a shorter one is taken where a cubic does not fit over a longer one.
 constexpr std::array<Duration, 3> kReaches = {std::chrono::milliseconds(3000), std::chrono::milliseconds(1400),
                                               std::chrono::milliseconds(700)};
 

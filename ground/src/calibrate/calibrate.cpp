@@ -45,7 +45,7 @@ class ProgressMeter {
   std::size_t done_ = 0;
 };
 
-/// No fix started the filter: says what became of them.
+/// The error that no fix started the filter; says what became of the fixes.
 SetupError nothing_used(const std::vector<FixRecord>& fixes) {
   FixCounts counts;
   for (const FixRecord& fix : fixes) {
@@ -75,7 +75,8 @@ Calibration known_before(const PassSettings& settings, const CalibrationOptions&
   return before;
 }
 
-/// Beside the batch runs what flies, with a drift model that it has room for and without what only a whole pass shows.
+/// Options of the on-board run at the time of the batch: without what only a whole pass shows, and with esg20 in place
+/// of a larger drift model.
 CalibrationOptions options_of_on_board_run(const PassSettings& settings, CalibrationOptions options) {
   options.estimator = Estimator::kInvariant;
   options.further_states[FurtherState::kCoefficientChange] = FurtherStateOptions::Choice::kOff;
@@ -85,13 +86,13 @@ CalibrationOptions options_of_on_board_run(const PassSettings& settings, Calibra
   return options;
 }
 
-/// The batch, and how the drift models that were compared fly over what it found.
+/// The batch, and the open-loop errors of the drift models that were compared.
 struct Smoothed {
   Refinement refinement;
   std::vector<DriftModelForecast> drift_models;
 };
 
-/// `decision` keeps what was screened, which the result refers to.
+/// `decision` keeps the screened pass, to which the result refers.
 Smoothed smooth(const Pass& pass, Decision& decision) {
   if (!decision.screened) {
     decision.screened = screen(pass, decision.options);

@@ -46,14 +46,15 @@ void refuse_stranger(const PassSettings& last, const PassSettings& next, const s
   }
 }
 
-/// What the data alone say: the estimate and `shift`, with this covariance; very large where they say nothing.
+/// The most likely value by the data alone, estimate + `shift`, and its covariance, very large where the data say
+/// nothing.
 struct Likelihood {
   VectorXd shift;
   MatrixXd covariance;
 };
 
 Likelihood likelihood_of(const Calibration& before, const Calibration& after) {
-  // What the data add to the prior below this part of it is taken for this part.
+  // Lower limit of the information that the data add, as a fraction of that of the prior.
   constexpr double kLeast = 1e-6;
   // Where P0 is one, P has eigenvalues λ of 0 to 1, and the inverse of P⁻¹ − P0⁻¹ has λ / (1 − λ).
   const Eigen::LLT<MatrixXd> prior(before.covariance);
@@ -85,7 +86,7 @@ Comparison compare(const CalibrationRun& earlier, const CalibrationRun& later) {
   return {among(false), among(true)};
 }
 
-/// Codes of what forbids the use of a pass alone and stays true of the passes together.
+/// Findings that forbid the use of one pass and hold for the passes together as well.
 std::vector<std::string_view> lasting_faults(const Verdict& verdict) {
   std::vector<std::string_view> codes;
   for (const Finding& finding : verdict.findings) {

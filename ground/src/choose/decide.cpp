@@ -29,9 +29,9 @@ bool is_judged_by_trial(const FurtherStateRow& row) {
   return !row.key.empty() && row.state != FurtherState::kWanderingDrift;
 }
 
-/// Odds of 20 to 1.
+/// Log of the odds, 20 to 1, from which on a state or model is accepted.
 constexpr double kLogOddsToAccept = 3;
-/// Pairs of fixes that give the noise of the star tracker within some percent.
+/// Smallest number of pairs of fixes from which the noise of the star tracker is estimated, to some percent.
 constexpr std::size_t kLeastFixPairs = 1000;
 
 /// 1-sigma of the star tracker by the changes of a trial; the median makes it robust against outliers. Needs changes.
@@ -71,7 +71,7 @@ void use_noise(const CalibrationNoise& noise, CalibrationOptions& options) {
   }
 }
 
-/// As in the prior calibration.
+/// Settles open choices as the prior calibration has them.
 CalibrationOptions as_before(CalibrationOptions options, const Calibration& prior) {
   for (const FurtherStateRow& row : kFurtherStates) {
     // How the coefficients changed over an earlier pass says nothing of this one.
@@ -180,7 +180,7 @@ void decide_again_with_more_noise(const Pass& pass, const Screened& screened, co
   CalibrationOptions& options = decision.options;
   const CalibrationOptions free = with_everything(options, asked, largest_model);
   const CalibrationOptions like = wandering_like(walk, free);
-  // Looked at only where the walk is worth it: before that, nobody asks whether it failed.
+  // Waited for only where a walk was accepted; otherwise it does not matter whether the trial failed.
   std::packaged_task<std::pair<Trial, NoiseFit>()> try_wandering([&] {
     Trial trial(pass, screened, like);
     const NoiseFit likely = with_most_likely_wandering(trial, like);
@@ -228,7 +228,7 @@ void leave_out_what_is_open(CalibrationOptions& options) {
   options.drift_model = options.drift_model.value_or(kEsg7);
 }
 
-/// By what the pass itself shows.
+/// Decides by the data of the pass.
 Decision decide_by_pass(const Pass& pass, const Screened& screened, const CalibrationOptions& asked,
                         const DriftModelId& largest_model) {
   Decision decision{asked, {}, {}, {}};
@@ -270,7 +270,7 @@ DriftModelId largest_to_compare(const CalibrationOptions& asked) {
   return vsh(is_vsh ? std::max(int{asked.drift_model->degree}, kFirstDegree) : kFirstDegree);
 }
 
-/// By one degree, where there is one.
+/// The model of one degree more, where there is one.
 std::optional<DriftModelId> larger_model(const DriftModelId& model) {
   const bool is_there = model.family == DriftModelId::Family::kVsh && model.degree < DriftModelId::kMaxDegree;
   return is_there ? std::optional(vsh(model.degree + 1)) : std::nullopt;
@@ -352,7 +352,7 @@ Decision decide(const Pass& pass, const CalibrationOptions& asked_for) {
   for (;;) {
     Decision decided = decide_by_pass(pass, screened, asked, largest_model);
     const std::optional<DriftModelId> larger = larger_model(largest_model);
-    // None where the pass is too short for any.
+    // There are no forecasts where the pass is too short.
     if (!larger || decided.forecasts.empty() || best_of(decided.forecasts) != &decided.forecasts.back()) {
       if (pass.settings.gyros.size() == 2) {  // which of more gyros is at fault is judged by the noise found
         decided.screened = std::move(screened);

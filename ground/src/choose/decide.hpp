@@ -10,7 +10,8 @@
 
 namespace trihedron::ground {
 
-/// The options with nothing left to decide, `find_noise` saying whether it was found; and on what evidence.
+/// Options in which nothing is left to decide (`find_noise` says whether the noise was found), and the evidence for
+/// them.
 struct Decision {
   CalibrationOptions options;
   std::vector<Evidence> evidence;    ///< empty where nothing was to be decided
@@ -18,9 +19,9 @@ struct Decision {
   std::optional<Screened> screened;  ///< the screened pass by which it was decided, where it was
 };
 
-/// Settles each choice that is left to the program by the whole pass. Estimator paper has no further states; a prior
-/// calibration tells them where the pass has one; else they are those that the pass makes 20 times as likely as their
-/// absence. The noise is found where it is asked for, on a pass that is long enough and has no prior calibration.
+/// Settles each choice that is left to the program by the whole pass. Estimator paper has no further states; where the
+/// pass has a prior calibration, they are those of it; else those whose presence the pass makes 20 times as likely as
+/// their absence. The noise is found where it is asked for, on a pass that is long enough and has no prior calibration.
 /// Throws SetupError.
 [[nodiscard]] Decision decide(const Pass& pass, const CalibrationOptions& asked);
 

@@ -18,7 +18,7 @@ constexpr std::size_t kParts = 6;
 /// Parts at the beginning that are only fitted, not forecast.
 constexpr std::size_t kLearning = 2;
 
-/// What is known of the states of a smaller model: those that it does not have are zero.
+/// Information on the states of a smaller model: the states that it does not have are zero.
 struct Restricted {
   double log_likelihood = 0;
   VectorXd x;  ///< truth − solution, of all states
@@ -93,7 +93,7 @@ Forecast forecast(const PassProblem& problem, const PassSolution& solution, cons
   return result;
 }
 
-/// Of the fit, as if it were set right by the smoothed attitude at one fix.
+/// The gyros of the fit, with the momenta set by the smoothed attitude at one fix.
 std::vector<GyroCalibration> records_of(const Forecast::Fit& fit, const SmoothedCourse& course, std::size_t at) {
   std::vector<GyroCalibration> records = fit.gyros;
   for (std::size_t k = 0; k < records.size(); ++k) {

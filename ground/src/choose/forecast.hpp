@@ -11,8 +11,8 @@ namespace trihedron::ground {
 
 struct Forecast {
   DriftModelId drift_model;
-  /// ln of the likelihood of each part of the pass by the parts before it, but for the first ones; up to a constant
-  /// that the models share.
+  /// ln of the likelihood of each part of the pass given the parts before it, summed over all but the first parts; up
+  /// to a constant that the models share.
   double log_likelihood = 0;
   struct Fit {
     Time until{};
@@ -21,8 +21,8 @@ struct Forecast {
   std::vector<Fit> fits;  ///< to the parts before each forecast
 };
 
-/// Of these drift models, all of which the problem's contains, in this order; the problem taken as linear about its
-/// solution. Empty where it has too few arcs to have parts.
+/// Forecasts by these drift models, each contained in that of the problem; the problem is taken as linear about its
+/// solution. Empty where it has too few arcs.
 [[nodiscard]] std::vector<Forecast> forecasts(const PassProblem& problem, const BatchResult& found,
                                               const std::vector<DriftModelId>& models);
 

@@ -14,14 +14,13 @@
 namespace trihedron::ground {
 namespace {
 
-/// Goes uphill over process noise on a grid, each by two numbers.
+/// Search for the largest likelihood over a grid of process noise, two integers per point.
 class Search {
  public:
   using Point = std::pair<int, int>;
   using At = std::function<ProcessNoise(double, int)>;
 
-  /// From the best of `starts`, (0, 0) among them, to the best of its neighbours, and so on, within the bounds; all
-  /// included.
+  /// Goes from the best of `starts`, which contains (0, 0), to the best of its neighbours and so on, within the bounds.
   Search(const Trial& trial, At at, const std::vector<Point>& starts, const Point& lowest, const Point& highest)
       : trial_(trial), linear_(trial.linear()), at_(std::move(at)) {
     gather_constants(linear_.prior, linear_.prior_y, linear_.stages);
@@ -42,11 +41,11 @@ class Search {
     const double peak = tried_.at(best_);
     const auto below = tried_.find({i - 1, j});
     const auto above = tried_.find({i + 1, j});
-    double beside = 0;
+    double offset = 0;
     if (below != tried_.end() && above != tried_.end()) {
-      beside = (above->second - below->second) / (4 * peak - 2 * below->second - 2 * above->second);
+      offset = (above->second - below->second) / (4 * peak - 2 * below->second - 2 * above->second);
     }
-    return {at_(i + beside, j), peak, peak - tried_.at({0, 0})};
+    return {at_(i + offset, j), peak, peak - tried_.at({0, 0})};
   }
 
  private:

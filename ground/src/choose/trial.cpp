@@ -12,8 +12,8 @@
 namespace trihedron::ground {
 namespace {
 
-/// ln of the Bayes factor for states being free instead of zero (Savage and Dickey): the density of zero before over
-/// that after. `root`: a square root of their covariance now.
+/// ln of the Bayes factor for states being free instead of zero (Savage and Dickey): the density at zero before the
+/// data over that after. `root`: a square root of their covariance after.
 double log_bayes_factor(const Eigen::VectorXd& estimate, const Eigen::MatrixXd& root,
                         const Eigen::VectorXd& prior_sigma) {
   const Eigen::MatrixXd scaled = prior_sigma.cwiseInverse().asDiagonal() * root;
@@ -22,7 +22,7 @@ double log_bayes_factor(const Eigen::VectorXd& estimate, const Eigen::MatrixXd& 
   return white.squaredNorm() / 2 + covariance.matrixLLT().diagonal().array().log().sum();
 }
 
-/// From the smallest on, those that a model contains and that are tried.
+/// The models to compare with a model: those that it contains, from the smallest on, and itself.
 std::vector<DriftModelId> models_up_to(const DriftModelId& model) {
   std::vector<DriftModelId> models{kEsg7};
   for (int degree = 1; degree <= model.degree; ++degree) {

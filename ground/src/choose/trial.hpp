@@ -17,7 +17,7 @@ class Trial {
   /// Refers to `screened`, which needs a fix. Throws SetupError.
   Trial(const Pass& pass, const Screened& screened, const CalibrationOptions& options);
 
-  /// Again, with other noise.
+  /// Fits again, with other noise.
   void refit(const ProcessNoise& noise);
 
   [[nodiscard]] const PassProblem::Linear& linear() const { return found_.linear; }
@@ -28,7 +28,7 @@ class Trial {
 
   /// ln of the Bayes factor of these states, which the trial must have; not of drift that wanders.
   [[nodiscard]] double log_evidence(FurtherState state) const;
-  /// Of its drift model and those that it contains.
+  /// Forecasts by its drift model and those that it contains.
   [[nodiscard]] std::vector<Forecast> forecasts() const;
 
   /// Change of the difference between the first star tracker and the gyros from fix to fix, about c x, y, z: everything

@@ -18,7 +18,7 @@ namespace {
 
 constexpr int kPair = 2;
 
-/// The drift turns by nanoradians over such a step: the midpoint rule loses nothing even in a slew.
+/// Step of the integration. The drift turns by nanoradians over it: the midpoint rule loses nothing even in a slew.
 constexpr Duration kStep = std::chrono::seconds(3);
 
 /// Directions at any time, interpolated between samples; asked for in ascending order.
@@ -60,7 +60,7 @@ class Readings {
   std::size_t next_ = 0;
 };
 
-/// A gyro flown with what is known of it.
+/// A gyro propagated with given parameters.
 struct OpenLoopGyro {
   Gyro gyro;
   DriftModel drift;

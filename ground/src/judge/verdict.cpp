@@ -33,8 +33,8 @@ constexpr double kNisTolerance = 0.025;
 constexpr double kNisWrong = 0.25;
 /// Two nominal alignment accuracies of the system.
 constexpr double kWeakAlignment_rad = 20 * kArcsecond;
-/// A drift of a few degrees per day, of a gyro or of the orbit plane, is below the noise over this time; over longer
-/// ones it can stand in for an alignment.
+/// Over this time a drift of a few degrees per day, of a gyro or of the orbit plane, is below the noise; over longer
+/// times it can be mistaken for an alignment.
 constexpr Duration kDriftStretch = std::chrono::minutes(10);
 /// Fraction of rejected fixes above which the result rests on a selection that the filter has made itself.
 constexpr double kMostlyRejected = 0.2;
@@ -69,7 +69,7 @@ void judge_length(const Pass& pass, std::vector<Finding>& findings) {
   const double span_s = to_seconds(pass.gyro.t.back() - pass.gyro.t.front());
   if (span_s < kOneOrbit_s) {
     add(findings, FindingCode::kShortPass,
-        "The pass is shorter than one orbit: alignment and drift coefficients are not yet told apart.",
+        "The pass is shorter than one orbit: alignment and drift coefficients are not yet separated.",
         fmt::format("{:.1f} min of telemetry", span_s / 60),
         "Alignment takes about one orbit, drift coefficients two to three.");
   }
@@ -107,14 +107,14 @@ void judge_batch(const Statistics& statistics, std::vector<Finding>& findings) {
 void judge_star_tracker(const Statistics& statistics, std::vector<Finding>& findings) {
   if (statistics.fixes_off_in_a_row > 0) {
     add(findings, FindingCode::kStarTrackerOff,
-        "For a while the star tracker was off by more than any drift can make; it was not believed.",
+        "For a while the star tracker was off by more than any drift can cause; its fixes were not used.",
         fmt::format("{} fixes, 20 and more in a row", statistics.fixes_off_in_a_row),
         "Look at its telemetry there: a wrong identification, or a head that was moved.");
   }
 }
 
 void judge_gyros(const Pass& pass, const CalibrationRun& run, std::vector<Finding>& findings) {
-  const auto tell = [&](GyroState state, FindingCode code, const char* text, const char* cure) {
+  const auto add_events = [&](GyroState state, FindingCode code, const char* text, const char* cure) {
     std::vector<GyroEvent> events;
     std::ranges::copy_if(run.gyro_events, std::back_inserter(events),
                          [&](const GyroEvent& event) { return event.state == state; });
@@ -126,17 +126,17 @@ void judge_gyros(const Pass& pass, const CalibrationRun& run, std::vector<Findin
   const auto isolated = std::count_if(run.gyro_events.begin(), run.gyro_events.end(),
                                       [](const GyroEvent& event) { return event.state == GyroState::kIsolated; });
   const bool enough = static_cast<long>(run.calibration.gyros.size()) - isolated >= 2;
-  const bool told =
-      tell(GyroState::kIsolated, FindingCode::kGyroIsolated,
-           enough ? "A gyro alone did not agree with the rest, time after time; the others went on without it."
-                  : "A gyro alone did not agree with the rest, time after time; without it there is no pair.",
-           "Look at its telemetry from there on. Its estimates are those of before.");
-  if (told && !enough) {
+  const bool added =
+      add_events(GyroState::kIsolated, FindingCode::kGyroIsolated,
+                 enough ? "A gyro alone did not agree with the rest, time after time; the others went on without it."
+                        : "A gyro alone did not agree with the rest, time after time; without it there is no pair.",
+                 "Look at its telemetry from there on. Its estimates are those of before.");
+  if (added && !enough) {
     findings.back().severity = Severity::kDoNotUse;
   }
-  tell(GyroState::kStuck, FindingCode::kGyroStuck,
-       "Readings of a gyro stood still, not even moved by noise; they were not used.",
-       "Look at the telemetry there: a frozen readout, or the last value repeated in a gap.");
+  add_events(GyroState::kStuck, FindingCode::kGyroStuck,
+             "Readings of a gyro stood still, not even moved by noise; they were not used.",
+             "Look at the telemetry there: a frozen readout, or the last value repeated in a gap.");
 }
 
 void judge_nis(const Statistics& statistics, const std::string& what_is_wrong, std::vector<Finding>& findings) {
@@ -216,7 +216,7 @@ void judge_halves(const Statistics& statistics, std::vector<Finding>& findings) 
   }
 }
 
-/// A model that is this much less likely than another is wrong, as ln.
+/// Log of the odds from which on a model counts as wrong against another.
 constexpr double kLogOddsOfWrongModel = 10;
 
 void judge_drift_model(const CalibrationRun& run, std::vector<Finding>& findings) {
@@ -303,12 +303,12 @@ void judge_star_tracker_errors(const CalibrationRun& run, std::vector<Finding>& 
 
 void judge_noise(const Pass& pass, const CalibrationRun& run, std::vector<Finding>& findings) {
   if (const auto& found = run.options.star_tracker_noise_rad; found && run.options.find_noise) {
-    const Eigen::Vector3d told = pass.settings.star_tracker_noise_rad / kArcsecond;
+    const Eigen::Vector3d given = pass.settings.star_tracker_noise_rad / kArcsecond;
     const Eigen::Vector3d now = *found / kArcsecond;
     add(findings, FindingCode::kStarTrackerNoise,
-        "The fixes scatter otherwise than pass.toml says; the noise found was used.",
-        fmt::format("{:.1f}″ {:.1f}″ {:.1f}″ found, {:.1f}″ {:.1f}″ {:.1f}″ told", now.x(), now.y(), now.z(), told.x(),
-                    told.y(), told.z()),
+        "The fixes do not scatter as pass.toml says; the noise found was used.",
+        fmt::format("{:.1f}″ {:.1f}″ {:.1f}″ found, {:.1f}″ {:.1f}″ {:.1f}″ in pass.toml", now.x(), now.y(), now.z(),
+                    given.x(), given.y(), given.z()),
         "Correct the noise figures of the star tracker in pass.toml.");
   }
 }
@@ -331,7 +331,7 @@ void judge_determination(const CalibrationRun& run, std::vector<Finding>& findin
 }
 
 void judge_steadiness(const Pass& pass, const CalibrationRun& run, std::vector<Finding>& findings) {
-  // Outliers would seem to move a steady axis.
+  // Outliers are left out: they would seem to move a steady axis.
   const StarTrackerTelemetry used = used_fixes(pass, run.fixes);
   const Eigen::Vector3d& noise = pass.settings.star_tracker_noise_rad;
   const auto observability = alignment_observability(used, noise, noise.minCoeff());
@@ -344,9 +344,9 @@ void judge_steadiness(const Pass& pass, const CalibrationRun& run, std::vector<F
       fmt::format(
           "Steady flight: the axis ({:+.3f}, {:+.3f}, {:+.3f}) in c is fixed in the body and in space (the "
           "orbit normal, where the spacecraft faces the Earth), so the alignment of each gyro about it cannot be "
-          "told from its initial direction. {} The attitude does not suffer while the flight stays steady.",
+          "separated from its initial direction. {} The attitude does not suffer while the flight stays steady.",
           axis.x(), axis.y(), axis.z(),
-          believes ? "Estimator paper takes noise for information there: do not believe its sigmas about this axis."
+          believes ? "Estimator paper takes noise for information there: its sigmas about this axis are too small."
                    : "The sigmas say so."),
       fmt::format("about {:.0f}″ at best about this axis from the fixes alone", observability.sigma_rad / kArcsecond),
       "Fly slews about the other axes during the calibration: ten minutes of 10° and more suffice.");

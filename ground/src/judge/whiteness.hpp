@@ -1,5 +1,5 @@
 #pragma once
-/// What innovations show that are not white.
+/// Tests whether innovations are white.
 
 #include <vector>
 
@@ -9,7 +9,7 @@ namespace trihedron::ground {
 
 /// Over all components of the innovations of the first star tracker, each in its sigma.
 struct Whiteness {
-  /// Autocorrelation of fixes 1 … kLags apart: N Σ r² is χ² of so many degrees of freedom where they are white.
+  /// Autocorrelation of fixes 1 … kLags apart: N Σ r² is χ² of these degrees of freedom where they are white.
   double correlation_square = 0;
   int degrees_of_freedom = 0;
   double largest_correlation = 0;

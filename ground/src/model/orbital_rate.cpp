@@ -12,7 +12,7 @@ namespace trihedron::ground {
 double orbital_rate_rad_s(const StarTrackerTelemetry& tracker) {
   constexpr double kFastest_rad_s = 0.02;  // beyond, an outlier
   constexpr double kLowOrbit_rad_s = 1.1e-3;
-  // The mean angular velocity in `in`: slews cancel but for the turn of their axes between out and back.
+  // The mean angular velocity in `in`: a slew and the slew back nearly cancel.
   Eigen::Vector3d turned = Eigen::Vector3d::Zero();
   double time_s = 0;
   for (std::size_t i = 1; i < tracker.size(); ++i) {
@@ -29,7 +29,7 @@ double orbital_rate_rad_s(const StarTrackerTelemetry& tracker) {
   if (!(rough_rad_s > 0.5 * kLowOrbit_rad_s)) {
     return kLowOrbit_rad_s;
   }
-  // Better, and of outliers and slews only the median: the turn about that axis over half of the pass.
+  // Refined, and robust by the median against outliers and slews: the turn about that axis over half of the pass.
   const Eigen::Vector3d axis = turned.normalized();
   const std::size_t half = tracker.size() / 2;
   std::vector<double> rates;

@@ -4,8 +4,7 @@
 
 namespace trihedron::ground {
 
-/// The rate of the orbit, as the attitude shows it. An attitude that stands still in space does not show it; then that
-/// of a low orbit.
+/// The rate of the orbit, from the attitude history. That of a low orbit where the attitude is fixed in space.
 [[nodiscard]] double orbital_rate_rad_s(const StarTrackerTelemetry& tracker);
 
 }  // namespace trihedron::ground

@@ -15,8 +15,9 @@
 namespace trihedron::ground {
 namespace {
 
-/// Prior sigma of a coefficient by that of those of eq. (1): further members are taken to be smaller, of each degree
-/// from 2 on the more so the faster they change with h, so that each moves the momentum alike. Of esg20 all alike.
+/// Prior sigma of a coefficient over that of the coefficients of eq. (1): further members are taken to be smaller, and
+/// from degree 2 on the smaller the faster they change with h, so that each moves the momentum by as much. In esg20 all
+/// are equal (docs/mathematics.md, section 3).
 double prior_factor(const DriftModelId& model, const DriftCoefficient& coefficient) {
   constexpr double kOutsideEq1 = 0.05;
   if (coefficient.is_in_eq1()) {
@@ -26,8 +27,9 @@ double prior_factor(const DriftModelId& model, const DriftCoefficient& coefficie
   return kOutsideEq1 * std::sqrt(6.0 / (degree * (degree + 1)));
 }
 
-/// Puts means, and sigmas of κ and δ.
-void put_prior(const GyroPrior& prior, int number, const Layout& layout, Gyro& mean, Eigen::Ref<Eigen::VectorXd> sigma) {
+/// Writes the means, and the sigmas of κ and δ.
+void put_prior(const GyroPrior& prior, int number, const Layout& layout, Gyro& mean,
+               Eigen::Ref<Eigen::VectorXd> sigma) {
   const std::vector<DriftCoefficient> coefficients = coefficients_of(layout.drift_model);
   for (const auto* table : {&prior.drift_rad_s, &prior.drift_sigma_rad_s}) {
     for (const auto& [coefficient, value] : *table) {

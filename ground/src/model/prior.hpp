@@ -1,5 +1,5 @@
 #pragma once
-/// What is known of the gyros before a pass.
+/// The prior of the gyros.
 
 #include "model/gyro.hpp"
 #include "trihedron/core/layout.hpp"
@@ -12,13 +12,13 @@ void refuse_unknown(const DriftModelId& drift_model);
 /// Throws SetupError where the record does not have as many coefficients as its model.
 void refuse_incomplete(const GyroCalibration& gyro);
 
-/// As the record has it, with its momentum; coefficients of the layout that it does not have are zero.
+/// The gyro of a record, with its momentum; coefficients of the layout that the record lacks are zero.
 [[nodiscard]] Gyro gyro_of(const GyroCalibration& record, const Layout& layout);
-/// The coefficients stand for when so much of their change has been.
+/// The record of a gyro, with the coefficients at the time when this fraction of their change has taken place.
 [[nodiscard]] GyroCalibration record_of(const Gyro& gyro, const Layout& layout, double part_of_change);
 
-/// By what pass.toml says of each gyro, or else by the earlier calibration that it names. Throws SetupError where that
-/// says less than the layout needs, or speaks of coefficients that its drift model does not have.
+/// From the earlier calibration that pass.toml names, or else from what it says of each gyro. Throws SetupError where
+/// these lack what the layout needs, or name coefficients that the drift model does not have.
 [[nodiscard]] Prior prior_of(const PassSettings& settings, const Layout& layout);
 
 }  // namespace trihedron::ground

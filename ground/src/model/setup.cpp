@@ -13,7 +13,7 @@
 namespace trihedron::ground {
 namespace {
 
-/// Of the change of a coefficient over a pass, as a part of the sigma of the coefficient itself.
+/// Prior sigma of the change of a coefficient over a pass, as a fraction of that of the coefficient.
 constexpr double kChangeSigma = 0.05;
 
 /// The largest sigma of a component of the bias that an earlier calibration has left; 0 without it.

@@ -13,8 +13,8 @@
 
 namespace trihedron::ground {
 
-/// The states that decided options ask for, of a spacecraft with these gyros and star trackers. Throws SetupError where
-/// something is left open in the options, or the estimator cannot have it.
+/// The layout for decided options and the gyros and star trackers of a spacecraft. Throws SetupError where the options
+/// leave something open, or the estimator cannot have it.
 [[nodiscard]] Layout layout_of(const PassSettings& settings, const CalibrationOptions& options);
 
 /// Noise, priors of the further states, gates; the layout is layout_of().
@@ -24,7 +24,7 @@ namespace trihedron::ground {
 
 /// The components of the further states that a layout has and calibration.json lists, in its order.
 [[nodiscard]] std::vector<ParameterId> further_parameters(const Layout& layout);
-/// Where a component of a further state stands in the layout, which must have it, and its value.
+/// Position in the layout and value of a component of a further state, which the layout must have.
 [[nodiscard]] int state_of(const Layout& layout, const ParameterId& parameter);
 [[nodiscard]] double value_of(const Layout& layout, const Gyros& gyros, const SharedStates& shared,
                               const ParameterId& parameter);

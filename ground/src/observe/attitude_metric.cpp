@@ -15,7 +15,7 @@ namespace {
 using Eigen::Matrix3d;
 using Eigen::MatrixXd;
 
-/// Gauss's points, of equal weight, for angles that are evenly distributed within the limits: exact to the third power.
+/// Gauss points of equal weight for angles that are uniformly distributed within the limits: exact to the third power.
 std::array<Matrix3d, 4> slews(const Mission& mission) {
   const double roll = mission.max_roll_rad * std::numbers::inv_sqrt3;
   const double pitch = mission.max_pitch_rad * std::numbers::inv_sqrt3;

@@ -9,7 +9,7 @@
 
 namespace trihedron::ground {
 
-/// What the body turns about in the mean; zero where it does not turn.
+/// Mean axis about which the body turns; zero where it does not turn.
 struct BodyRotation {
   Eigen::Vector3d axis_c{0, 0, 0};  ///< unit
   bool is_orbital = false;          ///< at the rate of an orbit
@@ -20,8 +20,8 @@ class ParameterBlocks {
   /// The drift coefficients of a gyro are a block, so are its alignments; each further state is one of its own.
   explicit ParameterBlocks(const std::vector<ParameterId>& parameters);
 
-  /// Other orthonormal columns of the same space, the first of them as nearly within one block as there is any, the
-  /// second the same of what is left, and so on. `space`: one row per parameter.
+  /// Other orthonormal columns of the same space: the first lies as nearly within one block as any direction of the
+  /// space, the second as nearly as any of the rest, and so on. `space`: one row per parameter.
   [[nodiscard]] Eigen::MatrixXd separated(Eigen::MatrixXd space) const;
 
   /// "gyro 1 alignment about the orbit normal, against its initial direction". `direction`: unit, by parameter, each in

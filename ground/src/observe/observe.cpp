@@ -78,7 +78,7 @@ BodyRotation mean_rotation(const std::vector<ScreenedPass::Fix>& fixes) {
   return rotation;
 }
 
-/// As if at each fix only one reading were used.
+/// The problem as if only one reading were used at each fix.
 ScreenedPass with_single_readings(ScreenedPass pass) {
   for (ScreenedPass::Fix& fix : pass.fixes) {
     fix.noise_factor = 1;
@@ -174,7 +174,7 @@ MatrixXd add_course(const Linearised& at, Observability& result) {
   return roots.back();
 }
 
-/// Names what is weak. `scaled_root`: of the information by the measurements, in units of the prior sigmas.
+/// Lists the weak combinations. `scaled_root`: of the information by the measurements, in units of the prior sigmas.
 void add_combinations(const MatrixXd& scaled_root, const BodyRotation& rotation, double tolerable_rad,
                       Observability& result) {
   const Eigen::JacobiSVD<MatrixXd> svd(scaled_root, Eigen::ComputeFullV);
@@ -185,7 +185,7 @@ void add_combinations(const MatrixXd& scaled_root, const BodyRotation& rotation,
   const MatrixXd scaled_metric =
       result.prior_sigma.asDiagonal() * result.attitude_metric * result.prior_sigma.asDiagonal();
   const ParameterBlocks blocks(result.parameters);
-  // Each kind apart: turned together, an unobservable combination could hide between weak ones.
+  // Each kind separately: rotated together, an unobservable combination could be spread over weak ones.
   const Index unobservable = (values.array() < Observability::kUnobservable).count();
   const Index weak = (values.array() < Observability::kWeak).count() - unobservable;
   for (const auto& [first, size] :
@@ -206,7 +206,7 @@ void add_combinations(const MatrixXd& scaled_root, const BodyRotation& rotation,
   }
 }
 
-/// Nothing is screened: samples and fixes of the first heads, in the order of their times.
+/// A pass without faults as if it had been screened: its samples and fixes, in the order of their times.
 ScreenedPass as_it_is(const Pass& pass, int gyros, int heads) {
   ScreenedPass screened;
   screened.gyros = gyros;

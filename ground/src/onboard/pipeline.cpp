@@ -32,12 +32,14 @@ SetupError error_of(SetupFault fault) {
   return {"there are more states than there is room for", "use fewer gyros, or a smaller drift model"};
 }
 
-/// With the room of another model, as many columns.
+/// Copies gyros into storage of another capacity.
 template <class To, class From>
 To with_room(const From& from, const Layout& layout) {
   To to;
   for (int k = 0; k < layout.gyros; ++k) {
-    static_cast<GyroReadout&>(to[k]) = from[k];
+    GyroReadout& readout = to[k];
+    const GyroReadout& its = from[k];
+    readout = its;
     to[k].h_in = from[k].h_in;
     to[k].drift_rad_s = from[k].drift_rad_s;
   }
@@ -80,7 +82,7 @@ struct Pipeline::Program {
     });
   }
 
-  /// The same of κ and δ, the coefficients as they are when so much of their change has been.
+  /// The same of κ and δ, with the coefficients at the time when this fraction of their change has taken place.
   [[nodiscard]] Roots parameter_root(double part_of_change) const {
     const Roots errors = error_root();
     Roots root = errors.middleRows(layout.drift(0), layout.parameters());

@@ -10,7 +10,7 @@
 namespace trihedron::ground {
 namespace {
 
-/// Between the paper's corrections.
+/// Time between recorded corrections: the correction interval of the paper.
 constexpr Duration kWatchedCorrections = std::chrono::minutes(90);
 /// Consecutive fixes attributed to the star tracker from which on they are no single outliers.
 constexpr long kJumpLength = 20;

@@ -7,7 +7,7 @@
 namespace trihedron::ground {
 namespace {
 
-/// Whether what is known before of a gyro names a coefficient that eq. (1) does not have.
+/// Whether the prior of a gyro names a coefficient that eq. (1) does not have.
 bool knows_of_drift_outside(const PassSettings& settings) {
   return std::ranges::any_of(settings.gyros, [](const GyroPrior& prior) {
     const auto outside = [](const auto& coefficient) { return !coefficient.first.is_in_eq1(); };

@@ -14,7 +14,7 @@ struct Screened {
   std::vector<GyroCalibration> first;
 };
 
-/// Runs the pass through the smallest layout that knows its prior. Throws SetupError.
+/// Runs the pass through the on-board step with the smallest layout that its prior allows. Throws SetupError.
 [[nodiscard]] Screened screen(const Pass& pass, const CalibrationOptions& asked);
 
 /// Options of the smallest layout: eq. (1), no further states.

@@ -81,8 +81,8 @@ void expect_causal(const Pass& pass, const CalibrationOptions& options, const st
   const NavigationRun whole = navigate(pass, options);
   for (const Duration cut : cuts) {
     SCOPED_TRACE(to_seconds(cut));
-    const auto samples = static_cast<std::size_t>(
-        std::ranges::upper_bound(pass.gyro.t, pass.settings.epoch + cut) - pass.gyro.t.begin());
+    const auto samples = static_cast<std::size_t>(std::ranges::upper_bound(pass.gyro.t, pass.settings.epoch + cut) -
+                                                  pass.gyro.t.begin());
     const Pass beginning = until_sample(pass, samples);
     expect_beginning(whole, navigate(beginning, options), beginning.gyro.t.back());
   }

@@ -116,7 +116,8 @@ TEST_P(DirtySamplePass, IsCalibratedAllTheSame) {
   EXPECT_LT(std::abs(clock_offset.value - 0.01), 4 * clock_offset.sigma);
   // 1 % of the fixes are off by up to 2°, nearly all of them by more than the gate lets through.
   const double outliers = 0.01 * static_cast<double>(pass_.star_tracker.size());
-  EXPECT_NEAR(static_cast<double>(calibration.statistics.fixes_rejected_as_outliers), outliers, 4 * std::sqrt(outliers));
+  EXPECT_NEAR(static_cast<double>(calibration.statistics.fixes_rejected_as_outliers), outliers,
+              4 * std::sqrt(outliers));
 }
 
 class HighDegreeSamplePass : public SamplePass {};

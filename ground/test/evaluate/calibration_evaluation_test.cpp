@@ -26,7 +26,7 @@ struct AtRest {
   AtRest() {
     pass.settings.star_tracker_noise_rad = {3e-4, 4e-4, 5e-4};
     for (int i = 0; i < 120; ++i) {
-      const Time t(minutes(i));
+      const Time t{minutes(i)};
       pass.star_tracker.t.push_back(t);
       pass.star_tracker.q_in_c.push_back(rolled(0));
       attitude.t.push_back(t);

@@ -68,7 +68,7 @@ TEST(Convergence, OfAKindIsThatOfItsLastDeterminedParameter) {
   EXPECT_EQ(settled(run, parameters, false), std::nullopt);
 }
 
-TEST(Convergence, IsNotThatOfAParameterThatTheCycleDoesNotEstimate) {
+TEST(Convergence, IsNotThatOfAParameterThatTheOnBoardStepDoesNotEstimate) {
   CalibrationRun run = three_parameters();
   run.calibration.states[1] = parameter("gyro1.W(3,1)");
   run.calibration.covariance(1, 1) = 0.01;

@@ -1,7 +1,5 @@
 // The drift models as records name them, the core computes them and the simulator flies them.
 
-#include "trihedron/records/drift_models.hpp"
-
 #include <gtest/gtest.h>
 
 #include <Eigen/QR>
@@ -13,6 +11,7 @@
 #include "model/prior.hpp"
 #include "trihedron/core/drift.hpp"
 #include "trihedron/ground/model/setup_error.hpp"
+#include "trihedron/records/drift_models.hpp"
 #include "trihedron/records/scenario.hpp"
 #include "trihedron/sim/harmonics.hpp"
 #include "trihedron/sim/random.hpp"
@@ -125,8 +124,10 @@ PassSettings with_common_sigma(double sigma_rad_s) {
 
 Eigen::VectorXd prior_sigmas(const PassSettings& settings, const DriftModelId& model) {
   const Layout layout{.drift_model = model};
-  return prior_of(settings, layout).covariance.diagonal().cwiseSqrt().segment(layout.drift(0) - layout.dynamic(),
-                                                                              layout.drift_size());
+  return prior_of(settings, layout)
+      .covariance.diagonal()
+      .cwiseSqrt()
+      .segment(layout.drift(0) - layout.dynamic(), layout.drift_size());
 }
 
 TEST(DriftModel, TakesFurtherMembersToBeTheSmallerTheFasterTheyChange) {

@@ -33,7 +33,7 @@ struct ColumnsView {
       std::fill(row(i) + columns, row(i) + padded(columns), 0.0);
     }
   }
-  /// Their sum, each so many times.
+  /// The sum of the columns, each times its coefficient.
   [[nodiscard]] Eigen::Vector3d times(const double* factors) const {
     Eigen::Vector3d sum = Eigen::Vector3d::Zero();
     for (int j = 0; j < columns; ++j) {

@@ -24,7 +24,7 @@ struct FittedDirections {
 /// where not. With weights equal, the noise at the middle of 49 samples falls to 0.21 of a single one.
 class DirectionsFit {
  public:
-  /// Fewer samples than these are not more than a polynomial of this degree needs.
+  /// The smallest number of samples that a polynomial of this degree is fitted to.
   [[nodiscard]] static constexpr int least_samples(int degree) { return 2 * (degree + 1); }
 
   /// Of `samples` samples, the first and the last of them at these times; of the first `gyros` gyros.

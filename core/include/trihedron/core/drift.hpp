@@ -98,8 +98,8 @@ class DriftModel {
   /// Which member of the family column i is; i < size().
   [[nodiscard]] const DriftCoefficient& member(int i) const { return members_[static_cast<std::size_t>(i)]; }
 
-  /// The columns at a direction h in case axes, unit. `part_of_change`: how much of the change there has been. What
-  /// points along h moves nothing and is left in. B: of columns(), and is padded.
+  /// The columns at a direction h in case axes, unit. `part_of_change`: the fraction of the change that has taken
+  /// place. Parts along h move nothing and are left in. B: of columns(), and is padded.
   void basis(const Eigen::Vector3d& h, double part_of_change, ColumnsView B) const;
 
   /// ω_b(h), rad/s, case axes, by a gyro's coefficients of all columns.

@@ -1,5 +1,5 @@
 #pragma once
-/// Which drift model is meant, and which of its coefficients, as values.
+/// Identity of a drift model and of each coefficient.
 
 #include <compare>
 #include <cstdint>
@@ -10,7 +10,7 @@ namespace trihedron {
 struct DriftModelId {
   enum class Family : std::uint8_t {
     kEsg7,   ///< eq. (1)
-    kEsg20,  ///< eq. (1), the rest of degrees 1 and 2, and the other potential of k0
+    kEsg20,  ///< eq. (1), the members of degrees 1 and 2 that it lacks, and D of Σh⁴/4, whose W is k0
     kVsh,    ///< eq. (1) and all vector spherical harmonics up to `degree` that it does not contain
   };
   static constexpr int kMaxDegree = 6;

@@ -118,7 +118,7 @@ class HarmonicTableOf {
 
   int max_degree_;
   std::array<double, kOrders> diagonal_{};  ///< Q_mm, a constant
-  std::array<double, kSize> up_{};                 ///< Q_lm = up z Q_(l−1)m − up_two Q_(l−2)m
+  std::array<double, kSize> up_{};          ///< Q_lm = up z Q_(l−1)m − up_two Q_(l−2)m
   std::array<double, kSize> up_two_{};
   std::array<double, kSize> slope_{};  ///< dQ_lm/dz = slope Q_l(m+1)
 };

@@ -150,7 +150,7 @@ class InvariantEstimator {
   /// Whether the prior allows the drift coefficients and alignments that are estimated.
   [[nodiscard]] bool prior_allows_estimates() const;
   void update_to_now(const Eigen::Matrix3d& C_in_c);
-  void update(const Compared& rows, double root_weight);
+  void update(const Compared& white, double root_weight);
   void begin_stretch();
   /// As CalibrationSetup::fixes_sharing_a_sample() (docs/mathematics.md, section 2).
   [[nodiscard]] double fixes_sharing_samples_of(const StarFix& fix) const;

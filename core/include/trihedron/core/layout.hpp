@@ -1,5 +1,5 @@
 #pragma once
-/// Which states an estimator has, and where each of them stands. The one place that knows.
+/// Which states an estimator has, and the position of each; the only place where this is defined.
 
 #include <array>
 #include <cstddef>
@@ -46,14 +46,15 @@ struct Layout {
   DriftModelId drift_model{};
   FurtherStates further{};
   int star_trackers = 1;
-  /// Components of the error of a direction: 3 in `in`, of which that along the momentum means nothing, or 2 across it.
+  /// Components of the error of a direction: 3 in `in`, of which that along the momentum has no effect of its own, or 2
+  /// across it.
   int direction_size = 3;
 
   friend constexpr bool operator==(const Layout&, const Layout&) = default;
 
   /// κ of one gyro.
   [[nodiscard]] constexpr int drift_size() const { return drift_model.size(); }
-  /// All that its drift is linear in: κ, the drift that wanders, the change of the coefficients of eq. (1).
+  /// Columns of its drift: κ, then the drift that wanders, then the change of the coefficients of eq. (1).
   [[nodiscard]] constexpr int drift_columns() const {
     return drift_size() + (further.wandering_drift ? 3 : 0) + (further.coefficient_change ? kEq1 : 0);
   }
@@ -154,7 +155,7 @@ constexpr auto Layout::owners(FurtherState state) const -> Owners {
 
 constexpr int Layout::first(FurtherState state, int owner) const { return (this->*kind_of(state).first)(owner); }
 
-/// The room that an estimator has: no Layout needs more than the one it is made for.
+/// Storage of an estimator: enough for every layout that has no more of anything than the largest one it is made for.
 struct Capacity {
   int gyros = 0;
   int drift_columns = 0;

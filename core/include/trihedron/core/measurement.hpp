@@ -49,7 +49,8 @@ template <class Derived>
 [[nodiscard]] auto by_readout_errors(const Layout& layout, const Eigen::MatrixBase<Derived>& by_reading,
                                      const GyroReadout& gyro, const Eigen::Vector3d& h_b) {
   using ByCase = Eigen::Matrix<double, Derived::RowsAtCompileTime, 3>;
-  using ByErrors = Eigen::Matrix<double, Derived::RowsAtCompileTime, Eigen::Dynamic, 0, Derived::RowsAtCompileTime,
+  constexpr int kRows = Derived::RowsAtCompileTime;
+  using ByErrors = Eigen::Matrix<double, kRows, Eigen::Dynamic, kRows == 1 ? Eigen::RowMajor : Eigen::ColMajor, kRows,
                                  GyroReadout::kMaxErrors>;
   const ByCase by_case = by_reading * gyro.C_c_b;
   return ByErrors(by_case.lazyProduct(GyroReadout::by_errors(layout, h_b)));

@@ -36,7 +36,7 @@ class Navigator {
   /// Widens the directions: `variance_rad2` per axis, as the estimator's.
   void add_direction_variance(double variance_rad2) { extra_variance_rad2_ += variance_rad2; }
 
-  /// Carries the errors over the stretch between two fixes, for which the estimator has integrated the sensitivities.
+  /// Carries the errors over the stretch between two fixes, by the sensitivities that the estimator has integrated.
   void extend(const Estimator& estimator, const Sensitivities& stretch);
 
   /// Attitude by the momenta and these readings, with its covariance. Needs started().
@@ -60,7 +60,7 @@ class Navigator {
                    double dt_s, Gyros& gyros) const;
   /// The sensitivities of the stretch after `since`, those since the correction.
   void append(const Estimator& estimator, const Sensitivities& stretch, Sensitivities& since) const;
-  /// Room for the errors, all zero.
+  /// Storage of the errors, set to zero.
   [[nodiscard]] RowsView new_errors(int rows, int columns);
   void restart_clock(const Layout& layout);
 

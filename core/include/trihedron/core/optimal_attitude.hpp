@@ -13,7 +13,7 @@ struct AttitudeByDirections {
   Rot<In, C> C_in_c;
   Eigen::Matrix<double, 3, 3 * kMaxGyros> by_directions = Eigen::Matrix<double, 3, 3 * kMaxGyros>::Zero();
 
-  [[nodiscard]] auto by_direction(int gyro) const { return by_directions.middleCols<3>(3 * gyro); }
+  [[nodiscard]] auto by_direction(int gyro) const { return by_directions.middleCols<3>(3L * gyro); }
 };
 
 /// An attitude with the covariance of its error ε in c axes, rad²: true C_in_c = est · exp([ε×]).

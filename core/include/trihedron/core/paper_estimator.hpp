@@ -52,9 +52,9 @@ class PaperEstimator {
   [[nodiscard]] bool started() const { return started_; }
   [[nodiscard]] const CalibrationSetup& setup() const { return setup_; }
   [[nodiscard]] const Layout& layout() const { return setup_.layout; }
-  [[nodiscard]] int states() const { return States::kSize; }
+  [[nodiscard]] static constexpr int states() { return States::kSize; }
   /// All three components of each direction's error, and then the parameters.
-  [[nodiscard]] Layout error_layout() const { return {}; }
+  [[nodiscard]] static constexpr Layout error_layout() { return {}; }
   [[nodiscard]] const DriftModel& drift() const { return drift_; }
   [[nodiscard]] const Gyros& gyros() const { return gyros_; }
   /// Effect of the errors at the last fix on the present directions.
@@ -63,11 +63,11 @@ class PaperEstimator {
   [[nodiscard]] const Gyros& prior_gyros() const { return prior_gyros_; }
 
   /// The trihedron: gyro 1 is the reference.
-  [[nodiscard]] Result<AttitudeByDirections, DirectionsFault> attitude(const Gyros& gyros, const Directions& h_b,
-                                                                       const GyroMask& used) const;
+  [[nodiscard]] static Result<AttitudeByDirections, DirectionsFault> attitude(const Gyros& gyros, const Directions& h_b,
+                                                                              const GyroMask& used);
   /// The same, only the attitude itself.
-  [[nodiscard]] Result<Rot<In, C>, DirectionsFault> rotation(const Gyros& gyros, const Directions& h_b,
-                                                             const GyroMask& used) const;
+  [[nodiscard]] static Result<Rot<In, C>, DirectionsFault> rotation(const Gyros& gyros, const Directions& h_b,
+                                                                    const GyroMask& used);
 
   /// As of InvariantEstimator.
   void error_root(RowsView root) const;

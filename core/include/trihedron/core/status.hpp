@@ -32,7 +32,7 @@ enum class FixStatus : std::uint8_t {
   kPending,              ///< held until the gyro samples round it are there
   kStarted,              ///< the first fix: sets the directions
   kUsed,                 ///< calibration updated
-  kUsedAfterReopening,   ///< used after a run of rejections, with the directions set free
+  kUsedAfterReopening,   ///< used after a run of rejections, with the directions reopened
   kRestarted,            ///< used after another run of rejections soon after: the filter restarted
   kRejectedNotRotation,  ///< quaternion not finite or not unit
   kRejectedOutOfOrder,   ///< repeated, or too late: the calibration has passed its time

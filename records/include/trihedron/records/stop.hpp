@@ -28,7 +28,7 @@ class StopRequest {
 class StopScope {
  public:
   /// Refers to `request`; null: nothing stops it.
-  explicit StopScope(const StopRequest* request) noexcept : before_(current_) { current_ = request; }
+  explicit StopScope(const StopRequest* request) noexcept { current_ = request; }
   StopScope(const StopScope&) = delete;
   StopScope& operator=(const StopScope&) = delete;
   ~StopScope() { current_ = before_; }
@@ -37,7 +37,7 @@ class StopScope {
 
  private:
   static inline thread_local const StopRequest* current_ = nullptr;
-  const StopRequest* before_;
+  const StopRequest* before_ = current_;
 };
 
 /// Throws Stopped where the request of this thread has been made. Cheap: each turn of a long loop may call it.

@@ -62,7 +62,7 @@ struct CorrectionInterval {
   std::optional<Duration> passed;  ///< when the limit was passed
   double max_total_rad = 0;
 };
-/// Empty where `errors` does not know the ages.
+/// Empty where `errors` has no ages.
 [[nodiscard]] std::vector<CorrectionInterval> correction_intervals(const AttitudeErrors& errors, double limit_rad);
 
 /// The same astro-correction with the parameters known before a calibration, and with those calibrated.

@@ -28,7 +28,7 @@ struct Combination {
   double singular_value = 0;      ///< prior sigma over that by the measurements alone
   double attitude_error_rad = 0;  ///< what it adds to Observability::attitude_error_rad, rms
   bool is_unobservable = false;   ///< below Observability::kUnobservable
-  /// Unobservable, and its part of the attitude error is more than the mission can bear.
+  /// Unobservable, and its part of the attitude error is larger than the mission tolerates.
   bool is_harmful = false;
 };
 
@@ -40,12 +40,12 @@ struct Observability {
   Eigen::VectorXd prior_sigma;          ///< rad/s, rad, or that of the further state
   Eigen::VectorXd sigma;                ///< by prior and measurements
   Eigen::MatrixXd covariance;           ///< the same
-  /// sigma by the measurements up to each of some times, evenly distributed over the pass.
+  /// sigma by the measurements up to each of some times, equally spaced over the pass.
   std::vector<Time> t;
   std::vector<Eigen::VectorXd> sigma_until;
   /// What z1 of eq. (3), the angle between the momenta, adds at the samples between the fixes: sigma with single
-  /// readings at the fixes, over that with z1 as well. Readings that are taken together round each fix, as `sigma` has
-  /// them, hold most of it. Empty but for pairs.
+  /// readings at the fixes, over that with z1 as well. Fitting the readings around each fix, as in `sigma`, already
+  /// gains most of it. Empty but for pairs.
   Eigen::VectorXd angle_gain;
 
   /// Of the root of the information by the measurements alone, in units of the prior sigmas: the directions at the
@@ -80,9 +80,9 @@ struct Observability {
 [[nodiscard]] double sigma_along(const Combination& combination, const Observability& observability,
                                  const Eigen::MatrixXd& covariance);
 
-/// Covariance of the parameters, as Observability::covariance, that a calibration of a flight will have. `exact`: what
-/// the prior says, without noise; its settings tell the noise that it will have, that of the gyros for all readings
-/// that are taken together at a fix. `options`: nothing is left to decide. Throws SetupError.
+/// Covariance of the parameters, as Observability::covariance, that a calibration of a flight will have. `exact`: the
+/// flight without noise, with its prior; its settings give the noise that it will have, for the gyros that of the fit
+/// at a fix. `options`: nothing is left to decide. Throws SetupError.
 [[nodiscard]] Eigen::MatrixXd predicted_covariance(const Pass& exact, const CalibrationOptions& options);
 
 }  // namespace trihedron::ground

@@ -10,8 +10,8 @@
 
 namespace trihedron::ground {
 
-/// Calls work(0) … work(count − 1), begun in this order. Throws what the first of them throws that throws anything, as
-/// if they ran one after the other; those after it are not begun any more.
+/// Calls work(0) … work(count − 1), begun in this order. Throws as if they ran one after the other: what the first that
+/// fails throws; those after it are not begun any more.
 void for_each_on_all_cores(std::size_t count, const std::function<void(std::size_t)>& work);
 
 /// The results of work(0) … work(count − 1). Throws as for_each_on_all_cores().
@@ -28,7 +28,7 @@ auto on_all_cores(std::size_t count, const Work& work) {
 /// throws, or else what the second throws.
 void side_by_side(const std::function<void()>& first, const std::function<void()>& second);
 
-/// Calls work(), which uses at most so many threads.
+/// Calls work(), which uses at most `cores` threads.
 void with_cores(unsigned cores, const std::function<void()>& work);
 
 }  // namespace trihedron::ground
