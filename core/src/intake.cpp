@@ -64,7 +64,7 @@ SampleStatus Intake::screen(GyroSample& sample) {
   return SampleStatus::kUsed;
 }
 
-FixStatus Intake::take_up(const StarFix& fix, const std::optional<Time>& latest, Time taken_until) {
+FixStatus Intake::look_at(const StarFix& fix, const std::optional<Time>& latest, Time taken_until) const {
   if (!fix.q_in_c.coeffs().allFinite() || !nearly_unit(fix.q_in_c.norm())) {
     return FixStatus::kRejectedNotRotation;
   }
@@ -79,38 +79,15 @@ FixStatus Intake::take_up(const StarFix& fix, const std::optional<Time>& latest,
   if (!latest || fix.t - *latest > max_interpolation_) {
     return FixStatus::kRejectedNoGyro;
   }
-  const auto end = fixes_.begin() + waiting_;
-  const bool repeated = std::any_of(fixes_.begin(), end,
-                                    [&](const StarFix& other) { return other.t == fix.t && other.head == fix.head; });
   const std::optional<Time>& used_t = used_fix_t_[static_cast<std::size_t>(fix.head)];
-  if (repeated || (used_t && fix.t <= *used_t) || fix.t < taken_until) {
-    return FixStatus::kRejectedOutOfOrder;
-  }
-  if (waiting_ == kMaxWaitingFixes) {
-    return FixStatus::kRejectedBacklog;
-  }
-  const auto place =
-      std::upper_bound(fixes_.begin(), end, fix, [](const StarFix& a, const StarFix& b) { return a.t < b.t; });
-  std::move_backward(place, end, end + 1);
-  *place = fix;
-  ++waiting_;
-  return FixStatus::kPending;
+  const bool too_late = (used_t && fix.t <= *used_t) || fix.t < taken_until;
+  return too_late ? FixStatus::kRejectedOutOfOrder : FixStatus::kPending;
 }
 
-StarFix Intake::take_next_fix() {
-  const StarFix fix = fixes_[0];
-  std::move(fixes_.begin() + 1, fixes_.begin() + waiting_, fixes_.begin());
-  --waiting_;
-  return fix;
-}
-
-int Intake::set_clock(Time t) {
+void Intake::set_clock(Time t) {
   used_fix_t_ = {};
   has_suspect_ = false;
   health_.set_clock(t);
-  const int dropped = waiting_;
-  waiting_ = 0;
-  return dropped;
 }
 
 GyroMask Intake::used_over(Time from, Time to) const {

@@ -52,9 +52,9 @@ std::optional<SetupFault> InvariantEstimator<kCapacity>::set_up(const Calibratio
 }
 
 template <Capacity kCapacity>
-double InvariantEstimator<kCapacity>::sharing_factor(const StarFix& fix) const {
+double InvariantEstimator<kCapacity>::fixes_sharing_samples_of(const StarFix& fix) const {
   const std::optional<Time>& last = used_fix_t_[static_cast<std::size_t>(fix.head)];
-  return last && *last < fix.t ? std::sqrt(setup_.fixes_sharing_a_sample(fix.t - *last)) : 1;
+  return last && *last < fix.t ? setup_.fixes_sharing_a_sample(fix.t - *last) : 1;
 }
 
 template <Capacity kCapacity>
@@ -278,6 +278,20 @@ auto InvariantEstimator<kCapacity>::whitened(const FixComparison& comparison, co
 }
 
 template <Capacity kCapacity>
+auto InvariantEstimator<kCapacity>::rows_to_use(const FixComparison& comparison, const Eigen::Matrix3d& R_c,
+                                                PerGyro<double> noise_rad, double noise_factor, double sharing) const
+    -> Compared {
+  const PerGyro<double> readout_rad = readout_noise(noise_factor * std::sqrt(sharing - 1));
+  for (int k = 0; k < layout().gyros; ++k) {
+    noise_rad[k] = std::hypot(noise_rad[k], readout_rad[k]);
+  }
+  Compared rows = rows_about_states_now<kMaxStates>(layout(), comparison);
+  ComponentCovariance L = noise_of(comparison, R_c, noise_rad);
+  whiten(L, rows_of(rows));
+  return rows;
+}
+
+template <Capacity kCapacity>
 auto InvariantEstimator<kCapacity>::angles_of(const FixComparison& comparison, const PerGyro<double>& noise_rad) const
     -> White {
   // An error of the attitude is common to all components. A very large R_c instead would still add some information on
@@ -369,12 +383,10 @@ inline void report_innovation(const Layout& layout, const FixComparison& compari
 }  // namespace detail
 
 template <Capacity kCapacity>
-FixReport InvariantEstimator<kCapacity>::correct(const StarFix& fix, const FixReadings& readings_at_fix) {
+FixReport InvariantEstimator<kCapacity>::correct(const StarFix& fix, const FixReadings& readings) {
   FixReport report;
   report.t = fix.t;
   report.head = fix.head;
-  FixReadings readings = readings_at_fix;
-  readings.noise_factor *= sharing_factor(fix);
   const FixBySharedStates by_shared = fix_by_shared_states(setup_, fix, readings.rate_c);
   const Rot<In, C> C_in_c = corrected(fix, by_shared, shared_);
   const Eigen::Matrix3d R_c = fix_noise(setup_, fix.head);
@@ -401,7 +413,7 @@ FixReport InvariantEstimator<kCapacity>::correct(const StarFix& fix, const FixRe
   }
   const FixComparison comparison =
       compare(layout(), gyros_, C_in_c.raw(), C_linear, readings.h_b, readings.used, by_shared);
-  White white = whitened(comparison, R_c, noise_rad);
+  const White white = whitened(comparison, R_c, noise_rad);
   const double misfit_rad = detail::misfit_rad(comparison);
   report.nis = white.nis;
   const ComponentCovariance left = white.L.lazyProduct(white.covariance);
@@ -452,8 +464,10 @@ FixReport InvariantEstimator<kCapacity>::correct(const StarFix& fix, const FixRe
       break;
   }
   angles_since_fix_ = 0;
+  const double sharing = fixes_sharing_samples_of(fix);
   used_fix_t_[static_cast<std::size_t>(fix.head)] = fix.t;
-  update(white.rows, std::sqrt(report.weight));
+  update(sharing > 1 ? rows_to_use(comparison, R_c, noise_rad, readings.noise_factor, sharing) : white.rows,
+         std::sqrt(report.weight));
   return report;
 }
 

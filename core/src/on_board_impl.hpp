@@ -18,6 +18,7 @@ std::optional<SetupFault> OnBoard<Estimator>::set_up(const CalibrationSetup& set
     return fault;
   }
   intake_ = Intake(setup);
+  fixes_.clear();
   readings_ = Readings<Gyros::capacity()>(setup, Estimator::kTakesSamplesTogether);
   schedule_ = Schedule(reach(), Estimator::kUsesAngles ? setup.angles_after : CalibrationSetup::kNever);
   navigator_ = {};
@@ -62,7 +63,10 @@ StepReport OnBoard<Estimator>::on_fix(const StarFix& fix) {
   report.gyros = intake_.health().states();
   report.fix.t = fix.t;
   report.fix.head = fix.head;
-  report.fix.status = intake_.take_up(fix, readings_.latest(), schedule_.taken_until());
+  report.fix.status = intake_.look_at(fix, readings_.latest(), schedule_.taken_until());
+  if (report.fix.status == FixStatus::kPending) {
+    report.fix.status = fixes_.push(fix);
+  }
   if (report.fix.status == FixStatus::kPending) {
     calibrate_until(readings_.latest_t() - reach(), report);
     report.angle_residual = angle_residual();
@@ -74,7 +78,7 @@ template <class Estimator>
 StepReport OnBoard<Estimator>::carry_on() {
   StepReport report;
   report.gyros = intake_.health().states();
-  if (intake_.waiting() > 0) {
+  if (fixes_.size() > 0) {
     report.t = readings_.latest_t();
     calibrate_until(report.t - reach(), report);
   }
@@ -85,10 +89,10 @@ template <class Estimator>
 StepReport OnBoard<Estimator>::flush() {
   StepReport report;
   report.gyros = intake_.health().states();
-  if (intake_.waiting() > 0) {
+  if (fixes_.size() > 0) {
     report.t = readings_.latest_t();
     schedule_.no_angles();  // otherwise the fix would wait for them
-    calibrate_until(std::max(report.t, intake_.next_fix().t), report);
+    calibrate_until(std::max(report.t, fixes_.next_t()), report);
   }
   return report;
 }
@@ -131,7 +135,8 @@ void OnBoard<Estimator>::set_clock(Time t) {
   corrected_t_ += shift;
   schedule_.set_clock(shift);
   follower_t_ = t;
-  fixes_dropped_ += intake_.set_clock(t);
+  intake_.set_clock(t);
+  fixes_dropped_ += fixes_.clear();
   readings_.clear();
   clock_set_back_ = true;
 }
@@ -143,7 +148,7 @@ template <class Estimator>
 void OnBoard<Estimator>::calibrate_until(Time limit, StepReport& report) {
   bool dealt_with_one = false;
   for (;;) {
-    switch (schedule_.next(limit, next_sample_t(), next_fix_t())) {
+    switch (schedule_.next(limit, next_sample_t(), fixes_.next_t())) {
       case Schedule::Next::kSample:
         follow_next_sample();
         break;
@@ -153,7 +158,7 @@ void OnBoard<Estimator>::calibrate_until(Time limit, StepReport& report) {
           return;
         }
         dealt_with_one = true;
-        correct(intake_.take_next_fix(), report);
+        correct(fixes_.pop(), report);
         break;
       case Schedule::Next::kAngles:
         if (report.angles.status != FixStatus::kNone) {

@@ -8,6 +8,14 @@
 
 namespace trihedron {
 
+namespace {
+
+bool positive(double value) { return value > 0 && std::isfinite(value); }
+
+bool is_rotation(const Eigen::Matrix3d& C) { return (C * C.transpose() - Eigen::Matrix3d::Identity()).norm() < 1e-6; }
+
+}  // namespace
+
 std::optional<SetupFault> CalibrationSetup::fault() const {
   for (int k = 0; k < layout.gyros; ++k) {
     if (!(readout_noise_rad[k] > 0 && readout_noise_rad[k] < 1)) {
@@ -16,22 +24,26 @@ std::optional<SetupFault> CalibrationSetup::fault() const {
   }
   for (int head = 0; head < layout.star_trackers; ++head) {
     const StarTrackerSetup& its = star_trackers[static_cast<std::size_t>(head)];
-    if (!(its.noise_rad.array() > 0).all() || !its.noise_rad.allFinite()) {
+    if (!(its.noise_rad.array() > 0).all() || !its.noise_rad.allFinite() || !is_rotation(its.C_c_s)) {
       return SetupFault::kNoiseNotPositive;
     }
   }
-  if (!(direction_random_walk_rad_sqrt_s >= 0) || !(gyro_period > Duration::zero())) {
+  if (!(direction_random_walk_rad_sqrt_s >= 0) || !std::isfinite(direction_random_walk_rad_sqrt_s) ||
+      !(gyro_period > Duration::zero())) {
     return SetupFault::kNoiseNotPositive;
   }
   if (!(gate_nis > 0) || !(student_t_freedom >= 0) || !(reopen_after_rejections > 0) ||
       !(reopen_after_jump_rejections > 0)) {
     return SetupFault::kGateNotPositive;
   }
-  if (layout.further.wandering_drift && !(wandering_drift.sigma > 0 && wandering_drift.time_s > 0)) {
+  const FurtherStates& further = layout.further;
+  if ((further.wandering_drift && !(positive(wandering_drift.sigma) && positive(wandering_drift.time_s))) ||
+      (further.coefficient_change && !positive(change_time_s)) ||
+      (further.orbital_error && !std::isfinite(orbital_rate_rad_s))) {
     return SetupFault::kPriorNotPositiveDefinite;
   }
   for (int state = layout.readout(0); state < layout.size(); ++state) {
-    if (!(prior_sigma_of_further_state(*this, state) > 0)) {
+    if (!positive(prior_sigma_of_further_state(*this, state))) {
       return SetupFault::kPriorNotPositiveDefinite;
     }
   }
@@ -56,7 +68,10 @@ Duration CalibrationSetup::recent() const {
 }
 
 double CalibrationSetup::fixes_sharing_a_sample(Duration since_the_last_fix) const {
-  return std::max(2 * to_seconds(reach()) / to_seconds(since_the_last_fix), 1.0);
+  // In the middle of its samples a cubic has 9/4 of the variance of their mean, for being so little sensitive to those
+  // far from it.
+  constexpr double kOfMean = 9.0 / 4;
+  return std::max(layout.star_trackers * 2 * to_seconds(reach()) / (kOfMean * to_seconds(since_the_last_fix)), 1.0);
 }
 
 double prior_sigma_of_further_state(const CalibrationSetup& setup, int state) {

@@ -409,14 +409,14 @@ TEST(OnBoardOfInvariant, RefusesFixesOfUnknownStarTrackersAndMoreThanCanWait) {
     EXPECT_EQ(on_board->on_fix(fix).fix.status, FixStatus::kRejectedUnknownHead);
   }
   fix.head = 0;
-  for (int i = 0; i < Intake::kMaxWaitingFixes; ++i) {
+  for (int i = 0; i < FixQueue<1>::kCapacity; ++i) {
     fix.t += std::chrono::milliseconds(1);
     EXPECT_EQ(on_board->on_fix(fix).fix.status, FixStatus::kPending);
   }
   fix.t += std::chrono::milliseconds(1);
   EXPECT_EQ(on_board->on_fix(fix).fix.status, FixStatus::kRejectedBacklog);
   // At the end without a sample after them they cannot be interpolated; none is forgotten.
-  for (int i = 0; i < Intake::kMaxWaitingFixes; ++i) {
+  for (int i = 0; i < FixQueue<1>::kCapacity; ++i) {
     EXPECT_EQ(on_board->flush().fix.status, FixStatus::kRejectedNoGyro);
   }
   EXPECT_EQ(on_board->flush().fix.status, FixStatus::kNone);

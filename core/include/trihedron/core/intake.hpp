@@ -1,6 +1,5 @@
 #pragma once
-/// What enters the on-board step: checks of the clock and of the readings, and the queue of fixes that wait for their
-/// readings.
+/// What enters the on-board step: checks of the clock, of the readings and of the fixes.
 
 #include <array>
 #include <chrono>
@@ -13,15 +12,13 @@
 
 namespace trihedron {
 
-/// Decides what of the telemetry is used, and keeps fixes until their readings are there.
+/// Decides what of the telemetry is used.
 class Intake {
  public:
   /// A time step larger than this is accepted only when the next sample confirms it.
   static constexpr Duration kMaxGap = std::chrono::hours(1);
   /// Consecutive samples behind the present time after which the clock is taken to have been set back.
   static constexpr int kSetBackSamples = 16;
-  /// Room for fixes at 20 Hz, each of which waits for the readings after it.
-  static constexpr int kMaxWaitingFixes = 40;
 
   Intake() = default;
   explicit Intake(const CalibrationSetup& setup);
@@ -33,18 +30,13 @@ class Intake {
   /// Checks the readings of a sample whose time has been accepted, and normalises them.
   [[nodiscard]] SampleStatus screen(GyroSample& sample);
 
-  /// Puts a fix among those that wait, in the order of their times. `taken_until`: fixes before it are too late.
-  [[nodiscard]] FixStatus take_up(const StarFix& fix, const std::optional<Time>& latest, Time taken_until);
-  [[nodiscard]] int waiting() const { return waiting_; }
-  /// The next fix; needs one that waits.
-  [[nodiscard]] const StarFix& next_fix() const { return fixes_[0]; }
-  [[nodiscard]] StarFix take_next_fix();
+  /// Checks a fix; kPending: it can be used. `taken_until`: fixes before it are too late.
+  [[nodiscard]] FixStatus look_at(const StarFix& fix, const std::optional<Time>& latest, Time taken_until) const;
   /// The estimator has used a fix.
   void mark_used(const StarFix& fix) { used_fix_t_[static_cast<std::size_t>(fix.head)] = fix.t; }
 
-  /// The clock has been set back to `t`. Discards the fixes that wait, since their time is unknown now, and returns
-  /// their number.
-  int set_clock(Time t);
+  /// The clock has been set back to `t`.
+  void set_clock(Time t);
 
   [[nodiscard]] GyroHealth& health() { return health_; }
   [[nodiscard]] const GyroHealth& health() const { return health_; }
@@ -59,8 +51,6 @@ class Intake {
   int star_trackers_ = 0;
   Duration max_interpolation_{};
   GyroHealth health_;
-  std::array<StarFix, kMaxWaitingFixes + 1> fixes_{};
-  int waiting_ = 0;
   std::array<std::optional<Time>, kMaxStarTrackers> used_fix_t_;
   int behind_present_ = 0;  ///< samples in a row
   Time behind_present_t_{};

@@ -34,6 +34,7 @@ class InvariantEstimator {
   static constexpr int kMaxStates = kCapacity.states;
   static constexpr int kMaxDynamic = 6 * kCapacity.gyros;
   static constexpr int kMaxErrors = kMaxStates;
+  static constexpr int kStarTrackers = kCapacity.star_trackers;  ///< at most
   static constexpr bool kUsesAngles = true;
   static constexpr bool kTakesSamplesTogether = true;
   using Gyro = GyroModel<kCapacity.drift_columns>;
@@ -133,6 +134,10 @@ class InvariantEstimator {
   [[nodiscard]] Eigen::Matrix3d misalignment_of(const StarFix& fix, const FixBySharedStates& by_shared) const;
   [[nodiscard]] White whitened(const FixComparison& comparison, const Eigen::Matrix3d& R_c,
                                const PerGyro<double>& noise_rad) const;
+  /// The rows of whitened() for the update by a fix that shares its samples with others, `sharing` of them, whose
+  /// readout noise is `noise_factor` times that of a single reading.
+  [[nodiscard]] Compared rows_to_use(const FixComparison& comparison, const Eigen::Matrix3d& R_c,
+                                     PerGyro<double> noise_rad, double noise_factor, double sharing) const;
   /// A comparison with the attitude eliminated and the noise of the readings alone: what the angles between the momenta
   /// show.
   [[nodiscard]] White angles_of(const FixComparison& comparison, const PerGyro<double>& noise_rad) const;
@@ -147,9 +152,8 @@ class InvariantEstimator {
   void update_to_now(const Eigen::Matrix3d& C_in_c);
   void update(const Compared& white, double root_weight);
   void begin_stretch();
-  /// Factor on the readout noise because other fixes of this star tracker share its samples (docs/mathematics.md,
-  /// section 2).
-  [[nodiscard]] double sharing_factor(const StarFix& fix) const;
+  /// As CalibrationSetup::fixes_sharing_a_sample() (docs/mathematics.md, section 2).
+  [[nodiscard]] double fixes_sharing_samples_of(const StarFix& fix) const;
 
   CalibrationSetup setup_;
   DriftModel drift_;

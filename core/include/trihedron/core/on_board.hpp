@@ -5,6 +5,7 @@
 #include <chrono>
 #include <optional>
 
+#include "trihedron/core/fix_queue.hpp"
 #include "trihedron/core/intake.hpp"
 #include "trihedron/core/invariant_estimator.hpp"
 #include "trihedron/core/navigator.hpp"
@@ -92,9 +93,9 @@ class OnBoard {
   [[nodiscard]] Time next_sample_t() const {
     return behind_ > 0 ? readings_.time(readings_.size() - behind_) : Time::max();
   }
-  [[nodiscard]] Time next_fix_t() const { return intake_.waiting() > 0 ? intake_.next_fix().t : Time::max(); }
 
   Intake intake_;
+  FixQueue<Estimator::kStarTrackers> fixes_;
   Readings<Gyros::capacity()> readings_;
   Schedule schedule_;
   Estimator estimator_;

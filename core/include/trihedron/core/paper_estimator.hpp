@@ -34,6 +34,7 @@ class PaperEstimator {
     [[nodiscard]] static constexpr int alignment(int gyro) { return drift(gyro) + Esg7::kSize; }
   };
   static constexpr int kGyros = 2;
+  static constexpr int kStarTrackers = 1;
   static constexpr int kMaxStates = States::kSize;
   static constexpr int kMaxErrors = Layout{}.size();
   static constexpr int kMeasurements = 4;

@@ -107,9 +107,8 @@ struct CalibrationSetup {
   [[nodiscard]] Duration reach() const;
   /// How far back samples are fitted together for the attitude now.
   [[nodiscard]] Duration recent() const;
-  /// Number of fixes of a star tracker that share a gyro sample at this interval, at least 1. The readout variance of
-  /// each is multiplied by it, so that together they do not count the noise of a sample as if it were independent in
-  /// each.
+  /// Number of fixes that share a gyro sample when those of each star tracker come at this interval, at least 1. The
+  /// readout variance of each is multiplied by it, so that together they do not claim more than the samples hold.
   [[nodiscard]] double fixes_sharing_a_sample(Duration since_the_last_fix) const;
 };
 

@@ -1,0 +1,217 @@
+#include "trihedron/core/intake.hpp"
+
+#include <gtest/gtest.h>
+
+#include <limits>
+
+#include "trihedron/core/fix_queue.hpp"
+#include "trihedron/core/schedule.hpp"
+
+namespace trihedron {
+namespace {
+
+Time second(double t_s) { return Time(from_seconds(t_s)); }
+
+CalibrationSetup intake_setup(int gyros = 2, int star_trackers = 1) {
+  CalibrationSetup setup;
+  setup.layout.gyros = gyros;
+  setup.layout.star_trackers = star_trackers;
+  return setup;
+}
+
+/// Readings that differ from sample to sample as live ones do.
+GyroSample live_sample(double t_s) {
+  GyroSample sample;
+  sample.t = second(t_s);
+  for (int k = 0; k < kMaxGyros; ++k) {
+    sample.h_b[k] = Eigen::Vector3d(1, 1e-5 * t_s, 0.1 * k).normalized();
+  }
+  return sample;
+}
+
+using Clock = Intake::Clock;
+
+TEST(IntakeClock, RunsOnWithSamplesThatComeLater) {
+  Intake intake(intake_setup());
+  EXPECT_EQ(intake.look_at_clock(second(5), std::nullopt), Clock::kRunsOn);
+  EXPECT_EQ(intake.look_at_clock(second(5.125), second(5)), Clock::kRunsOn);
+  EXPECT_EQ(intake.look_at_clock(second(3605), second(5)), Clock::kRunsOn);  // an hour without any
+  EXPECT_EQ(intake.look_at_clock(second(5), second(5)), Clock::kOutOfOrder);
+  EXPECT_EQ(intake.look_at_clock(second(4), second(5)), Clock::kOutOfOrder);
+}
+
+TEST(IntakeClock, BelievesALeapOnlyWhenTheNextSampleConfirmsIt) {
+  Intake intake(intake_setup());
+  EXPECT_EQ(intake.look_at_clock(second(1e5), second(0)), Clock::kOutOfOrder);
+  EXPECT_EQ(intake.look_at_clock(second(2e5), second(0)), Clock::kOutOfOrder);  // another wild one
+  EXPECT_EQ(intake.look_at_clock(second(2e5 + 0.1), second(0)), Clock::kRunsOn);
+  // One that is good in between takes the suspicion away.
+  EXPECT_EQ(intake.look_at_clock(second(1e5), second(0)), Clock::kOutOfOrder);
+  EXPECT_EQ(intake.look_at_clock(second(0.1), second(0)), Clock::kRunsOn);
+  EXPECT_EQ(intake.look_at_clock(second(1e5 + 0.1), second(0)), Clock::kOutOfOrder);
+}
+
+TEST(IntakeClock, IsSetBackBySixteenSamplesThatRunWell) {
+  Intake intake(intake_setup());
+  const auto behind = [&](double t_s) { return intake.look_at_clock(second(t_s), second(1000)); };
+  for (int i = 1; i < Intake::kSetBackSamples; ++i) {
+    EXPECT_EQ(behind(0.125 * i), Clock::kOutOfOrder) << i;
+  }
+  EXPECT_EQ(behind(2), Clock::kSetBack);
+  // With a gap, or backwards among themselves, they are counted anew.
+  for (int i = 0; i < 30; ++i) {
+    EXPECT_EQ(behind(10.0 + i), Clock::kOutOfOrder);
+    EXPECT_EQ(behind(90.0 - i), Clock::kOutOfOrder);
+  }
+}
+
+TEST(Intake, MakesReadingsUnitAndRejectsWhatIsNoDirection) {
+  Intake intake(intake_setup());
+  GyroSample sample = live_sample(0);
+  sample.h_b[0] *= 1 + 0.9 * kNormTolerance;
+  EXPECT_EQ(intake.screen(sample), SampleStatus::kUsed);
+  EXPECT_NEAR(sample.h_b[0].norm(), 1, 1e-15);
+  int i = 1;
+  for (const double bad :
+       {0.0, 1.01, 0.99, std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::infinity()}) {
+    sample = live_sample(i++);
+    sample.h_b[1] *= bad;
+    EXPECT_EQ(intake.screen(sample), SampleStatus::kRejectedNotDirection) << bad;
+  }
+  // Of a gyro that there is not nothing is asked.
+  sample = live_sample(i);
+  sample.h_b[2].setZero();
+  EXPECT_EQ(intake.screen(sample), SampleStatus::kUsed);
+}
+
+TEST(Intake, PutsSomethingFiniteWhereAGyroIsNotUsed) {
+  Intake intake(intake_setup(3));
+  for (int i = 0; i < 20; ++i) {
+    GyroSample sample = live_sample(0.125 * i);
+    sample.h_b[2].setConstant(std::numeric_limits<double>::quiet_NaN());
+    const SampleStatus status = intake.screen(sample);
+    EXPECT_EQ(status, i < 15 ? SampleStatus::kRejectedNotDirection : SampleStatus::kUsed) << i;
+    EXPECT_TRUE(i < 15 || sample.h_b[2].allFinite());
+  }
+  EXPECT_EQ(intake.health().states()[2], GyroState::kStuck);
+}
+
+TEST(Intake, RejectsSamplesAndFixesOfTooFewGyros) {
+  Intake intake(intake_setup());
+  for (int i = 0; i < 20; ++i) {
+    GyroSample sample = live_sample(0.125 * i);
+    sample.h_b[0] = Eigen::Vector3d::UnitX();
+    EXPECT_EQ(intake.screen(sample), i < 15 ? SampleStatus::kUsed : SampleStatus::kRejectedTooFewGyros) << i;
+  }
+  const StarFix fix{second(2.4), Eigen::Quaterniond::Identity()};
+  EXPECT_EQ(intake.look_at(fix, second(2.375), Time::min()), FixStatus::kRejectedTooFewGyros);
+}
+
+TEST(Intake, LooksAtFixes) {
+  Intake intake(intake_setup(2, 2));
+  const auto look = [&](const StarFix& fix, std::optional<Time> latest = second(10), Time until = second(8)) {
+    return intake.look_at(fix, latest, until);
+  };
+  const Eigen::Quaterniond q = Eigen::Quaterniond::Identity();
+  EXPECT_EQ(look({second(9), q}), FixStatus::kPending);
+  EXPECT_EQ(look({second(9), q, 1}), FixStatus::kPending);
+  for (const int head : {2, 4, -1}) {
+    EXPECT_EQ(look({second(9), q, head}), FixStatus::kRejectedUnknownHead) << head;
+  }
+  for (const double bad : {0.0, 1.01, std::numeric_limits<double>::quiet_NaN()}) {
+    EXPECT_EQ(look({second(9), Eigen::Quaterniond(bad * q.coeffs())}), FixStatus::kRejectedNotRotation) << bad;
+  }
+  EXPECT_EQ(look({second(9), q}, std::nullopt), FixStatus::kRejectedNoGyro);
+  EXPECT_EQ(look({second(10.5), q}), FixStatus::kPending);
+  EXPECT_EQ(look({second(10.6), q}), FixStatus::kRejectedNoGyro);
+  EXPECT_EQ(look({second(7.9), q}), FixStatus::kRejectedOutOfOrder);
+  // One that was used is not used again, nor one of the same star tracker before it.
+  intake.mark_used({second(9), q, 1});
+  EXPECT_EQ(look({second(9), q, 1}), FixStatus::kRejectedOutOfOrder);
+  EXPECT_EQ(look({second(8.5), q, 1}), FixStatus::kRejectedOutOfOrder);
+  EXPECT_EQ(look({second(8.5), q, 0}), FixStatus::kPending);
+  intake.set_clock(second(0));
+  EXPECT_EQ(look({second(8.5), q, 1}), FixStatus::kPending);
+}
+
+TEST(FixQueue, GivesFixesInTheOrderOfTheirTimes) {
+  FixQueue<2> queue;
+  EXPECT_EQ(queue.next_t(), Time::max());
+  const Eigen::Quaterniond q(Eigen::AngleAxisd(0.3, Eigen::Vector3d::UnitY()));
+  for (const double t_s : {3.0, 1.0, 2.0, 5.0, 4.0}) {
+    EXPECT_EQ(queue.push({second(t_s), q}), FixStatus::kPending);
+  }
+  EXPECT_EQ(queue.push({second(3), q, 1}), FixStatus::kPending);  // of another star tracker at the same time
+  EXPECT_EQ(queue.push({second(3), q, 1}), FixStatus::kRejectedOutOfOrder);
+  EXPECT_EQ(queue.push({second(3), q, 0}), FixStatus::kRejectedOutOfOrder);
+  double before_s = 0;
+  for (const int head : {0, 0, 0, 1, 0, 0}) {
+    const Time next_t = queue.next_t();
+    const StarFix fix = queue.pop();
+    EXPECT_EQ(fix.t, next_t);
+    EXPECT_EQ(fix.head, head);
+    EXPECT_EQ(fix.q_in_c.coeffs(), q.coeffs());
+    EXPECT_GE(to_seconds(fix.t.time_since_epoch()), before_s);
+    before_s = to_seconds(fix.t.time_since_epoch());
+  }
+  EXPECT_EQ(queue.size(), 0);
+}
+
+TEST(FixQueue, HasRoomForSoMany) {
+  FixQueue<1> queue;
+  const Eigen::Quaterniond q = Eigen::Quaterniond::Identity();
+  for (int round = 0; round < 3; ++round) {  // from any place of the ring on
+    for (int i = 0; i < FixQueue<1>::kCapacity; ++i) {
+      ASSERT_EQ(queue.push({second(1000 * round + i), q}), FixStatus::kPending);
+    }
+    EXPECT_EQ(queue.push({second(1e6), q}), FixStatus::kRejectedBacklog);
+    EXPECT_EQ(queue.size(), FixQueue<1>::kCapacity);
+    if (round == 1) {
+      EXPECT_EQ(queue.clear(), FixQueue<1>::kCapacity);
+    }
+    for (int i = 0; queue.size() > 0; ++i) {
+      EXPECT_EQ(queue.pop().t, second(1000 * round + i));
+    }
+    EXPECT_EQ(queue.push({second(1000 * round - 1), q}), FixStatus::kPending);
+    static_cast<void>(queue.pop());
+  }
+}
+
+TEST(Schedule, DoesTheEarliestThingFirst) {
+  using Next = Schedule::Next;
+  constexpr Time kNone = Time::max();
+  Schedule schedule(std::chrono::milliseconds(1400), std::chrono::minutes(1));
+  EXPECT_EQ(schedule.next(second(10), kNone, kNone), Next::kNothing);
+  EXPECT_EQ(schedule.next(second(10), second(9), kNone), Next::kSample);
+  EXPECT_EQ(schedule.next(second(10), second(11), kNone), Next::kNothing);
+  EXPECT_EQ(schedule.next(second(10), second(9), second(8)), Next::kFix);
+  EXPECT_EQ(schedule.next(second(10), second(9), second(9)), Next::kSample);  // the sample at the fix goes before it
+  EXPECT_EQ(schedule.next(second(10), kNone, second(8)), Next::kFix);
+  EXPECT_EQ(schedule.next(second(10), second(12), second(11)), Next::kNothing);
+  // A minute after the last fix the angles are due, as soon as no fix can come that would share their samples.
+  schedule.fix_used(second(0));
+  EXPECT_EQ(schedule.angles_t(), second(60));
+  EXPECT_EQ(schedule.next(second(61), second(60.1), kNone), Next::kNothing);
+  EXPECT_EQ(schedule.next(second(62.8), second(60.1), kNone), Next::kAngles);
+  EXPECT_EQ(schedule.next(second(62.8), second(60.1), second(62)), Next::kSample);  // a fix is before them
+  EXPECT_EQ(schedule.next(second(62.8), second(60.1), second(62.8)), Next::kAngles);
+  schedule.angles_used(second(60));
+  EXPECT_EQ(schedule.angles_t(), second(63));
+  EXPECT_EQ(schedule.taken_until(), second(62.8));
+  // The clock is set back by 100 s.
+  schedule.set_clock(-std::chrono::seconds(100));
+  EXPECT_EQ(schedule.angles_t(), second(-37));
+  EXPECT_EQ(schedule.taken_until(), Time::min());
+  schedule.no_angles();
+  schedule.set_clock(-std::chrono::seconds(100));
+  EXPECT_EQ(schedule.angles_t(), Time::max());
+}
+
+TEST(Schedule, WithoutAnglesNeverAsksForThem) {
+  Schedule schedule(std::chrono::milliseconds(1400), Duration::max());
+  schedule.fix_used(second(0));
+  EXPECT_EQ(schedule.next(second(1e6), second(1e5), Time::max()), Schedule::Next::kSample);
+}
+
+}  // namespace
+}  // namespace trihedron
