@@ -13,6 +13,7 @@
 
 namespace trihedron::ground {
 
+/// How a calibration compares with the truth, or with the star tracker.
 struct CalibrationEvaluation {
   AttitudeEvaluation navigation;          ///< of CalibrationRun::navigation
   AttitudeEvaluation attitude;            ///< of CalibrationRun::attitude
@@ -20,7 +21,7 @@ struct CalibrationEvaluation {
   std::vector<Convergence> convergence;   ///< by row of Calibration::states
   std::optional<Duration> drift_settled;  ///< as settled() has it
   std::optional<Duration> alignment_settled;
-  double limit_rad = kAttitudeLimit_rad;  ///< that the intervals stand for
+  double limit_rad = kAttitudeLimit_rad;  ///< error limit of the intervals
   std::vector<OpenLoops> open_loops;      ///< from each of the run's corrections
   IntervalExtension extension;            ///< by the open loops; the median from the second correction on
 };
