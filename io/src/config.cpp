@@ -10,6 +10,7 @@
 #include "text_file.hpp"
 #include "toml_table.hpp"
 #include "trihedron/io/quantity.hpp"
+#include "trihedron/records/drift_models.hpp"
 #include "wording.hpp"
 
 namespace trihedron::io {

@@ -10,6 +10,7 @@
 
 namespace trihedron::io {
 
+/// A pass and its truth, with the name under which results are kept.
 struct NamedPass {
   std::filesystem::path path;
   std::string name;  ///< of its directory or file; numbered where several have the same

@@ -13,6 +13,7 @@
 
 namespace trihedron::ground {
 
+/// How a calibration compares with the truth, or with the star tracker.
 struct CalibrationEvaluation {
   AttitudeEvaluation navigation;          ///< of CalibrationRun::navigation
   AttitudeEvaluation attitude;            ///< of CalibrationRun::attitude
