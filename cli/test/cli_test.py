@@ -200,7 +200,7 @@ def test_gyros_of_any_rate_are_calibrated_and_a_limit_is_told(tmp_path, period, 
     result = run("calibrate", rated, "-o", tmp_path / "out", "--config", tmp_path / "told.toml")
     assert result.returncode == TRUSTWORTHY, result.stdout + result.stderr
     for error, sigma in alignment_errors_arcsec(result.stdout):
-        assert abs(error) < 4 * sigma < 4 * 30
+        assert abs(error) < 4 * sigma < 4 * 60  # an hour without slews tells pitch from drift no better
     findings = json.loads((tmp_path / "out" / "calibration.json").read_text())["verdict"]["findings"]
     of_rate = [finding for finding in findings if finding["code"].startswith("gyro-samples-")]
     assert [finding["code"] for finding in of_rate] == told

@@ -172,7 +172,7 @@ TEST(EveryLayout, WorksOnBoard) { expect_that_all_work(false); }
 
 TEST(EveryLayout, OfDegreeSixIsConsistentOnBoard) { expect_that_all_work(true); }
 
-TEST(EveryFurtherState, IsFoundInMinutesWhenItIsAlone) {
+TEST(EveryFurtherState, IsFoundInMinutesOnceTheGyrosAreCalibrated) {
   for (const FurtherStateKind& kind : kFurtherStateKinds) {
     Layout layout{.gyros = 3};
     if (kind.flag != nullptr) {
@@ -180,12 +180,14 @@ TEST(EveryFurtherState, IsFoundInMinutesWhenItIsAlone) {
     } else {
       layout.star_trackers = 2;
     }
-    const test::Mission mission({.layout = layout, .duration_s = 300});
+    const test::Mission mission({.layout = layout, .duration_s = 300, .calibration_sigma = 1e-3});
     const auto on_board = mission.given.on_board();
     mission.fly(*on_board);
     const int first = layout.direction(layout.gyros);
     const Eigen::MatrixXd root = test::state_root(on_board->estimator()).bottomRows(layout.size() - first);
-    EXPECT_LT(least_gain(mission.given.setup, layout, root.rowwise().norm()), 0.5) << static_cast<int>(kind.state);
+    // What wanders is new every five minutes.
+    const double most = kind.state == FurtherState::kWanderingDrift ? 0.7 : 0.5;
+    EXPECT_LT(least_gain(mission.given.setup, layout, root.rowwise().norm()), most) << static_cast<int>(kind.state);
   }
 }
 

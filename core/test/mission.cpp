@@ -31,6 +31,7 @@ Mission::Mission(const MissionPlan& plan) : given(plan.layout) {
   const Layout& layout = plan.layout;
   const CalibrationSetup& setup = given.setup = setup_of(plan);
   given.set_alignment_sigma(kAlignmentSigma_rad);
+  given.covariance *= plan.calibration_sigma * plan.calibration_sigma;
   std::mt19937 random(plan.seed);
   std::normal_distribution<double> normal;
   const auto white = [&] { return Eigen::Vector3d(normal(random), normal(random), normal(random)); };
@@ -39,9 +40,9 @@ Mission::Mission(const MissionPlan& plan) : given(plan.layout) {
   for (int k = 0; k < layout.gyros; ++k) {
     auto& gyro = truth[k];
     gyro.h_in = momenta[k].normalized();
-    gyro.drift_rad_s =
-        kDriftSigma_rad_s * Eigen::VectorXd::NullaryExpr(layout.drift_columns(), [&] { return normal(random); });
-    gyro.C_c_b = turn(kAlignmentSigma_rad * white());
+    gyro.drift_rad_s = plan.calibration_sigma * kDriftSigma_rad_s *
+                       Eigen::VectorXd::NullaryExpr(layout.drift_columns(), [&] { return normal(random); });
+    gyro.C_c_b = turn(plan.calibration_sigma * kAlignmentSigma_rad * white());
     if (layout.further.wandering_drift) {
       gyro.drift_rad_s.segment<3>(layout.wandering_column()) = setup.wandering_drift.sigma * white();
     }

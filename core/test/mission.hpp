@@ -15,7 +15,8 @@ struct MissionPlan {
   double gyro_period_s = 0.125;
   double fix_period_s = 3;  ///< of each star tracker; they look one after the other
   double slews_rad = 0.5;
-  double slews_from_s = -1000;  ///< before the beginning: a clock that is off must not see it
+  double slews_from_s = -1000;   ///< before the beginning: a clock that is off must not see it
+  double calibration_sigma = 1;  ///< prior 1-sigma of alignments and drift coefficients, as part of the usual one
   unsigned seed = 1;
 };
 
