@@ -2,11 +2,12 @@
 # cmake/setup.sh [GROUP…]: installs what is missing of these groups on Debian 12, of program, tests and lint where none is named; does
 # nothing, quickly, when nothing is.
 set -euo pipefail
+cd "$(dirname "$0")/.."
 
 program=(
   g++ cmake ninja-build pkg-config
   libeigen3-dev libhdf5-dev libcli11-dev libtomlplusplus-dev libfmt-dev nlohmann-json3-dev libnetcdf-dev libfast-float-dev libsqlitecpp-dev
-  libtbb-dev libboost-dev liberfa-dev nodejs npm ca-certificates
+  libtbb-dev libboost-dev liberfa-dev ca-certificates
 )
 # Tests, their coverage, benches, validation.
 tests=(
@@ -23,28 +24,38 @@ for name in ${*:-program tests lint}; do
     program|tests|lint|docs) declare -n members=$name && packages+=("${members[@]}") ;;
     *) echo "setup: no group \"$name\"; there are program, tests, lint, docs" >&2; exit 2 ;;
   esac
+  if [ "$name" = program ]; then program_wanted=yes; fi
 done
 
 missing=()
 for package in "${packages[@]}"; do
   dpkg-query -W -f '${db:Status-Status}' "$package" 2>/dev/null | grep -qx installed || missing+=("$package")
 done
-# A node or npm of other origin serves as well as Debian's.
-for tool in nodejs:node npm:npm; do
-  if command -v "${tool#*:}" >/dev/null; then
-    missing=($(printf '%s\n' "${missing[@]}" | grep -vx "${tool%%:*}" || true))
-  fi
-done
-if [ ${#missing[@]} -eq 0 ]; then
-  exit 0
+
+# Node and npm, which fetch what the report draws with and run its tests: those of the machine, else of PyPI. Debian's npm needs hundreds
+# of packages, minutes of a first build.
+needs_node() {
+  [ -n "${program_wanted:-}" ] && ! { command -v node && command -v npm; } >/dev/null && ! [ -e build-node/installed ]
+}
+if needs_node; then
+  dpkg-query -W -f '${db:Status-Status}' python3-venv 2>/dev/null | grep -qx installed || missing+=(python3-venv)
 fi
 
-sudo=()
-if [ "$(id -u)" -ne 0 ]; then
-  command -v sudo >/dev/null || { echo "setup: run as root, or install sudo; missing: ${missing[*]}" >&2; exit 1; }
-  sudo=(sudo)
+if [ ${#missing[@]} -gt 0 ]; then
+  sudo=()
+  if [ "$(id -u)" -ne 0 ]; then
+    command -v sudo >/dev/null || { echo "setup: run as root, or install sudo; missing: ${missing[*]}" >&2; exit 1; }
+    sudo=(sudo)
+  fi
+  echo "setup: installing ${missing[*]}"
+  "${sudo[@]}" apt-get update -qq
+  "${sudo[@]}" env DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends \
+    "${missing[@]}" >/dev/null
 fi
-echo "setup: installing ${missing[*]}"
-"${sudo[@]}" apt-get update -qq
-"${sudo[@]}" env DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends \
-  "${missing[@]}" >/dev/null
+
+if needs_node; then
+  echo "setup: fetching node and npm into build-node"
+  python3 -m venv build-node
+  build-node/bin/pip install --quiet --disable-pip-version-check --requirement cmake/node-requirements.txt
+  touch build-node/installed
+fi
