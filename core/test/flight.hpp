@@ -4,9 +4,11 @@
 /// matters, and exact. And what most tests do with the on-board step.
 
 #include <Eigen/Core>
+#include <algorithm>
 #include <functional>
 #include <memory>
 #include <numbers>
+#include <type_traits>
 #include <vector>
 
 #include "trihedron/core/on_board.hpp"
@@ -70,7 +72,9 @@ struct Given {
 
   explicit Given(const Layout& layout = {}) : setup(nominal_setup(layout)), covariance(nominal_covariance(layout)) {
     for (auto& gyro : prior) {
-      gyro.drift_rad_s.setZero(layout.drift_columns());
+      using Drift = std::remove_cvref_t<decltype(gyro.drift_rad_s)>;
+      constexpr int kRoom = Drift::MaxSizeAtCompileTime;  // a layout may be too large for the estimator, which refuses it
+      gyro.drift_rad_s.setZero(std::min(layout.drift_columns(), kRoom));
     }
   }
 
