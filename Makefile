@@ -18,7 +18,7 @@ help:
 	@echo 'make docs     reference of the interfaces and all documents as web pages: out/docs/html/index.html'
 	@echo 'make install  into PREFIX (default /usr/local)'
 	@echo 'make setup | format | lint | sanitize | coverage | clean'
-	@echo 'Files are compiled in units of twelve, which makes a whole build shorter. Who edits one is served sooner with'
+	@echo 'Files are compiled in units of up to 24, which makes a whole build shorter. Who edits one is served sooner with'
 	@echo 'CMAKE_FLAGS=-DCMAKE_UNITY_BUILD=OFF, which compiles each on its own.'
 
 setup:
