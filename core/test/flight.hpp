@@ -73,7 +73,8 @@ struct Given {
   explicit Given(const Layout& layout = {}) : setup(nominal_setup(layout)), covariance(nominal_covariance(layout)) {
     for (auto& gyro : prior) {
       using Drift = std::remove_cvref_t<decltype(gyro.drift_rad_s)>;
-      constexpr int kRoom = Drift::MaxSizeAtCompileTime;  // a layout may be too large for the estimator, which refuses it
+      constexpr int kRoom =
+          Drift::MaxSizeAtCompileTime;  // a layout may be too large for the estimator, which refuses it
       gyro.drift_rad_s.setZero(std::min(layout.drift_columns(), kRoom));
     }
   }
