@@ -7,8 +7,9 @@
 namespace trihedron::io {
 
 /// A file written under a temporary name beside its target and renamed onto it by commit(); without commit() it is
-/// removed. A target that is not a regular file (a pipe, /dev/null) is written straight. Every failure throws
-/// MachineFailed.
+/// removed. What a killed program left under such a name is removed by the next. A target that is a symbolic link stays
+/// one: the file it leads to is replaced. A file that is replaced hands its mode on. A target that is not a regular
+/// file (a pipe, /dev/null) is written straight. Every failure throws MachineFailed.
 class AtomicFile {
  public:
   explicit AtomicFile(std::filesystem::path target);
@@ -47,8 +48,23 @@ class MadeDirectory {
   int made_ = 0;  ///< of it and those above
 };
 
+/// The only one that writes into a directory, as long as it lives. Throws MachineFailed, and tells who holds it.
+class DirectoryLock {
+ public:
+  explicit DirectoryLock(const std::filesystem::path& directory);
+  DirectoryLock(const DirectoryLock&) = delete;
+  DirectoryLock& operator=(const DirectoryLock&) = delete;
+  ~DirectoryLock();
+
+ private:
+  int descriptor_ = -1;
+};
+
 /// A directory whose files appear together: they are written under path(), a hidden directory within it, and moved to
-/// their places by commit(), beside what is there; without commit() nothing stays. Every failure throws MachineFailed.
+/// their places by commit(), beside what is there; without commit() nothing stays. Nobody else can stage files for the
+/// same directory meanwhile. commit() first gives the hidden directory the name of a complete set: where the program is
+/// killed before that the old files stay, and where it is killed later the next that stages files here finishes the
+/// work. Links and modes are kept as AtomicFile keeps them. Every failure throws MachineFailed.
 class StagedDirectory {
  public:
   explicit StagedDirectory(std::filesystem::path target);
@@ -60,10 +76,9 @@ class StagedDirectory {
   void commit();
 
  private:
-  void move_from(const std::filesystem::path& staged, const std::filesystem::path& target) const;
-
   std::filesystem::path target_;
   MadeDirectory made_;
+  DirectoryLock lock_;
   std::filesystem::path path_;
 };
 
