@@ -219,7 +219,7 @@ Series NetcdfReader::read_group(const std::string& group, Time epoch, ChooseRule
 
 NetcdfWriter::NetcdfWriter(const fs::path& path) : path_(path), file_(path) {
   prepare_library();
-  if (file_.temporary() == path) {
+  if (file_.straight()) {
     throw MachineFailed(path, "is no regular file", "give the name of a file on a disk: NetCDF needs one");
   }
   check(nc_create(fs::absolute(file_.temporary()).c_str(), NC_NETCDF4, &id_));
