@@ -30,7 +30,7 @@ ExitStatus run_demo(const std::filesystem::path& out, const Common& common) {
   simulate_pass(scenario, "scenario.toml", pass, silent);
   const Calibrated calibrated = calibrate_into(staged, out, {io::read_named_pass(pass)}, {}, common);
   // The calibration's verdict is the one that counts: this is the same filter on the same pass.
-  static_cast<void>(navigate_pass(pass, {.attitude = staged.path() / "navigation.csv"}, {}, silent));
+  static_cast<void>(navigate_pass(pass, {staged.path() / "navigation.csv", {}, {}}, {}, silent));
   staged.commit();
   fmt::print("{}", calibrated.summary);
   if (!common.quiet && !common.json) {

@@ -3,7 +3,6 @@
 
 #include <filesystem>
 #include <span>
-#include <string>
 #include <string_view>
 #include <vector>
 
@@ -53,7 +52,7 @@ class StagedDirectory {
   /// Asked before a long calculation: throws where one of these names in the directory is taken by what is no file.
   void expect_places(std::span<const std::string_view> names) const;
   /// The set has no file of this name: an earlier one goes.
-  void drop(const std::string& name) { dropped_.emplace_back(name); }
+  void drop(const std::filesystem::path& name) { dropped_.push_back(name); }
   void put_in_place();
   void keep();
   void commit();  ///< both
