@@ -62,6 +62,10 @@ def content(directory):
     return {os.fsencode(path.relative_to(directory)): path.read_bytes() for path in directory.rglob("*") if path.is_file()}
 
 
+def without_hidden(directory):
+    return {name: text for name, text in content(directory).items() if b".trihedron-" not in name}
+
+
 @pytest.fixture(scope="session")
 def given(tmp_path_factory):
     """Passes of four minutes, as directories with a truth and as NetCDF, and settings. Not to be changed."""
@@ -187,7 +191,7 @@ def test_a_broken_truth_is_refused_before_anything_is_written(given, own, tmp_pa
         assert not (tmp_path / "out").exists()
 
 
-# The grid of faults below holds the work long enough to see what comes before it: a pass that is refused in the work itself.
+# Seen by a pass that is refused in the work itself: what is told is what came first.
 
 
 def test_an_output_that_cannot_be_written_is_refused_before_the_work(given, tmp_path, calibrate):
@@ -371,6 +375,9 @@ def faults(tmp_path_factory):
     return library
 
 
+SERIAL = itertools.count()  # of copies
+
+
 class Machine:
     """Runs a command on a copy of a state of a directory while the machine fails, by a plan of faults."""
 
@@ -379,10 +386,9 @@ class Machine:
         self.below = below
         self.state = state
         self.command = command  # of the directory with the copy
-        self.serial = itertools.count()
 
     def copy(self):
-        return shutil.copytree(self.state, self.below / f"copy{next(self.serial)}", symlinks=True)
+        return shutil.copytree(self.state, self.below / f"copy{next(SERIAL)}", symlinks=True)
 
     def run(self, directory, kinds, **plan):
         environment = {**os.environ, "LD_PRELOAD": str(self.library), "FAULTS_BELOW": str(plan.pop("below", self.below)), "FAULTS_CALLS": kinds,
@@ -392,7 +398,7 @@ class Machine:
     def calls(self, kinds, **plan):
         """How many a run without a fault makes."""
         directory = self.copy()
-        count = self.below / f"count{next(self.serial)}"
+        count = self.below / f"count{next(SERIAL)}"
         result = self.run(directory, kinds, count=count, **plan)
         assert result.returncode in DONE, result.stderr
         shutil.rmtree(directory)
@@ -443,12 +449,12 @@ def second_after_first(given, faults, tmp_path_factory):
     return machine
 
 
-def is_new(machine, directory):
+def is_new(machine, directory, may_be_left=()):
     """Whether OUT and the catalogue are the new ones, each. Fails where one is neither the old nor the new one, or anything else is there."""
     out, rows = content(directory / "out"), catalogue_rows(directory / "c.db")
     assert out in (machine.old[0], machine.new[0]), sorted(out)
     assert rows in (machine.old[1], machine.new[1]), rows
-    assert sorted(path.name for path in directory.iterdir()) == ["c.db", "out"]
+    assert {path.name for path in directory.iterdir()} - set(may_be_left) == {"c.db", "out"}
     return out == machine.new[0], rows == machine.new[1]
 
 
@@ -477,15 +483,15 @@ def test_a_disk_that_is_full_or_fails_at_any_call_leaves_old_or_new(second_after
             take_up(machine, directory)
         both = is_new(machine, directory)
         shutil.rmtree(directory)
-        return result.returncode, both
+        return result.returncode, both, call
 
     calls = machine.calls(kinds)
     assert calls > 100
     outcomes = on_all(fail_at, chosen(calls, most, seed=error))
-    assert {status for status, _ in outcomes} & {MACHINE_FAILED}
-    for status, (out, catalogue) in outcomes:
-        assert out == catalogue
-        assert status == MACHINE_FAILED or out
+    assert {status for status, _, _ in outcomes} & {MACHINE_FAILED}
+    for status, (out, catalogue), call in outcomes:
+        assert out == catalogue, call
+        assert status == MACHINE_FAILED or out, call
 
 
 @pytest.mark.long
@@ -551,7 +557,8 @@ def test_a_kill_at_any_call_leaves_old_or_new_after_the_next_run(second_after_fi
         if call % 2 == 0:
             done("history", directory / "c.db")  # can be read after that
         take_up(machine, directory)
-        both = is_new(machine, directory)
+        # SQLite removes a journal in which nothing was begun when it writes the next time.
+        both = is_new(machine, directory, may_be_left=["c.db-journal"])
         done(*machine.command(directory))
         assert is_new(machine, directory) == (True, True)
         shutil.rmtree(directory)
@@ -597,7 +604,7 @@ def test_other_outputs_are_old_or_new_after_any_fault(given, faults, tmp_path, n
         result = machine.run(directory, kinds, do=do, first=call, last=call, below=directory)
         if do.startswith("errno"):
             assert result.returncode in DONE or result.returncode == MACHINE_FAILED, (plan, result.stderr)
-            assert result.returncode == MACHINE_FAILED or content(directory) == new
+            assert result.returncode == MACHINE_FAILED or without_hidden(directory) == new
         else:
             assert result.returncode == -int(do.split()[1])
         if do == f"signal {int(signal.SIGKILL)}" or "name" in kinds:
