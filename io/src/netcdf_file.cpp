@@ -1,6 +1,7 @@
 #include "netcdf_file.hpp"
 
-#include <H5public.h>
+#include <H5Fpublic.h>
+#include <H5Ipublic.h>
 #include <fmt/format.h>
 #include <netcdf.h>
 
@@ -49,6 +50,15 @@ bool worth_deflating(const std::vector<double>& values, double lsb) {
 /// The exit handler of HDF5 crashes when a full disk has kept it from closing a file, so it is switched off. All files
 /// of ours are closed by then. To be called before anything else of either library.
 void prepare_library() { [[maybe_unused]] static const herr_t once = H5dont_atexit(); }
+
+/// nc_close() crashes where HDF5 cannot write the last of a file. So HDF5 is kept from closing it there, and told to
+/// afterwards.
+int close_written(int id) {
+  hid_t file = H5I_INVALID_HID;
+  const bool is_held = H5Fget_obj_ids(H5F_OBJ_ALL, H5F_OBJ_FILE, 1, &file) == 1 && H5Iinc_ref(file) > 1;
+  const int status = nc_close(id);
+  return is_held && H5Fclose(file) < 0 ? NC_EHDFERR : status;
+}
 
 }  // namespace
 
@@ -227,7 +237,7 @@ NetcdfWriter::NetcdfWriter(const fs::path& path) : path_(path), file_(path) {
 
 NetcdfWriter::~NetcdfWriter() {
   if (id_ >= 0) {
-    nc_close(id_);
+    close_written(id_);
   }
 }
 
@@ -301,7 +311,7 @@ void NetcdfWriter::write_group(const std::string& group, Time epoch, std::span<c
 }
 
 void NetcdfWriter::commit() {
-  check(nc_close(std::exchange(id_, -1)));
+  check(close_written(std::exchange(id_, -1)));
   file_.commit();
 }
 
