@@ -238,8 +238,8 @@ void add_calibrate(CLI::App& program, const Common& common, int& exit_status) {
       options.estimator = Estimator::kBatch;
       options.definitive_attitude = true;
     }
-    exit_status = calibrate_passes(arguments->passes, options,
-                                   {arguments->out, arguments->config, arguments->catalogue}, common);
+    exit_status =
+        calibrate_passes(arguments->passes, options, {arguments->out, arguments->config, arguments->catalogue}, common);
   });
 }
 

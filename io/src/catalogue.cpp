@@ -22,7 +22,7 @@ namespace fs = std::filesystem;
 namespace {
 
 constexpr std::int64_t kApplicationId = 0x54524948;  // "TRIH"
-constexpr std::int64_t kSchemaVersion = 2;  // version 1 is read, and brought up to this one when it is written
+constexpr std::int64_t kSchemaVersion = 2;           // version 1 is read, and brought up to this one when it is written
 
 constexpr const char* kSchema = R"(
 CREATE TABLE calibration (

@@ -23,7 +23,8 @@ class Apart : public testing::Test {
   }
   /// Of this output of a command with the pass and the settings as inputs; empty where it is let through.
   [[nodiscard]] std::string refusal_of(const std::filesystem::path& output) const {
-    const std::filesystem::path inputs[] = {directory_ / "pass", directory_ / "config.toml", directory_ / "absent.toml", ""};
+    const std::filesystem::path inputs[] = {directory_ / "pass", directory_ / "config.toml", directory_ / "absent.toml",
+                                            ""};
     try {
       expect_apart(inputs, {&output, 1});
     } catch (const UsageError& error) {
@@ -41,7 +42,8 @@ TEST_F(Apart, RefusesAnOutputThatIsAnInput) {
 }
 
 TEST_F(Apart, RefusesAnOutputInAnInputDirectory) {
-  for (const char* name : {"pass/gyro.csv", "pass/new/deep.csv", "link/new", "out/../pass/below/x", "file_link", "second_name"}) {
+  for (const char* name :
+       {"pass/gyro.csv", "pass/new/deep.csv", "link/new", "out/../pass/below/x", "file_link", "second_name"}) {
     EXPECT_THAT(refusal_of(directory_ / name), testing::HasSubstr("lies in the input")) << name;
   }
 }

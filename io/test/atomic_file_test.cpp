@@ -177,7 +177,8 @@ TEST(AtomicFile, RemovesWhatAKilledProgramLeftAndNothingElse) {
     return fmt::format(".trihedron-{}-{}-0.partial", of_host, process);
   };
   write_text(directory / name(host.data(), dead).c_str(), "half");
-  const std::vector<std::string> others = {name(host.data(), ::getppid()), name("7-of-another", dead), ".trihedron-.partial"};
+  const std::vector<std::string> others = {name(host.data(), ::getppid()), name("7-of-another", dead),
+                                           ".trihedron-.partial"};
   for (const std::string& other : others) {
     write_text(directory / other.c_str(), "half");
   }

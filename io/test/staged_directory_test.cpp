@@ -166,9 +166,9 @@ TEST(StagedDirectory, IsForOneAtATimeAndTellsWhoThatIs) {
   const TemporaryDirectory directory;
   {
     const StagedDirectory first(directory / "out");
-    EXPECT_THAT([&] { const StagedDirectory second(directory / "out"); },
-                testing::ThrowsMessage<MachineFailed>(testing::HasSubstr(
-                    fmt::format("out: process {} on ", ::getpid()))));
+    EXPECT_THAT(
+        [&] { const StagedDirectory second(directory / "out"); },
+        testing::ThrowsMessage<MachineFailed>(testing::HasSubstr(fmt::format("out: process {} on ", ::getpid()))));
   }
   EXPECT_THAT(directory.names(), IsEmpty());
   write_text((std::filesystem::create_directory(directory / "out"), directory / "out/.trihedron-lock"), "left");

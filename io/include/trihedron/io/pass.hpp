@@ -79,9 +79,9 @@ struct PassFormat {
 /// As exact as the readout of the gyros of this scenario: a quantised one needs no finer step in the file.
 [[nodiscard]] PassFormat format_for(const Scenario& scenario);
 
-/// Where a pass is going to be written: NetCDF-4 when the name ends in .nc, else a directory, replacing the pass that is
-/// there with its truth. Made before a long calculation it refuses what cannot be written at once, and keeps a directory
-/// from others as long as it lives.
+/// Where a pass is going to be written: NetCDF-4 when the name ends in .nc, else a directory, replacing the pass that
+/// is there with its truth. Made before a long calculation it refuses what cannot be written at once, and keeps a
+/// directory from others as long as it lives.
 class PassWriter {
  public:
   /// Throws MachineFailed.
