@@ -261,7 +261,7 @@ void CatalogueUpdate::discard() noexcept {
   if (open_ != nullptr && is_new_) {
     // While the lock is held: whoever waits for it finds that the file has gone.
     std::error_code ignored;
-    fs::remove(file_, ignored);
+    fs::remove(behind_links(file_), ignored);
   }
   open_.reset();
 }

@@ -20,11 +20,11 @@ namespace trihedron::io {
 /// meanwhile.
 ///
 /// A set of files that belongs to the entries is put in place between the two (StagedDirectory), and kept after
-/// commit(). Whatever fails before commit() has returned, a full disk, too, leaves both as they were, and so does a
-/// kill after which the next run takes back files that were not kept. Only a kill between commit() and keep(), a few
-/// system calls apart, leaves new entries beside old files; each of the two is whole, and the same command once more
-/// replaces the entries and makes the files. Files first and then commit() would turn this round, with a window as long
-/// as it takes to bring the catalogue to the disk, and could not take the files back where that fails.
+/// commit(). Whatever fails before commit() has returned leaves both as they were, and so does a kill, after which the
+/// next run takes back files that were not kept. Only a kill between commit() and keep(), a few system calls apart, or
+/// a disk that fails in keep() leaves new entries beside old files; each of the two is whole, and the same command once
+/// more replaces the entries and makes the files. Files that are kept before commit() would turn this round, with a
+/// window as long as it takes to bring the catalogue to the disk, and could not be taken back where that fails.
 class CatalogueUpdate {
  public:
   /// Throws InputRefused for a file that is no catalogue, a damaged or newer one, or one of another spacecraft;
