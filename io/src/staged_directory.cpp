@@ -185,7 +185,7 @@ DirectoryLock::DirectoryLock(const fs::path& directory) : file_(directory / kLoc
     if (descriptor_ >= 0) {
       ::close(descriptor_);
     }
-    descriptor_ = ::open(file_.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0666);
+    descriptor_ = ::open(file_.c_str(), O_RDWR | O_CREAT | O_NOFOLLOW | O_CLOEXEC, 0666);
     if (descriptor_ < 0) {
       throw MachineFailed(unstaged(directory),
                           fmt::format("cannot be written into: {}", std::generic_category().message(errno)),
