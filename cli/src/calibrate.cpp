@@ -122,18 +122,26 @@ ground::SeveralPasses calibrate_in_order(const std::vector<io::NamedPass>& passe
   return calibrated;
 }
 
+/// Names in OUT that a calibration of these passes may write.
+std::vector<std::filesystem::path> output_names(const std::vector<io::NamedPass>& passes) {
+  std::vector<std::filesystem::path> names(kOutcomeFiles.begin(), kOutcomeFiles.end());
+  for (std::size_t i = 0; passes.size() > 1 && i < passes.size(); ++i) {
+    for (const std::string_view name : kOutcomeFiles) {
+      names.push_back(std::filesystem::path(passes[i].name) / name);
+    }
+  }
+  return names;
+}
+
 void expect_apart(const std::vector<io::NamedPass>& passes, const CalibrationFiles& files) {
   std::vector<std::filesystem::path> inputs = {files.config};
-  std::vector<std::filesystem::path> outputs = {files.out};
   for (const io::NamedPass& pass : passes) {
     inputs.push_back(pass.path);
     inputs.push_back(pass.loaded.prior_file);
   }
-  for (const std::string_view name : kOutcomeFiles) {
+  std::vector<std::filesystem::path> outputs = {files.out};
+  for (const std::filesystem::path& name : output_names(passes)) {
     outputs.push_back(files.out / name);
-    for (std::size_t i = 0; passes.size() > 1 && i < passes.size(); ++i) {
-      outputs.push_back(files.out / passes[i].name / name);
-    }
   }
   io::expect_apart({&files.catalogue, 1}, outputs);
   outputs.push_back(files.catalogue);
@@ -186,7 +194,7 @@ ExitStatus calibrate_passes(const std::vector<std::string>& paths, const Calibra
     io::expect_catalogue_of(passes.front().pass().settings.spacecraft, files.catalogue);
   }
   io::StagedDirectory staged(files.out);
-  staged.expect_places(kOutcomeFiles);
+  staged.expect_places(output_names(passes));
   const Calibrated calibrated = calibrate_into(staged, files.out, passes, options, common);
   if (files.catalogue.empty()) {
     staged.commit();

@@ -201,6 +201,12 @@ def test_an_output_that_cannot_be_written_is_refused_before_the_work(given, tmp_
     (tmp_path / "taken" / "report.html").mkdir(parents=True)
     for out in (tmp_path / "file", tmp_path / "file" / "out", "/proc/trihedron", tmp_path / "taken"):
         refused(calibrate(in_work, "-o", out), MACHINE_FAILED, out)
+    (tmp_path / "parallel").write_text("mine")
+    later = shutil.copytree(given / "second", tmp_path / "later")
+    (later / "pass.toml").write_text((later / "pass.toml").read_text().replace("2009-05-20T", "2009-05-21T"))
+    refused(calibrate(in_work, later, "-o", tmp_path), MACHINE_FAILED, tmp_path / "parallel")
+    shutil.rmtree(later)
+    (tmp_path / "parallel").unlink()
     for output in (tmp_path / "none" / "a.csv", tmp_path / "taken"):
         refused(run("navigate", in_work, "--online", "-o", output), MACHINE_FAILED, output)
     assert (tmp_path / "file").read_text() == "mine"
@@ -279,6 +285,19 @@ def test_of_two_writers_one_set_stays(given, tmp_path, calibrate):
         assert content(out) in sets.values()
 
 
+@pytest.mark.long
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGKILL])
+def test_a_demonstration_is_one_set(tmp_path, number):
+    """Stopped when its first files are made."""
+    out = tmp_path / "out"
+    process = subprocess.Popen([PROGRAM, "demo", "-o", out], stdout=subprocess.DEVNULL, stderr=subprocess.PIPE)
+    while process.poll() is None and not (out / ".trihedron-new" / "pass.nc").exists():
+        time.sleep(0.01)
+    process.send_signal(number)
+    assert process.communicate()[1] == b"" and process.returncode == -number
+    assert not out.exists() if number == signal.SIGINT else [path.name for path in out.iterdir() if path.name[0] != "."] == []
+
+
 # Names, links, modes.
 
 
@@ -314,8 +333,8 @@ def test_names_of_any_length_are_written(given, tmp_path, calibrate, length):
     assert len(list(tmp_path.iterdir())) == 4
 
 
-@pytest.mark.parametrize("path", ["..", ".", "../first/", "../link"])
-def test_a_pass_never_writes_outside_out(given, tmp_path, calibrate, path):
+@pytest.mark.parametrize("path, name", [("..", "first"), (".", "first"), ("../first/", "first"), ("../link", "link"), ("../link/.", "first")])
+def test_a_pass_never_writes_outside_out(given, tmp_path, calibrate, path, name):
     """By its name, where several are calibrated. The later one is of the next day."""
     work = tmp_path / "work"
     (work / "first" / "below").mkdir(parents=True)
@@ -330,9 +349,9 @@ def test_a_pass_never_writes_outside_out(given, tmp_path, calibrate, path):
     assert result.returncode in DONE, result.stderr
     assert content(work) == before
     assert sorted(entry.name for entry in tmp_path.iterdir()) == ["out", "work"]
-    assert sorted(entry.name for entry in (tmp_path / "out").iterdir()) == sorted([*FILES, "first", "second"])
-    for name in ("first", "second"):
-        assert sorted(entry.name for entry in (tmp_path / "out" / name).iterdir()) == FILES
+    assert sorted(entry.name for entry in (tmp_path / "out").iterdir()) == sorted([*FILES, name, "second"])
+    for below in (name, "second"):
+        assert sorted(entry.name for entry in (tmp_path / "out" / below).iterdir()) == FILES
 
 
 def test_passes_of_one_name_and_names_that_are_no_text_have_directories_of_their_own(given, tmp_path):

@@ -72,8 +72,11 @@ constexpr std::size_t kLongestName = 255;  // of a file, in bytes
 
 std::string name_of_pass(const std::filesystem::path& path) {
   std::error_code fault;
-  const std::filesystem::path whole = std::filesystem::canonical(path, fault);
-  const std::filesystem::path name = std::filesystem::is_directory(whole, fault) ? whole.filename() : whole.stem();
+  std::filesystem::path named = path.has_filename() ? path : path.parent_path();  // without a slash at the end
+  if (named.filename() == "." || named.filename() == "..") {
+    named = std::filesystem::canonical(path, fault);
+  }
+  const std::filesystem::path name = std::filesystem::is_directory(path, fault) ? named.filename() : named.stem();
   std::string text = cut(printable(name.string()), kLongestName);
   if (std::string_view(text).starts_with(kHidden)) {
     text.erase(0, 1);

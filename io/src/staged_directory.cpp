@@ -221,9 +221,9 @@ StagedDirectory::StagedDirectory(fs::path target)
 
 StagedDirectory::~StagedDirectory() { clear_up_if_it_can(target_); }
 
-void StagedDirectory::expect_places(std::span<const std::string_view> names) const {
+void StagedDirectory::expect_places(std::span<const fs::path> names) const {
   placing(target_, [&] {
-    for (const std::string_view name : names) {
+    for (const fs::path& name : names) {
       expect_place(target_, name);
     }
   });

@@ -53,13 +53,14 @@ TEST_F(NamedPasses, OfTheSameNameAreNumberedAsTheyWereGiven) {
   EXPECT_THAT(names_of({"a/pass.nc", "b/pass"}), ElementsAre("pass-2", "pass"));
 }
 
-TEST_F(NamedPasses, AreNamedByWhereTheirPathLeads) {
+TEST_F(NamedPasses, AreNamedByTheDirectoryThatDotsStandFor) {
   save("above/real", "03");
   std::filesystem::create_directory(directory_ / "above/real/below");
   std::filesystem::create_symlink("above/real", directory_ / "link");
-  for (const char* path : {"above/real/.", "above/real/below/..", "above/real//", "link", "link/"}) {
+  for (const char* path : {"above/real/.", "above/real/below/..", "above/real//", "link/.", "link/below/.."}) {
     EXPECT_THAT(names_of({path}), ElementsAre("real")) << path;
   }
+  EXPECT_THAT(names_of({"link/"}), ElementsAre("link"));
   save("2009.05.20", "03");
   EXPECT_THAT(names_of({"2009.05.20"}), ElementsAre("2009.05.20"));
 }

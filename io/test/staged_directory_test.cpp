@@ -8,7 +8,6 @@
 
 #include <iterator>
 #include <string>
-#include <string_view>
 
 #include "fixtures.hpp"
 #include "trihedron/io/atomic_file.hpp"
@@ -182,7 +181,7 @@ TEST(StagedDirectory, TellsBeforeTheWorkWhichPlacesAreTaken) {
   write_text(directory / "out/file", "old");
   std::filesystem::create_symlink("/dev/null", directory / "out/device");
   const StagedDirectory staged(directory / "out");
-  const auto fault_of = [&](std::string_view name) {
+  const auto fault_of = [&](const std::filesystem::path& name) {
     try {
       staged.expect_places({&name, 1});
     } catch (const MachineFailed& failed) {

@@ -13,11 +13,12 @@
 namespace trihedron::io {
 
 /// A pass and its truth, with the name under which results are kept. The name is that of one directory or file in any
-/// directory, never "." or "..", and valid UTF-8: bytes of a file name that are not, and control characters, become
+/// directory, never "." or ".." (then it is that of the directory they stand for), and valid UTF-8: bytes of a file
+/// name that are not, and control characters, become
 /// "%" and two hexadecimal digits.
 struct NamedPass {
   std::filesystem::path path;
-  std::string name;  ///< of its directory or file, behind links; numbered where several have the same
+  std::string name;  ///< of its directory or file as it was given; numbered where several have the same
   LoadedPass loaded;
   std::optional<Truth> truth;
 

@@ -3,7 +3,6 @@
 
 #include <filesystem>
 #include <span>
-#include <string_view>
 #include <vector>
 
 namespace trihedron::io {
@@ -50,7 +49,7 @@ class StagedDirectory {
 
   [[nodiscard]] const std::filesystem::path& path() const { return path_; }
   /// Asked before a long calculation: throws where one of these names in the directory is taken by what is no file.
-  void expect_places(std::span<const std::string_view> names) const;
+  void expect_places(std::span<const std::filesystem::path> names) const;
   /// The set has no file of this name: an earlier one goes.
   void drop(const std::filesystem::path& name) { dropped_.push_back(name); }
   void put_in_place();
