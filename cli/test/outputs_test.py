@@ -202,10 +202,10 @@ def test_an_output_that_cannot_be_written_is_refused_before_the_work(given, tmp_
     for out in (tmp_path / "file", tmp_path / "file" / "out", "/proc/trihedron", tmp_path / "taken"):
         refused(calibrate(in_work, "-o", out), MACHINE_FAILED, out)
     (tmp_path / "parallel").write_text("mine")
-    later = shutil.copytree(given / "second", tmp_path / "later")
+    later = shutil.copytree(given / "second", tmp_path / "in" / "later")
     (later / "pass.toml").write_text((later / "pass.toml").read_text().replace("2009-05-20T", "2009-05-21T"))
     refused(calibrate(in_work, later, "-o", tmp_path), MACHINE_FAILED, tmp_path / "parallel")
-    shutil.rmtree(later)
+    shutil.rmtree(tmp_path / "in")
     (tmp_path / "parallel").unlink()
     for output in (tmp_path / "none" / "a.csv", tmp_path / "taken"):
         refused(run("navigate", in_work, "--online", "-o", output), MACHINE_FAILED, output)

@@ -54,7 +54,7 @@ bool is_device(const fs::path& path) {
 }
 
 [[noreturn]] void refuse(const fs::path& output, const std::string& reason) {
-  throw UsageError(fmt::format("{}: {}, which would be destroyed; give another output", output.string(), reason));
+  throw UsageError(fmt::format("{}: {}; give another output", output.string(), reason));
 }
 
 }  // namespace
@@ -70,7 +70,7 @@ void expect_apart(std::span<const fs::path> inputs, std::span<const fs::path> ou
         continue;
       }
       if (is_same(output, input) || resolved(output) == resolved(input)) {
-        refuse(output, "the output is an input as well");
+        refuse(output, "the output is an input as well and would replace it");
       }
       if (fs::is_directory(input, ignored) && (lies_in(output, input) || is_linked_into(output, input))) {
         refuse(output, fmt::format("the output lies in the input {}", input.string()));
