@@ -1,7 +1,7 @@
 #pragma once
 /// What each number that comes from outside may be: by settings, calibrations, scenarios and options of the command
-/// line. The bounds are wide, but within them everything that is computed stays finite; beyond them a number has another
-/// unit than its name says, or is no measurement.
+/// line. The bounds are wide, but within them everything that is computed stays finite; beyond them a number has
+/// another unit than its name says, or is no measurement.
 
 #include <cmath>
 #include <limits>
@@ -41,7 +41,8 @@ inline constexpr Range kReadoutNoise_rad{1e-9, 0.1, "rad",
                                          "4.8e-6"};
 inline constexpr Range kStarTrackerNoise_rad{1e-9, 0.1, "rad",
                                              "it is the 1-sigma of an attitude; an arcsecond is 4.8e-6"};
-inline constexpr Range kDrift_rad_s{-1e-2, 1e-2, "rad/s", "no gyro drifts by half a degree a second; 1 deg/h is 4.8e-6"};
+inline constexpr Range kDrift_rad_s{-1e-2, 1e-2, "rad/s",
+                                    "no gyro drifts by half a degree a second; 1 deg/h is 4.8e-6"};
 inline constexpr Range kDriftSigma_rad_s{1e-15, 1e-2, "rad/s",
                                          "no gyro drifts by half a degree a second; 1 deg/h is 4.8e-6"};
 inline constexpr Range kRotation_rad{-kFullTurn_rad, kFullTurn_rad, "rad",
@@ -54,8 +55,9 @@ inline constexpr Range kRandomWalk_rad_sqrt_s{1e-15, 1e-3, "rad/s^0.5", "give 0 
 inline constexpr Range kGateNis{0.1, 1e12, "", "30 passes good fixes; a large number lets all pass"};
 inline constexpr Range kStudentTFreedom{1, 1e6, "", "give 5 to 20, or 0 for the gate alone", true};
 inline constexpr Range kRejections{1, 1e6, "", "it is a number of fixes"};
-inline constexpr Range kDurationSetting_s{1e-9, kYear_s, "s", "it is longer than nothing, and at most a year"};
-inline constexpr Range kWanderingDrift_rad_s{1e-15, 1e-2, "rad/s", "0.01deg/h is usual"};
+inline constexpr Range kAnglesAfter_s{1e-3, kYear_s, "s", "give some seconds or minutes, or never"};
+inline constexpr Range kCorrectionInterval_s{1e-3, kYear_s, "s", "it must be positive; say continuous to use each fix"};
+inline constexpr Range kWanderingDrift_rad_s{1e-15, 1e-2, "rad/s", "give auto, off, or a 1-sigma like 0.01deg/h"};
 inline constexpr Range kWanderingTime_s{1, kYear_s, "s", "an hour is usual"};
 
 // ---- Calibrations
@@ -65,7 +67,6 @@ inline constexpr Range kReadoutBias{-0.1, 0.1, "", "it is the error of a directi
 inline constexpr Range kFurtherState{-1e3, 1e3, "", "no error of a star tracker or gyro is so large"};
 inline constexpr Range kFurtherStateSigma{0, 1e3, "", "no error of a star tracker or gyro is so large"};
 inline constexpr Range kTimeOfCalibration_s{-1e9, 1e9, "s", "it is the time since the epoch"};
-inline constexpr Range kNoiseRandomWalk_rad_sqrt_s = kRandomWalk_rad_sqrt_s;
 
 // ---- Scenarios; what goes together is judged by the simulation
 
