@@ -147,7 +147,7 @@ void expect_work_after_extreme_readings() {
   for (std::size_t i = 0; i < kExtremes.size(); ++i) {
     flight.fixes[4 + 4 * i].q_in_c.coeffs()(static_cast<int>(i % 4)) = kExtremes[i];
   }
-  flight.samples[90].t = Time(std::chrono::hours(24 * 365 * 100));
+  flight.samples[90].t = Time(-std::chrono::hours(24 * 365 * 100));
   flight.fixes[3].head = 7;
   flight.fixes[4].head = -1;
   const Seen seen = seen_in(flight, *on_board);
