@@ -110,7 +110,7 @@ TEST_F(PassNetcdf, CoarserStepMakesASmallerFileOfALongPassToo) {
   Pass pass = read_pass(file()).pass;
   const GyroTelemetry once = pass.gyro;
   while (pass.gyro.size() < 20'000) {
-    pass.gyro.t.push_back(pass.gyro.t.back() + std::chrono::milliseconds{125});
+    pass.gyro.t.push_back(pass.gyro.t.back() + pass.settings.gyro_period);
     const std::size_t row = (pass.gyro.size() * 7919) % once.size();  // jumps, as noise makes them
     const auto begin = once.h.begin() + static_cast<std::ptrdiff_t>(row * 6);
     pass.gyro.h.insert(pass.gyro.h.end(), begin, begin + 6);
