@@ -90,6 +90,7 @@ auto told_of(const fs::path& file, const Work& work) {
     switch (fault.getErrorCode() & 0xff) {  // the primary code
       case SQLITE_NOTADB:
       case SQLITE_CORRUPT:
+      case SQLITE_TOOBIG:
       case SQLITE_ERROR:
         throw InputRefused(file, {}, fmt::format("is damaged or no database: {}", fault.what()),
                            "restore it from a copy, or give the name of a new one");
