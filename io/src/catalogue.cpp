@@ -5,6 +5,7 @@
 #include <fmt/format.h>
 #include <sqlite3.h>
 
+#include <array>
 #include <cmath>
 #include <map>
 #include <system_error>
@@ -70,11 +71,27 @@ void distrust(SQLite::Database& database) {
   database.exec("PRAGMA cell_size_check = ON; PRAGMA mmap_size = 0");
 }
 
+/// Refuses one with a write-ahead log before SQLite looks into it: even a reader then leaves files beside it. Asked of
+/// SQLite's own descriptor, because the lock of this process goes when any other of the file is closed.
+void expect_no_log(SQLite::Database& database, const fs::path& file) {
+  constexpr std::size_t kWriteVersion = 18;  // the database file format, section 1.3; 1 is the rollback journal
+  constexpr std::size_t kReadVersion = 19;
+  std::array<unsigned char, 100> header{};
+  sqlite3_file* open_file = nullptr;
+  sqlite3_file_control(database.getHandle(), "main", SQLITE_FCNTL_FILE_POINTER, &open_file);
+  const int status = open_file->pMethods->xRead(open_file, header.data(), static_cast<int>(header.size()), 0);
+  if (status == SQLITE_OK && header[kWriteVersion] == 2 && header[kReadVersion] == 2) {
+    throw InputRefused(file, {}, "keeps a write-ahead log, as no catalogue does",
+                       "give it to sqlite3 with \"PRAGMA journal_mode = DELETE\"");
+  }
+}
+
 SQLite::Database opened(const fs::path& file, int access) {
   constexpr int kPatience_ms = 2000;  // for another program that writes
   expect_regular_file(file);
   // A relative name could be one that means something else to SQLite, ":memory:".
   SQLite::Database database(fs::absolute(file).string(), access, kPatience_ms);
+  expect_no_log(database, file);
   distrust(database);
   return database;
 }

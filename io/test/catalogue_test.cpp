@@ -181,6 +181,15 @@ TEST_F(Catalogue, RefusesATableWithOtherColumns) {
   EXPECT_THAT(refusal_of_all(), HasSubstr("has the \"table finding\", which is not that of a catalogue"));
 }
 
+TEST_F(Catalogue, RefusesAWriteAheadLogAndLeavesNoneBehind) {
+  add(sample_entry());
+  execute("PRAGMA journal_mode = WAL");
+  EXPECT_THAT(refusal_of_all(), HasSubstr("keeps a write-ahead log"));
+  EXPECT_THAT(directory_.names(), ElementsAre("catalogue.db"));
+  execute("PRAGMA journal_mode = DELETE");
+  EXPECT_EQ(refusal_of_all(), "");
+}
+
 TEST_F(Catalogue, AcceptsWhatSqliteItselfAdds) {
   add(sample_entry());
   execute("ANALYZE");
