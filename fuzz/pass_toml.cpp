@@ -1,6 +1,7 @@
 #include "pass_toml.hpp"
 
 #include "target.hpp"
+#include "trihedron/io/error.hpp"
 
 void trihedron::fuzz::read(std::string_view bytes) {
   for (const int gyros : {2, 4}) {
