@@ -108,6 +108,8 @@ auto told_of(const fs::path& file, const Work& work) {
       case SQLITE_NOTADB:
       case SQLITE_CORRUPT:
       case SQLITE_TOOBIG:
+      case SQLITE_CONSTRAINT:
+      case SQLITE_MISMATCH:
       case SQLITE_ERROR:
         throw InputRefused(file, {}, fmt::format("is damaged or no database: {}", fault.what()),
                            "restore it from a copy, or give the name of a new one");
@@ -175,8 +177,14 @@ void check_catalogue(SQLite::Database& database, const fs::path& file) {
                        "use the program that wrote it, or a newer one");
   }
   check_schema(database, file);
-  if (const std::string found = database.execAndGet("PRAGMA quick_check(1)").getString(); found != "ok") {
-    throw InputRefused(file, {}, fmt::format("is damaged: {}", found), "restore it from a copy");
+  if (const std::string found = database.execAndGet("PRAGMA integrity_check(1)").getString(); found != "ok") {
+    throw InputRefused(file, {}, fmt::format("is damaged: {}", in_quotes(found)), "restore it from a copy");
+  }
+  if (SQLite::Statement orphans(database, "PRAGMA foreign_key_check"); orphans.executeStep()) {
+    throw InputRefused(file, {},
+                       fmt::format("has a row in table {} that belongs to no calibration",
+                                   in_quotes(orphans.getColumn(0).getString())),
+                       "restore it from a copy, or remove the row; use sqlite3 with \"PRAGMA foreign_keys = ON\"");
   }
 }
 

@@ -190,6 +190,30 @@ TEST_F(Catalogue, RefusesAWriteAheadLogAndLeavesNoneBehind) {
   EXPECT_EQ(refusal_of_all(), "");
 }
 
+TEST_F(Catalogue, RefusesRowsThatBelongToNoCalibration) {
+  add(sample_entry());
+  execute("PRAGMA foreign_keys = OFF; DELETE FROM calibration");
+  EXPECT_THAT(refusal_of_all(), HasSubstr("has a row in table"));
+  execute("DELETE FROM parameter; DELETE FROM finding");
+  EXPECT_EQ(refusal_of_all(), "");
+}
+
+TEST_F(Catalogue, RefusesAnIndexThatDisagreesWithItsTable) {
+  add(sample_entry());
+  std::string bytes = read_text(file_);
+  // The key of the calibration stands in the table and again in its index.
+  const std::string epoch = "2009-05-20T00:00:00";
+  std::size_t places = 0;
+  for (std::size_t at = bytes.find(epoch); at != std::string::npos; at = bytes.find(epoch, at + 1)) {
+    if (bytes.compare(at + epoch.size(), 1, "\"") != 0) {  // not within its JSON
+      bytes[at + 3] = places++ == 0 ? '9' : '8';
+    }
+  }
+  ASSERT_EQ(places, 2U);  // in the row and in the index
+  write_text(file_, bytes);
+  EXPECT_THAT(refusal_of_all(), HasSubstr("is damaged"));
+}
+
 TEST_F(Catalogue, AcceptsWhatSqliteItselfAdds) {
   add(sample_entry());
   execute("ANALYZE");
