@@ -11,7 +11,8 @@ void trihedron::fuzz::read(std::string_view bytes) {
     before = io::read_catalogue(file.path()).size();
   } catch (const io::InputRefused&) {
   }
-  expect(std::distance(std::filesystem::directory_iterator(file.directory()), {}) == 1, "nothing left beside the catalogue");
+  expect(std::distance(std::filesystem::directory_iterator(file.directory()), {}) == 1,
+         "nothing left beside the catalogue");
   io::expect_catalogue_of("Resurs-DK1", file.path());
   io::add_to_catalogue(file.path(), {&entry, 1});
   expect(io::read_catalogue(file.path()).size() >= before, "what was there before");

@@ -13,10 +13,12 @@
 namespace {
 
 constexpr std::array kTypes = {NC_DOUBLE, NC_FLOAT, NC_INT, NC_INT64, NC_UINT64, NC_BYTE, NC_CHAR, NC_STRING, NC_SHORT};
-constexpr std::array kNames = {"t_s",  "h1_x",       "h1_y",         "h1_z",       "h2_x",      "h2_y",  "h2_z",          "h3_x",     "time",
-                               "gyro", "pass_toml",  "prior_json",   "truth_json", "units",     "truth", "star_tracker",  "q_x",      "q_y",
-                               "q_z",  "q_w",        "scale_factor", "add_offset", "_FillValue", "x",    "star_tracker_2", "comment"};
-constexpr std::array kTexts = {"1", "degree", "seconds", "seconds since 2009-05-20", "seconds since 2009-05-20T00:00:00", "", "nan"};
+constexpr std::array kNames = {
+    "t_s",  "h1_x",      "h1_y",         "h1_z",       "h2_x",       "h2_y",  "h2_z",           "h3_x",   "time",
+    "gyro", "pass_toml", "prior_json",   "truth_json", "units",      "truth", "star_tracker",   "q_x",    "q_y",
+    "q_z",  "q_w",       "scale_factor", "add_offset", "_FillValue", "x",     "star_tracker_2", "comment"};
+constexpr std::array kTexts = {
+    "1", "degree", "seconds", "seconds since 2009-05-20", "seconds since 2009-05-20T00:00:00", "", "nan"};
 
 class Writer {
  public:
@@ -51,7 +53,8 @@ class Writer {
     for (int count = input_.ConsumeIntegralInRange(0, 3); count > 0; --count) {
       int dimension = 0;
       const std::size_t length = input_.ConsumeIntegralInRange<std::size_t>(0, kLongest);
-      if (nc_def_dim(group, input_.ConsumeProbability<float>() < 0.7F ? "time" : name(), length, &dimension) == NC_NOERR) {
+      if (nc_def_dim(group, input_.ConsumeProbability<float>() < 0.7F ? "time" : name(), length, &dimension) ==
+          NC_NOERR) {
         dimensions.push_back(dimension);
       }
     }

@@ -64,7 +64,8 @@ void write_seeds(const fs::path& directory, const fs::path& examples) {
         "UPDATE calibration SET json = replace(json, '1', '9e99'), pass = x'ff', passes = -1",
         "UPDATE sqlite_schema SET sql = replace(sql, 'STRICT', ''), rootpage = 3 WHERE name = 'parameter'",
         "INSERT INTO parameter SELECT calibration, state || '2', value, sigma FROM parameter; DELETE FROM finding",
-        "PRAGMA user_version = 2; PRAGMA application_id = 1; PRAGMA encoding = 'UTF-16'; VACUUM; PRAGMA journal_mode = WAL",
+        "PRAGMA user_version = 2; PRAGMA application_id = 1; PRAGMA encoding = 'UTF-16'; VACUUM; PRAGMA journal_mode = "
+        "WAL",
         "ALTER TABLE finding ADD COLUMN c AS (hex(zeroblob(1000))); CREATE INDEX i ON finding (code) WHERE code > 1",
         "UPDATE calibration SET epoch_tai = CAST(x'00' AS TEXT), json = hex(zeroblob(9999)), t_s = -9e999"}) {
     io::write_text(at("catalogue_sql", fmt::format("{}.sql", ++number).c_str()), statement);

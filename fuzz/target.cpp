@@ -41,7 +41,8 @@ class WorstTime {
 }  // namespace
 
 MemoryFile::MemoryFile(std::string_view bytes) : descriptor_(::memfd_create("input", MFD_CLOEXEC)) {
-  expect(::write(descriptor_, bytes.data(), bytes.size()) == static_cast<ssize_t>(bytes.size()), "memory for the input");
+  expect(::write(descriptor_, bytes.data(), bytes.size()) == static_cast<ssize_t>(bytes.size()),
+         "memory for the input");
 }
 
 MemoryFile::~MemoryFile() { ::close(descriptor_); }

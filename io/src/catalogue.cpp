@@ -127,11 +127,6 @@ std::int64_t number(SQLite::Database& database, const std::string& query) {
   return database.execAndGet(query).getInt64();
 }
 
-void make_tables(SQLite::Database& database) {
-  database.exec(kSchema);
-  database.exec(fmt::format("PRAGMA application_id = {}; PRAGMA user_version = {}", kApplicationId, kSchemaVersion));
-}
-
 /// What each table, index, view and trigger is, by kind and name: the statement that made it, without the quotation
 /// marks that renaming puts round names. Those of SQLite itself are left out.
 std::map<std::string, std::string> schema_of(SQLite::Database& database) {
@@ -145,12 +140,12 @@ std::map<std::string, std::string> schema_of(SQLite::Database& database) {
   return schema;
 }
 
-/// Refuses a database of which the tables are not exactly those of a catalogue: a view, a trigger or a check in it
+/// Refuses a database of which the tables are not exactly those that `schema` makes: a view, a trigger or a check in it
 /// could do anything, or never end.
-void check_schema(SQLite::Database& database, const fs::path& file) {
+void check_schema(SQLite::Database& database, const fs::path& file, const char* schema) {
   constexpr const char* kCure = "give a catalogue that `trihedron calibrate --catalogue` wrote and nobody has changed";
   SQLite::Database own(":memory:", SQLite::OPEN_READWRITE | SQLite::OPEN_CREATE);
-  make_tables(own);
+  own.exec(schema);
   const auto expected = schema_of(own);
   const auto found = schema_of(database);
   for (const auto& [name, statement] : found) {
@@ -176,7 +171,7 @@ void check_catalogue(SQLite::Database& database, const fs::path& file) {
                        fmt::format("is a catalogue of version {}, this program reads {}", version, kSchemaVersion),
                        "use the program that wrote it, or a newer one");
   }
-  check_schema(database, file);
+  check_schema(database, file, kSchema);
   if (const std::string found = database.execAndGet("PRAGMA integrity_check(1)").getString(); found != "ok") {
     throw InputRefused(file, {}, fmt::format("is damaged: {}", in_quotes(found)), "restore it from a copy");
   }
@@ -186,6 +181,11 @@ void check_catalogue(SQLite::Database& database, const fs::path& file) {
                                    in_quotes(orphans.getColumn(0).getString())),
                        "restore it from a copy, or remove the row; use sqlite3 with \"PRAGMA foreign_keys = ON\"");
   }
+}
+
+void make_tables(SQLite::Database& database) {
+  database.exec(kSchema);
+  database.exec(fmt::format("PRAGMA application_id = {}; PRAGMA user_version = {}", kApplicationId, kSchemaVersion));
 }
 
 bool is_empty(SQLite::Database& database) {
