@@ -78,7 +78,7 @@ void expect_no_log(SQLite::Database& database, const fs::path& file) {
   constexpr std::size_t kReadVersion = 19;
   std::array<unsigned char, 100> header{};
   sqlite3_file* open_file = nullptr;
-  sqlite3_file_control(database.getHandle(), "main", SQLITE_FCNTL_FILE_POINTER, &open_file);
+  sqlite3_file_control(database.getHandle(), "main", SQLITE_FCNTL_FILE_POINTER, static_cast<void*>(&open_file));
   const int status = open_file->pMethods->xRead(open_file, header.data(), static_cast<int>(header.size()), 0);
   if (status == SQLITE_OK && header[kWriteVersion] == 2 && header[kReadVersion] == 2) {
     throw InputRefused(file, {}, "keeps a write-ahead log, as no catalogue does",

@@ -45,7 +45,7 @@ struct Walk {
 };
 
 /// Empty where the data of the object, if it has any, are in this file.
-std::string fault_of_data(hid_t root, const char* name) {
+std::string_view fault_of_data(hid_t root, const char* name) {
   const Handle object(H5Oopen(root, name, H5P_DEFAULT), H5Oclose);
   if (object.id() < 0) {
     return "cannot be opened";
@@ -62,7 +62,7 @@ std::string fault_of_data(hid_t root, const char* name) {
              : "";
 }
 
-std::string fault_of_link(hid_t root, const char* name, const H5L_info_t& link, Walk& walk) {
+std::string_view fault_of_link(hid_t root, const char* name, const H5L_info_t& link, Walk& walk) {
   if (link.type != H5L_TYPE_HARD) {
     return "is a symbolic link";
   }
@@ -85,7 +85,7 @@ herr_t look_at(hid_t root, const char* name, const H5L_info_t* link, void* data)
   constexpr herr_t kFailed = -1;
   try {
     auto& walk = *static_cast<Walk*>(data);
-    if (const std::string fault = fault_of_link(root, name, *link, walk); !fault.empty()) {
+    if (const std::string_view fault = fault_of_link(root, name, *link, walk); !fault.empty()) {
       walk.fault = fmt::format("{} {}", in_quotes(name), fault);
     }
     return walk.fault.empty() ? kGoOn : kEnough;

@@ -12,6 +12,6 @@ void prepare_hdf5();
 
 /// Throws InputRefused unless the file is HDF5, a tree of groups and data with plain links, each object linked once,
 /// all data within the file, and neither deep nor large beyond any pass.
-void check_hdf5_structure(const std::filesystem::path& file);
+void check_hdf5_structure(const std::filesystem::path& path);
 
 }  // namespace trihedron::io

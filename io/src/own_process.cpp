@@ -156,7 +156,7 @@ class Descriptor {
 
 }  // namespace
 
-void Sink::write(const void* data, std::size_t size) {
+void Sink::write(const void* data, std::size_t size) const {
   const char* at = static_cast<const char*>(data);
   while (size > 0) {
     const ssize_t written = ::write(descriptor_, at, size);

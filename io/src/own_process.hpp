@@ -24,7 +24,7 @@ class Sink {
   [[nodiscard]] bool has_begun() const { return has_begun_; }
 
  private:
-  void write(const void* data, std::size_t size);
+  void write(const void* data, std::size_t size) const;
 
   int descriptor_;
   std::int64_t outcome_;
