@@ -6,15 +6,19 @@
 #include <sqlite3.h>
 #include <unistd.h>
 
+#include <array>
 #include <cerrno>
 #include <cmath>
+#include <map>
 #include <system_error>
 #include <utility>
 
 #include "directories.hpp"
+#include "input_file.hpp"
 #include "trihedron/io/calibration.hpp"
 #include "trihedron/io/error.hpp"
 #include "trihedron/io/time_text.hpp"
+#include "trihedron/records/stop.hpp"
 #include "wording.hpp"
 
 namespace trihedron::io {
@@ -24,6 +28,7 @@ namespace {
 constexpr std::int64_t kApplicationId = 0x54524948;  // "TRIH"
 constexpr std::int64_t kSchemaVersion = 2;           // version 1 is read, and brought up to this one when it is written
 
+// By the key of `calibration`.
 constexpr const char* kSchema = R"(
 CREATE TABLE calibration (
   id INTEGER PRIMARY KEY,
@@ -37,7 +42,7 @@ CREATE TABLE calibration (
   drift_model TEXT NOT NULL,
   trustworthy INTEGER NOT NULL,
   json TEXT NOT NULL,
-  UNIQUE (start_up, pass, epoch_tai, t_s, estimator, drift_model, passes)
+  UNIQUE ({})
 ) STRICT;
 CREATE TABLE parameter (
   calibration INTEGER NOT NULL REFERENCES calibration (id) ON DELETE CASCADE,
@@ -51,6 +56,11 @@ CREATE TABLE finding (
   code TEXT NOT NULL
 ) STRICT;
 )";
+
+std::string schema_of_version(std::int64_t version) {
+  return fmt::format(kSchema, version == 1 ? "epoch_tai, t_s, estimator, drift_model, passes"
+                                           : "start_up, pass, epoch_tai, t_s, estimator, drift_model, passes");
+}
 
 // The tables of version 1, whose key left out start-up and pass, are taken over whole. Children go first.
 constexpr const char* kUpgradeBegin = R"(
@@ -67,11 +77,48 @@ DROP TABLE finding_1;
 DROP TABLE parameter_1;
 DROP TABLE calibration_1;
 )";
+int stop_asked_for(void* /*unused*/) {
+  const StopRequest* const request = StopScope::current();
+  return request != nullptr && request->made() ? 1 : 0;
+}
+
+/// Whoever wrote the file, nothing in it is executed, and damage is found rather than believed.
+void distrust(SQLite::Database& database) {
+  constexpr int kLongestValue = 64 << 20;  // bytes; the calibration with most states has 5 MB
+  constexpr int kSteps = 10'000;           // of SQLite's machine: less than a millisecond
+  sqlite3* const handle = database.getHandle();
+  sqlite3_db_config(handle, SQLITE_DBCONFIG_DEFENSIVE, 1, nullptr);
+  sqlite3_db_config(handle, SQLITE_DBCONFIG_TRUSTED_SCHEMA, 0, nullptr);
+  sqlite3_db_config(handle, SQLITE_DBCONFIG_ENABLE_TRIGGER, 0, nullptr);
+  sqlite3_db_config(handle, SQLITE_DBCONFIG_ENABLE_VIEW, 0, nullptr);
+  sqlite3_limit(handle, SQLITE_LIMIT_LENGTH, kLongestValue);
+  sqlite3_progress_handler(handle, kSteps, stop_asked_for, nullptr);
+  database.exec("PRAGMA cell_size_check = ON; PRAGMA mmap_size = 0");
+}
+
+/// Refuses one with a write-ahead log before SQLite looks into it: even a reader then leaves files beside it. Asked of
+/// SQLite's own descriptor, because the lock of this process goes when any other of the file is closed.
+void expect_no_log(SQLite::Database& database, const fs::path& file) {
+  constexpr std::size_t kWriteVersion = 18;  // the database file format, section 1.3; 1 is the rollback journal
+  constexpr std::size_t kReadVersion = 19;
+  std::array<unsigned char, 100> header{};
+  sqlite3_file* open_file = nullptr;
+  sqlite3_file_control(database.getHandle(), "main", SQLITE_FCNTL_FILE_POINTER, static_cast<void*>(&open_file));
+  const int status = open_file->pMethods->xRead(open_file, header.data(), static_cast<int>(header.size()), 0);
+  if (status == SQLITE_OK && header[kWriteVersion] == 2 && header[kReadVersion] == 2) {
+    throw InputRefused(file, {}, "keeps a write-ahead log, as no catalogue does",
+                       "give it to sqlite3 with \"PRAGMA journal_mode = DELETE\"");
+  }
+}
 
 SQLite::Database opened(const fs::path& file, int access) {
   constexpr int kPatience_ms = 2000;  // for another program that writes
+  expect_regular_file(file);
   // A relative name could be one that means something else to SQLite, ":memory:".
-  return {fs::absolute(file).string(), access, kPatience_ms};
+  SQLite::Database database(fs::absolute(file).string(), access, kPatience_ms);
+  expect_no_log(database, file);
+  distrust(database);
+  return database;
 }
 
 SQLite::Database opened_to_write(const fs::path& file) {
@@ -87,9 +134,13 @@ auto told_of(const fs::path& file, const Work& work) {
   try {
     return work();
   } catch (const SQLite::Exception& fault) {
+    check_stop();                           // which ends what SQLite does
     switch (fault.getErrorCode() & 0xff) {  // the primary code
       case SQLITE_NOTADB:
       case SQLITE_CORRUPT:
+      case SQLITE_TOOBIG:
+      case SQLITE_CONSTRAINT:
+      case SQLITE_MISMATCH:
       case SQLITE_ERROR:
         throw InputRefused(file, {}, fmt::format("is damaged or no database: {}", fault.what()),
                            "restore it from a copy, or give the name of a new one");
@@ -108,25 +159,65 @@ std::int64_t number(SQLite::Database& database, const std::string& query) {
 }
 
 std::int64_t version_of(SQLite::Database& database) { return number(database, "PRAGMA user_version"); }
+/// What each table, index, view and trigger is, by kind and name: the statement that made it, without the quotation
+/// marks that renaming puts round names. Those of SQLite itself are left out.
+std::map<std::string, std::string> schema_of(SQLite::Database& database) {
+  SQLite::Statement rows(database,
+                         "SELECT type || ' ' || name, replace(coalesce(sql, ''), '\"', '') FROM sqlite_schema "
+                         "WHERE name NOT LIKE 'sqlite\\_%' ESCAPE '\\'");
+  std::map<std::string, std::string> schema;
+  while (rows.executeStep()) {
+    schema[rows.getColumn(0).getString()] = rows.getColumn(1).getString();
+  }
+  return schema;
+}
+
+/// Refuses a database of which the tables are not exactly those that `schema` makes: a view, a trigger or a check in it
+/// could do anything, or never end.
+void check_schema(SQLite::Database& database, const fs::path& file, const std::string& schema) {
+  constexpr const char* kCure = "give a catalogue that `trihedron calibrate --catalogue` wrote and nobody has changed";
+  SQLite::Database own(":memory:", SQLite::OPEN_READWRITE | SQLite::OPEN_CREATE);
+  own.exec(schema);
+  const auto expected = schema_of(own);
+  const auto found = schema_of(database);
+  for (const auto& [name, statement] : found) {
+    if (const auto same = expected.find(name); same == expected.end() || same->second != statement) {
+      throw InputRefused(file, {}, fmt::format("has the {}, which is not that of a catalogue", in_quotes(name)), kCure);
+    }
+  }
+  for (const auto& [name, statement] : expected) {
+    if (!found.contains(name)) {
+      throw InputRefused(file, {}, fmt::format("lacks the {} of a catalogue", in_quotes(name)), kCure);
+    }
+  }
+}
 
 /// Refuses what is not a whole catalogue that this program can read.
 void check_catalogue(SQLite::Database& database, const fs::path& file) {
-  if (const std::string found = database.execAndGet("PRAGMA quick_check(1)").getString(); found != "ok") {
-    throw InputRefused(file, {}, fmt::format("is damaged: {}", found), "restore it from a copy");
-  }
   if (number(database, "PRAGMA application_id") != kApplicationId) {
     throw InputRefused(file, {}, "is a database, but no catalogue of calibrations",
                        "give a catalogue that `trihedron calibrate --catalogue` wrote, or the name of a new one");
   }
-  if (const std::int64_t version = version_of(database); version < 1 || version > kSchemaVersion) {
+  const std::int64_t version = version_of(database);
+  if (version < 1 || version > kSchemaVersion) {
     throw InputRefused(file, {},
                        fmt::format("is a catalogue of version {}, this program reads 1 to {}", version, kSchemaVersion),
                        "use the program that wrote it, or a newer one");
   }
+  check_schema(database, file, schema_of_version(version));
+  if (const std::string found = database.execAndGet("PRAGMA integrity_check(1)").getString(); found != "ok") {
+    throw InputRefused(file, {}, fmt::format("is damaged: {}", in_quotes(found)), "restore it from a copy");
+  }
+  if (SQLite::Statement orphans(database, "PRAGMA foreign_key_check"); orphans.executeStep()) {
+    throw InputRefused(file, {},
+                       fmt::format("has a row in table {} that belongs to no calibration",
+                                   in_quotes(orphans.getColumn(0).getString())),
+                       "restore it from a copy, or remove the row; use sqlite3 with \"PRAGMA foreign_keys = ON\"");
+  }
 }
 
 void make_tables(SQLite::Database& database) {
-  database.exec(kSchema);
+  database.exec(schema_of_version(kSchemaVersion));
   database.exec(fmt::format("PRAGMA application_id = {}; PRAGMA user_version = {}", kApplicationId, kSchemaVersion));
 }
 
