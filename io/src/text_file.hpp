@@ -12,12 +12,15 @@ namespace trihedron::io {
 class TextFile {
  public:
   /// Throws InputRefused when there is no such file or it may not be read, MachineFailed when reading fails.
+  /// kStandardInput is read to its end, up to 1 GiB.
   explicit TextFile(const std::filesystem::path& path);
 
   [[nodiscard]] std::string_view text() const { return {bytes_.get(), size_}; }
   [[nodiscard]] bool ends_with_newline() const { return text().ends_with('\n'); }
 
  private:
+  void read_standard_input();
+
   std::unique_ptr<char[]> bytes_;
   std::size_t size_ = 0;
 };

@@ -34,9 +34,7 @@ std::string_view type_of(const toml::node& node) {
 
 }  // namespace
 
-TomlTable::TomlTable(const toml::table& table, std::filesystem::path file, std::string name,
-                     const std::vector<std::string_view>& known)
-    : table_(table), file_(std::move(file)), name_(std::move(name)) {
+void TomlTable::expect_known(const std::vector<std::string_view>& known) const {
   for (const auto& [key, node] : table_) {
     if (std::ranges::find(known, key.str()) == known.end()) {
       throw InputRefused(file_, position_of(key.source()),
@@ -72,7 +70,7 @@ std::string TomlTable::text(const toml::node& node, std::string_view key) const 
   return value->get();
 }
 
-double TomlTable::number(const toml::node& node, std::string_view key) const {
+double TomlTable::number(const toml::node& node, std::string_view key, Range range) const {
   const std::optional<double> value = node.is_number() ? node.value<double>() : std::nullopt;
   if (!value) {
     refuse(node, fmt::format("\"{}\" is {}", key, type_of(node)),
@@ -81,18 +79,13 @@ double TomlTable::number(const toml::node& node, std::string_view key) const {
   if (!std::isfinite(*value)) {
     refuse(node, fmt::format("\"{}\" is not finite", key), "give a finite number");
   }
+  if (!range.holds(*value)) {
+    refuse(node, fmt::format("\"{}\" is {}", key, *value), range.cure());
+  }
   return *value;
 }
 
-double TomlTable::positive(const toml::node& node, std::string_view key) const {
-  const double value = number(node, key);
-  if (!(value > 0)) {
-    refuse(node, fmt::format("\"{}\" is {}", key, value), "it must be positive");
-  }
-  return value;
-}
-
-Eigen::Vector3d TomlTable::three_numbers(const toml::node& node, std::string_view key) const {
+Eigen::Vector3d TomlTable::three_numbers(const toml::node& node, std::string_view key, Range range) const {
   const toml::array* array = node.as_array();
   if (array == nullptr || array->size() != 3) {
     refuse(node,
@@ -100,15 +93,7 @@ Eigen::Vector3d TomlTable::three_numbers(const toml::node& node, std::string_vie
                             : fmt::format("\"{}\" has {} elements", key, array->size()),
            "give three numbers: [x, y, z]");
   }
-  return {number((*array)[0], key), number((*array)[1], key), number((*array)[2], key)};
-}
-
-Eigen::Vector3d TomlTable::three_positive(const toml::node& node, std::string_view key) const {
-  const Eigen::Vector3d values = three_numbers(node, key);
-  if (!(values.minCoeff() > 0)) {
-    refuse(node, fmt::format("\"{}\" has an element that is not positive", key), "all three must be positive");
-  }
-  return values;
+  return {number((*array)[0], key, range), number((*array)[1], key, range), number((*array)[2], key, range)};
 }
 
 void TomlTable::refuse(const toml::node& node, std::string reason, std::string cure) const {

@@ -58,7 +58,7 @@ TEST(Config, RefusesNamesThatThereAreNot) {
               HasSubstr("there is no drift model \"vsh:9\"; use auto, esg7, esg20, or vsh:1 … vsh:6"));
   EXPECT_THAT(refused_config("[further_states]\nclock_ofset = \"on\"\n"), HasSubstr("did you mean \"clock_offset\"?"));
   EXPECT_THAT(refused_config("[further_states]\nreadout_bias = \"maybe\"\n"),
-              HasSubstr("\"readout_bias\" is neither auto nor on nor off"));
+              HasSubstr("\"readout_bias\" cannot be \"maybe\"; known here: auto, off, on"));
   EXPECT_THAT(refused_config("[further_states]\nwandering_drift = \"-1e-8rad/s\"\n"),
               HasSubstr("\"wandering_drift\" is not positive"));
 }

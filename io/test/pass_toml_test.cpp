@@ -87,6 +87,7 @@ TEST_F(PassToml, RefusesBadPriors) {
   write_calibration(directory_ / "earlier.json", sample_calibration());
   EXPECT_THAT(refusal_with("prior = \"earlier.json\"\n" + replaced(toml_, "duration_s", "prior = \"x\"\nduration_s")),
               HasSubstr("pass.toml:1:9: \"prior\" is there twice"));
+  EXPECT_THAT(refusal_with("prior = \"\"\n" + toml_), HasSubstr("is not a regular file"));
   Calibration three = sample_calibration();
   three.gyros.push_back(three.gyros[0]);
   write_calibration(directory_ / "earlier.json", three);
@@ -130,8 +131,9 @@ TEST_F(PassToml, RefusesKeyWithoutItsUnitSuggestingTheRightOne) {
 }
 
 TEST_F(PassToml, RefusesUnknownKeysAtEveryLevel) {
-  EXPECT_THAT(refusal_with("nonsense_altogether = 1\n" + toml_),
-              HasSubstr("pass.toml:1:1: key \"nonsense_altogether\" is not known in the file; known here: pass, gyro"));
+  EXPECT_THAT(
+      refusal_with("nonsense_altogether = 1\n" + toml_),
+      HasSubstr("pass.toml:1:1: key \"nonsense_altogether\" is not known in the file; known here: pass, prior, gyro"));
   EXPECT_THAT(refusal_with(toml_ + "[[gyro.unit]]\nperiod_s = 1\n[[gyro.unit]]\n"),
               HasSubstr("pass.toml:16:1: key \"period_s\" is not known in [[gyro.unit]] 1"));
   EXPECT_THAT(refusal_with(toml_ + "[[gyro.unit]]\n[[gyro.unit]]\ndrift_prior_rad_s = {mu13 = 1e-6}\n"),
@@ -177,8 +179,10 @@ TEST_F(PassToml, RefusesValuesThatMakeNoSense) {
   EXPECT_THAT(refusal_with(replaced(toml_, "= 90", "= 1e12")), HasSubstr("give seconds between"));
   EXPECT_THAT(refusal_with(replaced(toml_, "= 90", "= 59.9")), HasSubstr("shorter than a minute"));
   EXPECT_THAT(refusal_with(replaced(toml_, "2e-06", "0")), HasSubstr("\"drift_prior_sigma_rad_s\" is 0"));
-  EXPECT_THAT(refusal_with(replaced(toml_, "8e-03", "[1e-3, 1e-3, 0]")), HasSubstr("an element that is not positive"));
-  EXPECT_THAT(refusal_with(replaced(toml_, "2e-05", "-2e-05")), HasSubstr("an element that is not positive"));
+  EXPECT_THAT(refusal_with(replaced(toml_, "8e-03", "[1e-3, 1e-3, 0]")),
+              HasSubstr("\"alignment_prior_sigma_rad\" is 0; it must be positive"));
+  EXPECT_THAT(refusal_with(replaced(toml_, "2e-05", "-2e-05")),
+              HasSubstr("\"noise_rad\" is -2e-05; it must be positive"));
 }
 
 TEST_F(PassToml, RefusesUnitsThatAreNotOnePerGyro) {
