@@ -1,12 +1,16 @@
-#include <fmt/core.h>
+#include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <filesystem>
 #include <memory>
 #include <optional>
+#include <span>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "commands.hpp"
+#include "decisions.hpp"
 #include "progress.hpp"
 #include "steps.hpp"
 #include "summary.hpp"
@@ -22,6 +26,7 @@
 #include "trihedron/io/named_pass.hpp"
 #include "trihedron/io/residuals.hpp"
 #include "trihedron/records/run.hpp"
+#include "trihedron/records/text.hpp"
 #include "trihedron/report/report.hpp"
 
 namespace trihedron::cli {
@@ -89,17 +94,25 @@ std::string outcome_text(const Outcome& outcome, const CorrectionOptions& correc
 }
 
 ground::SeveralPasses calibrate_in_order(const std::vector<io::NamedPass>& passes, const CalibrationOptions& options,
-                                         bool quiet) {
+                                         const Common& common) {
   ground::SeveralPasses calibrated(options);
   for (const io::NamedPass& pass : passes) {
     try {
-      const ProgressBar bar("calibrate", quiet);
+      const ProgressBar bar("calibrate", common.quiet);
+      log_pass(common.log, pass.path.string(), pass.loaded);
       calibrated.add(pass.name, pass.pass(), bar.meter());
+      log_run(common.log, calibrated.passes().back().run);
     } catch (const ground::SetupError& error) {
       throw io::InputRefused(pass.path, {}, error.what(), error.cure());
     }
   }
   return calibrated;
+}
+
+std::string not_one_of(const std::string& given, std::span<const std::string_view> known, const std::string& all) {
+  const std::string_view name = nearest(given, known);
+  return name.empty() ? fmt::format("{} is not one of {}", given, all)
+                      : fmt::format("{} is not one of {}: did you mean {}?", given, all, name);
 }
 
 std::vector<std::string> estimator_names() {
@@ -115,11 +128,12 @@ std::vector<std::string> estimator_names() {
 ExitStatus calibrate_passes(const std::vector<std::string>& paths, const CalibrationOptions& options,
                             const std::filesystem::path& out, const std::optional<std::filesystem::path>& catalogue,
                             const Common& common) {
+  log_settings(common.log, options);
   const std::vector<io::NamedPass> passes = io::read_passes(paths);
   if (catalogue) {
     io::expect_catalogue_of(passes.front().pass().settings.spacecraft, *catalogue);
   }
-  const ground::SeveralPasses calibrated = calibrate_in_order(passes, options, common.quiet);
+  const ground::SeveralPasses calibrated = calibrate_in_order(passes, options, common);
   const bool several = passes.size() > 1;
   io::StagedDirectory staged(out);
   for (std::size_t i = 0; several && i < passes.size(); ++i) {
@@ -132,17 +146,24 @@ ExitStatus calibrate_passes(const std::vector<std::string>& paths, const Calibra
     io::add_to_catalogue(*catalogue, calibrated.catalogue_entries());
   }
 
-  if (common.json) {
+  if (several) {
+    common.log.say("of all passes together:");
+    log_run(common.log, calibrated.combined());
+  }
+  common.log.say(fmt::format("written {}", out.string()));
+  const auto as_json = [&] {
     nlohmann::ordered_json json = outcome_json(outcome);
     if (several) {
       json["passes"] = passes_json(calibrated.passes());
     }
-    fmt::print("{}\n", json.dump(1));
-  } else if (!common.quiet) {
-    fmt::print("{}{}Written     {}: calibration.json attitude.csv {}residuals.nc report.html effective-config.toml\n",
-               several ? passes_text(calibrated.passes()) : "", outcome_text(outcome, options.corrections),
-               out.string(), options.definitive_attitude ? "definitive-attitude.csv " : "");
-  }
+    return json;
+  };
+  show(common, as_json, [&] {
+    return fmt::format(
+        "{}{}Written     {}: calibration.json attitude.csv {}residuals.nc report.html effective-config.toml\n",
+        several ? passes_text(calibrated.passes()) : "", outcome_text(outcome, options.corrections),
+        printable(out.string()), options.definitive_attitude ? "definitive-attitude.csv " : "");
+  });
   return outcome.run.calibration.verdict.trustworthy ? kTrustworthy : kDoNotUse;
 }
 
@@ -161,19 +182,32 @@ void add_calibrate(CLI::App& program, const Common& common, int& exit_status) {
       program.add_subcommand("calibrate", "Calibrate drift and alignment of the gyros against the star tracker");
   command->add_option("PASS", arguments->passes, "Directory or NetCDF file; several of one start of the rotors")
       ->required();
-  command->add_option("-o,--output", arguments->out, "Directory to write into")->required();
-  command->add_option("--estimator", arguments->estimator, "Estimator")->check(CLI::IsMember(estimator_names()));
-  command->add_option("--drift-model", arguments->drift_model, "Drift model")->check([](const std::string& name) {
-    return name == kAutoDriftModel || drift_model_named(name)
-               ? ""
-               : fmt::format("not one of {}, {}", kAutoDriftModel, drift_model_choices());
-  });
-  command->add_option("--config", arguments->config, "Settings (TOML); see effective-config.toml of any run");
+  command->add_option("-o,--output", arguments->out, "Directory to write into")->required()->type_name("DIRECTORY");
+  command
+      ->add_option("--estimator", arguments->estimator,
+                   "How the calibration is made: the one that flies, the paper's, least squares over the whole pass; "
+                   "invariant unless the settings say otherwise")
+      ->check([](const std::string& name) {
+        const std::vector<std::string> names = estimator_names();
+        const std::vector<std::string_view> known(names.begin(), names.end());
+        return estimator_named(name) ? "" : not_one_of(name, known, fmt::format("{}", fmt::join(known, ", ")));
+      })
+      ->type_name(fmt::format("{}", fmt::join(estimator_names(), "|")));
+  command
+      ->add_option("--drift-model", arguments->drift_model,
+                   "Drift model; auto, the one that the pass gives evidence of, unless the settings say otherwise")
+      ->check([](const std::string& name) {
+        return name == kAutoDriftModel || drift_model_named(name)
+                   ? ""
+                   : not_one_of(name, {}, fmt::format("{}, {}", kAutoDriftModel, drift_model_choices()));
+      })
+      ->type_name(drift_model_words());
   command->add_flag("--definitive", arguments->definitive,
                     "Write definitive-attitude.csv as well: at each gyro sample, by estimator batch");
-  command->add_option("--catalogue", arguments->catalogue, "Database to add the calibrations to; see history");
-  command->callback([&common, &exit_status, arguments] {
-    CalibrationOptions options = arguments->config.empty() ? CalibrationOptions{} : io::read_config(arguments->config);
+  command->add_option("--catalogue", arguments->catalogue, "Database to add the calibrations to; see history")
+      ->type_name("FILE");
+  const auto settle = [arguments] {
+    CalibrationOptions options = settings_of(arguments->config);
     if (!arguments->estimator.empty()) {
       options.estimator = estimator_named(arguments->estimator).value();
     }
@@ -184,6 +218,19 @@ void add_calibrate(CLI::App& program, const Common& common, int& exit_status) {
       options.estimator = Estimator::kBatch;
       options.definitive_attitude = true;
     }
+    return options;
+  };
+  add_config(*command, arguments->config, settle);
+  command->footer(
+      "trihedron calibrate pass.nc -o out\n"
+      "# Passes of one start of the rotors, combined and kept\n"
+      "trihedron calibrate monday.nc tuesday.nc -o out --catalogue resurs.db\n"
+      "# With another gate\n"
+      "trihedron calibrate --print-config > settings.toml\n"
+      "sed -i 's/^gate_nis.*/gate_nis = 40/' settings.toml\n"
+      "trihedron calibrate pass.nc -o out --config settings.toml --log-file calibrate.log");
+  command->callback([&common, &exit_status, arguments, settle] {
+    const CalibrationOptions options = settle();
     const auto catalogue =
         arguments->catalogue.empty() ? std::nullopt : std::optional(std::filesystem::path(arguments->catalogue));
     exit_status = calibrate_passes(arguments->passes, options, arguments->out, catalogue, common);

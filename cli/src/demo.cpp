@@ -1,4 +1,4 @@
-#include <fmt/core.h>
+#include <fmt/format.h>
 
 #include <filesystem>
 #include <memory>
@@ -9,6 +9,7 @@
 #include "steps.hpp"
 #include "trihedron/io/atomic_file.hpp"
 #include "trihedron/io/scenario.hpp"
+#include "trihedron/records/text.hpp"
 
 namespace trihedron::cli {
 namespace {
@@ -22,7 +23,9 @@ constexpr const char* kScenario =
     "seed = 2009\n";
 
 ExitStatus run_demo(const std::filesystem::path& out, const Common& common) {
-  const Common silent{.quiet = true, .json = false};
+  Common silent = common;
+  silent.quiet = true;
+  silent.json = false;
   const io::MadeDirectory made(out);
   io::write_file(out / "scenario.toml", kScenario);
   simulate_pass(io::read_scenario(out / "scenario.toml"), "scenario.toml", out / "pass.nc", silent);
@@ -30,8 +33,8 @@ ExitStatus run_demo(const std::filesystem::path& out, const Common& common) {
   // The calibration's verdict is the one that counts: this is the same filter on the same pass.
   static_cast<void>(navigate_pass(out / "pass.nc", std::nullopt, {}, out / "navigation.csv", silent));
   if (!common.quiet && !common.json) {
-    fmt::print("            scenario.toml pass.nc navigation.csv\n\nThe report is {}\n",
-               (out / "report.html").string());
+    print_text(stdout, fmt::format("            scenario.toml pass.nc navigation.csv\n\nThe report is {}\n",
+                                   printable((out / "report.html").string())));
   }
   return calibrated;
 }
@@ -42,7 +45,8 @@ void add_demo(CLI::App& program, const Common& common, int& exit_status) {
   auto out = std::make_shared<std::string>("trihedron-demo");
   CLI::App* command = program.add_subcommand(
       "demo", "The paper's experiment: simulate nine hours, calibrate, navigate, evaluate, report");
-  command->add_option("-o,--output", *out, "Directory to write into")->capture_default_str();
+  command->add_option("-o,--output", *out, "Directory to write into")->capture_default_str()->type_name("DIRECTORY");
+  command->footer("trihedron demo -o demo");
   command->callback([&common, &exit_status, out] { exit_status = run_demo(*out, common); });
 }
 

@@ -1,9 +1,10 @@
-#include <fmt/core.h>
+#include <fmt/format.h>
 
 #include <memory>
 #include <string>
 
 #include "commands.hpp"
+#include "decisions.hpp"
 #include "progress.hpp"
 #include "steps.hpp"
 #include "summary.hpp"
@@ -16,6 +17,7 @@
 #include "trihedron/io/error.hpp"
 #include "trihedron/io/named_pass.hpp"
 #include "trihedron/records/run.hpp"
+#include "trihedron/records/text.hpp"
 
 namespace trihedron::cli {
 
@@ -24,8 +26,11 @@ ExitStatus navigate_pass(const std::filesystem::path& pass, const std::optional<
                          const Common& common) {
   io::NamedPass named = io::read_named_pass(pass);
   io::LoadedPass& loaded = named.loaded;
+  log_pass(common.log, pass.string(), loaded);
+  log_settings(common.log, options);
   if (calibration) {
-    loaded.pass.settings.prior = io::read_calibration(*calibration);
+    common.log.say(fmt::format("the values of {} are held", calibration->string()));
+    loaded.pass.settings.prior = io::read_calibration(source(calibration->string()));
   }
   NavigationRun result;
   try {
@@ -35,18 +40,25 @@ ExitStatus navigate_pass(const std::filesystem::path& pass, const std::optional<
     throw io::InputRefused(pass, {}, error.what(), error.cure());
   }
   const Time epoch = loaded.pass.settings.epoch;
-  io::write_attitude(attitude, epoch, result.attitude);
-  const ground::AttitudeEvaluation evaluation = ground::evaluate_navigation(loaded.pass, result, named.truth_or_null());
-  if (common.json) {
-    nlohmann::ordered_json json = {{"pass", pass_json(loaded)},
-                                   {"verdict", verdict_json(result.verdict)},
-                                   {"statistics", statistics_json(result.statistics)},
-                                   {"evaluation", evaluation_json(evaluation, epoch)}};
-    fmt::print("{}\n", json.dump(1));
-  } else if (!common.quiet) {
-    fmt::print("{}{}\n{}\nWritten     {}: {} epochs\n", pass_text(loaded), verdict_text(result.verdict),
-               evaluation_text(evaluation, epoch, "Attitude error"), attitude.string(), result.attitude.size());
+  if (attitude == kStandardStream) {
+    print_data(stdout, io::format_attitude(epoch, result.attitude));
+  } else {
+    io::write_attitude(attitude, epoch, result.attitude);
   }
+  const ground::AttitudeEvaluation evaluation = ground::evaluate_navigation(loaded.pass, result, named.truth_or_null());
+  log_verdict(common.log, result.verdict);
+  common.log.say(fmt::format("written {}: {} epochs", attitude.string(), result.attitude.size()));
+  const auto as_json = [&] {
+    return nlohmann::ordered_json{{"pass", pass_json(loaded)},
+                                  {"verdict", verdict_json(result.verdict)},
+                                  {"statistics", statistics_json(result.statistics)},
+                                  {"evaluation", evaluation_json(evaluation, epoch)}};
+  };
+  show(beside(attitude.string(), common), as_json, [&] {
+    return fmt::format("{}{}\n{}\nWritten     {}: {} epochs\n", pass_text(loaded), verdict_text(result.verdict),
+                       evaluation_text(evaluation, epoch, "Attitude error"), printable(attitude.string()),
+                       result.attitude.size());
+  });
   return result.verdict.trustworthy ? kTrustworthy : kDoNotUse;
 }
 
@@ -64,20 +76,36 @@ void add_navigate(CLI::App& program, const Common& common, int& exit_status) {
   CLI::App* command = program.add_subcommand("navigate", "Give the attitude at every gyro sample");
   command->add_option("PASS", arguments->pass, "Directory or NetCDF file")->required();
   CLI::Option_group* source = command->add_option_group("parameters");
-  source->add_option("--calibration", arguments->calibration, "Hold the values of a calibration.json");
+  source
+      ->add_option("--calibration", arguments->calibration,
+                   "Hold the values of a calibration.json; - for standard input")
+      ->type_name("FILE");
   source->add_flag("--online", arguments->online, "Calibrate along, and take over the estimates at each correction");
   source->add_flag("--prior", arguments->prior, "Hold the values known before the pass, those of its pass.toml");
   source->require_option(1);
-  command->add_option(
-      "--correction-interval", arguments->interval,
-      "Time between astro-corrections: a duration, none or continuous (90min unless the settings say otherwise)");
-  command->add_option("--config", arguments->config, "Estimator settings (TOML)");
-  command->add_option("-o,--output", arguments->attitude, "Attitude file to write (CSV)")->required();
-  command->callback([&common, &exit_status, arguments] {
-    CalibrationOptions options = arguments->config.empty() ? CalibrationOptions{} : io::read_config(arguments->config);
+  command
+      ->add_option("--correction-interval", arguments->interval,
+                   "Time between astro-corrections: none, only the first; continuous, each fix; 90min unless the "
+                   "settings say otherwise")
+      ->type_name("DURATION|none|continuous");
+  command->add_option("-o,--output", arguments->attitude, "Attitude file to write (CSV); - for standard output")
+      ->required()
+      ->type_name("FILE");
+  const auto settle = [arguments] {
+    CalibrationOptions options = settings_of(arguments->config);
     if (!arguments->interval.empty()) {
       options.corrections = io::parse_correction_interval(arguments->interval);
     }
+    return options;
+  };
+  add_config(*command, arguments->config, settle);
+  command->footer(
+      "# As on board: calibrate along, correct every 90 min\n"
+      "trihedron navigate pass.nc --online -o attitude.csv\n"
+      "# With the values of an earlier calibration\n"
+      "trihedron navigate pass.nc --calibration out/calibration.json --correction-interval 3h -o attitude.csv");
+  command->callback([&common, &exit_status, arguments, settle] {
+    CalibrationOptions options = settle();
     options.corrections.take_parameters = arguments->online;
     const auto calibration =
         arguments->calibration.empty() ? std::nullopt : std::optional(std::filesystem::path(arguments->calibration));

@@ -53,13 +53,15 @@ std::string with_coloured_verdict(std::string text) {
 void Log::open(bool verbose, const std::string& file) {
   std::vector<spdlog::sink_ptr> sinks;
   if (verbose) {
-    sinks.push_back(std::make_shared<spdlog::sinks::stderr_sink_st>())->set_pattern("trihedron: %v");
+    sinks.push_back(std::make_shared<spdlog::sinks::stderr_sink_st>());
+    sinks.back()->set_pattern("trihedron: %v");
   }
   if (!file.empty()) {
     try {
       sinks.push_back(std::make_shared<spdlog::sinks::basic_file_sink_st>(file));
     } catch (const spdlog::spdlog_ex&) {
-      throw io::MachineFailed(file, "the log cannot be written", "check that its directory is there and may be written");
+      throw io::MachineFailed(file, "the log cannot be written",
+                              "check that its directory is there and may be written");
     }
     sinks.back()->set_pattern("%Y-%m-%dT%H:%M:%S.%e%z %v");
   }
@@ -82,9 +84,7 @@ void Log::say(std::string_view text) const {
   }
 }
 
-std::string source(const std::string& name) {
-  return name == kStandardStream ? std::string(io::kStandardInput) : name;
-}
+std::string source(const std::string& name) { return name == kStandardStream ? std::string(io::kStandardInput) : name; }
 
 Common beside(const std::string& output, const Common& common) {
   Common result = common;

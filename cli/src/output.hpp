@@ -43,8 +43,8 @@ inline constexpr std::string_view kStandardStream = "-";
 /// As it is: data, JSON.
 void print_data(std::FILE* stream, std::string_view data);
 
-/// Of several lines; whatever is in the names, it cannot steer the terminal. A verdict is coloured on a terminal, unless
-/// NO_COLOR is set.
+/// Of several lines; whatever is in the names, it cannot steer the terminal. A verdict is coloured on a terminal,
+/// unless NO_COLOR is set.
 void print_text(std::FILE* stream, std::string_view text);
 
 /// Of one document. What is no number becomes null, a byte that is no UTF-8 U+FFFD.

@@ -43,7 +43,8 @@ void TextFile::read_standard_input() {
       break;
     }
     if (got < 0 && errno != EINTR) {
-      throw MachineFailed("standard input", fmt::format("cannot be read: {}", error_text(errno)), "check what gives it");
+      throw MachineFailed("standard input", fmt::format("cannot be read: {}", error_text(errno)),
+                          "check what gives it");
     }
     size_ += static_cast<std::size_t>(std::max<ssize_t>(got, 0));
     if (size_ == kMost) {

@@ -143,8 +143,11 @@ std::string angle_text(double rad) {
   if (!std::isfinite(rad)) {
     return std::string(kNoNumber);
   }
-  const AngleUnit unit = unit_of_angle(rad);
-  return three_digits(rad / unit.rad) + unit.symbol;
+  return angle_text(rad, unit_of_angle(rad));
+}
+
+std::string angle_text(double rad, AngleUnit unit) {
+  return std::isfinite(rad) ? three_digits(rad / unit.rad) + unit.symbol : std::string(kNoEntry);
 }
 
 }  // namespace trihedron

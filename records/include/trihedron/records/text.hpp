@@ -42,4 +42,10 @@ struct AngleUnit {
 /// "2.94″", "10.2′", or kNoNumber.
 [[nodiscard]] std::string angle_text(double rad);
 
+/// What stands in a table in place of a number that is infinite or none.
+inline constexpr std::string_view kNoEntry = "—";
+
+/// In this unit, or kNoEntry.
+[[nodiscard]] std::string angle_text(double rad, AngleUnit unit);
+
 }  // namespace trihedron
