@@ -6,6 +6,7 @@
 #include <string>
 
 #include "output.hpp"
+#include "trihedron/records/limits.hpp"
 #include "trihedron/records/options.hpp"
 
 namespace trihedron::cli {
@@ -31,8 +32,8 @@ void add_config(CLI::App& command, std::string& file, const std::function<Calibr
 /// Settings of the file, "-" for standard input, or of the program where there is none.
 [[nodiscard]] CalibrationOptions settings_of(const std::string& file);
 
-/// For a whole number from 1.
-[[nodiscard]] CLI::Validator at_least_one();
+/// For a whole number in a range.
+[[nodiscard]] CLI::Validator whole(const Range& range);
 
 /// "auto|esg7|esg20|vsh:1|…"
 [[nodiscard]] std::string drift_model_words();

@@ -10,6 +10,7 @@
 
 #include "commands.hpp"
 #include "manual.hpp"
+#include "standard_streams.hpp"
 #include "stop_on_signals.hpp"
 #include "trihedron/io/error.hpp"
 #include "trihedron/records/stop.hpp"
@@ -20,6 +21,14 @@ namespace {
 int fail(int status, std::string_view message) {
   trihedron::check_stop();  // what failed may have failed by that alone
   trihedron::cli::print_text(stderr, fmt::format("trihedron: {}\n", trihedron::printable(message)));
+  return status;
+}
+
+/// `status`, or the failure to write all of standard output.
+int printed(int status) {
+  if (std::fflush(stdout) != 0 || std::ferror(stdout) != 0) {
+    return fail(trihedron::cli::kMachineFailed, "standard output: cannot be written; free some space, or open it");
+  }
   return status;
 }
 
@@ -81,10 +90,7 @@ int run(int argc, char** argv) {
       exit_status = cli::kTrustworthy;
     }
     common.log.say(fmt::format("exit status {}", exit_status));
-    if (std::fflush(stdout) != 0 || std::ferror(stdout) != 0) {
-      return fail(cli::kMachineFailed, "standard output: cannot be written; free some space");
-    }
-    return exit_status;
+    return printed(exit_status);
   } catch (const io::UsageError& error) {
     return fail(cli::kWrongUsage, error.what());
   } catch (const io::InputRefused& error) {
@@ -103,5 +109,6 @@ int run(int argc, char** argv) {
 }  // namespace
 
 int main(int argc, char** argv) {
+  trihedron::cli::open_standard_streams();
   return trihedron::cli::stopped_by_signals([argc, argv] { return run(argc, argv); });
 }

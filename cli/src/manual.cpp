@@ -58,7 +58,8 @@ std::vector<const CLI::Option*> options_of(const CLI::App& app, bool positional)
     return option->get_positional() == positional && !option->get_group().empty();
   });
   for (const CLI::App* group : app.get_subcommands([](const CLI::App* sub) { return sub->get_name().empty(); })) {
-    std::ranges::copy(options_of(*group, positional), std::back_inserter(options));
+    std::ranges::copy_if(options_of(*group, positional), std::back_inserter(options),
+                         [](const CLI::Option* option) { return option->get_name() != "--help"; });
   }
   return options;
 }

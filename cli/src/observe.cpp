@@ -209,12 +209,14 @@ void add_observe(CLI::App& program, const Common& common, int& exit_status) {
   };
   limit("--max-rate", arguments->max_rate, "RATE", "Of these slews, instead of max_slew_rate of the scenario");
   limit("--max-angle", arguments->max_angle, "ANGLE", "Of these slews")->capture_default_str();
-  limit("--slews", arguments->slews, "NUMBER", "Largest number of slews")->check(at_least_one())->capture_default_str();
+  limit("--slews", arguments->slews, "NUMBER", "Largest number of slews")
+      ->check(whole(trihedron::limits::kSlews))
+      ->capture_default_str();
   limit("--manoeuvre-time", arguments->manoeuvre_time, "DURATION", "Of all slews together, turns and holds")
       ->capture_default_str();
   limit("--confirm", arguments->confirming_runs, "NUMBER",
         "Number of flights with these slews to simulate and calibrate")
-      ->check(at_least_one());
+      ->check(whole(trihedron::limits::kFlights));
   add_config(*command, arguments->config, [arguments] { return settings_of(arguments->config); });
   command->footer(
       "trihedron observe pass.nc\n"
@@ -230,11 +232,15 @@ void add_observe(CLI::App& program, const Common& common, int& exit_status) {
     }
     plan::SlewLimits limits;
     if (!arguments->max_rate.empty()) {
-      limits.max_rate_rad_s = io::parse_rate_rad_s(arguments->max_rate);
+      limits.max_rate_rad_s = io::within(trihedron::limits::kSlewRate_rad_s, io::parse_rate_rad_s(arguments->max_rate),
+                                         "--max-rate " + arguments->max_rate);
     }
-    limits.max_angle_rad = io::parse_angle_rad(arguments->max_angle);
+    limits.max_angle_rad = io::within(trihedron::limits::kSlewAngle_rad, io::parse_angle_rad(arguments->max_angle),
+                                      "--max-angle " + arguments->max_angle);
     limits.slews = arguments->slews;
-    limits.manoeuvre_time = io::parse_duration(arguments->manoeuvre_time);
+    limits.manoeuvre_time =
+        io::within(trihedron::limits::kManoeuvreTime_s, io::parse_duration(arguments->manoeuvre_time),
+                   "--manoeuvre-time " + arguments->manoeuvre_time);
     exit_status = advise_for(arguments->path, options, limits, arguments->confirming_runs, common);
   });
 }

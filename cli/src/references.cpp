@@ -95,12 +95,14 @@ CalibrationOptions settings_of(const std::string& file) {
   return file.empty() ? CalibrationOptions{} : io::read_config(source(file));
 }
 
-CLI::Validator at_least_one() {
-  return {[](const std::string& text) {
+CLI::Validator whole(const Range& range) {
+  const auto least = static_cast<int>(range.least);
+  const auto most = static_cast<int>(range.most);
+  return {[least, most](const std::string& text) {
             int value = 0;
-            return CLI::detail::lexical_cast(text, value) && value >= 1
+            return CLI::detail::lexical_cast(text, value) && value >= least && value <= most
                        ? std::string()
-                       : fmt::format("{} is not a whole number from 1", text);
+                       : fmt::format("{} is not a whole number from {} to {}", text, least, most);
           },
           ""};
 }

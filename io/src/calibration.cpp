@@ -49,7 +49,7 @@ void read_drift(const JsonNode& drift, GyroCalibration& gyro) {
     }
   }
   for (const std::string& name : names) {
-    gyro.drift_rad_s.push_back(drift.at(name).number());
+    gyro.drift_rad_s.push_back(drift.at(name).number(limits::kDrift_rad_s));
   }
 }
 
@@ -61,17 +61,20 @@ Eigen::Vector3d parse_momentum(const JsonNode& node) {
   return momentum;
 }
 
-Member vector_member(std::string_view key, Eigen::Vector3d& target, std::string_view about) {
-  return {key, about, three_of(number_schema()), [&target](const JsonNode& node) { target = node.vector3(); }};
+Member vector_member(std::string_view key, Eigen::Vector3d& target, const Range& range, std::string_view about) {
+  return {key, about, three_of(number_schema(range)),
+          [&target, range](const JsonNode& node) { target = node.vector3(range); }};
 }
 
 Members gyro_members(GyroCalibration& gyro) {
   return {{"drift_model", "of eq. (1) or beyond it", drift_model_schema(),
            [&gyro](const JsonNode& node) { gyro.drift_model = parse_drift_model(node); }},
-          {"drift_rad_s", "by coefficient of the model", object_of({}, number_schema()),
+          {"drift_rad_s", "by coefficient of the model", object_of({}, number_schema(limits::kDrift_rad_s)),
            [&gyro](const JsonNode& node) { read_drift(node, gyro); }},
-          vector_member("alignment_rotation_vector_rad", gyro.alignment_rotation_vector_rad, "v_c = exp([this x]) v_b"),
-          optional_member(vector_member("readout_bias", gyro.readout_bias, "of the direction cosines")),
+          vector_member("alignment_rotation_vector_rad", gyro.alignment_rotation_vector_rad, limits::kRotation_rad,
+                        "v_c = exp([this x]) v_b"),
+          optional_member(
+              vector_member("readout_bias", gyro.readout_bias, limits::kReadoutBias, "of the direction cosines")),
           {"momentum_in", "its direction at t_s, a unit vector", three_of(number_schema()),
            [&gyro](const JsonNode& node) { gyro.momentum_in = parse_momentum(node); }}};
 }
@@ -126,6 +129,12 @@ Eigen::MatrixXd parse_matrix(const JsonNode& node, std::size_t size) {
   return matrix;
 }
 
+const Range& range_of_sigma(const ParameterId& state) {
+  return state.is_drift()       ? limits::kDriftSigma_rad_s
+         : state.is_alignment() ? limits::kAlignmentSigma_rad
+                                : limits::kFurtherStateSigma;
+}
+
 /// States and covariance. States that this program does not know are left out: what is left is still the covariance of
 /// the others.
 void read_matrix(const JsonNode& node, const std::vector<std::string>& names, Calibration& calibration) {
@@ -138,6 +147,15 @@ void read_matrix(const JsonNode& node, const std::vector<std::string>& names, Ca
     }
   }
   calibration.covariance = matrix(rows, rows);
+  for (Eigen::Index i = 0; i < calibration.covariance.rows(); ++i) {
+    const Range& range = range_of_sigma(calibration.states[static_cast<std::size_t>(i)]);
+    const double sigma = std::sqrt(calibration.covariance(i, i));
+    if (!(sigma <= range.most)) {
+      node.refuse(fmt::format("has the variance of a sigma of {} that {}",
+                              name_of(calibration.states[static_cast<std::size_t>(i)]), is_outside(sigma, range)),
+                  std::string(range.why));
+    }
+  }
 }
 
 Members covariance_members(Calibration& calibration, std::vector<std::string>& names) {
@@ -152,37 +170,29 @@ Members covariance_members(Calibration& calibration, std::vector<std::string>& n
            [&](const JsonNode& node) { read_matrix(node, names, calibration); }}};
 }
 
-double parse_not_negative(const JsonNode& node) {
-  const double value = node.number();
-  if (!(value >= 0)) {
-    node.refuse(fmt::format("is {}", value), "a noise is zero or more");
-  }
-  return value;
+/// Zero as well: there is no such noise.
+Range zero_or(Range range) {
+  range.zero_allowed = true;
+  return range;
 }
 
 Members noise_members(CalibrationNoise& noise) {
-  const auto not_negative = [](std::string_view key, double& target, std::string_view about) -> Member {
-    return {key, about, number_schema(kNotNegative),
-            [&target](const JsonNode& node) { target = parse_not_negative(node); }};
+  const auto member = [](std::string_view key, double& target, const Range& range, std::string_view about) -> Member {
+    return {key, about, number_schema(range), [&target, range](const JsonNode& node) { target = node.number(range); }};
   };
-  const auto read_time = [&noise](const JsonNode& node) {
-    noise.wandering_time_s = parse_not_negative(node);
-    if (!(noise.wandering_time_s < 1e9) || (noise.wandering_drift_rad_s > 0 && !(noise.wandering_time_s > 0))) {
-      node.refuse(fmt::format("is {}", noise.wandering_time_s), "give seconds, above 0 and below 1e9");
-    }
-  };
-  const auto read_star_tracker = [&noise](const JsonNode& node) {
-    noise.star_tracker_noise_rad = node.vector3();
-    if (!(noise.star_tracker_noise_rad->array() > 0).all()) {
-      node.refuse("is not positive", "give a 1-sigma about each axis");
-    }
-  };
-  return {not_negative("direction_random_walk_rad_sqrt_s", noise.direction_random_walk_rad_sqrt_s,
-                       "of each momentum, per axis across it"),
-          not_negative("wandering_drift_rad_s", noise.wandering_drift_rad_s, "1-sigma; 0: it was not estimated"),
-          {"wandering_time_s", "its correlation time", number_schema({.least = 0, .most = 1e9}), read_time},
+  const Range time = zero_or(limits::kWanderingTime_s);
+  return {member("direction_random_walk_rad_sqrt_s", noise.direction_random_walk_rad_sqrt_s,
+                 limits::kRandomWalk_rad_sqrt_s, "of each momentum, per axis across it"),
+          member("wandering_drift_rad_s", noise.wandering_drift_rad_s, zero_or(limits::kWanderingDrift_rad_s),
+                 "1-sigma; 0: there is none"),
+          {"wandering_time_s", "its correlation time, 0 where there is none", number_schema(time),
+           [&noise, time](const JsonNode& node) {
+             noise.wandering_time_s = node.number(noise.wandering_drift_rad_s > 0 ? limits::kWanderingTime_s : time);
+           }},
           optional_member({"star_tracker_noise_rad", "1-sigma about c x, y, z, where it was found from the pass",
-                           three_of(number_schema(kPositive)), read_star_tracker})};
+                           three_of(number_schema(limits::kStarTrackerNoise_rad)), [&noise](const JsonNode& node) {
+                             noise.star_tracker_noise_rad = node.vector3(limits::kStarTrackerNoise_rad);
+                           }})};
 }
 
 Json noise_json(const CalibrationNoise& noise) {
@@ -277,10 +287,7 @@ void check_version(const JsonNode& node) {
 }
 
 void read_time(const JsonNode& node, Calibration& calibration) {
-  const double t_s = node.number();
-  if (!(std::abs(t_s) < 1e9)) {
-    node.refuse(fmt::format("is {}", t_s), "give seconds since the epoch, below 1e9");
-  }
+  const double t_s = node.number(limits::kTimeOfCalibration_s);
   calibration.t = calibration.epoch + from_seconds(t_s);
 }
 
@@ -295,8 +302,8 @@ void read_gyros(const JsonNode& node, Calibration& calibration) {
 
 void read_further(const JsonNode& node, Calibration& calibration) {
   for (const auto& [name, estimate] : node.members()) {
-    const double value = estimate.at("value").number();
-    const double sigma = estimate.at("sigma").number();
+    const double value = estimate.at("value").number(limits::kFurtherState);
+    const double sigma = estimate.at("sigma").number(limits::kFurtherStateSigma);
     if (const std::optional<ParameterId> parameter = parameter_named(name)) {
       calibration.further.push_back({*parameter, value, sigma});
     }
@@ -324,7 +331,9 @@ Members calibration_members(Calibration& calibration) {
   std::vector<std::string> names;
   Json gyros = array_of(schema_of(gyro_members(gyro)));
   gyros["minItems"] = 1;
-  const Json estimate = object_of({{"value", "", number_schema()}, {"sigma", "", number_schema()}}, true);
+  const Json estimate = object_of(
+      {{"value", "", number_schema(limits::kFurtherState)}, {"sigma", "", number_schema(limits::kFurtherStateSigma)}},
+      true);
   const Json statistic = {{"type", Json::array({"number", "null"})}};
   return {
       {"format", "", {{"const", kFormat}}, check_format},
@@ -333,7 +342,7 @@ Members calibration_members(Calibration& calibration) {
        [&](const JsonNode& node) { calibration.estimator = parse_estimator(node); }},
       {"epoch_tai", "start of the pass, TAI", epoch_schema(),
        [&](const JsonNode& node) { calibration.epoch = parse_epoch_node(node); }},
-      {"t_s", "since the epoch: when momentum_in holds", number_schema({.least = -1e9, .most = 1e9}),
+      {"t_s", "since the epoch: when momentum_in holds", number_schema(limits::kTimeOfCalibration_s),
        [&](const JsonNode& node) { read_time(node, calibration); }},
       {"gyros", "one element per gyro", gyros, [&](const JsonNode& node) { read_gyros(node, calibration); }},
       optional_member({"further", "further states by name", object_of({}, estimate),

@@ -63,7 +63,7 @@ Field drift_model(CalibrationOptions& options) {
 }
 
 /// A duration, or a word that stands for `of_word`.
-Field duration_or(std::string_view word, std::string_view key, Duration& target, Duration of_word,
+Field duration_or(std::string_view word, std::string_view key, Duration& target, Duration of_word, const Range& range_s,
                   std::string_view about) {
   return {key, about,
           [word] {
@@ -73,27 +73,26 @@ Field duration_or(std::string_view word, std::string_view key, Duration& target,
             if (quantity_text(table, node, key) == word) {
               target = of_word;
             } else {
-              duration(key, target, about, kPositive).read(table, node);
+              duration(key, target, range_s, about).read(table, node);
             }
           }};
 }
 
 Fields filter_fields(CalibrationOptions& options) {
-  constexpr int kMostFixes = 1'000'000;
-  return {
-      choice<bool>("noise", options.find_noise, "found: from the pass; told: as set here and in pass.toml",
-                   {{"found", true}, {"told", false}}),
-      quantity("direction_random_walk", options.direction_random_walk_rad_sqrt_s, kRandomWalk,
-               "process noise of each momentum, per axis across it", kNotNegative),
-      number("gate_nis", options.gate_nis, kPositive, "a fix with a larger normalised innovation squared is rejected"),
-      number("student_t_freedom", options.student_t_freedom, kNotNegative,
-             "5 to 20: it is used with less weight instead; 0: rejected"),
-      whole("reopen_after_rejections", options.reopen_after_rejections,
-            "in a row; then the directions are reopened and the fix is used", 1, kMostFixes),
-      whole("reopen_after_jump_rejections", options.reopen_after_jump_rejections,
-            "the same where they began with a jump that no drift can make", 1, kMostFixes),
-      duration_or(kNever, "angles_after", options.angles_after, Duration::max(),
-                  "without a fix, by the angles between the momenta: a duration or never")};
+  return {choice<bool>("noise", options.find_noise, "found: from the pass; told: as set here and in pass.toml",
+                       {{"found", true}, {"told", false}}),
+          quantity("direction_random_walk", options.direction_random_walk_rad_sqrt_s, kRandomWalk,
+                   limits::kRandomWalk_rad_sqrt_s, "process noise of each momentum, per axis across it"),
+          one_number("gate_nis", options.gate_nis, limits::kGateNis,
+                 "a fix with a larger normalised innovation squared is rejected"),
+          one_number("student_t_freedom", options.student_t_freedom, limits::kStudentTFreedom,
+                 "5 to 20: it is used with less weight instead; 0: rejected"),
+          whole("reopen_after_rejections", options.reopen_after_rejections, limits::kRejections,
+                "in a row; then the directions are reopened and the fix is used"),
+          whole("reopen_after_jump_rejections", options.reopen_after_jump_rejections, limits::kRejections,
+                "the same where they began with a jump that no drift can make"),
+          duration_or(kNever, "angles_after", options.angles_after, Duration::max(), limits::kAnglesAfter_s,
+                      "without a fix, by the angles between the momenta: a duration or never")};
 }
 
 /// auto, off, or its 1-sigma.
@@ -110,10 +109,7 @@ Field wandering_drift(const FurtherStateRow& row, FurtherStateOptions& states) {
               return;
             }
             states[row.state] = Choice::kOn;
-            states.wandering_drift_rad_s = parse_rate_rad_s(given);
-            if (!(states.wandering_drift_rad_s > 0)) {
-              table.refuse(node, fmt::format("\"{}\" is not positive", row.key), "give auto, off, or more than zero");
-            }
+            states.wandering_drift_rad_s = within(limits::kWanderingDrift_rad_s, parse_rate_rad_s(given), given);
           }};
 }
 
@@ -126,8 +122,8 @@ Fields further_state_fields(FurtherStateOptions& states) {
                            : choice<Choice>(row.key, states[row.state], row.about, {kChoices.begin(), kChoices.end()}));
     }
   }
-  fields.push_back(
-      duration(kWanderingTime, states.wandering_time, "correlation time of the drift that wanders", kPositive));
+  fields.push_back(duration(kWanderingTime, states.wandering_time, limits::kWanderingTime_s,
+                            "correlation time of the drift that wanders"));
   return fields;
 }
 
@@ -184,10 +180,7 @@ CorrectionOptions parse_correction_interval(std::string_view text) {
   } else if (text == kEachFix) {
     corrections.when = CorrectionOptions::When::kEachFix;
   } else {
-    corrections.interval = parse_duration(text);
-    if (!(corrections.interval > Duration::zero())) {
-      throw UsageError("a correction interval must be positive; say continuous to use each fix");
-    }
+    corrections.interval = within(limits::kCorrectionInterval_s, parse_duration(text), text);
   }
   return corrections;
 }

@@ -2,34 +2,22 @@
 
 #include <fmt/format.h>
 
-#include <cmath>
-
 #include "trihedron/records/drift_models.hpp"
 #include "trihedron/records/estimator.hpp"
 
 namespace trihedron::io {
 
-std::string Range::cure() const {
-  if (std::isfinite(least) && std::isfinite(most)) {
-    return fmt::format("give {}{} to {}", is_open ? "more than " : "", least, most);
-  }
-  if (least == 0) {
-    return is_open ? "it must be positive" : "give zero or more";
-  }
-  return std::isfinite(least) ? fmt::format("give {} or more", least) : fmt::format("give at most {}", most);
-}
-
 Json text_schema() { return {{"type", "string"}}; }
 
-Json number_schema(Range range) {
+Json number_schema(const Range& range) {
   Json schema = {{"type", "number"}};
-  if (std::isfinite(range.least)) {
-    schema[range.is_open ? "exclusiveMinimum" : "minimum"] = range.least;
+  if (range.least > kAnyNumber.least) {
+    schema["minimum"] = range.least;
   }
-  if (std::isfinite(range.most)) {
+  if (range.most < kAnyNumber.most) {
     schema["maximum"] = range.most;
   }
-  return schema;
+  return range.zero_allowed ? any_of({{{"const", 0}}, schema}) : schema;
 }
 
 Json quantity_schema(const QuantityKind& kind) {

@@ -4,7 +4,6 @@
 #include <concepts>
 #include <functional>
 #include <initializer_list>
-#include <limits>
 #include <span>
 #include <string>
 #include <string_view>
@@ -13,26 +12,14 @@
 
 #include "json_node.hpp"
 #include "quantity_kind.hpp"
+#include "trihedron/records/limits.hpp"
 
 namespace trihedron::io {
 
-/// Bounds of a number, both allowed; of an open range the lower one is not.
-struct Range {
-  double least = -std::numeric_limits<double>::infinity();
-  double most = std::numeric_limits<double>::infinity();
-  bool is_open = false;
-
-  [[nodiscard]] bool holds(double value) const { return (is_open ? value > least : value >= least) && value <= most; }
-  /// "it must be positive", "give 0 to 1"
-  [[nodiscard]] std::string cure() const;
-};
 inline constexpr Range kAnyNumber{};
-inline constexpr Range kPositive{.least = 0, .is_open = true};
-inline constexpr Range kNotNegative{.least = 0};
-inline constexpr Range kProbability{.least = 0, .most = 1};
 
 [[nodiscard]] Json text_schema();
-[[nodiscard]] Json number_schema(Range range = kAnyNumber);
+[[nodiscard]] Json number_schema(const Range& range = kAnyNumber);
 [[nodiscard]] Json quantity_schema(const QuantityKind& kind);
 [[nodiscard]] Json array_of(Json items);
 [[nodiscard]] Json three_of(Json items);

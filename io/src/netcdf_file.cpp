@@ -153,6 +153,25 @@ void NetcdfReader::read_column(int id, int variable, std::vector<double>& values
   }
 }
 
+void NetcdfReader::check_rows(const std::string& group, int id, std::span<const int> variables,
+                              std::size_t rows) const {
+  constexpr double kMostCompressed = 1100;  // deflate makes one byte of 1032 at most
+  std::size_t row_bytes = 0;
+  for (const int variable : variables) {
+    nc_type type = NC_NAT;
+    std::size_t bytes = 0;
+    check(nc_inq_vartype(id, variable, &type), "reading a type");
+    check(nc_inq_type(id, type, nullptr, &bytes), "reading a type");
+    row_bytes += bytes;
+  }
+  const std::uintmax_t held = fs::file_size(file_);
+  if (static_cast<double>(rows) * static_cast<double>(row_bytes) > kMostCompressed * static_cast<double>(held)) {
+    refuse(
+        fmt::format("group {} declares {} rows, more than a file of {} bytes can hold", in_quotes(group), rows, held),
+        "write the rows that there are; those that were declared and never written are no telemetry");
+  }
+}
+
 Series NetcdfReader::read_group(const std::string& group, Time epoch, ChooseRules choose) const {
   const int id = group_id(group);
   int dimension = 0;
@@ -179,6 +198,7 @@ Series NetcdfReader::read_group(const std::string& group, Time epoch, ChooseRule
   ColumnPlan plan = plan_columns(fs::path(file_.string() + ":" + group), present, choose);
   series.columns = std::move(plan.columns);
   const std::size_t width = series.columns.size();
+  check_rows(group, id, ids, rows);
   series.t_s.resize(rows);
   series.values.resize(rows * width);
   std::vector<double> column(rows);

@@ -40,6 +40,8 @@ class NetcdfReader {
   [[nodiscard]] std::optional<std::string> text_attribute(int group, int variable, const char* name) const;
   [[nodiscard]] std::optional<double> number_attribute(int group, int variable, const char* name) const;
   void check_time_units(const std::string& group, int id, int variable, Time epoch) const;
+  /// Refuses a group that declares more rows than the file can hold of these variables, however it is compressed.
+  void check_rows(const std::string& group, int id, std::span<const int> variables, std::size_t rows) const;
   void read_column(int id, int variable, std::vector<double>& values) const;
 
   std::filesystem::path file_;

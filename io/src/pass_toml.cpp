@@ -27,7 +27,7 @@ constexpr std::string_view kAlignment = "alignment_prior_rotation_vector_rad";
 constexpr std::string_view kAlignmentSigma = "alignment_prior_sigma_rad";
 
 /// A table by drift coefficient.
-Fields coefficient_fields(std::map<DriftCoefficient, double>& values, Range range) {
+Fields coefficient_fields(std::map<DriftCoefficient, double>& values, const Range& range) {
   Fields fields;
   for (int i = 0; i < Esg7::kSize; ++i) {
     const std::string_view name = Esg7::kNames.at(static_cast<std::size_t>(i));
@@ -40,19 +40,21 @@ Fields coefficient_fields(std::map<DriftCoefficient, double>& values, Range rang
 }
 
 Field drift_sigma(GyroPrior& prior) {
-  return number(kDriftSigma, prior.drift_common_sigma_rad_s, kPositive, "1-sigma of each drift coefficient");
+  return one_number(kDriftSigma, prior.drift_common_sigma_rad_s, limits::kDriftSigma_rad_s,
+                "1-sigma of each drift coefficient");
 }
 
 /// One number, or a table by coefficient.
 Field drift_sigmas(GyroPrior& prior, const fs::path& file) {
   const auto schema = [&prior] {
-    return any_of({number_schema(kPositive), schema_of(coefficient_fields(prior.drift_sigma_rad_s, kPositive))});
+    return any_of({number_schema(limits::kDriftSigma_rad_s),
+                   schema_of(coefficient_fields(prior.drift_sigma_rad_s, limits::kDriftSigma_rad_s))});
   };
   return {kDriftSigma, "1-sigma of each drift coefficient, or by coefficient", schema,
           [&prior, &file](const TomlTable& table, const toml::node& node) {
             if (node.is_table()) {
               read_fields(table.as_table(node, kDriftSigma), file, std::string(kDriftSigma),
-                          coefficient_fields(prior.drift_sigma_rad_s, kPositive));
+                          coefficient_fields(prior.drift_sigma_rad_s, limits::kDriftSigma_rad_s));
             } else {
               drift_sigma(prior).read(table, node);
             }
@@ -61,25 +63,29 @@ Field drift_sigmas(GyroPrior& prior, const fs::path& file) {
 
 /// One number, or three about c x, y, z.
 Field alignment_sigma(GyroPrior& prior) {
-  const auto schema = [] { return any_of({number_schema(kPositive), three_of(number_schema(kPositive))}); };
+  const auto schema = [] {
+    return any_of({number_schema(limits::kAlignmentSigma_rad), three_of(number_schema(limits::kAlignmentSigma_rad))});
+  };
   return {kAlignmentSigma, "1-sigma of the alignment, or about each axis", schema,
           [&prior](const TomlTable& table, const toml::node& node) {
-            prior.alignment_sigma_rad = node.is_array()
-                                            ? table.three_numbers(node, kAlignmentSigma, kPositive)
-                                            : Eigen::Vector3d::Constant(table.number(node, kAlignmentSigma, kPositive));
+            prior.alignment_sigma_rad =
+                node.is_array()
+                    ? table.three_numbers(node, kAlignmentSigma, limits::kAlignmentSigma_rad)
+                    : Eigen::Vector3d::Constant(table.number(node, kAlignmentSigma, limits::kAlignmentSigma_rad));
           }};
 }
 
 Field readout_noise(GyroPrior& prior) {
-  return number(kNoise, prior.readout_noise_rad, kPositive, "1-sigma per direction cosine");
+  return one_number(kNoise, prior.readout_noise_rad, limits::kReadoutNoise_rad, "1-sigma per direction cosine");
 }
 
 Fields unit_fields(GyroPrior& prior, const fs::path& file) {
   return {readout_noise(prior),
           section(kDrift, file, std::string(kDrift), "drift coefficients known before the pass",
-                  [&prior] { return coefficient_fields(prior.drift_rad_s, kAnyNumber); }),
+                  [&prior] { return coefficient_fields(prior.drift_rad_s, limits::kDrift_rad_s); }),
           drift_sigmas(prior, file),
-          three_numbers(kAlignment, prior.alignment_rotation_vector_rad, kAnyNumber, "alignment known before the pass"),
+          three_numbers(kAlignment, prior.alignment_rotation_vector_rad, limits::kRotation_rad,
+                        "alignment known before the pass"),
           alignment_sigma(prior)};
 }
 
@@ -116,7 +122,7 @@ Fields gyro_fields(PassSettings& settings, GyroPrior& common, const fs::path& fi
   };
   Field unit = units(settings.gyros, file);
   unit.read = [](const TomlTable&, const toml::node&) {};
-  return {required(number_of_seconds("period_s", settings.gyro_period, "of the samples")),
+  return {required(number_of_seconds("period_s", settings.gyro_period, limits::kGyroPeriod_s, "of the samples")),
           text(kStartUp, settings.start_up, "of the rotors, where it is known"),
           required(readout_noise(common)),
           required(std::move(sigma)),
@@ -141,9 +147,11 @@ Field gyros(PassSettings& settings, const fs::path& file) {
 }
 
 Fields further_head_fields(FurtherStarTracker& head) {
-  return {required(three_numbers(kHeadNoise, head.noise_rad, kPositive, "1-sigma about its x, y, z")),
-          required(three_numbers(kMounting, head.mounting_rotation_vector_rad, kAnyNumber, "as designed")),
-          required(number(kAlignmentSigma, head.alignment_prior_sigma_rad, kPositive, "1-sigma per axis"))};
+  return {
+      required(three_numbers(kHeadNoise, head.noise_rad, limits::kStarTrackerNoise_rad, "1-sigma about its x, y, z")),
+      required(three_numbers(kMounting, head.mounting_rotation_vector_rad, limits::kRotation_rad, "as designed")),
+      required(
+          one_number(kAlignmentSigma, head.alignment_prior_sigma_rad, limits::kAlignmentSigma_rad, "1-sigma per axis"))};
 }
 
 Field further_heads(PassSettings& settings, const fs::path& file) {
@@ -164,8 +172,10 @@ Field further_heads(PassSettings& settings, const fs::path& file) {
 }
 
 Fields star_tracker_fields(PassSettings& settings, const fs::path& file) {
-  return {required(number_of_seconds("period_s", settings.star_tracker_period, "of the fixes")),
-          required(three_numbers(kHeadNoise, settings.star_tracker_noise_rad, kPositive, "1-sigma about c x, y, z")),
+  return {required(number_of_seconds("period_s", settings.star_tracker_period, limits::kStarTrackerPeriod_s,
+                                     "of the fixes")),
+          required(three_numbers(kHeadNoise, settings.star_tracker_noise_rad, limits::kStarTrackerNoise_rad,
+                                 "1-sigma about c x, y, z")),
           further_heads(settings, file)};
 }
 
@@ -181,18 +191,9 @@ Field prior(std::optional<std::string>& found) {
 }
 
 Fields pass_fields(PassSettings& settings, std::optional<std::string>& prior_file) {
-  Field length = number_of_seconds("duration_s", settings.duration, "of the pass");
   return {required(text("spacecraft", settings.spacecraft, "its name")),
           required(epoch("epoch_tai", settings.epoch, "start of the pass, TAI")),
-          required({length.key, length.about,
-                    [] { return number_schema({.least = to_seconds(kShortestPass), .most = 1e9}); },
-                    [&settings, length](const TomlTable& table, const toml::node& node) {
-                      length.read(table, node);
-                      if (settings.duration < kShortestPass) {
-                        table.refuse(node, "the pass is shorter than a minute",
-                                     "give a longer pass: nothing can be calibrated");
-                      }
-                    }}),
+          required(number_of_seconds("duration_s", settings.duration, limits::kPassDuration_s, "of the pass")),
           prior(prior_file)};
 }
 

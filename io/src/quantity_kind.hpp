@@ -7,6 +7,8 @@
 #include <string>
 #include <string_view>
 
+#include "trihedron/records/limits.hpp"
+
 namespace trihedron::io {
 
 struct UnitOfMeasure {
@@ -18,6 +20,7 @@ struct QuantityKind {
   std::string_view name;  ///< "an angle"
   std::span<const UnitOfMeasure> units;
   std::string_view example;
+  Range range;  ///< where nothing narrower is told; durations in seconds
 };
 
 namespace units {
@@ -46,15 +49,17 @@ inline constexpr std::array kRateWalks = {UnitOfMeasure{"deg/h/s^0.5", kDegree /
 
 }  // namespace units
 
-inline constexpr QuantityKind kDuration{"a duration", units::kDurations, "90min"};                         ///< ns
-inline constexpr QuantityKind kAngle{"an angle", units::kAngles, "5arcmin"};                               ///< rad
-inline constexpr QuantityKind kRate{"a rate", units::kRates, "0.1deg/h"};                                  ///< rad/s
-inline constexpr QuantityKind kRandomWalk{"an angle random walk", units::kRandomWalks, "0.001deg/h^0.5"};  ///< rad/√s
-inline constexpr QuantityKind kLength{"a length", units::kLengths, "360km"};                               ///< m
-inline constexpr QuantityKind kFrequency{"a frequency", units::kFrequencies, "0.02Hz"};                    ///< Hz
-inline constexpr QuantityKind kAcceleration{"an angular acceleration", units::kAccelerations,
-                                            "0.02deg/s^2"};                                                ///< rad/s²
-inline constexpr QuantityKind kRateWalk{"a random walk of a rate", units::kRateWalks, "1e-9rad/s/s^0.5"};  ///< rad/s/√s
+inline constexpr QuantityKind kDuration{"a duration", units::kDurations, "90min", limits::kInterval_s};  ///< ns
+inline constexpr QuantityKind kAngle{"an angle", units::kAngles, "5arcmin", limits::kAngle_rad};         ///< rad
+inline constexpr QuantityKind kRate{"a rate", units::kRates, "0.1deg/h", limits::kRate_rad_s};           ///< rad/s
+inline constexpr QuantityKind kRandomWalk{"an angle random walk", units::kRandomWalks, "0.001deg/h^0.5",
+                                          limits::kScenarioRandomWalk_rad_sqrt_s};               ///< rad/√s
+inline constexpr QuantityKind kLength{"a length", units::kLengths, "360km", limits::kLength_m};  ///< m
+inline constexpr QuantityKind kFrequency{"a frequency", units::kFrequencies, "0.02Hz", limits::kFrequency_hz};  ///< Hz
+inline constexpr QuantityKind kAcceleration{"an angular acceleration", units::kAccelerations, "0.02deg/s^2",
+                                            limits::kAcceleration_rad_s2};  ///< rad/s²
+inline constexpr QuantityKind kRateWalk{"a random walk of a rate", units::kRateWalks, "1e-9rad/s/s^0.5",
+                                        limits::kRateWalk_rad_s_sqrt_s};  ///< rad/s/√s
 
 /// The value of a text, in the unit of the kind. Throws UsageError that names what is accepted.
 [[nodiscard]] double parse_quantity(std::string_view text, const QuantityKind& kind);

@@ -25,7 +25,7 @@ Fields scenario_fields(Scenario& scenario) {
   return {text("spacecraft", scenario.spacecraft, "its name"),
           whole("seed", scenario.seed, "every random draw depends on it alone"),
           epoch("epoch_tai", scenario.epoch, "start of the pass, TAI"),
-          duration("duration", scenario.duration, "of the pass")};
+          duration("duration", scenario.duration, limits::kPassDuration_s, "of the pass")};
 }
 
 Fields orbit_fields(OrbitScenario& orbit) {
@@ -160,7 +160,7 @@ Fields drift_fields(DriftScenario& drift, const fs::path& file) {
       quantity("outside_sigma", drift.outside_sigma_rad_s, kRate,
                "1-sigma of all further members of degree 1 and 2, drawn from the seed"),
       quantity("coefficient_walk", drift.coefficient_walk_rad_s_sqrt_s, kRateWalk, "of each coefficient"),
-      number("warm_up_fraction", drift.warm_up_fraction, kAnyNumber,
+      one_number("warm_up_fraction", drift.warm_up_fraction, limits::kPureNumber,
              "by which the coefficients are larger at the start"),
       signed_duration("warm_up_time", drift.warm_up_time_s, "in which that decays to 1/e"),
       quantity("direction_walk", drift.direction_walk_rad_sqrt_s, kRandomWalk, "of the momentum about each case axis"),
@@ -170,21 +170,22 @@ Fields drift_fields(DriftScenario& drift, const fs::path& file) {
 }
 
 Fields readout_fields(ReadoutScenario& readout) {
-  return {quantity("noise", readout.noise_rad, kAngle, "1-sigma per direction cosine, white"),
-          three_quantities("bias", readout.bias_rad, kAngle, "of the direction cosines"),
-          three_numbers("scale", readout.scale, kAnyNumber, "relative errors of scale of the direction cosines"),
-          quantity("quantum", readout.quantum_rad, kAngle, "of the direction cosines; 0: not quantised"),
-          number("dropout_probability", readout.dropout_probability, kAnyNumber, "that a sample is NaN"),
-          number("spike_probability", readout.spike_probability, kAnyNumber, "that one direction cosine is off"),
-          quantity("spike", readout.spike_rad, kAngle, "by at most so much"),
-          number("stuck_probability", readout.stuck_probability, kAnyNumber,
-                 "that a sample is the first to repeat the one before"),
-          signed_duration("stuck", readout.stuck_s, "how long it is repeated")};
+  return {
+      quantity("noise", readout.noise_rad, kAngle, "1-sigma per direction cosine, white"),
+      three_quantities("bias", readout.bias_rad, kAngle, "of the direction cosines"),
+      three_numbers("scale", readout.scale, limits::kPureNumber, "relative errors of scale of the direction cosines"),
+      quantity("quantum", readout.quantum_rad, kAngle, "of the direction cosines; 0: not quantised"),
+      one_number("dropout_probability", readout.dropout_probability, limits::kPureNumber, "that a sample is NaN"),
+      one_number("spike_probability", readout.spike_probability, limits::kPureNumber, "that one direction cosine is off"),
+      quantity("spike", readout.spike_rad, kAngle, "by at most so much"),
+      one_number("stuck_probability", readout.stuck_probability, limits::kPureNumber,
+             "that a sample is the first to repeat the one before"),
+      signed_duration("stuck", readout.stuck_s, "how long it is repeated")};
 }
 
 Fields unit_fields(GyroScenario& gyro, const fs::path& file) {
   return {
-      three_numbers("start_direction_c", gyro.start_direction_c, kAnyNumber,
+      three_numbers("start_direction_c", gyro.start_direction_c, limits::kPureNumber,
                     "of the momentum, c axes, of any length but 0"),
       three_quantities("mounting_rotation_vector", gyro.mounting_rotation_vector_rad, kAngle, "as designed and known"),
       three_quantities("misalignment", gyro.misalignment_rad, kAngle, "c axes; without it drawn from the seed"),
@@ -201,7 +202,7 @@ Fields unit_fields(GyroScenario& gyro, const fs::path& file) {
 Fields gyro_fields(Scenario& scenario, GyroScenario& gyro, const fs::path& file) {
   const auto units = [&gyro, &file] { return array_of(schema_of(unit_fields(gyro, file))); };
   return Fields{
-             duration("period", scenario.gyro_period, "of the samples"),
+             duration("period", scenario.gyro_period, limits::kGyroPeriod_s, "of the samples"),
              list("gaps", file, scenario.gyro_gaps, "without any sample", interval_fields),
              {"unit", "one per gyro, two to four: what differs", units, [](const TomlTable&, const toml::node&) {}}} +
          unit_fields(gyro, file);
@@ -244,10 +245,11 @@ Fields head_fields(StarTrackerScenario& head, const fs::path& file) {
                "no fix with the boresight nearer to the Earth's limb"),
       quantity("max_rate", head.max_rate_rad_s, kRate, "no fix above this body rate"),
       list("outages", file, head.outages, "without any fix", interval_fields),
-      number("dropout_probability", head.dropout_probability, kAnyNumber, "that a fix is missing"),
-      number("outlier_probability", head.outlier_probability, kAnyNumber, "that a fix is wrong"),
+      one_number("dropout_probability", head.dropout_probability, limits::kPureNumber, "that a fix is missing"),
+      one_number("outlier_probability", head.outlier_probability, limits::kPureNumber, "that a fix is wrong"),
       quantity("outlier", head.outlier_rad, kAngle, "by at most so much"),
-      number("wrong_sign_probability", head.wrong_sign_probability, kAnyNumber, "that -q is given in place of q")};
+      one_number("wrong_sign_probability", head.wrong_sign_probability, limits::kPureNumber,
+             "that -q is given in place of q")};
 }
 
 Fields further_head_fields(StarTrackerScenario& head, const fs::path& file) {
@@ -264,7 +266,7 @@ Fields star_tracker_fields(Scenario& scenario, const fs::path& file) {
     StarTrackerScenario head;
     return array_of(schema_of(further_head_fields(head, file)));
   };
-  return Fields{duration("period", scenario.star_tracker_period, "of the fixes"),
+  return Fields{duration("period", scenario.star_tracker_period, limits::kStarTrackerPeriod_s, "of the fixes"),
                 {"further", "further heads, each as the first in what it does not say", further,
                  [](const TomlTable&, const toml::node&) {}}} +
          head_fields(scenario.star_tracker, file);

@@ -62,23 +62,27 @@ Field text(std::string_view key, std::string& target, std::string_view about) {
           [key, &target](const TomlTable& table, const toml::node& node) { target = table.text(node, key); }};
 }
 
-Field number(std::string_view key, double& target, Range range, std::string_view about) {
+Field one_number(std::string_view key, double& target, const Range& range, std::string_view about) {
   return {key, about, [range] { return number_schema(range); },
           [key, &target, range](const TomlTable& table, const toml::node& node) {
             target = table.number(node, key, range);
           }};
 }
 
-Field number_of_seconds(std::string_view key, Duration& target, std::string_view about) {
-  static constexpr Range kSeconds{.least = 1e-9,
-                                  .most = 1e9};  // keeps every time far from the end of int64 nanoseconds
-  return {key, about, [] { return number_schema(kSeconds); },
-          [key, &target](const TomlTable& table, const toml::node& node) {
-            const double value_s = table.number(node, key, kPositive);
-            if (!kSeconds.holds(value_s)) {
-              table.refuse(node, fmt::format("\"{}\" is {}", key, value_s), "give seconds between 1e-9 and 1e9");
+Field number_of_seconds(std::string_view key, Duration& target, const Range& range, std::string_view about) {
+  return {key, about, [range] { return number_schema(range); },
+          [key, &target, range](const TomlTable& table, const toml::node& node) {
+            target = from_seconds(table.number(node, key, range));
+          }};
+}
+
+Field whole(std::string_view key, int& target, const Range& range, std::string_view about) {
+  return {key, about, [range] { return whole_schema(static_cast<int>(range.least), static_cast<int>(range.most)); },
+          [key, &target, range](const TomlTable& table, const toml::node& node) {
+            if (!node.is_integer()) {
+              table.refuse(node, fmt::format("\"{}\" is not a whole number", key), std::string(range.why));
             }
-            target = from_seconds(value_s);
+            target = static_cast<int>(table.number(node, key, range));
           }};
 }
 
@@ -101,7 +105,7 @@ Field epoch(std::string_view key, Time& target, std::string_view about) {
           }};
 }
 
-Field three_numbers(std::string_view key, Eigen::Vector3d& target, Range range, std::string_view about) {
+Field three_numbers(std::string_view key, Eigen::Vector3d& target, const Range& range, std::string_view about) {
   return {key, about, [range] { return three_of(number_schema(range)); },
           [key, &target, range](const TomlTable& table, const toml::node& node) {
             target = table.three_numbers(node, key, range);
@@ -119,17 +123,14 @@ std::string quantity_text(const TomlTable& table, const toml::node& node, std::s
 namespace {
 
 double quantity_value(const TomlTable& table, const toml::node& node, std::string_view key, const QuantityKind& kind,
-                      Range range) {
+                      const Range& range) {
   const std::string given = quantity_text(table, node, key);
-  const double value = parse_quantity(given, kind);
-  if (!range.holds(value)) {
-    table.refuse(node, fmt::format("\"{}\" is {}", key, in_quotes(given)), range.cure());
-  }
-  return value;
+  return within(range, parse_quantity(given, kind), given);
 }
 
 template <class T>
-Field one_quantity(std::string_view key, T& target, const QuantityKind& kind, std::string_view about, Range range) {
+Field one_quantity(std::string_view key, T& target, const QuantityKind& kind, std::string_view about,
+                   const Range& range) {
   return {key, about, [&kind] { return quantity_schema(kind); },
           [key, &target, &kind, range](const TomlTable& table, const toml::node& node) {
             target = quantity_value(table, node, key, kind, range);
@@ -146,7 +147,7 @@ Field vector_of_quantities(std::string_view key, T& target, const QuantityKind& 
             }
             Eigen::Vector3d values;
             for (int i = 0; i < 3; ++i) {
-              values(i) = quantity_value(table, (*array)[static_cast<std::size_t>(i)], key, kind, kAnyNumber);
+              values(i) = quantity_value(table, (*array)[static_cast<std::size_t>(i)], key, kind, kind.range);
             }
             target = values;
           }};
@@ -154,30 +155,32 @@ Field vector_of_quantities(std::string_view key, T& target, const QuantityKind& 
 
 }  // namespace
 
-Field quantity(std::string_view key, double& target, const QuantityKind& kind, std::string_view about, Range range) {
+Field quantity(std::string_view key, double& target, const QuantityKind& kind, std::string_view about) {
+  return one_quantity(key, target, kind, about, kind.range);
+}
+
+Field quantity(std::string_view key, double& target, const QuantityKind& kind, const Range& range,
+               std::string_view about) {
   return one_quantity(key, target, kind, about, range);
 }
 
 Field quantity(std::string_view key, std::optional<double>& target, const QuantityKind& kind, std::string_view about) {
-  return one_quantity(key, target, kind, about, kAnyNumber);
+  return one_quantity(key, target, kind, about, kind.range);
 }
 
-Field duration(std::string_view key, Duration& target, std::string_view about, Range range_s) {
+Field duration(std::string_view key, Duration& target, const Range& range_s, std::string_view about) {
   return {key, about, [] { return quantity_schema(kDuration); },
           [key, &target, range_s](const TomlTable& table, const toml::node& node) {
             const std::string given = quantity_text(table, node, key);
-            const Duration value = parse_duration(given);
-            if (!range_s.holds(to_seconds(value))) {
-              table.refuse(node, fmt::format("\"{}\" is {}", key, in_quotes(given)), range_s.cure());
-            }
-            target = value;
+            target = within(range_s, parse_duration(given), given);
           }};
 }
 
 Field signed_duration(std::string_view key, double& target_s, std::string_view about) {
   return {key, about, [] { return quantity_schema(kDuration); },
           [key, &target_s](const TomlTable& table, const toml::node& node) {
-            target_s = to_seconds(parse_signed_duration(quantity_text(table, node, key)));
+            const std::string given = quantity_text(table, node, key);
+            target_s = to_seconds(within(kDuration.range, parse_signed_duration(given), given));
           }};
 }
 

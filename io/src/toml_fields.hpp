@@ -2,6 +2,8 @@
 /// The keys of a TOML table, each with what it may hold and where its value goes: one list that is read by, and that
 /// the JSON schema of the file is made of.
 
+#include <fmt/format.h>
+
 #include <functional>
 #include <limits>
 #include <optional>
@@ -42,23 +44,27 @@ void read_fields(const toml::table& table, const std::filesystem::path& file, co
 // Values. A target is written when the key is read, and must live until then.
 
 [[nodiscard]] Field text(std::string_view key, std::string& target, std::string_view about);
-[[nodiscard]] Field number(std::string_view key, double& target, Range range, std::string_view about);
-/// Seconds from 1e-9 to 1e9, which every time of a pass is far below.
-[[nodiscard]] Field number_of_seconds(std::string_view key, Duration& target, std::string_view about);
+[[nodiscard]] Field one_number(std::string_view key, double& target, const Range& range, std::string_view about);
+[[nodiscard]] Field number_of_seconds(std::string_view key, Duration& target, const Range& range,
+                                      std::string_view about);
 /// An ISO date and time, as a text or as TOML has it.
 [[nodiscard]] Field epoch(std::string_view key, Time& target, std::string_view about);
 /// Numbers along or about x, y, z.
-[[nodiscard]] Field three_numbers(std::string_view key, Eigen::Vector3d& target, Range range, std::string_view about);
+[[nodiscard]] Field three_numbers(std::string_view key, Eigen::Vector3d& target, const Range& range,
+                                  std::string_view about);
+/// A number of something.
+[[nodiscard]] Field whole(std::string_view key, int& target, const Range& range, std::string_view about);
 
-// Values with a unit in a text. `range` is in the unit of the kind.
+// Values with a unit in a text, in the range of their kind unless another is told.
 
-[[nodiscard]] Field quantity(std::string_view key, double& target, const QuantityKind& kind, std::string_view about,
-                             Range range = kAnyNumber);
+[[nodiscard]] Field quantity(std::string_view key, double& target, const QuantityKind& kind, std::string_view about);
+[[nodiscard]] Field quantity(std::string_view key, double& target, const QuantityKind& kind, const Range& range,
+                             std::string_view about);
 [[nodiscard]] Field quantity(std::string_view key, std::optional<double>& target, const QuantityKind& kind,
                              std::string_view about);
-[[nodiscard]] Field duration(std::string_view key, Duration& target, std::string_view about,
-                             Range range_s = kNotNegative);
-/// The same in seconds, and it may be negative.
+/// Not negative.
+[[nodiscard]] Field duration(std::string_view key, Duration& target, const Range& range_s, std::string_view about);
+/// In seconds; it may be negative.
 [[nodiscard]] Field signed_duration(std::string_view key, double& target_s, std::string_view about);
 [[nodiscard]] Field three_quantities(std::string_view key, Eigen::Vector3d& target, const QuantityKind& kind,
                                      std::string_view about);
@@ -68,17 +74,17 @@ void read_fields(const toml::table& table, const std::filesystem::path& file, co
 /// The text of a value with a unit; refuses a bare number.
 [[nodiscard]] std::string quantity_text(const TomlTable& table, const toml::node& node, std::string_view key);
 
-/// A whole number from `least` to `most`.
+/// Any whole number that its type holds.
 template <class Integer>
-[[nodiscard]] Field whole(std::string_view key, Integer& target, std::string_view about,
-                          Integer least = std::numeric_limits<Integer>::min(),
-                          Integer most = std::numeric_limits<Integer>::max()) {
-  return {key, about, [least, most] { return whole_schema(least, most); },
-          [key, &target, least, most](const TomlTable& table, const toml::node& node) {
+[[nodiscard]] Field whole(std::string_view key, Integer& target, std::string_view about) {
+  static constexpr Integer kLeast = std::numeric_limits<Integer>::min();
+  static constexpr Integer kMost = std::numeric_limits<Integer>::max();
+  return {key, about, [] { return whole_schema(kLeast, kMost); },
+          [key, &target](const TomlTable& table, const toml::node& node) {
             const std::optional<Integer> value = node.is_integer() ? node.value<Integer>() : std::nullopt;
-            if (!value || *value < least || *value > most) {
+            if (!value) {
               table.refuse(node, fmt::format("\"{}\" is not a whole number in range", key),
-                           fmt::format("give a whole number from {} to {}", least, most));
+                           fmt::format("give a whole number from {} to {}", kLeast, kMost));
             }
             target = *value;
           }};

@@ -70,7 +70,7 @@ std::string TomlTable::text(const toml::node& node, std::string_view key) const 
   return value->get();
 }
 
-double TomlTable::number(const toml::node& node, std::string_view key, Range range) const {
+double TomlTable::number(const toml::node& node, std::string_view key, const Range& range) const {
   const std::optional<double> value = node.is_number() ? node.value<double>() : std::nullopt;
   if (!value) {
     refuse(node, fmt::format("\"{}\" is {}", key, type_of(node)),
@@ -80,12 +80,12 @@ double TomlTable::number(const toml::node& node, std::string_view key, Range ran
     refuse(node, fmt::format("\"{}\" is not finite", key), "give a finite number");
   }
   if (!range.holds(*value)) {
-    refuse(node, fmt::format("\"{}\" is {}", key, *value), range.cure());
+    refuse(node, fmt::format("\"{}\" {}", key, is_outside(*value, range)), std::string(range.why));
   }
   return *value;
 }
 
-Eigen::Vector3d TomlTable::three_numbers(const toml::node& node, std::string_view key, Range range) const {
+Eigen::Vector3d TomlTable::three_numbers(const toml::node& node, std::string_view key, const Range& range) const {
   const toml::array* array = node.as_array();
   if (array == nullptr || array->size() != 3) {
     refuse(node,

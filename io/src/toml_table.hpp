@@ -34,9 +34,9 @@ class TomlTable {
 
   [[nodiscard]] std::string text(const toml::node& node, std::string_view key) const;
   /// A finite number of the range, integer or float.
-  [[nodiscard]] double number(const toml::node& node, std::string_view key, Range range = kAnyNumber) const;
+  [[nodiscard]] double number(const toml::node& node, std::string_view key, const Range& range = kAnyNumber) const;
   [[nodiscard]] Eigen::Vector3d three_numbers(const toml::node& node, std::string_view key,
-                                              Range range = kAnyNumber) const;
+                                              const Range& range = kAnyNumber) const;
 
   [[noreturn]] void refuse(const toml::node& node, std::string reason, std::string cure) const;
 

@@ -49,6 +49,25 @@ class PassNetcdf : public testing::Test {
   RawPass raw_ = clean_pass();
 };
 
+// Rows that were declared and never written take no room in the file, and would take all memory.
+TEST_F(PassNetcdf, RefusesMoreRowsThanTheFileCanHold) {
+  int id = 0;
+  const auto pass_toml = raw_.toml;
+  ASSERT_EQ(nc_create(file().c_str(), NC_NETCDF4 | NC_CLOBBER, &id), NC_NOERR);
+  put_text(id, NC_GLOBAL, "pass_toml", pass_toml);
+  int gyro = 0;
+  int time = 0;
+  int column = 0;
+  ASSERT_EQ(nc_def_grp(id, "gyro", &gyro), NC_NOERR);
+  ASSERT_EQ(nc_def_dim(gyro, "time", 100'000'000, &time), NC_NOERR);
+  for (const char* name : {"t_s", "h1_x", "h1_y", "h1_z", "h2_x", "h2_y", "h2_z"}) {
+    ASSERT_EQ(nc_def_var(gyro, name, NC_DOUBLE, 1, &time, &column), NC_NOERR);
+    ASSERT_EQ(nc_def_var_deflate(gyro, column, 0, 1, 1), NC_NOERR);
+  }
+  ASSERT_EQ(nc_close(id), NC_NOERR);
+  EXPECT_THAT(read_refused(), HasSubstr("group \"gyro\" declares 100000000 rows, more than a file of "));
+}
+
 TEST_F(PassNetcdf, ReadsPlainDoublesAsTheCsvReaderReadsText) {
   raw_.save_directory(directory_ / "csv");
   expect_same_pass(read_pass(file()).pass, read_pass(directory_ / "csv").pass, 0, 0);
