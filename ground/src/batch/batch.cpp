@@ -66,8 +66,7 @@ double log_likelihood(const PassProblem& problem, const PassSolution& solution, 
   // gather_constants() has added stand below that triangle.
   const Eigen::Index directions = 2L * layout.gyros;
   const Eigen::Index rest = layout.size() - directions;
-  const double log_prior_root =
-      prior.block(directions, directions, rest, rest).diagonal().array().abs().log().sum();
+  const double log_prior_root = prior.block(directions, directions, rest, rest).diagonal().array().abs().log().sum();
   return log_prior_root - found.log_root_determinant - (found.residual_square + linear.cost_outside_rows) / 2;
 }
 

@@ -135,7 +135,8 @@ MatrixXd go_forward(const MatrixXd& prior, const VectorXd& prior_y, std::size_t 
     forward->measure(stage);
     if (i + 1 < stages) {
       SmootherResult::NoiseRows step = forward->move(stage);
-      // The determinant for (d, c, w) is that for (w, d', c) over |det A⁻¹|, the determinant of the change of variables.
+      // The determinant for (d, c, w) is that for (w, d', c) over |det A⁻¹|, the determinant of the change of
+      // variables.
       found.log_root_determinant += log_determinant(step.R) - std::log(std::abs(stage.A_inverse.determinant()));
       moved(std::move(step));
     }
@@ -155,7 +156,8 @@ MatrixXd go_forward(const MatrixXd& prior, const VectorXd& prior_y, std::size_t 
 SmootherLikelihood likelihood(const MatrixXd& prior, const VectorXd& prior_y, std::size_t stages,
                               const std::function<SmootherStage(std::size_t)>& stage) {
   SmootherLikelihood found;
-  static_cast<void>(go_forward(prior, prior_y, stages, stage, [](SmootherResult::NoiseRows&&) {}, found));
+  static_cast<void>(go_forward(
+      prior, prior_y, stages, stage, [](SmootherResult::NoiseRows&&) {}, found));
   return found;
 }
 

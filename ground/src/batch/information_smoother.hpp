@@ -27,8 +27,8 @@ struct SmootherLikelihood {
 };
 
 struct SmootherResult {
-  std::vector<Eigen::VectorXd> x;   ///< estimate of the states of each stage by all measurements
-  Eigen::MatrixXd last_root;        ///< of their covariance in the last stage, root rootᵀ
+  std::vector<Eigen::VectorXd> x;  ///< estimate of the states of each stage by all measurements
+  Eigen::MatrixXd last_root;       ///< of their covariance in the last stage, root rootᵀ
   SmootherLikelihood likelihood;
 
   /// w of one step by the states after it: R w + S x' = z with unit noise.
@@ -48,8 +48,7 @@ struct SmootherResult {
 /// The likelihood alone. `stage(i)` is asked for each of the `stages` once, in their order, so that they need not be
 /// kept. Throws as smooth().
 [[nodiscard]] SmootherLikelihood likelihood(const Eigen::MatrixXd& prior, const Eigen::VectorXd& prior_y,
-                                            std::size_t stages,
-                                            const std::function<SmootherStage(std::size_t)>& stage);
+                                            std::size_t stages, const std::function<SmootherStage(std::size_t)>& stage);
 
 /// Moves the rows of the stages that are about the constants alone to the prior, below the rows that are there. They
 /// are most of all rows, and do not depend on the noise: smooth() can then be called with different noise in a fraction

@@ -71,8 +71,7 @@ std::optional<SmoothedAttitude::At> SmoothedAttitude::at(const PassProblem::Mome
   if (!attitude) {
     return std::nullopt;
   }
-  const MatrixXd spread =
-      roots_.spread(moment.arc, problem_.attitude_by_states(moment, attitude.value(), reading.h_b));
+  const MatrixXd spread = roots_.spread(moment.arc, problem_.attitude_by_states(moment, attitude.value(), reading.h_b));
   Vector3d variance_rad2 = spread.rowwise().squaredNorm();
   for (int k = 0; k < problem_.layout().gyros; ++k) {
     const double noise_rad = problem_.setup().on_board.readout_noise_rad[k] * reading.noise_factor;

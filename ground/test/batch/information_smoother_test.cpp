@@ -102,8 +102,8 @@ void expect_equal(const System& system) {
   const SmootherResult result = smooth(system.prior, system.prior_y, system.stages);
   const Dense dense(system);
   const CovarianceRoots roots(result, system.stages);
-  const SmootherLikelihood alone = likelihood(system.prior, system.prior_y, system.stages.size(),
-                                              [&](std::size_t i) { return system.stages[i]; });
+  const SmootherLikelihood alone =
+      likelihood(system.prior, system.prior_y, system.stages.size(), [&](std::size_t i) { return system.stages[i]; });
   ASSERT_EQ(result.x.size(), dense.x.size());
   for (std::size_t i = 0; i < dense.x.size(); ++i) {
     EXPECT_LT((result.x[i] - dense.x[i]).norm(), 1e-11 * (1 + dense.x[i].norm())) << i;

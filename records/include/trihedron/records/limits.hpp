@@ -41,8 +41,7 @@ inline constexpr Range kReadoutNoise_rad{1e-9, 0.1, "rad",
                                          "4.8e-6"};
 inline constexpr Range kStarTrackerNoise_rad{1e-9, 0.1, "rad",
                                              "it is the 1-sigma of an attitude; an arcsecond is 4.8e-6"};
-inline constexpr Range kDrift_rad_s{-1e-2, 1e-2, "rad/s",
-                                    "no gyro drifts by half a degree a second; 1 deg/h is 4.8e-6"};
+inline constexpr Range kDrift_rad_s{-0.1, 0.1, "rad/s", "no gyro drifts by degrees a second; 1 deg/h is 4.8e-6"};
 inline constexpr Range kDriftSigma_rad_s{1e-15, 1e-2, "rad/s",
                                          "no gyro drifts by half a degree a second; 1 deg/h is 4.8e-6"};
 inline constexpr Range kRotation_rad{-kFullTurn_rad, kFullTurn_rad, "rad",
