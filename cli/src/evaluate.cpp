@@ -40,8 +40,8 @@ void add_evaluate(CLI::App& program, const Common& common, int& exit_status) {
       "trihedron evaluate pass.nc --attitude attitude.csv --limit 5arcmin\n"
       "# How much longer the attitude holds with a calibration\n"
       "trihedron navigate pass.nc --prior -o before.csv\n"
-      "trihedron navigate pass.nc --calibration out/calibration.json -o - | trihedron evaluate pass.nc --attitude - "
-      "--before before.csv");
+      "trihedron navigate pass.nc --calibration out/calibration.json -o - |\n"
+      "  trihedron evaluate pass.nc --attitude - --before before.csv");
   command->callback([&common, &exit_status, arguments] {
     const double limit_rad =
         io::within(limits::kAttitudeLimit_rad, io::parse_angle_rad(arguments->limit), "--limit " + arguments->limit);

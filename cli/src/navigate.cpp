@@ -103,7 +103,7 @@ void add_navigate(CLI::App& program, const Common& common, int& exit_status) {
       "# As on board: calibrate along, correct every 90 min\n"
       "trihedron navigate pass.nc --online -o attitude.csv\n"
       "# With the values of an earlier calibration\n"
-      "trihedron navigate pass.nc --calibration out/calibration.json --correction-interval 3h -o attitude.csv");
+      "trihedron navigate pass.nc --calibration calibration.json --correction-interval 3h -o a.csv");
   command->callback([&common, &exit_status, arguments, settle] {
     CalibrationOptions options = settle();
     options.corrections.take_parameters = arguments->online;

@@ -222,7 +222,7 @@ void add_observe(CLI::App& program, const Common& common, int& exit_status) {
       "trihedron observe pass.nc\n"
       "# The slews that calibrate best, and forty flights with them\n"
       "trihedron observe examples/steady-flight.toml --advise --confirm 40\n"
-      "trihedron observe examples/steady-flight.toml --advise --slews 2 --max-angle 20deg --manoeuvre-time 8min");
+      "trihedron observe scenario.toml --advise --slews 2 --max-angle 20deg --manoeuvre-time 8min");
   command->callback([&common, &exit_status, arguments] {
     const CalibrationOptions options = settings_of(arguments->config);
     log_settings(common.log, options);

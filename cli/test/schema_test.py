@@ -144,7 +144,7 @@ def test_outputs_have_only_what_is_described(calibrated):
     outputs = {
         "inspect-output": ("inspect", directory / "pass"),
         "navigate-output": ("navigate", directory / "pass", "--prior", "-o", directory / "before.csv", *told),
-        "evaluate-output": ("evaluate", directory / "pass", "--attitude", directory / "out" / "attitude.csv", "--before", directory / "before.csv"),
+        "evaluate-output": ("evaluate", directory / "pass", "--attitude", directory / "before.csv", "--before", directory / "before.csv"),
         "observe-output": ("observe", directory / "pass", *told),
         "history-output": ("history", directory / "c.db"),
     }

@@ -140,7 +140,7 @@ def test_a_key_and_a_missing_file_cannot_steer_the_terminal(tmp_path):
 
 def test_a_name_that_is_no_utf8_is_shown(flown, tmp_path):
     odd = os.fsencode(tmp_path) + b"/p\xff\xfess"
-    shutil.copytree(flown / "pass", odd)
+    shutil.copytree(os.fsencode(flown / "pass"), odd)
     two = [os.fsencode(PROGRAM), b"--json", b"calibrate", odd, b"-o", os.fsencode(tmp_path / "out"), b"--estimator", b"paper", b"--config",
            os.fsencode(flown / "told.toml"), b"--catalogue", os.fsencode(tmp_path / "c.db")]
     result = subprocess.run(two, capture_output=True)
@@ -238,7 +238,7 @@ clock_offset = "on"
 orbital_error = "off"
 readout_bias = "on"
 coefficient_change = "off"
-wandering_drift = "3e-9rad/s"
+wandering_drift = "3e-09rad/s"
 wandering_time = "47min"
 [corrections]
 interval = "continuous"
