@@ -11,8 +11,7 @@ namespace trihedron::io {
 /// line.
 class TextFile {
  public:
-  /// Throws InputRefused when there is no such file or it may not be read, MachineFailed when reading fails.
-  /// kStandardInput is read to its end, up to 1 GiB.
+  /// Throws as InputFile, and MachineFailed when reading fails. kStandardInput is read to its end, up to 1 GiB.
   explicit TextFile(const std::filesystem::path& path);
 
   [[nodiscard]] std::string_view text() const { return {bytes_.get(), size_}; }

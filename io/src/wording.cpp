@@ -35,7 +35,7 @@ std::string suggestion(std::string_view unknown, std::span<const std::string_vie
 
 std::string is_outside(double value, const Range& range) {
   const std::string unit = range.unit.empty() ? "" : fmt::format(" {}", range.unit);
-  return fmt::format("is {:g}{}, outside {}{:g} to {:g}{}", value, unit, range.zero_allowed ? "0 and " : "",
+  return fmt::format("is {}{}, outside {}{:g} to {:g}{}", value, unit, range.zero_allowed ? "0 and " : "",
                      range.least, range.most, unit);
 }
 

@@ -126,7 +126,7 @@ TEST(CalibrationJson, RefusesNumbersThatNoGyroHas) {
   Calibration calibration = sample_calibration();
   calibration.gyros[0].drift_rad_s[0] = 1e10;
   EXPECT_THAT(refusal_of(format_calibration(calibration)),
-              HasSubstr("gyros[0].drift_rad_s.k0 is 1e+10 rad/s, outside -0.1 to 0.1 rad/s; no gyro drifts"));
+              HasSubstr("gyros[0].drift_rad_s.k0 is 10000000000 rad/s, outside -0.1 to 0.1 rad/s; no gyro drifts"));
   calibration = sample_calibration();
   calibration.covariance(0, 0) = 1e50;
   EXPECT_THAT(refusal_of(format_calibration(calibration)),
