@@ -146,7 +146,7 @@ void man_options(std::string& page, const std::vector<const CLI::Option*>& optio
 
 void markdown_options(std::string& page, const std::vector<const CLI::Option*>& options) {
   for (const CLI::Option* option : options) {
-    page += fmt::format("- `{}`: {}\n", term_of(*option), meaning_of(*option));
+    page += "- " + wrapped(fmt::format("`{}`: {}", term_of(*option), meaning_of(*option)), 2, 2) + "\n";
   }
   page += options.empty() ? "" : "\n";
 }
