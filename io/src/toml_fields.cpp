@@ -201,7 +201,7 @@ void refuse_word(const TomlTable& table, const toml::node& node, std::string_vie
 }
 
 Field section(std::string_view key, const fs::path& file, std::string name, std::string_view about,
-              std::function<Fields()> fields) {
+              const std::function<Fields()>& fields) {
   return {key, about, [fields] { return schema_of(fields()); },
           [key, &file, name = std::move(name), fields](const TomlTable& table, const toml::node& node) {
             read_fields(table.as_table(node, key), file, name, fields());

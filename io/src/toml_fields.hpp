@@ -117,7 +117,7 @@ template <class T>
 // Tables.
 
 [[nodiscard]] Field section(std::string_view key, const std::filesystem::path& file, std::string name,
-                            std::string_view about, std::function<Fields()> fields);
+                            std::string_view about, const std::function<Fields()>& fields);
 
 /// The element tables; refuses what is no array of tables, or an empty one unless `may_be_empty`.
 [[nodiscard]] std::vector<const toml::table*> tables_of(const TomlTable& table, const toml::node& node,
