@@ -41,7 +41,7 @@ Fields coefficient_fields(std::map<DriftCoefficient, double>& values, const Rang
 
 Field drift_sigma(GyroPrior& prior) {
   return one_number(kDriftSigma, prior.drift_common_sigma_rad_s, limits::kDriftSigma_rad_s,
-                "1-sigma of each drift coefficient");
+                    "1-sigma of each drift coefficient");
 }
 
 /// One number, or a table by coefficient.
@@ -150,8 +150,8 @@ Fields further_head_fields(FurtherStarTracker& head) {
   return {
       required(three_numbers(kHeadNoise, head.noise_rad, limits::kStarTrackerNoise_rad, "1-sigma about its x, y, z")),
       required(three_numbers(kMounting, head.mounting_rotation_vector_rad, limits::kRotation_rad, "as designed")),
-      required(
-          one_number(kAlignmentSigma, head.alignment_prior_sigma_rad, limits::kAlignmentSigma_rad, "1-sigma per axis"))};
+      required(one_number(kAlignmentSigma, head.alignment_prior_sigma_rad, limits::kAlignmentSigma_rad,
+                          "1-sigma per axis"))};
 }
 
 Field further_heads(PassSettings& settings, const fs::path& file) {

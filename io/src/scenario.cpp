@@ -161,7 +161,7 @@ Fields drift_fields(DriftScenario& drift, const fs::path& file) {
                "1-sigma of all further members of degree 1 and 2, drawn from the seed"),
       quantity("coefficient_walk", drift.coefficient_walk_rad_s_sqrt_s, kRateWalk, "of each coefficient"),
       one_number("warm_up_fraction", drift.warm_up_fraction, limits::kPureNumber,
-             "by which the coefficients are larger at the start"),
+                 "by which the coefficients are larger at the start"),
       signed_duration("warm_up_time", drift.warm_up_time_s, "in which that decays to 1/e"),
       quantity("direction_walk", drift.direction_walk_rad_sqrt_s, kRandomWalk, "of the momentum about each case axis"),
       quantity("markov_sigma", drift.markov_sigma_rad_s, kRate,
@@ -176,10 +176,11 @@ Fields readout_fields(ReadoutScenario& readout) {
       three_numbers("scale", readout.scale, limits::kPureNumber, "relative errors of scale of the direction cosines"),
       quantity("quantum", readout.quantum_rad, kAngle, "of the direction cosines; 0: not quantised"),
       one_number("dropout_probability", readout.dropout_probability, limits::kPureNumber, "that a sample is NaN"),
-      one_number("spike_probability", readout.spike_probability, limits::kPureNumber, "that one direction cosine is off"),
+      one_number("spike_probability", readout.spike_probability, limits::kPureNumber,
+                 "that one direction cosine is off"),
       quantity("spike", readout.spike_rad, kAngle, "by at most so much"),
       one_number("stuck_probability", readout.stuck_probability, limits::kPureNumber,
-             "that a sample is the first to repeat the one before"),
+                 "that a sample is the first to repeat the one before"),
       signed_duration("stuck", readout.stuck_s, "how long it is repeated")};
 }
 
@@ -249,7 +250,7 @@ Fields head_fields(StarTrackerScenario& head, const fs::path& file) {
       one_number("outlier_probability", head.outlier_probability, limits::kPureNumber, "that a fix is wrong"),
       quantity("outlier", head.outlier_rad, kAngle, "by at most so much"),
       one_number("wrong_sign_probability", head.wrong_sign_probability, limits::kPureNumber,
-             "that -q is given in place of q")};
+                 "that -q is given in place of q")};
 }
 
 Fields further_head_fields(StarTrackerScenario& head, const fs::path& file) {

@@ -35,8 +35,8 @@ std::string suggestion(std::string_view unknown, std::span<const std::string_vie
 
 std::string is_outside(double value, const Range& range) {
   const std::string unit = range.unit.empty() ? "" : fmt::format(" {}", range.unit);
-  return fmt::format("is {}{}, outside {}{:g} to {:g}{}", value, unit, range.zero_allowed ? "0 and " : "",
-                     range.least, range.most, unit);
+  return fmt::format("is {}{}, outside {}{:g} to {:g}{}", value, unit, range.zero_allowed ? "0 and " : "", range.least,
+                     range.most, unit);
 }
 
 std::string estimator_choices() {
