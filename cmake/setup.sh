@@ -6,14 +6,14 @@ cd "$(dirname "$0")/.."
 
 program=(
   g++ cmake ninja-build pkg-config
-  libeigen3-dev libhdf5-dev libcli11-dev libtomlplusplus-dev libfmt-dev nlohmann-json3-dev libnetcdf-dev libfast-float-dev libsqlitecpp-dev
+  libeigen3-dev libhdf5-dev libcli11-dev libtomlplusplus-dev libfmt-dev nlohmann-json3-dev libspdlog-dev libnetcdf-dev libfast-float-dev libsqlitecpp-dev
   libtbb-dev libboost-dev liberfa-dev ca-certificates
 )
 # Tests, their coverage, benches, validation.
 tests=(
   libgtest-dev libgmock-dev librapidcheck-dev libbenchmark-dev
   chromium-headless-shell
-  gcovr python3 python3-pytest python3-xarray python3-h5netcdf
+  gcovr python3 python3-pytest python3-xarray python3-h5netcdf python3-jsonschema
 )
 docs=(doxygen)
 # The program, and the fixtures of its tests, under libFuzzer.

@@ -7,12 +7,13 @@
 #include "summary.hpp"
 #include "trihedron/core/time.hpp"
 #include "trihedron/io/quantity.hpp"
+#include "trihedron/records/text.hpp"
 
 namespace trihedron::cli {
 namespace {
 
 std::string sigma_text(const ground::Combination& combination, double sigma) {
-  return combination.is_alignment ? angle_text(sigma) : fmt::format("{:.1e} rad/s", sigma);
+  return combination.is_alignment ? angle_text(sigma) : figure("{:.1e} rad/s", sigma);
 }
 
 std::string slew_toml(const Slew& slew) {
@@ -38,7 +39,7 @@ std::string advice_text(const plan::Advice& advice) {
     fmt::format_to(out, "  {},\n", slew_toml(slew));
   }
   const auto row = [&](const std::string& before, const std::string& after, double times, const std::string& what) {
-    fmt::format_to(out, "  {:>14} {:>14} {:>8.0f} times   {}\n", before, after, times, what);
+    fmt::format_to(out, "  {:>14} {:>14} {:>8} times   {}\n", before, after, figure("{:.0f}", times), what);
   };
   fmt::format_to(out, "]\n\n  {:>14} {:>14} {:>14}\n", "1σ as it is", "with slews", "better");
   const double before_rad = advice.before.attitude_error_rad;
@@ -60,8 +61,9 @@ std::string confirmation_text(const plan::Confirmation& confirmation) {
     fmt::format_to(out, "  {:>14} {:>14}   {}\n", sigma_text(along.combination, along.predicted),
                    sigma_text(along.combination, along.simulated), along.combination.text);
   }
-  fmt::format_to(out, "  simulated over predicted {:.2f}; mean NEES {:.1f} (expected {} ± {:.1f})\n",
-                 confirmation.ratio, confirmation.nees, confirmation.parameters, confirmation.nees_tolerance());
+  fmt::format_to(out, "  simulated over predicted {}; mean NEES {} (expected {} ± {:.1f})\n",
+                 figure("{:.2f}", confirmation.ratio), figure("{:.1f}", confirmation.nees), confirmation.parameters,
+                 confirmation.nees_tolerance());
   return text;
 }
 

@@ -1,15 +1,20 @@
-#include <fmt/core.h>
+#include <fmt/format.h>
+#include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <array>
 #include <cstddef>
 #include <filesystem>
 #include <memory>
+#include <optional>
+#include <span>
 #include <string>
 #include <string_view>
 #include <utility>
 #include <vector>
 
 #include "commands.hpp"
+#include "decisions.hpp"
 #include "progress.hpp"
 #include "steps.hpp"
 #include "summary.hpp"
@@ -27,6 +32,7 @@
 #include "trihedron/io/residuals.hpp"
 #include "trihedron/io/staged_directory.hpp"
 #include "trihedron/records/run.hpp"
+#include "trihedron/records/text.hpp"
 #include "trihedron/report/report.hpp"
 
 namespace trihedron::cli {
@@ -109,12 +115,14 @@ std::string outcome_text(const Outcome& outcome, const CorrectionOptions& correc
 }
 
 ground::SeveralPasses calibrate_in_order(const std::vector<io::NamedPass>& passes, const CalibrationOptions& options,
-                                         bool quiet) {
+                                         const Common& common) {
   ground::SeveralPasses calibrated(options);
   for (const io::NamedPass& pass : passes) {
     try {
-      const ProgressBar bar("calibrate", quiet);
+      const ProgressBar bar("calibrate", common.quiet);
+      log_pass(common.log, pass.path.string(), pass.loaded);
       calibrated.add(pass.name, pass.pass(), bar.meter());
+      log_run(common.log, calibrated.passes().back().run);
     } catch (const ground::SetupError& error) {
       throw io::InputRefused(pass.path, {}, error.what(), error.cure());
     }
@@ -148,6 +156,12 @@ void expect_apart(const std::vector<io::NamedPass>& passes, const CalibrationFil
   io::expect_apart(inputs, outputs);
 }
 
+std::string not_one_of(const std::string& given, std::span<const std::string_view> known, const std::string& all) {
+  const std::string_view name = nearest(given, known);
+  return name.empty() ? fmt::format("{} is not one of {}", given, all)
+                      : fmt::format("{} is not one of {}: did you mean {}?", given, all, name);
+}
+
 std::vector<std::string> estimator_names() {
   std::vector<std::string> names;
   for (const EstimatorRow& row : kEstimators) {
@@ -161,7 +175,7 @@ std::vector<std::string> estimator_names() {
 Calibrated calibrate_into(io::StagedDirectory& staged, const std::filesystem::path& out,
                           const std::vector<io::NamedPass>& passes, const CalibrationOptions& options,
                           const Common& common) {
-  const ground::SeveralPasses calibrated = calibrate_in_order(passes, options, common.quiet);
+  const ground::SeveralPasses calibrated = calibrate_in_order(passes, options, common);
   const bool several = passes.size() > 1;
   for (std::size_t i = 0; several && i < passes.size(); ++i) {
     stage_outcome(staged, passes[i].name, outcome_of(passes[i], calibrated.passes()[i].run), options);
@@ -169,18 +183,22 @@ Calibrated calibrate_into(io::StagedDirectory& staged, const std::filesystem::pa
   const Outcome outcome = outcome_of(passes.back(), calibrated.combined());
   stage_outcome(staged, {}, outcome, options);
 
+  if (several) {
+    common.log.say("of all passes together:");
+    log_run(common.log, calibrated.combined());
+  }
   std::string summary;
   if (common.json) {
     nlohmann::ordered_json json = outcome_json(outcome);
     if (several) {
       json["passes"] = passes_json(calibrated.passes());
     }
-    summary = json.dump(1) + "\n";
+    summary = json_text(json) + "\n";
   } else if (!common.quiet) {
     summary = fmt::format(
         "{}{}Written     {}: calibration.json attitude.csv {}residuals.nc report.html effective-config.toml\n",
-        several ? passes_text(calibrated.passes()) : "", outcome_text(outcome, options.corrections), out.string(),
-        options.definitive_attitude ? "definitive-attitude.csv " : "");
+        several ? passes_text(calibrated.passes()) : "", outcome_text(outcome, options.corrections),
+        printable(out.string()), options.definitive_attitude ? "definitive-attitude.csv " : "");
   }
   return {outcome.run.calibration.verdict.trustworthy ? kTrustworthy : kDoNotUse, std::move(summary),
           calibrated.catalogue_entries()};
@@ -188,6 +206,7 @@ Calibrated calibrate_into(io::StagedDirectory& staged, const std::filesystem::pa
 
 ExitStatus calibrate_passes(const std::vector<std::string>& paths, const CalibrationOptions& options,
                             const CalibrationFiles& files, const Common& common) {
+  log_settings(common.log, options);
   const std::vector<io::NamedPass> passes = io::read_passes(paths, kOutcomeFiles);
   expect_apart(passes, files);
   if (!files.catalogue.empty()) {
@@ -204,7 +223,8 @@ ExitStatus calibrate_passes(const std::vector<std::string>& paths, const Calibra
     update.commit();
     staged.keep();
   }
-  fmt::print("{}", calibrated.summary);
+  common.log.say(fmt::format("written {}", files.out.string()));
+  print_summary(common, calibrated.summary);
   return calibrated.exit_status;
 }
 
@@ -223,19 +243,32 @@ void add_calibrate(CLI::App& program, const Common& common, int& exit_status) {
       program.add_subcommand("calibrate", "Calibrate drift and alignment of the gyros against the star tracker");
   command->add_option("PASS", arguments->passes, "Directory or NetCDF file; several of one start of the rotors")
       ->required();
-  command->add_option("-o,--output", arguments->out, "Directory to write into")->required();
-  command->add_option("--estimator", arguments->estimator, "Estimator")->check(CLI::IsMember(estimator_names()));
-  command->add_option("--drift-model", arguments->drift_model, "Drift model")->check([](const std::string& name) {
-    return name == kAutoDriftModel || drift_model_named(name)
-               ? ""
-               : fmt::format("not one of {}, {}", kAutoDriftModel, drift_model_choices());
-  });
-  command->add_option("--config", arguments->config, "Settings (TOML); see effective-config.toml of any run");
+  command->add_option("-o,--output", arguments->out, "Directory to write into")->required()->type_name("DIRECTORY");
+  command
+      ->add_option("--estimator", arguments->estimator,
+                   "How the calibration is made: the one that flies, the paper's, least squares over the whole pass; "
+                   "invariant unless the settings say otherwise")
+      ->check([](const std::string& name) {
+        const std::vector<std::string> names = estimator_names();
+        const std::vector<std::string_view> known(names.begin(), names.end());
+        return estimator_named(name) ? "" : not_one_of(name, known, fmt::format("{}", fmt::join(known, ", ")));
+      })
+      ->type_name(fmt::format("{}", fmt::join(estimator_names(), "|")));
+  command
+      ->add_option("--drift-model", arguments->drift_model,
+                   "Drift model; auto, the one that the pass gives evidence of, unless the settings say otherwise")
+      ->check([](const std::string& name) {
+        return name == kAutoDriftModel || drift_model_named(name)
+                   ? ""
+                   : not_one_of(name, {}, fmt::format("{}, {}", kAutoDriftModel, drift_model_choices()));
+      })
+      ->type_name(drift_model_words());
   command->add_flag("--definitive", arguments->definitive,
                     "Write definitive-attitude.csv as well: at each gyro sample, by estimator batch");
-  command->add_option("--catalogue", arguments->catalogue, "Database to add the calibrations to; see history");
-  command->callback([&common, &exit_status, arguments] {
-    CalibrationOptions options = arguments->config.empty() ? CalibrationOptions{} : io::read_config(arguments->config);
+  command->add_option("--catalogue", arguments->catalogue, "Database to add the calibrations to; see history")
+      ->type_name("FILE");
+  const auto settle = [arguments] {
+    CalibrationOptions options = settings_of(arguments->config);
     if (!arguments->estimator.empty()) {
       options.estimator = estimator_named(arguments->estimator).value();
     }
@@ -246,6 +279,19 @@ void add_calibrate(CLI::App& program, const Common& common, int& exit_status) {
       options.estimator = Estimator::kBatch;
       options.definitive_attitude = true;
     }
+    return options;
+  };
+  add_config(*command, arguments->config, settle);
+  command->footer(
+      "trihedron calibrate pass.nc -o out\n"
+      "# Passes of one start of the rotors, combined and kept\n"
+      "trihedron calibrate monday.nc tuesday.nc -o out --catalogue resurs.db\n"
+      "# With another gate\n"
+      "trihedron calibrate --print-config > settings.toml\n"
+      "sed -i 's/^gate_nis.*/gate_nis = 40/' settings.toml\n"
+      "trihedron calibrate pass.nc -o out --config settings.toml --log-file calibrate.log");
+  command->callback([&common, &exit_status, arguments, settle] {
+    const CalibrationOptions options = settle();
     exit_status =
         calibrate_passes(arguments->passes, options, {arguments->out, arguments->config, arguments->catalogue}, common);
   });

@@ -2,16 +2,17 @@
 /// One function per command: adds it to the program, and sets `exit_status` when it has run.
 
 #include <CLI/CLI.hpp>
+#include <functional>
+#include <string>
+
+#include "output.hpp"
+#include "trihedron/records/limits.hpp"
+#include "trihedron/records/options.hpp"
 
 namespace trihedron::cli {
 
 /// Pinned, see README. 2 to 4 come from exceptions, see main.cpp.
 enum ExitStatus : int { kTrustworthy = 0, kDoNotUse = 1, kWrongUsage = 2, kInputRefused = 3, kMachineFailed = 4 };
-
-struct Common {
-  bool quiet = false;
-  bool json = false;
-};
 
 void add_simulate(CLI::App& program, const Common& common, int& exit_status);
 void add_inspect(CLI::App& program, const Common& common, int& exit_status);
@@ -21,5 +22,20 @@ void add_evaluate(CLI::App& program, const Common& common, int& exit_status);
 void add_observe(CLI::App& program, const Common& common, int& exit_status);
 void add_history(CLI::App& program, const Common& common, int& exit_status);
 void add_demo(CLI::App& program, const Common& common, int& exit_status);
+/// schema, man, completion: what the program says of itself.
+void add_references(CLI::App& program, int& exit_status);
+
+/// --config and --print-config of a command that `options` is for, in this order, after the options that overrule them:
+/// `settle` gives the settings by all of these.
+void add_config(CLI::App& command, std::string& file, const std::function<CalibrationOptions()>& settle);
+
+/// Settings of the file, "-" for standard input, or of the program where there is none.
+[[nodiscard]] CalibrationOptions settings_of(const std::string& file);
+
+/// For a whole number in a range.
+[[nodiscard]] CLI::Validator whole(const Range& range);
+
+/// "auto|esg7|esg20|vsh:1|…"
+[[nodiscard]] std::string drift_model_words();
 
 }  // namespace trihedron::cli

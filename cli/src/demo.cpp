@@ -1,4 +1,4 @@
-#include <fmt/core.h>
+#include <fmt/format.h>
 
 #include <filesystem>
 #include <memory>
@@ -9,6 +9,7 @@
 #include "trihedron/io/atomic_file.hpp"
 #include "trihedron/io/named_pass.hpp"
 #include "trihedron/io/staged_directory.hpp"
+#include "trihedron/records/text.hpp"
 
 namespace trihedron::cli {
 namespace {
@@ -22,7 +23,9 @@ constexpr const char* kScenario =
     "seed = 2009\n";
 
 ExitStatus run_demo(const std::filesystem::path& out, const Common& common) {
-  const Common silent{.quiet = true, .json = false};
+  Common silent = common;
+  silent.quiet = true;
+  silent.json = false;
   io::StagedDirectory staged(out);
   const std::filesystem::path scenario = staged.path() / "scenario.toml";
   const std::filesystem::path pass = staged.path() / "pass.nc";
@@ -32,10 +35,10 @@ ExitStatus run_demo(const std::filesystem::path& out, const Common& common) {
   // The calibration's verdict is the one that counts: this is the same filter on the same pass.
   static_cast<void>(navigate_pass(pass, {staged.path() / "navigation.csv", {}, {}}, {}, silent));
   staged.commit();
-  fmt::print("{}", calibrated.summary);
+  print_summary(common, calibrated.summary);
   if (!common.quiet && !common.json) {
-    fmt::print("            scenario.toml pass.nc navigation.csv\n\nThe report is {}\n",
-               (out / "report.html").string());
+    print_text(stdout, fmt::format("            scenario.toml pass.nc navigation.csv\n\nThe report is {}\n",
+                                   printable((out / "report.html").string())));
   }
   return calibrated.exit_status;
 }
@@ -46,7 +49,8 @@ void add_demo(CLI::App& program, const Common& common, int& exit_status) {
   auto out = std::make_shared<std::string>("trihedron-demo");
   CLI::App* command = program.add_subcommand(
       "demo", "The paper's experiment: simulate nine hours, calibrate, navigate, evaluate, report");
-  command->add_option("-o,--output", *out, "Directory to write into")->capture_default_str();
+  command->add_option("-o,--output", *out, "Directory to write into")->capture_default_str()->type_name("DIRECTORY");
+  command->footer("trihedron demo -o demo");
   command->callback([&common, &exit_status, out] { exit_status = run_demo(*out, common); });
 }
 

@@ -5,6 +5,7 @@
 #include <string>
 
 #include "commands.hpp"
+#include "decisions.hpp"
 #include "summary.hpp"
 #include "trihedron/ground/evaluate/attitude_evaluation.hpp"
 #include "trihedron/io/attitude.hpp"
@@ -25,19 +26,30 @@ void add_evaluate(CLI::App& program, const Common& common, int& exit_status) {
   CLI::App* command =
       program.add_subcommand("evaluate", "Measure an attitude against the truth, or else the star tracker");
   command->add_option("PASS", arguments->pass, "Directory or NetCDF file")->required();
-  command->add_option("--attitude", arguments->attitude, "Attitude file (CSV)")->required();
-  command->add_option(
-      "--before", arguments->before,
-      "Attitude file made with the values known before: gives the extension of the correction interval");
-  command->add_option("--limit", arguments->limit, "Error that ends a correction interval")->capture_default_str();
+  command->add_option("--attitude", arguments->attitude, "Attitude file (CSV); - for standard input")
+      ->required()
+      ->type_name("FILE");
+  command
+      ->add_option("--before", arguments->before,
+                   "Attitude file made with the values known before: gives the extension of the correction interval")
+      ->type_name("FILE");
+  command->add_option("--limit", arguments->limit, "Error that ends a correction interval")
+      ->capture_default_str()
+      ->type_name("ANGLE");
+  command->footer(
+      "trihedron evaluate pass.nc --attitude attitude.csv --limit 5arcmin\n"
+      "# How much longer the attitude holds with a calibration\n"
+      "trihedron navigate pass.nc --prior -o before.csv\n"
+      "trihedron navigate pass.nc --calibration out/calibration.json -o - |\n"
+      "  trihedron evaluate pass.nc --attitude - --before before.csv");
   command->callback([&common, &exit_status, arguments] {
     const double limit_rad =
         io::within(limits::kAttitudeLimit_rad, io::parse_angle_rad(arguments->limit), "--limit " + arguments->limit);
     const io::NamedPass pass = io::read_named_pass(arguments->pass);
     const Time epoch = pass.pass().settings.epoch;
     const auto evaluation_of = [&](const std::string& file) {
-      ground::AttitudeEvaluation evaluation =
-          ground::evaluate_attitude(pass.pass(), io::read_attitude(file, epoch), pass.truth_or_null(), limit_rad);
+      ground::AttitudeEvaluation evaluation = ground::evaluate_attitude(
+          pass.pass(), io::read_attitude(source(file), epoch), pass.truth_or_null(), limit_rad);
       if (evaluation.errors.t.empty()) {
         throw io::InputRefused(
             file, {},
@@ -51,18 +63,19 @@ void add_evaluate(CLI::App& program, const Common& common, int& exit_status) {
     if (!arguments->before.empty()) {
       extension = ground::extension_between(evaluation_of(arguments->before), evaluation);
     }
-    if (common.json) {
+    log_pass(common.log, arguments->pass, pass.loaded);
+    common.log.say(fmt::format("{} is compared with the {}", arguments->attitude, name_of(evaluation.reference)));
+    const auto as_json = [&] {
       nlohmann::ordered_json json = evaluation_json(evaluation, epoch);
       if (extension) {
         json["extension"] = extension_json(*extension, epoch);
       }
-      fmt::print("{}\n", json.dump(1));
-    } else if (!common.quiet) {
-      fmt::print("{}", evaluation_text(evaluation, epoch, "Attitude error"));
-      if (extension) {
-        fmt::print("  correction interval extended {}\n", extension_text(extension->median));
-      }
-    }
+      return json;
+    };
+    show(common, as_json, [&] {
+      return evaluation_text(evaluation, epoch, "Attitude error") +
+             (extension ? fmt::format("  correction interval extended {}\n", extension_text(extension->median)) : "");
+    });
     exit_status = kTrustworthy;
   });
 }

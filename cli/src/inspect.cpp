@@ -4,6 +4,7 @@
 #include <string>
 
 #include "commands.hpp"
+#include "decisions.hpp"
 #include "summary.hpp"
 
 namespace trihedron::cli {
@@ -12,13 +13,16 @@ void add_inspect(CLI::App& program, const Common& common, int& exit_status) {
   auto pass = std::make_shared<std::string>();
   CLI::App* command = program.add_subcommand("inspect", "Say what a pass holds and what is wrong with its telemetry");
   command->add_option("PASS", *pass, "Directory or NetCDF file")->required();
+  command->footer(
+      "trihedron inspect pass-a\n"
+      "# For a program\n"
+      "trihedron --json inspect pass-a.nc");
   command->callback([&common, &exit_status, pass] {
     const io::LoadedPass loaded = io::read_pass(*pass);
-    if (common.json) {
-      fmt::print("{}\n", pass_json(loaded).dump(1));
-    } else if (!common.quiet) {
-      fmt::print("{}{}", pass_text(loaded), loaded.defects.empty() ? "            no defects\n" : "");
-    }
+    log_pass(common.log, *pass, loaded);
+    show(
+        common, [&] { return pass_json(loaded); },
+        [&] { return pass_text(loaded) + (loaded.defects.empty() ? "            no defects\n" : ""); });
     exit_status = kTrustworthy;
   });
 }

@@ -1,20 +1,26 @@
-#include <fmt/core.h>
+#include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <cstdio>
 #include <exception>
+#include <memory>
 #include <new>
+#include <string>
+#include <string_view>
 
 #include "commands.hpp"
+#include "manual.hpp"
 #include "standard_streams.hpp"
 #include "stop_on_signals.hpp"
 #include "trihedron/io/error.hpp"
 #include "trihedron/records/stop.hpp"
+#include "trihedron/records/text.hpp"
 
 namespace {
 
-int fail(int status, const char* message) {
+int fail(int status, std::string_view message) {
   trihedron::check_stop();  // what failed may have failed by that alone
-  trihedron::cli::say(fmt::format("trihedron: {}\n", message));
+  trihedron::cli::print_text(stderr, fmt::format("trihedron: {}\n", trihedron::printable(message)));
   return status;
 }
 
@@ -26,6 +32,19 @@ int printed(int status) {
   return status;
 }
 
+void add_commands(CLI::App& program, trihedron::cli::Common& common, int& exit_status) {
+  namespace cli = trihedron::cli;
+  cli::add_simulate(program, common, exit_status);
+  cli::add_inspect(program, common, exit_status);
+  cli::add_calibrate(program, common, exit_status);
+  cli::add_navigate(program, common, exit_status);
+  cli::add_evaluate(program, common, exit_status);
+  cli::add_observe(program, common, exit_status);
+  cli::add_history(program, common, exit_status);
+  cli::add_demo(program, common, exit_status);
+  cli::add_references(program, exit_status);
+}
+
 int run(int argc, char** argv) {
   namespace cli = trihedron::cli;
   namespace io = trihedron::io;
@@ -33,28 +52,44 @@ int run(int argc, char** argv) {
   try {
     CLI::App program("Calibrates electrostatic gyros in flight against a star tracker, and gives the attitude.",
                      "trihedron");
-    program.set_version_flag("--version", TRIHEDRON_VERSION);
+    program.formatter(std::make_shared<cli::HelpFormatter>());
+    program.set_help_flag("-h,--help", "Print what a command takes and gives");
+    program.set_version_flag("--version", TRIHEDRON_VERSION, "Print the version");
     program.require_subcommand(1);
     program.fallthrough();
+    program.footer(
+        "# The paper's experiment, with a report\n"
+        "trihedron demo\n"
+        "# A pass of telemetry: what it holds, and its calibration\n"
+        "trihedron inspect pass.nc\n"
+        "trihedron calibrate pass.nc -o out");
     cli::Common common;
+    bool verbose = false;
+    std::string log_file;
     program.add_flag("--quiet", common.quiet, "Print nothing but errors");
-    program.add_flag("--json", common.json, "Print the summary as JSON");
-    cli::add_simulate(program, common, exit_status);
-    cli::add_inspect(program, common, exit_status);
-    cli::add_calibrate(program, common, exit_status);
-    cli::add_navigate(program, common, exit_status);
-    cli::add_evaluate(program, common, exit_status);
-    cli::add_observe(program, common, exit_status);
-    cli::add_history(program, common, exit_status);
-    cli::add_demo(program, common, exit_status);
+    program.add_flag("--json", common.json, "Print the summary as JSON; trihedron schema describes it");
+    program.add_flag("--verbose", verbose, "Say on stderr what is decided, and why");
+    program.add_option("--log-file", log_file, "Write that into a file, with time stamps")->type_name("FILE");
+    program.parse_complete_callback([&] {
+      common.log.open(verbose, log_file);
+      common.log.say(fmt::format("trihedron " TRIHEDRON_VERSION ": {}", fmt::join(argv + 1, argv + argc, " ")));
+    });
+    add_commands(program, common, exit_status);
     try {
       program.parse(argc, argv);
+    } catch (const CLI::CallForHelp& call) {
+      cli::print_data(stdout, program.help());
+      exit_status = cli::kTrustworthy;
     } catch (const CLI::ParseError& error) {
-      if (error.get_exit_code() == 0) {  // --help, --version
-        return printed(program.exit(error));
+      if (error.get_exit_code() != 0) {
+        const std::string better = cli::meant(program, {argv, static_cast<std::size_t>(argc)});
+        return fail(cli::kWrongUsage,
+                    fmt::format("{}; see trihedron --help", better.empty() ? std::string(error.what()) : better));
       }
-      return fail(cli::kWrongUsage, fmt::format("{}; see trihedron --help", error.what()).c_str());
+      program.exit(error);  // --version, --print-config
+      exit_status = cli::kTrustworthy;
     }
+    common.log.say(fmt::format("exit status {}", exit_status));
     return printed(exit_status);
   } catch (const io::UsageError& error) {
     return fail(cli::kWrongUsage, error.what());
@@ -67,9 +102,6 @@ int run(int argc, char** argv) {
   } catch (const trihedron::Stopped&) {
     throw;
   } catch (const std::exception& error) {
-    if (std::ferror(stdout) != 0) {
-      return printed(cli::kMachineFailed);
-    }
     return fail(cli::kMachineFailed, error.what());
   }
 }

@@ -1,10 +1,11 @@
-#include <fmt/core.h>
+#include <fmt/format.h>
 
 #include <memory>
 #include <string>
 #include <vector>
 
 #include "commands.hpp"
+#include "decisions.hpp"
 #include "progress.hpp"
 #include "steps.hpp"
 #include "summary.hpp"
@@ -19,6 +20,7 @@
 #include "trihedron/io/error.hpp"
 #include "trihedron/io/named_pass.hpp"
 #include "trihedron/records/run.hpp"
+#include "trihedron/records/text.hpp"
 
 namespace trihedron::cli {
 
@@ -26,12 +28,18 @@ ExitStatus navigate_pass(const std::filesystem::path& pass, const NavigationFile
                          const CalibrationOptions& options, const Common& common) {
   io::NamedPass named = io::read_named_pass(pass);
   io::LoadedPass& loaded = named.loaded;
-  const std::vector<std::filesystem::path> inputs = {pass, loaded.prior_file, files.calibration, files.config};
-  io::expect_apart(inputs, {&files.attitude, 1});
+  log_pass(common.log, pass.string(), loaded);
+  log_settings(common.log, options);
   if (!files.calibration.empty()) {
-    loaded.pass.settings.prior = io::read_calibration(files.calibration);
+    common.log.say(fmt::format("the values of {} are held", files.calibration.string()));
+    loaded.pass.settings.prior = io::read_calibration(source(files.calibration.string()));
   }
-  io::expect_writable(files.attitude);
+  const bool to_stdout = files.attitude == kStandardStream;
+  if (!to_stdout) {
+    const std::vector<std::filesystem::path> inputs = {pass, loaded.prior_file, files.calibration, files.config};
+    io::expect_apart(inputs, {&files.attitude, 1});
+    io::expect_writable(files.attitude);
+  }
   NavigationRun result;
   try {
     const ProgressBar bar("navigate", common.quiet);
@@ -41,17 +49,24 @@ ExitStatus navigate_pass(const std::filesystem::path& pass, const NavigationFile
   }
   const Time epoch = loaded.pass.settings.epoch;
   const ground::AttitudeEvaluation evaluation = ground::evaluate_navigation(loaded.pass, result, named.truth_or_null());
-  io::write_attitude(files.attitude, epoch, result.attitude);
-  if (common.json) {
-    nlohmann::ordered_json json = {{"pass", pass_json(loaded)},
-                                   {"verdict", verdict_json(result.verdict)},
-                                   {"statistics", statistics_json(result.statistics)},
-                                   {"evaluation", evaluation_json(evaluation, epoch)}};
-    fmt::print("{}\n", json.dump(1));
-  } else if (!common.quiet) {
-    fmt::print("{}{}\n{}\nWritten     {}: {} epochs\n", pass_text(loaded), verdict_text(result.verdict),
-               evaluation_text(evaluation, epoch, "Attitude error"), files.attitude.string(), result.attitude.size());
+  if (to_stdout) {
+    print_data(stdout, io::format_attitude(epoch, result.attitude));
+  } else {
+    io::write_attitude(files.attitude, epoch, result.attitude);
   }
+  log_verdict(common.log, result.verdict);
+  common.log.say(fmt::format("written {}: {} epochs", files.attitude.string(), result.attitude.size()));
+  const auto as_json = [&] {
+    return nlohmann::ordered_json{{"pass", pass_json(loaded)},
+                                  {"verdict", verdict_json(result.verdict)},
+                                  {"statistics", statistics_json(result.statistics)},
+                                  {"evaluation", evaluation_json(evaluation, epoch)}};
+  };
+  show(beside(files.attitude.string(), common), as_json, [&] {
+    return fmt::format("{}{}\n{}\nWritten     {}: {} epochs\n", pass_text(loaded), verdict_text(result.verdict),
+                       evaluation_text(evaluation, epoch, "Attitude error"), printable(files.attitude.string()),
+                       result.attitude.size());
+  });
   return result.verdict.trustworthy ? kTrustworthy : kDoNotUse;
 }
 
@@ -69,20 +84,36 @@ void add_navigate(CLI::App& program, const Common& common, int& exit_status) {
   CLI::App* command = program.add_subcommand("navigate", "Give the attitude at every gyro sample");
   command->add_option("PASS", arguments->pass, "Directory or NetCDF file")->required();
   CLI::Option_group* source = command->add_option_group("parameters");
-  source->add_option("--calibration", arguments->calibration, "Hold the values of a calibration.json");
+  source
+      ->add_option("--calibration", arguments->calibration,
+                   "Hold the values of a calibration.json; - for standard input")
+      ->type_name("FILE");
   source->add_flag("--online", arguments->online, "Calibrate along, and take over the estimates at each correction");
   source->add_flag("--prior", arguments->prior, "Hold the values known before the pass, those of its pass.toml");
   source->require_option(1);
-  command->add_option(
-      "--correction-interval", arguments->interval,
-      "Time between astro-corrections: a duration, none or continuous (90min unless the settings say otherwise)");
-  command->add_option("--config", arguments->config, "Estimator settings (TOML)");
-  command->add_option("-o,--output", arguments->attitude, "Attitude file to write (CSV)")->required();
-  command->callback([&common, &exit_status, arguments] {
-    CalibrationOptions options = arguments->config.empty() ? CalibrationOptions{} : io::read_config(arguments->config);
+  command
+      ->add_option("--correction-interval", arguments->interval,
+                   "Time between astro-corrections: none, only the first; continuous, each fix; 90min unless the "
+                   "settings say otherwise")
+      ->type_name("DURATION|none|continuous");
+  command->add_option("-o,--output", arguments->attitude, "Attitude file to write (CSV); - for standard output")
+      ->required()
+      ->type_name("FILE");
+  const auto settle = [arguments] {
+    CalibrationOptions options = settings_of(arguments->config);
     if (!arguments->interval.empty()) {
       options.corrections = io::parse_correction_interval(arguments->interval);
     }
+    return options;
+  };
+  add_config(*command, arguments->config, settle);
+  command->footer(
+      "# As on board: calibrate along, correct every 90 min\n"
+      "trihedron navigate pass.nc --online -o attitude.csv\n"
+      "# With the values of an earlier calibration\n"
+      "trihedron navigate pass.nc --calibration calibration.json --correction-interval 3h -o a.csv");
+  command->callback([&common, &exit_status, arguments, settle] {
+    CalibrationOptions options = settle();
     options.corrections.take_parameters = arguments->online;
     exit_status = navigate_pass(arguments->pass, {arguments->attitude, arguments->calibration, arguments->config},
                                 options, common);

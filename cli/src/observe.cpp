@@ -13,15 +13,16 @@
 
 #include "advice.hpp"
 #include "commands.hpp"
+#include "decisions.hpp"
 #include "progress.hpp"
 #include "steps.hpp"
 #include "summary.hpp"
 #include "trihedron/ground/model/setup_error.hpp"
-#include "trihedron/io/config.hpp"
 #include "trihedron/io/error.hpp"
 #include "trihedron/io/pass.hpp"
 #include "trihedron/io/quantity.hpp"
 #include "trihedron/io/scenario.hpp"
+#include "trihedron/records/text.hpp"
 
 namespace trihedron::cli {
 namespace {
@@ -29,7 +30,7 @@ namespace {
 using ground::Observability;
 
 std::string sigma_text(const ParameterId& parameter, double sigma) {
-  return parameter.is_alignment() ? angle_text(sigma) : fmt::format("{:.1e}", sigma);
+  return parameter.is_alignment() ? angle_text(sigma) : figure("{:.1e}", sigma);
 }
 
 /// Rows: sigma of each parameter before the pass, after parts of it, after all.
@@ -50,7 +51,7 @@ std::string sigmas_text(const Observability& observability, Time epoch) {
       fmt::format_to(out, "   {:>10}", sigma_text(parameter, observability.sigma_until[time](row)));
     }
     if (observability.angle_gain.size() > 0) {
-      fmt::format_to(out, "   {:>6.2f}×", observability.angle_gain(row));
+      fmt::format_to(out, "   {:>6}×", figure("{:.2f}", observability.angle_gain(row)));
     }
     text += '\n';
   }
@@ -70,7 +71,7 @@ std::string combinations_text(const Observability& observability) {
                      combination.is_unobservable ? Observability::kUnobservable : Observability::kWeak);
       said = true;
     }
-    fmt::format_to(out, "  {:>8.3g} times, attitude {:>8}   {}\n", combination.singular_value,
+    fmt::format_to(out, "  {:>8} times, attitude {:>8}   {}\n", figure("{:.3g}", combination.singular_value),
                    angle_text(combination.attitude_error_rad), combination.text);
   }
   if (observability.is_harmful()) {
@@ -84,10 +85,11 @@ std::string combinations_text(const Observability& observability) {
 std::string observability_text(const Observability& observability, Time epoch) {
   const Eigen::VectorXd& s = observability.singular_values;
   return fmt::format(
-      "Observable  {} of {} parameters, priors removed; prior 1σ over that by the data alone: {:.2g} … {:.2g}\n"
+      "Observable  {} of {} parameters, priors removed; prior 1σ over that by the data alone: {} … {}\n"
       "Attitude    {} rms per axis by what the parameters leave, between corrections and slewing\n{}{}",
-      observability.rank, s.size(), s(0), s(s.size() - 1), angle_text(observability.attitude_error_rad),
-      sigmas_text(observability, epoch), combinations_text(observability));
+      observability.rank, s.size(), figure("{:.2g}", s(0)), figure("{:.2g}", s(s.size() - 1)),
+      angle_text(observability.attitude_error_rad), sigmas_text(observability, epoch),
+      combinations_text(observability));
 }
 
 nlohmann::ordered_json observability_json(const Observability& observability, Time epoch) {
@@ -123,18 +125,7 @@ nlohmann::ordered_json observability_json(const Observability& observability, Ti
   return json;
 }
 
-/// A whole number in a range; its message says the range.
-CLI::Range whole(const Range& range) { return {static_cast<int>(range.least), static_cast<int>(range.most)}; }
-
-bool is_scenario(const std::filesystem::path& path) { return path.extension() == ".toml"; }
-
-void print(const nlohmann::ordered_json& json, const std::string& text, const Common& common) {
-  if (common.json) {
-    fmt::print("{}\n", json.dump(1));
-  } else if (!common.quiet) {
-    fmt::print("{}", text);
-  }
-}
+bool is_scenario(const std::filesystem::path& path) { return path.extension() == ".toml" || path == kStandardStream; }
 
 /// Calls `work` and reports its errors as errors of this input file.
 template <class Work>
@@ -149,10 +140,15 @@ auto refusing(const std::string& path, const Work& work) {
 }
 
 ExitStatus observe_pass(const std::string& path, const CalibrationOptions& options, const Common& common) {
-  const Pass pass = is_scenario(path) ? simulated_by(io::read_scenario(path), path).pass : io::read_pass(path).pass;
+  const Pass pass =
+      is_scenario(path) ? simulated_by(io::read_scenario(source(path)), path).pass : io::read_pass(path).pass;
   const Observability observability = refusing(path, [&] { return ground::observe(pass, options); });
   const Time epoch = pass.settings.epoch;
-  print(observability_json(observability, epoch), observability_text(observability, epoch), common);
+  common.log.say(
+      fmt::format("{} of {} parameters are observable", observability.rank, observability.parameters.size()));
+  show(
+      common, [&] { return observability_json(observability, epoch); },
+      [&] { return observability_text(observability, epoch); });
   return observability.is_harmful() ? kDoNotUse : kTrustworthy;
 }
 
@@ -163,7 +159,7 @@ ExitStatus advise_for(const std::string& path, const CalibrationOptions& options
         "--advise needs a scenario; for a pass, give its attitude to one: calibrate PASS -o OUT, then "
         "reference = \"recorded\" and recorded = \"attitude.csv\" in [attitude]");
   }
-  const Scenario scenario = io::read_scenario(path);
+  const Scenario scenario = io::read_scenario(source(path));
   const plan::Advice advice = refusing(path, [&] {
     const ProgressBar bar("advise", common.quiet);
     return plan::advise(scenario, options, limits, {}, bar.meter());
@@ -175,12 +171,15 @@ ExitStatus advise_for(const std::string& path, const CalibrationOptions& options
       return plan::confirm(advice.scenario, advice.formerly_weak(), advice.after, confirming_runs, bar.meter());
     });
   }
-  nlohmann::ordered_json json = observability_json(advice.before, scenario.epoch);
-  json["advice"] = advice_json(advice, confirmation);
-  print(json,
-        observability_text(advice.before, scenario.epoch) + advice_text(advice) +
-            (confirmation ? confirmation_text(*confirmation) : ""),
-        common);
+  const auto as_json = [&] {
+    nlohmann::ordered_json json = observability_json(advice.before, scenario.epoch);
+    json["advice"] = advice_json(advice, confirmation);
+    return json;
+  };
+  show(common, as_json, [&] {
+    return observability_text(advice.before, scenario.epoch) + advice_text(advice) +
+           (confirmation ? confirmation_text(*confirmation) : "");
+  });
   return advice.after.is_harmful() ? kDoNotUse : kTrustworthy;
 }
 
@@ -199,25 +198,34 @@ void add_observe(CLI::App& program, const Common& common, int& exit_status) {
   };
   auto arguments = std::make_shared<Arguments>();
   CLI::App* command = program.add_subcommand("observe", "Say what a pass can tell of the parameters, and what not");
-  command->add_option("PASS|SCENARIO.toml", arguments->path, "Directory or NetCDF file; or a scenario to be simulated")
+  command
+      ->add_option("PASS|SCENARIO.toml", arguments->path,
+                   "Directory or NetCDF file; or a scenario to be simulated, - for standard input")
       ->required();
-  command->add_option("--config", arguments->config, "Settings (TOML); see effective-config.toml of any run");
   CLI::Option* advise =
       command->add_flag("--advise", arguments->advise, "Search the slews that calibrate best; of a scenario");
-  const auto limit = [&](const char* name, auto& value, const char* what) {
-    return command->add_option(name, value, what)->needs(advise);
+  const auto limit = [&](const char* name, auto& value, const char* type, const char* what) {
+    return command->add_option(name, value, what)->needs(advise)->type_name(type);
   };
-  limit("--max-rate", arguments->max_rate, "Of these slews, instead of max_slew_rate of the scenario");
-  limit("--max-angle", arguments->max_angle, "Of these slews")->capture_default_str();
-  limit("--slews", arguments->slews, "Largest number of slews")
+  limit("--max-rate", arguments->max_rate, "RATE", "Of these slews, instead of max_slew_rate of the scenario");
+  limit("--max-angle", arguments->max_angle, "ANGLE", "Of these slews")->capture_default_str();
+  limit("--slews", arguments->slews, "NUMBER", "Largest number of slews")
       ->check(whole(trihedron::limits::kSlews))
       ->capture_default_str();
-  limit("--manoeuvre-time", arguments->manoeuvre_time, "Of all slews together, turns and holds")->capture_default_str();
-  limit("--confirm", arguments->confirming_runs, "Number of flights with these slews to simulate and calibrate")
+  limit("--manoeuvre-time", arguments->manoeuvre_time, "DURATION", "Of all slews together, turns and holds")
+      ->capture_default_str();
+  limit("--confirm", arguments->confirming_runs, "NUMBER",
+        "Number of flights with these slews to simulate and calibrate")
       ->check(whole(trihedron::limits::kFlights));
+  add_config(*command, arguments->config, [arguments] { return settings_of(arguments->config); });
+  command->footer(
+      "trihedron observe pass.nc\n"
+      "# The slews that calibrate best, and forty flights with them\n"
+      "trihedron observe examples/steady-flight.toml --advise --confirm 40\n"
+      "trihedron observe scenario.toml --advise --slews 2 --max-angle 20deg --manoeuvre-time 8min");
   command->callback([&common, &exit_status, arguments] {
-    const CalibrationOptions options =
-        arguments->config.empty() ? CalibrationOptions{} : io::read_config(arguments->config);
+    const CalibrationOptions options = settings_of(arguments->config);
+    log_settings(common.log, options);
     if (!arguments->advise) {
       exit_status = observe_pass(arguments->path, options, common);
       return;

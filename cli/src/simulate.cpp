@@ -12,6 +12,7 @@
 #include "trihedron/io/error.hpp"
 #include "trihedron/io/pass.hpp"
 #include "trihedron/io/scenario.hpp"
+#include "trihedron/records/text.hpp"
 
 namespace trihedron::cli {
 namespace {
@@ -41,21 +42,33 @@ void simulate_pass(const std::filesystem::path& scenario_file, const std::string
   io::PassWriter writer(pass);
   const sim::SimulatedPass result = simulated_by(scenario, name);
   writer.write(result.pass, &result.truth, io::format_for(scenario));
-  if (common.json) {
-    fmt::print("{}\n", pass_json({result.pass, {}}).dump(1));
-  } else if (!common.quiet) {
-    fmt::print("{}Written     {}\n", pass_text({result.pass, {}}), pass.string());
-  }
+  common.log.say(fmt::format("simulated {}: {} samples, {} fixes; written {}", name, result.pass.gyro.size(),
+                             result.pass.star_tracker.size(), pass.string()));
+  show(
+      common,
+      [&] {
+        return pass_json({result.pass, {}});
+      },
+      [&] {
+        return fmt::format("{}Written     {}\n", pass_text({result.pass, {}}), printable(pass.string()));
+      });
 }
 
 void add_simulate(CLI::App& program, const Common& common, int& exit_status) {
   auto arguments = std::make_shared<SimulateArguments>();
   CLI::App* command =
       program.add_subcommand("simulate", "Make the telemetry of a pass, and its truth, from a scenario");
-  command->add_option("SCENARIO", arguments->scenario, "Scenario (TOML)")->required();
-  command->add_option("-o,--output", arguments->pass, "Pass to write: a directory, or a name in .nc")->required();
+  command->add_option("SCENARIO", arguments->scenario, "Scenario (TOML); - for standard input")->required();
+  command->add_option("-o,--output", arguments->pass, "Pass to write: a directory, or a NetCDF file by a name in .nc")
+      ->required()
+      ->type_name("PASS");
+  command->footer(
+      "# The paper's experiment\n"
+      "trihedron simulate examples/paper.toml -o pass.nc\n"
+      "# Two hours of it, without a file of its own\n"
+      "printf '[scenario]\\nduration = \"2h\"\\n' | trihedron simulate - -o pass");
   command->callback([&common, &exit_status, arguments] {
-    simulate_pass(arguments->scenario, arguments->scenario, arguments->pass, common);
+    simulate_pass(source(arguments->scenario), arguments->scenario, arguments->pass, common);
     exit_status = kTrustworthy;
   });
 }

@@ -3,12 +3,13 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include <array>
 #include <cmath>
 #include <iterator>
 
 #include "trihedron/ground/judge/verdict.hpp"
 #include "trihedron/io/time_text.hpp"
-#include "trihedron/records/scenario.hpp"
+#include "trihedron/records/text.hpp"
 
 namespace trihedron::cli {
 namespace {
@@ -38,17 +39,44 @@ nlohmann::ordered_json interval_json(const ground::CorrectionInterval& interval)
 
 }  // namespace
 
-std::string angle_text(double rad) {
-  return std::abs(rad) < 100 * kArcsecond ? fmt::format("{:.2f}″", rad / kArcsecond)
-                                          : fmt::format("{:.2f}′", rad / kArcminute);
+std::string figure(fmt::format_string<const double&> format, double value) {
+  return std::isfinite(value) ? fmt::vformat(format, fmt::make_format_args(value)) : std::string(kNoEntry);
 }
+
+namespace {
+
+std::string signed_angle_text(double rad, AngleUnit unit) { return (rad > 0 ? "+" : "") + angle_text(rad, unit); }
+
+/// One unit for a column of a table of errors.
+template <class Value>
+AngleUnit unit_of_column(const ground::AttitudeEvaluation& evaluation, const Value& value) {
+  std::vector<double> column;
+  for (const ground::ErrorStatistics& stretch : evaluation.stretches) {
+    column.push_back(value(stretch));
+  }
+  return unit_of_angles(column);
+}
+
+std::string residuals_text(const Statistics& statistics) {
+  if (!statistics.nis_mean) {
+    return "Residuals   none: no fix was judged\n";
+  }
+  std::string text = "Residuals   rms";
+  for (const double rms_rad : statistics.innovation_rms_rad) {
+    text += " " + angle_text(rms_rad);
+  }
+  return text + fmt::format("; mean NIS {} ({:.0f} expected)\n", figure("{:.3f}", *statistics.nis_mean),
+                            statistics.nis_degrees_of_freedom);
+}
+
+}  // namespace
 
 std::string pass_text(const io::LoadedPass& loaded) {
   const PassSettings& settings = loaded.pass.settings;
   std::string text;
   auto out = std::back_inserter(text);
-  fmt::format_to(out, "Pass        {}, {} TAI, {:.1f} min\n", settings.spacecraft, io::format_epoch(settings.epoch),
-                 minutes(settings.duration));
+  fmt::format_to(out, "Pass        {}, {} TAI, {:.1f} min\n", printable(settings.spacecraft),
+                 io::format_epoch(settings.epoch), minutes(settings.duration));
   fmt::format_to(out, "Telemetry   {} samples of {} gyros, {} fixes{}\n", loaded.pass.gyro.size(),
                  loaded.pass.gyro.gyros, loaded.pass.star_tracker.size(),
                  loaded.pass.further_star_trackers.empty() ? "" : " of the first star tracker");
@@ -57,7 +85,7 @@ std::string pass_text(const io::LoadedPass& loaded) {
                    i + 2);
   }
   for (const io::Defect& defect : loaded.defects) {
-    fmt::format_to(out, "            {}\n", defect.text());
+    fmt::format_to(out, "            {}\n", printable(defect.text()));
   }
   return text;
 }
@@ -87,38 +115,46 @@ std::string calibration_text(const CalibrationRun& run, const Eigen::VectorXd& e
     const auto sigma = [&] { return sigma_of(calibration, calibration.states[static_cast<std::size_t>(state)]); };
     const std::vector<std::string> names = coefficient_names(gyro.drift_model);
     for (std::size_t i = 0; i < gyro.drift_rad_s.size(); ++i, ++state) {
-      fmt::format_to(out, "  {:<8} {:>+13.4e} rad/s {:>12.1e}", names[i], gyro.drift_rad_s[i], sigma());
+      fmt::format_to(out, "  {:<8} {:>13} rad/s {:>12}", names[i], figure("{:+.4e}", gyro.drift_rad_s[i]),
+                     figure("{:.1e}", sigma()));
       if (has_truth && std::isfinite(estimate_minus_truth(state))) {
         fmt::format_to(out, " {:>+13.1e}", estimate_minus_truth(state));
       }
       text += '\n';
     }
     const Eigen::Vector3d lambda = gyro.alignment_rotation_vector_rad;
+    const std::array<double, 3> sigmas = {
+        sigma_of(calibration, calibration.states[static_cast<std::size_t>(state)]),
+        sigma_of(calibration, calibration.states[static_cast<std::size_t>(state) + 1]),
+        sigma_of(calibration, calibration.states[static_cast<std::size_t>(state) + 2])};
+    const AngleUnit unit = unit_of_angles({lambda.data(), 3});
+    const AngleUnit sigma_unit = unit_of_angles(sigmas);
     for (int axis = 0; axis < 3; ++axis, ++state) {
-      fmt::format_to(out, "  align_{:<2} {:>+13.4f} ′     {:>11.2f}″", std::string(1, "xyz"[axis]),
-                     lambda(axis) / kArcminute, sigma() / kArcsecond);
+      fmt::format_to(out, "  align_{:<2} {:>13} {}     {:>12}", std::string(1, "xyz"[axis]),
+                     figure("{:+.4f}", lambda(axis) / unit.rad), unit.symbol, angle_text(sigma(), sigma_unit));
       if (has_truth) {
-        fmt::format_to(out, " {:>+12.2f}″", estimate_minus_truth(state) / kArcsecond);
+        fmt::format_to(out, " {:>13}", signed_angle_text(estimate_minus_truth(state), sigma_unit));
       }
       text += '\n';
     }
   }
   const Statistics& statistics = calibration.statistics;
   for (const FurtherEstimate& estimate : calibration.further) {
-    fmt::format_to(out, "{}  {:<24} {:>+13.4e} {:>12.1e}\n",
+    fmt::format_to(out, "{}  {:<24} {:>13} {:>12}\n",
                    &estimate == calibration.further.data() ? "\nFurther states\n" : "", name_of(estimate.parameter),
-                   estimate.value, estimate.sigma);
+                   figure("{:+.4e}", estimate.value), figure("{:.1e}", estimate.sigma));
   }
   for (const Evidence& evidence : run.evidence) {
-    fmt::format_to(out, "{}  {:<24} ln Bayes factor {:>+9.1f}: {}\n",
-                   &evidence == run.evidence.data() ? "\nEvidence\n" : "", evidence.key(), evidence.log_bayes_factor,
-                   evidence.accepted ? "estimated" : "taken as zero");
+    fmt::format_to(out, "{}  {:<24} ln Bayes factor {:>9}: {}\n",
+                   &evidence == run.evidence.data() ? "\nEvidence\n" : "", evidence.key(),
+                   figure("{:+.1f}", evidence.log_bayes_factor), evidence.accepted ? "estimated" : "taken as zero");
   }
   for (const DriftModelForecast& model : run.drift_models) {
-    fmt::format_to(out, "{}  {:<8} {:>4} coefficients, forecast error {:>9}, ln likelihood {:>+10.1f}{}\n",
+    fmt::format_to(out, "{}  {:<8} {:>4} coefficients, forecast error {:>9}, ln likelihood {:>10}{}\n",
                    &model == run.drift_models.data() ? "\nDrift models, by forecasts of the rest of the pass\n" : "",
                    name_of(model.drift_model), model.drift_model.size(), angle_text(model.open_loop_rms_rad),
-                   model.log_likelihood, model.drift_model == calibration.gyros[0].drift_model ? ", used" : "");
+                   figure("{:+.1f}", model.log_likelihood),
+                   model.drift_model == calibration.gyros[0].drift_model ? ", used" : "");
   }
   text += "\nFixes      ";
   for (const NamedCount& its : named_counts(run.fix_counts)) {
@@ -136,12 +172,7 @@ std::string calibration_text(const CalibrationRun& run, const Eigen::VectorXd& e
   if (const long looks = statistics.angle_looks.value_or(0); looks > 0) {
     fmt::format_to(out, "Angles      between the momenta taken {} times, where no fix could be used\n", looks);
   }
-  fmt::format_to(out, "Residuals   rms");
-  for (const double rms_rad : statistics.innovation_rms_rad) {
-    fmt::format_to(out, " {:.2f}″", rms_rad / kArcsecond);
-  }
-  fmt::format_to(out, "; mean NIS {:.3f} ({:.0f} expected)\n", statistics.nis_mean.value_or(std::nan("")),
-                 statistics.nis_degrees_of_freedom);
+  text += residuals_text(statistics);
   fmt::format_to(out, "Noise       random walk of each momentum {:.1e} rad/√s, {}",
                  run.options.direction_random_walk_rad_sqrt_s, run.options.find_noise ? "the most likely" : "as given");
   const FurtherStateOptions& states = run.options.further_states;
@@ -150,16 +181,17 @@ std::string calibration_text(const CalibrationRun& run, const Eigen::VectorXd& e
                    to_seconds(states.wandering_time) / 60);
   }
   if (const auto& noise = run.options.star_tracker_noise_rad) {
-    fmt::format_to(out, "; star tracker {:.1f}″ {:.1f}″ {:.1f}″, not as in pass.toml", noise->x() / kArcsecond,
-                   noise->y() / kArcsecond, noise->z() / kArcsecond);
+    fmt::format_to(out, "; star tracker {} {} {}, not as in pass.toml", angle_text(noise->x()), angle_text(noise->y()),
+                   angle_text(noise->z()));
   }
   text += '\n';
   return text;
 }
 
 std::string extension_text(const std::optional<ground::Extension>& extension) {
-  return extension ? fmt::format("{}{:.3g} times", extension->is_lower_bound ? "≥ " : "", extension->factor)
-                   : "none measured";
+  return extension
+             ? fmt::format("{}{} times", extension->is_lower_bound ? "≥ " : "", figure("{:.3g}", extension->factor))
+             : "none measured";
 }
 
 std::string course_text(const CalibrationRun& run, const ground::CalibrationEvaluation& evaluation) {
@@ -183,7 +215,7 @@ std::string course_text(const CalibrationRun& run, const ground::CalibrationEval
     if (after.observed > Duration::zero()) {
       fmt::format_to(out, "  {:>13.0f} {:>14} {:>14} {:>12}\n", minutes(after.corrected - run.calibration.epoch),
                      interval(before), interval(after),
-                     factor ? fmt::format("{}{:.3g}", after.passed ? "" : "≥ ", *factor) : "");
+                     factor ? fmt::format("{}{}", after.passed ? "" : "≥ ", figure("{:.3g}", *factor)) : "");
     }
   }
   fmt::format_to(out, "  correction interval extended {} (the paper: 3–5)\n",
@@ -201,10 +233,13 @@ std::string evaluation_text(const ground::AttitudeEvaluation& evaluation, Time e
   }
   fmt::format_to(out, "  {:>13} {:>10} {:>10} {:>10} {:>12} {:>13}\n", "minutes", "roll rms", "pitch rms", "head. rms",
                  "largest", "(error/σ)²");
+  const auto rms_unit = unit_of_column(evaluation, [](const auto& s) { return s.rms_rad.maxCoeff(); });
+  const auto largest_unit = unit_of_column(evaluation, [](const auto& s) { return s.max_total_rad; });
   const auto row = [&](const std::string& name, const ground::ErrorStatistics& s) {
-    fmt::format_to(out, "  {:>13} {:>10} {:>10} {:>10} {:>12} {:>13}\n", name, angle_text(s.rms_rad.x()),
-                   angle_text(s.rms_rad.y()), angle_text(s.rms_rad.z()), angle_text(s.max_total_rad),
-                   s.normalised_square ? fmt::format("{:.2f}", *s.normalised_square) : "");
+    fmt::format_to(out, "  {:>13} {:>10} {:>10} {:>10} {:>12} {:>13}\n", name, angle_text(s.rms_rad.x(), rms_unit),
+                   angle_text(s.rms_rad.y(), rms_unit), angle_text(s.rms_rad.z(), rms_unit),
+                   angle_text(s.max_total_rad, largest_unit),
+                   s.normalised_square ? figure("{:.2f}", *s.normalised_square) : "");
   };
   for (const auto& s : evaluation.stretches) {
     row(fmt::format("{:.0f} … {:.0f}", minutes(s.from - epoch), minutes(s.to - epoch)), s);
@@ -232,7 +267,7 @@ std::string passes_text(const std::vector<ground::PassAlone>& passes) {
   for (const ground::PassAlone& pass : passes) {
     const Calibration& calibration = pass.run.calibration;
     auto out = std::back_inserter(text);
-    fmt::format_to(out, "  {:<16} {}  {}\n", pass.name, io::format_epoch(calibration.epoch),
+    fmt::format_to(out, "  {:<16} {}  {}\n", printable(pass.name), io::format_epoch(calibration.epoch),
                    calibration.verdict.trustworthy ? "trustworthy alone" : "alone not to be used");
     if (&pass != passes.data()) {
       fmt::format_to(out, "    coefficients   {}\n    alignments     {}\n", pass.coefficients.text(),
@@ -324,7 +359,7 @@ nlohmann::ordered_json course_json(const CalibrationRun& run, const ground::Cali
   const auto seconds = [](const std::optional<Duration>& time) {
     return time ? nlohmann::ordered_json(to_seconds(*time)) : nlohmann::ordered_json(nullptr);
   };
-  nlohmann::ordered_json states;
+  nlohmann::ordered_json states = nlohmann::ordered_json::object();
   for (std::size_t i = 0; i < evaluation.convergence.size(); ++i) {
     states[name_of(run.calibration.states[i])] = {{"determined", evaluation.convergence[i].determined},
                                                   {"settled_s", seconds(evaluation.convergence[i].settled)}};

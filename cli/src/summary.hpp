@@ -1,6 +1,8 @@
 #pragma once
 /// What the commands print: text for people, JSON for programs.
 
+#include <fmt/core.h>
+
 #include <Eigen/Core>
 #include <nlohmann/json.hpp>
 #include <optional>
@@ -14,8 +16,8 @@
 
 namespace trihedron::cli {
 
-/// An angle in the unit that suits its size.
-[[nodiscard]] std::string angle_text(double rad);
+/// In this format, or kNoEntry where it is infinite or none.
+[[nodiscard]] std::string figure(fmt::format_string<const double&> format, double value);
 
 [[nodiscard]] std::string pass_text(const io::LoadedPass& loaded);
 [[nodiscard]] std::string finding_text(const Finding& finding);

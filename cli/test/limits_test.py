@@ -108,9 +108,9 @@ def test_the_ends_of_the_ranges_end_in_a_status(edited, tmp_path, key, values, e
 @pytest.mark.parametrize("arguments, word", [
     (("evaluate", "p", "--attitude", "x", "--limit", "-5arcmin"), "--limit -5arcmin"),
     (("evaluate", "p", "--attitude", "x", "--limit", "400deg"), "outside 1e-09 to 3.15 rad"),
-    (("observe", "s.toml", "--advise", "--slews", "0"), "not in range 1 to 100;"),
-    (("observe", "s.toml", "--advise", "--slews", "-3"), "not in range 1 to 100;"),
-    (("observe", "s.toml", "--advise", "--confirm", "10000000"), "not in range 1 to 1000000;"),
+    (("observe", "s.toml", "--advise", "--slews", "0"), "is not a whole number from 1 to 100;"),
+    (("observe", "s.toml", "--advise", "--slews", "-3"), "is not a whole number from 1 to 100;"),
+    (("observe", "s.toml", "--advise", "--confirm", "10000000"), "is not a whole number from 1 to 1000000;"),
     (("observe", "s.toml", "--advise", "--max-angle", "-1deg"), "--max-angle -1deg"),
     (("observe", "s.toml", "--advise", "--max-rate", "1e9deg/s"), "outside 1e-06 to 1 rad/s"),
     (("observe", "s.toml", "--advise", "--manoeuvre-time", "0s"), "--manoeuvre-time 0s"),

@@ -66,7 +66,7 @@ AttitudeHistory read_attitude(const std::filesystem::path& path, Time epoch) {
   return attitude;
 }
 
-void write_attitude(const std::filesystem::path& path, Time epoch, const AttitudeHistory& attitude) {
+std::string format_attitude(Time epoch, const AttitudeHistory& attitude) {
   const bool has_sigma = !attitude.sigma_rad.empty();
   const bool has_age = !attitude.age_s.empty();
   if (attitude.q_in_c.size() != attitude.size() || (has_sigma && attitude.sigma_rad.size() != attitude.size()) ||
@@ -92,7 +92,11 @@ void write_attitude(const std::filesystem::path& path, Time epoch, const Attitud
     }
     out.push_back('\n');
   }
-  write_file(path, {out.data(), out.size()});
+  return fmt::to_string(out);
+}
+
+void write_attitude(const std::filesystem::path& path, Time epoch, const AttitudeHistory& attitude) {
+  write_file(path, format_attitude(epoch, attitude));
 }
 
 }  // namespace trihedron::io

@@ -7,7 +7,8 @@
 #include <cmath>
 #include <limits>
 
-#include "json_node.hpp"
+#include "json_schema.hpp"
+#include "schemas.hpp"
 #include "text_file.hpp"
 #include "trihedron/io/atomic_file.hpp"
 #include "trihedron/io/time_text.hpp"
@@ -38,10 +39,7 @@ Estimator parse_estimator(const JsonNode& node) {
   return *estimator;
 }
 
-GyroCalibration parse_gyro(const JsonNode& node) {
-  GyroCalibration gyro;
-  gyro.drift_model = parse_drift_model(node.at("drift_model"));
-  const JsonNode drift = node.at("drift_rad_s");
+void read_drift(const JsonNode& drift, GyroCalibration& gyro) {
   const std::vector<std::string> names = coefficient_names(gyro.drift_model);
   const std::vector<std::string_view> known(names.begin(), names.end());
   for (const auto& [name, value] : drift.members()) {
@@ -53,15 +51,32 @@ GyroCalibration parse_gyro(const JsonNode& node) {
   for (const std::string& name : names) {
     gyro.drift_rad_s.push_back(drift.at(name).number(limits::kDrift_rad_s));
   }
-  gyro.alignment_rotation_vector_rad = node.at("alignment_rotation_vector_rad").vector3(limits::kRotation_rad);
-  gyro.momentum_in = node.at("momentum_in").vector3();
-  if (!(std::abs(gyro.momentum_in.norm() - 1) <= 1e-6)) {
-    node.at("momentum_in").refuse("is not a unit vector", "repair it: it is the direction of the angular momentum");
+}
+
+Eigen::Vector3d parse_momentum(const JsonNode& node) {
+  const Eigen::Vector3d momentum = node.vector3();
+  if (!(std::abs(momentum.norm() - 1) <= 1e-6)) {
+    node.refuse("is not a unit vector", "repair it: it is the direction of the angular momentum");
   }
-  if (const auto bias = node.find("readout_bias")) {
-    gyro.readout_bias = bias->vector3(limits::kReadoutBias);
-  }
-  return gyro;
+  return momentum;
+}
+
+Member vector_member(std::string_view key, Eigen::Vector3d& target, const Range& range, std::string_view about) {
+  return {key, about, three_of(number_schema(range)),
+          [&target, range](const JsonNode& node) { target = node.vector3(range); }};
+}
+
+Members gyro_members(GyroCalibration& gyro) {
+  return {{"drift_model", "of eq. (1) or beyond it", drift_model_schema(),
+           [&gyro](const JsonNode& node) { gyro.drift_model = parse_drift_model(node); }},
+          {"drift_rad_s", "by coefficient of the model", object_of({}, number_schema(limits::kDrift_rad_s)),
+           [&gyro](const JsonNode& node) { read_drift(node, gyro); }},
+          vector_member("alignment_rotation_vector_rad", gyro.alignment_rotation_vector_rad, limits::kRotation_rad,
+                        "v_c = exp([this x]) v_b"),
+          optional_member(
+              vector_member("readout_bias", gyro.readout_bias, limits::kReadoutBias, "of the direction cosines")),
+          {"momentum_in", "its direction at t_s, a unit vector", three_of(number_schema()),
+           [&gyro](const JsonNode& node) { gyro.momentum_in = parse_momentum(node); }}};
 }
 
 /// A state "gyroN.…" must name a gyro and be there once; other states may be added.
@@ -122,13 +137,8 @@ const Range& range_of_sigma(const ParameterId& state) {
 
 /// States and covariance. States that this program does not know are left out: what is left is still the covariance of
 /// the others.
-void parse_covariance(const JsonNode& node, Calibration& calibration) {
-  std::vector<std::string> names;
-  for (const JsonNode& state : node.at("states").elements()) {
-    names.push_back(state.text());
-  }
-  check_states(node.at("states"), names, calibration.gyros.size());
-  const Eigen::MatrixXd matrix = parse_matrix(node.at("matrix"), names.size());
+void read_matrix(const JsonNode& node, const std::vector<std::string>& names, Calibration& calibration) {
+  const Eigen::MatrixXd matrix = parse_matrix(node, names.size());
   std::vector<Eigen::Index> rows;
   for (std::size_t i = 0; i < names.size(); ++i) {
     if (const std::optional<ParameterId> state = parameter_named(names[i])) {
@@ -141,33 +151,48 @@ void parse_covariance(const JsonNode& node, Calibration& calibration) {
     const Range& range = range_of_sigma(calibration.states[static_cast<std::size_t>(i)]);
     const double sigma = std::sqrt(calibration.covariance(i, i));
     if (!(sigma <= range.most)) {
-      node.at("matrix").refuse(
-          fmt::format("has the variance of a sigma of {} that {}",
-                      name_of(calibration.states[static_cast<std::size_t>(i)]), is_outside(sigma, range)),
-          std::string(range.why));
+      node.refuse(fmt::format("has the variance of a sigma of {} that {}",
+                              name_of(calibration.states[static_cast<std::size_t>(i)]), is_outside(sigma, range)),
+                  std::string(range.why));
     }
   }
 }
 
-/// A value that is zero where there is no such noise.
-double zero_or(const Range& range, const JsonNode& node) {
-  Range wider = range;
-  wider.zero_allowed = true;
-  return node.number(wider);
+Members covariance_members(Calibration& calibration, std::vector<std::string>& names) {
+  return {{"states", "names of the rows: gyro1.k0, gyro1.align_x, ...", array_of(text_schema()),
+           [&](const JsonNode& node) {
+             for (const JsonNode& state : node.elements()) {
+               names.push_back(state.text());
+             }
+             check_states(node, names, calibration.gyros.size());
+           }},
+          {"matrix", "in the units of the states, squared", array_of(array_of(number_schema())),
+           [&](const JsonNode& node) { read_matrix(node, names, calibration); }}};
 }
 
-CalibrationNoise parse_noise(const JsonNode& node) {
-  CalibrationNoise noise;
-  noise.direction_random_walk_rad_sqrt_s =
-      node.at("direction_random_walk_rad_sqrt_s").number(limits::kRandomWalk_rad_sqrt_s);
-  noise.wandering_drift_rad_s = zero_or(limits::kWanderingDrift_rad_s, node.at("wandering_drift_rad_s"));
-  noise.wandering_time_s = noise.wandering_drift_rad_s > 0
-                               ? node.at("wandering_time_s").number(limits::kWanderingTime_s)
-                               : zero_or(limits::kWanderingTime_s, node.at("wandering_time_s"));
-  if (const auto star_tracker = node.find("star_tracker_noise_rad")) {
-    noise.star_tracker_noise_rad = star_tracker->vector3(limits::kStarTrackerNoise_rad);
-  }
-  return noise;
+/// Zero as well: there is no such noise.
+Range zero_or(Range range) {
+  range.zero_allowed = true;
+  return range;
+}
+
+Members noise_members(CalibrationNoise& noise) {
+  const auto member = [](std::string_view key, double& target, const Range& range, std::string_view about) -> Member {
+    return {key, about, number_schema(range), [&target, range](const JsonNode& node) { target = node.number(range); }};
+  };
+  const Range time = zero_or(limits::kWanderingTime_s);
+  return {member("direction_random_walk_rad_sqrt_s", noise.direction_random_walk_rad_sqrt_s,
+                 limits::kRandomWalk_rad_sqrt_s, "of each momentum, per axis across it"),
+          member("wandering_drift_rad_s", noise.wandering_drift_rad_s, zero_or(limits::kWanderingDrift_rad_s),
+                 "1-sigma; 0: there is none"),
+          {"wandering_time_s", "its correlation time, 0 where there is none", number_schema(time),
+           [&noise, time](const JsonNode& node) {
+             noise.wandering_time_s = node.number(noise.wandering_drift_rad_s > 0 ? limits::kWanderingTime_s : time);
+           }},
+          optional_member({"star_tracker_noise_rad", "1-sigma about c x, y, z, where it was found from the pass",
+                           three_of(number_schema(limits::kStarTrackerNoise_rad)), [&noise](const JsonNode& node) {
+                             noise.star_tracker_noise_rad = node.vector3(limits::kStarTrackerNoise_rad);
+                           }})};
 }
 
 Json noise_json(const CalibrationNoise& noise) {
@@ -180,25 +205,40 @@ Json noise_json(const CalibrationNoise& noise) {
   return json;
 }
 
+FindingSeverity parse_severity(const JsonNode& node) {
+  const std::string name = node.text();
+  const auto* const found = std::ranges::find(kFindingSeverities, name, &FindingSeverityRow::name);
+  if (found == kFindingSeverities.end()) {
+    node.refuse(fmt::format("is {}", in_quotes(name)), "it must be note, warning or do-not-use");
+  }
+  return found->severity;
+}
+
+Json severity_schema() {
+  std::vector<std::string_view> names;
+  for (const FindingSeverityRow& row : kFindingSeverities) {
+    names.push_back(row.name);
+  }
+  return one_of(names);
+}
+
+Members finding_members(Finding& finding) {
+  const auto text = [](std::string_view key, std::string& target, std::string_view about) -> Member {
+    return {key, about, text_schema(), [&target](const JsonNode& node) { target = node.text(); }};
+  };
+  return {{"code", "its name for programs", text_schema(),
+           [&finding](const JsonNode& node) { finding.code = finding_code_named(node.text()); }},
+          text("text", finding.text, "what was found"),
+          optional_member(text("evidence", finding.evidence, "in numbers")),
+          optional_member(text("cure", finding.cure, "what to do")),
+          optional_member({"severity", "warning where it is left out", severity_schema(),
+                           [&finding](const JsonNode& node) { finding.severity = parse_severity(node); }})};
+}
+
 Finding parse_finding(const JsonNode& node) {
   Finding finding;
-  finding.code = finding_code_named(node.at("code").text());
-  finding.text = node.at("text").text();
-  if (const auto evidence = node.find("evidence")) {
-    finding.evidence = evidence->text();
-  }
-  if (const auto cure = node.find("cure")) {
-    finding.cure = cure->text();
-  }
   finding.severity = FindingSeverity::kWarning;
-  if (const auto severity = node.find("severity")) {
-    const std::string name = severity->text();
-    const auto* const found = std::ranges::find(kFindingSeverities, name, &FindingSeverityRow::name);
-    if (found == kFindingSeverities.end()) {
-      severity->refuse(fmt::format("is {}", in_quotes(name)), "it must be note, warning or do-not-use");
-    }
-    finding.severity = found->severity;
-  }
+  read_members(node, finding_members(finding));
   return finding;
 }
 
@@ -224,6 +264,107 @@ Json gyro_json(const GyroCalibration& gyro) {
           {"momentum_in", to_json_array(gyro.momentum_in)}};
 }
 
+Time parse_epoch_node(const JsonNode& node) {
+  const std::string epoch = node.text();
+  const std::optional<Time> parsed = parse_epoch(epoch);
+  if (!parsed) {
+    node.refuse(fmt::format("is {}, not an ISO date and time", in_quotes(epoch)),
+                "write it like \"2009-05-20T00:00:00\"");
+  }
+  return *parsed;
+}
+
+void check_format(const JsonNode& node) {
+  if (const std::string format = node.text(); format != kFormat) {
+    node.refuse(fmt::format("is {}", in_quotes(format)), fmt::format("give a file with format \"{}\"", kFormat));
+  }
+}
+
+void check_version(const JsonNode& node) {
+  if (const double version = node.number(); version != kVersion) {
+    node.refuse(fmt::format("is {}", version), fmt::format("this program reads version {}", kVersion));
+  }
+}
+
+void read_time(const JsonNode& node, Calibration& calibration) {
+  const double t_s = node.number(limits::kTimeOfCalibration_s);
+  calibration.t = calibration.epoch + from_seconds(t_s);
+}
+
+void read_gyros(const JsonNode& node, Calibration& calibration) {
+  for (const JsonNode& element : node.elements()) {
+    read_members(element, gyro_members(calibration.gyros.emplace_back()));
+  }
+  if (calibration.gyros.empty()) {
+    node.refuse("is empty", "give one element per gyro");
+  }
+}
+
+void read_further(const JsonNode& node, Calibration& calibration) {
+  for (const auto& [name, estimate] : node.members()) {
+    const double value = estimate.at("value").number(limits::kFurtherState);
+    const double sigma = estimate.at("sigma").number(limits::kFurtherStateSigma);
+    if (const std::optional<ParameterId> parameter = parameter_named(name)) {
+      calibration.further.push_back({*parameter, value, sigma});
+    }
+  }
+}
+
+Members verdict_members(Verdict& verdict) {
+  Finding finding;
+  return {{"trustworthy",
+           "false: do not use",
+           {{"type", "boolean"}},
+           [&verdict](const JsonNode& node) { verdict.trustworthy = node.boolean(); }},
+          {"findings", "why, and what else was found", array_of(schema_of(finding_members(finding))),
+           [&verdict](const JsonNode& node) {
+             for (const JsonNode& element : node.elements()) {
+               verdict.findings.push_back(parse_finding(element));
+             }
+           }}};
+}
+
+/// In the order of the file: the epoch is needed by what comes after it.
+Members calibration_members(Calibration& calibration) {
+  GyroCalibration gyro;
+  CalibrationNoise noise;
+  std::vector<std::string> names;
+  Json gyros = array_of(schema_of(gyro_members(gyro)));
+  gyros["minItems"] = 1;
+  const Json estimate = object_of(
+      {{"value", "", number_schema(limits::kFurtherState)}, {"sigma", "", number_schema(limits::kFurtherStateSigma)}},
+      true);
+  const Json statistic = {{"type", Json::array({"number", "null"})}};
+  return {
+      {"format", "", {{"const", kFormat}}, check_format},
+      {"version", "", {{"const", kVersion}}, check_version},
+      {"estimator", "how it was made", estimator_schema(),
+       [&](const JsonNode& node) { calibration.estimator = parse_estimator(node); }},
+      {"epoch_tai", "start of the pass, TAI", epoch_schema(),
+       [&](const JsonNode& node) { calibration.epoch = parse_epoch_node(node); }},
+      {"t_s", "since the epoch: when momentum_in holds", number_schema(limits::kTimeOfCalibration_s),
+       [&](const JsonNode& node) { read_time(node, calibration); }},
+      {"gyros", "one element per gyro", gyros, [&](const JsonNode& node) { read_gyros(node, calibration); }},
+      optional_member({"further", "further states by name", object_of({}, estimate),
+                       [&](const JsonNode& node) { read_further(node, calibration); }}),
+      optional_member({"noise", "that it went by", schema_of(noise_members(noise)),
+                       [&](const JsonNode& node) { read_members(node, noise_members(calibration.noise.emplace())); }}),
+      {"covariance", "of the estimate at t_s; alignments as small rotations, c axes",
+       schema_of(covariance_members(calibration, names)),
+       [&](const JsonNode& node) {
+         std::vector<std::string> states;
+         read_members(node, covariance_members(calibration, states));
+       }},
+      {"verdict", "whether to use it", schema_of(verdict_members(calibration.verdict)),
+       [&](const JsonNode& node) { read_members(node, verdict_members(calibration.verdict)); }},
+      {"statistics", "numbers that judge it", object_of({}, statistic), [&](const JsonNode& node) {
+         for (const auto& [name, value] : node.members()) {
+           set_value(calibration.statistics, name,
+                     value.is_null() ? std::numeric_limits<double>::quiet_NaN() : value.number());
+         }
+       }}};
+}
+
 /// An array with each element on its own line, which is how a person looks at a matrix or a list of findings.
 std::string lines(const Json& array) {
   std::string text;
@@ -242,55 +383,17 @@ Calibration read_calibration(const std::filesystem::path& path) {
 
 Calibration parse_calibration(std::string_view text, const std::filesystem::path& file) {
   const Json document = parse_json(text, file);
-  const JsonNode root(document, file);
-  if (const std::string format = root.at("format").text(); format != kFormat) {
-    root.at("format").refuse(fmt::format("is {}", in_quotes(format)),
-                             fmt::format("give a file with format \"{}\"", kFormat));
-  }
-  if (const double version = root.at("version").number(); version != kVersion) {
-    root.at("version").refuse(fmt::format("is {}", version), fmt::format("this program reads version {}", kVersion));
-  }
   Calibration calibration;
-  calibration.estimator = parse_estimator(root.at("estimator"));
-  const std::string epoch = root.at("epoch_tai").text();
-  const std::optional<Time> parsed_epoch = parse_epoch(epoch);
-  if (!parsed_epoch) {
-    root.at("epoch_tai")
-        .refuse(fmt::format("is {}, not an ISO date and time", in_quotes(epoch)),
-                "write it like \"2009-05-20T00:00:00\"");
-  }
-  calibration.epoch = *parsed_epoch;
-  const double t_s = root.at("t_s").number(limits::kTimeOfCalibration_s);
-  calibration.t = calibration.epoch + from_seconds(t_s);
-  for (const JsonNode& gyro : root.at("gyros").elements()) {
-    calibration.gyros.push_back(parse_gyro(gyro));
-  }
-  if (calibration.gyros.empty()) {
-    root.at("gyros").refuse("is empty", "give one element per gyro");
-  }
-  parse_covariance(root.at("covariance"), calibration);
-  const JsonNode verdict = root.at("verdict");
-  calibration.verdict.trustworthy = verdict.at("trustworthy").boolean();
-  for (const JsonNode& finding : verdict.at("findings").elements()) {
-    calibration.verdict.findings.push_back(parse_finding(finding));
-  }
-  if (const auto further = root.find("further")) {
-    for (const auto& [name, estimate] : further->members()) {
-      const double value = estimate.at("value").number(limits::kFurtherState);
-      const double sigma = estimate.at("sigma").number(limits::kFurtherStateSigma);
-      if (const std::optional<ParameterId> parameter = parameter_named(name)) {
-        calibration.further.push_back({*parameter, value, sigma});
-      }
-    }
-  }
-  if (const auto noise = root.find("noise")) {
-    calibration.noise = parse_noise(*noise);
-  }
-  for (const auto& [name, value] : root.at("statistics").members()) {
-    set_value(calibration.statistics, name,
-              value.is_null() ? std::numeric_limits<double>::quiet_NaN() : value.number());
-  }
+  read_members(JsonNode(document, file), calibration_members(calibration));
   return calibration;
+}
+
+Json calibration_schema() {
+  Calibration calibration;
+  return document_schema("Calibration",
+                         "calibration.json: what a calibration found, its covariance and its verdict. Further keys may "
+                         "be added.",
+                         schema_of(calibration_members(calibration)));
 }
 
 std::string format_calibration(const Calibration& calibration) {

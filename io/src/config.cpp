@@ -7,8 +7,9 @@
 #include <optional>
 #include <utility>
 
+#include "schemas.hpp"
 #include "text_file.hpp"
-#include "toml_table.hpp"
+#include "toml_fields.hpp"
 #include "trihedron/io/quantity.hpp"
 #include "trihedron/records/drift_models.hpp"
 #include "wording.hpp"
@@ -18,92 +19,165 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// A text, read by one of the parsers of quantity.hpp or this file.
-template <class Parse>
-auto parsed(const TomlTable& table, const toml::node& node, std::string_view key, Parse&& parse) {
-  if (node.is_number()) {
-    table.refuse(node, fmt::format("\"{}\" is a bare number", key), "write it as a text with its unit");
-  }
-  try {
-    return parse(table.text(node, key));
-  } catch (const UsageError& error) {
-    table.refuse(node, fmt::format("\"{}\": {}", key, error.what()), "correct the value");
-  }
-}
-
-/// A text with a unit, within a range.
-template <class Parse>
-auto quantity(const TomlTable& table, const toml::node& node, std::string_view key, const Range& range, Parse&& parse) {
-  return parsed(table, node, key, [&](std::string_view text) { return within(range, parse(text), text); });
-}
-
-int whole_number(const TomlTable& table, const toml::node& node, std::string_view key, const Range& range) {
-  if (!node.is_integer()) {
-    table.refuse(node, fmt::format("\"{}\" is not a whole number", key), std::string(range.why));
-  }
-  return static_cast<int>(table.number(node, key, range));
-}
-
 constexpr std::string_view kNever = "never";
+constexpr std::string_view kOnlyFirst = "none";
+constexpr std::string_view kEachFix = "continuous";
 constexpr std::string_view kWanderingTime = "wandering_time";
 
 using Choice = FurtherStateOptions::Choice;
-constexpr std::array<std::pair<Choice, const char*>, 3> kChoices = {
-    {{Choice::kAuto, "auto"}, {Choice::kOff, "off"}, {Choice::kOn, "on"}}};
+constexpr std::array<std::pair<std::string_view, Choice>, 3> kChoices = {
+    {{"auto", Choice::kAuto}, {"off", Choice::kOff}, {"on", Choice::kOn}}};
 
-const char* name_of(Choice choice) {
-  return std::ranges::find_if(kChoices, [&](const auto& c) { return c.first == choice; })->second;
+std::string_view name_of(Choice choice) {
+  return std::ranges::find(kChoices, choice, &std::pair<std::string_view, Choice>::second)->first;
 }
 
-std::optional<Choice> choice_of(std::string_view text) {
-  const auto found = std::ranges::find_if(kChoices, [&](const auto& c) { return c.second == text; });
-  return found == kChoices.end() ? std::nullopt : std::optional(found->first);
+Field estimator(CalibrationOptions& options) {
+  return {"estimator", "how the calibration is made", estimator_schema,
+          [&options](const TomlTable& table, const toml::node& node) {
+            const std::string name = table.text(node, "estimator");
+            const std::optional<Estimator> named = estimator_named(name);
+            if (!named) {
+              table.refuse(node, fmt::format("there is no estimator {}", in_quotes(name)),
+                           fmt::format("use one of: {}", estimator_choices()));
+            }
+            options.estimator = *named;
+          }};
 }
 
-Choice choice(const TomlTable& table, const toml::node& node, std::string_view key) {
-  const auto chosen = choice_of(table.text(node, key));
-  if (!chosen) {
-    table.refuse(node, fmt::format("\"{}\" is neither auto nor on nor off", key), "write one of them");
-  }
-  return *chosen;
+Field drift_model(CalibrationOptions& options) {
+  const auto schema = [] {
+    Json names = drift_model_schema();
+    names["enum"].insert(names["enum"].begin(), kAutoDriftModel);
+    return names;
+  };
+  return {"drift_model", "auto: the one that the pass gives evidence of", schema,
+          [&options](const TomlTable& table, const toml::node& node) {
+            const std::string name = table.text(node, "drift_model");
+            options.drift_model = drift_model_named(name);
+            if (!options.drift_model && name != kAutoDriftModel) {
+              table.refuse(node, fmt::format("there is no drift model {}", in_quotes(name)),
+                           fmt::format("use {}, {}", kAutoDriftModel, drift_model_choices()));
+            }
+          }};
 }
 
-/// Of [further_states].
-std::vector<std::string_view> further_state_keys() {
-  std::vector<std::string_view> keys;
+/// A duration, or a word that stands for `of_word`.
+Field duration_or(std::string_view word, std::string_view key, Duration& target, Duration of_word, const Range& range_s,
+                  std::string_view about) {
+  return {key, about,
+          [word] {
+            return any_of({one_of(std::array{word}), quantity_schema(kDuration)});
+          },
+          [=, &target](const TomlTable& table, const toml::node& node) {
+            if (quantity_text(table, node, key) == word) {
+              target = of_word;
+            } else {
+              duration(key, target, range_s, about).read(table, node);
+            }
+          }};
+}
+
+Fields filter_fields(CalibrationOptions& options) {
+  return {choice<bool>("noise", options.find_noise, "found: from the pass; told: as set here and in pass.toml",
+                       {{"found", true}, {"told", false}}),
+          quantity("direction_random_walk", options.direction_random_walk_rad_sqrt_s, kRandomWalk,
+                   limits::kRandomWalk_rad_sqrt_s, "process noise of each momentum, per axis across it"),
+          one_number("gate_nis", options.gate_nis, limits::kGateNis,
+                     "a fix with a larger normalised innovation squared is rejected"),
+          one_number("student_t_freedom", options.student_t_freedom, limits::kStudentTFreedom,
+                     "5 to 20: it is used with less weight instead; 0: rejected"),
+          whole("reopen_after_rejections", options.reopen_after_rejections, limits::kRejections,
+                "in a row; then the directions are reopened and the fix is used"),
+          whole("reopen_after_jump_rejections", options.reopen_after_jump_rejections, limits::kRejections,
+                "the same where they began with a jump that no drift can make"),
+          duration_or(kNever, "angles_after", options.angles_after, Duration::max(), limits::kAnglesAfter_s,
+                      "without a fix, by the angles between the momenta: a duration or never")};
+}
+
+/// auto, off, or its 1-sigma.
+Field wandering_drift(const FurtherStateRow& row, FurtherStateOptions& states) {
+  static constexpr std::array kWords = {Choice::kAuto, Choice::kOff};
+  const auto schema = [] {
+    return any_of({one_of(std::array{name_of(kWords[0]), name_of(kWords[1])}), quantity_schema(kRate)});
+  };
+  return {row.key, row.about, schema, [&row, &states](const TomlTable& table, const toml::node& node) {
+            const std::string given = quantity_text(table, node, row.key);
+            const auto* const word = std::ranges::find(kWords, given, [](Choice choice) { return name_of(choice); });
+            if (word != kWords.end()) {
+              states[row.state] = *word;
+              return;
+            }
+            states[row.state] = Choice::kOn;
+            states.wandering_drift_rad_s = within(limits::kWanderingDrift_rad_s, parse_rate_rad_s(given), given);
+          }};
+}
+
+Fields further_state_fields(FurtherStateOptions& states) {
+  Fields fields;
   for (const FurtherStateRow& row : kFurtherStates) {
     if (!row.key.empty()) {
-      keys.push_back(row.key);
+      fields.push_back(row.state == FurtherState::kWanderingDrift
+                           ? wandering_drift(row, states)
+                           : choice<Choice>(row.key, states[row.state], row.about, {kChoices.begin(), kChoices.end()}));
     }
   }
-  keys.push_back(kWanderingTime);
-  return keys;
+  fields.push_back(duration(kWanderingTime, states.wandering_time, limits::kWanderingTime_s,
+                            "correlation time of the drift that wanders"));
+  return fields;
 }
 
-/// The lines of [further_states].
-std::string format_further_states(const FurtherStateOptions& states) {
-  std::string text;
-  for (const FurtherStateRow& row : kFurtherStates) {
-    if (row.key.empty()) {
-      continue;
-    }
-    const bool has_size = row.state == FurtherState::kWanderingDrift;
-    text += fmt::format("{} = \"{}\"  # {}: {}\n", row.key,
-                        has_size && states.is_on(row.state) ? fmt::format("{}rad/s", states.wandering_drift_rad_s)
-                                                            : name_of(states[row.state]),
-                        row.about, has_size ? "auto, off, or its 1-sigma" : "auto, on or off");
-  }
-  return text + fmt::format("{} = \"{}\"  # and its correlation time\n", kWanderingTime,
-                            format_duration(states.wandering_time));
+Fields correction_fields(CorrectionOptions& corrections) {
+  constexpr std::string_view kKey = "interval";
+  const auto schema = [] { return any_of({one_of(std::array{kOnlyFirst, kEachFix}), quantity_schema(kDuration)}); };
+  return {{kKey, "of the open-loop navigator: a duration, none or continuous", schema,
+           [&corrections, kKey](const TomlTable& table, const toml::node& node) {
+             corrections = parse_correction_interval(quantity_text(table, node, kKey));
+           }}};
 }
+
+Fields file_fields(CalibrationOptions& options, const fs::path& file) {
+  return {
+      estimator(options), drift_model(options),
+      section("filter", file, "[filter]", "of estimators invariant and batch", [&] { return filter_fields(options); }),
+      section("further_states", file, "[further_states]", "of estimators invariant and batch",
+              [&] { return further_state_fields(options.further_states); }),
+      section("corrections", file, "[corrections]", "of the navigator",
+              [&] { return correction_fields(options.corrections); })};
+}
+
+/// Lines of TOML, each commented by what the schema says of its key.
+class Writer {
+ public:
+  explicit Writer(const Json& schema) : schema_(schema), keys_(&schema_.at("properties")) {}
+
+  void section(const std::string& name) {
+    const Json& table = schema_.at("properties").at(name);
+    text_ += fmt::format("\n[{}]  # {}\n", name, table.at("description").get_ref<const std::string&>());
+    keys_ = &table.at("properties");
+  }
+  void word(std::string_view key, std::string_view value) { number(key, fmt::format("\"{}\"", value)); }
+  template <class T>
+  void number(std::string_view key, const T& value) {
+    const auto& about = keys_->at(std::string(key)).at("description").get_ref<const std::string&>();
+    text_ += fmt::format("{} = {}  # {}\n", key, value, about);
+  }
+  [[nodiscard]] const std::string& text() const { return text_; }
+
+ private:
+  const Json& schema_;
+  const Json* keys_;
+  std::string text_ =
+      "# Settings as given, and the defaults of the others. Give this file to --config to repeat the run.\n";
+};
 
 }  // namespace
 
 CorrectionOptions parse_correction_interval(std::string_view text) {
   CorrectionOptions corrections;
-  if (text == "none") {
+  if (text == kOnlyFirst) {
     corrections.when = CorrectionOptions::When::kOnlyFirst;
-  } else if (text == "continuous") {
+  } else if (text == kEachFix) {
     corrections.when = CorrectionOptions::When::kEachFix;
   } else {
     corrections.interval = within(limits::kCorrectionInterval_s, parse_duration(text), text);
@@ -114,9 +188,9 @@ CorrectionOptions parse_correction_interval(std::string_view text) {
 std::string format_correction_interval(const CorrectionOptions& corrections) {
   switch (corrections.when) {
     case CorrectionOptions::When::kOnlyFirst:
-      return "none";
+      return std::string(kOnlyFirst);
     case CorrectionOptions::When::kEachFix:
-      return "continuous";
+      return std::string(kEachFix);
     case CorrectionOptions::When::kEvery:
       break;
   }
@@ -126,116 +200,48 @@ std::string format_correction_interval(const CorrectionOptions& corrections) {
 CalibrationOptions read_config(const fs::path& path) {
   const TextFile file(path);
   const toml::table document = parse_toml(file.text(), path);
-  const TomlTable root(document, path, "the file",
-                       {"estimator", "drift_model", "filter", "further_states", "corrections"});
   CalibrationOptions options;
-  if (const toml::node* node = root.find("estimator")) {
-    const std::optional<Estimator> estimator = estimator_named(root.text(*node, "estimator"));
-    if (!estimator) {
-      root.refuse(*node, fmt::format("there is no estimator {}", in_quotes(root.text(*node, "estimator"))),
-                  fmt::format("use one of: {}", estimator_choices()));
-    }
-    options.estimator = *estimator;
-  }
-  if (const toml::node* node = root.find("drift_model")) {
-    const std::string name = root.text(*node, "drift_model");
-    options.drift_model = drift_model_named(name);
-    if (!options.drift_model && name != kAutoDriftModel) {
-      root.refuse(*node, fmt::format("there is no drift model {}", in_quotes(name)),
-                  fmt::format("use {}, {}", kAutoDriftModel, drift_model_choices()));
-    }
-  }
-  if (root.find("filter") != nullptr) {
-    const TomlTable filter(root.table_at("filter"), path, "[filter]",
-                           {"noise", "direction_random_walk", "gate_nis", "student_t_freedom",
-                            "reopen_after_rejections", "reopen_after_jump_rejections", "angles_after"});
-    if (const toml::node* node = filter.find("noise")) {
-      const std::string noise = filter.text(*node, "noise");
-      if (noise != "found" && noise != "told") {
-        filter.refuse(*node, "\"noise\" is neither found nor told", "write one of them");
-      }
-      options.find_noise = noise == "found";
-    }
-    if (const toml::node* node = filter.find("direction_random_walk")) {
-      options.direction_random_walk_rad_sqrt_s = quantity(filter, *node, "direction_random_walk",
-                                                          limits::kRandomWalk_rad_sqrt_s, parse_random_walk_rad_sqrt_s);
-    }
-    if (const toml::node* node = filter.find("gate_nis")) {
-      options.gate_nis = filter.number(*node, "gate_nis", limits::kGateNis);
-    }
-    if (const toml::node* node = filter.find("reopen_after_rejections")) {
-      options.reopen_after_rejections = whole_number(filter, *node, "reopen_after_rejections", limits::kRejections);
-    }
-    if (const toml::node* node = filter.find("reopen_after_jump_rejections")) {
-      options.reopen_after_jump_rejections =
-          whole_number(filter, *node, "reopen_after_jump_rejections", limits::kRejections);
-    }
-    if (const toml::node* node = filter.find("student_t_freedom")) {
-      options.student_t_freedom = filter.number(*node, "student_t_freedom", limits::kStudentTFreedom);
-    }
-    if (const toml::node* node = filter.find("angles_after")) {
-      const bool never = filter.text(*node, "angles_after") == kNever;
-      options.angles_after =
-          never ? Duration::max() : quantity(filter, *node, "angles_after", limits::kAnglesAfter_s, parse_duration);
-    }
-  }
-  if (root.find("further_states") != nullptr) {
-    const TomlTable further(root.table_at("further_states"), path, "[further_states]", further_state_keys());
-    FurtherStateOptions& states = options.further_states;
-    for (const FurtherStateRow& row : kFurtherStates) {
-      const toml::node* node = row.key.empty() ? nullptr : further.find(row.key);
-      if (node == nullptr) {
-        continue;
-      }
-      if (row.state != FurtherState::kWanderingDrift) {
-        states[row.state] = choice(further, *node, row.key);
-      } else if (const auto word = choice_of(further.text(*node, row.key)); word && *word != Choice::kOn) {
-        states[row.state] = *word;
-      } else {
-        states[row.state] = Choice::kOn;
-        states.wandering_drift_rad_s =
-            quantity(further, *node, row.key, limits::kWanderingDrift_rad_s, parse_rate_rad_s);
-      }
-    }
-    if (const toml::node* node = further.find(kWanderingTime)) {
-      states.wandering_time = quantity(further, *node, kWanderingTime, limits::kWanderingTime_s, parse_duration);
-    }
-  }
-  if (root.find("corrections") != nullptr) {
-    const TomlTable corrections(root.table_at("corrections"), path, "[corrections]", {"interval"});
-    if (const toml::node* node = corrections.find("interval")) {
-      options.corrections = parsed(corrections, *node, "interval", parse_correction_interval);
-    }
-  }
+  read_fields(document, path, "the file", file_fields(options, path));
   return options;
 }
 
+Json config_schema() {
+  CalibrationOptions options;
+  const fs::path file;
+  return document_schema("Settings", "What --config takes (TOML). What is left out keeps its default.",
+                         schema_of(file_fields(options, file)));
+}
+
 std::string format_config(const CalibrationOptions& options) {
-  return fmt::format(
-      "# Settings as given, and the defaults of the others. Give this file to --config to repeat the run.\n"
-      "estimator = \"{}\"\n"
-      "drift_model = \"{}\"\n"
-      "\n"
-      "[filter]\n"
-      "noise = \"{}\"  # found: from the pass; told: as set here and in pass.toml\n"
-      "direction_random_walk = \"{}\"  # process noise of each momentum, per axis across it\n"
-      "gate_nis = {}  # a fix with a larger normalised innovation squared is rejected\n"
-      "student_t_freedom = {}  # 5 to 20: it is used with less weight instead; 0: rejected\n"
-      "reopen_after_rejections = {}  # in a row; then the directions are reopened and the fix is used\n"
-      "reopen_after_jump_rejections = {}  # the same where they began with a jump that no drift can make\n"
-      "angles_after = \"{}\"  # without a fix, by the angles between the momenta: a duration or never\n"
-      "\n"
-      "[further_states]  # of estimators invariant and batch\n"
-      "{}"
-      "\n"
-      "[corrections]\n"
-      "interval = \"{}\"  # of the open-loop navigator: a duration, none or continuous\n",
-      name_of(options.estimator), options.drift_model ? name_of(*options.drift_model) : std::string(kAutoDriftModel),
-      options.find_noise ? "found" : "told", format_random_walk(options.direction_random_walk_rad_sqrt_s),
-      options.gate_nis, options.student_t_freedom, options.reopen_after_rejections,
-      options.reopen_after_jump_rejections,
-      options.angles_after == Duration::max() ? std::string(kNever) : format_duration(options.angles_after),
-      format_further_states(options.further_states), format_correction_interval(options.corrections));
+  const Json schema = config_schema();
+  Writer out(schema);
+  out.word("estimator", name_of(options.estimator));
+  out.word("drift_model", options.drift_model ? name_of(*options.drift_model) : std::string(kAutoDriftModel));
+
+  out.section("filter");
+  out.word("noise", options.find_noise ? "found" : "told");
+  out.word("direction_random_walk", format_random_walk(options.direction_random_walk_rad_sqrt_s));
+  out.number("gate_nis", options.gate_nis);
+  out.number("student_t_freedom", options.student_t_freedom);
+  out.number("reopen_after_rejections", options.reopen_after_rejections);
+  out.number("reopen_after_jump_rejections", options.reopen_after_jump_rejections);
+  out.word("angles_after",
+           options.angles_after == Duration::max() ? std::string(kNever) : format_duration(options.angles_after));
+
+  out.section("further_states");
+  const FurtherStateOptions& states = options.further_states;
+  for (const FurtherStateRow& row : kFurtherStates) {
+    if (!row.key.empty()) {
+      const bool has_size = row.state == FurtherState::kWanderingDrift && states.is_on(row.state);
+      out.word(row.key, has_size ? fmt::format("{}rad/s", states.wandering_drift_rad_s)
+                                 : std::string(name_of(states[row.state])));
+    }
+  }
+  out.word(kWanderingTime, format_duration(states.wandering_time));
+
+  out.section("corrections");
+  out.word("interval", format_correction_interval(options.corrections));
+  return out.text();
 }
 
 }  // namespace trihedron::io

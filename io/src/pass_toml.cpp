@@ -3,15 +3,14 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <array>
 #include <sstream>
 
+#include "schemas.hpp"
 #include "screening.hpp"
-#include "toml_table.hpp"
+#include "toml_fields.hpp"
 #include "trihedron/core/drift.hpp"
 #include "trihedron/io/calibration.hpp"
 #include "trihedron/io/time_text.hpp"
-#include "wording.hpp"
 
 namespace trihedron::io {
 namespace {
@@ -27,120 +26,182 @@ constexpr std::string_view kDriftSigma = "drift_prior_sigma_rad_s";
 constexpr std::string_view kAlignment = "alignment_prior_rotation_vector_rad";
 constexpr std::string_view kAlignmentSigma = "alignment_prior_sigma_rad";
 
-Duration duration_at(const TomlTable& table, std::string_view key, const Range& range) {
-  return from_seconds(table.number(table.at(key), key, range));
-}
-
-Time parse_epoch_node(const TomlTable& table, std::string_view key) {
-  const toml::node& node = table.at(key);
-  std::string text;
-  if (const auto* local = node.as_date_time(); local != nullptr && !local->get().offset) {
-    std::ostringstream stream;
-    stream << local->get();
-    text = stream.str();
-  } else {
-    text = table.text(node, key);
-  }
-  const std::optional<Time> epoch = parse_epoch(text);
-  if (!epoch) {
-    table.refuse(node, fmt::format("\"{}\" is {}, not an ISO date and time", key, in_quotes(text)),
-                 "write it like \"2009-05-20T00:00:00\", TAI, years 1958 to 2200, without time zone");
-  }
-  return *epoch;
-}
-
 /// A table by drift coefficient.
-std::map<DriftCoefficient, double> by_coefficient(const TomlTable& parent, const toml::node& node, std::string_view key,
-                                                  const fs::path& file, const Range& range) {
-  const std::vector<std::string_view> known(Esg7::kNames.begin(), Esg7::kNames.end());
-  const TomlTable table(parent.as_table(node, key), file, std::string(key), known);
-  std::map<DriftCoefficient, double> values;
+Fields coefficient_fields(std::map<DriftCoefficient, double>& values, const Range& range) {
+  Fields fields;
   for (int i = 0; i < Esg7::kSize; ++i) {
-    const char* name = Esg7::kNames.at(static_cast<std::size_t>(i));
-    if (const toml::node* value = table.find(name)) {
-      values[DriftCoefficient::of_eq1(i)] = table.number(*value, name, range);
+    const std::string_view name = Esg7::kNames.at(static_cast<std::size_t>(i));
+    fields.push_back({name, "", [range] { return number_schema(range); },
+                      [=, &values](const TomlTable& table, const toml::node& node) {
+                        values[DriftCoefficient::of_eq1(i)] = table.number(node, name, range);
+                      }});
+  }
+  return fields;
+}
+
+Field drift_sigma(GyroPrior& prior) {
+  return one_number(kDriftSigma, prior.drift_common_sigma_rad_s, limits::kDriftSigma_rad_s,
+                    "1-sigma of each drift coefficient");
+}
+
+/// One number, or a table by coefficient.
+Field drift_sigmas(GyroPrior& prior, const fs::path& file) {
+  const auto schema = [&prior] {
+    return any_of({number_schema(limits::kDriftSigma_rad_s),
+                   schema_of(coefficient_fields(prior.drift_sigma_rad_s, limits::kDriftSigma_rad_s))});
+  };
+  return {kDriftSigma, "1-sigma of each drift coefficient, or by coefficient", schema,
+          [&prior, &file](const TomlTable& table, const toml::node& node) {
+            if (node.is_table()) {
+              read_fields(table.as_table(node, kDriftSigma), file, std::string(kDriftSigma),
+                          coefficient_fields(prior.drift_sigma_rad_s, limits::kDriftSigma_rad_s));
+            } else {
+              drift_sigma(prior).read(table, node);
+            }
+          }};
+}
+
+/// One number, or three about c x, y, z.
+Field alignment_sigma(GyroPrior& prior) {
+  const auto schema = [] {
+    return any_of({number_schema(limits::kAlignmentSigma_rad), three_of(number_schema(limits::kAlignmentSigma_rad))});
+  };
+  return {kAlignmentSigma, "1-sigma of the alignment, or about each axis", schema,
+          [&prior](const TomlTable& table, const toml::node& node) {
+            prior.alignment_sigma_rad =
+                node.is_array()
+                    ? table.three_numbers(node, kAlignmentSigma, limits::kAlignmentSigma_rad)
+                    : Eigen::Vector3d::Constant(table.number(node, kAlignmentSigma, limits::kAlignmentSigma_rad));
+          }};
+}
+
+Field readout_noise(GyroPrior& prior) {
+  return one_number(kNoise, prior.readout_noise_rad, limits::kReadoutNoise_rad, "1-sigma per direction cosine");
+}
+
+Fields unit_fields(GyroPrior& prior, const fs::path& file) {
+  return {readout_noise(prior),
+          section(kDrift, file, std::string(kDrift), "drift coefficients known before the pass",
+                  [&prior] { return coefficient_fields(prior.drift_rad_s, limits::kDrift_rad_s); }),
+          drift_sigmas(prior, file),
+          three_numbers(kAlignment, prior.alignment_rotation_vector_rad, limits::kRotation_rad,
+                        "alignment known before the pass"),
+          alignment_sigma(prior)};
+}
+
+/// What [[gyro.unit]] says of each gyro, over what is known of all.
+Field units(std::vector<GyroPrior>& gyros, const fs::path& file) {
+  const auto schema = [&file] {
+    GyroPrior prior;
+    return array_of(schema_of(unit_fields(prior, file)));
+  };
+  return {
+      "unit", "one per gyro: what differs", schema, [&gyros, &file](const TomlTable& table, const toml::node& node) {
+        const auto tables = tables_of(table, node, "unit", "begin the part of each gyro with [[gyro.unit]]");
+        if (tables.size() != gyros.size()) {
+          table.refuse(
+              node,
+              fmt::format("[[gyro.unit]] is there {} times, the telemetry has {} gyros", tables.size(), gyros.size()),
+              "give one per gyro, in their order");
+        }
+        for (std::size_t i = 0; i < gyros.size(); ++i) {
+          read_fields(*tables[i], file, fmt::format("[[gyro.unit]] {}", i + 1), unit_fields(gyros[i], file));
+        }
+      }};
+}
+
+/// `common`: of all gyros. What [[gyro.unit]] says of each is read after it.
+Fields gyro_fields(PassSettings& settings, GyroPrior& common, const fs::path& file) {
+  Field sigma = drift_sigma(common);
+  sigma.read = [&common](const TomlTable& table, const toml::node& node) {
+    if (node.is_table()) {
+      table.refuse(node, fmt::format("\"{}\" is a table", kDriftSigma),
+                   "in [gyro] give one number; a table by coefficient belongs in [[gyro.unit]]");
     }
-  }
-  return values;
+    drift_sigma(common).read(table, node);
+  };
+  Field unit = units(settings.gyros, file);
+  unit.read = [](const TomlTable&, const toml::node&) {};
+  return {required(number_of_seconds("period_s", settings.gyro_period, limits::kGyroPeriod_s, "of the samples")),
+          text(kStartUp, settings.start_up, "of the rotors, where it is known"),
+          required(readout_noise(common)),
+          required(std::move(sigma)),
+          required(alignment_sigma(common)),
+          std::move(unit)};
 }
 
-/// What the keys of [gyro] or of one [[gyro.unit]] say of a gyro, over what is known already.
-void read_prior(const TomlTable& table, const fs::path& file, GyroPrior& prior) {
-  if (const toml::node* node = table.find(kNoise)) {
-    prior.readout_noise_rad = table.number(*node, kNoise, limits::kReadoutNoise_rad);
-  }
-  if (const toml::node* node = table.find(kDrift)) {
-    prior.drift_rad_s = by_coefficient(table, *node, kDrift, file, limits::kDrift_rad_s);
-  }
-  if (const toml::node* node = table.find(kDriftSigma)) {
-    if (node->is_table()) {
-      prior.drift_sigma_rad_s = by_coefficient(table, *node, kDriftSigma, file, limits::kDriftSigma_rad_s);
-    } else {
-      prior.drift_common_sigma_rad_s = table.number(*node, kDriftSigma, limits::kDriftSigma_rad_s);
-    }
-  }
-  if (const toml::node* node = table.find(kAlignment)) {
-    prior.alignment_rotation_vector_rad = table.three_numbers(*node, kAlignment, limits::kRotation_rad);
-  }
-  if (const toml::node* node = table.find(kAlignmentSigma)) {
-    constexpr const Range& kRange = limits::kAlignmentSigma_rad;
-    prior.alignment_sigma_rad = node->is_array()
-                                    ? table.three_numbers(*node, kAlignmentSigma, kRange)
-                                    : Eigen::Vector3d::Constant(table.number(*node, kAlignmentSigma, kRange));
-  }
+Field gyros(PassSettings& settings, const fs::path& file) {
+  const auto schema = [&settings, &file] {
+    GyroPrior common;
+    return schema_of(gyro_fields(settings, common, file));
+  };
+  return {"gyro", "of all gyros", schema, [&settings, &file](const TomlTable& root, const toml::node& node) {
+            const toml::table& table = root.as_table(node, "gyro");
+            GyroPrior common;
+            read_fields(table, file, "[gyro]", gyro_fields(settings, common, file));
+            std::ranges::fill(settings.gyros, common);
+            if (const toml::node* unit = table.get("unit")) {
+              units(settings.gyros, file).read(TomlTable(table, file, "[gyro]"), *unit);
+            }
+          }};
 }
 
-std::vector<FurtherStarTracker> read_further_star_trackers(const TomlTable& table, const fs::path& file) {
-  std::vector<FurtherStarTracker> heads;
-  const toml::node* further = table.find("further");
-  if (further == nullptr) {
-    return heads;
-  }
-  const toml::array* array = further->as_array();
-  if (array == nullptr || !array->is_array_of_tables()) {
-    table.refuse(*further, "\"further\" is not an array of tables",
-                 "begin the part of each further head with [[star_tracker.further]]");
-  }
-  for (const toml::node& element : *array) {
-    const TomlTable head(*element.as_table(), file, fmt::format("[[star_tracker.further]] {}", heads.size() + 1),
-                         {kHeadNoise, kMounting, kAlignmentSigma});
-    heads.push_back({head.three_numbers(head.at(kHeadNoise), kHeadNoise, limits::kStarTrackerNoise_rad),
-                     head.three_numbers(head.at(kMounting), kMounting, limits::kRotation_rad),
-                     head.number(head.at(kAlignmentSigma), kAlignmentSigma, limits::kAlignmentSigma_rad)});
-  }
-  return heads;
+Fields further_head_fields(FurtherStarTracker& head) {
+  return {
+      required(three_numbers(kHeadNoise, head.noise_rad, limits::kStarTrackerNoise_rad, "1-sigma about its x, y, z")),
+      required(three_numbers(kMounting, head.mounting_rotation_vector_rad, limits::kRotation_rad, "as designed")),
+      required(one_number(kAlignmentSigma, head.alignment_prior_sigma_rad, limits::kAlignmentSigma_rad,
+                          "1-sigma per axis"))};
 }
 
-std::vector<GyroPrior> read_gyros(const TomlTable& table, const fs::path& file, int gyros) {
-  for (const std::string_view key : {kNoise, kDriftSigma, kAlignmentSigma}) {
-    static_cast<void>(table.at(key));
-  }
-  GyroPrior common;
-  if (const toml::node& node = table.at(kDriftSigma); node.is_table()) {
-    table.refuse(node, fmt::format("\"{}\" is a table", kDriftSigma),
-                 "in [gyro] give one number; a table by coefficient belongs in [[gyro.unit]]");
-  }
-  read_prior(table, file, common);
-  std::vector<GyroPrior> priors(static_cast<std::size_t>(gyros), common);
-  const toml::node* units = table.find("unit");
-  if (units == nullptr) {
-    return priors;
-  }
-  const toml::array* array = units->as_array();
-  if (array == nullptr || !array->is_array_of_tables()) {
-    table.refuse(*units, "\"unit\" is not an array of tables", "begin the part of each gyro with [[gyro.unit]]");
-  }
-  if (array->size() != priors.size()) {
-    table.refuse(*units,
-                 fmt::format("[[gyro.unit]] is there {} times, the telemetry has {} gyros", array->size(), gyros),
-                 "give one per gyro, in their order");
-  }
-  for (std::size_t i = 0; i < priors.size(); ++i) {
-    const TomlTable unit(*(*array)[i].as_table(), file, fmt::format("[[gyro.unit]] {}", i + 1),
-                         {kNoise, kDrift, kDriftSigma, kAlignment, kAlignmentSigma});
-    read_prior(unit, file, priors[i]);
-  }
-  return priors;
+Field further_heads(PassSettings& settings, const fs::path& file) {
+  const auto schema = [] {
+    FurtherStarTracker head;
+    return array_of(schema_of(further_head_fields(head)));
+  };
+  return {
+      "further", "further heads", schema, [&settings, &file](const TomlTable& table, const toml::node& node) {
+        settings.further_star_trackers.clear();
+        for (const toml::table* element :
+             tables_of(table, node, "further", "begin the part of each further head with [[star_tracker.further]]")) {
+          FurtherStarTracker& head = settings.further_star_trackers.emplace_back();
+          read_fields(*element, file, fmt::format("[[star_tracker.further]] {}", settings.further_star_trackers.size()),
+                      further_head_fields(head));
+        }
+      }};
+}
+
+Fields star_tracker_fields(PassSettings& settings, const fs::path& file) {
+  return {required(number_of_seconds("period_s", settings.star_tracker_period, limits::kStarTrackerPeriod_s,
+                                     "of the fixes")),
+          required(three_numbers(kHeadNoise, settings.star_tracker_noise_rad, limits::kStarTrackerNoise_rad,
+                                 "1-sigma about c x, y, z")),
+          further_heads(settings, file)};
+}
+
+/// An earlier calibration, in [pass] or before it.
+Field prior(std::optional<std::string>& found) {
+  return {"prior", "calibration.json of an earlier pass, beside this file", text_schema,
+          [&found](const TomlTable& table, const toml::node& node) {
+            if (found) {
+              table.refuse(node, "\"prior\" is there twice", "keep the one in [pass]");
+            }
+            found = table.text(node, "prior");
+          }};
+}
+
+Fields pass_fields(PassSettings& settings, std::optional<std::string>& prior_file) {
+  return {required(text("spacecraft", settings.spacecraft, "its name")),
+          required(epoch("epoch_tai", settings.epoch, "start of the pass, TAI")),
+          required(number_of_seconds("duration_s", settings.duration, limits::kPassDuration_s, "of the pass")),
+          prior(prior_file)};
+}
+
+Fields file_fields(PassSettings& settings, std::optional<std::string>& prior_file, const fs::path& file) {
+  return {required(section("pass", file, "[pass]", "when", [&] { return pass_fields(settings, prior_file); })),
+          prior(prior_file), required(gyros(settings, file)),
+          required(section("star_tracker", file, "[star_tracker]", "of the first head",
+                           [&] { return star_tracker_fields(settings, file); }))};
 }
 
 std::string format_three(const Eigen::Vector3d& v) { return fmt::format("[{}, {}, {}]", v.x(), v.y(), v.z()); }
@@ -190,69 +251,49 @@ std::string format_unit(const GyroPrior& gyro, const GyroPrior& common) {
   return text + fmt::format("{} = {}\n", kDriftSigma, format_map(sigmas));
 }
 
-TomlTable root_table(const toml::table& document, const fs::path& file) {
-  return {document, file, "the file", {"pass", "gyro", "star_tracker", "prior"}};
-}
-
-TomlTable pass_table(const TomlTable& root, const fs::path& file) {
-  return {root.table_at("pass"), file, "[pass]", {"spacecraft", "epoch_tai", "duration_s", "prior"}};
-}
-
-/// That `prior` names, at the root or in [pass]; empty where there is none.
-fs::path prior_file_in(const TomlTable& root, const TomlTable& pass, const fs::path& directory) {
-  const bool at_root = root.find("prior") != nullptr;
-  const TomlTable& holder = at_root ? root : pass;
-  const toml::node* const prior = holder.find("prior");
-  if (prior == nullptr) {
-    return {};
-  }
-  if (at_root && pass.find("prior") != nullptr) {
-    root.refuse(*prior, "\"prior\" is there twice", "keep the one in [pass]");
-  }
-  return directory / holder.text(*prior, "prior");
-}
-
 }  // namespace
 
 Time parse_pass_epoch(std::string_view text, const fs::path& file) {
   const toml::table document = parse_toml(text, file);
-  return parse_epoch_node(pass_table(root_table(document, file), file), "epoch_tai");
+  const TomlTable root(document, file, "the file");
+  PassSettings settings;
+  std::optional<std::string> prior_name;
+  read_fields(root.table_at("pass"), file, "[pass]", pass_fields(settings, prior_name));
+  return settings.epoch;
 }
 
 fs::path parse_prior_file(std::string_view text, const fs::path& file, const fs::path& directory) {
   const toml::table document = parse_toml(text, file);
-  const TomlTable root = root_table(document, file);
-  return prior_file_in(root, pass_table(root, file), directory);
+  const TomlTable root(document, file, "the file");
+  PassSettings settings;
+  std::optional<std::string> prior_name;
+  if (const toml::node* const at_root = root.find("prior")) {
+    prior(prior_name).read(root, *at_root);
+  }
+  read_fields(root.table_at("pass"), file, "[pass]", pass_fields(settings, prior_name));
+  return prior_name ? directory / *prior_name : fs::path();
 }
 
 PassSettings parse_pass_toml(std::string_view text, const fs::path& file, const fs::path& directory, int gyros) {
   const toml::table document = parse_toml(text, file);
-  const TomlTable root = root_table(document, file);
-  const TomlTable pass = pass_table(root, file);
-  const TomlTable gyro(root.table_at("gyro"), file, "[gyro]",
-                       {"period_s", kStartUp, kNoise, kDriftSigma, kAlignmentSigma, "unit"});
-  const TomlTable star_tracker(root.table_at("star_tracker"), file, "[star_tracker]",
-                               {"period_s", kHeadNoise, "further"});
-
   PassSettings settings;
-  settings.spacecraft = pass.text(pass.at("spacecraft"), "spacecraft");
-  settings.epoch = parse_epoch_node(pass, "epoch_tai");
-  settings.duration = duration_at(pass, "duration_s", limits::kPassDuration_s);
-  settings.gyro_period = duration_at(gyro, "period_s", limits::kGyroPeriod_s);
-  settings.star_tracker_period = duration_at(star_tracker, "period_s", limits::kStarTrackerPeriod_s);
-  settings.star_tracker_noise_rad =
-      star_tracker.three_numbers(star_tracker.at(kHeadNoise), kHeadNoise, limits::kStarTrackerNoise_rad);
-  settings.further_star_trackers = read_further_star_trackers(star_tracker, file);
-  settings.gyros = read_gyros(gyro, file, gyros);
-  if (const toml::node* start_up = gyro.find(kStartUp)) {
-    settings.start_up = gyro.text(*start_up, kStartUp);
-  }
-
-  if (const fs::path prior_file = prior_file_in(root, pass, directory); !prior_file.empty()) {
+  settings.gyros.resize(static_cast<std::size_t>(gyros));
+  std::optional<std::string> prior_name;
+  read_fields(document, file, "the file", file_fields(settings, prior_name, file));
+  if (prior_name) {
+    const fs::path prior_file = directory / *prior_name;
     settings.prior = read_calibration(prior_file);
     check_prior(*settings.prior, prior_file, gyros);
   }
   return settings;
+}
+
+Json pass_schema() {
+  PassSettings settings;
+  std::optional<std::string> prior_name;
+  const fs::path file;
+  return document_schema("Pass", "pass.toml: when and how the telemetry was taken, and what is known before.",
+                         schema_of(file_fields(settings, prior_name, file)));
 }
 
 void check_prior(const Calibration& prior, const fs::path& prior_file, int gyros) {

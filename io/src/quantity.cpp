@@ -2,54 +2,21 @@
 
 #include <fmt/format.h>
 
-#include <array>
 #include <charconv>
 #include <cmath>
 #include <cstdint>
-#include <numbers>
 #include <optional>
-#include <span>
 
+#include "quantity_kind.hpp"
 #include "trihedron/io/error.hpp"
 #include "wording.hpp"
 
 namespace trihedron::io {
 namespace {
 
-struct Unit {
-  std::string_view name;
-  double factor;  ///< of the unit that the program computes in
-};
-
-constexpr double kDegree = std::numbers::pi / 180;
-constexpr double kArcMinute = kDegree / 60;
-constexpr double kArcSecond = kDegree / 3600;
-
-// Largest first: formatting takes the first that fits.
-constexpr std::array kDurations = {Unit{"d", 86400e9}, Unit{"h", 3600e9}, Unit{"min", 60e9}, Unit{"s", 1e9},
-                                   Unit{"ms", 1e6},    Unit{"us", 1e3},   Unit{"ns", 1}};
-constexpr std::array kAngles = {Unit{"deg", kDegree}, Unit{"arcmin", kArcMinute}, Unit{"arcsec", kArcSecond},
-                                Unit{"rad", 1}};
-constexpr std::array kRates = {Unit{"deg/h", kDegree / 3600}, Unit{"deg/s", kDegree}, Unit{"arcmin/s", kArcMinute},
-                               Unit{"arcsec/s", kArcSecond},  Unit{"rad/s", 1},       Unit{"rad/h", 1.0 / 3600}};
-constexpr std::array kRandomWalks = {Unit{"deg/h^0.5", kDegree / 60}, Unit{"deg/s^0.5", kDegree},
-                                     Unit{"arcsec/s^0.5", kArcSecond}, Unit{"rad/s^0.5", 1}};
-
-/// Description of the accepted texts, for the error message.
-struct Kind {
-  std::string_view name;
-  std::span<const Unit> units;
-  std::string_view example;
-};
-
-constexpr Kind kDuration{"a duration", kDurations, "90min"};
-constexpr Kind kAngle{"an angle", kAngles, "5arcmin"};
-constexpr Kind kRate{"a rate", kRates, "0.1deg/h"};
-constexpr Kind kRandomWalk{"an angle random walk", kRandomWalks, "0.001deg/h^0.5"};
-
-[[noreturn]] void refuse(std::string_view text, const Kind& kind, std::string_view reason) {
+[[noreturn]] void refuse(std::string_view text, const QuantityKind& kind, std::string_view reason) {
   std::string accepted;
-  for (const Unit& unit : kind.units) {
+  for (const UnitOfMeasure& unit : kind.units) {
     accepted += accepted.empty() ? "" : ", ";
     accepted += unit.name;
   }
@@ -72,34 +39,14 @@ std::optional<Parsed> parse_head(std::string_view text) {
   return Parsed{number, trimmed(text.substr(static_cast<std::size_t>(end - text.data())))};
 }
 
-double parse(std::string_view text, const Kind& kind) {
-  const std::optional<Parsed> parsed = parse_head(trimmed(text));
-  if (!parsed) {
-    refuse(text, kind, "it does not begin with a finite number");
-  }
-  if (parsed->rest.empty()) {
-    refuse(text, kind, "the unit is missing");
-  }
-  for (const Unit& unit : kind.units) {
-    if (unit.name == parsed->rest) {
-      const double value = parsed->number * unit.factor;
-      if (!std::isfinite(value)) {
-        refuse(text, kind, "it is too large");
-      }
-      return value;
-    }
-  }
-  refuse(text, kind, fmt::format("unit {} is unknown", in_quotes(parsed->rest)));
-}
-
 /// The shortest text that parses back to the same bits; the last unit of each kind has factor 1 or fits always.
-std::string format(double value, const Kind& kind) {
+std::string format(double value, const QuantityKind& kind) {
   std::string best;
-  for (const Unit& unit : kind.units) {
+  for (const UnitOfMeasure& unit : kind.units) {
     for (const int digits : {6, 15, 17}) {
       const double number = value / unit.factor;
       const std::string text = fmt::format("{:.{}g}{}", number, digits, unit.name);
-      if (std::isfinite(number) && parse(text, kind) == value) {
+      if (std::isfinite(number) && parse_quantity(text, kind) == value) {
         if (best.empty() || text.size() < best.size()) {
           best = text;
         }
@@ -112,9 +59,40 @@ std::string format(double value, const Kind& kind) {
 
 }  // namespace
 
+double parse_quantity(std::string_view text, const QuantityKind& kind) {
+  const std::optional<Parsed> parsed = parse_head(trimmed(text));
+  if (!parsed) {
+    refuse(text, kind, "it does not begin with a finite number");
+  }
+  if (parsed->rest.empty()) {
+    refuse(text, kind, "the unit is missing");
+  }
+  for (const UnitOfMeasure& unit : kind.units) {
+    if (unit.name == parsed->rest) {
+      const double value = parsed->number * unit.factor;
+      if (!std::isfinite(value)) {
+        refuse(text, kind, "it is too large");
+      }
+      return value;
+    }
+  }
+  refuse(text, kind, fmt::format("unit {} is unknown", in_quotes(parsed->rest)));
+}
+
+std::string pattern_of(const QuantityKind& kind) {
+  std::string names;
+  for (const UnitOfMeasure& unit : kind.units) {
+    names += names.empty() ? "" : "|";
+    for (const char c : unit.name) {
+      names += c == '^' || c == '.' ? fmt::format("\\{}", c) : std::string(1, c);
+    }
+  }
+  return fmt::format(R"(^[ \t]*-?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?[ \t]*({})[ \t]*$)", names);
+}
+
 Duration parse_signed_duration(std::string_view text) {
   constexpr double kLimitNs = 9.2e18;
-  const double ns = parse(text, kDuration);
+  const double ns = parse_quantity(text, kDuration);
   if (!(std::abs(ns) < kLimitNs)) {
     refuse(text, kDuration, "it is longer than 292 years");
   }
@@ -133,9 +111,9 @@ Duration parse_duration(std::string_view text) {
   return duration;
 }
 
-double parse_angle_rad(std::string_view text) { return parse(text, kAngle); }
-double parse_rate_rad_s(std::string_view text) { return parse(text, kRate); }
-double parse_random_walk_rad_sqrt_s(std::string_view text) { return parse(text, kRandomWalk); }
+double parse_angle_rad(std::string_view text) { return parse_quantity(text, kAngle); }
+double parse_rate_rad_s(std::string_view text) { return parse_quantity(text, kRate); }
+double parse_random_walk_rad_sqrt_s(std::string_view text) { return parse_quantity(text, kRandomWalk); }
 
 double within(const Range& range, double value, std::string_view text) {
   if (!range.holds(value)) {
@@ -159,7 +137,7 @@ double parse_number(std::string_view text) {
 }
 
 std::string format_duration(Duration duration) {
-  for (const Unit& unit : kDurations) {
+  for (const UnitOfMeasure& unit : kDuration.units) {
     const auto ns = static_cast<std::int64_t>(unit.factor);
     if (duration.count() % ns == 0 && (duration.count() != 0 || unit.name == "s")) {
       return fmt::format("{}{}", duration.count() / ns, unit.name);

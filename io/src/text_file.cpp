@@ -3,16 +3,50 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <system_error>
 
 #include "input_file.hpp"
 #include "trihedron/io/error.hpp"
+#include "trihedron/io/standard_input.hpp"
 #include "trihedron/records/stop.hpp"
 
 namespace trihedron::io {
 
+void TextFile::read_standard_input() {
+  constexpr std::size_t kMost = std::size_t{1} << 30U;  // more than any text that this program takes
+  std::size_t capacity = std::size_t{1} << 16U;
+  bytes_ = std::make_unique_for_overwrite<char[]>(capacity + 1);
+  while (true) {
+    check_stop();
+    const ssize_t got = ::read(STDIN_FILENO, &bytes_[size_], capacity - size_);
+    if (got == 0) {
+      break;
+    }
+    if (got < 0 && errno != EINTR) {
+      throw MachineFailed("standard input", fmt::format("cannot be read: {}", std::generic_category().message(errno)),
+                          "check what gives it");
+    }
+    size_ += static_cast<std::size_t>(std::max<ssize_t>(got, 0));
+    if (size_ == kMost) {
+      throw InputRefused("standard input", {}, "is longer than 1 GiB", "give a text");
+    }
+    if (size_ == capacity) {
+      capacity *= 2;
+      auto larger = std::make_unique_for_overwrite<char[]>(capacity + 1);
+      std::copy_n(bytes_.get(), size_, larger.get());
+      bytes_ = std::move(larger);
+    }
+  }
+  bytes_[size_] = '\n';
+}
+
 TextFile::TextFile(const std::filesystem::path& path) {
+  if (path == kStandardInput) {
+    read_standard_input();
+    return;
+  }
   const InputFile file(path);
   const std::size_t expected = file.size();
   // Read, not memory-mapped: if another program truncates a mapped file, access ends this one by a signal.

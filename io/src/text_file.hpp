@@ -11,13 +11,15 @@ namespace trihedron::io {
 /// line.
 class TextFile {
  public:
-  /// Throws as InputFile, and MachineFailed when reading fails.
+  /// Throws as InputFile, and MachineFailed when reading fails. kStandardInput is read to its end, up to 1 GiB.
   explicit TextFile(const std::filesystem::path& path);
 
   [[nodiscard]] std::string_view text() const { return {bytes_.get(), size_}; }
   [[nodiscard]] bool ends_with_newline() const { return text().ends_with('\n'); }
 
  private:
+  void read_standard_input();
+
   std::unique_ptr<char[]> bytes_;
   std::size_t size_ = 0;
 };

@@ -34,9 +34,7 @@ std::string_view type_of(const toml::node& node) {
 
 }  // namespace
 
-TomlTable::TomlTable(const toml::table& table, std::filesystem::path file, std::string name,
-                     const std::vector<std::string_view>& known)
-    : table_(table), file_(std::move(file)), name_(std::move(name)) {
+void TomlTable::expect_known(const std::vector<std::string_view>& known) const {
   for (const auto& [key, node] : table_) {
     if (std::ranges::find(known, key.str()) == known.end()) {
       throw InputRefused(file_, position_of(key.source()),
@@ -72,7 +70,7 @@ std::string TomlTable::text(const toml::node& node, std::string_view key) const 
   return value->get();
 }
 
-double TomlTable::number(const toml::node& node, std::string_view key) const {
+double TomlTable::number(const toml::node& node, std::string_view key, const Range& range) const {
   const std::optional<double> value = node.is_number() ? node.value<double>() : std::nullopt;
   if (!value) {
     refuse(node, fmt::format("\"{}\" is {}", key, type_of(node)),
@@ -81,15 +79,10 @@ double TomlTable::number(const toml::node& node, std::string_view key) const {
   if (!std::isfinite(*value)) {
     refuse(node, fmt::format("\"{}\" is not finite", key), "give a finite number");
   }
-  return *value;
-}
-
-double TomlTable::number(const toml::node& node, std::string_view key, const Range& range) const {
-  const double value = number(node, key);
-  if (!range.holds(value)) {
-    refuse(node, fmt::format("\"{}\" {}", key, is_outside(value, range)), std::string(range.why));
+  if (!range.holds(*value)) {
+    refuse(node, fmt::format("\"{}\" {}", key, is_outside(*value, range)), std::string(range.why));
   }
-  return value;
+  return *value;
 }
 
 Eigen::Vector3d TomlTable::three_numbers(const toml::node& node, std::string_view key, const Range& range) const {

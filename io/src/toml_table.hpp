@@ -1,5 +1,5 @@
 #pragma once
-/// Strict reading of TOML tables: known keys only, and every refusal names its line and column.
+/// Strict reading of TOML tables: every refusal names its line and column.
 
 #include <toml++/toml.h>
 
@@ -8,19 +8,23 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
+#include "json_schema.hpp"
 #include "trihedron/io/error.hpp"
-#include "trihedron/records/limits.hpp"
 
 namespace trihedron::io {
 
 /// One table of a document; the document must outlive it.
 class TomlTable {
  public:
-  /// `name` is for people: "[gyro]". Refuses every key that is not known, suggesting the nearest.
-  TomlTable(const toml::table& table, std::filesystem::path file, std::string name,
-            const std::vector<std::string_view>& known);
+  /// `name` is for people: "[gyro]".
+  TomlTable(const toml::table& table, std::filesystem::path file, std::string name)
+      : table_(table), file_(std::move(file)), name_(std::move(name)) {}
+
+  /// Refuses every key that is not known, suggesting the nearest.
+  void expect_known(const std::vector<std::string_view>& known) const;
 
   [[nodiscard]] const toml::node* find(std::string_view key) const { return table_.get(key); }
   /// The value; refuses a missing key.
@@ -29,12 +33,10 @@ class TomlTable {
   [[nodiscard]] const toml::table& as_table(const toml::node& node, std::string_view key) const;
 
   [[nodiscard]] std::string text(const toml::node& node, std::string_view key) const;
-  /// A finite number, integer or float.
-  [[nodiscard]] double number(const toml::node& node, std::string_view key) const;
-  /// Refuses a number outside the range.
-  [[nodiscard]] double number(const toml::node& node, std::string_view key, const Range& range) const;
-  /// Each within the range.
-  [[nodiscard]] Eigen::Vector3d three_numbers(const toml::node& node, std::string_view key, const Range& range) const;
+  /// A finite number of the range, integer or float.
+  [[nodiscard]] double number(const toml::node& node, std::string_view key, const Range& range = kAnyNumber) const;
+  [[nodiscard]] Eigen::Vector3d three_numbers(const toml::node& node, std::string_view key,
+                                              const Range& range = kAnyNumber) const;
 
   [[noreturn]] void refuse(const toml::node& node, std::string reason, std::string cure) const;
 

@@ -58,9 +58,11 @@ TEST(Config, RefusesNamesThatThereAreNot) {
               HasSubstr("there is no drift model \"vsh:9\"; use auto, esg7, esg20, or vsh:1 … vsh:6"));
   EXPECT_THAT(refused_config("[further_states]\nclock_ofset = \"on\"\n"), HasSubstr("did you mean \"clock_offset\"?"));
   EXPECT_THAT(refused_config("[further_states]\nreadout_bias = \"maybe\"\n"),
-              HasSubstr("\"readout_bias\" is neither auto nor on nor off"));
-  EXPECT_THAT(refused_config("[further_states]\nwandering_drift = \"-1e-8rad/s\"\n"),
-              HasSubstr("\"wandering_drift\": \"-1e-8rad/s\" is -1e-08 rad/s, outside 1e-15 to 0.01 rad/s"));
+              HasSubstr("\"readout_bias\" cannot be \"maybe\"; known here: auto, off, on"));
+  EXPECT_THAT(
+      refused_config("[further_states]\nwandering_drift = \"-1e-8rad/s\"\n"),
+      HasSubstr(
+          "\"wandering_drift\" in [further_states]: \"-1e-8rad/s\" is -1e-08 rad/s, outside 1e-15 to 0.01 rad/s"));
 }
 
 TEST(Config, RefusesNumbersOutsideTheirRanges) {

@@ -87,6 +87,7 @@ TEST_F(PassToml, RefusesBadPriors) {
   write_calibration(directory_ / "earlier.json", sample_calibration());
   EXPECT_THAT(refusal_with("prior = \"earlier.json\"\n" + replaced(toml_, "duration_s", "prior = \"x\"\nduration_s")),
               HasSubstr("pass.toml:1:9: \"prior\" is there twice"));
+  EXPECT_THAT(refusal_with("prior = \"\"\n" + toml_), HasSubstr("not a regular file"));
   Calibration three = sample_calibration();
   three.gyros.push_back(three.gyros[0]);
   write_calibration(directory_ / "earlier.json", three);
@@ -130,8 +131,9 @@ TEST_F(PassToml, RefusesKeyWithoutItsUnitSuggestingTheRightOne) {
 }
 
 TEST_F(PassToml, RefusesUnknownKeysAtEveryLevel) {
-  EXPECT_THAT(refusal_with("nonsense_altogether = 1\n" + toml_),
-              HasSubstr("pass.toml:1:1: key \"nonsense_altogether\" is not known in the file; known here: pass, gyro"));
+  EXPECT_THAT(
+      refusal_with("nonsense_altogether = 1\n" + toml_),
+      HasSubstr("pass.toml:1:1: key \"nonsense_altogether\" is not known in the file; known here: pass, prior, gyro"));
   EXPECT_THAT(refusal_with(toml_ + "[[gyro.unit]]\nperiod_s = 1\n[[gyro.unit]]\n"),
               HasSubstr("pass.toml:16:1: key \"period_s\" is not known in [[gyro.unit]] 1"));
   EXPECT_THAT(refusal_with(toml_ + "[[gyro.unit]]\n[[gyro.unit]]\ndrift_prior_rad_s = {mu13 = 1e-6}\n"),

@@ -144,7 +144,7 @@ TEST(ScenarioToml, RefusalNamesPlaceReasonAndCure) {
   EXPECT_THAT(why_refused("[orbit]\ninclination = \"70\""), HasSubstr("accepted units: deg"));
   EXPECT_THAT(why_refused("[orbit]\nperigee_altitude = \"360 miles\""), HasSubstr("accepted units: km, m"));
   EXPECT_THAT(why_refused("[attitude]\nreference = \"orbit\""), HasSubstr("orbital"));
-  EXPECT_THAT(why_refused("[scenario]\nepoch_tai = \"yesterday\""), HasSubstr("not a date and time"));
+  EXPECT_THAT(why_refused("[scenario]\nepoch_tai = \"yesterday\""), HasSubstr("not an ISO date and time"));
   EXPECT_THAT(why_refused("[star_tracker]\nnoise = [\"1arcsec\"]"), HasSubstr("[x, y, z]"));
   EXPECT_THAT(why_refused("[gyro]\nunit = 3"), HasSubstr("[[gyro.unit]]"));
   EXPECT_THAT(why_refused("[scenario]\nseed = -1"), HasSubstr("whole number"));

@@ -60,6 +60,19 @@ std::optional<DriftModelId> drift_model_named(std::string_view name) {
   return std::nullopt;
 }
 
+std::vector<std::string> drift_model_names() {
+  std::vector<std::string> names;
+  for (const DriftModelRow& row : kDriftModels) {
+    if (row.largest_degree == 0) {
+      names.emplace_back(row.name);
+    }
+    for (int degree = 1; degree <= row.largest_degree; ++degree) {
+      names.push_back(std::string(row.name) + std::to_string(degree));
+    }
+  }
+  return names;
+}
+
 std::string drift_model_choices() {
   std::string choices;
   for (const DriftModelRow& row : kDriftModels) {

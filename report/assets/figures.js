@@ -132,6 +132,14 @@ const moment = (t, axes, colour) => ({
 
 const scaled = (values, factor, offset = 0) => values.map((v) => (v === null ? null : (v - offset) * factor));
 
+/** The unit in which angles up to `size` ″ are shown, and its size in ″: as records/text.hpp. */
+function angleUnit(size) {
+  if (size >= 6000) return { symbol: "°", size: 3600 };
+  return size >= 100 ? { symbol: "′", size: 60 } : { symbol: "″", size: 1 };
+}
+
+const angleText = (size) => `${Number((size / angleUnit(size).size).toPrecision(3))}${angleUnit(size).symbol}`;
+
 /** Greatest |value| of the rows from time `from` on. */
 function greatest(t, values, from) {
   let result = 0;
@@ -185,34 +193,41 @@ const FIGURES = {
       ? ["value", "detail"].flatMap((kind) => gyros.map((gyro) => ({ kind, gyro })))
       : gyros.flatMap((gyro) => ["value", "detail"].map((kind) => ({ kind, gyro })));
     const against = reference(Object.values(data.parameters)[0]);
+    const alignments = Object.values(data.parameters).filter((p) => p.name.startsWith("align_"));
+    const zeroOf = (p, kind) => (kind === "detail" ? p.truth ?? p.final : 0);
+    const reachOf = (p) => {
+      const late = lateFrom(p, data);
+      return Math.max(greatest(p.t, scaled(p.y[0], 1, zeroOf(p, "detail")), late), 3 * p.final_sigma, ...at(p.t, p.y[1], late));
+    };
+    const unit = {
+      value: angleUnit(Math.max(...alignments.map((p) => Math.max(...valueRange(p, p.y[0], p.y[1]).map(Math.abs))))),
+      detail: angleUnit(Math.max(...alignments.map(reachOf))),
+    };
     const layout = panels(look, {
       rows: cells.length / columns, columns, rowHeight: 240, duration: data.duration_min,
       titles: cells.map(({ kind, gyro }) => (kind === "value" ? `Gyro ${gyro}` : `Gyro ${gyro}, distance from ${against}`)),
-      units: cells.map(({ kind }, i) => (i % columns > 0 ? "" : kind === "value" ? "Λ, ′" : "distance, ″")),
+      units: cells.map(({ kind }, i) => (i % columns > 0 ? "" : `${kind === "value" ? "Λ" : "distance"}, ${unit[kind].symbol}`)),
     });
     const traces = cells.flatMap(({ kind, gyro }, i) => {
       const axes = panel(i);
-      const states = Object.values(data.parameters).filter((p) => p.gyro === gyro && p.name.startsWith("align_"));
-      let reach = 0;
+      const states = alignments.filter((p) => p.gyro === gyro);
+      const factor = 1 / unit[kind].size;
       const drawn = states.flatMap((p, axis) => {
         const c = axisColours(colour)[axis];
-        const detail = kind === "detail";
-        const factor = detail ? 60 : 1;
-        const value = scaled(p.y[0], factor, detail ? p.truth ?? p.final : 0);
-        const late = lateFrom(p, data);
-        reach = Math.max(reach, greatest(p.t, value, late), 180 * p.final_sigma, ...at(p.t, scaled(p.y[1], factor), late));
-        if (!detail && p.truth !== undefined) layout.shapes.push(level(p.truth, axes, c, "dash", 1));
+        const value = scaled(p.y[0], factor, zeroOf(p, kind));
+        if (kind === "value" && p.truth !== undefined) layout.shapes.push(level(p.truth * factor, axes, c, "dash", 1));
         return [
           band(p.t, value, scaled(p.y[1], factor), { colour: faded(c, 0.18), axes, group: p.name }),
           line(p.t, value, axes, { name: `${p.symbol} (${AXES[axis]})`, legendgroup: p.name, showlegend: i === 0,
             line: { color: c, dash: DASHES[axis], width: 1.8 },
-            hovertemplate: `%{x:.1f} min: %{y:.5~g}${detail ? "″" : "′"}<extra>${p.symbol}, gyro ${gyro}</extra>` }),
+            hovertemplate: `%{x:.1f} min: %{y:.5~g}${unit[kind].symbol}<extra>${p.symbol}, gyro ${gyro}</extra>` }),
         ];
       });
       if (kind === "detail") {
-        layout[axes.ykey].range = [-1.1 * reach, 1.1 * reach];
+        const reach = 1.1 * factor * Math.max(...states.map(reachOf));
+        layout[axes.ykey].range = [-reach, reach];
       } else {
-        layout[axes.ykey].range = spread(states.map((p) => valueRange(p, p.y[0], p.y[1])));
+        layout[axes.ykey].range = scaled(spread(states.map((p) => valueRange(p, p.y[0], p.y[1]))), factor);
       }
       return drawn;
     });
@@ -224,6 +239,10 @@ const FIGURES = {
     const { colour } = look;
     const corrections = data.corrections ?? [];
     const views = corrections.length > 1 ? ["", ", enlarged"] : [""];
+    // Enlarged: the scale is that of the error after the calibrated parameters have been taken over, from the second correction on.
+    const beginOf = (view) => (view ? corrections[1] + 0.1 : 0);
+    const unit = Object.fromEntries(views.map((view) =>
+      [view, angleUnit(Math.max(...data.navigation.map(({ t, y }) => greatest(t, y[0], beginOf(view)))))]));
     const columns = look.width < 640 ? 1 : views.length;
     const cells = columns > 1
       ? AXES.flatMap((_, axis) => views.map((view) => ({ axis, view })))
@@ -231,17 +250,17 @@ const FIGURES = {
     const layout = panels(look, {
       rows: cells.length / columns, columns, rowHeight: 150, duration: data.duration_min,
       titles: cells.map(({ axis, view }) => AXES[axis][0].toUpperCase() + AXES[axis].slice(1) + view),
-      units: cells.map((_, i) => (i % columns === 0 ? "error, ′" : "")),
+      units: cells.map(({ view }) => `error, ${unit[view].symbol}`),
     });
     const traces = cells.map(({ axis, view }, i) => {
       const { t, y } = data.navigation[axis];
+      const shown = scaled(y[0], 1 / unit[view].size);
       if (view) {
-        // The scale is that of the error after the calibrated parameters have been taken over: from the second correction on.
-        const half = 1.15 * greatest(t, y[0], corrections[1] + 0.1) || 1;
+        const half = 1.15 * greatest(t, shown, beginOf(view)) || 1;
         layout[panel(i).ykey].range = [-half, half];
       }
-      return line(t, y[0], panel(i), { name: AXES[axis], line: { color: axisColours(colour)[axis], width: 1.3 },
-        hovertemplate: `%{x:.1f} min: %{y:.3~g}′<extra>${AXES[axis]}</extra>` });
+      return line(t, shown, panel(i), { name: AXES[axis], line: { color: axisColours(colour)[axis], width: 1.3 },
+        hovertemplate: `%{x:.1f} min: %{y:.3~g}${unit[view].symbol}<extra>${AXES[axis]}</extra>` });
     });
     if (corrections.length <= 60) {
       cells.forEach((_, i) => corrections.forEach((t) => layout.shapes.push(moment(t, panel(i), colour.muted))));
@@ -252,19 +271,23 @@ const FIGURES = {
 
   attitude(data, look) {
     const { colour } = look;
+    const late = 0.2 * data.duration_min;
+    const reachOf = ({ t, y }) => Math.max(greatest(t, y[0], late), y[1] ? 3 * greatest(t, y[1], late) : 0);
+    const unit = angleUnit(Math.max(...data.attitude.map(reachOf)));
     const layout = panels(look, {
       rows: 3, columns: 1, rowHeight: 150, duration: data.duration_min,
-      titles: AXES.map((name) => name[0].toUpperCase() + name.slice(1)), units: AXES.map(() => "error, ″"),
+      titles: AXES.map((name) => name[0].toUpperCase() + name.slice(1)), units: AXES.map(() => `error, ${unit.symbol}`),
     });
-    const traces = data.attitude.flatMap(({ t, y }, i) => {
+    const traces = data.attitude.flatMap((errors, i) => {
       const axes = panel(i);
       const c = axisColours(colour)[i];
-      const late = 0.2 * data.duration_min;
+      const { t } = errors;
+      const y = errors.y.map((values) => scaled(values, 1 / unit.size));
       const bound = y[1] ? scaled(y[1], 3) : [];
-      const half = 1.15 * Math.max(greatest(t, y[0], late), greatest(t, bound, late));
+      const half = (1.15 * reachOf(errors)) / unit.size;
       layout[axes.ykey].range = [-half, half];
       const error = line(t, y[0], axes, { name: AXES[i], line: { color: c, width: 1 },
-        hovertemplate: `%{x:.1f} min: %{y:.3~g}″<extra>${AXES[i]}</extra>` });
+        hovertemplate: `%{x:.1f} min: %{y:.3~g}${unit.symbol}<extra>${AXES[i]}</extra>` });
       if (!y[1]) return [error];
       const edge = { color: colour.ink, width: 1.2, dash: "dash" };
       return [
@@ -285,7 +308,7 @@ const FIGURES = {
       dtick: timeTick(longest, look.width), tick0: 0, hoverformat: ".1f" };
     layout.yaxis = { ...axisStyle(colour), type: "log", title: axisTitle("total error, ″", 6), dtick: 1 };
     layout.shapes.push(level(limit, panel(0), colour.ink, "dot", 1.4));
-    layout.annotations.push({ text: `${Number((limit / 60).toPrecision(3))}′`, xref: "paper", yref: "y", x: 1, y: Math.log10(limit),
+    layout.annotations.push({ text: angleText(limit), xref: "paper", yref: "y", x: 1, y: Math.log10(limit),
       xanchor: "right", yanchor: "bottom", showarrow: false, font: { color: colour.ink } });
     const drawn = ({ t, y }, corrected, kind, style) => line(t, y[0], panel(0), { line: style,
       hovertemplate: `%{x:.1f} min after: %{y:.3~g}″<extra>corrected at ${Math.round(corrected)} min, ${kind}</extra>` });
@@ -304,25 +327,30 @@ const FIGURES = {
     const { colour } = look;
     const columns = look.width < 640 ? 1 : 2;
     const names = ["Gyro 1, first across", "Gyro 1, second across", "Gyro 2, first across", "Gyro 2, second across"];
+    const late = Math.min(10, 0.05 * data.duration_min);
+    const reachOf = ({ used }) => Math.max(greatest(used.t, used.y[0], late), 3 * greatest(used.t, used.y[1], late), 1e-3);
+    const unit = angleUnit(Math.max(...data.innovations.map(reachOf)));
+    const inUnit = ({ t, y }) => ({ t, y: y.map((values) => scaled(values, 1 / unit.size)) });
     const layout = panels(look, {
       rows: 4 / columns, columns, rowHeight: columns > 1 ? 210 : 170, duration: data.duration_min, titles: names,
-      units: names.map((_, i) => (i % columns === 0 ? "innovation, ″" : "")),
+      units: names.map((_, i) => (i % columns === 0 ? `innovation, ${unit.symbol}` : "")),
     });
-    const traces = data.innovations.flatMap(({ used, rejected }, i) => {
+    const traces = data.innovations.flatMap((innovation, i) => {
+      const used = inUnit(innovation.used);
+      const rejected = inUnit(innovation.rejected);
       const axes = panel(i);
       const c = gyroColour(colour, i < 2 ? 1 : 2);
       const bound = scaled(used.y[1], 3);
-      const late = Math.min(10, 0.05 * data.duration_min);
-      const half = 1.25 * Math.max(greatest(used.t, used.y[0], late), greatest(used.t, bound, late), 1e-3);
+      const half = (1.25 * reachOf(innovation)) / unit.size;
       layout[axes.ykey].range = [-half, half];
       const edge = { color: colour.ink, width: 1.2, dash: "dash" };
       return [
         // Drawn as a line: decimation keeps only the least and greatest values, which as points would look like two clouds.
         line(used.t, used.y[0], axes, { name: "used", legendgroup: "u", showlegend: i === 0, line: { color: c, width: 0.8 },
-          hovertemplate: `%{x:.2f} min: %{y:.3~g}″<extra></extra>` }),
+          hovertemplate: `%{x:.2f} min: %{y:.3~g}${unit.symbol}<extra></extra>` }),
         line(used.t, bound, axes, { hoverinfo: "skip", name: "± 3σ", legendgroup: "s", showlegend: i === 0, line: edge }),
         line(used.t, scaled(bound, -1), axes, { hoverinfo: "skip", legendgroup: "s", line: edge }),
-        rejectedMarks(rejected.t, rejected.y[0], axes, colour, -0.96 * half, 0.96 * half, "″", i === 0),
+        rejectedMarks(rejected.t, rejected.y[0], axes, colour, -0.96 * half, 0.96 * half, unit.symbol, i === 0),
       ];
     });
     return { traces, layout };
@@ -389,16 +417,18 @@ const FIGURES = {
     const models = data.drift_models;
     const layout = baseLayout(look, 300);
     const x = models.map((m) => m.coefficients);
+    const unit = angleUnit(Math.max(...models.map((m) => m.error)));
+    const errorOf = (m) => m.error / unit.size;
     layout.xaxis = { ...axisStyle(colour), title: axisTitle("coefficients of each gyro", 8), tickvals: x, ticktext: models.map((m) => `${m.coefficients}<br>${m.name}`) };
-    layout.yaxis = { ...axisStyle(colour), title: axisTitle("forecast error, ″", 6), rangemode: "tozero" };
+    layout.yaxis = { ...axisStyle(colour), title: axisTitle(`forecast error, ${unit.symbol}`, 6), rangemode: "tozero" };
     layout.margin = { ...layout.margin, b: 66 };
-    const hovertemplate = "%{customdata[0]}: %{y:.3~g}″, ln likelihood %{customdata[1]:+.1f}<extra></extra>";
+    const hovertemplate = `%{customdata[0]}: %{y:.3~g}${unit.symbol}, ln likelihood %{customdata[1]:+.1f}<extra></extra>`;
     const marker = (used) => ({ size: used ? 13 : 8, color: used ? colour.vermillion : colour.blue });
     const traces = [
-      { ...line(x, models.map((m) => m.error), panel(0), { line: { color: colour.blue } }), hoverinfo: "skip" },
+      { ...line(x, models.map(errorOf), panel(0), { line: { color: colour.blue } }), hoverinfo: "skip" },
       ...[false, true].map((used) => {
         const own = models.filter((m) => m.used === used);
-        return { x: own.map((m) => m.coefficients), y: own.map((m) => m.error), mode: "markers", marker: marker(used), name: used ? "used" : "compared",
+        return { x: own.map((m) => m.coefficients), y: own.map(errorOf), mode: "markers", marker: marker(used), name: used ? "used" : "compared",
           showlegend: own.length > 0, customdata: own.map((m) => [m.name, m.gain]), hovertemplate };
       }),
     ];

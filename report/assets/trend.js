@@ -5,13 +5,19 @@ FIGURES.trend = (data, look, { name }) => {
   const { calibrations } = data;
   const trends = data.trends.filter((trend) => trend.name === name);
   const columns = look.width < 640 ? 1 : trends.length;
-  const unit = trends[0].from === undefined ? "10⁻⁶ rad/s" : "″";
+  const isAngle = trends[0].from !== undefined;
+  const shownUnit = isAngle ? angleUnit(Math.max(...trends.flatMap(({ value, sigma }) => trendRange(value, sigma).map(Math.abs))))
+    : { symbol: "10⁻⁶ rad/s", size: 1 };
+  const unit = shownUnit.symbol;
   const layout = panels(look, {
     rows: trends.length / columns, columns, rowHeight: 190, duration: calibrations.length,
-    titles: trends.map(({ gyro, from }) => `Gyro ${gyro}${from === undefined ? "" : `, from ${from}′`}`),
+    titles: trends.map(({ gyro, from }) => `Gyro ${gyro}${isAngle ? `, from ${from}` : ""}`),
     units: trends.map(({ symbol }, i) => (i % columns === 0 ? `${symbol}, ${unit}` : "")),
   });
-  const traces = trends.flatMap(({ gyro, value, sigma }, i) => {
+  const traces = trends.flatMap((trend, i) => {
+    const { gyro } = trend;
+    const value = scaled(trend.value, 1 / shownUnit.size);
+    const sigma = scaled(trend.sigma, 1 / shownUnit.size);
     const axes = panel(i);
     Object.assign(layout[axes.xkey], { range: [0.5, calibrations.length + 0.5], dtick: Math.ceil(calibrations.length / 20), tick0: 1,
       title: layout[axes.xkey].title && axisTitle("calibration, as numbered above", 8), showgrid: false });

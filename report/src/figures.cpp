@@ -47,8 +47,8 @@ class Figures {
     put("parameters", parameters());
     put("corrections", corrections());
     if (input_.evaluation != nullptr) {
-      put("navigation", errors(input_.evaluation->navigation.errors, kArcminute_rad));
-      put("attitude", errors(input_.evaluation->attitude.errors, kArcsecond_rad));
+      put("navigation", errors(input_.evaluation->navigation.errors));
+      put("attitude", errors(input_.evaluation->attitude.errors));
       put("open_loops", open_loops());
     }
     put("innovations", innovations());
@@ -70,7 +70,7 @@ class Figures {
     const ParameterHistory& history = run_.parameters;
     for (std::size_t column = 0; column < parameters_.size() && !history.t.empty(); ++column) {
       const Parameter& parameter = parameters_[column];
-      const double unit = parameter.id.is_alignment() ? kArcminute_rad : kMicroradian;
+      const double unit = parameter.id.is_alignment() ? kArcsecond_rad : kMicroradian;
       Series series(2, fix_step_min_ + to_minutes(ParameterHistory::kStep));
       for (std::size_t row = 0; row < history.t.size(); ++row) {
         series.add(minutes(history.t[row]), {history.value[row][column] / unit, history.sigma[row][column] / unit});
@@ -102,17 +102,17 @@ class Figures {
     return times;
   }
 
-  /// Roll, pitch, heading: error and, where claimed, sigma.
-  [[nodiscard]] json errors(const ground::AttitudeErrors& errors, double unit) const {
+  /// Roll, pitch, heading: error and, where claimed, sigma, ″.
+  [[nodiscard]] json errors(const ground::AttitudeErrors& errors) const {
     json axes = json::array();
     for (Eigen::Index axis = 0; axis < 3 && !errors.t.empty(); ++axis) {
       Series series(errors.sigma_rad.empty() ? 1 : 2, fix_step_min_);
       for (std::size_t i = 0; i < errors.t.size(); ++i) {
-        const double error = errors.error_rad[i](axis) / unit;
+        const double error = errors.error_rad[i](axis) / kArcsecond_rad;
         if (errors.sigma_rad.empty()) {
           series.add(minutes(errors.t[i]), {error});
         } else {
-          series.add(minutes(errors.t[i]), {error, errors.sigma_rad[i](axis) / unit});
+          series.add(minutes(errors.t[i]), {error, errors.sigma_rad[i](axis) / kArcsecond_rad});
         }
       }
       axes.push_back(series.drawn(kWide));

@@ -1,5 +1,6 @@
 #pragma once
-/// The numbers behind the figures, decimated and in the units of their axes; assets/figures.js draws them.
+/// The numbers behind the figures, decimated: angles in ″, drift in 10⁻⁶ rad/s. assets/figures.js draws them, each axis
+/// in the unit that suits its range.
 
 #include <nlohmann/json.hpp>
 #include <vector>

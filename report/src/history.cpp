@@ -10,6 +10,7 @@
 #include "assets.hpp"
 #include "document.hpp"
 #include "parameters.hpp"
+#include "trihedron/records/text.hpp"
 #include "units.hpp"
 #include "verdict.hpp"
 #include "wording.hpp"
@@ -49,7 +50,7 @@ json trend_of(const ParameterId& state, const Catalogue& catalogue, const ground
                 {"value", value},
                 {"sigma", sigma}};
   if (state.is_alignment()) {
-    trend["from"] = signed_number(zero / kArcminute_rad, 3);
+    trend["from"] = (zero > 0 ? "+" : "") + angle(zero, 4);
   }
   return trend;
 }
@@ -131,25 +132,43 @@ json change_rows(const ground::History& history) {
   return rows;
 }
 
+/// Of values and of sigmas in the table of one kind.
+struct ShownUnits {
+  AngleUnit value{kMicroradian, "10⁻⁶ rad/s"};
+  AngleUnit sigma{kMicroradian, "10⁻⁶ rad/s"};
+};
+
+ShownUnits units_of_alignments(const ground::History& history) {
+  std::vector<double> means;
+  std::vector<double> sigmas;
+  for (const ground::Spread& spread : history.spreads) {
+    if (spread.state.is_alignment()) {
+      means.push_back(spread.mean);
+      sigmas.push_back(spread.next_sigma);
+    }
+  }
+  return {unit_of_angles(means), unit_of_angles(sigmas)};
+}
+
 /// Coefficients, and alignments in units of their own.
 json spread_tables(const ground::History& history) {
   json tables = json::array();
   for (const bool alignments : {false, true}) {
-    const double unit = alignments ? kArcminute_rad : kMicroradian;
-    const double sigma_unit = alignments ? kArcsecond_rad : kMicroradian;
+    const ShownUnits units = alignments ? units_of_alignments(history) : ShownUnits{};
     json rows = json::array();
     for (const ground::Spread& spread : history.spreads) {
       if (spread.state.is_alignment() == alignments) {
-        rows.push_back({{"symbol", full_symbol_of(spread.state)},
-                        {"start_ups", spread.start_ups},
-                        {"mean", signed_number(spread.mean / unit, decimals_for(spread.next_sigma / unit))},
-                        {"deviation", significant(spread.deviation / sigma_unit, 2)},
-                        {"next", significant(spread.next_sigma / sigma_unit, 2)}});
+        rows.push_back(
+            {{"symbol", full_symbol_of(spread.state)},
+             {"start_ups", spread.start_ups},
+             {"mean", signed_number(spread.mean / units.value.rad, decimals_for(spread.next_sigma / units.value.rad))},
+             {"deviation", significant(spread.deviation / units.sigma.rad, 2)},
+             {"next", significant(spread.next_sigma / units.sigma.rad, 2)}});
       }
     }
     tables.push_back({{"what", alignments ? "Alignment" : "Coefficient"},
-                      {"unit", alignments ? "′" : "10⁻⁶ rad/s"},
-                      {"sigma_unit", alignments ? "″" : "10⁻⁶ rad/s"},
+                      {"unit", units.value.symbol},
+                      {"sigma_unit", units.sigma.symbol},
                       {"rows", rows}});
   }
   return tables;

@@ -3,6 +3,8 @@
 #include <stdexcept>
 #include <vector>
 
+#include "trihedron/records/text.hpp"
+
 namespace trihedron::report {
 namespace {
 
@@ -122,9 +124,11 @@ class Template {
 }  // namespace
 
 std::string escaped(std::string_view text) {
+  // Names from telemetry may be no UTF-8, or hold marks that turn the direction of writing.
+  const std::string shown = printable_lines(text);
   std::string out;
-  out.reserve(text.size());
-  for (const char c : text) {
+  out.reserve(shown.size());
+  for (const char c : shown) {
     switch (c) {
       case '&':
         out += "&amp;";

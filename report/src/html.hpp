@@ -7,7 +7,7 @@
 
 namespace trihedron::report {
 
-/// `text` for the content of an element or a quoted attribute.
+/// `text` for the content of an element or a quoted attribute; what cannot be shown is made printable.
 [[nodiscard]] std::string escaped(std::string_view text);
 
 /// JSON for the inside of a script element: holds no '<', so that nothing in it ends the element.

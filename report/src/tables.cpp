@@ -13,6 +13,7 @@
 #include "trihedron/core/drift.hpp"
 #include "trihedron/core/outlier_gate.hpp"
 #include "trihedron/records/run.hpp"
+#include "trihedron/records/text.hpp"
 #include "units.hpp"
 #include "wording.hpp"
 
@@ -25,7 +26,25 @@ constexpr std::array<const char*, 3> kAxes = {"roll", "pitch", "heading"};
 
 // ---- Parameters
 
-json row_of(const Parameter& parameter) {
+/// Of the alignments of one gyro: one for values and truth, one for sigmas and errors.
+struct AlignmentUnits {
+  AngleUnit value;
+  AngleUnit sigma;
+};
+
+AlignmentUnits units_of_alignment(const std::vector<Parameter>& parameters, std::size_t gyro) {
+  std::vector<double> values;
+  std::vector<double> sigmas;
+  for (const Parameter& parameter : parameters) {
+    if (parameter.id.gyro() == gyro && parameter.id.is_alignment()) {
+      values.push_back(parameter.value);
+      sigmas.push_back(parameter.sigma);
+    }
+  }
+  return {unit_of_angles(values), unit_of_angles(sigmas)};
+}
+
+json row_of(const Parameter& parameter, const AlignmentUnits& units) {
   json row = {
       {"symbol", parameter.symbol},
       {"name", short_name_of(parameter.id)},
@@ -45,7 +64,7 @@ json row_of(const Parameter& parameter) {
                         : "—";
   };
   if (parameter.id.is_alignment()) {
-    put("", kArcminute_rad, kArcsecond_rad, kArcsecond_rad);
+    put("", units.value.rad, units.sigma.rad, units.sigma.rad);
   } else {
     put("", kMicroradian, kMicroradian, kMicroradian);
     put("_deg_h", kDegreePerHour_rad_s, kDegreePerHour_rad_s, kDegreePerHour_rad_s);
@@ -59,14 +78,17 @@ json row_of(const Parameter& parameter) {
 json gyros_of(const ReportInput& input, const std::vector<Parameter>& parameters) {
   json gyros = json::array();
   for (std::size_t k = 0; k < input.run.calibration.gyros.size(); ++k) {
+    const AlignmentUnits units = units_of_alignment(parameters, k);
     json gyro = {{"number", k + 1},
+                 {"value_unit", units.value.symbol},
+                 {"sigma_unit", units.sigma.symbol},
                  {"model", name_of(input.run.calibration.gyros[k].drift_model)},
                  {"drift", json::array()},
                  {"alignment", json::array()},
                  {"unmodelled", ""}};
     for (const Parameter& parameter : parameters) {
       if (parameter.id.gyro() == k) {
-        gyro[parameter.id.is_alignment() ? "alignment" : "drift"].push_back(row_of(parameter));
+        gyro[parameter.id.is_alignment() ? "alignment" : "drift"].push_back(row_of(parameter, units));
       }
     }
     if (input.truth != nullptr && k < input.truth->gyros.size()) {
@@ -131,7 +153,16 @@ json strongest_correlations(const ReportInput& input, const std::vector<Paramete
 
 // ---- Attitude
 
-json stretches_of(const ReportInput& input, const ground::AttitudeEvaluation& evaluation, double unit) {
+/// One unit for the rms of a table, one for the greatest errors.
+json stretches_of(const ReportInput& input, const ground::AttitudeEvaluation& evaluation) {
+  std::vector<double> rms;
+  std::vector<double> greatest;
+  for (const ground::ErrorStatistics& stretch : evaluation.stretches) {
+    rms.insert(rms.end(), stretch.rms_rad.begin(), stretch.rms_rad.end());
+    greatest.push_back(stretch.max_total_rad);
+  }
+  const AngleUnit rms_unit = unit_of_angles(rms);
+  const AngleUnit greatest_unit = unit_of_angles(greatest);
   json rows = json::array();
   for (const ground::ErrorStatistics& stretch : evaluation.stretches) {
     if (stretch.to == stretch.from) {  // the pass ends on the first epoch of the next stretch
@@ -140,21 +171,27 @@ json stretches_of(const ReportInput& input, const ground::AttitudeEvaluation& ev
     json row = {{"from", number(to_minutes(stretch.from - input.pass.settings.epoch), 0)},
                 {"to", number(to_minutes(stretch.to - input.pass.settings.epoch), 0)},
                 {"count", number(static_cast<double>(stretch.count), 0)},
-                {"total", number(stretch.max_total_rad / unit, 2)}};
+                {"total", significant(stretch.max_total_rad / greatest_unit.rad, 3)}};
     for (std::size_t axis = 0; axis < kAxes.size(); ++axis) {
-      row[std::string("rms_") + kAxes[axis]] = number(stretch.rms_rad(static_cast<Eigen::Index>(axis)) / unit, 2);
-      row[std::string("max_") + kAxes[axis]] = number(stretch.max_rad(static_cast<Eigen::Index>(axis)) / unit, 2);
+      const auto i = static_cast<Eigen::Index>(axis);
+      row[std::string("rms_") + kAxes[axis]] = significant(stretch.rms_rad(i) / rms_unit.rad, 3);
+      row[std::string("max_") + kAxes[axis]] = significant(stretch.max_rad(i) / greatest_unit.rad, 3);
     }
     row["honesty"] = stretch.normalised_square ? number(*stretch.normalised_square, 2) : "—";
     rows.push_back(std::move(row));
   }
-  return rows;
+  return {{"rms_unit", rms_unit.symbol}, {"greatest_unit", greatest_unit.symbol}, {"rows", rows}};
 }
 
-json open_loop_rows(const ReportInput& input) {
+json open_loop_table(const ReportInput& input) {
   const auto in_words = [](const ground::CorrectionInterval& interval) {
     return interval.passed ? number(to_minutes(*interval.passed), 1) : "> " + number(to_minutes(interval.observed), 0);
   };
+  std::vector<double> totals;
+  for (const ground::IntervalPair& pair : input.evaluation->extension.pairs) {
+    totals.push_back(pair.calibrated.max_total_rad);
+  }
+  const AngleUnit unit = unit_of_angles(totals);
   json rows = json::array();
   for (const ground::IntervalPair& pair : input.evaluation->extension.pairs) {
     const auto& [before, after] = pair;
@@ -166,9 +203,9 @@ json open_loop_rows(const ReportInput& input) {
                     {"before", in_words(before)},
                     {"after", in_words(after)},
                     {"extension", extension ? (after.passed ? "" : "≥ ") + significant(*extension, 2) : "—"},
-                    {"total", number(after.max_total_rad / kArcminute_rad, 2)}});
+                    {"total", significant(after.max_total_rad / unit.rad, 3)}});
   }
-  return rows;
+  return {{"unit", unit.symbol}, {"rows", rows}};
 }
 
 json evaluation_of(const ReportInput& input) {
@@ -178,10 +215,10 @@ json evaluation_of(const ReportInput& input) {
   }
   const ground::CalibrationEvaluation& evaluation = *input.evaluation;
   return {{"reference", reference_in_words(evaluation.attitude)},
-          {"navigation", stretches_of(input, evaluation.navigation, kArcminute_rad)},
-          {"attitude", stretches_of(input, evaluation.attitude, kArcsecond_rad)},
-          {"open_loops", open_loop_rows(input)},
-          {"limit", fmt::format("{:.3g}", evaluation.limit_rad / kArcminute_rad)}};
+          {"navigation", stretches_of(input, evaluation.navigation)},
+          {"attitude", stretches_of(input, evaluation.attitude)},
+          {"open_loops", open_loop_table(input)},
+          {"limit", limit_text(evaluation.limit_rad)}};
 }
 
 // ---- Innovations
@@ -298,14 +335,13 @@ json settings_of(const ReportInput& input) {
   put("Parameters at a correction", corrections.take_parameters ? "taken from the calibration" : "held");
   for (std::size_t k = 0; k < input.pass.settings.gyros.size(); ++k) {
     put(fmt::format("Readout noise of gyro {}", k + 1),
-        significant(input.pass.settings.gyros[k].readout_noise_rad / kArcsecond_rad, 3) + "″ per direction cosine, 1σ");
+        angle(input.pass.settings.gyros[k].readout_noise_rad, 3) + " per direction cosine, 1σ");
   }
   if (options.star_tracker_noise_rad) {
-    put("Star-tracker noise found",
-        of_axes(*options.star_tracker_noise_rad, kArcsecond_rad) + " ″ about roll / pitch / heading, 1σ");
+    put("Star-tracker noise found", of_axes(*options.star_tracker_noise_rad) + " about roll / pitch / heading, 1σ");
   }
   put(options.star_tracker_noise_rad ? "Star-tracker noise by pass.toml" : "Star-tracker noise",
-      of_axes(input.pass.settings.star_tracker_noise_rad, kArcsecond_rad) + " ″ about roll / pitch / heading, 1σ");
+      of_axes(input.pass.settings.star_tracker_noise_rad) + " about roll / pitch / heading, 1σ");
   return rows;
 }
 
@@ -315,12 +351,13 @@ struct ShownUnit {
   double size;
   const char* text;
 };
-ShownUnit shown_unit(Unit unit) {
-  switch (unit) {
+ShownUnit shown_unit(const FurtherEstimate& estimate) {
+  const AngleUnit angle_unit = unit_of_angle(std::max(std::abs(estimate.value), estimate.sigma));
+  switch (estimate.parameter.unit()) {
     case Unit::kSecond:
       return {"_s", 1e-3, "ms"};
     case Unit::kRadian:
-      return {"_rad", kArcsecond_rad, "″"};
+      return {"_rad", angle_unit.rad, angle_unit.symbol};
     case Unit::kRadianPerSecond:
       break;
   }
@@ -331,7 +368,7 @@ ShownUnit shown_unit(Unit unit) {
 json further_of(const ReportInput& input) {
   json rows = json::array();
   for (const FurtherEstimate& estimate : input.run.calibration.further) {
-    const ShownUnit unit = shown_unit(estimate.parameter.unit());
+    const ShownUnit unit = shown_unit(estimate);
     std::string name = name_of(estimate.parameter);
     name.resize(name.size() - (name.ends_with(unit.ending) ? unit.ending.size() : 0));
     std::ranges::replace(name, '_', ' ');
@@ -346,28 +383,33 @@ json further_of(const ReportInput& input) {
 json states_decided(const ReportInput& input) {
   json sentences = json::array();
   for (const Evidence& evidence : input.run.evidence) {
-    sentences.push_back(fmt::format("{}: {} ({:+.1f}).", evidence.label(),
-                                    evidence.accepted ? "estimated" : "taken as zero", evidence.log_bayes_factor));
+    sentences.push_back(fmt::format("{}: {} ({}).", evidence.label(), evidence.accepted ? "estimated" : "taken as zero",
+                                    signed_number(evidence.log_bayes_factor, 1)));
   }
   return sentences;
 }
 
-json drift_model_rows(const CalibrationRun& run) {
+json drift_model_table(const CalibrationRun& run) {
+  std::vector<double> errors;
+  for (const DriftModelForecast& model : run.drift_models) {
+    errors.push_back(model.open_loop_rms_rad);
+  }
+  const AngleUnit unit = unit_of_angles(errors);
   json rows = json::array();
   for (const DriftModelForecast& model : run.drift_models) {
     rows.push_back({{"name", name_of(model.drift_model)},
                     {"used", model.drift_model == run.calibration.gyros[0].drift_model},
                     {"coefficients", model.drift_model.size()},
-                    {"error", significant(model.open_loop_rms_rad / kArcsecond_rad, 3)},
-                    {"gain", fmt::format("{:+.1f}", model.log_likelihood)}});
+                    {"error", significant(model.open_loop_rms_rad / unit.rad, 3)},
+                    {"gain", signed_number(model.log_likelihood, 1)}});
   }
-  return rows;
+  return {{"unit", unit.symbol}, {"rows", rows}};
 }
 
 json statistics_rows(const Statistics& statistics) {
   json rows = json::array();
   for (const auto& [name, value] : named_values(statistics)) {
-    rows.push_back({{"name", name}, {"value", fmt::format("{:.6g}", value)}});
+    rows.push_back({{"name", name}, {"value", std::isfinite(value) ? fmt::format("{:.6g}", value) : "—"}});
   }
   return rows;
 }
@@ -394,7 +436,7 @@ json table_values(const ReportInput& input, const std::vector<Parameter>& parame
                  {"gyros", gyros_of(input, parameters)},
                  {"has_truth", input.truth != nullptr},
                  {"coefficients", coefficients_of(parameters)},
-                 {"drift_models", drift_model_rows(input.run)},
+                 {"drift_models", drift_model_table(input.run)},
                  {"correlations", strongest_correlations(input, parameters)},
                  {"evaluation", evaluation_of(input)},
                  {"innovation_rows", innovation_rows(input)},

@@ -93,12 +93,12 @@ std::string minutes_of(const ReportInput& input, const ground::ErrorStatistics& 
 json attitude_number(const ReportInput& input) {
   if (input.evaluation != nullptr && !input.evaluation->attitude.errors.t.empty()) {
     const auto stretches = whole_stretches(input.evaluation->attitude);
-    return figure_of_merit("Attitude error while calibrating", of_axes(stretches.back().rms_rad, kArcsecond_rad), "″",
+    return figure_of_merit("Attitude error while calibrating", of_axes(stretches.back().rms_rad), "",
                            "roll / pitch / heading, rms in " + minutes_of(input, stretches.back()) + " against " +
                                reference_in_words(input.evaluation->attitude));
   }
   if (!input.run.attitude.sigma_rad.empty()) {
-    return figure_of_merit("Attitude at the end", of_axes(input.run.attitude.sigma_rad.back(), kArcsecond_rad), "″",
+    return figure_of_merit("Attitude at the end", of_axes(input.run.attitude.sigma_rad.back()), "",
                            "roll / pitch / heading, 1σ as claimed; there is nothing to compare it with");
   }
   return nullptr;
@@ -109,14 +109,12 @@ json navigation_number(const ReportInput& input) {
     return nullptr;
   }
   const auto stretches = whole_stretches(input.evaluation->navigation);
-  const auto greatest = [](const ground::ErrorStatistics& stretch) {
-    return significant(stretch.max_total_rad / kArcminute_rad, 2);
-  };
+  const auto greatest = [](const ground::ErrorStatistics& stretch) { return angle(stretch.max_total_rad, 2); };
   const std::string name = "Greatest error between corrections";
   if (stretches.size() == 1) {
-    return figure_of_merit(name, greatest(input.evaluation->navigation.whole), "′", "open loop, total angle");
+    return figure_of_merit(name, greatest(input.evaluation->navigation.whole), "", "open loop, total angle");
   }
-  return figure_of_merit(name, greatest(stretches.front()) + " → " + greatest(stretches.back()), "′",
+  return figure_of_merit(name, greatest(stretches.front()) + " → " + greatest(stretches.back()), "",
                          "open loop, total angle: in " + minutes_of(input, stretches.front()) + " and in " +
                              minutes_of(input, stretches.back()));
 }
@@ -135,10 +133,10 @@ json alignment_number(const std::vector<Parameter>& parameters) {
   if (worst_sigma == 0) {
     return nullptr;
   }
-  const std::string sigma = significant(worst_sigma / kArcsecond_rad, 2);
-  return has_error ? figure_of_merit("Alignment error, worst axis", significant(worst_error / kArcsecond_rad, 2), "″",
-                                     "against the truth; claimed 1σ " + sigma + "″")
-                   : figure_of_merit("Alignment known to", sigma, "″", "1σ as claimed, worst axis");
+  const std::string sigma = angle(worst_sigma, 2);
+  return has_error ? figure_of_merit("Alignment error, worst axis", angle(worst_error, 2), "",
+                                     "against the truth; claimed 1σ " + sigma)
+                   : figure_of_merit("Alignment known to", sigma, "", "1σ as claimed, worst axis");
 }
 
 /// When the last of the chosen parameters settled. Those that the data do not determine have nothing to settle to.
@@ -182,11 +180,10 @@ json extension_number(const ReportInput& input) {
   }
   return figure_of_merit(
       "Correction interval extended", (extension->is_lower_bound ? "≥ " : "") + significant(extension->factor, 2), " ×",
-      fmt::format(
-          "time until the error passes {:.3g}′, with the calibrated values over those known before; median over "
-          "the corrections; the paper: 3–5 times{}",
-          input.evaluation->limit_rad / kArcminute_rad,
-          extension->is_lower_bound ? "; the pass ended before the limit was passed" : ""));
+      fmt::format("time until the error passes {}, with the calibrated values over those known before; median over "
+                  "the corrections; the paper: 3–5 times{}",
+                  limit_text(input.evaluation->limit_rad),
+                  extension->is_lower_bound ? "; the pass ended before the limit was passed" : ""));
 }
 
 json nis_number(const ReportInput& input) {

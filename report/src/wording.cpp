@@ -6,6 +6,8 @@
 #include <chrono>
 #include <cmath>
 
+#include "trihedron/records/text.hpp"
+
 namespace trihedron::report {
 namespace {
 
@@ -42,8 +44,20 @@ std::string significant(double value, int digits) {
   return number(value, std::clamp(digits - 1 - static_cast<int>(std::floor(std::log10(std::abs(value)))), 0, 12));
 }
 
-std::string of_axes(const Eigen::Vector3d& v, double unit) {
-  return significant(v.x() / unit, 2) + " / " + significant(v.y() / unit, 2) + " / " + significant(v.z() / unit, 2);
+std::string of_axes(const Eigen::Vector3d& v) {
+  const AngleUnit unit = unit_of_angles({v.data(), 3});
+  return fmt::format("{} / {} / {} {}", significant(v.x() / unit.rad, 2), significant(v.y() / unit.rad, 2),
+                     significant(v.z() / unit.rad, 2), unit.symbol);
+}
+
+std::string angle(double rad, int digits) {
+  const AngleUnit unit = unit_of_angle(rad);
+  return std::isfinite(rad) ? significant(rad / unit.rad, digits) + unit.symbol : number(rad, 0);
+}
+
+std::string limit_text(double rad) {
+  const AngleUnit unit = unit_of_angle(rad);
+  return fmt::format("{:.3g}{}", rad / unit.rad, unit.symbol);
 }
 
 int decimals_for(double sigma) {

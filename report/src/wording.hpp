@@ -18,8 +18,14 @@ namespace trihedron::report {
 /// To so many significant digits, never with an exponent.
 [[nodiscard]] std::string significant(double value, int digits);
 
-/// "1.2 / 0.9 / 3.4": roll, pitch, heading in `unit`.
-[[nodiscard]] std::string of_axes(const Eigen::Vector3d& v, double unit);
+/// "1.2 / 0.9 / 3.4 ″": roll, pitch, heading in one unit that suits their size.
+[[nodiscard]] std::string of_axes(const Eigen::Vector3d& v);
+
+/// "2.9″", "5′": in the unit that suits its size, "—" for what is no number.
+[[nodiscard]] std::string angle(double rad, int digits);
+
+/// "5′", "90″": of a limit, without zeros at its end.
+[[nodiscard]] std::string limit_text(double rad);
 
 /// Decimals that show two significant digits of `sigma`.
 [[nodiscard]] int decimals_for(double sigma);

@@ -2,7 +2,11 @@
 
 #include <gmock/gmock.h>
 
+#include <limits>
 #include <stdexcept>
+
+#include "units.hpp"
+#include "wording.hpp"
 
 namespace trihedron::report {
 namespace {
@@ -51,6 +55,20 @@ TEST(FillIn, RefusesSectionsThatDoNotMatch) {
   EXPECT_THROW((void)fill_in("{{#a}}", {{"a", true}}), std::invalid_argument);
   EXPECT_THROW((void)fill_in("{{#a}}{{/b}}", {{"a", true}}), std::invalid_argument);
   EXPECT_THROW((void)fill_in("{{a", {{"a", true}}), std::invalid_argument);
+}
+
+TEST(Html, WhatCannotBeShownIsMadePrintable) {
+  EXPECT_EQ(escaped("a\x1b[31m\xff<b"), "a\\x1b[31m\\xff&lt;b");
+  EXPECT_EQ(escaped("\xE2\x80\xAE"), "\\u{202e}");
+}
+
+TEST(Wording, AnglesHaveTheUnitOfTheirSize) {
+  EXPECT_EQ(angle(0.048 * kArcminute_rad, 2), "2.9″");
+  EXPECT_EQ(angle(30 * kArcminute_rad, 2), "30′");
+  EXPECT_EQ(angle(2 * kDegree_rad, 2), "2.0°");
+  EXPECT_EQ(angle(std::numeric_limits<double>::infinity(), 2), "—");
+  EXPECT_EQ(limit_text(5 * kArcminute_rad), "5′");
+  EXPECT_EQ(of_axes(Eigen::Vector3d(0.55, 12, 3) * kArcsecond_rad), "0.55 / 12 / 3.0 ″");
 }
 
 }  // namespace

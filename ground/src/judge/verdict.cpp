@@ -21,6 +21,7 @@
 #include "trihedron/core/telemetry.hpp"
 #include "trihedron/ground/evaluate/convergence.hpp"
 #include "trihedron/ground/evaluate/used_fixes.hpp"
+#include "trihedron/records/text.hpp"
 
 namespace trihedron::ground {
 namespace {
@@ -382,7 +383,9 @@ void judge_steadiness(const Pass& pass, const CalibrationRun& run, std::vector<F
           axis.x(), axis.y(), axis.z(),
           believes ? "Estimator paper takes noise for information there: its sigmas about this axis are too small."
                    : "The sigmas say so."),
-      fmt::format("about {:.0f}″ at best about this axis from the fixes alone", observability.sigma_rad / kArcsecond),
+      std::isfinite(observability.sigma_rad)
+          ? fmt::format("about {} at best about this axis from the fixes alone", angle_text(observability.sigma_rad))
+          : "the fixes alone do not determine it",
       "Fly slews about the other axes during the calibration: ten minutes of 10° and more suffice.");
 }
 

@@ -3,6 +3,7 @@
 /// c x, y, z, time since the last astro-correction.
 
 #include <filesystem>
+#include <string>
 
 #include "trihedron/core/time.hpp"
 #include "trihedron/records/pass.hpp"
@@ -15,7 +16,9 @@ namespace trihedron::io {
 [[nodiscard]] AttitudeHistory read_attitude(const std::filesystem::path& path, Time epoch);
 
 /// t_s with three decimals where that is exact, else nine; q with twelve. Columns of what is empty are not written.
-/// Throws MachineFailed when the file cannot be written; then nothing stays.
+[[nodiscard]] std::string format_attitude(Time epoch, const AttitudeHistory& attitude);
+
+/// That text. Throws MachineFailed when the file cannot be written; then nothing stays.
 void write_attitude(const std::filesystem::path& path, Time epoch, const AttitudeHistory& attitude);
 
 }  // namespace trihedron::io

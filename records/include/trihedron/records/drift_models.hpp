@@ -30,6 +30,8 @@ inline constexpr std::string_view kAutoDriftModel = "auto";
 [[nodiscard]] std::string name_of(const DriftModelId& model);
 /// Nothing for another name, or a degree that there is not.
 [[nodiscard]] std::optional<DriftModelId> drift_model_named(std::string_view name);
+/// Of each model.
+[[nodiscard]] std::vector<std::string> drift_model_names();
 /// For messages: "esg7, esg20, or vsh:1 … vsh:6"
 [[nodiscard]] std::string drift_model_choices();
 

@@ -1,0 +1,112 @@
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "commands.hpp"
+#include "manual.hpp"
+#include "schemas.hpp"
+#include "trihedron/io/config.hpp"
+#include "trihedron/io/error.hpp"
+#include "trihedron/records/drift_models.hpp"
+
+namespace trihedron::cli {
+namespace {
+
+void add_schema(CLI::App& program, int& exit_status) {
+  auto name = std::make_shared<std::string>();
+  std::string words;
+  for (const io::Schema& schema : all_schemas()) {
+    words += (words.empty() ? "" : "|") + schema.name;
+  }
+  CLI::App* command = program.add_subcommand("schema", "Print the JSON schema of a file or of an output of --json");
+  command->add_option("NAME", *name, "Of which; without it the names are listed")->type_name(words);
+  command->footer(
+      "# What a scenario may hold\n"
+      "trihedron schema scenario\n"
+      "# Check the output of a command\n"
+      "trihedron --json inspect pass.nc > pass.json && trihedron schema inspect-output > schema.json\n"
+      "python3 -m jsonschema -i pass.json schema.json");
+  command->callback([&exit_status, name] {
+    std::vector<std::string> names;
+    std::vector<std::string_view> known;
+    for (const io::Schema& schema : all_schemas()) {
+      if (schema.name == *name) {
+        print_data(stdout, schema.text + "\n");
+        exit_status = kTrustworthy;
+        return;
+      }
+      names.push_back(schema.name);
+    }
+    if (!name->empty()) {
+      throw io::UsageError(fmt::format("there is no schema {}; there are {}", *name, fmt::join(names, ", ")));
+    }
+    print_data(stdout, fmt::format("{}\n", fmt::join(names, "\n")));
+    exit_status = kTrustworthy;
+  });
+}
+
+}  // namespace
+
+void add_references(CLI::App& program, int& exit_status) {
+  add_schema(program, exit_status);
+  auto as_markdown = std::make_shared<bool>(false);
+  CLI::App* man = program.add_subcommand("man", "Print the manual page");
+  man->add_flag("--markdown", *as_markdown, "As Markdown, docs/commands.md");
+  man->footer("trihedron man > trihedron.1 && man ./trihedron.1");
+  man->callback([&program, &exit_status, as_markdown] {
+    print_data(stdout, *as_markdown ? markdown(program) : man_page(program));
+    exit_status = kTrustworthy;
+  });
+
+  auto shell = std::make_shared<std::string>();
+  CLI::App* completions = program.add_subcommand("completion", "Print a script that completes commands and options");
+  completions->add_option("SHELL", *shell, "bash, zsh or fish")
+      ->required()
+      ->type_name(std::string(kShells))
+      ->check([](const std::string& given) {
+        return std::ranges::count(CLI::detail::split(std::string(kShells), '|'), given) > 0
+                   ? std::string()
+                   : "not one of bash, zsh, fish";
+      });
+  completions->footer("source <(trihedron completion bash)");
+  completions->callback([&program, &exit_status, shell] {
+    print_data(stdout, completion(program, *shell));
+    exit_status = kTrustworthy;
+  });
+}
+
+void add_config(CLI::App& command, std::string& file, const std::function<CalibrationOptions()>& settle) {
+  command.add_option("--config", file, "Settings (TOML); - for standard input")->type_name("FILE");
+  // The last option of the command: when it is dealt with, those before it have their values.
+  command.add_flag_callback(
+      "--print-config",
+      [settle] {
+        print_data(stdout, io::format_config(settle()));
+        throw CLI::Success();
+      },
+      "Print the settings in effect, which --config takes, and do nothing else");
+}
+
+CalibrationOptions settings_of(const std::string& file) {
+  return file.empty() ? CalibrationOptions{} : io::read_config(source(file));
+}
+
+CLI::Validator whole(const Range& range) {
+  const auto least = static_cast<int>(range.least);
+  const auto most = static_cast<int>(range.most);
+  return {[least, most](const std::string& text) {
+            int value = 0;
+            return CLI::detail::lexical_cast(text, value) && value >= least && value <= most
+                       ? std::string()
+                       : fmt::format("{} is not a whole number from {} to {}", text, least, most);
+          },
+          ""};
+}
+
+std::string drift_model_words() { return fmt::format("{}|{}", kAutoDriftModel, fmt::join(drift_model_names(), "|")); }
+
+}  // namespace trihedron::cli

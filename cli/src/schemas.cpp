@@ -1,0 +1,212 @@
+#include "schemas.hpp"
+
+#include <algorithm>
+#include <initializer_list>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <utility>
+
+namespace trihedron::cli {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+/// An object of these keys and no other; one that ends in "?" may be left out.
+Json object(std::initializer_list<std::pair<std::string, Json>> keys) {
+  Json schema = {{"type", "object"}, {"properties", Json::object()}, {"required", Json::array()}};
+  for (const auto& [name, value] : keys) {
+    const bool may_lack = name.ends_with('?');
+    const std::string key = name.substr(0, name.size() - (may_lack ? 1 : 0));
+    schema["properties"][key] = value;
+    if (!may_lack) {
+      schema["required"].push_back(key);
+    }
+  }
+  schema["additionalProperties"] = false;
+  return schema;
+}
+
+Json with(Json object_schema, const Json& more) {
+  object_schema["properties"].update(more["properties"]);
+  for (const Json& key : more["required"]) {
+    object_schema["required"].push_back(key);
+  }
+  return object_schema;
+}
+
+Json array(const Json& items) { return {{"type", "array"}, {"items", items}}; }
+Json by_name(const Json& value) { return {{"type", "object"}, {"additionalProperties", value}}; }
+
+const Json& text() {
+  static const Json schema = {{"type", "string"}};
+  return schema;
+}
+const Json& flag() {
+  static const Json schema = {{"type", "boolean"}};
+  return schema;
+}
+const Json& count() {
+  static const Json schema = {{"type", "integer"}, {"minimum", 0}};
+  return schema;
+}
+/// null: there is none, or it is infinite.
+const Json& number() {
+  static const Json schema = {{"type", Json::array({"number", "null"})}};
+  return schema;
+}
+
+Json pass() {
+  const Json defect = object({{"kind", text()}, {"where", text()}, {"count", count()}, {"text", text()}});
+  return object({{"spacecraft", text()},
+                 {"epoch_tai", text()},
+                 {"duration_s", number()},
+                 {"gyros", count()},
+                 {"gyro_samples", count()},
+                 {"fixes", count()},
+                 {"defects", array(defect)},
+                 {"fixes_of_further_star_trackers?", array(count())}});
+}
+
+Json interval() {
+  return object({{"observed_s", number()}, {"max_total_rad", number()}, {"passed_limit_after_s", number()}});
+}
+
+Json evaluation() {
+  const Json axes = object({{"roll_rad", number()}, {"pitch_rad", number()}, {"heading_rad", number()}});
+  const Json errors = object({{"from_s", number()},
+                              {"to_s", number()},
+                              {"epochs", count()},
+                              {"rms", axes},
+                              {"max", axes},
+                              {"max_total_rad", number()},
+                              {"normalised_square?", number()}});
+  return object({{"reference", text()},
+                 {"whole", errors},
+                 {"per_90_min", array(errors)},
+                 {"limit_rad", number()},
+                 {"corrections", array(with(object({{"t_s", number()}}), interval()))}});
+}
+
+Json extension() {
+  const Json pair = object({{"t_s", number()}, {"known_before", interval()}, {"calibrated", interval()}});
+  return object({{"corrections", array(pair)}, {"factor", number()}, {"is_lower_bound?", flag()}});
+}
+
+Json findings() { return array(object({{"code", text()}, {"text", text()}, {"evidence", text()}, {"cure", text()}})); }
+
+Json verdict() { return object({{"trustworthy", flag()}, {"findings", findings()}}); }
+
+Json agreement() {
+  return object({{"chi_square", number()}, {"degrees_of_freedom", count()}, {"limit", number()}, {"holds", flag()}});
+}
+
+Json calibrate_output(const Json& calibration) {
+  const Json of_pass = object({{"name", text()},
+                               {"epoch_tai", text()},
+                               {"verdict", verdict()},
+                               {"coefficients?", agreement()},
+                               {"alignments?", agreement()}});
+  const Json evidence = object({{"states", text()}, {"log_bayes_factor", number()}, {"accepted", flag()}});
+  const Json model = object({{"drift_model", text()},
+                             {"coefficients", count()},
+                             {"log_likelihood", number()},
+                             {"open_loop_rms_rad", number()}});
+  const Json state = object({{"determined", flag()}, {"settled_s", number()}});
+  return object(
+      {{"pass", pass()},
+       {"calibration", calibration},
+       {"fixes", by_name(count())},
+       {"samples", by_name(count())},
+       {"navigation", evaluation()},
+       {"attitude", evaluation()},
+       {"evidence", array(evidence)},
+       {"drift_models", array(model)},
+       {"convergence", object({{"alignment_s", number()}, {"drift_s", number()}, {"states", by_name(state)}})},
+       {"extension", extension()},
+       {"passes?", array(of_pass)}});
+}
+
+Json navigate_output() {
+  return object(
+      {{"pass", pass()}, {"verdict", verdict()}, {"statistics", by_name(number())}, {"evaluation", evaluation()}});
+}
+
+Json evaluate_output() { return with(evaluation(), object({{"extension?", extension()}})); }
+
+Json observe_output() {
+  const Json parameter = object({{"name", text()},
+                                 {"prior_sigma", number()},
+                                 {"sigma", number()},
+                                 {"sigma_until", array(number())},
+                                 {"angle_gain?", number()}});
+  const Json combination = object({{"text", text()},
+                                   {"singular_value", number()},
+                                   {"attitude_error_rad", number()},
+                                   {"unobservable", flag()},
+                                   {"harmful", flag()}});
+  const Json slew =
+      object({{"begin_s", number()}, {"roll_rad", number()}, {"pitch_rad", number()}, {"yaw_rad", number()}});
+  const Json gain =
+      object({{"text", text()}, {"sigma_before", number()}, {"sigma_after", number()}, {"sigma_simulated?", number()}});
+  const Json confirmation =
+      object({{"runs", count()}, {"simulated_over_predicted", number()}, {"nees", number()}, {"parameters", count()}});
+  const Json advice = object({{"max_slew_rate_rad_s", number()},
+                              {"slews", array(slew)},
+                              {"attitude_error_rad", object({{"before", number()}, {"after", number()}})},
+                              {"combinations", array(gain)},
+                              {"confirmation?", confirmation}});
+  return object({{"rank", count()},
+                 {"singular_values", array(number())},
+                 {"attitude_error_rad", number()},
+                 {"t_s", array(number())},
+                 {"parameters", array(parameter)},
+                 {"combinations", array(combination)},
+                 {"advice?", advice}});
+}
+
+Json history_output(const Json& calibration) {
+  const Json entry = object({{"spacecraft", text()},
+                             {"pass", text()},
+                             {"start_up", text()},
+                             {"passes", count()},
+                             {"calibration", calibration}});
+  const Json change = object({{"from", text()},
+                              {"to", text()},
+                              {"coefficients", agreement()},
+                              {"alignments", agreement()},
+                              {"parameters", by_name(object({{"change", number()}, {"sigma", number()}}))}});
+  const Json spread = object({{"state", text()},
+                              {"start_ups", count()},
+                              {"mean", number()},
+                              {"deviation", number()},
+                              {"next_sigma", number()}});
+  return object({{"calibrations", array(entry)},
+                 {"changes", array(change)},
+                 {"spreads", array(spread)},
+                 {"findings", findings()}});
+}
+
+io::Schema output(const std::string& command, const std::string& about, const Json& schema) {
+  Json document = {{"$schema", "https://json-schema.org/draft/2020-12/schema"},
+                   {"title", "Output of " + command},
+                   {"description", about + " SI units, angles in radians; null where there is no number."}};
+  document.update(schema);
+  return {command + "-output", document.dump(1)};
+}
+
+}  // namespace
+
+std::vector<io::Schema> all_schemas() {
+  std::vector<io::Schema> schemas = io::schemas();
+  Json calibration = Json::parse(std::ranges::find(schemas, "calibration", &io::Schema::name)->text);
+  calibration.erase("$schema");
+  schemas.push_back(output("inspect", "What inspect and simulate print with --json.", pass()));
+  schemas.push_back(output("calibrate", "What calibrate and demo print with --json.", calibrate_output(calibration)));
+  schemas.push_back(output("navigate", "What navigate prints with --json.", navigate_output()));
+  schemas.push_back(output("evaluate", "What evaluate prints with --json.", evaluate_output()));
+  schemas.push_back(output("observe", "What observe prints with --json.", observe_output()));
+  schemas.push_back(output("history", "What history prints with --json.", history_output(calibration)));
+  return schemas;
+}
+
+}  // namespace trihedron::cli

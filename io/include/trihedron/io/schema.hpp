@@ -1,0 +1,17 @@
+#pragma once
+/// JSON schemas (draft 2020-12) of the TOML and JSON files that this module reads and writes. Its readers go by the
+/// same tables: a key that a schema does not allow is refused, and the other way round.
+
+#include <string>
+#include <vector>
+
+namespace trihedron::io {
+
+struct Schema {
+  std::string name;  ///< "pass", "calibration"
+  std::string text;  ///< JSON
+};
+
+[[nodiscard]] std::vector<Schema> schemas();
+
+}  // namespace trihedron::io
