@@ -444,7 +444,7 @@ std::string meant(const CLI::App& program, std::span<const char* const> argument
       if (std::ranges::find(known, name) == known.end()) {
         return suggested(name, known);
       }
-    } else if (!word.starts_with("-") && command == nullptr) {
+    } else if (!word.starts_with('-') && command == nullptr) {
       const auto found = std::ranges::find(commands, word);
       if (found == commands.end()) {
         return suggested(word, commands);

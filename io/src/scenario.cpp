@@ -88,13 +88,13 @@ Field recorded_attitude(AttitudeScenario& attitude, const fs::path& file, Time e
 
 /// "none", or a list.
 Field slews(AttitudeScenario& attitude, const fs::path& file) {
-  constexpr std::string_view kNone = "none";
+  static constexpr std::string_view kNone = "none";
   const auto schema = [] {
     Slew slew;
     return any_of({one_of(std::array{kNone}), array_of(schema_of(slew_fields(slew)))});
   };
   return {"slews", "none, or a list, in place of [attitude.imaging]", schema,
-          [&attitude, &file, kNone](const TomlTable& table, const toml::node& node) {
+          [&attitude, &file](const TomlTable& table, const toml::node& node) {
             auto& flown = attitude.slews.emplace<std::vector<Slew>>();
             if (!(node.is_string() && table.text(node, "slews") == kNone)) {
               list("slews", file, flown, "", slew_fields).read(table, node);
