@@ -38,17 +38,23 @@ std::optional<SetupFault> InvariantEstimator<kCapacity>::set_up(const Calibratio
   }
   setup_ = setup;
   drift_ = DriftModel(layout.drift_model, layout.further);
-  prior_gyros_ = gyros_ = prior;
-  shared_ = SharedStates::Zero(layout.shared_size());
+  prior_gyros_ = prior;
   prior_ = information;
-  information_.reset(layout.size(), layout.dynamic());
-  gate_ = OutlierGate(setup);
+  reset();
+  return std::nullopt;
+}
+
+template <Capacity kCapacity>
+void InvariantEstimator<kCapacity>::reset() {
+  gyros_ = prior_gyros_;
+  shared_ = SharedStates::Zero(layout().shared_size());
+  information_.reset(layout().size(), layout().dynamic());
+  gate_ = OutlierGate(setup_);
   begin_stretch();
   angles_since_fix_ = 0;
   angle_rejections_in_a_row_ = 0;
   restarted_from_estimates_ = false;
   started_ = false;
-  return std::nullopt;
 }
 
 template <Capacity kCapacity>

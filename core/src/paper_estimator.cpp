@@ -28,14 +28,20 @@ std::optional<SetupFault> PaperEstimator::set_up(const CalibrationSetup& setup, 
   }
   setup_ = setup;
   drift_ = DriftModel(setup.layout.drift_model, setup.layout.further);
-  prior_gyros_ = gyros_ = prior;
-  gate_ = OutlierGate(setup);
-  information_ = prior_ = information;
+  prior_gyros_ = prior;
+  prior_ = information;
+  reset();
+  return std::nullopt;
+}
+
+void PaperEstimator::reset() {
+  gyros_ = prior_gyros_;
+  gate_ = OutlierGate(setup_);
+  information_ = prior_;
   since_fix_ = {};
   time_since_fix_s_ = 0;
   extra_variance_rad2_ = 0;
   started_ = false;
-  return std::nullopt;
 }
 
 Result<AttitudeByDirections, DirectionsFault> PaperEstimator::attitude(const Gyros& gyros, const Directions& h_b,
