@@ -154,6 +154,7 @@ void Application<Estimator>::begin() {
   faults_ = 0;
   fixes_since_start_ = 0;
   refused_in_a_row_ = 0;
+  unknown_until_ = Time::min();
   adoption_ = Adoption::kNone;
   held_ = false;
   has_sample_ = false;
@@ -231,9 +232,11 @@ void Application<Estimator>::note_sample(const StepReport& report) {
     fix_t_ += shift;
     attitude_t_ += shift;
     set(Fault::kClockSetBack, on_board_.navigator().started());
+    unknown_until_ = report.t;
   } else if (has_sample_ && report.t - used_t_ > kLongGap) {
     detail::count_up(counts_.gaps);
     set(Fault::kGap, on_board_.navigator().started());
+    unknown_until_ = report.t;
   }
   if (!has_sample_) {
     fix_t_ = attitude_t_ = report.t;
@@ -259,8 +262,10 @@ void Application<Estimator>::note_fix(const StepReport& report) {
 template <class Estimator>
 void Application<Estimator>::note_used_fix(const StepReport& report) {
   fix_t_ = report.fix.t;
-  set(Fault::kClockSetBack, false);
-  set(Fault::kGap, false);
+  if (report.fix.t >= unknown_until_) {  // an earlier one may still have waited
+    set(Fault::kClockSetBack, false);
+    set(Fault::kGap, false);
+  }
   set(Fault::kAccuracy, false);
   if (report.corrected) {
     detail::count_up(counts_.corrections);

@@ -100,6 +100,7 @@ class Application {
   Time used_t_{};      ///< of the latest sample used
   Time fix_t_{};       ///< of the latest fix used; before the first, of the start
   Time attitude_t_{};  ///< of the latest sample that gave an attitude, or could have
+  Time unknown_until_ = Time::min();  ///< end of the last gap or jump of the clock
   std::uint32_t faults_ = 0;
   int fixes_since_start_ = 0;
   int refused_in_a_row_ = 0;
