@@ -5,7 +5,8 @@ BUILD := build
 LINT_TOOLS := build-lint/tools
 SOURCES := $(shell git ls-files '*.cpp' '*.hpp' 2>/dev/null)
 
-.PHONY: help setup build everything demo test bench validation consistency docs format lint sanitize coverage install clean
+.PHONY: help setup build everything demo test bench slots validation consistency fuzz fuzz-build fuzz-briefly docs format lint sanitize coverage install \
+  clean
 
 help:
 	@echo 'make demo     install what is missing, build, repeat the experiment of the paper, say where the report is'
@@ -13,8 +14,10 @@ help:
 	@echo 'make build    the program alone, at $(BUILD)/trihedron'
 	@echo 'make everything  with tests and benches'
 	@echo 'make bench    measure: the on-board step, reading, writing and simulating a pass'
+	@echo 'make slots    count the instructions of each slot of the on-board application'
 	@echo 'make validation  measure again what docs/validation.md tells'
 	@echo 'make consistency  measure again what docs/consistency.md tells: hours; goes on where it was interrupted'
+	@echo 'make fuzz     each reader against libFuzzer for FUZZ_SECONDS (3600), measures again what docs/reliability.md tells: hours'
 	@echo 'make docs     reference of the interfaces and all documents as web pages: out/docs/html/index.html'
 	@echo 'make install  into PREFIX (default /usr/local)'
 	@echo 'make setup | format | lint | sanitize | coverage | clean'
@@ -43,6 +46,13 @@ test: everything
 
 bench: everything
 	$(BUILD)/trihedron_bench
+
+# Instructions of each slot of the on-board application.
+slots: setup
+	@cmake/setup.sh measure
+	cmake --preset release $(CMAKE_FLAGS)
+	cmake --build $(BUILD) --target trihedron_slots
+	bench/slots.py $(BUILD)/trihedron_slots
 
 validation: everything
 	validation/validate.py $(BUILD)/trihedron docs/validation.md
@@ -78,6 +88,23 @@ consistency: everything
 	$(CONSISTENCY) $(WHOLE_PASS) --runs 30 --cells $(GEOMETRIES) --table agreement --place agreement docs/consistency.md
 	$(CONSISTENCY) $(WHOLE_PASS) --runs 20 --cells $(STEADY) --table agreement --place agreement20 docs/consistency.md
 
+# What is found is in out/fuzz/found, and the corpus, with which the next run goes on, beside it.
+FUZZ_SECONDS ?= 3600
+FUZZ = fuzz/run.py build-fuzz --seconds $(FUZZ_SECONDS) --jobs $(JOBS)
+
+fuzz-build:
+	@cmake/setup.sh program fuzz
+	cmake --preset fuzz $(CMAKE_FLAGS)
+	cmake --build build-fuzz --parallel $(JOBS) --target trihedron_fuzz
+
+fuzz: fuzz-build
+	$(FUZZ) --document docs/reliability.md
+
+# The same, for a minute of each, and no document.
+fuzz-briefly: FUZZ_SECONDS = 60
+fuzz-briefly: fuzz-build
+	$(FUZZ)
+
 # Fails on each warning but those of members and constants that have no comment of their own; see docs/Doxyfile.
 docs:
 	@cmake/setup.sh docs
@@ -102,7 +129,7 @@ lint: $(LINT_TOOLS)/installed
 	@$(LINT_TOOLS)/bin/clang-format --dry-run --Werror $(SOURCES)
 	cmake --preset lint
 	sed -n 's/^ *"file": "\(.*\/\(Unity\|src\)\/.*\)".*/\1/p' build-lint/compile_commands.json | \
-	  xargs -P $(JOBS) -n 1 $(LINT_TOOLS)/bin/clang-tidy --quiet -p build-lint
+	  xargs -P $(JOBS) -n 1 $(LINT_TOOLS)/bin/clang-tidy --quiet --extra-arg=-Wno-unused-command-line-argument -p build-lint
 
 install: build
 	cmake --install $(BUILD) $(if $(PREFIX),--prefix $(PREFIX))

@@ -138,7 +138,9 @@ enum trihedron_fix {
   /** Fewer than two gyros can be used, or at the start not all. */
   TRIHEDRON_FIX_REJECTED_TOO_FEW_GYROS = 12,
   /** NIS above the gate. */
-  TRIHEDRON_FIX_REJECTED_BY_GATE = 13
+  TRIHEDRON_FIX_REJECTED_BY_GATE = 13,
+  /** The estimate was no longer finite: the filter returns to the prior and starts with the next fix. */
+  TRIHEDRON_FIX_ESTIMATE_LOST = 14
 };
 
 /** Whether a gyro is used. */

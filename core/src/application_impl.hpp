@@ -247,6 +247,9 @@ void Application<Estimator>::note_sample(const StepReport& report) {
 
 template <class Estimator>
 void Application<Estimator>::note_fix(const StepReport& report) {
+  if (report.fix.status == FixStatus::kEstimateLost || report.angles.status == FixStatus::kEstimateLost) {
+    restart();
+  }
   if (report.fix.status == FixStatus::kNone || report.fix.status == FixStatus::kPending) {
     return;
   }
@@ -279,10 +282,7 @@ void Application<Estimator>::note_used_fix(const StepReport& report) {
       on_board_.begin_stretch();
       break;
     case FixStatus::kRestarted:
-      detail::count_up(counts_.filter_restarts);
-      withdraw();
-      happen(Event::kFilterRestarted);
-      fixes_since_start_ = 0;
+      restart();
       break;
     case FixStatus::kUsedAfterReopening:
       withdraw();
@@ -319,6 +319,15 @@ void Application<Estimator>::note_used_fix(const StepReport& report) {
              forecast_.known() && forecast_.error_rad() <= policy_.required_error_rad) {
     adopt();
   }
+}
+
+/// The filter has restarted, or has dropped its estimate and starts with the next fix.
+template <class Estimator>
+void Application<Estimator>::restart() {
+  detail::count_up(counts_.filter_restarts);
+  withdraw();
+  happen(Event::kFilterRestarted);
+  fixes_since_start_ = 0;
 }
 
 /// At the next fix that is used.

@@ -40,12 +40,12 @@ std::optional<SetupFault> InvariantEstimator<kCapacity>::set_up(const Calibratio
   drift_ = DriftModel(layout.drift_model, layout.further);
   prior_gyros_ = prior;
   prior_ = information;
-  reset();
+  forget();
   return std::nullopt;
 }
 
 template <Capacity kCapacity>
-void InvariantEstimator<kCapacity>::reset() {
+void InvariantEstimator<kCapacity>::forget() {
   gyros_ = prior_gyros_;
   shared_ = SharedStates::Zero(layout().shared_size());
   information_.reset(layout().size(), layout().dynamic());
@@ -55,6 +55,11 @@ void InvariantEstimator<kCapacity>::reset() {
   angle_rejections_in_a_row_ = 0;
   restarted_from_estimates_ = false;
   started_ = false;
+}
+
+template <Capacity kCapacity>
+bool InvariantEstimator<kCapacity>::sound() const {
+  return information_.regular() && shared_.allFinite() && estimates_are_finite(gyros_, layout());
 }
 
 template <Capacity kCapacity>
@@ -390,6 +395,26 @@ inline void report_innovation(const Layout& layout, const FixComparison& compari
 
 template <Capacity kCapacity>
 FixReport InvariantEstimator<kCapacity>::correct(const StarFix& fix, const FixReadings& readings) {
+  const FixReport report = take(fix, readings);
+  if (!started_ || sound()) {
+    return report;
+  }
+  forget();
+  return lost(fix);
+}
+
+template <Capacity kCapacity>
+AngleReport InvariantEstimator<kCapacity>::check_angles(Time t, const FixReadings& readings) {
+  const AngleReport report = take_angles(t, readings);
+  if (sound()) {
+    return report;
+  }
+  forget();
+  return {.status = FixStatus::kEstimateLost, .t = t};
+}
+
+template <Capacity kCapacity>
+FixReport InvariantEstimator<kCapacity>::take(const StarFix& fix, const FixReadings& readings) {
   FixReport report;
   report.t = fix.t;
   report.head = fix.head;
@@ -478,7 +503,7 @@ FixReport InvariantEstimator<kCapacity>::correct(const StarFix& fix, const FixRe
 }
 
 template <Capacity kCapacity>
-AngleReport InvariantEstimator<kCapacity>::check_angles(Time t, const FixReadings& readings) {
+AngleReport InvariantEstimator<kCapacity>::take_angles(Time t, const FixReadings& readings) {
   AngleReport report;
   report.t = t;
   const auto by_gyros = attitude(gyros_, readings.h_b, readings.used);

@@ -25,7 +25,7 @@ std::optional<SetupFault> OnBoard<Estimator>::set_up(const CalibrationSetup& set
 template <class Estimator>
 void OnBoard<Estimator>::reset() {
   const CalibrationSetup& setup = estimator_.setup();
-  estimator_.reset();
+  estimator_.forget();
   intake_ = Intake(setup);
   fixes_.clear();
   readings_ = Readings<Gyros::capacity()>(setup, Estimator::kTakesSamplesTogether);
@@ -222,6 +222,10 @@ void OnBoard<Estimator>::correct(const StarFix& fix, StepReport& report) {
     return;  // the estimator did not move its covariance to this fix
   }
   end_stretch(stretch, duration_s);
+  if (report.fix.status == FixStatus::kEstimateLost) {
+    schedule_.no_angles();
+    return;
+  }
   judge(report.fix.odd_gyro, report);
   report.compared = {fix, *readings};
   report.calibrated = calibrated(*readings);
@@ -268,6 +272,9 @@ void OnBoard<Estimator>::use_angles(Time t, const FixReadings& readings, StepRep
   if constexpr (Estimator::kUsesAngles) {
     report.angles = estimator_.check_angles(t, readings);
     schedule_.angles_used(t);
+    if (report.angles.status == FixStatus::kEstimateLost) {
+      schedule_.no_angles();
+    }
   }
 }
 

@@ -30,14 +30,14 @@ std::optional<SetupFault> PaperEstimator::set_up(const CalibrationSetup& setup, 
   drift_ = DriftModel(setup.layout.drift_model, setup.layout.further);
   prior_gyros_ = prior;
   prior_ = information;
-  reset();
+  forget();
   return std::nullopt;
 }
 
-void PaperEstimator::reset() {
+void PaperEstimator::forget() {
   gyros_ = prior_gyros_;
-  gate_ = OutlierGate(setup_);
   information_ = prior_;
+  gate_ = OutlierGate(setup_);
   since_fix_ = {};
   time_since_fix_s_ = 0;
   extra_variance_rad2_ = 0;
@@ -128,6 +128,15 @@ auto PaperEstimator::measure(const Gyros& gyros, const QuasiInertial& qi, const 
 }
 
 FixReport PaperEstimator::correct(const StarFix& fix, const FixReadings& readings) {
+  const FixReport report = take(fix, readings);
+  if (!started_ || sound()) {
+    return report;
+  }
+  forget();
+  return lost(fix);
+}
+
+FixReport PaperEstimator::take(const StarFix& fix, const FixReadings& readings) {
   FixReport report;
   report.t = fix.t;
   report.head = fix.head;

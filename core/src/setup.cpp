@@ -29,11 +29,11 @@ std::optional<SetupFault> CalibrationSetup::fault() const {
     }
   }
   if (!(direction_random_walk_rad_sqrt_s >= 0) || !std::isfinite(direction_random_walk_rad_sqrt_s) ||
-      !(gyro_period > Duration::zero())) {
+      !(gyro_period > Duration::zero() && gyro_period <= kLongestGyroPeriod)) {
     return SetupFault::kNoiseNotPositive;
   }
-  if (!(gate_nis > 0) || !(student_t_freedom >= 0) || !(reopen_after_rejections > 0) ||
-      !(reopen_after_jump_rejections > 0)) {
+  if (!(gate_nis > 0) || !(student_t_freedom >= 0 && std::isfinite(student_t_freedom)) ||
+      !(reopen_after_rejections > 0) || !(reopen_after_jump_rejections > 0)) {
     return SetupFault::kGateNotPositive;
   }
   const FurtherStates& further = layout.further;

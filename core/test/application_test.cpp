@@ -688,6 +688,23 @@ TEST(FilterRestarted, BeginsToAlignAgain) {
   EXPECT_TRUE(aligned_again);
 }
 
+TEST(FilterRestarted, AlsoWhereTheEstimateIsLost) {
+  Parameters table = test::nominal_parameters();
+  for (int i = 0; i < Layout{}.parameters(); ++i) {
+    table.covariance[test::covariance_index(i, i)] = 1e200;  // a prior that says nothing
+  }
+  const auto application = test::started<PairApplication>(table);
+  bool lost = false;
+  fly_from(flight(), 0, 60, *application, [&](const StepReport& report) {
+    if (report.fix.status == FixStatus::kEstimateLost) {
+      lost = true;
+      EXPECT_EQ(application->mode(), kAligning);
+    }
+  });
+  EXPECT_TRUE(lost);
+  EXPECT_GE(application->housekeeping().filter_restarts, 1U);
+}
+
 TEST(PairApplication, FitsInto32KiB) { EXPECT_LE(sizeof(PairApplication), 32U * 1024); }
 
 // ---- The forecast

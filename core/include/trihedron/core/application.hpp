@@ -82,6 +82,7 @@ class Application {
   void note_sample(const StepReport& report);
   void note_fix(const StepReport& report);
   void note_used_fix(const StepReport& report);
+  void restart();
   void adopt();
   void withdraw();
   void watch(const StepReport& report);

@@ -49,8 +49,8 @@ class PaperEstimator {
   [[nodiscard]] std::optional<SetupFault> set_up(const CalibrationSetup& setup, const Gyros& prior,
                                                  const Eigen::Ref<const Eigen::MatrixXd>& covariance);
 
-  /// As after set_up().
-  void reset();
+  /// Returns to the prior, not started: as after set_up().
+  void forget();
 
   [[nodiscard]] bool started() const { return started_; }
   [[nodiscard]] const CalibrationSetup& setup() const { return setup_; }
@@ -84,7 +84,8 @@ class PaperEstimator {
   /// Widens the directions: `variance_rad2` per axis for what a step too long for its readings may have missed.
   void add_direction_variance(double variance_rad2) { extra_variance_rad2_ += variance_rad2; }
 
-  /// Astro-correction: the first one starts the filter, each further one updates it.
+  /// Astro-correction: the first one starts the filter, each further one updates it. Where the estimate is not finite
+  /// after that, or has no covariance, it is forgotten: kEstimateLost, and no longer started().
   [[nodiscard]] FixReport correct(const StarFix& fix, const FixReadings& readings);
 
   /// The paper's components of direction errors: tangent bases of both momenta in the quasi-inertial frame, in `in`
@@ -109,6 +110,10 @@ class PaperEstimator {
  private:
   using Information = SquareRootInformation<kMaxStates, States::kDynamic>;
 
+  /// Whether the estimate is finite and has a covariance.
+  [[nodiscard]] bool sound() const { return information_.regular() && estimates_are_finite(gyros_, layout()); }
+  /// correct() before sound() is asked.
+  [[nodiscard]] FixReport take(const StarFix& fix, const FixReadings& readings);
   void update_covariance_to_now(const QuasiInertial& now);
   void feed_back(const Information::Vector& correction);
 
