@@ -2,7 +2,8 @@
 #define TRIHEDRON_H
 /**
  * The on-board application in C99. It allocates nothing, has no global state, and calls nothing of the system: the caller
- * owns the memory, feeds samples and fixes in time order, and asks. One object is used by one thread at a time.
+ * owns the memory, feeds samples and fixes in time order, and asks. One object is used by one thread at a time. No pointer
+ * may be null unless it says so.
  * docs/flight-interface.md describes records and numbers.
  */
 
@@ -14,6 +15,8 @@
 #ifdef __cplusplus
 extern "C" {
 #endif
+
+/* C has no `using`, and constants are to be known to the preprocessor. NOLINTBEGIN(modernize-*) */
 
 /** Of the functions; of the records there is TRIHEDRON_TABLES_VERSION. */
 #define TRIHEDRON_INTERFACE_VERSION 1u
@@ -70,6 +73,8 @@ uint64_t trihedron_save(const trihedron_application* its, void* memory, size_t s
  * and nothing is changed. `slots`, where it is not null: two of `trihedron_snapshot`, what each slot held.
  */
 uint64_t trihedron_restore(trihedron_application* its, const void* memory, size_t size, uint32_t slots[2]);
+
+/* NOLINTEND(modernize-*) */
 
 #ifdef __cplusplus
 }

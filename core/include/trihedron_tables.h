@@ -4,6 +4,8 @@
 
 #include <stdint.h>
 
+/* C has no `using`, and constants are to be known to the preprocessor. NOLINTBEGIN(modernize-*) */
+
 /** Of the tables in this file. */
 #define TRIHEDRON_TABLES_VERSION 1u
 /** There is room for so many in the tables. */
@@ -19,7 +21,7 @@ enum trihedron_mode {
   TRIHEDRON_MODE_ALIGNING = 2,
   /** The filter follows the fixes; the attitude rests on the parameters loaded or held. */
   TRIHEDRON_MODE_CALIBRATING = 3,
-  /** The calibration is adopted: the attitude keeps within the required error without the star tracker. */
+  /** The calibration is adopted: the attitude rests on it, also without the star tracker; `ready_s` says how long. */
   TRIHEDRON_MODE_NAVIGATING = 4,
   /** Attitude is delivered, but a fault takes away accuracy or redundancy; `faults` says which. */
   TRIHEDRON_MODE_DEGRADED = 5,
@@ -353,5 +355,7 @@ typedef struct trihedron_parameters {
   }
 /** Of the record, bytes. */
 #define TRIHEDRON_PARAMETERS_SIZE 4112u
+
+/* NOLINTEND(modernize-*) */
 
 #endif

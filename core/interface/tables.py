@@ -67,6 +67,7 @@ def cpp_comments(text, indent=""):
 
 def c_header():
     lines = [f"/* {NOTE} */", "#ifndef TRIHEDRON_TABLES_H", "#define TRIHEDRON_TABLES_H", "", "#include <stdint.h>", "",
+             "/* C has no `using`, and constants are to be known to the preprocessor. NOLINTBEGIN(modernize-*) */", "",
              "/** Of the tables in this file. */", f"#define TRIHEDRON_TABLES_VERSION {TABLES['version']}u",
              "/** There is room for so many in the tables. */", f"#define TRIHEDRON_MAX_GYROS {TABLES['max_gyros']}", ""]
     for enum in TABLES["enum"]:
@@ -88,7 +89,7 @@ def c_header():
                       f"#define TRIHEDRON_{struct['name'].upper()}_DEFAULT \\", "  { \\"]
             lines += [f"    .{field['name']} = {field.get('initialiser', field['default'])}, \\" for field in defaults] + ["  }"]
         lines += [f"/** Of the record, bytes. */", f"#define TRIHEDRON_{struct['name'].upper()}_SIZE {size}u", ""]
-    return "\n".join(lines + ["#endif", ""])
+    return "\n".join(lines + ["/* NOLINTEND(modernize-*) */", "", "#endif", ""])
 
 
 def cpp_header():
@@ -129,7 +130,7 @@ def table(head, rows):
 def document():
     lines = ["# Interface of the on-board application", "",
              f"{NOTE} Version {TABLES['version']} of the tables.", "",
-             "`core/include/trihedron.h` has the functions, `docs/adr/0012-on-board-application.md` the reasons. Numbers are in the byte order of",
+             "`core/include/trihedron.h` has the functions, `docs/adr/0014-on-board-application.md` the reasons. Numbers are in the byte order of",
              "the machine; records have no gaps.", ""]
     for enum in TABLES["enum"]:
         lines += [f"## `trihedron_{enum['name']}`", "", enum["doc"], ""]

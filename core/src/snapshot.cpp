@@ -32,8 +32,8 @@ void write_slot(std::span<std::byte> slot, std::uint32_t layout, std::uint64_t s
   SnapshotHeader header{.magic = SnapshotHeader::kMagic, .layout = layout, .sequence = sequence, .size = state.size()};
   header.crc = crc_of(header, state);
   const auto bytes = std::as_bytes(std::span(&header, 1));
-  std::copy(state.begin(), state.end(), slot.begin() + static_cast<std::ptrdiff_t>(bytes.size()));
-  std::copy(bytes.begin(), bytes.end(), slot.begin());
+  std::ranges::copy(state, slot.begin() + static_cast<std::ptrdiff_t>(bytes.size()));
+  std::ranges::copy(bytes, slot.begin());
 }
 
 }  // namespace trihedron::detail

@@ -1,6 +1,6 @@
 #pragma once
 /// The on-board application: modes, commands, faults and housekeeping about the on-board step, which it drives. It
-/// decides by itself when the calibration is good enough to navigate by. docs/adr/0012-on-board-application.md.
+/// decides by itself when the calibration is good enough to navigate by. docs/adr/0014-on-board-application.md.
 
 #include <array>
 #include <chrono>

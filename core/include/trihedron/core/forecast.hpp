@@ -1,5 +1,5 @@
 #pragma once
-/// What attitude error the calibration predicts for an open loop: docs/adr/0012-on-board-application.md.
+/// What attitude error the calibration predicts for an open loop: docs/adr/0014-on-board-application.md.
 
 #include <Eigen/Core>
 #include <algorithm>

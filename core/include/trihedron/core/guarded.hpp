@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cstddef>
 #include <cstdint>
+#include <cstring>
 #include <span>
 #include <type_traits>
 
@@ -35,7 +36,7 @@ class Guarded {
   GuardFinding check() {
     const auto state = bytes_of(state_);
     const auto copy = bytes_of(copy_);
-    if (std::equal(state.begin(), state.end(), copy.begin())) {
+    if (std::memcmp(state.data(), copy.data(), state.size()) == 0) {
       return GuardFinding::kWhole;
     }
     if (crc32(copy) == crc_) {

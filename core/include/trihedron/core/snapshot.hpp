@@ -1,6 +1,6 @@
 #pragma once
 /// Snapshots of a state, in memory of the caller that survives a restart: two slots, so that one is whole while the
-/// other is being written. docs/adr/0012-on-board-application.md.
+/// other is being written. docs/adr/0014-on-board-application.md.
 
 #include <algorithm>
 #include <array>

@@ -20,7 +20,7 @@ enum class Mode : std::uint8_t {
   kAligning = 2,
   /// The filter follows the fixes; the attitude rests on the parameters loaded or held.
   kCalibrating = 3,
-  /// The calibration is adopted: the attitude keeps within the required error without the star tracker.
+  /// The calibration is adopted: the attitude rests on it, also without the star tracker; `ready_s` says how long.
   kNavigating = 4,
   /// Attitude is delivered, but a fault takes away accuracy or redundancy; `faults` says which.
   kDegraded = 5,

@@ -32,6 +32,12 @@ inline constexpr std::size_t kEvents = 15;
 
 /// Of a command.
 [[nodiscard]] constexpr Event event_of(Command command) { return static_cast<Event>(command); }
+static_assert(event_of(Command::kStart) == Event::kStart && event_of(Command::kCorrectNow) == Event::kCorrectNow &&
+              event_of(Command::kAdoptCalibration) == Event::kAdoptCalibration &&
+              event_of(Command::kHoldCalibration) == Event::kHoldCalibration &&
+              event_of(Command::kSelectGyros) == Event::kSelectGyros &&
+              event_of(Command::kLoadParameters) == Event::kLoadParameters &&
+              event_of(Command::kReset) == Event::kReset && kCommands == 7);
 
 namespace detail {
 
