@@ -673,7 +673,8 @@ TEST(FilterRestarted, BeginsToAlignAgain) {
   std::vector<StarFix> fixes = flight().fixes;
   for (std::size_t i = 450; i < fixes.size(); ++i) {
     const Eigen::Vector3d axis = i / 60 % 2 == 0 ? Eigen::Vector3d::UnitX() : Eigen::Vector3d::UnitZ();
-    fixes[i].q_in_c = fixes[i].q_in_c * Eigen::Quaterniond(Eigen::AngleAxisd(0.03 * static_cast<double>(i / 60 % 3), axis));
+    fixes[i].q_in_c =
+        fixes[i].q_in_c * Eigen::Quaterniond(Eigen::AngleAxisd(0.03 * static_cast<double>(i / 60 % 3), axis));
   }
   Parameters table = test::nominal_parameters();
   table.reopen_after_jump_rejections = 20;
