@@ -1,5 +1,7 @@
 #include "trihedron/core/snapshot.hpp"
 
+#include <cstring>
+
 #include "trihedron/core/crc32.hpp"
 
 namespace trihedron::detail {
@@ -16,7 +18,7 @@ std::uint32_t crc_of(const SnapshotHeader& header, std::span<const std::byte> st
 SlotContent look_into(std::span<const std::byte> slot, std::uint32_t layout) {
   SnapshotHeader header;
   const auto bytes = std::as_writable_bytes(std::span(&header, 1));
-  std::copy_n(slot.begin(), bytes.size(), bytes.begin());
+  std::memcpy(bytes.data(), slot.data(), bytes.size());
   const auto state = slot.subspan(bytes.size());
   if (header.magic != SnapshotHeader::kMagic || header.layout != layout || header.size != state.size()) {
     return {SnapshotAnswer::kForeign, 0};
@@ -32,8 +34,8 @@ void write_slot(std::span<std::byte> slot, std::uint32_t layout, std::uint64_t s
   SnapshotHeader header{.magic = SnapshotHeader::kMagic, .layout = layout, .sequence = sequence, .size = state.size()};
   header.crc = crc_of(header, state);
   const auto bytes = std::as_bytes(std::span(&header, 1));
-  std::ranges::copy(state, slot.begin() + static_cast<std::ptrdiff_t>(bytes.size()));
-  std::ranges::copy(bytes, slot.begin());
+  std::memcpy(slot.subspan(bytes.size()).data(), state.data(), state.size());
+  std::memcpy(slot.data(), bytes.data(), bytes.size());
 }
 
 }  // namespace trihedron::detail

@@ -2,7 +2,6 @@
 /// A state kept twice, so that a bit that radiation flips in memory is found and put right before the state is used
 /// again.
 
-#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
@@ -40,11 +39,11 @@ class Guarded {
       return GuardFinding::kWhole;
     }
     if (crc32(copy) == crc_) {
-      std::copy(copy.begin(), copy.end(), state.begin());
+      std::memcpy(state.data(), copy.data(), state.size());
       return GuardFinding::kStateRepaired;
     }
     if (crc32(state) == crc_) {
-      std::copy(state.begin(), state.end(), copy.begin());
+      std::memcpy(copy.data(), state.data(), state.size());
       return GuardFinding::kCopyRepaired;
     }
     return GuardFinding::kLost;
@@ -76,7 +75,7 @@ class Guarded {
   }
   void seal() {
     const auto state = bytes_of(state_);
-    std::copy(state.begin(), state.end(), bytes_of(copy_).begin());
+    std::memcpy(bytes_of(copy_).data(), state.data(), state.size());
     crc_ = crc32(state);
   }
 

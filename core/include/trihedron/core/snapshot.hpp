@@ -6,6 +6,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <cstring>
 #include <span>
 #include <type_traits>
 
@@ -85,7 +86,7 @@ class SnapshotStore {
     other = other == SnapshotAnswer::kRestored ? SnapshotAnswer::kOlder : other;
     restored.sequence = found.of(newest);
     const auto bytes = slot(memory, newest).subspan(sizeof(SnapshotHeader));
-    std::copy(bytes.begin(), bytes.end(), std::as_writable_bytes(std::span(&state, 1)).begin());
+    std::memcpy(std::as_writable_bytes(std::span(&state, 1)).data(), bytes.data(), bytes.size());
     return restored;
   }
 
