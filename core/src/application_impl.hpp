@@ -486,10 +486,11 @@ Answer Application<Estimator>::load(const Parameters& table) {
   static_assert(std::size(Parameters{}.covariance) == kMostParameters * (kMostParameters + 1) / 2);
   const int size = setup.layout.parameters();
   Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, kMostParameters, kMostParameters> covariance(size, size);
+  covariance.setZero();
   const double* next = table.covariance;
   for (int row = 0; row < size; ++row) {
     for (int column = 0; column <= row; ++column) {
-      covariance(row, column) = covariance(column, row) = *next++;
+      covariance(row, column) = *next++;
     }
   }
   const ApplicationPolicy policy{.correction_interval = Duration(table.correction_interval_ns),

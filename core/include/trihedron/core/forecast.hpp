@@ -40,13 +40,9 @@ class Forecast {
   /// Whether a window is complete and each of its attitudes has been predicted for.
   [[nodiscard]] bool known() const { return predicted_ >= kAttitudes; }
   /// The largest error after the required interval, 99.7 %.
-  [[nodiscard]] double error_rad() const {
-    return *std::max_element(error_by_attitude_rad_.begin(), error_by_attitude_rad_.end());
-  }
+  [[nodiscard]] double error_rad() const { return *std::ranges::max_element(error_by_attitude_rad_); }
   /// How long the required error is kept, 99.7 %.
-  [[nodiscard]] double ready_s() const {
-    return *std::min_element(ready_by_attitude_s_.begin(), ready_by_attitude_s_.end());
-  }
+  [[nodiscard]] double ready_s() const { return *std::ranges::min_element(ready_by_attitude_s_); }
 
  private:
   template <class T>
