@@ -1,9 +1,12 @@
 #include <fmt/core.h>
 
+#include <array>
+#include <cstddef>
 #include <filesystem>
 #include <memory>
-#include <optional>
 #include <string>
+#include <string_view>
+#include <utility>
 #include <vector>
 
 #include "commands.hpp"
@@ -13,6 +16,7 @@
 #include "trihedron/ground/calibrate/several_passes.hpp"
 #include "trihedron/ground/evaluate/calibration_evaluation.hpp"
 #include "trihedron/ground/model/setup_error.hpp"
+#include "trihedron/io/apart.hpp"
 #include "trihedron/io/atomic_file.hpp"
 #include "trihedron/io/attitude.hpp"
 #include "trihedron/io/calibration.hpp"
@@ -21,6 +25,7 @@
 #include "trihedron/io/error.hpp"
 #include "trihedron/io/named_pass.hpp"
 #include "trihedron/io/residuals.hpp"
+#include "trihedron/io/staged_directory.hpp"
 #include "trihedron/records/run.hpp"
 #include "trihedron/report/report.hpp"
 
@@ -38,22 +43,37 @@ Outcome outcome_of(const io::NamedPass& pass, const CalibrationRun& run) {
   return {pass, run, ground::evaluate_calibration(pass.pass(), run, pass.truth_or_null())};
 }
 
-void write_outcome(const std::filesystem::path& out, const Outcome& outcome, const CalibrationOptions& options) {
+// Names of the files of an outcome.
+constexpr std::string_view kCalibrationFile = "calibration.json";
+constexpr std::string_view kAttitudeFile = "attitude.csv";
+constexpr std::string_view kDefinitiveFile = "definitive-attitude.csv";
+constexpr std::string_view kResidualsFile = "residuals.nc";
+constexpr std::string_view kConfigFile = "effective-config.toml";
+constexpr std::string_view kReportFile = "report.html";
+constexpr std::array kOutcomeFiles = {kCalibrationFile, kAttitudeFile, kDefinitiveFile,
+                                      kResidualsFile,   kConfigFile,   kReportFile};
+
+/// `below`: the directory in OUT.
+void stage_outcome(io::StagedDirectory& staged, const std::filesystem::path& below, const Outcome& outcome,
+                   const CalibrationOptions& options) {
   const Time epoch = outcome.run.calibration.epoch;
+  const std::filesystem::path out = staged.path() / below;
   const io::MadeDirectory made(out);
-  io::write_calibration(out / "calibration.json", outcome.run.calibration);
-  io::write_attitude(out / "attitude.csv", epoch, outcome.run.attitude);
+  io::write_calibration(out / kCalibrationFile, outcome.run.calibration);
+  io::write_attitude(out / kAttitudeFile, epoch, outcome.run.attitude);
   if (outcome.run.definitive_attitude.size() > 0) {
-    io::write_attitude(out / "definitive-attitude.csv", epoch, outcome.run.definitive_attitude);
+    io::write_attitude(out / kDefinitiveFile, epoch, outcome.run.definitive_attitude);
+  } else {
+    staged.drop(below / kDefinitiveFile);
   }
-  io::write_residuals(out / "residuals.nc", epoch, io::residual_tables(outcome.run));
-  io::write_file(out / "effective-config.toml", io::format_config(options));
+  io::write_residuals(out / kResidualsFile, epoch, io::residual_tables(outcome.run));
+  io::write_file(out / kConfigFile, io::format_config(options));
 
   report::ReportInput input{outcome.pass.pass(), outcome.run, outcome.pass.truth_or_null(), {}, &outcome.evaluation};
   for (const io::Defect& defect : outcome.pass.loaded.defects) {
     input.telemetry_notes.push_back(defect.text());
   }
-  io::write_file(out / "report.html", report::render(input));
+  io::write_file(out / kReportFile, report::render(input));
 }
 
 nlohmann::ordered_json counts_json(const std::vector<NamedCount>& counts) {
@@ -102,6 +122,32 @@ ground::SeveralPasses calibrate_in_order(const std::vector<io::NamedPass>& passe
   return calibrated;
 }
 
+/// Names in OUT that a calibration of these passes may write.
+std::vector<std::filesystem::path> output_names(const std::vector<io::NamedPass>& passes) {
+  std::vector<std::filesystem::path> names(kOutcomeFiles.begin(), kOutcomeFiles.end());
+  for (std::size_t i = 0; passes.size() > 1 && i < passes.size(); ++i) {
+    for (const std::string_view name : kOutcomeFiles) {
+      names.push_back(std::filesystem::path(passes[i].name) / name);
+    }
+  }
+  return names;
+}
+
+void expect_apart(const std::vector<io::NamedPass>& passes, const CalibrationFiles& files) {
+  std::vector<std::filesystem::path> inputs = {files.config};
+  for (const io::NamedPass& pass : passes) {
+    inputs.push_back(pass.path);
+    inputs.push_back(pass.loaded.prior_file);
+  }
+  std::vector<std::filesystem::path> outputs = {files.out};
+  for (const std::filesystem::path& name : output_names(passes)) {
+    outputs.push_back(files.out / name);
+  }
+  io::expect_apart({&files.catalogue, 1}, outputs);
+  outputs.push_back(files.catalogue);
+  io::expect_apart(inputs, outputs);
+}
+
 std::vector<std::string> estimator_names() {
   std::vector<std::string> names;
   for (const EstimatorRow& row : kEstimators) {
@@ -112,38 +158,54 @@ std::vector<std::string> estimator_names() {
 
 }  // namespace
 
-ExitStatus calibrate_passes(const std::vector<std::string>& paths, const CalibrationOptions& options,
-                            const std::filesystem::path& out, const std::optional<std::filesystem::path>& catalogue,
-                            const Common& common) {
-  const std::vector<io::NamedPass> passes = io::read_passes(paths);
-  if (catalogue) {
-    io::expect_catalogue_of(passes.front().pass().settings.spacecraft, *catalogue);
-  }
+Calibrated calibrate_into(io::StagedDirectory& staged, const std::filesystem::path& out,
+                          const std::vector<io::NamedPass>& passes, const CalibrationOptions& options,
+                          const Common& common) {
   const ground::SeveralPasses calibrated = calibrate_in_order(passes, options, common.quiet);
   const bool several = passes.size() > 1;
-  io::StagedDirectory staged(out);
   for (std::size_t i = 0; several && i < passes.size(); ++i) {
-    write_outcome(staged.path() / passes[i].name, outcome_of(passes[i], calibrated.passes()[i].run), options);
+    stage_outcome(staged, passes[i].name, outcome_of(passes[i], calibrated.passes()[i].run), options);
   }
   const Outcome outcome = outcome_of(passes.back(), calibrated.combined());
-  write_outcome(staged.path(), outcome, options);
-  staged.commit();
-  if (catalogue) {
-    io::add_to_catalogue(*catalogue, calibrated.catalogue_entries());
-  }
+  stage_outcome(staged, {}, outcome, options);
 
+  std::string summary;
   if (common.json) {
     nlohmann::ordered_json json = outcome_json(outcome);
     if (several) {
       json["passes"] = passes_json(calibrated.passes());
     }
-    fmt::print("{}\n", json.dump(1));
+    summary = json.dump(1) + "\n";
   } else if (!common.quiet) {
-    fmt::print("{}{}Written     {}: calibration.json attitude.csv {}residuals.nc report.html effective-config.toml\n",
-               several ? passes_text(calibrated.passes()) : "", outcome_text(outcome, options.corrections),
-               out.string(), options.definitive_attitude ? "definitive-attitude.csv " : "");
+    summary = fmt::format(
+        "{}{}Written     {}: calibration.json attitude.csv {}residuals.nc report.html effective-config.toml\n",
+        several ? passes_text(calibrated.passes()) : "", outcome_text(outcome, options.corrections), out.string(),
+        options.definitive_attitude ? "definitive-attitude.csv " : "");
   }
-  return outcome.run.calibration.verdict.trustworthy ? kTrustworthy : kDoNotUse;
+  return {outcome.run.calibration.verdict.trustworthy ? kTrustworthy : kDoNotUse, std::move(summary),
+          calibrated.catalogue_entries()};
+}
+
+ExitStatus calibrate_passes(const std::vector<std::string>& paths, const CalibrationOptions& options,
+                            const CalibrationFiles& files, const Common& common) {
+  const std::vector<io::NamedPass> passes = io::read_passes(paths, kOutcomeFiles);
+  expect_apart(passes, files);
+  if (!files.catalogue.empty()) {
+    io::expect_catalogue_of(passes.front().pass().settings.spacecraft, files.catalogue);
+  }
+  io::StagedDirectory staged(files.out);
+  staged.expect_places(output_names(passes));
+  const Calibrated calibrated = calibrate_into(staged, files.out, passes, options, common);
+  if (files.catalogue.empty()) {
+    staged.commit();
+  } else {
+    io::CatalogueUpdate update(files.catalogue, calibrated.catalogue_entries);
+    staged.put_in_place();
+    update.commit();
+    staged.keep();
+  }
+  fmt::print("{}", calibrated.summary);
+  return calibrated.exit_status;
 }
 
 void add_calibrate(CLI::App& program, const Common& common, int& exit_status) {
@@ -184,9 +246,8 @@ void add_calibrate(CLI::App& program, const Common& common, int& exit_status) {
       options.estimator = Estimator::kBatch;
       options.definitive_attitude = true;
     }
-    const auto catalogue =
-        arguments->catalogue.empty() ? std::nullopt : std::optional(std::filesystem::path(arguments->catalogue));
-    exit_status = calibrate_passes(arguments->passes, options, arguments->out, catalogue, common);
+    exit_status =
+        calibrate_passes(arguments->passes, options, {arguments->out, arguments->config, arguments->catalogue}, common);
   });
 }
 

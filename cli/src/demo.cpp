@@ -2,13 +2,13 @@
 
 #include <filesystem>
 #include <memory>
-#include <optional>
 #include <string>
 
 #include "commands.hpp"
 #include "steps.hpp"
 #include "trihedron/io/atomic_file.hpp"
-#include "trihedron/io/scenario.hpp"
+#include "trihedron/io/named_pass.hpp"
+#include "trihedron/io/staged_directory.hpp"
 
 namespace trihedron::cli {
 namespace {
@@ -23,17 +23,21 @@ constexpr const char* kScenario =
 
 ExitStatus run_demo(const std::filesystem::path& out, const Common& common) {
   const Common silent{.quiet = true, .json = false};
-  const io::MadeDirectory made(out);
-  io::write_file(out / "scenario.toml", kScenario);
-  simulate_pass(io::read_scenario(out / "scenario.toml"), "scenario.toml", out / "pass.nc", silent);
-  const ExitStatus calibrated = calibrate_passes({out / "pass.nc"}, {}, out, std::nullopt, common);
+  io::StagedDirectory staged(out);
+  const std::filesystem::path scenario = staged.path() / "scenario.toml";
+  const std::filesystem::path pass = staged.path() / "pass.nc";
+  io::write_file(scenario, kScenario);
+  simulate_pass(scenario, "scenario.toml", pass, silent);
+  const Calibrated calibrated = calibrate_into(staged, out, {io::read_named_pass(pass)}, {}, common);
   // The calibration's verdict is the one that counts: this is the same filter on the same pass.
-  static_cast<void>(navigate_pass(out / "pass.nc", std::nullopt, {}, out / "navigation.csv", silent));
+  static_cast<void>(navigate_pass(pass, {staged.path() / "navigation.csv", {}, {}}, {}, silent));
+  staged.commit();
+  fmt::print("{}", calibrated.summary);
   if (!common.quiet && !common.json) {
     fmt::print("            scenario.toml pass.nc navigation.csv\n\nThe report is {}\n",
                (out / "report.html").string());
   }
-  return calibrated;
+  return calibrated.exit_status;
 }
 
 }  // namespace

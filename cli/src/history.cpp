@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <filesystem>
 #include <iterator>
 #include <memory>
 #include <string>
@@ -11,6 +12,7 @@
 
 #include "commands.hpp"
 #include "summary.hpp"
+#include "trihedron/io/apart.hpp"
 #include "trihedron/io/atomic_file.hpp"
 #include "trihedron/io/calibration.hpp"
 #include "trihedron/io/catalogue.hpp"
@@ -199,10 +201,13 @@ void add_history(CLI::App& program, const Common& common, int& exit_status) {
   command->add_option("CATALOGUE", arguments->catalogue, "Database that calibrate --catalogue wrote")->required();
   command->add_option("-o,--output", arguments->report, "Report with the trend of each parameter to write (HTML)");
   command->callback([&common, &exit_status, arguments] {
-    const Catalogue catalogue = io::read_catalogue(arguments->catalogue);
+    const std::filesystem::path file = arguments->catalogue;
+    const std::filesystem::path written = arguments->report;
+    io::expect_apart({&file, 1}, {&written, 1});
+    const Catalogue catalogue = io::read_catalogue(file);
     const ground::History history = ground::compare_start_ups(catalogue);
-    if (!arguments->report.empty()) {
-      io::write_file(arguments->report, report::render_history(catalogue, history));
+    if (!written.empty()) {
+      io::write_file(written, report::render_history(catalogue, history));
     }
     if (common.json) {
       fmt::print("{}\n", history_json(catalogue, history).dump(1));

@@ -2,6 +2,7 @@
 
 #include <memory>
 #include <string>
+#include <vector>
 
 #include "commands.hpp"
 #include "progress.hpp"
@@ -10,6 +11,8 @@
 #include "trihedron/ground/calibrate/calibrate.hpp"
 #include "trihedron/ground/evaluate/attitude_evaluation.hpp"
 #include "trihedron/ground/model/setup_error.hpp"
+#include "trihedron/io/apart.hpp"
+#include "trihedron/io/atomic_file.hpp"
 #include "trihedron/io/attitude.hpp"
 #include "trihedron/io/calibration.hpp"
 #include "trihedron/io/config.hpp"
@@ -19,14 +22,16 @@
 
 namespace trihedron::cli {
 
-ExitStatus navigate_pass(const std::filesystem::path& pass, const std::optional<std::filesystem::path>& calibration,
-                         const CalibrationOptions& options, const std::filesystem::path& attitude,
-                         const Common& common) {
+ExitStatus navigate_pass(const std::filesystem::path& pass, const NavigationFiles& files,
+                         const CalibrationOptions& options, const Common& common) {
   io::NamedPass named = io::read_named_pass(pass);
   io::LoadedPass& loaded = named.loaded;
-  if (calibration) {
-    loaded.pass.settings.prior = io::read_calibration(*calibration);
+  const std::vector<std::filesystem::path> inputs = {pass, loaded.prior_file, files.calibration, files.config};
+  io::expect_apart(inputs, {&files.attitude, 1});
+  if (!files.calibration.empty()) {
+    loaded.pass.settings.prior = io::read_calibration(files.calibration);
   }
+  io::expect_writable(files.attitude);
   NavigationRun result;
   try {
     const ProgressBar bar("navigate", common.quiet);
@@ -35,8 +40,8 @@ ExitStatus navigate_pass(const std::filesystem::path& pass, const std::optional<
     throw io::InputRefused(pass, {}, error.what(), error.cure());
   }
   const Time epoch = loaded.pass.settings.epoch;
-  io::write_attitude(attitude, epoch, result.attitude);
   const ground::AttitudeEvaluation evaluation = ground::evaluate_navigation(loaded.pass, result, named.truth_or_null());
+  io::write_attitude(files.attitude, epoch, result.attitude);
   if (common.json) {
     nlohmann::ordered_json json = {{"pass", pass_json(loaded)},
                                    {"verdict", verdict_json(result.verdict)},
@@ -45,7 +50,7 @@ ExitStatus navigate_pass(const std::filesystem::path& pass, const std::optional<
     fmt::print("{}\n", json.dump(1));
   } else if (!common.quiet) {
     fmt::print("{}{}\n{}\nWritten     {}: {} epochs\n", pass_text(loaded), verdict_text(result.verdict),
-               evaluation_text(evaluation, epoch, "Attitude error"), attitude.string(), result.attitude.size());
+               evaluation_text(evaluation, epoch, "Attitude error"), files.attitude.string(), result.attitude.size());
   }
   return result.verdict.trustworthy ? kTrustworthy : kDoNotUse;
 }
@@ -79,9 +84,8 @@ void add_navigate(CLI::App& program, const Common& common, int& exit_status) {
       options.corrections = io::parse_correction_interval(arguments->interval);
     }
     options.corrections.take_parameters = arguments->online;
-    const auto calibration =
-        arguments->calibration.empty() ? std::nullopt : std::optional(std::filesystem::path(arguments->calibration));
-    exit_status = navigate_pass(arguments->pass, calibration, options, arguments->attitude, common);
+    exit_status = navigate_pass(arguments->pass, {arguments->attitude, arguments->calibration, arguments->config},
+                                options, common);
   });
 }
 

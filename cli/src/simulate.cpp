@@ -3,10 +3,12 @@
 #include <memory>
 #include <stdexcept>
 #include <string>
+#include <vector>
 
 #include "commands.hpp"
 #include "steps.hpp"
 #include "summary.hpp"
+#include "trihedron/io/apart.hpp"
 #include "trihedron/io/error.hpp"
 #include "trihedron/io/pass.hpp"
 #include "trihedron/io/scenario.hpp"
@@ -29,10 +31,16 @@ sim::SimulatedPass simulated_by(const Scenario& scenario, const std::string& nam
   }
 }
 
-void simulate_pass(const Scenario& scenario, const std::string& name, const std::filesystem::path& pass,
-                   const Common& common) {
+void simulate_pass(const std::filesystem::path& scenario_file, const std::string& name,
+                   const std::filesystem::path& pass, const Common& common) {
+  const Scenario scenario = io::read_scenario(scenario_file);
+  const std::vector<std::filesystem::path> inputs = {scenario_file, io::recorded_attitude_of(scenario_file)};
+  std::vector<std::filesystem::path> outputs = io::files_of_pass(pass, 1 + scenario.further_star_trackers.size());
+  outputs.push_back(pass);
+  io::expect_apart(inputs, outputs);
+  io::PassWriter writer(pass);
   const sim::SimulatedPass result = simulated_by(scenario, name);
-  io::write_pass(pass, result.pass, &result.truth, io::format_for(scenario));
+  writer.write(result.pass, &result.truth, io::format_for(scenario));
   if (common.json) {
     fmt::print("{}\n", pass_json({result.pass, {}}).dump(1));
   } else if (!common.quiet) {
@@ -47,7 +55,7 @@ void add_simulate(CLI::App& program, const Common& common, int& exit_status) {
   command->add_option("SCENARIO", arguments->scenario, "Scenario (TOML)")->required();
   command->add_option("-o,--output", arguments->pass, "Pass to write: a directory, or a name in .nc")->required();
   command->callback([&common, &exit_status, arguments] {
-    simulate_pass(io::read_scenario(arguments->scenario), arguments->scenario, arguments->pass, common);
+    simulate_pass(arguments->scenario, arguments->scenario, arguments->pass, common);
     exit_status = kTrustworthy;
   });
 }

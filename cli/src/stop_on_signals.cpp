@@ -23,13 +23,14 @@ extern "C" void receive(int signal) {
 int stopped_by_signals(const std::function<int()>& program) {
   struct sigaction action {};
   action.sa_handler = receive;  // without SA_RESTART: what waits for a pipe has to wake up
-  for (const int signal : {SIGINT, SIGTERM, SIGHUP}) {
+  for (const int signal : {SIGINT, SIGTERM, SIGHUP, SIGPIPE}) {
     struct sigaction before {};
     ::sigaction(signal, nullptr, &before);
     if (before.sa_handler != SIG_IGN) {
       ::sigaction(signal, &action, nullptr);
     }
   }
+  std::signal(SIGXFSZ, SIG_IGN);  // a file that may not grow is told as a full disk is
   const StopScope scope(&request);
   int status = EXIT_FAILURE;
   try {

@@ -2,15 +2,19 @@
 
 #include <fcntl.h>
 #include <fmt/format.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <algorithm>
 #include <atomic>
 #include <cerrno>
+#include <charconv>
+#include <csignal>
+#include <string>
 #include <system_error>
 #include <utility>
-#include <vector>
 
+#include "directories.hpp"
 #include "trihedron/io/error.hpp"
 #include "trihedron/records/stop.hpp"
 
@@ -18,49 +22,69 @@ namespace trihedron::io {
 namespace fs = std::filesystem;
 namespace {
 
-std::atomic<unsigned> serial = 0;  // of temporary names
+// A temporary name is `.trihedron-HOST-PID-N.partial`.
+constexpr std::string_view kPartial = ".partial";
 
-constexpr std::string_view kStaged = ".trihedron-";
+/// Of this process on this machine.
+std::string own_prefix(::pid_t process) { return fmt::format("{}{}-{}-", kHidden, host_name(), process); }
 
+/// Not longer than a name may be, however long that of the target is.
 fs::path temporary_beside(const fs::path& target) {
-  return target.parent_path() / fmt::format(".{}.{}-{}.partial", target.filename().string(), ::getpid(), serial++);
+  static std::atomic<unsigned> serial = 0;
+  return target.parent_path() / fmt::format("{}{}{}", own_prefix(::getpid()), serial++, kPartial);
 }
 
-fs::path directory_of(const fs::path& file) { return file.has_parent_path() ? file.parent_path() : fs::path("."); }
-
-/// A new name reaches the disk with its directory. Not every file system can do that, so failure is no error.
-void synchronise(const fs::path& directory) {
-  const int descriptor = ::open(directory.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
-  if (descriptor >= 0) {
-    ::fsync(descriptor);
-    ::close(descriptor);
+/// The process of this machine that writes under such a name; 0 where it is no such name, or of another machine.
+::pid_t writer_of(std::string_view name) {
+  if (!name.starts_with(kHidden) || !name.ends_with(kPartial)) {
+    return 0;
   }
+  const std::size_t dash = name.rfind('-');
+  const std::size_t before = name.rfind('-', dash - 1);
+  ::pid_t process = 0;
+  std::from_chars(name.data() + before + 1, name.data() + dash, process);
+  return name.starts_with(own_prefix(process)) ? process : 0;
 }
 
-/// Removes up to `count` directories, from this one upwards, as long as they are empty.
-void remove_empty(fs::path directory, int count) {
-  std::error_code fault;
-  directory = directory.has_filename() ? directory : directory.parent_path();
-  for (; count > 0 && (fs::remove(directory, fault), !fault); --count) {
-    directory = directory.parent_path();
+/// Those of programs of this machine that run no more.
+void remove_left_partials(const fs::path& directory) {
+  std::error_code ignored;
+  for (fs::directory_iterator entry(directory, ignored), end; !ignored && entry != end; entry.increment(ignored)) {
+    const ::pid_t process = writer_of(entry->path().filename().string());
+    if (process > 0 && ::kill(process, 0) != 0 && errno == ESRCH) {
+      std::error_code gone;
+      fs::remove(entry->path(), gone);
+    }
   }
 }
 
 }  // namespace
 
-AtomicFile::AtomicFile(fs::path target) : target_(std::move(target)) {
-  std::error_code ignored;
-  const fs::file_status status = fs::status(target_, ignored);
+AtomicFile::AtomicFile(fs::path target) : target_(behind_links(std::move(target))) {
+  std::error_code fault;
+  const fs::file_status status = fs::status(target_, fault);
+  if (status.type() == fs::file_type::none) {
+    fail(fault.value());
+  }
   if (fs::is_directory(status)) {
-    pending_ = false;
     throw MachineFailed(unstaged(target_), "is a directory", "give the name of a file");
   }
   // Renaming onto a device would replace the device.
-  temporary_ = fs::exists(status) && !fs::is_regular_file(status) ? target_ : temporary_beside(target_);
-  const int flags = O_WRONLY | O_CLOEXEC | (straight() ? 0 : O_CREAT | O_EXCL);
-  descriptor_ = ::open(temporary_.c_str(), flags, 0666);
+  if (fs::exists(status) && !fs::is_regular_file(status)) {
+    temporary_ = target_;
+    descriptor_ = ::open(temporary_.c_str(), O_WRONLY | O_CLOEXEC);
+  } else {
+    remove_left_partials(directory_of(target_));
+    do {
+      temporary_ = temporary_beside(target_);
+      descriptor_ = ::open(temporary_.c_str(), O_WRONLY | O_CLOEXEC | O_CREAT | O_EXCL, 0666);
+    } while (descriptor_ < 0 && errno == EEXIST);  // left by a program that had the number of this process
+  }
   if (descriptor_ < 0) {
     fail(errno);
+  }
+  if (fs::is_regular_file(status)) {
+    ::fchmod(descriptor_, static_cast<::mode_t>(status.permissions()));
   }
 }
 
@@ -113,75 +137,27 @@ void AtomicFile::fail(int error_number) const {
                       "check that the directory is there and may be written, and that the disk has room");
 }
 
-MadeDirectory::MadeDirectory(fs::path directory) : directory_(std::move(directory)) {
-  std::error_code fault;
-  for (fs::path above = directory_; !above.empty() && !fs::exists(above, fault); above = above.parent_path()) {
-    made_ += above.has_filename() ? 1 : 0;  // not where the name ends with a slash
-  }
-  fs::create_directories(directory_, fault);
-  // Without a fault, but also without a directory, where a file has the name.
-  if (fault || !fs::is_directory(directory_, fault)) {
-    remove_empty(directory_, made_);
-    throw MachineFailed(directory_,
-                        fmt::format("cannot be made a directory: {}", fault ? fault.message() : "a file has its name"),
-                        "check the name and the rights");
-  }
+void write_file(const fs::path& path, std::string_view content) {
+  AtomicFile file(path);
+  file.write(content);
+  file.commit();
 }
 
-MadeDirectory::~MadeDirectory() { remove_empty(directory_, made_); }
-
-StagedDirectory::StagedDirectory(fs::path target)
-    : target_(std::move(target)),
-      made_(target_),
-      path_(target_ / fmt::format("{}{}-{}", kStaged, ::getpid(), serial++)) {
-  std::error_code fault;
-  if (!fs::create_directory(path_, fault)) {
-    throw MachineFailed(target_, fmt::format("cannot be written into: {}", fault.message()), "check the rights");
-  }
-}
-
-StagedDirectory::~StagedDirectory() {
+void expect_writable(const fs::path& path) {
   std::error_code ignored;
-  fs::remove_all(path_, ignored);
-}
-
-void StagedDirectory::commit() {
-  move_from(path_, target_);
-  synchronise(target_);
-}
-
-void StagedDirectory::move_from(const fs::path& staged, const fs::path& target) const {
-  std::error_code fault;
-  const std::vector<fs::directory_entry> entries{fs::directory_iterator(staged), fs::directory_iterator()};
-  for (const fs::directory_entry& entry : entries) {
-    const fs::path place = target / entry.path().filename();
-    if (entry.is_directory()) {
-      fs::create_directory(place, fault);
-      if (!fault) {
-        move_from(entry.path(), place);
-      }
-    } else {
-      fs::rename(entry.path(), place, fault);
-    }
-    if (fault) {
-      throw MachineFailed(place, fmt::format("cannot be written: {}", fault.message()),
-                          "check that nothing else has its name");
-    }
+  // Who reads from a pipe would take an open that writes nothing for its end.
+  if (const fs::file_status status = fs::status(path, ignored);
+      !fs::exists(status) || fs::is_regular_file(status) || fs::is_directory(status)) {
+    const AtomicFile probe(path);
   }
 }
 
 fs::path unstaged(const fs::path& path) {
   fs::path known;
   for (const fs::path& part : path) {
-    known = part.string().starts_with(kStaged) ? known : known / part;
+    known = part.string().starts_with(kHidden) ? known : known / part;
   }
   return known;
-}
-
-void write_file(const fs::path& path, std::string_view content) {
-  AtomicFile file(path);
-  file.write(content);
-  file.commit();
 }
 
 }  // namespace trihedron::io

@@ -4,12 +4,16 @@
 #include <SQLiteCpp/VariadicBind.h>
 #include <fmt/format.h>
 #include <sqlite3.h>
+#include <unistd.h>
 
 #include <array>
+#include <cerrno>
 #include <cmath>
 #include <map>
 #include <system_error>
+#include <utility>
 
+#include "directories.hpp"
 #include "input_file.hpp"
 #include "trihedron/io/calibration.hpp"
 #include "trihedron/io/error.hpp"
@@ -22,8 +26,9 @@ namespace fs = std::filesystem;
 namespace {
 
 constexpr std::int64_t kApplicationId = 0x54524948;  // "TRIH"
-constexpr std::int64_t kSchemaVersion = 1;
+constexpr std::int64_t kSchemaVersion = 2;           // version 1 is read, and brought up to this one when it is written
 
+// By the key of `calibration`.
 constexpr const char* kSchema = R"(
 CREATE TABLE calibration (
   id INTEGER PRIMARY KEY,
@@ -37,7 +42,7 @@ CREATE TABLE calibration (
   drift_model TEXT NOT NULL,
   trustworthy INTEGER NOT NULL,
   json TEXT NOT NULL,
-  UNIQUE (epoch_tai, t_s, estimator, drift_model, passes)
+  UNIQUE ({})
 ) STRICT;
 CREATE TABLE parameter (
   calibration INTEGER NOT NULL REFERENCES calibration (id) ON DELETE CASCADE,
@@ -52,6 +57,26 @@ CREATE TABLE finding (
 ) STRICT;
 )";
 
+std::string schema_of_version(std::int64_t version) {
+  return fmt::format(kSchema, version == 1 ? "epoch_tai, t_s, estimator, drift_model, passes"
+                                           : "start_up, pass, epoch_tai, t_s, estimator, drift_model, passes");
+}
+
+// The tables of version 1, whose key left out start-up and pass, are taken over whole. Children go first.
+constexpr const char* kUpgradeBegin = R"(
+ALTER TABLE calibration RENAME TO calibration_1;
+ALTER TABLE parameter RENAME TO parameter_1;
+ALTER TABLE finding RENAME TO finding_1;
+)";
+constexpr const char* kUpgradeEnd = R"(
+INSERT INTO calibration SELECT id, spacecraft, pass, start_up, passes, epoch_tai, t_s, estimator, drift_model, trustworthy, json
+  FROM calibration_1;
+INSERT INTO parameter SELECT calibration, state, value, sigma FROM parameter_1;
+INSERT INTO finding SELECT calibration, code FROM finding_1;
+DROP TABLE finding_1;
+DROP TABLE parameter_1;
+DROP TABLE calibration_1;
+)";
 int stop_asked_for(void* /*unused*/) {
   const StopRequest* const request = StopScope::current();
   return request != nullptr && request->made() ? 1 : 0;
@@ -96,6 +121,12 @@ SQLite::Database opened(const fs::path& file, int access) {
   return database;
 }
 
+SQLite::Database opened_to_write(const fs::path& file) {
+  SQLite::Database database = opened(file, SQLite::OPEN_READWRITE | SQLite::OPEN_CREATE);
+  database.exec("PRAGMA foreign_keys = ON");  // not possible within a transaction
+  return database;
+}
+
 /// Calls `work` and turns the faults of SQLite into those of this module: InputRefused for a file that is no whole
 /// database, MachineFailed when the disk fails or another program holds the file.
 template <class Work>
@@ -127,6 +158,7 @@ std::int64_t number(SQLite::Database& database, const std::string& query) {
   return database.execAndGet(query).getInt64();
 }
 
+std::int64_t version_of(SQLite::Database& database) { return number(database, "PRAGMA user_version"); }
 /// What each table, index, view and trigger is, by kind and name: the statement that made it, without the quotation
 /// marks that renaming puts round names. Those of SQLite itself are left out.
 std::map<std::string, std::string> schema_of(SQLite::Database& database) {
@@ -142,7 +174,7 @@ std::map<std::string, std::string> schema_of(SQLite::Database& database) {
 
 /// Refuses a database of which the tables are not exactly those that `schema` makes: a view, a trigger or a check in it
 /// could do anything, or never end.
-void check_schema(SQLite::Database& database, const fs::path& file, const char* schema) {
+void check_schema(SQLite::Database& database, const fs::path& file, const std::string& schema) {
   constexpr const char* kCure = "give a catalogue that `trihedron calibrate --catalogue` wrote and nobody has changed";
   SQLite::Database own(":memory:", SQLite::OPEN_READWRITE | SQLite::OPEN_CREATE);
   own.exec(schema);
@@ -166,12 +198,13 @@ void check_catalogue(SQLite::Database& database, const fs::path& file) {
     throw InputRefused(file, {}, "is a database, but no catalogue of calibrations",
                        "give a catalogue that `trihedron calibrate --catalogue` wrote, or the name of a new one");
   }
-  if (const std::int64_t version = number(database, "PRAGMA user_version"); version != kSchemaVersion) {
+  const std::int64_t version = version_of(database);
+  if (version < 1 || version > kSchemaVersion) {
     throw InputRefused(file, {},
-                       fmt::format("is a catalogue of version {}, this program reads {}", version, kSchemaVersion),
+                       fmt::format("is a catalogue of version {}, this program reads 1 to {}", version, kSchemaVersion),
                        "use the program that wrote it, or a newer one");
   }
-  check_schema(database, file, kSchema);
+  check_schema(database, file, schema_of_version(version));
   if (const std::string found = database.execAndGet("PRAGMA integrity_check(1)").getString(); found != "ok") {
     throw InputRefused(file, {}, fmt::format("is damaged: {}", in_quotes(found)), "restore it from a copy");
   }
@@ -184,8 +217,14 @@ void check_catalogue(SQLite::Database& database, const fs::path& file) {
 }
 
 void make_tables(SQLite::Database& database) {
-  database.exec(kSchema);
+  database.exec(schema_of_version(kSchemaVersion));
   database.exec(fmt::format("PRAGMA application_id = {}; PRAGMA user_version = {}", kApplicationId, kSchemaVersion));
+}
+
+void upgrade(SQLite::Database& database) {
+  database.exec(kUpgradeBegin);
+  make_tables(database);
+  database.exec(kUpgradeEnd);
 }
 
 bool is_empty(SQLite::Database& database) {
@@ -236,38 +275,95 @@ void add_entry(SQLite::Database& database, const CatalogueEntry& entry, const st
   add_findings(database, row, calibration.verdict);
 }
 
+/// Takes back what a killed program left half done, by its journal; without that the file cannot be read.
+void take_back_half_done(const fs::path& file) {
+  if (fs::exists(behind_links(file).string() + "-journal")) {
+    SQLite::Database database = opened(file, SQLite::OPEN_READWRITE);
+    static_cast<void>(number(database, "PRAGMA schema_version"));
+  }
+}
+
+/// SQLite makes its journal beside the file that links lead to.
+void expect_directory_writable(const fs::path& file) {
+  const fs::path directory = directory_of(behind_links(file));
+  if (::access(directory.c_str(), W_OK | X_OK) != 0) {
+    throw MachineFailed(file, fmt::format("cannot be written: {}", std::generic_category().message(errno)),
+                        "check that the directory is there and may be written");
+  }
+}
+
 }  // namespace
 
 void expect_catalogue_of(const std::string& spacecraft, const fs::path& file) {
+  expect_directory_writable(file);
   std::error_code ignored;
   if (!fs::exists(file, ignored)) {
     return;
   }
   told_of(file, [&] {
+    take_back_half_done(file);
     SQLite::Database database = opened(file, SQLite::OPEN_READONLY);
     if (!is_empty(database)) {
       check_catalogue(database, file);
       check_spacecraft(database, file, spacecraft);
     }
+    SQLite::Database to_write = opened(file, SQLite::OPEN_READWRITE);
+    const SQLite::Transaction possible(to_write, SQLite::TransactionBehavior::IMMEDIATE);
   });
 }
 
+struct CatalogueUpdate::Open {
+  explicit Open(const fs::path& file)
+      : database(opened_to_write(file)), transaction(database, SQLite::TransactionBehavior::EXCLUSIVE) {}
+
+  SQLite::Database database;
+  SQLite::Transaction transaction;
+};
+
+CatalogueUpdate::CatalogueUpdate(fs::path file, std::span<const CatalogueEntry> entries) : file_(std::move(file)) {
+  std::error_code ignored;
+  is_new_ = !fs::exists(file_, ignored);
+  try {
+    told_of(file_, [&] {
+      open_ = std::make_unique<Open>(file_);
+      SQLite::Database& database = open_->database;
+      if (is_empty(database)) {
+        make_tables(database);
+      }
+      check_catalogue(database, file_);
+      if (version_of(database) < kSchemaVersion) {
+        upgrade(database);
+      }
+      for (const CatalogueEntry& entry : entries) {
+        check_spacecraft(database, file_, entry.spacecraft);
+        add_entry(database, entry,
+                  entry.start_up.empty() ? format_epoch(entries.front().calibration.epoch) : entry.start_up);
+      }
+    });
+  } catch (...) {
+    discard();
+    throw;
+  }
+}
+
+CatalogueUpdate::~CatalogueUpdate() { discard(); }
+
+void CatalogueUpdate::discard() noexcept {
+  if (open_ != nullptr && is_new_) {
+    // While the lock is held: whoever waits for it finds that the file has gone.
+    std::error_code ignored;
+    fs::remove(behind_links(file_), ignored);
+  }
+  open_.reset();
+}
+
+void CatalogueUpdate::commit() {
+  told_of(file_, [&] { open_->transaction.commit(); });
+  open_.reset();
+}
+
 void add_to_catalogue(const fs::path& file, std::span<const CatalogueEntry> entries) {
-  told_of(file, [&] {
-    SQLite::Database database = opened(file, SQLite::OPEN_READWRITE | SQLite::OPEN_CREATE);
-    database.exec("PRAGMA foreign_keys = ON");
-    SQLite::Transaction transaction(database, SQLite::TransactionBehavior::IMMEDIATE);
-    if (is_empty(database)) {
-      make_tables(database);
-    }
-    check_catalogue(database, file);
-    for (const CatalogueEntry& entry : entries) {
-      check_spacecraft(database, file, entry.spacecraft);
-      add_entry(database, entry,
-                entry.start_up.empty() ? format_epoch(entries.front().calibration.epoch) : entry.start_up);
-    }
-    transaction.commit();
-  });
+  CatalogueUpdate(file, entries).commit();
 }
 
 std::vector<CatalogueEntry> read_catalogue(const fs::path& file) {
@@ -276,6 +372,7 @@ std::vector<CatalogueEntry> read_catalogue(const fs::path& file) {
     throw InputRefused(file, {}, "there is no such catalogue", "make one with `trihedron calibrate --catalogue`");
   }
   return told_of(file, [&] {
+    take_back_half_done(file);
     SQLite::Database database = opened(file, SQLite::OPEN_READONLY);
     check_catalogue(database, file);
     SQLite::Statement rows(database,

@@ -16,6 +16,7 @@ struct UnscreenedPass {
   PassSettings settings;
   Series gyro;                        ///< columns h1_x, h1_y, h1_z, h2_x …
   std::vector<Series> star_trackers;  ///< columns q_x, q_y, q_z, q_w; the first head, then the further ones
+  std::filesystem::path prior_file;   ///< that the settings name; empty where they name none
 };
 
 /// A directory with pass.toml, gyro.csv and star_tracker.csv.

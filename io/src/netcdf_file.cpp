@@ -1,5 +1,7 @@
 #include "netcdf_file.hpp"
 
+#include <H5Fpublic.h>
+#include <H5Ipublic.h>
 #include <fmt/format.h>
 #include <netcdf.h>
 
@@ -44,6 +46,15 @@ bool worth_deflating(const std::vector<double>& values, double lsb) {
     change += std::isnan(step) ? 0 : step;
   }
   return change < kSteps * lsb * static_cast<double>(values.size());
+}
+
+/// nc_close() crashes where HDF5 cannot write the last of a file. So HDF5 is kept from closing it there, and told to
+/// afterwards.
+int close_written(int id) {
+  hid_t file = H5I_INVALID_HID;
+  const bool is_held = H5Fget_obj_ids(H5F_OBJ_ALL, H5F_OBJ_FILE, 1, &file) == 1 && H5Iinc_ref(file) > 1;
+  const int status = nc_close(id);
+  return is_held && H5Fclose(file) < 0 ? NC_EHDFERR : status;
 }
 
 }  // namespace
@@ -244,7 +255,7 @@ Series NetcdfReader::read_group(const std::string& group, Time epoch, ChooseRule
 
 NetcdfWriter::NetcdfWriter(const fs::path& path) : path_(path), file_(path) {
   prepare_hdf5();
-  if (file_.temporary() == path) {
+  if (file_.straight()) {
     throw MachineFailed(path, "is no regular file", "give the name of a file on a disk: NetCDF needs one");
   }
   check(nc_create(fs::absolute(file_.temporary()).c_str(), NC_NETCDF4, &id_));
@@ -252,7 +263,7 @@ NetcdfWriter::NetcdfWriter(const fs::path& path) : path_(path), file_(path) {
 
 NetcdfWriter::~NetcdfWriter() {
   if (id_ >= 0) {
-    nc_close(id_);
+    close_written(id_);
   }
 }
 
@@ -326,7 +337,7 @@ void NetcdfWriter::write_group(const std::string& group, Time epoch, std::span<c
 }
 
 void NetcdfWriter::commit() {
-  check(nc_close(std::exchange(id_, -1)));
+  check(close_written(std::exchange(id_, -1)));
   file_.commit();
 }
 

@@ -15,6 +15,7 @@
 #include "text_file.hpp"
 #include "trihedron/io/atomic_file.hpp"
 #include "trihedron/io/calibration.hpp"
+#include "trihedron/io/staged_directory.hpp"
 #include "trihedron/io/time_text.hpp"
 #include "trihedron/records/stop.hpp"
 #include "truth.hpp"
@@ -122,13 +123,12 @@ std::vector<double> truth_values(const Truth& truth) {
   return values;
 }
 
-void write_directory(const fs::path& directory, const Pass& pass, const Truth* truth) {
+void write_directory(StagedDirectory& staged, const Pass& pass, const Truth* truth) {
   // The sample passes' decimals: well below the noise of each quantity, the truth's below anything that is judged.
   constexpr int kGyroDecimals = 9;
   constexpr int kFixDecimals = 10;
   constexpr int kTruthDecimals = 12;
   const Time epoch = pass.settings.epoch;
-  StagedDirectory staged(directory);
   const auto add = [&](const std::string& name, const std::string& text) { write_file(staged.path() / name, text); };
   add(kSettingsFile, format_pass_toml(pass.settings, pass.settings.prior ? kPriorFile : ""));
   add(kGyroFile, csv_text(epoch, direction_names(pass.gyro.gyros), pass.gyro.t, pass.gyro.h, kGyroDecimals));
@@ -137,20 +137,20 @@ void write_directory(const fs::path& directory, const Pass& pass, const Truth* t
     add(star_tracker_name(head) + ".csv",
         csv_text(epoch, kQuaternionNames, fixes.t, quaternion_values(fixes.q_in_c), kFixDecimals));
   }
+  // What the pass that was here before had more is not of this one.
   if (pass.settings.prior) {
     add(kPriorFile, format_calibration(*pass.settings.prior));
+  } else {
+    staged.drop(kPriorFile);
   }
   if (truth != nullptr) {
     add(kTruthFile, csv_text(epoch, truth_names(*truth), truth->t, truth_values(*truth), kTruthDecimals));
     add(kTruthParametersFile, format_truth_parameters(*truth));
+  } else {
+    staged.drop(kTruthFile);
+    staged.drop(kTruthParametersFile);
   }
   staged.commit();
-  if (truth == nullptr) {
-    // The truth of the pass that was here before is not that of this one.
-    std::error_code ignored;
-    fs::remove(directory / kTruthFile, ignored);
-    fs::remove(directory / kTruthParametersFile, ignored);
-  }
 }
 
 std::string long_name(const std::string& column, bool measured) {
@@ -235,6 +235,7 @@ UnscreenedPass read_raw_directory(const fs::path& directory) {
   Series gyro = read_csv(directory / kGyroFile, gyro_columns);
   UnscreenedPass raw;
   raw.settings = parse_pass_toml(settings.text(), settings_file, directory, gyros_of(gyro));
+  raw.prior_file = parse_prior_file(settings.text(), settings_file, directory);
   raw.gyro = std::move(gyro);
   for (std::size_t head = 0; head <= raw.settings.further_star_trackers.size(); ++head) {
     raw.star_trackers.push_back(read_csv(directory / (star_tracker_name(head) + ".csv"), star_tracker_columns));
@@ -251,6 +252,7 @@ UnscreenedPass read_raw_netcdf(const fs::path& file) {
   raw.gyro = reader.read_group(kGyroGroup, epoch, gyro_columns);
   raw.settings =
       parse_pass_toml(settings_text, inside(file, kSettingsAttribute), file.parent_path(), gyros_of(raw.gyro));
+  raw.prior_file = parse_prior_file(settings_text, inside(file, kSettingsAttribute), file.parent_path());
   for (std::size_t head = 0; head <= raw.settings.further_star_trackers.size(); ++head) {
     raw.star_trackers.push_back(reader.read_group(star_tracker_name(head), epoch, star_tracker_columns));
   }
@@ -273,6 +275,7 @@ LoadedPass read_pass(const fs::path& path) {
     fixes = screen_star_tracker(std::move(raw.star_trackers[head]), raw.settings, loaded.defects);
   }
   loaded.pass.settings = std::move(raw.settings);
+  loaded.prior_file = std::move(raw.prior_file);
   return loaded;
 }
 
@@ -291,12 +294,38 @@ PassFormat format_for(const Scenario& scenario) {
   return format;
 }
 
-void write_pass(const fs::path& path, const Pass& pass, const Truth* truth, const PassFormat& format) {
-  if (is_netcdf_name(path)) {
-    write_netcdf(path, pass, truth, format);
+PassWriter::PassWriter(fs::path path) : path_(std::move(path)) {
+  if (is_netcdf_name(path_)) {
+    expect_writable(path_);
   } else {
-    write_directory(path, pass, truth);
+    staged_.emplace(path_);
   }
+}
+
+void PassWriter::write(const Pass& pass, const Truth* truth, const PassFormat& format) {
+  if (staged_) {
+    write_directory(*staged_, pass, truth);
+  } else {
+    write_netcdf(path_, pass, truth, format);
+  }
+}
+
+void write_pass(const fs::path& path, const Pass& pass, const Truth* truth, const PassFormat& format) {
+  PassWriter(path).write(pass, truth, format);
+}
+
+std::vector<fs::path> files_of_pass(const fs::path& path, std::size_t star_trackers) {
+  if (is_netcdf_name(path)) {
+    return {path};
+  }
+  std::vector<fs::path> files;
+  for (const char* name : {kSettingsFile, kGyroFile, kTruthFile, kTruthParametersFile, kPriorFile}) {
+    files.push_back(path / name);
+  }
+  for (std::size_t head = 0; head < star_trackers; ++head) {
+    files.push_back(path / (star_tracker_name(head) + ".csv"));
+  }
+  return files;
 }
 
 }  // namespace trihedron::io

@@ -198,11 +198,31 @@ TomlTable pass_table(const TomlTable& root, const fs::path& file) {
   return {root.table_at("pass"), file, "[pass]", {"spacecraft", "epoch_tai", "duration_s", "prior"}};
 }
 
+/// That `prior` names, at the root or in [pass]; empty where there is none.
+fs::path prior_file_in(const TomlTable& root, const TomlTable& pass, const fs::path& directory) {
+  const bool at_root = root.find("prior") != nullptr;
+  const TomlTable& holder = at_root ? root : pass;
+  const toml::node* const prior = holder.find("prior");
+  if (prior == nullptr) {
+    return {};
+  }
+  if (at_root && pass.find("prior") != nullptr) {
+    root.refuse(*prior, "\"prior\" is there twice", "keep the one in [pass]");
+  }
+  return directory / holder.text(*prior, "prior");
+}
+
 }  // namespace
 
 Time parse_pass_epoch(std::string_view text, const fs::path& file) {
   const toml::table document = parse_toml(text, file);
   return parse_epoch_node(pass_table(root_table(document, file), file), "epoch_tai");
+}
+
+fs::path parse_prior_file(std::string_view text, const fs::path& file, const fs::path& directory) {
+  const toml::table document = parse_toml(text, file);
+  const TomlTable root = root_table(document, file);
+  return prior_file_in(root, pass_table(root, file), directory);
 }
 
 PassSettings parse_pass_toml(std::string_view text, const fs::path& file, const fs::path& directory, int gyros) {
@@ -228,13 +248,7 @@ PassSettings parse_pass_toml(std::string_view text, const fs::path& file, const 
     settings.start_up = gyro.text(*start_up, kStartUp);
   }
 
-  const bool at_root = root.find("prior") != nullptr;
-  const TomlTable& holder = at_root ? root : pass;
-  if (const toml::node* prior = holder.find("prior")) {
-    if (at_root && pass.find("prior") != nullptr) {
-      root.refuse(*prior, "\"prior\" is there twice", "keep the one in [pass]");
-    }
-    const fs::path prior_file = directory / holder.text(*prior, "prior");
+  if (const fs::path prior_file = prior_file_in(root, pass, directory); !prior_file.empty()) {
     settings.prior = read_calibration(prior_file);
     check_prior(*settings.prior, prior_file, gyros);
   }

@@ -16,6 +16,10 @@ namespace trihedron::io {
 /// Only the epoch. Throws InputRefused.
 [[nodiscard]] Time parse_pass_epoch(std::string_view text, const std::filesystem::path& file);
 
+/// Only the file that `prior` names; empty where it names none. Throws InputRefused.
+[[nodiscard]] std::filesystem::path parse_prior_file(std::string_view text, const std::filesystem::path& file,
+                                                     const std::filesystem::path& directory);
+
 /// The text that parses back to the same settings. `prior_file` is the name for `prior`, empty for none.
 [[nodiscard]] std::string format_pass_toml(const PassSettings& settings, std::string_view prior_file);
 

@@ -426,4 +426,11 @@ Scenario read_scenario(const fs::path& file) {
   return parse_scenario(content.text(), file);
 }
 
+fs::path recorded_attitude_of(const fs::path& scenario_file) {
+  const TextFile content(scenario_file);
+  const toml::table document = parse_toml(content.text(), scenario_file);
+  const auto name = document["attitude"]["recorded"].value<std::string>();
+  return name ? scenario_file.parent_path() / *name : fs::path();
+}
+
 }  // namespace trihedron::io

@@ -1,7 +1,14 @@
 #include "trihedron/io/atomic_file.hpp"
 
+#include <fmt/format.h>
 #include <gmock/gmock.h>
+#include <sys/stat.h>
+#include <sys/wait.h>
 #include <unistd.h>
+
+#include <array>
+#include <string>
+#include <vector>
 
 #include "fixtures.hpp"
 #include "trihedron/io/attitude.hpp"
@@ -121,73 +128,75 @@ TEST(AtomicFile, NothingStaysOfAnyFileWhenTheDiskIsFull) {
   EXPECT_EQ(read_text(directory / "calibration.json"), "old");
 }
 
-TEST(MadeDirectory, GoesAgainWithThoseAboveItWhereNothingHasBeenPutIntoThem) {
+TEST(AtomicFile, KeepsTheModeOfTheFileItReplaces) {
   const TemporaryDirectory directory;
-  std::filesystem::create_directory(directory / "old");
-  for (const char* name : {"old", "old/a/b", "new/a/", "new"}) {
-    const MadeDirectory made(directory / name);
-    EXPECT_TRUE(std::filesystem::is_directory(directory / name));
-  }
-  EXPECT_THAT(directory.names(), ElementsAre("old"));
-  {
-    const MadeDirectory made(directory / "new/a/b");
-    write_text(directory / "new/file", "x");
-  }
-  EXPECT_FALSE(std::filesystem::exists(directory / "new/a"));
-  EXPECT_TRUE(std::filesystem::exists(directory / "new/file"));
+  using std::filesystem::perms;
+  const perms mode = perms::owner_read | perms::owner_write | perms::group_read;
+  write_text(directory / "a.txt", "old");
+  std::filesystem::permissions(directory / "a.txt", mode);
+  write_file(directory / "a.txt", "new");
+  EXPECT_EQ(std::filesystem::status(directory / "a.txt").permissions(), mode);
+  EXPECT_EQ(read_text(directory / "a.txt"), "new");
 }
 
-TEST(MadeDirectory, RefusesTheNameOfAFile) {
+TEST(AtomicFile, ReplacesWhatLinksLeadToAndKeepsTheLinks) {
   const TemporaryDirectory directory;
-  write_text(directory / "file", "x");
-  EXPECT_THROW(MadeDirectory(directory / "file"), MachineFailed);
-  EXPECT_THROW(MadeDirectory(directory / "file/a"), MachineFailed);
-  EXPECT_THAT(directory.names(), ElementsAre("file"));
+  std::filesystem::create_directory(directory / "below");
+  write_text(directory / "below/real", "old");
+  std::filesystem::create_symlink("real", directory / "below/second");
+  std::filesystem::create_symlink("below/second", directory / "first");
+  std::filesystem::create_symlink("below/absent", directory / "dangling");
+  std::filesystem::create_symlink("circle", directory / "circle");
+  write_file(directory / "first", "new");
+  write_file(directory / "dangling", "new");
+  EXPECT_EQ(read_text(directory / "below/real"), "new");
+  EXPECT_EQ(read_text(directory / "below/absent"), "new");
+  EXPECT_TRUE(std::filesystem::is_symlink(directory / "first"));
+  EXPECT_TRUE(std::filesystem::is_symlink(directory / "dangling"));
+  EXPECT_THROW(write_file(directory / "circle", "new"), MachineFailed);
+  EXPECT_THAT(directory.names(), ElementsAre("below", "circle", "dangling", "first"));
 }
 
-TEST(StagedDirectory, ShowsItsFilesOnlyAtCommitAndKeepsOthers) {
+TEST(AtomicFile, TakesTheLongestName) {
   const TemporaryDirectory directory;
-  std::filesystem::create_directory(directory / "out");
-  write_text(directory / "out/a.txt", "old");
-  write_text(directory / "out/other.txt", "other");
-  {
-    StagedDirectory staged(directory / "out");
-    write_file(staged.path() / "a.txt", "new");
-    std::filesystem::create_directory(staged.path() / "below");
-    write_file(staged.path() / "below/b.txt", "new");
-    EXPECT_EQ(read_text(directory / "out/a.txt"), "old");
-    staged.commit();
-  }
-  EXPECT_EQ(read_text(directory / "out/a.txt"), "new");
-  EXPECT_EQ(read_text(directory / "out/below/b.txt"), "new");
-  EXPECT_EQ(read_text(directory / "out/other.txt"), "other");
-  EXPECT_EQ(std::distance(std::filesystem::directory_iterator(directory / "out"), {}), 3);
+  const std::string name(255, 'n');
+  write_file(directory / name.c_str(), "x");
+  EXPECT_THAT(directory.names(), ElementsAre(name));
 }
 
-TEST(StagedDirectory, LeavesNothingWithoutCommit) {
+TEST(AtomicFile, RemovesWhatAKilledProgramLeftAndNothingElse) {
   const TemporaryDirectory directory;
-  {
-    const StagedDirectory staged(directory / "out/below");
-    write_file(staged.path() / "a.txt", "new");
+  std::array<char, 256> host{};
+  ASSERT_EQ(::gethostname(host.data(), host.size()), 0);
+  const ::pid_t dead = ::fork();
+  if (dead == 0) {
+    ::_exit(0);
   }
-  EXPECT_THAT(directory.names(), IsEmpty());
+  ASSERT_EQ(::waitpid(dead, nullptr, 0), dead);
+  const auto name = [](const std::string& of_host, ::pid_t process) {
+    return fmt::format(".trihedron-{}-{}-0.partial", of_host, process);
+  };
+  write_text(directory / name(host.data(), dead).c_str(), "half");
+  const std::vector<std::string> others = {name(host.data(), ::getppid()), name("7-of-another", dead),
+                                           ".trihedron-.partial"};
+  for (const std::string& other : others) {
+    write_text(directory / other.c_str(), "half");
+  }
+  write_file(directory / "a.txt", "x");
+  EXPECT_THAT(directory.names(), testing::UnorderedElementsAre(others[0], others[1], others[2], "a.txt"));
 }
 
-TEST(StagedDirectory, NamesThePlaceOfAFileThatCannotBeWritten) {
+TEST(AtomicFile, TellsBeforeTheWorkWhatCannotBeWrittenAndOpensNoPipe) {
   const TemporaryDirectory directory;
-  StagedDirectory staged(directory / "out");
-  EXPECT_EQ(unstaged(staged.path() / "below/a.txt"), directory / "out/below/a.txt");
-  const std::string text(2000, 'x');
-  {
-    const FileSizeLimit limit(1000);
-    EXPECT_THAT([&] { write_file(staged.path() / "a.txt", text); },
-                testing::ThrowsMessage<MachineFailed>(
-                    testing::StartsWith((directory / "out/a.txt").string() + ": cannot be written")));
-  }
-  std::filesystem::create_directories(directory / "out/b.txt");
-  write_file(staged.path() / "b.txt", text);
-  EXPECT_THAT([&] { staged.commit(); }, testing::ThrowsMessage<MachineFailed>(testing::StartsWith(
-                                            (directory / "out/b.txt").string() + ": cannot be written")));
+  write_text(directory / "a.txt", "old");
+  expect_writable(directory / "a.txt");
+  expect_writable(directory / "b.txt");
+  ASSERT_EQ(::mkfifo((directory / "pipe").c_str(), 0600), 0);
+  expect_writable(directory / "pipe");  // would wait for a reader
+  EXPECT_THROW(expect_writable(directory / "none/a.txt"), MachineFailed);
+  EXPECT_THROW(expect_writable(directory.path()), MachineFailed);
+  EXPECT_THAT(directory.names(), ElementsAre("a.txt", "pipe"));
+  EXPECT_EQ(read_text(directory / "a.txt"), "old");
 }
 
 TEST(AtomicFile, LeavesNothingWhereItIsStopped) {

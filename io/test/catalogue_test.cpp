@@ -3,6 +3,8 @@
 #include <SQLiteCpp/SQLiteCpp.h>
 #include <gmock/gmock.h>
 #include <sys/stat.h>
+#include <sys/wait.h>
+#include <unistd.h>
 
 #include <chrono>
 #include <vector>
@@ -78,7 +80,7 @@ TEST_F(Catalogue, AnswersQuestionsOfOtherPrograms) {
 }
 
 TEST_F(Catalogue, ReplacesTheSameCalibrationAndKeepsOthers) {
-  add(sample_entry("old name"));
+  add(sample_entry("same"));
   CatalogueEntry later = sample_entry("later");
   later.calibration.epoch += std::chrono::hours(24);
   later.calibration.t += std::chrono::hours(24);
@@ -87,14 +89,99 @@ TEST_F(Catalogue, ReplacesTheSameCalibrationAndKeepsOthers) {
   other.calibration.estimator = Estimator::kBatch;
   const std::vector<CatalogueEntry> entries = {later, of_two, other};
   add_to_catalogue(file_, entries);
-  add(sample_entry("new name"));
+  CatalogueEntry again = sample_entry("same");
+  again.calibration.verdict.trustworthy = true;
+  add(again);
   std::vector<std::string> passes;
   for (const CatalogueEntry& entry : read_catalogue(file_)) {
     passes.push_back(entry.pass);
   }
-  EXPECT_THAT(passes, ElementsAre("batch", "new name", "of two", "later"));
+  EXPECT_THAT(passes, ElementsAre("batch", "same", "of two", "later"));
+  EXPECT_EQ(count("calibration WHERE pass = 'same' AND trustworthy"), 1);
   EXPECT_EQ(count("parameter"), 4 * 20);
   EXPECT_EQ(count("finding"), 4 * 2);
+}
+
+TEST_F(Catalogue, KeepsAnotherStartUpAndAnotherPassOfTheSameEpoch) {
+  add(sample_entry());
+  CatalogueEntry start_up = sample_entry();
+  start_up.start_up = "another";
+  add(start_up);
+  add(sample_entry("pass-b"));
+  EXPECT_THAT(read_catalogue(file_), SizeIs(3));
+}
+
+TEST_F(Catalogue, IsAsItWasUntilTheUpdateIsCommitted) {
+  add(sample_entry());
+  const CatalogueEntry further = sample_entry("pass-b");
+  { const CatalogueUpdate update(file_, {&further, 1}); }
+  EXPECT_THAT(read_catalogue(file_), SizeIs(1));
+  {
+    CatalogueUpdate update(file_, {&further, 1});
+    update.commit();
+  }
+  EXPECT_THAT(read_catalogue(file_), SizeIs(2));
+  { const CatalogueUpdate update(directory_ / "new.db", {&further, 1}); }
+  EXPECT_THAT(directory_.names(), ElementsAre("catalogue.db"));
+}
+
+TEST_F(Catalogue, OfVersion1IsReadAndBroughtUpToVersion2WhenItIsWritten) {
+  add(sample_entry());
+  add(sample_entry("of two", 2));
+  // The tables of version 1 were these but for the key.
+  const auto tables = SQLite::Database(file_.string())
+                          .execAndGet("SELECT group_concat(sql, ';') FROM sqlite_schema WHERE type = 'table'")
+                          .getString();
+  const std::filesystem::path newer = directory_ / "newer.db";
+  std::filesystem::rename(file_, newer);
+  execute(replaced(tables, "UNIQUE (start_up, pass, ", "UNIQUE (").c_str());
+  execute(("ATTACH '" + newer.string() +
+           "' AS newer; INSERT INTO main.calibration SELECT * FROM newer.calibration; "
+           "INSERT INTO main.parameter SELECT * FROM newer.parameter; "
+           "INSERT INTO main.finding SELECT * FROM newer.finding; "
+           "PRAGMA main.application_id = 0x54524948; PRAGMA main.user_version = 1")
+              .c_str());
+  const std::string before = read_text(file_);
+  EXPECT_THAT(read_catalogue(file_), SizeIs(2));
+  expect_catalogue_of("Resurs-DK1", file_);
+  EXPECT_EQ(read_text(file_), before);
+  CatalogueEntry start_up = sample_entry();
+  start_up.start_up = "another";
+  { const CatalogueUpdate update(file_, {&start_up, 1}); }
+  EXPECT_EQ(count("pragma_user_version WHERE user_version = 1"), 1);
+  add(start_up);
+  EXPECT_EQ(count("pragma_user_version WHERE user_version = 2"), 1);
+  EXPECT_THAT(read_catalogue(file_), SizeIs(3));
+  EXPECT_EQ(count("parameter"), 3 * 20);
+  EXPECT_EQ(count("finding"), 3 * 2);
+  EXPECT_EQ(count("sqlite_schema WHERE type = 'table'"), 3);
+  add(start_up);  // replaced with its parameters
+  EXPECT_EQ(count("parameter"), 3 * 20);
+}
+
+TEST_F(Catalogue, IsReadAfterAProgramWasKilledWhileItWrote) {
+  add(sample_entry());
+  const ::pid_t child = ::fork();
+  if (child == 0) {
+    // A cache of nothing brings pages to the disk before the end of the transaction.
+    SQLite::Database database(file_.string(), SQLite::OPEN_READWRITE);
+    database.exec("PRAGMA cache_size = 0; BEGIN; UPDATE calibration SET pass = 'x' || hex(zeroblob(100000))");
+    ::_exit(0);
+  }
+  int status = -1;
+  ASSERT_EQ(::waitpid(child, &status, 0), child);
+  ASSERT_EQ(status, 0);
+  ASSERT_TRUE(std::filesystem::exists(file_.string() + "-journal"));
+  EXPECT_EQ(read_catalogue(file_).at(0).pass, "pass-a");
+  EXPECT_THAT(directory_.names(), ElementsAre("catalogue.db"));
+}
+
+TEST_F(Catalogue, IsAskedBeforeTheWorkWhetherItCanBeWritten) {
+  EXPECT_THROW(expect_catalogue_of("Resurs-DK1", directory_ / "none/c.db"), MachineFailed);
+  add(sample_entry());
+  SQLite::Database other(file_.string(), SQLite::OPEN_READWRITE);
+  other.exec("BEGIN IMMEDIATE");
+  EXPECT_THROW(expect_catalogue_of("Resurs-DK1", file_), MachineFailed);
 }
 
 TEST_F(Catalogue, AddsAllOrNone) {
@@ -136,8 +223,8 @@ TEST_F(Catalogue, RefusesTheDatabaseOfAnotherProgram) {
 
 TEST_F(Catalogue, RefusesANewerVersion) {
   add(sample_entry());
-  execute("PRAGMA user_version = 2");
-  EXPECT_THAT(refusal_of_all(), HasSubstr("is a catalogue of version 2, this program reads 1"));
+  execute("PRAGMA user_version = 3");
+  EXPECT_THAT(refusal_of_all(), HasSubstr("is a catalogue of version 3, this program reads 1 to 2"));
 }
 
 TEST_F(Catalogue, RefusesADamagedOne) {

@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "fixtures.hpp"
@@ -50,6 +51,46 @@ TEST_F(NamedPasses, OfTheSameNameAreNumberedAsTheyWereGiven) {
   save("a/pass.nc", "12");
   save("b/pass", "03");
   EXPECT_THAT(names_of({"a/pass.nc", "b/pass"}), ElementsAre("pass-2", "pass"));
+}
+
+TEST_F(NamedPasses, AreNamedByTheDirectoryThatDotsStandFor) {
+  save("above/real", "03");
+  std::filesystem::create_directory(directory_ / "above/real/below");
+  std::filesystem::create_symlink("above/real", directory_ / "link");
+  for (const char* path : {"above/real/.", "above/real/below/..", "above/real//", "link/.", "link/below/.."}) {
+    EXPECT_THAT(names_of({path}), ElementsAre("real")) << path;
+  }
+  EXPECT_THAT(names_of({"link/"}), ElementsAre("link"));
+  save("2009.05.20", "03");
+  EXPECT_THAT(names_of({"2009.05.20"}), ElementsAre("2009.05.20"));
+}
+
+TEST_F(NamedPasses, HaveNamesThatNoOtherHas) {
+  save("a/p", "01");
+  save("b/p", "02");
+  save("c/p-2", "03");
+  save("d/report.html", "04");
+  std::vector<std::string> names;
+  const std::string_view reserved = "report.html";
+  const std::vector<std::string> paths = {directory_ / "a/p", directory_ / "b/p", directory_ / "c/p-2",
+                                          directory_ / "d/report.html"};
+  for (const NamedPass& pass : read_passes(paths, {&reserved, 1})) {
+    names.push_back(pass.name);
+  }
+  EXPECT_THAT(names, ElementsAre("p", "p-3", "p-2", "report.html-2"));
+}
+
+TEST_F(NamedPasses, HaveNamesThatAreTextAndNotTooLong) {
+  save("a/\xff\x1b[1m\xc3\xa4\xed\xa0\x80", "01");
+  EXPECT_THAT(names_of({"a/\xff\x1b[1m\xc3\xa4\xed\xa0\x80"}), ElementsAre("%FF%1B[1m\xc3\xa4%ED%A0%80"));
+  save("a/.trihedron-new", "01");
+  EXPECT_THAT(names_of({"a/.trihedron-new"}), ElementsAre("trihedron-new"));
+  // 255 bytes, with characters of three each at the end.
+  std::string longest(255 - 9, 'n');
+  longest += "\xe2\x82\xac\xe2\x82\xac\xe2\x82\xac";
+  save(("b/" + longest).c_str(), "01");
+  save(("c/" + longest).c_str(), "02");
+  EXPECT_THAT(names_of({"b/" + longest, "c/" + longest}), ElementsAre(longest, longest.substr(0, 252) + "-2"));
 }
 
 TEST_F(NamedPasses, HaveATruthOnlyWhereThereIsOne) {

@@ -1,5 +1,5 @@
 #pragma once
-/// Files, and directories of files, that are written completely or not at all.
+/// Files that are written completely or not at all.
 
 #include <filesystem>
 #include <string_view>
@@ -7,8 +7,10 @@
 namespace trihedron::io {
 
 /// A file written under a temporary name beside its target and renamed onto it by commit(); without commit() it is
-/// removed. A target that is not a regular file (a pipe, /dev/null) is written straight. Every failure throws
-/// MachineFailed.
+/// removed. What a killed program of this machine left under such a name is removed by the next one that writes into
+/// the same directory. A target that is a symbolic link stays one: the file it leads to is replaced. A file that is
+/// replaced hands its mode on. A target that is not a regular file (a pipe, /dev/null) is written straight. Every
+/// failure throws MachineFailed.
 class AtomicFile {
  public:
   explicit AtomicFile(std::filesystem::path target);
@@ -20,12 +22,13 @@ class AtomicFile {
 
   /// The name to write under, for a library that opens the file itself; the target where that is written straight.
   [[nodiscard]] const std::filesystem::path& temporary() const { return temporary_; }
+  /// Whether the target is no regular file, so that its content goes there as it is written.
+  [[nodiscard]] bool straight() const { return temporary_ == target_; }
   void write(std::string_view content);
   /// Brings the content to the disk, then renames. The object must not be used afterwards.
   void commit();
 
  private:
-  [[nodiscard]] bool straight() const { return temporary_ == target_; }
   [[noreturn]] void fail(int error_number) const;
 
   std::filesystem::path target_;
@@ -34,43 +37,14 @@ class AtomicFile {
   bool pending_ = true;
 };
 
-/// Makes a directory and those above it; those that are still empty go again with the object. Throws MachineFailed.
-class MadeDirectory {
- public:
-  explicit MadeDirectory(std::filesystem::path directory);
-  MadeDirectory(const MadeDirectory&) = delete;
-  MadeDirectory& operator=(const MadeDirectory&) = delete;
-  ~MadeDirectory();
+/// One text, all or nothing.
+void write_file(const std::filesystem::path& path, std::string_view content);
 
- private:
-  std::filesystem::path directory_;
-  int made_ = 0;  ///< of it and those above
-};
-
-/// A directory whose files appear together: they are written under path(), a hidden directory within it, and moved to
-/// their places by commit(), beside what is there; without commit() nothing stays. Every failure throws MachineFailed.
-class StagedDirectory {
- public:
-  explicit StagedDirectory(std::filesystem::path target);
-  StagedDirectory(const StagedDirectory&) = delete;
-  StagedDirectory& operator=(const StagedDirectory&) = delete;
-  ~StagedDirectory();
-
-  [[nodiscard]] const std::filesystem::path& path() const { return path_; }
-  void commit();
-
- private:
-  void move_from(const std::filesystem::path& staged, const std::filesystem::path& target) const;
-
-  std::filesystem::path target_;
-  MadeDirectory made_;
-  std::filesystem::path path_;
-};
+/// Asked before a long calculation: throws MachineFailed where a file of this name could not even be begun. Leaves
+/// nothing.
+void expect_writable(const std::filesystem::path& path);
 
 /// The file that a user knows of by a path that may lie in a StagedDirectory.
 [[nodiscard]] std::filesystem::path unstaged(const std::filesystem::path& path);
-
-/// One text, all or nothing.
-void write_file(const std::filesystem::path& path, std::string_view content);
 
 }  // namespace trihedron::io

@@ -3,17 +3,22 @@
 
 #include <filesystem>
 #include <optional>
+#include <span>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "trihedron/io/pass.hpp"
 
 namespace trihedron::io {
 
-/// A pass and its truth, with the name under which results are kept.
+/// A pass and its truth, with the name under which results are kept. The name is that of one directory or file in any
+/// directory, never "." or ".." (then it is that of the directory they stand for), and valid UTF-8: bytes of a file
+/// name that are not, and control characters, become
+/// "%" and two hexadecimal digits.
 struct NamedPass {
   std::filesystem::path path;
-  std::string name;  ///< of its directory or file; numbered where several have the same
+  std::string name;  ///< of its directory or file as it was given; numbered where several have the same
   LoadedPass loaded;
   std::optional<Truth> truth;
 
@@ -25,7 +30,9 @@ struct NamedPass {
 /// Throws as read_pass and read_truth, and InputRefused for a truth of another number of gyros.
 [[nodiscard]] NamedPass read_named_pass(const std::filesystem::path& path);
 
-/// In the order of their epochs. Throws as read_named_pass.
-[[nodiscard]] std::vector<NamedPass> read_passes(const std::vector<std::string>& paths);
+/// In the order of their epochs, with names that differ from each other and from the `reserved`. Throws as
+/// read_named_pass.
+[[nodiscard]] std::vector<NamedPass> read_passes(const std::vector<std::string>& paths,
+                                                 std::span<const std::string_view> reserved = {});
 
 }  // namespace trihedron::io

@@ -2,6 +2,7 @@
 /// Passes as files: a directory with pass.toml, gyro.csv and star_tracker.csv, or one NetCDF-4 file with the same
 /// variables.
 
+#include <cstddef>
 #include <cstdint>
 #include <filesystem>
 #include <optional>
@@ -9,6 +10,7 @@
 #include <vector>
 
 #include "trihedron/core/time.hpp"
+#include "trihedron/io/staged_directory.hpp"
 #include "trihedron/records/pass.hpp"
 #include "trihedron/records/scenario.hpp"
 
@@ -58,6 +60,7 @@ struct Defect {
 struct LoadedPass {
   Pass pass;
   std::vector<Defect> defects;
+  std::filesystem::path prior_file{};  ///< that `prior` of its settings names; empty where it names none
 };
 
 /// Reads a pass and screens its telemetry. Throws InputRefused for what cannot be understood, MachineFailed when the
@@ -76,9 +79,27 @@ struct PassFormat {
 /// As exact as the readout of the gyros of this scenario: a quantised one needs no finer step in the file.
 [[nodiscard]] PassFormat format_for(const Scenario& scenario);
 
-/// Writes a pass: NetCDF-4 when the name ends in .nc, else a directory, replacing the pass that is there with its
-/// truth. `truth` may be null. The prior calibration goes along. Throws MachineFailed when it cannot be written; then
-/// nothing half-written stays.
+/// Where a pass is going to be written: NetCDF-4 when the name ends in .nc, else a directory, replacing the pass that
+/// is there with its truth. Made before a long calculation it refuses what cannot be written at once, and keeps a
+/// directory from others as long as it lives.
+class PassWriter {
+ public:
+  /// Throws MachineFailed.
+  explicit PassWriter(std::filesystem::path path);
+  /// Once. `truth` may be null. The prior calibration goes along. Throws MachineFailed when it cannot be written; then
+  /// the pass that was there before stays.
+  void write(const Pass& pass, const Truth* truth, const PassFormat& format = {});
+
+ private:
+  std::filesystem::path path_;
+  std::optional<StagedDirectory> staged_;
+};
+
+/// Writes it at once, as PassWriter.
 void write_pass(const std::filesystem::path& path, const Pass& pass, const Truth* truth, const PassFormat& format = {});
+
+/// The files that writing a pass with this number of star trackers may replace.
+[[nodiscard]] std::vector<std::filesystem::path> files_of_pass(const std::filesystem::path& path,
+                                                               std::size_t star_trackers);
 
 }  // namespace trihedron::io

@@ -17,4 +17,8 @@ namespace trihedron::io {
 /// Same, from text; `file` is for messages, and a recorded attitude is looked up beside it.
 [[nodiscard]] Scenario parse_scenario(std::string_view text, const std::filesystem::path& file);
 
+/// The file that `recorded` of a scenario names; empty where it names none. Throws as read_scenario where that is no
+/// TOML.
+[[nodiscard]] std::filesystem::path recorded_attitude_of(const std::filesystem::path& scenario_file);
+
 }  // namespace trihedron::io
