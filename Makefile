@@ -5,7 +5,7 @@ BUILD := build
 LINT_TOOLS := build-lint/tools
 SOURCES := $(shell git ls-files '*.cpp' '*.hpp' 2>/dev/null)
 
-.PHONY: help setup build everything demo test bench validation consistency fuzz fuzz-build fuzz-briefly docs format lint sanitize coverage install \
+.PHONY: help setup build everything demo test bench slots validation consistency fuzz fuzz-build fuzz-briefly docs format lint sanitize coverage install \
   clean
 
 help:
@@ -14,6 +14,7 @@ help:
 	@echo 'make build    the program alone, at $(BUILD)/trihedron'
 	@echo 'make everything  with tests and benches'
 	@echo 'make bench    measure: the on-board step, reading, writing and simulating a pass'
+	@echo 'make slots    count the instructions of each slot of the on-board application'
 	@echo 'make validation  measure again what docs/validation.md tells'
 	@echo 'make consistency  measure again what docs/consistency.md tells: hours; goes on where it was interrupted'
 	@echo 'make fuzz     each reader against libFuzzer for FUZZ_SECONDS (3600), measures again what docs/reliability.md tells: hours'
@@ -45,6 +46,13 @@ test: everything
 
 bench: everything
 	$(BUILD)/trihedron_bench
+
+# Instructions of each slot of the on-board application.
+slots: setup
+	@cmake/setup.sh measure
+	cmake --preset release $(CMAKE_FLAGS)
+	cmake --build $(BUILD) --target trihedron_slots
+	bench/slots.py $(BUILD)/trihedron_slots
 
 validation: everything
 	validation/validate.py $(BUILD)/trihedron docs/validation.md

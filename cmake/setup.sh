@@ -16,6 +16,7 @@ tests=(
   gcovr python3 python3-pytest python3-xarray python3-h5netcdf python3-jsonschema
 )
 docs=(doxygen)
+measure=(valgrind)
 # The program, and the fixtures of its tests, under libFuzzer.
 fuzz=(clang libclang-rt-14-dev libgtest-dev python3)
 lint=(git ca-certificates python3 python3-venv)
@@ -23,8 +24,8 @@ lint=(git ca-certificates python3 python3-venv)
 packages=()
 for name in ${*:-program tests lint}; do
   case $name in
-    program|tests|lint|docs|fuzz) declare -n members=$name && packages+=("${members[@]}") ;;
-    *) echo "setup: no group \"$name\"; there are program, tests, lint, docs, fuzz" >&2; exit 2 ;;
+    program|tests|lint|docs|fuzz|measure) declare -n members=$name && packages+=("${members[@]}") ;;
+    *) echo "setup: no group \"$name\"; there are program, tests, lint, docs, fuzz, measure" >&2; exit 2 ;;
   esac
   if [ "$name" = program ]; then program_wanted=yes; fi
 done

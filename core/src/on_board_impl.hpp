@@ -17,16 +17,42 @@ std::optional<SetupFault> OnBoard<Estimator>::set_up(const CalibrationSetup& set
   if (const auto fault = estimator_.set_up(setup, prior, covariance)) {
     return fault;
   }
+  policy_ = policy;
+  reset();
+  return std::nullopt;
+}
+
+template <class Estimator>
+void OnBoard<Estimator>::reset() {
+  const CalibrationSetup& setup = estimator_.setup();
+  estimator_.forget();
   intake_ = Intake(setup);
   fixes_.clear();
   readings_ = Readings<Gyros::capacity()>(setup, Estimator::kTakesSamplesTogether);
   schedule_ = Schedule(reach(), Estimator::kUsesAngles ? setup.angles_after : CalibrationSetup::kNever);
   navigator_ = {};
-  policy_ = policy;
+  parameters_ = policy_.take_parameters ? ParametersInUse::kOfCalibration : ParametersInUse::kOfSetUp;
   behind_ = 0;
   fixes_dropped_ = 0;
-  clock_set_back_ = start_unconfirmed_ = false;
-  return std::nullopt;
+  clock_set_back_ = start_unconfirmed_ = correction_wanted_ = false;
+  begin_stretch();
+}
+
+template <class Estimator>
+void OnBoard<Estimator>::begin_stretch() {
+  for (int k = 0; k < gyros(); ++k) {
+    stretch_.sensitivities[k].begin(estimator_.layout().drift_columns());
+  }
+  stretch_.duration_s = 0;
+}
+
+template <class Estimator>
+void OnBoard<Estimator>::end_stretch(const typename Estimator::Sensitivities& stretch, double duration_s) {
+  navigator_.extend(estimator_, stretch);
+  for (int k = 0; k < gyros(); ++k) {
+    stretch_.sensitivities[k].append(stretch[k], estimator_.layout().drift_columns());
+  }
+  stretch_.duration_s += duration_s;
 }
 
 template <class Estimator>
@@ -190,11 +216,12 @@ void OnBoard<Estimator>::correct(const StarFix& fix, StepReport& report) {
   }
   follow(fix.t, readings->h_b);
   const typename Estimator::Sensitivities stretch = estimator_.since_fix();
+  const double duration_s = estimator_.time_since_fix_s();
   report.fix = estimator_.correct(fix, *readings);
   if (report.fix.status == FixStatus::kRejectedGeometry) {
     return;  // the estimator did not move its covariance to this fix
   }
-  navigator_.extend(estimator_, stretch);
+  end_stretch(stretch, duration_s);
   if (report.fix.status == FixStatus::kEstimateLost) {
     schedule_.no_angles();
     return;
@@ -225,10 +252,11 @@ void OnBoard<Estimator>::look_at_angles(StepReport& report) {
   }
   follow(t, readings->h_b);
   const typename Estimator::Sensitivities stretch = estimator_.since_fix();
+  const double duration_s = estimator_.time_since_fix_s();
   use_angles(t, *readings, report);
   judge(report.angles.odd_gyro, report);
   if (report.angles.status != FixStatus::kRejectedGeometry) {
-    navigator_.extend(estimator_, stretch);
+    end_stretch(stretch, duration_s);
   }
 }
 
@@ -261,17 +289,19 @@ void OnBoard<Estimator>::correct_navigator(const FixReadings& readings, StepRepo
   // All later fixes contradicted the one that started filter and navigator: the navigator must be corrected again.
   const bool start_was_wrong = start_unconfirmed_ && report.fix.status == FixStatus::kUsedAfterReopening;
   start_unconfirmed_ = report.fix.status == FixStatus::kStarted;
-  if (navigator_.started() && !interval_over && !start_was_wrong) {
+  if (navigator_.started() && !interval_over && !start_was_wrong && !correction_wanted_) {
     return;
   }
-  if (policy_.take_parameters) {
+  if (parameters_ == ParametersInUse::kOfCalibration) {
     navigator_.correct(estimator_);
   } else if (report.calibrated) {
-    navigator_.correct_directions(estimator_, *report.calibrated, readings.h_b);
+    navigator_.correct_directions(estimator_, *report.calibrated, readings.h_b,
+                                  parameters_ == ParametersInUse::kOfSetUp);
   } else {
     return;
   }
   corrected_t_ = t;
+  correction_wanted_ = false;
   report.corrected = true;
   if (const auto solution = navigator_.attitude(estimator_, readings)) {
     report.navigated = solution.value();
@@ -409,20 +439,22 @@ void Navigator<Estimator>::correct(const Estimator& estimator) {
 
 template <class Estimator>
 void Navigator<Estimator>::correct_directions(const Estimator& estimator, const AttitudeSolution& attitude,
-                                              const Directions& h_b) {
+                                              const Directions& h_b, bool of_set_up) {
   const Layout layout = estimator.error_layout();
-  if (!started_) {
-    gyros_ = estimator.prior_gyros();
-  }
-  const Eigen::Matrix3d& C_in_c = attitude.C_in_c.raw();
-  // Columns: the error of the attitude, then those of the prior.
+  // Columns: the error of the attitude, then those of the parameters held. The root at an adoption is a triangle: its
+  // first columns hold errors of the directions alone.
   constexpr int kAttitude = 3;
   const int first = layout.direction(layout.gyros);
-  const int size = layout.shared() - first;
-  const RowsView view = new_errors(layout.shared(), kAttitude + size);
-  estimator.prior_error_root({&view(first, kAttitude), size, size, view.stride});
-  Eigen::Map<Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>> errors(view.data, view.rows,
-                                                                                            view.columns);
+  if (of_set_up || !started_) {
+    gyros_ = estimator.prior_gyros();
+    const int size = layout.shared() - first;
+    const RowsView view = new_errors(layout.shared(), kAttitude + size);
+    estimator.prior_error_root({&view(first, kAttitude), size, size, view.stride});
+  }
+  const bool of_calibration = error_columns_ == estimator.states();
+  Eigen::Map<Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>> errors(errors_.data(), error_rows_,
+                                                                                            error_columns_);
+  const Eigen::Matrix3d& C_in_c = attitude.C_in_c.raw();
   const Eigen::Matrix3d attitude_root = cholesky_root<3>(attitude.covariance_rad2);
   for (int k = 0; k < layout.gyros; ++k) {
     gyros_[k].h_in = (C_in_c * gyros_[k].in_c(h_b[k])).normalized();
@@ -432,6 +464,15 @@ void Navigator<Estimator>::correct_directions(const Estimator& estimator, const 
     phi -= by_readout_errors(layout, C_in_c * skew<double>(gyros_[k].in_c(h_b[k])), gyros_[k], h_b[k])
                .lazyProduct(errors.middleRows(layout.readout(k), layout.readout_size()));
     phi.template leftCols<kAttitude>() = C_in_c * attitude_root;
+    if (layout.further.wandering_drift &&
+        of_calibration) {  // it cannot be held: back to what is known of it beforehand
+      gyros_[k].drift_rad_s.template segment<3>(layout.wandering_column()).setZero();
+      auto wandering = errors.template middleRows<3>(layout.wandering(k));
+      wandering.setZero();
+      wandering.template middleCols<3>(layout.wandering(k))
+          .diagonal()
+          .setConstant(estimator.setup().wandering_drift.sigma);
+    }
   }
   restart_clock(layout);
 }

@@ -50,6 +50,9 @@ class InvariantEstimator {
   [[nodiscard]] std::optional<SetupFault> set_up(const CalibrationSetup& setup, const Gyros& prior,
                                                  const Eigen::Ref<const Eigen::MatrixXd>& covariance);
 
+  /// Returns to the prior, not started: as after set_up().
+  void forget();
+
   [[nodiscard]] bool started() const { return started_; }
   [[nodiscard]] const CalibrationSetup& setup() const { return setup_; }
   [[nodiscard]] const Layout& layout() const { return setup_.layout; }
@@ -62,6 +65,7 @@ class InvariantEstimator {
   [[nodiscard]] const SharedStates& shared() const { return shared_; }
   /// How errors at the last fix have changed the present directions.
   [[nodiscard]] const Sensitivities& since_fix() const { return since_fix_; }
+  [[nodiscard]] double time_since_fix_s() const { return time_since_fix_s_; }
   [[nodiscard]] const Information& information() const { return information_; }
   /// Prior means.
   [[nodiscard]] const Gyros& prior_gyros() const { return prior_gyros_; }
@@ -117,8 +121,6 @@ class InvariantEstimator {
   /// the minute until a run of rejections reopens the filter.
   static constexpr double kFaultMisfitOfPair_rad = 5.8e-3;  // 20′
 
-  /// Returns to the prior, not started.
-  void forget();
   /// Whether the estimate is finite and has a covariance.
   [[nodiscard]] bool sound() const;
   /// correct() and check_angles() before sound() is asked.
@@ -185,6 +187,7 @@ class InvariantEstimator {
 
 // Those that are built.
 extern template class InvariantEstimator<kPairCapacity>;
+extern template class InvariantEstimator<kTrioCapacity>;
 extern template class InvariantEstimator<kFullCapacity>;
 
 }  // namespace trihedron

@@ -173,6 +173,8 @@ struct Capacity {
 
 /// Two gyros with eq. (1) and one star tracker.
 inline constexpr Capacity kPairCapacity = Capacity::of(Layout{});
+/// The same with a third gyro.
+inline constexpr Capacity kTrioCapacity = Capacity::of(Layout{.gyros = 3});
 /// Everything.
 inline constexpr Layout kLargestLayout{.gyros = kMaxGyros,
                                        .drift_model = vsh(DriftModelId::kMaxDegree),

@@ -26,9 +26,11 @@ class Navigator {
   /// Instantaneous astro-correction: takes over the estimator's directions and parameters.
   void correct(const Estimator& estimator);
 
-  /// Instantaneous astro-correction with the parameters of the set-up held: the directions are those that the held
-  /// alignments read at this attitude (`h_b`), and the errors those of the set-up and of the attitude.
-  void correct_directions(const Estimator& estimator, const AttitudeSolution& attitude, const Directions& h_b);
+  /// Instantaneous astro-correction with the parameters held, those of the set-up or those in use: the directions are
+  /// those that the held alignments read at this attitude (`h_b`), and the errors those of the parameters held and of
+  /// the attitude.
+  void correct_directions(const Estimator& estimator, const AttitudeSolution& attitude, const Directions& h_b,
+                          bool of_set_up);
 
   /// Open-loop prediction over one step that ends at t; C_in_c and h_b of its middle. Needs started().
   void predict(const Estimator& estimator, const Eigen::Matrix3d& C_in_c, const Directions& h_b, Time t, double dt_s);

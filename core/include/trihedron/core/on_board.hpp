@@ -27,6 +27,9 @@ class OnBoard {
                                                  const Eigen::Ref<const Eigen::MatrixXd>& covariance,
                                                  const CorrectionPolicy& policy);
 
+  /// As after set_up().
+  void reset();
+
   /// One gyro sample. The navigator moves to it at once; the calibration follows some samples behind, when those round
   /// a fix are there. At most one fix is dealt with.
   StepReport on_gyro(const GyroSample& sample);
@@ -42,10 +45,34 @@ class OnBoard {
   /// when none waits.
   StepReport flush();
 
+  /// The next fix that is used corrects the navigator, whatever the interval.
+  void correct_at_next_fix() { correction_wanted_ = true; }
+  /// What the navigator takes over at its corrections; at first as the policy of the set-up says.
+  void use_parameters(ParametersInUse parameters) { parameters_ = parameters; }
+  /// Uses these gyros alone, and takes them back where they were isolated.
+  void select(const GyroMask& gyros) { intake_.health().select(gyros); }
+  /// Whether these gyros give an attitude by the readings of the latest sample.
+  [[nodiscard]] bool can_see_with(const GyroMask& gyros) const {
+    return readings_.size() > 0 && estimator_.rotation(estimator_.gyros(), readings_.latest_directions(), gyros).ok();
+  }
+  /// How errors at its beginning have changed the directions at its end, over the stretches between all fixes that have
+  /// been dealt with since begin_stretch().
+  struct Stretch {
+    typename Estimator::Sensitivities sensitivities;
+    double duration_s = 0;
+  };
+  [[nodiscard]] const Stretch& stretch() const { return stretch_; }
+  void begin_stretch();
+
   [[nodiscard]] const Estimator& estimator() const { return estimator_; }
   [[nodiscard]] const Navigator<Estimator>& navigator() const { return navigator_; }
+  [[nodiscard]] const GyroHealth& health() const { return intake_.health(); }
   /// Time of the latest sample used; needs one.
   [[nodiscard]] Time t() const { return readings_.latest_t(); }
+  /// The same, if there is one since the start or since the clock was set back.
+  [[nodiscard]] std::optional<Time> latest() const { return readings_.latest(); }
+  /// Of the navigator's last correction; needs navigator().started().
+  [[nodiscard]] Time corrected_t() const { return corrected_t_; }
 
   /// Open-loop attitude at the latest sample. Needs navigator().started().
   [[nodiscard]] Result<AttitudeSolution, DirectionsFault> navigation_attitude() const {
@@ -76,6 +103,8 @@ class OnBoard {
   void use_angles(Time t, const FixReadings& readings, StepReport& report);
   void judge(int odd_gyro, StepReport& report);
   void correct_navigator(const FixReadings& readings, StepReport& report);
+  /// After a fix, with what has passed since the one before it.
+  void end_stretch(const typename Estimator::Sensitivities& stretch, double duration_s);
   void navigate(Time from_t, const Directions& from, Time to_t, const Directions& to);
   void follow(Time t, const Directions& h_b);
   void follow_next_sample();
@@ -101,6 +130,9 @@ class OnBoard {
   Estimator estimator_;
   Navigator<Estimator> navigator_;
   CorrectionPolicy policy_;
+  ParametersInUse parameters_{};
+  bool correction_wanted_ = false;
+  Stretch stretch_;
   int behind_ = 0;  ///< samples to which the estimator has not yet been taken
   Time follower_t_{};
   Directions follower_h_b_;
@@ -117,6 +149,7 @@ using FullOnBoard = OnBoard<InvariantEstimator<kFullCapacity>>;
 
 // Those that are built.
 extern template class OnBoard<InvariantEstimator<kPairCapacity>>;
+extern template class OnBoard<InvariantEstimator<kTrioCapacity>>;
 extern template class OnBoard<InvariantEstimator<kFullCapacity>>;
 extern template class OnBoard<PaperEstimator>;
 

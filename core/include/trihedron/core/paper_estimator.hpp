@@ -49,6 +49,9 @@ class PaperEstimator {
   [[nodiscard]] std::optional<SetupFault> set_up(const CalibrationSetup& setup, const Gyros& prior,
                                                  const Eigen::Ref<const Eigen::MatrixXd>& covariance);
 
+  /// Returns to the prior, not started: as after set_up().
+  void forget();
+
   [[nodiscard]] bool started() const { return started_; }
   [[nodiscard]] const CalibrationSetup& setup() const { return setup_; }
   [[nodiscard]] const Layout& layout() const { return setup_.layout; }
@@ -59,6 +62,7 @@ class PaperEstimator {
   [[nodiscard]] const Gyros& gyros() const { return gyros_; }
   /// Effect of the errors at the last fix on the present directions.
   [[nodiscard]] const Sensitivities& since_fix() const { return since_fix_; }
+  [[nodiscard]] double time_since_fix_s() const { return time_since_fix_s_; }
   /// What was known before.
   [[nodiscard]] const Gyros& prior_gyros() const { return prior_gyros_; }
 
@@ -106,8 +110,6 @@ class PaperEstimator {
  private:
   using Information = SquareRootInformation<kMaxStates, States::kDynamic>;
 
-  /// Returns to the prior, not started.
-  void forget();
   /// Whether the estimate is finite and has a covariance.
   [[nodiscard]] bool sound() const { return information_.regular() && estimates_are_finite(gyros_, layout()); }
   /// correct() before sound() is asked.

@@ -56,9 +56,10 @@ inline constexpr std::size_t kFixStatuses = 15;
 /// Whether a gyro is used.
 enum class GyroState : std::uint8_t {
   kUsed,
-  kStuck,     ///< its readings do not change, not even by noise; used again when they do
-  kIsolated,  ///< left out for good: several times in a row it alone did not agree with the rest
+  kStuck,        ///< its readings do not change, not even by noise; used again when they do
+  kIsolated,     ///< left out for good: several times in a row it alone did not agree with the rest
+  kNotSelected,  ///< left out by command
 };
-inline constexpr std::size_t kGyroStates = 3;
+inline constexpr std::size_t kGyroStates = 4;
 
 }  // namespace trihedron

@@ -2,6 +2,7 @@
 /// What the on-board step reports of each event, and when it corrects the navigator.
 
 #include <chrono>
+#include <cstdint>
 #include <optional>
 
 #include "trihedron/core/fix_readings.hpp"
@@ -18,6 +19,13 @@ struct CorrectionPolicy {
   Duration interval = std::chrono::minutes(90);
   bool take_parameters = true;  ///< false: the parameters of the set-up are held
   bool navigate = true;         ///< false: the calibration alone, without a navigator
+};
+
+/// The parameters that the navigator uses from its next astro-correction on.
+enum class ParametersInUse : std::uint8_t {
+  kOfCalibration,  ///< taken over from the estimator at each correction
+  kOfSetUp,        ///< those known before
+  kHeld,           ///< those that it has; at the start those of the set-up
 };
 
 /// Report on one event; every member is valid, whatever was wrong with the event.
