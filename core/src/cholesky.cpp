@@ -1,23 +1,54 @@
 #include "trihedron/core/cholesky.hpp"
 
-#include <Eigen/Cholesky>
 #include <cmath>
 
 namespace trihedron {
 
 bool factorize(Eigen::Ref<Eigen::MatrixXd> a) {
-  const Eigen::LLT<Eigen::Ref<Eigen::MatrixXd>> factor(a);
-  a.triangularView<Eigen::StrictlyUpper>().setZero();
-  return factor.info() == Eigen::Success;
+  const Eigen::Index n = a.rows();
+  bool positive = true;
+  for (Eigen::Index j = 0; j < n; ++j) {
+    double square = a(j, j);
+    for (Eigen::Index k = 0; k < j; ++k) {
+      square -= a(j, k) * a(j, k);
+      a(k, j) = 0;
+    }
+    positive = positive && square > 0;
+    a(j, j) = std::sqrt(square);
+    for (Eigen::Index i = j + 1; i < n; ++i) {
+      double sum = a(i, j);
+      for (Eigen::Index k = 0; k < j; ++k) {
+        sum -= a(i, k) * a(j, k);
+      }
+      a(i, j) = sum / a(j, j);
+    }
+  }
+  return positive;
 }
 
 void solve_lower(const Eigen::Ref<const Eigen::MatrixXd>& L, Eigen::Ref<Eigen::MatrixXd> b) {
-  b = L.triangularView<Eigen::Lower>().solve(b);
+  for (Eigen::Index column = 0; column < b.cols(); ++column) {
+    for (Eigen::Index i = 0; i < b.rows(); ++i) {
+      double sum = b(i, column);
+      for (Eigen::Index k = 0; k < i; ++k) {
+        sum -= L(i, k) * b(k, column);
+      }
+      b(i, column) = sum / L(i, i);
+    }
+  }
 }
 
 void solve_factorized(const Eigen::Ref<const Eigen::MatrixXd>& L, Eigen::Ref<Eigen::MatrixXd> b) {
-  b = L.triangularView<Eigen::Lower>().solve(b);
-  b = L.transpose().triangularView<Eigen::Upper>().solve(b);
+  solve_lower(L, b);
+  for (Eigen::Index column = 0; column < b.cols(); ++column) {
+    for (Eigen::Index i = b.rows() - 1; i >= 0; --i) {
+      double sum = b(i, column);
+      for (Eigen::Index k = i + 1; k < b.rows(); ++k) {
+        sum -= L(k, i) * b(k, column);
+      }
+      b(i, column) = sum / L(i, i);
+    }
+  }
 }
 
 void solve_lower(const Eigen::Ref<const Eigen::MatrixXd>& L, RowsView b) {

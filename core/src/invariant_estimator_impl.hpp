@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "trihedron/core/cholesky.hpp"
+#include "trihedron/core/elementary.hpp"
 #include "trihedron/core/invariant_estimator.hpp"
 
 namespace trihedron {
@@ -235,7 +236,8 @@ PerGyro<double> InvariantEstimator<kCapacity>::reading_noise(const Eigen::Matrix
     rows.template middleCols<3>(layout().alignment(k)) = -C_linear;
     const Eigen::Matrix3d alignment = covariance_of(rows);
     rows.template middleCols<3>(layout().direction(k)).setIdentity();
-    noise_rad[k] = std::hypot(noise_rad[k], in_a_row * second_order_rad(alignment, covariance_of(rows)));
+    noise_rad[k] =
+        elementary::root_of_squares(noise_rad[k], in_a_row * second_order_rad(alignment, covariance_of(rows)));
   }
   return noise_rad;
 }
@@ -283,7 +285,7 @@ auto InvariantEstimator<kCapacity>::rows_to_use(const FixComparison& comparison,
     -> Compared {
   const PerGyro<double> readout_rad = readout_noise(noise_factor * std::sqrt(sharing - 1));
   for (int k = 0; k < layout().gyros; ++k) {
-    noise_rad[k] = std::hypot(noise_rad[k], readout_rad[k]);
+    noise_rad[k] = elementary::root_of_squares(noise_rad[k], readout_rad[k]);
   }
   Compared rows = rows_about_states_now<kMaxStates>(layout(), comparison);
   ComponentCovariance L = noise_of(comparison, R_c, noise_rad);
@@ -343,6 +345,22 @@ int InvariantEstimator<kCapacity>::odd_gyro(const FixComparison& comparison, Agr
     }
   }
   return odd;
+}
+
+template <Capacity kCapacity>
+int InvariantEstimator<kCapacity>::gyro_at_fault(const FixComparison& comparison, const Eigen::Matrix3d& C_by_gyros,
+                                                 const FixReadings& readings, const Eigen::Matrix3d& R_c,
+                                                 const PerGyro<double>& noise_rad) const {
+  // A misfit that a common rotation of all momenta explains is attributed to the star tracker.
+  const PerGyro<double> angle_noise_rad = reading_noise(C_by_gyros, readings.noise_factor, 1);
+  const FixComparison angles = compare(layout(), gyros_, C_by_gyros, C_by_gyros, readings.h_b, readings.used,
+                                       FixBySharedStates::Zero(3, layout().shared_size()));
+  if (angles_of(angles, angle_noise_rad).nis <= gate_of_freedom(angles.components() - 3, setup_.gate_nis)) {
+    return kNoGyro;
+  }
+  return odd_gyro(comparison, [&](const FixComparison& rest) {
+    return whitened(rest, R_c, noise_rad).nis <= gate_of_freedom(rest.components(), setup_.gate_nis);
+  });
 }
 
 namespace detail {
@@ -409,11 +427,11 @@ FixReport InvariantEstimator<kCapacity>::correct(const StarFix& fix, const FixRe
   PerGyro<double> noise_rad = reading_noise(C_linear, readings.noise_factor, 1);
   // Of the second order, and not normal: three times its sigma costs nothing but the weight of the first such fix.
   for (double& its : noise_rad) {
-    its = std::hypot(its, 3 * second_order_rad(misalignment, misalignment));
+    its = elementary::root_of_squares(its, 3 * second_order_rad(misalignment, misalignment));
   }
   const FixComparison comparison =
       compare(layout(), gyros_, C_in_c.raw(), C_linear, readings.h_b, readings.used, by_shared);
-  const White white = whitened(comparison, R_c, noise_rad);
+  White white = whitened(comparison, R_c, noise_rad);
   const double misfit_rad = detail::misfit_rad(comparison);
   report.nis = white.nis;
   const ComponentCovariance left = white.L.lazyProduct(white.covariance);
@@ -425,18 +443,8 @@ FixReport InvariantEstimator<kCapacity>::correct(const StarFix& fix, const FixRe
   report.weight = student_t_weight(setup_.student_t_freedom, report.nis, comparison.components());
   switch (report.status) {
     case FixStatus::kRejectedByGate:
-      // A misfit that a common rotation of all momenta explains is attributed to the star tracker.
       if (is_fault(report.nis, misfit_rad, count(readings.used))) {
-        const Eigen::Matrix3d& C_by_gyros = by_gyros.value().C_in_c.raw();
-        const PerGyro<double> angle_noise_rad = reading_noise(C_by_gyros, readings.noise_factor, 1);
-        const FixComparison angles = compare(layout(), gyros_, C_by_gyros, C_by_gyros, readings.h_b, readings.used,
-                                             FixBySharedStates::Zero(3, layout().shared_size()));
-        const int freedom = angles.components() - 3;
-        if (!(angles_of(angles, angle_noise_rad).nis <= gate_of_freedom(freedom, setup_.gate_nis))) {
-          report.odd_gyro = odd_gyro(comparison, [&](const FixComparison& rest) {
-            return whitened(rest, R_c, noise_rad).nis <= gate_of_freedom(rest.components(), setup_.gate_nis);
-          });
-        }
+        report.odd_gyro = gyro_at_fault(comparison, by_gyros.value().C_in_c.raw(), readings, R_c, noise_rad);
       }
       if (!(report.weight < 1) || report.jumped || report.odd_gyro != kNoGyro) {
         return report;
@@ -466,8 +474,10 @@ FixReport InvariantEstimator<kCapacity>::correct(const StarFix& fix, const FixRe
   angles_since_fix_ = 0;
   const double sharing = fixes_sharing_samples_of(fix);
   used_fix_t_[static_cast<std::size_t>(fix.head)] = fix.t;
-  update(sharing > 1 ? rows_to_use(comparison, R_c, noise_rad, readings.noise_factor, sharing) : white.rows,
-         std::sqrt(report.weight));
+  if (sharing > 1) {
+    white.rows = rows_to_use(comparison, R_c, noise_rad, readings.noise_factor, sharing);
+  }
+  update(white.rows, std::sqrt(report.weight));
   return report;
 }
 
@@ -485,7 +495,7 @@ AngleReport InvariantEstimator<kCapacity>::check_angles(Time t, const FixReading
   const PerGyro<double> noise_rad = reading_noise(C_in_c, readings.noise_factor, ++angles_since_fix_);
   const FixComparison comparison = compare(layout(), gyros_, C_in_c, C_in_c, readings.h_b, readings.used,
                                            FixBySharedStates::Zero(3, layout().shared_size()));
-  const White white = angles_of(comparison, noise_rad);
+  White white = angles_of(comparison, noise_rad);
   report.nis = white.nis;
   if (!(white.nis <= gate_of_freedom(comparison.components() - 3, setup_.gate_nis))) {
     report.status = FixStatus::kRejectedByGate;
@@ -504,10 +514,9 @@ AngleReport InvariantEstimator<kCapacity>::check_angles(Time t, const FixReading
 }
 
 template <Capacity kCapacity>
-void InvariantEstimator<kCapacity>::update(const Compared& white, double root_weight) {
-  Compared rows = white;
-  rows *= root_weight;
-  const Vector x = information_.update(rows_of(rows));
+void InvariantEstimator<kCapacity>::update(Compared& white, double root_weight) {
+  white *= root_weight;
+  const Vector x = information_.update(rows_of(white));
   const Layout& layout = setup_.layout;
   for (int k = 0; k < layout.gyros; ++k) {
     Gyro& gyro = gyros_[k];

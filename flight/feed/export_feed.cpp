@@ -1,5 +1,6 @@
-// trihedron_feed PASS FEED [HOURS]: writes the feed of a pass, as flight/targets/feed.hpp describes it: what the on-board
-// object of a pair is set up with, eq. (1) and no further states, and the first hours of events as replay() feeds them.
+// trihedron_feed PASS FEED [HOURS]: writes the feed of a pass, as flight/targets/feed.hpp describes it: what the
+// on-board object of a pair is set up with, eq. (1) and no further states, and the first hours of events as replay()
+// feeds them.
 
 #include <fmt/format.h>
 

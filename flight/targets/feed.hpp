@@ -56,10 +56,8 @@ class FromFeed {
   void operator()(double& value) { value = std::bit_cast<double>(words_.next()); }
   void operator()(Duration& value) { value = Duration(static_cast<std::int64_t>(words_.next())); }
   template <class Integer>
-    requires std::is_integral_v<Integer> || std::is_enum_v<Integer>
-  void operator()(Integer& value) {
-    value = static_cast<Integer>(words_.next());
-  }
+  requires std::is_integral_v<Integer> || std::is_enum_v<Integer>
+  void operator()(Integer& value) { value = static_cast<Integer>(words_.next()); }
 
  private:
   WordReader& words_;
@@ -72,10 +70,8 @@ class ToFeed {
   void operator()(double& value) { words_.put(value); }
   void operator()(Duration& value) { words_.put(std::int64_t{value.count()}); }
   template <class Integer>
-    requires std::is_integral_v<Integer> || std::is_enum_v<Integer>
-  void operator()(Integer& value) {
-    words_.put(static_cast<std::uint64_t>(value));
-  }
+  requires std::is_integral_v<Integer> || std::is_enum_v<Integer>
+  void operator()(Integer& value) { words_.put(static_cast<std::uint64_t>(value)); }
 
  private:
   WordWriter& words_;

@@ -32,7 +32,7 @@ template <Capacity kCapacity>
 class InvariantEstimator {
  public:
   static constexpr int kMaxStates = kCapacity.states;
-  static constexpr int kMaxDynamic = 6 * kCapacity.gyros;
+  static constexpr int kMaxDynamic = kCapacity.dynamic;
   static constexpr int kMaxErrors = kMaxStates;
   static constexpr int kStarTrackers = kCapacity.star_trackers;  ///< at most
   static constexpr bool kUsesAngles = true;
@@ -150,7 +150,12 @@ class InvariantEstimator {
   /// Whether the prior allows the drift coefficients and alignments that are estimated.
   [[nodiscard]] bool prior_allows_estimates() const;
   void update_to_now(const Eigen::Matrix3d& C_in_c);
-  void update(const Compared& white, double root_weight);
+  /// Takes the rows of a comparison, which are used up, with this weight.
+  void update(Compared& white, double root_weight);
+  /// The gyro whose fault explains a fix that was rejected; kNoGyro where none does.
+  [[nodiscard]] int gyro_at_fault(const FixComparison& comparison, const Eigen::Matrix3d& C_by_gyros,
+                                  const FixReadings& readings, const Eigen::Matrix3d& R_c,
+                                  const PerGyro<double>& noise_rad) const;
   void begin_stretch();
   /// As CalibrationSetup::fixes_sharing_a_sample() (docs/mathematics.md, section 2).
   [[nodiscard]] double fixes_sharing_samples_of(const StarFix& fix) const;
