@@ -26,7 +26,7 @@ bool factorize(Eigen::Ref<Eigen::MatrixXd> a) {
   return positive;
 }
 
-void solve_lower(const Eigen::Ref<const Eigen::MatrixXd>& L, Eigen::Ref<Eigen::MatrixXd> b) {
+void solve_lower(const MatrixView& L, Eigen::Ref<Eigen::MatrixXd> b) {
   for (Eigen::Index column = 0; column < b.cols(); ++column) {
     for (Eigen::Index i = 0; i < b.rows(); ++i) {
       double sum = b(i, column);
@@ -38,7 +38,7 @@ void solve_lower(const Eigen::Ref<const Eigen::MatrixXd>& L, Eigen::Ref<Eigen::M
   }
 }
 
-void solve_factorized(const Eigen::Ref<const Eigen::MatrixXd>& L, Eigen::Ref<Eigen::MatrixXd> b) {
+void solve_factorized(const MatrixView& L, Eigen::Ref<Eigen::MatrixXd> b) {
   solve_lower(L, b);
   for (Eigen::Index column = 0; column < b.cols(); ++column) {
     for (Eigen::Index i = b.rows() - 1; i >= 0; --i) {
@@ -51,7 +51,7 @@ void solve_factorized(const Eigen::Ref<const Eigen::MatrixXd>& L, Eigen::Ref<Eig
   }
 }
 
-void solve_lower(const Eigen::Ref<const Eigen::MatrixXd>& L, RowsView b) {
+void solve_lower(const MatrixView& L, RowsView b) {
   for (int i = 0; i < b.rows; ++i) {
     double* __restrict row = b.row(i);
     for (int j = 0; j < i; ++j) {

@@ -164,7 +164,7 @@ void InvariantEstimator<kCapacity>::start(const Eigen::Matrix3d& C_in_c, const F
   information_ = prior_;
   std::ranges::fill(second_order_rad_, 0.0);
   static_cast<void>(factorize(R));
-  solve_lower(R, rows_of(H));
+  solve_lower(matrix_of(R), rows_of(H));
   information_.add_information(rows_of(H));
   begin_stretch();
   angles_since_fix_ = 0;
@@ -212,7 +212,7 @@ Eigen::Matrix3d InvariantEstimator<kCapacity>::fused_attitude(const AttitudeByDi
   const Eigen::Matrix3d P =
       with_covariance(by_gyros, spread, readout_noise(readings.noise_factor), layout().gyros, 0).covariance_rad2;
   Eigen::Vector3d weighted = (by_gyros.C_in_c.inverse() * by_fix).log().raw();
-  solve_factorized(cholesky_root<3>(P + R_c), weighted);
+  solve_factorized(matrix_of(cholesky_root<3>(P + R_c)), weighted);
   return (by_gyros.C_in_c * Rot<C, C>::exp(Vec<C>::assume(P * weighted))).raw();
 }
 
@@ -264,7 +264,7 @@ void InvariantEstimator<kCapacity>::put_innovation(White& white) const {
   ComponentCovariance root = white.covariance;
   static_cast<void>(factorize(root));
   FixReport::Innovation y = white.rows.col(layout().size());
-  solve_lower(root, y);
+  solve_lower(matrix_of(root), y);
   white.nis = y.squaredNorm();
 }
 
@@ -272,7 +272,7 @@ template <Capacity kCapacity>
 auto InvariantEstimator<kCapacity>::whitened(const FixComparison& comparison, const Eigen::Matrix3d& R_c,
                                              const PerGyro<double>& noise_rad) const -> White {
   White white;
-  white.rows = rows_about_states_now<kMaxStates>(layout(), comparison);
+  white.rows = rows_about_states_now<kMaxStates, kMaxCompared>(layout(), comparison);
   white.L = noise_of(comparison, R_c, noise_rad);
   whiten(white.L, rows_of(white.rows));
   put_innovation(white);
@@ -287,7 +287,7 @@ auto InvariantEstimator<kCapacity>::rows_to_use(const FixComparison& comparison,
   for (int k = 0; k < layout().gyros; ++k) {
     noise_rad[k] = elementary::root_of_squares(noise_rad[k], readout_rad[k]);
   }
-  Compared rows = rows_about_states_now<kMaxStates>(layout(), comparison);
+  Compared rows = rows_about_states_now<kMaxStates, kMaxCompared>(layout(), comparison);
   ComponentCovariance L = noise_of(comparison, R_c, noise_rad);
   whiten(L, rows_of(rows));
   return rows;
@@ -301,9 +301,9 @@ auto InvariantEstimator<kCapacity>::angles_of(const FixComparison& comparison, c
   // what is left.
   const int components = comparison.components();
   const int columns = layout().size() + 1;
-  Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor, kMaxComponents, 3 + kMaxStates + 1> rows(
+  Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor, kMaxCompared, 3 + kMaxStates + 1> rows(
       components, 3 + columns);
-  rows.rightCols(columns) = rows_about_states_now<kMaxStates>(layout(), comparison);
+  rows.rightCols(columns) = rows_about_states_now<kMaxStates, kMaxCompared>(layout(), comparison);
   int row = 0;
   for (int k = 0; k < layout().gyros; ++k) {
     if (comparison.used[k]) {
@@ -329,15 +329,16 @@ bool InvariantEstimator<kCapacity>::is_fault(double nis, double misfit_rad, int 
 
 template <Capacity kCapacity>
 template <class Agrees>
-int InvariantEstimator<kCapacity>::odd_gyro(const FixComparison& comparison, Agrees&& agrees) {
+int InvariantEstimator<kCapacity>::odd_gyro(FixComparison& comparison, Agrees&& agrees) {
   int odd = kNoGyro;
   for (int k = 0; k < kMaxGyros; ++k) {
     if (!comparison.used[k]) {
       continue;
     }
-    FixComparison others = comparison;
-    others.used[k] = false;
-    if (agrees(others)) {
+    comparison.used[k] = false;
+    const bool others_agree = agrees(comparison);
+    comparison.used[k] = true;
+    if (others_agree) {
       if (odd != kNoGyro) {
         return kNoGyro;  // more than one candidate: ambiguous
       }
@@ -348,15 +349,19 @@ int InvariantEstimator<kCapacity>::odd_gyro(const FixComparison& comparison, Agr
 }
 
 template <Capacity kCapacity>
-int InvariantEstimator<kCapacity>::gyro_at_fault(const FixComparison& comparison, const Eigen::Matrix3d& C_by_gyros,
-                                                 const FixReadings& readings, const Eigen::Matrix3d& R_c,
-                                                 const PerGyro<double>& noise_rad) const {
-  // A misfit that a common rotation of all momenta explains is attributed to the star tracker.
-  const PerGyro<double> angle_noise_rad = reading_noise(C_by_gyros, readings.noise_factor, 1);
+bool InvariantEstimator<kCapacity>::angles_agree(const Eigen::Matrix3d& C_by_gyros, const FixReadings& readings) const {
+  const PerGyro<double> noise_rad = reading_noise(C_by_gyros, readings.noise_factor, 1);
   const FixComparison angles = compare(layout(), gyros_, C_by_gyros, C_by_gyros, readings.h_b, readings.used,
                                        FixBySharedStates::Zero(3, layout().shared_size()));
-  if (angles_of(angles, angle_noise_rad).nis <= gate_of_freedom(angles.components() - 3, setup_.gate_nis)) {
-    return kNoGyro;
+  return angles_of(angles, noise_rad).nis <= gate_of_freedom(angles.components() - 3, setup_.gate_nis);
+}
+
+template <Capacity kCapacity>
+int InvariantEstimator<kCapacity>::gyro_at_fault(FixComparison& comparison, const Eigen::Matrix3d& C_by_gyros,
+                                                 const FixReadings& readings, const Eigen::Matrix3d& R_c,
+                                                 const PerGyro<double>& noise_rad) const {
+  if (angles_agree(C_by_gyros, readings)) {
+    return kNoGyro;  // a misfit that a common rotation of all momenta explains is attributed to the star tracker
   }
   return odd_gyro(comparison, [&](const FixComparison& rest) {
     return whitened(rest, R_c, noise_rad).nis <= gate_of_freedom(rest.components(), setup_.gate_nis);
@@ -429,8 +434,7 @@ FixReport InvariantEstimator<kCapacity>::correct(const StarFix& fix, const FixRe
   for (double& its : noise_rad) {
     its = elementary::root_of_squares(its, 3 * second_order_rad(misalignment, misalignment));
   }
-  const FixComparison comparison =
-      compare(layout(), gyros_, C_in_c.raw(), C_linear, readings.h_b, readings.used, by_shared);
+  FixComparison comparison = compare(layout(), gyros_, C_in_c.raw(), C_linear, readings.h_b, readings.used, by_shared);
   White white = whitened(comparison, R_c, noise_rad);
   const double misfit_rad = detail::misfit_rad(comparison);
   report.nis = white.nis;
@@ -493,8 +497,8 @@ AngleReport InvariantEstimator<kCapacity>::check_angles(Time t, const FixReading
   const Eigen::Matrix3d& C_in_c = by_gyros.value().C_in_c.raw();
   update_to_now(C_in_c);
   const PerGyro<double> noise_rad = reading_noise(C_in_c, readings.noise_factor, ++angles_since_fix_);
-  const FixComparison comparison = compare(layout(), gyros_, C_in_c, C_in_c, readings.h_b, readings.used,
-                                           FixBySharedStates::Zero(3, layout().shared_size()));
+  FixComparison comparison = compare(layout(), gyros_, C_in_c, C_in_c, readings.h_b, readings.used,
+                                     FixBySharedStates::Zero(3, layout().shared_size()));
   White white = angles_of(comparison, noise_rad);
   report.nis = white.nis;
   if (!(white.nis <= gate_of_freedom(comparison.components() - 3, setup_.gate_nis))) {

@@ -56,7 +56,7 @@ ComponentCovariance noise_of(const FixComparison& comparison, const Eigen::Matri
 
 void whiten(ComponentCovariance& R, RowsView rows) {
   static_cast<void>(factorize(R));
-  solve_lower(R, rows);
+  solve_lower(matrix_of(R), rows);
 }
 
 AttitudeSolution with_covariance(const AttitudeByDirections& attitude, const Eigen::Matrix3d& spread_square,

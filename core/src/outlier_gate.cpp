@@ -11,7 +11,8 @@ namespace trihedron {
 double gate_of_freedom(int freedom, double gate_nis) {
   const double variance = 2.0 / (9 * freedom);
   constexpr double kItsVariance = 2.0 / (9 * kPairComponents);
-  const double sigmas = (elementary::cube_root(gate_nis / kPairComponents) - (1 - kItsVariance)) / std::sqrt(kItsVariance);
+  const double sigmas =
+      (elementary::cube_root(gate_nis / kPairComponents) - (1 - kItsVariance)) / std::sqrt(kItsVariance);
   const double root = std::max(1 - variance + sigmas * std::sqrt(variance), 0.0);
   return freedom * root * root * root;
 }

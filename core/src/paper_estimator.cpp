@@ -160,7 +160,7 @@ FixReport PaperEstimator::correct(const StarFix& fix, const FixReadings& reading
   const Eigen::Matrix<double, kMeasurements, kMaxStates> H = through.leftCols<kMaxStates>();
   const Eigen::Matrix4d covariance = Eigen::Matrix4d::Identity() + H.lazyProduct(H.transpose());
   Eigen::Vector4d normalized = rows.col(kMaxStates);
-  solve_lower(cholesky_root<kMeasurements>(covariance), normalized);
+  solve_lower(matrix_of(cholesky_root<kMeasurements>(covariance)), normalized);
   report.nis = normalized.squaredNorm();
   report.innovation = measurement.innovation;
   const Eigen::Matrix4d root = L;

@@ -97,7 +97,8 @@ class InvariantEstimator {
   [[nodiscard]] AngleReport check_angles(Time t, const FixReadings& readings);
 
  private:
-  using Compared = ComparedRows<kMaxStates>;
+  static constexpr int kMaxCompared = 2 * kCapacity.gyros;  ///< components of a comparison
+  using Compared = ComparedRows<kMaxStates, kMaxCompared>;
   /// A comparison as whitened rows about the states, with its innovation covariance and NIS.
   struct White {
     Compared rows;                   ///< (H, y), unit white noise
@@ -145,15 +146,18 @@ class InvariantEstimator {
   /// Whether a rejected misfit is so large that only a gyro fault explains it.
   [[nodiscard]] bool is_fault(double nis, double misfit_rad, int used) const;
   /// The one gyro whose removal makes a disagreeing comparison agree; kNoGyro where none or several do.
+  /// `comparison` is used for the trials, and in the end as it was.
   template <class Agrees>
-  [[nodiscard]] static int odd_gyro(const FixComparison& comparison, Agrees&& agrees);
+  [[nodiscard]] static int odd_gyro(FixComparison& comparison, Agrees&& agrees);
   /// Whether the prior allows the drift coefficients and alignments that are estimated.
   [[nodiscard]] bool prior_allows_estimates() const;
   void update_to_now(const Eigen::Matrix3d& C_in_c);
   /// Takes the rows of a comparison, which are used up, with this weight.
   void update(Compared& white, double root_weight);
+  /// Whether the gyros agree among themselves. Not inline, so that its stack is free again when a fault is looked for.
+  [[nodiscard, gnu::noinline]] bool angles_agree(const Eigen::Matrix3d& C_by_gyros, const FixReadings& readings) const;
   /// The gyro whose fault explains a fix that was rejected; kNoGyro where none does.
-  [[nodiscard]] int gyro_at_fault(const FixComparison& comparison, const Eigen::Matrix3d& C_by_gyros,
+  [[nodiscard]] int gyro_at_fault(FixComparison& comparison, const Eigen::Matrix3d& C_by_gyros,
                                   const FixReadings& readings, const Eigen::Matrix3d& R_c,
                                   const PerGyro<double>& noise_rad) const;
   void begin_stretch();

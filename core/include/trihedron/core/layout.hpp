@@ -168,7 +168,8 @@ struct Capacity {
   }
   [[nodiscard]] constexpr bool holds(const Layout& layout) const {
     return layout.gyros >= 2 && layout.gyros <= gyros && layout.drift_columns() <= drift_columns &&
-           layout.size() <= states && layout.dynamic() <= dynamic && layout.star_trackers >= 1 && layout.star_trackers <= star_trackers;
+           layout.size() <= states && layout.dynamic() <= dynamic && layout.star_trackers >= 1 &&
+           layout.star_trackers <= star_trackers;
   }
 };
 
