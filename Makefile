@@ -5,7 +5,7 @@ BUILD := build
 LINT_TOOLS := build-lint/tools
 SOURCES := $(shell git ls-files '*.cpp' '*.hpp' 2>/dev/null)
 
-.PHONY: help setup build everything demo test bench validation consistency docs format lint sanitize coverage install clean
+.PHONY: help setup build everything demo test flight bench validation consistency docs format lint sanitize coverage install clean
 
 help:
 	@echo 'make demo     install what is missing, build, repeat the experiment of the paper, say where the report is'
@@ -13,6 +13,7 @@ help:
 	@echo 'make build    the program alone, at $(BUILD)/trihedron'
 	@echo 'make everything  with tests and benches'
 	@echo 'make bench    measure: the on-board step, reading, writing and simulating a pass'
+	@echo 'make flight   fly core on an emulated Cortex-M7 and three other processors; writes the tables of docs/flight.md'
 	@echo 'make validation  measure again what docs/validation.md tells'
 	@echo 'make consistency  measure again what docs/consistency.md tells: hours; goes on where it was interrupted'
 	@echo 'make docs     reference of the interfaces and all documents as web pages: out/docs/html/index.html'
@@ -31,7 +32,7 @@ build:
 	cmake --build $(BUILD) --parallel $(JOBS) --target trihedron
 
 everything:
-	@cmake/setup.sh program tests
+	@cmake/setup.sh program tests flight
 	cmake --preset release $(CMAKE_FLAGS)
 	cmake --build $(BUILD) --parallel $(JOBS)
 
@@ -40,6 +41,13 @@ demo: build
 
 test: everything
 	ctest --test-dir $(BUILD) --output-on-failure --parallel $(JOBS)
+
+
+flight:
+	@cmake/setup.sh program tests flight targets
+	cmake $(if $(wildcard $(BUILD)/CMakeCache.txt),$(BUILD),--preset program) $(CMAKE_FLAGS)
+	cmake --build $(BUILD) --parallel $(JOBS) --target trihedron trihedron_feed
+	flight/targets/fly.py $(abspath $(BUILD)) docs/flight.md
 
 bench: everything
 	$(BUILD)/trihedron_bench

@@ -86,8 +86,10 @@ void put_calibration(WordWriter& result) {
   }
 }
 
-/// Feeds the events; false where the feed broke off.
+/// Feeds the events; false where the feed broke off. The stack is counted from here: what lies in this frame, above all
+/// the report of a step, is the caller's.
 bool fly(WordReader& feed, WordWriter& result) {
+  paint_stack();
   FromFeed next(feed);
   for (;;) {
     Event event;
@@ -126,7 +128,6 @@ int main(int argc, char** argv) {
   }
   result.put(kResultFormat);
   start_counting();
-  paint_stack();
   const bool whole = fly(feed, result);
   const std::size_t stack_bytes = stack_used();
   result.put(static_cast<std::uint64_t>(EventKind::kEnd));
@@ -134,6 +135,7 @@ int main(int argc, char** argv) {
   result.put(std::uint64_t{measures()});
   result.put(std::uint64_t{stack_bytes});
   result.put(std::uint64_t{sizeof(on_board)});
+  result.put(std::uint64_t{sizeof(StepReport)});
   if (!whole) {
     return kNoFeed;
   }
