@@ -10,7 +10,7 @@
 namespace trihedron {
 namespace {
 
-constexpr double kInfinite = std::numeric_limits<double>::infinity();
+constexpr double kUnbounded = std::numeric_limits<double>::infinity();
 constexpr double kNotNumber = std::numeric_limits<double>::quiet_NaN();
 constexpr double kLastDigits = 4e-16;
 
@@ -38,7 +38,7 @@ TEST(Elementary, SineAndCosineAreThoseOfTheLibraryToTheLastDigits) {
   at_many_sizes(1e-12, 1e6, check);
   for (int i = -16; i <= 16; ++i) {
     check(i * std::numbers::pi / 8);
-    check(std::nextafter(i * std::numbers::pi / 4, kInfinite));
+    check(std::nextafter(i * std::numbers::pi / 4, kUnbounded));
   }
   at_many_sizes(1e-300, 1e-3, [](double x) { expect_same_digits(elementary::sin(x), std::sin(x), 0); });
   EXPECT_EQ(elementary::sin(0), 0);
@@ -46,7 +46,7 @@ TEST(Elementary, SineAndCosineAreThoseOfTheLibraryToTheLastDigits) {
 }
 
 TEST(Elementary, SineAndCosineOutOfRangeAreNotNumbers) {
-  for (const double x : {1.0001e6, -1.0001e6, kInfinite, -kInfinite, kNotNumber}) {
+  for (const double x : {1.0001e6, -1.0001e6, kUnbounded, -kUnbounded, kNotNumber}) {
     EXPECT_TRUE(std::isnan(elementary::sin(x)));
     EXPECT_TRUE(std::isnan(elementary::cos(x)));
   }
@@ -64,18 +64,18 @@ TEST(Elementary, ArcTangentIsThatOfTheLibraryInAllQuadrants) {
   EXPECT_EQ(elementary::atan2(0, -2), std::numbers::pi);
   EXPECT_EQ(elementary::atan2(3, 0), std::numbers::pi / 2);
   EXPECT_EQ(elementary::atan2(-3, 0), -std::numbers::pi / 2);
-  EXPECT_EQ(elementary::atan2(kInfinite, 1), std::numbers::pi / 2);
+  EXPECT_EQ(elementary::atan2(kUnbounded, 1), std::numbers::pi / 2);
   EXPECT_TRUE(std::isnan(elementary::atan2(kNotNumber, 1)));
   EXPECT_TRUE(std::isnan(elementary::atan2(1, kNotNumber)));
-  EXPECT_TRUE(std::isnan(elementary::atan2(kInfinite, kInfinite)));
+  EXPECT_TRUE(std::isnan(elementary::atan2(kUnbounded, kUnbounded)));
 }
 
 TEST(Elementary, ExponentialIsThatOfTheLibrary) {
   at_many_sizes(1e-18, 699, [](double x) { expect_same_digits(elementary::exp(x), std::exp(x), 0); });
   EXPECT_EQ(elementary::exp(0), 1);
   EXPECT_EQ(elementary::exp(-701), 0);
-  EXPECT_EQ(elementary::exp(-kInfinite), 0);
-  EXPECT_EQ(elementary::exp(701), kInfinite);
+  EXPECT_EQ(elementary::exp(-kUnbounded), 0);
+  EXPECT_EQ(elementary::exp(701), kUnbounded);
   EXPECT_TRUE(std::isnan(elementary::exp(kNotNumber)));
 }
 
@@ -86,7 +86,7 @@ TEST(Elementary, CubeRootIsThatOfTheLibrary) {
     }
   });
   EXPECT_EQ(elementary::cube_root(0), 0);
-  EXPECT_EQ(elementary::cube_root(kInfinite), kInfinite);
+  EXPECT_EQ(elementary::cube_root(kUnbounded), kUnbounded);
   EXPECT_TRUE(std::isnan(elementary::cube_root(kNotNumber)));
 }
 
