@@ -5,7 +5,7 @@ BUILD := build
 LINT_TOOLS := build-lint/tools
 SOURCES := $(shell git ls-files '*.cpp' '*.hpp' 2>/dev/null)
 
-.PHONY: help setup build everything demo test flight bench validation consistency docs format lint sanitize coverage install clean
+.PHONY: help setup build everything demo test flight bench mutants validation consistency docs format lint sanitize coverage install clean
 
 help:
 	@echo 'make demo     install what is missing, build, repeat the experiment of the paper, say where the report is'
@@ -16,6 +16,7 @@ help:
 	@echo 'make flight   fly core on an emulated Cortex-M7 and three other processors; writes the tables of docs/flight.md'
 	@echo 'make validation  measure again what docs/validation.md tells'
 	@echo 'make consistency  measure again what docs/consistency.md tells: hours; goes on where it was interrupted'
+	@echo 'make mutants  whether the tests of core notice wrong formulas: hours; goes on where it was interrupted'
 	@echo 'make docs     reference of the interfaces and all documents as web pages: out/docs/html/index.html'
 	@echo 'make install  into PREFIX (default /usr/local)'
 	@echo 'make setup | format | lint | sanitize | coverage | clean'
@@ -54,6 +55,10 @@ bench: everything
 
 validation: everything
 	validation/validate.py $(BUILD)/trihedron docs/validation.md
+
+mutants:
+	@cmake/setup.sh program tests
+	validation/mutants/mutants.py build-mutants out/mutants.jsonl --jobs $(JOBS)
 
 # Counts the lines of core on the way, for `coverage`.
 sanitize:
