@@ -5,6 +5,7 @@ Run by CTest: python3 -m pytest fly_test.py, with TRIHEDRON_BUILD naming the bui
 import os
 import pathlib
 
+import numpy
 import pytest
 
 import fly
@@ -46,7 +47,7 @@ def test_a_planted_difference_is_found(desktop_and_target):
     changed.records["C_in_c"][5000, 1, 1] += 1e-15
     assert not changed.same_bits(desktop)
     changed = fly.Result(fly.directory(fly.CORTEX_M7, BUILD) / "short.result")
-    changed.calibration[100] ^= 1
+    changed.calibration[100] += numpy.uint64(1)
     assert not changed.same_bits(desktop)
 
 
@@ -93,4 +94,4 @@ def test_a_circle_of_calls_is_found(tmp_path):
     assert small.deepest("f") == (24, ("f", "g", "malloc"))
     assert small.foreign(["f"]) == ["malloc"]
     file.write_text(file.read_text() + edge.format("g", "f"))
-    assert small.circle(["f"]) == [] and CallGraph([file]).circle(["f"]) == ["f", "g", "f"]
+    assert small.circle(["f"]) == [] and CallGraph([file]).circle(["f"]) == ["f", "g"]
