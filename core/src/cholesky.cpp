@@ -3,6 +3,23 @@
 #include <cmath>
 
 namespace trihedron {
+namespace {
+
+/// In place: the upper triangle of `root` becomes that of its inverse, column by column from the right, upwards.
+void invert_upper(RowsView root) {
+  for (int j = root.rows - 1; j >= 0; --j) {
+    root(j, j) = 1 / root(j, j);
+    for (int i = j - 1; i >= 0; --i) {
+      double sum = 0;
+      for (int k = i + 1; k <= j; ++k) {
+        sum += root(i, k) * root(k, j);
+      }
+      root(i, j) = -sum / root(i, i);
+    }
+  }
+}
+
+}  // namespace
 
 bool factorize(Eigen::Ref<Eigen::MatrixXd> a) {
   const Eigen::Index n = a.rows();
@@ -97,17 +114,7 @@ bool information_root(const Eigen::Ref<const Eigen::MatrixXd>& covariance, RowsV
       }
     }
   }
-  // … and the root is its inverse, column by column from the right, upwards.
-  for (int j = n - 1; j >= 0; --j) {
-    root(j, j) = 1 / root(j, j);
-    for (int i = j - 1; i >= 0; --i) {
-      double sum = 0;
-      for (int k = i + 1; k <= j; ++k) {
-        sum += root(i, k) * root(k, j);
-      }
-      root(i, j) = -sum / root(i, i);
-    }
-  }
+  invert_upper(root);  // … and the root is its inverse
   for (int j = 0; j < n; ++j) {
     for (int i = 0; i <= j; ++i) {
       root(i, j) /= std::sqrt(covariance(j, j));

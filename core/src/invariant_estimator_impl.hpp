@@ -243,6 +243,30 @@ PerGyro<double> InvariantEstimator<kCapacity>::reading_noise(const Eigen::Matrix
 }
 
 template <Capacity kCapacity>
+PerGyro<double> InvariantEstimator<kCapacity>::fix_reading_noise(const Eigen::Matrix3d& C_linear, double noise_factor,
+                                                                 const Eigen::Matrix3d& misalignment) const {
+  PerGyro<double> noise_rad = reading_noise(C_linear, noise_factor, 1);
+  // Of the second order, and not normal: three times its sigma costs nothing but the weight of the first such fix.
+  for (double& its : noise_rad) {
+    its = elementary::root_of_squares(its, 3 * second_order_rad(misalignment, misalignment));
+  }
+  return noise_rad;
+}
+
+template <Capacity kCapacity>
+void InvariantEstimator<kCapacity>::restart(const Eigen::Matrix3d& C_in_c, const FixReadings& readings,
+                                            const Eigen::Matrix3d& R_c, const FixBySharedStates& by_shared) {
+  // The information was gathered about estimates that are far off: restart from the present ones, and where that is no
+  // better, from the prior.
+  restarted_from_estimates_ = !restarted_from_estimates_ && prior_allows_estimates();
+  if (!restarted_from_estimates_) {
+    gyros_ = prior_gyros_;
+    shared_.setZero();
+  }
+  start(C_in_c, readings, R_c, by_shared);
+}
+
+template <Capacity kCapacity>
 Eigen::Matrix3d InvariantEstimator<kCapacity>::misalignment_of(const StarFix& fix,
                                                                const FixBySharedStates& by_shared) const {
   if (fix.head == 0) {
@@ -406,6 +430,19 @@ inline void report_innovation(const Layout& layout, const FixComparison& compari
 }  // namespace detail
 
 template <Capacity kCapacity>
+void InvariantEstimator<kCapacity>::judge(const FixComparison& comparison, const White& white, double misfit_rad,
+                                          FixReport& report) {
+  report.nis = white.nis;
+  const ComponentCovariance left = white.L.lazyProduct(white.covariance);
+  detail::report_innovation(layout(), comparison, left.lazyProduct(white.L.transpose()), report);
+
+  report.status = gate_.judge(report.nis, misfit_rad, comparison.components());
+  report.rejections_in_a_row = gate_.rejections_in_a_row();
+  report.jumped = gate_.jumped();
+  report.weight = student_t_weight(setup_.student_t_freedom, report.nis, comparison.components());
+}
+
+template <Capacity kCapacity>
 FixReport InvariantEstimator<kCapacity>::correct(const StarFix& fix, const FixReadings& readings) {
   FixReport report;
   report.t = fix.t;
@@ -429,22 +466,11 @@ FixReport InvariantEstimator<kCapacity>::correct(const StarFix& fix, const FixRe
   update_to_now(by_gyros.value().C_in_c.raw());
   const Eigen::Matrix3d misalignment = misalignment_of(fix, by_shared);
   const Eigen::Matrix3d C_linear = fused_attitude(by_gyros.value(), C_in_c, R_c + misalignment, readings);
-  PerGyro<double> noise_rad = reading_noise(C_linear, readings.noise_factor, 1);
-  // Of the second order, and not normal: three times its sigma costs nothing but the weight of the first such fix.
-  for (double& its : noise_rad) {
-    its = elementary::root_of_squares(its, 3 * second_order_rad(misalignment, misalignment));
-  }
+  const PerGyro<double> noise_rad = fix_reading_noise(C_linear, readings.noise_factor, misalignment);
   FixComparison comparison = compare(layout(), gyros_, C_in_c.raw(), C_linear, readings.h_b, readings.used, by_shared);
   White white = whitened(comparison, R_c, noise_rad);
   const double misfit_rad = detail::misfit_rad(comparison);
-  report.nis = white.nis;
-  const ComponentCovariance left = white.L.lazyProduct(white.covariance);
-  detail::report_innovation(layout(), comparison, left.lazyProduct(white.L.transpose()), report);
-
-  report.status = gate_.judge(report.nis, misfit_rad, comparison.components());
-  report.rejections_in_a_row = gate_.rejections_in_a_row();
-  report.jumped = gate_.jumped();
-  report.weight = student_t_weight(setup_.student_t_freedom, report.nis, comparison.components());
+  judge(comparison, white, misfit_rad, report);
   switch (report.status) {
     case FixStatus::kRejectedByGate:
       if (is_fault(report.nis, misfit_rad, count(readings.used))) {
@@ -456,14 +482,7 @@ FixReport InvariantEstimator<kCapacity>::correct(const StarFix& fix, const FixRe
       report.status = FixStatus::kUsed;
       break;
     case FixStatus::kRestarted:
-      // The information was gathered about estimates that are far off: restart from the present ones, and where that is
-      // no better, from the prior.
-      restarted_from_estimates_ = !restarted_from_estimates_ && prior_allows_estimates();
-      if (!restarted_from_estimates_) {
-        gyros_ = prior_gyros_;
-        shared_.setZero();
-      }
-      start(C_in_c.raw(), readings, R_c, by_shared);
+      restart(C_in_c.raw(), readings, R_c, by_shared);
       report.weight = 1;
       return report;
     case FixStatus::kUsedAfterReopening:

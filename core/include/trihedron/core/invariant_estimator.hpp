@@ -123,6 +123,8 @@ class InvariantEstimator {
                                                const Eigen::Matrix3d& R_c, const FixReadings& readings) const;
   void start(const Eigen::Matrix3d& C_in_c, const FixReadings& readings, const Eigen::Matrix3d& R_c,
              const FixBySharedStates& by_shared);
+  void restart(const Eigen::Matrix3d& C_in_c, const FixReadings& readings, const Eigen::Matrix3d& R_c,
+               const FixBySharedStates& by_shared);
   /// 1-sigma per axis of the second-order term ½ a × b, which the linear model leaves out, by the covariances of a and
   /// b.
   [[nodiscard]] static double second_order_rad(const Eigen::Matrix3d& A, const Eigen::Matrix3d& B);
@@ -130,6 +132,9 @@ class InvariantEstimator {
   [[nodiscard]] PerGyro<double> readout_noise(double noise_factor) const;
   /// The same with the second-order term; n: consecutive measurements without a fix between them.
   [[nodiscard]] PerGyro<double> reading_noise(const Eigen::Matrix3d& C_linear, double noise_factor, int n) const;
+  /// The same for a fix, of whose error this is not known, noise apart.
+  [[nodiscard]] PerGyro<double> fix_reading_noise(const Eigen::Matrix3d& C_linear, double noise_factor,
+                                                  const Eigen::Matrix3d& misalignment) const;
   /// Covariance of what is not known of the error of a further star tracker's fix, noise apart: its first fix finds its
   /// alignment, and until then it is no attitude to linearise at.
   [[nodiscard]] Eigen::Matrix3d misalignment_of(const StarFix& fix, const FixBySharedStates& by_shared) const;
@@ -143,6 +148,8 @@ class InvariantEstimator {
   /// show.
   [[nodiscard]] White angles_of(const FixComparison& comparison, const PerGyro<double>& noise_rad) const;
   void put_innovation(White& white) const;
+  /// Reports the innovation and what the gate says of it.
+  void judge(const FixComparison& comparison, const White& white, double misfit_rad, FixReport& report);
   /// Whether a rejected misfit is so large that only a gyro fault explains it.
   [[nodiscard]] bool is_fault(double nis, double misfit_rad, int used) const;
   /// The one gyro whose removal makes a disagreeing comparison agree; kNoGyro where none or several do.

@@ -106,6 +106,9 @@ class PaperEstimator {
   using Information = SquareRootInformation<kMaxStates, States::kDynamic>;
 
   void update_covariance_to_now(const QuasiInertial& now);
+  /// Innovation, its covariance and NIS; `rows`: the measurement whitened, L: the root of its noise.
+  void report_innovation(const Measurement& measurement, const ComparedRows<kMaxStates>& rows, const Eigen::Matrix4d& L,
+                         FixReport& report) const;
   void feed_back(const Information::Vector& correction);
 
   CalibrationSetup setup_;
