@@ -20,7 +20,7 @@ docs=(doxygen)
 flight=(gcc-arm-none-eabi libnewlib-arm-none-eabi libstdc++-arm-none-eabi-newlib qemu-system-arm)
 # The further targets of `make flight`.
 targets=(g++-s390x-linux-gnu g++-riscv64-linux-gnu g++-multilib-sparc64-linux-gnu qemu-user)
-lint=(git ca-certificates python3 python3-venv)
+lint=(git ca-certificates cppcheck python3 python3-venv)
 
 packages=()
 for name in ${*:-program tests flight lint}; do

@@ -30,12 +30,12 @@ template <std::size_t N>
 constexpr std::array<double, N> alternating_factorials(int first) {
   std::array<double, N> c{};
   double factorial = 1;
-  int n = 1;
-  for (std::size_t k = 0; k < N; ++k) {
-    for (; n <= first + 2 * static_cast<int>(k); ++n) {
-      factorial *= n;
+  const int last = first + 2 * static_cast<int>(N) - 2;
+  for (int n = 1; n <= last; ++n) {
+    factorial *= n;
+    if (n >= first && (n - first) % 2 == 0) {
+      c[static_cast<std::size_t>((n - first) / 2)] = ((n - first) % 4 == 0 ? -1 : 1) / factorial;
     }
-    c[k] = (k % 2 == 0 ? -1 : 1) / factorial;
   }
   return c;
 }
