@@ -20,13 +20,15 @@ docs=(doxygen)
 flight=(gcc-arm-none-eabi libnewlib-arm-none-eabi libstdc++-arm-none-eabi-newlib qemu-system-arm)
 # The further targets of `make flight`.
 targets=(g++-s390x-linux-gnu g++-riscv64-linux-gnu g++-multilib-sparc64-linux-gnu qemu-user)
+# The program, and the fixtures of its tests, under libFuzzer.
+fuzz=(clang libclang-rt-14-dev libgtest-dev python3)
 lint=(git ca-certificates cppcheck python3 python3-venv)
 
 packages=()
 for name in ${*:-program tests flight lint}; do
   case $name in
-    program|tests|flight|targets|lint|docs) declare -n members=$name && packages+=("${members[@]}") ;;
-    *) echo "setup: no group \"$name\"; there are program, tests, flight, targets, lint, docs" >&2; exit 2 ;;
+    program|tests|flight|targets|lint|docs|fuzz) declare -n members=$name && packages+=("${members[@]}") ;;
+    *) echo "setup: no group \"$name\"; there are program, tests, flight, targets, lint, docs, fuzz" >&2; exit 2 ;;
   esac
   if [ "$name" = program ]; then program_wanted=yes; fi
 done

@@ -31,7 +31,8 @@ void add_evaluate(CLI::App& program, const Common& common, int& exit_status) {
       "Attitude file made with the values known before: gives the extension of the correction interval");
   command->add_option("--limit", arguments->limit, "Error that ends a correction interval")->capture_default_str();
   command->callback([&common, &exit_status, arguments] {
-    const double limit_rad = io::parse_angle_rad(arguments->limit);
+    const double limit_rad =
+        io::within(limits::kAttitudeLimit_rad, io::parse_angle_rad(arguments->limit), "--limit " + arguments->limit);
     const io::NamedPass pass = io::read_named_pass(arguments->pass);
     const Time epoch = pass.pass().settings.epoch;
     const auto evaluation_of = [&](const std::string& file) {

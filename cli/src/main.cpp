@@ -5,6 +5,7 @@
 #include <new>
 
 #include "commands.hpp"
+#include "standard_streams.hpp"
 #include "stop_on_signals.hpp"
 #include "trihedron/io/error.hpp"
 #include "trihedron/records/stop.hpp"
@@ -13,7 +14,15 @@ namespace {
 
 int fail(int status, const char* message) {
   trihedron::check_stop();  // what failed may have failed by that alone
-  fmt::print(stderr, "trihedron: {}\n", message);
+  trihedron::cli::say(fmt::format("trihedron: {}\n", message));
+  return status;
+}
+
+/// `status`, or the failure to write all of standard output.
+int printed(int status) {
+  if (std::fflush(stdout) != 0 || std::ferror(stdout) != 0) {
+    return fail(trihedron::cli::kMachineFailed, "standard output: cannot be written; free some space, or open it");
+  }
   return status;
 }
 
@@ -42,14 +51,11 @@ int run(int argc, char** argv) {
       program.parse(argc, argv);
     } catch (const CLI::ParseError& error) {
       if (error.get_exit_code() == 0) {  // --help, --version
-        return program.exit(error);
+        return printed(program.exit(error));
       }
       return fail(cli::kWrongUsage, fmt::format("{}; see trihedron --help", error.what()).c_str());
     }
-    if (std::fflush(stdout) != 0) {
-      return fail(cli::kMachineFailed, "standard output: cannot be written; free some space");
-    }
-    return exit_status;
+    return printed(exit_status);
   } catch (const io::UsageError& error) {
     return fail(cli::kWrongUsage, error.what());
   } catch (const io::InputRefused& error) {
@@ -61,6 +67,9 @@ int run(int argc, char** argv) {
   } catch (const trihedron::Stopped&) {
     throw;
   } catch (const std::exception& error) {
+    if (std::ferror(stdout) != 0) {
+      return printed(cli::kMachineFailed);
+    }
     return fail(cli::kMachineFailed, error.what());
   }
 }
@@ -68,5 +77,6 @@ int run(int argc, char** argv) {
 }  // namespace
 
 int main(int argc, char** argv) {
+  trihedron::cli::open_standard_streams();
   return trihedron::cli::stopped_by_signals([argc, argv] { return run(argc, argv); });
 }

@@ -123,6 +123,9 @@ nlohmann::ordered_json observability_json(const Observability& observability, Ti
   return json;
 }
 
+/// A whole number in a range; its message says the range.
+CLI::Range whole(const Range& range) { return {static_cast<int>(range.least), static_cast<int>(range.most)}; }
+
 bool is_scenario(const std::filesystem::path& path) { return path.extension() == ".toml"; }
 
 void print(const nlohmann::ordered_json& json, const std::string& text, const Common& common) {
@@ -206,10 +209,12 @@ void add_observe(CLI::App& program, const Common& common, int& exit_status) {
   };
   limit("--max-rate", arguments->max_rate, "Of these slews, instead of max_slew_rate of the scenario");
   limit("--max-angle", arguments->max_angle, "Of these slews")->capture_default_str();
-  limit("--slews", arguments->slews, "Largest number of slews")->check(CLI::PositiveNumber)->capture_default_str();
+  limit("--slews", arguments->slews, "Largest number of slews")
+      ->check(whole(trihedron::limits::kSlews))
+      ->capture_default_str();
   limit("--manoeuvre-time", arguments->manoeuvre_time, "Of all slews together, turns and holds")->capture_default_str();
   limit("--confirm", arguments->confirming_runs, "Number of flights with these slews to simulate and calibrate")
-      ->check(CLI::PositiveNumber);
+      ->check(whole(trihedron::limits::kFlights));
   command->callback([&common, &exit_status, arguments] {
     const CalibrationOptions options =
         arguments->config.empty() ? CalibrationOptions{} : io::read_config(arguments->config);
@@ -219,11 +224,15 @@ void add_observe(CLI::App& program, const Common& common, int& exit_status) {
     }
     plan::SlewLimits limits;
     if (!arguments->max_rate.empty()) {
-      limits.max_rate_rad_s = io::parse_rate_rad_s(arguments->max_rate);
+      limits.max_rate_rad_s = io::within(trihedron::limits::kSlewRate_rad_s, io::parse_rate_rad_s(arguments->max_rate),
+                                         "--max-rate " + arguments->max_rate);
     }
-    limits.max_angle_rad = io::parse_angle_rad(arguments->max_angle);
+    limits.max_angle_rad = io::within(trihedron::limits::kSlewAngle_rad, io::parse_angle_rad(arguments->max_angle),
+                                      "--max-angle " + arguments->max_angle);
     limits.slews = arguments->slews;
-    limits.manoeuvre_time = io::parse_duration(arguments->manoeuvre_time);
+    limits.manoeuvre_time =
+        io::within(trihedron::limits::kManoeuvreTime_s, io::parse_duration(arguments->manoeuvre_time),
+                   "--manoeuvre-time " + arguments->manoeuvre_time);
     exit_status = advise_for(arguments->path, options, limits, arguments->confirming_runs, common);
   });
 }

@@ -3,8 +3,9 @@
 #include <fmt/core.h>
 #include <unistd.h>
 
-#include <cstdio>
 #include <utility>
+
+#include "standard_streams.hpp"
 
 namespace trihedron::cli {
 
@@ -13,7 +14,7 @@ ProgressBar::ProgressBar(std::string what, bool quiet)
 
 ProgressBar::~ProgressBar() {
   if (shown_) {
-    fmt::print(stderr, "\r\033[K");
+    say("\r\033[K");
   }
 }
 
@@ -24,8 +25,7 @@ std::function<void(double)> ProgressBar::meter() const {
   return [this](double fraction) {
     constexpr int kWidth = 40;
     const int full = static_cast<int>(fraction * kWidth);
-    fmt::print(stderr, "\r{} [{:=<{}}{: <{}}] {:3.0f} %", what_, "", full, "", kWidth - full, 100 * fraction);
-    std::fflush(stderr);
+    say(fmt::format("\r{} [{:=<{}}{: <{}}] {:3.0f} %", what_, "", full, "", kWidth - full, 100 * fraction));
   };
 }
 

@@ -39,17 +39,28 @@ std::optional<SetupFault> InvariantEstimator<kCapacity>::set_up(const Calibratio
   }
   setup_ = setup;
   drift_ = DriftModel(layout.drift_model, layout.further);
-  prior_gyros_ = gyros_ = prior;
-  shared_ = SharedStates::Zero(layout.shared_size());
+  prior_gyros_ = prior;
   prior_ = information;
-  information_.reset(layout.size(), layout.dynamic());
-  gate_ = OutlierGate(setup);
+  forget();
+  return std::nullopt;
+}
+
+template <Capacity kCapacity>
+void InvariantEstimator<kCapacity>::forget() {
+  gyros_ = prior_gyros_;
+  shared_ = SharedStates::Zero(layout().shared_size());
+  information_.reset(layout().size(), layout().dynamic());
+  gate_ = OutlierGate(setup_);
   begin_stretch();
   angles_since_fix_ = 0;
   angle_rejections_in_a_row_ = 0;
   restarted_from_estimates_ = false;
   started_ = false;
-  return std::nullopt;
+}
+
+template <Capacity kCapacity>
+bool InvariantEstimator<kCapacity>::sound() const {
+  return information_.regular() && shared_.allFinite() && estimates_are_finite(gyros_, layout());
 }
 
 template <Capacity kCapacity>
@@ -444,6 +455,26 @@ void InvariantEstimator<kCapacity>::judge(const FixComparison& comparison, const
 
 template <Capacity kCapacity>
 FixReport InvariantEstimator<kCapacity>::correct(const StarFix& fix, const FixReadings& readings) {
+  const FixReport report = take(fix, readings);
+  if (!started_ || sound()) {
+    return report;
+  }
+  forget();
+  return lost(fix);
+}
+
+template <Capacity kCapacity>
+AngleReport InvariantEstimator<kCapacity>::check_angles(Time t, const FixReadings& readings) {
+  const AngleReport report = take_angles(t, readings);
+  if (sound()) {
+    return report;
+  }
+  forget();
+  return {.status = FixStatus::kEstimateLost, .t = t};
+}
+
+template <Capacity kCapacity>
+FixReport InvariantEstimator<kCapacity>::take(const StarFix& fix, const FixReadings& readings) {
   FixReport report;
   report.t = fix.t;
   report.head = fix.head;
@@ -505,7 +536,7 @@ FixReport InvariantEstimator<kCapacity>::correct(const StarFix& fix, const FixRe
 }
 
 template <Capacity kCapacity>
-AngleReport InvariantEstimator<kCapacity>::check_angles(Time t, const FixReadings& readings) {
+AngleReport InvariantEstimator<kCapacity>::take_angles(Time t, const FixReadings& readings) {
   AngleReport report;
   report.t = t;
   const auto by_gyros = attitude(gyros_, readings.h_b, readings.used);

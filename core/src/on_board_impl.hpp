@@ -196,6 +196,10 @@ void OnBoard<Estimator>::correct(const StarFix& fix, StepReport& report) {
     return;  // the estimator did not move its covariance to this fix
   }
   navigator_.extend(estimator_, stretch);
+  if (report.fix.status == FixStatus::kEstimateLost) {
+    schedule_.no_angles();
+    return;
+  }
   judge(report.fix.odd_gyro, report);
   report.compared = {fix, *readings};
   report.calibrated = calibrated(*readings);
@@ -241,6 +245,9 @@ void OnBoard<Estimator>::use_angles(Time t, const FixReadings& readings, StepRep
   if constexpr (Estimator::kUsesAngles) {
     report.angles = estimator_.check_angles(t, readings);
     schedule_.angles_used(t);
+    if (report.angles.status == FixStatus::kEstimateLost) {
+      schedule_.no_angles();
+    }
   }
 }
 

@@ -28,14 +28,20 @@ std::optional<SetupFault> PaperEstimator::set_up(const CalibrationSetup& setup, 
   }
   setup_ = setup;
   drift_ = DriftModel(setup.layout.drift_model, setup.layout.further);
-  prior_gyros_ = gyros_ = prior;
-  gate_ = OutlierGate(setup);
-  information_ = prior_ = information;
+  prior_gyros_ = prior;
+  prior_ = information;
+  forget();
+  return std::nullopt;
+}
+
+void PaperEstimator::forget() {
+  gyros_ = prior_gyros_;
+  information_ = prior_;
+  gate_ = OutlierGate(setup_);
   since_fix_ = {};
   time_since_fix_s_ = 0;
   extra_variance_rad2_ = 0;
   started_ = false;
-  return std::nullopt;
 }
 
 Result<AttitudeByDirections, DirectionsFault> PaperEstimator::attitude(const Gyros& gyros, const Directions& h_b,
@@ -135,6 +141,15 @@ void PaperEstimator::report_innovation(const Measurement& measurement, const Com
 }
 
 FixReport PaperEstimator::correct(const StarFix& fix, const FixReadings& readings) {
+  const FixReport report = take(fix, readings);
+  if (!started_ || sound()) {
+    return report;
+  }
+  forget();
+  return lost(fix);
+}
+
+FixReport PaperEstimator::take(const StarFix& fix, const FixReadings& readings) {
   FixReport report;
   report.t = fix.t;
   report.head = fix.head;

@@ -30,7 +30,8 @@ bool noise_is_usable(const CalibrationSetup& setup) {
     }
   }
   const double walk = setup.direction_random_walk_rad_sqrt_s;
-  return walk >= 0 && std::isfinite(walk) && setup.gyro_period > Duration::zero();
+  return walk >= 0 && std::isfinite(walk) && setup.gyro_period > Duration::zero() &&
+         setup.gyro_period <= CalibrationSetup::kLongestGyroPeriod;
 }
 
 bool further_states_are_usable(const CalibrationSetup& setup) {
@@ -55,8 +56,8 @@ std::optional<SetupFault> CalibrationSetup::fault() const {
   if (!noise_is_usable(*this)) {
     return SetupFault::kNoiseNotPositive;
   }
-  if (!(gate_nis > 0) || !(student_t_freedom >= 0) || !(reopen_after_rejections > 0) ||
-      !(reopen_after_jump_rejections > 0)) {
+  if (!(gate_nis > 0) || !(student_t_freedom >= 0 && std::isfinite(student_t_freedom)) ||
+      !(reopen_after_rejections > 0) || !(reopen_after_jump_rejections > 0)) {
     return SetupFault::kGateNotPositive;
   }
   if (!further_states_are_usable(*this)) {

@@ -51,15 +51,15 @@ GyroCalibration parse_gyro(const JsonNode& node) {
     }
   }
   for (const std::string& name : names) {
-    gyro.drift_rad_s.push_back(drift.at(name).number());
+    gyro.drift_rad_s.push_back(drift.at(name).number(limits::kDrift_rad_s));
   }
-  gyro.alignment_rotation_vector_rad = node.at("alignment_rotation_vector_rad").vector3();
+  gyro.alignment_rotation_vector_rad = node.at("alignment_rotation_vector_rad").vector3(limits::kRotation_rad);
   gyro.momentum_in = node.at("momentum_in").vector3();
   if (!(std::abs(gyro.momentum_in.norm() - 1) <= 1e-6)) {
     node.at("momentum_in").refuse("is not a unit vector", "repair it: it is the direction of the angular momentum");
   }
   if (const auto bias = node.find("readout_bias")) {
-    gyro.readout_bias = bias->vector3();
+    gyro.readout_bias = bias->vector3(limits::kReadoutBias);
   }
   return gyro;
 }
@@ -114,6 +114,12 @@ Eigen::MatrixXd parse_matrix(const JsonNode& node, std::size_t size) {
   return matrix;
 }
 
+const Range& range_of_sigma(const ParameterId& state) {
+  return state.is_drift()       ? limits::kDriftSigma_rad_s
+         : state.is_alignment() ? limits::kAlignmentSigma_rad
+                                : limits::kFurtherStateSigma;
+}
+
 /// States and covariance. States that this program does not know are left out: what is left is still the covariance of
 /// the others.
 void parse_covariance(const JsonNode& node, Calibration& calibration) {
@@ -131,29 +137,35 @@ void parse_covariance(const JsonNode& node, Calibration& calibration) {
     }
   }
   calibration.covariance = matrix(rows, rows);
+  for (Eigen::Index i = 0; i < calibration.covariance.rows(); ++i) {
+    const Range& range = range_of_sigma(calibration.states[static_cast<std::size_t>(i)]);
+    const double sigma = std::sqrt(calibration.covariance(i, i));
+    if (!(sigma <= range.most)) {
+      node.at("matrix").refuse(
+          fmt::format("has the variance of a sigma of {} that {}",
+                      name_of(calibration.states[static_cast<std::size_t>(i)]), is_outside(sigma, range)),
+          std::string(range.why));
+    }
+  }
+}
+
+/// A value that is zero where there is no such noise.
+double zero_or(const Range& range, const JsonNode& node) {
+  Range wider = range;
+  wider.zero_allowed = true;
+  return node.number(wider);
 }
 
 CalibrationNoise parse_noise(const JsonNode& node) {
-  const auto not_negative = [&](const char* name) {
-    const JsonNode value = node.at(name);
-    if (!(value.number() >= 0)) {
-      value.refuse(fmt::format("is {}", value.number()), "a noise is zero or more");
-    }
-    return value.number();
-  };
   CalibrationNoise noise;
-  noise.direction_random_walk_rad_sqrt_s = not_negative("direction_random_walk_rad_sqrt_s");
-  noise.wandering_drift_rad_s = not_negative("wandering_drift_rad_s");
-  noise.wandering_time_s = not_negative("wandering_time_s");
-  if (!(noise.wandering_time_s < 1e9) || (noise.wandering_drift_rad_s > 0 && !(noise.wandering_time_s > 0))) {
-    node.at("wandering_time_s")
-        .refuse(fmt::format("is {}", noise.wandering_time_s), "give seconds, above 0 and below 1e9");
-  }
+  noise.direction_random_walk_rad_sqrt_s =
+      node.at("direction_random_walk_rad_sqrt_s").number(limits::kRandomWalk_rad_sqrt_s);
+  noise.wandering_drift_rad_s = zero_or(limits::kWanderingDrift_rad_s, node.at("wandering_drift_rad_s"));
+  noise.wandering_time_s = noise.wandering_drift_rad_s > 0
+                               ? node.at("wandering_time_s").number(limits::kWanderingTime_s)
+                               : zero_or(limits::kWanderingTime_s, node.at("wandering_time_s"));
   if (const auto star_tracker = node.find("star_tracker_noise_rad")) {
-    noise.star_tracker_noise_rad = star_tracker->vector3();
-    if (!(noise.star_tracker_noise_rad->array() > 0).all()) {
-      star_tracker->refuse("is not positive", "give a 1-sigma about each axis");
-    }
+    noise.star_tracker_noise_rad = star_tracker->vector3(limits::kStarTrackerNoise_rad);
   }
   return noise;
 }
@@ -248,10 +260,7 @@ Calibration parse_calibration(std::string_view text, const std::filesystem::path
                 "write it like \"2009-05-20T00:00:00\"");
   }
   calibration.epoch = *parsed_epoch;
-  const double t_s = root.at("t_s").number();
-  if (!(std::abs(t_s) < 1e9)) {
-    root.at("t_s").refuse(fmt::format("is {}", t_s), "give seconds since the epoch, below 1e9");
-  }
+  const double t_s = root.at("t_s").number(limits::kTimeOfCalibration_s);
   calibration.t = calibration.epoch + from_seconds(t_s);
   for (const JsonNode& gyro : root.at("gyros").elements()) {
     calibration.gyros.push_back(parse_gyro(gyro));
@@ -267,8 +276,8 @@ Calibration parse_calibration(std::string_view text, const std::filesystem::path
   }
   if (const auto further = root.find("further")) {
     for (const auto& [name, estimate] : further->members()) {
-      const double value = estimate.at("value").number();
-      const double sigma = estimate.at("sigma").number();
+      const double value = estimate.at("value").number(limits::kFurtherState);
+      const double sigma = estimate.at("sigma").number(limits::kFurtherStateSigma);
       if (const std::optional<ParameterId> parameter = parameter_named(name)) {
         calibration.further.push_back({*parameter, value, sigma});
       }

@@ -5,12 +5,16 @@
 #include <fmt/format.h>
 #include <sqlite3.h>
 
+#include <array>
 #include <cmath>
+#include <map>
 #include <system_error>
 
+#include "input_file.hpp"
 #include "trihedron/io/calibration.hpp"
 #include "trihedron/io/error.hpp"
 #include "trihedron/io/time_text.hpp"
+#include "trihedron/records/stop.hpp"
 #include "wording.hpp"
 
 namespace trihedron::io {
@@ -48,10 +52,48 @@ CREATE TABLE finding (
 ) STRICT;
 )";
 
+int stop_asked_for(void* /*unused*/) {
+  const StopRequest* const request = StopScope::current();
+  return request != nullptr && request->made() ? 1 : 0;
+}
+
+/// Whoever wrote the file, nothing in it is executed, and damage is found rather than believed.
+void distrust(SQLite::Database& database) {
+  constexpr int kLongestValue = 64 << 20;  // bytes; the calibration with most states has 5 MB
+  constexpr int kSteps = 10'000;           // of SQLite's machine: less than a millisecond
+  sqlite3* const handle = database.getHandle();
+  sqlite3_db_config(handle, SQLITE_DBCONFIG_DEFENSIVE, 1, nullptr);
+  sqlite3_db_config(handle, SQLITE_DBCONFIG_TRUSTED_SCHEMA, 0, nullptr);
+  sqlite3_db_config(handle, SQLITE_DBCONFIG_ENABLE_TRIGGER, 0, nullptr);
+  sqlite3_db_config(handle, SQLITE_DBCONFIG_ENABLE_VIEW, 0, nullptr);
+  sqlite3_limit(handle, SQLITE_LIMIT_LENGTH, kLongestValue);
+  sqlite3_progress_handler(handle, kSteps, stop_asked_for, nullptr);
+  database.exec("PRAGMA cell_size_check = ON; PRAGMA mmap_size = 0");
+}
+
+/// Refuses one with a write-ahead log before SQLite looks into it: even a reader then leaves files beside it. Asked of
+/// SQLite's own descriptor, because the lock of this process goes when any other of the file is closed.
+void expect_no_log(SQLite::Database& database, const fs::path& file) {
+  constexpr std::size_t kWriteVersion = 18;  // the database file format, section 1.3; 1 is the rollback journal
+  constexpr std::size_t kReadVersion = 19;
+  std::array<unsigned char, 100> header{};
+  sqlite3_file* open_file = nullptr;
+  sqlite3_file_control(database.getHandle(), "main", SQLITE_FCNTL_FILE_POINTER, static_cast<void*>(&open_file));
+  const int status = open_file->pMethods->xRead(open_file, header.data(), static_cast<int>(header.size()), 0);
+  if (status == SQLITE_OK && header[kWriteVersion] == 2 && header[kReadVersion] == 2) {
+    throw InputRefused(file, {}, "keeps a write-ahead log, as no catalogue does",
+                       "give it to sqlite3 with \"PRAGMA journal_mode = DELETE\"");
+  }
+}
+
 SQLite::Database opened(const fs::path& file, int access) {
   constexpr int kPatience_ms = 2000;  // for another program that writes
+  expect_regular_file(file);
   // A relative name could be one that means something else to SQLite, ":memory:".
-  return {fs::absolute(file).string(), access, kPatience_ms};
+  SQLite::Database database(fs::absolute(file).string(), access, kPatience_ms);
+  expect_no_log(database, file);
+  distrust(database);
+  return database;
 }
 
 /// Calls `work` and turns the faults of SQLite into those of this module: InputRefused for a file that is no whole
@@ -61,9 +103,13 @@ auto told_of(const fs::path& file, const Work& work) {
   try {
     return work();
   } catch (const SQLite::Exception& fault) {
+    check_stop();                           // which ends what SQLite does
     switch (fault.getErrorCode() & 0xff) {  // the primary code
       case SQLITE_NOTADB:
       case SQLITE_CORRUPT:
+      case SQLITE_TOOBIG:
+      case SQLITE_CONSTRAINT:
+      case SQLITE_MISMATCH:
       case SQLITE_ERROR:
         throw InputRefused(file, {}, fmt::format("is damaged or no database: {}", fault.what()),
                            "restore it from a copy, or give the name of a new one");
@@ -81,11 +127,41 @@ std::int64_t number(SQLite::Database& database, const std::string& query) {
   return database.execAndGet(query).getInt64();
 }
 
+/// What each table, index, view and trigger is, by kind and name: the statement that made it, without the quotation
+/// marks that renaming puts round names. Those of SQLite itself are left out.
+std::map<std::string, std::string> schema_of(SQLite::Database& database) {
+  SQLite::Statement rows(database,
+                         "SELECT type || ' ' || name, replace(coalesce(sql, ''), '\"', '') FROM sqlite_schema "
+                         "WHERE name NOT LIKE 'sqlite\\_%' ESCAPE '\\'");
+  std::map<std::string, std::string> schema;
+  while (rows.executeStep()) {
+    schema[rows.getColumn(0).getString()] = rows.getColumn(1).getString();
+  }
+  return schema;
+}
+
+/// Refuses a database of which the tables are not exactly those that `schema` makes: a view, a trigger or a check in it
+/// could do anything, or never end.
+void check_schema(SQLite::Database& database, const fs::path& file, const char* schema) {
+  constexpr const char* kCure = "give a catalogue that `trihedron calibrate --catalogue` wrote and nobody has changed";
+  SQLite::Database own(":memory:", SQLite::OPEN_READWRITE | SQLite::OPEN_CREATE);
+  own.exec(schema);
+  const auto expected = schema_of(own);
+  const auto found = schema_of(database);
+  for (const auto& [name, statement] : found) {
+    if (const auto same = expected.find(name); same == expected.end() || same->second != statement) {
+      throw InputRefused(file, {}, fmt::format("has the {}, which is not that of a catalogue", in_quotes(name)), kCure);
+    }
+  }
+  for (const auto& [name, statement] : expected) {
+    if (!found.contains(name)) {
+      throw InputRefused(file, {}, fmt::format("lacks the {} of a catalogue", in_quotes(name)), kCure);
+    }
+  }
+}
+
 /// Refuses what is not a whole catalogue that this program can read.
 void check_catalogue(SQLite::Database& database, const fs::path& file) {
-  if (const std::string found = database.execAndGet("PRAGMA quick_check(1)").getString(); found != "ok") {
-    throw InputRefused(file, {}, fmt::format("is damaged: {}", found), "restore it from a copy");
-  }
   if (number(database, "PRAGMA application_id") != kApplicationId) {
     throw InputRefused(file, {}, "is a database, but no catalogue of calibrations",
                        "give a catalogue that `trihedron calibrate --catalogue` wrote, or the name of a new one");
@@ -94,6 +170,16 @@ void check_catalogue(SQLite::Database& database, const fs::path& file) {
     throw InputRefused(file, {},
                        fmt::format("is a catalogue of version {}, this program reads {}", version, kSchemaVersion),
                        "use the program that wrote it, or a newer one");
+  }
+  check_schema(database, file, kSchema);
+  if (const std::string found = database.execAndGet("PRAGMA integrity_check(1)").getString(); found != "ok") {
+    throw InputRefused(file, {}, fmt::format("is damaged: {}", in_quotes(found)), "restore it from a copy");
+  }
+  if (SQLite::Statement orphans(database, "PRAGMA foreign_key_check"); orphans.executeStep()) {
+    throw InputRefused(file, {},
+                       fmt::format("has a row in table {} that belongs to no calibration",
+                                   in_quotes(orphans.getColumn(0).getString())),
+                       "restore it from a copy, or remove the row; use sqlite3 with \"PRAGMA foreign_keys = ON\"");
   }
 }
 

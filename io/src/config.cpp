@@ -18,9 +18,9 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// A text with a unit, read by one of the parsers of quantity.hpp.
+/// A text, read by one of the parsers of quantity.hpp or this file.
 template <class Parse>
-auto quantity(const TomlTable& table, const toml::node& node, std::string_view key, Parse&& parse) {
+auto parsed(const TomlTable& table, const toml::node& node, std::string_view key, Parse&& parse) {
   if (node.is_number()) {
     table.refuse(node, fmt::format("\"{}\" is a bare number", key), "write it as a text with its unit");
   }
@@ -31,12 +31,17 @@ auto quantity(const TomlTable& table, const toml::node& node, std::string_view k
   }
 }
 
-int whole_number(const TomlTable& table, const toml::node& node, std::string_view key) {
-  const auto value = node.value_exact<std::int64_t>();
-  if (!value || *value < 1 || *value > 1'000'000) {
-    table.refuse(node, fmt::format("\"{}\" is not a whole number from 1 to 1000000", key), "give the number of fixes");
+/// A text with a unit, within a range.
+template <class Parse>
+auto quantity(const TomlTable& table, const toml::node& node, std::string_view key, const Range& range, Parse&& parse) {
+  return parsed(table, node, key, [&](std::string_view text) { return within(range, parse(text), text); });
+}
+
+int whole_number(const TomlTable& table, const toml::node& node, std::string_view key, const Range& range) {
+  if (!node.is_integer()) {
+    table.refuse(node, fmt::format("\"{}\" is not a whole number", key), std::string(range.why));
   }
-  return static_cast<int>(*value);
+  return static_cast<int>(table.number(node, key, range));
 }
 
 constexpr std::string_view kNever = "never";
@@ -101,10 +106,7 @@ CorrectionOptions parse_correction_interval(std::string_view text) {
   } else if (text == "continuous") {
     corrections.when = CorrectionOptions::When::kEachFix;
   } else {
-    corrections.interval = parse_duration(text);
-    if (!(corrections.interval > Duration::zero())) {
-      throw UsageError("a correction interval must be positive; say continuous to use each fix");
-    }
+    corrections.interval = within(limits::kCorrectionInterval_s, parse_duration(text), text);
   }
   return corrections;
 }
@@ -155,33 +157,26 @@ CalibrationOptions read_config(const fs::path& path) {
       options.find_noise = noise == "found";
     }
     if (const toml::node* node = filter.find("direction_random_walk")) {
-      options.direction_random_walk_rad_sqrt_s =
-          quantity(filter, *node, "direction_random_walk", parse_random_walk_rad_sqrt_s);
-      if (!(options.direction_random_walk_rad_sqrt_s >= 0)) {
-        filter.refuse(*node, "\"direction_random_walk\" is negative", "give zero or more");
-      }
+      options.direction_random_walk_rad_sqrt_s = quantity(filter, *node, "direction_random_walk",
+                                                          limits::kRandomWalk_rad_sqrt_s, parse_random_walk_rad_sqrt_s);
     }
     if (const toml::node* node = filter.find("gate_nis")) {
-      options.gate_nis = filter.positive(*node, "gate_nis");
+      options.gate_nis = filter.number(*node, "gate_nis", limits::kGateNis);
     }
     if (const toml::node* node = filter.find("reopen_after_rejections")) {
-      options.reopen_after_rejections = whole_number(filter, *node, "reopen_after_rejections");
+      options.reopen_after_rejections = whole_number(filter, *node, "reopen_after_rejections", limits::kRejections);
     }
     if (const toml::node* node = filter.find("reopen_after_jump_rejections")) {
-      options.reopen_after_jump_rejections = whole_number(filter, *node, "reopen_after_jump_rejections");
+      options.reopen_after_jump_rejections =
+          whole_number(filter, *node, "reopen_after_jump_rejections", limits::kRejections);
     }
     if (const toml::node* node = filter.find("student_t_freedom")) {
-      options.student_t_freedom = filter.number(*node, "student_t_freedom");
-      if (!(options.student_t_freedom >= 0)) {
-        filter.refuse(*node, "\"student_t_freedom\" is negative", "give 5 to 20, or 0 for the gate alone");
-      }
+      options.student_t_freedom = filter.number(*node, "student_t_freedom", limits::kStudentTFreedom);
     }
     if (const toml::node* node = filter.find("angles_after")) {
       const bool never = filter.text(*node, "angles_after") == kNever;
-      options.angles_after = never ? Duration::max() : quantity(filter, *node, "angles_after", parse_duration);
-      if (!(options.angles_after > Duration::zero())) {
-        filter.refuse(*node, "\"angles_after\" is not positive", "give more than zero, or never");
-      }
+      options.angles_after =
+          never ? Duration::max() : quantity(filter, *node, "angles_after", limits::kAnglesAfter_s, parse_duration);
     }
   }
   if (root.find("further_states") != nullptr) {
@@ -198,23 +193,18 @@ CalibrationOptions read_config(const fs::path& path) {
         states[row.state] = *word;
       } else {
         states[row.state] = Choice::kOn;
-        states.wandering_drift_rad_s = quantity(further, *node, row.key, parse_rate_rad_s);
-        if (!(states.wandering_drift_rad_s > 0)) {
-          further.refuse(*node, fmt::format("\"{}\" is not positive", row.key), "give auto, off, or more than zero");
-        }
+        states.wandering_drift_rad_s =
+            quantity(further, *node, row.key, limits::kWanderingDrift_rad_s, parse_rate_rad_s);
       }
     }
     if (const toml::node* node = further.find(kWanderingTime)) {
-      states.wandering_time = quantity(further, *node, kWanderingTime, parse_duration);
-      if (!(states.wandering_time > Duration::zero())) {
-        further.refuse(*node, fmt::format("\"{}\" is not positive", kWanderingTime), "give more than zero");
-      }
+      states.wandering_time = quantity(further, *node, kWanderingTime, limits::kWanderingTime_s, parse_duration);
     }
   }
   if (root.find("corrections") != nullptr) {
     const TomlTable corrections(root.table_at("corrections"), path, "[corrections]", {"interval"});
     if (const toml::node* node = corrections.find("interval")) {
-      options.corrections = quantity(corrections, *node, "interval", parse_correction_interval);
+      options.corrections = parsed(corrections, *node, "interval", parse_correction_interval);
     }
   }
   return options;

@@ -85,6 +85,14 @@ double JsonNode::number() const {
   return value_->get<double>();
 }
 
+double JsonNode::number(const Range& range) const {
+  const double value = number();
+  if (!range.holds(value)) {
+    refuse(is_outside(value, range), std::string(range.why));
+  }
+  return value;
+}
+
 std::vector<double> JsonNode::numbers() const {
   std::vector<double> values;
   for (const JsonNode& element : elements()) {
@@ -99,6 +107,15 @@ Eigen::Vector3d JsonNode::vector3() const {
     refuse(fmt::format("has {} elements", values.size()), "give three numbers: [x, y, z]");
   }
   return {values[0], values[1], values[2]};
+}
+
+Eigen::Vector3d JsonNode::vector3(const Range& range) const {
+  Eigen::Vector3d vector = vector3();
+  const std::vector<JsonNode> nodes = elements();
+  for (Eigen::Index i = 0; i < vector.size(); ++i) {
+    vector(i) = nodes[static_cast<std::size_t>(i)].number(range);
+  }
+  return vector;
 }
 
 void JsonNode::refuse(const std::string& reason, std::string cure) const {

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "trihedron/io/error.hpp"
+#include "trihedron/records/limits.hpp"
 
 namespace trihedron::io {
 
@@ -36,9 +37,12 @@ class JsonNode {
   [[nodiscard]] bool boolean() const;
   /// Finite.
   [[nodiscard]] double number() const;
+  [[nodiscard]] double number(const Range& range) const;
   [[nodiscard]] bool is_null() const { return value_->is_null(); }
   [[nodiscard]] std::vector<double> numbers() const;
   [[nodiscard]] Eigen::Vector3d vector3() const;
+  /// Each within the range.
+  [[nodiscard]] Eigen::Vector3d vector3(const Range& range) const;
 
   [[noreturn]] void refuse(const std::string& reason, std::string cure) const;
 

@@ -1,6 +1,5 @@
 #include "netcdf_file.hpp"
 
-#include <H5public.h>
 #include <fmt/format.h>
 #include <netcdf.h>
 
@@ -11,6 +10,7 @@
 #include <limits>
 #include <utility>
 
+#include "hdf5_structure.hpp"
 #include "trihedron/io/atomic_file.hpp"
 #include "trihedron/io/time_text.hpp"
 #include "trihedron/records/stop.hpp"
@@ -46,18 +46,14 @@ bool worth_deflating(const std::vector<double>& values, double lsb) {
   return change < kSteps * lsb * static_cast<double>(values.size());
 }
 
-/// The exit handler of HDF5 crashes when a full disk has kept it from closing a file, so it is switched off. All files
-/// of ours are closed by then. To be called before anything else of either library.
-void prepare_library() { [[maybe_unused]] static const herr_t once = H5dont_atexit(); }
-
 }  // namespace
 
 NetcdfReader::NetcdfReader(fs::path file) : file_(std::move(file)) {
-  prepare_library();
+  check_hdf5_structure(file_);
   // Absolute, because the library takes a name with "://" for a web address.
   const int status = nc_open(fs::absolute(file_).c_str(), NC_NOWRITE, &id_);
   if (status != NC_NOERR) {
-    refuse(fmt::format("is no NetCDF file that can be read ({})", nc_strerror(status)),
+    refuse(fmt::format("is no NetCDF-4 file that can be read ({})", nc_strerror(status)),
            "give a pass: a directory with pass.toml, gyro.csv and star_tracker.csv, or a NetCDF-4 file");
   }
 }
@@ -105,7 +101,7 @@ std::optional<std::string> NetcdfReader::text_attribute(int group, int variable,
   if (type == NC_STRING && length == 1) {  // as h5netcdf writes text
     char* text = nullptr;
     check(nc_get_att_string(group, variable, name, &text), fmt::format("reading attribute {}", in_quotes(name)));
-    std::string result(text);
+    std::string result(text == nullptr ? "" : text);  // HDF5 has strings that are nothing
     nc_free_string(1, &text);
     return result;
   }
@@ -143,6 +139,14 @@ void NetcdfReader::check_time_units(const std::string& group, int id, int variab
   }
 }
 
+void NetcdfReader::check_no_units(const std::string& group, int id, int variable, const std::string& name) const {
+  const std::optional<std::string> units = text_attribute(id, variable, "units");
+  if (units && *units != "1" && !units->empty()) {
+    refuse(fmt::format("group {}: {} has units {}", in_quotes(group), name, in_quotes(*units)),
+           "direction cosines and quaternions have none: convert the values, and give units \"1\"");
+  }
+}
+
 void NetcdfReader::read_column(int id, int variable, std::vector<double>& values) const {
   check(nc_get_var_double(id, variable, values.data()), "reading a variable");
   const double scale = number_attribute(id, variable, "scale_factor").value_or(1);
@@ -150,6 +154,25 @@ void NetcdfReader::read_column(int id, int variable, std::vector<double>& values
   const std::optional<double> fill = number_attribute(id, variable, "_FillValue");
   for (double& value : values) {
     value = value == fill ? std::numeric_limits<double>::quiet_NaN() : value * scale + offset;
+  }
+}
+
+void NetcdfReader::check_rows(const std::string& group, int id, std::span<const int> variables,
+                              std::size_t rows) const {
+  constexpr double kMostCompressed = 1100;  // deflate makes one byte of 1032 at most
+  std::size_t row_bytes = 0;
+  for (const int variable : variables) {
+    nc_type type = NC_NAT;
+    std::size_t bytes = 0;
+    check(nc_inq_vartype(id, variable, &type), "reading a type");
+    check(nc_inq_type(id, type, nullptr, &bytes), "reading a type");
+    row_bytes += bytes;
+  }
+  const std::uintmax_t held = fs::file_size(file_);
+  if (static_cast<double>(rows) * static_cast<double>(row_bytes) > kMostCompressed * static_cast<double>(held)) {
+    refuse(
+        fmt::format("group {} declares {} rows, more than a file of {} bytes can hold", in_quotes(group), rows, held),
+        "write the rows that there are; those that were declared and never written are no telemetry");
   }
 }
 
@@ -179,6 +202,7 @@ Series NetcdfReader::read_group(const std::string& group, Time epoch, ChooseRule
   ColumnPlan plan = plan_columns(fs::path(file_.string() + ":" + group), present, choose);
   series.columns = std::move(plan.columns);
   const std::size_t width = series.columns.size();
+  check_rows(group, id, ids, rows);
   series.t_s.resize(rows);
   series.values.resize(rows * width);
   std::vector<double> column(rows);
@@ -209,6 +233,7 @@ Series NetcdfReader::read_group(const std::string& group, Time epoch, ChooseRule
       check_time_units(group, id, ids[i], epoch);
       series.t_s = column;
     } else {
+      check_no_units(group, id, ids[i], present[i].name);
       for (std::size_t row = 0; row < rows; ++row) {
         series.values[row * width + static_cast<std::size_t>(plan.target[i])] = column[row];
       }
@@ -218,7 +243,7 @@ Series NetcdfReader::read_group(const std::string& group, Time epoch, ChooseRule
 }
 
 NetcdfWriter::NetcdfWriter(const fs::path& path) : path_(path), file_(path) {
-  prepare_library();
+  prepare_hdf5();
   if (file_.temporary() == path) {
     throw MachineFailed(path, "is no regular file", "give the name of a file on a disk: NetCDF needs one");
   }

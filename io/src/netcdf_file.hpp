@@ -30,7 +30,8 @@ class NetcdfReader {
   [[nodiscard]] bool has_group(const std::string& group) const;
   /// A text attribute of a group, of the root when `group` is empty; nullopt when there is none.
   [[nodiscard]] std::optional<std::string> text_attribute(const std::string& group, const std::string& name) const;
-  /// The columns of a group, CF-packed or not. `epoch` must be the one in the units of t_s where those name one.
+  /// The columns of a group, CF-packed or not, pure numbers but for t_s. `epoch` must be the one in the units of t_s
+  /// where those name one.
   [[nodiscard]] Series read_group(const std::string& group, Time epoch, ChooseRules choose) const;
 
  private:
@@ -40,6 +41,10 @@ class NetcdfReader {
   [[nodiscard]] std::optional<std::string> text_attribute(int group, int variable, const char* name) const;
   [[nodiscard]] std::optional<double> number_attribute(int group, int variable, const char* name) const;
   void check_time_units(const std::string& group, int id, int variable, Time epoch) const;
+  /// Refuses a group that declares more rows than the file can hold of these variables, however it is compressed.
+  void check_rows(const std::string& group, int id, std::span<const int> variables, std::size_t rows) const;
+  /// Throws InputRefused where a column that is a pure number claims a unit, such as degrees.
+  void check_no_units(const std::string& group, int id, int variable, const std::string& name) const;
   void read_column(int id, int variable, std::vector<double>& values) const;
 
   std::filesystem::path file_;

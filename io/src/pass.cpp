@@ -9,6 +9,7 @@
 #include "csv.hpp"
 #include "input_formats.hpp"
 #include "netcdf_file.hpp"
+#include "netcdf_input.hpp"
 #include "pass_toml.hpp"
 #include "screening.hpp"
 #include "text_file.hpp"
@@ -60,13 +61,12 @@ void check_there(const fs::path& path) {
 
 int gyros_of(const Series& gyro) { return static_cast<int>(gyro.columns.size() / 3); }
 
-std::string required_attribute(const NetcdfReader& reader, const fs::path& file, const char* group, const char* name) {
-  std::optional<std::string> text = reader.text_attribute(group, name);
-  if (!text) {
+const std::string& required(const std::optional<std::string>& attribute, const fs::path& file, const char* name) {
+  if (!attribute) {
     throw InputRefused(file, {}, fmt::format("lacks the attribute \"{}\"", name),
                        "write it as `trihedron simulate` does");
   }
-  return *std::move(text);
+  return *attribute;
 }
 
 /// One row per line, each column with its number of decimals.
@@ -203,15 +203,15 @@ void write_netcdf(const fs::path& path, const Pass& pass, const Truth* truth, co
 }
 
 std::optional<Truth> read_truth_netcdf(const fs::path& file) {
-  const NetcdfReader reader(file);
+  const NetcdfInput reader(file);
   if (!reader.has_group(kTruthGroup)) {
     return std::nullopt;
   }
-  const std::string parameters = required_attribute(reader, file, kTruthGroup, kTruthAttribute);
-  const std::string settings_text = required_attribute(reader, file, "", kSettingsAttribute);
-  const Time epoch = parse_pass_epoch(settings_text, inside(file, kSettingsAttribute));
-  return make_truth(parameters, inside(file, kTruthAttribute), reader.read_group(kTruthGroup, epoch, truth_columns),
-                    epoch);
+  const auto parameters = reader.text_attributes(kTruthGroup, {kTruthAttribute}).front();
+  const auto settings = reader.text_attributes("", {kSettingsAttribute}).front();
+  const Time epoch = parse_pass_epoch(required(settings, file, kSettingsAttribute), inside(file, kSettingsAttribute));
+  return make_truth(required(parameters, file, kTruthAttribute), inside(file, kTruthAttribute),
+                    reader.read_group(kTruthGroup, epoch, truth_columns), epoch);
 }
 
 std::optional<Truth> read_truth_directory(const fs::path& directory) {
@@ -243,8 +243,9 @@ UnscreenedPass read_raw_directory(const fs::path& directory) {
 }
 
 UnscreenedPass read_raw_netcdf(const fs::path& file) {
-  const NetcdfReader reader(file);
-  const std::string settings_text = required_attribute(reader, file, "", kSettingsAttribute);
+  const NetcdfInput reader(file);
+  const auto attributes = reader.text_attributes("", {kSettingsAttribute, kPriorAttribute});
+  const std::string& settings_text = required(attributes[0], file, kSettingsAttribute);
   const Time epoch = parse_pass_epoch(settings_text, inside(file, kSettingsAttribute));
   UnscreenedPass raw;
   raw.gyro = reader.read_group(kGyroGroup, epoch, gyro_columns);
@@ -253,7 +254,7 @@ UnscreenedPass read_raw_netcdf(const fs::path& file) {
   for (std::size_t head = 0; head <= raw.settings.further_star_trackers.size(); ++head) {
     raw.star_trackers.push_back(reader.read_group(star_tracker_name(head), epoch, star_tracker_columns));
   }
-  if (const auto prior = reader.text_attribute("", kPriorAttribute)) {
+  if (const auto& prior = attributes[1]) {
     raw.settings.prior = parse_calibration(*prior, inside(file, kPriorAttribute));
     check_prior(*raw.settings.prior, inside(file, kPriorAttribute), gyros_of(raw.gyro));
   }

@@ -18,8 +18,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr double kLongestPass_s = 1e9;  // keeps every time far from the end of int64 nanoseconds
-
 constexpr std::string_view kHeadNoise = "noise_rad";
 constexpr std::string_view kMounting = "mounting_rotation_vector_rad";
 constexpr std::string_view kStartUp = "start_up";
@@ -29,13 +27,8 @@ constexpr std::string_view kDriftSigma = "drift_prior_sigma_rad_s";
 constexpr std::string_view kAlignment = "alignment_prior_rotation_vector_rad";
 constexpr std::string_view kAlignmentSigma = "alignment_prior_sigma_rad";
 
-Duration period(const TomlTable& table, std::string_view key) {
-  const toml::node& node = table.at(key);
-  const double seconds = table.positive(node, key);
-  if (!(seconds >= 1e-9 && seconds <= kLongestPass_s)) {
-    table.refuse(node, fmt::format("\"{}\" is {}", key, seconds), "give seconds between 1e-9 and 1e9");
-  }
-  return from_seconds(seconds);
+Duration duration_at(const TomlTable& table, std::string_view key, const Range& range) {
+  return from_seconds(table.number(table.at(key), key, range));
 }
 
 Time parse_epoch_node(const TomlTable& table, std::string_view key) {
@@ -56,16 +49,16 @@ Time parse_epoch_node(const TomlTable& table, std::string_view key) {
   return *epoch;
 }
 
-/// A table by drift coefficient; `positive` where the values are sigmas.
+/// A table by drift coefficient.
 std::map<DriftCoefficient, double> by_coefficient(const TomlTable& parent, const toml::node& node, std::string_view key,
-                                                  const fs::path& file, bool positive) {
+                                                  const fs::path& file, const Range& range) {
   const std::vector<std::string_view> known(Esg7::kNames.begin(), Esg7::kNames.end());
   const TomlTable table(parent.as_table(node, key), file, std::string(key), known);
   std::map<DriftCoefficient, double> values;
   for (int i = 0; i < Esg7::kSize; ++i) {
     const char* name = Esg7::kNames.at(static_cast<std::size_t>(i));
     if (const toml::node* value = table.find(name)) {
-      values[DriftCoefficient::of_eq1(i)] = positive ? table.positive(*value, name) : table.number(*value, name);
+      values[DriftCoefficient::of_eq1(i)] = table.number(*value, name, range);
     }
   }
   return values;
@@ -74,24 +67,26 @@ std::map<DriftCoefficient, double> by_coefficient(const TomlTable& parent, const
 /// What the keys of [gyro] or of one [[gyro.unit]] say of a gyro, over what is known already.
 void read_prior(const TomlTable& table, const fs::path& file, GyroPrior& prior) {
   if (const toml::node* node = table.find(kNoise)) {
-    prior.readout_noise_rad = table.positive(*node, kNoise);
+    prior.readout_noise_rad = table.number(*node, kNoise, limits::kReadoutNoise_rad);
   }
   if (const toml::node* node = table.find(kDrift)) {
-    prior.drift_rad_s = by_coefficient(table, *node, kDrift, file, false);
+    prior.drift_rad_s = by_coefficient(table, *node, kDrift, file, limits::kDrift_rad_s);
   }
   if (const toml::node* node = table.find(kDriftSigma)) {
     if (node->is_table()) {
-      prior.drift_sigma_rad_s = by_coefficient(table, *node, kDriftSigma, file, true);
+      prior.drift_sigma_rad_s = by_coefficient(table, *node, kDriftSigma, file, limits::kDriftSigma_rad_s);
     } else {
-      prior.drift_common_sigma_rad_s = table.positive(*node, kDriftSigma);
+      prior.drift_common_sigma_rad_s = table.number(*node, kDriftSigma, limits::kDriftSigma_rad_s);
     }
   }
   if (const toml::node* node = table.find(kAlignment)) {
-    prior.alignment_rotation_vector_rad = table.three_numbers(*node, kAlignment);
+    prior.alignment_rotation_vector_rad = table.three_numbers(*node, kAlignment, limits::kRotation_rad);
   }
   if (const toml::node* node = table.find(kAlignmentSigma)) {
-    prior.alignment_sigma_rad = node->is_array() ? table.three_positive(*node, kAlignmentSigma)
-                                                 : Eigen::Vector3d::Constant(table.positive(*node, kAlignmentSigma));
+    constexpr const Range& kRange = limits::kAlignmentSigma_rad;
+    prior.alignment_sigma_rad = node->is_array()
+                                    ? table.three_numbers(*node, kAlignmentSigma, kRange)
+                                    : Eigen::Vector3d::Constant(table.number(*node, kAlignmentSigma, kRange));
   }
 }
 
@@ -109,9 +104,9 @@ std::vector<FurtherStarTracker> read_further_star_trackers(const TomlTable& tabl
   for (const toml::node& element : *array) {
     const TomlTable head(*element.as_table(), file, fmt::format("[[star_tracker.further]] {}", heads.size() + 1),
                          {kHeadNoise, kMounting, kAlignmentSigma});
-    heads.push_back({head.three_positive(head.at(kHeadNoise), kHeadNoise),
-                     head.three_numbers(head.at(kMounting), kMounting),
-                     head.positive(head.at(kAlignmentSigma), kAlignmentSigma)});
+    heads.push_back({head.three_numbers(head.at(kHeadNoise), kHeadNoise, limits::kStarTrackerNoise_rad),
+                     head.three_numbers(head.at(kMounting), kMounting, limits::kRotation_rad),
+                     head.number(head.at(kAlignmentSigma), kAlignmentSigma, limits::kAlignmentSigma_rad)});
   }
   return heads;
 }
@@ -222,14 +217,11 @@ PassSettings parse_pass_toml(std::string_view text, const fs::path& file, const 
   PassSettings settings;
   settings.spacecraft = pass.text(pass.at("spacecraft"), "spacecraft");
   settings.epoch = parse_epoch_node(pass, "epoch_tai");
-  settings.duration = period(pass, "duration_s");
-  if (settings.duration < kShortestPass) {
-    pass.refuse(pass.at("duration_s"), "the pass is shorter than a minute",
-                "give a longer pass: nothing can be calibrated");
-  }
-  settings.gyro_period = period(gyro, "period_s");
-  settings.star_tracker_period = period(star_tracker, "period_s");
-  settings.star_tracker_noise_rad = star_tracker.three_positive(star_tracker.at(kHeadNoise), kHeadNoise);
+  settings.duration = duration_at(pass, "duration_s", limits::kPassDuration_s);
+  settings.gyro_period = duration_at(gyro, "period_s", limits::kGyroPeriod_s);
+  settings.star_tracker_period = duration_at(star_tracker, "period_s", limits::kStarTrackerPeriod_s);
+  settings.star_tracker_noise_rad =
+      star_tracker.three_numbers(star_tracker.at(kHeadNoise), kHeadNoise, limits::kStarTrackerNoise_rad);
   settings.further_star_trackers = read_further_star_trackers(star_tracker, file);
   settings.gyros = read_gyros(gyro, file, gyros);
   if (const toml::node* start_up = gyro.find(kStartUp)) {

@@ -137,6 +137,18 @@ double parse_angle_rad(std::string_view text) { return parse(text, kAngle); }
 double parse_rate_rad_s(std::string_view text) { return parse(text, kRate); }
 double parse_random_walk_rad_sqrt_s(std::string_view text) { return parse(text, kRandomWalk); }
 
+double within(const Range& range, double value, std::string_view text) {
+  if (!range.holds(value)) {
+    throw UsageError(fmt::format("{} {}: {}", in_quotes(text), is_outside(value, range), range.why));
+  }
+  return value;
+}
+
+Duration within(const Range& range, Duration value, std::string_view text) {
+  static_cast<void>(within(range, to_seconds(value), text));
+  return value;
+}
+
 double parse_number(std::string_view text) {
   const std::optional<Parsed> parsed = parse_head(trimmed(text));
   if (!parsed || !parsed->rest.empty()) {

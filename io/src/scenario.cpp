@@ -68,15 +68,30 @@ double parse_in(std::string_view text, std::initializer_list<UnitOfMeasure> unit
   throw UsageError(fmt::format("{} has no known unit; accepted units: {}", in_quotes(text), accepted));
 }
 
-double parse_length_m(std::string_view text) { return parse_in(text, {{"km", 1e3}, {"m", 1}}); }
-double parse_frequency_hz(std::string_view text) { return parse_in(text, {{"Hz", 1}}); }
-double parse_acceleration_rad_s2(std::string_view text) {
-  return parse_in(text, {{"deg/s^2", kDegree}, {"rad/s^2", 1}});
+double length_m(std::string_view text) {
+  return within(limits::kLength_m, parse_in(text, {{"km", 1e3}, {"m", 1}}), text);
 }
-double parse_rate_walk_rad_s_sqrt_s(std::string_view text) {
-  return parse_in(text, {{"deg/h/s^0.5", kDegree / 3600}, {"rad/s/s^0.5", 1}});
+double frequency_hz(std::string_view text) { return within(limits::kFrequency_hz, parse_in(text, {{"Hz", 1}}), text); }
+double acceleration_rad_s2(std::string_view text) {
+  return within(limits::kAcceleration_rad_s2, parse_in(text, {{"deg/s^2", kDegree}, {"rad/s^2", 1}}), text);
 }
-double parse_signed_duration_s(std::string_view text) { return to_seconds(parse_signed_duration(text)); }
+double rate_walk_rad_s_sqrt_s(std::string_view text) {
+  return within(limits::kRateWalk_rad_s_sqrt_s, parse_in(text, {{"deg/h/s^0.5", kDegree / 3600}, {"rad/s/s^0.5", 1}}),
+                text);
+}
+double interval_s(std::string_view text) {
+  return to_seconds(within(limits::kInterval_s, parse_signed_duration(text), text));
+}
+double angle_rad(std::string_view text) { return within(limits::kAngle_rad, parse_angle_rad(text), text); }
+double rate_rad_s(std::string_view text) { return within(limits::kRate_rad_s, parse_rate_rad_s(text), text); }
+double random_walk_rad_sqrt_s(std::string_view text) {
+  return within(limits::kScenarioRandomWalk_rad_sqrt_s, parse_random_walk_rad_sqrt_s(text), text);
+}
+Duration pass_duration(std::string_view text) { return within(limits::kPassDuration_s, parse_duration(text), text); }
+Duration gyro_period(std::string_view text) { return within(limits::kGyroPeriod_s, parse_duration(text), text); }
+Duration star_tracker_period(std::string_view text) {
+  return within(limits::kStarTrackerPeriod_s, parse_duration(text), text);
+}
 
 /// The text of a value with a unit.
 std::string quantity_text(const TomlTable& table, const toml::node& node, std::string_view key) {
@@ -111,12 +126,15 @@ Field three(std::string_view key, T& target, Parse parse) {
 }
 
 Field pure_three(std::string_view key, Eigen::Vector3d& target) {
-  return {key,
-          [key, &target](const TomlTable& table, const toml::node& node) { target = table.three_numbers(node, key); }};
+  return {key, [key, &target](const TomlTable& table, const toml::node& node) {
+            target = table.three_numbers(node, key, limits::kPureNumber);
+          }};
 }
 
 Field pure(std::string_view key, double& target) {
-  return {key, [key, &target](const TomlTable& table, const toml::node& node) { target = table.number(node, key); }};
+  return {key, [key, &target](const TomlTable& table, const toml::node& node) {
+            target = table.number(node, key, limits::kPureNumber);
+          }};
 }
 
 template <class Integer>
@@ -176,8 +194,7 @@ Field list(std::string_view key, const fs::path& file, std::vector<T>& target, F
 }
 
 Fields interval_fields(Interval& interval) {
-  return {quantity("begin", interval.begin_s, parse_signed_duration_s),
-          quantity("end", interval.end_s, parse_signed_duration_s)};
+  return {quantity("begin", interval.begin_s, interval_s), quantity("end", interval.end_s, interval_s)};
 }
 
 Fields scenario_fields(Scenario& scenario) {
@@ -193,28 +210,27 @@ Fields scenario_fields(Scenario& scenario) {
              }
              scenario.epoch = *epoch;
            }},
-          quantity("duration", scenario.duration, parse_duration)};
+          quantity("duration", scenario.duration, pass_duration)};
 }
 
 Fields orbit_fields(OrbitScenario& orbit) {
-  return {quantity("perigee_altitude", orbit.perigee_altitude_m, parse_length_m),
-          quantity("apogee_altitude", orbit.apogee_altitude_m, parse_length_m),
-          quantity("inclination", orbit.inclination_rad, parse_angle_rad),
-          quantity("ascending_node", orbit.ascending_node_rad, parse_angle_rad),
-          quantity("argument_of_perigee", orbit.argument_of_perigee_rad, parse_angle_rad),
-          quantity("mean_anomaly", orbit.mean_anomaly_rad, parse_angle_rad)};
+  return {quantity("perigee_altitude", orbit.perigee_altitude_m, length_m),
+          quantity("apogee_altitude", orbit.apogee_altitude_m, length_m),
+          quantity("inclination", orbit.inclination_rad, angle_rad),
+          quantity("ascending_node", orbit.ascending_node_rad, angle_rad),
+          quantity("argument_of_perigee", orbit.argument_of_perigee_rad, angle_rad),
+          quantity("mean_anomaly", orbit.mean_anomaly_rad, angle_rad)};
 }
 
 Fields slew_fields(Slew& slew) {
-  return {quantity("begin", slew.begin_s, parse_signed_duration_s), quantity("roll", slew.roll_rad, parse_angle_rad),
-          quantity("pitch", slew.pitch_rad, parse_angle_rad), quantity("yaw", slew.yaw_rad, parse_angle_rad)};
+  return {quantity("begin", slew.begin_s, interval_s), quantity("roll", slew.roll_rad, angle_rad),
+          quantity("pitch", slew.pitch_rad, angle_rad), quantity("yaw", slew.yaw_rad, angle_rad)};
 }
 
 Fields imaging_fields(ImagingProgramme& imaging) {
-  return {quantity("max_roll", imaging.max_roll_rad, parse_angle_rad),
-          quantity("max_pitch", imaging.max_pitch_rad, parse_angle_rad),
-          quantity("mean_rest", imaging.mean_rest_s, parse_signed_duration_s),
-          quantity("dwell", imaging.dwell_s, parse_signed_duration_s)};
+  return {quantity("max_roll", imaging.max_roll_rad, angle_rad),
+          quantity("max_pitch", imaging.max_pitch_rad, angle_rad),
+          quantity("mean_rest", imaging.mean_rest_s, interval_s), quantity("dwell", imaging.dwell_s, interval_s)};
 }
 
 /// `slews = "none"`, or a list, or [attitude.imaging]; the last is the default.
@@ -262,58 +278,58 @@ Fields attitude_fields(AttitudeScenario& attitude, const fs::path& file, Time ep
              }
              read_fields(table.as_table(node, "imaging"), file, "[attitude.imaging]", imaging_fields(*imaging));
            }},
-          quantity("max_slew_rate", attitude.max_slew_rate_rad_s, parse_rate_rad_s),
-          quantity("max_slew_acceleration", attitude.max_slew_acceleration_rad_s2, parse_acceleration_rad_s2),
-          quantity("jitter", attitude.jitter_rad, parse_angle_rad),
-          quantity("jitter_bandwidth", attitude.jitter_bandwidth_hz, parse_frequency_hz)};
+          quantity("max_slew_rate", attitude.max_slew_rate_rad_s, rate_rad_s),
+          quantity("max_slew_acceleration", attitude.max_slew_acceleration_rad_s2, acceleration_rad_s2),
+          quantity("jitter", attitude.jitter_rad, angle_rad),
+          quantity("jitter_bandwidth", attitude.jitter_bandwidth_hz, frequency_hz)};
 }
 
 Fields harmonic_fields(DriftHarmonic& harmonic) {
   using Potential = DriftHarmonic::Potential;
   return {choice<Potential>("potential", harmonic.potential, {{"W", Potential::kW}, {"D", Potential::kD}}),
           whole("degree", harmonic.degree), whole("order", harmonic.order),
-          quantity("amplitude", harmonic.amplitude_rad_s, parse_rate_rad_s)};
+          quantity("amplitude", harmonic.amplitude_rad_s, rate_rad_s)};
 }
 
 Fields kappa_fields(std::array<double, 7>& kappa) {
   Fields fields;
   for (std::size_t i = 0; i < kappa.size(); ++i) {
-    fields.push_back(quantity(Esg7::kNames[i], kappa[i], parse_rate_rad_s));
+    fields.push_back(quantity(Esg7::kNames[i], kappa[i], rate_rad_s));
   }
   return fields;
 }
 
 Fields drift_fields(DriftScenario& drift, const fs::path& file) {
   return {section("kappa", file, "\"kappa\"", [&drift] { return kappa_fields(drift.kappa_rad_s.emplace()); }),
-          quantity("prior_sigma", drift.prior_sigma_rad_s, parse_rate_rad_s),
+          quantity("prior_sigma", drift.prior_sigma_rad_s, rate_rad_s),
           list("harmonics", file, drift.harmonics, harmonic_fields),
-          quantity("outside_sigma", drift.outside_sigma_rad_s, parse_rate_rad_s),
-          quantity("coefficient_walk", drift.coefficient_walk_rad_s_sqrt_s, parse_rate_walk_rad_s_sqrt_s),
+          quantity("outside_sigma", drift.outside_sigma_rad_s, rate_rad_s),
+          quantity("coefficient_walk", drift.coefficient_walk_rad_s_sqrt_s, rate_walk_rad_s_sqrt_s),
           pure("warm_up_fraction", drift.warm_up_fraction),
-          quantity("warm_up_time", drift.warm_up_time_s, parse_signed_duration_s),
-          quantity("direction_walk", drift.direction_walk_rad_sqrt_s, parse_random_walk_rad_sqrt_s),
-          quantity("markov_sigma", drift.markov_sigma_rad_s, parse_rate_rad_s),
-          quantity("markov_time", drift.markov_time_s, parse_signed_duration_s)};
+          quantity("warm_up_time", drift.warm_up_time_s, interval_s),
+          quantity("direction_walk", drift.direction_walk_rad_sqrt_s, random_walk_rad_sqrt_s),
+          quantity("markov_sigma", drift.markov_sigma_rad_s, rate_rad_s),
+          quantity("markov_time", drift.markov_time_s, interval_s)};
 }
 
 Fields readout_fields(ReadoutScenario& readout) {
-  return {quantity("noise", readout.noise_rad, parse_angle_rad),
-          three("bias", readout.bias_rad, parse_angle_rad),
+  return {quantity("noise", readout.noise_rad, angle_rad),
+          three("bias", readout.bias_rad, angle_rad),
           pure_three("scale", readout.scale),
-          quantity("quantum", readout.quantum_rad, parse_angle_rad),
+          quantity("quantum", readout.quantum_rad, angle_rad),
           pure("dropout_probability", readout.dropout_probability),
           pure("spike_probability", readout.spike_probability),
-          quantity("spike", readout.spike_rad, parse_angle_rad),
+          quantity("spike", readout.spike_rad, angle_rad),
           pure("stuck_probability", readout.stuck_probability),
-          quantity("stuck", readout.stuck_s, parse_signed_duration_s)};
+          quantity("stuck", readout.stuck_s, interval_s)};
 }
 
 Fields unit_fields(GyroScenario& gyro, const fs::path& file) {
   return {pure_three("start_direction_c", gyro.start_direction_c),
-          three("mounting_rotation_vector", gyro.mounting_rotation_vector_rad, parse_angle_rad),
-          three("misalignment", gyro.misalignment_rad, parse_angle_rad),
-          quantity("misalignment_magnitude", gyro.misalignment_magnitude_rad, parse_angle_rad),
-          quantity("alignment_prior_sigma", gyro.alignment_prior_sigma_rad, parse_angle_rad),
+          three("mounting_rotation_vector", gyro.mounting_rotation_vector_rad, angle_rad),
+          three("misalignment", gyro.misalignment_rad, angle_rad),
+          quantity("misalignment_magnitude", gyro.misalignment_magnitude_rad, angle_rad),
+          quantity("alignment_prior_sigma", gyro.alignment_prior_sigma_rad, angle_rad),
           section("drift", file, "[gyro.drift]", [&gyro, &file] { return drift_fields(gyro.drift, file); }),
           section("readout", file, "[gyro.readout]", [&gyro] { return readout_fields(gyro.readout); })};
 }
@@ -332,7 +348,7 @@ void read_gyros(const toml::table& table, const fs::path& file, Scenario& scenar
     GyroScenario& gyro = scenario.gyros[i];
     const Fields common = unit_fields(gyro, file);
     read_fields(table, file, "[gyro]",
-                Fields{quantity("period", scenario.gyro_period, parse_duration),
+                Fields{quantity("period", scenario.gyro_period, gyro_period),
                        list("gaps", file, scenario.gyro_gaps, interval_fields),
                        {"unit", [](const TomlTable&, const toml::node&) {}}} +
                     common);
@@ -344,22 +360,22 @@ void read_gyros(const toml::table& table, const fs::path& file, Scenario& scenar
 
 Fields head_fields(StarTrackerScenario& head, const fs::path& file) {
   using Aberration = StarTrackerScenario::Aberration;
-  return {three("noise", head.noise_rad, parse_angle_rad),
-          quantity("clock_offset", head.clock_offset_s, parse_signed_duration_s),
-          quantity("latency", head.latency_s, parse_signed_duration_s),
-          three("orbital_sine", head.orbital_sine_rad, parse_angle_rad),
-          three("orbital_cosine", head.orbital_cosine_rad, parse_angle_rad),
-          three("field_error", head.field_error_rad, parse_angle_rad),
-          quantity("field_correlation", head.field_correlation_rad, parse_angle_rad),
+  return {three("noise", head.noise_rad, angle_rad),
+          quantity("clock_offset", head.clock_offset_s, interval_s),
+          quantity("latency", head.latency_s, interval_s),
+          three("orbital_sine", head.orbital_sine_rad, angle_rad),
+          three("orbital_cosine", head.orbital_cosine_rad, angle_rad),
+          three("field_error", head.field_error_rad, angle_rad),
+          quantity("field_correlation", head.field_correlation_rad, angle_rad),
           choice<Aberration>("aberration", head.aberration,
                              {{"corrected", Aberration::kCorrected}, {"uncorrected", Aberration::kUncorrected}}),
-          quantity("sun_exclusion", head.sun_exclusion_rad, parse_angle_rad),
-          quantity("earth_exclusion", head.earth_exclusion_rad, parse_angle_rad),
-          quantity("max_rate", head.max_rate_rad_s, parse_rate_rad_s),
+          quantity("sun_exclusion", head.sun_exclusion_rad, angle_rad),
+          quantity("earth_exclusion", head.earth_exclusion_rad, angle_rad),
+          quantity("max_rate", head.max_rate_rad_s, rate_rad_s),
           list("outages", file, head.outages, interval_fields),
           pure("dropout_probability", head.dropout_probability),
           pure("outlier_probability", head.outlier_probability),
-          quantity("outlier", head.outlier_rad, parse_angle_rad),
+          quantity("outlier", head.outlier_rad, angle_rad),
           pure("wrong_sign_probability", head.wrong_sign_probability)};
 }
 
@@ -372,15 +388,15 @@ void read_star_trackers(const toml::table& table, const fs::path& file, Scenario
                 "begin the part of each further head with [[star_tracker.further]]");
   }
   read_fields(table, file, "[star_tracker]",
-              Fields{quantity("period", scenario.star_tracker_period, parse_duration),
+              Fields{quantity("period", scenario.star_tracker_period, star_tracker_period),
                      {"further", [](const TomlTable&, const toml::node&) {}}} +
                   head_fields(scenario.star_tracker, file));
   for (std::size_t i = 0; further != nullptr && i < further->as_array()->size(); ++i) {
     StarTrackerScenario head = scenario.star_tracker;
     read_fields(*(*further->as_array())[i].as_table(), file, fmt::format("[[star_tracker.further]] {}", i + 1),
-                Fields{three("mounting_rotation_vector", head.mounting_rotation_vector_rad, parse_angle_rad),
-                       three("misalignment", head.misalignment_rad, parse_angle_rad),
-                       quantity("alignment_prior_sigma", head.alignment_prior_sigma_rad, parse_angle_rad)} +
+                Fields{three("mounting_rotation_vector", head.mounting_rotation_vector_rad, angle_rad),
+                       three("misalignment", head.misalignment_rad, angle_rad),
+                       quantity("alignment_prior_sigma", head.alignment_prior_sigma_rad, angle_rad)} +
                     head_fields(head, file));
     scenario.further_star_trackers.push_back(head);
   }

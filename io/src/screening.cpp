@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <utility>
@@ -111,6 +112,50 @@ Kept keep_increasing(const Series& series, const PassSettings& settings, Duratio
     tally->report(defects);
   }
   return kept;
+}
+
+/// The unit in which a time was meant that is `factor` times what it should be.
+std::string_view unit_mistaken(double factor) {
+  struct Mistake {
+    double factor;
+    std::string_view text;
+  };
+  constexpr std::array kMistakes = {
+      Mistake{1e3, "the period looks like milliseconds"}, Mistake{1e6, "the period looks like microseconds"},
+      Mistake{1e-3, "the times t_s look like milliseconds"}, Mistake{1e-6, "the times t_s look like microseconds"}};
+  constexpr double kNear = 0.3;
+  const auto* const found = std::ranges::find_if(
+      kMistakes, [&](const Mistake& mistake) { return std::abs(factor / mistake.factor - 1) < kNear; });
+  return found == kMistakes.end() ? "one of them is wrong" : found->text;
+}
+
+/// Refuses a table that does not fit the period that it is told to have. Gaps and dropouts do not matter: it is refused
+/// where hardly any step is as short as twice that period, or hardly any as long as half of it.
+void check_period(const Series& series, const std::vector<Time>& t, Duration told, std::string_view section) {
+  constexpr std::size_t kLeastSteps = 20;
+  constexpr double kFactor = 2;
+  constexpr double kHardlyAny = 0.1;
+  std::vector<Duration> steps;
+  for (std::size_t i = 1; i < t.size(); ++i) {
+    steps.push_back(t[i] - t[i - 1]);
+  }
+  if (steps.size() < kLeastSteps) {
+    return;
+  }
+  const auto step_at = [&](double part) {
+    const auto place = steps.begin() + static_cast<std::ptrdiff_t>(part * static_cast<double>(steps.size() - 1));
+    std::ranges::nth_element(steps, place);
+    return to_seconds(*place);
+  };
+  const double told_s = to_seconds(told);
+  if (step_at(kHardlyAny) <= kFactor * told_s && step_at(1 - kHardlyAny) >= told_s / kFactor) {
+    return;
+  }
+  const double measured_s = step_at(0.5);
+  throw InputRefused(series.file, {},
+                     fmt::format("{} has a row every {:g} s, and period_s in [{}] of the settings is {:g} s: {}",
+                                 series.name, measured_s, section, told_s, unit_mistaken(told_s / measured_s)),
+                     fmt::format("both are in seconds: set period_s = {:g}, or correct t_s", measured_s));
 }
 
 /// Leaves the rows that stay, in place.
@@ -268,6 +313,7 @@ GyroTelemetry screen_gyro(Series series, const PassSettings& settings, std::vect
     throw InputRefused(series.file, {}, fmt::format("{} covers less than a minute", series.name),
                        "give a longer pass: nothing can be calibrated");
   }
+  check_period(series, kept.t, settings.gyro_period, "gyro");
   const std::size_t gyros = series.columns.size() / 3;
   for (std::size_t gyro = 0; gyro < gyros; ++gyro) {
     screen_one_gyro(series, kept, gyro, defects);
@@ -278,6 +324,7 @@ GyroTelemetry screen_gyro(Series series, const PassSettings& settings, std::vect
 
 StarTrackerTelemetry screen_star_tracker(Series series, const PassSettings& settings, std::vector<Defect>& defects) {
   Kept kept = keep_increasing(series, settings, settings.star_tracker_period, defects);
+  check_period(series, kept.t, settings.star_tracker_period, "star_tracker");
   NormTallies norms(series, series.name);
   Tally flips(series, Defect::Kind::kSignFlip, series.name);
   StarTrackerTelemetry fixes;

@@ -11,7 +11,7 @@ namespace trihedron::io {
 /// line.
 class TextFile {
  public:
-  /// Throws InputRefused when there is no such file or it may not be read, MachineFailed when reading fails.
+  /// Throws as InputFile, and MachineFailed when reading fails.
   explicit TextFile(const std::filesystem::path& path);
 
   [[nodiscard]] std::string_view text() const { return {bytes_.get(), size_}; }

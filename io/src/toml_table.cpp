@@ -84,15 +84,15 @@ double TomlTable::number(const toml::node& node, std::string_view key) const {
   return *value;
 }
 
-double TomlTable::positive(const toml::node& node, std::string_view key) const {
+double TomlTable::number(const toml::node& node, std::string_view key, const Range& range) const {
   const double value = number(node, key);
-  if (!(value > 0)) {
-    refuse(node, fmt::format("\"{}\" is {}", key, value), "it must be positive");
+  if (!range.holds(value)) {
+    refuse(node, fmt::format("\"{}\" {}", key, is_outside(value, range)), std::string(range.why));
   }
   return value;
 }
 
-Eigen::Vector3d TomlTable::three_numbers(const toml::node& node, std::string_view key) const {
+Eigen::Vector3d TomlTable::three_numbers(const toml::node& node, std::string_view key, const Range& range) const {
   const toml::array* array = node.as_array();
   if (array == nullptr || array->size() != 3) {
     refuse(node,
@@ -100,15 +100,7 @@ Eigen::Vector3d TomlTable::three_numbers(const toml::node& node, std::string_vie
                             : fmt::format("\"{}\" has {} elements", key, array->size()),
            "give three numbers: [x, y, z]");
   }
-  return {number((*array)[0], key), number((*array)[1], key), number((*array)[2], key)};
-}
-
-Eigen::Vector3d TomlTable::three_positive(const toml::node& node, std::string_view key) const {
-  const Eigen::Vector3d values = three_numbers(node, key);
-  if (!(values.minCoeff() > 0)) {
-    refuse(node, fmt::format("\"{}\" has an element that is not positive", key), "all three must be positive");
-  }
-  return values;
+  return {number((*array)[0], key, range), number((*array)[1], key, range), number((*array)[2], key, range)};
 }
 
 void TomlTable::refuse(const toml::node& node, std::string reason, std::string cure) const {

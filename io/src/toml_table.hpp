@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "trihedron/io/error.hpp"
+#include "trihedron/records/limits.hpp"
 
 namespace trihedron::io {
 
@@ -30,9 +31,10 @@ class TomlTable {
   [[nodiscard]] std::string text(const toml::node& node, std::string_view key) const;
   /// A finite number, integer or float.
   [[nodiscard]] double number(const toml::node& node, std::string_view key) const;
-  [[nodiscard]] double positive(const toml::node& node, std::string_view key) const;
-  [[nodiscard]] Eigen::Vector3d three_numbers(const toml::node& node, std::string_view key) const;
-  [[nodiscard]] Eigen::Vector3d three_positive(const toml::node& node, std::string_view key) const;
+  /// Refuses a number outside the range.
+  [[nodiscard]] double number(const toml::node& node, std::string_view key, const Range& range) const;
+  /// Each within the range.
+  [[nodiscard]] Eigen::Vector3d three_numbers(const toml::node& node, std::string_view key, const Range& range) const;
 
   [[noreturn]] void refuse(const toml::node& node, std::string reason, std::string cure) const;
 

@@ -59,6 +59,12 @@ std::string suggestion(std::string_view unknown, std::span<const std::string_vie
   return fmt::format("did you mean \"{}\"?", *nearest);
 }
 
+std::string is_outside(double value, const Range& range) {
+  const std::string unit = range.unit.empty() ? "" : fmt::format(" {}", range.unit);
+  return fmt::format("is {}{}, outside {}{:g} to {:g}{}", value, unit, range.zero_allowed ? "0 and " : "",
+                     range.least, range.most, unit);
+}
+
 std::string estimator_choices() {
   std::string text;
   for (const EstimatorRow& row : kEstimators) {

@@ -5,6 +5,8 @@
 #include <string>
 #include <string_view>
 
+#include "trihedron/records/limits.hpp"
+
 namespace trihedron::io {
 
 /// Without the blanks (space, tab, CR) at both ends.
@@ -16,6 +18,9 @@ namespace trihedron::io {
 /// `did you mean "period_s"?`, or the list of the known names when none is near. A name that the unknown one begins
 /// (its unit suffix is missing) is nearest.
 [[nodiscard]] std::string suggestion(std::string_view unknown, std::span<const std::string_view> known);
+
+/// "is 2 rad, outside 1e-09 to 0.1 rad"
+[[nodiscard]] std::string is_outside(double value, const Range& range);
 
 /// "invariant, paper, batch"
 [[nodiscard]] std::string estimator_choices();

@@ -11,6 +11,7 @@
 
 #include "fixtures.hpp"
 #include "trihedron/core/drift.hpp"
+#include "trihedron/records/limits.hpp"
 
 namespace trihedron::io {
 namespace {
@@ -117,12 +118,28 @@ TEST(CalibrationJson, RefusesNoiseThatIsNone) {
     EXPECT_THAT(refusal_of(format_calibration(calibration)), HasSubstr("noise.wandering_time_s is"));
   }
   calibration.noise = CalibrationNoise{0, Eigen::Vector3d(1e-5, 0, 1e-5), 0, 0};
-  EXPECT_THAT(refusal_of(format_calibration(calibration)), HasSubstr("noise.star_tracker_noise_rad is not positive"));
+  EXPECT_THAT(refusal_of(format_calibration(calibration)),
+              HasSubstr("noise.star_tracker_noise_rad[1] is 0 rad, outside"));
+}
+
+TEST(CalibrationJson, RefusesNumbersThatNoGyroHas) {
+  Calibration calibration = sample_calibration();
+  calibration.gyros[0].drift_rad_s[0] = 1e10;
+  EXPECT_THAT(refusal_of(format_calibration(calibration)),
+              HasSubstr("gyros[0].drift_rad_s.k0 is 10000000000 rad/s, outside -0.1 to 0.1 rad/s; no gyro drifts"));
+  calibration = sample_calibration();
+  calibration.covariance(0, 0) = 1e50;
+  EXPECT_THAT(refusal_of(format_calibration(calibration)),
+              HasSubstr("covariance.matrix has the variance of a sigma of gyro1.k0 that is 1e+25 rad/s, outside"));
+  calibration = sample_calibration();
+  calibration.gyros[1].alignment_rotation_vector_rad.y() = 7;
+  EXPECT_THAT(refusal_of(format_calibration(calibration)),
+              HasSubstr("gyros[1].alignment_rotation_vector_rad[1] is 7 rad, outside"));
 }
 
 RC_GTEST_PROP(CalibrationJson, NumbersComeBackBitForBit, (std::uint64_t bits)) {
   const auto value = std::bit_cast<double>(bits);
-  RC_PRE(std::isfinite(value));
+  RC_PRE(limits::kDrift_rad_s.holds(value));
   Calibration calibration = sample_calibration();
   calibration.gyros[0].drift_rad_s[2] = value;
   const Calibration back = parse_calibration(format_calibration(calibration), "c.json");

@@ -2,12 +2,14 @@
 
 #include <SQLiteCpp/SQLiteCpp.h>
 #include <gmock/gmock.h>
+#include <sys/stat.h>
 
 #include <chrono>
 #include <vector>
 
 #include "fixtures.hpp"
 #include "trihedron/io/calibration.hpp"
+#include "trihedron/records/stop.hpp"
 
 namespace trihedron::io {
 namespace {
@@ -154,14 +156,100 @@ TEST_F(Catalogue, RefusesACalibrationThatIsNone) {
 TEST_F(Catalogue, RefusesOneWithoutItsTables) {
   add(sample_entry());
   execute("DROP TABLE calibration");
-  EXPECT_THAT(refusal_of_all(), HasSubstr("no such table"));
+  EXPECT_THAT(refusal_of_all(), HasSubstr("lacks the \"table calibration\" of a catalogue"));
 }
 
-TEST_F(Catalogue, FailsWhereTheDirectoryIsMissingOrTheNameIsThatOfADirectory) {
+TEST_F(Catalogue, RefusesAViewInPlaceOfATableWithoutLookingIntoIt) {
+  add(sample_entry());
+  execute(
+      "DROP TABLE calibration; CREATE VIEW calibration AS WITH RECURSIVE endless (id) AS (SELECT 1 UNION ALL SELECT id "
+      "+ 1 FROM endless) SELECT id, '' AS spacecraft, '' AS pass, '' AS start_up, 1 AS passes, '' AS json, '' AS "
+      "epoch_tai, 0.0 AS t_s, '' AS estimator, '' AS drift_model FROM endless");
+  EXPECT_THAT(refusal_of_all(), HasSubstr("has the \"view calibration\", which is not that of a catalogue"));
+}
+
+TEST_F(Catalogue, RefusesTriggersAndDoesNotRunThem) {
+  add(sample_entry());
+  execute("CREATE TRIGGER thief AFTER INSERT ON calibration BEGIN DELETE FROM finding; END");
+  EXPECT_THAT(refusal_of_all(), HasSubstr("has the \"trigger thief\", which is not that of a catalogue"));
+  EXPECT_EQ(count("finding"), 2);
+}
+
+TEST_F(Catalogue, RefusesATableWithOtherColumns) {
+  add(sample_entry());
+  execute("ALTER TABLE finding ADD COLUMN endless TEXT AS (hex(zeroblob(length(code) * 1000)))");
+  EXPECT_THAT(refusal_of_all(), HasSubstr("has the \"table finding\", which is not that of a catalogue"));
+}
+
+TEST_F(Catalogue, RefusesAWriteAheadLogAndLeavesNoneBehind) {
+  add(sample_entry());
+  execute("PRAGMA journal_mode = WAL");
+  EXPECT_THAT(refusal_of_all(), HasSubstr("keeps a write-ahead log"));
+  EXPECT_THAT(directory_.names(), ElementsAre("catalogue.db"));
+  execute("PRAGMA journal_mode = DELETE");
+  EXPECT_EQ(refusal_of_all(), "");
+}
+
+TEST_F(Catalogue, RefusesRowsThatBelongToNoCalibration) {
+  add(sample_entry());
+  execute("PRAGMA foreign_keys = OFF; DELETE FROM calibration");
+  EXPECT_THAT(refusal_of_all(), HasSubstr("has a row in table"));
+  execute("DELETE FROM parameter; DELETE FROM finding");
+  EXPECT_EQ(refusal_of_all(), "");
+}
+
+TEST_F(Catalogue, RefusesAnIndexThatDisagreesWithItsTable) {
+  add(sample_entry());
+  std::string bytes = read_text(file_);
+  // The key of the calibration stands in the table and again in its index.
+  const std::string epoch = "2009-05-20T00:00:00";
+  std::size_t places = 0;
+  for (std::size_t at = bytes.find(epoch); at != std::string::npos; at = bytes.find(epoch, at + 1)) {
+    if (bytes.compare(at + epoch.size(), 1, "\"") != 0) {  // not within its JSON
+      bytes[at + 3] = places++ == 0 ? '9' : '8';
+    }
+  }
+  ASSERT_EQ(places, 2U);  // in the row and in the index
+  write_text(file_, bytes);
+  EXPECT_THAT(refusal_of_all(), HasSubstr("is damaged"));
+}
+
+TEST_F(Catalogue, AcceptsWhatSqliteItselfAdds) {
+  add(sample_entry());
+  execute("ANALYZE");
+  EXPECT_EQ(refusal_of_all(), "");
+}
+
+TEST_F(Catalogue, RefusesAValueTooLongForACalibration) {
+  add(sample_entry());
+  execute("UPDATE calibration SET json = hex(zeroblob(40000000))");
+  EXPECT_THAT(refusal([&] { static_cast<void>(read_catalogue(file_)); }), HasSubstr("too big"));
+}
+
+TEST_F(Catalogue, IsLeftWhenItsReaderIsAskedToStop) {
+  std::vector<CatalogueEntry> entries(200, sample_entry());
+  for (std::size_t i = 0; i < entries.size(); ++i) {
+    entries[i].calibration.epoch += std::chrono::hours(i);
+    entries[i].calibration.t += std::chrono::hours(i);
+  }
+  add_to_catalogue(file_, entries);
+  StopRequest request;
+  const StopScope scope(&request);
+  request.make();
+  EXPECT_THROW(static_cast<void>(read_catalogue(file_)), Stopped);
+}
+
+TEST_F(Catalogue, FailsWhereTheDirectoryIsMissing) {
   const CatalogueEntry entry = sample_entry();
   EXPECT_THROW(add_to_catalogue(directory_ / "none/c.db", {&entry, 1}), MachineFailed);
-  EXPECT_THROW(add_to_catalogue(directory_.path(), {&entry, 1}), MachineFailed);
-  EXPECT_THROW(static_cast<void>(read_catalogue(directory_.path())), MachineFailed);
+}
+
+TEST_F(Catalogue, RefusesTheNameOfADirectoryOrAFifo) {
+  std::filesystem::create_directory(file_);
+  EXPECT_THAT(refusal_of_all(), HasSubstr("catalogue.db: is a directory, not a regular file"));
+  std::filesystem::remove(file_);
+  ASSERT_EQ(::mkfifo(file_.c_str(), 0600), 0);
+  EXPECT_THAT(refusal_of_all(), HasSubstr("catalogue.db: is a FIFO, not a regular file"));
 }
 
 TEST_F(Catalogue, StaysAsItWasWhenTheDiskIsFull) {

@@ -60,7 +60,18 @@ TEST(Config, RefusesNamesThatThereAreNot) {
   EXPECT_THAT(refused_config("[further_states]\nreadout_bias = \"maybe\"\n"),
               HasSubstr("\"readout_bias\" is neither auto nor on nor off"));
   EXPECT_THAT(refused_config("[further_states]\nwandering_drift = \"-1e-8rad/s\"\n"),
-              HasSubstr("\"wandering_drift\" is not positive"));
+              HasSubstr("\"wandering_drift\": \"-1e-8rad/s\" is -1e-08 rad/s, outside 1e-15 to 0.01 rad/s"));
+}
+
+TEST(Config, RefusesNumbersOutsideTheirRanges) {
+  EXPECT_THAT(refused_config("[filter]\ndirection_random_walk = \"1rad/s^0.5\"\n"),
+              HasSubstr("outside 0 and 1e-15 to 0.001 rad/s^0.5: give 0 where there is none"));
+  EXPECT_THAT(refused_config("[filter]\ngate_nis = 0\n"), HasSubstr("\"gate_nis\" is 0, outside 0.1 to 1e+12"));
+  EXPECT_THAT(refused_config("[filter]\nstudent_t_freedom = 0.5\n"), HasSubstr("0 for the gate alone"));
+  EXPECT_THAT(refused_config("[filter]\nreopen_after_rejections = 0\n"), HasSubstr("it is a number of fixes"));
+  EXPECT_THAT(refused_config("[filter]\nangles_after = \"0s\"\n"), HasSubstr("or never"));
+  EXPECT_THAT(refused_config("[further_states]\nwandering_time = \"1000000h\"\n"), HasSubstr("an hour is usual"));
+  EXPECT_THAT(refused_config("[corrections]\ninterval = \"0s\"\n"), HasSubstr("must be positive; say continuous"));
 }
 
 }  // namespace

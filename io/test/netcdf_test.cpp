@@ -1,11 +1,14 @@
 #include <gmock/gmock.h>
+#include <hdf5.h>
 #include <netcdf.h>
+#include <sys/stat.h>
 
 #include <cmath>
 #include <cstdlib>
 #include <limits>
 
 #include "fixtures.hpp"
+#include "netcdf_file.hpp"
 #include "trihedron/io/pass.hpp"
 #include "trihedron/io/residuals.hpp"
 
@@ -49,6 +52,25 @@ class PassNetcdf : public testing::Test {
   RawPass raw_ = clean_pass();
 };
 
+// Rows that were declared and never written take no room in the file, and would take all memory.
+TEST_F(PassNetcdf, RefusesMoreRowsThanTheFileCanHold) {
+  int id = 0;
+  const auto pass_toml = raw_.toml;
+  ASSERT_EQ(nc_create(file().c_str(), NC_NETCDF4 | NC_CLOBBER, &id), NC_NOERR);
+  put_text(id, NC_GLOBAL, "pass_toml", pass_toml);
+  int gyro = 0;
+  int time = 0;
+  int column = 0;
+  ASSERT_EQ(nc_def_grp(id, "gyro", &gyro), NC_NOERR);
+  ASSERT_EQ(nc_def_dim(gyro, "time", 100'000'000, &time), NC_NOERR);
+  for (const char* name : {"t_s", "h1_x", "h1_y", "h1_z", "h2_x", "h2_y", "h2_z"}) {
+    ASSERT_EQ(nc_def_var(gyro, name, NC_DOUBLE, 1, &time, &column), NC_NOERR);
+    ASSERT_EQ(nc_def_var_deflate(gyro, column, 0, 1, 1), NC_NOERR);
+  }
+  ASSERT_EQ(nc_close(id), NC_NOERR);
+  EXPECT_THAT(read_refused(), HasSubstr("group \"gyro\" declares 100000000 rows, more than a file of "));
+}
+
 TEST_F(PassNetcdf, ReadsPlainDoublesAsTheCsvReaderReadsText) {
   raw_.save_directory(directory_ / "csv");
   expect_same_pass(read_pass(file()).pass, read_pass(directory_ / "csv").pass, 0, 0);
@@ -91,7 +113,7 @@ TEST_F(PassNetcdf, CoarserStepMakesASmallerFileOfALongPassToo) {
   Pass pass = read_pass(file()).pass;
   const GyroTelemetry once = pass.gyro;
   while (pass.gyro.size() < 20'000) {
-    pass.gyro.t.push_back(pass.gyro.t.back() + std::chrono::milliseconds{125});
+    pass.gyro.t.push_back(pass.gyro.t.back() + pass.settings.gyro_period);
     const std::size_t row = (pass.gyro.size() * 7919) % once.size();  // jumps, as noise makes them
     const auto begin = once.h.begin() + static_cast<std::ptrdiff_t>(row * 6);
     pass.gyro.h.insert(pass.gyro.h.end(), begin, begin + 6);
@@ -133,22 +155,114 @@ TEST_F(PassNetcdf, PriorIsLookedUpBesideTheFile) {
 
 TEST_F(PassNetcdf, RefusesAFileThatIsNoNetcdf) {
   write_text(file(), "t_s,h1_x\n");
-  EXPECT_THAT(read_refused(), HasSubstr("pass.nc: is no NetCDF file that can be read"));
+  EXPECT_THAT(read_refused(), HasSubstr("pass.nc: is no NetCDF-4 file that can be read"));
   write_text(file(), "");
-  EXPECT_THAT(read_refused(), HasSubstr("pass.nc: is no NetCDF file that can be read"));
+  EXPECT_THAT(read_refused(), HasSubstr("pass.nc: is no NetCDF-4 file that can be read"));
 }
 
 TEST_F(PassNetcdf, RefusesAFileThatIsCutShort) {
   std::filesystem::resize_file(file(), std::filesystem::file_size(file()) / 2);
-  EXPECT_THAT(read_refused(), HasSubstr("pass.nc: is no NetCDF file that can be read"));
+  EXPECT_THAT(read_refused(), HasSubstr("pass.nc: is no NetCDF-4 file that can be read"));
 }
 
 TEST_F(PassNetcdf, RefusesAFileWithoutGroups) {
-  int id = 0;
-  ASSERT_EQ(nc_create(file().c_str(), NC_CLOBBER, &id), NC_NOERR);
-  put_text(id, NC_GLOBAL, "pass_toml", raw_.toml);
-  ASSERT_EQ(nc_close(id), NC_NOERR);
-  EXPECT_THAT(read_refused(), HasSubstr("pass.nc: lacks group \"gyro\""));
+  const auto of_format = [&](int format) {
+    int id = 0;
+    EXPECT_EQ(nc_create(file().c_str(), NC_CLOBBER | format, &id), NC_NOERR);
+    put_text(id, NC_GLOBAL, "pass_toml", raw_.toml);
+    EXPECT_EQ(nc_close(id), NC_NOERR);
+    return read_refused();
+  };
+  EXPECT_THAT(of_format(NC_NETCDF4), HasSubstr("pass.nc: lacks group \"gyro\""));
+  EXPECT_THAT(of_format(NC_CLASSIC_MODEL), HasSubstr("pass.nc: is no NetCDF-4 file"));
+}
+
+TEST_F(PassNetcdf, RefusesTheNameOfADirectoryOrAFifo) {
+  std::filesystem::remove(file());
+  ASSERT_EQ(::mkfifo(file().c_str(), 0600), 0);
+  EXPECT_THAT(read_refused(), HasSubstr("pass.nc: is a FIFO, not a regular file"));
+  std::filesystem::remove(file());
+  std::filesystem::create_directory(file());
+  EXPECT_THAT(refusal([&] { static_cast<void>(NetcdfReader(file())); }), HasSubstr("is a directory"));
+}
+
+TEST_F(PassNetcdf, RefusesLinksThatMakeItMoreThanATree) {
+  const auto with_link = [&](auto link) {
+    raw_.save_netcdf(file());
+    const hid_t id = H5Fopen(file().c_str(), H5F_ACC_RDWR, H5P_DEFAULT);
+    EXPECT_GE(link(id), 0);
+    EXPECT_GE(H5Fclose(id), 0);
+    return read_refused();
+  };
+  const std::string file_name = file().string();
+  EXPECT_THAT(
+      with_link([](hid_t id) { return H5Lcreate_hard(id, "/gyro", id, "/gyro/again", H5P_DEFAULT, H5P_DEFAULT); }),
+      HasSubstr("is no tree of groups and data: \"gyro/again\" is linked more than once"));
+  EXPECT_THAT(with_link([](hid_t id) { return H5Lcreate_hard(id, "/", id, "/gyro/root", H5P_DEFAULT, H5P_DEFAULT); }),
+              HasSubstr("\"gyro/root\" is linked more than once"));
+  EXPECT_THAT(with_link([](hid_t id) { return H5Lcreate_soft("/gyro", id, "/gyro/again", H5P_DEFAULT, H5P_DEFAULT); }),
+              HasSubstr("\"gyro/again\" is a symbolic link"));
+  EXPECT_THAT(with_link([&](hid_t id) {
+                return H5Lcreate_external(file_name.c_str(), "/gyro", id, "/other", H5P_DEFAULT, H5P_DEFAULT);
+              }),
+              HasSubstr("\"other\" is a symbolic link"));
+  EXPECT_THAT(with_link([](hid_t id) {
+                std::string name;
+                herr_t status = 0;
+                for (int depth = 0; depth < 20 && status >= 0; ++depth) {
+                  name += "/deeper";
+                  const hid_t deeper = H5Gcreate2(id, name.c_str(), H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT);
+                  status = H5Gclose(deeper);
+                }
+                return status;
+              }),
+              HasSubstr("is nested too deeply"));
+}
+
+TEST_F(PassNetcdf, RefusesDataOfAnotherFile) {
+  const std::string secret = directory_ / "secret";
+  write_text(secret, std::string(80, 'x'));
+  const hid_t id = H5Fopen(file().c_str(), H5F_ACC_RDWR, H5P_DEFAULT);
+  const hsize_t size = 10;
+  const hid_t space = H5Screate_simple(1, &size, nullptr);
+  const hid_t layout = H5Pcreate(H5P_DATASET_CREATE);
+  EXPECT_GE(H5Pset_external(layout, secret.c_str(), 0, 80), 0);
+  const hid_t data = H5Dcreate2(id, "/gyro/stolen", H5T_NATIVE_DOUBLE, space, H5P_DEFAULT, layout, H5P_DEFAULT);
+  EXPECT_GE(data, 0);
+  H5Dclose(data);
+  H5Pclose(layout);
+  H5Sclose(space);
+  EXPECT_GE(H5Fclose(id), 0);
+  EXPECT_THAT(read_refused(), HasSubstr("\"gyro/stolen\" has its data in another file"));
+}
+
+TEST_F(PassNetcdf, RefusesUnitsOfPureNumbers) {
+  const auto with_units = [&](const char* of_group, const char* name, std::string_view units) {
+    raw_.save_netcdf(file());
+    change([&](int id) { put_text(group(id, of_group), variable(group(id, of_group), name), "units", units); });
+    return read_refused();
+  };
+  EXPECT_EQ(with_units("gyro", "h1_x", "1"), "");
+  EXPECT_EQ(with_units("gyro", "h1_x", ""), "");
+  EXPECT_THAT(with_units("gyro", "h2_y", "degree"),
+              HasSubstr("pass.nc: group \"gyro\": h2_y has units \"degree\"; direction cosines and quaternions have "
+                        "none: convert the values"));
+  EXPECT_THAT(with_units("star_tracker", "q_w", "rad"), HasSubstr("group \"star_tracker\": q_w has units \"rad\""));
+}
+
+TEST_F(PassNetcdf, ReadsAnAttributeThatIsAStringOfNothing) {
+  const hid_t id = H5Fopen(file().c_str(), H5F_ACC_RDWR, H5P_DEFAULT);
+  EXPECT_GE(H5Adelete(id, "pass_toml"), 0);
+  const hid_t space = H5Screate(H5S_SCALAR);
+  const hid_t type = H5Tcopy(H5T_C_S1);
+  EXPECT_GE(H5Tset_size(type, H5T_VARIABLE), 0);
+  const hid_t attribute = H5Acreate2(id, "pass_toml", type, space, H5P_DEFAULT, H5P_DEFAULT);
+  EXPECT_GE(attribute, 0);  // never written
+  H5Aclose(attribute);
+  H5Tclose(type);
+  H5Sclose(space);
+  EXPECT_GE(H5Fclose(id), 0);
+  EXPECT_THAT(read_refused(), HasSubstr("pass_toml"));
 }
 
 TEST_F(PassNetcdf, RefusesMissingOrWrongSettings) {

@@ -1,6 +1,12 @@
 #include <gmock/gmock.h>
+#include <sys/socket.h>
+#include <sys/stat.h>
+#include <sys/un.h>
+#include <unistd.h>
 
+#include <algorithm>
 #include <cmath>
+#include <iterator>
 
 #include "fixtures.hpp"
 #include "trihedron/core/drift.hpp"
@@ -102,7 +108,36 @@ TEST_F(PassCsv, RefusesMissingFilesNamingThem) {
 TEST_F(PassCsv, RefusesADirectoryInPlaceOfAFile) {
   std::filesystem::remove(directory_ / "gyro.csv");
   std::filesystem::create_directory(directory_ / "gyro.csv");
-  EXPECT_THAT(refusal([&] { static_cast<void>(read_pass(directory_.path())); }), HasSubstr("is not a regular file"));
+  EXPECT_THAT(refusal([&] { static_cast<void>(read_pass(directory_.path())); }),
+              HasSubstr("gyro.csv: is a directory, not a regular file"));
+}
+
+TEST_F(PassCsv, RefusesWhatCouldBeReadForEverAtOnce) {
+  for (const char* name : {"pass.toml", "gyro.csv", "star_tracker.csv"}) {
+    clean_pass().save_directory(directory_.path());
+    std::filesystem::remove(directory_ / name);
+    ASSERT_EQ(::mkfifo((directory_ / name).c_str(), 0600), 0);
+    EXPECT_THAT(refusal([&] { static_cast<void>(read_pass(directory_.path())); }),
+                AllOf(HasSubstr(name), HasSubstr("is a FIFO, not a regular file")));
+    std::filesystem::remove(directory_ / name);
+    std::filesystem::create_symlink("/dev/zero", directory_ / name);
+    EXPECT_THAT(refusal([&] { static_cast<void>(read_pass(directory_.path())); }),
+                AllOf(HasSubstr(name), HasSubstr("is a device, not a regular file")));
+    std::filesystem::remove(directory_ / name);
+  }
+}
+
+TEST_F(PassCsv, RefusesASocketInPlaceOfAFile) {
+  std::filesystem::remove(directory_ / "gyro.csv");
+  sockaddr_un address{.sun_family = AF_UNIX, .sun_path = {}};
+  const std::string name = (directory_ / "gyro.csv").string();
+  ASSERT_LT(name.size(), sizeof address.sun_path);
+  std::ranges::copy(name, std::begin(address.sun_path));
+  const int listener = ::socket(AF_UNIX, SOCK_STREAM, 0);
+  ASSERT_EQ(::bind(listener, reinterpret_cast<const sockaddr*>(&address), sizeof address), 0);
+  EXPECT_THAT(refusal([&] { static_cast<void>(read_pass(directory_.path())); }),
+              HasSubstr("is a socket, not a regular file"));
+  ::close(listener);
 }
 
 TEST_F(PassCsv, RefusesUnknownColumnNamingItsPlaceAndTheNearest) {

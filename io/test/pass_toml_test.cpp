@@ -170,15 +170,28 @@ TEST_F(PassToml, RefusesWrongTypes) {
 
 TEST_F(PassToml, RefusesValuesThatMakeNoSense) {
   EXPECT_THAT(refusal_with(replaced(toml_, "= 0.5", "= 0")),
-              HasSubstr("pass.toml:7:12: \"period_s\" is 0; it must be positive"));
-  EXPECT_THAT(refusal_with(replaced(toml_, "= 0.5", "= -1")), HasSubstr("it must be positive"));
+              HasSubstr("pass.toml:7:12: \"period_s\" is 0 s, outside 1e-05 to 60 s; it is the time between samples"));
+  EXPECT_THAT(refusal_with(replaced(toml_, "= 0.5", "= -1")), HasSubstr("is -1 s, outside"));
   EXPECT_THAT(refusal_with(replaced(toml_, "= 0.5", "= nan")), HasSubstr("\"period_s\" is not finite"));
-  EXPECT_THAT(refusal_with(replaced(toml_, "= 0.5", "= 1e-12")), HasSubstr("give seconds between"));
-  EXPECT_THAT(refusal_with(replaced(toml_, "= 90", "= 1e12")), HasSubstr("give seconds between"));
+  EXPECT_THAT(refusal_with(replaced(toml_, "= 0.5", "= 1e-12")), HasSubstr("outside 1e-05 to 60 s"));
+  EXPECT_THAT(refusal_with(replaced(toml_, "= 90", "= 1e12")), HasSubstr("none is longer than a year"));
   EXPECT_THAT(refusal_with(replaced(toml_, "= 90", "= 59.9")), HasSubstr("shorter than a minute"));
   EXPECT_THAT(refusal_with(replaced(toml_, "2e-06", "0")), HasSubstr("\"drift_prior_sigma_rad_s\" is 0"));
-  EXPECT_THAT(refusal_with(replaced(toml_, "8e-03", "[1e-3, 1e-3, 0]")), HasSubstr("an element that is not positive"));
-  EXPECT_THAT(refusal_with(replaced(toml_, "2e-05", "-2e-05")), HasSubstr("an element that is not positive"));
+  EXPECT_THAT(refusal_with(replaced(toml_, "8e-03", "[1e-3, 1e-3, 0]")),
+              HasSubstr("\"alignment_prior_sigma_rad\" is 0 rad, outside"));
+  EXPECT_THAT(refusal_with(replaced(toml_, "2e-05", "-2e-05")), HasSubstr("\"noise_rad\" is -2e-05 rad, outside"));
+}
+
+TEST_F(PassToml, RefusesNumbersThatAreNoMeasurementsTellingTheBounds) {
+  EXPECT_THAT(refusal_with(toml_ + "[[gyro.unit]]\nreadout_noise_rad = 2\n[[gyro.unit]]\n"),
+              HasSubstr("pass.toml:16:21: \"readout_noise_rad\" is 2 rad, outside 1e-09 to 0.1 rad; it is the 1-sigma "
+                        "of a direction cosine, which is at most 1"));
+  EXPECT_THAT(refusal_with(replaced(toml_, "2e-06", "100")),
+              HasSubstr("\"drift_prior_sigma_rad_s\" is 100 rad/s, outside 1e-15 to 0.01 rad/s"));
+  EXPECT_THAT(refusal_with(replaced(toml_, "2e-05", "1e100")), HasSubstr("is 1e+100 rad, outside 1e-09 to 0.1 rad"));
+  EXPECT_THAT(refusal_with(toml_ + "[[gyro.unit]]\ndrift_prior_rad_s = {k0 = 1e10}\n[[gyro.unit]]\n"),
+              HasSubstr("\"k0\" is 10000000000 rad/s, outside -0.1 to 0.1 rad/s"));
+  EXPECT_THAT(refusal_with(replaced(toml_, "8e-03", "1e30")), HasSubstr("a half turn is all there is"));
 }
 
 TEST_F(PassToml, RefusesUnitsThatAreNotOnePerGyro) {

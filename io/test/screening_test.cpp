@@ -43,6 +43,25 @@ INSTANTIATE_TEST_SUITE_P(Formats, Screening, testing::Values("csv", "netcdf"),
 
 TEST_P(Screening, FindsNothingInACleanPass) { EXPECT_THAT(load().defects, IsEmpty()); }
 
+TEST_P(Screening, RefusesAPeriodThatTheRowsDoNotHave) {
+  const std::string told = raw_.toml;
+  raw_.toml = replaced(told, "period_s = 0.5", "period_s = 50");
+  EXPECT_THAT(load_refused(),
+              HasSubstr(gyro_table() + " has a row every 0.5 s, and period_s in [gyro] of the settings is "
+                                       "50 s: one of them is wrong; both are in seconds: set period_s"));
+  raw_.toml = replaced(told, "period_s = 0.5", "period_s = 0.0005");
+  EXPECT_THAT(load_refused(), HasSubstr("the times t_s look like milliseconds"));
+  raw_.toml = replaced(told, "period_s = 3", "period_s = 3000");
+  EXPECT_THAT(load_refused(), HasSubstr("in [star_tracker] of the settings is 3000 s: the period looks like millisec"));
+}
+
+// Half of the samples and most of the fixes are gone.
+TEST_P(Screening, TakesAPeriodOfWhichManyRowsAreMissing) {
+  int row = 0;
+  std::erase_if(raw_.gyro.rows, [&](const auto&) { return ++row % 4 < 2; });
+  EXPECT_EQ(load().pass.gyro.size(), raw_.gyro.rows.size());
+}
+
 TEST_P(Screening, LeavesOutRowsWithoutATime) {
   raw_.gyro.rows[10][0] = kNaN;
   raw_.gyro.rows[20][0] = std::numeric_limits<double>::infinity();

@@ -11,9 +11,11 @@ namespace {
 
 constexpr int kMostIterations = 12;
 
-SmootherResult smoothed(const PassProblem::Linear& linear) {
+/// What `smoother` returns.
+template <class Smoother>
+auto solved(Smoother&& smoother) {
   try {
-    return smooth(linear.prior, linear.prior_y, linear.stages);
+    return smoother();
   } catch (const std::invalid_argument&) {
     throw SetupError("the fixes and samples that can be used do not determine the momenta of all gyros",
                      "calibrate a part of the pass in which all gyros work, or use estimator invariant with noise = "
@@ -36,25 +38,35 @@ BatchResult most_likely(const PassProblem& problem, PassSolution first, double c
   while (result.iterations < kMostIterations && !result.converged) {
     ++result.iterations;
     result.before = result.solution;
+    result.linear = {};  // long: one at a time
+    result.errors = {};
     result.linear = problem.linearise(result.before);
-    result.errors = smoothed(result.linear);
+    result.errors = solved([&] { return smooth(result.linear.prior, result.linear.prior_y, result.linear.stages); });
     problem.correct(result.errors, result.solution);
     result.converged = step_of_constants(problem.layout(), result.errors) < converged;
   }
   return result;
 }
 
-double log_likelihood(const PassProblem& problem, const PassSolution& solution, PassProblem::Linear linear,
+double log_likelihood(const PassProblem& problem, const PassSolution& solution, const PassProblem::Linear& linear,
                       const ProcessNoise& noise) {
   const Layout& layout = problem.layout();
-  problem.put_noise(solution, noise, linear);
-  const SmootherResult found = smoothed(linear);
+  Eigen::MatrixXd prior = linear.prior;
+  Eigen::VectorXd prior_y = linear.prior_y;
+  problem.put_noise(solution, noise, prior, prior_y);
+  const auto stage_at = [&](std::size_t arc) {
+    SmootherStage stage = linear.stages[arc];
+    if (arc < linear.ends.size()) {
+      problem.put_noise(solution, noise, arc, linear.ends[arc], stage);
+    }
+    return stage;
+  };
+  const SmootherLikelihood found = solved([&] { return likelihood(prior, prior_y, linear.stages.size(), stage_at); });
   // Of the directions at the start nothing is known before; the rest of the prior is triangular. Rows that
   // gather_constants() has added stand below that triangle.
   const Eigen::Index directions = 2L * layout.gyros;
   const Eigen::Index rest = layout.size() - directions;
-  const double log_prior_root =
-      linear.prior.block(directions, directions, rest, rest).diagonal().array().abs().log().sum();
+  const double log_prior_root = prior.block(directions, directions, rest, rest).diagonal().array().abs().log().sum();
   return log_prior_root - found.log_root_determinant - (found.residual_square + linear.cost_outside_rows) / 2;
 }
 

@@ -22,6 +22,6 @@ struct BatchResult {
 /// ln of the likelihood of the process noise, all states integrated over (Laplace); `linear`: the problem linearised
 /// near the solution. Up to a constant of the pass. Throws SetupError as most_likely().
 [[nodiscard]] double log_likelihood(const PassProblem& problem, const PassSolution& solution,
-                                    PassProblem::Linear linear, const ProcessNoise& noise);
+                                    const PassProblem::Linear& linear, const ProcessNoise& noise);
 
 }  // namespace trihedron::ground

@@ -4,7 +4,9 @@
 #include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
+#include <optional>
 #include <stdexcept>
+#include <utility>
 
 #include "trihedron/records/stop.hpp"
 
@@ -116,29 +118,58 @@ MatrixXd triangle_of(const MatrixXd& rows) {
   return triangle;
 }
 
+namespace {
+
+/// The whole forward pass. `stage(i)`: of the i-th of the `stages`; `moved(step)` gets the rows about w of each step.
+/// Returns the triangle at the end.
+template <class StageAt, class Moved>
+MatrixXd go_forward(const MatrixXd& prior, const VectorXd& prior_y, std::size_t stages, StageAt&& stage_at,
+                    Moved&& moved, SmootherLikelihood& found) {
+  const Index n = prior.cols();
+  std::optional<Forward> forward;
+  for (std::size_t i = 0; i < stages; ++i) {
+    const SmootherStage& stage = stage_at(i);
+    if (!forward) {
+      forward.emplace(prior, prior_y, stage.m.size());
+    }
+    forward->measure(stage);
+    if (i + 1 < stages) {
+      SmootherResult::NoiseRows step = forward->move(stage);
+      // The determinant for (d, c, w) is that for (w, d', c) over |det A⁻¹|, the determinant of the change of
+      // variables.
+      found.log_root_determinant += log_determinant(step.R) - std::log(std::abs(stage.A_inverse.determinant()));
+      moved(std::move(step));
+    }
+  }
+  MatrixXd triangle = forward->triangle();
+  found.residual_square = triangle(n, n) * triangle(n, n);
+  const auto root = triangle.topRows(n);
+  if (!((root.diagonal().array().abs() > 0).all() && root.allFinite())) {
+    throw std::invalid_argument("smoother: a state without any information");
+  }
+  found.log_root_determinant += log_determinant(root);
+  return triangle;
+}
+
+}  // namespace
+
+SmootherLikelihood likelihood(const MatrixXd& prior, const VectorXd& prior_y, std::size_t stages,
+                              const std::function<SmootherStage(std::size_t)>& stage) {
+  SmootherLikelihood found;
+  static_cast<void>(go_forward(
+      prior, prior_y, stages, stage, [](SmootherResult::NoiseRows&&) {}, found));
+  return found;
+}
+
 SmootherResult smooth(const MatrixXd& prior, const VectorXd& prior_y, const std::vector<SmootherStage>& stages) {
   const Index n = prior.cols();
   const Index d = stages.front().m.size();
   const Index c = n - d;
   SmootherResult result;
-  Forward forward(prior, prior_y, d);
-  for (std::size_t i = 0; i < stages.size(); ++i) {
-    forward.measure(stages[i]);
-    if (i + 1 == stages.size()) {
-      break;
-    }
-    result.steps.push_back(forward.move(stages[i]));
-    // The determinant for (d, c, w) is that for (w, d', c) over |det A⁻¹|, the determinant of the change of variables.
-    result.log_root_determinant +=
-        log_determinant(result.steps.back().R) - std::log(std::abs(stages[i].A_inverse.determinant()));
-  }
-  const MatrixXd triangle = forward.triangle();
-  result.residual_square = triangle(n, n) * triangle(n, n);
+  const MatrixXd triangle = go_forward(
+      prior, prior_y, stages.size(), [&](std::size_t i) -> const SmootherStage& { return stages[i]; },
+      [&](SmootherResult::NoiseRows&& step) { result.steps.push_back(std::move(step)); }, result.likelihood);
   const auto root = triangle.topRows(n);
-  if (!((root.diagonal().array().abs() > 0).all() && root.allFinite())) {
-    throw std::invalid_argument("smoother: a state without any information");
-  }
-  result.log_root_determinant += log_determinant(root);
   const auto R = root.leftCols(n).triangularView<Upper>();
   result.last_root = R.solve(MatrixXd::Identity(n, n));
 
@@ -208,30 +239,38 @@ std::vector<MatrixXd> information_on_constants(const MatrixXd& prior, const std:
   return roots;
 }
 
-std::vector<MatrixXd> covariance_roots(const SmootherResult& result, const std::vector<SmootherStage>& stages) {
-  const Index n = result.last_root.rows();
+CovarianceRoots::CovarianceRoots(const SmootherResult& result, const std::vector<SmootherStage>& stages)
+    : dynamic_(stages.size()) {
   const Index d = stages.front().m.size();
-  const Index c = n - d;
-  std::vector<MatrixXd> roots(stages.size());
-  roots.back() = result.last_root;
+  const Index c = result.last_root.rows() - d;
+  constants_ = result.last_root.bottomRightCorner(c, c);
+  dynamic_.back() = result.last_root.topRows(d);
   for (std::size_t i = result.steps.size(); i-- > 0;) {
     check_stop();
     const SmootherStage& stage = stages[i];
     const SmootherResult::NoiseRows& step = result.steps[i];
-    const MatrixXd& next = roots[i + 1];
+    const MatrixXd& next = dynamic_[i + 1];
     // d by the errors of d' and c, the columns of their root, and by those of w, which its rows have on their own. Only
     // d moves, and only its own columns and those of w have to be put together again.
     const auto R_w = step.R.triangularView<Upper>();
     const MatrixXd by_w = stage.A_inverse * stage.noise.asDiagonal();
-    const MatrixXd by_next =
-        stage.A_inverse * (next.topRows(d) - stage.B * next.bottomRows(c)) + by_w * R_w.solve(step.S * next);
+    MatrixXd seen = step.S.leftCols(d) * next;
+    seen.rightCols(c) += step.S.rightCols(c) * constants_;
+    MatrixXd moved = next;
+    moved.rightCols(c) -= stage.B * constants_;
+    const MatrixXd by_next = stage.A_inverse * moved + by_w * R_w.solve(seen);
     MatrixXd own(d, 2 * d);
     own << by_next.leftCols(d), by_w * R_w.solve(MatrixXd::Identity(d, d));
-    roots[i] = next;
-    roots[i].topLeftCorner(d, d) = triangle_of(own.transpose()).transpose();
-    roots[i].topRightCorner(d, c) = by_next.rightCols(c);
+    dynamic_[i] = by_next;
+    dynamic_[i].leftCols(d) = triangle_of(own.transpose()).transpose();
   }
-  return roots;
+}
+
+MatrixXd CovarianceRoots::spread(std::size_t stage, const MatrixXd& rows) const {
+  const Index c = constants_.cols();
+  MatrixXd spread = rows.leftCols(rows.cols() - c) * dynamic_[stage];
+  spread.rightCols(c) += rows.rightCols(c) * constants_;
+  return spread;
 }
 
 }  // namespace trihedron::ground

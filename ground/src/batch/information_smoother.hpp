@@ -3,6 +3,8 @@
 /// "Factorization Methods for Discrete Sequential Estimation", 1977, chapter X; Dyer and McReynolds, 1969).
 
 #include <Eigen/Core>
+#include <cstddef>
+#include <functional>
 #include <vector>
 
 namespace trihedron::ground {
@@ -18,11 +20,16 @@ struct SmootherStage {
   Eigen::VectorXd noise;  ///< 1-sigma, may be zero
 };
 
-struct SmootherResult {
-  std::vector<Eigen::VectorXd> x;   ///< estimate of the states of each stage by all measurements
-  Eigen::MatrixXd last_root;        ///< of their covariance in the last stage, root rootᵀ
+/// How well a solution fits.
+struct SmootherLikelihood {
   double residual_square = 0;       ///< of all measurements and of w at the estimate: −2 ln of the largest density
   double log_root_determinant = 0;  ///< ln |det R|, R the root of the information: of c and all d and w together
+};
+
+struct SmootherResult {
+  std::vector<Eigen::VectorXd> x;  ///< estimate of the states of each stage by all measurements
+  Eigen::MatrixXd last_root;       ///< of their covariance in the last stage, root rootᵀ
+  SmootherLikelihood likelihood;
 
   /// w of one step by the states after it: R w + S x' = z with unit noise.
   struct NoiseRows {
@@ -37,6 +44,11 @@ struct SmootherResult {
 /// std::invalid_argument where a state has no information.
 [[nodiscard]] SmootherResult smooth(const Eigen::MatrixXd& prior, const Eigen::VectorXd& prior_y,
                                     const std::vector<SmootherStage>& stages);
+
+/// The likelihood alone. `stage(i)` is asked for each of the `stages` once, in their order, so that they need not be
+/// kept. Throws as smooth().
+[[nodiscard]] SmootherLikelihood likelihood(const Eigen::MatrixXd& prior, const Eigen::VectorXd& prior_y,
+                                            std::size_t stages, const std::function<SmootherStage(std::size_t)>& stage);
 
 /// Moves the rows of the stages that are about the constants alone to the prior, below the rows that are there. They
 /// are most of all rows, and do not depend on the noise: smooth() can then be called with different noise in a fraction
@@ -58,8 +70,18 @@ void gather_constants(Eigen::MatrixXd& prior, Eigen::VectorXd& prior_y, std::vec
 /// The square triangle with the same information as `rows`, the last column of both being the right side (Householder).
 [[nodiscard]] Eigen::MatrixXd triangle_of(const Eigen::MatrixXd& rows);
 
-/// Square roots of the covariances of all stages' states by all measurements.
-[[nodiscard]] std::vector<Eigen::MatrixXd> covariance_roots(const SmootherResult& result,
-                                                            const std::vector<SmootherStage>& stages);
+/// Square roots of the covariances of all stages' states by all measurements. That part of them that is about the
+/// constants is the same in all stages and kept once.
+class CovarianceRoots {
+ public:
+  CovarianceRoots(const SmootherResult& result, const std::vector<SmootherStage>& stages);
+
+  /// Root of the covariance of what depends so on the states of a stage: rows · root of the stage.
+  [[nodiscard]] Eigen::MatrixXd spread(std::size_t stage, const Eigen::MatrixXd& rows) const;
+
+ private:
+  Eigen::MatrixXd constants_;             ///< c × c; no constant depends on the other columns
+  std::vector<Eigen::MatrixXd> dynamic_;  ///< rows of the states that move, stage by stage
+};
 
 }  // namespace trihedron::ground

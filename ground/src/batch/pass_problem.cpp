@@ -99,29 +99,28 @@ PassProblem::PassProblem(const ScreenedPass& pass, PassSetup setup)
     : setup_(std::move(setup)),
       layout_(setup_.layout()),
       drift_(layout_.drift_model, layout_.further),
-      gyros_(layout_.gyros) {
+      gyros_(layout_.gyros),
+      samples_(&pass.samples) {
   const Time first = pass.fixes.front().fix.t;
   auto fix = pass.fixes.begin();
   Time taken = first;
   const auto add_fixes_until = [&](Time t) {
     for (; fix != pass.fixes.end() && fix->fix.t <= t; ++fix) {
-      nodes_.push_back({fix->fix.t, fix->h_b, fix->used, &*fix, false});
+      nodes_.push_back({.t = fix->fix.t, .fix = &*fix});
       taken = fix->fix.t;
     }
   };
   Time before = first;
   bool after_gap = false;
-  for (const ScreenedPass::Sample& sample : pass.samples) {
-    if (sample.t <= first) {
-      continue;
-    }
-    add_fixes_until(sample.t - Duration{1});  // on its own time after it
-    after_gap = after_gap || sample.t - before > setup_.on_board.max_interpolation();
-    before = sample.t;
-    const bool fix_follows = fix != pass.fixes.end() && fix->fix.t - sample.t < setup_.sample_step / 2;
-    if (after_gap || (sample.t - taken >= setup_.sample_step && !fix_follows) || &sample == &pass.samples.back()) {
-      nodes_.push_back({sample.t, sample.h_b, sample.used, nullptr, std::exchange(after_gap, false)});
-      taken = sample.t;
+  for (std::size_t i = samples_->from(first + Duration{1}); i < samples_->size(); ++i) {
+    const Time t = samples_->t(i);
+    add_fixes_until(t - Duration{1});  // on its own time after it
+    after_gap = after_gap || t - before > setup_.on_board.max_interpolation();
+    before = t;
+    const bool fix_follows = fix != pass.fixes.end() && fix->fix.t - t < setup_.sample_step / 2;
+    if (after_gap || (t - taken >= setup_.sample_step && !fix_follows) || i + 1 == samples_->size()) {
+      nodes_.push_back({.t = t, .sample = i, .after_gap = std::exchange(after_gap, false)});
+      taken = t;
     }
   }
   add_fixes_until(Time::max());
@@ -151,10 +150,18 @@ void PassProblem::begin_arc(const PassSolution& solution, std::size_t arc, Momen
   }
 }
 
-void PassProblem::step(const Node& from, const Node& to, Moment& moment, double& extra_variance_rad2) const {
-  const double dt_s = to_seconds(to.t - from.t);
-  const double part = setup_.on_board.part_of_change(from.t + (to.t - from.t) / 2);
-  moment.t = to.t;
+PassProblem::Reading PassProblem::reading_at(const Node& node) const {
+  return node.fix != nullptr ? Reading{node.fix->h_b, node.fix->used}
+                             : Reading{samples_->h_b(node.sample), samples_->used(node.sample)};
+}
+
+void PassProblem::step(const Node& from_node, const Node& to_node, Moment& moment, double& extra_variance_rad2) const {
+  const Duration dt = to_node.t - from_node.t;
+  const double dt_s = to_seconds(dt);
+  const Reading from = reading_at(from_node);
+  const Reading to = reading_at(to_node);
+  const double part = setup_.on_board.part_of_change(from_node.t + dt / 2);
+  moment.t = to_node.t;
   // Gyros that can be used at both ends; where those are too few, at its end.
   const GyroMask at_both = both(from.used, to.used);
   const GyroMask used = count(at_both) >= 2 ? at_both : to.used;
@@ -185,7 +192,7 @@ void PassProblem::step(const Node& from, const Node& to, Moment& moment, double&
       middle[k] = gyro.reading_of(C_in_c.transpose() * gyro.h_in);
     }
     const Vector3d turned = precess(gyro, moment.since[k], drift_, C_in_c, middle[k], part, dt_s);
-    if (to.after_gap) {
+    if (to_node.after_gap) {
       largest_rad = std::max(largest_rad, missed_by_long_step_rad(turned.norm(), from.h_b[k], to.h_b[k], dt_s));
     }
   }
@@ -352,32 +359,29 @@ void PassProblem::end_arc(const PassSolution& solution, const Moment& moment, do
   stage.B.topRows(2L * gyros_) = by_states.rightCols(layout_.constants());
 }
 
-void PassProblem::put_noise(const PassSolution& solution, const ProcessNoise& noise, Linear& linear) const {
+void PassProblem::put_noise(const PassSolution& solution, const ProcessNoise& noise, MatrixXd& prior,
+                            VectorXd& prior_y) const {
+  for (int k = 0; layout_.further.wandering_drift && k < gyros_; ++k) {
+    const int row = layout_.wandering(k);
+    prior.block<3, 3>(row, row) = 1 / noise.wandering_drift.sigma * Matrix3d::Identity();
+    prior_y.segment<3>(row) = -solution.arcs[0].wandering_rad_s[k] / noise.wandering_drift.sigma;
+  }
+}
+
+void PassProblem::put_noise(const PassSolution& solution, const ProcessNoise& noise, std::size_t arc,
+                            const Linear::ArcEnd& end, SmootherStage& stage) const {
   const double walk = noise.direction_random_walk_rad_sqrt_s;
-  if (layout_.further.wandering_drift) {
-    for (int k = 0; k < gyros_; ++k) {
-      const int row = layout_.wandering(k);
-      linear.prior.block<3, 3>(row, row) = 1 / noise.wandering_drift.sigma * Matrix3d::Identity();
-      linear.prior_y.segment<3>(row) = -solution.arcs[0].wandering_rad_s[k] / noise.wandering_drift.sigma;
-    }
+  const double kept = noise.wandering_drift.kept(end.duration_s);
+  stage.noise.setZero(layout_.dynamic());
+  stage.noise.head(2L * gyros_).setConstant(std::sqrt(walk * walk * end.duration_s + end.extra_variance_rad2));
+  MatrixXd A = end.A;
+  for (int k = 0; layout_.further.wandering_drift && k < gyros_; ++k) {
+    const int row = layout_.wandering(k);
+    A.block<3, 3>(row, row) = kept * Matrix3d::Identity();
+    stage.m.segment<3>(row) = kept * solution.arcs[arc].wandering_rad_s[k] - solution.arcs[arc + 1].wandering_rad_s[k];
+    stage.noise.segment<3>(row).setConstant(noise.wandering_drift.noise(kept));
   }
-  for (std::size_t arc = 0; arc < linear.ends.size(); ++arc) {
-    Linear::ArcEnd& end = linear.ends[arc];
-    SmootherStage& stage = linear.stages[arc];
-    const double kept = noise.wandering_drift.kept(end.duration_s);
-    stage.noise.setZero(layout_.dynamic());
-    stage.noise.head(2L * gyros_).setConstant(std::sqrt(walk * walk * end.duration_s + end.extra_variance_rad2));
-    if (layout_.further.wandering_drift) {
-      for (int k = 0; k < gyros_; ++k) {
-        const int row = layout_.wandering(k);
-        end.A.block<3, 3>(row, row) = kept * Matrix3d::Identity();
-        stage.m.segment<3>(row) =
-            kept * solution.arcs[arc].wandering_rad_s[k] - solution.arcs[arc + 1].wandering_rad_s[k];
-        stage.noise.segment<3>(row).setConstant(noise.wandering_drift.noise(kept));
-      }
-    }
-    stage.A_inverse = end.A.inverse();
-  }
+  stage.A_inverse = A.inverse();
 }
 
 PassProblem::Linear PassProblem::linearise(const PassSolution& solution) const {
@@ -428,7 +432,7 @@ PassProblem::Linear PassProblem::linearise(const PassSolution& solution) const {
     check_stop();
     FixMerger nearby(setup_.fixes_together);
     for (; fix < fixes_until[arc]; ++fix) {
-      const auto& [its, rows] = fixes[fix];
+      auto& [its, rows] = fixes[fix];
       if (rows.y.size() == 0) {
         continue;
       }
@@ -437,11 +441,15 @@ PassProblem::Linear PassProblem::linearise(const PassSolution& solution) const {
       const double gate = scale * gate_of_freedom(static_cast<int>(rows.y.size()), setup_.on_board.gate_nis);
       linear.cost_outside_rows += nis > gate ? 2 * gate * (1 - gate / nis) : 0;
       nearby.add(*its, rows, nis > gate ? gate / nis : 1);
+      rows = {};  // most of the memory that this takes
     }
     linear.cost_outside_rows += nearby.put_into(linear.stages[arc], layout_.size());
   }
   std::ranges::for_each(linear.stages, compress);
-  put_noise(solution, setup_.noise(), linear);
+  put_noise(solution, setup_.noise(), linear.prior, linear.prior_y);
+  for (std::size_t arc = 0; arc < linear.ends.size(); ++arc) {
+    put_noise(solution, setup_.noise(), arc, linear.ends[arc], linear.stages[arc]);
+  }
   return linear;
 }
 

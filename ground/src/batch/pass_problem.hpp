@@ -59,7 +59,7 @@ struct PassSolution {
 
 class PassProblem {
  public:
-  /// Keeps a reference to the pass, which needs a fix.
+  /// Refers to the pass, which needs a fix.
   PassProblem(const ScreenedPass& pass, PassSetup setup);
 
   [[nodiscard]] const PassSetup& setup() const { return setup_; }
@@ -91,8 +91,11 @@ class PassProblem {
     double cost_outside_rows = 0;
   };
   [[nodiscard]] Linear linearise(const PassSolution& solution) const;
-  /// The same with other process noise than that of the setup.
-  void put_noise(const PassSolution& solution, const ProcessNoise& noise, Linear& linear) const;
+  /// The same with other process noise than that of the setup: of the prior, and of one of the stages.
+  void put_noise(const PassSolution& solution, const ProcessNoise& noise, Eigen::MatrixXd& prior,
+                 Eigen::VectorXd& prior_y) const;
+  void put_noise(const PassSolution& solution, const ProcessNoise& noise, std::size_t arc, const Linear::ArcEnd& end,
+                 SmootherStage& stage) const;
 
   [[nodiscard]] Time begin_of(std::size_t arc) const { return nodes_[arcs_[arc].begin].t; }
 
@@ -137,17 +140,21 @@ class PassProblem {
   /// A sample or a fix.
   struct Node {
     Time t{};
+    const ScreenedPass::Fix* fix = nullptr;
+    std::size_t sample = 0;  ///< where there is no fix
+    bool after_gap = false;
+  };
+  struct Reading {
     Directions h_b;
     GyroMask used{};
-    const ScreenedPass::Fix* fix = nullptr;
-    bool after_gap = false;
   };
   struct ArcNodes {
     std::size_t begin = 0;
     std::size_t end = 0;  ///< the first node of the next arc, which this one ends at, or that after the last
   };
 
-  void step(const Node& from, const Node& to, Moment& moment, double& extra_variance_rad2) const;
+  [[nodiscard]] Reading reading_at(const Node& node) const;
+  void step(const Node& from_node, const Node& to_node, Moment& moment, double& extra_variance_rad2) const;
   void begin_arc(const PassSolution& solution, std::size_t arc, Moment& moment) const;
   void add_prior(const PassSolution& solution, Linear& linear) const;
   void end_arc(const PassSolution& solution, const Moment& moment, double extra_variance_rad2, Linear& linear) const;
@@ -156,6 +163,7 @@ class PassProblem {
   Layout layout_;
   DriftModel drift_;
   int gyros_;
+  const ScreenedSamples* samples_;
   std::vector<Node> nodes_;
   std::vector<ArcNodes> arcs_;
 };

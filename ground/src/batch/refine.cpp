@@ -19,7 +19,7 @@ namespace {
 using Eigen::MatrixXd;
 
 /// Replaces the innovation of each fix by its residual after smoothing.
-void use_residuals(const PassProblem& problem, const PassSolution& solution, const std::vector<MatrixXd>& roots,
+void use_residuals(const PassProblem& problem, const PassSolution& solution, const CovarianceRoots& roots,
                    std::vector<FixRecord>& fixes) {
   std::map<std::pair<Time, int>, FixRecord*> compared;
   for (FixRecord& fix : fixes) {
@@ -41,7 +41,7 @@ void use_residuals(const PassProblem& problem, const PassSolution& solution, con
     fix.status = FixStatus::kRejectedByGate;
     if (!problem.is_outlier(rows)) {
       fix.status = FixStatus::kUsed;
-      const MatrixXd spread = rows.H * roots[moment.arc];
+      const MatrixXd spread = roots.spread(moment.arc, rows.H);
       covariance -= spread * spread.transpose();
     }
     fix.nis = rows.y.dot(covariance.ldlt().solve(rows.y));
@@ -60,13 +60,14 @@ void use_residuals(const PassProblem& problem, const PassSolution& solution, con
 
 /// Compares the constants by the first half of the pass with those by all of it (docs/mathematics.md, section 12). Only
 /// directions in which the second half at least halves the variance count.
-void compare_halves(const BatchResult& result, const Layout& layout, Statistics& statistics) {
+std::optional<Halves> compare_halves(const BatchResult& result, const Layout& layout) {
   constexpr double kLeast = 0.5;
   const PassProblem::Linear& linear = result.linear;
   const std::size_t half = linear.stages.size() / 2;
   if (half == 0) {
-    return;
+    return std::nullopt;
   }
+  Halves halves;
   const Eigen::Index c = layout.constants();
   const MatrixXd triangle = triangles_after(linear.prior, linear.prior_y, linear.stages, {half - 1}).front();
   const auto R = triangle.block(layout.dynamic(), layout.dynamic(), c, c).triangularView<Eigen::Upper>();
@@ -75,18 +76,26 @@ void compare_halves(const BatchResult& result, const Layout& layout, Statistics&
   const MatrixXd known = R * MatrixXd(result.errors.last_root.bottomRows(c));
   const Eigen::VectorXd whole = R * Eigen::VectorXd(result.errors.x.back().tail(c));
   const Eigen::SelfAdjointEigenSolver<MatrixXd> rest(known * known.transpose());
-  double square = 0;
-  int freedom = 0;
   for (Eigen::Index i = 0; i < c; ++i) {
     const double gained = 1 - rest.eigenvalues()(i);
     if (gained > kLeast) {
       const double off = rest.eigenvectors().col(i).dot(first - whole);
-      square += off * off / gained;
-      ++freedom;
+      halves.chi_square += off * off / gained;
+      ++halves.degrees_of_freedom;
     }
   }
-  statistics.halves_chi_square = square;
-  statistics.halves_degrees_of_freedom = freedom;
+  return halves;
+}
+
+/// The roots of a result, of which only the solution and the covariance at its end are kept: the rest is long.
+CovarianceRoots roots_of(BatchResult& result) {
+  for (SmootherStage& stage : result.linear.stages) {
+    stage.H = {};
+  }
+  CovarianceRoots roots(result.errors, result.linear.stages);
+  result.linear = {};
+  result.errors.steps = {};
+  return roots;
 }
 
 /// Rearranges the columns from the states `from` to the states `to`. A state that was not estimated along the pass gets
@@ -135,7 +144,8 @@ PassProblem problem_of(const Screened& screened, PassSetup setup) {
 Refinement::Refinement(const Screened& screened, PassSetup setup, const CalibrationOptions& options)
     : problem_(problem_of(screened, std::move(setup))),
       result_(most_likely(problem_, first_solution(problem_, screened))),
-      roots_(covariance_roots(result_.errors, result_.linear.stages)) {
+      halves_(compare_halves(result_, problem_.layout())),
+      roots_(roots_of(result_)) {
   const SmoothedAttitude smoothed(screened.pass, problem_, result_.solution, roots_);
   course_ = smoothed.course();
   if (options.definitive_attitude) {
@@ -166,7 +176,10 @@ void Refinement::put_into(CalibrationRun& run) && {
   rearrange(calibration.states, states, problem_.setup(), run.parameters);
   calibration.states = states;
   calibration.further = further_of(layout, result_);
-  compare_halves(result_, layout, calibration.statistics);
+  if (halves_) {
+    calibration.statistics.halves_chi_square = halves_->chi_square;
+    calibration.statistics.halves_degrees_of_freedom = halves_->degrees_of_freedom;
+  }
   calibration.statistics.batch_iterations = result_.iterations;
   calibration.statistics.batch_converged = result_.converged;
   use_residuals(problem_, result_.solution, roots_, run.fixes);

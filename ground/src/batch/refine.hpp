@@ -1,6 +1,7 @@
 #pragma once
 /// Estimator batch: a calibration refined by least squares over the whole pass.
 
+#include <optional>
 #include <vector>
 
 #include "batch/batch.hpp"
@@ -9,6 +10,12 @@
 #include "trihedron/records/run.hpp"
 
 namespace trihedron::ground {
+
+/// The constants by the first half of the pass compared with those by all of it.
+struct Halves {
+  double chi_square = 0;
+  int degrees_of_freedom = 0;
+};
 
 /// The whole pass by least squares; its results replace those of the on-board step.
 class Refinement {
@@ -26,7 +33,8 @@ class Refinement {
  private:
   PassProblem problem_;
   BatchResult result_;
-  std::vector<Eigen::MatrixXd> roots_;
+  std::optional<Halves> halves_;
+  CovarianceRoots roots_;
   SmoothedCourse course_;
   AttitudeHistory definitive_attitude_;
 };

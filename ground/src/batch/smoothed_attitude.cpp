@@ -34,26 +34,29 @@ SmoothReadings::At SmoothReadings::at(Time t, const At& otherwise) const {
 std::optional<SmoothReadings::At> SmoothReadings::fit(Time t, const GyroMask& used, Duration reach) const {
   constexpr int kDegree = 3;
   constexpr int kLeast = DirectionsFit::least_samples(kDegree);
-  const auto first = std::ranges::lower_bound(samples_, t - reach, {}, &ScreenedPass::Sample::t);
-  const auto last = std::ranges::upper_bound(first, samples_.end(), t + reach, {}, &ScreenedPass::Sample::t);
-  const auto size = static_cast<int>(last - first);
+  const std::size_t first = samples_.from(t - reach);
+  const std::size_t end = samples_.from(t + reach + Duration{1});
+  const auto size = static_cast<int>(end - first);
   if (size < kLeast) {
     return std::nullopt;
   }
-  const auto gap = std::adjacent_find(
-      first, last, [&](const auto& a, const auto& b) { return b.t - a.t > setup_.max_interpolation(); });
-  if (gap != last) {
-    return std::nullopt;
+  GyroMask all_used = used;
+  for (std::size_t i = first; i < end; ++i) {
+    if (i > first && samples_.t(i) - samples_.t(i - 1) > setup_.max_interpolation()) {
+      return std::nullopt;
+    }
+    all_used = both(all_used, samples_.used(i));
   }
-  DirectionsFit fit(t, first->t, std::prev(last)->t, size, kDegree, gyros_);
-  std::for_each(first, last, [&](const ScreenedPass::Sample& sample) { fit.add(sample.t, sample.h_b); });
+  DirectionsFit fit(t, samples_.t(first), samples_.t(end - 1), size, kDegree, gyros_);
+  for (std::size_t i = first; i < end; ++i) {
+    fit.add(samples_.t(i), samples_.h_b(i));
+  }
   const FittedDirections fitted = fit.solve();
   At at;
   at.h_b = fitted.h_b;
   at.noise_factor = fitted.noise_factor;
   for (int k = 0; k < gyros_; ++k) {
-    at.used[k] =
-        used[k] && std::all_of(first, last, [&](const ScreenedPass::Sample& sample) { return sample.used[k]; });
+    at.used[k] = all_used[k];
   }
   if (!fitted.explains(at.used, setup_.readout_noise_rad)) {
     return std::nullopt;
@@ -68,7 +71,7 @@ std::optional<SmoothedAttitude::At> SmoothedAttitude::at(const PassProblem::Mome
   if (!attitude) {
     return std::nullopt;
   }
-  const MatrixXd spread = problem_.attitude_by_states(moment, attitude.value(), reading.h_b) * roots_[moment.arc];
+  const MatrixXd spread = roots_.spread(moment.arc, problem_.attitude_by_states(moment, attitude.value(), reading.h_b));
   Vector3d variance_rad2 = spread.rowwise().squaredNorm();
   for (int k = 0; k < problem_.layout().gyros; ++k) {
     const double noise_rad = problem_.setup().on_board.readout_noise_rad[k] * reading.noise_factor;
@@ -109,16 +112,16 @@ SmoothedCourse SmoothedAttitude::course() const {
 AttitudeHistory SmoothedAttitude::between(const PassProblem::Moment& from, const PassProblem::Moment& to) const {
   AttitudeHistory history;
   PassProblem::Moment moment = to;
-  const auto first = std::ranges::upper_bound(screened_.samples, from.t, {}, &ScreenedPass::Sample::t);
-  for (auto sample = first; sample != screened_.samples.end() && sample->t <= to.t; ++sample) {
-    moment.t = sample->t;
+  const ScreenedSamples& samples = screened_.samples;
+  for (std::size_t i = samples.from(from.t + Duration{1}); i < samples.size() && samples.t(i) <= to.t; ++i) {
+    moment.t = samples.t(i);
     // From node to node a momentum turns by a fraction of an arcsecond.
-    const double part = to_seconds(sample->t - from.t) / to_seconds(to.t - from.t);
+    const double part = to_seconds(moment.t - from.t) / to_seconds(to.t - from.t);
     for (int k = 0; k < screened_.gyros; ++k) {
       moment.gyros[k].h_in = (from.gyros[k].h_in + part * (to.gyros[k].h_in - from.gyros[k].h_in)).normalized();
     }
-    if (const auto attitude = at(moment, {sample->h_b, sample->used, 1})) {
-      append(*attitude, sample->t, history);
+    if (const auto attitude = at(moment, {samples.h_b(i), samples.used(i), 1})) {
+      append(*attitude, moment.t, history);
     }
   }
   return history;

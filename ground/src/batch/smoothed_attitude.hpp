@@ -27,7 +27,7 @@ class SmoothReadings {
  private:
   [[nodiscard]] std::optional<At> fit(Time t, const GyroMask& used, Duration reach) const;
 
-  const std::vector<ScreenedPass::Sample>& samples_;
+  const ScreenedSamples& samples_;
   int gyros_;
   const CalibrationSetup& setup_;
 };
@@ -43,7 +43,7 @@ class SmoothedAttitude {
  public:
   /// `roots`: of the covariance, arc by arc. Refers to all of them.
   SmoothedAttitude(const ScreenedPass& screened, const PassProblem& problem, const PassSolution& solution,
-                   const std::vector<Eigen::MatrixXd>& roots)
+                   const CovarianceRoots& roots)
       : screened_(screened),
         problem_(problem),
         solution_(solution),
@@ -69,7 +69,7 @@ class SmoothedAttitude {
   const ScreenedPass& screened_;
   const PassProblem& problem_;
   const PassSolution& solution_;
-  const std::vector<Eigen::MatrixXd>& roots_;
+  const CovarianceRoots& roots_;
   SmoothReadings readings_;
 };
 

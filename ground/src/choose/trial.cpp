@@ -53,7 +53,9 @@ Trial::Trial(const Pass& pass, const Screened& screened, const CalibrationOption
 
 void Trial::refit(const ProcessNoise& noise) {
   problem_.set_noise(noise);
-  found_ = most_likely(problem_, std::move(found_.solution), kNearEnough);
+  PassSolution first = std::move(found_.solution);
+  found_ = {};  // long: one at a time
+  found_ = most_likely(problem_, std::move(first), kNearEnough);
 }
 
 double Trial::log_evidence(FurtherState state) const {

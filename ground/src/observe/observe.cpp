@@ -91,8 +91,7 @@ void add_angles(const PassProblem& problem, const ScreenedPass& pass, const Pass
                 Duration gyro_period, PassProblem::Linear& linear) {
   const PerGyro<double>& readout_noise_rad = problem.setup().on_board.readout_noise_rad;
   const double noise_rad = std::hypot(readout_noise_rad[0], readout_noise_rad[1]);
-  auto sample = pass.samples.begin();
-  Time before = pass.samples.front().t;
+  Time before = pass.samples.t(0);
   std::vector<Eigen::RowVectorXd> rows;
   std::size_t arc = 0;
   const auto close_arc = [&] {
@@ -111,12 +110,12 @@ void add_angles(const PassProblem& problem, const ScreenedPass& pass, const Pass
       close_arc();
       arc = moment.arc;
     }
-    sample = std::lower_bound(sample, pass.samples.end(), moment.t,
-                              [](const ScreenedPass::Sample& s, Time t) { return s.t < t; });
-    if (moment.fix == nullptr && sample != pass.samples.end() && sample->used[0] && sample->used[1]) {
+    const std::size_t sample = pass.samples.from(moment.t);
+    if (moment.fix == nullptr && sample < pass.samples.size() && pass.samples.used(sample)[0] &&
+        pass.samples.used(sample)[1]) {
       // One row represents all samples since the last one.
       const double samples = std::max(std::round(to_seconds(moment.t - before) / to_seconds(gyro_period)), 1.0);
-      const AngleRow row = angle_row(problem, moment, sample->h_b);
+      const AngleRow row = angle_row(problem, moment, pass.samples.h_b(sample));
       rows.emplace_back(row.by_states * (std::sqrt(samples) / (row.noise_factor * noise_rad)));
     }
     before = moment.t;
@@ -208,28 +207,22 @@ void add_combinations(const MatrixXd& scaled_root, const BodyRotation& rotation,
 
 /// A pass without faults as if it had been screened: its samples and fixes, in the order of their times.
 ScreenedPass as_it_is(const Pass& pass, int gyros, int heads) {
-  ScreenedPass screened;
-  screened.gyros = gyros;
+  ScreenedPass screened(pass.gyro, gyros);
   for (std::size_t i = 0; i < pass.gyro.size(); ++i) {
-    ScreenedPass::Sample& sample = screened.samples.emplace_back();
-    sample.t = pass.gyro.t[i];
-    for (int k = 0; k < gyros; ++k) {
-      sample.h_b[k] = pass.gyro.direction(i, k).normalized();
-      sample.used[k] = true;
-    }
+    screened.samples.add(i, all_gyros(gyros));
   }
   for (int head = 0; head < heads; ++head) {
     const StarTrackerTelemetry& fixes =
         head == 0 ? pass.star_tracker : pass.further_star_trackers[static_cast<std::size_t>(head - 1)];
     for (std::size_t i = 0; i < fixes.size(); ++i) {
-      const auto sample = std::ranges::lower_bound(screened.samples, fixes.t[i], {}, &ScreenedPass::Sample::t);
-      if (sample == screened.samples.end()) {
+      const std::size_t sample = screened.samples.from(fixes.t[i]);
+      if (sample == screened.samples.size()) {
         break;
       }
       ScreenedPass::Fix& fix = screened.fixes.emplace_back();
       fix.fix = {fixes.t[i], fixes.q_in_c[i], head};
-      fix.h_b = sample->h_b;
-      fix.used = sample->used;
+      fix.h_b = screened.samples.h_b(sample);
+      fix.used = screened.samples.used(sample);
       if (i > 0) {
         fix.rate_c = Rot<C, C>::assume(fixes.q_in_c[i - 1].conjugate() * fixes.q_in_c[i]).log().raw() /
                      to_seconds(fixes.t[i] - fixes.t[i - 1]);

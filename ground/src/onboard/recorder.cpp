@@ -79,7 +79,8 @@ void add_statistics(const std::vector<FixRecord>& fixes, Statistics& statistics)
   for (const FixRecord& fix : fixes) {
     statistics.fixes_used += fix.used() ? 1 : 0;
     statistics.fixes_rejected_as_outliers += fix.status == FixStatus::kRejectedByGate ? 1 : 0;
-    const bool was_reopened = fix.status == FixStatus::kUsedAfterReopening || fix.status == FixStatus::kRestarted;
+    const bool was_reopened = fix.status == FixStatus::kUsedAfterReopening || fix.status == FixStatus::kRestarted ||
+                              fix.status == FixStatus::kEstimateLost;
     statistics.reopened += was_reopened ? 1 : 0;
     in_a_row = fix.jumped ? in_a_row + 1 : 0;
     statistics.fixes_off_in_a_row += in_a_row == kJumpLength ? kJumpLength : in_a_row > kJumpLength ? 1 : 0;

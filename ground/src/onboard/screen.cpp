@@ -30,11 +30,12 @@ Screened screen(const Pass& pass, const CalibrationOptions& asked) {
     options.drift_model = asked.drift_model.value_or(kEsg20);
   }
   Pipeline pipeline(pass.settings, options, false);
-  Screened screened;
-  screened.pass.gyros = pipeline.layout().gyros;
-  replay(pass, pipeline, [&](const StepReport& report, const GyroSample& sample) {
+  Screened screened{ScreenedPass(pass.gyro, pipeline.layout().gyros), {}};
+  replay(pass, pipeline, [&](const StepReport& report, const GyroSample& /*sample*/) {
     screened.pass.add_fix(report);
-    screened.pass.add_sample(sample, report);
+    if (report.sample != SampleStatus::kNone) {
+      screened.pass.add_sample(report);
+    }
   });
   screened.pass.keep_longest();
   screened.first = pipeline.gyros();

@@ -8,7 +8,7 @@
 
 namespace trihedron::ground {
 
-/// Samples and fixes that the on-board step accepted, and its estimates as starting values.
+/// Samples and fixes that the on-board step accepted, and its estimates as starting values. Refers to the pass.
 struct Screened {
   ScreenedPass pass;
   std::vector<GyroCalibration> first;

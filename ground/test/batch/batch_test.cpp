@@ -293,15 +293,10 @@ TEST(Batch, ComparesTheHalvesOfThePass) {
 
 /// Samples and fixes of the beginning of a pass, all used.
 ScreenedPass screened_beginning(const sim::SimulatedPass& simulated, std::size_t samples) {
-  ScreenedPass screened;
-  screened.gyros = 2;
+  ScreenedPass screened(simulated.pass.gyro, 2);
   for (std::size_t i = 0; i < samples; ++i) {
-    ScreenedPass::Sample& sample = screened.samples.emplace_back();
-    sample.t = simulated.pass.gyro.t[i];
-    for (int k = 0; k < 2; ++k) {
-      sample.h_b[k] = simulated.pass.gyro.direction(i, k).normalized();
-      sample.used[k] = true;
-    }
+    screened.samples.add(i, all_gyros(2));
+    const ScreenedSamples::Sample sample = screened.samples[i];
     if (i % 24 == 0) {
       ScreenedPass::Fix& fix = screened.fixes.emplace_back();
       fix.fix = {sample.t, simulated.pass.star_tracker.q_in_c[i / 24], 0};
@@ -402,8 +397,8 @@ TEST(PassProblem, CarriesErrorsAlongAsTheFlightCodeDoes) {
   std::size_t followed = 0;
   problem.go_along(solution, [&](const PassProblem::Moment& moment) {
     for (; screened.samples[followed].t < moment.t; ++followed) {
-      const ScreenedPass::Sample& from = screened.samples[followed];
-      const ScreenedPass::Sample& to = screened.samples[followed + 1];
+      const ScreenedSamples::Sample from = screened.samples[followed];
+      const ScreenedSamples::Sample to = screened.samples[followed + 1];
       const double part = problem.setup().on_board.part_of_change(from.t + (to.t - from.t) / 2);
       Directions middle;
       for (int k = 0; k < 2; ++k) {
@@ -417,7 +412,7 @@ TEST(PassProblem, CarriesErrorsAlongAsTheFlightCodeDoes) {
     }
     const auto near = [](const auto& a, const auto& b, double size) { return (a - b).norm() <= 1.5e-4 * size; };
     const double turned_rad = angle_between<double>(solution.arcs[0].h_in[0], gyros[0].h_in);
-    const double since_s = to_seconds(moment.t - screened.samples.front().t);
+    const double since_s = to_seconds(moment.t - screened.samples.t(0));
     const int columns = layout.drift_columns();
     for (int k = 0; k < 2; ++k) {
       const Sensitivity<kMaxDriftColumns>& its = moment.since[k];

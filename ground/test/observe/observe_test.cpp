@@ -217,7 +217,7 @@ TEST(AngleRow, IsTheDerivativeOfZ1) {
   const PassProblem problem(screened.pass, pass_setup(pass.settings, options));
   const Layout& layout = problem.layout();
   const PassSolution solution = first_solution(problem, screened);
-  const ScreenedPass::Sample& last = screened.pass.samples.back();
+  const ScreenedSamples::Sample last = screened.pass.samples[screened.pass.samples.size() - 1];
   const auto row_at = [&](const PassSolution& at) {
     AngleRow row;
     problem.go_along(at, [&](const PassProblem::Moment& moment) {

@@ -5,6 +5,7 @@
 
 #include "trihedron/core/layout.hpp"
 #include "trihedron/core/status.hpp"
+#include "trihedron/core/telemetry.hpp"
 #include "trihedron/core/time.hpp"
 
 namespace trihedron {
@@ -30,6 +31,15 @@ struct FixReport {
 
   [[nodiscard]] bool used() const { return is_used(status); }
 };
+
+/// The report on a fix at which the estimate was lost.
+[[nodiscard]] inline FixReport lost(const StarFix& fix) {
+  FixReport report;
+  report.status = FixStatus::kEstimateLost;
+  report.t = fix.t;
+  report.head = fix.head;
+  return report;
+}
 
 /// Report on one update by the angles between the momenta alone.
 struct AngleReport {

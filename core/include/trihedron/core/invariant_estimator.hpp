@@ -89,11 +89,12 @@ class InvariantEstimator {
   /// Widens the directions: `variance_rad2` per axis for what a step too long for its readings may have missed.
   void add_direction_variance(double variance_rad2) { extra_variance_rad2_ += variance_rad2; }
 
-  /// The first fix starts the filter, each further one updates it.
+  /// The first fix starts the filter, each further one updates it. Where the estimate is not finite after that, or has
+  /// no covariance, it is forgotten: kEstimateLost, and no longer started().
   [[nodiscard]] FixReport correct(const StarFix& fix, const FixReadings& readings);
   /// Update without a fix: by the angles between the momenta, which the readings give without the attitude. It gives no
-  /// information about the attitude or anything that rotates all momenta alike, and never reopens the filter. Needs
-  /// started().
+  /// information about the attitude or anything that rotates all momenta alike, and never reopens the filter. The
+  /// estimate may be forgotten as by correct(). Needs started().
   [[nodiscard]] AngleReport check_angles(Time t, const FixReadings& readings);
 
  private:
@@ -117,6 +118,13 @@ class InvariantEstimator {
   /// the minute until a run of rejections reopens the filter.
   static constexpr double kFaultMisfitOfPair_rad = 5.8e-3;  // 20′
 
+  /// Returns to the prior, not started.
+  void forget();
+  /// Whether the estimate is finite and has a covariance.
+  [[nodiscard]] bool sound() const;
+  /// correct() and check_angles() before sound() is asked.
+  [[nodiscard]] FixReport take(const StarFix& fix, const FixReadings& readings);
+  [[nodiscard]] AngleReport take_angles(Time t, const FixReadings& readings);
   [[nodiscard]] Eigen::Matrix3d covariance_of(Rows3 by_states) const;
   /// The attitude by gyros and fix together, weighted by what is known of both. Needs the covariance at the fix.
   [[nodiscard]] Eigen::Matrix3d fused_attitude(const AttitudeByDirections& by_gyros, const Rot<In, C>& by_fix,

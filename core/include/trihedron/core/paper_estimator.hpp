@@ -80,7 +80,8 @@ class PaperEstimator {
   /// Widens the directions: `variance_rad2` per axis for what a step too long for its readings may have missed.
   void add_direction_variance(double variance_rad2) { extra_variance_rad2_ += variance_rad2; }
 
-  /// Astro-correction: the first one starts the filter, each further one updates it.
+  /// Astro-correction: the first one starts the filter, each further one updates it. Where the estimate is not finite
+  /// after that, or has no covariance, it is forgotten: kEstimateLost, and no longer started().
   [[nodiscard]] FixReport correct(const StarFix& fix, const FixReadings& readings);
 
   /// The paper's components of direction errors: tangent bases of both momenta in the quasi-inertial frame, in `in`
@@ -105,6 +106,12 @@ class PaperEstimator {
  private:
   using Information = SquareRootInformation<kMaxStates, States::kDynamic>;
 
+  /// Returns to the prior, not started.
+  void forget();
+  /// Whether the estimate is finite and has a covariance.
+  [[nodiscard]] bool sound() const { return information_.regular() && estimates_are_finite(gyros_, layout()); }
+  /// correct() before sound() is asked.
+  [[nodiscard]] FixReport take(const StarFix& fix, const FixReadings& readings);
   void update_covariance_to_now(const QuasiInertial& now);
   /// Innovation, its covariance and NIS; `rows`: the measurement whitened, L: the root of its noise.
   void report_innovation(const Measurement& measurement, const ComparedRows<kMaxStates>& rows, const Eigen::Matrix4d& L,

@@ -52,6 +52,7 @@ class Schedule {
   }
   /// Not before `t`: there are no readings.
   void put_angles_off(Time t) { angles_t_ = t; }
+  /// Until the next fix is used.
   void no_angles() { angles_t_ = Time::max(); }
   /// The clock has been set back by −shift.
   void set_clock(Duration shift) {

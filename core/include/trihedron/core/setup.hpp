@@ -58,6 +58,7 @@ class PerFurtherState {
 /// What a calibration filter is set up with.
 struct CalibrationSetup {
   static constexpr Duration kNever = Duration::max();
+  static constexpr Duration kLongestGyroPeriod = std::chrono::hours(1);
 
   Layout layout;
   PerGyro<double> readout_noise_rad{};  ///< 1-sigma per direction cosine
@@ -123,6 +124,17 @@ template <class Gyros>
     }
   }
   return true;
+}
+
+/// Whether estimates are means that can be used, with momenta.
+template <class Gyros>
+[[nodiscard]] bool estimates_are_finite(const Gyros& gyros, const Layout& layout) {
+  for (int k = 0; k < layout.gyros; ++k) {
+    if (!gyros[k].h_in.allFinite()) {
+      return false;
+    }
+  }
+  return means_are_usable(gyros, layout);
 }
 
 /// 1-sigma of one further state before anything is measured, rad, rad/s or s. `state`: its position, from

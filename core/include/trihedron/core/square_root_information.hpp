@@ -5,9 +5,10 @@
 
 #include <Eigen/Core>
 #include <array>
+#include <cmath>
 #include <cstddef>
+#include <limits>
 
-#include "trihedron/core/assert.hpp"
 #include "trihedron/core/rows_view.hpp"
 
 namespace trihedron {
@@ -104,11 +105,8 @@ class SquareRootInformation {
   }
 
   /// In place: rows of H become H R⁻¹, seen through the present uncertainty: H P Hᵀ is the product of the result with
-  /// its transpose. Needs regular().
-  void see_through_uncertainty(RowsView H) const {
-    TRIHEDRON_ASSERT(regular());
-    solve_rows(root(), H);
-  }
+  /// its transpose. Not finite unless regular().
+  void see_through_uncertainty(RowsView H) const { solve_rows(root(), H); }
 
   /// Measurement update with rows (H, y), y = H x + unit white noise, which are used up; y is the last column. Returns
   /// the correction, to be fed back; not finite unless regular() after it.
@@ -130,17 +128,15 @@ class SquareRootInformation {
     return x;
   }
 
-  /// R⁻¹, a square root of the covariance, P = R⁻¹ R⁻ᵀ, into `inverse`: its first rows, as many as it has. Needs
-  /// regular().
-  void inverse_root(RowsView inverse) const {
-    TRIHEDRON_ASSERT(regular());
-    invert_triangle(root(), inverse);
-  }
+  /// R⁻¹, a square root of the covariance, P = R⁻¹ R⁻ᵀ, into `inverse`: its first rows, as many as it has. Not
+  /// finite unless regular().
+  void inverse_root(RowsView inverse) const { invert_triangle(root(), inverse); }
 
-  /// Whether each state has information, so that a covariance exists.
+  /// Whether each state has information, finite, so that a covariance exists.
   [[nodiscard]] bool regular() const {
     for (int i = 0; i < states_; ++i) {
-      if (!(root()(i, i) != 0)) {
+      const double its = std::abs(root()(i, i));
+      if (!(its > 0 && its <= std::numeric_limits<double>::max())) {
         return false;
       }
     }

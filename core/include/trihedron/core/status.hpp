@@ -42,8 +42,10 @@ enum class FixStatus : std::uint8_t {
   kRejectedGeometry,     ///< momenta nearly parallel
   kRejectedTooFewGyros,  ///< fewer than two gyros can be used, or at the start not all; StepReport::gyros names them
   kRejectedByGate,       ///< NIS above the gate
+  kEstimateLost,         ///< estimate or its covariance was no longer finite: the filter returns to the prior, and the
+                         ///< next fix starts it; the navigator keeps what it has
 };
-inline constexpr std::size_t kFixStatuses = 14;
+inline constexpr std::size_t kFixStatuses = 15;
 
 /// Whether the fix took part in the estimation.
 [[nodiscard]] constexpr bool is_used(FixStatus status) {

@@ -31,6 +31,7 @@ inline constexpr std::array<StatusRow<FixStatus>, kFixStatuses> kFixStatusRows =
     {FixStatus::kRejectedGeometry, "rejected: momenta nearly parallel"},
     {FixStatus::kRejectedTooFewGyros, "rejected: too few gyros can be used"},
     {FixStatus::kRejectedByGate, "rejected: outlier"},
+    {FixStatus::kEstimateLost, "rejected: estimate was not finite and was dropped"},
 }};
 
 inline constexpr std::array<StatusRow<SampleStatus>, kSampleStatuses> kSampleStatusRows = {{

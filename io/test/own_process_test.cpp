@@ -1,0 +1,97 @@
+#include "own_process.hpp"
+
+#include <gmock/gmock.h>
+#include <unistd.h>
+
+#include <chrono>
+#include <csignal>
+#include <cstdlib>
+#include <new>
+#include <thread>
+
+#include "fixtures.hpp"
+#include "trihedron/records/stop.hpp"
+
+namespace trihedron::io {
+namespace {
+
+using testing::HasSubstr;
+
+void work_apart(const std::function<void(Sink&)>& work) {
+  in_own_process("pass.nc", work, [](Source& source) { static_cast<void>(source.number()); });
+}
+
+TEST(OwnProcess, GivesBackWhatWasRead) {
+  const std::vector<double> many(3'000'000, 0.5);
+  std::vector<double> got;
+  std::string text;
+  in_own_process(
+      "pass.nc",
+      [&](Sink& sink) {
+        sink.put(many);
+        sink.put("words");
+      },
+      [&](Source& source) {
+        got = source.numbers();
+        text = source.text();
+      });
+  EXPECT_EQ(got, many);
+  EXPECT_EQ(text, "words");
+}
+
+TEST(OwnProcess, ThrowsHereWhatIsThrownThere) {
+  EXPECT_EQ(refusal([] { work_apart([](Sink&) {
+                           throw InputRefused("a.csv", {2, 3}, "is bad", "mend it");
+                         }); }),
+            "a.csv:2:3: is bad; mend it");
+  EXPECT_THROW(work_apart([](Sink&) { throw MachineFailed("a.csv", "is gone", "look for it"); }), MachineFailed);
+  EXPECT_THROW(work_apart([](Sink&) { throw std::bad_alloc(); }), std::bad_alloc);
+}
+
+TEST(OwnProcess, RefusesAFileThatEndsIt) {
+  const auto refused = [](const auto& end) { return refusal([&] { work_apart([&](Sink&) { end(); }); }); };
+  for (const int signal : {SIGSEGV, SIGABRT, SIGFPE, SIGBUS}) {
+    EXPECT_THAT(refused([=] { std::raise(signal); }),
+                HasSubstr("pass.nc: is damaged in a way that the NetCDF library"));
+  }
+  EXPECT_THAT(refused([] { ::_exit(0); }), HasSubstr("is damaged"));
+  EXPECT_THAT(refused([] { std::raise(SIGXCPU); }), HasSubstr("busy for more than 10 s"));
+}
+
+TEST(OwnProcess, RefusesHalfAResult) {
+  EXPECT_THAT(refusal([] {
+                in_own_process(
+                    "pass.nc", [](Sink& sink) { sink.put(std::int64_t{1'000'000'000'000}); },  // a length and no more
+                    [](Source& source) { static_cast<void>(source.numbers()); });
+              }),
+              HasSubstr("is damaged"));
+  EXPECT_THAT(refusal([] {
+                work_apart([](Sink& sink) {
+                  sink.put("begun");
+                  throw std::bad_alloc();
+                });
+                in_own_process(
+                    "pass.nc",
+                    [](Sink& sink) {
+                      sink.put(std::int64_t{1});
+                      throw std::bad_alloc();
+                    },
+                    [](Source& source) { static_cast<void>(source.number() + source.number()); });
+              }),
+              HasSubstr("is damaged"));
+}
+
+TEST(OwnProcess, EndsWhenAskedToStop) {
+  StopRequest request;
+  const StopScope scope(&request);
+  std::jthread other([&] {
+    std::this_thread::sleep_for(std::chrono::milliseconds(50));
+    request.make();
+  });
+  const auto begun = std::chrono::steady_clock::now();
+  EXPECT_THROW(work_apart([](Sink&) { ::sleep(60); }), Stopped);
+  EXPECT_LT(std::chrono::steady_clock::now() - begun, std::chrono::seconds(5));
+}
+
+}  // namespace
+}  // namespace trihedron::io

@@ -1,0 +1,92 @@
+#pragma once
+/// What each number that comes from outside may be: by settings, calibrations, scenarios and options of the command
+/// line. The bounds are wide, but within them everything that is computed stays finite; beyond them a number has
+/// another unit than its name says, or is no measurement.
+
+#include <cmath>
+#include <limits>
+#include <string_view>
+
+namespace trihedron {
+
+/// The values that one kind of number may have, both ends included, in the unit that its names end with.
+struct Range {
+  double least = -std::numeric_limits<double>::max();
+  double most = std::numeric_limits<double>::max();
+  std::string_view unit;      ///< empty for a pure number
+  std::string_view why;       ///< for people: a whole sentence without its full stop
+  bool zero_allowed = false;  ///< although it is below `least`: there is none of it
+
+  /// False for what is not finite.
+  [[nodiscard]] constexpr bool holds(double value) const {
+    return (value >= least && value <= most) || (zero_allowed && value == 0);
+  }
+};
+
+/// All ranges. Where not told otherwise a noise is a 1-sigma.
+namespace limits {
+
+inline constexpr double kFullTurn_rad = 6.2832;
+inline constexpr double kYear_s = 3.2e7;
+
+// ---- Settings of a pass
+
+inline constexpr Range kPassDuration_s{60, kYear_s, "s",
+                                       "in a pass shorter than a minute nothing can be calibrated, and none is longer "
+                                       "than a year"};
+inline constexpr Range kGyroPeriod_s{1e-5, 60, "s", "it is the time between samples: 0.125 for 8 Hz"};
+inline constexpr Range kStarTrackerPeriod_s{1e-3, 86400, "s", "it is the time between fixes: 3 for one every 3 s"};
+inline constexpr Range kReadoutNoise_rad{1e-9, 0.1, "rad",
+                                         "it is the 1-sigma of a direction cosine, which is at most 1; an arcsecond is "
+                                         "4.8e-6"};
+inline constexpr Range kStarTrackerNoise_rad{1e-9, 0.1, "rad",
+                                             "it is the 1-sigma of an attitude; an arcsecond is 4.8e-6"};
+inline constexpr Range kDrift_rad_s{-0.1, 0.1, "rad/s", "no gyro drifts by degrees a second; 1 deg/h is 4.8e-6"};
+inline constexpr Range kDriftSigma_rad_s{1e-15, 1e-2, "rad/s",
+                                         "no gyro drifts by half a degree a second; 1 deg/h is 4.8e-6"};
+inline constexpr Range kRotation_rad{-kFullTurn_rad, kFullTurn_rad, "rad",
+                                     "it is one component of a rotation vector; a degree is 0.0175"};
+inline constexpr Range kAlignmentSigma_rad{1e-9, 3.15, "rad", "a half turn is all there is; an arcminute is 2.9e-4"};
+
+// ---- Settings of the estimators
+
+inline constexpr Range kRandomWalk_rad_sqrt_s{1e-15, 1e-3, "rad/s^0.5", "give 0 where there is none", true};
+inline constexpr Range kGateNis{0.1, 1e12, "", "30 passes good fixes; a large number lets all pass"};
+inline constexpr Range kStudentTFreedom{1, 1e6, "", "give 5 to 20, or 0 for the gate alone", true};
+inline constexpr Range kRejections{1, 1e6, "", "it is a number of fixes"};
+inline constexpr Range kAnglesAfter_s{1e-3, kYear_s, "s", "give some seconds or minutes, or never"};
+inline constexpr Range kCorrectionInterval_s{1e-3, kYear_s, "s", "it must be positive; say continuous to use each fix"};
+inline constexpr Range kWanderingDrift_rad_s{1e-15, 1e-2, "rad/s", "give auto, off, or a 1-sigma like 0.01deg/h"};
+inline constexpr Range kWanderingTime_s{1, kYear_s, "s", "an hour is usual"};
+
+// ---- Calibrations
+
+inline constexpr Range kReadoutBias{-0.1, 0.1, "", "it is the error of a direction cosine, which is at most 1"};
+/// Clock offset in seconds, errors of a star tracker in rad, drift in rad/s.
+inline constexpr Range kFurtherState{-1e3, 1e3, "", "no error of a star tracker or gyro is so large"};
+inline constexpr Range kFurtherStateSigma{0, 1e3, "", "no error of a star tracker or gyro is so large"};
+inline constexpr Range kTimeOfCalibration_s{-1e9, 1e9, "s", "it is the time since the epoch"};
+
+// ---- Scenarios; what goes together is judged by the simulation
+
+inline constexpr Range kLength_m{0, 1e9, "m", "the Moon is 3.8e8 m away"};
+inline constexpr Range kFrequency_hz{0, 1e4, "Hz", "a spacecraft does not shake faster"};
+inline constexpr Range kAcceleration_rad_s2{0, 10, "rad/s^2", "no spacecraft turns faster"};
+inline constexpr Range kRate_rad_s{-10, 10, "rad/s", "no spacecraft turns faster"};
+inline constexpr Range kRateWalk_rad_s_sqrt_s{0, 1e-2, "rad/s/s^0.5", "no gyro drifts so fast"};
+inline constexpr Range kScenarioRandomWalk_rad_sqrt_s{0, 1e-2, "rad/s^0.5", "no gyro drifts so fast"};
+inline constexpr Range kAngle_rad{-kFullTurn_rad, kFullTurn_rad, "rad", "it is at most a full turn"};
+inline constexpr Range kInterval_s{-kYear_s, kYear_s, "s", "it is at most a year"};
+inline constexpr Range kPureNumber{-1e3, 1e3, "", "no fraction or component is so large"};
+
+// ---- Options
+
+inline constexpr Range kAttitudeLimit_rad{1e-9, 3.15, "rad", "an error has no sign, and is at most a half turn"};
+inline constexpr Range kSlewRate_rad_s{1e-6, 1, "rad/s", "a spacecraft turns by some tenths of a degree a second"};
+inline constexpr Range kSlewAngle_rad{1e-4, 3.15, "rad", "a slew has some degrees, and at most a half turn"};
+inline constexpr Range kSlews{1, 100, "", "it is a number of slews"};
+inline constexpr Range kManoeuvreTime_s{1, kYear_s, "s", "it is the time of all slews together"};
+inline constexpr Range kFlights{1, 1e6, "", "it is a number of flights"};
+
+}  // namespace limits
+}  // namespace trihedron
