@@ -4,6 +4,7 @@ Run by CTest: python3 -m pytest fly_test.py, with TRIHEDRON_BUILD naming the bui
 """
 import os
 import pathlib
+import subprocess
 
 import numpy
 import pytest
@@ -49,6 +50,26 @@ def test_a_planted_difference_is_found(desktop_and_target):
     changed = fly.Result(fly.directory(fly.CORTEX_M7, BUILD) / "short.result")
     changed.calibration[100] += numpy.uint64(1)
     assert not changed.same_bits(desktop)
+
+
+@pytest.mark.long
+@needs_target
+def test_a_feed_that_breaks_off_is_refused(desktop_and_target, tmp_path):
+    whole = (BUILD / "flight" / "short.feed").read_bytes()
+    program = fly.directory(fly.DESKTOP, BUILD) / "fly"
+    for feed in (b"", whole[:4], whole[:100], whole[:-64], b"x" + whole[1:]):
+        (tmp_path / "feed").write_bytes(feed)
+        assert subprocess.run([program, tmp_path / "feed", tmp_path / "result"]).returncode == 3
+    assert subprocess.run([program, tmp_path / "none", tmp_path / "result"]).returncode == 3
+    assert subprocess.run([program, BUILD / "flight" / "short.feed", tmp_path / "none" / "result"]).returncode == 4
+    assert subprocess.run([program]).returncode == 2
+
+
+@pytest.mark.long
+@needs_target
+def test_what_is_no_pass_gets_no_feed(tmp_path):
+    assert subprocess.run([BUILD / "trihedron_feed", tmp_path, tmp_path / "feed"], capture_output=True).returncode == 3
+    assert subprocess.run([BUILD / "trihedron_feed"], capture_output=True).returncode == 2
 
 
 @pytest.mark.long
