@@ -5,8 +5,8 @@ BUILD := build
 LINT_TOOLS := build-lint/tools
 SOURCES := $(shell git ls-files '*.cpp' '*.hpp' 2>/dev/null)
 
-.PHONY: help setup build everything demo test bench slots validation consistency fuzz fuzz-build fuzz-briefly docs format lint sanitize coverage install \
-  clean
+.PHONY: help setup build everything demo test flight bench slots mutants validation consistency fuzz fuzz-build fuzz-briefly docs format lint \
+  standard sanitize coverage install clean
 
 help:
 	@echo 'make demo     install what is missing, build, repeat the experiment of the paper, say where the report is'
@@ -15,8 +15,10 @@ help:
 	@echo 'make everything  with tests and benches'
 	@echo 'make bench    measure: the on-board step, reading, writing and simulating a pass'
 	@echo 'make slots    count the instructions of each slot of the on-board application'
+	@echo 'make flight   fly core on an emulated Cortex-M7 and three other processors; writes the tables of docs/flight.md'
 	@echo 'make validation  measure again what docs/validation.md tells'
 	@echo 'make consistency  measure again what docs/consistency.md tells: hours; goes on where it was interrupted'
+	@echo 'make mutants  whether the tests of core notice wrong formulas: hours; goes on where it was interrupted'
 	@echo 'make fuzz     each reader against libFuzzer for FUZZ_SECONDS (3600), measures again what docs/reliability.md tells: hours'
 	@echo 'make docs     reference of the interfaces and all documents as web pages: out/docs/html/index.html'
 	@echo 'make install  into PREFIX (default /usr/local)'
@@ -34,7 +36,7 @@ build:
 	cmake --build $(BUILD) --parallel $(JOBS) --target trihedron
 
 everything:
-	@cmake/setup.sh program tests
+	@cmake/setup.sh program tests flight
 	cmake --preset release $(CMAKE_FLAGS)
 	cmake --build $(BUILD) --parallel $(JOBS)
 
@@ -43,6 +45,13 @@ demo: build
 
 test: everything
 	ctest --test-dir $(BUILD) --output-on-failure --parallel $(JOBS)
+
+
+flight:
+	@cmake/setup.sh program tests flight targets
+	cmake $(if $(wildcard $(BUILD)/CMakeCache.txt),$(BUILD),--preset program) $(CMAKE_FLAGS)
+	cmake --build $(BUILD) --parallel $(JOBS) --target trihedron trihedron_feed
+	flight/targets/fly.py $(abspath $(BUILD)) docs/flight.md
 
 bench: everything
 	$(BUILD)/trihedron_bench
@@ -56,6 +65,10 @@ slots: setup
 
 validation: everything
 	validation/validate.py $(BUILD)/trihedron docs/validation.md
+
+mutants:
+	@cmake/setup.sh program tests
+	validation/mutants/mutants.py build-mutants out/mutants.jsonl --jobs $(JOBS)
 
 # Counts the lines of core on the way, for `coverage`.
 sanitize:
@@ -124,7 +137,18 @@ $(LINT_TOOLS)/installed: cmake/lint-requirements.txt
 	touch $@
 
 # In units of several files: clang-tidy reads Eigen once for each unit instead of once for each file.
-lint: $(LINT_TOOLS)/installed
+# What docs/flight-standard.md has checked of core beyond that, by tools of their own. A view of rows is small enough to be copied.
+standard: $(LINT_TOOLS)/installed
+	@cmake/setup.sh program lint
+	cppcheck --quiet --enable=warning,performance,portability --suppress=missingInclude --suppress=passedByValue --std=c++20 --language=c++ \
+	  --error-exitcode=1 -I core/include core/src
+	$(LINT_TOOLS)/bin/lizard -l cpp core/src core/include -T cyclomatic_complexity=15 -T nloc=60 -T parameter_count=8 -w
+	cmake --preset lint
+	sed -n 's/^ *"file": "\(.*\/trihedron_core.dir\/Unity\/.*\)".*/\1/p' build-lint/compile_commands.json | \
+	  xargs -P $(JOBS) -n 1 $(LINT_TOOLS)/bin/clang-tidy --quiet --checks='-*,misc-no-recursion' --extra-arg=-Wno-unused-command-line-argument \
+	  -p build-lint
+
+lint: standard
 	@cmake/setup.sh program
 	@$(LINT_TOOLS)/bin/clang-format --dry-run --Werror $(SOURCES)
 	cmake --preset lint

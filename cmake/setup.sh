@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# cmake/setup.sh [GROUP…]: installs what is missing of these groups on Debian 12, of program, tests and lint where none is named; does
+# cmake/setup.sh [GROUP…]: installs what is missing of these groups on Debian 12, of program, tests, flight and lint where none is named; does
 # nothing, quickly, when nothing is.
 set -euo pipefail
 cd "$(dirname "$0")/.."
@@ -17,15 +17,19 @@ tests=(
 )
 docs=(doxygen)
 measure=(valgrind)
+# ARM Cortex-M7 without an operating system, emulated: a short flight is among the tests.
+flight=(gcc-arm-none-eabi libnewlib-arm-none-eabi libstdc++-arm-none-eabi-newlib qemu-system-arm)
+# The further targets of `make flight`.
+targets=(g++-s390x-linux-gnu g++-riscv64-linux-gnu g++-multilib-sparc64-linux-gnu qemu-user)
 # The program, and the fixtures of its tests, under libFuzzer.
 fuzz=(clang libclang-rt-14-dev libgtest-dev python3)
-lint=(git ca-certificates python3 python3-venv)
+lint=(git ca-certificates cppcheck python3 python3-venv)
 
 packages=()
-for name in ${*:-program tests lint}; do
+for name in ${*:-program tests flight lint}; do
   case $name in
-    program|tests|lint|docs|fuzz|measure) declare -n members=$name && packages+=("${members[@]}") ;;
-    *) echo "setup: no group \"$name\"; there are program, tests, lint, docs, fuzz, measure" >&2; exit 2 ;;
+    program|tests|flight|targets|lint|docs|fuzz|measure) declare -n members=$name && packages+=("${members[@]}") ;;
+    *) echo "setup: no group \"$name\"; there are program, tests, flight, targets, lint, docs, fuzz, measure" >&2; exit 2 ;;
   esac
   if [ "$name" = program ]; then program_wanted=yes; fi
 done

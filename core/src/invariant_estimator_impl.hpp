@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "trihedron/core/cholesky.hpp"
+#include "trihedron/core/elementary.hpp"
 #include "trihedron/core/invariant_estimator.hpp"
 
 namespace trihedron {
@@ -174,7 +175,7 @@ void InvariantEstimator<kCapacity>::start(const Eigen::Matrix3d& C_in_c, const F
   information_ = prior_;
   std::ranges::fill(second_order_rad_, 0.0);
   static_cast<void>(factorize(R));
-  solve_lower(R, rows_of(H));
+  solve_lower(matrix_of(R), rows_of(H));
   information_.add_information(rows_of(H));
   begin_stretch();
   angles_since_fix_ = 0;
@@ -222,7 +223,7 @@ Eigen::Matrix3d InvariantEstimator<kCapacity>::fused_attitude(const AttitudeByDi
   const Eigen::Matrix3d P =
       with_covariance(by_gyros, spread, readout_noise(readings.noise_factor), layout().gyros, 0).covariance_rad2;
   Eigen::Vector3d weighted = (by_gyros.C_in_c.inverse() * by_fix).log().raw();
-  solve_factorized(cholesky_root<3>(P + R_c), weighted);
+  solve_factorized(matrix_of(cholesky_root<3>(P + R_c)), weighted);
   return (by_gyros.C_in_c * Rot<C, C>::exp(Vec<C>::assume(P * weighted))).raw();
 }
 
@@ -246,9 +247,34 @@ PerGyro<double> InvariantEstimator<kCapacity>::reading_noise(const Eigen::Matrix
     rows.template middleCols<3>(layout().alignment(k)) = -C_linear;
     const Eigen::Matrix3d alignment = covariance_of(rows);
     rows.template middleCols<3>(layout().direction(k)).setIdentity();
-    noise_rad[k] = std::hypot(noise_rad[k], in_a_row * second_order_rad(alignment, covariance_of(rows)));
+    noise_rad[k] =
+        elementary::root_of_squares(noise_rad[k], in_a_row * second_order_rad(alignment, covariance_of(rows)));
   }
   return noise_rad;
+}
+
+template <Capacity kCapacity>
+PerGyro<double> InvariantEstimator<kCapacity>::fix_reading_noise(const Eigen::Matrix3d& C_linear, double noise_factor,
+                                                                 const Eigen::Matrix3d& misalignment) const {
+  PerGyro<double> noise_rad = reading_noise(C_linear, noise_factor, 1);
+  // Of the second order, and not normal: three times its sigma costs nothing but the weight of the first such fix.
+  for (double& its : noise_rad) {
+    its = elementary::root_of_squares(its, 3 * second_order_rad(misalignment, misalignment));
+  }
+  return noise_rad;
+}
+
+template <Capacity kCapacity>
+void InvariantEstimator<kCapacity>::restart(const Eigen::Matrix3d& C_in_c, const FixReadings& readings,
+                                            const Eigen::Matrix3d& R_c, const FixBySharedStates& by_shared) {
+  // The information was gathered about estimates that are far off: restart from the present ones, and where that is no
+  // better, from the prior.
+  restarted_from_estimates_ = !restarted_from_estimates_ && prior_allows_estimates();
+  if (!restarted_from_estimates_) {
+    gyros_ = prior_gyros_;
+    shared_.setZero();
+  }
+  start(C_in_c, readings, R_c, by_shared);
 }
 
 template <Capacity kCapacity>
@@ -273,7 +299,7 @@ void InvariantEstimator<kCapacity>::put_innovation(White& white) const {
   ComponentCovariance root = white.covariance;
   static_cast<void>(factorize(root));
   FixReport::Innovation y = white.rows.col(layout().size());
-  solve_lower(root, y);
+  solve_lower(matrix_of(root), y);
   white.nis = y.squaredNorm();
 }
 
@@ -281,7 +307,7 @@ template <Capacity kCapacity>
 auto InvariantEstimator<kCapacity>::whitened(const FixComparison& comparison, const Eigen::Matrix3d& R_c,
                                              const PerGyro<double>& noise_rad) const -> White {
   White white;
-  white.rows = rows_about_states_now<kMaxStates>(layout(), comparison);
+  white.rows = rows_about_states_now<kMaxStates, kMaxCompared>(layout(), comparison);
   white.L = noise_of(comparison, R_c, noise_rad);
   whiten(white.L, rows_of(white.rows));
   put_innovation(white);
@@ -294,9 +320,9 @@ auto InvariantEstimator<kCapacity>::rows_to_use(const FixComparison& comparison,
     -> Compared {
   const PerGyro<double> readout_rad = readout_noise(noise_factor * std::sqrt(sharing - 1));
   for (int k = 0; k < layout().gyros; ++k) {
-    noise_rad[k] = std::hypot(noise_rad[k], readout_rad[k]);
+    noise_rad[k] = elementary::root_of_squares(noise_rad[k], readout_rad[k]);
   }
-  Compared rows = rows_about_states_now<kMaxStates>(layout(), comparison);
+  Compared rows = rows_about_states_now<kMaxStates, kMaxCompared>(layout(), comparison);
   ComponentCovariance L = noise_of(comparison, R_c, noise_rad);
   whiten(L, rows_of(rows));
   return rows;
@@ -310,9 +336,9 @@ auto InvariantEstimator<kCapacity>::angles_of(const FixComparison& comparison, c
   // what is left.
   const int components = comparison.components();
   const int columns = layout().size() + 1;
-  Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor, kMaxComponents, 3 + kMaxStates + 1> rows(
+  Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor, kMaxCompared, 3 + kMaxStates + 1> rows(
       components, 3 + columns);
-  rows.rightCols(columns) = rows_about_states_now<kMaxStates>(layout(), comparison);
+  rows.rightCols(columns) = rows_about_states_now<kMaxStates, kMaxCompared>(layout(), comparison);
   int row = 0;
   for (int k = 0; k < layout().gyros; ++k) {
     if (comparison.used[k]) {
@@ -338,15 +364,16 @@ bool InvariantEstimator<kCapacity>::is_fault(double nis, double misfit_rad, int 
 
 template <Capacity kCapacity>
 template <class Agrees>
-int InvariantEstimator<kCapacity>::odd_gyro(const FixComparison& comparison, Agrees&& agrees) {
+int InvariantEstimator<kCapacity>::odd_gyro(FixComparison& comparison, Agrees&& agrees) {
   int odd = kNoGyro;
   for (int k = 0; k < kMaxGyros; ++k) {
     if (!comparison.used[k]) {
       continue;
     }
-    FixComparison others = comparison;
-    others.used[k] = false;
-    if (agrees(others)) {
+    comparison.used[k] = false;
+    const bool others_agree = agrees(comparison);
+    comparison.used[k] = true;
+    if (others_agree) {
       if (odd != kNoGyro) {
         return kNoGyro;  // more than one candidate: ambiguous
       }
@@ -354,6 +381,26 @@ int InvariantEstimator<kCapacity>::odd_gyro(const FixComparison& comparison, Agr
     }
   }
   return odd;
+}
+
+template <Capacity kCapacity>
+bool InvariantEstimator<kCapacity>::angles_agree(const Eigen::Matrix3d& C_by_gyros, const FixReadings& readings) const {
+  const PerGyro<double> noise_rad = reading_noise(C_by_gyros, readings.noise_factor, 1);
+  const FixComparison angles = compare(layout(), gyros_, C_by_gyros, C_by_gyros, readings.h_b, readings.used,
+                                       FixBySharedStates::Zero(3, layout().shared_size()));
+  return angles_of(angles, noise_rad).nis <= gate_of_freedom(angles.components() - 3, setup_.gate_nis);
+}
+
+template <Capacity kCapacity>
+int InvariantEstimator<kCapacity>::gyro_at_fault(FixComparison& comparison, const Eigen::Matrix3d& C_by_gyros,
+                                                 const FixReadings& readings, const Eigen::Matrix3d& R_c,
+                                                 const PerGyro<double>& noise_rad) const {
+  if (angles_agree(C_by_gyros, readings)) {
+    return kNoGyro;  // a misfit that a common rotation of all momenta explains is attributed to the star tracker
+  }
+  return odd_gyro(comparison, [&](const FixComparison& rest) {
+    return whitened(rest, R_c, noise_rad).nis <= gate_of_freedom(rest.components(), setup_.gate_nis);
+  });
 }
 
 namespace detail {
@@ -392,6 +439,19 @@ inline void report_innovation(const Layout& layout, const FixComparison& compari
 }
 
 }  // namespace detail
+
+template <Capacity kCapacity>
+void InvariantEstimator<kCapacity>::judge(const FixComparison& comparison, const White& white, double misfit_rad,
+                                          FixReport& report) {
+  report.nis = white.nis;
+  const ComponentCovariance left = white.L.lazyProduct(white.covariance);
+  detail::report_innovation(layout(), comparison, left.lazyProduct(white.L.transpose()), report);
+
+  report.status = gate_.judge(report.nis, misfit_rad, comparison.components());
+  report.rejections_in_a_row = gate_.rejections_in_a_row();
+  report.jumped = gate_.jumped();
+  report.weight = student_t_weight(setup_.student_t_freedom, report.nis, comparison.components());
+}
 
 template <Capacity kCapacity>
 FixReport InvariantEstimator<kCapacity>::correct(const StarFix& fix, const FixReadings& readings) {
@@ -437,37 +497,15 @@ FixReport InvariantEstimator<kCapacity>::take(const StarFix& fix, const FixReadi
   update_to_now(by_gyros.value().C_in_c.raw());
   const Eigen::Matrix3d misalignment = misalignment_of(fix, by_shared);
   const Eigen::Matrix3d C_linear = fused_attitude(by_gyros.value(), C_in_c, R_c + misalignment, readings);
-  PerGyro<double> noise_rad = reading_noise(C_linear, readings.noise_factor, 1);
-  // Of the second order, and not normal: three times its sigma costs nothing but the weight of the first such fix.
-  for (double& its : noise_rad) {
-    its = std::hypot(its, 3 * second_order_rad(misalignment, misalignment));
-  }
-  const FixComparison comparison =
-      compare(layout(), gyros_, C_in_c.raw(), C_linear, readings.h_b, readings.used, by_shared);
-  const White white = whitened(comparison, R_c, noise_rad);
+  const PerGyro<double> noise_rad = fix_reading_noise(C_linear, readings.noise_factor, misalignment);
+  FixComparison comparison = compare(layout(), gyros_, C_in_c.raw(), C_linear, readings.h_b, readings.used, by_shared);
+  White white = whitened(comparison, R_c, noise_rad);
   const double misfit_rad = detail::misfit_rad(comparison);
-  report.nis = white.nis;
-  const ComponentCovariance left = white.L.lazyProduct(white.covariance);
-  detail::report_innovation(layout(), comparison, left.lazyProduct(white.L.transpose()), report);
-
-  report.status = gate_.judge(report.nis, misfit_rad, comparison.components());
-  report.rejections_in_a_row = gate_.rejections_in_a_row();
-  report.jumped = gate_.jumped();
-  report.weight = student_t_weight(setup_.student_t_freedom, report.nis, comparison.components());
+  judge(comparison, white, misfit_rad, report);
   switch (report.status) {
     case FixStatus::kRejectedByGate:
-      // A misfit that a common rotation of all momenta explains is attributed to the star tracker.
       if (is_fault(report.nis, misfit_rad, count(readings.used))) {
-        const Eigen::Matrix3d& C_by_gyros = by_gyros.value().C_in_c.raw();
-        const PerGyro<double> angle_noise_rad = reading_noise(C_by_gyros, readings.noise_factor, 1);
-        const FixComparison angles = compare(layout(), gyros_, C_by_gyros, C_by_gyros, readings.h_b, readings.used,
-                                             FixBySharedStates::Zero(3, layout().shared_size()));
-        const int freedom = angles.components() - 3;
-        if (!(angles_of(angles, angle_noise_rad).nis <= gate_of_freedom(freedom, setup_.gate_nis))) {
-          report.odd_gyro = odd_gyro(comparison, [&](const FixComparison& rest) {
-            return whitened(rest, R_c, noise_rad).nis <= gate_of_freedom(rest.components(), setup_.gate_nis);
-          });
-        }
+        report.odd_gyro = gyro_at_fault(comparison, by_gyros.value().C_in_c.raw(), readings, R_c, noise_rad);
       }
       if (!(report.weight < 1) || report.jumped || report.odd_gyro != kNoGyro) {
         return report;
@@ -475,14 +513,7 @@ FixReport InvariantEstimator<kCapacity>::take(const StarFix& fix, const FixReadi
       report.status = FixStatus::kUsed;
       break;
     case FixStatus::kRestarted:
-      // The information was gathered about estimates that are far off: restart from the present ones, and where that is
-      // no better, from the prior.
-      restarted_from_estimates_ = !restarted_from_estimates_ && prior_allows_estimates();
-      if (!restarted_from_estimates_) {
-        gyros_ = prior_gyros_;
-        shared_.setZero();
-      }
-      start(C_in_c.raw(), readings, R_c, by_shared);
+      restart(C_in_c.raw(), readings, R_c, by_shared);
       report.weight = 1;
       return report;
     case FixStatus::kUsedAfterReopening:
@@ -497,8 +528,10 @@ FixReport InvariantEstimator<kCapacity>::take(const StarFix& fix, const FixReadi
   angles_since_fix_ = 0;
   const double sharing = fixes_sharing_samples_of(fix);
   used_fix_t_[static_cast<std::size_t>(fix.head)] = fix.t;
-  update(sharing > 1 ? rows_to_use(comparison, R_c, noise_rad, readings.noise_factor, sharing) : white.rows,
-         std::sqrt(report.weight));
+  if (sharing > 1) {
+    white.rows = rows_to_use(comparison, R_c, noise_rad, readings.noise_factor, sharing);
+  }
+  update(white.rows, std::sqrt(report.weight));
   return report;
 }
 
@@ -514,9 +547,9 @@ AngleReport InvariantEstimator<kCapacity>::take_angles(Time t, const FixReadings
   const Eigen::Matrix3d& C_in_c = by_gyros.value().C_in_c.raw();
   update_to_now(C_in_c);
   const PerGyro<double> noise_rad = reading_noise(C_in_c, readings.noise_factor, ++angles_since_fix_);
-  const FixComparison comparison = compare(layout(), gyros_, C_in_c, C_in_c, readings.h_b, readings.used,
-                                           FixBySharedStates::Zero(3, layout().shared_size()));
-  const White white = angles_of(comparison, noise_rad);
+  FixComparison comparison = compare(layout(), gyros_, C_in_c, C_in_c, readings.h_b, readings.used,
+                                     FixBySharedStates::Zero(3, layout().shared_size()));
+  White white = angles_of(comparison, noise_rad);
   report.nis = white.nis;
   if (!(white.nis <= gate_of_freedom(comparison.components() - 3, setup_.gate_nis))) {
     report.status = FixStatus::kRejectedByGate;
@@ -535,10 +568,9 @@ AngleReport InvariantEstimator<kCapacity>::take_angles(Time t, const FixReadings
 }
 
 template <Capacity kCapacity>
-void InvariantEstimator<kCapacity>::update(const Compared& white, double root_weight) {
-  Compared rows = white;
-  rows *= root_weight;
-  const Vector x = information_.update(rows_of(rows));
+void InvariantEstimator<kCapacity>::update(Compared& white, double root_weight) {
+  white *= root_weight;
+  const Vector x = information_.update(rows_of(white));
   const Layout& layout = setup_.layout;
   for (int k = 0; k < layout.gyros; ++k) {
     Gyro& gyro = gyros_[k];

@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "trihedron/core/cholesky.hpp"
+#include "trihedron/core/elementary.hpp"
 #include "trihedron/core/on_board.hpp"
 
 namespace trihedron {
@@ -506,7 +507,7 @@ void Navigator<Estimator>::precess_all(const Estimator& estimator, const Eigen::
     precess(gyros[k], estimator.drift(), C_in_c, h_b[k], part, dt_s);
     if (layout.further.wandering_drift) {
       gyros[k].drift_rad_s.template segment<3>(layout.wandering_column()) *=
-          std::exp(-dt_s / estimator.setup().wandering_drift.time_s);
+          elementary::exp(-dt_s / estimator.setup().wandering_drift.time_s);
     }
   }
 }
@@ -526,7 +527,7 @@ void Navigator<Estimator>::append(const Estimator& estimator, const Sensitivitie
     if (layout.further.wandering_drift) {
       auto faded = stretch[k];
       faded.by_drift.first(layout.drift_columns()).template middleCols<3>(layout.wandering_column()) *=
-          std::exp(-extended_until_s_ / estimator.setup().wandering_drift.time_s);
+          elementary::exp(-extended_until_s_ / estimator.setup().wandering_drift.time_s);
       since[k].append(faded, layout.drift_columns());
     } else {
       since[k].append(stretch[k], layout.drift_columns());
@@ -566,7 +567,8 @@ Result<AttitudeSolution, DirectionsFault> Navigator<Estimator>::attitude(const E
     // Variance of ∫w(t) dt given w(0): docs/mathematics.md, section 10.
     const double x = time_since_correction_s / setup.wandering_drift.time_s;
     const double scale_rad = setup.wandering_drift.sigma * setup.wandering_drift.time_s;
-    variance_rad2 += scale_rad * scale_rad * std::max(2 * x - 3 + 4 * std::exp(-x) - std::exp(-2 * x), 0.0);
+    variance_rad2 +=
+        scale_rad * scale_rad * std::max(2 * x - 3 + 4 * elementary::exp(-x) - elementary::exp(-2 * x), 0.0);
   }
   return with_covariance(by_directions.value(), gram<Estimator::kMaxStates>(spread), noise_rad, layout.gyros,
                          variance_rad2);

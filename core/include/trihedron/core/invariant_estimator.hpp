@@ -32,7 +32,7 @@ template <Capacity kCapacity>
 class InvariantEstimator {
  public:
   static constexpr int kMaxStates = kCapacity.states;
-  static constexpr int kMaxDynamic = 6 * kCapacity.gyros;
+  static constexpr int kMaxDynamic = kCapacity.dynamic;
   static constexpr int kMaxErrors = kMaxStates;
   static constexpr int kStarTrackers = kCapacity.star_trackers;  ///< at most
   static constexpr bool kUsesAngles = true;
@@ -102,7 +102,8 @@ class InvariantEstimator {
   [[nodiscard]] AngleReport check_angles(Time t, const FixReadings& readings);
 
  private:
-  using Compared = ComparedRows<kMaxStates>;
+  static constexpr int kMaxCompared = 2 * kCapacity.gyros;  ///< components of a comparison
+  using Compared = ComparedRows<kMaxStates, kMaxCompared>;
   /// A comparison as whitened rows about the states, with its innovation covariance and NIS.
   struct White {
     Compared rows;                   ///< (H, y), unit white noise
@@ -132,6 +133,8 @@ class InvariantEstimator {
                                                const Eigen::Matrix3d& R_c, const FixReadings& readings) const;
   void start(const Eigen::Matrix3d& C_in_c, const FixReadings& readings, const Eigen::Matrix3d& R_c,
              const FixBySharedStates& by_shared);
+  void restart(const Eigen::Matrix3d& C_in_c, const FixReadings& readings, const Eigen::Matrix3d& R_c,
+               const FixBySharedStates& by_shared);
   /// 1-sigma per axis of the second-order term ½ a × b, which the linear model leaves out, by the covariances of a and
   /// b.
   [[nodiscard]] static double second_order_rad(const Eigen::Matrix3d& A, const Eigen::Matrix3d& B);
@@ -139,6 +142,9 @@ class InvariantEstimator {
   [[nodiscard]] PerGyro<double> readout_noise(double noise_factor) const;
   /// The same with the second-order term; n: consecutive measurements without a fix between them.
   [[nodiscard]] PerGyro<double> reading_noise(const Eigen::Matrix3d& C_linear, double noise_factor, int n) const;
+  /// The same for a fix, of whose error this is not known, noise apart.
+  [[nodiscard]] PerGyro<double> fix_reading_noise(const Eigen::Matrix3d& C_linear, double noise_factor,
+                                                  const Eigen::Matrix3d& misalignment) const;
   /// Covariance of what is not known of the error of a further star tracker's fix, noise apart: its first fix finds its
   /// alignment, and until then it is no attitude to linearise at.
   [[nodiscard]] Eigen::Matrix3d misalignment_of(const StarFix& fix, const FixBySharedStates& by_shared) const;
@@ -152,15 +158,25 @@ class InvariantEstimator {
   /// show.
   [[nodiscard]] White angles_of(const FixComparison& comparison, const PerGyro<double>& noise_rad) const;
   void put_innovation(White& white) const;
+  /// Reports the innovation and what the gate says of it.
+  void judge(const FixComparison& comparison, const White& white, double misfit_rad, FixReport& report);
   /// Whether a rejected misfit is so large that only a gyro fault explains it.
   [[nodiscard]] bool is_fault(double nis, double misfit_rad, int used) const;
   /// The one gyro whose removal makes a disagreeing comparison agree; kNoGyro where none or several do.
+  /// `comparison` is used for the trials, and in the end as it was.
   template <class Agrees>
-  [[nodiscard]] static int odd_gyro(const FixComparison& comparison, Agrees&& agrees);
+  [[nodiscard]] static int odd_gyro(FixComparison& comparison, Agrees&& agrees);
   /// Whether the prior allows the drift coefficients and alignments that are estimated.
   [[nodiscard]] bool prior_allows_estimates() const;
   void update_to_now(const Eigen::Matrix3d& C_in_c);
-  void update(const Compared& white, double root_weight);
+  /// Takes the rows of a comparison, which are used up, with this weight.
+  void update(Compared& white, double root_weight);
+  /// Whether the gyros agree among themselves. Not inline, so that its stack is free again when a fault is looked for.
+  [[nodiscard, gnu::noinline]] bool angles_agree(const Eigen::Matrix3d& C_by_gyros, const FixReadings& readings) const;
+  /// The gyro whose fault explains a fix that was rejected; kNoGyro where none does.
+  [[nodiscard]] int gyro_at_fault(FixComparison& comparison, const Eigen::Matrix3d& C_by_gyros,
+                                  const FixReadings& readings, const Eigen::Matrix3d& R_c,
+                                  const PerGyro<double>& noise_rad) const;
   void begin_stretch();
   /// As CalibrationSetup::fixes_sharing_a_sample() (docs/mathematics.md, section 2).
   [[nodiscard]] double fixes_sharing_samples_of(const StarFix& fix) const;

@@ -160,14 +160,16 @@ struct Capacity {
   int gyros = 0;
   int drift_columns = 0;
   int states = 0;
+  int dynamic = 0;  ///< of the states, those that move
   int star_trackers = 0;
 
   [[nodiscard]] static constexpr Capacity of(const Layout& largest) {
-    return {largest.gyros, largest.drift_columns(), largest.size(), largest.star_trackers};
+    return {largest.gyros, largest.drift_columns(), largest.size(), largest.dynamic(), largest.star_trackers};
   }
   [[nodiscard]] constexpr bool holds(const Layout& layout) const {
     return layout.gyros >= 2 && layout.gyros <= gyros && layout.drift_columns() <= drift_columns &&
-           layout.size() <= states && layout.star_trackers >= 1 && layout.star_trackers <= star_trackers;
+           layout.size() <= states && layout.dynamic() <= dynamic && layout.star_trackers >= 1 &&
+           layout.star_trackers <= star_trackers;
   }
 };
 

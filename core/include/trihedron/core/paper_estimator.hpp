@@ -115,6 +115,9 @@ class PaperEstimator {
   /// correct() before sound() is asked.
   [[nodiscard]] FixReport take(const StarFix& fix, const FixReadings& readings);
   void update_covariance_to_now(const QuasiInertial& now);
+  /// Innovation, its covariance and NIS; `rows`: the measurement whitened, L: the root of its noise.
+  void report_innovation(const Measurement& measurement, const ComparedRows<kMaxStates>& rows, const Eigen::Matrix4d& L,
+                         FixReport& report) const;
   void feed_back(const Information::Vector& correction);
 
   CalibrationSetup setup_;
