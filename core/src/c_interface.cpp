@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cstddef>
 #include <cstdint>
-#include <memory>
+#include <new>
 #include <span>
 
 #include "trihedron.h"
@@ -52,7 +52,7 @@ trihedron_application* create(void* memory, std::size_t size, std::uint32_t gyro
   }
   // Gaps between members are part of a snapshot too.
   std::fill_n(static_cast<std::byte*>(memory), sizeof(Object), std::byte{});
-  auto* object = std::construct_at(static_cast<Object*>(memory));
+  auto* object = ::new (memory) Object;
   object->gyros = gyros;
   return object;
 }
