@@ -298,7 +298,8 @@ void Application<Estimator>::note_used_fix(const StepReport& report) {
         (report.navigated->C_in_c.inverse() * Rot<In, C>::assume(fix.q_in_c.normalized())).log().raw();
     Eigen::Vector3d white = off;
     const Eigen::Matrix3d noise = fix_noise(on_board_.estimator().setup(), fix.head);
-    solve_factorized(cholesky_root<3>(report.navigated->covariance_rad2 + noise), white);
+    const Eigen::Matrix3d root = cholesky_root<3>(report.navigated->covariance_rad2 + noise);
+    solve_factorized(matrix_of(root), white);
     navigation_residuals_.add(off.dot(white) / 3);
   }
   if (fixes_since_start_ >= policy_.aligned_after_fixes) {
