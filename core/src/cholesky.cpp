@@ -1,26 +1,74 @@
 #include "trihedron/core/cholesky.hpp"
 
-#include <Eigen/Cholesky>
 #include <cmath>
 
 namespace trihedron {
+namespace {
+
+/// In place: the upper triangle of `root` becomes that of its inverse, column by column from the right, upwards.
+void invert_upper(RowsView root) {
+  for (int j = root.rows - 1; j >= 0; --j) {
+    root(j, j) = 1 / root(j, j);
+    for (int i = j - 1; i >= 0; --i) {
+      double sum = 0;
+      for (int k = i + 1; k <= j; ++k) {
+        sum += root(i, k) * root(k, j);
+      }
+      root(i, j) = -sum / root(i, i);
+    }
+  }
+}
+
+}  // namespace
 
 bool factorize(Eigen::Ref<Eigen::MatrixXd> a) {
-  const Eigen::LLT<Eigen::Ref<Eigen::MatrixXd>> factor(a);
-  a.triangularView<Eigen::StrictlyUpper>().setZero();
-  return factor.info() == Eigen::Success;
+  const Eigen::Index n = a.rows();
+  bool positive = true;
+  for (Eigen::Index j = 0; j < n; ++j) {
+    double square = a(j, j);
+    for (Eigen::Index k = 0; k < j; ++k) {
+      square -= a(j, k) * a(j, k);
+      a(k, j) = 0;
+    }
+    positive = positive && square > 0;
+    a(j, j) = std::sqrt(square);
+    for (Eigen::Index i = j + 1; i < n; ++i) {
+      double sum = a(i, j);
+      for (Eigen::Index k = 0; k < j; ++k) {
+        sum -= a(i, k) * a(j, k);
+      }
+      a(i, j) = sum / a(j, j);
+    }
+  }
+  return positive;
 }
 
-void solve_lower(const Eigen::Ref<const Eigen::MatrixXd>& L, Eigen::Ref<Eigen::MatrixXd> b) {
-  b = L.triangularView<Eigen::Lower>().solve(b);
+void solve_lower(const MatrixView& L, Eigen::Ref<Eigen::MatrixXd> b) {
+  for (Eigen::Index column = 0; column < b.cols(); ++column) {
+    for (Eigen::Index i = 0; i < b.rows(); ++i) {
+      double sum = b(i, column);
+      for (Eigen::Index k = 0; k < i; ++k) {
+        sum -= L(i, k) * b(k, column);
+      }
+      b(i, column) = sum / L(i, i);
+    }
+  }
 }
 
-void solve_factorized(const Eigen::Ref<const Eigen::MatrixXd>& L, Eigen::Ref<Eigen::MatrixXd> b) {
-  b = L.triangularView<Eigen::Lower>().solve(b);
-  b = L.transpose().triangularView<Eigen::Upper>().solve(b);
+void solve_factorized(const MatrixView& L, Eigen::Ref<Eigen::MatrixXd> b) {
+  solve_lower(L, b);
+  for (Eigen::Index column = 0; column < b.cols(); ++column) {
+    for (Eigen::Index i = b.rows() - 1; i >= 0; --i) {
+      double sum = b(i, column);
+      for (Eigen::Index k = i + 1; k < b.rows(); ++k) {
+        sum -= L(k, i) * b(k, column);
+      }
+      b(i, column) = sum / L(i, i);
+    }
+  }
 }
 
-void solve_lower(const Eigen::Ref<const Eigen::MatrixXd>& L, RowsView b) {
+void solve_lower(const MatrixView& L, RowsView b) {
   for (int i = 0; i < b.rows; ++i) {
     double* __restrict row = b.row(i);
     for (int j = 0; j < i; ++j) {
@@ -66,17 +114,7 @@ bool information_root(const Eigen::Ref<const Eigen::MatrixXd>& covariance, RowsV
       }
     }
   }
-  // … and the root is its inverse, column by column from the right, upwards.
-  for (int j = n - 1; j >= 0; --j) {
-    root(j, j) = 1 / root(j, j);
-    for (int i = j - 1; i >= 0; --i) {
-      double sum = 0;
-      for (int k = i + 1; k <= j; ++k) {
-        sum += root(i, k) * root(k, j);
-      }
-      root(i, j) = -sum / root(i, i);
-    }
-  }
+  invert_upper(root);  // … and the root is its inverse
   for (int j = 0; j < n; ++j) {
     for (int i = 0; i <= j; ++i) {
       root(i, j) /= std::sqrt(covariance(j, j));

@@ -46,7 +46,7 @@ void DirectionsFit::add(Time t, const Directions& h_b) {
 FittedDirections DirectionsFit::solve() const {
   const Eigen::Matrix<double, kTerms, kTerms> L = cholesky_root<kTerms>(normal_);
   Right coefficients = right_;
-  solve_factorized(L, coefficients);
+  solve_factorized(matrix_of(L), coefficients);
   FittedDirections result;
   result.freedom = 2 * (samples_ - terms_);
   for (int k = 0; k < gyros_; ++k) {
@@ -63,7 +63,7 @@ FittedDirections DirectionsFit::solve() const {
     }
   }
   Eigen::Vector4d at_zero = Eigen::Vector4d::UnitX();
-  solve_lower(L, at_zero);
+  solve_lower(matrix_of(L), at_zero);
   result.noise_factor = at_zero.norm();
   return result;
 }

@@ -3,6 +3,11 @@
 #include <algorithm>
 
 namespace trihedron {
+namespace {
+
+bool in_range(Time t) { return -Intake::kMaxTime <= t.time_since_epoch() && t.time_since_epoch() <= Intake::kMaxTime; }
+
+}  // namespace
 
 Intake::Intake(const CalibrationSetup& setup)
     : gyros_(setup.layout.gyros),
@@ -11,6 +16,9 @@ Intake::Intake(const CalibrationSetup& setup)
       health_(setup.layout.gyros) {}
 
 Intake::Clock Intake::look_at_clock(Time t, const std::optional<Time>& latest) {
+  if (!in_range(t)) {
+    return Clock::kOutOfOrder;
+  }
   if (latest && !(t > *latest)) {
     if (!is_set_back(t)) {
       return Clock::kOutOfOrder;
@@ -70,6 +78,9 @@ FixStatus Intake::look_at(const StarFix& fix, const std::optional<Time>& latest,
   }
   if (fix.head < 0 || fix.head >= star_trackers_) {
     return FixStatus::kRejectedUnknownHead;
+  }
+  if (!in_range(fix.t)) {
+    return FixStatus::kRejectedOutOfOrder;
   }
   const PerGyro<GyroState> states = health_.states();
   const auto used_now = std::count(states.begin(), states.begin() + gyros_, GyroState::kUsed);

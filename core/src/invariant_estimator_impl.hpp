@@ -4,8 +4,10 @@
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "trihedron/core/cholesky.hpp"
+#include "trihedron/core/elementary.hpp"
 #include "trihedron/core/invariant_estimator.hpp"
 
 namespace trihedron {
@@ -39,7 +41,7 @@ std::optional<SetupFault> InvariantEstimator<kCapacity>::set_up(const Calibratio
   setup_ = setup;
   drift_ = DriftModel(layout.drift_model, layout.further);
   prior_gyros_ = prior;
-  prior_ = information;
+  prior_.pack(std::as_const(information).root());
   forget();
   return std::nullopt;
 }
@@ -79,10 +81,7 @@ void InvariantEstimator<kCapacity>::begin_stretch() {
 
 template <Capacity kCapacity>
 void InvariantEstimator<kCapacity>::prior_error_root(RowsView root) const {
-  const int first = layout().direction(layout().gyros);
-  const int size = layout().shared() - first;
-  const ConstRowsView R = prior_.root();
-  invert_triangle({&R(first, first), size, size, R.stride}, root);
+  prior_.invert(layout().direction(layout().gyros), root);
 }
 
 template <Capacity kCapacity>
@@ -99,30 +98,41 @@ double InvariantEstimator<kCapacity>::second_order_rad(const Eigen::Matrix3d& A,
 }
 
 template <Capacity kCapacity>
-void InvariantEstimator<kCapacity>::update_to_now(const Eigen::Matrix3d& C_in_c) {
+auto InvariantEstimator<kCapacity>::prediction_noise(const Eigen::Matrix3d& C_in_c)
+    -> PerGyro<double, kCapacity.gyros> {
   const Layout& layout = setup_.layout;
-  const int d = layout.dynamic();
-  const int columns = layout.drift_columns();
-  typename Information::DynamicMatrix A_inverse = Information::DynamicMatrix::Zero(d, d);
-  typename Information::DynamicByConstants B = Information::DynamicByConstants::Zero(d, layout.constants());
-  typename Information::DynamicVector noise = Information::DynamicVector::Zero(d);
   const double walk = setup_.direction_random_walk_rad_sqrt_s;
-  const double kept = setup_.wandering_drift.kept(time_since_fix_s_);
+  PerGyro<double, kCapacity.gyros> noise_rad;
   for (int k = 0; k < layout.gyros; ++k) {
-    const auto& since = since_fix_[k];
-    const auto by_drift = since.by_drift.first(columns);
-    const int row = layout.direction(k);
     // This error keeps its sign until the estimates change, so its sigma adds up, not its variance
     // (docs/mathematics.md, section 8).
     Rows3 rows = Rows3::Zero(3, layout.size());
     rows.template middleCols<3>(layout.alignment(k)) = C_in_c;
     const Eigen::Matrix3d alignment = covariance_of(rows);
     rows.setZero();
-    rows.middleCols(layout.drift(k), layout.drift_size()) = by_drift.leftCols(layout.drift_size());
+    rows.middleCols(layout.drift(k), layout.drift_size()) =
+        since_fix_[k].by_drift.first(layout.drift_columns()).leftCols(layout.drift_size());
     const double before = second_order_rad_[k];
     second_order_rad_[k] += second_order_rad(alignment, covariance_of(rows));
-    const double sigma = std::sqrt(walk * walk * time_since_fix_s_ + extra_variance_rad2_ +
-                                   second_order_rad_[k] * second_order_rad_[k] - before * before);
+    noise_rad[k] = std::sqrt(walk * walk * time_since_fix_s_ + extra_variance_rad2_ +
+                             second_order_rad_[k] * second_order_rad_[k] - before * before);
+  }
+  return noise_rad;
+}
+
+template <Capacity kCapacity>
+void InvariantEstimator<kCapacity>::propagate(const PerGyro<double, kCapacity.gyros>& noise_rad) {
+  const Layout& layout = setup_.layout;
+  const int d = layout.dynamic();
+  const int columns = layout.drift_columns();
+  typename Information::DynamicMatrix A_inverse = Information::DynamicMatrix::Zero(d, d);
+  typename Information::DynamicByConstants B = Information::DynamicByConstants::Zero(d, layout.constants());
+  typename Information::DynamicVector noise = Information::DynamicVector::Zero(d);
+  const double kept = setup_.wandering_drift.kept(time_since_fix_s_);
+  for (int k = 0; k < layout.gyros; ++k) {
+    const auto& since = since_fix_[k];
+    const auto by_drift = since.by_drift.first(columns);
+    const int row = layout.direction(k);
     const Eigen::Matrix3d to_start = since.by_start.inverse();
     A_inverse.template block<3, 3>(row, row) = to_start;
     B.block(row, layout.drift(k) - d, 3, layout.drift_size()) = by_drift.leftCols(layout.drift_size());
@@ -130,7 +140,7 @@ void InvariantEstimator<kCapacity>::update_to_now(const Eigen::Matrix3d& C_in_c)
     if (layout.further.coefficient_change) {
       B.block(row, layout.change(k) - d, 3, Layout::kEq1) = by_drift.middleCols(layout.change_column(), Layout::kEq1);
     }
-    noise.template segment<3>(row).setConstant(sigma);
+    noise.template segment<3>(row).setConstant(noise_rad[k]);
     if (layout.further.wandering_drift) {
       const int wandering = layout.wandering(k);
       A_inverse.template block<3, 3>(row, wandering) =
@@ -171,10 +181,11 @@ void InvariantEstimator<kCapacity>::start(const Eigen::Matrix3d& C_in_c, const F
     const double sigma = readings.used[k] ? setup_.readout_noise_rad[k] * readings.noise_factor : kUnknown_rad;
     R.template block<3, 3>(row, row).diagonal().array() += sigma * sigma;
   }
-  information_ = prior_;
+  information_.reset(layout.size(), layout.dynamic());
+  prior_.unpack(information_.root());
   std::ranges::fill(second_order_rad_, 0.0);
   static_cast<void>(factorize(R));
-  solve_lower(R, rows_of(H));
+  solve_lower(matrix_of(R), rows_of(H));
   information_.add_information(rows_of(H));
   begin_stretch();
   angles_since_fix_ = 0;
@@ -191,12 +202,11 @@ bool InvariantEstimator<kCapacity>::prior_allows_estimates() const {
     moved.template segment<3>(layout.alignment(k)) =
         Rot<C, C>::assume(Eigen::Matrix3d(gyros_[k].C_c_b * before.C_c_b.transpose())).log().raw();
   }
-  const ConstRowsView R = prior_.root();
   double square = 0;
   for (int i = 0; i < layout.size(); ++i) {
     double sum = 0;
     for (int j = i; j < layout.size(); ++j) {
-      sum += R(i, j) * moved(j);
+      sum += prior_(i, j) * moved(j);
     }
     square += sum * sum;
   }
@@ -222,7 +232,7 @@ Eigen::Matrix3d InvariantEstimator<kCapacity>::fused_attitude(const AttitudeByDi
   const Eigen::Matrix3d P =
       with_covariance(by_gyros, spread, readout_noise(readings.noise_factor), layout().gyros, 0).covariance_rad2;
   Eigen::Vector3d weighted = (by_gyros.C_in_c.inverse() * by_fix).log().raw();
-  solve_factorized(cholesky_root<3>(P + R_c), weighted);
+  solve_factorized(matrix_of(cholesky_root<3>(P + R_c)), weighted);
   return (by_gyros.C_in_c * Rot<C, C>::exp(Vec<C>::assume(P * weighted))).raw();
 }
 
@@ -246,9 +256,34 @@ PerGyro<double> InvariantEstimator<kCapacity>::reading_noise(const Eigen::Matrix
     rows.template middleCols<3>(layout().alignment(k)) = -C_linear;
     const Eigen::Matrix3d alignment = covariance_of(rows);
     rows.template middleCols<3>(layout().direction(k)).setIdentity();
-    noise_rad[k] = std::hypot(noise_rad[k], in_a_row * second_order_rad(alignment, covariance_of(rows)));
+    noise_rad[k] =
+        elementary::root_of_squares(noise_rad[k], in_a_row * second_order_rad(alignment, covariance_of(rows)));
   }
   return noise_rad;
+}
+
+template <Capacity kCapacity>
+PerGyro<double> InvariantEstimator<kCapacity>::fix_reading_noise(const Eigen::Matrix3d& C_linear, double noise_factor,
+                                                                 const Eigen::Matrix3d& misalignment) const {
+  PerGyro<double> noise_rad = reading_noise(C_linear, noise_factor, 1);
+  // Of the second order, and not normal: three times its sigma costs nothing but the weight of the first such fix.
+  for (double& its : noise_rad) {
+    its = elementary::root_of_squares(its, 3 * second_order_rad(misalignment, misalignment));
+  }
+  return noise_rad;
+}
+
+template <Capacity kCapacity>
+void InvariantEstimator<kCapacity>::restart(const Eigen::Matrix3d& C_in_c, const FixReadings& readings,
+                                            const Eigen::Matrix3d& R_c, const FixBySharedStates& by_shared) {
+  // The information was gathered about estimates that are far off: restart from the present ones, and where that is no
+  // better, from the prior.
+  restarted_from_estimates_ = !restarted_from_estimates_ && prior_allows_estimates();
+  if (!restarted_from_estimates_) {
+    gyros_ = prior_gyros_;
+    shared_.setZero();
+  }
+  start(C_in_c, readings, R_c, by_shared);
 }
 
 template <Capacity kCapacity>
@@ -273,7 +308,7 @@ void InvariantEstimator<kCapacity>::put_innovation(White& white) const {
   ComponentCovariance root = white.covariance;
   static_cast<void>(factorize(root));
   FixReport::Innovation y = white.rows.col(layout().size());
-  solve_lower(root, y);
+  solve_lower(matrix_of(root), y);
   white.nis = y.squaredNorm();
 }
 
@@ -281,7 +316,7 @@ template <Capacity kCapacity>
 auto InvariantEstimator<kCapacity>::whitened(const FixComparison& comparison, const Eigen::Matrix3d& R_c,
                                              const PerGyro<double>& noise_rad) const -> White {
   White white;
-  white.rows = rows_about_states_now<kMaxStates>(layout(), comparison);
+  white.rows = rows_about_states_now<kMaxStates, kMaxCompared>(layout(), comparison);
   white.L = noise_of(comparison, R_c, noise_rad);
   whiten(white.L, rows_of(white.rows));
   put_innovation(white);
@@ -292,11 +327,13 @@ template <Capacity kCapacity>
 auto InvariantEstimator<kCapacity>::rows_to_use(const FixComparison& comparison, const Eigen::Matrix3d& R_c,
                                                 PerGyro<double> noise_rad, double noise_factor, double sharing) const
     -> Compared {
-  const PerGyro<double> readout_rad = readout_noise(noise_factor * std::sqrt(sharing - 1));
-  for (int k = 0; k < layout().gyros; ++k) {
-    noise_rad[k] = std::hypot(noise_rad[k], readout_rad[k]);
+  if (sharing > 1) {
+    const PerGyro<double> readout_rad = readout_noise(noise_factor * std::sqrt(sharing - 1));
+    for (int k = 0; k < layout().gyros; ++k) {
+      noise_rad[k] = elementary::root_of_squares(noise_rad[k], readout_rad[k]);
+    }
   }
-  Compared rows = rows_about_states_now<kMaxStates>(layout(), comparison);
+  Compared rows = rows_about_states_now<kMaxStates, kMaxCompared>(layout(), comparison);
   ComponentCovariance L = noise_of(comparison, R_c, noise_rad);
   whiten(L, rows_of(rows));
   return rows;
@@ -310,9 +347,9 @@ auto InvariantEstimator<kCapacity>::angles_of(const FixComparison& comparison, c
   // what is left.
   const int components = comparison.components();
   const int columns = layout().size() + 1;
-  Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor, kMaxComponents, 3 + kMaxStates + 1> rows(
+  Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor, kMaxCompared, 3 + kMaxStates + 1> rows(
       components, 3 + columns);
-  rows.rightCols(columns) = rows_about_states_now<kMaxStates>(layout(), comparison);
+  rows.rightCols(columns) = rows_about_states_now<kMaxStates, kMaxCompared>(layout(), comparison);
   int row = 0;
   for (int k = 0; k < layout().gyros; ++k) {
     if (comparison.used[k]) {
@@ -338,15 +375,16 @@ bool InvariantEstimator<kCapacity>::is_fault(double nis, double misfit_rad, int 
 
 template <Capacity kCapacity>
 template <class Agrees>
-int InvariantEstimator<kCapacity>::odd_gyro(const FixComparison& comparison, Agrees&& agrees) {
+int InvariantEstimator<kCapacity>::odd_gyro(FixComparison& comparison, Agrees&& agrees) {
   int odd = kNoGyro;
   for (int k = 0; k < kMaxGyros; ++k) {
     if (!comparison.used[k]) {
       continue;
     }
-    FixComparison others = comparison;
-    others.used[k] = false;
-    if (agrees(others)) {
+    comparison.used[k] = false;
+    const bool others_agree = agrees(comparison);
+    comparison.used[k] = true;
+    if (others_agree) {
       if (odd != kNoGyro) {
         return kNoGyro;  // more than one candidate: ambiguous
       }
@@ -354,6 +392,26 @@ int InvariantEstimator<kCapacity>::odd_gyro(const FixComparison& comparison, Agr
     }
   }
   return odd;
+}
+
+template <Capacity kCapacity>
+bool InvariantEstimator<kCapacity>::angles_agree(const Eigen::Matrix3d& C_by_gyros, const FixReadings& readings) const {
+  const PerGyro<double> noise_rad = reading_noise(C_by_gyros, readings.noise_factor, 1);
+  const FixComparison angles = compare(layout(), gyros_, C_by_gyros, C_by_gyros, readings.h_b, readings.used,
+                                       FixBySharedStates::Zero(3, layout().shared_size()));
+  return angles_of(angles, noise_rad).nis <= gate_of_freedom(angles.components() - 3, setup_.gate_nis);
+}
+
+template <Capacity kCapacity>
+int InvariantEstimator<kCapacity>::gyro_at_fault(FixComparison& comparison, const Eigen::Matrix3d& C_by_gyros,
+                                                 const FixReadings& readings, const Eigen::Matrix3d& R_c,
+                                                 const PerGyro<double>& noise_rad) const {
+  if (angles_agree(C_by_gyros, readings)) {
+    return kNoGyro;  // a misfit that a common rotation of all momenta explains is attributed to the star tracker
+  }
+  return odd_gyro(comparison, [&](const FixComparison& rest) {
+    return whitened(rest, R_c, noise_rad).nis <= gate_of_freedom(rest.components(), setup_.gate_nis);
+  });
 }
 
 namespace detail {
@@ -394,58 +452,8 @@ inline void report_innovation(const Layout& layout, const FixComparison& compari
 }  // namespace detail
 
 template <Capacity kCapacity>
-FixReport InvariantEstimator<kCapacity>::correct(const StarFix& fix, const FixReadings& readings) {
-  const FixReport report = take(fix, readings);
-  if (!started_ || sound()) {
-    return report;
-  }
-  forget();
-  return lost(fix);
-}
-
-template <Capacity kCapacity>
-AngleReport InvariantEstimator<kCapacity>::check_angles(Time t, const FixReadings& readings) {
-  const AngleReport report = take_angles(t, readings);
-  if (sound()) {
-    return report;
-  }
-  forget();
-  return {.status = FixStatus::kEstimateLost, .t = t};
-}
-
-template <Capacity kCapacity>
-FixReport InvariantEstimator<kCapacity>::take(const StarFix& fix, const FixReadings& readings) {
-  FixReport report;
-  report.t = fix.t;
-  report.head = fix.head;
-  const FixBySharedStates by_shared = fix_by_shared_states(setup_, fix, readings.rate_c);
-  const Rot<In, C> C_in_c = corrected(fix, by_shared, shared_);
-  const Eigen::Matrix3d R_c = fix_noise(setup_, fix.head);
-  const auto by_gyros = attitude(gyros_, readings.h_b, readings.used);
-  if (!started_) {
-    start(C_in_c.raw(), readings, R_c, by_shared);
-    started_ = attitude(gyros_, readings.h_b, all_gyros(layout().gyros)).ok();
-    used_fix_t_ = {};
-    used_fix_t_[static_cast<std::size_t>(fix.head)] = fix.t;
-    report.status = started_ ? FixStatus::kStarted : FixStatus::kRejectedGeometry;
-    return report;
-  }
-  if (!by_gyros) {
-    report.status = FixStatus::kRejectedGeometry;
-    return report;
-  }
-  update_to_now(by_gyros.value().C_in_c.raw());
-  const Eigen::Matrix3d misalignment = misalignment_of(fix, by_shared);
-  const Eigen::Matrix3d C_linear = fused_attitude(by_gyros.value(), C_in_c, R_c + misalignment, readings);
-  PerGyro<double> noise_rad = reading_noise(C_linear, readings.noise_factor, 1);
-  // Of the second order, and not normal: three times its sigma costs nothing but the weight of the first such fix.
-  for (double& its : noise_rad) {
-    its = std::hypot(its, 3 * second_order_rad(misalignment, misalignment));
-  }
-  const FixComparison comparison =
-      compare(layout(), gyros_, C_in_c.raw(), C_linear, readings.h_b, readings.used, by_shared);
-  const White white = whitened(comparison, R_c, noise_rad);
-  const double misfit_rad = detail::misfit_rad(comparison);
+void InvariantEstimator<kCapacity>::ask_gate(const FixComparison& comparison, const White& white, double misfit_rad,
+                                             FixReport& report) {
   report.nis = white.nis;
   const ComponentCovariance left = white.L.lazyProduct(white.covariance);
   detail::report_innovation(layout(), comparison, left.lazyProduct(white.L.transpose()), report);
@@ -454,91 +462,275 @@ FixReport InvariantEstimator<kCapacity>::take(const StarFix& fix, const FixReadi
   report.rejections_in_a_row = gate_.rejections_in_a_row();
   report.jumped = gate_.jumped();
   report.weight = student_t_weight(setup_.student_t_freedom, report.nis, comparison.components());
+}
+
+// ---- Corrections, stage by stage
+
+template <Capacity kCapacity>
+int InvariantEstimator<kCapacity>::cost(const Correction& correction) {
+  constexpr std::array<int, 10> kCosts = {25, 120, 185, 85, 150, 140, 420, 300, 190, 0};
+  return kCosts[static_cast<std::size_t>(correction.stage)];
+}
+
+template <Capacity kCapacity>
+int InvariantEstimator<kCapacity>::cost_to_end(const Correction& correction) {
+  using Stage = typename Correction::Stage;
+  Correction next = correction;
+  int sum = 0;
+  for (auto stage = static_cast<int>(correction.stage); stage < static_cast<int>(Stage::kDone); ++stage) {
+    next.stage = static_cast<Stage>(stage);
+    const bool is_unusual = next.stage == Stage::kFault || next.stage == Stage::kRestart;
+    sum += is_unusual && next.stage != correction.stage ? 0 : cost(next);
+  }
+  return sum;
+}
+
+template <Capacity kCapacity>
+FixReport InvariantEstimator<kCapacity>::correct(const StarFix& fix, const FixReadings& readings) {
+  Correction correction;
+  FixReport report;
+  for (int i = 0; i < kMostStages && !correction.done(); ++i) {
+    carry_on(correction, fix, readings, report);
+  }
+  return report;
+}
+
+template <Capacity kCapacity>
+AngleReport InvariantEstimator<kCapacity>::check_angles(Time t, const FixReadings& readings) {
+  Correction correction;
+  AngleReport report;
+  for (int i = 0; i < kMostStages && !correction.done(); ++i) {
+    carry_on(correction, t, readings, report);
+  }
+  return report;
+}
+
+template <Capacity kCapacity>
+void InvariantEstimator<kCapacity>::carry_on(Correction& correction, const StarFix& fix, const FixReadings& readings,
+                                             FixReport& report) {
+  take(correction, fix, readings, report);
+  if (correction.done() && started_ && !sound()) {
+    forget();
+    report = lost(fix);
+  }
+}
+
+template <Capacity kCapacity>
+void InvariantEstimator<kCapacity>::carry_on(Correction& correction, Time t, const FixReadings& readings,
+                                             AngleReport& report) {
+  report.t = t;
+  take_angles(correction, readings, report);
+  if (correction.done() && !sound()) {
+    forget();
+    report = {.status = FixStatus::kEstimateLost, .t = t};
+  }
+}
+
+template <Capacity kCapacity>
+auto InvariantEstimator<kCapacity>::seen(const StarFix& fix, const FixReadings& readings) const -> Seen {
+  const FixBySharedStates by_shared = fix_by_shared_states(setup_, fix, readings.rate_c);
+  return {by_shared, corrected(fix, by_shared, shared_), fix_noise(setup_, fix.head)};
+}
+
+template <Capacity kCapacity>
+FixComparison InvariantEstimator<kCapacity>::compared(const Seen& its, const Correction& correction,
+                                                      const FixReadings& readings) const {
+  return compare(layout(), gyros_, its.C_in_c.raw(), correction.C_linear, readings.h_b, readings.used, its.by_shared);
+}
+
+template <Capacity kCapacity>
+void InvariantEstimator<kCapacity>::take(Correction& correction, const StarFix& fix, const FixReadings& readings,
+                                         FixReport& report) {
+  using Stage = typename Correction::Stage;
+  const Seen its = seen(fix, readings);
+  switch (correction.stage) {
+    case Stage::kBegin:
+      begin(correction, its, fix, readings, report);
+      break;
+    case Stage::kSecondOrder:
+      correction.prediction_noise_rad =
+          prediction_noise(correction.reopened ? correction.C_linear : attitude_now(readings).C_in_c.raw());
+      correction.stage = Stage::kPropagation;
+      break;
+    case Stage::kPropagation:
+      propagate(correction.prediction_noise_rad);
+      correction.stage = correction.reopened ? Stage::kUpdate : Stage::kAttitude;
+      break;
+    case Stage::kAttitude:
+      correction.C_linear =
+          fused_attitude(attitude_now(readings), its.C_in_c, its.R_c + misalignment_of(fix, its.by_shared), readings);
+      correction.stage = Stage::kNoise;
+      break;
+    case Stage::kNoise:
+      correction.reading_noise_rad =
+          fix_reading_noise(correction.C_linear, readings.noise_factor, misalignment_of(fix, its.by_shared));
+      correction.stage = Stage::kJudgement;
+      break;
+    case Stage::kJudgement:
+      judge(correction, its, readings, report);
+      break;
+    case Stage::kFault:
+      look_for_fault(correction, its, readings, report);
+      break;
+    case Stage::kRestart:
+      restart(its.C_in_c.raw(), readings, its.R_c, its.by_shared);
+      report.weight = 1;
+      correction.stage = Stage::kDone;
+      break;
+    case Stage::kUpdate:
+      update(correction, its, fix, readings, report);
+      break;
+    default:
+      correction.stage = Stage::kDone;
+      break;
+  }
+}
+
+template <Capacity kCapacity>
+void InvariantEstimator<kCapacity>::begin(Correction& correction, const Seen& its, const StarFix& fix,
+                                          const FixReadings& readings, FixReport& report) {
+  report.t = fix.t;
+  report.head = fix.head;
+  correction.stage = Correction::Stage::kDone;
+  if (!started_) {
+    start(its.C_in_c.raw(), readings, its.R_c, its.by_shared);
+    started_ = attitude(gyros_, readings.h_b, all_gyros(layout().gyros)).ok();
+    used_fix_t_ = {};
+    used_fix_t_[static_cast<std::size_t>(fix.head)] = fix.t;
+    report.status = started_ ? FixStatus::kStarted : FixStatus::kRejectedGeometry;
+  } else if (!attitude(gyros_, readings.h_b, readings.used)) {
+    report.status = FixStatus::kRejectedGeometry;
+  } else {
+    correction.stage = Correction::Stage::kSecondOrder;
+  }
+}
+
+template <Capacity kCapacity>
+void InvariantEstimator<kCapacity>::judge(Correction& correction, const Seen& its, const FixReadings& readings,
+                                          FixReport& report) {
+  using Stage = typename Correction::Stage;
+  const FixComparison comparison = compared(its, correction, readings);
+  const double misfit_rad = detail::misfit_rad(comparison);
+  ask_gate(comparison, whitened(comparison, its.R_c, correction.reading_noise_rad), misfit_rad, report);
+  correction.stage = Stage::kUpdate;
   switch (report.status) {
     case FixStatus::kRejectedByGate:
-      // A misfit that a common rotation of all momenta explains is attributed to the star tracker.
       if (is_fault(report.nis, misfit_rad, count(readings.used))) {
-        const Eigen::Matrix3d& C_by_gyros = by_gyros.value().C_in_c.raw();
-        const PerGyro<double> angle_noise_rad = reading_noise(C_by_gyros, readings.noise_factor, 1);
-        const FixComparison angles = compare(layout(), gyros_, C_by_gyros, C_by_gyros, readings.h_b, readings.used,
-                                             FixBySharedStates::Zero(3, layout().shared_size()));
-        const int freedom = angles.components() - 3;
-        if (!(angles_of(angles, angle_noise_rad).nis <= gate_of_freedom(freedom, setup_.gate_nis))) {
-          report.odd_gyro = odd_gyro(comparison, [&](const FixComparison& rest) {
-            return whitened(rest, R_c, noise_rad).nis <= gate_of_freedom(rest.components(), setup_.gate_nis);
-          });
-        }
+        correction.stage = Stage::kFault;
+      } else {
+        use_all_the_same(correction, report);
       }
-      if (!(report.weight < 1) || report.jumped || report.odd_gyro != kNoGyro) {
-        return report;
-      }
-      report.status = FixStatus::kUsed;
       break;
     case FixStatus::kRestarted:
-      // The information was gathered about estimates that are far off: restart from the present ones, and where that is
-      // no better, from the prior.
-      restarted_from_estimates_ = !restarted_from_estimates_ && prior_allows_estimates();
-      if (!restarted_from_estimates_) {
-        gyros_ = prior_gyros_;
-        shared_.setZero();
-      }
-      start(C_in_c.raw(), readings, R_c, by_shared);
-      report.weight = 1;
-      return report;
+      correction.stage = Stage::kRestart;
+      break;
     case FixStatus::kUsedAfterReopening:
       restarted_from_estimates_ = false;  // the last restart was long ago, so it had helped
       add_direction_variance(misfit_rad * misfit_rad / (2 * layout().gyros));
-      update_to_now(C_linear);
+      correction.reopened = true;
+      correction.stage = Stage::kSecondOrder;
       report.weight = 1;
       break;
     default:
       break;
   }
-  angles_since_fix_ = 0;
-  const double sharing = fixes_sharing_samples_of(fix);
-  used_fix_t_[static_cast<std::size_t>(fix.head)] = fix.t;
-  update(sharing > 1 ? rows_to_use(comparison, R_c, noise_rad, readings.noise_factor, sharing) : white.rows,
-         std::sqrt(report.weight));
-  return report;
 }
 
 template <Capacity kCapacity>
-AngleReport InvariantEstimator<kCapacity>::take_angles(Time t, const FixReadings& readings) {
-  AngleReport report;
-  report.t = t;
-  const auto by_gyros = attitude(gyros_, readings.h_b, readings.used);
-  if (!by_gyros) {
-    report.status = FixStatus::kRejectedGeometry;
-    return report;
+void InvariantEstimator<kCapacity>::use_all_the_same(Correction& correction, FixReport& report) {
+  if (!(report.weight < 1) || report.jumped || report.odd_gyro != kNoGyro) {
+    correction.stage = Correction::Stage::kDone;
+    return;
   }
-  const Eigen::Matrix3d& C_in_c = by_gyros.value().C_in_c.raw();
-  update_to_now(C_in_c);
-  const PerGyro<double> noise_rad = reading_noise(C_in_c, readings.noise_factor, ++angles_since_fix_);
-  const FixComparison comparison = compare(layout(), gyros_, C_in_c, C_in_c, readings.h_b, readings.used,
-                                           FixBySharedStates::Zero(3, layout().shared_size()));
-  const White white = angles_of(comparison, noise_rad);
+  report.status = FixStatus::kUsed;
+  correction.stage = Correction::Stage::kUpdate;
+}
+
+template <Capacity kCapacity>
+void InvariantEstimator<kCapacity>::look_for_fault(Correction& correction, const Seen& its, const FixReadings& readings,
+                                                   FixReport& report) const {
+  FixComparison comparison = compared(its, correction, readings);
+  report.odd_gyro =
+      gyro_at_fault(comparison, attitude_now(readings).C_in_c.raw(), readings, its.R_c, correction.reading_noise_rad);
+  use_all_the_same(correction, report);
+}
+
+template <Capacity kCapacity>
+void InvariantEstimator<kCapacity>::update(Correction& correction, const Seen& its, const StarFix& fix,
+                                           const FixReadings& readings, const FixReport& report) {
+  angles_since_fix_ = 0;
+  const double sharing = fixes_sharing_samples_of(fix);
+  used_fix_t_[static_cast<std::size_t>(fix.head)] = fix.t;
+  Compared rows = rows_to_use(compared(its, correction, readings), its.R_c, correction.reading_noise_rad,
+                              readings.noise_factor, sharing);
+  update(rows, std::sqrt(report.weight));
+  correction.stage = Correction::Stage::kDone;
+}
+
+template <Capacity kCapacity>
+void InvariantEstimator<kCapacity>::take_angles(Correction& correction, const FixReadings& readings,
+                                                AngleReport& report) {
+  using Stage = typename Correction::Stage;
+  switch (correction.stage) {
+    case Stage::kBegin:
+      if (attitude(gyros_, readings.h_b, readings.used)) {
+        correction.stage = Stage::kSecondOrder;
+      } else {
+        report.status = FixStatus::kRejectedGeometry;
+        correction.stage = Stage::kDone;
+      }
+      break;
+    case Stage::kSecondOrder:
+      correction.prediction_noise_rad = prediction_noise(attitude_now(readings).C_in_c.raw());
+      correction.stage = Stage::kPropagation;
+      break;
+    case Stage::kPropagation:
+      propagate(correction.prediction_noise_rad);
+      correction.stage = Stage::kNoise;
+      break;
+    case Stage::kNoise:
+      correction.reading_noise_rad =
+          reading_noise(attitude_now(readings).C_in_c.raw(), readings.noise_factor, ++angles_since_fix_);
+      correction.stage = Stage::kJudgement;
+      break;
+    case Stage::kJudgement:
+      judge_angles(correction, readings, report);
+      break;
+    default:
+      correction.stage = Stage::kDone;
+      break;
+  }
+}
+
+template <Capacity kCapacity>
+void InvariantEstimator<kCapacity>::judge_angles(Correction& correction, const FixReadings& readings,
+                                                 AngleReport& report) {
+  correction.stage = Correction::Stage::kDone;
+  const Eigen::Matrix3d C_in_c = attitude_now(readings).C_in_c.raw();
+  FixComparison comparison = compare(layout(), gyros_, C_in_c, C_in_c, readings.h_b, readings.used,
+                                     FixBySharedStates::Zero(3, layout().shared_size()));
+  White white = angles_of(comparison, correction.reading_noise_rad);
   report.nis = white.nis;
   if (!(white.nis <= gate_of_freedom(comparison.components() - 3, setup_.gate_nis))) {
     report.status = FixStatus::kRejectedByGate;
     if (count(readings.used) > 2 && is_fault(report.nis, detail::misfit_rad(comparison), count(readings.used))) {
       report.odd_gyro = odd_gyro(comparison, [&](const FixComparison& rest) {
-        return angles_of(rest, noise_rad).nis <= gate_of_freedom(rest.components() - 3, setup_.gate_nis);
+        return angles_of(rest, correction.reading_noise_rad).nis <=
+               gate_of_freedom(rest.components() - 3, setup_.gate_nis);
       });
     }
     report.rejections_in_a_row = ++angle_rejections_in_a_row_;
-    return report;
+    return;
   }
   report.status = FixStatus::kUsed;
   angle_rejections_in_a_row_ = 0;
   update(white.rows, 1);
-  return report;
 }
 
 template <Capacity kCapacity>
-void InvariantEstimator<kCapacity>::update(const Compared& white, double root_weight) {
-  Compared rows = white;
-  rows *= root_weight;
-  const Vector x = information_.update(rows_of(rows));
+void InvariantEstimator<kCapacity>::update(Compared& white, double root_weight) {
+  white *= root_weight;
+  const Vector x = information_.update(rows_of(white));
   const Layout& layout = setup_.layout;
   for (int k = 0; k < layout.gyros; ++k) {
     Gyro& gyro = gyros_[k];

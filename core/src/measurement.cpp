@@ -1,8 +1,7 @@
 #include "trihedron/core/measurement.hpp"
 
-#include <cmath>
-
 #include "trihedron/core/cholesky.hpp"
+#include "trihedron/core/elementary.hpp"
 
 namespace trihedron {
 
@@ -16,8 +15,8 @@ FixBySharedStates fix_by_shared_states(const CalibrationSetup& setup, const Star
   if (layout.further.orbital_error && fix.head == 0) {
     const double phase = setup.orbital_rate_rad_s * to_seconds(fix.t - setup.orbital_phase_zero);
     const int first = layout.orbital_error() - layout.shared();
-    by.middleCols<3>(first) = std::sin(phase) * Eigen::Matrix3d::Identity();
-    by.middleCols<3>(first + 3) = std::cos(phase) * Eigen::Matrix3d::Identity();
+    by.middleCols<3>(first) = elementary::sin(phase) * Eigen::Matrix3d::Identity();
+    by.middleCols<3>(first + 3) = elementary::cos(phase) * Eigen::Matrix3d::Identity();
   }
   if (fix.head > 0) {
     by.middleCols<3>(layout.star_tracker(fix.head) - layout.shared()).setIdentity();
@@ -50,14 +49,14 @@ ComponentCovariance noise_of(const FixComparison& comparison, const Eigen::Matri
       row += 2;
     }
   }
-  R = (by_fix * R_c).lazyProduct(by_fix.transpose());
+  R = by_fix.lazyProduct(R_c).eval().lazyProduct(by_fix.transpose());
   R.diagonal() += white;
   return R;
 }
 
 void whiten(ComponentCovariance& R, RowsView rows) {
   static_cast<void>(factorize(R));
-  solve_lower(R, rows);
+  solve_lower(matrix_of(R), rows);
 }
 
 AttitudeSolution with_covariance(const AttitudeByDirections& attitude, const Eigen::Matrix3d& spread_square,

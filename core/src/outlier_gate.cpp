@@ -4,12 +4,15 @@
 #include <cmath>
 #include <utility>
 
+#include "trihedron/core/elementary.hpp"
+
 namespace trihedron {
 
 double gate_of_freedom(int freedom, double gate_nis) {
   const double variance = 2.0 / (9 * freedom);
   constexpr double kItsVariance = 2.0 / (9 * kPairComponents);
-  const double sigmas = (std::cbrt(gate_nis / kPairComponents) - (1 - kItsVariance)) / std::sqrt(kItsVariance);
+  const double sigmas =
+      (elementary::cube_root(gate_nis / kPairComponents) - (1 - kItsVariance)) / std::sqrt(kItsVariance);
   const double root = std::max(1 - variance + sigmas * std::sqrt(variance), 0.0);
   return freedom * root * root * root;
 }

@@ -127,6 +127,19 @@ auto PaperEstimator::measure(const Gyros& gyros, const QuasiInertial& qi, const 
   return measurement;
 }
 
+void PaperEstimator::report_innovation(const Measurement& measurement, const ComparedRows<kMaxStates>& rows,
+                                       const Eigen::Matrix4d& L, FixReport& report) const {
+  ComparedRows<kMaxStates> through = rows;
+  information_.see_through_uncertainty({through.data(), kMeasurements, kMaxStates, kMaxStates + 1});
+  const Eigen::Matrix<double, kMeasurements, kMaxStates> H = through.leftCols<kMaxStates>();
+  const Eigen::Matrix4d covariance = Eigen::Matrix4d::Identity() + H.lazyProduct(H.transpose());
+  Eigen::Vector4d normalized = rows.col(kMaxStates);
+  solve_lower(matrix_of(cholesky_root<kMeasurements>(covariance)), normalized);
+  report.nis = normalized.squaredNorm();
+  report.innovation = measurement.innovation;
+  report.innovation_covariance = L * covariance * L.transpose();
+}
+
 FixReport PaperEstimator::correct(const StarFix& fix, const FixReadings& readings) {
   const FixReport report = take(fix, readings);
   if (!started_ || sound()) {
@@ -170,16 +183,7 @@ FixReport PaperEstimator::take(const StarFix& fix, const FixReadings& readings) 
     return report;
   }
 
-  ComparedRows<kMaxStates> through = rows;
-  information_.see_through_uncertainty({through.data(), kMeasurements, kMaxStates, kMaxStates + 1});
-  const Eigen::Matrix<double, kMeasurements, kMaxStates> H = through.leftCols<kMaxStates>();
-  const Eigen::Matrix4d covariance = Eigen::Matrix4d::Identity() + H.lazyProduct(H.transpose());
-  Eigen::Vector4d normalized = rows.col(kMaxStates);
-  solve_lower(cholesky_root<kMeasurements>(covariance), normalized);
-  report.nis = normalized.squaredNorm();
-  report.innovation = measurement.innovation;
-  const Eigen::Matrix4d root = L;
-  report.innovation_covariance = root * covariance * root.transpose();
+  report_innovation(measurement, rows, L, report);
   report.status = gate_.judge(report.nis, measurement.innovation.norm());
   report.rejections_in_a_row = gate_.rejections_in_a_row();
   report.jumped = gate_.jumped();

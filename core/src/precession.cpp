@@ -4,6 +4,8 @@
 #include <cmath>
 #include <numbers>
 
+#include "trihedron/core/elementary.hpp"
+
 namespace trihedron {
 
 void advance_by_drift(ColumnsView by_drift, ColumnsView basis, const Eigen::Matrix3d& dt_C_in_b,
@@ -40,7 +42,7 @@ Eigen::Matrix3d turned(const Eigen::Matrix3d& C_c_b, const Eigen::Vector3d& delt
   return Eigen::Quaterniond(Rot<C, C>::exp(Vec<C>::assume(delta)).raw() * C_c_b).normalized().toRotationMatrix();
 }
 
-double GaussMarkov::kept(double dt_s) const { return std::max(std::exp(-dt_s / time_s), 1e-6); }
+double GaussMarkov::kept(double dt_s) const { return std::max(elementary::exp(-dt_s / time_s), 1e-6); }
 
 double GaussMarkov::noise(double kept) const { return sigma * std::sqrt(1 - kept * kept); }
 

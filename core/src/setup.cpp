@@ -14,38 +14,54 @@ bool positive(double value) { return value > 0 && std::isfinite(value); }
 
 bool is_rotation(const Eigen::Matrix3d& C) { return (C * C.transpose() - Eigen::Matrix3d::Identity()).norm() < 1e-6; }
 
+bool is_usable(const StarTrackerSetup& its) {
+  return (its.noise_rad.array() > 0).all() && its.noise_rad.allFinite() && is_rotation(its.C_c_s);
+}
+
+bool noise_is_usable(const CalibrationSetup& setup) {
+  for (int k = 0; k < setup.layout.gyros; ++k) {
+    if (!(setup.readout_noise_rad[k] > 0 && setup.readout_noise_rad[k] < 1)) {
+      return false;
+    }
+  }
+  for (int head = 0; head < setup.layout.star_trackers; ++head) {
+    if (!is_usable(setup.star_trackers[static_cast<std::size_t>(head)])) {
+      return false;
+    }
+  }
+  const double walk = setup.direction_random_walk_rad_sqrt_s;
+  return walk >= 0 && std::isfinite(walk) && setup.gyro_period > Duration::zero() &&
+         setup.gyro_period <= CalibrationSetup::kLongestGyroPeriod;
+}
+
+bool further_states_are_usable(const CalibrationSetup& setup) {
+  const FurtherStates& further = setup.layout.further;
+  const GaussMarkov& wandering = setup.wandering_drift;
+  if ((further.wandering_drift && !(positive(wandering.sigma) && positive(wandering.time_s))) ||
+      (further.coefficient_change && !positive(setup.change_time_s)) ||
+      (further.orbital_error && !std::isfinite(setup.orbital_rate_rad_s))) {
+    return false;
+  }
+  for (int state = setup.layout.readout(0); state < setup.layout.size(); ++state) {
+    if (!positive(prior_sigma_of_further_state(setup, state))) {
+      return false;
+    }
+  }
+  return true;
+}
+
 }  // namespace
 
 std::optional<SetupFault> CalibrationSetup::fault() const {
-  for (int k = 0; k < layout.gyros; ++k) {
-    if (!(readout_noise_rad[k] > 0 && readout_noise_rad[k] < 1)) {
-      return SetupFault::kNoiseNotPositive;
-    }
-  }
-  for (int head = 0; head < layout.star_trackers; ++head) {
-    const StarTrackerSetup& its = star_trackers[static_cast<std::size_t>(head)];
-    if (!(its.noise_rad.array() > 0).all() || !its.noise_rad.allFinite() || !is_rotation(its.C_c_s)) {
-      return SetupFault::kNoiseNotPositive;
-    }
-  }
-  if (!(direction_random_walk_rad_sqrt_s >= 0) || !std::isfinite(direction_random_walk_rad_sqrt_s) ||
-      !(gyro_period > Duration::zero() && gyro_period <= kLongestGyroPeriod)) {
+  if (!noise_is_usable(*this)) {
     return SetupFault::kNoiseNotPositive;
   }
   if (!(gate_nis > 0) || !(student_t_freedom >= 0 && std::isfinite(student_t_freedom)) ||
       !(reopen_after_rejections > 0) || !(reopen_after_jump_rejections > 0)) {
     return SetupFault::kGateNotPositive;
   }
-  const FurtherStates& further = layout.further;
-  if ((further.wandering_drift && !(positive(wandering_drift.sigma) && positive(wandering_drift.time_s))) ||
-      (further.coefficient_change && !positive(change_time_s)) ||
-      (further.orbital_error && !std::isfinite(orbital_rate_rad_s))) {
+  if (!further_states_are_usable(*this)) {
     return SetupFault::kPriorNotPositiveDefinite;
-  }
-  for (int state = layout.readout(0); state < layout.size(); ++state) {
-    if (!positive(prior_sigma_of_further_state(*this, state))) {
-      return SetupFault::kPriorNotPositiveDefinite;
-    }
   }
   return std::nullopt;
 }

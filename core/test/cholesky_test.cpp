@@ -24,13 +24,13 @@ TEST(Cholesky, SolvesAsTheInverseDoes) {
   const Eigen::Matrix3d L = cholesky_root<3>(a);
   const Eigen::Matrix<double, 3, 5> b = Eigen::Matrix<double, 3, 5>::Random();
   Eigen::Matrix<double, 3, 5> x = b;
-  solve_lower(L, x);
+  solve_lower(matrix_of(L), x);
   EXPECT_LT((L * x - b).norm(), 1e-13);
   x = b;
-  solve_factorized(L, x);
+  solve_factorized(matrix_of(L), x);
   EXPECT_LT((x - a.inverse() * b).norm(), 1e-12 * x.norm());
   Eigen::Vector3d column = b.col(2);
-  solve_factorized(L, column);
+  solve_factorized(matrix_of(L), column);
   EXPECT_LT((column - x.col(2)).norm(), 1e-14 * column.norm());
 }
 

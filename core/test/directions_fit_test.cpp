@@ -6,6 +6,7 @@
 #include <limits>
 #include <random>
 
+#include "flight.hpp"
 #include "trihedron/core/frames.hpp"
 
 namespace trihedron {
@@ -23,7 +24,7 @@ Directions sample(double t_s, double noise_rad = 0, std::mt19937* random = nullp
   h_b[0] = rotated<double>(Eigen::Vector3d(0.6, 0, 0.8), Eigen::Vector3d(0, angle, 0));
   h_b[1] = rotated<double>(Eigen::Vector3d(0, 1, 0), Eigen::Vector3d(angle, 0, angle));
   for (int k = 0; k < kFittedGyros && random != nullptr; ++k) {
-    h_b[k] += noise_rad * Eigen::Vector3d(normal(*random), normal(*random), normal(*random));
+    h_b[k] += noise_rad * test::white(*random, normal);
     h_b[k].normalize();
   }
   return h_b;

@@ -16,6 +16,13 @@ Eigen::Vector3d attitude_error(const Eigen::Matrix3d& truth, const AttitudeSolut
   return rotation_vector(truth.transpose() * estimate.C_in_c.raw());
 }
 
+Eigen::Vector3d white(std::mt19937& random, std::normal_distribution<double>& normal) {
+  const double z = normal(random);
+  const double y = normal(random);
+  const double x = normal(random);
+  return {x, y, z};
+}
+
 double normalised_square(const Eigen::VectorXd& error, const Eigen::MatrixXd& covariance) {
   // Scaled to unit diagonal first: errors may differ by 1e6 in size.
   const Eigen::VectorXd scale = covariance.diagonal().cwiseSqrt().cwiseInverse();
@@ -41,11 +48,13 @@ Flight::Flight(const FlightPlan& plan) {
   const DriftModel eq1;
   std::mt19937 random(plan.seed);
   std::normal_distribution<double> normal;
-  const auto white = [&] { return Eigen::Vector3d(normal(random), normal(random), normal(random)); };
+  const auto white = [&] { return test::white(random, normal); };
 
   constexpr double kPeriod_s = 0.125;
   const int count = static_cast<int>(plan.duration_s / kPeriod_s);
   double next_fix_s = plan.fix_offset_s;
+  std::mt19937 intervals(plan.seed);
+  std::uniform_real_distribution<double> even;
   for (int i = 0; i <= count; ++i) {
     const double t_s = i * kPeriod_s;
     const Eigen::Matrix3d C_in_c = attitude(t_s, plan.slews_rad, plan.steady_until_s);
@@ -57,10 +66,11 @@ Flight::Flight(const FlightPlan& plan) {
     }
     samples.push_back(sample);
     C_in_c_at_samples.push_back(C_in_c);
-    for (; next_fix_s < t_s + kPeriod_s && next_fix_s <= plan.duration_s; next_fix_s += 3) {
+    for (; next_fix_s < t_s + kPeriod_s && next_fix_s <= plan.duration_s;) {
       const Eigen::Vector3d error = plan.noise * kTracker_rad.cwiseProduct(white());
       const Eigen::Matrix3d measured = attitude(next_fix_s, plan.slews_rad, plan.steady_until_s) * turn(error);
       fixes.push_back({Time(from_seconds(next_fix_s)), Eigen::Quaterniond(measured)});
+      next_fix_s += plan.fix_interval_s - plan.fix_jitter_s * even(intervals);
     }
     if (i == count) {
       break;
@@ -78,8 +88,7 @@ std::vector<GyroSample> with_third_gyro(const Flight& pair, const Eigen::Vector3
   std::mt19937 random(seed);
   std::normal_distribution<double> normal;
   for (std::size_t i = 0; i < samples.size(); ++i) {
-    samples[i].h_b[2] = pair.C_in_c_at_samples[i].transpose() * h_in +
-                        Flight::kReadout_rad * Eigen::Vector3d(normal(random), normal(random), normal(random));
+    samples[i].h_b[2] = pair.C_in_c_at_samples[i].transpose() * h_in + Flight::kReadout_rad * white(random, normal);
   }
   return samples;
 }

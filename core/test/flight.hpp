@@ -8,6 +8,7 @@
 #include <functional>
 #include <memory>
 #include <numbers>
+#include <random>
 #include <type_traits>
 #include <vector>
 
@@ -28,7 +29,9 @@ struct FlightPlan {
   double misalignment = 1;  ///< times 30′
   double noise = 1;         ///< of the nominal noise
   unsigned seed = 1;
-  double fix_offset_s = 0;  ///< fixes at 3 s · n + offset
+  double fix_offset_s = 0;    ///< of the first fix
+  double fix_interval_s = 3;  ///< from each to the next
+  double fix_jitter_s = 0;    ///< by which it may be shorter
 };
 
 struct Flight {
@@ -47,6 +50,10 @@ struct Flight {
 
 /// Samples of a pair, and a third gyro's in a case without misalignment, whose rotor does not drift from `h_in`.
 [[nodiscard]] std::vector<GyroSample> with_third_gyro(const Flight& pair, const Eigen::Vector3d& h_in, unsigned seed);
+
+/// Three independent numbers of unit variance. Drawn one after another: which of the arguments of a call is worked out
+/// first is each compiler's own choice, and a test flies the same noise with all of them.
+[[nodiscard]] Eigen::Vector3d white(std::mt19937& random, std::normal_distribution<double>& normal);
 
 /// exp([v×]) for a rotation vector, rad.
 [[nodiscard]] Eigen::Matrix3d turn(const Eigen::Vector3d& v);

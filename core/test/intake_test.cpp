@@ -58,6 +58,11 @@ TEST(IntakeClock, IsSetBackBySixteenSamplesThatRunWell) {
     EXPECT_EQ(behind(0.125 * i), Clock::kOutOfOrder) << i;
   }
   EXPECT_EQ(behind(2), Clock::kSetBack);
+  // A time from which no difference can be told is none.
+  for (const Time t : {Time::min(), Time::max(), Time(Intake::kMaxTime + Duration(1))}) {
+    EXPECT_EQ(intake.look_at_clock(t, std::nullopt), Clock::kOutOfOrder);
+    EXPECT_EQ(intake.look_at_clock(t, second(1000)), Clock::kOutOfOrder);
+  }
   // With a gap, or backwards among themselves, they are counted anew.
   for (int i = 0; i < 30; ++i) {
     EXPECT_EQ(behind(10.0 + i), Clock::kOutOfOrder);
@@ -125,6 +130,8 @@ TEST(Intake, LooksAtFixes) {
   EXPECT_EQ(look({second(10.5), q}), FixStatus::kPending);
   EXPECT_EQ(look({second(10.6), q}), FixStatus::kRejectedNoGyro);
   EXPECT_EQ(look({second(7.9), q}), FixStatus::kRejectedOutOfOrder);
+  EXPECT_EQ(look({Time::min(), q}), FixStatus::kRejectedOutOfOrder);
+  EXPECT_EQ(look({Time::max(), q}), FixStatus::kRejectedOutOfOrder);
   // One that was used is not used again, nor one of the same star tracker before it.
   intake.mark_used({second(9), q, 1});
   EXPECT_EQ(look({second(9), q, 1}), FixStatus::kRejectedOutOfOrder);

@@ -281,8 +281,7 @@ TEST(InvariantEstimator, FindsTheAlignmentOfAFurtherStarTracker) {
   // Both look at the same time; C_in_c of the second is by its mounting as designed.
   std::vector<StarFix> fixes;
   for (const StarFix& fix : flight.fixes) {
-    const Eigen::Vector3d noise_s =
-        second.noise_rad.cwiseProduct(Eigen::Vector3d(normal(random), normal(random), normal(random)));
+    const Eigen::Vector3d noise_s = second.noise_rad.cwiseProduct(test::white(random, normal));
     const Eigen::Matrix3d C_in_c = test::Flight::attitude(to_seconds(fix.t.time_since_epoch()), 0.5);
     const Eigen::Vector3d error = misalignment + second.C_c_s * noise_s;
     fixes.push_back(fix);

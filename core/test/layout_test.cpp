@@ -156,7 +156,7 @@ TEST(Capacity, HoldsWhatHasRoomInEachRespect) {
   layout = three;
   layout.star_trackers = 0;
   EXPECT_FALSE(room.holds(layout));
-  EXPECT_FALSE(kFullCapacity.holds({.drift_model = vsh(DriftModelId::kMaxDegree + 1)}));
+  EXPECT_FALSE(kFullCapacity.holds({.drift_model = vsh(DriftModelId::kMaxDegreeOnBoard + 1)}));
 }
 
 TEST(Layout, HasNothingOfWhatIsOff) {

@@ -34,7 +34,7 @@ Mission::Mission(const MissionPlan& plan) : given(plan.layout) {
   given.covariance *= plan.calibration_sigma * plan.calibration_sigma;
   std::mt19937 random(plan.seed);
   std::normal_distribution<double> normal;
-  const auto white = [&] { return Eigen::Vector3d(normal(random), normal(random), normal(random)); };
+  const auto white = [&] { return test::white(random, normal); };
 
   const Eigen::Vector3d momenta[] = {{0.51, 0.59, 0.63}, {-0.72, 0.49, 0.49}, {0.1, -0.8, 0.6}, {0.7, 0.1, -0.7}};
   for (int k = 0; k < layout.gyros; ++k) {

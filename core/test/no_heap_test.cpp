@@ -2,12 +2,15 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cstddef>
 #include <cstdlib>
 #include <memory>
 #include <new>
 
+#include "application_flight.hpp"
 #include "flight.hpp"
+#include "trihedron/core/snapshot.hpp"
 
 namespace {
 
@@ -104,6 +107,25 @@ void expect_no_allocations(const test::Given<Estimator>& given) {
   EXPECT_TRUE(reopened);
   EXPECT_TRUE(set_back);
   EXPECT_EQ(angles > 0, Estimator::kUsesAngles);
+}
+
+TEST(Application, AllocatesNothing) {
+  const test::Flight flight({.duration_s = 1500});
+  const auto memory = std::make_unique<std::array<std::byte, SnapshotStore<PairApplication>::kSize>>();
+  const Parameters table = test::nominal_parameters();
+  const auto application = std::make_unique<PairApplication>();
+  const long before = allocations;
+  EXPECT_EQ(application->load(table), Answer::kAccepted);
+  EXPECT_EQ(application->command(Command::kStart), Answer::kAccepted);
+  test::fly(flight, *application);
+  EXPECT_EQ(application->command(Command::kSelectGyros, 0b11), Answer::kAccepted);
+  EXPECT_EQ(application->command(Command::kHoldCalibration), Answer::kAccepted);
+  const Housekeeping record = application->housekeeping();
+  EXPECT_EQ(SnapshotStore<PairApplication>::save(*application, *memory), 1U);
+  EXPECT_EQ(SnapshotStore<PairApplication>::restore(*memory, *application).sequence, 1U);
+  EXPECT_EQ(application->command(Command::kReset), Answer::kAccepted);
+  EXPECT_EQ(allocations, before);
+  EXPECT_EQ(record.mode, TRIHEDRON_MODE_NAVIGATING);
 }
 
 TEST(OnBoard, OfThePaperAllocatesNothing) { expect_no_allocations<PaperEstimator>(test::PaperGiven()); }

@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
+
 #include "numerical_jacobian.hpp"
 #include "trihedron/core/drift.hpp"
 
@@ -151,6 +153,25 @@ TEST(Sensitivity, OfTwoStretchesIsTheirChain) {
   EXPECT_LT((chained.by_drift.first(kColumns) - whole.by_drift.first(kColumns)).norm(),
             1e-12 * whole.by_drift.first(kColumns).norm());
   EXPECT_LT((chained.by_alignment - whole.by_alignment).norm(), 1e-10 * whole.by_alignment.norm());
+}
+
+/// dw = −w/T dt + dn: a value decays exponentially, and the noise of density 2σ²/T that comes meanwhile is that decayed
+/// too, here summed up over a thousand small pieces.
+TEST(GaussMarkov, IsTheSolutionOfItsDifferentialEquation) {
+  const GaussMarkov process{.sigma = 3, .time_s = 700};
+  for (const double dt_s : {1.0, 30.0, 700.0, 4000.0}) {
+    const double kept = process.kept(dt_s);
+    EXPECT_NEAR(kept, std::exp(-dt_s / process.time_s), 1e-14);
+    constexpr int kPieces = 1000;
+    double variance = 0;
+    for (int i = 0; i < kPieces; ++i) {
+      const double age_s = (i + 0.5) * dt_s / kPieces;
+      variance += 2 * 9 / 700.0 * std::exp(-2 * age_s / 700) * dt_s / kPieces;
+    }
+    EXPECT_NEAR(process.noise(kept) * process.noise(kept), variance, 1e-4 * variance) << dt_s;
+  }
+  EXPECT_EQ(process.kept(1e9), 1e-6);
+  EXPECT_EQ(process.noise(1), 0);
 }
 
 }  // namespace

@@ -543,8 +543,7 @@ Spread with_outliers(const Outliers& outliers, double student_t_freedom) {
     for (std::size_t i = 1; i < flight.fixes.size(); ++i) {
       const double size = outliers.least + (outliers.most - outliers.least) * uniform(random);
       const double factor = uniform(random) < outliers.share ? size : 0;
-      const Eigen::Vector3d error = factor * test::Flight::kTracker_rad.cwiseProduct(
-                                                 Eigen::Vector3d(normal(random), normal(random), normal(random)));
+      const Eigen::Vector3d error = factor * test::Flight::kTracker_rad.cwiseProduct(test::white(random, normal));
       flight.fixes[i].q_in_c = flight.fixes[i].q_in_c * Eigen::Quaterniond(test::turn(error));
     }
     test::Given<Estimator> given;

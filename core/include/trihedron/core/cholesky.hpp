@@ -8,17 +8,26 @@
 
 namespace trihedron {
 
+/// A matrix that is only read, of any size. Unlike Eigen::Ref<const Eigen::MatrixXd> it never holds a copy, so that
+/// nothing refers to the heap.
+using MatrixView = Eigen::Map<const Eigen::MatrixXd, 0, Eigen::OuterStride<>>;
+template <class Derived>
+[[nodiscard]] MatrixView matrix_of(const Eigen::PlainObjectBase<Derived>& matrix) {
+  static_assert(!Derived::IsRowMajor);
+  return {matrix.data(), matrix.rows(), matrix.cols(), Eigen::OuterStride<>(matrix.outerStride())};
+}
+
 /// In place: a = L Lᵀ becomes L, zero above the diagonal. False, and `a` of no use, unless it is positive definite.
 [[nodiscard]] bool factorize(Eigen::Ref<Eigen::MatrixXd> a);
 
 /// In place: b becomes L⁻¹ b.
-void solve_lower(const Eigen::Ref<const Eigen::MatrixXd>& L, Eigen::Ref<Eigen::MatrixXd> b);
+void solve_lower(const MatrixView& L, Eigen::Ref<Eigen::MatrixXd> b);
 
 /// In place: b becomes (L Lᵀ)⁻¹ b.
-void solve_factorized(const Eigen::Ref<const Eigen::MatrixXd>& L, Eigen::Ref<Eigen::MatrixXd> b);
+void solve_factorized(const MatrixView& L, Eigen::Ref<Eigen::MatrixXd> b);
 
 /// In place: rows b become L⁻¹ b.
-void solve_lower(const Eigen::Ref<const Eigen::MatrixXd>& L, RowsView b);
+void solve_lower(const MatrixView& L, RowsView b);
 
 /// The upper triangular root of the inverse of `covariance`, of which the lower triangle is used: rootᵀ root =
 /// covariance⁻¹. `root` is square and of the same size; below the diagonal it is left as it is. False, and `root` of no

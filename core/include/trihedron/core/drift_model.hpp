@@ -13,7 +13,8 @@ struct DriftModelId {
     kEsg20,  ///< eq. (1), the members of degrees 1 and 2 that it lacks, and D of Σh⁴/4, whose W is k0
     kVsh,    ///< eq. (1) and all vector spherical harmonics up to `degree` that it does not contain
   };
-  static constexpr int kMaxDegree = 6;
+  static constexpr int kMaxDegree = 8;
+  static constexpr int kMaxDegreeOnBoard = 6;  ///< an estimator on board has room for no more
 
   Family family = Family::kEsg7;
   std::uint8_t degree = 0;  ///< of kVsh, 1 … kMaxDegree; 0 otherwise

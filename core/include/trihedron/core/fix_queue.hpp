@@ -21,16 +21,25 @@ class FixQueue {
 
   [[nodiscard]] int size() const { return size_; }
   /// Of the first; Time::max() where none waits.
-  [[nodiscard]] Time next_t() const { return size_ > 0 ? slot(0).t : Time::max(); }
+  [[nodiscard]] Time next_t() const { return size_ > 0 ? time(0) : Time::max(); }
+
+  /// How many of them are not later than `t`; at most `most`.
+  [[nodiscard]] int count_until(Time t, int most) const {
+    int count = 0;
+    while (count < std::min(size_, most) && time(count) <= t) {
+      ++count;
+    }
+    return count;
+  }
 
   /// kPending, or why it cannot wait.
   [[nodiscard]] FixStatus push(const StarFix& fix) {
     int place = size_;
-    while (place > 0 && slot(place - 1).t > fix.t) {
+    while (place > 0 && time(place - 1) > fix.t) {
       --place;
     }
-    for (int i = place; i > 0 && slot(i - 1).t == fix.t; --i) {
-      if (slot(i - 1).head == fix.head) {
+    for (int i = place; i > 0 && time(i - 1) == fix.t; --i) {
+      if (heads_[slot(i - 1)] == fix.head) {
         return FixStatus::kRejectedOutOfOrder;  // repeated
       }
     }
@@ -38,12 +47,13 @@ class FixQueue {
       return FixStatus::kRejectedBacklog;
     }
     for (int i = size_; i > place; --i) {
-      slot(i) = slot(i - 1);
+      times_[slot(i)] = times_[slot(i - 1)];
+      heads_[slot(i)] = heads_[slot(i - 1)];
+      q_in_c_[slot(i)] = q_in_c_[slot(i - 1)];
     }
-    Slot& its = slot(place);
-    its.t = fix.t;
-    its.head = fix.head;
-    std::copy_n(fix.q_in_c.coeffs().data(), its.q_in_c.size(), its.q_in_c.begin());
+    times_[slot(place)] = fix.t;
+    heads_[slot(place)] = static_cast<std::int8_t>(fix.head);
+    std::copy_n(fix.q_in_c.coeffs().data(), fix.q_in_c.coeffs().size(), q_in_c_[slot(place)].begin());
     ++size_;
     return FixStatus::kPending;
   }
@@ -51,8 +61,8 @@ class FixQueue {
   /// The first of them; needs one.
   [[nodiscard]] StarFix pop() {
     TRIHEDRON_ASSERT(size_ > 0);
-    const Slot& its = slot(0);
-    const StarFix fix{its.t, Eigen::Quaterniond(its.q_in_c.data()), its.head};
+    const std::size_t its = slot(0);
+    const StarFix fix{times_[its], Eigen::Quaterniond(q_in_c_[its].data()), heads_[its]};
     first_ = (first_ + 1) % kCapacity;
     --size_;
     return fix;
@@ -66,16 +76,15 @@ class FixQueue {
   }
 
  private:
-  /// A StarFix without the gaps that alignment leaves in one.
-  struct Slot {
-    std::array<double, 4> q_in_c{};
-    Time t{};
-    int head = 0;
-  };
-  [[nodiscard]] Slot& slot(int i) { return slots_[static_cast<std::size_t>((first_ + i) % kCapacity)]; }
-  [[nodiscard]] const Slot& slot(int i) const { return slots_[static_cast<std::size_t>((first_ + i) % kCapacity)]; }
+  [[nodiscard]] std::size_t slot(int i) const { return static_cast<std::size_t>((first_ + i) % kCapacity); }
+  [[nodiscard]] Time time(int i) const { return times_[slot(i)]; }
 
-  std::array<Slot, static_cast<std::size_t>(kCapacity)> slots_{};
+  // Apart, without the gaps that alignment would leave between them.
+  template <class T>
+  using Slots = std::array<T, static_cast<std::size_t>(kCapacity)>;
+  Slots<std::array<double, 4>> q_in_c_{};
+  Slots<Time> times_{};
+  Slots<std::int8_t> heads_{};
   int first_ = 0;
   int size_ = 0;
 };

@@ -6,6 +6,8 @@
 #include <Eigen/Geometry>
 #include <cmath>
 
+#include "trihedron/core/elementary.hpp"
+
 namespace trihedron {
 
 /// Absolute inertial frame, ICRF axes.
@@ -36,8 +38,7 @@ template <class S>
 /// Angle between two vectors, rad, in [0, π]; accurate at both ends, where acos of the dot product is not.
 template <class S>
 [[nodiscard]] S angle_between(const Vector3<S>& a, const Vector3<S>& b) {
-  using std::atan2;
-  return atan2(a.cross(b).norm(), a.dot(b));
+  return elementary::atan2(a.cross(b).norm(), a.dot(b));
 }
 
 namespace detail {
@@ -51,14 +52,13 @@ struct RodriguesCoefficients {
 /// exp([v×]) = I + a [v×] + b [v×]² for |v|² = angle2.
 template <class S>
 [[nodiscard]] RodriguesCoefficients<S> rodrigues_coefficients(S angle2) {
-  using std::sin;
   using std::sqrt;
   if (angle2 < S(1e-6)) {  // the quotients would lose digits; the next terms of the series are below 1e-17
     return {S(1) - angle2 / S(6) * (S(1) - angle2 / S(20)), S(0.5) - angle2 / S(24) * (S(1) - angle2 / S(30))};
   }
   const S angle = sqrt(angle2);
-  const S half = sin(angle / S(2));
-  return {sin(angle) / angle, S(2) * half * half / angle2};
+  const S half = elementary::sin(angle / S(2));
+  return {elementary::sin(angle) / angle, S(2) * half * half / angle2};
 }
 
 }  // namespace detail
@@ -123,13 +123,12 @@ class Rot {
 
   /// The rotation vector v in rad, |v| ≤ π, with exp(v) equal to this rotation.
   [[nodiscard]] Vec<To, S> log() const {
-    using std::atan2;
     Quaternion q = quaternion();
     if (q.w() < S(0)) {
       q.coeffs() = -q.coeffs();
     }
     const S s = q.vec().norm();
-    const S factor = s > S(1e-12) ? S(2) * atan2(s, q.w()) / s : S(2);
+    const S factor = s > S(1e-12) ? S(2) * elementary::atan2(s, q.w()) / s : S(2);
     return Vec<To, S>::assume(factor * q.vec());
   }
 

@@ -23,7 +23,7 @@ class GyroHealth {
   static constexpr Duration kMemory = std::chrono::seconds(10);
 
   GyroHealth() = default;
-  explicit GyroHealth(int gyros) : gyros_(gyros) {}
+  explicit GyroHealth(int gyros) : gyros_(gyros), selected_(all_gyros(gyros)) {}
 
   /// Takes the next sample; in time order.
   void look_at(const GyroSample& sample) {
@@ -57,11 +57,21 @@ class GyroHealth {
     }
   }
 
+  /// Leaves out all gyros but these, and takes these back where they were isolated.
+  void select(const GyroMask& selected) {
+    for (int k = 0; k < gyros_; ++k) {
+      selected_[k] = selected[k];
+      isolated_[k] = isolated_[k] && !selected[k];
+    }
+    suspect_ = kNoGyro;
+    verdicts_ = 0;
+  }
+
   /// Those whose readings can be used from `from` to `to`, both included.
   [[nodiscard]] GyroMask usable(Time from, Time to) const {
     GyroMask mask;
     for (int k = 0; k < gyros_; ++k) {
-      mask[k] = !isolated_[k] && !(readings_[k].stuck_from <= to && from <= readings_[k].stuck_until);
+      mask[k] = selected_[k] && !isolated_[k] && !(readings_[k].stuck_from <= to && from <= readings_[k].stuck_until);
     }
     return mask;
   }
@@ -69,7 +79,10 @@ class GyroHealth {
   [[nodiscard]] PerGyro<GyroState> states() const {
     PerGyro<GyroState> states;
     for (int k = 0; k < gyros_; ++k) {
-      states[k] = isolated_[k] ? GyroState::kIsolated : readings_[k].stuck ? GyroState::kStuck : GyroState::kUsed;
+      states[k] = !selected_[k]        ? GyroState::kNotSelected
+                  : isolated_[k]       ? GyroState::kIsolated
+                  : readings_[k].stuck ? GyroState::kStuck
+                                       : GyroState::kUsed;
     }
     return states;
   }
@@ -95,6 +108,7 @@ class GyroHealth {
 
   int gyros_ = 0;
   PerGyro<Readings> readings_;
+  GyroMask selected_{};
   GyroMask isolated_{};
   int suspect_ = kNoGyro;
   int verdicts_ = 0;

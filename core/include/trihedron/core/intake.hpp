@@ -19,6 +19,8 @@ class Intake {
   static constexpr Duration kMaxGap = std::chrono::hours(1);
   /// Consecutive samples behind the present time after which the clock is taken to have been set back.
   static constexpr int kSetBackSamples = 16;
+  /// Times farther from the origin, 146 years, are out of order, so that the difference of any two can be told.
+  static constexpr Duration kMaxTime = Duration::max() / 2;
 
   Intake() = default;
   explicit Intake(const CalibrationSetup& setup);
@@ -26,6 +28,11 @@ class Intake {
   enum class Clock : std::uint8_t { kRunsOn, kOutOfOrder, kSetBack };
   /// Checks the clock by the time `t` of a sample; `latest`: time of the last sample accepted.
   [[nodiscard]] Clock look_at_clock(Time t, const std::optional<Time>& latest);
+
+  /// Whether the last samples were behind the present time and ran on there; a time that stands still does not.
+  [[nodiscard]] bool may_be_set_back() const { return behind_present_ > 1; }
+  /// Where it may: samples before the one at which the clock is taken to have been set back, if they all go on so.
+  [[nodiscard]] int samples_to_set_back() const { return kSetBackSamples - 1 - behind_present_; }
 
   /// Checks the readings of a sample whose time has been accepted, and normalises them.
   [[nodiscard]] SampleStatus screen(GyroSample& sample);

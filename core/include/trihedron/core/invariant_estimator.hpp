@@ -4,6 +4,7 @@
 
 #include <Eigen/Core>
 #include <array>
+#include <cstdint>
 #include <optional>
 
 #include "trihedron/core/drift.hpp"
@@ -32,7 +33,7 @@ template <Capacity kCapacity>
 class InvariantEstimator {
  public:
   static constexpr int kMaxStates = kCapacity.states;
-  static constexpr int kMaxDynamic = 6 * kCapacity.gyros;
+  static constexpr int kMaxDynamic = kCapacity.dynamic;
   static constexpr int kMaxErrors = kMaxStates;
   static constexpr int kStarTrackers = kCapacity.star_trackers;  ///< at most
   static constexpr bool kUsesAngles = true;
@@ -50,6 +51,9 @@ class InvariantEstimator {
   [[nodiscard]] std::optional<SetupFault> set_up(const CalibrationSetup& setup, const Gyros& prior,
                                                  const Eigen::Ref<const Eigen::MatrixXd>& covariance);
 
+  /// Returns to the prior, not started: as after set_up().
+  void forget();
+
   [[nodiscard]] bool started() const { return started_; }
   [[nodiscard]] const CalibrationSetup& setup() const { return setup_; }
   [[nodiscard]] const Layout& layout() const { return setup_.layout; }
@@ -62,6 +66,7 @@ class InvariantEstimator {
   [[nodiscard]] const SharedStates& shared() const { return shared_; }
   /// How errors at the last fix have changed the present directions.
   [[nodiscard]] const Sensitivities& since_fix() const { return since_fix_; }
+  [[nodiscard]] double time_since_fix_s() const { return time_since_fix_s_; }
   [[nodiscard]] const Information& information() const { return information_; }
   /// Prior means.
   [[nodiscard]] const Gyros& prior_gyros() const { return prior_gyros_; }
@@ -89,16 +94,50 @@ class InvariantEstimator {
   /// Widens the directions: `variance_rad2` per axis for what a step too long for its readings may have missed.
   void add_direction_variance(double variance_rad2) { extra_variance_rad2_ += variance_rad2; }
 
-  /// The first fix starts the filter, each further one updates it. Where the estimate is not finite after that, or has
-  /// no covariance, it is forgotten: kEstimateLost, and no longer started().
+  /// A correction of the estimate, and what its stages leave for one another. Between two of them the estimate is not
+  /// predicted; all else may be asked, and is that of the stages that have been carried out.
+  struct Correction {
+    enum class Stage : std::uint8_t {
+      kBegin,        ///< starts the filter, or sees whether the readings give an attitude
+      kSecondOrder,  ///< how much the linear model of the prediction leaves out
+      kPropagation,  ///< the information to the present time
+      kAttitude,     ///< the one to linearise at
+      kNoise,        ///< of the readings
+      kJudgement,    ///< innovation and gate; of the angles, also the update
+      kFault,        ///< which gyro is at fault
+      kRestart,
+      kUpdate,
+      kDone,
+    };
+    Stage stage = Stage::kBegin;
+    bool reopened = false;
+    PerGyro<double, kCapacity.gyros> prediction_noise_rad;  ///< 1-sigma per axis of the directions
+    PerGyro<double> reading_noise_rad;
+    Eigen::Matrix3d C_linear = Eigen::Matrix3d::Identity();
+
+    [[nodiscard]] bool done() const { return stage == Stage::kDone; }
+  };
+  /// Stages of a correction, at most; those of a reopening come twice.
+  static constexpr int kMostStages = 12;
+  /// What the next stage takes, about, in 100 instructions on two gyros with eq. (1); and all from it on, as it usually
+  /// goes.
+  [[nodiscard]] static int cost(const Correction& correction);
+  [[nodiscard]] static int cost_to_end(const Correction& correction);
+
+  /// The next stage of a correction by a fix: the first fix starts the filter, each further one updates it. Where the
+  /// estimate is not finite in the end, or has no covariance, it is forgotten: kEstimateLost, and no longer started().
+  void carry_on(Correction& correction, const StarFix& fix, const FixReadings& readings, FixReport& report);
+  /// The next stage of a correction without a fix: by the angles between the momenta, which the readings give without
+  /// the attitude. It gives no information about the attitude or anything that rotates all momenta alike, and never
+  /// reopens the filter. The estimate may be forgotten as with a fix. Needs started().
+  void carry_on(Correction& correction, Time t, const FixReadings& readings, AngleReport& report);
+  /// All stages of it.
   [[nodiscard]] FixReport correct(const StarFix& fix, const FixReadings& readings);
-  /// Update without a fix: by the angles between the momenta, which the readings give without the attitude. It gives no
-  /// information about the attitude or anything that rotates all momenta alike, and never reopens the filter. The
-  /// estimate may be forgotten as by correct(). Needs started().
   [[nodiscard]] AngleReport check_angles(Time t, const FixReadings& readings);
 
  private:
-  using Compared = ComparedRows<kMaxStates>;
+  static constexpr int kMaxCompared = 2 * kCapacity.gyros;  ///< components of a comparison
+  using Compared = ComparedRows<kMaxStates, kMaxCompared>;
   /// A comparison as whitened rows about the states, with its innovation covariance and NIS.
   struct White {
     Compared rows;                   ///< (H, y), unit white noise
@@ -117,19 +156,38 @@ class InvariantEstimator {
   /// the minute until a run of rejections reopens the filter.
   static constexpr double kFaultMisfitOfPair_rad = 5.8e-3;  // 20′
 
-  /// Returns to the prior, not started.
-  void forget();
   /// Whether the estimate is finite and has a covariance.
   [[nodiscard]] bool sound() const;
-  /// correct() and check_angles() before sound() is asked.
-  [[nodiscard]] FixReport take(const StarFix& fix, const FixReadings& readings);
-  [[nodiscard]] AngleReport take_angles(Time t, const FixReadings& readings);
+  /// carry_on() before sound() is asked.
+  void take(Correction& correction, const StarFix& fix, const FixReadings& readings, FixReport& report);
+  void take_angles(Correction& correction, const FixReadings& readings, AngleReport& report);
+  /// A fix as it is compared.
+  struct Seen {
+    FixBySharedStates by_shared;
+    Rot<In, C> C_in_c;
+    Eigen::Matrix3d R_c;
+  };
+  [[nodiscard]] Seen seen(const StarFix& fix, const FixReadings& readings) const;
+  [[nodiscard]] FixComparison compared(const Seen& its, const Correction& correction,
+                                       const FixReadings& readings) const;
+  /// The stages of take(), as they are named.
+  void begin(Correction& correction, const Seen& its, const StarFix& fix, const FixReadings& readings,
+             FixReport& report);
+  void judge(Correction& correction, const Seen& its, const FixReadings& readings, FixReport& report);
+  /// Of a fix above the gate: whether a lower weight takes it.
+  static void use_all_the_same(Correction& correction, FixReport& report);
+  void look_for_fault(Correction& correction, const Seen& its, const FixReadings& readings, FixReport& report) const;
+  void update(Correction& correction, const Seen& its, const StarFix& fix, const FixReadings& readings,
+              const FixReport& report);
+  void judge_angles(Correction& correction, const FixReadings& readings, AngleReport& report);
   [[nodiscard]] Eigen::Matrix3d covariance_of(Rows3 by_states) const;
   /// The attitude by gyros and fix together, weighted by what is known of both. Needs the covariance at the fix.
   [[nodiscard]] Eigen::Matrix3d fused_attitude(const AttitudeByDirections& by_gyros, const Rot<In, C>& by_fix,
                                                const Eigen::Matrix3d& R_c, const FixReadings& readings) const;
   void start(const Eigen::Matrix3d& C_in_c, const FixReadings& readings, const Eigen::Matrix3d& R_c,
              const FixBySharedStates& by_shared);
+  void restart(const Eigen::Matrix3d& C_in_c, const FixReadings& readings, const Eigen::Matrix3d& R_c,
+               const FixBySharedStates& by_shared);
   /// 1-sigma per axis of the second-order term ½ a × b, which the linear model leaves out, by the covariances of a and
   /// b.
   [[nodiscard]] static double second_order_rad(const Eigen::Matrix3d& A, const Eigen::Matrix3d& B);
@@ -137,28 +195,47 @@ class InvariantEstimator {
   [[nodiscard]] PerGyro<double> readout_noise(double noise_factor) const;
   /// The same with the second-order term; n: consecutive measurements without a fix between them.
   [[nodiscard]] PerGyro<double> reading_noise(const Eigen::Matrix3d& C_linear, double noise_factor, int n) const;
+  /// The same for a fix, of whose error this is not known, noise apart.
+  [[nodiscard]] PerGyro<double> fix_reading_noise(const Eigen::Matrix3d& C_linear, double noise_factor,
+                                                  const Eigen::Matrix3d& misalignment) const;
   /// Covariance of what is not known of the error of a further star tracker's fix, noise apart: its first fix finds its
   /// alignment, and until then it is no attitude to linearise at.
   [[nodiscard]] Eigen::Matrix3d misalignment_of(const StarFix& fix, const FixBySharedStates& by_shared) const;
   [[nodiscard]] White whitened(const FixComparison& comparison, const Eigen::Matrix3d& R_c,
                                const PerGyro<double>& noise_rad) const;
-  /// The rows of whitened() for the update by a fix that shares its samples with others, `sharing` of them, whose
-  /// readout noise is `noise_factor` times that of a single reading.
+  /// The rows of whitened() for the update by a fix that shares its samples with others, `sharing` of them with itself,
+  /// whose readout noise is `noise_factor` times that of a single reading.
   [[nodiscard]] Compared rows_to_use(const FixComparison& comparison, const Eigen::Matrix3d& R_c,
                                      PerGyro<double> noise_rad, double noise_factor, double sharing) const;
   /// A comparison with the attitude eliminated and the noise of the readings alone: what the angles between the momenta
   /// show.
   [[nodiscard]] White angles_of(const FixComparison& comparison, const PerGyro<double>& noise_rad) const;
   void put_innovation(White& white) const;
+  /// Reports the innovation and what the gate says of it.
+  void ask_gate(const FixComparison& comparison, const White& white, double misfit_rad, FixReport& report);
   /// Whether a rejected misfit is so large that only a gyro fault explains it.
   [[nodiscard]] bool is_fault(double nis, double misfit_rad, int used) const;
   /// The one gyro whose removal makes a disagreeing comparison agree; kNoGyro where none or several do.
+  /// `comparison` is used for the trials, and in the end as it was.
   template <class Agrees>
-  [[nodiscard]] static int odd_gyro(const FixComparison& comparison, Agrees&& agrees);
+  [[nodiscard]] static int odd_gyro(FixComparison& comparison, Agrees&& agrees);
   /// Whether the prior allows the drift coefficients and alignments that are estimated.
   [[nodiscard]] bool prior_allows_estimates() const;
-  void update_to_now(const Eigen::Matrix3d& C_in_c);
-  void update(const Compared& white, double root_weight);
+  /// The attitude of these readings by the estimate, which has been found to exist.
+  [[nodiscard]] AttitudeByDirections attitude_now(const FixReadings& readings) const {
+    return attitude(gyros_, readings.h_b, readings.used).value();
+  }
+  /// Noise of the prediction since the last fix, the second-order term with it.
+  [[nodiscard]] PerGyro<double, kCapacity.gyros> prediction_noise(const Eigen::Matrix3d& C_in_c);
+  void propagate(const PerGyro<double, kCapacity.gyros>& noise_rad);
+  /// Takes the rows of a comparison, which are used up, with this weight.
+  void update(Compared& white, double root_weight);
+  /// Whether the gyros agree among themselves. Not inline, so that its stack is free again when a fault is looked for.
+  [[nodiscard, gnu::noinline]] bool angles_agree(const Eigen::Matrix3d& C_by_gyros, const FixReadings& readings) const;
+  /// The gyro whose fault explains a fix that was rejected; kNoGyro where none does.
+  [[nodiscard]] int gyro_at_fault(FixComparison& comparison, const Eigen::Matrix3d& C_by_gyros,
+                                  const FixReadings& readings, const Eigen::Matrix3d& R_c,
+                                  const PerGyro<double>& noise_rad) const;
   void begin_stretch();
   /// As CalibrationSetup::fixes_sharing_a_sample() (docs/mathematics.md, section 2).
   [[nodiscard]] double fixes_sharing_samples_of(const StarFix& fix) const;
@@ -170,7 +247,7 @@ class InvariantEstimator {
   SharedStates shared_;
   Sensitivities since_fix_;
   Information information_;
-  Information prior_;  ///< without anything of the directions
+  PackedTriangle<kMaxStates> prior_;  ///< root of the information, without anything of the directions
   OutlierGate gate_;
   std::array<std::optional<Time>, kMaxStarTrackers> used_fix_t_;
   PerGyro<double>
@@ -185,6 +262,7 @@ class InvariantEstimator {
 
 // Those that are built.
 extern template class InvariantEstimator<kPairCapacity>;
+extern template class InvariantEstimator<kTrioCapacity>;
 extern template class InvariantEstimator<kFullCapacity>;
 
 }  // namespace trihedron

@@ -160,26 +160,35 @@ struct Capacity {
   int gyros = 0;
   int drift_columns = 0;
   int states = 0;
+  int dynamic = 0;  ///< of the states, those that move
   int star_trackers = 0;
 
   [[nodiscard]] static constexpr Capacity of(const Layout& largest) {
-    return {largest.gyros, largest.drift_columns(), largest.size(), largest.star_trackers};
+    return {largest.gyros, largest.drift_columns(), largest.size(), largest.dynamic(), largest.star_trackers};
   }
   [[nodiscard]] constexpr bool holds(const Layout& layout) const {
     return layout.gyros >= 2 && layout.gyros <= gyros && layout.drift_columns() <= drift_columns &&
-           layout.size() <= states && layout.star_trackers >= 1 && layout.star_trackers <= star_trackers;
+           layout.size() <= states && layout.dynamic() <= dynamic && layout.star_trackers >= 1 &&
+           layout.star_trackers <= star_trackers;
   }
 };
 
 /// Two gyros with eq. (1) and one star tracker.
 inline constexpr Capacity kPairCapacity = Capacity::of(Layout{});
-/// Everything.
+/// The same with a third gyro.
+inline constexpr Capacity kTrioCapacity = Capacity::of(Layout{.gyros = 3});
+/// Everything that is estimated on board.
 inline constexpr Layout kLargestLayout{.gyros = kMaxGyros,
-                                       .drift_model = vsh(DriftModelId::kMaxDegree),
+                                       .drift_model = vsh(DriftModelId::kMaxDegreeOnBoard),
                                        .further = kAllFurtherStates,
                                        .star_trackers = kMaxStarTrackers};
 inline constexpr Capacity kFullCapacity = Capacity::of(kLargestLayout);
-inline constexpr int kMaxDriftColumns = kFullCapacity.drift_columns;
+/// Everything that is estimated by a whole pass.
+inline constexpr Capacity kPassCapacity = Capacity::of({.gyros = kMaxGyros,
+                                                        .drift_model = vsh(DriftModelId::kMaxDegree),
+                                                        .further = kAllFurtherStates,
+                                                        .star_trackers = kMaxStarTrackers});
+inline constexpr int kMaxDriftColumns = kPassCapacity.drift_columns;
 /// Clock offset, error at orbital period, alignments of further star trackers.
 inline constexpr int kMaxSharedStates = kLargestLayout.shared_size();
 /// Components of a fix: two across each momentum.

@@ -89,9 +89,9 @@ using ComponentCovariance = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic
 [[nodiscard]] ComponentCovariance noise_of(const FixComparison& comparison, const Eigen::Matrix3d& R_c,
                                            const PerGyro<double>& readout_noise_rad);
 
-/// Rows about the states, and right of them what they are compared with; room for kMaxComponents rows and Max states.
-template <int Max>
-using ComparedRows = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor, kMaxComponents, Max + 1>;
+/// Rows about the states, and right of them what they are compared with; room for Max states and as many components.
+template <int Max, int Components = kMaxComponents>
+using ComparedRows = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor, Components, Max + 1>;
 /// Three rows about the states.
 template <int Max>
 using StateRows3 = Eigen::Matrix<double, 3, Eigen::Dynamic, Eigen::RowMajor, 3, Max>;
@@ -112,9 +112,10 @@ void put_drift_columns(const Layout& layout, int gyro, const M& m, Rows&& rows) 
 }
 
 /// The comparison as rows (H, y) about the states at its time.
-template <int Max>
-[[nodiscard]] ComparedRows<Max> rows_about_states_now(const Layout& layout, const FixComparison& comparison) {
-  ComparedRows<Max> rows(comparison.components(), layout.size() + 1);
+template <int Max, int Components = kMaxComponents>
+[[nodiscard]] ComparedRows<Max, Components> rows_about_states_now(const Layout& layout,
+                                                                  const FixComparison& comparison) {
+  ComparedRows<Max, Components> rows(comparison.components(), layout.size() + 1);
   rows.setZero();
   int row = 0;
   for (int k = 0; k < layout.gyros; ++k) {

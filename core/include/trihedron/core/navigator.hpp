@@ -9,6 +9,7 @@
 #include "trihedron/core/fix_readings.hpp"
 #include "trihedron/core/measurement.hpp"
 #include "trihedron/core/optimal_attitude.hpp"
+#include "trihedron/core/step_report.hpp"
 
 namespace trihedron {
 
@@ -20,59 +21,64 @@ class Navigator {
   using Gyros = typename Estimator::Gyros;
   using Sensitivities = typename Estimator::Sensitivities;
 
+  /// Momenta and parameters, and what has come to their errors since the correction.
+  struct State {
+    Gyros gyros;
+    double time_s = 0;               ///< since the correction
+    double extra_variance_rad2 = 0;  ///< of the directions, per axis
+  };
+
   [[nodiscard]] bool started() const { return started_; }
-  [[nodiscard]] const Gyros& gyros() const { return gyros_; }
+  [[nodiscard]] const Gyros& gyros() const { return state_.gyros; }
+  [[nodiscard]] State& state() { return state_; }
+  [[nodiscard]] const State& state() const { return state_; }
 
-  /// Instantaneous astro-correction: takes over the estimator's directions and parameters.
-  void correct(const Estimator& estimator);
+  /// What an instantaneous astro-correction takes over.
+  struct Source {
+    ParametersInUse parameters{};
+    /// With the parameters held, those of the set-up or those in use: the attitude at which the held alignments read
+    /// the directions (`h_b`). The errors are then those of the parameters held and of the attitude.
+    AttitudeSolution attitude;
+    Directions h_b;
+  };
+  /// The state that a correction makes: the estimator's, or the parameters held with directions of their own.
+  [[nodiscard]] State corrected(const Estimator& estimator, const Source& source) const;
+  /// Instantaneous astro-correction: `state` is corrected(), or what it has become since; the errors are those at the
+  /// estimator's last fix. Nothing may have been asked of another correction between.
+  void take_over(const Estimator& estimator, const Source& source, const State& state);
 
-  /// Instantaneous astro-correction with the parameters of the set-up held: the directions are those that the held
-  /// alignments read at this attitude (`h_b`), and the errors those of the set-up and of the attitude.
-  void correct_directions(const Estimator& estimator, const AttitudeSolution& attitude, const Directions& h_b);
-
-  /// Open-loop prediction over one step that ends at t; C_in_c and h_b of its middle. Needs started().
-  void predict(const Estimator& estimator, const Eigen::Matrix3d& C_in_c, const Directions& h_b, Time t, double dt_s);
-
-  /// Widens the directions: `variance_rad2` per axis, as the estimator's.
-  void add_direction_variance(double variance_rad2) { extra_variance_rad2_ += variance_rad2; }
+  /// Open-loop prediction of a state over one step that ends at t; C_in_c and h_b of its middle.
+  static void predict(const Estimator& estimator, const Eigen::Matrix3d& C_in_c, const Directions& h_b, Time t,
+                      double dt_s, State& state);
 
   /// Carries the errors over the stretch between two fixes, by the sensitivities that the estimator has integrated.
   void extend(const Estimator& estimator, const Sensitivities& stretch);
 
-  /// Attitude by the momenta and these readings, with its covariance. Needs started().
+  /// Attitude by the momenta of a state and these readings, with the covariance of the present correction. Needs
+  /// started().
   [[nodiscard]] Result<AttitudeSolution, DirectionsFault> attitude(const Estimator& estimator,
-                                                                   const FixReadings& readings) const {
-    return attitude(estimator, gyros_, readings, time_since_correction_s_);
-  }
-
-  /// The same `back_s` before the present, which has `t` and to which C_in_c and h_b are the middle of the step.
-  [[nodiscard]] Result<AttitudeSolution, DirectionsFault> attitude_before(const Estimator& estimator,
-                                                                          const FixReadings& readings,
-                                                                          const Eigen::Matrix3d& C_in_c,
-                                                                          const Directions& h_b, Time t,
-                                                                          double back_s) const;
+                                                                   const FixReadings& readings,
+                                                                   const State& state) const;
 
  private:
-  [[nodiscard]] Result<AttitudeSolution, DirectionsFault> attitude(const Estimator& estimator, const Gyros& gyros,
-                                                                   const FixReadings& readings,
-                                                                   double time_since_correction_s) const;
-  void precess_all(const Estimator& estimator, const Eigen::Matrix3d& C_in_c, const Directions& h_b, Time t,
-                   double dt_s, Gyros& gyros) const;
   /// The sensitivities of the stretch after `since`, those since the correction.
   void append(const Estimator& estimator, const Sensitivities& stretch, Sensitivities& since) const;
   /// Storage of the errors, set to zero.
   [[nodiscard]] RowsView new_errors(int rows, int columns);
-  void restart_clock(const Layout& layout);
+  /// The errors of a correction with the parameters held.
+  void hold_errors(const Estimator& estimator, const Source& source, const Gyros& gyros);
+  /// Whether the parameters held are those of the set-up.
+  [[nodiscard]] bool are_of_set_up(const Source& source) const {
+    return source.parameters == ParametersInUse::kOfSetUp || !started_;
+  }
 
-  Gyros gyros_;
+  State state_;
   /// Root of the covariance of the errors at the correction, rows as in error_layout(), one after the other.
   std::array<double, static_cast<std::size_t>(Estimator::kMaxErrors) * Estimator::kMaxStates> errors_{};
   int error_rows_ = 0;
   int error_columns_ = 0;
   Sensitivities since_correction_;
-  double time_since_correction_s_ = 0;
   double extended_until_s_ = 0;
-  double extra_variance_rad2_ = 0;
   bool started_ = false;
 };
 

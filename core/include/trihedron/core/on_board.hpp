@@ -3,6 +3,7 @@
 /// exceptions.
 
 #include <chrono>
+#include <cstdint>
 #include <optional>
 
 #include "trihedron/core/fix_queue.hpp"
@@ -27,8 +28,11 @@ class OnBoard {
                                                  const Eigen::Ref<const Eigen::MatrixXd>& covariance,
                                                  const CorrectionPolicy& policy);
 
+  /// As after set_up().
+  void reset();
+
   /// One gyro sample. The navigator moves to it at once; the calibration follows some samples behind, when those round
-  /// a fix are there. At most one fix is dealt with.
+  /// a fix are there. At most one fix is dealt with; where its work is spread, a part of one.
   StepReport on_gyro(const GyroSample& sample);
 
   /// One fix. It waits for the gyro samples round it and is reported with the step that has them; without need for them
@@ -42,14 +46,39 @@ class OnBoard {
   /// when none waits.
   StepReport flush();
 
+  /// The next fix that is used corrects the navigator, whatever the interval.
+  void correct_at_next_fix() { correction_wanted_ = true; }
+  /// What the navigator takes over at its corrections; at first as the policy of the set-up says.
+  void use_parameters(ParametersInUse parameters) { parameters_ = parameters; }
+  /// Uses these gyros alone, and takes them back where they were isolated.
+  void select(const GyroMask& gyros) { intake_.health().select(gyros); }
+  /// Whether these gyros give an attitude by the readings of the latest sample.
+  [[nodiscard]] bool can_see_with(const GyroMask& gyros) const {
+    return readings_.size() > 0 && estimator_.rotation(estimator_.gyros(), readings_.latest_directions(), gyros).ok();
+  }
+  /// How errors at its beginning have changed the directions at its end, over the stretches between all fixes that have
+  /// been dealt with since begin_stretch().
+  struct Stretch {
+    typename Estimator::Sensitivities sensitivities;
+    double duration_s = 0;
+  };
+  [[nodiscard]] const Stretch& stretch() const { return stretch_; }
+  void begin_stretch();
+
   [[nodiscard]] const Estimator& estimator() const { return estimator_; }
   [[nodiscard]] const Navigator<Estimator>& navigator() const { return navigator_; }
+  [[nodiscard]] const GyroHealth& health() const { return intake_.health(); }
   /// Time of the latest sample used; needs one.
   [[nodiscard]] Time t() const { return readings_.latest_t(); }
+  /// The same, if there is one since the start or since the clock was set back.
+  [[nodiscard]] std::optional<Time> latest() const { return readings_.latest(); }
+  /// Of the navigator's last correction; needs navigator().started().
+  [[nodiscard]] Time corrected_t() const { return corrected_t_; }
 
   /// Open-loop attitude at the latest sample. Needs navigator().started().
   [[nodiscard]] Result<AttitudeSolution, DirectionsFault> navigation_attitude() const {
-    return navigator_.attitude(estimator_, readings_.now(estimator_.setup(), intake_.health(), estimator_.gyros()));
+    return navigator_.attitude(estimator_, readings_.now(estimator_.setup(), intake_.health(), estimator_.gyros()),
+                               navigator_.state());
   }
 
  private:
@@ -68,22 +97,106 @@ class OnBoard {
   [[nodiscard]] std::optional<Eigen::Matrix3d> attitude_of(const Gyros& gyros, Step& step) const;
   [[nodiscard]] double variance_of_long_step(const Step& step) const;
 
-  [[nodiscard]] SampleStatus let_in(GyroSample& sample);
-  void set_clock(Time t);
+  [[nodiscard]] SampleStatus let_in(GyroSample& sample, StepReport& report);
+  void set_clock(Time t, StepReport& report);
   void calibrate_until(Time limit, StepReport& report);
-  void correct(const StarFix& fix, StepReport& report);
-  void look_at_angles(StepReport& report);
-  void use_angles(Time t, const FixReadings& readings, StepReport& report);
-  void judge(int odd_gyro, StepReport& report);
-  void correct_navigator(const FixReadings& readings, StepReport& report);
-  void navigate(Time from_t, const Directions& from, Time to_t, const Directions& to);
+  void calibrate_at_once(Time limit, StepReport& report);
+  enum class Beginnings : std::uint8_t { kAllowed, kPutOff };
+  void calibrate_some(Time limit, Beginnings beginnings, StepReport& report);
+  void calibrate_in_doubt(StepReport& report);
+
+  /// A fix, or the readings alone, that is being dealt with, and what its stages leave for one another. While there is
+  /// one the estimator stays at its time; the navigator goes on as before it, up to kTakingOver.
+  struct Work {
+    enum class Stage : std::uint8_t {
+      kNone,
+      kFix,         ///< the stages of the estimator
+      kCalibrated,  ///< the attitude that the calibration gives
+      kAngles,      ///< the stages of the estimator, by the angles alone
+      kCatchingUp,  ///< the state of the corrected navigator follows the samples since the fix
+      kTakingOver,  ///< the navigator is corrected
+      kNavigated,   ///< the attitude that the navigator gave, or gives now
+      kReport,
+    };
+    Stage stage = Stage::kNone;
+    bool has_fix = false;
+    bool has_past = false;  ///< `state` is the navigator's at the fix
+    bool moved = false;     ///< the covariance has been moved to the present time
+    ParametersInUse parameters{};
+    Time t{};
+    Time state_t{};  ///< of `state`, in kCatchingUp
+    ComparedFix its;
+    FixOutcome outcome;
+    typename Estimator::Correction correction;
+    typename Navigator<Estimator>::State state;
+  };
+  /// What takes how long, about, in 100 instructions on two gyros with eq. (1).
+  struct Cost {
+    static constexpr int kSample = 32;
+    static constexpr int kBeginning = 170;
+    static constexpr int kCalibrated = 90;
+    static constexpr int kNavigatedSample = 16;
+    static constexpr int kTakingOver = 250;
+    static constexpr int kNavigated = 135;
+    static constexpr int kReport = 215;  ///< what is made of the report, such as a forecast
+  };
+  /// Fixes that have become due wait for the one that is dealt with: with one of them, its work has so many samples
+  /// left; with two, half as many; with more than these, all is done at once.
+  static constexpr int kHurry = 6;
+  /// Samples that a stage of kCatchingUp takes.
+  static constexpr int kCaughtUpTogether = 6;
+
+  [[nodiscard]] bool is_working() const { return work_.stage != Work::Stage::kNone; }
+  [[nodiscard]] bool spreads() const { return policy_.spread_over > 0; }
+  /// Whether something has been dealt with, or refused when it was due.
+  [[nodiscard]] static bool has_outcome(const StepReport& report) {
+    return (report.fix.status != FixStatus::kNone && report.fix.status != FixStatus::kPending) ||
+           report.angles.status != FixStatus::kNone;
+  }
+  /// Begins to deal with a fix, or with the angles between the momenta at the time that they are due; false where it
+  /// is refused or put off.
+  [[nodiscard]] bool begin(const StarFix& fix, StepReport& report);
+  [[nodiscard]] bool begin_angles();
+  /// Begins with the fix or the angles that are next, as begin() and begin_angles().
+  [[nodiscard]] bool begin_next(Schedule::Next next, StepReport& report);
+  void prepare(Time t, const FixReadings& readings, typename Work::Stage stage);
+  /// The next stage, up to kReport; all of them, and what they come to.
+  void work();
+  void finish(StepReport& report);
+  void hand_over(StepReport& report);
+  template <class Stage>
+  void carry_on_with(const FixStatus& status, Stage&& stage);
+  void work_on_fix();
+  [[nodiscard]] typename Work::Stage after_calibration();
+  void work_on_angles();
+  [[nodiscard]] bool is_correction_due(Time t) const;
+  [[nodiscard]] typename Navigator<Estimator>::Source source() const;
+  void catch_up(int samples);
+  void take_over();
+  void note_navigated();
+  void look_back();
+  [[nodiscard]] int samples_after(Time t) const { return readings_.size() - readings_.first_after(t); }
+
+  /// How the work is spread.
+  void plan(int late);
+  void hurry(Time limit);
+  [[nodiscard]] int share_of_slot(Time limit) const;
+  [[nodiscard]] static int cost_of(Schedule::Next next);
+  [[nodiscard]] int cost_of_stage() const;
+  [[nodiscard]] int cost_to_end() const;
+  /// Whether a sample would be lost that is still needed: of a burst of fixes, each of which takes a slot by itself.
+  [[nodiscard]] bool is_too_far_behind() const;
+
+  /// After a fix, with what has passed since the one before it.
+  void end_stretch(const typename Estimator::Sensitivities& stretch, double duration_s);
+  void navigate(Time from_t, const Directions& from, Time to_t, const Directions& to,
+                typename Navigator<Estimator>::State& state) const;
   void follow(Time t, const Directions& h_b);
   void follow_next_sample();
   [[nodiscard]] std::optional<FixReadings> readings_at(Time t) const {
     return readings_.at(t, estimator_.setup(), intake_.health(), estimator_.gyros());
   }
   [[nodiscard]] std::optional<AttitudeSolution> calibrated(const FixReadings& readings) const;
-  [[nodiscard]] std::optional<AttitudeSolution> navigated_before(Time t, const FixReadings& readings) const;
   [[nodiscard]] double angle_residual() const;
   [[nodiscard]] int gyros() const { return estimator_.layout().gyros; }
   [[nodiscard]] Duration reach() const {
@@ -101,6 +214,13 @@ class OnBoard {
   Estimator estimator_;
   Navigator<Estimator> navigator_;
   CorrectionPolicy policy_;
+  ParametersInUse parameters_{};
+  bool correction_wanted_ = false;
+  Stretch stretch_;
+  Work work_;
+  int slots_left_ = 0;  ///< samples over which the work that there is is to be spread; 0: it is done at once
+  Time worked_t_{};     ///< of the last fix, or angles, dealt with
+  bool has_worked_ = false;
   int behind_ = 0;  ///< samples to which the estimator has not yet been taken
   Time follower_t_{};
   Directions follower_h_b_;
@@ -117,6 +237,7 @@ using FullOnBoard = OnBoard<InvariantEstimator<kFullCapacity>>;
 
 // Those that are built.
 extern template class OnBoard<InvariantEstimator<kPairCapacity>>;
+extern template class OnBoard<InvariantEstimator<kTrioCapacity>>;
 extern template class OnBoard<InvariantEstimator<kFullCapacity>>;
 extern template class OnBoard<PaperEstimator>;
 

@@ -3,6 +3,7 @@
 /// eqs. 3 and 4).
 
 #include <Eigen/Core>
+#include <cstdint>
 #include <optional>
 
 #include "trihedron/core/drift.hpp"
@@ -49,6 +50,9 @@ class PaperEstimator {
   [[nodiscard]] std::optional<SetupFault> set_up(const CalibrationSetup& setup, const Gyros& prior,
                                                  const Eigen::Ref<const Eigen::MatrixXd>& covariance);
 
+  /// Returns to the prior, not started: as after set_up().
+  void forget();
+
   [[nodiscard]] bool started() const { return started_; }
   [[nodiscard]] const CalibrationSetup& setup() const { return setup_; }
   [[nodiscard]] const Layout& layout() const { return setup_.layout; }
@@ -59,6 +63,7 @@ class PaperEstimator {
   [[nodiscard]] const Gyros& gyros() const { return gyros_; }
   /// Effect of the errors at the last fix on the present directions.
   [[nodiscard]] const Sensitivities& since_fix() const { return since_fix_; }
+  [[nodiscard]] double time_since_fix_s() const { return time_since_fix_s_; }
   /// What was known before.
   [[nodiscard]] const Gyros& prior_gyros() const { return prior_gyros_; }
 
@@ -79,6 +84,22 @@ class PaperEstimator {
 
   /// Widens the directions: `variance_rad2` per axis for what a step too long for its readings may have missed.
   void add_direction_variance(double variance_rad2) { extra_variance_rad2_ += variance_rad2; }
+
+  /// As of InvariantEstimator, of a single stage.
+  struct Correction {
+    enum class Stage : std::uint8_t { kPropagation, kDone };
+    Stage stage = Stage::kPropagation;
+    static constexpr bool reopened = false;
+
+    [[nodiscard]] bool done() const { return stage == Stage::kDone; }
+  };
+  static constexpr int kMostStages = 1;
+  [[nodiscard]] static int cost(const Correction& correction) { return correction.done() ? 0 : 600; }
+  [[nodiscard]] static int cost_to_end(const Correction& correction) { return cost(correction); }
+  void carry_on(Correction& correction, const StarFix& fix, const FixReadings& readings, FixReport& report) {
+    report = correct(fix, readings);
+    correction.stage = Correction::Stage::kDone;
+  }
 
   /// Astro-correction: the first one starts the filter, each further one updates it. Where the estimate is not finite
   /// after that, or has no covariance, it is forgotten: kEstimateLost, and no longer started().
@@ -106,13 +127,14 @@ class PaperEstimator {
  private:
   using Information = SquareRootInformation<kMaxStates, States::kDynamic>;
 
-  /// Returns to the prior, not started.
-  void forget();
   /// Whether the estimate is finite and has a covariance.
   [[nodiscard]] bool sound() const { return information_.regular() && estimates_are_finite(gyros_, layout()); }
   /// correct() before sound() is asked.
   [[nodiscard]] FixReport take(const StarFix& fix, const FixReadings& readings);
   void update_covariance_to_now(const QuasiInertial& now);
+  /// Innovation, its covariance and NIS; `rows`: the measurement whitened, L: the root of its noise.
+  void report_innovation(const Measurement& measurement, const ComparedRows<kMaxStates>& rows, const Eigen::Matrix4d& L,
+                         FixReport& report) const;
   void feed_back(const Information::Vector& correction);
 
   CalibrationSetup setup_;

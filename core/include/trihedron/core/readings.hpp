@@ -1,6 +1,7 @@
 #pragma once
 /// The latest gyro samples, and what the gyros read at any time between them.
 
+#include <algorithm>
 #include <array>
 #include <chrono>
 #include <cstddef>
@@ -19,13 +20,12 @@ namespace trihedron {
 [[nodiscard]] Directions between(const Directions& a, const Directions& b, double fraction, int gyros);
 
 /// Buffer of the latest kCapacity samples, screened and of unit length, kGyros directions each; the oldest is dropped.
-/// Samples that come less than kMinSpacing after the last one are not taken, so that the buffer covers the time that is
-/// needed at any rate.
+/// Samples that come less than min_spacing() after the last one are not taken, so that the buffer covers the time that
+/// is needed at any rate.
 template <int kGyros>
 class Readings {
  public:
   static constexpr int kCapacity = 80;
-  /// 80 of these are 6 s, the longest time that the angles between the momenta wait.
   static constexpr Duration kMinSpacing = std::chrono::milliseconds(75);
 
   Readings() = default;
@@ -54,7 +54,10 @@ class Readings {
   [[nodiscard]] Directions latest_directions() const { return directions(size_ - 1); }
 
   /// Whether a sample comes sooner than there is room for.
-  [[nodiscard]] bool too_soon(Time t) const { return size_ > 0 && t - latest_t() < kMinSpacing; }
+  [[nodiscard]] bool too_soon(Time t) const { return size_ > 0 && t - latest_t() < min_spacing(); }
+  /// The longest that a sample is needed is by the angles between the momenta: they wait for three times `reach`, and
+  /// their work may then be spread over CorrectionPolicy::kMostSpread samples.
+  [[nodiscard]] Duration min_spacing() const { return std::max(kMinSpacing, reach_ / kSpacingsOfReach); }
 
   void push(const GyroSample& sample) {
     if (full()) {
@@ -116,6 +119,7 @@ class Readings {
   }
 
  private:
+  static constexpr int kSpacingsOfReach = 19;
   struct Stored {
     Time t{};
     PerGyro<Eigen::Vector3d, kGyros> h_b;

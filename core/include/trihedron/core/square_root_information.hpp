@@ -4,6 +4,7 @@
 /// is of fixed capacity; the work is done by plain loops, compiled once.
 
 #include <Eigen/Core>
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstddef>
@@ -30,6 +31,54 @@ void invert_triangle(ConstRowsView root, RowsView inverse);
 
 /// product = a · b, all of them apart in memory.
 void multiply(ConstRowsView a, ConstRowsView b, RowsView product);
+
+/// An upper triangle that is only kept: half the room. There is room for Max rows.
+template <int Max>
+class PackedTriangle {
+ public:
+  /// Takes the upper triangle of R.
+  void pack(ConstRowsView R) {
+    size_ = R.rows;
+    for (int i = 0; i < size_; ++i) {
+      std::copy_n(R.row(i) + i, size_ - i, row(i));
+    }
+  }
+  /// Into the upper triangle of R, of the same size.
+  void unpack(RowsView R) const {
+    for (int i = 0; i < size_; ++i) {
+      std::copy_n(row(i), size_ - i, R.row(i) + i);
+    }
+  }
+  /// j ≥ i.
+  [[nodiscard]] double operator()(int i, int j) const { return row(i)[j - i]; }
+
+  /// As invert_triangle(), of the rows and columns from `first` on, as many as `inverse` has.
+  void invert(int first, RowsView inverse) const {
+    for (int i = 0; i < inverse.rows; ++i) {
+      double* x = inverse.row(i);
+      std::fill_n(x, inverse.columns, 0.0);
+      x[i] = 1;
+      for (int j = i; j < inverse.columns; ++j) {
+        const double* R = row(first + j);
+        x[j] /= R[0];
+        for (int k = j + 1; k < inverse.columns; ++k) {
+          x[k] -= x[j] * R[k - j];
+        }
+      }
+    }
+  }
+
+ private:
+  /// From the diagonal on.
+  [[nodiscard]] double* row(int i) { return data_.data() + begin(i); }
+  [[nodiscard]] const double* row(int i) const { return data_.data() + begin(i); }
+  [[nodiscard]] std::ptrdiff_t begin(int i) const {
+    return static_cast<std::ptrdiff_t>(i) * size_ - static_cast<std::ptrdiff_t>(i) * (i - 1) / 2;
+  }
+
+  int size_ = 0;
+  std::array<double, static_cast<std::size_t>(Max) * (Max + 1) / 2> data_{};
+};
 
 /// Estimate errors x ~ (0, (RᵀR)⁻¹) of states, the first `dynamic` of which move; the others are constants. R is upper
 /// triangular. A direction without information stays without: R times it remains zero to rounding, whatever the number

@@ -17,7 +17,7 @@ enum class SampleStatus : std::uint8_t {
   kRejectedTooFewGyros,    ///< fewer than two gyros can be used; the report names them
   kUsedAfterClockSetBack,  ///< first sample used after the telemetry clock was set back: no prediction is made across
                            ///< the jump
-  kThinned,                ///< good, but less than Readings::kMinSpacing after the sample before it: not used
+  kThinned,                ///< good, but less than Readings::min_spacing() after the sample before it: not used
 };
 inline constexpr std::size_t kSampleStatuses = 8;
 
@@ -56,9 +56,10 @@ inline constexpr std::size_t kFixStatuses = 15;
 /// Whether a gyro is used.
 enum class GyroState : std::uint8_t {
   kUsed,
-  kStuck,     ///< its readings do not change, not even by noise; used again when they do
-  kIsolated,  ///< left out for good: several times in a row it alone did not agree with the rest
+  kStuck,        ///< its readings do not change, not even by noise; used again when they do
+  kIsolated,     ///< left out for good: several times in a row it alone did not agree with the rest
+  kNotSelected,  ///< left out by command
 };
-inline constexpr std::size_t kGyroStates = 3;
+inline constexpr std::size_t kGyroStates = 4;
 
 }  // namespace trihedron

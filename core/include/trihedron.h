@@ -1,0 +1,86 @@
+#ifndef TRIHEDRON_H
+#define TRIHEDRON_H
+/**
+ * The on-board application in C99. It allocates nothing, has no global state, and calls nothing of the system: the caller
+ * owns the memory, feeds samples and fixes in time order, and asks. One object is used by one thread at a time. No pointer
+ * may be null unless it says so.
+ * docs/flight-interface.md describes records and numbers.
+ */
+
+#include <stddef.h>
+#include <stdint.h>
+
+#include "trihedron_tables.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/* C has no `using`, and constants are to be known to the preprocessor. NOLINTBEGIN(modernize-*) */
+
+/** Of the functions; of the records there is TRIHEDRON_TABLES_VERSION. */
+#define TRIHEDRON_INTERFACE_VERSION 1u
+/** As compiled into the library; to be compared with TRIHEDRON_INTERFACE_VERSION and TRIHEDRON_TABLES_VERSION. */
+uint32_t trihedron_interface_version(void);
+uint32_t trihedron_tables_version(void);
+
+/** Memory that is enough for an object of two or three gyros, and for its snapshots, bytes; and its alignment. */
+#define TRIHEDRON_SIZE_OF_2_GYROS 32768u
+#define TRIHEDRON_SIZE_OF_3_GYROS 61440u
+#define TRIHEDRON_SNAPSHOTS_SIZE_OF_2_GYROS 65664u
+#define TRIHEDRON_SNAPSHOTS_SIZE_OF_3_GYROS 122944u
+#define TRIHEDRON_ALIGNMENT 32u
+
+/** What is needed exactly, bytes; 0 for a number of gyros that there is nothing for. Snapshots need no alignment. */
+size_t trihedron_size(uint32_t gyros);
+size_t trihedron_alignment(void);
+size_t trihedron_snapshots_size(uint32_t gyros);
+
+/** The object, in the caller's memory. It has no pointers and may be moved as bytes between two calls. */
+typedef struct trihedron_application trihedron_application;
+
+/**
+ * Makes an object with room for `gyros` gyros in standby, without parameters. Null where the memory is null, too small or
+ * not aligned, or `gyros` is neither 2 nor 3. Nothing is to be done to end its life.
+ */
+trihedron_application* trihedron_create(void* memory, size_t size, uint32_t gyros);
+
+/** Parameters of so many gyros with the usual noise and priors, to be changed as needed. */
+void trihedron_default_parameters(uint32_t gyros, trihedron_parameters* parameters);
+
+/** Command load_parameters: of `trihedron_answer`. Nothing is changed where it is refused. */
+uint32_t trihedron_load_parameters(trihedron_application* its, const trihedron_parameters* parameters);
+
+/** Any other command, of `trihedron_command`; `argument` as the command says. Returns of `trihedron_answer`. */
+uint32_t trihedron_command(trihedron_application* its, uint32_t command, uint32_t argument);
+
+/** One gyro sample: of `trihedron_sample`. To be called at each of them; a part of the work of a fix is done in it. */
+uint32_t trihedron_on_gyro(trihedron_application* its, const trihedron_gyro_sample* sample);
+
+/**
+ * One fix: of `trihedron_fix`, of this fix, or of one before it where they come so fast that it is dealt with now. It waits
+ * for the samples round it; `last_fix` of the housekeeping record then says what was done with it.
+ */
+uint32_t trihedron_on_fix(trihedron_application* its, const trihedron_star_fix* fix);
+
+/** The attitude at the latest sample. 1, or 0 where there is none, and nothing is written. */
+uint32_t trihedron_get_attitude(const trihedron_application* its, trihedron_attitude* attitude);
+
+void trihedron_get_housekeeping(const trihedron_application* its, trihedron_housekeeping* housekeeping);
+
+/** Writes a snapshot into one of two slots in `memory`; its sequence number, or 0 where the memory is too small. */
+uint64_t trihedron_save(const trihedron_application* its, void* memory, size_t size);
+
+/**
+ * Restores the newest whole snapshot into an object that has been created. Its sequence number, or 0 where there is none
+ * and nothing is changed. `slots`, where it is not null: two of `trihedron_snapshot`, what each slot held.
+ */
+uint64_t trihedron_restore(trihedron_application* its, const void* memory, size_t size, uint32_t slots[2]);
+
+/* NOLINTEND(modernize-*) */
+
+#ifdef __cplusplus
+}
+#endif
+
+#endif

@@ -1,0 +1,532 @@
+#pragma once
+/// Definitions of Application.
+
+#include <algorithm>
+#include <cmath>
+#include <iterator>
+
+#include "forecast_impl.hpp"
+#include "trihedron/core/application.hpp"
+#include "trihedron/core/cholesky.hpp"
+
+namespace trihedron {
+
+namespace detail {
+
+inline void count_up(std::uint32_t& counter) { counter += counter < UINT32_MAX ? 1 : 0; }
+
+[[nodiscard]] constexpr Answer answer_to(SetupFault fault) {
+  switch (fault) {
+    case SetupFault::kTooLarge:
+      return Answer::kTooLarge;
+    case SetupFault::kPriorNotPositiveDefinite:
+      return Answer::kCovarianceNotPositiveDefinite;
+    case SetupFault::kPriorMeanNotUsable:
+      return Answer::kMeanNotUsable;
+    case SetupFault::kNoiseNotPositive:
+    case SetupFault::kGateNotPositive:
+      break;
+  }
+  return Answer::kNotPositive;
+}
+
+/// What the estimator does not check: times with which no sum can overflow, and numbers that are finite.
+[[nodiscard]] inline bool is_usable(const CalibrationSetup& setup, const ApplicationPolicy& policy) {
+  const Duration zero{};
+  constexpr Duration kLongest = std::chrono::hours(24 * 365);
+  constexpr Duration kSlowest = std::chrono::minutes(1);
+  const auto is_time = [&](Duration its) { return its > zero && its <= kLongest; };
+  return setup.gyro_period > zero && setup.gyro_period <= kSlowest && setup.angles_after >= zero &&
+         std::isfinite(setup.gate_nis) && policy.correction_interval >= zero && policy.required_error_rad > 0 &&
+         std::isfinite(policy.required_error_rad) && is_time(policy.required_interval) && is_time(policy.window) &&
+         is_time(policy.star_tracker_timeout) && is_time(policy.failed_after) && policy.aligned_after_fixes > 0 &&
+         policy.spread_over >= 0;
+}
+
+}  // namespace detail
+
+// ---- Commands
+
+template <class Estimator>
+Answer Application<Estimator>::load(const CalibrationSetup& setup, const Gyros& prior,
+                                    const Eigen::Ref<const Eigen::MatrixXd>& covariance,
+                                    const ApplicationPolicy& policy) {
+  if (!next_mode(mode_, Event::kLoadParameters)) {
+    return answer(Answer::kNotInThisMode);
+  }
+  if (!detail::is_usable(setup, policy)) {
+    return answer(Answer::kNotPositive);
+  }
+  const CorrectionPolicy corrections{
+      .interval = policy.correction_interval, .take_parameters = false, .spread_over = policy.spread_over};
+  if (const auto fault = on_board_.set_up(setup, prior, covariance, corrections)) {
+    return answer(detail::answer_to(*fault));
+  }
+  policy_ = policy;
+  loaded_ = true;
+  begin();
+  return answer(Answer::kAccepted);
+}
+
+template <class Estimator>
+Answer Application<Estimator>::command(Command command, std::uint32_t argument) {
+  return answer(answer_to(command, argument));
+}
+
+template <class Estimator>
+Answer Application<Estimator>::answer(Answer answer) {
+  counts_.last_answer = static_cast<std::uint8_t>(answer);
+  detail::count_up(answer == Answer::kAccepted ? counts_.commands_accepted : counts_.commands_refused);
+  return answer;
+}
+
+template <class Estimator>
+Answer Application<Estimator>::answer_to(Command command, std::uint32_t argument) {
+  if (static_cast<std::size_t>(command) >= kCommands || command == Command::kLoadParameters) {
+    return Answer::kUnknownCommand;  // parameters are loaded by load()
+  }
+  if (!next_mode(mode_, event_of(command))) {
+    return Answer::kNotInThisMode;
+  }
+  switch (command) {
+    case Command::kStart:
+      if (!loaded_) {
+        return Answer::kNoParameters;
+      }
+      fix_t_ = attitude_t_ = now_;
+      break;
+    case Command::kCorrectNow:
+      on_board_.correct_at_next_fix();
+      break;
+    case Command::kAdoptCalibration:
+      if (!calibration_residuals_.agree()) {
+        return Answer::kResidualsDisagree;
+      }
+      held_ = false;
+      adopt();
+      break;
+    case Command::kHoldCalibration:
+      hold();
+      break;
+    case Command::kSelectGyros:
+      if (const Answer refusal = select(argument); refusal != Answer::kAccepted) {
+        return refusal;
+      }
+      break;
+    case Command::kReset:
+      if (loaded_) {
+        on_board_.reset();
+        begin();
+      }
+      break;
+    case Command::kLoadParameters:
+      break;
+  }
+  happen(event_of(command));
+  return Answer::kAccepted;
+}
+
+template <class Estimator>
+Answer Application<Estimator>::select(std::uint32_t bits) {
+  if (bits >> gyros() != 0) {
+    return Answer::kNoSuchGyro;
+  }
+  GyroMask mask;
+  for (int k = 0; k < gyros(); ++k) {
+    mask[k] = (bits >> k & 1U) != 0;
+  }
+  if (count(mask) < 2) {
+    return Answer::kTooFewGyros;
+  }
+  if (!on_board_.can_see_with(mask)) {
+    return Answer::kMomentaNearlyParallel;
+  }
+  on_board_.select(mask);
+  return Answer::kAccepted;
+}
+
+/// As after loading parameters; counters go on.
+template <class Estimator>
+void Application<Estimator>::begin() {
+  forecast_ = Forecast<Estimator>(policy_.window, policy_.required_interval, policy_.required_error_rad);
+  calibration_residuals_.restart();
+  navigation_residuals_.restart();
+  faults_ = 0;
+  fixes_since_start_ = 0;
+  refused_in_a_row_ = 0;
+  unknown_until_ = Time::min();
+  adoption_ = Adoption::kNone;
+  held_ = false;
+  has_sample_ = false;
+}
+
+template <class Estimator>
+void Application<Estimator>::happen(Event event) {
+  if (const auto next = next_mode(mode_, event)) {
+    mode_ = *next;
+  }
+}
+
+template <class Estimator>
+void Application<Estimator>::set(Fault fault, bool is_there) {
+  const auto bit = static_cast<std::uint32_t>(fault);
+  faults_ = is_there ? faults_ | bit : faults_ & ~bit;
+}
+
+// ---- Samples and fixes
+
+template <class Estimator>
+StepReport Application<Estimator>::on_gyro(const GyroSample& sample) {
+  if (!loaded_ || mode_ == Mode::kFailed) {
+    StepReport report;
+    report.t = sample.t;
+    return report;
+  }
+  const StepReport report = on_board_.on_gyro(sample);
+  note(report);
+  return report;
+}
+
+template <class Estimator>
+StepReport Application<Estimator>::on_fix(const StarFix& fix) {
+  if (!is_looking_at_fixes()) {
+    detail::count_up(counts_.fixes_ignored);
+    StepReport report;
+    report.t = fix.t;
+    return report;
+  }
+  const StepReport report = on_board_.on_fix(fix);
+  note(report);
+  return report;
+}
+
+template <class Estimator>
+void Application<Estimator>::note(const StepReport& report) {
+  note_sample(report);
+  note_fix(report);
+  watch(report);
+}
+
+template <class Estimator>
+void Application<Estimator>::note_sample(const StepReport& report) {
+  if (report.sample == SampleStatus::kNone) {
+    return;
+  }
+  counts_.last_sample = static_cast<std::uint8_t>(report.sample);
+  if (report.sample == SampleStatus::kThinned) {
+    detail::count_up(counts_.samples_thinned);
+    return;
+  }
+  if (!is_used(report.sample)) {
+    detail::count_up(counts_.samples_rejected);
+    refused_in_a_row_ = std::min(refused_in_a_row_ + 1, kStandingStill);
+    now_ = report.sample == SampleStatus::kRejectedOutOfOrder ? now_ : report.t;
+    return;
+  }
+  detail::count_up(counts_.samples_used);
+  refused_in_a_row_ = 0;
+  counts_.angle_residual = report.angle_residual;
+  if (report.sample == SampleStatus::kUsedAfterClockSetBack) {
+    detail::count_up(counts_.clock_set_backs);
+    const Duration shift = report.t - used_t_;
+    fix_t_ += shift;
+    attitude_t_ += shift;
+    set(Fault::kClockSetBack, on_board_.navigator().started());
+    unknown_until_ = report.t;
+  } else if (has_sample_ && report.t - used_t_ > kLongGap) {
+    detail::count_up(counts_.gaps);
+    set(Fault::kGap, on_board_.navigator().started());
+    unknown_until_ = report.t;
+  }
+  if (!has_sample_) {
+    fix_t_ = attitude_t_ = report.t;
+    has_sample_ = true;
+  }
+  now_ = used_t_ = report.t;
+}
+
+template <class Estimator>
+void Application<Estimator>::note_fix(const StepReport& report) {
+  if (report.fix.status == FixStatus::kEstimateLost || report.angles.status == FixStatus::kEstimateLost) {
+    restart();
+  }
+  if (report.fix.status == FixStatus::kNone || report.fix.status == FixStatus::kPending) {
+    return;
+  }
+  counts_.last_fix = static_cast<std::uint8_t>(report.fix.status);
+  if (!report.fix.used()) {
+    detail::count_up(counts_.fixes_rejected);
+    return;
+  }
+  detail::count_up(counts_.fixes_used);
+  note_used_fix(report);
+}
+
+template <class Estimator>
+void Application<Estimator>::note_used_fix(const StepReport& report) {
+  fix_t_ = report.fix.t;
+  if (report.fix.t >= unknown_until_) {  // an earlier one may still have waited
+    set(Fault::kClockSetBack, false);
+    set(Fault::kGap, false);
+  }
+  set(Fault::kAccuracy, false);
+  if (report.corrected) {
+    detail::count_up(counts_.corrections);
+    navigation_residuals_.restart();
+  }
+  const StarFix& fix = report.compared->fix;
+  switch (report.fix.status) {
+    case FixStatus::kStarted:
+      happen(Event::kFirstFix);
+      fixes_since_start_ = 0;
+      on_board_.begin_stretch();
+      break;
+    case FixStatus::kRestarted:
+      restart();
+      break;
+    case FixStatus::kUsedAfterReopening:
+      withdraw();
+      break;
+    default:
+      ++fixes_since_start_;
+      calibration_residuals_.add(report.fix.nis / static_cast<double>(report.fix.innovation.size()));
+      forecast_.extend(on_board_, fix.q_in_c.normalized().toRotationMatrix());
+      break;
+  }
+  note_navigated(report);
+  if (fixes_since_start_ >= policy_.aligned_after_fixes) {
+    happen(Event::kAligned);
+  }
+  forecast_.predict(on_board_.estimator(), on_board_.health().usable(fix.t, fix.t));
+  if (report.corrected && adoption_ == Adoption::kPending) {
+    adoption_ = Adoption::kDone;
+    detail::count_up(counts_.adoptions);
+    happen(Event::kAdopted);
+  }
+  if (!held_) {
+    decide_on_adoption();
+  }
+}
+
+/// How far the open loop was off at a fix.
+template <class Estimator>
+void Application<Estimator>::note_navigated(const StepReport& report) {
+  if (report.navigated && !report.corrected) {
+    const StarFix& fix = report.compared->fix;
+    const Eigen::Vector3d off =
+        (report.navigated->C_in_c.inverse() * Rot<In, C>::assume(fix.q_in_c.normalized())).log().raw();
+    Eigen::Vector3d white = off;
+    const Eigen::Matrix3d noise = fix_noise(on_board_.estimator().setup(), fix.head);
+    const Eigen::Matrix3d root = cholesky_root<3>(report.navigated->covariance_rad2 + noise);
+    solve_factorized(matrix_of(root), white);
+    navigation_residuals_.add(off.dot(white) / 3);
+  }
+}
+
+template <class Estimator>
+void Application<Estimator>::decide_on_adoption() {
+  if (calibration_residuals_.disagree() || navigation_residuals_.disagree()) {
+    withdraw();
+  } else if (mode_ == Mode::kCalibrating && adoption_ == Adoption::kNone && calibration_residuals_.agree() &&
+             forecast_.known() && forecast_.error_rad() <= policy_.required_error_rad) {
+    adopt();
+  }
+}
+
+/// The filter has restarted, or has dropped its estimate and starts with the next fix.
+template <class Estimator>
+void Application<Estimator>::restart() {
+  detail::count_up(counts_.filter_restarts);
+  withdraw();
+  happen(Event::kFilterRestarted);
+  fixes_since_start_ = 0;
+}
+
+/// At the next fix that is used.
+template <class Estimator>
+void Application<Estimator>::adopt() {
+  adoption_ = adoption_ == Adoption::kDone ? Adoption::kDone : Adoption::kPending;
+  on_board_.use_parameters(ParametersInUse::kOfCalibration);
+  on_board_.correct_at_next_fix();
+}
+
+/// Nothing is adopted or taken back until further notice.
+template <class Estimator>
+void Application<Estimator>::hold() {
+  held_ = true;
+  adoption_ = adoption_ == Adoption::kDone ? Adoption::kDone : Adoption::kNone;
+  on_board_.use_parameters(ParametersInUse::kHeld);
+}
+
+/// Its residuals contradict the calibration: back to what was known before it.
+template <class Estimator>
+void Application<Estimator>::withdraw() {
+  calibration_residuals_.restart();
+  navigation_residuals_.restart();
+  if (held_ || adoption_ == Adoption::kNone) {
+    return;
+  }
+  if (adoption_ == Adoption::kDone) {
+    detail::count_up(counts_.withdrawals);
+  }
+  adoption_ = Adoption::kNone;
+  on_board_.use_parameters(ParametersInUse::kOfSetUp);
+  on_board_.correct_at_next_fix();
+  happen(Event::kTakenBack);
+}
+
+// ---- Faults
+
+template <class Estimator>
+void Application<Estimator>::watch(const StepReport& report) {
+  int selected = 0;
+  int used = 0;
+  for (int k = 0; k < gyros(); ++k) {
+    selected += report.gyros[k] != GyroState::kNotSelected ? 1 : 0;
+    used += report.gyros[k] == GyroState::kUsed ? 1 : 0;
+  }
+  const bool can_see = used >= 2 && refused_in_a_row_ < kStandingStill &&
+                       now_ - used_t_ <= on_board_.estimator().setup().max_interpolation();
+  attitude_t_ = can_see ? now_ : attitude_t_;
+  set(Fault::kNoAttitude, !can_see);
+  set(Fault::kGyroLost, used >= 2 && used < selected);
+  if (!is_looking_at_fixes()) {
+    return;
+  }
+  set(Fault::kStarTrackerLost, now_ - fix_t_ > policy_.star_tracker_timeout);
+  const bool is_navigating = on_board_.navigator().started();
+  if (is_navigating && has(Fault::kStarTrackerLost) && adoption_ == Adoption::kDone) {
+    set(Fault::kAccuracy, to_seconds(now_ - on_board_.corrected_t()) > forecast_.ready_s());
+  }
+  if (now_ - attitude_t_ > policy_.failed_after) {
+    happen(Event::kFailure);
+    return;
+  }
+  change_mode_by_faults();
+}
+
+template <class Estimator>
+void Application<Estimator>::change_mode_by_faults() {
+  if (is_degraded()) {
+    happen(Event::kFault);
+  } else if (mode_ == Mode::kDegraded) {
+    happen(Event::kRecovered);
+    if (adoption_ == Adoption::kDone) {
+      happen(Event::kAdopted);
+    }
+  }
+}
+
+/// An adopted calibration navigates without the star tracker: its loss is a fault only while there is none.
+template <class Estimator>
+bool Application<Estimator>::is_degraded() const {
+  const bool needs_star_tracker = mode_ != Mode::kNavigating;
+  return has(Fault::kNoAttitude) || has(Fault::kGyroLost) || has(Fault::kClockSetBack) || has(Fault::kGap) ||
+         has(Fault::kAccuracy) || (needs_star_tracker && has(Fault::kStarTrackerLost));
+}
+
+// ---- What comes out
+
+template <class Estimator>
+std::optional<AttitudeSolution> Application<Estimator>::attitude() const {
+  if (!on_board_.navigator().started() || !on_board_.latest() || has(Fault::kNoAttitude)) {
+    return std::nullopt;
+  }
+  const auto solution = on_board_.navigation_attitude();
+  return solution ? std::optional(solution.value()) : std::nullopt;
+}
+
+template <class Estimator>
+Housekeeping Application<Estimator>::housekeeping() const {
+  Housekeeping record = counts_;
+  record.version = TRIHEDRON_TABLES_VERSION;
+  record.time_ns = now_.time_since_epoch().count();
+  record.mode = static_cast<std::uint8_t>(mode_);
+  record.faults = faults_;
+  record.adopted = adoption_ == Adoption::kDone ? 1 : 0;
+  record.held = held_ ? 1 : 0;
+  record.residual_ratio = calibration_residuals_.mean();
+  record.navigation_ratio = navigation_residuals_.mean();
+  record.required_error_rad = policy_.required_error_rad;
+  record.required_s = to_seconds(policy_.required_interval);
+  record.predicted = forecast_.known() ? 1 : 0;
+  if (forecast_.known()) {
+    record.predicted_error_rad = forecast_.error_rad();
+    record.ready_s = forecast_.ready_s();
+  }
+  const auto states = on_board_.health().states();
+  for (int k = 0; k < gyros() && loaded_; ++k) {
+    record.gyros[k] = static_cast<std::uint8_t>(states[k]);
+  }
+  if (on_board_.navigator().started()) {
+    record.last_fix_ns = fix_t_.time_since_epoch().count();
+    record.corrected_ns = on_board_.corrected_t().time_since_epoch().count();
+  }
+  if (const auto solution = attitude()) {
+    record.attitude_valid = 1;
+    const Eigen::Quaterniond q = solution->C_in_c.quaternion();
+    for (int i = 0; i < 4; ++i) {
+      record.q_in_c[i] = q.coeffs()(i);
+    }
+    for (int i = 0; i < 3; ++i) {
+      record.sigma_rad[i] = std::sqrt(solution->covariance_rad2(i, i));
+    }
+  }
+  return record;
+}
+
+// ---- The table of parameters
+
+template <class Estimator>
+Answer Application<Estimator>::load(const Parameters& table) {
+  if (!next_mode(mode_, Event::kLoadParameters)) {
+    return answer(Answer::kNotInThisMode);
+  }
+  if (table.version != TRIHEDRON_TABLES_VERSION) {
+    return answer(Answer::kWrongVersion);
+  }
+  constexpr int kMost = std::min(TRIHEDRON_MAX_GYROS, Estimator::Gyros::capacity());
+  if (table.gyros < 2 || table.gyros > static_cast<std::uint32_t>(kMost)) {
+    return answer(Answer::kTooLarge);
+  }
+  const auto as_int = [](std::uint32_t number) { return static_cast<int>(std::min<std::uint32_t>(number, INT32_MAX)); };
+  const int gyros = as_int(table.gyros);
+  CalibrationSetup setup;
+  setup.layout = {.gyros = gyros};
+  setup.gyro_period = Duration(table.gyro_period_ns);
+  setup.angles_after = Duration(table.angles_after_ns);
+  setup.star_trackers[0].noise_rad = Eigen::Vector3d(table.star_tracker_noise_rad);
+  setup.direction_random_walk_rad_sqrt_s = table.direction_random_walk_rad_sqrt_s;
+  setup.gate_nis = table.gate_nis;
+  setup.reopen_after_rejections = as_int(table.reopen_after_rejections);
+  setup.reopen_after_jump_rejections = as_int(table.reopen_after_jump_rejections);
+  setup.restart_within_fixes = as_int(table.restart_within_fixes);
+  Gyros prior;
+  for (int k = 0; k < gyros; ++k) {
+    setup.readout_noise_rad[k] = table.readout_noise_rad[k];
+    prior[k].drift_rad_s = Eigen::Map<const Eigen::Matrix<double, Layout::kEq1, 1>>(table.drift_rad_s[k]);
+    prior[k].C_c_b = Rot<C, C>::exp(Vec<C>::assume(Eigen::Vector3d(table.alignment_rad[k]))).raw();
+  }
+  constexpr int kMostParameters = Layout{.gyros = TRIHEDRON_MAX_GYROS}.parameters();
+  static_assert(std::size(Parameters{}.covariance) == kMostParameters * (kMostParameters + 1) / 2);
+  const int size = setup.layout.parameters();
+  Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, kMostParameters, kMostParameters> covariance(size, size);
+  covariance.setZero();
+  const double* next = table.covariance;
+  for (int row = 0; row < size; ++row) {
+    for (int column = 0; column <= row; ++column) {
+      covariance(row, column) = *next++;
+    }
+  }
+  const ApplicationPolicy policy{.correction_interval = Duration(table.correction_interval_ns),
+                                 .required_error_rad = table.required_error_rad,
+                                 .required_interval = Duration(table.required_interval_ns),
+                                 .window = Duration(table.window_ns),
+                                 .star_tracker_timeout = Duration(table.star_tracker_timeout_ns),
+                                 .failed_after = Duration(table.failed_after_ns),
+                                 .aligned_after_fixes = as_int(table.aligned_after_fixes),
+                                 .spread_over = as_int(table.spread_over)};
+  return load(setup, prior, covariance, policy);
+}
+
+}  // namespace trihedron

@@ -1,0 +1,5 @@
+#include "on_board_impl.hpp"
+
+namespace trihedron {
+template class OnBoard<InvariantEstimator<kTrioCapacity>>;
+}  // namespace trihedron

@@ -1,0 +1,177 @@
+// trihedron.h as a C program sees it, and that it is the application itself.
+
+#include <gtest/gtest.h>
+
+#include <cstring>
+#include <vector>
+
+#include "application_flight.hpp"
+#include "trihedron.h"
+
+namespace trihedron {
+namespace {
+
+/// ObjectMemory as the constants of the header ask for it, full of garbage.
+template <std::size_t kSize>
+struct alignas(TRIHEDRON_ALIGNMENT) ObjectMemory {
+  std::byte bytes[kSize];
+  ObjectMemory() { std::memset(bytes, 0xA5, kSize); }
+};
+using OfTwo = ObjectMemory<TRIHEDRON_SIZE_OF_2_GYROS>;
+
+trihedron_gyro_sample record_of(const GyroSample& sample) {
+  trihedron_gyro_sample record{};
+  record.time_ns = sample.t.time_since_epoch().count();
+  for (int k = 0; k < 2; ++k) {
+    Eigen::Map<Eigen::Vector3d>(record.h_b[k]) = sample.h_b[k];
+  }
+  return record;
+}
+trihedron_star_fix record_of(const StarFix& fix) {
+  trihedron_star_fix record{};
+  record.time_ns = fix.t.time_since_epoch().count();
+  Eigen::Map<Eigen::Vector4d>(record.q_in_c) = fix.q_in_c.coeffs();
+  return record;
+}
+
+/// What test::fly() drives.
+struct ByC {
+  trihedron_application* its;
+
+  StepReport on_gyro(const GyroSample& sample) const {
+    const auto record = record_of(sample);
+    StepReport report;
+    report.sample = static_cast<SampleStatus>(trihedron_on_gyro(its, &record));
+    return report;
+  }
+  StepReport on_fix(const StarFix& fix) const {
+    const auto record = record_of(fix);
+    StepReport report;
+    report.fix.status = static_cast<FixStatus>(trihedron_on_fix(its, &record));
+    return report;
+  }
+};
+
+TEST(CInterface, SaysWhatItIs) {
+  EXPECT_EQ(trihedron_interface_version(), TRIHEDRON_INTERFACE_VERSION);
+  EXPECT_EQ(trihedron_tables_version(), TRIHEDRON_TABLES_VERSION);
+  EXPECT_EQ(TRIHEDRON_ALIGNMENT % trihedron_alignment(), 0U);
+  EXPECT_GT(trihedron_size(2), 20000U);
+  EXPECT_LE(trihedron_size(2), TRIHEDRON_SIZE_OF_2_GYROS);
+  EXPECT_LE(trihedron_size(3), TRIHEDRON_SIZE_OF_3_GYROS);
+  EXPECT_LE(trihedron_snapshots_size(2), TRIHEDRON_SNAPSHOTS_SIZE_OF_2_GYROS);
+  EXPECT_LE(trihedron_snapshots_size(3), TRIHEDRON_SNAPSHOTS_SIZE_OF_3_GYROS);
+  for (const std::uint32_t gyros : {0U, 1U, 4U}) {
+    EXPECT_EQ(trihedron_size(gyros), 0U);
+    EXPECT_EQ(trihedron_snapshots_size(gyros), 0U);
+  }
+}
+
+TEST(CInterface, RefusesMemoryThatWillNotDo) {
+  OfTwo memory;
+  EXPECT_EQ(trihedron_create(nullptr, sizeof memory, 2), nullptr);
+  EXPECT_EQ(trihedron_create(memory.bytes, trihedron_size(2) - 1, 2), nullptr);
+  EXPECT_EQ(trihedron_create(memory.bytes, sizeof memory, 3), nullptr);
+  EXPECT_EQ(trihedron_create(memory.bytes, sizeof memory, 4), nullptr);
+  EXPECT_EQ(trihedron_create(memory.bytes + 4, sizeof memory - 4, 2), nullptr);
+  EXPECT_NE(trihedron_create(memory.bytes, trihedron_size(2), 2), nullptr);
+}
+
+TEST(CInterface, IsTheApplicationBitForBit) {
+  const test::Flight flight({.duration_s = 1500});
+  const Parameters parameters = test::nominal_parameters();
+  const auto application = test::started<PairApplication>(parameters);
+  OfTwo memory;
+  trihedron_application* its = trihedron_create(memory.bytes, sizeof memory, 2);
+  AttitudeRecord attitude{};
+  EXPECT_EQ(trihedron_get_attitude(its, &attitude), 0U);
+  EXPECT_EQ(trihedron_load_parameters(its, &parameters), TRIHEDRON_ANSWER_ACCEPTED);
+  EXPECT_EQ(trihedron_command(its, TRIHEDRON_COMMAND_START, 0), TRIHEDRON_ANSWER_ACCEPTED);
+  std::vector<SampleStatus> samples[2];
+  std::vector<FixStatus> fixes[2];
+  const auto note = [&](std::size_t which) {
+    return [&, which](const StepReport& report) {
+      samples[which].push_back(report.sample);
+      fixes[which].push_back(report.sample == SampleStatus::kNone ? report.fix.status : FixStatus::kNone);
+    };
+  };
+  ByC by_c{its};
+  test::fly(flight, by_c, note(0));
+  test::fly(flight, *application, note(1));
+  EXPECT_EQ(samples[0], samples[1]);
+  EXPECT_EQ(fixes[0], fixes[1]);
+  Housekeeping record{};
+  trihedron_get_housekeeping(its, &record);
+  const Housekeeping expected = application->housekeeping();
+  EXPECT_EQ(record.mode, TRIHEDRON_MODE_NAVIGATING);
+  EXPECT_EQ(std::memcmp(&record, &expected, sizeof record), 0);
+  EXPECT_EQ(trihedron_get_attitude(its, &attitude), 1U);
+  EXPECT_EQ(attitude.time_ns, flight.samples.back().t.time_since_epoch().count());
+  for (int i = 0; i < 3; ++i) {
+    EXPECT_EQ(std::sqrt(attitude.covariance_rad2[i][i]), record.sigma_rad[i]);
+  }
+}
+
+TEST(CInterface, RefusesWhatItDoesNotKnow) {
+  OfTwo memory;
+  trihedron_application* its = trihedron_create(memory.bytes, sizeof memory, 2);
+  for (const std::uint32_t command : {7U, 255U, 256U, 0xFFFFFFFFU}) {
+    EXPECT_EQ(trihedron_command(its, command, 0), TRIHEDRON_ANSWER_UNKNOWN_COMMAND);
+  }
+  EXPECT_EQ(trihedron_command(its, TRIHEDRON_COMMAND_START, 0), TRIHEDRON_ANSWER_NO_PARAMETERS);
+  Parameters parameters = test::nominal_parameters();
+  parameters.version = 99;
+  EXPECT_EQ(trihedron_load_parameters(its, &parameters), TRIHEDRON_ANSWER_WRONG_VERSION);
+  Housekeeping record{};
+  trihedron_get_housekeeping(its, &record);
+  EXPECT_EQ(record.commands_refused, 6U);
+}
+
+TEST(CInterface, HasDefaultsThatAreAccepted) {
+  ObjectMemory<TRIHEDRON_SIZE_OF_3_GYROS> memory;
+  for (const std::uint32_t gyros : {2U, 3U}) {
+    Parameters parameters;
+    trihedron_default_parameters(gyros, &parameters);
+    trihedron_application* its = trihedron_create(memory.bytes, sizeof memory, gyros);
+    EXPECT_EQ(trihedron_load_parameters(its, &parameters), TRIHEDRON_ANSWER_ACCEPTED);
+    EXPECT_EQ(parameters.covariance[test::covariance_index(13, 13)], 4e-12);
+    EXPECT_EQ(parameters.covariance[test::covariance_index(18, 18)], 8.7e-3 * 8.7e-3);
+    EXPECT_EQ(parameters.covariance[test::covariance_index(18, 17)], 0);
+  }
+}
+
+TEST(CInterface, SavesAndRestores) {
+  const test::Flight flight({.duration_s = 60});
+  const Parameters parameters = test::nominal_parameters();
+  OfTwo memory;
+  trihedron_application* its = trihedron_create(memory.bytes, sizeof memory, 2);
+  trihedron_load_parameters(its, &parameters);
+  trihedron_command(its, TRIHEDRON_COMMAND_START, 0);
+  ByC by_c{its};
+  test::fly_from(flight, 0, 30, by_c);
+  std::vector<std::byte> slots(trihedron_snapshots_size(2) + 1);
+  void* unaligned = slots.data() + 1;
+  const std::size_t size = slots.size() - 1;
+  EXPECT_EQ(trihedron_save(its, unaligned, size - 1), 0U);
+  EXPECT_EQ(trihedron_save(its, unaligned, size), 1U);
+  test::fly_from(flight, 30, 1e9, by_c);
+  Housekeeping whole{};
+  trihedron_get_housekeeping(its, &whole);
+
+  OfTwo other;
+  ByC again{trihedron_create(other.bytes, sizeof other, 2)};
+  std::uint32_t answers[2];
+  EXPECT_EQ(trihedron_restore(again.its, unaligned, size - 1, answers), 0U);
+  EXPECT_EQ(answers[0], TRIHEDRON_SNAPSHOT_TOO_SMALL);
+  EXPECT_EQ(trihedron_restore(again.its, unaligned, size, nullptr), 1U);
+  EXPECT_EQ(trihedron_restore(again.its, unaligned, size, answers), 1U);
+  EXPECT_EQ(answers[0], TRIHEDRON_SNAPSHOT_RESTORED);
+  EXPECT_EQ(answers[1], TRIHEDRON_SNAPSHOT_FOREIGN);
+  test::fly_from(flight, 30, 1e9, again);
+  Housekeeping restored{};
+  trihedron_get_housekeeping(again.its, &restored);
+  EXPECT_EQ(std::memcmp(&whole, &restored, sizeof whole), 0);
+}
+
+}  // namespace
+}  // namespace trihedron

@@ -1,0 +1,305 @@
+// The work of a fix, spread over the samples after it.
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <memory>
+#include <random>
+#include <set>
+#include <vector>
+
+#include "flight.hpp"
+#include "mission.hpp"
+
+namespace trihedron {
+namespace {
+
+using Numbers = std::vector<double>;
+
+void append(const Eigen::Ref<const Eigen::MatrixXd>& matrix, Numbers& numbers) {
+  for (const double its : matrix.reshaped()) {
+    numbers.push_back(its);
+  }
+}
+void append(const std::optional<AttitudeSolution>& solution, Numbers& numbers) {
+  numbers.push_back(solution.has_value() ? 1 : 0);
+  if (solution) {
+    append(solution->C_in_c.raw(), numbers);
+    append(solution->covariance_rad2, numbers);
+  }
+}
+
+/// All that came out of a flight, and what its end left.
+struct Outcomes {
+  std::vector<Numbers> fixes;
+  std::vector<Numbers> angles;
+  Numbers end;
+  std::set<FixStatus> statuses;
+
+  void note(const StepReport& report) {
+    if (report.fix.status != FixStatus::kNone && report.fix.status != FixStatus::kPending) {
+      const FixReport& fix = report.fix;
+      statuses.insert(fix.status);
+      Numbers& its = fixes.emplace_back();
+      its = {to_seconds(fix.t.time_since_epoch()),
+             static_cast<double>(fix.status),
+             fix.nis,
+             fix.weight,
+             static_cast<double>(fix.rejections_in_a_row),
+             fix.jumped ? 1.0 : 0.0,
+             static_cast<double>(fix.odd_gyro),
+             report.corrected ? 1.0 : 0.0};
+      append(fix.innovation, its);
+      append(fix.innovation_covariance, its);
+      append(report.calibrated, its);
+      append(report.navigated, its);
+    }
+    if (report.angles.status != FixStatus::kNone) {
+      angles.push_back({to_seconds(report.angles.t.time_since_epoch()), static_cast<double>(report.angles.status),
+                        report.angles.nis, static_cast<double>(report.angles.rejections_in_a_row)});
+    }
+  }
+  template <class OnBoard>
+  void note_end(const OnBoard& on_board) {
+    const auto& estimator = on_board.estimator();
+    Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> root(estimator.error_layout().shared(),
+                                                                                estimator.states());
+    estimator.error_root(rows_of(root));
+    append(root, end);
+    for (int k = 0; k < estimator.layout().gyros; ++k) {
+      for (const auto* its : {&estimator.gyros()[k], &on_board.navigator().gyros()[k]}) {
+        append(its->h_in, end);
+        append(its->drift_rad_s, end);
+        append(its->C_c_b, end);
+      }
+    }
+    if (on_board.navigator().started()) {
+      append(std::optional(on_board.navigation_attitude().value()), end);
+    }
+  }
+};
+
+struct Events {
+  std::vector<GyroSample> samples;
+  std::vector<StarFix> fixes;
+};
+
+/// Without the fixes of the last ten seconds, after which everything has been dealt with.
+Events ended(Events events) {
+  const Time end = events.samples.back().t - std::chrono::seconds(10);
+  std::erase_if(events.fixes, [&](const StarFix& fix) { return fix.t > end; });
+  return events;
+}
+
+template <class Estimator>
+Outcomes outcomes(const Events& events, const test::Given<Estimator>& given, CorrectionPolicy policy, int spread_over) {
+  policy.spread_over = spread_over;
+  const auto on_board = given.on_board(policy);
+  Outcomes found;
+  test::fly(events.samples, events.fixes, *on_board, [&](const StepReport& report) { found.note(report); });
+  found.note_end(*on_board);
+  return found;
+}
+
+template <class Estimator>
+Outcomes expect_the_bits_of_all_at_once(const Events& events, const test::Given<Estimator>& given,
+                                        const CorrectionPolicy& policy = {}) {
+  const Outcomes at_once = outcomes(events, given, policy, 0);
+  for (const int spread_over : {1, 3, 20}) {
+    const Outcomes spread = outcomes(events, given, policy, spread_over);
+    EXPECT_EQ(spread.fixes, at_once.fixes) << spread_over;
+    EXPECT_EQ(spread.angles, at_once.angles) << spread_over;
+    EXPECT_EQ(spread.end, at_once.end) << spread_over;
+  }
+  return at_once;
+}
+
+Events events_of(const test::FlightPlan& plan) {
+  test::Flight flight(plan);
+  return ended({std::move(flight.samples), std::move(flight.fixes)});
+}
+
+TEST(SpreadWork, HasTheBitsOfAllAtOnceAtEachRateOfFixes) {
+  for (const auto& [interval_s, jitter_s] : {std::pair(3.0, 0.0), {3.0, 0.5}, {1.0, 0.0}, {0.7, 0.6}}) {
+    const Events events =
+        events_of({.duration_s = 900, .fix_offset_s = 0.03, .fix_interval_s = interval_s, .fix_jitter_s = jitter_s});
+    const auto all = expect_the_bits_of_all_at_once(events, test::PairGiven());
+    EXPECT_EQ(all.fixes.size(), events.fixes.size());
+  }
+}
+
+TEST(SpreadWork, HasTheBitsOfAllAtOnceAtEachKindOfCorrection) {
+  const Events events = events_of({.duration_s = 900, .fix_jitter_s = 0.5});
+  for (const Duration interval :
+       {CorrectionPolicy::kEveryFix, CorrectionPolicy::kOnlyFirst, Duration(std::chrono::seconds(100))}) {
+    for (const bool take_parameters : {true, false}) {
+      expect_the_bits_of_all_at_once(events, test::PairGiven(), {interval, take_parameters});
+    }
+  }
+  expect_the_bits_of_all_at_once(events, test::PairGiven(), {.navigate = false});
+  expect_the_bits_of_all_at_once(events, test::PaperGiven());
+}
+
+TEST(SpreadWork, HasTheBitsOfAllAtOnceWhateverBecomesOfAFix) {
+  // Single outliers; none for two minutes; and from then on all of them off by a degree, twice.
+  Events events = events_of({.duration_s = 2400, .fix_jitter_s = 0.5});
+  std::erase_if(events.fixes, [](const StarFix& fix) {
+    const double t_s = to_seconds(fix.t.time_since_epoch());
+    return t_s > 400 && t_s < 520;
+  });
+  std::mt19937 random(1);
+  for (StarFix& fix : events.fixes) {
+    const double t_s = to_seconds(fix.t.time_since_epoch());
+    const bool is_outlier = t_s > 100 && random() % 20 == 0;
+    const double off_rad = (is_outlier ? 0.1 : 0) + (t_s > 800 ? 0.017 : 0) - (t_s > 1000 ? 0.034 : 0);
+    fix.q_in_c = fix.q_in_c * Eigen::Quaterniond(test::turn(off_rad, -off_rad, 0));
+  }
+  test::PairGiven given;
+  given.setup.reopen_after_jump_rejections = 20;
+  const auto all = expect_the_bits_of_all_at_once(events, given, {.interval = std::chrono::seconds(60)});
+  for (const FixStatus status : {FixStatus::kStarted, FixStatus::kUsed, FixStatus::kRejectedByGate,
+                                 FixStatus::kUsedAfterReopening, FixStatus::kRestarted}) {
+    EXPECT_TRUE(all.statuses.contains(status)) << static_cast<int>(status);
+  }
+  EXPECT_GT(all.angles.size(), 10U);
+  given.setup.student_t_freedom = 4;
+  expect_the_bits_of_all_at_once(events, given);
+}
+
+TEST(SpreadWork, HasTheBitsOfAllAtOnceWithMoreGyrosAndStarTrackersAtOtherRates) {
+  for (const double gyro_period_s : {0.08, 0.125, 1.0}) {
+    const test::Mission mission({.layout = {.gyros = 3, .star_trackers = 2}, .gyro_period_s = gyro_period_s});
+    expect_the_bits_of_all_at_once(ended({mission.samples, mission.fixes}), mission.given);
+  }
+}
+
+/// From the fix on: the navigator goes on as if there was none, until it is corrected.
+TEST(SpreadWork, LeavesTheAttitudeThatOfBeforeTheFix) {
+  const Events events = events_of({.duration_s = 600});
+  const auto with = test::PairGiven().on_board({.interval = CorrectionPolicy::kEveryFix, .spread_over = 20});
+  const std::size_t first = 8 * 300;
+  Events before = events;
+  before.samples.resize(first);
+  before.fixes.resize(first / 24);
+  test::fly(before.samples, before.fixes, *with);
+  const auto without = std::make_unique<PairOnBoard>(*with);
+  int alike = 0;
+  StepReport report;
+  with->on_fix(events.fixes[first / 24]);
+  for (std::size_t i = first; report.fix.t != events.fixes[first / 24].t || report.fix.status == FixStatus::kPending;
+       ++i) {
+    ASSERT_LT(i, first + 60);
+    report = with->on_gyro(events.samples[i]);
+    without->on_gyro(events.samples[i]);
+    const auto its = with->navigation_attitude().value();
+    const auto expected = without->navigation_attitude().value();
+    if (with->corrected_t() == without->corrected_t()) {
+      ++alike;
+      EXPECT_EQ(its.C_in_c.raw(), expected.C_in_c.raw());
+      // The sensitivities, which the estimator integrates, wait for it: up to two seconds of drift errors.
+      EXPECT_LT((its.covariance_rad2 - expected.covariance_rad2).norm(), 0.02 * expected.covariance_rad2.norm());
+    } else {
+      EXPECT_EQ(with->corrected_t(), events.fixes[first / 24].t);
+      EXPECT_NE(its.C_in_c.raw(), expected.C_in_c.raw());
+    }
+  }
+  EXPECT_TRUE(report.corrected);
+  EXPECT_GT(alike, 16);
+}
+
+TEST(SpreadWork, OfFixesThatComeFasterThanItIsDoneLosesNone) {
+  for (const double interval_s : {0.125, 0.05}) {
+    const Events events = events_of({.duration_s = 60, .fix_offset_s = 0.02, .fix_interval_s = interval_s});
+    // With a correction at each fix: without one the navigator's attitude at a fix that had to wait differs by
+    // rounding.
+    const CorrectionPolicy policy{.interval = CorrectionPolicy::kEveryFix};
+    const Outcomes at_once = outcomes(events, test::PairGiven(), policy, 0);
+    const Outcomes spread = outcomes(events, test::PairGiven(), policy, 20);
+    EXPECT_EQ(at_once.fixes.size(), events.fixes.size());
+    EXPECT_EQ(spread.fixes, at_once.fixes);
+    EXPECT_EQ(spread.end, at_once.end);
+  }
+}
+
+/// A clock that is set back at any time after a fix: what was being dealt with is reported before.
+TEST(SpreadWork, IsDoneBeforeTheClockIsBelievedToBeSetBack) {
+  int during = 0;
+  for (int samples = 8 * 60; samples < 8 * 60 + 24; ++samples) {
+    Events events = events_of({.duration_s = 100});
+    const Time set_back_t = events.samples[static_cast<std::size_t>(samples)].t;
+    const auto set_back = [&](auto& its) { its.t -= its.t >= set_back_t ? std::chrono::seconds(10) : Duration(0); };
+    std::for_each(events.samples.begin(), events.samples.end(), set_back);
+    std::erase_if(events.fixes, [&](const StarFix& fix) { return fix.t >= set_back_t; });
+    const auto on_board = test::PairGiven().on_board({.interval = CorrectionPolicy::kEveryFix, .spread_over = 20});
+    const auto at_once = test::PairGiven().on_board({.interval = CorrectionPolicy::kEveryFix});
+    Outcomes outcome;
+    Outcomes expected;
+    auto fix = events.fixes.begin();
+    for (const GyroSample& sample : events.samples) {
+      const StepReport report = on_board->on_gyro(sample);
+      outcome.note(report);
+      expected.note(at_once->on_gyro(sample));
+      during += report.sample == SampleStatus::kRejectedOutOfOrder && report.fix.status == FixStatus::kUsed ? 1 : 0;
+      if (report.sample == SampleStatus::kUsedAfterClockSetBack) {
+        EXPECT_EQ(report.fix.status, FixStatus::kNone);
+      }
+      for (; fix != events.fixes.end() && fix->t <= sample.t; ++fix) {
+        outcome.note(on_board->on_fix(*fix));
+        expected.note(at_once->on_fix(*fix));
+      }
+    }
+    outcome.note_end(*on_board);
+    expected.note_end(*at_once);
+    EXPECT_EQ(outcome.fixes, expected.fixes) << samples;
+    EXPECT_EQ(outcome.end, expected.end) << samples;
+  }
+  EXPECT_GT(during, 10);
+}
+
+TEST(SpreadWork, OverMoreSamplesThanTheBufferHoldsIsThatOverTheMost) {
+  const Events events = events_of({.duration_s = 120});
+  const Outcomes most = outcomes(events, test::PairGiven(), {}, CorrectionPolicy::kMostSpread);
+  EXPECT_EQ(outcomes(events, test::PairGiven(), {}, 10'000).fixes, most.fixes);
+}
+
+/// Samples that come much faster than the set-up says would fill the buffer before they are used.
+TEST(SpreadWork, OfSamplesFasterThanTheSetUpSaysHasRoom) {
+  const Events events = events_of({.duration_s = 300, .fix_interval_s = 4});
+  for (const int period_s : {1, 5}) {
+    test::PairGiven given;
+    given.setup.gyro_period = std::chrono::seconds(period_s);
+    const auto all = expect_the_bits_of_all_at_once(events, given, {.interval = CorrectionPolicy::kEveryFix});
+    EXPECT_TRUE(all.statuses.contains(FixStatus::kUsed));
+  }
+}
+
+TEST(SpreadWork, RefusesAFixThatIsRepeatedWhileItIsDealtWith) {
+  const Events events = events_of({.duration_s = 60});
+  const auto on_board = test::PairGiven().on_board({.spread_over = 20});
+  int refused = 0;
+  test::fly(events.samples, events.fixes, *on_board, [&](const StepReport& report) {
+    if (report.sample == SampleStatus::kUsed && report.t > events.fixes[8].t && report.t < events.fixes[9].t) {
+      EXPECT_EQ(on_board->on_fix(events.fixes[8]).fix.status, FixStatus::kRejectedOutOfOrder);
+      ++refused;
+    }
+  });
+  EXPECT_EQ(refused, 23);
+}
+
+TEST(SpreadWork, IsFinishedByFlushAndCarryOn) {
+  const Events events = events_of({.duration_s = 60});
+  for (const bool flushes : {true, false}) {
+    const auto on_board = test::PairGiven().on_board({.spread_over = 20});
+    Events some = events;
+    some.samples.resize(8 * 33 + 16);  // the fix at 33 s became due half a second ago
+    some.fixes.resize(12);
+    test::fly(some.samples, some.fixes, *on_board);
+    const StepReport report = flushes ? on_board->flush() : on_board->carry_on();
+    EXPECT_EQ(report.fix.t, some.fixes.back().t);
+    EXPECT_EQ(report.fix.status, FixStatus::kUsed);
+    EXPECT_EQ((flushes ? on_board->flush() : on_board->carry_on()).fix.status, FixStatus::kNone);
+  }
+}
+
+}  // namespace
+}  // namespace trihedron
