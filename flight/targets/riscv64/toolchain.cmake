@@ -1,0 +1,6 @@
+# 64-bit RISC-V under user-mode emulation; linked statically, so that no libraries of it are needed to run.
+set(CMAKE_SYSTEM_NAME Linux)
+set(CMAKE_SYSTEM_PROCESSOR riscv64)
+set(CMAKE_CXX_COMPILER riscv64-linux-gnu-g++)
+set(CMAKE_CXX_FLAGS_INIT "")
+set(CMAKE_EXE_LINKER_FLAGS_INIT "-static")
