@@ -121,11 +121,10 @@ MatrixXd triangle_of(const MatrixXd& rows) {
 namespace {
 
 /// The whole forward pass. `stage(i)`: of the i-th of the `stages`; `moved(step)` gets the rows about w of each step.
-/// Returns the triangle at the end.
+/// Returns the triangle at the end; adds ln |det R| of all w.
 template <class StageAt, class Moved>
 MatrixXd go_forward(const MatrixXd& prior, const VectorXd& prior_y, std::size_t stages, StageAt&& stage_at,
-                    Moved&& moved, SmootherLikelihood& found) {
-  const Index n = prior.cols();
+                    Moved&& moved, double& log_root_determinant) {
   std::optional<Forward> forward;
   for (std::size_t i = 0; i < stages; ++i) {
     const SmootherStage& stage = stage_at(i);
@@ -137,27 +136,47 @@ MatrixXd go_forward(const MatrixXd& prior, const VectorXd& prior_y, std::size_t 
       SmootherResult::NoiseRows step = forward->move(stage);
       // The determinant for (d, c, w) is that for (w, d', c) over |det A⁻¹|, the determinant of the change of
       // variables.
-      found.log_root_determinant += log_determinant(step.R) - std::log(std::abs(stage.A_inverse.determinant()));
+      log_root_determinant += log_determinant(step.R) - std::log(std::abs(stage.A_inverse.determinant()));
       moved(std::move(step));
     }
   }
-  MatrixXd triangle = forward->triangle();
-  found.residual_square = triangle(n, n) * triangle(n, n);
-  const auto root = triangle.topRows(n);
+  return forward->triangle();
+}
+
+/// Throws std::invalid_argument where a state has no information.
+void refuse_singular(const Eigen::Ref<const MatrixXd>& root) {
   if (!((root.diagonal().array().abs() > 0).all() && root.allFinite())) {
     throw std::invalid_argument("smoother: a state without any information");
   }
-  found.log_root_determinant += log_determinant(root);
-  return triangle;
+}
+
+/// That of all states, by their triangle at the end and what go_forward() has added.
+SmootherLikelihood likelihood_by(const MatrixXd& triangle, double log_root_determinant) {
+  const Index n = triangle.cols() - 1;
+  refuse_singular(triangle.topLeftCorner(n, n));
+  return {triangle(n, n) * triangle(n, n), log_root_determinant + log_determinant(triangle.topLeftCorner(n, n))};
 }
 
 }  // namespace
 
 SmootherLikelihood likelihood(const MatrixXd& prior, const VectorXd& prior_y, std::size_t stages,
                               const std::function<SmootherStage(std::size_t)>& stage) {
-  SmootherLikelihood found;
-  static_cast<void>(go_forward(
-      prior, prior_y, stages, stage, [](SmootherResult::NoiseRows&&) {}, found));
+  double log_root_determinant = 0;
+  const MatrixXd triangle = go_forward(
+      prior, prior_y, stages, stage, [](SmootherResult::NoiseRows&&) {}, log_root_determinant);
+  return likelihood_by(triangle, log_root_determinant);
+}
+
+ConstantsInformation eliminate_moving(const MatrixXd& prior, const VectorXd& prior_y, std::size_t stages,
+                                      const std::function<SmootherStage(std::size_t)>& stage) {
+  ConstantsInformation found;
+  const MatrixXd triangle = go_forward(
+      prior, prior_y, stages, stage, [](SmootherResult::NoiseRows&&) {}, found.log_root_determinant);
+  const Index d = stage(0).m.size();
+  const auto moving = triangle.topLeftCorner(d, d);
+  refuse_singular(moving);
+  found.log_root_determinant += log_determinant(moving);
+  found.triangle = triangle.bottomRightCorner(triangle.rows() - d, triangle.cols() - d);
   return found;
 }
 
@@ -166,9 +185,11 @@ SmootherResult smooth(const MatrixXd& prior, const VectorXd& prior_y, const std:
   const Index d = stages.front().m.size();
   const Index c = n - d;
   SmootherResult result;
+  double log_root_determinant = 0;
   const MatrixXd triangle = go_forward(
       prior, prior_y, stages.size(), [&](std::size_t i) -> const SmootherStage& { return stages[i]; },
-      [&](SmootherResult::NoiseRows&& step) { result.steps.push_back(std::move(step)); }, result.likelihood);
+      [&](SmootherResult::NoiseRows&& step) { result.steps.push_back(std::move(step)); }, log_root_determinant);
+  result.likelihood = likelihood_by(triangle, log_root_determinant);
   const auto root = triangle.topRows(n);
   const auto R = root.leftCols(n).triangularView<Upper>();
   result.last_root = R.solve(MatrixXd::Identity(n, n));

@@ -50,6 +50,17 @@ struct SmootherResult {
 [[nodiscard]] SmootherLikelihood likelihood(const Eigen::MatrixXd& prior, const Eigen::VectorXd& prior_y,
                                             std::size_t stages, const std::function<SmootherStage(std::size_t)>& stage);
 
+/// What is known of the constants when all states that move are eliminated.
+struct ConstantsInformation {
+  Eigen::MatrixXd triangle;         ///< right side last; the corner holds the residual
+  double log_root_determinant = 0;  ///< ln |det R| of d of the last stage and of all w
+};
+
+/// The constants need no information. `stage`: as of likelihood().
+[[nodiscard]] ConstantsInformation eliminate_moving(const Eigen::MatrixXd& prior, const Eigen::VectorXd& prior_y,
+                                                    std::size_t stages,
+                                                    const std::function<SmootherStage(std::size_t)>& stage);
+
 /// Moves the rows of the stages that are about the constants alone to the prior, below the rows that are there. They
 /// are most of all rows, and do not depend on the noise: smooth() can then be called with different noise in a fraction
 /// of the time.

@@ -267,7 +267,7 @@ Result<AttitudeByDirections, DirectionsFault> PassProblem::attitude(const Moment
 MatrixXd PassProblem::attitude_by_states(const Moment& moment, const AttitudeByDirections& attitude,
                                          const Directions& h_b) const {
   return by_states_of_arc(
-      moment, attitude_by_states_now<kFullCapacity.states>(setup_.on_board.layout, attitude, moment.gyros, h_b));
+      moment, attitude_by_states_now<kPassCapacity.states>(setup_.on_board.layout, attitude, moment.gyros, h_b));
 }
 
 PassProblem::FixRows PassProblem::compare(const PassSolution& solution, const Moment& moment) const {
@@ -284,7 +284,7 @@ PassProblem::FixRows PassProblem::compare(const PassSolution& solution, const Mo
   // Linearised at the attitude by the gyros, which has no noise of the fix.
   const FixComparison comparison =
       trihedron::compare(setup.layout, moment.gyros, C_fix.raw(), by_gyros.value().raw(), fix.h_b, fix.used, by_shared);
-  const auto about_now = rows_about_states_now<kFullCapacity.states>(setup.layout, comparison);
+  const auto about_now = rows_about_states_now<kPassCapacity.states>(setup.layout, comparison);
   rows.y = about_now.col(setup.layout.size());
   rows.H = by_states_of_arc(moment, about_now);
   PerGyro<double> noise_rad;

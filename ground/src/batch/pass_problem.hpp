@@ -68,6 +68,8 @@ class PassProblem {
     setup_.on_board.direction_random_walk_rad_sqrt_s = noise.direction_random_walk_rad_sqrt_s;
     setup_.on_board.wandering_drift = noise.wandering_drift;
   }
+  /// Of κ and δ; that at the construction is the setup's.
+  void set_prior(Prior prior) { setup_.prior = std::move(prior); }
   [[nodiscard]] std::size_t arcs() const { return arcs_.size(); }
 
   /// Momenta along the pass by these parameters, those at its first fix read from it; no wandering drift.
@@ -130,7 +132,7 @@ class PassProblem {
   [[nodiscard]] Result<AttitudeByDirections, DirectionsFault> attitude(const Moment& moment, const Directions& h_b,
                                                                        const GyroMask& used) const;
   /// Rows about the states at a moment, as on board, as rows about those of its arc.
-  using Rows = ComparedRows<kFullCapacity.states>;
+  using Rows = ComparedRows<kPassCapacity.states>;
   [[nodiscard]] Eigen::MatrixXd by_states_of_arc(const Moment& moment, Rows rows) const;
   /// Derivative of the error of an attitude, c axes, by the states of the arc.
   [[nodiscard]] Eigen::MatrixXd attitude_by_states(const Moment& moment, const AttitudeByDirections& attitude,

@@ -87,6 +87,15 @@ std::optional<Halves> compare_halves(const BatchResult& result, const Layout& la
   return halves;
 }
 
+/// The part of a symmetric matrix, in units of the covariance root rootᵀ, that makes it larger.
+MatrixXd positive_part(const MatrixXd& added, const MatrixXd& root) {
+  const auto to_units = root.triangularView<Eigen::Upper>();
+  const MatrixXd half = to_units.solve(added);
+  const Eigen::SelfAdjointEigenSolver<MatrixXd> in_units(to_units.solve(MatrixXd(half.transpose())));
+  const MatrixXd longer = root * in_units.eigenvectors() * in_units.eigenvalues().cwiseMax(0).cwiseSqrt().asDiagonal();
+  return longer * longer.transpose();
+}
+
 /// The roots of a result, of which only the solution and the covariance at its end are kept: the rest is long.
 CovarianceRoots roots_of(BatchResult& result) {
   for (SmootherStage& stage : result.linear.stages) {
@@ -141,11 +150,17 @@ PassProblem problem_of(const Screened& screened, PassSetup setup) {
 
 }  // namespace
 
-Refinement::Refinement(const Screened& screened, PassSetup setup, const CalibrationOptions& options)
+Refinement::Refinement(const Screened& screened, PassSetup setup, const CalibrationOptions& options,
+                       const std::optional<FieldPrior>& field)
     : problem_(problem_of(screened, std::move(setup))),
       result_(most_likely(problem_, first_solution(problem_, screened))),
       halves_(compare_halves(result_, problem_.layout())),
       roots_(roots_of(result_)) {
+  if (field) {
+    const Eigen::Index c = problem_.layout().constants();
+    more_covariance_ = positive_part(field->more_covariance, result_.errors.last_root.bottomRightCorner(c, c));
+    field_levels_ = field->levels;
+  }
   const SmoothedAttitude smoothed(screened.pass, problem_, result_.solution, roots_);
   course_ = smoothed.course();
   if (options.definitive_attitude) {
@@ -158,6 +173,10 @@ void Refinement::put_into(CalibrationRun& run) && {
   Calibration& calibration = run.calibration;
   const MatrixXd own = result_.errors.last_root.middleRows(layout.drift(0), layout.parameters());
   calibration.covariance = own * own.transpose();
+  if (more_covariance_.size() > 0) {
+    calibration.covariance += more_covariance_.topLeftCorner(layout.parameters(), layout.parameters());
+  }
+  calibration.drift_field = field_levels_;
   problem_.go_along(result_.solution, [&](const PassProblem::Moment& moment) {
     calibration.t = moment.t;
     for (int k = 0; k < layout.gyros; ++k) {

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "batch/batch.hpp"
+#include "batch/drift_field.hpp"
 #include "batch/smoothed_attitude.hpp"
 #include "onboard/screen.hpp"
 #include "trihedron/records/run.hpp"
@@ -20,8 +21,10 @@ struct Halves {
 /// The whole pass by least squares; its results replace those of the on-board step.
 class Refinement {
  public:
-  /// Solves the problem. Keeps a reference to `screened`. Throws SetupError.
-  Refinement(const Screened& screened, PassSetup setup, const CalibrationOptions& options);
+  /// Solves the problem. `field`: what a trial has found of the drift field, where the drift is one; the setup has its
+  /// variances. Keeps a reference to `screened`. Throws SetupError.
+  Refinement(const Screened& screened, PassSetup setup, const CalibrationOptions& options,
+             const std::optional<FieldPrior>& field = std::nullopt);
 
   /// What the smoothed pass shows at the fixes.
   [[nodiscard]] const SmoothedCourse& course() const { return course_; }
@@ -33,6 +36,8 @@ class Refinement {
  private:
   PassProblem problem_;
   BatchResult result_;
+  Eigen::MatrixXd more_covariance_;  ///< of the constants; empty: none
+  std::vector<DriftFieldLevel> field_levels_;
   std::optional<Halves> halves_;
   CovarianceRoots roots_;
   SmoothedCourse course_;

@@ -79,6 +79,7 @@ Calibration known_before(const PassSettings& settings, const CalibrationOptions&
 /// of a larger drift model.
 CalibrationOptions options_of_on_board_run(const PassSettings& settings, CalibrationOptions options) {
   options.estimator = Estimator::kInvariant;
+  options.drift_field = false;
   options.further_states[FurtherState::kCoefficientChange] = FurtherStateOptions::Choice::kOff;
   if (options.drift_model && options.drift_model->family == DriftModelId::Family::kVsh && !settings.prior) {
     options.drift_model = kEsg20;
@@ -97,7 +98,11 @@ Smoothed smooth(const Pass& pass, Decision& decision) {
   if (!decision.screened) {
     decision.screened = screen(pass, decision.options);
   }
-  Refinement refinement(*decision.screened, pass_setup(pass.settings, decision.options), decision.options);
+  PassSetup setup = pass_setup(pass.settings, decision.options);
+  if (decision.field) {
+    put_sigma(setup.layout(), FieldMembers(setup.layout()), decision.field->sigma_rad_s, setup.prior);
+  }
+  Refinement refinement(*decision.screened, std::move(setup), decision.options, decision.field);
   std::vector<DriftModelForecast> drift_models = flown(decision.forecasts, refinement.course());
   return {std::move(refinement), std::move(drift_models)};
 }
@@ -112,7 +117,7 @@ CalibrationRun calibrate(const Pass& pass, const CalibrationOptions& options, co
   Recorder recorder;
   ProgressMeter meter(progress, pass.gyro.size());
   const auto on_board = [&] {
-    replay(pass, pipeline, [&](const StepReport& report, const GyroSample& /*sample*/) {
+    replay(pass, pipeline, [&](const StepReport& report) {
       recorder.add(report, pipeline);
       meter.step(report);
     });
@@ -149,7 +154,7 @@ NavigationRun navigate(const Pass& pass, const CalibrationOptions& options, cons
   Pipeline pipeline(pass.settings, settled_before(pass.settings, options));
   NavigationRecorder recorder;
   ProgressMeter meter(progress, pass.gyro.size());
-  replay(pass, pipeline, [&](const StepReport& report, const GyroSample& /*sample*/) {
+  replay(pass, pipeline, [&](const StepReport& report) {
     recorder.add(report, pipeline);
     meter.step(report);
   });

@@ -214,6 +214,7 @@ void decide_again_with_more_noise(const Pass& pass, const Screened& screened, co
   } else {
     use_walk(with_most_likely_walk(decided, options).noise, options);
   }
+  decision.field = decided.field_prior();
   if (wandering) {
     decision.evidence.push_back(*wandering);
   }
@@ -231,7 +232,7 @@ void leave_out_what_is_open(CalibrationOptions& options) {
 /// Decides by the data of the pass.
 Decision decide_by_pass(const Pass& pass, const Screened& screened, const CalibrationOptions& asked,
                         const DriftModelId& largest_model) {
-  Decision decision{asked, {}, {}, {}};
+  Decision decision{asked, {}, {}, {}, {}};
   CalibrationOptions& options = decision.options;
   const bool wandering_is_open = options.further_states[FurtherState::kWanderingDrift] == Choice::kAuto;
   if (wandering_is_open) {
@@ -242,6 +243,9 @@ Decision decide_by_pass(const Pass& pass, const Screened& screened, const Calibr
   options.find_noise = asked.find_noise && changes.size() >= kLeastFixPairs;
   if (!options.find_noise) {
     settle_states(everything, asked, decision);
+    if (options.drift_field) {
+      decision.field = Trial(pass, screened, options).field_prior();
+    }
     return decision;
   }
   options.star_tracker_noise_rad = other_star_tracker_noise(pass, changes);
@@ -256,6 +260,7 @@ Decision decide_by_pass(const Pass& pass, const Screened& screened, const Calibr
                                  walking, decision);
   } else {
     use_walk(walking.noise, options);
+    decision.field = decided.field_prior();
   }
   return decision;
 }
@@ -272,7 +277,7 @@ DriftModelId largest_to_compare(const CalibrationOptions& asked) {
 
 /// The model of one degree more, where there is one.
 std::optional<DriftModelId> larger_model(const DriftModelId& model) {
-  const bool is_there = model.family == DriftModelId::Family::kVsh && model.degree < DriftModelId::kMaxDegree;
+  const bool is_there = model.family == DriftModelId::Family::kVsh && model.degree < DriftModelId::kMaxDegreeOnBoard;
   return is_there ? std::optional(vsh(model.degree + 1)) : std::nullopt;
 }
 
@@ -330,16 +335,16 @@ Decision decide(const Pass& pass, const CalibrationOptions& asked_for) {
   }
   settle_by_estimator(asked);
   if (pass.settings.prior || asked.estimator == Estimator::kPaper) {
-    return {settled_before(pass.settings, asked), {}, {}, {}};
+    return {settled_before(pass.settings, asked), {}, {}, {}, {}};
   }
-  Decision decision{asked, {}, {}, {}};
+  Decision decision{asked, {}, {}, {}, {}};
   CalibrationOptions& options = decision.options;
   options.find_noise = false;
   const bool states_are_settled =
       asked.drift_model && std::ranges::none_of(kFurtherStates, [&](const FurtherStateRow& row) {
         return is_judged_by_trial(row) && asked.further_states[row.state] == Choice::kAuto;
       });
-  if (states_are_settled && !asked.find_noise) {
+  if (states_are_settled && !asked.find_noise && !asked.drift_field) {
     leave_out_what_is_open(options);
     return decision;
   }

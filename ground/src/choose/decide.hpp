@@ -4,6 +4,7 @@
 #include <optional>
 #include <vector>
 
+#include "batch/drift_field.hpp"
 #include "choose/forecast.hpp"
 #include "onboard/screen.hpp"
 #include "trihedron/records/run.hpp"
@@ -16,6 +17,7 @@ struct Decision {
   CalibrationOptions options;
   std::vector<Evidence> evidence;    ///< empty where nothing was to be decided
   std::vector<Forecast> forecasts;   ///< of the drift models that were compared
+  std::optional<FieldPrior> field;   ///< where the drift is estimated as one
   std::optional<Screened> screened;  ///< the screened pass by which it was decided, where it was
 };
 

@@ -4,6 +4,7 @@
 
 #include <Eigen/Cholesky>
 #include <chrono>
+#include <limits>
 #include <optional>
 
 #include "batch/pass_setup.hpp"
@@ -36,6 +37,8 @@ std::vector<DriftModelId> models_up_to(const DriftModelId& model) {
 
 /// Convergence limit of the constants in sigmas: enough for a decision.
 constexpr double kNearEnough = 0.2;
+/// No step is longer.
+constexpr double kOneIteration = std::numeric_limits<double>::infinity();
 
 /// Coarser steps, for speed: over some seconds the body turns by some degrees at most.
 PassSetup coarse(PassSetup setup) {
@@ -47,15 +50,45 @@ PassSetup coarse(PassSetup setup) {
 }  // namespace
 
 Trial::Trial(const Pass& pass, const Screened& screened, const CalibrationOptions& options)
-    : drift_model_(*options.drift_model),
-      problem_(screened.pass, coarse(pass_setup(pass.settings, options))),
-      found_(most_likely(problem_, first_solution(problem_, screened), kNearEnough)) {}
+    : drift_model_(*options.drift_model), problem_(screened.pass, coarse(pass_setup(pass.settings, options))) {
+  PassSolution first = first_solution(problem_, screened);
+  if (options.drift_field) {
+    field_.emplace(problem_.layout());
+    found_ = most_likely(problem_, std::move(first), kOneIteration);
+    first = found_.solution;
+  }
+  fit(std::move(first));
+}
+
+void Trial::fit(PassSolution first) {
+  if (field_) {
+    spectrum_ =
+        most_likely_spectrum(*field_, field_information(found_.linear, problem_.setup().noise()), spectrum_.log_rms);
+    Prior prior = problem_.setup().prior;
+    put_sigma(problem_.layout(), *field_, field_->sigma(spectrum_.log_rms), prior);
+    problem_.set_prior(std::move(prior));
+  }
+  found_ = {};  // long: one at a time
+  found_ = most_likely(problem_, std::move(first), kNearEnough);
+}
 
 void Trial::refit(const ProcessNoise& noise) {
   problem_.set_noise(noise);
-  PassSolution first = std::move(found_.solution);
-  found_ = {};  // long: one at a time
-  found_ = most_likely(problem_, std::move(first), kNearEnough);
+  fit(PassSolution(found_.solution));
+}
+
+double Trial::log_likelihood(const PassProblem::Linear& linear, const ProcessNoise& noise) const {
+  return field_ ? most_likely_spectrum(*field_, field_information(linear, noise), spectrum_.log_rms).log_likelihood
+                : ground::log_likelihood(problem_, found_.before, linear, noise);
+}
+
+std::optional<FieldPrior> Trial::field_prior() const {
+  if (!field_) {
+    return std::nullopt;
+  }
+  const FieldInformation information = field_information(found_.linear, problem_.setup().noise());
+  return ground::field_prior(problem_.layout(), *field_, information,
+                             most_likely_spectrum(*field_, information, spectrum_.log_rms));
 }
 
 double Trial::log_evidence(FurtherState state) const {
@@ -78,7 +111,7 @@ double Trial::log_evidence(FurtherState state) const {
 }
 
 std::vector<Forecast> Trial::forecasts() const {
-  return ground::forecasts(problem_, found_, models_up_to(drift_model_));
+  return field_ ? std::vector<Forecast>() : ground::forecasts(problem_, found_, models_up_to(drift_model_));
 }
 
 std::vector<Eigen::Vector3d> Trial::changes_rad() const {

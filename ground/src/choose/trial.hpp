@@ -2,9 +2,11 @@
 /// A quick fit of a pass with one choice of states, by which the choices are compared.
 
 #include <Eigen/Core>
+#include <optional>
 #include <vector>
 
 #include "batch/batch.hpp"
+#include "batch/drift_field.hpp"
 #include "choose/forecast.hpp"
 #include "onboard/screen.hpp"
 
@@ -21,14 +23,16 @@ class Trial {
   void refit(const ProcessNoise& noise);
 
   [[nodiscard]] const PassProblem::Linear& linear() const { return found_.linear; }
-  /// `linear`: that of linear(), also after gather_constants().
-  [[nodiscard]] double log_likelihood(const PassProblem::Linear& linear, const ProcessNoise& noise) const {
-    return ground::log_likelihood(problem_, found_.before, linear, noise);
-  }
+  /// `linear`: that of linear(), also after gather_constants(). Where the drift is a field, by the spectrum of it that
+  /// is most likely with this noise.
+  [[nodiscard]] double log_likelihood(const PassProblem::Linear& linear, const ProcessNoise& noise) const;
+
+  /// Prior of the drift field, where the drift is one.
+  [[nodiscard]] std::optional<FieldPrior> field_prior() const;
 
   /// ln of the Bayes factor of these states, which the trial must have; not of drift that wanders.
   [[nodiscard]] double log_evidence(FurtherState state) const;
-  /// Forecasts by its drift model and those that it contains.
+  /// Forecasts by its drift model and those that it contains; none of a field.
   [[nodiscard]] std::vector<Forecast> forecasts() const;
 
   /// Change of the difference between the first star tracker and the gyros from fix to fix, about c x, y, z: everything
@@ -36,8 +40,15 @@ class Trial {
   [[nodiscard]] std::vector<Eigen::Vector3d> changes_rad() const;
 
  private:
+  void fit(PassSolution first);
+  [[nodiscard]] FieldInformation field_information(const PassProblem::Linear& linear, const ProcessNoise& noise) const {
+    return information_on_field(problem_, found_.before, linear, noise, *field_);
+  }
+
   DriftModelId drift_model_;
   PassProblem problem_;
+  std::optional<FieldMembers> field_;  ///< where the drift is one
+  FieldSpectrum spectrum_;             ///< of it
   BatchResult found_;
 };
 

@@ -34,6 +34,18 @@ Layout layout_of(const PassSettings& settings, const CalibrationOptions& options
     throw SetupError("the drift model is left open", fmt::format("use {}", drift_model_choices()));
   }
   refuse_unknown(*options.drift_model);
+  if (options.estimator != Estimator::kBatch) {
+    if (options.drift_field) {
+      throw SetupError("the drift field is estimated from a whole pass, by estimator batch alone",
+                       "use estimator batch, or name a drift model");
+    }
+    if (options.drift_model->degree > DriftModelId::kMaxDegreeOnBoard) {
+      throw SetupError(
+          fmt::format("drift model {} is too large for estimator {}", name_of(*options.drift_model),
+                      name_of(options.estimator)),
+          fmt::format("use estimator batch, or {} at most", name_of(vsh(DriftModelId::kMaxDegreeOnBoard))));
+    }
+  }
   const int gyros = static_cast<int>(settings.gyros.size());
   if (gyros < 2 || gyros > kMaxGyros) {
     throw SetupError(fmt::format("a calibration needs two to {} gyros; the pass has {}", kMaxGyros, gyros),

@@ -6,13 +6,12 @@
 
 #include "model/prior.hpp"
 #include "model/setup.hpp"
+#include "onboard/calibration_of.hpp"
 #include "trihedron/core/on_board.hpp"
 #include "trihedron/ground/model/setup_error.hpp"
 
 namespace trihedron::ground {
 namespace {
-
-using Roots = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 
 SetupError error_of(SetupFault fault) {
   switch (fault) {
@@ -30,20 +29,6 @@ SetupError error_of(SetupFault fault) {
       break;
   }
   return {"there are more states than there is room for", "use fewer gyros, or a smaller drift model"};
-}
-
-/// Copies gyros into storage of another capacity.
-template <class To, class From>
-To with_room(const From& from, const Layout& layout) {
-  To to;
-  for (int k = 0; k < layout.gyros; ++k) {
-    GyroReadout& readout = to[k];
-    const GyroReadout& its = from[k];
-    readout = its;
-    to[k].h_in = from[k].h_in;
-    to[k].drift_rad_s = from[k].drift_rad_s;
-  }
-  return to;
 }
 
 }  // namespace
@@ -71,28 +56,6 @@ struct Pipeline::Program {
 
   [[nodiscard]] Gyros gyros() const {
     return visit([&](const auto& its) { return with_room<Gyros>(its.estimator().gyros(), layout); });
-  }
-
-  /// Of the errors of the states before the shared ones, root rootᵀ their covariance.
-  [[nodiscard]] Roots error_root() const {
-    return visit([&](const auto& its) {
-      Roots root(its.estimator().error_layout().shared(), its.estimator().states());
-      its.estimator().error_root(rows_of(root));
-      return root;
-    });
-  }
-
-  /// The same of κ and δ, with the coefficients at the time when this fraction of their change has taken place.
-  [[nodiscard]] Roots parameter_root(double part_of_change) const {
-    const Roots errors = error_root();
-    Roots root = errors.middleRows(layout.drift(0), layout.parameters());
-    if (layout.further.coefficient_change) {
-      for (int k = 0; k < layout.gyros; ++k) {
-        root.middleRows(layout.drift(k) - layout.drift(0), Layout::kEq1) +=
-            part_of_change * errors.middleRows(layout.change(k), Layout::kEq1);
-      }
-    }
-    return root;
   }
 };
 
@@ -160,47 +123,25 @@ double Pipeline::part_of_change() const {
 }
 
 std::vector<GyroCalibration> Pipeline::gyros() const {
-  std::vector<GyroCalibration> records;
-  const Gyros gyros = program_->gyros();
-  for (int k = 0; k < layout().gyros; ++k) {
-    records.push_back(record_of(gyros[k], layout(), part_of_change()));
-  }
-  return records;
+  return program_->visit(
+      [&](const auto& its) { return records_of(its.estimator().gyros(), layout(), part_of_change()); });
 }
 
-std::vector<GyroCalibration> Pipeline::gyros_before() const {
-  std::vector<GyroCalibration> records;
-  for (int k = 0; k < layout().gyros; ++k) {
-    records.push_back(record_of(program_->prior.gyros[k], layout(), 0));
-  }
-  return records;
-}
+std::vector<GyroCalibration> Pipeline::gyros_before() const { return records_of(program_->prior.gyros, layout(), 0); }
 
-Eigen::VectorXd Pipeline::state_sigmas() const { return program_->parameter_root(part_of_change()).rowwise().norm(); }
+Eigen::VectorXd Pipeline::state_sigmas() const {
+  return program_->visit([&](const auto& its) -> Eigen::VectorXd {
+    return parameter_root(its.estimator(), part_of_change()).rowwise().norm();
+  });
+}
 
 Calibration Pipeline::calibration() const {
-  Calibration result;
+  Calibration result = program_->visit([&](const auto& its) { return calibration_of(its, settings_.epoch); });
   result.estimator = options_.estimator;
-  result.epoch = settings_.epoch;
-  result.t = program_->visit([](const auto& its) { return its.t(); });
-  result.gyros = gyros();
-  result.states = drift_and_alignment(layout().drift_model, static_cast<std::size_t>(layout().gyros));
-  const Roots root = program_->parameter_root(part_of_change());
-  result.covariance = root * root.transpose();
-  result.noise = CalibrationNoise{options_.direction_random_walk_rad_sqrt_s, options_.star_tracker_noise_rad};
+  result.noise->star_tracker_noise_rad = options_.star_tracker_noise_rad;
   if (layout().further.wandering_drift) {
     result.noise->wandering_drift_rad_s = options_.further_states.wandering_drift_rad_s;
     result.noise->wandering_time_s = to_seconds(options_.further_states.wandering_time);
-  }
-  if (const auto* full = std::get_if<std::unique_ptr<FullOnBoard>>(&program_->on_board)) {
-    const auto& estimator = (*full)->estimator();
-    const Gyros gyros = program_->gyros();
-    Roots all(layout().size(), layout().size());
-    estimator.error_root(rows_of(all));
-    for (const ParameterId& parameter : further_parameters(layout())) {
-      result.further.push_back({parameter, value_of(layout(), gyros, estimator.shared(), parameter),
-                                all.row(state_of(layout(), parameter)).norm()});
-    }
   }
   return result;
 }

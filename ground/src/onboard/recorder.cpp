@@ -15,12 +15,6 @@ constexpr Duration kWatchedCorrections = std::chrono::minutes(90);
 /// Consecutive fixes attributed to the star tracker from which on they are no single outliers.
 constexpr long kJumpLength = 20;
 
-void append(AttitudeHistory& history, Time t, const AttitudeSolution& solution) {
-  history.t.push_back(t);
-  history.q_in_c.push_back(solution.C_in_c.quaternion());
-  history.sigma_rad.emplace_back(solution.covariance_rad2.diagonal().cwiseSqrt());
-}
-
 /// Estimates in the order of drift_and_alignment().
 std::vector<double> parameter_values(const std::vector<GyroCalibration>& gyros) {
   std::vector<double> values;
@@ -50,6 +44,12 @@ Correction correction_of(const Pipeline& pipeline, const AttitudeSolution& attit
   return correction;
 }
 
+void append(AttitudeHistory& history, Time t, const AttitudeSolution& solution, Time corrected) {
+  ground::append(history, t, solution);
+  history.age_s.resize(history.t.size());
+  history.age_s.back() = to_seconds(t - corrected);
+}
+
 }  // namespace
 
 FixRecord record_of(const StepReport& report, int gyros) {
@@ -71,37 +71,60 @@ FixRecord record_of(const StepReport& report, int gyros) {
   return record;
 }
 
+void append(AttitudeHistory& history, Time t, const AttitudeSolution& solution) {
+  if (!history.t.empty() && history.t.back() == t) {
+    history.q_in_c.back() = solution.C_in_c.quaternion();
+    history.sigma_rad.back() = solution.covariance_rad2.diagonal().cwiseSqrt();
+    return;
+  }
+  history.t.push_back(t);
+  history.q_in_c.push_back(solution.C_in_c.quaternion());
+  history.sigma_rad.emplace_back(solution.covariance_rad2.diagonal().cwiseSqrt());
+}
+
+void FixSums::add(const FixRecord& fix) {
+  ++fixes_;
+  components_ = fix.innovation.size();
+  used_ += fix.used() ? 1 : 0;
+  outliers_ += fix.status == FixStatus::kRejectedByGate ? 1 : 0;
+  const bool was_reopened = fix.status == FixStatus::kUsedAfterReopening || fix.status == FixStatus::kRestarted ||
+                            fix.status == FixStatus::kEstimateLost;
+  reopened_ += was_reopened ? 1 : 0;
+  jumped_in_a_row_ = fix.jumped ? jumped_in_a_row_ + 1 : 0;
+  off_in_a_row_ += jumped_in_a_row_ == kJumpLength ? kJumpLength : jumped_in_a_row_ > kJumpLength ? 1 : 0;
+  if (fix.status == FixStatus::kUsed) {
+    nis_ += fix.nis;
+    freedom_ += fix.degrees_of_freedom;
+    ++judged_;
+    for (std::size_t i = 0; i < components_; ++i) {
+      squares_[i] += std::pow(fix.innovation[i], 2);
+    }
+  }
+}
+
+void FixSums::put_into(Statistics& statistics) const {
+  statistics.fixes = fixes_;
+  statistics.fixes_used = used_;
+  statistics.fixes_rejected_as_outliers = outliers_;
+  statistics.fixes_off_in_a_row = off_in_a_row_;
+  statistics.reopened = reopened_;
+  statistics.nis_count = judged_;
+  if (judged_ > 0) {
+    const auto count = static_cast<double>(judged_);
+    statistics.nis_degrees_of_freedom = freedom_ / count;
+    statistics.nis_mean = nis_ / count;
+    for (std::size_t i = 0; i < components_; ++i) {
+      statistics.innovation_rms_rad.push_back(std::sqrt(squares_[i] / count));
+    }
+  }
+}
+
 void add_statistics(const std::vector<FixRecord>& fixes, Statistics& statistics) {
-  double nis_sum = 0;
-  long in_a_row = 0;
-  double freedom = 0;
-  std::vector<double> squares(fixes.empty() ? 0 : fixes.front().innovation.size());
+  FixSums sums;
   for (const FixRecord& fix : fixes) {
-    statistics.fixes_used += fix.used() ? 1 : 0;
-    statistics.fixes_rejected_as_outliers += fix.status == FixStatus::kRejectedByGate ? 1 : 0;
-    const bool was_reopened = fix.status == FixStatus::kUsedAfterReopening || fix.status == FixStatus::kRestarted ||
-                              fix.status == FixStatus::kEstimateLost;
-    statistics.reopened += was_reopened ? 1 : 0;
-    in_a_row = fix.jumped ? in_a_row + 1 : 0;
-    statistics.fixes_off_in_a_row += in_a_row == kJumpLength ? kJumpLength : in_a_row > kJumpLength ? 1 : 0;
-    if (fix.status == FixStatus::kUsed) {
-      nis_sum += fix.nis;
-      freedom += fix.degrees_of_freedom;
-      ++statistics.nis_count;
-      for (std::size_t i = 0; i < squares.size(); ++i) {
-        squares[i] += std::pow(fix.innovation[i], 2);
-      }
-    }
+    sums.add(fix);
   }
-  statistics.fixes = static_cast<long>(fixes.size());
-  if (statistics.nis_count > 0) {
-    const auto count = static_cast<double>(statistics.nis_count);
-    statistics.nis_degrees_of_freedom = freedom / count;
-    statistics.nis_mean = nis_sum / count;
-    for (const double square : squares) {
-      statistics.innovation_rms_rad.push_back(std::sqrt(square / count));
-    }
-  }
+  sums.put_into(statistics);
 }
 
 void Recorder::add(const StepReport& report, const Pipeline& pipeline) {
@@ -131,8 +154,7 @@ void Recorder::add_fix(const StepReport& report, const Pipeline& pipeline) {
     append(run_.attitude, report.fix.t, *report.calibrated);
   }
   if (report.navigated) {
-    append(run_.navigation, report.fix.t, *report.navigated);
-    run_.navigation.age_s.push_back(to_seconds(report.fix.t - corrected_));
+    append(run_.navigation, report.fix.t, *report.navigated, corrected_);
   }
 }
 
@@ -174,8 +196,7 @@ void NavigationRecorder::add(const StepReport& report, const Pipeline& pipeline)
     return;
   }
   if (const std::optional<AttitudeSolution> solution = pipeline.navigation_attitude()) {
-    append(run_.attitude, report.t, *solution);
-    run_.attitude.age_s.push_back(to_seconds(report.t - corrected_));
+    append(run_.attitude, report.t, *solution, corrected_);
   }
 }
 

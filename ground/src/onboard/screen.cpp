@@ -31,7 +31,7 @@ Screened screen(const Pass& pass, const CalibrationOptions& asked) {
   }
   Pipeline pipeline(pass.settings, options, false);
   Screened screened{ScreenedPass(pass.gyro, pipeline.layout().gyros), {}};
-  replay(pass, pipeline, [&](const StepReport& report, const GyroSample& /*sample*/) {
+  replay(pass, pipeline, [&](const StepReport& report) {
     screened.pass.add_fix(report);
     if (report.sample != SampleStatus::kNone) {
       screened.pass.add_sample(report);

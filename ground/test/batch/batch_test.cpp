@@ -324,6 +324,7 @@ PassSetup full_setup(const sim::SimulatedPass& simulated) {
   setup.prior.covariance.setIdentity(layout.parameters(), layout.parameters());
   setup.on_board.star_trackers[0].noise_rad.setConstant(std::sqrt(1e-9));
   setup.on_board.wandering_drift.sigma = 1e-7;
+  setup.on_board.orbital_phase_zero = simulated.pass.settings.epoch;
   return setup;
 }
 

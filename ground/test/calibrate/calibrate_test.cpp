@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <vector>
 
 #include "named.hpp"
@@ -58,6 +59,48 @@ TEST(Calibrate, FindsTheTruthWithinItsSigmas) {
   EXPECT_EQ(result.t, two_hours().pass.gyro.t.back());
   EXPECT_GT(progress.size(), 50U);
   EXPECT_LE(progress.back(), 1);
+}
+
+/// NEES of eq. (1) and the alignments alone.
+double nees_of_eq1(const Truth& truth, const Calibration& calibration) {
+  const auto rows = rows_of(calibration, drift_and_alignment(kEsg7, calibration.gyros.size()));
+  const Eigen::VectorXd errors = estimate_minus_truth(calibration, truth)(rows);
+  return errors.dot(calibration.covariance(rows, rows).llt().solve(errors));
+}
+
+/// Drift of degrees that no smaller model has, 2 % of eq. (1) each.
+TEST(Calibrate, ADriftFieldKeepsTheSigmasHonest) {
+  Scenario scenario = scenario_in_eq1(5, std::chrono::hours(4));
+  for (GyroScenario& gyro : scenario.gyros) {
+    for (const int degree : {1, 3, 4, 6}) {
+      for (const int order : {-1, 1, 3}) {
+        if (order <= degree) {
+          gyro.drift.harmonics.push_back({DriftHarmonic::Potential::kW, degree, order, 4e-8});
+          gyro.drift.harmonics.push_back({DriftHarmonic::Potential::kD, degree, order, -3e-8});
+        }
+      }
+    }
+  }
+  const sim::SimulatedPass simulated = sim::simulate(scenario);
+  CalibrationOptions options;
+  options.estimator = Estimator::kBatch;
+  options.further_states = FurtherStateOptions::none();
+  options.find_noise = false;
+  ASSERT_TRUE(set_drift_model("field", options));
+  const Calibration by_field = calibrate(simulated.pass, options).calibration;
+  // 20 degrees of freedom: above 45 once in a thousand.
+  EXPECT_LT(nees_of_eq1(simulated.truth, by_field), 45);
+  EXPECT_EQ(by_field.drift_field.size(), 32U);
+  ASSERT_TRUE(set_drift_model("esg7", options));
+  EXPECT_GT(nees_of_eq1(simulated.truth, calibrate(simulated.pass, options).calibration), 1000);
+}
+
+TEST(Calibrate, ADriftFieldNeedsTheBatch) {
+  CalibrationOptions options = told();
+  ASSERT_TRUE(set_drift_model("field", options));
+  EXPECT_THROW(static_cast<void>(calibrate(two_hours().pass, options)), SetupError);
+  ASSERT_TRUE(set_drift_model("vsh:7", options));
+  EXPECT_THROW(static_cast<void>(calibrate(two_hours().pass, options)), SetupError);
 }
 
 TEST(Calibrate, SmoothsTheAttitude) {
@@ -151,6 +194,17 @@ TEST(Calibrate, WithTwoStarTrackersFindsNoOtherNoiseThanTheirs) {
   EXPECT_TRUE(run.options.find_noise);
   EXPECT_FALSE(run.options.star_tracker_noise_rad.has_value());
   EXPECT_NEAR(run.calibration.statistics.nis_mean.value(), 4, 0.3);
+}
+
+TEST(Calibrate, TellsOneAttitudeWhereTwoStarTrackersHaveAFixAtOneTime) {
+  Scenario scenario = scenario_in_eq1(12, std::chrono::minutes(10));
+  scenario.further_star_trackers.resize(1, scenario.star_tracker);
+  const auto run = calibrate(sim::simulate(scenario).pass, told());
+  ASSERT_EQ(run.fixes[0].t, run.fixes[1].t);
+  EXPECT_TRUE(std::ranges::is_sorted(run.attitude.t, std::less_equal<>()));
+  EXPECT_EQ(run.attitude.t.back(), run.fixes.back().t);
+  EXPECT_TRUE(std::ranges::is_sorted(run.navigation.t, std::less_equal<>()));
+  EXPECT_EQ(run.navigation.age_s.size(), run.navigation.t.size());
 }
 
 TEST(Calibrate, TakesAStarTrackerThatSaysNothingForHalfOfThePass) {

@@ -80,7 +80,7 @@ TEST(DriftModel, HasItsMembersInTheOrderOfItsCoefficients) {
 /// Up to a degree there are 2 n (n + 2) fields. With eq. (1) there are as many from degree 4 on; below it adds what it
 /// has of higher degree.
 TEST(DriftModel, IsCompleteWithoutSayingAnythingTwice) {
-  const std::array<int, 6> sizes = {6 + 7, 16 + 3, 30 + 1, 48, 70, 96};
+  const std::array<int, 8> sizes = {6 + 7, 16 + 3, 30 + 1, 48, 70, 96, 126, 160};
   for (int degree = 1; degree <= DriftModelId::kMaxDegree; ++degree) {
     const DriftModel model(vsh(degree), {});
     EXPECT_EQ(model.size(), sizes[static_cast<std::size_t>(degree - 1)]);
@@ -89,8 +89,8 @@ TEST(DriftModel, IsCompleteWithoutSayingAnythingTwice) {
 }
 
 TEST(DriftModel, IsThatOfTheSimulator) {
-  const DriftModel model(vsh(6), {});
-  const std::vector<DriftCoefficient> coefficients = coefficients_of(vsh(6));
+  const DriftModel model(kLargestDriftModel, {});
+  const std::vector<DriftCoefficient> coefficients = coefficients_of(kLargestDriftModel);
   sim::Stream stream(5, sim::Source::kKappa);
   int seen = 0;
   for (int degree = 1; degree <= DriftModelId::kMaxDegree; ++degree) {

@@ -1,9 +1,11 @@
 #pragma once
 /// Collects the reports of a pipeline.
 
+#include <array>
 #include <optional>
 #include <vector>
 
+#include "trihedron/core/layout.hpp"
 #include "trihedron/ground/onboard/pipeline.hpp"
 #include "trihedron/records/run.hpp"
 
@@ -11,6 +13,31 @@ namespace trihedron::ground {
 
 /// The record of one fix; `gyros`: their number.
 [[nodiscard]] FixRecord record_of(const StepReport& report, int gyros);
+/// Adds the solution at `t`, with its sigmas. Of several at one time, as of fixes of several star trackers, the last is
+/// kept.
+void append(AttitudeHistory& history, Time t, const AttitudeSolution& solution);
+
+/// What Statistics says of fixes, summed up one by one; plain data.
+class FixSums {
+ public:
+  void add(const FixRecord& fix);
+  /// What is not about fixes is left as it is.
+  void put_into(Statistics& statistics) const;
+
+ private:
+  long fixes_ = 0;
+  long used_ = 0;
+  long outliers_ = 0;
+  long reopened_ = 0;
+  long off_in_a_row_ = 0;  ///< of runs that were long enough
+  long jumped_in_a_row_ = 0;
+  long judged_ = 0;  ///< that the mean NIS is over
+  double nis_ = 0;
+  double freedom_ = 0;
+  std::array<double, kMaxComponents> squares_{};
+  std::size_t components_ = 0;
+};
+
 /// Of fixes; what is not about fixes is left as it is.
 void add_statistics(const std::vector<FixRecord>& fixes, Statistics& statistics);
 

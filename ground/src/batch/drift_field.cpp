@@ -1,0 +1,298 @@
+#include "batch/drift_field.hpp"
+
+#include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numbers>
+
+#include "batch/information_smoother.hpp"
+#include "trihedron/ground/tasks/on_all_cores.hpp"
+#include "trihedron/records/drift_models.hpp"
+#include "trihedron/records/stop.hpp"
+
+namespace trihedron::ground {
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+/// Prior of the spectrum: ln of the root mean square of a group is normal about that of a rotor that eq. (1) describes
+/// to what a pass can show; of all gyros together it is uncertain by a factor of 20, gyros among each other and groups
+/// of one gyro among each other by a factor of e. A rotor that has much of one degree is likely to have some of the
+/// next.
+constexpr double kMeanRms_rad_s = 1e-10;
+constexpr double kSigmaOfAll = 3;
+constexpr double kSigmaOfGyro = 1;
+constexpr double kSigmaOfGroup = 1;
+
+MatrixXd prior_information(const std::vector<FieldMembers::Group>& groups) {
+  const auto size = static_cast<Index>(groups.size());
+  MatrixXd covariance = MatrixXd::Constant(size, size, kSigmaOfAll * kSigmaOfAll);
+  for (Index i = 0; i < size; ++i) {
+    for (Index j = 0; j < size; ++j) {
+      if (groups[static_cast<std::size_t>(i)].gyro == groups[static_cast<std::size_t>(j)].gyro) {
+        covariance(i, j) += kSigmaOfGyro * kSigmaOfGyro;
+      }
+    }
+    covariance(i, i) += kSigmaOfGroup * kSigmaOfGroup;
+  }
+  return covariance.llt().solve(MatrixXd::Identity(size, size));
+}
+
+/// The posterior of the amplitudes by one spectrum.
+struct Posterior {
+  VectorXd sigma;       ///< before, rad/s
+  VectorXd mean;        ///< in these
+  MatrixXd covariance;  ///< in these
+  double log_likelihood = 0;
+
+  [[nodiscard]] VectorXd amplitudes() const { return sigma.cwiseProduct(mean); }
+  [[nodiscard]] MatrixXd covariance_of_amplitudes() const {
+    return sigma.asDiagonal() * covariance * sigma.asDiagonal();
+  }
+};
+
+/// Posteriors by different spectra of one pass.
+class Posteriors {
+ public:
+  Posteriors(const FieldMembers& members, const FieldInformation& information)
+      : members_(members),
+        square_(information.R.transpose() * information.R),
+        seen_(information.R.transpose() * information.y),
+        outside_(information.log_likelihood - information.y.squaredNorm() / 2),
+        prior_(prior_information(members.groups())) {}
+
+  [[nodiscard]] const MatrixXd& prior() const { return prior_; }
+  [[nodiscard]] static VectorXd apart(const VectorXd& log_rms) { return log_rms.array() - std::log(kMeanRms_rad_s); }
+
+  [[nodiscard]] Posterior at(const VectorXd& log_rms) const {
+    check_stop();
+    Posterior found;
+    found.sigma = members_.sigma(log_rms);
+    MatrixXd information = found.sigma.asDiagonal() * square_ * found.sigma.asDiagonal();
+    information.diagonal().array() += 1;
+    const Eigen::LLT<MatrixXd> root(information);
+    const VectorXd seen = found.sigma.cwiseProduct(seen_);
+    found.mean = root.solve(seen);
+    found.covariance = root.solve(MatrixXd::Identity(seen.size(), seen.size()));
+    const VectorXd apart_from_prior = apart(log_rms);
+    found.log_likelihood = outside_ - root.matrixLLT().diagonal().array().log().sum() + seen.dot(found.mean) / 2 -
+                           apart_from_prior.dot(prior_ * apart_from_prior) / 2;
+    return found;
+  }
+
+  /// Derivative of the log likelihood by ln of the root mean squares, and the information on these that is expected.
+  void differentiate(const VectorXd& log_rms, const Posterior& at, VectorXd& gradient, MatrixXd& information) const {
+    gradient = -prior_ * apart(log_rms);
+    information = prior_;
+    const std::vector<Index>& group = members_.group_of();
+    for (Index i = 0; i < members_.size(); ++i) {
+      const Index g = group[static_cast<std::size_t>(i)];
+      gradient(g) += at.mean(i) * at.mean(i) + at.covariance(i, i) - 1;
+      for (Index j = 0; j < members_.size(); ++j) {
+        const double learnt = (i == j ? 1 : 0) - at.covariance(i, j);
+        information(g, group[static_cast<std::size_t>(j)]) += 2 * learnt * learnt;
+      }
+    }
+  }
+
+ private:
+  const FieldMembers& members_;
+  MatrixXd square_;
+  VectorXd seen_;
+  double outside_;
+  MatrixXd prior_;
+};
+
+}  // namespace
+
+FieldMembers::FieldMembers(const Layout& layout) {
+  const std::vector<DriftCoefficient> coefficients = coefficients_of(layout.drift_model);
+  std::vector<double> of_rms;
+  for (int k = 0; k < layout.gyros; ++k) {
+    for (std::size_t i = 0; i < coefficients.size(); ++i) {
+      const DriftCoefficient& its = coefficients[i];
+      if (its.is_in_eq1()) {
+        continue;
+      }
+      if (groups_.empty() || groups_.back().gyro != k || groups_.back().potential != its.member ||
+          groups_.back().degree != its.degree) {
+        groups_.push_back({k, its.member, its.degree});
+      }
+      group_of_.push_back(static_cast<Index>(groups_.size()) - 1);
+      states_.push_back(layout.drift(k) + static_cast<Index>(i));
+      // The mean square of |∇Y| over the sphere is l (l + 1)/4π; a degree has 2 l + 1 of them.
+      const double l = its.degree;
+      of_rms.push_back(std::sqrt(4 * std::numbers::pi / ((2 * l + 1) * l * (l + 1))));
+    }
+  }
+  of_rms_ = VectorXd::Map(of_rms.data(), static_cast<Index>(of_rms.size()));
+}
+
+VectorXd FieldMembers::sigma(const VectorXd& log_rms) const {
+  return of_rms_.cwiseProduct(VectorXd(log_rms.array().exp())(group_of_));
+}
+
+FieldInformation information_on_field(const PassProblem& problem, const PassSolution& solution,
+                                      const PassProblem::Linear& linear, const ProcessNoise& noise,
+                                      const FieldMembers& members) {
+  const Layout& layout = problem.layout();
+  MatrixXd prior = linear.prior;
+  VectorXd prior_y = linear.prior_y;
+  problem.put_noise(solution, noise, prior, prior_y);
+  std::vector<bool> is_member(static_cast<std::size_t>(layout.size()), false);
+  for (const Index state : members.states()) {
+    prior.row(state).setZero();
+    prior_y(state) = 0;
+    is_member[static_cast<std::size_t>(state)] = true;
+  }
+  const ConstantsInformation found = eliminate_moving(prior, prior_y, linear.stages.size(), [&](std::size_t arc) {
+    SmootherStage stage = linear.stages[arc];
+    if (arc < linear.ends.size()) {
+      problem.put_noise(solution, noise, arc, linear.ends[arc], stage);
+    }
+    return stage;
+  });
+
+  FieldInformation information;
+  for (Index state = layout.dynamic(); state < layout.size(); ++state) {
+    if (!is_member[static_cast<std::size_t>(state)]) {
+      information.others.push_back(state);
+    }
+  }
+  const auto others = static_cast<Index>(information.others.size());
+  const Index size = members.size();
+  const Index last = others + size;
+  MatrixXd rows(last + 1, last + 1);
+  rows.col(last) = found.triangle.col(last);
+  for (Index i = 0; i < others; ++i) {
+    rows.col(i) = found.triangle.col(information.others[static_cast<std::size_t>(i)] - layout.dynamic());
+  }
+  for (Index i = 0; i < size; ++i) {
+    const Index state = members.states()[static_cast<std::size_t>(i)];
+    const auto gyro = static_cast<int>(
+        members.groups()[static_cast<std::size_t>(members.group_of()[static_cast<std::size_t>(i)])].gyro);
+    rows.col(others + i) = found.triangle.col(state - layout.dynamic());
+    // From the error of the solution to the amplitude itself.
+    rows.col(last) += rows.col(others + i) * solution.gyros[gyro].drift_rad_s(state - layout.drift(gyro));
+  }
+  const MatrixXd triangle = triangle_of(rows);
+  information.R = triangle.block(others, others, size, size);
+  information.y = triangle.block(others, last, size, 1);
+  const auto own = triangle.topLeftCorner(others, others);
+  information.others_by_members =
+      -own.triangularView<Eigen::Upper>().solve(MatrixXd(triangle.block(0, others, others, size)));
+  // Of the directions at the start nothing is known before; the rest of the prior is triangular.
+  double log_prior_root = 0;
+  for (Index state = 2L * layout.gyros; state < layout.size(); ++state) {
+    log_prior_root += is_member[static_cast<std::size_t>(state)] ? 0 : std::log(std::abs(prior(state, state)));
+  }
+  const double residual = triangle(last, last);
+  information.log_likelihood = log_prior_root - found.log_root_determinant - own.diagonal().array().abs().log().sum() -
+                               (residual * residual + linear.cost_outside_rows) / 2;
+  return information;
+}
+
+FieldSpectrum most_likely_spectrum(const FieldMembers& members, const FieldInformation& information,
+                                   const VectorXd& first) {
+  constexpr int kMostSteps = 60;
+  constexpr double kLongestStep = 2;    // of any logarithm: a factor of seven
+  constexpr double kNearEnough = 0.01;  // in the log likelihood
+  constexpr int kMostHalvings = 10;
+  const Posteriors posteriors(members, information);
+  FieldSpectrum spectrum;
+  spectrum.log_rms = first.size() > 0
+                         ? first
+                         : VectorXd::Constant(static_cast<Index>(members.groups().size()), std::log(kMeanRms_rad_s));
+  Posterior here = posteriors.at(spectrum.log_rms);
+  for (int i = 0; i < kMostSteps; ++i) {
+    VectorXd gradient;
+    posteriors.differentiate(spectrum.log_rms, here, gradient, spectrum.information);
+    VectorXd step = spectrum.information.llt().solve(gradient);
+    if (step.dot(gradient) < kNearEnough) {
+      break;
+    }
+    step *= std::min(1.0, kLongestStep / step.cwiseAbs().maxCoeff());
+    Posterior next = posteriors.at(spectrum.log_rms + step);
+    for (int halving = 0; halving < kMostHalvings && !(next.log_likelihood > here.log_likelihood); ++halving) {
+      step /= 2;
+      next = posteriors.at(spectrum.log_rms + step);
+    }
+    if (!(next.log_likelihood > here.log_likelihood)) {
+      break;
+    }
+    spectrum.log_rms += step;
+    here = std::move(next);
+  }
+  spectrum.log_likelihood = here.log_likelihood;
+  return spectrum;
+}
+
+MatrixXd covariance_of_spectrum(const FieldMembers& members, const FieldInformation& information,
+                                const FieldSpectrum& spectrum) {
+  // Along each principal axis of the uncertainty, so many of its sigmas, which is exact to second order.
+  constexpr std::array<double, 4> kAway = {-2.5, -1.25, 1.25, 2.5};
+  const Posteriors posteriors(members, information);
+  const Posterior centre = posteriors.at(spectrum.log_rms);
+  const VectorXd amplitudes = centre.amplitudes();
+  const MatrixXd covariance = centre.covariance_of_amplitudes();
+  const Eigen::SelfAdjointEigenSolver<MatrixXd> axes(spectrum.information);
+  const auto along = [&](std::size_t axis) {
+    const auto i = static_cast<Index>(axis);
+    const VectorXd sigma = axes.eigenvectors().col(i) / std::sqrt(axes.eigenvalues()(i));
+    MatrixXd added = MatrixXd::Zero(members.size(), members.size());
+    double weights = 1;
+    for (const double away : kAway) {
+      const Posterior there = posteriors.at(spectrum.log_rms + away * sigma);
+      const double weight = std::exp(std::min(there.log_likelihood - centre.log_likelihood, 0.0));
+      const VectorXd moved = there.amplitudes() - amplitudes;
+      added += weight * (there.covariance_of_amplitudes() - covariance + moved * moved.transpose());
+      weights += weight;
+    }
+    return MatrixXd(added / weights);
+  };
+  const std::vector<MatrixXd> parts = on_all_cores(members.groups().size(), along);
+  MatrixXd added = MatrixXd::Zero(members.size(), members.size());
+  for (const MatrixXd& part : parts) {
+    added += part;
+  }
+  return added;
+}
+
+FieldPrior field_prior(const Layout& layout, const FieldMembers& members, const FieldInformation& information,
+                       const FieldSpectrum& spectrum) {
+  FieldPrior prior;
+  prior.sigma_rad_s = members.sigma(spectrum.log_rms);
+  const MatrixXd added = covariance_of_spectrum(members, information, spectrum);
+  MatrixXd by_members = MatrixXd::Zero(layout.constants(), members.size());
+  for (Index i = 0; i < members.size(); ++i) {
+    by_members(members.states()[static_cast<std::size_t>(i)] - layout.dynamic(), i) = 1;
+  }
+  for (std::size_t i = 0; i < information.others.size(); ++i) {
+    by_members.row(information.others[i] - layout.dynamic()) = information.others_by_members.row(static_cast<Index>(i));
+  }
+  prior.more_covariance = by_members * added * by_members.transpose();
+  const MatrixXd covariance =
+      spectrum.information.llt().solve(MatrixXd::Identity(spectrum.information.rows(), spectrum.information.cols()));
+  for (std::size_t g = 0; g < members.groups().size(); ++g) {
+    const FieldMembers::Group& group = members.groups()[g];
+    const auto i = static_cast<Index>(g);
+    prior.levels.push_back({group.gyro, group.potential, group.degree, std::exp(spectrum.log_rms(i)),
+                            std::exp(std::sqrt(covariance(i, i)))});
+  }
+  return prior;
+}
+
+void put_sigma(const Layout& layout, const FieldMembers& members, const VectorXd& sigma_rad_s, Prior& prior) {
+  for (Index i = 0; i < members.size(); ++i) {
+    const Index row = members.states()[static_cast<std::size_t>(i)] - layout.drift(0);
+    prior.covariance.row(row).setZero();
+    prior.covariance.col(row).setZero();
+    prior.covariance(row, row) = sigma_rad_s(i) * sigma_rad_s(i);
+  }
+}
+
+}  // namespace trihedron::ground

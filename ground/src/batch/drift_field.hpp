@@ -1,0 +1,88 @@
+#pragma once
+/// The drift of rotors as a random field on the sphere (docs/mathematics.md, section 12): members outside eq. (1) with
+/// variances, one for each gyro, potential and degree, that the pass determines.
+
+#include <Eigen/Core>
+#include <vector>
+
+#include "batch/pass_problem.hpp"
+#include "trihedron/core/layout.hpp"
+#include "trihedron/records/calibration.hpp"
+
+namespace trihedron::ground {
+
+/// Which states of a layout are members outside eq. (1), and which share a variance.
+class FieldMembers {
+ public:
+  explicit FieldMembers(const Layout& layout);
+
+  /// Of one gyro, potential and degree.
+  struct Group {
+    int gyro = 0;
+    DriftCoefficient::Member potential = DriftCoefficient::Member::kW;
+    int degree = 0;
+  };
+  [[nodiscard]] const std::vector<Group>& groups() const { return groups_; }
+  /// State of each member, as among all states; group of each.
+  [[nodiscard]] const std::vector<Eigen::Index>& states() const { return states_; }
+  [[nodiscard]] const std::vector<Eigen::Index>& group_of() const { return group_of_; }
+  [[nodiscard]] Eigen::Index size() const { return static_cast<Eigen::Index>(states_.size()); }
+
+  /// 1-sigma of each member, rad/s, with which the members of each group make drift of this root mean square over the
+  /// sphere, rad/s; ln of that, by group.
+  [[nodiscard]] Eigen::VectorXd sigma(const Eigen::VectorXd& log_rms) const;
+
+ private:
+  std::vector<Group> groups_;
+  std::vector<Eigen::Index> states_;
+  std::vector<Eigen::Index> group_of_;
+  Eigen::VectorXd of_rms_;  ///< 1-sigma of each member over the root mean square of its group
+};
+
+/// What a pass says of the members when nothing is known of them before, all other states eliminated: R a = y + unit
+/// noise, a their amplitudes, rad/s.
+struct FieldInformation {
+  Eigen::MatrixXd R;
+  Eigen::VectorXd y;
+  double log_likelihood = 0;          ///< of what the members have no part in, up to a constant of the pass
+  Eigen::MatrixXd others_by_members;  ///< how the estimates of the other constants follow those of the members
+  std::vector<Eigen::Index> others;   ///< which states these are
+};
+
+/// `linear`: the problem linearised at the solution, also after gather_constants(); `noise`: the process noise.
+[[nodiscard]] FieldInformation information_on_field(const PassProblem& problem, const PassSolution& solution,
+                                                    const PassProblem::Linear& linear, const ProcessNoise& noise,
+                                                    const FieldMembers& members);
+
+/// The spectrum that makes the pass most likely, ln of the root mean square of each group, rad/s; its prior is in the
+/// source.
+struct FieldSpectrum {
+  Eigen::VectorXd log_rms;
+  Eigen::MatrixXd information;  ///< on log_rms, there
+  double log_likelihood = 0;    ///< of the pass, with the prior density of the spectrum; up to a constant of the pass
+};
+
+/// By Fisher's scoring. `first`: where it begins; empty: at the mean of its prior.
+[[nodiscard]] FieldSpectrum most_likely_spectrum(const FieldMembers& members, const FieldInformation& information,
+                                                 const Eigen::VectorXd& first = {});
+
+/// What the uncertainty of the spectrum adds to the covariance of the amplitudes, about their estimates by the most
+/// likely one: their mean square over the spectra that the pass allows, less their covariance by that one.
+[[nodiscard]] Eigen::MatrixXd covariance_of_spectrum(const FieldMembers& members, const FieldInformation& information,
+                                                     const FieldSpectrum& spectrum);
+
+/// The prior of the drift field that a pass has determined.
+struct FieldPrior {
+  Eigen::VectorXd sigma_rad_s;      ///< of each member, in their order
+  Eigen::MatrixXd more_covariance;  ///< of all constants, for the uncertainty of the spectrum
+  std::vector<DriftFieldLevel> levels;
+};
+
+/// As covariance_of_spectrum(), carried over to all constants.
+[[nodiscard]] FieldPrior field_prior(const Layout& layout, const FieldMembers& members,
+                                     const FieldInformation& information, const FieldSpectrum& spectrum);
+
+/// Sets the variances of the members in a prior that knows nothing else of them.
+void put_sigma(const Layout& layout, const FieldMembers& members, const Eigen::VectorXd& sigma_rad_s, Prior& prior);
+
+}  // namespace trihedron::ground

@@ -1,0 +1,211 @@
+#include "batch/drift_field.hpp"
+
+#include <gtest/gtest.h>
+
+#include <Eigen/Cholesky>
+#include <Eigen/LU>
+#include <Eigen/QR>
+#include <cmath>
+#include <random>
+
+#include "trihedron/records/drift_models.hpp"
+
+namespace trihedron::ground {
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+const Layout kSmall{.drift_model = vsh(3)};
+
+MatrixXd normal_matrix(Index rows, Index columns, std::mt19937_64& random) {
+  std::normal_distribution<double> normal;
+  return MatrixXd::NullaryExpr(rows, columns, [&] { return normal(random); });
+}
+
+/// Every amplitude seen with this sigma, mixed so that no member stands alone.
+FieldInformation seen_with(double sigma_rad_s, const VectorXd& amplitudes, std::mt19937_64& random) {
+  const Index size = amplitudes.size();
+  const Eigen::HouseholderQR<MatrixXd> mixed(normal_matrix(size, size, random));
+  FieldInformation information;
+  information.R = MatrixXd(mixed.householderQ()) / sigma_rad_s;
+  information.y = information.R * amplitudes + normal_matrix(size, 1, random);
+  return information;
+}
+
+/// ln of the normal density of y when the amplitudes have these sigmas.
+double log_density(const FieldInformation& information, const VectorXd& sigma) {
+  const MatrixXd spread = information.R * sigma.asDiagonal();
+  MatrixXd covariance = spread * spread.transpose();
+  covariance.diagonal().array() += 1;
+  const Eigen::LLT<MatrixXd> root(covariance);
+  return -root.matrixLLT().diagonal().array().log().sum() -
+         VectorXd(root.matrixL().solve(information.y)).squaredNorm() / 2;
+}
+
+TEST(DriftField, GroupsTheMembersOutsideEq1ByGyroPotentialAndDegree) {
+  const FieldMembers members(kSmall);
+  EXPECT_EQ(members.size(), 2 * (vsh(3).size() - Layout::kEq1));
+  ASSERT_EQ(members.groups().size(), 12U);
+  EXPECT_EQ(members.groups()[0].degree, 1);
+  EXPECT_EQ(members.groups()[11].gyro, 1);
+  EXPECT_EQ(members.groups()[11].potential, DriftCoefficient::Member::kD);
+  EXPECT_EQ(members.groups()[11].degree, 3);
+  EXPECT_EQ(members.states().front(), kSmall.drift(0) + Layout::kEq1);
+  EXPECT_EQ(members.states().back(), kSmall.alignment(1) - 1);
+}
+
+/// Members of degree 1 are complete: with random amplitudes of the sigmas, the mean square of their drift over the
+/// sphere is that asked for.
+TEST(DriftField, SigmasMakeDriftOfTheRootMeanSquare) {
+  const Layout layout{.drift_model = vsh(1)};
+  const FieldMembers members(layout);
+  VectorXd log_rms = VectorXd::Constant(4, -100.0);
+  log_rms(0) = std::log(2e-8);
+  const VectorXd sigma = members.sigma(log_rms);
+  const DriftModel model(layout.drift_model, {});
+  std::mt19937_64 random(3);
+  double square = 0;
+  constexpr int kDirections = 4000;
+  for (int i = 0; i < kDirections; ++i) {
+    const Eigen::Vector3d h = normal_matrix(3, 1, random).col(0).head<3>().normalized();
+    Columns<kMaxDriftColumns> columns;
+    model.basis(h, 0, columns.view(model.columns()));
+    const MatrixXd basis = columns.first(model.size());
+    for (Index j = 0; j < members.size() / 2; ++j) {
+      const Eigen::Vector3d column = basis.col(Layout::kEq1 + j);
+      square += (column - h * h.dot(column)).squaredNorm() * sigma(j) * sigma(j) / kDirections;
+    }
+  }
+  EXPECT_NEAR(std::sqrt(square), 2e-8, 0.02 * 2e-8);
+}
+
+TEST(DriftField, FindsTheSpectrumOfAmplitudesThatAreSeenWell) {
+  std::mt19937_64 random(5);
+  const FieldMembers members(kSmall);
+  const VectorXd truth = VectorXd::Constant(static_cast<Index>(members.groups().size()), std::log(3e-8));
+  const VectorXd amplitudes = members.sigma(truth).cwiseProduct(normal_matrix(members.size(), 1, random).col(0));
+  const FieldInformation information = seen_with(1e-10, amplitudes, random);
+  const FieldSpectrum found = most_likely_spectrum(members, information);
+  // What these amplitudes show themselves, drawn a little towards the level of the other groups.
+  VectorXd square = VectorXd::Zero(truth.size());
+  VectorXd count = VectorXd::Zero(truth.size());
+  const VectorXd in_sigmas = amplitudes.cwiseQuotient(members.sigma(truth));
+  for (Index i = 0; i < members.size(); ++i) {
+    const Index group = members.group_of()[static_cast<std::size_t>(i)];
+    square(group) += in_sigmas(i) * in_sigmas(i);
+    count(group) += 1;
+  }
+  const VectorXd shown = truth.array() + square.cwiseQuotient(count).array().log() / 2;
+  EXPECT_LT((found.log_rms - shown).cwiseAbs().maxCoeff(), 0.25);
+}
+
+/// ln of the prior density of a spectrum of two gyros, up to a constant: docs/adr/0017-drift-field.md.
+double log_prior(const FieldMembers& members, const VectorXd& log_rms) {
+  const Index size = log_rms.size();
+  MatrixXd covariance(size, size);
+  for (Index i = 0; i < size; ++i) {
+    for (Index j = 0; j < size; ++j) {
+      const bool of_one_gyro =
+          members.groups()[static_cast<std::size_t>(i)].gyro == members.groups()[static_cast<std::size_t>(j)].gyro;
+      covariance(i, j) = 9 + (of_one_gyro ? 1 : 0) + (i == j ? 1 : 0);
+    }
+  }
+  const VectorXd apart = log_rms.array() - std::log(1e-10);
+  return -apart.dot(covariance.inverse() * apart) / 2;
+}
+
+TEST(DriftField, TheSpectrumIsTheMostLikelyOne) {
+  std::mt19937_64 random(7);
+  const FieldMembers members(kSmall);
+  const FieldInformation information = seen_with(1e-9, normal_matrix(members.size(), 1, random).col(0) * 1e-8, random);
+  const FieldSpectrum found = most_likely_spectrum(members, information);
+  const auto log_posterior = [&](const VectorXd& log_rms) {
+    return log_density(information, members.sigma(log_rms)) + log_prior(members, log_rms);
+  };
+  const double highest = log_posterior(found.log_rms);
+  EXPECT_NEAR(found.log_likelihood, highest, 1e-6);
+  for (Index g = 0; g < found.log_rms.size(); ++g) {
+    for (const double step : {-0.3, 0.3}) {
+      VectorXd away = found.log_rms;
+      away(g) += step;
+      EXPECT_LT(log_posterior(away), highest) << g;
+    }
+  }
+}
+
+TEST(DriftField, WithoutEvidenceItIsSmallAndNotNothing) {
+  std::mt19937_64 random(9);
+  const FieldMembers members(kSmall);
+  const FieldInformation information = seen_with(1e-9, VectorXd::Zero(members.size()), random);
+  const FieldSpectrum found = most_likely_spectrum(members, information);
+  EXPECT_LT(found.log_rms.maxCoeff(), std::log(1e-9));
+  EXPECT_GT(found.log_rms.minCoeff(), std::log(1e-13));
+}
+
+/// One degree is seen to be large: what cannot be seen of the other degrees is taken to be larger than without that.
+TEST(DriftField, ARotorThatHasMuchOfOneDegreeMayHaveMuchOfTheNext) {
+  std::mt19937_64 random(11);
+  const FieldMembers members(kSmall);
+  FieldInformation information = seen_with(1e-9, VectorXd::Zero(members.size()), random);
+  const auto blind_but_for_degree_1 = [&](double amplitude) {
+    information.R.setZero();
+    information.y.setZero();
+    for (Index i = 0; i < members.size(); ++i) {
+      if (members.groups()[static_cast<std::size_t>(members.group_of()[static_cast<std::size_t>(i)])].degree == 1) {
+        information.R(i, i) = 1e10;
+        information.y(i) = 1e10 * amplitude;
+      }
+    }
+    return most_likely_spectrum(members, information).log_rms(11);
+  };
+  EXPECT_GT(blind_but_for_degree_1(1e-7), blind_but_for_degree_1(0) + 2);
+}
+
+/// Against the mixture of posteriors by spectra drawn from what the pass leaves open, each with its weight.
+TEST(DriftField, TheUncertaintyOfTheSpectrumIsThatOfAllSpectraThatThePassAllows) {
+  std::mt19937_64 random(13);
+  const Layout layout{.drift_model = vsh(1)};
+  const FieldMembers members(layout);
+  const FieldInformation information = seen_with(2e-9, normal_matrix(members.size(), 1, random).col(0) * 4e-9, random);
+  const FieldSpectrum found = most_likely_spectrum(members, information);
+  const MatrixXd added = covariance_of_spectrum(members, information, found);
+
+  const auto posterior = [&](const VectorXd& log_rms, VectorXd& mean) {
+    const VectorXd weight = members.sigma(log_rms).cwiseAbs2().cwiseInverse();
+    MatrixXd square = information.R.transpose() * information.R;
+    square.diagonal() += weight;
+    const Eigen::LLT<MatrixXd> root(square);
+    mean = root.solve(information.R.transpose() * information.y);
+    return MatrixXd(root.solve(MatrixXd::Identity(members.size(), members.size())));
+  };
+  VectorXd centre;
+  const MatrixXd covariance = posterior(found.log_rms, centre);
+  const Eigen::LLT<MatrixXd> information_root(found.information);
+  const MatrixXd to_log = information_root.matrixU().solve(MatrixXd::Identity(4, 4));
+  MatrixXd sum = MatrixXd::Zero(members.size(), members.size());
+  constexpr int kDraws = 20000;
+  for (int i = 0; i < kDraws; ++i) {
+    VectorXd mean;
+    const MatrixXd own = posterior(found.log_rms + to_log * normal_matrix(4, 1, random).col(0), mean);
+    sum += (own + (mean - centre) * (mean - centre).transpose() - covariance) / kDraws;
+  }
+  // The draws are from the normal approximation; the real distribution is skew, hence the tolerance.
+  EXPECT_NEAR((added.trace() + covariance.trace()) / (sum.trace() + covariance.trace()), 1, 0.25);
+  EXPECT_GT(added.trace(), 0);
+}
+
+TEST(DriftField, PutsItsVariancesIntoThePrior) {
+  const FieldMembers members(kSmall);
+  Prior prior;
+  prior.covariance = MatrixXd::Identity(kSmall.parameters(), kSmall.parameters());
+  const VectorXd sigma = VectorXd::LinSpaced(members.size(), 1e-9, 2e-9);
+  put_sigma(kSmall, members, sigma, prior);
+  EXPECT_EQ(prior.covariance(6, 6), 1);
+  EXPECT_EQ(prior.covariance(7, 7), sigma(0) * sigma(0));
+  EXPECT_EQ(prior.covariance(kSmall.drift_size(), kSmall.drift_size()), 1);
+}
+
+}  // namespace
+}  // namespace trihedron::ground
