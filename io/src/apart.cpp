@@ -2,7 +2,9 @@
 
 #include <fmt/format.h>
 
+#include <cstddef>
 #include <string>
+#include <string_view>
 #include <system_error>
 
 #include "trihedron/io/error.hpp"
@@ -57,23 +59,34 @@ bool is_device(const fs::path& path) {
   throw UsageError(fmt::format("{}: {}; give another output", output.string(), reason));
 }
 
+void expect_apart(const fs::path& output, const fs::path& other, std::string_view what) {
+  std::error_code ignored;
+  if (output.empty() || other.empty() || is_device(output)) {
+    return;
+  }
+  if (is_same(output, other) || resolved(output) == resolved(other)) {
+    refuse(output, fmt::format("the output is the {} {} as well and would replace it", what, other.string()));
+  }
+  if (fs::is_directory(other, ignored) && (lies_in(output, other) || is_linked_into(output, other))) {
+    refuse(output, fmt::format("the output lies in the {} {}", what, other.string()));
+  }
+}
+
 }  // namespace
 
 void expect_apart(std::span<const fs::path> inputs, std::span<const fs::path> outputs) {
   for (const fs::path& output : outputs) {
-    if (output.empty() || is_device(output)) {
-      continue;
-    }
     for (const fs::path& input : inputs) {
-      std::error_code ignored;
-      if (input.empty()) {
-        continue;
-      }
-      if (is_same(output, input) || resolved(output) == resolved(input)) {
-        refuse(output, "the output is an input as well and would replace it");
-      }
-      if (fs::is_directory(input, ignored) && (lies_in(output, input) || is_linked_into(output, input))) {
-        refuse(output, fmt::format("the output lies in the input {}", input.string()));
+      expect_apart(output, input, "input");
+    }
+  }
+}
+
+void expect_apart_from_each_other(std::span<const fs::path> outputs) {
+  for (std::size_t i = 0; i < outputs.size(); ++i) {
+    for (std::size_t j = 0; j < outputs.size(); ++j) {
+      if (i != j) {
+        expect_apart(outputs[i], outputs[j], "other output");
       }
     }
   }

@@ -40,7 +40,10 @@ fs::path temporary_beside(const fs::path& target) {
     return 0;
   }
   const std::size_t dash = name.rfind('-');
-  const std::size_t before = name.rfind('-', dash - 1);
+  const std::size_t before = dash == std::string_view::npos ? dash : name.substr(0, dash).rfind('-');
+  if (before == std::string_view::npos) {
+    return 0;
+  }
   ::pid_t process = 0;
   std::from_chars(name.data() + before + 1, name.data() + dash, process);
   return name.starts_with(own_prefix(process)) ? process : 0;

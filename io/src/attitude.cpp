@@ -66,7 +66,7 @@ AttitudeHistory read_attitude(const std::filesystem::path& path, Time epoch) {
   return attitude;
 }
 
-std::string format_attitude(Time epoch, const AttitudeHistory& attitude) {
+std::string format_attitude_rows(Time epoch, const AttitudeHistory& attitude) {
   const bool has_sigma = !attitude.sigma_rad.empty();
   const bool has_age = !attitude.age_s.empty();
   if (attitude.q_in_c.size() != attitude.size() || (has_sigma && attitude.sigma_rad.size() != attitude.size()) ||
@@ -76,8 +76,6 @@ std::string format_attitude(Time epoch, const AttitudeHistory& attitude) {
   fmt::memory_buffer out;
   constexpr std::size_t kLineLength = 120;
   out.reserve(attitude.size() * kLineLength);
-  fmt::format_to(fmt::appender(out), "t_s,q_x,q_y,q_z,q_w{}{}\n",
-                 has_sigma ? ",sigma_x_rad,sigma_y_rad,sigma_z_rad" : "", has_age ? ",age_s" : "");
   for (std::size_t i = 0; i < attitude.size(); ++i) {
     check_stop();
     const Eigen::Quaterniond& q = attitude.q_in_c[i];
@@ -93,6 +91,15 @@ std::string format_attitude(Time epoch, const AttitudeHistory& attitude) {
     out.push_back('\n');
   }
   return fmt::to_string(out);
+}
+
+std::string format_attitude(Time epoch, const AttitudeHistory& attitude) {
+  const std::string_view names = kAttitudeColumns.substr(0, kAttitudeColumns.size() - 1);
+  const std::size_t sigmas = names.find(",sigma_x_rad");
+  const std::size_t age = names.find(",age_s");
+  return fmt::format("{}{}{}\n{}", names.substr(0, sigmas),
+                     attitude.sigma_rad.empty() ? "" : names.substr(sigmas, age - sigmas),
+                     attitude.age_s.empty() ? "" : names.substr(age), format_attitude_rows(epoch, attitude));
 }
 
 void write_attitude(const std::filesystem::path& path, Time epoch, const AttitudeHistory& attitude) {

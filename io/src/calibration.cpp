@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <charconv>
 #include <cmath>
 #include <limits>
@@ -264,6 +265,41 @@ Json gyro_json(const GyroCalibration& gyro) {
           {"momentum_in", to_json_array(gyro.momentum_in)}};
 }
 
+constexpr std::array<std::string_view, 2> kPotentials = {"W", "D"};
+
+Members level_members(DriftFieldLevel& level, std::size_t gyros) {
+  return {
+      {"gyro", "1 …", whole_schema(1, kMaxGyros),
+       [&level, gyros](const JsonNode& node) {
+         level.gyro = static_cast<int>(node.number({1, static_cast<double>(gyros), "", "it is one of the gyros"})) - 1;
+       }},
+      {"potential", "W: -grad W, D: h x grad D", one_of(kPotentials),
+       [&level](const JsonNode& node) {
+         const std::string name = node.text();
+         if (std::ranges::find(kPotentials, name) == kPotentials.end()) {
+           node.refuse(fmt::format("is {}, no potential", in_quotes(name)), "give W or D");
+         }
+         level.potential = name == kPotentials[0] ? DriftCoefficient::Member::kW : DriftCoefficient::Member::kD;
+       }},
+      {"degree", "", whole_schema(1, DriftModelId::kMaxDegree),
+       [&level](const JsonNode& node) {
+         level.degree =
+             static_cast<int>(node.number({1, DriftModelId::kMaxDegree, "", "it is a degree of the drift field"}));
+       }},
+      {"rms_rad_s", "over the sphere, most likely", number_schema(limits::kDriftField_rad_s),
+       [&level](const JsonNode& node) { level.rms_rad_s = node.number(limits::kDriftField_rad_s); }},
+      {"sigma_factor", "its 1-sigma: from rms / factor to rms * factor", number_schema(limits::kSigmaFactor),
+       [&level](const JsonNode& node) { level.sigma_factor = node.number(limits::kSigmaFactor); }}};
+}
+
+Json level_json(const DriftFieldLevel& level) {
+  return {{"gyro", level.gyro + 1},
+          {"potential", kPotentials[level.potential == DriftCoefficient::Member::kW ? 0 : 1]},
+          {"degree", level.degree},
+          {"rms_rad_s", level.rms_rad_s},
+          {"sigma_factor", level.sigma_factor}};
+}
+
 Time parse_epoch_node(const JsonNode& node) {
   const std::string epoch = node.text();
   const std::optional<Time> parsed = parse_epoch(epoch);
@@ -328,6 +364,7 @@ Members verdict_members(Verdict& verdict) {
 Members calibration_members(Calibration& calibration) {
   GyroCalibration gyro;
   CalibrationNoise noise;
+  DriftFieldLevel level;
   std::vector<std::string> names;
   Json gyros = array_of(schema_of(gyro_members(gyro)));
   gyros["minItems"] = 1;
@@ -349,6 +386,14 @@ Members calibration_members(Calibration& calibration) {
                        [&](const JsonNode& node) { read_further(node, calibration); }}),
       optional_member({"noise", "that it went by", schema_of(noise_members(noise)),
                        [&](const JsonNode& node) { read_members(node, noise_members(calibration.noise.emplace())); }}),
+      optional_member({"drift_field", "drift outside eq. (1) by potential and degree, where it is estimated as a field",
+                       array_of(schema_of(level_members(level, kMaxGyros))),
+                       [&](const JsonNode& node) {
+                         for (const JsonNode& element : node.elements()) {
+                           read_members(element, level_members(calibration.drift_field.emplace_back(),
+                                                               calibration.gyros.size()));
+                         }
+                       }}),
       {"covariance", "of the estimate at t_s; alignments as small rotations, c axes",
        schema_of(covariance_members(calibration, names)),
        [&](const JsonNode& node) {
@@ -420,6 +465,11 @@ std::string format_calibration(const Calibration& calibration) {
   }
   const std::string noise =
       calibration.noise ? fmt::format(" \"noise\": {},\n", dump(noise_json(*calibration.noise))) : "";
+  Json levels = Json::array();
+  for (const DriftFieldLevel& level : calibration.drift_field) {
+    levels.push_back(level_json(level));
+  }
+  const std::string field = levels.empty() ? "" : fmt::format(" \"drift_field\": {},\n", lines(levels));
   Json findings = Json::array();
   for (const Finding& finding : calibration.verdict.findings) {
     findings.push_back(finding_json(finding));
@@ -428,13 +478,13 @@ std::string format_calibration(const Calibration& calibration) {
       "{{\"format\": \"{}\", \"version\": {},\n"
       " \"estimator\": {}, \"epoch_tai\": \"{}\", \"t_s\": {},\n"
       " \"gyros\": {},\n"
-      " \"further\": {},\n{}"
+      " \"further\": {},\n{}{}"
       " \"covariance\": {{\n  \"states\": {},\n  \"matrix\": {}}},\n"
       " \"verdict\": {{\"trustworthy\": {}, \"findings\": {}}},\n"
       " \"statistics\": {}}}\n",
       kFormat, kVersion, dump(Json(name_of(calibration.estimator))), format_epoch(calibration.epoch),
-      dump(Json(to_seconds(calibration.t - calibration.epoch))), lines(gyros), dump(further), noise, dump(states),
-      lines(matrix), calibration.verdict.trustworthy, lines(findings), dump(statistics));
+      dump(Json(to_seconds(calibration.t - calibration.epoch))), lines(gyros), dump(further), noise, field,
+      dump(states), lines(matrix), calibration.verdict.trustworthy, lines(findings), dump(statistics));
 }
 
 void write_calibration(const std::filesystem::path& path, const Calibration& calibration) {

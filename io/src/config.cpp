@@ -46,18 +46,14 @@ Field estimator(CalibrationOptions& options) {
 }
 
 Field drift_model(CalibrationOptions& options) {
-  const auto schema = [] {
-    Json names = drift_model_schema();
-    names["enum"].insert(names["enum"].begin(), kAutoDriftModel);
-    return names;
-  };
-  return {"drift_model", "auto: the one that the pass gives evidence of", schema,
-          [&options](const TomlTable& table, const toml::node& node) {
+  const auto schema = [] { return Json{{"enum", drift_model_words()}}; };
+  return {"drift_model",
+          "auto: the one that the pass gives evidence of; field: all members, by a prior that the pass determines",
+          schema, [&options](const TomlTable& table, const toml::node& node) {
             const std::string name = table.text(node, "drift_model");
-            options.drift_model = drift_model_named(name);
-            if (!options.drift_model && name != kAutoDriftModel) {
+            if (!set_drift_model(name, options)) {
               table.refuse(node, fmt::format("there is no drift model {}", in_quotes(name)),
-                           fmt::format("use {}, {}", kAutoDriftModel, drift_model_choices()));
+                           fmt::format("use {}", drift_model_word_choices()));
             }
           }};
 }
@@ -216,7 +212,7 @@ std::string format_config(const CalibrationOptions& options) {
   const Json schema = config_schema();
   Writer out(schema);
   out.word("estimator", name_of(options.estimator));
-  out.word("drift_model", options.drift_model ? name_of(*options.drift_model) : std::string(kAutoDriftModel));
+  out.word("drift_model", drift_model_word(options));
 
   out.section("filter");
   out.word("noise", options.find_noise ? "found" : "told");

@@ -14,10 +14,13 @@
 #include <csignal>
 #include <cstdlib>
 #include <exception>
+#include <fstream>
 #include <new>
+#include <optional>
 #include <system_error>
 #include <utility>
 
+#include "trihedron/io/descriptor.hpp"
 #include "trihedron/io/error.hpp"
 #include "trihedron/records/stop.hpp"
 
@@ -26,26 +29,49 @@ namespace {
 
 namespace fs = std::filesystem;
 
+constexpr const char* kDamagedOrTooLarge = "the file is damaged, or too large for this machine: get it again";
+
 /// What the other process says first.
 enum class Outcome : std::int64_t { kDone, kInputRefused, kMachineFailed, kOutOfMemory };
 
-/// Processor time, s: ten for the library to begin with, and one for each megabyte of the file.
-rlim_t time_limit_s(const fs::path& file) {
+/// What the other process may take.
+struct Limits {
+  rlim_t cpu_s = 0;
+  rlim_t data_bytes = RLIM_INFINITY;
+};
+
+/// Bytes of private data of this process; nothing where the system does not say.
+std::optional<rlim_t> data_bytes_now() {
+  std::array<rlim_t, 6> pages{};  // size, resident, shared, text, library, data and stack
+  std::ifstream file("/proc/self/statm");
+  for (rlim_t& of_kind : pages) {
+    file >> of_kind;
+  }
+  return file ? std::optional(pages.back() * static_cast<rlim_t>(::sysconf(_SC_PAGESIZE))) : std::nullopt;
+}
+
+/// What the size of the file explains: of processor time ten seconds for the library to begin with and one for each
+/// megabyte, of memory a quarter of a gigabyte and sixteen times the file.
+Limits limits_for(const fs::path& file) {
   std::error_code ignored;
-  const std::uintmax_t bytes = fs::file_size(file, ignored);
-  return 10 + (ignored ? 0 : static_cast<rlim_t>(bytes >> 20));
+  const std::uintmax_t size = fs::file_size(file, ignored);
+  const rlim_t bytes = ignored ? 0 : static_cast<rlim_t>(size);
+  const std::optional<rlim_t> now = data_bytes_now();
+  return {10 + (bytes >> 20), now ? *now + (rlim_t{256} << 20) + 16 * bytes : RLIM_INFINITY};
 }
 
 /// In the new process: nothing of it is seen outside, and it ends with this one.
-void settle_in(rlim_t cpu_s) {
+void settle_in(const Limits& limits) {
   ::prctl(PR_SET_PDEATHSIG, SIGKILL);
   for (const int signal : {SIGSEGV, SIGBUS, SIGFPE, SIGILL, SIGABRT, SIGXCPU, SIGPIPE}) {
     std::signal(signal, SIG_DFL);
   }
   const rlimit no_core{0, 0};
   ::setrlimit(RLIMIT_CORE, &no_core);
-  const rlimit time{cpu_s, cpu_s};
+  const rlimit time{limits.cpu_s, limits.cpu_s};
   ::setrlimit(RLIMIT_CPU, &time);
+  const rlimit data{limits.data_bytes, limits.data_bytes};
+  ::setrlimit(RLIMIT_DATA, &data);
   const int nowhere = ::open("/dev/null", O_RDWR | O_CLOEXEC);
   ::dup2(nowhere, STDERR_FILENO);  // where the C library reports a damaged heap
 }
@@ -81,24 +107,24 @@ void do_work(int descriptor, const std::function<void(Sink&)>& work) {
   }
 }
 
-void take_outcome(Source& source, const std::function<void(Source&)>& take) {
+void take_outcome(Source& source, const fs::path& file, const std::function<void(Source&)>& take) {
   switch (static_cast<Outcome>(source.number())) {
     case Outcome::kDone:
       take(source);
       return;
     case Outcome::kInputRefused: {
-      fs::path file = source.text();
+      fs::path place = source.text();
       const Position position{source.number(), source.number()};
       std::string reason = source.text();
-      throw InputRefused(std::move(file), position, std::move(reason), source.text());
+      throw InputRefused(std::move(place), position, std::move(reason), source.text());
     }
     case Outcome::kMachineFailed: {
-      fs::path file = source.text();
+      fs::path place = source.text();
       std::string reason = source.text();
-      throw MachineFailed(std::move(file), std::move(reason), source.text());
+      throw MachineFailed(std::move(place), std::move(reason), source.text());
     }
     case Outcome::kOutOfMemory:
-      throw std::bad_alloc();
+      throw InputRefused(file, {}, "takes more memory than its size explains, or than there is", kDamagedOrTooLarge);
   }
   throw PipeEnded();
 }
@@ -128,28 +154,11 @@ class Child {
   pid_t id_;
 };
 
-class Descriptor {
- public:
-  explicit Descriptor(int number) : number_(number) {}
-  Descriptor(const Descriptor&) = delete;
-  Descriptor& operator=(const Descriptor&) = delete;
-  ~Descriptor() { close(); }
-  void close() {
-    if (number_ >= 0) {
-      ::close(std::exchange(number_, -1));
-    }
-  }
-  [[nodiscard]] int number() const { return number_; }
-
- private:
-  int number_;
-};
-
 [[noreturn]] void refuse_by(int status, const fs::path& file, rlim_t cpu_s) {
   if (WIFSIGNALED(status) && (WTERMSIG(status) == SIGXCPU || WTERMSIG(status) == SIGKILL)) {
     throw InputRefused(file, {},
                        fmt::format("keeps the NetCDF library busy for more than {} s, or takes all memory", cpu_s),
-                       "the file is damaged, or too large for this machine: get it again");
+                       kDamagedOrTooLarge);
   }
   throw InputRefused(file, {}, "is damaged in a way that the NetCDF library does not survive", "get it again");
 }
@@ -228,7 +237,7 @@ std::vector<double> Source::numbers() { return sequence<std::vector<double>>(); 
 
 void in_own_process(const fs::path& file, const std::function<void(Sink&)>& work,
                     const std::function<void(Source&)>& take) {
-  const rlim_t cpu_s = time_limit_s(file);
+  const Limits limits = limits_for(file);
   std::array<int, 2> ends{};
   if (::pipe2(ends.data(), O_CLOEXEC) != 0) {
     throw MachineFailed(file, "cannot be read: no pipe is left", "close some programs");
@@ -242,7 +251,7 @@ void in_own_process(const fs::path& file, const std::function<void(Sink&)>& work
     throw MachineFailed(file, "cannot be read: no process is left", "close some programs");
   }
   if (id == 0) {
-    settle_in(cpu_s);
+    settle_in(limits);
     try {
       do_work(ends[1], work);
       ::_exit(EXIT_SUCCESS);
@@ -254,10 +263,10 @@ void in_own_process(const fs::path& file, const std::function<void(Sink&)>& work
   write_end.close();
   try {
     Source source(read_end.number());
-    take_outcome(source, take);
+    take_outcome(source, file, take);
   } catch (const PipeEnded&) {
     check_stop();  // the same signal may have ended the other
-    refuse_by(child.status(), file, cpu_s);
+    refuse_by(child.status(), file, limits.cpu_s);
   }
 }
 

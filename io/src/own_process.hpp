@@ -52,8 +52,8 @@ class Source {
 };
 
 /// Calls `work` in a copy of this process, and `take` in this one; `work` puts what `take` gets, in the same order.
-/// What `work` throws before it has put anything is thrown here: InputRefused, MachineFailed, std::bad_alloc. Throws
-/// InputRefused where the library ends the process or takes longer than the size of the file explains, Stopped when
+/// InputRefused and MachineFailed that `work` throws before it has put anything are thrown here. Throws InputRefused
+/// where the library ends the process, or takes longer or more memory than the size of the file explains, Stopped when
 /// asked to stop.
 void in_own_process(const std::filesystem::path& file, const std::function<void(Sink&)>& work,
                     const std::function<void(Source&)>& take);

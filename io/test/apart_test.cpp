@@ -37,7 +37,9 @@ class Apart : public testing::Test {
 
 TEST_F(Apart, RefusesAnOutputThatIsAnInput) {
   for (const char* name : {"config.toml", "out/../config.toml", "absent.toml", "pass", "pass/", "link", "link/."}) {
-    EXPECT_THAT(refusal_of(directory_ / name), testing::HasSubstr("is an input as well")) << name;
+    EXPECT_THAT(refusal_of(directory_ / name),
+                testing::AllOf(testing::HasSubstr("is the input"), testing::HasSubstr("as well")))
+        << name;
   }
 }
 
@@ -46,6 +48,28 @@ TEST_F(Apart, RefusesAnOutputInAnInputDirectory) {
        {"pass/gyro.csv", "pass/new/deep.csv", "link/new", "out/../pass/below/x", "file_link", "second_name"}) {
     EXPECT_THAT(refusal_of(directory_ / name), testing::HasSubstr("lies in the input")) << name;
   }
+}
+
+TEST_F(Apart, RefusesTwoOutputsThatAreOne) {
+  const auto refusal_of_both = [&](const std::filesystem::path& a, const std::filesystem::path& b) -> std::string {
+    const std::filesystem::path outputs[] = {directory_ / "out/other", a, "", b};
+    try {
+      expect_apart_from_each_other(outputs);
+    } catch (const UsageError& error) {
+      return error.what();
+    }
+    return {};
+  };
+  for (const char* name : {"out/a.csv", "new", "second_name"}) {
+    EXPECT_THAT(refusal_of_both(directory_ / name, directory_ / "out/.." / name),
+                testing::HasSubstr("is the other output"));
+  }
+  EXPECT_THAT(refusal_of_both(directory_ / "out/new", directory_ / "out"),
+              testing::HasSubstr("lies in the other output"));
+  EXPECT_THAT(refusal_of_both(directory_ / "pass/gyro.csv", directory_ / "second_name"),
+              testing::HasSubstr("is the other output"));
+  EXPECT_EQ(refusal_of_both(directory_ / "out/new", directory_ / "out/newer"), "");
+  EXPECT_EQ(refusal_of_both("/dev/null", "/dev/null"), "");
 }
 
 TEST_F(Apart, LetsThroughWhatReplacesNoInput) {

@@ -101,6 +101,27 @@ TEST(CalibrationJson, RefusesDriftModelsAndEstimatorsThatThereAreNot) {
               HasSubstr("estimator is \"magic\", no estimator; give one of: invariant, paper, batch"));
 }
 
+TEST(CalibrationJson, KeepsTheDriftField) {
+  Calibration calibration = sample_calibration();
+  calibration.drift_field = {{0, DriftCoefficient::Member::kW, 1, 3e-8, 1.5},
+                             {1, DriftCoefficient::Member::kD, 8, 1e-10, 3.0}};
+  const std::string text = format_calibration(calibration);
+  const Calibration back = parse_calibration(text, "c.json");
+  ASSERT_EQ(back.drift_field.size(), 2U);
+  for (std::size_t i = 0; i < 2; ++i) {
+    EXPECT_EQ(back.drift_field[i].gyro, calibration.drift_field[i].gyro);
+    EXPECT_EQ(back.drift_field[i].potential, calibration.drift_field[i].potential);
+    EXPECT_EQ(back.drift_field[i].degree, calibration.drift_field[i].degree);
+    EXPECT_EQ(back.drift_field[i].rms_rad_s, calibration.drift_field[i].rms_rad_s);
+    EXPECT_EQ(back.drift_field[i].sigma_factor, calibration.drift_field[i].sigma_factor);
+  }
+  EXPECT_THAT(refusal_of(replaced(text, "\"potential\":\"D\"", "\"potential\":\"X\"")), HasSubstr("no potential"));
+  EXPECT_THAT(refusal_of(replaced(text, "\"gyro\":2", "\"gyro\":3")), HasSubstr("drift_field[1].gyro"));
+  EXPECT_THAT(refusal_of(replaced(text, "\"degree\":8", "\"degree\":9")), HasSubstr("drift_field[1].degree"));
+  EXPECT_THAT(refusal_of(replaced(text, "\"sigma_factor\":1.5", "\"sigma_factor\":0.5")),
+              HasSubstr("drift_field[0].sigma_factor"));
+}
+
 TEST(CalibrationJson, MayBeWithoutNoise) {
   Calibration calibration = sample_calibration();
   calibration.noise->star_tracker_noise_rad.reset();

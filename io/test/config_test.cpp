@@ -55,7 +55,7 @@ TEST(Config, RefusesNamesThatThereAreNot) {
   EXPECT_THAT(refused_config("estimator = \"magic\"\n"),
               HasSubstr("there is no estimator \"magic\"; use one of: invariant, paper, batch"));
   EXPECT_THAT(refused_config("drift_model = \"vsh:9\"\n"),
-              HasSubstr("there is no drift model \"vsh:9\"; use auto, esg7, esg20, or vsh:1 … vsh:6"));
+              HasSubstr("there is no drift model \"vsh:9\"; use auto, field, esg7, esg20, or vsh:1 … vsh:8"));
   EXPECT_THAT(refused_config("[further_states]\nclock_ofset = \"on\"\n"), HasSubstr("did you mean \"clock_offset\"?"));
   EXPECT_THAT(refused_config("[further_states]\nreadout_bias = \"maybe\"\n"),
               HasSubstr("\"readout_bias\" cannot be \"maybe\"; known here: auto, off, on"));

@@ -7,6 +7,7 @@
 #include <csignal>
 #include <cstdlib>
 #include <new>
+#include <string>
 #include <thread>
 
 #include "fixtures.hpp"
@@ -15,6 +16,7 @@
 namespace trihedron::io {
 namespace {
 
+using testing::AnyOf;
 using testing::HasSubstr;
 
 void work_apart(const std::function<void(Sink&)>& work) {
@@ -45,7 +47,16 @@ TEST(OwnProcess, ThrowsHereWhatIsThrownThere) {
                          }); }),
             "a.csv:2:3: is bad; mend it");
   EXPECT_THROW(work_apart([](Sink&) { throw MachineFailed("a.csv", "is gone", "look for it"); }), MachineFailed);
-  EXPECT_THROW(work_apart([](Sink&) { throw std::bad_alloc(); }), std::bad_alloc);
+}
+
+TEST(OwnProcess, RefusesAFileThatTakesMoreMemoryThanItsSizeExplains) {
+  const auto with_bytes = [](std::size_t bytes) {
+    return [bytes](Sink& sink) { sink.put(std::int64_t{std::string(bytes, 'x').back()}); };
+  };
+  EXPECT_NO_THROW(work_apart(with_bytes(100 << 20)));
+  EXPECT_THAT(
+      refusal([&] { work_apart(with_bytes(700 << 20)); }),
+      AnyOf(HasSubstr("takes more memory than its size explains"), HasSubstr("is damaged")));  // by its sanitizer
 }
 
 TEST(OwnProcess, RefusesAFileThatEndsIt) {

@@ -11,4 +11,7 @@ namespace trihedron::io {
 /// device or a pipe replaces nothing and is let through.
 void expect_apart(std::span<const std::filesystem::path> inputs, std::span<const std::filesystem::path> outputs);
 
+/// Throws UsageError where two outputs are the same file, by whatever name, or one lies in another that is a directory.
+void expect_apart_from_each_other(std::span<const std::filesystem::path> outputs);
+
 }  // namespace trihedron::io

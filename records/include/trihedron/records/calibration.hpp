@@ -30,6 +30,16 @@ struct FurtherEstimate {
   double sigma = 0;
 };
 
+/// How much drift outside eq. (1) the members of one potential and degree make, where the drift is estimated as a
+/// field.
+struct DriftFieldLevel {
+  int gyro = 0;                                                       ///< index
+  DriftCoefficient::Member potential = DriftCoefficient::Member::kW;  ///< kW or kD
+  int degree = 0;
+  double rms_rad_s = 0;     ///< root mean square over the sphere, of the most likely spectrum
+  double sigma_factor = 1;  ///< its 1-sigma: from rms/factor to rms · factor
+};
+
 /// The noise levels that a calibration used.
 struct CalibrationNoise {
   double direction_random_walk_rad_sqrt_s = 0;  ///< of each momentum across itself, per axis
@@ -52,6 +62,7 @@ struct Calibration {
   Eigen::MatrixXd covariance;
   std::vector<FurtherEstimate> further;  ///< empty where none was estimated
   std::optional<CalibrationNoise> noise;
+  std::vector<DriftFieldLevel> drift_field;  ///< empty where the drift is not estimated as a field
   Verdict verdict;
   Statistics statistics;
 };

@@ -26,6 +26,10 @@ inline constexpr DriftModelId kLargestDriftModel = vsh(DriftModelId::kMaxDegree)
 /// In settings in place of a name: the model that the pass gives evidence of.
 inline constexpr std::string_view kAutoDriftModel = "auto";
 
+/// In settings in place of a name: the largest model, the members outside eq. (1) with variances that the pass
+/// determines. Of estimator batch.
+inline constexpr std::string_view kDriftField = "field";
+
 /// "esg7", "vsh:2"
 [[nodiscard]] std::string name_of(const DriftModelId& model);
 /// Nothing for another name, or a degree that there is not.

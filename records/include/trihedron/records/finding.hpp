@@ -43,6 +43,7 @@ enum class FindingCode : std::uint8_t {
   kAlignmentMoved,
   kCoefficientsMoved,
   kPassNotTrustworthy,
+  kNotAdopted,
   kOther,  ///< of a file, from a program that knows more
 };
 
@@ -64,7 +65,7 @@ struct FindingRow {
   std::string_view name;     ///< stable, for programs
   FindingSeverity severity;  ///< where the one who finds it does not say otherwise
 };
-inline constexpr std::array<FindingRow, 31> kFindings = {{
+inline constexpr std::array<FindingRow, 32> kFindings = {{
     {FindingCode::kTooFewFixes, "too-few-fixes", FindingSeverity::kDoNotUse},
     {FindingCode::kShortPass, "short-pass", FindingSeverity::kWarning},
     {FindingCode::kManyRejected, "many-rejected", FindingSeverity::kWarning},
@@ -95,6 +96,7 @@ inline constexpr std::array<FindingRow, 31> kFindings = {{
     {FindingCode::kAlignmentMoved, "alignment-moved", FindingSeverity::kWarning},
     {FindingCode::kCoefficientsMoved, "coefficients-moved", FindingSeverity::kDoNotUse},
     {FindingCode::kPassNotTrustworthy, "pass-not-trustworthy", FindingSeverity::kDoNotUse},
+    {FindingCode::kNotAdopted, "not-adopted", FindingSeverity::kDoNotUse},
     {FindingCode::kOther, "other", FindingSeverity::kWarning},
 }};
 

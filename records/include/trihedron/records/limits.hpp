@@ -44,6 +44,8 @@ inline constexpr Range kStarTrackerNoise_rad{1e-9, 0.1, "rad",
 inline constexpr Range kDrift_rad_s{-0.1, 0.1, "rad/s", "no gyro drifts by degrees a second; 1 deg/h is 4.8e-6"};
 inline constexpr Range kDriftSigma_rad_s{1e-15, 1e-2, "rad/s",
                                          "no gyro drifts by half a degree a second; 1 deg/h is 4.8e-6"};
+inline constexpr Range kDriftField_rad_s{0, 0.1, "rad/s", "no gyro drifts by degrees a second; 1 deg/h is 4.8e-6"};
+inline constexpr Range kSigmaFactor{1, 1e9, "", "a level is known to a factor of 1 or more"};
 inline constexpr Range kRotation_rad{-kFullTurn_rad, kFullTurn_rad, "rad",
                                      "it is one component of a rotation vector; a degree is 0.0175"};
 inline constexpr Range kAlignmentSigma_rad{1e-9, 3.15, "rad", "a half turn is all there is; an arcminute is 2.9e-4"};
@@ -86,6 +88,10 @@ inline constexpr Range kSlewRate_rad_s{1e-6, 1, "rad/s", "a spacecraft turns by 
 inline constexpr Range kSlewAngle_rad{1e-4, 3.15, "rad", "a slew has some degrees, and at most a half turn"};
 inline constexpr Range kSlews{1, 100, "", "it is a number of slews"};
 inline constexpr Range kManoeuvreTime_s{1, kYear_s, "s", "it is the time of all slews together"};
+inline constexpr Range kSpeed{1e-3, 1e9, "",
+                              "it is how many times faster than the telemetry was taken; max is as fast as can be"};
+inline constexpr Range kRequiredInterval_s{1, 3.1e7, "s",
+                                           "it is the time for which an attitude is to hold, at most a year"};
 inline constexpr Range kFlights{1, 1e6, "", "it is a number of flights"};
 
 }  // namespace limits

@@ -6,6 +6,9 @@
 #include <chrono>
 #include <cstdint>
 #include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
 
 #include "trihedron/core/drift_model.hpp"
 #include "trihedron/core/time.hpp"
@@ -51,6 +54,8 @@ struct FurtherStateOptions {
 struct CalibrationOptions {
   Estimator estimator = Estimator::kInvariant;
   std::optional<DriftModelId> drift_model;  ///< without it the one that the pass gives evidence of
+  /// Whether the prior variances of the members outside eq. (1) are found from the pass; needs kLargestDriftModel.
+  bool drift_field = false;
   /// Whether the noise is estimated from a pass that is long enough, instead of taken from the settings.
   bool find_noise = true;
   /// Process noise of each momentum, per axis across it; where the noise is found from the pass, its lower limit. The
@@ -78,5 +83,14 @@ struct CalibrationOptions {
   CorrectionOptions corrections;
   bool definitive_attitude = false;  ///< of estimator batch: the smoothed attitude at each gyro sample as well
 };
+
+/// The drift model as settings name it: "auto", "field", or that of a model.
+[[nodiscard]] std::string drift_model_word(const CalibrationOptions& options);
+/// Sets it by such a word. False, and nothing set, for another word.
+[[nodiscard]] bool set_drift_model(std::string_view word, CalibrationOptions& options);
+/// The words.
+[[nodiscard]] std::vector<std::string> drift_model_words();
+/// For messages: "auto, field, esg7, esg20, or vsh:1 … vsh:8"
+[[nodiscard]] std::string drift_model_word_choices();
 
 }  // namespace trihedron

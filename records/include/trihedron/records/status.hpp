@@ -49,6 +49,7 @@ inline constexpr std::array<StatusRow<GyroState>, kGyroStates> kGyroStateRows = 
     {GyroState::kUsed, "used again"},
     {GyroState::kStuck, "stuck"},
     {GyroState::kIsolated, "left out for good"},
+    {GyroState::kNotSelected, "left out by command"},
 }};
 
 /// Its name in the table.
