@@ -254,14 +254,15 @@ void add_calibrate(CLI::App& program, const Common& common, int& exit_status) {
       })
       ->type_name(fmt::format("{}", fmt::join(estimator_names(), "|")));
   command
-      ->add_option("--drift-model", arguments->drift_model,
-                   "Drift model; auto, the one that the pass gives evidence of, unless the settings say otherwise")
+      ->add_option(
+          "--drift-model", arguments->drift_model,
+          "Drift model; auto, the one that the pass gives evidence of, unless the settings say otherwise; field: all "
+          "members, by a prior that the pass determines, of estimator batch")
       ->check([](const std::string& name) {
-        return name == kAutoDriftModel || drift_model_named(name)
-                   ? ""
-                   : not_one_of(name, {}, fmt::format("{}, {}", kAutoDriftModel, drift_model_choices()));
+        CalibrationOptions options;
+        return set_drift_model(name, options) ? "" : not_one_of(name, {}, drift_model_word_choices());
       })
-      ->type_name(drift_model_words());
+      ->type_name(fmt::format("{}", fmt::join(trihedron::drift_model_words(), "|")));
   command->add_flag("--definitive", arguments->definitive,
                     "Write definitive-attitude.csv as well: at each gyro sample, by estimator batch");
   command->add_option("--catalogue", arguments->catalogue, "Database to add the calibrations to; see history")
@@ -272,7 +273,7 @@ void add_calibrate(CLI::App& program, const Common& common, int& exit_status) {
       options.estimator = estimator_named(arguments->estimator).value();
     }
     if (!arguments->drift_model.empty()) {
-      options.drift_model = drift_model_named(arguments->drift_model);
+      static_cast<void>(set_drift_model(arguments->drift_model, options));
     }
     if (arguments->definitive) {
       options.estimator = Estimator::kBatch;

@@ -18,6 +18,7 @@ void add_simulate(CLI::App& program, const Common& common, int& exit_status);
 void add_inspect(CLI::App& program, const Common& common, int& exit_status);
 void add_calibrate(CLI::App& program, const Common& common, int& exit_status);
 void add_navigate(CLI::App& program, const Common& common, int& exit_status);
+void add_replay(CLI::App& program, const Common& common, int& exit_status);
 void add_evaluate(CLI::App& program, const Common& common, int& exit_status);
 void add_observe(CLI::App& program, const Common& common, int& exit_status);
 void add_history(CLI::App& program, const Common& common, int& exit_status);
@@ -34,8 +35,5 @@ void add_config(CLI::App& command, std::string& file, const std::function<Calibr
 
 /// For a whole number in a range.
 [[nodiscard]] CLI::Validator whole(const Range& range);
-
-/// "auto|esg7|esg20|vsh:1|…"
-[[nodiscard]] std::string drift_model_words();
 
 }  // namespace trihedron::cli

@@ -38,6 +38,7 @@ void add_commands(CLI::App& program, trihedron::cli::Common& common, int& exit_s
   cli::add_inspect(program, common, exit_status);
   cli::add_calibrate(program, common, exit_status);
   cli::add_navigate(program, common, exit_status);
+  cli::add_replay(program, common, exit_status);
   cli::add_evaluate(program, common, exit_status);
   cli::add_observe(program, common, exit_status);
   cli::add_history(program, common, exit_status);

@@ -10,6 +10,7 @@
 #include <utility>
 #include <vector>
 
+#include "terminal.hpp"
 #include "trihedron/records/text.hpp"
 
 namespace trihedron::cli {
@@ -24,12 +25,6 @@ constexpr std::array<std::pair<int, std::string_view>, 5> kExitStatuses = {
      {2, "wrong usage"},
      {3, "an input was refused, with its place, the reason and the cure"},
      {4, "the machine failed: disk, memory"}}};
-
-/// Columns that UTF-8 text takes: none of its characters is a wide one.
-std::size_t width(std::string_view text) {
-  return static_cast<std::size_t>(
-      std::ranges::count_if(text, [](char c) { return (static_cast<unsigned char>(c) & 0xC0U) != 0x80; }));
-}
 
 /// Lines of at most kColumns; the first begins at column `at`, the others at `indent`.
 std::string wrapped(std::string_view text, std::size_t indent, std::size_t at) {

@@ -3,18 +3,26 @@
 #include <fmt/core.h>
 #include <spdlog/sinks/basic_file_sink.h>
 #include <spdlog/sinks/stdout_sinks.h>
-#include <unistd.h>
 
-#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <iomanip>
+#include <system_error>
 #include <utility>
 #include <vector>
 
+#include "terminal.hpp"
 #include "trihedron/io/error.hpp"
 #include "trihedron/io/standard_input.hpp"
 #include "trihedron/records/text.hpp"
 
 namespace trihedron::cli {
 namespace {
+
+// Of a line of the log file: what stands first, and second in the first line.
+constexpr const char* kLogPattern = "%Y-%m-%dT%H:%M:%S.%e%z %v";
+constexpr int kTimeStampLength = 29;
+constexpr std::string_view kName = "trihedron";
 
 /// The strings of a JSON text with the controls of U+0080 to U+009F escaped, which some terminals obey; those below are
 /// so anyway.
@@ -26,13 +34,6 @@ std::string without_controls(std::string text) {
     }
   }
   return text;
-}
-
-bool is_coloured(std::FILE* stream) {
-  const char* const no_color = std::getenv("NO_COLOR");  // NOLINT(concurrency-mt-unsafe): nothing sets it
-  const char* const terminal = std::getenv("TERM");      // NOLINT(concurrency-mt-unsafe)
-  return (no_color == nullptr || *no_color == '\0') && terminal != nullptr && std::string_view(terminal) != "dumb" &&
-         isatty(fileno(stream)) == 1;
 }
 
 std::string with_coloured_verdict(std::string text) {
@@ -48,9 +49,26 @@ std::string with_coloured_verdict(std::string text) {
   return text;
 }
 
+/// Whether a file holds something that the log would spoil: anything but earlier lines of a log, the first of which is
+/// `2026-01-31T12:00:00.000+00:00 trihedron 1.2.3: …`.
+bool holds_other_than_log(const std::string& file) {
+  std::error_code ignored;
+  if (!std::filesystem::is_regular_file(file, ignored) || std::filesystem::file_size(file, ignored) == 0) {
+    return false;
+  }
+  std::string time_stamp;
+  std::string name;
+  std::ifstream(file) >> std::setw(kTimeStampLength + 1) >> time_stamp >> std::setw(kName.size() + 1) >> name;
+  return time_stamp.size() != kTimeStampLength || time_stamp[10] != 'T' || name != kName;
+}
+
 }  // namespace
 
 void Log::open(bool verbose, const std::string& file) {
+  if (holds_other_than_log(file)) {
+    throw io::UsageError(
+        fmt::format("{}: there is a file that is no log of trihedron; name another for --log-file", file));
+  }
   std::vector<spdlog::sink_ptr> sinks;
   if (verbose) {
     sinks.push_back(std::make_shared<spdlog::sinks::stderr_sink_st>());
@@ -63,7 +81,7 @@ void Log::open(bool verbose, const std::string& file) {
       throw io::MachineFailed(file, "the log cannot be written",
                               "check that its directory is there and may be written");
     }
-    sinks.back()->set_pattern("%Y-%m-%dT%H:%M:%S.%e%z %v");
+    sinks.back()->set_pattern(kLogPattern);
   }
   if (!sinks.empty()) {
     logger_ = std::make_shared<spdlog::logger>("trihedron", sinks.begin(), sinks.end());

@@ -107,6 +107,4 @@ CLI::Validator whole(const Range& range) {
           ""};
 }
 
-std::string drift_model_words() { return fmt::format("{}|{}", kAutoDriftModel, fmt::join(drift_model_names(), "|")); }
-
 }  // namespace trihedron::cli

@@ -131,6 +131,30 @@ Json navigate_output() {
       {{"pass", pass()}, {"verdict", verdict()}, {"statistics", by_name(number())}, {"evaluation", evaluation()}});
 }
 
+Json replay_output() {
+  const Json durations = object(
+      {{"count", count()}, {"p50_s", number()}, {"p99_s", number()}, {"p999_s", number()}, {"longest_s", number()}});
+  return object({{"pass", pass()},
+                 {"verdict", verdict()},
+                 {"statistics", by_name(number())},
+                 {"mode", text()},
+                 {"faults", array(text())},
+                 {"readiness_s", number()},
+                 {"predicted_error_rad", number()},
+                 {"adoptions", count()},
+                 {"withdrawals", count()},
+                 {"samples_used", count()},
+                 {"samples_thinned", count()},
+                 {"samples_rejected", count()},
+                 {"fixes_used", count()},
+                 {"fixes_rejected", count()},
+                 {"attitudes", count()},
+                 {"snapshots", count()},
+                 {"calls", durations},
+                 {"late", durations},
+                 {"resumed_s?", number()}});
+}
+
 Json evaluate_output() { return with(evaluation(), object({{"extension?", extension()}})); }
 
 Json observe_output() {
@@ -203,6 +227,7 @@ std::vector<io::Schema> all_schemas() {
   schemas.push_back(output("inspect", "What inspect and simulate print with --json.", pass()));
   schemas.push_back(output("calibrate", "What calibrate and demo print with --json.", calibrate_output(calibration)));
   schemas.push_back(output("navigate", "What navigate prints with --json.", navigate_output()));
+  schemas.push_back(output("replay", "What replay prints with --json.", replay_output()));
   schemas.push_back(output("evaluate", "What evaluate prints with --json.", evaluate_output()));
   schemas.push_back(output("observe", "What observe prints with --json.", observe_output()));
   schemas.push_back(output("history", "What history prints with --json.", history_output(calibration)));

@@ -14,8 +14,6 @@
 namespace trihedron::cli {
 namespace {
 
-double minutes(Duration d) { return to_seconds(d) / 60; }
-
 nlohmann::ordered_json axes_json(const Eigen::Vector3d& rad) {
   return {{"roll_rad", rad.x()}, {"pitch_rad", rad.y()}, {"heading_rad", rad.z()}};
 }
@@ -114,7 +112,11 @@ std::string calibration_text(const CalibrationRun& run, const Eigen::VectorXd& e
     fmt::format_to(out, "\nGyro {}      {:>18} {:>12}{}\n", k + 1, "value", "1σ", has_truth ? "   est. − true" : "");
     const auto sigma = [&] { return sigma_of(calibration, calibration.states[static_cast<std::size_t>(state)]); };
     const std::vector<std::string> names = coefficient_names(gyro.drift_model);
+    const std::vector<DriftCoefficient> coefficients = coefficients_of(gyro.drift_model);
     for (std::size_t i = 0; i < gyro.drift_rad_s.size(); ++i, ++state) {
+      if (!calibration.drift_field.empty() && !coefficients[i].is_in_eq1()) {
+        continue;
+      }
       fmt::format_to(out, "  {:<8} {:>13} rad/s {:>12}", names[i], figure("{:+.4e}", gyro.drift_rad_s[i]),
                      figure("{:.1e}", sigma()));
       if (has_truth && std::isfinite(estimate_minus_truth(state))) {
@@ -143,6 +145,12 @@ std::string calibration_text(const CalibrationRun& run, const Eigen::VectorXd& e
     fmt::format_to(out, "{}  {:<24} {:>13} {:>12}\n",
                    &estimate == calibration.further.data() ? "\nFurther states\n" : "", name_of(estimate.parameter),
                    figure("{:+.4e}", estimate.value), figure("{:.1e}", estimate.sigma));
+  }
+  for (const DriftFieldLevel& level : calibration.drift_field) {
+    fmt::format_to(out, "{}  gyro {} {}, degree {}     {:>13} rad/s, to a factor of {:.2g}\n",
+                   &level == calibration.drift_field.data() ? "\nDrift field, rms of each degree\n" : "",
+                   level.gyro + 1, level.potential == DriftCoefficient::Member::kW ? 'W' : 'D', level.degree,
+                   figure("{:.1e}", level.rms_rad_s), level.sigma_factor);
   }
   for (const Evidence& evidence : run.evidence) {
     fmt::format_to(out, "{}  {:<24} ln Bayes factor {:>9}: {}\n",

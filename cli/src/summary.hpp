@@ -16,6 +16,8 @@
 
 namespace trihedron::cli {
 
+[[nodiscard]] inline double minutes(Duration duration) { return to_seconds(duration) / 60; }
+
 /// In this format, or kNoEntry where it is infinite or none.
 [[nodiscard]] std::string figure(fmt::format_string<const double&> format, double value);
 

@@ -1,19 +1,14 @@
 """Numbers at and beyond their ranges, closed streams, and memory: what the program does at its limits. Run by CTest with TRIHEDRON_BUILD naming
 the build directory."""
 import os
-import pathlib
 import re
 import subprocess
 
 import pytest
 
-PROGRAM = pathlib.Path(os.environ["TRIHEDRON_BUILD"]) / "trihedron"
-TRUSTWORTHY, DO_NOT_USE, WRONG_USAGE, INPUT_REFUSED, MACHINE_FAILED = range(5)
+from program import DO_NOT_USE, INPUT_REFUSED, MACHINE_FAILED, PROGRAM, TRUSTWORTHY, WRONG_USAGE, refused, run
+
 ESTIMATORS = ("invariant", "paper", "batch")
-
-
-def run(*arguments, **options):
-    return subprocess.run([str(PROGRAM), *map(str, arguments)], capture_output=True, text=True, **options)
 
 
 def simulated(directory, name, scenario):
@@ -46,13 +41,6 @@ def edited(short_pass, tmp_path):
         return directory
 
     return make
-
-
-def refused(result, status, *words):
-    assert result.returncode == status, result.stderr
-    assert result.stderr.count("\n") == 1, result.stderr
-    for word in words:
-        assert word in result.stderr, result.stderr
 
 
 # Numbers.

@@ -26,23 +26,13 @@ import time
 
 import hdf5_checksums
 import mutations
+from program import DO_NOT_USE, INPUT_REFUSED, TOLD, TRUSTWORTHY
 
-TRUSTWORTHY, DO_NOT_USE, WRONG_USAGE, INPUT_REFUSED = range(4)
 LIMIT_CPU_S = 10  # of all threads; several times what the longest takes
 LIMIT_S = 90  # wall clock: who waits for nothing takes no processor time
 LIMIT_BYTES = 400 << 20  # resident
 ADDRESS_SPACE_BYTES = 8 << 30  # beyond it memory is refused: no machine is brought down by a failure
 FILE_BYTES = 200 << 20
-TOLD = """drift_model = "esg7"
-[filter]
-noise = "told"
-[further_states]
-clock_offset = "off"
-orbital_error = "off"
-readout_bias = "off"
-coefficient_change = "off"
-wandering_drift = "off"
-"""
 SHORT = '[scenario]\nseed = {seed}\nduration = "150s"\n[gyro]\nperiod = "1s"\n'
 FOUR = SHORT + "".join(f"[[gyro.unit]]\nstart_direction_c = {direction}\n" for direction in
                        ([1, 0.1, 0], [0.1, 1, 0], [0, 0.1, 1], [0.6, 0.6, 0.5])) + """
@@ -74,6 +64,7 @@ class Originals:
         self.run("calibrate", "pass", "-o", "out", "--config", "told.toml", "--catalogue", "catalogue.db")
         self.run("calibrate", "second", "-o", "out2", "--config", "told.toml", "--catalogue", "catalogue.db")
         self.run("navigate", "pass", "--online", "-o", "attitude.csv")
+        self.run("replay", "pass", "--speed", "max", "--state", "replay.state")
         shutil.copy(directory / "out/calibration.json", directory)
         shutil.copy(directory / "out/effective-config.toml", directory / "config.toml")
         shutil.copytree(directory / "pass", directory / "known")
@@ -100,11 +91,15 @@ def spoil_table(rng, content):
     return mutations.spoilt(rng, content, mutations.TABLE)
 
 
+def spoil_bytes(rng, content):
+    return mutations.spoilt(rng, content, mutations.BYTES)
+
+
 def spoil_netcdf(rng, content):
     """Often in the metadata, which are a small part of the file; with checksums that fit, if the length is the same."""
     kind = rng.randrange(3)
     if kind == 0:
-        return mutations.spoilt(rng, content, mutations.BYTES)
+        return spoil_bytes(rng, content)
     begin, end = rng.choice(hdf5_checksums.blocks(content))
     part = content[begin:end]
     edit = rng.choice([mutations.flip_bits, mutations.set_bytes, mutations.overwrite_integer, mutations.zero_stretch])
@@ -169,7 +164,8 @@ def of_pass(name, file, spoil):
     calibrate = ("calibrate", path, "-o", "{out}", "--config", "{in}/told.toml")
     return Target(file, spoil, [name, "told.toml"], [
         ("inspect", path), ("--json", "inspect", path), calibrate, (*calibrate, "--estimator", "paper"), (*calibrate, "--estimator", "batch"),
-        ("calibrate", path, "-o", "{out}"), ("navigate", path, "--online", "-o", "{out}/a.csv"), ("observe", path)])
+        ("calibrate", path, "-o", "{out}"), ("navigate", path, "--online", "-o", "{out}/a.csv"), ("observe", path),
+        ("replay", path, "--speed", "max", "-o", "{out}/a.csv", "--calibration", "{out}/c.json", "--state", "{out}/s")])
 
 
 TARGETS = [
@@ -190,6 +186,8 @@ TARGETS = [
     Target("calibration.json", spoil_text, ["pass"], [
         ("navigate", "{in}/pass", "--calibration", "{in}/calibration.json", "-o", "{out}/a.csv"),
         ("navigate", "{in}/pass", "--calibration", "{in}/calibration.json", "-o", "{out}/a.csv", "--correction-interval", "30s")]),
+    Target("replay.state", spoil_bytes, ["pass"], [
+        ("replay", "{in}/pass", "--speed", "max", "--calibration", "{out}/c.json", "--state", "{in}/replay.state", "--resume")], ["replay.state"]),
     Target("config.toml", spoil_text, ["pass"], [
         ("calibrate", "{in}/pass", "-o", "{out}", "--config", "{in}/config.toml"), ("observe", "{in}/pass", "--config", "{in}/config.toml"),
         ("navigate", "{in}/pass", "--online", "--config", "{in}/config.toml", "-o", "{out}/a.csv")]),
@@ -318,7 +316,7 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("program", type=pathlib.Path)
     parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--inputs", type=int, default=3000)
+    parser.add_argument("--inputs", type=int, default=2000)
     parser.add_argument("--jobs", type=int, default=os.cpu_count())
     parser.add_argument("--only", type=int, help="one input of the seed; its messages are shown")
     parser.add_argument("--keep", help="directory for the files of each input that is run")

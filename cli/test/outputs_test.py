@@ -19,42 +19,23 @@ import time
 
 import pytest
 
-PROGRAM = pathlib.Path(os.environ["TRIHEDRON_BUILD"]) / "trihedron"
-TRUSTWORTHY, DO_NOT_USE, WRONG_USAGE, INPUT_REFUSED, MACHINE_FAILED = range(5)
+import program
+from program import DO_NOT_USE, INPUT_REFUSED, MACHINE_FAILED, PROGRAM, TOLD, TRUSTWORTHY, WRONG_USAGE, refused
+
 DONE = (TRUSTWORTHY, DO_NOT_USE)
 ALL_FAULTS = os.environ.get("TRIHEDRON_FAULTS") == "all"
 SCENARIO = '[scenario]\nseed = {}\nduration = "4min"\n[gyro]\nperiod = "1s"\n'
-# Nothing left to decide.
-TOLD = """
-drift_model = "esg7"
-[filter]
-noise = "told"
-[further_states]
-clock_offset = "off"
-orbital_error = "off"
-readout_bias = "off"
-coefficient_change = "off"
-wandering_drift = "off"
-"""
 FILES = ["attitude.csv", "calibration.json", "effective-config.toml", "report.html", "residuals.nc"]
 
 
 def run(*arguments, **options):
-    return subprocess.run([PROGRAM, "--quiet", *arguments], capture_output=True, text=True, errors="replace", check=False, **options)
+    return program.run("--quiet", *arguments, errors="replace", **options)
 
 
 def done(*arguments, **options):
     result = run(*arguments, **options)
     assert result.returncode in DONE, result.stderr
     return result
-
-
-def refused(result, status, *words):
-    """By this status, in one line with these words."""
-    assert result.returncode == status, (result.returncode, result.stderr)
-    assert result.stderr.startswith("trihedron: ") and result.stderr.count("\n") == 1, result.stderr
-    for word in words:
-        assert str(word) in result.stderr, result.stderr
 
 
 def content(directory):

@@ -1,31 +1,17 @@
 """A command that is interrupted ends at once, by the signal, and leaves nothing half-written. Run by CTest with TRIHEDRON_BUILD naming
 the build directory."""
-import os
-import pathlib
 import signal
 import subprocess
 import time
 
 import pytest
 
-BUILD = pathlib.Path(os.environ["TRIHEDRON_BUILD"])
-PROGRAM = BUILD / "trihedron"
+from program import BUILD, PROGRAM, TOLD
+
 CONSISTENCY = BUILD / "trihedron_consistency"
 SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 # A tenth of a second where nothing else runs.
 LIMIT_S = 2
-
-TOLD = """
-drift_model = "esg7"
-[filter]
-noise = "told"
-[further_states]
-clock_offset = "off"
-orbital_error = "off"
-readout_bias = "off"
-coefficient_change = "off"
-wandering_drift = "off"
-"""
 
 
 def begin(*command):

@@ -2,7 +2,6 @@
 build directory."""
 import json
 import os
-import pathlib
 import pty
 import re
 import shutil
@@ -10,10 +9,9 @@ import subprocess
 
 import pytest
 
-ROOT = pathlib.Path(__file__).resolve().parents[2]
-PROGRAM = pathlib.Path(os.environ["TRIHEDRON_BUILD"]) / "trihedron"
-TRUSTWORTHY, DO_NOT_USE, WRONG_USAGE, INPUT_REFUSED, MACHINE_FAILED = range(5)
-COMMANDS = ["simulate", "inspect", "calibrate", "navigate", "evaluate", "observe", "history", "demo", "schema", "man", "completion"]
+from program import DO_NOT_USE, INPUT_REFUSED, MACHINE_FAILED, PROGRAM, ROOT, TOLD, TRUSTWORTHY, WRONG_USAGE, run
+
+COMMANDS = ["simulate", "inspect", "calibrate", "navigate", "replay", "evaluate", "observe", "history", "demo", "schema", "man", "completion"]
 
 SCENARIO = """
 [scenario]
@@ -22,21 +20,6 @@ duration = "20min"
 [gyro.drift]
 outside_sigma = "0rad/s"
 """
-TOLD = """
-drift_model = "esg7"
-[filter]
-noise = "told"
-[further_states]
-clock_offset = "off"
-orbital_error = "off"
-readout_bias = "off"
-coefficient_change = "off"
-wandering_drift = "off"
-"""
-
-
-def run(*arguments, **options):
-    return subprocess.run([str(PROGRAM), *map(str, arguments)], capture_output=True, **{"text": True, **options})
 
 
 @pytest.fixture(scope="module")
@@ -172,7 +155,7 @@ def test_help_says_what_people_look_for(command):
 
 def test_help_names_values_and_defaults():
     text = run("calibrate", "--help").stdout
-    assert "invariant|paper|batch" in text and "auto|esg7|esg20|vsh:1" in text and "(required)" in text
+    assert "invariant|paper|batch" in text and "auto|field|esg7|esg20|vsh:1" in text and "(required)" in text
     assert "[default: 5arcmin]" in run("evaluate", "--help").stdout
     assert "[default: 30deg]" in run("observe", "--help").stdout
     assert run("navigate", "--help").stdout.count("--help") == 1
@@ -294,6 +277,16 @@ def test_the_log_says_what_was_decided(flown, tmp_path):
     assert nowhere.returncode == MACHINE_FAILED and "/proc/nowhere/log" in nowhere.stderr and nowhere.stderr.count("\n") == 1
     full = run("--log-file", "/dev/full", "inspect", flown / "pass")
     assert full.returncode == MACHINE_FAILED and "/dev/full" in full.stderr, full.stderr
+
+
+def test_the_log_spoils_no_file(flown, tmp_path):
+    for name in ("gyro.csv", "pass.toml"):
+        before = (flown / "pass" / name).read_bytes()
+        result = run("--log-file", flown / "pass" / name, "inspect", flown / "pass")
+        assert result.returncode == WRONG_USAGE and "no log of trihedron" in result.stderr and result.stderr.count("\n") == 1
+        assert (flown / "pass" / name).read_bytes() == before
+    (tmp_path / "empty").touch()
+    assert run("--log-file", tmp_path / "empty", "inspect", flown / "pass").returncode == TRUSTWORTHY
 
 
 def on_terminal(*arguments, **environment):

@@ -1,0 +1,400 @@
+"""A pass replayed through the on-board application: what it shows, that it can be killed at any moment and carried on, and that its attitude
+is that of the other programs that fly the same. Run by CTest with TRIHEDRON_BUILD naming the build directory."""
+import fcntl
+import json
+import os
+import pty
+import random
+import re
+import select
+import signal
+import struct
+import subprocess
+import termios
+import time
+
+import numpy
+import pytest
+
+from program import BUILD, DO_NOT_USE, INPUT_REFUSED, MACHINE_FAILED, PROGRAM, TOLD, TRUSTWORTHY, WRONG_USAGE, refused, run
+
+# What is required of a calibration here, so that it is adopted within two hours.
+SOON = ("--required-interval", "20min", "--window", "20min")
+
+
+def simulated(directory, name, scenario):
+    (directory / f"{name}.toml").write_text(scenario)
+    result = run("--quiet", "simulate", directory / f"{name}.toml", "-o", directory / f"{name}.nc")
+    assert result.returncode == TRUSTWORTHY, result.stderr
+    return directory / f"{name}.nc"
+
+
+@pytest.fixture(scope="module")
+def given(tmp_path_factory):
+    directory = tmp_path_factory.mktemp("given")
+    (directory / "told.toml").write_text(TOLD)
+    return directory
+
+
+@pytest.fixture(scope="module")
+def two_hours(given):
+    return simulated(given, "two_hours", '[scenario]\nseed = 5\nduration = "2h"\n[gyro.drift]\noutside_sigma = "0rad/s"\n')
+
+
+@pytest.fixture(scope="module")
+def minutes(given):
+    """Eight minutes with outliers, of a name that tries to steer the terminal."""
+    return simulated(given, "minutes", '[scenario]\nspacecraft = "RE\\u001b[2JSURS"\nseed = 2\nduration = "8min"\n'
+                     "[star_tracker]\noutlier_probability = 0.05\n")
+
+
+@pytest.fixture(scope="module")
+def whole(two_hours, tmp_path_factory):
+    """What a replay of the two hours gives that nothing breaks off, and how long it takes."""
+    out = tmp_path_factory.mktemp("whole")
+    began = time.monotonic()
+    result = run("--quiet", "replay", two_hours, "--speed", "max", *SOON, "-o", out / "attitude.csv", "--calibration",
+                 out / "calibration.json", "--state", out / "state")
+    assert result.returncode == TRUSTWORTHY, result.stderr
+    return out, time.monotonic() - began
+
+
+def attitude_of(path):
+    return numpy.loadtxt(path, delimiter=",", skiprows=1)
+
+
+# What it shows.
+
+
+def test_lines_where_there_is_no_terminal(two_hours):
+    result = run("replay", two_hours, "--speed", "max", *SOON)
+    assert result.returncode == TRUSTWORTHY, result.stderr
+    lines = result.stdout.splitlines()
+    in_minutes = [line for line in lines if re.match(r" *[\d.]+ min  \w+.*, sigma .*fixes \d+ used \d+ rejected, call ", line)]
+    assert 115 <= len(in_minutes) <= 121
+    for word in ("mode aligning", "mode calibrating", "mode navigating", "calibration adopted: attitude within 5′"):
+        assert any(word in line for line in lines), word
+    assert "\x1b" not in result.stdout
+    assert any(line.startswith("Verdict     trustworthy") for line in lines)
+    assert any(re.match(r"Call        50 % [\d.]+ µs, 99 % .*, 99.9 % .*, longest ", line) for line in lines)
+
+
+def test_rejections_are_told_once_a_run(minutes):
+    result = run("replay", minutes, "--speed", "max")
+    told = [line for line in result.stdout.splitlines() if "fix rejected: outlier" in line]
+    counts = int(re.search(r"Fixes       \d+ used, (\d+) rejected", result.stdout).group(1))
+    assert 1 <= len(told) <= counts
+    assert result.returncode == DO_NOT_USE
+    assert "not-adopted" in result.stdout and "nothing was predicted yet" in result.stdout
+    assert "\x1b" not in result.stdout
+
+
+def test_json_is_one_object_and_quiet_is_quiet(minutes, tmp_path):
+    result = run("--json", "replay", minutes, "--speed", "max", "-o", tmp_path / "a.csv")
+    told = json.loads(result.stdout)
+    assert told["mode"] == "calibrating" and told["faults"] == [] and told["adoptions"] == 0
+    assert told["attitudes"] == len(attitude_of(tmp_path / "a.csv"))
+    assert told["calls"]["count"] > 3800 and 0 < told["calls"]["p50_s"] <= told["calls"]["p99_s"] <= told["calls"]["longest_s"]
+    assert run("--quiet", "replay", minutes, "--speed", "max").stdout == ""
+
+
+def test_data_on_standard_output_leave_the_lines_to_standard_error(minutes, tmp_path):
+    run("--quiet", "replay", minutes, "--speed", "max", "-o", tmp_path / "a.csv")
+    piped = run("replay", minutes, "--speed", "max", "-o", "-")
+    assert piped.stdout == (tmp_path / "a.csv").read_text()
+    assert "mode aligning" in piped.stderr
+
+
+class Terminal:
+    """The program on a terminal of its own."""
+
+    def __init__(self, *arguments, rows=40, columns=100, term="xterm", **environment):
+        self.master, slave = pty.openpty()
+        fcntl.ioctl(slave, termios.TIOCSWINSZ, struct.pack("HHHH", rows, columns, 0, 0))
+        self.process = subprocess.Popen([str(PROGRAM), *map(str, arguments)], stdin=slave, stdout=slave, stderr=slave,
+                                        env={**os.environ, "TERM": term, **environment}, start_new_session=True)
+        os.close(slave)
+        self.shown = b""
+
+    def read(self, seconds):
+        """For so long, or until it ends."""
+        until = time.monotonic() + seconds
+        while time.monotonic() < until:
+            if select.select([self.master], [], [], 0.05)[0]:
+                try:
+                    self.shown += os.read(self.master, 65536)
+                except OSError:
+                    break
+        return self.shown.decode()
+
+    def end(self):
+        self.read(60)
+        os.close(self.master)
+        return self.process.wait(timeout=60)
+
+
+def test_a_live_screen_in_a_terminal(minutes):
+    terminal = Terminal("replay", minutes, "--speed", "240", NO_COLOR="")
+    assert terminal.end() == DO_NOT_USE
+    shown = terminal.shown.decode()
+    assert shown.startswith("\x1b[?25l") and shown.count("\x1b[?25l") == 1
+    assert shown.count("\x1b[?25h") == 1 and "Verdict" in shown.split("\x1b[?25h")[1]
+    frames = re.split(r"\r\x1b\[\d+A", shown)
+    assert 5 <= len(frames) <= 30
+    for frame in frames[3:]:
+        for word in ("Mode        ", "Sigmas      ", "Readiness   ", "Call        50 %", "Late        50 %", "Rejections  ", "k0 ", "align_x"):
+            assert word in frame, (word, frame)
+    assert "rejected: outlier" in shown and "Mode        calibrating" in shown
+    # The name cannot steer the terminal: nothing but what moves the cursor.
+    assert "RE\\x1b[2JSURS" in shown
+    assert set(re.findall(r"\x1b\[[\d;?]*[A-Za-z]", shown)) <= {"\x1b[?25l", "\x1b[?25h", "\x1b[K", "\x1b[J", "\x1b[1;31m", "\x1b[1;32m", "\x1b[0m",
+                                                              *re.findall(r"\x1b\[\d+A", shown)}
+
+
+def test_a_screen_fits_its_terminal(minutes):
+    terminal = Terminal("replay", minutes, "--speed", "480", rows=12, columns=40)
+    terminal.end()
+    screen = terminal.shown.decode().split("\x1b[?25h")[0]
+    for frame in re.split(r"\r\x1b\[\d+A", screen)[1:]:
+        lines = re.sub(r"\x1b\[[\d;?]*[A-Za-z]", "", frame).replace("\r", "").rstrip("\n").split("\n")
+        assert len(lines) <= 11 and max(map(len, lines)) < 40
+
+
+def test_no_colour_and_a_dumb_terminal(two_hours, minutes):
+    arguments = ("replay", two_hours, "--speed", "max", *SOON)
+    for environment, is_coloured in (({}, True), ({"NO_COLOR": "1"}, False)):
+        os.environ.pop("NO_COLOR", None)
+        terminal = Terminal(*arguments, **environment)
+        terminal.end()
+        assert ("\x1b[1;32m" in terminal.shown.decode()) == is_coloured
+    dumb = Terminal("replay", minutes, "--speed", "max", term="dumb")
+    dumb.end()
+    assert b"\x1b" not in dumb.shown and b" min  mode aligning" in dumb.shown
+
+
+@pytest.mark.parametrize("with_signal", [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_ends_it_within_a_second_and_gives_the_cursor_back(minutes, with_signal):
+    terminal = Terminal("replay", minutes, "--speed", "1")
+    terminal.read(0.8)
+    terminal.process.send_signal(with_signal)
+    sent = time.monotonic()
+    assert terminal.end() == -with_signal
+    assert time.monotonic() - sent < 2
+    assert terminal.shown.endswith(b"\x1b[?25h")
+
+
+# By the clock.
+
+
+def test_it_takes_as_long_as_the_speed_says(minutes):
+    began = time.monotonic()
+    result = run("--json", "replay", minutes, "--speed", "240")
+    took = time.monotonic() - began
+    assert 1.9 < took < 6
+    late = json.loads(result.stdout)["late"]
+    assert late["count"] > 3800 and late["p50_s"] < 0.05
+
+
+@pytest.mark.parametrize("speed", ["0", "-1", "fast", "nan", "inf", "", "1x", "MAX", "1e30"])
+def test_a_bad_speed_is_refused(minutes, speed):
+    refused(run("replay", minutes, f"--speed={speed}"), WRONG_USAGE, "--speed", "max")
+
+
+def test_other_options_that_make_no_sense_are_refused(minutes, tmp_path):
+    refused(run("replay", minutes, "--resume"), WRONG_USAGE, "--state")
+    refused(run("replay", minutes, "--state", tmp_path / "s", "-o", "-"), WRONG_USAGE, "standard output")
+    refused(run("replay", minutes, "--required-error", "5"), WRONG_USAGE, "unit")
+    refused(run("replay", minutes, "--required-error", "0arcmin"), WRONG_USAGE, "outside")
+    refused(run("replay", minutes, "--window", "0min"), WRONG_USAGE, "outside")
+    for files in (("-o", minutes), ("--state", minutes), ("--calibration", minutes), ("-o", tmp_path / "x", "--state", tmp_path / "x"),
+                  ("--calibration", tmp_path / "x", "--state", tmp_path / "x")):
+        refused(run("replay", minutes, "--speed", "max", *files), WRONG_USAGE, "output")
+    assert list(tmp_path.iterdir()) == []
+    (tmp_path / "settings.toml").write_text('drift_model = "esg20"\n')
+    refused(run("replay", minutes, "--config", tmp_path / "settings.toml"), INPUT_REFUSED, "esg7")
+
+
+# Killed and carried on.
+
+
+def test_killed_at_any_moment_it_ends_as_if_nothing_had_been(two_hours, whole, tmp_path):
+    expected, takes_s = whole
+    attitude = (expected / "attitude.csv").read_bytes()
+    moments = random.Random(11)
+    kills = hits = went_on = 0
+    for attempt in range(8):
+        out = tmp_path / str(attempt)
+        out.mkdir()
+        files = ["-o", str(out / "attitude.csv"), "--calibration", str(out / "calibration.json"), "--state", str(out / "state"), "--resume"]
+        for speed in ("3600", "7200", "max"):
+            process = subprocess.Popen([str(PROGRAM), "--quiet", "replay", str(two_hours), "--speed", speed, *SOON, *files])
+            time.sleep(moments.uniform(0, 0.7 * takes_s if speed == "max" else 1.3))
+            process.kill()
+            kills += 1
+            hits += process.wait() == -signal.SIGKILL
+            written = (out / "attitude.csv").read_bytes() if (out / "attitude.csv").exists() else b""
+            assert attitude.startswith(written)
+        result = run("--json", "replay", two_hours, "--speed", "max", *SOON, *files)
+        assert result.returncode == TRUSTWORTHY, result.stderr
+        # What was confirmed is no more than what was written, and is not made again.
+        told = json.loads(result.stdout)
+        went_on += told.get("resumed_s", 0) > 0
+        assert told["attitudes"] == attitude.count(b"\n") - 1
+        for name in ("attitude.csv", "calibration.json"):
+            assert (out / name).read_bytes() == (expected / name).read_bytes(), (attempt, name)
+    assert kills >= 20 and hits >= 16 and went_on >= 6
+
+
+def test_a_signal_confirms_all_that_there_is(two_hours, whole, tmp_path):
+    expected, _ = whole
+    arguments = ("--quiet", "replay", two_hours, "--speed", "max", *SOON, "-o", tmp_path / "a.csv", "--calibration", tmp_path / "c.json", "--state",
+                 tmp_path / "state")
+    slowly = ["3600" if its == "max" else its for its in arguments]
+    process = subprocess.Popen([str(PROGRAM), *map(str, slowly)])
+    time.sleep(1.2)
+    process.send_signal(signal.SIGTERM)
+    assert process.wait(timeout=10) == -signal.SIGTERM
+    written = (tmp_path / "a.csv").read_bytes()
+    assert written.endswith(b"\n") and (expected / "attitude.csv").read_bytes().startswith(written)
+    refused(run(*arguments), WRONG_USAGE, "--resume")
+    assert (tmp_path / "a.csv").read_bytes() == written
+    result = run("--json", *arguments[1:], "--resume")
+    assert result.returncode == TRUSTWORTHY, result.stderr
+    # It goes on from the last line.
+    assert abs(json.loads(result.stdout)["resumed_s"] - float(written.splitlines()[-1].split(b",")[0])) < 0.2
+    assert (tmp_path / "a.csv").read_bytes() == (expected / "attitude.csv").read_bytes()
+    assert (tmp_path / "c.json").read_bytes() == (expected / "calibration.json").read_bytes()
+    # Once more: all is done already.
+    again = run("--json", *arguments[1:], "--resume")
+    assert json.loads(again.stdout)["calls"]["count"] == 0
+    assert (tmp_path / "c.json").read_bytes() == (expected / "calibration.json").read_bytes()
+
+
+@pytest.fixture
+def broken_off(minutes, tmp_path):
+    """A replay that was stopped half-way, and the arguments that carry it on."""
+    arguments = ("--quiet", "replay", minutes, "--speed", "240", "-o", tmp_path / "a.csv", "--state", tmp_path / "state")
+    process = subprocess.Popen([str(PROGRAM), *map(str, arguments)])
+    time.sleep(1.2)
+    process.kill()
+    process.wait()
+    return tmp_path, (*("max" if its == "240" else its for its in arguments), "--resume")
+
+
+def test_a_torn_slot_leaves_the_other(broken_off):
+    directory, arguments = broken_off
+    state = bytearray((directory / "state").read_bytes())
+    half = len(state) // 2
+    newest = 0 if state[8:16] > state[half + 8:half + 16] else half  # sequence numbers, least significant byte first, below 256
+    state[newest + 4000] ^= 1
+    (directory / "state").write_bytes(state)
+    result = run("--verbose", *arguments[1:])
+    assert result.returncode == DO_NOT_USE, result.stderr
+    assert "torn or damaged" in result.stderr
+    run("--quiet", "replay", arguments[2], "--speed", "max", "-o", directory / "whole.csv")
+    assert (directory / "a.csv").read_bytes() == (directory / "whole.csv").read_bytes()
+
+
+@pytest.mark.parametrize(("spoil", "words"), [
+    (lambda state: state[:3000], ("too short",)),
+    (lambda state: b"", ("too short",)),
+    (lambda state: bytes(len(state)), ("none of this program",)),
+    (lambda state: bytes(len(state) - 4) + b"text", ("none of this program",)),
+    (lambda state: bytes(byte ^ (i % 5000 == 4999) for i, byte in enumerate(state)), ("torn or damaged",)),
+])
+def test_a_state_that_is_none_is_refused(broken_off, spoil, words):
+    directory, arguments = broken_off
+    (directory / "state").write_bytes(spoil((directory / "state").read_bytes()))
+    before = (directory / "a.csv").read_bytes()
+    refused(run(*arguments), INPUT_REFUSED, "state", *words)
+    assert (directory / "a.csv").read_bytes() == before
+
+
+def test_a_state_goes_with_its_pass_its_settings_and_its_attitude(broken_off, two_hours):
+    directory, arguments = broken_off
+    other_pass = [two_hours if its == arguments[2] else its for its in arguments]
+    refused(run(*other_pass), INPUT_REFUSED, "another pass")
+    refused(run(*arguments, "--window", "20min"), INPUT_REFUSED, "other settings")
+    refused(run(*arguments, "--correction-interval", "90min"), INPUT_REFUSED, "other settings")
+    refused(run(*(its for its in arguments if its not in ("-o", directory / "a.csv"))), INPUT_REFUSED, "file of attitude")
+    attitude = (directory / "a.csv").read_bytes()
+    for changed, words in ((attitude[:200], "confirmed"), (attitude.replace(b"t_s", b"T_s"), "confirmed")):
+        (directory / "a.csv").write_bytes(changed)
+        refused(run(*arguments), INPUT_REFUSED, words)
+        assert (directory / "a.csv").read_bytes() == changed
+    (directory / "a.csv").write_bytes(attitude)
+    assert run(*arguments).returncode == DO_NOT_USE
+
+
+def test_a_file_that_is_no_state_is_not_replaced(minutes, tmp_path):
+    (tmp_path / "notes.txt").write_text("mine")
+    refused(run("replay", minutes, "--speed", "max", "--state", tmp_path / "notes.txt"), WRONG_USAGE, "no state")
+    assert (tmp_path / "notes.txt").read_text() == "mine"
+
+
+def test_a_state_is_of_one_replay_at_a_time(minutes, tmp_path):
+    arguments = ("--quiet", "replay", minutes, "--state", tmp_path / "state", "--resume")
+    process = subprocess.Popen([str(PROGRAM), *map(str, arguments)])
+    while not (tmp_path / "state").exists():
+        time.sleep(0.02)
+    time.sleep(0.3)
+    refused(run(*arguments), MACHINE_FAILED, "another program")
+    process.kill()
+    process.wait()
+
+
+# The same attitude as of others.
+
+
+def test_it_is_navigate_with_the_prior_until_the_adoption_and_online_from_then_on(given, two_hours):
+    result = run("--quiet", "replay", two_hours, "--speed", "max", *SOON, "--spread-over", "0", "-o", given / "replay.csv")
+    assert result.returncode == TRUSTWORTHY, result.stderr
+    told = ("--config", given / "told.toml", "--correction-interval", "continuous")
+    for source in ("prior", "online"):
+        result = run("--quiet", "navigate", two_hours, f"--{source}", *told, "-o", given / f"{source}.csv")
+        assert result.returncode in (TRUSTWORTHY, DO_NOT_USE), result.stderr
+    lines = {name: path.read_text().splitlines()[1:] for name, path in (
+        ("replay", given / "replay.csv"), ("prior", given / "prior.csv"), ("online", given / "online.csv"))}
+    assert len(lines["replay"]) == len(lines["prior"]) == len(lines["online"]) > 57000
+    as_prior = [a == b for a, b in zip(lines["replay"], lines["prior"])]
+    as_online = [a == b for a, b in zip(lines["replay"], lines["online"])]
+    adopted = as_prior.index(False)
+    # At once from the one to the other, and not back.
+    assert all(as_online[adopted:]) and not any(as_prior[adopted:])
+    assert 20 * 60 < float(lines["replay"][adopted].split(",")[0]) < 100 * 60
+
+
+def test_it_is_the_example_in_c(two_hours, whole, tmp_path):
+    result = run("--quiet", "replay", two_hours, "--speed", "max", *SOON, "--records", tmp_path / "records")
+    assert result.returncode == TRUSTWORTHY, result.stderr
+    example = BUILD / "replayed"
+    assert subprocess.run([example, tmp_path / "records", tmp_path / "attitudes"]).returncode == 0
+    attitudes = numpy.fromfile(tmp_path / "attitudes", dtype=[("time_ns", "i8"), ("q", "f8", 4), ("covariance", "f8", (3, 3))])
+    lines = (whole[0] / "attitude.csv").read_text().splitlines()[1:]
+    assert len(attitudes) == len(lines) > 57000
+    sigmas = numpy.sqrt(numpy.einsum("nii->ni", attitudes["covariance"]))
+    for line, q, sigma in zip(lines, attitudes["q"], sigmas):
+        assert line.split(",")[1:8] == [*(f"{its:.12f}" for its in q), *(f"{its:.6e}" for its in sigma)]
+    # It is no example of a file that is damaged.
+    records = (tmp_path / "records").read_bytes()
+    for damaged in (b"", records[:-1], records[8:], records[:4136] + records[:8]):
+        (tmp_path / "damaged").write_bytes(damaged)
+        assert subprocess.run([example, tmp_path / "damaged", tmp_path / "none"], capture_output=True).returncode == 3
+    assert subprocess.run([example], capture_output=True).returncode == 2
+    assert subprocess.run([example, tmp_path / "records", tmp_path / "none" / "a"], capture_output=True).returncode == 4
+
+
+def test_a_pass_without_a_usable_fix_gives_no_attitude(tmp_path):
+    blind = simulated(tmp_path, "blind", """
+[scenario]
+duration = "4min"
+[gyro]
+gaps = [{begin = "30s", end = "210s"}]
+[star_tracker]
+outages = [{begin = "0s", end = "40s"}, {begin = "200s", end = "5min"}]
+""")
+    result = run("replay", blind, "--speed", "max", "-o", tmp_path / "a.csv", "--calibration", tmp_path / "c.json")
+    assert result.returncode == DO_NOT_USE, result.stderr
+    assert "Mode        waiting for a fix" in result.stdout or "Mode        failed" in result.stdout
+    assert "not-adopted" in result.stdout and "no fix could be used" in result.stdout
+    assert (tmp_path / "a.csv").read_text().count("\n") == 1 and not (tmp_path / "c.json").exists()
