@@ -298,10 +298,6 @@ void put_gaps(const ReportInput& input, json& values) {
   values["more_gaps"] = gaps.size() > kShown ? std::to_string(gaps.size() - kShown) : "";
 }
 
-std::string drift_model_of(const CalibrationOptions& options) {
-  return options.drift_model ? name_of(*options.drift_model) : std::string(kAutoDriftModel);
-}
-
 json settings_of(const ReportInput& input) {
   const CalibrationOptions& options = input.run.options;
   json rows = json::array();
@@ -309,7 +305,7 @@ json settings_of(const ReportInput& input) {
     rows.push_back({{"name", name}, {"value", value}});
   };
   put("Estimator", std::string(name_of(input.run.calibration.estimator)));
-  put("Drift model", drift_model_of(options));
+  put("Drift model", drift_model_word(options));
   put("Noise", options.find_noise ? "found from the pass" : "given, by settings or an earlier calibration");
   put("Process noise of each momentum",
       fmt::format("{}″ per √h", significant(options.direction_random_walk_rad_sqrt_s * 60 / kArcsecond_rad, 2)));
@@ -406,6 +402,24 @@ json drift_model_table(const CalibrationRun& run) {
   return {{"unit", unit.symbol}, {"rows", rows}};
 }
 
+/// A row for each gyro and degree, both potentials in it.
+json drift_field_rows(const Calibration& calibration) {
+  json rows = json::array();
+  const auto text = [](const DriftFieldLevel& level) {
+    return fmt::format("{:.2g} ({:.2g} … {:.2g})", level.rms_rad_s / kMicroradian,
+                       level.rms_rad_s / level.sigma_factor / kMicroradian,
+                       level.rms_rad_s * level.sigma_factor / kMicroradian);
+  };
+  for (const DriftFieldLevel& level : calibration.drift_field) {
+    const std::string name = fmt::format("Gyro {}, degree {}", level.gyro + 1, level.degree);
+    if (rows.empty() || rows.back()["name"] != name) {
+      rows.push_back({{"name", name}});
+    }
+    rows.back()[level.potential == DriftCoefficient::Member::kW ? "W" : "D"] = text(level);
+  }
+  return rows;
+}
+
 json statistics_rows(const Statistics& statistics) {
   json rows = json::array();
   for (const auto& [name, value] : named_values(statistics)) {
@@ -424,7 +438,7 @@ json facts_of(const ReportInput& input) {
                                     number(static_cast<double>(input.pass.gyro.size()), 0))),
           fact("Star tracker", counted(static_cast<long>(input.pass.star_tracker.size()), "fix", "fixes")),
           fact("Estimator", fmt::format("{}, drift model {}", name_of(input.run.calibration.estimator),
-                                        drift_model_of(input.run.options)))};
+                                        drift_model_word(input.run.options)))};
 }
 
 }  // namespace
@@ -437,6 +451,7 @@ json table_values(const ReportInput& input, const std::vector<Parameter>& parame
                  {"has_truth", input.truth != nullptr},
                  {"coefficients", coefficients_of(parameters)},
                  {"drift_models", drift_model_table(input.run)},
+                 {"drift_field", drift_field_rows(input.run.calibration)},
                  {"correlations", strongest_correlations(input, parameters)},
                  {"evaluation", evaluation_of(input)},
                  {"innovation_rows", innovation_rows(input)},
@@ -448,7 +463,7 @@ json table_values(const ReportInput& input, const std::vector<Parameter>& parame
                  {"settings", settings_of(input)},
                  {"statistics", statistics_rows(input.run.calibration.statistics)}};
   put_gaps(input, values);
-  for (const char* list : {"correlations", "gaps", "telemetry_notes", "further", "states_decided"}) {
+  for (const char* list : {"correlations", "drift_field", "gaps", "telemetry_notes", "further", "states_decided"}) {
     values[std::string("has_") + list] = !values[list].empty();
   }
   return values;

@@ -46,7 +46,7 @@ std::string significant(double value, int digits) {
 
 std::string of_axes(const Eigen::Vector3d& v) {
   const AngleUnit unit = unit_of_angles({v.data(), 3});
-  return fmt::format("{} / {} / {} {}", significant(v.x() / unit.rad, 2), significant(v.y() / unit.rad, 2),
+  return fmt::format("{} / {} / {}{}", significant(v.x() / unit.rad, 2), significant(v.y() / unit.rad, 2),
                      significant(v.z() / unit.rad, 2), unit.symbol);
 }
 

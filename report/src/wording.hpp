@@ -18,7 +18,7 @@ namespace trihedron::report {
 /// To so many significant digits, never with an exponent.
 [[nodiscard]] std::string significant(double value, int digits);
 
-/// "1.2 / 0.9 / 3.4 ″": roll, pitch, heading in one unit that suits their size.
+/// "1.2 / 0.9 / 3.4″": roll, pitch, heading in one unit that suits their size.
 [[nodiscard]] std::string of_axes(const Eigen::Vector3d& v);
 
 /// "2.9″", "5′": in the unit that suits its size, "—" for what is no number.

@@ -68,7 +68,7 @@ TEST(Wording, AnglesHaveTheUnitOfTheirSize) {
   EXPECT_EQ(angle(2 * kDegree_rad, 2), "2.0°");
   EXPECT_EQ(angle(std::numeric_limits<double>::infinity(), 2), "—");
   EXPECT_EQ(limit_text(5 * kArcminute_rad), "5′");
-  EXPECT_EQ(of_axes(Eigen::Vector3d(0.55, 12, 3) * kArcsecond_rad), "0.55 / 12 / 3.0 ″");
+  EXPECT_EQ(of_axes(Eigen::Vector3d(0.55, 12, 3) * kArcsecond_rad), "0.55 / 12 / 3.0″");
 }
 
 }  // namespace

@@ -50,7 +50,7 @@ CalibrationOptions options_of(Estimator estimator, double walk_rad_sqrt_s) {
 Estimate by_filter(const sim::SimulatedPass& flown, Estimator estimator, double walk_rad_sqrt_s) {
   ground::Pipeline pipeline(flown.pass.settings, options_of(estimator, walk_rad_sqrt_s), false);
   Estimate estimate;
-  ground::replay(flown.pass, pipeline, [&](const StepReport& report, const GyroSample& /*sample*/) {
+  ground::replay(flown.pass, pipeline, [&](const StepReport& report) {
     const FixStatus status = report.fix.status;
     if (status == FixStatus::kRejectedByGate || (is_used(status) && status != FixStatus::kStarted)) {
       estimate.nis += report.fix.nis;
