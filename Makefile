@@ -5,8 +5,8 @@ BUILD := build
 LINT_TOOLS := build-lint/tools
 SOURCES := $(shell git ls-files '*.cpp' '*.hpp' 2>/dev/null)
 
-.PHONY: help setup build everything demo test bench validation consistency fuzz fuzz-build fuzz-briefly docs format lint sanitize coverage install \
-  clean
+.PHONY: help setup build everything demo test flight bench slots mutants validation consistency fuzz fuzz-build fuzz-briefly docs format lint \
+  standard sanitize coverage install clean
 
 help:
 	@echo 'make demo     install what is missing, build, repeat the experiment of the paper, say where the report is'
@@ -14,12 +14,17 @@ help:
 	@echo 'make build    the program alone, at $(BUILD)/trihedron'
 	@echo 'make everything  with tests and benches'
 	@echo 'make bench    measure: the on-board step, reading, writing and simulating a pass'
+	@echo 'make slots    count the instructions of each slot of the on-board application'
+	@echo 'make flight   fly core on an emulated Cortex-M7 and three other processors; writes the tables of docs/flight.md'
 	@echo 'make validation  measure again what docs/validation.md tells'
 	@echo 'make consistency  measure again what docs/consistency.md tells: hours; goes on where it was interrupted'
-	@echo 'make fuzz     each reader against libFuzzer for FUZZ_SECONDS (3600), measures again what docs/reliability.md tells: hours'
+	@echo 'make mutants  whether the tests of core notice wrong formulas; goes on where it was interrupted'
+	@echo 'make fuzz     each reader against libFuzzer for FUZZ_SECONDS (3600) each, measures again what docs/reliability.md tells: hours'
 	@echo 'make docs     reference of the interfaces and all documents as web pages: out/docs/html/index.html'
 	@echo 'make install  into PREFIX (default /usr/local)'
-	@echo 'make setup | format | lint | sanitize | coverage | clean'
+	@echo 'make sanitize build with clang under address and undefined-behaviour sanitizers, and run the tests that are not long'
+	@echo 'make coverage the same, then the lines and branches of core that its own tests take'
+	@echo 'make setup | format | lint | clean'
 	@echo 'Files are compiled in units of up to 24, which makes a whole build shorter. Who edits one is served sooner with'
 	@echo 'CMAKE_FLAGS=-DCMAKE_UNITY_BUILD=OFF, which compiles each on its own.'
 
@@ -33,7 +38,7 @@ build:
 	cmake --build $(BUILD) --parallel $(JOBS) --target trihedron
 
 everything:
-	@cmake/setup.sh program tests
+	@cmake/setup.sh program tests flight
 	cmake --preset release $(CMAKE_FLAGS)
 	cmake --build $(BUILD) --parallel $(JOBS)
 
@@ -43,24 +48,40 @@ demo: build
 test: everything
 	ctest --test-dir $(BUILD) --output-on-failure --parallel $(JOBS)
 
+
+flight:
+	@cmake/setup.sh program tests flight targets
+	cmake $(if $(wildcard $(BUILD)/CMakeCache.txt),$(BUILD),--preset program) $(CMAKE_FLAGS)
+	cmake --build $(BUILD) --parallel $(JOBS) --target trihedron trihedron_fly
+	flight/targets/fly.py $(abspath $(BUILD)) docs/flight.md
+
 bench: everything
 	$(BUILD)/trihedron_bench
+
+# Instructions of each slot of the on-board application.
+slots:
+	@cmake/setup.sh program tests
+	cmake --preset release $(CMAKE_FLAGS)
+	cmake --build $(BUILD) --target trihedron_slots
+	bench/slots.py $(BUILD)/trihedron_slots
 
 validation: everything
 	validation/validate.py $(BUILD)/trihedron docs/validation.md
 
-# Counts the lines of core on the way, for `coverage`.
-sanitize:
+mutants:
 	@cmake/setup.sh program tests
+	validation/mutants/mutants.py build-mutants out/mutants.jsonl --document docs/flight-standard.md --jobs $(JOBS)
+
+# Counts the lines and branches of core on the way, for `coverage`.
+sanitize:
+	@cmake/setup.sh program tests sanitizers
 	cmake --preset sanitize $(CMAKE_FLAGS)
 	cmake --build build-sanitize --parallel $(JOBS)
-	find build-sanitize -name '*.gcda' -delete
+	rm -rf build-sanitize/coverage
 	ctest --test-dir build-sanitize --output-on-failure --parallel $(JOBS) -LE long
 
-# Threads race for the counters, which may come out negative; gcovr then leaves that line out.
 coverage: sanitize
-	gcovr --gcov-ignore-parse-errors --root . --filter 'core/(include|src)/' --exclude-throw-branches --exclude-unreachable-branches \
-	  --fail-under-line 95 --print-summary build-sanitize/core
+	core/test/coverage.py build-sanitize
 
 CONSISTENCY = $(BUILD)/trihedron_consistency --resume out/consistency.txt
 WHOLE_PASS = --estimators invariant,batch
@@ -80,14 +101,15 @@ consistency: everything
 	$(CONSISTENCY) $(WHOLE_PASS) --runs 30 --cells $(GEOMETRIES) --table agreement --place agreement docs/consistency.md
 	$(CONSISTENCY) $(WHOLE_PASS) --runs 20 --cells $(STEADY) --table agreement --place agreement20 docs/consistency.md
 
-# What is found is in out/fuzz/found, and the corpus, with which the next run goes on, beside it.
+# FUZZ_SECONDS: of processor time for each target. FUZZ_TARGETS: those alone, separated by commas. What is found is in out/fuzz/found, and the
+# corpus, with which the next run goes on, beside it.
 FUZZ_SECONDS ?= 3600
-FUZZ = fuzz/run.py build-fuzz --seconds $(FUZZ_SECONDS) --jobs $(JOBS)
+FUZZ = fuzz/run.py build-sanitize --seconds $(FUZZ_SECONDS) --jobs $(JOBS) $(if $(FUZZ_TARGETS),--targets $(FUZZ_TARGETS))
 
 fuzz-build:
-	@cmake/setup.sh program fuzz
-	cmake --preset fuzz $(CMAKE_FLAGS)
-	cmake --build build-fuzz --parallel $(JOBS) --target trihedron_fuzz
+	@cmake/setup.sh program tests sanitizers
+	cmake --preset sanitize $(CMAKE_FLAGS)
+	cmake --build build-sanitize --parallel $(JOBS) --target trihedron_fuzz
 
 fuzz: fuzz-build
 	$(FUZZ) --document docs/reliability.md
@@ -115,13 +137,23 @@ $(LINT_TOOLS)/installed: cmake/lint-requirements.txt
 	$(LINT_TOOLS)/bin/pip install --quiet --disable-pip-version-check --requirement $<
 	touch $@
 
-# In units of several files: clang-tidy reads Eigen once for each unit instead of once for each file.
-lint: $(LINT_TOOLS)/installed
+# What docs/flight-standard.md has checked of core by tools of their own. A view of rows is small enough to be copied.
+standard: $(LINT_TOOLS)/installed
+	@cmake/setup.sh lint
+	cppcheck --quiet --enable=warning,performance,portability --suppress=missingInclude --suppress=passedByValue --std=c++20 --language=c++ \
+	  --error-exitcode=1 -I core/include core/src
+	$(LINT_TOOLS)/bin/lizard -l cpp core/src core/include -T cyclomatic_complexity=15 -T nloc=60 -T parameter_count=8 -w
+
+# In units of several files: clang-tidy reads Eigen once for each unit instead of once for each file. Recursion is forbidden in core alone.
+UNITS = sed -n 's/^ *"file": "\(.*\/\(Unity\|src\)\/.*\)".*/\1/p' build-lint/compile_commands.json
+TIDY = xargs -P $(JOBS) -n 1 $(LINT_TOOLS)/bin/clang-tidy --quiet --extra-arg=-Wno-unused-command-line-argument -p build-lint
+
+lint: standard
 	@cmake/setup.sh program
 	@$(LINT_TOOLS)/bin/clang-format --dry-run --Werror $(SOURCES)
 	cmake --preset lint
-	sed -n 's/^ *"file": "\(.*\/\(Unity\|src\)\/.*\)".*/\1/p' build-lint/compile_commands.json | \
-	  xargs -P $(JOBS) -n 1 $(LINT_TOOLS)/bin/clang-tidy --quiet --extra-arg=-Wno-unused-command-line-argument -p build-lint
+	$(UNITS) | grep '/trihedron_core\.dir/' | $(TIDY) --checks=misc-no-recursion
+	$(UNITS) | grep -v '/trihedron_core\.dir/' | $(TIDY)
 
 install: build
 	cmake --install $(BUILD) $(if $(PREFIX),--prefix $(PREFIX))

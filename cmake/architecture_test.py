@@ -12,8 +12,9 @@ ROOT = pathlib.Path(__file__).resolve().parent.parent
 MODULES_CMAKE = ROOT / "cmake" / "Modules.cmake"
 
 # core flies: what needs a heap, exceptions, streams, files, threads or a clock does not belong there.
-CORE_MAY_INCLUDE = {"array", "algorithm", "chrono", "cmath", "compare", "cstddef", "cstdint", "cstdlib", "iterator", "limits", "numbers", "optional",
-                    "type_traits", "utility"}
+CORE_MAY_INCLUDE = {"array", "algorithm", "chrono", "cmath", "compare", "cstddef", "cstdint", "cstdlib", "cstring", "iterator", "limits", "memory", "numbers",
+                    "optional", "span", "type_traits", "utility",
+                    "stddef.h", "stdint.h", "trihedron.h", "trihedron_tables.h"}  # the interface in C
 
 
 def table_of(prefix):

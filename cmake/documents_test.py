@@ -4,6 +4,8 @@ Run by CTest: python3 -m pytest documents_test.py.
 """
 import pathlib
 import re
+import subprocess
+import sys
 
 import pytest
 
@@ -29,3 +31,10 @@ def test_paths_that_a_document_names_exist(document):
 def test_paths_are_found_in_text():
     text = "See `core/include/a.hpp` (`docs/adr/`), `io/src/<format>.cpp`, `h_b`, `C_in_c`, `a/b`, and `cmake --preset x`."
     assert paths_named(text) == ["core/include/a.hpp", "docs/adr/"]
+
+
+def test_tables_of_the_application_are_up_to_date(tmp_path):
+    subprocess.run([sys.executable, ROOT / "core" / "interface" / "tables.py", tmp_path], check=True)
+    made = sorted(path.relative_to(tmp_path) for path in tmp_path.glob("**/*") if path.is_file())
+    assert len(made) == 4
+    assert [str(path) for path in made if (tmp_path / path).read_text() != (ROOT / path).read_text()] == []

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# cmake/setup.sh [GROUP…]: installs what is missing of these groups on Debian 12, of program, tests and lint where none is named; does
-# nothing, quickly, when nothing is.
+# cmake/setup.sh [GROUP…]: installs what is missing of these groups on Debian 12, of program, tests, sanitizers, flight and lint where none is
+# named; does nothing, quickly, when nothing is.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
@@ -9,22 +9,26 @@ program=(
   libeigen3-dev libhdf5-dev libcli11-dev libtomlplusplus-dev libfmt-dev nlohmann-json3-dev libspdlog-dev libnetcdf-dev libfast-float-dev libsqlitecpp-dev
   libtbb-dev libboost-dev liberfa-dev ca-certificates
 )
-# Tests, their coverage, benches, validation.
+# Tests, benches, validation.
 tests=(
   libgtest-dev libgmock-dev librapidcheck-dev libbenchmark-dev
   chromium-headless-shell
-  gcovr python3 python3-pytest python3-xarray python3-h5netcdf python3-jsonschema
+  valgrind python3 python3-pytest python3-xarray python3-h5netcdf python3-jsonschema
 )
 docs=(doxygen)
-# The program, and the fixtures of its tests, under libFuzzer.
-fuzz=(clang libclang-rt-14-dev libgtest-dev python3)
-lint=(git ca-certificates python3 python3-venv)
+# ARM Cortex-M7 without an operating system, emulated: a short flight is among the tests.
+flight=(gcc-arm-none-eabi libnewlib-arm-none-eabi libstdc++-arm-none-eabi-newlib qemu-system-arm)
+# The further targets of `make flight`.
+targets=(g++-s390x-linux-gnu g++-riscv64-linux-gnu g++-multilib-sparc64-linux-gnu qemu-user)
+# Program and tests under sanitizers, the coverage of core, libFuzzer.
+sanitizers=(clang-16 libclang-rt-16-dev llvm-16)
+lint=(git ca-certificates cppcheck python3 python3-venv)
 
 packages=()
-for name in ${*:-program tests lint}; do
+for name in ${*:-program tests sanitizers flight lint}; do
   case $name in
-    program|tests|lint|docs|fuzz) declare -n members=$name && packages+=("${members[@]}") ;;
-    *) echo "setup: no group \"$name\"; there are program, tests, lint, docs, fuzz" >&2; exit 2 ;;
+    program|tests|sanitizers|flight|targets|lint|docs) declare -n members=$name && packages+=("${members[@]}") ;;
+    *) echo "setup: no group \"$name\"; there are program, tests, sanitizers, flight, targets, lint, docs" >&2; exit 2 ;;
   esac
   if [ "$name" = program ]; then program_wanted=yes; fi
 done
