@@ -163,6 +163,7 @@ outside_sigma = "0rad/s"
 """
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("period, told, evidence", [
     ("1s", ["gyro-samples-far-apart"], "sampled every 1 s"),
     ("125ms", [], ""),
@@ -239,6 +240,7 @@ def test_navigation_online_improves_with_each_correction(tmp_path):
     assert all(s["max_total_rad"] < 20 * ARCSECOND for s in stretches[2:])
 
 
+@pytest.mark.long
 def test_navigation_by_a_calibration_is_good_from_the_start(calibrated, tmp_path):
     out, _ = calibrated
     evaluation = navigate_and_evaluate(tmp_path, "--calibration", out / "calibration.json")
@@ -256,6 +258,7 @@ def test_navigation_without_corrections_and_with_each_fix(calibrated, tmp_path):
     assert each["per_90_min"][-1]["max_total_rad"] < 30 * ARCSECOND
 
 
+@pytest.mark.long
 def test_a_calibration_of_another_start_up_is_not_to_be_used(calibrated, tmp_path):
     out, _ = calibrated
     calibration = json.loads((out / "calibration.json").read_text())
@@ -313,6 +316,7 @@ def test_examples_simulate_and_calibrate(scenario, tmp_path):
     assert run("--quiet", "calibrate", tmp_path / "pass.nc", "-o", tmp_path / "out").returncode in (TRUSTWORTHY, DO_NOT_USE)
 
 
+@pytest.mark.long
 def test_the_papers_example_says_the_defaults(tmp_path):
     (tmp_path / "empty.toml").write_text("")
     for name, scenario in (("empty", tmp_path / "empty.toml"), ("paper", ROOT / "examples" / "paper.toml")):
@@ -410,6 +414,7 @@ def test_passes_of_one_start_up_are_combined_in_the_order_of_time(start_ups):
         assert all(both < one for both, one in zip(sigmas(combined), sigmas(alone)))
 
 
+@pytest.mark.long
 def test_passes_of_two_start_ups_are_not_to_be_used_together(start_ups, tmp_path):
     directory, _ = start_ups
     result = run("calibrate", directory / "first.nc", directory / "third", "-o", tmp_path / "out", "--config", directory / "told.toml")
@@ -714,6 +719,7 @@ def test_observe_finds_nothing_missing_in_a_pass_with_slews(observe):
     assert "Unobservable" not in result.stdout
 
 
+@pytest.mark.long
 def test_advice_can_be_pasted_and_is_confirmed(observe):
     result = observe("--advise", "--slews", "1", "--manoeuvre-time", "8min", "--max-angle", "20deg", "--max-rate", "0.4deg/s",
                      "--confirm", "2")

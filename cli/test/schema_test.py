@@ -196,6 +196,7 @@ def edits(text):
     yield "not_a_key = 1\n" + text
 
 
+@pytest.mark.long  # the readers are fuzzed under the sanitizers
 def test_unknown_keys_and_wrong_types_are_refused_by_schema_and_reader(whole, flown):
     name, text = whole
     tried = 0
