@@ -54,6 +54,7 @@ Trial::Trial(const Pass& pass, const Screened& screened, const CalibrationOption
   PassSolution first = first_solution(problem_, screened);
   if (options.drift_field) {
     field_.emplace(problem_.layout());
+    problem_.use(modes_of(problem_, first, *field_));
     found_ = most_likely(problem_, std::move(first), kOneIteration);
     first = found_.solution;
   }
@@ -65,7 +66,7 @@ void Trial::fit(PassSolution first) {
     spectrum_ =
         most_likely_spectrum(*field_, field_information(found_.linear, problem_.setup().noise()), spectrum_.log_rms);
     Prior prior = problem_.setup().prior;
-    put_sigma(problem_.layout(), *field_, field_->sigma(spectrum_.log_rms), prior);
+    put_sigma(problem_.setup().layout(), *field_, field_->sigma(spectrum_.log_rms), prior);
     problem_.set_prior(std::move(prior));
   }
   found_ = {};  // long: one at a time
@@ -87,7 +88,7 @@ std::optional<FieldPrior> Trial::field_prior() const {
     return std::nullopt;
   }
   const FieldInformation information = field_information(found_.linear, problem_.setup().noise());
-  return ground::field_prior(problem_.layout(), *field_, information,
+  return ground::field_prior(problem_, *field_, information,
                              most_likely_spectrum(*field_, information, spectrum_.log_rms));
 }
 
@@ -100,7 +101,7 @@ double Trial::log_evidence(FurtherState state) const {
   for (const ParameterId& parameter : further_parameters(layout)) {
     if (parameter.is_further(state)) {
       rows.push_back(state_of(layout, parameter));
-      values.push_back(value_of(layout, found_.solution.gyros, found_.solution.shared, parameter));
+      values.push_back(value_of(setup.layout, found_.solution.gyros, found_.solution.shared, parameter));
       sigmas.push_back(prior_sigma_of_further_state(setup, state_of(setup.layout, parameter)));
     }
   }
