@@ -5,6 +5,7 @@
 #include <CLI/CLI.hpp>
 #include <optional>
 #include <string>
+#include <span>
 #include <string_view>
 
 namespace trihedron::cli {

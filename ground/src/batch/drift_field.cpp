@@ -134,16 +134,14 @@ VectorXd FieldMembers::sigma(const VectorXd& log_rms) const {
   return of_rms_.cwiseProduct(VectorXd(log_rms.array().exp())(group_of_));
 }
 
-DriftModes modes_of(const PassProblem& problem, const PassSolution& solution, const FieldMembers& members) {
-  // A mode of drift as large as this in each group, larger than is known of any rotor's, whose effect on all fixes
-  // together is less than this part of their noise cannot be seen and does not matter.
-  constexpr double kLargestRms_rad_s = 3e-7;
-  constexpr double kLeastEffect = 0.1;
+DriftModes modes_of(const PassProblem& problem, const PassSolution& solution, const FieldMembers& members,
+                    const VectorXd& log_rms) {
+  // What moves all fixes together by less than this part of their noise cannot be seen and does not matter.
+  constexpr double kLeastEffect = 0.3;
   const PassSetup& setup = problem.setup();
   const Index size = members.of_one_gyro();
-  const VectorXd unit =
-      members.sigma(VectorXd::Constant(static_cast<Index>(members.groups().size()), std::log(kLargestRms_rad_s)))
-          .head(size);
+  const VectorXd units = members.sigma(log_rms);
+  const auto unit = [&](int k) { return units.segment(k * size, size).asDiagonal(); };
   const auto arcs = static_cast<Index>(problem.arcs());
   const double noise_rad = setup.on_board.star_trackers[0].noise_rad.minCoeff() /
                            std::sqrt(static_cast<double>(problem.fixes()) / static_cast<double>(arcs));
@@ -157,7 +155,7 @@ DriftModes modes_of(const PassProblem& problem, const PassSolution& solution, co
     for (int k = 0; k < setup.on_board.layout.gyros; ++k) {
       turned[k].middleRows<3>(row) = turned[k].middleRows<3>(row - 3) +
                                      moment.since[k].by_drift.first(Layout::kEq1 + static_cast<int>(size)).rightCols(size) *
-                                         unit.asDiagonal() / noise_rad;
+                                         unit(k) / noise_rad;
     }
   });
   const std::vector<Eigen::BDCSVD<MatrixXd>> found =
@@ -171,8 +169,8 @@ DriftModes modes_of(const PassProblem& problem, const PassSolution& solution, co
   DriftModes modes;
   for (int k = 0; k < setup.on_board.layout.gyros; ++k) {
     const MatrixXd directions = found[static_cast<std::size_t>(k)].matrixV().leftCols(count);
-    modes.gyros[k].coefficients = unit.asDiagonal() * directions;
-    modes.gyros[k].amplitudes = directions.transpose() * unit.cwiseInverse().asDiagonal();
+    modes.gyros[k].coefficients = unit(k) * directions;
+    modes.gyros[k].amplitudes = directions.transpose() * unit(k).inverse();
   }
   return modes;
 }

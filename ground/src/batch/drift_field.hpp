@@ -42,9 +42,10 @@ class FieldMembers {
   Eigen::VectorXd of_rms_;  ///< 1-sigma of each member over the root mean square of its group
 };
 
-/// The combinations of the members that a pass can show. `solution`: near enough to tell how the gyros moved.
-[[nodiscard]] DriftModes modes_of(const PassProblem& problem, const PassSolution& solution,
-                                  const FieldMembers& members);
+/// The combinations of the members that a pass can show where each group has drift of up to this root mean square, ln of
+/// rad/s. `solution`: near enough to tell how the gyros moved.
+[[nodiscard]] DriftModes modes_of(const PassProblem& problem, const PassSolution& solution, const FieldMembers& members,
+                                  const Eigen::VectorXd& log_rms);
 
 /// What a pass says of the members when nothing is known of them before, all other states eliminated: R a = y + unit
 /// noise, a their amplitudes, rad/s.
