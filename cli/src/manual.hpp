@@ -4,8 +4,8 @@
 
 #include <CLI/CLI.hpp>
 #include <optional>
-#include <string>
 #include <span>
+#include <string>
 #include <string_view>
 
 namespace trihedron::cli {

@@ -43,7 +43,6 @@ BatchResult most_likely(const PassProblem& problem, PassSolution first, double c
     result.linear = problem.linearise(result.before);
     result.errors = solved([&] { return smooth(result.linear.prior, result.linear.prior_y, result.linear.stages); });
     problem.correct(result.errors, result.solution);
-    std::fprintf(stderr, "iteration %d outside %g kappa %g step %g size %d\n", result.iterations, result.solution.gyros[0].drift_rad_s.tail(100).cwiseAbs().maxCoeff(), result.solution.gyros[0].drift_rad_s.head(7).cwiseAbs().maxCoeff(), step_of_constants(problem.layout(), result.errors), problem.layout().size());
     result.converged = step_of_constants(problem.layout(), result.errors) < converged;
   }
   return result;

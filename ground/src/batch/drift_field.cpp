@@ -153,9 +153,9 @@ DriftModes modes_of(const PassProblem& problem, const PassSolution& solution, co
   problem.go_over_arcs(solution, [&](const PassProblem::Moment& moment) {
     const auto row = 3 * static_cast<Index>(moment.arc + 1);
     for (int k = 0; k < setup.on_board.layout.gyros; ++k) {
-      turned[k].middleRows<3>(row) = turned[k].middleRows<3>(row - 3) +
-                                     moment.since[k].by_drift.first(Layout::kEq1 + static_cast<int>(size)).rightCols(size) *
-                                         unit(k) / noise_rad;
+      turned[k].middleRows<3>(row) =
+          turned[k].middleRows<3>(row - 3) +
+          moment.since[k].by_drift.first(Layout::kEq1 + static_cast<int>(size)).rightCols(size) * unit(k) / noise_rad;
     }
   });
   const std::vector<Eigen::BDCSVD<MatrixXd>> found =

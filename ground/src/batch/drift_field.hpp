@@ -42,8 +42,8 @@ class FieldMembers {
   Eigen::VectorXd of_rms_;  ///< 1-sigma of each member over the root mean square of its group
 };
 
-/// The combinations of the members that a pass can show where each group has drift of up to this root mean square, ln of
-/// rad/s. `solution`: near enough to tell how the gyros moved.
+/// The combinations of the members that a pass can show where each group has drift of up to this root mean square, ln
+/// of rad/s. `solution`: near enough to tell how the gyros moved.
 [[nodiscard]] DriftModes modes_of(const PassProblem& problem, const PassSolution& solution, const FieldMembers& members,
                                   const Eigen::VectorXd& log_rms);
 
@@ -52,12 +52,13 @@ class FieldMembers {
 struct FieldInformation {
   Eigen::MatrixXd R;  ///< a row for each mode
   Eigen::VectorXd y;
-  double log_likelihood = 0;          ///< of what the members have no part in, up to a constant of the pass
+  double log_likelihood = 0;  ///< of what the members have no part in, up to a constant of the pass
   /// How the estimates of the other constants, in their order, follow those of the members.
   Eigen::MatrixXd others_by_members;
 };
 
-/// The problem has modes. `linear`: the problem linearised at the solution, also after gather_constants(); `noise`: the process noise.
+/// The problem has modes. `linear`: the problem linearised at the solution, also after gather_constants(); `noise`: the
+/// process noise.
 [[nodiscard]] FieldInformation information_on_field(const PassProblem& problem, const PassSolution& solution,
                                                     const PassProblem::Linear& linear, const ProcessNoise& noise,
                                                     const FieldMembers& members);

@@ -90,6 +90,20 @@ class FixMerger {
   double square_ = 0;
 };
 
+/// Adds the rows of a fix, whitened, with the weight that its misfit leaves it: beyond the gate its influence falls
+/// with the third power. `gate`: of its NIS. Returns the part of the cost that the rows do not contain.
+double add_fix(PassProblem::FixRows rows, const ScreenedPass::Fix& fix, double gate, FixMerger& nearby) {
+  if (rows.y.size() == 0) {
+    return 0;
+  }
+  const Eigen::LLT<MatrixXd> root(rows.R);
+  root.matrixL().solveInPlace(rows.H);
+  root.matrixL().solveInPlace(rows.y);
+  const double nis = rows.y.squaredNorm();
+  nearby.add(fix, rows, nis > gate ? gate / nis : 1);
+  return nis > gate ? 2 * gate * (1 - gate / nis) : 0;
+}
+
 /// Small rotation, across `from`, that turns it into `to`.
 Vector3d turn(const Vector3d& from, const Vector3d& to) { return from.cross(to); }
 
@@ -212,8 +226,7 @@ MatrixXd PassProblem::by_states_of_arc(const Moment& moment, Rows rows) const {
   by_states.middleCols(layout_.wandering(0), moving) = rows.middleCols(on_board.wandering(0), moving);
   for (int k = 0; k < gyros_; ++k) {
     by_states.middleCols<Layout::kEq1>(layout_.drift(k)) = rows.middleCols<Layout::kEq1>(on_board.drift(k));
-    const auto outside =
-        rows.middleCols(on_board.drift(k) + Layout::kEq1, on_board.drift_size() - Layout::kEq1);
+    const auto outside = rows.middleCols(on_board.drift(k) + Layout::kEq1, on_board.drift_size() - Layout::kEq1);
     auto its = by_states.middleCols(layout_.drift(k) + Layout::kEq1, layout_.drift_size() - Layout::kEq1);
     if (modes_) {
       its = outside * modes_->gyros[k].coefficients;
@@ -244,9 +257,8 @@ PassSolution PassProblem::start(const Gyros& gyros) const {
     const Vector3d seen = first.used[k] ? h_c[k] : gyros[k].C_c_b.col(0);  // anywhere
     solution.arcs[0].h_in[k] = (first.fix.q_in_c.normalized() * seen).normalized();
   }
-  go_over_arcs(solution, [&](const Moment& moment) {
-    solution.arcs[moment.arc + 1].h_in = momenta(moment.gyros, gyros_);
-  });
+  go_over_arcs(solution,
+               [&](const Moment& moment) { solution.arcs[moment.arc + 1].h_in = momenta(moment.gyros, gyros_); });
   return solution;
 }
 
@@ -316,10 +328,13 @@ PassProblem::FixRows PassProblem::compare(const PassSolution& solution, const Mo
   return rows;
 }
 
-bool PassProblem::is_outlier(const FixRows& rows) const {
-  return rows.y.dot(rows.R.llt().solve(rows.y)) >
-         gate_of_freedom(std::max(static_cast<int>(rows.y.size()), 1), setup_.on_board.gate_nis);
+double PassProblem::FixRows::nis() const { return y.dot(R.llt().solve(y)); }
+
+double PassProblem::gate_of(const FixRows& rows) const {
+  return gate_of_freedom(std::max(static_cast<int>(rows.y.size()), 1), setup_.on_board.gate_nis);
 }
+
+bool PassProblem::is_outlier(const FixRows& rows) const { return rows.nis() > gate_of(rows); }
 
 MatrixXd PassProblem::prior_covariance() const {
   if (!modes_) {
@@ -424,68 +439,62 @@ void PassProblem::put_noise(const PassSolution& solution, const ProcessNoise& no
   stage.A_inverse = A.inverse();
 }
 
+double PassProblem::scale_of_misfits(const PassSolution& solution) const {
+  constexpr double kMedianOfFour = 0.84;  // of χ²/n; nearer to 1 for more
+  std::vector<double> nis_per_component;
+  Moment moment;
+  double unused = 0;
+  for (std::size_t arc = 0; arc < arcs_.size(); ++arc) {
+    std::size_t i = arcs_[arc].begin;
+    for (begin_arc(solution, arc, moment); i + 1 < arcs_[arc].end && nodes_[i].fix == nullptr; ++i) {
+      step(nodes_[i], nodes_[i + 1], moment, unused);
+    }
+    moment.fix = nodes_[i].fix;
+    const FixRows rows = moment.fix != nullptr ? compare(solution, moment) : FixRows{};
+    if (rows.y.size() > 0) {
+      nis_per_component.push_back(rows.nis() / static_cast<double>(rows.y.size()));
+    }
+  }
+  if (nis_per_component.empty()) {
+    return 1;
+  }
+  const auto middle = nis_per_component.begin() + static_cast<std::ptrdiff_t>(nis_per_component.size() / 2);
+  std::nth_element(nis_per_component.begin(), middle, nis_per_component.end());
+  return std::max(*middle / kMedianOfFour, 1.0);
+}
+
 PassProblem::Linear PassProblem::linearise(const PassSolution& solution) const {
+  // Far from the solution all fixes have large misfits: outliers are those far above the median.
+  const double scale = scale_of_misfits(solution);
   Linear linear;
   add_prior(solution, linear);
   linear.stages.resize(arcs_.size());
   Moment moment;
-  std::vector<std::pair<const ScreenedPass::Fix*, FixRows>> fixes;
-  std::vector<double> nis_per_component;
-  std::vector<std::size_t> fixes_until;
   for (std::size_t arc = 0; arc < arcs_.size(); ++arc) {
     check_stop();
     begin_arc(solution, arc, moment);
     double extra_variance_rad2 = 0;
+    FixMerger nearby(setup_.fixes_together);
     for (std::size_t i = arcs_[arc].begin; i < arcs_[arc].end; ++i) {
       moment.fix = nodes_[i].fix;
       if (moment.fix != nullptr) {
-        FixRows& rows = fixes.emplace_back(moment.fix, compare(solution, moment)).second;
-        const Eigen::LLT<MatrixXd> root(rows.R);
-        root.matrixL().solveInPlace(rows.H);
-        root.matrixL().solveInPlace(rows.y);
-        if (rows.y.size() > 0) {
-          nis_per_component.push_back(rows.y.squaredNorm() / static_cast<double>(rows.y.size()));
-        }
+        FixRows rows = compare(solution, moment);
+        const double gate = scale * gate_of(rows);
+        linear.cost_outside_rows += add_fix(std::move(rows), *moment.fix, gate, nearby);
       }
       if (i + 1 < nodes_.size()) {
         step(nodes_[i], nodes_[i + 1], moment, extra_variance_rad2);
       }
     }
-    fixes_until.push_back(fixes.size());
+    SmootherStage& stage = linear.stages[arc];
+    linear.cost_outside_rows += nearby.put_into(stage, layout_.size());
+    compress(stage);
     if (arc + 1 < arcs_.size()) {
       end_arc(solution, moment, extra_variance_rad2, linear);
     } else {
-      linear.stages[arc].m.setZero(layout_.dynamic());
+      stage.m.setZero(layout_.dynamic());
     }
   }
-  // Far from the solution all fixes have large misfits: outliers are those far above the median.
-  constexpr double kMedianOfFour = 0.84;  // of χ²/n; nearer to 1 for more
-  double scale = 1;
-  std::vector<double> sorted = nis_per_component;
-  if (!sorted.empty()) {
-    const auto middle = sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2);
-    std::nth_element(sorted.begin(), middle, sorted.end());
-    scale = std::max(*middle / kMedianOfFour, 1.0);
-  }
-  std::size_t fix = 0;
-  for (std::size_t arc = 0; arc < arcs_.size(); ++arc) {
-    check_stop();
-    FixMerger nearby(setup_.fixes_together);
-    for (; fix < fixes_until[arc]; ++fix) {
-      auto& [its, rows] = fixes[fix];
-      if (rows.y.size() == 0) {
-        continue;
-      }
-      // Its influence falls with the third power of the misfit beyond the gate.
-      const double nis = rows.y.squaredNorm();
-      const double gate = scale * gate_of_freedom(static_cast<int>(rows.y.size()), setup_.on_board.gate_nis);
-      linear.cost_outside_rows += nis > gate ? 2 * gate * (1 - gate / nis) : 0;
-      nearby.add(*its, rows, nis > gate ? gate / nis : 1);
-      rows = {};  // most of the memory that this takes
-    }
-    linear.cost_outside_rows += nearby.put_into(linear.stages[arc], layout_.size());
-  }
-  std::ranges::for_each(linear.stages, compress);
   put_noise(solution, setup_.noise(), linear.prior, linear.prior_y);
   for (std::size_t arc = 0; arc < linear.ends.size(); ++arc) {
     put_noise(solution, setup_.noise(), arc, linear.ends[arc], linear.stages[arc]);

@@ -143,6 +143,7 @@ class PassProblem {
     Eigen::MatrixXd H;
     Eigen::VectorXd y;
     Eigen::MatrixXd R;
+    [[nodiscard]] double nis() const;
   };
   [[nodiscard]] FixRows compare(const PassSolution& solution, const Moment& moment) const;
 
@@ -176,6 +177,9 @@ class PassProblem {
     std::size_t end = 0;  ///< the first node of the next arc, which this one ends at, or that after the last
   };
 
+  [[nodiscard]] double gate_of(const FixRows& rows) const;
+  /// How far the misfits are beyond their noise as a rule, by the first fix of each arc: the square of it, 1 or more.
+  [[nodiscard]] double scale_of_misfits(const PassSolution& solution) const;
   [[nodiscard]] Reading reading_at(const Node& node) const;
   void step(const Node& from_node, const Node& to_node, Moment& moment, double& extra_variance_rad2) const;
   void begin_arc(const PassSolution& solution, std::size_t arc, Moment& moment) const;

@@ -39,7 +39,7 @@ std::vector<DriftModelId> models_up_to(const DriftModelId& model) {
 /// Convergence limit of the constants in sigmas: enough for a decision.
 constexpr double kNearEnough = 0.2;
 /// Drift in each group that the modes of a field are for at first: more than rotors have that eq. (1) describes.
-constexpr double kFirstFieldLevel_rad_s = 1e-9;
+constexpr double kFirstFieldLevel_rad_s = 3e-10;
 /// No step is longer.
 constexpr double kOneIteration = std::numeric_limits<double>::infinity();
 
@@ -79,9 +79,9 @@ PassSolution Trial::with_likely_field(PassSolution first) {
   const double room = std::log(3.0);
   const double more_than_enough = 2 * room;
   if (!problem_.modes()) {
-    use_modes(Eigen::VectorXd::Constant(static_cast<Eigen::Index>(field_->groups().size()),
-                                        std::log(kFirstFieldLevel_rad_s)),
-              first);
+    use_modes(
+        Eigen::VectorXd::Constant(static_cast<Eigen::Index>(field_->groups().size()), std::log(kFirstFieldLevel_rad_s)),
+        first);
   }
   for (int round = 0; round < kMostRounds; ++round) {
     if (found_.linear.stages.empty()) {
