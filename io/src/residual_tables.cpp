@@ -1,6 +1,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <string>
 #include <utility>
 
@@ -51,6 +52,9 @@ Table parameter_table(const CalibrationRun& run) {
     for (std::size_t row = 0; row < run.parameters.t.size(); ++row) {
       value.push_back(run.parameters.value[row][i]);
       sigma.push_back(run.parameters.sigma[row][i]);
+    }
+    if (!value.empty() && std::ranges::all_of(value, [](double its) { return std::isnan(its); })) {
+      continue;  // found from the whole pass, and not followed along it
     }
     parameters.columns.push_back({name, unit, "estimate of " + name_of(state) + " after the fix", std::move(value)});
     parameters.columns.push_back({name + "_sigma", unit, "its 1-sigma", std::move(sigma)});

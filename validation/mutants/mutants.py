@@ -3,8 +3,8 @@
 
 All edits of edits.toml are compiled into one build of core and its tests: each function that has some stands there once for each of them, and
 the number in the variable TRIHEDRON_MUTANT says which one runs. An edit outside of functions has a build of its own. Then the tests run
-with each edit until one fails, the quick ones first. Outcomes go into the file OUTCOMES one by one, so that a run goes on where it was
-interrupted; they hold for the sources they were found with. Exit status 0: all edits are caught but those that need not be.
+with each edit until one fails: first the one that failed with it in an earlier run, then the quick ones. Outcomes go into the file OUTCOMES
+one by one, so that a run goes on where it was interrupted; they hold for the sources they were found with. Exit status 0: all edits are caught but those that need not be.
 """
 import argparse
 import concurrent.futures
@@ -65,13 +65,14 @@ def digest(root=ROOT):
 
 
 class Outcomes:
-    """One line of JSON for each edit; those of other sources are left out."""
+    """One line of JSON for each edit; of those of other sources only the test that failed is remembered."""
 
     def __init__(self, file, sources):
-        self.file, self.sources, self.found = file, sources, {}
+        self.file, self.sources, self.found, self.failed_before = file, sources, {}, {}
         if file.exists():
             for line in file.read_text().splitlines():
                 its = json.loads(line)
+                self.failed_before[its["key"]] = its["by"].split(",")[0]
                 if its["sources"] == sources:
                     self.found[its["key"]] = its
 
@@ -194,8 +195,13 @@ class Bench:
     def directory(self, program):
         return next(its for its in self.build.rglob(program) if its.is_file())
 
-    def measure(self):
-        """Runs all tests without an edit, and plans by their times: (program, tests, longest time) in the order in which they are run."""
+    def measure(self, sources):
+        """Runs all tests without an edit, and plans by their times: (program, tests, longest time) in the order in which they are run. The
+        plan for these sources is kept beside the build."""
+        kept = self.build.parent / f"plan-{sources}.json"
+        if kept.exists():
+            self.plan = json.loads(kept.read_text())
+            return
         quick, slow = [], []
         for program in PROGRAMS:
             with tempfile.TemporaryDirectory() as folder:
@@ -210,10 +216,12 @@ class Bench:
             slow += [(time_s, program, [name]) for name, time_s in times.items() if time_s >= QUICK_S]
         self.plan = [(program, tests, LONGEST_OF_USUAL * time_s + LONGEST_S)
                      for time_s, program, tests in sorted(quick) + sorted(slow) if tests]
+        kept.write_text(json.dumps(self.plan))
 
-    def first_failure(self, number):
-        """The name of a test that fails with this edit; nothing where all pass."""
-        for program, tests, limit_s in self.plan:
+    def first_failure(self, number, likely):
+        """The name of a test that fails with this edit; nothing where all pass. `likely`: of a test that is run first."""
+        first = [(program, [likely], limit_s) for program, tests, limit_s in self.plan if likely in tests]
+        for program, tests, limit_s in first + self.plan:
             if failure := self.run(program, tests, number, limit_s):
                 return failure
         return None
@@ -273,14 +281,14 @@ def try_all(left, build, jobs, outcomes):
         print(f"{outcome:18} {edit.file}: {edit.wrong}" + (f" ({by})" if by else ""), flush=True)
 
     def try_one(bench, number, edit):
-        failure = bench.first_failure(number)
+        failure = bench.first_failure(number, outcomes.failed_before.get(edit.key()))
         note(edit, *((CAUGHT, failure) if failure else (SURVIVED, "")))
 
     bench = Bench(build / "all", jobs)
     outside = bench.prepare(list(enumerate(edits(), 1)))
     if output := bench.built():
         sys.exit(f"mutants: core does not build with all edits\n{output[-4000:]}")
-    bench.measure()
+    bench.measure(outcomes.sources)
     with concurrent.futures.ThreadPoolExecutor(jobs) as pool:
         for _ in pool.map(lambda its: try_one(bench, *its), [its for its in left if its[0] not in outside]):
             pass

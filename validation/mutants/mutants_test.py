@@ -37,7 +37,8 @@ def test_outcomes_are_kept_for_the_sources_they_were_found_with(tmp_path):
     edit = mutants.Edit("core/src/a.cpp", "a", "b", "a factor")
     mutants.Outcomes(tmp_path / "outcomes", "these").add(edit, mutants.CAUGHT, "core.A.B")
     assert edit.key() in mutants.Outcomes(tmp_path / "outcomes", "these").found
-    assert mutants.Outcomes(tmp_path / "outcomes", "others").found == {}
+    others = mutants.Outcomes(tmp_path / "outcomes", "others")
+    assert others.found == {} and others.failed_before == {edit.key(): "core.A.B"}
 
 
 SOURCE = '''namespace a {

@@ -2,6 +2,7 @@
 
 #include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
+#include <Eigen/SVD>
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -44,14 +45,15 @@ MatrixXd prior_information(const std::vector<FieldMembers::Group>& groups) {
 
 /// The posterior of the amplitudes by one spectrum.
 struct Posterior {
-  VectorXd sigma;       ///< before, rad/s
-  VectorXd mean;        ///< in these
-  MatrixXd covariance;  ///< in these
+  VectorXd sigma;   ///< before, rad/s
+  VectorXd mean;    ///< in these
+  MatrixXd learnt;  ///< their covariance before, which is 1, less that after
   double log_likelihood = 0;
 
   [[nodiscard]] VectorXd amplitudes() const { return sigma.cwiseProduct(mean); }
   [[nodiscard]] MatrixXd covariance_of_amplitudes() const {
-    return sigma.asDiagonal() * covariance * sigma.asDiagonal();
+    const MatrixXd after = MatrixXd::Identity(sigma.size(), sigma.size()) - learnt;
+    return sigma.asDiagonal() * after * sigma.asDiagonal();
   }
 };
 
@@ -59,11 +61,7 @@ struct Posterior {
 class Posteriors {
  public:
   Posteriors(const FieldMembers& members, const FieldInformation& information)
-      : members_(members),
-        square_(information.R.transpose() * information.R),
-        seen_(information.R.transpose() * information.y),
-        outside_(information.log_likelihood - information.y.squaredNorm() / 2),
-        prior_(prior_information(members.groups())) {}
+      : members_(members), information_(information), prior_(prior_information(members.groups())) {}
 
   [[nodiscard]] const MatrixXd& prior() const { return prior_; }
   [[nodiscard]] static VectorXd apart(const VectorXd& log_rms) { return log_rms.array() - std::log(kMeanRms_rad_s); }
@@ -72,15 +70,18 @@ class Posteriors {
     check_stop();
     Posterior found;
     found.sigma = members_.sigma(log_rms);
-    MatrixXd information = found.sigma.asDiagonal() * square_ * found.sigma.asDiagonal();
-    information.diagonal().array() += 1;
-    const Eigen::LLT<MatrixXd> root(information);
-    const VectorXd seen = found.sigma.cwiseProduct(seen_);
-    found.mean = root.solve(seen);
-    found.covariance = root.solve(MatrixXd::Identity(seen.size(), seen.size()));
+    // y by its own covariance: there are fewer of it than of the members.
+    MatrixXd white = information_.R * found.sigma.asDiagonal();
+    MatrixXd covariance = white * white.transpose();
+    covariance.diagonal().array() += 1;
+    const Eigen::LLT<MatrixXd> root(covariance);
+    root.matrixL().solveInPlace(white);
+    const VectorXd y = root.matrixL().solve(information_.y);
+    found.mean = white.transpose() * y;
+    found.learnt = white.transpose() * white;
     const VectorXd apart_from_prior = apart(log_rms);
-    found.log_likelihood = outside_ - root.matrixLLT().diagonal().array().log().sum() + seen.dot(found.mean) / 2 -
-                           apart_from_prior.dot(prior_ * apart_from_prior) / 2;
+    found.log_likelihood = information_.log_likelihood - root.matrixLLT().diagonal().array().log().sum() -
+                           y.squaredNorm() / 2 - apart_from_prior.dot(prior_ * apart_from_prior) / 2;
     return found;
   }
 
@@ -91,19 +92,16 @@ class Posteriors {
     const std::vector<Index>& group = members_.group_of();
     for (Index i = 0; i < members_.size(); ++i) {
       const Index g = group[static_cast<std::size_t>(i)];
-      gradient(g) += at.mean(i) * at.mean(i) + at.covariance(i, i) - 1;
+      gradient(g) += at.mean(i) * at.mean(i) - at.learnt(i, i);
       for (Index j = 0; j < members_.size(); ++j) {
-        const double learnt = (i == j ? 1 : 0) - at.covariance(i, j);
-        information(g, group[static_cast<std::size_t>(j)]) += 2 * learnt * learnt;
+        information(g, group[static_cast<std::size_t>(j)]) += 2 * at.learnt(i, j) * at.learnt(i, j);
       }
     }
   }
 
  private:
   const FieldMembers& members_;
-  MatrixXd square_;
-  VectorXd seen_;
-  double outside_;
+  const FieldInformation& information_;
   MatrixXd prior_;
 };
 
@@ -136,18 +134,62 @@ VectorXd FieldMembers::sigma(const VectorXd& log_rms) const {
   return of_rms_.cwiseProduct(VectorXd(log_rms.array().exp())(group_of_));
 }
 
+DriftModes modes_of(const PassProblem& problem, const PassSolution& solution, const FieldMembers& members,
+                    const VectorXd& log_rms) {
+  // What moves all fixes together by less than this part of their noise cannot be seen and does not matter.
+  constexpr double kLeastEffect = 0.3;
+  const PassSetup& setup = problem.setup();
+  const Index size = members.of_one_gyro();
+  const VectorXd units = members.sigma(log_rms);
+  const auto unit = [&](int k) { return units.segment(k * size, size).asDiagonal(); };
+  const auto arcs = static_cast<Index>(problem.arcs());
+  const double noise_rad = setup.on_board.star_trackers[0].noise_rad.minCoeff() /
+                           std::sqrt(static_cast<double>(problem.fixes()) / static_cast<double>(arcs));
+  // How far each member has turned the momenta until the end of each arc, in units of the noise of the fixes of one.
+  PerGyro<MatrixXd> turned;
+  for (int k = 0; k < setup.on_board.layout.gyros; ++k) {
+    turned[k].setZero(3 * arcs, size);
+  }
+  problem.go_over_arcs(solution, [&](const PassProblem::Moment& moment) {
+    const auto row = 3 * static_cast<Index>(moment.arc + 1);
+    for (int k = 0; k < setup.on_board.layout.gyros; ++k) {
+      turned[k].middleRows<3>(row) =
+          turned[k].middleRows<3>(row - 3) +
+          moment.since[k].by_drift.first(Layout::kEq1 + static_cast<int>(size)).rightCols(size) * unit(k) / noise_rad;
+    }
+  });
+  const std::vector<Eigen::BDCSVD<MatrixXd>> found =
+      on_all_cores(static_cast<std::size_t>(setup.on_board.layout.gyros), [&](std::size_t k) {
+        return Eigen::BDCSVD<MatrixXd>(triangle_of(turned[static_cast<int>(k)]), Eigen::ComputeFullV);
+      });
+  Index count = 1;
+  for (const auto& its : found) {
+    count = std::max<Index>(count, (its.singularValues().array() > kLeastEffect).count());
+  }
+  DriftModes modes;
+  for (int k = 0; k < setup.on_board.layout.gyros; ++k) {
+    const MatrixXd directions = found[static_cast<std::size_t>(k)].matrixV().leftCols(count);
+    modes.gyros[k].coefficients = unit(k) * directions;
+    modes.gyros[k].amplitudes = directions.transpose() * unit(k).inverse();
+  }
+  return modes;
+}
+
 FieldInformation information_on_field(const PassProblem& problem, const PassSolution& solution,
                                       const PassProblem::Linear& linear, const ProcessNoise& noise,
                                       const FieldMembers& members) {
   const Layout& layout = problem.layout();
   MatrixXd prior = linear.prior;
   VectorXd prior_y = linear.prior_y;
+  const DriftModes& modes = *problem.modes();
   problem.put_noise(solution, noise, prior, prior_y);
-  std::vector<bool> is_member(static_cast<std::size_t>(layout.size()), false);
-  for (const Index state : members.states()) {
-    prior.row(state).setZero();
-    prior_y(state) = 0;
-    is_member[static_cast<std::size_t>(state)] = true;
+  std::vector<bool> is_mode(static_cast<std::size_t>(layout.size()), false);
+  for (int k = 0; k < layout.gyros; ++k) {
+    for (Index state = layout.drift(k) + Layout::kEq1; state < layout.alignment(k); ++state) {
+      prior.row(state).setZero();
+      prior_y(state) = 0;
+      is_mode[static_cast<std::size_t>(state)] = true;
+    }
   }
   const ConstantsInformation found = eliminate_moving(prior, prior_y, linear.stages.size(), [&](std::size_t arc) {
     SmootherStage stage = linear.stages[arc];
@@ -157,38 +199,38 @@ FieldInformation information_on_field(const PassProblem& problem, const PassSolu
     return stage;
   });
 
-  FieldInformation information;
-  for (Index state = layout.dynamic(); state < layout.size(); ++state) {
-    if (!is_member[static_cast<std::size_t>(state)]) {
-      information.others.push_back(state);
-    }
-  }
-  const auto others = static_cast<Index>(information.others.size());
-  const Index size = members.size();
+  // The modes after all others.
+  const Index size = Index{layout.gyros} * layout.drift_modes;
+  const Index others = layout.constants() - size;
   const Index last = others + size;
   MatrixXd rows(last + 1, last + 1);
   rows.col(last) = found.triangle.col(last);
-  for (Index i = 0; i < others; ++i) {
-    rows.col(i) = found.triangle.col(information.others[static_cast<std::size_t>(i)] - layout.dynamic());
+  Index column = 0;
+  for (Index state = layout.dynamic(); state < layout.size(); ++state) {
+    if (!is_mode[static_cast<std::size_t>(state)]) {
+      rows.col(column++) = found.triangle.col(state - layout.dynamic());
+    }
   }
-  for (Index i = 0; i < size; ++i) {
-    const Index state = members.states()[static_cast<std::size_t>(i)];
-    const auto gyro = static_cast<int>(
-        members.groups()[static_cast<std::size_t>(members.group_of()[static_cast<std::size_t>(i)])].gyro);
-    rows.col(others + i) = found.triangle.col(state - layout.dynamic());
+  MatrixXd by_members = MatrixXd::Zero(size, members.size());
+  for (int k = 0; k < layout.gyros; ++k) {
+    const MatrixXd& amplitudes = modes.gyros[k].amplitudes;
+    const auto its = found.triangle.middleCols(layout.drift(k) + Layout::kEq1 - layout.dynamic(), layout.drift_modes);
+    rows.middleCols(others + k * layout.drift_modes, layout.drift_modes) = its;
     // From the error of the solution to the amplitude itself.
-    rows.col(last) += rows.col(others + i) * solution.gyros[gyro].drift_rad_s(state - layout.drift(gyro));
+    rows.col(last) += its * (amplitudes * solution.gyros[k].drift_rad_s.segment(Layout::kEq1, amplitudes.cols()));
+    by_members.block(k * amplitudes.rows(), k * amplitudes.cols(), amplitudes.rows(), amplitudes.cols()) = amplitudes;
   }
   const MatrixXd triangle = triangle_of(rows);
-  information.R = triangle.block(others, others, size, size);
+  FieldInformation information;
+  information.R = triangle.block(others, others, size, size) * by_members;
   information.y = triangle.block(others, last, size, 1);
   const auto own = triangle.topLeftCorner(others, others);
   information.others_by_members =
-      -own.triangularView<Eigen::Upper>().solve(MatrixXd(triangle.block(0, others, others, size)));
+      -own.triangularView<Eigen::Upper>().solve(MatrixXd(triangle.block(0, others, others, size))) * by_members;
   // Of the directions at the start nothing is known before; the rest of the prior is triangular.
   double log_prior_root = 0;
   for (Index state = 2L * layout.gyros; state < layout.size(); ++state) {
-    log_prior_root += is_member[static_cast<std::size_t>(state)] ? 0 : std::log(std::abs(prior(state, state)));
+    log_prior_root += is_mode[static_cast<std::size_t>(state)] ? 0 : std::log(std::abs(prior(state, state)));
   }
   const double residual = triangle(last, last);
   information.log_likelihood = log_prior_root - found.log_root_determinant - own.diagonal().array().abs().log().sum() -
@@ -262,17 +304,25 @@ MatrixXd covariance_of_spectrum(const FieldMembers& members, const FieldInformat
   return added;
 }
 
-FieldPrior field_prior(const Layout& layout, const FieldMembers& members, const FieldInformation& information,
+FieldPrior field_prior(const PassProblem& problem, const FieldMembers& members, const FieldInformation& information,
                        const FieldSpectrum& spectrum) {
+  const Layout layout = problem.setup().layout();
   FieldPrior prior;
+  prior.modes = *problem.modes();
   prior.sigma_rad_s = members.sigma(spectrum.log_rms);
   const MatrixXd added = covariance_of_spectrum(members, information, spectrum);
-  MatrixXd by_members = MatrixXd::Zero(layout.constants(), members.size());
+  MatrixXd by_members = MatrixXd::Zero(layout.parameters(), members.size());
+  std::vector<bool> is_member(static_cast<std::size_t>(layout.parameters()), false);
   for (Index i = 0; i < members.size(); ++i) {
-    by_members(members.states()[static_cast<std::size_t>(i)] - layout.dynamic(), i) = 1;
+    const Index row = members.states()[static_cast<std::size_t>(i)] - layout.drift(0);
+    is_member[static_cast<std::size_t>(row)] = true;
+    by_members(row, i) = 1;
   }
-  for (std::size_t i = 0; i < information.others.size(); ++i) {
-    by_members.row(information.others[i] - layout.dynamic()) = information.others_by_members.row(static_cast<Index>(i));
+  Index other = 0;
+  for (Index row = 0; row < layout.parameters(); ++row) {
+    if (!is_member[static_cast<std::size_t>(row)]) {
+      by_members.row(row) = information.others_by_members.row(other++);
+    }
   }
   prior.more_covariance = by_members * added * by_members.transpose();
   const MatrixXd covariance =

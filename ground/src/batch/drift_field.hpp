@@ -28,6 +28,9 @@ class FieldMembers {
   [[nodiscard]] const std::vector<Eigen::Index>& group_of() const { return group_of_; }
   [[nodiscard]] Eigen::Index size() const { return static_cast<Eigen::Index>(states_.size()); }
 
+  /// Those of one gyro, of which each has as many.
+  [[nodiscard]] Eigen::Index of_one_gyro() const { return size() / (groups_.back().gyro + 1); }
+
   /// 1-sigma of each member, rad/s, with which the members of each group make drift of this root mean square over the
   /// sphere, rad/s; ln of that, by group.
   [[nodiscard]] Eigen::VectorXd sigma(const Eigen::VectorXd& log_rms) const;
@@ -39,17 +42,23 @@ class FieldMembers {
   Eigen::VectorXd of_rms_;  ///< 1-sigma of each member over the root mean square of its group
 };
 
+/// The combinations of the members that a pass can show where each group has drift of up to this root mean square, ln
+/// of rad/s. `solution`: near enough to tell how the gyros moved.
+[[nodiscard]] DriftModes modes_of(const PassProblem& problem, const PassSolution& solution, const FieldMembers& members,
+                                  const Eigen::VectorXd& log_rms);
+
 /// What a pass says of the members when nothing is known of them before, all other states eliminated: R a = y + unit
 /// noise, a their amplitudes, rad/s.
 struct FieldInformation {
-  Eigen::MatrixXd R;
+  Eigen::MatrixXd R;  ///< a row for each mode
   Eigen::VectorXd y;
-  double log_likelihood = 0;          ///< of what the members have no part in, up to a constant of the pass
-  Eigen::MatrixXd others_by_members;  ///< how the estimates of the other constants follow those of the members
-  std::vector<Eigen::Index> others;   ///< which states these are
+  double log_likelihood = 0;  ///< of what the members have no part in, up to a constant of the pass
+  /// How the estimates of the other constants, in their order, follow those of the members.
+  Eigen::MatrixXd others_by_members;
 };
 
-/// `linear`: the problem linearised at the solution, also after gather_constants(); `noise`: the process noise.
+/// The problem has modes. `linear`: the problem linearised at the solution, also after gather_constants(); `noise`: the
+/// process noise.
 [[nodiscard]] FieldInformation information_on_field(const PassProblem& problem, const PassSolution& solution,
                                                     const PassProblem::Linear& linear, const ProcessNoise& noise,
                                                     const FieldMembers& members);
@@ -73,13 +82,14 @@ struct FieldSpectrum {
 
 /// The prior of the drift field that a pass has determined.
 struct FieldPrior {
+  DriftModes modes;
   Eigen::VectorXd sigma_rad_s;      ///< of each member, in their order
-  Eigen::MatrixXd more_covariance;  ///< of all constants, for the uncertainty of the spectrum
+  Eigen::MatrixXd more_covariance;  ///< of κ and δ, for the uncertainty of the spectrum
   std::vector<DriftFieldLevel> levels;
 };
 
-/// As covariance_of_spectrum(), carried over to all constants.
-[[nodiscard]] FieldPrior field_prior(const Layout& layout, const FieldMembers& members,
+/// As covariance_of_spectrum(), carried over to κ and δ.
+[[nodiscard]] FieldPrior field_prior(const PassProblem& problem, const FieldMembers& members,
                                      const FieldInformation& information, const FieldSpectrum& spectrum);
 
 /// Sets the variances of the members in a prior that knows nothing else of them.

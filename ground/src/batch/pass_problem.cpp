@@ -90,6 +90,20 @@ class FixMerger {
   double square_ = 0;
 };
 
+/// Adds the rows of a fix, whitened, with the weight that its misfit leaves it: beyond the gate its influence falls
+/// with the third power. `gate`: of its NIS. Returns the part of the cost that the rows do not contain.
+double add_fix(PassProblem::FixRows rows, const ScreenedPass::Fix& fix, double gate, FixMerger& nearby) {
+  if (rows.y.size() == 0) {
+    return 0;
+  }
+  const Eigen::LLT<MatrixXd> root(rows.R);
+  root.matrixL().solveInPlace(rows.H);
+  root.matrixL().solveInPlace(rows.y);
+  const double nis = rows.y.squaredNorm();
+  nearby.add(fix, rows, nis > gate ? gate / nis : 1);
+  return nis > gate ? 2 * gate * (1 - gate / nis) : 0;
+}
+
 /// Small rotation, across `from`, that turns it into `to`.
 Vector3d turn(const Vector3d& from, const Vector3d& to) { return from.cross(to); }
 
@@ -100,7 +114,8 @@ PassProblem::PassProblem(const ScreenedPass& pass, PassSetup setup)
       layout_(setup_.layout()),
       drift_(layout_.drift_model, layout_.further),
       gyros_(layout_.gyros),
-      samples_(&pass.samples) {
+      samples_(&pass.samples),
+      fixes_(pass.fixes.size()) {
   const Time first = pass.fixes.front().fix.t;
   auto fix = pass.fixes.begin();
   Time taken = first;
@@ -144,7 +159,7 @@ void PassProblem::begin_arc(const PassSolution& solution, std::size_t arc, Momen
     Gyro& gyro = moment.gyros[k];
     gyro.h_in = solution.arcs[arc].h_in[k];
     if (layout_.further.wandering_drift) {
-      gyro.drift_rad_s.segment<3>(layout_.wandering_column()) = solution.arcs[arc].wandering_rad_s[k];
+      gyro.drift_rad_s.segment<3>(setup_.on_board.layout.wandering_column()) = solution.arcs[arc].wandering_rad_s[k];
     }
     moment.directions[k] = across(gyro.h_in);
   }
@@ -207,8 +222,21 @@ MatrixXd PassProblem::by_states_of_arc(const Moment& moment, Rows rows) const {
     by_states.middleCols<2>(layout_.direction(k)) =
         rows.middleCols<3>(on_board.direction(k)).lazyProduct(moment.directions[k]);
   }
-  const int rest = layout_.size() - layout_.direction(gyros_);
-  by_states.rightCols(rest) = rows.middleCols(on_board.direction(gyros_), rest);
+  const int moving = layout_.drift(0) - layout_.wandering(0);
+  by_states.middleCols(layout_.wandering(0), moving) = rows.middleCols(on_board.wandering(0), moving);
+  for (int k = 0; k < gyros_; ++k) {
+    by_states.middleCols<Layout::kEq1>(layout_.drift(k)) = rows.middleCols<Layout::kEq1>(on_board.drift(k));
+    const auto outside = rows.middleCols(on_board.drift(k) + Layout::kEq1, on_board.drift_size() - Layout::kEq1);
+    auto its = by_states.middleCols(layout_.drift(k) + Layout::kEq1, layout_.drift_size() - Layout::kEq1);
+    if (modes_) {
+      its = outside * modes_->gyros[k].coefficients;
+    } else {
+      its = outside;
+    }
+    by_states.middleCols<3>(layout_.alignment(k)) = rows.middleCols<3>(on_board.alignment(k));
+  }
+  const int rest = layout_.size() - layout_.readout(0);
+  by_states.rightCols(rest) = rows.middleCols(on_board.readout(0), rest);
   return by_states;
 }
 
@@ -229,18 +257,22 @@ PassSolution PassProblem::start(const Gyros& gyros) const {
     const Vector3d seen = first.used[k] ? h_c[k] : gyros[k].C_c_b.col(0);  // anywhere
     solution.arcs[0].h_in[k] = (first.fix.q_in_c.normalized() * seen).normalized();
   }
+  go_over_arcs(solution,
+               [&](const Moment& moment) { solution.arcs[moment.arc + 1].h_in = momenta(moment.gyros, gyros_); });
+  return solution;
+}
+
+void PassProblem::go_over_arcs(const PassSolution& solution, const std::function<void(const Moment&)>& at_end) const {
   Moment moment;
   double unused = 0;
-  for (std::size_t arc = 0; arc < arcs_.size(); ++arc) {
-    if (arc > 0) {
-      solution.arcs[arc].h_in = momenta(moment.gyros, gyros_);
-    }
+  for (std::size_t arc = 0; arc + 1 < arcs_.size(); ++arc) {
+    check_stop();
     begin_arc(solution, arc, moment);
-    for (std::size_t i = arcs_[arc].begin; i + 1 < nodes_.size() && i < arcs_[arc].end; ++i) {
+    for (std::size_t i = arcs_[arc].begin; i < arcs_[arc].end; ++i) {
       step(nodes_[i], nodes_[i + 1], moment, unused);
     }
+    at_end(moment);
   }
-  return solution;
 }
 
 void PassProblem::go_along(const PassSolution& solution, const std::function<void(const Moment&)>& visit) const {
@@ -296,14 +328,34 @@ PassProblem::FixRows PassProblem::compare(const PassSolution& solution, const Mo
   return rows;
 }
 
-bool PassProblem::is_outlier(const FixRows& rows) const {
-  return rows.y.dot(rows.R.llt().solve(rows.y)) >
-         gate_of_freedom(std::max(static_cast<int>(rows.y.size()), 1), setup_.on_board.gate_nis);
+double PassProblem::FixRows::nis() const { return y.dot(R.llt().solve(y)); }
+
+double PassProblem::gate_of(const FixRows& rows) const {
+  return gate_of_freedom(std::max(static_cast<int>(rows.y.size()), 1), setup_.on_board.gate_nis);
+}
+
+bool PassProblem::is_outlier(const FixRows& rows) const { return rows.nis() > gate_of(rows); }
+
+MatrixXd PassProblem::prior_covariance() const {
+  if (!modes_) {
+    return setup_.prior.covariance;
+  }
+  const Layout& on_board = setup_.on_board.layout;
+  MatrixXd by_coefficients = MatrixXd::Zero(layout_.parameters(), on_board.parameters());
+  for (int k = 0; k < gyros_; ++k) {
+    const int row = layout_.drift(k) - layout_.drift(0);
+    const int column = on_board.drift(k) - on_board.drift(0);
+    const MatrixXd& amplitudes = modes_->gyros[k].amplitudes;
+    by_coefficients.block<Layout::kEq1, Layout::kEq1>(row, column).setIdentity();
+    by_coefficients.block(row + Layout::kEq1, column + Layout::kEq1, amplitudes.rows(), amplitudes.cols()) = amplitudes;
+    by_coefficients.block<3, 3>(row + layout_.drift_size(), column + on_board.drift_size()).setIdentity();
+  }
+  return by_coefficients * setup_.prior.covariance * by_coefficients.transpose();
 }
 
 void PassProblem::add_prior(const PassSolution& solution, Linear& linear) const {
   const CalibrationSetup& setup = setup_.on_board;
-  const int fewer = setup.layout.dynamic() - layout_.dynamic();  // of the states that move
+  const int fewer = setup.layout.readout(0) - layout_.readout(0);  // of the states before
   VectorXd sigma = VectorXd::Constant(layout_.size(), kUnknown_rad);
   for (int state = layout_.readout(0); state < layout_.size(); ++state) {
     sigma(state) = prior_sigma_of_further_state(setup, state + fewer);
@@ -313,12 +365,15 @@ void PassProblem::add_prior(const PassSolution& solution, Linear& linear) const 
     const Gyro& prior = setup_.prior.gyros[k];
     const Gyro& gyro = solution.gyros[k];
     const Gyro::Coefficients drift = prior.drift_rad_s - gyro.drift_rad_s;
-    apart.segment(layout_.drift(k), layout_.drift_size()) = drift.head(layout_.drift_size());
+    const VectorXd outside = drift.segment(Layout::kEq1, setup.layout.drift_size() - Layout::kEq1);
+    apart.segment<Layout::kEq1>(layout_.drift(k)) = drift.head<Layout::kEq1>();
+    apart.segment(layout_.drift(k) + Layout::kEq1, layout_.drift_size() - Layout::kEq1) =
+        modes_ ? VectorXd(modes_->gyros[k].amplitudes * outside) : outside;
     apart.segment<3>(layout_.alignment(k)) =
         Rot<C, C>::assume(Matrix3d(prior.C_c_b * gyro.C_c_b.transpose())).log().raw();
     apart.segment(layout_.readout(k), layout_.readout_size()) = prior.errors(layout_) - gyro.errors(layout_);
     if (layout_.further.coefficient_change) {
-      apart.segment<Layout::kEq1>(layout_.change(k)) = drift.segment<Layout::kEq1>(layout_.change_column());
+      apart.segment<Layout::kEq1>(layout_.change(k)) = drift.segment<Layout::kEq1>(setup.layout.change_column());
     }
   }
   apart.tail(solution.shared.size()) = -solution.shared;
@@ -331,7 +386,7 @@ void PassProblem::add_prior(const PassSolution& solution, Linear& linear) const 
   }
   const int size = layout_.parameters();
   linear.prior.block(layout_.drift(0), layout_.drift(0), size, size) =
-      setup_.prior.covariance.llt().matrixL().solve(MatrixXd::Identity(size, size));
+      prior_covariance().llt().matrixL().solve(MatrixXd::Identity(size, size));
   linear.prior_y = linear.prior * apart;
 }
 
@@ -384,68 +439,62 @@ void PassProblem::put_noise(const PassSolution& solution, const ProcessNoise& no
   stage.A_inverse = A.inverse();
 }
 
+double PassProblem::scale_of_misfits(const PassSolution& solution) const {
+  constexpr double kMedianOfFour = 0.84;  // of χ²/n; nearer to 1 for more
+  std::vector<double> nis_per_component;
+  Moment moment;
+  double unused = 0;
+  for (std::size_t arc = 0; arc < arcs_.size(); ++arc) {
+    std::size_t i = arcs_[arc].begin;
+    for (begin_arc(solution, arc, moment); i + 1 < arcs_[arc].end && nodes_[i].fix == nullptr; ++i) {
+      step(nodes_[i], nodes_[i + 1], moment, unused);
+    }
+    moment.fix = nodes_[i].fix;
+    const FixRows rows = moment.fix != nullptr ? compare(solution, moment) : FixRows{};
+    if (rows.y.size() > 0) {
+      nis_per_component.push_back(rows.nis() / static_cast<double>(rows.y.size()));
+    }
+  }
+  if (nis_per_component.empty()) {
+    return 1;
+  }
+  const auto middle = nis_per_component.begin() + static_cast<std::ptrdiff_t>(nis_per_component.size() / 2);
+  std::nth_element(nis_per_component.begin(), middle, nis_per_component.end());
+  return std::max(*middle / kMedianOfFour, 1.0);
+}
+
 PassProblem::Linear PassProblem::linearise(const PassSolution& solution) const {
+  // Far from the solution all fixes have large misfits: outliers are those far above the median.
+  const double scale = scale_of_misfits(solution);
   Linear linear;
   add_prior(solution, linear);
   linear.stages.resize(arcs_.size());
   Moment moment;
-  std::vector<std::pair<const ScreenedPass::Fix*, FixRows>> fixes;
-  std::vector<double> nis_per_component;
-  std::vector<std::size_t> fixes_until;
   for (std::size_t arc = 0; arc < arcs_.size(); ++arc) {
     check_stop();
     begin_arc(solution, arc, moment);
     double extra_variance_rad2 = 0;
+    FixMerger nearby(setup_.fixes_together);
     for (std::size_t i = arcs_[arc].begin; i < arcs_[arc].end; ++i) {
       moment.fix = nodes_[i].fix;
       if (moment.fix != nullptr) {
-        FixRows& rows = fixes.emplace_back(moment.fix, compare(solution, moment)).second;
-        const Eigen::LLT<MatrixXd> root(rows.R);
-        root.matrixL().solveInPlace(rows.H);
-        root.matrixL().solveInPlace(rows.y);
-        if (rows.y.size() > 0) {
-          nis_per_component.push_back(rows.y.squaredNorm() / static_cast<double>(rows.y.size()));
-        }
+        FixRows rows = compare(solution, moment);
+        const double gate = scale * gate_of(rows);
+        linear.cost_outside_rows += add_fix(std::move(rows), *moment.fix, gate, nearby);
       }
       if (i + 1 < nodes_.size()) {
         step(nodes_[i], nodes_[i + 1], moment, extra_variance_rad2);
       }
     }
-    fixes_until.push_back(fixes.size());
+    SmootherStage& stage = linear.stages[arc];
+    linear.cost_outside_rows += nearby.put_into(stage, layout_.size());
+    compress(stage);
     if (arc + 1 < arcs_.size()) {
       end_arc(solution, moment, extra_variance_rad2, linear);
     } else {
-      linear.stages[arc].m.setZero(layout_.dynamic());
+      stage.m.setZero(layout_.dynamic());
     }
   }
-  // Far from the solution all fixes have large misfits: outliers are those far above the median.
-  constexpr double kMedianOfFour = 0.84;  // of χ²/n; nearer to 1 for more
-  double scale = 1;
-  std::vector<double> sorted = nis_per_component;
-  if (!sorted.empty()) {
-    const auto middle = sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2);
-    std::nth_element(sorted.begin(), middle, sorted.end());
-    scale = std::max(*middle / kMedianOfFour, 1.0);
-  }
-  std::size_t fix = 0;
-  for (std::size_t arc = 0; arc < arcs_.size(); ++arc) {
-    check_stop();
-    FixMerger nearby(setup_.fixes_together);
-    for (; fix < fixes_until[arc]; ++fix) {
-      auto& [its, rows] = fixes[fix];
-      if (rows.y.size() == 0) {
-        continue;
-      }
-      // Its influence falls with the third power of the misfit beyond the gate.
-      const double nis = rows.y.squaredNorm();
-      const double gate = scale * gate_of_freedom(static_cast<int>(rows.y.size()), setup_.on_board.gate_nis);
-      linear.cost_outside_rows += nis > gate ? 2 * gate * (1 - gate / nis) : 0;
-      nearby.add(*its, rows, nis > gate ? gate / nis : 1);
-      rows = {};  // most of the memory that this takes
-    }
-    linear.cost_outside_rows += nearby.put_into(linear.stages[arc], layout_.size());
-  }
-  std::ranges::for_each(linear.stages, compress);
   put_noise(solution, setup_.noise(), linear.prior, linear.prior_y);
   for (std::size_t arc = 0; arc < linear.ends.size(); ++arc) {
     put_noise(solution, setup_.noise(), arc, linear.ends[arc], linear.stages[arc]);
@@ -465,8 +514,18 @@ void PassProblem::correct(const SmootherResult& found, PassSolution& solution) c
     }
   }
   const VectorXd& x = found.x.back();
+  // As errors of the states on board.
+  const Layout& on_board = setup_.on_board.layout;
+  VectorXd errors = VectorXd::Zero(on_board.size());
+  const int rest = layout_.size() - layout_.readout(0);
+  errors.tail(rest) = x.tail(rest);
   for (int k = 0; k < gyros_; ++k) {
-    add_parameter_errors(layout_, k, x, solution.gyros[k]);
+    const auto outside = x.segment(layout_.drift(k) + Layout::kEq1, layout_.drift_size() - Layout::kEq1);
+    errors.segment<Layout::kEq1>(on_board.drift(k)) = x.segment<Layout::kEq1>(layout_.drift(k));
+    errors.segment(on_board.drift(k) + Layout::kEq1, on_board.drift_size() - Layout::kEq1) =
+        modes_ ? VectorXd(modes_->gyros[k].coefficients * outside) : VectorXd(outside);
+    errors.segment<3>(on_board.alignment(k)) = x.segment<3>(layout_.alignment(k));
+    add_parameter_errors(on_board, k, errors, solution.gyros[k]);
   }
   solution.shared += x.tail(solution.shared.size());
 }

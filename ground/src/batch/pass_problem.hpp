@@ -17,6 +17,17 @@
 
 namespace trihedron::ground {
 
+/// The combinations of the coefficients outside eq. (1) of each gyro that a pass can show; what is orthogonal to them
+/// moves no momentum by as much as its noise.
+struct DriftModes {
+  struct OfGyro {
+    Eigen::MatrixXd coefficients;  ///< by their amplitudes: a column for each mode
+    Eigen::MatrixXd amplitudes;    ///< by coefficients: a row for each mode; amplitudes · coefficients = 1
+  };
+  PerGyro<OfGyro> gyros;
+  [[nodiscard]] int size() const { return static_cast<int>(gyros[0].coefficients.cols()); }
+};
+
 /// What moves the momenta in addition to the drift model.
 struct ProcessNoise {
   double direction_random_walk_rad_sqrt_s = 0;  ///< per axis across each momentum
@@ -34,8 +45,8 @@ struct PassSetup {
   /// Length of an arc; process noise is added at its end, and after a gap.
   Duration arc = std::chrono::seconds(60);
 
-  /// The states of the batch: of each direction's error two components across the momentum, so that all of them have
-  /// information; the rest as on board.
+  /// Of each direction's error two components across the momentum, so that all of them have information; the rest as on
+  /// board.
   [[nodiscard]] Layout layout() const {
     Layout layout = on_board.layout;
     layout.direction_size = 2;
@@ -63,7 +74,14 @@ class PassProblem {
   PassProblem(const ScreenedPass& pass, PassSetup setup);
 
   [[nodiscard]] const PassSetup& setup() const { return setup_; }
+  /// The states of the rows and solutions of the linearised problem: those of the setup, or modes in place of
+  /// coefficients outside eq. (1).
   [[nodiscard]] const Layout& layout() const { return layout_; }
+  [[nodiscard]] const std::optional<DriftModes>& modes() const { return modes_; }
+  void use(DriftModes modes) {
+    layout_.drift_modes = modes.size();
+    modes_ = std::move(modes);
+  }
   void set_noise(const ProcessNoise& noise) {
     setup_.on_board.direction_random_walk_rad_sqrt_s = noise.direction_random_walk_rad_sqrt_s;
     setup_.on_board.wandering_drift = noise.wandering_drift;
@@ -71,6 +89,7 @@ class PassProblem {
   /// Of κ and δ; that at the construction is the setup's.
   void set_prior(Prior prior) { setup_.prior = std::move(prior); }
   [[nodiscard]] std::size_t arcs() const { return arcs_.size(); }
+  [[nodiscard]] std::size_t fixes() const { return fixes_; }
 
   /// Momenta along the pass by these parameters, those at its first fix read from it; no wandering drift.
   [[nodiscard]] PassSolution start(const Gyros& gyros) const;
@@ -113,6 +132,8 @@ class PassProblem {
     PerGyro<Sensitivity<kMaxDriftColumns>> since;     ///< the beginning of the arc
     PerGyro<Eigen::Matrix<double, 3, 2>> directions;  ///< there: φ by the two components across the momentum
   };
+  /// Visits the end of each arc but the last, where the next begins; that one begins as the solution then says.
+  void go_over_arcs(const PassSolution& solution, const std::function<void(const Moment&)>& at_end) const;
   /// Visits all samples that are used, and all fixes, in time order.
   void go_along(const PassSolution& solution, const std::function<void(const Moment&)>& visit) const;
 
@@ -122,6 +143,7 @@ class PassProblem {
     Eigen::MatrixXd H;
     Eigen::VectorXd y;
     Eigen::MatrixXd R;
+    [[nodiscard]] double nis() const;
   };
   [[nodiscard]] FixRows compare(const PassSolution& solution, const Moment& moment) const;
 
@@ -155,19 +177,25 @@ class PassProblem {
     std::size_t end = 0;  ///< the first node of the next arc, which this one ends at, or that after the last
   };
 
+  [[nodiscard]] double gate_of(const FixRows& rows) const;
+  /// How far the misfits are beyond their noise as a rule, by the first fix of each arc: the square of it, 1 or more.
+  [[nodiscard]] double scale_of_misfits(const PassSolution& solution) const;
   [[nodiscard]] Reading reading_at(const Node& node) const;
   void step(const Node& from_node, const Node& to_node, Moment& moment, double& extra_variance_rad2) const;
   void begin_arc(const PassSolution& solution, std::size_t arc, Moment& moment) const;
   void add_prior(const PassSolution& solution, Linear& linear) const;
+  [[nodiscard]] Eigen::MatrixXd prior_covariance() const;
   void end_arc(const PassSolution& solution, const Moment& moment, double extra_variance_rad2, Linear& linear) const;
 
   PassSetup setup_;
   Layout layout_;
+  std::optional<DriftModes> modes_;
   DriftModel drift_;
   int gyros_;
   const ScreenedSamples* samples_;
   std::vector<Node> nodes_;
   std::vector<ArcNodes> arcs_;
+  std::size_t fixes_ = 0;
 };
 
 }  // namespace trihedron::ground

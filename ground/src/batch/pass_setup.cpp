@@ -15,7 +15,7 @@ PassSetup pass_setup(const PassSettings& settings, const CalibrationOptions& opt
 PassSolution first_solution(const PassProblem& problem, const Screened& screened) {
   Gyros gyros;
   for (std::size_t k = 0; k < screened.first.size(); ++k) {
-    gyros[static_cast<int>(k)] = gyro_of(screened.first[k], problem.layout());
+    gyros[static_cast<int>(k)] = gyro_of(screened.first[k], problem.setup().on_board.layout);
   }
   return problem.start(gyros);
 }

@@ -127,17 +127,53 @@ void rearrange(const std::vector<ParameterId>& from, const std::vector<Parameter
   history = std::move(rearranged);
 }
 
-std::vector<FurtherEstimate> further_of(const Layout& layout, const BatchResult& result) {
+std::vector<FurtherEstimate> further_of(const PassProblem& problem, const BatchResult& result) {
   std::vector<FurtherEstimate> further;
-  for (const ParameterId& parameter : further_parameters(layout)) {
-    further.push_back({parameter, value_of(layout, result.solution.gyros, result.solution.shared, parameter),
-                       result.errors.last_root.row(state_of(layout, parameter)).norm()});
+  const Layout& on_board = problem.setup().on_board.layout;
+  for (const ParameterId& parameter : further_parameters(on_board)) {
+    further.push_back({parameter, value_of(on_board, result.solution.gyros, result.solution.shared, parameter),
+                       result.errors.last_root.row(state_of(problem.layout(), parameter)).norm()});
   }
   return further;
 }
 
+/// κ and δ of all gyros.
+struct Parameters {
+  Gyros gyros;
+  MatrixXd covariance;
+};
+
+/// Those of a drift field. What the pass says of its modes is known; the members are the most likely ones that make
+/// them, and what the modes leave open of them is as uncertain as before.
+Parameters with_members(const PassProblem& problem, const FieldPrior& field, Parameters by_modes) {
+  const Layout& modes = problem.layout();
+  const Layout members = problem.setup().layout();
+  Parameters found{by_modes.gyros, MatrixXd::Zero(members.parameters(), members.parameters())};
+  MatrixXd follow = MatrixXd::Zero(members.parameters(), modes.parameters());
+  const Eigen::Index size = members.drift_size() - Layout::kEq1;
+  for (int k = 0; k < members.gyros; ++k) {
+    const int row = members.drift(k) - members.drift(0);
+    const int column = modes.drift(k) - modes.drift(0);
+    const MatrixXd& amplitudes = field.modes.gyros[k].amplitudes;
+    const Eigen::VectorXd variance = field.sigma_rad_s.segment(k * size, size).cwiseAbs2();
+    const MatrixXd before = variance.asDiagonal() * amplitudes.transpose();
+    const MatrixXd by_mode = (amplitudes * before).ldlt().solve(before.transpose()).transpose();
+    auto outside = found.gyros[k].drift_rad_s.segment(Layout::kEq1, size);
+    outside = (by_mode * (amplitudes * outside)).eval();
+    follow.block<Layout::kEq1, Layout::kEq1>(row, column).setIdentity();
+    follow.block(row + Layout::kEq1, column + Layout::kEq1, size, by_mode.cols()) = by_mode;
+    follow.block<3, 3>(row + members.drift_size(), column + modes.drift_size()).setIdentity();
+    found.covariance.block(row + Layout::kEq1, row + Layout::kEq1, size, size) =
+        MatrixXd(variance.asDiagonal()) - by_mode * before.transpose();
+  }
+  found.covariance += follow * by_modes.covariance * follow.transpose();
+  const Eigen::LLT<MatrixXd> root(found.covariance.reverse());
+  found.covariance += positive_part(field.more_covariance, MatrixXd(root.matrixL()).reverse());
+  return found;
+}
+
 /// The problem of a screened pass. Throws SetupError where it has no solution.
-PassProblem problem_of(const Screened& screened, PassSetup setup) {
+PassProblem problem_of(const Screened& screened, PassSetup setup, const std::optional<FieldPrior>& field) {
   if (screened.pass.fixes.empty()) {
     throw SetupError("no fix could be compared with the gyros", "look at the telemetry with `trihedron inspect`");
   }
@@ -145,22 +181,22 @@ PassProblem problem_of(const Screened& screened, PassSetup setup) {
     throw SetupError("the clock of the telemetry was set back within the pass: how its parts lie in time is unknown",
                      "calibrate the parts apart, or use estimator invariant");
   }
-  return {screened.pass, std::move(setup)};
+  PassProblem problem(screened.pass, std::move(setup));
+  if (field) {
+    problem.use(field->modes);
+  }
+  return problem;
 }
 
 }  // namespace
 
 Refinement::Refinement(const Screened& screened, PassSetup setup, const CalibrationOptions& options,
                        const std::optional<FieldPrior>& field)
-    : problem_(problem_of(screened, std::move(setup))),
+    : problem_(problem_of(screened, std::move(setup), field)),
+      field_(field),
       result_(most_likely(problem_, first_solution(problem_, screened))),
       halves_(compare_halves(result_, problem_.layout())),
       roots_(roots_of(result_)) {
-  if (field) {
-    const Eigen::Index c = problem_.layout().constants();
-    more_covariance_ = positive_part(field->more_covariance, result_.errors.last_root.bottomRightCorner(c, c));
-    field_levels_ = field->levels;
-  }
   const SmoothedAttitude smoothed(screened.pass, problem_, result_.solution, roots_);
   course_ = smoothed.course();
   if (options.definitive_attitude) {
@@ -169,14 +205,15 @@ Refinement::Refinement(const Screened& screened, PassSetup setup, const Calibrat
 }
 
 void Refinement::put_into(CalibrationRun& run) && {
-  const Layout& layout = problem_.layout();
+  const Layout& layout = problem_.setup().on_board.layout;
   Calibration& calibration = run.calibration;
-  const MatrixXd own = result_.errors.last_root.middleRows(layout.drift(0), layout.parameters());
-  calibration.covariance = own * own.transpose();
-  if (more_covariance_.size() > 0) {
-    calibration.covariance += more_covariance_.topLeftCorner(layout.parameters(), layout.parameters());
+  const MatrixXd own = result_.errors.last_root.middleRows(problem_.layout().drift(0), problem_.layout().parameters());
+  Parameters parameters{result_.solution.gyros, own * own.transpose()};
+  if (field_) {
+    parameters = with_members(problem_, *field_, std::move(parameters));
+    calibration.drift_field = field_->levels;
   }
-  calibration.drift_field = field_levels_;
+  calibration.covariance = parameters.covariance;
   problem_.go_along(result_.solution, [&](const PassProblem::Moment& moment) {
     calibration.t = moment.t;
     for (int k = 0; k < layout.gyros; ++k) {
@@ -186,7 +223,7 @@ void Refinement::put_into(CalibrationRun& run) && {
   for (int k = 0; k < layout.gyros; ++k) {
     GyroCalibration& gyro = calibration.gyros[static_cast<std::size_t>(k)];
     const Eigen::Vector3d momentum_in = gyro.momentum_in;
-    gyro = record_of(result_.solution.gyros[k], layout, 0);  // the coefficients stand for the end of the pass
+    gyro = record_of(parameters.gyros[k], layout, 0);  // the coefficients stand for the end of the pass
     gyro.momentum_in = momentum_in;
   }
   calibration.estimator = Estimator::kBatch;
@@ -194,7 +231,7 @@ void Refinement::put_into(CalibrationRun& run) && {
       drift_and_alignment(layout.drift_model, static_cast<std::size_t>(layout.gyros));
   rearrange(calibration.states, states, problem_.setup(), run.parameters);
   calibration.states = states;
-  calibration.further = further_of(layout, result_);
+  calibration.further = further_of(problem_, result_);
   if (halves_) {
     calibration.statistics.halves_chi_square = halves_->chi_square;
     calibration.statistics.halves_degrees_of_freedom = halves_->degrees_of_freedom;

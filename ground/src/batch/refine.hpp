@@ -35,9 +35,8 @@ class Refinement {
 
  private:
   PassProblem problem_;
+  std::optional<FieldPrior> field_;
   BatchResult result_;
-  Eigen::MatrixXd more_covariance_;  ///< of the constants; empty: none
-  std::vector<DriftFieldLevel> field_levels_;
   std::optional<Halves> halves_;
   CovarianceRoots roots_;
   SmoothedCourse course_;

@@ -4,6 +4,7 @@
 
 #include <Eigen/Cholesky>
 #include <chrono>
+#include <cmath>
 #include <limits>
 #include <optional>
 
@@ -37,6 +38,8 @@ std::vector<DriftModelId> models_up_to(const DriftModelId& model) {
 
 /// Convergence limit of the constants in sigmas: enough for a decision.
 constexpr double kNearEnough = 0.2;
+/// Drift in each group that the modes of a field are for at first: more than rotors have that eq. (1) describes.
+constexpr double kFirstFieldLevel_rad_s = 3e-10;
 /// No step is longer.
 constexpr double kOneIteration = std::numeric_limits<double>::infinity();
 
@@ -51,22 +54,61 @@ PassSetup coarse(PassSetup setup) {
 
 Trial::Trial(const Pass& pass, const Screened& screened, const CalibrationOptions& options)
     : drift_model_(*options.drift_model), problem_(screened.pass, coarse(pass_setup(pass.settings, options))) {
-  PassSolution first = first_solution(problem_, screened);
   if (options.drift_field) {
     field_.emplace(problem_.layout());
-    found_ = most_likely(problem_, std::move(first), kOneIteration);
-    first = found_.solution;
   }
-  fit(std::move(first));
+  fit(first_solution(problem_, screened));
+}
+
+/// Modes for a field of this level, and the solution by them.
+void Trial::use_modes(Eigen::VectorXd level, PassSolution& solution) {
+  DriftModes modes = modes_of(problem_, solution, *field_, level);
+  for (int k = 0; k < problem_.layout().gyros; ++k) {
+    const DriftModes::OfGyro& its = modes.gyros[k];
+    auto outside = solution.gyros[k].drift_rad_s.segment(Layout::kEq1, its.coefficients.rows());
+    outside = (its.coefficients * (its.amplitudes * outside)).eval();
+  }
+  problem_.use(std::move(modes));
+  field_level_ = std::move(level);
+}
+
+/// Finds the spectrum of the field and gives the problem its variances. Where it is larger than the modes are for, or
+/// much smaller, they are chosen again.
+PassSolution Trial::with_likely_field(PassSolution first) {
+  constexpr int kMostRounds = 4;
+  const double room = std::log(3.0);
+  const double more_than_enough = 2 * room;
+  if (!problem_.modes()) {
+    use_modes(
+        Eigen::VectorXd::Constant(static_cast<Eigen::Index>(field_->groups().size()), std::log(kFirstFieldLevel_rad_s)),
+        first);
+  }
+  for (int round = 0; round < kMostRounds; ++round) {
+    if (found_.linear.stages.empty()) {
+      found_ = most_likely(problem_, std::move(first), kOneIteration);
+      first = found_.solution;
+    }
+    spectrum_ =
+        most_likely_spectrum(*field_, field_information(found_.linear, problem_.setup().noise()), spectrum_.log_rms);
+    const Eigen::VectorXd above = field_level_ - spectrum_.log_rms;
+    if ((above.array() > room).all()) {
+      if ((above.array() > more_than_enough).all()) {
+        use_modes(spectrum_.log_rms.array() + room, first);
+      }
+      break;
+    }
+    use_modes(field_level_.cwiseMax((spectrum_.log_rms.array() + more_than_enough).matrix()), first);
+    found_ = {};
+  }
+  Prior prior = problem_.setup().prior;
+  put_sigma(problem_.setup().layout(), *field_, field_->sigma(spectrum_.log_rms), prior);
+  problem_.set_prior(std::move(prior));
+  return first;
 }
 
 void Trial::fit(PassSolution first) {
   if (field_) {
-    spectrum_ =
-        most_likely_spectrum(*field_, field_information(found_.linear, problem_.setup().noise()), spectrum_.log_rms);
-    Prior prior = problem_.setup().prior;
-    put_sigma(problem_.layout(), *field_, field_->sigma(spectrum_.log_rms), prior);
-    problem_.set_prior(std::move(prior));
+    first = with_likely_field(std::move(first));
   }
   found_ = {};  // long: one at a time
   found_ = most_likely(problem_, std::move(first), kNearEnough);
@@ -87,7 +129,7 @@ std::optional<FieldPrior> Trial::field_prior() const {
     return std::nullopt;
   }
   const FieldInformation information = field_information(found_.linear, problem_.setup().noise());
-  return ground::field_prior(problem_.layout(), *field_, information,
+  return ground::field_prior(problem_, *field_, information,
                              most_likely_spectrum(*field_, information, spectrum_.log_rms));
 }
 
@@ -100,7 +142,7 @@ double Trial::log_evidence(FurtherState state) const {
   for (const ParameterId& parameter : further_parameters(layout)) {
     if (parameter.is_further(state)) {
       rows.push_back(state_of(layout, parameter));
-      values.push_back(value_of(layout, found_.solution.gyros, found_.solution.shared, parameter));
+      values.push_back(value_of(setup.layout, found_.solution.gyros, found_.solution.shared, parameter));
       sigmas.push_back(prior_sigma_of_further_state(setup, state_of(setup.layout, parameter)));
     }
   }

@@ -41,6 +41,8 @@ class Trial {
 
  private:
   void fit(PassSolution first);
+  void use_modes(Eigen::VectorXd level, PassSolution& solution);
+  [[nodiscard]] PassSolution with_likely_field(PassSolution first);
   [[nodiscard]] FieldInformation field_information(const PassProblem::Linear& linear, const ProcessNoise& noise) const {
     return information_on_field(problem_, found_.before, linear, noise, *field_);
   }
@@ -49,6 +51,7 @@ class Trial {
   PassProblem problem_;
   std::optional<FieldMembers> field_;  ///< where the drift is one
   FieldSpectrum spectrum_;             ///< of it
+  Eigen::VectorXd field_level_;        ///< that its modes are for, ln of rad/s
   BatchResult found_;
 };
 

@@ -8,6 +8,9 @@
 #include <cmath>
 #include <random>
 
+#include "batch/batch.hpp"
+#include "batch/pass_setup.hpp"
+#include "passes.hpp"
 #include "trihedron/records/drift_models.hpp"
 
 namespace trihedron::ground {
@@ -205,6 +208,37 @@ TEST(DriftField, PutsItsVariancesIntoThePrior) {
   EXPECT_EQ(prior.covariance(6, 6), 1);
   EXPECT_EQ(prior.covariance(7, 7), sigma(0) * sigma(0));
   EXPECT_EQ(prior.covariance(kSmall.drift_size(), kSmall.drift_size()), 1);
+}
+
+/// What modes leave out cannot be seen: eq. (1), alignment and their sigmas are those of all members.
+TEST(DriftField, ItsModesTellWhatAllMembersTell) {
+  CalibrationOptions options = told();
+  options.estimator = Estimator::kBatch;
+  options.drift_model = vsh(6);
+  const Screened screened = screen(two_hours().pass, options);
+  PassSetup setup = pass_setup(two_hours().pass.settings, options);
+  const FieldMembers members(setup.layout());
+  const VectorXd level = VectorXd::Constant(static_cast<Index>(members.groups().size()), std::log(2e-8));
+  put_sigma(setup.layout(), members, members.sigma(level), setup.prior);
+  const PassProblem all(screened.pass, setup);
+  PassProblem few(screened.pass, setup);
+  const PassSolution first = first_solution(all, screened);
+  few.use(modes_of(few, first, members, level.array() + std::log(3.0)));
+  EXPECT_LT(few.layout().drift_modes, members.of_one_gyro());
+  const BatchResult by_all = most_likely(all, first);
+  const BatchResult by_few = most_likely(few, first);
+  for (int k = 0; k < 2; ++k) {
+    for (int i = 0; i < Layout::kEq1; ++i) {
+      const double sigma = by_all.errors.last_root.row(all.layout().drift(k) + i).norm();
+      EXPECT_NEAR(by_few.solution.gyros[k].drift_rad_s(i), by_all.solution.gyros[k].drift_rad_s(i), 0.02 * sigma);
+      EXPECT_NEAR(by_few.errors.last_root.row(few.layout().drift(k) + i).norm() / sigma, 1, 0.01);
+    }
+    const Eigen::Matrix3d& C_c_b = by_all.solution.gyros[k].C_c_b;
+    const auto sigma = by_all.errors.last_root.middleRows<3>(all.layout().alignment(k)).rowwise().norm().eval();
+    const Eigen::Vector3d apart =
+        Rot<C, C>::assume(Eigen::Matrix3d(by_few.solution.gyros[k].C_c_b * C_c_b.transpose())).log().raw();
+    EXPECT_LT(apart.cwiseQuotient(sigma).cwiseAbs().maxCoeff(), 0.02);
+  }
 }
 
 }  // namespace

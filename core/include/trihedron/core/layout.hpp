@@ -49,11 +49,13 @@ struct Layout {
   /// Components of the error of a direction: 3 in `in`, of which that along the momentum has no effect of its own, or 2
   /// across it.
   int direction_size = 3;
+  /// Combinations of the coefficients outside eq. (1) that stand for these; negative: the coefficients themselves.
+  int drift_modes = -1;
 
   friend constexpr bool operator==(const Layout&, const Layout&) = default;
 
   /// κ of one gyro.
-  [[nodiscard]] constexpr int drift_size() const { return drift_model.size(); }
+  [[nodiscard]] constexpr int drift_size() const { return drift_modes < 0 ? drift_model.size() : kEq1 + drift_modes; }
   /// Columns of its drift: κ, then the drift that wanders, then the change of the coefficients of eq. (1).
   [[nodiscard]] constexpr int drift_columns() const {
     return drift_size() + (further.wandering_drift ? 3 : 0) + (further.coefficient_change ? kEq1 : 0);
