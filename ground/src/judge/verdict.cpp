@@ -118,6 +118,13 @@ void judge_star_tracker(const Statistics& statistics, std::vector<Finding>& find
         fmt::format("{} fixes, 20 and more in a row", statistics.fixes_off_in_a_row),
         "Look at its telemetry there: a wrong identification, or a head that was moved.");
   }
+  if (statistics.fixes_frozen > 0) {
+    add(findings, FindingCode::kStarTrackerFrozen,
+        "The star tracker repeated its last quaternion with new time stamps while the body turned; these fixes were "
+        "not used.",
+        fmt::format("{} of {} fixes", statistics.fixes_frozen, statistics.fixes),
+        "Look at its telemetry there: an output that is held when no stars are identified.");
+  }
 }
 
 void judge_gyros(const Pass& pass, const CalibrationRun& run, std::vector<Finding>& findings) {
@@ -511,6 +518,7 @@ Verdict judge_navigation(const NavigationRun& run) {
         "Calibrate anew; drift coefficients change at every start of a rotor.");
   }
   judge_rejections(run.statistics, findings);
+  judge_star_tracker(run.statistics, findings);
   judge_nis(run.statistics, "the calibration in use does not fit this pass, or the model is incomplete", findings);
   return verdict_of(std::move(findings));
 }

@@ -87,6 +87,7 @@ void FixSums::add(const FixRecord& fix) {
   components_ = fix.innovation.size();
   used_ += fix.used() ? 1 : 0;
   outliers_ += fix.status == FixStatus::kRejectedByGate ? 1 : 0;
+  frozen_ += fix.status == FixStatus::kRejectedFrozen ? 1 : 0;
   const bool was_reopened = fix.status == FixStatus::kUsedAfterReopening || fix.status == FixStatus::kRestarted ||
                             fix.status == FixStatus::kEstimateLost;
   reopened_ += was_reopened ? 1 : 0;
@@ -106,6 +107,7 @@ void FixSums::put_into(Statistics& statistics) const {
   statistics.fixes = fixes_;
   statistics.fixes_used = used_;
   statistics.fixes_rejected_as_outliers = outliers_;
+  statistics.fixes_frozen = frozen_;
   statistics.fixes_off_in_a_row = off_in_a_row_;
   statistics.reopened = reopened_;
   statistics.nis_count = judged_;

@@ -283,6 +283,15 @@ TEST(Verdict, FindsAStarTrackerThatWasOff) {
   EXPECT_THAT(codes(judge(good_pass(), run)), ElementsAre("star-tracker-off"));
 }
 
+TEST(Verdict, FindsAStarTrackerThatWasFrozen) {
+  auto run = good_run();
+  run.calibration.statistics.fixes_frozen = 100;
+  const Verdict verdict = judge(good_pass(), run);
+  EXPECT_THAT(codes(verdict), ElementsAre("star-tracker-frozen"));
+  EXPECT_EQ(verdict.findings[0].evidence, "100 of 3601 fixes");
+  EXPECT_TRUE(verdict.trustworthy);
+}
+
 TEST(Verdict, FindsABadlyPlacedPair) {
   auto run = good_run();
   run.calibration.gyros[1].momentum_in = {std::cos(0.5), std::sin(0.5), 0};

@@ -19,6 +19,7 @@ enum class FindingCode : std::uint8_t {
   kReopened,
   kBatchNotConverged,
   kStarTrackerOff,
+  kStarTrackerFrozen,
   kGyroIsolated,
   kGyroStuck,
   kGyroSamplesThinned,
@@ -65,13 +66,14 @@ struct FindingRow {
   std::string_view name;     ///< stable, for programs
   FindingSeverity severity;  ///< where the one who finds it does not say otherwise
 };
-inline constexpr std::array<FindingRow, 32> kFindings = {{
+inline constexpr std::array<FindingRow, 33> kFindings = {{
     {FindingCode::kTooFewFixes, "too-few-fixes", FindingSeverity::kDoNotUse},
     {FindingCode::kShortPass, "short-pass", FindingSeverity::kWarning},
     {FindingCode::kManyRejected, "many-rejected", FindingSeverity::kWarning},
     {FindingCode::kReopened, "reopened", FindingSeverity::kWarning},
     {FindingCode::kBatchNotConverged, "batch-not-converged", FindingSeverity::kDoNotUse},
     {FindingCode::kStarTrackerOff, "star-tracker-off", FindingSeverity::kWarning},
+    {FindingCode::kStarTrackerFrozen, "star-tracker-frozen", FindingSeverity::kWarning},
     {FindingCode::kGyroIsolated, "gyro-isolated", FindingSeverity::kWarning},
     {FindingCode::kGyroStuck, "gyro-stuck", FindingSeverity::kWarning},
     {FindingCode::kGyroSamplesThinned, "gyro-samples-thinned", FindingSeverity::kNote},

@@ -28,6 +28,7 @@ class FixSums {
   long fixes_ = 0;
   long used_ = 0;
   long outliers_ = 0;
+  long frozen_ = 0;
   long reopened_ = 0;
   long off_in_a_row_ = 0;  ///< of runs that were long enough
   long jumped_in_a_row_ = 0;
