@@ -189,17 +189,69 @@ void Recorder::add_angle(Time t, double residual) {
   run_.angle_residual_max.back() = std::max(run_.angle_residual_max.back(), residual);
 }
 
-void NavigationRecorder::add(const StepReport& report, const Pipeline& pipeline) {
-  if (report.fix.status != FixStatus::kNone && report.fix.status != FixStatus::kPending) {
-    run_.fixes.push_back(record_of(report, pipeline.layout().gyros));
-    corrected_ = report.corrected ? report.fix.t : corrected_;
-  }
-  if (report.sample != SampleStatus::kUsed) {
+void CorrectionSums::add(const FixRecord& fix, Duration interval) {
+  if (fix.corrected_navigator) {
+    ++made_;
+    corrected_ = fix.t;
+    waiting_since_.reset();
     return;
   }
-  if (const std::optional<AttitudeSolution> solution = pipeline.navigation_attitude()) {
-    append(run_.attitude, report.t, *solution, corrected_);
+  if (corrected_ && fix.t - *corrected_ < interval) {
+    return;
   }
+  waiting_since_ = waiting_since_.value_or(fix.t);
+  if (fix.t - *waiting_since_ >= interval) {
+    ++missed_;
+    waiting_since_ = fix.t;
+  }
+}
+
+void NavigationRecorder::add(const StepReport& report, const Pipeline& pipeline) {
+  if (report.fix.status != FixStatus::kNone && report.fix.status != FixStatus::kPending) {
+    add_fix(report, pipeline);
+  }
+  if (report.sample == SampleStatus::kUsed) {
+    if (const std::optional<AttitudeSolution> solution = pipeline.navigation_attitude()) {
+      append(run_.attitude, report.t, *solution, corrected_);
+    }
+  }
+  if (report.sample != SampleStatus::kNone && !run_.attitude.t.empty()) {
+    ++run_.samples[report.sample];
+  }
+}
+
+void NavigationRecorder::add_fix(const StepReport& report, const Pipeline& pipeline) {
+  const FixRecord& fix = run_.fixes.emplace_back(record_of(report, pipeline.layout().gyros));
+  corrections_.add(fix, pipeline.correction_interval());
+  if (report.corrected) {
+    corrected_ = fix.t;
+    end_open_loop();
+  } else if (fix.head == 0 && !fix.jumped && report.navigated && report.compared) {
+    if (last_compared_.size() == kLastFixes) {
+      last_compared_.erase(last_compared_.begin());
+    }
+    last_compared_.push_back(pipeline.compare(*report.navigated, *report.compared));
+  }
+}
+
+void NavigationRecorder::end_open_loop() {
+  if (last_compared_.size() == kLastFixes) {
+    const auto median = [&](auto member) {
+      const auto middle = last_compared_.begin() + kLastFixes / 2;
+      std::ranges::nth_element(last_compared_, middle, {}, member);
+      return (*middle).*member;
+    };
+    const Time t = last_compared_.back().t;
+    run_.open_loops.push_back({t, median(&OpenLoopEnd::error_rad), median(&OpenLoopEnd::square)});
+  }
+  last_compared_.clear();
+}
+
+NavigationRun NavigationRecorder::take() && {
+  end_open_loop();
+  run_.corrections = corrections_.made();
+  run_.corrections_missed = corrections_.missed();
+  return std::move(run_);
 }
 
 }  // namespace trihedron::ground
