@@ -542,7 +542,8 @@ void judge_prior(const PassSettings& settings, const NavigationRun& run, std::ve
       both_named ? fmt::format("start-up {} in place of {}", prior.start_up, settings.start_up)
                  : fmt::format("made {:.0f} days {} this pass", std::abs(to_seconds(later)) / 86400,
                                later > Duration::zero() ? "before" : "after"),
-      "Calibrate on this pass, or name the start-up (start_up) in the pass.toml of both.");
+      both_named ? "Calibrate on this pass, or on another one of its start-up."
+                 : "Calibrate on this pass, or name the start-up (start_up) in the pass.toml of both.");
 }
 
 }  // namespace
