@@ -89,7 +89,7 @@ std::string pass_text(const io::LoadedPass& loaded) {
 }
 
 std::string finding_text(const Finding& finding) {
-  return fmt::format("  {:<20}{}\n{:22}{}\n{:22}→ {}\n", name_of(finding.code), finding.text, "", finding.evidence, "",
+  return fmt::format("  {:<19} {}\n{:22}{}\n{:22}→ {}\n", name_of(finding.code), finding.text, "", finding.evidence, "",
                      finding.cure);
 }
 

@@ -7,7 +7,7 @@
 /* C has no `using`, and constants are to be known to the preprocessor. NOLINTBEGIN(modernize-*) */
 
 /** Of the tables in this file. */
-#define TRIHEDRON_TABLES_VERSION 1u
+#define TRIHEDRON_TABLES_VERSION 2u
 /** There is room for so many in the tables. */
 #define TRIHEDRON_MAX_GYROS 3
 
@@ -142,7 +142,9 @@ enum trihedron_fix {
   /** NIS above the gate. */
   TRIHEDRON_FIX_REJECTED_BY_GATE = 13,
   /** The estimate was no longer finite: the filter returns to the prior and starts with the next fix. */
-  TRIHEDRON_FIX_ESTIMATE_LOST = 14
+  TRIHEDRON_FIX_ESTIMATE_LOST = 14,
+  /** The quaternion of the fix before it once more, while the gyros show that the body has turned. */
+  TRIHEDRON_FIX_REJECTED_FROZEN = 15
 };
 
 /** Whether a gyro is used. */

@@ -12,6 +12,19 @@
 
 namespace trihedron {
 
+/// How fast a momentum of any gyro may drift by what is known before: by the mean and the 1-sigma of all coefficients.
+template <class Gyros>
+double largest_drift_rad_s(const Layout& layout, const Gyros& prior,
+                           const Eigen::Ref<const Eigen::MatrixXd>& covariance) {
+  double largest_rad_s = 0;
+  for (int k = 0; k < layout.gyros; ++k) {
+    const int first = layout.drift(k) - layout.drift(0);
+    const double variance = covariance.diagonal().segment(first, layout.drift_size()).sum();
+    largest_rad_s = std::max(largest_rad_s, std::sqrt(prior[k].drift_rad_s.squaredNorm() + variance));
+  }
+  return largest_rad_s;
+}
+
 template <class Estimator>
 std::optional<SetupFault> OnBoard<Estimator>::set_up(const CalibrationSetup& setup, const Gyros& prior,
                                                      const Eigen::Ref<const Eigen::MatrixXd>& covariance,
@@ -19,6 +32,7 @@ std::optional<SetupFault> OnBoard<Estimator>::set_up(const CalibrationSetup& set
   if (const auto fault = estimator_.set_up(setup, prior, covariance)) {
     return fault;
   }
+  frozen_fixes_ = decltype(frozen_fixes_)(largest_drift_rad_s(setup.layout, prior, covariance));
   policy_ = policy;
   policy_.spread_over = std::min(policy.spread_over, CorrectionPolicy::kMostSpread);
   reset();
@@ -31,6 +45,7 @@ void OnBoard<Estimator>::reset() {
   estimator_.forget();
   intake_ = Intake(setup);
   fixes_.clear();
+  frozen_fixes_.forget();
   readings_ = Readings<Gyros::capacity()>(setup, Estimator::kTakesSamplesTogether);
   schedule_ = Schedule(reach(), Estimator::kUsesAngles ? setup.angles_after : CalibrationSetup::kNever);
   navigator_ = {};
@@ -189,6 +204,7 @@ void OnBoard<Estimator>::set_clock(Time t, StepReport& report) {
   corrected_t_ += shift;
   worked_t_ += shift;
   schedule_.set_clock(shift);
+  frozen_fixes_.set_clock(shift);
   follower_t_ = t;
   intake_.set_clock(t);
   fixes_dropped_ += fixes_.clear();
@@ -394,6 +410,9 @@ bool OnBoard<Estimator>::begin(const StarFix& fix, StepReport& report) {
   }
   if (!readings) {
     return refuse(FixStatus::kRejectedNoGyro);
+  }
+  if (frozen_fixes_.look_at(fix, *readings, estimator_.setup(), estimator_.gyros())) {
+    return refuse(FixStatus::kRejectedFrozen);
   }
   prepare(fix.t, *readings, Work::Stage::kFix);
   work_.has_fix = true;

@@ -71,7 +71,8 @@ static_assert(static_cast<std::uint32_t>(FixStatus::kRejectedGeometry) == TRIHED
 static_assert(static_cast<std::uint32_t>(FixStatus::kRejectedTooFewGyros) == TRIHEDRON_FIX_REJECTED_TOO_FEW_GYROS);
 static_assert(static_cast<std::uint32_t>(FixStatus::kRejectedByGate) == TRIHEDRON_FIX_REJECTED_BY_GATE);
 static_assert(static_cast<std::uint32_t>(FixStatus::kEstimateLost) == TRIHEDRON_FIX_ESTIMATE_LOST);
-static_assert(kFixStatuses == 15);
+static_assert(static_cast<std::uint32_t>(FixStatus::kRejectedFrozen) == TRIHEDRON_FIX_REJECTED_FROZEN);
+static_assert(kFixStatuses == 16);
 static_assert(static_cast<std::uint32_t>(GyroState::kUsed) == TRIHEDRON_GYRO_USED);
 static_assert(static_cast<std::uint32_t>(GyroState::kStuck) == TRIHEDRON_GYRO_STUCK);
 static_assert(static_cast<std::uint32_t>(GyroState::kIsolated) == TRIHEDRON_GYRO_ISOLATED);

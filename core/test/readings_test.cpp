@@ -2,6 +2,10 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
 #include "trihedron/core/frames.hpp"
 
 namespace trihedron {
@@ -160,6 +164,77 @@ TEST(Readings, OfAStuckGyroAreNotUsed) {
   ASSERT_TRUE(readings);
   EXPECT_TRUE(readings->used[0]);
   EXPECT_FALSE(readings->used[1]);
+}
+
+/// Samples every 0.125 s up to 5 s, some of them spoilt by spikes of one gyro, without noise.
+struct Spiked {
+  SomeReadings buffer;
+
+  Spiked(const std::vector<int>& spikes, int gyro, const Eigen::Vector3d& axis, int last = 40) {
+    for (int i = 0; i <= last; ++i) {
+      GyroSample s = turning_sample(0.125 * i);
+      if (std::ranges::find(spikes, i) != spikes.end()) {
+        s.h_b[gyro] = rotated<double>(s.h_b[gyro], 0.017 * axis);
+      }
+      buffer.readings.push(s);
+    }
+  }
+  [[nodiscard]] GyroMask used_now() const {
+    return buffer.readings.now(buffer_setup(), buffer.health, buffer.gyros).used;
+  }
+};
+
+TEST(Readings, OfASpikeAreNotUsedNow) {
+  const Eigen::Vector3d y = Eigen::Vector3d::UnitY();
+  const Eigen::Vector3d z = Eigen::Vector3d::UnitZ();
+  EXPECT_FALSE(Spiked({40}, 0, y).used_now()[0]);
+  EXPECT_TRUE(Spiked({40}, 0, y).used_now()[1]);
+  EXPECT_FALSE(Spiked({40}, 1, z).used_now()[1]);
+  EXPECT_TRUE(Spiked({40}, 1, z).used_now()[0]);
+  EXPECT_EQ(count(Spiked({}, 0, y).used_now()), 2);
+  // Spikes before it do not count, …
+  for (int spike = 20; spike < 40; ++spike) {
+    EXPECT_EQ(count(Spiked({spike}, 0, y).used_now()), 2) << spike;
+    EXPECT_FALSE(Spiked({spike, 40}, 0, y).used_now()[0]) << spike;  // also where it is the same again
+  }
+  EXPECT_EQ(count(Spiked({30, 36, 38}, 0, y).used_now()), 2);
+  EXPECT_FALSE(Spiked({31, 37, 40}, 0, y).used_now()[0]);
+  // … and of two in a row the second is known by the angle to the other momentum.
+  EXPECT_FALSE(Spiked({39, 40}, 1, z).used_now()[1]);
+  // The first samples are compared with nothing.
+  EXPECT_EQ(count(Spiked({2}, 0, y, 2).used_now()), 2);
+  EXPECT_FALSE(Spiked({3}, 0, y, 3).used_now()[0]);
+}
+
+TEST(Readings, OfTwoPaperSamplesAreHeldAgainstThoseBeforeThem) {
+  SomeReadings buffer(false);  // not fitted together
+  for (int i = 0; i <= 40; ++i) {
+    buffer.push(0.125 * i);
+  }
+  GyroSample spike = turning_sample(5.125);
+  spike.h_b[0] = rotated<double>(spike.h_b[0], Eigen::Vector3d(0, 0.017, 0));
+  buffer.readings.push(spike);
+  EXPECT_FALSE(buffer.readings.now(buffer_setup(), buffer.health, buffer.gyros).used[0]);
+}
+
+TEST(Readings, OfABodyThatShakesAreUsed) {
+  // 0.01 rad to and fro at each sample, all gyros alike: no polynomial explains it, but the momenta stay as they are.
+  SomeReadings buffer;
+  GyroMask used{};
+  int unused = 0;
+  for (int i = 0; i <= 80; ++i) {
+    GyroSample s = turning_sample(0.125 * i);
+    const double shaken_rad = i < 20 ? 0 : 0.01 * std::sin(2.0 * i);
+    for (int k = 0; k < 2; ++k) {
+      s.h_b[k] = rotated<double>(s.h_b[k], Eigen::Vector3d(shaken_rad, 0, 0));
+    }
+    buffer.readings.push(s);
+    used = buffer.readings.now(buffer_setup(), buffer.health, buffer.gyros).used;
+    unused += count(used) < 2 ? 1 : 0;
+  }
+  EXPECT_EQ(count(used), 2);
+  EXPECT_GE(unused, 1);  // as it begins
+  EXPECT_LE(unused, 8);
 }
 
 TEST(Between, GoesFromOneDirectionToTheOther) {

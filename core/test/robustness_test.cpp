@@ -62,6 +62,52 @@ double momentum_error(const OnBoard& on_board, const test::Flight& flight) {
   return worst;
 }
 
+// ---- A gyro with spikes
+
+template <class Estimator>
+class SpikedGyro : public testing::Test {};
+using SpikedEstimators = testing::Types<PaperEstimator, Pair, Full>;
+TYPED_TEST_SUITE(SpikedGyro, SpikedEstimators);
+
+TYPED_TEST(SpikedGyro, GivesNoAttitudeInPlaceOfAWrongOne) {
+  test::Flight flight({.duration_s = 1800});
+  std::mt19937 random(5);
+  std::normal_distribution<double> normal;
+  std::uniform_real_distribution<double> even;
+  for (GyroSample& sample : flight.samples) {
+    for (int k = 0; k < 2; ++k) {
+      if (even(random) < 0.01) {  // a degree in any direction, the length kept
+        const Eigen::Vector3d h = sample.h_b[k];
+        sample.h_b[k] = rotated<double>(h, kDegree * h.cross(test::white(random, normal)).normalized());
+      }
+    }
+  }
+  const auto on_board = make_on_board<TypeParam>();
+  double worst = 0;
+  int given = 0;
+  int samples = 0;
+  std::size_t sample = 0;
+  test::fly(flight, *on_board, [&](const StepReport& report) {
+    if (report.sample == SampleStatus::kNone) {
+      return;
+    }
+    const Eigen::Matrix3d& truth = flight.C_in_c_at_samples[sample++];
+    if (!on_board->navigator().started()) {
+      return;
+    }
+    ++samples;
+    if (const auto attitude = on_board->navigation_attitude()) {
+      ++given;
+      const Eigen::Vector3d error = test::attitude_error(truth, attitude.value());
+      worst = std::max(
+          worst, error.cwiseQuotient(attitude.value().covariance_rad2.diagonal().cwiseSqrt()).cwiseAbs().maxCoeff());
+    }
+  });
+  EXPECT_LT(worst, 10);  // a spike is a thousand; half a minute of arc may still pass for noise of an extrapolation
+  EXPECT_GT(given, 0.97 * samples);
+  EXPECT_LT(given, 0.99 * samples);
+}
+
 // ---- A star tracker that lies
 
 template <class Estimator>

@@ -62,7 +62,7 @@ def requirements():
 
 def missing_tests(of_requirements):
     text = "".join(file.read_text() for file in (ROOT / "core" / "test").glob("*.cpp"))
-    there = {".".join(names) for names in re.findall(r"\bTEST(?:_[FP])?\((\w+),\s*(\w+)\)", text)}
+    there = {".".join(names) for names in re.findall(r"\b(?:TYPED_)?TEST(?:_[FP])?\((\w+),\s*(\w+)\)", text)}
     return [(requirement, test) for requirement, tests in of_requirements.items() for test in tests
             if test not in there and not (ROOT / test).is_file()]
 

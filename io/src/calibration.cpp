@@ -379,6 +379,8 @@ Members calibration_members(Calibration& calibration) {
        [&](const JsonNode& node) { calibration.estimator = parse_estimator(node); }},
       {"epoch_tai", "start of the pass, TAI", epoch_schema(),
        [&](const JsonNode& node) { calibration.epoch = parse_epoch_node(node); }},
+      optional_member({"start_up", "of the rotors, where the pass names it; coefficients change at every start",
+                       text_schema(), [&](const JsonNode& node) { calibration.start_up = node.text(); }}),
       {"t_s", "since the epoch: when momentum_in holds", number_schema(limits::kTimeOfCalibration_s),
        [&](const JsonNode& node) { read_time(node, calibration); }},
       {"gyros", "one element per gyro", gyros, [&](const JsonNode& node) { read_gyros(node, calibration); }},
@@ -463,6 +465,8 @@ std::string format_calibration(const Calibration& calibration) {
   for (const auto& [name, value] : named_values(calibration.statistics)) {
     statistics[name] = value;
   }
+  const std::string start_up =
+      calibration.start_up.empty() ? "" : fmt::format(" \"start_up\": {},", dump(Json(calibration.start_up)));
   const std::string noise =
       calibration.noise ? fmt::format(" \"noise\": {},\n", dump(noise_json(*calibration.noise))) : "";
   Json levels = Json::array();
@@ -476,13 +480,13 @@ std::string format_calibration(const Calibration& calibration) {
   }
   return fmt::format(
       "{{\"format\": \"{}\", \"version\": {},\n"
-      " \"estimator\": {}, \"epoch_tai\": \"{}\", \"t_s\": {},\n"
+      " \"estimator\": {}, \"epoch_tai\": \"{}\",{} \"t_s\": {},\n"
       " \"gyros\": {},\n"
       " \"further\": {},\n{}{}"
       " \"covariance\": {{\n  \"states\": {},\n  \"matrix\": {}}},\n"
       " \"verdict\": {{\"trustworthy\": {}, \"findings\": {}}},\n"
       " \"statistics\": {}}}\n",
-      kFormat, kVersion, dump(Json(name_of(calibration.estimator))), format_epoch(calibration.epoch),
+      kFormat, kVersion, dump(Json(name_of(calibration.estimator))), format_epoch(calibration.epoch), start_up,
       dump(Json(to_seconds(calibration.t - calibration.epoch))), lines(gyros), dump(further), noise, field,
       dump(states), lines(matrix), calibration.verdict.trustworthy, lines(findings), dump(statistics));
 }

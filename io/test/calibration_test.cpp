@@ -24,6 +24,14 @@ std::string refusal_of(std::string_view text) {
 
 std::string sample_text() { return format_calibration(sample_calibration()); }
 
+TEST(CalibrationJson, NamesTheStartUpWhereItIsKnown) {
+  Calibration calibration = sample_calibration();
+  EXPECT_EQ(format_calibration(calibration).find("start_up"), std::string::npos);
+  EXPECT_EQ(parse_calibration(format_calibration(calibration), "c.json").start_up, "");
+  calibration.start_up = "of \"May\"";
+  EXPECT_EQ(parse_calibration(format_calibration(calibration), "c.json").start_up, calibration.start_up);
+}
+
 TEST(CalibrationJson, ComesBackFromAFileWhole) {
   const TemporaryDirectory directory;
   const Calibration calibration = sample_calibration();

@@ -18,11 +18,12 @@ struct Row {
   Field field;
 };
 
-constexpr std::array<Row, 13> kRows = {{
+constexpr std::array<Row, 14> kRows = {{
     {"angle_looks", &Statistics::angle_looks},
     {"batch_converged", &Statistics::batch_converged},
     {"batch_iterations", &Statistics::batch_iterations},
     {"fixes", &Statistics::fixes},
+    {"fixes_frozen", &Statistics::fixes_frozen},
     {"fixes_off_in_a_row", &Statistics::fixes_off_in_a_row},
     {"fixes_rejected_as_outliers", &Statistics::fixes_rejected_as_outliers},
     {"fixes_used", &Statistics::fixes_used},

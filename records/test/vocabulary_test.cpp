@@ -168,8 +168,8 @@ TEST(Vocabulary, StatisticsComeBackFromTheirNamesInTheirOrder) {
   set_value(back, "reopened", std::numeric_limits<double>::quiet_NaN());
   set_value(back, "innovation_x_rms_rad", 3);
   EXPECT_THAT(named_values(back),
-              ElementsAre(Pair("batch_converged", 0), Pair("fixes", 100), Pair("fixes_off_in_a_row", 0),
-                          Pair("fixes_rejected_as_outliers", 0), Pair("fixes_used", 90),
+              ElementsAre(Pair("batch_converged", 0), Pair("fixes", 100), Pair("fixes_frozen", 0),
+                          Pair("fixes_off_in_a_row", 0), Pair("fixes_rejected_as_outliers", 0), Pair("fixes_used", 90),
                           Pair("innovation_1_rms_rad", 1e-5), Pair("innovation_2_rms_rad", 2e-5), Pair("nis_count", 0),
                           Pair("nis_degrees_of_freedom", 0), Pair("nis_mean", testing::IsNan()), Pair("reopened", 0)));
 }

@@ -47,7 +47,7 @@ class FlownApplication {
 namespace {
 
 /// Of the ground's part of a state; to be counted up whenever it changes.
-constexpr std::uint32_t kGroundPartVersion = 1;
+constexpr std::uint32_t kGroundPartVersion = 2;
 
 /// What the ground keeps beside the application; plain data.
 struct GroundPart {

@@ -138,6 +138,7 @@ CalibrationRun calibrate(const Pass& pass, const CalibrationOptions& options, co
   const Statistics recorded = run.calibration.statistics;
   run.calibration = pipeline.calibration();
   run.calibration.statistics = recorded;
+  run.calibration.start_up = pass.settings.start_up;
   if (smoothed) {
     run.drift_models = std::move(smoothed->drift_models);
     std::move(smoothed->refinement).put_into(run);
@@ -167,7 +168,7 @@ NavigationRun navigate(const Pass& pass, const CalibrationOptions& options, cons
     run.held_parameters_misfit = pipeline.squared_distance_from_prior();
     run.misfit_limit = boost::math::quantile(boost::math::chi_squared(pipeline.layout().parameters()), 0.999);
   }
-  run.verdict = judge_navigation(run);
+  run.verdict = judge_navigation(pass, run);
   return run;
 }
 

@@ -169,6 +169,7 @@ const PassAlone& SeveralPasses::add(const std::string& name, const Pass& pass, c
   }
   last_ = pass.settings;
   start_up_ = start_up_.empty() ? pass.settings.start_up : start_up_;
+  combined_.calibration.start_up = start_up_;
   return added;
 }
 

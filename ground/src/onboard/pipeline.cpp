@@ -7,6 +7,7 @@
 #include "model/prior.hpp"
 #include "model/setup.hpp"
 #include "onboard/calibration_of.hpp"
+#include "trihedron/core/measurement.hpp"
 #include "trihedron/core/on_board.hpp"
 #include "trihedron/ground/model/setup_error.hpp"
 
@@ -114,6 +115,8 @@ std::span<const StepReport> Pipeline::finish() {
 
 const Layout& Pipeline::layout() const { return program_->layout; }
 
+Duration Pipeline::correction_interval() const { return policy_of(options_.corrections).interval; }
+
 bool Pipeline::started() const {
   return program_->visit([](const auto& its) { return its.estimator().started(); });
 }
@@ -158,6 +161,20 @@ double Pipeline::squared_distance_from_prior() const {
         Rot<C, C>::assume(Eigen::Matrix3d(gyros[k].C_c_b * held.C_c_b.transpose())).log().raw();
   }
   return moved.dot(program_->prior.covariance.llt().solve(moved));
+}
+
+OpenLoopEnd Pipeline::compare(const AttitudeSolution& attitude, const ComparedFix& its) const {
+  return program_->visit([&](const auto& on_board) {
+    const auto& estimator = on_board.estimator();
+    Rot<In, C> by_fix = Rot<In, C>::assume(its.fix.q_in_c.normalized());
+    if constexpr (requires { estimator.shared(); }) {
+      by_fix =
+          corrected(its.fix, fix_by_shared_states(estimator.setup(), its.fix, its.readings.rate_c), estimator.shared());
+    }
+    const Eigen::Vector3d apart_rad = (by_fix.inverse() * attitude.C_in_c).log().raw();
+    const Eigen::Matrix3d covariance = attitude.covariance_rad2 + fix_noise(estimator.setup(), its.fix.head);
+    return OpenLoopEnd{its.fix.t, apart_rad.norm(), apart_rad.dot(covariance.llt().solve(apart_rad))};
+  });
 }
 
 std::optional<AttitudeSolution> Pipeline::navigation_attitude() const {

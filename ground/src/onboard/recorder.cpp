@@ -87,6 +87,7 @@ void FixSums::add(const FixRecord& fix) {
   components_ = fix.innovation.size();
   used_ += fix.used() ? 1 : 0;
   outliers_ += fix.status == FixStatus::kRejectedByGate ? 1 : 0;
+  frozen_ += fix.status == FixStatus::kRejectedFrozen ? 1 : 0;
   const bool was_reopened = fix.status == FixStatus::kUsedAfterReopening || fix.status == FixStatus::kRestarted ||
                             fix.status == FixStatus::kEstimateLost;
   reopened_ += was_reopened ? 1 : 0;
@@ -106,6 +107,7 @@ void FixSums::put_into(Statistics& statistics) const {
   statistics.fixes = fixes_;
   statistics.fixes_used = used_;
   statistics.fixes_rejected_as_outliers = outliers_;
+  statistics.fixes_frozen = frozen_;
   statistics.fixes_off_in_a_row = off_in_a_row_;
   statistics.reopened = reopened_;
   statistics.nis_count = judged_;
@@ -187,17 +189,69 @@ void Recorder::add_angle(Time t, double residual) {
   run_.angle_residual_max.back() = std::max(run_.angle_residual_max.back(), residual);
 }
 
-void NavigationRecorder::add(const StepReport& report, const Pipeline& pipeline) {
-  if (report.fix.status != FixStatus::kNone && report.fix.status != FixStatus::kPending) {
-    run_.fixes.push_back(record_of(report, pipeline.layout().gyros));
-    corrected_ = report.corrected ? report.fix.t : corrected_;
-  }
-  if (report.sample != SampleStatus::kUsed) {
+void CorrectionSums::add(const FixRecord& fix, Duration interval) {
+  if (fix.corrected_navigator) {
+    ++made_;
+    corrected_ = fix.t;
+    waiting_since_.reset();
     return;
   }
-  if (const std::optional<AttitudeSolution> solution = pipeline.navigation_attitude()) {
-    append(run_.attitude, report.t, *solution, corrected_);
+  if (corrected_ && fix.t - *corrected_ < interval) {
+    return;
   }
+  waiting_since_ = waiting_since_.value_or(fix.t);
+  if (fix.t - *waiting_since_ >= interval) {
+    ++missed_;
+    waiting_since_ = fix.t;
+  }
+}
+
+void NavigationRecorder::add(const StepReport& report, const Pipeline& pipeline) {
+  if (report.fix.status != FixStatus::kNone && report.fix.status != FixStatus::kPending) {
+    add_fix(report, pipeline);
+  }
+  if (report.sample == SampleStatus::kUsed) {
+    if (const std::optional<AttitudeSolution> solution = pipeline.navigation_attitude()) {
+      append(run_.attitude, report.t, *solution, corrected_);
+    }
+  }
+  if (report.sample != SampleStatus::kNone && !run_.attitude.t.empty()) {
+    ++run_.samples[report.sample];
+  }
+}
+
+void NavigationRecorder::add_fix(const StepReport& report, const Pipeline& pipeline) {
+  const FixRecord& fix = run_.fixes.emplace_back(record_of(report, pipeline.layout().gyros));
+  corrections_.add(fix, pipeline.correction_interval());
+  if (report.corrected) {
+    corrected_ = fix.t;
+    end_open_loop();
+  } else if (fix.head == 0 && !fix.jumped && report.navigated && report.compared) {
+    if (last_compared_.size() == kLastFixes) {
+      last_compared_.erase(last_compared_.begin());
+    }
+    last_compared_.push_back(pipeline.compare(*report.navigated, *report.compared));
+  }
+}
+
+void NavigationRecorder::end_open_loop() {
+  if (last_compared_.size() == kLastFixes) {
+    const auto median = [&](auto member) {
+      const auto middle = last_compared_.begin() + kLastFixes / 2;
+      std::ranges::nth_element(last_compared_, middle, {}, member);
+      return (*middle).*member;
+    };
+    const Time t = last_compared_.back().t;
+    run_.open_loops.push_back({t, median(&OpenLoopEnd::error_rad), median(&OpenLoopEnd::square)});
+  }
+  last_compared_.clear();
+}
+
+NavigationRun NavigationRecorder::take() && {
+  end_open_loop();
+  run_.corrections = corrections_.made();
+  run_.corrections_missed = corrections_.missed();
+  return std::move(run_);
 }
 
 }  // namespace trihedron::ground

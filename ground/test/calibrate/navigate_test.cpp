@@ -10,6 +10,7 @@
 
 #include "passes.hpp"
 #include "trihedron/ground/calibrate/calibrate.hpp"
+#include "trihedron/ground/onboard/recorder.hpp"
 #include "trihedron/records/run.hpp"
 
 namespace trihedron::ground {
@@ -165,6 +166,71 @@ TEST(Navigate, DoesNotTakeWhatOnlyTheWholePassShows) {
   const NavigationRun without = navigate(pass, told());
   ASSERT_EQ(by_default.attitude.size(), without.attitude.size());
   EXPECT_TRUE(all_same_bits(by_default.attitude.q_in_c.back().coeffs(), without.attitude.q_in_c.back().coeffs()));
+}
+
+/// A pass navigated with the values of its own calibration, after they have been spoilt.
+template <class Spoil>
+NavigationRun navigate_with(const Spoil& spoil) {
+  Pass pass = two_hours().pass;
+  CalibrationOptions options = told();
+  pass.settings.prior = calibrate(pass, options).calibration;
+  spoil(*pass.settings.prior);
+  options.corrections = {CorrectionOptions::When::kEvery, minutes(30), false};
+  return navigate(pass, options);
+}
+
+TEST(Navigate, WithAGoodCalibrationHasNoFindings) {
+  const NavigationRun run = navigate_with([](Calibration&) {});
+  EXPECT_TRUE(run.verdict.trustworthy);
+  for (const Finding& finding : run.verdict.findings) {
+    ADD_FAILURE() << finding.text << " " << finding.evidence;
+  }
+  EXPECT_EQ(run.corrections, 5);  // at 0, 30 … 120 min
+  EXPECT_EQ(run.corrections_missed, 0);
+  EXPECT_EQ(run.open_loops.size(), 4U);
+  EXPECT_EQ(run.samples[SampleStatus::kUsed], static_cast<long>(run.attitude.size()));
+}
+
+TEST(Navigate, WithCoefficientsTenThousandTimesTooLargeIsNotToBeUsed) {
+  const NavigationRun run = navigate_with([](Calibration& calibration) {
+    for (GyroCalibration& gyro : calibration.gyros) {
+      for (double& coefficient : gyro.drift_rad_s) {
+        coefficient *= 1e4;
+      }
+    }
+  });
+  EXPECT_FALSE(run.verdict.trustworthy);
+  EXPECT_TRUE(run.verdict.has(FindingCode::kAttitudeIncomplete));
+}
+
+TEST(Navigate, WithAnAlignmentFarOffIsNotToBeUsed) {
+  const NavigationRun run =
+      navigate_with([](Calibration& calibration) { calibration.gyros[0].alignment_rotation_vector_rad.x() += 1; });
+  EXPECT_FALSE(run.verdict.trustworthy);
+}
+
+TEST(CorrectionSums, CountsIntervalsOverWhichNoFixCouldCorrect) {
+  CorrectionSums sums;
+  const auto fix = [&](int t_min, bool corrected, Duration interval = minutes(30)) {
+    FixRecord record;
+    record.t = Time(minutes(t_min));
+    record.corrected_navigator = corrected;
+    sums.add(record, interval);
+    return sums.missed();
+  };
+  EXPECT_EQ(fix(0, false), 0);
+  EXPECT_EQ(fix(1, true), 0);
+  EXPECT_EQ(fix(2, false), 0);
+  EXPECT_EQ(fix(32, false), 0);  // due, and refused
+  EXPECT_EQ(fix(33, true), 0);
+  EXPECT_EQ(fix(500, false), 0);  // after a gap
+  EXPECT_EQ(fix(529, false), 0);
+  EXPECT_EQ(fix(530, false), 1);
+  EXPECT_EQ(fix(559, false), 1);
+  EXPECT_EQ(fix(560, true), 1);
+  EXPECT_EQ(sums.made(), 3);
+  EXPECT_EQ(fix(561, false, Duration::zero()), 2);  // each fix
+  EXPECT_EQ(fix(561, false, Duration::max()), 2);   // only the first
 }
 
 }  // namespace

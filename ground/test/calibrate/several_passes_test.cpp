@@ -179,6 +179,7 @@ TEST(SeveralPasses, GoIntoACatalogueEachAloneAndTogether) {
   EXPECT_EQ(entries[2].pass, "second");
   EXPECT_EQ(entries[2].passes, 2);
   EXPECT_EQ(entries[2].calibration.covariance, passes.combined().calibration.covariance);
+  EXPECT_EQ(entries[2].calibration.start_up, "May");
   for (const CatalogueEntry& entry : entries) {
     EXPECT_EQ(entry.spacecraft, "Resurs-DK1");
     EXPECT_EQ(entry.start_up, "May");

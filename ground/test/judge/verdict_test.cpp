@@ -283,6 +283,15 @@ TEST(Verdict, FindsAStarTrackerThatWasOff) {
   EXPECT_THAT(codes(judge(good_pass(), run)), ElementsAre("star-tracker-off"));
 }
 
+TEST(Verdict, FindsAStarTrackerThatWasFrozen) {
+  auto run = good_run();
+  run.calibration.statistics.fixes_frozen = 100;
+  const Verdict verdict = judge(good_pass(), run);
+  EXPECT_THAT(codes(verdict), ElementsAre("star-tracker-frozen"));
+  EXPECT_EQ(verdict.findings[0].evidence, "100 of 3601 fixes");
+  EXPECT_TRUE(verdict.trustworthy);
+}
+
 TEST(Verdict, FindsABadlyPlacedPair) {
   auto run = good_run();
   run.calibration.gyros[1].momentum_in = {std::cos(0.5), std::sin(0.5), 0};
@@ -291,20 +300,133 @@ TEST(Verdict, FindsABadlyPlacedPair) {
   EXPECT_THAT(codes(judge(good_pass(), run)), ElementsAre("pair-badly-placed"));
 }
 
-TEST(Verdict, OfANavigationSaysWhetherTheParametersFit) {
+NavigationRun good_navigation() {
   NavigationRun run;
   run.statistics = good_run().calibration.statistics;
-  EXPECT_TRUE(judge_navigation(run).trustworthy);
+  run.samples[SampleStatus::kUsed] = 86400;
+  run.attitude.t.resize(86400);
+  run.corrections = 7;
+  run.open_loops.assign(7, {.t = {}, .error_rad = 1e-4, .square = 3});
+  return run;
+}
+
+TEST(Verdict, OfANavigationSaysWhetherTheParametersFit) {
+  NavigationRun run = good_navigation();
+  const auto verdict = [&] { return judge_navigation(good_pass(), run); };
+  EXPECT_THAT(codes(verdict()), IsEmpty());
   run.misfit_limit = 45;
   run.held_parameters_misfit = 30;
-  EXPECT_TRUE(judge_navigation(run).trustworthy);
+  EXPECT_TRUE(verdict().trustworthy);
   run.held_parameters_misfit = 60;
-  EXPECT_THAT(codes(judge_navigation(run)), ElementsAre("calibration-does-not-fit"));
-  EXPECT_FALSE(judge_navigation(run).trustworthy);
+  EXPECT_THAT(codes(verdict()), ElementsAre("calibration-does-not-fit"));
+  EXPECT_FALSE(verdict().trustworthy);
   run.held_parameters_misfit.reset();
   run.statistics.nis_mean = 40;
-  EXPECT_THAT(codes(judge_navigation(run)), ElementsAre("nis-out-of-bounds"));
-  EXPECT_FALSE(judge_navigation(run).trustworthy);
+  EXPECT_THAT(codes(verdict()), ElementsAre("nis-out-of-bounds"));
+  EXPECT_FALSE(verdict().trustworthy);
+  run = good_navigation();
+  run.statistics.fixes_frozen = 20;
+  EXPECT_THAT(codes(verdict()), ElementsAre("star-tracker-frozen"));
+}
+
+TEST(Verdict, OfANavigationFindsSamplesWithoutAttitude) {
+  NavigationRun run = good_navigation();
+  const auto verdict = [&] { return judge_navigation(good_pass(), run); };
+  run.samples[SampleStatus::kRejectedNotDirection] = 80000;  // the telemetry's, and counted there
+  run.samples[SampleStatus::kThinned] = 800000;
+  run.samples[SampleStatus::kRejectedTooFewGyros] = 4000;
+  EXPECT_THAT(codes(verdict()), IsEmpty());
+  run.samples[SampleStatus::kRejectedTooFewGyros] = 10000;
+  EXPECT_THAT(codes(verdict()), ElementsAre("attitude-incomplete"));
+  EXPECT_TRUE(verdict().trustworthy);
+  EXPECT_EQ(verdict().findings[0].evidence,
+            "10000 of 96400 samples: no attitude by the readings at 0, too few gyros at 10000");
+  run.samples[SampleStatus::kRejectedTooFewGyros] = 100000;
+  EXPECT_FALSE(verdict().trustworthy);
+  run = good_navigation();
+  run.attitude.t.resize(83000);
+  EXPECT_THAT(codes(verdict()), IsEmpty());
+  run.attitude.t.resize(272);
+  EXPECT_THAT(codes(verdict()), ElementsAre("attitude-incomplete"));
+  EXPECT_FALSE(verdict().trustworthy);
+  run = good_navigation();
+  run.samples[SampleStatus::kRejectedGeometry] = 10000;
+  EXPECT_THAT(codes(verdict()), ElementsAre("attitude-incomplete"));
+  EXPECT_FALSE(verdict().trustworthy);
+}
+
+TEST(Verdict, OfANavigationFindsCorrectionsThatWereNotMade) {
+  NavigationRun run = good_navigation();
+  const auto verdict = [&] { return judge_navigation(good_pass(), run); };
+  run.corrections = 1000;
+  run.corrections_missed = 40;  // of each fix: a few outliers
+  EXPECT_THAT(codes(verdict()), IsEmpty());
+  run.corrections = 6;
+  run.corrections_missed = 1;
+  EXPECT_THAT(codes(verdict()), ElementsAre("corrections-missed"));
+  EXPECT_TRUE(verdict().trustworthy);
+  run.corrections = 2;
+  run.corrections_missed = 5;
+  EXPECT_FALSE(verdict().trustworthy);
+}
+
+TEST(Verdict, OfANavigationFindsAnAttitudeThatIsOffTheFixes) {
+  NavigationRun run = good_navigation();
+  const auto verdict = [&] { return judge_navigation(good_pass(), run); };
+  run.open_loops.assign(7, {.t = {}, .error_rad = 1e-4, .square = 16});  // 99.9 % lie below 16.3
+  EXPECT_THAT(codes(verdict()), IsEmpty());
+  run.open_loops.assign(7, {.t = {}, .error_rad = 1e-4, .square = 20});
+  EXPECT_THAT(codes(verdict()), ElementsAre("attitude-off-fixes"));
+  EXPECT_TRUE(verdict().trustworthy);
+  run.open_loops.assign(7, {.t = {}, .error_rad = 1e-4, .square = 28});
+  EXPECT_FALSE(verdict().trustworthy);
+  run.open_loops[3].square = std::nan("");  // as of an overflow
+  EXPECT_FALSE(verdict().trustworthy);
+  run.open_loops.clear();
+  EXPECT_THAT(codes(verdict()), IsEmpty());
+}
+
+TEST(Verdict, OfANavigationTakesOverThatOfTheCalibrationInUse) {
+  NavigationRun run = good_navigation();
+  Pass pass = good_pass();
+  pass.settings.prior.emplace().verdict.trustworthy = true;
+  run.held_parameters_misfit = 0;
+  EXPECT_THAT(codes(judge_navigation(pass, run)), IsEmpty());
+  pass.settings.prior->verdict.trustworthy = false;
+  EXPECT_EQ(judge_navigation(pass, run).findings.at(0).evidence, "it gives no reason");
+  pass.settings.prior->verdict.findings = {{FindingCode::kTooFewFixes, "", "", ""},
+                                           {FindingCode::kShortPass, "", "", ""}};
+  const Verdict held = judge_navigation(pass, run);
+  EXPECT_THAT(codes(held), ElementsAre("calibration-not-trustworthy"));
+  EXPECT_EQ(held.findings[0].evidence, "too-few-fixes");
+  EXPECT_FALSE(held.trustworthy);
+  run.held_parameters_misfit.reset();  // calibrated along: a start only
+  EXPECT_THAT(codes(judge_navigation(pass, run)), ElementsAre("calibration-not-trustworthy"));
+  EXPECT_TRUE(judge_navigation(pass, run).trustworthy);
+}
+
+TEST(Verdict, OfANavigationFindsACalibrationOfAnotherStartUp) {
+  const NavigationRun run = good_navigation();
+  Pass pass = good_pass();
+  pass.settings.prior.emplace().verdict.trustworthy = true;
+  const auto found = [&](std::chrono::days later, const char* of_calibration, const char* of_pass) {
+    pass.settings.epoch = pass.settings.prior->epoch + later;
+    pass.settings.prior->start_up = of_calibration;
+    pass.settings.start_up = of_pass;
+    const Verdict verdict = judge_navigation(pass, run);
+    EXPECT_TRUE(verdict.trustworthy);
+    return verdict.findings.empty()
+               ? ""
+               : std::string(name_of(verdict.findings[0].code)) + ": " + verdict.findings[0].evidence;
+  };
+  using std::chrono::days;
+  EXPECT_EQ(found(days(0), "", ""), "");
+  EXPECT_EQ(found(days(29), "", ""), "");
+  EXPECT_EQ(found(days(-29), "", "May"), "");
+  EXPECT_EQ(found(days(400), "May", "May"), "");
+  EXPECT_EQ(found(days(400), "", ""), "calibration-of-another-time: made 400 days before this pass");
+  EXPECT_EQ(found(days(-400), "May", ""), "calibration-of-another-time: made 400 days after this pass");
+  EXPECT_EQ(found(days(1), "May", "June"), "calibration-of-another-time: start-up May in place of June");
 }
 
 TEST(AlignmentObservability, IsNilWhereTheAxisNeverMoves) {

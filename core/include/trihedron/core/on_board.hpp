@@ -7,6 +7,7 @@
 #include <optional>
 
 #include "trihedron/core/fix_queue.hpp"
+#include "trihedron/core/frozen_fixes.hpp"
 #include "trihedron/core/intake.hpp"
 #include "trihedron/core/invariant_estimator.hpp"
 #include "trihedron/core/navigator.hpp"
@@ -209,6 +210,7 @@ class OnBoard {
 
   Intake intake_;
   FixQueue<Estimator::kStarTrackers> fixes_;
+  FrozenFixes<Estimator::kStarTrackers, Gyros::capacity()> frozen_fixes_;
   Readings<Gyros::capacity()> readings_;
   Schedule schedule_;
   Estimator estimator_;

@@ -104,17 +104,20 @@ class Readings {
     } else {
       return std::nullopt;
     }
-    fit(t, reach_, after, 3, setup, health, gyros, readings);
+    static_cast<void>(fit(t, reach_, after, 3, setup, health, gyros, readings));
     return readings;
   }
 
-  /// Readings at the latest sample; needs one.
+  /// Readings at the latest sample; needs one. Where no polynomial explains the samples up to it, a gyro whose latest
+  /// reading alone leads elsewhere than those before it is not used.
   template <class Gyros>
   [[nodiscard]] FixReadings now(const CalibrationSetup& setup, const GyroHealth& health, const Gyros& gyros) const {
     FixReadings readings;
     readings.used = health.usable(latest_t(), latest_t());
     readings.h_b = latest_directions();
-    fit(latest_t(), recent_, size_, 2, setup, health, gyros, readings);
+    if (!fit(latest_t(), recent_, size_, 2, setup, health, gyros, readings)) {
+      leave_out_spikes(setup, gyros, readings);
+    }
     return readings;
   }
 
@@ -128,9 +131,9 @@ class Readings {
   [[nodiscard]] const Stored& at(int i) const { return samples_[index(i)]; }
 
   /// Fits a polynomial to the samples within `reach` to both sides of `t`, if they are more than it needs and it
-  /// explains them; `after`: the first of them after `t`.
+  /// explains them; whether it does. `after`: the first of them after `t`.
   template <class Gyros>
-  void fit(Time t, Duration reach, int after, int degree, const CalibrationSetup& setup, const GyroHealth& health,
+  bool fit(Time t, Duration reach, int after, int degree, const CalibrationSetup& setup, const GyroHealth& health,
            const Gyros& gyros, FixReadings& readings) const {
     const auto adjacent = [&](int i) { return time(i + 1) - time(i) <= max_interpolation_; };
     int begin = after - 1;
@@ -142,7 +145,7 @@ class Readings {
       ++end;
     }
     if (end - begin < DirectionsFit::least_samples(degree)) {
-      return;
+      return false;
     }
     DirectionsFit fit(t, time(begin), time(end - 1), end - begin, degree, gyros_);
     for (int i = begin; i < end; ++i) {
@@ -151,7 +154,7 @@ class Readings {
     const FittedDirections fitted = fit.solve();
     const GyroMask used = health.usable(time(begin), time(end - 1));
     if (count(used) < 2 || !fitted.explains(used, setup.readout_noise_rad)) {
-      return;
+      return false;
     }
     readings.used = used;
     readings.h_b = fitted.h_b;
@@ -163,6 +166,71 @@ class Readings {
       h_c_rate[k] = gyros[k].C_c_b * fitted.h_b_rate[k];
     }
     readings.rate_c = rate_by_directions(h_c, h_c_rate, used);
+    return true;
+  }
+
+  /// Squared deviation, in its variance of two components, above which a reading does not belong to others: once in
+  /// 3e6.
+  static constexpr double kSpike = 30;
+  /// Samples before one that it is compared with, or spacings of them.
+  static constexpr int kCompared = 4;
+
+  /// Leaves out each gyro whose latest reading leads elsewhere. Where the one before it did so as well, the body may
+  /// have begun to move in another way: it then turns all momenta alike, and the angles between them stay.
+  template <class Gyros>
+  void leave_out_spikes(const CalibrationSetup& setup, const Gyros& gyros, FixReadings& readings) const {
+    const int latest = size_ - 1;
+    const GyroMask used = readings.used;
+    for (int k = 0; k < gyros_; ++k) {
+      const double noise_rad = setup.readout_noise_rad[k];
+      readings.used[k] =
+          used[k] && (continues(latest, k, noise_rad, setup.recent()) ||
+                      (!continues(latest - 1, k, noise_rad, setup.recent()) && keeps_angles(k, setup, gyros, used)));
+    }
+  }
+
+  /// Whether the reading of a gyro in sample i lies on the parabola through some three before it, one, two … samples
+  /// apart and not longer ago than `within`. Two of these parabolas are enough, so that a spike among those before it
+  /// does not count, and one where there are no more; true where there is none.
+  [[nodiscard]] bool continues(int i, int gyro, double noise_rad, Duration within) const {
+    int compared = 0;
+    int agree = 0;
+    for (int apart = 1; apart <= kCompared && 3 * apart <= i && time(i) - time(i - 3 * apart) <= within; ++apart) {
+      const double t = to_seconds(time(i - apart) - time(i));
+      const double u = to_seconds(time(i - 2 * apart) - time(i));
+      const double v = to_seconds(time(i - 3 * apart) - time(i));
+      const Eigen::Vector3d weights(u * v / ((u - t) * (v - t)), t * v / ((t - u) * (v - u)),
+                                    t * u / ((t - v) * (u - v)));
+      const Eigen::Vector3d off = at(i).h_b[gyro] - weights(0) * at(i - apart).h_b[gyro] -
+                                  weights(1) * at(i - 2 * apart).h_b[gyro] - weights(2) * at(i - 3 * apart).h_b[gyro];
+      const double limit = kSpike * noise_rad * noise_rad * (1 + weights.squaredNorm());
+      agree += off.squaredNorm() <= limit ? 1 : 0;
+      ++compared;
+    }
+    return agree >= std::min(compared, 2);
+  }
+
+  /// Whether the angle of a gyro's momentum to one of the others, by the latest readings, is that by two of the samples
+  /// before.
+  template <class Gyros>
+  [[nodiscard]] bool keeps_angles(int gyro, const CalibrationSetup& setup, const Gyros& gyros,
+                                  const GyroMask& used) const {
+    const auto cosine = [&](int i, int other) {
+      return gyros[gyro].in_c(at(i).h_b[gyro]).dot(gyros[other].in_c(at(i).h_b[other]));
+    };
+    const int latest = size_ - 1;
+    for (int other = 0; other < gyros_; ++other) {
+      const double noise_rad = std::max(setup.readout_noise_rad[gyro], setup.readout_noise_rad[other]);
+      int agree = 0;
+      for (int i = std::max(latest - kCompared, 0); other != gyro && used[other] && i < latest; ++i) {
+        const double moved = cosine(latest, other) - cosine(i, other);
+        agree += moved * moved <= kSpike * 4 * noise_rad * noise_rad ? 1 : 0;
+      }
+      if (agree >= 2) {
+        return true;
+      }
+    }
+    return false;
   }
 
   int gyros_ = 0;

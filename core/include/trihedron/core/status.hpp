@@ -44,8 +44,9 @@ enum class FixStatus : std::uint8_t {
   kRejectedByGate,       ///< NIS above the gate
   kEstimateLost,         ///< estimate or its covariance was no longer finite: the filter returns to the prior, and the
                          ///< next fix starts it; the navigator keeps what it has
+  kRejectedFrozen,  ///< the quaternion of the fix before it once more, while the gyros show that the body has turned
 };
-inline constexpr std::size_t kFixStatuses = 15;
+inline constexpr std::size_t kFixStatuses = 16;
 
 /// Whether the fix took part in the estimation.
 [[nodiscard]] constexpr bool is_used(FixStatus status) {

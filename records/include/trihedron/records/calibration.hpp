@@ -3,6 +3,7 @@
 
 #include <Eigen/Core>
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "trihedron/core/time.hpp"
@@ -52,8 +53,9 @@ struct CalibrationNoise {
 /// The result of a calibration: parameters of all gyros, their covariance, verdict, statistics.
 struct Calibration {
   Estimator estimator = Estimator::kInvariant;
-  Time epoch{};  ///< of the pass
-  Time t{};      ///< for which the momenta stand
+  Time epoch{};          ///< of the pass
+  std::string start_up;  ///< of the rotors, as in PassSettings; empty where it is not known
+  Time t{};              ///< for which the momenta stand
   std::vector<GyroCalibration> gyros;
   /// Drift coefficients and alignments, one per row of `covariance`.
   std::vector<ParameterId> states;

@@ -19,6 +19,7 @@ enum class FindingCode : std::uint8_t {
   kReopened,
   kBatchNotConverged,
   kStarTrackerOff,
+  kStarTrackerFrozen,
   kGyroIsolated,
   kGyroStuck,
   kGyroSamplesThinned,
@@ -40,6 +41,11 @@ enum class FindingCode : std::uint8_t {
   kStarTrackersNotUsed,
   kPairBadlyPlaced,
   kCalibrationDoesNotFit,
+  kCalibrationNotTrustworthy,
+  kCalibrationOfAnotherTime,
+  kAttitudeIncomplete,
+  kCorrectionsMissed,
+  kAttitudeOffFixes,
   kAlignmentMoved,
   kCoefficientsMoved,
   kPassNotTrustworthy,
@@ -65,13 +71,14 @@ struct FindingRow {
   std::string_view name;     ///< stable, for programs
   FindingSeverity severity;  ///< where the one who finds it does not say otherwise
 };
-inline constexpr std::array<FindingRow, 32> kFindings = {{
+inline constexpr std::array<FindingRow, 38> kFindings = {{
     {FindingCode::kTooFewFixes, "too-few-fixes", FindingSeverity::kDoNotUse},
     {FindingCode::kShortPass, "short-pass", FindingSeverity::kWarning},
     {FindingCode::kManyRejected, "many-rejected", FindingSeverity::kWarning},
     {FindingCode::kReopened, "reopened", FindingSeverity::kWarning},
     {FindingCode::kBatchNotConverged, "batch-not-converged", FindingSeverity::kDoNotUse},
     {FindingCode::kStarTrackerOff, "star-tracker-off", FindingSeverity::kWarning},
+    {FindingCode::kStarTrackerFrozen, "star-tracker-frozen", FindingSeverity::kWarning},
     {FindingCode::kGyroIsolated, "gyro-isolated", FindingSeverity::kWarning},
     {FindingCode::kGyroStuck, "gyro-stuck", FindingSeverity::kWarning},
     {FindingCode::kGyroSamplesThinned, "gyro-samples-thinned", FindingSeverity::kNote},
@@ -93,6 +100,11 @@ inline constexpr std::array<FindingRow, 32> kFindings = {{
     {FindingCode::kStarTrackersNotUsed, "star-trackers-not-used", FindingSeverity::kNote},
     {FindingCode::kPairBadlyPlaced, "pair-badly-placed", FindingSeverity::kWarning},
     {FindingCode::kCalibrationDoesNotFit, "calibration-does-not-fit", FindingSeverity::kDoNotUse},
+    {FindingCode::kCalibrationNotTrustworthy, "calibration-not-trustworthy", FindingSeverity::kDoNotUse},
+    {FindingCode::kCalibrationOfAnotherTime, "calibration-of-another-time", FindingSeverity::kWarning},
+    {FindingCode::kAttitudeIncomplete, "attitude-incomplete", FindingSeverity::kWarning},
+    {FindingCode::kCorrectionsMissed, "corrections-missed", FindingSeverity::kWarning},
+    {FindingCode::kAttitudeOffFixes, "attitude-off-fixes", FindingSeverity::kWarning},
     {FindingCode::kAlignmentMoved, "alignment-moved", FindingSeverity::kWarning},
     {FindingCode::kCoefficientsMoved, "coefficients-moved", FindingSeverity::kDoNotUse},
     {FindingCode::kPassNotTrustworthy, "pass-not-trustworthy", FindingSeverity::kDoNotUse},

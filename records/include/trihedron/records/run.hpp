@@ -93,10 +93,22 @@ struct CalibrationRun {
   std::vector<GyroEvent> gyro_events;  ///< changes of a gyro's state
 };
 
+/// How far the navigator was off the fixes at the end of an open loop: just before a correction, or at the end of the
+/// pass. Medians over the last fixes, so that a single outlier does not count.
+struct OpenLoopEnd {
+  Time t{};              ///< of the last of these fixes
+  double error_rad = 0;  ///< angle between its attitude and that of the fix
+  double square = 0;     ///< of the same by its covariance, that of the attitude and of the fix: χ² of three
+};
+
 /// The attitude of a pass by the open-loop navigator, and how well the parameters in use fitted.
 struct NavigationRun {
   AttitudeHistory attitude;  ///< at every gyro sample used
   std::vector<FixRecord> fixes;
+  SampleCounts samples;                 ///< from that of the first attitude on, by what was done with them
+  long corrections = 0;                 ///< astro-corrections made
+  long corrections_missed = 0;          ///< intervals over which there were fixes, but none that could correct
+  std::vector<OpenLoopEnd> open_loops;  ///< where fixes could be compared with it
   Statistics statistics;
   /// Where parameters are held: (estimated − held)ᵀ P⁻¹ (estimated − held), P the covariance they were given with, and
   /// its 99.9 % limit.

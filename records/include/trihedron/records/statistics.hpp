@@ -16,6 +16,8 @@ struct Statistics {
   long fixes_rejected_as_outliers = 0;
   /// In runs of 20 and more whose misfits are larger than drift can cause.
   long fixes_off_in_a_row = 0;
+  /// Refused because the star tracker repeated its quaternion while the body turned.
+  long fixes_frozen = 0;
   long reopened = 0;                       ///< how often the filter reopened the directions, or restarted
   long nis_count = 0;                      ///< fixes that the mean NIS is over
   double nis_degrees_of_freedom = 0;       ///< their mean

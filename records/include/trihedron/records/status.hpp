@@ -32,6 +32,7 @@ inline constexpr std::array<StatusRow<FixStatus>, kFixStatuses> kFixStatusRows =
     {FixStatus::kRejectedTooFewGyros, "rejected: too few gyros can be used"},
     {FixStatus::kRejectedByGate, "rejected: outlier"},
     {FixStatus::kEstimateLost, "rejected: estimate was not finite and was dropped"},
+    {FixStatus::kRejectedFrozen, "rejected: star tracker frozen"},
 }};
 
 inline constexpr std::array<StatusRow<SampleStatus>, kSampleStatuses> kSampleStatusRows = {{

@@ -6,8 +6,8 @@ namespace trihedron::ground {
 
 /// Findings with evidence and cure, and whether the result may be used.
 [[nodiscard]] Verdict judge(const Pass& pass, const CalibrationRun& run);
-/// Whether the parameters in use fit the pass.
-[[nodiscard]] Verdict judge_navigation(const NavigationRun& run);
+/// Whether the attitude covers the pass and agrees with the fixes, and whether the parameters in use fit it.
+[[nodiscard]] Verdict judge_navigation(const Pass& pass, const NavigationRun& run);
 
 /// One for each gyro and state: how often, and when first, in minutes from `epoch`.
 [[nodiscard]] std::vector<std::string> texts_of(const std::vector<GyroEvent>& events, Time epoch);

@@ -13,6 +13,7 @@
 #include "trihedron/records/calibration.hpp"
 #include "trihedron/records/options.hpp"
 #include "trihedron/records/pass.hpp"
+#include "trihedron/records/run.hpp"
 
 namespace trihedron::ground {
 
@@ -35,6 +36,8 @@ class Pipeline {
   [[nodiscard]] const PassSettings& settings() const { return settings_; }
   [[nodiscard]] const CalibrationOptions& options() const { return options_; }
   [[nodiscard]] const Layout& layout() const;
+  /// As of CorrectionPolicy.
+  [[nodiscard]] Duration correction_interval() const;
 
   /// Whether a fix has started the calibration.
   [[nodiscard]] bool started() const;
@@ -50,6 +53,9 @@ class Pipeline {
 
   /// Open-loop attitude at the latest sample; nothing where there is none yet.
   [[nodiscard]] std::optional<AttitudeSolution> navigation_attitude() const;
+  /// How far an attitude at the time of a fix of the first star tracker is off that fix, by the angle and by both
+  /// covariances.
+  [[nodiscard]] OpenLoopEnd compare(const AttitudeSolution& attitude, const ComparedFix& its) const;
 
  private:
   struct Program;

@@ -28,6 +28,7 @@ class FixSums {
   long fixes_ = 0;
   long used_ = 0;
   long outliers_ = 0;
+  long frozen_ = 0;
   long reopened_ = 0;
   long off_in_a_row_ = 0;  ///< of runs that were long enough
   long jumped_in_a_row_ = 0;
@@ -61,15 +62,37 @@ class Recorder {
   PerGyro<GyroState> gyros_before_{};
 };
 
+/// Counts astro-corrections, and the intervals over which fixes were there but none could correct.
+class CorrectionSums {
+ public:
+  void add(const FixRecord& fix, Duration interval);
+  [[nodiscard]] long made() const { return made_; }
+  [[nodiscard]] long missed() const { return missed_; }
+
+ private:
+  std::optional<Time> corrected_;      ///< the last one
+  std::optional<Time> waiting_since_;  ///< the first fix that could have corrected
+  long made_ = 0;
+  long missed_ = 0;
+};
+
 /// Puts the attitude of a pipeline's navigator at each sample, and its fixes, into a run.
 class NavigationRecorder {
  public:
   void add(const StepReport& report, const Pipeline& pipeline);
-  [[nodiscard]] NavigationRun take() && { return std::move(run_); }
+  [[nodiscard]] NavigationRun take() &&;
 
  private:
+  /// Fixes that an open loop is compared with at its end.
+  static constexpr std::size_t kLastFixes = 5;
+
+  void add_fix(const StepReport& report, const Pipeline& pipeline);
+  void end_open_loop();
+
   NavigationRun run_;
   Time corrected_{};
+  CorrectionSums corrections_;
+  std::vector<OpenLoopEnd> last_compared_;  ///< of each of the last fixes since the last correction
 };
 
 }  // namespace trihedron::ground
