@@ -215,7 +215,7 @@ FieldInformation information_on_field(const PassProblem& problem, const PassSolu
   for (int k = 0; k < layout.gyros; ++k) {
     const MatrixXd& amplitudes = modes.gyros[k].amplitudes;
     const auto its = found.triangle.middleCols(layout.drift(k) + Layout::kEq1 - layout.dynamic(), layout.drift_modes);
-    rows.middleCols(others + k * layout.drift_modes, layout.drift_modes) = its;
+    rows.middleCols(others + Index{k} * layout.drift_modes, layout.drift_modes) = its;
     // From the error of the solution to the amplitude itself.
     rows.col(last) += its * (amplitudes * solution.gyros[k].drift_rad_s.segment(Layout::kEq1, amplitudes.cols()));
     by_members.block(k * amplitudes.rows(), k * amplitudes.cols(), amplitudes.rows(), amplitudes.cols()) = amplitudes;

@@ -145,7 +145,7 @@ struct Parameters {
 
 /// Those of a drift field. What the pass says of its modes is known; the members are the most likely ones that make
 /// them, and what the modes leave open of them is as uncertain as before.
-Parameters with_members(const PassProblem& problem, const FieldPrior& field, Parameters by_modes) {
+Parameters with_members(const PassProblem& problem, const FieldPrior& field, const Parameters& by_modes) {
   const Layout& modes = problem.layout();
   const Layout members = problem.setup().layout();
   Parameters found{by_modes.gyros, MatrixXd::Zero(members.parameters(), members.parameters())};
@@ -210,7 +210,7 @@ void Refinement::put_into(CalibrationRun& run) && {
   const MatrixXd own = result_.errors.last_root.middleRows(problem_.layout().drift(0), problem_.layout().parameters());
   Parameters parameters{result_.solution.gyros, own * own.transpose()};
   if (field_) {
-    parameters = with_members(problem_, *field_, std::move(parameters));
+    parameters = with_members(problem_, *field_, parameters);
     calibration.drift_field = field_->levels;
   }
   calibration.covariance = parameters.covariance;
