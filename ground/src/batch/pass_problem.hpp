@@ -178,7 +178,7 @@ class PassProblem {
   };
 
   [[nodiscard]] double gate_of(const FixRows& rows) const;
-  /// How far the misfits are beyond their noise as a rule, by the first fix of each arc: the square of it, 1 or more.
+  /// How far the misfits are beyond their noise as a rule, by the first fixes of each arc: the square of it, 1 or more.
   [[nodiscard]] double scale_of_misfits(const PassSolution& solution) const;
   [[nodiscard]] Reading reading_at(const Node& node) const;
   void step(const Node& from_node, const Node& to_node, Moment& moment, double& extra_variance_rad2) const;
