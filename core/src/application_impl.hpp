@@ -298,7 +298,8 @@ void Application<Estimator>::note_used_fix(const StepReport& report) {
     happen(Event::kAligned);
   }
   forecast_.predict(on_board_.estimator(), on_board_.health().usable(fix.t, fix.t));
-  if (report.corrected && adoption_ == Adoption::kPending) {
+  const bool is_by_calibration = on_board_.corrected_by() == ParametersInUse::kOfCalibration;
+  if (report.corrected && is_by_calibration && adoption_ == Adoption::kPending) {
     adoption_ = Adoption::kDone;
     detail::count_up(counts_.adoptions);
     happen(Event::kAdopted);
@@ -354,7 +355,8 @@ void Application<Estimator>::adopt() {
 template <class Estimator>
 void Application<Estimator>::hold() {
   held_ = true;
-  adoption_ = adoption_ == Adoption::kDone ? Adoption::kDone : Adoption::kNone;
+  const bool is_done = adoption_ == Adoption::kDone || on_board_.corrected_by() == ParametersInUse::kOfCalibration;
+  adoption_ = adoption_ != Adoption::kNone && is_done ? Adoption::kDone : Adoption::kNone;
   on_board_.use_parameters(ParametersInUse::kHeld);
 }
 

@@ -56,6 +56,7 @@ void OnBoard<Estimator>::reset() {
   behind_ = 0;
   fixes_dropped_ = 0;
   clock_set_back_ = start_unconfirmed_ = correction_wanted_ = false;
+  corrected_by_ = {};
   begin_stretch();
 }
 
@@ -586,6 +587,17 @@ void OnBoard<Estimator>::work_on_angles() {
   work_.stage = work_.has_fix ? Work::Stage::kNavigated : Work::Stage::kReport;
 }
 
+/// A correction by the others that is under way is given up: the next fix makes one by these.
+template <class Estimator>
+void OnBoard<Estimator>::use_parameters(ParametersInUse parameters) {
+  const bool is_under_way = work_.stage == Work::Stage::kCatchingUp || work_.stage == Work::Stage::kTakingOver;
+  if (is_under_way && parameters != parameters_) {
+    work_.stage = Work::Stage::kNavigated;
+    correction_wanted_ = true;
+  }
+  parameters_ = parameters;
+}
+
 template <class Estimator>
 bool OnBoard<Estimator>::is_correction_due(Time t) const {
   const bool interval_over = policy_.interval != CorrectionPolicy::kOnlyFirst && t - corrected_t_ >= policy_.interval;
@@ -618,6 +630,7 @@ void OnBoard<Estimator>::take_over() {
   catch_up(readings_.size());
   navigator_.take_over(estimator_, source(), work_.state);
   corrected_t_ = work_.t;
+  corrected_by_ = work_.parameters;
   correction_wanted_ = false;
   work_.outcome.corrected = true;
   work_.stage = Work::Stage::kNavigated;

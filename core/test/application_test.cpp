@@ -4,6 +4,7 @@
 
 #include <cstring>
 #include <limits>
+#include <map>
 #include <set>
 #include <tuple>
 
@@ -385,6 +386,83 @@ TEST(Adoption, WaitsForTheRequiredErrorAndNotForACommand) {
   EXPECT_EQ(application->housekeeping().adopted, 1);
   EXPECT_EQ(application->mode(), kNavigating);
   EXPECT_LT(error_rad(*application), before_rad);
+}
+
+using Attitudes = std::map<Time, Eigen::Matrix3d>;
+
+/// Goes on from `from_s` to `to_s`; the attitude after each sample.
+Attitudes attitudes(double from_s, double to_s, PairApplication& application) {
+  Attitudes found;
+  fly_from(flight(), from_s, to_s, application, [&](const StepReport& report) {
+    if (const auto attitude = application.attitude(); attitude && report.sample == SampleStatus::kUsed) {
+      found[report.t] = attitude->C_in_c.raw();
+    }
+  });
+  return found;
+}
+
+/// Corrected at each fix, whose work is spread over all samples up to the next one.
+PairApplication corrected_at_each_fix() {
+  Parameters table = test::nominal_parameters();
+  table.required_error_rad = 1 * kArcsecond;  // nothing is adopted by itself
+  table.correction_interval_ns = 1;
+  table.spread_over = 1000;
+  PairApplication application;
+  EXPECT_EQ(application.load(table), Answer::kAccepted);
+  EXPECT_EQ(application.command(Command::kStart), Answer::kAccepted);
+  fly_from(flight(), 0, 600, application);
+  return application;
+}
+
+TEST(Adoption, CommandedWhileACorrectionIsUnderWayIsDoneByTheNextOne) {
+  const PairApplication begun = corrected_at_each_fix();
+  PairApplication before = begun;
+  EXPECT_EQ(before.command(Command::kAdoptCalibration), Answer::kAccepted);
+  const Attitudes adopted = attitudes(600, 620, before);
+  for (int samples = 0; samples < 24; ++samples) {
+    const double commanded_s = 606 + samples / 8.0;
+    PairApplication application = begun;
+    fly_from(flight(), 600, commanded_s, application);
+    EXPECT_EQ(application.command(Command::kAdoptCalibration), Answer::kAccepted);
+    for (double t_s = commanded_s; t_s < 618; t_s += 0.125) {
+      const Attitudes now = attitudes(t_s, t_s + 0.125, application);
+      if (application.housekeeping().adopted != 0) {
+        ASSERT_EQ(now.size(), 1U);
+        EXPECT_EQ(now.begin()->second, adopted.at(now.begin()->first)) << samples << " " << t_s;
+      }
+    }
+    EXPECT_EQ(application.housekeeping().adopted, 1) << samples;
+  }
+}
+
+TEST(Hold, WhileTheCorrectionOfAnAdoptionIsUnderWayGivesItUp) {
+  const PairApplication begun = corrected_at_each_fix();
+  PairApplication before = begun;
+  EXPECT_EQ(before.command(Command::kHoldCalibration), Answer::kAccepted);
+  const Attitudes held = attitudes(600, 620, before);
+  int given_up = 0;
+  int done = 0;
+  for (int samples = 0; samples < 48; ++samples) {
+    const double commanded_s = 606 + samples / 8.0;
+    PairApplication application = begun;
+    fly_from(flight(), 600, 605, application);
+    EXPECT_EQ(application.command(Command::kAdoptCalibration), Answer::kAccepted);
+    fly_from(flight(), 605, commanded_s, application);
+    if (application.housekeeping().adopted != 0) {
+      continue;
+    }
+    EXPECT_EQ(application.command(Command::kHoldCalibration), Answer::kAccepted);
+    const bool is_done = application.housekeeping().adopted != 0;
+    ++(is_done ? done : given_up);
+
+    fly_from(flight(), commanded_s, 616, application);
+    EXPECT_EQ(application.housekeeping().adopted, is_done ? 1 : 0) << samples;
+    for (const auto& [t, attitude] : attitudes(616, 618, application)) {
+      EXPECT_EQ(attitude == held.at(t), !is_done) << samples;
+    }
+  }
+  EXPECT_GT(given_up, 1);
+  EXPECT_GT(done, 0);  // the navigator has been corrected, and the report of it was still to come
 }
 
 /// A case that has been moved: gyro 1 reads everything turned, from 1500 s on.

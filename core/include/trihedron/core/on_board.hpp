@@ -50,7 +50,9 @@ class OnBoard {
   /// The next fix that is used corrects the navigator, whatever the interval.
   void correct_at_next_fix() { correction_wanted_ = true; }
   /// What the navigator takes over at its corrections; at first as the policy of the set-up says.
-  void use_parameters(ParametersInUse parameters) { parameters_ = parameters; }
+  void use_parameters(ParametersInUse parameters);
+  /// Those that the navigator was last corrected by, maybe at a fix whose report is still to come.
+  [[nodiscard]] ParametersInUse corrected_by() const { return corrected_by_; }
   /// Uses these gyros alone, and takes them back where they were isolated.
   void select(const GyroMask& gyros) { intake_.health().select(gyros); }
   /// Whether these gyros give an attitude by the readings of the latest sample.
@@ -217,6 +219,7 @@ class OnBoard {
   Navigator<Estimator> navigator_;
   CorrectionPolicy policy_;
   ParametersInUse parameters_{};
+  ParametersInUse corrected_by_{};
   bool correction_wanted_ = false;
   Stretch stretch_;
   Work work_;
