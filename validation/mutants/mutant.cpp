@@ -4,13 +4,13 @@
 
 #include <cstdlib>
 
-extern "C" {
-
 int trihedron_mutant = 0;
 
-[[gnu::constructor(101)]] static void choose_mutant() {
+namespace {
+
+[[gnu::constructor(101)]] void choose_mutant() {
   const char* number = std::getenv("TRIHEDRON_MUTANT");
-  trihedron_mutant = number != nullptr ? std::atoi(number) : 0;
+  trihedron_mutant = number != nullptr ? static_cast<int>(std::strtol(number, nullptr, 10)) : 0;
 }
 
-}  // extern "C"
+}  // namespace
