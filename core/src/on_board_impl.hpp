@@ -100,7 +100,7 @@ StepReport OnBoard<Estimator>::on_gyro(const GyroSample& sample) {
     slots_left_ = 0;
     calibrate_until(readings_.latest_t() - reach(), report);
   }
-  if (behind_ == readings_.size() && readings_.full() && !is_working()) {
+  if (behind_ == readings_.size() && readings_.full()) {
     follow_next_sample();  // buffer full: the oldest sample is processed before its time
   }
   readings_.push(screened);
@@ -614,7 +614,7 @@ template <class Estimator>
 void OnBoard<Estimator>::catch_up(int samples) {
   const int first = readings_.first_after(work_.state_t);
   const int end = std::min(first + samples, readings_.size());
-  Directions from = work_.state_t == work_.t || first == 0 ? work_.its.readings.h_b : readings_.directions(first - 1);
+  Directions from = work_.state_t == work_.t ? work_.its.readings.h_b : readings_.directions(std::max(first, 1) - 1);
   for (int i = first; i < end; ++i) {
     const Directions to = readings_.directions(i);
     navigate(work_.state_t, from, readings_.time(i), to, work_.state);

@@ -198,6 +198,9 @@ TEST(Commands, HaveTheirReasonsOfRefusal) {
   PairApplication empty;
   EXPECT_EQ(empty.command(Command::kStart), Answer::kNoParameters);
   EXPECT_EQ(empty.mode(), kStandby);
+  const Housekeeping nothing = empty.housekeeping();
+  EXPECT_EQ(empty.on_gyro(flight().samples[0]).sample, SampleStatus::kNone);
+  EXPECT_TRUE(same(empty.housekeeping(), nothing));
   EXPECT_EQ(empty.command(Command::kReset), Answer::kAccepted);
   const PairApplication before = application_in(kCalibrating);
   const auto refused = [&](Command command, std::uint32_t argument) {
@@ -316,6 +319,23 @@ TEST(ParameterTable, SaysTheSameAsTheSetUp) {
   EXPECT_EQ(by_set_up.load(given.setup, given.prior, given.covariance, policy), Answer::kAccepted);
   EXPECT_EQ(by_set_up.command(Command::kStart), Answer::kAccepted);
   EXPECT_TRUE(same_from(0, *by_table, by_set_up));
+}
+
+TEST(SetUp, WithAnythingWrongIsRefusedAsATableIs) {
+  const test::PairGiven given;
+  const auto load = [&](PairApplication& application, const CalibrationSetup& setup, const ApplicationPolicy& policy) {
+    return application.load(setup, given.prior, given.covariance, policy);
+  };
+  PairApplication standby = application_in(kStandby);
+  CalibrationSetup of_three = given.setup;
+  of_three.layout.gyros = 3;
+  EXPECT_EQ(load(standby, of_three, {}), Answer::kTooLarge);
+  EXPECT_EQ(load(standby, given.setup, {.spread_over = -1}), Answer::kNotPositive);
+  EXPECT_EQ(load(standby, given.setup, {.spread_over = 0}), Answer::kAccepted);
+  const PairApplication before = application_in(kCalibrating);
+  PairApplication after = before;
+  EXPECT_EQ(load(after, given.setup, {}), Answer::kNotInThisMode);
+  EXPECT_TRUE(same_from(end_of(before), before, after));
 }
 
 // ---- Adoption
@@ -496,6 +516,27 @@ TEST(Adoption, IsTakenBackWhenResidualsDisagree) {
             application->on_board().estimator().prior_gyros()[0].drift_rad_s);
 }
 
+/// A soft error in the memory of the estimate: no longer a covariance.
+void spoil_information(PairApplication& application) {
+  const_cast<double&>(application.on_board().estimator().information().root()(25, 25)) = kNaN;
+}
+
+TEST(Adoption, ThatIsStillToComeIsDroppedWhenTheEstimateIsLost) {
+  PairApplication application = application_in(kCalibrating);
+  fly_from(flight(), 300, 600, application);
+  EXPECT_EQ(application.command(Command::kAdoptCalibration), Answer::kAccepted);
+  spoil_information(application);
+  fly_from(flight(), 600, 620, application);
+  const Housekeeping record = application.housekeeping();
+  EXPECT_EQ(record.filter_restarts, 1U);
+  EXPECT_EQ(record.adoptions, 0U);
+  EXPECT_EQ(record.withdrawals, 0U);  // nothing had been adopted
+  EXPECT_EQ(record.adopted, 0);
+  EXPECT_EQ(application.mode(), kAligning);
+  EXPECT_EQ(application.on_board().corrected_by(), ParametersInUse::kOfSetUp);
+  EXPECT_GT(application.on_board().corrected_t(), Time(std::chrono::seconds(600)));
+}
+
 TEST(Adoption, IsTakenBackWhenTheNavigatorLeavesTheFixes) {
   // The filter follows a drift that changes slowly; the navigator, corrected once in forty minutes, does not.
   Parameters table = test::nominal_parameters();
@@ -669,6 +710,50 @@ TEST(NoAttitude, FailsInEachModeThatHasStarted) {
   }
 }
 
+TEST(NoAttitude, AtASpikeIsThatOfTheSampleAlone) {
+  PairApplication application = application_in(kCalibrating);
+  GyroSample spike = flight().samples[8 * 300];
+  spike.h_b[1] = rotated<double>(spike.h_b[1], Eigen::Vector3d(0.017, 0, 0));
+  EXPECT_EQ(application.on_gyro(spike).sample, SampleStatus::kUsed);
+  EXPECT_FALSE(application.attitude());
+  EXPECT_EQ(application.housekeeping().attitude_valid, 0);
+  EXPECT_FALSE(application.has(Fault::kNoAttitude));
+  application.on_gyro(flight().samples[8 * 300 + 1]);
+  EXPECT_TRUE(application.attitude());
+}
+
+TEST(NoAttitude, AfterHalfASecondWithoutADirection) {
+  PairApplication application = application_in(kCalibrating);
+  for (std::size_t i = 0; i < 6; ++i) {
+    GyroSample sample = flight().samples[8 * 300 + i];
+    sample.h_b[0].setConstant(kNaN);
+    EXPECT_EQ(application.on_gyro(sample).sample, SampleStatus::kRejectedNotDirection);
+    EXPECT_EQ(application.has(Fault::kNoAttitude), i >= 4) << i;  // 0.625 s after the last that was used
+    EXPECT_EQ(application.attitude().has_value(), i < 4) << i;
+  }
+  application.on_gyro(flight().samples[8 * 300 + 6]);
+  EXPECT_FALSE(application.has(Fault::kNoAttitude));
+}
+
+TEST(NoAttitude, BeforeASampleHasBeenUsedByTheClockThatHasBeenSetBack) {
+  PairApplication application = application_in(kCalibrating);
+  std::vector<GyroSample> samples(flight().samples.begin() + 8 * 300, flight().samples.begin() + 8 * 300 + 20);
+  for (GyroSample& sample : samples) {
+    sample.t -= std::chrono::seconds(200);
+  }
+  samples[15].h_b[0].setZero();  // at the sixteenth the clock is taken to have been set back
+  for (std::size_t i = 0; i < 16; ++i) {
+    EXPECT_EQ(application.on_gyro(samples[i]).sample,
+              i < 15 ? SampleStatus::kRejectedOutOfOrder : SampleStatus::kRejectedNotDirection);
+  }
+  EXPECT_FALSE(application.attitude());
+  EXPECT_EQ(application.housekeeping().attitude_valid, 0);
+  EXPECT_EQ(application.command(Command::kSelectGyros, 0b11), Answer::kMomentaNearlyParallel);
+  EXPECT_EQ(application.on_gyro(samples[16]).sample, SampleStatus::kUsedAfterClockSetBack);
+  EXPECT_TRUE(application.attitude());
+  EXPECT_EQ(application.command(Command::kSelectGyros, 0b11), Answer::kAccepted);
+}
+
 TEST(Clock, SetBackDegradesUntilAFixIsUsed) {
   for (const Mode mode : {kCalibrating, kNavigating}) {
     PairApplication application = application_in(mode);
@@ -809,9 +894,45 @@ TEST(FilterRestarted, AlsoWhereTheEstimateIsLost) {
   EXPECT_GE(application->housekeeping().filter_restarts, 1U);
 }
 
+TEST(FilterRestarted, AlsoWhereTheEstimateIsLostWithoutAStarTracker) {
+  PairApplication application = application_in(kCalibrating);
+  fly_from(flight().samples, kNoFixes, 300, 350, application);
+  spoil_information(application);
+  bool lost = false;
+  fly_from(flight().samples, kNoFixes, 350, 400, application, [&](const StepReport& report) {
+    if (report.angles.status == FixStatus::kEstimateLost) {
+      lost = true;
+      EXPECT_EQ(application.mode(), kAligning);
+    }
+  });
+  EXPECT_TRUE(lost);
+  EXPECT_EQ(application.housekeeping().filter_restarts, 1U);
+  fly_from(flight(), 400, 600, application);
+  EXPECT_EQ(application.mode(), kCalibrating);
+}
+
 TEST(PairApplication, FitsInto32KiB) { EXPECT_LE(sizeof(PairApplication), 32U * 1024); }
 
 // ---- The forecast
+
+TEST(Forecast, OfAGyroOfAPairThatHasStuckIsThatItIsNotReady) {
+  // The fix at 1500 s is the last before it, and is dealt with when it shows.
+  PairApplication application = application_in(kNavigating);
+  const auto samples = frozen(1500, 1510);
+  fly_from(samples, flight().fixes, kAdopted_s, 1500, application);
+  EXPECT_GT(application.forecast().ready_s(), 0);
+  double ready_s = 1;
+  fly_from(samples, flight().fixes, 1500, 1505, application, [&](const StepReport& report) {
+    if (report.fix.t == Time(std::chrono::seconds(1500)) && report.fix.used()) {
+      ready_s = application.forecast().ready_s();
+    }
+  });
+  EXPECT_EQ(ready_s, 0);
+  EXPECT_EQ(application.forecast().error_rad(), kInfinity);
+  // Eight fixes later each attitude has been predicted for again.
+  fly_from(samples, flight().fixes, 1505, 1550, application);
+  EXPECT_GT(application.forecast().ready_s(), 0);
+}
 
 TEST(Error997, IsTheQuantileOfTheLength) {
   // Of one axis, of three equal ones, and of two: √χ² of 1, 3 and 2 degrees of freedom at 0.997, from tables.

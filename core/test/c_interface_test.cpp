@@ -22,7 +22,7 @@ using OfTwo = ObjectMemory<TRIHEDRON_SIZE_OF_2_GYROS>;
 trihedron_gyro_sample record_of(const GyroSample& sample) {
   trihedron_gyro_sample record{};
   record.time_ns = sample.t.time_since_epoch().count();
-  for (int k = 0; k < 2; ++k) {
+  for (int k = 0; k < TRIHEDRON_MAX_GYROS; ++k) {
     Eigen::Map<Eigen::Vector3d>(record.h_b[k]) = sample.h_b[k];
   }
   return record;
@@ -109,6 +109,34 @@ TEST(CInterface, IsTheApplicationBitForBit) {
   EXPECT_EQ(attitude.time_ns, flight.samples.back().t.time_since_epoch().count());
   for (int i = 0; i < 3; ++i) {
     EXPECT_EQ(std::sqrt(attitude.covariance_rad2[i][i]), record.sigma_rad[i]);
+  }
+}
+
+TEST(CInterface, OfThreeGyrosIsTheirApplicationBitForBit) {
+  const test::Flight flight({.duration_s = 120});
+  const auto samples = test::with_third_gyro(flight, Eigen::Vector3d(0.1, -0.8, 0.6).normalized(), 1);
+  const Parameters parameters = test::nominal_parameters(3);
+  const auto application = test::started<TrioApplication>(parameters);
+  ObjectMemory<TRIHEDRON_SIZE_OF_3_GYROS> memory;
+  ByC by_c{trihedron_create(memory.bytes, sizeof memory, 3)};
+  EXPECT_EQ(trihedron_load_parameters(by_c.its, &parameters), TRIHEDRON_ANSWER_ACCEPTED);
+  EXPECT_EQ(trihedron_command(by_c.its, TRIHEDRON_COMMAND_START, 0), TRIHEDRON_ANSWER_ACCEPTED);
+  test::fly(samples, flight.fixes, by_c);
+  test::fly(samples, flight.fixes, *application);
+  const Housekeeping expected = application->housekeeping();
+  AttitudeRecord attitude{};
+  EXPECT_EQ(trihedron_get_attitude(by_c.its, &attitude), 1U);
+  EXPECT_EQ(std::memcmp(attitude.q_in_c, expected.q_in_c, sizeof attitude.q_in_c), 0);
+
+  std::vector<std::byte> slots(trihedron_snapshots_size(3));
+  EXPECT_EQ(trihedron_save(by_c.its, slots.data(), slots.size()), 1U);
+  ObjectMemory<TRIHEDRON_SIZE_OF_3_GYROS> other;
+  ByC again{trihedron_create(other.bytes, sizeof other, 3)};
+  EXPECT_EQ(trihedron_restore(again.its, slots.data(), slots.size(), nullptr), 1U);
+  for (const ByC& its : {by_c, again}) {
+    Housekeeping record{};
+    trihedron_get_housekeeping(its.its, &record);
+    EXPECT_EQ(std::memcmp(&record, &expected, sizeof record), 0);
   }
 }
 

@@ -49,6 +49,10 @@ TEST(IntakeClock, BelievesALeapOnlyWhenTheNextSampleConfirmsIt) {
   EXPECT_EQ(intake.look_at_clock(second(1e5), second(0)), Clock::kOutOfOrder);
   EXPECT_EQ(intake.look_at_clock(second(0.1), second(0)), Clock::kRunsOn);
   EXPECT_EQ(intake.look_at_clock(second(1e5 + 0.1), second(0)), Clock::kOutOfOrder);
+  // Nor does a wild one confirm another that comes after it in time.
+  EXPECT_EQ(intake.look_at_clock(second(2e5), second(0)), Clock::kOutOfOrder);
+  EXPECT_EQ(intake.look_at_clock(second(2e5 - 0.1), second(0)), Clock::kOutOfOrder);
+  EXPECT_EQ(intake.look_at_clock(second(2e5), second(0)), Clock::kRunsOn);
 }
 
 TEST(IntakeClock, IsSetBackBySixteenSamplesThatRunWell) {
@@ -110,6 +114,53 @@ TEST(Intake, RejectsSamplesAndFixesOfTooFewGyros) {
   }
   const StarFix fix{second(2.4), Eigen::Quaterniond::Identity()};
   EXPECT_EQ(intake.look_at(fix, second(2.375), Time::min()), FixStatus::kRejectedTooFewGyros);
+}
+
+/// Samples from `from_s` up to `to_s`, in which gyro 1 reads the same all the time if `sticks`.
+void look_on(GyroHealth& health, double from_s, double to_s, double period_s, bool sticks) {
+  for (int i = 0; from_s + i * period_s < to_s; ++i) {
+    GyroSample sample = live_sample(from_s + i * period_s);
+    if (sticks) {
+      sample.h_b[1] = Eigen::Vector3d::UnitY();
+    }
+    health.look_at(sample);
+  }
+}
+
+TEST(GyroHealth, IsStuckOnlyAfterASecondHoweverManySamplesThereAre) {
+  GyroHealth health(2);
+  look_on(health, 0, 0.995, 0.02, true);  // fifty samples
+  EXPECT_EQ(health.states()[1], GyroState::kUsed);
+  look_on(health, 1, 1.005, 0.02, true);
+  EXPECT_EQ(health.states()[1], GyroState::kStuck);
+  EXPECT_EQ(health.states()[0], GyroState::kUsed);
+}
+
+TEST(GyroHealth, TakesStuckStretchesTogetherThatAreNearEachOther) {
+  for (const double lives_s : {5.0, 20.0}) {
+    GyroHealth health(2);
+    look_on(health, 0, 5, 0.125, true);
+    look_on(health, 5, 5 + lives_s, 0.125, false);
+    look_on(health, 5 + lives_s, 10 + lives_s, 0.125, true);
+    const Time between = second(5 + lives_s / 2);
+    EXPECT_EQ(health.usable(between, between)[1], lives_s > 10) << lives_s;
+    EXPECT_FALSE(health.usable(second(6 + lives_s), second(7 + lives_s))[1]);
+  }
+}
+
+TEST(GyroHealth, OfAnIsolatedGyroIsGoodAgainOnceItIsSelected) {
+  GyroHealth health(3);
+  for (int i = 0; i < GyroHealth::kVerdicts; ++i) {
+    EXPECT_EQ(health.states()[2], GyroState::kUsed);
+    health.judge(2);
+  }
+  EXPECT_EQ(health.states()[2], GyroState::kIsolated);
+  health.select(all_gyros(2));
+  EXPECT_EQ(health.states()[2], GyroState::kNotSelected);
+  EXPECT_EQ(count(health.usable(second(0), second(1))), 2);
+  health.select(all_gyros(3));
+  EXPECT_EQ(health.states()[2], GyroState::kUsed);
+  EXPECT_EQ(count(health.usable(second(0), second(1))), 3);
 }
 
 TEST(Intake, LooksAtFixes) {

@@ -339,6 +339,28 @@ TEST(InvariantEstimator, RejectsOutliersReopensAndBeginsAnew) {
   EXPECT_EQ(statuses.back(), FixStatus::kUsed);
 }
 
+TEST(InvariantEstimator, BeginsAnewFromThePriorWhereThatExcludesTheEstimates) {
+  // The star tracker turns twice within minutes. By then the drift has been found, at several or many of its sigmas.
+  for (const double sigma_rad_s : {2e-6, 4e-7}) {
+    test::Flight flight({.duration_s = 1200});
+    for (std::size_t i = 300; i < flight.fixes.size(); ++i) {
+      flight.fixes[i].q_in_c = flight.fixes[i].q_in_c * Eigen::Quaterniond(test::turn(i < 350 ? 0.001 : 0.002, 0, 0));
+    }
+    PairGiven given;
+    for (int k = 0; k < 2; ++k) {
+      given.covariance.diagonal().segment<7>(10L * k).setConstant(sigma_rad_s * sigma_rad_s);
+    }
+    const auto on_board = given.on_board();
+    int restarts = 0;
+    test::fly(flight, *on_board, [&](const StepReport& report) {
+      if (report.fix.status == FixStatus::kRestarted && ++restarts == 1) {
+        EXPECT_EQ(on_board->estimator().gyros()[0].drift_rad_s == given.prior[0].drift_rad_s, sigma_rad_s < 1e-6);
+      }
+    });
+    EXPECT_GE(restarts, 1);
+  }
+}
+
 TEST(InvariantEstimator, RefusesParallelMomenta) {
   const auto made = PairGiven().estimator();
   auto& estimator = *made;
@@ -529,6 +551,40 @@ TEST(OnBoardOfInvariant, ForgetsDriftThatWandersInALongGap) {
   }
 }
 
+TEST(OnBoardOfInvariant, CannotHoldDriftThatWanders) {
+  // Parameters are held from 200 s on, those of the calibration or of the set-up; the last correction is at 300 s.
+  test::Flight flight({.duration_s = 600});
+  flight.fixes.resize(101);
+  FullGiven given(kWithAll);
+  given.know(flight.truth);
+  given.covariance *= 1e-8;
+  given.setup.wandering_drift = {1e-5, 100};
+  for (const bool take_parameters : {true, false}) {
+    const auto on_board = given.on_board({.interval = CorrectionPolicy::kEveryFix, .take_parameters = take_parameters});
+    const auto drift = [&] { return on_board->navigator().gyros()[0].drift_rad_s; };
+    const int wandering = kWithAll.wandering_column();
+    Eigen::VectorXd held;
+    test::fly(flight, *on_board, [&](const StepReport& report) {
+      if (report.t == Time(std::chrono::seconds(200))) {
+        EXPECT_EQ(drift().segment<3>(wandering).norm() > 0, take_parameters);
+        on_board->use_parameters(ParametersInUse::kHeld);
+        held = drift().head(wandering);
+      }
+    });
+    EXPECT_EQ(on_board->corrected_t(), Time(std::chrono::seconds(300)));
+    EXPECT_EQ(drift().head(wandering), held);
+    EXPECT_EQ(drift().segment<3>(wandering).norm(), 0);
+    // Nothing is known of the drift that wanders: as above.
+    const auto& gyros = on_board->navigator().gyros();
+    const auto by_directions =
+        on_board->estimator().attitude(gyros, flight.samples.back().h_b, all_gyros(2)).value().by_directions;
+    const double variance = 2 * 1e-6 * (2 + std::exp(-3));
+    EXPECT_NEAR(
+        on_board->navigation_attitude().value().covariance_rad2.trace() / (by_directions.squaredNorm() * variance), 1,
+        0.1);
+  }
+}
+
 TEST(OnBoardOfInvariant, HoldsTheParametersOfTheSetup) {
   const test::Flight flight({.duration_s = 600});
   FullGiven given(kWithAll);
@@ -541,6 +597,19 @@ TEST(OnBoardOfInvariant, HoldsTheParametersOfTheSetup) {
   for (int k = 0; k < 2; ++k) {
     EXPECT_EQ(on_board->navigator().gyros()[k].C_c_b, given.prior[k].C_c_b);
   }
+}
+
+TEST(OnBoardOfInvariant, HoldsTheParametersOfTheSetupWhereThereAreNoneInUseYet) {
+  const test::Flight flight({.duration_s = 300});
+  const auto of_set_up = test::flown(flight, PairGiven(), {.take_parameters = false});
+  const auto held = PairGiven().on_board();
+  held->use_parameters(ParametersInUse::kHeld);
+  test::fly(flight, *held);
+  test::flush(*held);
+  EXPECT_EQ(held->navigator().gyros()[0].C_c_b, PairGiven().prior[0].C_c_b);
+  EXPECT_EQ(held->navigation_attitude().value().C_in_c.raw(), of_set_up->navigation_attitude().value().C_in_c.raw());
+  EXPECT_EQ(held->navigation_attitude().value().covariance_rad2,
+            of_set_up->navigation_attitude().value().covariance_rad2);
 }
 
 }  // namespace

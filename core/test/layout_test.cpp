@@ -129,6 +129,16 @@ static_assert(Layout{.direction_size = 2}.size() == 24);
 
 TEST(Layout, FillsItsPositionsWithoutOverlap) { EXPECT_TRUE(for_every_layout(positions_fill_without_overlap)); }
 
+TEST(Layout, OfDriftModesHasEquation1AndThese) {
+  for (const int modes : {0, 5}) {
+    const Layout layout{.drift_model = kEsg20, .further = {.wandering_drift = true}, .drift_modes = modes};
+    EXPECT_EQ(layout.drift_size(), Layout::kEq1 + modes);
+    EXPECT_EQ(layout.wandering_column(), Layout::kEq1 + modes);
+    EXPECT_EQ(layout.parameters(), 2 * (Layout::kEq1 + modes + 3));
+    EXPECT_TRUE(positions_fill_without_overlap(layout));
+  }
+}
+
 TEST(Capacity, HoldsWhatHasRoomInEachRespect) {
   const Layout three{.gyros = 3};
   const Capacity room = Capacity::of(three);
@@ -147,6 +157,12 @@ TEST(Capacity, HoldsWhatHasRoomInEachRespect) {
   layout = three;
   layout.further.clock_offset = true;
   EXPECT_FALSE(room.holds(layout));
+  // Fewer states and no more columns, but more of the states move.
+  const Capacity room_of_columns = Capacity::of({.gyros = 3, .drift_model = vsh(1)});
+  layout = {.further = {.wandering_drift = true}};
+  EXPECT_LE(layout.drift_columns(), room_of_columns.drift_columns);
+  EXPECT_LE(layout.size(), room_of_columns.states);
+  EXPECT_FALSE(room_of_columns.holds(layout));
   // Nor what is no layout.
   for (const int gyros : {-1, 0, 1}) {
     layout = three;

@@ -88,6 +88,10 @@ TEST(OptimalAttitude, NeedsTwoDirectionsApart) {
   Directions in = in_space();
   in[2] = in[1] = -in[0];
   EXPECT_EQ(optimal_attitude(in, in_body(), kAll).fault(), DirectionsFault::kMomentaNearlyParallel);
+  in = in_space();
+  in[0].setZero();
+  EXPECT_EQ(optimal_attitude(in, in_body(), all_gyros(2)).fault(), DirectionsFault::kNotFinite);
+  EXPECT_EQ(optimal_attitude(in_space(), in, all_gyros(2)).fault(), DirectionsFault::kNotFinite);
 }
 
 TEST(OptimalAttitude, OfTwoAlikeIsExactHoweverTheyDisagree) {

@@ -131,6 +131,14 @@ TEST(PaperEstimator, RefusesSetupsThatCannotWork) {
   EXPECT_EQ(fault_of([](PaperGiven& g) { g.setup.layout.star_trackers = 2; }), Fault::kTooLarge);
 }
 
+TEST(PaperEstimator, GivesNoAttitudeByOneGyro) {
+  const Moment moment;
+  EXPECT_TRUE(Paper::rotation(moment.gyros, moment.h_b, all_gyros(2)).ok());
+  EXPECT_EQ(Paper::rotation(moment.gyros, moment.h_b, all_gyros(1)).fault(), DirectionsFault::kTooFew);
+  EXPECT_TRUE(Paper::attitude(moment.gyros, moment.h_b, all_gyros(2)).ok());
+  EXPECT_EQ(Paper::attitude(moment.gyros, moment.h_b, all_gyros(1)).fault(), DirectionsFault::kTooFew);
+}
+
 TEST(PaperEstimator, ConvergesToTheTruthWithoutNoise) {
   // Told of the nominal noise, given none: what is left is the error of the linearisation and of the prior.
   const test::Flight flight({.duration_s = 5400, .noise = 0});

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <numbers>
 
 #include "numerical_jacobian.hpp"
 #include "trihedron/core/drift.hpp"
@@ -153,6 +154,15 @@ TEST(Sensitivity, OfTwoStretchesIsTheirChain) {
   EXPECT_LT((chained.by_drift.first(kColumns) - whole.by_drift.first(kColumns)).norm(),
             1e-12 * whole.by_drift.first(kColumns).norm());
   EXPECT_LT((chained.by_alignment - whole.by_alignment).norm(), 1e-10 * whole.by_alignment.norm());
+}
+
+TEST(LongStep, MissesTheDriftTimesTheTurnThatMayHaveBeen) {
+  const Eigen::Vector3d from = Eigen::Vector3d::UnitX();
+  const Eigen::Vector3d to(std::cos(0.4), std::sin(0.4), 0);
+  EXPECT_NEAR(missed_by_long_step_rad(1e-3, from, to, 60), 4e-4, 1e-15);
+  EXPECT_EQ(missed_by_long_step_rad(1e-3, from, from, 60), 0);
+  // In longer than a quarter of an orbit the body may have turned right round.
+  EXPECT_NEAR(missed_by_long_step_rad(1e-3, from, from, 1e4), 1e-3 * std::numbers::pi, 1e-15);
 }
 
 /// dw = −w/T dt + dn: a value decays exponentially, and the noise of density 2σ²/T that comes meanwhile is that decayed

@@ -3,7 +3,9 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <utility>
 #include <vector>
 
 #include "trihedron/core/frames.hpp"
@@ -139,6 +141,29 @@ TEST(Readings, AreNotThoseOverAGap) {
   EXPECT_LT(readings_off(beside->h_b, 7.5), 1e-7);
 }
 
+TEST(Readings, BesideAGapAreThoseOfTheSamplesOfThatSideAlone) {
+  // A gap that is short enough for the samples beyond it to be within reach.
+  SomeReadings both;
+  SomeReadings before;
+  SomeReadings after;
+  for (int i = 0; i <= 80; ++i) {
+    const double t_s = 0.125 * i;
+    if (t_s <= 4 || t_s >= 5) {
+      both.push(t_s);
+      (t_s < 4.5 ? before : after).push(t_s);
+    }
+  }
+  for (const auto& [side, t_s] : {std::pair(&before, 3.6), {&after, 5.3}}) {
+    const auto expected = side->at_time(t_s);
+    const auto readings = both.at_time(t_s);
+    ASSERT_TRUE(expected && readings);
+    EXPECT_LT(readings->noise_factor, 1);
+    EXPECT_EQ(readings->noise_factor, expected->noise_factor);
+    EXPECT_EQ(readings->h_b[0], expected->h_b[0]);
+    EXPECT_EQ(readings->rate_c, expected->rate_c);
+  }
+}
+
 TEST(Readings, AreSingleWhereNoPolynomialExplainsThem) {
   SomeReadings buffer;
   for (int i = 0; i <= 40; ++i) {
@@ -204,6 +229,42 @@ TEST(Readings, OfASpikeAreNotUsedNow) {
   // The first samples are compared with nothing.
   EXPECT_EQ(count(Spiked({2}, 0, y, 2).used_now()), 2);
   EXPECT_FALSE(Spiked({3}, 0, y, 3).used_now()[0]);
+}
+
+/// Samples of three gyros, the third of which is not selected; those of the first two from `first` on are turned, each
+/// about its axis.
+GyroMask used_of_three(int first, const std::array<Eigen::Vector3d, 3>& axes) {
+  CalibrationSetup setup = buffer_setup();
+  setup.layout.gyros = 3;
+  setup.readout_noise_rad[2] = kReadingNoise_rad;
+  Readings<3> readings(setup, true);
+  GyroHealth health(3);
+  health.select(all_gyros(2));
+  for (int i = 0; i <= 40; ++i) {
+    GyroSample s = turning_sample(0.125 * i);
+    s.h_b[2] = rotated<double>(Eigen::Vector3d(0, 0.8, 0.6), Eigen::Vector3d(0, 0, -kRate_rad_s * 0.125 * i));
+    for (int k = 0; k < 3 && i >= first; ++k) {
+      s.h_b[k] = rotated<double>(s.h_b[k], 0.017 * axes[static_cast<std::size_t>(k)]);
+    }
+    health.look_at(s);
+    readings.push(s);
+  }
+  return readings.now(setup, health, PerGyro<GyroModel<7>, 3>()).used;
+}
+
+TEST(Readings, OfASpikeAreJudgedByTheGyrosThatAreUsed) {
+  const Eigen::Vector3d none = Eigen::Vector3d::Zero();
+  const Eigen::Vector3d y = Eigen::Vector3d::UnitY();
+  const auto expect_used = [](const GyroMask& used, bool first, bool second) {
+    EXPECT_EQ(used[0], first);
+    EXPECT_EQ(used[1], second);
+    EXPECT_FALSE(used[2]);
+  };
+  expect_used(used_of_three(40, {y, none, none}), false, true);
+  // Two spikes in a row of the first, which the third shares: its angle to that one says nothing.
+  expect_used(used_of_three(39, {y, none, y}), false, true);
+  // The body begins to move in another way.
+  expect_used(used_of_three(39, {y, y, y}), true, true);
 }
 
 TEST(Readings, OfTwoPaperSamplesAreHeldAgainstThoseBeforeThem) {

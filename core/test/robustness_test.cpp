@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <memory>
 #include <numbers>
 #include <random>
@@ -315,6 +316,38 @@ TEST(AnglesWithoutFixes, ShowAGyroThatHasJumped) {
   EXPECT_EQ(s.estimator->gyros()[0].h_in, before);
 }
 
+TEST(AnglesWithoutFixes, AreNotToldOfMomentaThatAreReadNearlyParallel) {
+  Started<Pair> s;
+  const Eigen::Vector3d before = s.estimator->gyros()[0].h_in;
+  FixReadings parallel = s.readings;
+  parallel.h_b[1] = parallel.h_b[0];
+  EXPECT_EQ(s.estimator->check_angles(Time(std::chrono::seconds(3)), parallel).status, FixStatus::kRejectedGeometry);
+  EXPECT_EQ(s.estimator->gyros()[0].h_in, before);
+  EXPECT_EQ(s.estimator->check_angles(Time(std::chrono::seconds(3)), s.readings).status, FixStatus::kUsed);
+}
+
+// A soft error in an estimate, as if a bit of the memory had been flipped, is noticed when the estimate is used next.
+
+TEST(EstimateThatIsNotFinite, OfADriftIsLostAtTheNextFix) {
+  Started<PaperEstimator> s;
+  const_cast<double&>(s.estimator->gyros()[1].drift_rad_s(2)) = std::numeric_limits<double>::infinity();
+  const StarFix fix{Time(std::chrono::seconds(3)), Eigen::Quaterniond(s.C_in_c)};
+  EXPECT_EQ(s.estimator->correct(fix, s.readings).status, FixStatus::kEstimateLost);
+  EXPECT_FALSE(s.estimator->started());
+  EXPECT_EQ(s.estimator->correct(fix, s.readings).status, FixStatus::kStarted);
+  EXPECT_TRUE(s.estimator->gyros()[1].drift_rad_s.allFinite());
+}
+
+TEST(EstimateThatIsNotFinite, OfTheClockOffsetIsLostAtTheNextFix) {
+  Started<Full> s({.further = {.clock_offset = true}});
+  const_cast<double&>(s.estimator->shared()(0)) = std::numeric_limits<double>::infinity();
+  const StarFix fix{Time(std::chrono::seconds(3)), Eigen::Quaterniond(s.C_in_c)};
+  EXPECT_EQ(s.estimator->correct(fix, s.readings).status, FixStatus::kEstimateLost);
+  EXPECT_FALSE(s.estimator->started());
+  EXPECT_EQ(s.estimator->correct(fix, s.readings).status, FixStatus::kStarted);
+  EXPECT_EQ(s.estimator->shared()(0), 0);
+}
+
 TEST(AnglesWithoutFixes, ShareNoSamplesWithFixes) {
   // The star tracker falls silent at 60 s and comes back at some second of the interval between two looks.
   for (int back_s = 150; back_s < 153; ++back_s) {
@@ -485,6 +518,55 @@ TEST(StuckGyro, OfAPairStopsItUntilItLivesAgain) {
   EXPECT_LT(sum.worst_rad, 60 * test::kArcsecond);
 }
 
+TEST(StuckGyro, OfAPairWhenTheAnglesAreDuePutsThemOff) {
+  // The stretch begins half a second before a look, and is known two seconds after its beginning.
+  test::Flight flight({.duration_s = 400});
+  flight.fixes.resize(60);  // until 177 s: looks at 237, 240, … s
+  stick(flight.samples, 1, 239.5, 300);
+  const auto on_board = make_on_board<Pair>();
+  std::vector<double> looks_s;
+  test::fly(flight, *on_board, [&](const StepReport& report) {
+    if (report.angles.status != FixStatus::kNone) {
+      EXPECT_EQ(report.angles.status, FixStatus::kUsed);
+      looks_s.push_back(to_seconds(report.angles.t.time_since_epoch()));
+    }
+  });
+  ASSERT_GE(looks_s.size(), 20U);
+  EXPECT_EQ(looks_s[0], 237);
+  EXPECT_GT(looks_s[1], 300);
+  EXPECT_LT(looks_s[1], 310);
+}
+
+TEST(RestartOfThree, WhileOneIsNotUsedKeepsItsMomentumAndKnowsNothingOfIt) {
+  test::FullGiven given(kThree);
+  given.setup.reopen_after_rejections = given.setup.reopen_after_jump_rejections = 1;
+  Started<Full> s(kThree);
+  ASSERT_FALSE(s.estimator->set_up(given.setup, given.prior, given.covariance));
+  ASSERT_EQ(s.estimator->correct({Time{}, Eigen::Quaterniond(s.C_in_c)}, s.readings).status, FixStatus::kStarted);
+  const Eigen::Vector3d third_in = s.estimator->gyros()[2].h_in;
+  s.readings.used[2] = false;
+  const Eigen::Matrix3d turned[] = {s.C_in_c * test::turn(0.01, 0, 0), s.C_in_c * test::turn(0, 0.02, 0)};
+  const auto correct = [&](int i) {
+    return s.estimator->correct({Time(std::chrono::seconds(3 * (i + 1))), Eigen::Quaterniond(turned[i])}, s.readings);
+  };
+  ASSERT_EQ(correct(0).status, FixStatus::kUsedAfterReopening);
+  ASSERT_EQ(correct(1).status, FixStatus::kRestarted);
+  const Eigen::MatrixXd root = test::error_root(*s.estimator);
+  for (int k = 0; k < 3; ++k) {
+    const Full::Gyro& gyro = s.estimator->gyros()[k];
+    const double sigma = root.middleRows<3>(kThree.direction(k)).rowwise().norm().maxCoeff();
+    const double off_rad = angle_between<double>(gyro.h_in, turned[1] * gyro.in_c(s.readings.h_b[k]));
+    if (k < 2) {
+      EXPECT_LT(off_rad, 1e-12);
+      EXPECT_LT(sigma, 0.02);
+    } else {
+      EXPECT_LT(angle_between<double>(gyro.h_in, third_in), 0.03);
+      EXPECT_GT(off_rad, 1e-3);
+      EXPECT_GT(sigma, 0.5);
+    }
+  }
+}
+
 TEST(WanderingGyro, OfThreeIsIsolatedAndTheOthersGoOn) {
   Flight3 flight({.duration_s = 2400});
   const auto good = every_fix<Full>(kThree);
@@ -650,6 +732,24 @@ TYPED_TEST(StudentT, DoesNotBelieveALieEither) {
   EXPECT_EQ(count(fixes, FixStatus::kRejectedByGate), 200);
   EXPECT_EQ(fixes.back().fix.status, FixStatus::kUsed);
   EXPECT_LT(momentum_error(*on_board, flight), 8 * test::kArcsecond);
+}
+
+TEST(StudentTOfInvariant, DoesNotUseAFixThatTheFaultOfOneOfThreeGyrosExplains) {
+  test::FullGiven given(kThree);
+  given.setup.student_t_freedom = 5;
+  Started<Full> s(kThree);
+  ASSERT_FALSE(s.estimator->set_up(given.setup, given.prior, given.covariance));
+  ASSERT_EQ(s.estimator->correct({Time{}, Eigen::Quaterniond(s.C_in_c)}, s.readings).status, FixStatus::kStarted);
+  const StarFix fix{Time(std::chrono::seconds(3)), Eigen::Quaterniond(s.C_in_c)};
+  const Eigen::Vector3d before = s.estimator->gyros()[2].h_in;
+  FixReadings odd = s.readings;
+  odd.h_b[2] = rotated<double>(odd.h_b[2], Eigen::Vector3d(2e-3, 0, 0));
+  const FixReport report = s.estimator->correct(fix, odd);
+  EXPECT_EQ(report.status, FixStatus::kRejectedByGate);
+  EXPECT_EQ(report.odd_gyro, 2);
+  EXPECT_FALSE(report.jumped);
+  EXPECT_LT(report.weight, 0.1);
+  EXPECT_LT(angle_between<double>(s.estimator->gyros()[2].h_in, before), 1e-9);
 }
 
 TYPED_TEST(StudentT, ReopensAsTheGateDoes) {

@@ -65,7 +65,7 @@ TEST(SetUp, RefusesNoiseThatIsNotPositive) {
     EXPECT_EQ(fault_after([&](FullGiven& given) { given.setup.direction_random_walk_rad_sqrt_s = bad; }),
               SetupFault::kNoiseNotPositive);
   }
-  for (const Duration bad : {Duration::zero(), Duration(-1)}) {
+  for (const Duration bad : {Duration::zero(), Duration(-1), CalibrationSetup::kLongestGyroPeriod + Duration(1)}) {
     EXPECT_EQ(fault_after([&](FullGiven& given) { given.setup.gyro_period = bad; }), SetupFault::kNoiseNotPositive);
   }
   EXPECT_EQ(fault_after([](FullGiven& given) { given.setup.star_trackers[1].C_c_s *= 1.01; }),
@@ -102,6 +102,7 @@ TEST(SetUp, RefusesPriorsThatAreNotPositiveDefinite) {
   EXPECT_EQ(fault_after([](FullGiven& given) { given.covariance(1, 0) = given.covariance(0, 1) = 4.1e-12; }), kFault);
   EXPECT_EQ(fault_after([](FullGiven& given) { given.covariance(5, 2) = kNotANumber; }), kFault);
   EXPECT_EQ(fault_after([](FullGiven& given) { given.covariance.conservativeResize(10, 10); }), kFault);
+  EXPECT_EQ(fault_after([](FullGiven& given) { given.covariance.conservativeResize(Eigen::NoChange, 10); }), kFault);
   EXPECT_EQ(fault_after([](FullGiven& given) { given.covariance.resize(0, 0); }), kFault);
 }
 

@@ -98,6 +98,18 @@ TEST(Snapshot, WithAnyBitFlippedIsRefusedAndTheOtherTaken) {
   }
 }
 
+TEST(Snapshot, WithoutASequenceNumberIsNoSnapshot) {
+  Memory memory(SmallStore::kSize);
+  SmallStore::save(small(1), memory);
+  const Small other = small(2);
+  detail::write_slot(std::span(memory).subspan(kSmallSlot), Small::kSnapshotLayout, 0,
+                     std::as_bytes(std::span(&other, 1)));
+  Small state;
+  const auto restored = SmallStore::restore(memory, state);
+  EXPECT_EQ(restored.slots[1], SnapshotAnswer::kCorrupted);
+  EXPECT_EQ(state.bytes, small(1).bytes);
+}
+
 TEST(Snapshot, TornAnywhereIsRefusedAndTheOtherTaken) {
   Memory before(SmallStore::kSize);
   SmallStore::save(small(1), before);

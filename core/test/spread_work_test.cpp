@@ -256,6 +256,120 @@ TEST(SpreadWork, IsDoneBeforeTheClockIsBelievedToBeSetBack) {
   EXPECT_GT(during, 10);
 }
 
+/// The clock is set back by 10 s, from sample `first` on.
+void set_back(std::vector<GyroSample>& samples, std::size_t first) {
+  for (std::size_t i = first; i < samples.size(); ++i) {
+    samples[i].t -= std::chrono::seconds(10);
+  }
+}
+
+TEST(SpreadWork, BeginsNoFixWhileItIsInDoubtWhetherTheClockHasBeenSetBack) {
+  // At 63.5 s the fix at 60 s is nearly done; another one comes late and is due at once, and then the clock is set
+  // back.
+  Events events = events_of({.duration_s = 80});
+  const std::size_t first = 8 * 63 + 5;
+  set_back(events.samples, first);
+  const auto on_board = test::PairGiven().on_board({.spread_over = 20});
+  Events before = events;
+  before.samples.resize(first);
+  before.fixes.resize(21);
+  test::fly(before.samples, before.fixes, *on_board);
+  const StarFix late{Time(from_seconds(60.3)), Eigen::Quaterniond(test::Flight::attitude(60.3, 0.5))};
+  ASSERT_EQ(on_board->on_fix(late).fix.status, FixStatus::kPending);
+  std::vector<Time> dealt_with;
+  for (std::size_t i = first; i < first + 20; ++i) {
+    const StepReport report = on_board->on_gyro(events.samples[i]);
+    if (report.fix.status != FixStatus::kNone) {
+      dealt_with.push_back(report.fix.t);
+    }
+    EXPECT_EQ(report.sample, i < first + 15    ? SampleStatus::kRejectedOutOfOrder
+                             : i == first + 15 ? SampleStatus::kUsedAfterClockSetBack
+                                               : SampleStatus::kUsed);
+    EXPECT_EQ(report.fixes_dropped, i == first + 15 ? 1 : 0);
+  }
+  EXPECT_EQ(dealt_with, std::vector{events.fixes[20].t});
+}
+
+TEST(SpreadWork, OfABurstOfFixesIsDoneWhenTheClockIsSetBack) {
+  // Without fixes the angles are due at 78 s, and wait until 82.2 s. Before that the clock is set back, and in the last
+  // moment fixes come that are due; the first of them is an outlier, so that the angles are used with it.
+  Events events = events_of({.duration_s = 120});
+  const std::size_t first = 8 * 81 + 4;
+  set_back(events.samples, first);
+  events.fixes.resize(7);
+  const auto on_board = test::PairGiven().on_board({.spread_over = 20});
+  Events before = events;
+  before.samples.resize(first);
+  test::fly(before.samples, before.fixes, *on_board);
+  for (std::size_t i = first; i < first + 15; ++i) {
+    EXPECT_EQ(on_board->on_gyro(events.samples[i]).fix.status, FixStatus::kNone);
+  }
+  constexpr int kBurst = 7;
+  const Time burst_t(from_seconds(79.4));
+  for (int i = 0; i < kBurst; ++i) {
+    const Time t = burst_t + i * std::chrono::milliseconds(80);
+    const Eigen::Matrix3d attitude = test::Flight::attitude(to_seconds(t.time_since_epoch()), 0.5);
+    EXPECT_EQ(on_board->on_fix({t, Eigen::Quaterniond(attitude * test::turn(i == 0 ? 0.01 : 0, 0, 0))}).fix.status,
+              FixStatus::kPending);
+  }
+  const StepReport report = on_board->on_gyro(events.samples[first + 15]);
+  EXPECT_EQ(report.sample, SampleStatus::kUsedAfterClockSetBack);
+  EXPECT_EQ(report.fixes_dropped, kBurst - 1);
+  EXPECT_EQ(report.fix.status, FixStatus::kRejectedByGate);
+  EXPECT_EQ(report.angles.status, FixStatus::kUsed);
+  // By the clock as it is now.
+  EXPECT_EQ(report.fix.t - events.samples[first + 15].t, burst_t - events.samples[first - 1].t);
+}
+
+TEST(SpreadWork, TakesAFixThatComesWhileTheAnglesAreDealtWith) {
+  const Events events = events_of({.duration_s = 100});
+  const auto without = test::PairGiven().on_board({.spread_over = 20});
+  int looks = 0;
+  for (std::size_t i = 0; i < events.samples.size(); ++i) {
+    looks += without->on_gyro(events.samples[i]).angles.status == FixStatus::kUsed ? 1 : 0;
+    if (i % 24 == 0 && i <= 8 * 18) {
+      without->on_fix(events.fixes[i / 24]);
+    }
+    if (i < 8 * 83 || i >= 8 * 86) {  // the time of one look and the next
+      continue;
+    }
+    const auto with = std::make_unique<PairOnBoard>(*without);
+    const double t_s = 0.125 * static_cast<double>(i);
+    const Time t = events.samples[i].t;
+    EXPECT_EQ(with->on_fix({t, Eigen::Quaterniond(test::Flight::attitude(t_s, 0.5))}).fix.status, FixStatus::kPending);
+    FixReport fix;
+    for (std::size_t next = i + 1; next < i + 50; ++next) {
+      const StepReport report = with->on_gyro(events.samples[next]);
+      fix = report.fix.status != FixStatus::kNone ? report.fix : fix;
+    }
+    EXPECT_EQ(fix.status, FixStatus::kUsed) << i;
+    EXPECT_EQ(fix.t, t);
+  }
+  EXPECT_GE(looks, 4);
+}
+
+TEST(SpreadWork, OfAFixWhoseGyroSticksAfterItHasNoAttitudeOfTheNavigatorThere) {
+  // The fix at 60.5 s waits for that at 60 s. By its turn gyro 2 is known to have stuck from 60.625 s on.
+  Events events = events_of({.duration_s = 80});
+  events.fixes.resize(21);
+  events.fixes.push_back({Time(from_seconds(60.5)), Eigen::Quaterniond(test::Flight::attitude(60.5, 0.5))});
+  for (std::size_t i = 8 * 60 + 5; i < 8 * 70; ++i) {
+    events.samples[i].h_b[1] = events.samples[8 * 60 + 5].h_b[1];
+  }
+  const auto on_board = test::PairGiven().on_board({.interval = std::chrono::hours(1), .spread_over = 20});
+  std::vector<StepReport> reports;
+  test::fly(events.samples, events.fixes, *on_board, [&](const StepReport& report) {
+    if (report.fix.status != FixStatus::kNone && report.fix.status != FixStatus::kPending) {
+      reports.push_back(report);
+    }
+  });
+  ASSERT_EQ(reports.size(), 22U);
+  EXPECT_TRUE(reports[20].navigated);
+  EXPECT_EQ(reports[21].fix.status, FixStatus::kUsed);
+  EXPECT_TRUE(reports[21].calibrated);
+  EXPECT_FALSE(reports[21].navigated);
+}
+
 TEST(SpreadWork, OverMoreSamplesThanTheBufferHoldsIsThatOverTheMost) {
   const Events events = events_of({.duration_s = 120});
   const Outcomes most = outcomes(events, test::PairGiven(), {}, CorrectionPolicy::kMostSpread);

@@ -212,7 +212,7 @@ class FlownAs final : public detail::FlownApplication {
     ZeroedState<State<Application>> state;
     const auto restored = Store::restore(memory, *state);
     Resumed resumed{restored.slots, restored.sequence, false, state->ground.output};
-    if (restored.ok() && state->ground.replay == state_->ground.replay) {
+    if (restored.ok() && fits(*state)) {
       resumed.is_of_this_replay = true;
       state_ = std::move(state);
       events_ = Events(pass_, 1, state_->ground.position);
@@ -221,6 +221,15 @@ class FlownAs final : public detail::FlownApplication {
   }
 
  private:
+  /// Whether a state is of this replay: what marks it, the layout that the parameters have, and a place in the pass.
+  [[nodiscard]] bool fits(const State<Application>& state) const {
+    const GroundPart& part = state.ground;
+    const auto& [samples, fixes] = part.position;
+    const bool is_in_pass = samples <= pass_.gyro.size() && fixes[0] <= pass_.star_tracker.size() &&
+                            std::all_of(fixes.begin() + 1, fixes.end(), [](std::uint64_t taken) { return taken == 0; });
+    return part.replay == state_->ground.replay && is_in_pass && part.attitudes <= samples &&
+           state.application.on_board().estimator().layout() == layout();
+  }
   [[nodiscard]] Application& application() { return state_->application; }
   [[nodiscard]] const Application& application() const { return state_->application; }
   [[nodiscard]] const Layout& layout() const { return application().on_board().estimator().layout(); }

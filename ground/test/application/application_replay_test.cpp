@@ -8,10 +8,12 @@
 #include <functional>
 #include <memory>
 #include <random>
+#include <span>
 #include <vector>
 
 #include "passes.hpp"
 #include "trihedron.h"
+#include "trihedron/core/snapshot.hpp"
 #include "trihedron/ground/application/parameters.hpp"
 #include "trihedron/ground/calibrate/calibrate.hpp"
 #include "trihedron/ground/model/setup_error.hpp"
@@ -235,6 +237,56 @@ TEST(ApplicationReplay, RefusesSnapshotsThatAreTornOrOfAnotherReplay) {
   stricter.gate_nis += 1;
   EXPECT_FALSE(ApplicationReplay(pass, stricter).resume(memory).is_of_this_replay);
   EXPECT_TRUE(ApplicationReplay(pass, table_of(pass)).resume(memory).is_of_this_replay);
+}
+
+/// A snapshot in which one number of 64 bits of the first slot is another, with a CRC that is right all the same.
+std::vector<std::byte> forged(std::vector<std::byte> memory, std::size_t at, std::uint64_t number) {
+  SnapshotHeader header;
+  std::memcpy(&header, memory.data(), sizeof header);
+  std::memcpy(&memory[at], &number, sizeof number);
+  const std::vector<std::byte> before = memory;
+  const std::size_t size = memory.size() / 2;
+  trihedron::detail::write_slot(std::span(memory).first(size), header.layout, header.sequence,
+                                std::span(before).first(size).subspan(sizeof header));
+  return memory;
+}
+
+TEST(ApplicationReplay, RefusesASnapshotOfAPlaceThatThePassDoesNotHave) {
+  const Pass& pass = two_hours().pass;
+  ApplicationReplay replay(pass, table_of(pass));
+  std::vector<std::byte> memory(replay.snapshots_size());
+  for (int i = 0; i < 5000; ++i) {
+    static_cast<void>(replay.feed());
+  }
+  const std::uint64_t attitudes = replay.attitudes();
+  static_cast<void>(replay.save(memory, {}));
+  // The mark of the replay, the samples taken, the fixes of four star trackers, and the attitudes that came of them.
+  std::size_t mark = memory.size() / 2 - 8;
+  const auto number_at = [&](std::size_t at) {
+    std::uint64_t number = 0;
+    std::memcpy(&number, &memory[at], sizeof number);
+    return number;
+  };
+  while (number_at(mark) >> 32 != pass.gyro.size() + pass.star_tracker.size()) {
+    mark -= 8;
+  }
+  const std::uint64_t samples = number_at(mark + 8);
+  ASSERT_EQ(samples + number_at(mark + 16), 5000U);
+  ASSERT_EQ(number_at(mark + 48), attitudes);
+  const auto is_taken = [&](std::size_t at, std::uint64_t number) {
+    ApplicationReplay other(pass, table_of(pass));
+    const bool taken = other.resume(forged(memory, at, number)).is_of_this_replay;
+    EXPECT_EQ(other.attitudes(), taken ? number_at(mark + 48) : 0);
+    return taken;
+  };
+  EXPECT_TRUE(is_taken(mark + 8, samples));
+  EXPECT_FALSE(is_taken(mark, number_at(mark) + 1));
+  EXPECT_TRUE(is_taken(mark + 8, pass.gyro.size()));
+  EXPECT_FALSE(is_taken(mark + 8, pass.gyro.size() + 1));
+  EXPECT_FALSE(is_taken(mark + 8, attitudes - 1));  // fewer samples than attitudes
+  EXPECT_FALSE(is_taken(mark + 16, pass.star_tracker.size() + 1));
+  EXPECT_FALSE(is_taken(mark + 24, 1));  // of a star tracker that the application does not have
+  EXPECT_FALSE(is_taken(mark + 40, ~std::uint64_t{0}));
 }
 
 TEST(ApplicationReplay, TakesThreeGyros) {

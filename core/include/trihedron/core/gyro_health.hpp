@@ -61,7 +61,7 @@ class GyroHealth {
   void select(const GyroMask& selected) {
     for (int k = 0; k < gyros_; ++k) {
       selected_[k] = selected[k];
-      isolated_[k] = isolated_[k] && !selected[k];
+      isolated_[k] = false;
     }
     suspect_ = kNoGyro;
     verdicts_ = 0;

@@ -94,7 +94,7 @@ class PaperEstimator {
     [[nodiscard]] bool done() const { return stage == Stage::kDone; }
   };
   static constexpr int kMostStages = 1;
-  [[nodiscard]] static int cost(const Correction& correction) { return correction.done() ? 0 : 600; }
+  [[nodiscard]] static int cost(const Correction& /*not done*/) { return 600; }
   [[nodiscard]] static int cost_to_end(const Correction& correction) { return cost(correction); }
   void carry_on(Correction& correction, const StarFix& fix, const FixReadings& readings, FixReport& report) {
     report = correct(fix, readings);

@@ -74,7 +74,8 @@ class ApplicationReplay {
   struct Resumed {
     std::array<SnapshotAnswer, 2> slots{};  ///< what each held
     std::uint64_t sequence = 0;             ///< 0: neither is whole; nothing is changed
-    bool is_of_this_replay = false;         ///< false: of another pass or of other parameters; nothing is changed
+    bool is_of_this_replay = false;         ///< false: of another pass or of other parameters, or of a place that the
+                                            ///< pass does not have; nothing is changed
     ConfirmedOutput output;
   };
   /// Goes on from the newest whole snapshot.
