@@ -264,10 +264,10 @@ void set_back(std::vector<GyroSample>& samples, std::size_t first) {
 }
 
 TEST(SpreadWork, BeginsNoFixWhileItIsInDoubtWhetherTheClockHasBeenSetBack) {
-  // At 63.5 s the fix at 60 s is nearly done; another one comes late and is due at once, and then the clock is set
+  // At 62.5 s the fix at 60 s is half done; another one comes late and is due at once, and then the clock is set
   // back.
   Events events = events_of({.duration_s = 80});
-  const std::size_t first = 8 * 63 + 5;
+  const std::size_t first = 8 * 62 + 5;
   set_back(events.samples, first);
   const auto on_board = test::PairGiven().on_board({.spread_over = 20});
   Events before = events;
