@@ -722,6 +722,24 @@ TEST(NoAttitude, AtASpikeIsThatOfTheSampleAlone) {
   EXPECT_TRUE(application.attitude());
 }
 
+TEST(NoAttitude, OfTheNavigatorAtAFixSaysNothingAgainstIt) {
+  // A fix that waits for the one before it. By its turn gyro 2 is known to have stuck just after it.
+  Parameters table = test::nominal_parameters();
+  table.correction_interval_ns = Duration(std::chrono::hours(1)).count();
+  std::vector<StarFix> fixes(flight().fixes.begin(), flight().fixes.begin() + 101);  // until 300 s
+  fixes.push_back({Time(from_seconds(300.5)), Eigen::Quaterniond(test::Flight::attitude(300.5, 0.5))});
+  const auto application = test::started<PairApplication>(table);
+  std::vector<double> ratios;
+  fly_from(frozen(300.625, 310), fixes, 0, 310, *application, [&](const StepReport& report) {
+    if (report.fix.t >= Time(std::chrono::seconds(300)) && report.fix.used()) {
+      ratios.push_back(application->housekeeping().navigation_ratio);
+    }
+  });
+  EXPECT_EQ(application->housekeeping().fixes_used, 102U);
+  ASSERT_EQ(ratios.size(), 2U);
+  EXPECT_EQ(ratios[1], ratios[0]);
+}
+
 TEST(NoAttitude, AfterHalfASecondWithoutADirection) {
   PairApplication application = application_in(kCalibrating);
   for (std::size_t i = 0; i < 6; ++i) {

@@ -148,6 +148,16 @@ TEST(GyroHealth, TakesStuckStretchesTogetherThatAreNearEachOther) {
   }
 }
 
+TEST(GyroHealth, IsNotThatOfAFaultWhileNowThisGyroIsSuspectedAndNowThat) {
+  GyroHealth health(3);
+  for (int i = 0; i < 10 * GyroHealth::kVerdicts; ++i) {
+    health.judge(i % 5 == 4 ? kNoGyro : i / 4 % 3);
+  }
+  for (int k = 0; k < 3; ++k) {
+    EXPECT_EQ(health.states()[k], GyroState::kUsed);
+  }
+}
+
 TEST(GyroHealth, OfAnIsolatedGyroIsGoodAgainOnceItIsSelected) {
   GyroHealth health(3);
   for (int i = 0; i < GyroHealth::kVerdicts; ++i) {

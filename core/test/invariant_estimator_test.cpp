@@ -83,6 +83,73 @@ TEST(InvariantEstimator, GainsNothingAboutTheAxisOfASteadyTurnInTenThousandSteps
   EXPECT_GT(information_about(0, n.unitOrthogonal()), 1e6 * before[0]);
 }
 
+/// An estimator that has been started with momenta that are well apart, and readings that agree with it.
+struct StartedPair {
+  std::unique_ptr<test::PairEstimator> estimator;
+  Eigen::Matrix3d C_in_c = test::turn(0.3, -0.2, 0.9);
+  FixReadings readings;
+
+  explicit StartedPair(const PairGiven& given) : estimator(given.estimator()) {
+    readings.used = all_gyros(2);
+    readings.h_b[0] = Eigen::Vector3d(0.8, 0.1, 0.6).normalized();
+    readings.h_b[1] = Eigen::Vector3d(-0.1, 0.9, 0.4).normalized();
+    EXPECT_EQ(estimator->correct(fix(0), readings).status, FixStatus::kStarted);
+  }
+  [[nodiscard]] StarFix fix(int t_s, const Eigen::Vector3d& turned_rad = Eigen::Vector3d::Zero()) const {
+    return {Time(std::chrono::seconds(t_s)), Eigen::Quaterniond(C_in_c * test::turn(turned_rad))};
+  }
+};
+
+TEST(InvariantEstimator, KnowsTheSecondOrderOfItsErrors) {
+  // Alignments unknown by a radian and drift unknown: what the linear model of prediction and reading leaves out is as
+  // large as what it has. With covariances σ² 1 and B: |a × b|²/8 is σ² tr B / 4.
+  PairGiven given;
+  given.set_alignment_sigma(1);
+  StartedPair s(given);
+  auto& estimator = *s.estimator;
+  for (int i = 1; i <= 600; ++i) {
+    estimator.predict(s.C_in_c, s.readings.h_b, Time(std::chrono::seconds(i)), 1);
+  }
+  double expected[2];
+  for (int k = 0; k < 2; ++k) {
+    const Eigen::Matrix<double, 3, 7> by_drift = estimator.since_fix()[k].by_drift.first(7);
+    const Eigen::Matrix3d B = given.covariance(0, 0) * by_drift * by_drift.transpose();
+    const Eigen::Vector3d h = estimator.gyros()[k].h_in;
+    const double of_prediction = B.trace() / 4;
+    const double of_reading = (B.trace() + 3 * of_prediction) / 4;
+    // The noise of the two fixes is a hundredth of it.
+    expected[k] = B.trace() - h.dot(B * h) + 2 * of_prediction + 2 * of_reading;
+  }
+  const auto covariance = estimator.correct(s.fix(600), s.readings).innovation_covariance;
+  for (int k = 0; k < 2; ++k) {
+    EXPECT_NEAR((covariance.block<2, 2>(2L * k, 2L * k).trace()) / expected[k], 1, 0.03) << k;
+  }
+}
+
+TEST(InvariantEstimator, LinearisesAtTheAttitudeByGyrosAndFixTogether) {
+  StartedPair s(PairGiven{});
+  auto& estimator = *s.estimator;
+  const StarFix fix = s.fix(3, Eigen::Vector3d(3e-5, -2e-5, 1e-4));
+  test::PairEstimator::Correction correction;
+  FixReport report;
+  while (correction.stage != test::PairEstimator::Correction::Stage::kNoise) {
+    ASSERT_FALSE(correction.done());
+    estimator.carry_on(correction, fix, s.readings, report);
+  }
+  const CalibrationSetup& setup = estimator.setup();
+  const auto by_gyros = estimator.attitude(estimator.gyros(), s.readings.h_b, s.readings.used).value();
+  const auto by_errors = attitude_by_states_now<test::PairEstimator::kMaxStates>(estimator.layout(), by_gyros,
+                                                                                 estimator.gyros(), s.readings.h_b);
+  const Eigen::Matrix3d P =
+      with_covariance(by_gyros, estimator.covariance_of_errors(by_errors), setup.readout_noise_rad, 2, 0)
+          .covariance_rad2;
+  const Eigen::Matrix3d R = setup.star_trackers[0].noise_rad.cwiseAbs2().asDiagonal();
+  const Eigen::Matrix3d C_by_gyros = by_gyros.C_in_c.raw();
+  const Eigen::Vector3d off = test::rotation_vector(C_by_gyros.transpose() * fix.q_in_c.toRotationMatrix());
+  const Eigen::Matrix3d expected = C_by_gyros * test::turn(P * (P + R).inverse() * off);
+  EXPECT_LT(test::rotation_vector(expected.transpose() * correction.C_linear).norm(), 1e-6 * off.norm());
+}
+
 struct MeanOutcome {
   double nees = 0;
   double nis = 0;
@@ -223,6 +290,8 @@ TEST(GyroModel, TakesTheBiasOutOfAReading) {
   const Eigen::Vector3d reading = (h + gyro.readout_bias).normalized();
   EXPECT_LT((gyro.corrected(reading) - h).norm(), 1e-8);
   EXPECT_EQ(GyroModel<Esg7::kSize>().corrected(reading), reading);
+  gyro.C_c_b = test::turn(0.1, -0.2, 0.3);
+  EXPECT_LT((gyro.in_c(gyro.reading_of(h).normalized()) - h).norm(), 1e-8);
 }
 
 /// Readouts with these biases.
@@ -530,6 +599,99 @@ TEST(OnBoardOfInvariant, KnowsHowDriftThatWandersGoesOn) {
   EXPECT_NEAR(size.at(300) / size.at(200), std::exp(-1), 1e-9);
 }
 
+TEST(OnBoardOfInvariant, KnowsDriftThatWandersSoonAfterACorrectionToo) {
+  test::Flight flight({.duration_s = 30});
+  FullGiven given(kWithAll);
+  given.know(flight.truth);
+  given.covariance *= 1e-8;
+  given.setup.wandering_drift = {1e-4, 100};
+  const auto on_board = test::flown(flight, given, {.interval = CorrectionPolicy::kOnlyFirst});
+  const auto& gyros = on_board->navigator().gyros();
+  const auto by_directions =
+      on_board->estimator().attitude(gyros, flight.samples.back().h_b, all_gyros(2)).value().by_directions;
+  const double variance = 2e-4 * (0.3 - 1 + std::exp(-0.3));
+  EXPECT_NEAR(
+      on_board->navigation_attitude().value().covariance_rad2.trace() / (by_directions.squaredNorm() * variance), 1,
+      0.03);
+}
+
+TEST(OnBoardOfInvariant, LetsDriftThatWandersFadeWhereAFixIsRejected) {
+  test::Flight flight({.duration_s = 150});
+  flight.fixes[40].q_in_c = flight.fixes[40].q_in_c * Eigen::Quaterniond(test::turn(0.01, 0, 0));
+  FullGiven given(kWithAll);
+  given.setup.wandering_drift = {1e-5, 100};
+  const auto on_board = given.on_board();
+  const auto wandering = [&] {
+    return on_board->estimator().gyros()[0].drift_rad_s.segment<3>(kWithAll.wandering_column()).norm();
+  };
+  double before = 0;
+  double after = 0;
+  test::fly(flight, *on_board, [&](const StepReport& report) {
+    before = report.fix.used() && report.fix.t == flight.fixes[39].t ? wandering() : before;
+    after = report.fix.status == FixStatus::kRejectedByGate ? wandering() : after;
+  });
+  EXPECT_GT(before, 0);
+  EXPECT_NEAR(after / before, std::exp(-0.03), 1e-9);
+}
+
+/// Of the attitude at the last sample of a flight with known parameters: by a variance of each direction, per axis.
+double expected_trace(const PairOnBoard& on_board, const test::Flight& flight, double variance_rad2) {
+  const auto& gyros = on_board.navigator().gyros();
+  return variance_rad2 * on_board.estimator()
+                             .attitude(gyros, flight.samples.back().h_b, all_gyros(2))
+                             .value()
+                             .by_directions.squaredNorm();
+}
+
+TEST(OnBoardOfInvariant, KnowsTheRandomWalkSinceTheCorrection) {
+  const test::Flight flight({.duration_s = 300});
+  PairGiven given;
+  given.know(flight.truth);
+  given.covariance *= 1e-8;
+  given.setup.direction_random_walk_rad_sqrt_s = 1e-4;
+  const auto on_board = test::flown(flight, given, {.interval = CorrectionPolicy::kOnlyFirst});
+  EXPECT_NEAR(
+      on_board->navigation_attitude().value().covariance_rad2.trace() / expected_trace(*on_board, flight, 1e-8 * 300),
+      1, 0.02);
+}
+
+TEST(OnBoardOfInvariant, KnowsWhatALongStepMayHaveMissed) {
+  test::Flight flight({.duration_s = 450});
+  const GyroSample before = flight.samples[8 * 300];
+  flight.samples.erase(flight.samples.begin() + 8 * 300 + 1, flight.samples.end() - 1);
+  PairGiven given;
+  given.know(flight.truth);
+  given.covariance *= 1e-8;
+  const auto on_board = given.on_board({.interval = CorrectionPolicy::kEveryFix});
+  test::fly(flight, *on_board);
+  double missed_rad = 0;  // by the worse of the two
+  for (int k = 0; k < 2; ++k) {
+    const double turn_rad = angle_between<double>(before.h_b[k], flight.samples.back().h_b[k]);
+    missed_rad = std::max(missed_rad, 150 * flight.truth[k].drift_rad_s.norm() * turn_rad);
+  }
+  EXPECT_GT(missed_rad, 2e-4);
+  EXPECT_NEAR(on_board->navigation_attitude().value().covariance_rad2.trace() /
+                  expected_trace(*on_board, flight, missed_rad * missed_rad),
+              1, 0.05);
+}
+
+TEST(OnBoardOfInvariant, TellsTheAttitudeOfTheNavigatorAtAFixSecondsAgo) {
+  const test::Flight flight({.duration_s = 300, .noise = 0});
+  PairGiven given;
+  given.know(flight.truth);
+  given.covariance *= 1e-8;
+  const auto on_board = given.on_board({.interval = CorrectionPolicy::kOnlyFirst});
+  int told = 0;
+  test::fly(flight, *on_board, [&](const StepReport& report) {
+    if (report.navigated && !report.corrected) {
+      const auto i = static_cast<std::size_t>(8 * to_seconds(report.fix.t.time_since_epoch()) + 0.5);
+      EXPECT_LT(test::attitude_error(flight.C_in_c_at_samples[i], *report.navigated).norm(), 1e-6);
+      ++told;
+    }
+  });
+  EXPECT_EQ(told, 99);
+}
+
 TEST(OnBoardOfInvariant, ForgetsDriftThatWandersInALongGap) {
   // Longer than a correlation time by more than a double can hold.
   test::Flight flight({.duration_s = 300});
@@ -604,7 +766,11 @@ TEST(OnBoardOfInvariant, HoldsTheParametersOfTheSetupWhereThereAreNoneInUseYet) 
   const auto of_set_up = test::flown(flight, PairGiven(), {.take_parameters = false});
   const auto held = PairGiven().on_board();
   held->use_parameters(ParametersInUse::kHeld);
-  test::fly(flight, *held);
+  test::fly(flight, *held, [&](const StepReport& report) {
+    if (report.fix.status == FixStatus::kStarted) {  // unknown alignments do not show where the directions were read
+      EXPECT_LT(report.navigated->covariance_rad2.trace(), 1.5 * report.calibrated->covariance_rad2.trace());
+    }
+  });
   test::flush(*held);
   EXPECT_EQ(held->navigator().gyros()[0].C_c_b, PairGiven().prior[0].C_c_b);
   EXPECT_EQ(held->navigation_attitude().value().C_in_c.raw(), of_set_up->navigation_attitude().value().C_in_c.raw());

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/SVD>
+#include <cmath>
 
 #include "numerical_jacobian.hpp"
 
@@ -88,6 +89,12 @@ TEST(OptimalAttitude, NeedsTwoDirectionsApart) {
   Directions in = in_space();
   in[2] = in[1] = -in[0];
   EXPECT_EQ(optimal_attitude(in, in_body(), kAll).fault(), DirectionsFault::kMomentaNearlyParallel);
+  // By more than asin(kMinSine).
+  for (const double part : {0.98, 1.02}) {
+    in = in_space();
+    in[1] = rotated<double>(in[0], std::asin(part * kMinSine) * in[0].unitOrthogonal());
+    EXPECT_EQ(optimal_attitude(in, in, all_gyros(2)).ok(), part > 1);
+  }
   in = in_space();
   in[0].setZero();
   EXPECT_EQ(optimal_attitude(in, in_body(), all_gyros(2)).fault(), DirectionsFault::kNotFinite);

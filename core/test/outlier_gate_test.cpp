@@ -62,10 +62,12 @@ TEST(OutlierGate, ReopensAfterARunAndRestartsAfterAnotherSoon) {
   EXPECT_EQ(run(), FixStatus::kUsedAfterReopening);
   EXPECT_EQ(run(), FixStatus::kRestarted);
   // Ten good fixes later the suspicion is over.
-  for (int i = 0; i < 10; ++i) {
-    EXPECT_EQ(gate.judge(4, kSmall_rad), FixStatus::kUsed);
+  for (const int good : {9, 10}) {
+    for (int i = 0; i < good; ++i) {
+      EXPECT_EQ(gate.judge(4, kSmall_rad), FixStatus::kUsed);
+    }
+    EXPECT_EQ(run(), good < 10 ? FixStatus::kRestarted : FixStatus::kUsedAfterReopening);
   }
-  EXPECT_EQ(run(), FixStatus::kUsedAfterReopening);
 }
 
 TEST(OutlierGate, WaitsLongerWhereTheMisfitHasJumped) {
@@ -76,6 +78,13 @@ TEST(OutlierGate, WaitsLongerWhereTheMisfitHasJumped) {
   EXPECT_EQ(rejections(gate, kLie_rad), 2);
   EXPECT_EQ(gate.judge(4, kSmall_rad), FixStatus::kUsed);
   EXPECT_EQ(rejections(gate, kLie_rad), 49);
+}
+
+TEST(OutlierGate, DoesNotWaitLongerOnceTheMisfitIsBackAsFarAsDriftMayTell) {
+  OutlierGate gate = make_gate(3, 50);
+  EXPECT_EQ(gate.judge(4, kSmall_rad), FixStatus::kUsed);
+  EXPECT_EQ(gate.judge(100, kLie_rad), FixStatus::kRejectedByGate);
+  EXPECT_EQ(rejections(gate, kSmall_rad + 0.9 * OutlierGate::kLargestStep_rad), 2);
 }
 
 TEST(OutlierGate, WaitsLongerWhereASmallOutlierWentBefore) {

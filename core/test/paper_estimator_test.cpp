@@ -131,6 +131,24 @@ TEST(PaperEstimator, RefusesSetupsThatCannotWork) {
   EXPECT_EQ(fault_of([](PaperGiven& g) { g.setup.layout.star_trackers = 2; }), Fault::kTooLarge);
 }
 
+TEST(PaperEstimator, HasARandomWalkThatIsAlikeInAllDirections) {
+  PaperGiven given;
+  given.setup.direction_random_walk_rad_sqrt_s = 1e-3;
+  const auto estimator = given.estimator();
+  const Moment moment;
+  const FixReadings readings{.h_b = moment.h_b, .used = all_gyros(2)};
+  const StarFix fix{Time{}, Eigen::Quaterniond(moment.C_in_c)};
+  ASSERT_EQ(estimator->correct(fix, readings).status, FixStatus::kStarted);
+  estimator->predict(moment.C_in_c, moment.h_b, Time(std::chrono::seconds(10)), 10);
+  const auto covariance = estimator->correct(fix, readings).innovation_covariance;
+  const double sine = estimator->gyros()[0].h_in.cross(estimator->gyros()[1].h_in).norm();
+  EXPECT_LT(sine, 0.98);
+  // Component 2 of the second momentum is by an axis that is not across it.
+  for (int i = 0; i < 4; ++i) {
+    EXPECT_NEAR(covariance(i, i) / 1e-5, i == 3 ? sine * sine : 1, 3e-3) << i;
+  }
+}
+
 TEST(PaperEstimator, GivesNoAttitudeByOneGyro) {
   const Moment moment;
   EXPECT_TRUE(Paper::rotation(moment.gyros, moment.h_b, all_gyros(2)).ok());

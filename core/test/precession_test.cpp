@@ -162,7 +162,8 @@ TEST(LongStep, MissesTheDriftTimesTheTurnThatMayHaveBeen) {
   EXPECT_NEAR(missed_by_long_step_rad(1e-3, from, to, 60), 4e-4, 1e-15);
   EXPECT_EQ(missed_by_long_step_rad(1e-3, from, from, 60), 0);
   // In longer than a quarter of an orbit the body may have turned right round.
-  EXPECT_NEAR(missed_by_long_step_rad(1e-3, from, from, 1e4), 1e-3 * std::numbers::pi, 1e-15);
+  EXPECT_EQ(missed_by_long_step_rad(1e-3, from, from, 0.99 * kQuarterOrbit_s), 0);
+  EXPECT_NEAR(missed_by_long_step_rad(1e-3, from, from, 1.01 * kQuarterOrbit_s), 1e-3 * std::numbers::pi, 1e-15);
 }
 
 /// dw = −w/T dt + dn: a value decays exponentially, and the noise of density 2σ²/T that comes meanwhile is that decayed

@@ -537,6 +537,50 @@ TEST(StuckGyro, OfAPairWhenTheAnglesAreDuePutsThemOff) {
   EXPECT_LT(looks_s[1], 310);
 }
 
+TEST(WanderingGyro, OfThreeIsSuspectedOnlyWhereTheMisfitIsFarAboveTheGate) {
+  for (const double off_rad : {1.6e-4, 1e-3}) {
+    Started<Full> s(kThree);
+    s.readings.h_b[2] = rotated<double>(s.readings.h_b[2], Eigen::Vector3d(off_rad, 0, 0));
+    const FixReport report =
+        s.estimator->correct({Time(std::chrono::seconds(3)), Eigen::Quaterniond(s.C_in_c)}, s.readings);
+    EXPECT_EQ(report.status, FixStatus::kRejectedByGate);
+    EXPECT_EQ(report.nis > 4 * s.estimator->setup().gate_nis, off_rad > 5e-4);
+    EXPECT_EQ(report.odd_gyro, off_rad > 5e-4 ? 2 : kNoGyro);
+  }
+}
+
+/// The directions go to the fix as far as their variance, widened by the square of the misfit, and that of the fix say.
+template <class Estimator>
+void expect_reopening_by_the_misfit() {
+  constexpr double kNoise_rad = 2e-5;
+  constexpr double kMisfit_rad = 2e-4;
+  test::Given<Estimator> given;
+  given.setup.reopen_after_rejections = given.setup.reopen_after_jump_rejections = 1;
+  given.setup.star_trackers[0].noise_rad.setConstant(kNoise_rad);
+  given.setup.readout_noise_rad[0] = given.setup.readout_noise_rad[1] = 1e-7;
+  given.covariance *= 1e-8;
+  Started<Estimator> s;
+  ASSERT_FALSE(s.estimator->set_up(given.setup, given.prior, given.covariance));
+  ASSERT_EQ(s.estimator->correct({Time{}, Eigen::Quaterniond(s.C_in_c)}, s.readings).status, FixStatus::kStarted);
+  // About an axis across both momenta, so that each is off by all of it.
+  const Eigen::Vector3d across = s.readings.h_b[0].cross(s.readings.h_b[1]).normalized();
+  const Eigen::Matrix3d turned = s.C_in_c * test::turn(kMisfit_rad * across);
+  const StarFix fix{Time(std::chrono::seconds(3)), Eigen::Quaterniond(turned)};
+  ASSERT_EQ(s.estimator->correct(fix, s.readings).status, FixStatus::kUsedAfterReopening);
+  // Both agree, so that the variance of their mean is half of what each is widened by.
+  const double of_start = kNoise_rad * kNoise_rad;
+  const double widened = of_start + 2 * kMisfit_rad * kMisfit_rad / 4 / 2;
+  for (int k = 0; k < 2; ++k) {
+    const double left_rad = angle_between<double>(s.estimator->gyros()[k].h_in, turned * s.readings.h_b[k]);
+    EXPECT_NEAR(left_rad / kMisfit_rad, of_start / (of_start + widened), 0.01);
+  }
+}
+
+TEST(Reopening, WidensByTheSquareOfTheMisfit) {
+  expect_reopening_by_the_misfit<Pair>();
+  expect_reopening_by_the_misfit<PaperEstimator>();
+}
+
 TEST(RestartOfThree, WhileOneIsNotUsedKeepsItsMomentumAndKnowsNothingOfIt) {
   test::FullGiven given(kThree);
   given.setup.reopen_after_rejections = given.setup.reopen_after_jump_rejections = 1;

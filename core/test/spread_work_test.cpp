@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 #include <memory>
 #include <random>
 #include <set>
@@ -368,6 +369,31 @@ TEST(SpreadWork, OfAFixWhoseGyroSticksAfterItHasNoAttitudeOfTheNavigatorThere) {
   EXPECT_EQ(reports[21].fix.status, FixStatus::kUsed);
   EXPECT_TRUE(reports[21].calibrated);
   EXPECT_FALSE(reports[21].navigated);
+  EXPECT_LT(reports[21].t, Time(std::chrono::seconds(65)));  // while the gyro sticks
+}
+
+/// How long after the fix at 80 s its report comes, where fixes come each second from `from_s` on, and each
+/// other second before.
+double delay_at_80_s(double from_s) {
+  Events events = events_of({.duration_s = 100, .fix_interval_s = 1});
+  const Time looked_at = events.fixes[80].t;
+  std::erase_if(events.fixes, [&](const StarFix& fix) {
+    const double t_s = to_seconds(fix.t.time_since_epoch());
+    return t_s < from_s && std::fmod(t_s, 2) != 0;
+  });
+  const auto on_board = test::PairGiven().on_board({.interval = CorrectionPolicy::kEveryFix, .spread_over = 20});
+  double delay_s = 0;
+  test::fly(events.samples, events.fixes, *on_board, [&](const StepReport& report) {
+    delay_s =
+        report.sample != SampleStatus::kNone && report.fix.t == looked_at ? to_seconds(report.t - looked_at) : delay_s;
+  });
+  return delay_s;
+}
+
+TEST(SpreadWork, ThatBeginsLateSinceFixesComeFasterIsInTimeAgainAfterSomeOfThem) {
+  EXPECT_GT(delay_at_80_s(0), 1.4);
+  EXPECT_GT(delay_at_80_s(79), delay_at_80_s(0));
+  EXPECT_EQ(delay_at_80_s(60), delay_at_80_s(0));
 }
 
 TEST(SpreadWork, OverMoreSamplesThanTheBufferHoldsIsThatOverTheMost) {
