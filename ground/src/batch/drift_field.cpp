@@ -150,7 +150,7 @@ DriftModes modes_of(const PassProblem& problem, const PassSolution& solution, co
   for (int k = 0; k < setup.on_board.layout.gyros; ++k) {
     turned[k].setZero(3 * arcs, size);
   }
-  problem.go_over_arcs(solution, [&](const PassProblem::Moment& moment) {
+  problem.go_over_arcs_by_coefficients(solution, [&](const PassProblem::Moment& moment) {
     const auto row = 3 * static_cast<Index>(moment.arc + 1);
     for (int k = 0; k < setup.on_board.layout.gyros; ++k) {
       turned[k].middleRows<3>(row) =

@@ -107,12 +107,29 @@ double add_fix(PassProblem::FixRows rows, const ScreenedPass::Fix& fix, double g
 /// Small rotation, across `from`, that turns it into `to`.
 Vector3d turn(const Vector3d& from, const Vector3d& to) { return from.cross(to); }
 
+/// precess() with the sensitivities to the columns of `sensitive`, of which there are fewer than the drift has.
+Vector3d precess_by(const DriftModel& drift, const DriftModel& sensitive, Gyro& gyro,
+                    Sensitivity<kMaxDriftColumns>& since, const Matrix3d& C_in_c, const Vector3d& h_b,
+                    double part_of_change, double dt_s) {
+  Columns<kMaxDriftColumns> columns;
+  const Vector3d reading = gyro.corrected(h_b);
+  const auto basis = columns.view(sensitive.columns());
+  sensitive.basis(reading, part_of_change, basis);
+  const Matrix3d dt_C_in_b = dt_s * (C_in_c * gyro.C_c_b);
+  const Vector3d turn = dt_C_in_b * drift.rate(reading, part_of_change, gyro.drift_rad_s.data());
+  gyro.h_in = rotated<double>(gyro.h_in, turn).normalized();
+  since.advance(basis, C_in_c, dt_C_in_b, turn);
+  return turn;
+}
+
 }  // namespace
 
 PassProblem::PassProblem(const ScreenedPass& pass, PassSetup setup)
     : setup_(std::move(setup)),
       layout_(setup_.layout()),
+      on_board_(setup_.on_board.layout),
       drift_(layout_.drift_model, layout_.further),
+      drift_of_eq1_(kEsg7, layout_.further),
       gyros_(layout_.gyros),
       samples_(&pass.samples),
       fixes_(pass.fixes.size()) {
@@ -170,7 +187,8 @@ PassProblem::Reading PassProblem::reading_at(const Node& node) const {
                              : Reading{samples_->h_b(node.sample), samples_->used(node.sample)};
 }
 
-void PassProblem::step(const Node& from_node, const Node& to_node, Moment& moment, double& extra_variance_rad2) const {
+void PassProblem::step(const Node& from_node, const Node& to_node, const DriftModel& sensitive, Moment& moment,
+                       double& extra_variance_rad2) const {
   const Duration dt = to_node.t - from_node.t;
   const double dt_s = to_seconds(dt);
   const Reading from = reading_at(from_node);
@@ -206,7 +224,9 @@ void PassProblem::step(const Node& from_node, const Node& to_node, Moment& momen
     if (!used[k]) {  // its momentum turns all the same: what it would read at the attitude of the others
       middle[k] = gyro.reading_of(C_in_c.transpose() * gyro.h_in);
     }
-    const Vector3d turned = precess(gyro, moment.since[k], drift_, C_in_c, middle[k], part, dt_s);
+    const Vector3d turned =
+        &sensitive == &drift_ ? precess(gyro, moment.since[k], drift_, C_in_c, middle[k], part, dt_s)
+                              : precess_by(drift_, sensitive, gyro, moment.since[k], C_in_c, middle[k], part, dt_s);
     if (to_node.after_gap) {
       largest_rad = std::max(largest_rad, missed_by_long_step_rad(turned.norm(), from.h_b[k], to.h_b[k], dt_s));
     }
@@ -215,29 +235,63 @@ void PassProblem::step(const Node& from_node, const Node& to_node, Moment& momen
 }
 
 MatrixXd PassProblem::by_states_of_arc(const Moment& moment, Rows rows) const {
-  const Layout& on_board = setup_.on_board.layout;
-  carry_back(on_board, moment.since, rows);
   MatrixXd by_states(rows.rows(), layout_.size());
+  for (int k = 0; modes_ && k < gyros_; ++k) {
+    by_states.middleCols(layout_.drift(k) + Layout::kEq1, modes_->size()) =
+        rows.middleCols<3>(on_board_.direction(k)).lazyProduct(moved_by_modes_.at(moment.arc, moment.t, k));
+  }
+  carry_back(on_board_, moment.since, rows);
+  const int moving = layout_.drift(0) - layout_.wandering(0);
+  by_states.middleCols(layout_.wandering(0), moving) = rows.middleCols(on_board_.wandering(0), moving);
   for (int k = 0; k < gyros_; ++k) {
     by_states.middleCols<2>(layout_.direction(k)) =
-        rows.middleCols<3>(on_board.direction(k)).lazyProduct(moment.directions[k]);
-  }
-  const int moving = layout_.drift(0) - layout_.wandering(0);
-  by_states.middleCols(layout_.wandering(0), moving) = rows.middleCols(on_board.wandering(0), moving);
-  for (int k = 0; k < gyros_; ++k) {
-    by_states.middleCols<Layout::kEq1>(layout_.drift(k)) = rows.middleCols<Layout::kEq1>(on_board.drift(k));
-    const auto outside = rows.middleCols(on_board.drift(k) + Layout::kEq1, on_board.drift_size() - Layout::kEq1);
-    auto its = by_states.middleCols(layout_.drift(k) + Layout::kEq1, layout_.drift_size() - Layout::kEq1);
-    if (modes_) {
-      its = outside * modes_->gyros[k].coefficients;
-    } else {
-      its = outside;
-    }
-    by_states.middleCols<3>(layout_.alignment(k)) = rows.middleCols<3>(on_board.alignment(k));
+        rows.middleCols<3>(on_board_.direction(k)).lazyProduct(moment.directions[k]);
+    by_states.middleCols(layout_.drift(k), on_board_.drift_size()) =
+        rows.middleCols(on_board_.drift(k), on_board_.drift_size());
+    by_states.middleCols<3>(layout_.alignment(k)) = rows.middleCols<3>(on_board_.alignment(k));
   }
   const int rest = layout_.size() - layout_.readout(0);
-  by_states.rightCols(rest) = rows.middleCols(on_board.readout(0), rest);
+  by_states.rightCols(rest) = rows.middleCols(on_board_.readout(0), rest);
   return by_states;
+}
+
+VectorXd PassProblem::as_states(int gyro, const VectorXd& outside) const {
+  return modes_ ? VectorXd(modes_->gyros[gyro].amplitudes * outside) : outside;
+}
+
+VectorXd PassProblem::as_coefficients(int gyro, const VectorXd& states) const {
+  return modes_ ? VectorXd(modes_->gyros[gyro].coefficients * states) : states;
+}
+
+void PassProblem::use(DriftModes modes, const PassSolution& solution) {
+  constexpr Duration kApart = std::chrono::seconds(10);  // over which the drift turns a momentum evenly
+  modes_ = std::move(modes);
+  layout_.drift_modes = modes_->size();
+  on_board_.drift_model = kEsg7;
+  moved_by_modes_ = {};
+  Moment moment;
+  double unused = 0;
+  for (std::size_t arc = 0; arc < arcs_.size(); ++arc) {
+    check_stop();
+    begin_arc(solution, arc, moment);
+    const std::size_t last = std::min(arcs_[arc].end, nodes_.size() - 1);
+    Time taken = moment.t - kApart;
+    for (std::size_t i = arcs_[arc].begin; i <= last; ++i) {
+      if (i > arcs_[arc].begin) {
+        step(nodes_[i - 1], nodes_[i], drift_, moment, unused);
+      }
+      if (i == last || moment.t - taken >= kApart) {
+        taken = moment.t;
+        MovedByModes::Columns moved;
+        for (int k = 0; k < gyros_; ++k) {
+          const MatrixXd& outside = modes_->gyros[k].coefficients;
+          const auto by_drift = moment.since[k].by_drift.first(layout_.drift_model.size());
+          moved[k] = (by_drift.rightCols(outside.rows()) * outside).cast<float>();
+        }
+        moved_by_modes_.add(arc, moment.t, std::move(moved));
+      }
+    }
+  }
 }
 
 PassSolution PassProblem::start(const Gyros& gyros) const {
@@ -263,13 +317,23 @@ PassSolution PassProblem::start(const Gyros& gyros) const {
 }
 
 void PassProblem::go_over_arcs(const PassSolution& solution, const std::function<void(const Moment&)>& at_end) const {
+  go_over_arcs(solution, sensitive(), at_end);
+}
+
+void PassProblem::go_over_arcs_by_coefficients(const PassSolution& solution,
+                                               const std::function<void(const Moment&)>& at_end) const {
+  go_over_arcs(solution, drift_, at_end);
+}
+
+void PassProblem::go_over_arcs(const PassSolution& solution, const DriftModel& sensitive,
+                               const std::function<void(const Moment&)>& at_end) const {
   Moment moment;
   double unused = 0;
   for (std::size_t arc = 0; arc + 1 < arcs_.size(); ++arc) {
     check_stop();
     begin_arc(solution, arc, moment);
     for (std::size_t i = arcs_[arc].begin; i < arcs_[arc].end; ++i) {
-      step(nodes_[i], nodes_[i + 1], moment, unused);
+      step(nodes_[i], nodes_[i + 1], sensitive, moment, unused);
     }
     at_end(moment);
   }
@@ -283,7 +347,7 @@ void PassProblem::go_along(const PassSolution& solution, const std::function<voi
     begin_arc(solution, arc, moment);
     for (std::size_t i = arcs_[arc].begin; i < arcs_[arc].end; ++i) {
       if (i > arcs_[arc].begin) {
-        step(nodes_[i - 1], nodes_[i], moment, unused);
+        step(nodes_[i - 1], nodes_[i], sensitive(), moment, unused);
       }
       moment.fix = nodes_[i].fix;
       visit(moment);
@@ -299,7 +363,7 @@ Result<AttitudeByDirections, DirectionsFault> PassProblem::attitude(const Moment
 MatrixXd PassProblem::attitude_by_states(const Moment& moment, const AttitudeByDirections& attitude,
                                          const Directions& h_b) const {
   return by_states_of_arc(
-      moment, attitude_by_states_now<kPassCapacity.states>(setup_.on_board.layout, attitude, moment.gyros, h_b));
+      moment, attitude_by_states_now<kPassCapacity.states>(on_board_, attitude, moment.gyros, h_b));
 }
 
 PassProblem::FixRows PassProblem::compare(const PassSolution& solution, const Moment& moment) const {
@@ -315,9 +379,9 @@ PassProblem::FixRows PassProblem::compare(const PassSolution& solution, const Mo
   const Rot<In, C> C_fix = corrected(fix.fix, by_shared, solution.shared);
   // Linearised at the attitude by the gyros, which has no noise of the fix.
   const FixComparison comparison =
-      trihedron::compare(setup.layout, moment.gyros, C_fix.raw(), by_gyros.value().raw(), fix.h_b, fix.used, by_shared);
-  const auto about_now = rows_about_states_now<kPassCapacity.states>(setup.layout, comparison);
-  rows.y = about_now.col(setup.layout.size());
+      trihedron::compare(on_board_, moment.gyros, C_fix.raw(), by_gyros.value().raw(), fix.h_b, fix.used, by_shared);
+  const auto about_now = rows_about_states_now<kPassCapacity.states>(on_board_, comparison);
+  rows.y = about_now.col(on_board_.size());
   rows.H = by_states_of_arc(moment, about_now);
   PerGyro<double> noise_rad;
   const double sharing = std::sqrt(setup.fixes_sharing_a_sample(fix.since_last));
@@ -340,17 +404,12 @@ MatrixXd PassProblem::prior_covariance() const {
   if (!modes_) {
     return setup_.prior.covariance;
   }
-  const Layout& on_board = setup_.on_board.layout;
-  MatrixXd by_coefficients = MatrixXd::Zero(layout_.parameters(), on_board.parameters());
+  PerGyro<MatrixXd> amplitudes;
   for (int k = 0; k < gyros_; ++k) {
-    const int row = layout_.drift(k) - layout_.drift(0);
-    const int column = on_board.drift(k) - on_board.drift(0);
-    const MatrixXd& amplitudes = modes_->gyros[k].amplitudes;
-    by_coefficients.block<Layout::kEq1, Layout::kEq1>(row, column).setIdentity();
-    by_coefficients.block(row + Layout::kEq1, column + Layout::kEq1, amplitudes.rows(), amplitudes.cols()) = amplitudes;
-    by_coefficients.block<3, 3>(row + layout_.drift_size(), column + on_board.drift_size()).setIdentity();
+    amplitudes[k] = modes_->gyros[k].amplitudes;
   }
-  return by_coefficients * setup_.prior.covariance * by_coefficients.transpose();
+  const MatrixXd map = parameters_by_parameters(layout_, setup_.layout(), amplitudes);
+  return map * setup_.prior.covariance * map.transpose();
 }
 
 void PassProblem::add_prior(const PassSolution& solution, Linear& linear) const {
@@ -365,10 +424,9 @@ void PassProblem::add_prior(const PassSolution& solution, Linear& linear) const 
     const Gyro& prior = setup_.prior.gyros[k];
     const Gyro& gyro = solution.gyros[k];
     const Gyro::Coefficients drift = prior.drift_rad_s - gyro.drift_rad_s;
-    const VectorXd outside = drift.segment(Layout::kEq1, setup.layout.drift_size() - Layout::kEq1);
     apart.segment<Layout::kEq1>(layout_.drift(k)) = drift.head<Layout::kEq1>();
     apart.segment(layout_.drift(k) + Layout::kEq1, layout_.drift_size() - Layout::kEq1) =
-        modes_ ? VectorXd(modes_->gyros[k].amplitudes * outside) : outside;
+        as_states(k, drift.segment(Layout::kEq1, setup.layout.drift_size() - Layout::kEq1));
     apart.segment<3>(layout_.alignment(k)) =
         Rot<C, C>::assume(Matrix3d(prior.C_c_b * gyro.C_c_b.transpose())).log().raw();
     apart.segment(layout_.readout(k), layout_.readout_size()) = prior.errors(layout_) - gyro.errors(layout_);
@@ -392,7 +450,6 @@ void PassProblem::add_prior(const PassSolution& solution, Linear& linear) const 
 
 void PassProblem::end_arc(const PassSolution& solution, const Moment& moment, double extra_variance_rad2,
                           Linear& linear) const {
-  const Layout& on_board = setup_.on_board.layout;
   const int d = layout_.dynamic();
   SmootherStage& stage = linear.stages[moment.arc];
   Linear::ArcEnd& end = linear.ends.emplace_back();
@@ -400,11 +457,11 @@ void PassProblem::end_arc(const PassSolution& solution, const Moment& moment, do
   end.extra_variance_rad2 = extra_variance_rad2;
   stage.m.setZero(d);
   const PassSolution::Arc& next = solution.arcs[moment.arc + 1];
-  Rows rows = Rows::Zero(2L * gyros_, on_board.size());
+  Rows rows = Rows::Zero(2L * gyros_, on_board_.size());
   for (int k = 0; k < gyros_; ++k) {
     const Eigen::Matrix<double, 2, 3> T = across(next.h_in[k]).transpose();
     const int row = layout_.direction(k);
-    rows.block<2, 3>(row, on_board.direction(k)) = T;
+    rows.block<2, 3>(row, on_board_.direction(k)) = T;
     stage.m.segment<2>(row) = T * turn(next.h_in[k], moment.gyros[k].h_in);
   }
   const MatrixXd by_states = by_states_of_arc(moment, rows);
@@ -451,7 +508,7 @@ double PassProblem::scale_of_misfits(const PassSolution& solution) const {
     std::size_t left = of_one_arc;
     for (std::size_t i = arcs_[arc].begin; i < arcs_[arc].end && left > 0; ++i) {
       if (i > arcs_[arc].begin) {
-        step(nodes_[i - 1], nodes_[i], moment, unused);
+        step(nodes_[i - 1], nodes_[i], sensitive(), moment, unused);
       }
       moment.fix = nodes_[i].fix;
       const FixRows rows = moment.fix != nullptr ? compare(solution, moment) : FixRows{};
@@ -489,7 +546,7 @@ PassProblem::Linear PassProblem::linearise(const PassSolution& solution) const {
         linear.cost_outside_rows += add_fix(std::move(rows), *moment.fix, gate, nearby);
       }
       if (i + 1 < nodes_.size()) {
-        step(nodes_[i], nodes_[i + 1], moment, extra_variance_rad2);
+        step(nodes_[i], nodes_[i + 1], sensitive(), moment, extra_variance_rad2);
       }
     }
     SmootherStage& stage = linear.stages[arc];
@@ -526,10 +583,9 @@ void PassProblem::correct(const SmootherResult& found, PassSolution& solution) c
   const int rest = layout_.size() - layout_.readout(0);
   errors.tail(rest) = x.tail(rest);
   for (int k = 0; k < gyros_; ++k) {
-    const auto outside = x.segment(layout_.drift(k) + Layout::kEq1, layout_.drift_size() - Layout::kEq1);
     errors.segment<Layout::kEq1>(on_board.drift(k)) = x.segment<Layout::kEq1>(layout_.drift(k));
     errors.segment(on_board.drift(k) + Layout::kEq1, on_board.drift_size() - Layout::kEq1) =
-        modes_ ? VectorXd(modes_->gyros[k].coefficients * outside) : VectorXd(outside);
+        as_coefficients(k, x.segment(layout_.drift(k) + Layout::kEq1, layout_.drift_size() - Layout::kEq1));
     errors.segment<3>(on_board.alignment(k)) = x.segment<3>(layout_.alignment(k));
     add_parameter_errors(on_board, k, errors, solution.gyros[k]);
   }

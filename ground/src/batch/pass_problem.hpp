@@ -8,6 +8,7 @@
 #include <optional>
 #include <vector>
 
+#include "batch/drift_modes.hpp"
 #include "batch/information_smoother.hpp"
 #include "model/gyro.hpp"
 #include "onboard/screened_pass.hpp"
@@ -16,17 +17,6 @@
 #include "trihedron/core/setup.hpp"
 
 namespace trihedron::ground {
-
-/// The combinations of the coefficients outside eq. (1) of each gyro that a pass can show; what is orthogonal to them
-/// moves no momentum by as much as its noise.
-struct DriftModes {
-  struct OfGyro {
-    Eigen::MatrixXd coefficients;  ///< by their amplitudes: a column for each mode
-    Eigen::MatrixXd amplitudes;    ///< by coefficients: a row for each mode; amplitudes · coefficients = 1
-  };
-  PerGyro<OfGyro> gyros;
-  [[nodiscard]] int size() const { return static_cast<int>(gyros[0].coefficients.cols()); }
-};
 
 /// What moves the momenta in addition to the drift model.
 struct ProcessNoise {
@@ -78,10 +68,8 @@ class PassProblem {
   /// coefficients outside eq. (1).
   [[nodiscard]] const Layout& layout() const { return layout_; }
   [[nodiscard]] const std::optional<DriftModes>& modes() const { return modes_; }
-  void use(DriftModes modes) {
-    layout_.drift_modes = modes.size();
-    modes_ = std::move(modes);
-  }
+  /// `solution`: near enough to tell how each mode moves the momenta.
+  void use(DriftModes modes, const PassSolution& solution);
   void set_noise(const ProcessNoise& noise) {
     setup_.on_board.direction_random_walk_rad_sqrt_s = noise.direction_random_walk_rad_sqrt_s;
     setup_.on_board.wandering_drift = noise.wandering_drift;
@@ -129,11 +117,15 @@ class PassProblem {
     Time t{};
     const ScreenedPass::Fix* fix = nullptr;  ///< there, if any
     Gyros gyros;  ///< estimates, with the momenta of this time and the wandering drift of the arc
-    PerGyro<Sensitivity<kMaxDriftColumns>> since;     ///< the beginning of the arc
+    /// The beginning of the arc; by the coefficients of eq. (1) alone where modes stand for the others.
+    PerGyro<Sensitivity<kMaxDriftColumns>> since;
     PerGyro<Eigen::Matrix<double, 3, 2>> directions;  ///< there: φ by the two components across the momentum
   };
   /// Visits the end of each arc but the last, where the next begins; that one begins as the solution then says.
   void go_over_arcs(const PassSolution& solution, const std::function<void(const Moment&)>& at_end) const;
+  /// The same with the sensitivities to all coefficients, modes or not.
+  void go_over_arcs_by_coefficients(const PassSolution& solution,
+                                    const std::function<void(const Moment&)>& at_end) const;
   /// Visits all samples that are used, and all fixes, in time order.
   void go_along(const PassSolution& solution, const std::function<void(const Moment&)>& visit) const;
 
@@ -181,7 +173,15 @@ class PassProblem {
   /// How far the misfits are beyond their noise as a rule, by the first fixes of each arc: the square of it, 1 or more.
   [[nodiscard]] double scale_of_misfits(const PassSolution& solution) const;
   [[nodiscard]] Reading reading_at(const Node& node) const;
-  void step(const Node& from_node, const Node& to_node, Moment& moment, double& extra_variance_rad2) const;
+  /// `sensitive`: the columns of the drift that the sensitivities are about; the momenta turn by all.
+  void step(const Node& from_node, const Node& to_node, const DriftModel& sensitive, Moment& moment,
+            double& extra_variance_rad2) const;
+  void go_over_arcs(const PassSolution& solution, const DriftModel& sensitive,
+                    const std::function<void(const Moment&)>& at_end) const;
+  [[nodiscard]] const DriftModel& sensitive() const { return modes_ ? drift_of_eq1_ : drift_; }
+  /// Coefficients outside eq. (1) as the states that stand for them, and back.
+  [[nodiscard]] Eigen::VectorXd as_states(int gyro, const Eigen::VectorXd& outside) const;
+  [[nodiscard]] Eigen::VectorXd as_coefficients(int gyro, const Eigen::VectorXd& states) const;
   void begin_arc(const PassSolution& solution, std::size_t arc, Moment& moment) const;
   void add_prior(const PassSolution& solution, Linear& linear) const;
   [[nodiscard]] Eigen::MatrixXd prior_covariance() const;
@@ -189,8 +189,13 @@ class PassProblem {
 
   PassSetup setup_;
   Layout layout_;
+  /// Of the rows of fixes and attitudes as they are on board: those of the setup, without coefficients outside eq. (1)
+  /// where modes stand for them.
+  Layout on_board_;
   std::optional<DriftModes> modes_;
+  MovedByModes moved_by_modes_;
   DriftModel drift_;
+  DriftModel drift_of_eq1_;
   int gyros_;
   const ScreenedSamples* samples_;
   std::vector<Node> nodes_;

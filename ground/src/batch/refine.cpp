@@ -149,23 +149,20 @@ Parameters with_members(const PassProblem& problem, const FieldPrior& field, con
   const Layout& modes = problem.layout();
   const Layout members = problem.setup().layout();
   Parameters found{by_modes.gyros, MatrixXd::Zero(members.parameters(), members.parameters())};
-  MatrixXd follow = MatrixXd::Zero(members.parameters(), modes.parameters());
+  PerGyro<MatrixXd> by_modes_of_gyro;
   const Eigen::Index size = members.drift_size() - Layout::kEq1;
   for (int k = 0; k < members.gyros; ++k) {
-    const int row = members.drift(k) - members.drift(0);
-    const int column = modes.drift(k) - modes.drift(0);
+    const int row = members.drift(k) - members.drift(0) + Layout::kEq1;
     const MatrixXd& amplitudes = field.modes.gyros[k].amplitudes;
     const Eigen::VectorXd variance = field.sigma_rad_s.segment(k * size, size).cwiseAbs2();
     const MatrixXd before = variance.asDiagonal() * amplitudes.transpose();
-    const MatrixXd by_mode = (amplitudes * before).ldlt().solve(before.transpose()).transpose();
+    MatrixXd& by_mode = by_modes_of_gyro[k];
+    by_mode = (amplitudes * before).ldlt().solve(before.transpose()).transpose();
     auto outside = found.gyros[k].drift_rad_s.segment(Layout::kEq1, size);
     outside = (by_mode * (amplitudes * outside)).eval();
-    follow.block<Layout::kEq1, Layout::kEq1>(row, column).setIdentity();
-    follow.block(row + Layout::kEq1, column + Layout::kEq1, size, by_mode.cols()) = by_mode;
-    follow.block<3, 3>(row + members.drift_size(), column + modes.drift_size()).setIdentity();
-    found.covariance.block(row + Layout::kEq1, row + Layout::kEq1, size, size) =
-        MatrixXd(variance.asDiagonal()) - by_mode * before.transpose();
+    found.covariance.block(row, row, size, size) = MatrixXd(variance.asDiagonal()) - by_mode * before.transpose();
   }
+  const MatrixXd follow = parameters_by_parameters(members, modes, by_modes_of_gyro);
   found.covariance += follow * by_modes.covariance * follow.transpose();
   const Eigen::LLT<MatrixXd> root(found.covariance.reverse());
   found.covariance += positive_part(field.more_covariance, MatrixXd(root.matrixL()).reverse());
@@ -173,7 +170,7 @@ Parameters with_members(const PassProblem& problem, const FieldPrior& field, con
 }
 
 /// The problem of a screened pass. Throws SetupError where it has no solution.
-PassProblem problem_of(const Screened& screened, PassSetup setup, const std::optional<FieldPrior>& field) {
+PassProblem problem_of(const Screened& screened, PassSetup setup) {
   if (screened.pass.fixes.empty()) {
     throw SetupError("no fix could be compared with the gyros", "look at the telemetry with `trihedron inspect`");
   }
@@ -181,20 +178,25 @@ PassProblem problem_of(const Screened& screened, PassSetup setup, const std::opt
     throw SetupError("the clock of the telemetry was set back within the pass: how its parts lie in time is unknown",
                      "calibrate the parts apart, or use estimator invariant");
   }
-  PassProblem problem(screened.pass, std::move(setup));
+  return {screened.pass, std::move(setup)};
+}
+
+/// The first solution, with the modes of the field in use.
+PassSolution begin(PassProblem& problem, const Screened& screened, const std::optional<FieldPrior>& field) {
+  PassSolution first = first_solution(problem, screened);
   if (field) {
-    problem.use(field->modes);
+    problem.use(field->modes, first);
   }
-  return problem;
+  return first;
 }
 
 }  // namespace
 
 Refinement::Refinement(const Screened& screened, PassSetup setup, const CalibrationOptions& options,
                        const std::optional<FieldPrior>& field)
-    : problem_(problem_of(screened, std::move(setup), field)),
+    : problem_(problem_of(screened, std::move(setup))),
       field_(field),
-      result_(most_likely(problem_, first_solution(problem_, screened))),
+      result_(most_likely(problem_, begin(problem_, screened, field_))),
       halves_(compare_halves(result_, problem_.layout())),
       roots_(roots_of(result_)) {
   const SmoothedAttitude smoothed(screened.pass, problem_, result_.solution, roots_);

@@ -68,7 +68,7 @@ void Trial::use_modes(Eigen::VectorXd level, PassSolution& solution) {
     auto outside = solution.gyros[k].drift_rad_s.segment(Layout::kEq1, its.coefficients.rows());
     outside = (its.coefficients * (its.amplitudes * outside)).eval();
   }
-  problem_.use(std::move(modes));
+  problem_.use(std::move(modes), solution);
   field_level_ = std::move(level);
 }
 

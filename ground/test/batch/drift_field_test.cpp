@@ -223,7 +223,7 @@ TEST(DriftField, ItsModesTellWhatAllMembersTell) {
   const PassProblem all(screened.pass, setup);
   PassProblem few(screened.pass, setup);
   const PassSolution first = first_solution(all, screened);
-  few.use(modes_of(few, first, members, level.array() + std::log(3.0)));
+  few.use(modes_of(few, first, members, level.array() + std::log(3.0)), first);
   EXPECT_LT(few.layout().drift_modes, members.of_one_gyro());
   const BatchResult by_all = most_likely(all, first);
   const BatchResult by_few = most_likely(few, first);

@@ -22,6 +22,10 @@ struct GyroModel : GyroReadout {
   Coefficients drift_rad_s = Coefficients::Zero(Layout::kEq1 <= Max ? Layout::kEq1 : Max);
 };
 
+/// by_drift ← by_drift + turn × by_drift + dt_C_in_b · basis, column by column; all of the same size.
+void advance_by_drift(ColumnsView by_drift, ColumnsView basis, const Eigen::Matrix3d& dt_C_in_b,
+                      const Eigen::Vector3d& turn);
+
 /// Linearised effect of three causes on one momentum since a reference epoch:
 /// φ(t) = by_start φ(t0) + by_drift Δκ + by_alignment δ, with h(true) = exp([φ×]) h(est), φ in `in`;
 /// κ(true) = κ(est) + Δκ, all columns of the drift model; C_c_b(true) = exp([δ×]) C_c_b(est), δ in c.
@@ -37,6 +41,15 @@ struct Sensitivity {
     by_drift.view(columns).set_zero();
     by_alignment.setZero();
   }
+  /// Over one step more, in which the momentum turned by `turn`, rad. C_in_c: the attitude in it; dt_C_in_b: from the
+  /// case, times its length, s; basis: columns of the drift in it, padded, as many as by_drift has.
+  void advance(ColumnsView basis, const Eigen::Matrix3d& C_in_c, const Eigen::Matrix3d& dt_C_in_b,
+               const Eigen::Vector3d& turn) {
+    const Eigen::Matrix3d cross = skew<double>(turn);
+    by_start += cross * by_start;
+    by_alignment += cross * (by_alignment - C_in_c);
+    advance_by_drift(by_drift.view(basis.columns), basis, dt_C_in_b, turn);
+  }
   /// Makes it that of this stretch followed by `next`.
   void append(const Sensitivity& next, int columns) {
     by_start = (next.by_start * by_start).eval();
@@ -45,10 +58,6 @@ struct Sensitivity {
     by_alignment = (next.by_start * by_alignment + next.by_alignment).eval();
   }
 };
-
-/// by_drift ← by_drift + turn × by_drift + dt_C_in_b · basis, column by column; all of the same size.
-void advance_by_drift(ColumnsView by_drift, ColumnsView basis, const Eigen::Matrix3d& dt_C_in_b,
-                      const Eigen::Vector3d& turn);
 
 /// Turns one momentum by its drift over `dt_s`, with attitude and reading of the middle of the step (midpoint rule;
 /// exact for constant ω_in). C_in_c: attitude; h_b: reading, unit; part_of_change: as of DriftModel.
@@ -71,10 +80,7 @@ Eigen::Vector3d precess(GyroModel<Max>& gyro, Sensitivity<Max>& sensitivity, con
   const Eigen::Matrix3d dt_C_in_b = dt_s * (C_in_c * gyro.C_c_b);
   const Eigen::Vector3d turn = dt_C_in_b * columns.view(size).times(gyro.drift_rad_s.data());
   gyro.h_in = rotated<double>(gyro.h_in, turn).normalized();
-  const Eigen::Matrix3d cross = skew<double>(turn);
-  sensitivity.by_start += cross * sensitivity.by_start;
-  sensitivity.by_alignment += cross * (sensitivity.by_alignment - C_in_c);
-  advance_by_drift(sensitivity.by_drift.view(size), columns.view(size), dt_C_in_b, turn);
+  sensitivity.advance(columns.view(size), C_in_c, dt_C_in_b, turn);
   return turn;
 }
 
