@@ -8,6 +8,8 @@ import pathlib
 import re
 import subprocess
 
+import pytest
+
 ROOT = pathlib.Path(__file__).resolve().parent.parent
 MODULES_CMAKE = ROOT / "cmake" / "Modules.cmake"
 
@@ -160,3 +162,17 @@ def test_a_planted_include_of_another_room_is_found(tmp_path):
 def test_a_planted_link_is_found():
     dot = '"node0" [ label = "trihedron_core\\n(trihedron::core)" ];\n"node1" [ label = "trihedron_io\\n(x)" ];\n"node0" -> "node1"'
     assert wrong_links(dot, allowed()) == ["core links io"]
+
+
+def test_a_kernel_for_newer_processors_shares_no_function_with_the_rest():
+    """Of functions that several objects define the linker keeps any one, and that of this kernel would not run everywhere."""
+    build = pathlib.Path(os.environ["TRIHEDRON_BUILD"])
+    if "CMAKE_BUILD_TYPE:STRING=Release" not in (build / "CMakeCache.txt").read_text():
+        pytest.skip("only an optimised build leaves no small functions")
+    objects = list((build / "ground" / "CMakeFiles" / "trihedron_rotate_up_avx2.dir").rglob("*.o"))
+    if not objects:
+        pytest.skip("no such kernel for this processor")
+    names = subprocess.run(["nm", "--demangle", "--defined-only", *objects], check=True, capture_output=True, text=True).stdout
+    functions = re.findall(r"^\w+ [TWuV] (.*)$", names, re.MULTILINE)
+    assert any("rotate_up_avx2(" in name for name in functions)
+    assert [name for name in functions if "rotate_up_avx2" not in name and not name.startswith("DW.ref.")] == []

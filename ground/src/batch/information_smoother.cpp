@@ -1,13 +1,13 @@
 #include "batch/information_smoother.hpp"
 
 #include <Eigen/LU>
-#include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
 #include <optional>
 #include <stdexcept>
 #include <utility>
 
+#include "batch/householder.hpp"
 #include "trihedron/records/stop.hpp"
 
 namespace trihedron::ground {
@@ -20,12 +20,12 @@ using Eigen::VectorXd;
 
 double log_determinant(const MatrixXd& triangle) { return triangle.diagonal().array().abs().log().sum(); }
 
-/// Rotates rows (Householder) so that in the first `columns` columns only an upper triangle remains.
+/// Rotates rows so that in the first `columns` columns only an upper triangle remains.
 void rotate_up(MatrixXd& rows, Index columns) {
-  const Eigen::HouseholderQR<MatrixXd> qr(rows.leftCols(columns));
-  rows.rightCols(rows.cols() - columns).applyOnTheLeft(qr.householderQ().adjoint());
-  rows.leftCols(columns).setZero();
-  rows.topLeftCorner(columns, columns) = qr.matrixQR().topRows(columns).triangularView<Upper>();
+  ground::rotate_up(rows.data(), rows.rows(), rows.cols(), columns);
+  for (Index column = 0; column < columns; ++column) {
+    rows.col(column).tail(rows.rows() - std::min(column + 1, rows.rows())).setZero();
+  }
 }
 
 /// Rows about the constants alone, with right side; compressed to a triangle whenever the buffer is full.
@@ -111,10 +111,11 @@ class Forward {
 
 MatrixXd triangle_of(const MatrixXd& rows) {
   const Index size = rows.cols();
+  MatrixXd rotated = rows;
+  rotate_up(rotated, size);
   MatrixXd triangle = MatrixXd::Zero(size, size);
   const Index there = std::min(rows.rows(), size);
-  triangle.topRows(there) =
-      Eigen::HouseholderQR<MatrixXd>(rows).matrixQR().topRows(there).template triangularView<Upper>();
+  triangle.topRows(there) = rotated.topRows(there);
   return triangle;
 }
 
