@@ -51,6 +51,7 @@ class Figures {
       put("attitude", errors(input_.evaluation->attitude.errors));
       put("open_loops", open_loops());
     }
+    put("forecast", forecast());
     put("innovations", innovations());
     put("histogram", histogram());
     put("nis", nis());
@@ -138,6 +139,46 @@ class Figures {
       }
     }
     return loops.empty() ? loops : json{{"limit", input_.evaluation->limit_rad / kArcsecond_rad}, {"loops", loops}};
+  }
+
+  /// The predicted total error over the time since the correction, ″, and how far the open loops of the pass have gone.
+  [[nodiscard]] json forecast() const {
+    const std::optional<OpenLoopForecast>& its = run_.calibration.forecast;
+    if (!its || its->errors.size() < 2) {
+      return {};
+    }
+    Series series(3, 2 * to_minutes(its->errors[1].after));
+    for (const PredictedError& error : its->errors) {
+      series.add(to_minutes(error.after), {error.error_68_rad / kArcsecond_rad, error.error_95_rad / kArcsecond_rad,
+                                           error.error_997_rad / kArcsecond_rad});
+    }
+    json loops = json::array();
+    for (const ground::OpenLoops& one : input_.evaluation == nullptr ? std::vector<ground::OpenLoops>{}
+                                                                     : input_.evaluation->open_loops) {
+      // At the first correction nothing is calibrated yet.
+      if (&one == input_.evaluation->open_loops.data() || one.predicted.size() < 2 || one.calibrated.t.size() < 2) {
+        continue;
+      }
+      Series flown(1, fix_step_min_);
+      for (std::size_t i = 0; i < one.calibrated.t.size(); ++i) {
+        flown.add(one.calibrated.age_s[i] / 60, {one.calibrated.error_rad[i].norm() / kArcsecond_rad});
+      }
+      Series predicted(1, 2 * to_minutes(one.predicted[1].after));
+      for (const PredictedError& error : one.predicted) {
+        predicted.add(to_minutes(error.after), {error.error_997_rad / kArcsecond_rad});
+      }
+      loops.push_back({{"corrected", rounded(minutes(one.calibrated.t.front()), 6)},
+                       {"flown", flown.drawn(kHalf / 2)},
+                       {"predicted", predicted.drawn(kHalf / 2)}});
+    }
+    json figure = {{"predicted", series.drawn(kHalf)},
+                   {"limit", its->usual.limit_rad / kArcsecond_rad},
+                   {"loops", loops}};
+    if (its->need) {
+      figure["need"] = {{"limit", its->need->need.error_rad / kArcsecond_rad},
+                        {"interval", to_minutes(its->need->need.interval)}};
+    }
+    return figure;
   }
 
   /// Per component the used ones with their sigmas, and the ones that the gate rejected.

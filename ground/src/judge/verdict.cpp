@@ -12,6 +12,7 @@
 #include <numbers>
 #include <utility>
 
+#include "judge/need.hpp"
 #include "judge/whiteness.hpp"
 #include "model/orbital_rate.hpp"
 #include "trihedron/core/directions_fit.hpp"
@@ -624,6 +625,7 @@ Verdict judge(const Pass& pass, const CalibrationRun& run) {
   judge_gyros(pass, run, findings);
   judge_gyro_rate(pass, run, findings);
   judge_unused_sensors(pass, run, findings);
+  judge_need(run.calibration.forecast, findings);
   return verdict_of(std::move(findings));
 }
 
@@ -644,6 +646,7 @@ Verdict judge_navigation(const Pass& pass, const NavigationRun& run) {
   judge_rejections(run.statistics, findings);
   judge_star_tracker(run.statistics, findings);
   judge_nis(run.statistics, "the calibration in use does not fit this pass, or the model is incomplete", findings);
+  judge_need(run.forecast, findings);
   return verdict_of(std::move(findings));
 }
 
