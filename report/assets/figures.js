@@ -343,7 +343,7 @@ const FIGURES = {
     for (const { corrected, flown, predicted: bound } of loops) {
       const of = `corrected at ${Math.round(corrected)} min`;
       traces.push(line(flown.t, flown.y[0], panel(0), { line: { color: faded(colour.vermillion, 0.7), width: 1 },
-        hovertemplate: `%{x:.1f} min after: %{y:.3~g}″<extra>${of}, flown</extra>` }));
+        hovertemplate: `%{x:.0f} min after: %{y:.3~g}″<extra>${of}, flown</extra>` }));
       traces.push(line(bound.t, bound.y[0], panel(0), { line: { color: faded(colour.vermillion, 0.5), width: 1, dash: "dash" },
         hovertemplate: `%{x:.0f} min after: %{y:.3~g}″<extra>${of}, 99.7 % as predicted then</extra>` }));
     }

@@ -141,6 +141,22 @@ class Figures {
     return loops.empty() ? loops : json{{"limit", input_.evaluation->limit_rad / kArcsecond_rad}, {"loops", loops}};
   }
 
+  /// Of the total error over the time since the correction, min, in steps of this length, ″.
+  [[nodiscard]] static Series medians(const ground::AttitudeErrors& errors, double step_min) {
+    Series series(1, 2 * step_min);
+    for (std::size_t begin = 0; begin < errors.t.size();) {
+      const double step = std::floor(errors.age_s[begin] / 60 / step_min);
+      std::vector<double> totals;
+      for (; begin < errors.t.size() && std::floor(errors.age_s[begin] / 60 / step_min) == step; ++begin) {
+        totals.push_back(errors.error_rad[begin].norm() / kArcsecond_rad);
+      }
+      const auto middle = totals.begin() + static_cast<std::ptrdiff_t>(totals.size() / 2);
+      std::ranges::nth_element(totals, middle);
+      series.add((step + 0.5) * step_min, {*middle});
+    }
+    return series;
+  }
+
   /// The predicted total error over the time since the correction, ″, and how far the open loops of the pass have gone.
   [[nodiscard]] json forecast() const {
     const std::optional<OpenLoopForecast>& its = run_.calibration.forecast;
@@ -153,20 +169,18 @@ class Figures {
                                            error.error_997_rad / kArcsecond_rad});
     }
     json loops = json::array();
-    for (const ground::OpenLoops& one : input_.evaluation == nullptr ? std::vector<ground::OpenLoops>{}
-                                                                     : input_.evaluation->open_loops) {
-      // At the first correction nothing is calibrated yet.
-      if (&one == input_.evaluation->open_loops.data() || one.predicted.size() < 2 || one.calibrated.t.size() < 2) {
+    // At the first correction nothing is calibrated yet.
+    for (std::size_t i = 1; input_.evaluation != nullptr && i < input_.evaluation->open_loops.size(); ++i) {
+      const ground::OpenLoops& one = input_.evaluation->open_loops[i];
+      if (one.predicted.size() < 2 || one.calibrated.t.size() < 2) {
         continue;
       }
-      Series flown(1, fix_step_min_);
-      for (std::size_t i = 0; i < one.calibrated.t.size(); ++i) {
-        flown.add(one.calibrated.age_s[i] / 60, {one.calibrated.error_rad[i].norm() / kArcsecond_rad});
-      }
-      Series predicted(1, 2 * to_minutes(one.predicted[1].after));
+      const double step_min = to_minutes(one.predicted[1].after);
+      Series predicted(1, 2 * step_min);
       for (const PredictedError& error : one.predicted) {
         predicted.add(to_minutes(error.after), {error.error_997_rad / kArcsecond_rad});
       }
+      const Series flown = medians(one.calibrated, step_min);
       loops.push_back({{"corrected", rounded(minutes(one.calibrated.t.front()), 6)},
                        {"flown", flown.drawn(kHalf / 2)},
                        {"predicted", predicted.drawn(kHalf / 2)}});

@@ -129,9 +129,9 @@ OpenLoopForecast forecast_of(const Pass& pass, const CalibrationOptions& options
     return forecast(pipeline.errors(), pipeline.gyros(), motion, rule, options.need);
   }
   // The next correction knows the attitude as well as the last one did.
-  Eigen::Vector3d sigma_rad = attitude.sigma_rad.back();
-  for (std::size_t i = 0; i < attitude.size(); ++i) {
-    sigma_rad = attitude.age_s[i] == 0 ? attitude.sigma_rad[i] : sigma_rad;
+  Eigen::Vector3d sigma_rad = attitude.sigma_rad.front();
+  for (std::size_t i = 1; i < attitude.size(); ++i) {
+    sigma_rad = attitude.age_s[i] < attitude.age_s[i - 1] ? attitude.sigma_rad[i] : sigma_rad;
   }
   const Pipeline::Held held = pipeline.held_at(Rot<In, C>::assume(attitude.q_in_c.back()),
                                                Eigen::Matrix3d(sigma_rad.cwiseAbs2().asDiagonal()));
