@@ -50,6 +50,7 @@ enum class FindingCode : std::uint8_t {
   kCoefficientsMoved,
   kPassNotTrustworthy,
   kNotAdopted,
+  kDriftNotExplained,
   kOther,  ///< of a file, from a program that knows more
 };
 
@@ -71,7 +72,7 @@ struct FindingRow {
   std::string_view name;     ///< stable, for programs
   FindingSeverity severity;  ///< where the one who finds it does not say otherwise
 };
-inline constexpr std::array<FindingRow, 38> kFindings = {{
+inline constexpr std::array<FindingRow, 39> kFindings = {{
     {FindingCode::kTooFewFixes, "too-few-fixes", FindingSeverity::kDoNotUse},
     {FindingCode::kShortPass, "short-pass", FindingSeverity::kWarning},
     {FindingCode::kManyRejected, "many-rejected", FindingSeverity::kWarning},
@@ -109,6 +110,7 @@ inline constexpr std::array<FindingRow, 38> kFindings = {{
     {FindingCode::kCoefficientsMoved, "coefficients-moved", FindingSeverity::kDoNotUse},
     {FindingCode::kPassNotTrustworthy, "pass-not-trustworthy", FindingSeverity::kDoNotUse},
     {FindingCode::kNotAdopted, "not-adopted", FindingSeverity::kDoNotUse},
+    {FindingCode::kDriftNotExplained, "drift-not-explained", FindingSeverity::kWarning},
     {FindingCode::kOther, "other", FindingSeverity::kWarning},
 }};
 
