@@ -12,6 +12,7 @@
 #include <numbers>
 #include <utility>
 
+#include "judge/drift_left.hpp"
 #include "judge/need.hpp"
 #include "judge/whiteness.hpp"
 #include "model/orbital_rate.hpp"
@@ -613,6 +614,7 @@ Verdict judge(const Pass& pass, const CalibrationRun& run) {
   judge_nis(statistics, "its model is incomplete or the noise is understated", findings);
   judge_noise(pass, run, findings);
   judge_whiteness(pass, run, findings);
+  judge_drift_left(pass, run, findings);
   judge_halves(statistics, findings);
   judge_drift_model(run, findings);
   judge_change(run, findings);

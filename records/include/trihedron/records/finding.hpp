@@ -51,6 +51,7 @@ enum class FindingCode : std::uint8_t {
   kPassNotTrustworthy,
   kNotAdopted,
   kNeedNotMet,
+  kDriftNotExplained,
   kOther,  ///< of a file, from a program that knows more
 };
 
@@ -111,6 +112,7 @@ inline constexpr std::array<FindingRow, 39> kFindings = {{
     {FindingCode::kPassNotTrustworthy, "pass-not-trustworthy", FindingSeverity::kDoNotUse},
     {FindingCode::kNotAdopted, "not-adopted", FindingSeverity::kDoNotUse},
     {FindingCode::kNeedNotMet, "need-not-met", FindingSeverity::kDoNotUse},
+    {FindingCode::kDriftNotExplained, "drift-not-explained", FindingSeverity::kWarning},
     {FindingCode::kOther, "other", FindingSeverity::kWarning},
 }};
 
