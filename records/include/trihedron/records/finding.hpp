@@ -73,7 +73,7 @@ struct FindingRow {
   std::string_view name;     ///< stable, for programs
   FindingSeverity severity;  ///< where the one who finds it does not say otherwise
 };
-inline constexpr std::array<FindingRow, 39> kFindings = {{
+inline constexpr auto kFindings = std::to_array<FindingRow>({
     {FindingCode::kTooFewFixes, "too-few-fixes", FindingSeverity::kDoNotUse},
     {FindingCode::kShortPass, "short-pass", FindingSeverity::kWarning},
     {FindingCode::kManyRejected, "many-rejected", FindingSeverity::kWarning},
@@ -114,7 +114,7 @@ inline constexpr std::array<FindingRow, 39> kFindings = {{
     {FindingCode::kNeedNotMet, "need-not-met", FindingSeverity::kDoNotUse},
     {FindingCode::kDriftNotExplained, "drift-not-explained", FindingSeverity::kWarning},
     {FindingCode::kOther, "other", FindingSeverity::kWarning},
-}};
+});
 
 /// Its row in the table.
 [[nodiscard]] constexpr const FindingRow& row_of(FindingCode code) { return kFindings[static_cast<std::size_t>(code)]; }
