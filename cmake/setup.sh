@@ -7,7 +7,7 @@ cd "$(dirname "$0")/.."
 program=(
   g++ cmake ninja-build pkg-config
   libeigen3-dev libhdf5-dev libcli11-dev libtomlplusplus-dev libfmt-dev nlohmann-json3-dev libspdlog-dev libnetcdf-dev libfast-float-dev libsqlitecpp-dev
-  libtbb-dev libboost-dev liberfa-dev ca-certificates
+  libtbb-dev libboost-dev liberfa-dev libpugixml-dev ca-certificates
 )
 # Tests, benches, validation.
 tests=(

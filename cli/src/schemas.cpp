@@ -217,6 +217,23 @@ Json history_output(const Json& calibration) {
                  {"findings", findings()}});
 }
 
+/// Of export and import.
+Json interchange_output() {
+  return object({{"input", text()},
+                 {"input_format", text()},
+                 {"written", array(text())},
+                 {"output_format", text()},
+                 {"epochs", count()},
+                 {"segments", count()},
+                 {"left_out", count()},
+                 {"epoch_tai", text()},
+                 {"time_system", text()},
+                 {"inertial_frame", text()},
+                 {"body_frame", text()},
+                 {"object_name", text()},
+                 {"object_id", text()}});
+}
+
 io::Schema output(const std::string& command, const std::string& about, const Json& schema) {
   Json document = {{"$schema", "https://json-schema.org/draft/2020-12/schema"},
                    {"title", "Output of " + command},
@@ -238,6 +255,8 @@ std::vector<io::Schema> all_schemas() {
   schemas.push_back(output("evaluate", "What evaluate prints with --json.", evaluate_output()));
   schemas.push_back(output("observe", "What observe prints with --json.", observe_output()));
   schemas.push_back(output("history", "What history prints with --json.", history_output(calibration)));
+  schemas.push_back(output("export", "What export prints with --json.", interchange_output()));
+  schemas.push_back(output("import", "What import prints with --json.", interchange_output()));
   return schemas;
 }
 
