@@ -102,6 +102,7 @@ class AcmWriter {
     const AttitudeHistory& attitude = context_.attitude->attitude;
     const std::vector<Eigen::Vector3d>& rates = context_.attitude->rate_rad_s;
     text_.put("\nATT_START\n", "<att>\n");
+    text_.entry("ATT_BASIS", "DETERMINED_GND");
     text_.entry("ATT_BASIS_ID", id_);
     text_.entry("REF_FRAME_A", description_.inertial_frame);
     text_.entry("REF_FRAME_B", description_.body_frame);
@@ -128,6 +129,7 @@ class AcmWriter {
     const AttitudeHistory& attitude = context_.attitude->attitude;
     text_.put("\nCOV_START\n", "<cov>\n");
     text_.entry("COMMENT", "Where an attitude has no sigma its epoch is left out");
+    text_.entry("COV_BASIS", "DETERMINED_GND");
     text_.entry("COV_BASIS_ID", id_);
     text_.entry("COV_REF_FRAME", description_.body_frame);
     text_.entry("COV_TYPE", "ANGLE");

@@ -96,7 +96,7 @@ std::string kernel_name(std::string_view text) {
 }
 
 /// In quotation marks, those within doubled.
-std::string quoted(std::string_view text) {
+std::string kernel_text(std::string_view text) {
   std::string result = "'";
   for (const char c : text) {
     result += c == '\'' ? "''" : std::string(1, c);
@@ -119,7 +119,7 @@ std::string numbers(const std::string& name, const std::vector<double>& values) 
 }
 
 std::string words(const std::string& name, const std::vector<std::string>& values) {
-  return variable(name, values, [](const std::string& value) { return quoted(value); });
+  return variable(name, values, [](const std::string& value) { return kernel_text(value); });
 }
 
 /// The spacecraft's name and number, and frame c.
@@ -130,7 +130,7 @@ std::string body_frame(const SpiceObject& object) {
       "   NAIF_BODY_NAME += ( {0} )\n   NAIF_BODY_CODE += ( {1} )\n\n"
       "   FRAME_{2} = {3}\n   FRAME_{3}_NAME = '{2}'\n   FRAME_{3}_CLASS = 3\n   FRAME_{3}_CLASS_ID = {3}\n"
       "   FRAME_{3}_CENTER = {1}\n   CK_{3}_SCLK = {1}\n   CK_{3}_SPK = {1}\n",
-      quoted(kernel_name(object.name)), object.naif_id, name, id);
+      kernel_text(kernel_name(object.name)), object.naif_id, name, id);
 }
 
 }  // namespace

@@ -68,7 +68,7 @@ TEST_P(EveryMessage, ComesBackWithEveryEpochAndQuaternion) {
   EXPECT_EQ(back.epoch, epoch);
   EXPECT_EQ(back.object_name, "RESURS-DK1 <1> & \"2\"");
   EXPECT_EQ(back.object_id, "2006-021A");
-  EXPECT_EQ(back.inertial_frame, "ICRF");
+  EXPECT_EQ(back.inertial_frame, "GCRF");
   EXPECT_EQ(back.body_frame, "SC_BODY_1");
   EXPECT_EQ(back.time_system, name_of(scale));
   EXPECT_EQ(back.segments, 2U);
@@ -353,7 +353,7 @@ TEST(DamagedAem, OfTextIsRefusedWithTheReason) {
       {"ORIGINATOR = TRIHEDRON\n", "ORIGINATOR =\n", "ORIGINATOR has no value"},
       {"OBJECT_NAME = RESURS-DK1\n", "", "the metadata has no OBJECT_NAME"},
       {"OBJECT_ID = 2006-021A\n", "", "the metadata has no OBJECT_ID"},
-      {"REF_FRAME_A = ICRF\n", "", "the metadata has no REF_FRAME_A"},
+      {"REF_FRAME_A = GCRF\n", "", "the metadata has no REF_FRAME_A"},
       {"REF_FRAME_B = SC_BODY_1\n", "", "the metadata has no REF_FRAME_B"},
       {"TIME_SYSTEM = TAI\n", "", "the metadata has no TIME_SYSTEM"},
       {"START_TIME = 2009-05-20T00:00:00\n", "", "the metadata has no START_TIME"},
@@ -361,13 +361,13 @@ TEST(DamagedAem, OfTextIsRefusedWithTheReason) {
       {"ATTITUDE_TYPE = QUATERNION/ANGVEL\n", "", "the metadata has no ATTITUDE_TYPE"},
       {"ANGVEL_FRAME = SC_BODY_1\n", "", "the metadata has no ANGVEL_FRAME"},
       {"OBJECT_ID = 2006-021A\n", "OBJECT_ID = 2006-021A\nOBJECT_ID = 2006-021A\n", "OBJECT_ID is there twice"},
-      {"REF_FRAME_A = ICRF", "REF_FRAME_A = ITRF2014", "\"ITRF2014\" is neither an inertial frame nor"},
-      {"REF_FRAME_A = ICRF", "REF_FRAME_A = LVLH", "\"LVLH\" is neither"},
-      {"REF_FRAME_A = ICRF", "REF_FRAME_A = SC_BODY_2", "both frames are of the spacecraft"},
+      {"REF_FRAME_A = GCRF", "REF_FRAME_A = ITRF2014", "\"ITRF2014\" is neither an inertial frame nor"},
+      {"REF_FRAME_A = GCRF", "REF_FRAME_A = LVLH", "\"LVLH\" is neither"},
+      {"REF_FRAME_A = GCRF", "REF_FRAME_A = SC_BODY_2", "both frames are of the spacecraft"},
       {"REF_FRAME_B = SC_BODY_1", "REF_FRAME_B = EME2000", "both frames are inertial"},
       {"REF_FRAME_B = SC_BODY_1", "REF_FRAME_B = SC_BODYGUARD", "\"SC_BODYGUARD\" is neither"},
       {"REF_FRAME_B = SC_BODY_1", "REF_FRAME_B = SC_BODY_", "\"SC_BODY_\" is neither"},
-      {"REF_FRAME_A = ICRF", "REF_FRAME_A = J2000", "those of the segment before"},
+      {"REF_FRAME_A = GCRF", "REF_FRAME_A = J2000", "those of the segment before"},
       {"OBJECT_ID = 2006-021A", "OBJECT_ID = 2006-021B", "that of the segment before"},
       {"TIME_SYSTEM = TAI", "TIME_SYSTEM = ET", "the time system \"ET\" is not known; give one of TAI, UTC"},
       {"TIME_SYSTEM = TAI", "TIME_SYSTEM = GPS", "that of the segment before GPS"},
@@ -381,7 +381,7 @@ TEST(DamagedAem, OfTextIsRefusedWithTheReason) {
       {"ATTITUDE_TYPE = QUATERNION/ANGVEL", "ATTITUDE_TYPE = QUATERNION/RATE", "is not read"},
       {"ATTITUDE_TYPE = QUATERNION/ANGVEL", "ATTITUDE_TYPE = QUATERNION", "the line has 8 values, not 5"},
       {"ATTITUDE_TYPE = QUATERNION/ANGVEL", "ATTITUDE_TYPE = QUATERNION/DERIVATIVE", "the line has 8 values, not 9"},
-      {"ANGVEL_FRAME = SC_BODY_1", "ANGVEL_FRAME = SC_BODY_2", "is neither of the two frames; give ICRF or SC_BODY_1"},
+      {"ANGVEL_FRAME = SC_BODY_1", "ANGVEL_FRAME = SC_BODY_2", "is neither of the two frames; give GCRF or SC_BODY_1"},
       {"ANGVEL_FRAME = SC_BODY_1", "QUATERNION_TYPE = FIRST", "\"QUATERNION_TYPE\" is no keyword"},
       {"ANGVEL_FRAME = SC_BODY_1", "ANGVEL_FRAME = SC_BODY_1 [deg]", "an AEM has no units"},
       {"ANGVEL_FRAME = SC_BODY_1", "ANGVEL_FRAME", "\"ANGVEL_FRAME\" is no assignment"},
@@ -389,7 +389,7 @@ TEST(DamagedAem, OfTextIsRefusedWithTheReason) {
       {"META_STOP\n", "", "\"DATA_START\" is no assignment"},
       {"DATA_START\n", "", "META_STOP is not followed by DATA_START"},
       {"DATA_STOP\n", "", "a.aem:62:1: the line has 1 value, not 8"},
-      {"2009-05-20T00:00:00.125000001", "2009-05-20T00:00:00", "a.aem:21:1: the epoch \"2009-05-20T00:00:00\" is not later"},
+      {"2009-05-20T00:00:00.125000001", "2009-05-20T00:00:00", "a.aem:22:1: the epoch \"2009-05-20T00:00:00\" is not later"},
       {"2009-05-20T00:00:00.125000001", "0.125", "\"0.125\" is no time"},
       {"2009-05-20T00:00:00.125000001", "2009-05-20T00:00:00.125000001Z", "ends with Z"},
       {"2009-05-20T00:00:00.125000001 ", "2009-05-20T00:00:00.125000001 0 ", "the line has 9 values, not 8"},
@@ -419,14 +419,14 @@ TEST(DamagedAem, OfXmlIsRefusedWithTheReason) {
       {"<aem ", "<oem ", "is no whole XML"},
       {"</aem>", "", "is no whole XML"},
       {"</header>", "", "is no whole XML"},
-      {"<header>", "<header><header></header>", "is no whole XML"},
+      {"<header>", "<header><header></header>", "\"header\" is no keyword of the header"},
       {"<ORIGINATOR>TRIHEDRON</ORIGINATOR>\n", "", "the header has no ORIGINATOR"},
       {"<ORIGINATOR>TRIHEDRON</ORIGINATOR>", "<ORIGINATOR/>", "ORIGINATOR has no value"},
       {"<ORIGINATOR>TRIHEDRON</ORIGINATOR>", "<ORIGINATOR><b/></ORIGINATOR>", "holds more than a text"},
       {"<ORIGINATOR>TRIHEDRON</ORIGINATOR>", "<ORIGINATOR>A</ORIGINATOR><ORIGINATOR>B</ORIGINATOR>", "is there twice"},
       {"<OBJECT_ID>2006-021A</OBJECT_ID>", "", "the metadata has no OBJECT_ID"},
       {"<OBJECT_ID>2006-021A</OBJECT_ID>", "<OBJEKT_ID>2006-021A</OBJEKT_ID>", "did you mean \"OBJECT_ID\"?"},
-      {"<REF_FRAME_A>ICRF<", "<REF_FRAME_A>MARS<", "\"MARS\" is neither an inertial frame"},
+      {"<REF_FRAME_A>GCRF<", "<REF_FRAME_A>MARS<", "\"MARS\" is neither an inertial frame"},
       {"<TIME_SYSTEM>TAI<", "<TIME_SYSTEM>SCLK<", "the time system \"SCLK\" is not known"},
       {"<segment>", "<segment><metadata></metadata>", "does not consist of <metadata> and <data>"},
       {"<body>", "<body><sigment></sigment>", "\"sigment\" where <segment> should stand"},

@@ -25,7 +25,7 @@ struct MessageDescription {
   std::string object_name = "UNKNOWN";
   std::string object_id = "UNKNOWN";  ///< international designator, 2006-021A
   std::string originator = "TRIHEDRON";
-  std::string inertial_frame = "ICRF";  ///< the axes of `in`
+  std::string inertial_frame = "GCRF";  ///< the axes of `in`: those of ICRF, with the origin at the Earth
   std::string body_frame = "SC_BODY_1";  ///< the axes of c
   TimeScale time_scale = TimeScale::kTai;
   std::string created_utc;  ///< creation date
