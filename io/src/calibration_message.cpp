@@ -130,7 +130,6 @@ class AcmWriter {
     text_.put("\nCOV_START\n", "<cov>\n");
     text_.entry("COMMENT", "Where an attitude has no sigma its epoch is left out");
     text_.entry("COV_BASIS", "DETERMINED_GND");
-    text_.entry("COV_BASIS_ID", id_);
     text_.entry("COV_REF_FRAME", description_.body_frame);
     text_.entry("COV_TYPE", "ANGLE");
     for (std::size_t i = 0; i < attitude.size(); ++i) {
@@ -143,19 +142,18 @@ class AcmWriter {
     text_.put("COV_STOP\n", "</cov>\n");
   }
 
-  void sensor(int number, std::string_view kind, const Eigen::Vector3d* noise_rad, Duration period) {
-    text_.put("SENSOR_START\n", "<sensorData>\n");
+  /// As text only: the standard's text, its schema and Orekit name the element of XML differently.
+  void sensor(int number, std::string_view kind, Duration period) {
+    if (!text_.kvn()) {
+      return;
+    }
+    text_.put("SENSOR_START\n");
     text_.entry("SENSOR_NUMBER", std::to_string(number));
     text_.entry("SENSOR_USED", kind);
-    if (noise_rad != nullptr) {
-      const Eigen::Vector3d noise = *noise_rad * kDegree;
-      text_.entry("NUMBER_SENSOR_NOISE_COVARIANCE", "3");
-      text_.entry("SENSOR_NOISE_STDDEV", fmt::format("{:.6e} {:.6e} {:.6e}", noise.x(), noise.y(), noise.z()), "deg");
-    }
     if (period > Duration::zero()) {
       text_.entry("SENSOR_FREQUENCY", fmt::format("{:.9e}", 1 / to_seconds(period)), "Hz");
     }
-    text_.put("SENSOR_STOP\n", "</sensorData>\n");
+    text_.put("SENSOR_STOP\n");
   }
 
   void determination() {
@@ -173,23 +171,11 @@ class AcmWriter {
     text_.entry("REF_FRAME_B", description_.body_frame);
     const PassSettings* pass = context_.pass;
     int number = 1;
-    const Eigen::Vector3d* noise = nullptr;
-    if (calibration_.noise && calibration_.noise->star_tracker_noise_rad) {
-      noise = &*calibration_.noise->star_tracker_noise_rad;  // found by the calibration
-    } else if (pass != nullptr) {
-      noise = &pass->star_tracker_noise_rad;
-    }
-    sensor(number++, "AST", noise, pass != nullptr ? pass->star_tracker_period : Duration::zero());
-    if (pass != nullptr) {
-      for (const FurtherStarTracker& head : pass->further_star_trackers) {
-        sensor(number++, "AST", &head.noise_rad, pass->star_tracker_period);
-      }
+    for (std::size_t head = 0; head < star_trackers(); ++head) {
+      sensor(number++, "AST", pass != nullptr ? pass->star_tracker_period : Duration::zero());
     }
     for (std::size_t k = 0; k < calibration_.gyros.size(); ++k) {
-      const double readout = pass != nullptr && k < pass->gyros.size() ? pass->gyros[k].readout_noise_rad : 0;
-      const Eigen::Vector3d readout_noise = Eigen::Vector3d::Constant(readout);
-      sensor(number++, "GYRO", readout > 0 ? &readout_noise : nullptr,
-             pass != nullptr ? pass->gyro_period : Duration::zero());
+      sensor(number++, "GYRO", pass != nullptr ? pass->gyro_period : Duration::zero());
     }
     text_.put("AD_STOP\n", "</ad>\n");
   }
@@ -212,9 +198,40 @@ class AcmWriter {
     }
   }
 
+  [[nodiscard]] std::size_t star_trackers() const {
+    return 1 + (context_.pass != nullptr ? context_.pass->further_star_trackers.size() : 0);
+  }
+
+  void star_tracker_noise(std::size_t head, const Eigen::Vector3d& noise_rad) {
+    user(fmt::format("STAR_TRACKER{}_NOISE_RAD", head + 1),
+         fmt::format("{:.6e} {:.6e} {:.6e}", noise_rad.x(), noise_rad.y(), noise_rad.z()));
+  }
+
+  /// Noise: as told by the pass, or as found by the calibration. Not among the keywords of sensors, because peers
+  /// differ about the number of elements before it.
+  void sensors() {
+    const PassSettings* pass = context_.pass;
+    user("STAR_TRACKERS", std::to_string(star_trackers()));
+    user("GYROS", std::to_string(calibration_.gyros.size()));
+    if (calibration_.noise && calibration_.noise->star_tracker_noise_rad) {
+      star_tracker_noise(0, *calibration_.noise->star_tracker_noise_rad);
+    } else if (pass != nullptr) {
+      star_tracker_noise(0, pass->star_tracker_noise_rad);
+    }
+    if (pass == nullptr) {
+      return;
+    }
+    for (std::size_t head = 0; head < pass->further_star_trackers.size(); ++head) {
+      star_tracker_noise(head + 1, pass->further_star_trackers[head].noise_rad);
+    }
+    for (std::size_t k = 0; k < std::min(calibration_.gyros.size(), pass->gyros.size()); ++k) {
+      user(fmt::format("GYRO{}_READOUT_NOISE_RAD", k + 1), fmt::format("{:.6e}", pass->gyros[k].readout_noise_rad));
+    }
+  }
+
   void user_defined() {
     text_.put("\nUSER_START\n", "<user>\n");
-    user("VERDICT", calibration_.verdict.trustworthy ? "TRUSTWORTHY" : "DO_NOT_USE");
+    user("VERDICT", calibration_.verdict.trustworthy ? "TRUSTWORTHY" : "DO NOT USE");
     std::vector<std::string> findings;
     for (const Finding& finding : calibration_.verdict.findings) {
       findings.emplace_back(name_of(finding.code));
@@ -227,6 +244,7 @@ class AcmWriter {
     if (!context_.covariance_file.empty()) {
       user("COVARIANCE_FILE", context_.covariance_file);
     }
+    sensors();
     constexpr std::string_view kAxes = "XYZ";
     for (std::size_t k = 0; k < calibration_.gyros.size(); ++k) {
       const GyroCalibration& gyro = calibration_.gyros[k];

@@ -138,11 +138,14 @@ def test_peers_read_a_calibration(calibrated, calibration, tmp_path, form):
     assert states.size() == len(q)
     got = np.array([[float(value) for value in state.getElements()] for state in states])
     assert np.abs(got - q).max() <= 1e-15
-    assert data.getAttitudeDeterminationBlock().getSensorsUsed().size() == 3
+    determination = data.getAttitudeDeterminationBlock()
+    assert str(determination.getMethod()) == "EKF"
+    if form == "acm":
+        assert [str(determination.getSensorsUsed().get(i).getSensorUsed()) for i in range(3)] == ["AST", "GYRO", "GYRO"]
     user = {str(key): str(data.getUserDefinedBlock().getParameters().get(key))
             for key in data.getUserDefinedBlock().getParameters().keySet()}
     for index, gyro in enumerate(calibration["gyros"], start=1):
         for name, value in gyro["drift_rad_s"].items():
             assert abs(float(user[f"TRIHEDRON_GYRO{index}_{name.upper()}_RAD_S"]) - value) <= 1e-15 * abs(value)
-    assert user["TRIHEDRON_VERDICT"] == ("TRUSTWORTHY" if calibration["verdict"]["trustworthy"] else "DO_NOT_USE")
+    assert user["TRIHEDRON_VERDICT"] == ("TRUSTWORTHY" if calibration["verdict"]["trustworthy"] else "DO NOT USE")
     assert (tmp_path / user["TRIHEDRON_COVARIANCE_FILE"]).exists()
