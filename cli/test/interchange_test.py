@@ -40,14 +40,18 @@ def test_attitude_comes_back(flown, tmp_path, form, scale):
 
 def test_a_message_is_an_attitude_wherever_one_is_taken(flown, tmp_path):
     done("export", flown / "a.csv", "--format", "aem", "-o", tmp_path / "a.aem", "--pass", flown / "pass", "--time-system", "UTC")
-    told = [json.loads(done("--json", "evaluate", flown / "pass", "--attitude", name).stdout) for name in (flown / "a.csv", tmp_path / "a.aem")]
-    for evaluation in told:  # a message has no sigmas
-        for key in [key for key in evaluation if "sigma" in key or "coverage" in key or "nees" in key or key == "within_3_sigma"]:
-            del evaluation[key]
-    assert told[0]["errors"] == told[1]["errors"] if "errors" in told[0] else told[0].keys() == told[1].keys()
-    scenario = SCENARIO + '[attitude]\nreference = "recorded"\nrecorded = "a.aem"\n'
-    (tmp_path / "recorded.toml").write_text(scenario)
+    told = []
+    for name in (flown / "a.csv", tmp_path / "a.aem"):
+        whole = json.loads(done("--json", "evaluate", flown / "pass", "--attitude", name).stdout)["whole"]
+        told.append([whole["epochs"], *whole["rms"].values(), *whole["max"].values()])
+    assert told[0][0] > 200 and told[0] == told[1]
+    # A body at rest, from before a scenario to after it.
+    rows = "".join(f"{t},0,0,0.6,0.8\n" for t in range(-1, 243))
+    (tmp_path / "rest.csv").write_text("t_s,q_x,q_y,q_z,q_w\n" + rows)
+    done("export", tmp_path / "rest.csv", "--format", "aem-xml", "-o", tmp_path / "rest.xml", "--pass", flown / "pass")
+    (tmp_path / "recorded.toml").write_text(SCENARIO + '[attitude]\nreference = "recorded"\nrecorded = "rest.xml"\n')
     done("simulate", tmp_path / "recorded.toml", "-o", tmp_path / "pass")
+    assert numbers(tmp_path / "pass" / "truth.csv")[100][1:] == pytest.approx([0, 0, 0.6, 0.8], abs=1e-12)
 
 
 def test_streams(flown, tmp_path):
