@@ -59,10 +59,12 @@ void write_seeds(const fs::path& directory, const fs::path& examples) {
   const std::vector<Eigen::Vector3d> rates(attitude.size(), {1e-3, 2e-3, 3e-3});
   for (const bool with_rates : {false, true}) {
     const std::span<const Eigen::Vector3d> given = with_rates ? rates : std::span<const Eigen::Vector3d>();
-    io::write_text(at("attitude_message", with_rates ? "rates.aem" : "quaternions.aem"),
-                   io::format_aem(attitude, given, truth.t.front(), description, Duration::max(), io::MessageSyntax::kKvn));
-    io::write_text(at("attitude_message", with_rates ? "rates.xml" : "quaternions.xml"),
-                   io::format_aem(attitude, given, truth.t.front(), description, Duration::max(), io::MessageSyntax::kXml));
+    io::write_text(
+        at("attitude_message", with_rates ? "rates.aem" : "quaternions.aem"),
+        io::format_aem(attitude, given, truth.t.front(), description, Duration::max(), io::MessageSyntax::kKvn));
+    io::write_text(
+        at("attitude_message", with_rates ? "rates.xml" : "quaternions.xml"),
+        io::format_aem(attitude, given, truth.t.front(), description, Duration::max(), io::MessageSyntax::kXml));
   }
 
   const CatalogueEntry entry{"Resurs-DK1", "pass-a", "2009-05-20", 1, io::sample_calibration()};

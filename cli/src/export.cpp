@@ -125,9 +125,19 @@ void export_attitude(const ExportArguments& arguments, const Common& common) {
   const Time epoch = epoch_source.epoch.value_or(read.epoch.value_or(read.attitude.t.front()));
   const Duration gap = arguments.gap.empty() ? io::usual_gap(read.attitude) : io::parse_duration(arguments.gap);
   const std::vector<std::size_t> stretches = io::stretches(read.attitude, gap);
-  InterchangeSummary summary{arguments.file, read.format, files_of(arguments), "SPICE CK of type 3, its clock and frames",
-                             read.attitude.size(), stretches.size() - 1, read.left_out, epoch, "TDT of SPICE",
-                             "J2000", "", description.object_name, description.object_id};
+  InterchangeSummary summary{arguments.file,
+                             read.format,
+                             files_of(arguments),
+                             "SPICE CK of type 3, its clock and frames",
+                             read.attitude.size(),
+                             stretches.size() - 1,
+                             read.left_out,
+                             epoch,
+                             "TDT of SPICE",
+                             "J2000",
+                             "",
+                             description.object_name,
+                             description.object_id};
   if (arguments.format == "ck") {
     const io::SpiceObject object = spice_object(arguments, description);
     const io::SpiceClock clock = io::SpiceClock::of(read.attitude);
@@ -155,8 +165,19 @@ void export_calibration(const ExportArguments& arguments, const Common& common) 
   }
   const io::MessageDescription description = description_of(arguments, epoch_source);
   const Calibration calibration = io::read_calibration(source(arguments.file));
-  InterchangeSummary summary{arguments.file, "calibration", files_of(arguments), "SPICE FK", 0, 0, 0, calibration.epoch,
-                             "TAI", "J2000", "", description.object_name, description.object_id};
+  InterchangeSummary summary{arguments.file,
+                             "calibration",
+                             files_of(arguments),
+                             "SPICE FK",
+                             0,
+                             0,
+                             0,
+                             calibration.epoch,
+                             "TAI",
+                             "J2000",
+                             "",
+                             description.object_name,
+                             description.object_id};
   if (arguments.format == "fk") {
     const io::SpiceObject object = spice_object(arguments, description);
     put_out(arguments, io::format_calibration_frames(calibration, object));
@@ -190,8 +211,12 @@ void export_calibration(const ExportArguments& arguments, const Common& common) 
 
 void add_export(CLI::App& program, const Common& common, int& exit_status) {
   auto arguments = std::make_shared<ExportArguments>();
-  CLI::App* command = program.add_subcommand("export", "Write attitude or calibration for other software: CCSDS messages, SPICE kernels");
-  command->add_option("FILE", arguments->file, "Attitude file (CSV) or message, for acm and fk calibration.json; - for standard input")->required();
+  CLI::App* command = program.add_subcommand(
+      "export", "Write attitude or calibration for other software: CCSDS messages, SPICE kernels");
+  command
+      ->add_option("FILE", arguments->file,
+                   "Attitude file (CSV) or message, for acm and fk calibration.json; - for standard input")
+      ->required();
   const std::vector<std::string> formats = {"aem", "aem-xml", "ck", "acm", "acm-xml", "fk"};
   command
       ->add_option("--format", arguments->format,
@@ -207,7 +232,8 @@ void add_export(CLI::App& program, const Common& common, int& exit_status) {
   command->add_option("--time-system", arguments->time_system, "Time scale of the epochs")
       ->capture_default_str()
       ->type_name(fmt::format("{}", fmt::join(io::kTimeScales, "|")));
-  command->add_option("--inertial-frame", arguments->description.inertial_frame, "Name of the axes that q_in_c leads to")
+  command
+      ->add_option("--inertial-frame", arguments->description.inertial_frame, "Name of the axes that q_in_c leads to")
       ->capture_default_str()
       ->type_name("NAME");
   command->add_option("--body-frame", arguments->description.body_frame, "Name of the axes c, of the star tracker")
@@ -224,11 +250,13 @@ void add_export(CLI::App& program, const Common& common, int& exit_status) {
       ->capture_default_str()
       ->type_name("NAME");
   command
-      ->add_option("--gap", arguments->gap,
-                   "Step above which there is a gap: a new segment or interval begins (default: 1.5 times the median step)")
+      ->add_option(
+          "--gap", arguments->gap,
+          "Step above which there is a gap: a new segment or interval begins (default: 1.5 times the median step)")
       ->type_name("DURATION");
   command
-      ->add_option("--attitude", arguments->attitude, "For acm: attitude to give as well, with its sigmas as covariance")
+      ->add_option("--attitude", arguments->attitude,
+                   "For acm: attitude to give as well, with its sigmas as covariance")
       ->type_name("FILE");
   command->add_option("--naif-id", arguments->naif_id, "For ck and fk: number of the spacecraft in SPICE")
       ->capture_default_str()

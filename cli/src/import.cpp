@@ -60,10 +60,10 @@ void show_interchange(const Common& common, const InterchangeSummary& summary) {
     if (summary.left_out > 0) {
       text += fmt::format("  left out  {} epochs outside the useable spans\n", summary.left_out);
     }
-    text += fmt::format("Spacecraft  {}, {}\nFrames      {} in {}\nTime        {}, epoch {} TAI\n",
-                        printable(summary.object_name), printable(summary.object_id), printable(summary.body_frame),
-                        printable(summary.inertial_frame), printable(summary.time_system),
-                        io::format_epoch(summary.epoch));
+    text +=
+        fmt::format("Spacecraft  {}, {}\nFrames      {} in {}\nTime        {}, epoch {} TAI\n",
+                    printable(summary.object_name), printable(summary.object_id), printable(summary.body_frame),
+                    printable(summary.inertial_frame), printable(summary.time_system), io::format_epoch(summary.epoch));
     for (const std::string& file : summary.written) {
       text += fmt::format("Written     {}: {}\n", printable(file), summary.output_format);
     }
@@ -105,10 +105,19 @@ void add_import(CLI::App& program, const Common& common, int& exit_status) {
     } else {
       io::write_file(written, text);
     }
-    show_interchange(beside(arguments->output, common),
-                     {arguments->file, message.format, {arguments->output}, "attitude file", message.attitude.size(),
-                      message.segments, message.left_out, epoch, message.time_system, message.inertial_frame,
-                      message.body_frame, message.object_name, message.object_id});
+    show_interchange(beside(arguments->output, common), {arguments->file,
+                                                         message.format,
+                                                         {arguments->output},
+                                                         "attitude file",
+                                                         message.attitude.size(),
+                                                         message.segments,
+                                                         message.left_out,
+                                                         epoch,
+                                                         message.time_system,
+                                                         message.inertial_frame,
+                                                         message.body_frame,
+                                                         message.object_name,
+                                                         message.object_id});
     exit_status = kTrustworthy;
   });
 }

@@ -6,10 +6,10 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 
-#include "ccsds_frames.hpp"
 #include "attitude_rules.hpp"
+#include "ccsds_frames.hpp"
+#include "ndm_text.hpp"
 #include "trihedron/io/time_text.hpp"
 #include "trihedron/records/stop.hpp"
 #include "wording.hpp"
@@ -18,40 +18,16 @@ namespace trihedron::io {
 namespace {
 
 constexpr std::array<std::string_view, 4> kHeader = {"CLASSIFICATION", "CREATION_DATE", "ORIGINATOR", "MESSAGE_ID"};
-constexpr std::array<std::string_view, 15> kMetadata = {"OBJECT_NAME",
-                                                        "OBJECT_ID",
-                                                        "CENTER_NAME",
-                                                        "REF_FRAME_A",
-                                                        "REF_FRAME_B",
-                                                        "TIME_SYSTEM",
-                                                        "START_TIME",
-                                                        "USEABLE_START_TIME",
-                                                        "USEABLE_STOP_TIME",
-                                                        "STOP_TIME",
-                                                        "ATTITUDE_TYPE",
-                                                        "EULER_ROT_SEQ",
-                                                        "ANGVEL_FRAME",
-                                                        "INTERPOLATION_METHOD",
-                                                        "INTERPOLATION_DEGREE"};
-constexpr std::array<std::string_view, 17> kMetadata1 = {"OBJECT_NAME",
-                                                         "OBJECT_ID",
-                                                         "CENTER_NAME",
-                                                         "REF_FRAME_A",
-                                                         "REF_FRAME_B",
-                                                         "ATTITUDE_DIR",
-                                                         "TIME_SYSTEM",
-                                                         "START_TIME",
-                                                         "USEABLE_START_TIME",
-                                                         "USEABLE_STOP_TIME",
-                                                         "STOP_TIME",
-                                                         "ATTITUDE_TYPE",
-                                                         "QUATERNION_TYPE",
-                                                         "EULER_ROT_SEQ",
-                                                         "RATE_FRAME",
-                                                         "INTERPOLATION_METHOD",
-                                                         "INTERPOLATION_DEGREE"};
-
-constexpr double kDegree = std::numbers::pi / 180;
+constexpr std::array<std::string_view, 15> kMetadata = {
+    "OBJECT_NAME",   "OBJECT_ID",     "CENTER_NAME",        "REF_FRAME_A",          "REF_FRAME_B",
+    "TIME_SYSTEM",   "START_TIME",    "USEABLE_START_TIME", "USEABLE_STOP_TIME",    "STOP_TIME",
+    "ATTITUDE_TYPE", "EULER_ROT_SEQ", "ANGVEL_FRAME",       "INTERPOLATION_METHOD", "INTERPOLATION_DEGREE"};
+constexpr std::array<std::string_view, 17> kMetadata1 = {
+    "OBJECT_NAME",         "OBJECT_ID",         "CENTER_NAME", "REF_FRAME_A",
+    "REF_FRAME_B",         "ATTITUDE_DIR",      "TIME_SYSTEM", "START_TIME",
+    "USEABLE_START_TIME",  "USEABLE_STOP_TIME", "STOP_TIME",   "ATTITUDE_TYPE",
+    "QUATERNION_TYPE",     "EULER_ROT_SEQ",     "RATE_FRAME",  "INTERPOLATION_METHOD",
+    "INTERPOLATION_DEGREE"};
 
 }  // namespace
 
@@ -79,7 +55,8 @@ void AemBuilder::comment(std::string_view text) {
 void AemBuilder::take_entry(Entries& entries, AemField key, AemField value, std::span<const std::string_view> known,
                             std::string_view section) const {
   if (std::ranges::find(known, key.text) == known.end()) {
-    refuse(key.at, fmt::format("{} is no keyword of the {} of an AEM version {}", in_quotes(key.text), section, version_),
+    refuse(key.at,
+           fmt::format("{} is no keyword of the {} of an AEM version {}", in_quotes(key.text), section, version_),
            suggestion(key.text, known));
   }
   if (value.text.empty()) {
@@ -148,7 +125,8 @@ void AemBuilder::take_frames(Position at) {
   const std::string name_b = normalised(b.value);
   for (const auto& [name, entry] : {std::pair{&name_a, &a}, std::pair{&name_b, &b}}) {
     if (!is_inertial_frame(*name) && !is_spacecraft_frame(*name)) {
-      refuse(entry->at, fmt::format("{} is neither an inertial frame nor one of the spacecraft", in_quotes(entry->value)),
+      refuse(entry->at,
+             fmt::format("{} is neither an inertial frame nor one of the spacecraft", in_quotes(entry->value)),
              fmt::format("turn the attitude into one of {} before; frames of the spacecraft are named {}",
                          kInertialFrames, kSpacecraftFrames));
     }
@@ -161,8 +139,9 @@ void AemBuilder::take_frames(Position at) {
   const std::string& inertial = a_is_body_ ? name_b : name_a;
   const std::string& body = a_is_body_ ? name_a : name_b;
   if (message_.segments > 0 && (inertial != message_.inertial_frame || body != message_.body_frame)) {
-    refuse(a.at, fmt::format("the frames are {} and {}, those of the segment before {} and {}", in_quotes(inertial),
-                             in_quotes(body), in_quotes(message_.inertial_frame), in_quotes(message_.body_frame)),
+    refuse(a.at,
+           fmt::format("the frames are {} and {}, those of the segment before {} and {}", in_quotes(inertial),
+                       in_quotes(body), in_quotes(message_.inertial_frame), in_quotes(message_.body_frame)),
            "give each pair of frames a message of its own");
   }
   message_.inertial_frame = inertial;
@@ -189,8 +168,8 @@ void AemBuilder::take_time_span(Position at) {
     time_ = TimeText(*scale);
   }
   if (message_.segments > 0 && name_of(*scale) != message_.time_system) {
-    refuse(system.at, fmt::format("the time system is {}, that of the segment before {}", name_of(*scale),
-                                  message_.time_system),
+    refuse(system.at,
+           fmt::format("the time system is {}, that of the segment before {}", name_of(*scale), message_.time_system),
            "give the whole message in one time system");
   }
   message_.time_system = name_of(*scale);
@@ -255,8 +234,9 @@ void AemBuilder::end_metadata(Position at) {
   const std::string& name = needed(metadata_, "OBJECT_NAME", at, "metadata").value;
   const Entry& id = needed(metadata_, "OBJECT_ID", at, "metadata");
   if (message_.segments > 0 && normalised(id.value) != normalised(message_.object_id)) {
-    refuse(id.at, fmt::format("the object is {}, that of the segment before {}", in_quotes(id.value),
-                              in_quotes(message_.object_id)),
+    refuse(id.at,
+           fmt::format("the object is {}, that of the segment before {}", in_quotes(id.value),
+                       in_quotes(message_.object_id)),
            "give each spacecraft a message of its own");
   }
   message_.object_name = name;
@@ -288,7 +268,7 @@ Eigen::Vector3d AemBuilder::rate_of(const Eigen::Quaterniond& given, std::span<c
     const Eigen::Quaterniond q_dot(number(fields[8]), number(fields[5]), number(fields[6]), number(fields[7]));
     omega_b = 2 * (q.conjugate() * (from_b_to_a ? q_dot.conjugate() : q_dot)).vec();
   } else {
-    omega_b = Eigen::Vector3d(number(fields[5]), number(fields[6]), number(fields[7])) * kDegree;
+    omega_b = Eigen::Vector3d(number(fields[5]), number(fields[6]), number(fields[7])) / kDegreesPerRadian;
     if (rate_in_a_) {
       omega_b = q.conjugate() * omega_b;
     }

@@ -159,7 +159,8 @@ class Kvn {
     }
     const std::size_t expected = columns_of(builder.kind());
     if (count != expected) {
-      builder.refuse(lines_.at(words), fmt::format("the line has {} value{}, not {}", count, count == 1 ? "" : "s", expected),
+      builder.refuse(lines_.at(words),
+                     fmt::format("the line has {} value{}, not {}", count, count == 1 ? "" : "s", expected),
                      "an epoch and the numbers of ATTITUDE_TYPE stand in a line");
     }
     if (builder.scalar_first()) {

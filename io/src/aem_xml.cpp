@@ -48,8 +48,8 @@ bool is_element(const pugi::xml_node& node) { return node.type() == pugi::node_e
 class Xml {
  public:
   Xml(std::string_view text, const std::filesystem::path& file) : places_(text), file_(file), size_(text.size()) {
-    const pugi::xml_parse_result parsed = document_.load_buffer(text.data(), text.size(), pugi::parse_default,
-                                                                pugi::encoding_utf8);
+    const pugi::xml_parse_result parsed =
+        document_.load_buffer(text.data(), text.size(), pugi::parse_default, pugi::encoding_utf8);
     if (parsed.status == pugi::status_out_of_memory) {
       throw std::bad_alloc();
     }
@@ -172,9 +172,9 @@ class Xml {
       refuse(state, "<attitudeState> does not hold one quaternion",
              "give quaternionEphemeris, quaternionDerivative or quaternionAngVel, as ATTITUDE_TYPE says");
     }
-    const std::span<const std::string_view> tags =
-        builder.kind() == AemBuilder::Kind::kAngularVelocity ? std::span<const std::string_view>(kAngularVelocityTags)
-                                                             : std::span<const std::string_view>(kQuaternionTags);
+    const std::span<const std::string_view> tags = builder.kind() == AemBuilder::Kind::kAngularVelocity
+                                                       ? std::span<const std::string_view>(kAngularVelocityTags)
+                                                       : std::span<const std::string_view>(kQuaternionTags);
     // Rates of version 1 are those of Euler angles, and are not used.
     const bool rates_ignored = builder.kind() == AemBuilder::Kind::kEulerRate;
     const std::size_t count = rates_ignored ? 5 : columns_of(builder.kind());
@@ -187,7 +187,8 @@ class Xml {
         if (rates_ignored && name_of(leaf).ends_with("_RATE")) {
           return;
         }
-        refuse(leaf, fmt::format("<{}> is no part of this ATTITUDE_TYPE", leaf.name()), "correct the type, or remove it");
+        refuse(leaf, fmt::format("<{}> is no part of this ATTITUDE_TYPE", leaf.name()),
+               "correct the type, or remove it");
       }
       if (there.at(index)) {
         refuse(leaf, fmt::format("<{}> is there twice", leaf.name()), "keep one");

@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 
 #include "aem_syntax.hpp"
 #include "attitude_rules.hpp"
@@ -18,8 +17,6 @@
 
 namespace trihedron::io {
 namespace {
-
-constexpr double kDegreesPerRadian = 180 / std::numbers::pi;
 
 std::string_view without_lead(std::string_view text) {
   constexpr std::string_view kByteOrderMark = "\xEF\xBB\xBF";
@@ -81,8 +78,7 @@ class AemWriter {
     const Eigen::Quaterniond& q = attitude.q_in_c[i];
     const std::string t = time_.format(attitude.t[i]);
     const auto out = fmt::appender(text_.buffer());
-    const Eigen::Vector3d rate = rates_ ? Eigen::Vector3d(rate_rad_s_[i] * kDegreesPerRadian)
-                                        : Eigen::Vector3d::Zero();
+    const Eigen::Vector3d rate = rates_ ? Eigen::Vector3d(rate_rad_s_[i] * kDegreesPerRadian) : Eigen::Vector3d::Zero();
     if (text_.kvn()) {
       fmt::format_to(out, "{} {:.15e} {:.15e} {:.15e} {:.15e}", t, q.x(), q.y(), q.z(), q.w());
       if (rates_) {
@@ -156,9 +152,7 @@ std::string format_aem(const AttitudeHistory& attitude, std::span<const Eigen::V
   return AemWriter(description, syntax, rate_rad_s).write(attitude, epoch, stretches(attitude, gap));
 }
 
-bool is_attitude_message(std::string_view text) {
-  return is_xml(text) || without_lead(text).starts_with("CCSDS_");
-}
+bool is_attitude_message(std::string_view text) { return is_xml(text) || without_lead(text).starts_with("CCSDS_"); }
 
 AttitudeMessage parse_attitude_message(std::string_view text, const std::filesystem::path& file) {
   return is_xml(text) ? parse_aem_xml(text, file) : parse_aem_kvn(text, file);

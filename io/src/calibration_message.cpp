@@ -7,7 +7,6 @@
 #include <algorithm>
 #include <cctype>
 #include <cmath>
-#include <numbers>
 
 #include "ndm_text.hpp"
 #include "trihedron/io/atomic_file.hpp"
@@ -17,8 +16,6 @@
 
 namespace trihedron::io {
 namespace {
-
-constexpr double kDegree = 180 / std::numbers::pi;
 
 /// "K0", "W_2_M1" for W(2,-1): what may stand in a keyword.
 std::string keyword_of(std::string_view name) {
@@ -50,7 +47,8 @@ class AcmWriter {
         id_(fmt::format("AD_{}", format_epoch(calibration.t))) {}
 
   std::string write() {
-    text_.header("ACM", "Calibration of electrostatic gyros; the keywords TRIHEDRON_... are described in its documentation",
+    text_.header("ACM",
+                 "Calibration of electrostatic gyros; the keywords TRIHEDRON_... are described in its documentation",
                  description_);
     metadata();
     text_.put("", "<data>\n");
@@ -69,9 +67,7 @@ class AcmWriter {
 
  private:
   [[nodiscard]] bool has_attitude() const { return context_.attitude != nullptr; }
-  [[nodiscard]] bool has_covariance() const {
-    return has_attitude() && !context_.attitude->attitude.sigma_rad.empty();
-  }
+  [[nodiscard]] bool has_covariance() const { return has_attitude() && !context_.attitude->attitude.sigma_rad.empty(); }
   /// Seconds since EPOCH_TZERO, to nanoseconds.
   [[nodiscard]] std::string relative(Time t) const { return format_seconds(t - calibration_.epoch); }
 
@@ -117,7 +113,7 @@ class AcmWriter {
       std::string values =
           fmt::format("{} {:.15e} {:.15e} {:.15e} {:.15e}", relative(attitude.t[i]), q.x(), q.y(), q.z(), q.w());
       if (!rates.empty()) {
-        const Eigen::Vector3d rate = rates[i] * kDegree;
+        const Eigen::Vector3d rate = rates[i] * kDegreesPerRadian;
         values += fmt::format(" {:.15e} {:.15e} {:.15e}", rate.x(), rate.y(), rate.z());
       }
       line("attLine", values);
@@ -133,10 +129,10 @@ class AcmWriter {
     text_.entry("COV_REF_FRAME", description_.body_frame);
     text_.entry("COV_TYPE", "ANGLE");
     for (std::size_t i = 0; i < attitude.size(); ++i) {
-      const Eigen::Vector3d variance = (attitude.sigma_rad[i] * kDegree).array().square();
+      const Eigen::Vector3d variance = (attitude.sigma_rad[i] * kDegreesPerRadian).array().square();
       if (variance.allFinite()) {
-        line("covLine", fmt::format("{} {:.6e} {:.6e} {:.6e}", relative(attitude.t[i]), variance.x(), variance.y(),
-                                    variance.z()));
+        line("covLine",
+             fmt::format("{} {:.6e} {:.6e} {:.6e}", relative(attitude.t[i]), variance.x(), variance.y(), variance.z()));
       }
     }
     text_.put("COV_STOP\n", "</cov>\n");
@@ -184,7 +180,8 @@ class AcmWriter {
     if (text_.kvn()) {
       text_.entry("USER_DEFINED_TRIHEDRON_" + key, value);
     } else {
-      text_.put(fmt::format("<USER_DEFINED parameter=\"TRIHEDRON_{}\">{}</USER_DEFINED>\n", key, escaped_for_xml(value)));
+      text_.put(
+          fmt::format("<USER_DEFINED parameter=\"TRIHEDRON_{}\">{}</USER_DEFINED>\n", key, escaped_for_xml(value)));
     }
   }
 

@@ -18,15 +18,15 @@ std::string normalised(std::string_view name) {
 }
 
 bool is_inertial_frame(std::string_view name) {
-  constexpr std::array<std::string_view, 8> kKnown = {"ICRF",  "ICRF1",   "ICRF2", "ICRF3",
+  constexpr std::array<std::string_view, 8> kKnown = {"ICRF", "ICRF1",   "ICRF2", "ICRF3",
                                                       "GCRF", "EME2000", "J2000", "EME_2000"};
   return std::ranges::find(kKnown, name) != kKnown.end();
 }
 
 bool is_spacecraft_frame(std::string_view name) {
-  constexpr std::array<std::string_view, 12> kKinds = {"SC_BODY",   "AST",         "STARTRACKER", "INSTRUMENT",
-                                                       "GYRO_FRAME", "IMU_FRAME",  "SENSOR",      "ACC",
-                                                       "DSS",       "CSS",         "ESA",         "TAM"};
+  constexpr std::array<std::string_view, 12> kKinds = {"SC_BODY",    "AST",       "STARTRACKER", "INSTRUMENT",
+                                                       "GYRO_FRAME", "IMU_FRAME", "SENSOR",      "ACC",
+                                                       "DSS",        "CSS",       "ESA",         "TAM"};
   return std::ranges::any_of(kKinds, [&](std::string_view kind) {
     if (!name.starts_with(kind)) {
       return false;

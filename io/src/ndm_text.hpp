@@ -3,12 +3,16 @@
 
 #include <fmt/format.h>
 
+#include <numbers>
 #include <string>
 #include <string_view>
 
 #include "trihedron/io/attitude_message.hpp"
 
 namespace trihedron::io {
+
+/// Messages have angles in degrees.
+inline constexpr double kDegreesPerRadian = 180 / std::numbers::pi;
 
 /// Printable ASCII and not blank, which is all that a message may hold: throws UsageError, with `what` for its subject.
 void expect_plain(std::string_view text, std::string_view what);

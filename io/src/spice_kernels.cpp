@@ -65,8 +65,8 @@ std::string daf_of(const std::vector<double>& data, double begin, double end, st
   put(bytes, kRecord + 16, 1.0);
   put(bytes, kRecord + 24, begin);
   put(bytes, kRecord + 32, end);
-  const std::int32_t integers[] = {frame_id, kJ2000, kCkType, 1, static_cast<std::int32_t>(first),
-                                   static_cast<std::int32_t>(last)};
+  const std::int32_t integers[] = {
+      frame_id, kJ2000, kCkType, 1, static_cast<std::int32_t>(first), static_cast<std::int32_t>(last)};
   std::memcpy(&bytes[kRecord + 40], integers, sizeof integers);
   // Its name.
   put_text(bytes, 2 * kRecord, name, kRecord);
@@ -149,9 +149,10 @@ void expect_spice_object(const SpiceObject& object) {
   }
   const bool plain = std::ranges::all_of(object.name, [](char c) { return c >= ' ' && c <= '~'; });
   if (object.name.empty() || std::isalpha(static_cast<unsigned char>(object.name.front())) == 0 || !plain) {
-    throw UsageError(fmt::format("the name of the spacecraft, {}: give one in ASCII that begins with a letter, by "
-                                 "--object-name",
-                                 in_quotes(object.name)));
+    throw UsageError(
+        fmt::format("the name of the spacecraft, {}: give one in ASCII that begins with a letter, by "
+                    "--object-name",
+                    in_quotes(object.name)));
   }
 }
 

@@ -134,8 +134,7 @@ std::optional<ClockReading> parse_reading(std::string_view text) {
     return std::nullopt;
   }
   return ClockReading{std::chrono::sys_days(*date) - kOrigin,
-                      hours(hour) + minutes(minute) + seconds(second) + Duration(fraction_ns), second == 60,
-                      zulu};
+                      hours(hour) + minutes(minute) + seconds(second) + Duration(fraction_ns), second == 60, zulu};
 }
 
 }  // namespace
@@ -147,8 +146,7 @@ std::optional<TimeScale> time_scale_named(std::string_view name) {
     return std::ranges::equal(name, known, [](unsigned char a, unsigned char b) { return std::toupper(a) == b; });
   };
   const auto* found = std::ranges::find_if(kTimeScales, same);
-  return found == kTimeScales.end() ? std::nullopt
-                                    : std::optional(static_cast<TimeScale>(found - kTimeScales.begin()));
+  return found == kTimeScales.end() ? std::nullopt : std::optional(static_cast<TimeScale>(found - kTimeScales.begin()));
 }
 
 Duration TimeText::tdb_minus_tt(Time tt) {
@@ -186,7 +184,8 @@ std::string TimeText::format(Time t) {
   for (const days day : {day_of_tai, day_of_tai - days(1)}) {
     const std::optional<Duration> leaps = leap_seconds(day);
     if (!leaps) {
-      throw UsageError(fmt::format("{} TAI {}; use the time system TAI, or a newer ERFA", format_epoch(t), kUtcUnknown));
+      throw UsageError(
+          fmt::format("{} TAI {}; use the time system TAI, or a newer ERFA", format_epoch(t), kUtcUnknown));
     }
     const Duration since_midnight = t.time_since_epoch() - day - *leaps;
     if (since_midnight < Duration::zero()) {
@@ -210,8 +209,9 @@ std::optional<Time> TimeText::parse(std::string_view text, Fault& fault) {
     return std::nullopt;
   }
   if (reading->zulu && scale_ != TimeScale::kUtc) {
-    fault = {fmt::format("{} ends with Z, which means UTC, but the time system is {}", in_quotes(text), name_of(scale_)),
-             "take the Z off, or correct TIME_SYSTEM"};
+    fault = {
+        fmt::format("{} ends with Z, which means UTC, but the time system is {}", in_quotes(text), name_of(scale_)),
+        "take the Z off, or correct TIME_SYSTEM"};
     return std::nullopt;
   }
   Duration leaps{};

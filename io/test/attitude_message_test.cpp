@@ -82,7 +82,8 @@ TEST_P(EveryMessage, ComesBackWithEveryEpochAndQuaternion) {
       EXPECT_LE((back.rate_rad_s[i] - rate_rad_s[i]).norm(), 1e-16);
     }
   }
-  EXPECT_EQ(format_aem(back.attitude, back.rate_rad_s, epoch, description(scale), usual_gap(attitude), syntax).size(), text.size());
+  EXPECT_EQ(format_aem(back.attitude, back.rate_rad_s, epoch, description(scale), usual_gap(attitude), syntax).size(),
+            text.size());
 }
 
 INSTANTIATE_TEST_SUITE_P(Aem, EveryMessage,
@@ -133,10 +134,10 @@ TEST(TimeText, ReadsDayOfYearFractionsAndZulu) {
 TEST(TimeText, RefusesWhatIsNoTime) {
   TimeText::Fault fault;
   for (const char* text :
-       {"", "2009", "2009-05-20", "2009-05-20 00:00:00", "2009-5-20T00:00:00", "2009-02-29T00:00:00", "2009-366T00:00:00",
-        "2009-000T00:00:00", "2009-05-20T24:00:00", "2009-05-20T00:60:00", "2009-05-20T00:00:61", "2009-05-20T00:00:00.",
-        "2009-05-20T00:00:00,5", "2009-05-20T00:00:00 ", "2009-05-20T00:00:00+01:00", "1957-12-31T00:00:00",
-        "2201-01-01T00:00:00", "2009-05-20T-1:00:00", "2009-05-20T12:59:60"}) {
+       {"", "2009", "2009-05-20", "2009-05-20 00:00:00", "2009-5-20T00:00:00", "2009-02-29T00:00:00",
+        "2009-366T00:00:00", "2009-000T00:00:00", "2009-05-20T24:00:00", "2009-05-20T00:60:00", "2009-05-20T00:00:61",
+        "2009-05-20T00:00:00.", "2009-05-20T00:00:00,5", "2009-05-20T00:00:00 ", "2009-05-20T00:00:00+01:00",
+        "1957-12-31T00:00:00", "2201-01-01T00:00:00", "2009-05-20T-1:00:00", "2009-05-20T12:59:60"}) {
     EXPECT_FALSE(TimeText(TimeScale::kTai).parse(text, fault)) << text;
     EXPECT_THAT(fault.reason, HasSubstr("is no time")) << text;
   }
@@ -172,9 +173,8 @@ AttitudeHistory read(const std::string& text) { return parse_attitude_message(te
 
 TEST(Aem, TurnsTheExampleOfTheStandardAsTheStandardDoes) {
   // Annex F2.2: B is A turned by +90° about Z, Q = 0 0 0.7071 0.7071, and the X axis of A is (0, −1, 0) in B.
-  const AttitudeHistory attitude =
-      read(kvn(metadata("ICRF", "SC_BODY_1", ""),
-               "2009-05-20T00:00:00 0.0 0.0 0.70710678118654752 0.70710678118654752\n"));
+  const AttitudeHistory attitude = read(
+      kvn(metadata("ICRF", "SC_BODY_1", ""), "2009-05-20T00:00:00 0.0 0.0 0.70710678118654752 0.70710678118654752\n"));
   const Eigen::Vector3d x_in_c = attitude.q_in_c[0].conjugate() * Eigen::Vector3d::UnitX();
   EXPECT_LE((x_in_c - Eigen::Vector3d(0, -1, 0)).norm(), 1e-15);
 }
@@ -185,10 +185,10 @@ TEST(Aem, TakesEitherDirectionAndOrder) {
   const std::vector<std::string> texts = {
       kvn(metadata("ICRF", "SC_BODY_1", ""), first + "0.36 0.48 0 0.8\n"),
       kvn(metadata("sc body 1", "j2000", ""), first + "-0.36 -0.48 0 0.8\n"),
-      kvn(metadata("EME2000", "INSTRUMENT_A", "ATTITUDE_DIR = A2B\nQUATERNION_TYPE = LAST\n"), first + "0.36 0.48 0 0.8\n",
+      kvn(metadata("EME2000", "INSTRUMENT_A", "ATTITUDE_DIR = A2B\nQUATERNION_TYPE = LAST\n"),
+          first + "0.36 0.48 0 0.8\n", "1.0"),
+      kvn(metadata("ICRF", "SC_BODY_1", "ATTITUDE_DIR = B2A\nQUATERNION_TYPE = FIRST\n"), first + "0.8 -0.36 -0.48 0\n",
           "1.0"),
-      kvn(metadata("ICRF", "SC_BODY_1", "ATTITUDE_DIR = B2A\nQUATERNION_TYPE = FIRST\n"),
-          first + "0.8 -0.36 -0.48 0\n", "1.0"),
       kvn(metadata("SC_BODY_1", "GCRF", "ATTITUDE_DIR = B2A\nQUATERNION_TYPE = LAST\n"), first + "0.36 0.48 0 0.8\n",
           "1.0"),
       kvn(metadata("SC_BODY_1", "ICRF", "ATTITUDE_DIR = A2B\nQUATERNION_TYPE = LAST\n"), first + "-0.36 -0.48 0 0.8\n",
@@ -255,8 +255,8 @@ TEST(Aem, LeavesOutWhatIsNotUseable) {
 
 TEST(Aem, TakesTheLaterOfTwoSegmentsWhereTheyMeet) {
   const std::string m = metadata("ICRF", "SC_BODY_1", "");
-  const std::string second = m.substr(0, m.find("START_TIME")) + "START_TIME = 2009-05-20T00:00:02\n" +
-                             m.substr(m.find("STOP_TIME"));
+  const std::string second =
+      m.substr(0, m.find("START_TIME")) + "START_TIME = 2009-05-20T00:00:02\n" + m.substr(m.find("STOP_TIME"));
   const AttitudeMessage message = parse_attitude_message(
       kvn(m, "2009-05-20T00:00:00 0 0 0 1\n2009-05-20T00:00:02 0 0 0 1\n") + "META_START\n" + second +
           "META_STOP\nDATA_START\n2009-05-20T00:00:02 0 0 1 0\n2009-05-20T00:00:04 0 0 1 0\nDATA_STOP\n",
@@ -372,12 +372,16 @@ TEST(DamagedAem, OfTextIsRefusedWithTheReason) {
       {"TIME_SYSTEM = TAI", "TIME_SYSTEM = ET", "the time system \"ET\" is not known; give one of TAI, UTC"},
       {"TIME_SYSTEM = TAI", "TIME_SYSTEM = GPS", "that of the segment before GPS"},
       {"START_TIME = 2009-05-20T00:00:00", "START_TIME = 2009-05-21T00:00:00", "STOP_TIME is before START_TIME"},
-      {"START_TIME = 2009-05-20T00:00:00", "START_TIME = 2009-05-20T00:00:00.1", "lies outside START_TIME and STOP_TIME"},
+      {"START_TIME = 2009-05-20T00:00:00", "START_TIME = 2009-05-20T00:00:00.1",
+       "lies outside START_TIME and STOP_TIME"},
       {"STOP_TIME = 2009-05-20T00:00:04.875000039", "STOP_TIME = 2009-05-20T00:00:04.8", "lies outside START_TIME"},
       {"STOP_TIME = 2009-05-20T00:00:04.875000039", "STOP_TIME = 2009-05-20T00:00:04.875000039Z", "ends with Z"},
-      {"STOP_TIME = 2009", "USEABLE_START_TIME = 2008-05-20T00:00:00\nSTOP_TIME = 2009", "the useable span does not lie"},
-      {"STOP_TIME = 2009", "USEABLE_STOP_TIME = 2010-05-20T00:00:00\nSTOP_TIME = 2009", "the useable span does not lie"},
-      {"ATTITUDE_TYPE = QUATERNION/ANGVEL", "ATTITUDE_TYPE = EULER_ANGLE", "\"EULER_ANGLE\" is not read; give QUATERNION"},
+      {"STOP_TIME = 2009", "USEABLE_START_TIME = 2008-05-20T00:00:00\nSTOP_TIME = 2009",
+       "the useable span does not lie"},
+      {"STOP_TIME = 2009", "USEABLE_STOP_TIME = 2010-05-20T00:00:00\nSTOP_TIME = 2009",
+       "the useable span does not lie"},
+      {"ATTITUDE_TYPE = QUATERNION/ANGVEL", "ATTITUDE_TYPE = EULER_ANGLE",
+       "\"EULER_ANGLE\" is not read; give QUATERNION"},
       {"ATTITUDE_TYPE = QUATERNION/ANGVEL", "ATTITUDE_TYPE = QUATERNION/RATE", "is not read"},
       {"ATTITUDE_TYPE = QUATERNION/ANGVEL", "ATTITUDE_TYPE = QUATERNION", "the line has 8 values, not 5"},
       {"ATTITUDE_TYPE = QUATERNION/ANGVEL", "ATTITUDE_TYPE = QUATERNION/DERIVATIVE", "the line has 8 values, not 9"},
@@ -389,7 +393,8 @@ TEST(DamagedAem, OfTextIsRefusedWithTheReason) {
       {"META_STOP\n", "", "\"DATA_START\" is no assignment"},
       {"DATA_START\n", "", "META_STOP is not followed by DATA_START"},
       {"DATA_STOP\n", "", "a.aem:62:1: the line has 1 value, not 8"},
-      {"2009-05-20T00:00:00.125000001", "2009-05-20T00:00:00", "a.aem:22:1: the epoch \"2009-05-20T00:00:00\" is not later"},
+      {"2009-05-20T00:00:00.125000001", "2009-05-20T00:00:00",
+       "a.aem:22:1: the epoch \"2009-05-20T00:00:00\" is not later"},
       {"2009-05-20T00:00:00.125000001", "0.125", "\"0.125\" is no time"},
       {"2009-05-20T00:00:00.125000001", "2009-05-20T00:00:00.125000001Z", "ends with Z"},
       {"2009-05-20T00:00:00.125000001 ", "2009-05-20T00:00:00.125000001 0 ", "the line has 9 values, not 8"},
@@ -438,9 +443,11 @@ TEST(DamagedAem, OfXmlIsRefusedWithTheReason) {
       {"<EPOCH>2009-05-20T00:00:00</EPOCH>", "", "<quaternionAngVel> has no <EPOCH>"},
       {"<EPOCH>2009-05-20T00:00:00</EPOCH>", "<EPOCH>now</EPOCH>", "\"now\" is no time"},
       {"<EPOCH>2009-05-20T00:00:00</EPOCH>", "<EPOCH>2009-05-20T00:00:01</EPOCH>", "is not later than the one before"},
-      {"<ANGVEL_X units=\"deg/s\">", "<ANGVEL_X units=\"rad/s\">", "the unit of <ANGVEL_X> is \"rad/s\"; give it in deg/s"},
+      {"<ANGVEL_X units=\"deg/s\">", "<ANGVEL_X units=\"rad/s\">",
+       "the unit of <ANGVEL_X> is \"rad/s\"; give it in deg/s"},
       {"<QC>", "<QC units=\"deg\">", "the unit of <QC> is \"deg\"; it has none"},
-      {"<ATTITUDE_TYPE>QUATERNION/ANGVEL<", "<ATTITUDE_TYPE>QUATERNION<", "<ANGVEL_X> is no part of this ATTITUDE_TYPE"},
+      {"<ATTITUDE_TYPE>QUATERNION/ANGVEL<", "<ATTITUDE_TYPE>QUATERNION<",
+       "<ANGVEL_X> is no part of this ATTITUDE_TYPE"},
       {"<ATTITUDE_TYPE>QUATERNION/ANGVEL<", "<ATTITUDE_TYPE>SPIN<", "\"SPIN\" is not read"},
   };
   for (const Damage& damage : damages) {

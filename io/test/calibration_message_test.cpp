@@ -39,7 +39,8 @@ TEST(Acm, HoldsEachParameterAndItsSigma) {
 TEST(Acm, HoldsAttitudeAndDiagonalCovariance) {
   const Calibration calibration = sample_calibration();
   AttitudeMessage attitude;
-  attitude.attitude.t = {calibration.epoch + std::chrono::milliseconds(1500), calibration.epoch + std::chrono::seconds(3)};
+  attitude.attitude.t = {calibration.epoch + std::chrono::milliseconds(1500),
+                         calibration.epoch + std::chrono::seconds(3)};
   attitude.attitude.q_in_c = {Eigen::Quaterniond(0.8, 0.6, 0, 0), Eigen::Quaterniond(1, 0, 0, 0)};
   attitude.attitude.sigma_rad = {{1e-5, 2e-5, 3e-5}, {kNaN, 1e-5, 1e-5}};
   const std::string text = format_acm(calibration, {&attitude, nullptr, ""}, description(), MessageSyntax::kKvn);

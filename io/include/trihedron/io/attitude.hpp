@@ -26,8 +26,8 @@ enum class AttitudeDigits {
   kAll,             ///< so many that each comes back bit for bit
 };
 
-/// t_s with three decimals where that is exact, else nine. Columns of what is empty are not written; the rates are those
-/// of an AttitudeMessage.
+/// t_s with three decimals where that is exact, else nine. Columns of what is empty are not written; the rates are
+/// those of an AttitudeMessage.
 [[nodiscard]] std::string format_attitude(Time epoch, const AttitudeHistory& attitude,
                                           AttitudeDigits digits = AttitudeDigits::kTwelveDecimals,
                                           std::span<const Eigen::Vector3d> rate_rad_s = {});

@@ -25,7 +25,7 @@ struct MessageDescription {
   std::string object_name = "UNKNOWN";
   std::string object_id = "UNKNOWN";  ///< international designator, 2006-021A
   std::string originator = "TRIHEDRON";
-  std::string inertial_frame = "GCRF";  ///< the axes of `in`: those of ICRF, with the origin at the Earth
+  std::string inertial_frame = "GCRF";   ///< the axes of `in`: those of ICRF, with the origin at the Earth
   std::string body_frame = "SC_BODY_1";  ///< the axes of c
   TimeScale time_scale = TimeScale::kTai;
   std::string created_utc;  ///< creation date
@@ -42,9 +42,9 @@ void expect_writable_description(const MessageDescription& description);
 enum class MessageSyntax { kKvn, kXml };
 
 /// An AEM version 2 with one segment for each stretch without a gap: QUATERNION/ANGVEL where there are rates (of c with
-/// respect to in, c axes), else QUATERNION. Numbers have 16 digits, the most that the standard allows, which is exact to 5e-17. `epoch`, that of the
-/// attitude file, stands in a comment, by which read_attitude_message() finds it again. Throws UsageError as
-/// expect_writable_description() and TimeText::format().
+/// respect to in, c axes), else QUATERNION. Numbers have 16 digits, the most that the standard allows, which is exact
+/// to 5e-17. `epoch`, that of the attitude file, stands in a comment, by which read_attitude_message() finds it again.
+/// Throws UsageError as expect_writable_description() and TimeText::format().
 [[nodiscard]] std::string format_aem(const AttitudeHistory& attitude, std::span<const Eigen::Vector3d> rate_rad_s,
                                      Time epoch, const MessageDescription& description, Duration gap,
                                      MessageSyntax syntax);
@@ -53,13 +53,13 @@ enum class MessageSyntax { kKvn, kXml };
 struct AttitudeMessage {
   AttitudeHistory attitude;
   std::vector<Eigen::Vector3d> rate_rad_s;  ///< of c with respect to in, c axes; empty where unknown
-  std::string format;  ///< for people: "CCSDS AEM version 2, KVN"
+  std::string format;                       ///< for people: "CCSDS AEM version 2, KVN"
   std::string object_name;
   std::string object_id;
   std::string inertial_frame;
   std::string body_frame;
   std::string time_system;
-  std::optional<Time> epoch;   ///< of t_s in the attitude file that the message was made from
+  std::optional<Time> epoch;  ///< of t_s in the attitude file that the message was made from
   std::size_t segments = 0;
   std::size_t left_out = 0;  ///< rows outside the useable span of their segment, or that the next segment has again
 };

@@ -23,8 +23,8 @@ struct CalibrationContext {
 [[nodiscard]] std::string format_acm(const Calibration& calibration, const CalibrationContext& context,
                                      const MessageDescription& description, MessageSyntax syntax);
 
-/// NetCDF-4: `covariance(state, state_2)` in the units of its states, with their names and units as `state` and `units`.
-/// Throws MachineFailed.
+/// NetCDF-4: `covariance(state, state_2)` in the units of its states, with their names and units as `state` and
+/// `units`. Throws MachineFailed.
 void write_covariance(const std::filesystem::path& path, const Calibration& calibration);
 
 }  // namespace trihedron::io

@@ -44,8 +44,8 @@ struct SpiceClock {
 };
 
 /// Angular velocity of c with respect to in, c axes, at every epoch: of the given rates, or where there are none by the
-/// rotations to both neighbours of the stretch (of second order, at its ends of first), zero where a stretch is a single
-/// epoch.
+/// rotations to both neighbours of the stretch (of second order, at its ends of first), zero where a stretch is a
+/// single epoch.
 [[nodiscard]] std::vector<Eigen::Vector3d> rates_of(const AttitudeHistory& attitude,
                                                     std::span<const Eigen::Vector3d> given,
                                                     std::span<const std::size_t> stretches);
