@@ -132,6 +132,8 @@ Truth::StarTracker truth_of(const StarTrackerScenario& head) {
 
 }  // namespace
 
+void expect_possible(const Scenario& scenario) { check(scenario); }
+
 SimulatedPass simulate(const Scenario& scenario) {
   check(scenario);
   const double duration_s = to_seconds(scenario.duration);
