@@ -17,6 +17,7 @@
 #include "progress.hpp"
 #include "standard_streams.hpp"
 #include "steps.hpp"
+#include "terminal.hpp"
 #include "trihedron/campaign/perform.hpp"
 #include "trihedron/campaign/sampling.hpp"
 #include "trihedron/campaign/summary.hpp"
@@ -69,7 +70,7 @@ bool is_there(const fs::path& path) {
 }
 
 /// The runs that OUT has of this campaign; nothing where there is no journal. Refuses that of another campaign.
-std::optional<io::Journal> journal_in(const fs::path& out, const io::CampaignIdentity& identity) {
+std::optional<io::Journal> journal_in(const fs::path& out, const CampaignIdentity& identity) {
   const fs::path file = out / kJournalFile;
   if (!is_there(file)) {
     return std::nullopt;
@@ -156,9 +157,9 @@ class Campaign {
         counter.add();
       });
     } catch (const Stopped&) {
-      say(fmt::format("\r\033[Ktrihedron: stopped; {} of {} runs are kept: go on with {} --resume\n", records_.size(),
-                      plan().runs, printable(command_of(arguments_)))
-              .substr(is_screen(stderr) ? 0 : 4));
+      say(fmt::format("{}trihedron: stopped; {} of {} runs are kept: go on with {} --resume\n",
+                      is_screen(stderr) ? "\r\033[K" : "", records_.size(), plan().runs,
+                      printable(command_of(arguments_))));
       throw;
     }
     std::ranges::sort(records_, {}, &RunRecord::run);
@@ -167,7 +168,7 @@ class Campaign {
   const io::CampaignFile& file_;
   const CampaignArguments& arguments_;
   const Common& common_;
-  io::CampaignIdentity identity_;
+  CampaignIdentity identity_;
   io::StagedDirectory staged_;
   std::optional<io::JournalWriter> writer_;
   std::vector<RunRecord> records_;
