@@ -71,6 +71,11 @@ double quantile_supported(std::size_t runs, double confidence) {
   return std::pow(1 - confidence, 1 / static_cast<double>(runs));
 }
 
+bool is_share_above(std::size_t count, std::size_t of, double share, double confidence) {
+  return count > 0 && boost::math::cdf(boost::math::complement(boost::math::binomial(static_cast<double>(of), share),
+                                                               static_cast<double>(count) - 1)) < 1 - confidence;
+}
+
 std::optional<RankCorrelation> rank_correlation(std::span<const double> x, std::span<const double> y) {
   std::vector<double> first;
   std::vector<double> second;

@@ -22,7 +22,7 @@ constexpr double kMostSigmaFactor = 1.2;
 constexpr double kNisMatters = 0.02;
 /// A NEES that a consistent run passes once in a million times is taken for an error of its sigmas.
 constexpr double kCertainlyWrong = 1e-6;
-/// Share of such runs among those called trustworthy that is too large.
+/// Share of such runs among those called trustworthy that is too large, where it is exceeded for certain.
 constexpr double kMostWrong = 0.01;
 constexpr std::size_t kWorstOfEach = 3;
 
@@ -342,7 +342,7 @@ void judge_nees(const Records& trustworthy, CampaignSummary& summary) {
          fmt::format("{:.2g} % of the trustworthy runs have a NEES that chance passes once in a million: runs {}",
                      100 * share, listed(wrong)),
          "Look at them with --only: their verdict missed something.",
-         share > kMostWrong ? FindingSeverity::kDoNotUse : FindingSeverity::kWarning});
+         is_share_above(wrong.size(), trustworthy.size(), kMostWrong) ? FindingSeverity::kDoNotUse : FindingSeverity::kWarning});
   }
 }
 

@@ -27,6 +27,10 @@ struct QuantileBounds {
 /// Largest quantile that so many runs bound from above with this confidence.
 [[nodiscard]] double quantile_supported(std::size_t runs, double confidence = kConfidence);
 
+/// Whether `count` of `of` say with this confidence that more than `share` of all are so (C. J. Clopper, E. S. Pearson
+/// 1934).
+[[nodiscard]] bool is_share_above(std::size_t count, std::size_t of, double share, double confidence = kConfidence);
+
 /// Spearman's rank correlation, with mean ranks for equal values.
 struct RankCorrelation {
   double rho = 0;
