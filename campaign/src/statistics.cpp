@@ -38,7 +38,9 @@ QuantileBounds quantile_bounds(std::span<const double> values, double p, double 
   const auto rank = static_cast<std::size_t>(std::ceil(p * n));
   bounds.estimate = values[std::clamp<std::size_t>(rank, 1, values.size()) - 1];
   // The r-th value is not below the quantile where fewer than r of all are below it.
-  const auto is_upper = [&](std::size_t r) { return boost::math::cdf(below, static_cast<double>(r) - 1) >= confidence; };
+  const auto is_upper = [&](std::size_t r) {
+    return boost::math::cdf(below, static_cast<double>(r) - 1) >= confidence;
+  };
   // And not above it where r or more are.
   const auto is_lower = [&](std::size_t r) {
     return boost::math::cdf(boost::math::complement(below, static_cast<double>(r) - 1)) >= confidence;

@@ -191,8 +191,8 @@ std::vector<ParameterErrors> errors_of_parameters(std::size_t gyros, const Recor
                                      kCampaignCoefficients * gyro + k, records));
     }
     for (std::size_t axis = 0; axis < 3; ++axis) {
-      all.push_back(parameter_errors(fmt::format("gyro{}.align_{}", gyro + 1, "xyz"[axis]), true, 3 * gyro + axis,
-                                     records));
+      all.push_back(
+          parameter_errors(fmt::format("gyro{}.align_{}", gyro + 1, "xyz"[axis]), true, 3 * gyro + axis, records));
     }
   }
   return all;
@@ -272,7 +272,8 @@ void judge_failures(std::span<const RunRecord> records, CampaignSummary& summary
   summary.campaign_findings.push_back(
       {"runs-failed", fmt::format("{} of {} runs failed, and are in no statistic.", failed.size(), records.size()),
        fmt::format("runs {}; most often: {}", listed(failed), reason->first),
-       "Look at one with --only. If such flights cannot be, narrow the distributions; if they can, the statistics are too "
+       "Look at one with --only. If such flights cannot be, narrow the distributions; if they can, the statistics are "
+       "too "
        "good.",
        FindingSeverity::kDoNotUse});
 }
@@ -292,8 +293,7 @@ void judge_verdicts(const Records& trustworthy, std::size_t finished, CampaignSu
     }
   }
   summary.campaign_findings.push_back(
-      {"runs-not-trustworthy",
-       fmt::format("{} of {} calibrations say of themselves: do not use.", refused, finished),
+      {"runs-not-trustworthy", fmt::format("{} of {} calibrations say of themselves: do not use.", refused, finished),
        fmt::format("{:.1f} % of the runs{}", 100.0 * static_cast<double>(refused) / static_cast<double>(finished),
                    most_often),
        "Plan for so many passes without a calibration, or for better ones: observe --advise finds slews.",
@@ -313,8 +313,10 @@ void judge_nees(const Records& trustworthy, CampaignSummary& summary) {
     const bool matters = nees.sigma_factor() > kMostSigmaFactor;
     summary.campaign_findings.push_back(
         {"nees-above-bounds",
-         fmt::format("The sigmas of the parameters are too small, by a factor of {:.2f}.", nees.sigma_factor()), evidence,
-         "Look at the worst runs and at what matters most: something in these scenarios is not in the estimator's model.",
+         fmt::format("The sigmas of the parameters are too small, by a factor of {:.2f}.", nees.sigma_factor()),
+         evidence,
+         "Look at the worst runs and at what matters most: something in these scenarios is not in the estimator's "
+         "model.",
          matters ? FindingSeverity::kDoNotUse : FindingSeverity::kWarning});
   } else if (ratio < nees.limit.low) {
     summary.campaign_findings.push_back(
@@ -342,7 +344,8 @@ void judge_nees(const Records& trustworthy, CampaignSummary& summary) {
          fmt::format("{:.2g} % of the trustworthy runs have a NEES that chance passes once in a million: runs {}",
                      100 * share, listed(wrong)),
          "Look at them with --only: their verdict missed something.",
-         is_share_above(wrong.size(), trustworthy.size(), kMostWrong) ? FindingSeverity::kDoNotUse : FindingSeverity::kWarning});
+         is_share_above(wrong.size(), trustworthy.size(), kMostWrong) ? FindingSeverity::kDoNotUse
+                                                                      : FindingSeverity::kWarning});
   }
 }
 
@@ -373,10 +376,10 @@ void judge_number(const Records& trustworthy, CampaignSummary& summary) {
   summary.campaign_findings.push_back(
       {"too-few-runs",
        fmt::format("{} trustworthy runs do not support the quantile of {:.1f} %.", trustworthy.size(), 100 * highest),
-       fmt::format("at {:.0f} % confidence their largest value bounds the quantile of {:.1f} %; for {:.1f} % it takes {} "
-                   "runs",
-                   100 * kConfidence, std::floor(1000 * quantile_supported(trustworthy.size())) / 10, 100 * highest,
-                   needed),
+       fmt::format(
+           "at {:.0f} % confidence their largest value bounds the quantile of {:.1f} %; for {:.1f} % it takes {} "
+           "runs",
+           100 * kConfidence, std::floor(1000 * quantile_supported(trustworthy.size())) / 10, 100 * highest, needed),
        fmt::format("For the quantile of {:.1f} % let {} runs be trustworthy.", 100 * highest, needed),
        FindingSeverity::kNote});
 }

@@ -52,7 +52,8 @@ std::vector<RunRecord> performed(const CampaignPlan& plan, unsigned jobs, const 
     numbers.push_back(run);
   }
   std::vector<RunRecord> records;
-  perform_all(plan, numbers, scenario_of, told(), jobs, [&](RunRecord&& record) { records.push_back(std::move(record)); });
+  perform_all(plan, numbers, scenario_of, told(), jobs,
+              [&](RunRecord&& record) { records.push_back(std::move(record)); });
   std::ranges::sort(records, {}, &RunRecord::run);
   return records;
 }

@@ -63,8 +63,7 @@ TEST(Sampling, HasTheMomentsOfItsDistributions) {
   plan.runs = kRuns;
   const double ln2 = std::numbers::ln2;
   plan.inputs = {
-      uniform("u", 2, 6),
-      input_of("n", {.kind = Kind::kNormal, .a = 5, .b = 2, .least = -7, .most = 17}),
+      uniform("u", 2, 6), input_of("n", {.kind = Kind::kNormal, .a = 5, .b = 2, .least = -7, .most = 17}),
       input_of("ln", {.kind = Kind::kLognormal, .a = 3, .b = 2, .least = 3.0 / 64, .most = 3.0 * 64}),
       input_of("lu", {.kind = Kind::kLoguniform, .a = 1, .b = std::exp(4.0), .least = 1, .most = std::exp(4.0)}),
       input_of("half", {.kind = Kind::kNormal, .a = 0, .b = 1, .least = 0, .most = 6})};

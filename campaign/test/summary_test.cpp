@@ -58,7 +58,8 @@ TEST(RankCorrelation, IsOneForWhatGrowsTogetherWhateverItsScale) {
 }
 
 TEST(RankCorrelation, HasTheValueOfTheTextbookAndMeanRanksForTies) {
-  // Ranks of y: 1, 3, 2, 5, 4: rho = 1 − 6·(0 + 1 + 1 + 1 + 1)/(5·24) = 0.8; t = 0.8 √(3/0.36) = 2.3094, two-sided p 0.1041.
+  // Ranks of y: 1, 3, 2, 5, 4: rho = 1 − 6·(0 + 1 + 1 + 1 + 1)/(5·24) = 0.8; t = 0.8 √(3/0.36) = 2.3094, two-sided p
+  // 0.1041.
   const std::vector<double> x = {10, 20, 30, 40, 50};
   const std::vector<double> y = {1, 6, 2, 9, 8};
   const auto correlation = rank_correlation(x, y);
@@ -162,7 +163,8 @@ TEST(CampaignSummary, NamesRunsThatAreTrustedButWrong) {
 }
 
 TEST(CampaignSummary, WithManyRunsThatAreTrustedButWrongIsNotToBeUsed) {
-  // Of 100, one percent is exceeded with 90 % confidence by three: P(3 or more of Bin(100, 0.01)) = 0.079, P(2 or more) = 0.26.
+  // Of 100, one percent is exceeded with 90 % confidence by three: P(3 or more of Bin(100, 0.01)) = 0.079, P(2 or more)
+  // = 0.26.
   EXPECT_FALSE(is_share_above(2, 100, 0.01));
   EXPECT_TRUE(is_share_above(3, 100, 0.01));
   EXPECT_FALSE(is_share_above(0, 100, 0.01));

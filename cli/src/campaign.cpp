@@ -1,3 +1,5 @@
+#include "trihedron/io/campaign.hpp"
+
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -23,7 +25,6 @@
 #include "trihedron/campaign/summary.hpp"
 #include "trihedron/io/apart.hpp"
 #include "trihedron/io/atomic_file.hpp"
-#include "trihedron/io/campaign.hpp"
 #include "trihedron/io/error.hpp"
 #include "trihedron/io/pass.hpp"
 #include "trihedron/records/stop.hpp"
@@ -97,9 +98,9 @@ class Campaign {
     const fs::path journal_file = fs::path(arguments.out) / kJournalFile;
     if (std::optional<io::Journal> journal = journal_in(arguments.out, identity_)) {
       if (!arguments.resume) {
-        throw io::InputRefused(journal_file, {},
-                               fmt::format("holds {} of {} runs of this campaign", journal->records.size(), plan().runs),
-                               "add --resume to go on with it, or give another directory");
+        throw io::InputRefused(
+            journal_file, {}, fmt::format("holds {} of {} runs of this campaign", journal->records.size(), plan().runs),
+            "add --resume to go on with it, or give another directory");
       }
       if (journal->damaged > 0) {
         say(fmt::format("trihedron: {}: {} damaged, performed again\n", printable(journal_file.string()),
@@ -125,9 +126,9 @@ class Campaign {
     show(
         common_, [&] { return campaign_json(plan(), summary, command); },
         [&] {
-          return campaign_text(plan(), summary, command) +
-                 fmt::format("Written     {}: {} {} {} {}\n", printable(arguments_.out), kTableFile, kCampaignReport,
-                             kTimesFile, kJournalFile);
+          return campaign_text(plan(), summary, command) + fmt::format("Written     {}: {} {} {} {}\n",
+                                                                       printable(arguments_.out), kTableFile,
+                                                                       kCampaignReport, kTimesFile, kJournalFile);
         });
     return summary.trustworthy_campaign() ? kTrustworthy : kDoNotUse;
   }
@@ -145,7 +146,8 @@ class Campaign {
         missing.push_back(run);
       }
     }
-    common_.log.say(fmt::format("campaign {}: {} of {} runs are to be performed", plan().name, missing.size(), plan().runs));
+    common_.log.say(
+        fmt::format("campaign {}: {} of {} runs are to be performed", plan().name, missing.size(), plan().runs));
     RunCounter counter("campaign", records_.size(), plan().runs, common_.quiet);
     const unsigned jobs = arguments_.jobs > 0 ? arguments_.jobs : std::max(std::thread::hardware_concurrency(), 1U);
     try {
@@ -262,7 +264,8 @@ void add_campaign(CLI::App& program, const Common& common, int& exit_status) {
   auto arguments = std::make_shared<CampaignArguments>();
   CLI::App* command = program.add_subcommand(
       "campaign", "Simulate, calibrate and measure many flights with values drawn from distributions");
-  command->add_option("CAMPAIGN.toml", arguments->file, "What varies, and how often; trihedron schema campaign")->required();
+  command->add_option("CAMPAIGN.toml", arguments->file, "What varies, and how often; trihedron schema campaign")
+      ->required();
   CLI::Option* out =
       command->add_option("-o,--output", arguments->out, "Directory to write into")->type_name("DIRECTORY");
   CLI::Option* resume =

@@ -38,8 +38,8 @@ std::string measure_text(const Measure& measure, double value) {
 
 /// Fills the columns by characters, not by bytes.
 std::string right(const std::string& text, std::size_t columns) {
-  const auto characters = static_cast<std::size_t>(
-      std::ranges::count_if(text, [](unsigned char c) { return (c & 0xC0U) != 0x80U; }));
+  const auto characters =
+      static_cast<std::size_t>(std::ranges::count_if(text, [](unsigned char c) { return (c & 0xC0U) != 0x80U; }));
   return std::string(columns - std::min(columns, characters), ' ') + text;
 }
 
@@ -48,16 +48,17 @@ std::string consistency_text(const char* name, const std::optional<Consistency>&
     return "";
   }
   const Consistency& its = *consistency;
-  return fmt::format("{:<12}{:.{}f} of {:.{}f}, mean over {} trustworthy runs; 95 % of consistent campaigns: {:.{}f} … "
-                     "{:.{}f}; {:.1f} % of the runs in their own 95 %\n",
-                     name, its.mean, digits, its.freedom, digits == 1 ? 0 : 2, its.runs, its.usual.low * its.freedom,
-                     digits, its.usual.high * its.freedom, digits, 100 * its.within);
+  return fmt::format(
+      "{:<12}{:.{}f} of {:.{}f}, mean over {} trustworthy runs; 95 % of consistent campaigns: {:.{}f} … "
+      "{:.{}f}; {:.1f} % of the runs in their own 95 %\n",
+      name, its.mean, digits, its.freedom, digits == 1 ? 0 : 2, its.runs, its.usual.low * its.freedom, digits,
+      its.usual.high * its.freedom, digits, 100 * its.within);
 }
 
 /// Each quantile, and below it its upper bound.
 std::string measures_text(const std::vector<MeasureStatistics>& statistics, const char* whose) {
-  std::string text = fmt::format("\nOver the {} runs, not exceeded (intervals and extension: reached) by a share of\n{:<50}",
-                                 whose, "");
+  std::string text = fmt::format(
+      "\nOver the {} runs, not exceeded (intervals and extension: reached) by a share of\n{:<50}", whose, "");
   for (const double p : campaign::kReportedQuantiles) {
     text += right(fmt::format("{:g} %", 100 * p), 11);
   }
@@ -72,7 +73,8 @@ std::string measures_text(const std::vector<MeasureStatistics>& statistics, cons
     for (const campaign::QuantileBounds& quantile : its.quantiles) {
       row += right(measure_text(*its.measure, quantile.estimate), 11);
       const std::optional<double>& worst = its.measure->large_is_bad ? quantile.upper : quantile.lower;
-      bound += right(worst ? (its.measure->large_is_bad ? "≤ " : "≥ ") + measure_text(*its.measure, *worst) : "too few", 11);
+      bound +=
+          right(worst ? (its.measure->large_is_bad ? "≤ " : "≥ ") + measure_text(*its.measure, *worst) : "too few", 11);
     }
     text += fmt::format("{} {:>6}\n{}\n", row, its.runs, bound);
   }
@@ -97,8 +99,8 @@ std::string influences_text(const CampaignPlan& plan, const CampaignSummary& sum
   if (summary.pairs == 0) {
     return "";
   }
-  return fmt::format("\nWhat matters: rank correlations that chance does not make, {} of {}{}\n", significant, summary.pairs,
-                     significant > shown ? fmt::format("; the strongest {}", shown) : "") +
+  return fmt::format("\nWhat matters: rank correlations that chance does not make, {} of {}{}\n", significant,
+                     summary.pairs, significant > shown ? fmt::format("; the strongest {}", shown) : "") +
          text;
 }
 
@@ -148,10 +150,11 @@ ordered_json measures_json(const std::vector<MeasureStatistics>& statistics) {
       quantiles.push_back(std::move(one));
     }
     const Measure::Unit unit = its.measure->unit;
-    json[std::string(its.measure->key)] = {
-        {"unit", unit == Measure::Unit::kRadian ? "rad" : unit == Measure::Unit::kSecond ? "s" : "1"},
-        {"runs", its.runs},
-        {"quantiles", std::move(quantiles)}};
+    json[std::string(its.measure->key)] = {{"unit", unit == Measure::Unit::kRadian   ? "rad"
+                                                    : unit == Measure::Unit::kSecond ? "s"
+                                                                                     : "1"},
+                                           {"runs", its.runs},
+                                           {"quantiles", std::move(quantiles)}};
   }
   return json;
 }
@@ -171,9 +174,10 @@ std::string campaign_text(const CampaignPlan& plan, const CampaignSummary& summa
       "Campaign    {}: {} runs, seed {}, {} over {} value{}\n"
       "Verdict     {}\n"
       "Runs        {} trustworthy, {} do not use, {} failed\n",
-      printable(plan.name), plan.runs, plan.seed, plan.latin_hypercube ? "Latin hypercube" : "drawn", plan.inputs.size(),
-      plan.inputs.size() == 1 ? "" : "s", summary.trustworthy_campaign() ? "trustworthy" : "DO NOT USE",
-      summary.count(RunOutcome::kTrustworthy), summary.count(RunOutcome::kDoNotUse), summary.count(RunOutcome::kFailed));
+      printable(plan.name), plan.runs, plan.seed, plan.latin_hypercube ? "Latin hypercube" : "drawn",
+      plan.inputs.size(), plan.inputs.size() == 1 ? "" : "s",
+      summary.trustworthy_campaign() ? "trustworthy" : "DO NOT USE", summary.count(RunOutcome::kTrustworthy),
+      summary.count(RunOutcome::kDoNotUse), summary.count(RunOutcome::kFailed));
   for (const campaign::CampaignFinding& finding : summary.campaign_findings) {
     text += finding_lines(finding);
   }
@@ -197,12 +201,9 @@ ordered_json campaign_json(const CampaignPlan& plan, const CampaignSummary& summ
   }
   ordered_json parameters = ordered_json::object();
   for (const campaign::ParameterErrors& its : summary.parameters) {
-    parameters[its.name] = {{"runs", its.runs},
-                            {"rms", its.rms},
-                            {"sigma", its.sigma},
-                            {"normalised_rms", its.normalised},
-                            {"usual_low", its.usual.low},
-                            {"usual_high", its.usual.high}};
+    parameters[its.name] = {{"runs", its.runs},           {"rms", its.rms},
+                            {"sigma", its.sigma},         {"normalised_rms", its.normalised},
+                            {"usual_low", its.usual.low}, {"usual_high", its.usual.high}};
   }
   ordered_json influences = ordered_json::array();
   for (const campaign::Influence& influence : summary.influences) {
@@ -245,11 +246,12 @@ ordered_json campaign_json(const CampaignPlan& plan, const CampaignSummary& summ
 }
 
 std::string run_text(const CampaignPlan& plan, const RunRecord& record) {
-  std::string text = fmt::format("Run         {} of {}, {}; seed of its scenario {}\n", record.run, printable(plan.name),
-                                 record.outcome == RunOutcome::kTrustworthy ? "trustworthy"
-                                 : record.outcome == RunOutcome::kDoNotUse  ? "DO NOT USE"
-                                                                            : "FAILED",
-                                 record.seed);
+  std::string text =
+      fmt::format("Run         {} of {}, {}; seed of its scenario {}\n", record.run, printable(plan.name),
+                  record.outcome == RunOutcome::kTrustworthy ? "trustworthy"
+                  : record.outcome == RunOutcome::kDoNotUse  ? "DO NOT USE"
+                                                             : "FAILED",
+                  record.seed);
   if (!record.reason.empty()) {
     text += fmt::format("  {}\n", printable(record.reason));
   }
@@ -284,9 +286,14 @@ ordered_json run_json(const CampaignPlan& plan, const RunRecord& record) {
   for (const RunQuantityRow& row : kRunQuantityRows) {
     values[std::string(row.name)] = record[row.quantity];
   }
-  return {{"run", record.run},           {"seed", record.seed},         {"draws", draws},
-          {"outcome", name_of(record.outcome)}, {"reason", record.reason},     {"drift_model", record.drift_model},
-          {"findings", record.findings}, {"values", values}};
+  return {{"run", record.run},
+          {"seed", record.seed},
+          {"draws", draws},
+          {"outcome", name_of(record.outcome)},
+          {"reason", record.reason},
+          {"drift_model", record.drift_model},
+          {"findings", record.findings},
+          {"values", values}};
 }
 
 }  // namespace trihedron::cli

@@ -69,10 +69,10 @@ void RunCounter::show() const {
   const int full = static_cast<int>(kWidth * done_ / all_);
   const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begun_).count();
   const auto here = static_cast<double>(done_ - before_);
-  const std::string pace =
-      here > 0 && seconds > 0
-          ? fmt::format(", {:.3g} runs/s, {} left", here / seconds, about(seconds / here * static_cast<double>(all_ - done_)))
-          : "";
+  const std::string pace = here > 0 && seconds > 0
+                               ? fmt::format(", {:.3g} runs/s, {} left", here / seconds,
+                                             about(seconds / here * static_cast<double>(all_ - done_)))
+                               : "";
   say(fmt::format("\r\033[K{} [{:=<{}}{: <{}}] {}/{}{}", what_, "", full, "", kWidth - full, done_, all_, pace));
 }
 

@@ -130,10 +130,8 @@ Json navigate_output() {
   return object(
       {{"pass", pass()},
        {"verdict", verdict()},
-       {"readiness", object({{"limit_rad", number()},
-                             {"time_s", number()},
-                             {"is_lower_bound", flag()},
-                             {"need_met?", flag()}})},
+       {"readiness",
+        object({{"limit_rad", number()}, {"time_s", number()}, {"is_lower_bound", flag()}, {"need_met?", flag()}})},
        {"statistics", by_name(number())},
        {"evaluation", evaluation()}});
 }
@@ -244,8 +242,8 @@ Json campaign_output() {
                                  {"rank_correlation", number()},
                                  {"p_value", number()},
                                  {"significant", flag()}});
-  const Json worst = object(
-      {{"run", count()}, {"why", text()}, {"command", text()}, {"measure?", text()}, {"value?", number()}});
+  const Json worst =
+      object({{"run", count()}, {"why", text()}, {"command", text()}, {"measure?", text()}, {"value?", number()}});
   return object({{"campaign", text()},
                  {"seed", count()},
                  {"runs", count()},

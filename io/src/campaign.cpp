@@ -148,8 +148,8 @@ void flatten(const toml::node& node, const std::string& key, CampaignIdentity& l
 struct Varied {
   CampaignInput input;
   std::vector<std::string> path;
-  std::vector<toml::array> options;  ///< each an array of the one value
-  toml::table as_given;              ///< the distribution
+  std::vector<toml::array> options;   ///< each an array of the one value
+  toml::table as_given;               ///< the distribution
   const toml::node* place = nullptr;  ///< in the document
 };
 
@@ -221,8 +221,9 @@ class DistributionReader {
   [[nodiscard]] double like_others(const toml::node& node) const {
     const Amount found = amount(node);
     if (found.unit != varied_.input.unit) {
-      refuse(node, fmt::format("{} is not in {}, as the number before", in_quotes(text_of(node)),
-                               varied_.input.unit.empty() ? "no unit" : varied_.input.unit),
+      refuse(node,
+             fmt::format("{} is not in {}, as the number before", in_quotes(text_of(node)),
+                         varied_.input.unit.empty() ? "no unit" : varied_.input.unit),
              "write all numbers of a distribution in one unit");
     }
     return found.value;
@@ -373,18 +374,20 @@ struct Head {
 
 Field count(std::string_view key, std::uint64_t& target, std::string_view about) {
   const Range& range = limits::kCampaignRuns;
-  return {key, about,
-          [&range] { return whole_schema(static_cast<std::int64_t>(range.least), static_cast<std::int64_t>(range.most)); },
-          [key, &target, &range](const TomlTable& table, const toml::node& node) {
-            if (!node.is_integer()) {
-              table.refuse(node, fmt::format("\"{}\" is not a whole number", key), std::string(range.why));
-            }
-            target = static_cast<std::uint64_t>(table.number(node, key, range));
-          }};
+  return {
+      key, about,
+      [&range] { return whole_schema(static_cast<std::int64_t>(range.least), static_cast<std::int64_t>(range.most)); },
+      [key, &target, &range](const TomlTable& table, const toml::node& node) {
+        if (!node.is_integer()) {
+          table.refuse(node, fmt::format("\"{}\" is not a whole number", key), std::string(range.why));
+        }
+        target = static_cast<std::uint64_t>(table.number(node, key, range));
+      }};
 }
 
 Field limit(double& target) {
-  return quantity("limit", target, kAngle, limits::kAttitudeLimit_rad, "attitude error that ends a correction interval");
+  return quantity("limit", target, kAngle, limits::kAttitudeLimit_rad,
+                  "attitude error that ends a correction interval");
 }
 
 Fields head_fields(Head& head) {
@@ -408,7 +411,10 @@ struct Source {
 };
 
 Field source(std::string_view key, Source& target, std::string_view about, const std::function<Json()>& table_schema) {
-  return {key, about, [table_schema] { return any_of({text_schema(), table_schema()}); },
+  return {key, about,
+          [table_schema] {
+            return any_of({text_schema(), table_schema()});
+          },
           [key, &target](const TomlTable& table, const toml::node& node) {
             target.place = &node;
             if (node.is_table()) {
@@ -421,17 +427,17 @@ Field source(std::string_view key, Source& target, std::string_view about, const
 
 Fields campaign_fields(Head& head, Source& base, Source& calibration, const toml::table*& vary, const fs::path& file) {
   const auto vary_schema = [] { return Json{{"type", "object"}}; };
-  return {section("campaign", file, "[campaign]", "how many runs, and how they are drawn",
-                  [&head] { return head_fields(head); }),
-          source("base", base, "the scenario: a file, or its tables; without it the paper's experiment",
-                 scenario_table_schema),
-          source("calibration", calibration, "the settings: a file, or its tables; without it those of the program",
-                 config_table_schema),
-          {"vary",
-           "by the path of a key of the scenario, parts joined by points, elements of lists counted from 1: a table "
-           "with one of uniform, loguniform, normal, lognormal, choice, grid",
-           vary_schema,
-           [&vary](const TomlTable& table, const toml::node& node) { vary = &table.as_table(node, "vary"); }}};
+  return {
+      section("campaign", file, "[campaign]", "how many runs, and how they are drawn",
+              [&head] { return head_fields(head); }),
+      source("base", base, "the scenario: a file, or its tables; without it the paper's experiment",
+             scenario_table_schema),
+      source("calibration", calibration, "the settings: a file, or its tables; without it those of the program",
+             config_table_schema),
+      {"vary",
+       "by the path of a key of the scenario, parts joined by points, elements of lists counted from 1: a table "
+       "with one of uniform, loguniform, normal, lognormal, choice, grid",
+       vary_schema, [&vary](const TomlTable& table, const toml::node& node) { vary = &table.as_table(node, "vary"); }}};
 }
 
 }  // namespace
@@ -472,9 +478,8 @@ struct CampaignFile::Content {
   }
 
   void try_draw(const Varied& one, double draw, const ScenarioCheck& check) const {
-    const std::string what = one.input.distribution.has_options()
-                                 ? one.input.options[static_cast<std::size_t>(draw)]
-                                 : fmt::format("{}{}", draw, one.input.unit);
+    const std::string what = one.input.distribution.has_options() ? one.input.options[static_cast<std::size_t>(draw)]
+                                                                  : fmt::format("{}{}", draw, one.input.unit);
     const std::string drawn = fmt::format("{} = {}", one.input.key, in_quotes(what));
     try {
       toml::table scenario = base;
@@ -578,8 +583,9 @@ struct CampaignFile::Content {
     plan.repeats = std::max<std::uint64_t>(head.repeats, 1);
     const double runs = points * static_cast<double>(plan.repeats);
     if (!limits::kCampaignRuns.holds(runs)) {
-      refuse(place, fmt::format("the grid has {:.6g} points, with repeats {:.6g} runs, more than {:.0f}", points, runs,
-                                limits::kCampaignRuns.most),
+      refuse(place,
+             fmt::format("the grid has {:.6g} points, with repeats {:.6g} runs, more than {:.0f}", points, runs,
+                         limits::kCampaignRuns.most),
              "give shorter lists, or distributions with runs and sampling = \"latin-hypercube\"");
     }
     plan.runs = static_cast<std::uint64_t>(runs);
@@ -641,9 +647,9 @@ CampaignIdentity CampaignFile::identity(std::string_view version) const {
   }
   flatten(content_->base, "base", lines);
   if (!content_->recorded.empty()) {
-    lines.push_back({"base.attitude.recorded, its content",
-                     fmt::format("{} bytes, CRC-32 {:08x}", content_->recorded.size(),
-                                 crc32(std::as_bytes(std::span(content_->recorded))))});
+    lines.push_back(
+        {"base.attitude.recorded, its content", fmt::format("{} bytes, CRC-32 {:08x}", content_->recorded.size(),
+                                                            crc32(std::as_bytes(std::span(content_->recorded))))});
   }
   flatten(parse_toml(format_config(content_->options), "settings"), "calibration", lines);
   return lines;

@@ -149,7 +149,9 @@ Fields correction_fields(CorrectionOptions& corrections) {
 
 Fields file_fields(CalibrationOptions& options, const fs::path& file) {
   return {
-      estimator(options), drift_model(options), need(options),
+      estimator(options),
+      drift_model(options),
+      need(options),
       section("filter", file, "[filter]", "of estimators invariant and batch", [&] { return filter_fields(options); }),
       section("further_states", file, "[further_states]", "of estimators invariant and batch",
               [&] { return further_state_fields(options.further_states); }),

@@ -2,12 +2,12 @@
 /// NetCDF-4 by groups that hold columns along the dimension `time`. The library below is not thread-safe: one file at a
 /// time.
 
+#include <cstddef>
+#include <cstdint>
 #include <filesystem>
 #include <optional>
 #include <span>
 #include <string>
-#include <cstddef>
-#include <cstdint>
 #include <utility>
 #include <variant>
 #include <vector>

@@ -136,7 +136,8 @@ void write_run_table(const fs::path& file, const CampaignPlan& plan, std::string
        {{"long_name", "drift model that the calibration used"}}},
       {"findings",
        {kRun},
-       column<std::string>(records, [](const RunRecord& record) { return fmt::format("{}", fmt::join(record.findings, " ")); }),
+       column<std::string>(records,
+                           [](const RunRecord& record) { return fmt::format("{}", fmt::join(record.findings, " ")); }),
        {{"long_name", "codes of the findings of the verdict"}}}};
   std::map<std::string, int> taken;
   for (std::size_t i = 0; i < plan.inputs.size(); ++i) {
@@ -149,7 +150,8 @@ void write_run_table(const fs::path& file, const CampaignPlan& plan, std::string
   NetcdfWriter writer(file);
   writer.write_attribute("", "Conventions", "CF-1.10");
   writer.write_attribute("", "title", plan.name);
-  writer.write_attribute("", "source", "trihedron campaign: simulated passes, calibrated and compared with their truth");
+  writer.write_attribute("", "source",
+                         "trihedron campaign: simulated passes, calibrated and compared with their truth");
   writer.write_attribute("", "campaign_seed", std::to_string(plan.seed));
   writer.write_attribute("", "campaign_digest", std::string(digest));
   writer.write_attribute("", "sampling", plan.latin_hypercube ? "latin-hypercube" : "random");

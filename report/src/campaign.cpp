@@ -86,17 +86,21 @@ json consistency_number(const char* name, const std::optional<Consistency>& cons
     return {{"name", name}, {"value", "—"}, {"unit", ""}, {"note", "no trustworthy run"}};
   }
   const Consistency& its = *consistency;
-  return {{"name", name},
-          {"value", number(its.mean, digits)},
-          {"unit", fmt::format(" of {}", significant(its.freedom, 3))},
-          {"note", fmt::format("mean of {} trustworthy runs; of a consistent estimator {} … {} in 95 %", its.runs,
-                               number(its.usual.low * its.freedom, digits), number(its.usual.high * its.freedom, digits))}};
+  return {
+      {"name", name},
+      {"value", number(its.mean, digits)},
+      {"unit", fmt::format(" of {}", significant(its.freedom, 3))},
+      {"note", fmt::format("mean of {} trustworthy runs; of a consistent estimator {} … {} in 95 %", its.runs,
+                           number(its.usual.low * its.freedom, digits), number(its.usual.high * its.freedom, digits))}};
 }
 
 json quantile_number(const MeasureStatistics& statistics, double p) {
   const auto quantile = std::ranges::find(statistics.quantiles, p, &campaign::QuantileBounds::p);
   const Measure& measure = *statistics.measure;
-  json row = {{"name", fmt::format("{}, {} % of the runs", measure.label, 100 * p)}, {"value", "—"}, {"unit", ""}, {"note", "in no run"}};
+  json row = {{"name", fmt::format("{}, {} % of the runs", measure.label, 100 * p)},
+              {"value", "—"},
+              {"unit", ""},
+              {"note", "in no run"}};
   if (quantile != statistics.quantiles.end()) {
     const std::optional<double>& bound = measure.large_is_bad ? quantile->upper : quantile->lower;
     row["value"] = shown(measure, quantile->estimate);
@@ -188,12 +192,13 @@ json influence_rows(const CampaignReportInput& input) {
   json rows = json::array();
   for (const campaign::Influence& influence : input.summary.influences) {
     if (influence.is_significant) {
-      rows.push_back({{"key", input.plan.inputs[influence.input].key},
-                      {"measure", influence.measure->label},
-                      {"rho", signed_number(influence.correlation.rho, 2)},
-                      {"p", influence.correlation.p_value < 1e-12 ? std::string("< 10⁻¹²")
-                                                                  : fmt::format("{:.1e}", influence.correlation.p_value)},
-                      {"runs", influence.correlation.count}});
+      rows.push_back(
+          {{"key", input.plan.inputs[influence.input].key},
+           {"measure", influence.measure->label},
+           {"rho", signed_number(influence.correlation.rho, 2)},
+           {"p", influence.correlation.p_value < 1e-12 ? std::string("< 10⁻¹²")
+                                                       : fmt::format("{:.1e}", influence.correlation.p_value)},
+           {"runs", influence.correlation.count}});
     }
   }
   return rows;
@@ -445,15 +450,15 @@ std::string render_campaign(const CampaignReportInput& input) {
                  {"codes", count_rows(summary.findings)},
                  {"reasons", count_rows(summary.reasons)},
                  {"inputs", input_rows(input.plan)}};
-  return html_of({.title = "Campaign",
-                  .kind = "Monte Carlo campaign of gyro calibrations",
-                  .first_section = "verdict",
-                  .reading_notes = "Errors are estimate − truth; sigmas are one standard deviation.",
-                  .content = assets::kCampaign,
-                  .script = std::string(assets::kFigures) + std::string(assets::kCampaignFigures) +
-                            std::string(assets::kReport),
-                  .figures = std::move(figures)},
-                 std::move(values));
+  return html_of(
+      {.title = "Campaign",
+       .kind = "Monte Carlo campaign of gyro calibrations",
+       .first_section = "verdict",
+       .reading_notes = "Errors are estimate − truth; sigmas are one standard deviation.",
+       .content = assets::kCampaign,
+       .script = std::string(assets::kFigures) + std::string(assets::kCampaignFigures) + std::string(assets::kReport),
+       .figures = std::move(figures)},
+      std::move(values));
 }
 
 }  // namespace trihedron::report

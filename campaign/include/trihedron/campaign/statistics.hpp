@@ -14,9 +14,11 @@ inline constexpr double kConfidence = 0.9;
 /// A quantile over runs, and bounds of the true one by order statistics (H. A. David, Order Statistics, section 7.1).
 struct QuantileBounds {
   double p = 0;
-  double estimate = 0;          ///< smallest value that a share p of the runs does not exceed
-  std::optional<double> lower;  ///< the true quantile is not below it, with kConfidence; absent where the runs are too few
-  std::optional<double> upper;  ///< the true quantile is not above it, with kConfidence; absent where the runs are too few
+  double estimate = 0;  ///< smallest value that a share p of the runs does not exceed
+  std::optional<double>
+      lower;  ///< the true quantile is not below it, with kConfidence; absent where the runs are too few
+  std::optional<double>
+      upper;  ///< the true quantile is not above it, with kConfidence; absent where the runs are too few
 };
 
 /// values: increasing, at least one; infinity is a value. 0 < p < 1.

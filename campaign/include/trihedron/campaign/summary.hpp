@@ -62,9 +62,9 @@ struct ParameterErrors {
   std::string name;  ///< "gyro1.k0"
   bool is_alignment = false;
   std::size_t runs = 0;
-  double rms = 0;            ///< rad/s or rad
-  double sigma = 0;          ///< rms of those claimed
-  double normalised = 0;     ///< rms of error/sigma: 1 for honest sigmas
+  double rms = 0;           ///< rad/s or rad
+  double sigma = 0;         ///< rms of those claimed
+  double normalised = 0;    ///< rms of error/sigma: 1 for honest sigmas
   ChiSquareBounds usual{};  ///< of `normalised`, that hold 95 %
 };
 
@@ -94,17 +94,17 @@ struct CampaignFinding {
 };
 
 struct CampaignSummary {
-  std::array<std::size_t, 3> outcomes{};         ///< by RunOutcome
-  std::map<std::string, std::size_t> findings;   ///< runs by the codes of their findings
-  std::map<std::string, std::size_t> reasons;    ///< runs that failed, by the reason
-  std::optional<Consistency> nees;               ///< of trustworthy runs
-  std::optional<Consistency> nees_of_all;        ///< of all that did not fail
-  std::optional<Consistency> nis;                ///< of trustworthy runs
-  std::vector<MeasureStatistics> trustworthy;    ///< by measures(): of trustworthy runs
-  std::vector<MeasureStatistics> all;            ///< of all that did not fail
-  std::vector<ParameterErrors> parameters;       ///< of trustworthy runs
-  std::vector<Influence> influences;             ///< strongest first; of all that did not fail
-  std::size_t pairs = 0;                         ///< that were looked at for an influence
+  std::array<std::size_t, 3> outcomes{};        ///< by RunOutcome
+  std::map<std::string, std::size_t> findings;  ///< runs by the codes of their findings
+  std::map<std::string, std::size_t> reasons;   ///< runs that failed, by the reason
+  std::optional<Consistency> nees;              ///< of trustworthy runs
+  std::optional<Consistency> nees_of_all;       ///< of all that did not fail
+  std::optional<Consistency> nis;               ///< of trustworthy runs
+  std::vector<MeasureStatistics> trustworthy;   ///< by measures(): of trustworthy runs
+  std::vector<MeasureStatistics> all;           ///< of all that did not fail
+  std::vector<ParameterErrors> parameters;      ///< of trustworthy runs
+  std::vector<Influence> influences;            ///< strongest first; of all that did not fail
+  std::size_t pairs = 0;                        ///< that were looked at for an influence
   std::vector<WorstRun> worst;
   std::vector<CampaignFinding> campaign_findings;
 

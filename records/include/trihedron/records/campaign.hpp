@@ -26,10 +26,10 @@ struct Distribution {
   Kind kind = Kind::kUniform;
   double a = 0;
   double b = 0;
-  double least = 0;             ///< nothing below is drawn
-  double most = 0;              ///< nothing above is drawn
+  double least = 0;               ///< nothing below is drawn
+  double most = 0;                ///< nothing above is drawn
   std::vector<double> weights{};  ///< of kChoice, one per option, above zero
-  std::size_t options = 0;      ///< of kChoice and kGrid
+  std::size_t options = 0;        ///< of kChoice and kGrid
 
   [[nodiscard]] bool has_options() const { return kind == Kind::kChoice || kind == Kind::kGrid; }
 };
