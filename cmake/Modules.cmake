@@ -19,8 +19,9 @@ set(TRIHEDRON_sim_MAY_USE core records)
 set(TRIHEDRON_io_MAY_USE core records)
 set(TRIHEDRON_ground_MAY_USE core records)
 set(TRIHEDRON_plan_MAY_USE core records sim ground)
-set(TRIHEDRON_report_MAY_USE core records ground)
-set(TRIHEDRON_cli_MAY_USE core records sim io ground plan report)
+set(TRIHEDRON_campaign_MAY_USE core records sim ground)
+set(TRIHEDRON_report_MAY_USE core records ground campaign)
+set(TRIHEDRON_cli_MAY_USE core records sim io ground plan campaign report)
 
 # Within ground, from room to room.
 set(TRIHEDRON_ground_tasks_MAY_USE)

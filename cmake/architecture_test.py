@@ -105,7 +105,7 @@ def assert_acyclic(table):
 
 def test_table_is_read_and_acyclic():
     table = allowed()
-    assert {"core", "records", "sim", "io", "ground", "plan", "report", "cli"} == set(table)
+    assert {"core", "records", "sim", "io", "ground", "plan", "campaign", "report", "cli"} == set(table)
     assert table["core"] == set()
     assert_acyclic(table)
 

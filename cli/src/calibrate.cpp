@@ -174,6 +174,11 @@ std::vector<std::string> estimator_names() {
 
 }  // namespace
 
+void stage_calibration(io::StagedDirectory& staged, const io::NamedPass& pass, const CalibrationRun& run,
+                       ground::CalibrationEvaluation evaluation, const CalibrationOptions& options) {
+  stage_outcome(staged, {}, {pass, run, std::move(evaluation)}, options);
+}
+
 Calibrated calibrate_into(io::StagedDirectory& staged, const std::filesystem::path& out,
                           const std::vector<io::NamedPass>& passes, const CalibrationOptions& options,
                           const Common& common) {

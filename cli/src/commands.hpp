@@ -23,6 +23,7 @@ void add_evaluate(CLI::App& program, const Common& common, int& exit_status);
 void add_observe(CLI::App& program, const Common& common, int& exit_status);
 void add_export(CLI::App& program, const Common& common, int& exit_status);
 void add_import(CLI::App& program, const Common& common, int& exit_status);
+void add_campaign(CLI::App& program, const Common& common, int& exit_status);
 void add_history(CLI::App& program, const Common& common, int& exit_status);
 void add_demo(CLI::App& program, const Common& common, int& exit_status);
 /// schema, man, completion: what the program says of itself.

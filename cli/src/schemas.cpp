@@ -130,10 +130,8 @@ Json navigate_output() {
   return object(
       {{"pass", pass()},
        {"verdict", verdict()},
-       {"readiness", object({{"limit_rad", number()},
-                             {"time_s", number()},
-                             {"is_lower_bound", flag()},
-                             {"need_met?", flag()}})},
+       {"readiness",
+        object({{"limit_rad", number()}, {"time_s", number()}, {"is_lower_bound", flag()}, {"need_met?", flag()}})},
        {"statistics", by_name(number())},
        {"evaluation", evaluation()}});
 }
@@ -234,6 +232,65 @@ Json interchange_output() {
                  {"object_id", text()}});
 }
 
+Json campaign_output() {
+  const Json finding =
+      object({{"code", text()}, {"severity", text()}, {"text", text()}, {"evidence", text()}, {"cure", text()}});
+  Json consistency = object({{"runs", count()},
+                             {"mean", number()},
+                             {"degrees_of_freedom", number()},
+                             {"usual_low", number()},
+                             {"usual_high", number()},
+                             {"limit_low", number()},
+                             {"limit_high", number()},
+                             {"share_of_runs_within_95_percent", number()},
+                             {"sigma_factor", number()}});
+  consistency["type"] = Json::array({"object", "null"});
+  const Json quantile = object({{"share", number()}, {"value", number()}, {"lower", number()}, {"upper", number()}});
+  const Json measures = by_name(object({{"unit", text()}, {"runs", count()}, {"quantiles", array(quantile)}}));
+  const Json parameter = object({{"runs", count()},
+                                 {"rms", number()},
+                                 {"sigma", number()},
+                                 {"normalised_rms", number()},
+                                 {"usual_low", number()},
+                                 {"usual_high", number()}});
+  const Json influence = object({{"key", text()},
+                                 {"measure", text()},
+                                 {"runs", count()},
+                                 {"rank_correlation", number()},
+                                 {"p_value", number()},
+                                 {"significant", flag()}});
+  const Json worst =
+      object({{"run", count()}, {"why", text()}, {"command", text()}, {"measure?", text()}, {"value?", number()}});
+  return object({{"campaign", text()},
+                 {"seed", count()},
+                 {"runs", count()},
+                 {"trustworthy", flag()},
+                 {"outcomes", object({{"trustworthy", count()}, {"do_not_use", count()}, {"failed", count()}})},
+                 {"findings", array(finding)},
+                 {"findings_of_runs", by_name(count())},
+                 {"reasons_of_failures", by_name(count())},
+                 {"nees", consistency},
+                 {"nees_of_all", consistency},
+                 {"nis", consistency},
+                 {"confidence", number()},
+                 {"measures", measures},
+                 {"measures_of_all", measures},
+                 {"parameters", by_name(parameter)},
+                 {"influences", array(influence)},
+                 {"worst", array(worst)}});
+}
+
+Json run_output() {
+  return object({{"run", count()},
+                 {"seed", count()},
+                 {"draws", by_name(text())},
+                 {"outcome", text()},
+                 {"reason", text()},
+                 {"drift_model", text()},
+                 {"findings", array(text())},
+                 {"values", by_name(array(number()))}});
+}
+
 io::Schema output(const std::string& command, const std::string& about, const Json& schema) {
   Json document = {{"$schema", "https://json-schema.org/draft/2020-12/schema"},
                    {"title", "Output of " + command},
@@ -257,6 +314,8 @@ std::vector<io::Schema> all_schemas() {
   schemas.push_back(output("history", "What history prints with --json.", history_output(calibration)));
   schemas.push_back(output("export", "What export prints with --json.", interchange_output()));
   schemas.push_back(output("import", "What import prints with --json.", interchange_output()));
+  schemas.push_back(output("campaign", "What campaign prints with --json.", campaign_output()));
+  schemas.push_back(output("campaign-run", "What campaign --only prints with --json, and run.json.", run_output()));
   return schemas;
 }
 

@@ -6,10 +6,12 @@
 #include <vector>
 
 #include "commands.hpp"
+#include "trihedron/ground/evaluate/calibration_evaluation.hpp"
 #include "trihedron/io/named_pass.hpp"
 #include "trihedron/io/staged_directory.hpp"
 #include "trihedron/records/catalogue.hpp"
 #include "trihedron/records/options.hpp"
+#include "trihedron/records/run.hpp"
 #include "trihedron/records/scenario.hpp"
 #include "trihedron/sim/simulate.hpp"
 
@@ -33,6 +35,10 @@ struct Calibrated {
 [[nodiscard]] Calibrated calibrate_into(io::StagedDirectory& staged, const std::filesystem::path& out,
                                         const std::vector<io::NamedPass>& passes, const CalibrationOptions& options,
                                         const Common& common);
+
+/// Stages the files of a calibration that has been made and evaluated.
+void stage_calibration(io::StagedDirectory& staged, const io::NamedPass& pass, const CalibrationRun& run,
+                       ground::CalibrationEvaluation evaluation, const CalibrationOptions& options);
 
 /// Of a calibration; an empty path is none.
 struct CalibrationFiles {

@@ -97,15 +97,16 @@ def test_schemas_are_schemas(name):
 
 
 def test_every_file_and_output_has_one():
-    assert NAMES == ["pass", "config", "scenario", "calibration", "truth", "inspect-output", "calibrate-output", "navigate-output",
-                     "replay-output", "evaluate-output", "observe-output", "history-output", "export-output", "import-output"]
+    assert NAMES == ["pass", "config", "scenario", "campaign", "calibration", "truth", "inspect-output", "calibrate-output", "navigate-output",
+                     "replay-output", "evaluate-output", "observe-output", "history-output", "export-output", "import-output",
+                     "campaign-output", "campaign-run-output"]
     result = run("schema", "scenari")
     assert result.returncode == WRONG_USAGE and "scenario" in result.stderr
 
 
 @pytest.mark.parametrize("path", sorted((ROOT / "examples").glob("*.toml")), ids=lambda path: path.stem)
 def test_examples_are_scenarios(path):
-    check(toml(path.read_text()), "scenario")
+    check(toml(path.read_text()), "campaign" if path.stem == "campaign" else "scenario")
 
 
 def test_files_that_are_written_have_only_what_is_described(calibrated):

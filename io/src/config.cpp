@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "schemas.hpp"
+#include "settings_tables.hpp"
 #include "text_file.hpp"
 #include "toml_fields.hpp"
 #include "trihedron/io/quantity.hpp"
@@ -148,7 +149,9 @@ Fields correction_fields(CorrectionOptions& corrections) {
 
 Fields file_fields(CalibrationOptions& options, const fs::path& file) {
   return {
-      estimator(options), drift_model(options), need(options),
+      estimator(options),
+      drift_model(options),
+      need(options),
       section("filter", file, "[filter]", "of estimators invariant and batch", [&] { return filter_fields(options); }),
       section("further_states", file, "[further_states]", "of estimators invariant and batch",
               [&] { return further_state_fields(options.further_states); }),
@@ -209,17 +212,24 @@ std::string format_correction_interval(const CorrectionOptions& corrections) {
 
 CalibrationOptions read_config(const fs::path& path) {
   const TextFile file(path);
-  const toml::table document = parse_toml(file.text(), path);
+  return config_of_table(parse_toml(file.text(), path), path, "the file");
+}
+
+CalibrationOptions config_of_table(const toml::table& table, const fs::path& file, const std::string& name) {
   CalibrationOptions options;
-  read_fields(document, path, "the file", file_fields(options, path));
+  read_fields(table, file, name, file_fields(options, file));
   return options;
 }
 
-Json config_schema() {
+Json config_table_schema() {
   CalibrationOptions options;
   const fs::path file;
+  return schema_of(file_fields(options, file));
+}
+
+Json config_schema() {
   return document_schema("Settings", "What --config takes (TOML). What is left out keeps its default.",
-                         schema_of(file_fields(options, file)));
+                         config_table_schema());
 }
 
 std::string format_config(const CalibrationOptions& options) {

@@ -10,6 +10,7 @@
 #include <cmath>
 #include <cstdint>
 #include <limits>
+#include <sstream>
 #include <utility>
 
 #include "hdf5_structure.hpp"
@@ -332,6 +333,49 @@ void NetcdfWriter::write_group(const std::string& group, Time epoch, std::span<c
       check(nc_put_var_int(id, variable, values.data()));
     } else {
       check(nc_put_var_double(id, variable, column.values.data()));
+    }
+  }
+}
+
+void NetcdfWriter::write_variables(std::span<const std::pair<std::string, std::size_t>> dimensions,
+                                   std::span<const ShapedVariable> variables) {
+  for (const auto& [name, length] : dimensions) {
+    int dimension = 0;
+    check(nc_def_dim(id_, name.c_str(), length, &dimension));
+  }
+  for (const ShapedVariable& variable : variables) {
+    check_stop();
+    std::vector<int> ids;
+    for (const std::string& dimension : variable.dimensions) {
+      check(nc_inq_dimid(id_, dimension.c_str(), &ids.emplace_back()));
+    }
+    constexpr std::array<nc_type, 3> kTypes = {NC_DOUBLE, NC_INT64, NC_STRING};
+    int id = 0;
+    check(nc_def_var(id_, variable.name.c_str(), kTypes[variable.values.index()], static_cast<int>(ids.size()),
+                     ids.data(), &id));
+    for (const auto& [name, text] : variable.attributes) {
+      if (name == "flag_values") {
+        std::vector<long long> flags;
+        std::istringstream words(text);
+        for (long long flag = 0; words >> flag; words.ignore()) {
+          flags.push_back(flag);
+        }
+        check(nc_put_att_longlong(id_, id, name.c_str(), NC_INT64, flags.size(), flags.data()));
+      } else {
+        check(nc_put_att_text(id_, id, name.c_str(), text.size(), text.c_str()));
+      }
+    }
+    if (const auto* numbers = std::get_if<std::vector<double>>(&variable.values)) {
+      check(nc_put_var_double(id_, id, numbers->data()));
+    } else if (const auto* whole = std::get_if<std::vector<std::int64_t>>(&variable.values)) {
+      const std::vector<long long> values(whole->begin(), whole->end());
+      check(nc_put_var_longlong(id_, id, values.data()));
+    } else if (const auto* texts = std::get_if<std::vector<std::string>>(&variable.values)) {
+      std::vector<const char*> values;
+      for (const std::string& text : *texts) {
+        values.push_back(text.c_str());
+      }
+      check(nc_put_var_string(id_, id, values.data()));
     }
   }
 }

@@ -2,10 +2,14 @@
 /// NetCDF-4 by groups that hold columns along the dimension `time`. The library below is not thread-safe: one file at a
 /// time.
 
+#include <cstddef>
+#include <cstdint>
 #include <filesystem>
 #include <optional>
 #include <span>
 #include <string>
+#include <utility>
+#include <variant>
 #include <vector>
 
 #include "series.hpp"
@@ -56,6 +60,15 @@ struct PackedColumn : Column {
   double lsb = 0;
 };
 
+/// A variable over named dimensions, the last of which changes first, with its attributes: all texts but flag_values,
+/// which are whole numbers.
+struct ShapedVariable {
+  std::string name;
+  std::vector<std::string> dimensions;
+  std::variant<std::vector<double>, std::vector<std::int64_t>, std::vector<std::string>> values;
+  std::vector<std::pair<std::string, std::string>> attributes;
+};
+
 /// A file being written under a temporary name; it appears at commit(). Everything throws MachineFailed on failure.
 class NetcdfWriter {
  public:
@@ -67,6 +80,9 @@ class NetcdfWriter {
   void write_attribute(const std::string& group, const std::string& name, const std::string& text);
   void write_group(const std::string& group, Time epoch, std::span<const Time> t,
                    std::span<const PackedColumn> columns);
+  /// In the root; `dimensions` by name and length. Values must fill them.
+  void write_variables(std::span<const std::pair<std::string, std::size_t>> dimensions,
+                       std::span<const ShapedVariable> variables);
   void commit();
 
  private:

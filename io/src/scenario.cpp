@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "schemas.hpp"
+#include "settings_tables.hpp"
 #include "text_file.hpp"
 #include "toml_fields.hpp"
 #include "trihedron/core/drift.hpp"
@@ -329,11 +330,14 @@ Fields file_fields(Scenario& scenario, const fs::path& file) {
 
 }  // namespace
 
-Scenario parse_scenario(std::string_view text, const fs::path& file) {
-  const toml::table document = parse_toml(text, file);
+Scenario scenario_of_table(const toml::table& table, const fs::path& file, const std::string& name) {
   Scenario scenario;
-  read_fields(document, file, "the file", file_fields(scenario, file));
+  read_fields(table, file, name, file_fields(scenario, file));
   return scenario;
+}
+
+Scenario parse_scenario(std::string_view text, const fs::path& file) {
+  return scenario_of_table(parse_toml(text, file), file, "the file");
 }
 
 Scenario read_scenario(const fs::path& file) {
@@ -348,13 +352,17 @@ fs::path recorded_attitude_of(const fs::path& scenario_file) {
   return name ? scenario_file.parent_path() / *name : fs::path();
 }
 
-Json scenario_schema() {
+Json scenario_table_schema() {
   Scenario scenario;
   const fs::path file;
+  return schema_of(file_fields(scenario, file));
+}
+
+Json scenario_schema() {
   return document_schema("Scenario",
                          "What a simulated pass is made of (TOML). What is left out keeps its default, which is the "
                          "paper's experiment.",
-                         schema_of(file_fields(scenario, file)));
+                         scenario_table_schema());
 }
 
 }  // namespace trihedron::io

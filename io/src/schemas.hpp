@@ -8,6 +8,7 @@ namespace trihedron::io {
 [[nodiscard]] Json pass_schema();
 [[nodiscard]] Json config_schema();
 [[nodiscard]] Json scenario_schema();
+[[nodiscard]] Json campaign_schema();
 [[nodiscard]] Json calibration_schema();
 [[nodiscard]] Json truth_schema();
 

@@ -8,6 +8,8 @@ namespace trihedron::report::assets {
 extern const std::string_view kDocument;
 extern const std::string_view kPage;
 extern const std::string_view kHistory;
+extern const std::string_view kCampaign;
+extern const std::string_view kCampaignFigures;
 extern const std::string_view kStyle;
 extern const std::string_view kFigures;
 extern const std::string_view kSphere;

@@ -132,6 +132,8 @@ Truth::StarTracker truth_of(const StarTrackerScenario& head) {
 
 }  // namespace
 
+void expect_possible(const Scenario& scenario) { check(scenario); }
+
 SimulatedPass simulate(const Scenario& scenario) {
   check(scenario);
   const double duration_s = to_seconds(scenario.duration);
@@ -148,8 +150,8 @@ SimulatedPass simulate(const Scenario& scenario) {
   const AttitudeProgramme attitude(scenario.attitude, orbit, scenario.seed, -margin_s, duration_s + margin_s);
 
   const Sky sky(scenario.epoch, -margin_s, duration_s + margin_s);
-  const bool is_warmed = std::ranges::any_of(
-      scenario.gyros, [](const GyroScenario& gyro) { return gyro.drift.thermal_fraction != 0; });
+  const bool is_warmed =
+      std::ranges::any_of(scenario.gyros, [](const GyroScenario& gyro) { return gyro.drift.thermal_fraction != 0; });
 
   Rot<In, C> C_in_c = attitude.at(0);
   std::vector<Gyro> gyros;

@@ -99,6 +99,9 @@ inline constexpr Range kSpeed{1e-3, 1e9, "",
 inline constexpr Range kRequiredInterval_s{1, 3.1e7, "s",
                                            "it is the time for which an attitude is to hold, at most a year"};
 inline constexpr Range kFlights{1, 1e6, "", "it is a number of flights"};
+/// A row of a campaign takes a kilobyte of memory when its table is written.
+inline constexpr Range kCampaignRuns{1, 1e6, "", "it is a number of runs"};
+inline constexpr Range kJobs{1, 1024, "", "it is a number of threads"};
 
 }  // namespace limits
 }  // namespace trihedron

@@ -24,4 +24,7 @@ struct SimulatedPass {
 /// that makes no sense, naming the field.
 [[nodiscard]] SimulatedPass simulate(const Scenario& scenario);
 
+/// What simulate() asks of the numbers of a scenario, without its work. Throws as that.
+void expect_possible(const Scenario& scenario);
+
 }  // namespace trihedron::sim

@@ -1,0 +1,45 @@
+#pragma once
+/// The runs of a campaign. A run is a function of its number alone; who performs it, in what order and beside what does
+/// not matter. Whoever collects the records is the only one that writes.
+
+#include <cstdint>
+#include <functional>
+#include <span>
+
+#include "trihedron/ground/evaluate/calibration_evaluation.hpp"
+#include "trihedron/records/campaign.hpp"
+#include "trihedron/records/options.hpp"
+#include "trihedron/records/run.hpp"
+#include "trihedron/sim/simulate.hpp"
+
+namespace trihedron::campaign {
+
+/// The scenario of a run by its seed and draws. Called from several threads. Throws std::invalid_argument for draws
+/// that make no scenario; that run has failed. Whatever else it throws ends the campaign.
+using ScenarioOf = std::function<Scenario(std::uint64_t seed, std::span<const double> draws)>;
+
+/// All of a run: for one that is looked at alone.
+struct Flight {
+  sim::SimulatedPass simulated;
+  CalibrationRun run;
+  ground::CalibrationEvaluation evaluation;
+};
+
+/// Simulates, calibrates, compares with the truth. Throws std::invalid_argument and ground::SetupError.
+[[nodiscard]] Flight fly(const Scenario& scenario, const CalibrationOptions& options, double limit_rad);
+
+/// What is measured of it, and its verdict. Without number, seed, draws and times.
+[[nodiscard]] RunRecord record_of(const Flight& flight, std::size_t gyros);
+
+/// `flown`, which may be null, is given what was flown where the run did not fail. Does not throw for a run that
+/// fails; throws Stopped, std::bad_alloc, and what `scenario_of` throws.
+[[nodiscard]] RunRecord perform(const CampaignPlan& plan, std::uint64_t run, const ScenarioOf& scenario_of,
+                                const CalibrationOptions& options,
+                                const std::function<void(Flight&&)>& flown = nullptr);
+
+/// Performs runs side by side, each on one core, and hands over each record when it is there: one at a time, in no
+/// order. jobs: 1 or more threads. Throws as perform(), and what `collect` throws.
+void perform_all(const CampaignPlan& plan, std::span<const std::uint64_t> runs, const ScenarioOf& scenario_of,
+                 const CalibrationOptions& options, unsigned jobs, const std::function<void(RunRecord&&)>& collect);
+
+}  // namespace trihedron::campaign

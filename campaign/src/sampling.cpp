@@ -1,0 +1,130 @@
+#include "trihedron/campaign/sampling.hpp"
+
+#include <algorithm>
+#include <bit>
+#include <boost/math/distributions/normal.hpp>
+#include <cmath>
+#include <numeric>
+
+#include "trihedron/sim/random.hpp"
+
+namespace trihedron::campaign {
+namespace {
+
+/// FNV-1a.
+std::uint64_t hash_of(std::string_view text) {
+  std::uint64_t hash = 0xcbf29ce484222325;
+  for (const char c : text) {
+    hash = (hash ^ static_cast<unsigned char>(c)) * 0x100000001b3;
+  }
+  return hash;
+}
+
+/// Each part is mixed before the next is added, so that neighbouring seeds and runs give unrelated numbers.
+std::uint64_t mixed(std::uint64_t seed, std::uint64_t run, std::uint64_t what) {
+  std::uint64_t state = seed;
+  state = sim::splitmix64(state) ^ run;
+  state = sim::splitmix64(state) ^ what;
+  return sim::splitmix64(state);
+}
+
+/// Of a number that the distribution takes to the straight line of a standard normal.
+double truncated_normal(double u, double from, double to) {
+  const boost::math::normal standard;
+  // The tail that is nearer to zero keeps its digits.
+  if (from > 0) {
+    return -truncated_normal(1 - u, -to, -from);
+  }
+  const double low = boost::math::cdf(standard, from);
+  const double high = boost::math::cdf(standard, to);
+  const double p = low + u * (high - low);
+  return p > 0 && p < 1 ? std::clamp(boost::math::quantile(standard, p), from, to) : (p > 0 ? to : from);
+}
+
+std::uint64_t grid_points(const CampaignPlan& plan) {
+  std::uint64_t points = 1;
+  for (const CampaignInput& input : plan.inputs) {
+    points *= input.distribution.kind == Distribution::Kind::kGrid ? input.distribution.options : 1;
+  }
+  return points;
+}
+
+}  // namespace
+
+std::uint64_t seed_of_run(const CampaignPlan& plan, std::uint64_t run) {
+  return mixed(plan.seed, run, hash_of("scenario.seed")) >> 1U;
+}
+
+double uniform_of(std::uint64_t seed, std::uint64_t run, std::string_view key) {
+  return (static_cast<double>(mixed(seed, run, hash_of(key)) >> 11U) + 0.5) * 0x1p-53;
+}
+
+double quantile_of(const Distribution& distribution, double u) {
+  const auto& [kind, a, b, least, most, weights, options] = distribution;
+  switch (kind) {
+    case Distribution::Kind::kUniform:
+      return std::clamp(a + u * (b - a), least, most);
+    case Distribution::Kind::kLoguniform:
+      return std::clamp(a * std::pow(b / a, u), least, most);
+    case Distribution::Kind::kNormal:
+      return std::clamp(a + b * truncated_normal(u, (least - a) / b, (most - a) / b), least, most);
+    case Distribution::Kind::kLognormal: {
+      const double sigma = std::log(b);
+      return std::clamp(
+          a * std::exp(sigma * truncated_normal(u, std::log(least / a) / sigma, std::log(most / a) / sigma)), least,
+          most);
+    }
+    case Distribution::Kind::kChoice: {
+      double left = u * std::accumulate(weights.begin(), weights.end(), 0.0);
+      std::size_t i = 0;
+      while (i + 1 < weights.size() && left >= weights[i]) {
+        left -= weights[i++];
+      }
+      return static_cast<double>(i);
+    }
+    case Distribution::Kind::kGrid:
+      break;
+  }
+  return 0;
+}
+
+std::uint64_t permuted(std::uint64_t i, std::uint64_t count, std::uint64_t key) {
+  constexpr unsigned kRounds = 8;
+  const unsigned half = std::max((static_cast<unsigned>(std::bit_width(count - 1)) + 1) / 2, 1U);
+  const std::uint64_t mask = (std::uint64_t{1} << half) - 1;
+  do {
+    std::uint64_t left = i >> half;
+    std::uint64_t right = i & mask;
+    for (unsigned round = 0; round < kRounds; ++round) {
+      const std::uint64_t next = left ^ (mixed(key, round, right) & mask);
+      left = right;
+      right = next;
+    }
+    i = (left << half) | right;
+  } while (i >= count);
+  return i;
+}
+
+std::vector<double> draws_of_run(const CampaignPlan& plan, std::uint64_t run) {
+  std::vector<double> draws;
+  std::uint64_t below = grid_points(plan);
+  std::uint64_t point = run / plan.repeats;
+  for (const CampaignInput& input : plan.inputs) {
+    if (input.distribution.kind == Distribution::Kind::kGrid) {
+      // The last key changes first.
+      below /= input.distribution.options;
+      draws.push_back(static_cast<double>(point / below));
+      point %= below;
+      continue;
+    }
+    double u = uniform_of(plan.seed, run, input.key);
+    if (plan.latin_hypercube) {
+      const std::uint64_t stratum = permuted(run, plan.runs, mixed(plan.seed, 0, hash_of("order of " + input.key)));
+      u = (static_cast<double>(stratum) + u) / static_cast<double>(plan.runs);
+    }
+    draws.push_back(quantile_of(input.distribution, u));
+  }
+  return draws;
+}
+
+}  // namespace trihedron::campaign

@@ -1,0 +1,434 @@
+#include "trihedron/campaign/summary.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <set>
+#include <utility>
+
+#include "trihedron/core/drift.hpp"
+
+namespace trihedron::campaign {
+namespace {
+
+constexpr double kUsual = 0.95;
+constexpr double kLimit = 0.999;
+/// Sigmas too small by more than this are not to be used: an error budget of 3 sigma then is one of 2.5, exceeded five
+/// times as often.
+constexpr double kMostSigmaFactor = 1.2;
+/// Below this the innovations of a few hundred runs differ from χ² by things that nobody would act on.
+constexpr double kNisMatters = 0.02;
+/// A NEES that a consistent run passes once in a million times is taken for an error of its sigmas.
+constexpr double kCertainlyWrong = 1e-6;
+/// Share of such runs among those called trustworthy that is too large, where it is exceeded for certain.
+constexpr double kMostWrong = 0.01;
+constexpr std::size_t kWorstOfEach = 3;
+
+double or_infinite(const RunRecord& record, double value) {
+  return record.outcome != RunOutcome::kFailed && std::isnan(value) ? std::numeric_limits<double>::infinity() : value;
+}
+
+double norm_of(const RunRecord& record, RunQuantity quantity, std::size_t from) {
+  return std::hypot(record.at(quantity, from), record.at(quantity, from + 1), record.at(quantity, from + 2));
+}
+
+double largest_alignment_error(const RunRecord& record) {
+  double largest = std::numeric_limits<double>::quiet_NaN();
+  for (std::size_t i = 0; i + 2 < record[RunQuantity::kAlignmentError].size(); i += 3) {
+    const double error = norm_of(record, RunQuantity::kAlignmentError, i);
+    largest = error <= largest || std::isnan(error) ? largest : error;
+  }
+  return largest;
+}
+
+constexpr std::size_t kLargest = kErrorQuantiles.size() - 1;
+
+constexpr std::array<Measure, 11> kMeasures = {{
+    {"nees", "NEES of the parameters", Measure::Unit::kNone, true,
+     [](const RunRecord& record) { return record.at(RunQuantity::kNees); }},
+    {"alignment_error", "Alignment error, worst gyro", Measure::Unit::kRadian, true, largest_alignment_error},
+    {"attitude_rms", "Attitude of the calibration, rms", Measure::Unit::kRadian, true,
+     [](const RunRecord& record) { return norm_of(record, RunQuantity::kAttitudeRms, 0); }},
+    {"navigation_error", "Navigator, corrected every 90 min, largest error", Measure::Unit::kRadian, true,
+     [](const RunRecord& record) { return record.at(RunQuantity::kNavigationError, kLargest); }},
+    {"corrected_error", "Error right after a correction", Measure::Unit::kRadian, true,
+     [](const RunRecord& record) { return record.at(RunQuantity::kCorrectedError); }},
+    {"open_loop_error", "Open loop of 90 min, largest error", Measure::Unit::kRadian, true,
+     [](const RunRecord& record) { return record.at(RunQuantity::kOpenLoopError); }},
+    {"open_loop_error_to_end", "Open loop to the end of the pass, largest error", Measure::Unit::kRadian, true,
+     [](const RunRecord& record) { return record.at(RunQuantity::kOpenLoopErrorToEnd); }},
+    {"drift_settled", "Drift coefficients settled", Measure::Unit::kSecond, true,
+     [](const RunRecord& record) { return or_infinite(record, record.at(RunQuantity::kDriftSettled)); }},
+    {"alignment_settled", "Alignments settled", Measure::Unit::kSecond, true,
+     [](const RunRecord& record) { return or_infinite(record, record.at(RunQuantity::kAlignmentSettled)); }},
+    {"interval_after", "Correction interval", Measure::Unit::kSecond, false,
+     [](const RunRecord& record) { return record.at(RunQuantity::kIntervalAfter); }},
+    {"extension", "Extension of the correction interval", Measure::Unit::kNone, false,
+     [](const RunRecord& record) { return record.at(RunQuantity::kExtension); }},
+}};
+
+using Records = std::vector<const RunRecord*>;
+
+MeasureStatistics statistics_of(const Measure& measure, const Records& records) {
+  MeasureStatistics result{.measure = &measure, .runs = 0, .quantiles = {}};
+  std::vector<double> values;
+  for (const RunRecord* record : records) {
+    const double value = measure.of(*record);
+    if (!std::isnan(value)) {
+      values.push_back(measure.large_is_bad ? value : -value);
+    }
+  }
+  result.runs = values.size();
+  if (values.empty()) {
+    return result;
+  }
+  std::ranges::sort(values);
+  for (const double p : kReportedQuantiles) {
+    QuantileBounds bounds = quantile_bounds(values, p);
+    if (!measure.large_is_bad) {
+      const auto negative = [](const std::optional<double>& value) {
+        return value ? std::optional(-*value) : std::nullopt;
+      };
+      bounds = {.p = p, .estimate = -bounds.estimate, .lower = negative(bounds.upper), .upper = negative(bounds.lower)};
+    }
+    result.quantiles.push_back(bounds);
+  }
+  return result;
+}
+
+std::optional<Consistency> nees_of(const Records& records) {
+  Consistency result;
+  double sum = 0;
+  double freedom = 0;
+  for (const RunRecord* record : records) {
+    const double nees = record->at(RunQuantity::kNees);
+    const double of_run = record->at(RunQuantity::kNeesFreedom);
+    if (!std::isfinite(nees) || !(of_run > 0)) {
+      continue;
+    }
+    ++result.runs;
+    sum += nees;
+    freedom += of_run;
+    const double share = chi_square_share(nees, of_run);
+    result.within += share >= (1 - kUsual) / 2 && share <= (1 + kUsual) / 2 ? 1 : 0;
+  }
+  if (result.runs == 0) {
+    return std::nullopt;
+  }
+  const auto n = static_cast<double>(result.runs);
+  result.mean = sum / n;
+  result.freedom = freedom / n;
+  result.within /= n;
+  result.usual = chi_square_bounds(freedom, kUsual);
+  result.limit = chi_square_bounds(freedom, kLimit);
+  return result;
+}
+
+/// Per fix.
+std::optional<Consistency> nis_of(const Records& records) {
+  Consistency result;
+  double sum = 0;
+  double freedom = 0;
+  double fixes = 0;
+  for (const RunRecord* record : records) {
+    const double count = record->at(RunQuantity::kNisFixes);
+    const double nis = record->at(RunQuantity::kNisMean);
+    const double of_fix = record->at(RunQuantity::kNisFreedom);
+    if (!std::isfinite(nis) || !(count > 0) || !(of_fix > 0)) {
+      continue;
+    }
+    ++result.runs;
+    sum += nis * count;
+    freedom += of_fix * count;
+    fixes += count;
+    const double share = chi_square_share(nis * count, of_fix * count);
+    result.within += share >= (1 - kUsual) / 2 && share <= (1 + kUsual) / 2 ? 1 : 0;
+  }
+  if (result.runs == 0) {
+    return std::nullopt;
+  }
+  result.mean = sum / fixes;
+  result.freedom = freedom / fixes;
+  result.within /= static_cast<double>(result.runs);
+  result.usual = chi_square_bounds(freedom, kUsual);
+  result.limit = chi_square_bounds(freedom, kLimit);
+  return result;
+}
+
+ParameterErrors parameter_errors(std::string name, bool is_alignment, std::size_t place, const Records& records) {
+  ParameterErrors result;
+  result.name = std::move(name);
+  result.is_alignment = is_alignment;
+  double normalised = 0;
+  for (const RunRecord* record : records) {
+    const double error = record->at(is_alignment ? RunQuantity::kAlignmentError : RunQuantity::kDriftError, place);
+    const double sigma = record->at(is_alignment ? RunQuantity::kAlignmentSigma : RunQuantity::kDriftSigma, place);
+    if (std::isfinite(error) && sigma > 0) {
+      ++result.runs;
+      result.rms += error * error;
+      result.sigma += sigma * sigma;
+      normalised += (error / sigma) * (error / sigma);
+    }
+  }
+  if (result.runs > 0) {
+    const auto n = static_cast<double>(result.runs);
+    result.rms = std::sqrt(result.rms / n);
+    result.sigma = std::sqrt(result.sigma / n);
+    result.normalised = std::sqrt(normalised / n);
+    const ChiSquareBounds of_square = chi_square_bounds(n, kUsual);
+    result.usual = {std::sqrt(of_square.low), std::sqrt(of_square.high)};
+  }
+  return result;
+}
+
+std::vector<ParameterErrors> errors_of_parameters(std::size_t gyros, const Records& records) {
+  std::vector<ParameterErrors> all;
+  for (std::size_t gyro = 0; gyro < gyros; ++gyro) {
+    for (std::size_t k = 0; k < kCampaignCoefficients; ++k) {
+      all.push_back(parameter_errors(fmt::format("gyro{}.{}", gyro + 1, Esg7::kNames[k]), false,
+                                     kCampaignCoefficients * gyro + k, records));
+    }
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      all.push_back(
+          parameter_errors(fmt::format("gyro{}.align_{}", gyro + 1, "xyz"[axis]), true, 3 * gyro + axis, records));
+    }
+  }
+  return all;
+}
+
+/// Words have no order; of two words the correlation is that of belonging to the second.
+bool has_order(const CampaignInput& input) { return input.is_number() || input.distribution.options == 2; }
+
+void find_influences(const CampaignPlan& plan, const Records& records, CampaignSummary& summary) {
+  for (std::size_t i = 0; i < plan.inputs.size(); ++i) {
+    if (!has_order(plan.inputs[i])) {
+      continue;
+    }
+    std::vector<double> drawn;
+    for (const RunRecord* record : records) {
+      drawn.push_back(plan.inputs[i].shown(record->draws[i]));
+    }
+    for (const Measure& measure : kMeasures) {
+      std::vector<double> values;
+      for (const RunRecord* record : records) {
+        values.push_back(measure.of(*record));
+      }
+      if (const auto correlation = rank_correlation(drawn, values)) {
+        ++summary.pairs;
+        summary.influences.push_back({i, &measure, *correlation, false});
+      }
+    }
+  }
+  for (Influence& influence : summary.influences) {
+    // Bonferroni: some are significant by chance where many are looked at.
+    influence.is_significant = influence.correlation.p_value < (1 - kUsual) / static_cast<double>(summary.pairs);
+  }
+  std::ranges::stable_sort(summary.influences, std::ranges::greater{},
+                           [](const Influence& influence) { return std::abs(influence.correlation.rho); });
+}
+
+void find_worst(std::span<const RunRecord> records, const Records& finished, CampaignSummary& summary) {
+  std::size_t failed = 0;
+  for (const RunRecord& record : records) {
+    if (record.outcome == RunOutcome::kFailed && failed++ < kWorstOfEach) {
+      summary.worst.push_back({record.run, "failed: " + record.reason, nullptr, 0});
+    }
+  }
+  for (const std::string_view key : {"nees", "open_loop_error", "alignment_error", "navigation_error"}) {
+    const Measure& measure = *std::ranges::find(kMeasures, key, &Measure::key);
+    Records sorted;
+    std::ranges::copy_if(finished, std::back_inserter(sorted),
+                         [&](const RunRecord* record) { return std::isfinite(measure.of(*record)); });
+    std::ranges::stable_sort(sorted, std::ranges::greater{},
+                             [&](const RunRecord* record) { return measure.of(*record); });
+    for (std::size_t i = 0; i < std::min(kWorstOfEach, sorted.size()); ++i) {
+      summary.worst.push_back({sorted[i]->run, std::string(measure.label), &measure, measure.of(*sorted[i])});
+    }
+  }
+}
+
+std::string listed(const std::vector<std::uint64_t>& runs) {
+  constexpr std::size_t kShown = 8;
+  std::string text;
+  for (std::size_t i = 0; i < std::min(kShown, runs.size()); ++i) {
+    text += fmt::format("{}{}", i == 0 ? "" : ", ", runs[i]);
+  }
+  return runs.size() > kShown ? text + ", …" : text;
+}
+
+void judge_failures(std::span<const RunRecord> records, CampaignSummary& summary) {
+  std::vector<std::uint64_t> failed;
+  for (const RunRecord& record : records) {
+    if (record.outcome == RunOutcome::kFailed) {
+      failed.push_back(record.run);
+    }
+  }
+  if (failed.empty()) {
+    return;
+  }
+  const auto reason = std::ranges::max_element(summary.reasons, {}, [](const auto& row) { return row.second; });
+  summary.campaign_findings.push_back(
+      {"runs-failed", fmt::format("{} of {} runs failed, and are in no statistic.", failed.size(), records.size()),
+       fmt::format("runs {}; most often: {}", listed(failed), reason->first),
+       "Look at one with --only. If such flights cannot be, narrow the distributions; if they can, the statistics are "
+       "too "
+       "good.",
+       FindingSeverity::kDoNotUse});
+}
+
+void judge_verdicts(const Records& trustworthy, std::size_t finished, CampaignSummary& summary) {
+  const std::size_t refused = finished - trustworthy.size();
+  if (refused == 0) {
+    return;
+  }
+  std::string most_often;
+  std::size_t most = 0;
+  for (const auto& [code, count] : summary.findings) {
+    const FindingCode known = finding_code_named(code);
+    if (count > most && row_of(known).severity == FindingSeverity::kDoNotUse) {
+      most = count;
+      most_often = fmt::format("; most often {}, in {} runs", code, count);
+    }
+  }
+  summary.campaign_findings.push_back(
+      {"runs-not-trustworthy", fmt::format("{} of {} calibrations say of themselves: do not use.", refused, finished),
+       fmt::format("{:.1f} % of the runs{}", 100.0 * static_cast<double>(refused) / static_cast<double>(finished),
+                   most_often),
+       "Plan for so many passes without a calibration, or for better ones: observe --advise finds slews.",
+       trustworthy.empty() ? FindingSeverity::kDoNotUse : FindingSeverity::kWarning});
+}
+
+void judge_nees(const Records& trustworthy, CampaignSummary& summary) {
+  if (!summary.nees) {
+    return;
+  }
+  const Consistency& nees = *summary.nees;
+  const double ratio = nees.mean / nees.freedom;
+  const std::string evidence =
+      fmt::format("mean {:.1f} of {:.0f} over {} runs; a consistent estimator lies within {:.1f} … {:.1f} in 99.9 %",
+                  nees.mean, nees.freedom, nees.runs, nees.limit.low * nees.freedom, nees.limit.high * nees.freedom);
+  if (ratio > nees.limit.high) {
+    const bool matters = nees.sigma_factor() > kMostSigmaFactor;
+    summary.campaign_findings.push_back(
+        {"nees-above-bounds",
+         fmt::format("The sigmas of the parameters are too small, by a factor of {:.2f}.", nees.sigma_factor()),
+         evidence,
+         "Look at the worst runs and at what matters most: something in these scenarios is not in the estimator's "
+         "model.",
+         matters ? FindingSeverity::kDoNotUse : FindingSeverity::kWarning});
+  } else if (ratio < nees.limit.low) {
+    summary.campaign_findings.push_back(
+        {"nees-below-bounds",
+         fmt::format("The sigmas of the parameters are larger than the errors, by a factor of {:.2f}.",
+                     1 / nees.sigma_factor()),
+         evidence, "Nothing is unsafe. If accuracy is wanted, compare the prior sigmas with what the scenarios draw.",
+         FindingSeverity::kNote});
+  }
+  std::vector<std::uint64_t> wrong;
+  for (const RunRecord* record : trustworthy) {
+    const double of_run = record->at(RunQuantity::kNeesFreedom);
+    const double value = record->at(RunQuantity::kNees);
+    if (of_run > 0 && !(value <= chi_square_quantile(1 - kCertainlyWrong, of_run))) {
+      wrong.push_back(record->run);
+    }
+  }
+  if (!wrong.empty()) {
+    const double share = static_cast<double>(wrong.size()) / static_cast<double>(trustworthy.size());
+    summary.campaign_findings.push_back(
+        {"trusted-but-wrong",
+         fmt::format("{} run{} called trustworthy {} errors that {} sigmas rule out.", wrong.size(),
+                     wrong.size() == 1 ? "" : "s", wrong.size() == 1 ? "has" : "have",
+                     wrong.size() == 1 ? "its" : "their"),
+         fmt::format("{:.2g} % of the trustworthy runs have a NEES that chance passes once in a million: runs {}",
+                     100 * share, listed(wrong)),
+         "Look at them with --only: their verdict missed something.",
+         is_share_above(wrong.size(), trustworthy.size(), kMostWrong) ? FindingSeverity::kDoNotUse
+                                                                      : FindingSeverity::kWarning});
+  }
+}
+
+void judge_nis(CampaignSummary& summary) {
+  if (!summary.nis) {
+    return;
+  }
+  const Consistency& nis = *summary.nis;
+  const double ratio = nis.mean / nis.freedom;
+  if ((ratio > nis.limit.high || ratio < nis.limit.low) && std::abs(nis.sigma_factor() - 1) > kNisMatters) {
+    summary.campaign_findings.push_back(
+        {"nis-out-of-bounds",
+         fmt::format("The innovations are {} than the noise that the estimator goes by, by a factor of {:.3f}.",
+                     ratio > 1 ? "larger" : "smaller", nis.sigma_factor()),
+         fmt::format("mean {:.3f} of {:.2f}; a consistent estimator lies within {:.3f} … {:.3f} in 99.9 %", nis.mean,
+                     nis.freedom, nis.limit.low * nis.freedom, nis.limit.high * nis.freedom),
+         "Compare the noise in the scenarios with that in the settings; noise = \"found\" looks for it.",
+         FindingSeverity::kWarning});
+  }
+}
+
+void judge_number(const Records& trustworthy, CampaignSummary& summary) {
+  const double highest = kReportedQuantiles.back();
+  const std::size_t needed = runs_needed(highest);
+  if (trustworthy.empty() || trustworthy.size() >= needed) {
+    return;
+  }
+  summary.campaign_findings.push_back(
+      {"too-few-runs",
+       fmt::format("{} trustworthy runs do not support the quantile of {:.1f} %.", trustworthy.size(), 100 * highest),
+       fmt::format(
+           "at {:.0f} % confidence their largest value bounds the quantile of {:.1f} %; for {:.1f} % it takes {} "
+           "runs",
+           100 * kConfidence, std::floor(1000 * quantile_supported(trustworthy.size())) / 10, 100 * highest, needed),
+       fmt::format("For the quantile of {:.1f} % let {} runs be trustworthy.", 100 * highest, needed),
+       FindingSeverity::kNote});
+}
+
+}  // namespace
+
+std::span<const Measure> measures() { return kMeasures; }
+
+double Consistency::sigma_factor() const { return std::sqrt(mean / freedom); }
+
+bool CampaignSummary::trustworthy_campaign() const {
+  return std::ranges::find(campaign_findings, FindingSeverity::kDoNotUse, &CampaignFinding::severity) ==
+         campaign_findings.end();
+}
+
+CampaignSummary summarise(const CampaignPlan& plan, std::span<const RunRecord> records) {
+  CampaignSummary summary;
+  Records finished;
+  Records trustworthy;
+  for (const RunRecord& record : records) {
+    ++summary.outcomes[static_cast<std::size_t>(record.outcome)];
+    if (record.outcome == RunOutcome::kFailed) {
+      ++summary.reasons[record.reason];
+      continue;
+    }
+    finished.push_back(&record);
+    if (record.outcome == RunOutcome::kTrustworthy) {
+      trustworthy.push_back(&record);
+    }
+    for (const std::string& code : std::set<std::string>(record.findings.begin(), record.findings.end())) {
+      ++summary.findings[code];
+    }
+  }
+  summary.nees = nees_of(trustworthy);
+  summary.nees_of_all = nees_of(finished);
+  summary.nis = nis_of(trustworthy);
+  for (const Measure& measure : kMeasures) {
+    summary.trustworthy.push_back(statistics_of(measure, trustworthy));
+    summary.all.push_back(statistics_of(measure, finished));
+  }
+  summary.parameters = errors_of_parameters(plan.gyros, trustworthy);
+  find_influences(plan, finished, summary);
+  find_worst(records, finished, summary);
+  judge_failures(records, summary);
+  judge_verdicts(trustworthy, finished.size(), summary);
+  judge_nees(trustworthy, summary);
+  judge_nis(summary);
+  judge_number(trustworthy, summary);
+  return summary;
+}
+
+}  // namespace trihedron::campaign

@@ -1,0 +1,148 @@
+#include "trihedron/campaign/perform.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <new>
+#include <stdexcept>
+#include <vector>
+
+#include "trihedron/records/stop.hpp"
+
+namespace trihedron::campaign {
+namespace {
+
+CampaignPlan six_runs() {
+  CampaignPlan plan;
+  plan.seed = 2;
+  plan.runs = 6;
+  CampaignInput input;
+  input.key = "gyro.readout.noise";
+  input.distribution = {.a = 1, .b = 4, .least = 1, .most = 4};
+  input.unit = "arcsec";
+  plan.inputs = {input};
+  return plan;
+}
+
+Scenario short_scenario(std::uint64_t seed, std::span<const double> draws) {
+  Scenario scenario;
+  scenario.seed = seed;
+  scenario.duration = std::chrono::minutes(5);
+  for (GyroScenario& gyro : scenario.gyros) {
+    gyro.readout.noise_rad = draws[0] * kArcsecond;
+  }
+  return scenario;
+}
+
+CalibrationOptions told() {
+  CalibrationOptions options;
+  options.drift_model = kEsg7;
+  options.find_noise = false;
+  options.further_states = FurtherStateOptions::none();
+  return options;
+}
+
+/// In the order of their numbers.
+std::vector<RunRecord> performed(const CampaignPlan& plan, unsigned jobs, const ScenarioOf& scenario_of) {
+  std::vector<std::uint64_t> numbers;
+  for (std::uint64_t run = 0; run < plan.runs; ++run) {
+    numbers.push_back(run);
+  }
+  std::vector<RunRecord> records;
+  perform_all(plan, numbers, scenario_of, told(), jobs,
+              [&](RunRecord&& record) { records.push_back(std::move(record)); });
+  std::ranges::sort(records, {}, &RunRecord::run);
+  return records;
+}
+
+void expect_same(const RunRecord& a, const RunRecord& b) {
+  EXPECT_EQ(a.run, b.run);
+  EXPECT_EQ(a.seed, b.seed);
+  EXPECT_EQ(a.draws, b.draws);
+  EXPECT_EQ(a.outcome, b.outcome);
+  EXPECT_EQ(a.findings, b.findings);
+  for (const RunQuantityRow& row : kRunQuantityRows) {
+    ASSERT_EQ(a[row.quantity].size(), b[row.quantity].size()) << row.name;
+    for (std::size_t i = 0; i < a[row.quantity].size(); ++i) {
+      const double x = a.at(row.quantity, i);
+      const double y = b.at(row.quantity, i);
+      EXPECT_TRUE(x == y || (std::isnan(x) && std::isnan(y))) << row.name << ' ' << x << ' ' << y;
+    }
+  }
+}
+
+TEST(Campaign, GivesTheSameBitsOnAnyNumberOfThreadsAndForARunAlone) {
+  const CampaignPlan plan = six_runs();
+  const std::vector<RunRecord> one = performed(plan, 1, short_scenario);
+  const std::vector<RunRecord> three = performed(plan, 3, short_scenario);
+  ASSERT_EQ(one.size(), 6U);
+  ASSERT_EQ(three.size(), 6U);
+  for (std::size_t i = 0; i < one.size(); ++i) {
+    expect_same(one[i], three[i]);
+  }
+  expect_same(one[4], perform(plan, 4, short_scenario, told()));
+  EXPECT_NE(one[4].at(RunQuantity::kNees), one[5].at(RunQuantity::kNees));
+}
+
+TEST(Campaign, MeasuresARunAgainstItsTruth) {
+  const CampaignPlan plan = six_runs();
+  const RunRecord record = perform(plan, 0, short_scenario, told());
+  EXPECT_EQ(record.at(RunQuantity::kNeesFreedom), 20);
+  EXPECT_GT(record.at(RunQuantity::kNees), 0);
+  EXPECT_EQ(record[RunQuantity::kAlignmentError].size(), 6U);
+  EXPECT_EQ(record[RunQuantity::kDriftSigma].size(), 14U);
+  EXPECT_GT(record.at(RunQuantity::kAttitudeRms), 0);
+  EXPECT_GT(record.cpu_s, 0);
+  // Five minutes have one correction, and an open loop counts from the second on.
+  EXPECT_TRUE(std::isnan(record.at(RunQuantity::kOpenLoopError)));
+}
+
+TEST(Campaign, MakesARowWithItsReasonOfARunThatFails) {
+  const auto fails = [](std::uint64_t seed, std::span<const double> draws) {
+    Scenario scenario = short_scenario(seed, draws);
+    if (draws[0] > 2) {
+      scenario.star_tracker.dropout_probability = 1;
+    }
+    return scenario;
+  };
+  const std::vector<RunRecord> records = performed(six_runs(), 2, fails);
+  ASSERT_EQ(records.size(), 6U);
+  for (const RunRecord& record : records) {
+    EXPECT_EQ(record.outcome == RunOutcome::kFailed, record.draws[0] > 2);
+    if (record.outcome == RunOutcome::kFailed) {
+      EXPECT_THAT(record.reason, testing::HasSubstr("no fix"));
+      EXPECT_TRUE(std::isnan(record.at(RunQuantity::kNees)));
+      EXPECT_EQ(record[RunQuantity::kDriftSigma].size(), 14U);
+    }
+  }
+  const auto impossible = [](std::uint64_t /*seed*/, std::span<const double> /*draws*/) -> Scenario {
+    throw std::invalid_argument("no such scenario");
+  };
+  EXPECT_EQ(perform(six_runs(), 0, impossible, told()).reason, "no such scenario");
+}
+
+TEST(Campaign, EndsByAMachineThatFailsAndByAStop) {
+  const auto exhausted = [](std::uint64_t /*seed*/, std::span<const double> /*draws*/) -> Scenario {
+    throw std::bad_alloc();
+  };
+  EXPECT_THROW(performed(six_runs(), 2, exhausted), std::bad_alloc);
+  StopRequest request;
+  const StopScope scope(&request);
+  std::vector<std::uint64_t> numbers = {0, 1, 2, 3, 4, 5};
+  std::size_t collected = 0;
+  EXPECT_THROW(perform_all(six_runs(), numbers, short_scenario, told(), 1,
+                           [&](RunRecord&& record) {
+                             EXPECT_LT(record.run, 2U);
+                             if (++collected == 2) {
+                               request.make();
+                             }
+                           }),
+               Stopped);
+  EXPECT_EQ(collected, 2U);
+}
+
+}  // namespace
+}  // namespace trihedron::campaign

@@ -1,0 +1,237 @@
+#include "trihedron/campaign/summary.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+#include <numeric>
+#include <string>
+#include <vector>
+
+#include "trihedron/campaign/statistics.hpp"
+
+namespace trihedron::campaign {
+namespace {
+
+std::vector<double> one_to(int n) {
+  std::vector<double> values(static_cast<std::size_t>(n));
+  std::iota(values.begin(), values.end(), 1.0);
+  return values;
+}
+
+TEST(OrderStatistics, NeedAsManyRunsAsTheClosedFormSays) {
+  EXPECT_EQ(runs_needed(0.997, 0.9), 767U);  // 1 − 0.997^766 = 0.8999, 1 − 0.997^767 = 0.9002
+  EXPECT_EQ(runs_needed(0.95, 0.95), 59U);   // Wilks 1941
+  EXPECT_EQ(runs_needed(0.9, 0.9), 22U);
+  EXPECT_NEAR(std::pow(quantile_supported(767), 767), 0.1, 1e-12);  // rounding
+}
+
+TEST(OrderStatistics, BoundAQuantileByTheLargestValueFromThatNumberOn) {
+  EXPECT_EQ(quantile_bounds(one_to(59), 0.95, 0.95).upper, 59);
+  EXPECT_FALSE(quantile_bounds(one_to(58), 0.95, 0.95).upper.has_value());
+  EXPECT_EQ(quantile_bounds(one_to(93), 0.95, 0.95).upper, 92);  // Wilks' second order
+  EXPECT_EQ(quantile_bounds(one_to(92), 0.95, 0.95).upper, 92);
+}
+
+TEST(OrderStatistics, OfAMedianAreThoseOfTheSignTest) {
+  // n = 10: P(Bin(10, 1/2) ≤ 6) = 848/1024 < 0.9 ≤ P(≤ 7) = 968/1024: ranks 8 and, by symmetry, 3.
+  const QuantileBounds bounds = quantile_bounds(one_to(10), 0.5);
+  EXPECT_EQ(bounds.estimate, 5);
+  EXPECT_EQ(bounds.upper, 8);
+  EXPECT_EQ(bounds.lower, 3);
+}
+
+TEST(OrderStatistics, OfASingleValueBoundNothing) {
+  const QuantileBounds bounds = quantile_bounds(one_to(1), 0.5);
+  EXPECT_EQ(bounds.estimate, 1);
+  EXPECT_FALSE(bounds.upper.has_value());
+  EXPECT_FALSE(bounds.lower.has_value());
+}
+
+TEST(RankCorrelation, IsOneForWhatGrowsTogetherWhateverItsScale) {
+  const std::vector<double> x = {1, 2, 3, 4, 5};
+  const std::vector<double> y = {1, 10, 100, 1000, std::numeric_limits<double>::infinity()};
+  ASSERT_TRUE(rank_correlation(x, y).has_value());
+  EXPECT_EQ(rank_correlation(x, y)->rho, 1);
+  EXPECT_EQ(rank_correlation(x, y)->p_value, 0);
+}
+
+TEST(RankCorrelation, HasTheValueOfTheTextbookAndMeanRanksForTies) {
+  // Ranks of y: 1, 3, 2, 5, 4: rho = 1 − 6·(0 + 1 + 1 + 1 + 1)/(5·24) = 0.8; t = 0.8 √(3/0.36) = 2.3094, two-sided p
+  // 0.1041.
+  const std::vector<double> x = {10, 20, 30, 40, 50};
+  const std::vector<double> y = {1, 6, 2, 9, 8};
+  const auto correlation = rank_correlation(x, y);
+  ASSERT_TRUE(correlation.has_value());
+  EXPECT_NEAR(correlation->rho, 0.8, 1e-12);
+  EXPECT_NEAR(correlation->p_value, 0.10409, 1e-5);
+  // Ranks 1.5, 1.5, 3, 4 against 1, 2, 3, 4: 4.5/√(4.5·5).
+  EXPECT_NEAR(rank_correlation(std::vector<double>{7, 7, 8, 9}, std::vector<double>{1, 2, 3, 4})->rho,
+              4.5 / std::sqrt(4.5 * 5), 1e-12);
+}
+
+TEST(RankCorrelation, IsNoneForFewPairsOrWhatDoesNotChange) {
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_FALSE(rank_correlation(std::vector<double>{1, 2, 3}, std::vector<double>{1, 2, 3}).has_value());
+  EXPECT_FALSE(rank_correlation(std::vector<double>{1, 2, 3, nan}, std::vector<double>{1, 2, 3, 4}).has_value());
+  EXPECT_FALSE(rank_correlation(std::vector<double>{5, 5, 5, 5}, std::vector<double>{1, 2, 3, 4}).has_value());
+}
+
+TEST(ChiSquareBounds, AreThoseOfTheTable) {
+  const ChiSquareBounds bounds = chi_square_bounds(10, 0.95);  // 3.247 and 20.483
+  EXPECT_NEAR(bounds.low * 10, 3.247, 5e-4);
+  EXPECT_NEAR(bounds.high * 10, 20.483, 5e-4);
+}
+
+/// A run with honest sigmas and a NEES of its degrees of freedom.
+RunRecord run_of(std::uint64_t number, double nees = 20) {
+  RunRecord record;
+  record.run = number;
+  record.outcome = RunOutcome::kTrustworthy;
+  record.draws = {static_cast<double>(number)};
+  for (const RunQuantityRow& row : kRunQuantityRows) {
+    record[row.quantity].assign(size_of(row.shape, 2), 1);
+  }
+  record[RunQuantity::kNees] = {nees};
+  record[RunQuantity::kNeesFreedom] = {20};
+  record[RunQuantity::kNisMean] = {4};
+  record[RunQuantity::kNisFreedom] = {4};
+  record[RunQuantity::kNisFixes] = {10000};
+  record[RunQuantity::kOpenLoopError] = {1e-4 + 1e-6 * static_cast<double>(number)};
+  return record;
+}
+
+CampaignPlan plan_of(std::size_t runs) {
+  CampaignPlan plan;
+  plan.runs = runs;
+  CampaignInput input;
+  input.key = "gyro.readout.noise";
+  plan.inputs = {input};
+  return plan;
+}
+
+std::vector<RunRecord> runs_of(std::size_t count, double nees = 20) {
+  std::vector<RunRecord> records;
+  for (std::size_t i = 0; i < count; ++i) {
+    records.push_back(run_of(i, nees));
+  }
+  return records;
+}
+
+std::vector<std::string> codes_of(const CampaignSummary& summary) {
+  std::vector<std::string> codes;
+  for (const CampaignFinding& finding : summary.campaign_findings) {
+    codes.push_back(finding.code);
+  }
+  return codes;
+}
+
+TEST(CampaignSummary, OfConsistentRunsIsTrustworthy) {
+  const CampaignSummary summary = summarise(plan_of(800), runs_of(800));
+  EXPECT_TRUE(summary.trustworthy_campaign());
+  EXPECT_THAT(codes_of(summary), testing::IsEmpty());
+  EXPECT_EQ(summary.nees->mean, 20);
+  EXPECT_NEAR(summary.nees->sigma_factor(), 1, 1e-15);
+}
+
+TEST(CampaignSummary, SaysHowManyRunsTheHighestQuantileTakes) {
+  const CampaignSummary summary = summarise(plan_of(100), runs_of(100));
+  EXPECT_THAT(codes_of(summary), testing::ElementsAre("too-few-runs"));
+  EXPECT_THAT(summary.campaign_findings.front().evidence, testing::HasSubstr("767"));
+  EXPECT_TRUE(summary.trustworthy_campaign());
+}
+
+TEST(CampaignSummary, OfSigmasThatAreTooSmallIsNotToBeUsed) {
+  const CampaignSummary slightly = summarise(plan_of(800), runs_of(800, 22));
+  EXPECT_THAT(codes_of(slightly), testing::ElementsAre("nees-above-bounds"));
+  EXPECT_TRUE(slightly.trustworthy_campaign());
+  const CampaignSummary badly = summarise(plan_of(800), runs_of(800, 30));
+  EXPECT_FALSE(badly.trustworthy_campaign());
+  const CampaignSummary cautious = summarise(plan_of(800), runs_of(800, 15));
+  EXPECT_THAT(codes_of(cautious), testing::ElementsAre("nees-below-bounds"));
+  EXPECT_TRUE(cautious.trustworthy_campaign());
+}
+
+TEST(CampaignSummary, NamesRunsThatAreTrustedButWrong) {
+  std::vector<RunRecord> records = runs_of(800);
+  records[17][RunQuantity::kNees] = {100};  // χ² of 20 passes 68 once in a million
+  const CampaignSummary summary = summarise(plan_of(800), records);
+  EXPECT_THAT(codes_of(summary), testing::ElementsAre("trusted-but-wrong"));
+  EXPECT_THAT(summary.campaign_findings.front().evidence, testing::HasSubstr("runs 17"));
+  EXPECT_EQ(summary.worst.front().run, 17U);
+}
+
+TEST(CampaignSummary, WithManyRunsThatAreTrustedButWrongIsNotToBeUsed) {
+  // Of 100, one percent is exceeded with 90 % confidence by three: P(3 or more of Bin(100, 0.01)) = 0.079, P(2 or more)
+  // = 0.26.
+  EXPECT_FALSE(is_share_above(2, 100, 0.01));
+  EXPECT_TRUE(is_share_above(3, 100, 0.01));
+  EXPECT_FALSE(is_share_above(0, 100, 0.01));
+  std::vector<RunRecord> records = runs_of(100, 19);
+  for (std::size_t i = 0; i < 3; ++i) {
+    records[i][RunQuantity::kNees] = {75};
+  }
+  EXPECT_FALSE(summarise(plan_of(100), records).trustworthy_campaign());
+}
+
+TEST(CampaignSummary, OfRunsThatFailedIsNotToBeUsed) {
+  std::vector<RunRecord> records = runs_of(800);
+  records[3].outcome = RunOutcome::kFailed;
+  records[3].reason = "no fix";
+  const CampaignSummary summary = summarise(plan_of(800), records);
+  EXPECT_FALSE(summary.trustworthy_campaign());
+  EXPECT_THAT(codes_of(summary), testing::ElementsAre("runs-failed"));
+  EXPECT_EQ(summary.reasons.at("no fix"), 1U);
+  EXPECT_EQ(summary.nees->runs, 799U);
+  EXPECT_EQ(summary.worst.front().run, 3U);
+}
+
+TEST(CampaignSummary, WithoutATrustworthyRunIsNotToBeUsed) {
+  std::vector<RunRecord> records = runs_of(10);
+  for (RunRecord& record : records) {
+    record.outcome = RunOutcome::kDoNotUse;
+  }
+  const CampaignSummary summary = summarise(plan_of(10), records);
+  EXPECT_FALSE(summary.trustworthy_campaign());
+  EXPECT_FALSE(summary.nees.has_value());
+  EXPECT_EQ(summary.nees_of_all->runs, 10U);
+}
+
+TEST(CampaignSummary, FindsWhatMatters) {
+  const CampaignSummary summary = summarise(plan_of(100), runs_of(100));
+  ASSERT_FALSE(summary.influences.empty());
+  EXPECT_EQ(summary.influences.front().measure->key, "open_loop_error");
+  EXPECT_EQ(summary.influences.front().correlation.rho, 1);
+  EXPECT_TRUE(summary.influences.front().is_significant);
+}
+
+TEST(CampaignSummary, CountsWhatHasNotSettledAsLaterThanAll) {
+  std::vector<RunRecord> records = runs_of(100);
+  for (std::size_t i = 0; i < 20; ++i) {
+    records[i][RunQuantity::kDriftSettled] = {std::numeric_limits<double>::quiet_NaN()};
+  }
+  const CampaignSummary summary = summarise(plan_of(100), records);
+  for (const MeasureStatistics& its : summary.all) {
+    if (its.measure->key == "drift_settled") {
+      EXPECT_EQ(its.runs, 100U);
+      EXPECT_EQ(its.quantiles[0].estimate, 1);
+      EXPECT_TRUE(std::isinf(its.quantiles[1].estimate));
+    }
+  }
+}
+
+TEST(CampaignSummary, CountsTheQuantilesOfAnExtensionFromAbove) {
+  std::vector<RunRecord> records = runs_of(100);
+  for (std::size_t i = 0; i < 100; ++i) {
+    records[i][RunQuantity::kExtension] = {static_cast<double>(i + 1)};
+  }
+  const CampaignSummary summary = summarise(plan_of(100), records);
+  const QuantileBounds& ninety = summary.all.back().quantiles[1];
+  EXPECT_EQ(ninety.estimate, 11);  // 90 of 100 reach it
+  EXPECT_LT(*ninety.lower, 11);
+  EXPECT_GT(*ninety.upper, 11);
+}
+
+}  // namespace
+}  // namespace trihedron::campaign

@@ -1,0 +1,266 @@
+"""`campaign`: what is refused before the work, runs that can be repeated alone, kills and stops. Run by CTest with TRIHEDRON_BUILD naming the
+build directory."""
+import json
+import os
+import signal
+import subprocess
+import time
+
+import pytest
+import xarray
+
+from program import DO_NOT_USE, INPUT_REFUSED, PROGRAM, ROOT, TRUSTWORTHY, WRONG_USAGE, refused, run
+
+# Twelve runs of five minutes with nothing left to decide: a hundredth of a second each.
+CAMPAIGN = """
+[campaign]
+name = "Test"
+repeats = 2
+seed = 5
+[base.scenario]
+duration = "5min"
+[calibration]
+drift_model = "esg7"
+[calibration.filter]
+noise = "told"
+[calibration.further_states]
+clock_offset = "off"
+orbital_error = "off"
+readout_bias = "off"
+coefficient_change = "off"
+wandering_drift = "off"
+[vary]
+gyro.readout.noise = {grid = ["1arcsec", "2arcsec", "4arcsec"]}
+star_tracker.dropout_probability = {grid = [0, 0.1]}
+attitude.reference = {choice = ["orbital", "yaw-steered"]}
+gyro.misalignment_magnitude = {normal = ["20arcmin", "5arcmin"], min = "1arcmin"}
+"""
+
+
+@pytest.fixture(scope="module")
+def finished(tmp_path_factory):
+    directory = tmp_path_factory.mktemp("campaign")
+    (directory / "c.toml").write_text(CAMPAIGN)
+    result = run("campaign", directory / "c.toml", "-o", directory / "out", "--jobs", "1")
+    assert result.returncode in (TRUSTWORTHY, DO_NOT_USE), result.stderr
+    assert not result.stderr
+    assert "Test: 12 runs" in result.stdout
+    return directory
+
+
+def table(out):
+    return (out / "runs.nc").read_bytes()
+
+
+def records(out):
+    return (out / "runs.journal").read_text().count("\n") - 1
+
+
+def until(journal, count, process):
+    """The journal has so many runs."""
+    for _ in range(4000):
+        if journal.exists() and journal.read_text().count("\n") > count:
+            return
+        assert process.poll() is None
+        time.sleep(0.005)
+    pytest.fail("no run came to its end")
+
+
+def test_the_table_is_the_same_on_any_number_of_threads(finished):
+    result = run("--quiet", "campaign", finished / "c.toml", "-o", finished / "two", "--jobs", "2")
+    assert result.returncode in (TRUSTWORTHY, DO_NOT_USE)
+    assert table(finished / "two") == table(finished / "out")
+
+
+def test_the_table_is_read_by_xarray(finished):
+    with xarray.open_dataset(finished / "out" / "runs.nc") as runs:
+        assert dict(runs.sizes) == {"run": 12, "gyro": 2, "axis": 3, "coefficient": 7, "quantile": 4}
+        assert list(runs.run) == list(range(12))
+        assert list(runs.coefficient.values[:2]) == ["k0", "mu12"]
+        assert (runs.nees_degrees_of_freedom == 20).all()
+        assert runs.alignment_error.dims == ("run", "gyro", "axis") and runs.alignment_error.attrs["units"] == "rad"
+        assert sorted(set(runs.input_gyro_readout_noise.values)) == [1, 2, 4]
+        assert runs.input_gyro_readout_noise.attrs["units"] == "arcsec"
+        assert runs.input_gyro_readout_noise.attrs["key"] == "gyro.readout.noise"
+        assert set(runs.input_attitude_reference.values) <= {"orbital", "yaw-steered"}
+        assert list(runs.outcome.attrs["flag_values"]) == [0, 1, 2]
+        # By the definition in its long_name, from the errors and sigmas beside it where nothing is correlated: not less than any of them.
+        largest = (abs(runs.alignment_error / runs.alignment_sigma)).max(["gyro", "axis"])
+        assert (runs.nees >= largest**2 * (1 - 1e-9)).all()
+
+
+def test_a_kill_loses_no_finished_run_and_repeats_none(finished):
+    out = finished / "killed"
+    process = subprocess.Popen([PROGRAM, "campaign", finished / "c.toml", "-o", out, "--jobs", "1"], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    until(out / "runs.journal", 3, process)
+    process.kill()
+    process.wait()
+    kept = (out / "runs.journal").read_text()
+    kept = kept[: kept.rindex("\n") + 1]
+    assert not (out / "runs.nc").exists()
+    with open(out / "runs.journal", "a") as journal:
+        journal.write('12345678 {"run": ')  # as a write that was cut short
+    result = run("--quiet", "campaign", finished / "c.toml", "-o", out, "--resume", "--jobs", "2")
+    assert result.returncode in (TRUSTWORTHY, DO_NOT_USE), result.stderr
+    assert (out / "runs.journal").read_text().startswith(kept)
+    assert records(out) == 12
+    assert table(out) == table(finished / "out")
+    times = (out / "times.csv").read_text()
+    assert run("--quiet", "campaign", finished / "c.toml", "-o", out, "--resume").returncode == result.returncode  # nothing is left to do
+    assert (out / "times.csv").read_text() == times
+
+
+def test_a_record_that_is_damaged_is_performed_again_and_the_others_stay(finished):
+    out = finished / "damaged"
+    run("--quiet", "campaign", finished / "c.toml", "-o", out)
+    lines = (out / "runs.journal").read_text().split("\n")
+    lines[4] = lines[4].replace('"outcome":', '"outcomE":')
+    (out / "runs.journal").write_text("\n".join(lines))
+    result = run("--quiet", "campaign", finished / "c.toml", "-o", out, "--resume")
+    assert "1 run is damaged, performed again" in result.stderr
+    assert records(out) == 13
+    assert table(out) == table(finished / "out")
+
+
+@pytest.mark.parametrize("with_signal", [signal.SIGINT, signal.SIGTERM])
+def test_a_stop_keeps_what_is_finished_and_says_how_to_go_on(finished, tmp_path, with_signal):
+    out = tmp_path / "out"
+    process = subprocess.Popen([PROGRAM, "campaign", finished / "c.toml", "-o", out, "--jobs", "1"], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    until(out / "runs.journal", 2, process)
+    process.send_signal(with_signal)
+    sent = time.monotonic()
+    _, said = process.communicate(timeout=60)
+    assert time.monotonic() - sent < 2
+    assert process.returncode == -with_signal
+    assert "runs are kept: go on with trihedron campaign" in said and said.endswith("--resume\n")
+    assert sorted(os.listdir(out)) == ["runs.journal"]
+    run("--quiet", "campaign", finished / "c.toml", "-o", out, "--resume")
+    assert table(out) == table(finished / "out")
+
+
+def test_a_run_alone_is_that_of_the_campaign(finished):
+    result = run("campaign", finished / "c.toml", "-o", finished / "out", "--only", "7")
+    assert "the same result, bit for bit" in result.stdout
+    alone = finished / "out" / "run-7"
+    assert sorted(os.listdir(alone)) == ["attitude.csv", "calibration.json", "effective-config.toml", "pass.nc", "report.html", "residuals.nc",
+                                         "run.json", "scenario.toml"]
+    with xarray.open_dataset(finished / "out" / "runs.nc") as runs:
+        row = runs.sel(run=7)
+        values = json.loads((alone / "run.json").read_text())["values"]
+        assert values["nees"] == [float(row.nees)]
+        assert values["alignment_error"] == list(row.alignment_error.values.ravel())
+    # And without the campaign: from the scenario that is beside it.
+    assert run("--quiet", "simulate", alone / "scenario.toml", "-o", finished / "again.nc").returncode == TRUSTWORTHY
+    for group in ("gyro", "star_tracker", "truth"):
+        with xarray.open_dataset(finished / "again.nc", group=group) as again, xarray.open_dataset(alone / "pass.nc", group=group) as written:
+            assert again.equals(written)
+    shown = json.loads(run("--json", "campaign", finished / "c.toml", "--only", "7").stdout)
+    assert shown["values"]["nees"] == values["nees"]
+
+
+def test_the_worst_run_is_repeated_by_the_command_that_is_shown(finished):
+    result = run("--json", "campaign", finished / "c.toml", "-o", finished / "out", "--resume")
+    command = json.loads(result.stdout)["worst"][0]["command"].split()
+    assert command[0] == "trihedron"
+    assert "bit for bit" in run(*command[1:]).stdout
+
+
+def test_runs_that_fail_are_rows_and_the_exit_status_says_so(tmp_path):
+    text = CAMPAIGN.replace("grid = [0, 0.1]", "grid = [0, 1]")
+    (tmp_path / "c.toml").write_text(text)
+    result = run("campaign", tmp_path / "c.toml", "-o", tmp_path / "out")
+    assert result.returncode == DO_NOT_USE
+    assert "6 failed" in result.stdout and "runs-failed" in result.stdout
+    with xarray.open_dataset(tmp_path / "out" / "runs.nc") as runs:
+        failed = runs.outcome == 2
+        assert int(failed.sum()) == 6
+        assert (runs.input_star_tracker_dropout_probability[failed] == 1).all()
+        assert all("no fix" in reason for reason in runs.reason[failed].values)
+        assert runs.nees[failed].isnull().all()
+    report = (tmp_path / "out" / "report.html").read_text()
+    assert "6 of 12 runs failed" in report
+    assert run("campaign", tmp_path / "c.toml", "--only", "2").returncode == DO_NOT_USE
+
+
+# What is refused before the work.
+
+
+def with_key(line):
+    return CAMPAIGN + line + "\n"
+
+
+@pytest.mark.parametrize("text, words", [
+    (with_key('gyro.readout.nois = {uniform = ["1arcsec", "2arcsec"]}'), ["c.toml:23:", "did you mean \"noise\"", "gyro.readout.nois"]),
+    (with_key('"gyro.readout.noisse" = {uniform = ["1arcsec", "2arcsec"]}'), ["c.toml:23:", "did you mean \"noise\""]),
+    (with_key("gyro.readout.spike = {uniform = [1, 2]}"), ["c.toml:23:", "unit"]),
+    (with_key('gyro.readout.spike = {uniform = ["1s", "2s"]}'), ["c.toml:23:", "angle", "arcsec"]),
+    (with_key('gyro.readout.spike = {uniform = ["1arcsec", "2arcmin"]}'), ["c.toml:23:", "one unit"]),
+    (with_key('gyro.readout.spike = {uniform = ["2arcsec", "1arcsec"]}'), ["c.toml:23:", "smaller number first"]),
+    (with_key('gyro.readout.spike = {unifrom = ["1arcsec", "2arcsec"]}'), ["c.toml:23:", "did you mean \"uniform\""]),
+    (with_key('gyro.readout.spike = {normal = ["1arcsec", "-2arcsec"]}'), ["c.toml:23:", "sigma"]),
+    (with_key('gyro.readout.spike = {lognormal = ["1arcsec", "2arcsec"]}'), ["c.toml:23:", "factor"]),
+    (with_key('gyro.readout.spike = {loguniform = ["0arcsec", "2arcsec"]}'), ["c.toml:23:", "logarithm"]),
+    (with_key('gyro.readout.spike = {normal = ["1arcsec", "2arcsec"], min = "5arcmin"}'), ["c.toml:23:", "one unit"]),
+    (with_key('gyro.readout.spike = {normal = ["1arcsec", "2arcsec"], min = "50arcsec"}'), ["c.toml:23:", "nothing can be drawn"]),
+    (with_key('gyro.readout.spike = {uniform = ["1arcsec", "2arcsec"], min = "0arcsec"}'), ["c.toml:23:", "no meaning"]),
+    (with_key('gyro.readout.spike = {uniform = ["1arcsec", "2arcsec"], choice = ["1arcsec"]}'), ["c.toml:23:", "two distributions"]),
+    (with_key('gyro.readout.spike = {choice = ["1arcsec"], weights = [1, 2]}'), ["c.toml:23:", "weights"]),
+    (with_key('gyro.readout.spike = {choice = ["1arcsec"], weights = [0]}'), ["c.toml:23:", "above zero"]),
+    (with_key("gyro.readout.spike = {choice = []}"), ["c.toml:23:", "list"]),
+    (with_key("gyro.readout.spike_probability = {uniform = [0.5, 2]}"), ["c.toml:23:", "0 … 1"]),
+    (with_key("gyro.readout.stuck_probability = {normal = [0.5, 0.2]}"), ["c.toml:23:", "min and max"]),
+    (with_key("gyro.readout.spike = \"1arcsec\""), ["c.toml:23:", "no distribution"]),
+    (with_key('"attitude.reference.x" = {choice = ["a"]}'), ["c.toml:23:", "same value"]),
+    (with_key('gyro.unit.3.readout.noise = {uniform = ["1arcsec", "2arcsec"]}'), ["c.toml:23:", "unit", "base scenario"]),
+    (with_key("scenario.seed = {choice = [1, 2]}"), ["c.toml:23:", "seed of its own"]),
+    (with_key('"gyro.readout" = {choice = [{}]}'), ["c.toml", "same value"]),
+    (CAMPAIGN.replace("repeats = 2", "runs = 10"), ["c.toml:4:", "grid", "repeats"]),
+    (CAMPAIGN.replace("repeats = 2", "repeats = 0"), ["c.toml:4:", "repeats"]),
+    (CAMPAIGN.replace("repeats = 2", "repeat = 2"), ["c.toml:4:", "did you mean \"repeats\""]),
+    (CAMPAIGN.replace("repeats = 2", "repeats = 1000000"), ["c.toml:2:", "6e+06 runs", "latin-hypercube"]),
+    (with_key("\n".join(f'gyro.readout.{key} = {{grid = [{", ".join(["0"] * 100)}]}}' for key in
+                        ("spike_probability", "stuck_probability")) + "\n" + "\n".join(
+        f'star_tracker.{key} = {{grid = [{", ".join(["0"] * 100)}]}}' for key in ("outlier_probability", "wrong_sign_probability")) + "\n" +
+        f'gyro.readout.dropout_probability = {{grid = [{", ".join(["0"] * 100)}]}}\ngyro.drift.warm_up_fraction = {{grid = [{", ".join(["0"] * 100)}]}}'),
+     ["6e+12 points", "1000000", "latin-hypercube"]),
+    (CAMPAIGN.replace("grid", "choice"), ["repeats", "runs"]),
+    (CAMPAIGN.replace("grid", "choice").replace("repeats = 2", ""), ["runs", "missing"]),
+    (CAMPAIGN.replace('duration = "5min"', 'duratio = "5min"'), ["c.toml:7:", "did you mean \"duration\""]),
+    (CAMPAIGN.replace('drift_model = "esg7"', 'drift_model = "esg8"'), ["c.toml:9:", "esg7"]),
+    ("base = \"nowhere.toml\"\n" + CAMPAIGN.replace('[base.scenario]\nduration = "5min"\n', ""), ["nowhere.toml"]),
+    ("[campaign", ["c.toml:1:"]),
+])
+def test_a_campaign_that_cannot_be_is_refused_before_the_work(tmp_path, text, words):
+    (tmp_path / "c.toml").write_text(text)
+    refused(run("campaign", tmp_path / "c.toml", "-o", tmp_path / "out"), INPUT_REFUSED, *words)
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_directory_of_another_campaign_is_refused_with_the_difference(finished, tmp_path):
+    refused(run("campaign", finished / "c.toml", "-o", finished / "out"), INPUT_REFUSED, "12 of 12 runs", "--resume")
+    before = table(finished / "out")
+    for old, new, difference in (("seed = 5", "seed = 6", 'campaign.seed is "6", was "5"'), ('"4arcsec"', '"5arcsec"', "vary.gyro.readout.noise"),
+                                 ("5min\"", "6min\"", 'base.scenario.duration is "6min", was "5min"'), ("esg7", "esg20", "calibration.drift_model")):
+        (tmp_path / "c.toml").write_text(CAMPAIGN.replace(old, new))
+        for arguments in ((), ("--resume",), ("--only", "1")):
+            refused(run("campaign", tmp_path / "c.toml", "-o", finished / "out", *arguments), INPUT_REFUSED, "another campaign", difference)
+    assert table(finished / "out") == before
+    (tmp_path / "out").mkdir()
+    (tmp_path / "out" / "runs.journal").write_text("notes\n")
+    refused(run("campaign", finished / "c.toml", "-o", tmp_path / "out", "--resume"), INPUT_REFUSED, "runs.journal", "no journal")
+    assert (tmp_path / "out" / "runs.journal").read_text() == "notes\n"
+
+
+def test_wrong_usage(finished, tmp_path):
+    campaign = finished / "c.toml"
+    refused(run("campaign", campaign), WRONG_USAGE, "-o")
+    refused(run("campaign", campaign, "--only", "12"), WRONG_USAGE, "0 to 11")
+    refused(run("campaign", campaign, "--only", "-1"), WRONG_USAGE, "--only")
+    refused(run("campaign", campaign, "-o", tmp_path / "out", "--jobs", "0"), WRONG_USAGE, "--jobs")
+    refused(run("campaign", campaign, "-o", tmp_path / "out", "--resume", "--only", "1"), WRONG_USAGE, "--only")
+    refused(run("campaign", campaign, "-o", campaign), WRONG_USAGE, "c.toml")
+
+
+def test_the_example_is_a_campaign(tmp_path):
+    result = run("--json", "campaign", ROOT / "examples" / "campaign.toml", "--only", "200")
+    assert result.returncode == WRONG_USAGE and "0 to 199" in result.stderr

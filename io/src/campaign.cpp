@@ -1,0 +1,678 @@
+#include "trihedron/io/campaign.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <array>
+#include <charconv>
+#include <cmath>
+#include <functional>
+#include <sstream>
+#include <stdexcept>
+#include <string>
+#include <utility>
+
+#include "schemas.hpp"
+#include "settings_tables.hpp"
+#include "text_file.hpp"
+#include "toml_fields.hpp"
+#include "trihedron/core/crc32.hpp"
+#include "trihedron/io/config.hpp"
+#include "trihedron/io/error.hpp"
+#include "trihedron/io/quantity.hpp"
+#include "wording.hpp"
+
+namespace trihedron::io {
+namespace {
+
+namespace fs = std::filesystem;
+using Kind = Distribution::Kind;
+
+/// A normal is cut here, so that all it can draw can be tried before the work; beyond lie 2e-9 of it.
+constexpr double kMostSigmas = 6;
+
+constexpr std::array<std::pair<std::string_view, Kind>, 6> kKinds = {{{"uniform", Kind::kUniform},
+                                                                      {"loguniform", Kind::kLoguniform},
+                                                                      {"normal", Kind::kNormal},
+                                                                      {"lognormal", Kind::kLognormal},
+                                                                      {"choice", Kind::kChoice},
+                                                                      {"grid", Kind::kGrid}}};
+constexpr std::array<std::string_view, 9> kDistributionKeys = {"uniform", "loguniform", "normal", "lognormal", "choice",
+                                                               "grid",    "weights",    "min",    "max"};
+constexpr std::string_view kForms =
+    "write one of {uniform = [from, to]}, {loguniform = [from, to]}, {normal = [mean, sigma]}, "
+    "{lognormal = [median, factor]}, {choice = [a, b]}, {grid = [a, b]}";
+
+std::vector<std::string> parts_of(std::string_view path) {
+  std::vector<std::string> parts;
+  for (std::size_t begin = 0; begin <= path.size();) {
+    const std::size_t end = std::min(path.find('.', begin), path.size());
+    parts.emplace_back(path.substr(begin, end - begin));
+    begin = end + 1;
+  }
+  return parts;
+}
+
+/// From 1; nothing for what is no number.
+std::optional<std::size_t> number_of(std::string_view part) {
+  std::size_t number = 0;
+  const auto [end, fault] = std::from_chars(part.data(), part.data() + part.size(), number);
+  return fault == std::errc() && end == part.data() + part.size() && number > 0 ? std::optional(number) : std::nullopt;
+}
+
+/// Why a value has no place in a scenario.
+struct NoPlace {
+  std::string reason;
+  std::string cure;
+};
+
+/// Puts a copy of `value` where the path leads: through tables, which are made, and elements of arrays, counted from 1,
+/// which have to be there.
+void put(toml::table& scenario, const std::vector<std::string>& path, const toml::node& value) {
+  toml::node* at = &scenario;
+  for (std::size_t i = 0; i < path.size(); ++i) {
+    const bool is_last = i + 1 == path.size();
+    if (toml::array* array = at->as_array()) {
+      const std::optional<std::size_t> number = number_of(path[i]);
+      if (!number || *number > array->size()) {
+        throw NoPlace{fmt::format("{} is no element of a list of {}", in_quotes(path[i]), array->size()),
+                      "elements are counted from 1; the base scenario must have the list"};
+      }
+      if (is_last) {
+        array->replace(array->cbegin() + static_cast<std::ptrdiff_t>(*number - 1), value);
+      } else {
+        at = array->get(*number - 1);
+      }
+    } else if (toml::table* table = at->as_table()) {
+      if (is_last) {
+        table->insert_or_assign(path[i], value);
+      } else {
+        if (!table->contains(path[i])) {
+          if (number_of(path[i + 1])) {
+            throw NoPlace{fmt::format("the base scenario has no list {}", in_quotes(path[i])),
+                          "write the list in the base scenario, so that one of its elements can vary"};
+          }
+          table->insert(path[i], toml::table{});
+        }
+        at = table->get(path[i]);
+      }
+    } else {
+      throw NoPlace{fmt::format("{} is one value in the base scenario, nothing lies in it", in_quotes(path[i - 1])),
+                    "leave out the rest of the key"};
+    }
+  }
+}
+
+/// A number and the unit behind it.
+struct Amount {
+  double value = 0;
+  std::string unit;
+};
+
+std::optional<Amount> amount_of(const toml::node& node) {
+  if (node.is_number()) {
+    return Amount{*node.value<double>(), ""};
+  }
+  const auto* text = node.as_string();
+  if (text == nullptr) {
+    return std::nullopt;
+  }
+  const std::string_view given = trimmed(text->get());
+  Amount amount;
+  const auto [end, fault] = std::from_chars(given.data(), given.data() + given.size(), amount.value);
+  amount.unit = std::string(trimmed(given.substr(static_cast<std::size_t>(end - given.data()))));
+  return fault == std::errc() && std::isfinite(amount.value) ? std::optional(amount) : std::nullopt;
+}
+
+std::string text_of(const toml::node& node) {
+  if (const auto* text = node.as_string()) {
+    return text->get();
+  }
+  std::ostringstream stream;
+  stream << toml::node_view<const toml::node>(node);
+  return stream.str();
+}
+
+void flatten(const toml::node& node, const std::string& key, CampaignIdentity& lines) {
+  if (const toml::table* table = node.as_table()) {
+    for (const auto& [name, value] : *table) {
+      flatten(value, fmt::format("{}{}{}", key, key.empty() ? "" : ".", name.str()), lines);
+    }
+  } else {
+    lines.push_back({key, text_of(node)});
+  }
+}
+
+/// An input, and what is needed to put its draws into a scenario.
+struct Varied {
+  CampaignInput input;
+  std::vector<std::string> path;
+  std::vector<toml::array> options;   ///< each an array of the one value
+  toml::table as_given;               ///< the distribution
+  const toml::node* place = nullptr;  ///< in the document
+};
+
+/// Reads one distribution.
+class DistributionReader {
+ public:
+  DistributionReader(const toml::table& table, const fs::path& file, const std::string& key)
+      : table_(table), reader_(table, file, fmt::format("the distribution of {}", in_quotes(key))) {
+    varied_.input.key = key;
+    varied_.path = parts_of(key);
+    varied_.as_given = table;
+    varied_.place = &table;
+  }
+
+  [[nodiscard]] Varied read() && {
+    reader_.expect_known({kDistributionKeys.begin(), kDistributionKeys.end()});
+    const toml::node* parameters = nullptr;
+    Distribution& distribution = varied_.input.distribution;
+    for (const auto& [word, kind] : kKinds) {
+      if (const toml::node* node = table_.get(word)) {
+        if (parameters != nullptr) {
+          refuse(*node, "there are two distributions", "keep one of them");
+        }
+        parameters = node;
+        distribution.kind = kind;
+        word_ = word;
+      }
+    }
+    if (parameters == nullptr) {
+      refuse(table_, "there is no distribution", std::string(kForms));
+    }
+    for (const auto& [key, needs] : {std::pair{"weights", distribution.kind == Kind::kChoice},
+                                     std::pair{"min", is_unbounded()}, std::pair{"max", is_unbounded()}}) {
+      if (const toml::node* node = table_.get(key); node != nullptr && !needs) {
+        refuse(*node, fmt::format("\"{}\" has no meaning beside \"{}\"", key, word_), "leave it out");
+      }
+    }
+    const toml::array* list = parameters->as_array();
+    if (list == nullptr || list->empty()) {
+      refuse(*parameters, fmt::format("\"{}\" is not a list", word_), std::string(kForms));
+    }
+    if (distribution.has_options()) {
+      read_options(*list);
+    } else {
+      read_two_numbers(*list);
+    }
+    return std::move(varied_);
+  }
+
+ private:
+  [[noreturn]] void refuse(const toml::node& node, const std::string& reason, const std::string& cure) const {
+    reader_.refuse(node, fmt::format("{}: {}", in_quotes(varied_.input.key), reason), cure);
+  }
+
+  [[nodiscard]] bool is_unbounded() const {
+    return varied_.input.distribution.kind == Kind::kNormal || varied_.input.distribution.kind == Kind::kLognormal;
+  }
+
+  [[nodiscard]] Amount amount(const toml::node& node) const {
+    const std::optional<Amount> found = amount_of(node);
+    if (!found) {
+      refuse(node, fmt::format("{} is no number", in_quotes(text_of(node))),
+             "give a number, with its unit where the key has one, like \"2arcsec\"; words go into {choice = [a, b]}");
+    }
+    return *found;
+  }
+
+  /// In the unit of the others.
+  [[nodiscard]] double like_others(const toml::node& node) const {
+    const Amount found = amount(node);
+    if (found.unit != varied_.input.unit) {
+      refuse(node,
+             fmt::format("{} is not in {}, as the number before", in_quotes(text_of(node)),
+                         varied_.input.unit.empty() ? "no unit" : varied_.input.unit),
+             "write all numbers of a distribution in one unit");
+    }
+    return found.value;
+  }
+
+  void read_two_numbers(const toml::array& list) {
+    CampaignInput& input = varied_.input;
+    Distribution& distribution = input.distribution;
+    if (list.size() != 2) {
+      refuse(list, fmt::format("\"{}\" has {} numbers", word_, list.size()), std::string(kForms));
+    }
+    const Amount first = amount(list[0]);
+    input.unit = first.unit;
+    distribution.a = first.value;
+    if (distribution.kind == Kind::kLognormal) {
+      const Amount factor = amount(list[1]);
+      if (!factor.unit.empty() || !(factor.value > 1)) {
+        refuse(list[1], fmt::format("{} is no factor", in_quotes(text_of(list[1]))),
+               "the second number of lognormal is the factor of one sigma, above 1 and without unit");
+      }
+      distribution.b = factor.value;
+    } else {
+      distribution.b = like_others(list[1]);
+    }
+    const double a = distribution.a;
+    const double b = distribution.b;
+    if (const bool is_by_logarithm = distribution.kind == Kind::kLoguniform || distribution.kind == Kind::kLognormal;
+        is_by_logarithm && !(a > 0)) {
+      refuse(list[0], fmt::format("{} has no logarithm", in_quotes(text_of(list[0]))), "give a number above zero");
+    }
+    if (distribution.kind == Kind::kNormal && !(b > 0)) {
+      refuse(list[1], fmt::format("{} is no sigma", in_quotes(text_of(list[1]))), "give a sigma above zero");
+    }
+    if (!is_unbounded() && !(a < b)) {
+      refuse(list, fmt::format("{} is not below {}", text_of(list[0]), text_of(list[1])),
+             "give the smaller number first");
+    }
+    switch (distribution.kind) {
+      case Kind::kNormal:
+        distribution.least = a - kMostSigmas * b;
+        distribution.most = a + kMostSigmas * b;
+        break;
+      case Kind::kLognormal:
+        distribution.least = a * std::pow(b, -kMostSigmas);
+        distribution.most = a * std::pow(b, kMostSigmas);
+        break;
+      default:
+        distribution.least = a;
+        distribution.most = b;
+    }
+    if (const toml::node* least = table_.get("min")) {
+      distribution.least = std::max(distribution.least, like_others(*least));
+    }
+    if (const toml::node* most = table_.get("max")) {
+      distribution.most = std::min(distribution.most, like_others(*most));
+    }
+    if (!(distribution.least < distribution.most) || !std::isfinite(distribution.most - distribution.least)) {
+      refuse(table_, "nothing can be drawn between its limits",
+             fmt::format("give a min below max, both within {} sigma", kMostSigmas));
+    }
+  }
+
+  void read_options(const toml::array& list) {
+    CampaignInput& input = varied_.input;
+    bool all_numbers = true;
+    for (const toml::node& node : list) {
+      const std::optional<Amount> found = amount_of(node);
+      if (input.options.empty() && found) {
+        input.unit = found->unit;
+      }
+      all_numbers = all_numbers && found && found->unit == input.unit;
+      if (all_numbers) {
+        input.numbers.push_back(found->value);
+      }
+      input.options.push_back(text_of(node));
+      varied_.options.emplace_back().push_back(node);
+    }
+    if (!all_numbers) {
+      input.numbers.clear();
+      input.unit.clear();
+    }
+    input.distribution.options = list.size();
+    if (input.distribution.kind == Kind::kChoice) {
+      read_weights();
+    }
+    input.distribution.most = static_cast<double>(list.size() - 1);
+  }
+
+  void read_weights() {
+    Distribution& distribution = varied_.input.distribution;
+    distribution.weights.assign(distribution.options, 1);
+    const toml::node* node = table_.get("weights");
+    if (node == nullptr) {
+      return;
+    }
+    const toml::array* weights = node->as_array();
+    if (weights == nullptr || weights->size() != distribution.options) {
+      refuse(*node, "\"weights\" is not a list as long as the choice", "give one number above zero per choice");
+    }
+    for (std::size_t i = 0; i < distribution.options; ++i) {
+      distribution.weights[i] = reader_.number((*weights)[i], "weights");
+      if (!(distribution.weights[i] > 0)) {
+        refuse((*weights)[i], "a weight is not above zero", "give a positive weight, or leave out that choice");
+      }
+    }
+  }
+
+  const toml::table& table_;
+  TomlTable reader_;
+  std::string_view word_;
+  Varied varied_;
+};
+
+bool is_distribution(const toml::table& table) {
+  return std::ranges::any_of(kKinds, [&](const auto& row) { return table.contains(row.first); });
+}
+
+/// Keys may be quoted paths or tables in each other: all the same.
+void read_varied(const toml::table& table, const fs::path& file, const std::string& above, std::vector<Varied>& all) {
+  for (const auto& [name, node] : table) {
+    const std::string key = fmt::format("{}{}{}", above, above.empty() ? "" : ".", name.str());
+    const toml::table* below = node.as_table();
+    if (below == nullptr || below->empty()) {
+      std::vector<std::string_view> words;
+      for (const auto& [word, kind] : kKinds) {
+        words.push_back(word);
+      }
+      const std::string cure = node.is_array() ? suggestion(name.str(), words) : std::string(kForms);
+      TomlTable(table, file, "[vary]").refuse(node, fmt::format("{} has no distribution", in_quotes(key)), cure);
+    }
+    if (is_distribution(*below)) {
+      all.push_back(DistributionReader(*below, file, key).read());
+    } else {
+      read_varied(*below, file, key, all);
+    }
+  }
+}
+
+/// Of [campaign].
+struct Head {
+  std::string name = "Campaign";
+  std::uint64_t runs = 0;
+  std::uint64_t seed = 0;
+  std::uint64_t repeats = 0;
+  enum class Sampling { kRandom, kLatinHypercube } sampling = Sampling::kRandom;
+  double limit_rad = CampaignPlan{}.limit_rad;
+};
+
+Field count(std::string_view key, std::uint64_t& target, std::string_view about) {
+  const Range& range = limits::kCampaignRuns;
+  return {
+      key, about,
+      [&range] { return whole_schema(static_cast<std::int64_t>(range.least), static_cast<std::int64_t>(range.most)); },
+      [key, &target, &range](const TomlTable& table, const toml::node& node) {
+        if (!node.is_integer()) {
+          table.refuse(node, fmt::format("\"{}\" is not a whole number", key), std::string(range.why));
+        }
+        target = static_cast<std::uint64_t>(table.number(node, key, range));
+      }};
+}
+
+Field limit(double& target) {
+  return quantity("limit", target, kAngle, limits::kAttitudeLimit_rad,
+                  "attitude error that ends a correction interval");
+}
+
+Fields head_fields(Head& head) {
+  using Sampling = Head::Sampling;
+  return {text("name", head.name, "for the report"),
+          count("runs", head.runs, "how many; without a grid"),
+          whole("seed", head.seed, "every draw depends on it, the number of the run and the key alone"),
+          count("repeats", head.repeats, "runs at each point of the grid, 1 without it"),
+          choice<Sampling>("sampling", head.sampling,
+                           "of the distributions: each run for itself, or each key in as many equal parts as there are "
+                           "runs, one run in each",
+                           {{"random", Sampling::kRandom}, {"latin-hypercube", Sampling::kLatinHypercube}}),
+          limit(head.limit_rad)};
+}
+
+/// A table, or the name of a file beside the campaign's.
+struct Source {
+  const toml::table* table = nullptr;
+  std::string file;
+  const toml::node* place = nullptr;
+};
+
+Field source(std::string_view key, Source& target, std::string_view about, const std::function<Json()>& table_schema) {
+  return {key, about,
+          [table_schema] {
+            return any_of({text_schema(), table_schema()});
+          },
+          [key, &target](const TomlTable& table, const toml::node& node) {
+            target.place = &node;
+            if (node.is_table()) {
+              target.table = node.as_table();
+            } else {
+              target.file = table.text(node, key);
+            }
+          }};
+}
+
+Fields campaign_fields(Head& head, Source& base, Source& calibration, const toml::table*& vary, const fs::path& file) {
+  const auto vary_schema = [] { return Json{{"type", "object"}}; };
+  return {
+      section("campaign", file, "[campaign]", "how many runs, and how they are drawn",
+              [&head] { return head_fields(head); }),
+      source("base", base, "the scenario: a file, or its tables; without it the paper's experiment",
+             scenario_table_schema),
+      source("calibration", calibration, "the settings: a file, or its tables; without it those of the program",
+             config_table_schema),
+      {"vary",
+       "by the path of a key of the scenario, parts joined by points, elements of lists counted from 1: a table "
+       "with one of uniform, loguniform, normal, lognormal, choice, grid",
+       vary_schema, [&vary](const TomlTable& table, const toml::node& node) { vary = &table.as_table(node, "vary"); }}};
+}
+
+}  // namespace
+
+struct CampaignFile::Content {
+  fs::path file;
+  toml::table document;
+  fs::path scenario_file;  ///< that positions and a recorded attitude of the base are of
+  toml::table base;
+  std::vector<fs::path> inputs;
+  CalibrationOptions options;
+  CampaignPlan plan;
+  std::vector<Varied> varied;
+  std::string recorded;  ///< attitude that the base flies, as text
+
+  [[nodiscard]] toml::table table_of(std::uint64_t seed, std::span<const double> draws) const {
+    toml::table scenario = base;
+    put(scenario, {"scenario", "seed"}, toml::value<std::int64_t>(static_cast<std::int64_t>(seed)));
+    for (std::size_t i = 0; i < varied.size(); ++i) {
+      put_draw(scenario, varied[i], draws[i]);
+    }
+    return scenario;
+  }
+
+  static void put_draw(toml::table& scenario, const Varied& varied, double draw) {
+    const CampaignInput& input = varied.input;
+    if (input.distribution.has_options()) {
+      put(scenario, varied.path, *varied.options[static_cast<std::size_t>(draw)].get(0));
+    } else if (input.unit.empty()) {
+      put(scenario, varied.path, toml::value<double>(draw));
+    } else {
+      put(scenario, varied.path, toml::value<std::string>(fmt::format("{}{}", draw, input.unit)));
+    }
+  }
+
+  [[noreturn]] void refuse(const toml::node& place, std::string reason, std::string cure) const {
+    TomlTable(document, file, "the file").refuse(place, std::move(reason), std::move(cure));
+  }
+
+  void try_draw(const Varied& one, double draw, const ScenarioCheck& check) const {
+    const std::string what = one.input.distribution.has_options() ? one.input.options[static_cast<std::size_t>(draw)]
+                                                                  : fmt::format("{}{}", draw, one.input.unit);
+    const std::string drawn = fmt::format("{} = {}", one.input.key, in_quotes(what));
+    try {
+      toml::table scenario = base;
+      put_draw(scenario, one, draw);
+      check(scenario_of_table(scenario, scenario_file, "the scenario"));
+    } catch (const NoPlace& none) {
+      refuse(*one.place, fmt::format("{}: {}", drawn, none.reason), none.cure);
+    } catch (const InputRefused& refused) {
+      refuse(*one.place, fmt::format("{} can be drawn: {}", drawn, refused.reason()), refused.cure());
+    } catch (const std::invalid_argument& refused) {
+      refuse(*one.place, fmt::format("{} can be drawn: {}", drawn, refused.what()),
+             "narrow the distribution, by min and max where it has no ends");
+    }
+  }
+
+  void read_base(const Source& source, const ScenarioCheck& check) {
+    scenario_file = file;
+    if (source.table != nullptr) {
+      base = *source.table;
+    } else if (!source.file.empty()) {
+      scenario_file = file.parent_path() / source.file;
+      inputs.push_back(scenario_file);
+    }
+    toml::table parsed;
+    const toml::table* table = source.table != nullptr ? source.table : &parsed;
+    if (source.table == nullptr && !source.file.empty()) {
+      parsed = parse_toml(TextFile(scenario_file).text(), scenario_file);
+      base = parsed;
+    }
+    const Scenario scenario = scenario_of_table(*table, scenario_file, source.table != nullptr ? "[base]" : "the file");
+    try {
+      check(scenario);
+    } catch (const std::invalid_argument& error) {
+      throw InputRefused(scenario_file, {}, error.what(), "correct the base scenario");
+    }
+    plan.gyros = scenario.gyros.size();
+    if (const auto name = base["attitude"]["recorded"].value<std::string>()) {
+      // Wherever a scenario of a run is written, it leads there.
+      const fs::path attitude = fs::absolute(scenario_file.parent_path() / *name);
+      inputs.push_back(attitude);
+      recorded = std::string(TextFile(attitude).text());
+      put(base, {"attitude", "recorded"}, toml::value<std::string>(attitude.string()));
+    }
+  }
+
+  void read_options(const Source& source) {
+    if (source.table != nullptr) {
+      options = config_of_table(*source.table, file, "[calibration]");
+    } else if (!source.file.empty()) {
+      inputs.push_back(file.parent_path() / source.file);
+      options = read_config(inputs.back());
+    }
+  }
+
+  void expect_different_keys() const {
+    for (const Varied& one : varied) {
+      for (const Varied& other : varied) {
+        if (&one != &other && (one.input.key == other.input.key || one.input.key.starts_with(other.input.key + "."))) {
+          refuse(*one.place,
+                 fmt::format("{} and {} draw the same value", in_quotes(other.input.key), in_quotes(one.input.key)),
+                 "keep one of them");
+        }
+      }
+      if (one.input.key == "scenario.seed") {
+        refuse(*one.place, "\"scenario.seed\" cannot vary by a distribution",
+               "leave it out: each run has a seed of its own, which follows from that of the campaign");
+      }
+    }
+  }
+
+  /// Of [campaign], or of the file where that is missing.
+  void count_runs(const Head& head) {
+    const toml::node* table = document.get("campaign");
+    const toml::node& place = table != nullptr ? *table : static_cast<const toml::node&>(document);
+    const auto place_of = [&](const char* key) -> const toml::node& {
+      const toml::node* node = document["campaign"][key].node();
+      return node != nullptr ? *node : place;
+    };
+    double points = 1;
+    bool is_grid = false;
+    for (const Varied& one : varied) {
+      if (one.input.distribution.kind == Kind::kGrid) {
+        is_grid = true;
+        points *= static_cast<double>(one.input.distribution.options);
+      }
+    }
+    if (!is_grid) {
+      if (head.repeats != 0) {
+        refuse(place_of("repeats"), "\"repeats\" has no meaning without a grid", "give \"runs\" in its place");
+      }
+      if (head.runs == 0) {
+        refuse(place, "\"runs\" is missing in [campaign]", "say how many runs there are to be: runs = 1000");
+      }
+      plan.runs = head.runs;
+      return;
+    }
+    if (head.runs != 0) {
+      refuse(place_of("runs"), fmt::format("\"runs\" and a grid of {} points are both there", points),
+             "leave it out, and give \"repeats\": how many runs there are at each point");
+    }
+    plan.repeats = std::max<std::uint64_t>(head.repeats, 1);
+    const double runs = points * static_cast<double>(plan.repeats);
+    if (!limits::kCampaignRuns.holds(runs)) {
+      refuse(place,
+             fmt::format("the grid has {:.6g} points, with repeats {:.6g} runs, more than {:.0f}", points, runs,
+                         limits::kCampaignRuns.most),
+             "give shorter lists, or distributions with runs and sampling = \"latin-hypercube\"");
+    }
+    plan.runs = static_cast<std::uint64_t>(runs);
+  }
+};
+
+CampaignFile::CampaignFile(const fs::path& file, const ScenarioCheck& check) {
+  auto content = std::make_unique<Content>();
+  content->file = file;
+  content->inputs.push_back(file);
+  content->document = parse_toml(TextFile(file).text(), file);
+  Head head;
+  Source base;
+  Source calibration;
+  const toml::table* vary = nullptr;
+  read_fields(content->document, file, "the file", campaign_fields(head, base, calibration, vary, file));
+  content->read_base(base, check);
+  content->read_options(calibration);
+  if (vary != nullptr) {
+    read_varied(*vary, file, "", content->varied);
+  }
+  content->expect_different_keys();
+  content->count_runs(head);
+  content->plan.name = head.name;
+  content->plan.seed = head.seed;
+  content->plan.limit_rad = head.limit_rad;
+  content->plan.latin_hypercube = head.sampling == Head::Sampling::kLatinHypercube;
+  for (const Varied& one : content->varied) {
+    if (one.input.distribution.has_options()) {
+      for (std::size_t option = 0; option < one.input.distribution.options; ++option) {
+        content->try_draw(one, static_cast<double>(option), check);
+      }
+    } else {
+      content->try_draw(one, one.input.distribution.least, check);
+      content->try_draw(one, one.input.distribution.most, check);
+    }
+    content->plan.inputs.push_back(one.input);
+  }
+  content_ = std::move(content);
+}
+
+CampaignFile::~CampaignFile() = default;
+
+const CampaignPlan& CampaignFile::plan() const { return content_->plan; }
+const CalibrationOptions& CampaignFile::options() const { return content_->options; }
+std::vector<fs::path> CampaignFile::inputs() const { return content_->inputs; }
+
+CampaignIdentity CampaignFile::identity(std::string_view version) const {
+  const CampaignPlan& plan = content_->plan;
+  CampaignIdentity lines = {{"version", std::string(version)},
+                            {"campaign.name", plan.name},
+                            {"campaign.seed", std::to_string(plan.seed)},
+                            {"campaign.runs", std::to_string(plan.runs)},
+                            {"campaign.repeats", std::to_string(plan.repeats)},
+                            {"campaign.sampling", plan.latin_hypercube ? "latin-hypercube" : "random"},
+                            {"campaign.limit", format_angle(plan.limit_rad)}};
+  for (const Varied& one : content_->varied) {
+    lines.push_back({"vary." + one.input.key, text_of(one.as_given)});
+  }
+  flatten(content_->base, "base", lines);
+  if (!content_->recorded.empty()) {
+    lines.push_back(
+        {"base.attitude.recorded, its content", fmt::format("{} bytes, CRC-32 {:08x}", content_->recorded.size(),
+                                                            crc32(std::as_bytes(std::span(content_->recorded))))});
+  }
+  flatten(parse_toml(format_config(content_->options), "settings"), "calibration", lines);
+  return lines;
+}
+
+Scenario CampaignFile::scenario(std::uint64_t seed, std::span<const double> draws) const {
+  return scenario_of_table(content_->table_of(seed, draws), content_->scenario_file, "the scenario");
+}
+
+std::string CampaignFile::scenario_text(std::uint64_t seed, std::span<const double> draws) const {
+  std::ostringstream stream;
+  stream << toml::toml_formatter(content_->table_of(seed, draws)) << "\n";
+  return stream.str();
+}
+
+Json campaign_schema() {
+  Head head;
+  Source base;
+  Source calibration;
+  const toml::table* vary = nullptr;
+  const fs::path file;
+  return document_schema("Campaign", "Monte Carlo over scenarios: what is drawn for each run (TOML).",
+                         schema_of(campaign_fields(head, base, calibration, vary, file)));
+}
+
+}  // namespace trihedron::io

@@ -1,0 +1,79 @@
+// Figures of a campaign: distributions over the runs, and what they depend on.
+
+/** Unit and size of what is drawn: angles come in ″. */
+function shownUnit(unit, values) {
+  if (unit !== "angle") return { symbol: unit === "" ? "" : ` ${unit}`, size: 1 };
+  return angleUnit(Math.max(...values.map(Math.abs)));
+}
+
+FIGURES.ecdf = (data, look, { name }) => {
+  const { colour } = look;
+  const { label, unit, x, y, bounds, expected } = data.ecdf[name];
+  const { symbol, size } = shownUnit(unit, x);
+  const shown = scaled(x, 1 / size);
+  const layout = baseLayout(look, look.print ? 260 : 320);
+  const least = Math.min(...shown);
+  const isWide = least > 0 && Math.max(...shown) > 30 * least;
+  layout.xaxis = { ...axisStyle(colour), type: isWide ? "log" : "linear", title: axisTitle(`${label}${symbol === "" ? "" : `, ${symbol.trim()}`}`, 8) };
+  layout.yaxis = { ...axisStyle(colour), range: [-0.02, 1.04], title: axisTitle("share of the runs", 6), tickformat: ".0%" };
+  const traces = [{
+    ...line(shown, y, panel(0), { name: "runs", line: { color: colour.blue, shape: "hv", width: 2 } }), showlegend: expected !== undefined,
+    hovertemplate: `%{y:.1%} up to %{x:.4~g}${symbol}<extra></extra>`,
+  }];
+  if (expected) {
+    traces.push({ ...line(expected.x, expected.y, panel(0), { name: "χ² of a consistent estimator", line: { color: colour.ink, dash: "dash" } }), showlegend: true,
+      hoverinfo: "skip" });
+  }
+  const known = bounds.filter(({ lower, upper }) => lower !== null || upper !== null);
+  const [left, right] = [Math.min(...shown), Math.max(...shown)];
+  known.forEach(({ share, lower, upper }) => {
+    const from = lower === null ? left : lower / size;
+    const to = upper === null ? right : upper / size;
+    traces.push({
+      x: [from, to], y: [share, share], mode: "lines+markers", showlegend: false, line: { color: colour.vermillion, width: 2 },
+      marker: { symbol: "line-ns-open", size: 10, color: colour.vermillion, opacity: [lower === null ? 0 : 1, upper === null ? 0 : 1] },
+      hovertemplate: `${+(100 * share).toPrecision(3)} %: ${lower === null ? "too few runs" : "from"} … ${upper === null ? "too few runs" : "to"} %{x:.4~g}${symbol}<extra></extra>`,
+    });
+  });
+  return { traces, layout };
+};
+
+FIGURES.influences = (data, look) => {
+  const { colour } = look;
+  const { keys, measures, rho, marks } = data.influences;
+  const longest = Math.max(...keys.map((key) => key.length));
+  const left = Math.min(7 * longest + 20, 0.42 * look.width);
+  const letters = Math.floor((left - 20) / 7);
+  const layout = { ...baseLayout(look, 34 * keys.length + 250), margin: { l: left, r: 70, t: 14, b: 220 } };
+  const short = (key) => (key.length <= letters ? key : `…${key.slice(1 - letters)}`);
+  layout.xaxis = { ...axisStyle(colour), tickvals: measures.map((_, i) => i), ticktext: measures, tickangle: -45, showgrid: false, ticks: "", showline: false };
+  layout.yaxis = { ...axisStyle(colour), tickvals: keys.map((_, i) => i), ticktext: keys.map(short), autorange: "reversed", showgrid: false, ticks: "", showline: false };
+  const traces = [{
+    type: "heatmap", z: rho, x: measures.map((_, i) => i), y: keys.map((_, i) => i), zmin: -1, zmax: 1, xgap: 1, ygap: 1,
+    colorscale: [[0, colour["correlation-minus"]], [0.5, colour["correlation-zero"]], [1, colour["correlation-plus"]]],
+    text: marks, texttemplate: "%{text}", textfont: { size: 11 },
+    customdata: keys.map((key) => measures.map((measure) => `${key}, ${measure}`)),
+    hovertemplate: "%{customdata}: %{z:+.2f}<extra></extra>",
+    colorbar: { thickness: 12, outlinewidth: 0, tickvals: [-1, -0.5, 0, 0.5, 1], ticktext: ["−1", "−0.5", "0", "+0.5", "+1"] },
+  }];
+  return { traces, layout };
+};
+
+FIGURES.scatter = (data, look, { name }) => {
+  const { colour } = look;
+  const { key, key_unit, words, log, label, unit, rho, x, y, run } = data.scatters[Number(name)];
+  const { symbol, size } = shownUnit(unit, y);
+  const shown = scaled(y, 1 / size);
+  const layout = baseLayout(look, look.print ? 260 : 320);
+  layout.xaxis = { ...axisStyle(colour), type: log ? "log" : "linear", title: axisTitle(`${key}${key_unit ? `, ${key_unit}` : ""}`, 8) };
+  if (words) Object.assign(layout.xaxis, { tickvals: words.map((_, i) => i), ticktext: words });
+  const least = Math.min(...shown);
+  layout.yaxis = { ...axisStyle(colour), type: least > 0 && Math.max(...shown) > 30 * least ? "log" : "linear", title: axisTitle(symbol.trim() === "" ? label : symbol.trim(), 6) };
+  layout.annotations.push({ text: `ρ = ${rho.toFixed(2).replace("-", "−")}`, xref: "paper", yref: "paper", x: 1, y: 1, xanchor: "right", yanchor: "bottom",
+    showarrow: false, font: { size: 13, color: colour.ink } });
+  return {
+    traces: [{ x, y: shown, customdata: run, mode: "markers", showlegend: false, marker: { color: faded(colour.blue, 0.55), size: 5 },
+      hovertemplate: `run %{customdata}: %{y:.4~g}${symbol} at %{x:.4~g}${key_unit}<extra></extra>` }],
+    layout,
+  };
+};
