@@ -73,6 +73,9 @@ class Truth:
         self.gyros = json.loads((whole / "truth.json").read_text())["gyros"]
         self.attitude = {t: tuple(q) for t, q in rows_of(whole / "truth.csv", QUATERNION).items()}
         self.alignments = [exponential(gyro["lambda_rad"]) for gyro in self.gyros]
+        if moved and moved.exchanged:
+            self.gyros.reverse()
+            self.alignments.reverse()
         if moved and moved.gyro:
             self.alignments[0] = product(self.alignments[0], inverse(moved.gyro))
         if moved and moved.tracker:
@@ -203,8 +206,10 @@ class Outcomes:
         new = [{"program": self.program} | outcome for outcome in outcomes]
         self.found += new
         self.file.parent.mkdir(parents=True, exist_ok=True)
+        # A line that was cut short by a kill is ended, so that it does not take the next one with it.
+        cut_short = self.file.exists() and self.file.read_bytes()[-1:] not in (b"", b"\n")
         with open(self.file, "a") as file:
-            file.write("".join(json.dumps(outcome) + "\n" for outcome in new))
+            file.write("\n" * cut_short + "".join(json.dumps(outcome) + "\n" for outcome in new))
 
 
 def measure(program, outcomes, worlds, seeds, estimators, jobs):
