@@ -58,13 +58,17 @@ std::optional<SlowLine> strongest_slow_line(const std::vector<FixRecord>& fixes,
     }
     const double span_s = its.t_s.back() - its.t_s.front();
     const auto lines = static_cast<int>(span_s / shortest_period_s);
+    std::vector<std::complex<double>> first(n);
+    std::ranges::transform(its.t_s, first.begin(), [span_s](double t_s) {
+      return std::polar(1.0, -2 * std::numbers::pi * t_s / span_s);
+    });
+    std::vector<std::complex<double>> turn(n, 1.0);
     for (int line = 1; line <= lines; ++line) {
-      const double rate_rad_s = 2 * std::numbers::pi * line / span_s;
       std::complex<double> sum[kComponents];
       for (std::size_t i = 0; i < n; ++i) {
-        const std::complex<double> turn = std::polar(1.0, -rate_rad_s * its.t_s[i]);
-        sum[0] += its.z[0][i] * turn;
-        sum[1] += its.z[1][i] * turn;
+        turn[i] *= first[i];
+        sum[0] += its.z[0][i] * turn[i];
+        sum[1] += its.z[1][i] * turn[i];
       }
       for (const std::complex<double>& of_component : sum) {
         ++tried;
