@@ -148,8 +148,8 @@ SimulatedPass simulate(const Scenario& scenario) {
   const AttitudeProgramme attitude(scenario.attitude, orbit, scenario.seed, -margin_s, duration_s + margin_s);
 
   const Sky sky(scenario.epoch, -margin_s, duration_s + margin_s);
-  const bool is_warmed = std::ranges::any_of(
-      scenario.gyros, [](const GyroScenario& gyro) { return gyro.drift.thermal_fraction != 0; });
+  const bool is_warmed =
+      std::ranges::any_of(scenario.gyros, [](const GyroScenario& gyro) { return gyro.drift.thermal_fraction != 0; });
 
   Rot<In, C> C_in_c = attitude.at(0);
   std::vector<Gyro> gyros;
