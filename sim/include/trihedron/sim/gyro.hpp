@@ -30,8 +30,7 @@ class Drift {
 
   /// ω_b(h), rad/s, during the step. h: unit.
   [[nodiscard]] Vec<Case> rate(const Vec<Case>& h) const {
-    Vector3<double> rate =
-        Esg7::rate<double>(h.raw(), kappa_now_rad_s_) + field_.rate<double>(h.raw()) + markov_rad_s_;
+    Vector3<double> rate = Esg7::rate<double>(h.raw(), kappa_now_rad_s_) + field_.rate<double>(h.raw()) + markov_rad_s_;
     if (bump_) {
       rate += bump_->rate(h.raw());
     }
