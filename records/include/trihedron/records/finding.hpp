@@ -32,6 +32,13 @@ enum class FindingCode : std::uint8_t {
   kDriftModelTooLarge,
   kDriftModelAtItsLimit,
   kCoefficientsChanged,
+  kGyroMountingMoved,
+  kStarTrackerMoved,
+  kMomentumJumped,
+  kInertialAxesTurned,
+  kCoefficientsNotConstant,
+  kAberrationNotCorrected,
+  kReadoutScaleOff,
   kClockOffsetFound,
   kOrbitalErrorFound,
   kStarTrackerNoise,
@@ -71,7 +78,7 @@ struct FindingRow {
   std::string_view name;     ///< stable, for programs
   FindingSeverity severity;  ///< where the one who finds it does not say otherwise
 };
-inline constexpr std::array<FindingRow, 38> kFindings = {{
+inline constexpr std::array<FindingRow, 45> kFindings = {{
     {FindingCode::kTooFewFixes, "too-few-fixes", FindingSeverity::kDoNotUse},
     {FindingCode::kShortPass, "short-pass", FindingSeverity::kWarning},
     {FindingCode::kManyRejected, "many-rejected", FindingSeverity::kWarning},
@@ -91,6 +98,13 @@ inline constexpr std::array<FindingRow, 38> kFindings = {{
     {FindingCode::kDriftModelTooLarge, "drift-model-too-large", FindingSeverity::kWarning},
     {FindingCode::kDriftModelAtItsLimit, "drift-model-at-its-limit", FindingSeverity::kWarning},
     {FindingCode::kCoefficientsChanged, "coefficients-changed", FindingSeverity::kWarning},
+    {FindingCode::kGyroMountingMoved, "gyro-mounting-moved", FindingSeverity::kDoNotUse},
+    {FindingCode::kStarTrackerMoved, "star-tracker-moved", FindingSeverity::kDoNotUse},
+    {FindingCode::kMomentumJumped, "momentum-jumped", FindingSeverity::kDoNotUse},
+    {FindingCode::kInertialAxesTurned, "inertial-axes-turned", FindingSeverity::kDoNotUse},
+    {FindingCode::kCoefficientsNotConstant, "coefficients-not-constant", FindingSeverity::kDoNotUse},
+    {FindingCode::kAberrationNotCorrected, "aberration-not-corrected", FindingSeverity::kDoNotUse},
+    {FindingCode::kReadoutScaleOff, "readout-scale-off", FindingSeverity::kDoNotUse},
     {FindingCode::kClockOffsetFound, "clock-offset-found", FindingSeverity::kNote},
     {FindingCode::kOrbitalErrorFound, "orbital-error-found", FindingSeverity::kNote},
     {FindingCode::kStarTrackerNoise, "star-tracker-noise", FindingSeverity::kWarning},
