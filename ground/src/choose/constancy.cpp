@@ -149,12 +149,13 @@ std::vector<MatrixXd> forms_of_arcs(const PassProblem& problem, const PassSoluti
 /// the steps of the parameters at the beginning of each stretch but the first, those of the momenta, the shapes, 1.
 class Constancy {
  public:
-  explicit Constancy(const Trial& trial) : problem_(trial.problem()), layout_(problem_.layout()) {
-    const PassProblem::Linear& linear = trial.linear();
+  /// `found`: converged, so that its rows are about what is most likely.
+  Constancy(const PassProblem& problem, const BatchResult& found) : problem_(problem), layout_(problem_.layout()) {
+    const PassProblem::Linear& linear = found.linear;
     for (std::size_t i = 0; i <= stretches(problem_.arcs()); ++i) {
       begins_.push_back(i * problem_.arcs() / stretches(problem_.arcs()));
     }
-    const std::vector<MatrixXd> arcs = forms_of_arcs(problem_, trial.found().before);
+    const std::vector<MatrixXd> arcs = forms_of_arcs(problem_, found.before);
     const auto count = static_cast<Index>(begins_.size()) - 1;
     const Index d = layout_.dynamic();
     const Index n = layout_.size();
@@ -309,7 +310,11 @@ std::vector<Change> changes_over(const Trial& trial) {
   if (Constancy::stretches(problem.arcs()) < kLeastStretches) {
     return {};
   }
-  const Constancy pass(trial);
+  // In steady flight an alignment is as unknown as before, and what it makes with the drift is of second order: a fifth
+  // of its sigma, enough for a decision, would look like something that moves.
+  constexpr double kConverged = 0.01;
+  const BatchResult found = most_likely(problem, trial.found().solution, kConverged);
+  const Constancy pass(problem, found);
   const Layout& layout = problem.layout();
   const Index steps = pass.steps();
   // What may be expected of each, 1-sigma: a case or a head that slips, coefficients that change by a tenth of what is
@@ -403,7 +408,7 @@ std::vector<Change> changes_over(const Trial& trial) {
       Entries entries;
       for (int gyro = std::max(k, 0); gyro < (k < 0 ? layout.gyros : k + 1); ++gyro) {
         const Eigen::Matrix<double, 2, 3> by_turn =
-            across(trial.found().before.arcs[pass.arc(step)].h_in[gyro]).transpose();
+            across(found.before.arcs[pass.arc(step)].h_in[gyro]).transpose();
         for (int i = 0; i < 2; ++i) {
           for (int j = 0; k < 0 && j < 3; ++j) {
             entries.emplace_back(pass.momentum(step, gyro) + i, j, by_turn(i, j));
