@@ -5,7 +5,8 @@ BUILD := build
 LINT_TOOLS := build-lint/tools
 SOURCES := $(shell git ls-files '*.cpp' '*.hpp' 2>/dev/null)
 
-.PHONY: help setup build everything demo test flight bench slots mutants validation consistency fuzz fuzz-build fuzz-briefly docs format lint \
+.PHONY: help setup build everything demo test flight bench slots mutants validation consistency forecasts verdict fuzz fuzz-build fuzz-briefly docs \
+  format lint \
   standard sanitize coverage install clean
 
 help:
@@ -18,6 +19,8 @@ help:
 	@echo 'make flight   fly core on an emulated Cortex-M7 and three other processors; writes the tables of docs/flight.md'
 	@echo 'make validation  measure again what docs/validation.md tells'
 	@echo 'make consistency  measure again what docs/consistency.md tells: hours; goes on where it was interrupted'
+	@echo 'make forecasts  measure again what docs/forecasts.md tells: hours; goes on where it was interrupted'
+	@echo 'make verdict  measure again what docs/verdict.md tells (WORLDS=pattern, SEEDS=number); goes on where it was interrupted'
 	@echo 'make mutants  whether the tests of core notice wrong formulas; goes on where it was interrupted'
 	@echo 'make fuzz     each reader against libFuzzer for FUZZ_SECONDS (3600) each, measures again what docs/reliability.md tells: hours'
 	@echo 'make docs     reference of the interfaces and all documents as web pages: out/docs/html/index.html'
@@ -100,6 +103,17 @@ consistency: everything
 	$(CONSISTENCY) $(WHOLE_PASS) --runs 30 --cells $(GEOMETRIES) --table observable --place observable docs/consistency.md
 	$(CONSISTENCY) $(WHOLE_PASS) --runs 30 --cells $(GEOMETRIES) --table agreement --place agreement docs/consistency.md
 	$(CONSISTENCY) $(WHOLE_PASS) --runs 20 --cells $(STEADY) --table agreement --place agreement20 docs/consistency.md
+
+forecasts: everything
+	@mkdir -p out
+	@if [ $(BUILD)/trihedron_forecasts -nt out/forecasts.csv ]; then rm -f out/forecasts.csv; fi
+	$(BUILD)/trihedron_forecasts --resume out/forecasts.csv docs/forecasts.md
+
+# WORLDS: a regular expression that their names contain. SEEDS: passes of each world. The table is of all worlds that were measured.
+SEEDS ?= 12
+verdict: build
+	@mkdir -p out
+	validation/verdict/verdict.py $(BUILD)/trihedron out/verdict.jsonl --document docs/verdict.md --worlds '$(WORLDS)' --seeds $(SEEDS) --jobs $(JOBS)
 
 # FUZZ_SECONDS: of processor time for each target. FUZZ_TARGETS: those alone, separated by commas. What is found is in out/fuzz/found, and the
 # corpus, with which the next run goes on, beside it.

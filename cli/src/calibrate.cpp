@@ -28,6 +28,7 @@
 #include "trihedron/io/config.hpp"
 #include "trihedron/io/error.hpp"
 #include "trihedron/io/named_pass.hpp"
+#include "trihedron/io/quantity.hpp"
 #include "trihedron/io/residuals.hpp"
 #include "trihedron/io/staged_directory.hpp"
 #include "trihedron/records/run.hpp"
@@ -105,7 +106,9 @@ nlohmann::ordered_json outcome_json(const Outcome& outcome) {
 std::string outcome_text(const Outcome& outcome, const CorrectionOptions& corrections) {
   const Time epoch = outcome.run.calibration.epoch;
   return fmt::format(
-      "{}{}{}{}\n{}\n{}\n", pass_text(outcome.pass.loaded), verdict_text(outcome.run.calibration.verdict),
+      "{}{}{}{}{}{}\n{}\n{}\n", verdict_line(outcome.run.calibration), pass_text(outcome.pass.loaded),
+      findings_text(outcome.run.calibration.verdict),
+      outcome.run.calibration.forecast ? forecast_text(*outcome.run.calibration.forecast) : "",
       calibration_text(outcome.run, outcome.evaluation.estimate_minus_truth),
       course_text(outcome.run, outcome.evaluation),
       evaluation_text(outcome.evaluation.navigation, epoch,
@@ -235,6 +238,7 @@ void add_calibrate(CLI::App& program, const Common& common, int& exit_status) {
     std::string drift_model;
     std::string config;
     std::string catalogue;
+    std::string need;
     bool definitive = false;
   };
   auto arguments = std::make_shared<Arguments>();
@@ -263,6 +267,7 @@ void add_calibrate(CLI::App& program, const Common& common, int& exit_status) {
         return set_drift_model(name, options) ? "" : not_one_of(name, {}, drift_model_word_choices());
       })
       ->type_name(fmt::format("{}", fmt::join(trihedron::drift_model_words(), "|")));
+  add_need(*command, arguments->need);
   command->add_flag("--definitive", arguments->definitive,
                     "Write definitive-attitude.csv as well: at each gyro sample, by estimator batch");
   command->add_option("--catalogue", arguments->catalogue, "Database to add the calibrations to; see history")
@@ -275,6 +280,9 @@ void add_calibrate(CLI::App& program, const Common& common, int& exit_status) {
     if (!arguments->drift_model.empty()) {
       static_cast<void>(set_drift_model(arguments->drift_model, options));
     }
+    if (!arguments->need.empty()) {
+      options.need = io::parse_need(arguments->need);
+    }
     if (arguments->definitive) {
       options.estimator = Estimator::kBatch;
       options.definitive_attitude = true;
@@ -286,6 +294,8 @@ void add_calibrate(CLI::App& program, const Common& common, int& exit_status) {
       "trihedron calibrate pass.nc -o out\n"
       "# Passes of one start of the rotors, combined and kept\n"
       "trihedron calibrate monday.nc tuesday.nc -o out --catalogue resurs.db\n"
+      "# Exit status 1 where the attitude is not known well enough for long enough\n"
+      "trihedron calibrate pass.nc -o out --need '5arcmin for 270min'\n"
       "# With another gate\n"
       "trihedron calibrate --print-config > settings.toml\n"
       "sed -i 's/^gate_nis.*/gate_nis = 40/' settings.toml\n"

@@ -26,6 +26,9 @@ void add_demo(CLI::App& program, const Common& common, int& exit_status);
 /// schema, man, completion: what the program says of itself.
 void add_references(CLI::App& program, int& exit_status);
 
+/// --need.
+void add_need(CLI::App& command, std::string& need);
+
 /// --config and --print-config of a command that `options` is for, in this order, after the options that overrule them:
 /// `settle` gives the settings by all of these.
 void add_config(CLI::App& command, std::string& file, const std::function<CalibrationOptions()>& settle);

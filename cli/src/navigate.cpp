@@ -18,6 +18,7 @@
 #include "trihedron/io/calibration.hpp"
 #include "trihedron/io/config.hpp"
 #include "trihedron/io/error.hpp"
+#include "trihedron/io/quantity.hpp"
 #include "trihedron/io/named_pass.hpp"
 #include "trihedron/records/run.hpp"
 #include "trihedron/records/text.hpp"
@@ -59,12 +60,13 @@ ExitStatus navigate_pass(const std::filesystem::path& pass, const NavigationFile
   const auto as_json = [&] {
     return nlohmann::ordered_json{{"pass", pass_json(loaded)},
                                   {"verdict", verdict_json(result.verdict)},
+                                  {"readiness", readiness_json(*result.forecast)},
                                   {"statistics", statistics_json(result.statistics)},
                                   {"evaluation", evaluation_json(evaluation, epoch)}};
   };
   show(beside(files.attitude.string(), common), as_json, [&] {
-    return fmt::format("{}{}\n{}\nWritten     {}: {} epochs\n", pass_text(loaded), verdict_text(result.verdict),
-                       evaluation_text(evaluation, epoch, "Attitude error"), printable(files.attitude.string()),
+    return fmt::format("{}{}{}\n{}\nWritten     {}: {} epochs\n", pass_text(loaded), verdict_text(result.verdict),
+                       forecast_text(*result.forecast), evaluation_text(evaluation, epoch, "Attitude error"), printable(files.attitude.string()),
                        result.attitude.size());
   });
   return result.verdict.trustworthy ? kTrustworthy : kDoNotUse;
@@ -78,6 +80,7 @@ void add_navigate(CLI::App& program, const Common& common, int& exit_status) {
     bool prior = false;
     std::string interval;
     std::string attitude;
+    std::string need;
     std::string config;
   };
   auto arguments = std::make_shared<Arguments>();
@@ -96,6 +99,7 @@ void add_navigate(CLI::App& program, const Common& common, int& exit_status) {
                    "Time between astro-corrections: none, only the first; continuous, each fix; 90min unless the "
                    "settings say otherwise")
       ->type_name("DURATION|none|continuous");
+  add_need(*command, arguments->need);
   command->add_option("-o,--output", arguments->attitude, "Attitude file to write (CSV); - for standard output")
       ->required()
       ->type_name("FILE");
@@ -103,6 +107,9 @@ void add_navigate(CLI::App& program, const Common& common, int& exit_status) {
     CalibrationOptions options = settings_of(arguments->config);
     if (!arguments->interval.empty()) {
       options.corrections = io::parse_correction_interval(arguments->interval);
+    }
+    if (!arguments->need.empty()) {
+      options.need = io::parse_need(arguments->need);
     }
     return options;
   };

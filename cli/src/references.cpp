@@ -79,6 +79,14 @@ void add_references(CLI::App& program, int& exit_status) {
   });
 }
 
+void add_need(CLI::App& command, std::string& need) {
+  command
+      .add_option("--need", need,
+                  "Accuracy that is needed without the star tracker, like \"5arcmin for 270min\": where it is not "
+                  "predicted with 99.7 %, the verdict is do not use")
+      ->type_name("\"ANGLE for DURATION\"");
+}
+
 void add_config(CLI::App& command, std::string& file, const std::function<CalibrationOptions()>& settle) {
   command.add_option("--config", file, "Settings (TOML); - for standard input")->type_name("FILE");
   // The last option of the command: when it is dealt with, those before it have their values.

@@ -128,7 +128,14 @@ Json calibrate_output(const Json& calibration) {
 
 Json navigate_output() {
   return object(
-      {{"pass", pass()}, {"verdict", verdict()}, {"statistics", by_name(number())}, {"evaluation", evaluation()}});
+      {{"pass", pass()},
+       {"verdict", verdict()},
+       {"readiness", object({{"limit_rad", number()},
+                             {"time_s", number()},
+                             {"is_lower_bound", flag()},
+                             {"need_met?", flag()}})},
+       {"statistics", by_name(number())},
+       {"evaluation", evaluation()}});
 }
 
 Json replay_output() {

@@ -93,8 +93,72 @@ std::string finding_text(const Finding& finding) {
                      finding.cure);
 }
 
+namespace {
+
+const char* word_of(const Verdict& verdict) { return verdict.trustworthy ? "trustworthy" : "DO NOT USE"; }
+
+std::string need_text(const NeedForecast& need) {
+  return fmt::format("{} is {}met", in_words(need.need), need.met ? "" : "not ");
+}
+
+}  // namespace
+
+std::string verdict_line(const Calibration& calibration) {
+  std::vector<std::string> parts;
+  for (const Finding& finding : calibration.verdict.findings) {
+    if (finding.severity == Finding::Severity::kDoNotUse) {
+      parts.emplace_back(name_of(finding.code));
+    }
+  }
+  if (calibration.forecast) {
+    const OpenLoopForecast& forecast = *calibration.forecast;
+    if (forecast.need && forecast.need->met) {
+      parts.push_back("the need of " + need_text(*forecast.need));
+    }
+    // What is predicted by a model that is wrong says nothing.
+    if (calibration.verdict.trustworthy) {
+      parts.push_back(in_words(forecast.usual));
+    } else if (forecast.need && parts.size() == 1 && !forecast.need->met) {
+      parts.push_back(in_words(forecast.need->accuracy));
+    }
+  }
+  if (const auto& determined = calibration.determined; determined && determined->coefficients < determined->of) {
+    parts.push_back(fmt::format("{} of {} drift coefficients not determined",
+                                determined->of - determined->coefficients, determined->of));
+  }
+  return fmt::format("Verdict     {}{}{}\n", word_of(calibration.verdict), parts.empty() ? "" : ": ",
+                     fmt::join(parts, "; "));
+}
+
+std::string forecast_text(const OpenLoopForecast& forecast) {
+  std::string text = fmt::format("Readiness   {}\n", in_words(forecast.usual));
+  if (forecast.need) {
+    text += fmt::format("            the need of {}: predicted {} by then\n", need_text(*forecast.need),
+                        angle_text(forecast.need->error_997_rad));
+  }
+  return text;
+}
+
+nlohmann::ordered_json readiness_json(const OpenLoopForecast& forecast) {
+  nlohmann::ordered_json json = {{"limit_rad", forecast.usual.limit_rad},
+                                 {"time_s", to_seconds(forecast.usual.within)},
+                                 {"is_lower_bound", forecast.usual.is_lower_bound}};
+  if (forecast.need) {
+    json["need_met"] = forecast.need->met;
+  }
+  return json;
+}
+
+std::string findings_text(const Verdict& verdict) {
+  std::string text;
+  for (const Finding& finding : verdict.findings) {
+    text += finding_text(finding);
+  }
+  return text.empty() ? text : "Findings\n" + text;
+}
+
 std::string verdict_text(const Verdict& verdict) {
-  std::string text = fmt::format("Verdict     {}\n", verdict.trustworthy ? "trustworthy" : "DO NOT USE");
+  std::string text = fmt::format("Verdict     {}\n", word_of(verdict));
   for (const Finding& finding : verdict.findings) {
     text += finding_text(finding);
   }

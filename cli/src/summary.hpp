@@ -24,6 +24,11 @@ namespace trihedron::cli {
 [[nodiscard]] std::string pass_text(const io::LoadedPass& loaded);
 [[nodiscard]] std::string finding_text(const Finding& finding);
 [[nodiscard]] std::string verdict_text(const Verdict& verdict);
+[[nodiscard]] std::string findings_text(const Verdict& verdict);
+/// In one line whether a calibration may be used, and for what.
+[[nodiscard]] std::string verdict_line(const Calibration& calibration);
+/// How long an accuracy is predicted to be kept, in one line each; and whether a need is met.
+[[nodiscard]] std::string forecast_text(const OpenLoopForecast& forecast);
 /// `estimate_minus_truth`: by row of Calibration::states; empty where there is no truth.
 [[nodiscard]] std::string calibration_text(const CalibrationRun& run, const Eigen::VectorXd& estimate_minus_truth);
 /// When the parameters settled, and how long the attitude holds with them.
@@ -39,6 +44,8 @@ namespace trihedron::cli {
 [[nodiscard]] nlohmann::ordered_json statistics_json(const Statistics& statistics);
 [[nodiscard]] nlohmann::ordered_json pass_json(const io::LoadedPass& loaded);
 [[nodiscard]] nlohmann::ordered_json findings_json(const std::vector<Finding>& findings);
+/// Whether a need is met, how long the usual limit is kept, s.
+[[nodiscard]] nlohmann::ordered_json readiness_json(const OpenLoopForecast& forecast);
 [[nodiscard]] nlohmann::ordered_json verdict_json(const Verdict& verdict);
 [[nodiscard]] nlohmann::ordered_json course_json(const CalibrationRun& run,
                                                  const ground::CalibrationEvaluation& evaluation);

@@ -207,6 +207,49 @@ def test_invariant_estimator_with_further_states(tmp_path):
         assert setting in effective
 
 
+def test_ten_minutes_say_in_the_first_line_what_they_are_good_for_and_by_the_status_what_not(csv_pass, tmp_path):
+    settings = tmp_path / "told.toml"
+    settings.write_text(TOLD)
+    directory = csv_pass(10)
+    options = ("calibrate", directory, "-o", tmp_path / "out", "--config", settings)
+    without = run(*options)
+    first = without.stdout.splitlines()[0]
+    assert without.returncode == TRUSTWORTHY, without.stdout
+    assert first.startswith("Verdict     trustworthy: attitude within 5′ for "), first
+    assert " of 14 drift coefficients not determined" in first
+    unmet = run(*options, "--need", "5arcmin for 270min")
+    assert unmet.returncode == DO_NOT_USE
+    assert unmet.stdout.startswith("Verdict     DO NOT USE: need-not-met; attitude within 5′ for ")
+    calibration = json.loads((tmp_path / "out" / "calibration.json").read_text())
+    need = calibration["forecast"]["need"]
+    assert not need["met"] and need["error_rad"] == pytest.approx(0.0014544, rel=1e-4) and need["interval_s"] == 16200
+    # The evidence names what the error is made of; the cure the time for which the need is met.
+    finding = next(f for f in calibration["verdict"]["findings"] if f["code"] == "need-not-met")
+    assert need["causes"][0]["name"] in finding["evidence"] and "orrect every" in finding["cure"]
+    kept_s = need["within"]["time_s"]
+    assert 0 < kept_s < 16200
+    # A need that is a little less is met.
+    met = run(*options, "--need", f"5arcmin for {int(kept_s) - 1}s")
+    assert met.returncode == TRUSTWORTHY and "is met" in met.stdout.splitlines()[0]
+    # The same by the settings, which the result repeats.
+    settings.write_text('need = "5arcmin for 270min"\n' + TOLD)
+    assert run(*options).returncode == DO_NOT_USE
+    assert 'need = "5arcmin for 270min"' in (tmp_path / "out" / "effective-config.toml").read_text()
+
+
+def test_navigate_says_how_long_the_attitude_will_hold(calibrated, tmp_path):
+    out, _ = calibrated
+    options = ("navigate", EXAMPLE, "--calibration", out / "calibration.json", "-o", tmp_path / "attitude.csv")
+    result = run("--json", *options)
+    readiness = json.loads(result.stdout)["readiness"]
+    assert result.returncode == TRUSTWORTHY and readiness["limit_rad"] == pytest.approx(0.0014544, rel=1e-4)
+    assert readiness["time_s"] > 4 * 3600
+    need = run(*options, "--need", "0.1arcsec for 270min")
+    assert need.returncode == DO_NOT_USE and "need-not-met" in need.stdout
+    held = run("--json", "navigate", EXAMPLE, "--prior", "-o", tmp_path / "attitude.csv")
+    assert json.loads(held.stdout)["readiness"]["time_s"] < readiness["time_s"] / 10
+
+
 def test_json_is_one_document(tmp_path):
     result = run("calibrate", EXAMPLE, "-o", tmp_path / "out", "--json")
     summary = json.loads(result.stdout)
@@ -490,6 +533,12 @@ def test_a_catalogue_that_cannot_be_written_is_a_machine_failure(start_ups, tmp_
     (("navigate", EXAMPLE, "-o", "x", "--online", "--correction-interval", "90"), "unit"),
     (("navigate", EXAMPLE, "-o", "x", "--online", "--correction-interval", "0min"), "positive"),
     (("evaluate", EXAMPLE, "--attitude", "x", "--limit", "5"), "unit"),
+    (("calibrate", EXAMPLE, "-o", "x", "--need", "5arcmin"), "5arcmin for 270min"),
+    (("calibrate", EXAMPLE, "-o", "x", "--need", "5arcmin for 270"), "unit"),
+    (("calibrate", EXAMPLE, "-o", "x", "--need", "5 for 270min"), "unit"),
+    (("calibrate", EXAMPLE, "-o", "x", "--need", "270min for 5arcmin"), "angle"),
+    (("calibrate", EXAMPLE, "-o", "x", "--need", "0arcmin for 270min"), "outside"),
+    (("navigate", EXAMPLE, "-o", "x", "--online", "--need", "5arcmin for 0min"), "outside"),
 ])
 def test_wrong_usage_is_told_in_one_line(arguments, word):
     refused(run(*arguments), WRONG_USAGE, word)
@@ -611,6 +660,8 @@ def test_a_field_that_is_no_number_is_named_with_line_and_column(csv_pass):
     ("[corrections]\ninterval = 90\n", "interval"),
     ("[corrections]\ninterval = \"-5min\"\n", "interval"),
     ("estimator = \"magic\"\n", "magic"),
+    ("need = \"5arcmin\"\n", "5arcmin for 270min"),
+    ("need = 5\n", "need"),
 ])
 def test_bad_settings_are_refused(tmp_path, config, word):
     file = tmp_path / "config.toml"

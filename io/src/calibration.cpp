@@ -300,6 +300,168 @@ Json level_json(const DriftFieldLevel& level) {
           {"sigma_factor", level.sigma_factor}};
 }
 
+Member number_member(std::string_view key, double& target, const Range& range, std::string_view about) {
+  return {key, about, number_schema(range), [&target, range](const JsonNode& node) { target = node.number(range); }};
+}
+
+Member time_member(std::string_view key, Duration& target, std::string_view about) {
+  return {key, about, number_schema(limits::kForecastTime_s),
+          [&target](const JsonNode& node) { target = from_seconds(node.number(limits::kForecastTime_s)); }};
+}
+
+Member flag_member(std::string_view key, bool& target, std::string_view about) {
+  return {key, about, {{"type", "boolean"}}, [&target](const JsonNode& node) { target = node.boolean(); }};
+}
+
+Members accuracy_members(AccuracyForecast& accuracy) {
+  return {number_member("limit_rad", accuracy.limit_rad, limits::kNeededError_rad, "total attitude error, 99.7 %"),
+          time_member("time_s", accuracy.within, "after the correction, until it is first passed"),
+          flag_member("is_lower_bound", accuracy.is_lower_bound, "it was not passed until the end of the forecast")};
+}
+
+Json accuracy_json(const AccuracyForecast& accuracy) {
+  return {{"limit_rad", accuracy.limit_rad},
+          {"time_s", to_seconds(accuracy.within)},
+          {"is_lower_bound", accuracy.is_lower_bound}};
+}
+
+Members cause_members(ErrorCause& cause) {
+  return {{"name", "of a state, or what else it is", text_schema(),
+           [&cause](const JsonNode& node) {
+             cause.name = node.text();
+             cause.is_parameter = parameter_named(cause.name).has_value();
+           }},
+          number_member("share", cause.share, limits::kShare,
+                        "of the mean square error that would not be there if it were known; they overlap")};
+}
+
+Members need_members(NeedForecast& need) {
+  ErrorCause cause;
+  return {number_member("error_rad", need.need.error_rad, limits::kNeededError_rad, "that may not be exceeded, 99.7 %"),
+          time_member("interval_s", need.need.interval, "for so long after the correction"),
+          flag_member("met", need.met, ""),
+          optional_member(number_member("error_997_rad", need.error_997_rad, limits::kForecastError_rad,
+                                        "predicted; missing where there is no attitude")),
+          {"within", "how long it is kept", schema_of(accuracy_members(need.accuracy)),
+           [&need](const JsonNode& node) { read_members(node, accuracy_members(need.accuracy)); }},
+          {"causes", "of the error at the end of the interval, largest first", array_of(schema_of(cause_members(cause))),
+           [&need](const JsonNode& node) {
+             for (const JsonNode& element : node.elements()) {
+               read_members(element, cause_members(need.causes.emplace_back()));
+             }
+           }}};
+}
+
+Json need_json(const NeedForecast& need) {
+  Json json = {{"error_rad", need.need.error_rad}, {"interval_s", to_seconds(need.need.interval)}, {"met", need.met}};
+  if (std::isfinite(need.error_997_rad)) {
+    json["error_997_rad"] = need.error_997_rad;
+  }
+  json["within"] = accuracy_json(need.accuracy);
+  json["causes"] = Json::array();
+  for (const ErrorCause& cause : need.causes) {
+    json["causes"].push_back({{"name", cause.name}, {"share", cause.share}});
+  }
+  return json;
+}
+
+/// A series of the forecast: where a value of it is in an error.
+struct ForecastSeries {
+  std::string_view key;
+  std::string_view about;
+  double (*get)(const PredictedError&);
+  void (*set)(PredictedError&, double);
+};
+
+constexpr std::array<ForecastSeries, 7> kForecastSeries = {{
+    {"after_s", "since the correction", [](const PredictedError& e) { return to_seconds(e.after); },
+     [](PredictedError& e, double value) { e.after = from_seconds(value); }},
+    {"sigma_roll_rad", "1-sigma about c x", [](const PredictedError& e) { return std::sqrt(e.covariance_rad2(0, 0)); },
+     [](PredictedError& e, double value) { e.covariance_rad2(0, 0) = value * value; }},
+    {"sigma_pitch_rad", "about c y", [](const PredictedError& e) { return std::sqrt(e.covariance_rad2(1, 1)); },
+     [](PredictedError& e, double value) { e.covariance_rad2(1, 1) = value * value; }},
+    {"sigma_heading_rad", "about c z", [](const PredictedError& e) { return std::sqrt(e.covariance_rad2(2, 2)); },
+     [](PredictedError& e, double value) { e.covariance_rad2(2, 2) = value * value; }},
+    {"error_68_rad", "that the total error is below in 68 % of the cases",
+     [](const PredictedError& e) { return e.error_68_rad; },
+     [](PredictedError& e, double value) { e.error_68_rad = value; }},
+    {"error_95_rad", "95 %", [](const PredictedError& e) { return e.error_95_rad; },
+     [](PredictedError& e, double value) { e.error_95_rad = value; }},
+    {"error_997_rad", "99.7 %", [](const PredictedError& e) { return e.error_997_rad; },
+     [](PredictedError& e, double value) { e.error_997_rad = value; }},
+}};
+
+void read_series(const JsonNode& node, const ForecastSeries& series, std::vector<PredictedError>& errors) {
+  const Range& range = series.key == kForecastSeries[0].key ? limits::kForecastTime_s : limits::kForecastError_rad;
+  const std::vector<JsonNode> values = node.elements();
+  if (series.key == kForecastSeries[0].key) {
+    errors.resize(values.size());
+  }
+  if (values.size() != errors.size()) {
+    node.refuse(fmt::format("has {} values for {} times", values.size(), errors.size()), "give one for each time");
+  }
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    series.set(errors[i], values[i].number(range));
+  }
+}
+
+Members forecast_members(OpenLoopForecast& forecast) {
+  NeedForecast need;
+  Members members = {
+      {"motion", "how the body is taken to turn", one_of(std::array{name_of(ForecastMotion::kOfPass),
+                                                                    name_of(ForecastMotion::kLastOrbit),
+                                                                    name_of(ForecastMotion::kTurnsOn)}),
+       [&forecast](const JsonNode& node) {
+         const std::optional<ForecastMotion> motion = forecast_motion_named(node.text());
+         if (!motion) {
+           node.refuse(fmt::format("is {}, no motion", in_quotes(node.text())), "calibrate again");
+         }
+         forecast.motion = *motion;
+       }},
+      {"within", "how long the usual limit is kept", schema_of(accuracy_members(forecast.usual)),
+       [&forecast](const JsonNode& node) { read_members(node, accuracy_members(forecast.usual)); }},
+      optional_member({"need", "where one is stated", schema_of(need_members(need)),
+                       [&forecast](const JsonNode& node) {
+                         read_members(node, need_members(forecast.need.emplace()));
+                       }})};
+  for (const ForecastSeries& series : kForecastSeries) {
+    members.push_back({series.key, series.about,
+                       array_of(number_schema(series.key == kForecastSeries[0].key ? limits::kForecastTime_s
+                                                                                   : limits::kForecastError_rad)),
+                       [&forecast, &series](const JsonNode& node) { read_series(node, series, forecast.errors); }});
+  }
+  return members;
+}
+
+/// Up to where there is no attitude any more.
+Json forecast_json(const OpenLoopForecast& forecast) {
+  Json json = {{"motion", name_of(forecast.motion)}, {"within", accuracy_json(forecast.usual)}};
+  if (forecast.need) {
+    json["need"] = need_json(*forecast.need);
+  }
+  for (const ForecastSeries& series : kForecastSeries) {
+    Json& values = json[std::string(series.key)] = Json::array();
+    for (const PredictedError& error : forecast.errors) {
+      if (!std::isfinite(error.error_997_rad)) {
+        break;
+      }
+      values.push_back(series.get(error));
+    }
+  }
+  return json;
+}
+
+Members determined_members(Determined& determined) {
+  constexpr int kMost = Layout::kEq1 * kMaxGyros;
+  const auto member = [](std::string_view key, int& target, std::string_view about) -> Member {
+    return {key, about, whole_schema(0, kMost), [&target](const JsonNode& node) {
+              target = static_cast<int>(node.number({0, kMost, "", "it is a number of coefficients"}));
+            }};
+  };
+  return {member("coefficients", determined.coefficients, "of eq. (1), known at least twice as well as before"),
+          member("of", determined.of, "")};
+}
+
 Time parse_epoch_node(const JsonNode& node) {
   const std::string epoch = node.text();
   const std::optional<Time> parsed = parse_epoch(epoch);
@@ -365,6 +527,8 @@ Members calibration_members(Calibration& calibration) {
   GyroCalibration gyro;
   CalibrationNoise noise;
   DriftFieldLevel level;
+  Determined determined;
+  OpenLoopForecast forecast;
   std::vector<std::string> names;
   Json gyros = array_of(schema_of(gyro_members(gyro)));
   gyros["minItems"] = 1;
@@ -396,6 +560,13 @@ Members calibration_members(Calibration& calibration) {
                                                                calibration.gyros.size()));
                          }
                        }}),
+      optional_member(
+          {"determined", "how many drift coefficients the pass determines", schema_of(determined_members(determined)),
+           [&](const JsonNode& node) { read_members(node, determined_members(calibration.determined.emplace())); }}),
+      optional_member(
+          {"forecast", "attitude error predicted for an open loop from a correction at the end of the pass",
+           schema_of(forecast_members(forecast)),
+           [&](const JsonNode& node) { read_members(node, forecast_members(calibration.forecast.emplace())); }}),
       {"covariance", "of the estimate at t_s; alignments as small rotations, c axes",
        schema_of(covariance_members(calibration, names)),
        [&](const JsonNode& node) {
@@ -474,6 +645,13 @@ std::string format_calibration(const Calibration& calibration) {
     levels.push_back(level_json(level));
   }
   const std::string field = levels.empty() ? "" : fmt::format(" \"drift_field\": {},\n", lines(levels));
+  const std::string determined =
+      calibration.determined ? fmt::format(" \"determined\": {},\n",
+                                           dump({{"coefficients", calibration.determined->coefficients},
+                                                 {"of", calibration.determined->of}}))
+                             : "";
+  const std::string forecast =
+      calibration.forecast ? fmt::format(" \"forecast\": {},\n", dump(forecast_json(*calibration.forecast))) : "";
   Json findings = Json::array();
   for (const Finding& finding : calibration.verdict.findings) {
     findings.push_back(finding_json(finding));
@@ -482,12 +660,12 @@ std::string format_calibration(const Calibration& calibration) {
       "{{\"format\": \"{}\", \"version\": {},\n"
       " \"estimator\": {}, \"epoch_tai\": \"{}\",{} \"t_s\": {},\n"
       " \"gyros\": {},\n"
-      " \"further\": {},\n{}{}"
+      " \"further\": {},\n{}{}{}{}"
       " \"covariance\": {{\n  \"states\": {},\n  \"matrix\": {}}},\n"
       " \"verdict\": {{\"trustworthy\": {}, \"findings\": {}}},\n"
       " \"statistics\": {}}}\n",
       kFormat, kVersion, dump(Json(name_of(calibration.estimator))), format_epoch(calibration.epoch), start_up,
-      dump(Json(to_seconds(calibration.t - calibration.epoch))), lines(gyros), dump(further), noise, field,
+      dump(Json(to_seconds(calibration.t - calibration.epoch))), lines(gyros), dump(further), noise, field, determined, forecast,
       dump(states), lines(matrix), calibration.verdict.trustworthy, lines(findings), dump(statistics));
 }
 

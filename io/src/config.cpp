@@ -22,6 +22,8 @@ namespace fs = std::filesystem;
 constexpr std::string_view kNever = "never";
 constexpr std::string_view kOnlyFirst = "none";
 constexpr std::string_view kEachFix = "continuous";
+constexpr std::string_view kNeed = "need";
+constexpr std::string_view kNoNeed = "none";
 constexpr std::string_view kWanderingTime = "wandering_time";
 
 using Choice = FurtherStateOptions::Choice;
@@ -71,6 +73,18 @@ Field duration_or(std::string_view word, std::string_view key, Duration& target,
             } else {
               duration(key, target, range_s, about).read(table, node);
             }
+          }};
+}
+
+Field need(CalibrationOptions& options) {
+  const auto schema = [] {
+    return any_of({one_of(std::array{kNoNeed}),
+                   Json{{"type", "string"}, {"pattern", " for "}, {"examples", {"5arcmin for 270min"}}}});
+  };
+  return {kNeed, "accuracy of the attitude without the star tracker, 99.7 %, like 5arcmin for 270min; or none", schema,
+          [&options](const TomlTable& table, const toml::node& node) {
+            const std::string given = quantity_text(table, node, kNeed);
+            options.need = given == kNoNeed ? std::nullopt : std::optional(parse_need(given));
           }};
 }
 
@@ -134,7 +148,7 @@ Fields correction_fields(CorrectionOptions& corrections) {
 
 Fields file_fields(CalibrationOptions& options, const fs::path& file) {
   return {
-      estimator(options), drift_model(options),
+      estimator(options), drift_model(options), need(options),
       section("filter", file, "[filter]", "of estimators invariant and batch", [&] { return filter_fields(options); }),
       section("further_states", file, "[further_states]", "of estimators invariant and batch",
               [&] { return further_state_fields(options.further_states); }),
@@ -213,6 +227,7 @@ std::string format_config(const CalibrationOptions& options) {
   Writer out(schema);
   out.word("estimator", name_of(options.estimator));
   out.word("drift_model", drift_model_word(options));
+  out.word(kNeed, options.need ? format_need(*options.need) : std::string(kNoNeed));
 
   out.section("filter");
   out.word("noise", options.find_noise ? "found" : "told");

@@ -115,6 +115,20 @@ double parse_angle_rad(std::string_view text) { return parse_quantity(text, kAng
 double parse_rate_rad_s(std::string_view text) { return parse_quantity(text, kRate); }
 double parse_random_walk_rad_sqrt_s(std::string_view text) { return parse_quantity(text, kRandomWalk); }
 
+Need parse_need(std::string_view text) {
+  constexpr std::string_view kFor = " for ";
+  const std::size_t at = text.find(kFor);
+  if (at == std::string_view::npos) {
+    throw UsageError(fmt::format("{} is not an accuracy that is needed: write an angle and how long it must be kept, "
+                                 "each with its unit (for example 5arcmin for 270min)",
+                                 in_quotes(text)));
+  }
+  const std::string_view error = text.substr(0, at);
+  const std::string_view interval = text.substr(at + kFor.size());
+  return {within(limits::kNeededError_rad, parse_angle_rad(error), error),
+          within(limits::kNeededInterval_s, parse_duration(interval), interval)};
+}
+
 double within(const Range& range, double value, std::string_view text) {
   if (!range.holds(value)) {
     throw UsageError(fmt::format("{} {}: {}", in_quotes(text), is_outside(value, range), range.why));
@@ -134,6 +148,10 @@ double parse_number(std::string_view text) {
                                  in_quotes(text)));
   }
   return parsed->number;
+}
+
+std::string format_need(const Need& need) {
+  return format_angle(need.error_rad) + " for " + format_duration(need.interval);
 }
 
 std::string format_duration(Duration duration) {

@@ -173,7 +173,27 @@ Fields drift_fields(DriftScenario& drift, const fs::path& file) {
       quantity("direction_walk", drift.direction_walk_rad_sqrt_s, kRandomWalk, "of the momentum about each case axis"),
       quantity("markov_sigma", drift.markov_sigma_rad_s, kRate,
                "1-sigma of a first-order Gauss-Markov drift about each case axis"),
-      signed_duration("markov_time", drift.markov_time_s, "its correlation time")};
+      signed_duration("markov_time", drift.markov_time_s, "its correlation time"),
+      quantity("bump", drift.bump_rad_s, kRate, "largest drift of a sharp feature on the sphere of directions"),
+      three_numbers("bump_centre", drift.bump_centre, limits::kPureNumber,
+                    "where it is, case axes, of any length but 0; without it drawn from the seed"),
+      quantity("bump_radius", drift.bump_radius_rad, kAngle, "beyond which it is nothing"),
+      quantity("hysteresis", drift.hysteresis_rad_s, kRate,
+               "largest drift that depends on the side from which a direction was reached"),
+      quantity("hysteresis_width", drift.hysteresis_width_rad, kAngle, "after which it has changed sides"),
+      one_number("slew_fraction", drift.slew_fraction, limits::kPureNumber,
+                 "by which the coefficients are larger in a slew"),
+      signed_duration("slew_time", drift.slew_time_s, "in which that decays to 1/e after it"),
+      quantity("jump_sigma", drift.jump_sigma_rad_s, kRate, "1-sigma of one jump of each coefficient"),
+      signed_duration("jump_at", drift.jump_at_s, "when they jump, since the start of the pass"),
+      one_number("polhode_fraction", drift.polhode_fraction, limits::kPureNumber,
+                 "by which the polhode of the rotor modulates the coefficients"),
+      signed_duration("polhode_period", drift.polhode_period_s, "of the polhode at the start of the pass"),
+      one_number("polhode_period_rate", drift.polhode_period_rate, limits::kPureNumber,
+                 "by which that period grows, seconds per second"),
+      one_number("thermal_fraction", drift.thermal_fraction, limits::kPureNumber,
+                 "by which the coefficients are larger in sunlight, smaller in the Earth's shadow"),
+      signed_duration("thermal_time", drift.thermal_time_s, "in which they follow light and shadow")};
 }
 
 Fields readout_fields(ReadoutScenario& readout) {

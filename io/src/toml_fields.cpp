@@ -112,6 +112,14 @@ Field three_numbers(std::string_view key, Eigen::Vector3d& target, const Range& 
           }};
 }
 
+Field three_numbers(std::string_view key, std::optional<Eigen::Vector3d>& target, const Range& range,
+                    std::string_view about) {
+  return {key, about, [range] { return three_of(number_schema(range)); },
+          [key, &target, range](const TomlTable& table, const toml::node& node) {
+            target = table.three_numbers(node, key, range);
+          }};
+}
+
 std::string quantity_text(const TomlTable& table, const toml::node& node, std::string_view key) {
   if (!node.is_string()) {
     table.refuse(node, fmt::format("\"{}\" must be a string with a number and its unit", key),

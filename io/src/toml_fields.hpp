@@ -52,6 +52,8 @@ void read_fields(const toml::table& table, const std::filesystem::path& file, co
 /// Numbers along or about x, y, z.
 [[nodiscard]] Field three_numbers(std::string_view key, Eigen::Vector3d& target, const Range& range,
                                   std::string_view about);
+[[nodiscard]] Field three_numbers(std::string_view key, std::optional<Eigen::Vector3d>& target, const Range& range,
+                                  std::string_view about);
 /// A number of something.
 [[nodiscard]] Field whole(std::string_view key, int& target, const Range& range, std::string_view about);
 

@@ -6,8 +6,10 @@
 
 #include <algorithm>
 #include <bit>
+#include <chrono>
 #include <cmath>
 #include <cstdint>
+#include <limits>
 
 #include "fixtures.hpp"
 #include "trihedron/core/drift.hpp"
@@ -23,6 +25,46 @@ std::string refusal_of(std::string_view text) {
 }
 
 std::string sample_text() { return format_calibration(sample_calibration()); }
+
+TEST(CalibrationJson, KeepsTheForecastUpToWhereThereIsNoAttitude) {
+  Calibration calibration = sample_calibration();
+  calibration.determined = Determined{7, 14};
+  OpenLoopForecast& forecast = calibration.forecast.emplace();
+  forecast.motion = ForecastMotion::kTurnsOn;
+  forecast.usual = {1.5e-3, std::chrono::minutes(90), true};
+  forecast.need = NeedForecast{{1e-3, std::chrono::minutes(30)}, false, 2e-3, {1e-3, std::chrono::minutes(20), false},
+                               {{"gyro1.k0", true, 0.75}, {"readout noise", false, 0.25}}};
+  for (const double sigma : {1e-4, 2e-4, std::numeric_limits<double>::infinity()}) {
+    PredictedError& error = forecast.errors.emplace_back();
+    error.after = std::chrono::minutes(10) * static_cast<int>(forecast.errors.size() - 1);
+    error.covariance_rad2 = Eigen::Vector3d(sigma * sigma, 4 * sigma * sigma, 9 * sigma * sigma).asDiagonal();
+    error.error_68_rad = sigma;
+    error.error_95_rad = 2 * sigma;
+    error.error_997_rad = 3 * sigma;
+  }
+  const Calibration back = parse_calibration(format_calibration(calibration), "calibration.json");
+  EXPECT_EQ(back.determined->coefficients, 7);
+  EXPECT_EQ(back.determined->of, 14);
+  ASSERT_TRUE(back.forecast && back.forecast->need);
+  EXPECT_EQ(back.forecast->motion, ForecastMotion::kTurnsOn);
+  EXPECT_EQ(back.forecast->usual.within, forecast.usual.within);
+  EXPECT_TRUE(back.forecast->usual.is_lower_bound);
+  EXPECT_EQ(back.forecast->need->need, forecast.need->need);
+  EXPECT_FALSE(back.forecast->need->met);
+  EXPECT_EQ(back.forecast->need->error_997_rad, 2e-3);
+  EXPECT_EQ(back.forecast->need->accuracy.within, std::chrono::minutes(20));
+  ASSERT_EQ(back.forecast->need->causes.size(), 2U);
+  EXPECT_TRUE(back.forecast->need->causes[0].is_parameter);
+  EXPECT_FALSE(back.forecast->need->causes[1].is_parameter);
+  ASSERT_EQ(back.forecast->errors.size(), 2U);
+  for (std::size_t i = 0; i < 2; ++i) {
+    EXPECT_EQ(back.forecast->errors[i].after, forecast.errors[i].after);
+    EXPECT_TRUE(back.forecast->errors[i].covariance_rad2.isApprox(forecast.errors[i].covariance_rad2, 1e-12));
+    EXPECT_EQ(back.forecast->errors[i].error_68_rad, forecast.errors[i].error_68_rad);
+    EXPECT_EQ(back.forecast->errors[i].error_95_rad, forecast.errors[i].error_95_rad);
+    EXPECT_EQ(back.forecast->errors[i].error_997_rad, forecast.errors[i].error_997_rad);
+  }
+}
 
 TEST(CalibrationJson, NamesTheStartUpWhereItIsKnown) {
   Calibration calibration = sample_calibration();

@@ -152,6 +152,42 @@ outlier_probability = 0.01
   EXPECT_EQ(scenario.star_tracker.outlier_probability, 0.01);
 }
 
+TEST(ScenarioToml, DriftOutsideEveryModelGoesWhereItsNamesSay) {
+  const DriftScenario drift = parse(R"([gyro.drift]
+bump = "1e-7rad/s"
+bump_centre = [0, 1, 2]
+bump_radius = "15deg"
+hysteresis = "2e-8rad/s"
+hysteresis_width = "3deg"
+slew_fraction = 0.1
+slew_time = "10min"
+jump_sigma = "3e-8rad/s"
+jump_at = "2h"
+polhode_fraction = 0.2
+polhode_period = "90min"
+polhode_period_rate = -0.01
+thermal_fraction = 0.3
+thermal_time = "5min"
+)")
+                                  .gyros[1]
+                                  .drift;
+  EXPECT_EQ(drift.bump_rad_s, 1e-7);
+  EXPECT_EQ(drift.bump_centre, Eigen::Vector3d(0, 1, 2));
+  EXPECT_DOUBLE_EQ(drift.bump_radius_rad, 15 * kDegree);
+  EXPECT_EQ(drift.hysteresis_rad_s, 2e-8);
+  EXPECT_DOUBLE_EQ(drift.hysteresis_width_rad, 3 * kDegree);
+  EXPECT_EQ(drift.slew_fraction, 0.1);
+  EXPECT_EQ(drift.slew_time_s, 600);
+  EXPECT_EQ(drift.jump_sigma_rad_s, 3e-8);
+  EXPECT_EQ(drift.jump_at_s, 7200);
+  EXPECT_EQ(drift.polhode_fraction, 0.2);
+  EXPECT_EQ(drift.polhode_period_s, 5400);
+  EXPECT_EQ(drift.polhode_period_rate, -0.01);
+  EXPECT_EQ(drift.thermal_fraction, 0.3);
+  EXPECT_EQ(drift.thermal_time_s, 300);
+  EXPECT_FALSE(parse("").gyros[0].drift.bump_centre);
+}
+
 TEST(ScenarioToml, SlewsNoneAndImagingAreAlternatives) {
   EXPECT_TRUE(std::get<std::vector<Slew>>(parse("attitude = {slews = \"none\"}").attitude.slews).empty());
   EXPECT_EQ(std::get<ImagingProgramme>(parse("attitude = {imaging = {dwell = \"5min\"}}").attitude.slews).dwell_s, 300);

@@ -323,6 +323,41 @@ const FIGURES = {
     return { traces, layout };
   },
 
+  forecast(data, look) {
+    const { colour } = look;
+    const { predicted, limit, loops, need } = data.forecast;
+    const layout = baseLayout(look, look.print ? 300 : 420);
+    const longest = predicted.t.at(-1);
+    layout.xaxis = { ...axisStyle(colour), title: axisTitle("time since the correction, min", 8), range: [0, longest],
+      dtick: timeTick(longest, look.width), tick0: 0, hoverformat: ".0f" };
+    layout.yaxis = { ...axisStyle(colour), type: "log", title: axisTitle("total error, ″", 6), dtick: 1 };
+    layout.shapes.push(level(limit, panel(0), colour.ink, "dot", 1.4));
+    if (need) {
+      layout.shapes.push({ type: "line", xref: "x", yref: "y", x0: 0, x1: need.interval, y0: need.limit, y1: need.limit,
+        line: { color: colour.vermillion, width: 3 } });
+    }
+    const shares = ["68 %", "95 %", "99.7 %"];
+    const traces = shares.map((share, i) => line(predicted.t, predicted.y[i], panel(0), { name: `predicted, ${share}`,
+      showlegend: true, line: { color: colour.blue, width: 1.2 + 0.5 * i, dash: ["dot", "dash", "solid"][i] },
+      hovertemplate: `%{x:.0f} min after: %{y:.3~g}″<extra>${share} of the errors are below</extra>` }));
+    for (const { corrected, flown, predicted: bound } of loops) {
+      const of = `corrected at ${Math.round(corrected)} min`;
+      traces.push(line(flown.t, flown.y[0], panel(0), { line: { color: faded(colour.vermillion, 0.7), width: 1 },
+        hovertemplate: `%{x:.0f} min after: %{y:.3~g}″<extra>${of}, flown</extra>` }));
+      traces.push(line(bound.t, bound.y[0], panel(0), { line: { color: faded(colour.vermillion, 0.5), width: 1, dash: "dash" },
+        hovertemplate: `%{x:.0f} min after: %{y:.3~g}″<extra>${of}, 99.7 % as predicted then</extra>` }));
+    }
+    if (loops.length > 0) {
+      traces.push(legendOnly("flown in the pass", { color: colour.vermillion, width: 1 }),
+        legendOnly("99.7 % of it, predicted then", { color: colour.vermillion, width: 1, dash: "dash" }));
+    }
+    traces.push(legendOnly("limit", { color: colour.ink, dash: "dot", width: 1.4 }));
+    if (need) {
+      traces.push(legendOnly("needed", { color: colour.vermillion, width: 3 }));
+    }
+    return { traces, layout };
+  },
+
   innovations(data, look) {
     const { colour } = look;
     const columns = look.width < 640 ? 1 : 2;

@@ -51,6 +51,7 @@ class Figures {
       put("attitude", errors(input_.evaluation->attitude.errors));
       put("open_loops", open_loops());
     }
+    put("forecast", forecast());
     put("innovations", innovations());
     put("histogram", histogram());
     put("nis", nis());
@@ -138,6 +139,60 @@ class Figures {
       }
     }
     return loops.empty() ? loops : json{{"limit", input_.evaluation->limit_rad / kArcsecond_rad}, {"loops", loops}};
+  }
+
+  /// Of the total error over the time since the correction, min, in steps of this length, ″.
+  [[nodiscard]] static Series medians(const ground::AttitudeErrors& errors, double step_min) {
+    Series series(1, 2 * step_min);
+    for (std::size_t begin = 0; begin < errors.t.size();) {
+      const double step = std::floor(errors.age_s[begin] / 60 / step_min);
+      std::vector<double> totals;
+      for (; begin < errors.t.size() && std::floor(errors.age_s[begin] / 60 / step_min) == step; ++begin) {
+        totals.push_back(errors.error_rad[begin].norm() / kArcsecond_rad);
+      }
+      const auto middle = totals.begin() + static_cast<std::ptrdiff_t>(totals.size() / 2);
+      std::ranges::nth_element(totals, middle);
+      series.add((step + 0.5) * step_min, {*middle});
+    }
+    return series;
+  }
+
+  /// The predicted total error over the time since the correction, ″, and how far the open loops of the pass have gone.
+  [[nodiscard]] json forecast() const {
+    const std::optional<OpenLoopForecast>& its = run_.calibration.forecast;
+    if (!its || its->errors.size() < 2) {
+      return {};
+    }
+    Series series(3, 2 * to_minutes(its->errors[1].after));
+    for (const PredictedError& error : its->errors) {
+      series.add(to_minutes(error.after), {error.error_68_rad / kArcsecond_rad, error.error_95_rad / kArcsecond_rad,
+                                           error.error_997_rad / kArcsecond_rad});
+    }
+    json loops = json::array();
+    // At the first correction nothing is calibrated yet.
+    for (std::size_t i = 1; input_.evaluation != nullptr && i < input_.evaluation->open_loops.size(); ++i) {
+      const ground::OpenLoops& one = input_.evaluation->open_loops[i];
+      if (one.predicted.size() < 2 || one.calibrated.t.size() < 2) {
+        continue;
+      }
+      const double step_min = to_minutes(one.predicted[1].after);
+      Series predicted(1, 2 * step_min);
+      for (const PredictedError& error : one.predicted) {
+        predicted.add(to_minutes(error.after), {error.error_997_rad / kArcsecond_rad});
+      }
+      const Series flown = medians(one.calibrated, step_min);
+      loops.push_back({{"corrected", rounded(minutes(one.calibrated.t.front()), 6)},
+                       {"flown", flown.drawn(kHalf / 2)},
+                       {"predicted", predicted.drawn(kHalf / 2)}});
+    }
+    json figure = {{"predicted", series.drawn(kHalf)},
+                   {"limit", its->usual.limit_rad / kArcsecond_rad},
+                   {"loops", loops}};
+    if (its->need) {
+      figure["need"] = {{"limit", its->need->need.error_rad / kArcsecond_rad},
+                        {"interval", to_minutes(its->need->need.interval)}};
+    }
+    return figure;
   }
 
   /// Per component the used ones with their sigmas, and the ones that the gate rejected.

@@ -1,7 +1,9 @@
 #include "trihedron/sim/gyro.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numbers>
 #include <stdexcept>
 
 #include "trihedron/sim/precession.hpp"
@@ -57,22 +59,47 @@ Drift::Drift(const DriftScenario& scenario, std::uint64_t seed, std::uint64_t gy
       field_(outside_members(scenario, seed, gyro)),
       coefficient_random_(seed, Source::kCoefficientWalk, gyro),
       walk_random_(seed, Source::kDirectionWalk, gyro),
-      markov_random_(seed, Source::kMarkovDrift, gyro) {
+      markov_random_(seed, Source::kMarkovDrift, gyro),
+      jump_random_(seed, Source::kCoefficientJump, gyro) {
   if (scenario.markov_sigma_rad_s > 0) {
     markov_rad_s_ = scenario.markov_sigma_rad_s * markov_random_.normal3();
   }
+  if (scenario.bump_rad_s != 0) {
+    bump_.emplace(scenario.bump_rad_s,
+                  scenario.bump_centre.value_or(Stream(seed, Source::kDriftBump, gyro).direction()),
+                  scenario.bump_radius_rad);
+  }
+  if (scenario.hysteresis_rad_s != 0) {
+    hysteresis_.emplace(scenario.hysteresis_rad_s, scenario.hysteresis_width_rad);
+  }
+  if (scenario.slew_fraction != 0 || scenario.polhode_fraction != 0 || scenario.thermal_fraction != 0) {
+    modulation_.emplace(scenario, 2 * std::numbers::pi * Stream(seed, Source::kPolhode, gyro).uniform());
+  }
+  warm_up_ = scenario.warm_up_fraction;
 }
 
-void Drift::next_step(double t_s, double step_s) {
+void Drift::next_step(double t_s, double step_s, const Vec<Case>& h, const DriftModulation::Flight& flight) {
   if (scenario_.coefficient_walk_rad_s_sqrt_s > 0) {
     const double sigma = scenario_.coefficient_walk_rad_s_sqrt_s * std::sqrt(step_s);
     for (int i = 0; i < Esg7::kSize; ++i) {
       kappa_rad_s_(i) += sigma * coefficient_random_.normal();
     }
-    kappa_now_rad_s_ = kappa_rad_s_;
+  }
+  if (scenario_.jump_sigma_rad_s > 0 && !has_jumped_ && t_s >= scenario_.jump_at_s) {
+    has_jumped_ = true;
+    for (int i = 0; i < Esg7::kSize; ++i) {
+      kappa_rad_s_(i) += scenario_.jump_sigma_rad_s * jump_random_.normal();
+    }
   }
   if (scenario_.warm_up_fraction != 0) {
-    kappa_now_rad_s_ = kappa_rad_s_ * (1 + scenario_.warm_up_fraction * std::exp(-t_s / scenario_.warm_up_time_s));
+    warm_up_ = scenario_.warm_up_fraction * std::exp(-t_s / scenario_.warm_up_time_s);
+  }
+  if (modulation_) {
+    modulation_->next_step(t_s, step_s, flight);
+  }
+  kappa_now_rad_s_ = kappa_rad_s_ * (1 + warm_up_ + (modulation_ ? modulation_->now() : 0));
+  if (hysteresis_) {
+    hysteresis_->move_to(h.raw());
   }
   if (scenario_.direction_walk_rad_sqrt_s > 0) {
     walk_rad_ = Vec<Case>::assume(scenario_.direction_walk_rad_sqrt_s * std::sqrt(step_s) * walk_random_.normal3());
@@ -82,6 +109,20 @@ void Drift::next_step(double t_s, double step_s) {
     markov_rad_s_ =
         kept * markov_rad_s_ + scenario_.markov_sigma_rad_s * std::sqrt(1 - kept * kept) * markov_random_.normal3();
   }
+}
+
+Esg7::Coefficients<double> Drift::part_in_eq1_rad_s() const {
+  Esg7::Coefficients<double> part = kappa_rad_s_ * (1 + warm_up_ + (modulation_ ? modulation_->mean() : 0));
+  // Members of other degrees are orthogonal to eq. (1); those drawn as outside of it are so, too.
+  const auto may_be_in_eq1 = [](const DriftHarmonic& member) {
+    return member.amplitude_rad_s != 0 && member.degree >= 2 && member.degree <= 4;
+  };
+  if (bump_ || std::ranges::any_of(scenario_.harmonics, may_be_in_eq1)) {
+    part += part_in_eq1([this](const Vector3d& h) -> Vector3d {
+      return field_.rate<double>(h) + (bump_ ? bump_->rate(h) : Vector3d(Vector3d::Zero()));
+    });
+  }
+  return part;
 }
 
 Readout::Readout(const ReadoutScenario& scenario, Duration sample_period, std::uint64_t seed, int gyro)
@@ -132,8 +173,12 @@ Gyro::Gyro(const GyroScenario& scenario, const Rot<In, C>& C_in_c, std::uint64_t
       C_in_b_(C_in_c * C_c_b_),
       h_in_(C_in_c * start_direction(scenario)) {}
 
-void Gyro::advance(double t_s, double step_s, const Rot<In, C>& middle, const Rot<In, C>& end) {
-  drift_.next_step(t_s, step_s);
+void Gyro::advance(double t_s, double step_s, const Rot<In, C>& middle, const Rot<In, C>& end, bool sunlit) {
+  DriftModulation::Flight flight{0, sunlit};
+  if (drift_.is_modulated()) {
+    flight.body_rate_rad_s = (C_in_b_.inverse() * (end * C_c_b_)).log().raw().norm() / step_s;
+  }
+  drift_.next_step(t_s, step_s, momentum_in_case(), flight);
   if (mounting_change_.is_there()) {
     C_c_b_ = Rot<C, C>::exp(Vec<C>::assume(mounting_change_.at(t_s + step_s))) * C_c_b_at_start_;
   }
@@ -152,8 +197,9 @@ void Gyro::advance(double t_s, double step_s, const Rot<In, C>& middle, const Ro
 
 Truth::Gyro Gyro::truth() const {
   Truth::Gyro truth;
+  const Esg7::Coefficients<double> part = drift_.part_in_eq1_rad_s();
   for (int i = 0; i < Esg7::kSize; ++i) {
-    truth.drift_rad_s.emplace_back(DriftCoefficient::of_eq1(i), drift_.kappa_rad_s()(i));
+    truth.drift_rad_s.emplace_back(DriftCoefficient::of_eq1(i), part(i));
   }
   for (const DriftHarmonic& member : drift_.outside().members()) {
     truth.unmodelled_rad_s.emplace_back(name(member), member.amplitude_rad_s);

@@ -24,7 +24,7 @@ void require(bool condition, const std::string& message) {
 
 bool is_probability(double p) { return p >= 0 && p <= 1; }
 
-void check(const GyroScenario& gyro, const std::string& name) {
+void check(const GyroScenario& gyro, const std::string& name, double duration_s) {
   const DriftScenario& drift = gyro.drift;
   const ReadoutScenario& readout = gyro.readout;
   require(gyro.misalignment_magnitude_rad >= 0, name + ".misalignment_magnitude_rad must not be negative");
@@ -36,6 +36,12 @@ void check(const GyroScenario& gyro, const std::string& name) {
   require(drift.markov_sigma_rad_s >= 0, name + ".drift.markov_sigma_rad_s must not be negative");
   require(drift.warm_up_time_s > 0, name + ".drift.warm_up_time_s must be positive");
   require(drift.markov_time_s > 0, name + ".drift.markov_time_s must be positive");
+  require(drift.jump_sigma_rad_s >= 0, name + ".drift.jump_sigma_rad_s must not be negative");
+  require(drift.slew_time_s > 0, name + ".drift.slew_time_s must be positive");
+  require(drift.polhode_period_s > 0, name + ".drift.polhode_period_s must be positive");
+  require(drift.polhode_period_s + drift.polhode_period_rate * duration_s > 0,
+          name + ".drift.polhode_period_rate makes the period negative within the pass");
+  require(drift.thermal_time_s > 0, name + ".drift.thermal_time_s must be positive");
   require(readout.noise_rad >= 0, name + ".readout.noise_rad must not be negative");
   require(readout.quantum_rad >= 0, name + ".readout.quantum_rad must not be negative");
   require(readout.stuck_s >= 0, name + ".readout.stuck_s must not be negative");
@@ -64,7 +70,7 @@ void check(const Scenario& scenario) {
       "star_tracker_period must be a multiple of gyro_period");
   require(scenario.gyros.size() >= 2 && scenario.gyros.size() <= 4, "there must be 2 to 4 gyros");
   for (std::size_t i = 0; i < scenario.gyros.size(); ++i) {
-    check(scenario.gyros[i], "gyros[" + std::to_string(i) + "]");
+    check(scenario.gyros[i], "gyros[" + std::to_string(i) + "]", to_seconds(scenario.duration));
   }
   require(scenario.attitude.jitter_rad >= 0, "attitude.jitter_rad must not be negative");
   check(scenario.star_tracker, "star_tracker");
@@ -113,6 +119,13 @@ void record_truth(Time t, const Rot<In, C>& C_in_c, const std::vector<Gyro>& gyr
   }
 }
 
+/// Whether the Earth does not hide the Sun. The shadow is a cylinder: over the penumbra of ten seconds nothing warms.
+bool is_sunlit(const Vec<In>& position_m, const Vec<In>& sun_m) {
+  const Eigen::Vector3d r = position_m.raw();
+  const Eigen::Vector3d to_sun = sun_m.raw().normalized();
+  return r.dot(to_sun) > 0 || r.cross(to_sun).norm() > kEarthRadius_m;
+}
+
 Truth::StarTracker truth_of(const StarTrackerScenario& head) {
   return {head.clock_offset_s - head.latency_s, head.orbital_sine_rad, head.orbital_cosine_rad, head.misalignment_rad};
 }
@@ -133,6 +146,10 @@ SimulatedPass simulate(const Scenario& scenario) {
 
   const KeplerJ2 orbit(scenario.orbit);
   const AttitudeProgramme attitude(scenario.attitude, orbit, scenario.seed, -margin_s, duration_s + margin_s);
+
+  const Sky sky(scenario.epoch, -margin_s, duration_s + margin_s);
+  const bool is_warmed = std::ranges::any_of(
+      scenario.gyros, [](const GyroScenario& gyro) { return gyro.drift.thermal_fraction != 0; });
 
   Rot<In, C> C_in_c = attitude.at(0);
   std::vector<Gyro> gyros;
@@ -171,8 +188,9 @@ SimulatedPass simulate(const Scenario& scenario) {
     }
     const Rot<In, C> middle = attitude.at(t_s + step_s / 2);
     const Rot<In, C> end = attitude.at(t_s + step_s);
+    const bool sunlit = is_warmed && is_sunlit(orbit.at(t_s).position_m, sky.at(t_s).sun_m);
     for (Gyro& gyro : gyros) {
-      gyro.advance(t_s, step_s, middle, end);
+      gyro.advance(t_s, step_s, middle, end, sunlit);
     }
     C_in_c = end;
   }
@@ -180,7 +198,6 @@ SimulatedPass simulate(const Scenario& scenario) {
     result.truth.gyros.push_back(gyro.truth());
   }
 
-  const Sky sky(scenario.epoch, -margin_s, duration_s + margin_s);
   for (std::size_t i = 0; i < heads.size(); ++i) {
     StarTrackerTelemetry& fixes = i == 0 ? result.pass.star_tracker : result.pass.further_star_trackers.emplace_back();
     fixes = simulate_fixes(heads[i], {attitude, orbit, sky}, scenario.epoch, scenario.duration,

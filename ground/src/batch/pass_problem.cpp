@@ -254,6 +254,12 @@ MatrixXd PassProblem::by_states_of_arc(const Moment& moment, Rows rows) const {
   return by_states;
 }
 
+MatrixXd PassProblem::momentum_by_states(const Moment& moment, int gyro) const {
+  Rows rows = Rows::Zero(3, on_board_.size());
+  rows.middleCols<3>(on_board_.direction(gyro)).setIdentity();
+  return by_states_of_arc(moment, rows);
+}
+
 VectorXd PassProblem::as_states(int gyro, const VectorXd& outside) const {
   return modes_ ? VectorXd(modes_->gyros[gyro].amplitudes * outside) : outside;
 }

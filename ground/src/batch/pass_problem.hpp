@@ -151,6 +151,8 @@ class PassProblem {
   /// Rows about the states at a moment, as on board, as rows about those of its arc.
   using Rows = ComparedRows<kPassCapacity.states>;
   [[nodiscard]] Eigen::MatrixXd by_states_of_arc(const Moment& moment, Rows rows) const;
+  /// φ of a momentum, `in`, by the states of the arc.
+  [[nodiscard]] Eigen::MatrixXd momentum_by_states(const Moment& moment, int gyro) const;
   /// Derivative of the error of an attitude, c axes, by the states of the arc.
   [[nodiscard]] Eigen::MatrixXd attitude_by_states(const Moment& moment, const AttitudeByDirections& attitude,
                                                    const Directions& h_b) const;

@@ -9,6 +9,7 @@
 
 #include "batch/pass_setup.hpp"
 #include "batch/smoothed_attitude.hpp"
+#include "model/open_loop_start.hpp"
 #include "model/prior.hpp"
 #include "model/setup.hpp"
 #include "trihedron/ground/model/setup_error.hpp"
@@ -141,6 +142,7 @@ std::vector<FurtherEstimate> further_of(const PassProblem& problem, const BatchR
 struct Parameters {
   Gyros gyros;
   MatrixXd covariance;
+  MatrixXd by_states;  ///< their errors by those of κ and δ along the pass
 };
 
 /// Those of a drift field. What the pass says of its modes is known; the members are the most likely ones that make
@@ -148,7 +150,7 @@ struct Parameters {
 Parameters with_members(const PassProblem& problem, const FieldPrior& field, const Parameters& by_modes) {
   const Layout& modes = problem.layout();
   const Layout members = problem.setup().layout();
-  Parameters found{by_modes.gyros, MatrixXd::Zero(members.parameters(), members.parameters())};
+  Parameters found{by_modes.gyros, MatrixXd::Zero(members.parameters(), members.parameters()), {}};
   PerGyro<MatrixXd> by_modes_of_gyro;
   const Eigen::Index size = members.drift_size() - Layout::kEq1;
   for (int k = 0; k < members.gyros; ++k) {
@@ -162,11 +164,33 @@ Parameters with_members(const PassProblem& problem, const FieldPrior& field, con
     outside = (by_mode * (amplitudes * outside)).eval();
     found.covariance.block(row, row, size, size) = MatrixXd(variance.asDiagonal()) - by_mode * before.transpose();
   }
-  const MatrixXd follow = parameters_by_parameters(members, modes, by_modes_of_gyro);
-  found.covariance += follow * by_modes.covariance * follow.transpose();
+  found.by_states = parameters_by_parameters(members, modes, by_modes_of_gyro);
+  found.covariance += found.by_states * by_modes.covariance * found.by_states.transpose();
   const Eigen::LLT<MatrixXd> root(found.covariance.reverse());
   found.covariance += positive_part(field.more_covariance, MatrixXd(root.matrixL()).reverse());
   return found;
+}
+
+/// What is known of the errors at the last moment of the pass.
+OpenLoopStart errors_at_end(const PassProblem& problem, const BatchResult& result, const PassProblem::Moment& last,
+                            const Parameters& parameters) {
+  const CalibrationSetup& setup = problem.setup().on_board;
+  const Layout& own = problem.layout();
+  const Layout& layout = setup.layout;
+  MatrixXd by_states = MatrixXd::Zero(layout.shared(), own.size());
+  for (int k = 0; k < layout.gyros; ++k) {
+    by_states.middleRows<3>(layout.direction(k)) = problem.momentum_by_states(last, k);
+  }
+  const int wandering = own.drift(0) - own.wandering(0);
+  by_states.block(layout.wandering(0), own.wandering(0), wandering, wandering).setIdentity();
+  by_states.block(layout.drift(0), own.drift(0), layout.parameters(), own.parameters()) = parameters.by_states;
+  const int rest = layout.shared() - layout.readout(0);
+  by_states.block(layout.readout(0), own.readout(0), rest, rest).setIdentity();
+  const MatrixXd root = by_states * result.errors.last_root;
+  MatrixXd covariance = root * root.transpose();
+  // As much as it is larger, the errors of the parameters have nothing in common with those of the momenta.
+  covariance.block(layout.drift(0), layout.drift(0), layout.parameters(), layout.parameters()) = parameters.covariance;
+  return open_loop_start(setup, layout, last.gyros, std::move(covariance));
 }
 
 /// The problem of a screened pass. Throws SetupError where it has no solution.
@@ -210,18 +234,20 @@ void Refinement::put_into(CalibrationRun& run) && {
   const Layout& layout = problem_.setup().on_board.layout;
   Calibration& calibration = run.calibration;
   const MatrixXd own = result_.errors.last_root.middleRows(problem_.layout().drift(0), problem_.layout().parameters());
-  Parameters parameters{result_.solution.gyros, own * own.transpose()};
+  Parameters parameters{result_.solution.gyros, own * own.transpose(),
+                        MatrixXd::Identity(problem_.layout().parameters(), problem_.layout().parameters())};
   if (field_) {
     parameters = with_members(problem_, *field_, parameters);
     calibration.drift_field = field_->levels;
   }
   calibration.covariance = parameters.covariance;
-  problem_.go_along(result_.solution, [&](const PassProblem::Moment& moment) {
-    calibration.t = moment.t;
-    for (int k = 0; k < layout.gyros; ++k) {
-      calibration.gyros[static_cast<std::size_t>(k)].momentum_in = moment.gyros[k].h_in;
-    }
-  });
+  std::optional<PassProblem::Moment> last;
+  problem_.go_along(result_.solution, [&](const PassProblem::Moment& moment) { last = moment; });
+  calibration.t = last->t;
+  for (int k = 0; k < layout.gyros; ++k) {
+    calibration.gyros[static_cast<std::size_t>(k)].momentum_in = last->gyros[k].h_in;
+  }
+  run.errors = errors_at_end(problem_, result_, *last, parameters);
   for (int k = 0; k < layout.gyros; ++k) {
     GyroCalibration& gyro = calibration.gyros[static_cast<std::size_t>(k)];
     const Eigen::Vector3d momentum_in = gyro.momentum_in;

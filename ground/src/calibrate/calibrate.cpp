@@ -10,8 +10,11 @@
 #include "batch/pass_setup.hpp"
 #include "batch/refine.hpp"
 #include "choose/decide.hpp"
+#include "model/orbital_rate.hpp"
 #include "model/prior.hpp"
 #include "model/setup.hpp"
+#include "trihedron/ground/evaluate/convergence.hpp"
+#include "trihedron/ground/evaluate/open_loop_forecast.hpp"
 #include "trihedron/ground/judge/verdict.hpp"
 #include "trihedron/ground/model/setup_error.hpp"
 #include "trihedron/ground/onboard/pipeline.hpp"
@@ -107,6 +110,34 @@ Smoothed smooth(const Pass& pass, Decision& decision) {
   return {std::move(refinement), std::move(drift_models)};
 }
 
+/// With the calibrated parameters from the end of the pass on.
+std::optional<OpenLoopForecast> forecast_of(const Pass& pass, const CalibrationRun& run) {
+  if (run.attitude.size() == 0) {
+    return std::nullopt;
+  }
+  const BodyMotion motion(run.attitude.t, run.attitude.q_in_c, orbital_rate_rad_s(pass.star_tracker));
+  return forecast(run.errors, run.calibration.gyros, motion, attitude_rule_of(run.calibration.estimator),
+                  run.options.need);
+}
+
+/// With the parameters in use at the end of the pass.
+OpenLoopForecast forecast_of(const Pass& pass, const CalibrationOptions& options, const Pipeline& pipeline,
+                             const AttitudeHistory& attitude) {
+  const BodyMotion motion(attitude.t, attitude.q_in_c, orbital_rate_rad_s(pass.star_tracker));
+  const AttitudeRule rule = attitude_rule_of(options.estimator);
+  if (options.corrections.take_parameters) {
+    return forecast(pipeline.errors(), pipeline.gyros(), motion, rule, options.need);
+  }
+  // The next correction knows the attitude as well as the last one did.
+  Eigen::Vector3d sigma_rad = attitude.sigma_rad.front();
+  for (std::size_t i = 1; i < attitude.size(); ++i) {
+    sigma_rad = attitude.age_s[i] < attitude.age_s[i - 1] ? attitude.sigma_rad[i] : sigma_rad;
+  }
+  const Pipeline::Held held = pipeline.held_at(Rot<In, C>::assume(attitude.q_in_c.back()),
+                                               Eigen::Matrix3d(sigma_rad.cwiseAbs2().asDiagonal()));
+  return forecast(held.errors, held.gyros, motion, rule, options.need);
+}
+
 }  // namespace
 
 CalibrationRun calibrate(const Pass& pass, const CalibrationOptions& options, const Progress& progress) {
@@ -138,6 +169,7 @@ CalibrationRun calibrate(const Pass& pass, const CalibrationOptions& options, co
   run.known_before = known_before(pass.settings, decision.options);
   const Statistics recorded = run.calibration.statistics;
   run.calibration = pipeline.calibration();
+  run.errors = pipeline.errors();
   run.calibration.statistics = recorded;
   run.calibration.start_up = pass.settings.start_up;
   if (smoothed) {
@@ -148,6 +180,8 @@ CalibrationRun calibrate(const Pass& pass, const CalibrationOptions& options, co
     ++run.fix_counts[fix.status];
   }
   add_statistics(run.fixes, run.calibration.statistics);
+  run.calibration.determined = determined(run);
+  run.calibration.forecast = forecast_of(pass, run);
   run.calibration.verdict = judge(pass, run);
   return run;
 }
@@ -169,6 +203,7 @@ NavigationRun navigate(const Pass& pass, const CalibrationOptions& options, cons
     run.held_parameters_misfit = pipeline.squared_distance_from_prior();
     run.misfit_limit = boost::math::quantile(boost::math::chi_squared(pipeline.layout().parameters()), 0.999);
   }
+  run.forecast = forecast_of(pass, options, pipeline, run.attitude);
   run.verdict = judge_navigation(pass, run);
   return run;
 }

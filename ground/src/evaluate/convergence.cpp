@@ -19,6 +19,18 @@ bool is_determined(const CalibrationRun& run, std::size_t row) {
   return sigma_in_row(run.calibration, row) <= 0.5 * sigma_in_row(run.known_before, row);
 }
 
+Determined determined(const CalibrationRun& run) {
+  Determined found;
+  for (std::size_t row = 0; row < run.calibration.states.size(); ++row) {
+    const ParameterId& state = run.calibration.states[row];
+    if (state.is_drift() && state.coefficient.is_in_eq1()) {
+      ++found.of;
+      found.coefficients += is_determined(run, row) ? 1 : 0;
+    }
+  }
+  return found;
+}
+
 std::size_t settled_from(const std::vector<double>& error, double tolerance) {
   std::size_t row = error.size();
   while (row > 0 && std::abs(error[row - 1]) <= tolerance) {

@@ -5,11 +5,13 @@
 #include <algorithm>
 #include <chrono>
 
+#include "model/orbital_rate.hpp"
 #include "model/prior.hpp"
 #include "trihedron/core/optimal_attitude.hpp"
 #include "trihedron/core/precession.hpp"
 #include "trihedron/core/setup.hpp"
 #include "trihedron/core/telemetry.hpp"
+#include "trihedron/ground/evaluate/open_loop_forecast.hpp"
 #include "trihedron/ground/model/setup_error.hpp"
 #include "trihedron/records/stop.hpp"
 
@@ -68,6 +70,7 @@ struct OpenLoopGyro {
 
 struct Pair {
   std::vector<OpenLoopGyro> gyros;
+  AttitudeRule rule = AttitudeRule::kTrihedron;
 
   [[nodiscard]] Result<AttitudeByDirections, DirectionsFault> attitude(const Directions& h_b) const {
     Directions h_in;
@@ -77,7 +80,12 @@ struct Pair {
       h_in[k] = gyro.h_in;
       h_c[k] = gyro.in_c(h_b[k]);
     }
-    return trihedron_attitude(h_in, h_c);
+    if (rule == AttitudeRule::kTrihedron) {
+      return trihedron_attitude(h_in, h_c);
+    }
+    GyroMask used{};
+    used[0] = used[1] = true;
+    return optimal_attitude(h_in, h_c, used);
   }
 };
 
@@ -86,14 +94,31 @@ CorrectionInterval interval_of(const AttitudeErrors& errors, double limit_rad) {
   return intervals.empty() ? CorrectionInterval{} : intervals.front();
 }
 
+/// Every ten minutes up to the end of the pass.
+std::vector<PredictedError> predicted(const CalibrationRun& run, const Correction& correction, AttitudeRule rule,
+                                      double orbital_rate) {
+  if (!correction.errors.is_known() || run.attitude.size() == 0) {
+    return {};
+  }
+  const BodyMotion motion(run.attitude.t, run.attitude.q_in_c, orbital_rate);
+  GyroMask used{};
+  used[0] = used[1] = true;
+  std::vector<Duration> after;
+  for (Duration time{}; correction.t + time <= motion.end(); time += std::chrono::minutes(10)) {
+    after.push_back(time);
+  }
+  return predicted_errors({correction.errors, correction.calibrated, correction.t, motion, rule, used}, after);
+}
+
 }  // namespace
 
 AttitudeHistory fly_open_loop(const Pass& pass, Time t, const std::vector<GyroCalibration>& gyros,
-                              const std::vector<Time>& epochs) {
+                              const std::vector<Time>& epochs, AttitudeRule rule) {
   if (gyros.size() < kPair) {
     throw SetupError("an open loop needs two gyros", "give a calibration of a pair");
   }
   Pair flown;
+  flown.rule = rule;
   for (int k = 0; k < kPair; ++k) {
     const GyroCalibration& record = gyros[static_cast<std::size_t>(k)];
     refuse_incomplete(record);
@@ -136,16 +161,22 @@ AttitudeHistory fly_open_loop(const Pass& pass, Time t, const std::vector<GyroCa
   return history;
 }
 
+AttitudeRule attitude_rule_of(Estimator estimator) {
+  return estimator == Estimator::kPaper ? AttitudeRule::kTrihedron : AttitudeRule::kAllAlike;
+}
+
 std::vector<OpenLoops> fly_open_loops(const Pass& pass, const CalibrationRun& run, const std::vector<Time>& reference_t,
                                       const std::vector<Eigen::Quaterniond>& reference_q_in_c, double limit_rad) {
+  const AttitudeRule rule = attitude_rule_of(run.calibration.estimator);
   const auto errors_of = [&](Time t, const std::vector<GyroCalibration>& gyros) {
-    return attitude_errors(fly_open_loop(pass, t, gyros, reference_t), reference_t, reference_q_in_c);
+    return attitude_errors(fly_open_loop(pass, t, gyros, reference_t, rule), reference_t, reference_q_in_c);
   };
   std::vector<OpenLoops> all;
   for (const Correction& correction : run.corrections) {
     OpenLoops loops;
     loops.known_before = errors_of(correction.t, correction.known_before);
     loops.calibrated = errors_of(correction.t, correction.calibrated);
+    loops.predicted = predicted(run, correction, rule, orbital_rate_rad_s(pass.star_tracker));
     loops.intervals = {interval_of(loops.known_before, limit_rad), interval_of(loops.calibrated, limit_rad)};
     all.push_back(std::move(loops));
   }

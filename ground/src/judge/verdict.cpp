@@ -13,6 +13,8 @@
 #include <utility>
 
 #include "judge/changes.hpp"
+#include "judge/drift_left.hpp"
+#include "judge/need.hpp"
 #include "judge/whiteness.hpp"
 #include "model/orbital_rate.hpp"
 #include "trihedron/core/directions_fit.hpp"
@@ -613,6 +615,7 @@ Verdict judge(const Pass& pass, const CalibrationRun& run) {
   judge_nis(statistics, "its model is incomplete or the noise is understated", findings);
   judge_noise(pass, run, findings);
   judge_whiteness(pass, run, findings);
+  judge_drift_left(pass, run, findings);
   judge_halves(statistics, findings);
   judge_drift_model(run, findings);
   judge_change(run, findings);
@@ -626,6 +629,7 @@ Verdict judge(const Pass& pass, const CalibrationRun& run) {
   judge_gyros(pass, run, findings);
   judge_gyro_rate(pass, run, findings);
   judge_unused_sensors(pass, run, findings);
+  judge_need(run.calibration.forecast, findings);
   return verdict_of(std::move(findings));
 }
 
@@ -646,6 +650,7 @@ Verdict judge_navigation(const Pass& pass, const NavigationRun& run) {
   judge_rejections(run.statistics, findings);
   judge_star_tracker(run.statistics, findings);
   judge_nis(run.statistics, "the calibration in use does not fit this pass, or the model is incomplete", findings);
+  judge_need(run.forecast, findings);
   return verdict_of(std::move(findings));
 }
 

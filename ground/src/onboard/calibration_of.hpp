@@ -44,6 +44,20 @@ template <class Estimator>
   return root;
 }
 
+/// Covariance of the errors of a started estimator at its last fix, the states before those that the gyros share, with
+/// the coefficients at the time when this fraction of their change has taken place.
+template <class Estimator>
+[[nodiscard]] Eigen::MatrixXd error_covariance(const Estimator& estimator, double part_of_change) {
+  const Layout layout = estimator.error_layout();
+  Roots errors(layout.shared(), estimator.states());
+  estimator.error_root(rows_of(errors));
+  for (int k = 0; k < layout.gyros && layout.further.coefficient_change; ++k) {
+    errors.middleRows(layout.drift(k), Layout::kEq1) +=
+        part_of_change * errors.middleRows(layout.change(k), Layout::kEq1);
+  }
+  return errors * errors.transpose();
+}
+
 /// The gyros as records, with the coefficients of that time.
 template <class Gyros>
 [[nodiscard]] std::vector<GyroCalibration> records_of(const Gyros& gyros, const Layout& layout, double part_of_change) {

@@ -4,6 +4,7 @@
 #include <utility>
 #include <variant>
 
+#include "model/open_loop_start.hpp"
 #include "model/prior.hpp"
 #include "model/setup.hpp"
 #include "onboard/calibration_of.hpp"
@@ -147,6 +148,28 @@ Calibration Pipeline::calibration() const {
     result.noise->wandering_time_s = to_seconds(options_.further_states.wandering_time);
   }
   return result;
+}
+
+OpenLoopStart Pipeline::errors() const {
+  return program_->visit([&](const auto& its) {
+    const auto& estimator = its.estimator();
+    const Layout layout = estimator.error_layout();
+    return open_loop_start(estimator.setup(), layout, program_->gyros(),
+                           error_covariance(estimator, part_of_change()));
+  });
+}
+
+Pipeline::Held Pipeline::held_at(const Rot<In, C>& C_in_c, const Eigen::Matrix3d& covariance_rad2) const {
+  const Gyros estimated = program_->gyros();
+  Gyros held = program_->prior.gyros;
+  for (int k = 0; k < layout().gyros; ++k) {
+    // What the gyro reads is told by the estimates.
+    const Eigen::Vector3d h_b = estimated[k].reading_of(C_in_c.raw().transpose() * estimated[k].h_in);
+    held[k].h_in = (C_in_c.raw() * held[k].in_c(h_b)).normalized();
+  }
+  const CalibrationSetup setup = setup_of(settings_, options_);
+  return {records_of(held, layout(), 0),
+          start_with_held_parameters(setup, held, program_->prior.covariance, C_in_c.raw(), covariance_rad2)};
 }
 
 double Pipeline::squared_distance_from_prior() const {

@@ -31,7 +31,7 @@ Eigen::Matrix3d alignment_of(const GyroCalibration& gyro) {
 }
 
 Correction correction_of(const Pipeline& pipeline, const AttitudeSolution& attitude, Time t) {
-  Correction correction{t, pipeline.gyros_before(), pipeline.gyros()};
+  Correction correction{t, pipeline.gyros_before(), pipeline.gyros(), pipeline.errors()};
   const Eigen::Matrix3d& C_in_c = attitude.C_in_c.raw();
   for (std::size_t k = 0; k < correction.calibrated.size(); ++k) {
     const GyroCalibration& calibrated = correction.calibrated[k];

@@ -11,9 +11,20 @@
 
 namespace trihedron {
 
-/// The length that an error with this covariance exceeds in 3 of 1000 cases, rad. Its square is taken as a multiple of
-/// χ² with the same mean and variance (Satterthwaite 1946), whose quantile is that of Wilson and Hilferty (1931).
-[[nodiscard]] double error_997_rad(const Eigen::Matrix3d& covariance_rad2);
+/// The quantile of the length of an error with this covariance, rad, that a standard normal variable has at `normal`.
+/// The square of the length is taken as a multiple of χ² with the same mean and variance (Satterthwaite 1946), whose
+/// quantile is that of Wilson and Hilferty (1931).
+[[nodiscard]] double error_quantile_rad(const Eigen::Matrix3d& covariance_rad2, double normal);
+
+// Quantiles of a standard normal variable, one-sided.
+inline constexpr double kNormal68 = 0.4677;
+inline constexpr double kNormal95 = 1.6449;
+inline constexpr double kNormal997 = 2.7478;
+
+/// The length that an error with this covariance exceeds in 3 of 1000 cases, rad.
+[[nodiscard]] inline double error_997_rad(const Eigen::Matrix3d& covariance_rad2) {
+  return error_quantile_rad(covariance_rad2, kNormal997);
+}
 
 /// Takes it that in an open loop the body turns as it has turned in the last complete window, e.g. an orbit: the
 /// sensitivities of that window times the time, over its length, and attitudes spread over it. The errors at the

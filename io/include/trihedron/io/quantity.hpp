@@ -9,6 +9,7 @@
 #include <string_view>
 
 #include "trihedron/core/time.hpp"
+#include "trihedron/records/open_loop_forecast.hpp"
 #include "trihedron/records/limits.hpp"
 
 namespace trihedron::io {
@@ -23,12 +24,16 @@ namespace trihedron::io {
 [[nodiscard]] double parse_rate_rad_s(std::string_view text);
 /// Angle random walk, `0.001deg/h^0.5`, `1e-8rad/s^0.5`; gives rad/s^0.5.
 [[nodiscard]] double parse_random_walk_rad_sqrt_s(std::string_view text);
+/// `5arcmin for 270min`: an attitude error and how long it must not be exceeded.
+[[nodiscard]] Need parse_need(std::string_view text);
 /// One of these, within a range; throws UsageError with the range and the reason for it. Durations are in seconds.
 [[nodiscard]] double within(const Range& range, double value, std::string_view text);
 [[nodiscard]] Duration within(const Range& range, Duration value, std::string_view text);
 /// A pure number, finite.
 [[nodiscard]] double parse_number(std::string_view text);
 
+/// As `5arcmin for 270min`.
+[[nodiscard]] std::string format_need(const Need& need);
 /// In the largest unit of which it is a whole multiple, as `90min`.
 [[nodiscard]] std::string format_duration(Duration duration);
 /// As `5arcmin`.

@@ -10,6 +10,7 @@
 #include "trihedron/records/drift_models.hpp"
 #include "trihedron/records/estimator.hpp"
 #include "trihedron/records/finding.hpp"
+#include "trihedron/records/open_loop_forecast.hpp"
 #include "trihedron/records/parameter_id.hpp"
 #include "trihedron/records/statistics.hpp"
 
@@ -65,6 +66,8 @@ struct Calibration {
   std::vector<FurtherEstimate> further;  ///< empty where none was estimated
   std::optional<CalibrationNoise> noise;
   std::vector<DriftFieldLevel> drift_field;  ///< empty where the drift is not estimated as a field
+  std::optional<Determined> determined;
+  std::optional<OpenLoopForecast> forecast;
   Verdict verdict;
   Statistics statistics;
 };

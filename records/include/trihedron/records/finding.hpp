@@ -57,6 +57,8 @@ enum class FindingCode : std::uint8_t {
   kCoefficientsMoved,
   kPassNotTrustworthy,
   kNotAdopted,
+  kNeedNotMet,
+  kDriftNotExplained,
   kOther,  ///< of a file, from a program that knows more
 };
 
@@ -78,7 +80,7 @@ struct FindingRow {
   std::string_view name;     ///< stable, for programs
   FindingSeverity severity;  ///< where the one who finds it does not say otherwise
 };
-inline constexpr std::array<FindingRow, 45> kFindings = {{
+inline constexpr auto kFindings = std::to_array<FindingRow>({
     {FindingCode::kTooFewFixes, "too-few-fixes", FindingSeverity::kDoNotUse},
     {FindingCode::kShortPass, "short-pass", FindingSeverity::kWarning},
     {FindingCode::kManyRejected, "many-rejected", FindingSeverity::kWarning},
@@ -123,8 +125,10 @@ inline constexpr std::array<FindingRow, 45> kFindings = {{
     {FindingCode::kCoefficientsMoved, "coefficients-moved", FindingSeverity::kDoNotUse},
     {FindingCode::kPassNotTrustworthy, "pass-not-trustworthy", FindingSeverity::kDoNotUse},
     {FindingCode::kNotAdopted, "not-adopted", FindingSeverity::kDoNotUse},
+    {FindingCode::kNeedNotMet, "need-not-met", FindingSeverity::kDoNotUse},
+    {FindingCode::kDriftNotExplained, "drift-not-explained", FindingSeverity::kWarning},
     {FindingCode::kOther, "other", FindingSeverity::kWarning},
-}};
+});
 
 /// Its row in the table.
 [[nodiscard]] constexpr const FindingRow& row_of(FindingCode code) { return kFindings[static_cast<std::size_t>(code)]; }

@@ -58,6 +58,9 @@ inline constexpr Range kStudentTFreedom{1, 1e6, "", "give 5 to 20, or 0 for the 
 inline constexpr Range kRejections{1, 1e6, "", "it is a number of fixes"};
 inline constexpr Range kAnglesAfter_s{1e-3, kYear_s, "s", "give some seconds or minutes, or never"};
 inline constexpr Range kCorrectionInterval_s{1e-3, kYear_s, "s", "it must be positive; say continuous to use each fix"};
+inline constexpr Range kNeededError_rad{1e-9, 3.15, "rad", "an arcminute is 2.9e-4, and a half turn is all there is"};
+inline constexpr Range kNeededInterval_s{1, 3.2e6, "s",
+                                         "it is the time between two astro-corrections, a month at most"};
 inline constexpr Range kWanderingDrift_rad_s{1e-15, 1e-2, "rad/s", "give auto, off, or a 1-sigma like 0.01deg/h"};
 inline constexpr Range kWanderingTime_s{1, kYear_s, "s", "an hour is usual"};
 
@@ -67,6 +70,9 @@ inline constexpr Range kReadoutBias{-0.1, 0.1, "", "it is the error of a directi
 /// Clock offset in seconds, errors of a star tracker in rad, drift in rad/s.
 inline constexpr Range kFurtherState{-1e3, 1e3, "", "no error of a star tracker or gyro is so large"};
 inline constexpr Range kFurtherStateSigma{0, 1e3, "", "no error of a star tracker or gyro is so large"};
+inline constexpr Range kForecastTime_s{0, 3.2e6, "s", "a forecast is for a month at most"};
+inline constexpr Range kForecastError_rad{0, 1e9, "rad", "it is an angle"};
+inline constexpr Range kShare{0, 1e9, "", "it is a share"};
 inline constexpr Range kTimeOfCalibration_s{-1e9, 1e9, "s", "it is the time since the epoch"};
 
 // ---- Scenarios; what goes together is judged by the simulation

@@ -14,6 +14,7 @@
 #include "trihedron/core/time.hpp"
 #include "trihedron/records/estimator.hpp"
 #include "trihedron/records/further_state.hpp"
+#include "trihedron/records/open_loop_forecast.hpp"
 
 namespace trihedron {
 
@@ -81,6 +82,7 @@ struct CalibrationOptions {
   Duration angles_after = std::chrono::minutes(1);
   FurtherStateOptions further_states;
   CorrectionOptions corrections;
+  std::optional<Need> need;          ///< of the attitude between corrections; without one nothing is judged by it
   bool definitive_attitude = false;  ///< of estimator batch: the smoothed attitude at each gyro sample as well
 };
 

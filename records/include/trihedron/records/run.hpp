@@ -47,6 +47,7 @@ struct Correction {
   Time t{};
   std::vector<GyroCalibration> known_before;  ///< the parameters of before the pass
   std::vector<GyroCalibration> calibrated;    ///< as estimated until then
+  OpenLoopStart errors;                       ///< of `calibrated`
 };
 
 /// A change of the state of a gyro.
@@ -117,6 +118,7 @@ struct CalibrationRun {
   std::vector<DriftModelForecast> drift_models;  ///< that were compared, smallest first
   Calibration known_before;                      ///< values and covariance before the pass; states as in `calibration`
   Calibration calibration;                       ///< with verdict and statistics
+  OpenLoopStart errors;                          ///< of the calibration
   std::vector<FixRecord> fixes;
   ParameterHistory parameters;
   std::vector<Correction> corrections;  ///< at the first used fix, and then every 90 min
@@ -152,6 +154,7 @@ struct NavigationRun {
   /// its 99.9 % limit.
   std::optional<double> held_parameters_misfit;
   double misfit_limit = 0;
+  std::optional<OpenLoopForecast> forecast;  ///< with the parameters in use at the end
   Verdict verdict;
 };
 

@@ -115,6 +115,33 @@ struct DriftScenario {
   double direction_walk_rad_sqrt_s = 0;  ///< random walk of the momentum about each case axis: rad per √s
   double markov_sigma_rad_s = 0;  ///< first-order Gauss–Markov drift about each case axis, stationary from the start
   double markov_time_s = 3600;
+
+  // Drift that no model of an estimator contains (trihedron/sim/unmodelled.hpp); 0 switches each off.
+
+  /// A sharp feature on the sphere of directions: its largest drift; where it is, case axes, any length but 0, without
+  /// it drawn from the seed, evenly over the sphere; its radius.
+  double bump_rad_s = 0;
+  std::optional<Eigen::Vector3d> bump_centre{};
+  double bump_radius_rad = 20 * kDegree;
+  /// Largest drift that depends on the side from which a direction was reached, and the angle after which it has
+  /// turned to the other side.
+  double hysteresis_rad_s = 0;
+  double hysteresis_width_rad = 5 * kDegree;
+  /// All κ larger by this fraction while the body slews, decaying after the slew.
+  double slew_fraction = 0;
+  double slew_time_s = 900;
+  /// Each κ jumps once, by a normal draw of this sigma.
+  double jump_sigma_rad_s = 0;
+  double jump_at_s = 4.5 * 3600;
+  /// All κ modulated by the polhode: fraction × cos φ(t), φ at the start drawn from the seed, its period growing by
+  /// polhode_period_rate seconds per second (Gravity Probe B: hours, and changing all the time).
+  double polhode_fraction = 0;
+  double polhode_period_s = 2 * 3600;
+  double polhode_period_rate = 0.02;
+  /// All κ larger by this fraction after a long time in sunlight, smaller in the Earth's shadow, following with this
+  /// time constant.
+  double thermal_fraction = 0;
+  double thermal_time_s = 1200;
 };
 
 /// How the direction of the momentum is read in case axes: reading = unit((1 + scale) h + bias + noise), then

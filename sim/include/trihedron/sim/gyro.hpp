@@ -11,6 +11,7 @@
 #include "trihedron/sim/event.hpp"
 #include "trihedron/sim/harmonics.hpp"
 #include "trihedron/sim/random.hpp"
+#include "trihedron/sim/unmodelled.hpp"
 
 namespace trihedron::sim {
 
@@ -24,32 +25,51 @@ class Drift {
   /// Throws std::invalid_argument for a harmonic that does not exist.
   Drift(const DriftScenario& scenario, std::uint64_t seed, std::uint64_t gyro);
 
-  /// Moves on to the step that begins at t_s and lasts step_s: draws its random parts.
-  void next_step(double t_s, double step_s);
+  /// Moves on to the step that begins at t_s and lasts step_s: draws its random parts. h: unit, at its beginning.
+  void next_step(double t_s, double step_s, const Vec<Case>& h = {}, const DriftModulation::Flight& flight = {});
 
   /// ω_b(h), rad/s, during the step. h: unit.
   [[nodiscard]] Vec<Case> rate(const Vec<Case>& h) const {
-    return Vec<Case>::assume(Esg7::rate<double>(h.raw(), kappa_now_rad_s_) + field_.rate<double>(h.raw()) +
-                             markov_rad_s_);
+    Vector3<double> rate =
+        Esg7::rate<double>(h.raw(), kappa_now_rad_s_) + field_.rate<double>(h.raw()) + markov_rad_s_;
+    if (bump_) {
+      rate += bump_->rate(h.raw());
+    }
+    if (hysteresis_) {
+      rate += hysteresis_->rate(h.raw());
+    }
+    return Vec<Case>::assume(rate);
   }
   /// The random rotation that the momentum takes during the step beside its drift, rad, if there is one.
   [[nodiscard]] const std::optional<Vec<Case>>& walk() const { return walk_rad_; }
 
   /// κ of eq. (1) as it is now, rad/s.
   [[nodiscard]] const Esg7::Coefficients<double>& kappa_rad_s() const { return kappa_now_rad_s_; }
+  /// The part of the drift in the span of eq. (1), rad/s: by least squares over the sphere, of what is modulated over
+  /// the time so far, too; of what walks, warms up or jumps as it is now.
+  [[nodiscard]] Esg7::Coefficients<double> part_in_eq1_rad_s() const;
   [[nodiscard]] const HarmonicField& outside() const { return field_; }
   [[nodiscard]] const Vector3<double>& markov_rad_s() const { return markov_rad_s_; }
+  [[nodiscard]] const std::optional<DriftBump>& bump() const { return bump_; }
+  /// Whether the flight changes it, so that next_step() has to be told of it.
+  [[nodiscard]] bool is_modulated() const { return modulation_.has_value(); }
 
  private:
   DriftScenario scenario_;
-  Esg7::Coefficients<double> kappa_rad_s_;  ///< without the warm-up term
+  Esg7::Coefficients<double> kappa_rad_s_;  ///< without warm-up and modulation
   Esg7::Coefficients<double> kappa_now_rad_s_;
   HarmonicField field_;
+  std::optional<DriftBump> bump_;
+  std::optional<DriftHysteresis> hysteresis_;
+  std::optional<DriftModulation> modulation_;
+  bool has_jumped_ = false;
+  double warm_up_ = 0;  ///< fraction now
   Vector3<double> markov_rad_s_ = Vector3<double>::Zero();
   std::optional<Vec<Case>> walk_rad_;
   Stream coefficient_random_;
   Stream walk_random_;
   Stream markov_random_;
+  Stream jump_random_;
 };
 
 /// The readout of one gyro: scale error, bias, noise, quantisation and faults between the true direction and telemetry.
@@ -80,13 +100,14 @@ class Gyro {
   Gyro(const GyroScenario& scenario, const Rot<In, C>& C_in_c, std::uint64_t seed, int gyro);
 
   /// Integrates over one step that begins at t_s, from where the last one ended; C_in_c in its middle and at its end.
-  void advance(double t_s, double step_s, const Rot<In, C>& middle, const Rot<In, C>& end);
+  /// sunlit: whether the Sun shines on the spacecraft.
+  void advance(double t_s, double step_s, const Rot<In, C>& middle, const Rot<In, C>& end, bool sunlit = false);
 
   [[nodiscard]] const Vec<In>& momentum() const { return h_in_; }
   [[nodiscard]] Vec<Case> momentum_in_case() const { return C_in_b_.inverse() * h_in_; }
   [[nodiscard]] const Rot<C, Case>& alignment() const { return C_c_b_; }
   [[nodiscard]] const Drift& drift() const { return drift_; }
-  /// Coefficients and alignment as they are now.
+  /// Coefficients by Drift::part_in_eq1_rad_s(), alignment as it is now.
   [[nodiscard]] Truth::Gyro truth() const;
 
  private:

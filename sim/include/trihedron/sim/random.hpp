@@ -29,6 +29,9 @@ enum class Source : std::uint64_t {
   kTrackerDropout,
   kTrackerOutlier,
   kTrackerSign,
+  kDriftBump,
+  kCoefficientJump,
+  kPolhode,
 };
 
 /// splitmix64 (Steele, Lea, Flood 2014): advances the state and returns its next value. Bijective in the state.

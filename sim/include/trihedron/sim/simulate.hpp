@@ -12,8 +12,9 @@ namespace trihedron::sim {
 /// What simulate() makes: telemetry, the truth behind it, and the faults that were put into it.
 struct SimulatedPass {
   Pass pass;
-  /// At every epoch at which a fix is due, whether there is one or not. Drift coefficients as they are at the end of
-  /// the pass; `unmodelled_rad_s` holds the amplitudes of orthonormal harmonics, "W(1,0)".
+  /// At every epoch at which a fix is due, whether there is one or not. Drift coefficients by
+  /// Drift::part_in_eq1_rad_s() at the end of the pass; `unmodelled_rad_s` holds the amplitudes of orthonormal
+  /// harmonics, "W(1,0)", the whole of them.
   Truth truth;
   std::vector<Event>
       events;  ///< what was done to the telemetry; gyros' first, then the star tracker's, each in time order

@@ -13,6 +13,8 @@ namespace trihedron::ground {
 
 /// Whether the data say more of the parameter in this row of Calibration::states than was known before.
 [[nodiscard]] bool is_determined(const CalibrationRun& run, std::size_t row);
+/// Of the drift coefficients of eq. (1).
+[[nodiscard]] Determined determined(const CalibrationRun& run);
 
 /// When one parameter converged.
 struct Convergence {

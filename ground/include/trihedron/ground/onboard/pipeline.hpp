@@ -48,6 +48,15 @@ class Pipeline {
   [[nodiscard]] std::vector<GyroCalibration> gyros_before() const;
   /// 1-sigma of each state of calibration(). Needs started().
   [[nodiscard]] Eigen::VectorXd state_sigmas() const;
+  /// What is known of the errors of gyros() at the last fix. Needs started().
+  [[nodiscard]] OpenLoopStart errors() const;
+  /// The same of the parameters known before the pass with momenta read through them at an attitude of this covariance,
+  /// c axes, and those gyros.
+  struct Held {
+    std::vector<GyroCalibration> gyros;
+    OpenLoopStart errors;
+  };
+  [[nodiscard]] Held held_at(const Rot<In, C>& C_in_c, const Eigen::Matrix3d& covariance_rad2) const;
   /// (estimated − prior)ᵀ P⁻¹ (estimated − prior) of κ and δ, P the covariance of the prior.
   [[nodiscard]] double squared_distance_from_prior() const;
 

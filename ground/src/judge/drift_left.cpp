@@ -1,0 +1,134 @@
+#include "judge/drift_left.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <complex>
+#include <numbers>
+#include <string>
+#include <vector>
+
+#include "model/orbital_rate.hpp"
+
+namespace trihedron::ground {
+namespace {
+
+constexpr std::size_t kComponents = 2;  ///< of an innovation per gyro
+
+/// Times and innovations, in their sigmas, of one gyro.
+struct OfGyro {
+  std::vector<double> t_s;
+  std::vector<double> z[kComponents];
+};
+
+std::vector<OfGyro> by_gyro(const std::vector<FixRecord>& fixes) {
+  std::vector<OfGyro> all;
+  for (const FixRecord& fix : fixes) {
+    if (fix.status != FixStatus::kUsed || fix.head != 0) {
+      continue;
+    }
+    all.resize(std::max(all.size(), fix.innovation.size() / kComponents));
+    for (std::size_t k = 0; k < fix.innovation.size() / kComponents; ++k) {
+      const double* const y = &fix.innovation[k * kComponents];
+      const double* const sigma = &fix.innovation_sigma[k * kComponents];
+      if (sigma[0] > 0 && sigma[1] > 0) {
+        all[k].t_s.push_back(to_seconds(fix.t - fixes.front().t));
+        all[k].z[0].push_back(y[0] / sigma[0]);
+        all[k].z[1].push_back(y[1] / sigma[1]);
+      }
+    }
+  }
+  return all;
+}
+
+}  // namespace
+
+std::optional<SlowLine> strongest_slow_line(const std::vector<FixRecord>& fixes, double shortest_period_s) {
+  constexpr std::size_t kFew = 1000;
+  std::optional<SlowLine> strongest;
+  double most = 0;
+  double tried = 0;
+  const std::vector<OfGyro> gyros = by_gyro(fixes);
+  for (std::size_t k = 0; k < gyros.size(); ++k) {
+    const OfGyro& its = gyros[k];
+    const std::size_t n = its.t_s.size();
+    if (n < kFew) {
+      continue;
+    }
+    const double span_s = its.t_s.back() - its.t_s.front();
+    const auto lines = static_cast<int>(span_s / shortest_period_s);
+    for (int line = 1; line <= lines; ++line) {
+      const double rate_rad_s = 2 * std::numbers::pi * line / span_s;
+      std::complex<double> sum[kComponents];
+      for (std::size_t i = 0; i < n; ++i) {
+        const std::complex<double> turn = std::polar(1.0, -rate_rad_s * its.t_s[i]);
+        sum[0] += its.z[0][i] * turn;
+        sum[1] += its.z[1][i] * turn;
+      }
+      for (const std::complex<double>& of_component : sum) {
+        ++tried;
+        // Exponentially distributed, of mean 1, where the innovations are white.
+        const double power = std::norm(of_component) / static_cast<double>(n);
+        if (power > most) {
+          most = power;
+          strongest = {static_cast<int>(k), span_s / line, 2 * std::abs(of_component) / static_cast<double>(n), 0};
+        }
+      }
+    }
+  }
+  if (strongest) {
+    strongest->log_chance = std::min(0.0, std::log(tried) - most);
+  }
+  return strongest;
+}
+
+void judge_drift_left(const Pass& pass, const CalibrationRun& run, std::vector<Finding>& findings) {
+  // One pass in a hundred thousand that is as the model says.
+  const double limit = std::log(1e-5);
+  // Periods down to a tenth of an orbit: drift of low degree makes no shorter ones.
+  constexpr double kMultiples = 10;
+  constexpr double kUsualOrbit_s = 5400;
+  // Over an orbit a random walk as large moves a momentum by 0.5 arcseconds, as the sigmas of a calibration are.
+  constexpr double kUsualWalk_rad_sqrt_s = 3e-8;
+
+  const bool told = std::ranges::any_of(findings, [](const Finding& finding) {
+    return finding.code == FindingCode::kInnovationsNotWhite || finding.code == FindingCode::kOrbitalLine;
+  });
+  const double rate_rad_s = std::abs(orbital_rate_rad_s(pass.star_tracker));
+  const double orbit_s = rate_rad_s > 0 ? 2 * std::numbers::pi / rate_rad_s : kUsualOrbit_s;
+  std::string evidence;
+  if (const auto line = strongest_slow_line(run.fixes, orbit_s / kMultiples);
+      line && line->log_chance < limit && !told) {
+    evidence = fmt::format(
+        "the innovations of gyro {} have a line of {:.0f} min, amplitude {:.2f} sigma; the chance of one as strong is "
+        "below 1e{:.0f}",
+        line->gyro + 1, line->period_s / 60, line->amplitude, std::ceil(line->log_chance / std::numbers::ln10));
+  }
+  if (run.options.find_noise) {
+    const bool wanders = std::ranges::any_of(run.evidence, [](const Evidence& its) {
+      return its.state == FurtherState::kWanderingDrift && its.accepted;
+    });
+    const double walk = run.options.direction_random_walk_rad_sqrt_s;
+    const std::string separator = evidence.empty() ? "" : "; ";
+    if (wanders) {
+      const FurtherStateOptions& states = run.options.further_states;
+      evidence += fmt::format("{}drift of {:.1e} rad/s, 1-sigma, that wanders in {:.0f} min was needed beside the model",
+                              separator, states.wandering_drift_rad_s, to_seconds(states.wandering_time) / 60);
+    } else if (walk > kUsualWalk_rad_sqrt_s) {
+      evidence += fmt::format("{}a random walk of the momenta of {:.1e} rad/s^0.5 was needed beside the model",
+                              separator, walk);
+    }
+  }
+  if (!evidence.empty()) {
+    findings.push_back({FindingCode::kDriftNotExplained,
+                        "A part of the drift is in no coefficient of the model. The noise that stands for it is in the "
+                        "sigmas of alignment and attitude; single coefficients may be off by many of theirs, as where "
+                        "drift depends on place, history or temperature.",
+                        evidence,
+                        "Do not carry single coefficients to another flight. Estimator batch with a larger drift model "
+                        "may explain it; an error of the star tracker can look alike."});
+  }
+}
+
+}  // namespace trihedron::ground

@@ -1,0 +1,53 @@
+#include "judge/need.hpp"
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <string>
+
+#include "trihedron/records/text.hpp"
+
+namespace trihedron::ground {
+namespace {
+
+std::string causes_in_words(const std::vector<ErrorCause>& causes) {
+  constexpr double kTold = 0.1;
+  std::string text;
+  for (const ErrorCause& cause : causes) {
+    if (text.empty() || cause.share >= kTold) {
+      text += fmt::format("{}{} ({:.0f} %)", text.empty() ? "" : ", ", cause.name, 100 * cause.share);
+    }
+  }
+  return text;
+}
+
+/// By what the error is made of most.
+std::string cure_of(const NeedForecast& need) {
+  const bool by_parameter = need.causes.empty() || need.causes.front().is_parameter;
+  const std::string better = by_parameter
+                                 ? "Calibrate on a longer pass, with slews, or on several passes of this start-up."
+                                 : "A longer pass will not help: it is noise of the gyros.";
+  if (need.accuracy.within < std::chrono::minutes(1)) {
+    return better;
+  }
+  return fmt::format("{} Or correct every {}, for which it is kept.", better, time_in_words(need.accuracy.within));
+}
+
+}  // namespace
+
+void judge_need(const std::optional<OpenLoopForecast>& forecast, std::vector<Finding>& findings) {
+  if (!forecast || !forecast->need || forecast->need->met) {
+    return;
+  }
+  const NeedForecast& need = *forecast->need;
+  const bool is_known = std::isfinite(need.error_997_rad);
+  findings.push_back(
+      {FindingCode::kNeedNotMet,
+       fmt::format("The need is not met: {} after an astro-correction (99.7 %).", in_words(need.need)),
+       is_known ? fmt::format("predicted {} by then; what it is made of at the end, with what is correlated: {}",
+                              angle_text(need.error_997_rad), causes_in_words(need.causes))
+                : "the momenta come too near to one line to give an attitude",
+       cure_of(need)});
+}
+
+}  // namespace trihedron::ground

@@ -1,0 +1,345 @@
+#!/usr/bin/python3
+"""Measures the verdict as a test is measured: verdict.py PROGRAM OUTCOMES [--document FILE] [--worlds PATTERN] [--estimators NAMES] [--seeds N] [--jobs N].
+
+For each world and seed a pass of nine hours and the four and a half after it are simulated and, where the world says so, made wrong. Each estimator
+calibrates the nine hours; `navigate` flies its result open loop through the rest. A result is wrong where the truth is beyond LIMIT_SIGMAS of
+what it claims, or beyond the need, 5 arcmin for 270 min. The verdict is that of `calibrate`: exit status 0 is trustworthy.
+
+Outcomes go into the file OUTCOMES, a line of JSON each, so that a run goes on where it was interrupted; they hold for the program they were found with.
+--document writes the tables of docs/verdict.md of all outcomes there are.
+"""
+import argparse
+import concurrent.futures
+import hashlib
+import json
+import math
+import os
+import pathlib
+import random
+import re
+import subprocess
+import sys
+import tempfile
+
+import passes
+from rotations import exponential, inverse, logarithm, product
+from worlds import ARCSECOND, PASS_S, WORLDS
+
+FORECAST_S = 270 * 60.0
+NEED_RAD = math.radians(5 / 60)
+LIMIT_SIGMAS = 4
+# Of the epochs of an attitude history. By normal errors 4 sigmas of one of three axes are passed at 2 in 10 000; neighbours are alike.
+ROWS_BEYOND = 0.01
+ESTIMATORS = ("invariant", "batch")
+# Memory instead of a disk: a pass of CSV files has 35 MB and lives for seconds.
+SCRATCH = "/dev/shm" if os.access("/dev/shm", os.W_OK) else None
+
+
+def key_of(world, seed):
+    """Of the random generator of a world and of its scenario: the same on every machine."""
+    return int.from_bytes(hashlib.sha256(f"{world} {seed}".encode()).digest()[:4], "big")
+
+
+# ---- One pass
+
+def call(program, *arguments):
+    """The exit status and what was printed; 4, the machine failed, is no outcome."""
+    done = subprocess.run([program, *map(str, arguments)], capture_output=True, text=True)
+    if done.returncode not in (0, 1, 3):
+        raise RuntimeError(f"{' '.join(map(str, arguments))}: exit status {done.returncode}\n{done.stderr}")
+    return done.returncode, done.stdout
+
+
+def rows_of(file, columns, every_ms=3000):
+    """{milliseconds: numbers} of the rows of a CSV file at multiples of every_ms."""
+    with open(file) as text:
+        head = next(text).rstrip("\n").split(",")
+        place = [head.index(column) for column in columns]
+        rows = {}
+        for line in text:
+            t = round(float(line[:line.index(",")]) * 1000)
+            if t % every_ms == 0:
+                cells = line.split(",")
+                rows[t] = [float(cells[i]) for i in place]
+        return rows
+
+
+QUATERNION = ("q_x", "q_y", "q_z", "q_w")
+SIGMAS = ("sigma_x_rad", "sigma_y_rad", "sigma_z_rad")
+
+
+class Truth:
+    def __init__(self, whole, moved):
+        self.gyros = json.loads((whole / "truth.json").read_text())["gyros"]
+        self.attitude = {t: tuple(q) for t, q in rows_of(whole / "truth.csv", QUATERNION).items()}
+        self.alignments = [exponential(gyro["lambda_rad"]) for gyro in self.gyros]
+        if moved and moved.gyro:
+            self.alignments[0] = product(self.alignments[0], inverse(moved.gyro))
+        if moved and moved.tracker:
+            self.alignments = [product(inverse(moved.tracker), alignment) for alignment in self.alignments]
+            self.attitude = {t: product(q, moved.tracker) if t > PASS_S * 1000 else q for t, q in self.attitude.items()}
+
+
+def alignment_errors(truth, calibration):
+    """Of each axis of each gyro: (error, sigma), rad."""
+    matrix, states = calibration["covariance"]["matrix"], calibration["covariance"]["states"]
+    errors = []
+    for number, (true, gyro) in enumerate(zip(truth.alignments, calibration["gyros"]), 1):
+        off = logarithm(product(true, inverse(exponential(gyro["alignment_rotation_vector_rad"]))))
+        for axis, error in zip("xyz", off):
+            at = states.index(f"gyro{number}.align_{axis}")
+            errors.append((error, math.sqrt(matrix[at][at])))
+    return errors
+
+
+def drift_sigmas(truth, calibration):
+    """The largest error of a coefficient of eq. (1) in its sigmas."""
+    matrix, states = calibration["covariance"]["matrix"], calibration["covariance"]["states"]
+    largest = 0
+    for number, (true, gyro) in enumerate(zip(truth.gyros, calibration["gyros"]), 1):
+        for name, value in zip(("k0", "mu12", "mu23", "mu31", "nu12", "nu23", "nu31"), true["drift_rad_s"]):
+            at = states.index(f"gyro{number}.{name}")
+            largest = max(largest, abs(value - gyro["drift_rad_s"][name]) / math.sqrt(matrix[at][at]))
+    return largest
+
+
+def attitude_errors(truth, file):
+    """At the epochs of both: (error, rad; error of the worst axis in its sigmas)."""
+    for t, row in rows_of(file, QUATERNION + SIGMAS).items():
+        if t in truth.attitude:
+            off = logarithm(product(inverse(truth.attitude[t]), tuple(row[:4])))
+            yield math.sqrt(sum(x * x for x in off)), max(abs(x) / sigma for x, sigma in zip(off, row[4:]))
+
+
+def judged(program, directory, truth, estimator):
+    """An outcome of one estimator on the passes of the directory."""
+    out, forecast = directory / estimator, directory / f"{estimator}.csv"
+    status, printed = call(program, "--json", "calibrate", directory / "pass", "-o", out, "--estimator", estimator)
+    if status == 3:
+        return {"status": status, "findings": ["refused"], "wrong": []}
+    calibration = json.loads((out / "calibration.json").read_text())
+    findings = {finding["code"]: finding.get("severity", "") for finding in calibration["verdict"]["findings"]}
+    wrong = []
+
+    alignment = alignment_errors(truth, calibration)
+    alignment_sigmas = max(abs(error) / sigma for error, sigma in alignment)
+    if not alignment_sigmas <= LIMIT_SIGMAS:
+        wrong.append("alignment")
+
+    history = list(attitude_errors(truth, out / "attitude.csv"))
+    beyond = sum(not sigmas <= LIMIT_SIGMAS for _, sigmas in history) / len(history) if history else 0
+    worst_rad = max((error for error, sigmas in history if not sigmas <= LIMIT_SIGMAS), default=0)
+    if beyond > ROWS_BEYOND or worst_rad > NEED_RAD:
+        wrong.append("attitude")
+
+    # The fixes of the rest are there for the first one alone.
+    flown, _ = call(program, "--json", "navigate", directory / "later", "--calibration", out / "calibration.json",
+                    "--correction-interval", "none", "-o", forecast)
+    ahead = list(attitude_errors(truth, forecast)) if flown != 3 else []
+    forecast_rad = max((error for error, _ in ahead), default=math.inf)
+    forecast_sigmas = max((sigmas for _, sigmas in ahead), default=math.inf)
+    # Half of the epochs: what navigates falls away where the calibration is of another world.
+    if not forecast_sigmas <= LIMIT_SIGMAS or len(ahead) < FORECAST_S / 3 / 2:
+        wrong.append("forecast")
+    if not forecast_rad <= NEED_RAD:
+        wrong.append("need")
+    return {"status": status, "findings": sorted(findings), "do_not_use": sorted(code for code, severity in findings.items() if severity == "do-not-use"),
+            "wrong": wrong, "alignment_sigmas": rounded(alignment_sigmas),
+            "alignment_arcsec": rounded(max(abs(error) for error, _ in alignment) / ARCSECOND),
+            "drift_sigmas": rounded(drift_sigmas(truth, calibration)), "rows_beyond": rounded(beyond), "attitude_arcsec": rounded(worst_rad / ARCSECOND),
+            "forecast_sigmas": rounded(forecast_sigmas), "forecast_arcsec": rounded(forecast_rad / ARCSECOND)}
+
+
+def rounded(value):
+    return float(f"{value:.4g}") if math.isfinite(value) else None
+
+
+def outcomes_of(program, name, seed, estimators):
+    """What these estimators make of the pass of the world of this name and seed."""
+    world = next(world for world in WORLDS if world.name == name)
+    key = key_of(world.name, seed)
+    with tempfile.TemporaryDirectory(prefix="verdict-", dir=SCRATCH) as scratch:
+        directory = pathlib.Path(scratch)
+        (directory / "scenario.toml").write_text(
+            f'[scenario]\nseed = {key}\nduration = "{(PASS_S + FORECAST_S) / 60:.0f}min"\n' + world.scenario(random.Random(key)))
+        status, _ = call(program, "--quiet", "simulate", directory / "scenario.toml", "-o", directory / "whole")
+        if status != 0:
+            raise RuntimeError(f"{world.name}: the scenario was refused\n{(directory / 'scenario.toml').read_text()}")
+        passes.cut(directory / "whole", directory / "pass", directory / "later", PASS_S)
+        (directory / "whole" / "gyro.csv").unlink()
+        moved = None
+        if world.edit:
+            moved = world.edit(passes.Telemetry(directory / "pass"), random.Random(key))
+            world.edit(passes.Telemetry(directory / "later"), random.Random(key))
+        truth = Truth(directory / "whole", moved)
+        return [{"world": world.name, "seed": seed, "estimator": estimator} | judged(program, directory, truth, estimator) for estimator in estimators]
+
+
+# ---- All of them
+
+def digest(program):
+    return hashlib.sha256(pathlib.Path(program).read_bytes()).hexdigest()[:16]
+
+
+class Outcomes:
+    """One line of JSON for each run, with the program that it holds for."""
+
+    def __init__(self, file, program):
+        self.file, self.program = file, digest(program)
+        self.found = []
+        if file.exists():
+            for line in file.read_text().splitlines():
+                try:
+                    outcome = json.loads(line)
+                except json.JSONDecodeError:  # the line that was being written when the run was killed
+                    continue
+                if outcome["program"] == self.program:
+                    self.found.append(outcome)
+
+    def has(self, world, seed, estimator):
+        return any((outcome["world"], outcome["seed"], outcome["estimator"]) == (world.name, seed, estimator) for outcome in self.found)
+
+    def add(self, outcomes):
+        new = [{"program": self.program} | outcome for outcome in outcomes]
+        self.found += new
+        self.file.parent.mkdir(parents=True, exist_ok=True)
+        with open(self.file, "a") as file:
+            file.write("".join(json.dumps(outcome) + "\n" for outcome in new))
+
+
+def measure(program, outcomes, worlds, seeds, estimators, jobs):
+    """Seed by seed, so that an interrupted run has some of every world."""
+    every = [(world, seed, [e for e in estimators if not outcomes.has(world, seed, e)]) for seed in seeds for world in worlds]
+    missing = [run for run in every if run[2]]
+    with concurrent.futures.ProcessPoolExecutor(jobs) as pool:
+        running = [pool.submit(outcomes_of, program, world.name, seed, names) for world, seed, names in missing]
+        try:
+            for done, future in enumerate(concurrent.futures.as_completed(running), 1):
+                found = future.result()
+                outcomes.add(found)
+                print(f"{done} of {len(missing)}: " + "; ".join(line_of(outcome) for outcome in found), flush=True)
+        except BaseException:
+            pool.shutdown(cancel_futures=True)
+            raise
+
+
+def line_of(outcome):
+    said = {0: "trustworthy", 1: "do not use", 3: "refused"}[outcome["status"]]
+    return (f"{outcome['world']} {outcome['seed']} {outcome['estimator']}: {said}, "
+            + (f"wrong ({', '.join(outcome['wrong'])})" if outcome["wrong"] else "right")
+            + (f" {', '.join(outcome['do_not_use'])}" if outcome.get("do_not_use") else ""))
+
+
+# ---- The tables
+
+def bounds(hits, runs, confidence=0.95):
+    """Clopper and Pearson's interval of a probability of which `hits` in `runs` were seen."""
+    if runs == 0:
+        return 0.0, 1.0
+
+    def at_most(k, p):
+        """P(X <= k), X binomial."""
+        if p <= 0 or k >= runs:
+            return 1.0
+        if p >= 1:
+            return 0.0
+        return math.fsum(math.exp(math.lgamma(runs + 1) - math.lgamma(i + 1) - math.lgamma(runs - i + 1)
+                                  + i * math.log(p) + (runs - i) * math.log1p(-p)) for i in range(k + 1))
+
+    def solve(falls_below, level):
+        low, high = 0.0, 1.0
+        for _ in range(60):
+            middle = (low + high) / 2
+            low, high = (middle, high) if falls_below(middle) > level else (low, middle)
+        return (low + high) / 2
+
+    tail = (1 - confidence) / 2
+    lower = 0.0 if hits == 0 else solve(lambda p: at_most(hits - 1, p), 1 - tail)
+    upper = 1.0 if hits == runs else solve(lambda p: at_most(hits, p), tail)
+    return lower, upper
+
+
+def is_wrong(outcome):
+    return bool(outcome["wrong"])
+
+
+def is_trusted(outcome):
+    return outcome["status"] == 0
+
+
+def share(hits, runs):
+    low, high = bounds(hits, runs)
+    return f"{hits} of {runs}: {100 * hits / runs:.1f} % ({100 * low:.1f} … {100 * high:.1f})" if runs else "–"
+
+
+def summary(outcomes):
+    """Of results (a refusal is none): wrong ones called trustworthy, of all; right ones called not, of all right ones."""
+    results = [outcome for outcome in outcomes if outcome["status"] != 3]
+    right = [outcome for outcome in results if not is_wrong(outcome)]
+    return (sum(is_wrong(outcome) and is_trusted(outcome) for outcome in outcomes), len(outcomes),
+            sum(not is_trusted(outcome) for outcome in right), len(right))
+
+
+def table(heads, rows):
+    return "\n".join("| " + " | ".join(row) + " |" for row in [heads, ["---"] * len(heads), *rows])
+
+
+def in_all(outcomes):
+    groups = list(dict.fromkeys(world.group for world in WORLDS))
+    of_group = {group: [world.name for world in WORLDS if world.group == group] for group in groups}
+    rows = []
+    for name, chosen in [(group, lambda o, group=group: o["world"] in of_group[group]) for group in groups] + [("all", lambda o: True)]:
+        for estimator in ESTIMATORS:
+            trusted_wrong, runs, refused_right, right = summary([o for o in outcomes if chosen(o) and o["estimator"] == estimator])
+            rows.append([name, estimator, share(trusted_wrong, runs), share(refused_right, right)])
+    return table(["worlds", "estimator", "wrong, called trustworthy, of all", "right, called not, of the right ones"], rows)
+
+
+def per_world(outcomes):
+    rows = []
+    for world in WORLDS:
+        for estimator in ESTIMATORS:
+            its = [o for o in outcomes if o["world"] == world.name and o["estimator"] == estimator]
+            if not its:
+                continue
+            counts = [sum(is_wrong(o) == wrong and o["status"] != 3 and is_trusted(o) == trusted for o in its)
+                      for wrong, trusted in ((False, True), (False, False), (True, False), (True, True))]
+            refused = sum(o["status"] == 3 for o in its)
+            why = sorted({code for o in its for code in o.get("do_not_use", [])})
+            what = sorted({reason for o in its if is_trusted(o) for reason in o["wrong"]})
+            rows.append([world.name, estimator, *(str(count) if count else "·" for count in (*counts, refused)), ", ".join(what), ", ".join(why)])
+    return table(["world", "estimator", "right, trusted", "right, not", "wrong, not", "**wrong, trusted**", "refused", "wrong and trusted in", "findings that forbid use"], rows)
+
+
+def write(document, outcomes):
+    """Each table stands between `<!-- NAME -->` and `<!-- end -->`; the text around it is left alone."""
+    text = document.read_text()
+    for name, made in (("in-all", in_all(outcomes)), ("per-world", per_world(outcomes))):
+        text, places = re.subn(rf"(<!-- {name} -->\n).*?(<!-- end -->)", lambda place: place[1] + made + "\n" + place[2], text, flags=re.DOTALL)
+        if places != 1:
+            sys.exit(f"{document}: has no place for the table {name}")
+    document.write_text(text)
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("program", type=pathlib.Path)
+    parser.add_argument("outcomes", type=pathlib.Path)
+    parser.add_argument("--document", type=pathlib.Path)
+    parser.add_argument("--worlds", default="", metavar="PATTERN", help="regular expression that their names contain")
+    parser.add_argument("--estimators", default=",".join(ESTIMATORS), metavar="NAMES", help="separated by commas; [default: %(default)s]")
+    parser.add_argument("--seeds", type=int, default=12, metavar="N")
+    parser.add_argument("--jobs", type=int, default=os.cpu_count(), metavar="N")
+    given = parser.parse_args()
+    program = given.program.resolve()
+    outcomes = Outcomes(given.outcomes, program)
+    worlds = [world for world in WORLDS if re.search(given.worlds, world.name)]
+    measure(program, outcomes, worlds, range(1, given.seeds + 1), given.estimators.split(","), given.jobs)
+    print(per_world(outcomes.found))
+    print(in_all(outcomes.found))
+    if given.document:
+        write(given.document, outcomes.found)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,268 @@
+"""The worlds of the verdict: what each pass is made of. World.name is what --worlds selects by, World.group the part of the table.
+
+A world gives the scenario of the pass, by a random generator of its seed, and may edit the telemetry afterwards. Drift outside the models is
+given in a size that is a few percent of eq. (1), 2e-6 rad/s, and in one that is about half of it.
+"""
+import dataclasses
+import math
+import random
+from collections.abc import Callable
+
+from rotations import exponential, inverse, product
+
+ARCSECOND = math.pi / 180 / 3600
+PASS_S = 9 * 3600.0
+
+
+@dataclasses.dataclass(frozen=True)
+class World:
+    name: str
+    group: str
+    scenario: Callable[[random.Random], str]  # the TOML text behind [scenario], without its seed and duration
+    # (telemetry, random): of the pass that is calibrated and, with the same draws, of that which is forecast; returns what moved, or None.
+    edit: Callable | None = None
+
+
+@dataclasses.dataclass(frozen=True)
+class Moved:
+    """What stands elsewhere at the end of the pass than the truth of the simulation says: quaternions."""
+    gyro: tuple | None = None     # of the case of gyro 1: h_b = gyro h_b(simulated)
+    tracker: tuple | None = None  # of c, which are the axes of the star tracker: q_in_c = q_in_c(simulated) tracker
+
+
+def toml(**tables):
+    """"gyro_drift" is [gyro.drift]; values are written as they are, texts quoted by the caller."""
+    return "".join(f"[{name.replace('_drift', '.drift').replace('_readout', '.readout')}]\n"
+                   + "".join(f"{key} = {value}\n" for key, value in table.items()) for name, table in tables.items())
+
+
+QUIET = {"outside_sigma": '"0rad/s"'}
+
+
+def constant(text):
+    return lambda random: text
+
+
+# ---- Worlds of nothing but what the models contain
+
+SLEWS = toml(gyro_drift={})
+NO_OUTSIDE = toml(gyro_drift=QUIET)
+STEADY = toml(attitude={"slews": '"none"'}, gyro_drift={})
+YAW_STEERED = toml(attitude={"reference": '"yaw-steered"', "slews": '"none"'}, gyro_drift={})
+YAW_STEERED_SLEWS = toml(attitude={"reference": '"yaw-steered"'}, gyro_drift={})
+THREE_GYROS = toml(gyro_drift={}) + "".join(f"[[gyro.unit]]\nstart_direction_c = {direction}\n" for direction in (
+    "[0.995, 0.087, 0.045]", "[0.14, 0.985, 0.094]", "[0.1, 0.2, 0.97]"))
+
+
+# ---- Drift that no model contains
+
+def per_gyro(random, drift_of):
+    """drift_of(random, gyro): lines of [gyro.unit.drift]."""
+    directions = ("[0.995, 0.087, 0.045]", "[0.14, 0.985, 0.094]")
+    return toml(gyro_drift=QUIET) + "".join(
+        f"[[gyro.unit]]\nstart_direction_c = {direction}\n[gyro.unit.drift]\n{drift_of(random, gyro)}\n" for gyro, direction in enumerate(directions))
+
+
+def members(random, amplitude, degrees=(1, 3, 4, 6)):
+    """All members of these degrees, each within ± amplitude."""
+    drawn = [f'{{potential = "{potential}", degree = {degree}, order = {order}, amplitude = "{random.uniform(-amplitude, amplitude):.6e}rad/s"}}'
+             for potential in "WD" for degree in degrees for order in range(-degree, degree + 1)]
+    return f"harmonics = [{', '.join(drawn)}]"
+
+
+def degrees(amplitude):
+    return lambda random: per_gyro(random, lambda random, gyro: members(random, amplitude))
+
+
+def bump(amplitude):
+    """On the way of each momentum: that of gyro 1 goes round in the plane of x and z, that of gyro 2 stays within 40 degrees of y."""
+    def centre(random, gyro):
+        angle, side = random.uniform(0, 2 * math.pi), random.uniform(-0.3, 0.3)
+        return (math.cos(angle), side, math.sin(angle)) if gyro == 0 else (0.3 * math.cos(angle), 1, 0.3 * math.sin(angle))
+    return lambda random: per_gyro(random, lambda random, gyro: f'bump = "{amplitude}rad/s"\nbump_centre = {list(centre(random, gyro))}')
+
+
+def drifting(**keys):
+    return constant(toml(gyro_drift=QUIET | keys))
+
+
+# ---- Telemetry that is dirty as telemetry is
+
+DIRTY = toml(gyro={"gaps": '[{begin = "100min", end = "112min"}, {begin = "301min", end = "301.5min"}]'}, gyro_drift={},
+             gyro_readout={"dropout_probability": 0.001, "spike_probability": 0.001, "stuck_probability": 1e-5},
+             star_tracker={"outlier_probability": 0.02, "dropout_probability": 0.02, "wrong_sign_probability": 0.5,
+                           "outages": '[{begin = "200min", end = "230min"}]'})
+
+
+def tracker(**keys):
+    return constant(toml(gyro_drift={}, star_tracker=keys))
+
+
+# ---- Telemetry that is wrong
+
+def in_degrees(telemetry, random):
+    """Direction cosines given as angles from 90 degrees would be caught by their norm; the noise of pass.toml is what is read."""
+    def scale(text):
+        return f"{float(text) * 180 / math.pi!r}"
+    lines = (telemetry.directory / "pass.toml").read_text().splitlines()
+    for line in lines:
+        if line.startswith("noise_rad"):
+            values = line[line.index("[") + 1:line.index("]")].split(",")
+            telemetry.settings((line, f"noise_rad = [{', '.join(scale(value) for value in values)}]"))
+        elif line.startswith("readout_noise_rad"):
+            telemetry.settings((line, f"readout_noise_rad = {scale(line.split('=')[1].split('#')[0])}"))
+
+
+def fixes_by(change):
+    return lambda telemetry, random: telemetry.fixes(lambda t_s, q: change(q))
+
+
+def readings_by(change):
+    return lambda telemetry, random: telemetry.readings(lambda t_s, h: change(h))
+
+
+def stamps_of_fixes(change):
+    """change(t_s) returns the stamp that is written."""
+    return lambda telemetry, random: telemetry.rewrite("star_tracker.csv", lambda rows: [[change(row[0]), *row[1:]] for row in rows])
+
+
+def tracker_moves(rotation_vector_of):
+    """A fix is C_in_c exp([e×]), e = rotation_vector_of(t_s, random axis)."""
+    def edit(telemetry, random):
+        axis = unit(random)
+        # What moves stops at the end of the pass, so that afterwards there is one truth.
+        telemetry.fixes(lambda t_s, q: product(q, exponential(rotation_vector_of(min(t_s, PASS_S), axis))))
+        return Moved(tracker=exponential(rotation_vector_of(PASS_S, axis)))
+    return edit
+
+
+def unit(random):
+    v = [random.gauss(0, 1) for _ in range(3)]
+    size = math.sqrt(sum(x * x for x in v))
+    return [x / size for x in v]
+
+
+def scaled(axis, size):
+    return [size * x for x in axis]
+
+
+def frozen(seconds):
+    def edit(telemetry, random):
+        begin = random.uniform(0.2, 0.7) * PASS_S
+        def held(rows):
+            last = None
+            for row in rows:
+                if begin <= row[0] < begin + seconds and last is not None:
+                    row[1:] = last
+                last = row[1:]
+            return rows
+        telemetry.rewrite("star_tracker.csv", held)
+    return edit
+
+
+def case_steps(size_rad):
+    """The case of gyro 1 turns against c in mid-pass: its readings do."""
+    def edit(telemetry, random):
+        turn = exponential(scaled(unit(random), size_rad))
+        def change(t_s, h):
+            return [*product(product(turn, (*h[:3], 0.0)), inverse(turn))[:3], *h[3:]] if t_s >= PASS_S / 2 else h
+        telemetry.readings(change)
+        return Moved(gyro=turn)
+    return edit
+
+
+def spikes(share, size_rad):
+    """Of gyro 1, that keep the norm."""
+    def edit(telemetry, random):
+        def change(t_s, h):
+            if random.random() >= share:
+                return h
+            turn = exponential(scaled(unit(random), random.uniform(0, size_rad)))
+            return [*product(product(turn, (*h[:3], 0.0)), inverse(turn))[:3], *h[3:]]
+        telemetry.readings(change)
+    return edit
+
+
+def late(seconds):
+    """Gyro 2 is stamped late: its column is moved by whole samples."""
+    def edit(telemetry, random):
+        def shifted(rows):
+            samples = round(seconds / 0.125)
+            columns = [row[4:7] for row in rows]
+            return [[*row[:4], *columns[max(i - samples, 0)]] for i, row in enumerate(rows)]
+        telemetry.rewrite("gyro.csv", shifted)
+    return edit
+
+
+def inertial_step(size_rad):
+    """From mid-pass on the momentum of gyro 1 is another one: turned in inertial space, at the attitude of the nearest fix."""
+    def edit(telemetry, random):
+        fixes = {}
+        for line in (telemetry.directory / "star_tracker.csv").read_text().splitlines()[1:]:
+            cells = [float(cell) for cell in line.split(",")]
+            fixes[round(cells[0] / 3)] = tuple(cells[1:5])
+        turn = exponential(scaled(unit(random), size_rad))
+        def change(t_s, h):
+            if t_s < PASS_S / 2:
+                return h
+            q = fixes.get(round(t_s / 3))
+            both = product(product(inverse(q), turn), q) if q else turn
+            return [*product(product(both, (*h[:3], 0.0)), inverse(both))[:3], *h[3:]]
+        telemetry.readings(change)
+    return edit
+
+
+WORLDS = [
+    World("slews", "in the models", constant(SLEWS)),
+    World("slews-eq1", "in the models", constant(NO_OUTSIDE)),
+    World("steady", "in the models", constant(STEADY)),
+    World("yaw-steered", "in the models", constant(YAW_STEERED)),
+    World("yaw-steered-slews", "in the models", constant(YAW_STEERED_SLEWS)),
+    World("three-gyros", "in the models", constant(THREE_GYROS)),
+
+    World("degrees-5e-8", "drift outside eq. (1)", degrees(5e-8)),
+    World("degrees-8e-8", "drift outside eq. (1)", degrees(8e-8)),
+    World("bump-5e-8", "drift outside eq. (1)", bump(5e-8)),
+    World("bump-1e-6", "drift outside eq. (1)", bump(1e-6)),
+    World("hysteresis-5e-7", "drift outside eq. (1)", drifting(hysteresis='"5e-7rad/s"')),
+    World("hysteresis-5e-8", "drift outside eq. (1)", drifting(hysteresis='"5e-8rad/s"')),
+    World("after-slews-0.5", "drift outside eq. (1)", drifting(slew_fraction=0.5)),
+    World("after-slews-0.05", "drift outside eq. (1)", drifting(slew_fraction=0.05)),
+    World("jump-1e-6", "drift outside eq. (1)", drifting(jump_sigma='"1e-6rad/s"')),
+    World("jump-1e-7", "drift outside eq. (1)", drifting(jump_sigma='"1e-7rad/s"')),
+    World("polhode-0.5", "drift outside eq. (1)", drifting(polhode_fraction=0.5)),
+    World("polhode-0.05", "drift outside eq. (1)", drifting(polhode_fraction=0.05)),
+    World("thermal-0.5", "drift outside eq. (1)", drifting(thermal_fraction=0.5)),
+    World("thermal-0.05", "drift outside eq. (1)", drifting(thermal_fraction=0.05)),
+    World("walk", "drift outside eq. (1)", drifting(coefficient_walk='"1e-10rad/s/s^0.5"')),
+    World("warm-up-0.3", "drift outside eq. (1)", drifting(warm_up_fraction=0.3)),
+
+    World("dirty", "dirty telemetry", constant(DIRTY)),
+    World("dirty-degrees", "dirty telemetry", lambda random: DIRTY.replace("[gyro.drift]\n", "[gyro.drift]\n" + members(random, 5e-8) + "\n")),
+    World("clock-offset-20ms", "dirty telemetry", tracker(clock_offset='"20ms"')),
+    World("orbital-error-15", "dirty telemetry", tracker(orbital_sine='["15arcsec", "-10arcsec", "5arcsec"]', orbital_cosine='["5arcsec", "10arcsec", "-15arcsec"]')),
+    World("field-error", "dirty telemetry", tracker(field_error='["2arcsec", "2arcsec", "10arcsec"]')),
+    World("blinded", "dirty telemetry", tracker(sun_exclusion='"40deg"', earth_exclusion='"25deg"')),
+
+    World("noise-in-degrees", "wrong units and sides", constant(SLEWS), in_degrees),
+    World("scalar-first", "wrong units and sides", constant(SLEWS), fixes_by(lambda q: (q[3], q[0], q[1], q[2]))),
+    World("conjugate", "wrong units and sides", constant(SLEWS), fixes_by(inverse)),
+    World("gyros-exchanged", "wrong units and sides", constant(SLEWS), readings_by(lambda h: h[3:] + h[:3])),
+    World("axis-mirrored", "wrong units and sides", constant(SLEWS), readings_by(lambda h: [h[0], -h[1], *h[2:]])),
+    World("axes-exchanged", "wrong units and sides", constant(SLEWS), readings_by(lambda h: [h[1], h[0], *h[2:]])),
+
+    World("frozen-tracker-70s", "faults", constant(SLEWS), frozen(70)),
+    World("frozen-tracker-1h", "faults", constant(SLEWS), frozen(3600)),
+    World("tracker-slip-20", "faults", constant(SLEWS), tracker_moves(lambda t, axis: scaled(axis, 20 * ARCSECOND if t > PASS_S / 2 else 0))),
+    World("tracker-ramp-60", "faults", constant(SLEWS), tracker_moves(lambda t, axis: scaled(axis, 60 * ARCSECOND * t / PASS_S))),
+    World("gyro-case-step-20", "faults", constant(SLEWS), case_steps(20 * ARCSECOND)),
+    World("gyro-case-step-60", "faults", constant(SLEWS), case_steps(60 * ARCSECOND)),
+    World("gyro-spikes", "faults", constant(SLEWS), spikes(0.01, math.radians(1))),
+    World("inertial-step-1deg", "faults", constant(SLEWS), inertial_step(math.radians(1))),
+    World("aberration", "faults", tracker(aberration='"uncorrected"')),
+    World("cosine-scale", "faults", constant(toml(gyro_drift={}, gyro_readout={"scale": "[5e-4, -5e-4, 0]"}))),
+    World("gyro-late-125ms", "faults", constant(SLEWS), late(0.125)),
+    World("stamps-3s-late", "faults", constant(SLEWS), stamps_of_fixes(lambda t: t + 3)),
+    World("clock-100ppm", "faults", constant(SLEWS), stamps_of_fixes(lambda t: t * (1 + 1e-4))),
+    World("clock-1ppm", "faults", constant(SLEWS), stamps_of_fixes(lambda t: t * (1 + 1e-6))),
+]
