@@ -26,7 +26,7 @@ void add_evaluate(CLI::App& program, const Common& common, int& exit_status) {
   CLI::App* command =
       program.add_subcommand("evaluate", "Measure an attitude against the truth, or else the star tracker");
   command->add_option("PASS", arguments->pass, "Directory or NetCDF file")->required();
-  command->add_option("--attitude", arguments->attitude, "Attitude file (CSV); - for standard input")
+  command->add_option("--attitude", arguments->attitude, "Attitude file (CSV) or CCSDS AEM; - for standard input")
       ->required()
       ->type_name("FILE");
   command

@@ -266,8 +266,8 @@ void add_export(CLI::App& program, const Common& common, int& exit_status) {
   command->footer(
       "trihedron export attitude.csv --format aem -o attitude.aem --pass pass.nc --time-system UTC\n"
       "trihedron export attitude.csv --format ck -o attitude.bc --pass pass.nc --naif-id -28380\n"
-      "trihedron export out/calibration.json --format acm -o calibration.acm --pass pass.nc --attitude attitude.csv\n"
-      "trihedron export out/calibration.json --format fk -o gyros.tf --naif-id -28380 --object-name RESURS-DK1");
+      "trihedron export out/calibration.json --format acm -o out.acm --pass pass.nc --attitude a.csv\n"
+      "trihedron export out/calibration.json --format fk -o gyros.tf --object-name RESURS-DK1");
   command->callback([&common, &exit_status, arguments] {
     expect_places(*arguments);
     if (arguments->format.starts_with("acm") || arguments->format == "fk") {

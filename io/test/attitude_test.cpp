@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "fixtures.hpp"
+#include "trihedron/io/attitude_message.hpp"
 
 namespace trihedron::io {
 namespace {
@@ -41,6 +42,20 @@ TEST_F(AttitudeCsv, IsWrittenWithFixedDecimals) {
       "3.125,0.000000000000,-0.600000000000,0.000000000000,0.800000000000,0.000000e+00,0.000000e+00,0.000000e+00\n"
       "3.125000001,0.000000000000,-0.600000000000,0.000000000000,0.800000000000,3.333333e-01,1.000000e+00,2.000000e+"
       "00\n");
+}
+
+TEST_F(AttitudeCsv, MayHaveRates) {
+  write_text(directory_ / "a.csv",
+             "t_s,rate_x_rad_s,rate_y_rad_s,rate_z_rad_s,q_x,q_y,q_z,q_w,age_s\n1,0.1,-0.2,0.3,0,0,0.6,0.8,5\n");
+  const AttitudeMessage message = read_attitude_of_any_format(directory_ / "a.csv", epoch_);
+  ASSERT_EQ(message.rate_rad_s.size(), 1U);
+  EXPECT_EQ(message.rate_rad_s[0], Eigen::Vector3d(0.1, -0.2, 0.3));
+  EXPECT_EQ(message.attitude.age_s, std::vector<double>{5});
+  EXPECT_EQ(format_attitude(epoch_, message.attitude, AttitudeDigits::kAll, message.rate_rad_s),
+            "t_s,q_x,q_y,q_z,q_w,age_s,rate_x_rad_s,rate_y_rad_s,rate_z_rad_s\n1.000,0,0,0.6,0.8,5.000,0.1,-0.2,0.3\n");
+  EXPECT_THAT(refusal_of("t_s,q_x,q_y,q_z,q_w,rate_x_rad_s,rate_y_rad_s,rate_z_rad_s\n1,0,0,0,1,0.1,,0.3\n"),
+              HasSubstr("a rate is missing"));
+  EXPECT_THAT(refusal_of("t_s,q_x,q_y,q_z,q_w,rate_x_rad_s\n1,0,0,0,1,0.1\n"), HasSubstr("rate_y_rad_s"));
 }
 
 TEST_F(AttitudeCsv, ComesBackWithAndWithoutSigmas) {
