@@ -24,6 +24,16 @@
 #include "wording.hpp"
 
 namespace trihedron::io {
+
+/// An input, and what is needed to put its draws into a scenario.
+struct Varied {
+  CampaignInput input;
+  std::vector<std::string> path;
+  std::vector<toml::array> options;   ///< each an array of the one value
+  toml::table as_given;               ///< the distribution
+  const toml::node* place = nullptr;  ///< in the document
+};
+
 namespace {
 
 namespace fs = std::filesystem;
@@ -143,15 +153,6 @@ void flatten(const toml::node& node, const std::string& key, CampaignIdentity& l
     lines.push_back({key, text_of(node)});
   }
 }
-
-/// An input, and what is needed to put its draws into a scenario.
-struct Varied {
-  CampaignInput input;
-  std::vector<std::string> path;
-  std::vector<toml::array> options;   ///< each an array of the one value
-  toml::table as_given;               ///< the distribution
-  const toml::node* place = nullptr;  ///< in the document
-};
 
 /// Reads one distribution.
 class DistributionReader {
