@@ -7,7 +7,7 @@ SOURCES := $(shell git ls-files '*.cpp' '*.hpp' 2>/dev/null)
 
 .PHONY: help setup build everything demo test flight bench slots mutants validation consistency forecasts verdict fuzz fuzz-build fuzz-briefly docs \
   format lint \
-  standard sanitize coverage install clean
+  standard sanitize coverage interop install clean
 
 help:
 	@echo 'make demo     install what is missing, build, repeat the experiment of the paper, say where the report is'
@@ -22,6 +22,7 @@ help:
 	@echo 'make forecasts  measure again what docs/forecasts.md tells: hours; goes on where it was interrupted'
 	@echo 'make verdict  measure again what docs/verdict.md tells (WORLDS=pattern, SEEDS=number); goes on where it was interrupted'
 	@echo 'make mutants  whether the tests of core notice wrong formulas; goes on where it was interrupted'
+	@echo 'make interop  whether ccsds-ndm-py, Orekit and SPICE read what export writes, and import what they write: a minute'
 	@echo 'make fuzz     each reader against libFuzzer for FUZZ_SECONDS (3600) each, measures again what docs/reliability.md tells: hours'
 	@echo 'make docs     reference of the interfaces and all documents as web pages: out/docs/html/index.html'
 	@echo 'make install  into PREFIX (default /usr/local)'
@@ -70,6 +71,12 @@ slots:
 
 validation: everything
 	validation/validate.py $(BUILD)/trihedron docs/validation.md
+
+interop: build
+	@cmake/setup.sh interop
+	@test -e build-interop/bin/pip || python3 -m venv build-interop
+	@build-interop/bin/pip install --quiet --disable-pip-version-check --requirement validation/interop/requirements.txt
+	TRIHEDRON_BUILD=$(abspath $(BUILD)) build-interop/bin/python -m pytest -q -p no:cacheprovider validation/interop
 
 mutants:
 	@cmake/setup.sh program tests

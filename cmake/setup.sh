@@ -7,7 +7,7 @@ cd "$(dirname "$0")/.."
 program=(
   g++ cmake ninja-build pkg-config
   libeigen3-dev libhdf5-dev libcli11-dev libtomlplusplus-dev libfmt-dev nlohmann-json3-dev libspdlog-dev libnetcdf-dev libfast-float-dev libsqlitecpp-dev
-  libtbb-dev libboost-dev liberfa-dev ca-certificates
+  libtbb-dev libboost-dev liberfa-dev libpugixml-dev ca-certificates
 )
 # Tests, benches, validation.
 tests=(
@@ -16,6 +16,8 @@ tests=(
   valgrind python3 python3-pytest python3-xarray python3-h5netcdf python3-jsonschema
 )
 docs=(doxygen)
+# Other software that reads what the program writes: Orekit runs on Java, the rest comes from PyPI.
+interop=(default-jre-headless python3 python3-venv)
 # ARM Cortex-M7 without an operating system, emulated: a short flight is among the tests.
 flight=(gcc-arm-none-eabi libnewlib-arm-none-eabi libstdc++-arm-none-eabi-newlib qemu-system-arm)
 # The further targets of `make flight`.
@@ -27,8 +29,8 @@ lint=(git ca-certificates cppcheck python3 python3-venv)
 packages=()
 for name in ${*:-program tests sanitizers flight lint}; do
   case $name in
-    program|tests|sanitizers|flight|targets|lint|docs) declare -n members=$name && packages+=("${members[@]}") ;;
-    *) echo "setup: no group \"$name\"; there are program, tests, sanitizers, flight, targets, lint, docs" >&2; exit 2 ;;
+    program|tests|sanitizers|flight|targets|lint|docs|interop) declare -n members=$name && packages+=("${members[@]}") ;;
+    *) echo "setup: no group \"$name\"; there are program, tests, sanitizers, flight, targets, lint, docs, interop" >&2; exit 2 ;;
   esac
   if [ "$name" = program ]; then program_wanted=yes; fi
 done

@@ -7,6 +7,7 @@
 
 #include "fixtures.hpp"
 #include "trihedron/io/attitude.hpp"
+#include "trihedron/io/attitude_message.hpp"
 #include "trihedron/io/calibration.hpp"
 #include "trihedron/io/catalogue.hpp"
 #include "trihedron/io/config.hpp"
@@ -52,6 +53,19 @@ void write_seeds(const fs::path& directory, const fs::path& examples) {
   attitude.sigma_rad.assign(attitude.size(), {1e-5, 1e-5, 1e-4});
   attitude.age_s.assign(attitude.size(), 1.5);
   io::write_attitude(at("attitude", "full.csv"), truth.t.front(), attitude);
+
+  io::MessageDescription description;
+  description.created_utc = "2026-01-02T03:04:05";
+  const std::vector<Eigen::Vector3d> rates(attitude.size(), {1e-3, 2e-3, 3e-3});
+  for (const bool with_rates : {false, true}) {
+    const std::span<const Eigen::Vector3d> given = with_rates ? rates : std::span<const Eigen::Vector3d>();
+    io::write_text(
+        at("attitude_message", with_rates ? "rates.aem" : "quaternions.aem"),
+        io::format_aem(attitude, given, truth.t.front(), description, Duration::max(), io::MessageSyntax::kKvn));
+    io::write_text(
+        at("attitude_message", with_rates ? "rates.xml" : "quaternions.xml"),
+        io::format_aem(attitude, given, truth.t.front(), description, Duration::max(), io::MessageSyntax::kXml));
+  }
 
   const CatalogueEntry entry{"Resurs-DK1", "pass-a", "2009-05-20", 1, io::sample_calibration()};
   fs::remove(at("catalogue", "one.db"));

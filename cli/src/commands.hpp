@@ -21,6 +21,8 @@ void add_navigate(CLI::App& program, const Common& common, int& exit_status);
 void add_replay(CLI::App& program, const Common& common, int& exit_status);
 void add_evaluate(CLI::App& program, const Common& common, int& exit_status);
 void add_observe(CLI::App& program, const Common& common, int& exit_status);
+void add_export(CLI::App& program, const Common& common, int& exit_status);
+void add_import(CLI::App& program, const Common& common, int& exit_status);
 void add_campaign(CLI::App& program, const Common& common, int& exit_status);
 void add_history(CLI::App& program, const Common& common, int& exit_status);
 void add_demo(CLI::App& program, const Common& common, int& exit_status);

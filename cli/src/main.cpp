@@ -43,6 +43,8 @@ void add_commands(CLI::App& program, trihedron::cli::Common& common, int& exit_s
   cli::add_observe(program, common, exit_status);
   cli::add_campaign(program, common, exit_status);
   cli::add_history(program, common, exit_status);
+  cli::add_export(program, common, exit_status);
+  cli::add_import(program, common, exit_status);
   cli::add_demo(program, common, exit_status);
   cli::add_references(program, exit_status);
 }

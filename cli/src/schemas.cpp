@@ -215,6 +215,23 @@ Json history_output(const Json& calibration) {
                  {"findings", findings()}});
 }
 
+/// Of export and import.
+Json interchange_output() {
+  return object({{"input", text()},
+                 {"input_format", text()},
+                 {"written", array(text())},
+                 {"output_format", text()},
+                 {"epochs", count()},
+                 {"segments", count()},
+                 {"left_out", count()},
+                 {"epoch_tai", text()},
+                 {"time_system", text()},
+                 {"inertial_frame", text()},
+                 {"body_frame", text()},
+                 {"object_name", text()},
+                 {"object_id", text()}});
+}
+
 Json campaign_output() {
   const Json finding =
       object({{"code", text()}, {"severity", text()}, {"text", text()}, {"evidence", text()}, {"cure", text()}});
@@ -295,6 +312,8 @@ std::vector<io::Schema> all_schemas() {
   schemas.push_back(output("evaluate", "What evaluate prints with --json.", evaluate_output()));
   schemas.push_back(output("observe", "What observe prints with --json.", observe_output()));
   schemas.push_back(output("history", "What history prints with --json.", history_output(calibration)));
+  schemas.push_back(output("export", "What export prints with --json.", interchange_output()));
+  schemas.push_back(output("import", "What import prints with --json.", interchange_output()));
   schemas.push_back(output("campaign", "What campaign prints with --json.", campaign_output()));
   schemas.push_back(output("campaign-run", "What campaign --only prints with --json, and run.json.", run_output()));
   return schemas;

@@ -64,6 +64,8 @@ class Originals:
         self.run("calibrate", "pass", "-o", "out", "--config", "told.toml", "--catalogue", "catalogue.db")
         self.run("calibrate", "second", "-o", "out2", "--config", "told.toml", "--catalogue", "catalogue.db")
         self.run("navigate", "pass", "--online", "-o", "attitude.csv")
+        for form in ("aem", "aem-xml"):
+            self.run("export", "attitude.csv", "--format", form, "-o", f"attitude.{form}", "--pass", "pass", "--time-system", "UTC")
         self.run("replay", "pass", "--speed", "max", "--state", "replay.state")
         shutil.copy(directory / "out/calibration.json", directory)
         shutil.copy(directory / "out/effective-config.toml", directory / "config.toml")
@@ -197,6 +199,15 @@ TARGETS = [
     Target("attitude.csv", spoil_table, ["pass", "recorded.toml"], [
         ("evaluate", "{in}/pass", "--attitude", "{in}/attitude.csv"),
         ("simulate", "{in}/recorded.toml", "-o", "{out}/pass")]),
+    *[Target(f"attitude.{form}", spoil_text, ["pass"], [
+        ("import", f"{{in}}/attitude.{form}", "-o", "{out}/a.csv"), ("--json", "import", f"{{in}}/attitude.{form}", "-o", "{out}/a.csv"),
+        ("evaluate", "{in}/pass", "--attitude", f"{{in}}/attitude.{form}"),
+        ("export", f"{{in}}/attitude.{form}", "--format", "ck", "-o", "{out}/a.bc")]) for form in ("aem", "aem-xml")],
+    Target("attitude.csv", spoil_table, ["pass"], [
+        ("export", "{in}/attitude.csv", "--format", form, "-o", "{out}/a.x", "--pass", "{in}/pass") for form in ("aem", "aem-xml", "ck")]),
+    Target("calibration.json", spoil_text, ["pass", "attitude.csv"], [
+        ("export", "{in}/calibration.json", "--format", form, "-o", "{out}/c.x", *more)
+        for form, more in (("acm", ("--attitude", "{in}/attitude.csv", "--pass", "{in}/pass")), ("acm-xml", ()), ("fk", ()))]),
     Target("catalogue.db", spoil_catalogue, [], [
         ("history", "{in}/catalogue.db"), ("--json", "history", "{in}/catalogue.db"), ("history", "{in}/catalogue.db", "-o", "{out}/h.html")]),
     Target("catalogue.db", spoil_catalogue, ["pass", "told.toml"], [(*CALIBRATE, "--catalogue", "{in}/catalogue.db")], ["catalogue.db"]),

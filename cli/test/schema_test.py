@@ -98,7 +98,8 @@ def test_schemas_are_schemas(name):
 
 def test_every_file_and_output_has_one():
     assert NAMES == ["pass", "config", "scenario", "campaign", "calibration", "truth", "inspect-output", "calibrate-output", "navigate-output",
-                     "replay-output", "evaluate-output", "observe-output", "history-output", "campaign-output", "campaign-run-output"]
+                     "replay-output", "evaluate-output", "observe-output", "history-output", "export-output", "import-output",
+                     "campaign-output", "campaign-run-output"]
     result = run("schema", "scenari")
     assert result.returncode == WRONG_USAGE and "scenario" in result.stderr
 
@@ -127,6 +128,8 @@ def test_outputs_have_only_what_is_described(calibrated):
         "evaluate-output": ("evaluate", directory / "pass", "--attitude", directory / "before.csv", "--before", directory / "before.csv"),
         "observe-output": ("observe", directory / "pass", *told),
         "history-output": ("history", directory / "c.db"),
+        "export-output": ("export", directory / "before.csv", "--format", "aem", "-o", directory / "a.aem", "--pass", directory / "pass"),
+        "import-output": ("import", directory / "a.aem", "-o", directory / "a.csv"),
     }
     for name, arguments in outputs.items():
         result = run("--json", *arguments)

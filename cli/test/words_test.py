@@ -11,7 +11,8 @@ import pytest
 
 from program import DO_NOT_USE, INPUT_REFUSED, MACHINE_FAILED, PROGRAM, ROOT, TOLD, TRUSTWORTHY, WRONG_USAGE, run
 
-COMMANDS = ["simulate", "inspect", "calibrate", "navigate", "replay", "evaluate", "observe", "campaign", "history", "demo", "schema", "man", "completion"]
+COMMANDS = ["simulate", "inspect", "calibrate", "navigate", "replay", "evaluate", "observe", "campaign", "history", "export", "import",
+            "demo", "schema", "man", "completion"]
 
 SCENARIO = """
 [scenario]

@@ -6,8 +6,11 @@
 #include <cmath>
 #include <stdexcept>
 
+#include "attitude_rules.hpp"
 #include "csv.hpp"
+#include "text_file.hpp"
 #include "trihedron/io/atomic_file.hpp"
+#include "trihedron/io/attitude_message.hpp"
 #include "trihedron/io/time_text.hpp"
 #include "trihedron/records/stop.hpp"
 
@@ -21,8 +24,19 @@ namespace {
 }  // namespace
 
 AttitudeHistory read_attitude(const std::filesystem::path& path, Time epoch) {
-  constexpr double kNormTolerance = 1e-3;
-  const Series series = read_csv(path, attitude_columns);
+  return read_attitude_of_any_format(path, epoch).attitude;
+}
+
+AttitudeMessage read_attitude_of_any_format(const std::filesystem::path& path, std::optional<Time> given_epoch) {
+  const TextFile content(path);
+  if (is_attitude_message(content.text())) {
+    return parse_attitude_message(content.text(), path);
+  }
+  if (!given_epoch) {
+    throw UsageError("an attitude file counts t_s from the epoch of its pass: give the pass by --pass, or --epoch");
+  }
+  const Time epoch = *given_epoch;
+  const Series series = parse_csv(content, path, attitude_columns);
   if (series.cut_line > 0) {
     throw InputRefused(path, {series.cut_line, 0}, "the last line is cut short", "write the file again");
   }
@@ -31,8 +45,14 @@ AttitudeHistory read_attitude(const std::filesystem::path& path, Time epoch) {
   }
   const auto has = [&](const char* column) { return std::ranges::count(series.columns, column) > 0; };
   const bool has_sigma = has("sigma_x_rad");
+  const bool has_rate = has("rate_x_rad_s");
   const bool has_age = has("age_s");
-  AttitudeHistory attitude;
+  AttitudeMessage message;
+  message.format = "attitude file";
+  message.inertial_frame = "ICRF";
+  message.time_system = "TAI";
+  message.epoch = epoch;
+  AttitudeHistory& attitude = message.attitude;
   for (std::size_t i = 0; i < series.rows(); ++i) {
     const double* row = series.row(i);
     if (!(std::abs(series.t_s[i]) < 1e9)) {
@@ -43,7 +63,7 @@ AttitudeHistory read_attitude(const std::filesystem::path& path, Time epoch) {
       refuse(series, i, "the time stamp does not increase");
     }
     const Eigen::Quaterniond q(row[3], row[0], row[1], row[2]);
-    if (!(std::abs(q.norm() - 1) <= kNormTolerance)) {
+    if (!is_unit(q)) {
       refuse(series, i, "q is not a unit quaternion");
     }
     attitude.t.push_back(t);
@@ -55,22 +75,33 @@ AttitudeHistory read_attitude(const std::filesystem::path& path, Time epoch) {
       }
       attitude.sigma_rad.push_back(sigma);
     }
+    const double* next = row + (has_sigma ? 7 : 4);
+    if (has_rate) {
+      const Eigen::Vector3d rate(next[0], next[1], next[2]);
+      if (!rate.allFinite()) {
+        refuse(series, i, "a rate is missing");
+      }
+      message.rate_rad_s.push_back(rate);
+      next += 3;
+    }
     if (has_age) {
-      const double age_s = row[has_sigma ? 7 : 4];
+      const double age_s = *next;
       if (!(age_s >= 0 && age_s < 1e9)) {
         refuse(series, i, "age_s is not between 0 and 1e9 s");
       }
       attitude.age_s.push_back(age_s);
     }
   }
-  return attitude;
+  return message;
 }
 
-std::string format_attitude_rows(Time epoch, const AttitudeHistory& attitude) {
+std::string format_attitude_rows(Time epoch, const AttitudeHistory& attitude, AttitudeDigits digits,
+                                 std::span<const Eigen::Vector3d> rate_rad_s) {
   const bool has_sigma = !attitude.sigma_rad.empty();
+  const bool has_rate = !rate_rad_s.empty();
   const bool has_age = !attitude.age_s.empty();
   if (attitude.q_in_c.size() != attitude.size() || (has_sigma && attitude.sigma_rad.size() != attitude.size()) ||
-      (has_age && attitude.age_s.size() != attitude.size())) {
+      (has_rate && rate_rad_s.size() != attitude.size()) || (has_age && attitude.age_s.size() != attitude.size())) {
     throw std::invalid_argument("the columns of an attitude history differ in length");
   }
   fmt::memory_buffer out;
@@ -79,8 +110,12 @@ std::string format_attitude_rows(Time epoch, const AttitudeHistory& attitude) {
   for (std::size_t i = 0; i < attitude.size(); ++i) {
     check_stop();
     const Eigen::Quaterniond& q = attitude.q_in_c[i];
-    fmt::format_to(fmt::appender(out), "{},{:.12f},{:.12f},{:.12f},{:.12f}", format_seconds(attitude.t[i] - epoch),
-                   q.x(), q.y(), q.z(), q.w());
+    const std::string t_s = format_seconds(attitude.t[i] - epoch);
+    if (digits == AttitudeDigits::kAll) {
+      fmt::format_to(fmt::appender(out), "{},{},{},{},{}", t_s, q.x(), q.y(), q.z(), q.w());
+    } else {
+      fmt::format_to(fmt::appender(out), "{},{:.12f},{:.12f},{:.12f},{:.12f}", t_s, q.x(), q.y(), q.z(), q.w());
+    }
     if (has_sigma) {
       const Eigen::Vector3d& sigma = attitude.sigma_rad[i];
       fmt::format_to(fmt::appender(out), ",{:.6e},{:.6e},{:.6e}", sigma.x(), sigma.y(), sigma.z());
@@ -88,18 +123,25 @@ std::string format_attitude_rows(Time epoch, const AttitudeHistory& attitude) {
     if (has_age) {
       fmt::format_to(fmt::appender(out), ",{:.3f}", attitude.age_s[i]);
     }
+    if (has_rate) {
+      const Eigen::Vector3d& rate = rate_rad_s[i];
+      fmt::format_to(fmt::appender(out), ",{},{},{}", rate.x(), rate.y(), rate.z());
+    }
     out.push_back('\n');
   }
   return fmt::to_string(out);
 }
 
-std::string format_attitude(Time epoch, const AttitudeHistory& attitude) {
+std::string format_attitude(Time epoch, const AttitudeHistory& attitude, AttitudeDigits digits,
+                            std::span<const Eigen::Vector3d> rate_rad_s) {
   const std::string_view names = kAttitudeColumns.substr(0, kAttitudeColumns.size() - 1);
   const std::size_t sigmas = names.find(",sigma_x_rad");
   const std::size_t age = names.find(",age_s");
-  return fmt::format("{}{}{}\n{}", names.substr(0, sigmas),
+  return fmt::format("{}{}{}{}\n{}", names.substr(0, sigmas),
                      attitude.sigma_rad.empty() ? "" : names.substr(sigmas, age - sigmas),
-                     attitude.age_s.empty() ? "" : names.substr(age), format_attitude_rows(epoch, attitude));
+                     attitude.age_s.empty() ? "" : names.substr(age),
+                     rate_rad_s.empty() ? "" : ",rate_x_rad_s,rate_y_rad_s,rate_z_rad_s",
+                     format_attitude_rows(epoch, attitude, digits, rate_rad_s));
 }
 
 void write_attitude(const std::filesystem::path& path, Time epoch, const AttitudeHistory& attitude) {

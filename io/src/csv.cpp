@@ -6,7 +6,6 @@
 #include <cstring>
 #include <limits>
 
-#include "text_file.hpp"
 #include "trihedron/records/stop.hpp"
 #include "wording.hpp"
 
@@ -94,9 +93,10 @@ bool is_cut_short(std::string_view line, std::size_t fields) {
 
 }  // namespace
 
-Series read_csv(const fs::path& file, ChooseRules choose) {
+Series read_csv(const fs::path& file, ChooseRules choose) { return parse_csv(TextFile(file), file, choose); }
+
+Series parse_csv(const TextFile& content, const fs::path& file, ChooseRules choose) {
   constexpr std::string_view kByteOrderMark = "\xEF\xBB\xBF";
-  const TextFile content(file);
   std::string_view text = content.text();
   text.remove_prefix(text.starts_with(kByteOrderMark) ? kByteOrderMark.size() : 0);
 

@@ -152,6 +152,13 @@ Fields kappa_fields(std::array<double, 7>& kappa) {
   return fields;
 }
 
+Fields mounting_change_fields(MountingChange& change) {
+  return {three_quantities("mounting_step", change.step_rad, kAngle,
+                           "rotation vector by which the mounting moves at once; of a gyro c axes, of a head its own"),
+          signed_duration("mounting_step_at", change.step_at_s, "when it does, since the start of the pass"),
+          three_quantities("mounting_rate", change.rate_rad_s, kRate, "at which the mounting turns evenly, same axes")};
+}
+
 Fields drift_fields(DriftScenario& drift, const fs::path& file) {
   return {
       section("kappa", file, "\"kappa\"", "coefficients of eq. (1); without them drawn from the seed",
@@ -206,7 +213,7 @@ Fields readout_fields(ReadoutScenario& readout) {
 }
 
 Fields unit_fields(GyroScenario& gyro, const fs::path& file) {
-  return {
+  return Fields{
       three_numbers("start_direction_c", gyro.start_direction_c, limits::kPureNumber,
                     "of the momentum, c axes, of any length but 0"),
       three_quantities("mounting_rotation_vector", gyro.mounting_rotation_vector_rad, kAngle, "as designed and known"),
@@ -217,7 +224,8 @@ Fields unit_fields(GyroScenario& gyro, const fs::path& file) {
       section("drift", file, "[gyro.drift]", "how the momentum precesses",
               [&gyro, &file] { return drift_fields(gyro.drift, file); }),
       section("readout", file, "[gyro.readout]", "how the direction of the momentum is read",
-              [&gyro] { return readout_fields(gyro.readout); })};
+              [&gyro] { return readout_fields(gyro.readout); })} +
+         mounting_change_fields(gyro.mounting_change);
 }
 
 /// `unit`: of one gyro. Its tables are read after what [gyro] says of all.
@@ -250,7 +258,7 @@ void read_gyros(const toml::table& table, const fs::path& file, Scenario& scenar
 
 Fields head_fields(StarTrackerScenario& head, const fs::path& file) {
   using Aberration = StarTrackerScenario::Aberration;
-  return {
+  return Fields{
       three_quantities("noise", head.noise_rad, kAngle, "1-sigma about its x, y, z, white"),
       signed_duration("clock_offset", head.clock_offset_s, "a fix stamped t holds the attitude at t + offset"),
       signed_duration("latency", head.latency_s, "a fix stamped t holds the attitude at t - latency"),
@@ -271,7 +279,11 @@ Fields head_fields(StarTrackerScenario& head, const fs::path& file) {
       one_number("outlier_probability", head.outlier_probability, limits::kPureNumber, "that a fix is wrong"),
       quantity("outlier", head.outlier_rad, kAngle, "by at most so much"),
       one_number("wrong_sign_probability", head.wrong_sign_probability, limits::kPureNumber,
-                 "that -q is given in place of q")};
+                 "that -q is given in place of q"),
+      three_quantities("inertial_step", head.inertial_step_rad, kAngle,
+                       "rotation vector by which what it takes for in turns at once, in axes"),
+      signed_duration("inertial_step_at", head.inertial_step_at_s, "when it does, since the start of the pass")} +
+         mounting_change_fields(head.mounting_change);
 }
 
 Fields further_head_fields(StarTrackerScenario& head, const fs::path& file) {

@@ -73,11 +73,14 @@ ColumnRules truth_columns(const fs::path& file, std::span<const ColumnName> pres
 ColumnRules attitude_columns(const fs::path& /*file*/, std::span<const ColumnName> present) {
   ColumnRules rules{kQuaternion, {"age_s"}, true};
   const std::vector<std::string> sigmas = {"sigma_x_rad", "sigma_y_rad", "sigma_z_rad"};
-  // All three or none: one alone would be taken for something else.
-  const bool any =
-      std::ranges::any_of(present, [&](const ColumnName& c) { return std::ranges::count(sigmas, c.name) > 0; });
-  if (any) {
-    std::ranges::copy(sigmas, std::back_inserter(rules.required));
+  const std::vector<std::string> rates = {"rate_x_rad_s", "rate_y_rad_s", "rate_z_rad_s"};
+  for (const std::vector<std::string>* names : {&sigmas, &rates}) {
+    // All three or none: one alone would be taken for something else.
+    const bool any =
+        std::ranges::any_of(present, [&](const ColumnName& c) { return std::ranges::count(*names, c.name) > 0; });
+    if (any) {
+      std::ranges::copy(*names, std::back_inserter(rules.required));
+    }
   }
   return rules;
 }

@@ -45,6 +45,27 @@ clock_offset = "7ms"
   EXPECT_THAT(why_refused("[star_tracker]\nmisalignment = [\"1deg\", \"0deg\", \"0deg\"]"), HasSubstr("misalignment"));
 }
 
+TEST(ScenarioToml, MountingsMoveByTheirOwnKeys) {
+  const Scenario scenario = parse(R"(
+[gyro]
+mounting_step = ["20arcsec", "0deg", "0deg"]
+mounting_step_at = "4h"
+[[gyro.unit]]
+[[gyro.unit]]
+mounting_step = ["0deg", "0deg", "0deg"]
+[star_tracker]
+mounting_rate = ["0deg/h", "0.002deg/h", "0deg/h"]
+inertial_step = ["0deg", "0deg", "1deg"]
+inertial_step_at = "5h"
+)");
+  EXPECT_EQ(scenario.gyros[0].mounting_change.at(4 * 3600.0 - 1), Eigen::Vector3d(0, 0, 0));
+  EXPECT_EQ(scenario.gyros[0].mounting_change.at(4 * 3600.0).x(), 20 * kArcsecond);
+  EXPECT_FALSE(scenario.gyros[1].mounting_change.is_there());
+  EXPECT_DOUBLE_EQ(scenario.star_tracker.mounting_change.at(1800).y(), 0.001 * kDegree);
+  EXPECT_EQ(scenario.star_tracker.inertial_step_rad.z(), kDegree);
+  EXPECT_EQ(scenario.star_tracker.inertial_step_at_s, 5 * 3600.0);
+}
+
 TEST(ScenarioToml, ValuesGoWhereTheirNamesSay) {
   const Scenario scenario = parse(R"(
 [scenario]

@@ -167,7 +167,9 @@ Vector3d Readout::read(Time t, const Vec<Case>& h, std::vector<Event>& events) {
 
 Gyro::Gyro(const GyroScenario& scenario, const Rot<In, C>& C_in_c, std::uint64_t seed, int gyro)
     : drift_(scenario.drift, seed, static_cast<std::uint64_t>(gyro)),
-      C_c_b_(true_alignment(scenario, seed, static_cast<std::uint64_t>(gyro))),
+      mounting_change_(scenario.mounting_change),
+      C_c_b_at_start_(true_alignment(scenario, seed, static_cast<std::uint64_t>(gyro))),
+      C_c_b_(C_c_b_at_start_),
       C_in_b_(C_in_c * C_c_b_),
       h_in_(C_in_c * start_direction(scenario)) {}
 
@@ -177,6 +179,9 @@ void Gyro::advance(double t_s, double step_s, const Rot<In, C>& middle, const Ro
     flight.body_rate_rad_s = (C_in_b_.inverse() * (end * C_c_b_)).log().raw().norm() / step_s;
   }
   drift_.next_step(t_s, step_s, momentum_in_case(), flight);
+  if (mounting_change_.is_there()) {
+    C_c_b_ = Rot<C, C>::exp(Vec<C>::assume(mounting_change_.at(t_s + step_s))) * C_c_b_at_start_;
+  }
   const Rot<In, Case> C_in_b[3] = {C_in_b_, middle * C_c_b_, end * C_c_b_};
   const auto omega_in = [&](int stage, const Vector3d& h) -> Vector3d {
     const Rot<In, Case>& C_in_b_now = C_in_b[stage];

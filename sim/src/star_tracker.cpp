@@ -116,6 +116,7 @@ StarTrackerTelemetry simulate_fixes(const StarTrackerScenario& head, const StarT
       continue;
     }
 
+    error += head.mounting_change.at(t_s);
     const Rot<In, Head> truth = view.attitude.at(t_s) * C_c_s;
     if (head.aberration == StarTrackerScenario::Aberration::kUncorrected) {
       error += aberration_error(truth, view.ephemeris.at(t_s).velocity_m_s + view.sky.at(t_s).earth_velocity_m_s).raw();
@@ -124,6 +125,9 @@ StarTrackerTelemetry simulate_fixes(const StarTrackerScenario& head, const StarT
     if (is_outlier) {
       measured = measured * Rot<Head, Head>::exp(Vec<Head>::assume(gross));
       tell(t, Fault::kFixOutlier);
+    }
+    if (t_s >= head.inertial_step_at_s && !head.inertial_step_rad.isZero(0)) {
+      measured = Rot<In, In>::exp(Vec<In>::assume(head.inertial_step_rad)) * measured;
     }
     Quaterniond q = (measured * C_c_s_designed.inverse()).quaternion();
     if (q.dot(previous) < 0) {

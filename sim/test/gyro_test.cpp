@@ -381,6 +381,23 @@ TEST(Gyro, DirectionWalksAsTheRootOfTimeWithTheAllanVarianceOfWhiteRate) {
   EXPECT_NEAR(gyro.momentum().norm(), 1, 1e-11);
 }
 
+TEST(Gyro, CaseThatSlipsReadsAMomentumThatStaysWhereItIs) {
+  GyroScenario scenario;
+  scenario.drift = no_drift();
+  scenario.misalignment_rad = Vector3d::Zero();
+  const Vector3d step(0, 0, 1e-3);
+  scenario.mounting_change = {.step_rad = step, .step_at_s = 2 * kStep_s};
+  Gyro gyro(scenario, {}, 1, 0);
+  const Vector3d before = gyro.momentum_in_case().raw();
+  gyro.advance(0, kStep_s, {}, {});
+  EXPECT_LT((gyro.momentum_in_case().raw() - before).norm(), 1e-15);
+  gyro.advance(kStep_s, kStep_s, {}, {});
+  EXPECT_LT((gyro.alignment().log().raw() - step).norm(), 1e-15);
+  // v_c = exp([step×]) v_b.
+  EXPECT_LT((gyro.momentum_in_case().raw() - (before - step.cross(before))).norm(), 1e-6);
+  EXPECT_EQ(gyro.truth().alignment_rotation_vector_rad, gyro.alignment().log().raw());
+}
+
 TEST(Gyro, MisalignmentIsOfItsLengthAndEvenInDirection) {
   const GyroScenario scenario;
   Vector3d sum = Vector3d::Zero();

@@ -163,6 +163,25 @@ TEST_F(StarTracker, FixStampedTHoldsTheAttitudeOfTheClockOffsetLater) {
   EXPECT_GT(most, 1e-4);  // 1.1e-3 rad/s × 0.15 s: it does show
 }
 
+TEST_F(StarTracker, MountingMovesByItsStepAndEvenly) {
+  StarTrackerScenario head = perfect();
+  head.mounting_change = {.step_rad = {1e-4, 0, 0}, .step_at_s = 9000, .rate_rad_s = {0, 1e-9, 0}};
+  const std::vector<Vector3d> error = errors(fixes(head));
+  EXPECT_LT((error[2999] - Vector3d(0, 8997e-9, 0)).norm(), 1e-12);
+  EXPECT_LT((error[3000] - Vector3d(1e-4, 9000e-9, 0)).norm(), 1e-12);
+}
+
+TEST_F(StarTracker, InertialAxesTurnAtOnce) {
+  StarTrackerScenario head = perfect();
+  head.inertial_step_rad = {0, 0, 1e-3};
+  head.inertial_step_at_s = 9000;
+  const StarTrackerTelemetry turned = fixes(head);
+  const StarTrackerTelemetry still = fixes(perfect());
+  EXPECT_EQ(turned.q_in_c[2999].coeffs(), still.q_in_c[2999].coeffs());
+  const auto by = Rot<In, In>::assume(turned.q_in_c[3000] * still.q_in_c[3000].conjugate()).log().raw();
+  EXPECT_LT((by - Vector3d(0, 0, 1e-3)).norm(), 1e-12);
+}
+
 TEST_F(StarTracker, OrbitalErrorRepeatsEveryRevolution) {
   StarTrackerScenario head = perfect();
   head.orbital_sine_rad = Vector3d(8, 0, 3) * kArcsecond;

@@ -153,8 +153,10 @@ TEST(PartInEq1, FindsEq1ItselfAndNothingInWhatIsOrthogonalToIt) {
   const Esg7::Coefficients<double> found =
       part_in_eq1([&](const Vector3d& h) -> Vector3d { return Esg7::rate<double>(h, kappa); });
   EXPECT_LT((found - kappa).norm(), 1e-12);
-  const HarmonicField outside(
-      {{DriftHarmonic::Potential::kW, 1, 0, 1}, {DriftHarmonic::Potential::kD, 2, -2, 1}, {DriftHarmonic::Potential::kW, 3, 0, 1}, {DriftHarmonic::Potential::kD, 6, 4, 1}});
+  const HarmonicField outside({{DriftHarmonic::Potential::kW, 1, 0, 1},
+                               {DriftHarmonic::Potential::kD, 2, -2, 1},
+                               {DriftHarmonic::Potential::kW, 3, 0, 1},
+                               {DriftHarmonic::Potential::kD, 6, 4, 1}});
   EXPECT_LT(part_in_eq1([&](const Vector3d& h) -> Vector3d { return outside.rate<double>(h); }).norm(), 1e-12);
 }
 

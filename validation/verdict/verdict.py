@@ -27,6 +27,7 @@ from worlds import ARCSECOND, PASS_S, WORLDS
 
 FORECAST_S = 270 * 60.0
 NEED_RAD = math.radians(5 / 60)
+NEED = "5arcmin for 270min"
 LIMIT_SIGMAS = 4
 # Of the epochs of an attitude history. By normal errors 4 sigmas of one of three axes are passed at 2 in 10 000; neighbours are alike.
 ROWS_BEYOND = 0.01
@@ -73,6 +74,9 @@ class Truth:
         self.gyros = json.loads((whole / "truth.json").read_text())["gyros"]
         self.attitude = {t: tuple(q) for t, q in rows_of(whole / "truth.csv", QUATERNION).items()}
         self.alignments = [exponential(gyro["lambda_rad"]) for gyro in self.gyros]
+        if moved and moved.exchanged:
+            self.gyros.reverse()
+            self.alignments.reverse()
         if moved and moved.gyro:
             self.alignments[0] = product(self.alignments[0], inverse(moved.gyro))
         if moved and moved.tracker:
@@ -114,7 +118,7 @@ def attitude_errors(truth, file):
 def judged(program, directory, truth, estimator):
     """An outcome of one estimator on the passes of the directory."""
     out, forecast = directory / estimator, directory / f"{estimator}.csv"
-    status, printed = call(program, "--json", "calibrate", directory / "pass", "-o", out, "--estimator", estimator)
+    status, printed = call(program, "--json", "calibrate", directory / "pass", "-o", out, "--estimator", estimator, "--need", NEED)
     if status == 3:
         return {"status": status, "findings": ["refused"], "wrong": []}
     calibration = json.loads((out / "calibration.json").read_text())
@@ -203,24 +207,33 @@ class Outcomes:
         new = [{"program": self.program} | outcome for outcome in outcomes]
         self.found += new
         self.file.parent.mkdir(parents=True, exist_ok=True)
+        # A line that was cut short by a kill is ended, so that it does not take the next one with it.
+        cut_short = self.file.exists() and self.file.read_bytes()[-1:] not in (b"", b"\n")
         with open(self.file, "a") as file:
-            file.write("".join(json.dumps(outcome) + "\n" for outcome in new))
+            file.write("\n" * cut_short + "".join(json.dumps(outcome) + "\n" for outcome in new))
 
 
 def measure(program, outcomes, worlds, seeds, estimators, jobs):
-    """Seed by seed, so that an interrupted run has some of every world."""
+    """Seed by seed, so that an interrupted run has some of every world. Returns why some have no outcome; they are tried again the next time."""
+    failures = []
     every = [(world, seed, [e for e in estimators if not outcomes.has(world, seed, e)]) for seed in seeds for world in worlds]
     missing = [run for run in every if run[2]]
     with concurrent.futures.ProcessPoolExecutor(jobs) as pool:
         running = [pool.submit(outcomes_of, program, world.name, seed, names) for world, seed, names in missing]
         try:
             for done, future in enumerate(concurrent.futures.as_completed(running), 1):
-                found = future.result()
+                try:
+                    found = future.result()
+                except RuntimeError as failure:
+                    failures.append(failure)
+                    print(f"{done} of {len(missing)}: no outcome: {failure}", flush=True)
+                    continue
                 outcomes.add(found)
                 print(f"{done} of {len(missing)}: " + "; ".join(line_of(outcome) for outcome in found), flush=True)
         except BaseException:
             pool.shutdown(cancel_futures=True)
             raise
+    return failures
 
 
 def line_of(outcome):
@@ -334,11 +347,13 @@ def main():
     program = given.program.resolve()
     outcomes = Outcomes(given.outcomes, program)
     worlds = [world for world in WORLDS if re.search(given.worlds, world.name)]
-    measure(program, outcomes, worlds, range(1, given.seeds + 1), given.estimators.split(","), given.jobs)
+    failures = measure(program, outcomes, worlds, range(1, given.seeds + 1), given.estimators.split(","), given.jobs)
     print(per_world(outcomes.found))
     print(in_all(outcomes.found))
     if given.document:
         write(given.document, outcomes.found)
+    if failures:
+        sys.exit(f"{len(failures)} runs have no outcome")
 
 
 if __name__ == "__main__":

@@ -112,6 +112,8 @@ def test_what_has_moved_is_judged_where_it_is(truth, tmp_path):
     reading = rotated(moved.gyro, (0, 0.6, 0.8))
     assert rotated(there.alignments[0], reading) == pytest.approx(rotated(truth.alignments[0], (0, 0.6, 0.8)), abs=1e-12)
     slipped = verdict.Truth(tmp_path / "whole", worlds.Moved(tracker=exponential((0, 0, 1e-4))))
+    exchanged = verdict.Truth(tmp_path / "whole", worlds.Moved(exchanged=True))
+    assert exchanged.alignments == truth.alignments[::-1] and exchanged.gyros == truth.gyros[::-1]
     in_c = rotated(exponential((0, 0, 1e-4)), rotated(slipped.alignments[1], (0, 0.6, 0.8)))
     assert in_c == pytest.approx(rotated(truth.alignments[1], (0, 0.6, 0.8)), abs=1e-12)
 
@@ -134,7 +136,7 @@ def test_the_document_has_a_place_for_each_table(tmp_path):
 
 # What holds whatever else: nominal passes are right and trusted, and telemetry on the wrong side never gives a result that is trusted.
 # One seed, so that the test takes seconds; the shares are in docs/verdict.md.
-@pytest.mark.parametrize("world, trusted", [("slews", True), ("scalar-first", False), ("conjugate", False), ("gyros-exchanged", False)])
+@pytest.mark.parametrize("world, trusted", [("slews", True), ("scalar-first", False), ("conjugate", False), ("axis-mirrored", False)])
 def test_a_few_worlds(world, trusted):
     [found] = verdict.outcomes_of(PROGRAM, world, 1, ["invariant"])
     if trusted:

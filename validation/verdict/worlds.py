@@ -27,6 +27,7 @@ class World:
 class Moved:
     """What stands elsewhere at the end of the pass than the truth of the simulation says: quaternions."""
     gyro: tuple | None = None     # of the case of gyro 1: h_b = gyro h_b(simulated)
+    exchanged: bool = False       # gyros of one mounting with their columns exchanged: each is then called by the name of the other
     tracker: tuple | None = None  # of c, which are the axes of the star tracker: q_in_c = q_in_c(simulated) tracker
 
 
@@ -119,6 +120,12 @@ def fixes_by(change):
 
 def readings_by(change):
     return lambda telemetry, random: telemetry.readings(lambda t_s, h: change(h))
+
+
+def exchanged(telemetry, random):
+    """No telemetry can tell: where both are mounted alike, only their names are wrong."""
+    telemetry.readings(lambda t_s, h: h[3:] + h[:3])
+    return Moved(exchanged=True)
 
 
 def stamps_of_fixes(change):
@@ -247,7 +254,7 @@ WORLDS = [
     World("noise-in-degrees", "wrong units and sides", constant(SLEWS), in_degrees),
     World("scalar-first", "wrong units and sides", constant(SLEWS), fixes_by(lambda q: (q[3], q[0], q[1], q[2]))),
     World("conjugate", "wrong units and sides", constant(SLEWS), fixes_by(inverse)),
-    World("gyros-exchanged", "wrong units and sides", constant(SLEWS), readings_by(lambda h: h[3:] + h[:3])),
+    World("gyros-exchanged", "wrong units and sides", constant(SLEWS), exchanged),
     World("axis-mirrored", "wrong units and sides", constant(SLEWS), readings_by(lambda h: [h[0], -h[1], *h[2:]])),
     World("axes-exchanged", "wrong units and sides", constant(SLEWS), readings_by(lambda h: [h[1], h[0], *h[2:]])),
 

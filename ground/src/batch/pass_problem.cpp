@@ -21,14 +21,6 @@ using Eigen::VectorXd;
 /// 1-sigma of a direction of which nothing is known.
 constexpr double kUnknown_rad = 1;
 
-/// Columns: two unit vectors across h and across each other.
-Eigen::Matrix<double, 3, 2> across(const Vector3d& h) {
-  Eigen::Matrix<double, 3, 2> columns;
-  columns.col(0) = h.unitOrthogonal();
-  columns.col(1) = h.cross(columns.col(0));
-  return columns;
-}
-
 /// Reduces the rows of a stage to a triangle: no more rows than states, and one for the residual.
 void compress(SmootherStage& stage) {
   const Eigen::Index states = stage.H.cols();
@@ -123,6 +115,13 @@ Vector3d precess_by(const DriftModel& drift, const DriftModel& sensitive, Gyro& 
 }
 
 }  // namespace
+
+Eigen::Matrix<double, 3, 2> across(const Vector3d& h) {
+  Eigen::Matrix<double, 3, 2> columns;
+  columns.col(0) = h.unitOrthogonal();
+  columns.col(1) = h.cross(columns.col(0));
+  return columns;
+}
 
 PassProblem::PassProblem(const ScreenedPass& pass, PassSetup setup)
     : setup_(std::move(setup)),

@@ -47,6 +47,9 @@ struct PassSetup {
   }
 };
 
+/// Columns: two unit vectors across h and across each other; the components of the error of a direction.
+[[nodiscard]] Eigen::Matrix<double, 3, 2> across(const Eigen::Vector3d& h);
+
 /// Estimates of all states; momenta and wandering drift at the beginning of each arc.
 struct PassSolution {
   Gyros gyros;          ///< their momenta mean nothing

@@ -165,6 +165,7 @@ CalibrationRun calibrate(const Pass& pass, const CalibrationOptions& options, co
   CalibrationRun run = std::move(recorder).take();
   run.options = decision.options;
   run.evidence = decision.evidence;
+  run.changes = decision.changes;
   run.known_before = known_before(pass.settings, decision.options);
   const Statistics recorded = run.calibration.statistics;
   run.calibration = pipeline.calibration();

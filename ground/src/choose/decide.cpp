@@ -12,6 +12,7 @@
 #include <utility>
 #include <vector>
 
+#include "choose/constancy.hpp"
 #include "choose/noise_search.hpp"
 #include "model/orbital_rate.hpp"
 #include "model/prior.hpp"
@@ -173,7 +174,9 @@ CalibrationOptions wandering_like(const NoiseFit& walking, CalibrationOptions op
 
 /// The noise is larger than the settings say, so the states were decided with too small a noise. Decides again, with
 /// the noise found while all states are free, and decides whether the drift wanders. `everything`: the trial with all
-/// states free and the noise of the settings; `walk`: the noise found with the states decided first.
+/// states free and the noise of the settings; `walk`: the noise found with the states decided first. Where the largest
+/// drift model with its own noise is likelier than these, it is kept: noise in place of the members that the smaller one
+/// lacks, which act at every orbit alike, would make its sigmas wrong, though its forecasts are as good.
 void decide_again_with_more_noise(const Pass& pass, const Screened& screened, const CalibrationOptions& asked,
                                   const DriftModelId& largest_model, bool wandering_is_open, Trial everything,
                                   const NoiseFit& walk, Decision& decision) {
@@ -205,6 +208,9 @@ void decide_again_with_more_noise(const Pass& pass, const Screened& screened, co
     }
   }
   settle_states(everything, asked, decision);
+  if (!asked.drift_model && walking.log_likelihood > walk.log_likelihood + kLogOddsToAccept) {
+    options.drift_model = largest_model;
+  }
   if (wanders) {
     use_wandering(*wanders, options);
   }
@@ -215,6 +221,7 @@ void decide_again_with_more_noise(const Pass& pass, const Screened& screened, co
     use_walk(with_most_likely_walk(decided, options).noise, options);
   }
   decision.field = decided.field_prior();
+  decision.changes = changes_over(decided);
   if (wandering) {
     decision.evidence.push_back(*wandering);
   }
@@ -232,7 +239,7 @@ void leave_out_what_is_open(CalibrationOptions& options) {
 /// Decides by the data of the pass.
 Decision decide_by_pass(const Pass& pass, const Screened& screened, const CalibrationOptions& asked,
                         const DriftModelId& largest_model) {
-  Decision decision{asked, {}, {}, {}, {}};
+  Decision decision{asked, {}, {}, {}, {}, {}};
   CalibrationOptions& options = decision.options;
   const bool wandering_is_open = options.further_states[FurtherState::kWanderingDrift] == Choice::kAuto;
   if (wandering_is_open) {
@@ -243,6 +250,7 @@ Decision decide_by_pass(const Pass& pass, const Screened& screened, const Calibr
   options.find_noise = asked.find_noise && changes.size() >= kLeastFixPairs;
   if (!options.find_noise) {
     settle_states(everything, asked, decision);
+    decision.changes = changes_over(everything);
     if (options.drift_field) {
       decision.field = Trial(pass, screened, options).field_prior();
     }
@@ -261,6 +269,7 @@ Decision decide_by_pass(const Pass& pass, const Screened& screened, const Calibr
   } else {
     use_walk(walking.noise, options);
     decision.field = decided.field_prior();
+    decision.changes = changes_over(decided);
   }
   return decision;
 }
@@ -335,9 +344,9 @@ Decision decide(const Pass& pass, const CalibrationOptions& asked_for) {
   }
   settle_by_estimator(asked);
   if (pass.settings.prior || asked.estimator == Estimator::kPaper) {
-    return {settled_before(pass.settings, asked), {}, {}, {}, {}};
+    return {settled_before(pass.settings, asked), {}, {}, {}, {}, {}};
   }
-  Decision decision{asked, {}, {}, {}, {}};
+  Decision decision{asked, {}, {}, {}, {}, {}};
   CalibrationOptions& options = decision.options;
   options.find_noise = false;
   const bool states_are_settled =

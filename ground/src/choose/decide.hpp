@@ -18,6 +18,7 @@ struct Decision {
   std::vector<Evidence> evidence;    ///< empty where nothing was to be decided
   std::vector<Forecast> forecasts;   ///< of the drift models that were compared
   std::optional<FieldPrior> field;   ///< where the drift is estimated as one
+  std::vector<Change> changes;       ///< what moves during the pass
   std::optional<Screened> screened;  ///< the screened pass by which it was decided, where it was
 };
 

@@ -22,6 +22,8 @@ class Trial {
   /// Fits again, with other noise.
   void refit(const ProcessNoise& noise);
 
+  [[nodiscard]] const PassProblem& problem() const { return problem_; }
+  [[nodiscard]] const BatchResult& found() const { return found_; }
   [[nodiscard]] const PassProblem::Linear& linear() const { return found_.linear; }
   /// `linear`: that of linear(), also after gather_constants(). Where the drift is a field, by the spectrum of it that
   /// is most likely with this noise.

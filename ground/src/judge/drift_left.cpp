@@ -58,13 +58,16 @@ std::optional<SlowLine> strongest_slow_line(const std::vector<FixRecord>& fixes,
     }
     const double span_s = its.t_s.back() - its.t_s.front();
     const auto lines = static_cast<int>(span_s / shortest_period_s);
+    std::vector<std::complex<double>> first(n);
+    std::ranges::transform(its.t_s, first.begin(),
+                           [span_s](double t_s) { return std::polar(1.0, -2 * std::numbers::pi * t_s / span_s); });
+    std::vector<std::complex<double>> turn(n, 1.0);
     for (int line = 1; line <= lines; ++line) {
-      const double rate_rad_s = 2 * std::numbers::pi * line / span_s;
       std::complex<double> sum[kComponents];
       for (std::size_t i = 0; i < n; ++i) {
-        const std::complex<double> turn = std::polar(1.0, -rate_rad_s * its.t_s[i]);
-        sum[0] += its.z[0][i] * turn;
-        sum[1] += its.z[1][i] * turn;
+        turn[i] *= first[i];
+        sum[0] += its.z[0][i] * turn[i];
+        sum[1] += its.z[1][i] * turn[i];
       }
       for (const std::complex<double>& of_component : sum) {
         ++tried;
@@ -106,15 +109,15 @@ void judge_drift_left(const Pass& pass, const CalibrationRun& run, std::vector<F
         line->gyro + 1, line->period_s / 60, line->amplitude, std::ceil(line->log_chance / std::numbers::ln10));
   }
   if (run.options.find_noise) {
-    const bool wanders = std::ranges::any_of(run.evidence, [](const Evidence& its) {
-      return its.state == FurtherState::kWanderingDrift && its.accepted;
-    });
+    const bool wanders = std::ranges::any_of(
+        run.evidence, [](const Evidence& its) { return its.state == FurtherState::kWanderingDrift && its.accepted; });
     const double walk = run.options.direction_random_walk_rad_sqrt_s;
     const std::string separator = evidence.empty() ? "" : "; ";
     if (wanders) {
       const FurtherStateOptions& states = run.options.further_states;
-      evidence += fmt::format("{}drift of {:.1e} rad/s, 1-sigma, that wanders in {:.0f} min was needed beside the model",
-                              separator, states.wandering_drift_rad_s, to_seconds(states.wandering_time) / 60);
+      evidence +=
+          fmt::format("{}drift of {:.1e} rad/s, 1-sigma, that wanders in {:.0f} min was needed beside the model",
+                      separator, states.wandering_drift_rad_s, to_seconds(states.wandering_time) / 60);
     } else if (walk > kUsualWalk_rad_sqrt_s) {
       evidence += fmt::format("{}a random walk of the momenta of {:.1e} rad/s^0.5 was needed beside the model",
                               separator, walk);

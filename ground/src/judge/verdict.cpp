@@ -12,6 +12,7 @@
 #include <numbers>
 #include <utility>
 
+#include "judge/changes.hpp"
 #include "judge/drift_left.hpp"
 #include "judge/need.hpp"
 #include "judge/whiteness.hpp"
@@ -618,6 +619,7 @@ Verdict judge(const Pass& pass, const CalibrationRun& run) {
   judge_halves(statistics, findings);
   judge_drift_model(run, findings);
   judge_change(run, findings);
+  judge_changes(run, findings);
   judge_star_tracker_errors(run, findings);
   judge_determination(run, findings);
   judge_steadiness(pass, run, findings);

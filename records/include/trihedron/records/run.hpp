@@ -1,7 +1,9 @@
 #pragma once
 /// Everything that a calibration or navigation of a pass records.
 
+#include <Eigen/Core>
 #include <chrono>
+#include <cstdint>
 #include <optional>
 #include <string_view>
 #include <vector>
@@ -74,6 +76,41 @@ struct DriftModelForecast {
   double open_loop_rms_rad = 0;  ///< attitude error, flown open loop over the next part
 };
 
+/// What may move during a pass that the estimators take to stand still.
+enum class Moving : std::uint8_t {
+  kGyroCase,      ///< the case of a gyro against the body
+  kStarTracker,   ///< the star tracker against the body: the cases of all gyros alike
+  kMomentum,      ///< the momentum of a gyro, by more than its drift
+  kInertialAxes,  ///< what the star tracker takes for `in`: all momenta alike
+  kCoefficients,  ///< drift coefficients of eq. (1), of a gyro or of all
+  kAberration,    ///< fixes are off as starlight is by the motion of the spacecraft
+  kReadoutScale,  ///< the scales of a gyro's direction cosines are off
+};
+
+/// How it does.
+enum class Motion : std::uint8_t {
+  kStep,     ///< once
+  kRamp,     ///< evenly
+  kDecay,    ///< fast at first, towards a steady value
+  kWalk,     ///< by steps at random
+  kPresent,  ///< it is there all the time
+};
+
+/// Something that moves during the pass, by the evidence of the whole pass.
+struct Change {
+  Moving moving = Moving::kGyroCase;
+  Motion motion = Motion::kStep;
+  int gyro = -1;        ///< from 0; −1: all
+  Time from{}, until{};  ///< between which a step lies
+  double log_odds = 0;  ///< ln of the Bayes factor for it against nothing that moves, less ln of the number of tries
+  /// Size and 1-sigma: rotation vector, rad, c axes (kInertialAxes: in axes; kMomentum: two components across the
+  /// momentum); coefficients, rad/s, gyro by gyro; over the pass. For kWalk one number, the root of the sum of squares of all steps.
+  Eigen::VectorXd size, sigma;
+  /// Coefficients of eq. (1) and alignment of each gyro at the end of the pass, less what is estimated without the
+  /// change: rad/s, rad.
+  Eigen::VectorXd parameters_off;
+};
+
 /// A calibration of a pass, and everything that was recorded on the way.
 struct CalibrationRun {
   CalibrationOptions options;                    ///< as decided
@@ -93,6 +130,7 @@ struct CalibrationRun {
   SampleCounts samples;                ///< gyro samples by what was done with them
   FixCounts fix_counts;                ///< fixes by what was done with them
   std::vector<GyroEvent> gyro_events;  ///< changes of a gyro's state
+  std::vector<Change> changes;         ///< what moves during the pass, the likeliest first
 };
 
 /// How far the navigator was off the fixes at the end of an open loop: just before a correction, or at the end of the

@@ -159,6 +159,19 @@ struct ReadoutScenario {
   double stuck_s = 2;
 };
 
+/// How a mounting moves during the pass: by a step, and evenly. Small angles: their sum is a rotation vector.
+struct MountingChange {
+  Eigen::Vector3d step_rad{0, 0, 0};
+  double step_at_s = 0;  ///< from this time of the pass on
+  Eigen::Vector3d rate_rad_s{0, 0, 0};
+
+  [[nodiscard]] bool is_there() const { return !step_rad.isZero(0) || !rate_rad_s.isZero(0); }
+  /// Rotation vector since the start of the pass, rad.
+  [[nodiscard]] Eigen::Vector3d at(double t_s) const {
+    return t_s * rate_rad_s + (t_s >= step_at_s ? step_rad : Eigen::Vector3d(0, 0, 0));
+  }
+};
+
 /// One gyro: where its momentum points at the start, how it is mounted, how it drifts, how it is read.
 struct GyroScenario {
   Eigen::Vector3d start_direction_c{0.995, 0.087, 0.045};  ///< of the momentum, c axes, at the start; any length but 0
@@ -168,6 +181,7 @@ struct GyroScenario {
   std::optional<Eigen::Vector3d> misalignment_rad{};
   double misalignment_magnitude_rad = 30 * kArcminute;
   double alignment_prior_sigma_rad = 30 * kArcminute;  ///< given to the estimator, per axis
+  MountingChange mounting_change{};                    ///< of the case against the body, c axes
   DriftScenario drift{};
   ReadoutScenario readout{};
 };
@@ -183,6 +197,11 @@ struct StarTrackerScenario {
   Eigen::Vector3d noise_rad{3 * kArcsecond, 3 * kArcsecond, 20 * kArcsecond};  ///< white, about s x, y, z
   double clock_offset_s = 0;
   double latency_s = 0;
+
+  MountingChange mounting_change{};  ///< of the head against the body, s axes
+  /// Turn of what the head takes for `in`, in axes, from inertial_step_at_s on: as by another catalogue or equinox.
+  Eigen::Vector3d inertial_step_rad{0, 0, 0};
+  double inertial_step_at_s = 0;
 
   /// p_s, p_c of the error p_s sin nt + p_c cos nt; n the mean rate of the argument of latitude, t from the start of
   /// the pass.

@@ -30,8 +30,7 @@ class Drift {
 
   /// ω_b(h), rad/s, during the step. h: unit.
   [[nodiscard]] Vec<Case> rate(const Vec<Case>& h) const {
-    Vector3<double> rate =
-        Esg7::rate<double>(h.raw(), kappa_now_rad_s_) + field_.rate<double>(h.raw()) + markov_rad_s_;
+    Vector3<double> rate = Esg7::rate<double>(h.raw(), kappa_now_rad_s_) + field_.rate<double>(h.raw()) + markov_rad_s_;
     if (bump_) {
       rate += bump_->rate(h.raw());
     }
@@ -107,11 +106,13 @@ class Gyro {
   [[nodiscard]] Vec<Case> momentum_in_case() const { return C_in_b_.inverse() * h_in_; }
   [[nodiscard]] const Rot<C, Case>& alignment() const { return C_c_b_; }
   [[nodiscard]] const Drift& drift() const { return drift_; }
-  /// Coefficients by Drift::part_in_eq1_rad_s().
+  /// Coefficients by Drift::part_in_eq1_rad_s(), alignment as it is now.
   [[nodiscard]] Truth::Gyro truth() const;
 
  private:
   Drift drift_;
+  MountingChange mounting_change_;
+  Rot<C, Case> C_c_b_at_start_;
   Rot<C, Case> C_c_b_;
   Rot<In, Case> C_in_b_;
   Vec<In> h_in_;

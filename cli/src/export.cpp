@@ -1,0 +1,282 @@
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "interchange.hpp"
+#include "trihedron/io/apart.hpp"
+#include "trihedron/io/atomic_file.hpp"
+#include "trihedron/io/attitude_message.hpp"
+#include "trihedron/io/calibration.hpp"
+#include "trihedron/io/calibration_message.hpp"
+#include "trihedron/io/error.hpp"
+#include "trihedron/io/named_pass.hpp"
+#include "trihedron/io/quantity.hpp"
+#include "trihedron/io/spice_kernels.hpp"
+#include "trihedron/io/time_scale.hpp"
+
+namespace trihedron::cli {
+namespace {
+
+struct ExportArguments {
+  std::string file;
+  std::string format;
+  std::string output;
+  EpochOptions epoch;
+  std::string time_system = "TAI";
+  std::string object_name;
+  io::MessageDescription description;
+  std::string gap;
+  std::string attitude;
+  int naif_id = io::SpiceObject{}.naif_id;
+};
+
+/// What is written beside the output: its name with another ending.
+std::string beside_output(const ExportArguments& arguments, const char* ending) {
+  return std::filesystem::path(arguments.output).replace_extension(ending).string();
+}
+
+std::vector<std::string> files_of(const ExportArguments& arguments) {
+  std::vector<std::string> files = {arguments.output};
+  if (arguments.format == "ck") {
+    files.push_back(beside_output(arguments, ".tsc"));
+    files.push_back(beside_output(arguments, ".tf"));
+  } else if (arguments.format.starts_with("acm")) {
+    files.push_back(beside_output(arguments, ".covariance.nc"));
+  }
+  return files;
+}
+
+void expect_places(const ExportArguments& arguments) {
+  const bool several = files_of(arguments).size() > 1;
+  if (arguments.output == kStandardStream) {
+    if (several) {
+      throw io::UsageError(fmt::format("--format {} writes several files: name one by -o", arguments.format));
+    }
+    return;
+  }
+  std::vector<std::filesystem::path> written;
+  for (const std::string& file : files_of(arguments)) {
+    written.emplace_back(file);
+  }
+  const std::vector<std::filesystem::path> inputs = {arguments.file, arguments.epoch.pass, arguments.attitude};
+  io::expect_apart(inputs, written);
+  io::expect_apart_from_each_other(written);
+}
+
+/// Each whole, and none where one cannot be written.
+void write_all(const std::vector<std::string>& files, const std::vector<std::string>& contents) {
+  std::vector<io::AtomicFile> written;
+  for (std::size_t i = 0; i < contents.size(); ++i) {
+    written.emplace_back(files[i]).write(contents[i]);
+  }
+  for (io::AtomicFile& file : written) {
+    file.commit();
+  }
+}
+
+io::MessageDescription description_of(const ExportArguments& arguments, const EpochSource& source) {
+  io::MessageDescription description = arguments.description;
+  const std::optional<io::TimeScale> scale = io::time_scale_named(arguments.time_system);
+  if (!scale) {
+    throw io::UsageError(
+        fmt::format("--time-system {}: give one of {}", arguments.time_system, fmt::join(io::kTimeScales, ", ")));
+  }
+  description.time_scale = *scale;
+  if (!arguments.object_name.empty()) {
+    description.object_name = arguments.object_name;
+  } else if (!source.spacecraft.empty()) {
+    description.object_name = source.spacecraft;
+  }
+  if (description.created_utc.empty()) {
+    description.created_utc = io::utc_now();
+  } else {
+    io::TimeText::Fault fault;
+    if (!io::TimeText(io::TimeScale::kUtc).parse(description.created_utc, fault)) {
+      throw io::UsageError(fmt::format("--created {}; {}", fault.reason, fault.cure));
+    }
+  }
+  io::expect_writable_description(description);
+  return description;
+}
+
+io::SpiceObject spice_object(const ExportArguments& arguments, const io::MessageDescription& description) {
+  io::SpiceObject object{arguments.naif_id, description.object_name};
+  io::expect_spice_object(object);
+  return object;
+}
+
+void put_out(const ExportArguments& arguments, const std::string& text) {
+  if (arguments.output == kStandardStream) {
+    print_data(stdout, text);
+  } else {
+    io::write_file(arguments.output, text);
+  }
+}
+
+void export_attitude(const ExportArguments& arguments, const Common& common) {
+  const EpochSource epoch_source = epoch_of(arguments.epoch);
+  const io::MessageDescription description = description_of(arguments, epoch_source);
+  const io::AttitudeMessage read = io::read_attitude_of_any_format(source(arguments.file), epoch_source.epoch);
+  const Time epoch = epoch_source.epoch.value_or(read.epoch.value_or(read.attitude.t.front()));
+  const Duration gap = arguments.gap.empty() ? io::usual_gap(read.attitude) : io::parse_duration(arguments.gap);
+  const std::vector<std::size_t> stretches = io::stretches(read.attitude, gap);
+  InterchangeSummary summary{arguments.file,
+                             read.format,
+                             files_of(arguments),
+                             "SPICE CK of type 3, its clock and frames",
+                             read.attitude.size(),
+                             stretches.size() - 1,
+                             read.left_out,
+                             epoch,
+                             "TDT of SPICE",
+                             "J2000",
+                             "",
+                             description.object_name,
+                             description.object_id};
+  if (arguments.format == "ck") {
+    const io::SpiceObject object = spice_object(arguments, description);
+    const io::SpiceClock clock = io::SpiceClock::of(read.attitude);
+    write_all(summary.written, {io::format_ck(read.attitude, read.rate_rad_s, clock, object, stretches),
+                                io::format_sclk(clock, object), io::format_ck_frames(object)});
+    summary.body_frame = object.frame_name();
+  } else {
+    const bool xml = arguments.format == "aem-xml";
+    put_out(arguments, io::format_aem(read.attitude, read.rate_rad_s, epoch, description, gap,
+                                      xml ? io::MessageSyntax::kXml : io::MessageSyntax::kKvn));
+    summary.output_format = fmt::format("CCSDS AEM version 2, {}", xml ? "XML" : "KVN");
+    summary.time_system = io::name_of(description.time_scale);
+    summary.inertial_frame = description.inertial_frame;
+    summary.body_frame = description.body_frame;
+  }
+  show_interchange(beside(arguments.output, common), summary);
+}
+
+void export_calibration(const ExportArguments& arguments, const Common& common) {
+  std::optional<io::NamedPass> pass;
+  EpochSource epoch_source;
+  if (!arguments.epoch.pass.empty()) {
+    pass = io::read_named_pass(arguments.epoch.pass);
+    epoch_source = {pass->pass().settings.epoch, pass->pass().settings.spacecraft};
+  }
+  const io::MessageDescription description = description_of(arguments, epoch_source);
+  const Calibration calibration = io::read_calibration(source(arguments.file));
+  InterchangeSummary summary{arguments.file,
+                             "calibration",
+                             files_of(arguments),
+                             "SPICE FK",
+                             0,
+                             0,
+                             0,
+                             calibration.epoch,
+                             "TAI",
+                             "J2000",
+                             "",
+                             description.object_name,
+                             description.object_id};
+  if (arguments.format == "fk") {
+    const io::SpiceObject object = spice_object(arguments, description);
+    put_out(arguments, io::format_calibration_frames(calibration, object));
+    summary.body_frame = object.frame_name();
+  } else {
+    std::optional<io::AttitudeMessage> attitude;
+    if (!arguments.attitude.empty()) {
+      attitude = io::read_attitude_of_any_format(arguments.attitude, calibration.epoch);
+    }
+    const bool xml = arguments.format == "acm-xml";
+    io::CalibrationContext context;
+    context.attitude = attitude ? &*attitude : nullptr;
+    context.pass = pass ? &pass->pass().settings : nullptr;
+    context.covariance_file = std::filesystem::path(summary.written[1]).filename().string();
+    const std::string text =
+        io::format_acm(calibration, context, description, xml ? io::MessageSyntax::kXml : io::MessageSyntax::kKvn);
+    io::AtomicFile message(arguments.output);
+    message.write(text);
+    io::write_covariance(summary.written[1], calibration);
+    message.commit();
+    summary.output_format = fmt::format("CCSDS ACM version 2, {}, and its covariance", xml ? "XML" : "KVN");
+    summary.epochs = attitude ? attitude->attitude.size() : 0;
+    summary.time_system = io::name_of(description.time_scale);
+    summary.inertial_frame = description.inertial_frame;
+    summary.body_frame = description.body_frame;
+  }
+  show_interchange(beside(arguments.output, common), summary);
+}
+
+}  // namespace
+
+void add_export(CLI::App& program, const Common& common, int& exit_status) {
+  auto arguments = std::make_shared<ExportArguments>();
+  CLI::App* command = program.add_subcommand(
+      "export", "Write attitude or calibration for other software: CCSDS messages, SPICE kernels");
+  command
+      ->add_option("FILE", arguments->file,
+                   "Attitude file (CSV) or message, for acm and fk calibration.json; - for standard input")
+      ->required();
+  const std::vector<std::string> formats = {"aem", "aem-xml", "ck", "acm", "acm-xml", "fk"};
+  command
+      ->add_option("--format", arguments->format,
+                   "What to write: of an attitude aem (text), aem-xml or ck (with .tsc and .tf beside it), of a "
+                   "calibration acm (text), acm-xml (with .covariance.nc beside it) or fk")
+      ->required()
+      ->type_name(fmt::format("{}", fmt::join(formats, "|")))
+      ->check(CLI::IsMember(formats));
+  command->add_option("-o,--output", arguments->output, "File to write; - for standard output")
+      ->required()
+      ->type_name("FILE");
+  add_epoch_options(*command, arguments->epoch, "that t_s of the attitude file counts from");
+  command->add_option("--time-system", arguments->time_system, "Time scale of the epochs")
+      ->capture_default_str()
+      ->type_name(fmt::format("{}", fmt::join(io::kTimeScales, "|")));
+  command
+      ->add_option("--inertial-frame", arguments->description.inertial_frame, "Name of the axes that q_in_c leads to")
+      ->capture_default_str()
+      ->type_name("NAME");
+  command->add_option("--body-frame", arguments->description.body_frame, "Name of the axes c, of the star tracker")
+      ->capture_default_str()
+      ->type_name("NAME");
+  command
+      ->add_option("--object-name", arguments->object_name,
+                   "Name of the spacecraft (default: that of the pass, else UNKNOWN)")
+      ->type_name("NAME");
+  command->add_option("--object-id", arguments->description.object_id, "Its international designator: 2006-021A")
+      ->capture_default_str()
+      ->type_name("ID");
+  command->add_option("--originator", arguments->description.originator, "Who gives the message")
+      ->capture_default_str()
+      ->type_name("NAME");
+  command
+      ->add_option(
+          "--gap", arguments->gap,
+          "Step above which there is a gap: a new segment or interval begins (default: 1.5 times the median step)")
+      ->type_name("DURATION");
+  command
+      ->add_option("--attitude", arguments->attitude,
+                   "For acm: attitude to give as well, with its sigmas as covariance")
+      ->type_name("FILE");
+  command->add_option("--naif-id", arguments->naif_id, "For ck and fk: number of the spacecraft in SPICE")
+      ->capture_default_str()
+      ->type_name("N");
+  command->add_option("--created", arguments->description.created_utc, "Creation date, UTC (default: now)")
+      ->type_name("TIME");
+  command->footer(
+      "trihedron export attitude.csv --format aem -o attitude.aem --pass pass.nc --time-system UTC\n"
+      "trihedron export attitude.csv --format ck -o attitude.bc --pass pass.nc --naif-id -28380\n"
+      "trihedron export out/calibration.json --format acm -o calibration.acm --pass pass.nc --attitude attitude.csv\n"
+      "trihedron export out/calibration.json --format fk -o gyros.tf --naif-id -28380 --object-name RESURS-DK1");
+  command->callback([&common, &exit_status, arguments] {
+    expect_places(*arguments);
+    if (arguments->format.starts_with("acm") || arguments->format == "fk") {
+      export_calibration(*arguments, common);
+    } else {
+      export_attitude(*arguments, common);
+    }
+    exit_status = kTrustworthy;
+  });
+}
+
+}  // namespace trihedron::cli

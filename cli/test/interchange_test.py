@@ -1,0 +1,146 @@
+"""export and import: what they write, refuse, and never replace. Run by CTest with TRIHEDRON_BUILD naming the build directory."""
+import json
+import struct
+
+import pytest
+import xarray
+
+from program import DO_NOT_USE, INPUT_REFUSED, TOLD, TRUSTWORTHY, WRONG_USAGE, refused, run
+
+SCENARIO = '[scenario]\nseed = 3\nduration = "4min"\n[gyro]\nperiod = "1s"\n'
+
+
+def done(*arguments, **options):
+    result = run("--quiet", *arguments, **options)
+    assert result.returncode in (TRUSTWORTHY, DO_NOT_USE), result.stderr
+    return result
+
+
+@pytest.fixture(scope="module")
+def flown(tmp_path_factory):
+    directory = tmp_path_factory.mktemp("flown")
+    (directory / "told.toml").write_text(TOLD)
+    done("simulate", "-", "-o", directory / "pass", input=SCENARIO)
+    done("calibrate", directory / "pass", "-o", directory / "out", "--config", directory / "told.toml")
+    done("navigate", directory / "pass", "--calibration", directory / "out" / "calibration.json", "-o", directory / "a.csv")
+    return directory
+
+
+def numbers(path):
+    return [[float(value) for value in line.split(",")[:5]] for line in path.read_text().splitlines()[1:]]
+
+
+@pytest.mark.parametrize("form", ["aem", "aem-xml"])
+@pytest.mark.parametrize("scale", ["TAI", "UTC", "GPS", "TT", "TDB"])
+def test_attitude_comes_back(flown, tmp_path, form, scale):
+    done("export", flown / "a.csv", "--format", form, "-o", tmp_path / "a", "--pass", flown / "pass", "--time-system", scale)
+    done("import", tmp_path / "a", "-o", tmp_path / "b.csv")
+    assert numbers(tmp_path / "b.csv") == numbers(flown / "a.csv")
+
+
+def test_a_message_is_an_attitude_wherever_one_is_taken(flown, tmp_path):
+    done("export", flown / "a.csv", "--format", "aem", "-o", tmp_path / "a.aem", "--pass", flown / "pass", "--time-system", "UTC")
+    told = []
+    for name in (flown / "a.csv", tmp_path / "a.aem"):
+        whole = json.loads(done("--json", "evaluate", flown / "pass", "--attitude", name).stdout)["whole"]
+        told.append([whole["epochs"], *whole["rms"].values(), *whole["max"].values()])
+    assert told[0][0] > 70 and told[0] == told[1]
+    # A body at rest, from before a scenario to after it.
+    rows = "".join(f"{t},0,0,0.6,0.8\n" for t in range(-1, 243))
+    (tmp_path / "rest.csv").write_text("t_s,q_x,q_y,q_z,q_w\n" + rows)
+    done("export", tmp_path / "rest.csv", "--format", "aem-xml", "-o", tmp_path / "rest.xml", "--pass", flown / "pass")
+    (tmp_path / "recorded.toml").write_text(SCENARIO + '[attitude]\nreference = "recorded"\nrecorded = "rest.xml"\n')
+    done("simulate", tmp_path / "recorded.toml", "-o", tmp_path / "pass")
+    assert numbers(tmp_path / "pass" / "truth.csv")[100][1:] == pytest.approx([0, 0, 0.6, 0.8], abs=1e-12)
+
+
+def test_streams(flown, tmp_path):
+    text = done("export", "-", "--format", "aem", "-o", "-", "--epoch", "2009-05-20T00:00:00", input=(flown / "a.csv").read_text()).stdout
+    assert text.startswith("CCSDS_AEM_VERS = 2.0\n") and "REF_FRAME_A = GCRF" in text and "OBJECT_NAME = UNKNOWN" in text
+    back = done("import", "-", "-o", "-", input=text).stdout
+    assert len(back.splitlines()) == len((flown / "a.csv").read_text().splitlines())
+    refused(run("export", flown / "a.csv", "--format", "ck", "-o", "-", "--pass", flown / "pass"), WRONG_USAGE, "several files")
+
+
+def test_epoch_is_never_guessed(flown, tmp_path):
+    export = ("export", flown / "a.csv", "--format", "aem", "-o", tmp_path / "a.aem")
+    refused(run(*export), WRONG_USAGE, "--pass", "--epoch")
+    refused(run(*export, "--epoch", "20 May"), WRONG_USAGE, "--epoch 20 May")
+    refused(run(*export, "--epoch", "2009-05-20T00:00:00", "--pass", flown / "pass"), WRONG_USAGE)
+    assert not (tmp_path / "a.aem").exists()
+
+
+@pytest.mark.parametrize("arguments, words", [
+    (("--time-system", "ET"), ["--time-system ET", "TAI, UTC"]),
+    (("--inertial-frame", "ITRF2014"), ["--inertial-frame ITRF2014", "ICRF"]),
+    (("--body-frame", "Body"), ["--body-frame Body", "SC_BODY_1"]),
+    (("--object-id", ""), ["--object-id"]),
+    (("--object-name", "Спутник"), ["ASCII"]),
+    (("--gap", "3"), ["3"]),
+    (("--created", "today"), ["--created"]),
+    (("--epoch", "1960-01-01T00:00:00", "--time-system", "UTC"), ["leap seconds"]),
+    (("--format", "oem"), ["oem"]),
+])
+def test_wrong_options_are_refused(flown, tmp_path, arguments, words):
+    given = ("--format", "aem") if "--format" not in arguments else ()
+    epoch = ("--epoch", "2009-05-20T00:00:00") if "--epoch" not in arguments else ()
+    refused(run("export", flown / "a.csv", "-o", tmp_path / "a.aem", *given, *epoch, *arguments), WRONG_USAGE, *words)
+    assert not (tmp_path / "a.aem").exists()
+
+
+@pytest.mark.parametrize("naif_id", ["0", "5", "-2000001"])
+def test_wrong_numbers_of_spacecraft_are_refused(flown, tmp_path, naif_id):
+    refused(run("export", flown / "a.csv", "--format", "ck", "-o", tmp_path / "a.bc", "--pass", flown / "pass", "--naif-id", naif_id), WRONG_USAGE,
+            "--naif-id")
+
+
+def test_what_is_read_is_never_replaced(flown, tmp_path):
+    (tmp_path / "a.csv").write_text((flown / "a.csv").read_text())
+    export = ("--epoch", "2009-05-20T00:00:00")
+    refused(run("export", tmp_path / "a.csv", "--format", "aem", "-o", tmp_path / "a.csv", *export), WRONG_USAGE)
+    (tmp_path / "b.tf").write_text((flown / "a.csv").read_text())
+    refused(run("export", tmp_path / "b.tf", "--format", "ck", "-o", tmp_path / "b.bc", *export), WRONG_USAGE)
+    refused(run("export", tmp_path / "a.csv", "--format", "ck", "-o", tmp_path / "c.tf", *export), WRONG_USAGE)
+    refused(run("export", flown / "a.csv", "--format", "aem", "-o", flown / "pass" / "a.aem", "--pass", flown / "pass"), WRONG_USAGE)
+    done("export", tmp_path / "a.csv", "--format", "aem", "-o", tmp_path / "a.aem", *export)
+    refused(run("import", tmp_path / "a.aem", "-o", tmp_path / "a.aem"), WRONG_USAGE)
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["a.aem", "a.csv", "b.tf"]
+
+
+def test_what_is_no_message_is_refused(flown, tmp_path):
+    refused(run("import", flown / "a.csv", "-o", tmp_path / "b.csv"), INPUT_REFUSED, "does not begin with CCSDS_AEM_VERS")
+    refused(run("import", flown / "pass" / "truth.json", "-o", tmp_path / "b.csv"), INPUT_REFUSED)
+    (tmp_path / "cut.aem").write_text(
+        done("export", flown / "a.csv", "--format", "aem", "-o", "-", "--pass", flown / "pass").stdout[:3000])
+    refused(run("evaluate", flown / "pass", "--attitude", tmp_path / "cut.aem"), INPUT_REFUSED, "cut.aem:", ";")
+    assert not (tmp_path / "b.csv").exists()
+
+
+def test_kernels_of_an_attitude(flown, tmp_path):
+    done("export", flown / "a.csv", "--format", "ck", "-o", tmp_path / "a.bc", "--pass", flown / "pass", "--naif-id", "-28380")
+    kernel = (tmp_path / "a.bc").read_bytes()
+    assert kernel.startswith(b"DAF/CK  ") and len(kernel) % 1024 == 0
+    assert struct.unpack("<6i", kernel[1064:1088])[:4] == (-28380000, 1, 3, 1)
+    assert "SCLK_DATA_TYPE_28380 = ( 1 )" in (tmp_path / "a.tsc").read_text()
+    assert "FRAME_-28380000_CLASS = 3" in (tmp_path / "a.tf").read_text()
+
+
+@pytest.mark.parametrize("form", ["acm", "acm-xml"])
+def test_calibration_as_message_with_its_covariance(flown, tmp_path, form):
+    calibration = json.loads((flown / "out" / "calibration.json").read_text())
+    done("export", flown / "out" / "calibration.json", "--format", form, "-o", tmp_path / "c.acm", "--pass", flown / "pass", "--attitude",
+         flown / "a.csv")
+    text = (tmp_path / "c.acm").read_text()
+    assert f"{calibration['gyros'][1]['drift_rad_s']['k0']:.15e}" in text
+    assert "c.covariance.nc" in text
+    with xarray.open_dataset(tmp_path / "c.covariance.nc") as covariance:
+        assert list(covariance.state.values) == calibration["covariance"]["states"]
+        assert (covariance.covariance.values == calibration["covariance"]["matrix"]).all()
+
+
+def test_calibration_as_frames(flown, tmp_path):
+    text = done("export", flown / "out" / "calibration.json", "--format", "fk", "-o", "-", "--object-name", "RESURS-DK1").stdout
+    for words in ("FRAME_RESURS-DK1_GYRO2 = -999002", "TKFRAME_-999002_SPEC = 'MATRIX'", "INS-999001_DRIFT_RAD_S"):
+        assert words in text
+    refused(run("export", flown / "out" / "calibration.json", "--format", "fk", "-o", "-", "--object-name", "1"), WRONG_USAGE)
+    refused(run("export", flown / "a.csv", "--format", "fk", "-o", "-"), INPUT_REFUSED)

@@ -1,0 +1,464 @@
+#include "choose/constancy.hpp"
+
+#include <Eigen/Cholesky>
+#include <Eigen/LU>
+#include <Eigen/SparseCore>
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "trihedron/core/frames.hpp"
+
+namespace trihedron::ground {
+namespace {
+
+using Eigen::Index;
+using Eigen::Matrix3d;
+using Eigen::MatrixXd;
+using Eigen::Vector3d;
+using Eigen::VectorXd;
+
+/// Coefficients of eq. (1) and the alignment of one gyro.
+constexpr int kOfGyro = Layout::kEq1 + 3;
+constexpr int kOfAberration = 9;
+
+/// Sums of squares as forms zᵀ Q z of variables z of which the last is 1. The variables of a stretch of the pass: the
+/// noise w of a step, states that move at the beginning and now, constants, shapes of errors of the fixes, 1.
+class StretchForm {
+ public:
+  StretchForm(Index moving, Index constants, Index shapes)
+      : d_(moving), Q_(MatrixXd::Zero(3 * moving + constants + shapes + 1, 3 * moving + constants + shapes + 1)) {}
+
+  /// `arc`: of the states that move now, constants, shapes and 1.
+  void measure(const MatrixXd& arc) {
+    const Index rest = arc.rows() - d_;
+    const Index d = moved_ ? 2 * d_ : d_;
+    Q_.block(d, d, d_, d_) += arc.topLeftCorner(d_, d_);
+    Q_.block(d, 3 * d_, d_, rest) += arc.topRightCorner(d_, rest);
+    Q_.block(3 * d_, d, rest, d_) += arc.bottomLeftCorner(rest, d_);
+    Q_.bottomRightCorner(rest, rest) += arc.bottomRightCorner(rest, rest);
+  }
+
+  /// Goes on to the beginning of the next arc.
+  void move(const SmootherStage& stage) {
+    constexpr double kLeastNoise_rad = 1e-9;  // 0.2 mas: no reading shows it
+    const Index constants = stage.B.cols();
+    MatrixXd to = MatrixXd::Zero(d_, Q_.cols());
+    if (!moved_) {  // w = (d' − A d − B c − m) / noise
+      to.middleCols(d_, d_) = -stage.A_inverse.inverse();
+      to.middleCols(2 * d_, d_).setIdentity();
+      to.middleCols(3 * d_, constants) = -stage.B;
+      to.rightCols(1) = -stage.m;
+      to = stage.noise.cwiseMax(kLeastNoise_rad).cwiseInverse().asDiagonal() * to;
+      Q_.noalias() += to.transpose() * to;
+      moved_ = true;
+      return;
+    }
+    // d = A⁻¹ (d' − B c − m − noise w), of which w is then eliminated.
+    to.leftCols(d_) = -stage.A_inverse * stage.noise.asDiagonal();
+    to.middleCols(2 * d_, d_) = stage.A_inverse;
+    to.middleCols(3 * d_, constants) = -stage.A_inverse * stage.B;
+    to.rightCols(1) = -stage.A_inverse * stage.m;
+    MatrixXd rows = Q_.middleRows(2 * d_, d_);
+    const MatrixXd own = rows.middleCols(2 * d_, d_);
+    rows.middleCols(2 * d_, d_) = own / 2;
+    Q_.middleRows(2 * d_, d_).setZero();
+    Q_.middleCols(2 * d_, d_).setZero();
+    rows.middleCols(2 * d_, d_).setZero();
+    const MatrixXd crossed = to.transpose() * (rows + own * to / 2);
+    Q_ += crossed + crossed.transpose();
+    const MatrixXd by_w = Q_.topRows(d_);
+    const MatrixXd w = by_w.leftCols(d_) + MatrixXd::Identity(d_, d_);
+    Q_.noalias() -= by_w.transpose() * w.llt().solve(by_w);
+    Q_.topRows(d_).setZero();
+    Q_.leftCols(d_).setZero();
+  }
+
+  /// Without w.
+  [[nodiscard]] MatrixXd form() const { return Q_.bottomRightCorner(Q_.rows() - d_, Q_.cols() - d_); }
+
+ private:
+  Index d_;
+  MatrixXd Q_;
+  bool moved_ = false;  ///< beyond its first arc
+};
+
+/// Removes the first variables of a form, to their likeliest values. `follow`: how these follow the others, negated.
+MatrixXd without_first(const MatrixXd& form, Index size, MatrixXd* follow = nullptr) {
+  const Index rest = form.rows() - size;
+  const Eigen::LLT<MatrixXd> root(form.topLeftCorner(size, size));
+  const MatrixXd half = root.matrixL().solve(form.topRightCorner(size, rest));
+  if (follow != nullptr) {
+    *follow = root.matrixU().solve(half);
+  }
+  MatrixXd left = form.bottomRightCorner(rest, rest);
+  left.selfadjointView<Eigen::Lower>().rankUpdate(half.transpose(), -1);
+  return left.selfadjointView<Eigen::Lower>();
+}
+
+Matrix3d cross(const Vector3d& v) {
+  Matrix3d m;
+  m << 0, -v.z(), v.y(), v.z(), 0, -v.x(), -v.y(), v.x(), 0;
+  return m;
+}
+
+/// The fixes of each arc as forms of the states of the arc, shapes and 1. The shapes: aberration by a velocity that is
+/// constant, and by two at orbital period, over the speed of light, in axes; relative errors of scale of the direction
+/// cosines, gyro by gyro. Each moves the directions as a small rotation of the cases would, an alignment.
+std::vector<MatrixXd> forms_of_arcs(const PassProblem& problem, const PassSolution& solution) {
+  const Layout& layout = problem.layout();
+  const CalibrationSetup& setup = problem.setup().on_board;
+  const Index n = layout.size();
+  const Index shapes = kOfAberration + 3L * layout.gyros;
+  std::vector<MatrixXd> forms(problem.arcs(), MatrixXd::Zero(n + shapes + 1, n + shapes + 1));
+  problem.go_along(solution, [&](const PassProblem::Moment& moment) {
+    if (moment.fix == nullptr) {
+      return;
+    }
+    PassProblem::FixRows rows = problem.compare(solution, moment);
+    if (rows.y.size() == 0 || problem.is_outlier(rows)) {
+      return;
+    }
+    MatrixXd all(rows.y.size(), n + shapes + 1);
+    all << rows.H, MatrixXd::Zero(rows.y.size(), shapes), -rows.y;
+    const Matrix3d C_c_in = moment.fix->fix.q_in_c.normalized().toRotationMatrix().transpose();
+    const Matrix3d aberrated = cross(Vector3d::UnitZ()) * C_c_in;
+    const double phase = setup.orbital_rate_rad_s * to_seconds(moment.t - setup.orbital_phase_zero);
+    for (int k = 0; k < layout.gyros; ++k) {
+      const auto by_alignment = rows.H.middleCols<3>(layout.alignment(k));
+      if (moment.fix->fix.head == 0) {
+        const MatrixXd by_velocity = by_alignment * aberrated;
+        all.middleCols<3>(n) += by_velocity;
+        all.middleCols<3>(n + 3) += std::cos(phase) * by_velocity;
+        all.middleCols<3>(n + 6) += std::sin(phase) * by_velocity;
+      }
+      const Matrix3d& C_c_b = moment.gyros[k].C_c_b;
+      const Vector3d& h_b = moment.fix->h_b[k];
+      all.middleCols<3>(n + kOfAberration + 3L * k) = by_alignment * cross(-(C_c_b * h_b)) * C_c_b * h_b.asDiagonal();
+    }
+    rows.R.llt().matrixL().solveInPlace(all);
+    forms[moment.arc].selfadjointView<Eigen::Lower>().rankUpdate(all.transpose());
+  });
+  for (MatrixXd& form : forms) {
+    form = MatrixXd(form.selfadjointView<Eigen::Lower>());
+  }
+  return forms;
+}
+
+/// The whole pass as a form of what may move, all else eliminated. The pass is cut into stretches; the variables are
+/// the steps of the parameters at the beginning of each stretch but the first, those of the momenta, the shapes, 1.
+class Constancy {
+ public:
+  /// `found`: converged, so that its rows are about what is most likely.
+  Constancy(const PassProblem& problem, const BatchResult& found) : problem_(problem), layout_(problem_.layout()) {
+    const PassProblem::Linear& linear = found.linear;
+    for (std::size_t i = 0; i <= stretches(problem_.arcs()); ++i) {
+      begins_.push_back(i * problem_.arcs() / stretches(problem_.arcs()));
+    }
+    const std::vector<MatrixXd> arcs = forms_of_arcs(problem_, found.before);
+    const auto count = static_cast<Index>(begins_.size()) - 1;
+    const Index d = layout_.dynamic();
+    const Index n = layout_.size();
+    const Index shapes = kOfAberration + 3L * layout_.gyros;
+    std::vector<Index> parameters;
+    std::vector<Index> others;
+    for (Index c = d; c < n; ++c) {
+      bool own = false;
+      for (int k = 0; k < layout_.gyros; ++k) {
+        own = own || (c >= layout_.drift(k) && c < layout_.drift(k) + Layout::kEq1) ||
+              (c >= layout_.alignment(k) && c < layout_.alignment(k) + 3);
+      }
+      (own ? parameters : others).push_back(c);
+    }
+    // Variables: the states that move at the beginnings; the other constants; parameters and steps of the momenta
+    // stretch by stretch; shapes; 1.
+    const Index at_others = count * d;
+    const Index at_steps = at_others + static_cast<Index>(others.size());
+    const Index at_shapes = at_steps + count * of_stretch();
+    const Index size = at_shapes + shapes + 1;
+    MatrixXd whole = MatrixXd::Zero(size, size);
+    for (Index i = 0; i < count; ++i) {
+      StretchForm stretch(d, n - d, shapes);
+      for (std::size_t arc = begins_[static_cast<std::size_t>(i)]; arc < begins_[static_cast<std::size_t>(i) + 1];
+           ++arc) {
+        stretch.measure(arc == 0 ? MatrixXd(arcs[arc] + prior_form(linear, n, shapes)) : arcs[arc]);
+        if (arc + 1 < arcs.size()) {
+          stretch.move(linear.stages[arc]);
+        }
+      }
+      std::vector<Index> place(static_cast<std::size_t>(2 * d + n - d + shapes + 1));
+      for (Index j = 0; j < d; ++j) {
+        place[static_cast<std::size_t>(j)] = i * d + j;
+        place[static_cast<std::size_t>(d + j)] = std::min(i + 1, count - 1) * d + j;  // of the last there is nothing
+      }
+      const auto constant = [&](Index c) -> Index& { return place[static_cast<std::size_t>(d + c)]; };
+      for (std::size_t j = 0; j < others.size(); ++j) {
+        constant(others[j]) = at_others + static_cast<Index>(j);
+      }
+      for (std::size_t j = 0; j < parameters.size(); ++j) {
+        constant(parameters[j]) = at_steps + i * of_stretch() + static_cast<Index>(j);
+      }
+      for (Index j = 0; j <= shapes; ++j) {
+        constant(n + j) = at_shapes + j;
+      }
+      const MatrixXd form = stretch.form();
+      whole(place, place) += form;
+      if (i + 1 < count) {  // the states at its end are those of the next beginning less the step there
+        const Index step = at_steps + (i + 1) * of_stretch() + kOfGyro * layout_.gyros;
+        const Index directions = 2L * layout_.gyros;
+        for (Index j = 0; j < directions; ++j) {
+          for (std::size_t row = 0; row < place.size(); ++row) {
+            const double value = form(d + j, static_cast<Index>(row));
+            whole(step + j, place[row]) -= value;
+            whole(place[row], step + j) -= value;
+          }
+        }
+        whole.block(step, step, directions, directions) += form.block(d, d, directions, directions);
+      }
+    }
+    // Steps in place of the values of each stretch: a step changes all that follows.
+    const Index own = kOfGyro * layout_.gyros;
+    for (Index i = count - 1; i-- > 0;) {
+      const Index at = at_steps + i * of_stretch();
+      whole.middleRows(at, own) += whole.middleRows(at + of_stretch(), own);
+    }
+    for (Index i = count - 1; i-- > 0;) {
+      const Index at = at_steps + i * of_stretch();
+      whole.middleCols(at, own) += whole.middleCols(at + of_stretch(), own);
+    }
+    whole.block(at_steps + own, at_steps + own, 2L * layout_.gyros, 2L * layout_.gyros)
+        .setIdentity();  // there is no step of the momenta at the start
+    const MatrixXd rest = without_first(whole, at_others);
+    MatrixXd follow;
+    form_ = without_first(rest, static_cast<Index>(others.size()) + of_stretch(), &follow);
+    follow_ = follow.middleRows(static_cast<Index>(others.size()), own);
+    at_shapes_ = (count - 1) * of_stretch();
+  }
+
+  static std::size_t stretches(std::size_t arcs) {
+    constexpr std::size_t kMost = 36;
+    constexpr std::size_t kArcsAtLeast = 10;
+    return std::min(kMost, arcs / kArcsAtLeast);
+  }
+
+  [[nodiscard]] Index steps() const { return static_cast<Index>(begins_.size()) - 2; }
+  /// The arc that a step is at the beginning of.
+  [[nodiscard]] std::size_t arc(Index step) const { return begins_[static_cast<std::size_t>(step) + 1]; }
+  /// The middle of a stretch; steps are at the middle between two of them.
+  [[nodiscard]] Time middle(Index stretch) const {
+    const auto at = static_cast<std::size_t>(stretch);
+    return problem_.begin_of((begins_[at] + begins_[at + 1]) / 2);
+  }
+  [[nodiscard]] Index parameter(Index step, int gyro, int i) const {
+    return step * of_stretch() + kOfGyro * gyro + i;
+  }
+  [[nodiscard]] Index momentum(Index step, int gyro) const {
+    return step * of_stretch() + kOfGyro * layout_.gyros + 2L * gyro;
+  }
+  [[nodiscard]] Index aberration() const { return at_shapes_; }
+  [[nodiscard]] Index scale(int gyro) const { return at_shapes_ + kOfAberration + 3L * gyro; }
+  [[nodiscard]] Index size() const { return form_.rows() - 1; }
+  /// Middle of a stretch, of the pass from 0 to 1.
+  [[nodiscard]] double part(Index stretch) const {
+    const auto at = static_cast<std::size_t>(stretch);
+    return static_cast<double>(begins_[at] + begins_[at + 1]) / 2 / static_cast<double>(begins_.back());
+  }
+
+  /// What moves as these columns times numbers of this 1-sigma; gets log_odds (of one try), size, sigma and
+  /// parameters_off.
+  void put_into(Change& change, const Eigen::SparseMatrix<double>& columns, const VectorXd& prior_sigma) const {
+    const MatrixXd by_form = form_.topLeftCorner(size(), size()) * columns;
+    const auto D = prior_sigma.asDiagonal();
+    const MatrixXd S = MatrixXd(D * (columns.transpose() * by_form) * D) +
+                       MatrixXd::Identity(prior_sigma.size(), prior_sigma.size());
+    const VectorXd b = -(D * (columns.transpose() * form_.topRightCorner(size(), 1)));
+    const Eigen::LLT<MatrixXd> root(S);
+    const VectorXd found = root.solve(b);
+    change.log_odds = b.dot(found) / 2 - root.matrixLLT().diagonal().array().log().sum();
+    change.size = D * found;
+    change.sigma = (D * root.solve(MatrixXd(D))).diagonal().cwiseSqrt();
+    const VectorXd moved = columns * change.size;
+    change.parameters_off = -(follow_.leftCols(size()) * moved);
+    for (Index step = 0; step < steps(); ++step) {
+      change.parameters_off += moved.segment(parameter(step, 0, 0), change.parameters_off.size());
+    }
+  }
+
+ private:
+  [[nodiscard]] Index of_stretch() const { return (kOfGyro + 2) * layout_.gyros; }
+
+  static MatrixXd prior_form(const PassProblem::Linear& linear, Index n, Index shapes) {
+    MatrixXd rows = MatrixXd::Zero(linear.prior.rows(), n + shapes + 1);
+    rows.leftCols(n) = linear.prior;
+    rows.rightCols(1) = -linear.prior_y;
+    return rows.transpose() * rows;
+  }
+
+  const PassProblem& problem_;
+  Layout layout_;
+  std::vector<std::size_t> begins_;  ///< arcs where stretches begin, and their number
+  MatrixXd form_;
+  MatrixXd follow_;  ///< parameters by the variables, negated
+  Index at_shapes_ = 0;
+};
+
+}  // namespace
+
+std::vector<Change> changes_over(const Trial& trial) {
+  constexpr std::size_t kLeastStretches = 6;
+  const PassProblem& problem = trial.problem();
+  if (Constancy::stretches(problem.arcs()) < kLeastStretches) {
+    return {};
+  }
+  // In steady flight an alignment is as unknown as before, and what it makes with the drift is of second order: a fifth
+  // of its sigma, enough for a decision, would look like something that moves.
+  constexpr double kConverged = 0.01;
+  const BatchResult found = most_likely(problem, trial.found().solution, kConverged);
+  const Constancy pass(problem, found);
+  const Layout& layout = problem.layout();
+  const Index steps = pass.steps();
+  // What may be expected of each, 1-sigma: a case or a head that slips, coefficients that change by a tenth of what is
+  // expected of them, the Earth's orbital velocity over that of light and a spacecraft's, scales as of a first ground
+  // calibration.
+  constexpr double kMoves_rad = 60.0 / 206265;
+  constexpr double kPartOfCoefficients = 0.1;
+  constexpr double kAnnual = 6e-5;
+  constexpr double kOrbital = 1.5e-5;
+  constexpr double kScale = 1e-3;
+  VectorXd coefficient_sigma(Index{Layout::kEq1} * layout.gyros);
+  for (int k = 0; k < layout.gyros; ++k) {
+    for (int i = 0; i < Layout::kEq1; ++i) {
+      const Layout members = problem.setup().layout();
+      const Index row = members.drift(k) + i - members.drift(0);
+      coefficient_sigma(Layout::kEq1 * k + i) =
+          kPartOfCoefficients * std::sqrt(problem.setup().prior.covariance(row, row));
+    }
+  }
+
+  const auto what = [](Moving moving, Motion motion, int gyro, Time from = {}, Time until = {}) {
+    Change change;
+    change.moving = moving;
+    change.motion = motion;
+    change.gyro = gyro;
+    change.from = from;
+    change.until = until;
+    return change;
+  };
+  using Entries = std::vector<Eigen::Triplet<double>>;
+  std::vector<Change> best;
+  int tries = 0;
+  const auto consider = [&](Change change, const Entries& entries, const VectorXd& sigma) {
+    ++tries;
+    Eigen::SparseMatrix<double> columns(pass.size(), sigma.size());
+    columns.setFromTriplets(entries.begin(), entries.end());
+    pass.put_into(change, columns, sigma);
+    const auto same = std::ranges::find_if(best, [&](const Change& other) {
+      return other.moving == change.moving && other.motion == change.motion && other.gyro == change.gyro;
+    });
+    if (same == best.end()) {
+      best.push_back(std::move(change));
+    } else if (change.log_odds > same->log_odds) {
+      *same = std::move(change);
+    }
+  };
+  const auto sigmas = [](Index size, double sigma) { return VectorXd(VectorXd::Constant(size, sigma)); };
+  const auto coefficients = [&](int gyro) {
+    return gyro < 0 ? coefficient_sigma : VectorXd(coefficient_sigma.segment<Layout::kEq1>(Layout::kEq1 * gyro));
+  };
+  /// Parameters that follow a course: its rise from each stretch to the next.
+  const auto along = [&](int gyro, int from, int size, bool alike, const auto& rise) {
+    Entries entries;
+    for (int k = std::max(gyro, 0); k < (gyro < 0 ? layout.gyros : gyro + 1); ++k) {
+      for (int i = 0; i < size; ++i) {
+        const int column = gyro < 0 && !alike ? size * k + i : i;
+        for (Index step = 0; step < steps; ++step) {
+          if (const double by = rise(step); by != 0) {
+            entries.emplace_back(pass.parameter(step, k, from + i), column, by);
+          }
+        }
+      }
+    }
+    return entries;
+  };
+  const auto once_at = [](Index when) { return [when](Index step) { return step == when ? 1.0 : 0.0; }; };
+  const auto evenly = [&](Index step) { return pass.part(step + 1) - pass.part(step); };
+  const auto decaying = [&](double time) {
+    return [&pass, time](Index step) {
+      return std::exp(-pass.part(step) / time) - std::exp(-pass.part(step + 1) / time);
+    };
+  };
+
+  for (int k = -1; k < layout.gyros; ++k) {
+    const Moving moving = k < 0 ? Moving::kStarTracker : Moving::kGyroCase;
+    consider(what(moving, Motion::kRamp, k), along(k, Layout::kEq1, 3, true, evenly),
+             sigmas(3, kMoves_rad));
+    consider(what(Moving::kCoefficients, Motion::kRamp, k),
+             along(k, 0, Layout::kEq1, false, evenly), coefficients(k));
+    for (const double time : {0.05, 0.1, 0.2, 0.4}) {
+      consider(what(Moving::kCoefficients, Motion::kDecay, k),
+               along(k, 0, Layout::kEq1, false, decaying(time)), coefficients(k));
+    }
+    for (Index step = 0; step < steps; ++step) {
+      const Time from = pass.middle(step);
+      const Time until = pass.middle(step + 1);
+      consider(what(moving, Motion::kStep, k, from, until),
+               along(k, Layout::kEq1, 3, true, once_at(step)), sigmas(3, kMoves_rad));
+      consider(what(Moving::kCoefficients, Motion::kStep, k, from, until),
+               along(k, 0, Layout::kEq1, false, once_at(step)), coefficients(k));
+      Entries entries;
+      for (int gyro = std::max(k, 0); gyro < (k < 0 ? layout.gyros : k + 1); ++gyro) {
+        const Eigen::Matrix<double, 2, 3> by_turn =
+            across(found.before.arcs[pass.arc(step)].h_in[gyro]).transpose();
+        for (int i = 0; i < 2; ++i) {
+          for (int j = 0; k < 0 && j < 3; ++j) {
+            entries.emplace_back(pass.momentum(step, gyro) + i, j, by_turn(i, j));
+          }
+          if (k >= 0) {
+            entries.emplace_back(pass.momentum(step, gyro) + i, i, 1);
+          }
+        }
+      }
+      consider(what(k < 0 ? Moving::kInertialAxes : Moving::kMomentum, Motion::kStep, k, from, until),
+               entries, sigmas(k < 0 ? 3 : 2, kMoves_rad));
+    }
+  }
+  const auto shape = [](Index at, Index size) {
+    Entries entries;
+    for (Index i = 0; i < size; ++i) {
+      entries.emplace_back(at + i, i, 1);
+    }
+    return entries;
+  };
+  VectorXd velocity = sigmas(kOfAberration, kOrbital);
+  velocity.head<3>().setConstant(kAnnual);
+  consider(what(Moving::kAberration, Motion::kPresent, -1), shape(pass.aberration(), kOfAberration), velocity);
+  for (int k = 0; k < layout.gyros; ++k) {
+    consider(what(Moving::kReadoutScale, Motion::kPresent, k), shape(pass.scale(k), 3),
+             sigmas(3, kScale));
+  }
+  for (const double part : {0.01, 0.03, 0.1, 0.3, 1.0}) {
+    Entries entries;
+    VectorXd sigma(steps * coefficient_sigma.size());
+    for (Index step = 0; step < steps; ++step) {
+      for (Index i = 0; i < coefficient_sigma.size(); ++i) {
+        const Index column = step * coefficient_sigma.size() + i;
+        entries.emplace_back(pass.parameter(step, static_cast<int>(i) / Layout::kEq1, static_cast<int>(i) % Layout::kEq1), column, 1);
+        sigma(column) = part * coefficient_sigma(i) / std::sqrt(static_cast<double>(steps));
+      }
+    }
+    consider(what(Moving::kCoefficients, Motion::kWalk, -1), entries, sigma);
+  }
+  for (Change& change : best) {
+    change.log_odds -= std::log(tries);
+    if (change.moving == Moving::kStarTracker) {  // found as that of the cases against it
+      change.size = -change.size;
+    } else if (change.motion == Motion::kWalk) {
+      change.size = VectorXd::Constant(1, change.size.norm());
+      change.sigma = VectorXd::Constant(1, change.sigma.norm());
+    }
+  }
+  std::ranges::sort(best, [](const Change& a, const Change& b) { return a.log_odds > b.log_odds; });
+  return best;
+}
+
+}  // namespace trihedron::ground

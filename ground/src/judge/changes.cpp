@@ -1,0 +1,164 @@
+#include "judge/changes.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+
+#include "trihedron/core/layout.hpp"
+#include "trihedron/records/text.hpp"
+
+namespace trihedron::ground {
+namespace {
+
+/// ln of the odds from which on something counts as moving: at most 1 in 20 000 passes in which nothing does.
+constexpr double kLogOddsOfChange = 9.9;
+/// … and up to which less likely explanations are named beside the likeliest.
+constexpr double kCannotBeTold = 5;
+/// Where a change moves a parameter by so many claimed sigmas, the result is wrong: the error is up to twice as large,
+/// because the noise found and the drift model have followed a part of the change.
+constexpr double kSigmasOfWrong = 2;
+
+std::string of_gyro(const Change& change) {
+  return change.gyro < 0 ? std::string("all gyros") : fmt::format("gyro {}", change.gyro + 1);
+}
+
+std::string described(const Change& change) {
+  switch (change.moving) {
+    case Moving::kGyroCase:
+      return fmt::format("{} of the case of {}", change.motion == Motion::kStep ? "a step" : "a slow turn",
+                         of_gyro(change));
+    case Moving::kStarTracker:
+      return change.motion == Motion::kStep ? "a step of the star tracker's mounting"
+                                            : "a slow turn of the star tracker's mounting";
+    case Moving::kMomentum:
+      return fmt::format("a jump of the momentum of {}", of_gyro(change));
+    case Moving::kInertialAxes:
+      return "a jump of the inertial axes of the star tracker";
+    case Moving::kCoefficients:
+      return fmt::format("{} of the coefficients of {}",
+                         change.motion == Motion::kStep    ? "a jump"
+                         : change.motion == Motion::kWalk  ? "a random walk"
+                         : change.motion == Motion::kDecay ? "a warm-up"
+                                                           : "an even change",
+                         of_gyro(change));
+    case Moving::kAberration:
+      return "aberration of starlight in the fixes";
+    case Moving::kReadoutScale:
+      return fmt::format("errors of scale of the direction cosines of {}", of_gyro(change));
+  }
+  return {};
+}
+
+FindingCode code_of(Moving moving) {
+  switch (moving) {
+    case Moving::kGyroCase:
+      return FindingCode::kGyroMountingMoved;
+    case Moving::kStarTracker:
+      return FindingCode::kStarTrackerMoved;
+    case Moving::kMomentum:
+      return FindingCode::kMomentumJumped;
+    case Moving::kInertialAxes:
+      return FindingCode::kInertialAxesTurned;
+    case Moving::kCoefficients:
+      return FindingCode::kCoefficientsNotConstant;
+    case Moving::kAberration:
+      return FindingCode::kAberrationNotCorrected;
+    case Moving::kReadoutScale:
+      return FindingCode::kReadoutScaleOff;
+  }
+  return FindingCode::kOther;
+}
+
+std::string cure_of(const Change& change) {
+  switch (change.moving) {
+    case Moving::kGyroCase:
+    case Moving::kStarTracker:
+    case Moving::kMomentum:
+    case Moving::kInertialAxes:
+      return change.motion == Motion::kStep
+                 ? "Cut the pass there and calibrate on the parts apart; look for what happened at that time."
+                 : "Look for what warms the mounting; calibrate on a shorter pass.";
+    case Moving::kCoefficients:
+      return change.motion == Motion::kStep
+                 ? "Cut the pass there and calibrate on the parts apart."
+                 : "Use estimator batch with coefficient_change = \"on\" in [further_states], or calibrate on a shorter "
+                   "and later part of the pass.";
+    case Moving::kAberration:
+      return "Correct aberration in the star tracker, or in its fixes before they come here.";
+    case Moving::kReadoutScale:
+      return "Correct the scales of the direction cosines; check that each reading is a unit vector before it is scaled.";
+  }
+  return {};
+}
+
+/// Coefficients in rad/s, pure numbers, or angles.
+std::string size_text(const Change& change) {
+  if (change.motion == Motion::kWalk) {
+    return {};
+  }
+  const double size = change.size.norm();
+  const double sigma = change.sigma.norm();
+  const std::string text =
+      change.moving == Moving::kCoefficients ? fmt::format("{:.1e} ± {:.1e} rad/s", size, sigma)
+      : change.moving == Moving::kAberration || change.moving == Moving::kReadoutScale
+          ? fmt::format("{:.1e} ± {:.1e}", size, sigma)
+          : fmt::format("{} ± {}", angle_text(size), angle_text(sigma));
+  return text + ", ";
+}
+
+/// Of the parameters by which the result is off, the largest in its claimed sigma.
+double sigmas_off(const CalibrationRun& run, const Change& change) {
+  constexpr int kOfGyro = Layout::kEq1 + 3;
+  double worst = 0;
+  for (std::size_t row = 0; row < run.calibration.states.size(); ++row) {
+    const ParameterId& state = run.calibration.states[row];
+    int i = state.is_alignment() ? Layout::kEq1 + state.component : Layout::kEq1;
+    for (int member = 0; state.is_drift() && member < Layout::kEq1; ++member) {
+      i = state.coefficient == DriftCoefficient::of_eq1(member) ? member : i;
+    }
+    if (state.is_drift() && i == Layout::kEq1) {
+      continue;  // outside eq. (1)
+    }
+    const auto at = static_cast<Eigen::Index>(row);
+    worst = std::max(worst, std::abs(change.parameters_off(kOfGyro * static_cast<Eigen::Index>(state.gyro()) + i)) /
+                                std::sqrt(run.calibration.covariance(at, at)));
+  }
+  return worst;
+}
+
+}  // namespace
+
+void judge_changes(const CalibrationRun& run, std::vector<Finding>& findings) {
+  if (run.changes.empty() || run.changes.front().log_odds < kLogOddsOfChange) {
+    return;
+  }
+  const Change& likeliest = run.changes.front();
+  std::string others;
+  for (const Change& change : run.changes) {
+    if (&change != &likeliest && change.log_odds > likeliest.log_odds - kCannotBeTold) {
+      others += (others.empty() ? "; nearly as likely: " : ", ") + described(change);
+    }
+  }
+  const double off = sigmas_off(run, likeliest);
+  const auto minutes = [&](Time t) { return to_seconds(t - run.calibration.epoch) / 60; };
+  const std::string when = likeliest.motion == Motion::kStep ? fmt::format(" between {:.0f} and {:.0f} min", minutes(likeliest.from),
+                                                                          minutes(likeliest.until))
+                                                            : std::string();
+  std::string what = described(likeliest);
+  what.front() = static_cast<char>(what.front() - 'a' + 'A');
+  Finding finding{code_of(likeliest.moving),
+                  fmt::format("{}{}: the estimates take what moves for constant{}.", what, when,
+                              off > kSigmasOfWrong ? ", and their sigmas are wrong" : ""),
+                  fmt::format("{}likelier than nothing by e^{:.0f}; the largest effect on a parameter is {:.1f} of its "
+                              "sigmas{}",
+                              size_text(likeliest), likeliest.log_odds, off, others),
+                  cure_of(likeliest)};
+  if (off <= kSigmasOfWrong) {
+    finding.severity = FindingSeverity::kWarning;
+  }
+  findings.push_back(std::move(finding));
+}
+
+}  // namespace trihedron::ground

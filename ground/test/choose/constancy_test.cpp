@@ -1,0 +1,102 @@
+#include "choose/constancy.hpp"
+
+#include <gtest/gtest.h>
+
+#include <functional>
+
+#include "passes.hpp"
+#include "trihedron/ground/calibrate/calibrate.hpp"
+
+namespace trihedron::ground {
+namespace {
+
+constexpr double kMiddle_s = 1.5 * 3600;
+const Eigen::Vector3d kAxis{0.6, -0.64, 0.48};
+
+/// Three hours with slews in which something moves.
+CalibrationRun calibrated(std::uint64_t seed, const std::function<void(Scenario&)>& change) {
+  Scenario scenario = scenario_in_eq1(seed, std::chrono::hours(3));
+  change(scenario);
+  return calibrate(sim::simulate(scenario).pass, CalibrationOptions());
+}
+
+bool names(const CalibrationRun& run, FindingCode code) { return run.calibration.verdict.has(code); }
+
+bool names_a_change(const CalibrationRun& run) {
+  for (const FindingCode code :
+       {FindingCode::kGyroMountingMoved, FindingCode::kStarTrackerMoved, FindingCode::kMomentumJumped,
+        FindingCode::kInertialAxesTurned, FindingCode::kCoefficientsNotConstant, FindingCode::kAberrationNotCorrected,
+        FindingCode::kReadoutScaleOff}) {
+    if (names(run, code)) {
+      return true;
+    }
+  }
+  return false;
+}
+
+TEST(Constancy, FindsNothingWhereNothingMoves) {
+  for (const std::uint64_t seed : {1, 2, 3}) {
+    EXPECT_FALSE(names_a_change(calibrated(seed, [](Scenario&) {}))) << seed;
+  }
+  EXPECT_FALSE(names_a_change(calibrated(4, [](Scenario& scenario) { scenario.attitude.slews = std::vector<Slew>{}; })));
+}
+
+TEST(Constancy, NamesTheCaseThatSlippedAndWhen) {
+  const CalibrationRun run = calibrated(1, [](Scenario& scenario) {
+    scenario.gyros[0].mounting_change = {.step_rad = 20 * kArcsecond * kAxis, .step_at_s = kMiddle_s};
+  });
+  EXPECT_TRUE(names(run, FindingCode::kGyroMountingMoved));
+  EXPECT_FALSE(run.calibration.verdict.trustworthy);
+  const Change& change = run.changes.front();
+  EXPECT_EQ(change.gyro, 0);
+  const Time at = run.calibration.epoch + from_seconds(kMiddle_s);
+  EXPECT_LE(change.from, at);
+  EXPECT_GE(change.until, at);
+  // Five of its sigmas, and what half a stretch of the pass without the step makes of it.
+  EXPECT_LT((change.size - 20 * kArcsecond * kAxis).norm(), 5 * change.sigma.norm() + 4 * kArcsecond);
+}
+
+TEST(Constancy, NamesTheStarTrackerThatSlipped) {
+  const CalibrationRun run = calibrated(2, [](Scenario& scenario) {
+    scenario.star_tracker.mounting_change = {.step_rad = 20 * kArcsecond * kAxis, .step_at_s = kMiddle_s};
+  });
+  EXPECT_TRUE(names(run, FindingCode::kStarTrackerMoved));
+  EXPECT_FALSE(run.calibration.verdict.trustworthy);
+}
+
+TEST(Constancy, NamesTheStarTrackerThatTurnsSlowly) {
+  const CalibrationRun run = calibrated(3, [](Scenario& scenario) {
+    scenario.star_tracker.mounting_change.rate_rad_s = 60 * kArcsecond / (2 * kMiddle_s) * kAxis;
+  });
+  EXPECT_TRUE(names(run, FindingCode::kStarTrackerMoved));
+  EXPECT_FALSE(run.calibration.verdict.trustworthy);
+}
+
+TEST(Constancy, NamesCoefficientsThatChange) {
+  const CalibrationRun run = calibrated(4, [](Scenario& scenario) {
+    for (GyroScenario& gyro : scenario.gyros) {
+      gyro.drift.warm_up_fraction = 0.3;
+    }
+  });
+  EXPECT_TRUE(names(run, FindingCode::kCoefficientsNotConstant));
+  EXPECT_FALSE(run.calibration.verdict.trustworthy);
+}
+
+TEST(Constancy, NamesAberration) {
+  const CalibrationRun run = calibrated(5, [](Scenario& scenario) {
+    scenario.star_tracker.aberration = StarTrackerScenario::Aberration::kUncorrected;
+  });
+  EXPECT_TRUE(names(run, FindingCode::kAberrationNotCorrected));
+  EXPECT_FALSE(run.calibration.verdict.trustworthy);
+}
+
+TEST(Constancy, NamesInertialAxesThatJump) {
+  const CalibrationRun run = calibrated(6, [](Scenario& scenario) {
+    scenario.star_tracker.inertial_step_rad = 40 * kArcsecond * kAxis;
+    scenario.star_tracker.inertial_step_at_s = kMiddle_s;
+  });
+  EXPECT_TRUE(names(run, FindingCode::kInertialAxesTurned));
+}
+
+}  // namespace
+}  // namespace trihedron::ground

@@ -1,0 +1,348 @@
+#include "trihedron/io/calibration_message.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+#include <netcdf.h>
+
+#include <algorithm>
+#include <cctype>
+#include <cmath>
+
+#include "ndm_text.hpp"
+#include "trihedron/io/atomic_file.hpp"
+#include "trihedron/io/error.hpp"
+#include "trihedron/io/time_text.hpp"
+#include "trihedron/records/stop.hpp"
+
+namespace trihedron::io {
+namespace {
+
+/// "K0", "W_2_M1" for W(2,-1): what may stand in a keyword.
+std::string keyword_of(std::string_view name) {
+  std::string result;
+  for (const char c : name) {
+    if (c == '-') {
+      result.push_back('M');
+    } else if (std::isalnum(static_cast<unsigned char>(c)) != 0) {
+      result.push_back(static_cast<char>(std::toupper(static_cast<unsigned char>(c))));
+    } else if (c != ')') {
+      result.push_back('_');
+    }
+  }
+  return result;
+}
+
+std::string number(double value) { return fmt::format("{:.15e}", value); }
+
+/// The parts of an ACM in their order.
+class AcmWriter {
+ public:
+  AcmWriter(const Calibration& calibration, const CalibrationContext& context, const MessageDescription& description,
+            MessageSyntax syntax)
+      : calibration_(calibration),
+        context_(context),
+        description_(description),
+        text_(syntax),
+        time_(description.time_scale),
+        id_(fmt::format("AD_{}", format_epoch(calibration.t))) {}
+
+  std::string write() {
+    text_.header("ACM",
+                 "Calibration of electrostatic gyros; the keywords TRIHEDRON_... are described in its documentation",
+                 description_);
+    metadata();
+    text_.put("", "<data>\n");
+    if (has_attitude()) {
+      attitude();
+    }
+    if (has_covariance()) {
+      covariance();
+    }
+    determination();
+    user_defined();
+    text_.put("", "</data>\n</segment>\n");
+    text_.end("ACM");
+    return text_.text();
+  }
+
+ private:
+  [[nodiscard]] bool has_attitude() const { return context_.attitude != nullptr; }
+  [[nodiscard]] bool has_covariance() const { return has_attitude() && !context_.attitude->attitude.sigma_rad.empty(); }
+  /// Seconds since EPOCH_TZERO, to nanoseconds.
+  [[nodiscard]] std::string relative(Time t) const { return format_seconds(t - calibration_.epoch); }
+
+  void metadata() {
+    text_.put("\nMETA_START\n", "<segment>\n<metadata>\n");
+    text_.entry("OBJECT_NAME", description_.object_name);
+    text_.entry("INTERNATIONAL_DESIGNATOR", description_.object_id);
+    text_.entry("TIME_SYSTEM", name_of(description_.time_scale));
+    text_.entry("EPOCH_TZERO", time_.format(calibration_.epoch));
+    text_.entry("ACM_DATA_ELEMENTS",
+                fmt::format("{}{}AD, USER", has_attitude() ? "ATT, " : "", has_covariance() ? "COV, " : ""));
+    Time start = calibration_.t;
+    Time stop = calibration_.t;
+    if (has_attitude()) {
+      start = std::min(start, context_.attitude->attitude.t.front());
+      stop = std::max(stop, context_.attitude->attitude.t.back());
+    }
+    text_.entry("START_TIME", relative(start));
+    text_.entry("STOP_TIME", relative(stop));
+    text_.put("META_STOP\n", "</metadata>\n");
+  }
+
+  void line(const std::string& tag, const std::string& values) {
+    text_.put(text_.kvn() ? values + "\n" : fmt::format("<{0}>{1}</{0}>\n", tag, values));
+  }
+
+  void attitude() {
+    const AttitudeHistory& attitude = context_.attitude->attitude;
+    const std::vector<Eigen::Vector3d>& rates = context_.attitude->rate_rad_s;
+    text_.put("\nATT_START\n", "<att>\n");
+    text_.entry("ATT_BASIS", "DETERMINED_GND");
+    text_.entry("ATT_BASIS_ID", id_);
+    text_.entry("REF_FRAME_A", description_.inertial_frame);
+    text_.entry("REF_FRAME_B", description_.body_frame);
+    text_.entry("NUMBER_STATES", rates.empty() ? "4" : "7");
+    text_.entry("ATT_TYPE", "QUATERNION");
+    if (!rates.empty()) {
+      text_.entry("RATE_TYPE", "ANGVEL");
+    }
+    for (std::size_t i = 0; i < attitude.size(); ++i) {
+      check_stop();
+      const Eigen::Quaterniond& q = attitude.q_in_c[i];
+      std::string values =
+          fmt::format("{} {:.15e} {:.15e} {:.15e} {:.15e}", relative(attitude.t[i]), q.x(), q.y(), q.z(), q.w());
+      if (!rates.empty()) {
+        const Eigen::Vector3d rate = rates[i] * kDegreesPerRadian;
+        values += fmt::format(" {:.15e} {:.15e} {:.15e}", rate.x(), rate.y(), rate.z());
+      }
+      line("attLine", values);
+    }
+    text_.put("ATT_STOP\n", "</att>\n");
+  }
+
+  void covariance() {
+    const AttitudeHistory& attitude = context_.attitude->attitude;
+    text_.put("\nCOV_START\n", "<cov>\n");
+    text_.entry("COMMENT", "Where an attitude has no sigma its epoch is left out");
+    text_.entry("COV_BASIS", "DETERMINED_GND");
+    text_.entry("COV_REF_FRAME", description_.body_frame);
+    text_.entry("COV_TYPE", "ANGLE");
+    for (std::size_t i = 0; i < attitude.size(); ++i) {
+      const Eigen::Vector3d variance = (attitude.sigma_rad[i] * kDegreesPerRadian).array().square();
+      if (variance.allFinite()) {
+        line("covLine",
+             fmt::format("{} {:.6e} {:.6e} {:.6e}", relative(attitude.t[i]), variance.x(), variance.y(), variance.z()));
+      }
+    }
+    text_.put("COV_STOP\n", "</cov>\n");
+  }
+
+  /// As text only: the standard's text, its schema and Orekit name the element of XML differently.
+  void sensor(int number, std::string_view kind, Duration period) {
+    if (!text_.kvn()) {
+      return;
+    }
+    text_.put("SENSOR_START\n");
+    text_.entry("SENSOR_NUMBER", std::to_string(number));
+    text_.entry("SENSOR_USED", kind);
+    if (period > Duration::zero()) {
+      text_.entry("SENSOR_FREQUENCY", fmt::format("{:.9e}", 1 / to_seconds(period)), "Hz");
+    }
+    text_.put("SENSOR_STOP\n");
+  }
+
+  void determination() {
+    text_.put("\nAD_START\n", "<ad>\n");
+    text_.entry("COMMENT", fmt::format("Estimator {}", name_of(calibration_.estimator)));
+    text_.entry("AD_ID", id_);
+    text_.entry("AD_METHOD", calibration_.estimator == Estimator::kBatch ? "BATCH" : "EKF");
+    text_.entry("ATTITUDE_SOURCE", "GND");
+    text_.entry("NUMBER_STATES", std::to_string(calibration_.states.size() + calibration_.further.size()));
+    text_.entry("ATTITUDE_STATES", "QUATERNION");
+    if (has_covariance()) {
+      text_.entry("COV_TYPE", "ANGLE");
+    }
+    text_.entry("REF_FRAME_A", description_.inertial_frame);
+    text_.entry("REF_FRAME_B", description_.body_frame);
+    const PassSettings* pass = context_.pass;
+    int number = 1;
+    for (std::size_t head = 0; head < star_trackers(); ++head) {
+      sensor(number++, "AST", pass != nullptr ? pass->star_tracker_period : Duration::zero());
+    }
+    for (std::size_t k = 0; k < calibration_.gyros.size(); ++k) {
+      sensor(number++, "GYRO", pass != nullptr ? pass->gyro_period : Duration::zero());
+    }
+    text_.put("AD_STOP\n", "</ad>\n");
+  }
+
+  void user(const std::string& key, std::string_view value) {
+    if (text_.kvn()) {
+      text_.entry("USER_DEFINED_TRIHEDRON_" + key, value);
+    } else {
+      text_.put(
+          fmt::format("<USER_DEFINED parameter=\"TRIHEDRON_{}\">{}</USER_DEFINED>\n", key, escaped_for_xml(value)));
+    }
+  }
+
+  /// A state and its 1-sigma; `unit` ends the keyword.
+  void state(const std::string& key, const std::string& unit, double value, double sigma) {
+    if (std::isfinite(value)) {
+      user(key + unit, number(value));
+    }
+    if (std::isfinite(sigma)) {
+      user(key + "_SIGMA" + unit, number(sigma));
+    }
+  }
+
+  [[nodiscard]] std::size_t star_trackers() const {
+    return 1 + (context_.pass != nullptr ? context_.pass->further_star_trackers.size() : 0);
+  }
+
+  void star_tracker_noise(std::size_t head, const Eigen::Vector3d& noise_rad) {
+    user(fmt::format("STAR_TRACKER{}_NOISE_RAD", head + 1),
+         fmt::format("{:.6e} {:.6e} {:.6e}", noise_rad.x(), noise_rad.y(), noise_rad.z()));
+  }
+
+  /// Noise: as told by the pass, or as found by the calibration. Not among the keywords of sensors, because peers
+  /// differ about the number of elements before it.
+  void sensors() {
+    const PassSettings* pass = context_.pass;
+    user("STAR_TRACKERS", std::to_string(star_trackers()));
+    user("GYROS", std::to_string(calibration_.gyros.size()));
+    if (calibration_.noise && calibration_.noise->star_tracker_noise_rad) {
+      star_tracker_noise(0, *calibration_.noise->star_tracker_noise_rad);
+    } else if (pass != nullptr) {
+      star_tracker_noise(0, pass->star_tracker_noise_rad);
+    }
+    if (pass == nullptr) {
+      return;
+    }
+    for (std::size_t head = 0; head < pass->further_star_trackers.size(); ++head) {
+      star_tracker_noise(head + 1, pass->further_star_trackers[head].noise_rad);
+    }
+    for (std::size_t k = 0; k < std::min(calibration_.gyros.size(), pass->gyros.size()); ++k) {
+      user(fmt::format("GYRO{}_READOUT_NOISE_RAD", k + 1), fmt::format("{:.6e}", pass->gyros[k].readout_noise_rad));
+    }
+  }
+
+  void user_defined() {
+    text_.put("\nUSER_START\n", "<user>\n");
+    user("VERDICT", calibration_.verdict.trustworthy ? "TRUSTWORTHY" : "DO NOT USE");
+    std::vector<std::string> findings;
+    for (const Finding& finding : calibration_.verdict.findings) {
+      findings.emplace_back(name_of(finding.code));
+    }
+    if (!findings.empty()) {
+      user("FINDINGS", fmt::format("{}", fmt::join(findings, " ")));
+    }
+    user("ESTIMATOR", name_of(calibration_.estimator));
+    user("EPOCH_S", relative(calibration_.t));
+    if (!context_.covariance_file.empty()) {
+      user("COVARIANCE_FILE", context_.covariance_file);
+    }
+    sensors();
+    constexpr std::string_view kAxes = "XYZ";
+    for (std::size_t k = 0; k < calibration_.gyros.size(); ++k) {
+      const GyroCalibration& gyro = calibration_.gyros[k];
+      const std::string owner = fmt::format("GYRO{}_", k + 1);
+      user(owner + "DRIFT_MODEL", name_of(gyro.drift_model));
+      const std::vector<DriftCoefficient> coefficients = coefficients_of(gyro.drift_model);
+      for (std::size_t i = 0; i < coefficients.size(); ++i) {
+        state(owner + keyword_of(name_of(coefficients[i])), "_RAD_S", gyro.drift_rad_s.at(i),
+              sigma_of(calibration_, ParameterId::drift(k, coefficients[i])));
+      }
+      for (int axis = 0; axis < 3; ++axis) {
+        const char letter = kAxes[static_cast<std::size_t>(axis)];
+        state(fmt::format("{}ALIGN_{}", owner, letter), "_RAD", gyro.alignment_rotation_vector_rad(axis),
+              sigma_of(calibration_, ParameterId::alignment(k, axis)));
+        user(fmt::format("{}MOMENTUM_IN_{}", owner, letter), number(gyro.momentum_in(axis)));
+      }
+    }
+    for (const FurtherEstimate& further : calibration_.further) {
+      state(keyword_of(name_of(further.parameter)), "", further.value, further.sigma);
+    }
+    text_.put("USER_STOP\n", "</user>\n");
+  }
+
+  const Calibration& calibration_;
+  const CalibrationContext& context_;
+  const MessageDescription& description_;
+  NdmText text_;
+  TimeText time_;
+  std::string id_;
+};
+
+}  // namespace
+
+std::string format_acm(const Calibration& calibration, const CalibrationContext& context,
+                       const MessageDescription& description, MessageSyntax syntax) {
+  expect_writable_description(description);
+  if (!context.covariance_file.empty()) {
+    expect_plain(context.covariance_file, "the name of the covariance file,");
+  }
+  if (description.time_scale == TimeScale::kTdb) {
+    throw UsageError("--time-system TDB: its seconds are not those of the calibration; use TAI, UTC, GPS or TT");
+  }
+  return AcmWriter(calibration, context, description, syntax).write();
+}
+
+void write_covariance(const std::filesystem::path& path, const Calibration& calibration) {
+  AtomicFile file(path);
+  const auto check = [&](int status) {
+    if (status != NC_NOERR) {
+      throw MachineFailed(unstaged(path), fmt::format("cannot be written: {}", nc_strerror(status)),
+                          "free some space, or choose another place");
+    }
+  };
+  const std::size_t n = calibration.states.size();
+  std::vector<std::string> names;
+  std::vector<const char*> name_pointers;
+  std::vector<const char*> units;
+  for (const ParameterId& state : calibration.states) {
+    names.push_back(name_of(state));
+    units.push_back(state.is_drift() ? "rad s-1" : "rad");
+  }
+  for (const std::string& name : names) {
+    name_pointers.push_back(name.c_str());
+  }
+  int id = -1;
+  check(nc_create(std::filesystem::absolute(file.temporary()).c_str(), NC_NETCDF4, &id));
+  struct Closer {
+    int id;
+    ~Closer() {
+      if (id >= 0) {
+        nc_close(id);
+      }
+    }
+  } closer{id};
+  int rows = -1;
+  int columns = -1;
+  int covariance = -1;
+  int state = -1;
+  int unit = -1;
+  check(nc_def_dim(id, "state", n, &rows));
+  check(nc_def_dim(id, "state_2", n, &columns));
+  const int dimensions[] = {rows, columns};
+  check(nc_def_var(id, "covariance", NC_DOUBLE, 2, dimensions, &covariance));
+  check(nc_def_var(id, "state", NC_STRING, 1, &rows, &state));
+  check(nc_def_var(id, "units", NC_STRING, 1, &rows, &unit));
+  const auto attribute = [&](int variable, const char* name, const std::string& text) {
+    check(nc_put_att_text(id, variable, name, text.size(), text.c_str()));
+  };
+  attribute(NC_GLOBAL, "title", "Covariance of a calibration of electrostatic gyros, as in calibration.json");
+  attribute(NC_GLOBAL, "epoch_tai", format_epoch(calibration.t));
+  attribute(covariance, "long_name", "covariance of the errors, estimate - truth; alignments about c x, y, z");
+  check(nc_enddef(id));
+  if (n > 0) {
+    const Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> by_rows = calibration.covariance;
+    check(nc_put_var_double(id, covariance, by_rows.data()));
+    check(nc_put_var_string(id, state, name_pointers.data()));
+    check(nc_put_var_string(id, unit, units.data()));
+  }
+  closer.id = -1;
+  check(nc_close(id));
+  file.commit();
+}
+
+}  // namespace trihedron::io

@@ -1,0 +1,151 @@
+"""CCSDS messages, with ccsds-ndm-py and Orekit as peers."""
+import datetime
+
+import ccsds_ndm
+import numpy as np
+import orekit_jpype
+import pytest
+from conftest import EPOCH, read_attitude, run
+
+orekit_jpype.initVM()
+from java.io import File  # noqa: E402
+from java.lang import StringBuilder  # noqa: E402
+from org.orekit.data import DataContext, DataSource, DirectoryCrawler  # noqa: E402
+from org.orekit.files.ccsds.ndm import ParserBuilder, WriterBuilder  # noqa: E402
+from org.orekit.files.ccsds.utils.generation import KvnGenerator, XmlGenerator  # noqa: E402
+from org.orekit.time import AbsoluteDate, TimeScalesFactory  # noqa: E402
+
+# When each number of leap seconds since 1999 began.
+LEAP_SECONDS = ((1999, "JAN", 32), (2006, "JAN", 33), (2009, "JAN", 34), (2012, "JUL", 35), (2015, "JUL", 36), (2017, "JAN", 37))
+# UTC − TAI and the like at the epoch, s; TDB by what Orekit computes.
+SCALES = ("TAI", "UTC", "GPS", "TT")
+FORMATS = ("aem", "aem-xml")
+
+
+@pytest.fixture(scope="session", autouse=True)
+def leap_seconds(tmp_path_factory):
+    """Orekit takes them from a file of the form of the IERS."""
+    directory = tmp_path_factory.mktemp("orekit")
+    lines = [" 1972 JAN  1 =JD 2441317.5  TAI-UTC=  10.0       S + (MJD - 41317.) X 0.0      S"]
+    for year, month, seconds in LEAP_SECONDS:
+        day = datetime.date(year, 1 if month == "JAN" else 7, 1).toordinal() + 1721424.5
+        lines.append(f" {year} {month}  1 =JD {day:.1f}  TAI-UTC=  {seconds}.0       S + (MJD - 41317.) X 0.0      S")
+    (directory / "tai-utc.dat").write_text("\n".join(lines) + "\n")
+    DataContext.getDefault().getDataProvidersManager().addProvider(DirectoryCrawler(File(str(directory))))
+
+
+def exported(attitude, directory, form, scale):
+    path = directory / f"attitude.{form}"
+    run("--quiet", "export", attitude.path, "--format", form, "-o", path, "--epoch", EPOCH, "--time-system", scale,
+        "--object-name", "RESURS-DK1", "--object-id", "2006-021A")
+    return path
+
+
+def orekit_parser():
+    return ParserBuilder().buildAemParser()
+
+
+def states_of_orekit(aem):
+    """Seconds since the epoch, and quaternions, scalar last."""
+    epoch = AbsoluteDate(EPOCH, TimeScalesFactory.getTAI())
+    states = [state for segment in aem.getSegments() for state in segment.getData().getAngularCoordinates()]
+    t_s = np.array([state.getDate().durationFrom(epoch) for state in states])
+    rotations = [state.getRotation() for state in states]
+    return t_s, np.array([[r.getQ1(), r.getQ2(), r.getQ3(), r.getQ0()] for r in rotations])
+
+
+@pytest.mark.parametrize("scale", (*SCALES, "TDB"))
+@pytest.mark.parametrize("form", FORMATS)
+def test_comes_back_by_import(attitude, tmp_path, form, scale):
+    run("--quiet", "import", exported(attitude, tmp_path, form, scale), "-o", tmp_path / "back.csv")
+    t_ns, q = read_attitude(tmp_path / "back.csv")
+    assert (t_ns == attitude.t_ns).all()
+    assert np.abs(q - attitude.q).max() <= 1e-15
+
+
+@pytest.mark.parametrize("scale", SCALES)
+@pytest.mark.parametrize("form", FORMATS)
+def test_orekit_reads_every_epoch_and_quaternion(attitude, tmp_path, form, scale):
+    aem = orekit_parser().parseMessage(DataSource(str(exported(attitude, tmp_path, form, scale))))
+    t_s, q = states_of_orekit(aem)
+    assert len(aem.getSegments()) == len(attitude.stretches)
+    # durationFrom gives a double: 200 s are known to 2.8e-14 s.
+    assert (np.rint(t_s * 1e9) == attitude.t_ns).all() and np.abs(t_s - attitude.t_ns * 1e-9).max() <= 3e-14
+    assert np.abs(q - attitude.q).max() <= 1e-15
+
+
+def test_orekit_turns_vectors_as_we_do(attitude, tmp_path):
+    """Components in c of the inertial x axis: q* x q."""
+    from org.hipparchus.geometry.euclidean.threed import Vector3D
+    aem = orekit_parser().parseMessage(DataSource(str(exported(attitude, tmp_path, "aem", "TAI"))))
+    state = aem.getSegments().get(0).getData().getAngularCoordinates().get(100)
+    x, y, z, w = attitude.q[100]
+    expected = [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)]  # first row of C_in_c
+    turned = state.getRotation().applyTo(Vector3D.PLUS_I)
+    assert np.abs(np.array([turned.getX(), turned.getY(), turned.getZ()]) - expected).max() <= 1e-15
+
+
+@pytest.mark.parametrize("scale", SCALES)
+@pytest.mark.parametrize("form", FORMATS)
+def test_what_orekit_writes_is_read(attitude, tmp_path, form, scale):
+    aem = orekit_parser().parseMessage(DataSource(str(exported(attitude, tmp_path, form, scale))))
+    text = StringBuilder()
+    generator = (KvnGenerator(text, 0, "a", 0.0, 0) if form == "aem" else XmlGenerator(text, 2, "a", 0.0, True, None))
+    WriterBuilder().buildAemWriter().writeMessage(generator, aem)
+    generator.close()
+    (tmp_path / "theirs").write_text(str(text.toString()))
+    run("--quiet", "import", tmp_path / "theirs", "-o", tmp_path / "back.csv", "--epoch", EPOCH)
+    t_ns, q = read_attitude(tmp_path / "back.csv")
+    assert (t_ns == attitude.t_ns).all()
+    assert np.abs(q - attitude.q).max() <= 1e-15
+
+
+@pytest.mark.parametrize("scale", SCALES)
+@pytest.mark.parametrize("form", FORMATS)
+def test_ccsds_ndm_reads_and_writes(attitude, tmp_path, form, scale):
+    path = exported(attitude, tmp_path, form, scale)
+    aem = ccsds_ndm.Aem.from_file(str(path))
+    aem.validate()
+    states = np.concatenate([segment.data.attitude_states_numpy for segment in aem.segments])
+    assert np.abs(states - attitude.q).max() <= 1e-15
+    epochs = [epoch for segment in aem.segments for epoch in segment.data.attitude_states_epochs]
+    assert len(epochs) == len(attitude.t_ns)
+    if scale == "TAI":
+        begin = datetime.datetime.fromisoformat(EPOCH)
+        for epoch, t_ns in zip(epochs, attitude.t_ns):
+            since = datetime.datetime.fromisoformat(epoch[:19]) - begin
+            fraction = int(epoch[20:].ljust(9, "0") or 0)
+            assert round(since.total_seconds()) * 10**9 + fraction == t_ns
+    for theirs in ("KVN", "XML"):
+        (tmp_path / theirs).write_text(aem.to_str(theirs.lower()))
+        run("--quiet", "import", tmp_path / theirs, "-o", tmp_path / "back.csv", "--epoch", EPOCH)
+        t_ns, q = read_attitude(tmp_path / "back.csv")
+        assert (t_ns == attitude.t_ns).all()
+        assert np.abs(q - attitude.q).max() <= 1e-15
+
+
+@pytest.mark.parametrize("form", ("acm", "acm-xml"))
+def test_peers_read_a_calibration(calibrated, calibration, tmp_path, form):
+    path = tmp_path / f"calibration.{form}"
+    run("--quiet", "export", calibrated / "out" / "calibration.json", "--format", form, "-o", path, "--pass", calibrated / "pass",
+        "--attitude", calibrated / "out" / "attitude.csv")
+    acm = ccsds_ndm.Acm.from_file(str(path))
+    acm.validate()
+    orekit = ParserBuilder().buildAcmParser().parseMessage(DataSource(str(path)))
+    data = orekit.getSegments().get(0).getData()
+    states = data.getAttitudeBlocks().get(0).getAttitudeStates()
+    _, q = read_attitude(calibrated / "out" / "attitude.csv")
+    assert states.size() == len(q)
+    got = np.array([[float(value) for value in state.getElements()] for state in states])
+    assert np.abs(got - q).max() <= 1e-15
+    determination = data.getAttitudeDeterminationBlock()
+    assert str(determination.getMethod()) == "EKF"
+    if form == "acm":
+        assert [str(determination.getSensorsUsed().get(i).getSensorUsed()) for i in range(3)] == ["AST", "GYRO", "GYRO"]
+    user = {str(key): str(data.getUserDefinedBlock().getParameters().get(key))
+            for key in data.getUserDefinedBlock().getParameters().keySet()}
+    for index, gyro in enumerate(calibration["gyros"], start=1):
+        for name, value in gyro["drift_rad_s"].items():
+            assert abs(float(user[f"TRIHEDRON_GYRO{index}_{name.upper()}_RAD_S"]) - value) <= 1e-15 * abs(value)
+    assert user["TRIHEDRON_VERDICT"] == ("TRUSTWORTHY" if calibration["verdict"]["trustworthy"] else "DO NOT USE")
+    assert (tmp_path / user["TRIHEDRON_COVARIANCE_FILE"]).exists()
