@@ -2,10 +2,12 @@
 build directory."""
 import json
 import os
+import pty
 import signal
 import subprocess
 import time
 
+import jsonschema
 import pytest
 import xarray
 
@@ -163,6 +165,39 @@ def test_the_worst_run_is_repeated_by_the_command_that_is_shown(finished):
     command = json.loads(result.stdout)["worst"][0]["command"].split()
     assert command[0] == "trihedron"
     assert "bit for bit" in run(*command[1:]).stdout
+
+
+def schema(name):
+    return json.loads(run("schema", name).stdout)
+
+
+def test_outputs_are_as_their_schemas_say(finished):
+    campaign = json.loads(run("--json", "campaign", finished / "c.toml", "-o", finished / "out", "--resume").stdout, parse_constant=pytest.fail)
+    jsonschema.validate(campaign, schema("campaign-output"))
+    assert campaign["runs"] == 12 and sum(campaign["outcomes"].values()) == 12
+    alone = json.loads(run("--json", "campaign", finished / "c.toml", "--only", "3").stdout, parse_constant=pytest.fail)
+    jsonschema.validate(alone, schema("campaign-run-output"))
+    with pytest.raises(jsonschema.ValidationError):
+        jsonschema.validate({**campaign, "more": 1}, schema("campaign-output"))
+
+
+def test_progress_with_its_rate_goes_to_a_terminal_only(finished, tmp_path):
+    master, slave = pty.openpty()
+    process = subprocess.Popen([PROGRAM, "campaign", finished / "c.toml", "-o", tmp_path / "out"], stdout=subprocess.DEVNULL, stderr=slave)
+    os.close(slave)
+    shown = b""
+    while True:
+        try:
+            more = os.read(master, 4096)
+        except OSError:  # the other end is closed
+            break
+        if not more:
+            break
+        shown += more
+    os.close(master)
+    assert process.wait(timeout=60) in (TRUSTWORTHY, DO_NOT_USE)
+    assert b"6/12" in shown and b"runs/s" in shown and b"left" in shown
+    assert shown.endswith(b"\r\x1b[K")
 
 
 def test_runs_that_fail_are_rows_and_the_exit_status_says_so(tmp_path):

@@ -24,6 +24,16 @@
 #include "wording.hpp"
 
 namespace trihedron::io {
+
+/// An input, and what is needed to put its draws into a scenario.
+struct Varied {
+  CampaignInput input;
+  std::vector<std::string> path;
+  std::vector<toml::array> options;   ///< each an array of the one value
+  toml::table as_given;               ///< the distribution
+  const toml::node* place = nullptr;  ///< in the document
+};
+
 namespace {
 
 namespace fs = std::filesystem;
@@ -143,15 +153,6 @@ void flatten(const toml::node& node, const std::string& key, CampaignIdentity& l
     lines.push_back({key, text_of(node)});
   }
 }
-
-/// An input, and what is needed to put its draws into a scenario.
-struct Varied {
-  CampaignInput input;
-  std::vector<std::string> path;
-  std::vector<toml::array> options;   ///< each an array of the one value
-  toml::table as_given;               ///< the distribution
-  const toml::node* place = nullptr;  ///< in the document
-};
 
 /// Reads one distribution.
 class DistributionReader {
@@ -404,13 +405,13 @@ Fields head_fields(Head& head) {
 }
 
 /// A table, or the name of a file beside the campaign's.
-struct Source {
+struct Origin {
   const toml::table* table = nullptr;
   std::string file;
   const toml::node* place = nullptr;
 };
 
-Field source(std::string_view key, Source& target, std::string_view about, const std::function<Json()>& table_schema) {
+Field origin(std::string_view key, Origin& target, std::string_view about, const std::function<Json()>& table_schema) {
   return {key, about,
           [table_schema] {
             return any_of({text_schema(), table_schema()});
@@ -425,14 +426,14 @@ Field source(std::string_view key, Source& target, std::string_view about, const
           }};
 }
 
-Fields campaign_fields(Head& head, Source& base, Source& calibration, const toml::table*& vary, const fs::path& file) {
+Fields campaign_fields(Head& head, Origin& base, Origin& calibration, const toml::table*& vary, const fs::path& file) {
   const auto vary_schema = [] { return Json{{"type", "object"}}; };
   return {
       section("campaign", file, "[campaign]", "how many runs, and how they are drawn",
               [&head] { return head_fields(head); }),
-      source("base", base, "the scenario: a file, or its tables; without it the paper's experiment",
+      origin("base", base, "the scenario: a file, or its tables; without it the paper's experiment",
              scenario_table_schema),
-      source("calibration", calibration, "the settings: a file, or its tables; without it those of the program",
+      origin("calibration", calibration, "the settings: a file, or its tables; without it those of the program",
              config_table_schema),
       {"vary",
        "by the path of a key of the scenario, parts joined by points, elements of lists counted from 1: a table "
@@ -495,21 +496,21 @@ struct CampaignFile::Content {
     }
   }
 
-  void read_base(const Source& source, const ScenarioCheck& check) {
+  void read_base(const Origin& origin, const ScenarioCheck& check) {
     scenario_file = file;
-    if (source.table != nullptr) {
-      base = *source.table;
-    } else if (!source.file.empty()) {
-      scenario_file = file.parent_path() / source.file;
+    if (origin.table != nullptr) {
+      base = *origin.table;
+    } else if (!origin.file.empty()) {
+      scenario_file = file.parent_path() / origin.file;
       inputs.push_back(scenario_file);
     }
     toml::table parsed;
-    const toml::table* table = source.table != nullptr ? source.table : &parsed;
-    if (source.table == nullptr && !source.file.empty()) {
+    const toml::table* table = origin.table != nullptr ? origin.table : &parsed;
+    if (origin.table == nullptr && !origin.file.empty()) {
       parsed = parse_toml(TextFile(scenario_file).text(), scenario_file);
       base = parsed;
     }
-    const Scenario scenario = scenario_of_table(*table, scenario_file, source.table != nullptr ? "[base]" : "the file");
+    const Scenario scenario = scenario_of_table(*table, scenario_file, origin.table != nullptr ? "[base]" : "the file");
     try {
       check(scenario);
     } catch (const std::invalid_argument& error) {
@@ -525,11 +526,11 @@ struct CampaignFile::Content {
     }
   }
 
-  void read_options(const Source& source) {
-    if (source.table != nullptr) {
-      options = config_of_table(*source.table, file, "[calibration]");
-    } else if (!source.file.empty()) {
-      inputs.push_back(file.parent_path() / source.file);
+  void read_options(const Origin& origin) {
+    if (origin.table != nullptr) {
+      options = config_of_table(*origin.table, file, "[calibration]");
+    } else if (!origin.file.empty()) {
+      inputs.push_back(file.parent_path() / origin.file);
       options = read_config(inputs.back());
     }
   }
@@ -598,8 +599,8 @@ CampaignFile::CampaignFile(const fs::path& file, const ScenarioCheck& check) {
   content->inputs.push_back(file);
   content->document = parse_toml(TextFile(file).text(), file);
   Head head;
-  Source base;
-  Source calibration;
+  Origin base;
+  Origin calibration;
   const toml::table* vary = nullptr;
   read_fields(content->document, file, "the file", campaign_fields(head, base, calibration, vary, file));
   content->read_base(base, check);
@@ -667,8 +668,8 @@ std::string CampaignFile::scenario_text(std::uint64_t seed, std::span<const doub
 
 Json campaign_schema() {
   Head head;
-  Source base;
-  Source calibration;
+  Origin base;
+  Origin calibration;
   const toml::table* vary = nullptr;
   const fs::path file;
   return document_schema("Campaign", "Monte Carlo over scenarios: what is drawn for each run (TOML).",

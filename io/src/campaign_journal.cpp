@@ -23,7 +23,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::string_view kFormat = "trihedron-campaign-journal";
+constexpr std::string_view kJournalFormat = "trihedron-campaign-journal";
 constexpr std::size_t kCrcDigits = 8;
 
 std::uint32_t crc_of(std::string_view text) { return crc32(std::as_bytes(std::span(text))); }
@@ -63,13 +63,13 @@ Json json_of(const CampaignIdentity& identity) {
   for (const IdentityLine& line : identity) {
     lines.push_back({line.key, line.text});
   }
-  return {{"format", kFormat}, {"version", 1}, {"digest", digest_of(identity)}, {"campaign", lines}};
+  return {{"format", kJournalFormat}, {"version", 1}, {"digest", digest_of(identity)}, {"campaign", lines}};
 }
 
 CampaignIdentity identity_of(const Json& json, const fs::path& file) {
   const InputRefused other(file, {1, 1}, "is no journal of a campaign that this program knows",
                            "give the directory of another campaign, or an empty one");
-  if (!json.is_object() || json.value("format", "") != kFormat || json.value("version", 0) != 1 ||
+  if (!json.is_object() || json.value("format", "") != kJournalFormat || json.value("version", 0) != 1 ||
       !json.contains("campaign")) {
     throw other;
   }
