@@ -237,7 +237,9 @@ def measure(program, outcomes, worlds, seeds, estimators, jobs):
 
 
 def line_of(outcome):
-    said = {0: "trustworthy", 1: "do not use", 3: "refused"}[outcome["status"]]
+    if outcome["status"] == 3:
+        return f"{outcome['world']} {outcome['seed']} {outcome['estimator']}: refused"
+    said = {0: "trustworthy", 1: "do not use"}[outcome["status"]]
     return (f"{outcome['world']} {outcome['seed']} {outcome['estimator']}: {said}, "
             + (f"wrong ({', '.join(outcome['wrong'])})" if outcome["wrong"] else "right")
             + (f" {', '.join(outcome['do_not_use'])}" if outcome.get("do_not_use") else ""))
