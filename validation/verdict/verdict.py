@@ -322,8 +322,11 @@ def per_world(outcomes):
             refused = sum(o["status"] == 3 for o in its)
             why = sorted({code for o in its for code in o.get("do_not_use", [])})
             what = sorted({reason for o in its if is_trusted(o) for reason in o["wrong"]})
-            rows.append([world.name, estimator, *(str(count) if count else "·" for count in (*counts, refused)), ", ".join(what), ", ".join(why)])
-    return table(["world", "estimator", "right, trusted", "right, not", "wrong, not", "**wrong, trusted**", "refused", "wrong and trusted in", "findings that forbid use"], rows)
+            off = [o for o in its if o.get("drift_sigmas", 0) > LIMIT_SIGMAS]
+            told = sum(not is_trusted(o) or "drift-not-explained" in o["findings"] for o in off)
+            rows.append([world.name, estimator, *(str(count) if count else "·" for count in (*counts, refused)),
+                         f"{len(off)}, {told}" if off else "·", ", ".join(what), ", ".join(why)])
+    return table(["world", "estimator", "right, trusted", "right, not", "wrong, not", "**wrong, trusted**", "refused", "coefficient off, told", "wrong and trusted in", "findings that forbid use"], rows)
 
 
 def write(document, outcomes):

@@ -131,7 +131,10 @@ def test_the_document_has_a_place_for_each_table(tmp_path):
     document = tmp_path / "verdict.md"
     document.write_text((pathlib.Path(verdict.__file__).parents[2] / "docs" / "verdict.md").read_text())
     verdict.write(document, [outcome(), outcome(wrong=["need"])])
-    assert "| slews | batch | 1 |" in document.read_text()
+    off = outcome() | {"drift_sigmas": 7, "findings": []}
+    told = off | {"findings": ["drift-not-explained"]}
+    verdict.write(document, [outcome(), outcome(wrong=["need"]), off, told])
+    assert "| slews | batch | 3 | · | · | 1 | · | 2, 1 | need |" in document.read_text()
 
 
 # What holds whatever else: nominal passes are right and trusted, and telemetry on the wrong side never gives a result that is trusted.
