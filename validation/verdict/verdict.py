@@ -237,7 +237,9 @@ def measure(program, outcomes, worlds, seeds, estimators, jobs):
 
 
 def line_of(outcome):
-    said = {0: "trustworthy", 1: "do not use", 3: "refused"}[outcome["status"]]
+    if outcome["status"] == 3:
+        return f"{outcome['world']} {outcome['seed']} {outcome['estimator']}: refused"
+    said = {0: "trustworthy", 1: "do not use"}[outcome["status"]]
     return (f"{outcome['world']} {outcome['seed']} {outcome['estimator']}: {said}, "
             + (f"wrong ({', '.join(outcome['wrong'])})" if outcome["wrong"] else "right")
             + (f" {', '.join(outcome['do_not_use'])}" if outcome.get("do_not_use") else ""))
@@ -320,8 +322,11 @@ def per_world(outcomes):
             refused = sum(o["status"] == 3 for o in its)
             why = sorted({code for o in its for code in o.get("do_not_use", [])})
             what = sorted({reason for o in its if is_trusted(o) for reason in o["wrong"]})
-            rows.append([world.name, estimator, *(str(count) if count else "·" for count in (*counts, refused)), ", ".join(what), ", ".join(why)])
-    return table(["world", "estimator", "right, trusted", "right, not", "wrong, not", "**wrong, trusted**", "refused", "wrong and trusted in", "findings that forbid use"], rows)
+            off = [o for o in its if o.get("drift_sigmas", 0) > LIMIT_SIGMAS]
+            told = sum(not is_trusted(o) or "drift-not-explained" in o["findings"] for o in off)
+            rows.append([world.name, estimator, *(str(count) if count else "·" for count in (*counts, refused)),
+                         f"{len(off)}, {told}" if off else "·", ", ".join(what), ", ".join(why)])
+    return table(["world", "estimator", "right, trusted", "right, not", "wrong, not", "**wrong, trusted**", "refused", "coefficient off, told", "wrong and trusted in", "findings that forbid use"], rows)
 
 
 def write(document, outcomes):

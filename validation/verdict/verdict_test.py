@@ -131,11 +131,15 @@ def test_the_document_has_a_place_for_each_table(tmp_path):
     document = tmp_path / "verdict.md"
     document.write_text((pathlib.Path(verdict.__file__).parents[2] / "docs" / "verdict.md").read_text())
     verdict.write(document, [outcome(), outcome(wrong=["need"])])
-    assert "| slews | batch | 1 |" in document.read_text()
+    off = outcome() | {"drift_sigmas": 7, "findings": []}
+    told = off | {"findings": ["drift-not-explained"]}
+    verdict.write(document, [outcome(), outcome(wrong=["need"]), off, told])
+    assert "| slews | batch | 3 | · | · | 1 | · | 2, 1 | need |" in document.read_text()
 
 
 # What holds whatever else: nominal passes are right and trusted, and telemetry on the wrong side never gives a result that is trusted.
 # One seed, so that the test takes seconds; the shares are in docs/verdict.md.
+@pytest.mark.long
 @pytest.mark.parametrize("world, trusted", [("slews", True), ("scalar-first", False), ("conjugate", False), ("axis-mirrored", False)])
 def test_a_few_worlds(world, trusted):
     [found] = verdict.outcomes_of(PROGRAM, world, 1, ["invariant"])
@@ -145,6 +149,7 @@ def test_a_few_worlds(world, trusted):
         assert found["status"] != 0, found
 
 
+@pytest.mark.long
 def test_the_scenario_of_each_world_can_be_simulated(tmp_path):
     for world in worlds.WORLDS:
         file = tmp_path / f"{world.name}.toml"
