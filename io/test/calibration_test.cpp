@@ -32,7 +32,10 @@ TEST(CalibrationJson, KeepsTheForecastUpToWhereThereIsNoAttitude) {
   OpenLoopForecast& forecast = calibration.forecast.emplace();
   forecast.motion = ForecastMotion::kTurnsOn;
   forecast.usual = {1.5e-3, std::chrono::minutes(90), true};
-  forecast.need = NeedForecast{{1e-3, std::chrono::minutes(30)}, false, 2e-3, {1e-3, std::chrono::minutes(20), false},
+  forecast.need = NeedForecast{{1e-3, std::chrono::minutes(30)},
+                               false,
+                               2e-3,
+                               {1e-3, std::chrono::minutes(20), false},
                                {{"gyro1.k0", true, 0.75}, {"readout noise", false, 0.25}}};
   for (const double sigma : {1e-4, 2e-4, std::numeric_limits<double>::infinity()}) {
     PredictedError& error = forecast.errors.emplace_back();

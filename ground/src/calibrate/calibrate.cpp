@@ -133,8 +133,8 @@ OpenLoopForecast forecast_of(const Pass& pass, const CalibrationOptions& options
   for (std::size_t i = 1; i < attitude.size(); ++i) {
     sigma_rad = attitude.age_s[i] < attitude.age_s[i - 1] ? attitude.sigma_rad[i] : sigma_rad;
   }
-  const Pipeline::Held held = pipeline.held_at(Rot<In, C>::assume(attitude.q_in_c.back()),
-                                               Eigen::Matrix3d(sigma_rad.cwiseAbs2().asDiagonal()));
+  const Pipeline::Held held =
+      pipeline.held_at(Rot<In, C>::assume(attitude.q_in_c.back()), Eigen::Matrix3d(sigma_rad.cwiseAbs2().asDiagonal()));
   return forecast(held.errors, held.gyros, motion, rule, options.need);
 }
 

@@ -132,9 +132,18 @@ struct OpenLoopPrediction::State {
 
 OpenLoopPrediction::OpenLoopPrediction(const OpenLoopStart& start, const std::vector<GyroCalibration>& gyros, Time t,
                                        const BodyMotion& motion, AttitudeRule rule, const GyroMask& used)
-    : state_(std::make_unique<State>(
-          State{start, t, motion, rule, used, {}, DriftModel(start.layout.drift_model, start.layout.further), {}, {}, {},
-                {}, {}})) {
+    : state_(std::make_unique<State>(State{start,
+                                           t,
+                                           motion,
+                                           rule,
+                                           used,
+                                           {},
+                                           DriftModel(start.layout.drift_model, start.layout.further),
+                                           {},
+                                           {},
+                                           {},
+                                           {},
+                                           {}})) {
   const Layout& layout = start.layout;
   for (int k = 0; k < layout.gyros; ++k) {
     const GyroCalibration& record = gyros.at(static_cast<std::size_t>(k));
@@ -158,14 +167,12 @@ void OpenLoopPrediction::State::step(Duration dt) {
   for (int k = 0; k < layout.gyros; ++k) {
     Gyro& gyro = gyros[k];
     const Eigen::Vector3d h_b = gyro.reading_of(C_in_c.transpose() * gyro.h_in).normalized();
-    const Eigen::Vector3d turn =
-        precess(gyro, since[k], drift, C_in_c, h_b, middle_s / start.change_time_s, dt_s);
+    const Eigen::Vector3d turn = precess(gyro, since[k], drift, C_in_c, h_b, middle_s / start.change_time_s, dt_s);
     if (layout.further.wandering_drift) {
       const GaussMarkov& wandering = start.wandering_drift;
       const Eigen::Matrix3d C_in_b = C_in_c * gyro.C_c_b;
       const Eigen::Matrix3d turned = Eigen::Matrix3d::Identity() + skew<double>(turn);
-      by_first_wandering[k] =
-          turned * by_first_wandering[k] + dt_s * std::exp(-middle_s / wandering.time_s) * C_in_b;
+      by_first_wandering[k] = turned * by_first_wandering[k] + dt_s * std::exp(-middle_s / wandering.time_s) * C_in_b;
       const double kept = wandering.kept(dt_s);
       Matrix6 on = Matrix6::Zero();
       on.topLeftCorner<3, 3>() = turned;

@@ -73,8 +73,7 @@ class Loop {
       add_parameter_errors(start.layout, k, x, truth_[k]);
       truth_[k].h_in = rotated<double>(truth_[k].h_in, Eigen::Vector3d(x.segment<3>(start.layout.direction(k))));
       if (start.layout.further.wandering_drift) {
-        truth_[k].drift_rad_s.segment<3>(start.layout.wandering_column()) =
-            x.segment<3>(start.layout.wandering(k));
+        truth_[k].drift_rad_s.segment<3>(start.layout.wandering_column()) = x.segment<3>(start.layout.wandering(k));
       }
     }
   }
@@ -190,10 +189,9 @@ TEST(OpenLoopPrediction, HasTheDerivativesOfTheFlight) {
       prediction.go_on(after);
       const Eigen::Matrix3d predicted = prediction.error().covariance_rad2;
       const Eigen::VectorXd x = sigma(i) * Eigen::VectorXd::Unit(layout.shared(), i);
-      const Eigen::Vector3d by_flight =
-          (Loop(start, motion, t, x, 1).error_after(after, false) -
-           Loop(start, motion, t, -x, 1).error_after(after, false)) /
-          2;
+      const Eigen::Vector3d by_flight = (Loop(start, motion, t, x, 1).error_after(after, false) -
+                                         Loop(start, motion, t, -x, 1).error_after(after, false)) /
+                                        2;
       start.wandering_drift = wandering;
       // The sensitivities take the attitude as known: of an error the drift makes κT ≈ 2 % more in this time.
       EXPECT_LT((by_flight * by_flight.transpose() - predicted).norm(), 0.05 * by_flight.squaredNorm() + 1e-18)

@@ -1,5 +1,6 @@
 #pragma once
-/// What attitude error a calibration predicts for an open loop from an astro-correction on, and what a user needs of it.
+/// What attitude error a calibration predicts for an open loop from an astro-correction on, and what a user needs of
+/// it.
 
 #include <Eigen/Core>
 #include <chrono>
@@ -78,8 +79,8 @@ struct AccuracyForecast {
 struct NeedForecast {
   Need need;
   bool met = false;
-  double error_997_rad = 0;         ///< the largest until then
-  AccuracyForecast accuracy;        ///< how long the needed accuracy is kept
+  double error_997_rad = 0;        ///< the largest until then
+  AccuracyForecast accuracy;       ///< how long the needed accuracy is kept
   std::vector<ErrorCause> causes;  ///< of the error at the end of the interval, largest first; not all
 };
 
