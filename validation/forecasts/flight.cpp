@@ -52,13 +52,21 @@ std::vector<World> worlds() {
     }
     return scenario;
   };
+  const auto high_degree = [](DriftScenario& drift) {
+    using Potential = DriftHarmonic::Potential;
+    drift.harmonics = {{Potential::kW, 1, 1, 3e-8},
+                       {Potential::kD, 3, 2, 2e-8},
+                       {Potential::kD, 4, 3, 2e-8},
+                       {Potential::kW, 6, -2, 1e-8}};
+  };
   Scenario steady = of_each_gyro([](DriftScenario&) {});
   steady.attitude.slews = std::vector<Slew>{};
   return {{"nominal", 1, of_each_gyro([](DriftScenario&) {})},
           {"steady", 2, steady},
           {"outside", 3, of_each_gyro([](DriftScenario& drift) { drift.outside_sigma_rad_s = 1e-8; })},
           {"walk", 4, of_each_gyro([](DriftScenario& drift) { drift.direction_walk_rad_sqrt_s = 5e-8; })},
-          {"wandering", 5, of_each_gyro([](DriftScenario& drift) { drift.markov_sigma_rad_s = 3e-8; })}};
+          {"wandering", 5, of_each_gyro([](DriftScenario& drift) { drift.markov_sigma_rad_s = 3e-8; })},
+          {"high-degree", 6, of_each_gyro(high_degree)}};
 }
 
 std::vector<Forecast> fly(const World& world, int run_number, const Flight& flight, const CalibrationOptions& options) {
