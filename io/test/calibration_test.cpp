@@ -69,6 +69,22 @@ TEST(CalibrationJson, KeepsTheForecastUpToWhereThereIsNoAttitude) {
   }
 }
 
+TEST(CalibrationJson, RefusesAForecastThatIsNone) {
+  Calibration calibration = sample_calibration();
+  OpenLoopForecast& forecast = calibration.forecast.emplace();
+  forecast.usual.limit_rad = 1.5e-3;
+  forecast.errors.resize(2);
+  const std::string text = format_calibration(calibration);
+  const auto refusal_with = [&](const std::string& from, const std::string& to) {
+    std::string changed = text;
+    changed.replace(changed.find(from), from.size(), to);
+    return refusal_of(changed);
+  };
+  EXPECT_THAT(refusal_with("last-orbit-repeated", "tumbles"), HasSubstr("no motion"));
+  EXPECT_THAT(refusal_with("\"error_95_rad\": [0.0, 0.0]", "\"error_95_rad\": [0.0]"), HasSubstr("1 values for 2 times"));
+  EXPECT_THAT(refusal_with("\"error_95_rad\": [0.0, 0.0]", "\"error_95_rad\": [0.0, -1.0]"), HasSubstr("outside"));
+}
+
 TEST(CalibrationJson, NamesTheStartUpWhereItIsKnown) {
   Calibration calibration = sample_calibration();
   EXPECT_EQ(format_calibration(calibration).find("start_up"), std::string::npos);

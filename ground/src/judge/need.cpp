@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <string>
 
@@ -34,6 +35,13 @@ std::string cure_of(const NeedForecast& need) {
 }
 
 }  // namespace
+
+bool fails_a_need_alone(const Verdict& verdict) {
+  return verdict.has(FindingCode::kNeedNotMet) &&
+         std::ranges::none_of(verdict.findings, [](const Finding& finding) {
+           return finding.severity == Finding::Severity::kDoNotUse && finding.code != FindingCode::kNeedNotMet;
+         });
+}
 
 void judge_need(const std::optional<OpenLoopForecast>& forecast, std::vector<Finding>& findings) {
   if (!forecast || !forecast->need || forecast->need->met) {
