@@ -3,7 +3,9 @@
 #include <gmock/gmock.h>
 
 #include <array>
+#include <chrono>
 #include <cmath>
+#include <limits>
 #include <random>
 
 #include "named.hpp"
