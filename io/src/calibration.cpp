@@ -408,16 +408,6 @@ void read_series(const JsonNode& node, const ForecastSeries& series, std::vector
 Members forecast_members(OpenLoopForecast& forecast) {
   NeedForecast need;
   Members members = {
-      {"motion", "how the body is taken to turn",
-       one_of(std::array{name_of(ForecastMotion::kOfPass), name_of(ForecastMotion::kLastOrbit),
-                         name_of(ForecastMotion::kTurnsOn)}),
-       [&forecast](const JsonNode& node) {
-         const std::optional<ForecastMotion> motion = forecast_motion_named(node.text());
-         if (!motion) {
-           node.refuse(fmt::format("is {}, no motion", in_quotes(node.text())), "calibrate again");
-         }
-         forecast.motion = *motion;
-       }},
       {"within", "how long the usual limit is kept", schema_of(accuracy_members(forecast.usual)),
        [&forecast](const JsonNode& node) { read_members(node, accuracy_members(forecast.usual)); }},
       optional_member({"need", "where one is stated", schema_of(need_members(need)), [&forecast](const JsonNode& node) {
@@ -434,7 +424,7 @@ Members forecast_members(OpenLoopForecast& forecast) {
 
 /// Up to where there is no attitude any more.
 Json forecast_json(const OpenLoopForecast& forecast) {
-  Json json = {{"motion", name_of(forecast.motion)}, {"within", accuracy_json(forecast.usual)}};
+  Json json = {{"within", accuracy_json(forecast.usual)}};
   if (forecast.need) {
     json["need"] = need_json(*forecast.need);
   }

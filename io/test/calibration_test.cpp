@@ -30,7 +30,6 @@ TEST(CalibrationJson, KeepsTheForecastUpToWhereThereIsNoAttitude) {
   Calibration calibration = sample_calibration();
   calibration.determined = Determined{7, 14};
   OpenLoopForecast& forecast = calibration.forecast.emplace();
-  forecast.motion = ForecastMotion::kTurnsOn;
   forecast.usual = {1.5e-3, std::chrono::minutes(90), true};
   forecast.need = NeedForecast{{1e-3, std::chrono::minutes(30)},
                                false,
@@ -49,7 +48,6 @@ TEST(CalibrationJson, KeepsTheForecastUpToWhereThereIsNoAttitude) {
   EXPECT_EQ(back.determined->coefficients, 7);
   EXPECT_EQ(back.determined->of, 14);
   ASSERT_TRUE(back.forecast && back.forecast->need);
-  EXPECT_EQ(back.forecast->motion, ForecastMotion::kTurnsOn);
   EXPECT_EQ(back.forecast->usual.within, forecast.usual.within);
   EXPECT_TRUE(back.forecast->usual.is_lower_bound);
   EXPECT_EQ(back.forecast->need->need, forecast.need->need);
@@ -80,8 +78,8 @@ TEST(CalibrationJson, RefusesAForecastThatIsNone) {
     changed.replace(changed.find(from), from.size(), to);
     return refusal_of(changed);
   };
-  EXPECT_THAT(refusal_with("last-orbit-repeated", "tumbles"), HasSubstr("no motion"));
-  EXPECT_THAT(refusal_with("\"error_95_rad\": [0.0, 0.0]", "\"error_95_rad\": [0.0]"), HasSubstr("1 values for 2 times"));
+  EXPECT_THAT(refusal_with("\"error_95_rad\": [0.0, 0.0]", "\"error_95_rad\": [0.0]"),
+              HasSubstr("1 values for 2 times"));
   EXPECT_THAT(refusal_with("\"error_95_rad\": [0.0, 0.0]", "\"error_95_rad\": [0.0, -1.0]"), HasSubstr("outside"));
 }
 

@@ -27,12 +27,5 @@ TEST(OpenLoopForecast, IsToldInWords) {
   EXPECT_EQ(in_words(Need{kFiveArcminutes / 10, minutes(90)}), "30″ for 90 min");
 }
 
-TEST(OpenLoopForecast, HasANameForEachMotion) {
-  for (const ForecastMotion motion : {ForecastMotion::kOfPass, ForecastMotion::kLastOrbit, ForecastMotion::kTurnsOn}) {
-    EXPECT_EQ(forecast_motion_named(name_of(motion)), motion);
-  }
-  EXPECT_FALSE(forecast_motion_named("tumbles"));
-}
-
 }  // namespace
 }  // namespace trihedron

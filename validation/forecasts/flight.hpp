@@ -24,11 +24,11 @@ struct World {
 struct Forecast {
   double corrected_min = 0;  ///< in the pass
   double after_min = 0;
-  double square = 0;                       ///< of the error by the predicted covariance: χ² of three
-  Eigen::Vector3d in_sigmas{0, 0, 0};      ///< roll, pitch, heading
-  double error_rad = 0;                    ///< total
-  double error_997_rad = 0;                ///< predicted for the motion that was flown
-  double error_997_by_last_orbit_rad = 0;  ///< predicted where the motion after the calibration is not known
+  double square = 0;                   ///< of the error by the predicted covariance: χ² of three
+  Eigen::Vector3d in_sigmas{0, 0, 0};  ///< roll, pitch, heading
+  double error_rad = 0;                ///< total
+  double error_997_rad = 0;            ///< predicted for the motion that was flown
+  double error_997_continued_rad = 0;  ///< predicted where the motion after the calibration is not known
 };
 
 struct Flight {

@@ -37,8 +37,7 @@ std::string cure_of(const NeedForecast& need) {
 }  // namespace
 
 bool fails_a_need_alone(const Verdict& verdict) {
-  return verdict.has(FindingCode::kNeedNotMet) &&
-         std::ranges::none_of(verdict.findings, [](const Finding& finding) {
+  return verdict.has(FindingCode::kNeedNotMet) && std::ranges::none_of(verdict.findings, [](const Finding& finding) {
            return finding.severity == Finding::Severity::kDoNotUse && finding.code != FindingCode::kNeedNotMet;
          });
 }
