@@ -18,8 +18,8 @@
 #include "trihedron/io/calibration.hpp"
 #include "trihedron/io/config.hpp"
 #include "trihedron/io/error.hpp"
-#include "trihedron/io/quantity.hpp"
 #include "trihedron/io/named_pass.hpp"
+#include "trihedron/io/quantity.hpp"
 #include "trihedron/records/run.hpp"
 #include "trihedron/records/text.hpp"
 
@@ -66,8 +66,8 @@ ExitStatus navigate_pass(const std::filesystem::path& pass, const NavigationFile
   };
   show(beside(files.attitude.string(), common), as_json, [&] {
     return fmt::format("{}{}{}\n{}\nWritten     {}: {} epochs\n", pass_text(loaded), verdict_text(result.verdict),
-                       forecast_text(*result.forecast), evaluation_text(evaluation, epoch, "Attitude error"), printable(files.attitude.string()),
-                       result.attitude.size());
+                       forecast_text(*result.forecast), evaluation_text(evaluation, epoch, "Attitude error"),
+                       printable(files.attitude.string()), result.attitude.size());
   });
   return result.verdict.trustworthy ? kTrustworthy : kDoNotUse;
 }

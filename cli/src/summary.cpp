@@ -123,8 +123,8 @@ std::string verdict_line(const Calibration& calibration) {
     }
   }
   if (const auto& determined = calibration.determined; determined && determined->coefficients < determined->of) {
-    parts.push_back(fmt::format("{} of {} drift coefficients not determined",
-                                determined->of - determined->coefficients, determined->of));
+    parts.push_back(fmt::format("{} of {} drift coefficients not determined", determined->of - determined->coefficients,
+                                determined->of));
   }
   return fmt::format("Verdict     {}{}{}\n", word_of(calibration.verdict), parts.empty() ? "" : ": ",
                      fmt::join(parts, "; "));

@@ -344,8 +344,8 @@ Members need_members(NeedForecast& need) {
                                         "predicted; missing where there is no attitude")),
           {"within", "how long it is kept", schema_of(accuracy_members(need.accuracy)),
            [&need](const JsonNode& node) { read_members(node, accuracy_members(need.accuracy)); }},
-          {"causes", "of the error at the end of the interval, largest first", array_of(schema_of(cause_members(cause))),
-           [&need](const JsonNode& node) {
+          {"causes", "of the error at the end of the interval, largest first",
+           array_of(schema_of(cause_members(cause))), [&need](const JsonNode& node) {
              for (const JsonNode& element : node.elements()) {
                read_members(element, cause_members(need.causes.emplace_back()));
              }
@@ -408,20 +408,9 @@ void read_series(const JsonNode& node, const ForecastSeries& series, std::vector
 Members forecast_members(OpenLoopForecast& forecast) {
   NeedForecast need;
   Members members = {
-      {"motion", "how the body is taken to turn", one_of(std::array{name_of(ForecastMotion::kOfPass),
-                                                                    name_of(ForecastMotion::kLastOrbit),
-                                                                    name_of(ForecastMotion::kTurnsOn)}),
-       [&forecast](const JsonNode& node) {
-         const std::optional<ForecastMotion> motion = forecast_motion_named(node.text());
-         if (!motion) {
-           node.refuse(fmt::format("is {}, no motion", in_quotes(node.text())), "calibrate again");
-         }
-         forecast.motion = *motion;
-       }},
       {"within", "how long the usual limit is kept", schema_of(accuracy_members(forecast.usual)),
        [&forecast](const JsonNode& node) { read_members(node, accuracy_members(forecast.usual)); }},
-      optional_member({"need", "where one is stated", schema_of(need_members(need)),
-                       [&forecast](const JsonNode& node) {
+      optional_member({"need", "where one is stated", schema_of(need_members(need)), [&forecast](const JsonNode& node) {
                          read_members(node, need_members(forecast.need.emplace()));
                        }})};
   for (const ForecastSeries& series : kForecastSeries) {
@@ -435,7 +424,7 @@ Members forecast_members(OpenLoopForecast& forecast) {
 
 /// Up to where there is no attitude any more.
 Json forecast_json(const OpenLoopForecast& forecast) {
-  Json json = {{"motion", name_of(forecast.motion)}, {"within", accuracy_json(forecast.usual)}};
+  Json json = {{"within", accuracy_json(forecast.usual)}};
   if (forecast.need) {
     json["need"] = need_json(*forecast.need);
   }
@@ -646,10 +635,10 @@ std::string format_calibration(const Calibration& calibration) {
   }
   const std::string field = levels.empty() ? "" : fmt::format(" \"drift_field\": {},\n", lines(levels));
   const std::string determined =
-      calibration.determined ? fmt::format(" \"determined\": {},\n",
-                                           dump({{"coefficients", calibration.determined->coefficients},
-                                                 {"of", calibration.determined->of}}))
-                             : "";
+      calibration.determined
+          ? fmt::format(" \"determined\": {},\n", dump({{"coefficients", calibration.determined->coefficients},
+                                                        {"of", calibration.determined->of}}))
+          : "";
   const std::string forecast =
       calibration.forecast ? fmt::format(" \"forecast\": {},\n", dump(forecast_json(*calibration.forecast))) : "";
   Json findings = Json::array();
@@ -665,8 +654,8 @@ std::string format_calibration(const Calibration& calibration) {
       " \"verdict\": {{\"trustworthy\": {}, \"findings\": {}}},\n"
       " \"statistics\": {}}}\n",
       kFormat, kVersion, dump(Json(name_of(calibration.estimator))), format_epoch(calibration.epoch), start_up,
-      dump(Json(to_seconds(calibration.t - calibration.epoch))), lines(gyros), dump(further), noise, field, determined, forecast,
-      dump(states), lines(matrix), calibration.verdict.trustworthy, lines(findings), dump(statistics));
+      dump(Json(to_seconds(calibration.t - calibration.epoch))), lines(gyros), dump(further), noise, field, determined,
+      forecast, dump(states), lines(matrix), calibration.verdict.trustworthy, lines(findings), dump(statistics));
 }
 
 void write_calibration(const std::filesystem::path& path, const Calibration& calibration) {

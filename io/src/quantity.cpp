@@ -119,9 +119,10 @@ Need parse_need(std::string_view text) {
   constexpr std::string_view kFor = " for ";
   const std::size_t at = text.find(kFor);
   if (at == std::string_view::npos) {
-    throw UsageError(fmt::format("{} is not an accuracy that is needed: write an angle and how long it must be kept, "
-                                 "each with its unit (for example 5arcmin for 270min)",
-                                 in_quotes(text)));
+    throw UsageError(
+        fmt::format("{} is not an accuracy that is needed: write an angle and how long it must be kept, "
+                    "each with its unit (for example 5arcmin for 270min)",
+                    in_quotes(text)));
   }
   const std::string_view error = text.substr(0, at);
   const std::string_view interval = text.substr(at + kFor.size());

@@ -30,9 +30,11 @@ TEST(CalibrationJson, KeepsTheForecastUpToWhereThereIsNoAttitude) {
   Calibration calibration = sample_calibration();
   calibration.determined = Determined{7, 14};
   OpenLoopForecast& forecast = calibration.forecast.emplace();
-  forecast.motion = ForecastMotion::kTurnsOn;
   forecast.usual = {1.5e-3, std::chrono::minutes(90), true};
-  forecast.need = NeedForecast{{1e-3, std::chrono::minutes(30)}, false, 2e-3, {1e-3, std::chrono::minutes(20), false},
+  forecast.need = NeedForecast{{1e-3, std::chrono::minutes(30)},
+                               false,
+                               2e-3,
+                               {1e-3, std::chrono::minutes(20), false},
                                {{"gyro1.k0", true, 0.75}, {"readout noise", false, 0.25}}};
   for (const double sigma : {1e-4, 2e-4, std::numeric_limits<double>::infinity()}) {
     PredictedError& error = forecast.errors.emplace_back();
@@ -46,7 +48,6 @@ TEST(CalibrationJson, KeepsTheForecastUpToWhereThereIsNoAttitude) {
   EXPECT_EQ(back.determined->coefficients, 7);
   EXPECT_EQ(back.determined->of, 14);
   ASSERT_TRUE(back.forecast && back.forecast->need);
-  EXPECT_EQ(back.forecast->motion, ForecastMotion::kTurnsOn);
   EXPECT_EQ(back.forecast->usual.within, forecast.usual.within);
   EXPECT_TRUE(back.forecast->usual.is_lower_bound);
   EXPECT_EQ(back.forecast->need->need, forecast.need->need);
@@ -64,6 +65,22 @@ TEST(CalibrationJson, KeepsTheForecastUpToWhereThereIsNoAttitude) {
     EXPECT_EQ(back.forecast->errors[i].error_95_rad, forecast.errors[i].error_95_rad);
     EXPECT_EQ(back.forecast->errors[i].error_997_rad, forecast.errors[i].error_997_rad);
   }
+}
+
+TEST(CalibrationJson, RefusesAForecastThatIsNone) {
+  Calibration calibration = sample_calibration();
+  OpenLoopForecast& forecast = calibration.forecast.emplace();
+  forecast.usual.limit_rad = 1.5e-3;
+  forecast.errors.resize(2);
+  const std::string text = format_calibration(calibration);
+  const auto refusal_with = [&](const std::string& from, const std::string& to) {
+    std::string changed = text;
+    changed.replace(changed.find(from), from.size(), to);
+    return refusal_of(changed);
+  };
+  EXPECT_THAT(refusal_with("\"error_95_rad\": [0.0, 0.0]", "\"error_95_rad\": [0.0]"),
+              HasSubstr("1 values for 2 times"));
+  EXPECT_THAT(refusal_with("\"error_95_rad\": [0.0, 0.0]", "\"error_95_rad\": [0.0, -1.0]"), HasSubstr("outside"));
 }
 
 TEST(CalibrationJson, NamesTheStartUpWhereItIsKnown) {

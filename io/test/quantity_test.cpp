@@ -55,6 +55,21 @@ TEST(Quantity, ReadsAnglesRatesAndRandomWalks) {
   EXPECT_EQ(parse_number("-2.5e3"), -2500);
 }
 
+TEST(Quantity, ReadsANeedAndGivesItBack) {
+  const Need need = parse_need("5arcmin for 270min");
+  EXPECT_DOUBLE_EQ(need.error_rad, parse_angle_rad("5arcmin"));
+  EXPECT_EQ(need.interval, std::chrono::minutes(270));
+  EXPECT_EQ(format_need(need), "5arcmin for 270min");
+  EXPECT_EQ(parse_need(" 30 arcsec for 4.5h ").interval, std::chrono::minutes(270));
+  for (const char* text : {"5arcmin", "5arcmin 270min", "", "for", "5arcmin for270min"}) {
+    EXPECT_THAT(usage_error(parse_need, text), HasSubstr("5arcmin for 270min")) << text;
+  }
+  EXPECT_THAT(usage_error(parse_need, "5arcmin for 270"), HasSubstr("unit"));
+  EXPECT_THAT(usage_error(parse_need, "270min for 5arcmin"), HasSubstr("an angle"));
+  EXPECT_THAT(usage_error(parse_need, "-5arcmin for 270min"), HasSubstr("outside"));
+  EXPECT_THAT(usage_error(parse_need, "5arcmin for 1000d"), HasSubstr("month"));
+}
+
 TEST(Quantity, RefusesBareNumberSayingWhichUnitsAreAccepted) {
   EXPECT_THAT(usage_error(parse_duration, "90"),
               HasSubstr("the unit is missing; accepted units: d, h, min, s, ms, us, ns"));

@@ -1,19 +1,11 @@
 #include "trihedron/records/open_loop_forecast.hpp"
 
-#include <algorithm>
-#include <array>
 #include <cstdio>
-#include <utility>
 
 #include "trihedron/records/text.hpp"
 
 namespace trihedron {
 namespace {
-
-using NamedMotion = std::pair<ForecastMotion, std::string_view>;
-constexpr std::array<NamedMotion, 3> kMotions = {{{ForecastMotion::kOfPass, "of-pass"},
-                                                  {ForecastMotion::kLastOrbit, "last-orbit-repeated"},
-                                                  {ForecastMotion::kTurnsOn, "turns-on"}}};
 
 /// 5′ rather than 5.00′.
 std::string limit_text(double rad) {
@@ -24,15 +16,6 @@ std::string limit_text(double rad) {
 }
 
 }  // namespace
-
-std::string_view name_of(ForecastMotion motion) {
-  return std::ranges::find(kMotions, motion, &NamedMotion::first)->second;
-}
-
-std::optional<ForecastMotion> forecast_motion_named(std::string_view name) {
-  const auto* const found = std::ranges::find(kMotions, name, &NamedMotion::second);
-  return found == kMotions.end() ? std::nullopt : std::optional(found->first);
-}
 
 std::string time_in_words(Duration time) {
   constexpr long kMinutesUpTo = 120;

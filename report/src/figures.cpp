@@ -185,9 +185,8 @@ class Figures {
                        {"flown", flown.drawn(kHalf / 2)},
                        {"predicted", predicted.drawn(kHalf / 2)}});
     }
-    json figure = {{"predicted", series.drawn(kHalf)},
-                   {"limit", its->usual.limit_rad / kArcsecond_rad},
-                   {"loops", loops}};
+    json figure = {
+        {"predicted", series.drawn(kHalf)}, {"limit", its->usual.limit_rad / kArcsecond_rad}, {"loops", loops}};
     if (its->need) {
       figure["need"] = {{"limit", its->need->need.error_rad / kArcsecond_rad},
                         {"interval", to_minutes(its->need->need.interval)}};

@@ -193,12 +193,12 @@ json forecast_number(const ReportInput& input) {
   }
   const AccuracyForecast& accuracy = forecast->need ? forecast->need->accuracy : forecast->usual;
   const std::string limit = limit_text(accuracy.limit_rad);
-  return figure_of_merit(
-      "Holds " + limit + " without the star tracker",
-      (accuracy.is_lower_bound ? "≥ " : "") + time_in_words(accuracy.within), "",
-      forecast->need ? fmt::format("predicted, 99.7 %, after a correction; needed: {}, which is {}met",
-                                   in_words(forecast->need->need), forecast->need->met ? "" : "not ")
-                     : "predicted, 99.7 %, after a correction at the end of the pass");
+  return figure_of_merit("Holds " + limit + " without the star tracker",
+                         (accuracy.is_lower_bound ? "≥ " : "") + time_in_words(accuracy.within), "",
+                         forecast->need
+                             ? fmt::format("predicted, 99.7 %, after a correction; needed: {}, which is {}met",
+                                           in_words(forecast->need->need), forecast->need->met ? "" : "not ")
+                             : "predicted, 99.7 %, after a correction at the end of the pass");
 }
 
 json nis_number(const ReportInput& input) {
@@ -256,10 +256,10 @@ json findings_of(const std::vector<Finding>& findings) {
 
 json verdict_values(const ReportInput& input, const std::vector<Parameter>& parameters) {
   json numbers = json::array();
-  for (json& merit : std::vector<json>{attitude_number(input), alignment_number(parameters),
-                                       convergence_number(parameters, true), convergence_number(parameters, false),
-                                       navigation_number(input), forecast_number(input), extension_number(input),
-                                       nis_number(input)}) {
+  for (json& merit :
+       std::vector<json>{attitude_number(input), alignment_number(parameters), convergence_number(parameters, true),
+                         convergence_number(parameters, false), navigation_number(input), forecast_number(input),
+                         extension_number(input), nis_number(input)}) {
     if (!merit.is_null()) {
       numbers.push_back(std::move(merit));
     }

@@ -212,6 +212,17 @@ class Generator {
     make_open_loops();
   }
 
+  static PredictedError predicted_after(int minute, double sigma_rad_per_s) {
+    const double sigma_rad = 1e-5 + sigma_rad_per_s * 60 * minute;
+    PredictedError error;
+    error.after = std::chrono::minutes(minute);
+    error.covariance_rad2.diagonal().setConstant(sigma_rad * sigma_rad);
+    error.error_68_rad = 1.9 * sigma_rad;
+    error.error_95_rad = 2.8 * sigma_rad;
+    error.error_997_rad = 3.7 * sigma_rad;
+    return error;
+  }
+
   /// The error grows as a share of the time since the correction, the smaller the later the correction.
   void make_open_loops() {
     ground::CalibrationEvaluation& evaluation = out_.evaluation;
@@ -226,13 +237,22 @@ class Generator {
         }
         return errors;
       };
-      ground::OpenLoops loops{grown(2e-6), grown(from_s == 0 ? 2e-6 : 1e-7), {}};
+      ground::OpenLoops loops{grown(2e-6), grown(from_s == 0 ? 2e-6 : 1e-7), {}, {}};
       loops.intervals = {ground::correction_intervals(loops.known_before, evaluation.limit_rad).front(),
                          ground::correction_intervals(loops.calibrated, evaluation.limit_rad).front()};
+      for (int minute = 0; minute <= 540; minute += 10) {
+        loops.predicted.push_back(predicted_after(minute, 2e-7));
+      }
       evaluation.open_loops.push_back(loops);
       evaluation.extension.pairs.push_back(loops.intervals);
     }
     evaluation.extension.median = ground::median_extension(evaluation.open_loops);
+    OpenLoopForecast& forecast = out_.run.calibration.forecast.emplace();
+    for (int minute = 0; minute <= 1440; minute += 10) {
+      forecast.errors.push_back(predicted_after(minute, 1e-7));
+    }
+    forecast.usual = {evaluation.limit_rad, std::chrono::minutes(80), false};
+    forecast.need = NeedForecast{{1e-3, std::chrono::minutes(60)}, true, 9e-4, forecast.usual, {}};
   }
 
   void make_angle() {

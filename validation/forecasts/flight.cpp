@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
-#include <numbers>
 
 #include "trihedron/core/frames.hpp"
 #include "trihedron/ground/calibrate/calibrate.hpp"
@@ -16,9 +15,6 @@
 
 namespace trihedron::forecasts {
 namespace {
-
-/// What the forecasts of a pass need of the orbit: its period is that of the default scenario.
-constexpr double kOrbitalRate_rad_s = 2 * std::numbers::pi / 5630;
 
 GyroMask pair() {
   GyroMask used{};
@@ -52,13 +48,21 @@ std::vector<World> worlds() {
     }
     return scenario;
   };
+  const auto high_degree = [](DriftScenario& drift) {
+    using Potential = DriftHarmonic::Potential;
+    drift.harmonics = {{Potential::kW, 1, 1, 3e-8},
+                       {Potential::kD, 3, 2, 2e-8},
+                       {Potential::kD, 4, 3, 2e-8},
+                       {Potential::kW, 6, -2, 1e-8}};
+  };
   Scenario steady = of_each_gyro([](DriftScenario&) {});
   steady.attitude.slews = std::vector<Slew>{};
   return {{"nominal", 1, of_each_gyro([](DriftScenario&) {})},
           {"steady", 2, steady},
           {"outside", 3, of_each_gyro([](DriftScenario& drift) { drift.outside_sigma_rad_s = 1e-8; })},
           {"walk", 4, of_each_gyro([](DriftScenario& drift) { drift.direction_walk_rad_sqrt_s = 5e-8; })},
-          {"wandering", 5, of_each_gyro([](DriftScenario& drift) { drift.markov_sigma_rad_s = 3e-8; })}};
+          {"wandering", 5, of_each_gyro([](DriftScenario& drift) { drift.markov_sigma_rad_s = 3e-8; })},
+          {"high-degree", 6, of_each_gyro(high_degree)}};
 }
 
 std::vector<Forecast> fly(const World& world, int run_number, const Flight& flight, const CalibrationOptions& options) {
@@ -70,8 +74,8 @@ std::vector<Forecast> fly(const World& world, int run_number, const Flight& flig
   const Pass calibrated = first_part(flown.pass, flight.calibrated);
   const CalibrationRun run = ground::calibrate(calibrated, options);
   const ground::AttitudeRule rule = ground::attitude_rule_of(options.estimator);
-  const ground::BodyMotion as_flown(flown.truth.t, flown.truth.q_in_c, kOrbitalRate_rad_s);
-  const ground::BodyMotion as_known(run.attitude.t, run.attitude.q_in_c, kOrbitalRate_rad_s);
+  const ground::BodyMotion as_flown(flown.truth.t, flown.truth.q_in_c);
+  const ground::BodyMotion as_known(run.attitude.t, run.attitude.q_in_c);
 
   std::vector<Forecast> found;
   const auto add = [&](Time t, const std::vector<GyroCalibration>& gyros, OpenLoopStart errors) {
@@ -103,7 +107,7 @@ std::vector<Forecast> fly(const World& world, int run_number, const Flight& flig
       forecast.in_sigmas = error.cwiseQuotient(covariance.diagonal().cwiseSqrt());
       forecast.error_rad = error.norm();
       forecast.error_997_rad = of_flown[i].error_997_rad;
-      forecast.error_997_by_last_orbit_rad = of_known[i].error_997_rad;
+      forecast.error_997_continued_rad = of_known[i].error_997_rad;
     }
   };
   for (std::size_t i = 1; i < run.corrections.size() && options.estimator != Estimator::kBatch; ++i) {

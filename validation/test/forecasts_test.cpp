@@ -1,5 +1,3 @@
-#include "forecasts/flight.hpp"
-
 #include <gmock/gmock.h>
 
 #include <algorithm>
@@ -8,6 +6,8 @@
 #include <chrono>
 #include <string>
 #include <vector>
+
+#include "forecasts/flight.hpp"
 
 namespace trihedron::forecasts {
 namespace {
@@ -51,8 +51,8 @@ void expect_covered(const std::vector<Forecast>& forecasts) {
   const boost::math::chi_squared all(3 * count);
   EXPECT_GT(sum, boost::math::quantile(all, 0.0005));
   EXPECT_LT(sum, boost::math::quantile(boost::math::complement(all, 0.0005)));
-  EXPECT_LE(beyond_2_sigmas, boost::math::quantile(boost::math::complement(
-                                 boost::math::binomial(count, 0.0455), 0.001)));
+  EXPECT_LE(beyond_2_sigmas,
+            boost::math::quantile(boost::math::complement(boost::math::binomial(count, 0.0455), 0.001)));
   EXPECT_LE(beyond, 2);
 }
 

@@ -223,9 +223,9 @@ void PassProblem::step(const Node& from_node, const Node& to_node, const DriftMo
     if (!used[k]) {  // its momentum turns all the same: what it would read at the attitude of the others
       middle[k] = gyro.reading_of(C_in_c.transpose() * gyro.h_in);
     }
-    const Vector3d turned =
-        &sensitive == &drift_ ? precess(gyro, moment.since[k], drift_, C_in_c, middle[k], part, dt_s)
-                              : precess_by(drift_, sensitive, gyro, moment.since[k], C_in_c, middle[k], part, dt_s);
+    const Vector3d turned = &sensitive == &drift_
+                                ? precess(gyro, moment.since[k], drift_, C_in_c, middle[k], part, dt_s)
+                                : precess_by(drift_, sensitive, gyro, moment.since[k], C_in_c, middle[k], part, dt_s);
     if (to_node.after_gap) {
       largest_rad = std::max(largest_rad, missed_by_long_step_rad(turned.norm(), from.h_b[k], to.h_b[k], dt_s));
     }
@@ -367,8 +367,7 @@ Result<AttitudeByDirections, DirectionsFault> PassProblem::attitude(const Moment
 
 MatrixXd PassProblem::attitude_by_states(const Moment& moment, const AttitudeByDirections& attitude,
                                          const Directions& h_b) const {
-  return by_states_of_arc(
-      moment, attitude_by_states_now<kPassCapacity.states>(on_board_, attitude, moment.gyros, h_b));
+  return by_states_of_arc(moment, attitude_by_states_now<kPassCapacity.states>(on_board_, attitude, moment.gyros, h_b));
 }
 
 PassProblem::FixRows PassProblem::compare(const PassSolution& solution, const Moment& moment) const {

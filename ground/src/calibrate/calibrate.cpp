@@ -10,7 +10,6 @@
 #include "batch/pass_setup.hpp"
 #include "batch/refine.hpp"
 #include "choose/decide.hpp"
-#include "model/orbital_rate.hpp"
 #include "model/prior.hpp"
 #include "model/setup.hpp"
 #include "trihedron/ground/evaluate/convergence.hpp"
@@ -111,19 +110,19 @@ Smoothed smooth(const Pass& pass, Decision& decision) {
 }
 
 /// With the calibrated parameters from the end of the pass on.
-std::optional<OpenLoopForecast> forecast_of(const Pass& pass, const CalibrationRun& run) {
+std::optional<OpenLoopForecast> forecast_of(const CalibrationRun& run) {
   if (run.attitude.size() == 0) {
     return std::nullopt;
   }
-  const BodyMotion motion(run.attitude.t, run.attitude.q_in_c, orbital_rate_rad_s(pass.star_tracker));
+  const BodyMotion motion(run.attitude.t, run.attitude.q_in_c);
   return forecast(run.errors, run.calibration.gyros, motion, attitude_rule_of(run.calibration.estimator),
                   run.options.need);
 }
 
 /// With the parameters in use at the end of the pass.
-OpenLoopForecast forecast_of(const Pass& pass, const CalibrationOptions& options, const Pipeline& pipeline,
+OpenLoopForecast forecast_of(const CalibrationOptions& options, const Pipeline& pipeline,
                              const AttitudeHistory& attitude) {
-  const BodyMotion motion(attitude.t, attitude.q_in_c, orbital_rate_rad_s(pass.star_tracker));
+  const BodyMotion motion(attitude.t, attitude.q_in_c);
   const AttitudeRule rule = attitude_rule_of(options.estimator);
   if (options.corrections.take_parameters) {
     return forecast(pipeline.errors(), pipeline.gyros(), motion, rule, options.need);
@@ -133,8 +132,8 @@ OpenLoopForecast forecast_of(const Pass& pass, const CalibrationOptions& options
   for (std::size_t i = 1; i < attitude.size(); ++i) {
     sigma_rad = attitude.age_s[i] < attitude.age_s[i - 1] ? attitude.sigma_rad[i] : sigma_rad;
   }
-  const Pipeline::Held held = pipeline.held_at(Rot<In, C>::assume(attitude.q_in_c.back()),
-                                               Eigen::Matrix3d(sigma_rad.cwiseAbs2().asDiagonal()));
+  const Pipeline::Held held =
+      pipeline.held_at(Rot<In, C>::assume(attitude.q_in_c.back()), Eigen::Matrix3d(sigma_rad.cwiseAbs2().asDiagonal()));
   return forecast(held.errors, held.gyros, motion, rule, options.need);
 }
 
@@ -181,7 +180,7 @@ CalibrationRun calibrate(const Pass& pass, const CalibrationOptions& options, co
   }
   add_statistics(run.fixes, run.calibration.statistics);
   run.calibration.determined = determined(run);
-  run.calibration.forecast = forecast_of(pass, run);
+  run.calibration.forecast = forecast_of(run);
   run.calibration.verdict = judge(pass, run);
   return run;
 }
@@ -203,7 +202,7 @@ NavigationRun navigate(const Pass& pass, const CalibrationOptions& options, cons
     run.held_parameters_misfit = pipeline.squared_distance_from_prior();
     run.misfit_limit = boost::math::quantile(boost::math::chi_squared(pipeline.layout().parameters()), 0.999);
   }
-  run.forecast = forecast_of(pass, options, pipeline, run.attitude);
+  run.forecast = forecast_of(options, pipeline, run.attitude);
   run.verdict = judge_navigation(pass, run);
   return run;
 }

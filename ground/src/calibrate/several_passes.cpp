@@ -86,11 +86,12 @@ Comparison compare(const CalibrationRun& earlier, const CalibrationRun& later) {
   return {among(false), among(true)};
 }
 
-/// Findings that forbid the use of one pass and hold for the passes together as well.
+/// Findings that forbid the use of one pass and hold for the passes together as well; a need is one of all together.
 std::vector<std::string_view> lasting_faults(const Verdict& verdict) {
   std::vector<std::string_view> codes;
   for (const Finding& finding : verdict.findings) {
-    if (finding.severity == Severity::kDoNotUse && finding.code != kWeakAxis) {
+    if (finding.severity == Severity::kDoNotUse && finding.code != kWeakAxis &&
+        finding.code != FindingCode::kNeedNotMet) {
       codes.push_back(name_of(finding.code));
     }
   }

@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <chrono>
 
-#include "model/orbital_rate.hpp"
 #include "model/prior.hpp"
 #include "trihedron/core/optimal_attitude.hpp"
 #include "trihedron/core/precession.hpp"
@@ -95,12 +94,11 @@ CorrectionInterval interval_of(const AttitudeErrors& errors, double limit_rad) {
 }
 
 /// Every ten minutes up to the end of the pass.
-std::vector<PredictedError> predicted(const CalibrationRun& run, const Correction& correction, AttitudeRule rule,
-                                      double orbital_rate) {
+std::vector<PredictedError> predicted(const CalibrationRun& run, const Correction& correction, AttitudeRule rule) {
   if (!correction.errors.is_known() || run.attitude.size() == 0) {
     return {};
   }
-  const BodyMotion motion(run.attitude.t, run.attitude.q_in_c, orbital_rate);
+  const BodyMotion motion(run.attitude.t, run.attitude.q_in_c);
   GyroMask used{};
   used[0] = used[1] = true;
   std::vector<Duration> after;
@@ -176,7 +174,7 @@ std::vector<OpenLoops> fly_open_loops(const Pass& pass, const CalibrationRun& ru
     OpenLoops loops;
     loops.known_before = errors_of(correction.t, correction.known_before);
     loops.calibrated = errors_of(correction.t, correction.calibrated);
-    loops.predicted = predicted(run, correction, rule, orbital_rate_rad_s(pass.star_tracker));
+    loops.predicted = predicted(run, correction, rule);
     loops.intervals = {interval_of(loops.known_before, limit_rad), interval_of(loops.calibrated, limit_rad)};
     all.push_back(std::move(loops));
   }

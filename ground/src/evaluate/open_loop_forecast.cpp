@@ -71,26 +71,32 @@ class Accuracy {
 
 // ---- Motion
 
-BodyMotion::BodyMotion(const std::vector<Time>& t, const std::vector<Eigen::Quaterniond>& q_in_c,
-                       double orbital_rate_rad_s)
-    : t_(t),
-      q_in_c_(q_in_c),
-      period_(from_seconds(2 * std::numbers::pi / orbital_rate_rad_s)),
-      beyond_(t.back() - t.front() >= period_ ? ForecastMotion::kLastOrbit : ForecastMotion::kTurnsOn) {
-  if (const double span_s = to_seconds(t.back() - t.front()); span_s > 0) {
-    const auto first = Rot<In, C>::assume(q_in_c.front().normalized());
-    const auto last = Rot<In, C>::assume(q_in_c.back().normalized());
-    rate_in_rad_s_ = (last * first.inverse()).log().raw() / span_s;
+BodyMotion::BodyMotion(const std::vector<Time>& t, const std::vector<Eigen::Quaterniond>& q_in_c)
+    : t_(t), q_in_c_(q_in_c) {
+  const double span_s = to_seconds(t.back() - t.front());
+  if (!(span_s > 0)) {
+    return;
   }
+  // The mean angular velocity: a slew and the slew back nearly cancel.
+  for (std::size_t i = 1; i < q_in_c.size(); ++i) {
+    const auto before = Rot<In, C>::assume(q_in_c[i - 1].normalized());
+    const auto after = Rot<In, C>::assume(q_in_c[i].normalized());
+    rate_in_rad_s_ += (after * before.inverse()).log().raw() / span_s;
+  }
+  // The whole pass again; of one that is nearly whole orbits less, so that the manoeuvres come at other phases.
+  constexpr double kNearlyWhole = 0.15;
+  constexpr double kLess = 0.38;
+  const double orbits = span_s * rate_in_rad_s_.norm() / (2 * std::numbers::pi);
+  const double whole = std::round(orbits);
+  const bool is_nearly_whole = whole > 0 && std::abs(orbits - whole) < kNearlyWhole;
+  again_ = from_seconds(is_nearly_whole ? span_s * (whole - kLess) / orbits : span_s);
 }
 
 Eigen::Matrix3d BodyMotion::C_in_c(Time t) const {
-  if (t > t_.back() && beyond_ == ForecastMotion::kTurnsOn) {
-    const Eigen::Vector3d turn = rate_in_rad_s_ * to_seconds(t - t_.back());
-    return Rot<In, In>::exp(Vec<In>::assume(turn)).raw() * q_in_c_.back().normalized().toRotationMatrix();
-  }
-  if (t > t_.back()) {
-    t -= ((t - t_.back()) / period_ + 1) * period_;
+  if (t > t_.back() && again_ > Duration::zero()) {
+    const Duration later = ((t - t_.back() - Duration(1)) / again_ + 1) * again_;
+    const Eigen::Vector3d turn = rate_in_rad_s_ * to_seconds(later);
+    return Rot<In, In>::exp(Vec<In>::assume(turn)).raw() * C_in_c(t - later);
   }
   const auto after = std::ranges::lower_bound(t_, t);
   if (after == t_.begin() || after == t_.end()) {
@@ -132,9 +138,18 @@ struct OpenLoopPrediction::State {
 
 OpenLoopPrediction::OpenLoopPrediction(const OpenLoopStart& start, const std::vector<GyroCalibration>& gyros, Time t,
                                        const BodyMotion& motion, AttitudeRule rule, const GyroMask& used)
-    : state_(std::make_unique<State>(
-          State{start, t, motion, rule, used, {}, DriftModel(start.layout.drift_model, start.layout.further), {}, {}, {},
-                {}, {}})) {
+    : state_(std::make_unique<State>(State{start,
+                                           t,
+                                           motion,
+                                           rule,
+                                           used,
+                                           {},
+                                           DriftModel(start.layout.drift_model, start.layout.further),
+                                           {},
+                                           {},
+                                           {},
+                                           {},
+                                           {}})) {
   const Layout& layout = start.layout;
   for (int k = 0; k < layout.gyros; ++k) {
     const GyroCalibration& record = gyros.at(static_cast<std::size_t>(k));
@@ -158,14 +173,12 @@ void OpenLoopPrediction::State::step(Duration dt) {
   for (int k = 0; k < layout.gyros; ++k) {
     Gyro& gyro = gyros[k];
     const Eigen::Vector3d h_b = gyro.reading_of(C_in_c.transpose() * gyro.h_in).normalized();
-    const Eigen::Vector3d turn =
-        precess(gyro, since[k], drift, C_in_c, h_b, middle_s / start.change_time_s, dt_s);
+    const Eigen::Vector3d turn = precess(gyro, since[k], drift, C_in_c, h_b, middle_s / start.change_time_s, dt_s);
     if (layout.further.wandering_drift) {
       const GaussMarkov& wandering = start.wandering_drift;
       const Eigen::Matrix3d C_in_b = C_in_c * gyro.C_c_b;
       const Eigen::Matrix3d turned = Eigen::Matrix3d::Identity() + skew<double>(turn);
-      by_first_wandering[k] =
-          turned * by_first_wandering[k] + dt_s * std::exp(-middle_s / wandering.time_s) * C_in_b;
+      by_first_wandering[k] = turned * by_first_wandering[k] + dt_s * std::exp(-middle_s / wandering.time_s) * C_in_b;
       const double kept = wandering.kept(dt_s);
       Matrix6 on = Matrix6::Zero();
       on.topLeftCorner<3, 3>() = turned;
@@ -280,7 +293,6 @@ OpenLoopForecast forecast(const OpenLoopStart& start, const std::vector<GyroCali
   }
   OpenLoopPrediction prediction(start, gyros, motion.end(), motion, rule, used);
   OpenLoopForecast result;
-  result.motion = motion.beyond();
   Accuracy usual(limit_rad);
   std::optional<Accuracy> needed;
   if (need) {

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <string>
 
@@ -22,7 +23,7 @@ std::string causes_in_words(const std::vector<ErrorCause>& causes) {
 }
 
 /// By what the error is made of most.
-std::string cure_of(const NeedForecast& need) {
+std::string cure_of_need(const NeedForecast& need) {
   const bool by_parameter = need.causes.empty() || need.causes.front().is_parameter;
   const std::string better = by_parameter
                                  ? "Calibrate on a longer pass, with slews, or on several passes of this start-up."
@@ -34,6 +35,12 @@ std::string cure_of(const NeedForecast& need) {
 }
 
 }  // namespace
+
+bool fails_a_need_alone(const Verdict& verdict) {
+  return verdict.has(FindingCode::kNeedNotMet) && std::ranges::none_of(verdict.findings, [](const Finding& finding) {
+           return finding.severity == Finding::Severity::kDoNotUse && finding.code != FindingCode::kNeedNotMet;
+         });
+}
 
 void judge_need(const std::optional<OpenLoopForecast>& forecast, std::vector<Finding>& findings) {
   if (!forecast || !forecast->need || forecast->need->met) {
@@ -47,7 +54,7 @@ void judge_need(const std::optional<OpenLoopForecast>& forecast, std::vector<Fin
        is_known ? fmt::format("predicted {} by then; what it is made of at the end, with what is correlated: {}",
                               angle_text(need.error_997_rad), causes_in_words(need.causes))
                 : "the momenta come too near to one line to give an attitude",
-       cure_of(need)});
+       cure_of_need(need)});
 }
 
 }  // namespace trihedron::ground

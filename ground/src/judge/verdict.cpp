@@ -517,7 +517,8 @@ void judge_prior(const PassSettings& settings, const NavigationRun& run, std::ve
     return;
   }
   const Calibration& prior = *settings.prior;
-  if (!prior.verdict.trustworthy) {
+  // A calibration that only does not meet the need of another user is not wrong.
+  if (!prior.verdict.trustworthy && !fails_a_need_alone(prior.verdict)) {
     std::vector<std::string_view> why;
     for (const Finding& finding : prior.verdict.findings) {
       if (finding.severity == Severity::kDoNotUse) {

@@ -52,8 +52,7 @@ OpenLoopStart start_with_held_parameters(const CalibrationSetup& setup, const Gy
         -by_readout_errors(layout, C_in_c * skew<double>(gyros[k].in_c(h_b)), gyros[k], h_b);
     by_attitude.middleRows<3>(layout.direction(k)) = C_in_c;
   }
-  covariance =
-      follow * covariance * follow.transpose() + by_attitude * attitude_rad2 * by_attitude.transpose();
+  covariance = follow * covariance * follow.transpose() + by_attitude * attitude_rad2 * by_attitude.transpose();
   return open_loop_start(setup, layout, gyros, std::move(covariance));
 }
 

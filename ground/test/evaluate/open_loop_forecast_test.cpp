@@ -73,8 +73,7 @@ class Loop {
       add_parameter_errors(start.layout, k, x, truth_[k]);
       truth_[k].h_in = rotated<double>(truth_[k].h_in, Eigen::Vector3d(x.segment<3>(start.layout.direction(k))));
       if (start.layout.further.wandering_drift) {
-        truth_[k].drift_rad_s.segment<3>(start.layout.wandering_column()) =
-            x.segment<3>(start.layout.wandering(k));
+        truth_[k].drift_rad_s.segment<3>(start.layout.wandering_column()) = x.segment<3>(start.layout.wandering(k));
       }
     }
   }
@@ -174,7 +173,7 @@ Layout with_wandering_drift() {
 // derivative, which flights to both sides give. Beyond the end of what is given, so that the last orbit is repeated.
 TEST(OpenLoopPrediction, HasTheDerivativesOfTheFlight) {
   const Flight flight;
-  const BodyMotion motion(flight.t, flight.q_in_c, kRate_rad_s);
+  const BodyMotion motion(flight.t, flight.q_in_c);
   const Layout layout = with_wandering_drift();
   const Time t = flight.t.back() - minutes(40);
   OpenLoopStart start = start_of(layout, motion.C_in_c(t));
@@ -190,10 +189,9 @@ TEST(OpenLoopPrediction, HasTheDerivativesOfTheFlight) {
       prediction.go_on(after);
       const Eigen::Matrix3d predicted = prediction.error().covariance_rad2;
       const Eigen::VectorXd x = sigma(i) * Eigen::VectorXd::Unit(layout.shared(), i);
-      const Eigen::Vector3d by_flight =
-          (Loop(start, motion, t, x, 1).error_after(after, false) -
-           Loop(start, motion, t, -x, 1).error_after(after, false)) /
-          2;
+      const Eigen::Vector3d by_flight = (Loop(start, motion, t, x, 1).error_after(after, false) -
+                                         Loop(start, motion, t, -x, 1).error_after(after, false)) /
+                                        2;
       start.wandering_drift = wandering;
       // The sensitivities take the attitude as known: of an error the drift makes κT ≈ 2 % more in this time.
       EXPECT_LT((by_flight * by_flight.transpose() - predicted).norm(), 0.05 * by_flight.squaredNorm() + 1e-18)
@@ -205,7 +203,7 @@ TEST(OpenLoopPrediction, HasTheDerivativesOfTheFlight) {
 // Draws from the covariance, flown with all their noise: their squares by the predicted covariance are χ² of three.
 TEST(OpenLoopPrediction, IsWhatDrawsFromTheCovarianceDo) {
   const Flight flight;
-  const BodyMotion motion(flight.t, flight.q_in_c, kRate_rad_s);
+  const BodyMotion motion(flight.t, flight.q_in_c);
   const Time t = flight.t.back() - minutes(40);
   OpenLoopStart start = start_of(with_wandering_drift(), motion.C_in_c(t));
   start.direction_random_walk_rad_sqrt_s = kWalk_rad_sqrt_s;
@@ -250,32 +248,61 @@ TEST(OpenLoopPrediction, IsWhatDrawsFromTheCovarianceDo) {
   }
 }
 
-TEST(BodyMotion, RepeatsTheLastOrbitOrTurnsOn) {
+TEST(BodyMotion, GoesOnTurningWithTheSameManoeuvresAtOtherPhases) {
   const Flight flight;
-  const Time end = flight.t.back();
-  const BodyMotion orbits(flight.t, flight.q_in_c, kRate_rad_s);
-  EXPECT_EQ(orbits.beyond(), ForecastMotion::kLastOrbit);
-  const Duration period = from_seconds(2 * M_PI / kRate_rad_s);
-  EXPECT_TRUE(orbits.C_in_c(end - seconds(1234)).isApprox(orbits.C_in_c(end - seconds(1234) + 3 * period), 1e-12));
-  Flight minutes_only;
-  minutes_only.t.resize(61);
-  minutes_only.q_in_c.resize(61);
-  const BodyMotion turns(minutes_only.t, minutes_only.q_in_c, kRate_rad_s);
-  EXPECT_EQ(turns.beyond(), ForecastMotion::kTurnsOn);
+  const BodyMotion motion(flight.t, flight.q_in_c);
+  // Off the steady turn by 0.5 rad in the middle of the slew, which comes again when the 1.26 orbits of the flight have
+  // passed, at another phase.
+  const auto off_rad = [&](Time t) {
+    const Eigen::AngleAxisd steady(-kRate_rad_s * to_seconds(t - flight.t.front()), Eigen::Vector3d::UnitY());
+    return Eigen::AngleAxisd(steady.toRotationMatrix().transpose() * motion.C_in_c(t)).angle();
+  };
+  const Time slew = flight.t.front() + seconds(4300);
+  const Duration orbit = from_seconds(2 * M_PI / kRate_rad_s);
+  EXPECT_NEAR(off_rad(slew), 0.5, 1e-3);
+  // Between slew and slew back the axis of both turns in space by a third of a radian: what they leave of 0.5 rad moves
+  // the mean rate.
+  constexpr double kLeft_rad = 0.06;
+  EXPECT_NEAR(off_rad(slew + seconds(7200)), 0.5, kLeft_rad);
+  EXPECT_LT(off_rad(slew + orbit), kLeft_rad);
+  EXPECT_LT(off_rad(flight.t.back() + seconds(60)), kLeft_rad);
+  // A flight of one orbit: 0.62 of an orbit later.
+  Flight one_orbit;
+  one_orbit.t.resize(573);
+  one_orbit.q_in_c.resize(573);
+  const BodyMotion of_one(one_orbit.t, one_orbit.q_in_c);
+  const Eigen::AngleAxisd steady(-kRate_rad_s * 0.62 * to_seconds(orbit), Eigen::Vector3d::UnitY());
+  EXPECT_LT(Eigen::AngleAxisd((steady * of_one.C_in_c(slew)).transpose() *
+                              of_one.C_in_c(slew + from_seconds(0.62 * to_seconds(orbit))))
+                .angle(),
+            kLeft_rad);
+}
+
+TEST(BodyMotion, OfAShortPassTurnsOnAndOfAFixedAttitudeStays) {
+  Flight ten_minutes;
+  const Flight flight = ten_minutes;
+  ten_minutes.t.resize(61);
+  ten_minutes.q_in_c.resize(61);
+  const BodyMotion turns(ten_minutes.t, ten_minutes.q_in_c);
   // Steady until then, so that the flight itself goes on the same for a while.
   EXPECT_TRUE(turns.C_in_c(flight.t[300]).isApprox(flight.q_in_c[300].toRotationMatrix(), 1e-9));
+  const std::vector<Eigen::Quaterniond> fixed(flight.t.size(), Eigen::Quaterniond(0.5, 0.5, 0.5, 0.5));
+  const BodyMotion stays(flight.t, fixed);
+  EXPECT_TRUE(stays.C_in_c(flight.t.back() + hours(5)).isApprox(fixed[0].toRotationMatrix(), 1e-9));
+  const std::vector<Time> once{flight.t.front()};
+  const BodyMotion known_once(once, fixed);
+  EXPECT_TRUE(known_once.C_in_c(flight.t.back()).isApprox(fixed[0].toRotationMatrix(), 1e-9));
 }
 
 TEST(Forecast, SaysHowLongAnAccuracyIsKeptAndWhatLimitsIt) {
   const Flight flight;
-  const BodyMotion motion(flight.t, flight.q_in_c, kRate_rad_s);
+  const BodyMotion motion(flight.t, flight.q_in_c);
   const Eigen::Matrix3d C_in_c = motion.C_in_c(motion.end());
   OpenLoopStart start = start_of(Layout{}, C_in_c);
   const Eigen::Index k0 = start.layout.drift(0);
   start.covariance(k0, k0) = 1e-12;  // much less known than the others
   const Need need{5 * kArcminute, minutes(271)};
   const OpenLoopForecast found = forecast(start, gyros(C_in_c), motion, AttitudeRule::kAllAlike, need);
-  EXPECT_EQ(found.motion, ForecastMotion::kLastOrbit);
   ASSERT_EQ(found.errors.size(), 145);
   EXPECT_EQ(found.errors.back().after, hours(24));
   ASSERT_TRUE(found.need);
@@ -296,7 +323,7 @@ TEST(Forecast, SaysHowLongAnAccuracyIsKeptAndWhatLimitsIt) {
 
 TEST(Forecast, OfNoErrorsHoldsAndOfParallelMomentaDoesNot) {
   const Flight flight;
-  const BodyMotion motion(flight.t, flight.q_in_c, kRate_rad_s);
+  const BodyMotion motion(flight.t, flight.q_in_c);
   const Eigen::Matrix3d C_in_c = motion.C_in_c(motion.end());
   OpenLoopStart start = start_of(Layout{}, C_in_c);
   start.covariance.setZero();

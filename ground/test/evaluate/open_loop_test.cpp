@@ -113,7 +113,7 @@ TEST(OpenLoops, WithBetterCoefficientsLastLonger) {
   const auto& [pass, truth, events] = three_hours();
   CalibrationRun run;
   for (const std::size_t epoch : {0U, 600U, 1200U}) {
-    Correction correction{truth.t[epoch], true_gyros(epoch), true_gyros(epoch)};
+    Correction correction{truth.t[epoch], true_gyros(epoch), true_gyros(epoch), {}};
     for (std::size_t i = 0; i < 7; ++i) {
       correction.known_before[0].drift_rad_s[i] += 1e-5;
       correction.calibrated[0].drift_rad_s[i] += 1e-6;

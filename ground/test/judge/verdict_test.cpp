@@ -3,7 +3,9 @@
 #include <gmock/gmock.h>
 
 #include <array>
+#include <chrono>
 #include <cmath>
+#include <limits>
 #include <random>
 
 #include "named.hpp"
@@ -403,6 +405,38 @@ TEST(Verdict, OfANavigationTakesOverThatOfTheCalibrationInUse) {
   run.held_parameters_misfit.reset();  // calibrated along: a start only
   EXPECT_THAT(codes(judge_navigation(pass, run)), ElementsAre("calibration-not-trustworthy"));
   EXPECT_TRUE(judge_navigation(pass, run).trustworthy);
+  // What does not meet a need is not wrong; with another fault it is.
+  run.held_parameters_misfit = 0;
+  pass.settings.prior->verdict.findings = {{FindingCode::kNeedNotMet, "", "", ""}};
+  EXPECT_THAT(codes(judge_navigation(pass, run)), IsEmpty());
+  pass.settings.prior->verdict.findings.push_back({FindingCode::kTooFewFixes, "", "", ""});
+  EXPECT_THAT(codes(judge_navigation(pass, run)), ElementsAre("calibration-not-trustworthy"));
+}
+
+TEST(Verdict, SaysWhatLimitsANeedThatIsNotMet) {
+  NavigationRun run = good_navigation();
+  const Pass pass = good_pass();
+  NeedForecast& need = run.forecast.emplace().need.emplace();
+  need.need = {1e-3, std::chrono::minutes(270)};
+  need.met = true;
+  EXPECT_THAT(codes(judge_navigation(pass, run)), IsEmpty());
+  need.met = false;
+  need.error_997_rad = 2e-3;
+  need.accuracy = {1e-3, std::chrono::minutes(40), false};
+  need.causes = {{"gyro1.k0", true, 0.8}, {"gyro2.k0", true, 0.15}, {"readout noise", false, 0.01}};
+  const Verdict by_parameter = judge_navigation(pass, run);
+  EXPECT_THAT(codes(by_parameter), ElementsAre("need-not-met"));
+  EXPECT_FALSE(by_parameter.trustworthy);
+  EXPECT_THAT(by_parameter.findings[0].evidence, HasSubstr("gyro1.k0 (80 %), gyro2.k0 (15 %)"));
+  EXPECT_THAT(by_parameter.findings[0].evidence, Not(HasSubstr("readout")));
+  EXPECT_THAT(by_parameter.findings[0].cure, HasSubstr("correct every 40 min"));
+  need.causes = {{"drift that wanders", false, 0.9}};
+  need.accuracy.within = Duration::zero();
+  const Verdict by_noise = judge_navigation(pass, run);
+  EXPECT_THAT(by_noise.findings[0].cure, HasSubstr("noise of the gyros"));
+  EXPECT_THAT(by_noise.findings[0].cure, Not(HasSubstr("every")));
+  need.error_997_rad = std::numeric_limits<double>::infinity();
+  EXPECT_THAT(judge_navigation(pass, run).findings[0].evidence, HasSubstr("one line"));
 }
 
 TEST(Verdict, OfANavigationFindsACalibrationOfAnotherStartUp) {

@@ -9,8 +9,8 @@
 #include <string_view>
 
 #include "trihedron/core/time.hpp"
-#include "trihedron/records/open_loop_forecast.hpp"
 #include "trihedron/records/limits.hpp"
+#include "trihedron/records/open_loop_forecast.hpp"
 
 namespace trihedron::io {
 

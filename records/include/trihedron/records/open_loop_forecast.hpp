@@ -1,12 +1,11 @@
 #pragma once
-/// What attitude error a calibration predicts for an open loop from an astro-correction on, and what a user needs of it.
+/// What attitude error a calibration predicts for an open loop from an astro-correction on, and what a user needs of
+/// it.
 
 #include <Eigen/Core>
 #include <chrono>
-#include <cstdint>
 #include <optional>
 #include <string>
-#include <string_view>
 #include <vector>
 
 #include "trihedron/core/layout.hpp"
@@ -39,17 +38,6 @@ struct OpenLoopStart {
   [[nodiscard]] bool is_known() const { return covariance.size() > 0; }
 };
 
-/// How the body is taken to turn.
-enum class ForecastMotion : std::uint8_t {
-  kOfPass,     ///< as it did
-  kLastOrbit,  ///< again and again as in the last orbit of the pass
-  kTurnsOn,    ///< on as it has turned over the pass, which is shorter than an orbit
-};
-/// For programs.
-[[nodiscard]] std::string_view name_of(ForecastMotion motion);
-/// Nothing for a name that this program does not know.
-[[nodiscard]] std::optional<ForecastMotion> forecast_motion_named(std::string_view name);
-
 /// The error of the attitude some time after the correction.
 struct PredictedError {
   Duration after{};
@@ -78,14 +66,13 @@ struct AccuracyForecast {
 struct NeedForecast {
   Need need;
   bool met = false;
-  double error_997_rad = 0;         ///< the largest until then
-  AccuracyForecast accuracy;        ///< how long the needed accuracy is kept
+  double error_997_rad = 0;        ///< the largest until then
+  AccuracyForecast accuracy;       ///< how long the needed accuracy is kept
   std::vector<ErrorCause> causes;  ///< of the error at the end of the interval, largest first; not all
 };
 
 /// Of an open loop from an astro-correction at the end of the pass.
 struct OpenLoopForecast {
-  ForecastMotion motion = ForecastMotion::kLastOrbit;
   std::vector<PredictedError> errors;  ///< from zero on, evenly
   AccuracyForecast usual;              ///< the usual limit
   std::optional<NeedForecast> need;    ///< where one is stated

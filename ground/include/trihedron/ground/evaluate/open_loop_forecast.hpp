@@ -16,22 +16,21 @@
 
 namespace trihedron::ground {
 
-/// Attitudes of the body at any time from that of the first given on: between those given by the shortest turn; beyond
-/// the last as in the last orbit, or where there is no whole orbit by turning on at the mean rate.
+/// Attitudes of the body at any time from that of the first given on: between those given by the shortest turn. Beyond
+/// the last the body goes on turning at its mean rate, and makes the same manoeuvres again, at other phases of the
+/// orbit.
 class BodyMotion {
  public:
   /// At least one attitude, in ascending order. Refers to them.
-  BodyMotion(const std::vector<Time>& t, const std::vector<Eigen::Quaterniond>& q_in_c, double orbital_rate_rad_s);
+  BodyMotion(const std::vector<Time>& t, const std::vector<Eigen::Quaterniond>& q_in_c);
 
-  [[nodiscard]] ForecastMotion beyond() const { return beyond_; }
   [[nodiscard]] Time end() const { return t_.back(); }
   [[nodiscard]] Eigen::Matrix3d C_in_c(Time t) const;
 
  private:
   const std::vector<Time>& t_;
   const std::vector<Eigen::Quaterniond>& q_in_c_;
-  Duration period_;
-  ForecastMotion beyond_;
+  Duration again_{};  ///< after which the manoeuvres come again
   Eigen::Vector3d rate_in_rad_s_{0, 0, 0};
 };
 
