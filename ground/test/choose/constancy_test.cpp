@@ -38,7 +38,8 @@ TEST(Constancy, FindsNothingWhereNothingMoves) {
   for (const std::uint64_t seed : {1U, 2U, 3U}) {
     EXPECT_FALSE(names_a_change(calibrated(seed, [](Scenario&) {}))) << seed;
   }
-  EXPECT_FALSE(names_a_change(calibrated(4, [](Scenario& scenario) { scenario.attitude.slews = std::vector<Slew>{}; })));
+  const auto steady = [](Scenario& scenario) { scenario.attitude.slews = std::vector<Slew>{}; };
+  EXPECT_FALSE(names_a_change(calibrated(4, steady)));
 }
 
 TEST(Constancy, NamesTheCaseThatSlippedAndWhen) {
