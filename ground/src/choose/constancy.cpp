@@ -442,7 +442,8 @@ std::vector<Change> changes_over(const Trial& trial) {
     for (Index step = 0; step < steps; ++step) {
       for (Index i = 0; i < coefficient_sigma.size(); ++i) {
         const Index column = step * coefficient_sigma.size() + i;
-        entries.emplace_back(pass.parameter(step, static_cast<int>(i) / Layout::kEq1, static_cast<int>(i) % Layout::kEq1), column, 1);
+        const auto member = static_cast<int>(i);
+        entries.emplace_back(pass.parameter(step, member / Layout::kEq1, member % Layout::kEq1), column, 1);
         sigma(column) = part * coefficient_sigma(i) / std::sqrt(static_cast<double>(steps));
       }
     }

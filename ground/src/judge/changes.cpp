@@ -143,9 +143,10 @@ void judge_changes(const CalibrationRun& run, std::vector<Finding>& findings) {
   }
   const double off = sigmas_off(run, likeliest);
   const auto minutes = [&](Time t) { return to_seconds(t - run.calibration.epoch) / 60; };
-  const std::string when = likeliest.motion == Motion::kStep ? fmt::format(" between {:.0f} and {:.0f} min", minutes(likeliest.from),
-                                                                          minutes(likeliest.until))
-                                                            : std::string();
+  std::string when;
+  if (likeliest.motion == Motion::kStep) {
+    when = fmt::format(" between {:.0f} and {:.0f} min", minutes(likeliest.from), minutes(likeliest.until));
+  }
   std::string what = described(likeliest);
   what.front() = static_cast<char>(what.front() - 'a' + 'A');
   Finding finding{code_of(likeliest.moving),

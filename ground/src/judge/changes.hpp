@@ -7,9 +7,9 @@
 
 namespace trihedron::ground {
 
-/// Names the likeliest of the changes that the pass gives evidence of (docs/mathematics.md, section 12): what moved, when, by how
-/// much, and what cures it; nothing where none is likely. The result must not be used where it moves a parameter by
-/// more than its claimed sigma allows.
+/// Names the likeliest of the changes that the pass gives evidence of (docs/mathematics.md, section 12): what moved,
+/// when, by how much, and what cures it; nothing where none is likely. The result must not be used where it moves a
+/// parameter by more than its claimed sigma allows.
 void judge_changes(const CalibrationRun& run, std::vector<Finding>& findings);
 
 }  // namespace trihedron::ground

@@ -35,10 +35,11 @@ bool names_a_change(const CalibrationRun& run) {
 }
 
 TEST(Constancy, FindsNothingWhereNothingMoves) {
-  for (const std::uint64_t seed : {1, 2, 3}) {
+  for (const std::uint64_t seed : {1U, 2U, 3U}) {
     EXPECT_FALSE(names_a_change(calibrated(seed, [](Scenario&) {}))) << seed;
   }
-  EXPECT_FALSE(names_a_change(calibrated(4, [](Scenario& scenario) { scenario.attitude.slews = std::vector<Slew>{}; })));
+  const auto steady = [](Scenario& scenario) { scenario.attitude.slews = std::vector<Slew>{}; };
+  EXPECT_FALSE(names_a_change(calibrated(4, steady)));
 }
 
 TEST(Constancy, NamesTheCaseThatSlippedAndWhen) {

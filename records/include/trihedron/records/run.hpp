@@ -104,7 +104,8 @@ struct Change {
   Time from{}, until{};  ///< between which a step lies
   double log_odds = 0;  ///< ln of the Bayes factor for it against nothing that moves, less ln of the number of tries
   /// Size and 1-sigma: rotation vector, rad, c axes (kInertialAxes: in axes; kMomentum: two components across the
-  /// momentum); coefficients, rad/s, gyro by gyro; over the pass. For kWalk one number, the root of the sum of squares of all steps.
+  /// momentum); coefficients, rad/s, gyro by gyro; over the pass. For kWalk one number, the root of the sum of
+  /// squares of all steps.
   Eigen::VectorXd size, sigma;
   /// Coefficients of eq. (1) and alignment of each gyro at the end of the pass, less what is estimated without the
   /// change: rad/s, rad.
