@@ -13,7 +13,7 @@ FixBySharedStates fix_by_shared_states(const CalibrationSetup& setup, const Star
     by.col(layout.clock_offset() - layout.shared()) = rate_c;
   }
   if (layout.further.clock_rate) {
-    by.col(layout.clock_rate() - layout.shared()) = to_seconds(fix.t - setup.no_change_at) * rate_c;
+    by.col(layout.clock_rate() - layout.shared()) = to_seconds(fix.t - setup.orbital_phase_zero) * rate_c;
   }
   if (layout.further.orbital_error && fix.head == 0) {
     const double phase = setup.orbital_rate_rad_s * to_seconds(fix.t - setup.orbital_phase_zero);

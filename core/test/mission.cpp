@@ -57,7 +57,7 @@ Mission::Mission(const MissionPlan& plan) : given(plan.layout) {
   const auto clock_s = [&](double t_s) {
     const double offset_s = layout.further.clock_offset ? shared(layout.clock_offset() - layout.shared()) : 0;
     const double rate = layout.further.clock_rate ? shared(layout.clock_rate() - layout.shared()) : 0;
-    return offset_s + rate * (t_s - to_seconds(setup.no_change_at - Time{}));
+    return offset_s + rate * (t_s - to_seconds(setup.orbital_phase_zero - Time{}));
   };
   const auto attitude = [&](double t_s) { return Flight::attitude(t_s, plan.slews_rad, plan.slews_from_s); };
 
