@@ -15,8 +15,8 @@ constexpr FurtherStates set_of_further_states(int number) {
           .readout_bias = (number & 2) != 0,
           .coefficient_change = (number & 4) != 0,
           .clock_offset = (number & 8) != 0,
-          .clock_rate = (number & 32) != 0,
-          .orbital_error = (number & 16) != 0};
+          .orbital_error = (number & 16) != 0,
+          .clock_rate = (number & 32) != 0};
 }
 
 /// Whether `predicate` holds for every layout that there is; where the compiler counts its steps, of one star tracker

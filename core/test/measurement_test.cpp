@@ -148,7 +148,7 @@ TEST(FixNoise, IsAboutTheAxesOfItsStarTracker) {
 
 TEST(FixBySharedStates, IsHowTheFixFollowsThem) {
   CalibrationSetup setup;
-  setup.layout = {.further = {.clock_offset = true, .clock_rate = true, .orbital_error = true}, .star_trackers = 3};
+  setup.layout = {.further = {.clock_offset = true, .orbital_error = true, .clock_rate = true}, .star_trackers = 3};
   setup.orbital_phase_zero = Time(std::chrono::seconds(30));
   const Layout& layout = setup.layout;
   const Eigen::Vector3d rate_c(1e-3, -2e-3, 5e-4);

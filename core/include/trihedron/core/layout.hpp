@@ -32,8 +32,8 @@ struct FurtherStates {
   bool readout_bias = false;
   bool coefficient_change = false;
   bool clock_offset = false;
-  bool clock_rate = false;
   bool orbital_error = false;
+  bool clock_rate = false;
 
   friend constexpr bool operator==(const FurtherStates&, const FurtherStates&) = default;
 };
