@@ -1,11 +1,13 @@
 #include <fmt/core.h>
 
 #include <memory>
+#include <optional>
 #include <string>
 
 #include "commands.hpp"
 #include "decisions.hpp"
 #include "summary.hpp"
+#include "trihedron/ground/clocks/clocks.hpp"
 
 namespace trihedron::cli {
 
@@ -20,9 +22,18 @@ void add_inspect(CLI::App& program, const Common& common, int& exit_status) {
   command->callback([&common, &exit_status, pass] {
     const io::LoadedPass loaded = io::read_pass(*pass);
     log_pass(common.log, *pass, loaded);
+    const std::optional<Clocks> clocks = ground::clocks_of(loaded.pass);
     show(
-        common, [&] { return pass_json(loaded); },
-        [&] { return pass_text(loaded) + (loaded.defects.empty() ? "            no defects\n" : ""); });
+        common,
+        [&] {
+          nlohmann::ordered_json json = pass_json(loaded);
+          json["clocks"] = clocks_json(clocks, loaded.pass.gyro.gyros);
+          return json;
+        },
+        [&] {
+          return pass_text(loaded) + (loaded.defects.empty() ? "            no defects\n" : "") +
+                 clocks_text(clocks, loaded.pass.gyro.gyros);
+        });
     exit_status = kTrustworthy;
   });
 }

@@ -55,6 +55,21 @@ const Json& number() {
   return schema;
 }
 
+/// Of inspect; null where the pass does not show them.
+Json clocks() {
+  Json schema = object({{"mid_offset_s", number()},
+                        {"mid_offset_sigma_s", number()},
+                        {"offset_s", number()},
+                        {"offset_sigma_s", number()},
+                        {"rate_s_s", number()},
+                        {"rate_sigma_s_s", number()},
+                        {"reference_gyro", count()},
+                        {"gyros_late_s", array(number())},
+                        {"gyros_late_sigma_s", array(number())}});
+  schema["type"] = Json::array({"object", "null"});
+  return schema;
+}
+
 Json pass() {
   const Json defect = object({{"kind", text()}, {"where", text()}, {"count", count()}, {"text", text()}});
   return object({{"spacecraft", text()},
@@ -64,7 +79,8 @@ Json pass() {
                  {"gyro_samples", count()},
                  {"fixes", count()},
                  {"defects", array(defect)},
-                 {"fixes_of_further_star_trackers?", array(count())}});
+                 {"fixes_of_further_star_trackers?", array(count())},
+                 {"clocks?", clocks()}});
 }
 
 Json interval() {

@@ -88,6 +88,25 @@ std::string pass_text(const io::LoadedPass& loaded) {
   return text;
 }
 
+std::string clocks_text(const std::optional<Clocks>& clocks, int gyros) {
+  if (!clocks) {
+    return "Clocks      not shown by this pass: the body turns too evenly, or the pass is too short\n";
+  }
+  std::string text = fmt::format(
+      "Clocks      fixes hold the attitude {:+.4f} s ± {:.2f} ms after their stamp in the middle of the pass; {:+.4g} "
+      "± "
+      "{:.2g} ppm\n",
+      clocks->mid_offset_s.value, 1e3 * clocks->mid_offset_s.sigma, 1e6 * clocks->rate_s_s.value,
+      1e6 * clocks->rate_s_s.sigma);
+  for (int k = 0; k < gyros; ++k) {
+    if (k != clocks->reference) {
+      text += fmt::format("            gyro {} is stamped {:+.2f} ± {:.2f} ms late against gyro {}\n", k + 1,
+                          1e3 * clocks->late_s[k].value, 1e3 * clocks->late_s[k].sigma, clocks->reference + 1);
+    }
+  }
+  return text;
+}
+
 std::string finding_text(const Finding& finding) {
   return fmt::format("  {:<19} {}\n{:22}{}\n{:22}→ {}\n", name_of(finding.code), finding.text, "", finding.evidence, "",
                      finding.cure);
@@ -396,6 +415,23 @@ nlohmann::ordered_json pass_json(const io::LoadedPass& loaded) {
     json["defects"].push_back(item);
   }
   return json;
+}
+
+nlohmann::ordered_json clocks_json(const std::optional<Clocks>& clocks, int gyros) {
+  if (!clocks) {
+    return nullptr;
+  }
+  nlohmann::ordered_json late_s = nlohmann::ordered_json::array();
+  nlohmann::ordered_json late_sigma_s = nlohmann::ordered_json::array();
+  for (int k = 0; k < gyros; ++k) {
+    late_s.push_back(clocks->late_s[k].value);
+    late_sigma_s.push_back(clocks->late_s[k].sigma);
+  }
+  return {{"mid_offset_s", clocks->mid_offset_s.value}, {"mid_offset_sigma_s", clocks->mid_offset_s.sigma},
+          {"offset_s", clocks->offset_s.value},         {"offset_sigma_s", clocks->offset_s.sigma},
+          {"rate_s_s", clocks->rate_s_s.value},         {"rate_sigma_s_s", clocks->rate_s_s.sigma},
+          {"reference_gyro", clocks->reference + 1},    {"gyros_late_s", late_s},
+          {"gyros_late_sigma_s", late_sigma_s}};
 }
 
 nlohmann::ordered_json findings_json(const std::vector<Finding>& findings) {

@@ -15,6 +15,7 @@ drift_model = "esg7"
 noise = "told"
 [further_states]
 clock_offset = "off"
+clock_rate = "off"
 orbital_error = "off"
 readout_bias = "off"
 coefficient_change = "off"

@@ -219,6 +219,7 @@ reopen_after_jump_rejections = 333
 angles_after = "never"
 [further_states]
 clock_offset = "on"
+clock_rate = "off"
 orbital_error = "off"
 readout_bias = "on"
 coefficient_change = "off"

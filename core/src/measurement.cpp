@@ -12,6 +12,9 @@ FixBySharedStates fix_by_shared_states(const CalibrationSetup& setup, const Star
   if (layout.further.clock_offset) {
     by.col(layout.clock_offset() - layout.shared()) = rate_c;
   }
+  if (layout.further.clock_rate) {
+    by.col(layout.clock_rate() - layout.shared()) = to_seconds(fix.t - setup.orbital_phase_zero) * rate_c;
+  }
   if (layout.further.orbital_error && fix.head == 0) {
     const double phase = setup.orbital_rate_rad_s * to_seconds(fix.t - setup.orbital_phase_zero);
     const int first = layout.orbital_error() - layout.shared();

@@ -255,31 +255,33 @@ TEST(InvariantEstimator, AStepInTwoHalvesIsTheStep) {
   }
 }
 
-TEST(InvariantEstimator, FindsTheClockOffsetAndTheErrorAtOrbitalPeriod) {
+TEST(InvariantEstimator, FindsOffsetAndRateOfTheClockAndTheErrorAtOrbitalPeriod) {
   test::Flight flight({.duration_s = 5400});
   const Eigen::Vector3d sine(3e-5, -2e-5, 4e-5);
   const Eigen::Vector3d cosine(-1e-5, 5e-5, 2e-5);
   constexpr double kRate = 1.1e-3;
   constexpr double kOffset_s = 0.02;
+  constexpr double kClockRate = 1e-5;
   for (StarFix& fix : flight.fixes) {
     const double t_s = to_seconds(fix.t.time_since_epoch());
     const auto at = [&](double time_s) { return Eigen::Quaterniond(test::Flight::attitude(time_s, 0.5)); };
     const Eigen::Vector3d e = sine * std::sin(kRate * t_s) + cosine * std::cos(kRate * t_s);
     const Eigen::Quaterniond noise = at(t_s).conjugate() * fix.q_in_c;
-    fix.q_in_c = at(t_s + kOffset_s) * Eigen::Quaterniond(test::turn(e)) * noise;
+    fix.q_in_c = at(t_s + kOffset_s + kClockRate * t_s) * Eigen::Quaterniond(test::turn(e)) * noise;
   }
   FullGiven given(kWithAll);
   given.setup.orbital_rate_rad_s = kRate;
   const auto on_board = test::flown(flight, given);
   const auto& shared = on_board->estimator().shared();
   const Eigen::MatrixXd root = test::state_root(on_board->estimator());
-  Eigen::Matrix<double, 7, 1> truth;
-  truth << kOffset_s, sine, cosine;
-  for (int i = 0; i < 7; ++i) {
+  Eigen::Matrix<double, 8, 1> truth;
+  truth << kOffset_s, kClockRate, sine, cosine;
+  for (int i = 0; i < 8; ++i) {
     const double sigma = root.row(kWithAll.shared() + i).norm();
     EXPECT_LT(std::abs(shared(i) - truth(i)), 4 * sigma) << i;
   }
   EXPECT_LT(root.row(kWithAll.clock_offset()).norm(), 1e-3);
+  EXPECT_LT(root.row(kWithAll.clock_rate()).norm(), 1e-6);
   EXPECT_LT(root.row(kWithAll.orbital_error()).norm(), 5 * test::kArcsecond);
 }
 

@@ -61,6 +61,7 @@ const Layout kComparedLayouts[] = {
     {},
     {.further = {.readout_bias = true}},
     {.gyros = 3, .drift_model = vsh(2), .further = {.clock_offset = true, .orbital_error = true}},
+    {.further = {.clock_rate = true}},
     {.gyros = 4, .drift_model = kEsg20, .further = kAllFurtherStates, .star_trackers = 3},
 };
 
@@ -147,7 +148,7 @@ TEST(FixNoise, IsAboutTheAxesOfItsStarTracker) {
 
 TEST(FixBySharedStates, IsHowTheFixFollowsThem) {
   CalibrationSetup setup;
-  setup.layout = {.further = {.clock_offset = true, .orbital_error = true}, .star_trackers = 3};
+  setup.layout = {.further = {.clock_offset = true, .orbital_error = true, .clock_rate = true}, .star_trackers = 3};
   setup.orbital_phase_zero = Time(std::chrono::seconds(30));
   const Layout& layout = setup.layout;
   const Eigen::Vector3d rate_c(1e-3, -2e-3, 5e-4);
@@ -159,10 +160,11 @@ TEST(FixBySharedStates, IsHowTheFixFollowsThem) {
       const Eigen::MatrixXd columns = by(t_s, head);
       ASSERT_EQ(columns.cols(), layout.shared_size());
       EXPECT_EQ(columns.col(0), rate_c);
+      EXPECT_LT((columns.col(1) - (t_s - 30) * rate_c).norm(), 1e-15);
       const double phase = setup.orbital_rate_rad_s * (t_s - 30);
       const double seen = head == 0 ? 1 : 0;
-      EXPECT_LT((columns.middleCols<3>(1) - seen * std::sin(phase) * Eigen::Matrix3d::Identity()).norm(), 1e-15);
-      EXPECT_LT((columns.middleCols<3>(4) - seen * std::cos(phase) * Eigen::Matrix3d::Identity()).norm(), 1e-15);
+      EXPECT_LT((columns.middleCols<3>(2) - seen * std::sin(phase) * Eigen::Matrix3d::Identity()).norm(), 1e-15);
+      EXPECT_LT((columns.middleCols<3>(5) - seen * std::cos(phase) * Eigen::Matrix3d::Identity()).norm(), 1e-15);
       for (int other = 1; other < 3; ++other) {
         EXPECT_EQ((columns.middleCols<3>(layout.star_tracker(other) - layout.shared())),
                   Eigen::Matrix3d(Eigen::Matrix3d::Identity() * (other == head)));

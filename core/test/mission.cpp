@@ -54,7 +54,11 @@ Mission::Mission(const MissionPlan& plan) : given(plan.layout) {
   for (int i = 0; i < layout.shared_size(); ++i) {
     shared(i) = prior_sigma_of_further_state(setup, layout.shared() + i) * normal(random);
   }
-  const double clock_offset_s = layout.further.clock_offset ? shared(0) : 0;
+  const auto clock_s = [&](double t_s) {
+    const double offset_s = layout.further.clock_offset ? shared(layout.clock_offset() - layout.shared()) : 0;
+    const double rate = layout.further.clock_rate ? shared(layout.clock_rate() - layout.shared()) : 0;
+    return offset_s + rate * (t_s - to_seconds(setup.orbital_phase_zero - Time{}));
+  };
   const auto attitude = [&](double t_s) { return Flight::attitude(t_s, plan.slews_rad, plan.slews_from_s); };
 
   const DriftModel drift(layout.drift_model, layout.further);
@@ -95,7 +99,7 @@ Mission::Mission(const MissionPlan& plan) : given(plan.layout) {
       // A clock that is off shows another attitude; the other errors that the shared states stand for turn it.
       Eigen::Vector3d error = fix_by_shared_states(setup, fix, Eigen::Vector3d::Zero()) * shared;
       error += its.C_c_s * its.noise_rad.cwiseProduct(white());
-      fix.q_in_c = Eigen::Quaterniond(attitude(*first + clock_offset_s) * turn(error));
+      fix.q_in_c = Eigen::Quaterniond(attitude(*first + clock_s(*first)) * turn(error));
       fixes.push_back(fix);
       *first += plan.fix_period_s;
     }

@@ -17,6 +17,7 @@
 #include "trihedron/io/calibration.hpp"
 #include "trihedron/io/staged_directory.hpp"
 #include "trihedron/io/time_text.hpp"
+#include "trihedron/records/clocks.hpp"
 #include "trihedron/records/stop.hpp"
 #include "truth.hpp"
 
@@ -267,6 +268,10 @@ LoadedPass read_pass(const fs::path& path) {
   check_there(path);
   const auto format = std::ranges::find_if(kInputFormats, [&](const InputFormat& f) { return f.recognises(path); });
   UnscreenedPass raw = format->read(path);
+  const ClockCorrection clocks{raw.settings.star_tracker_clock_offset_s, raw.settings.star_tracker_clock_rate_s_s, {}};
+  for (Series& fixes : raw.star_trackers) {
+    std::ranges::transform(fixes.t_s, fixes.t_s.begin(), [&](double t_s) { return clocks.true_s(t_s); });
+  }
   LoadedPass loaded;
   loaded.pass.gyro = screen_gyro(std::move(raw.gyro), raw.settings, loaded.defects);
   for (std::size_t head = 0; head < raw.star_trackers.size(); ++head) {
@@ -275,6 +280,11 @@ LoadedPass read_pass(const fs::path& path) {
     fixes = screen_star_tracker(std::move(raw.star_trackers[head]), raw.settings, loaded.defects);
   }
   loaded.pass.settings = std::move(raw.settings);
+  ClockCorrection gyros;
+  for (std::size_t k = 0; k < loaded.pass.settings.gyros.size() && k < std::size_t{kMaxGyros}; ++k) {
+    gyros.late_s[static_cast<int>(k)] = loaded.pass.settings.gyros[k].latency_s;
+  }
+  correct(loaded.pass, gyros);
   loaded.prior_file = std::move(raw.prior_file);
   return loaded;
 }

@@ -19,6 +19,9 @@ namespace fs = std::filesystem;
 
 constexpr std::string_view kHeadNoise = "noise_rad";
 constexpr std::string_view kMounting = "mounting_rotation_vector_rad";
+constexpr std::string_view kClockOffset = "clock_offset_s";
+constexpr std::string_view kClockRate = "clock_rate_s_s";
+constexpr std::string_view kLatency = "latency_s";
 constexpr std::string_view kStartUp = "start_up";
 constexpr std::string_view kNoise = "readout_noise_rad";
 constexpr std::string_view kDrift = "drift_prior_rad_s";
@@ -86,7 +89,9 @@ Fields unit_fields(GyroPrior& prior, const fs::path& file) {
           drift_sigmas(prior, file),
           three_numbers(kAlignment, prior.alignment_rotation_vector_rad, limits::kRotation_rad,
                         "alignment known before the pass"),
-          alignment_sigma(prior)};
+          alignment_sigma(prior),
+          one_number(kLatency, prior.latency_s, limits::kLatency_s,
+                     "by which its readings are stamped late; they are interpolated when the pass is read")};
 }
 
 /// What [[gyro.unit]] says of each gyro, over what is known of all.
@@ -176,6 +181,10 @@ Fields star_tracker_fields(PassSettings& settings, const fs::path& file) {
                                      "of the fixes")),
           required(three_numbers(kHeadNoise, settings.star_tracker_noise_rad, limits::kStarTrackerNoise_rad,
                                  "1-sigma about c x, y, z")),
+          one_number(kClockOffset, settings.star_tracker_clock_offset_s, limits::kClockOffset_s,
+                     "a fix stamped t holds the attitude at t + offset; stamps are corrected when the pass is read"),
+          one_number(kClockRate, settings.star_tracker_clock_rate_s_s, limits::kClockRate_s_s,
+                     "by which that offset grows from the epoch on"),
           further_heads(settings, file)};
 }
 

@@ -203,6 +203,7 @@ Fields readout_fields(ReadoutScenario& readout) {
       three_quantities("bias", readout.bias_rad, kAngle, "of the direction cosines"),
       three_numbers("scale", readout.scale, limits::kPureNumber, "relative errors of scale of the direction cosines"),
       quantity("quantum", readout.quantum_rad, kAngle, "of the direction cosines; 0: not quantised"),
+      signed_duration("latency", readout.latency_s, "a reading stamped t holds the direction at t - latency"),
       one_number("dropout_probability", readout.dropout_probability, limits::kPureNumber, "that a sample is NaN"),
       one_number("spike_probability", readout.spike_probability, limits::kPureNumber,
                  "that one direction cosine is off"),
@@ -261,6 +262,8 @@ Fields head_fields(StarTrackerScenario& head, const fs::path& file) {
   return Fields{
       three_quantities("noise", head.noise_rad, kAngle, "1-sigma about its x, y, z, white"),
       signed_duration("clock_offset", head.clock_offset_s, "a fix stamped t holds the attitude at t + offset"),
+      one_number("clock_rate", head.clock_rate, limits::kClockRate_s_s,
+                 "by which that offset grows, in seconds per second from the start of the pass on"),
       signed_duration("latency", head.latency_s, "a fix stamped t holds the attitude at t - latency"),
       three_quantities("orbital_sine", head.orbital_sine_rad, kAngle, "of the error at orbital period"),
       three_quantities("orbital_cosine", head.orbital_cosine_rad, kAngle, "of the error at orbital period"),

@@ -90,6 +90,8 @@ Members star_tracker_members(Truth::StarTracker& head) {
   return {
       {"clock_offset_s", "a fix stamped t holds the attitude at t + offset", number_schema(),
        [&head](const JsonNode& node) { head.clock_offset_s = node.number(); }},
+      optional_member({"clock_rate_s_s", "by which that offset grows from the start of the pass on", number_schema(),
+                       [&head](const JsonNode& node) { head.clock_rate_s_s = node.number(); }}),
       vector_member("orbital_sine_rad", head.orbital_sine_rad, "of the error at orbital period, axes of the head"),
       vector_member("orbital_cosine_rad", head.orbital_cosine_rad, "of the error at orbital period, axes of the head"),
       vector_member("misalignment_rad", head.misalignment_rad, "c axes")};
@@ -97,6 +99,7 @@ Members star_tracker_members(Truth::StarTracker& head) {
 
 Json star_tracker_json(const Truth::StarTracker& head) {
   return {{"clock_offset_s", head.clock_offset_s},
+          {"clock_rate_s_s", head.clock_rate_s_s},
           {"orbital_sine_rad", to_json_array(head.orbital_sine_rad)},
           {"orbital_cosine_rad", to_json_array(head.orbital_cosine_rad)},
           {"misalignment_rad", to_json_array(head.misalignment_rad)}};

@@ -133,8 +133,8 @@ Truth clean_truth() {
     truth.gyros.push_back(parameters);
   }
   truth.orbital_rate_rad_s = 1e-3 / 3;
-  truth.star_trackers = {{1e-2 / 3, {1e-5, 2e-5, 3e-5}, {4e-5, 5e-5, 6e-5}, {0, 0, 0}},
-                         {0, {0, 0, 0}, {0, 0, 1e-5}, {1e-3, 0, 1e-4}}};
+  truth.star_trackers = {{1e-2 / 3, 1e-6 / 7, {1e-5, 2e-5, 3e-5}, {4e-5, 5e-5, 6e-5}, {0, 0, 0}},
+                         {0, 0, {0, 0, 0}, {0, 0, 1e-5}, {1e-3, 0, 1e-4}}};
   for (const auto& row : clean_pass().star_tracker.rows) {
     truth.t.push_back(sample_calibration().epoch + from_seconds(row[0]));
     truth.q_in_c.emplace_back(row[4], row[1], row[2], row[3]);

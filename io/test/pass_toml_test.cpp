@@ -39,6 +39,27 @@ TEST_F(PassToml, GivesEveryGyroTheCommonPrior) {
   EXPECT_EQ(settings.star_tracker_noise_rad, Eigen::Vector3d(1e-5, 2e-5, 9e-5));
 }
 
+TEST_F(PassToml, CorrectsStampsWhenThePassIsRead) {
+  const Pass given = read_pass(directory_.path()).pass;
+  write_text(directory_ / "pass.toml",
+             toml_ + "clock_offset_s = 1.5\nclock_rate_s_s = 1e-3\n[[gyro.unit]]\n[[gyro.unit]]\nlatency_s = 0.25\n");
+  const Pass corrected = read_pass(directory_.path()).pass;
+  // The last fixes lie after the end of the pass.
+  ASSERT_GT(corrected.star_tracker.size(), 25U);
+  for (std::size_t i = 0; i < corrected.star_tracker.size(); ++i) {
+    const double given_s = to_seconds(given.star_tracker.t[i] - given.settings.epoch);
+    EXPECT_NEAR(to_seconds(corrected.star_tracker.t[i] - given.settings.epoch), 1.001 * given_s + 1.5, 2e-9);
+  }
+  EXPECT_EQ(corrected.gyro.direction(7, 0), given.gyro.direction(7, 0));
+  const Eigen::Vector3d later = (given.gyro.direction(7, 1) + given.gyro.direction(8, 1)) / 2;
+  EXPECT_LT((corrected.gyro.direction(7, 1) - later).norm(), 1e-15);
+  // What is written is what was corrected, and says nothing of it any more.
+  write_pass(directory_ / "again", corrected, nullptr);
+  const Pass again = read_pass(directory_ / "again").pass;
+  EXPECT_EQ(again.star_tracker.t, corrected.star_tracker.t);
+  EXPECT_THAT(refusal_with(toml_ + "clock_rate_s_s = 1\n"), HasSubstr("clock_rate_s_s"));
+}
+
 TEST_F(PassToml, UnitOverridesTheCommonPriorOfItsGyro) {
   const PassSettings settings = read_with(toml_ + R"(
 [[gyro.unit]]

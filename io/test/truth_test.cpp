@@ -101,6 +101,7 @@ TEST_F(TruthFiles, ComeBackFromBothFormats) {
     ASSERT_EQ(back->star_trackers.size(), truth.star_trackers.size());
     for (std::size_t i = 0; i < truth.star_trackers.size(); ++i) {
       EXPECT_EQ(back->star_trackers[i].clock_offset_s, truth.star_trackers[i].clock_offset_s);
+      EXPECT_EQ(back->star_trackers[i].clock_rate_s_s, truth.star_trackers[i].clock_rate_s_s);
       EXPECT_EQ(back->star_trackers[i].orbital_sine_rad, truth.star_trackers[i].orbital_sine_rad);
       EXPECT_EQ(back->star_trackers[i].orbital_cosine_rad, truth.star_trackers[i].orbital_cosine_rad);
       EXPECT_EQ(back->star_trackers[i].misalignment_rad, truth.star_trackers[i].misalignment_rad);

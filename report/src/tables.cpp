@@ -352,6 +352,8 @@ ShownUnit shown_unit(const FurtherEstimate& estimate) {
   switch (estimate.parameter.unit()) {
     case Unit::kSecond:
       return {"_s", 1e-3, "ms"};
+    case Unit::kSecondPerSecond:
+      return {"_s_s", 1e-6, "ppm"};
     case Unit::kRadian:
       return {"_rad", angle_unit.rad, angle_unit.symbol};
     case Unit::kRadianPerSecond:

@@ -43,6 +43,7 @@ void check(const GyroScenario& gyro, const std::string& name, double duration_s)
           name + ".drift.polhode_period_rate makes the period negative within the pass");
   require(drift.thermal_time_s > 0, name + ".drift.thermal_time_s must be positive");
   require(readout.noise_rad >= 0, name + ".readout.noise_rad must not be negative");
+  require(std::isfinite(readout.latency_s), name + ".readout.latency_s must be finite");
   require(readout.quantum_rad >= 0, name + ".readout.quantum_rad must not be negative");
   require(readout.stuck_s >= 0, name + ".readout.stuck_s must not be negative");
   require(is_probability(readout.dropout_probability), name + ".readout.dropout_probability must be 0 … 1");
@@ -55,6 +56,7 @@ void check(const StarTrackerScenario& head, const std::string& name) {
   require((head.field_error_rad.array() >= 0).all(), name + ".field_error_rad must not be negative");
   require(head.field_correlation_rad > 0, name + ".field_correlation_rad must be positive");
   require(std::isfinite(head.clock_offset_s), name + ".clock_offset_s must be finite");
+  require(std::isfinite(head.clock_rate), name + ".clock_rate must be finite");
   require(std::isfinite(head.latency_s), name + ".latency_s must be finite");
   require(is_probability(head.dropout_probability), name + ".dropout_probability must be 0 … 1");
   require(is_probability(head.outlier_probability), name + ".outlier_probability must be 0 … 1");
@@ -127,7 +129,8 @@ bool is_sunlit(const Vec<In>& position_m, const Vec<In>& sun_m) {
 }
 
 Truth::StarTracker truth_of(const StarTrackerScenario& head) {
-  return {head.clock_offset_s - head.latency_s, head.orbital_sine_rad, head.orbital_cosine_rad, head.misalignment_rad};
+  return {head.clock_offset_s - head.latency_s, head.clock_rate, head.orbital_sine_rad, head.orbital_cosine_rad,
+          head.misalignment_rad};
 }
 
 }  // namespace
@@ -140,10 +143,14 @@ SimulatedPass simulate(const Scenario& scenario) {
   const double step_s = to_seconds(scenario.gyro_period);
   std::vector<StarTrackerScenario> heads{scenario.star_tracker};
   heads.insert(heads.end(), scenario.further_star_trackers.begin(), scenario.further_star_trackers.end());
-  // Fixes look at C(t + offset), and their rate a little to both sides.
+  // Fixes look at C(t + offset), and their rate a little to both sides; readings at C(t − latency).
   double margin_s = 0;
   for (const StarTrackerScenario& head : heads) {
-    margin_s = std::max(margin_s, std::abs(head.clock_offset_s) + std::abs(head.latency_s) + 0.1);
+    margin_s = std::max(margin_s, std::abs(head.clock_offset_s) + std::abs(head.clock_rate) * duration_s +
+                                      std::abs(head.latency_s) + 0.1);
+  }
+  for (const GyroScenario& gyro : scenario.gyros) {
+    margin_s = std::max(margin_s, std::abs(gyro.readout.latency_s));
   }
 
   const KeplerJ2 orbit(scenario.orbit);
@@ -170,6 +177,11 @@ SimulatedPass simulate(const Scenario& scenario) {
   telemetry.t.reserve(samples);
   telemetry.h.reserve(samples * gyros.size() * 3);
 
+  // Over a latency the momentum itself does not move by anything that can be read.
+  const auto seen_by = [&](std::size_t i, double t_s) {
+    const double latency_s = scenario.gyros[i].readout.latency_s;
+    return latency_s == 0 ? gyros[i].momentum_in_case() : gyros[i].momentum_in_case(attitude.at(t_s - latency_s));
+  };
   for (Duration since{0};; since += scenario.gyro_period) {
     check_stop();
     const Time t = scenario.epoch + since;
@@ -182,7 +194,7 @@ SimulatedPass simulate(const Scenario& scenario) {
     } else {
       telemetry.t.push_back(t);
       for (std::size_t i = 0; i < gyros.size(); ++i) {
-        append(telemetry.h, readouts[i].read(t, gyros[i].momentum_in_case(), result.events));
+        append(telemetry.h, readouts[i].read(t, seen_by(i, t_s), result.events));
       }
     }
     if (since + scenario.gyro_period > scenario.duration) {

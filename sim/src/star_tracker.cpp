@@ -87,7 +87,7 @@ StarTrackerTelemetry simulate_fixes(const StarTrackerScenario& head, const StarT
   for (Duration since{0}; since <= duration; since += period) {
     check_stop();
     const Time t = epoch + since;
-    const double t_s = to_seconds(since) + head.clock_offset_s - head.latency_s;
+    const double t_s = to_seconds(since) * (1 + head.clock_rate) + head.clock_offset_s - head.latency_s;
     const double phase = n * to_seconds(since);
 
     // Every random number of a fix is drawn whether it is used or not, so that switching a fault on changes no other

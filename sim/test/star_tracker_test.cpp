@@ -182,6 +182,16 @@ TEST_F(StarTracker, InertialAxesTurnAtOnce) {
   EXPECT_LT((by - Vector3d(0, 0, 1e-3)).norm(), 1e-12);
 }
 
+TEST_F(StarTracker, FixStampedTHoldsTheAttitudeOfAClockThatRunsAtAnotherRate) {
+  StarTrackerScenario head = perfect();
+  head.clock_rate = 1e-4;
+  const StarTrackerTelemetry all = fixes(head);
+  for (std::size_t i = 0; i < all.size(); i += 100) {
+    const Rot<In, C> fix = Rot<In, C>::assume(all.q_in_c[i]);
+    ASSERT_LT((attitude_.at(1.0001 * t_s(all.t[i])).inverse() * fix).log().norm(), 1e-12);
+  }
+}
+
 TEST_F(StarTracker, OrbitalErrorRepeatsEveryRevolution) {
   StarTrackerScenario head = perfect();
   head.orbital_sine_rad = Vector3d(8, 0, 3) * kArcsecond;

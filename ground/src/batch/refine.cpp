@@ -139,7 +139,7 @@ std::vector<FurtherEstimate> further_of(const PassProblem& problem, const BatchR
 }
 
 /// κ and δ of all gyros.
-struct Parameters {
+struct KappaAndDelta {
   Gyros gyros;
   MatrixXd covariance;
   MatrixXd by_states;  ///< their errors by those of κ and δ along the pass
@@ -147,10 +147,10 @@ struct Parameters {
 
 /// Those of a drift field. What the pass says of its modes is known; the members are the most likely ones that make
 /// them, and what the modes leave open of them is as uncertain as before.
-Parameters with_members(const PassProblem& problem, const FieldPrior& field, const Parameters& by_modes) {
+KappaAndDelta with_members(const PassProblem& problem, const FieldPrior& field, const KappaAndDelta& by_modes) {
   const Layout& modes = problem.layout();
   const Layout members = problem.setup().layout();
-  Parameters found{by_modes.gyros, MatrixXd::Zero(members.parameters(), members.parameters()), {}};
+  KappaAndDelta found{by_modes.gyros, MatrixXd::Zero(members.parameters(), members.parameters()), {}};
   PerGyro<MatrixXd> by_modes_of_gyro;
   const Eigen::Index size = members.drift_size() - Layout::kEq1;
   for (int k = 0; k < members.gyros; ++k) {
@@ -173,7 +173,7 @@ Parameters with_members(const PassProblem& problem, const FieldPrior& field, con
 
 /// What is known of the errors at the last moment of the pass.
 OpenLoopStart errors_at_end(const PassProblem& problem, const BatchResult& result, const PassProblem::Moment& last,
-                            const Parameters& parameters) {
+                            const KappaAndDelta& parameters) {
   const CalibrationSetup& setup = problem.setup().on_board;
   const Layout& own = problem.layout();
   const Layout& layout = setup.layout;
@@ -234,7 +234,7 @@ void Refinement::put_into(CalibrationRun& run) && {
   const Layout& layout = problem_.setup().on_board.layout;
   Calibration& calibration = run.calibration;
   const MatrixXd own = result_.errors.last_root.middleRows(problem_.layout().drift(0), problem_.layout().parameters());
-  Parameters parameters{result_.solution.gyros, own * own.transpose(),
+  KappaAndDelta parameters{result_.solution.gyros, own * own.transpose(),
                         MatrixXd::Identity(problem_.layout().parameters(), problem_.layout().parameters())};
   if (field_) {
     parameters = with_members(problem_, *field_, parameters);

@@ -12,6 +12,7 @@
 #include "choose/decide.hpp"
 #include "model/prior.hpp"
 #include "model/setup.hpp"
+#include "trihedron/ground/clocks/clocks.hpp"
 #include "trihedron/ground/evaluate/convergence.hpp"
 #include "trihedron/ground/evaluate/open_loop_forecast.hpp"
 #include "trihedron/ground/judge/verdict.hpp"
@@ -137,9 +138,42 @@ OpenLoopForecast forecast_of(const CalibrationOptions& options, const Pipeline& 
   return forecast(held.errors, held.gyros, motion, rule, options.need);
 }
 
-}  // namespace
+/// What is corrected before the calibration: what is switched off is not.
+ClockCorrection wanted_correction(const Clocks& clocks, const PassSettings& settings,
+                                  const CalibrationOptions& options) {
+  ClockCorrection correction = correction_by(clocks, settings);
+  if (options.further_states[FurtherState::kClockOffset] == FurtherStateOptions::Choice::kOff) {
+    correction.offset_s = correction.rate_s_s = 0;
+  }
+  return correction;
+}
 
-CalibrationRun calibrate(const Pass& pass, const CalibrationOptions& options, const Progress& progress) {
+/// With states for what the correction of the stamps leaves of the star tracker's clock.
+CalibrationOptions with_clock_states(CalibrationOptions options, const ClockCorrection& correction) {
+  const auto turn_on = [&](FurtherState state, bool wanted) {
+    FurtherStateOptions::Choice& choice = options.further_states[state];
+    if (wanted && choice == FurtherStateOptions::Choice::kAuto && options.estimator != Estimator::kPaper) {
+      choice = FurtherStateOptions::Choice::kOn;
+    }
+  };
+  turn_on(FurtherState::kClockOffset, correction.of_star_tracker());
+  turn_on(FurtherState::kClockRate, correction.rate_s_s != 0);
+  return options;
+}
+
+/// Makes estimates those of the telemetry as it was given.
+void add_to_estimates(const ClockCorrection& correction, std::vector<FurtherEstimate>& estimates) {
+  for (FurtherEstimate& estimate : estimates) {
+    if (estimate.parameter.is_further(FurtherState::kClockOffset)) {
+      estimate.value += correction.offset_s;
+    } else if (estimate.parameter.is_further(FurtherState::kClockRate)) {
+      estimate.value += correction.rate_s_s;
+    }
+  }
+}
+
+/// `pass`: with its stamps corrected. Without a verdict.
+CalibrationRun calibrate_as_stamped(const Pass& pass, const CalibrationOptions& options, const Progress& progress) {
   Decision decision = decide(pass, options);
   const bool by_batch = decision.options.estimator == Estimator::kBatch;
   Pipeline pipeline(pass.settings,
@@ -181,7 +215,25 @@ CalibrationRun calibrate(const Pass& pass, const CalibrationOptions& options, co
   add_statistics(run.fixes, run.calibration.statistics);
   run.calibration.determined = determined(run);
   run.calibration.forecast = forecast_of(run);
-  run.calibration.verdict = judge(pass, run);
+  return run;
+}
+
+}  // namespace
+
+CalibrationRun calibrate(const Pass& pass, const CalibrationOptions& options, const Progress& progress) {
+  const std::optional<Clocks> clocks = clocks_of(pass);
+  const ClockCorrection correction = clocks ? wanted_correction(*clocks, pass.settings, options) : ClockCorrection{};
+  std::optional<Pass> corrected;
+  if (correction.of_star_tracker() || correction.of_gyros()) {
+    corrected = pass;
+    correct(*corrected, correction);
+  }
+  const Pass& stamped = corrected ? *corrected : pass;
+  CalibrationRun run = calibrate_as_stamped(stamped, with_clock_states(options, correction), progress);
+  run.clocks = clocks;
+  run.clock_correction = correction;
+  add_to_estimates(correction, run.calibration.further);
+  run.calibration.verdict = judge(stamped, run);
   return run;
 }
 
@@ -203,6 +255,7 @@ NavigationRun navigate(const Pass& pass, const CalibrationOptions& options, cons
     run.misfit_limit = boost::math::quantile(boost::math::chi_squared(pipeline.layout().parameters()), 0.999);
   }
   run.forecast = forecast_of(options, pipeline, run.attitude);
+  run.clocks = clocks_of(pass);
   run.verdict = judge_navigation(pass, run);
   return run;
 }

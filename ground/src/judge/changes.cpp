@@ -110,7 +110,7 @@ std::string size_text(const Change& change) {
 
 /// Of the parameters by which the result is off, the largest in its claimed sigma.
 double sigmas_off(const CalibrationRun& run, const Change& change) {
-  constexpr int kOfGyro = Layout::kEq1 + 3;
+  constexpr int kOwnParameters = Layout::kEq1 + 3;
   double worst = 0;
   for (std::size_t row = 0; row < run.calibration.states.size(); ++row) {
     const ParameterId& state = run.calibration.states[row];
@@ -122,7 +122,7 @@ double sigmas_off(const CalibrationRun& run, const Change& change) {
       continue;  // outside eq. (1)
     }
     const auto at = static_cast<Eigen::Index>(row);
-    worst = std::max(worst, std::abs(change.parameters_off(kOfGyro * static_cast<Eigen::Index>(state.gyro()) + i)) /
+    worst = std::max(worst, std::abs(change.parameters_off(kOwnParameters * static_cast<Eigen::Index>(state.gyro()) + i)) /
                                 std::sqrt(run.calibration.covariance(at, at)));
   }
   return worst;

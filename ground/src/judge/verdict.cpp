@@ -13,6 +13,7 @@
 #include <utility>
 
 #include "judge/changes.hpp"
+#include "judge/clocks.hpp"
 #include "judge/drift_left.hpp"
 #include "judge/need.hpp"
 #include "judge/whiteness.hpp"
@@ -317,26 +318,16 @@ void judge_change(const CalibrationRun& run, std::vector<Finding>& findings) {
 
 void judge_star_tracker_errors(const CalibrationRun& run, std::vector<Finding>& findings) {
   constexpr double kSigmasToReport = 5;
-  double clock_s = 0;
   double orbital_rad = 0;
   double sureness = 0;
   for (const FurtherEstimate& state : run.calibration.further) {
     if (std::abs(state.value) < kSigmasToReport * state.sigma) {
       continue;
     }
-    if (state.parameter.is_further(FurtherState::kClockOffset)) {
-      clock_s = state.value;
-    } else if (state.parameter.is_further(FurtherState::kOrbitalError) &&
-               std::abs(state.value) > std::abs(orbital_rad)) {
+    if (state.parameter.is_further(FurtherState::kOrbitalError) && std::abs(state.value) > std::abs(orbital_rad)) {
       orbital_rad = state.value;
       sureness = std::abs(state.value / state.sigma);
     }
-  }
-  if (clock_s != 0) {
-    add(findings, FindingCode::kClockOffsetFound,
-        "The clock of the star tracker is off; the calibration has taken account of it.",
-        fmt::format("fixes hold the attitude {:+.2f} ms after their stamp", 1e3 * clock_s),
-        "Correct the time stamps of the star tracker.");
   }
   if (orbital_rad != 0) {
     add(findings, FindingCode::kOrbitalErrorFound,
@@ -621,6 +612,7 @@ Verdict judge(const Pass& pass, const CalibrationRun& run) {
   judge_drift_model(run, findings);
   judge_change(run, findings);
   judge_changes(run, findings);
+  judge_clocks(pass, run, findings);
   judge_star_tracker_errors(run, findings);
   judge_determination(run, findings);
   judge_steadiness(pass, run, findings);
@@ -645,6 +637,7 @@ Verdict judge_navigation(const Pass& pass, const NavigationRun& run) {
                     *run.held_parameters_misfit, run.misfit_limit),
         "Calibrate anew; drift coefficients change at every start of a rotor.");
   }
+  judge_clocks(pass, run, findings);
   judge_coverage(run, findings);
   judge_corrections(run, findings);
   judge_open_loops(run, findings);

@@ -173,6 +173,7 @@ double truth_of(const ParameterId& parameter, const Truth& truth) {
       const double at_end = *truth.gyros[parameter.owner].drift(DriftCoefficient::of_eq1(parameter.component));
       return at_end * (end - 1 - kChangeFraction) / end;
     }
+    case FurtherState::kClockRate:
     case FurtherState::kWanderingDrift:
       break;
   }

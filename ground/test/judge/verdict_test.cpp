@@ -157,6 +157,17 @@ TEST(Verdict, TellsOfErrorsOfTheStarTrackerThatWereFound) {
   EXPECT_TRUE(judge(good_pass(), run).trustworthy);
 }
 
+TEST(Verdict, TellsOfAClockRateThatWasFound) {
+  auto run = good_run();
+  run.calibration.further = {{parameter("clock_offset_s"), 1e-4, 1e-4}, {parameter("clock_rate_s_s"), 1e-8, 1e-8}};
+  EXPECT_THAT(codes(judge(good_pass(), run)), IsEmpty());
+  run.calibration.further[1].value = 1e-6;
+  const Verdict verdict = judge(good_pass(), run);
+  EXPECT_THAT(codes(verdict), ElementsAre("clock-rate-found"));
+  EXPECT_THAT(verdict.findings[0].text, HasSubstr("which of them is wrong"));
+  EXPECT_TRUE(verdict.trustworthy);
+}
+
 TEST(Verdict, FindsTooFewFixes) {
   auto run = good_run();
   run.calibration.statistics.fixes_used = 99;

@@ -17,13 +17,14 @@ inline constexpr int kMaxStarTrackers = 4;
 /// of calibration.json.
 enum class FurtherState : std::uint8_t {
   kClockOffset,           ///< τ of the star trackers: a fix stamped t holds the attitude at t + τ
+  kClockRate,             ///< of the star trackers: τ grows by so many seconds per second
   kOrbitalError,          ///< of the first star tracker: exp([(p_s sin nt + p_c cos nt)×]) in c
   kStarTrackerAlignment,  ///< of the star trackers other than the first; always there for those of the layout
   kReadoutBias,           ///< of the direction cosines of each gyro
   kCoefficientChange,     ///< of the coefficients of eq. (1) of each gyro, linear in time
   kWanderingDrift,        ///< first-order Gauss–Markov drift about the case axes of each gyro
 };
-inline constexpr std::size_t kFurtherStateCount = 6;
+inline constexpr std::size_t kFurtherStateCount = 7;
 
 /// Which of them are estimated; alignments of star trackers are not a choice.
 struct FurtherStates {
@@ -32,11 +33,12 @@ struct FurtherStates {
   bool coefficient_change = false;
   bool clock_offset = false;
   bool orbital_error = false;
+  bool clock_rate = false;
 
   friend constexpr bool operator==(const FurtherStates&, const FurtherStates&) = default;
 };
 
-inline constexpr FurtherStates kAllFurtherStates{true, true, true, true, true};
+inline constexpr FurtherStates kAllFurtherStates{true, true, true, true, true, true};
 
 /// First the states that move, then the constants gyro by gyro, then those that the gyros share.
 struct Layout {
@@ -77,8 +79,11 @@ struct Layout {
   /// The first state that the gyros share; those before it are the errors that move an attitude by the gyros.
   [[nodiscard]] constexpr int shared() const { return change(further.coefficient_change ? gyros : 0); }
   [[nodiscard]] constexpr int clock_offset(int /*of the pass*/ = 0) const { return shared(); }
-  [[nodiscard]] constexpr int orbital_error(int /*of the pass*/ = 0) const {
+  [[nodiscard]] constexpr int clock_rate(int /*of the pass*/ = 0) const {
     return shared() + (further.clock_offset ? 1 : 0);
+  }
+  [[nodiscard]] constexpr int orbital_error(int /*of the pass*/ = 0) const {
+    return clock_rate() + (further.clock_rate ? 1 : 0);
   }
   /// Alignment of star tracker 1, 2 …; the first, 0, has none, since its axes are c.
   [[nodiscard]] constexpr int star_tracker(int head) const {
@@ -112,7 +117,7 @@ struct FurtherStateKind {
   Owner owner;
   int size;                         ///< components of each owner
   int (Layout::*first)(int) const;  ///< position of those of an owner
-  /// Default 1-sigma of each component before anything is measured, in rad, rad/s or s. 0: CalibrationSetup has a
+  /// Default 1-sigma of each component before anything is measured, in rad, rad/s, s or s/s. 0: CalibrationSetup has a
   /// member of its own for it.
   double prior_sigma;
 };
@@ -121,6 +126,9 @@ struct FurtherStateKind {
 inline constexpr std::array<FurtherStateKind, kFurtherStateCount> kFurtherStateKinds = {{
     {FurtherState::kClockOffset, &FurtherStates::clock_offset, FurtherStateKind::Owner::kPass, 1, &Layout::clock_offset,
      0.1},
+    // A quartz oscillator is within 20 ppm or so of its rate; with compensation of its temperature, within some ppm.
+    {FurtherState::kClockRate, &FurtherStates::clock_rate, FurtherStateKind::Owner::kPass, 1, &Layout::clock_rate,
+     2e-5},
     {FurtherState::kOrbitalError, &FurtherStates::orbital_error, FurtherStateKind::Owner::kPass, 6,
      &Layout::orbital_error, 1e-4},
     {FurtherState::kStarTrackerAlignment, nullptr, FurtherStateKind::Owner::kFurtherStarTracker, 3,
@@ -191,7 +199,7 @@ inline constexpr Capacity kPassCapacity = Capacity::of({.gyros = kMaxGyros,
                                                         .further = kAllFurtherStates,
                                                         .star_trackers = kMaxStarTrackers});
 inline constexpr int kMaxDriftColumns = kPassCapacity.drift_columns;
-/// Clock offset, error at orbital period, alignments of further star trackers.
+/// Offset and rate of the clock, error at orbital period, alignments of further star trackers.
 inline constexpr int kMaxSharedStates = kLargestLayout.shared_size();
 /// Components of a fix: two across each momentum.
 inline constexpr int kMaxComponents = 2 * kMaxGyros;

@@ -68,12 +68,12 @@ struct CalibrationSetup {
 
   // Of the further states, where the layout has them.
   GaussMarkov wandering_drift;  ///< rad/s per case axis
-  /// 1-sigma of each component before anything is measured, rad, rad/s or s; of the change over change_time_s.
+  /// 1-sigma of each component before anything is measured, rad, rad/s, s or s/s; of the change over change_time_s.
   PerFurtherState<double> further_sigma = default_further_sigmas();
   double change_time_s = 32400;
   Time no_change_at{};                 ///< the coefficients stand for this time
   double orbital_rate_rad_s = 1.1e-3;  ///< n
-  Time orbital_phase_zero{};           ///< where nt = 0
+  Time orbital_phase_zero{};           ///< where nt = 0, and for which the clock offset stands
 
   /// A fix with a NIS above this is rejected; χ² of 4 degrees of freedom passes 30 once in 2e5 good fixes. That of a
   /// pair: of more gyros a gate that good fixes pass as often.
@@ -137,7 +137,7 @@ template <class Gyros>
   return means_are_usable(gyros, layout);
 }
 
-/// 1-sigma of one further state before anything is measured, rad, rad/s or s. `state`: its position, from
+/// 1-sigma of one further state before anything is measured, rad, rad/s, s or s/s. `state`: its position, from
 /// layout.readout(0) on.
 [[nodiscard]] double prior_sigma_of_further_state(const CalibrationSetup& setup, int state);
 

@@ -12,7 +12,7 @@
 namespace trihedron {
 
 /// Of a parameter.
-enum class Unit : std::uint8_t { kSecond, kRadian, kRadianPerSecond };
+enum class Unit : std::uint8_t { kSecond, kSecondPerSecond, kRadian, kRadianPerSecond };
 
 /// One kind of further states, as users meet it.
 struct FurtherStateRow {
@@ -31,6 +31,7 @@ struct FurtherStateRow {
 /// Names of the components.
 namespace further_state_components {
 inline constexpr std::array<std::string_view, 1> kClockOffset = {"clock_offset_s"};
+inline constexpr std::array<std::string_view, 1> kClockRate = {"clock_rate_s_s"};
 inline constexpr std::array<std::string_view, 6> kOrbitalError = {"orbital_sine_x_rad",   "orbital_sine_y_rad",
                                                                   "orbital_sine_z_rad",   "orbital_cosine_x_rad",
                                                                   "orbital_cosine_y_rad", "orbital_cosine_z_rad"};
@@ -46,6 +47,8 @@ inline constexpr std::array<std::string_view, 7> kCoefficientChange = {
 inline constexpr std::array<FurtherStateRow, kFurtherStateCount> kFurtherStates = {{
     {FurtherState::kClockOffset, "clock_offset", "Clock offset", "of the star tracker", Unit::kSecond,
      further_state_components::kClockOffset},
+    {FurtherState::kClockRate, "clock_rate", "Clock rate", "of the star tracker, against that of the gyros",
+     Unit::kSecondPerSecond, further_state_components::kClockRate},
     {FurtherState::kOrbitalError, "orbital_error", "Error at orbital period", "of the star tracker, at orbital period",
      Unit::kRadian, further_state_components::kOrbitalError},
     {FurtherState::kStarTrackerAlignment, "", "Alignment of a further star tracker", "", Unit::kRadian,

@@ -36,6 +36,9 @@ inline constexpr Range kPassDuration_s{60, kYear_s, "s",
                                        "than a year"};
 inline constexpr Range kGyroPeriod_s{1e-5, 60, "s", "it is the time between samples: 0.125 for 8 Hz"};
 inline constexpr Range kStarTrackerPeriod_s{1e-3, 86400, "s", "it is the time between fixes: 3 for one every 3 s"};
+inline constexpr Range kClockOffset_s{-1e3, 1e3, "s", "it is the time from a stamp to what it stands for"};
+inline constexpr Range kClockRate_s_s{-1e-2, 1e-2, "s/s", "1e-6 is a clock that gains a microsecond each second"};
+inline constexpr Range kLatency_s{-10, 10, "s", "it is the time from a reading to its stamp"};
 inline constexpr Range kReadoutNoise_rad{1e-9, 0.1, "rad",
                                          "it is the 1-sigma of a direction cosine, which is at most 1; an arcsecond is "
                                          "4.8e-6"};

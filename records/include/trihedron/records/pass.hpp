@@ -17,7 +17,9 @@ namespace trihedron {
 
 /// What is known of one gyro before the pass: prior means and 1-sigma.
 struct GyroPrior {
-  double readout_noise_rad = 0;                          ///< per direction cosine
+  double readout_noise_rad = 0;  ///< per direction cosine
+  /// By which its readings are stamped late. Those of a pass in memory are mended by it already.
+  double latency_s = 0;
   std::map<DriftCoefficient, double> drift_rad_s;        ///< missing means 0
   std::map<DriftCoefficient, double> drift_sigma_rad_s;  ///< missing means the common sigma
   double drift_common_sigma_rad_s = 0;
@@ -41,6 +43,10 @@ struct PassSettings {
   Duration gyro_period{};
   Duration star_tracker_period{};
   Eigen::Vector3d star_tracker_noise_rad{0, 0, 0};  ///< of the first head, 1-sigma about c x, y, z
+  /// A fix is stamped t in the telemetry where it holds the attitude at t + offset + rate (t − epoch). Stamps of a pass
+  /// in memory are mended by it already.
+  double star_tracker_clock_offset_s = 0;
+  double star_tracker_clock_rate_s_s = 0;
   std::vector<FurtherStarTracker> further_star_trackers;
   std::vector<GyroPrior> gyros;
   std::string start_up;  ///< of the rotors, "2009-05-20"; empty where it is not given
@@ -101,7 +107,8 @@ struct Truth {
   };
   /// Errors of a head that do not change at random; C_c_s as in FurtherStarTracker.
   struct StarTracker {
-    double clock_offset_s = 0;                  ///< a fix stamped t holds the attitude at t + offset
+    double clock_offset_s = 0;  ///< a fix stamped t holds the attitude at t + offset + rate (t − epoch)
+    double clock_rate_s_s = 0;
     Eigen::Vector3d orbital_sine_rad{0, 0, 0};  ///< of the error p_s sin nt + p_c cos nt, head axes
     Eigen::Vector3d orbital_cosine_rad{0, 0, 0};
     Eigen::Vector3d misalignment_rad{0, 0, 0};  ///< m, c axes

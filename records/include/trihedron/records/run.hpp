@@ -10,6 +10,7 @@
 
 #include "trihedron/core/status.hpp"
 #include "trihedron/records/calibration.hpp"
+#include "trihedron/records/clocks.hpp"
 #include "trihedron/records/options.hpp"
 #include "trihedron/records/pass.hpp"
 #include "trihedron/records/statistics.hpp"
@@ -115,6 +116,8 @@ struct Change {
 /// A calibration of a pass, and everything that was recorded on the way.
 struct CalibrationRun {
   CalibrationOptions options;                    ///< as decided
+  std::optional<Clocks> clocks;                  ///< where the pass shows them, by its stamps as they are given
+  ClockCorrection clock_correction;              ///< of the stamps, made before the calibration
   std::vector<Evidence> evidence;                ///< of what was left to the program to decide
   std::vector<DriftModelForecast> drift_models;  ///< that were compared, smallest first
   Calibration known_before;                      ///< values and covariance before the pass; states as in `calibration`
@@ -149,6 +152,7 @@ struct NavigationRun {
   SampleCounts samples;                 ///< from that of the first attitude on, by what was done with them
   long corrections = 0;                 ///< astro-corrections made
   long corrections_missed = 0;          ///< intervals over which there were fixes, but none that could correct
+  std::optional<Clocks> clocks;         ///< where the pass shows them
   std::vector<OpenLoopEnd> open_loops;  ///< where fixes could be compared with it
   Statistics statistics;
   /// Where parameters are held: (estimated − held)ᵀ P⁻¹ (estimated − held), P the covariance they were given with, and

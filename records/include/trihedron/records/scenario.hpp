@@ -151,6 +151,7 @@ struct ReadoutScenario {
   Eigen::Vector3d bias_rad{0, 0, 0};
   Eigen::Vector3d scale{0, 0, 0};
   double quantum_rad = 0;
+  double latency_s = 0;  ///< a reading stamped t holds the direction at t − latency
 
   double dropout_probability = 0;  ///< the sample is NaN
   double spike_probability = 0;    ///< one direction cosine is off by up to ± spike_rad
@@ -186,8 +187,9 @@ struct GyroScenario {
   ReadoutScenario readout{};
 };
 
-/// A star-tracker head with axes s; those of the first are c. A fix stamped t holds C_in_s(t + clock_offset − latency)
-/// exp([e×]), e in s axes the sum of the errors below, and is given as q_in_c by the mounting as designed.
+/// A star-tracker head with axes s; those of the first are c. A fix stamped t holds C_in_s(t + clock_offset +
+/// clock_rate (t − epoch) − latency) exp([e×]), e in s axes the sum of the errors below, and is given as q_in_c by the
+/// mounting as designed.
 struct StarTrackerScenario {
   // Of further heads only: C_c_s = exp([misalignment×]) exp([mounting×]).
   Eigen::Vector3d mounting_rotation_vector_rad{0, 0, 0};
@@ -196,6 +198,7 @@ struct StarTrackerScenario {
 
   Eigen::Vector3d noise_rad{3 * kArcsecond, 3 * kArcsecond, 20 * kArcsecond};  ///< white, about s x, y, z
   double clock_offset_s = 0;
+  double clock_rate = 0;  ///< s/s
   double latency_s = 0;
 
   MountingChange mounting_change{};  ///< of the head against the body, s axes

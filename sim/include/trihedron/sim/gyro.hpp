@@ -104,6 +104,10 @@ class Gyro {
 
   [[nodiscard]] const Vec<In>& momentum() const { return h_in_; }
   [[nodiscard]] Vec<Case> momentum_in_case() const { return C_in_b_.inverse() * h_in_; }
+  /// The same in the case of a body that stands at C_in_c.
+  [[nodiscard]] Vec<Case> momentum_in_case(const Rot<In, C>& C_in_c) const {
+    return (C_in_c * C_c_b_).inverse() * h_in_;
+  }
   [[nodiscard]] const Rot<C, Case>& alignment() const { return C_c_b_; }
   [[nodiscard]] const Drift& drift() const { return drift_; }
   /// Coefficients by Drift::part_in_eq1_rad_s(), alignment as it is now.

@@ -1,0 +1,151 @@
+#include "judge/clocks.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+
+namespace trihedron::ground {
+namespace {
+
+constexpr double kSigmasToTell = 5;
+/// From here on an offset is more than a state can hold (its prior sigma is 0.1 s), …
+constexpr double kTooFar_s = 0.3;
+/// … a change of it over the pass is seen, or is more than the attitude should suffer: at 0.5 deg/s 20 ms are 36″, …
+constexpr double kSeenChange_s = 0.01;
+constexpr double kTooMuchChange_s = 0.05;
+/// … and so is a gyro that is late against another.
+constexpr double kSeenLate_s = 2e-3;
+constexpr double kTooLate_s = 0.01;
+
+constexpr const char* kWhichClock =
+    "The two clocks alone do not tell which of them is wrong; times given are those of the gyros.";
+
+/// The line of pass.toml that mends the stamps; what it says already is in them.
+std::string cure_of_star_tracker(const PassSettings& settings, double offset_s, double rate_s_s) {
+  const double rate = settings.star_tracker_clock_rate_s_s + rate_s_s;
+  return fmt::format(
+      "Correct the stamps of the star tracker, or say in pass.toml, [star_tracker]: clock_offset_s = {:.4f}{}.",
+      settings.star_tracker_clock_offset_s + offset_s, rate == 0 ? "" : fmt::format(", clock_rate_s_s = {:.4g}", rate));
+}
+
+void add(std::vector<Finding>& findings, FindingCode code, Finding::Severity severity, std::string text,
+         std::string evidence, std::string cure) {
+  findings.push_back({code, std::move(text), std::move(evidence), std::move(cure), severity});
+}
+
+std::string offset_text(double offset_s) {
+  return std::abs(offset_s) < 1 ? fmt::format("{:+.2f} ms", 1e3 * offset_s) : fmt::format("{:+.4f} s", offset_s);
+}
+
+/// The value of a shared state of one component, where it is known to be there.
+double sure_value_of(const CalibrationRun& run, FurtherState state) {
+  for (const FurtherEstimate& estimate : run.calibration.further) {
+    if (estimate.parameter.is_further(state) && std::abs(estimate.value) >= kSigmasToTell * estimate.sigma) {
+      return estimate.value;
+    }
+  }
+  return 0;
+}
+
+void judge_late_gyros(const PassSettings& settings, const Clocks& clocks, const PerGyro<double>& late_s,
+                      std::vector<Finding>& findings, Finding::Severity severity, const char* what_of_it) {
+  for (int k = 0; k < static_cast<int>(settings.gyros.size()); ++k) {
+    if (late_s[k] == 0) {
+      continue;
+    }
+    const GyroPrior& prior = settings.gyros[static_cast<std::size_t>(k)];
+    const bool late = late_s[k] > 0;
+    add(findings, FindingCode::kGyroLate, severity,
+        fmt::format("The readings of gyro {} are stamped {} against those of gyro {}{}.", k + 1,
+                    late ? "late" : "early", clocks.reference + 1, what_of_it),
+        fmt::format("{:+.2f} ± {:.2f} ms", 1e3 * late_s[k], 1e3 * clocks.late_s[k].sigma),
+        fmt::format("Correct its stamps, or say in pass.toml, which then needs a [[gyro.unit]] for each gyro, in that "
+                    "of gyro {}: "
+                    "latency_s = {:.5f}.",
+                    k + 1, prior.latency_s + late_s[k]));
+  }
+}
+
+}  // namespace
+
+void judge_clocks(const Pass& pass, const CalibrationRun& run, std::vector<Finding>& findings) {
+  const ClockCorrection& correction = run.clock_correction;
+  const bool corrected = correction.of_star_tracker();
+  double offset_s = sure_value_of(run, FurtherState::kClockOffset);
+  double rate = sure_value_of(run, FurtherState::kClockRate);
+  if (offset_s == 0 && rate == 0 && corrected) {  // estimator paper has no states for them
+    offset_s = correction.offset_s;
+    rate = correction.rate_s_s;
+  }
+  const auto severity = corrected ? Finding::Severity::kWarning : Finding::Severity::kNote;
+  const std::string cure = cure_of_star_tracker(pass.settings, offset_s, rate);
+  if (offset_s != 0) {
+    add(findings, FindingCode::kClockOffsetFound, severity,
+        corrected ? fmt::format("The stamps of the star tracker are far off those of the gyros; the calibration has "
+                                "taken account of it. {}",
+                                kWhichClock)
+                  : "The clock of the star tracker is off that of the gyros; the calibration has taken account of it.",
+        fmt::format("fixes hold the attitude {} after their stamp", offset_text(offset_s)), cure);
+  }
+  if (rate != 0) {
+    add(findings, FindingCode::kClockRateFound, severity,
+        fmt::format("The clocks of star tracker and gyros run at different rates; the calibration has taken account of "
+                    "it. {}",
+                    kWhichClock),
+        fmt::format("{:+.4g} ppm: the stamps of the star tracker {} by {:.3g} ms an hour", 1e6 * rate,
+                    rate > 0 ? "fall behind" : "gain", 3.6e6 * std::abs(rate)),
+        cure);
+  }
+  if (!run.clocks) {
+    return;
+  }
+  judge_late_gyros(pass.settings, *run.clocks, correction.late_s, findings, Finding::Severity::kWarning,
+                   "; the calibration has interpolated them");
+  const Measured& middle = run.clocks->mid_offset_s;
+  if (!corrected && middle.is_sure(kSigmasToTell) && std::abs(middle.value) > kTooFar_s) {
+    add(findings, FindingCode::kClocksApart, Finding::Severity::kDoNotUse,
+        fmt::format(
+            "The stamps of the star tracker are far off those of the gyros, and by the settings nothing was done "
+            "about it. {}",
+            kWhichClock),
+        fmt::format("fixes hold the attitude {} after their stamp", offset_text(middle.value)),
+        cure_of_star_tracker(pass.settings, middle.value, 0));
+  }
+}
+
+void judge_clocks(const Pass& pass, const NavigationRun& run, std::vector<Finding>& findings) {
+  if (!run.clocks) {
+    return;
+  }
+  const Clocks& clocks = *run.clocks;
+  const Measured& middle = clocks.mid_offset_s;
+  const double change_s =
+      clocks.rate_s_s.is_sure(kSigmasToTell) ? clocks.rate_s_s.value * to_seconds(pass.settings.duration) : 0;
+  const bool far = middle.is_sure(kSigmasToTell) && std::abs(middle.value) > kTooFar_s;
+  if (far || std::abs(change_s) > kSeenChange_s) {
+    const bool wrong = far || std::abs(change_s) > kTooMuchChange_s;
+    const Measured& at_epoch = change_s == 0 ? middle : clocks.offset_s;
+    add(findings, FindingCode::kClocksApart, wrong ? Finding::Severity::kDoNotUse : Finding::Severity::kWarning,
+        fmt::format("The stamps of the star tracker are off those of the gyros, which is in the attitude. {}",
+                    kWhichClock),
+        fmt::format(
+            "fixes hold the attitude {} after their stamp in the middle of the pass; over the pass that changes "
+            "by {}",
+            offset_text(middle.value), offset_text(change_s)),
+        cure_of_star_tracker(pass.settings, at_epoch.value, change_s == 0 ? 0 : clocks.rate_s_s.value));
+  }
+  PerGyro<double> late_s{};
+  double latest_s = 0;
+  for (int k = 0; k < static_cast<int>(pass.settings.gyros.size()); ++k) {
+    const Measured& its = clocks.late_s[k];
+    late_s[k] = its.is_sure(kSigmasToTell) && std::abs(its.value) > kSeenLate_s ? its.value : 0;
+    latest_s = std::max(latest_s, std::abs(late_s[k]));
+  }
+  judge_late_gyros(pass.settings, clocks, late_s, findings,
+                   latest_s > kTooLate_s ? Finding::Severity::kDoNotUse : Finding::Severity::kWarning,
+                   ", which is in the attitude");
+}
+
+}  // namespace trihedron::ground

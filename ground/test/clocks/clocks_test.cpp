@@ -1,0 +1,229 @@
+#include "trihedron/ground/clocks/clocks.hpp"
+
+#include <gmock/gmock.h>
+
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+#include "passes.hpp"
+#include "trihedron/ground/calibrate/calibrate.hpp"
+#include "trihedron/ground/judge/verdict.hpp"
+#include "trihedron/sim/simulate.hpp"
+
+namespace trihedron::ground {
+namespace {
+
+using testing::HasSubstr;
+
+Scenario four_hours(std::uint64_t seed) { return scenario_in_eq1(seed, std::chrono::hours(4)); }
+
+Clocks clocks_of(const Scenario& scenario) {
+  const auto found = ground::clocks_of(sim::simulate(scenario).pass);
+  return found.value();
+}
+
+void expect_within(const Measured& found, double truth, double sigmas) {
+  EXPECT_LT(std::abs(found.value - truth), sigmas * found.sigma) << found.value << " ± " << found.sigma;
+}
+
+void expect_finding(const Verdict& verdict, FindingCode code, const char* cure) {
+  const auto found = std::ranges::find(verdict.findings, code, &Finding::code);
+  ASSERT_NE(found, verdict.findings.end()) << name_of(code);
+  EXPECT_THAT(found->cure, HasSubstr(cure));
+}
+
+/// Five of its sigmas: once in two million times of independent noise; what the drift of the lag leaves is in it.
+constexpr double kSigmas = 5;
+
+TEST(Clocks, ThatAgreeAreLeftAlone) {
+  for (const std::uint64_t seed : {1U, 2U, 3U, 4U, 5U}) {
+    Scenario scenario = four_hours(seed);
+    scenario.gyros[0].drift.outside_sigma_rad_s = 1e-8;
+    scenario.star_tracker.outlier_probability = 0.01;
+    const Clocks clocks = clocks_of(scenario);
+    expect_within(clocks.mid_offset_s, 0, kSigmas);
+    expect_within(clocks.rate_s_s, 0, kSigmas);
+    expect_within(clocks.late_s[1 - clocks.reference], 0, kSigmas);
+    EXPECT_LT(clocks.mid_offset_s.sigma, 5e-4);
+    const ClockCorrection correction = correction_by(clocks, sim::simulate(scenario).pass.settings);
+    EXPECT_FALSE(correction.of_star_tracker() || correction.of_gyros()) << seed;
+  }
+}
+
+TEST(Clocks, OfAStarTrackerSecondsOrMinutesOffAreFound) {
+  for (const double offset_s : {-3.0, 1.3, 0.4, -120.0, 500.0}) {
+    Scenario scenario = four_hours(7);
+    scenario.star_tracker.clock_offset_s = offset_s;
+    const Clocks clocks = clocks_of(scenario);
+    expect_within(clocks.mid_offset_s, offset_s, kSigmas);
+    const ClockCorrection correction = correction_by(clocks, sim::simulate(scenario).pass.settings);
+    EXPECT_NEAR(correction.offset_s, offset_s, 2e-3);
+    EXPECT_EQ(correction.rate_s_s, 0);
+  }
+}
+
+TEST(Clocks, OfAnotherRateAreFound) {
+  for (const double rate : {1e-4, -1e-5, 1e-6}) {
+    Scenario scenario = four_hours(8);
+    scenario.star_tracker.clock_rate = rate;
+    const Clocks clocks = clocks_of(scenario);
+    expect_within(clocks.rate_s_s, rate, kSigmas);
+    expect_within(clocks.offset_s, 0, kSigmas);
+    // What the state can hold is left to it.
+    const ClockCorrection correction = correction_by(clocks, sim::simulate(scenario).pass.settings);
+    EXPECT_EQ(correction.of_star_tracker(), std::abs(rate) > 5e-6);
+  }
+}
+
+TEST(Clocks, OfAGyroThatIsLateAreFound) {
+  for (const std::size_t late : {0U, 1U}) {
+    Scenario scenario = four_hours(9);
+    scenario.gyros[late].readout.latency_s = 0.02;
+    const Clocks clocks = clocks_of(scenario);
+    // The star tracker agrees with the other one.
+    EXPECT_EQ(clocks.reference, late == 0 ? 1 : 0);
+    expect_within(clocks.mid_offset_s, 0, kSigmas);
+    expect_within(clocks.late_s[static_cast<int>(late)], 0.02, kSigmas);
+  }
+}
+
+TEST(Clocks, OfThreeGyrosTheOneThatDiffersIsLate) {
+  Scenario scenario = four_hours(10);
+  scenario.gyros.push_back(scenario.gyros[0]);
+  scenario.gyros[2].start_direction_c = {0.1, -0.2, 0.97};
+  scenario.gyros[1].readout.latency_s = -0.01;
+  scenario.star_tracker.clock_offset_s = 2;
+  const Clocks clocks = clocks_of(scenario);
+  EXPECT_NE(clocks.reference, 1);
+  expect_within(clocks.mid_offset_s, 2, kSigmas);
+  expect_within(clocks.late_s[1], -0.01, kSigmas);
+  expect_within(clocks.late_s[2 - clocks.reference], 0, kSigmas);
+}
+
+TEST(Clocks, AreNotInventedWhereTheBodyTurnsEvenly) {
+  for (const double offset_s : {0.0, -3.0}) {
+    Scenario scenario = four_hours(11);
+    scenario.attitude.slews = std::vector<Slew>{};
+    scenario.star_tracker.clock_offset_s = offset_s;
+    EXPECT_FALSE(ground::clocks_of(sim::simulate(scenario).pass).has_value());
+  }
+}
+
+TEST(Clocks, OfAShortOrEmptyPassAreNotTold) {
+  Pass pass = sim::simulate(scenario_in_eq1(1, std::chrono::minutes(2))).pass;
+  EXPECT_FALSE(ground::clocks_of(pass).has_value());
+  pass.star_tracker = {};
+  EXPECT_FALSE(ground::clocks_of(pass).has_value());
+  pass.gyro.t.clear();
+  pass.gyro.h.clear();
+  EXPECT_FALSE(ground::clocks_of(pass).has_value());
+}
+
+TEST(Clocks, CorrectionGivesThePassOfStampsThatAgree) {
+  Scenario scenario = scenario_in_eq1(12, std::chrono::minutes(20));
+  scenario.attitude.jitter_rad = 0;
+  for (GyroScenario& gyro : scenario.gyros) {
+    gyro.readout.noise_rad = 0;
+  }
+  const Pass good = sim::simulate(scenario).pass;
+  Pass late = good;
+  late.gyro.h[3 * 2 * 1000] = std::nan("");  // of gyro 1
+  for (std::size_t i = late.gyro.size(); --i > 0;) {
+    const Eigen::Vector3d now = good.gyro.direction(i, 1);
+    const Eigen::Vector3d then = good.gyro.direction(i - 1, 1);
+    Eigen::Map<Eigen::Vector3d>(&late.gyro.h[(2 * i + 1) * 3]) = 0.8 * now + 0.2 * then;  // 25 ms late
+  }
+  ClockCorrection correction{2, 1e-3, {}};
+  correction.late_s[1] = 0.025;
+  correct(late, correction);
+  for (std::size_t i = 10; i + 10 < good.gyro.size(); ++i) {
+    // A parabola between samples: 72″/s² × (0.125 s)².
+    ASSERT_LT((late.gyro.direction(i, 1) - good.gyro.direction(i, 1)).norm(), 6e-6) << i;
+    ASSERT_EQ(late.gyro.direction(i, 0).hasNaN(), i == 1000);
+  }
+  EXPECT_TRUE(late.gyro.direction(good.gyro.size() - 1, 1).hasNaN());  // nothing follows
+  for (std::size_t i = 0; i < good.star_tracker.size(); ++i) {
+    const double before_s = to_seconds(good.star_tracker.t[i] - good.settings.epoch);
+    EXPECT_NEAR(to_seconds(late.star_tracker.t[i] - good.settings.epoch), before_s * (1 + 1e-3) + 2, 2e-9);
+  }
+}
+
+/// A fault of the clocks, what names it, and the line that mends it.
+struct Fault {
+  const char* name;
+  void (*put)(Scenario&);
+  FindingCode code;
+  const char* cure;
+};
+
+const Fault kFaults[] = {
+    {"late", [](Scenario& s) { s.star_tracker.latency_s = 3; }, FindingCode::kClockOffsetFound, "clock_offset_s = -"},
+    {"early", [](Scenario& s) { s.star_tracker.clock_offset_s = 60; }, FindingCode::kClockOffsetFound,
+     "clock_offset_s = "},
+    {"ppm100", [](Scenario& s) { s.star_tracker.clock_rate = 1e-4; }, FindingCode::kClockRateFound,
+     "clock_rate_s_s = "},
+    {"ppm1", [](Scenario& s) { s.star_tracker.clock_rate = 1e-6; }, FindingCode::kClockRateFound, "clock_rate_s_s = "},
+    {"gyro", [](Scenario& s) { s.gyros[1].readout.latency_s = 0.02; }, FindingCode::kGyroLate, "latency_s = 0.0"}};
+
+class ClockFaults : public testing::TestWithParam<Estimator> {};
+
+/// χ² of 20 passes 45 once in a thousand times.
+constexpr double kNeesBound = 45;
+
+TEST_P(ClockFaults, AreTakenAccountOfAndNamed) {
+  CalibrationOptions options;
+  options.estimator = GetParam();
+  for (const Fault& fault : kFaults) {
+    Scenario scenario = four_hours(3);
+    fault.put(scenario);
+    const auto simulated = sim::simulate(scenario);
+    const auto run = calibrate(simulated.pass, options);
+    EXPECT_LT(nees_of(simulated.truth, run.calibration), kNeesBound) << fault.name;
+    EXPECT_TRUE(run.calibration.verdict.trustworthy) << fault.name;
+    expect_finding(run.calibration.verdict, fault.code, fault.cure);
+    for (const FurtherEstimate& estimate : run.calibration.further) {
+      const Truth::StarTracker& truth = simulated.truth.star_trackers[0];
+      if (estimate.parameter.is_further(FurtherState::kClockOffset)) {
+        EXPECT_LT(std::abs(estimate.value - truth.clock_offset_s), kSigmas * estimate.sigma) << fault.name;
+      } else if (estimate.parameter.is_further(FurtherState::kClockRate)) {
+        EXPECT_LT(std::abs(estimate.value - truth.clock_rate_s_s), kSigmas * estimate.sigma) << fault.name;
+      }
+    }
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(All, ClockFaults, testing::Values(Estimator::kInvariant, Estimator::kBatch));
+
+TEST(Calibrate, LeavesClocksThatAreSwitchedOffAndSaysSo) {
+  Scenario scenario = scenario_in_eq1(3, std::chrono::hours(2));
+  scenario.star_tracker.clock_offset_s = -3;
+  const auto run = calibrate(sim::simulate(scenario).pass, told());
+  EXPECT_FALSE(run.clock_correction.of_star_tracker());
+  EXPECT_FALSE(run.calibration.verdict.trustworthy);
+  expect_finding(run.calibration.verdict, FindingCode::kClocksApart, "clock_offset_s = -");
+}
+
+TEST(Navigate, TellsOfClocksThatAreApart) {
+  const auto verdict_with = [](double offset_s, double rate, double late_s) {
+    Scenario scenario = scenario_in_eq1(3, std::chrono::hours(2));
+    scenario.star_tracker.clock_offset_s = offset_s;
+    scenario.star_tracker.clock_rate = rate;
+    scenario.gyros[1].readout.latency_s = late_s;
+    CalibrationOptions options;
+    options.drift_model = kEsg7;
+    return navigate(sim::simulate(scenario).pass, options).verdict;
+  };
+  const Verdict good = verdict_with(0.01, 0, 0);
+  EXPECT_FALSE(good.has(FindingCode::kClocksApart) || good.has(FindingCode::kGyroLate));
+  expect_finding(verdict_with(-3, 0, 0), FindingCode::kClocksApart, "clock_offset_s = -");
+  const Verdict fast = verdict_with(0, 1e-4, 0);
+  expect_finding(fast, FindingCode::kClocksApart, "clock_rate_s_s = ");
+  EXPECT_FALSE(fast.trustworthy);
+  const Verdict late = verdict_with(0, 0, 0.02);
+  expect_finding(late, FindingCode::kGyroLate, "latency_s = 0.0");
+  EXPECT_FALSE(late.trustworthy);
+}
+
+}  // namespace
+}  // namespace trihedron::ground
