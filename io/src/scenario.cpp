@@ -215,17 +215,18 @@ Fields readout_fields(ReadoutScenario& readout) {
 
 Fields unit_fields(GyroScenario& gyro, const fs::path& file) {
   return Fields{
-      three_numbers("start_direction_c", gyro.start_direction_c, limits::kPureNumber,
-                    "of the momentum, c axes, of any length but 0"),
-      three_quantities("mounting_rotation_vector", gyro.mounting_rotation_vector_rad, kAngle, "as designed and known"),
-      three_quantities("misalignment", gyro.misalignment_rad, kAngle, "c axes; without it drawn from the seed"),
-      quantity("misalignment_magnitude", gyro.misalignment_magnitude_rad, kAngle, "of the one that is drawn"),
-      quantity("alignment_prior_sigma", gyro.alignment_prior_sigma_rad, kAngle,
-               "1-sigma per axis; the estimator is told it"),
-      section("drift", file, "[gyro.drift]", "how the momentum precesses",
-              [&gyro, &file] { return drift_fields(gyro.drift, file); }),
-      section("readout", file, "[gyro.readout]", "how the direction of the momentum is read",
-              [&gyro] { return readout_fields(gyro.readout); })} +
+             three_numbers("start_direction_c", gyro.start_direction_c, limits::kPureNumber,
+                           "of the momentum, c axes, of any length but 0"),
+             three_quantities("mounting_rotation_vector", gyro.mounting_rotation_vector_rad, kAngle,
+                              "as designed and known"),
+             three_quantities("misalignment", gyro.misalignment_rad, kAngle, "c axes; without it drawn from the seed"),
+             quantity("misalignment_magnitude", gyro.misalignment_magnitude_rad, kAngle, "of the one that is drawn"),
+             quantity("alignment_prior_sigma", gyro.alignment_prior_sigma_rad, kAngle,
+                      "1-sigma per axis; the estimator is told it"),
+             section("drift", file, "[gyro.drift]", "how the momentum precesses",
+                     [&gyro, &file] { return drift_fields(gyro.drift, file); }),
+             section("readout", file, "[gyro.readout]", "how the direction of the momentum is read",
+                     [&gyro] { return readout_fields(gyro.readout); })} +
          mounting_change_fields(gyro.mounting_change);
 }
 
@@ -260,32 +261,34 @@ void read_gyros(const toml::table& table, const fs::path& file, Scenario& scenar
 Fields head_fields(StarTrackerScenario& head, const fs::path& file) {
   using Aberration = StarTrackerScenario::Aberration;
   return Fields{
-      three_quantities("noise", head.noise_rad, kAngle, "1-sigma about its x, y, z, white"),
-      signed_duration("clock_offset", head.clock_offset_s, "a fix stamped t holds the attitude at t + offset"),
-      one_number("clock_rate", head.clock_rate, limits::kClockRate_s_s,
-                 "by which that offset grows, in seconds per second from the start of the pass on"),
-      signed_duration("latency", head.latency_s, "a fix stamped t holds the attitude at t - latency"),
-      three_quantities("orbital_sine", head.orbital_sine_rad, kAngle, "of the error at orbital period"),
-      three_quantities("orbital_cosine", head.orbital_cosine_rad, kAngle, "of the error at orbital period"),
-      three_quantities("field_error", head.field_error_rad, kAngle,
-                       "1-sigma of the error that depends on where the stars stand in the field of view"),
-      quantity("field_correlation", head.field_correlation_rad, kAngle,
-               "by which the field moves until that error is another"),
-      choice<Aberration>("aberration", head.aberration, "of starlight",
-                         {{"corrected", Aberration::kCorrected}, {"uncorrected", Aberration::kUncorrected}}),
-      quantity("sun_exclusion", head.sun_exclusion_rad, kAngle, "no fix with the boresight nearer to the Sun's centre"),
-      quantity("earth_exclusion", head.earth_exclusion_rad, kAngle,
-               "no fix with the boresight nearer to the Earth's limb"),
-      quantity("max_rate", head.max_rate_rad_s, kRate, "no fix above this body rate"),
-      list("outages", file, head.outages, "without any fix", interval_fields),
-      one_number("dropout_probability", head.dropout_probability, limits::kPureNumber, "that a fix is missing"),
-      one_number("outlier_probability", head.outlier_probability, limits::kPureNumber, "that a fix is wrong"),
-      quantity("outlier", head.outlier_rad, kAngle, "by at most so much"),
-      one_number("wrong_sign_probability", head.wrong_sign_probability, limits::kPureNumber,
-                 "that -q is given in place of q"),
-      three_quantities("inertial_step", head.inertial_step_rad, kAngle,
-                       "rotation vector by which what it takes for in turns at once, in axes"),
-      signed_duration("inertial_step_at", head.inertial_step_at_s, "when it does, since the start of the pass")} +
+             three_quantities("noise", head.noise_rad, kAngle, "1-sigma about its x, y, z, white"),
+             signed_duration("clock_offset", head.clock_offset_s, "a fix stamped t holds the attitude at t + offset"),
+             one_number("clock_rate", head.clock_rate, limits::kClockRate_s_s,
+                        "by which that offset grows, in seconds per second from the start of the pass on"),
+             signed_duration("latency", head.latency_s, "a fix stamped t holds the attitude at t - latency"),
+             three_quantities("orbital_sine", head.orbital_sine_rad, kAngle, "of the error at orbital period"),
+             three_quantities("orbital_cosine", head.orbital_cosine_rad, kAngle, "of the error at orbital period"),
+             three_quantities("field_error", head.field_error_rad, kAngle,
+                              "1-sigma of the error that depends on where the stars stand in the field of view"),
+             quantity("field_correlation", head.field_correlation_rad, kAngle,
+                      "by which the field moves until that error is another"),
+             choice<Aberration>("aberration", head.aberration, "of starlight",
+                                {{"corrected", Aberration::kCorrected}, {"uncorrected", Aberration::kUncorrected}}),
+             quantity("sun_exclusion", head.sun_exclusion_rad, kAngle,
+                      "no fix with the boresight nearer to the Sun's centre"),
+             quantity("earth_exclusion", head.earth_exclusion_rad, kAngle,
+                      "no fix with the boresight nearer to the Earth's limb"),
+             quantity("max_rate", head.max_rate_rad_s, kRate, "no fix above this body rate"),
+             list("outages", file, head.outages, "without any fix", interval_fields),
+             one_number("dropout_probability", head.dropout_probability, limits::kPureNumber, "that a fix is missing"),
+             one_number("outlier_probability", head.outlier_probability, limits::kPureNumber, "that a fix is wrong"),
+             quantity("outlier", head.outlier_rad, kAngle, "by at most so much"),
+             one_number("wrong_sign_probability", head.wrong_sign_probability, limits::kPureNumber,
+                        "that -q is given in place of q"),
+             three_quantities("inertial_step", head.inertial_step_rad, kAngle,
+                              "rotation vector by which what it takes for in turns at once, in axes"),
+             signed_duration("inertial_step_at", head.inertial_step_at_s,
+                             "when it does, since the start of the pass")} +
          mounting_change_fields(head.mounting_change);
 }
 

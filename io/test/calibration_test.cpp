@@ -78,9 +78,8 @@ TEST(CalibrationJson, RefusesAForecastThatIsNone) {
     changed.replace(changed.find(from), from.size(), to);
     return refusal_of(changed);
   };
-  EXPECT_THAT(refusal_with("\"error_95_rad\": [0.0, 0.0]", "\"error_95_rad\": [0.0]"),
-              HasSubstr("1 values for 2 times"));
-  EXPECT_THAT(refusal_with("\"error_95_rad\": [0.0, 0.0]", "\"error_95_rad\": [0.0, -1.0]"), HasSubstr("outside"));
+  EXPECT_THAT(refusal_with("\"error_95_rad\":[0.0,0.0]", "\"error_95_rad\":[0.0]"), HasSubstr("1 values for 2 times"));
+  EXPECT_THAT(refusal_with("\"error_95_rad\":[0.0,0.0]", "\"error_95_rad\":[0.0,-1.0]"), HasSubstr("outside"));
 }
 
 TEST(CalibrationJson, NamesTheStartUpWhereItIsKnown) {

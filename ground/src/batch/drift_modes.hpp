@@ -1,6 +1,6 @@
 #pragma once
-/// Modes of the drift field: the combinations of coefficients outside eq. (1) that a pass can show (docs/mathematics.md,
-/// section 12).
+/// Modes of the drift field: the combinations of coefficients outside eq. (1) that a pass can show
+/// (docs/mathematics.md, section 12).
 
 #include <Eigen/Core>
 #include <vector>
@@ -21,8 +21,8 @@ struct DriftModes {
   [[nodiscard]] int size() const { return static_cast<int>(gyros[0].coefficients.cols()); }
 };
 
-/// κ and δ of all gyros in the layout `to` by those in the layout `from`: coefficients of eq. (1) and alignments are the
-/// same, and `outside` makes the coefficients outside eq. (1) of each gyro, or the amplitudes of its modes.
+/// κ and δ of all gyros in the layout `to` by those in the layout `from`: coefficients of eq. (1) and alignments are
+/// the same, and `outside` makes the coefficients outside eq. (1) of each gyro, or the amplitudes of its modes.
 [[nodiscard]] Eigen::MatrixXd parameters_by_parameters(const Layout& to, const Layout& from,
                                                        const PerGyro<Eigen::MatrixXd>& outside);
 

@@ -1,5 +1,5 @@
-// Compiled once for each instruction set, with TRIHEDRON_KERNEL the name of the function. Eigen goes into a namespace of
-// that name: functions of one name compiled for different processors must not meet in a program, in which the linker
+// Compiled once for each instruction set, with TRIHEDRON_KERNEL the name of the function. Eigen goes into a namespace
+// of that name: functions of one name compiled for different processors must not meet in a program, in which the linker
 // keeps any of them.
 #define Eigen TRIHEDRON_KERNEL
 #include <Eigen/QR>

@@ -249,9 +249,7 @@ class Constancy {
     const auto at = static_cast<std::size_t>(stretch);
     return problem_.begin_of((begins_[at] + begins_[at + 1]) / 2);
   }
-  [[nodiscard]] Index parameter(Index step, int gyro, int i) const {
-    return step * of_stretch() + kOfGyro * gyro + i;
-  }
+  [[nodiscard]] Index parameter(Index step, int gyro, int i) const { return step * of_stretch() + kOfGyro * gyro + i; }
   [[nodiscard]] Index momentum(Index step, int gyro) const {
     return step * of_stretch() + kOfGyro * layout_.gyros + 2L * gyro;
   }
@@ -269,8 +267,8 @@ class Constancy {
   void put_into(Change& change, const Eigen::SparseMatrix<double>& columns, const VectorXd& prior_sigma) const {
     const MatrixXd by_form = form_.topLeftCorner(size(), size()) * columns;
     const auto D = prior_sigma.asDiagonal();
-    const MatrixXd S = MatrixXd(D * (columns.transpose() * by_form) * D) +
-                       MatrixXd::Identity(prior_sigma.size(), prior_sigma.size());
+    const MatrixXd S =
+        MatrixXd(D * (columns.transpose() * by_form) * D) + MatrixXd::Identity(prior_sigma.size(), prior_sigma.size());
     const VectorXd b = -(D * (columns.transpose() * form_.topRightCorner(size(), 1)));
     const Eigen::LLT<MatrixXd> root(S);
     const VectorXd found = root.solve(b);
@@ -383,32 +381,28 @@ std::vector<Change> changes_over(const Trial& trial) {
   const auto once_at = [](Index when) { return [when](Index step) { return step == when ? 1.0 : 0.0; }; };
   const auto evenly = [&](Index step) { return pass.part(step + 1) - pass.part(step); };
   const auto decaying = [&](double time) {
-    return [&pass, time](Index step) {
-      return std::exp(-pass.part(step) / time) - std::exp(-pass.part(step + 1) / time);
-    };
+    return
+        [&pass, time](Index step) { return std::exp(-pass.part(step) / time) - std::exp(-pass.part(step + 1) / time); };
   };
 
   for (int k = -1; k < layout.gyros; ++k) {
     const Moving moving = k < 0 ? Moving::kStarTracker : Moving::kGyroCase;
-    consider(what(moving, Motion::kRamp, k), along(k, Layout::kEq1, 3, true, evenly),
-             sigmas(3, kMoves_rad));
-    consider(what(Moving::kCoefficients, Motion::kRamp, k),
-             along(k, 0, Layout::kEq1, false, evenly), coefficients(k));
+    consider(what(moving, Motion::kRamp, k), along(k, Layout::kEq1, 3, true, evenly), sigmas(3, kMoves_rad));
+    consider(what(Moving::kCoefficients, Motion::kRamp, k), along(k, 0, Layout::kEq1, false, evenly), coefficients(k));
     for (const double time : {0.05, 0.1, 0.2, 0.4}) {
-      consider(what(Moving::kCoefficients, Motion::kDecay, k),
-               along(k, 0, Layout::kEq1, false, decaying(time)), coefficients(k));
+      consider(what(Moving::kCoefficients, Motion::kDecay, k), along(k, 0, Layout::kEq1, false, decaying(time)),
+               coefficients(k));
     }
     for (Index step = 0; step < steps; ++step) {
       const Time from = pass.middle(step);
       const Time until = pass.middle(step + 1);
-      consider(what(moving, Motion::kStep, k, from, until),
-               along(k, Layout::kEq1, 3, true, once_at(step)), sigmas(3, kMoves_rad));
+      consider(what(moving, Motion::kStep, k, from, until), along(k, Layout::kEq1, 3, true, once_at(step)),
+               sigmas(3, kMoves_rad));
       consider(what(Moving::kCoefficients, Motion::kStep, k, from, until),
                along(k, 0, Layout::kEq1, false, once_at(step)), coefficients(k));
       Entries entries;
       for (int gyro = std::max(k, 0); gyro < (k < 0 ? layout.gyros : k + 1); ++gyro) {
-        const Eigen::Matrix<double, 2, 3> by_turn =
-            across(found.before.arcs[pass.arc(step)].h_in[gyro]).transpose();
+        const Eigen::Matrix<double, 2, 3> by_turn = across(found.before.arcs[pass.arc(step)].h_in[gyro]).transpose();
         for (int i = 0; i < 2; ++i) {
           for (int j = 0; k < 0 && j < 3; ++j) {
             entries.emplace_back(pass.momentum(step, gyro) + i, j, by_turn(i, j));
@@ -418,8 +412,8 @@ std::vector<Change> changes_over(const Trial& trial) {
           }
         }
       }
-      consider(what(k < 0 ? Moving::kInertialAxes : Moving::kMomentum, Motion::kStep, k, from, until),
-               entries, sigmas(k < 0 ? 3 : 2, kMoves_rad));
+      consider(what(k < 0 ? Moving::kInertialAxes : Moving::kMomentum, Motion::kStep, k, from, until), entries,
+               sigmas(k < 0 ? 3 : 2, kMoves_rad));
     }
   }
   const auto shape = [](Index at, Index size) {
@@ -433,8 +427,7 @@ std::vector<Change> changes_over(const Trial& trial) {
   velocity.head<3>().setConstant(kAnnual);
   consider(what(Moving::kAberration, Motion::kPresent, -1), shape(pass.aberration(), kOfAberration), velocity);
   for (int k = 0; k < layout.gyros; ++k) {
-    consider(what(Moving::kReadoutScale, Motion::kPresent, k), shape(pass.scale(k), 3),
-             sigmas(3, kScale));
+    consider(what(Moving::kReadoutScale, Motion::kPresent, k), shape(pass.scale(k), 3), sigmas(3, kScale));
   }
   for (const double part : {0.01, 0.03, 0.1, 0.3, 1.0}) {
     Entries entries;

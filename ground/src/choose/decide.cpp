@@ -175,8 +175,8 @@ CalibrationOptions wandering_like(const NoiseFit& walking, CalibrationOptions op
 /// The noise is larger than the settings say, so the states were decided with too small a noise. Decides again, with
 /// the noise found while all states are free, and decides whether the drift wanders. `everything`: the trial with all
 /// states free and the noise of the settings; `walk`: the noise found with the states decided first. Where the largest
-/// drift model with its own noise is likelier than these, it is kept: noise in place of the members that the smaller one
-/// lacks, which act at every orbit alike, would make its sigmas wrong, though its forecasts are as good.
+/// drift model with its own noise is likelier than these, it is kept: noise in place of the members that the smaller
+/// one lacks, which act at every orbit alike, would make its sigmas wrong, though its forecasts are as good.
 void decide_again_with_more_noise(const Pass& pass, const Screened& screened, const CalibrationOptions& asked,
                                   const DriftModelId& largest_model, bool wandering_is_open, Trial everything,
                                   const NoiseFit& walk, Decision& decision) {

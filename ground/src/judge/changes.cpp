@@ -81,14 +81,15 @@ std::string cure_of(const Change& change) {
                  ? "Cut the pass there and calibrate on the parts apart; look for what happened at that time."
                  : "Look for what warms the mounting; calibrate on a shorter pass.";
     case Moving::kCoefficients:
-      return change.motion == Motion::kStep
-                 ? "Cut the pass there and calibrate on the parts apart."
-                 : "Use estimator batch with coefficient_change = \"on\" in [further_states], or calibrate on a shorter "
-                   "and later part of the pass.";
+      return change.motion == Motion::kStep ? "Cut the pass there and calibrate on the parts apart."
+                                            : "Use estimator batch with coefficient_change = \"on\" in "
+                                              "[further_states], or calibrate on a shorter "
+                                              "and later part of the pass.";
     case Moving::kAberration:
       return "Correct aberration in the star tracker, or in its fixes before they come here.";
     case Moving::kReadoutScale:
-      return "Correct the scales of the direction cosines; check that each reading is a unit vector before it is scaled.";
+      return "Correct the scales of the direction cosines; check that each reading is a unit vector before it is "
+             "scaled.";
   }
   return {};
 }
@@ -100,11 +101,10 @@ std::string size_text(const Change& change) {
   }
   const double size = change.size.norm();
   const double sigma = change.sigma.norm();
-  const std::string text =
-      change.moving == Moving::kCoefficients ? fmt::format("{:.1e} ± {:.1e} rad/s", size, sigma)
-      : change.moving == Moving::kAberration || change.moving == Moving::kReadoutScale
-          ? fmt::format("{:.1e} ± {:.1e}", size, sigma)
-          : fmt::format("{} ± {}", angle_text(size), angle_text(sigma));
+  const std::string text = change.moving == Moving::kCoefficients ? fmt::format("{:.1e} ± {:.1e} rad/s", size, sigma)
+                           : change.moving == Moving::kAberration || change.moving == Moving::kReadoutScale
+                               ? fmt::format("{:.1e} ± {:.1e}", size, sigma)
+                               : fmt::format("{} ± {}", angle_text(size), angle_text(sigma));
   return text + ", ";
 }
 
@@ -122,8 +122,9 @@ double sigmas_off(const CalibrationRun& run, const Change& change) {
       continue;  // outside eq. (1)
     }
     const auto at = static_cast<Eigen::Index>(row);
-    worst = std::max(worst, std::abs(change.parameters_off(kOwnParameters * static_cast<Eigen::Index>(state.gyro()) + i)) /
-                                std::sqrt(run.calibration.covariance(at, at)));
+    worst =
+        std::max(worst, std::abs(change.parameters_off(kOwnParameters * static_cast<Eigen::Index>(state.gyro()) + i)) /
+                            std::sqrt(run.calibration.covariance(at, at)));
   }
   return worst;
 }

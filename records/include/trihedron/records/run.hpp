@@ -101,9 +101,9 @@ enum class Motion : std::uint8_t {
 struct Change {
   Moving moving = Moving::kGyroCase;
   Motion motion = Motion::kStep;
-  int gyro = -1;        ///< from 0; −1: all
+  int gyro = -1;         ///< from 0; −1: all
   Time from{}, until{};  ///< between which a step lies
-  double log_odds = 0;  ///< ln of the Bayes factor for it against nothing that moves, less ln of the number of tries
+  double log_odds = 0;   ///< ln of the Bayes factor for it against nothing that moves, less ln of the number of tries
   /// Size and 1-sigma: rotation vector, rad, c axes (kInertialAxes: in axes; kMomentum: two components across the
   /// momentum); coefficients, rad/s, gyro by gyro; over the pass. For kWalk one number, the root of the sum of
   /// squares of all steps.
