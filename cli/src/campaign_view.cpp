@@ -63,7 +63,6 @@ std::string measures_text(const std::vector<MeasureStatistics>& statistics, cons
     text += right(fmt::format("{:g} %", 100 * p), 11);
   }
   text += "   runs\n";
-  std::string bounds;
   for (const MeasureStatistics& its : statistics) {
     if (its.quantiles.empty()) {
       continue;

@@ -326,7 +326,7 @@ void AemBuilder::row(std::span<const AemField> fields) {
   ++used_;
 }
 
-void AemBuilder::end_segment(Position at) {
+void AemBuilder::end_segment(Position at) const {
   if (rows_ == 0) {
     refuse(at, "the segment has no data", "add them, or remove the segment");
   }

@@ -39,7 +39,7 @@ class AemBuilder {
   [[nodiscard]] bool scalar_first() const { return scalar_first_; }
   /// Epoch, Q1, Q2, Q3, QC, and by kind their derivatives in this order, or the three rates.
   void row(std::span<const AemField> fields);
-  void end_segment(Position at);
+  void end_segment(Position at) const;
   [[nodiscard]] AttitudeMessage finish(Position at);
 
   [[noreturn]] void refuse(Position at, std::string reason, std::string cure) const;
@@ -54,7 +54,8 @@ class AemBuilder {
   void end_header(Position at);
   void take_entry(Entries& entries, AemField key, AemField value, std::span<const std::string_view> known,
                   std::string_view section) const;
-  const Entry& needed(const Entries& entries, const std::string& key, Position at, std::string_view section) const;
+  [[nodiscard]] const Entry& needed(const Entries& entries, const std::string& key, Position at,
+                                    std::string_view section) const;
   [[nodiscard]] Time time_of(std::string_view text, Position at);
   void take_frames(Position at);
   void take_time_span(Position at);

@@ -97,7 +97,7 @@ class Xml {
   [[nodiscard]] pugi::xml_node only(const pugi::xml_node& node, std::string_view first, std::string_view second) const {
     const pugi::xml_node child = node.first_child();
     const pugi::xml_node next = child.next_sibling();
-    if (name_of(child) != first || name_of(next) != second || next.next_sibling()) {
+    if (name_of(child) != first || name_of(next) != second || !next.next_sibling().empty()) {
       refuse(node, fmt::format("<{}> does not consist of <{}> and <{}>", node.name(), first, second),
              "give an AEM of the standard's structure");
     }
@@ -111,13 +111,13 @@ class Xml {
       pugi::xml_node aem;
       for (const pugi::xml_node& child : node.children()) {
         if (name_of(child) == "aem") {
-          if (aem) {
+          if (!aem.empty()) {
             refuse(child, "there are several AEM in it", "give each a file of its own");
           }
           aem = child;
         }
       }
-      node = aem ? aem : node;
+      node = aem.empty() ? node : aem;
     }
     if (name_of(node) != "aem") {
       refuse(node, fmt::format("its root is {}", in_quotes(node.name())), "give an attitude ephemeris message, <aem>");
@@ -127,7 +127,8 @@ class Xml {
 
   [[nodiscard]] AemField text_of(const pugi::xml_node& node) const {
     const pugi::xml_node text = node.first_child();
-    if (text.next_sibling() || (text && text.type() != pugi::node_pcdata && text.type() != pugi::node_cdata)) {
+    if (!text.next_sibling().empty() ||
+        (!text.empty() && text.type() != pugi::node_pcdata && text.type() != pugi::node_cdata)) {
       refuse(node, fmt::format("<{}> holds more than a text", node.name()), "give it a value alone");
     }
     std::string_view words = text.value();
@@ -168,7 +169,7 @@ class Xml {
 
   void read_state(AemBuilder& builder, const pugi::xml_node& state) const {
     const pugi::xml_node type = state.first_child();
-    if (type.next_sibling() || !name_of(type).starts_with("quaternion")) {
+    if (!type.next_sibling().empty() || !name_of(type).starts_with("quaternion")) {
       refuse(state, "<attitudeState> does not hold one quaternion",
              "give quaternionEphemeris, quaternionDerivative or quaternionAngVel, as ATTITUDE_TYPE says");
     }
@@ -222,7 +223,7 @@ class Xml {
     const pugi::xml_attribute units = leaf.attribute("units");
     const std::string_view name = name_of(leaf);
     const std::string_view expected = index < 5 ? "" : name.ends_with("_DOT") ? "1/s" : "deg/s";
-    if (units && units.value() != expected) {
+    if (!units.empty() && units.value() != expected) {
       refuse(leaf, fmt::format("the unit of <{}> is {}", leaf.name(), in_quotes(units.value())),
              expected.empty() ? "it has none" : fmt::format("give it in {}", expected));
     }

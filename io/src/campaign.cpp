@@ -26,7 +26,7 @@
 namespace trihedron::io {
 
 /// An input, and what is needed to put its draws into a scenario.
-struct Varied {
+struct Varied {  // NOLINT(misc-use-internal-linkage): a member of CampaignFile has vectors of it
   CampaignInput input;
   std::vector<std::string> path;
   std::vector<toml::array> options;   ///< each an array of the one value
@@ -72,7 +72,8 @@ std::optional<std::size_t> number_of(std::string_view part) {
 }
 
 /// Why a value has no place in a scenario.
-struct NoPlace {
+struct NoPlace : std::exception {
+  NoPlace(std::string why, std::string what_to_do) : reason(std::move(why)), cure(std::move(what_to_do)) {}
   std::string reason;
   std::string cure;
 };
@@ -375,15 +376,14 @@ struct Head {
 
 Field count(std::string_view key, std::uint64_t& target, std::string_view about) {
   const Range& range = limits::kCampaignRuns;
-  return {
-      key, about,
-      [&range] { return whole_schema(static_cast<std::int64_t>(range.least), static_cast<std::int64_t>(range.most)); },
-      [key, &target, &range](const TomlTable& table, const toml::node& node) {
-        if (!node.is_integer()) {
-          table.refuse(node, fmt::format("\"{}\" is not a whole number", key), std::string(range.why));
-        }
-        target = static_cast<std::uint64_t>(table.number(node, key, range));
-      }};
+  return {key, about,
+          [] { return whole_schema(static_cast<std::int64_t>(range.least), static_cast<std::int64_t>(range.most)); },
+          [key, &target](const TomlTable& table, const toml::node& node) {
+            if (!node.is_integer()) {
+              table.refuse(node, fmt::format("\"{}\" is not a whole number", key), std::string(range.why));
+            }
+            target = static_cast<std::uint64_t>(table.number(node, key, range));
+          }};
 }
 
 Field limit(double& target) {

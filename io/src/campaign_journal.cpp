@@ -48,7 +48,10 @@ Json opened(std::string_view line) {
 }
 
 /// null for what is no number.
-Json numbers_json(const std::vector<double>& values) { return Json(values); }
+Json numbers_json(const std::vector<double>& values) {
+  Json json = values;
+  return json;
+}
 
 std::vector<double> numbers_of(const Json& json) {
   std::vector<double> values;
@@ -66,17 +69,20 @@ Json json_of(const CampaignIdentity& identity) {
   return {{"format", kJournalFormat}, {"version", 1}, {"digest", digest_of(identity)}, {"campaign", lines}};
 }
 
+[[noreturn]] void refuse_journal(const fs::path& file) {
+  throw InputRefused(file, {1, 1}, "is no journal of a campaign that this program knows",
+                     "give the directory of another campaign, or an empty one");
+}
+
 CampaignIdentity identity_of(const Json& json, const fs::path& file) {
-  const InputRefused other(file, {1, 1}, "is no journal of a campaign that this program knows",
-                           "give the directory of another campaign, or an empty one");
   if (!json.is_object() || json.value("format", "") != kJournalFormat || json.value("version", 0) != 1 ||
       !json.contains("campaign")) {
-    throw other;
+    refuse_journal(file);
   }
   CampaignIdentity identity;
   for (const Json& line : json["campaign"]) {
     if (!line.is_array() || line.size() != 2 || !line[0].is_string() || !line[1].is_string()) {
-      throw other;
+      refuse_journal(file);
     }
     identity.push_back({line[0].get<std::string>(), line[1].get<std::string>()});
   }

@@ -28,7 +28,7 @@ constexpr std::int32_t kDoublesPerSummary = 2;
 constexpr std::int32_t kIntegersPerSummary = 6;
 constexpr std::int32_t kSummaryRecord = 2;
 constexpr std::size_t kFirstDataRecord = 4;
-constexpr std::size_t kNameLength = 8 * (kDoublesPerSummary + (kIntegersPerSummary + 1) / 2);
+constexpr std::size_t kNameLength = std::size_t{8} * (kDoublesPerSummary + (kIntegersPerSummary + 1) / 2);
 constexpr std::int32_t kJ2000 = 1;  // SPICE's number of the frame
 constexpr std::int32_t kCkType = 3;
 

@@ -123,7 +123,7 @@ void record_truth(Time t, const Rot<In, C>& C_in_c, const std::vector<Gyro>& gyr
 
 /// Whether the Earth does not hide the Sun. The shadow is a cylinder: over the penumbra of ten seconds nothing warms.
 bool is_sunlit(const Vec<In>& position_m, const Vec<In>& sun_m) {
-  const Eigen::Vector3d r = position_m.raw();
+  const Eigen::Vector3d& r = position_m.raw();
   const Eigen::Vector3d to_sun = sun_m.raw().normalized();
   return r.dot(to_sun) > 0 || r.cross(to_sun).norm() > kEarthRadius_m;
 }

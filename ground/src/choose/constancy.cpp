@@ -19,7 +19,7 @@ using Eigen::Vector3d;
 using Eigen::VectorXd;
 
 /// Coefficients of eq. (1) and the alignment of one gyro.
-constexpr int kOfGyro = Layout::kEq1 + 3;
+constexpr Index kOfGyro = Layout::kEq1 + 3;
 constexpr int kOfAberration = 9;
 
 /// Sums of squares as forms zᵀ Q z of variables z of which the last is 1. The variables of a stretch of the pass: the
@@ -361,7 +361,7 @@ std::vector<Change> changes_over(const Trial& trial) {
   };
   const auto sigmas = [](Index size, double sigma) { return VectorXd(VectorXd::Constant(size, sigma)); };
   const auto coefficients = [&](int gyro) {
-    return gyro < 0 ? coefficient_sigma : VectorXd(coefficient_sigma.segment<Layout::kEq1>(Layout::kEq1 * gyro));
+    return gyro < 0 ? coefficient_sigma : VectorXd(coefficient_sigma.segment<Layout::kEq1>(Index{Layout::kEq1} * gyro));
   };
   /// Parameters that follow a course: its rise from each stretch to the next.
   const auto along = [&](int gyro, int from, int size, bool alike, const auto& rise) {

@@ -275,9 +275,9 @@ double rough_offset_s(const Pass& pass, const GyroReadings& readings) {
 /// against the first, and of each gyro what would pass for it: alignment and coefficients of eq. (1).
 struct Unknowns {
   int gyros;
-  [[nodiscard]] constexpr int offset() const { return 0; }
-  [[nodiscard]] constexpr int rate() const { return 1; }
-  [[nodiscard]] constexpr int late(int gyro) const { return 1 + gyro; }  ///< of gyro 2 on
+  [[nodiscard]] static constexpr int offset() { return 0; }
+  [[nodiscard]] static constexpr int rate() { return 1; }
+  [[nodiscard]] static constexpr int late(int gyro) { return 1 + gyro; }  ///< of gyro 2 on
   [[nodiscard]] constexpr int alignment(int gyro) const { return 1 + gyros + kOwn * gyro; }
   [[nodiscard]] constexpr int drift(int gyro) const { return alignment(gyro) + 3; }
   [[nodiscard]] constexpr int size() const { return alignment(gyros); }
@@ -297,11 +297,11 @@ class TurnFit {
         turns_(turns_of(pass.star_tracker, std::max(kLag_s, to_seconds(pass.settings.star_tracker_period)))),
         x_(VectorXd::Zero(unknowns_.size())),
         prior_sigma_(unknowns_.size()) {
-    x_(unknowns_.offset()) = offset_s;
+    x_(Unknowns::offset()) = offset_s;
     // Wide enough to hold nothing back; the rate in s/s.
     prior_sigma_.setConstant(1);
-    prior_sigma_(unknowns_.offset()) = 10;
-    prior_sigma_(unknowns_.rate()) = 1e-2;
+    prior_sigma_(Unknowns::offset()) = 10;
+    prior_sigma_(Unknowns::rate()) = 1e-2;
     for (int k = 0; k < unknowns_.gyros; ++k) {
       prior_sigma_.segment<3>(unknowns_.alignment(k)).setConstant(3 * largest_alignment_sigma(pass.settings));
       prior_sigma_.segment<Esg7::kSize>(unknowns_.drift(k)).setConstant(1e-4);
@@ -336,8 +336,8 @@ class TurnFit {
     for (int round = 0; round < kMostRounds; ++round) {
       read();
       const VectorXd before = x_;
-      if (!step(round < kRough) || std::abs(x_(unknowns_.offset())) > 2 * kFarthest_s ||
-          std::abs(x_(unknowns_.rate())) > kFastest) {
+      if (!step(round < kRough) || std::abs(x_(Unknowns::offset())) > 2 * kFarthest_s ||
+          std::abs(x_(Unknowns::rate())) > kFastest) {
         return std::nullopt;
       }
       const double sigma_s = std::sqrt(normal_.solve(VectorXd(VectorXd::Unit(unknowns_.size(), 0)))(0));
@@ -357,7 +357,7 @@ class TurnFit {
       if (!needed_[i]) {
         continue;
       }
-      const double clock_s = x_(unknowns_.offset()) + x_(unknowns_.rate()) * to_seconds(fixes.t[i] - middle_);
+      const double clock_s = x_(Unknowns::offset()) + x_(Unknowns::rate()) * to_seconds(fixes.t[i] - middle_);
       at_fix_[i] = readings_.at(fixes.t[i] + from_seconds(clock_s), from);
     }
   }
@@ -384,11 +384,11 @@ class TurnFit {
     };
     const Matrix3d smooth = trihedron(*second) * trihedron(*first).transpose();
     const int n = unknowns_.size();
-    rows.setZero(2 * unknowns_.gyros, n + 1);
+    rows.setZero(2L * unknowns_.gyros, n + 1);
     Eigen::Matrix<double, Eigen::Dynamic, 3, 0, kMostRows, 3> by_fix(rows.rows(), 3);
     Eigen::Matrix<double, Eigen::Dynamic, 1, 0, kMostRows, 1> white(rows.rows());
     for (int k = 0; k < unknowns_.gyros; ++k) {
-      const double late_s = k == 0 ? 0 : x_(unknowns_.late(k));
+      const double late_s = k == 0 ? 0 : x_(Unknowns::late(k));
       const auto moved = [&](const FittedDirections& fit) {
         return std::pair<Vector3d, Vector3d>(align[k] * (fit.h_b[k] + late_s * fit.h_b_rate[k]),
                                              align[k] * fit.h_b_rate[k]);
@@ -403,20 +403,20 @@ class TurnFit {
           span_s / 2 * (smooth * readings_.drift_basis(k, first->h_b[k]) + readings_.drift_basis(k, second->h_b[k]));
       const Vector3d drift = by_drift * x_.segment<Esg7::kSize>(unknowns_.drift(k));
       const Vector3d off = h2 - back * h1 - drift.cross(h2);
-      auto its = rows.middleRows<2>(2 * k);
+      auto its = rows.middleRows<2>(2L * k);
       its.col(n) = -across * off;
       const Vector3d by_offset = rate2 - smooth * rate1;
-      its.col(unknowns_.offset()) = across * by_offset;
-      its.col(unknowns_.rate()) = across * (ages_s[1] * rate2 - ages_s[0] * (smooth * rate1));
+      its.col(Unknowns::offset()) = across * by_offset;
+      its.col(Unknowns::rate()) = across * (ages_s[1] * rate2 - ages_s[0] * (smooth * rate1));
       if (k > 0) {
-        its.col(unknowns_.late(k)) = its.col(unknowns_.offset());
+        its.col(Unknowns::late(k)) = its.col(Unknowns::offset());
       }
       its.middleCols<3>(unknowns_.alignment(k)) = across * (smooth * skew<double>(h1) - skew<double>(h2));
       its.middleCols<Esg7::kSize>(unknowns_.drift(k)) = across * skew<double>(h2) * by_drift;
-      by_fix.middleRows<2>(2 * k) = across * skew<double>(h2);
+      by_fix.middleRows<2>(2L * k) = across * skew<double>(h2);
       const double readout_rad = pass_.settings.gyros[static_cast<std::size_t>(k)].readout_noise_rad;
       const double unknown_rad = roughly ? largest_alignment_sigma(pass_.settings) * turn.angle_rad : 0;
-      white.segment<2>(2 * k).setConstant(readout_rad * readout_rad + unknown_rad * unknown_rad);
+      white.segment<2>(2L * k).setConstant(readout_rad * readout_rad + unknown_rad * unknown_rad);
     }
     const Eigen::Vector3d noise = 2 * pass_.settings.star_tracker_noise_rad.cwiseAbs2();
     Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, kMostRows, kMostRows> R =
@@ -470,7 +470,7 @@ class TurnFit {
       if (square > gate) {
         continue;
       }
-      shown_ += rows.col(unknowns_.offset()).squaredNorm();
+      shown_ += rows.col(Unknowns::offset()).squaredNorm();
       shown_by_noise_ += noise_square;
       normal.selfadjointView<Eigen::Lower>().rankUpdate(rows.leftCols(n).transpose());
       score.noalias() += rows.leftCols(n).transpose() * rows.col(n);
@@ -506,7 +506,7 @@ class TurnFit {
     };
     const auto unit = [&](int i) { return VectorXd(VectorXd::Unit(unknowns_.size(), i)); };
     const auto offset_of = [&](int gyro) {
-      return gyro == 0 ? unit(0) : VectorXd(unit(0) + unit(unknowns_.late(gyro)));
+      return gyro == 0 ? unit(0) : VectorXd(unit(0) + unit(Unknowns::late(gyro)));
     };
     Clocks clocks;
     // The star tracker is a witness as well: where it agrees with one gyro, the others are late. Of three gyros and
@@ -524,8 +524,8 @@ class TurnFit {
     }
     const VectorXd middle = offset_of(clocks.reference);
     clocks.mid_offset_s = measured(middle);
-    clocks.rate_s_s = measured(unit(unknowns_.rate()));
-    clocks.offset_s = measured(middle + to_seconds(pass_.settings.epoch - middle_) * unit(unknowns_.rate()));
+    clocks.rate_s_s = measured(unit(Unknowns::rate()));
+    clocks.offset_s = measured(middle + to_seconds(pass_.settings.epoch - middle_) * unit(Unknowns::rate()));
     for (int k = 0; k < unknowns_.gyros; ++k) {
       clocks.late_s[k] = k == clocks.reference ? Measured{} : measured(offset_of(k) - middle);
     }

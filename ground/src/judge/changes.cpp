@@ -71,7 +71,7 @@ FindingCode code_of(Moving moving) {
   return FindingCode::kOther;
 }
 
-std::string cure_of(const Change& change) {
+std::string_view cure_of(const Change& change) {
   switch (change.moving) {
     case Moving::kGyroCase:
     case Moving::kStarTracker:
@@ -156,7 +156,7 @@ void judge_changes(const CalibrationRun& run, std::vector<Finding>& findings) {
                   fmt::format("{}likelier than nothing by e^{:.0f}; the largest effect on a parameter is {:.1f} of its "
                               "sigmas{}",
                               size_text(likeliest), likeliest.log_odds, off, others),
-                  cure_of(likeliest)};
+                  std::string(cure_of(likeliest))};
   if (off <= kSigmasOfWrong) {
     finding.severity = FindingSeverity::kWarning;
   }

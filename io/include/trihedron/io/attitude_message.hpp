@@ -73,6 +73,7 @@ struct AttitudeMessage {
 [[nodiscard]] AttitudeMessage read_attitude_message(const std::filesystem::path& file);
 /// Same, or an attitude file (CSV), which needs the epoch that its t_s counts from: throws UsageError where that is not
 /// given.
-[[nodiscard]] AttitudeMessage read_attitude_of_any_format(const std::filesystem::path& file, std::optional<Time> epoch);
+[[nodiscard]] AttitudeMessage read_attitude_of_any_format(const std::filesystem::path& path,
+                                                          std::optional<Time> given_epoch);
 
 }  // namespace trihedron::io
