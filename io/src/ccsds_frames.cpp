@@ -24,10 +24,10 @@ bool is_inertial_frame(std::string_view name) {
 }
 
 bool is_spacecraft_frame(std::string_view name) {
-  constexpr std::array<std::string_view, 12> kSpacecraftFrames = {
-      "SC_BODY", "AST", "STARTRACKER", "INSTRUMENT", "GYRO_FRAME", "IMU_FRAME",
-      "SENSOR",  "ACC", "DSS",         "CSS",        "ESA",        "TAM"};
-  return std::ranges::any_of(kSpacecraftFrames, [&](std::string_view kind) {
+  constexpr std::array<std::string_view, 12> kFrameKinds = {"SC_BODY",    "AST",       "STARTRACKER", "INSTRUMENT",
+                                                            "GYRO_FRAME", "IMU_FRAME", "SENSOR",      "ACC",
+                                                            "DSS",        "CSS",       "ESA",         "TAM"};
+  return std::ranges::any_of(kFrameKinds, [&](std::string_view kind) {
     if (!name.starts_with(kind)) {
       return false;
     }
