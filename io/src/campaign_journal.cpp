@@ -39,9 +39,10 @@ Json opened(std::string_view line) {
   if (line.size() <= kCrcDigits + 1 || line[kCrcDigits] != ' ') {
     return Json::value_t::discarded;
   }
-  const auto [end, fault] = std::from_chars(line.data(), line.data() + kCrcDigits, crc, 16);
+  const std::string_view digits = line.substr(0, kCrcDigits);
+  const auto [end, fault] = std::from_chars(digits.data(), digits.data() + digits.size(), crc, 16);
   const std::string_view text = line.substr(kCrcDigits + 1);
-  if (fault != std::errc() || end != line.data() + kCrcDigits || crc != crc_of(text)) {
+  if (fault != std::errc() || end != digits.data() + digits.size() || crc != crc_of(text)) {
     return Json::value_t::discarded;
   }
   return Json::parse(text, nullptr, false);
