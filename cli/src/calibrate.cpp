@@ -265,8 +265,8 @@ void add_calibrate(CLI::App& program, const Common& common, int& exit_status) {
   command
       ->add_option(
           "--drift-model", arguments->drift_model,
-          "Drift model; auto, the one that the pass gives evidence of, unless the settings say otherwise; field: all "
-          "members, by a prior that the pass determines, of estimator batch")
+          "Drift model; auto, the one that the pass gives evidence of, unless the settings say otherwise: of estimator "
+          "batch field, which is all members by a prior that the pass determines")
       ->check([](const std::string& name) {
         CalibrationOptions options;
         return set_drift_model(name, options) ? "" : not_one_of(name, {}, drift_model_word_choices());

@@ -2,12 +2,14 @@
 
 #include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
-#include <Eigen/SVD>
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <numbers>
+#include <utility>
+#include <vector>
 
+#include "batch/gram.hpp"
 #include "batch/information_smoother.hpp"
 #include "trihedron/ground/tasks/on_all_cores.hpp"
 #include "trihedron/records/drift_models.hpp"
@@ -21,39 +23,49 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
 /// Prior of the spectrum: ln of the root mean square of a group is normal about that of a rotor that eq. (1) describes
-/// to what a pass can show; of all gyros together it is uncertain by a factor of 20, gyros among each other and groups
-/// of one gyro among each other by a factor of e. A rotor that has much of one degree is likely to have some of the
-/// next.
+/// to what a pass can show; of all gyros together it is uncertain by a factor of 20, gyros among each other and degrees
+/// of one gyro among each other by a factor of e or so, of which half a logarithm is that of W from D. A rotor that has
+/// much of one degree is likely to have some of the next, and near a great circle W and D of a degree look alike.
 constexpr double kMeanRms_rad_s = 1e-10;
 constexpr double kSigmaOfAll = 3;
 constexpr double kSigmaOfGyro = 1;
-constexpr double kSigmaOfGroup = 1;
+constexpr double kSigmaOfDegree = 0.85;
+constexpr double kSigmaOfGroup = 0.5;
 
 MatrixXd prior_information(const std::vector<FieldMembers::Group>& groups) {
   const auto size = static_cast<Index>(groups.size());
   MatrixXd covariance = MatrixXd::Constant(size, size, kSigmaOfAll * kSigmaOfAll);
   for (Index i = 0; i < size; ++i) {
     for (Index j = 0; j < size; ++j) {
-      if (groups[static_cast<std::size_t>(i)].gyro == groups[static_cast<std::size_t>(j)].gyro) {
-        covariance(i, j) += kSigmaOfGyro * kSigmaOfGyro;
-      }
+      const FieldMembers::Group& a = groups[static_cast<std::size_t>(i)];
+      const FieldMembers::Group& b = groups[static_cast<std::size_t>(j)];
+      covariance(i, j) += a.gyro == b.gyro ? kSigmaOfGyro * kSigmaOfGyro : 0;
+      covariance(i, j) += a.gyro == b.gyro && a.degree == b.degree ? kSigmaOfDegree * kSigmaOfDegree : 0;
     }
     covariance(i, i) += kSigmaOfGroup * kSigmaOfGroup;
   }
   return covariance.llt().solve(MatrixXd::Identity(size, size));
 }
 
+/// The pass by one spectrum.
+struct Likelihood {
+  VectorXd sigma;  ///< of the members, rad/s
+  MatrixXd L;      ///< root of the covariance of y
+  VectorXd y;      ///< white
+  double log_likelihood = 0;
+};
+
 /// The posterior of the amplitudes by one spectrum.
 struct Posterior {
-  VectorXd sigma;   ///< before, rad/s
-  VectorXd mean;    ///< in these
-  MatrixXd learnt;  ///< their covariance before, which is 1, less that after
-  double log_likelihood = 0;
+  VectorXd sigma;  ///< before, rad/s
+  MatrixXd white;  ///< their covariance before, which is 1 in these, less that after is whiteᵀ white
+  VectorXd mean;   ///< in these
 
   [[nodiscard]] VectorXd amplitudes() const { return sigma.cwiseProduct(mean); }
-  [[nodiscard]] MatrixXd covariance_of_amplitudes() const {
-    const MatrixXd after = MatrixXd::Identity(sigma.size(), sigma.size()) - learnt;
-    return sigma.asDiagonal() * after * sigma.asDiagonal();
+  /// The lower triangle of the covariance after is added to that of `sum`.
+  void add_covariance(double weight, MatrixXd& sum) const {
+    sum.diagonal() += weight * sigma.cwiseAbs2();
+    add_gram(sigma.asDiagonal() * white.transpose(), -weight, sum);
   }
 };
 
@@ -63,43 +75,53 @@ class Posteriors {
   Posteriors(const FieldMembers& members, const FieldInformation& information)
       : members_(members), information_(information), prior_(prior_information(members.groups())) {}
 
-  [[nodiscard]] const MatrixXd& prior() const { return prior_; }
-  [[nodiscard]] static VectorXd apart(const VectorXd& log_rms) { return log_rms.array() - std::log(kMeanRms_rad_s); }
-
-  [[nodiscard]] Posterior at(const VectorXd& log_rms) const {
+  [[nodiscard]] Likelihood at(const VectorXd& log_rms) const {
     check_stop();
-    Posterior found;
+    Likelihood found;
     found.sigma = members_.sigma(log_rms);
     // y by its own covariance: there are fewer of it than of the members.
-    MatrixXd white = information_.R * found.sigma.asDiagonal();
-    MatrixXd covariance = white * white.transpose();
-    covariance.diagonal().array() += 1;
-    const Eigen::LLT<MatrixXd> root(covariance);
-    root.matrixL().solveInPlace(white);
-    const VectorXd y = root.matrixL().solve(information_.y);
-    found.mean = white.transpose() * y;
-    found.learnt = white.transpose() * white;
+    MatrixXd covariance = MatrixXd::Identity(information_.R.rows(), information_.R.rows());
+    add_gram(information_.R * found.sigma.asDiagonal(), 1, covariance);
+    const Eigen::LLT<MatrixXd> root(std::move(covariance));
+    found.L = root.matrixLLT();
+    found.y = root.matrixL().solve(information_.y);
     const VectorXd apart_from_prior = apart(log_rms);
-    found.log_likelihood = information_.log_likelihood - root.matrixLLT().diagonal().array().log().sum() -
-                           y.squaredNorm() / 2 - apart_from_prior.dot(prior_ * apart_from_prior) / 2;
+    found.log_likelihood = information_.log_likelihood - found.L.diagonal().array().log().sum() -
+                           found.y.squaredNorm() / 2 - apart_from_prior.dot(prior_ * apart_from_prior) / 2;
+    return found;
+  }
+
+  [[nodiscard]] Posterior posterior(const Likelihood& by) const {
+    Posterior found;
+    found.sigma = by.sigma;
+    found.white = information_.R * by.sigma.asDiagonal();
+    solve_lower(by.L, found.white);
+    found.mean = found.white.transpose() * by.y;
     return found;
   }
 
   /// Derivative of the log likelihood by ln of the root mean squares, and the information on these that is expected.
-  void differentiate(const VectorXd& log_rms, const Posterior& at, VectorXd& gradient, MatrixXd& information) const {
+  void differentiate(const VectorXd& log_rms, const Likelihood& by, VectorXd& gradient, MatrixXd& information) const {
+    const Posterior at = posterior(by);
+    MatrixXd learnt = MatrixXd::Zero(members_.size(), members_.size());
+    add_gram(at.white.transpose(), 1, learnt);
     gradient = -prior_ * apart(log_rms);
-    information = prior_;
+    information = MatrixXd::Zero(prior_.rows(), prior_.cols());
     const std::vector<Index>& group = members_.group_of();
-    for (Index i = 0; i < members_.size(); ++i) {
-      const Index g = group[static_cast<std::size_t>(i)];
-      gradient(g) += at.mean(i) * at.mean(i) - at.learnt(i, i);
-      for (Index j = 0; j < members_.size(); ++j) {
-        information(g, group[static_cast<std::size_t>(j)]) += 2 * at.learnt(i, j) * at.learnt(i, j);
+    for (Index j = 0; j < members_.size(); ++j) {
+      const Index g = group[static_cast<std::size_t>(j)];
+      gradient(g) += at.mean(j) * at.mean(j) - learnt(j, j);
+      information(g, g) += learnt(j, j) * learnt(j, j);
+      for (Index i = j + 1; i < members_.size(); ++i) {  // the groups are in the order of the members
+        information(group[static_cast<std::size_t>(i)], g) += 2 * learnt(i, j) * learnt(i, j);
       }
     }
+    information = MatrixXd(information + information.transpose()) + prior_;
   }
 
  private:
+  [[nodiscard]] static VectorXd apart(const VectorXd& log_rms) { return log_rms.array() - std::log(kMeanRms_rad_s); }
+
   const FieldMembers& members_;
   const FieldInformation& information_;
   MatrixXd prior_;
@@ -134,14 +156,14 @@ VectorXd FieldMembers::sigma(const VectorXd& log_rms) const {
   return of_rms_.cwiseProduct(VectorXd(log_rms.array().exp())(group_of_));
 }
 
-DriftModes modes_of(const PassProblem& problem, const PassSolution& solution, const FieldMembers& members,
-                    const VectorXd& log_rms) {
+namespace {
+
+/// `units`: a lower triangle for each gyro, by which its members are made of ones that are independent and of size 1.
+DriftModes modes_of(const PassProblem& problem, const PassSolution& solution, const PerGyro<MatrixXd>& units) {
   // What moves all fixes together by less than this part of their noise cannot be seen and does not matter.
   constexpr double kLeastEffect = 0.3;
   const PassSetup& setup = problem.setup();
-  const Index size = members.of_one_gyro();
-  const VectorXd units = members.sigma(log_rms);
-  const auto unit = [&](int k) { return units.segment(k * size, size).asDiagonal(); };
+  const Index size = units[0].rows();
   const auto arcs = static_cast<Index>(problem.arcs());
   const double noise_rad = setup.on_board.star_trackers[0].noise_rad.minCoeff() /
                            std::sqrt(static_cast<double>(problem.fixes()) / static_cast<double>(arcs));
@@ -155,24 +177,54 @@ DriftModes modes_of(const PassProblem& problem, const PassSolution& solution, co
     for (int k = 0; k < setup.on_board.layout.gyros; ++k) {
       turned[k].middleRows<3>(row) =
           turned[k].middleRows<3>(row - 3) +
-          moment.since[k].by_drift.first(Layout::kEq1 + static_cast<int>(size)).rightCols(size) * unit(k) / noise_rad;
+          moment.since[k].by_drift.first(Layout::kEq1 + static_cast<int>(size)).rightCols(size) / noise_rad;
     }
   });
-  const std::vector<Eigen::BDCSVD<MatrixXd>> found =
+  // The squares of the singular values span ten powers of ten at most, so that those that count are exact enough.
+  const std::vector<Eigen::SelfAdjointEigenSolver<MatrixXd>> found =
       on_all_cores(static_cast<std::size_t>(setup.on_board.layout.gyros), [&](std::size_t k) {
-        return Eigen::BDCSVD<MatrixXd>(triangle_of(turned[static_cast<int>(k)]), Eigen::ComputeFullV);
+        const auto gyro = static_cast<int>(k);
+        MatrixXd effects = MatrixXd::Zero(size, size);
+        add_gram((turned[gyro] * units[gyro]).transpose(), 1, effects);
+        return Eigen::SelfAdjointEigenSolver<MatrixXd>(effects);
       });
   Index count = 1;
   for (const auto& its : found) {
-    count = std::max<Index>(count, (its.singularValues().array() > kLeastEffect).count());
+    count = std::max<Index>(count, (its.eigenvalues().array() > kLeastEffect * kLeastEffect).count());
   }
   DriftModes modes;
   for (int k = 0; k < setup.on_board.layout.gyros; ++k) {
-    const MatrixXd directions = found[static_cast<std::size_t>(k)].matrixV().leftCols(count);
-    modes.gyros[k].coefficients = unit(k) * directions;
-    modes.gyros[k].amplitudes = directions.transpose() * unit(k).inverse();
+    const MatrixXd directions = found[static_cast<std::size_t>(k)].eigenvectors().rightCols(count);
+    const auto unit = units[k].triangularView<Eigen::Lower>();
+    modes.gyros[k].coefficients = unit * directions;
+    modes.gyros[k].amplitudes = unit.transpose().solve(directions).transpose();
   }
   return modes;
+}
+
+}  // namespace
+
+DriftModes modes_of(const PassProblem& problem, const PassSolution& solution, const FieldMembers& members,
+                    const VectorXd& log_rms) {
+  PerGyro<MatrixXd> units;
+  const Index size = members.of_one_gyro();
+  for (int k = 0; k < problem.setup().on_board.layout.gyros; ++k) {
+    units[k] = members.sigma(log_rms).segment(k * size, size).asDiagonal();
+  }
+  return modes_of(problem, solution, units);
+}
+
+DriftModes modes_of(const PassProblem& problem, const PassSolution& solution) {
+  constexpr double kSigmas = 3;
+  const Layout layout = problem.setup().layout();
+  const Index size = layout.drift_size() - Layout::kEq1;
+  PerGyro<MatrixXd> units;
+  for (int k = 0; k < layout.gyros; ++k) {
+    const int row = layout.drift(k) - layout.drift(0) + Layout::kEq1;
+    const MatrixXd covariance = problem.setup().prior.covariance.block(row, row, size, size);
+    units[k] = kSigmas * MatrixXd(covariance.llt().matrixL());
+  }
+  return modes_of(problem, solution, units);
 }
 
 FieldInformation information_on_field(const PassProblem& problem, const PassSolution& solution,
@@ -249,7 +301,7 @@ FieldSpectrum most_likely_spectrum(const FieldMembers& members, const FieldInfor
   spectrum.log_rms = first.size() > 0
                          ? first
                          : VectorXd::Constant(static_cast<Index>(members.groups().size()), std::log(kMeanRms_rad_s));
-  Posterior here = posteriors.at(spectrum.log_rms);
+  Likelihood here = posteriors.at(spectrum.log_rms);
   for (int i = 0; i < kMostSteps; ++i) {
     VectorXd gradient;
     posteriors.differentiate(spectrum.log_rms, here, gradient, spectrum.information);
@@ -258,7 +310,7 @@ FieldSpectrum most_likely_spectrum(const FieldMembers& members, const FieldInfor
       break;
     }
     step *= std::min(1.0, kLongestStep / step.cwiseAbs().maxCoeff());
-    Posterior next = posteriors.at(spectrum.log_rms + step);
+    Likelihood next = posteriors.at(spectrum.log_rms + step);
     for (int halving = 0; halving < kMostHalvings && !(next.log_likelihood > here.log_likelihood); ++halving) {
       step /= 2;
       next = posteriors.at(spectrum.log_rms + step);
@@ -273,36 +325,97 @@ FieldSpectrum most_likely_spectrum(const FieldMembers& members, const FieldInfor
   return spectrum;
 }
 
-MatrixXd covariance_of_spectrum(const FieldMembers& members, const FieldInformation& information,
-                                const FieldSpectrum& spectrum) {
+namespace {
+
+/// Spectra that the pass may have beside the most likely one, in sets of which each is weighed against that one alone.
+std::vector<std::vector<VectorXd>> other_spectra(const FieldSpectrum& spectrum) {
   // Along each principal axis of the uncertainty, so many of its sigmas, which is exact to second order.
   constexpr std::array<double, 4> kAway = {-2.5, -1.25, 1.25, 2.5};
-  const Posteriors posteriors(members, information);
-  const Posterior centre = posteriors.at(spectrum.log_rms);
-  const VectorXd amplitudes = centre.amplitudes();
-  const MatrixXd covariance = centre.covariance_of_amplitudes();
+  std::vector<std::vector<VectorXd>> sets;
   const Eigen::SelfAdjointEigenSolver<MatrixXd> axes(spectrum.information);
-  const auto along = [&](std::size_t axis) {
-    const auto i = static_cast<Index>(axis);
+  for (Index i = 0; i < axes.eigenvalues().size(); ++i) {
     const VectorXd sigma = axes.eigenvectors().col(i) / std::sqrt(axes.eigenvalues()(i));
-    MatrixXd added = MatrixXd::Zero(members.size(), members.size());
-    double weights = 1;
+    std::vector<VectorXd>& set = sets.emplace_back();
     for (const double away : kAway) {
-      const Posterior there = posteriors.at(spectrum.log_rms + away * sigma);
-      const double weight = std::exp(std::min(there.log_likelihood - centre.log_likelihood, 0.0));
-      const VectorXd moved = there.amplitudes() - amplitudes;
-      added += weight * (there.covariance_of_amplitudes() - covariance + moved * moved.transpose());
-      weights += weight;
+      set.emplace_back(spectrum.log_rms + away * sigma);
     }
-    return MatrixXd(added / weights);
+  }
+  return sets;
+}
+
+}  // namespace
+
+MatrixXd covariance_of_spectrum(const FieldMembers& members, const FieldInformation& information,
+                                const FieldSpectrum& spectrum) {
+  const Posteriors posteriors(members, information);
+  const Likelihood centre = posteriors.at(spectrum.log_rms);
+  const Posterior by_centre = posteriors.posterior(centre);
+  const VectorXd amplitudes = by_centre.amplitudes();
+  const std::vector<std::vector<VectorXd>> sets = other_spectra(spectrum);
+  // What a part of the sets adds, in one sum: a matrix of all members is large.
+  const auto added_by = [&](std::size_t part, std::size_t parts) {
+    MatrixXd added = MatrixXd::Zero(members.size(), members.size());
+    double weight_of_centre = 0;
+    for (std::size_t i = part; i < sets.size(); i += parts) {
+      std::vector<Likelihood> there;
+      std::vector<double> weight;
+      double weights = 1;
+      for (const VectorXd& log_rms : sets[i]) {
+        there.push_back(posteriors.at(log_rms));
+        weight.push_back(std::exp(std::min(there.back().log_likelihood - centre.log_likelihood, 0.0)));
+        weights += weight.back();
+      }
+      for (std::size_t j = 0; j < there.size(); ++j) {
+        const Posterior its = posteriors.posterior(there[j]);
+        its.add_covariance(weight[j] / weights, added);
+        add_gram(its.amplitudes() - amplitudes, weight[j] / weights, added);
+        weight_of_centre -= weight[j] / weights;
+      }
+    }
+    by_centre.add_covariance(weight_of_centre, added);
+    return added;
   };
-  const std::vector<MatrixXd> parts = on_all_cores(members.groups().size(), along);
+  constexpr std::size_t kParts = 4;
   MatrixXd added = MatrixXd::Zero(members.size(), members.size());
-  for (const MatrixXd& part : parts) {
+  for (const MatrixXd& part : on_all_cores(kParts, [&](std::size_t part) { return added_by(part, kParts); })) {
     added += part;
   }
-  return added;
+  return added.selfadjointView<Eigen::Lower>();
 }
+
+namespace {
+
+/// `added`: to the variances of the amplitudes, by the uncertainty of the spectrum.
+MeanSquares mean_squares_of(const Layout& layout, const FieldMembers& members, const FieldInformation& information,
+                            const FieldSpectrum& spectrum, const VectorXd& added) {
+  const Posteriors posteriors(members, information);
+  const Posterior found = posteriors.posterior(posteriors.at(spectrum.log_rms));
+  const VectorXd learnt = found.white.colwise().squaredNorm();
+  const VectorXd squares =
+      found.amplitudes().cwiseAbs2() + VectorXd(found.sigma.cwiseAbs2().array() * (1 - learnt.array())) + added;
+  const auto groups = static_cast<Index>(members.groups().size());
+  const VectorXd of_rms = members.sigma(VectorXd::Zero(groups)).cwiseAbs2();
+  VectorXd mean = VectorXd::Zero(groups);
+  VectorXd count = VectorXd::Zero(groups);
+  for (Index i = 0; i < members.size(); ++i) {
+    const Index g = members.group_of()[static_cast<std::size_t>(i)];
+    mean(g) += std::max(squares(i), 0.0) / of_rms(i);
+    count(g) += 1;
+  }
+  mean = mean.cwiseQuotient(count);
+  const std::vector<DriftCoefficient> coefficients = coefficients_of(layout.drift_model);
+  MeanSquares found_of(static_cast<std::size_t>(layout.gyros));
+  for (Index i = 0; i < members.size(); ++i) {
+    const auto at = static_cast<std::size_t>(i);
+    const Index g = members.group_of()[at];
+    const int gyro = members.groups()[static_cast<std::size_t>(g)].gyro;
+    const auto column = static_cast<std::size_t>(members.states()[at] - layout.drift(gyro));
+    found_of[static_cast<std::size_t>(gyro)][coefficients[column]] = of_rms(i) * mean(g);
+  }
+  return found_of;
+}
+
+}  // namespace
 
 FieldPrior field_prior(const PassProblem& problem, const FieldMembers& members, const FieldInformation& information,
                        const FieldSpectrum& spectrum) {
@@ -311,6 +424,8 @@ FieldPrior field_prior(const PassProblem& problem, const FieldMembers& members, 
   prior.modes = *problem.modes();
   prior.sigma_rad_s = members.sigma(spectrum.log_rms);
   const MatrixXd added = covariance_of_spectrum(members, information, spectrum);
+  prior.log_evidence = spectrum.log_likelihood - (information.log_likelihood - information.y.squaredNorm() / 2);
+  prior.members = mean_squares_of(layout, members, information, spectrum, added.diagonal());
   MatrixXd by_members = MatrixXd::Zero(layout.parameters(), members.size());
   std::vector<bool> is_member(static_cast<std::size_t>(layout.parameters()), false);
   for (Index i = 0; i < members.size(); ++i) {

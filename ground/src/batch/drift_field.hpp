@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "batch/pass_problem.hpp"
+#include "model/drift_on_board.hpp"
 #include "trihedron/core/layout.hpp"
 #include "trihedron/records/calibration.hpp"
 
@@ -46,6 +47,8 @@ class FieldMembers {
 /// of rad/s. `solution`: near enough to tell how the gyros moved.
 [[nodiscard]] DriftModes modes_of(const PassProblem& problem, const PassSolution& solution, const FieldMembers& members,
                                   const Eigen::VectorXd& log_rms);
+/// The same where the prior covariance of the members of each gyro is known, of whatever form.
+[[nodiscard]] DriftModes modes_of(const PassProblem& problem, const PassSolution& solution);
 
 /// What a pass says of the members when nothing is known of them before, all other states eliminated: R a = y + unit
 /// noise, a their amplitudes, rad/s.
@@ -86,6 +89,9 @@ struct FieldPrior {
   Eigen::VectorXd sigma_rad_s;      ///< of each member, in their order
   Eigen::MatrixXd more_covariance;  ///< of κ and δ, for the uncertainty of the spectrum
   std::vector<DriftFieldLevel> levels;
+  double log_evidence = 0;  ///< ln of how much more likely the pass is by the spectrum than without any such drift
+  /// Of each member what the pass leaves possible, the uncertainty of the spectrum included: the mean of its group.
+  MeanSquares members;
 };
 
 /// As covariance_of_spectrum(), carried over to κ and δ.

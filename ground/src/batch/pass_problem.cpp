@@ -33,14 +33,19 @@ void compress(SmootherStage& stage) {
   }
 }
 
-/// Collects whitened rows of fixes; consecutive fixes closer than `reach` are replaced by their weighted mean.
+/// Collects whitened rows of fixes; consecutive fixes closer than `reach`, between which the body has not turned by
+/// more than `turn_rad`, are replaced by their weighted mean.
 class FixMerger {
  public:
-  explicit FixMerger(Duration reach) : reach_(reach) {}
+  FixMerger(Duration reach, double turn_rad) : reach_(reach), turn_rad_(turn_rad) {}
 
   void add(const ScreenedPass::Fix& fix, const PassProblem::FixRows& rows, double weight) {
-    const bool first = sums_.empty() || fix.fix.t - sums_.back().t >= reach_ || sums_.back().head != fix.fix.head ||
+    turned_rad_ += sums_.empty() ? 0 : fix.rate_c.norm() * to_seconds(fix.fix.t - last_t_);
+    last_t_ = fix.fix.t;
+    const bool first = sums_.empty() || fix.fix.t - sums_.back().t >= reach_ || turned_rad_ > turn_rad_ ||
+                       sums_.back().head != fix.fix.head ||
                        !std::equal(fix.used.begin(), fix.used.end(), sums_.back().used.begin());
+    turned_rad_ = first ? 0 : turned_rad_;
     Sum& sum = first ? sums_.emplace_back() : sums_.back();
     const double square = weight * weight;
     square_ += square * rows.y.squaredNorm();
@@ -77,6 +82,9 @@ class FixMerger {
     VectorXd y;
   };
   Duration reach_;
+  double turn_rad_;
+  Time last_t_{};
+  double turned_rad_ = 0;  ///< since the first of the last sum
   std::vector<Sum> sums_;
   Eigen::Index size_ = 0;
   double square_ = 0;
@@ -541,7 +549,7 @@ PassProblem::Linear PassProblem::linearise(const PassSolution& solution) const {
     check_stop();
     begin_arc(solution, arc, moment);
     double extra_variance_rad2 = 0;
-    FixMerger nearby(setup_.fixes_together);
+    FixMerger nearby(setup_.fixes_together, setup_.turn_together_rad);
     for (std::size_t i = arcs_[arc].begin; i < arcs_[arc].end; ++i) {
       moment.fix = nodes_[i].fix;
       if (moment.fix != nullptr) {

@@ -30,8 +30,11 @@ struct PassSetup {
   /// Step of the prediction, up to half as long again before a fix; between the samples used the body turns little, and
   /// their noise is averaged in the end.
   Duration sample_step = std::chrono::seconds(1);
-  /// Fixes closer in time than this are merged into one; their differences are lost.
-  Duration fixes_together{};
+  /// Fixes closer in time than this, between which the body turns by no more than that, are merged into one; their
+  /// differences are lost. Those of a degree hold 1e-5 of what the fixes tell: within it the rows change by a
+  /// hundredth.
+  Duration fixes_together = std::chrono::seconds(15);
+  double turn_together_rad = 0.0175;
   /// Length of an arc; process noise is added at its end, and after a gap.
   Duration arc = std::chrono::seconds(60);
 

@@ -146,28 +146,55 @@ struct KappaAndDelta {
 };
 
 /// Those of a drift field. What the pass says of its modes is known; the members are the most likely ones that make
-/// them, and what the modes leave open of them is as uncertain as before.
-KappaAndDelta with_members(const PassProblem& problem, const FieldPrior& field, const KappaAndDelta& by_modes) {
+/// them, and what the modes leave open of them is as uncertain as before. `more_covariance`: for the uncertainty of the
+/// spectrum.
+KappaAndDelta with_members(const PassProblem& problem, const MatrixXd& more_covariance, const KappaAndDelta& by_modes) {
   const Layout& modes = problem.layout();
   const Layout members = problem.setup().layout();
-  KappaAndDelta found{by_modes.gyros, MatrixXd::Zero(members.parameters(), members.parameters()), {}};
-  PerGyro<MatrixXd> by_modes_of_gyro;
+  const Prior& prior = problem.setup().prior;
+  PerGyro<MatrixXd> amplitudes;
+  Eigen::VectorXd moved = Eigen::VectorXd::Zero(modes.parameters());  // from the prior means
   const Eigen::Index size = members.drift_size() - Layout::kEq1;
   for (int k = 0; k < members.gyros; ++k) {
-    const int row = members.drift(k) - members.drift(0) + Layout::kEq1;
-    const MatrixXd& amplitudes = field.modes.gyros[k].amplitudes;
-    const Eigen::VectorXd variance = field.sigma_rad_s.segment(k * size, size).cwiseAbs2();
-    const MatrixXd before = variance.asDiagonal() * amplitudes.transpose();
-    MatrixXd& by_mode = by_modes_of_gyro[k];
-    by_mode = (amplitudes * before).ldlt().solve(before.transpose()).transpose();
-    auto outside = found.gyros[k].drift_rad_s.segment(Layout::kEq1, size);
-    outside = (by_mode * (amplitudes * outside)).eval();
-    found.covariance.block(row, row, size, size) = MatrixXd(variance.asDiagonal()) - by_mode * before.transpose();
+    amplitudes[k] = problem.modes()->gyros[k].amplitudes;
+    const Gyro& before = prior.gyros[k];
+    const Gyro& after = by_modes.gyros[k];
+    const Eigen::VectorXd drift = after.drift_rad_s - before.drift_rad_s;
+    const int row = modes.drift(k) - modes.drift(0);
+    moved.segment<Layout::kEq1>(row) = drift.head<Layout::kEq1>();
+    moved.segment(row + Layout::kEq1, amplitudes[k].rows()) = amplitudes[k] * drift.segment(Layout::kEq1, size);
+    moved.segment<3>(row + modes.drift_size()) =
+        Rot<C, C>::assume(Eigen::Matrix3d(after.C_c_b * before.C_c_b.transpose())).log().raw();
   }
-  found.by_states = parameters_by_parameters(members, modes, by_modes_of_gyro);
-  found.covariance += found.by_states * by_modes.covariance * found.by_states.transpose();
-  const Eigen::LLT<MatrixXd> root(found.covariance.reverse());
-  found.covariance += positive_part(field.more_covariance, MatrixXd(root.matrixL()).reverse());
+  // In units of the prior sigmas, which differ by many powers of ten.
+  const Eigen::VectorXd sigma = prior.covariance.diagonal().cwiseSqrt();
+  const MatrixXd scaled = sigma.cwiseInverse().asDiagonal() * prior.covariance * sigma.cwiseInverse().asDiagonal();
+  const MatrixXd by_parameters = parameters_by_parameters(modes, members, amplitudes) * sigma.asDiagonal();
+  const MatrixXd before = by_parameters * scaled;
+  const MatrixXd follow =
+      sigma.asDiagonal() * MatrixXd((before * by_parameters.transpose()).ldlt().solve(before).transpose());
+  KappaAndDelta found{by_modes.gyros, {}, follow};
+  const Eigen::VectorXd errors = follow * moved;
+  for (int k = 0; k < members.gyros; ++k) {
+    const int row = members.drift(k) - members.drift(0) + Layout::kEq1;
+    found.gyros[k].drift_rad_s.segment(Layout::kEq1, size) =
+        prior.gyros[k].drift_rad_s.segment(Layout::kEq1, size) + errors.segment(row, size);
+  }
+  // What the modes leave open: of members alone, since modes, coefficients of eq. (1) and alignments are among them.
+  found.covariance = prior.covariance - follow * before * sigma.asDiagonal();
+  for (int k = 0; k < members.gyros; ++k) {
+    const int row = members.drift(k) - members.drift(0);
+    for (const auto& [first, count] : {std::pair(row, Layout::kEq1), std::pair(row + members.drift_size(), 3)}) {
+      found.covariance.middleRows(first, count).setZero();
+      found.covariance.middleCols(first, count).setZero();
+    }
+  }
+  found.covariance = (found.covariance + found.covariance.transpose()).eval() / 2;
+  found.covariance += follow * by_modes.covariance * follow.transpose();
+  if (more_covariance.size() > 0) {
+    const Eigen::LLT<MatrixXd> root(found.covariance.reverse());
+    found.covariance += positive_part(more_covariance, MatrixXd(root.matrixL()).reverse());
+  }
   return found;
 }
 
@@ -206,10 +233,16 @@ PassProblem problem_of(const Screened& screened, PassSetup setup) {
 }
 
 /// The first solution, with the modes of the field in use.
-PassSolution begin(PassProblem& problem, const Screened& screened, const std::optional<FieldPrior>& field) {
+PassSolution begin(PassProblem& problem, const Screened& screened, const CalibrationOptions& options,
+                   const std::optional<FieldPrior>& field) {
   PassSolution first = first_solution(problem, screened);
-  if (field) {
-    problem.use(field->modes, first);
+  if (options.drift_field) {
+    if (!field) {  // the prior is an earlier calibration's: estimates begin there
+      for (int k = 0; k < problem.layout().gyros; ++k) {
+        first.gyros[k].drift_rad_s = problem.setup().prior.gyros[k].drift_rad_s;
+      }
+    }
+    problem.use(field ? field->modes : modes_of(problem, first), first);
   }
   return first;
 }
@@ -220,7 +253,7 @@ Refinement::Refinement(const Screened& screened, PassSetup setup, const Calibrat
                        const std::optional<FieldPrior>& field)
     : problem_(problem_of(screened, std::move(setup))),
       field_(field),
-      result_(most_likely(problem_, begin(problem_, screened, field_))),
+      result_(most_likely(problem_, begin(problem_, screened, options, field_))),
       halves_(compare_halves(result_, problem_.layout())),
       roots_(roots_of(result_)) {
   const SmoothedAttitude smoothed(screened.pass, problem_, result_.solution, roots_);
@@ -235,9 +268,11 @@ void Refinement::put_into(CalibrationRun& run) && {
   Calibration& calibration = run.calibration;
   const MatrixXd own = result_.errors.last_root.middleRows(problem_.layout().drift(0), problem_.layout().parameters());
   KappaAndDelta parameters{result_.solution.gyros, own * own.transpose(),
-                           MatrixXd::Identity(problem_.layout().parameters(), problem_.layout().parameters())};
+                        MatrixXd::Identity(problem_.layout().parameters(), problem_.layout().parameters())};
+  if (problem_.modes()) {
+    parameters = with_members(problem_, field_ ? field_->more_covariance : MatrixXd(), parameters);
+  }
   if (field_) {
-    parameters = with_members(problem_, *field_, parameters);
     calibration.drift_field = field_->levels;
   }
   calibration.covariance = parameters.covariance;

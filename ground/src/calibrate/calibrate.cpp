@@ -10,6 +10,7 @@
 #include "batch/pass_setup.hpp"
 #include "batch/refine.hpp"
 #include "choose/decide.hpp"
+#include "model/drift_on_board.hpp"
 #include "model/prior.hpp"
 #include "model/setup.hpp"
 #include "trihedron/ground/clocks/clocks.hpp"
@@ -62,10 +63,20 @@ SetupError nothing_used(const std::vector<FixRecord>& fixes) {
           "look at the telemetry with `trihedron inspect`"};
 }
 
+/// With the variances of the members of a drift field that the pass has determined.
+Prior prior_by(const PassSettings& settings, const Layout& layout, const std::optional<FieldPrior>& field) {
+  Prior prior = prior_of(settings, layout);
+  if (field) {
+    put_sigma(layout, FieldMembers(layout), field->sigma_rad_s, prior);
+  }
+  return prior;
+}
+
 /// The prior as a calibration: values and covariance.
-Calibration known_before(const PassSettings& settings, const CalibrationOptions& options) {
+Calibration known_before(const PassSettings& settings, const CalibrationOptions& options,
+                         const std::optional<FieldPrior>& field) {
   const Layout layout = layout_of(settings, options);
-  const Prior prior = prior_of(settings, layout);
+  const Prior prior = prior_by(settings, layout, field);
   Calibration before;
   before.estimator = options.estimator;
   before.epoch = before.t = settings.epoch;
@@ -82,8 +93,11 @@ Calibration known_before(const PassSettings& settings, const CalibrationOptions&
 /// of a larger drift model.
 CalibrationOptions options_of_on_board_run(const PassSettings& settings, CalibrationOptions options) {
   options.estimator = Estimator::kInvariant;
-  options.drift_field = false;
   options.further_states[FurtherState::kCoefficientChange] = FurtherStateOptions::Choice::kOff;
+  if (settings.prior && options.drift_field) {
+    use(drift_on_board(mean_squares_of(*settings.prior)), options);
+  }
+  options.drift_field = false;
   if (options.drift_model && options.drift_model->family == DriftModelId::Family::kVsh && !settings.prior) {
     options.drift_model = kEsg20;
   }
@@ -102,9 +116,7 @@ Smoothed smooth(const Pass& pass, Decision& decision) {
     decision.screened = screen(pass, decision.options);
   }
   PassSetup setup = pass_setup(pass.settings, decision.options);
-  if (decision.field) {
-    put_sigma(setup.layout(), FieldMembers(setup.layout()), decision.field->sigma_rad_s, setup.prior);
-  }
+  setup.prior = prior_by(pass.settings, setup.layout(), decision.field);
   Refinement refinement(*decision.screened, std::move(setup), decision.options, decision.field);
   std::vector<DriftModelForecast> drift_models = flown(decision.forecasts, refinement.course());
   return {std::move(refinement), std::move(drift_models)};
@@ -176,8 +188,8 @@ void add_to_estimates(const ClockCorrection& correction, std::vector<FurtherEsti
 CalibrationRun calibrate_as_stamped(const Pass& pass, const CalibrationOptions& options, const Progress& progress) {
   Decision decision = decide(pass, options);
   const bool by_batch = decision.options.estimator == Estimator::kBatch;
-  Pipeline pipeline(pass.settings,
-                    by_batch ? options_of_on_board_run(pass.settings, decision.options) : decision.options);
+  const PassSettings& settings = decision.settings ? *decision.settings : pass.settings;
+  Pipeline pipeline(settings, by_batch ? options_of_on_board_run(settings, decision.options) : decision.options);
   Recorder recorder;
   ProgressMeter meter(progress, pass.gyro.size());
   const auto on_board = [&] {
@@ -199,7 +211,7 @@ CalibrationRun calibrate_as_stamped(const Pass& pass, const CalibrationOptions& 
   run.options = decision.options;
   run.evidence = decision.evidence;
   run.changes = decision.changes;
-  run.known_before = known_before(pass.settings, decision.options);
+  run.known_before = known_before(settings, decision.options, decision.field);
   const Statistics recorded = run.calibration.statistics;
   run.calibration = pipeline.calibration();
   run.errors = pipeline.errors();
@@ -208,6 +220,9 @@ CalibrationRun calibrate_as_stamped(const Pass& pass, const CalibrationOptions& 
   if (smoothed) {
     run.drift_models = std::move(smoothed->drift_models);
     std::move(smoothed->refinement).put_into(run);
+    if (decision.options.drift_field && !decision.field) {  // the spectrum is that of the earlier calibration
+      run.calibration.drift_field = pass.settings.prior->drift_field;
+    }
   }
   for (const FixRecord& fix : run.fixes) {
     ++run.fix_counts[fix.status];

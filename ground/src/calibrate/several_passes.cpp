@@ -158,6 +158,7 @@ const PassAlone& SeveralPasses::add(const std::string& name, const Pass& pass, c
     refuse_stranger(last_, pass.settings, start_up_);
     // One start of the rotors has one drift model.
     options.drift_model = combined_.options.drift_model;
+    options.drift_field = combined_.options.drift_field;
   }
   PassAlone& added = passes_.emplace_back(PassAlone{name, calibrate(pass, options, progress), {}, {}});
   if (passes_.size() == 1) {

@@ -14,6 +14,7 @@
 
 #include "choose/constancy.hpp"
 #include "choose/noise_search.hpp"
+#include "model/drift_on_board.hpp"
 #include "model/orbital_rate.hpp"
 #include "model/prior.hpp"
 #include "trihedron/ground/model/setup_error.hpp"
@@ -87,7 +88,14 @@ CalibrationOptions as_before(CalibrationOptions options, const Calibration& prio
   return options;
 }
 
-/// Throws SetupError where the earlier calibration is of other gyros or of another drift model.
+/// Whether an estimator on board has no room for the drift model of a calibration: a drift field.
+bool has_field(const Calibration& calibration) {
+  const DriftModelId& model = calibration.gyros.at(0).drift_model;
+  return model.family == DriftModelId::Family::kVsh && model.degree > DriftModelId::kMaxDegreeOnBoard;
+}
+
+/// Throws SetupError where the earlier calibration is of other gyros, or of another drift model; of one with a drift
+/// field a smaller model takes a part.
 void refuse_prior_of_others(const PassSettings& settings, const CalibrationOptions& asked) {
   const std::optional<Calibration>& prior = settings.prior;
   if (!prior) {
@@ -100,7 +108,9 @@ void refuse_prior_of_others(const PassSettings& settings, const CalibrationOptio
   }
   for (std::size_t k = 0; k < prior->gyros.size(); ++k) {
     const GyroCalibration& gyro = prior->gyros[k];
-    if (asked.drift_model && gyro.drift_model != *asked.drift_model) {
+    const bool contains =
+        asked.drift_model && has_field(*prior) && asked.drift_model->family != DriftModelId::Family::kEsg20;
+    if (asked.drift_model && gyro.drift_model != *asked.drift_model && !contains) {
       throw SetupError(fmt::format("the earlier calibration of gyro {} is of drift model '{}', not {}", k + 1,
                                    name_of(gyro.drift_model), name_of(*asked.drift_model)),
                        "use a calibration made with the same drift model");
@@ -239,7 +249,7 @@ void leave_out_what_is_open(CalibrationOptions& options) {
 /// Decides by the data of the pass.
 Decision decide_by_pass(const Pass& pass, const Screened& screened, const CalibrationOptions& asked,
                         const DriftModelId& largest_model) {
-  Decision decision{asked, {}, {}, {}, {}, {}};
+  Decision decision{asked, {}, {}, {}, {}, {}, {}};
   CalibrationOptions& options = decision.options;
   const bool wandering_is_open = options.further_states[FurtherState::kWanderingDrift] == Choice::kAuto;
   if (wandering_is_open) {
@@ -316,7 +326,10 @@ void settle_by_estimator(CalibrationOptions& asked) {
 
 CalibrationOptions settled_before(const PassSettings& settings, CalibrationOptions options) {
   const std::optional<Calibration>& prior = settings.prior;
-  if (prior && !options.drift_model) {
+  const bool by_batch = options.estimator == Estimator::kBatch;
+  const bool is_of_field = prior && has_field(*prior);
+  const std::optional<DriftModelId> asked = options.drift_model;
+  if (prior && !asked && (by_batch || !is_of_field)) {
     options.drift_model = prior->gyros.at(0).drift_model;
   }
   settle_by_estimator(options);
@@ -326,6 +339,12 @@ CalibrationOptions settled_before(const PassSettings& settings, CalibrationOptio
       use_noise(*prior->noise, options);
     }
     options = prior ? as_before(options, *prior) : with_usual_states(options);
+  }
+  if (is_of_field && by_batch && options.drift_model == prior->gyros.at(0).drift_model) {
+    options.drift_field = true;
+  } else if (is_of_field && options.estimator != Estimator::kPaper) {
+    const MeanSquares members = mean_squares_of(*prior);
+    use(options.drift_model ? drift_on_board(members, *options.drift_model) : drift_on_board(members), options);
   }
   options.find_noise = false;
   leave_out_what_is_open(options);
@@ -344,9 +363,16 @@ Decision decide(const Pass& pass, const CalibrationOptions& asked_for) {
   }
   settle_by_estimator(asked);
   if (pass.settings.prior || asked.estimator == Estimator::kPaper) {
-    return {settled_before(pass.settings, asked), {}, {}, {}, {}, {}};
+    return {settled_before(pass.settings, asked), {}, {}, {}, {}, {}, {}};
   }
-  Decision decision{asked, {}, {}, {}, {}, {}};
+  const bool on_board = asked.estimator != Estimator::kBatch;
+  const bool by_field = !asked.drift_model && !knows_of_drift_outside(pass.settings);
+  if (by_field) {
+    asked.drift_field = true;
+    asked.drift_model = kLargestDriftModel;
+    asked.estimator = Estimator::kBatch;
+  }
+  Decision decision{asked, {}, {}, {}, {}, {}, {}};
   CalibrationOptions& options = decision.options;
   options.find_noise = false;
   const bool states_are_settled =
@@ -359,8 +385,24 @@ Decision decide(const Pass& pass, const CalibrationOptions& asked_for) {
   }
   Screened screened = screen(pass, options);
   if (screened.pass.fixes.empty()) {
+    options.estimator = asked_for.estimator;
+    options.drift_field = asked_for.drift_field;
+    options.drift_model = asked_for.drift_model;
     leave_out_what_is_open(options);
     return decision;
+  }
+  if (by_field && on_board) {
+    Decision decided = decide_by_pass(pass, screened, asked, kLargestDriftModel);
+    decided.options.estimator = asked_for.estimator;
+    const double log_evidence = decided.field->log_evidence;
+    decided.evidence.push_back({{}, log_evidence, log_evidence > kLogOddsToAccept});
+    const DriftOnBoard drift =
+        log_evidence > kLogOddsToAccept ? drift_on_board(decided.field->members) : DriftOnBoard{kEsg7, 0};
+    use(drift, decided.options);
+    decided.settings = pass.settings;
+    use(decided.field->members, drift.drift_model, *decided.settings);
+    decided.field.reset();
+    return decided;
   }
   DriftModelId largest_model = largest_to_compare(asked);
   for (;;) {

@@ -15,21 +15,26 @@ namespace trihedron::ground {
 /// them.
 struct Decision {
   CalibrationOptions options;
-  std::vector<Evidence> evidence;    ///< empty where nothing was to be decided
-  std::vector<Forecast> forecasts;   ///< of the drift models that were compared
-  std::optional<FieldPrior> field;   ///< where the drift is estimated as one
-  std::vector<Change> changes;       ///< what moves during the pass
+  std::vector<Evidence> evidence;   ///< empty where nothing was to be decided
+  std::vector<Forecast> forecasts;  ///< of the drift models that were compared
+  std::optional<FieldPrior> field;  ///< where the drift is estimated as one
+  std::vector<Change> changes;      ///< what moves during the pass
+  /// Those of the pass with what it shows of the size of members outside eq. (1), for an estimator on board.
+  std::optional<PassSettings> settings;
   std::optional<Screened> screened;  ///< the screened pass by which it was decided, where it was
 };
 
 /// Settles each choice that is left to the program by the whole pass. Estimator paper has no further states; where the
 /// pass has a prior calibration, they are those of it; else those whose presence the pass makes 20 times as likely as
-/// their absence. The noise is found where it is asked for, on a pass that is long enough and has no prior calibration.
+/// their absence. Unless a drift model is asked for, or the settings speak of members outside eq. (1), the drift is a
+/// field: of estimator batch as it is; estimator invariant has the model of drift_on_board() with the variances that
+/// were found. The noise is found where it is asked for, on a pass that is long enough and has no prior calibration.
 /// Throws SetupError.
 [[nodiscard]] Decision decide(const Pass& pass, const CalibrationOptions& asked);
 
 /// Settles the same before the first event, as on board: by the earlier calibration, or else drift model esg20, clock
-/// offset and error at orbital period, with priors that allow for their absence. The noise is that of the options.
+/// offset and error at orbital period, with priors that allow for their absence. The noise is that of the options. Of
+/// an earlier calibration with a drift field an estimator on board has the model of drift_on_board().
 /// Throws SetupError.
 [[nodiscard]] CalibrationOptions settled_before(const PassSettings& settings, CalibrationOptions options);
 

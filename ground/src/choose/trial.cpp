@@ -47,6 +47,7 @@ constexpr double kOneIteration = std::numeric_limits<double>::infinity();
 PassSetup coarse(PassSetup setup) {
   setup.sample_step = std::chrono::seconds(3);
   setup.fixes_together = std::chrono::seconds(10);
+  setup.turn_together_rad = std::numeric_limits<double>::infinity();
   return setup;
 }
 

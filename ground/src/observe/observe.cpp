@@ -10,6 +10,7 @@
 #include "batch/batch.hpp"
 #include "batch/pass_setup.hpp"
 #include "choose/decide.hpp"
+#include "model/drift_on_board.hpp"
 #include "model/setup.hpp"
 #include "observe/angle_row.hpp"
 #include "observe/attitude_metric.hpp"
@@ -250,6 +251,9 @@ bool Observability::is_harmful() const {
 
 Observability observe(const Pass& pass, const CalibrationOptions& asked, const Mission& mission) {
   Decision decision = decide(pass, asked);
+  if (decision.field) {  // what a pass can show is told of a model with few members
+    use(drift_on_board(decision.field->members), decision.options);
+  }
   const CalibrationOptions& options = decision.options;
   const Screened screened = decision.screened ? std::move(*decision.screened) : screen(pass, options);
   if (screened.pass.fixes.empty()) {

@@ -1,21 +1,9 @@
 #include "onboard/screen.hpp"
 
-#include <algorithm>
-
+#include "model/drift_on_board.hpp"
 #include "trihedron/ground/onboard/replay.hpp"
 
 namespace trihedron::ground {
-namespace {
-
-/// Whether the prior of a gyro names a coefficient that eq. (1) does not have.
-bool knows_of_drift_outside(const PassSettings& settings) {
-  return std::ranges::any_of(settings.gyros, [](const GyroPrior& prior) {
-    const auto outside = [](const auto& coefficient) { return !coefficient.first.is_in_eq1(); };
-    return std::ranges::any_of(prior.drift_rad_s, outside) || std::ranges::any_of(prior.drift_sigma_rad_s, outside);
-  });
-}
-
-}  // namespace
 
 CalibrationOptions without_further_states(CalibrationOptions options) {
   options.drift_model = kEsg7;
@@ -28,7 +16,12 @@ Screened screen(const Pass& pass, const CalibrationOptions& asked) {
   const bool prior_has_more = pass.settings.prior && asked.drift_model && asked.drift_model != kEsg7;
   if (prior_has_more || (asked.drift_model != kEsg7 && knows_of_drift_outside(pass.settings))) {
     options.drift_model = asked.drift_model.value_or(kEsg20);
+    // Of a larger one the rest would not be seen by the gates.
+    if (options.drift_model->degree > DriftModelId::kMaxDegreeOnBoard) {
+      options.drift_model = vsh(DriftModelId::kMaxDegreeOnBoard);
+    }
   }
+  options.drift_field = false;
   Pipeline pipeline(pass.settings, options, false);
   Screened screened{ScreenedPass(pass.gyro, pipeline.layout().gyros), {}};
   replay(pass, pipeline, [&](const StepReport& report) {

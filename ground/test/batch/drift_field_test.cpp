@@ -110,9 +110,11 @@ double log_prior(const FieldMembers& members, const VectorXd& log_rms) {
   MatrixXd covariance(size, size);
   for (Index i = 0; i < size; ++i) {
     for (Index j = 0; j < size; ++j) {
-      const bool of_one_gyro =
-          members.groups()[static_cast<std::size_t>(i)].gyro == members.groups()[static_cast<std::size_t>(j)].gyro;
-      covariance(i, j) = 9 + (of_one_gyro ? 1 : 0) + (i == j ? 1 : 0);
+      const FieldMembers::Group& a = members.groups()[static_cast<std::size_t>(i)];
+      const FieldMembers::Group& b = members.groups()[static_cast<std::size_t>(j)];
+      const bool of_one_gyro = a.gyro == b.gyro;
+      covariance(i, j) =
+          9 + (of_one_gyro ? 1 : 0) + (of_one_gyro && a.degree == b.degree ? 0.85 * 0.85 : 0) + (i == j ? 0.25 : 0);
     }
   }
   const VectorXd apart = log_rms.array() - std::log(1e-10);

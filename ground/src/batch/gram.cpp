@@ -1,0 +1,47 @@
+#include "batch/gram.hpp"
+
+namespace trihedron::ground {
+namespace kernels {
+
+namespace gram_baseline {
+void add_gram(const double* a, long rows, long columns, double weight, double* gram);
+void solve_lower(const double* L, long rows, double* a, long columns);
+}  // namespace gram_baseline
+namespace gram_avx2 {
+void add_gram(const double* a, long rows, long columns, double weight, double* gram);
+void solve_lower(const double* L, long rows, double* a, long columns);
+}  // namespace gram_avx2
+
+namespace {
+
+#ifdef TRIHEDRON_HAS_AVX2
+bool has_avx2() {
+  static const bool found = __builtin_cpu_supports("avx2") > 0 && __builtin_cpu_supports("fma") > 0;
+  return found;
+}
+#endif
+
+}  // namespace
+}  // namespace kernels
+
+void add_gram(const Eigen::MatrixXd& a, double weight, Eigen::MatrixXd& gram) {
+#ifdef TRIHEDRON_HAS_AVX2
+  if (kernels::has_avx2()) {
+    kernels::gram_avx2::add_gram(a.data(), a.rows(), a.cols(), weight, gram.data());
+    return;
+  }
+#endif
+  kernels::gram_baseline::add_gram(a.data(), a.rows(), a.cols(), weight, gram.data());
+}
+
+void solve_lower(const Eigen::MatrixXd& L, Eigen::MatrixXd& a) {
+#ifdef TRIHEDRON_HAS_AVX2
+  if (kernels::has_avx2()) {
+    kernels::gram_avx2::solve_lower(L.data(), L.rows(), a.data(), a.cols());
+    return;
+  }
+#endif
+  kernels::gram_baseline::solve_lower(L.data(), L.rows(), a.data(), a.cols());
+}
+
+}  // namespace trihedron::ground
