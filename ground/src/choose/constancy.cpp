@@ -102,15 +102,24 @@ Matrix3d cross(const Vector3d& v) {
   return m;
 }
 
-/// The fixes of each arc as forms of the states of the arc, shapes and 1. The shapes: aberration by a velocity that is
-/// constant, and by two at orbital period, over the speed of light, in axes; relative errors of scale of the direction
-/// cosines, gyro by gyro. Each moves the directions as a small rotation of the cases would, an alignment.
-std::vector<MatrixXd> forms_of_arcs(const PassProblem& problem, const PassSolution& solution) {
+/// Calls `use(arc, form)` for each arc in turn with its fixes as a form of the states of the arc, shapes and 1. The
+/// shapes: aberration by a velocity that is constant, and by two at orbital period, over the speed of light, in axes;
+/// relative errors of scale of the direction cosines, gyro by gyro. Each moves the directions as a small rotation of the
+/// cases would, an alignment.
+template <class Use>
+void for_each_arc(const PassProblem& problem, const PassSolution& solution, const Use& use) {
   const Layout& layout = problem.layout();
   const CalibrationSetup& setup = problem.setup().on_board;
   const Index n = layout.size();
   const Index shapes = kOfAberration + 3L * layout.gyros;
-  std::vector<MatrixXd> forms(problem.arcs(), MatrixXd::Zero(n + shapes + 1, n + shapes + 1));
+  MatrixXd form = MatrixXd::Zero(n + shapes + 1, n + shapes + 1);
+  std::size_t arc = 0;
+  const auto go_on_to = [&](std::size_t next) {
+    for (; arc < next; ++arc) {
+      use(arc, MatrixXd(form.selfadjointView<Eigen::Lower>()));
+      form.setZero();
+    }
+  };
   problem.go_along(solution, [&](const PassProblem::Moment& moment) {
     if (moment.fix == nullptr) {
       return;
@@ -119,6 +128,7 @@ std::vector<MatrixXd> forms_of_arcs(const PassProblem& problem, const PassSoluti
     if (rows.y.size() == 0 || problem.is_outlier(rows)) {
       return;
     }
+    go_on_to(moment.arc);
     MatrixXd all(rows.y.size(), n + shapes + 1);
     all << rows.H, MatrixXd::Zero(rows.y.size(), shapes), -rows.y;
     const Matrix3d C_c_in = moment.fix->fix.q_in_c.normalized().toRotationMatrix().transpose();
@@ -137,12 +147,9 @@ std::vector<MatrixXd> forms_of_arcs(const PassProblem& problem, const PassSoluti
       all.middleCols<3>(n + kOfAberration + 3L * k) = by_alignment * cross(-(C_c_b * h_b)) * C_c_b * h_b.asDiagonal();
     }
     rows.R.llt().matrixL().solveInPlace(all);
-    forms[moment.arc].selfadjointView<Eigen::Lower>().rankUpdate(all.transpose());
+    form.selfadjointView<Eigen::Lower>().rankUpdate(all.transpose());
   });
-  for (MatrixXd& form : forms) {
-    form = MatrixXd(form.selfadjointView<Eigen::Lower>());
-  }
-  return forms;
+  go_on_to(problem.arcs());
 }
 
 /// The whole pass as a form of what may move, all else eliminated. The pass is cut into stretches; the variables are
@@ -155,7 +162,6 @@ class Constancy {
     for (std::size_t i = 0; i <= stretches(problem_.arcs()); ++i) {
       begins_.push_back(i * problem_.arcs() / stretches(problem_.arcs()));
     }
-    const std::vector<MatrixXd> arcs = forms_of_arcs(problem_, found.before);
     const auto count = static_cast<Index>(begins_.size()) - 1;
     const Index d = layout_.dynamic();
     const Index n = layout_.size();
@@ -177,15 +183,7 @@ class Constancy {
     const Index at_shapes = at_steps + count * of_stretch();
     const Index size = at_shapes + shapes + 1;
     MatrixXd whole = MatrixXd::Zero(size, size);
-    for (Index i = 0; i < count; ++i) {
-      StretchForm stretch(d, n - d, shapes);
-      for (std::size_t arc = begins_[static_cast<std::size_t>(i)]; arc < begins_[static_cast<std::size_t>(i) + 1];
-           ++arc) {
-        stretch.measure(arc == 0 ? MatrixXd(arcs[arc] + prior_form(linear, n, shapes)) : arcs[arc]);
-        if (arc + 1 < arcs.size()) {
-          stretch.move(linear.stages[arc]);
-        }
-      }
+    const auto add_stretch = [&](Index i, const MatrixXd& form) {
       std::vector<Index> place(static_cast<std::size_t>(2 * d + n - d + shapes + 1));
       for (Index j = 0; j < d; ++j) {
         place[static_cast<std::size_t>(j)] = i * d + j;
@@ -201,7 +199,6 @@ class Constancy {
       for (Index j = 0; j <= shapes; ++j) {
         constant(n + j) = at_shapes + j;
       }
-      const MatrixXd form = stretch.form();
       whole(place, place) += form;
       if (i + 1 < count) {  // the states at its end are those of the next beginning less the step there
         const Index step = at_steps + (i + 1) * of_stretch() + kOfGyro * layout_.gyros;
@@ -215,7 +212,19 @@ class Constancy {
         }
         whole.block(step, step, directions, directions) += form.block(d, d, directions, directions);
       }
-    }
+    };
+    StretchForm stretch(d, n - d, shapes);
+    Index at_stretch = 0;
+    for_each_arc(problem_, found.before, [&](std::size_t arc, const MatrixXd& fixes) {
+      stretch.measure(arc == 0 ? MatrixXd(fixes + prior_form(linear, n, shapes)) : fixes);
+      if (arc + 1 < problem_.arcs()) {
+        stretch.move(linear.stages[arc]);
+      }
+      if (arc + 1 == begins_[static_cast<std::size_t>(at_stretch) + 1]) {
+        add_stretch(at_stretch++, stretch.form());
+        stretch = StretchForm(d, n - d, shapes);
+      }
+    });
     // Steps in place of the values of each stretch: a step changes all that follows.
     const Index own = kOfGyro * layout_.gyros;
     for (Index i = count - 1; i-- > 0;) {
