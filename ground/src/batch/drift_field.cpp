@@ -31,6 +31,8 @@ constexpr double kSigmaOfAll = 3;
 constexpr double kSigmaOfGyro = 1;
 constexpr double kSigmaOfDegree = 0.85;
 constexpr double kSigmaOfGroup = 0.5;
+/// Larger than all of eq. (1): a rotor that drifts so is not one that it describes.
+constexpr double kMostRms_rad_s = 1e-5;
 
 MatrixXd prior_information(const std::vector<FieldMembers::Group>& groups) {
   const auto size = static_cast<Index>(groups.size());
@@ -310,6 +312,7 @@ FieldSpectrum most_likely_spectrum(const FieldMembers& members, const FieldInfor
       break;
     }
     step *= std::min(1.0, kLongestStep / step.cwiseAbs().maxCoeff());
+    step = (spectrum.log_rms + step).cwiseMin(std::log(kMostRms_rad_s)) - spectrum.log_rms;
     Likelihood next = posteriors.at(spectrum.log_rms + step);
     for (int halving = 0; halving < kMostHalvings && !(next.log_likelihood > here.log_likelihood); ++halving) {
       step /= 2;
@@ -327,20 +330,28 @@ FieldSpectrum most_likely_spectrum(const FieldMembers& members, const FieldInfor
 
 namespace {
 
-/// Spectra that the pass may have beside the most likely one, in sets of which each is weighed against that one alone.
-std::vector<std::vector<VectorXd>> other_spectra(const FieldSpectrum& spectrum) {
-  // Along each principal axis of the uncertainty, so many of its sigmas, which is exact to second order.
-  constexpr std::array<double, 4> kAway = {-2.5, -1.25, 1.25, 2.5};
-  std::vector<std::vector<VectorXd>> sets;
-  const Eigen::SelfAdjointEigenSolver<MatrixXd> axes(spectrum.information);
-  for (Index i = 0; i < axes.eigenvalues().size(); ++i) {
-    const VectorXd sigma = axes.eigenvectors().col(i) / std::sqrt(axes.eigenvalues()(i));
-    std::vector<VectorXd>& set = sets.emplace_back();
+/// ln of the root mean square of each group, of which the square is the mean over the spectra that the pass allows; not
+/// below the most likely one. Other groups follow as far as they have their level in common.
+VectorXd log_of_mean_squares(const Posteriors& posteriors, const FieldSpectrum& spectrum, double log_likelihood) {
+  // In sigmas of the logarithm. The mean of a square is far above its most likely value, and of large values the pass
+  // says itself that they are not.
+  constexpr std::array<double, 6> kAway = {-2.5, -1.25, 1.25, 2.5, 3.75, 5};
+  const Index size = spectrum.log_rms.size();
+  const MatrixXd covariance = spectrum.information.llt().solve(MatrixXd::Identity(size, size));
+  const std::vector<double> found = on_all_cores(static_cast<std::size_t>(size), [&](std::size_t group) {
+    const auto g = static_cast<Index>(group);
+    const VectorXd sigma = covariance.col(g) / std::sqrt(covariance(g, g));
+    double weights = 1;
+    double squares = 1;
     for (const double away : kAway) {
-      set.emplace_back(spectrum.log_rms + away * sigma);
+      const double there = posteriors.at(spectrum.log_rms + away * sigma).log_likelihood;
+      const double weight = std::exp(std::min(there - log_likelihood, 0.0));
+      weights += weight;
+      squares += weight * std::exp(2 * away * sigma(g));
     }
-  }
-  return sets;
+    return std::log(std::max(squares / weights, 1.0)) / 2;
+  });
+  return spectrum.log_rms + VectorXd::Map(found.data(), size);
 }
 
 }  // namespace
@@ -348,38 +359,14 @@ std::vector<std::vector<VectorXd>> other_spectra(const FieldSpectrum& spectrum) 
 MatrixXd covariance_of_spectrum(const FieldMembers& members, const FieldInformation& information,
                                 const FieldSpectrum& spectrum) {
   const Posteriors posteriors(members, information);
-  const Likelihood centre = posteriors.at(spectrum.log_rms);
-  const Posterior by_centre = posteriors.posterior(centre);
-  const VectorXd amplitudes = by_centre.amplitudes();
-  const std::vector<std::vector<VectorXd>> sets = other_spectra(spectrum);
-  // What a part of the sets adds, in one sum: a matrix of all members is large.
-  const auto added_by = [&](std::size_t part, std::size_t parts) {
-    MatrixXd added = MatrixXd::Zero(members.size(), members.size());
-    double weight_of_centre = 0;
-    for (std::size_t i = part; i < sets.size(); i += parts) {
-      std::vector<Likelihood> there;
-      std::vector<double> weight;
-      double weights = 1;
-      for (const VectorXd& log_rms : sets[i]) {
-        there.push_back(posteriors.at(log_rms));
-        weight.push_back(std::exp(std::min(there.back().log_likelihood - centre.log_likelihood, 0.0)));
-        weights += weight.back();
-      }
-      for (std::size_t j = 0; j < there.size(); ++j) {
-        const Posterior its = posteriors.posterior(there[j]);
-        its.add_covariance(weight[j] / weights, added);
-        add_gram(its.amplitudes() - amplitudes, weight[j] / weights, added);
-        weight_of_centre -= weight[j] / weights;
-      }
-    }
-    by_centre.add_covariance(weight_of_centre, added);
-    return added;
-  };
-  constexpr std::size_t kParts = 4;
+  const Likelihood likelihood = posteriors.at(spectrum.log_rms);
+  const Posterior most_likely = posteriors.posterior(likelihood);
+  const Posterior mean =
+      posteriors.posterior(posteriors.at(log_of_mean_squares(posteriors, spectrum, likelihood.log_likelihood)));
   MatrixXd added = MatrixXd::Zero(members.size(), members.size());
-  for (const MatrixXd& part : on_all_cores(kParts, [&](std::size_t part) { return added_by(part, kParts); })) {
-    added += part;
-  }
+  mean.add_covariance(1, added);
+  most_likely.add_covariance(-1, added);
+  add_gram(mean.amplitudes() - most_likely.amplitudes(), 1, added);
   return added.selfadjointView<Eigen::Lower>();
 }
 

@@ -79,7 +79,7 @@ struct FieldSpectrum {
                                                  const Eigen::VectorXd& first = {});
 
 /// What the uncertainty of the spectrum adds to the covariance of the amplitudes, about their estimates by the most
-/// likely one: their mean square over the spectra that the pass allows, less their covariance by that one.
+/// likely one. What no data determine has the mean variance over the spectra that the pass allows.
 [[nodiscard]] Eigen::MatrixXd covariance_of_spectrum(const FieldMembers& members, const FieldInformation& information,
                                                      const FieldSpectrum& spectrum);
 

@@ -224,7 +224,7 @@ void decide_again_with_more_noise(const Pass& pass, const Screened& screened, co
   if (wanders) {
     use_wandering(*wanders, options);
   }
-  Trial decided(pass, screened, options);
+  Trial decided(pass, screened, options, wanders.value_or(walking.noise));
   if (wanders) {
     use_wandering(with_most_likely_wandering(decided, options).noise, options);
   } else {
@@ -246,6 +246,16 @@ void leave_out_what_is_open(CalibrationOptions& options) {
   options.drift_model = options.drift_model.value_or(kEsg7);
 }
 
+/// The random walk that makes the pass most likely by eq. (1) alone, where it is more than the settings say. By less noise
+/// than there is a drift field is fitted to the noise, with members of any size; this is enough beside any field.
+std::optional<ProcessNoise> walk_by_eq1(const Pass& pass, const Screened& screened, const CalibrationOptions& asked) {
+  CalibrationOptions options = with_everything(asked, asked, kEsg7);
+  options.drift_field = false;
+  Trial trial(pass, screened, options);
+  const NoiseFit walk = with_most_likely_walk(trial, options);
+  return walk.gain > kLogOddsToAccept ? std::optional(walk.noise) : std::nullopt;
+}
+
 /// Decides by the data of the pass.
 Decision decide_by_pass(const Pass& pass, const Screened& screened, const CalibrationOptions& asked,
                         const DriftModelId& largest_model) {
@@ -255,23 +265,30 @@ Decision decide_by_pass(const Pass& pass, const Screened& screened, const Calibr
   if (wandering_is_open) {
     options.further_states[FurtherState::kWanderingDrift] = Choice::kOff;
   }
-  Trial everything(pass, screened, with_everything(options, asked, largest_model));
+  std::optional<ProcessNoise> noise;
+  if (options.drift_field && asked.find_noise) {
+    noise = walk_by_eq1(pass, screened, options);
+  }
+  Trial everything(pass, screened, with_everything(options, asked, largest_model), noise);
   const std::vector<Eigen::Vector3d> changes = everything.changes_rad();
   options.find_noise = asked.find_noise && changes.size() >= kLeastFixPairs;
   if (!options.find_noise) {
     settle_states(everything, asked, decision);
     decision.changes = changes_over(everything);
     if (options.drift_field) {
-      decision.field = Trial(pass, screened, options).field_prior();
+      decision.field = Trial(pass, screened, options, noise).field_prior();
     }
     return decision;
   }
   options.star_tracker_noise_rad = other_star_tracker_noise(pass, changes);
   if (options.star_tracker_noise_rad) {
-    everything = Trial(pass, screened, with_everything(options, asked, largest_model));
+    everything = Trial(pass, screened, with_everything(options, asked, largest_model), noise);
+  }
+  if (noise) {
+    noise = with_most_likely_walk(everything, with_everything(options, asked, largest_model)).noise;
   }
   settle_states(everything, asked, decision);
-  Trial decided(pass, screened, options);
+  Trial decided(pass, screened, options, noise);
   const NoiseFit walking = with_most_likely_walk(decided, options);
   if (walking.gain > kLogOddsToAccept) {
     decide_again_with_more_noise(pass, screened, asked, largest_model, wandering_is_open, std::move(everything),

@@ -53,10 +53,14 @@ PassSetup coarse(PassSetup setup) {
 
 }  // namespace
 
-Trial::Trial(const Pass& pass, const Screened& screened, const CalibrationOptions& options)
+Trial::Trial(const Pass& pass, const Screened& screened, const CalibrationOptions& options,
+             const std::optional<ProcessNoise>& noise)
     : drift_model_(*options.drift_model), problem_(screened.pass, coarse(pass_setup(pass.settings, options))) {
   if (options.drift_field) {
     field_.emplace(problem_.layout());
+  }
+  if (noise) {
+    problem_.set_noise(*noise);
   }
   fit(first_solution(problem_, screened));
 }

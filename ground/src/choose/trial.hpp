@@ -16,8 +16,9 @@ namespace trihedron::ground {
 /// instead of zero.
 class Trial {
  public:
-  /// Refers to `screened`, which needs a fix. Throws SetupError.
-  Trial(const Pass& pass, const Screened& screened, const CalibrationOptions& options);
+  /// `noise`: where it is other than the options say. Refers to `screened`, which needs a fix. Throws SetupError.
+  Trial(const Pass& pass, const Screened& screened, const CalibrationOptions& options,
+        const std::optional<ProcessNoise>& noise = {});
 
   /// Fits again, with other noise.
   void refit(const ProcessNoise& noise);
