@@ -23,13 +23,16 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
 /// Prior of the spectrum: ln of the root mean square of a group is normal about that of a rotor that eq. (1) describes
-/// to what a pass can show; of all gyros together it is uncertain by a factor of 20, gyros among each other and degrees
-/// of one gyro among each other by a factor of e or so, of which half a logarithm is that of W from D. A rotor that has
-/// much of one degree is likely to have some of the next, and near a great circle W and D of a degree look alike.
+/// to what a pass can show; of all gyros together it is uncertain by a factor of 20, gyros among each other by a factor
+/// of e, degrees of one gyro by e² of which neighbours have most in common, W and D of one degree by half a logarithm. A
+/// rotor that has much of one degree is likely to have some of the next, and near a great circle W and D of a degree
+/// look alike; but of low degrees, which act much as eq. (1) does, a pass shows little, and that it shows nothing of high
+/// ones says little of them.
 constexpr double kMeanRms_rad_s = 1e-10;
 constexpr double kSigmaOfAll = 3;
 constexpr double kSigmaOfGyro = 1;
-constexpr double kSigmaOfDegree = 0.85;
+constexpr double kSigmaOfDegree = 2;
+constexpr double kDegreesAlike = 3;
 constexpr double kSigmaOfGroup = 0.5;
 /// Larger than all of eq. (1): a rotor that drifts so is not one that it describes.
 constexpr double kMostRms_rad_s = 1e-5;
@@ -42,7 +45,9 @@ MatrixXd prior_information(const std::vector<FieldMembers::Group>& groups) {
       const FieldMembers::Group& a = groups[static_cast<std::size_t>(i)];
       const FieldMembers::Group& b = groups[static_cast<std::size_t>(j)];
       covariance(i, j) += a.gyro == b.gyro ? kSigmaOfGyro * kSigmaOfGyro : 0;
-      covariance(i, j) += a.gyro == b.gyro && a.degree == b.degree ? kSigmaOfDegree * kSigmaOfDegree : 0;
+      covariance(i, j) += a.gyro == b.gyro ? kSigmaOfDegree * kSigmaOfDegree *
+                                                 std::exp(-std::abs(a.degree - b.degree) / kDegreesAlike)
+                                           : 0;
     }
     covariance(i, i) += kSigmaOfGroup * kSigmaOfGroup;
   }
@@ -335,7 +340,7 @@ namespace {
 VectorXd log_of_mean_squares(const Posteriors& posteriors, const FieldSpectrum& spectrum, double log_likelihood) {
   // In sigmas of the logarithm. The mean of a square is far above its most likely value, and of large values the pass
   // says itself that they are not.
-  constexpr std::array<double, 6> kAway = {-2.5, -1.25, 1.25, 2.5, 3.75, 5};
+  constexpr std::array<double, 7> kAway = {-2.5, -1.25, 1.25, 2.5, 3.75, 5, 6.25};
   const Index size = spectrum.log_rms.size();
   const MatrixXd covariance = spectrum.information.llt().solve(MatrixXd::Identity(size, size));
   const std::vector<double> found = on_all_cores(static_cast<std::size_t>(size), [&](std::size_t group) {

@@ -114,7 +114,7 @@ double log_prior(const FieldMembers& members, const VectorXd& log_rms) {
       const FieldMembers::Group& b = members.groups()[static_cast<std::size_t>(j)];
       const bool of_one_gyro = a.gyro == b.gyro;
       covariance(i, j) =
-          9 + (of_one_gyro ? 1 : 0) + (of_one_gyro && a.degree == b.degree ? 0.85 * 0.85 : 0) + (i == j ? 0.25 : 0);
+          9 + (of_one_gyro ? 1 + 4 * std::exp(-std::abs(a.degree - b.degree) / 3.0) : 0) + (i == j ? 0.25 : 0);
     }
   }
   const VectorXd apart = log_rms.array() - std::log(1e-10);
