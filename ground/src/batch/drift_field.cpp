@@ -22,13 +22,15 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-/// Prior of the spectrum: ln of the root mean square of a group is normal about that of a rotor that eq. (1) describes
-/// to what a pass can show; of all gyros together it is uncertain by a factor of 20, gyros among each other by a factor
-/// of e, degrees of one gyro by e² of which neighbours have most in common, W and D of one degree by half a logarithm. A
-/// rotor that has much of one degree is likely to have some of the next, and near a great circle W and D of a degree
-/// look alike; but of low degrees, which act much as eq. (1) does, a pass shows little, and that it shows nothing of high
-/// ones says little of them.
-constexpr double kMeanRms_rad_s = 1e-10;
+/// Prior of the spectrum: ln of the root mean square of a group is normal. What is expected falls from degree to degree,
+/// from some thousandths of eq. (1) to what no pass can show; of all gyros together it is uncertain by a factor of 20,
+/// gyros among each other by a factor of e, degrees of one gyro by e² of which neighbours have most in common, W and D
+/// of one degree by half a logarithm. A rotor that has much of one degree is likely to have some of the next, and near a
+/// great circle W and D of a degree look alike; but of low degrees, which act much as eq. (1) does, a pass without slews
+/// shows little, and that it shows nothing of high ones says little of them.
+constexpr double kRmsOfDegree1_rad_s = 5e-9;
+constexpr double kFallPerDegree = 0.7;
+constexpr double kLeastRms_rad_s = 1e-10;
 constexpr double kSigmaOfAll = 3;
 constexpr double kSigmaOfGyro = 1;
 constexpr double kSigmaOfDegree = 2;
@@ -36,6 +38,14 @@ constexpr double kDegreesAlike = 3;
 constexpr double kSigmaOfGroup = 0.5;
 /// Larger than all of eq. (1): a rotor that drifts so is not one that it describes.
 constexpr double kMostRms_rad_s = 1e-5;
+
+VectorXd prior_mean(const std::vector<FieldMembers::Group>& groups) {
+  VectorXd mean(static_cast<Index>(groups.size()));
+  std::ranges::transform(groups, mean.begin(), [](const FieldMembers::Group& group) {
+    return std::log(std::max(kRmsOfDegree1_rad_s * std::exp(-kFallPerDegree * (group.degree - 1)), kLeastRms_rad_s));
+  });
+  return mean;
+}
 
 MatrixXd prior_information(const std::vector<FieldMembers::Group>& groups) {
   const auto size = static_cast<Index>(groups.size());
@@ -80,7 +90,10 @@ struct Posterior {
 class Posteriors {
  public:
   Posteriors(const FieldMembers& members, const FieldInformation& information)
-      : members_(members), information_(information), prior_(prior_information(members.groups())) {}
+      : members_(members),
+        information_(information),
+        prior_mean_(prior_mean(members.groups())),
+        prior_(prior_information(members.groups())) {}
 
   [[nodiscard]] Likelihood at(const VectorXd& log_rms) const {
     check_stop();
@@ -92,7 +105,7 @@ class Posteriors {
     const Eigen::LLT<MatrixXd> root(std::move(covariance));
     found.L = root.matrixLLT();
     found.y = root.matrixL().solve(information_.y);
-    const VectorXd apart_from_prior = apart(log_rms);
+    const VectorXd apart_from_prior = log_rms - prior_mean_;
     found.log_likelihood = information_.log_likelihood - found.L.diagonal().array().log().sum() -
                            found.y.squaredNorm() / 2 - apart_from_prior.dot(prior_ * apart_from_prior) / 2;
     return found;
@@ -112,7 +125,7 @@ class Posteriors {
     const Posterior at = posterior(by);
     MatrixXd learnt = MatrixXd::Zero(members_.size(), members_.size());
     add_gram(at.white.transpose(), 1, learnt);
-    gradient = -prior_ * apart(log_rms);
+    gradient = -prior_ * (log_rms - prior_mean_);
     information = MatrixXd::Zero(prior_.rows(), prior_.cols());
     const std::vector<Index>& group = members_.group_of();
     for (Index j = 0; j < members_.size(); ++j) {
@@ -127,10 +140,9 @@ class Posteriors {
   }
 
  private:
-  [[nodiscard]] static VectorXd apart(const VectorXd& log_rms) { return log_rms.array() - std::log(kMeanRms_rad_s); }
-
   const FieldMembers& members_;
   const FieldInformation& information_;
+  VectorXd prior_mean_;
   MatrixXd prior_;
 };
 
@@ -158,6 +170,8 @@ FieldMembers::FieldMembers(const Layout& layout) {
   }
   of_rms_ = VectorXd::Map(of_rms.data(), static_cast<Index>(of_rms.size()));
 }
+
+VectorXd FieldMembers::expected() const { return prior_mean(groups_); }
 
 VectorXd FieldMembers::sigma(const VectorXd& log_rms) const {
   return of_rms_.cwiseProduct(VectorXd(log_rms.array().exp())(group_of_));
@@ -305,9 +319,7 @@ FieldSpectrum most_likely_spectrum(const FieldMembers& members, const FieldInfor
   constexpr int kMostHalvings = 10;
   const Posteriors posteriors(members, information);
   FieldSpectrum spectrum;
-  spectrum.log_rms = first.size() > 0
-                         ? first
-                         : VectorXd::Constant(static_cast<Index>(members.groups().size()), std::log(kMeanRms_rad_s));
+  spectrum.log_rms = first.size() > 0 ? first : members.expected();
   Likelihood here = posteriors.at(spectrum.log_rms);
   for (int i = 0; i < kMostSteps; ++i) {
     VectorXd gradient;
@@ -349,10 +361,11 @@ VectorXd log_of_mean_squares(const Posteriors& posteriors, const FieldSpectrum& 
     double weights = 1;
     double squares = 1;
     for (const double away : kAway) {
-      const double there = posteriors.at(spectrum.log_rms + away * sigma).log_likelihood;
+      const VectorXd other = (spectrum.log_rms + away * sigma).cwiseMin(std::log(kMostRms_rad_s));
+    const double there = posteriors.at(other).log_likelihood;
       const double weight = std::exp(std::min(there - log_likelihood, 0.0));
       weights += weight;
-      squares += weight * std::exp(2 * away * sigma(g));
+      squares += weight * std::exp(2 * (other(g) - spectrum.log_rms(g)));
     }
     return std::log(std::max(squares / weights, 1.0)) / 2;
   });

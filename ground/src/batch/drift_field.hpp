@@ -32,6 +32,8 @@ class FieldMembers {
   /// Those of one gyro, of which each has as many.
   [[nodiscard]] Eigen::Index of_one_gyro() const { return size() / (groups_.back().gyro + 1); }
 
+  /// The spectrum that a rotor is expected to have, ln of the root mean square of each group, rad/s.
+  [[nodiscard]] Eigen::VectorXd expected() const;
   /// 1-sigma of each member, rad/s, with which the members of each group make drift of this root mean square over the
   /// sphere, rad/s; ln of that, by group.
   [[nodiscard]] Eigen::VectorXd sigma(const Eigen::VectorXd& log_rms) const;
@@ -74,7 +76,7 @@ struct FieldSpectrum {
   double log_likelihood = 0;    ///< of the pass, with the prior density of the spectrum; up to a constant of the pass
 };
 
-/// By Fisher's scoring. `first`: where it begins; empty: at the mean of its prior.
+/// By Fisher's scoring. `first`: where it begins; empty: at the expected one.
 [[nodiscard]] FieldSpectrum most_likely_spectrum(const FieldMembers& members, const FieldInformation& information,
                                                  const Eigen::VectorXd& first = {});
 

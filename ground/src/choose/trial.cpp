@@ -38,8 +38,8 @@ std::vector<DriftModelId> models_up_to(const DriftModelId& model) {
 
 /// Convergence limit of the constants in sigmas: enough for a decision.
 constexpr double kNearEnough = 0.2;
-/// Drift in each group that the modes of a field are for at first: more than rotors have that eq. (1) describes.
-constexpr double kFirstFieldLevel_rad_s = 3e-10;
+/// So many times the drift that is expected are the modes of a field for at first.
+constexpr double kFirstFieldLevel = 4;
 /// No step is longer.
 constexpr double kOneIteration = std::numeric_limits<double>::infinity();
 
@@ -84,9 +84,7 @@ PassSolution Trial::with_likely_field(PassSolution first) {
   const double room = std::log(3.0);
   const double more_than_enough = 2 * room;
   if (!problem_.modes()) {
-    use_modes(
-        Eigen::VectorXd::Constant(static_cast<Eigen::Index>(field_->groups().size()), std::log(kFirstFieldLevel_rad_s)),
-        first);
+    use_modes(field_->expected().array() + std::log(kFirstFieldLevel), first);
   }
   for (int round = 0; round < kMostRounds; ++round) {
     if (found_.linear.stages.empty()) {
