@@ -119,19 +119,31 @@ void refuse_prior_of_others(const PassSettings& settings, const CalibrationOptio
   }
 }
 
-/// The smallest model such that no larger one is more likely by kLogOddsToAccept; nullptr of an empty list.
-const Forecast* best_of(const std::vector<Forecast>& forecasts) {
+/// Whether a drift model has all coefficients that the priors of the gyros name.
+bool has_what_is_named(const DriftModelId& model, const PassSettings& settings) {
+  const std::vector<DriftCoefficient> its = coefficients_of(model);
+  const auto has = [&](const auto& named) { return std::ranges::find(its, named.first) != its.end(); };
+  return std::ranges::all_of(settings.gyros, [&](const GyroPrior& prior) {
+    return std::ranges::all_of(prior.drift_rad_s, has) && std::ranges::all_of(prior.drift_sigma_rad_s, has);
+  });
+}
+
+/// The smallest model with what the settings name such that no larger one is more likely by kLogOddsToAccept; nullptr of
+/// an empty list.
+const Forecast* best_of(const std::vector<Forecast>& forecasts, const PassSettings& settings) {
   double most = -std::numeric_limits<double>::infinity();
   const Forecast* best = nullptr;
   for (auto forecast = forecasts.rbegin(); forecast != forecasts.rend(); ++forecast) {
     most = std::max(most, forecast->log_likelihood);
-    best = forecast->log_likelihood >= most - kLogOddsToAccept ? &*forecast : best;
+    const bool enough = forecast->log_likelihood >= most - kLogOddsToAccept;
+    best = enough && has_what_is_named(forecast->drift_model, settings) ? &*forecast : best;
   }
   return best;
 }
 
 /// Decides the open choices and the drift model by the evidence of a trial with all states free.
-void settle_states(const Trial& everything, const CalibrationOptions& asked, Decision& decision) {
+void settle_states(const Trial& everything, const PassSettings& settings, const CalibrationOptions& asked,
+                   Decision& decision) {
   decision.evidence.clear();
   const auto settle = [&](std::optional<FurtherState> state, double log_bayes_factor) {
     decision.evidence.push_back({state, log_bayes_factor, log_bayes_factor > kLogOddsToAccept});
@@ -145,7 +157,7 @@ void settle_states(const Trial& everything, const CalibrationOptions& asked, Dec
   }
   decision.forecasts = everything.forecasts();
   if (!asked.drift_model) {
-    const Forecast* best = best_of(decision.forecasts);
+    const Forecast* best = best_of(decision.forecasts, settings);
     settle({}, best == nullptr ? 0 : best->log_likelihood - decision.forecasts.front().log_likelihood);
     decision.options.drift_model = best == nullptr ? kEsg7 : best->drift_model;
   }
@@ -217,7 +229,7 @@ void decide_again_with_more_noise(const Pass& pass, const Screened& screened, co
       everything = std::move(trial);
     }
   }
-  settle_states(everything, asked, decision);
+  settle_states(everything, pass.settings, asked, decision);
   if (!asked.drift_model && walking.log_likelihood > walk.log_likelihood + kLogOddsToAccept) {
     options.drift_model = largest_model;
   }
@@ -273,7 +285,7 @@ Decision decide_by_pass(const Pass& pass, const Screened& screened, const Calibr
   const std::vector<Eigen::Vector3d> changes = everything.changes_rad();
   options.find_noise = asked.find_noise && changes.size() >= kLeastFixPairs;
   if (!options.find_noise) {
-    settle_states(everything, asked, decision);
+    settle_states(everything, pass.settings, asked, decision);
     decision.changes = changes_over(everything);
     if (options.drift_field) {
       decision.field = Trial(pass, screened, options, noise).field_prior();
@@ -287,7 +299,7 @@ Decision decide_by_pass(const Pass& pass, const Screened& screened, const Calibr
   if (noise) {
     noise = with_most_likely_walk(everything, with_everything(options, asked, largest_model)).noise;
   }
-  settle_states(everything, asked, decision);
+  settle_states(everything, pass.settings, asked, decision);
   Trial decided(pass, screened, options, noise);
   const NoiseFit walking = with_most_likely_walk(decided, options);
   if (walking.gain > kLogOddsToAccept) {
@@ -426,7 +438,7 @@ Decision decide(const Pass& pass, const CalibrationOptions& asked_for) {
     Decision decided = decide_by_pass(pass, screened, asked, largest_model);
     const std::optional<DriftModelId> larger = larger_model(largest_model);
     // There are no forecasts where the pass is too short.
-    if (!larger || decided.forecasts.empty() || best_of(decided.forecasts) != &decided.forecasts.back()) {
+    if (!larger || decided.forecasts.empty() || best_of(decided.forecasts, pass.settings) != &decided.forecasts.back()) {
       if (pass.settings.gyros.size() == 2) {  // which of more gyros is at fault is judged by the noise found
         decided.screened = std::move(screened);
       }
