@@ -5,6 +5,7 @@
 #include <Eigen/SparseCore>
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <utility>
 
 #include "trihedron/core/frames.hpp"
@@ -111,6 +112,18 @@ std::vector<MatrixXd> forms_of_arcs(const PassProblem& problem, const PassSoluti
   const Index n = layout.size();
   const Index shapes = kOfAberration + 3L * layout.gyros;
   std::vector<MatrixXd> forms(problem.arcs(), MatrixXd::Zero(n + shapes + 1, n + shapes + 1));
+  // Rows of fixes of one arc, until there are enough of them that a product is worth its beginning.
+  constexpr Index kTogether = 64;
+  constexpr Index kMostRows = 2 * kMaxGyros;
+  MatrixXd gathered(n + shapes + 1, kTogether + kMostRows);
+  Index count = 0;
+  std::size_t arc = 0;
+  const auto put_into_form = [&] {
+    if (count > 0) {
+      forms[arc].selfadjointView<Eigen::Lower>().rankUpdate(gathered.leftCols(count));
+      count = 0;
+    }
+  };
   problem.go_along(solution, [&](const PassProblem::Moment& moment) {
     if (moment.fix == nullptr) {
       return;
@@ -137,8 +150,14 @@ std::vector<MatrixXd> forms_of_arcs(const PassProblem& problem, const PassSoluti
       all.middleCols<3>(n + kOfAberration + 3L * k) = by_alignment * cross(-(C_c_b * h_b)) * C_c_b * h_b.asDiagonal();
     }
     rows.R.llt().matrixL().solveInPlace(all);
-    forms[moment.arc].selfadjointView<Eigen::Lower>().rankUpdate(all.transpose());
+    if (moment.arc != arc || count >= kTogether) {
+      put_into_form();
+      arc = moment.arc;
+    }
+    gathered.middleCols(count, all.rows()) = all.transpose();
+    count += all.rows();
   });
+  put_into_form();
   for (MatrixXd& form : forms) {
     form = MatrixXd(form.selfadjointView<Eigen::Lower>());
   }
@@ -262,9 +281,10 @@ class Constancy {
     return static_cast<double>(begins_[at] + begins_[at + 1]) / 2 / static_cast<double>(begins_.back());
   }
 
-  /// What moves as these columns times numbers of this 1-sigma; gets log_odds (of one try), size, sigma and
-  /// parameters_off.
-  void put_into(Change& change, const Eigen::SparseMatrix<double>& columns, const VectorXd& prior_sigma) const {
+  /// What moves as these columns times numbers of this 1-sigma; gets log_odds (of one try), and where these are above
+  /// `worth_more_than`, size, sigma and parameters_off.
+  void put_into(Change& change, const Eigen::SparseMatrix<double>& columns, const VectorXd& prior_sigma,
+                double worth_more_than) const {
     const MatrixXd by_form = form_.topLeftCorner(size(), size()) * columns;
     const auto D = prior_sigma.asDiagonal();
     const MatrixXd S =
@@ -273,8 +293,14 @@ class Constancy {
     const Eigen::LLT<MatrixXd> root(S);
     const VectorXd found = root.solve(b);
     change.log_odds = b.dot(found) / 2 - root.matrixLLT().diagonal().array().log().sum();
+    if (change.log_odds <= worth_more_than) {
+      return;
+    }
     change.size = D * found;
-    change.sigma = (D * root.solve(MatrixXd(D))).diagonal().cwiseSqrt();
+    // The diagonal of S⁻¹ = L⁻ᵀ L⁻¹.
+    MatrixXd inverse = MatrixXd::Identity(prior_sigma.size(), prior_sigma.size());
+    root.matrixL().solveInPlace(inverse);
+    change.sigma = D * VectorXd(inverse.colwise().norm().transpose());
     const VectorXd moved = columns * change.size;
     change.parameters_off = -(follow_.leftCols(size()) * moved);
     for (Index step = 0; step < steps(); ++step) {
@@ -349,11 +375,12 @@ std::vector<Change> changes_over(const Trial& trial) {
     ++tries;
     Eigen::SparseMatrix<double> columns(pass.size(), sigma.size());
     columns.setFromTriplets(entries.begin(), entries.end());
-    pass.put_into(change, columns, sigma);
     const auto same = std::ranges::find_if(best, [&](const Change& other) {
       return other.moving == change.moving && other.motion == change.motion && other.gyro == change.gyro;
     });
-    if (same == best.end()) {
+    const bool is_first = same == best.end();
+    pass.put_into(change, columns, sigma, is_first ? -std::numeric_limits<double>::infinity() : same->log_odds);
+    if (is_first) {
       best.push_back(std::move(change));
     } else if (change.log_odds > same->log_odds) {
       *same = std::move(change);
