@@ -67,7 +67,8 @@ bench:
 	cmake --build $(BUILD) --parallel $(JOBS) --target $(BENCHES)
 	bench/performance.py $(BUILD) docs/performance.md
 
-# Before `make bench`, which puts the result into docs/performance.md. PEERS: programs of others that print as bench/peers/paper_model.hpp does.
+# Before `make bench`, which puts the result into docs/performance.md. PEERS: programs of others, each PROGRAM=HOW, that print as
+# bench/peers/paper_model.hpp does.
 peers:
 	@cmake/setup.sh program tests
 	cmake --preset release $(CMAKE_FLAGS)

@@ -2,8 +2,8 @@
 """Measures what docs/performance.md tells and writes its tables: performance.py BUILD DOCUMENT [--kept DIRECTORY].
 
 Times are Google Benchmark's, of the processor; instructions are callgrind's, and exact. Both are kept as JSON in DIRECTORY (out/bench);
-what is there and newer than the programs is not measured again, so that an interrupted run goes on. With `--peers` the filters of
-others that bench/peers/peers.py has measured are put in as well.
+what is there and newer than the programs is not measured again, so that an interrupted run goes on. What bench/peers/peers.py
+has left there of the filters of others is put in as well.
 """
 import argparse
 import json
@@ -73,6 +73,10 @@ WHY = {
 }
 
 
+# Under callgrind each of these takes a quarter of an hour: `calibrate` is decisions and what is told, and of the batch the time says enough.
+NOT_COUNTED = {"calibrate", "batch, all told", "batch, all told, definitive attitude", "batch"}
+
+
 # ---- Measuring
 
 def kept(path, newer_than, measure):
@@ -126,14 +130,11 @@ def milliseconds(its):
     return its["cpu_time"] * {"ns": 1e-6, "us": 1e-3, "ms": 1, "s": 1e3}[its["time_unit"]]
 
 
-def parts_table(times, counts):
+def parts_table(names, times, counts):
     rows = []
-    for name, count in counts.items():
-        if name.startswith("hours/"):
-            continue
-        its = times.get(f"nine hours/{name}")
-        rows.append([name, f"{milliseconds(its):.0f}" if its else "", f"{SAMPLES / milliseconds(its) / 1e3:.2f}" if its else "",
-                     f"{count / 1e6:.0f}", f"{count / SAMPLES:.0f}"])
+    for name in names:
+        its, count = milliseconds(times[f"nine hours/{name}"]), counts.get(name)
+        rows.append([name, f"{its:.0f}", f"{SAMPLES / its / 1e3:.2f}", *([f"{count / 1e6:.0f}", f"{count / SAMPLES:.0f}"] if count else ["", ""])])
     return table(["part", "ms", "million samples/s", "million instructions", "instructions a sample"], rows)
 
 
@@ -166,29 +167,32 @@ def peers_table(found):
     return table(["filter", "built", "ms", "times ours", "greatest difference of a parameter"], rows, right=2)
 
 
+def place_of(table_name):
+    return re.compile(rf"(<!-- {table_name} -->\n).*?(<!-- end -->)", re.DOTALL)
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("build", type=pathlib.Path)
     parser.add_argument("document", type=pathlib.Path)
     parser.add_argument("--kept", type=pathlib.Path, default=pathlib.Path("out/bench"))
     arguments = parser.parse_args()
+    if missing := [name for name in ("parts", "floor", "scaling", "peers") if not place_of(name).search(arguments.document.read_text())]:
+        sys.exit(f"{arguments.document}: has no place for {', '.join(missing)}")
     build, directory = arguments.build.resolve(), arguments.kept
     directory.mkdir(parents=True, exist_ok=True)
     counter = build / "trihedron_count_parts"
     listed = subprocess.run([counter], capture_output=True, text=True, check=False).stderr
     names = [line.strip() for line in listed.splitlines() if line.startswith("  ")]
-    counts = counts_of(counter, directory, names + ["hours/1", "hours/3", "hours/9"])
+    counts = counts_of(counter, directory, [name for name in names if name not in NOT_COUNTED] + ["hours/1", "hours/3", "hours/9"])
     times = {re.sub(r"/process_time$", "", its["name"]): its for its in times_of(build / "trihedron_bench", directory)["benchmarks"]}
-    tables = {"parts": parts_table(times, counts), "floor": floor_table(counts), "scaling": scaling_table(times, counts)}
+    tables = {"parts": parts_table(names, times, counts), "floor": floor_table(counts), "scaling": scaling_table(times, counts)}
     peers = directory / "peers.json"
     if peers.exists():
         tables["peers"] = peers_table(json.loads(peers.read_text()))
     text = arguments.document.read_text()
     for name, measured in tables.items():
-        pattern = re.compile(rf"(<!-- {name} -->\n).*?(<!-- end -->)", re.DOTALL)
-        if not pattern.search(text):
-            sys.exit(f"{arguments.document}: has no place for the table {name}")
-        text = pattern.sub(lambda place: place[1] + measured + "\n" + place[2], text)
+        text = place_of(name).sub(lambda place: place[1] + measured + "\n" + place[2], text)
         print(f"\n{name}\n{measured}")
     arguments.document.write_text(text)
 
