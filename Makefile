@@ -70,7 +70,7 @@ bench:
 # Before `make bench`, which puts the result into docs/performance.md. PEERS: programs of others, each PROGRAM=HOW, that print as
 # bench/peers/paper_model.hpp does.
 peers:
-	@cmake/setup.sh program tests
+	@cmake/setup.sh program tests peers
 	cmake --preset release $(CMAKE_FLAGS)
 	cmake --build $(BUILD) --parallel $(JOBS) --target trihedron trihedron_peer_ours trihedron_peer_dense trihedron_peer_dense_native
 	@test -e build-peers/bin/pip || python3 -m venv build-peers

@@ -1,8 +1,9 @@
 #pragma once
-/// The paper's filter as somebody writes it who has Eigen and no trihedron: 24 states (two components of each momentum's
-/// error in the quasi-inertial trihedron, seven coefficients and three alignment angles of each gyro), their transition
-/// over each gyro sample, eq. (3) at each fix with the correlated noise, and feedback into the model. The covariance is
-/// left to the filter that uses it. trihedron's own code is not used, so that equal results say something.
+/// The paper's filter as somebody writes it who has Eigen and no trihedron: 24 states (two components of each
+/// momentum's error in the quasi-inertial trihedron, seven coefficients and three alignment angles of each gyro), their
+/// transition over each gyro sample, eq. (3) at each fix with the correlated noise, and feedback into the model. The
+/// covariance is left to the filter that uses it. trihedron's own code is not used, so that equal results say
+/// something.
 
 #include <Eigen/Dense>
 #include <Eigen/Geometry>
@@ -111,8 +112,7 @@ struct Basis {
   Basis() = default;
   explicit Basis(const Gyro* gyros) {
     const Matrix3d q = trihedron(gyros[0].h_in, gyros[1].h_in);
-    const double cotangent =
-        gyros[0].h_in.dot(gyros[1].h_in) / gyros[0].h_in.cross(gyros[1].h_in).norm();
+    const double cotangent = gyros[0].h_in.dot(gyros[1].h_in) / gyros[0].h_in.cross(gyros[1].h_in).norm();
     components[0] << q.col(0).transpose(), q.col(2).transpose();
     tangents[0] << q.col(0), q.col(2);
     components[1] << q.col(0).transpose(), q.col(1).transpose();
@@ -207,8 +207,7 @@ class Model {
       const Vector3d error = basis_.tangents[k] * x.segment<2>(direction(k));
       gyro.h_in = (turn(gyro.h_in.cross(error)) * gyro.h_in).normalized();
       gyro.kappa += x.segment<7>(drift(k));
-      gyro.C_c_b =
-          Eigen::Quaterniond(turn(x.segment<3>(alignment(k))) * gyro.C_c_b).normalized().toRotationMatrix();
+      gyro.C_c_b = Eigen::Quaterniond(turn(x.segment<3>(alignment(k))) * gyro.C_c_b).normalized().toRotationMatrix();
     }
   }
 
@@ -227,7 +226,8 @@ class Model {
   Basis basis_;
 };
 
-/// Flies a pass. `Filter` has start(P), predict(F), and update(y, H, R), which returns the correction, and covariance().
+/// Flies a pass. `Filter` has start(P), predict(F), and update(y, H, R), which returns the correction, and
+/// covariance().
 template <class Filter>
 Model fly(const Pass& pass, Filter& filter) {
   Model model;
