@@ -138,6 +138,17 @@ def parts_table(names, times, counts):
     return table(["part", "ms", "million samples/s", "million instructions", "instructions a sample"], rows)
 
 
+def goals_table(times):
+    def of(*names):
+        return sum(milliseconds(times[f"nine hours/{name}"]) for name in names)
+    files = ("read NetCDF", "report", "write results")
+    goals = [("nine hours through the default filter: 26 states, a fix each 3 s, a prediction at each sample", 40, of("filter")),
+             ("`calibrate` from NetCDF to written results, decisions included", 250, of("calibrate", *files)),
+             ("the same by estimator batch", 500, of("batch", *files))]
+    return table(["", "goal, ms", "now, ms", ""],
+                 [[what, f"{goal}", f"{now:.0f}", "met" if now <= goal else f"{now / goal:.1f} times the goal"] for what, goal, now in goals])
+
+
 def floor_table(counts):
     rows = []
     for name, (floor, unit) in FLOOR.items():
@@ -177,7 +188,7 @@ def main():
     parser.add_argument("document", type=pathlib.Path)
     parser.add_argument("--kept", type=pathlib.Path, default=pathlib.Path("out/bench"))
     arguments = parser.parse_args()
-    if missing := [name for name in ("parts", "floor", "scaling", "peers") if not place_of(name).search(arguments.document.read_text())]:
+    if missing := [name for name in ("parts", "goals", "floor", "scaling", "peers") if not place_of(name).search(arguments.document.read_text())]:
         sys.exit(f"{arguments.document}: has no place for {', '.join(missing)}")
     build, directory = arguments.build.resolve(), arguments.kept
     directory.mkdir(parents=True, exist_ok=True)
@@ -186,7 +197,7 @@ def main():
     names = [line.strip() for line in listed.splitlines() if line.startswith("  ")]
     counts = counts_of(counter, directory, [name for name in names if name not in NOT_COUNTED] + ["hours/1", "hours/3", "hours/9"])
     times = {re.sub(r"/process_time$", "", its["name"]): its for its in times_of(build / "trihedron_bench", directory)["benchmarks"]}
-    tables = {"parts": parts_table(names, times, counts), "floor": floor_table(counts), "scaling": scaling_table(times, counts)}
+    tables = {"parts": parts_table(names, times, counts), "goals": goals_table(times), "floor": floor_table(counts), "scaling": scaling_table(times, counts)}
     peers = directory / "peers.json"
     if peers.exists():
         tables["peers"] = peers_table(json.loads(peers.read_text()))
