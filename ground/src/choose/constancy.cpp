@@ -114,7 +114,7 @@ std::vector<MatrixXd> forms_of_arcs(const PassProblem& problem, const PassSoluti
   std::vector<MatrixXd> forms(problem.arcs(), MatrixXd::Zero(n + shapes + 1, n + shapes + 1));
   // Rows of fixes of one arc, until there are enough of them that a product is worth its beginning.
   constexpr Index kTogether = 64;
-  constexpr Index kMostRows = 2 * kMaxGyros;
+  constexpr Index kMostRows = 2L * kMaxGyros;
   MatrixXd gathered(n + shapes + 1, kTogether + kMostRows);
   Index count = 0;
   std::size_t arc = 0;
