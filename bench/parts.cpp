@@ -99,6 +99,11 @@ Run fixes() {
   };
 }
 
+Run deciding() {
+  const Pass& pass = nine_hours().pass;
+  return [&pass] { static_cast<void>(ground::decide(pass, CalibrationOptions{})); };
+}
+
 Run calibration(Estimator estimator, bool told, bool definitive = false) {
   const Pass& pass = nine_hours().pass;
   CalibrationOptions options = told ? all_told() : CalibrationOptions{};
@@ -195,7 +200,7 @@ const std::vector<Part>& parts() {
       {"filter of the paper", [] { return filter<PaperEstimator>(events()); }},
       {"on-board step without navigator", [] { return on_board(events(), false); }},
       {"on-board step", [] { return on_board(events(), true); }},
-      {"decisions", [] { return [] { static_cast<void>(ground::decide(nine_hours().pass, CalibrationOptions{})); }; }},
+      {"decisions", deciding},
       {"calibrate, all told", [] { return calibration(Estimator::kInvariant, true); }},
       {"calibrate", [] { return calibration(Estimator::kInvariant, false); }},
       {"batch, all told", [] { return calibration(Estimator::kBatch, true); }},
