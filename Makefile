@@ -7,7 +7,7 @@ BUILD := build
 LINT_TOOLS := build-lint/tools
 SOURCES := $(shell git ls-files '*.cpp' '*.hpp' 2>/dev/null)
 
-.PHONY: help setup build everything demo test flight bench slots mutants validation consistency forecasts verdict fuzz fuzz-build fuzz-briefly docs \
+.PHONY: help setup build everything demo test flight bench peers slots mutants validation consistency forecasts verdict fuzz fuzz-build fuzz-briefly docs \
   format lint \
   standard sanitize coverage interop install clean
 
@@ -16,7 +16,8 @@ help:
 	@echo 'make test     build and run all tests'
 	@echo 'make build    the program alone, at $(BUILD)/trihedron'
 	@echo 'make everything  with tests and benches'
-	@echo 'make bench    measure: the on-board step, reading, writing and simulating a pass'
+	@echo 'make bench    measure again what docs/performance.md tells: half an hour; goes on where it was interrupted'
+	@echo 'make peers    fly the filters of others over the same pass (PEERS: further programs): two minutes'
 	@echo 'make slots    count the instructions of each slot of the on-board application'
 	@echo 'make flight   fly core on an emulated Cortex-M7 and three other processors; writes the tables of docs/flight.md'
 	@echo 'make validation  measure again what docs/validation.md tells'
@@ -61,8 +62,22 @@ flight:
 	cmake --build $(BUILD) --parallel $(JOBS) --target trihedron trihedron_fly
 	flight/targets/fly.py $(abspath $(BUILD)) docs/flight.md
 
-bench: everything
-	$(BUILD)/trihedron_bench
+BENCHES = trihedron trihedron_bench trihedron_count_parts
+bench:
+	@cmake/setup.sh program tests
+	cmake --preset release $(CMAKE_FLAGS)
+	cmake --build $(BUILD) --parallel $(JOBS) --target $(BENCHES)
+	bench/performance.py $(BUILD) docs/performance.md
+
+# Before `make bench`, which puts the result into docs/performance.md. PEERS: programs of others, each PROGRAM=HOW, that print as
+# bench/peers/paper_model.hpp does.
+peers:
+	@cmake/setup.sh program tests peers
+	cmake --preset release $(CMAKE_FLAGS)
+	cmake --build $(BUILD) --parallel $(JOBS) --target trihedron trihedron_peer_ours trihedron_peer_dense trihedron_peer_dense_native
+	@test -e build-peers/bin/pip || python3 -m venv build-peers
+	@build-peers/bin/pip install --quiet --disable-pip-version-check --requirement bench/peers/requirements.txt
+	build-peers/bin/python bench/peers/peers.py $(BUILD) out/bench/peers.json $(PEERS)
 
 # Instructions of each slot of the on-board application.
 slots:

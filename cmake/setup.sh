@@ -18,6 +18,8 @@ tests=(
 docs=(doxygen)
 # Other software that reads what the program writes: Orekit runs on Java, the rest comes from PyPI.
 interop=(default-jre-headless python3 python3-venv)
+# Filters in Python, whose packages come from PyPI.
+peers=(python3 python3-venv)
 # ARM Cortex-M7 without an operating system, emulated: a short flight is among the tests.
 flight=(gcc-arm-none-eabi libnewlib-arm-none-eabi libstdc++-arm-none-eabi-newlib qemu-system-arm)
 # The further targets of `make flight`.
@@ -29,8 +31,8 @@ lint=(git ca-certificates cppcheck python3 python3-venv)
 packages=()
 for name in ${*:-program tests sanitizers flight lint}; do
   case $name in
-    program|tests|sanitizers|flight|targets|lint|docs|interop) declare -n members=$name && packages+=("${members[@]}") ;;
-    *) echo "setup: no group \"$name\"; there are program, tests, sanitizers, flight, targets, lint, docs, interop" >&2; exit 2 ;;
+    program|tests|sanitizers|flight|targets|lint|docs|interop|peers) declare -n members=$name && packages+=("${members[@]}") ;;
+    *) echo "setup: no group \"$name\"; there are program, tests, sanitizers, flight, targets, lint, docs, interop, peers" >&2; exit 2 ;;
   esac
   if [ "$name" = program ]; then program_wanted=yes; fi
 done

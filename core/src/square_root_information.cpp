@@ -103,30 +103,38 @@ void triangularise(RowsView rows, int columns) {
 
 namespace {
 
-/// solve_rows() of M rows, side by side.
+/// solve_rows() of M rows, side by side, two columns at a time.
 template <std::size_t M>
 void solve_rows_together(ConstRowsView root, RowsView rows) {
   double* x[M];
   for (std::size_t i = 0; i < M; ++i) {
     x[i] = rows.row(static_cast<int>(i));
   }
-  for (int j = 0; j < root.rows; ++j) {
-    if (std::all_of(std::begin(x), std::end(x), [&](const double* row) { return row[j] == 0; })) {
-      continue;
-    }
+  const int n = root.rows;
+  int j = 0;
+  while (j < n && std::all_of(std::begin(x), std::end(x), [&](const double* row) { return row[j] == 0; })) {
+    ++j;
+  }
+  for (; j + 1 < n; j += 2) {
     const double* __restrict R = root.row(j);
+    const double* __restrict next_R = root.row(j + 1);
     double value[M];
+    double next[M];
     for (std::size_t i = 0; i < M; ++i) {
       value[i] = x[i][j] /= R[j];
+      next[i] = x[i][j + 1] = (x[i][j + 1] - value[i] * R[j + 1]) / next_R[j + 1];
     }
 #ifndef __clang__
 #pragma GCC ivdep  // the rows do not overlap
 #endif
-    for (int k = j + 1; k < root.rows; ++k) {
+    for (int k = j + 2; k < n; ++k) {
       for (std::size_t i = 0; i < M; ++i) {
-        x[i][k] -= value[i] * R[k];
+        x[i][k] = (x[i][k] - value[i] * R[k]) - next[i] * next_R[k];
       }
     }
+  }
+  for (std::size_t i = 0; j < n && i < M; ++i) {
+    x[i][j] /= root(j, j);
   }
 }
 

@@ -5,6 +5,7 @@
 #include <Eigen/SparseCore>
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <utility>
 
 #include "trihedron/core/frames.hpp"
@@ -113,9 +114,21 @@ void for_each_arc(const PassProblem& problem, const PassSolution& solution, cons
   const Index n = layout.size();
   const Index shapes = kOfAberration + 3L * layout.gyros;
   MatrixXd form = MatrixXd::Zero(n + shapes + 1, n + shapes + 1);
+  // Rows of fixes of one arc, until there are enough of them that a product is worth its beginning.
+  constexpr Index kTogether = 64;
+  constexpr Index kMostRows = 2L * kMaxGyros;
+  MatrixXd gathered(n + shapes + 1, kTogether + kMostRows);
+  Index count = 0;
+  const auto put_into_form = [&] {
+    if (count > 0) {
+      form.selfadjointView<Eigen::Lower>().rankUpdate(gathered.leftCols(count));
+      count = 0;
+    }
+  };
   std::size_t arc = 0;
   const auto go_on_to = [&](std::size_t next) {
     for (; arc < next; ++arc) {
+      put_into_form();
       use(arc, MatrixXd(form.selfadjointView<Eigen::Lower>()));
       form.setZero();
     }
@@ -147,7 +160,11 @@ void for_each_arc(const PassProblem& problem, const PassSolution& solution, cons
       all.middleCols<3>(n + kOfAberration + 3L * k) = by_alignment * cross(-(C_c_b * h_b)) * C_c_b * h_b.asDiagonal();
     }
     rows.R.llt().matrixL().solveInPlace(all);
-    form.selfadjointView<Eigen::Lower>().rankUpdate(all.transpose());
+    if (count >= kTogether) {
+      put_into_form();
+    }
+    gathered.middleCols(count, all.rows()) = all.transpose();
+    count += all.rows();
   });
   go_on_to(problem.arcs());
 }
@@ -271,9 +288,10 @@ class Constancy {
     return static_cast<double>(begins_[at] + begins_[at + 1]) / 2 / static_cast<double>(begins_.back());
   }
 
-  /// What moves as these columns times numbers of this 1-sigma; gets log_odds (of one try), size, sigma and
-  /// parameters_off.
-  void put_into(Change& change, const Eigen::SparseMatrix<double>& columns, const VectorXd& prior_sigma) const {
+  /// What moves as these columns times numbers of this 1-sigma; gets log_odds (of one try), and where these are above
+  /// `worth_more_than`, size, sigma and parameters_off.
+  void put_into(Change& change, const Eigen::SparseMatrix<double>& columns, const VectorXd& prior_sigma,
+                double worth_more_than) const {
     const MatrixXd by_form = form_.topLeftCorner(size(), size()) * columns;
     const auto D = prior_sigma.asDiagonal();
     const MatrixXd S =
@@ -282,8 +300,14 @@ class Constancy {
     const Eigen::LLT<MatrixXd> root(S);
     const VectorXd found = root.solve(b);
     change.log_odds = b.dot(found) / 2 - root.matrixLLT().diagonal().array().log().sum();
+    if (change.log_odds <= worth_more_than) {
+      return;
+    }
     change.size = D * found;
-    change.sigma = (D * root.solve(MatrixXd(D))).diagonal().cwiseSqrt();
+    // The diagonal of S⁻¹ = L⁻ᵀ L⁻¹.
+    MatrixXd inverse = MatrixXd::Identity(prior_sigma.size(), prior_sigma.size());
+    root.matrixL().solveInPlace(inverse);
+    change.sigma = D * VectorXd(inverse.colwise().norm().transpose());
     const VectorXd moved = columns * change.size;
     change.parameters_off = -(follow_.leftCols(size()) * moved);
     for (Index step = 0; step < steps(); ++step) {
@@ -358,11 +382,12 @@ std::vector<Change> changes_over(const Trial& trial) {
     ++tries;
     Eigen::SparseMatrix<double> columns(pass.size(), sigma.size());
     columns.setFromTriplets(entries.begin(), entries.end());
-    pass.put_into(change, columns, sigma);
     const auto same = std::ranges::find_if(best, [&](const Change& other) {
       return other.moving == change.moving && other.motion == change.motion && other.gyro == change.gyro;
     });
-    if (same == best.end()) {
+    const bool is_first = same == best.end();
+    pass.put_into(change, columns, sigma, is_first ? -std::numeric_limits<double>::infinity() : same->log_odds);
+    if (is_first) {
       best.push_back(std::move(change));
     } else if (change.log_odds > same->log_odds) {
       *same = std::move(change);

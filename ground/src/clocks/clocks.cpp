@@ -314,10 +314,6 @@ class TurnFit {
     }
     turns_.resize((turns_.size() + every - 1) / every);
     at_fix_.resize(pass.star_tracker.size());
-    needed_.resize(pass.star_tracker.size());
-    for (const Turn& turn : turns_) {
-      needed_[turn.first_fix] = needed_[turn.second_fix] = true;
-    }
     if (!turns_.empty()) {
       begin_ = pass.star_tracker.t.front();
       middle_ = begin_ + (pass.star_tracker.t.back() - begin_) / 2;
@@ -334,7 +330,7 @@ class TurnFit {
     constexpr double kNear_s = 1e-5;
     constexpr double kNearSigmas = 0.1;
     for (int round = 0; round < kMostRounds; ++round) {
-      read();
+      read(round < kRough);
       const VectorXd before = x_;
       if (!step(round < kRough) || std::abs(x_(Unknowns::offset())) > 2 * kFarthest_s ||
           std::abs(x_(Unknowns::rate())) > kFastest) {
@@ -349,12 +345,16 @@ class TurnFit {
   }
 
  private:
-  /// What the gyros read at each fix, by the clocks as they are now.
-  void read() {
+  /// What the gyros read at each fix that step() asks for, by the clocks as they are now.
+  void read(bool roughly) {
     const StarTrackerTelemetry& fixes = pass_.star_tracker;
+    std::vector<bool> needed(fixes.size());
+    for (std::size_t i = 0; i < turns_.size(); i += roughly ? kThinned : 1) {
+      needed[turns_[i].first_fix] = needed[turns_[i].second_fix] = true;
+    }
     std::size_t from = 0;
     for (std::size_t i = 0; i < fixes.size(); ++i) {
-      if (!needed_[i]) {
+      if (!needed[i]) {
         continue;
       }
       const double clock_s = x_(Unknowns::offset()) + x_(Unknowns::rate()) * to_seconds(fixes.t[i] - middle_);
@@ -447,6 +447,16 @@ class TurnFit {
     VectorXd sum = VectorXd::Zero(n);
     long stretch = 0;
     long used = 0;
+    // Rows of several turns, until there are enough of them that a product is worth its beginning.
+    constexpr Eigen::Index kTogether = 64;
+    MatrixXd gathered(n, kTogether + kMostRows);
+    Eigen::Index count = 0;
+    const auto put_into_normal = [&] {
+      if (count > 0) {
+        normal.selfadjointView<Eigen::Lower>().rankUpdate(gathered.leftCols(count));
+        count = 0;
+      }
+    };
     const auto close = [&] {
       if (used > 0) {
         scores_.push_back(score);
@@ -472,11 +482,16 @@ class TurnFit {
       }
       shown_ += rows.col(Unknowns::offset()).squaredNorm();
       shown_by_noise_ += noise_square;
-      normal.selfadjointView<Eigen::Lower>().rankUpdate(rows.leftCols(n).transpose());
+      gathered.middleCols(count, rows.rows()) = rows.leftCols(n).transpose();
+      count += rows.rows();
+      if (count >= kTogether) {
+        put_into_normal();
+      }
       score.noalias() += rows.leftCols(n).transpose() * rows.col(n);
       ++used;
     }
     close();
+    put_into_normal();
     if (squares.size() < kLeastPairs / kThinned) {
       return false;
     }
@@ -541,7 +556,6 @@ class TurnFit {
   Time begin_{};
   Time middle_{};
   std::vector<std::optional<FittedDirections>> at_fix_;
-  std::vector<bool> needed_;  ///< fixes of the turns
   double scale_ = 1;
   double shown_ = 0;  ///< square sum of the derivatives by the offset; and what noise alone would make of it
   double shown_by_noise_ = 0;

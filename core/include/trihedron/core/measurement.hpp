@@ -187,7 +187,21 @@ void add_parameter_errors(const Layout& layout, int gyro, const Vector& x, Gyro&
 /// rows · rowsᵀ.
 template <int Max>
 [[nodiscard]] Eigen::Matrix3d gram(const StateRows3<Max>& rows) {
-  return rows.lazyProduct(rows.transpose());
+  const double* x = rows.data();
+  const double* y = x + rows.cols();
+  const double* z = y + rows.cols();
+  double xx = 0, yy = 0, zz = 0, xy = 0, xz = 0, yz = 0;
+  for (Eigen::Index i = 0; i < rows.cols(); ++i) {
+    xx += x[i] * x[i];
+    yy += y[i] * y[i];
+    zz += z[i] * z[i];
+    xy += x[i] * y[i];
+    xz += x[i] * z[i];
+    yz += y[i] * z[i];
+  }
+  Eigen::Matrix3d square;
+  square << xx, xy, xz, xy, yy, yz, xz, yz, zz;
+  return square;
 }
 
 }  // namespace trihedron
