@@ -329,7 +329,9 @@ std::vector<io::Schema> all_schemas() {
   schemas.push_back(output("observe", "What observe prints with --json.", observe_output()));
   schemas.push_back(output("history", "What history prints with --json.", history_output(calibration)));
   schemas.push_back(output("export", "What export prints with --json.", interchange_output()));
-  schemas.push_back(output("import", "What import prints with --json.", interchange_output()));
+  schemas.push_back(
+      output("import", "What import prints with --json: of an attitude, or of a pass.",
+             {{"anyOf", Json::array({interchange_output(), with(pass(), object({{"written", text()}}))})}}));
   schemas.push_back(output("campaign", "What campaign prints with --json.", campaign_output()));
   schemas.push_back(output("campaign-run", "What campaign --only prints with --json, and run.json.", run_output()));
   return schemas;

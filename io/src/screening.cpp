@@ -28,7 +28,7 @@ class Tally {
     defect_.count += count;
     if (defect_.first.size() < Defect::kPlaces) {
       const double t_s = row < series_.rows() ? series_.t_s[row] : std::numeric_limits<double>::quiet_NaN();
-      defect_.first.push_back({series_.position(row).line, static_cast<std::int64_t>(row), t_s});
+      defect_.first.push_back({series_.position(row).line, static_cast<std::int64_t>(series_.place(row)), t_s});
     }
   }
   void add_stretch(std::size_t row, std::int64_t count, Duration length) {
