@@ -70,6 +70,18 @@ Json clocks() {
   return schema;
 }
 
+/// Of inspect; null where there is too little telemetry for it.
+Json consistency() {
+  const Json mistake = object({{"kind", text()}, {"text", text()}, {"motion_rad", number()}});
+  Json schema = object({{"consistent", flag()},
+                        {"motion_rad", array(number())},
+                        {"allowed_rad", array(number())},
+                        {"mistakes", array(mistake)},
+                        {"proposal", array(text())}});
+  schema["type"] = Json::array({"object", "null"});
+  return schema;
+}
+
 Json pass() {
   const Json defect = object({{"kind", text()}, {"where", text()}, {"count", count()}, {"text", text()}});
   return object({{"spacecraft", text()},
@@ -80,7 +92,12 @@ Json pass() {
                  {"fixes", count()},
                  {"defects", array(defect)},
                  {"fixes_of_further_star_trackers?", array(count())},
-                 {"clocks?", clocks()}});
+                 {"periods?", object({{"gyro_s", number()},
+                                      {"gyro_told_s", number()},
+                                      {"star_tracker_s", number()},
+                                      {"star_tracker_told_s", number()}})},
+                 {"clocks?", clocks()},
+                 {"consistency?", consistency()}});
 }
 
 Json interval() {

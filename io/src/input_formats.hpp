@@ -21,6 +21,7 @@ struct UnscreenedPass {
   // Of telemetry.toml alone.
   std::vector<Defect> left_out{};                ///< rows that its flags and sigmas have taken out
   Selection selection{};                         ///< that it asks for
+  ColumnsRead columns{};                         ///< in other formats they have the names of the components
   std::vector<std::filesystem::path> sources{};  ///< files that it names
 };
 

@@ -294,6 +294,14 @@ LoadedPass read_pass(const fs::path& path, const Selection& selection) {
   correct(loaded.pass, gyros);
   loaded.prior_file = std::move(raw.prior_file);
   loaded.sources = std::move(raw.sources);
+  loaded.columns = std::move(raw.columns);
+  if (loaded.columns.quaternion.empty()) {
+    loaded.columns.quaternion = kQuaternionNames;
+    const std::vector<std::string> names = direction_names(loaded.pass.gyro.gyros);
+    for (auto name = names.begin(); name != names.end(); name += 3) {
+      loaded.columns.directions.emplace_back(name, name + 3);
+    }
+  }
   return loaded;
 }
 

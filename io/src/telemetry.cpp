@@ -335,6 +335,24 @@ void measure(PassSettings& settings, const GyroSource& gyros, const StarTrackerS
   }
 }
 
+std::string negated(const std::string& name) { return name.starts_with('-') ? name.substr(1) : "-" + name; }
+
+ColumnsRead columns_of(const TelemetryMap& map) {
+  ColumnsRead columns;
+  const StarTrackerMap& head = map.star_trackers.front();
+  columns.quaternion = head.quaternion;
+  if (head.scalar_first) {
+    std::ranges::rotate(columns.quaternion, columns.quaternion.begin() + 1);
+  }
+  for (std::size_t i = 0; i < 3 && head.is_inverse; ++i) {
+    columns.quaternion[i] = negated(columns.quaternion[i]);
+  }
+  for (const DirectionMap& unit : map.gyro.units) {
+    columns.directions.push_back(unit.columns);
+  }
+  return columns;
+}
+
 }  // namespace
 
 bool is_telemetry_map(const fs::path& path) { return path.extension() == ".toml"; }
@@ -360,6 +378,7 @@ UnscreenedPass read_raw_telemetry(const fs::path& file) {
     raw.sources.push_back(directory / head.file);
     heads.push_back(read_star_tracker(head, directory));
   }
+  raw.columns = columns_of(map);
   measure(raw.settings, gyros, heads.front(), file);
   raw.gyro = gyro_series(gyros, raw.settings.epoch, raw.left_out);
   for (const StarTrackerSource& head : heads) {

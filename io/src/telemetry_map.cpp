@@ -10,6 +10,7 @@
 
 #include "pass_toml.hpp"
 #include "schemas.hpp"
+#include "telemetry_table.hpp"
 #include "toml_fields.hpp"
 #include "trihedron/io/time_text.hpp"
 #include "wording.hpp"
@@ -342,7 +343,7 @@ Fields interval_fields(IntervalMap& map, const fs::path& file) {
 Field instant(std::string_view key, std::optional<Time>& target, const Stamps& stamps, std::string_view about) {
   return {key, about, text_schema, [key, &target, &stamps](const TomlTable& table, const toml::node& node) {
             TimeText::Fault fault;
-            target = TimeText(stamps.scale).parse(table.text(node, key), fault);
+            target = StampReader(stamps).of_text(table.text(node, key), fault);
             if (!target) {
               table.refuse(node, fmt::format("\"{}\": {}", key, fault.reason), fault.cure);
             }

@@ -77,6 +77,12 @@ struct Selection {
   std::vector<LeftOut> exclude;
 };
 
+/// From which columns the components were taken; "-NAME" with the other sign.
+struct ColumnsRead {
+  std::vector<std::string> quaternion;               ///< x, y, z, w of the first head
+  std::vector<std::vector<std::string>> directions;  ///< x, y, z of each gyro
+};
+
 /// A pass as read, and what was wrong with its telemetry.
 struct LoadedPass {
   Pass pass;
@@ -84,6 +90,7 @@ struct LoadedPass {
   std::filesystem::path prior_file{};  ///< that `prior` of its settings names; empty where it names none
   /// Files that were read besides `path` and what is in it: those that a telemetry.toml names.
   std::vector<std::filesystem::path> sources{};
+  ColumnsRead columns{};
 };
 
 /// Reads a pass and screens its telemetry: a directory, a NetCDF-4 file, or a telemetry.toml (docs/telemetry.md).
