@@ -33,7 +33,8 @@ void add_epoch_options(CLI::App& command, EpochOptions& options, const std::stri
 EpochSource epoch_of(const EpochOptions& options) {
   if (!options.pass.empty()) {
     const io::NamedPass pass = io::read_named_pass(options.pass);
-    return {pass.pass().settings.epoch, pass.pass().settings.spacecraft};
+    const PassSettings& settings = pass.pass().settings;
+    return {settings.epoch, settings.spacecraft, settings.inertial_frame};
   }
   if (options.epoch.empty()) {
     return {};

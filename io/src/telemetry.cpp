@@ -286,7 +286,9 @@ void expect_within(const Range& range, Duration value, const fs::path& path, std
     throw InputRefused(path, {},
                        fmt::format("{} is {:g} s by the stamps, outside {:g} to {:g} s: {}", key, to_seconds(value),
                                    range.least, range.most, range.why),
-                       "check the format of the time, or tell the key");
+                       range.holds(1e-3 * to_seconds(value))   ? "they look like milliseconds: format = \"ms\""
+                       : range.holds(1e-6 * to_seconds(value)) ? "they look like microseconds: format = \"us\""
+                                                               : "check the format of the time, or tell the key");
   }
 }
 

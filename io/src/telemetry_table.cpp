@@ -206,10 +206,9 @@ std::optional<Time> StampReader::of_text(std::string_view text, TimeText::Fault&
   return clock_.parse(text, fault);
 }
 
-ForeignTable parse_foreign_csv(const TextFile& content, const fs::path& file, const TableMap& map,
+ForeignTable parse_foreign_csv(std::string_view text, const fs::path& file, const TableMap& map,
                                const std::vector<std::string>& stamps, const std::vector<std::string>& numbers) {
   constexpr std::string_view kByteOrderMark = "\xEF\xBB\xBF";
-  std::string_view text = content.text();
   text.remove_prefix(text.starts_with(kByteOrderMark) ? kByteOrderMark.size() : 0);
 
   const char separator = map.separator.front();
@@ -309,7 +308,7 @@ ForeignTable read_foreign_table(const TableMap& map, const fs::path& directory, 
                                 const std::vector<std::string>& numbers) {
   const fs::path file = directory / map.file;
   return is_netcdf(file) ? read_netcdf_table(file, map, stamps, numbers)
-                         : parse_foreign_csv(TextFile(file), file, map, stamps, numbers);
+                         : parse_foreign_csv(TextFile(file).text(), file, map, stamps, numbers);
 }
 
 }  // namespace trihedron::io

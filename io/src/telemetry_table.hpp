@@ -3,7 +3,9 @@
 
 #include <filesystem>
 #include <limits>
+#include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "telemetry_map.hpp"
@@ -49,9 +51,8 @@ struct ForeignTable {
 /// Intervals that a file of the map holds. Throws InputRefused.
 [[nodiscard]] std::vector<LeftOut> read_intervals(const IntervalMap& map, const std::filesystem::path& directory);
 
-/// The same of a text that has been read; for `file` in messages.
-class TextFile;
-[[nodiscard]] ForeignTable parse_foreign_csv(const TextFile& content, const std::filesystem::path& file,
+/// The same of the text of a CSV file; `file` is for messages.
+[[nodiscard]] ForeignTable parse_foreign_csv(std::string_view text, const std::filesystem::path& file,
                                              const TableMap& map, const std::vector<std::string>& stamps,
                                              const std::vector<std::string>& numbers);
 

@@ -145,7 +145,7 @@ TEST(Telemetry, PeriodsAndEpochThatAreToldGoBeforeTheStamps) {
 
 TEST(Telemetry, CorruptStampsDoNotMoveTheEpoch) {
   Foreign foreign;
-  foreign.gyros += "5e9;0;0;0;1;0;0;0\n";
+  foreign.gyros += "1.3e9;0;0;0;1;0;0;0\n";
   const LoadedPass loaded = foreign.load();
   EXPECT_EQ(to_seconds(loaded.pass.settings.duration), 90);
   EXPECT_EQ(only(loaded.defects, Kind::kTimeOutsidePass).first.front().line, 185);
@@ -506,6 +506,59 @@ TEST(Telemetry, StampsThatCannotShowThePassAreRefused) {
   foreign.toml = replaced(foreign.toml, "since = \"1980-01-06T00:00:00\"", "since = \"2199-01-01T00:00:00\"");
   EXPECT_NE(refusal([&] { static_cast<void>(foreign.load()); }).find("not one value of column \"Time UTC\" is a time"),
             std::string::npos);
+}
+
+std::string message_of(const Foreign& foreign) {
+  return refusal([&] { static_cast<void>(foreign.load()); });
+}
+
+TEST(Telemetry, UnitsThatAreMistakenAreProposed) {
+  Foreign counts;
+  counts.toml = replaced(counts.toml, "counts_per_unit = 32768\n", "");
+  EXPECT_NE(message_of(counts).find("counts_per_unit = 32768"), std::string::npos) << message_of(counts);
+  Foreign angles;
+  angles.toml = replaced(angles.toml, "unit = \"deg\"\n", "");
+  EXPECT_NE(message_of(angles).find("unit = \"deg\""), std::string::npos) << message_of(angles);
+  Foreign quaternions;
+  quaternions.toml = replaced(quaternions.toml, "scalar =", "counts_per_unit = 0.001\nscalar =");
+  EXPECT_NE(message_of(quaternions).find("counts_per_unit = 1000"), std::string::npos) << message_of(quaternions);
+  Foreign milliseconds;
+  milliseconds.toml = replaced(milliseconds.toml, "format = \"s\", since = \"1970-01-01T00:00:00\"",
+                               "format = \"days\", since = \"1970-01-01T00:00:00\"");
+  EXPECT_NE(message_of(milliseconds).find("not one value of column"), std::string::npos) << message_of(milliseconds);
+}
+
+TEST(Telemetry, StampsInMillisecondsAreProposed) {
+  Foreign foreign;
+  std::string gyros = "made by somebody\nTime UTC;A1;A2;A3;OK;B1;B2;B3\n";
+  for (int i = 0; i <= 180; ++i) {
+    gyros += fmt::format("{};0;0;32768;1;90;0;90\n", 500 * i);
+  }
+  foreign.gyros = gyros;
+  foreign.toml = replaced(foreign.toml, R"(time = {scale = "UTC", format = "s", since = "1970-01-01T00:00:00", leap_seconds = "left-out"})",
+                          R"(time = {scale = "TAI", format = "s", since = "2009-05-20T00:00:00"})");
+  EXPECT_NE(message_of(foreign).find("format = \"ms\""), std::string::npos) << message_of(foreign);
+}
+
+TEST(Telemetry, ColumnsExchangedBetweenGyrosAreProposed) {
+  const TemporaryDirectory directory;
+  RawPass pass = clean_pass();
+  for (auto& row : pass.gyro.rows) {
+    row[1] = 0.8;
+    row[2] = 0.6 * std::sin(1e-3 * row[0]);
+    row[3] = 0.6 * std::cos(1e-3 * row[0]);
+    row[4] = 0.2;
+    row[5] = 0.3;
+    row[6] = std::sqrt(1 - 0.04 - 0.09);
+  }
+  pass.save_directory(directory / "right");
+  EXPECT_EQ(refusal([&] { static_cast<void>(read_pass(directory / "right")); }), "");
+  for (auto& row : pass.gyro.rows) {
+    std::swap(row[1], row[5]);
+  }
+  pass.save_directory(directory / "pass");
+  const std::string message = refusal([&] { static_cast<void>(read_pass(directory / "pass")); });
+  EXPECT_NE(message.find("columns h1_x and h2_y look exchanged"), std::string::npos) << message;
 }
 
 TEST(Telemetry, AWrongRangeIsRefused) {
