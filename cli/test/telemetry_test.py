@@ -77,7 +77,7 @@ def test_every_command_takes_it_as_a_pass(tmp_path):
 
 def test_ranges_and_intervals_cut_any_pass(tmp_path):
     done("--quiet", "import", EXAMPLE / "telemetry.toml", "-o", tmp_path / "whole")
-    (tmp_path / "out.csv").write_text("begin,end,why\n2009-05-20T00:01:40,2009-05-20T00:01:49.5,test\n")
+    (tmp_path / "out.csv").write_text("begin,end,why\n2009-05-20T00:02:00,2009-05-20T00:02:09.5,test\n")
     told = json.loads(done("--json", "import", tmp_path / "whole", "-o", tmp_path / "part", "--from", "2009-05-20T00:01:00Z", "--to", "2009-05-20T00:02:30",
                            "--exclude", tmp_path / "out.csv", "--time-system", "UTC").stdout)
     assert told["epoch_tai"] == "2009-05-20T00:01:34" and told["duration_s"] == 90

@@ -14,6 +14,7 @@
 #include "telemetry_map.hpp"
 #include "telemetry_table.hpp"
 #include "text_file.hpp"
+#include "toml_table.hpp"
 #include "trihedron/io/time_text.hpp"
 #include "trihedron/records/limits.hpp"
 
@@ -356,6 +357,17 @@ ColumnsRead columns_of(const TelemetryMap& map) {
 }
 
 }  // namespace
+
+bool is_telemetry_toml(const fs::path& file) {
+  if (!is_telemetry_map(file)) {
+    return false;
+  }
+  try {
+    return parse_toml(TextFile(file).text(), file).contains("telemetry");
+  } catch (const InputRefused&) {
+    return false;
+  }
+}
 
 bool is_telemetry_map(const fs::path& path) { return path.extension() == ".toml"; }
 

@@ -128,6 +128,12 @@ TEST(Telemetry, OfOthersIsTheSamePass) {
   expect_same_pass(loaded.pass, clean().pass, 1e-12, 1e-15);
   EXPECT_EQ(loaded.sources, (std::vector<fs::path>{foreign.directory / "gyros.txt", foreign.directory / "stars.csv"}));
   EXPECT_FALSE(read_truth(foreign.file()));
+  EXPECT_TRUE(is_telemetry_toml(foreign.file()));
+  write_text(foreign.directory / "scenario.toml", "[scenario]\n");
+  write_text(foreign.directory / "damaged.toml", "[telemetry\n");
+  for (const char* const other : {"scenario.toml", "damaged.toml", "gyros.txt", "nowhere.toml"}) {
+    EXPECT_FALSE(is_telemetry_toml(foreign.directory / other)) << other;
+  }
 }
 
 TEST(Telemetry, PeriodsAndEpochThatAreToldGoBeforeTheStamps) {

@@ -147,13 +147,13 @@ class Scene {
       C_c_b_[k] = rotation(has_calibration ? pass.settings.prior->gyros[static_cast<std::size_t>(k)]
                                                  .alignment_rotation_vector_rad
                                            : prior.alignment_rotation_vector_rad);
-      // An alignment that is off by δ moves a momentum by up to 2 |δ| as the body turns, its drift κ by a few |κ| times
-      // half a window; both to three sigmas. Nothing is judged below half a degree.
+      // As the body turns, an alignment that is off by δ moves a momentum by up to |δ| from its mean, drift κ by a few
+      // |κ| times half a window; both to three sigmas. Nothing is judged below half a degree.
       constexpr double kSigmas = 3;
       constexpr double kLeast_rad = 0.01;
       constexpr double kCoefficients = 7;
       const double drift_rad = std::sqrt(kCoefficients) * prior.drift_common_sigma_rad_s * to_seconds(kWindow) / 2;
-      allowed_rad_[k] = kLeast_rad + kSigmas * (2 * prior.alignment_sigma_rad.norm() + drift_rad);
+      allowed_rad_[k] = kLeast_rad + kSigmas * (prior.alignment_sigma_rad.norm() + drift_rad);
       motion_rad_[k] = motion_of(k, kAsTold);
     }
   }

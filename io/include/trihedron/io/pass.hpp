@@ -99,6 +99,10 @@ struct LoadedPass {
 /// NetCDF.
 [[nodiscard]] LoadedPass read_pass(const std::filesystem::path& path, const Selection& selection = {});
 
+/// Whether the file is a telemetry.toml, a TOML document with a table `telemetry`, and not another: a scenario. What
+/// cannot be understood is none.
+[[nodiscard]] bool is_telemetry_toml(const std::filesystem::path& file);
+
 /// Intervals of a CSV file with columns `begin` and `end`, ISO dates and times of this scale; other columns are
 /// skipped. Throws InputRefused, also where an interval does not end after it begins.
 [[nodiscard]] std::vector<LeftOut> read_intervals(const std::filesystem::path& file, TimeScale scale);
