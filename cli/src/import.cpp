@@ -189,13 +189,13 @@ void add_import(CLI::App& program, const Common& common, int& exit_status) {
   CLI::App* command = program.add_subcommand(
       "import", "Read others' telemetry by a telemetry.toml, or another software's attitude: CCSDS AEM");
   command
-      ->add_option("FILE", arguments->file,
-                   "telemetry.toml or pass; or message, as text or XML, - for standard input")
+      ->add_option("FILE", arguments->file, "telemetry.toml or pass; or message, as text or XML, - for standard input")
       ->required();
   command
-      ->add_option("-o,--output", arguments->output,
-                   "Pass to write: a directory, or a NetCDF file by a name in .nc; of a message the attitude file (CSV), "
-                   "- for standard output")
+      ->add_option(
+          "-o,--output", arguments->output,
+          "Pass to write: a directory, or a NetCDF file by a name in .nc; of a message the attitude file (CSV), "
+          "- for standard output")
       ->required()
       ->type_name("OUTPUT");
   command->add_option("--from", arguments->from, "Leave out what is earlier: 2009-05-20T00:00:00")->type_name("TIME");
@@ -213,7 +213,8 @@ void add_import(CLI::App& program, const Common& common, int& exit_status) {
       "# Columns of others' CSV or NetCDF files, by a map of them: docs/telemetry.md\n"
       "trihedron import examples/telemetry/telemetry.toml -o pass.nc\n"
       "# Half an hour of it, without manoeuvres\n"
-      "trihedron import telemetry.toml -o pass.nc --from 2009-05-20T00:10:00 --to 2009-05-20T00:40:00 --exclude slews.csv\n"
+      "trihedron import telemetry.toml -o pass.nc --from 2009-05-20T00:10:00 --to 2009-05-20T00:40:00 --exclude "
+      "slews.csv\n"
       "trihedron import attitude.aem -o attitude.csv --pass pass.nc\n"
       "# Other commands read telemetry.toml and messages themselves\n"
       "trihedron inspect telemetry.toml\n"

@@ -53,8 +53,7 @@ ExitStatus navigate_pass(const std::filesystem::path& pass, const NavigationFile
   const io::Mounting& mounting = loaded.pass.settings.star_tracker_mounting_rotation_vector_rad;
   const ground::AttitudeEvaluation evaluation = ground::evaluate_navigation(loaded.pass, result, named.truth_or_null());
   if (to_stdout) {
-    print_data(stdout,
-               io::format_attitude(epoch, result.attitude, io::AttitudeDigits::kTwelveDecimals, {}, mounting));
+    print_data(stdout, io::format_attitude(epoch, result.attitude, io::AttitudeDigits::kTwelveDecimals, {}, mounting));
   } else {
     io::write_attitude(files.attitude, epoch, result.attitude, mounting);
   }

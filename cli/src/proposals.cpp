@@ -79,9 +79,8 @@ std::string words_for_quaternion(const Mistake& mistake) {
   if (scalar_first) {
     words.emplace_back("the scalar is the first component");
   }
-  const bool is_conjugate = std::all_of(components.begin(), components.begin() + 3, [](const SignedComponent& part) {
-    return part.sign < 0;
-  });
+  const bool is_conjugate = std::all_of(components.begin(), components.begin() + 3,
+                                        [](const SignedComponent& part) { return part.sign < 0; });
   if (is_conjugate) {
     words.emplace_back("they map inertial axes to those of the tracker (conjugate)");
     for (SignedComponent& part : components) {
@@ -106,7 +105,8 @@ std::string words_for(const Mistake& mistake) {
     case Mistake::Kind::kClock:
       return fmt::format("fixes hold the attitude {:+.3f} s after their stamp", mistake.offset_s);
     case Mistake::Kind::kNothingTried:
-      return "no usual mistake explains it: fixes of another pass or spacecraft, clocks more than ten minutes apart, or "
+      return "no usual mistake explains it: fixes of another pass or spacecraft, clocks more than ten minutes apart, "
+             "or "
              "alignments further off than their prior sigmas say";
   }
   return "";
@@ -138,8 +138,8 @@ std::vector<std::string> lines_for(const Mistake& mistake, const io::LoadedPass&
               "scalar = \"last\"", "maps = \"tracker-to-inertial\""};
     case Mistake::Kind::kGyroAxes:
       return {fmt::format("[[telemetry.gyro.unit]]  # gyro {}", mistake.gyro + 1),
-              fmt::format("direction = {}",
-                          rearranged(columns.directions[static_cast<std::size_t>(mistake.gyro)], mistake.components, 3))};
+              fmt::format("direction = {}", rearranged(columns.directions[static_cast<std::size_t>(mistake.gyro)],
+                                                       mistake.components, 3))};
     case Mistake::Kind::kGyrosExchanged: {
       constexpr std::array<SignedComponent, 4> kAsTold = {{{0, 1}, {1, 1}, {2, 1}, {3, 1}}};
       return {"[[telemetry.gyro.unit]]  # gyro 1",
@@ -148,8 +148,8 @@ std::vector<std::string> lines_for(const Mistake& mistake, const io::LoadedPass&
               fmt::format("direction = {}", rearranged(columns.directions[0], kAsTold, 3))};
     }
     case Mistake::Kind::kClock:
-      return {"[star_tracker]", fmt::format("clock_offset_s = {:.3f}", loaded.pass.settings.star_tracker_clock_offset_s +
-                                                                           mistake.offset_s)};
+      return {"[star_tracker]", fmt::format("clock_offset_s = {:.3f}",
+                                            loaded.pass.settings.star_tracker_clock_offset_s + mistake.offset_s)};
     case Mistake::Kind::kNothingTried:
       break;
   }

@@ -86,7 +86,8 @@ class Keeper {
  public:
   Keeper(const ReplayRequest& request, const io::LoadedPass& loaded, const Parameters& parameters,
          ground::ApplicationReplay& replay, const Common& common)
-      : request_(request), replay_(replay),
+      : request_(request),
+        replay_(replay),
         epoch_(loaded.pass.settings.epoch),
         mounting_(loaded.pass.settings.star_tracker_mounting_rotation_vector_rad) {
     const fs::path& state = request.files.state;

@@ -154,8 +154,8 @@ std::string format_attitude(Time epoch, const AttitudeHistory& attitude, Attitud
   return fmt::format("{}{}{}{}{}\n{}", names.substr(0, sigmas),
                      attitude.sigma_rad.empty() ? "" : names.substr(sigmas, age - sigmas),
                      attitude.age_s.empty() ? "" : names.substr(age),
-                     rate_rad_s.empty() ? "" : ",rate_x_rad_s,rate_y_rad_s,rate_z_rad_s",
-                     mounting ? kBodyColumns : "", format_attitude_rows(epoch, attitude, digits, rate_rad_s, mounting));
+                     rate_rad_s.empty() ? "" : ",rate_x_rad_s,rate_y_rad_s,rate_z_rad_s", mounting ? kBodyColumns : "",
+                     format_attitude_rows(epoch, attitude, digits, rate_rad_s, mounting));
 }
 
 std::string attitude_header(const Mounting& mounting) {

@@ -119,10 +119,10 @@ Field units(std::vector<GyroPrior>& gyros, const fs::path& file) {
         for (std::size_t i = 0; i < gyros.size(); ++i) {
           read_fields(*tables[i], file, fmt::format("[[gyro.unit]] {}", i + 1), unit_fields(gyros[i], file));
           if (gyros[i].mounting_rotation_vector_rad && tables[i]->contains(kAlignment)) {
-            table.refuse(*tables[i]->get(kAlignment),
-                         fmt::format("\"{}\" and \"{}\" are both there, and each gives the alignment", kAlignment,
-                                     kMounting),
-                         "keep one of them");
+            table.refuse(
+                *tables[i]->get(kAlignment),
+                fmt::format("\"{}\" and \"{}\" are both there, and each gives the alignment", kAlignment, kMounting),
+                "keep one of them");
           }
         }
       }};
@@ -199,9 +199,9 @@ Field further_heads(PassSettings& settings, const fs::path& file) {
 }
 
 Fields star_tracker_fields(PassSettings& settings, const fs::path& file, Told told) {
-  return {told_or_measured(number_of_seconds("period_s", settings.star_tracker_period, limits::kStarTrackerPeriod_s,
-                                             "of the fixes"),
-                           told),
+  return {told_or_measured(
+              number_of_seconds("period_s", settings.star_tracker_period, limits::kStarTrackerPeriod_s, "of the fixes"),
+              told),
           told_or_measured(three_numbers(kHeadNoise, settings.star_tracker_noise_rad, limits::kStarTrackerNoise_rad,
                                          "1-sigma about c x, y, z"),
                            told),
@@ -231,9 +231,9 @@ Field inertial_frame(std::string& target) {
           [&target](const TomlTable& table, const toml::node& node) {
             target = table.text(node, kInertialFrame);
             if (!is_inertial_frame(normalised(target))) {
-              table.refuse(node, fmt::format("\"{}\" is {}, no inertial frame that is known", kInertialFrame,
-                                             in_quotes(target)),
-                           "give ICRF, GCRF or EME2000; turn the attitude where it refers to other axes");
+              table.refuse(
+                  node, fmt::format("\"{}\" is {}, no inertial frame that is known", kInertialFrame, in_quotes(target)),
+                  "give ICRF, GCRF or EME2000; turn the attitude where it refers to other axes");
             }
           }};
 }
@@ -247,11 +247,11 @@ Fields pass_fields(PassSettings& settings, std::optional<std::string>& prior_fil
 }
 
 Fields file_fields(PassSettings& settings, std::optional<std::string>& prior_file, const fs::path& file, Told told) {
-  return {required(
-              section("pass", file, "[pass]", "when", [&, told] { return pass_fields(settings, prior_file, told); })),
-          prior(prior_file), required(gyros(settings, file, told)),
-          required(section("star_tracker", file, "[star_tracker]", "of the first head",
-                           [&, told] { return star_tracker_fields(settings, file, told); }))};
+  return {
+      required(section("pass", file, "[pass]", "when", [&, told] { return pass_fields(settings, prior_file, told); })),
+      prior(prior_file), required(gyros(settings, file, told)),
+      required(section("star_tracker", file, "[star_tracker]", "of the first head",
+                       [&, told] { return star_tracker_fields(settings, file, told); }))};
 }
 
 /// The alignment of each gyro of which the mounting in the body is told: C_c_b = C_body_cᵀ C_body_b.
@@ -371,8 +371,7 @@ SettingsOfTelemetry read_telemetry_settings(const toml::table& document, const f
   return read_pass_settings(document, file, directory, gyros, Told::kOrMeasured, {telemetry});
 }
 
-Fields telemetry_settings_fields(PassSettings& settings, std::optional<std::string>& prior_name,
-                                 const fs::path& file) {
+Fields telemetry_settings_fields(PassSettings& settings, std::optional<std::string>& prior_name, const fs::path& file) {
   return file_fields(settings, prior_name, file, Told::kOrMeasured);
 }
 

@@ -216,8 +216,10 @@ Series star_tracker_series(const StarTrackerSource& source, Time epoch, std::vec
       series.values.push_back(table.numbers[part.place][row] * part.factor);
     }
   }
-  leave_out(series, [&](std::size_t row) { return !is_good[row]; }, Defect::Kind::kFlagged, defects);
-  leave_out(series, [&](std::size_t row) { return !is_sure[row]; }, Defect::Kind::kLargeSigma, defects);
+  leave_out(
+      series, [&](std::size_t row) { return !is_good[row]; }, Defect::Kind::kFlagged, defects);
+  leave_out(
+      series, [&](std::size_t row) { return !is_sure[row]; }, Defect::Kind::kLargeSigma, defects);
   return series;
 }
 
@@ -340,7 +342,7 @@ void measure(PassSettings& settings, const GyroSource& gyros, const StarTrackerS
 
 std::string negated(const std::string& name) { return name.starts_with('-') ? name.substr(1) : "-" + name; }
 
-ColumnsRead columns_of(const TelemetryMap& map) {
+ColumnsRead columns_read(const TelemetryMap& map) {
   ColumnsRead columns;
   const StarTrackerMap& head = map.star_trackers.front();
   columns.quaternion = head.quaternion;
@@ -392,7 +394,7 @@ UnscreenedPass read_raw_telemetry(const fs::path& file) {
     raw.sources.push_back(directory / head.file);
     heads.push_back(read_star_tracker(head, directory));
   }
-  raw.columns = columns_of(map);
+  raw.columns = columns_read(map);
   measure(raw.settings, gyros, heads.front(), file);
   raw.gyro = gyro_series(gyros, raw.settings.epoch, raw.left_out);
   for (const StarTrackerSource& head : heads) {

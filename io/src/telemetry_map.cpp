@@ -23,7 +23,7 @@ namespace fs = std::filesystem;
 using Check = std::function<void(const TomlTable&, const toml::node&)>;
 
 /// A field that is looked at when it has been read.
-Field checked(Field field, const Check& check) {
+Field looked_at(Field field, const Check& check) {
   field.read = [read = std::move(field.read), check](const TomlTable& table, const toml::node& node) {
     read(table, node);
     check(table, node);
@@ -33,7 +33,7 @@ Field checked(Field field, const Check& check) {
 
 /// A name that is not empty.
 Field name_of_something(std::string_view key, std::string& target, std::string_view about) {
-  return checked(text(key, target, about), [key, &target](const TomlTable& table, const toml::node& node) {
+  return looked_at(text(key, target, about), [key, &target](const TomlTable& table, const toml::node& node) {
     if (target.empty()) {
       table.refuse(node, fmt::format("\"{}\" is empty", key), "give the name");
     }
@@ -41,7 +41,7 @@ Field name_of_something(std::string_view key, std::string& target, std::string_v
 }
 
 /// So many names.
-Field names(std::string_view key, std::vector<std::string>& target, std::size_t count, std::string_view about) {
+Field column_names(std::string_view key, std::vector<std::string>& target, std::size_t count, std::string_view about) {
   const auto schema = [count] {
     Json array = array_of(text_schema());
     array["minItems"] = count;
@@ -73,8 +73,8 @@ Field names(std::string_view key, std::vector<std::string>& target, std::size_t 
 
 /// Numbers or texts of any number.
 template <class T, class Take>
-Field any_number_of(std::string_view key, std::vector<T>& target, std::string_view about,
-                    std::function<Json()> schema, Take take) {
+Field any_number_of(std::string_view key, std::vector<T>& target, std::string_view about, std::function<Json()> schema,
+                    Take take) {
   return {key, about, [schema = std::move(schema)] { return array_of(schema()); },
           [key, &target, take](const TomlTable& table, const toml::node& node) {
             const toml::array* const array = node.as_array();
@@ -95,8 +95,8 @@ Field clock_reading(std::string_view key, std::optional<Time>& target, std::stri
   return {key, about, text_schema, [key, &target](const TomlTable& table, const toml::node& node) {
             target = parse_epoch(table.text(node, key));
             if (!target) {
-              table.refuse(node, fmt::format("\"{}\" is {}, not an ISO date and time", key,
-                                             in_quotes(table.text(node, key))),
+              table.refuse(node,
+                           fmt::format("\"{}\" is {}, not an ISO date and time", key, in_quotes(table.text(node, key))),
                            "write it like \"1970-01-01T00:00:00\", as the clock of the scale shows it, years 1958 to "
                            "2200, without time zone");
             }
@@ -109,11 +109,11 @@ struct FormatWord {
   double unit_s;
 };
 constexpr std::array kFormatWords = {
-    FormatWord{"iso", Stamps::Format::kIso, 1},        FormatWord{"s", Stamps::Format::kNumber, 1},
-    FormatWord{"ms", Stamps::Format::kNumber, 1e-3},   FormatWord{"us", Stamps::Format::kNumber, 1e-6},
-    FormatWord{"ns", Stamps::Format::kNumber, 1e-9},   FormatWord{"min", Stamps::Format::kNumber, 60},
-    FormatWord{"h", Stamps::Format::kNumber, 3600},    FormatWord{"days", Stamps::Format::kNumber, 86400},
-    FormatWord{"mjd", Stamps::Format::kMjd, 86400},    FormatWord{"jd", Stamps::Format::kJd, 86400}};
+    FormatWord{"iso", Stamps::Format::kIso, 1},      FormatWord{"s", Stamps::Format::kNumber, 1},
+    FormatWord{"ms", Stamps::Format::kNumber, 1e-3}, FormatWord{"us", Stamps::Format::kNumber, 1e-6},
+    FormatWord{"ns", Stamps::Format::kNumber, 1e-9}, FormatWord{"min", Stamps::Format::kNumber, 60},
+    FormatWord{"h", Stamps::Format::kNumber, 3600},  FormatWord{"days", Stamps::Format::kNumber, 86400},
+    FormatWord{"mjd", Stamps::Format::kMjd, 86400},  FormatWord{"jd", Stamps::Format::kJd, 86400}};
 
 Field format_of_stamps(Stamps& stamps) {
   std::vector<std::string_view> known;
@@ -148,7 +148,9 @@ Field scale_of(Stamps& stamps) {
 
 Field leap_seconds_of(Stamps& stamps) {
   return {"leap_seconds", "whether numbers in UTC count leap seconds; Unix time leaves them out",
-          [] { return one_of(std::array<std::string_view, 2>{"counted", "left-out"}); },
+          [] {
+            return one_of(std::array<std::string_view, 2>{"counted", "left-out"});
+          },
           [&stamps](const TomlTable& table, const toml::node& node) {
             bool is_counted = false;
             choice("leap_seconds", is_counted, "", {{"counted", true}, {"left-out", false}}).read(table, node);
@@ -172,7 +174,8 @@ void check_stamps(const Stamps& stamps, const TomlTable& table, const toml::node
                  "give leap_seconds = \"left-out\" (Unix time) or \"counted\"");
   }
   if (!has_choice && stamps.leap_seconds_counted) {
-    table.refuse(node, "\"time\" has \"leap_seconds\", which only numbers in UTC can count or leave out", "take it out");
+    table.refuse(node, "\"time\" has \"leap_seconds\", which only numbers in UTC can count or leave out",
+                 "take it out");
   }
   if (stamps.leap_seconds_counted.value_or(false) && !TimeText(TimeScale::kUtc).tai_of(*stamps.since)) {
     table.refuse(node, "\"since\" is a time of UTC for which leap seconds are not known, and they are counted from it",
@@ -187,38 +190,43 @@ Field time_of_table(Stamps& stamps, const fs::path& file) {
                   clock_reading("since", stamps.since, "when numbers are 0, as the clock of the scale shows it"),
                   leap_seconds_of(stamps)};
   });
-  return checked(std::move(field),
-                 [&stamps](const TomlTable& table, const toml::node& node) { check_stamps(stamps, table, node); });
+  return looked_at(std::move(field),
+                   [&stamps](const TomlTable& table, const toml::node& node) { check_stamps(stamps, table, node); });
 }
 
 // ---- Tables
 
 Fields table_fields(TableMap& map, const fs::path& file) {
-  return {required(name_of_something("file", map.file, "with the columns, CSV, or NetCDF where it ends in .nc")),
-          time_of_table(map.stamps, file),
-          checked(text("separator", map.separator, "between fields of CSV, one character; a blank is any number of them"),
-                  [&map](const TomlTable& table, const toml::node& node) {
-                    constexpr std::string_view kNone = "\"\r\n-+.0123456789";
-                    if (map.separator.size() != 1 || kNone.find(map.separator.front()) != std::string_view::npos) {
-                      table.refuse(node, fmt::format("\"separator\" is {}, not a character that separates",
-                                                     in_quotes(map.separator)),
-                                   "give one character: \",\", \";\", \"\\t\" or \" \"");
-                    }
-                  }),
-          whole("header_line", map.header_line, limits::kHeaderLine,
-                "of CSV, with the names of the columns; 0: none, they are called \"1\", \"2\" …"),
-          text("comment", map.comment, "with which lines of CSV begin that are skipped"),
-          any_number_of("missing", map.missing, "texts that stand for no value, besides an empty field and nan",
-                        text_schema,
-                        [](const TomlTable& table, const toml::node& node) { return table.text(node, "missing"); })};
+  return {
+      required(name_of_something("file", map.file, "with the columns, CSV, or NetCDF where it ends in .nc")),
+      time_of_table(map.stamps, file),
+      looked_at(text("separator", map.separator, "between fields of CSV, one character; a blank is any number of them"),
+                [&map](const TomlTable& table, const toml::node& node) {
+                  constexpr std::string_view kNone = "\"\r\n-+.0123456789";
+                  if (map.separator.size() != 1 || kNone.find(map.separator.front()) != std::string_view::npos) {
+                    table.refuse(
+                        node,
+                        fmt::format("\"separator\" is {}, not a character that separates", in_quotes(map.separator)),
+                        "give one character: \",\", \";\", \"\\t\" or \" \"");
+                  }
+                }),
+      whole("header_line", map.header_line, limits::kHeaderLine,
+            "of CSV, with the names of the columns; 0: none, they are called \"1\", \"2\" …"),
+      text("comment", map.comment, "with which lines of CSV begin that are skipped"),
+      any_number_of("missing", map.missing, "texts that stand for no value, besides an empty field and nan",
+                    text_schema,
+                    [](const TomlTable& table, const toml::node& node) { return table.text(node, "missing"); })};
 }
 
-Field time_column(TableMap& map) { return required(name_of_something("time_column", map.time_column, "of the stamps")); }
+Field time_column(TableMap& map) {
+  return required(name_of_something("time_column", map.time_column, "of the stamps"));
+}
 
 Fields flag_fields(FlagMap& flag) {
   return {name_of_something("flag", flag.column, "column that says whether a row is good"),
-          any_number_of("good", flag.good, "values of the flag that are good", [] { return number_schema(); },
-                        [](const TomlTable& table, const toml::node& node) { return table.number(node, "good"); })};
+          any_number_of(
+              "good", flag.good, "values of the flag that are good", [] { return number_schema(); },
+              [](const TomlTable& table, const toml::node& node) { return table.number(node, "good"); })};
 }
 
 void check_flag(const FlagMap& flag, const TomlTable& table, const toml::node& node) {
@@ -243,31 +251,32 @@ Field unit_of_direction(double& angle_unit_rad) {
 }
 
 Fields direction_fields(DirectionMap& map) {
-  return Fields{required(names("direction", map.columns, 3,
-                               "columns of the momentum along the axes x, y, z of the case; \"-NAME\" changes the sign")),
+  return Fields{required(column_names(
+                    "direction", map.columns, 3,
+                    "columns of the momentum along the axes x, y, z of the case; \"-NAME\" changes the sign")),
                 counts(map.counts_per_unit), unit_of_direction(map.angle_unit_rad)} +
          flag_fields(map.flag);
 }
 
 /// Each element is looked at when it has been read.
 template <class T, class FieldsOf, class CheckOf>
-Field checked_list(std::string_view key, const fs::path& file, std::vector<T>& target, std::string_view about,
-                   FieldsOf fields, CheckOf check) {
-  return checked(list(key, file, target, about, fields),
-                 [&target, check](const TomlTable& table, const toml::node& node) {
-                   const toml::array& array = *node.as_array();
-                   for (std::size_t i = 0; i < target.size(); ++i) {
-                     check(target[i], table, array[i]);
-                   }
-                 });
+Field looked_at_list(std::string_view key, const fs::path& file, std::vector<T>& target, std::string_view about,
+                     FieldsOf fields, CheckOf check) {
+  return looked_at(list(key, file, target, about, fields),
+                   [&target, check](const TomlTable& table, const toml::node& node) {
+                     const toml::array& array = *node.as_array();
+                     for (std::size_t i = 0; i < target.size(); ++i) {
+                       check(target[i], table, array[i]);
+                     }
+                   });
 }
 
 Fields gyro_fields(GyroMap& map, const fs::path& file) {
-  Field units = checked_list("unit", file, map.units, "one per gyro", direction_fields,
-                             [](const DirectionMap& unit, const TomlTable& table, const toml::node& node) {
-                               check_flag(unit.flag, table, node);
-                             });
-  units = checked(std::move(units), [&map](const TomlTable& table, const toml::node& node) {
+  Field units = looked_at_list("unit", file, map.units, "one per gyro", direction_fields,
+                               [](const DirectionMap& unit, const TomlTable& table, const toml::node& node) {
+                                 check_flag(unit.flag, table, node);
+                               });
+  units = looked_at(std::move(units), [&map](const TomlTable& table, const toml::node& node) {
     if (map.units.size() < 2 || map.units.size() > std::size_t{kMaxGyros}) {
       table.refuse(node, fmt::format("[[telemetry.gyro.unit]] is there {} times", map.units.size()),
                    fmt::format("attitude needs two gyros, and at most {} are handled", kMaxGyros));
@@ -289,15 +298,16 @@ Field unit_of_sigma(double& unit_rad) {
 Fields star_tracker_fields(StarTrackerMap& map, const fs::path& file) {
   return table_fields(map, file) +
          Fields{time_column(map),
-                required(names("quaternion", map.quaternion, 4,
-                               "columns in the order of the file (see scalar), Hamilton; \"-NAME\" changes the sign")),
+                required(column_names(
+                    "quaternion", map.quaternion, 4,
+                    "columns in the order of the file (see scalar), Hamilton; \"-NAME\" changes the sign")),
                 required(choice("scalar", map.scalar_first, "whether the scalar is the first or the last of the four",
                                 {{"first", true}, {"last", false}})),
                 required(choice("maps", map.is_inverse,
                                 "components of which axes it takes to which: v_to = q ⊗ v_from ⊗ q*",
                                 {{"tracker-to-inertial", false}, {"inertial-to-tracker", true}})),
                 counts(map.counts_per_unit),
-                names("sigma", map.sigma, 3, "columns of each fix's 1-sigma about the axes x, y, z of the head"),
+                column_names("sigma", map.sigma, 3, "columns of each fix's 1-sigma about the axes x, y, z of the head"),
                 choice("sigma_is", map.is_variance, "what these columns hold", {{"sigma", false}, {"variance", true}}),
                 unit_of_sigma(map.sigma_unit_rad),
                 {"largest_sigma_rad", "fixes with a larger one are left out",
@@ -316,14 +326,17 @@ void check_star_tracker(const StarTrackerMap& map, const TomlTable& table, const
   }
   for (const char* const key : {"sigma_is", "largest_sigma_rad"}) {
     if (map.sigma.empty() && own.contains(key)) {
-      table.refuse(*own.get(key), fmt::format("\"{}\" is there without \"sigma\"", key), "name the columns of the sigmas");
+      table.refuse(*own.get(key), fmt::format("\"{}\" is there without \"sigma\"", key),
+                   "name the columns of the sigmas");
     }
   }
 }
 
 Fields interval_fields(IntervalMap& map, const fs::path& file) {
   Field of{"of", "what is left out: gyros, star-trackers or both",
-           [] { return one_of(std::array<std::string_view, 3>{"gyros", "star-trackers", "both"}); },
+           [] {
+             return one_of(std::array<std::string_view, 3>{"gyros", "star-trackers", "both"});
+           },
            [&map](const TomlTable& table, const toml::node& node) {
              std::pair<bool, bool> chosen;
              choice("of", chosen, "",
@@ -369,19 +382,19 @@ Fields telemetry_fields(TelemetryMap& map, const fs::path& file) {
                          map.gyro.stamps = map.stamps;
                          return gyro_fields(map.gyro, file);
                        })),
-      checked(required(section("star_tracker", file, "[telemetry.star_tracker]", "the table of the first head",
-                               [&map, &file] {
-                                 map.star_trackers.front().stamps = map.stamps;
-                                 return star_tracker_fields(map.star_trackers.front(), file);
-                               })),
-              [&map](const TomlTable& table, const toml::node& node) {
-                check_star_tracker(map.star_trackers.front(), table, node);
-              }),
-      checked(checked_list("further_star_tracker", file, *heads, "the table of each further head", further,
-                           check_star_tracker),
-              [&map, heads](const TomlTable& /*table*/, const toml::node& /*node*/) {
-                map.star_trackers.insert(map.star_trackers.end(), heads->begin(), heads->end());
-              }),
+      looked_at(required(section("star_tracker", file, "[telemetry.star_tracker]", "the table of the first head",
+                                 [&map, &file] {
+                                   map.star_trackers.front().stamps = map.stamps;
+                                   return star_tracker_fields(map.star_trackers.front(), file);
+                                 })),
+                [&map](const TomlTable& table, const toml::node& node) {
+                  check_star_tracker(map.star_trackers.front(), table, node);
+                }),
+      looked_at(looked_at_list("further_star_tracker", file, *heads, "the table of each further head", further,
+                               check_star_tracker),
+                [&map, heads](const TomlTable& /*table*/, const toml::node& /*node*/) {
+                  map.star_trackers.insert(map.star_trackers.end(), heads->begin(), heads->end());
+                }),
       list("exclude", file, map.exclude, "files of intervals that are left out: manoeuvres, eclipses, tests", interval),
       instant("from", map.from, map.stamps, "what is earlier is left out; in the scale of [telemetry.time]"),
       instant("to", map.to, map.stamps, "what is later is left out")};
@@ -425,8 +438,7 @@ Json telemetry_schema() {
   std::optional<std::string> prior_name;
   const fs::path file;
   return document_schema(
-      "Telemetry",
-      "telemetry.toml: where the columns of a pass are and what they mean, beside what pass.toml says.",
+      "Telemetry", "telemetry.toml: where the columns of a pass are and what they mean, beside what pass.toml says.",
       schema_of(telemetry_settings_fields(settings, prior_name, file) + Fields{telemetry(map, file)}));
 }
 

@@ -21,7 +21,7 @@ struct Stamps {
 
   TimeScale scale = TimeScale::kTai;
   Format format = Format::kIso;
-  double unit_s = 1;         ///< of numbers
+  double unit_s = 1;          ///< of numbers
   std::optional<Time> since;  ///< of numbers: what the clock of the scale shows at 0, counted as Time counts TAI
   /// Of numbers in UTC: whether they count leap seconds. Unix time does not.
   std::optional<bool> leap_seconds_counted;
@@ -33,9 +33,9 @@ struct TableMap {
   std::string time_column;
   Stamps stamps;
   // Of CSV.
-  std::string separator = ",";  ///< one character; a blank stands for any number of blanks and tabs
-  int header_line = 1;          ///< with the names; 0: there is none, and columns are called "1", "2" …
-  std::string comment;          ///< lines that begin with it are skipped; empty: there are none
+  std::string separator = ",";       ///< one character; a blank stands for any number of blanks and tabs
+  int header_line = 1;               ///< with the names; 0: there is none, and columns are called "1", "2" …
+  std::string comment;               ///< lines that begin with it are skipped; empty: there are none
   std::vector<std::string> missing;  ///< texts that stand for a missing value, besides an empty field and nan
 };
 

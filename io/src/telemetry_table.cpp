@@ -37,7 +37,7 @@ struct CsvField {
 bool is_blank(char c) { return c == ' ' || c == '\t' || c == '\r'; }
 
 /// Fields of a line. A field in quotation marks may hold the separator.
-void split(std::string_view line, char separator, std::vector<CsvField>& fields) {
+void split_fields(std::string_view line, char separator, std::vector<CsvField>& fields) {
   fields.clear();
   const bool by_blanks = separator == ' ';
   while (!line.empty() && (line.back() == '\r' || (by_blanks && is_blank(line.back())))) {
@@ -68,9 +68,9 @@ void split(std::string_view line, char separator, std::vector<CsvField>& fields)
 }
 
 /// Splits a text into lines.
-class Lines {
+class TextLines {
  public:
-  explicit Lines(std::string_view text) : rest_(text) {}
+  explicit TextLines(std::string_view text) : rest_(text) {}
 
   [[nodiscard]] bool next() {
     if (rest_.empty()) {
@@ -106,21 +106,22 @@ std::size_t column_named(const std::string& name, const Header& header, const fs
   const auto found = std::ranges::find(header.names, name);
   if (found == header.names.end()) {
     const std::vector<std::string_view> known(header.names.begin(), header.names.end());
-    throw InputRefused(file, {header.line, 0}, fmt::format("lacks column {}", in_quotes(name)), suggestion(name, known));
+    throw InputRefused(file, {header.line, 0}, fmt::format("lacks column {}", in_quotes(name)),
+                       suggestion(name, known));
   }
   const auto again = std::find(found + 1, header.names.end(), name);
   if (again != header.names.end()) {
-    throw InputRefused(file,
-                       {header.line, static_cast<std::int64_t>(header.begin[static_cast<std::size_t>(
-                                         again - header.names.begin())]) +
-                                         1},
-                       fmt::format("column {} is there twice", in_quotes(name)),
-                       "rename one of them, or give header_line = 0 and name columns by their number");
+    throw InputRefused(
+        file,
+        {header.line,
+         static_cast<std::int64_t>(header.begin[static_cast<std::size_t>(again - header.names.begin())]) + 1},
+        fmt::format("column {} is there twice", in_quotes(name)),
+        "rename one of them, or give header_line = 0 and name columns by their number");
   }
   return static_cast<std::size_t>(found - header.names.begin());
 }
 
-double number_of(const CsvField& field, const TableMap& map, const fs::path& file, std::int64_t line,
+double number_in(const CsvField& field, const TableMap& map, const fs::path& file, std::int64_t line,
                  const std::string& column) {
   double value = std::numeric_limits<double>::quiet_NaN();
   if (field.text.empty() || std::ranges::find(map.missing, field.text) != map.missing.end()) {
@@ -138,10 +139,10 @@ double number_of(const CsvField& field, const TableMap& map, const fs::path& fil
   return value;
 }
 
-Time time_of(const CsvField& field, const TableMap& map, StampReader& reader, const fs::path& file, std::int64_t line,
+Time time_in(const CsvField& field, const TableMap& map, StampReader& reader, const fs::path& file, std::int64_t line,
              const std::string& column) {
   if (map.stamps.format != Stamps::Format::kIso) {
-    return reader.of_number(number_of(field, map, file, line, column));
+    return reader.of_number(number_in(field, map, file, line, column));
   }
   if (field.text.empty() || std::ranges::find(map.missing, field.text) != map.missing.end()) {
     return kNoTime;
@@ -170,7 +171,8 @@ ForeignTable read_netcdf_table(const fs::path& file, const TableMap& map, const 
   StampReader reader(map.stamps);
   for (std::size_t i = 0; i < stamps.size(); ++i) {
     std::vector<Time>& times = table.stamps.emplace_back();
-    std::ranges::transform(columns[i], std::back_inserter(times), [&](double value) { return reader.of_number(value); });
+    std::ranges::transform(columns[i], std::back_inserter(times),
+                           [&](double value) { return reader.of_number(value); });
   }
   columns.erase(columns.begin(), columns.begin() + static_cast<std::ptrdiff_t>(stamps.size()));
   table.numbers = std::move(columns);
@@ -214,16 +216,17 @@ ForeignTable parse_foreign_csv(std::string_view text, const fs::path& file, cons
   const char separator = map.separator.front();
   std::vector<CsvField> fields;
   Header header;
-  Lines lines(text);
+  TextLines lines(text);
   while (lines.number() < map.header_line && lines.next()) {
   }
   if (lines.number() < map.header_line) {
-    throw InputRefused(file, {}, fmt::format("has {} lines, and its columns are to be named in line {}", lines.number(),
-                                             map.header_line),
-                       "give the number of that line as header_line");
+    throw InputRefused(
+        file, {},
+        fmt::format("has {} lines, and its columns are to be named in line {}", lines.number(), map.header_line),
+        "give the number of that line as header_line");
   }
   if (map.header_line > 0) {
-    split(lines.line(), separator, fields);
+    split_fields(lines.line(), separator, fields);
     header.line = lines.number();
     for (const CsvField& field : fields) {
       header.names.emplace_back(field.text);
@@ -258,7 +261,7 @@ ForeignTable parse_foreign_csv(std::string_view text, const fs::path& file, cons
     if (trimmed(line).empty() || (!map.comment.empty() && line.starts_with(map.comment))) {
       continue;
     }
-    split(line, separator, fields);
+    split_fields(line, separator, fields);
     if (header.names.empty()) {
       for (std::size_t i = 0; i < fields.size(); ++i) {
         header.names.push_back(fmt::to_string(i + 1));
@@ -281,10 +284,10 @@ ForeignTable parse_foreign_csv(std::string_view text, const fs::path& file, cons
     }
     try {
       for (std::size_t i = 0; i < stamps.size(); ++i) {
-        row_stamps[i] = time_of(fields[stamp_at[i]], map, reader, file, lines.number(), stamps[i]);
+        row_stamps[i] = time_in(fields[stamp_at[i]], map, reader, file, lines.number(), stamps[i]);
       }
       for (std::size_t i = 0; i < numbers.size(); ++i) {
-        row_numbers[i] = number_of(fields[number_at[i]], map, file, lines.number(), numbers[i]);
+        row_numbers[i] = number_in(fields[number_at[i]], map, file, lines.number(), numbers[i]);
       }
     } catch (const InputRefused&) {
       if (!lines.is_unended()) {

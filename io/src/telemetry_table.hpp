@@ -32,10 +32,10 @@ class StampReader {
 
 struct ForeignTable {
   std::filesystem::path file;
-  std::string name;                      ///< for people
-  std::int64_t first_line = 0;           ///< of the first row; 0 where there are no lines
-  std::vector<std::size_t> row_in_file;  ///< counted from `first_line`; empty where that is its index
-  std::vector<std::vector<Time>> stamps;    ///< by column
+  std::string name;                          ///< for people
+  std::int64_t first_line = 0;               ///< of the first row; 0 where there are no lines
+  std::vector<std::size_t> row_in_file;      ///< counted from `first_line`; empty where that is its index
+  std::vector<std::vector<Time>> stamps;     ///< by column
   std::vector<std::vector<double>> numbers;  ///< by column; NaN where missing
   std::int64_t cut_line = 0;                 ///< as in Series
 

@@ -16,7 +16,7 @@ namespace trihedron::io {
 namespace {
 
 constexpr double kTolerance = 1e-3;  // of a norm, as in the screening
-constexpr double kShare = 0.9;       // of the rows must fit
+constexpr double kMostOfRows = 0.9;  // of the rows must fit
 constexpr std::size_t kMostRows = 1000;
 
 std::vector<std::size_t> some_of(std::span<const std::size_t> rows) {
@@ -32,7 +32,7 @@ template <class NormOf>
 bool is_norm(const std::vector<std::size_t>& rows, double expected, const NormOf& norm_of) {
   const auto fits = [&](std::size_t row) { return std::abs(norm_of(row) / expected - 1) <= kTolerance; };
   return !rows.empty() &&
-         static_cast<double>(std::ranges::count_if(rows, fits)) >= kShare * static_cast<double>(rows.size());
+         static_cast<double>(std::ranges::count_if(rows, fits)) >= kMostOfRows * static_cast<double>(rows.size());
 }
 
 /// The count that stands for 1, where all rows have the same norm.
@@ -54,9 +54,10 @@ std::optional<double> counts_per_unit(const std::vector<std::size_t>& rows, cons
 }
 
 std::string cure_of_counts(double counts) {
-  return fmt::format("they all have the norm {0:g}: divide by it, or read them by a telemetry.toml with "
-                     "counts_per_unit = {0:.6g}",
-                     counts);
+  return fmt::format(
+      "they all have the norm {0:g}: divide by it, or read them by a telemetry.toml with "
+      "counts_per_unit = {0:.6g}",
+      counts);
 }
 
 }  // namespace
@@ -96,16 +97,18 @@ std::string cure_of_directions(const Series& series, std::span<const std::size_t
     return cure_of_counts(*counts);
   }
   constexpr std::array kUnits = {std::pair{"deg", units::kDegree}, std::pair{"arcmin", units::kArcMinute},
-                                 std::pair{"arcsec", units::kArcSecond}, std::pair{"mrad", 1e-3}, std::pair{"rad", 1.0}};
+                                 std::pair{"arcsec", units::kArcSecond}, std::pair{"mrad", 1e-3},
+                                 std::pair{"rad", 1.0}};
   for (const auto& [name, unit] : kUnits) {
     const auto of_angles = [&, unit_rad = unit](std::size_t row) {
       return norm(std::cos(value(row, first) * unit_rad), std::cos(value(row, first + 1) * unit_rad),
                   std::cos(value(row, first + 2) * unit_rad));
     };
     if (is_norm(some, 1, of_angles)) {
-      return fmt::format("they look like angles from the axes: give their cosines, or read them by a telemetry.toml with "
-                         "unit = \"{}\"",
-                         name);
+      return fmt::format(
+          "they look like angles from the axes: give their cosines, or read them by a telemetry.toml with "
+          "unit = \"{}\"",
+          name);
     }
   }
   return otherwise;

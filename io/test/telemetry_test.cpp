@@ -112,7 +112,7 @@ struct Foreign {
   }
 };
 
-LoadedPass clean() {
+LoadedPass clean_loaded() {
   const TemporaryDirectory directory;
   clean_pass().save_directory(directory / "pass");
   return read_pass(directory / "pass");
@@ -125,7 +125,7 @@ TEST(Telemetry, OfOthersIsTheSamePass) {
   EXPECT_EQ(loaded.pass.settings.inertial_frame, "EME2000");
   loaded.pass.settings.inertial_frame.clear();
   // Cosines of angles in degrees with 16 digits; stamps of 1.2e9 s, of which a double has 0.2 µs.
-  expect_same_pass(loaded.pass, clean().pass, 1e-12, 1e-15);
+  expect_same_pass(loaded.pass, clean_loaded().pass, 1e-12, 1e-15);
   EXPECT_EQ(loaded.sources, (std::vector<fs::path>{foreign.directory / "gyros.txt", foreign.directory / "stars.csv"}));
   EXPECT_FALSE(read_truth(foreign.file()));
   EXPECT_TRUE(is_telemetry_toml(foreign.file()));
@@ -239,7 +239,9 @@ of = "star-trackers"
   EXPECT_EQ(loaded.pass.star_tracker.t[8], epoch + std::chrono::seconds(36));
   EXPECT_EQ(loaded.sources.front(), foreign.directory / "slews.csv");
   // The same range of the file itself.
-  foreign.toml = replaced(foreign.toml, "[telemetry.time]", fmt::format("[telemetry]\nfrom = \"{}\"\nto = \"{}\"\n[telemetry.time]", iso_utc(6), iso_utc(81)));
+  foreign.toml =
+      replaced(foreign.toml, "[telemetry.time]",
+               fmt::format("[telemetry]\nfrom = \"{}\"\nto = \"{}\"\n[telemetry.time]", iso_utc(6), iso_utc(81)));
   EXPECT_EQ(foreign.load().pass.settings.duration, loaded.pass.settings.duration);
 }
 
@@ -263,7 +265,8 @@ TEST(Telemetry, MountingInTheBodyGivesTheAlignment) {
   const LoadedPass loaded = foreign.load();
   const PassSettings& settings = loaded.pass.settings;
   EXPECT_NEAR((settings.gyros[0].alignment_rotation_vector_rad - Eigen::Vector3d(0, 0, 0.3)).norm(), 0, 1e-15);
-  const Eigen::Quaterniond c_b = Eigen::AngleAxisd(-0.2, Eigen::Vector3d::UnitZ()) * Eigen::Quaterniond(Eigen::AngleAxisd(0.3, Eigen::Vector3d::UnitX()));
+  const Eigen::Quaterniond c_b = Eigen::AngleAxisd(-0.2, Eigen::Vector3d::UnitZ()) *
+                                 Eigen::Quaterniond(Eigen::AngleAxisd(0.3, Eigen::Vector3d::UnitX()));
   const Eigen::Vector3d found = settings.gyros[1].alignment_rotation_vector_rad;
   EXPECT_LT(Eigen::Quaterniond(Eigen::AngleAxisd(found.norm(), found.normalized())).angularDistance(c_b), 1e-15);
   // It is written and read back.
@@ -294,8 +297,9 @@ TEST_P(StampsOfTelemetry, AreTheInstant) {
   StampReader reader(stamps);
   TimeText::Fault fault;
   const std::string stamp(GetParam().stamp);
-  const std::optional<Time> read = stamps.format == Stamps::Format::kIso ? reader.of_text(stamp, fault)
-                                                                         : std::optional(reader.of_number(std::stod(stamp)));
+  const std::optional<Time> read = stamps.format == Stamps::Format::kIso
+                                       ? reader.of_text(stamp, fault)
+                                       : std::optional(reader.of_number(std::stod(stamp)));
   ASSERT_TRUE(read) << fault.reason;
   // A double has 40 µs of a Julian date, less than 1 µs of the others.
   EXPECT_NEAR(to_seconds(*read - sample_calibration().epoch), 0, stamps.format == Stamps::Format::kJd ? 5e-5 : 1e-6);
@@ -310,22 +314,23 @@ TEST(Telemetry, NumbersThatStandForNoTimeHaveNone) {
 
 INSTANTIATE_TEST_SUITE_P(
     All, StampsOfTelemetry,
-    testing::Values(StampCase{R"(scale = "TAI", format = "iso")", "2009-05-20T00:00:00"},
-                    StampCase{R"(scale = "UTC", format = "iso")", "2009-139T23:59:26Z"},
-                    StampCase{R"(scale = "GPS", format = "s", since = "1980-01-06T00:00:00")", "926812781"},
-                    StampCase{R"(scale = "GPS", format = "h", since = "2009-05-19T22:59:41")", "1"},
-                    StampCase{R"(scale = "TAI", format = "ms", since = "1958-01-01T00:00:00")", "1621468800000"},
-                    StampCase{R"(scale = "TT", format = "s", since = "2000-01-01T12:00:00")", "296049632.184"},
-                    StampCase{R"(scale = "UTC", format = "us", since = "1970-01-01T00:00:00", leap_seconds = "left-out")",
-                              "1242777566000000"},
-                    StampCase{R"(scale = "UTC", format = "ns", since = "2009-01-01T00:00:00", leap_seconds = "counted")",
-                              "12009566000000000"},
-                    StampCase{R"(scale = "UTC", format = "s", since = "2008-12-31T00:00:00", leap_seconds = "counted")",
-                              "12095967"},
-                    StampCase{R"(scale = "TAI", format = "mjd")", "54971"},
-                    StampCase{R"(scale = "UTC", format = "jd")", "2454971.4996064813"},
-                    StampCase{R"(scale = "TAI", format = "min", since = "2009-05-19T23:00:00")", "60"},
-                    StampCase{R"(scale = "TAI", format = "days", since = "2009-05-19T00:00:00")", "1"}));
+    testing::Values(
+        StampCase{R"(scale = "TAI", format = "iso")", "2009-05-20T00:00:00"},
+        StampCase{R"(scale = "UTC", format = "iso")", "2009-139T23:59:26Z"},
+        StampCase{R"(scale = "GPS", format = "s", since = "1980-01-06T00:00:00")", "926812781"},
+        StampCase{R"(scale = "GPS", format = "h", since = "2009-05-19T22:59:41")", "1"},
+        StampCase{R"(scale = "TAI", format = "ms", since = "1958-01-01T00:00:00")", "1621468800000"},
+        StampCase{R"(scale = "TT", format = "s", since = "2000-01-01T12:00:00")", "296049632.184"},
+        StampCase{R"(scale = "UTC", format = "us", since = "1970-01-01T00:00:00", leap_seconds = "left-out")",
+                  "1242777566000000"},
+        StampCase{R"(scale = "UTC", format = "ns", since = "2009-01-01T00:00:00", leap_seconds = "counted")",
+                  "12009566000000000"},
+        StampCase{R"(scale = "UTC", format = "s", since = "2008-12-31T00:00:00", leap_seconds = "counted")",
+                  "12095967"},
+        StampCase{R"(scale = "TAI", format = "mjd")", "54971"},
+        StampCase{R"(scale = "UTC", format = "jd")", "2454971.4996064813"},
+        StampCase{R"(scale = "TAI", format = "min", since = "2009-05-19T23:00:00")", "60"},
+        StampCase{R"(scale = "TAI", format = "days", since = "2009-05-19T00:00:00")", "1"}));
 
 // ---- NetCDF
 
@@ -367,7 +372,9 @@ scalar = "last"
 maps = "tracker-to-inertial"
 )";
 
-std::string of_netcdf(const std::string& toml) { return toml.substr(0, toml.find("[telemetry.star_tracker]")) + std::string(kStars); }
+std::string of_netcdf(const std::string& toml) {
+  return toml.substr(0, toml.find("[telemetry.star_tracker]")) + std::string(kStars);
+}
 
 TEST(Telemetry, OfNetcdfIsTheSamePass) {
   Foreign foreign;
@@ -376,7 +383,7 @@ TEST(Telemetry, OfNetcdfIsTheSamePass) {
   LoadedPass loaded = foreign.load();
   EXPECT_TRUE(loaded.defects.empty());
   loaded.pass.settings.inertial_frame.clear();
-  expect_same_pass(loaded.pass, clean().pass, 1e-12, 1e-15);
+  expect_same_pass(loaded.pass, clean_loaded().pass, 1e-12, 1e-15);
 }
 
 // ---- Refusals
@@ -403,7 +410,8 @@ INSTANTIATE_TEST_SUITE_P(
     Keys, RefusedTelemetry,
     testing::Values(
         Spoilt{"EME2000", "TEME", "telemetry.toml:3:18: \"inertial_frame\" is \"TEME\""},
-        Spoilt{"noise_rad = [1e-05, 2e-05, 9e-05]\n\n[telemetry.time]", "\n[telemetry.time]\nfrom = 1", "not known in time"},
+        Spoilt{"noise_rad = [1e-05, 2e-05, 9e-05]\n\n[telemetry.time]", "\n[telemetry.time]\nfrom = 1",
+               "not known in time"},
         Spoilt{"[telemetry.time]", "[telemetry.tiem]", "did you mean"},
         Spoilt{"scale = \"UTC\"\nformat", "scale = \"Moscow\"\nformat", "\"scale\" cannot be \"Moscow\""},
         Spoilt{"format = \"iso\"", "format = \"text\"", "\"format\" cannot be \"text\""},
@@ -432,8 +440,7 @@ INSTANTIATE_TEST_SUITE_P(
         Spoilt{"[\"A3\", \"-A1\", \"A2\"]", "[\"A3\", \"-\", \"A2\"]", "a name that is empty"},
         Spoilt{"[\"A3\", \"-A1\", \"A2\"]", "[\"A3\", \"-A1\", \"A9\"]", "gyros.txt:2: lacks column \"A9\""},
         Spoilt{"counts_per_unit = 32768", "counts_per_unit = 0", "counts_per_unit"},
-        Spoilt{"good = [1, 3]", "", "belong together"},
-        Spoilt{"good = [1, 3]", "good = 1", "no list"},
+        Spoilt{"good = [1, 3]", "", "belong together"}, Spoilt{"good = [1, 3]", "good = 1", "no list"},
         Spoilt{"unit = \"deg\"", "unit = \"grad\"", "\"unit\" cannot be \"grad\""},
         Spoilt{"[[telemetry.gyro.unit]]\ndirection = [\"B1\", \"B2\", \"B3\"]\nunit = \"deg\"", "", "is there 1 times"},
         Spoilt{"[\"s\", \"x\", \"y\", \"z\"]", "[\"x\", \"y\", \"z\"]", "not a list of 4 names"},
@@ -444,11 +451,18 @@ INSTANTIATE_TEST_SUITE_P(
         Spoilt{"sigma_unit = \"arcsec\"", "", "belong together"},
         Spoilt{"sigma = [\"sx\", \"sy\", \"sz\"]\nsigma_unit = \"arcsec\"", "", "is there without \"sigma\""},
         Spoilt{"largest_sigma_rad = 1e-3", "largest_sigma_rad = 10", "largest_sigma_rad"},
-        Spoilt{"stars.csv", "nowhere.csv", "nowhere.csv"},
-        Spoilt{"stars.csv", "stars.nc", "stars.nc"},
-        Spoilt{"[star_tracker]\n", "[star_tracker]\n[[star_tracker.further]]\nnoise_rad = [1e-5, 1e-5, 1e-5]\nmounting_rotation_vector_rad = [0, 1, 0]\nalignment_prior_sigma_rad = 1e-3\n[star_tracker2]\n", "star_tracker2"},
-        Spoilt{"[star_tracker]\n", "[[gyro.unit]]\nmounting_rotation_vector_rad = [0, 0, 1]\n[[gyro.unit]]\n[star_tracker]\n", "and [star_tracker] has none"},
-        Spoilt{"[star_tracker]\n", "[[gyro.unit]]\nmounting_rotation_vector_rad = [0, 0, 1]\nalignment_prior_rotation_vector_rad = [0, 0, 0]\n[[gyro.unit]]\n[star_tracker]\n", "each gives the alignment"},
+        Spoilt{"stars.csv", "nowhere.csv", "nowhere.csv"}, Spoilt{"stars.csv", "stars.nc", "stars.nc"},
+        Spoilt{"[star_tracker]\n",
+               "[star_tracker]\n[[star_tracker.further]]\nnoise_rad = [1e-5, 1e-5, 1e-5]\nmounting_rotation_vector_rad "
+               "= [0, 1, 0]\nalignment_prior_sigma_rad = 1e-3\n[star_tracker2]\n",
+               "star_tracker2"},
+        Spoilt{"[star_tracker]\n",
+               "[[gyro.unit]]\nmounting_rotation_vector_rad = [0, 0, 1]\n[[gyro.unit]]\n[star_tracker]\n",
+               "and [star_tracker] has none"},
+        Spoilt{"[star_tracker]\n",
+               "[[gyro.unit]]\nmounting_rotation_vector_rad = [0, 0, 1]\nalignment_prior_rotation_vector_rad = [0, 0, "
+               "0]\n[[gyro.unit]]\n[star_tracker]\n",
+               "each gives the alignment"},
         Spoilt{"readout_noise_rad = 1e-05\n", "", "key \"readout_noise_rad\" is missing"}));
 
 struct SpoiltText {
@@ -472,7 +486,8 @@ TEST_P(RefusedTables, NameThePlace) {
 
 INSTANTIATE_TEST_SUITE_P(
     Text, RefusedTables,
-    testing::Values(SpoiltText{true, "\n1242777567.000;", "\n1242777567,000;", "gyros.txt:6:1: \"1242777567,000\" of column \"Time UTC\" is not a number"},
+    testing::Values(SpoiltText{true, "\n1242777567.000;", "\n1242777567,000;",
+                               "gyros.txt:6:1: \"1242777567,000\" of column \"Time UTC\" is not a number"},
                     SpoiltText{true, ";32768;", ";0x8000;", "of column \"A3\" is not a number"},
                     SpoiltText{true, ";A2;", ";A1;", "gyros.txt:2:13: column \"A1\" is there twice"},
                     SpoiltText{true, ";1;", ";1;7;", "gyros.txt:4:1: the line has 9 fields, the header 8"},
@@ -541,8 +556,9 @@ TEST(Telemetry, StampsInMillisecondsAreProposed) {
     gyros += fmt::format("{};0;0;32768;1;90;0;90\n", 500 * i);
   }
   foreign.gyros = gyros;
-  foreign.toml = replaced(foreign.toml, R"(time = {scale = "UTC", format = "s", since = "1970-01-01T00:00:00", leap_seconds = "left-out"})",
-                          R"(time = {scale = "TAI", format = "s", since = "2009-05-20T00:00:00"})");
+  foreign.toml = replaced(
+      foreign.toml, R"(time = {scale = "UTC", format = "s", since = "1970-01-01T00:00:00", leap_seconds = "left-out"})",
+      R"(time = {scale = "TAI", format = "s", since = "2009-05-20T00:00:00"})");
   EXPECT_NE(message_of(foreign).find("format = \"ms\""), std::string::npos) << message_of(foreign);
 }
 
@@ -605,7 +621,9 @@ TEST(Telemetry, WhatNetcdfDoesNotHoldIsRefused) {
   EXPECT_NE(message("acs/q[0]", "gnc/q[0]").find("lacks group \"gnc\""), std::string::npos);
   EXPECT_NE(message("acs/q[0]", "acs/text").find("does not hold numbers"), std::string::npos);
   EXPECT_NE(message("acs/q[0]", "acs/short").find("has 3 rows"), std::string::npos);
-  EXPECT_NE(message("format = \"ms\", since = \"2009-05-20T00:00:00\"", "format = \"iso\"").find("where stamps are numbers"), std::string::npos);
+  EXPECT_NE(
+      message("format = \"ms\", since = \"2009-05-20T00:00:00\"", "format = \"iso\"").find("where stamps are numbers"),
+      std::string::npos);
 }
 
 }  // namespace

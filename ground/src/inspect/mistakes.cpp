@@ -12,10 +12,10 @@
 namespace trihedron::ground {
 namespace {
 
-using Components = std::array<SignedComponent, 4>;
-using Axes = std::array<SignedComponent, 3>;
+using ComponentOrder = std::array<SignedComponent, 4>;
+using AxisOrder = std::array<SignedComponent, 3>;
 
-constexpr Components kAsTold = {{{0, 1}, {1, 1}, {2, 1}, {3, 1}}};
+constexpr ComponentOrder kAsTold = {{{0, 1}, {1, 1}, {2, 1}, {3, 1}}};
 
 /// A fix and the readings at its time.
 struct Sight {
@@ -28,7 +28,7 @@ using Window = std::vector<Sight>;
 
 constexpr Duration kWindow = std::chrono::minutes(20);
 constexpr std::size_t kMostWindows = 12;
-constexpr std::size_t kMostSights = 40;   // of a window
+constexpr std::size_t kMostSights = 40;  // of a window
 constexpr std::size_t kFewestSights = 10;
 constexpr double kShare = 0.8;  // of the fixes: one of five may be an outlier
 /// A mistake explains what it lessens by this factor at least: wrong hypotheses lessen it by chance, by less than 2.
@@ -38,7 +38,7 @@ constexpr double kClock_s = 0.5;
 constexpr double kClockSigmas = 5;
 
 /// Readings interpolated at t, of length 1; NaN where there is none within 1.5 periods.
-Eigen::Vector3d reading_at(const Pass& pass, Time t, int gyro) {
+Eigen::Vector3d direction_at(const Pass& pass, Time t, int gyro) {
   const Eigen::Vector3d none = Eigen::Vector3d::Constant(std::numeric_limits<double>::quiet_NaN());
   const std::vector<Time>& times = pass.gyro.t;
   const auto after = std::ranges::lower_bound(times, t);
@@ -81,7 +81,7 @@ std::vector<Window> windows_of(const Pass& pass, Duration offset) {
       Sight sight;
       sight.q_in_c = q.normalized();
       for (int k = 0; k < pass.gyro.gyros; ++k) {
-        sight.h_b[k] = reading_at(pass, fixes.t[i] + offset, k);
+        sight.h_b[k] = direction_at(pass, fixes.t[i] + offset, k);
       }
       window.push_back(sight);
     }
@@ -90,7 +90,7 @@ std::vector<Window> windows_of(const Pass& pass, Duration offset) {
   return windows;
 }
 
-Eigen::Quaterniond rearranged(const Eigen::Quaterniond& q, const Components& components) {
+Eigen::Quaterniond put_in_order(const Eigen::Quaterniond& q, const ComponentOrder& components) {
   const std::array<double, 4> told = {q.x(), q.y(), q.z(), q.w()};
   const auto at = [&](std::size_t i) {
     return components[i].sign * told[static_cast<std::size_t>(components[i].from)];
@@ -98,7 +98,7 @@ Eigen::Quaterniond rearranged(const Eigen::Quaterniond& q, const Components& com
   return {at(3), at(0), at(1), at(2)};
 }
 
-Eigen::Vector3d rearranged(const Eigen::Vector3d& h, const Axes& axes) {
+Eigen::Vector3d put_in_order(const Eigen::Vector3d& h, const AxisOrder& axes) {
   return {axes[0].sign * h(axes[0].from), axes[1].sign * h(axes[1].from), axes[2].sign * h(axes[2].from)};
 }
 
@@ -144,9 +144,9 @@ class Scene {
     for (int k = 0; k < gyros(); ++k) {
       const GyroPrior& prior = pass.settings.gyros[static_cast<std::size_t>(k)];
       const bool has_calibration = pass.settings.prior.has_value();
-      C_c_b_[k] = rotation(has_calibration ? pass.settings.prior->gyros[static_cast<std::size_t>(k)]
-                                                 .alignment_rotation_vector_rad
-                                           : prior.alignment_rotation_vector_rad);
+      C_c_b_[k] = rotation(has_calibration
+                               ? pass.settings.prior->gyros[static_cast<std::size_t>(k)].alignment_rotation_vector_rad
+                               : prior.alignment_rotation_vector_rad);
       // As the body turns, an alignment that is off by δ moves a momentum by up to |δ| from its mean, drift κ by a few
       // |κ| times half a window; both to three sigmas. Nothing is judged below half a degree.
       constexpr double kSigmas = 3;
@@ -175,14 +175,14 @@ class Scene {
     return !(motion_rad > allowed_rad_[gyro]) && !(kExplains * motion_rad > motion_rad_[gyro] && !is_good(gyro));
   }
 
-  [[nodiscard]] double motion_of(int gyro, const Components& components) const {
+  [[nodiscard]] double motion_of(int gyro, const ComponentOrder& components) const {
     return motion(windows_, [&](const Sight& sight) -> Eigen::Vector3d {
-      return rearranged(sight.q_in_c, components) * (C_c_b_[gyro] * sight.h_b[gyro]);
+      return put_in_order(sight.q_in_c, components) * (C_c_b_[gyro] * sight.h_b[gyro]);
     });
   }
-  [[nodiscard]] double motion_of(int gyro, const Axes& axes) const {
+  [[nodiscard]] double motion_of(int gyro, const AxisOrder& axes) const {
     return motion(windows_, [&](const Sight& sight) -> Eigen::Vector3d {
-      return sight.q_in_c * (C_c_b_[gyro] * rearranged(sight.h_b[gyro], axes));
+      return sight.q_in_c * (C_c_b_[gyro] * put_in_order(sight.h_b[gyro], axes));
     });
   }
   /// With the readings of another gyro.
@@ -195,9 +195,8 @@ class Scene {
     if (late_.empty()) {
       late_ = windows_of(pass_, from_seconds(offset_s));
     }
-    return motion(late_, [&](const Sight& sight) -> Eigen::Vector3d {
-      return sight.q_in_c * (C_c_b_[gyro] * sight.h_b[gyro]);
-    });
+    return motion(
+        late_, [&](const Sight& sight) -> Eigen::Vector3d { return sight.q_in_c * (C_c_b_[gyro] * sight.h_b[gyro]); });
   }
   /// The largest over the gyros where it explains each of them, else nothing.
   template <class MotionOf>
@@ -247,9 +246,9 @@ std::vector<std::array<SignedComponent, Size>> all_arrangements() {
   return all;
 }
 
-/// How unusual an arrangement is: 2 for each mistake that it takes. Of a quaternion these are scalar first, conjugate (1
-/// beside the first, which often come together), axes in another order, and each axis mirrored.
-int cost_of(const Components& components) {
+/// How unusual an arrangement is: 2 for each mistake that it takes. Of a quaternion these are scalar first, conjugate
+/// (1 beside the first, which often come together), axes in another order, and each axis mirrored.
+int cost_of(const ComponentOrder& components) {
   const bool scalar_first = components[3].from == 0;
   int moved = 0;
   int minus = 0;
@@ -262,7 +261,7 @@ int cost_of(const Components& components) {
   return (scalar_first ? 2 : 0) + (moved > 0 ? 2 : 0) + (minus == 3 ? conjugate : 2 * minus);
 }
 
-int cost_of(const Axes& axes) {
+int cost_of(const AxisOrder& axes) {
   int moved = 0;
   int minus = 0;
   for (int i = 0; i < 3; ++i) {
@@ -308,13 +307,13 @@ std::vector<Explanation<Arrangement>> usual_explanations(const std::vector<Arran
 }
 
 void try_quaternions(const Scene& scene, std::vector<Mistake>& mistakes) {
-  std::vector<Components> all;
-  for (const Components& components : all_arrangements<4>()) {
+  std::vector<ComponentOrder> all;
+  for (const ComponentOrder& components : all_arrangements<4>()) {
     if (components[3].sign > 0 && (components[3].from == 0 || components[3].from == 3)) {
       all.push_back(components);
     }
   }
-  const auto found = usual_explanations(all, [&](const Components& components) {
+  const auto found = usual_explanations(all, [&](const ComponentOrder& components) {
     return scene.explained([&](int k) { return scene.motion_of(k, components); });
   });
   for (const auto& [components, left] : found) {
@@ -327,7 +326,7 @@ void try_gyro_axes(const Scene& scene, std::vector<Mistake>& mistakes) {
     if (scene.is_good(k)) {
       continue;
     }
-    const auto found = usual_explanations(all_arrangements<3>(), [&](const Axes& axes) -> std::optional<double> {
+    const auto found = usual_explanations(all_arrangements<3>(), [&](const AxisOrder& axes) -> std::optional<double> {
       const double left = scene.motion_of(k, axes);
       return scene.explains(k, left) ? std::optional(left) : std::nullopt;
     });

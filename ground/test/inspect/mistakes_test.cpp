@@ -6,6 +6,7 @@
 #include <array>
 #include <chrono>
 #include <cmath>
+#include <cstdint>
 #include <optional>
 #include <string>
 #include <vector>
@@ -18,6 +19,18 @@ namespace trihedron::ground {
 namespace {
 
 using Kind = Mistake::Kind;
+
+/// Slews of an hour and ten minutes; readings each second, which are quickly simulated.
+Scenario an_hour(std::uint64_t seed) {
+  Scenario scenario = scenario_in_eq1(seed, std::chrono::minutes(70));
+  scenario.gyro_period = std::chrono::seconds(1);
+  return scenario;
+}
+
+const Pass& flown() {
+  static const Pass pass = sim::simulate(an_hour(5)).pass;
+  return pass;
+}
 
 Consistency found_in(const Pass& pass) { return consistency_of(pass, std::nullopt).value(); }
 
@@ -37,7 +50,8 @@ std::string described(const Consistency& consistency) {
 }
 
 /// The one that explains, with what is proposed for it.
-void expect_only(const Consistency& consistency, Kind kind, int gyro, const std::array<SignedComponent, 4>& components) {
+void expect_only(const Consistency& consistency, Kind kind, int gyro,
+                 const std::array<SignedComponent, 4>& components) {
   EXPECT_FALSE(consistency.is_consistent);
   ASSERT_EQ(consistency.mistakes.size(), 1U) << described(consistency);
   const Mistake& mistake = consistency.mistakes.front();
@@ -62,7 +76,7 @@ Pass with_fixes(Pass pass, const Told& told) {
 }
 
 /// What mends it.
-Told inverse(const Told& told) {
+Told mending(const Told& told) {
   Told mended{};
   for (int i = 0; i < 4; ++i) {
     const SignedComponent& part = told[static_cast<std::size_t>(i)];
@@ -104,19 +118,19 @@ class QuaternionsOfAPass : public testing::TestWithParam<QuaternionCase> {};
 
 TEST_P(QuaternionsOfAPass, ThatAreMistakenAreRecognised) {
   const Told& told = GetParam().told;
-  expect_only(found_in(with_fixes(two_hours().pass, told)), Kind::kQuaternion, 0, inverse(told));
+  expect_only(found_in(with_fixes(flown(), told)), Kind::kQuaternion, 0, mending(told));
 }
 
 /// In steady flight about c y, what turns the fixes round y cannot be told from what they are.
 TEST_P(QuaternionsOfAPass, AreNeverMendedWronglyInSteadyFlight) {
-  Scenario scenario = scenario_in_eq1(5, std::chrono::hours(2));
+  Scenario scenario = an_hour(5);
   scenario.attitude.slews = std::vector<Slew>{};
   static const Pass pass = sim::simulate(scenario).pass;
   const Told& told = GetParam().told;
   const Consistency consistency = found_in(with_fixes(pass, told));
   if (consistency.mistakes.size() == 1) {
     EXPECT_EQ(consistency.mistakes.front().kind, Kind::kQuaternion);
-    EXPECT_EQ(consistency.mistakes.front().components, inverse(told));
+    EXPECT_EQ(consistency.mistakes.front().components, mending(told));
   }
 }
 
@@ -140,7 +154,7 @@ TEST_P(AxesOfAGyro, ThatAreMistakenAreRecognised) {
     mended[static_cast<std::size_t>(part.from)] = {i, part.sign};
   }
   for (const int gyro : {0, 1}) {
-    expect_only(found_in(with_readings(two_hours().pass, gyro, told)), Kind::kGyroAxes, gyro, mended);
+    expect_only(found_in(with_readings(flown(), gyro, told)), Kind::kGyroAxes, gyro, mended);
   }
 }
 
@@ -152,7 +166,7 @@ INSTANTIATE_TEST_SUITE_P(All, AxesOfAGyro,
                          [](const auto& one) { return one.param.name; });
 
 TEST(Mistakes, GyrosWithEachOthersReadingsAreRecognisedByTheirAlignments) {
-  Pass pass = two_hours().pass;
+  Pass pass = flown();
   const Eigen::Vector3d turn(0, 0.4, 0.3);
   const Eigen::AngleAxisd mounting(turn.norm(), turn.normalized());
   pass.settings.gyros[1].alignment_rotation_vector_rad = turn;
@@ -168,7 +182,7 @@ TEST(Mistakes, GyrosWithEachOthersReadingsAreRecognisedByTheirAlignments) {
 }
 
 TEST(Mistakes, AStarTrackerTenMinutesLateIsRecognised) {
-  Scenario scenario = scenario_in_eq1(7, std::chrono::hours(2));
+  Scenario scenario = an_hour(7);
   for (const double offset_s : {-590.0, 20.0}) {
     scenario.star_tracker.clock_offset_s = offset_s;
     const Pass pass = sim::simulate(scenario).pass;
@@ -182,8 +196,8 @@ TEST(Mistakes, AStarTrackerTenMinutesLateIsRecognised) {
 
 /// Of the same orbit, with slews at other times.
 TEST(Mistakes, FixesOfAnotherPassAreNotMended) {
-  Pass pass = two_hours().pass;
-  const Pass other = sim::simulate(scenario_in_eq1(6, std::chrono::hours(2))).pass;
+  Pass pass = flown();
+  const Pass other = sim::simulate(an_hour(6)).pass;
   pass.star_tracker = other.star_tracker;
   const std::optional<Consistency> consistency = consistency_of(pass, clocks_of(pass));
   ASSERT_TRUE(consistency);
@@ -193,7 +207,7 @@ TEST(Mistakes, FixesOfAnotherPassAreNotMended) {
 }
 
 Pass right_pass(const std::string& kind) {
-  Scenario scenario = scenario_in_eq1(11, std::chrono::hours(2));
+  Scenario scenario = an_hour(11);
   if (kind == "steady") {
     scenario.attitude.slews = std::vector<Slew>{};
   } else if (kind == "three gyros") {
@@ -220,14 +234,14 @@ TEST(Mistakes, AreNotSeenInRightPasses) {
     const Pass pass = right_pass(kind);
     const std::optional<Consistency> consistency = consistency_of(pass, clocks_of(pass));
     ASSERT_TRUE(consistency) << kind;
-    EXPECT_TRUE(consistency->is_consistent) << kind << " " << consistency->motion_rad[0] << " "
-                                            << consistency->motion_rad[1];
+    EXPECT_TRUE(consistency->is_consistent)
+        << kind << " " << consistency->motion_rad[0] << " " << consistency->motion_rad[1];
     EXPECT_TRUE(consistency->mistakes.empty()) << kind;
   }
 }
 
 TEST(Mistakes, NeedFixesWithReadingsBesideThem) {
-  Pass pass = two_hours().pass;
+  Pass pass = flown();
   pass.star_tracker.t.resize(5);
   pass.star_tracker.q_in_c.resize(5);
   EXPECT_FALSE(consistency_of(pass, std::nullopt));

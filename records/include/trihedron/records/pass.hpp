@@ -54,7 +54,7 @@ struct PassSettings {
   /// Of the first head in the body, as designed: v_body = exp([m×]) v_c. Without it the body axes are c.
   std::optional<Eigen::Vector3d> star_tracker_mounting_rotation_vector_rad{};
   std::string inertial_frame{};  ///< name of the axes `in` that the fixes refer to; empty where it is not given
-  std::string start_up;  ///< of the rotors, "2009-05-20"; empty where it is not given
+  std::string start_up;          ///< of the rotors, "2009-05-20"; empty where it is not given
   std::optional<Calibration>
       prior;  ///< an earlier calibration: replaces drift and alignment of `gyros`, with its covariance
 };
