@@ -212,9 +212,8 @@ void add_import(CLI::App& program, const Common& common, int& exit_status) {
   command->footer(
       "# Columns of others' CSV or NetCDF files, by a map of them: docs/telemetry.md\n"
       "trihedron import examples/telemetry/telemetry.toml -o pass.nc\n"
-      "# Half an hour of it, without manoeuvres\n"
-      "trihedron import telemetry.toml -o pass.nc --from 2009-05-20T00:10:00 --to 2009-05-20T00:40:00 --exclude "
-      "slews.csv\n"
+      "# A part of it, without manoeuvres\n"
+      "trihedron import telemetry.toml -o pass.nc --from 2009-05-20T00:10:00 --exclude slews.csv\n"
       "trihedron import attitude.aem -o attitude.csv --pass pass.nc\n"
       "# Other commands read telemetry.toml and messages themselves\n"
       "trihedron inspect telemetry.toml\n"

@@ -71,23 +71,6 @@ Field column_names(std::string_view key, std::vector<std::string>& target, std::
           }};
 }
 
-/// Numbers or texts of any number.
-template <class T, class Take>
-Field any_number_of(std::string_view key, std::vector<T>& target, std::string_view about, std::function<Json()> schema,
-                    Take take) {
-  return {key, about, [schema = std::move(schema)] { return array_of(schema()); },
-          [key, &target, take](const TomlTable& table, const toml::node& node) {
-            const toml::array* const array = node.as_array();
-            if (array == nullptr) {
-              table.refuse(node, fmt::format("\"{}\" is no list", key), "give a list: [0, 1]");
-            }
-            target.clear();
-            for (const toml::node& element : *array) {
-              target.push_back(take(table, element));
-            }
-          }};
-}
-
 // ---- Time
 
 /// What the clock of the scale shows, without time zone.
@@ -213,9 +196,7 @@ Fields table_fields(TableMap& map, const fs::path& file) {
       whole("header_line", map.header_line, limits::kHeaderLine,
             "of CSV, with the names of the columns; 0: none, they are called \"1\", \"2\" …"),
       text("comment", map.comment, "with which lines of CSV begin that are skipped"),
-      any_number_of("missing", map.missing, "texts that stand for no value, besides an empty field and nan",
-                    text_schema,
-                    [](const TomlTable& table, const toml::node& node) { return table.text(node, "missing"); })};
+      list_of_texts("missing", map.missing, "that stand for no value, besides an empty field and nan")};
 }
 
 Field time_column(TableMap& map) {
@@ -224,9 +205,7 @@ Field time_column(TableMap& map) {
 
 Fields flag_fields(FlagMap& flag) {
   return {name_of_something("flag", flag.column, "column that says whether a row is good"),
-          any_number_of(
-              "good", flag.good, "values of the flag that are good", [] { return number_schema(); },
-              [](const TomlTable& table, const toml::node& node) { return table.number(node, "good"); })};
+          list_of_numbers("good", flag.good, "values of the flag that are good")};
 }
 
 void check_flag(const FlagMap& flag, const TomlTable& table, const toml::node& node) {

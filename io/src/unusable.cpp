@@ -120,7 +120,7 @@ std::string cure_of_quaternions(const Series& series, std::span<const std::size_
     return std::sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
   };
   const std::optional<double> counts = counts_per_unit(some_of(rows), norm_of);
-  return counts ? cure_of_counts(*counts) : otherwise;
+  return counts ? cure_of_counts(*counts) : std::move(otherwise);
 }
 
 }  // namespace trihedron::io
