@@ -188,7 +188,7 @@ std::string consistency_text(const std::optional<ground::Consistency>& consisten
   for (int k = 0; k < loaded.pass.gyro.gyros; ++k) {
     text += fmt::format("{} {:.2f}°", k == 0 ? "" : ",", degrees(consistency->allowed_rad[k]));
   }
-  text += "\n";
+  text += '\n';
   const std::vector<Mistake>& mistakes = consistency->mistakes;
   if (mistakes.size() > 1) {
     text += "Mistake     one of these would explain it, and this pass does not tell which:\n";

@@ -180,23 +180,24 @@ Field time_of_table(Stamps& stamps, const fs::path& file) {
 // ---- Tables
 
 Fields table_fields(TableMap& map, const fs::path& file) {
-  return {
-      required(name_of_something("file", map.file, "with the columns, CSV, or NetCDF where it ends in .nc")),
-      time_of_table(map.stamps, file),
-      looked_at(text("separator", map.separator, "between fields of CSV, one character; a blank is any number of them"),
-                [&map](const TomlTable& table, const toml::node& node) {
-                  constexpr std::string_view kNone = "\"\r\n-+.0123456789";
-                  if (map.separator.size() != 1 || kNone.find(map.separator.front()) != std::string_view::npos) {
-                    table.refuse(
-                        node,
-                        fmt::format("\"separator\" is {}, not a character that separates", in_quotes(map.separator)),
-                        "give one character: \",\", \";\", \"\\t\" or \" \"");
-                  }
-                }),
-      whole("header_line", map.header_line, limits::kHeaderLine,
-            "of CSV, with the names of the columns; 0: none, they are called \"1\", \"2\" …"),
-      text("comment", map.comment, "with which lines of CSV begin that are skipped"),
-      list_of_texts("missing", map.missing, "that stand for no value, besides an empty field and nan")};
+  Field name = required(name_of_something("file", map.file, "with the columns, CSV, or NetCDF where it ends in .nc"));
+  Field time = time_of_table(map.stamps, file);
+  Field separator = looked_at(
+      text("separator", map.separator, "between fields of CSV, one character; a blank is any number of them"),
+      [&map](const TomlTable& table, const toml::node& node) {
+        constexpr std::string_view kNone = "\"\r\n-+.0123456789";
+        if (map.separator.size() != 1 || kNone.find(map.separator.front()) != std::string_view::npos) {
+          table.refuse(node,
+                       fmt::format("\"separator\" is {}, not a character that separates", in_quotes(map.separator)),
+                       "give one character: \",\", \";\", \"\\t\" or \" \"");
+        }
+      });
+  Field header = whole("header_line", map.header_line, limits::kHeaderLine,
+                       "of CSV, with the names of the columns; 0: none, they are called \"1\", \"2\" …");
+  Field comment = text("comment", map.comment, "with which lines of CSV begin that are skipped");
+  Field missing = list_of_texts("missing", map.missing, "that stand for no value, besides an empty field and nan");
+  return {std::move(name),   std::move(time),    std::move(separator),
+          std::move(header), std::move(comment), std::move(missing)};
 }
 
 Field time_column(TableMap& map) {
@@ -204,8 +205,9 @@ Field time_column(TableMap& map) {
 }
 
 Fields flag_fields(FlagMap& flag) {
-  return {name_of_something("flag", flag.column, "column that says whether a row is good"),
-          list_of_numbers("good", flag.good, "values of the flag that are good")};
+  Field column = name_of_something("flag", flag.column, "column that says whether a row is good");
+  Field good = list_of_numbers("good", flag.good, "values of the flag that are good");
+  return {std::move(column), std::move(good)};
 }
 
 void check_flag(const FlagMap& flag, const TomlTable& table, const toml::node& node) {
