@@ -33,6 +33,7 @@ set(TRIHEDRON_ground_batch_MAY_USE tasks model onboard)
 set(TRIHEDRON_ground_choose_MAY_USE tasks model evaluate onboard batch)
 set(TRIHEDRON_ground_application_MAY_USE model onboard choose)
 set(TRIHEDRON_ground_judge_MAY_USE model clocks evaluate)
+set(TRIHEDRON_ground_inspect_MAY_USE)
 set(TRIHEDRON_ground_observe_MAY_USE tasks model onboard batch choose)
 set(TRIHEDRON_ground_calibrate_MAY_USE tasks model clocks evaluate onboard batch choose judge)
 

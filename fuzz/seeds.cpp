@@ -41,6 +41,9 @@ void write_seeds(const fs::path& directory, const fs::path& examples) {
                  io::read_text(work / "known/truth.json") + '\0' + io::read_text(work / "known/truth.csv"));
   io::write_text(at("pass_toml", "clean.toml"), raw.toml);
   io::write_text(at("pass_toml", "full.toml"), io::read_text(work / "known/pass.toml"));
+  const fs::path others = examples / "telemetry";
+  io::write_text(at("telemetry", "example"),
+                 io::read_text(others / "telemetry.toml") + '\0' + io::read_text(others / "gyros.csv").substr(0, 1000));
   const fs::path calibration = at("calibration", "calibration.json");
   io::write_calibration(calibration, io::sample_calibration());
 

@@ -66,9 +66,10 @@ void stage_outcome(io::StagedDirectory& staged, const std::filesystem::path& bel
   const std::filesystem::path out = staged.path() / below;
   const io::MadeDirectory made(out);
   io::write_calibration(out / kCalibrationFile, outcome.run.calibration);
-  io::write_attitude(out / kAttitudeFile, epoch, outcome.run.attitude);
+  const io::Mounting& mounting = outcome.pass.pass().settings.star_tracker_mounting_rotation_vector_rad;
+  io::write_attitude(out / kAttitudeFile, epoch, outcome.run.attitude, mounting);
   if (outcome.run.definitive_attitude.size() > 0) {
-    io::write_attitude(out / kDefinitiveFile, epoch, outcome.run.definitive_attitude);
+    io::write_attitude(out / kDefinitiveFile, epoch, outcome.run.definitive_attitude, mounting);
   } else {
     staged.drop(below / kDefinitiveFile);
   }
@@ -148,6 +149,7 @@ void expect_apart(const std::vector<io::NamedPass>& passes, const CalibrationFil
   for (const io::NamedPass& pass : passes) {
     inputs.push_back(pass.path);
     inputs.push_back(pass.loaded.prior_file);
+    inputs.insert(inputs.end(), pass.loaded.sources.begin(), pass.loaded.sources.end());
   }
   std::vector<std::filesystem::path> outputs = {files.out};
   for (const std::filesystem::path& name : output_names(passes)) {

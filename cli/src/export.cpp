@@ -29,6 +29,7 @@ struct ExportArguments {
   EpochOptions epoch;
   std::string time_system = "TAI";
   std::string object_name;
+  std::string inertial_frame;
   io::MessageDescription description;
   std::string gap;
   std::string attitude;
@@ -87,6 +88,11 @@ io::MessageDescription description_of(const ExportArguments& arguments, const Ep
         fmt::format("--time-system {}: give one of {}", arguments.time_system, fmt::join(io::kTimeScales, ", ")));
   }
   description.time_scale = *scale;
+  if (!arguments.inertial_frame.empty()) {
+    description.inertial_frame = arguments.inertial_frame;
+  } else if (!source.inertial_frame.empty()) {
+    description.inertial_frame = source.inertial_frame;
+  }
   if (!arguments.object_name.empty()) {
     description.object_name = arguments.object_name;
   } else if (!source.spacecraft.empty()) {
@@ -233,8 +239,8 @@ void add_export(CLI::App& program, const Common& common, int& exit_status) {
       ->capture_default_str()
       ->type_name(fmt::format("{}", fmt::join(io::kTimeScales, "|")));
   command
-      ->add_option("--inertial-frame", arguments->description.inertial_frame, "Name of the axes that q_in_c leads to")
-      ->capture_default_str()
+      ->add_option("--inertial-frame", arguments->inertial_frame,
+                   "Name of the axes that q_in_c leads to (default: that of the pass, else GCRF)")
       ->type_name("NAME");
   command->add_option("--body-frame", arguments->description.body_frame, "Name of the axes c, of the star tracker")
       ->capture_default_str()

@@ -1,15 +1,23 @@
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
+#include <filesystem>
 #include <memory>
+#include <optional>
 #include <string>
+#include <system_error>
+#include <vector>
 
+#include "decisions.hpp"
 #include "interchange.hpp"
+#include "summary.hpp"
 #include "trihedron/io/apart.hpp"
 #include "trihedron/io/atomic_file.hpp"
 #include "trihedron/io/attitude.hpp"
 #include "trihedron/io/attitude_message.hpp"
 #include "trihedron/io/error.hpp"
 #include "trihedron/io/named_pass.hpp"
+#include "trihedron/io/time_scale.hpp"
 #include "trihedron/io/time_text.hpp"
 #include "trihedron/records/text.hpp"
 
@@ -25,7 +33,8 @@ void add_epoch_options(CLI::App& command, EpochOptions& options, const std::stri
 EpochSource epoch_of(const EpochOptions& options) {
   if (!options.pass.empty()) {
     const io::NamedPass pass = io::read_named_pass(options.pass);
-    return {pass.pass().settings.epoch, pass.pass().settings.spacecraft};
+    const PassSettings& settings = pass.pass().settings;
+    return {settings.epoch, settings.spacecraft, settings.inertial_frame};
   }
   if (options.epoch.empty()) {
     return {};
@@ -71,53 +80,150 @@ void show_interchange(const Common& common, const InterchangeSummary& summary) {
   });
 }
 
-void add_import(CLI::App& program, const Common& common, int& exit_status) {
-  struct Arguments {
-    std::string file;
-    std::string output;
-    EpochOptions epoch;
+namespace {
+
+struct ImportArguments {
+  std::string file;
+  std::string output;
+  EpochOptions epoch;
+  std::string time_system;
+  std::string from;
+  std::string to;
+  std::vector<std::string> exclude;
+};
+
+/// Whether a pass is to be written: from a telemetry.toml, or another pass.
+bool is_pass(const std::filesystem::path& file) {
+  std::error_code ignored;
+  return std::filesystem::is_directory(file, ignored) || file.extension() == ".toml" || file.extension() == ".nc";
+}
+
+io::Selection selection_of(const ImportArguments& arguments) {
+  const std::optional<io::TimeScale> scale = io::time_scale_named(arguments.time_system);
+  if (!scale) {
+    throw io::UsageError(
+        fmt::format("--time-system {}: give one of {}", arguments.time_system, fmt::join(io::kTimeScales, ", ")));
+  }
+  const auto instant = [&](const char* option, const std::string& given) -> std::optional<Time> {
+    if (given.empty()) {
+      return std::nullopt;
+    }
+    io::TimeText::Fault fault;
+    const std::optional<Time> t = io::TimeText(*scale).parse(given, fault);
+    if (!t) {
+      throw io::UsageError(fmt::format("{}: {}; {}", option, fault.reason, fault.cure));
+    }
+    return t;
   };
-  auto arguments = std::make_shared<Arguments>();
-  CLI::App* command = program.add_subcommand("import", "Read another software's attitude: CCSDS AEM");
-  command->add_option("FILE", arguments->file, "Message, as text or XML; - for standard input")->required();
-  command->add_option("-o,--output", arguments->output, "Attitude file to write (CSV); - for standard output")
+  io::Selection selection{instant("--from", arguments.from), instant("--to", arguments.to), {}};
+  for (const std::string& file : arguments.exclude) {
+    const std::vector<io::LeftOut> intervals = io::read_intervals(source(file), *scale);
+    selection.exclude.insert(selection.exclude.end(), intervals.begin(), intervals.end());
+  }
+  return selection;
+}
+
+void import_pass(const ImportArguments& arguments, const Common& common) {
+  if (!arguments.epoch.pass.empty() || !arguments.epoch.epoch.empty()) {
+    throw io::UsageError("--pass and --epoch are for an attitude; the epoch of a pass is in its own files");
+  }
+  const io::LoadedPass loaded = io::read_pass(arguments.file, selection_of(arguments));
+  log_pass(common.log, arguments.file, loaded);
+  std::vector<std::filesystem::path> inputs = {arguments.file};
+  inputs.insert(inputs.end(), arguments.exclude.begin(), arguments.exclude.end());
+  inputs.insert(inputs.end(), loaded.sources.begin(), loaded.sources.end());
+  std::vector<std::filesystem::path> outputs =
+      io::files_of_pass(arguments.output, 1 + loaded.pass.further_star_trackers.size());
+  outputs.emplace_back(arguments.output);
+  io::expect_apart(inputs, outputs);
+  io::write_pass(arguments.output, loaded.pass, nullptr);
+  show(
+      common,
+      [&] {
+        nlohmann::ordered_json json = pass_json(loaded);
+        json["written"] = arguments.output;
+        return json;
+      },
+      [&] { return fmt::format("{}Written     {}\n", pass_text(loaded), printable(arguments.output)); });
+}
+
+void import_attitude(const ImportArguments& arguments, const Common& common) {
+  if (!arguments.from.empty() || !arguments.to.empty() || !arguments.exclude.empty()) {
+    throw io::UsageError("--from, --to and --exclude are for a pass, and this is taken for an attitude");
+  }
+  const std::filesystem::path written = arguments.output;
+  const bool to_stdout = arguments.output == kStandardStream;
+  if (!to_stdout) {
+    const std::vector<std::filesystem::path> inputs = {arguments.file, arguments.epoch.pass};
+    io::expect_apart(inputs, {&written, 1});
+  }
+  const std::optional<Time> told = epoch_of(arguments.epoch).epoch;
+  const io::AttitudeMessage message = io::read_attitude_message(source(arguments.file));
+  const Time epoch = told.value_or(message.epoch.value_or(message.attitude.t.front()));
+  const std::string text = io::format_attitude(epoch, message.attitude, io::AttitudeDigits::kAll, message.rate_rad_s);
+  if (to_stdout) {
+    print_data(stdout, text);
+  } else {
+    io::write_file(written, text);
+  }
+  show_interchange(beside(arguments.output, common), {arguments.file,
+                                                      message.format,
+                                                      {arguments.output},
+                                                      "attitude file",
+                                                      message.attitude.size(),
+                                                      message.segments,
+                                                      message.left_out,
+                                                      epoch,
+                                                      message.time_system,
+                                                      message.inertial_frame,
+                                                      message.body_frame,
+                                                      message.object_name,
+                                                      message.object_id});
+}
+
+}  // namespace
+
+void add_import(CLI::App& program, const Common& common, int& exit_status) {
+  auto arguments = std::make_shared<ImportArguments>();
+  arguments->time_system = "TAI";
+  CLI::App* command = program.add_subcommand(
+      "import", "Read others' telemetry by a telemetry.toml, or another software's attitude: CCSDS AEM");
+  command
+      ->add_option("FILE", arguments->file, "telemetry.toml or pass; or message, as text or XML, - for standard input")
+      ->required();
+  command
+      ->add_option(
+          "-o,--output", arguments->output,
+          "Pass to write: a directory, or a NetCDF file by a name in .nc; of a message the attitude file (CSV), "
+          "- for standard output")
       ->required()
+      ->type_name("OUTPUT");
+  command->add_option("--from", arguments->from, "Leave out what is earlier: 2009-05-20T00:00:00")->type_name("TIME");
+  command->add_option("--to", arguments->to, "Leave out what is later")->type_name("TIME");
+  command
+      ->add_option("--exclude", arguments->exclude,
+                   "Leave out the intervals of this CSV file, columns begin and end; may be given several times")
       ->type_name("FILE");
+  command->add_option("--time-system", arguments->time_system, "Of --from, --to and --exclude: TAI, UTC, GPS, TT, TDB")
+      ->capture_default_str()
+      ->type_name("NAME");
   add_epoch_options(*command, arguments->epoch,
                     "that t_s is to count from (default: the one that export noted, else the first in the file)");
   command->footer(
+      "# Columns of others' CSV or NetCDF files, by a map of them: docs/telemetry.md\n"
+      "trihedron import examples/telemetry/telemetry.toml -o pass.nc\n"
+      "# A part of it, without manoeuvres\n"
+      "trihedron import telemetry.toml -o pass.nc --from 2009-05-20T00:10:00 --exclude slews.csv\n"
       "trihedron import attitude.aem -o attitude.csv --pass pass.nc\n"
-      "# Other commands read the message itself\n"
+      "# Other commands read telemetry.toml and messages themselves\n"
+      "trihedron inspect telemetry.toml\n"
       "trihedron evaluate pass.nc --attitude attitude.aem");
   command->callback([&common, &exit_status, arguments] {
-    const std::filesystem::path written = arguments->output;
-    const bool to_stdout = arguments->output == kStandardStream;
-    if (!to_stdout) {
-      const std::vector<std::filesystem::path> inputs = {arguments->file, arguments->epoch.pass};
-      io::expect_apart(inputs, {&written, 1});
-    }
-    const std::optional<Time> told = epoch_of(arguments->epoch).epoch;
-    const io::AttitudeMessage message = io::read_attitude_message(source(arguments->file));
-    const Time epoch = told.value_or(message.epoch.value_or(message.attitude.t.front()));
-    const std::string text = io::format_attitude(epoch, message.attitude, io::AttitudeDigits::kAll, message.rate_rad_s);
-    if (to_stdout) {
-      print_data(stdout, text);
+    if (is_pass(arguments->file)) {
+      import_pass(*arguments, common);
     } else {
-      io::write_file(written, text);
+      import_attitude(*arguments, common);
     }
-    show_interchange(beside(arguments->output, common), {arguments->file,
-                                                         message.format,
-                                                         {arguments->output},
-                                                         "attitude file",
-                                                         message.attitude.size(),
-                                                         message.segments,
-                                                         message.left_out,
-                                                         epoch,
-                                                         message.time_system,
-                                                         message.inertial_frame,
-                                                         message.body_frame,
-                                                         message.object_name,
-                                                         message.object_id});
     exit_status = kTrustworthy;
   });
 }

@@ -22,7 +22,8 @@ void add_epoch_options(CLI::App& command, EpochOptions& options, const std::stri
 /// What a pass or an option says.
 struct EpochSource {
   std::optional<Time> epoch;
-  std::string spacecraft;  ///< of the pass; empty without one
+  std::string spacecraft;        ///< of the pass; empty without one
+  std::string inertial_frame{};  ///< same
 };
 
 /// Throws UsageError where both say it, or the option is no time.

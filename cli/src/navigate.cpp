@@ -37,7 +37,8 @@ ExitStatus navigate_pass(const std::filesystem::path& pass, const NavigationFile
   }
   const bool to_stdout = files.attitude == kStandardStream;
   if (!to_stdout) {
-    const std::vector<std::filesystem::path> inputs = {pass, loaded.prior_file, files.calibration, files.config};
+    std::vector<std::filesystem::path> inputs = {pass, loaded.prior_file, files.calibration, files.config};
+    inputs.insert(inputs.end(), loaded.sources.begin(), loaded.sources.end());
     io::expect_apart(inputs, {&files.attitude, 1});
     io::expect_writable(files.attitude);
   }
@@ -49,11 +50,12 @@ ExitStatus navigate_pass(const std::filesystem::path& pass, const NavigationFile
     throw io::InputRefused(pass, {}, error.what(), error.cure());
   }
   const Time epoch = loaded.pass.settings.epoch;
+  const io::Mounting& mounting = loaded.pass.settings.star_tracker_mounting_rotation_vector_rad;
   const ground::AttitudeEvaluation evaluation = ground::evaluate_navigation(loaded.pass, result, named.truth_or_null());
   if (to_stdout) {
-    print_data(stdout, io::format_attitude(epoch, result.attitude));
+    print_data(stdout, io::format_attitude(epoch, result.attitude, io::AttitudeDigits::kTwelveDecimals, {}, mounting));
   } else {
-    io::write_attitude(files.attitude, epoch, result.attitude);
+    io::write_attitude(files.attitude, epoch, result.attitude, mounting);
   }
   log_verdict(common.log, result.verdict);
   common.log.say(fmt::format("written {}: {} epochs", files.attitude.string(), result.attitude.size()));

@@ -125,7 +125,9 @@ nlohmann::ordered_json observability_json(const Observability& observability, Ti
   return json;
 }
 
-bool is_scenario(const std::filesystem::path& path) { return path.extension() == ".toml" || path == kStandardStream; }
+bool is_scenario(const std::filesystem::path& path) {
+  return (path.extension() == ".toml" && !io::is_telemetry_toml(path)) || path == kStandardStream;
+}
 
 /// Calls `work` and reports its errors as errors of this input file.
 template <class Work>

@@ -86,7 +86,10 @@ class Keeper {
  public:
   Keeper(const ReplayRequest& request, const io::LoadedPass& loaded, const Parameters& parameters,
          ground::ApplicationReplay& replay, const Common& common)
-      : request_(request), replay_(replay), epoch_(loaded.pass.settings.epoch) {
+      : request_(request),
+        replay_(replay),
+        epoch_(loaded.pass.settings.epoch),
+        mounting_(loaded.pass.settings.star_tracker_mounting_rotation_vector_rad) {
     const fs::path& state = request.files.state;
     std::error_code ignored;
     const bool is_there = !state.empty() && fs::exists(state, ignored);
@@ -104,7 +107,7 @@ class Keeper {
     if (!request.files.attitude.empty() && !to_stdout()) {
       attitude_.emplace(io::GrowingFile::begin(request.files.attitude));
     }
-    put(io::kAttitudeColumns);
+    put(io::attitude_header(mounting_));
     if (!state.empty()) {
       memory_.resize(replay_.snapshots_size());
       save();
@@ -132,7 +135,7 @@ class Keeper {
   /// Brings all that came out to where it is kept; whether that is confirmed.
   bool confirm() {
     const StopScope nothing_stops(nullptr);  // rows that have been taken must arrive
-    put(io::format_attitude_rows(epoch_, std::exchange(rows_, {})));
+    put(io::format_attitude_rows(epoch_, std::exchange(rows_, {}), io::AttitudeDigits::kTwelveDecimals, {}, mounting_));
     if (!state_) {
       return false;
     }
@@ -218,6 +221,7 @@ class Keeper {
   const ReplayRequest& request_;
   ground::ApplicationReplay& replay_;
   Time epoch_;
+  io::Mounting mounting_;
   AttitudeHistory rows_;  ///< not yet put anywhere
   std::optional<io::GrowingFile> attitude_;
   std::optional<io::SlotFile> state_;

@@ -70,6 +70,18 @@ Json clocks() {
   return schema;
 }
 
+/// Of inspect; null where there is too little telemetry for it.
+Json consistency() {
+  const Json mistake = object({{"kind", text()}, {"text", text()}, {"motion_rad", number()}});
+  Json schema = object({{"consistent", flag()},
+                        {"motion_rad", array(number())},
+                        {"allowed_rad", array(number())},
+                        {"mistakes", array(mistake)},
+                        {"proposal", array(text())}});
+  schema["type"] = Json::array({"object", "null"});
+  return schema;
+}
+
 Json pass() {
   const Json defect = object({{"kind", text()}, {"where", text()}, {"count", count()}, {"text", text()}});
   return object({{"spacecraft", text()},
@@ -80,7 +92,12 @@ Json pass() {
                  {"fixes", count()},
                  {"defects", array(defect)},
                  {"fixes_of_further_star_trackers?", array(count())},
-                 {"clocks?", clocks()}});
+                 {"periods?", object({{"gyro_s", number()},
+                                      {"gyro_told_s", number()},
+                                      {"star_tracker_s", number()},
+                                      {"star_tracker_told_s", number()}})},
+                 {"clocks?", clocks()},
+                 {"consistency?", consistency()}});
 }
 
 Json interval() {
@@ -329,7 +346,9 @@ std::vector<io::Schema> all_schemas() {
   schemas.push_back(output("observe", "What observe prints with --json.", observe_output()));
   schemas.push_back(output("history", "What history prints with --json.", history_output(calibration)));
   schemas.push_back(output("export", "What export prints with --json.", interchange_output()));
-  schemas.push_back(output("import", "What import prints with --json.", interchange_output()));
+  schemas.push_back(
+      output("import", "What import prints with --json: of an attitude, or of a pass.",
+             {{"anyOf", Json::array({interchange_output(), with(pass(), object({{"written", text()}}))})}}));
   schemas.push_back(output("campaign", "What campaign prints with --json.", campaign_output()));
   schemas.push_back(output("campaign-run", "What campaign --only prints with --json, and run.json.", run_output()));
   return schemas;

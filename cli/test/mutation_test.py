@@ -67,6 +67,7 @@ class Originals:
         for form in ("aem", "aem-xml"):
             self.run("export", "attitude.csv", "--format", form, "-o", f"attitude.{form}", "--pass", "pass", "--time-system", "UTC")
         self.run("replay", "pass", "--speed", "max", "--state", "replay.state")
+        shutil.copytree(examples / "telemetry", directory / "telemetry")
         shutil.copy(directory / "out/calibration.json", directory)
         shutil.copy(directory / "out/effective-config.toml", directory / "config.toml")
         shutil.copytree(directory / "pass", directory / "known")
@@ -179,6 +180,10 @@ TARGETS = [
     of_pass("four", "four/pass.toml", spoil_text),
     of_pass("known", "known/prior.json", spoil_text),
     of_pass("known", "known/pass.toml", spoil_text),
+    *[Target(f"telemetry/{file}", spoil, ["telemetry"], [
+        ("import", "{in}/telemetry/telemetry.toml", "-o", "{out}/pass"), ("import", "{in}/telemetry/telemetry.toml", "-o", "{out}/pass.nc"),
+        ("inspect", "{in}/telemetry/telemetry.toml"), ("--json", "inspect", "{in}/telemetry/telemetry.toml")])
+      for file, spoil in (("telemetry.toml", spoil_text), ("gyros.csv", spoil_table), ("star_tracker.csv", spoil_table), ("slews.csv", spoil_table))],
     of_pass("pass.nc", "pass.nc", spoil_netcdf),
     of_pass("four.nc", "four.nc", spoil_netcdf),
     *[Target(f"pass/{truth}", spoil, ["pass", "attitude.csv", "calibration.json", "told.toml"], [

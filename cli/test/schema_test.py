@@ -100,7 +100,7 @@ def test_schemas_are_schemas(name):
 
 
 def test_every_file_and_output_has_one():
-    assert NAMES == ["pass", "config", "scenario", "campaign", "calibration", "truth", "inspect-output", "calibrate-output", "navigate-output",
+    assert NAMES == ["pass", "telemetry", "config", "scenario", "campaign", "calibration", "truth", "inspect-output", "calibrate-output", "navigate-output",
                      "replay-output", "evaluate-output", "observe-output", "history-output", "export-output", "import-output",
                      "campaign-output", "campaign-run-output"]
     result = run("schema", "scenari")

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 #include <stdexcept>
@@ -19,6 +20,14 @@ namespace {
 
 [[noreturn]] void refuse(const Series& series, std::size_t row, std::string reason) {
   throw InputRefused(series.file, series.position(row), std::move(reason), "repair or remove the line");
+}
+
+constexpr std::string_view kBodyColumns = ",q_body_x,q_body_y,q_body_z,q_body_w";
+
+Eigen::Quaterniond q_c_body_of(const Mounting& mounting) {
+  const Eigen::Vector3d turn = mounting.value_or(Eigen::Vector3d::Zero());
+  const double angle = turn.norm();
+  return angle > 0 ? Eigen::Quaterniond(Eigen::AngleAxisd(-angle, turn / angle)) : Eigen::Quaterniond::Identity();
 }
 
 }  // namespace
@@ -96,7 +105,8 @@ AttitudeMessage read_attitude_of_any_format(const std::filesystem::path& path, s
 }
 
 std::string format_attitude_rows(Time epoch, const AttitudeHistory& attitude, AttitudeDigits digits,
-                                 std::span<const Eigen::Vector3d> rate_rad_s) {
+                                 std::span<const Eigen::Vector3d> rate_rad_s, const Mounting& mounting) {
+  const Eigen::Quaterniond q_c_body = q_c_body_of(mounting);
   const bool has_sigma = !attitude.sigma_rad.empty();
   const bool has_rate = !rate_rad_s.empty();
   const bool has_age = !attitude.age_s.empty();
@@ -127,25 +137,34 @@ std::string format_attitude_rows(Time epoch, const AttitudeHistory& attitude, At
       const Eigen::Vector3d& rate = rate_rad_s[i];
       fmt::format_to(fmt::appender(out), ",{},{},{}", rate.x(), rate.y(), rate.z());
     }
+    if (mounting) {
+      const Eigen::Quaterniond body = q * q_c_body;
+      fmt::format_to(fmt::appender(out), ",{:.12f},{:.12f},{:.12f},{:.12f}", body.x(), body.y(), body.z(), body.w());
+    }
     out.push_back('\n');
   }
   return fmt::to_string(out);
 }
 
 std::string format_attitude(Time epoch, const AttitudeHistory& attitude, AttitudeDigits digits,
-                            std::span<const Eigen::Vector3d> rate_rad_s) {
+                            std::span<const Eigen::Vector3d> rate_rad_s, const Mounting& mounting) {
   const std::string_view names = kAttitudeColumns.substr(0, kAttitudeColumns.size() - 1);
   const std::size_t sigmas = names.find(",sigma_x_rad");
   const std::size_t age = names.find(",age_s");
-  return fmt::format("{}{}{}{}\n{}", names.substr(0, sigmas),
+  return fmt::format("{}{}{}{}{}\n{}", names.substr(0, sigmas),
                      attitude.sigma_rad.empty() ? "" : names.substr(sigmas, age - sigmas),
                      attitude.age_s.empty() ? "" : names.substr(age),
-                     rate_rad_s.empty() ? "" : ",rate_x_rad_s,rate_y_rad_s,rate_z_rad_s",
-                     format_attitude_rows(epoch, attitude, digits, rate_rad_s));
+                     rate_rad_s.empty() ? "" : ",rate_x_rad_s,rate_y_rad_s,rate_z_rad_s", mounting ? kBodyColumns : "",
+                     format_attitude_rows(epoch, attitude, digits, rate_rad_s, mounting));
 }
 
-void write_attitude(const std::filesystem::path& path, Time epoch, const AttitudeHistory& attitude) {
-  write_file(path, format_attitude(epoch, attitude));
+std::string attitude_header(const Mounting& mounting) {
+  return fmt::format("{}{}\n", kAttitudeColumns.substr(0, kAttitudeColumns.size() - 1), mounting ? kBodyColumns : "");
+}
+
+void write_attitude(const std::filesystem::path& path, Time epoch, const AttitudeHistory& attitude,
+                    const Mounting& mounting) {
+  write_file(path, format_attitude(epoch, attitude, AttitudeDigits::kTwelveDecimals, {}, mounting));
 }
 
 }  // namespace trihedron::io

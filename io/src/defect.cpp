@@ -41,6 +41,15 @@ Words words(Defect::Kind kind) {
       return {"stuck-samples", "stuck sample", "stuck samples", "kept for the estimator to judge"};
     case kSilentGyro:
       return {"silent-gyro", "stretch of silence", "stretches of silence", "kept for the estimator to reject"};
+    case kOutsideRange:
+      return {"outside-range", "row outside the time range", "rows outside the time range", "left out"};
+    case kExcluded:
+      return {"excluded", "row in an excluded interval", "rows in excluded intervals", "left out"};
+    case kFlagged:
+      return {"flagged", "row with a flag that is not good", "rows with a flag that is not good", "not used"};
+    case kLargeSigma:
+      return {"large-sigma", "fix whose sigma is too large or missing", "fixes whose sigma is too large or missing",
+              "left out"};
     case kGap:
       return {"gap", "gap", "gaps", "not filled"};
   }

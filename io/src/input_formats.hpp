@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "series.hpp"
+#include "trihedron/io/pass.hpp"
 #include "trihedron/records/pass.hpp"
 
 namespace trihedron::io {
@@ -17,12 +18,20 @@ struct UnscreenedPass {
   Series gyro;                        ///< columns h1_x, h1_y, h1_z, h2_x …
   std::vector<Series> star_trackers;  ///< columns q_x, q_y, q_z, q_w; the first head, then the further ones
   std::filesystem::path prior_file;   ///< that the settings name; empty where they name none
+  // Of telemetry.toml alone.
+  std::vector<Defect> left_out{};                ///< rows that its flags and sigmas have taken out
+  Selection selection{};                         ///< that it asks for
+  ColumnsRead columns{};                         ///< in other formats they have the names of the components
+  std::vector<std::filesystem::path> sources{};  ///< files that it names
 };
 
 /// A directory with pass.toml, gyro.csv and star_tracker.csv.
 [[nodiscard]] UnscreenedPass read_raw_directory(const std::filesystem::path& directory);
 /// A NetCDF-4 file with the same variables.
 [[nodiscard]] UnscreenedPass read_raw_netcdf(const std::filesystem::path& file);
+/// A telemetry.toml, which says where others' files have the columns.
+[[nodiscard]] UnscreenedPass read_raw_telemetry(const std::filesystem::path& file);
+[[nodiscard]] bool is_telemetry_map(const std::filesystem::path& path);
 
 struct InputFormat {
   bool (*recognises)(const std::filesystem::path& path);  ///< whether a path that exists is to be read by this format
@@ -33,6 +42,7 @@ struct InputFormat {
 inline constexpr std::array kInputFormats = {
     InputFormat{[](const std::filesystem::path& path) { return std::filesystem::is_directory(path); },
                 read_raw_directory},
+    InputFormat{is_telemetry_map, read_raw_telemetry},
     InputFormat{[](const std::filesystem::path&) { return true; }, read_raw_netcdf},
 };
 

@@ -7,6 +7,7 @@
 
 #include <algorithm>
 #include <array>
+#include <charconv>
 #include <cmath>
 #include <cstdint>
 #include <limits>
@@ -161,6 +162,10 @@ void NetcdfReader::check_no_units(const std::string& group, int id, int variable
 
 void NetcdfReader::read_column(int id, int variable, std::vector<double>& values) const {
   check(nc_get_var_double(id, variable, values.data()), "reading a variable");
+  unpack(id, variable, values);
+}
+
+void NetcdfReader::unpack(int id, int variable, std::vector<double>& values) const {
   const double scale = number_attribute(id, variable, "scale_factor").value_or(1);
   const double offset = number_attribute(id, variable, "add_offset").value_or(0);
   const std::optional<double> fill = number_attribute(id, variable, "_FillValue");
@@ -252,6 +257,64 @@ Series NetcdfReader::read_group(const std::string& group, Time epoch, ChooseRule
     }
   }
   return series;
+}
+
+std::vector<std::vector<double>> NetcdfReader::read_variables(std::span<const std::string> paths) const {
+  std::vector<std::vector<double>> columns;
+  for (const std::string& path : paths) {
+    check_stop();
+    const std::size_t bracket = path.ends_with(']') ? path.rfind('[') : std::string::npos;
+    const std::size_t slash = path.rfind('/', bracket);
+    const std::string group = slash == std::string::npos ? "" : path.substr(0, slash);
+    const std::size_t begin = slash == std::string::npos ? 0 : slash + 1;
+    const std::string name = path.substr(begin, bracket == std::string::npos ? bracket : bracket - begin);
+    const int id = group_id(group);
+    int variable = 0;
+    if (nc_inq_varid(id, name.c_str(), &variable) != NC_NOERR) {
+      refuse(fmt::format("lacks variable {}", in_quotes(path)), "name one that ncdump -h shows, as GROUP/NAME");
+    }
+    std::array<int, 2> dimensions{};
+    std::array<std::size_t, 2> length{0, 1};
+    int count = 0;
+    nc_type type = NC_NAT;
+    check(nc_inq_varndims(id, variable, &count), "reading the dimensions");
+    check(nc_inq_vartype(id, variable, &type), "reading a type");
+    const int expected = bracket == std::string::npos ? 1 : 2;
+    if (count != expected) {
+      refuse(fmt::format("variable {} has {} dimension{}, not {}", in_quotes(path), count, count == 1 ? "" : "s",
+                         expected),
+             "a column has one; name column 0 of a variable with two as NAME[0]");
+    }
+    if (type == NC_CHAR || type >= NC_STRING) {
+      refuse(fmt::format("variable {} does not hold numbers", in_quotes(path)), "name one of numbers");
+    }
+    check(nc_inq_vardimid(id, variable, dimensions.data()), "reading the dimensions");
+    for (std::size_t i = 0; i < static_cast<std::size_t>(count); ++i) {
+      check(nc_inq_dimlen(id, dimensions[i], &length[i]), "reading the dimensions");
+    }
+    std::array<std::size_t, 2> start{0, 0};
+    if (count == 2) {
+      const char* const first = path.data() + bracket + 1;
+      const char* const last = path.data() + path.size() - 1;
+      const auto [end, fault] = std::from_chars(first, last, start[1]);
+      if (fault != std::errc() || end != last || start[1] >= length[1]) {
+        refuse(fmt::format("variable {} has no such column", in_quotes(path)),
+               fmt::format("it has {} of them, counted from 0", length[1]));
+      }
+    }
+    const int checked = variable;
+    check_rows(group, id, {&checked, 1}, length[0]);
+    if (!columns.empty() && columns.front().size() != length[0]) {
+      refuse(fmt::format("variable {} has {} rows, {} has {}", in_quotes(path), length[0], in_quotes(paths.front()),
+                         columns.front().size()),
+             "the columns of a table must have the same length");
+    }
+    std::vector<double>& column = columns.emplace_back(length[0]);
+    const std::array<std::size_t, 2> rows{length[0], 1};
+    check(nc_get_vara_double(id, variable, start.data(), rows.data(), column.data()), "reading a variable");
+    unpack(id, variable, column);
+  }
+  return columns;
 }
 
 NetcdfWriter::NetcdfWriter(const fs::path& path) : path_(path), file_(path) {

@@ -37,6 +37,9 @@ class NetcdfReader {
   /// The columns of a group, CF-packed or not, pure numbers but for t_s. `epoch` must be the one in the units of t_s
   /// where those name one.
   [[nodiscard]] Series read_group(const std::string& group, Time epoch, ChooseRules choose) const;
+  /// Variables by their paths ("group/name"), of one row each along a dimension that all have in common or that has the
+  /// same length; "name[i]" is column i of one with two dimensions. CF-packed or not, whatever their units are.
+  [[nodiscard]] std::vector<std::vector<double>> read_variables(std::span<const std::string> paths) const;
 
  private:
   [[noreturn]] void refuse(std::string reason, std::string cure) const;
@@ -50,6 +53,7 @@ class NetcdfReader {
   /// Throws InputRefused where a column that is a pure number claims a unit, such as degrees.
   void check_no_units(const std::string& group, int id, int variable, const std::string& name) const;
   void read_column(int id, int variable, std::vector<double>& values) const;
+  void unpack(int id, int variable, std::vector<double>& values) const;
 
   std::filesystem::path file_;
   int id_ = -1;

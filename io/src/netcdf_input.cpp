@@ -72,6 +72,26 @@ std::vector<std::optional<std::string>> NetcdfInput::text_attributes(const std::
   return texts;
 }
 
+std::vector<std::vector<double>> NetcdfInput::read_variables(const std::vector<std::string>& paths) const {
+  std::vector<std::vector<double>> columns;
+  in_own_process(
+      file_,
+      [&](Sink& sink) {
+        for (const std::vector<double>& column : NetcdfReader(file_).read_variables(paths)) {
+          sink.put(column);
+        }
+      },
+      [&](Source& source) {
+        for (std::size_t i = 0; i < paths.size(); ++i) {
+          columns.push_back(source.numbers());
+          if (columns.back().size() != columns.front().size()) {
+            throw PipeEnded();
+          }
+        }
+      });
+  return columns;
+}
+
 Series NetcdfInput::read_group(const std::string& group, Time epoch, ChooseRules choose) const {
   Series series;
   in_own_process(

@@ -22,6 +22,7 @@ class NetcdfInput {
   /// Of each name; nullopt where there is none.
   [[nodiscard]] std::vector<std::optional<std::string>> text_attributes(const std::string& group,
                                                                         const std::vector<std::string>& names) const;
+  [[nodiscard]] std::vector<std::vector<double>> read_variables(const std::vector<std::string>& paths) const;
   [[nodiscard]] Series read_group(const std::string& group, Time epoch, ChooseRules choose) const;
 
  private:

@@ -12,6 +12,7 @@
 #include "netcdf_input.hpp"
 #include "pass_toml.hpp"
 #include "screening.hpp"
+#include "selection.hpp"
 #include "text_file.hpp"
 #include "trihedron/io/atomic_file.hpp"
 #include "trihedron/io/calibration.hpp"
@@ -57,7 +58,8 @@ void check_there(const fs::path& path) {
   std::error_code ignored;
   if (!fs::exists(path, ignored)) {
     throw InputRefused(path, {}, "there is no such file or directory",
-                       "give a pass: a directory with pass.toml, gyro.csv and star_tracker.csv, or a NetCDF-4 file");
+                       "give a pass: a directory with pass.toml, gyro.csv and star_tracker.csv, a NetCDF-4 file, or a "
+                       "telemetry.toml");
   }
 }
 
@@ -264,7 +266,7 @@ UnscreenedPass read_raw_netcdf(const fs::path& file) {
   return raw;
 }
 
-LoadedPass read_pass(const fs::path& path) {
+LoadedPass read_pass(const fs::path& path, const Selection& selection) {
   check_there(path);
   const auto format = std::ranges::find_if(kInputFormats, [&](const InputFormat& f) { return f.recognises(path); });
   UnscreenedPass raw = format->read(path);
@@ -273,6 +275,11 @@ LoadedPass read_pass(const fs::path& path) {
     std::ranges::transform(fixes.t_s, fixes.t_s.begin(), [&](double t_s) { return clocks.true_s(t_s); });
   }
   LoadedPass loaded;
+  loaded.defects = std::move(raw.left_out);
+  raw.selection.from = selection.from ? selection.from : raw.selection.from;
+  raw.selection.to = selection.to ? selection.to : raw.selection.to;
+  raw.selection.exclude.insert(raw.selection.exclude.end(), selection.exclude.begin(), selection.exclude.end());
+  select(raw, path, loaded.defects);
   loaded.pass.gyro = screen_gyro(std::move(raw.gyro), raw.settings, loaded.defects);
   for (std::size_t head = 0; head < raw.star_trackers.size(); ++head) {
     StarTrackerTelemetry& fixes =
@@ -286,11 +293,23 @@ LoadedPass read_pass(const fs::path& path) {
   }
   correct(loaded.pass, gyros);
   loaded.prior_file = std::move(raw.prior_file);
+  loaded.sources = std::move(raw.sources);
+  loaded.columns = std::move(raw.columns);
+  if (loaded.columns.quaternion.empty()) {
+    loaded.columns.quaternion = kQuaternionNames;
+    const std::vector<std::string> names = direction_names(loaded.pass.gyro.gyros);
+    for (auto name = names.begin(); name != names.end(); name += 3) {
+      loaded.columns.directions.emplace_back(name, name + 3);
+    }
+  }
   return loaded;
 }
 
 std::optional<Truth> read_truth(const fs::path& path) {
   check_there(path);
+  if (is_telemetry_map(path) && !fs::is_directory(path)) {
+    return std::nullopt;
+  }
   return fs::is_directory(path) ? read_truth_directory(path) : read_truth_netcdf(path);
 }
 

@@ -2,15 +2,19 @@
 
 #include <fmt/format.h>
 
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <sstream>
+#include <utility>
 
+#include "ccsds_frames.hpp"
 #include "schemas.hpp"
 #include "screening.hpp"
 #include "toml_fields.hpp"
 #include "trihedron/core/drift.hpp"
 #include "trihedron/io/calibration.hpp"
 #include "trihedron/io/time_text.hpp"
+#include "wording.hpp"
 
 namespace trihedron::io {
 namespace {
@@ -19,6 +23,7 @@ namespace fs = std::filesystem;
 
 constexpr std::string_view kHeadNoise = "noise_rad";
 constexpr std::string_view kMounting = "mounting_rotation_vector_rad";
+constexpr std::string_view kInertialFrame = "inertial_frame";
 constexpr std::string_view kClockOffset = "clock_offset_s";
 constexpr std::string_view kClockRate = "clock_rate_s_s";
 constexpr std::string_view kLatency = "latency_s";
@@ -91,7 +96,9 @@ Fields unit_fields(GyroPrior& prior, const fs::path& file) {
                         "alignment known before the pass"),
           alignment_sigma(prior),
           one_number(kLatency, prior.latency_s, limits::kLatency_s,
-                     "by which its readings are stamped late; they are interpolated when the pass is read")};
+                     "by which its readings are stamped late; they are interpolated when the pass is read"),
+          three_numbers(kMounting, prior.mounting_rotation_vector_rad, limits::kRotation_rad,
+                        "of its case in the body, as designed: v_body = exp([m×]) v_case; instead of the alignment")};
 }
 
 /// What [[gyro.unit]] says of each gyro, over what is known of all.
@@ -111,12 +118,26 @@ Field units(std::vector<GyroPrior>& gyros, const fs::path& file) {
         }
         for (std::size_t i = 0; i < gyros.size(); ++i) {
           read_fields(*tables[i], file, fmt::format("[[gyro.unit]] {}", i + 1), unit_fields(gyros[i], file));
+          if (gyros[i].mounting_rotation_vector_rad && tables[i]->contains(kAlignment)) {
+            table.refuse(
+                *tables[i]->get(kAlignment),
+                fmt::format("\"{}\" and \"{}\" are both there, and each gives the alignment", kAlignment, kMounting),
+                "keep one of them");
+          }
         }
       }};
 }
 
+/// Whether what the telemetry shows may be left out.
+enum class Told { kAll, kOrMeasured };
+
+Field told_or_measured(Field field, Told told) {
+  field.is_required = told == Told::kAll;
+  return field;
+}
+
 /// `common`: of all gyros. What [[gyro.unit]] says of each is read after it.
-Fields gyro_fields(PassSettings& settings, GyroPrior& common, const fs::path& file) {
+Fields gyro_fields(PassSettings& settings, GyroPrior& common, const fs::path& file, Told told) {
   Field sigma = drift_sigma(common);
   sigma.read = [&common](const TomlTable& table, const toml::node& node) {
     if (node.is_table()) {
@@ -127,7 +148,8 @@ Fields gyro_fields(PassSettings& settings, GyroPrior& common, const fs::path& fi
   };
   Field unit = units(settings.gyros, file);
   unit.read = [](const TomlTable&, const toml::node&) {};
-  return {required(number_of_seconds("period_s", settings.gyro_period, limits::kGyroPeriod_s, "of the samples")),
+  return {told_or_measured(number_of_seconds("period_s", settings.gyro_period, limits::kGyroPeriod_s, "of the samples"),
+                           told),
           text(kStartUp, settings.start_up, "of the rotors, where it is known"),
           required(readout_noise(common)),
           required(std::move(sigma)),
@@ -135,15 +157,15 @@ Fields gyro_fields(PassSettings& settings, GyroPrior& common, const fs::path& fi
           std::move(unit)};
 }
 
-Field gyros(PassSettings& settings, const fs::path& file) {
-  const auto schema = [&settings, &file] {
+Field gyros(PassSettings& settings, const fs::path& file, Told told) {
+  const auto schema = [&settings, &file, told] {
     GyroPrior common;
-    return schema_of(gyro_fields(settings, common, file));
+    return schema_of(gyro_fields(settings, common, file, told));
   };
-  return {"gyro", "of all gyros", schema, [&settings, &file](const TomlTable& root, const toml::node& node) {
+  return {"gyro", "of all gyros", schema, [&settings, &file, told](const TomlTable& root, const toml::node& node) {
             const toml::table& table = root.as_table(node, "gyro");
             GyroPrior common;
-            read_fields(table, file, "[gyro]", gyro_fields(settings, common, file));
+            read_fields(table, file, "[gyro]", gyro_fields(settings, common, file, told));
             std::ranges::fill(settings.gyros, common);
             if (const toml::node* unit = table.get("unit")) {
               units(settings.gyros, file).read(TomlTable(table, file, "[gyro]"), *unit);
@@ -176,11 +198,15 @@ Field further_heads(PassSettings& settings, const fs::path& file) {
       }};
 }
 
-Fields star_tracker_fields(PassSettings& settings, const fs::path& file) {
-  return {required(number_of_seconds("period_s", settings.star_tracker_period, limits::kStarTrackerPeriod_s,
-                                     "of the fixes")),
-          required(three_numbers(kHeadNoise, settings.star_tracker_noise_rad, limits::kStarTrackerNoise_rad,
-                                 "1-sigma about c x, y, z")),
+Fields star_tracker_fields(PassSettings& settings, const fs::path& file, Told told) {
+  return {told_or_measured(
+              number_of_seconds("period_s", settings.star_tracker_period, limits::kStarTrackerPeriod_s, "of the fixes"),
+              told),
+          told_or_measured(three_numbers(kHeadNoise, settings.star_tracker_noise_rad, limits::kStarTrackerNoise_rad,
+                                         "1-sigma about c x, y, z"),
+                           told),
+          three_numbers(kMounting, settings.star_tracker_mounting_rotation_vector_rad, limits::kRotation_rad,
+                        "of the first head in the body, as designed: v_body = exp([m×]) v_c"),
           one_number(kClockOffset, settings.star_tracker_clock_offset_s, limits::kClockOffset_s,
                      "a fix stamped t holds the attitude at t + offset; stamps are corrected when the pass is read"),
           one_number(kClockRate, settings.star_tracker_clock_rate_s_s, limits::kClockRate_s_s,
@@ -199,18 +225,71 @@ Field prior(std::optional<std::string>& found) {
           }};
 }
 
-Fields pass_fields(PassSettings& settings, std::optional<std::string>& prior_file) {
-  return {required(text("spacecraft", settings.spacecraft, "its name")),
-          required(epoch("epoch_tai", settings.epoch, "start of the pass, TAI")),
-          required(number_of_seconds("duration_s", settings.duration, limits::kPassDuration_s, "of the pass")),
-          prior(prior_file)};
+/// One that is known to be inertial.
+Field inertial_frame(std::string& target) {
+  return {kInertialFrame, "name of the axes that the fixes refer to: GCRF, EME2000 …", text_schema,
+          [&target](const TomlTable& table, const toml::node& node) {
+            target = table.text(node, kInertialFrame);
+            if (!is_inertial_frame(normalised(target))) {
+              table.refuse(
+                  node, fmt::format("\"{}\" is {}, no inertial frame that is known", kInertialFrame, in_quotes(target)),
+                  "give ICRF, GCRF or EME2000; turn the attitude where it refers to other axes");
+            }
+          }};
 }
 
-Fields file_fields(PassSettings& settings, std::optional<std::string>& prior_file, const fs::path& file) {
-  return {required(section("pass", file, "[pass]", "when", [&] { return pass_fields(settings, prior_file); })),
-          prior(prior_file), required(gyros(settings, file)),
-          required(section("star_tracker", file, "[star_tracker]", "of the first head",
-                           [&] { return star_tracker_fields(settings, file); }))};
+Fields pass_fields(PassSettings& settings, std::optional<std::string>& prior_file, Told told) {
+  return {required(text("spacecraft", settings.spacecraft, "its name")),
+          told_or_measured(epoch("epoch_tai", settings.epoch, "start of the pass, TAI"), told),
+          told_or_measured(number_of_seconds("duration_s", settings.duration, limits::kPassDuration_s, "of the pass"),
+                           told),
+          inertial_frame(settings.inertial_frame), prior(prior_file)};
+}
+
+Fields file_fields(PassSettings& settings, std::optional<std::string>& prior_file, const fs::path& file, Told told) {
+  return {
+      required(section("pass", file, "[pass]", "when", [&, told] { return pass_fields(settings, prior_file, told); })),
+      prior(prior_file), required(gyros(settings, file, told)),
+      required(section("star_tracker", file, "[star_tracker]", "of the first head",
+                       [&, told] { return star_tracker_fields(settings, file, told); }))};
+}
+
+/// The alignment of each gyro of which the mounting in the body is told: C_c_b = C_body_cᵀ C_body_b.
+void align_by_mounting(PassSettings& settings, const fs::path& file) {
+  const auto turned = [](const Eigen::Vector3d& vector) -> Eigen::Quaterniond {
+    const double angle = vector.norm();
+    return angle > 0 ? Eigen::Quaterniond(Eigen::AngleAxisd(angle, vector / angle)) : Eigen::Quaterniond::Identity();
+  };
+  for (std::size_t k = 0; k < settings.gyros.size(); ++k) {
+    GyroPrior& gyro = settings.gyros[k];
+    if (!gyro.mounting_rotation_vector_rad) {
+      continue;
+    }
+    if (!settings.star_tracker_mounting_rotation_vector_rad) {
+      throw InputRefused(file, {},
+                         fmt::format("[[gyro.unit]] {} has \"{}\", and [star_tracker] has none", k + 1, kMounting),
+                         "give that of the star tracker as well: the alignment is between the two");
+    }
+    const Eigen::AngleAxisd c_b(turned(*settings.star_tracker_mounting_rotation_vector_rad).conjugate() *
+                                turned(*gyro.mounting_rotation_vector_rad));
+    gyro.alignment_rotation_vector_rad = c_b.angle() * c_b.axis();
+  }
+}
+
+SettingsOfTelemetry read_pass_settings(const toml::table& document, const fs::path& file, const fs::path& directory,
+                                       int gyros, Told told, const Fields& more) {
+  PassSettings settings;
+  settings.gyros.resize(static_cast<std::size_t>(gyros));
+  std::optional<std::string> prior_name;
+  read_fields(document, file, "the file", file_fields(settings, prior_name, file, told) + more);
+  align_by_mounting(settings, file);
+  fs::path prior_file;
+  if (prior_name) {
+    prior_file = directory / *prior_name;
+    settings.prior = read_calibration(prior_file);
+    check_prior(*settings.prior, prior_file, gyros);
+  }
+  return {std::move(settings), std::move(prior_file)};
 }
 
 std::string format_three(const Eigen::Vector3d& v) { return fmt::format("[{}, {}, {}]", v.x(), v.y(), v.z()); }
@@ -267,7 +346,7 @@ Time parse_pass_epoch(std::string_view text, const fs::path& file) {
   const TomlTable root(document, file, "the file");
   PassSettings settings;
   std::optional<std::string> prior_name;
-  read_fields(root.table_at("pass"), file, "[pass]", pass_fields(settings, prior_name));
+  read_fields(root.table_at("pass"), file, "[pass]", pass_fields(settings, prior_name, Told::kAll));
   return settings.epoch;
 }
 
@@ -279,22 +358,21 @@ fs::path parse_prior_file(std::string_view text, const fs::path& file, const fs:
   if (const toml::node* const at_root = root.find("prior")) {
     prior(prior_name).read(root, *at_root);
   }
-  read_fields(root.table_at("pass"), file, "[pass]", pass_fields(settings, prior_name));
+  read_fields(root.table_at("pass"), file, "[pass]", pass_fields(settings, prior_name, Told::kAll));
   return prior_name ? directory / *prior_name : fs::path();
 }
 
 PassSettings parse_pass_toml(std::string_view text, const fs::path& file, const fs::path& directory, int gyros) {
-  const toml::table document = parse_toml(text, file);
-  PassSettings settings;
-  settings.gyros.resize(static_cast<std::size_t>(gyros));
-  std::optional<std::string> prior_name;
-  read_fields(document, file, "the file", file_fields(settings, prior_name, file));
-  if (prior_name) {
-    const fs::path prior_file = directory / *prior_name;
-    settings.prior = read_calibration(prior_file);
-    check_prior(*settings.prior, prior_file, gyros);
-  }
-  return settings;
+  return read_pass_settings(parse_toml(text, file), file, directory, gyros, Told::kAll, {}).settings;
+}
+
+SettingsOfTelemetry read_telemetry_settings(const toml::table& document, const fs::path& file,
+                                            const fs::path& directory, int gyros, const Field& telemetry) {
+  return read_pass_settings(document, file, directory, gyros, Told::kOrMeasured, {telemetry});
+}
+
+Fields telemetry_settings_fields(PassSettings& settings, std::optional<std::string>& prior_name, const fs::path& file) {
+  return file_fields(settings, prior_name, file, Told::kOrMeasured);
 }
 
 Json pass_schema() {
@@ -302,7 +380,7 @@ Json pass_schema() {
   std::optional<std::string> prior_name;
   const fs::path file;
   return document_schema("Pass", "pass.toml: when and how the telemetry was taken, and what is known before.",
-                         schema_of(file_fields(settings, prior_name, file)));
+                         schema_of(file_fields(settings, prior_name, file, Told::kAll)));
 }
 
 void check_prior(const Calibration& prior, const fs::path& prior_file, int gyros) {
@@ -318,6 +396,9 @@ std::string format_pass_toml(const PassSettings& settings, std::string_view prio
   std::string text =
       fmt::format("# One pass of telemetry.\n[pass]\nspacecraft = {}\nepoch_tai = \"{}\"\nduration_s = {}\n",
                   format_text(settings.spacecraft), format_epoch(settings.epoch), format_seconds(settings.duration));
+  if (!settings.inertial_frame.empty()) {
+    text += fmt::format("{} = {}\n", kInertialFrame, format_text(settings.inertial_frame));
+  }
   if (!prior_file.empty()) {
     text += fmt::format("prior = \"{}\"\n", prior_file);
   }
@@ -334,6 +415,10 @@ std::string format_pass_toml(const PassSettings& settings, std::string_view prio
   text += fmt::format("\n[star_tracker]\nperiod_s = {}\n{} = {}  # 1-sigma about c x, y, z\n",
                       format_seconds(settings.star_tracker_period), kHeadNoise,
                       format_three(settings.star_tracker_noise_rad));
+  if (settings.star_tracker_mounting_rotation_vector_rad) {
+    text += fmt::format("{} = {}  # in the body\n", kMounting,
+                        format_three(*settings.star_tracker_mounting_rotation_vector_rad));
+  }
   for (const FurtherStarTracker& head : settings.further_star_trackers) {
     text += fmt::format("\n[[star_tracker.further]]\n{} = {}  # about its own axes\n{} = {}\n{} = {}\n", kHeadNoise,
                         format_three(head.noise_rad), kMounting, format_three(head.mounting_rotation_vector_rad),

@@ -4,6 +4,7 @@
 #include <string>
 #include <string_view>
 
+#include "toml_fields.hpp"
 #include "trihedron/records/pass.hpp"
 
 namespace trihedron::io {
@@ -19,6 +20,22 @@ namespace trihedron::io {
 /// Only the file that `prior` names; empty where it names none. Throws InputRefused.
 [[nodiscard]] std::filesystem::path parse_prior_file(std::string_view text, const std::filesystem::path& file,
                                                      const std::filesystem::path& directory);
+
+/// What a telemetry.toml says beside where its columns are.
+struct SettingsOfTelemetry {
+  PassSettings settings;
+  std::filesystem::path prior_file;  ///< empty where there is none
+};
+
+/// The same keys as in pass.toml, in a document that has the table `telemetry` as well. Epoch, duration, periods and
+/// the noise of the star tracker may be left out: they are zero then. Throws InputRefused.
+[[nodiscard]] SettingsOfTelemetry read_telemetry_settings(const toml::table& document,
+                                                          const std::filesystem::path& file,
+                                                          const std::filesystem::path& directory, int gyros,
+                                                          const Field& telemetry);
+/// Those keys.
+[[nodiscard]] Fields telemetry_settings_fields(PassSettings& settings, std::optional<std::string>& prior_name,
+                                               const std::filesystem::path& file);
 
 /// The text that parses back to the same settings. `prior_file` is the name for `prior`, empty for none.
 [[nodiscard]] std::string format_pass_toml(const PassSettings& settings, std::string_view prior_file);

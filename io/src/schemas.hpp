@@ -6,6 +6,7 @@
 namespace trihedron::io {
 
 [[nodiscard]] Json pass_schema();
+[[nodiscard]] Json telemetry_schema();
 [[nodiscard]] Json config_schema();
 [[nodiscard]] Json scenario_schema();
 [[nodiscard]] Json campaign_schema();

@@ -8,6 +8,8 @@
 #include <limits>
 #include <utility>
 
+#include "unusable.hpp"
+
 namespace trihedron::io {
 namespace {
 
@@ -28,7 +30,7 @@ class Tally {
     defect_.count += count;
     if (defect_.first.size() < Defect::kPlaces) {
       const double t_s = row < series_.rows() ? series_.t_s[row] : std::numeric_limits<double>::quiet_NaN();
-      defect_.first.push_back({series_.position(row).line, static_cast<std::int64_t>(row), t_s});
+      defect_.first.push_back({series_.position(row).line, static_cast<std::int64_t>(series_.place(row)), t_s});
     }
   }
   void add_stretch(std::size_t row, std::int64_t count, Duration length) {
@@ -249,7 +251,7 @@ void screen_one_gyro(const Series& series, const Kept& kept, std::size_t gyro, s
   if (std::ranges::count(usable, 1) == 0) {
     throw InputRefused(series.file, {},
                        fmt::format("{} is silent all pass long: not one of its directions is a unit vector", where),
-                       "leave this gyro out, or repair its telemetry");
+                       cure_of_directions(series, kept.rows, gyro, "leave this gyro out, or repair its telemetry"));
   }
   const auto length = [&](std::size_t first, std::size_t last) { return kept.t[last] - kept.t[first]; };
   for_each_run(
@@ -345,7 +347,8 @@ StarTrackerTelemetry screen_star_tracker(Series series, const PassSettings& sett
   }
   if (usable == 0) {
     throw InputRefused(series.file, {}, fmt::format("{} has no fix at all that can be used", series.name),
-                       "give star-tracker telemetry: unit quaternions at times inside the pass");
+                       cure_of_quaternions(series, kept.rows,
+                                           "give star-tracker telemetry: unit quaternions at times inside the pass"));
   }
   norms.report(defects);
   flips.report(defects);

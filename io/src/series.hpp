@@ -44,11 +44,17 @@ struct Series {
   std::vector<double> t_s;
   std::vector<double> values;  ///< row-major, columns.size() per row; NaN where missing
   std::int64_t cut_line = 0;   ///< of a last line that was cut short and left out; 0 when there is none
+  /// Where each row stands in the file, counted from `first_line`; empty where that is its index.
+  std::vector<std::size_t> row_in_file;
 
   [[nodiscard]] std::size_t rows() const { return t_s.size(); }
+  [[nodiscard]] std::size_t place(std::size_t i) const { return i < row_in_file.size() ? row_in_file[i] : i; }
   [[nodiscard]] const double* row(std::size_t i) const { return values.data() + i * columns.size(); }
   [[nodiscard]] Position position(std::size_t row_index) const {
-    return {first_line > 0 ? first_line + static_cast<std::int64_t>(row_index) : 0, 0};
+    if (row_index == rows() && cut_line > 0) {
+      return {cut_line, 0};
+    }
+    return {first_line > 0 ? first_line + static_cast<std::int64_t>(place(row_index)) : 0, 0};
   }
 };
 

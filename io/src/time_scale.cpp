@@ -232,6 +232,10 @@ std::optional<Time> TimeText::parse(std::string_view text, Fault& fault) {
     return std::nullopt;
   }
   const Time clock(reading->day + reading->since_midnight);
+  return scale_ == TimeScale::kUtc ? clock + leaps : tai_of(clock);
+}
+
+std::optional<Time> TimeText::tai_of(Time clock) {
   switch (scale_) {
     case TimeScale::kTai:
       return clock;
@@ -239,8 +243,10 @@ std::optional<Time> TimeText::parse(std::string_view text, Fault& fault) {
       return clock + kTaiMinusGps;
     case TimeScale::kTt:
       return clock - kTtMinusTai;
-    case TimeScale::kUtc:
-      return clock + leaps;
+    case TimeScale::kUtc: {
+      const std::optional<Duration> leaps = leap_seconds(std::chrono::floor<days>(clock.time_since_epoch()));
+      return leaps ? std::optional(clock + *leaps) : std::nullopt;
+    }
     case TimeScale::kTdb:
       break;
   }

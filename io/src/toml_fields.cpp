@@ -12,6 +12,18 @@ namespace trihedron::io {
 
 namespace fs = std::filesystem;
 
+namespace {
+
+const toml::array& elements_of(const TomlTable& table, const toml::node& node, std::string_view key) {
+  const toml::array* const array = node.as_array();
+  if (array == nullptr) {
+    table.refuse(node, fmt::format("\"{}\" is no list", key), "give a list in brackets");
+  }
+  return *array;
+}
+
+}  // namespace
+
 Fields operator+(Fields a, const Fields& b) {
   a.insert(a.end(), b.begin(), b.end());
   return a;
@@ -117,6 +129,26 @@ Field three_numbers(std::string_view key, std::optional<Eigen::Vector3d>& target
   return {key, about, [range] { return three_of(number_schema(range)); },
           [key, &target, range](const TomlTable& table, const toml::node& node) {
             target = table.three_numbers(node, key, range);
+          }};
+}
+
+Field list_of_texts(std::string_view key, std::vector<std::string>& target, std::string_view about) {
+  return {key, about, [] { return array_of(text_schema()); },
+          [key, &target](const TomlTable& table, const toml::node& node) {
+            target.clear();
+            for (const toml::node& element : elements_of(table, node, key)) {
+              target.push_back(table.text(element, key));
+            }
+          }};
+}
+
+Field list_of_numbers(std::string_view key, std::vector<double>& target, std::string_view about) {
+  return {key, about, [] { return array_of(number_schema()); },
+          [key, &target](const TomlTable& table, const toml::node& node) {
+            target.clear();
+            for (const toml::node& element : elements_of(table, node, key)) {
+              target.push_back(table.number(element, key));
+            }
           }};
 }
 

@@ -54,6 +54,9 @@ void read_fields(const toml::table& table, const std::filesystem::path& file, co
                                   std::string_view about);
 [[nodiscard]] Field three_numbers(std::string_view key, std::optional<Eigen::Vector3d>& target, const Range& range,
                                   std::string_view about);
+/// Any number of them.
+[[nodiscard]] Field list_of_texts(std::string_view key, std::vector<std::string>& target, std::string_view about);
+[[nodiscard]] Field list_of_numbers(std::string_view key, std::vector<double>& target, std::string_view about);
 /// A number of something.
 [[nodiscard]] Field whole(std::string_view key, int& target, const Range& range, std::string_view about);
 

@@ -217,6 +217,7 @@ CalibrationRun calibrate_as_stamped(const Pass& pass, const CalibrationOptions& 
   run.errors = pipeline.errors();
   run.calibration.statistics = recorded;
   run.calibration.start_up = pass.settings.start_up;
+  run.calibration.drift_field = decision.levels;
   if (smoothed) {
     run.drift_models = std::move(smoothed->drift_models);
     std::move(smoothed->refinement).put_into(run);

@@ -271,7 +271,7 @@ std::optional<ProcessNoise> walk_by_eq1(const Pass& pass, const Screened& screen
 /// Decides by the data of the pass.
 Decision decide_by_pass(const Pass& pass, const Screened& screened, const CalibrationOptions& asked,
                         const DriftModelId& largest_model) {
-  Decision decision{asked, {}, {}, {}, {}, {}, {}};
+  Decision decision{asked, {}, {}, {}, {}, {}, {}, {}};
   CalibrationOptions& options = decision.options;
   const bool wandering_is_open = options.further_states[FurtherState::kWanderingDrift] == Choice::kAuto;
   if (wandering_is_open) {
@@ -392,7 +392,7 @@ Decision decide(const Pass& pass, const CalibrationOptions& asked_for) {
   }
   settle_by_estimator(asked);
   if (pass.settings.prior || asked.estimator == Estimator::kPaper) {
-    return {settled_before(pass.settings, asked), {}, {}, {}, {}, {}, {}};
+    return {settled_before(pass.settings, asked), {}, {}, {}, {}, {}, {}, {}};
   }
   const bool on_board = asked.estimator != Estimator::kBatch;
   const bool by_field = !asked.drift_model && !knows_of_drift_outside(pass.settings);
@@ -401,7 +401,7 @@ Decision decide(const Pass& pass, const CalibrationOptions& asked_for) {
     asked.drift_model = kLargestDriftModel;
     asked.estimator = Estimator::kBatch;
   }
-  Decision decision{asked, {}, {}, {}, {}, {}, {}};
+  Decision decision{asked, {}, {}, {}, {}, {}, {}, {}};
   CalibrationOptions& options = decision.options;
   options.find_noise = false;
   const bool states_are_settled =
@@ -430,6 +430,9 @@ Decision decide(const Pass& pass, const CalibrationOptions& asked_for) {
     use(drift, decided.options);
     decided.settings = pass.settings;
     use(decided.field->members, drift.drift_model, *decided.settings);
+    if (drift.drift_model != kEsg7) {
+      decided.levels = std::move(decided.field->levels);
+    }
     decided.field.reset();
     return decided;
   }

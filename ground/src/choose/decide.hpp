@@ -21,6 +21,7 @@ struct Decision {
   std::vector<Change> changes;      ///< what moves during the pass
   /// Those of the pass with what it shows of the size of members outside eq. (1), for an estimator on board.
   std::optional<PassSettings> settings;
+  std::vector<DriftFieldLevel> levels;  ///< of the field of which that estimator has the members
   std::optional<Screened> screened;  ///< the screened pass by which it was decided, where it was
 };
 

@@ -1,10 +1,12 @@
 #pragma once
 /// Attitude files: `t_s,q_x,q_y,q_z,q_w,sigma_x_rad,sigma_y_rad,sigma_z_rad,age_s`, CSV; q_in_c, sigmas about
 /// c x, y, z, time since the last astro-correction. `rate_x_rad_s,rate_y_rad_s,rate_z_rad_s` may follow: of c with
-/// respect to in, c axes.
+/// respect to in, c axes. `q_body_x,q_body_y,q_body_z,q_body_w` come last where the pass tells how the star tracker
+/// stands in the body: q_in_body.
 
 #include <Eigen/Core>
 #include <filesystem>
+#include <optional>
 #include <span>
 #include <string>
 #include <string_view>
@@ -26,20 +28,28 @@ enum class AttitudeDigits {
   kAll,             ///< so many that each comes back bit for bit
 };
 
+/// Of the star tracker in the body, PassSettings::star_tracker_mounting_rotation_vector_rad.
+using Mounting = std::optional<Eigen::Vector3d>;
+
 /// t_s with three decimals where that is exact, else nine. Columns of what is empty are not written; the rates are
 /// those of an AttitudeMessage.
 [[nodiscard]] std::string format_attitude(Time epoch, const AttitudeHistory& attitude,
                                           AttitudeDigits digits = AttitudeDigits::kTwelveDecimals,
-                                          std::span<const Eigen::Vector3d> rate_rad_s = {});
+                                          std::span<const Eigen::Vector3d> rate_rad_s = {},
+                                          const Mounting& mounting = std::nullopt);
 
 /// The first line where all columns are there.
 inline constexpr std::string_view kAttitudeColumns = "t_s,q_x,q_y,q_z,q_w,sigma_x_rad,sigma_y_rad,sigma_z_rad,age_s\n";
+/// The first line where there is a mounting.
+[[nodiscard]] std::string attitude_header(const Mounting& mounting);
 /// The lines after it.
 [[nodiscard]] std::string format_attitude_rows(Time epoch, const AttitudeHistory& attitude,
                                                AttitudeDigits digits = AttitudeDigits::kTwelveDecimals,
-                                               std::span<const Eigen::Vector3d> rate_rad_s = {});
+                                               std::span<const Eigen::Vector3d> rate_rad_s = {},
+                                               const Mounting& mounting = std::nullopt);
 
 /// That text. Throws MachineFailed when the file cannot be written; then nothing stays.
-void write_attitude(const std::filesystem::path& path, Time epoch, const AttitudeHistory& attitude);
+void write_attitude(const std::filesystem::path& path, Time epoch, const AttitudeHistory& attitude,
+                    const Mounting& mounting = std::nullopt);
 
 }  // namespace trihedron::io

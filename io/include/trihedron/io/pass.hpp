@@ -11,6 +11,7 @@
 
 #include "trihedron/core/time.hpp"
 #include "trihedron/io/staged_directory.hpp"
+#include "trihedron/io/time_scale.hpp"
 #include "trihedron/records/pass.hpp"
 #include "trihedron/records/scenario.hpp"
 
@@ -38,6 +39,10 @@ struct Defect {
     kSignFlip,         ///< kept: q changes hemisphere between neighbouring fixes
     kStuckSamples,     ///< kept: one gyro's direction is identical for 8 samples or more; counts the samples
     kSilentGyro,       ///< kept: no usable direction for a minute or more; counts the stretches
+    kOutsideRange,     ///< left out: before or after the time range that was asked for
+    kExcluded,         ///< left out: in an interval that was to be left out
+    kFlagged,          ///< a quality flag says that it is bad: a fix is left out, a gyro's reading taken as missing
+    kLargeSigma,       ///< left out: a fix whose own 1-sigma is too large, or none
     kGap,              ///< more than 1.5 periods without a row, at the ends of the pass too; counts the gaps
   };
   static constexpr std::size_t kPlaces = 5;
@@ -56,16 +61,51 @@ struct Defect {
 /// Stable, for programs: "missing-time", "time-outside-pass" …
 [[nodiscard]] const char* name_of(Defect::Kind kind);
 
+/// A stretch of time of which the telemetry is not to be used: begin ≤ t < end.
+struct LeftOut {
+  Time begin{};
+  Time end{};
+  bool gyros = true;
+  bool star_trackers = true;
+};
+
+/// What of a pass is to be used. A pass of which a part is used begins and ends with that part: epoch and duration are
+/// those of the part.
+struct Selection {
+  std::optional<Time> from;
+  std::optional<Time> to;
+  std::vector<LeftOut> exclude;
+};
+
+/// From which columns the components were taken; "-NAME" with the other sign.
+struct ColumnsRead {
+  std::vector<std::string> quaternion;               ///< x, y, z, w of the first head
+  std::vector<std::vector<std::string>> directions;  ///< x, y, z of each gyro
+};
+
 /// A pass as read, and what was wrong with its telemetry.
 struct LoadedPass {
   Pass pass;
   std::vector<Defect> defects;
   std::filesystem::path prior_file{};  ///< that `prior` of its settings names; empty where it names none
+  /// Files that were read besides `path` and what is in it: those that a telemetry.toml names.
+  std::vector<std::filesystem::path> sources{};
+  ColumnsRead columns{};
 };
 
-/// Reads a pass and screens its telemetry. Throws InputRefused for what cannot be understood, MachineFailed when the
-/// disk fails. Not to be called from two threads at once for NetCDF.
-[[nodiscard]] LoadedPass read_pass(const std::filesystem::path& path);
+/// Reads a pass and screens its telemetry: a directory, a NetCDF-4 file, or a telemetry.toml (docs/telemetry.md).
+/// `selection` goes before what a telemetry.toml asks for, and its intervals are left out as well. Throws InputRefused
+/// for what cannot be understood, MachineFailed when the disk fails. Not to be called from two threads at once for
+/// NetCDF.
+[[nodiscard]] LoadedPass read_pass(const std::filesystem::path& path, const Selection& selection = {});
+
+/// Whether the file is a telemetry.toml, a TOML document with a table `telemetry`, and not another: a scenario. What
+/// cannot be understood is none.
+[[nodiscard]] bool is_telemetry_toml(const std::filesystem::path& file);
+
+/// Intervals of a CSV file with columns `begin` and `end`, ISO dates and times of this scale; other columns are
+/// skipped. Throws InputRefused, also where an interval does not end after it begins.
+[[nodiscard]] std::vector<LeftOut> read_intervals(const std::filesystem::path& file, TimeScale scale);
 
 /// The truth of a simulated pass; nullopt when there is none. Throws as read_pass, also for any flaw in it.
 [[nodiscard]] std::optional<Truth> read_truth(const std::filesystem::path& path);

@@ -39,6 +39,9 @@ class TimeText {
   /// Date by month and day or by day of the year, any number of decimals (rounded to nanoseconds), and Z where the
   /// scale is UTC. `fault` says what is wrong where there is no result.
   [[nodiscard]] std::optional<Time> parse(std::string_view text, Fault& fault);
+  /// TAI of what the clock of the scale shows, given as Time counts TAI. A clock of UTC that shows the second after a
+  /// leap second is taken to be past it. Nothing for UTC where leap seconds are not known.
+  [[nodiscard]] std::optional<Time> tai_of(Time clock);
 
  private:
   /// TDB − TT at an instant of TT, counted as Time counts TAI.

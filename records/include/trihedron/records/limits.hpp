@@ -53,6 +53,11 @@ inline constexpr Range kRotation_rad{-kFullTurn_rad, kFullTurn_rad, "rad",
                                      "it is one component of a rotation vector; a degree is 0.0175"};
 inline constexpr Range kAlignmentSigma_rad{1e-9, 3.15, "rad", "a half turn is all there is; an arcminute is 2.9e-4"};
 
+// ---- Telemetry of others
+
+inline constexpr Range kHeaderLine{0, 1000, "", "it is the number of a line at the top of the file; 0 is none"};
+inline constexpr Range kCountsPerUnit{1e-9, 1e18, "", "it is the count that stands for 1, or for one unit of an angle"};
+
 // ---- Settings of the estimators
 
 inline constexpr Range kRandomWalk_rad_sqrt_s{1e-15, 1e-3, "rad/s^0.5", "give 0 where there is none", true};

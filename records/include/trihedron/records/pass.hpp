@@ -25,6 +25,8 @@ struct GyroPrior {
   double drift_common_sigma_rad_s = 0;
   Eigen::Vector3d alignment_rotation_vector_rad{0, 0, 0};
   Eigen::Vector3d alignment_sigma_rad{0, 0, 0};
+  /// Of the case in the body, as designed: v_body = exp([m×]) v_b. Where it is given, the alignment follows from it.
+  std::optional<Eigen::Vector3d> mounting_rotation_vector_rad{};
 };
 
 /// A star-tracker head other than the first. The first head's axes are c; the axes s of this one are turned from them:
@@ -49,7 +51,10 @@ struct PassSettings {
   double star_tracker_clock_rate_s_s = 0;
   std::vector<FurtherStarTracker> further_star_trackers;
   std::vector<GyroPrior> gyros;
-  std::string start_up;  ///< of the rotors, "2009-05-20"; empty where it is not given
+  /// Of the first head in the body, as designed: v_body = exp([m×]) v_c. Without it the body axes are c.
+  std::optional<Eigen::Vector3d> star_tracker_mounting_rotation_vector_rad{};
+  std::string inertial_frame{};  ///< name of the axes `in` that the fixes refer to; empty where it is not given
+  std::string start_up;          ///< of the rotors, "2009-05-20"; empty where it is not given
   std::optional<Calibration>
       prior;  ///< an earlier calibration: replaces drift and alignment of `gyros`, with its covariance
 };
