@@ -204,6 +204,7 @@ struct Spiked {
       buffer.readings.push(s);
     }
   }
+  [[nodiscard]] GyroMask used_at(double t_s) const { return buffer.at_time(t_s).value().used; }
   [[nodiscard]] GyroMask used_now() const {
     return buffer.readings.now(buffer_setup(), buffer.health, buffer.gyros).used;
   }
@@ -229,6 +230,28 @@ TEST(Readings, OfASpikeAreNotUsedNow) {
   // The first samples are compared with nothing.
   EXPECT_EQ(count(Spiked({2}, 0, y, 2).used_now()), 2);
   EXPECT_FALSE(Spiked({3}, 0, y, 3).used_now()[0]);
+}
+
+TEST(Readings, OfASpikeAreNotUsedAtAFix) {
+  const Eigen::Vector3d y = Eigen::Vector3d::UnitY();
+  const Eigen::Vector3d z = Eigen::Vector3d::UnitZ();
+  // At the time of the fix, or one of the two that it lies between.
+  for (const auto& [spike, t_s] : {std::pair(20, 2.5), {20, 2.55}, {21, 2.55}}) {
+    const GyroMask first = Spiked({spike}, 0, y).used_at(t_s);
+    EXPECT_FALSE(first[0]) << spike << ' ' << t_s;
+    EXPECT_TRUE(first[1]) << spike << ' ' << t_s;
+    EXPECT_FALSE(Spiked({spike}, 1, z).used_at(t_s)[1]) << spike << ' ' << t_s;
+  }
+  // Those further away do no harm, …
+  for (int spike = 9; spike <= 31; ++spike) {
+    if (spike != 20) {
+      EXPECT_EQ(count(Spiked({spike}, 0, y).used_at(2.5)), 2) << spike;
+      EXPECT_FALSE(Spiked({spike, 20}, 0, y).used_at(2.5)[0]) << spike;
+    }
+  }
+  EXPECT_FALSE(Spiked({20, 21}, 0, y).used_at(2.55)[0]);
+  // … and neither does one that nothing can be compared with.
+  EXPECT_EQ(count(Spiked({2}, 0, y, 2).used_at(0.25)), 2);
 }
 
 /// Samples of three gyros, the third of which is not selected; those of the first two from `first` on are turned, each
@@ -296,6 +319,8 @@ TEST(Readings, OfABodyThatShakesAreUsed) {
   EXPECT_EQ(count(used), 2);
   EXPECT_GE(unused, 1);  // as it begins
   EXPECT_LE(unused, 8);
+  EXPECT_EQ(count(buffer.at_time(7.5).value().used), 2);
+  EXPECT_EQ(count(buffer.at_time(7.55).value().used), 2);
 }
 
 TEST(Between, GoesFromOneDirectionToTheOther) {

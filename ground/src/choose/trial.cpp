@@ -152,6 +152,25 @@ double Trial::log_evidence(FurtherState state) const {
   return log_bayes_factor(vector(values), found_.errors.last_root(rows, Eigen::all), vector(sigmas));
 }
 
+double Trial::log_evidence_outside_eq1() const {
+  const Layout& layout = problem_.layout();
+  const int outside = layout.drift_size() - Layout::kEq1;
+  const Eigen::Index own = layout.drift_size() + 3;  // of a gyro in the prior, alignment included
+  std::vector<int> rows;
+  Eigen::VectorXd values(Eigen::Index{outside} * layout.gyros);
+  Eigen::VectorXd sigmas(values.size());
+  for (int k = 0; k < layout.gyros; ++k) {
+    for (int i = 0; i < outside; ++i) {
+      const auto at = static_cast<Eigen::Index>(rows.size());
+      const Eigen::Index in_prior = k * own + Layout::kEq1 + i;
+      rows.push_back(layout.drift(k) + Layout::kEq1 + i);
+      values(at) = found_.solution.gyros[k].drift_rad_s(Layout::kEq1 + i);
+      sigmas(at) = std::sqrt(problem_.setup().prior.covariance(in_prior, in_prior));
+    }
+  }
+  return log_bayes_factor(values, found_.errors.last_root(rows, Eigen::all), sigmas);
+}
+
 std::vector<Forecast> Trial::forecasts() const {
   return field_ ? std::vector<Forecast>() : ground::forecasts(problem_, found_, models_up_to(drift_model_));
 }
