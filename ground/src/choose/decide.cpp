@@ -236,6 +236,35 @@ void decide_again_with_more_noise(const Pass& pass, const Screened& screened, co
   }
 }
 
+/// Where something seems to move while the drift is that of eq. (1), drift outside it may be what does: the trial with
+/// all states free may not show it, because they stand for each other. Takes the largest drift model where it is
+/// likelier than all that moves.
+void ask_for_drift_outside_eq1(const Pass& pass, const Screened& screened, const CalibrationOptions& asked,
+                               const DriftModelId& largest_model, Decision& decision) {
+  CalibrationOptions& options = decision.options;
+  const double by_changes = decision.changes.empty() ? 0 : decision.changes.front().log_odds;
+  if (asked.drift_model || options.drift_field || options.drift_model != kEsg7 || largest_model == kEsg7 ||
+      by_changes <= kLogOddsToAccept) {
+    return;
+  }
+  CalibrationOptions larger = options;
+  larger.drift_model = largest_model;
+  larger.direction_random_walk_rad_sqrt_s = asked.direction_random_walk_rad_sqrt_s;
+  Trial trial(pass, screened, larger);
+  const double by_drift = trial.log_evidence_outside_eq1();
+  if (by_drift <= by_changes) {
+    return;
+  }
+  if (options.find_noise && options.further_states[FurtherState::kWanderingDrift] != Choice::kOn) {
+    use_walk(with_most_likely_walk(trial, larger).noise, larger);
+  }
+  options = larger;
+  decision.changes = changes_over(trial);
+  for (Evidence& evidence : decision.evidence) {
+    evidence = evidence.state ? evidence : Evidence{{}, by_drift, true};
+  }
+}
+
 /// There are no usable fixes to decide by: what is open is off.
 void leave_out_what_is_open(CalibrationOptions& options) {
   for (const FurtherStateRow& row : kFurtherStates) {
@@ -260,6 +289,7 @@ Decision decide_by_pass(const Pass& pass, const Screened& screened, const Calibr
   if (!options.find_noise) {
     settle_states(everything, asked, decision);
     decision.changes = changes_over(everything);
+    ask_for_drift_outside_eq1(pass, screened, asked, largest_model, decision);
     if (options.drift_field) {
       decision.field = Trial(pass, screened, options).field_prior();
     }
@@ -280,6 +310,7 @@ Decision decide_by_pass(const Pass& pass, const Screened& screened, const Calibr
     decision.field = decided.field_prior();
     decision.changes = changes_over(decided);
   }
+  ask_for_drift_outside_eq1(pass, screened, asked, largest_model, decision);
   return decision;
 }
 

@@ -3,8 +3,11 @@
 #include <fmt/format.h>
 
 #include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
+#include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <iterator>
 #include <limits>
 #include <optional>
 
@@ -22,6 +25,29 @@ double log_bayes_factor(const Eigen::VectorXd& estimate, const Eigen::MatrixXd& 
   const Eigen::LLT<Eigen::MatrixXd> covariance(scaled * scaled.transpose());
   const Eigen::VectorXd white = covariance.matrixL().solve(estimate.cwiseQuotient(prior_sigma));
   return white.squaredNorm() / 2 + covariance.matrixLLT().diagonal().array().log().sum();
+}
+
+/// … of states that are of a size not known, up to that of their priors: the mean of the factors for priors of one, a
+/// third, a tenth and a thirtieth of the width.
+double log_bayes_factor_of_any_size(const Eigen::VectorXd& estimate, const Eigen::MatrixXd& root,
+                                    const Eigen::VectorXd& prior_sigma) {
+  constexpr double kWidths[] = {1, 0.3, 0.1, 0.03};
+  const Eigen::MatrixXd scaled = prior_sigma.cwiseInverse().asDiagonal() * root;
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> modes(scaled * scaled.transpose());
+  const Eigen::ArrayXd variance = modes.eigenvalues().array().max(std::numeric_limits<double>::min());
+  const Eigen::ArrayXd by_data =  // Λ x, by the data alone
+      (modes.eigenvectors().transpose() * estimate.cwiseQuotient(prior_sigma)).array() / variance;
+  const Eigen::ArrayXd information = (1 / variance - 1).max(0);
+  double most = -std::numeric_limits<double>::infinity();
+  double sum = 0;
+  for (const double width : kWidths) {
+    const double factor = (by_data.square() / (information + 1 / (width * width))).sum() / 2 -
+                          (1 + width * width * information).log().sum() / 2;
+    const double larger = std::max(most, factor);
+    sum = sum * std::exp(most - larger) + std::exp(factor - larger);
+    most = larger;
+  }
+  return most + std::log(sum / std::size(kWidths));
 }
 
 /// The models to compare with a model: those that it contains, from the smallest on, and itself.
@@ -168,7 +194,7 @@ double Trial::log_evidence_outside_eq1() const {
       sigmas(at) = std::sqrt(problem_.setup().prior.covariance(in_prior, in_prior));
     }
   }
-  return log_bayes_factor(values, found_.errors.last_root(rows, Eigen::all), sigmas);
+  return log_bayes_factor_of_any_size(values, found_.errors.last_root(rows, Eigen::all), sigmas);
 }
 
 std::vector<Forecast> Trial::forecasts() const {

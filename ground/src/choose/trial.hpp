@@ -34,7 +34,8 @@ class Trial {
 
   /// ln of the Bayes factor of these states, which the trial must have; not of drift that wanders.
   [[nodiscard]] double log_evidence(FurtherState state) const;
-  /// … and of the members of its drift model that eq. (1) does not have. Needs some, and no field.
+  /// … and of the members of its drift model that eq. (1) does not have, of whatever size up to that of their priors.
+  /// Needs some, and no field.
   [[nodiscard]] double log_evidence_outside_eq1() const;
   /// Forecasts by its drift model and those that it contains; none of a field.
   [[nodiscard]] std::vector<Forecast> forecasts() const;

@@ -219,8 +219,8 @@ constexpr double kFalseAlarm = 1e-5;
 /// Correlations and lines below these limits do no harm, however significant.
 constexpr double kCorrelated = 0.05;
 constexpr double kLineInSigmas = 0.1;
-/// From here on what is said to be within two sigmas is beyond four.
-constexpr double kSigmasTooSmall = 2;
+/// By so much too small, and one in a hundred of errors about three axes is beyond four of its sigmas.
+constexpr double kSigmasTooSmall = 4 / 2.93;
 
 bool is_chance(double square, int degrees_of_freedom) {
   return degrees_of_freedom == 0 || square <= boost::math::quantile(boost::math::complement(

@@ -115,10 +115,11 @@ TEST(Verdict, FindsInnovationsThatAreNotWhite) {
   EXPECT_THAT(codes(judge(good_pass(), with_innovations(-0.3, 0))), Contains("innovations-not-white"));
 }
 
-TEST(Verdict, ForbidsSigmasThatAreTwiceTooSmallBecauseFixesAreOffAlike) {
-  // Means of such numbers are off by √((1 + r)/(1 − r)) times what they would be of white ones: 1.5 and 3 times.
-  EXPECT_TRUE(judge(good_pass(), with_innovations(0.4, 0)).trustworthy);
-  EXPECT_FALSE(judge(good_pass(), with_innovations(0.8, 0)).trustworthy);
+TEST(Verdict, ForbidsSigmasThatAreTooSmallBecauseFixesAreOffAlike) {
+  // Means of such numbers are off by √((1 + r)/(1 − r)) times what they would be of white ones: 1.2 and 1.7 times.
+  EXPECT_TRUE(judge(good_pass(), with_innovations(0.2, 0)).trustworthy);
+  EXPECT_FALSE(judge(good_pass(), with_innovations(0.5, 0)).trustworthy);
+  EXPECT_TRUE(judge(good_pass(), with_innovations(-0.5, 0)).trustworthy);
 }
 
 /// With the coefficient of its first gyro, and its alignment, off by so many sigmas because the coefficients change.
