@@ -463,8 +463,8 @@ Json clocks_json(const ClockCorrection& clocks, std::size_t gyros) {
   return {{"clock_offset_s", clocks.offset_s},
           {"clock_rate_s_s", clocks.rate_s_s},
           {"latency_s", std::vector<double>(clocks.late_s.begin(),
-                                            clocks.late_s.begin() + static_cast<std::ptrdiff_t>(
-                                                                        std::min(gyros, std::size_t{kMaxGyros})))}};
+                                            clocks.late_s.begin() +
+                                                static_cast<std::ptrdiff_t>(std::min(gyros, std::size_t{kMaxGyros})))}};
 }
 
 Members determined_members(Determined& determined) {
@@ -567,12 +567,11 @@ Members calibration_members(Calibration& calibration) {
       {"gyros", "one element per gyro", gyros, [&](const JsonNode& node) { read_gyros(node, calibration); }},
       optional_member({"further", "further states by name", object_of({}, estimate),
                        [&](const JsonNode& node) { read_further(node, calibration); }}),
-      optional_member(
-          {"clocks", "how far the stamps of the telemetry are off, as in pass.toml, whose own are in it",
-           schema_of(clock_members(clocks, kMaxGyros)),
-           [&](const JsonNode& node) {
-             read_members(node, clock_members(calibration.clocks.emplace(), calibration.gyros.size()));
-           }}),
+      optional_member({"clocks", "how far the stamps of the telemetry are off, as in pass.toml, whose own are in it",
+                       schema_of(clock_members(clocks, kMaxGyros)),
+                       [&](const JsonNode& node) {
+                         read_members(node, clock_members(calibration.clocks.emplace(), calibration.gyros.size()));
+                       }}),
       optional_member({"noise", "that it went by", schema_of(noise_members(noise)),
                        [&](const JsonNode& node) { read_members(node, noise_members(calibration.noise.emplace())); }}),
       optional_member({"drift_field", "drift outside eq. (1) by potential and degree, where it is estimated as a field",
@@ -693,7 +692,8 @@ std::string format_calibration(const Calibration& calibration) {
       " \"statistics\": {}}}\n",
       kFormat, kVersion, dump(Json(name_of(calibration.estimator))), format_epoch(calibration.epoch), start_up,
       dump(Json(to_seconds(calibration.t - calibration.epoch))), lines(gyros), dump(further), clocks, noise, field,
-      determined, forecast, dump(states), lines(matrix), calibration.verdict.trustworthy, lines(findings), dump(statistics));
+      determined, forecast, dump(states), lines(matrix), calibration.verdict.trustworthy, lines(findings),
+      dump(statistics));
 }
 
 void write_calibration(const std::filesystem::path& path, const Calibration& calibration) {

@@ -202,7 +202,8 @@ TEST(CalibrationJson, KeepsTheClocksWhereTheyAreOff) {
   EXPECT_EQ(back->late_s[1], clocks.late_s[1]);
   EXPECT_THAT(refusal_of(replaced(text, "\"clock_rate_s_s\":1e-06", "\"clock_rate_s_s\":1")),
               HasSubstr("clocks.clock_rate_s_s is 1"));
-  EXPECT_THAT(refusal_of(replaced(text, "[0.0,0.02]", "[0.02]")), HasSubstr("clocks.latency_s has 1 values for 2 gyros"));
+  EXPECT_THAT(refusal_of(replaced(text, "[0.0,0.02]", "[0.02]")),
+              HasSubstr("clocks.latency_s has 1 values for 2 gyros"));
   EXPECT_THAT(refusal_of(replaced(text, "[0.0,0.02]", "[0.0,99]")), HasSubstr("clocks.latency_s[1] is 99"));
 }
 

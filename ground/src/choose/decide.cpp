@@ -137,8 +137,8 @@ void settle_states(const Trial& everything, const CalibrationOptions& asked, Dec
   if (!asked.drift_model) {
     const Forecast* best = best_of(decision.forecasts);
     double log_odds = best == nullptr ? 0 : best->log_likelihood - decision.forecasts.front().log_likelihood;
-    // Forecasts do not tell drift outside eq. (1) from coefficients and alignments that are off, where the two act alike
-    // on the way that a momentum is flown; the fixes of the whole pass may.
+    // Forecasts do not tell drift outside eq. (1) from coefficients and alignments that are off, where the two act
+    // alike on the way that a momentum is flown; the fixes of the whole pass may.
     if (decision.forecasts.size() > 1 && best == &decision.forecasts.front()) {
       if (const double by_fixes = everything.log_evidence_outside_eq1(); by_fixes > kLogOddsToAccept) {
         best = &decision.forecasts.back();

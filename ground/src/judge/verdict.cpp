@@ -237,10 +237,11 @@ void judge_whiteness(const Pass& pass, const CalibrationRun& run, std::vector<Fi
     add(findings, FindingCode::kInnovationsNotWhite,
         "Fixes that follow each other are off alike: something is left in them that the model does not have, and its "
         "sigmas are too small.",
-        fmt::format("autocorrelation up to {:+.3f}; N Σ r² {:.0f} of {} degrees of freedom; averages of them are off by "
-                    "{:.1f} times what their sigmas say",
-                    found.largest_correlation, found.correlation_square, found.degrees_of_freedom,
-                    std::sqrt(found.variance_of_mean)),
+        fmt::format(
+            "autocorrelation up to {:+.3f}; N Σ r² {:.0f} of {} degrees of freedom; averages of them are off by "
+            "{:.1f} times what their sigmas say",
+            found.largest_correlation, found.correlation_square, found.degrees_of_freedom,
+            std::sqrt(found.variance_of_mean)),
         kCure);
     if (found.variance_of_mean > kSigmasTooSmall * kSigmasTooSmall) {
       findings.back().severity = Severity::kDoNotUse;

@@ -189,9 +189,8 @@ class Readings {
       return found.agree >= std::min(found.compared, 2);
     };
     for (int k = 0; k < gyros_; ++k) {
-      readings.used[k] =
-          used[k] &&
-          (continues(latest, k) || (!continues(latest - 1, k) && keeps_angles(latest, k, setup, gyros, used)));
+      readings.used[k] = used[k] && (continues(latest, k) ||
+                                     (!continues(latest - 1, k) && keeps_angles(latest, k, setup, gyros, used)));
     }
   }
 
@@ -214,8 +213,7 @@ class Readings {
     for (int k = 0; k < gyros_; ++k) {
       for (int i = first; i <= last; ++i) {
         const bool alone = i == 0 || i + 1 == size_ || belongs(i - 1, k) || belongs(i + 1, k);
-        readings.used[k] =
-            readings.used[k] && (belongs(i, k) || (!alone && keeps_angles(i, k, setup, gyros, used)));
+        readings.used[k] = readings.used[k] && (belongs(i, k) || (!alone && keeps_angles(i, k, setup, gyros, used)));
       }
     }
   }

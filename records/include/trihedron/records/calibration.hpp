@@ -65,8 +65,8 @@ struct Calibration {
   /// axes.
   Eigen::MatrixXd covariance;
   std::vector<FurtherEstimate> further;  ///< empty where none was estimated
-  /// Of stamps as they are telemetered, at and since `epoch`; what pass.toml says of them is in it. Empty where they are
-  /// right.
+  /// Of stamps as they are telemetered, at and since `epoch`; what pass.toml says of them is in it. Empty where they
+  /// are right.
   std::optional<ClockCorrection> clocks;
   std::optional<CalibrationNoise> noise;
   std::vector<DriftFieldLevel> drift_field;  ///< empty where the drift is not estimated as a field
