@@ -106,6 +106,7 @@ TEST(Readings, AreThoseOfASampleOrBetweenTwo) {
   const FixReadings now = buffer.readings.now(buffer_setup(), buffer.health, buffer.gyros);
   EXPECT_EQ(readings_off(now.h_b, 5), 0);
   EXPECT_EQ(now.noise_factor, 1);
+  EXPECT_EQ(count(buffer.at_time(0).value().used), 2);  // nothing before it to be compared with
 }
 
 TEST(Readings, TakeTheSamplesRoundATimeTogether) {
@@ -249,7 +250,10 @@ TEST(Readings, OfASpikeAreNotUsedAtAFix) {
       EXPECT_FALSE(Spiked({spike, 20}, 0, y).used_at(2.5)[0]) << spike;
     }
   }
+  EXPECT_EQ(count(Spiked({17, 18, 19}, 0, y).used_at(2.5)), 2);  // it agrees with those behind it
   EXPECT_FALSE(Spiked({20, 21}, 0, y).used_at(2.55)[0]);
+  EXPECT_FALSE(Spiked({19, 20}, 0, y).used_at(2.5)[0]);
+  EXPECT_FALSE(Spiked({19, 20, 21}, 1, z).used_at(2.5)[1]);  // by the angle to the other momentum
   // … and neither does one that nothing can be compared with.
   EXPECT_EQ(count(Spiked({2}, 0, y, 2).used_at(0.25)), 2);
 }
@@ -299,6 +303,18 @@ TEST(Readings, OfTwoPaperSamplesAreHeldAgainstThoseBeforeThem) {
   spike.h_b[0] = rotated<double>(spike.h_b[0], Eigen::Vector3d(0, 0.017, 0));
   buffer.readings.push(spike);
   EXPECT_FALSE(buffer.readings.now(buffer_setup(), buffer.health, buffer.gyros).used[0]);
+}
+
+TEST(Readings, AreNotHeldAgainstThoseFarAway) {
+  SomeReadings buffer;
+  buffer.push(0);
+  for (const double t_s : {3.0, 6.0, 9.0}) {  // further apart than readings are compared
+    GyroSample s = turning_sample(t_s);
+    s.h_b[0] = rotated<double>(s.h_b[0], Eigen::Vector3d(0, 0.017 * t_s * t_s * t_s, 0));
+    buffer.readings.push(s);
+  }
+  EXPECT_EQ(count(buffer.at_time(9).value().used), 2);
+  EXPECT_EQ(count(buffer.readings.now(buffer_setup(), buffer.health, buffer.gyros).used), 2);
 }
 
 TEST(Readings, OfABodyThatShakesAreUsed) {

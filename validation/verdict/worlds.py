@@ -254,7 +254,7 @@ WORLDS = [
     World("field-error", "dirty telemetry", tracker(field_error='["2arcsec", "2arcsec", "10arcsec"]'), faults=("innovations-not-white",)),
     World("blinded", "dirty telemetry", tracker(sun_exclusion='"40deg"', earth_exclusion='"25deg"')),
 
-    World("noise-in-degrees", "wrong units and sides", constant(SLEWS), in_degrees),
+    World("noise-in-degrees", "wrong units and sides", constant(SLEWS), in_degrees, faults=("nis-out-of-bounds",)),
     World("scalar-first", "wrong units and sides", constant(SLEWS), fixes_by(lambda q: (q[3], q[0], q[1], q[2]))),
     World("conjugate", "wrong units and sides", constant(SLEWS), fixes_by(inverse)),
     World("gyros-exchanged", "wrong units and sides", constant(SLEWS), exchanged),
