@@ -49,6 +49,7 @@ ExitStatus navigate_pass(const std::filesystem::path& pass, const NavigationFile
   } catch (const ground::SetupError& error) {
     throw io::InputRefused(pass, {}, error.what(), error.cure());
   }
+  correct(loaded.pass, result.clock_correction);  // the fixes that it is compared with
   const Time epoch = loaded.pass.settings.epoch;
   const io::Mounting& mounting = loaded.pass.settings.star_tracker_mounting_rotation_vector_rad;
   const ground::AttitudeEvaluation evaluation = ground::evaluate_navigation(loaded.pass, result, named.truth_or_null());

@@ -145,6 +145,9 @@ std::string verdict_line(const Calibration& calibration) {
     parts.push_back(fmt::format("{} of {} drift coefficients not determined", determined->of - determined->coefficients,
                                 determined->of));
   }
+  if (calibration.verdict.trustworthy && calibration.verdict.has(FindingCode::kWeakAlignmentAxis)) {
+    parts.emplace_back("alignment about one axis not determined");
+  }
   return fmt::format("Verdict     {}{}{}\n", word_of(calibration.verdict), parts.empty() ? "" : ": ",
                      fmt::join(parts, "; "));
 }

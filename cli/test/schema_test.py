@@ -256,11 +256,17 @@ def test_a_calibration_that_its_schema_refuses_is_refused(calibrated):
     for path, value in [(["format"], "another"), (["version"], 2), (["estimator"], "magic"), (["epoch_tai"], "noon"), (["t_s"], "0"), (["gyros"], []),
                         (["gyros", 0, "momentum_in"], [1, 0]), (["gyros", 0, "drift_model"], None), (["gyros", 0, "drift_rad_s", "k0"], 1e10),
                         (["covariance", "matrix", 0, 0], "1"), (["covariance", "states"], None), (["verdict", "trustworthy"], "yes"),
-                        (["verdict", "findings"], [{"code": "x"}]), (["noise", "wandering_drift_rad_s"], -1), (["statistics"], None)]:
+                        (["verdict", "findings"], [{"code": "x"}]), (["noise", "wandering_drift_rad_s"], -1), (["statistics"], None),
+                        (["clocks"], {"clock_offset_s": 1.0, "clock_rate_s_s": 0.0}),
+                        (["clocks"], {"clock_offset_s": "1 s", "clock_rate_s_s": 0.0, "latency_s": [0.0, 0.0]})]:
         document = edited(path, value)
         assert not is_valid(document, "calibration"), path
         result = run("navigate", directory / "pass", "--calibration", "-", "-o", directory / "a.csv", input=json.dumps(document))
         assert result.returncode == INPUT_REFUSED, (path, result.stderr)
+    clocks = edited(["clocks"], {"clock_offset_s": 1e-3, "clock_rate_s_s": 0.0, "latency_s": [0.0, 0.0]})
+    assert is_valid(clocks, "calibration")
+    result = run("navigate", directory / "pass", "--calibration", "-", "-o", directory / "a.csv", input=json.dumps(clocks))
+    assert "clock-offset-found" in result.stdout, result.stderr
     later = edited(["added_later"], {"any": "thing"})
     assert is_valid(later, "calibration")
     result = run("--quiet", "navigate", directory / "pass", "--calibration", "-", "-o", directory / "a.csv", input=json.dumps(later))

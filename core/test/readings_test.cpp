@@ -106,6 +106,7 @@ TEST(Readings, AreThoseOfASampleOrBetweenTwo) {
   const FixReadings now = buffer.readings.now(buffer_setup(), buffer.health, buffer.gyros);
   EXPECT_EQ(readings_off(now.h_b, 5), 0);
   EXPECT_EQ(now.noise_factor, 1);
+  EXPECT_EQ(count(buffer.at_time(0).value().used), 2);  // nothing before it to be compared with
 }
 
 TEST(Readings, TakeTheSamplesRoundATimeTogether) {
@@ -204,6 +205,7 @@ struct Spiked {
       buffer.readings.push(s);
     }
   }
+  [[nodiscard]] GyroMask used_at(double t_s) const { return buffer.at_time(t_s).value().used; }
   [[nodiscard]] GyroMask used_now() const {
     return buffer.readings.now(buffer_setup(), buffer.health, buffer.gyros).used;
   }
@@ -229,6 +231,31 @@ TEST(Readings, OfASpikeAreNotUsedNow) {
   // The first samples are compared with nothing.
   EXPECT_EQ(count(Spiked({2}, 0, y, 2).used_now()), 2);
   EXPECT_FALSE(Spiked({3}, 0, y, 3).used_now()[0]);
+}
+
+TEST(Readings, OfASpikeAreNotUsedAtAFix) {
+  const Eigen::Vector3d y = Eigen::Vector3d::UnitY();
+  const Eigen::Vector3d z = Eigen::Vector3d::UnitZ();
+  // At the time of the fix, or one of the two that it lies between.
+  for (const auto& [spike, t_s] : {std::pair(20, 2.5), {20, 2.55}, {21, 2.55}}) {
+    const GyroMask first = Spiked({spike}, 0, y).used_at(t_s);
+    EXPECT_FALSE(first[0]) << spike << ' ' << t_s;
+    EXPECT_TRUE(first[1]) << spike << ' ' << t_s;
+    EXPECT_FALSE(Spiked({spike}, 1, z).used_at(t_s)[1]) << spike << ' ' << t_s;
+  }
+  // Those further away do no harm, …
+  for (int spike = 9; spike <= 31; ++spike) {
+    if (spike != 20) {
+      EXPECT_EQ(count(Spiked({spike}, 0, y).used_at(2.5)), 2) << spike;
+      EXPECT_FALSE(Spiked({spike, 20}, 0, y).used_at(2.5)[0]) << spike;
+    }
+  }
+  EXPECT_EQ(count(Spiked({17, 18, 19}, 0, y).used_at(2.5)), 2);  // it agrees with those behind it
+  EXPECT_FALSE(Spiked({20, 21}, 0, y).used_at(2.55)[0]);
+  EXPECT_FALSE(Spiked({19, 20}, 0, y).used_at(2.5)[0]);
+  EXPECT_FALSE(Spiked({19, 20, 21}, 1, z).used_at(2.5)[1]);  // by the angle to the other momentum
+  // … and neither does one that nothing can be compared with.
+  EXPECT_EQ(count(Spiked({2}, 0, y, 2).used_at(0.25)), 2);
 }
 
 /// Samples of three gyros, the third of which is not selected; those of the first two from `first` on are turned, each
@@ -278,6 +305,18 @@ TEST(Readings, OfTwoPaperSamplesAreHeldAgainstThoseBeforeThem) {
   EXPECT_FALSE(buffer.readings.now(buffer_setup(), buffer.health, buffer.gyros).used[0]);
 }
 
+TEST(Readings, AreNotHeldAgainstThoseFarAway) {
+  SomeReadings buffer;
+  buffer.push(0);
+  for (const double t_s : {3.0, 6.0, 9.0}) {  // further apart than readings are compared
+    GyroSample s = turning_sample(t_s);
+    s.h_b[0] = rotated<double>(s.h_b[0], Eigen::Vector3d(0, 0.017 * t_s * t_s * t_s, 0));
+    buffer.readings.push(s);
+  }
+  EXPECT_EQ(count(buffer.at_time(9).value().used), 2);
+  EXPECT_EQ(count(buffer.readings.now(buffer_setup(), buffer.health, buffer.gyros).used), 2);
+}
+
 TEST(Readings, OfABodyThatShakesAreUsed) {
   // 0.01 rad to and fro at each sample, all gyros alike: no polynomial explains it, but the momenta stay as they are.
   SomeReadings buffer;
@@ -296,6 +335,8 @@ TEST(Readings, OfABodyThatShakesAreUsed) {
   EXPECT_EQ(count(used), 2);
   EXPECT_GE(unused, 1);  // as it begins
   EXPECT_LE(unused, 8);
+  EXPECT_EQ(count(buffer.at_time(7.5).value().used), 2);
+  EXPECT_EQ(count(buffer.at_time(7.55).value().used), 2);
 }
 
 TEST(Between, GoesFromOneDirectionToTheOther) {

@@ -440,6 +440,33 @@ Json forecast_json(const OpenLoopForecast& forecast) {
   return json;
 }
 
+void read_latencies(const JsonNode& node, std::size_t gyros, ClockCorrection& clocks) {
+  const std::vector<JsonNode> values = node.elements();
+  if (values.size() != gyros) {
+    node.refuse(fmt::format("has {} values for {} gyros", values.size(), gyros), "give one for each gyro");
+  }
+  for (std::size_t k = 0; k < std::min(gyros, std::size_t{kMaxGyros}); ++k) {
+    clocks.late_s[static_cast<int>(k)] = values[k].number(limits::kLatency_s);
+  }
+}
+
+Members clock_members(ClockCorrection& clocks, std::size_t gyros) {
+  return {number_member("clock_offset_s", clocks.offset_s, limits::kClockOffset_s,
+                        "a fix stamped t holds the attitude at t + this + clock_rate_s_s (t - epoch)"),
+          number_member("clock_rate_s_s", clocks.rate_s_s, limits::kClockRate_s_s, "of the star tracker"),
+          {"latency_s", "of each gyro: a reading stamped t holds the direction at t - this",
+           array_of(number_schema(limits::kLatency_s)),
+           [&clocks, gyros](const JsonNode& node) { read_latencies(node, gyros, clocks); }}};
+}
+
+Json clocks_json(const ClockCorrection& clocks, std::size_t gyros) {
+  return {{"clock_offset_s", clocks.offset_s},
+          {"clock_rate_s_s", clocks.rate_s_s},
+          {"latency_s", std::vector<double>(clocks.late_s.begin(),
+                                            clocks.late_s.begin() +
+                                                static_cast<std::ptrdiff_t>(std::min(gyros, std::size_t{kMaxGyros})))}};
+}
+
 Members determined_members(Determined& determined) {
   constexpr int kMost = Layout::kEq1 * kMaxGyros;
   const auto member = [](std::string_view key, int& target, std::string_view about) -> Member {
@@ -515,6 +542,7 @@ Members verdict_members(Verdict& verdict) {
 Members calibration_members(Calibration& calibration) {
   GyroCalibration gyro;
   CalibrationNoise noise;
+  ClockCorrection clocks;
   DriftFieldLevel level;
   Determined determined;
   OpenLoopForecast forecast;
@@ -539,6 +567,11 @@ Members calibration_members(Calibration& calibration) {
       {"gyros", "one element per gyro", gyros, [&](const JsonNode& node) { read_gyros(node, calibration); }},
       optional_member({"further", "further states by name", object_of({}, estimate),
                        [&](const JsonNode& node) { read_further(node, calibration); }}),
+      optional_member({"clocks", "how far the stamps of the telemetry are off, as in pass.toml, whose own are in it",
+                       schema_of(clock_members(clocks, kMaxGyros)),
+                       [&](const JsonNode& node) {
+                         read_members(node, clock_members(calibration.clocks.emplace(), calibration.gyros.size()));
+                       }}),
       optional_member({"noise", "that it went by", schema_of(noise_members(noise)),
                        [&](const JsonNode& node) { read_members(node, noise_members(calibration.noise.emplace())); }}),
       optional_member({"drift_field", "drift outside eq. (1) by potential and degree, where it is estimated as a field",
@@ -627,6 +660,10 @@ std::string format_calibration(const Calibration& calibration) {
   }
   const std::string start_up =
       calibration.start_up.empty() ? "" : fmt::format(" \"start_up\": {},", dump(Json(calibration.start_up)));
+  const std::string clocks =
+      calibration.clocks
+          ? fmt::format(" \"clocks\": {},\n", dump(clocks_json(*calibration.clocks, calibration.gyros.size())))
+          : "";
   const std::string noise =
       calibration.noise ? fmt::format(" \"noise\": {},\n", dump(noise_json(*calibration.noise))) : "";
   Json levels = Json::array();
@@ -649,13 +686,14 @@ std::string format_calibration(const Calibration& calibration) {
       "{{\"format\": \"{}\", \"version\": {},\n"
       " \"estimator\": {}, \"epoch_tai\": \"{}\",{} \"t_s\": {},\n"
       " \"gyros\": {},\n"
-      " \"further\": {},\n{}{}{}{}"
+      " \"further\": {},\n{}{}{}{}{}"
       " \"covariance\": {{\n  \"states\": {},\n  \"matrix\": {}}},\n"
       " \"verdict\": {{\"trustworthy\": {}, \"findings\": {}}},\n"
       " \"statistics\": {}}}\n",
       kFormat, kVersion, dump(Json(name_of(calibration.estimator))), format_epoch(calibration.epoch), start_up,
-      dump(Json(to_seconds(calibration.t - calibration.epoch))), lines(gyros), dump(further), noise, field, determined,
-      forecast, dump(states), lines(matrix), calibration.verdict.trustworthy, lines(findings), dump(statistics));
+      dump(Json(to_seconds(calibration.t - calibration.epoch))), lines(gyros), dump(further), clocks, noise, field,
+      determined, forecast, dump(states), lines(matrix), calibration.verdict.trustworthy, lines(findings),
+      dump(statistics));
 }
 
 void write_calibration(const std::filesystem::path& path, const Calibration& calibration) {

@@ -188,6 +188,25 @@ TEST(CalibrationJson, KeepsTheDriftField) {
               HasSubstr("drift_field[0].sigma_factor"));
 }
 
+TEST(CalibrationJson, KeepsTheClocksWhereTheyAreOff) {
+  Calibration calibration = sample_calibration();
+  EXPECT_FALSE(parse_calibration(format_calibration(calibration), "c.json").clocks.has_value());
+  ClockCorrection& clocks = calibration.clocks.emplace(ClockCorrection{-3.25, 1e-6, {}});
+  clocks.late_s[1] = 0.02;
+  const std::string text = format_calibration(calibration);
+  const std::optional<ClockCorrection> back = parse_calibration(text, "c.json").clocks;
+  ASSERT_TRUE(back.has_value());
+  EXPECT_EQ(back->offset_s, clocks.offset_s);
+  EXPECT_EQ(back->rate_s_s, clocks.rate_s_s);
+  EXPECT_EQ(back->late_s[0], 0);
+  EXPECT_EQ(back->late_s[1], clocks.late_s[1]);
+  EXPECT_THAT(refusal_of(replaced(text, "\"clock_rate_s_s\":1e-06", "\"clock_rate_s_s\":1")),
+              HasSubstr("clocks.clock_rate_s_s is 1"));
+  EXPECT_THAT(refusal_of(replaced(text, "[0.0,0.02]", "[0.02]")),
+              HasSubstr("clocks.latency_s has 1 values for 2 gyros"));
+  EXPECT_THAT(refusal_of(replaced(text, "[0.0,0.02]", "[0.0,99]")), HasSubstr("clocks.latency_s[1] is 99"));
+}
+
 TEST(CalibrationJson, MayBeWithoutNoise) {
   Calibration calibration = sample_calibration();
   calibration.noise->star_tracker_noise_rad.reset();

@@ -47,12 +47,29 @@ def test_a_pass_is_cut_at_the_first_row_of_the_rest(tmp_path, at_s, first):
 
 
 def outcome(world="slews", status=0, wrong=(), estimator="batch", seed=1):
-    return {"world": world, "seed": seed, "estimator": estimator, "status": status, "wrong": list(wrong)}
+    return {"world": world, "seed": seed, "estimator": estimator, "status": status, "wrong": list(wrong), "findings": []}
 
 
 def test_shares_are_of_what_they_say():
     outcomes = [outcome(), outcome(status=1), outcome(wrong=["alignment"]), outcome(status=1, wrong=["need"]), outcome(status=3)]
     assert verdict.summary(outcomes) == (1, 5, 1, 2)
+
+
+def test_reasons_of_refusals_are_told_apart():
+    def refused(world, *codes, wrong=()):
+        return outcome(world, status=1, wrong=wrong) | {"do_not_use": list(codes), "findings": list(codes)}
+    outcomes = [refused("gyro-case-step-20", "gyro-mounting-moved", "need-not-met"), refused("slews", "gyro-mounting-moved"),
+                refused("slews", "need-not-met"), refused("slews", "need-not-met", wrong=["need"]), outcome()]
+    assert verdict.reasons(outcomes) == [1, 1, 1]
+    for world in worlds.WORLDS:
+        assert isinstance(world.faults, tuple), world.name
+
+
+def test_forecasts_are_held_against_what_was_predicted():
+    def flown(error, predicted, *findings):
+        return outcome() | {"forecast_arcsec": error, "predicted_arcsec": predicted, "findings": list(findings)}
+    made = verdict.predictions([flown(30, 100), flown(400, 800, "need-not-met"), flown(400, 1000, "need-not-met"), flown(5, 1000, "need-not-met")])
+    assert "| batch | 3 | 0.40 | 0.50 | 1 |" in made
 
 
 def test_an_interrupted_run_goes_on_and_forgets_another_program(tmp_path):

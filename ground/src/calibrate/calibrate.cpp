@@ -2,7 +2,9 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <boost/math/distributions/chi_squared.hpp>
+#include <chrono>
 #include <cmath>
 #include <optional>
 #include <utility>
@@ -10,6 +12,7 @@
 #include "batch/pass_setup.hpp"
 #include "batch/refine.hpp"
 #include "choose/decide.hpp"
+#include "judge/changes.hpp"
 #include "model/drift_on_board.hpp"
 #include "model/prior.hpp"
 #include "model/setup.hpp"
@@ -184,6 +187,61 @@ void add_to_estimates(const ClockCorrection& correction, std::vector<FurtherEsti
   }
 }
 
+/// How far the stamps of the telemetry are off in all: what pass.toml says, what was corrected before the calibration,
+/// and what the calibration found of the rest where it is sure of it. `further`: as add_to_estimates() leaves them.
+std::optional<ClockCorrection> clocks_found(const PassSettings& settings, const ClockCorrection& corrected,
+                                            const std::vector<FurtherEstimate>& further) {
+  constexpr double kSure = 5;
+  const auto is_clock = [](const FurtherEstimate& estimate) {
+    return estimate.parameter.is_further(FurtherState::kClockOffset) ||
+           estimate.parameter.is_further(FurtherState::kClockRate);
+  };
+  ClockCorrection found = corrected;
+  // Offset and rate are correlated: both are taken where one of them is known to be there.
+  if (std::ranges::any_of(further, [&](const FurtherEstimate& estimate) {
+        return is_clock(estimate) && std::abs(estimate.value) >= kSure * estimate.sigma;
+      })) {
+    for (const FurtherEstimate& estimate : further) {
+      if (estimate.parameter.is_further(FurtherState::kClockOffset)) {
+        found.offset_s = estimate.value;
+      } else if (estimate.parameter.is_further(FurtherState::kClockRate)) {
+        found.rate_s_s = estimate.value;
+      }
+    }
+  }
+  found.offset_s += settings.star_tracker_clock_offset_s;
+  found.rate_s_s += settings.star_tracker_clock_rate_s_s;
+  for (std::size_t k = 0; k < std::min(settings.gyros.size(), std::size_t{kMaxGyros}); ++k) {
+    found.late_s[static_cast<int>(k)] += settings.gyros[k].latency_s;
+  }
+  return found.of_star_tracker() || found.of_gyros() ? std::optional(found) : std::nullopt;
+}
+
+/// What is left to correct of stamps that pass.toml has mended, where the clocks still are as the calibration in use
+/// found them. Nothing where it is so old that even a rate known to 0.01 ppm no longer tells the offset.
+ClockCorrection clocks_before(const PassSettings& settings) {
+  constexpr Duration kHolds = std::chrono::days(30);
+  constexpr double kNothing_s = 1e-6;  // no attitude shows it
+  if (!settings.prior || !settings.prior->clocks) {
+    return {};
+  }
+  const Duration since = settings.epoch - settings.prior->epoch;
+  if (std::chrono::abs(since) > kHolds) {
+    return {};
+  }
+  ClockCorrection left = *settings.prior->clocks;
+  left.offset_s += left.rate_s_s * to_seconds(since) - settings.star_tracker_clock_offset_s;
+  left.rate_s_s -= settings.star_tracker_clock_rate_s_s;
+  for (std::size_t k = 0; k < std::min(settings.gyros.size(), std::size_t{kMaxGyros}); ++k) {
+    double& late_s = left.late_s[static_cast<int>(k)];
+    late_s -= settings.gyros[k].latency_s;
+    late_s = std::abs(late_s) < kNothing_s ? 0 : late_s;
+  }
+  left.offset_s = std::abs(left.offset_s) < kNothing_s ? 0 : left.offset_s;
+  left.rate_s_s = std::abs(left.rate_s_s) * to_seconds(settings.duration) < kNothing_s ? 0 : left.rate_s_s;
+  return left;
+}
+
 /// `pass`: with its stamps corrected. Without a verdict.
 CalibrationRun calibrate_as_stamped(const Pass& pass, const CalibrationOptions& options, const Progress& progress) {
   Decision decision = decide(pass, options);
@@ -249,11 +307,20 @@ CalibrationRun calibrate(const Pass& pass, const CalibrationOptions& options, co
   run.clocks = clocks;
   run.clock_correction = correction;
   add_to_estimates(correction, run.calibration.further);
+  run.calibration.clocks = clocks_found(pass.settings, correction, run.calibration.further);
   run.calibration.verdict = judge(stamped, run);
+  put_changes_into_covariance(run);
   return run;
 }
 
-NavigationRun navigate(const Pass& pass, const CalibrationOptions& options, const Progress& progress) {
+NavigationRun navigate(const Pass& as_telemetered, const CalibrationOptions& options, const Progress& progress) {
+  const ClockCorrection correction = clocks_before(as_telemetered.settings);
+  std::optional<Pass> corrected;
+  if (correction.of_star_tracker() || correction.of_gyros()) {
+    corrected = as_telemetered;
+    correct(*corrected, correction);
+  }
+  const Pass& pass = corrected ? *corrected : as_telemetered;
   Pipeline pipeline(pass.settings, settled_before(pass.settings, options));
   NavigationRecorder recorder;
   ProgressMeter meter(progress, pass.gyro.size());
@@ -271,6 +338,7 @@ NavigationRun navigate(const Pass& pass, const CalibrationOptions& options, cons
     run.misfit_limit = boost::math::quantile(boost::math::chi_squared(pipeline.layout().parameters()), 0.999);
   }
   run.forecast = forecast_of(options, pipeline, run.attitude);
+  run.clock_correction = correction;
   run.clocks = clocks_of(pass);
   run.verdict = judge_navigation(pass, run);
   return run;

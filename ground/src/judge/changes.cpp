@@ -16,9 +16,11 @@ namespace {
 constexpr double kLogOddsOfChange = 9.9;
 /// … and up to which less likely explanations are named beside the likeliest.
 constexpr double kCannotBeTold = 5;
-/// Where a change moves a parameter by so many claimed sigmas, the result is wrong: the error is up to twice as large,
-/// because the noise found and the drift model have followed a part of the change.
-constexpr double kSigmasOfWrong = 2;
+/// The error is up to so many times what a change is found to make, because the noise found and the drift model have
+/// followed a part of it.
+constexpr double kMoreThanFound = 2;
+/// Where a change moves a parameter by so many claimed sigmas, the result is wrong.
+constexpr double kSigmasOfWrong = 4 / kMoreThanFound;
 
 std::string of_gyro(const Change& change) {
   return change.gyro < 0 ? std::string("all gyros") : fmt::format("gyro {}", change.gyro + 1);
@@ -108,12 +110,12 @@ std::string size_text(const Change& change) {
   return text + ", ";
 }
 
-/// Of the parameters by which the result is off, the largest in its claimed sigma.
-double sigmas_off(const CalibrationRun& run, const Change& change) {
+/// Of the parameters in the order of Calibration::states; 0 for those that Change does not tell of.
+Eigen::VectorXd parameters_off(const Calibration& calibration, const Change& change) {
   constexpr int kOwnParameters = Layout::kEq1 + 3;
-  double worst = 0;
-  for (std::size_t row = 0; row < run.calibration.states.size(); ++row) {
-    const ParameterId& state = run.calibration.states[row];
+  Eigen::VectorXd off = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(calibration.states.size()));
+  for (std::size_t row = 0; row < calibration.states.size(); ++row) {
+    const ParameterId& state = calibration.states[row];
     int i = state.is_alignment() ? Layout::kEq1 + state.component : Layout::kEq1;
     for (int member = 0; state.is_drift() && member < Layout::kEq1; ++member) {
       i = state.coefficient == DriftCoefficient::of_eq1(member) ? member : i;
@@ -121,28 +123,53 @@ double sigmas_off(const CalibrationRun& run, const Change& change) {
     if (state.is_drift() && i == Layout::kEq1) {
       continue;  // outside eq. (1)
     }
-    const auto at = static_cast<Eigen::Index>(row);
-    worst =
-        std::max(worst, std::abs(change.parameters_off(kOwnParameters * static_cast<Eigen::Index>(state.gyro()) + i)) /
-                            std::sqrt(run.calibration.covariance(at, at)));
+    off(static_cast<Eigen::Index>(row)) =
+        change.parameters_off(kOwnParameters * static_cast<Eigen::Index>(state.gyro()) + i);
+  }
+  return off;
+}
+
+/// Of the parameters by which the result is off, the largest in its claimed sigma; of the alignments alone, or of all.
+double sigmas_off(const Calibration& calibration, const Change& change, bool alignments_alone) {
+  const Eigen::VectorXd off = parameters_off(calibration, change);
+  double worst = 0;
+  for (Eigen::Index i = 0; i < off.size(); ++i) {
+    if (!alignments_alone || calibration.states[static_cast<std::size_t>(i)].is_alignment()) {
+      worst = std::max(worst, std::abs(off(i)) / std::sqrt(calibration.covariance(i, i)));
+    }
   }
   return worst;
 }
 
+/// The likeliest, where it counts as there.
+const Change* change_found(const CalibrationRun& run) {
+  return run.changes.empty() || run.changes.front().log_odds < kLogOddsOfChange ? nullptr : &run.changes.front();
+}
+
 }  // namespace
 
+void put_changes_into_covariance(CalibrationRun& run) {
+  if (const Change* const change = change_found(run); change != nullptr && change->moving == Moving::kCoefficients) {
+    const Eigen::VectorXd off = kMoreThanFound * parameters_off(run.calibration, *change);
+    run.calibration.covariance += off * off.transpose();
+  }
+}
+
 void judge_changes(const CalibrationRun& run, std::vector<Finding>& findings) {
-  if (run.changes.empty() || run.changes.front().log_odds < kLogOddsOfChange) {
+  const Change* const found = change_found(run);
+  if (found == nullptr) {
     return;
   }
-  const Change& likeliest = run.changes.front();
+  const Change& likeliest = *found;
   std::string others;
   for (const Change& change : run.changes) {
     if (&change != &likeliest && change.log_odds > likeliest.log_odds - kCannotBeTold) {
       others += (others.empty() ? "; nearly as likely: " : ", ") + described(change);
     }
   }
-  const double off = sigmas_off(run, likeliest);
+  const double off = sigmas_off(run.calibration, likeliest, false);
+  const bool in_covariance = likeliest.moving == Moving::kCoefficients;
+  const bool is_wrong = (in_covariance ? sigmas_off(run.calibration, likeliest, true) : off) > kSigmasOfWrong;
   const auto minutes = [&](Time t) { return to_seconds(t - run.calibration.epoch) / 60; };
   std::string when;
   if (likeliest.motion == Motion::kStep) {
@@ -152,12 +179,14 @@ void judge_changes(const CalibrationRun& run, std::vector<Finding>& findings) {
   what.front() = static_cast<char>(what.front() - 'a' + 'A');
   Finding finding{code_of(likeliest.moving),
                   fmt::format("{}{}: the estimates take what moves for constant{}.", what, when,
-                              off > kSigmasOfWrong ? ", and their sigmas are wrong" : ""),
+                              is_wrong        ? ", and their sigmas are wrong"
+                              : in_covariance ? "; what that makes of the coefficients is in their sigmas"
+                                              : ""),
                   fmt::format("{}likelier than nothing by e^{:.0f}; the largest effect on a parameter is {:.1f} of its "
                               "sigmas{}",
                               size_text(likeliest), likeliest.log_odds, off, others),
                   std::string(cure_of(likeliest))};
-  if (off <= kSigmasOfWrong) {
+  if (!is_wrong) {
     finding.severity = FindingSeverity::kWarning;
   }
   findings.push_back(std::move(finding));

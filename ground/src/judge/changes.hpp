@@ -9,7 +9,12 @@ namespace trihedron::ground {
 
 /// Names the likeliest of the changes that the pass gives evidence of (docs/mathematics.md, section 12): what moved,
 /// when, by how much, and what cures it; nothing where none is likely. The result must not be used where it moves a
-/// parameter by more than its claimed sigma allows.
+/// parameter by more than its claimed sigma allows. Of coefficients that change that is so for the alignments alone:
+/// what they are off themselves is put into the covariance.
 void judge_changes(const CalibrationRun& run, std::vector<Finding>& findings);
+
+/// Adds what the estimates are off by coefficients that change to the covariance, of all parameters together; nothing
+/// where none are found to change. To be called once, after the verdict.
+void put_changes_into_covariance(CalibrationRun& run);
 
 }  // namespace trihedron::ground

@@ -19,6 +19,11 @@ constexpr double kTooMuchChange_s = 0.05;
 constexpr double kSeenLate_s = 2e-3;
 constexpr double kTooLate_s = 0.01;
 
+/// Where the calibration in use had something to say of them.
+constexpr const char* kAfterCorrection = " though they were corrected as the calibration in use says";
+constexpr const char* kCureAfterCorrection =
+    "The clocks are no longer as the calibration found them: calibrate on this pass, or take \"clocks\" out of the "
+    "file where the stamps are right by now.";
 constexpr const char* kWhichClock =
     "The two clocks alone do not tell which of them is wrong; times given are those of the gyros.";
 
@@ -65,6 +70,28 @@ void judge_late_gyros(const PassSettings& settings, const Clocks& clocks, const 
                     "of gyro {}: "
                     "latency_s = {:.5f}.",
                     k + 1, prior.latency_s + late_s[k]));
+  }
+}
+
+/// What the navigation corrected by the calibration in use.
+void tell_correction(const PassSettings& settings, const ClockCorrection& correction, std::vector<Finding>& findings) {
+  constexpr const char* kNone = "None needed while the clocks stay as they are.";
+  if (correction.of_star_tracker()) {
+    const double change_s = correction.rate_s_s * to_seconds(settings.duration);
+    add(findings, FindingCode::kClockOffsetFound, Finding::Severity::kNote,
+        "The stamps of the star tracker were corrected by what the calibration in use found of its clock.",
+        fmt::format("fixes hold the attitude {} after their stamp at the epoch of this pass; over the pass that "
+                    "changes by {}",
+                    offset_text(correction.offset_s), offset_text(change_s)),
+        kNone);
+  }
+  for (int k = 0; k < static_cast<int>(settings.gyros.size()); ++k) {
+    if (correction.late_s[k] != 0) {
+      add(findings, FindingCode::kGyroLate, Finding::Severity::kNote,
+          fmt::format("The readings of gyro {} were interpolated by what the calibration in use found of its stamps.",
+                      k + 1),
+          fmt::format("{:+.2f} ms", 1e3 * correction.late_s[k]), kNone);
+    }
   }
 }
 
@@ -116,6 +143,8 @@ void judge_clocks(const Pass& pass, const CalibrationRun& run, std::vector<Findi
 }
 
 void judge_clocks(const Pass& pass, const NavigationRun& run, std::vector<Finding>& findings) {
+  const bool corrected = run.clock_correction.of_star_tracker() || run.clock_correction.of_gyros();
+  tell_correction(pass.settings, run.clock_correction, findings);
   if (!run.clocks) {
     return;
   }
@@ -128,13 +157,14 @@ void judge_clocks(const Pass& pass, const NavigationRun& run, std::vector<Findin
     const bool wrong = far || std::abs(change_s) > kTooMuchChange_s;
     const Measured& at_epoch = change_s == 0 ? middle : clocks.offset_s;
     add(findings, FindingCode::kClocksApart, wrong ? Finding::Severity::kDoNotUse : Finding::Severity::kWarning,
-        fmt::format("The stamps of the star tracker are off those of the gyros, which is in the attitude. {}",
-                    kWhichClock),
+        fmt::format("The stamps of the star tracker are off those of the gyros{}, which is in the attitude. {}",
+                    corrected ? kAfterCorrection : "", kWhichClock),
         fmt::format(
             "fixes hold the attitude {} after their stamp in the middle of the pass; over the pass that changes "
             "by {}",
             offset_text(middle.value), offset_text(change_s)),
-        cure_of_star_tracker(pass.settings, at_epoch.value, change_s == 0 ? 0 : clocks.rate_s_s.value));
+        corrected ? kCureAfterCorrection
+                  : cure_of_star_tracker(pass.settings, at_epoch.value, change_s == 0 ? 0 : clocks.rate_s_s.value));
   }
   PerGyro<double> late_s{};
   double latest_s = 0;
@@ -143,9 +173,13 @@ void judge_clocks(const Pass& pass, const NavigationRun& run, std::vector<Findin
     late_s[k] = its.is_sure(kSigmasToTell) && std::abs(its.value) > kSeenLate_s ? its.value : 0;
     latest_s = std::max(latest_s, std::abs(late_s[k]));
   }
+  const std::size_t before = findings.size();
   judge_late_gyros(pass.settings, clocks, late_s, findings,
                    latest_s > kTooLate_s ? Finding::Severity::kDoNotUse : Finding::Severity::kWarning,
                    ", which is in the attitude");
+  for (std::size_t i = before; corrected && i < findings.size(); ++i) {
+    findings[i].cure = kCureAfterCorrection;
+  }
 }
 
 }  // namespace trihedron::ground

@@ -219,6 +219,8 @@ constexpr double kFalseAlarm = 1e-5;
 /// Correlations and lines below these limits do no harm, however significant.
 constexpr double kCorrelated = 0.05;
 constexpr double kLineInSigmas = 0.1;
+/// By so much too small, and one in a hundred of errors about three axes is beyond four of its sigmas.
+constexpr double kSigmasTooSmall = 4 / 2.93;
 
 bool is_chance(double square, int degrees_of_freedom) {
   return degrees_of_freedom == 0 || square <= boost::math::quantile(boost::math::complement(
@@ -235,9 +237,15 @@ void judge_whiteness(const Pass& pass, const CalibrationRun& run, std::vector<Fi
     add(findings, FindingCode::kInnovationsNotWhite,
         "Fixes that follow each other are off alike: something is left in them that the model does not have, and its "
         "sigmas are too small.",
-        fmt::format("autocorrelation up to {:+.3f}; N Σ r² {:.0f} of {} degrees of freedom", found.largest_correlation,
-                    found.correlation_square, found.degrees_of_freedom),
+        fmt::format(
+            "autocorrelation up to {:+.3f}; N Σ r² {:.0f} of {} degrees of freedom; averages of them are off by "
+            "{:.1f} times what their sigmas say",
+            found.largest_correlation, found.correlation_square, found.degrees_of_freedom,
+            std::sqrt(found.variance_of_mean)),
         kCure);
+    if (found.variance_of_mean > kSigmasTooSmall * kSigmasTooSmall) {
+      findings.back().severity = Severity::kDoNotUse;
+    }
   }
   for (const Whiteness::Line& line : found.lines) {
     if (line.amplitude > kLineInSigmas && !is_chance(2 * line.power, line.degrees_of_freedom)) {
@@ -388,6 +396,13 @@ void judge_steadiness(const Pass& pass, const CalibrationRun& run, std::vector<F
           ? fmt::format("about {} at best about this axis from the fixes alone", angle_text(observability.sigma_rad))
           : "the fixes alone do not determine it",
       "Fly slews about the other axes during the calibration: ten minutes of 10° and more suffice.");
+  // What is not known is in the sigmas, and by them the forecast for flight as in the pass is made.
+  const std::optional<OpenLoopForecast>& forecast = run.calibration.forecast;
+  if (!believes && forecast && forecast->need && forecast->need->met) {
+    Finding& finding = findings.back();
+    finding.severity = Severity::kWarning;
+    finding.text += " The need that is stated is met with these sigmas.";
+  }
 }
 
 void judge_unused_sensors(const Pass& pass, const CalibrationRun& run, std::vector<Finding>& findings) {

@@ -41,6 +41,21 @@ double correlation(const std::vector<double>& z, int lag) {
   return product / square;
 }
 
+/// By how much the variance of a mean is larger than that of white numbers: 1 + 2 Σ r, up to the first lag at which
+/// nothing is left of the correlation. What follows is noise of the estimates.
+double variance_of_mean(const std::vector<double>& z) {
+  constexpr int kMostLags = 200;  // ten minutes, at the usual rate
+  double factor = 1;
+  for (int lag = 1; lag <= kMostLags; ++lag) {
+    const double r = correlation(z, lag);
+    if (r <= 0) {
+      break;
+    }
+    factor += 2 * r;
+  }
+  return factor;
+}
+
 Whiteness::Line line_of(const std::vector<Series>& all, int multiple, double orbital_rate_rad_s) {
   Whiteness::Line line{multiple, 0, 2 * static_cast<int>(all.size()), 0};
   for (const Series& series : all) {
@@ -61,6 +76,7 @@ Whiteness whiteness(const std::vector<FixRecord>& fixes, double orbital_rate_rad
   const std::vector<Series> all = series_of(fixes);
   Whiteness result;
   for (const Series& series : all) {
+    result.variance_of_mean = std::max(result.variance_of_mean, variance_of_mean(series.z));
     for (int lag = 1; lag <= Whiteness::kLags; ++lag) {
       const double r = correlation(series.z, lag);
       result.correlation_square += static_cast<double>(series.z.size()) * r * r;

@@ -13,6 +13,8 @@ struct Whiteness {
   double correlation_square = 0;
   int degrees_of_freedom = 0;
   double largest_correlation = 0;
+  /// Of the component with the most: by how much the variance of a mean of many is larger than if they were white.
+  double variance_of_mean = 1;
 
   /// At a multiple of the orbital rate. Twice the power is χ² of `degrees_of_freedom` where there is no line.
   struct Line {

@@ -225,5 +225,79 @@ TEST(Navigate, TellsOfClocksThatAreApart) {
   EXPECT_FALSE(late.trustworthy);
 }
 
+/// An open loop over the next hour with what a calibration of the hours before found; `latency_s` of the star tracker
+/// and of gyro 2, in the calibration and in the hour after it.
+struct Later {
+  NavigationRun run;
+  double worst_sigmas = 0;  ///< of the error of the attitude about one axis
+};
+
+Later navigated(double tracker_s, double gyro_s, double later_tracker_s, double stated_s = 0) {
+  const auto flown = [&](double latency_s) {
+    Scenario scenario = scenario_in_eq1(3, std::chrono::hours(3));
+    scenario.star_tracker.latency_s = latency_s;
+    scenario.gyros[1].readout.latency_s = gyro_s;
+    return sim::simulate(scenario);
+  };
+  const Time cut = Time{} + std::chrono::hours(2);
+  const auto split = [&](const Pass& whole, bool first) {
+    Pass part = whole;
+    const Time at = whole.settings.epoch + (cut - Time{});
+    const auto begin = std::ranges::lower_bound(whole.gyro.t, at) - whole.gyro.t.begin();
+    const auto fix = std::ranges::lower_bound(whole.star_tracker.t, at) - whole.star_tracker.t.begin();
+    const auto keep = [first](auto& values, std::ptrdiff_t place) {
+      first ? values.erase(values.begin() + place, values.end()) : values.erase(values.begin(), values.begin() + place);
+    };
+    keep(part.gyro.t, begin);
+    keep(part.gyro.h, begin * 3 * whole.gyro.gyros);
+    keep(part.star_tracker.t, fix);
+    keep(part.star_tracker.q_in_c, fix);
+    return part;
+  };
+  CalibrationOptions options = told();
+  options.further_states[FurtherState::kClockOffset] = FurtherStateOptions::Choice::kAuto;
+  Pass later = split(flown(later_tracker_s).pass, false);
+  later.settings.prior = calibrate(split(flown(tracker_s).pass, true), options).calibration;
+  if (stated_s != 0) {
+    later.settings.star_tracker_clock_offset_s = stated_s;
+    correct(later, {stated_s, 0, {}});
+  }
+  CalibrationOptions open_loop;
+  open_loop.corrections.take_parameters = false;
+  open_loop.corrections.when = CorrectionOptions::When::kOnlyFirst;
+  Later result{navigate(later, open_loop), 0};
+  const Truth truth = flown(0).truth;
+  const AttitudeErrors errors = attitude_errors(result.run.attitude, truth.t, truth.q_in_c);
+  for (std::size_t i = 0; i < errors.error_rad.size(); ++i) {
+    result.worst_sigmas =
+        std::max(result.worst_sigmas, (errors.error_rad[i].array() / errors.sigma_rad[i].array()).abs().maxCoeff());
+  }
+  return result;
+}
+
+TEST(Navigate, CorrectsStampsAsTheCalibrationInUseFoundThem) {
+  for (const auto& [tracker_s, gyro_s, code] : {std::tuple(3.0, 0.0, FindingCode::kClockOffsetFound),
+                                                {0.02, 0.0, FindingCode::kClockOffsetFound},
+                                                {0.0, 0.125, FindingCode::kGyroLate}}) {
+    const Later later = navigated(tracker_s, gyro_s, tracker_s);
+    EXPECT_LT(later.worst_sigmas, kSigmas) << tracker_s << ' ' << gyro_s;
+    EXPECT_TRUE(later.run.verdict.trustworthy);
+    EXPECT_TRUE(later.run.verdict.has(code));
+    EXPECT_FALSE(later.run.verdict.has(FindingCode::kClocksApart));
+  }
+}
+
+TEST(Navigate, DoesNotCorrectTwiceWhatPassTomlStates) {
+  const Later later = navigated(3, 0, 3, -3);
+  EXPECT_NEAR(later.run.clock_correction.offset_s, 0, 5e-3);
+  EXPECT_LT(later.worst_sigmas, kSigmas);
+}
+
+TEST(Navigate, SaysThatTheClocksAreNoLongerAsTheCalibrationFoundThem) {
+  const Later later = navigated(3, 0, 0);
+  EXPECT_FALSE(later.run.verdict.trustworthy);
+  expect_finding(later.run.verdict, FindingCode::kClocksApart, "no longer as the calibration found them");
+}
+
 }  // namespace
 }  // namespace trihedron::ground

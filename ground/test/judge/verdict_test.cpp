@@ -8,6 +8,7 @@
 #include <limits>
 #include <random>
 
+#include "judge/changes.hpp"
 #include "named.hpp"
 #include "trihedron/core/frames.hpp"
 
@@ -112,6 +113,53 @@ TEST(Verdict, FindsInnovationsThatAreNotWhite) {
   EXPECT_THAT(codes(judge(good_pass(), with_innovations(0, 0))), IsEmpty());
   EXPECT_THAT(codes(judge(good_pass(), with_innovations(0.3, 0))), Contains("innovations-not-white"));
   EXPECT_THAT(codes(judge(good_pass(), with_innovations(-0.3, 0))), Contains("innovations-not-white"));
+}
+
+TEST(Verdict, ForbidsSigmasThatAreTooSmallBecauseFixesAreOffAlike) {
+  // Means of such numbers are off by √((1 + r)/(1 − r)) times what they would be of white ones: 1.2 and 1.7 times.
+  EXPECT_TRUE(judge(good_pass(), with_innovations(0.2, 0)).trustworthy);
+  EXPECT_FALSE(judge(good_pass(), with_innovations(0.5, 0)).trustworthy);
+  EXPECT_TRUE(judge(good_pass(), with_innovations(-0.5, 0)).trustworthy);
+}
+
+/// With the coefficient of its first gyro, and its alignment, off by so many sigmas because the coefficients change.
+CalibrationRun with_coefficients_off(double coefficient_sigmas, double alignment_sigmas) {
+  auto run = good_run();
+  Change& change = run.changes.emplace_back();
+  change.moving = Moving::kCoefficients;
+  change.motion = Motion::kWalk;
+  change.log_odds = 100;
+  change.parameters_off = Eigen::VectorXd::Zero(20);
+  change.parameters_off(0) = coefficient_sigmas * 1e-9;
+  change.parameters_off(7) = alignment_sigmas * 1e-6;
+  return run;
+}
+
+TEST(Verdict, CountsCoefficientsThatChangeInTheirSigmas) {
+  auto run = with_coefficients_off(10, 1);
+  EXPECT_THAT(codes(judge(good_pass(), run)), ElementsAre("coefficients-not-constant"));
+  EXPECT_TRUE(judge(good_pass(), run).trustworthy);
+  put_changes_into_covariance(run);
+  // Twice what was found.
+  EXPECT_NEAR(std::sqrt(run.calibration.covariance(0, 0)), std::hypot(1.0, 20.0) * 1e-9, 1e-15);
+  EXPECT_NEAR(std::sqrt(run.calibration.covariance(1, 1)), std::hypot(1.0, 2.0) * 1e-6, 1e-12);
+  EXPECT_NEAR(run.calibration.covariance(0, 1), 20e-9 * 2e-6, 1e-21);
+}
+
+TEST(Verdict, ForbidsCoefficientsThatChangeWhereTheAlignmentIsOffByThem) {
+  EXPECT_FALSE(judge(good_pass(), with_coefficients_off(10, 3)).trustworthy);
+}
+
+TEST(Verdict, LeavesTheCovarianceWhereNoCoefficientChanges) {
+  auto run = with_coefficients_off(10, 1);
+  run.changes.front().log_odds = 5;
+  put_changes_into_covariance(run);
+  EXPECT_EQ(run.calibration.covariance(0, 0), good_run().calibration.covariance(0, 0));
+  run.changes.front().log_odds = 100;
+  run.changes.front().moving = Moving::kGyroCase;
+  put_changes_into_covariance(run);
+  EXPECT_EQ(run.calibration.covariance(0, 0), good_run().calibration.covariance(0, 0));
+  EXPECT_FALSE(judge(good_pass(), run).trustworthy);
 }
 
 TEST(Verdict, FindsALineAtTheOrbitalRate) {
@@ -232,6 +280,21 @@ TEST(Verdict, FindsSteadyFlightAndNamesItsAxis) {
   EXPECT_THAT(codes(verdict), ElementsAre("weak-alignment-axis"));
   EXPECT_NE(verdict.findings[0].text.find("+1.000"), std::string::npos);
   EXPECT_FALSE(verdict.trustworthy);
+}
+
+TEST(Verdict, OfSteadyFlightIsTrustworthyForAStatedNeedThatIsMet) {
+  auto pass = good_pass();
+  pass.star_tracker = flight(0);
+  auto run = good_run();
+  NeedForecast& need = run.calibration.forecast.emplace().need.emplace();
+  need.met = true;
+  EXPECT_THAT(codes(judge(pass, run)), ElementsAre("weak-alignment-axis"));
+  EXPECT_TRUE(judge(pass, run).trustworthy);
+  run.options.estimator = Estimator::kPaper;  // its sigmas about this axis are too small, and so is the forecast
+  EXPECT_FALSE(judge(pass, run).trustworthy);
+  run.options.estimator = Estimator::kInvariant;
+  need.met = false;
+  EXPECT_FALSE(judge(pass, run).trustworthy);
 }
 
 TEST(Verdict, FindsSteadyFlightBehindRejectedOutliers) {

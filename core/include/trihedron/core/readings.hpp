@@ -83,7 +83,8 @@ class Readings {
   }
 
   /// Readings at `t`, by a cubic through the samples round it, or between the two next to it; nothing where there are
-  /// none close enough. `gyros`: their estimates, for the rate of the body.
+  /// none close enough. Where no cubic explains them, a gyro is not used whose reading next to `t` is a spike. `gyros`:
+  /// their estimates, for the rate of the body.
   template <class Gyros>
   [[nodiscard]] std::optional<FixReadings> at(Time t, const CalibrationSetup& setup, const GyroHealth& health,
                                               const Gyros& gyros) const {
@@ -104,7 +105,9 @@ class Readings {
     } else {
       return std::nullopt;
     }
-    static_cast<void>(fit(t, reach_, after, 3, setup, health, gyros, readings));
+    if (!fit(t, reach_, after, 3, setup, health, gyros, readings)) {
+      leave_out_spikes(after - 1, before_t == t ? after - 1 : after, setup, gyros, readings);
+    }
     return readings;
   }
 
@@ -116,7 +119,7 @@ class Readings {
     readings.used = health.usable(latest_t(), latest_t());
     readings.h_b = latest_directions();
     if (!fit(latest_t(), recent_, size_, 2, setup, health, gyros, readings)) {
-      leave_out_spikes(setup, gyros, readings);
+      leave_out_spikes_now(setup, gyros, readings);
     }
     return readings;
   }
@@ -178,52 +181,87 @@ class Readings {
   /// Leaves out each gyro whose latest reading leads elsewhere. Where the one before it did so as well, the body may
   /// have begun to move in another way: it then turns all momenta alike, and the angles between them stay.
   template <class Gyros>
-  void leave_out_spikes(const CalibrationSetup& setup, const Gyros& gyros, FixReadings& readings) const {
+  void leave_out_spikes_now(const CalibrationSetup& setup, const Gyros& gyros, FixReadings& readings) const {
     const int latest = size_ - 1;
     const GyroMask used = readings.used;
+    const auto continues = [&](int i, int k) {
+      const Agreement found = with_neighbours(i, -1, k, setup.readout_noise_rad[k], setup.recent());
+      return found.agree >= std::min(found.compared, 2);
+    };
     for (int k = 0; k < gyros_; ++k) {
-      const double noise_rad = setup.readout_noise_rad[k];
-      readings.used[k] =
-          used[k] && (continues(latest, k, noise_rad, setup.recent()) ||
-                      (!continues(latest - 1, k, noise_rad, setup.recent()) && keeps_angles(k, setup, gyros, used)));
+      readings.used[k] = used[k] && (continues(latest, k) ||
+                                     (!continues(latest - 1, k) && keeps_angles(latest, k, setup, gyros, used)));
     }
   }
 
-  /// Whether the reading of a gyro in sample i lies on the parabola through some three before it, one, two … samples
-  /// apart and not longer ago than `within`. Two of these parabolas are enough, so that a spike among those before it
-  /// does not count, and one where there are no more; true where there is none.
-  [[nodiscard]] bool continues(int i, int gyro, double noise_rad, Duration within) const {
+  /// Leaves out each gyro whose reading in one of the samples `first` and `last` leads elsewhere both than those before
+  /// it and than those after it. Where the samples beside it do so as well, the body moves in a way that no parabola
+  /// follows, and again the angles stay.
+  template <class Gyros>
+  void leave_out_spikes(int first, int last, const CalibrationSetup& setup, const Gyros& gyros,
+                        FixReadings& readings) const {
+    const GyroMask used = readings.used;
+    const auto belongs = [&](int i, int k) {
+      const double noise_rad = setup.readout_noise_rad[k];
+      const Agreement before = with_neighbours(i, -1, k, noise_rad, setup.recent());
+      const Agreement after = with_neighbours(i, 1, k, noise_rad, setup.recent());
+      const auto agrees = [](const Agreement& side) {
+        return side.compared > 0 && side.agree >= std::min(side.compared, 2);
+      };
+      return agrees(before) || agrees(after) || before.compared + after.compared == 0;
+    };
+    for (int k = 0; k < gyros_; ++k) {
+      for (int i = first; i <= last; ++i) {
+        const bool alone = i == 0 || i + 1 == size_ || belongs(i - 1, k) || belongs(i + 1, k);
+        readings.used[k] = readings.used[k] && (belongs(i, k) || (!alone && keeps_angles(i, k, setup, gyros, used)));
+      }
+    }
+  }
+
+  /// How many parabolas a reading was compared with, and with how many it agrees.
+  struct Agreement {
     int compared = 0;
     int agree = 0;
-    for (int apart = 1; apart <= kCompared && 3 * apart <= i && time(i) - time(i - 3 * apart) <= within; ++apart) {
-      const double t = to_seconds(time(i - apart) - time(i));
-      const double u = to_seconds(time(i - 2 * apart) - time(i));
-      const double v = to_seconds(time(i - 3 * apart) - time(i));
+  };
+
+  /// The reading of a gyro in sample i, compared with the parabolas through some three before it (`side` −1) or after
+  /// it (1), one, two … samples apart and not further away than `within`. Two that agree are enough, so that a spike
+  /// among its neighbours does not count, and one where there are no more.
+  [[nodiscard]] Agreement with_neighbours(int i, int side, int gyro, double noise_rad, Duration within) const {
+    Agreement found;
+    for (int apart = 1; apart <= kCompared; ++apart) {
+      const int step = side * apart;
+      const int farthest = i + 3 * step;
+      if (farthest < 0 || farthest >= size_ || (time(farthest) - time(i)) * side > within) {
+        break;
+      }
+      const double t = to_seconds(time(i + step) - time(i));
+      const double u = to_seconds(time(i + 2 * step) - time(i));
+      const double v = to_seconds(time(farthest) - time(i));
       const Eigen::Vector3d weights(u * v / ((u - t) * (v - t)), t * v / ((t - u) * (v - u)),
                                     t * u / ((t - v) * (u - v)));
-      const Eigen::Vector3d off = at(i).h_b[gyro] - weights(0) * at(i - apart).h_b[gyro] -
-                                  weights(1) * at(i - 2 * apart).h_b[gyro] - weights(2) * at(i - 3 * apart).h_b[gyro];
+      const Eigen::Vector3d off = at(i).h_b[gyro] - weights(0) * at(i + step).h_b[gyro] -
+                                  weights(1) * at(i + 2 * step).h_b[gyro] - weights(2) * at(farthest).h_b[gyro];
       const double limit = kSpike * noise_rad * noise_rad * (1 + weights.squaredNorm());
-      agree += off.squaredNorm() <= limit ? 1 : 0;
-      ++compared;
+      found.agree += off.squaredNorm() <= limit ? 1 : 0;
+      ++found.compared;
     }
-    return agree >= std::min(compared, 2);
+    return found;
   }
 
-  /// Whether the angle of a gyro's momentum to one of the others, by the latest readings, is that by two of the samples
-  /// before.
+  /// Whether the angle of a gyro's momentum to one of the others, by the readings of sample i, is that by two of the
+  /// samples before.
   template <class Gyros>
-  [[nodiscard]] bool keeps_angles(int gyro, const CalibrationSetup& setup, const Gyros& gyros,
+  [[nodiscard]] bool keeps_angles(int sample, int gyro, const CalibrationSetup& setup, const Gyros& gyros,
                                   const GyroMask& used) const {
     const auto cosine = [&](int i, int other) {
       return gyros[gyro].in_c(at(i).h_b[gyro]).dot(gyros[other].in_c(at(i).h_b[other]));
     };
-    const int latest = size_ - 1;
     for (int other = 0; other < gyros_; ++other) {
       const double noise_rad = std::max(setup.readout_noise_rad[gyro], setup.readout_noise_rad[other]);
       int agree = 0;
-      for (int i = std::max(latest - kCompared, 0); other != gyro && used[other] && i < latest; ++i) {
-        const double moved = cosine(latest, other) - cosine(i, other);
+      for (int i = std::max(sample - kCompared, 0); other != gyro && used[other] && i < sample; ++i) {
+        const double moved = cosine(sample, other) - cosine(i, other);
         agree += moved * moved <= kSpike * 4 * noise_rad * noise_rad ? 1 : 0;
       }
       if (agree >= 2) {

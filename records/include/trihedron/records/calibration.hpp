@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "trihedron/core/time.hpp"
+#include "trihedron/records/clock_correction.hpp"
 #include "trihedron/records/drift_models.hpp"
 #include "trihedron/records/estimator.hpp"
 #include "trihedron/records/finding.hpp"
@@ -64,6 +65,9 @@ struct Calibration {
   /// axes.
   Eigen::MatrixXd covariance;
   std::vector<FurtherEstimate> further;  ///< empty where none was estimated
+  /// Of stamps as they are telemetered, at and since `epoch`; what pass.toml says of them is in it. Empty where they
+  /// are right.
+  std::optional<ClockCorrection> clocks;
   std::optional<CalibrationNoise> noise;
   std::vector<DriftFieldLevel> drift_field;  ///< empty where the drift is not estimated as a field
   std::optional<Determined> determined;

@@ -152,7 +152,8 @@ struct NavigationRun {
   SampleCounts samples;                 ///< from that of the first attitude on, by what was done with them
   long corrections = 0;                 ///< astro-corrections made
   long corrections_missed = 0;          ///< intervals over which there were fixes, but none that could correct
-  std::optional<Clocks> clocks;         ///< where the pass shows them
+  ClockCorrection clock_correction;     ///< of the stamps, by the calibration in use
+  std::optional<Clocks> clocks;         ///< where the pass shows them, behind this correction
   std::vector<OpenLoopEnd> open_loops;  ///< where fixes could be compared with it
   Statistics statistics;
   /// Where parameters are held: (estimated − held)ᵀ P⁻¹ (estimated − held), P the covariance they were given with, and
