@@ -1,6 +1,8 @@
 # For users: `make demo`, `make test`. Everything else is CMake; see CMakePresets.json.
 SHELL := bash
 JOBS ?= $(shell nproc)
+# One more than there are processors: some tests wait, for the moment of a signal, a lock, a browser.
+TEST_JOBS ?= $(shell echo $$(($(JOBS) + 1)))
 BUILD := build
 LINT_TOOLS := build-lint/tools
 SOURCES := $(shell git ls-files '*.cpp' '*.hpp' 2>/dev/null)
@@ -29,7 +31,7 @@ help:
 	@echo 'make sanitize build with clang under address and undefined-behaviour sanitizers, and run the tests that are not long'
 	@echo 'make coverage the same, then the lines and branches of core that its own tests take'
 	@echo 'make setup | format | lint | clean'
-	@echo 'Files are compiled in units of up to 24, which makes a whole build shorter. Who edits one is served sooner with'
+	@echo 'Files are compiled in units of up to 32, which makes a whole build shorter. Who edits one is served sooner with'
 	@echo 'CMAKE_FLAGS=-DCMAKE_UNITY_BUILD=OFF, which compiles each on its own.'
 
 setup:
@@ -50,7 +52,7 @@ demo: build
 	$(BUILD)/trihedron demo -o out/demo
 
 test: everything
-	ctest --test-dir $(BUILD) --output-on-failure --parallel $(JOBS)
+	ctest --test-dir $(BUILD) --output-on-failure --parallel $(TEST_JOBS)
 
 
 flight:
@@ -88,7 +90,7 @@ sanitize:
 	cmake --preset sanitize $(CMAKE_FLAGS)
 	cmake --build build-sanitize --parallel $(JOBS)
 	rm -rf build-sanitize/coverage
-	ctest --test-dir build-sanitize --output-on-failure --parallel $(JOBS) -LE long
+	ctest --test-dir build-sanitize --output-on-failure --parallel $(TEST_JOBS) -LE long
 
 coverage: sanitize
 	core/test/coverage.py build-sanitize

@@ -303,9 +303,9 @@ class Constancy {
 }  // namespace
 
 std::vector<Change> changes_over(const Trial& trial) {
-  constexpr std::size_t kLeastStretches = 6;
+  constexpr std::size_t kEnoughStretches = 6;
   const PassProblem& problem = trial.problem();
-  if (Constancy::stretches(problem.arcs()) < kLeastStretches) {
+  if (Constancy::stretches(problem.arcs()) < kEnoughStretches) {
     return {};
   }
   // In steady flight an alignment is as unknown as before, and what it makes with the drift is of second order: a fifth
