@@ -22,12 +22,12 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-/// Prior of the spectrum: ln of the root mean square of a group is normal. What is expected falls from degree to degree,
-/// from some thousandths of eq. (1) to what no pass can show; of all gyros together it is uncertain by a factor of 20,
-/// gyros among each other by a factor of e, degrees of one gyro by e² of which neighbours have most in common, W and D
-/// of one degree by half a logarithm. A rotor that has much of one degree is likely to have some of the next, and near a
-/// great circle W and D of a degree look alike; but of low degrees, which act much as eq. (1) does, a pass without slews
-/// shows little, and that it shows nothing of high ones says little of them.
+/// Prior of the spectrum: ln of the root mean square of a group is normal. What is expected falls from degree to
+/// degree, from some thousandths of eq. (1) to what no pass can show; of all gyros together it is uncertain by a factor
+/// of 20, gyros among each other by a factor of e, degrees of one gyro by e² of which neighbours have most in common, W
+/// and D of one degree by half a logarithm. A rotor that has much of one degree is likely to have some of the next, and
+/// near a great circle W and D of a degree look alike; but of low degrees, which act much as eq. (1) does, a pass
+/// without slews shows little, and that it shows nothing of high ones says little of them.
 constexpr double kRmsOfDegree1_rad_s = 5e-9;
 constexpr double kFallPerDegree = 0.7;
 constexpr double kLeastRms_rad_s = 1e-10;
@@ -55,9 +55,9 @@ MatrixXd prior_information(const std::vector<FieldMembers::Group>& groups) {
       const FieldMembers::Group& a = groups[static_cast<std::size_t>(i)];
       const FieldMembers::Group& b = groups[static_cast<std::size_t>(j)];
       covariance(i, j) += a.gyro == b.gyro ? kSigmaOfGyro * kSigmaOfGyro : 0;
-      covariance(i, j) += a.gyro == b.gyro ? kSigmaOfDegree * kSigmaOfDegree *
-                                                 std::exp(-std::abs(a.degree - b.degree) / kDegreesAlike)
-                                           : 0;
+      covariance(i, j) +=
+          a.gyro == b.gyro ? kSigmaOfDegree * kSigmaOfDegree * std::exp(-std::abs(a.degree - b.degree) / kDegreesAlike)
+                           : 0;
     }
     covariance(i, i) += kSigmaOfGroup * kSigmaOfGroup;
   }
@@ -362,7 +362,7 @@ VectorXd log_of_mean_squares(const Posteriors& posteriors, const FieldSpectrum& 
     double squares = 1;
     for (const double away : kAway) {
       const VectorXd other = (spectrum.log_rms + away * sigma).cwiseMin(std::log(kMostRms_rad_s));
-    const double there = posteriors.at(other).log_likelihood;
+      const double there = posteriors.at(other).log_likelihood;
       const double weight = std::exp(std::min(there - log_likelihood, 0.0));
       weights += weight;
       squares += weight * std::exp(2 * (other(g) - spectrum.log_rms(g)));

@@ -268,7 +268,7 @@ void Refinement::put_into(CalibrationRun& run) && {
   Calibration& calibration = run.calibration;
   const MatrixXd own = result_.errors.last_root.middleRows(problem_.layout().drift(0), problem_.layout().parameters());
   KappaAndDelta parameters{result_.solution.gyros, own * own.transpose(),
-                        MatrixXd::Identity(problem_.layout().parameters(), problem_.layout().parameters())};
+                           MatrixXd::Identity(problem_.layout().parameters(), problem_.layout().parameters())};
   if (problem_.modes()) {
     parameters = with_members(problem_, field_ ? field_->more_covariance : MatrixXd(), parameters);
   }

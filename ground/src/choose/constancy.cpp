@@ -105,8 +105,8 @@ Matrix3d cross(const Vector3d& v) {
 
 /// Calls `use(arc, form)` for each arc in turn with its fixes as a form of the states of the arc, shapes and 1. The
 /// shapes: aberration by a velocity that is constant, and by two at orbital period, over the speed of light, in axes;
-/// relative errors of scale of the direction cosines, gyro by gyro. Each moves the directions as a small rotation of the
-/// cases would, an alignment.
+/// relative errors of scale of the direction cosines, gyro by gyro. Each moves the directions as a small rotation of
+/// the cases would, an alignment.
 template <class Use>
 void for_each_arc(const PassProblem& problem, const PassSolution& solution, const Use& use) {
   const Layout& layout = problem.layout();

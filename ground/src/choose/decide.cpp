@@ -128,8 +128,8 @@ bool has_what_is_named(const DriftModelId& model, const PassSettings& settings) 
   });
 }
 
-/// The smallest model with what the settings name such that no larger one is more likely by kLogOddsToAccept; nullptr of
-/// an empty list.
+/// The smallest model with what the settings name such that no larger one is more likely by kLogOddsToAccept; nullptr
+/// of an empty list.
 const Forecast* best_of(const std::vector<Forecast>& forecasts, const PassSettings& settings) {
   double most = -std::numeric_limits<double>::infinity();
   const Forecast* best = nullptr;
@@ -258,8 +258,8 @@ void leave_out_what_is_open(CalibrationOptions& options) {
   options.drift_model = options.drift_model.value_or(kEsg7);
 }
 
-/// The random walk that makes the pass most likely by eq. (1) alone, where it is more than the settings say. By less noise
-/// than there is a drift field is fitted to the noise, with members of any size; this is enough beside any field.
+/// The random walk that makes the pass most likely by eq. (1) alone, where it is more than the settings say. By less
+/// noise than there is a drift field is fitted to the noise, with members of any size; this is enough beside any field.
 std::optional<ProcessNoise> walk_by_eq1(const Pass& pass, const Screened& screened, const CalibrationOptions& asked) {
   CalibrationOptions options = with_everything(asked, asked, kEsg7);
   options.drift_field = false;
@@ -441,7 +441,8 @@ Decision decide(const Pass& pass, const CalibrationOptions& asked_for) {
     Decision decided = decide_by_pass(pass, screened, asked, largest_model);
     const std::optional<DriftModelId> larger = larger_model(largest_model);
     // There are no forecasts where the pass is too short.
-    if (!larger || decided.forecasts.empty() || best_of(decided.forecasts, pass.settings) != &decided.forecasts.back()) {
+    if (!larger || decided.forecasts.empty() ||
+        best_of(decided.forecasts, pass.settings) != &decided.forecasts.back()) {
       if (pass.settings.gyros.size() == 2) {  // which of more gyros is at fault is judged by the noise found
         decided.screened = std::move(screened);
       }

@@ -22,7 +22,7 @@ struct Decision {
   /// Those of the pass with what it shows of the size of members outside eq. (1), for an estimator on board.
   std::optional<PassSettings> settings;
   std::vector<DriftFieldLevel> levels;  ///< of the field of which that estimator has the members
-  std::optional<Screened> screened;  ///< the screened pass by which it was decided, where it was
+  std::optional<Screened> screened;     ///< the screened pass by which it was decided, where it was
 };
 
 /// Settles each choice that is left to the program by the whole pass. Estimator paper has no further states; where the

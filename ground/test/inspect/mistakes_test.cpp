@@ -186,7 +186,7 @@ TEST(Mistakes, AStarTrackerTenMinutesLateIsRecognised) {
   for (const double offset_s : {-590.0, 20.0}) {
     scenario.star_tracker.clock_offset_s = offset_s;
     const Pass pass = sim::simulate(scenario).pass;
-    const auto consistency = consistency_of(pass, clocks_of(pass));
+    const auto consistency = consistency_of(pass, ground::clocks_of(pass));
     ASSERT_TRUE(consistency);
     ASSERT_EQ(consistency->mistakes.size(), 1U) << offset_s;
     EXPECT_EQ(consistency->mistakes.front().kind, Kind::kClock);
@@ -199,7 +199,7 @@ TEST(Mistakes, FixesOfAnotherPassAreNotMended) {
   Pass pass = flown();
   const Pass other = sim::simulate(an_hour(6)).pass;
   pass.star_tracker = other.star_tracker;
-  const std::optional<Consistency> consistency = consistency_of(pass, clocks_of(pass));
+  const std::optional<Consistency> consistency = consistency_of(pass, ground::clocks_of(pass));
   ASSERT_TRUE(consistency);
   EXPECT_FALSE(consistency->is_consistent);
   ASSERT_EQ(consistency->mistakes.size(), 1U);
@@ -232,7 +232,7 @@ Pass right_pass(const std::string& kind) {
 TEST(Mistakes, AreNotSeenInRightPasses) {
   for (const char* const kind : {"slews", "steady", "three gyros", "outliers", "outside", "short", "rough alignment"}) {
     const Pass pass = right_pass(kind);
-    const std::optional<Consistency> consistency = consistency_of(pass, clocks_of(pass));
+    const std::optional<Consistency> consistency = consistency_of(pass, ground::clocks_of(pass));
     ASSERT_TRUE(consistency) << kind;
     EXPECT_TRUE(consistency->is_consistent)
         << kind << " " << consistency->motion_rad[0] << " " << consistency->motion_rad[1];
