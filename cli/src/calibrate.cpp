@@ -1,5 +1,6 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
+#include <malloc.h>
 
 #include <array>
 #include <cstddef>
@@ -125,6 +126,9 @@ ground::SeveralPasses calibrate_in_order(const std::vector<io::NamedPass>& passe
       const ProgressBar bar("calibrate", common.quiet);
       log_pass(common.log, pass.path.string(), pass.loaded);
       calibrated.add(pass.name, pass.pass(), bar.meter());
+#ifdef __GLIBC__
+      malloc_trim(0);  // what the decisions took is free, and not yet given back
+#endif
       log_run(common.log, calibrated.passes().back().run);
     } catch (const ground::SetupError& error) {
       throw io::InputRefused(pass.path, {}, error.what(), error.cure());

@@ -342,7 +342,7 @@ def test_calibrate_measures_convergence_and_extension(tmp_path):
 def test_demo_repeats_the_papers_experiment(tmp_path):
     result = run("demo", "-o", tmp_path / "demo")
     assert result.returncode == TRUSTWORTHY, result.stderr + result.stdout
-    assert "D(1,0)" in result.stdout  # a drift that eq. (1) does not contain
+    assert "gyro 1 D, degree 1" in result.stdout  # a drift that eq. (1) does not contain
     assert f"The report is {tmp_path / 'demo' / 'report.html'}" in result.stdout
     assert sorted(f.name for f in (tmp_path / "demo").iterdir()) == [
         "attitude.csv", "calibration.json", "effective-config.toml", "navigation.csv", "pass.nc", "report.html", "residuals.nc",

@@ -43,9 +43,11 @@ inline Eigen::Vector3d alignment_error(const Calibration& calibration, const Tru
                                       ParameterId::alignment(gyro, 2)}));
 }
 
+/// eᵀP⁻¹e of eq. (1) and the alignments, whatever else the drift model holds; χ² of 20 for a pair.
 inline double nees_of(const Truth& truth, const Calibration& calibration) {
-  const Eigen::VectorXd errors = estimate_minus_truth(calibration, truth);
-  return errors.dot(calibration.covariance.llt().solve(errors));
+  const auto rows = rows_of(calibration, drift_and_alignment(kEsg7, calibration.gyros.size()));
+  const Eigen::VectorXd errors = estimate_minus_truth(calibration, truth)(rows);
+  return errors.dot(Eigen::MatrixXd(calibration.covariance(rows, rows)).llt().solve(errors));
 }
 
 }  // namespace trihedron::ground

@@ -212,12 +212,16 @@ void decide_again_with_more_noise(const Pass& pass, const Screened& screened, co
     return std::pair(std::move(trial), likely);
   });
   NoiseFit walking;
-  side_by_side([&] { walking = with_most_likely_walk(everything, free); },
-               [&] {
-                 if (wandering_is_open) {
-                   try_wandering();
-                 }
-               });
+  side_by_side(
+      [&] {
+        everything.refit(everything.problem().setup().noise());
+        walking = with_most_likely_walk(everything, free);
+      },
+      [&] {
+        if (wandering_is_open) {
+          try_wandering();
+        }
+      });
   std::optional<Evidence> wandering;
   std::optional<ProcessNoise> wanders;
   if (wandering_is_open && walking.gain > kLogOddsToAccept) {
@@ -300,6 +304,7 @@ Decision decide_by_pass(const Pass& pass, const Screened& screened, const Calibr
     noise = with_most_likely_walk(everything, with_everything(options, asked, largest_model)).noise;
   }
   settle_states(everything, pass.settings, asked, decision);
+  everything.release();
   Trial decided(pass, screened, options, noise);
   const NoiseFit walking = with_most_likely_walk(decided, options);
   if (walking.gain > kLogOddsToAccept) {

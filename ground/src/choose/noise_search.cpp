@@ -21,8 +21,9 @@ class Search {
   using At = std::function<ProcessNoise(double, int)>;
 
   /// Goes from the best of `starts`, which contains (0, 0), to the best of its neighbours and so on, within the bounds.
-  Search(const Trial& trial, At at, const std::vector<Point>& starts, const Point& lowest, const Point& highest)
-      : trial_(trial), linear_(trial.linear()), at_(std::move(at)) {
+  /// The trial is to be fitted again.
+  Search(Trial& trial, At at, const std::vector<Point>& starts, const Point& lowest, const Point& highest)
+      : trial_(trial), linear_(trial.take_linear()), at_(std::move(at)) {
     gather_constants(linear_.prior, linear_.prior_y, linear_.stages);
     look_at(starts);
     for (std::optional<Point> last; last != best_;) {

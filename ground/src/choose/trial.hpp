@@ -3,6 +3,7 @@
 
 #include <Eigen/Core>
 #include <optional>
+#include <utility>
 #include <vector>
 
 #include "batch/batch.hpp"
@@ -22,12 +23,14 @@ class Trial {
 
   /// Fits again, with other noise.
   void refit(const ProcessNoise& noise);
+  /// Gives away or frees what is large. Until it is fitted again, the trial is to be asked for nothing but likelihoods.
+  [[nodiscard]] PassProblem::Linear take_linear() { return std::exchange(found_.linear, {}); }
+  void release() { found_.linear = {}, found_.errors = {}; }
 
   [[nodiscard]] const PassProblem& problem() const { return problem_; }
   [[nodiscard]] const BatchResult& found() const { return found_; }
-  [[nodiscard]] const PassProblem::Linear& linear() const { return found_.linear; }
-  /// `linear`: that of linear(), also after gather_constants(). Where the drift is a field, by the spectrum of it that
-  /// is most likely with this noise.
+  /// `linear`: that of take_linear(), also after gather_constants(). Where the drift is a field, by the spectrum of it
+  /// that is most likely with this noise.
   [[nodiscard]] double log_likelihood(const PassProblem::Linear& linear, const ProcessNoise& noise) const;
 
   /// Prior of the drift field, where the drift is one.

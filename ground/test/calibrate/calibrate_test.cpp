@@ -61,13 +61,6 @@ TEST(Calibrate, FindsTheTruthWithinItsSigmas) {
   EXPECT_LE(progress.back(), 1);
 }
 
-/// NEES of eq. (1) and the alignments alone.
-double nees_of_eq1(const Truth& truth, const Calibration& calibration) {
-  const auto rows = rows_of(calibration, drift_and_alignment(kEsg7, calibration.gyros.size()));
-  const Eigen::VectorXd errors = estimate_minus_truth(calibration, truth)(rows);
-  return errors.dot(calibration.covariance(rows, rows).llt().solve(errors));
-}
-
 /// Drift of degrees that no smaller model has, 2 % of eq. (1) each.
 Scenario with_drift_outside(std::uint64_t seed, Duration duration) {
   Scenario scenario = scenario_in_eq1(seed, duration);
@@ -98,16 +91,16 @@ TEST(Calibrate, ADriftFieldKeepsTheSigmasHonest) {
   CalibrationOptions options = with_drift_open(Estimator::kBatch);
   const Calibration by_field = calibrate(simulated.pass, options).calibration;
   // 20 degrees of freedom: above 45 once in a thousand.
-  EXPECT_LT(nees_of_eq1(simulated.truth, by_field), 45);
+  EXPECT_LT(nees_of(simulated.truth, by_field), 45);
   EXPECT_EQ(by_field.drift_field.size(), 32U);
   ASSERT_TRUE(set_drift_model("esg7", options));
-  EXPECT_GT(nees_of_eq1(simulated.truth, calibrate(simulated.pass, options).calibration), 1000);
+  EXPECT_GT(nees_of(simulated.truth, calibrate(simulated.pass, options).calibration), 1000);
 }
 
 TEST(Calibrate, OnBoardTheDriftFieldIsItsLargeMembersAndNoise) {
   const sim::SimulatedPass simulated = sim::simulate(with_drift_outside(5, std::chrono::hours(4)));
   const CalibrationRun run = calibrate(simulated.pass, with_drift_open(Estimator::kInvariant));
-  EXPECT_LT(nees_of_eq1(simulated.truth, run.calibration), 45);
+  EXPECT_LT(nees_of(simulated.truth, run.calibration), 45);
   EXPECT_EQ(run.calibration.gyros.at(0).drift_model, vsh(DriftModelId::kMaxDegreeOnBoard));
   EXPECT_GT(run.options.further_states.wandering_drift_rad_s, 0);
 }
@@ -129,7 +122,7 @@ TEST(Calibrate, ADriftFieldIsThePriorOfEitherEstimator) {
   next.pass.settings.prior = before;
   for (const Estimator estimator : {Estimator::kBatch, Estimator::kInvariant}) {
     const Calibration after = calibrate(next.pass, with_drift_open(estimator)).calibration;
-    EXPECT_LT(nees_of_eq1(next.truth, after), 45) << static_cast<int>(estimator);
+    EXPECT_LT(nees_of(next.truth, after), 45) << static_cast<int>(estimator);
     for (const ParameterId& state : drift_and_alignment(kEsg7, 2)) {
       EXPECT_LT(sigma_of(after, state), 1.05 * sigma_of(before, state)) << static_cast<int>(estimator);
     }
