@@ -102,7 +102,7 @@ class Posteriors {
     // y by its own covariance: there are fewer of it than of the members.
     MatrixXd covariance = MatrixXd::Identity(information_.R.rows(), information_.R.rows());
     add_gram(information_.R * found.sigma.asDiagonal(), 1, covariance);
-    const Eigen::LLT<MatrixXd> root(std::move(covariance));
+    const Eigen::LLT<MatrixXd> root(covariance);
     found.L = root.matrixLLT();
     found.y = root.matrixL().solve(information_.y);
     const VectorXd apart_from_prior = log_rms - prior_mean_;

@@ -1,32 +1,23 @@
 #include "batch/gram.hpp"
 
+#include "batch/gram_kernel.hpp"
+
 namespace trihedron::ground {
-namespace kernels {
-
-namespace gram_baseline {
-void add_gram(const double* a, long rows, long columns, double weight, double* gram);
-void solve_lower(const double* L, long rows, double* a, long columns);
-}  // namespace gram_baseline
-namespace gram_avx2 {
-void add_gram(const double* a, long rows, long columns, double weight, double* gram);
-void solve_lower(const double* L, long rows, double* a, long columns);
-}  // namespace gram_avx2
-
 namespace {
 
 #ifdef TRIHEDRON_HAS_AVX2
 bool has_avx2() {
-  static const bool found = __builtin_cpu_supports("avx2") > 0 && __builtin_cpu_supports("fma") > 0;
+  static const bool found =
+      static_cast<int>(__builtin_cpu_supports("avx2")) != 0 && static_cast<int>(__builtin_cpu_supports("fma")) != 0;
   return found;
 }
 #endif
 
 }  // namespace
-}  // namespace kernels
 
 void add_gram(const Eigen::MatrixXd& a, double weight, Eigen::MatrixXd& gram) {
 #ifdef TRIHEDRON_HAS_AVX2
-  if (kernels::has_avx2()) {
+  if (has_avx2()) {
     kernels::gram_avx2::add_gram(a.data(), a.rows(), a.cols(), weight, gram.data());
     return;
   }
@@ -36,7 +27,7 @@ void add_gram(const Eigen::MatrixXd& a, double weight, Eigen::MatrixXd& gram) {
 
 void solve_lower(const Eigen::MatrixXd& L, Eigen::MatrixXd& a) {
 #ifdef TRIHEDRON_HAS_AVX2
-  if (kernels::has_avx2()) {
+  if (has_avx2()) {
     kernels::gram_avx2::solve_lower(L.data(), L.rows(), a.data(), a.cols());
     return;
   }

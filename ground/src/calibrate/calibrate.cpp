@@ -313,18 +313,18 @@ CalibrationRun calibrate(const Pass& pass, const CalibrationOptions& options, co
   return run;
 }
 
-NavigationRun navigate(const Pass& as_telemetered, const CalibrationOptions& options, const Progress& progress) {
-  const ClockCorrection correction = clocks_before(as_telemetered.settings);
+NavigationRun navigate(const Pass& pass, const CalibrationOptions& options, const Progress& progress) {
+  const ClockCorrection correction = clocks_before(pass.settings);
   std::optional<Pass> corrected;
   if (correction.of_star_tracker() || correction.of_gyros()) {
-    corrected = as_telemetered;
+    corrected = pass;
     correct(*corrected, correction);
   }
-  const Pass& pass = corrected ? *corrected : as_telemetered;
-  Pipeline pipeline(pass.settings, settled_before(pass.settings, options));
+  const Pass& stamped = corrected ? *corrected : pass;
+  Pipeline pipeline(stamped.settings, settled_before(stamped.settings, options));
   NavigationRecorder recorder;
-  ProgressMeter meter(progress, pass.gyro.size());
-  replay(pass, pipeline, [&](const StepReport& report) {
+  ProgressMeter meter(progress, stamped.gyro.size());
+  replay(stamped, pipeline, [&](const StepReport& report) {
     recorder.add(report, pipeline);
     meter.step(report);
   });
@@ -339,8 +339,8 @@ NavigationRun navigate(const Pass& as_telemetered, const CalibrationOptions& opt
   }
   run.forecast = forecast_of(options, pipeline, run.attitude);
   run.clock_correction = correction;
-  run.clocks = clocks_of(pass);
-  run.verdict = judge_navigation(pass, run);
+  run.clocks = clocks_of(stamped);
+  run.verdict = judge_navigation(stamped, run);
   return run;
 }
 
