@@ -144,6 +144,12 @@ auto told_of(const fs::path& file, const Work& work) {
       case SQLITE_ERROR:
         throw InputRefused(file, {}, fmt::format("is damaged or no database: {}", fault.what()),
                            "restore it from a copy, or give the name of a new one");
+      case SQLITE_READONLY:
+        if (::access(file.c_str(), W_OK) == 0) {  // the head of the file says so itself
+          throw InputRefused(file, {}, "can only be read: it is damaged, or of a later SQLite",
+                             "restore it from a copy, or give the name of a new one");
+        }
+        [[fallthrough]];
       default:
         throw MachineFailed(
             file, fmt::format("cannot be read or written: {}", fault.what()),

@@ -209,6 +209,17 @@ TEST_F(Catalogue, RefusesToReadWhereThereIsNone) {
   EXPECT_THAT(directory_.names(), testing::IsEmpty());
 }
 
+/// Byte 18 of the head is the version of the format that a program must know to write.
+TEST_F(Catalogue, RefusesToWriteWhatItsHeadSaysCanOnlyBeRead) {
+  add(sample_entry());
+  std::string bytes = read_text(file_);
+  bytes[18] = '&';
+  write_text(file_, bytes);
+  EXPECT_THAT(refusal([&] { expect_catalogue_of("Resurs-DK1", file_); }), HasSubstr("can only be read"));
+  EXPECT_THAT(refusal([&] { add(sample_entry("pass-b")); }), HasSubstr("can only be read"));
+  EXPECT_THAT(read_catalogue(file_), SizeIs(1));
+}
+
 TEST_F(Catalogue, RefusesAFileThatIsNoDatabase) {
   write_text(file_, "t_s,h1_x\n" + std::string(1000, '0'));
   EXPECT_THAT(refusal_of_all(), HasSubstr("catalogue.db: is damaged or no database: "));
