@@ -74,7 +74,8 @@ class Figures {
       const double unit = parameter.id.is_alignment() ? kArcsecond_rad : kMicroradian;
       Series series(2, fix_step_min_ + to_minutes(ParameterHistory::kStep));
       for (std::size_t row = 0; row < history.t.size(); ++row) {
-        series.add(minutes(history.t[row]), {history.value[row][column] / unit, history.sigma[row][column] / unit});
+        series.add(minutes(history.t[row]),
+                   {history.value[row][parameter.row] / unit, history.sigma[row][parameter.row] / unit});
       }
       json figure = series.drawn(kHalf);
       figure["gyro"] = parameter.id.gyro() + 1;
@@ -313,8 +314,9 @@ class Figures {
       names.push_back({{"gyro", parameters_[i].id.gyro() + 1}, {"symbol", parameters_[i].symbol}});
       json row = json::array();
       for (std::size_t j = 0; j < parameters_.size(); ++j) {
-        const double rho = covariance(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j)) /
-                           (parameters_[i].sigma * parameters_[j].sigma);
+        const double rho =
+            covariance(static_cast<Eigen::Index>(parameters_[i].row), static_cast<Eigen::Index>(parameters_[j].row)) /
+            (parameters_[i].sigma * parameters_[j].sigma);
         row.push_back(std::round(rho * 1000) / 1000);
       }
       rows.push_back(std::move(row));

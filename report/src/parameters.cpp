@@ -45,6 +45,7 @@ std::vector<Parameter> parameters_of(const ReportInput& input) {
     const auto row = static_cast<Eigen::Index>(i);
     Parameter parameter;
     parameter.id = calibration.states[i];
+    parameter.row = i;
     // Of a drift field the report shows the levels: its hundreds of members mean little one by one.
     if (!calibration.drift_field.empty() && parameter.id.is_drift() && !parameter.id.coefficient.is_in_eq1()) {
       continue;

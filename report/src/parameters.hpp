@@ -1,6 +1,7 @@
 #pragma once
 /// The parameters of a calibration one by one: value, sigma, history, and the truth where it is known.
 
+#include <cstddef>
 #include <optional>
 #include <string>
 #include <vector>
@@ -12,6 +13,7 @@ namespace trihedron::report {
 /// One row of Calibration::states.
 struct Parameter {
   ParameterId id;
+  std::size_t row = 0;        ///< in Calibration::states and its covariance, and in ParameterHistory
   std::string symbol;         ///< "k₀", "Λx"
   double value = 0;           ///< rad/s; alignment: component of the rotation vector, rad
   double sigma = 0;           ///< rad/s or rad
@@ -26,7 +28,7 @@ struct Parameter {
   [[nodiscard]] std::string full_symbol() const { return symbol + " of gyro " + std::to_string(id.gyro() + 1); }
 };
 
-/// All of them, in the order of Calibration::states.
+/// All of them, in the order of Calibration::states; of a drift field those of eq. (1) and the alignments.
 [[nodiscard]] std::vector<Parameter> parameters_of(const ReportInput& input);
 
 /// "k₀", "μ₃₁", "Λx", "W(1,-1)": without the gyro.

@@ -135,7 +135,8 @@ json strongest_correlations(const ReportInput& input, const std::vector<Paramete
   std::vector<Pair> pairs;
   for (std::size_t i = 0; i < parameters.size(); ++i) {
     for (std::size_t j = 0; j < i; ++j) {
-      const double rho = input.run.calibration.covariance(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j)) /
+      const double rho = input.run.calibration.covariance(static_cast<Eigen::Index>(parameters[i].row),
+                                                          static_cast<Eigen::Index>(parameters[j].row)) /
                          (parameters[i].sigma * parameters[j].sigma);
       if (std::abs(rho) >= 0.5) {
         pairs.push_back({rho, parameters[j].full_symbol() + " and " + parameters[i].full_symbol()});

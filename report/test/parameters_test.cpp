@@ -50,6 +50,25 @@ TEST_F(ParametersOfARun, ClaimNoErrorWithoutTruth) {
   }
 }
 
+/// Of a drift field the members are left out, and what comes after them keeps its own history and correlations.
+TEST_F(ParametersOfARun, KeepTheirRowsWhereMembersOfAFieldAreLeftOut) {
+  Calibration& calibration = run.run.calibration;
+  calibration.states[3] = ParameterId::drift(0, {DriftCoefficient::Member::kW, 1, 0});
+  calibration.drift_field.emplace_back();
+  const ReportInput input = run.alone();
+  const auto parameters = parameters_of(input);
+  ASSERT_EQ(parameters.size(), 19U);
+  EXPECT_EQ(name_of(parameters[3].id), "gyro1.nu12");
+  EXPECT_EQ(parameters[3].row, 4U);
+  const nlohmann::json figures = figure_data(input, parameters);
+  const double first = run.run.parameters.value.front()[10] / kMicroradian;
+  EXPECT_NEAR(figures.at("parameters").at("gyro2.k0").at("y").at(0).front().get<double>(), first,
+              1e-3 * std::abs(first));
+  const double rho =
+      calibration.covariance(4, 10) / std::sqrt(calibration.covariance(4, 4) * calibration.covariance(10, 10));
+  EXPECT_NEAR(figures.at("correlation").at("values").at(3).at(9).get<double>(), rho, 5.1e-4);
+}
+
 TEST_F(ParametersOfARun, AreDrawnWithoutGapsWhereFixesComeFasterThanRows) {
   run.pass.settings.star_tracker_period = std::chrono::milliseconds(100);
   const ReportInput input = run.judged();
