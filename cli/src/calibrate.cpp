@@ -39,6 +39,13 @@
 namespace trihedron::cli {
 namespace {
 
+/// What is free and was not yet given back to the system.
+void give_back_memory() {
+#ifdef __GLIBC__
+  malloc_trim(0);
+#endif
+}
+
 /// A calibration of a pass with its evaluation. Holds references.
 struct Outcome {
   const io::NamedPass& pass;
@@ -74,7 +81,6 @@ void stage_outcome(io::StagedDirectory& staged, const std::filesystem::path& bel
   } else {
     staged.drop(below / kDefinitiveFile);
   }
-  io::write_residuals(out / kResidualsFile, epoch, io::residual_tables(outcome.run));
   io::write_file(out / kConfigFile, io::format_config(options));
 
   report::ReportInput input{outcome.pass.pass(), outcome.run, outcome.pass.truth_or_null(), {}, &outcome.evaluation};
@@ -82,6 +88,9 @@ void stage_outcome(io::StagedDirectory& staged, const std::filesystem::path& bel
     input.telemetry_notes.push_back(defect.text());
   }
   io::write_file(out / kReportFile, report::render(input));
+  // After the report: the library keeps what it takes, and both together would be the most memory of all.
+  give_back_memory();
+  io::write_residuals(out / kResidualsFile, epoch, io::residual_tables(outcome.run));
 }
 
 nlohmann::ordered_json counts_json(const std::vector<NamedCount>& counts) {
@@ -126,9 +135,7 @@ ground::SeveralPasses calibrate_in_order(const std::vector<io::NamedPass>& passe
       const ProgressBar bar("calibrate", common.quiet);
       log_pass(common.log, pass.path.string(), pass.loaded);
       calibrated.add(pass.name, pass.pass(), bar.meter());
-#ifdef __GLIBC__
-      malloc_trim(0);  // what the decisions took is free, and not yet given back
-#endif
+      give_back_memory();
       log_run(common.log, calibrated.passes().back().run);
     } catch (const ground::SetupError& error) {
       throw io::InputRefused(pass.path, {}, error.what(), error.cure());
