@@ -18,6 +18,17 @@ constexpr int max_degree_of(DriftModelId id) {
                                                      : 0;
 }
 
+/// Of the potential of a member. W(4, 4) stands for what k0 leaves of W(4, 0) and W(4, 4), orthogonal to it over the
+/// sphere: Σ h⁴ is √7 Y(4, 0) + √5 Y(4, 4), but for a factor and a constant.
+template <class Harmonics>
+Eigen::Vector3d gradient(const Harmonics& harmonics, const DriftCoefficient& its) {
+  constexpr double kSqrt5Over12 = 0.6454972243679028;
+  constexpr double kSqrt7Over12 = 0.7637626158259733;
+  const Eigen::Vector3d own = harmonics.polynomial_gradient(its.degree, its.order);
+  const bool shares_with_k0 = its.member == Member::kW && its.degree == 4 && its.order == 4;
+  return shares_with_k0 ? Eigen::Vector3d(kSqrt7Over12 * own - kSqrt5Over12 * harmonics.polynomial_gradient(4, 0)) : own;
+}
+
 }  // namespace
 
 DriftModel::DriftModel(DriftModelId id, const FurtherStates& further)
@@ -68,10 +79,10 @@ void DriftModel::basis(const Eigen::Vector3d& h, double part_of_change, ColumnsV
       const DriftCoefficient& its = member(i);
       switch (its.member) {
         case Member::kW:
-          B.set_column(i, -harmonics.polynomial_gradient(its.degree, its.order));
+          B.set_column(i, -gradient(harmonics, its));
           break;
         case Member::kD:
-          B.set_column(i, h.cross(harmonics.polynomial_gradient(its.degree, its.order)));
+          B.set_column(i, h.cross(gradient(harmonics, its)));
           break;
         default:
           B.set_column(i, h.cross(h.cwiseProduct(h).cwiseProduct(h)));
@@ -115,7 +126,7 @@ Eigen::Vector3d DriftModel::rate(const Eigen::Vector3d& h, double part_of_change
       if (its.member == Member::kCubeD) {
         d += coefficients[i] * h.cwiseProduct(h).cwiseProduct(h);
       } else {
-        (its.member == Member::kW ? w : d) += coefficients[i] * harmonics.polynomial_gradient(its.degree, its.order);
+        (its.member == Member::kW ? w : d) += coefficients[i] * gradient(harmonics, its);
       }
     }
     rate += h.cross(d) - w;
