@@ -26,7 +26,8 @@ Eigen::Vector3d gradient(const Harmonics& harmonics, const DriftCoefficient& its
   constexpr double kSqrt7Over12 = 0.7637626158259733;
   const Eigen::Vector3d own = harmonics.polynomial_gradient(its.degree, its.order);
   const bool shares_with_k0 = its.member == Member::kW && its.degree == 4 && its.order == 4;
-  return shares_with_k0 ? Eigen::Vector3d(kSqrt7Over12 * own - kSqrt5Over12 * harmonics.polynomial_gradient(4, 0)) : own;
+  return shares_with_k0 ? Eigen::Vector3d(kSqrt7Over12 * own - kSqrt5Over12 * harmonics.polynomial_gradient(4, 0))
+                        : own;
 }
 
 }  // namespace

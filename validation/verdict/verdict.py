@@ -96,15 +96,39 @@ def alignment_errors(truth, calibration):
     return errors
 
 
-def drift_sigmas(truth, calibration):
-    """The largest error of a coefficient of eq. (1) in its sigmas."""
+EQ1 = ("k0", "mu12", "mu23", "mu31", "nu12", "nu23", "nu31")
+
+
+def drift_errors(truth, calibration):
+    """Of each coefficient of eq. (1) of each gyro: (error, sigma), rad/s."""
     matrix, states = calibration["covariance"]["matrix"], calibration["covariance"]["states"]
-    largest = 0
+    errors = []
     for number, (true, gyro) in enumerate(zip(truth.gyros, calibration["gyros"]), 1):
-        for name, value in zip(("k0", "mu12", "mu23", "mu31", "nu12", "nu23", "nu31"), true["drift_rad_s"]):
+        for name, value in zip(EQ1, true["drift_rad_s"]):
             at = states.index(f"gyro{number}.{name}")
-            largest = max(largest, abs(value - gyro["drift_rad_s"][name]) / math.sqrt(matrix[at][at]))
-    return largest
+            errors.append((value - gyro["drift_rad_s"][name], math.sqrt(matrix[at][at])))
+    return errors
+
+
+def nees_of(errors, calibration):
+    """eᵀ P⁻¹ e of the coefficients of eq. (1) and the alignments, in the order of drift_errors() and alignment_errors(). In units of the sigmas,
+    by Cholesky's decomposition; None where P is not positive definite."""
+    matrix, states = calibration["covariance"]["matrix"], calibration["covariance"]["states"]
+    numbers = range(1, len(calibration["gyros"]) + 1)
+    at = [states.index(f"gyro{number}.{name}") for number in numbers for name in EQ1]
+    at += [states.index(f"gyro{number}.align_{axis}") for number in numbers for axis in "xyz"]
+    sigmas = [sigma for _, sigma in errors]
+    rows, white = [], []
+    for i, (error, sigma) in enumerate(errors):
+        row = []
+        for j in range(i + 1):
+            left = matrix[at[i]][at[j]] / sigmas[i] / sigmas[j] - math.fsum(a * b for a, b in zip(row, rows[j] if j < i else row))
+            if i == j and left <= 0:
+                return None
+            row.append(math.sqrt(left) if i == j else left / rows[j][j])
+        rows.append(row)
+        white.append((error / sigma - math.fsum(a * b for a, b in zip(row, white))) / row[i])
+    return math.fsum(value * value for value in white)
 
 
 def attitude_errors(truth, file):
@@ -122,6 +146,7 @@ def judged(program, directory, truth, estimator):
     if status == 3:
         return {"status": status, "findings": ["refused"], "wrong": []}
     calibration = json.loads((out / "calibration.json").read_text())
+    drift = drift_errors(truth, calibration)
     findings = {finding["code"]: finding.get("severity", "") for finding in calibration["verdict"]["findings"]}
     wrong = []
 
@@ -150,7 +175,8 @@ def judged(program, directory, truth, estimator):
     return {"status": status, "findings": sorted(findings), "do_not_use": sorted(code for code, severity in findings.items() if severity == "do-not-use"),
             "wrong": wrong, "alignment_sigmas": rounded(alignment_sigmas),
             "alignment_arcsec": rounded(max(abs(error) for error, _ in alignment) / ARCSECOND),
-            "drift_sigmas": rounded(drift_sigmas(truth, calibration)), "rows_beyond": rounded(beyond), "attitude_arcsec": rounded(worst_rad / ARCSECOND),
+            "drift_sigmas": rounded(max(abs(error) / sigma for error, sigma in drift)), "nees": rounded(nees_of(drift + alignment, calibration)),
+            "nees_states": len(drift + alignment), "rows_beyond": rounded(beyond), "attitude_arcsec": rounded(worst_rad / ARCSECOND),
             "forecast_sigmas": rounded(forecast_sigmas), "forecast_arcsec": rounded(forecast_rad / ARCSECOND),
             "predicted_arcsec": rounded(predicted_rad(calibration) / ARCSECOND)}
 
@@ -161,7 +187,7 @@ def predicted_rad(calibration):
 
 
 def rounded(value):
-    return float(f"{value:.4g}") if math.isfinite(value) else None
+    return float(f"{value:.4g}") if value is not None and math.isfinite(value) else None
 
 
 def outcomes_of(program, name, seed, estimators):
@@ -302,6 +328,7 @@ def summary(outcomes):
 
 
 NEED_NOT_MET = "need-not-met"
+WITH_CONSTANT_DRIFT = ("in the models", "drift outside eq. (1)", "dirty telemetry")
 FAULTS = {world.name: set(world.faults) for world in WORLDS}
 
 
@@ -370,10 +397,24 @@ def per_world(outcomes):
     return table(["world", "estimator", "right, trusted", "right, not", "wrong, not", "**wrong, trusted**", "refused", "coefficient off, told", "wrong and trusted in", "findings that forbid use"], rows)
 
 
+def consistency(outcomes):
+    """NEES over the number of states; of worlds that no findings describe, whose coefficients are constant."""
+    rows = []
+    for world in WORLDS:
+        its = {estimator: [o["nees"] / o["nees_states"] for o in outcomes
+                           if o["world"] == world.name and o["estimator"] == estimator and o.get("nees") is not None] for estimator in ESTIMATORS}
+        if world.group in WITH_CONSTANT_DRIFT and not world.faults and any(its.values()):
+            rows.append([world.name] + [cell for estimator in ESTIMATORS for cell in (
+                (str(len(its[estimator])), f"{math.fsum(its[estimator]) / len(its[estimator]):.2f}", f"{max(its[estimator]):.2f}")
+                if its[estimator] else ("·", "·", "·"))])
+    return table(["world"] + [head for estimator in ESTIMATORS for head in (f"{estimator}: passes", "mean", "largest")], rows)
+
+
 def write(document, outcomes):
     """Each table stands between `<!-- NAME -->` and `<!-- end -->`; the text around it is left alone."""
     text = document.read_text()
-    for name, made in (("in-all", in_all(outcomes)), ("predictions", predictions(outcomes)), ("per-world", per_world(outcomes))):
+    for name, made in (("in-all", in_all(outcomes)), ("predictions", predictions(outcomes)), ("per-world", per_world(outcomes)),
+                       ("consistency", consistency(outcomes))):
         text, places = re.subn(rf"(<!-- {name} -->\n).*?(<!-- end -->)", lambda place: place[1] + made + "\n" + place[2], text, flags=re.DOTALL)
         if places != 1:
             sys.exit(f"{document}: has no place for the table {name}")
@@ -396,6 +437,7 @@ def main():
     failures = measure(program, outcomes, worlds, range(1, given.seeds + 1), given.estimators.split(","), given.jobs)
     print(per_world(outcomes.found))
     print(in_all(outcomes.found))
+    print(consistency(outcomes.found))
     if given.document:
         write(given.document, outcomes.found)
     if failures:

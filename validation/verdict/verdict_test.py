@@ -110,7 +110,19 @@ def truth(tmp_path):
 def test_errors_of_alignment_are_in_their_sigmas(truth, tmp_path):
     errors = verdict.alignment_errors(truth, calibration(tmp_path, truth, off=5e-6))
     assert max(abs(error) / sigma for error, sigma in errors) == pytest.approx(5, rel=1e-6)
-    assert verdict.drift_sigmas(truth, calibration(tmp_path, truth)) == 0
+    assert all(error == 0 for error, _ in verdict.drift_errors(truth, calibration(tmp_path, truth)))
+
+
+def test_nees_takes_the_correlations_into_account(truth, tmp_path):
+    found = calibration(tmp_path, truth, off=5e-6)
+    errors = verdict.drift_errors(truth, found) + verdict.alignment_errors(truth, found)
+    assert verdict.nees_of(errors, found) == pytest.approx(25, rel=1e-6)
+    # Of two errors 0 and e with the correlation r: e² / (1 − r²).
+    at = found["covariance"]["states"].index("gyro2.align_y")
+    found["covariance"]["matrix"][0][at] = found["covariance"]["matrix"][at][0] = 0.6e-12
+    assert verdict.nees_of(errors, found) == pytest.approx(25 / 0.64, rel=1e-6)
+    found["covariance"]["matrix"][0][at] = found["covariance"]["matrix"][at][0] = 1.1e-12
+    assert verdict.nees_of(errors, found) is None
 
 
 def test_errors_of_attitude_are_in_their_sigmas_and_of_the_fixes_alone(truth, tmp_path):
@@ -152,6 +164,8 @@ def test_the_document_has_a_place_for_each_table(tmp_path):
     told = off | {"findings": ["drift-not-explained"]}
     verdict.write(document, [outcome(), outcome(wrong=["need"]), off, told])
     assert "| slews | batch | 3 | · | · | 1 | · | 2, 1 | need |" in document.read_text()
+    verdict.write(document, [outcome() | {"nees": nees, "nees_states": 20} for nees in (10, 40)])
+    assert "| slews | · | · | · | 2 | 1.25 | 2.00 |" in document.read_text()
 
 
 # What holds whatever else: nominal passes are right and trusted, and telemetry on the wrong side never gives a result that is trusted.

@@ -23,18 +23,23 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
 /// Prior of the spectrum: ln of the root mean square of a group is normal. What is expected falls from degree to
-/// degree, from some thousandths of eq. (1) to what no pass can show; of all gyros together it is uncertain by a factor
-/// of 20, gyros among each other by a factor of e, degrees of one gyro by e² of which neighbours have most in common, W
-/// and D of one degree by half a logarithm. A rotor that has much of one degree is likely to have some of the next, and
-/// near a great circle W and D of a degree look alike; but of low degrees, which act much as eq. (1) does, a pass
-/// without slews shows little, and that it shows nothing of high ones says little of them.
+/// degree, from some thousandths of eq. (1) to what no pass can show; of symmetric members, as the three pairs of
+/// electrodes make them, e times as much is expected. Of all gyros together it is uncertain by a factor of e², gyros
+/// among each other by a factor of e, degrees of one gyro by e² of which neighbours have most in common, symmetric
+/// members and others by e in the same way, W and D of one degree by half a logarithm. A rotor that has much of one
+/// degree is likely to have some of the next, and near a great circle W and D of a degree look alike; but of low
+/// degrees, which act much as eq. (1) does, a pass without slews shows little, and that it shows nothing of high ones
+/// says little of them. Symmetric members look more like eq. (1) than others, so that a pass shows less of them than of
+/// these: they may be there alone, and where the others are, they are as well.
 constexpr double kRmsOfDegree1_rad_s = 5e-9;
 constexpr double kFallPerDegree = 0.7;
 constexpr double kLeastRms_rad_s = 1e-10;
-constexpr double kSigmaOfAll = 3;
+constexpr double kLogOfSymmetric = 1;
+constexpr double kSigmaOfAll = 2;
 constexpr double kSigmaOfGyro = 1;
 constexpr double kSigmaOfDegree = 2;
 constexpr double kDegreesAlike = 3;
+constexpr double kSigmaOfSymmetry = 1;
 constexpr double kSigmaOfGroup = 0.5;
 /// Larger than all of eq. (1): a rotor that drifts so is not one that it describes.
 constexpr double kMostRms_rad_s = 1e-5;
@@ -42,7 +47,8 @@ constexpr double kMostRms_rad_s = 1e-5;
 VectorXd prior_mean(const std::vector<FieldMembers::Group>& groups) {
   VectorXd mean(static_cast<Index>(groups.size()));
   std::ranges::transform(groups, mean.begin(), [](const FieldMembers::Group& group) {
-    return std::log(std::max(kRmsOfDegree1_rad_s * std::exp(-kFallPerDegree * (group.degree - 1)), kLeastRms_rad_s));
+    return std::log(std::max(kRmsOfDegree1_rad_s * std::exp(-kFallPerDegree * (group.degree - 1)), kLeastRms_rad_s)) +
+           (group.symmetric ? kLogOfSymmetric : 0);
   });
   return mean;
 }
@@ -54,14 +60,21 @@ MatrixXd prior_information(const std::vector<FieldMembers::Group>& groups) {
     for (Index j = 0; j < size; ++j) {
       const FieldMembers::Group& a = groups[static_cast<std::size_t>(i)];
       const FieldMembers::Group& b = groups[static_cast<std::size_t>(j)];
-      covariance(i, j) += a.gyro == b.gyro ? kSigmaOfGyro * kSigmaOfGyro : 0;
-      covariance(i, j) +=
-          a.gyro == b.gyro ? kSigmaOfDegree * kSigmaOfDegree * std::exp(-std::abs(a.degree - b.degree) / kDegreesAlike)
-                           : 0;
+      if (a.gyro == b.gyro) {
+        const double alike = std::exp(-std::abs(a.degree - b.degree) / kDegreesAlike);
+        covariance(i, j) += kSigmaOfGyro * kSigmaOfGyro + kSigmaOfDegree * kSigmaOfDegree * alike;
+        covariance(i, j) += a.symmetric == b.symmetric ? kSigmaOfSymmetry * kSigmaOfSymmetry * alike : 0;
+      }
     }
     covariance(i, i) += kSigmaOfGroup * kSigmaOfGroup;
   }
   return covariance.llt().solve(MatrixXd::Identity(size, size));
+}
+
+/// W(2, 0), W(2, 2) and so on, even in each component of h, and those that are h1 h2 h3 times such.
+bool is_symmetric(const DriftCoefficient& member) {
+  const bool even_degree = member.degree % 2 == 0;
+  return member.order % 2 == 0 && (even_degree ? member.order >= 0 : member.order < 0);
 }
 
 /// The pass by one spectrum.
@@ -132,7 +145,7 @@ class Posteriors {
       const Index g = group[static_cast<std::size_t>(j)];
       gradient(g) += at.mean(j) * at.mean(j) - learnt(j, j);
       information(g, g) += learnt(j, j) * learnt(j, j);
-      for (Index i = j + 1; i < members_.size(); ++i) {  // the groups are in the order of the members
+      for (Index i = j + 1; i < members_.size(); ++i) {
         information(group[static_cast<std::size_t>(i)], g) += 2 * learnt(i, j) * learnt(i, j);
       }
     }
@@ -150,25 +163,31 @@ class Posteriors {
 
 FieldMembers::FieldMembers(const Layout& layout) {
   const std::vector<DriftCoefficient> coefficients = coefficients_of(layout.drift_model);
-  std::vector<double> of_rms;
+  VectorXd sizes;  // of the groups
   for (int k = 0; k < layout.gyros; ++k) {
     for (std::size_t i = 0; i < coefficients.size(); ++i) {
       const DriftCoefficient& its = coefficients[i];
       if (its.is_in_eq1()) {
         continue;
       }
-      if (groups_.empty() || groups_.back().gyro != k || groups_.back().potential != its.member ||
-          groups_.back().degree != its.degree) {
-        groups_.push_back({k, its.member, its.degree});
+      const Group group{k, its.member, its.degree, is_symmetric(its)};
+      const auto found = std::ranges::find(groups_, group) - groups_.begin();
+      if (found == std::ssize(groups_)) {
+        groups_.push_back(group);
+        sizes.conservativeResizeLike(VectorXd::Zero(found + 1));
       }
-      group_of_.push_back(static_cast<Index>(groups_.size()) - 1);
+      sizes(found) += 1;
+      group_of_.push_back(found);
       states_.push_back(layout.drift(k) + static_cast<Index>(i));
-      // The mean square of |∇Y| over the sphere is l (l + 1)/4π; a degree has 2 l + 1 of them.
-      const double l = its.degree;
-      of_rms.push_back(std::sqrt(4 * std::numbers::pi / ((2 * l + 1) * l * (l + 1))));
     }
   }
-  of_rms_ = VectorXd::Map(of_rms.data(), static_cast<Index>(of_rms.size()));
+  of_rms_.resize(size());
+  for (Index i = 0; i < size(); ++i) {
+    const Index g = group_of_[static_cast<std::size_t>(i)];
+    // The mean square of |∇Y| over the sphere is l (l + 1)/4π.
+    const double l = groups_[static_cast<std::size_t>(g)].degree;
+    of_rms_(i) = std::sqrt(4 * std::numbers::pi / (sizes(g) * l * (l + 1)));
+  }
 }
 
 VectorXd FieldMembers::expected() const { return prior_mean(groups_); }
@@ -420,6 +439,29 @@ MeanSquares mean_squares_of(const Layout& layout, const FieldMembers& members, c
   return found_of;
 }
 
+/// The spectrum by potential and degree. `covariance`: of the ln of the root mean squares of the groups.
+std::vector<DriftFieldLevel> levels_of(const FieldMembers& members, const VectorXd& log_rms,
+                                       const MatrixXd& covariance) {
+  const std::vector<FieldMembers::Group>& groups = members.groups();
+  std::vector<DriftFieldLevel> levels;
+  for (const FieldMembers::Group& first : groups) {
+    if (std::ranges::any_of(levels, [&](const DriftFieldLevel& level) {
+          return level.gyro == first.gyro && level.potential == first.potential && level.degree == first.degree;
+        })) {
+      continue;
+    }
+    VectorXd squares(log_rms.size());
+    std::ranges::transform(groups, log_rms, squares.begin(), [&](const FieldMembers::Group& group, double log) {
+      const bool its = group.gyro == first.gyro && group.potential == first.potential && group.degree == first.degree;
+      return its ? std::exp(2 * log) : 0;
+    });
+    const VectorXd parts = squares / squares.sum();
+    levels.push_back({first.gyro, first.potential, first.degree, std::sqrt(squares.sum()),
+                      std::exp(std::sqrt(parts.dot(covariance * parts)))});
+  }
+  return levels;
+}
+
 }  // namespace
 
 FieldPrior field_prior(const PassProblem& problem, const FieldMembers& members, const FieldInformation& information,
@@ -447,12 +489,7 @@ FieldPrior field_prior(const PassProblem& problem, const FieldMembers& members, 
   prior.more_covariance = by_members * added * by_members.transpose();
   const MatrixXd covariance =
       spectrum.information.llt().solve(MatrixXd::Identity(spectrum.information.rows(), spectrum.information.cols()));
-  for (std::size_t g = 0; g < members.groups().size(); ++g) {
-    const FieldMembers::Group& group = members.groups()[g];
-    const auto i = static_cast<Index>(g);
-    prior.levels.push_back({group.gyro, group.potential, group.degree, std::exp(spectrum.log_rms(i)),
-                            std::exp(std::sqrt(covariance(i, i)))});
-  }
+  prior.levels = levels_of(members, spectrum.log_rms, covariance);
   return prior;
 }
 

@@ -1,6 +1,6 @@
 #pragma once
 /// The drift of rotors as a random field on the sphere (docs/mathematics.md, section 12): members outside eq. (1) with
-/// variances, one for each gyro, potential and degree, that the pass determines.
+/// variances, one for each gyro, potential, degree and symmetry, that the pass determines.
 
 #include <Eigen/Core>
 #include <vector>
@@ -17,11 +17,15 @@ class FieldMembers {
  public:
   explicit FieldMembers(const Layout& layout);
 
-  /// Of one gyro, potential and degree.
+  /// Of one gyro, potential and degree: those that half a turn about any axis of the case leaves as they are, as it
+  /// does all of eq. (1), or the others.
   struct Group {
     int gyro = 0;
     DriftCoefficient::Member potential = DriftCoefficient::Member::kW;
     int degree = 0;
+    bool symmetric = false;
+
+    friend bool operator==(const Group&, const Group&) = default;
   };
   [[nodiscard]] const std::vector<Group>& groups() const { return groups_; }
   /// State of each member, as among all states; group of each.

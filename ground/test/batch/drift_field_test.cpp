@@ -47,6 +47,41 @@ double log_density(const FieldInformation& information, const VectorXd& sigma) {
          VectorXd(root.matrixL().solve(information.y)).squaredNorm() / 2;
 }
 
+/// Whether half a turn about any axis of the case leaves the drift of a member as it is.
+bool is_left_by_half_turns(const DriftModel& model, Index member) {
+  const Eigen::Vector3d h = Eigen::Vector3d(0.3, -0.5, 0.7).normalized();
+  const auto across_h = [&](const Eigen::Vector3d& direction) {
+    Columns<kMaxDriftColumns> columns;
+    model.basis(direction, 0, columns.view(model.columns()));
+    const Eigen::Vector3d drift = columns.first(model.size()).col(member);
+    return Eigen::Vector3d(drift - direction * direction.dot(drift));
+  };
+  for (int axis = 0; axis < 3; ++axis) {
+    Eigen::Vector3d turn = Eigen::Vector3d::Constant(-1);
+    turn(axis) = 1;
+    if ((across_h(turn.cwiseProduct(h)) - turn.cwiseProduct(across_h(h))).norm() > 1e-12) {
+      return false;
+    }
+  }
+  return true;
+}
+
+TEST(DriftField, SymmetricGroupsAreWhatHalfTurnsLeaveAsItIs) {
+  const Layout layout{.drift_model = vsh(8)};
+  const FieldMembers members(layout);
+  EXPECT_EQ(members.groups().size(), 2U * 2 * (8 + 5));  // of degrees 1 to 8, and from 4 on both kinds
+  const DriftModel model(layout.drift_model, {});
+  for (Index i = 0; i < Layout::kEq1; ++i) {
+    EXPECT_TRUE(is_left_by_half_turns(model, i));
+  }
+  for (Index i = 0; i < members.of_one_gyro(); ++i) {
+    const Index group = members.group_of()[static_cast<std::size_t>(i)];
+    EXPECT_EQ(members.groups()[static_cast<std::size_t>(group)].symmetric,
+              is_left_by_half_turns(model, Layout::kEq1 + i))
+        << i;
+  }
+}
+
 TEST(DriftField, GroupsTheMembersOutsideEq1ByGyroPotentialAndDegree) {
   const FieldMembers members(kSmall);
   EXPECT_EQ(members.size(), 2 * (vsh(3).size() - Layout::kEq1));
@@ -114,21 +149,22 @@ double log_prior(const FieldMembers& members, const VectorXd& log_rms) {
       const FieldMembers::Group& a = members.groups()[static_cast<std::size_t>(i)];
       const FieldMembers::Group& b = members.groups()[static_cast<std::size_t>(j)];
       const bool of_one_gyro = a.gyro == b.gyro;
+      const double alike = std::exp(-std::abs(a.degree - b.degree) / 3.0);
       covariance(i, j) =
-          9 + (of_one_gyro ? 1 + 4 * std::exp(-std::abs(a.degree - b.degree) / 3.0) : 0) + (i == j ? 0.25 : 0);
+          4 + (of_one_gyro ? 1 + (a.symmetric == b.symmetric ? 4 + 1 : 4) * alike : 0) + (i == j ? 0.25 : 0);
     }
   }
   VectorXd apart = log_rms;
   for (Index g = 0; g < size; ++g) {
-    const int degree = members.groups()[static_cast<std::size_t>(g)].degree;
-    apart(g) -= std::log(std::max(5e-9 * std::exp(-0.7 * (degree - 1)), 1e-10));
+    const FieldMembers::Group& group = members.groups()[static_cast<std::size_t>(g)];
+    apart(g) -= std::log(std::max(5e-9 * std::exp(-0.7 * (group.degree - 1)), 1e-10)) + (group.symmetric ? 1 : 0);
   }
   return -apart.dot(covariance.inverse() * apart) / 2;
 }
 
 TEST(DriftField, TheSpectrumIsTheMostLikelyOne) {
   std::mt19937_64 random(7);
-  const FieldMembers members(kSmall);
+  const FieldMembers members(Layout{.drift_model = vsh(4)});
   const FieldInformation information = seen_with(1e-9, normal_matrix(members.size(), 1, random).col(0) * 1e-8, random);
   const FieldSpectrum found = most_likely_spectrum(members, information);
   const auto log_posterior = [&](const VectorXd& log_rms) {
