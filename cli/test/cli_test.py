@@ -250,11 +250,15 @@ def test_navigate_says_how_long_the_attitude_will_hold(calibrated, tmp_path):
     assert json.loads(held.stdout)["readiness"]["time_s"] < readiness["time_s"] / 10
 
 
-def test_json_is_one_document(tmp_path):
-    result = run("calibrate", EXAMPLE, "-o", tmp_path / "out", "--json")
-    summary = json.loads(result.stdout)
-    assert summary["calibration"]["verdict"]["trustworthy"] is True
-    assert summary["navigation"]["reference"] == "truth"
+@pytest.fixture(scope="session")
+def outcome(tmp_path_factory):
+    """Of a calibration of the example by default, as JSON."""
+    return json.loads(run("calibrate", EXAMPLE, "-o", tmp_path_factory.mktemp("outcome"), "--json").stdout)
+
+
+def test_json_is_one_document(outcome):
+    assert outcome["calibration"]["verdict"]["trustworthy"] is True
+    assert outcome["navigation"]["reference"] == "truth"
 
 
 def test_quiet_prints_nothing(tmp_path):
@@ -330,8 +334,7 @@ def test_extension_of_the_correction_interval_by_attitude_files(calibrated, tmp_
 
 
 @pytest.mark.long
-def test_calibrate_measures_convergence_and_extension(tmp_path):
-    outcome = json.loads(run("calibrate", EXAMPLE, "-o", tmp_path / "out", "--json").stdout)
+def test_calibrate_measures_convergence_and_extension(outcome):
     assert 0 < outcome["convergence"]["alignment_s"] < 90 * 60
     assert len(outcome["convergence"]["states"]) == 20
     assert [c["t_s"] for c in outcome["extension"]["corrections"]] == [0, 5400, 10800, 16200]
