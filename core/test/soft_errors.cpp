@@ -38,7 +38,7 @@ constexpr double kWithStarTracker_s = 1600;
 constexpr double kFlownOn_s = 120;
 constexpr double kSilent_rad = 10 * test::kArcsecond;
 constexpr double kSigmaFactor = 1.5;
-constexpr std::size_t kSamplesPerStep = 24;  // of the states kept
+constexpr std::size_t kSamplesPerStep = 240;  // of the states kept
 constexpr auto kSamplesFlownOn = static_cast<std::size_t>(kFlownOn_s * 8);
 constexpr std::size_t kSamplesWithGuard = 48;
 
