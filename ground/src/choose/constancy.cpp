@@ -8,6 +8,7 @@
 #include <limits>
 #include <utility>
 
+#include "batch/gram.hpp"
 #include "trihedron/core/frames.hpp"
 
 namespace trihedron::ground {
@@ -87,13 +88,15 @@ class StretchForm {
 /// Removes the first variables of a form, to their likeliest values. `follow`: how these follow the others, negated.
 MatrixXd without_first(const MatrixXd& form, Index size, MatrixXd* follow = nullptr) {
   const Index rest = form.rows() - size;
-  const Eigen::LLT<MatrixXd> root(form.topLeftCorner(size, size));
-  const MatrixXd half = root.matrixL().solve(form.topRightCorner(size, rest));
+  MatrixXd root = form.topLeftCorner(size, size);
+  static_cast<void>(to_root(root));  // positive definite, since the pass has a solution
+  MatrixXd half = form.topRightCorner(size, rest);
+  solve_lower(root, half);
   if (follow != nullptr) {
-    *follow = root.matrixU().solve(half);
+    *follow = root.triangularView<Eigen::Lower>().transpose().solve(half);
   }
   MatrixXd left = form.bottomRightCorner(rest, rest);
-  left.selfadjointView<Eigen::Lower>().rankUpdate(half.transpose(), -1);
+  add_gram(half.transpose(), -1, left);
   return left.selfadjointView<Eigen::Lower>();
 }
 
@@ -121,7 +124,7 @@ void for_each_arc(const PassProblem& problem, const PassSolution& solution, cons
   Index count = 0;
   const auto put_into_form = [&] {
     if (count > 0) {
-      form.selfadjointView<Eigen::Lower>().rankUpdate(gathered.leftCols(count));
+      add_gram(gathered.leftCols(count), 1, form);
       count = 0;
     }
   };

@@ -36,6 +36,9 @@ class Search {
     }
   }
 
+  /// Gives back what it took from the trial.
+  [[nodiscard]] PassProblem::Linear linear() && { return std::move(linear_); }
+
   /// The best point, its first number by a parabola through its neighbours where it has two.
   [[nodiscard]] NoiseFit best() const {
     const auto [i, j] = best_;
@@ -84,8 +87,9 @@ NoiseFit converge(Trial& trial, const Search::At& at, const std::vector<Search::
   NoiseFit likely;
   for (int round = 0; round < kRounds; ++round) {
     const ProcessNoise before = likely.noise;
-    likely = Search(trial, at, starts, lowest, highest).best();
-    trial.refit(likely.noise);
+    Search search(trial, at, starts, lowest, highest);
+    likely = search.best();
+    trial.refit(likely.noise, std::move(search).linear());
     const auto same = [](double a, double b) { return std::abs(a - b) <= kNoiseTolerance * b; };
     if (same(before.direction_random_walk_rad_sqrt_s, likely.noise.direction_random_walk_rad_sqrt_s) &&
         same(before.wandering_drift.sigma, likely.noise.wandering_drift.sigma) &&

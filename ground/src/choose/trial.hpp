@@ -21,8 +21,9 @@ class Trial {
   Trial(const Pass& pass, const Screened& screened, const CalibrationOptions& options,
         const std::optional<ProcessNoise>& noise = {});
 
-  /// Fits again, with other noise.
-  void refit(const ProcessNoise& noise);
+  /// Fits again, with other noise. `linear`: that of take_linear(), where it was taken, by which the spectrum of a field
+  /// is found again: the last step from it was a fraction of the sigmas.
+  void refit(const ProcessNoise& noise, PassProblem::Linear linear = {});
   /// Gives away or frees what is large. Until it is fitted again, the trial is to be asked for nothing but likelihoods.
   [[nodiscard]] PassProblem::Linear take_linear() { return std::exchange(found_.linear, {}); }
   void release() { found_.linear = {}, found_.errors = {}; }
@@ -58,6 +59,7 @@ class Trial {
   std::optional<FieldMembers> field_;  ///< where the drift is one
   FieldSpectrum spectrum_;             ///< of it
   Eigen::VectorXd field_level_;        ///< that its modes are for, ln of rad/s
+  std::optional<MovedByModes> moved_;  ///< by each of its members
   BatchResult found_;
 };
 
