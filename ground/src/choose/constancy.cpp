@@ -297,19 +297,19 @@ class Constancy {
                 double worth_more_than) const {
     const MatrixXd by_form = form_.topLeftCorner(size(), size()) * columns;
     const auto D = prior_sigma.asDiagonal();
-    const MatrixXd S =
+    MatrixXd root =
         MatrixXd(D * (columns.transpose() * by_form) * D) + MatrixXd::Identity(prior_sigma.size(), prior_sigma.size());
-    const VectorXd b = -(D * (columns.transpose() * form_.topRightCorner(size(), 1)));
-    const Eigen::LLT<MatrixXd> root(S);
-    const VectorXd found = root.solve(b);
-    change.log_odds = b.dot(found) / 2 - root.matrixLLT().diagonal().array().log().sum();
+    static_cast<void>(to_root(root));  // positive definite: 1 and more
+    const auto L = root.triangularView<Eigen::Lower>();
+    const VectorXd white = L.solve(-(D * (columns.transpose() * form_.topRightCorner(size(), 1))));
+    change.log_odds = white.squaredNorm() / 2 - root.diagonal().array().log().sum();
     if (change.log_odds <= worth_more_than) {
       return;
     }
-    change.size = D * found;
-    // The diagonal of S⁻¹ = L⁻ᵀ L⁻¹.
+    change.size = D * VectorXd(root.transpose().triangularView<Eigen::Upper>().solve(white));
+    // The diagonal of L⁻ᵀ L⁻¹.
     MatrixXd inverse = MatrixXd::Identity(prior_sigma.size(), prior_sigma.size());
-    root.matrixL().solveInPlace(inverse);
+    solve_lower(root, inverse);
     change.sigma = D * VectorXd(inverse.colwise().norm().transpose());
     const VectorXd moved = columns * change.size;
     change.parameters_off = -(follow_.leftCols(size()) * moved);

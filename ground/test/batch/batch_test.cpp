@@ -376,11 +376,9 @@ TEST(PassProblem, TellsTheSameByParts) {
   const PassSolution solution = first_solution(problem, screened);
   const PassProblem::Linear whole = problem.linearise(solution);
   const PassProblem::Linear parts = problem.linearise_by_parts(solution);
-  std::size_t with_constants = 0;
-  for (const SmootherStage& stage : parts.stages) {
-    with_constants += stage.H.rows() > layout.dynamic() ? 1 : 0;
-  }
-  EXPECT_EQ(with_constants, PassProblem::kParts);
+  const auto with_constants = std::ranges::count_if(
+      parts.stages, [&](const SmootherStage& stage) { return stage.H.rows() > layout.dynamic(); });
+  EXPECT_EQ(static_cast<std::size_t>(with_constants), PassProblem::kParts);
   const SmootherResult by_whole = smooth(whole.prior, whole.prior_y, whole.stages);
   const SmootherResult by_parts = smooth(parts.prior, parts.prior_y, parts.stages);
   EXPECT_NEAR(by_parts.likelihood.residual_square, by_whole.likelihood.residual_square,
