@@ -458,7 +458,8 @@ FieldPrior field_prior(const PassProblem& problem, const FieldMembers& members, 
       by_members.row(row) = information.others_by_members.row(other++);
     }
   }
-  prior.more_covariance = by_members * added * by_members.transpose();
+  const MatrixXd more = multiply(multiply(by_members, added), by_members.transpose());
+  prior.more_covariance = (more + more.transpose()) / 2;
   const MatrixXd covariance =
       spectrum.information.llt().solve(MatrixXd::Identity(spectrum.information.rows(), spectrum.information.cols()));
   for (std::size_t g = 0; g < members.groups().size(); ++g) {

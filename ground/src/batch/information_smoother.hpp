@@ -59,8 +59,8 @@ struct ConstantsInformation {
 };
 
 /// The constants need no information. `stage`: as of likelihood(). By normal equations, a fraction of the work of a
-/// triangle: lower_root() of them is that triangle to rounding, as long as what is known of the constants together is
-/// more than 1e-6 of what is known of each if the others were known.
+/// triangle, which lower_root() makes of them: combinations of the constants of which more is known than 1e-10 of what
+/// is known of each constant if the others were known have four digits and more.
 [[nodiscard]] ConstantsInformation eliminate_moving(const Eigen::MatrixXd& prior, const Eigen::VectorXd& prior_y,
                                                     std::size_t stages,
                                                     const std::function<SmootherStage(std::size_t)>& stage);

@@ -123,12 +123,14 @@ std::optional<Halves> compare_halves(const PassProblem& problem, const BatchResu
   return halves;
 }
 
-/// The part of a symmetric matrix, in units of the covariance root rootᵀ, that makes it larger.
-MatrixXd positive_part(const MatrixXd& added, const MatrixXd& root) {
-  const auto to_units = root.triangularView<Eigen::Upper>();
-  MatrixXd axes = to_units.solve(MatrixXd(to_units.solve(added).transpose()));
+/// The part of a symmetric matrix, in units of the covariance L Lᵀ, that makes it larger; L: lower triangle.
+MatrixXd positive_part(const MatrixXd& added, const MatrixXd& L) {
+  MatrixXd axes = added;
+  solve_lower(L, axes);
+  axes.transposeInPlace();
+  solve_lower(L, axes);
   const Eigen::VectorXd longer_by = to_axes(axes);
-  return square(multiply(root, axes) * longer_by.cwiseMax(0).cwiseSqrt().asDiagonal());
+  return square(multiply(L, axes) * longer_by.cwiseMax(0).cwiseSqrt().asDiagonal());
 }
 
 /// The roots of a result, of which only the solution and the covariance at its end are kept: the rest is long.
@@ -227,8 +229,10 @@ KappaAndDelta with_members(const PassProblem& problem, const MatrixXd& more_cova
   found.covariance += multiply(multiply(follow, by_modes.covariance), follow.transpose());
   found.covariance = (found.covariance + found.covariance.transpose()).eval() / 2;
   if (more_covariance.size() > 0) {
-    const Eigen::LLT<MatrixXd> root(found.covariance.reverse());
-    found.covariance += positive_part(more_covariance, MatrixXd(root.matrixL()).reverse());
+    MatrixXd root = found.covariance;
+    static_cast<void>(to_root(root));  // positive definite, since the pass has a solution
+    root.triangularView<Eigen::StrictlyUpper>().setZero();
+    found.covariance += positive_part(more_covariance, root);
   }
   return found;
 }
