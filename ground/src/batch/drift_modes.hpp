@@ -26,8 +26,8 @@ struct DriftModes {
 [[nodiscard]] Eigen::MatrixXd parameters_by_parameters(const Layout& to, const Layout& from,
                                                        const PerGyro<Eigen::MatrixXd>& outside);
 
-/// How far each mode, or each coefficient, has turned the momenta since the beginning of an arc, tabulated along a pass. It depends on the
-/// estimates so little that it need not be computed again when these are corrected.
+/// How far each mode, or each coefficient, has turned the momenta since the beginning of an arc, tabulated along a
+/// pass. It depends on the estimates so little that it need not be computed again when these are corrected.
 class MovedByModes {
  public:
   using Columns = PerGyro<Eigen::MatrixXf>;  ///< 3 × modes, `in`, s; to seven digits, to take half the memory

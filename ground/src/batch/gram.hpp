@@ -15,12 +15,12 @@ void add_gram(const Eigen::MatrixXd& a, double weight, Eigen::MatrixXd& gram);
 /// a becomes L⁻¹ a; only the lower triangle of L is used.
 void solve_lower(const Eigen::MatrixXd& L, Eigen::MatrixXd& a);
 
-/// The lower triangle of a becomes that of L, a = L Lᵀ; what is above it is left as it is. Returns whether a is positive
-/// definite; where it is not, the triangle is left without meaning.
+/// The lower triangle of a becomes that of L, a = L Lᵀ; what is above it is left as it is. Returns whether a is
+/// positive definite; where it is not, the triangle is left without meaning.
 [[nodiscard]] bool to_root(Eigen::MatrixXd& a);
 
-/// A symmetric matrix becomes its axes, a column for each; returns their eigenvalues, increasing. Only the lower triangle
-/// is used.
+/// A symmetric matrix becomes its axes, a column for each; returns their eigenvalues, increasing. Only the lower
+/// triangle is used.
 [[nodiscard]] Eigen::VectorXd to_axes(Eigen::MatrixXd& a);
 
 /// a b.

@@ -1,5 +1,6 @@
 #pragma once
-/// The products of gram.hpp as compiled for each instruction set; matrices column by column, but rows that are few and long.
+/// The products of gram.hpp as compiled for each instruction set; matrices column by column, but rows that are few and
+/// long.
 
 namespace trihedron::ground::kernels {
 

@@ -143,9 +143,7 @@ class Forward {
     return {moved_.topLeftCorner(d_, d_), moved_.block(0, d_, d_, n_), moved_.topRightCorner(d_, 1)};
   }
   /// ln |det| of the rows about w by w.
-  [[nodiscard]] double log_determinant_of_noise() const {
-    return moved_.diagonal().head(d_).array().abs().log().sum();
-  }
+  [[nodiscard]] double log_determinant_of_noise() const { return moved_.diagonal().head(d_).array().abs().log().sum(); }
 
   /// The rows about d, right side last.
   [[nodiscard]] const LongRows& moving() const { return moving_; }
@@ -198,8 +196,7 @@ Forward<Constants> go_forward(const MatrixXd& prior, const VectorXd& prior_y, st
       forward->move(stage);
       // The determinant for (d, c, w) is that for (w, d', c) over |det A⁻¹|, the determinant of the change of
       // variables.
-      log_root_determinant +=
-          forward->log_determinant_of_noise() - std::log(std::abs(stage.A_inverse.determinant()));
+      log_root_determinant += forward->log_determinant_of_noise() - std::log(std::abs(stage.A_inverse.determinant()));
       moved(*forward);
     }
   }
@@ -225,15 +222,16 @@ SmootherLikelihood likelihood_by(const MatrixXd& triangle, double log_root_deter
 SmootherLikelihood likelihood(const MatrixXd& prior, const VectorXd& prior_y, std::size_t stages,
                               const std::function<SmootherStage(std::size_t)>& stage) {
   double log_root_determinant = 0;
-  const auto forward = go_forward<ConstantRows>(prior, prior_y, stages, stage, [](const auto&) {}, log_root_determinant);
+  const auto forward = go_forward<ConstantRows>(
+      prior, prior_y, stages, stage, [](const auto&) {}, log_root_determinant);
   return likelihood_by(forward.triangle(), log_root_determinant);
 }
 
 ConstantsInformation eliminate_moving(const MatrixXd& prior, const VectorXd& prior_y, std::size_t stages,
                                       const std::function<SmootherStage(std::size_t)>& stage) {
   ConstantsInformation found;
-  auto forward =
-      go_forward<ConstantSquares>(prior, prior_y, stages, stage, [](const auto&) {}, found.log_root_determinant);
+  auto forward = go_forward<ConstantSquares>(
+      prior, prior_y, stages, stage, [](const auto&) {}, found.log_root_determinant);
   const MatrixXd moving = forward.moving().leftCols(forward.moving().rows());
   refuse_singular(moving);
   found.log_root_determinant += log_determinant(moving);

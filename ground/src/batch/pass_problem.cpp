@@ -41,7 +41,8 @@ Vector3d turn(const Vector3d& from, const Vector3d& to) { return from.cross(to);
 Vector3d rate_of(const RotorDrift& rotor, const Gyro& gyro, const Vector3d& h, double part_of_change,
                  const Layout& layout) {
   const Vector3d rate = rotor.rate(h, part_of_change);
-  return layout.further.wandering_drift ? Vector3d(rate + gyro.drift_rad_s.segment<3>(layout.wandering_column())) : rate;
+  return layout.further.wandering_drift ? Vector3d(rate + gyro.drift_rad_s.segment<3>(layout.wandering_column()))
+                                        : rate;
 }
 
 /// By how much a body may turn in a step of a table, rad.

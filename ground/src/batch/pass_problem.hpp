@@ -111,8 +111,8 @@ class PassProblem {
     double cost_outside_rows = 0;
   };
   [[nodiscard]] Linear linearise(const PassSolution& solution) const;
-  /// The same with the rows about the constants alone as a triangle in the last arc of each part of the pass: a fraction
-  /// of the rows, for whom only the ends of the parts matter.
+  /// The same with the rows about the constants alone as a triangle in the last arc of each part of the pass: a
+  /// fraction of the rows, for whom only the ends of the parts matter.
   [[nodiscard]] Linear linearise_by_parts(const PassSolution& solution) const;
   static constexpr std::size_t kParts = 6;
   /// The arc after the last one of that many parts.
@@ -187,8 +187,8 @@ class PassProblem {
     std::size_t end = 0;  ///< the first node of the next arc, which this one ends at, or that after the last
   };
 
-  /// What turns the momenta along a solution, and the columns that the sensitivities are about: there are fewer of these
-  /// where modes stand for the others.
+  /// What turns the momenta along a solution, and the columns that the sensitivities are about: there are fewer of
+  /// these where modes stand for the others.
   struct Drift {
     const DriftModel* sensitive = nullptr;
     PerGyro<RotorDrift> rotors;
@@ -201,8 +201,8 @@ class PassProblem {
   };
   [[nodiscard]] Compared compare_now(const PassSolution& solution, const Moment& moment) const;
   class FixMerger;
-  /// Adds the rows of a fix, whitened, with the weight that its misfit leaves it: beyond the gate, `scale` times that of
-  /// its NIS, its influence falls with the third power. Returns the part of the cost that the rows do not contain.
+  /// Adds the rows of a fix, whitened, with the weight that its misfit leaves it: beyond the gate, `scale` times that
+  /// of its NIS, its influence falls with the third power. Returns the part of the cost that the rows do not contain.
   double add_fix(Compared fix, const Moment& moment, double scale, FixMerger& nearby) const;
   [[nodiscard]] Linear linearise(const PassSolution& solution, bool by_parts) const;
 
@@ -216,8 +216,8 @@ class PassProblem {
   [[nodiscard]] Drift drift_along(const PassSolution& solution, const DriftModel* sensitive) const;
   void go_along_arc(const PassSolution& solution, std::size_t arc, const Drift& drift,
                     const std::function<void(const Moment&)>& visit) const;
-  /// Rows about the states at a moment as rows about those of its arc but for the modes, in the order of without_modes_;
-  /// and these put where they are among all states.
+  /// Rows about the states at a moment as rows about those of its arc but for the modes, in the order of
+  /// without_modes_; and these put where they are among all states.
   [[nodiscard]] Eigen::MatrixXd by_states_but_modes(const Moment& moment, Rows rows) const;
   void put_beside_modes(const Eigen::MatrixXd& rows, Eigen::Ref<Eigen::MatrixXd> all) const;
   [[nodiscard]] const DriftModel& sensitive() const { return modes_ ? drift_of_eq1_ : drift_; }

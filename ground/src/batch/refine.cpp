@@ -208,8 +208,7 @@ KappaAndDelta with_members(const PassProblem& problem, const MatrixXd& more_cova
   const MatrixXd by_parameters = parameters_by_parameters(modes, members, amplitudes) * sigma.asDiagonal();
   const MatrixXd before = multiply(by_parameters, scaled);
   const MatrixXd follow =
-      sigma.asDiagonal() *
-      MatrixXd(multiply(before, by_parameters.transpose()).ldlt().solve(before).transpose());
+      sigma.asDiagonal() * MatrixXd(multiply(before, by_parameters.transpose()).ldlt().solve(before).transpose());
   KappaAndDelta found{by_modes.gyros, {}, follow};
   const Eigen::VectorXd errors = follow * moved;
   for (int k = 0; k < members.gyros; ++k) {

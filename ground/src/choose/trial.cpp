@@ -121,9 +121,8 @@ void Trial::fit(PassSolution first) {
   found_ = most_likely(problem_, std::move(first), kNearEnough);
 }
 
-void Trial::refit(const ProcessNoise& noise, PassProblem::Linear linear) {
+void Trial::refit(const ProcessNoise& noise) {
   problem_.set_noise(noise);
-  found_.linear = std::move(linear);
   fit(PassSolution(found_.solution));
 }
 

@@ -169,11 +169,11 @@ TEST(InformationSmoother, EliminatesWhatMovesAsTheTriangleDoes) {
   const auto own = triangle.bottomRightCorner(kConstants + 1, kConstants + 1);
   const MatrixXd squares = found.squares.selfadjointView<Eigen::Lower>();
   EXPECT_LT((squares - own.transpose() * own).norm(), 1e-12 * squares.norm());
-  EXPECT_NEAR(found.log_root_determinant + own.diagonal().head(kConstants).array().abs().log().sum(),
-              likelihood(system.prior, system.prior_y, system.stages.size(), [&](std::size_t i) {
-                return system.stages[i];
-              }).log_root_determinant,
-              1e-12);
+  EXPECT_NEAR(
+      found.log_root_determinant + own.diagonal().head(kConstants).array().abs().log().sum(),
+      likelihood(system.prior, system.prior_y, system.stages.size(), [&](std::size_t i) { return system.stages[i]; })
+          .log_root_determinant,
+      1e-12);
 }
 
 /// Columns of sizes as far apart as coefficients and angles are, and more of them than the buffer has rows.
