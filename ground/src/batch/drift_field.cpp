@@ -208,8 +208,8 @@ DriftModes modes_of(const PassProblem& problem, const MovedByModes& by_coefficie
   const std::vector<Axes> found =
       on_all_cores(static_cast<std::size_t>(setup.on_board.layout.gyros), [&](std::size_t k) {
         const auto gyro = static_cast<int>(k);
-        Axes axes{{}, MatrixXd::Zero(size, size)};
-        add_gram(multiply(turned[gyro], units[gyro]).transpose(), 1, axes.directions);
+        const MatrixXd effects = square(turned[gyro].transpose());
+        Axes axes{{}, multiply(multiply(units[gyro].transpose(), effects), units[gyro])};
         axes.squares = to_axes(axes.directions);
         return axes;
       });

@@ -35,6 +35,7 @@ class Search {
     }
   }
 
+  [[nodiscard]] const Point& best_point() const { return best_; }
   /// The best point, its first number by a parabola through its neighbours where it has two.
   [[nodiscard]] NoiseFit best() const {
     const auto [i, j] = best_;
@@ -77,14 +78,19 @@ GaussMarkov wandering_of(const CalibrationOptions& options) {
 const std::vector<Search::Point> kAllLevels = {{0, 0}, {3, 0}, {6, 0}, {9, 0}};
 
 /// Alternates the search for the noise and a refit with it, because the noise decides which fixes are outliers, until a
-/// search finds that of the last refit again.
-NoiseFit converge(Trial& trial, const Search::At& at, const std::vector<Search::Point>& starts,
-                  const Search::Point& lowest, const Search::Point& highest) {
+/// search finds that of the last refit again. Which of several maxima is the largest the first search tells.
+NoiseFit converge(Trial& trial, const Search::At& at, std::vector<Search::Point> starts, const Search::Point& lowest,
+                  const Search::Point& highest) {
   constexpr int kRounds = 3;
   NoiseFit likely;
   for (int round = 0; round < kRounds; ++round) {
     const ProcessNoise before = likely.noise;
-    likely = Search(trial, at, starts, lowest, highest).best();
+    const Search search(trial, at, starts, lowest, highest);
+    starts = {{0, 0}};
+    if (search.best_point() != starts.front()) {
+      starts.push_back(search.best_point());
+    }
+    likely = search.best();
     const auto same = [](double a, double b) { return std::abs(a - b) <= kNoiseTolerance * b; };
     if (same(before.direction_random_walk_rad_sqrt_s, likely.noise.direction_random_walk_rad_sqrt_s) &&
         same(before.wandering_drift.sigma, likely.noise.wandering_drift.sigma) &&
