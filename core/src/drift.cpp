@@ -18,16 +18,13 @@ constexpr int max_degree_of(DriftModelId id) {
                                                      : 0;
 }
 
-/// Of the potential of a member. W(4, 4) stands for what k0 leaves of W(4, 0) and W(4, 4), orthogonal to it over the
-/// sphere: Σ h⁴ is √7 Y(4, 0) + √5 Y(4, 4), but for a factor and a constant.
+/// Of the potential of a member.
 template <class Harmonics>
 Eigen::Vector3d gradient(const Harmonics& harmonics, const DriftCoefficient& its) {
-  constexpr double kSqrt5Over12 = 0.6454972243679028;
-  constexpr double kSqrt7Over12 = 0.7637626158259733;
   const Eigen::Vector3d own = harmonics.polynomial_gradient(its.degree, its.order);
-  const bool shares_with_k0 = its.member == Member::kW && its.degree == 4 && its.order == 4;
-  return shares_with_k0 ? Eigen::Vector3d(kSqrt7Over12 * own - kSqrt5Over12 * harmonics.polynomial_gradient(4, 0))
-                        : own;
+  return BesideK0::is(its)
+             ? Eigen::Vector3d(BesideK0::kOf44 * own + BesideK0::kOf40 * harmonics.polynomial_gradient(4, 0))
+             : own;
 }
 
 }  // namespace

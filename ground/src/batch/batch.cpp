@@ -40,7 +40,7 @@ BatchResult most_likely(const PassProblem& problem, PassSolution first, double c
     result.before = result.solution;
     result.linear = {};  // long: one at a time
     result.errors = {};
-    result.linear = problem.linearise(result.before);
+    result.linear = problem.linearise_by_parts(result.before);
     result.errors = solved([&] { return smooth(result.linear.prior, result.linear.prior_y, result.linear.stages); });
     problem.correct(result.errors, result.solution);
     result.converged = step_of_constants(problem.layout(), result.errors) < converged;

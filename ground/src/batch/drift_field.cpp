@@ -1,7 +1,6 @@
 #include "batch/drift_field.hpp"
 
 #include <Eigen/Cholesky>
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -115,9 +114,11 @@ class Posteriors {
     // y by its own covariance: there are fewer of it than of the members.
     MatrixXd covariance = MatrixXd::Identity(information_.R.rows(), information_.R.rows());
     add_gram(information_.R * found.sigma.asDiagonal(), 1, covariance);
-    const Eigen::LLT<MatrixXd> root(covariance);
-    found.L = root.matrixLLT();
-    found.y = root.matrixL().solve(information_.y);
+    if (!to_root(covariance)) {  // of numbers that are none
+      covariance.setConstant(std::nan(""));
+    }
+    found.L = std::move(covariance);
+    found.y = found.L.triangularView<Eigen::Lower>().solve(information_.y);
     const VectorXd apart_from_prior = log_rms - prior_mean_;
     found.log_likelihood = information_.log_likelihood - found.L.diagonal().array().log().sum() -
                            found.y.squaredNorm() / 2 - apart_from_prior.dot(prior_ * apart_from_prior) / 2;
@@ -199,7 +200,7 @@ VectorXd FieldMembers::sigma(const VectorXd& log_rms) const {
 namespace {
 
 /// `units`: a lower triangle for each gyro, by which its members are made of ones that are independent and of size 1.
-DriftModes modes_of(const PassProblem& problem, const PassSolution& solution, const PerGyro<MatrixXd>& units) {
+DriftModes modes_of(const PassProblem& problem, const MovedByModes& by_coefficients, const PerGyro<MatrixXd>& units) {
   // What moves all fixes together by less than this part of their noise cannot be seen and does not matter.
   constexpr double kLeastEffect = 0.3;
   const PassSetup& setup = problem.setup();
@@ -211,30 +212,33 @@ DriftModes modes_of(const PassProblem& problem, const PassSolution& solution, co
   PerGyro<MatrixXd> turned;
   for (int k = 0; k < setup.on_board.layout.gyros; ++k) {
     turned[k].setZero(3 * arcs, size);
-  }
-  problem.go_over_arcs_by_coefficients(solution, [&](const PassProblem::Moment& moment) {
-    const auto row = 3 * static_cast<Index>(moment.arc + 1);
-    for (int k = 0; k < setup.on_board.layout.gyros; ++k) {
-      turned[k].middleRows<3>(row) =
-          turned[k].middleRows<3>(row - 3) +
-          moment.since[k].by_drift.first(Layout::kEq1 + static_cast<int>(size)).rightCols(size) / noise_rad;
+    for (Index arc = 0; arc + 1 < arcs; ++arc) {
+      const auto of_arc = static_cast<std::size_t>(arc);
+      turned[k].middleRows<3>(3 * arc + 3) =
+          turned[k].middleRows<3>(3 * arc) +
+          by_coefficients.added(of_arc, by_coefficients.size(of_arc) - 1, k).cast<double>() / noise_rad;
     }
-  });
+  }
   // The squares of the singular values span ten powers of ten at most, so that those that count are exact enough.
-  const std::vector<Eigen::SelfAdjointEigenSolver<MatrixXd>> found =
+  struct Axes {
+    VectorXd squares;
+    MatrixXd directions;
+  };
+  const std::vector<Axes> found =
       on_all_cores(static_cast<std::size_t>(setup.on_board.layout.gyros), [&](std::size_t k) {
         const auto gyro = static_cast<int>(k);
-        MatrixXd effects = MatrixXd::Zero(size, size);
-        add_gram((turned[gyro] * units[gyro]).transpose(), 1, effects);
-        return Eigen::SelfAdjointEigenSolver<MatrixXd>(effects);
+        const MatrixXd effects = square(turned[gyro].transpose());
+        Axes axes{{}, multiply(multiply(units[gyro].transpose(), effects), units[gyro])};
+        axes.squares = to_axes(axes.directions);
+        return axes;
       });
   Index count = 1;
-  for (const auto& its : found) {
-    count = std::max<Index>(count, (its.eigenvalues().array() > kLeastEffect * kLeastEffect).count());
+  for (const Axes& its : found) {
+    count = std::max<Index>(count, (its.squares.array() > kLeastEffect * kLeastEffect).count());
   }
   DriftModes modes;
   for (int k = 0; k < setup.on_board.layout.gyros; ++k) {
-    const MatrixXd directions = found[static_cast<std::size_t>(k)].eigenvectors().rightCols(count);
+    const MatrixXd directions = found[static_cast<std::size_t>(k)].directions.rightCols(count);
     const auto unit = units[k].triangularView<Eigen::Lower>();
     modes.gyros[k].coefficients = unit * directions;
     modes.gyros[k].amplitudes = unit.transpose().solve(directions).transpose();
@@ -244,17 +248,17 @@ DriftModes modes_of(const PassProblem& problem, const PassSolution& solution, co
 
 }  // namespace
 
-DriftModes modes_of(const PassProblem& problem, const PassSolution& solution, const FieldMembers& members,
+DriftModes modes_of(const PassProblem& problem, const MovedByModes& by_coefficients, const FieldMembers& members,
                     const VectorXd& log_rms) {
   PerGyro<MatrixXd> units;
   const Index size = members.of_one_gyro();
   for (int k = 0; k < problem.setup().on_board.layout.gyros; ++k) {
     units[k] = members.sigma(log_rms).segment(k * size, size).asDiagonal();
   }
-  return modes_of(problem, solution, units);
+  return modes_of(problem, by_coefficients, units);
 }
 
-DriftModes modes_of(const PassProblem& problem, const PassSolution& solution) {
+DriftModes modes_of(const PassProblem& problem, const MovedByModes& by_coefficients) {
   constexpr double kSigmas = 3;
   const Layout layout = problem.setup().layout();
   const Index size = layout.drift_size() - Layout::kEq1;
@@ -264,7 +268,7 @@ DriftModes modes_of(const PassProblem& problem, const PassSolution& solution) {
     const MatrixXd covariance = problem.setup().prior.covariance.block(row, row, size, size);
     units[k] = kSigmas * MatrixXd(covariance.llt().matrixL());
   }
-  return modes_of(problem, solution, units);
+  return modes_of(problem, by_coefficients, units);
 }
 
 FieldInformation information_on_field(const PassProblem& problem, const PassSolution& solution,
@@ -291,34 +295,44 @@ FieldInformation information_on_field(const PassProblem& problem, const PassSolu
     return stage;
   });
 
-  // The modes after all others.
+  // The modes after all others, then the right side, with the error of the solution made the amplitude itself.
   const Index size = Index{layout.gyros} * layout.drift_modes;
   const Index others = layout.constants() - size;
   const Index last = others + size;
-  MatrixXd rows(last + 1, last + 1);
-  rows.col(last) = found.triangle.col(last);
-  Index column = 0;
-  for (Index state = layout.dynamic(); state < layout.size(); ++state) {
-    if (!is_mode[static_cast<std::size_t>(state)]) {
-      rows.col(column++) = found.triangle.col(state - layout.dynamic());
+  std::vector<Index> order;
+  for (const bool modes_now : {false, true}) {
+    for (Index state = layout.dynamic(); state < layout.size(); ++state) {
+      if (is_mode[static_cast<std::size_t>(state)] == modes_now) {
+        order.push_back(state - layout.dynamic());
+      }
     }
   }
-  MatrixXd by_members = MatrixXd::Zero(size, members.size());
+  order.push_back(layout.constants());
+  VectorXd amplitudes = VectorXd::Zero(size);
   for (int k = 0; k < layout.gyros; ++k) {
-    const MatrixXd& amplitudes = modes.gyros[k].amplitudes;
-    const auto its = found.triangle.middleCols(layout.drift(k) + Layout::kEq1 - layout.dynamic(), layout.drift_modes);
-    rows.middleCols(others + Index{k} * layout.drift_modes, layout.drift_modes) = its;
-    // From the error of the solution to the amplitude itself.
-    rows.col(last) += its * (amplitudes * solution.gyros[k].drift_rad_s.segment(Layout::kEq1, amplitudes.cols()));
-    by_members.block(k * amplitudes.rows(), k * amplitudes.cols(), amplitudes.rows(), amplitudes.cols()) = amplitudes;
+    const MatrixXd& its = modes.gyros[k].amplitudes;
+    amplitudes.segment(Index{k} * layout.drift_modes, layout.drift_modes) =
+        its * solution.gyros[k].drift_rad_s.segment(Layout::kEq1, its.cols());
   }
-  const MatrixXd triangle = triangle_of(rows);
+  MatrixXd squares = MatrixXd(found.squares.selfadjointView<Eigen::Lower>())(order, order);
+  squares.col(last) += squares.middleCols(others, size) * amplitudes;
+  squares.row(last) += amplitudes.transpose() * squares.middleRows(others, size);
+  const MatrixXd triangle = lower_root(squares).transpose();
+  const auto by_members = [&](const MatrixXd& by_modes) {
+    MatrixXd by(by_modes.rows(), members.size());
+    for (int k = 0; k < layout.gyros; ++k) {
+      const MatrixXd& its = modes.gyros[k].amplitudes;
+      by.middleCols(Index{k} * its.cols(), its.cols()) =
+          multiply(by_modes.middleCols(Index{k} * layout.drift_modes, layout.drift_modes), its);
+    }
+    return by;
+  };
   FieldInformation information;
-  information.R = triangle.block(others, others, size, size) * by_members;
+  information.R = by_members(triangle.block(others, others, size, size));
   information.y = triangle.block(others, last, size, 1);
   const auto own = triangle.topLeftCorner(others, others);
-  information.others_by_members =
-      -own.triangularView<Eigen::Upper>().solve(MatrixXd(triangle.block(0, others, others, size))) * by_members;
+  information.others_by_members = by_members(
+      MatrixXd(-own.triangularView<Eigen::Upper>().solve(MatrixXd(triangle.block(0, others, others, size)))));
   // Of the directions at the start nothing is known before; the rest of the prior is triangular.
   double log_prior_root = 0;
   for (Index state = 2L * layout.gyros; state < layout.size(); ++state) {
@@ -486,7 +500,8 @@ FieldPrior field_prior(const PassProblem& problem, const FieldMembers& members, 
       by_members.row(row) = information.others_by_members.row(other++);
     }
   }
-  prior.more_covariance = by_members * added * by_members.transpose();
+  const MatrixXd more = multiply(multiply(by_members, added), by_members.transpose());
+  prior.more_covariance = (more + more.transpose()) / 2;
   const MatrixXd covariance =
       spectrum.information.llt().solve(MatrixXd::Identity(spectrum.information.rows(), spectrum.information.cols()));
   prior.levels = levels_of(members, spectrum.log_rms, covariance);

@@ -50,11 +50,11 @@ class FieldMembers {
 };
 
 /// The combinations of the members that a pass can show where each group has drift of up to this root mean square, ln
-/// of rad/s. `solution`: near enough to tell how the gyros moved.
-[[nodiscard]] DriftModes modes_of(const PassProblem& problem, const PassSolution& solution, const FieldMembers& members,
-                                  const Eigen::VectorXd& log_rms);
+/// of rad/s. `by_coefficients`: of a solution near enough to tell how the gyros moved.
+[[nodiscard]] DriftModes modes_of(const PassProblem& problem, const MovedByModes& by_coefficients,
+                                  const FieldMembers& members, const Eigen::VectorXd& log_rms);
 /// The same where the prior covariance of the members of each gyro is known, of whatever form.
-[[nodiscard]] DriftModes modes_of(const PassProblem& problem, const PassSolution& solution);
+[[nodiscard]] DriftModes modes_of(const PassProblem& problem, const MovedByModes& by_coefficients);
 
 /// What a pass says of the members when nothing is known of them before, all other states eliminated: R a = y + unit
 /// noise, a their amplitudes, rad/s.

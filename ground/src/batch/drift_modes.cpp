@@ -1,7 +1,6 @@
 #include "batch/drift_modes.hpp"
 
 #include <algorithm>
-#include <iterator>
 #include <utility>
 
 namespace trihedron::ground {
@@ -25,15 +24,24 @@ void MovedByModes::add(std::size_t arc, Time t, Columns moved) {
   arcs_[arc].push_back({t, std::move(moved)});
 }
 
-MatrixXd MovedByModes::at(std::size_t arc, Time t, int gyro) const {
+MovedByModes::Place MovedByModes::place(std::size_t arc, Time t) const {
   const std::vector<Moment>& its = arcs_.at(arc);
   const auto after = std::ranges::lower_bound(its, t, {}, &Moment::t);
-  if (after == its.begin() || after == its.end()) {
-    return (after == its.end() ? its.back() : *after).moved[gyro].cast<double>();
+  if (after == its.begin()) {
+    return {};
   }
-  const Moment& before = *std::prev(after);
-  const auto part = static_cast<float>(to_seconds(t - before.t) / to_seconds(after->t - before.t));
-  return (before.moved[gyro] + part * (after->moved[gyro] - before.moved[gyro])).cast<double>();
+  const auto before = static_cast<std::size_t>(after - its.begin()) - 1;
+  if (after == its.end()) {
+    return {before, 0};
+  }
+  return {before, to_seconds(t - its[before].t) / to_seconds(after->t - its[before].t)};
+}
+
+MatrixXd MovedByModes::at(std::size_t arc, Time t, int gyro) const {
+  const auto [before, part] = place(arc, t);
+  const Eigen::MatrixXf& from = added(arc, before, gyro);
+  return (part > 0 ? Eigen::MatrixXf(from + static_cast<float>(part) * (added(arc, before + 1, gyro) - from)) : from)
+      .cast<double>();
 }
 
 }  // namespace trihedron::ground

@@ -26,8 +26,8 @@ struct DriftModes {
 [[nodiscard]] Eigen::MatrixXd parameters_by_parameters(const Layout& to, const Layout& from,
                                                        const PerGyro<Eigen::MatrixXd>& outside);
 
-/// How far each mode has turned the momenta since the beginning of an arc, tabulated along a pass. It depends on the
-/// estimates so little that it need not be computed again when these are corrected.
+/// How far each mode, or each coefficient, has turned the momenta since the beginning of an arc, tabulated along a
+/// pass. It depends on the estimates so little that it need not be computed again when these are corrected.
 class MovedByModes {
  public:
   using Columns = PerGyro<Eigen::MatrixXf>;  ///< 3 × modes, `in`, s; to seven digits, to take half the memory
@@ -36,6 +36,19 @@ class MovedByModes {
   void add(std::size_t arc, Time t, Columns moved);
   /// φ of a momentum by the amplitudes of its modes, 3 × modes, at a moment of an arc: linear between those added.
   [[nodiscard]] Eigen::MatrixXd at(std::size_t arc, Time t, int gyro) const;
+
+  /// A moment of an arc among those added: the last one before it, and how far it is to the next.
+  struct Place {
+    std::size_t before = 0;
+    double part = 0;
+  };
+  [[nodiscard]] Place place(std::size_t arc, Time t) const;
+  /// How many were added.
+  [[nodiscard]] std::size_t size(std::size_t arc) const { return arcs_[arc].size(); }
+  [[nodiscard]] Time t(std::size_t arc, std::size_t number) const { return arcs_[arc][number].t; }
+  [[nodiscard]] const Eigen::MatrixXf& added(std::size_t arc, std::size_t number, int gyro) const {
+    return arcs_[arc][number].moved[gyro];
+  }
 
  private:
   struct Moment {

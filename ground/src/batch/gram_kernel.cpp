@@ -2,7 +2,9 @@
 #include "batch/gram_kernel.hpp"
 
 #define Eigen TRIHEDRON_KERNEL
+#include <Eigen/Cholesky>
 #include <Eigen/Core>
+#include <Eigen/Eigenvalues>
 #undef Eigen
 
 namespace trihedron::ground::kernels::TRIHEDRON_KERNEL {
@@ -18,6 +20,34 @@ void solve_lower(const double* L, long rows, double* a, long columns) {
   const eigen::Map<const eigen::MatrixXd> root(L, rows, rows);
   eigen::Map<eigen::MatrixXd> its(a, rows, columns);
   root.triangularView<eigen::Lower>().solveInPlace(its);
+}
+
+bool to_root(double* a, long rows) {
+  eigen::Map<eigen::MatrixXd> its(a, rows, rows);
+  eigen::Ref<eigen::MatrixXd> in_place = its;
+  return eigen::LLT<eigen::Ref<eigen::MatrixXd>>(in_place).info() == eigen::Success;
+}
+
+void to_axes(double* a, long rows, double* values) {
+  eigen::Map<eigen::MatrixXd> its(a, rows, rows);
+  const eigen::SelfAdjointEigenSolver<eigen::MatrixXd> found(its);
+  its = found.eigenvectors();
+  eigen::Map<eigen::VectorXd>(values, rows) = found.eigenvalues();
+}
+
+void multiply(const double* a, long rows, long inner, const double* b, long columns, double* product) {
+  eigen::Map<eigen::MatrixXd>(product, rows, columns).noalias() =
+      eigen::Map<const eigen::MatrixXd>(a, rows, inner) * eigen::Map<const eigen::MatrixXd>(b, inner, columns);
+}
+
+void subtract_product(const double* a, long rows, long inner, const double* b, long columns, double* from,
+                      long stride) {
+  for (long i = 0; i < rows; ++i) {
+    eigen::Map<eigen::RowVectorXd> its(from + i * stride, columns);
+    for (long j = 0; j < inner; ++j) {
+      its -= a[i + j * rows] * eigen::Map<const eigen::RowVectorXd>(b + j * columns, columns);
+    }
+  }
 }
 
 }  // namespace trihedron::ground::kernels::TRIHEDRON_KERNEL

@@ -1,23 +1,36 @@
 #include "batch/householder.hpp"
 
+#include "batch/householder_kernel.hpp"
+#include "batch/vector_instructions.hpp"
+
 namespace trihedron::ground {
-namespace kernels {
+namespace {
 
-void rotate_up_baseline(double* a, long rows, long all_columns, long columns);
-void rotate_up_avx2(double* a, long rows, long all_columns, long columns);
+struct Rotations {
+  decltype(&kernels::householder_baseline::rotate_up) rotate_up;
+  decltype(&kernels::householder_baseline::rotate_rows_up) rotate_rows_up;
+};
 
-}  // namespace kernels
+const Rotations& rotations() {
+  static constexpr Rotations kBaseline{kernels::householder_baseline::rotate_up,
+                                       kernels::householder_baseline::rotate_rows_up};
+#ifdef TRIHEDRON_HAS_AVX2
+  static constexpr Rotations kAvx2{kernels::householder_avx2::rotate_up, kernels::householder_avx2::rotate_rows_up};
+  static const Rotations& chosen = of_this_processor(kBaseline, kAvx2);
+  return chosen;
+#else
+  return kBaseline;
+#endif
+}
+
+}  // namespace
 
 void rotate_up(double* a, long rows, long all_columns, long columns) {
-#ifdef TRIHEDRON_HAS_AVX2
-  static const bool has_avx2 =
-      static_cast<int>(__builtin_cpu_supports("avx2")) != 0 && static_cast<int>(__builtin_cpu_supports("fma")) != 0;
-  if (has_avx2) {
-    kernels::rotate_up_avx2(a, rows, all_columns, columns);
-    return;
-  }
-#endif
-  kernels::rotate_up_baseline(a, rows, all_columns, columns);
+  rotations().rotate_up(a, rows, all_columns, columns);
+}
+
+void rotate_rows_up(double* a, long rows, long all_columns, long columns) {
+  rotations().rotate_rows_up(a, rows, all_columns, columns);
 }
 
 }  // namespace trihedron::ground

@@ -8,4 +8,7 @@ namespace trihedron::ground {
 /// is left without meaning. a: column-major, `rows` × `all_columns`, without gaps; columns ≤ all_columns.
 void rotate_up(double* a, long rows, long all_columns, long columns);
 
+/// The same for rows that are few and long, stored row by row; what is below the triangle becomes zero.
+void rotate_rows_up(double* a, long rows, long all_columns, long columns);
+
 }  // namespace trihedron::ground

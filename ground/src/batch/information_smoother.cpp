@@ -7,6 +7,7 @@
 #include <stdexcept>
 #include <utility>
 
+#include "batch/gram.hpp"
 #include "batch/householder.hpp"
 #include "trihedron/records/stop.hpp"
 
@@ -21,12 +22,7 @@ using Eigen::VectorXd;
 double log_determinant(const MatrixXd& triangle) { return triangle.diagonal().array().abs().log().sum(); }
 
 /// Rotates rows so that in the first `columns` columns only an upper triangle remains.
-void rotate_up(MatrixXd& rows, Index columns) {
-  ground::rotate_up(rows.data(), rows.rows(), rows.cols(), columns);
-  for (Index column = 0; column < columns; ++column) {
-    rows.col(column).tail(rows.rows() - std::min(column + 1, rows.rows())).setZero();
-  }
-}
+void rotate_up(LongRows& rows, Index columns) { rotate_rows_up(rows.data(), rows.rows(), rows.cols(), columns); }
 
 /// Rows about the constants alone, with right side; compressed to a triangle whenever the buffer is full.
 class ConstantRows {
@@ -54,57 +50,120 @@ class ConstantRows {
   Index size_ = 0;
 };
 
-/// Forward pass. The rows about d are kept as a triangle; the rest are about c alone, which is constant, and are kept
-/// until the end.
+}  // namespace
+
+ConstantSquares::ConstantSquares(Index columns)
+    : rows_(columns, kBufferedRows), squares_(MatrixXd::Zero(columns, columns)) {}
+
+void ConstantSquares::make_room(Index rows) {
+  if (size_ + rows > rows_.cols()) {
+    put_into_squares();
+    rows_.resize(Eigen::NoChange, std::max(rows, rows_.cols()));
+  }
+}
+
+void ConstantSquares::put_into_squares() {
+  if (size_ > 0) {
+    rows_.rightCols(rows_.cols() - size_).setZero();
+    add_gram(rows_, 1, squares_);
+    size_ = 0;
+  }
+}
+
+MatrixXd ConstantSquares::take() {
+  put_into_squares();
+  return std::exchange(squares_, MatrixXd::Zero(squares_.rows(), squares_.cols()));
+}
+
+MatrixXd lower_root(const MatrixXd& squares) {
+  // Of columns of length one, so that no rounding of the largest hides the smallest.
+  const VectorXd length = squares.diagonal().cwiseMax(0).cwiseSqrt();
+  const VectorXd scale = (length.array() > 0).select(length.cwiseInverse(), 0);
+  const MatrixXd scaled = scale.asDiagonal() * squares * scale.asDiagonal();
+  // Where a combination of columns is zero to rounding, the least that makes its root real.
+  double rounding = 0;
+  for (;;) {
+    MatrixXd root = scaled;
+    root.diagonal().array() += rounding;
+    root.diagonal() = (length.array() > 0).select(root.diagonal(), 1);
+    if (to_root(root)) {
+      root.triangularView<Eigen::StrictlyUpper>().setZero();
+      return length.asDiagonal() * root;
+    }
+    if (!(rounding < 1)) {  // not a number
+      return MatrixXd::Constant(squares.rows(), squares.cols(), std::nan(""));
+    }
+    rounding = rounding > 0 ? 10 * rounding : static_cast<double>(squares.rows()) * 1e-16;
+  }
+}
+
+namespace {
+
+/// Forward pass. The rows about d are kept as a triangle; the rest are about c alone, which is constant, and go into
+/// `constants`: ConstantRows or ConstantSquares.
+template <class Constants>
 class Forward {
  public:
   Forward(const MatrixXd& prior, const VectorXd& prior_y, Index d)
-      : n_(prior.cols()), d_(d), constant_rows_(n_ - d + 1), moving_(prior.rows(), n_ + 1) {
+      : n_(prior.cols()), d_(d), constants_(n_ - d + 1), moving_(prior.rows(), n_ + 1) {
     moving_ << prior, prior_y;
   }
 
   void measure(const SmootherStage& stage) {
     check_stop();
     const Index c = n_ - d_;
-    MatrixXd rows = MatrixXd::Zero(std::max(moving_.rows() + stage.H.rows(), d_), n_ + 1);
-    rows.topRows(moving_.rows()) = moving_;
-    rows.block(moving_.rows(), 0, stage.H.rows(), n_) = stage.H;
-    rows.block(moving_.rows(), n_, stage.H.rows(), 1) = stage.y;
-    rotate_up(rows, d_);
-    constant_rows_.add(rows.bottomRightCorner(rows.rows() - d_, c + 1));
-    moving_ = rows.topRows(d_);
+    rows_.resize(std::max(moving_.rows() + stage.H.rows(), d_), n_ + 1);
+    rows_.topRows(moving_.rows()) = moving_;
+    rows_.block(moving_.rows(), 0, stage.H.rows(), n_) = stage.H;
+    rows_.block(moving_.rows(), n_, stage.H.rows(), 1) = stage.y;
+    rows_.bottomRows(rows_.rows() - moving_.rows() - stage.H.rows()).setZero();
+    rotate_up(rows_, d_);
+    constants_.add(rows_.bottomRightCorner(rows_.rows() - d_, c + 1));
+    moving_ = rows_.topRows(d_);
   }
 
-  /// Time update to the next stage; returns the rows about w.
-  SmootherResult::NoiseRows move(const SmootherStage& stage) {
+  /// Time update to the next stage; the rows about w are then those of noise_rows().
+  void move(const SmootherStage& stage) {
     const Index d = d_;
     const Index c = n_ - d;
     // With d = A⁻¹ (d' − B c − m − noise w) put in: columns w, d', c, right side; w has unit rows of its own.
     const MatrixXd R_d = moving_.leftCols(d) * stage.A_inverse;
-    MatrixXd moved = MatrixXd::Zero(2 * d, d + n_ + 1);
-    moved.topLeftCorner(d, d).setIdentity();
-    moved.block(d, 0, d, d) = -R_d * stage.noise.asDiagonal();
-    moved.block(d, d, d, d) = R_d;
-    moved.block(d, 2 * d, d, c) = moving_.middleCols(d, c) - R_d * stage.B;
-    moved.bottomRightCorner(d, 1) = moving_.rightCols(1) + R_d * stage.m;
-    rotate_up(moved, d);
-    moving_ = moved.bottomRightCorner(d, n_ + 1);
-    return {moved.topLeftCorner(d, d), moved.block(0, d, d, n_), moved.topRightCorner(d, 1)};
+    moved_.setZero(2 * d, d + n_ + 1);
+    moved_.topLeftCorner(d, d).setIdentity();
+    moved_.block(d, 0, d, d) = -R_d * stage.noise.asDiagonal();
+    moved_.block(d, d, d, d) = R_d;
+    moved_.block(d, 2 * d, d, c) = moving_.middleCols(d, c);
+    subtract_product(R_d, stage.B, moved_.data() + d * moved_.cols() + 2 * d, moved_.cols());
+    moved_.bottomRightCorner(d, 1) = moving_.rightCols(1) + R_d * stage.m;
+    rotate_up(moved_, d);
+    moving_ = moved_.bottomRightCorner(d, n_ + 1);
   }
+
+  [[nodiscard]] SmootherResult::NoiseRows noise_rows() const {
+    return {moved_.topLeftCorner(d_, d_), moved_.block(0, d_, d_, n_), moved_.topRightCorner(d_, 1)};
+  }
+  /// ln |det| of the rows about w by w.
+  [[nodiscard]] double log_determinant_of_noise() const { return moved_.diagonal().head(d_).array().abs().log().sum(); }
+
+  /// The rows about d, right side last.
+  [[nodiscard]] const LongRows& moving() const { return moving_; }
+  [[nodiscard]] Constants& constants() { return constants_; }
 
   /// Triangle about (d, c), right side last; its rows about c hold whatever d is.
   [[nodiscard]] MatrixXd triangle() const {
     MatrixXd triangle = MatrixXd::Zero(n_ + 1, n_ + 1);
     triangle.topRows(d_) = moving_;
-    triangle.bottomRightCorner(n_ - d_ + 1, n_ - d_ + 1) = constant_rows_.triangle();
+    triangle.bottomRightCorner(n_ - d_ + 1, n_ - d_ + 1) = constants_.triangle();
     return triangle;
   }
 
  private:
   Index n_;
   Index d_;
-  ConstantRows constant_rows_;
-  MatrixXd moving_;
+  Constants constants_;
+  LongRows moving_;
+  LongRows rows_;
+  LongRows moved_;
 };
 
 }  // namespace
@@ -112,21 +171,21 @@ class Forward {
 MatrixXd triangle_of(const MatrixXd& rows) {
   const Index size = rows.cols();
   MatrixXd rotated = rows;
-  rotate_up(rotated, size);
+  ground::rotate_up(rotated.data(), rotated.rows(), size, size);
   MatrixXd triangle = MatrixXd::Zero(size, size);
   const Index there = std::min(rows.rows(), size);
-  triangle.topRows(there) = rotated.topRows(there);
+  triangle.topRows(there) = rotated.topRows(there).triangularView<Upper>();
   return triangle;
 }
 
 namespace {
 
-/// The whole forward pass. `stage(i)`: of the i-th of the `stages`; `moved(step)` gets the rows about w of each step.
-/// Returns the triangle at the end; adds ln |det R| of all w.
-template <class StageAt, class Moved>
-MatrixXd go_forward(const MatrixXd& prior, const VectorXd& prior_y, std::size_t stages, StageAt&& stage_at,
-                    Moved&& moved, double& log_root_determinant) {
-  std::optional<Forward> forward;
+/// The whole forward pass. `stage(i)`: of the i-th of the `stages`; `moved(forward)` is called after each step. Adds
+/// ln |det R| of all w.
+template <class Constants, class StageAt, class Moved>
+Forward<Constants> go_forward(const MatrixXd& prior, const VectorXd& prior_y, std::size_t stages, StageAt&& stage_at,
+                              Moved&& moved, double& log_root_determinant) {
+  std::optional<Forward<Constants>> forward;
   for (std::size_t i = 0; i < stages; ++i) {
     const SmootherStage& stage = stage_at(i);
     if (!forward) {
@@ -134,14 +193,14 @@ MatrixXd go_forward(const MatrixXd& prior, const VectorXd& prior_y, std::size_t 
     }
     forward->measure(stage);
     if (i + 1 < stages) {
-      SmootherResult::NoiseRows step = forward->move(stage);
+      forward->move(stage);
       // The determinant for (d, c, w) is that for (w, d', c) over |det A⁻¹|, the determinant of the change of
       // variables.
-      log_root_determinant += log_determinant(step.R) - std::log(std::abs(stage.A_inverse.determinant()));
-      moved(std::move(step));
+      log_root_determinant += forward->log_determinant_of_noise() - std::log(std::abs(stage.A_inverse.determinant()));
+      moved(*forward);
     }
   }
-  return forward->triangle();
+  return *std::move(forward);
 }
 
 /// Throws std::invalid_argument where a state has no information.
@@ -163,21 +222,20 @@ SmootherLikelihood likelihood_by(const MatrixXd& triangle, double log_root_deter
 SmootherLikelihood likelihood(const MatrixXd& prior, const VectorXd& prior_y, std::size_t stages,
                               const std::function<SmootherStage(std::size_t)>& stage) {
   double log_root_determinant = 0;
-  const MatrixXd triangle = go_forward(
-      prior, prior_y, stages, stage, [](SmootherResult::NoiseRows&&) {}, log_root_determinant);
-  return likelihood_by(triangle, log_root_determinant);
+  const auto forward = go_forward<ConstantRows>(
+      prior, prior_y, stages, stage, [](const auto&) {}, log_root_determinant);
+  return likelihood_by(forward.triangle(), log_root_determinant);
 }
 
 ConstantsInformation eliminate_moving(const MatrixXd& prior, const VectorXd& prior_y, std::size_t stages,
                                       const std::function<SmootherStage(std::size_t)>& stage) {
   ConstantsInformation found;
-  const MatrixXd triangle = go_forward(
-      prior, prior_y, stages, stage, [](SmootherResult::NoiseRows&&) {}, found.log_root_determinant);
-  const Index d = stage(0).m.size();
-  const auto moving = triangle.topLeftCorner(d, d);
+  auto forward = go_forward<ConstantSquares>(
+      prior, prior_y, stages, stage, [](const auto&) {}, found.log_root_determinant);
+  const MatrixXd moving = forward.moving().leftCols(forward.moving().rows());
   refuse_singular(moving);
   found.log_root_determinant += log_determinant(moving);
-  found.triangle = triangle.bottomRightCorner(triangle.rows() - d, triangle.cols() - d);
+  found.squares = forward.constants().take();
   return found;
 }
 
@@ -187,17 +245,21 @@ SmootherResult smooth(const MatrixXd& prior, const VectorXd& prior_y, const std:
   const Index c = n - d;
   SmootherResult result;
   double log_root_determinant = 0;
-  const MatrixXd triangle = go_forward(
-      prior, prior_y, stages.size(), [&](std::size_t i) -> const SmootherStage& { return stages[i]; },
-      [&](SmootherResult::NoiseRows&& step) { result.steps.push_back(std::move(step)); }, log_root_determinant);
+  const MatrixXd triangle =
+      go_forward<ConstantRows>(
+          prior, prior_y, stages.size(), [&](std::size_t i) -> const SmootherStage& { return stages[i]; },
+          [&](const auto& forward) { result.steps.push_back(forward.noise_rows()); }, log_root_determinant)
+          .triangle();
   result.likelihood = likelihood_by(triangle, log_root_determinant);
   const auto root = triangle.topRows(n);
-  const auto R = root.leftCols(n).triangularView<Upper>();
-  result.last_root = R.solve(MatrixXd::Identity(n, n));
+  const auto R = root.leftCols(n);
+  MatrixXd inverse = MatrixXd::Identity(n, n);
+  solve_lower(R.transpose(), inverse);
+  result.last_root = inverse.transpose();
+  result.x.resize(stages.size());
+  result.x.back() = R.triangularView<Upper>().solve(root.col(n));
 
   // Backward.
-  result.x.resize(stages.size());
-  result.x.back() = R.solve(root.col(n));
   for (std::size_t i = result.steps.size(); i-- > 0;) {
     const SmootherStage& stage = stages[i];
     const SmootherResult::NoiseRows& step = result.steps[i];
@@ -213,29 +275,45 @@ SmootherResult smooth(const MatrixXd& prior, const VectorXd& prior_y, const std:
 void gather_constants(MatrixXd& prior, VectorXd& prior_y, std::vector<SmootherStage>& stages) {
   const Index n = prior.cols();
   const Index d = stages.front().m.size();
-  ConstantRows constant_rows(n - d + 1);
+  ConstantSquares constants(n - d + 1);
   for (SmootherStage& stage : stages) {
     check_stop();
-    if (stage.H.rows() > d) {
-      MatrixXd rows(stage.H.rows(), n + 1);
-      rows << stage.H, stage.y;
-      rotate_up(rows, d);
-      constant_rows.add(rows.bottomRightCorner(rows.rows() - d, n - d + 1));
-      stage.H = rows.topLeftCorner(d, n);
-      stage.y = rows.topRightCorner(d, 1);
-    }
+    take_constants(stage, d, constants);
   }
-  const MatrixXd constants = constant_rows.triangle();
+  const MatrixXd triangle = lower_root(constants.take()).transpose();
   const Index before = prior.rows();
-  prior.conservativeResize(before + constants.rows(), n);
-  prior.bottomRows(constants.rows()) << MatrixXd::Zero(constants.rows(), d), constants.leftCols(n - d);
+  prior.conservativeResize(before + triangle.rows(), n);
+  prior.bottomRows(triangle.rows()) << MatrixXd::Zero(triangle.rows(), d), triangle.leftCols(n - d);
   prior_y.conservativeResize(prior.rows());
-  prior_y.tail(constants.rows()) = constants.rightCols(1);
+  prior_y.tail(triangle.rows()) = triangle.rightCols(1);
+}
+
+void take_constants(SmootherStage& stage, Index d, ConstantSquares& constants) {
+  const Index n = stage.H.cols();
+  if (stage.H.rows() <= d) {
+    return;
+  }
+  LongRows rows(stage.H.rows(), n + 1);
+  rows << stage.H, stage.y;
+  rotate_up(rows, d);
+  constants.add(rows.bottomRightCorner(rows.rows() - d, n - d + 1));
+  stage.H = rows.topLeftCorner(d, n);
+  stage.y = rows.topRightCorner(d, 1);
+}
+
+void put_back(ConstantSquares& constants, Index d, SmootherStage& stage) {
+  const MatrixXd triangle = lower_root(constants.take()).transpose();
+  const Index c = triangle.cols() - 1;
+  const Index before = stage.H.rows();
+  stage.H.conservativeResize(before + triangle.rows(), d + c);
+  stage.H.bottomRows(triangle.rows()) << MatrixXd::Zero(triangle.rows(), d), triangle.leftCols(c);
+  stage.y.conservativeResize(stage.H.rows());
+  stage.y.tail(triangle.rows()) = triangle.rightCols(1);
 }
 
 std::vector<MatrixXd> triangles_after(const MatrixXd& prior, const VectorXd& prior_y,
                                       const std::vector<SmootherStage>& stages, const std::vector<std::size_t>& after) {
-  Forward forward(prior, prior_y, stages.front().m.size());
+  Forward<ConstantRows> forward(prior, prior_y, stages.front().m.size());
   std::vector<MatrixXd> triangles;
   std::size_t i = 0;
   for (const std::size_t last : after) {
@@ -290,8 +368,8 @@ CovarianceRoots::CovarianceRoots(const SmootherResult& result, const std::vector
 
 MatrixXd CovarianceRoots::spread(std::size_t stage, const MatrixXd& rows) const {
   const Index c = constants_.cols();
-  MatrixXd spread = rows.leftCols(rows.cols() - c) * dynamic_[stage];
-  spread.rightCols(c) += rows.rightCols(c) * constants_;
+  MatrixXd spread = multiply(rows.leftCols(rows.cols() - c), dynamic_[stage]);
+  spread.rightCols(c) += multiply(rows.rightCols(c), constants_);
   return spread;
 }
 

@@ -7,6 +7,8 @@
 #include <functional>
 #include <vector>
 
+#include "batch/gram.hpp"
+
 namespace trihedron::ground {
 
 /// One stage of a linear system of states x = (d, c), of which the constants c are the same in all stages: what is
@@ -15,7 +17,7 @@ struct SmootherStage {
   Eigen::MatrixXd H;
   Eigen::VectorXd y;
   Eigen::MatrixXd A_inverse;
-  Eigen::MatrixXd B;
+  LongRows B;
   Eigen::VectorXd m;
   Eigen::VectorXd noise;  ///< 1-sigma, may be zero
 };
@@ -52,14 +54,50 @@ struct SmootherResult {
 
 /// What is known of the constants when all states that move are eliminated.
 struct ConstantsInformation {
-  Eigen::MatrixXd triangle;         ///< right side last; the corner holds the residual
+  Eigen::MatrixXd squares;          ///< products of the columns of their rows, right side last; lower triangle
   double log_root_determinant = 0;  ///< ln |det R| of d of the last stage and of all w
 };
 
-/// The constants need no information. `stage`: as of likelihood().
+/// The constants need no information. `stage`: as of likelihood(). By normal equations, a fraction of the work of a
+/// triangle, which lower_root() makes of them: combinations of the constants of which more is known than 1e-10 of what
+/// is known of each constant if the others were known have four digits and more.
 [[nodiscard]] ConstantsInformation eliminate_moving(const Eigen::MatrixXd& prior, const Eigen::VectorXd& prior_y,
                                                     std::size_t stages,
                                                     const std::function<SmootherStage(std::size_t)>& stage);
+
+/// Products of the columns of rows about constants, right side last.
+class ConstantSquares {
+ public:
+  explicit ConstantSquares(Eigen::Index columns);
+
+  template <class Rows>
+  void add(const Rows& rows) {
+    make_room(rows.rows());
+    rows_.middleCols(size_, rows.rows()) = rows.transpose();
+    size_ += rows.rows();
+  }
+
+  /// The lower triangle of the products of all rows since the last call.
+  [[nodiscard]] Eigen::MatrixXd take();
+
+ private:
+  static constexpr Eigen::Index kBufferedRows = 256;
+  void make_room(Eigen::Index rows);
+  void put_into_squares();
+
+  Eigen::MatrixXd rows_;  ///< a column for each
+  Eigen::Index size_ = 0;
+  Eigen::MatrixXd squares_;
+};
+
+/// The lower triangle L with L Lᵀ = squares, of which the lower triangle is used; combinations of columns that are zero
+/// to rounding stay so small. NaN where a number is.
+[[nodiscard]] Eigen::MatrixXd lower_root(const Eigen::MatrixXd& squares);
+
+/// Moves the rows of a stage that are about the constants alone into `constants`. d: number of the states that move.
+void take_constants(SmootherStage& stage, Eigen::Index d, ConstantSquares& constants);
+/// Puts what was taken back as a triangle, into the same stage or a later one: the constants are the same in all.
+void put_back(ConstantSquares& constants, Eigen::Index d, SmootherStage& stage);
 
 /// Moves the rows of the stages that are about the constants alone to the prior, below the rows that are there. They
 /// are most of all rows, and do not depend on the noise: smooth() can then be called with different noise in a fraction

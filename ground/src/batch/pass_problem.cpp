@@ -7,6 +7,7 @@
 #include <numbers>
 #include <utility>
 
+#include "batch/gram.hpp"
 #include "trihedron/core/outlier_gate.hpp"
 #include "trihedron/records/stop.hpp"
 
@@ -33,96 +34,145 @@ void compress(SmootherStage& stage) {
   }
 }
 
-/// Collects whitened rows of fixes; consecutive fixes closer than `reach`, between which the body has not turned by
-/// more than `turn_rad`, are replaced by their weighted mean.
-class FixMerger {
- public:
-  FixMerger(Duration reach, double turn_rad) : reach_(reach), turn_rad_(turn_rad) {}
+/// Small rotation, across `from`, that turns it into `to`.
+Vector3d turn(const Vector3d& from, const Vector3d& to) { return from.cross(to); }
 
-  void add(const ScreenedPass::Fix& fix, const PassProblem::FixRows& rows, double weight) {
+/// ω_b of a gyro in an arc.
+Vector3d rate_of(const RotorDrift& rotor, const Gyro& gyro, const Vector3d& h, double part_of_change,
+                 const Layout& layout) {
+  const Vector3d rate = rotor.rate(h, part_of_change);
+  return layout.further.wandering_drift ? Vector3d(rate + gyro.drift_rad_s.segment<3>(layout.wandering_column()))
+                                        : rate;
+}
+
+/// By how much a body may turn in a step of a table, rad.
+constexpr double kLittleTurn_rad = 0.01;
+
+/// Whether the readings of all gyros that are used at both ends have turned by little.
+bool turned_little(const Directions& from, const Directions& to, const GyroMask& used, int gyros) {
+  bool little = true;
+  for (int k = 0; k < gyros; ++k) {
+    little = little && (!used[k] || (to[k] - from[k]).norm() < kLittleTurn_rad);
+  }
+  return little;
+}
+
+}  // namespace
+
+/// Collects whitened rows of fixes of an arc; consecutive fixes closer than the setup says, between which the body has
+/// not turned by more than that, are replaced by their weighted mean. Rows about modes are made once for each mean.
+class PassProblem::FixMerger {
+ public:
+  explicit FixMerger(const PassProblem& problem) : problem_(problem) {}
+
+  /// `whitened`: rows as on board, right side last.
+  void add(const Moment& moment, const Rows& whitened, double weight) {
+    const ScreenedPass::Fix& fix = *moment.fix;
+    const PassSetup& setup = problem_.setup_;
     turned_rad_ += sums_.empty() ? 0 : fix.rate_c.norm() * to_seconds(fix.fix.t - last_t_);
     last_t_ = fix.fix.t;
-    const bool first = sums_.empty() || fix.fix.t - sums_.back().t >= reach_ || turned_rad_ > turn_rad_ ||
-                       sums_.back().head != fix.fix.head ||
+    const bool first = sums_.empty() || fix.fix.t - sums_.back().t >= setup.fixes_together ||
+                       turned_rad_ > setup.turn_together_rad || sums_.back().head != fix.fix.head ||
                        !std::equal(fix.used.begin(), fix.used.end(), sums_.back().used.begin());
     turned_rad_ = first ? 0 : turned_rad_;
     Sum& sum = first ? sums_.emplace_back() : sums_.back();
     const double square = weight * weight;
-    square_ += square * rows.y.squaredNorm();
+    const auto y = whitened.col(whitened.cols() - 1);
+    const Rows about_states = whitened.leftCols(whitened.cols() - 1);
+    square_ += square * y.squaredNorm();
     if (first) {
-      sum = {fix.fix.t, fix.fix.head, fix.used, square, square * rows.H, square * rows.y};
-      size_ += rows.y.size();
-      return;
+      sum.t = fix.fix.t;
+      sum.head = fix.fix.head;
+      sum.used = fix.used;
+      sum.H.setZero(y.size(), problem_.without_modes_.size());
+      sum.y.setZero(y.size());
+      size_ += y.size();
     }
     sum.weight += square;
-    sum.H += square * rows.H;
-    sum.y += square * rows.y;
+    sum.y += square * y;
+    if (problem_.modes_) {
+      const MovedByModes::Place at = problem_.moved_by_modes_.place(moment.arc, moment.t);
+      sum.add_moved(at.before, square * (1 - at.part), about_states, problem_.on_board_);
+      if (at.part > 0) {
+        sum.add_moved(at.before + 1, square * at.part, about_states, problem_.on_board_);
+      }
+    }
+    sum.H += square * problem_.by_states_but_modes(moment, about_states);
   }
 
   /// Writes the rows; returns the sum of squares about the means, which the rows do not contain.
-  [[nodiscard]] double put_into(SmootherStage& stage, Eigen::Index states) const {
-    stage.H.resize(size_, states);
+  [[nodiscard]] double put_into(std::size_t arc, SmootherStage& stage) const {
+    stage.H.resize(size_, problem_.layout_.size());
     stage.y.resize(size_);
     Eigen::Index row = 0;
     for (const Sum& sum : sums_) {
-      stage.H.middleRows(row, sum.y.size()) = sum.H / std::sqrt(sum.weight);
+      auto H = stage.H.middleRows(row, sum.y.size());
+      problem_.put_beside_modes(sum.H / std::sqrt(sum.weight), H);
       stage.y.segment(row, sum.y.size()) = sum.y / std::sqrt(sum.weight);
       row += sum.y.size();
+    }
+    for (int k = 0; problem_.modes_ && k < problem_.gyros_; ++k) {
+      put_modes_into(arc, k, stage.H);
     }
     return square_ - stage.y.squaredNorm();
   }
 
  private:
+  /// All rows about how far a momentum has moved at the moments of the table, times how far the modes move it there.
+  void put_modes_into(std::size_t arc, int gyro, MatrixXd& H) const {
+    const auto moments = static_cast<Eigen::Index>(problem_.moved_by_modes_.size(arc));
+    const int modes = problem_.modes_->size();
+    MatrixXd by_moved = MatrixXd::Zero(size_, 3 * moments);
+    Eigen::Index row = 0;
+    for (const Sum& sum : sums_) {
+      for (const Moved& moved : sum.moved) {
+        by_moved.block(row, 3 * static_cast<Eigen::Index>(moved.number), sum.y.size(), 3) =
+            moved.by[gyro] / std::sqrt(sum.weight);
+      }
+      row += sum.y.size();
+    }
+    MatrixXd moved_by_modes(3 * moments, modes);
+    for (Eigen::Index i = 0; i < moments; ++i) {
+      moved_by_modes.middleRows<3>(3 * i) =
+          problem_.moved_by_modes_.added(arc, static_cast<std::size_t>(i), gyro).cast<double>();
+    }
+    H.middleCols(problem_.layout_.drift(gyro) + Layout::kEq1, modes) = multiply(by_moved, moved_by_modes);
+  }
+
+  /// Rows about how far the momenta have moved at one moment of the table.
+  struct Moved {
+    std::size_t number = 0;
+    PerGyro<Eigen::Matrix<double, Eigen::Dynamic, 3, 0, kMaxComponents, 3>> by;
+  };
   struct Sum {
     Time t{};  ///< of the first
     int head = 0;
     GyroMask used{};
     double weight = 0;
-    MatrixXd H;
+    MatrixXd H;  ///< without modes
     VectorXd y;
+    std::vector<Moved> moved;
+
+    void add_moved(std::size_t number, double factor, const Rows& rows, const Layout& layout) {
+      auto at = std::ranges::find(moved, number, &Moved::number);
+      if (at == moved.end()) {
+        at = moved.insert(at, Moved{number, {}});
+        for (int k = 0; k < layout.gyros; ++k) {
+          at->by[k].setZero(rows.rows(), 3);
+        }
+      }
+      for (int k = 0; k < layout.gyros; ++k) {
+        at->by[k] += factor * rows.middleCols<3>(layout.direction(k));
+      }
+    }
   };
-  Duration reach_;
-  double turn_rad_;
+  const PassProblem& problem_;
   Time last_t_{};
   double turned_rad_ = 0;  ///< since the first of the last sum
   std::vector<Sum> sums_;
   Eigen::Index size_ = 0;
   double square_ = 0;
 };
-
-/// Adds the rows of a fix, whitened, with the weight that its misfit leaves it: beyond the gate its influence falls
-/// with the third power. `gate`: of its NIS. Returns the part of the cost that the rows do not contain.
-double add_fix(PassProblem::FixRows rows, const ScreenedPass::Fix& fix, double gate, FixMerger& nearby) {
-  if (rows.y.size() == 0) {
-    return 0;
-  }
-  const Eigen::LLT<MatrixXd> root(rows.R);
-  root.matrixL().solveInPlace(rows.H);
-  root.matrixL().solveInPlace(rows.y);
-  const double nis = rows.y.squaredNorm();
-  nearby.add(fix, rows, nis > gate ? gate / nis : 1);
-  return nis > gate ? 2 * gate * (1 - gate / nis) : 0;
-}
-
-/// Small rotation, across `from`, that turns it into `to`.
-Vector3d turn(const Vector3d& from, const Vector3d& to) { return from.cross(to); }
-
-/// precess() with the sensitivities to the columns of `sensitive`, of which there are fewer than the drift has.
-Vector3d precess_by(const DriftModel& drift, const DriftModel& sensitive, Gyro& gyro,
-                    Sensitivity<kMaxDriftColumns>& since, const Matrix3d& C_in_c, const Vector3d& h_b,
-                    double part_of_change, double dt_s) {
-  Columns<kMaxDriftColumns> columns;
-  const Vector3d reading = gyro.corrected(h_b);
-  const auto basis = columns.view(sensitive.columns());
-  sensitive.basis(reading, part_of_change, basis);
-  const Matrix3d dt_C_in_b = dt_s * (C_in_c * gyro.C_c_b);
-  const Vector3d turn = dt_C_in_b * drift.rate(reading, part_of_change, gyro.drift_rad_s.data());
-  gyro.h_in = rotated<double>(gyro.h_in, turn).normalized();
-  since.advance(basis, C_in_c, dt_C_in_b, turn);
-  return turn;
-}
-
-}  // namespace
 
 Eigen::Matrix<double, 3, 2> across(const Vector3d& h) {
   Eigen::Matrix<double, 3, 2> columns;
@@ -134,6 +184,7 @@ Eigen::Matrix<double, 3, 2> across(const Vector3d& h) {
 PassProblem::PassProblem(const ScreenedPass& pass, PassSetup setup)
     : setup_(std::move(setup)),
       layout_(setup_.layout()),
+      without_modes_(layout_),
       on_board_(setup_.on_board.layout),
       drift_(layout_.drift_model, layout_.further),
       drift_of_eq1_(kEsg7, layout_.further),
@@ -194,8 +245,17 @@ PassProblem::Reading PassProblem::reading_at(const Node& node) const {
                              : Reading{samples_->h_b(node.sample), samples_->used(node.sample)};
 }
 
-void PassProblem::step(const Node& from_node, const Node& to_node, const DriftModel& sensitive, Moment& moment,
+PassProblem::Drift PassProblem::drift_along(const PassSolution& solution, const DriftModel* sensitive) const {
+  Drift drift{sensitive, {}};
+  for (int k = 0; k < gyros_; ++k) {
+    drift.rotors[k] = RotorDrift(drift_, solution.gyros[k].drift_rad_s.data());
+  }
+  return drift;
+}
+
+void PassProblem::step(const Node& from_node, const Node& to_node, const Drift& drift, Moment& moment,
                        double& extra_variance_rad2) const {
+  const Layout& columns = setup_.on_board.layout;
   const Duration dt = to_node.t - from_node.t;
   const double dt_s = to_seconds(dt);
   const Reading from = reading_at(from_node);
@@ -209,14 +269,18 @@ void PassProblem::step(const Node& from_node, const Node& to_node, const DriftMo
   for (int k = 0; k < gyros_; ++k) {
     middle[k] = at_both[k] ? (from.h_b[k] + to.h_b[k]).normalized() : used[k] ? to.h_b[k] : Vector3d::UnitX();
   }
+  Directions omega_b = {};
+  for (int k = 0; k < gyros_; ++k) {
+    const Gyro& gyro = moment.gyros[k];
+    omega_b[k] = rate_of(drift.rotors[k], gyro, gyro.corrected(middle[k]), part, columns);
+  }
   // The momenta in the middle of the step; those at its begin would be half a step of drift behind.
   const Directions seen_c = in_c(moment.gyros, gyros_, middle);
   Directions h_middle = momenta(moment.gyros, gyros_);
   if (const auto at_begin = optimal_rotation(h_middle, seen_c, used)) {
     for (int k = 0; k < gyros_; ++k) {
       const Gyro& gyro = moment.gyros[k];
-      const Vector3d omega_b = drift_.rate(gyro.corrected(middle[k]), part, gyro.drift_rad_s.data());
-      h_middle[k] = rotated<double>(h_middle[k], at_begin.value().raw() * (gyro.C_c_b * omega_b) * (dt_s / 2));
+      h_middle[k] = rotated<double>(h_middle[k], at_begin.value().raw() * (gyro.C_c_b * omega_b[k]) * (dt_s / 2));
     }
   }
   const auto attitude = optimal_rotation(h_middle, seen_c, used);
@@ -230,10 +294,17 @@ void PassProblem::step(const Node& from_node, const Node& to_node, const DriftMo
     Gyro& gyro = moment.gyros[k];
     if (!used[k]) {  // its momentum turns all the same: what it would read at the attitude of the others
       middle[k] = gyro.reading_of(C_in_c.transpose() * gyro.h_in);
+      omega_b[k] = rate_of(drift.rotors[k], gyro, gyro.corrected(middle[k]), part, columns);
     }
-    const Vector3d turned = &sensitive == &drift_
-                                ? precess(gyro, moment.since[k], drift_, C_in_c, middle[k], part, dt_s)
-                                : precess_by(drift_, sensitive, gyro, moment.since[k], C_in_c, middle[k], part, dt_s);
+    const Vector3d reading = gyro.corrected(middle[k]);
+    const Matrix3d dt_C_in_b = dt_s * (C_in_c * gyro.C_c_b);
+    const Vector3d turned = dt_C_in_b * omega_b[k];
+    gyro.h_in = rotated<double>(gyro.h_in, turned).normalized();
+    if (drift.sensitive != nullptr) {
+      Columns<kMaxDriftColumns> basis;
+      drift.sensitive->basis(reading, part, basis.view(drift.sensitive->columns()));
+      moment.since[k].advance(basis.view(drift.sensitive->columns()), C_in_c, dt_C_in_b, turned);
+    }
     if (to_node.after_gap) {
       largest_rad = std::max(largest_rad, missed_by_long_step_rad(turned.norm(), from.h_b[k], to.h_b[k], dt_s));
     }
@@ -241,24 +312,44 @@ void PassProblem::step(const Node& from_node, const Node& to_node, const DriftMo
   extra_variance_rad2 += largest_rad * largest_rad;
 }
 
-MatrixXd PassProblem::by_states_of_arc(const Moment& moment, Rows rows) const {
+MatrixXd PassProblem::by_states_but_modes(const Moment& moment, Rows rows) const {
+  const Layout& to = without_modes_;
+  MatrixXd by_states(rows.rows(), to.size());
+  carry_back(on_board_, moment.since, rows);
+  const int moving = to.drift(0) - to.wandering(0);
+  by_states.middleCols(to.wandering(0), moving) = rows.middleCols(on_board_.wandering(0), moving);
+  for (int k = 0; k < gyros_; ++k) {
+    by_states.middleCols<2>(to.direction(k)) =
+        rows.middleCols<3>(on_board_.direction(k)).lazyProduct(moment.directions[k]);
+  }
+  const int rest = to.size() - to.drift(0);
+  by_states.rightCols(rest) = rows.middleCols(on_board_.drift(0), rest);
+  return by_states;
+}
+
+void PassProblem::put_beside_modes(const MatrixXd& rows, Eigen::Ref<MatrixXd> all) const {
+  const Layout& from = without_modes_;
+  all.leftCols(layout_.drift(0)) = rows.leftCols(from.drift(0));
+  for (int k = 0; k < gyros_; ++k) {
+    const int size = from.drift_size();
+    all.middleCols(layout_.drift(k), size) = rows.middleCols(from.drift(k), size);
+    all.middleCols<3>(layout_.alignment(k)) = rows.middleCols<3>(from.alignment(k));
+  }
+  const int rest = layout_.size() - layout_.readout(0);
+  all.rightCols(rest) = rows.rightCols(rest);
+}
+
+MatrixXd PassProblem::by_states_of_arc(const Moment& moment, const Rows& rows) const {
+  const MatrixXd but_modes = by_states_but_modes(moment, rows);
+  if (!modes_) {
+    return but_modes;
+  }
   MatrixXd by_states(rows.rows(), layout_.size());
-  for (int k = 0; modes_ && k < gyros_; ++k) {
+  put_beside_modes(but_modes, by_states);
+  for (int k = 0; k < gyros_; ++k) {
     by_states.middleCols(layout_.drift(k) + Layout::kEq1, modes_->size()) =
         rows.middleCols<3>(on_board_.direction(k)).lazyProduct(moved_by_modes_.at(moment.arc, moment.t, k));
   }
-  carry_back(on_board_, moment.since, rows);
-  const int moving = layout_.drift(0) - layout_.wandering(0);
-  by_states.middleCols(layout_.wandering(0), moving) = rows.middleCols(on_board_.wandering(0), moving);
-  for (int k = 0; k < gyros_; ++k) {
-    by_states.middleCols<2>(layout_.direction(k)) =
-        rows.middleCols<3>(on_board_.direction(k)).lazyProduct(moment.directions[k]);
-    by_states.middleCols(layout_.drift(k), on_board_.drift_size()) =
-        rows.middleCols(on_board_.drift(k), on_board_.drift_size());
-    by_states.middleCols<3>(layout_.alignment(k)) = rows.middleCols<3>(on_board_.alignment(k));
-  }
-  const int rest = layout_.size() - layout_.readout(0);
-  by_states.rightCols(rest) = rows.middleCols(on_board_.readout(0), rest);
   return by_states;
 }
 
@@ -276,12 +367,11 @@ VectorXd PassProblem::as_coefficients(int gyro, const VectorXd& states) const {
   return modes_ ? VectorXd(modes_->gyros[gyro].coefficients * states) : states;
 }
 
-void PassProblem::use(DriftModes modes, const PassSolution& solution) {
+MovedByModes PassProblem::moved_by_coefficients(const PassSolution& solution) const {
   constexpr Duration kApart = std::chrono::seconds(10);  // over which the drift turns a momentum evenly
-  modes_ = std::move(modes);
-  layout_.drift_modes = modes_->size();
-  on_board_.drift_model = kEsg7;
-  moved_by_modes_ = {};
+  constexpr Duration kStep = std::chrono::seconds(3);    // a third of that, unless the body turns fast
+  const Drift drift = drift_along(solution, &drift_);
+  MovedByModes table;
   Moment moment;
   double unused = 0;
   for (std::size_t arc = 0; arc < arcs_.size(); ++arc) {
@@ -289,20 +379,58 @@ void PassProblem::use(DriftModes modes, const PassSolution& solution) {
     begin_arc(solution, arc, moment);
     const std::size_t last = std::min(arcs_[arc].end, nodes_.size() - 1);
     Time taken = moment.t - kApart;
-    for (std::size_t i = arcs_[arc].begin; i <= last; ++i) {
-      if (i > arcs_[arc].begin) {
-        step(nodes_[i - 1], nodes_[i], drift_, moment, unused);
+    std::size_t from = arcs_[arc].begin;
+    Reading read = reading_at(nodes_[from]);
+    for (std::size_t i = from; i <= last; ++i) {
+      if (i > from) {
+        const Reading next = i < last ? reading_at(nodes_[i + 1]) : Reading{};
+        if (i < last && nodes_[i + 1].t - nodes_[from].t <= kStep &&
+            turned_little(read.h_b, next.h_b, both(read.used, next.used), gyros_)) {
+          continue;
+        }
+        step(nodes_[from], nodes_[i], drift, moment, unused);
+        from = i;
+        read = reading_at(nodes_[i]);
       }
       if (i == last || moment.t - taken >= kApart) {
         taken = moment.t;
         MovedByModes::Columns moved;
         for (int k = 0; k < gyros_; ++k) {
-          const MatrixXd& outside = modes_->gyros[k].coefficients;
-          const auto by_drift = moment.since[k].by_drift.first(layout_.drift_model.size());
-          moved[k] = (by_drift.rightCols(outside.rows()) * outside).cast<float>();
+          const auto by_drift = moment.since[k].by_drift.first(drift_.size());
+          moved[k] = by_drift.rightCols(drift_.size() - Layout::kEq1).cast<float>();
         }
-        moved_by_modes_.add(arc, moment.t, std::move(moved));
+        table.add(arc, moment.t, std::move(moved));
       }
+    }
+  }
+  return table;
+}
+
+void PassProblem::use(DriftModes modes, const MovedByModes& by_coefficients) {
+  modes_ = std::move(modes);
+  layout_.drift_modes = modes_->size();
+  on_board_.drift_model = kEsg7;
+  without_modes_ = layout_;
+  without_modes_.drift_model = kEsg7;
+  without_modes_.drift_modes = -1;
+  moved_by_modes_ = {};
+  for (std::size_t arc = 0; arc < arcs_.size(); ++arc) {
+    check_stop();
+    const std::size_t size = by_coefficients.size(arc);
+    PerGyro<MatrixXd> moved;  // of the whole arc
+    for (int k = 0; k < gyros_; ++k) {
+      MatrixXd rows(3 * static_cast<Eigen::Index>(size), modes_->gyros[k].coefficients.rows());
+      for (std::size_t i = 0; i < size; ++i) {
+        rows.middleRows<3>(3 * static_cast<Eigen::Index>(i)) = by_coefficients.added(arc, i, k).cast<double>();
+      }
+      moved[k] = multiply(rows, modes_->gyros[k].coefficients);
+    }
+    for (std::size_t i = 0; i < size; ++i) {
+      MovedByModes::Columns columns;
+      for (int k = 0; k < gyros_; ++k) {
+        columns[k] = moved[k].middleRows<3>(3 * static_cast<Eigen::Index>(i)).cast<float>();
+      }
+      moved_by_modes_.add(arc, by_coefficients.t(arc, i), std::move(columns));
     }
   }
 }
@@ -324,47 +452,54 @@ PassSolution PassProblem::start(const Gyros& gyros) const {
     const Vector3d seen = first.used[k] ? h_c[k] : gyros[k].C_c_b.col(0);  // anywhere
     solution.arcs[0].h_in[k] = (first.fix.q_in_c.normalized() * seen).normalized();
   }
-  go_over_arcs(solution,
-               [&](const Moment& moment) { solution.arcs[moment.arc + 1].h_in = momenta(moment.gyros, gyros_); });
-  return solution;
-}
-
-void PassProblem::go_over_arcs(const PassSolution& solution, const std::function<void(const Moment&)>& at_end) const {
-  go_over_arcs(solution, sensitive(), at_end);
-}
-
-void PassProblem::go_over_arcs_by_coefficients(const PassSolution& solution,
-                                               const std::function<void(const Moment&)>& at_end) const {
-  go_over_arcs(solution, drift_, at_end);
-}
-
-void PassProblem::go_over_arcs(const PassSolution& solution, const DriftModel& sensitive,
-                               const std::function<void(const Moment&)>& at_end) const {
+  const Drift drift = drift_along(solution, nullptr);
   Moment moment;
   double unused = 0;
   for (std::size_t arc = 0; arc + 1 < arcs_.size(); ++arc) {
     check_stop();
     begin_arc(solution, arc, moment);
     for (std::size_t i = arcs_[arc].begin; i < arcs_[arc].end; ++i) {
-      step(nodes_[i], nodes_[i + 1], sensitive, moment, unused);
+      step(nodes_[i], nodes_[i + 1], drift, moment, unused);
     }
-    at_end(moment);
+    solution.arcs[arc + 1].h_in = momenta(moment.gyros, gyros_);
   }
+  return solution;
 }
 
 void PassProblem::go_along(const PassSolution& solution, const std::function<void(const Moment&)>& visit) const {
+  const Drift drift = drift_along(solution, &sensitive());
+  for (std::size_t arc = 0; arc < arcs_.size(); ++arc) {
+    go_along_arc(solution, arc, drift, visit);
+  }
+}
+
+void PassProblem::go_along_momenta(const PassSolution& solution,
+                                   const std::function<void(const Moment&)>& visit) const {
+  const Drift drift = drift_along(solution, nullptr);
+  for (std::size_t arc = 0; arc < arcs_.size(); ++arc) {
+    go_along_arc(solution, arc, drift, visit);
+  }
+}
+
+PassProblem::Moment PassProblem::last_moment(const PassSolution& solution) const {
+  Moment last;
+  go_along_arc(solution, arcs_.size() - 1, drift_along(solution, &sensitive()),
+               [&](const Moment& moment) { last = moment; });
+  return last;
+}
+
+void PassProblem::go_along_arc(const PassSolution& solution, std::size_t arc, const Drift& drift,
+                               const std::function<void(const Moment&)>& visit) const {
+  check_stop();
   Moment moment;
   double unused = 0;
-  for (std::size_t arc = 0; arc < arcs_.size(); ++arc) {
-    check_stop();
-    begin_arc(solution, arc, moment);
-    for (std::size_t i = arcs_[arc].begin; i < arcs_[arc].end; ++i) {
-      if (i > arcs_[arc].begin) {
-        step(nodes_[i - 1], nodes_[i], sensitive(), moment, unused);
-      }
-      moment.fix = nodes_[i].fix;
-      visit(moment);
+  begin_arc(solution, arc, moment);
+  for (std::size_t i = arcs_[arc].begin; i < arcs_[arc].end; ++i) {
+    if (i > arcs_[arc].begin) {
+      step(nodes_[i - 1], nodes_[i], drift, moment, unused);
     }
+    moment.fix = nodes_[i].fix;
+    visit(moment);
   }
 }
 
@@ -378,39 +513,47 @@ MatrixXd PassProblem::attitude_by_states(const Moment& moment, const AttitudeByD
   return by_states_of_arc(moment, attitude_by_states_now<kPassCapacity.states>(on_board_, attitude, moment.gyros, h_b));
 }
 
-PassProblem::FixRows PassProblem::compare(const PassSolution& solution, const Moment& moment) const {
+PassProblem::Compared PassProblem::compare_now(const PassSolution& solution, const Moment& moment) const {
   const ScreenedPass::Fix& fix = *moment.fix;
   const CalibrationSetup& setup = setup_.on_board;
-  FixRows rows;
   const auto by_gyros = optimal_rotation(momenta(moment.gyros, gyros_), in_c(moment.gyros, gyros_, fix.h_b), fix.used);
   if (!by_gyros) {
-    rows.H.setZero(0, layout_.size());
-    return rows;
+    return {};
   }
   const FixBySharedStates by_shared = fix_by_shared_states(setup, fix.fix, fix.rate_c);
   const Rot<In, C> C_fix = corrected(fix.fix, by_shared, solution.shared);
   // Linearised at the attitude by the gyros, which has no noise of the fix.
   const FixComparison comparison =
       trihedron::compare(on_board_, moment.gyros, C_fix.raw(), by_gyros.value().raw(), fix.h_b, fix.used, by_shared);
-  const auto about_now = rows_about_states_now<kPassCapacity.states>(on_board_, comparison);
-  rows.y = about_now.col(on_board_.size());
-  rows.H = by_states_of_arc(moment, about_now);
   PerGyro<double> noise_rad;
   const double sharing = std::sqrt(setup.fixes_sharing_a_sample(fix.since_last));
   for (int k = 0; k < gyros_; ++k) {
     noise_rad[k] = setup.readout_noise_rad[k] * fix.noise_factor * sharing;
   }
-  rows.R = noise_of(comparison, fix_noise(setup, fix.fix.head), noise_rad);
+  return {rows_about_states_now<kPassCapacity.states>(on_board_, comparison),
+          noise_of(comparison, fix_noise(setup, fix.fix.head), noise_rad)};
+}
+
+PassProblem::FixRows PassProblem::compare(const PassSolution& solution, const Moment& moment) const {
+  const Compared compared = compare_now(solution, moment);
+  FixRows rows;
+  if (compared.rows.rows() == 0) {
+    rows.H.setZero(0, layout_.size());
+    return rows;
+  }
+  rows.y = compared.rows.col(on_board_.size());
+  rows.H = by_states_of_arc(moment, compared.rows.leftCols(on_board_.size()));
+  rows.R = compared.R;
   return rows;
 }
 
 double PassProblem::FixRows::nis() const { return y.dot(R.llt().solve(y)); }
 
-double PassProblem::gate_of(const FixRows& rows) const {
-  return gate_of_freedom(std::max(static_cast<int>(rows.y.size()), 1), setup_.on_board.gate_nis);
+double PassProblem::gate_of(Eigen::Index components) const {
+  return gate_of_freedom(std::max(static_cast<int>(components), 1), setup_.on_board.gate_nis);
 }
 
-bool PassProblem::is_outlier(const FixRows& rows) const { return rows.nis() > gate_of(rows); }
+bool PassProblem::is_outlier(const FixRows& rows) const { return rows.nis() > gate_of(rows.y.size()); }
 
 MatrixXd PassProblem::prior_covariance() const {
   if (!modes_) {
@@ -421,7 +564,7 @@ MatrixXd PassProblem::prior_covariance() const {
     amplitudes[k] = modes_->gyros[k].amplitudes;
   }
   const MatrixXd map = parameters_by_parameters(layout_, setup_.layout(), amplitudes);
-  return map * setup_.prior.covariance * map.transpose();
+  return multiply(multiply(map, setup_.prior.covariance), map.transpose());
 }
 
 void PassProblem::add_prior(const PassSolution& solution, Linear& linear) const {
@@ -455,8 +598,13 @@ void PassProblem::add_prior(const PassSolution& solution, Linear& linear) const 
     }
   }
   const int size = layout_.parameters();
-  linear.prior.block(layout_.drift(0), layout_.drift(0), size, size) =
-      prior_covariance().llt().matrixL().solve(MatrixXd::Identity(size, size));
+  MatrixXd root = prior_covariance();
+  if (!to_root(root)) {
+    root.setConstant(std::nan(""));  // which smooth() refuses
+  }
+  MatrixXd inverse = MatrixXd::Identity(size, size);
+  solve_lower(root, inverse);
+  linear.prior.block(layout_.drift(0), layout_.drift(0), size, size) = inverse;
   linear.prior_y = linear.prior * apart;
 }
 
@@ -513,6 +661,7 @@ double PassProblem::scale_of_misfits(const PassSolution& solution) const {
   constexpr std::size_t kEnough = 100;
   const std::size_t of_one_arc = 1 + kEnough / arcs_.size();
   std::vector<double> nis_per_component;
+  const Drift drift = drift_along(solution, nullptr);
   Moment moment;
   double unused = 0;
   for (std::size_t arc = 0; arc < arcs_.size(); ++arc) {
@@ -520,12 +669,13 @@ double PassProblem::scale_of_misfits(const PassSolution& solution) const {
     std::size_t left = of_one_arc;
     for (std::size_t i = arcs_[arc].begin; i < arcs_[arc].end && left > 0; ++i) {
       if (i > arcs_[arc].begin) {
-        step(nodes_[i - 1], nodes_[i], sensitive(), moment, unused);
+        step(nodes_[i - 1], nodes_[i], drift, moment, unused);
       }
       moment.fix = nodes_[i].fix;
-      const FixRows rows = moment.fix != nullptr ? compare(solution, moment) : FixRows{};
-      if (rows.y.size() > 0) {
-        nis_per_component.push_back(rows.nis() / static_cast<double>(rows.y.size()));
+      Compared fix = moment.fix != nullptr ? compare_now(solution, moment) : Compared{};
+      if (const Eigen::Index components = fix.rows.rows(); components > 0) {
+        whiten(fix.R, rows_of(fix.rows));
+        nis_per_component.push_back(fix.rows.col(on_board_.size()).squaredNorm() / static_cast<double>(components));
         --left;
       }
     }
@@ -538,32 +688,49 @@ double PassProblem::scale_of_misfits(const PassSolution& solution) const {
   return std::max(*middle / kMedianOfFour, 1.0);
 }
 
-PassProblem::Linear PassProblem::linearise(const PassSolution& solution) const {
+PassProblem::Linear PassProblem::linearise(const PassSolution& solution) const { return linearise(solution, false); }
+
+PassProblem::Linear PassProblem::linearise_by_parts(const PassSolution& solution) const {
+  return linearise(solution, true);
+}
+
+PassProblem::Linear PassProblem::linearise(const PassSolution& solution, bool by_parts) const {
   // Far from the solution all fixes have large misfits: outliers are those far above the median.
   const double scale = scale_of_misfits(solution);
   Linear linear;
   add_prior(solution, linear);
   linear.stages.resize(arcs_.size());
+  const Drift drift = drift_along(solution, &sensitive());
+  ConstantSquares constants(layout_.constants() + 1);
+  std::size_t part = 0;
   Moment moment;
   for (std::size_t arc = 0; arc < arcs_.size(); ++arc) {
     check_stop();
     begin_arc(solution, arc, moment);
     double extra_variance_rad2 = 0;
-    FixMerger nearby(setup_.fixes_together, setup_.turn_together_rad);
+    FixMerger nearby(*this);
     for (std::size_t i = arcs_[arc].begin; i < arcs_[arc].end; ++i) {
       moment.fix = nodes_[i].fix;
       if (moment.fix != nullptr) {
-        FixRows rows = compare(solution, moment);
-        const double gate = scale * gate_of(rows);
-        linear.cost_outside_rows += add_fix(std::move(rows), *moment.fix, gate, nearby);
+        linear.cost_outside_rows += add_fix(compare_now(solution, moment), moment, scale, nearby);
       }
       if (i + 1 < nodes_.size()) {
-        step(nodes_[i], nodes_[i + 1], sensitive(), moment, extra_variance_rad2);
+        step(nodes_[i], nodes_[i + 1], drift, moment, extra_variance_rad2);
       }
     }
     SmootherStage& stage = linear.stages[arc];
-    linear.cost_outside_rows += nearby.put_into(stage, layout_.size());
-    compress(stage);
+    linear.cost_outside_rows += nearby.put_into(arc, stage);
+    if (by_parts) {
+      take_constants(stage, layout_.dynamic(), constants);
+      while (part < kParts && end_of(part + 1) <= arc) {
+        ++part;
+      }
+      if (arc + 1 == end_of(part + 1)) {
+        put_back(constants, layout_.dynamic(), stage);
+      }
+    } else {
+      compress(stage);
+    }
     if (arc + 1 < arcs_.size()) {
       end_arc(solution, moment, extra_variance_rad2, linear);
     } else {
@@ -575,6 +742,17 @@ PassProblem::Linear PassProblem::linearise(const PassSolution& solution) const {
     put_noise(solution, setup_.noise(), arc, linear.ends[arc], linear.stages[arc]);
   }
   return linear;
+}
+
+double PassProblem::add_fix(Compared fix, const Moment& moment, double scale, FixMerger& nearby) const {
+  if (fix.rows.rows() == 0) {
+    return 0;
+  }
+  const double gate = scale * gate_of(fix.rows.rows());
+  whiten(fix.R, rows_of(fix.rows));
+  const double nis = fix.rows.col(on_board_.size()).squaredNorm();
+  nearby.add(moment, fix.rows, nis > gate ? gate / nis : 1);
+  return nis > gate ? 2 * gate * (1 - gate / nis) : 0;
 }
 
 void PassProblem::correct(const SmootherResult& found, PassSolution& solution) const {

@@ -6,10 +6,12 @@
 #include <chrono>
 #include <functional>
 #include <optional>
+#include <utility>
 #include <vector>
 
 #include "batch/drift_modes.hpp"
 #include "batch/information_smoother.hpp"
+#include "batch/rotor_drift.hpp"
 #include "model/gyro.hpp"
 #include "onboard/screened_pass.hpp"
 #include "trihedron/core/measurement.hpp"
@@ -74,8 +76,11 @@ class PassProblem {
   /// coefficients outside eq. (1).
   [[nodiscard]] const Layout& layout() const { return layout_; }
   [[nodiscard]] const std::optional<DriftModes>& modes() const { return modes_; }
-  /// `solution`: near enough to tell how each mode moves the momenta.
-  void use(DriftModes modes, const PassSolution& solution);
+  /// How far each coefficient outside eq. (1) turns the momenta along a solution that is near enough to tell, and modes
+  /// by a table of that. It need not be computed
+  /// again when the solution is corrected.
+  [[nodiscard]] MovedByModes moved_by_coefficients(const PassSolution& solution) const;
+  void use(DriftModes modes, const MovedByModes& by_coefficients);
   void set_noise(const ProcessNoise& noise) {
     setup_.on_board.direction_random_walk_rad_sqrt_s = noise.direction_random_walk_rad_sqrt_s;
     setup_.on_board.wandering_drift = noise.wandering_drift;
@@ -106,6 +111,12 @@ class PassProblem {
     double cost_outside_rows = 0;
   };
   [[nodiscard]] Linear linearise(const PassSolution& solution) const;
+  /// The same with the rows about the constants alone as a triangle in the last arc of each part of the pass: a
+  /// fraction of the rows, for whom only the ends of the parts matter.
+  [[nodiscard]] Linear linearise_by_parts(const PassSolution& solution) const;
+  static constexpr std::size_t kParts = 6;
+  /// The arc after the last one of that many parts.
+  [[nodiscard]] std::size_t end_of(std::size_t parts) const { return parts * arcs_.size() / kParts; }
   /// The same with other process noise than that of the setup: of the prior, and of one of the stages.
   void put_noise(const PassSolution& solution, const ProcessNoise& noise, Eigen::MatrixXd& prior,
                  Eigen::VectorXd& prior_y) const;
@@ -127,13 +138,12 @@ class PassProblem {
     PerGyro<Sensitivity<kMaxDriftColumns>> since;
     PerGyro<Eigen::Matrix<double, 3, 2>> directions;  ///< there: φ by the two components across the momentum
   };
-  /// Visits the end of each arc but the last, where the next begins; that one begins as the solution then says.
-  void go_over_arcs(const PassSolution& solution, const std::function<void(const Moment&)>& at_end) const;
-  /// The same with the sensitivities to all coefficients, modes or not.
-  void go_over_arcs_by_coefficients(const PassSolution& solution,
-                                    const std::function<void(const Moment&)>& at_end) const;
   /// Visits all samples that are used, and all fixes, in time order.
   void go_along(const PassSolution& solution, const std::function<void(const Moment&)>& visit) const;
+  /// The same with the momenta alone, without how they depend on the states.
+  void go_along_momenta(const PassSolution& solution, const std::function<void(const Moment&)>& visit) const;
+  /// What go_along() visits last.
+  [[nodiscard]] Moment last_moment(const PassSolution& solution) const;
 
   /// A fix compared with the momenta: components of the misfit, their noise, and their derivative by the states of its
   /// arc.
@@ -153,7 +163,7 @@ class PassProblem {
                                                                        const GyroMask& used) const;
   /// Rows about the states at a moment, as on board, as rows about those of its arc.
   using Rows = ComparedRows<kPassCapacity.states>;
-  [[nodiscard]] Eigen::MatrixXd by_states_of_arc(const Moment& moment, Rows rows) const;
+  [[nodiscard]] Eigen::MatrixXd by_states_of_arc(const Moment& moment, const Rows& rows) const;
   /// φ of a momentum, `in`, by the states of the arc.
   [[nodiscard]] Eigen::MatrixXd momentum_by_states(const Moment& moment, int gyro) const;
   /// Derivative of the error of an attitude, c axes, by the states of the arc.
@@ -177,15 +187,39 @@ class PassProblem {
     std::size_t end = 0;  ///< the first node of the next arc, which this one ends at, or that after the last
   };
 
-  [[nodiscard]] double gate_of(const FixRows& rows) const;
+  /// What turns the momenta along a solution, and the columns that the sensitivities are about: there are fewer of
+  /// these where modes stand for the others.
+  struct Drift {
+    const DriftModel* sensitive = nullptr;
+    PerGyro<RotorDrift> rotors;
+  };
+
+  /// A fix compared with the momenta at its time, not yet by the states of the arc: rows as on board, right side last.
+  struct Compared {
+    Rows rows;
+    ComponentCovariance R;
+  };
+  [[nodiscard]] Compared compare_now(const PassSolution& solution, const Moment& moment) const;
+  class FixMerger;
+  /// Adds the rows of a fix, whitened, with the weight that its misfit leaves it: beyond the gate, `scale` times that
+  /// of its NIS, its influence falls with the third power. Returns the part of the cost that the rows do not contain.
+  double add_fix(Compared fix, const Moment& moment, double scale, FixMerger& nearby) const;
+  [[nodiscard]] Linear linearise(const PassSolution& solution, bool by_parts) const;
+
+  [[nodiscard]] double gate_of(Eigen::Index components) const;
   /// How far the misfits are beyond their noise as a rule, by the first fixes of each arc: the square of it, 1 or more.
   [[nodiscard]] double scale_of_misfits(const PassSolution& solution) const;
   [[nodiscard]] Reading reading_at(const Node& node) const;
-  /// `sensitive`: the columns of the drift that the sensitivities are about; the momenta turn by all.
-  void step(const Node& from_node, const Node& to_node, const DriftModel& sensitive, Moment& moment,
+  void step(const Node& from_node, const Node& to_node, const Drift& drift, Moment& moment,
             double& extra_variance_rad2) const;
-  void go_over_arcs(const PassSolution& solution, const DriftModel& sensitive,
-                    const std::function<void(const Moment&)>& at_end) const;
+  /// `sensitive`: null where the momenta alone are wanted.
+  [[nodiscard]] Drift drift_along(const PassSolution& solution, const DriftModel* sensitive) const;
+  void go_along_arc(const PassSolution& solution, std::size_t arc, const Drift& drift,
+                    const std::function<void(const Moment&)>& visit) const;
+  /// Rows about the states at a moment as rows about those of its arc but for the modes, in the order of
+  /// without_modes_; and these put where they are among all states.
+  [[nodiscard]] Eigen::MatrixXd by_states_but_modes(const Moment& moment, Rows rows) const;
+  void put_beside_modes(const Eigen::MatrixXd& rows, Eigen::Ref<Eigen::MatrixXd> all) const;
   [[nodiscard]] const DriftModel& sensitive() const { return modes_ ? drift_of_eq1_ : drift_; }
   /// Coefficients outside eq. (1) as the states that stand for them, and back.
   [[nodiscard]] Eigen::VectorXd as_states(int gyro, const Eigen::VectorXd& outside) const;
@@ -197,6 +231,7 @@ class PassProblem {
 
   PassSetup setup_;
   Layout layout_;
+  Layout without_modes_;  ///< the same without modes and what they stand for
   /// Of the rows of fixes and attitudes as they are on board: those of the setup, without coefficients outside eq. (1)
   /// where modes stand for them.
   Layout on_board_;

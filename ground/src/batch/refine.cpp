@@ -1,12 +1,12 @@
 #include "batch/refine.hpp"
 
 #include <Eigen/Cholesky>
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <map>
 #include <utility>
 
+#include "batch/gram.hpp"
 #include "batch/pass_setup.hpp"
 #include "batch/smoothed_attitude.hpp"
 #include "model/open_loop_start.hpp"
@@ -28,43 +28,77 @@ void use_residuals(const PassProblem& problem, const PassSolution& solution, con
       compared[{fix.t, fix.head}] = &fix;
     }
   }
+  // Those of an arc together, because their spread is one large product.
+  struct Residual {
+    FixRecord* fix = nullptr;
+    GyroMask used{};
+    PassProblem::FixRows rows;
+  };
+  std::vector<Residual> of_arc;
+  std::size_t arc = 0;
+  const auto put_into_fixes = [&] {
+    Eigen::Index size = 0;
+    for (const Residual& residual : of_arc) {
+      size += residual.rows.y.size();
+    }
+    MatrixXd all(size, problem.layout().size());
+    Eigen::Index row = 0;
+    for (const Residual& residual : of_arc) {
+      all.middleRows(row, residual.rows.y.size()) = residual.rows.H;
+      row += residual.rows.y.size();
+    }
+    const MatrixXd spreads = roots.spread(arc, all);
+    row = 0;
+    for (const Residual& residual : of_arc) {
+      const PassProblem::FixRows& rows = residual.rows;
+      FixRecord& fix = *residual.fix;
+      MatrixXd covariance = rows.R;
+      fix.status = FixStatus::kRejectedByGate;
+      if (!problem.is_outlier(rows)) {
+        fix.status = FixStatus::kUsed;
+        const auto spread = spreads.middleRows(row, rows.y.size());
+        covariance -= spread * spread.transpose();
+      }
+      row += rows.y.size();
+      fix.nis = rows.y.dot(covariance.ldlt().solve(rows.y));
+      fix.degrees_of_freedom = static_cast<int>(rows.y.size());
+      std::ranges::fill(fix.innovation, 0);
+      std::ranges::fill(fix.innovation_sigma, 0);
+      Eigen::Index component = 0;
+      for (int k = 0; k < problem.layout().gyros; ++k) {
+        for (int i = 2 * k; residual.used[k] && i < 2 * k + 2; ++i, ++component) {
+          fix.innovation[static_cast<std::size_t>(i)] = rows.y(component);
+          fix.innovation_sigma[static_cast<std::size_t>(i)] = std::sqrt(covariance(component, component));
+        }
+      }
+    }
+    of_arc.clear();
+  };
   problem.go_along(solution, [&](const PassProblem::Moment& moment) {
     const auto found = moment.fix == nullptr ? compared.end() : compared.find({moment.t, moment.fix->fix.head});
     if (found == compared.end()) {
       return;
     }
-    const PassProblem::FixRows rows = problem.compare(solution, moment);
+    PassProblem::FixRows rows = problem.compare(solution, moment);
     if (rows.y.size() == 0) {
       return;
     }
-    FixRecord& fix = *found->second;
-    MatrixXd covariance = rows.R;
-    fix.status = FixStatus::kRejectedByGate;
-    if (!problem.is_outlier(rows)) {
-      fix.status = FixStatus::kUsed;
-      const MatrixXd spread = roots.spread(moment.arc, rows.H);
-      covariance -= spread * spread.transpose();
+    if (moment.arc != arc) {
+      put_into_fixes();
+      arc = moment.arc;
     }
-    fix.nis = rows.y.dot(covariance.ldlt().solve(rows.y));
-    fix.degrees_of_freedom = static_cast<int>(rows.y.size());
-    std::ranges::fill(fix.innovation, 0);
-    std::ranges::fill(fix.innovation_sigma, 0);
-    Eigen::Index row = 0;
-    for (int k = 0; k < problem.layout().gyros; ++k) {
-      for (int i = 2 * k; moment.fix->used[k] && i < 2 * k + 2; ++i, ++row) {
-        fix.innovation[static_cast<std::size_t>(i)] = rows.y(row);
-        fix.innovation_sigma[static_cast<std::size_t>(i)] = std::sqrt(covariance(row, row));
-      }
-    }
+    of_arc.push_back({found->second, moment.fix->used, std::move(rows)});
   });
+  put_into_fixes();
 }
 
 /// Compares the constants by the first half of the pass with those by all of it (docs/mathematics.md, section 12). Only
 /// directions in which the second half at least halves the variance count.
-std::optional<Halves> compare_halves(const BatchResult& result, const Layout& layout) {
+std::optional<Halves> compare_halves(const PassProblem& problem, const BatchResult& result) {
   constexpr double kLeast = 0.5;
+  const Layout& layout = problem.layout();
   const PassProblem::Linear& linear = result.linear;
-  const std::size_t half = linear.stages.size() / 2;
+  const std::size_t half = problem.end_of(PassProblem::kParts / 2);
   if (half == 0) {
     return std::nullopt;
   }
@@ -74,13 +108,14 @@ std::optional<Halves> compare_halves(const BatchResult& result, const Layout& la
   const auto R = triangle.block(layout.dynamic(), layout.dynamic(), c, c).triangularView<Eigen::Upper>();
   // In units of the sigmas after the first half; in these the covariance by the whole pass is `rest`.
   const Eigen::VectorXd first = triangle.block(layout.dynamic(), layout.size(), c, 1);
-  const MatrixXd known = R * MatrixXd(result.errors.last_root.bottomRows(c));
+  const MatrixXd known = multiply(MatrixXd(R), result.errors.last_root.bottomRows(c));
   const Eigen::VectorXd whole = R * Eigen::VectorXd(result.errors.x.back().tail(c));
-  const Eigen::SelfAdjointEigenSolver<MatrixXd> rest(known * known.transpose());
+  MatrixXd axes = square(known);
+  const Eigen::VectorXd rest = to_axes(axes);
   for (Eigen::Index i = 0; i < c; ++i) {
-    const double gained = 1 - rest.eigenvalues()(i);
+    const double gained = 1 - rest(i);
     if (gained > kLeast) {
-      const double off = rest.eigenvectors().col(i).dot(first - whole);
+      const double off = axes.col(i).dot(first - whole);
       halves.chi_square += off * off / gained;
       ++halves.degrees_of_freedom;
     }
@@ -88,13 +123,14 @@ std::optional<Halves> compare_halves(const BatchResult& result, const Layout& la
   return halves;
 }
 
-/// The part of a symmetric matrix, in units of the covariance root rootᵀ, that makes it larger.
-MatrixXd positive_part(const MatrixXd& added, const MatrixXd& root) {
-  const auto to_units = root.triangularView<Eigen::Upper>();
-  const MatrixXd half = to_units.solve(added);
-  const Eigen::SelfAdjointEigenSolver<MatrixXd> in_units(to_units.solve(MatrixXd(half.transpose())));
-  const MatrixXd longer = root * in_units.eigenvectors() * in_units.eigenvalues().cwiseMax(0).cwiseSqrt().asDiagonal();
-  return longer * longer.transpose();
+/// The part of a symmetric matrix, in units of the covariance L Lᵀ, that makes it larger; L: lower triangle.
+MatrixXd positive_part(const MatrixXd& added, const MatrixXd& L) {
+  MatrixXd axes = added;
+  solve_lower(L, axes);
+  axes.transposeInPlace();
+  solve_lower(L, axes);
+  const Eigen::VectorXd longer_by = to_axes(axes);
+  return square(multiply(L, axes) * longer_by.cwiseMax(0).cwiseSqrt().asDiagonal());
 }
 
 /// The roots of a result, of which only the solution and the covariance at its end are kept: the rest is long.
@@ -170,9 +206,9 @@ KappaAndDelta with_members(const PassProblem& problem, const MatrixXd& more_cova
   const Eigen::VectorXd sigma = prior.covariance.diagonal().cwiseSqrt();
   const MatrixXd scaled = sigma.cwiseInverse().asDiagonal() * prior.covariance * sigma.cwiseInverse().asDiagonal();
   const MatrixXd by_parameters = parameters_by_parameters(modes, members, amplitudes) * sigma.asDiagonal();
-  const MatrixXd before = by_parameters * scaled;
+  const MatrixXd before = multiply(by_parameters, scaled);
   const MatrixXd follow =
-      sigma.asDiagonal() * MatrixXd((before * by_parameters.transpose()).ldlt().solve(before).transpose());
+      sigma.asDiagonal() * MatrixXd(multiply(before, by_parameters.transpose()).ldlt().solve(before).transpose());
   KappaAndDelta found{by_modes.gyros, {}, follow};
   const Eigen::VectorXd errors = follow * moved;
   for (int k = 0; k < members.gyros; ++k) {
@@ -181,7 +217,7 @@ KappaAndDelta with_members(const PassProblem& problem, const MatrixXd& more_cova
         prior.gyros[k].drift_rad_s.segment(Layout::kEq1, size) + errors.segment(row, size);
   }
   // What the modes leave open: of members alone, since modes, coefficients of eq. (1) and alignments are among them.
-  found.covariance = prior.covariance - follow * before * sigma.asDiagonal();
+  found.covariance = prior.covariance - multiply(follow, before) * sigma.asDiagonal();
   for (int k = 0; k < members.gyros; ++k) {
     const int row = members.drift(k) - members.drift(0);
     for (const auto& [first, count] : {std::pair(row, Layout::kEq1), std::pair(row + members.drift_size(), 3)}) {
@@ -189,11 +225,13 @@ KappaAndDelta with_members(const PassProblem& problem, const MatrixXd& more_cova
       found.covariance.middleCols(first, count).setZero();
     }
   }
+  found.covariance += multiply(multiply(follow, by_modes.covariance), follow.transpose());
   found.covariance = (found.covariance + found.covariance.transpose()).eval() / 2;
-  found.covariance += follow * by_modes.covariance * follow.transpose();
   if (more_covariance.size() > 0) {
-    const Eigen::LLT<MatrixXd> root(found.covariance.reverse());
-    found.covariance += positive_part(more_covariance, MatrixXd(root.matrixL()).reverse());
+    MatrixXd root = found.covariance;
+    static_cast<void>(to_root(root));  // positive definite, since the pass has a solution
+    root.triangularView<Eigen::StrictlyUpper>().setZero();
+    found.covariance += positive_part(more_covariance, root);
   }
   return found;
 }
@@ -213,8 +251,8 @@ OpenLoopStart errors_at_end(const PassProblem& problem, const BatchResult& resul
   by_states.block(layout.drift(0), own.drift(0), layout.parameters(), own.parameters()) = parameters.by_states;
   const int rest = layout.shared() - layout.readout(0);
   by_states.block(layout.readout(0), own.readout(0), rest, rest).setIdentity();
-  const MatrixXd root = by_states * result.errors.last_root;
-  MatrixXd covariance = root * root.transpose();
+  const MatrixXd root = multiply(by_states, result.errors.last_root);
+  MatrixXd covariance = square(root);
   // As much as it is larger, the errors of the parameters have nothing in common with those of the momenta.
   covariance.block(layout.drift(0), layout.drift(0), layout.parameters(), layout.parameters()) = parameters.covariance;
   return open_loop_start(setup, layout, last.gyros, std::move(covariance));
@@ -242,7 +280,8 @@ PassSolution begin(PassProblem& problem, const Screened& screened, const Calibra
         first.gyros[k].drift_rad_s = problem.setup().prior.gyros[k].drift_rad_s;
       }
     }
-    problem.use(field ? field->modes : modes_of(problem, first), first);
+    const MovedByModes by_coefficients = problem.moved_by_coefficients(first);
+    problem.use(field ? field->modes : modes_of(problem, by_coefficients), by_coefficients);
   }
   return first;
 }
@@ -254,7 +293,7 @@ Refinement::Refinement(const Screened& screened, PassSetup setup, const Calibrat
     : problem_(problem_of(screened, std::move(setup))),
       field_(field),
       result_(most_likely(problem_, begin(problem_, screened, options, field_))),
-      halves_(compare_halves(result_, problem_.layout())),
+      halves_(compare_halves(problem_, result_)),
       roots_(roots_of(result_)) {
   const SmoothedAttitude smoothed(screened.pass, problem_, result_.solution, roots_);
   course_ = smoothed.course();
@@ -267,7 +306,7 @@ void Refinement::put_into(CalibrationRun& run) && {
   const Layout& layout = problem_.setup().on_board.layout;
   Calibration& calibration = run.calibration;
   const MatrixXd own = result_.errors.last_root.middleRows(problem_.layout().drift(0), problem_.layout().parameters());
-  KappaAndDelta parameters{result_.solution.gyros, own * own.transpose(),
+  KappaAndDelta parameters{result_.solution.gyros, square(own),
                            MatrixXd::Identity(problem_.layout().parameters(), problem_.layout().parameters())};
   if (problem_.modes()) {
     parameters = with_members(problem_, field_ ? field_->more_covariance : MatrixXd(), parameters);
@@ -276,13 +315,12 @@ void Refinement::put_into(CalibrationRun& run) && {
     calibration.drift_field = field_->levels;
   }
   calibration.covariance = parameters.covariance;
-  std::optional<PassProblem::Moment> last;
-  problem_.go_along(result_.solution, [&](const PassProblem::Moment& moment) { last = moment; });
-  calibration.t = last->t;
+  const PassProblem::Moment last = problem_.last_moment(result_.solution);
+  calibration.t = last.t;
   for (int k = 0; k < layout.gyros; ++k) {
-    calibration.gyros[static_cast<std::size_t>(k)].momentum_in = last->gyros[k].h_in;
+    calibration.gyros[static_cast<std::size_t>(k)].momentum_in = last.gyros[k].h_in;
   }
-  run.errors = errors_at_end(problem_, result_, *last, parameters);
+  run.errors = errors_at_end(problem_, result_, last, parameters);
   for (int k = 0; k < layout.gyros; ++k) {
     GyroCalibration& gyro = calibration.gyros[static_cast<std::size_t>(k)];
     const Eigen::Vector3d momentum_in = gyro.momentum_in;

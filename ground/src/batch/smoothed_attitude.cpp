@@ -64,20 +64,31 @@ std::optional<SmoothReadings::At> SmoothReadings::fit(Time t, const GyroMask& us
   return count(at.used) >= 2 ? std::optional(at) : std::nullopt;
 }
 
-std::optional<SmoothedAttitude::At> SmoothedAttitude::at(const PassProblem::Moment& moment,
-                                                         const SmoothReadings::At& otherwise) const {
+std::optional<SmoothedAttitude::Rows> SmoothedAttitude::rows_at(const PassProblem::Moment& moment,
+                                                                const SmoothReadings::At& otherwise) const {
   const SmoothReadings::At reading = readings_.at(moment.t, otherwise);
   const auto attitude = problem_.attitude(moment, reading.h_b, reading.used);
   if (!attitude) {
     return std::nullopt;
   }
-  const MatrixXd spread = roots_.spread(moment.arc, problem_.attitude_by_states(moment, attitude.value(), reading.h_b));
-  Vector3d variance_rad2 = spread.rowwise().squaredNorm();
+  Rows rows{attitude.value().C_in_c, problem_.attitude_by_states(moment, attitude.value(), reading.h_b),
+            Vector3d::Zero()};
   for (int k = 0; k < problem_.layout().gyros; ++k) {
     const double noise_rad = problem_.setup().on_board.readout_noise_rad[k] * reading.noise_factor;
-    variance_rad2 += noise_rad * noise_rad * attitude.value().by_direction(k).rowwise().squaredNorm();
+    rows.readout_variance_rad2 += noise_rad * noise_rad * attitude.value().by_direction(k).rowwise().squaredNorm();
   }
-  return At{attitude.value().C_in_c, variance_rad2.cwiseSqrt()};
+  return rows;
+}
+
+SmoothedAttitude::At SmoothedAttitude::with_sigma(const Rows& rows, const Eigen::Ref<const MatrixXd>& spread) {
+  const Vector3d variance_rad2 = spread.rowwise().squaredNorm();
+  return {rows.C_in_c, (variance_rad2 + rows.readout_variance_rad2).cwiseSqrt()};
+}
+
+std::optional<SmoothedAttitude::At> SmoothedAttitude::at(const PassProblem::Moment& moment,
+                                                         const SmoothReadings::At& otherwise) const {
+  const std::optional<Rows> rows = rows_at(moment, otherwise);
+  return rows ? std::optional(with_sigma(*rows, roots_.spread(moment.arc, rows->by_states))) : std::nullopt;
 }
 
 void SmoothedAttitude::append(const At& attitude, Time t, AttitudeHistory& history) {
@@ -90,22 +101,44 @@ SmoothedCourse SmoothedAttitude::course() const {
   SmoothedCourse course;
   const int gyros = problem_.layout().gyros;
   course.readings.gyros = gyros;
+  // Those of an arc together, because their sigmas are one large product.
+  std::vector<Rows> of_arc;
+  std::size_t arc = 0;
+  const auto take_sigmas = [&] {
+    const auto count = static_cast<Eigen::Index>(of_arc.size());
+    MatrixXd all(3 * count, problem_.layout().size());
+    for (Eigen::Index i = 0; i < count; ++i) {
+      all.middleRows<3>(3 * i) = of_arc[static_cast<std::size_t>(i)].by_states;
+    }
+    const MatrixXd spread = roots_.spread(arc, all);
+    for (Eigen::Index i = 0; i < count; ++i) {
+      const At its = with_sigma(of_arc[static_cast<std::size_t>(i)], spread.middleRows<3>(3 * i));
+      course.attitude.sigma_rad.push_back(its.sigma_rad);
+    }
+    of_arc.clear();
+  };
   problem_.go_along(solution_, [&](const PassProblem::Moment& moment) {
     if (moment.fix == nullptr) {
       return;
     }
-    const auto attitude = at(moment, {moment.fix->h_b, moment.fix->used, moment.fix->noise_factor});
-    if (!attitude) {
+    std::optional<Rows> rows = rows_at(moment, {moment.fix->h_b, moment.fix->used, moment.fix->noise_factor});
+    if (!rows) {
       return;
     }
-    append(*attitude, moment.t, course.attitude);
+    if (moment.arc != arc) {
+      take_sigmas();
+      arc = moment.arc;
+    }
+    course.attitude.t.push_back(moment.t);
+    course.attitude.q_in_c.push_back(rows->C_in_c.quaternion());
     course.readings.t.push_back(moment.t);
     for (int k = 0; k < gyros; ++k) {
-      const Vector3d h_b =
-          moment.gyros[k].C_c_b.transpose() * (attitude->C_in_c.raw().transpose() * moment.gyros[k].h_in);
+      const Vector3d h_b = moment.gyros[k].C_c_b.transpose() * (rows->C_in_c.raw().transpose() * moment.gyros[k].h_in);
       course.readings.h.insert(course.readings.h.end(), h_b.begin(), h_b.end());
     }
+    of_arc.push_back(*std::move(rows));
   });
+  take_sigmas();
   return course;
 }
 

@@ -60,6 +60,16 @@ class SmoothedAttitude {
     Rot<In, C> C_in_c;
     Eigen::Vector3d sigma_rad;
   };
+  /// An attitude before its sigmas are known.
+  struct Rows {
+    Rot<In, C> C_in_c;
+    Eigen::MatrixXd by_states;              ///< its error, c axes, by the states of the arc
+    Eigen::Vector3d readout_variance_rad2;  ///< of the noise of the readings
+  };
+  [[nodiscard]] std::optional<Rows> rows_at(const PassProblem::Moment& moment,
+                                            const SmoothReadings::At& otherwise) const;
+  /// `spread`: of its rows.
+  [[nodiscard]] static At with_sigma(const Rows& rows, const Eigen::Ref<const Eigen::MatrixXd>& spread);
   /// `otherwise` as of SmoothReadings. Nothing where the directions give no attitude.
   [[nodiscard]] std::optional<At> at(const PassProblem::Moment& moment, const SmoothReadings::At& otherwise) const;
   /// At the samples after `from`, a node, up to and with `to`, the next one.

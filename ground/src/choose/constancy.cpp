@@ -8,6 +8,7 @@
 #include <limits>
 #include <utility>
 
+#include "batch/gram.hpp"
 #include "trihedron/core/frames.hpp"
 
 namespace trihedron::ground {
@@ -87,13 +88,15 @@ class StretchForm {
 /// Removes the first variables of a form, to their likeliest values. `follow`: how these follow the others, negated.
 MatrixXd without_first(const MatrixXd& form, Index size, MatrixXd* follow = nullptr) {
   const Index rest = form.rows() - size;
-  const Eigen::LLT<MatrixXd> root(form.topLeftCorner(size, size));
-  const MatrixXd half = root.matrixL().solve(form.topRightCorner(size, rest));
+  MatrixXd root = form.topLeftCorner(size, size);
+  static_cast<void>(to_root(root));  // positive definite, since the pass has a solution
+  MatrixXd half = form.topRightCorner(size, rest);
+  solve_lower(root, half);
   if (follow != nullptr) {
-    *follow = root.matrixU().solve(half);
+    *follow = root.triangularView<Eigen::Lower>().transpose().solve(half);
   }
   MatrixXd left = form.bottomRightCorner(rest, rest);
-  left.selfadjointView<Eigen::Lower>().rankUpdate(half.transpose(), -1);
+  add_gram(half.transpose(), -1, left);
   return left.selfadjointView<Eigen::Lower>();
 }
 
@@ -121,7 +124,7 @@ void for_each_arc(const PassProblem& problem, const PassSolution& solution, cons
   Index count = 0;
   const auto put_into_form = [&] {
     if (count > 0) {
-      form.selfadjointView<Eigen::Lower>().rankUpdate(gathered.leftCols(count));
+      add_gram(gathered.leftCols(count), 1, form);
       count = 0;
     }
   };
@@ -294,19 +297,19 @@ class Constancy {
                 double worth_more_than) const {
     const MatrixXd by_form = form_.topLeftCorner(size(), size()) * columns;
     const auto D = prior_sigma.asDiagonal();
-    const MatrixXd S =
+    MatrixXd root =
         MatrixXd(D * (columns.transpose() * by_form) * D) + MatrixXd::Identity(prior_sigma.size(), prior_sigma.size());
-    const VectorXd b = -(D * (columns.transpose() * form_.topRightCorner(size(), 1)));
-    const Eigen::LLT<MatrixXd> root(S);
-    const VectorXd found = root.solve(b);
-    change.log_odds = b.dot(found) / 2 - root.matrixLLT().diagonal().array().log().sum();
+    static_cast<void>(to_root(root));  // positive definite: 1 and more
+    const auto L = root.triangularView<Eigen::Lower>();
+    const VectorXd white = L.solve(-(D * (columns.transpose() * form_.topRightCorner(size(), 1))));
+    change.log_odds = white.squaredNorm() / 2 - root.diagonal().array().log().sum();
     if (change.log_odds <= worth_more_than) {
       return;
     }
-    change.size = D * found;
-    // The diagonal of S⁻¹ = L⁻ᵀ L⁻¹.
+    change.size = D * VectorXd(root.transpose().triangularView<Eigen::Upper>().solve(white));
+    // The diagonal of L⁻ᵀ L⁻¹.
     MatrixXd inverse = MatrixXd::Identity(prior_sigma.size(), prior_sigma.size());
-    root.matrixL().solveInPlace(inverse);
+    solve_lower(root, inverse);
     change.sigma = D * VectorXd(inverse.colwise().norm().transpose());
     const VectorXd moved = columns * change.size;
     change.parameters_off = -(follow_.leftCols(size()) * moved);

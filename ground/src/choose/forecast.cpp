@@ -14,7 +14,7 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-constexpr std::size_t kParts = 6;
+constexpr std::size_t kParts = PassProblem::kParts;
 /// Parts at the beginning that are only fitted, not forecast.
 constexpr std::size_t kLearning = 2;
 
@@ -114,7 +114,7 @@ std::vector<Forecast> forecasts(const PassProblem& problem, const BatchResult& f
   }
   std::vector<std::size_t> ends;
   for (std::size_t part = kLearning; part <= kParts; ++part) {
-    ends.push_back(part * problem.arcs() / kParts - 1);
+    ends.push_back(problem.end_of(part) - 1);
   }
   const PassProblem::Linear& linear = found.linear;
   const std::vector<MatrixXd> triangles = triangles_after(linear.prior, linear.prior_y, linear.stages, ends);

@@ -21,9 +21,8 @@ class Search {
   using At = std::function<ProcessNoise(double, int)>;
 
   /// Goes from the best of `starts`, which contains (0, 0), to the best of its neighbours and so on, within the bounds.
-  /// The trial is to be fitted again.
-  Search(Trial& trial, At at, const std::vector<Point>& starts, const Point& lowest, const Point& highest)
-      : trial_(trial), linear_(trial.take_linear()), at_(std::move(at)) {
+  Search(const Trial& trial, At at, const std::vector<Point>& starts, const Point& lowest, const Point& highest)
+      : trial_(trial), linear_(trial.found().linear), at_(std::move(at)) {
     gather_constants(linear_.prior, linear_.prior_y, linear_.stages);
     look_at(starts);
     for (std::optional<Point> last; last != best_;) {
@@ -36,6 +35,7 @@ class Search {
     }
   }
 
+  [[nodiscard]] const Point& best_point() const { return best_; }
   /// The best point, its first number by a parabola through its neighbours where it has two.
   [[nodiscard]] NoiseFit best() const {
     const auto [i, j] = best_;
@@ -77,21 +77,28 @@ GaussMarkov wandering_of(const CalibrationOptions& options) {
 /// Starting levels; several, because with an incomplete model the likelihood has more than one maximum.
 const std::vector<Search::Point> kAllLevels = {{0, 0}, {3, 0}, {6, 0}, {9, 0}};
 
-/// Alternates the search for the noise and a refit with it, because the noise decides which fixes are outliers.
-NoiseFit converge(Trial& trial, const Search::At& at, const std::vector<Search::Point>& starts,
-                  const Search::Point& lowest, const Search::Point& highest) {
+/// Alternates the search for the noise and a refit with it, because the noise decides which fixes are outliers, until a
+/// search finds that of the last refit again. Which of several maxima is the largest the first search tells.
+NoiseFit converge(Trial& trial, const Search::At& at, std::vector<Search::Point> starts, const Search::Point& lowest,
+                  const Search::Point& highest) {
   constexpr int kRounds = 3;
   NoiseFit likely;
   for (int round = 0; round < kRounds; ++round) {
     const ProcessNoise before = likely.noise;
-    likely = Search(trial, at, starts, lowest, highest).best();
-    trial.refit(likely.noise);
+    const Search search(trial, at, starts, lowest, highest);
+    starts = {{0, 0}};
+    if (search.best_point() != starts.front()) {
+      starts.push_back(search.best_point());
+    }
+    likely = search.best();
     const auto same = [](double a, double b) { return std::abs(a - b) <= kNoiseTolerance * b; };
     if (same(before.direction_random_walk_rad_sqrt_s, likely.noise.direction_random_walk_rad_sqrt_s) &&
         same(before.wandering_drift.sigma, likely.noise.wandering_drift.sigma) &&
         same(before.wandering_drift.time_s, likely.noise.wandering_drift.time_s)) {
+      trial.set_noise(likely.noise);
       break;
     }
+    trial.refit(likely.noise);
   }
   return likely;
 }

@@ -67,13 +67,16 @@ Trial::Trial(const Pass& pass, const Screened& screened, const CalibrationOption
 
 /// Modes for a field of this level, and the solution by them.
 void Trial::use_modes(Eigen::VectorXd level, PassSolution& solution) {
-  DriftModes modes = modes_of(problem_, solution, *field_, level);
+  if (!moved_) {
+    moved_ = problem_.moved_by_coefficients(solution);
+  }
+  DriftModes modes = modes_of(problem_, *moved_, *field_, level);
   for (int k = 0; k < problem_.layout().gyros; ++k) {
     const DriftModes::OfGyro& its = modes.gyros[k];
     auto outside = solution.gyros[k].drift_rad_s.segment(Layout::kEq1, its.coefficients.rows());
     outside = (its.coefficients * (its.amplitudes * outside)).eval();
   }
-  problem_.use(std::move(modes), solution);
+  problem_.use(std::move(modes), *moved_);
   field_level_ = std::move(level);
 }
 
@@ -103,6 +106,7 @@ PassSolution Trial::with_likely_field(PassSolution first) {
     use_modes(field_level_.cwiseMax((spectrum_.log_rms.array() + more_than_enough).matrix()), first);
     found_ = {};
   }
+  moved_.reset();  // long; seldom needed again
   Prior prior = problem_.setup().prior;
   put_sigma(problem_.setup().layout(), *field_, field_->sigma(spectrum_.log_rms), prior);
   problem_.set_prior(std::move(prior));
@@ -164,7 +168,7 @@ std::vector<Eigen::Vector3d> Trial::changes_rad() const {
   std::vector<Eigen::Vector3d> changes;
   std::optional<Eigen::Quaterniond> last;
   Time last_t{};
-  problem_.go_along(found_.solution, [&](const PassProblem::Moment& moment) {
+  problem_.go_along_momenta(found_.solution, [&](const PassProblem::Moment& moment) {
     if (moment.fix == nullptr || moment.fix->fix.head != 0) {
       return;
     }

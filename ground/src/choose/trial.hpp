@@ -3,7 +3,6 @@
 
 #include <Eigen/Core>
 #include <optional>
-#include <utility>
 #include <vector>
 
 #include "batch/batch.hpp"
@@ -21,15 +20,17 @@ class Trial {
   Trial(const Pass& pass, const Screened& screened, const CalibrationOptions& options,
         const std::optional<ProcessNoise>& noise = {});
 
-  /// Fits again, with other noise.
+  /// Fits again, with other noise. The spectrum of a field is found by the last linearisation, from which the last step
+  /// was a fraction of the sigmas.
   void refit(const ProcessNoise& noise);
-  /// Gives away or frees what is large. Until it is fitted again, the trial is to be asked for nothing but likelihoods.
-  [[nodiscard]] PassProblem::Linear take_linear() { return std::exchange(found_.linear, {}); }
+  /// Takes noise that is other by so little that the fit is good enough.
+  void set_noise(const ProcessNoise& noise) { problem_.set_noise(noise); }
+  /// Frees what is large. Until it is fitted again, the trial is to be asked for nothing.
   void release() { found_.linear = {}, found_.errors = {}; }
 
   [[nodiscard]] const PassProblem& problem() const { return problem_; }
   [[nodiscard]] const BatchResult& found() const { return found_; }
-  /// `linear`: that of take_linear(), also after gather_constants(). Where the drift is a field, by the spectrum of it
+  /// `linear`: that of found(), also after gather_constants(). Where the drift is a field, by the spectrum of it
   /// that is most likely with this noise.
   [[nodiscard]] double log_likelihood(const PassProblem::Linear& linear, const ProcessNoise& noise) const;
 
@@ -58,6 +59,7 @@ class Trial {
   std::optional<FieldMembers> field_;  ///< where the drift is one
   FieldSpectrum spectrum_;             ///< of it
   Eigen::VectorXd field_level_;        ///< that its modes are for, ln of rad/s
+  std::optional<MovedByModes> moved_;  ///< by each of its members
   BatchResult found_;
 };
 

@@ -314,6 +314,7 @@ class TurnFit {
     }
     turns_.resize((turns_.size() + every - 1) / every);
     at_fix_.resize(pass.star_tracker.size());
+    fitted_.resize(pass.star_tracker.size());
     if (!turns_.empty()) {
       begin_ = pass.star_tracker.t.front();
       middle_ = begin_ + (pass.star_tracker.t.back() - begin_) / 2;
@@ -358,7 +359,17 @@ class TurnFit {
         continue;
       }
       const double clock_s = x_(Unknowns::offset()) + x_(Unknowns::rate()) * to_seconds(fixes.t[i] - middle_);
-      at_fix_[i] = readings_.at(fixes.t[i] + from_seconds(clock_s), from);
+      // Over a millisecond even a slew that begins bends by 1e-9 rad.
+      constexpr double kNear_s = 1e-3;
+      std::optional<Fitted>& its = fitted_[i];
+      if (!its || std::abs(clock_s - its->clock_s) > kNear_s) {
+        its = Fitted{clock_s, readings_.at(fixes.t[i] + from_seconds(clock_s), from)};
+      }
+      at_fix_[i] = its->directions;
+      for (int k = 0; at_fix_[i] && k < unknowns_.gyros; ++k) {
+        Vector3d& h_b = at_fix_[i]->h_b[k];
+        h_b = (h_b + (clock_s - its->clock_s) * at_fix_[i]->h_b_rate[k]).normalized();
+      }
     }
   }
 
@@ -555,6 +566,12 @@ class TurnFit {
   VectorXd prior_sigma_;
   Time begin_{};
   Time middle_{};
+  /// What the gyros read at each fix, and by which clock the samples around it were fitted.
+  struct Fitted {
+    double clock_s = 0;
+    std::optional<FittedDirections> directions;
+  };
+  std::vector<std::optional<Fitted>> fitted_;
   std::vector<std::optional<FittedDirections>> at_fix_;
   double scale_ = 1;
   double shown_ = 0;  ///< square sum of the derivatives by the offset; and what noise alone would make of it

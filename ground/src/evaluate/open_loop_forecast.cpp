@@ -55,6 +55,8 @@ class Accuracy {
       found_.within = last_->after + from_seconds(part * to_seconds(error.after - last_->after));
     }
   }
+  /// Whether it has passed: later errors change nothing.
+  [[nodiscard]] bool passed() const { return passed_; }
   [[nodiscard]] AccuracyForecast found() const {
     AccuracyForecast found = found_;
     found.is_lower_bound = !passed_;
@@ -301,6 +303,10 @@ OpenLoopForecast forecast(const OpenLoopStart& start, const std::vector<GyroCali
   }
   const auto look = [&](Duration after) {
     prediction.go_on(after);
+    const bool kept = after % kKept == Duration::zero();
+    if (!kept && usual.passed() && (!needed || (needed->passed() && after > need->interval))) {
+      return;
+    }
     const PredictedError error = prediction.error();
     usual.add(error);
     if (needed) {
@@ -313,7 +319,7 @@ OpenLoopForecast forecast(const OpenLoopStart& start, const std::vector<GyroCali
         result.need->causes.resize(std::min(result.need->causes.size(), kToldCauses));
       }
     }
-    if (after % kKept == Duration::zero()) {
+    if (kept) {
       result.errors.push_back(error);
     }
   };

@@ -9,6 +9,8 @@
 #include <cmath>
 
 #include "batch/pass_problem.hpp"
+#include "batch/pass_setup.hpp"
+#include "onboard/screen.hpp"
 #include "passes.hpp"
 #include "trihedron/core/optimal_attitude.hpp"
 #include "trihedron/core/precession.hpp"
@@ -364,6 +366,36 @@ TEST(PassProblem, KnowsHowTheMisfitOfAFixDependsOnEachState) {
     const Eigen::VectorXd numerical = (moved(-step) - moved(step)) / (2 * step);
     // Terms of second order are of the size of the misfit, which is below 5e-4 rad, times the derivative.
     EXPECT_LT((numerical - H.col(state)).norm(), 1e-3 * (1e-3 + H.col(state).norm())) << state;
+  }
+}
+
+TEST(PassProblem, TellsTheSameByParts) {
+  const Screened screened = screen(two_hours().pass, batch());
+  const PassProblem problem(screened.pass, pass_setup(two_hours().pass.settings, batch()));
+  const Layout& layout = problem.layout();
+  const PassSolution solution = first_solution(problem, screened);
+  const PassProblem::Linear whole = problem.linearise(solution);
+  const PassProblem::Linear parts = problem.linearise_by_parts(solution);
+  const auto with_constants = std::ranges::count_if(
+      parts.stages, [&](const SmootherStage& stage) { return stage.H.rows() > layout.dynamic(); });
+  EXPECT_EQ(static_cast<std::size_t>(with_constants), PassProblem::kParts);
+  const SmootherResult by_whole = smooth(whole.prior, whole.prior_y, whole.stages);
+  const SmootherResult by_parts = smooth(parts.prior, parts.prior_y, parts.stages);
+  EXPECT_NEAR(by_parts.likelihood.residual_square, by_whole.likelihood.residual_square,
+              1e-9 * by_whole.likelihood.residual_square);
+  EXPECT_NEAR(by_parts.likelihood.log_root_determinant, by_whole.likelihood.log_root_determinant, 1e-6);
+  for (int state = 0; state < layout.size(); ++state) {
+    const double sigma = by_whole.last_root.row(state).norm();
+    EXPECT_NEAR(by_parts.last_root.row(state).norm(), sigma, 1e-6 * sigma) << state;
+    EXPECT_NEAR(by_parts.x.back()(state), by_whole.x.back()(state), 1e-6 * sigma) << state;
+  }
+  // At the end of each part they tell what all fixes until then do.
+  const std::vector<std::size_t> ends = {problem.end_of(2) - 1, problem.end_of(3) - 1};
+  const std::vector<Eigen::MatrixXd> of_whole = information_on_constants(whole.prior, whole.stages, ends);
+  const std::vector<Eigen::MatrixXd> of_parts = information_on_constants(parts.prior, parts.stages, ends);
+  for (std::size_t i = 0; i < ends.size(); ++i) {
+    const Eigen::MatrixXd apart = of_whole[i].triangularView<Eigen::Upper>().solve<Eigen::OnTheRight>(of_parts[i]);
+    EXPECT_LT((apart.transpose() * apart - Eigen::MatrixXd::Identity(apart.rows(), apart.cols())).norm(), 1e-5) << i;
   }
 }
 

@@ -277,7 +277,8 @@ TEST(DriftField, ItsModesTellWhatAllMembersTell) {
   const PassProblem all(screened.pass, setup);
   PassProblem few(screened.pass, setup);
   const PassSolution first = first_solution(all, screened);
-  few.use(modes_of(few, first, members, level.array() + std::log(3.0)), first);
+  const MovedByModes by_coefficients = few.moved_by_coefficients(first);
+  few.use(modes_of(few, by_coefficients, members, level.array() + std::log(3.0)), by_coefficients);
   EXPECT_LT(few.layout().drift_modes, members.of_one_gyro());
   const BatchResult by_all = most_likely(all, first);
   const BatchResult by_few = most_likely(few, first);

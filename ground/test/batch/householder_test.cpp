@@ -44,6 +44,26 @@ TEST_P(RotateUp, AgreesWithTheQrDecompositionUpToSigns) {
   }
 }
 
+TEST_P(RotateUp, IsTheSameRowByRow) {
+  const Shape shape = GetParam();
+  const MatrixXd before = MatrixXd::Random(shape.rows, shape.all_columns);
+  Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> after = before;
+  rotate_rows_up(after.data(), after.rows(), after.cols(), shape.columns);
+  for (int column = 0; column < shape.columns; ++column) {
+    EXPECT_TRUE((after.col(column).tail(shape.rows - std::min(column + 1, shape.rows)).array() == 0).all()) << column;
+  }
+  EXPECT_LT((after.transpose() * after - before.transpose() * before).cwiseAbs().maxCoeff(), 1e-12 * shape.rows);
+}
+
+/// Nothing to rotate: columns that are zero, and rows that are.
+TEST(RotateRowsUp, LeavesZerosAsTheyAre) {
+  Eigen::Matrix<double, 4, 5, Eigen::RowMajor> rows = Eigen::Matrix<double, 4, 5, Eigen::RowMajor>::Zero();
+  rows.row(1).tail(3) << 1, -2, 3;
+  const auto before = rows;
+  rotate_rows_up(rows.data(), rows.rows(), rows.cols(), 2);
+  EXPECT_EQ(rows, before);
+}
+
 INSTANTIATE_TEST_SUITE_P(Of, RotateUp,
                          testing::Values(Shape{1, 1, 1}, Shape{3, 7, 5}, Shape{40, 12, 4}, Shape{12, 12, 12},
                                          Shape{200, 130, 130}, Shape{130, 200, 60}),

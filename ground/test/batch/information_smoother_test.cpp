@@ -142,6 +142,76 @@ TEST(InformationSmoother, IsTheSameWithTheConstantsGathered) {
   EXPECT_NEAR(gathered.likelihood.log_root_determinant, apart.likelihood.log_root_determinant, 1e-12);
 }
 
+TEST(InformationSmoother, IsTheSameWithTheConstantsAtTheEndOfAPart) {
+  System system(7, 0.5, 0.3);
+  const SmootherResult apart = smooth(system.prior, system.prior_y, system.stages);
+  ConstantSquares constants(kConstants + 1);
+  for (std::size_t i = 0; i < system.stages.size(); ++i) {
+    take_constants(system.stages[i], kDynamic, constants);
+    if (i == 3 || i == 6) {
+      put_back(constants, kDynamic, system.stages[i]);
+    }
+  }
+  const SmootherResult at_ends = smooth(system.prior, system.prior_y, system.stages);
+  for (std::size_t i = 0; i < apart.x.size(); ++i) {
+    EXPECT_LT((apart.x[i] - at_ends.x[i]).norm(), 1e-12) << i;
+  }
+  EXPECT_NEAR(at_ends.likelihood.residual_square, apart.likelihood.residual_square, 1e-12);
+  EXPECT_NEAR(at_ends.likelihood.log_root_determinant, apart.likelihood.log_root_determinant, 1e-12);
+}
+
+TEST(InformationSmoother, EliminatesWhatMovesAsTheTriangleDoes) {
+  const System system(7, 0.5, 0.3);
+  const ConstantsInformation found = eliminate_moving(system.prior, system.prior_y, system.stages.size(),
+                                                      [&](std::size_t i) { return system.stages[i]; });
+  const MatrixXd triangle =
+      triangles_after(system.prior, system.prior_y, system.stages, {system.stages.size() - 1}).front();
+  const auto own = triangle.bottomRightCorner(kConstants + 1, kConstants + 1);
+  const MatrixXd squares = found.squares.selfadjointView<Eigen::Lower>();
+  EXPECT_LT((squares - own.transpose() * own).norm(), 1e-12 * squares.norm());
+  EXPECT_NEAR(
+      found.log_root_determinant + own.diagonal().head(kConstants).array().abs().log().sum(),
+      likelihood(system.prior, system.prior_y, system.stages.size(), [&](std::size_t i) { return system.stages[i]; })
+          .log_root_determinant,
+      1e-12);
+}
+
+/// Columns of sizes as far apart as coefficients and angles are, and more of them than the buffer has rows.
+TEST(InformationSmoother, RootsOfSquaresAreTheTriangleOfTheRows) {
+  const VectorXd size = Eigen::Vector4d(1e11, 1, 1e6, 1e-3);
+  const MatrixXd rows = MatrixXd::Random(700, 4) * size.asDiagonal();
+  ConstantSquares constants(4);
+  constants.add(rows.topRows(600));
+  constants.add(rows.bottomRows(100));
+  const MatrixXd root = lower_root(constants.take()).transpose();
+  const MatrixXd triangle = triangle_of(rows);
+  EXPECT_LT(((root.cwiseAbs() - triangle.cwiseAbs()) * size.cwiseInverse().asDiagonal()).norm(), 1e-12 * 700);
+  EXPECT_EQ(constants.take(), MatrixXd::Zero(4, 4));
+}
+
+/// Of a combination of which 1e-10 of what is known of each column is known, four digits are left.
+TEST(InformationSmoother, RootsOfSquaresKnowWhatIsKnownOfDifferences) {
+  MatrixXd rows = MatrixXd::Random(700, 3);
+  rows.col(2) = rows.col(1) + 1e-5 * rows.col(2);
+  ConstantSquares constants(3);
+  constants.add(rows);
+  const MatrixXd root = lower_root(constants.take());
+  const MatrixXd triangle = triangle_of(rows);
+  EXPECT_NEAR(root(2, 2), std::abs(triangle(2, 2)), 1e-4 * std::abs(triangle(2, 2)));
+}
+
+TEST(InformationSmoother, RootsOfSquaresAreThereWhereNothingIsKnown) {
+  MatrixXd rows = MatrixXd::Random(5, 4);
+  rows.col(1) = rows.col(0);  // a combination that nothing is known of
+  rows.col(3).setZero();
+  const MatrixXd root = lower_root(rows.transpose() * rows);
+  EXPECT_LT((root * root.transpose() - rows.transpose() * rows).norm(), 1e-13);
+  EXPECT_LT(std::abs(root(1, 1)), 1e-6);
+  EXPECT_EQ(root.row(3).norm(), 0);
+  rows(2, 2) = std::nan("");
+  EXPECT_TRUE(lower_root(rows.transpose() * rows).hasNaN());
+}
+
 TEST(InformationSmoother, KnowsTheInformationOnConstantsAtEachStage) {
   System system(7, 0.5, 0.3);
   system.prior.rightCols(kConstants).setZero();
