@@ -86,7 +86,7 @@ struct Esg7 {
 /// The member W(4, 4) of a model stands for what k0 leaves of W(4, 0) and W(4, 4), orthogonal to it over the sphere: Σ
 /// h⁴ is √7 Y(4, 0) + √5 Y(4, 4), but for a factor and a constant.
 struct BesideK0 {
-  static constexpr double kOf40 = -0.6454972243679028;  ///< √(5/12)
+  static constexpr double kOf40 = -0.6454972243679028;  ///< −√(5/12)
   static constexpr double kOf44 = 0.7637626158259733;   ///< √(7/12)
 
   [[nodiscard]] static constexpr bool is(const DriftCoefficient& member) {
