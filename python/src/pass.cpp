@@ -1,5 +1,4 @@
 #include <nanobind/nanobind.h>
-#include <nanobind/stl/filesystem.h>
 #include <nanobind/stl/optional.h>
 #include <nanobind/stl/pair.h>
 #include <nanobind/stl/shared_ptr.h>
@@ -7,7 +6,6 @@
 #include <nanobind/stl/vector.h>
 
 #include <algorithm>
-#include <filesystem>
 #include <string>
 #include <utility>
 #include <vector>
@@ -24,12 +22,8 @@
 
 namespace trihedron::python {
 namespace nb = nanobind;
-namespace fs = std::filesystem;
 using nb::literals::operator""_a;
 namespace {
-
-/// A table as Python gives it: its name, times and rows.
-using GivenTable = std::tuple<std::string, GivenVector, GivenMatrix>;
 
 io::TableInMemory table_of(const std::string& name, const GivenVector& t_s, const GivenMatrix& values) {
   return {name, {t_s.data(), t_s.data() + t_s.size()}, {values.data(), values.data() + values.size()}};
@@ -160,11 +154,11 @@ void bind_pass(nb::module_& module) {
           "head"_a);
 
   module.def(
-      "read_tables", [](const fs::path& directory) { return io::read_tables(directory); }, "directory"_a,
+      "read_tables", [](const std::string& directory) { return io::read_tables(directory); }, "directory"_a,
       nb::call_guard<nb::gil_scoped_release>(), "The tables of a pass directory");
   module.def(
       "read_truth",
-      [](const fs::path& directory, std::int64_t epoch_ns) -> std::optional<io::TruthInMemory> {
+      [](const std::string& directory, std::int64_t epoch_ns) -> std::optional<io::TruthInMemory> {
         const std::optional<Truth> truth = io::read_truth(directory);
         return truth ? std::optional(io::tables_of(*truth, Time(Duration(epoch_ns)))) : std::nullopt;
       },

@@ -12,7 +12,7 @@ from ._pipeline import Pipeline
 from ._results import Calibration, Navigation, Observation
 
 
-@xr.register_datatree_accessor("trihedron")
+@xr.register_datatree_accessor("trihedron")  # type: ignore[no-untyped-call, untyped-decorator, unused-ignore]
 class PassAccessor:
     """Of a DataTree laid out as pass.nc: `xarray.open_datatree("pass.nc").trihedron.calibrate()`."""
 

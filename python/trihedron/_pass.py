@@ -176,7 +176,7 @@ class Pass:
         return cls._from_groups(dict(tree.attrs), groups, name)
 
     @classmethod
-    def _from_groups(cls, attributes: Mapping[str, Any], groups: Mapping[str, xr.Dataset], name: str) -> Pass:
+    def _from_groups(cls, attributes: Mapping[Any, Any], groups: Mapping[str, xr.Dataset], name: str) -> Pass:
         toml = attributes.get("pass_toml")
         if not isinstance(toml, str):
             raise InputRefused('lacks the attribute "pass_toml"', "write it as `trihedron simulate` or Pass.to_netcdf() does", name)
@@ -184,7 +184,7 @@ class Pass:
             missing = "gyro" if "gyro" not in groups else "star_tracker"
             raise InputRefused(f'lacks group "{missing}"', "write it as `trihedron simulate` or Pass.to_netcdf() does", name)
         settings = Settings(toml, _gyros_of(groups["gyro"], name), str(attributes.get("prior_json", "")))
-        heads = []
+        heads: list[xr.Dataset] = []
         while _star_tracker_name(len(heads)) in groups:
             heads.append(_with_frames(groups[_star_tracker_name(len(heads))], settings, True))
         truth = _with_frames(groups["truth"], settings, False) if "truth" in groups else None
@@ -367,8 +367,8 @@ def read_pass(path: PathLike) -> Pass:
     """
     file = pathlib.Path(path)
     if file.is_dir():
-        tables = _native.read_tables(file)
-        return Pass._from_tables(tables, _native.read_truth(file, _epoch_ns(tomllib.loads(tables.settings))), str(file))
+        tables = _native.read_tables(str(file))
+        return Pass._from_tables(tables, _native.read_truth(str(file), _epoch_ns(tomllib.loads(tables.settings))), str(file))
     if not file.is_file():
         raise InputRefused(
             "there is no such file or directory",

@@ -65,13 +65,12 @@ def errors_dataset(its: _native.AttitudeErrors, epoch_ns: int) -> xr.Dataset:
 
 
 class _Result:
-    _native: Any
+    _its: _native.CalibrationResult | _native.NavigationResult
 
     @property
     def verdict(self) -> _native.Verdict:
         """Whether the result may be used: verdict.trustworthy; why: verdict.findings."""
-        its: _native.Verdict = self._native.verdict
-        return its
+        return self._its.verdict
 
     @property
     def findings(self) -> list[_native.Finding]:
@@ -81,38 +80,38 @@ class _Result:
     @property
     def statistics(self) -> dict[str, float]:
         """Numbers that sum up how it went."""
-        its: dict[str, float] = self._native.statistics
-        return its
+        return self._its.statistics
 
     @property
     def forecast(self) -> _native.Forecast | None:
         """Attitude error predicted for an open loop from the end of the pass on."""
-        its: _native.Forecast | None = self._native.forecast
-        return its
+        return self._its.forecast
 
 
 class Calibration(_Result):
     """A calibration of a pass."""
 
+    _its: _native.CalibrationResult
+
     def __init__(self, native: _native.CalibrationResult, of: Pass) -> None:
-        self._native = native
+        self._its = native
         #: The pass that was calibrated.
         self.of = of
 
     @property
     def states(self) -> list[str]:
         """Names of the rows of the covariance: gyro1.k0 …, gyro1.align_x …"""
-        return self._native.states
+        return self._its.states
 
     @property
     def values(self) -> Doubles:
         """Of the states: drift, rad/s; alignment, components of the rotation vector, rad."""
-        return self._native.values
+        return self._its.values
 
     @property
     def covariance(self) -> Doubles:
         """Of the errors of the states, estimate - truth: (rad/s)², rad²; shape (n, n). A view that cannot be written to."""
-        return self._native.covariance
+        return self._its.covariance
 
     @property
     def sigmas(self) -> Doubles:
@@ -131,26 +130,26 @@ class Calibration(_Result):
     @property
     def attitude(self) -> xr.Dataset:
         """Of the calibration itself at the fixes: q_x, q_y, q_z, q_w, and sigmas about c x, y, z."""
-        return attitude_dataset(self._native.attitude, self._native.epoch_ns)
+        return attitude_dataset(self._its.attitude, self._its.epoch_ns)
 
     @property
     def definitive_attitude(self) -> xr.Dataset:
         """Smoothed, at each gyro sample; without rows unless it was asked for."""
-        return attitude_dataset(self._native.definitive_attitude, self._native.epoch_ns)
+        return attitude_dataset(self._its.definitive_attitude, self._its.epoch_ns)
 
     @property
     def navigation(self) -> xr.Dataset:
         """Of the navigator at the fixes, corrected now and then."""
-        return attitude_dataset(self._native.navigation, self._native.epoch_ns)
+        return attitude_dataset(self._its.navigation, self._its.epoch_ns)
 
     def _table(self, group: str) -> xr.Dataset:
-        table = next(its for its in self._native.tables if its.group == group)
+        table = next(its for its in self._its.tables if its.group == group)
         return xr.Dataset(
             {
                 its.name: xr.Variable("time", its.values, {"units": its.units, "long_name": its.long_name})
                 for its in table.columns
             },
-            {"t_s": _time(table.t_ns, self._native.epoch_ns)},
+            {"t_s": _time(table.t_ns, self._its.epoch_ns)},
         )
 
     @property
@@ -171,21 +170,21 @@ class Calibration(_Result):
     @property
     def fix_counts(self) -> dict[str, int]:
         """Fixes by what was done with them."""
-        return self._native.fix_counts
+        return self._its.fix_counts
 
     @property
     def sample_counts(self) -> dict[str, int]:
         """Gyro samples by what was done with them."""
-        return self._native.sample_counts
+        return self._its.sample_counts
 
     @property
     def settings(self) -> dict[str, Any]:
         """As decided, with nothing left open: fit for `settings` of another call."""
-        return tomllib.loads(self._native.settings)
+        return tomllib.loads(self._its.settings)
 
     def to_json(self) -> str:
         """The text of calibration.json, byte for byte that of the program."""
-        return self._native.json
+        return self._its.json
 
     def to_dict(self) -> dict[str, Any]:
         """calibration.json."""
@@ -198,11 +197,11 @@ class Calibration(_Result):
 
     def write_attitude(self, path: PathLike, *, definitive: bool = False) -> None:
         """Writes an attitude file (CSV), as the program does."""
-        _write(path, self._native.format_attitude(definitive))
+        _write(path, self._its.format_attitude(definitive))
 
     def evaluate(self) -> Evaluation:
         """Errors against the truth of the pass where it has one, else against the star tracker."""
-        return Evaluation(_native.evaluate(self._native, self.of._truth_table()), self)
+        return Evaluation(_native.evaluate(self._its, self.of._truth_table()), self)
 
     def __repr__(self) -> str:
         return f"<trihedron.Calibration of {self.of.name}: {self.verdict!r}; {self.forecast!r}>"
@@ -211,39 +210,41 @@ class Calibration(_Result):
 class Navigation(_Result):
     """The attitude of a pass by the open-loop navigator."""
 
+    _its: _native.NavigationResult
+
     def __init__(self, native: _native.NavigationResult, of: Pass) -> None:
-        self._native = native
+        self._its = native
         #: The pass that was flown.
         self.of = of
 
     @property
     def attitude(self) -> xr.Dataset:
         """At every gyro sample: q_x, q_y, q_z, q_w, sigmas about c x, y, z, age_s."""
-        return attitude_dataset(self._native.attitude, self._native.epoch_ns)
+        return attitude_dataset(self._its.attitude, self._its.epoch_ns)
 
     @property
     def corrections(self) -> int:
         """Astro-corrections made."""
-        return self._native.corrections
+        return self._its.corrections
 
     def write_attitude(self, path: PathLike) -> None:
         """Writes an attitude file (CSV), as the program does."""
-        _write(path, self._native.format_attitude())
+        _write(path, self._its.format_attitude())
 
     def __repr__(self) -> str:
-        return f"<trihedron.Navigation of {self.of.name}: {self._native.attitude.t_ns.size} epochs, {self.verdict!r}>"
+        return f"<trihedron.Navigation of {self.of.name}: {self._its.attitude.t_ns.size} epochs, {self.verdict!r}>"
 
 
 class Observation:
     """What a pass can tell of the parameters."""
 
     def __init__(self, native: _native.ObservationResult) -> None:
-        self._native = native
+        self._its = native
 
     @property
     def parameters(self) -> xr.Dataset:
         """prior_sigma and sigma by parameter; sigma_until: by the measurements up to each of t_s."""
-        its = self._native
+        its = self._its
         return xr.Dataset(
             {
                 "prior_sigma": ("parameter", its.prior_sigma),
@@ -256,32 +257,32 @@ class Observation:
     @property
     def covariance(self) -> Doubles:
         """Of the parameters by prior and measurements; a view that cannot be written to."""
-        return self._native.covariance
+        return self._its.covariance
 
     @property
     def singular_values(self) -> Doubles:
         """Prior sigma over that by the measurements alone, largest first."""
-        return self._native.singular_values
+        return self._its.singular_values
 
     @property
     def rank(self) -> int:
         """How many combinations are observable."""
-        return self._native.rank
+        return self._its.rank
 
     @property
     def attitude_error_rad(self) -> float:
         """rms per axis by what the parameters leave, between corrections and slewing."""
-        return self._native.attitude_error_rad
+        return self._its.attitude_error_rad
 
     @property
     def weak(self) -> list[_native.Combination]:
         """Combinations of parameters that the pass tells little of."""
-        return self._native.weak
+        return self._its.weak
 
     @property
     def is_harmful(self) -> bool:
         """Whether one of them does harm to the mission."""
-        return self._native.is_harmful
+        return self._its.is_harmful
 
     def __repr__(self) -> str:
         return f"<trihedron.Observation: {self.rank} of {len(self.singular_values)} parameters observable, {len(self.weak)} weak>"
@@ -291,59 +292,59 @@ class Evaluation:
     """Errors of a calibration's attitudes against a reference."""
 
     def __init__(self, native: _native.EvaluationResult, of: Calibration) -> None:
-        self._native = native
+        self._its = native
         #: The calibration that was evaluated.
         self.of = of
 
     @property
     def reference(self) -> str:
         """truth, or star tracker."""
-        return self._native.navigation.reference
+        return self._its.navigation.reference
 
     @property
     def attitude(self) -> xr.Dataset:
         """Errors of the attitude of the calibration itself, c axes, with the sigmas that it claims."""
-        return errors_dataset(self._native.attitude.errors, self._native.epoch_ns)
+        return errors_dataset(self._its.attitude.errors, self._its.epoch_ns)
 
     @property
     def navigation(self) -> xr.Dataset:
         """Errors of the navigator, likewise."""
-        return errors_dataset(self._native.navigation.errors, self._native.epoch_ns)
+        return errors_dataset(self._its.navigation.errors, self._its.epoch_ns)
 
     @property
     def open_loops(self) -> list[OpenLoop]:
         """Flown from each astro-correction to the end of the pass."""
-        return [OpenLoop(its, self._native.epoch_ns) for its in self._native.open_loops]
+        return [OpenLoop(its, self._its.epoch_ns) for its in self._its.open_loops]
 
     @property
     def estimate_minus_truth(self) -> Doubles:
         """By state; empty without a truth."""
-        return self._native.estimate_minus_truth
+        return self._its.estimate_minus_truth
 
 
 class OpenLoop:
     """The attitude without the star tracker, from an astro-correction to the end of the pass."""
 
     def __init__(self, native: _native.OpenLoops, epoch_ns: int) -> None:
-        self._native = native
+        self._its = native
         self._epoch_ns = epoch_ns
 
     @property
     def corrected_s(self) -> float:
         """When the correction was, since the epoch of the pass."""
-        return float(seconds_since(np.int64(self._native.corrected_ns), self._epoch_ns))
+        return float(seconds_since(np.array([self._its.corrected_ns]), self._epoch_ns)[0])
 
     @property
     def known_before(self) -> xr.Dataset:
         """Errors with the parameters known before the pass."""
-        return errors_dataset(self._native.known_before, self._epoch_ns)
+        return errors_dataset(self._its.known_before, self._epoch_ns)
 
     @property
     def calibrated(self) -> xr.Dataset:
         """Errors with those calibrated until the correction."""
-        return errors_dataset(self._native.calibrated, self._epoch_ns)
+        return errors_dataset(self._its.calibrated, self._epoch_ns)
 
     @property
     def predicted(self) -> _native.PredictedErrors:
         """What was predicted of the latter."""
-        return self._native.predicted
+        return self._its.predicted

@@ -6,10 +6,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ._arrays import Doubles
 from ._results import Calibration, Evaluation, Navigation
 
 if TYPE_CHECKING:
     import xarray as xr
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 __all__ = ["attitude_uncertainty", "forecast", "open_loop", "parameters", "residuals"]
@@ -21,18 +23,18 @@ _DEG_H = 180 * 3600 / np.pi
 _AXES = {"x": "roll", "y": "pitch", "z": "heading"}
 
 
-def _figure(rows: int, columns: int = 1, height: float = 2.0) -> tuple[Figure, list]:
+def _figure(rows: int, columns: int = 1, height: float = 2.0) -> tuple[Figure, list[Axes]]:
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(9.0, 1.0 + height * rows), layout="constrained")
     return figure, list(np.atleast_1d(figure.subplots(rows, columns, sharex=True)).ravel())
 
 
-def _hours(dataset: xr.Dataset) -> np.ndarray:
-    return dataset.t_s.values / _HOUR
+def _hours(dataset: xr.Dataset) -> Doubles:
+    return np.asarray(dataset.t_s.values) / _HOUR
 
 
-def _finish(axes: list) -> None:
+def _finish(axes: list[Axes]) -> None:
     for its in axes:
         its.grid(visible=True, alpha=0.3)
     axes[-1].set_xlabel("time since the epoch, h")
@@ -85,8 +87,9 @@ def parameters(result: Calibration) -> Figure:
     return figure
 
 
-def _total(errors: xr.Dataset) -> np.ndarray:
-    return np.sqrt(sum(errors[f"error_{axis}_rad"].values ** 2 for axis in _AXES))
+def _total(errors: xr.Dataset) -> Doubles:
+    total: Doubles = np.sqrt(np.sum([errors[f"error_{axis}_rad"].values ** 2 for axis in _AXES], axis=0))
+    return total
 
 
 def open_loop(evaluation: Evaluation) -> Figure:
@@ -95,18 +98,16 @@ def open_loop(evaluation: Evaluation) -> Figure:
     figure, axes = _figure(1, height=4)
     axis = axes[0]
     for i, loop in enumerate(loops):
-        label = {"known": None, "calibrated": None, "predicted": None}
-        if i == 0:
-            label = {"known": "parameters known before", "calibrated": "calibrated", "predicted": "predicted, 99.7 %"}
-        for errors, colour, name in ((loop.known_before, "0.7", "known"), (loop.calibrated, "C0", "calibrated")):
-            axis.semilogy(errors.t_s.values / _HOUR, _total(errors) * _ARCMIN, color=colour, linewidth=0.7, label=label[name])
+        first = i == 0  # the legend needs each once
+        for errors, colour, name in ((loop.known_before, "0.7", "parameters known before"), (loop.calibrated, "C0", "calibrated")):
+            axis.semilogy(_hours(errors), _total(errors) * _ARCMIN, color=colour, linewidth=0.7, label=name if first else None)
         predicted = loop.predicted
         axis.semilogy(
             (loop.corrected_s + predicted.after_s) / _HOUR,
             predicted.error_997_rad * _ARCMIN,
             "k--",
             linewidth=0.7,
-            label=label["predicted"],
+            label="predicted, 99.7 %" if first else None,
         )
     axis.axhline(5, color="r", linewidth=0.7)
     axis.set_ylabel("attitude error, ′")
