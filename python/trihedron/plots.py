@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import functools
+import io
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -23,10 +25,23 @@ _DEG_H = 180 * 3600 / np.pi
 _AXES = {"x": "roll", "y": "pitch", "z": "heading"}
 
 
-def _figure(rows: int, columns: int = 1, height: float = 2.0) -> tuple[Figure, list[Axes]]:
+@functools.cache
+def _shown_by_notebooks() -> type[Figure]:
     from matplotlib.figure import Figure
 
-    figure = Figure(figsize=(9.0, 1.0 + height * rows), layout="constrained")
+    class ShownFigure(Figure):
+        """A figure that notebooks show, whatever of pyplot has been imported."""
+
+        def _repr_png_(self) -> bytes:
+            png = io.BytesIO()
+            self.savefig(png, format="png")
+            return png.getvalue()
+
+    return ShownFigure
+
+
+def _figure(rows: int, columns: int = 1, height: float = 2.0) -> tuple[Figure, list[Axes]]:
+    figure = _shown_by_notebooks()(figsize=(9.0, 1.0 + height * rows), layout="constrained")
     return figure, list(np.atleast_1d(figure.subplots(rows, columns, sharex=True)).ravel())
 
 
