@@ -375,6 +375,12 @@ def read_pass(path: PathLike) -> Pass:
             "give a pass: a directory with pass.toml, gyro.csv and star_tracker.csv, or a NetCDF-4 file",
             str(file),
         )
+    if file.suffix == ".toml":
+        raise InputRefused(
+            "is TOML, and only the program reads a telemetry.toml",
+            "bring its tables in as arrays: Pass.from_arrays()",
+            str(file),
+        )
     try:
         groups = {
             key.strip("/"): its.load() for key, its in xr.open_groups(file, engine="h5netcdf", decode_times=False).items()
