@@ -140,7 +140,11 @@ void bind_pipeline(nb::module_& module) {
                    "Two components for each gyro; empty where the fix was not compared")
       .def_ro("gyros", &Report::gyros, "State of each gyro after this event")
       .def_ro("angle_residual", &Report::angle_residual,
-              "Cosine of the angle between the momenta, predicted minus measured");
+              "Cosine of the angle between the momenta, predicted minus measured")
+      .def("__repr__", [](const Report& its) {
+        return "<StepReport: sample " + (its.sample.empty() ? "none" : its.sample) + ", fix " +
+               (its.fix.empty() ? "none" : its.fix) + (its.corrected ? ", corrected>" : ">");
+      });
 
   nb::class_<PipelineOfPass>(module, "Pipeline", "The on-board step, event by event")
       .def(

@@ -121,6 +121,7 @@ void bind_forecast(nb::module_& module) {
       .def("__repr__", [](const AccuracyForecast& its) { return in_words(its); });
   nb::class_<NeedForecast>(module, "NeedForecast", "A need, and whether it is predicted to be met")
       .def_ro("met", &NeedForecast::met)
+      .def("__repr__", [](const NeedForecast& its) { return in_words(its.need) + (its.met ? ": met" : ": not met"); })
       .def_ro("error_997_rad", &NeedForecast::error_997_rad)
       .def_ro("accuracy", &NeedForecast::accuracy);
   nb::class_<OpenLoopForecast>(module, "Forecast", "Of an open loop from an astro-correction at the end of the pass")

@@ -378,7 +378,7 @@ def read_pass(path: PathLike) -> Pass:
     if file.suffix == ".toml":
         raise InputRefused(
             "is TOML, and only the program reads a telemetry.toml",
-            "bring its tables in as arrays: Pass.from_arrays()",
+            "make a pass of it: trihedron import telemetry.toml -o pass.nc",
             str(file),
         )
     try:
