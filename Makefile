@@ -77,7 +77,7 @@ wheel: $(PYTHON_TOOLS)/installed
 	@cmake/setup.sh program python
 	rm -rf out/wheel
 	$(WHEEL_PYTHON) -m pip wheel --quiet --no-deps --wheel-dir out/wheel/plain .
-	$(PYTHON_TOOLS)/bin/auditwheel repair --plat auto --wheel-dir out/wheel out/wheel/plain/trihedron-*.whl
+	PATH=$(abspath $(PYTHON_TOOLS)/bin):$$PATH $(PYTHON_TOOLS)/bin/auditwheel repair --plat auto --wheel-dir out/wheel out/wheel/plain/trihedron-*.whl
 	rm -rf out/wheel/plain
 	@ls -l out/wheel
 

@@ -366,10 +366,10 @@ LoadedPass screened(PassInMemory tables, const Selection& selection) {
   raw.settings = parse_settings(tables.settings, tables.prior, tables.name, tables.gyros);
   const std::size_t heads = 1 + raw.settings.further_star_trackers.size();
   if (tables.star_trackers.size() != heads) {
-    throw InputRefused(tables.name, {},
-                       fmt::format("has {} tables of star trackers, and settings of {}", tables.star_trackers.size(),
-                                   heads),
-                       "give a [[star_tracker.further]] for each but the first");
+    throw InputRefused(
+        tables.name, {},
+        fmt::format("has {} tables of star trackers, and settings of {}", tables.star_trackers.size(), heads),
+        "give a [[star_tracker.further]] for each but the first");
   }
   raw.gyro = series_of(std::move(tables.gyro), direction_names(tables.gyros), tables.name);
   for (TableInMemory& fixes : tables.star_trackers) {
@@ -390,8 +390,7 @@ PassInMemory tables_of(const Pass& pass, double direction_step) {
   }
   for (std::size_t head = 0; head <= pass.further_star_trackers.size(); ++head) {
     const StarTrackerTelemetry& fixes = star_tracker_of(pass, head);
-    tables.star_trackers.push_back(
-        in_memory(star_tracker_name(head), epoch, fixes.t, quaternion_values(fixes.q_in_c)));
+    tables.star_trackers.push_back(in_memory(star_tracker_name(head), epoch, fixes.t, quaternion_values(fixes.q_in_c)));
   }
   return tables;
 }

@@ -1,3 +1,5 @@
+#include "trihedron/io/pass.hpp"
+
 #include <nanobind/nanobind.h>
 #include <nanobind/stl/optional.h>
 #include <nanobind/stl/pair.h>
@@ -14,7 +16,6 @@
 #include "bindings.hpp"
 #include "trihedron/io/config.hpp"
 #include "trihedron/io/error.hpp"
-#include "trihedron/io/pass.hpp"
 #include "trihedron/io/scenario.hpp"
 #include "trihedron/io/time_text.hpp"
 #include "trihedron/sim/simulate.hpp"
@@ -90,15 +91,13 @@ void bind_pass(nb::module_& module) {
       .def_ro("prior", &io::PassInMemory::prior, "Text of a calibration.json, or empty")
       .def_ro("gyros", &io::PassInMemory::gyros)
       .def_ro("gyro", &io::PassInMemory::gyro)
-      .def_prop_ro(
-          "star_trackers",
-          [](nb::pointer_and_handle<io::PassInMemory> self) {
-            nb::typed<nb::list, io::TableInMemory> tables;
-            for (io::TableInMemory& its : self.p->star_trackers) {
-              tables.append(nb::cast(&its, nb::rv_policy::reference_internal, self.h));
-            }
-            return tables;
-          });
+      .def_prop_ro("star_trackers", [](nb::pointer_and_handle<io::PassInMemory> self) {
+        nb::typed<nb::list, io::TableInMemory> tables;
+        for (io::TableInMemory& its : self.p->star_trackers) {
+          tables.append(nb::cast(&its, nb::rv_policy::reference_internal, self.h));
+        }
+        return tables;
+      });
 
   nb::class_<io::TruthInMemory>(module, "TruthTable", "The truth of a simulated pass")
       .def(
@@ -164,9 +163,9 @@ void bind_pass(nb::module_& module) {
       },
       "directory"_a, "epoch_ns"_a, nb::call_guard<nb::gil_scoped_release>(), "The truth of a pass directory");
   module.def(
-      "screened",
-      [](const io::PassInMemory& tables) { return std::make_shared<ScreenedPass>(io::screened(tables)); }, "tables"_a,
-      nb::call_guard<nb::gil_scoped_release>(), "The pass as an estimator takes it, and what was wrong with it");
+      "screened", [](const io::PassInMemory& tables) { return std::make_shared<ScreenedPass>(io::screened(tables)); },
+      "tables"_a, nb::call_guard<nb::gil_scoped_release>(),
+      "The pass as an estimator takes it, and what was wrong with it");
   module.def(
       "simulate",
       [](const std::string& scenario, const std::string& name, const nb::object& progress) {
@@ -181,9 +180,11 @@ void bind_pass(nb::module_& module) {
         return epoch ? std::optional(epoch->time_since_epoch().count()) : std::nullopt;
       },
       "iso"_a, "Nanoseconds TAI since 1958");
-  module.def("format_epoch", [](std::int64_t ns) { return io::format_epoch(Time(Duration(ns))); }, "ns"_a);
-  module.def("effective_settings", [](const std::string& settings) { return io::format_config(options_of(settings)); },
-             "settings"_a, "All settings, as effective-config.toml has them");
+  module.def(
+      "format_epoch", [](std::int64_t ns) { return io::format_epoch(Time(Duration(ns))); }, "ns"_a);
+  module.def(
+      "effective_settings", [](const std::string& settings) { return io::format_config(options_of(settings)); },
+      "settings"_a, "All settings, as effective-config.toml has them");
 }
 
 }  // namespace trihedron::python

@@ -116,28 +116,34 @@ class PipelineOfPass {
 
 void bind_pipeline(nb::module_& module) {
   nb::class_<Attitude>(module, "Attitude", "An attitude with its covariance")
-      .def_prop_ro("t_ns", [](const Attitude& its) { return its.t.time_since_epoch().count(); },
-                   "Nanoseconds TAI since 1958")
-      .def_prop_ro("q_in_c", [](nb::pointer_and_handle<Attitude> self) { return view(self.p->q_in_c, self.h); },
-                   "x, y, z, w, Hamilton")
-      .def_prop_ro("covariance_rad2",
-                   [](nb::pointer_and_handle<Attitude> self) { return view(self.p->covariance_rad2, self.h); },
-                   "Of the small rotation about c x, y, z; shape (3, 3)");
+      .def_prop_ro(
+          "t_ns", [](const Attitude& its) { return its.t.time_since_epoch().count(); }, "Nanoseconds TAI since 1958")
+      .def_prop_ro(
+          "q_in_c", [](nb::pointer_and_handle<Attitude> self) { return view(self.p->q_in_c, self.h); },
+          "x, y, z, w, Hamilton")
+      .def_prop_ro(
+          "covariance_rad2",
+          [](nb::pointer_and_handle<Attitude> self) { return view(self.p->covariance_rad2, self.h); },
+          "Of the small rotation about c x, y, z; shape (3, 3)");
 
   nb::class_<Report>(module, "StepReport", "What was done at one event")
-      .def_prop_ro("t_ns", [](const Report& its) { return its.t.time_since_epoch().count(); },
-                   "Of the event: nanoseconds TAI since 1958")
+      .def_prop_ro(
+          "t_ns", [](const Report& its) { return its.t.time_since_epoch().count(); },
+          "Of the event: nanoseconds TAI since 1958")
       .def_ro("sample", &Report::sample, "What was done with the gyro sample; empty where the event was none")
       .def_ro("fix", &Report::fix, "What was done with the fix that was dealt with; empty where none was")
-      .def_prop_ro("fix_t_ns", [](const Report& its) {
-        return its.fix_t ? std::optional(its.fix_t->time_since_epoch().count()) : std::nullopt;
-      }, "Of that fix")
+      .def_prop_ro(
+          "fix_t_ns",
+          [](const Report& its) {
+            return its.fix_t ? std::optional(its.fix_t->time_since_epoch().count()) : std::nullopt;
+          },
+          "Of that fix")
       .def_ro("head", &Report::head, "The star tracker that it is of, from 0")
       .def_ro("corrected", &Report::corrected, "The navigator was corrected at that fix")
       .def_ro("nis", &Report::nis, "Normalised innovation squared")
-      .def_prop_ro("innovation_rad",
-                   [](nb::pointer_and_handle<Report> self) { return view(self.p->innovation_rad, self.h); },
-                   "Two components for each gyro; empty where the fix was not compared")
+      .def_prop_ro(
+          "innovation_rad", [](nb::pointer_and_handle<Report> self) { return view(self.p->innovation_rad, self.h); },
+          "Two components for each gyro; empty where the fix was not compared")
       .def_ro("gyros", &Report::gyros, "State of each gyro after this event")
       .def_ro("angle_residual", &Report::angle_residual,
               "Cosine of the angle between the momenta, predicted minus measured")
@@ -174,10 +180,13 @@ void bind_pipeline(nb::module_& module) {
       .def_prop_ro("gyros", [](const PipelineOfPass& its) { return its.pipeline().layout().gyros; })
       .def_prop_ro("star_trackers", [](const PipelineOfPass& its) { return its.pipeline().layout().star_trackers; })
       .def_prop_ro("settings", [](const PipelineOfPass& its) { return io::format_config(its.pipeline().options()); })
-      .def_prop_ro("calibration", [](const PipelineOfPass& its) -> std::optional<std::string> {
-        return its.pipeline().started() ? std::optional(io::format_calibration(its.pipeline().calibration()))
-                                        : std::nullopt;
-      }, "The text of a calibration.json as of the latest sample, without verdict; None before the first fix");
+      .def_prop_ro(
+          "calibration",
+          [](const PipelineOfPass& its) -> std::optional<std::string> {
+            return its.pipeline().started() ? std::optional(io::format_calibration(its.pipeline().calibration()))
+                                            : std::nullopt;
+          },
+          "The text of a calibration.json as of the latest sample, without verdict; None before the first fix");
 }
 
 }  // namespace trihedron::python

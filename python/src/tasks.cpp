@@ -44,8 +44,8 @@ void bind_work(nb::module_& module) {
 
   module.def(
       "navigate",
-      [](const SharedPass& pass, const std::string& settings, bool online, const std::optional<std::string>& calibration,
-         const nb::object& progress) {
+      [](const SharedPass& pass, const std::string& settings, bool online,
+         const std::optional<std::string>& calibration, const nb::object& progress) {
         CalibrationOptions options = options_of(settings);
         options.corrections.take_parameters = online;
         std::optional<Calibration> held;
@@ -70,8 +70,7 @@ void bind_work(nb::module_& module) {
       [](const SharedPass& pass, const std::string& settings, const nb::object& progress) {
         const CalibrationOptions options = options_of(settings);
         return interruptible_result(progress, [&](const Progress& /*meter*/) {
-          return std::make_shared<ObservationResult>(
-              ObservationResult{pass, ground::observe(pass->pass(), options)});
+          return std::make_shared<ObservationResult>(ObservationResult{pass, ground::observe(pass->pass(), options)});
         });
       },
       "screened"_a, "settings"_a, "progress"_a.none());
@@ -83,9 +82,8 @@ void bind_work(nb::module_& module) {
           const Pass& pass = result->pass->pass();
           const std::optional<Truth> its =
               truth ? std::optional(io::truth_of(*truth, "truth", pass.settings.epoch)) : std::nullopt;
-          return std::make_shared<EvaluationResult>(
-              EvaluationResult{pass.settings.epoch,
-                               ground::evaluate_calibration(pass, result->run, its ? &*its : nullptr)});
+          return std::make_shared<EvaluationResult>(EvaluationResult{
+              pass.settings.epoch, ground::evaluate_calibration(pass, result->run, its ? &*its : nullptr)});
         });
       },
       "result"_a, "truth"_a.none());

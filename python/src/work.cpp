@@ -27,7 +27,7 @@ class Worker {
           } catch (...) {
             failure_ = std::current_exception();
           }
-          const std::lock_guard lock(mutex_);
+          const std::scoped_lock lock(mutex_);
           done_ = true;
           changed_.notify_all();
         }) {}

@@ -1,5 +1,6 @@
 #pragma once
-/// Long work for Python: without the interpreter's lock, with its progress told and an end when Python is asked for one.
+/// Long work for Python: without the interpreter's lock, with its progress told and an end when Python is asked for
+/// one.
 
 #include <nanobind/nanobind.h>
 

@@ -108,11 +108,11 @@ struct TableInMemory {
 
 /// A pass in memory, for programs that have read it themselves.
 struct PassInMemory {
-  std::filesystem::path name;   ///< for messages
-  std::string settings;         ///< the text of a pass.toml
-  std::string prior;            ///< the text of a calibration.json; empty where there is none
-  int gyros = 0;                ///< 2 or more
-  TableInMemory gyro;           ///< h1_x, h1_y, h1_z, h2_x …
+  std::filesystem::path name;                ///< for messages
+  std::string settings;                      ///< the text of a pass.toml
+  std::string prior;                         ///< the text of a calibration.json; empty where there is none
+  int gyros = 0;                             ///< 2 or more
+  TableInMemory gyro;                        ///< h1_x, h1_y, h1_z, h2_x …
   std::vector<TableInMemory> star_trackers;  ///< q_x, q_y, q_z, q_w; the first head, then the further ones
 };
 
@@ -125,7 +125,8 @@ struct PassInMemory {
 /// read_pass().
 [[nodiscard]] PassInMemory read_tables(const std::filesystem::path& directory);
 
-/// Screens them as read_pass() does what it has read, with the same result. Throws as parse_settings(), and InputRefused.
+/// Screens them as read_pass() does what it has read, with the same result. Throws as parse_settings(), and
+/// InputRefused.
 [[nodiscard]] LoadedPass screened(PassInMemory tables, const Selection& selection = {});
 
 /// What a file keeps of a pass: its direction cosines, in steps of `step`, are those that read_tables() finds again.
