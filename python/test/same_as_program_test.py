@@ -174,3 +174,53 @@ def test_feed_reports_every_event(flown):
     assert sum(report.fix == "used" for report in reports) > 900
     assert pipeline.calibration["covariance"]["states"][0] == "gyro1.k0"
     assert pipeline.attitude.covariance_rad2.shape == (3, 3)
+
+
+THREE_GYROS_AND_TWO_HEADS = """
+[scenario]
+duration = "15min"
+seed = 11
+[gyro]
+gaps = [{begin = "5min", end = "6min"}]
+[[gyro.unit]]
+start_direction_c = [0.995, 0.087, 0.045]
+[[gyro.unit]]
+start_direction_c = [0.14, 0.985, 0.094]
+[[gyro.unit]]
+start_direction_c = [0.1, 0.2, 0.97]
+[star_tracker]
+outlier_probability = 0.01
+[[star_tracker.further]]
+mounting_rotation_vector = ["0deg", "60deg", "0deg"]
+"""
+
+
+def test_more_gyros_and_star_trackers_with_faults_go_both_ways(work):
+    (work / "three.toml").write_text(THREE_GYROS_AND_TWO_HEADS)
+    program("simulate", work / "three.toml", "-o", work / "three.nc")
+    read = trihedron.read_pass(work / "three.nc")
+    assert read.settings.gyros == 3 and len(read.star_trackers) == 2
+    assert {defect.kind for defect in read.defects} >= {"gap"}
+    same_telemetry(trihedron.simulate(work / "three.toml"), read)
+    spoilt = read.gyro.copy(deep=True)
+    spoilt.h3_y[50:60] = np.nan
+    spoilt.t_s[[70, 71]] = spoilt.t_s.values[[71, 70]]
+    dirty = trihedron.Pass(read.settings, spoilt, read.star_trackers)
+    dirty.to_netcdf(work / "dirty.nc")
+    program("calibrate", work / "dirty.nc", "-o", work / "of-dirty")
+    assert trihedron.calibrate(dirty).to_json() == (work / "of-dirty" / "calibration.json").read_text()
+    program("navigate", work / "dirty.nc", "--online", "-o", work / "of-dirty.csv")
+    trihedron.navigate(dirty).write_attitude(work / "python.csv")
+    assert (work / "python.csv").read_bytes() == (work / "of-dirty.csv").read_bytes()
+    reports = list(trihedron.Pipeline(dirty).feed(dirty.events()))
+    assert {report.head for report in reports if report.fix} == {0, 1}
+
+
+def test_an_earlier_calibration_goes_along(flown, calibrated, work):
+    later = trihedron.Pass(flown.settings.toml, flown.gyro, flown.star_trackers, prior=calibrated.to_dict())
+    later.to_netcdf(work / "with-prior.nc")
+    program("calibrate", work / "with-prior.nc", "-o", work / "of-prior")
+    found = trihedron.calibrate(later)
+    assert found.to_json() == (work / "of-prior" / "calibration.json").read_text()
+    assert found.to_json() != calibrated.to_json()
+    assert trihedron.read_pass(work / "with-prior.nc").settings.prior == later.settings.prior

@@ -138,6 +138,7 @@ struct TruthInMemory {
   int gyros = 0;
   TableInMemory table;  ///< q_x, q_y, q_z, q_w, h1_x, h1_y, h1_z, h2_x …
 };
+/// Of the truth of a pass with this epoch.
 [[nodiscard]] TruthInMemory tables_of(const Truth& truth, Time epoch);
 /// Throws InputRefused for any flaw. `name`: for messages.
 [[nodiscard]] Truth truth_of(TruthInMemory tables, const std::filesystem::path& name, Time epoch);
