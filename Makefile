@@ -212,12 +212,12 @@ standard: $(LINT_TOOLS)/installed
 UNITS = sed -n 's/^ *"file": "\(.*\/\(Unity\|src\)\/.*\)".*/\1/p' build-lint/compile_commands.json
 TIDY = xargs -P $(JOBS) -n 1 $(LINT_TOOLS)/bin/clang-tidy --quiet --extra-arg=-Wno-unused-command-line-argument -p build-lint
 
-lint: standard
+lint: standard $(PYTHON_TOOLS)/installed
 	@cmake/setup.sh program
 	@$(LINT_TOOLS)/bin/clang-format --dry-run --Werror $(SOURCES)
-	cmake --preset lint
+	cmake --preset lint -DTRIHEDRON_BUILD_PYTHON=ON -DPython_EXECUTABLE=$(abspath $(PYTHON_TOOLS)/bin/python)
 	$(UNITS) | grep '/trihedron_core\.dir/' | $(TIDY) --checks=misc-no-recursion
-	$(UNITS) | grep -v '/trihedron_core\.dir/' | $(TIDY)
+	$(UNITS) | grep -v '/trihedron_core\.dir/\|/nanobind' | $(TIDY)
 	$(LINT_TOOLS)/bin/clang-tidy --quiet validation/mutants/mutant.cpp -- -std=c++20  # no build directory has it
 
 install: build
