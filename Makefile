@@ -10,7 +10,7 @@ SOURCES := $(shell git ls-files '*.cpp' '*.hpp' 2>/dev/null)
 
 .PHONY: help setup build everything demo test flight bench peers slots mutants validation consistency forecasts verdict fuzz fuzz-build fuzz-briefly docs \
   format lint \
-  standard sanitize coverage interop wheel python-test install clean
+  standard sanitize coverage interop wheel wheel-test python-test install clean
 
 help:
 	@echo 'make demo     install what is missing, build, repeat the experiment of the paper, say where the report is'
@@ -27,7 +27,7 @@ help:
 	@echo 'make verdict  measure again what docs/verdict.md tells (WORLDS=pattern, SEEDS=number); goes on where it was interrupted'
 	@echo 'make mutants  whether the tests of core notice wrong formulas; goes on where it was interrupted'
 	@echo 'make interop  whether ccsds-ndm-py, Orekit and SPICE read what export writes, and import what they write: a minute'
-	@echo 'make wheel    the Python package, in out/wheel'
+	@echo 'make wheel    the Python package, in out/wheel (WHEEL_PYTHON=python3.13: for 3.12 and later); make wheel-test tries it'
 	@echo 'make python-test  the Python package and its tests, which are part of `make test`'
 	@echo 'make fuzz     each reader against libFuzzer for FUZZ_SECONDS (3600) each, measures again what docs/reliability.md tells: hours'
 	@echo 'make docs     reference of the interfaces and all documents as web pages: out/docs/html/index.html'
@@ -80,6 +80,16 @@ wheel: $(PYTHON_TOOLS)/installed
 	PATH=$(abspath $(PYTHON_TOOLS)/bin):$$PATH $(PYTHON_TOOLS)/bin/auditwheel repair --plat auto --wheel-dir out/wheel out/wheel/plain/trihedron-*.whl
 	rm -rf out/wheel/plain
 	@ls -l out/wheel
+	@test -z "$$(find out/wheel -size +5M)" || { echo 'the wheel is larger than 5 MB' >&2; exit 1; }
+
+# In a fresh environment of WHEEL_PYTHON, with what else the tests need; they compare with the program.
+wheel-test: build
+	@cmake/setup.sh python
+	rm -rf build-python/fresh
+	$(WHEEL_PYTHON) -m venv build-python/fresh
+	build-python/fresh/bin/pip install --quiet --disable-pip-version-check "$$(ls $(abspath out/wheel)/*.whl)[plots]" \
+	  $$(grep -E '^(mypy|pytest|nbclient|nbformat|ipykernel)=' python/requirements.txt)
+	TRIHEDRON_BUILD=$(abspath $(BUILD)) PYTHONDONTWRITEBYTECODE=1 build-python/fresh/bin/python -m pytest -q -p no:cacheprovider python/test
 
 
 flight:

@@ -7,11 +7,14 @@ import textwrap
 
 import pytest
 
-ROOT = pathlib.Path(__file__).resolve().parents[2]
+import trihedron
 
 
 def mypy(*arguments, directory):
-    environment = {**os.environ, "MYPYPATH": str(pathlib.Path(os.environ["TRIHEDRON_BUILD"]) / "python")}
+    environment = dict(os.environ)
+    package = pathlib.Path(trihedron.__file__).parent
+    if "site-packages" not in package.parts:  # that of the build directory
+        environment["MYPYPATH"] = str(package.parent)
     return subprocess.run([sys.executable, "-m", "mypy", "--cache-dir", str(directory / "mypy"), *map(str, arguments)],
                           cwd=directory, env=environment, capture_output=True, text=True)
 
