@@ -35,7 +35,7 @@ help:
 	@echo 'make sanitize build with clang under address and undefined-behaviour sanitizers, and run the tests that are not long'
 	@echo 'make coverage the same, then the lines and branches of core that its own tests take'
 	@echo 'make setup | format | lint | clean'
-	@echo 'Files are compiled in units of up to 32, which makes a whole build shorter. Who edits one is served sooner with'
+	@echo 'Files are compiled in units of a dozen or more, which makes a whole build shorter. Who edits one is served sooner with'
 	@echo 'CMAKE_FLAGS=-DCMAKE_UNITY_BUILD=OFF, which compiles each on its own.'
 
 setup:
@@ -218,9 +218,10 @@ standard: $(LINT_TOOLS)/installed
 	  --error-exitcode=1 -I core/include core/src
 	$(LINT_TOOLS)/bin/lizard -l cpp core/src core/include -T cyclomatic_complexity=15 -T nloc=60 -T parameter_count=8 -w
 
-# In units of several files: clang-tidy reads Eigen once for each unit instead of once for each file. Recursion is forbidden in core alone.
+# In units of several files: clang-tidy reads Eigen once for each unit instead of once for each file. What runs beside it goes first; see .ci/run.
+# Recursion is forbidden in core alone.
 UNITS = sed -n 's/^ *"file": "\(.*\/\(Unity\|src\)\/.*\)".*/\1/p' build-lint/compile_commands.json
-TIDY = xargs -P $(JOBS) -n 1 $(LINT_TOOLS)/bin/clang-tidy --quiet --extra-arg=-Wno-unused-command-line-argument -p build-lint
+TIDY = nice -n 19 xargs -P $(JOBS) -n 1 $(LINT_TOOLS)/bin/clang-tidy --quiet --extra-arg=-Wno-unused-command-line-argument -p build-lint
 
 lint: standard $(PYTHON_TOOLS)/installed
 	@cmake/setup.sh program

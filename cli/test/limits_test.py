@@ -163,8 +163,9 @@ def peak_mb(*arguments):
     return usage.ru_maxrss / 1000
 
 
+# Reader and estimator take their memory one after the other, and what the reader leaves is the same of either file.
 @pytest.mark.long
-@pytest.mark.parametrize("name, estimator", [("pass", "batch"), ("pass.nc", "batch"), ("pass", "invariant"), ("pass.nc", "invariant")])
+@pytest.mark.parametrize("name, estimator", [("pass", "batch"), ("pass.nc", "invariant")])
 def test_nine_hours_take_bounded_memory(tmp_path, name, estimator):
     nine_hours = simulated(tmp_path, name, '[scenario]\nduration = "9h"\n')
     assert peak_mb("calibrate", nine_hours, "-o", tmp_path / "out", "--estimator", estimator) < 150
