@@ -5,11 +5,12 @@ JOBS ?= $(shell nproc)
 TEST_JOBS ?= $(shell echo $$(($(JOBS) + 1)))
 BUILD := build
 LINT_TOOLS := build-lint/tools
+PYTHON_TOOLS := build-python/tools
 SOURCES := $(shell git ls-files '*.cpp' '*.hpp' 2>/dev/null)
 
 .PHONY: help setup build everything demo test flight bench peers slots mutants validation consistency forecasts verdict fuzz fuzz-build fuzz-briefly docs \
   format lint \
-  standard sanitize coverage interop install clean
+  standard sanitize coverage interop wheel wheel-test python-test install clean
 
 help:
 	@echo 'make demo     install what is missing, build, repeat the experiment of the paper, say where the report is'
@@ -26,6 +27,8 @@ help:
 	@echo 'make verdict  measure again what docs/verdict.md tells (WORLDS=pattern, SEEDS=number); goes on where it was interrupted'
 	@echo 'make mutants  whether the tests of core notice wrong formulas; goes on where it was interrupted'
 	@echo 'make interop  whether ccsds-ndm-py, Orekit and SPICE read what export writes, and import what they write: a minute'
+	@echo 'make wheel    the Python package, in out/wheel (WHEEL_PYTHON=python3.13: for 3.12 and later); make wheel-test tries it'
+	@echo 'make python-test  the Python package and its tests, which are part of `make test`'
 	@echo 'make fuzz     each reader against libFuzzer for FUZZ_SECONDS (3600) each, measures again what docs/reliability.md tells: hours'
 	@echo 'make docs     reference of the interfaces and all documents as web pages: out/docs/html/index.html'
 	@echo 'make install  into PREFIX (default /usr/local)'
@@ -44,9 +47,9 @@ build:
 	cmake $(if $(wildcard $(BUILD)/CMakeCache.txt),$(BUILD),--preset program) $(CMAKE_FLAGS)
 	cmake --build $(BUILD) --parallel $(JOBS) --target trihedron
 
-everything:
+everything: $(PYTHON_TOOLS)/installed
 	@cmake/setup.sh program tests flight
-	cmake --preset release $(CMAKE_FLAGS)
+	cmake --preset release -DTRIHEDRON_BUILD_PYTHON=ON -DPython_EXECUTABLE=$(abspath $(PYTHON_TOOLS)/bin/python) $(CMAKE_FLAGS)
 	cmake --build $(BUILD) --parallel $(JOBS)
 
 demo: build
@@ -54,6 +57,39 @@ demo: build
 
 test: everything
 	ctest --test-dir $(BUILD) --output-on-failure --parallel $(TEST_JOBS)
+
+# What the Python package is built with, needs and is tested with.
+$(PYTHON_TOOLS)/installed: python/requirements.txt
+	@cmake/setup.sh python
+	/usr/bin/python3 -m venv $(PYTHON_TOOLS)
+	$(PYTHON_TOOLS)/bin/pip install --quiet --disable-pip-version-check --requirement $<
+	touch $@
+
+python-test: $(PYTHON_TOOLS)/installed
+	@cmake/setup.sh program tests
+	cmake --preset release -DTRIHEDRON_BUILD_PYTHON=ON -DPython_EXECUTABLE=$(abspath $(PYTHON_TOOLS)/bin/python) $(CMAKE_FLAGS)
+	cmake --build $(BUILD) --parallel $(JOBS) --target trihedron trihedron_python_stub
+	ctest --test-dir $(BUILD) --output-on-failure -R '^python\.'
+
+# With the libraries of this machine that it needs put in. WHEEL_PYTHON: of version 3.12 or later, for one wheel for all of these.
+WHEEL_PYTHON ?= $(PYTHON_TOOLS)/bin/python
+wheel: $(PYTHON_TOOLS)/installed
+	@cmake/setup.sh program python
+	rm -rf out/wheel
+	$(WHEEL_PYTHON) -m pip wheel --quiet --no-deps --wheel-dir out/wheel/plain .
+	PATH=$(abspath $(PYTHON_TOOLS)/bin):$$PATH $(PYTHON_TOOLS)/bin/auditwheel repair --plat auto --wheel-dir out/wheel out/wheel/plain/trihedron-*.whl
+	rm -rf out/wheel/plain
+	@ls -l out/wheel
+	@test -z "$$(find out/wheel -size +5M)" || { echo 'the wheel is larger than 5 MB' >&2; exit 1; }
+
+# In a fresh environment of WHEEL_PYTHON, with what else the tests need; they compare with the program.
+wheel-test: build
+	@cmake/setup.sh python
+	rm -rf build-python/fresh
+	$(WHEEL_PYTHON) -m venv build-python/fresh
+	build-python/fresh/bin/pip install --quiet --disable-pip-version-check "$$(ls $(abspath out/wheel)/*.whl)[plots]" \
+	  $$(grep -E '^(mypy|pytest|nbclient|nbformat|ipykernel)=' python/requirements.txt)
+	TRIHEDRON_BUILD=$(abspath $(BUILD)) PYTHONDONTWRITEBYTECODE=1 build-python/fresh/bin/python -m pytest -q -p no:cacheprovider python/test
 
 
 flight:
@@ -187,12 +223,12 @@ standard: $(LINT_TOOLS)/installed
 UNITS = sed -n 's/^ *"file": "\(.*\/\(Unity\|src\)\/.*\)".*/\1/p' build-lint/compile_commands.json
 TIDY = nice -n 19 xargs -P $(JOBS) -n 1 $(LINT_TOOLS)/bin/clang-tidy --quiet --extra-arg=-Wno-unused-command-line-argument -p build-lint
 
-lint: standard
+lint: standard $(PYTHON_TOOLS)/installed
 	@cmake/setup.sh program
 	@$(LINT_TOOLS)/bin/clang-format --dry-run --Werror $(SOURCES)
-	cmake --preset lint
+	cmake --preset lint -DTRIHEDRON_BUILD_PYTHON=ON -DPython_EXECUTABLE=$(abspath $(PYTHON_TOOLS)/bin/python)
 	$(UNITS) | grep '/trihedron_core\.dir/' | $(TIDY) --checks=misc-no-recursion
-	$(UNITS) | grep -v '/trihedron_core\.dir/' | $(TIDY)
+	$(UNITS) | grep -v '/trihedron_core\.dir/\|/nanobind' | $(TIDY)
 	$(LINT_TOOLS)/bin/clang-tidy --quiet validation/mutants/mutant.cpp -- -std=c++20  # no build directory has it
 
 install: build

@@ -1,6 +1,6 @@
 # One way to make a module, so that the dependency directions cannot be got wrong by accident.
 #
-#   cli → report, plan → ground, sim; io → records → core
+#   cli → report, plan → ground, sim; io → records → core; python → ground, sim, io
 #
 # trihedron_module(<name> [SOURCES …] [MODULES …] [LIBRARIES …] [PRIVATE_LIBRARIES …])
 #   makes the target trihedron_<name> with the alias trihedron::<name>; MODULES must be allowed by the table below.
@@ -22,6 +22,7 @@ set(TRIHEDRON_plan_MAY_USE core records sim ground)
 set(TRIHEDRON_campaign_MAY_USE core records sim ground)
 set(TRIHEDRON_report_MAY_USE core records ground campaign)
 set(TRIHEDRON_cli_MAY_USE core records sim io ground plan campaign report)
+set(TRIHEDRON_python_MAY_USE core records sim io ground)
 
 # Within ground, from room to room.
 set(TRIHEDRON_ground_tasks_MAY_USE)
@@ -37,6 +38,14 @@ set(TRIHEDRON_ground_inspect_MAY_USE)
 set(TRIHEDRON_ground_observe_MAY_USE tasks model onboard batch choose)
 set(TRIHEDRON_ground_calibrate_MAY_USE tasks model clocks evaluate onboard batch choose judge)
 
+# Of a library that the Python module, which is a shared one, is linked of. Its functions may call each other straight, as in a program.
+function(trihedron_position_independent target)
+  if(NOT TRIHEDRON_SANITIZE)
+    set_target_properties(${target} PROPERTIES POSITION_INDEPENDENT_CODE ON)
+    target_compile_options(${target} PRIVATE $<$<CXX_COMPILER_ID:GNU>:-fno-semantic-interposition>)
+  endif()
+endfunction()
+
 function(trihedron_module name)
   cmake_parse_arguments(arg "" "" "SOURCES;MODULES;LIBRARIES;PRIVATE_LIBRARIES" ${ARGN})
   set(target trihedron_${name})
@@ -44,6 +53,9 @@ function(trihedron_module name)
     add_library(${target} STATIC ${arg_SOURCES})
     set(scope PUBLIC)
     target_link_libraries(${target} PRIVATE $<BUILD_INTERFACE:trihedron_warnings> ${arg_PRIVATE_LIBRARIES})
+    if(name IN_LIST TRIHEDRON_python_MAY_USE)
+      trihedron_position_independent(${target})
+    endif()
   else()
     add_library(${target} INTERFACE)
     set(scope INTERFACE)

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# cmake/setup.sh [GROUP…]: installs what is missing of these groups on Debian 12, of program, tests, sanitizers, flight and lint where none is
-# named; does nothing, quickly, when nothing is.
+# cmake/setup.sh [GROUP…]: installs what is missing of these groups on Debian 12, of program, tests, sanitizers, flight, lint and python where none
+# is named; does nothing, quickly, when nothing is.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
@@ -18,6 +18,8 @@ tests=(
 docs=(doxygen)
 # Other software that reads what the program writes: Orekit runs on Java, the rest comes from PyPI.
 interop=(default-jre-headless python3 python3-venv)
+# The Python package; what it needs of PyPI is in python/requirements.txt.
+python=(python3 python3-dev python3-venv)
 # Filters in Python, whose packages come from PyPI.
 peers=(python3 python3-venv)
 # ARM Cortex-M7 without an operating system, emulated: a short flight is among the tests.
@@ -29,10 +31,10 @@ sanitizers=(clang-16 libclang-rt-16-dev llvm-16)
 lint=(git ca-certificates cppcheck python3 python3-venv)
 
 packages=()
-for name in ${*:-program tests sanitizers flight lint}; do
+for name in ${*:-program tests sanitizers flight lint python}; do
   case $name in
-    program|tests|sanitizers|flight|targets|lint|docs|interop|peers) declare -n members=$name && packages+=("${members[@]}") ;;
-    *) echo "setup: no group \"$name\"; there are program, tests, sanitizers, flight, targets, lint, docs, interop, peers" >&2; exit 2 ;;
+    program|tests|sanitizers|flight|targets|lint|docs|interop|python|peers) declare -n members=$name && packages+=("${members[@]}") ;;
+    *) echo "setup: no group \"$name\"; there are program, tests, sanitizers, flight, targets, lint, docs, interop, python, peers" >&2; exit 2 ;;
   esac
   if [ "$name" = program ]; then program_wanted=yes; fi
 done

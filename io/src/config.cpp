@@ -212,7 +212,11 @@ std::string format_correction_interval(const CorrectionOptions& corrections) {
 
 CalibrationOptions read_config(const fs::path& path) {
   const TextFile file(path);
-  return config_of_table(parse_toml(file.text(), path), path, "the file");
+  return parse_config(file.text(), path);
+}
+
+CalibrationOptions parse_config(std::string_view text, const fs::path& file) {
+  return config_of_table(parse_toml(text, file), file, "the file");
 }
 
 CalibrationOptions config_of_table(const toml::table& table, const fs::path& file, const std::string& name) {

@@ -3,6 +3,8 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
+#include <iterator>
 #include <system_error>
 #include <utility>
 
@@ -230,6 +232,66 @@ std::optional<Truth> read_truth_directory(const fs::path& directory) {
   return make_truth(parameters.text(), parameters_file, series, parse_pass_epoch(settings.text(), settings_file));
 }
 
+TableInMemory in_memory(std::string name, Time epoch, const std::vector<Time>& t, std::vector<double> values) {
+  TableInMemory table{std::move(name), {}, std::move(values)};
+  table.t_s.reserve(t.size());
+  std::ranges::transform(t, std::back_inserter(table.t_s), [&](Time at) { return to_seconds(at - epoch); });
+  return table;
+}
+
+Series series_of(TableInMemory table, std::vector<std::string> columns, const fs::path& file) {
+  if (table.values.size() != table.t_s.size() * columns.size()) {
+    throw InputRefused(file, {},
+                       fmt::format("{} has {} times and {} values, of {} columns", table.name, table.t_s.size(),
+                                   table.values.size(), columns.size()),
+                       "give as many rows of values as there are times");
+  }
+  Series series;
+  series.file = file;
+  series.name = std::move(table.name);
+  series.columns = std::move(columns);
+  series.t_s = std::move(table.t_s);
+  series.values = std::move(table.values);
+  return series;
+}
+
+/// `path`: for messages.
+LoadedPass screened(UnscreenedPass raw, const fs::path& path, const Selection& selection) {
+  const ClockCorrection clocks{raw.settings.star_tracker_clock_offset_s, raw.settings.star_tracker_clock_rate_s_s, {}};
+  for (Series& fixes : raw.star_trackers) {
+    std::ranges::transform(fixes.t_s, fixes.t_s.begin(), [&](double t_s) { return clocks.true_s(t_s); });
+  }
+  LoadedPass loaded;
+  loaded.defects = std::move(raw.left_out);
+  raw.selection.from = selection.from ? selection.from : raw.selection.from;
+  raw.selection.to = selection.to ? selection.to : raw.selection.to;
+  raw.selection.exclude.insert(raw.selection.exclude.end(), selection.exclude.begin(), selection.exclude.end());
+  select(raw, path, loaded.defects);
+  loaded.pass.gyro = screen_gyro(std::move(raw.gyro), raw.settings, loaded.defects);
+  for (std::size_t head = 0; head < raw.star_trackers.size(); ++head) {
+    StarTrackerTelemetry& fixes =
+        head == 0 ? loaded.pass.star_tracker : loaded.pass.further_star_trackers.emplace_back();
+    fixes = screen_star_tracker(std::move(raw.star_trackers[head]), raw.settings, loaded.defects);
+  }
+  loaded.pass.settings = std::move(raw.settings);
+  ClockCorrection gyros;
+  for (std::size_t k = 0; k < loaded.pass.settings.gyros.size() && k < std::size_t{kMaxGyros}; ++k) {
+    gyros.late_s[static_cast<int>(k)] = loaded.pass.settings.gyros[k].latency_s;
+  }
+  correct(loaded.pass, gyros);
+  loaded.prior_file = std::move(raw.prior_file);
+  loaded.sources = std::move(raw.sources);
+  loaded.columns = std::move(raw.columns);
+  if (loaded.columns.quaternion.empty()) {
+    loaded.columns.quaternion = kQuaternionNames;
+    const std::vector<std::string> names = direction_names(loaded.pass.gyro.gyros);
+    for (auto name = names.begin(); name != names.end(); name += 3) {
+      loaded.columns.directions.emplace_back(name, name + 3);
+    }
+  }
+  return loaded;
+}
+
 }  // namespace
 
 UnscreenedPass read_raw_directory(const fs::path& directory) {
@@ -269,40 +331,83 @@ UnscreenedPass read_raw_netcdf(const fs::path& file) {
 LoadedPass read_pass(const fs::path& path, const Selection& selection) {
   check_there(path);
   const auto format = std::ranges::find_if(kInputFormats, [&](const InputFormat& f) { return f.recognises(path); });
-  UnscreenedPass raw = format->read(path);
-  const ClockCorrection clocks{raw.settings.star_tracker_clock_offset_s, raw.settings.star_tracker_clock_rate_s_s, {}};
+  return screened(format->read(path), path, selection);
+}
+
+PassInMemory read_tables(const fs::path& directory) {
+  check_there(directory);
+  UnscreenedPass raw = read_raw_directory(directory);
+  const auto table = [](Series&& series) {
+    return TableInMemory{std::move(series.name), std::move(series.t_s), std::move(series.values)};
+  };
+  PassInMemory tables;
+  tables.name = directory;
+  tables.settings = format_pass_toml(raw.settings, "");
+  tables.prior = raw.settings.prior ? format_calibration(*raw.settings.prior) : "";
+  tables.gyros = gyros_of(raw.gyro);
+  tables.gyro = table(std::move(raw.gyro));
   for (Series& fixes : raw.star_trackers) {
-    std::ranges::transform(fixes.t_s, fixes.t_s.begin(), [&](double t_s) { return clocks.true_s(t_s); });
+    tables.star_trackers.push_back(table(std::move(fixes)));
   }
-  LoadedPass loaded;
-  loaded.defects = std::move(raw.left_out);
-  raw.selection.from = selection.from ? selection.from : raw.selection.from;
-  raw.selection.to = selection.to ? selection.to : raw.selection.to;
-  raw.selection.exclude.insert(raw.selection.exclude.end(), selection.exclude.begin(), selection.exclude.end());
-  select(raw, path, loaded.defects);
-  loaded.pass.gyro = screen_gyro(std::move(raw.gyro), raw.settings, loaded.defects);
-  for (std::size_t head = 0; head < raw.star_trackers.size(); ++head) {
-    StarTrackerTelemetry& fixes =
-        head == 0 ? loaded.pass.star_tracker : loaded.pass.further_star_trackers.emplace_back();
-    fixes = screen_star_tracker(std::move(raw.star_trackers[head]), raw.settings, loaded.defects);
+  return tables;
+}
+
+PassSettings parse_settings(const std::string& settings, const std::string& prior, const fs::path& name, int gyros) {
+  PassSettings its = parse_pass_toml(settings, inside(name, kSettingsAttribute), name.parent_path(), gyros);
+  if (!prior.empty()) {
+    its.prior = parse_calibration(prior, inside(name, kPriorAttribute));
+    check_prior(*its.prior, inside(name, kPriorAttribute), gyros);
   }
-  loaded.pass.settings = std::move(raw.settings);
-  ClockCorrection gyros;
-  for (std::size_t k = 0; k < loaded.pass.settings.gyros.size() && k < std::size_t{kMaxGyros}; ++k) {
-    gyros.late_s[static_cast<int>(k)] = loaded.pass.settings.gyros[k].latency_s;
+  return its;
+}
+
+LoadedPass screened(PassInMemory tables, const Selection& selection) {
+  UnscreenedPass raw;
+  raw.settings = parse_settings(tables.settings, tables.prior, tables.name, tables.gyros);
+  const std::size_t heads = 1 + raw.settings.further_star_trackers.size();
+  if (tables.star_trackers.size() != heads) {
+    throw InputRefused(
+        tables.name, {},
+        fmt::format("has {} tables of star trackers, and settings of {}", tables.star_trackers.size(), heads),
+        "give a [[star_tracker.further]] for each but the first");
   }
-  correct(loaded.pass, gyros);
-  loaded.prior_file = std::move(raw.prior_file);
-  loaded.sources = std::move(raw.sources);
-  loaded.columns = std::move(raw.columns);
-  if (loaded.columns.quaternion.empty()) {
-    loaded.columns.quaternion = kQuaternionNames;
-    const std::vector<std::string> names = direction_names(loaded.pass.gyro.gyros);
-    for (auto name = names.begin(); name != names.end(); name += 3) {
-      loaded.columns.directions.emplace_back(name, name + 3);
-    }
+  raw.gyro = series_of(std::move(tables.gyro), direction_names(tables.gyros), tables.name);
+  for (TableInMemory& fixes : tables.star_trackers) {
+    raw.star_trackers.push_back(series_of(std::move(fixes), kQuaternionNames, tables.name));
   }
-  return loaded;
+  return screened(std::move(raw), tables.name, selection);
+}
+
+PassInMemory tables_of(const Pass& pass, double direction_step) {
+  const Time epoch = pass.settings.epoch;
+  PassInMemory tables;
+  tables.settings = format_pass_toml(pass.settings, "");
+  tables.prior = pass.settings.prior ? format_calibration(*pass.settings.prior) : "";
+  tables.gyros = pass.gyro.gyros;
+  tables.gyro = in_memory(kGyroGroup, epoch, pass.gyro.t, pass.gyro.h);
+  for (double& value : tables.gyro.values) {
+    value = std::isfinite(value) ? static_cast<double>(std::lround(value / direction_step)) * direction_step : value;
+  }
+  for (std::size_t head = 0; head <= pass.further_star_trackers.size(); ++head) {
+    const StarTrackerTelemetry& fixes = star_tracker_of(pass, head);
+    tables.star_trackers.push_back(in_memory(star_tracker_name(head), epoch, fixes.t, quaternion_values(fixes.q_in_c)));
+  }
+  return tables;
+}
+
+TruthInMemory tables_of(const Truth& truth, Time epoch) {
+  TruthInMemory tables;
+  tables.parameters = format_truth_parameters(truth);
+  tables.gyros = static_cast<int>(truth.gyros.size());
+  tables.table = in_memory(kTruthGroup, epoch, truth.t, truth_values(truth));
+  return tables;
+}
+
+Truth truth_of(TruthInMemory tables, const fs::path& name, Time epoch) {
+  std::vector<std::string> columns = kQuaternionNames;
+  std::ranges::move(direction_names(tables.gyros), std::back_inserter(columns));
+  return make_truth(tables.parameters, inside(name, kTruthAttribute),
+                    series_of(std::move(tables.table), std::move(columns), name), epoch);
 }
 
 std::optional<Truth> read_truth(const fs::path& path) {

@@ -7,6 +7,7 @@
 #include "batch/drift_field.hpp"
 #include "choose/forecast.hpp"
 #include "onboard/screen.hpp"
+#include "trihedron/ground/choose/settled.hpp"
 #include "trihedron/records/run.hpp"
 
 namespace trihedron::ground {
@@ -32,11 +33,5 @@ struct Decision {
 /// were found. The noise is found where it is asked for, on a pass that is long enough and has no prior calibration.
 /// Throws SetupError.
 [[nodiscard]] Decision decide(const Pass& pass, const CalibrationOptions& asked);
-
-/// Settles the same before the first event, as on board: by the earlier calibration, or else drift model esg20, clock
-/// offset and error at orbital period, with priors that allow for their absence. The noise is that of the options. Of
-/// an earlier calibration with a drift field an estimator on board has the model of drift_on_board().
-/// Throws SetupError.
-[[nodiscard]] CalibrationOptions settled_before(const PassSettings& settings, CalibrationOptions options);
 
 }  // namespace trihedron::ground

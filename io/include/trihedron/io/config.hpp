@@ -13,6 +13,8 @@ namespace trihedron::io {
 /// What the file leaves out keeps its default. Throws InputRefused for unknown keys, bare numbers and values out of
 /// range.
 [[nodiscard]] CalibrationOptions read_config(const std::filesystem::path& path);
+/// Same, from the text; `file` is named in refusals.
+[[nodiscard]] CalibrationOptions parse_config(std::string_view text, const std::filesystem::path& file);
 /// Complete, with a comment per value; reads back to the same options.
 [[nodiscard]] std::string format_config(const CalibrationOptions& options);
 

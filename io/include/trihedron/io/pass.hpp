@@ -99,6 +99,50 @@ struct LoadedPass {
 /// NetCDF.
 [[nodiscard]] LoadedPass read_pass(const std::filesystem::path& path, const Selection& selection = {});
 
+/// A table of a pass in memory, as a file has it before it is screened: rows may be as dirty as telemetry is.
+struct TableInMemory {
+  std::string name;            ///< for messages: "gyro"
+  std::vector<double> t_s;     ///< since the epoch of the pass
+  std::vector<double> values;  ///< row by row; NaN where missing
+};
+
+/// A pass in memory, for programs that have read it themselves.
+struct PassInMemory {
+  std::filesystem::path name;                ///< for messages
+  std::string settings;                      ///< the text of a pass.toml
+  std::string prior;                         ///< the text of a calibration.json; empty where there is none
+  int gyros = 0;                             ///< 2 or more
+  TableInMemory gyro;                        ///< h1_x, h1_y, h1_z, h2_x …
+  std::vector<TableInMemory> star_trackers;  ///< q_x, q_y, q_z, q_w; the first head, then the further ones
+};
+
+/// Settings, the text of a pass.toml of so many gyros, with an earlier calibration, the text of a calibration.json, or
+/// empty. A `prior` that they name is looked up in the directory of `name`. Throws InputRefused.
+[[nodiscard]] PassSettings parse_settings(const std::string& settings, const std::string& prior,
+                                          const std::filesystem::path& name, int gyros);
+
+/// The tables of a pass with its settings, its earlier calibration among them, as they stand in a directory. Throws as
+/// read_pass().
+[[nodiscard]] PassInMemory read_tables(const std::filesystem::path& directory);
+
+/// Screens them as read_pass() does what it has read, with the same result. Throws as parse_settings(), and
+/// InputRefused.
+[[nodiscard]] LoadedPass screened(PassInMemory tables, const Selection& selection = {});
+
+/// What a file keeps of a pass: its direction cosines, in steps of `step`, are those that read_tables() finds again.
+[[nodiscard]] PassInMemory tables_of(const Pass& pass, double direction_step);
+
+/// The truth of a simulated pass, likewise.
+struct TruthInMemory {
+  std::string parameters;  ///< the text of a truth.json
+  int gyros = 0;
+  TableInMemory table;  ///< q_x, q_y, q_z, q_w, h1_x, h1_y, h1_z, h2_x …
+};
+/// Of the truth of a pass with this epoch.
+[[nodiscard]] TruthInMemory tables_of(const Truth& truth, Time epoch);
+/// Throws InputRefused for any flaw. `name`: for messages.
+[[nodiscard]] Truth truth_of(TruthInMemory tables, const std::filesystem::path& name, Time epoch);
+
 /// Whether the file is a telemetry.toml, a TOML document with a table `telemetry`, and not another: a scenario. What
 /// cannot be understood is none.
 [[nodiscard]] bool is_telemetry_toml(const std::filesystem::path& file);
