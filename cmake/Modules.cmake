@@ -40,7 +40,7 @@ set(TRIHEDRON_ground_calibrate_MAY_USE tasks model clocks evaluate onboard batch
 
 # Of a library that the Python module, which is a shared one, is linked of. Its functions may call each other straight, as in a program.
 function(trihedron_position_independent target)
-  if(NOT TRIHEDRON_SANITIZE)
+  if(TRIHEDRON_BUILD_PYTHON OR TRIHEDRON_ONLY_PYTHON)
     set_target_properties(${target} PROPERTIES POSITION_INDEPENDENT_CODE ON)
     target_compile_options(${target} PRIVATE $<$<CXX_COMPILER_ID:GNU>:-fno-semantic-interposition>)
   endif()

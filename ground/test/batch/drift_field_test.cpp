@@ -264,7 +264,9 @@ TEST(DriftField, PutsItsVariancesIntoThePrior) {
   EXPECT_EQ(prior.covariance(kSmall.drift_size(), kSmall.drift_size()), 1);
 }
 
-/// What modes leave out cannot be seen: eq. (1), alignment and their sigmas are those of all members.
+/// What modes leave out cannot be seen: eq. (1), alignment and their sigmas are those of all members. At the level of
+/// this prior each mode that is left out moves all fixes together by less than a tenth of their noise, which is worth a
+/// hundredth of a sigma, of some modes next to the limit.
 TEST(DriftField, ItsModesTellWhatAllMembersTell) {
   CalibrationOptions options = told();
   options.estimator = Estimator::kBatch;
@@ -285,14 +287,14 @@ TEST(DriftField, ItsModesTellWhatAllMembersTell) {
   for (int k = 0; k < 2; ++k) {
     for (int i = 0; i < Layout::kEq1; ++i) {
       const double sigma = by_all.errors.last_root.row(all.layout().drift(k) + i).norm();
-      EXPECT_NEAR(by_few.solution.gyros[k].drift_rad_s(i), by_all.solution.gyros[k].drift_rad_s(i), 0.02 * sigma);
+      EXPECT_NEAR(by_few.solution.gyros[k].drift_rad_s(i), by_all.solution.gyros[k].drift_rad_s(i), 0.03 * sigma);
       EXPECT_NEAR(by_few.errors.last_root.row(few.layout().drift(k) + i).norm() / sigma, 1, 0.01);
     }
     const Eigen::Matrix3d& C_c_b = by_all.solution.gyros[k].C_c_b;
     const auto sigma = by_all.errors.last_root.middleRows<3>(all.layout().alignment(k)).rowwise().norm().eval();
     const Eigen::Vector3d apart =
         Rot<C, C>::assume(Eigen::Matrix3d(by_few.solution.gyros[k].C_c_b * C_c_b.transpose())).log().raw();
-    EXPECT_LT(apart.cwiseQuotient(sigma).cwiseAbs().maxCoeff(), 0.02);
+    EXPECT_LT(apart.cwiseQuotient(sigma).cwiseAbs().maxCoeff(), 0.03);
   }
 }
 
