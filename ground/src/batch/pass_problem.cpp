@@ -368,8 +368,8 @@ VectorXd PassProblem::as_coefficients(int gyro, const VectorXd& states) const {
 }
 
 MovedByModes PassProblem::moved_by_coefficients(const PassSolution& solution) const {
-  constexpr Duration kApart = std::chrono::seconds(10);  // over which the drift turns a momentum evenly
-  constexpr Duration kStep = std::chrono::seconds(3);    // a third of that, unless the body turns fast
+  constexpr Duration kApart = std::chrono::seconds(10);     // over which the drift turns a momentum evenly
+  constexpr Duration kTableStep = std::chrono::seconds(3);  // a third of that, unless the body turns fast
   const Drift drift = drift_along(solution, &drift_);
   MovedByModes table;
   Moment moment;
@@ -384,7 +384,7 @@ MovedByModes PassProblem::moved_by_coefficients(const PassSolution& solution) co
     for (std::size_t i = from; i <= last; ++i) {
       if (i > from) {
         const Reading next = i < last ? reading_at(nodes_[i + 1]) : Reading{};
-        if (i < last && nodes_[i + 1].t - nodes_[from].t <= kStep &&
+        if (i < last && nodes_[i + 1].t - nodes_[from].t <= kTableStep &&
             turned_little(read.h_b, next.h_b, both(read.used, next.used), gyros_)) {
           continue;
         }
