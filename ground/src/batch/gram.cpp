@@ -25,7 +25,7 @@ const GramKernels& gram_kernels() {
   static constexpr GramKernels kAvx2{kernels::gram_avx2::add_gram, kernels::gram_avx2::solve_lower,
                                      kernels::gram_avx2::to_root,  kernels::gram_avx2::to_axes,
                                      kernels::gram_avx2::multiply, kernels::gram_avx2::subtract_product};
-  static const GramKernels& chosen = of_this_processor(kBaseline, kAvx2);
+  static const GramKernels chosen = of_this_processor(kBaseline, kAvx2);
   return chosen;
 #else
   return kBaseline;

@@ -16,7 +16,7 @@ const Rotations& rotations() {
                                        kernels::householder_baseline::rotate_rows_up};
 #ifdef TRIHEDRON_HAS_AVX2
   static constexpr Rotations kAvx2{kernels::householder_avx2::rotate_up, kernels::householder_avx2::rotate_rows_up};
-  static const Rotations& chosen = of_this_processor(kBaseline, kAvx2);
+  static const Rotations chosen = of_this_processor(kBaseline, kAvx2);
   return chosen;
 #else
   return kBaseline;
