@@ -445,6 +445,12 @@ TelemetryToml parse_telemetry_toml(std::string_view text, const fs::path& file, 
   const std::size_t heads = told.settings.further_star_trackers.size() + 1;
   if (result.map.packets) {
     map_packets(result.map, heads);
+    if (result.map.packets->apid + static_cast<int>(heads) > kLastApid) {
+      throw InputRefused(file, {},
+                         fmt::format("\"apid\" {} leaves no room for {} star trackers up to {}",
+                                     result.map.packets->apid, heads, kLastApid),
+                         "give a smaller one");
+    }
   }
   if (heads != result.map.star_trackers.size()) {
     throw InputRefused(file, {},
