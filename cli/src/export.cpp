@@ -271,15 +271,17 @@ void add_export(CLI::App& program, const Common& common, int& exit_status) {
   CLI::App* command = program.add_subcommand(
       "export", "Write attitude, calibration or pass for other software: CCSDS messages and packets, SPICE kernels");
   command
-      ->add_option("FILE", arguments->file,
-                   "Attitude file (CSV) or message, for acm and fk calibration.json, for packets a pass; - for standard input")
+      ->add_option(
+          "FILE", arguments->file,
+          "Attitude file (CSV) or message, for acm and fk calibration.json, for packets a pass; - for standard input")
       ->required();
   const std::vector<std::string> formats = {"aem", "aem-xml", "ck", "acm", "acm-xml", "fk", kPackets};
   command
-      ->add_option("--format", arguments->format,
-                   "What to write: of an attitude aem (text), aem-xml or ck (with .tsc and .tf beside it), of a "
-                   "calibration acm (text), acm-xml (with .covariance.nc beside it) or fk, of a pass packets (space packets, "
-                   "with .toml and .xtce.xml beside it)")
+      ->add_option(
+          "--format", arguments->format,
+          "What to write: of an attitude aem (text), aem-xml or ck (with .tsc and .tf beside it), of a "
+          "calibration acm (text), acm-xml (with .covariance.nc beside it) or fk, of a pass packets (space packets, "
+          "with .toml and .xtce.xml beside it)")
       ->required()
       ->type_name(fmt::format("{}", fmt::join(formats, "|")))
       ->check(CLI::IsMember(formats));

@@ -31,7 +31,8 @@ std::vector<PacketField> header(int apid, std::uint64_t structure) {
       {"PUS_VERSION", FieldKind::kUnsigned, 4, FieldRule::kMust, 2, "2: PUS-C"},
       {"TIME_REFERENCE_STATUS", FieldKind::kUnsigned, 4, FieldRule::kWritten, 0, "not used"},
       {"SERVICE_TYPE", FieldKind::kUnsigned, 8, FieldRule::kSelects, kReportService, "housekeeping"},
-      {"MESSAGE_SUBTYPE", FieldKind::kUnsigned, 8, FieldRule::kSelects, kReportSubtype, "housekeeping parameter report"},
+      {"MESSAGE_SUBTYPE", FieldKind::kUnsigned, 8, FieldRule::kSelects, kReportSubtype,
+       "housekeeping parameter report"},
       {"MESSAGE_TYPE_COUNTER", FieldKind::kUnsigned, 16, FieldRule::kVaries, 0, "of the APID, modulo 65536; not used"},
       {"DESTINATION_ID", FieldKind::kUnsigned, 16, FieldRule::kWritten, 0, "not used"},
       {"CUC_PREAMBLE", FieldKind::kUnsigned, 16, FieldRule::kMust, kCucPreamble,
@@ -82,8 +83,7 @@ std::string type_name(const PacketField& field) {
 }
 
 std::string type_text(const PacketField& field) {
-  const std::string integer =
-      fmt::format("<IntegerDataEncoding sizeInBits=\"{}\" encoding=\"unsigned\"/>", field.bits);
+  const std::string integer = fmt::format("<IntegerDataEncoding sizeInBits=\"{}\" encoding=\"unsigned\"/>", field.bits);
   switch (field.kind) {
     case FieldKind::kFlag:
       return fmt::format(
@@ -109,10 +109,13 @@ std::string type_text(const PacketField& field) {
 }
 
 PacketField crc_field() {
-  return {"CRC",        FieldKind::kUnsigned,
-          16,           FieldRule::kVaries,
-          0,            "packet error control: CRC-16-CCITT of all octets before it, polynomial 1021, begins with FFFF "
-                        "(hexadecimal)"};
+  return {"CRC",
+          FieldKind::kUnsigned,
+          16,
+          FieldRule::kVaries,
+          0,
+          "packet error control: CRC-16-CCITT of all octets before it, polynomial 1021, begins with FFFF "
+          "(hexadecimal)"};
 }
 
 std::string entry(const PacketField& field) {
@@ -251,9 +254,9 @@ std::string format_xtce(const std::vector<PacketLayout>& layouts) {
                   "          <RestrictionCriteria>\n            <ComparisonList>\n";
     for (const PacketField& field : layout.fields) {
       if (field.rule == FieldRule::kSelects) {
-        containers += fmt::format(
-            "              <Comparison parameterRef=\"{}\" value=\"{}\" useCalibratedValue=\"false\"/>\n", field.name,
-            field.value);
+        containers +=
+            fmt::format("              <Comparison parameterRef=\"{}\" value=\"{}\" useCalibratedValue=\"false\"/>\n",
+                        field.name, field.value);
       }
     }
     containers +=

@@ -124,11 +124,12 @@ class Source {
     if (octets.size() < header_octets() + kCrcOctets ||
         packet_crc(octets.substr(0, checked)) != bits_at(octets, 8 * checked, 8 * kCrcOctets)) {
       if (octets.size() != octets_) {
-        refuse(packet,
-               fmt::format("is of APID {}, has a wrong CRC, and {} octets instead of {}: its length may be damaged, and "
-                           "where the next one begins is not certain",
-                           layout_.apid, octets.size(), octets_),
-               "get the file again, or take this packet out; packets without packet error control are not read");
+        refuse(
+            packet,
+            fmt::format("is of APID {}, has a wrong CRC, and {} octets instead of {}: its length may be damaged, and "
+                        "where the next one begins is not certain",
+                        layout_.apid, octets.size(), octets_),
+            "get the file again, or take this packet out; packets without packet error control are not read");
       }
       sequence_.add_damaged(packet);
       return Found::kDamaged;
@@ -149,8 +150,9 @@ class Source {
     if (table_.rows() == 0) {
       throw InputRefused(
           table_.file, {}, fmt::format("has no report of {}, APID {}; it has {}", name_, layout_.apid, others),
-          fmt::format("correct apid or gyros in [telemetry.packets]; a report is of service 3, subtype 25, structure {}",
-                      layout_.fields[header_fields() - 1].value));
+          fmt::format(
+              "correct apid or gyros in [telemetry.packets]; a report is of service 3, subtype 25, structure {}",
+              layout_.fields[header_fields() - 1].value));
     }
     return std::move(sequence_).missing(table_.name);
   }
@@ -218,17 +220,18 @@ Packet next_packet(std::string_view bytes, std::size_t begin, std::int64_t numbe
   const std::uint64_t version = bits_at(packet.octets, 0, 3);  // one octet is there
   if (version != 0) {
     throw InputRefused(
-        file, {}, fmt::format("{}: no space packet begins here, its version is {} instead of 0", packet.place(), version),
+        file, {},
+        fmt::format("{}: no space packet begins here, its version is {} instead of 0", packet.place(), version),
         number == 1 ? "give CCSDS space packets one after the other, without frames or headers of a ground station"
                     : "the packet before may have a damaged length: get the file again, or take that packet out");
   }
   const std::size_t told = left < kPrimary ? kPrimary : kPrimary + 1 + bits_at(packet.octets, kLengthBit, 16);
   if (left < told) {
-    throw InputRefused(file, {},
-                       fmt::format("{} is cut short: {} of its {} octets are there", packet.place(), left,
-                                   left < kPrimary ? "6 or more" : fmt::to_string(told)),
-                       begin > 0 ? fmt::format("get the file again, or keep its first {} octets", begin)
-                                 : "get the file again");
+    throw InputRefused(
+        file, {},
+        fmt::format("{} is cut short: {} of its {} octets are there", packet.place(), left,
+                    left < kPrimary ? "6 or more" : fmt::to_string(told)),
+        begin > 0 ? fmt::format("get the file again, or keep its first {} octets", begin) : "get the file again");
   }
   packet.octets = packet.octets.substr(0, told);
   return packet;
@@ -331,9 +334,10 @@ class Reports {
 void expect_writable(const Pass& pass, int apid) {
   const int heads = 1 + static_cast<int>(pass.further_star_trackers.size());
   if (apid < 0 || apid + heads > kLastApid) {
-    throw UsageError(fmt::format("--apid {}: the gyros have this APID and {} star tracker{} the following, 0 to {}; give "
-                                 "{} at most",
-                                 apid, heads, heads == 1 ? " has" : "s have", kLastApid, kLastApid - heads));
+    throw UsageError(
+        fmt::format("--apid {}: the gyros have this APID and {} star tracker{} the following, 0 to {}; give "
+                    "{} at most",
+                    apid, heads, heads == 1 ? " has" : "s have", kLastApid, kLastApid - heads));
   }
   const auto holds = [](const std::vector<Time>& times) {
     return std::ranges::all_of(times, [](Time t) { return t >= Time{} && t < kCucEnd; });
@@ -348,14 +352,14 @@ void expect_writable(const Pass& pass, int apid) {
 
 PacketFiles format_packets(const Pass& pass, int apid, const std::string& packets_name, const std::string& prior_name) {
   expect_writable(pass, apid);
-  const std::vector<PacketLayout> layouts =
-      layouts_of(apid, pass.gyro.gyros, 1 + pass.further_star_trackers.size());
+  const std::vector<PacketLayout> layouts = layouts_of(apid, pass.gyro.gyros, 1 + pass.further_star_trackers.size());
   PacketFiles files;
   files.xtce = format_xtce(layouts);
   files.toml = format_pass_toml(pass.settings, pass.settings.prior ? prior_name : "") +
-               fmt::format("\n[telemetry.packets]\nfile = {}\napid = {}  # of the gyros; the star trackers follow\n"
-                           "gyros = {}\n",
-                           format_text(packets_name), apid, pass.gyro.gyros);
+               fmt::format(
+                   "\n[telemetry.packets]\nfile = {}\napid = {}  # of the gyros; the star trackers follow\n"
+                   "gyros = {}\n",
+                   format_text(packets_name), apid, pass.gyro.gyros);
   files.prior = pass.settings.prior ? format_calibration(*pass.settings.prior) : "";
 
   struct Stream {
@@ -386,9 +390,9 @@ PacketFiles format_packets(const Pass& pass, int apid, const std::string& packet
       stream->reports.append(files.packets, t, std::span(pass.gyro.h).subspan(row * width, width), 3);
     } else {
       const auto head = stream - streams.begin();
-      const Eigen::Quaterniond& q =
-          head == 1 ? pass.star_tracker.q_in_c[row]
-                    : pass.further_star_trackers[static_cast<std::size_t>(head - 2)].q_in_c[row];
+      const Eigen::Quaterniond& q = head == 1
+                                        ? pass.star_tracker.q_in_c[row]
+                                        : pass.further_star_trackers[static_cast<std::size_t>(head - 2)].q_in_c[row];
       const std::array<double, 4> numbers = {q.x(), q.y(), q.z(), q.w()};
       stream->reports.append(files.packets, t, numbers, numbers.size());
     }

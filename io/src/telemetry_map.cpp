@@ -390,14 +390,14 @@ Fields packet_fields(TelemetryMap& map, const fs::path& file) {
   Field time = time_of_table(map.stamps, file);
   time.about = "how instants are written in from, to and files of intervals; TAI, iso where it is left out";
   return {std::move(time),
-          required(section("packets", file, "[telemetry.packets]", "space packets",
-                           [&packets] {
-                             return Fields{
-                                 required(name_of_something("file", packets.file, "space packets, one after the other")),
-                                 whole("apid", packets.apid, limits::kApid,
-                                       "APID of the gyros; the star trackers have the following ones"),
-                                 whole("gyros", packets.gyros, limits::kGyrosOfPackets, "how many gyros there are")};
-                           })),
+          required(section(
+              "packets", file, "[telemetry.packets]", "space packets",
+              [&packets] {
+                return Fields{required(name_of_something("file", packets.file, "space packets, one after the other")),
+                              whole("apid", packets.apid, limits::kApid,
+                                    "APID of the gyros; the star trackers have the following ones"),
+                              whole("gyros", packets.gyros, limits::kGyrosOfPackets, "how many gyros there are")};
+              })),
           list("exclude", file, map.exclude, "files of intervals that are left out", interval),
           instant("from", map.from, map.stamps, "what is earlier is left out; in the scale of [telemetry.time]"),
           instant("to", map.to, map.stamps, "what is later is left out")};
@@ -438,10 +438,8 @@ TelemetryToml parse_telemetry_toml(std::string_view text, const fs::path& file, 
   const TomlTable root(document, file, "the file");
   field.read(root, root.at("telemetry"));  // before the rest: it says how many gyros there are
   field.read = [](const TomlTable&, const toml::node&) {};
-  const int gyros =
-      result.map.packets ? result.map.packets->gyros : static_cast<int>(result.map.gyro.units.size());
-  SettingsOfTelemetry told =
-      read_telemetry_settings(document, file, directory, gyros, field);
+  const int gyros = result.map.packets ? result.map.packets->gyros : static_cast<int>(result.map.gyro.units.size());
+  SettingsOfTelemetry told = read_telemetry_settings(document, file, directory, gyros, field);
   const std::size_t heads = told.settings.further_star_trackers.size() + 1;
   if (result.map.packets) {
     map_packets(result.map, heads);
@@ -459,8 +457,9 @@ TelemetryToml parse_telemetry_toml(std::string_view text, const fs::path& file, 
                        "give one of each per further head, in the same order");
   }
   if (told.settings.star_tracker_noise_rad.isZero(0) && result.map.star_trackers.front().sigma.empty()) {
-    root.refuse(root.table_at("star_tracker"), "key \"noise_rad\" is missing in [star_tracker]",
-                result.map.packets ? "add it" : "add it, or name the columns of each fix's sigma in [telemetry.star_tracker]");
+    root.refuse(
+        root.table_at("star_tracker"), "key \"noise_rad\" is missing in [star_tracker]",
+        result.map.packets ? "add it" : "add it, or name the columns of each fix's sigma in [telemetry.star_tracker]");
   }
   result.settings = std::move(told.settings);
   result.prior_file = std::move(told.prior_file);

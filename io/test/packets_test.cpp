@@ -160,10 +160,10 @@ TEST(Packets, HaveTheOctetsOfTheStandards) {
     octets += fmt::format("{:02x}", static_cast<unsigned char>(c));
   }
   const std::string fix =
-      "0865c0000035"                                                      // primary header: telemetry, APID 101, first
-      "20031900000000"                                                    // PUS-C, 3/25, counter 0, destination 0
-      "9f0460a5a68000000000"                                              // CUC with its P-field
-      "000101"                                                            // structure 1, valid
+      "0865c0000035"                                                       // primary header: telemetry, APID 101, first
+      "20031900000000"                                                     // PUS-C, 3/25, counter 0, destination 0
+      "9f0460a5a68000000000"                                               // CUC with its P-field
+      "000101"                                                             // structure 1, valid
       "bfe00000000000003fe00000000000003fe00000000000003fe0000000000000";  // x, y, z, w
   const std::string sample =
       "0864c0000046"
@@ -341,7 +341,9 @@ TEST(Packets, OfWhatCannotBeUnderstoodAreRefusedWithPlaceReasonAndCure) {
   std::ranges::copy_if(packets, std::back_inserter(gyros),
                        [](const std::string& packet) { return apid_of(packet) == kDefaultApid; });
   expect(refused(joined(gyros)), "p.ccsds: ", "no report of star tracker 1, APID 101");
-  expect(refusal([&] { static_cast<void>(parse_packets(clean_bytes(), "p.ccsds", {"p.ccsds", 100, 3}, 1)); }),
+  expect(refusal([&] {
+           static_cast<void>(parse_packets(clean_bytes(), "p.ccsds", {"p.ccsds", 100, 3}, 1));
+         }),
          "p.ccsds: ", "no report of 3 gyros, APID 100");
 }
 
