@@ -3,6 +3,7 @@ import json
 import struct
 
 import numpy as np
+import orekit_jpype
 import pytest
 from conftest import run
 from space_packet_parser.generators import ccsds_generator
@@ -10,6 +11,10 @@ from space_packet_parser.xtce.definitions import XtcePacketDefinition
 from space_packet_parser.xtce.validation import validate_xtce
 from spacepackets.ccsds.spacepacket import PacketType, SequenceFlags
 from spacepackets.ecss.tm import InvalidTmCrc16Error, PusTm
+
+orekit_jpype.initVM()
+from org.orekit.data import DataContext  # noqa: E402
+from org.orekit.time import AbsoluteDate  # noqa: E402
 
 SCENARIO = """[scenario]
 seed = 7
@@ -94,6 +99,20 @@ def test_spacepackets_finds_headers_and_crc_right(flown):
     broken[30] ^= 4
     with pytest.raises(InvalidTmCrc16Error):
         PusTm.unpack(bytes(broken), TIME_OCTETS)
+
+
+def test_orekit_reads_the_time_code_by_its_p_field(flown):
+    tai = DataContext.getDefault().getTimeScales().getTAI()
+    since = AbsoluteDate("1958-01-01T00:00:00", tai)
+    times = {apid: [] for apid in TABLES}
+    packets = octets_of_packets(flown / "telemetry.ccsds")
+    for octets in packets[:200]:
+        signed = [octet - 256 if octet > 127 else octet for octet in octets[13:23]]
+        date = AbsoluteDate.parseCCSDSUnsegmentedTimeCode(signed[0], signed[1], signed[2:], None, since)
+        times[PusTm.unpack(octets, TIME_OCTETS).apid].append(date.durationFrom(since))
+    for apid, name in TABLES.items():
+        expected = [cuc / 2**32 for cuc in read_table(flown / "pass" / f"{name}.csv")[0][:len(times[apid])]]
+        assert times[apid] == pytest.approx(expected, rel=0, abs=2.4e-7)
 
 
 def made(apid, count, structure, cuc, valid, numbers):
