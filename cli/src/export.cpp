@@ -273,7 +273,7 @@ void add_export(CLI::App& program, const Common& common, int& exit_status) {
   command
       ->add_option(
           "FILE", arguments->file,
-          "Attitude file (CSV) or message, for acm and fk calibration.json, for packets a pass; - for standard input")
+          "Attitude file (CSV) or message, for acm and fk calibration.json, - for standard input; for packets a pass")
       ->required();
   const std::vector<std::string> formats = {"aem", "aem-xml", "ck", "acm", "acm-xml", "fk", kPackets};
   command
