@@ -127,7 +127,7 @@ std::string entry(const PacketField& field) {
 std::size_t PacketLayout::octets() const {
   const int bits = std::accumulate(fields.begin(), fields.end(), 0,
                                    [](int sum, const PacketField& field) { return sum + field.bits; });
-  return static_cast<std::size_t>(bits / 8 + kCrcOctets);
+  return static_cast<std::size_t>(bits) / 8 + kCrcOctets;
 }
 
 std::size_t header_fields() {

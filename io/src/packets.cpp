@@ -63,7 +63,7 @@ class Sequence {
       note(packet);
     }
   }
-  [[nodiscard]] Defect missing(std::string where) && {
+  [[nodiscard]] Defect missing(std::string where) {
     Defect defect;
     defect.kind = Defect::Kind::kPacketsMissing;
     defect.where = std::move(where);
@@ -146,7 +146,7 @@ class Source {
   }
 
   /// The missing packets of a source that has some; refuses one that has none.
-  Defect finish(const std::string& others) && {
+  Defect finish(const std::string& others) {
     if (table_.rows() == 0) {
       throw InputRefused(
           table_.file, {}, fmt::format("has no report of {}, APID {}; it has {}", name_, layout_.apid, others),
@@ -154,7 +154,7 @@ class Source {
               "correct apid or gyros in [telemetry.packets]; a report is of service 3, subtype 25, structure {}",
               layout_.fields[header_fields() - 1].value));
     }
-    return std::move(sequence_).missing(table_.name);
+    return sequence_.missing(table_.name);
   }
   [[nodiscard]] ForeignTable table() && { return std::move(table_); }
   [[nodiscard]] int apid() const { return layout_.apid; }
@@ -293,7 +293,7 @@ PacketTables parse_packets(std::string_view bytes, const fs::path& file, const P
   others.where = fmt::format("{}, {}", file.filename().string(), apids_text(apids));
   result.defects = {std::move(others), std::move(damaged)};
   for (Source& source : sources) {
-    result.defects.push_back(std::move(source).finish(has));
+    result.defects.push_back(source.finish(has));
     result.tables.push_back(std::move(source).table());
   }
   std::erase_if(result.defects, [](const Defect& defect) { return defect.count == 0; });

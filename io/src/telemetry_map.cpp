@@ -10,6 +10,7 @@
 
 #include "pass_toml.hpp"
 #include "schemas.hpp"
+#include "series.hpp"
 #include "telemetry_table.hpp"
 #include "toml_fields.hpp"
 #include "trihedron/io/time_text.hpp"

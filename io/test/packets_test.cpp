@@ -179,10 +179,8 @@ TEST(Packets, HaveTheOctetsOfTheStandards) {
 }
 
 TEST(Packets, HoldTimeToTheNanosecond) {
-  std::mt19937_64 generator(1);
-  std::uniform_int_distribution<std::int64_t> any(0, kCucEnd.time_since_epoch().count() - 1);
-  for (int i = 0; i < 10000; ++i) {
-    const Time t{Duration(any(generator))};
+  for (std::int64_t i = 0; i < 10000; ++i) {
+    const Time t{Duration(i * 429'496'729'599'993)};  // as far as the code goes, with any nanosecond
     ASSERT_EQ(time_of_cuc(cuc_of(t)), t);
   }
   for (const std::int64_t ns : {0L, 1L, 499'999'999L, 500'000'000L, 999'999'999L, 1'000'000'000L}) {
