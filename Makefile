@@ -26,7 +26,7 @@ help:
 	@echo 'make forecasts  measure again what docs/forecasts.md tells: hours; goes on where it was interrupted'
 	@echo 'make verdict  measure again what docs/verdict.md tells (WORLDS=pattern, SEEDS=number); goes on where it was interrupted'
 	@echo 'make mutants  whether the tests of core notice wrong formulas; goes on where it was interrupted'
-	@echo 'make interop  whether ccsds-ndm-py, Orekit and SPICE read what export writes, and import what they write: a minute'
+	@echo 'make interop  whether ccsds-ndm-py, Orekit, SPICE, space_packet_parser and spacepackets read what export writes, and import what they write: a minute'
 	@echo 'make wheel    the Python package, in out/wheel (WHEEL_PYTHON=python3.13: for 3.12 and later); make wheel-test tries it'
 	@echo 'make python-test  the Python package and its tests, which are part of `make test`'
 	@echo 'make fuzz     each reader against libFuzzer for FUZZ_SECONDS (3600) each, measures again what docs/reliability.md tells: hours'
