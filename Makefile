@@ -178,7 +178,8 @@ verdict: build
 # FUZZ_SECONDS: of processor time for each target. FUZZ_TARGETS: those alone, separated by commas. What is found is in out/fuzz/found, and the
 # corpus, with which the next run goes on, beside it.
 FUZZ_SECONDS ?= 3600
-FUZZ = fuzz/run.py build-sanitize --seconds $(FUZZ_SECONDS) --jobs $(JOBS) $(if $(FUZZ_TARGETS),--targets $(FUZZ_TARGETS))
+FUZZ_JOBS ?= $(JOBS)
+FUZZ = fuzz/run.py build-sanitize --seconds $(FUZZ_SECONDS) --jobs $(FUZZ_JOBS) $(if $(FUZZ_TARGETS),--targets $(FUZZ_TARGETS))
 
 fuzz-build:
 	@cmake/setup.sh program tests sanitizers
@@ -191,7 +192,7 @@ fuzz: fuzz-build
 # The same, for a minute of each, and no document.
 fuzz-briefly: FUZZ_SECONDS = 60
 fuzz-briefly: fuzz-build
-	$(FUZZ)
+	nice $(FUZZ)
 
 # Fails on each warning but those of members and constants that have no comment of their own; see docs/Doxyfile.
 docs:
