@@ -12,7 +12,7 @@ import pytest
 ROOT = pathlib.Path(__file__).resolve().parent.parent
 DOCUMENTS = ["docs/mathematics.md", "docs/architecture.md", "docs/reliability.md", "CONTRIBUTING.md"]
 FOLDERS = ["core", "records", "sim", "io", "ground", "plan", "campaign", "report", "cli", "flight", "python", "bench", "validation", "fuzz", "examples", "docs",
-           "cmake", ".ci"]
+           "cmake", "debian", "packaging", ".ci"]
 
 
 def paths_named(text):
