@@ -16,7 +16,7 @@ container=$("${buildah[@]}" from scratch)
 "${buildah[@]}" config --entrypoint '["/usr/bin/trihedron"]' --cmd --help --workingdir /work --env LANG=C.UTF-8 \
   --label org.opencontainers.image.title=trihedron --label "org.opencontainers.image.version=$version" \
   --label org.opencontainers.image.licenses=Apache-2.0 "$container"
-"${buildah[@]}" commit --quiet "$container" "oci-archive:$out/trihedron-$version.oci.tar:trihedron:$version" > /dev/null
+"${buildah[@]}" commit --quiet --disable-compression=false "$container" "oci-archive:$out/trihedron-$version.oci.tar:trihedron:$version" > /dev/null
 "${buildah[@]}" rm "$container" > /dev/null
 rm -rf "$out/root" "$out/storage" "$out/run"
 ls -l "$out"
