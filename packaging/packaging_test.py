@@ -22,10 +22,14 @@ def prefix(tmp_path_factory):
     return prefix
 
 
-def test_installed_are_program_manual_page_and_completion(prefix):
+def test_installed_are_program_manual_pages_and_completion(prefix):
+    told = subprocess.run([prefix / "bin/trihedron", "man", "--markdown"], capture_output=True, text=True).stdout
+    commands = set(re.findall(r"^## (\w+)$", told, re.M))
+    assert {"calibrate", "navigate"} < commands
     assert sorted(str(path.relative_to(prefix)) for path in prefix.rglob("*") if path.is_file()) == [
         "bin/trihedron", "share/bash-completion/completions/trihedron", "share/fish/vendor_completions.d/trihedron.fish",
-        "share/man/man1/trihedron.1", "share/zsh/site-functions/_trihedron"]
+        *(f"share/man/man1/trihedron-{command}.1" for command in sorted(commands)), "share/man/man1/trihedron.1",
+        "share/zsh/site-functions/_trihedron"]
 
 
 def test_installed_program_tells_the_version_of_the_project(prefix):
