@@ -11,6 +11,7 @@
 #include "trihedron/io/calibration.hpp"
 #include "trihedron/io/catalogue.hpp"
 #include "trihedron/io/config.hpp"
+#include "trihedron/io/packets.hpp"
 #include "trihedron/io/pass.hpp"
 
 namespace {
@@ -33,6 +34,13 @@ void write_seeds(const fs::path& directory, const fs::path& examples) {
   pass.settings.prior = io::sample_calibration();
   io::write_pass(at("netcdf", "known.nc"), pass, &truth);
   fs::copy_file(work / "raw.nc", at("netcdf", "raw.nc"), fs::copy_options::overwrite_existing);
+
+  Pass beginning = pass;
+  beginning.gyro.t.resize(20);
+  beginning.star_tracker.t.resize(4);
+  const std::string packets = io::format_packets(beginning, io::kDefaultApid, "", "").packets;
+  io::write_text(at("packets", "as-they-are"), '\0' + packets);
+  io::write_text(at("packets", "sealed"), '\1' + packets);
 
   io::write_text(at("csv", "gyro.csv"), raw.gyro.csv().substr(0, 3000));
   io::write_text(at("csv", "star_tracker.csv"), raw.star_tracker.csv());

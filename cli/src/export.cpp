@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "decisions.hpp"
 #include "interchange.hpp"
 #include "trihedron/io/apart.hpp"
 #include "trihedron/io/atomic_file.hpp"
@@ -15,12 +16,15 @@
 #include "trihedron/io/calibration_message.hpp"
 #include "trihedron/io/error.hpp"
 #include "trihedron/io/named_pass.hpp"
+#include "trihedron/io/packets.hpp"
 #include "trihedron/io/quantity.hpp"
 #include "trihedron/io/spice_kernels.hpp"
 #include "trihedron/io/time_scale.hpp"
 
 namespace trihedron::cli {
 namespace {
+
+constexpr const char* kPackets = "packets";
 
 struct ExportArguments {
   std::string file;
@@ -34,6 +38,7 @@ struct ExportArguments {
   std::string gap;
   std::string attitude;
   int naif_id = io::SpiceObject{}.naif_id;
+  int apid = io::kDefaultApid;
 };
 
 /// What is written beside the output: its name with another ending.
@@ -48,6 +53,9 @@ std::vector<std::string> files_of(const ExportArguments& arguments) {
     files.push_back(beside_output(arguments, ".tf"));
   } else if (arguments.format.starts_with("acm")) {
     files.push_back(beside_output(arguments, ".covariance.nc"));
+  } else if (arguments.format == kPackets) {
+    files.push_back(beside_output(arguments, ".toml"));
+    files.push_back(beside_output(arguments, ".xtce.xml"));
   }
   return files;
 }
@@ -213,21 +221,67 @@ void export_calibration(const ExportArguments& arguments, const Common& common) 
   show_interchange(beside(arguments.output, common), summary);
 }
 
+void export_pass(const ExportArguments& arguments, const Common& common) {
+  if (!arguments.epoch.pass.empty() || !arguments.epoch.epoch.empty()) {
+    throw io::UsageError("--pass and --epoch are for an attitude; FILE is the pass that packets are made of");
+  }
+  const io::LoadedPass loaded = io::read_pass(arguments.file);
+  log_pass(common.log, arguments.file, loaded);
+  const Pass& pass = loaded.pass;
+  const std::string prior = beside_output(arguments, ".prior.json");
+  const auto name_of_file = [](const std::string& path) { return std::filesystem::path(path).filename().string(); };
+  const io::PacketFiles files =
+      io::format_packets(pass, arguments.apid, name_of_file(arguments.output), name_of_file(prior));
+  std::vector<std::string> written = files_of(arguments);
+  std::vector<std::string> contents = {files.packets, files.toml, files.xtce};
+  if (!files.prior.empty()) {
+    written.push_back(prior);
+    contents.push_back(files.prior);
+  }
+  std::vector<std::filesystem::path> inputs = io::files_of_pass(arguments.file, 1 + pass.further_star_trackers.size());
+  inputs.emplace_back(loaded.prior_file);
+  inputs.insert(inputs.end(), loaded.sources.begin(), loaded.sources.end());
+  const std::vector<std::filesystem::path> outputs(written.begin(), written.end());
+  io::expect_apart(inputs, outputs);
+  io::expect_apart_from_each_other(outputs);
+  write_all(written, contents);
+  InterchangeSummary summary{arguments.file,
+                             "pass",
+                             written,
+                             "CCSDS space packets, PUS-C 3/25, with telemetry.toml and XTCE 1.2",
+                             pass.gyro.size() + pass.star_tracker.size(),
+                             1,
+                             0,
+                             pass.settings.epoch,
+                             "TAI",
+                             pass.settings.inertial_frame.empty() ? "GCRF" : pass.settings.inertial_frame,
+                             "c",
+                             pass.settings.spacecraft,
+                             arguments.description.object_id};
+  for (const StarTrackerTelemetry& fixes : pass.further_star_trackers) {
+    summary.epochs += fixes.size();
+  }
+  show_interchange(common, summary);
+}
+
 }  // namespace
 
 void add_export(CLI::App& program, const Common& common, int& exit_status) {
   auto arguments = std::make_shared<ExportArguments>();
   CLI::App* command = program.add_subcommand(
-      "export", "Write attitude or calibration for other software: CCSDS messages, SPICE kernels");
+      "export", "Write attitude, calibration or pass for other software: CCSDS messages and packets, SPICE kernels");
   command
-      ->add_option("FILE", arguments->file,
-                   "Attitude file (CSV) or message, for acm and fk calibration.json; - for standard input")
+      ->add_option(
+          "FILE", arguments->file,
+          "Attitude file (CSV) or message, for acm and fk calibration.json, - for standard input; for packets a pass")
       ->required();
-  const std::vector<std::string> formats = {"aem", "aem-xml", "ck", "acm", "acm-xml", "fk"};
+  const std::vector<std::string> formats = {"aem", "aem-xml", "ck", "acm", "acm-xml", "fk", kPackets};
   command
-      ->add_option("--format", arguments->format,
-                   "What to write: of an attitude aem (text), aem-xml or ck (with .tsc and .tf beside it), of a "
-                   "calibration acm (text), acm-xml (with .covariance.nc beside it) or fk")
+      ->add_option(
+          "--format", arguments->format,
+          "What to write: of an attitude aem (text), aem-xml or ck (with .tsc and .tf beside it), of a "
+          "calibration acm (text), acm-xml (with .covariance.nc beside it) or fk, of a pass packets (space packets, "
+          "with .toml and .xtce.xml beside it)")
       ->required()
       ->type_name(fmt::format("{}", fmt::join(formats, "|")))
       ->check(CLI::IsMember(formats));
@@ -267,16 +321,22 @@ void add_export(CLI::App& program, const Common& common, int& exit_status) {
   command->add_option("--naif-id", arguments->naif_id, "For ck and fk: number of the spacecraft in SPICE")
       ->capture_default_str()
       ->type_name("N");
+  command->add_option("--apid", arguments->apid, "For packets: APID of the gyros; the star trackers have the following")
+      ->capture_default_str()
+      ->type_name("N");
   command->add_option("--created", arguments->description.created_utc, "Creation date, UTC (default: now)")
       ->type_name("TIME");
   command->footer(
       "trihedron export attitude.csv --format aem -o attitude.aem --pass pass.nc --time-system UTC\n"
       "trihedron export attitude.csv --format ck -o attitude.bc --pass pass.nc --naif-id -28380\n"
       "trihedron export out/calibration.json --format acm -o out.acm --pass pass.nc --attitude a.csv\n"
-      "trihedron export out/calibration.json --format fk -o gyros.tf --object-name RESURS-DK1");
+      "trihedron export out/calibration.json --format fk -o gyros.tf --object-name RESURS-DK1\n"
+      "trihedron export pass.nc --format packets -o telemetry.ccsds  # read again by telemetry.toml");
   command->callback([&common, &exit_status, arguments] {
     expect_places(*arguments);
-    if (arguments->format.starts_with("acm") || arguments->format == "fk") {
+    if (arguments->format == kPackets) {
+      export_pass(*arguments, common);
+    } else if (arguments->format.starts_with("acm") || arguments->format == "fk") {
       export_calibration(*arguments, common);
     } else {
       export_attitude(*arguments, common);

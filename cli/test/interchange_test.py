@@ -1,7 +1,9 @@
 """export and import: what they write, refuse, and never replace. Run by CTest with TRIHEDRON_BUILD naming the build directory."""
 import json
 import struct
+import tomllib
 
+import jsonschema
 import pytest
 import xarray
 
@@ -146,3 +148,46 @@ def test_calibration_as_frames(flown, tmp_path):
         assert words in text
     refused(run("export", flown / "out" / "calibration.json", "--format", "fk", "-o", "-", "--object-name", "1"), WRONG_USAGE)
     refused(run("export", flown / "a.csv", "--format", "fk", "-o", "-"), INPUT_REFUSED)
+
+
+def test_a_pass_as_space_packets_is_the_same_pass(flown, tmp_path):
+    said = json.loads(done("--json", "export", flown / "pass", "--format", "packets", "-o", tmp_path / "p.ccsds", "--apid", "40").stdout)
+    assert said["written"] == [str(tmp_path / f"p.{ending}") for ending in ("ccsds", "toml", "xtce.xml")]
+    assert said["epochs"] == sum(len((flown / "pass" / name).read_text().splitlines()) - 1 for name in ("gyro.csv", "star_tracker.csv"))
+    schema = json.loads(run("schema", "telemetry").stdout)
+    document = tomllib.loads((tmp_path / "p.toml").read_text())
+    jsonschema.validate(document, schema)
+    assert not jsonschema.Draft202012Validator(schema).is_valid({**document, "telemetry": {**document["telemetry"], "gyro": {}}})
+    done("calibrate", tmp_path / "p.toml", "-o", tmp_path / "out", "--config", flown / "told.toml")
+    for name in ("calibration.json", "attitude.csv"):
+        assert (tmp_path / "out" / name).read_text() == (flown / "out" / name).read_text()
+    # With an earlier calibration, which goes along, and from packets to packets.
+    (tmp_path / "p.toml").write_text(f'[pass]\nprior = "{flown / "out" / "calibration.json"}"\n' +
+                                     (tmp_path / "p.toml").read_text().replace("[pass]\n", ""))
+    done("export", tmp_path / "p.toml", "--format", "packets", "-o", tmp_path / "again.ccsds", "--apid", "40")
+    assert (tmp_path / "again.ccsds").read_bytes() == (tmp_path / "p.ccsds").read_bytes()
+    assert 'prior = "again.prior.json"' in (tmp_path / "again.toml").read_text()
+    done("inspect", tmp_path / "again.toml")
+
+
+def test_damaged_space_packets_are_said_with_their_place(flown, tmp_path):
+    done("export", flown / "pass", "--format", "packets", "-o", tmp_path / "p.ccsds")
+    octets = bytearray((tmp_path / "p.ccsds").read_bytes())
+    octets[100] ^= 1  # in the second packet, which begins at 77
+    (tmp_path / "p.ccsds").write_bytes(octets)
+    (defect,) = json.loads(done("--json", "inspect", tmp_path / "p.toml").stdout)["defects"][:1]
+    assert (defect["kind"], defect["count"]) == ("packet-damaged", 1)
+    assert defect["text"].endswith("left out: packet 2 at octet 77.")
+    (tmp_path / "p.ccsds").write_bytes(octets[:-20])
+    refused(run("inspect", tmp_path / "p.toml"), INPUT_REFUSED, "p.ccsds: packet", "is cut short", "; get the file again")
+    refused(run("inspect", tmp_path / "p.ccsds"), INPUT_REFUSED, "is no NetCDF-4 file", "telemetry.toml")
+
+
+def test_space_packets_replace_nothing_that_is_read(flown, tmp_path):
+    done("export", flown / "pass", "--format", "packets", "-o", tmp_path / "p.ccsds")
+    for file, output in ((flown / "pass", flown / "pass" / "p.ccsds"), (tmp_path / "p.toml", tmp_path / "p.ccsds"),
+                         (tmp_path / "p.toml", tmp_path / "p.toml"), (flown / "pass", "-")):
+        refused(run("export", file, "--format", "packets", "-o", output), WRONG_USAGE, "output" if output != "-" else "several files")
+    refused(run("export", flown / "pass", "--format", "packets", "-o", tmp_path / "x.ccsds", "--pass", flown / "pass"), WRONG_USAGE, "--pass")
+    refused(run("export", flown / "pass", "--format", "packets", "-o", tmp_path / "x.ccsds", "--apid", "2046"), WRONG_USAGE, "2045 at most")
+    assert not (tmp_path / "x.ccsds").exists()

@@ -66,6 +66,9 @@ class Originals:
         self.run("navigate", "pass", "--online", "-o", "attitude.csv")
         for form in ("aem", "aem-xml"):
             self.run("export", "attitude.csv", "--format", form, "-o", f"attitude.{form}", "--pass", "pass", "--time-system", "UTC")
+        for name in ("pass", "four"):
+            (directory / f"{name}_packets").mkdir()
+            self.run("export", name, "--format", "packets", "-o", f"{name}_packets/telemetry.ccsds")
         self.run("replay", "pass", "--speed", "max", "--state", "replay.state")
         shutil.copytree(examples / "telemetry", directory / "telemetry")
         shutil.copy(directory / "out/calibration.json", directory)
@@ -184,6 +187,12 @@ TARGETS = [
         ("import", "{in}/telemetry/telemetry.toml", "-o", "{out}/pass"), ("import", "{in}/telemetry/telemetry.toml", "-o", "{out}/pass.nc"),
         ("inspect", "{in}/telemetry/telemetry.toml"), ("--json", "inspect", "{in}/telemetry/telemetry.toml")])
       for file, spoil in (("telemetry.toml", spoil_text), ("gyros.csv", spoil_table), ("star_tracker.csv", spoil_table), ("slews.csv", spoil_table))],
+    *[Target(f"{name}_packets/telemetry.{ending}", spoil, [f"{name}_packets", "told.toml"], [
+        (*words, f"{{in}}/{name}_packets/telemetry.toml", *more) for words, more in (
+            (("inspect",), ()), (("--json", "inspect"), ()), (("import",), ("-o", "{out}/pass")),
+            (("calibrate",), ("-o", "{out}", "--config", "{in}/told.toml")),
+            (("export",), ("--format", "packets", "-o", "{out}/t.ccsds")))])
+      for name in ("pass", "four") for ending, spoil in (("ccsds", spoil_bytes), ("toml", spoil_text))],
     of_pass("pass.nc", "pass.nc", spoil_netcdf),
     of_pass("four.nc", "four.nc", spoil_netcdf),
     *[Target(f"pass/{truth}", spoil, ["pass", "attitude.csv", "calibration.json", "told.toml"], [

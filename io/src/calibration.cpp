@@ -44,6 +44,10 @@ void read_drift(const JsonNode& drift, GyroCalibration& gyro) {
   const std::vector<std::string> names = coefficient_names(gyro.drift_model);
   const std::vector<std::string_view> known(names.begin(), names.end());
   for (const auto& [name, value] : drift.members()) {
+    if (name == "W(4,4)") {
+      drift.refuse("has W(4,4) of an earlier version",
+                   "calibrate again: k0 and W(4,4) had a part in common, now W(4,4-k0) has none in k0");
+    }
     if (std::ranges::find(known, name) == known.end()) {
       drift.refuse(fmt::format("has coefficient {}, not one of {}", in_quotes(name), name_of(gyro.drift_model)),
                    suggestion(name, known));

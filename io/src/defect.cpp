@@ -50,6 +50,13 @@ Words words(Defect::Kind kind) {
     case kLargeSigma:
       return {"large-sigma", "fix whose sigma is too large or missing", "fixes whose sigma is too large or missing",
               "left out"};
+    case kPacketDamaged:
+      return {"packet-damaged", "packet whose CRC is wrong", "packets whose CRC is wrong", "left out"};
+    case kPacketsMissing:
+      return {"packets-missing", "packet missing by the sequence count", "packets missing by the sequence count",
+              "not filled"};
+    case kOtherPackets:
+      return {"other-packets", "packet of something else", "packets of something else", "skipped"};
     case kGap:
       return {"gap", "gap", "gaps", "not filled"};
   }
@@ -57,6 +64,9 @@ Words words(Defect::Kind kind) {
 }
 
 std::string place_text(const Place& place) {
+  if (place.packet > 0) {
+    return fmt::format("packet {} at octet {}", place.packet, place.octet);
+  }
   std::string text = place.line > 0 ? fmt::format("line {}", place.line) : fmt::format("sample {}", place.sample);
   if (std::isfinite(place.t_s)) {
     text += fmt::format(" (t_s {})", place.t_s);

@@ -306,12 +306,6 @@ bool differs(const GyroPrior& gyro, const GyroPrior& common) {
          gyro.alignment_sigma_rad != common.alignment_sigma_rad;
 }
 
-std::string format_text(const std::string& text) {
-  std::ostringstream stream;
-  stream << toml::value<std::string>(text);
-  return stream.str();
-}
-
 std::string format_map(const std::map<DriftCoefficient, double>& values) {
   std::string text;
   for (const auto& [coefficient, value] : values) {
@@ -389,6 +383,12 @@ void check_prior(const Calibration& prior, const fs::path& prior_file, int gyros
                        fmt::format("has {} gyros, the telemetry of the pass has {}", prior.gyros.size(), gyros),
                        "give a calibration of the same gyros as prior");
   }
+}
+
+std::string format_text(const std::string& text) {
+  std::ostringstream stream;
+  stream << toml::value<std::string>(text);
+  return stream.str();
 }
 
 std::string format_pass_toml(const PassSettings& settings, std::string_view prior_file) {

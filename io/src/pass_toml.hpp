@@ -40,6 +40,9 @@ struct SettingsOfTelemetry {
 /// The text that parses back to the same settings. `prior_file` is the name for `prior`, empty for none.
 [[nodiscard]] std::string format_pass_toml(const PassSettings& settings, std::string_view prior_file);
 
+/// As a string of TOML.
+[[nodiscard]] std::string format_text(const std::string& text);
+
 /// Throws InputRefused when a prior calibration is not for this many gyros.
 void check_prior(const Calibration& prior, const std::filesystem::path& prior_file, int gyros);
 

@@ -5,11 +5,13 @@
 #include <array>
 #include <chrono>
 #include <cmath>
+#include <functional>
 #include <limits>
 #include <optional>
 #include <utility>
 
 #include "input_formats.hpp"
+#include "packets.hpp"
 #include "selection.hpp"
 #include "telemetry_map.hpp"
 #include "telemetry_table.hpp"
@@ -118,14 +120,17 @@ struct GyroSource {
   ForeignTable table;
 };
 
-GyroSource read_gyros(const GyroMap& map, const fs::path& directory) {
+/// Gives the table of a map with the columns that are wanted of it.
+using ReadTable = std::function<ForeignTable(const TableMap&, const Wanted&)>;
+
+GyroSource read_gyros(const GyroMap& map, const ReadTable& read) {
   GyroSource source;
   Wanted wanted;
   for (const DirectionMap& unit : map.units) {
     source.gyros.push_back(
         {wanted.parts(unit.columns, 1 / unit.counts_per_unit), unit.angle_unit_rad, flag_of(unit.flag, wanted)});
   }
-  source.table = read_table(map, directory, wanted);
+  source.table = read(map, wanted);
   return source;
 }
 
@@ -184,7 +189,7 @@ struct StarTrackerSource {
   }
 };
 
-StarTrackerSource read_star_tracker(const StarTrackerMap& map, const fs::path& directory) {
+StarTrackerSource read_star_tracker(const StarTrackerMap& map, const ReadTable& read) {
   StarTrackerSource source;
   Wanted wanted;
   source.quaternion = wanted.parts(map.quaternion, 1 / map.counts_per_unit);
@@ -198,7 +203,7 @@ StarTrackerSource read_star_tracker(const StarTrackerMap& map, const fs::path& d
   source.is_variance = map.is_variance;
   source.largest_sigma_rad = map.largest_sigma_rad.value_or(source.largest_sigma_rad);
   source.flag = flag_of(map.flag, wanted);
-  source.table = read_table(map, directory, wanted);
+  source.table = read(map, wanted);
   return source;
 }
 
@@ -387,12 +392,26 @@ UnscreenedPass read_raw_telemetry(const fs::path& file) {
     raw.sources.push_back(directory / intervals.file);
     std::ranges::copy(read_intervals(intervals, directory), std::back_inserter(raw.selection.exclude));
   }
-  raw.sources.push_back(directory / map.gyro.file);
-  const GyroSource gyros = read_gyros(map.gyro, directory);
+  PacketTables packets;
+  if (map.packets) {
+    const fs::path packet_file = directory / map.packets->file;
+    raw.sources.push_back(packet_file);
+    const TextFile octets(packet_file);
+    packets = parse_packets(octets.text(), packet_file, *map.packets, map.star_trackers.size());
+    raw.left_out = std::move(packets.defects);
+  }
+  std::size_t given = 0;
+  const ReadTable read = [&](const TableMap& table, const Wanted& wanted) {
+    if (map.packets) {
+      return std::move(packets.tables.at(given++));
+    }
+    raw.sources.push_back(directory / table.file);
+    return read_table(table, directory, wanted);
+  };
+  const GyroSource gyros = read_gyros(map.gyro, read);
   std::vector<StarTrackerSource> heads;
   for (const StarTrackerMap& head : map.star_trackers) {
-    raw.sources.push_back(directory / head.file);
-    heads.push_back(read_star_tracker(head, directory));
+    heads.push_back(read_star_tracker(head, read));
   }
   raw.columns = columns_read(map);
   measure(raw.settings, gyros, heads.front(), file);

@@ -10,6 +10,7 @@
 
 #include "pass_toml.hpp"
 #include "schemas.hpp"
+#include "series.hpp"
 #include "telemetry_table.hpp"
 #include "toml_fields.hpp"
 #include "trihedron/io/time_text.hpp"
@@ -381,9 +382,52 @@ Fields telemetry_fields(TelemetryMap& map, const fs::path& file) {
       instant("to", map.to, map.stamps, "what is later is left out")};
 }
 
+Fields packet_fields(TelemetryMap& map, const fs::path& file) {
+  PacketMap& packets = map.packets.emplace();
+  const auto interval = [&map, &file](IntervalMap& intervals) {
+    intervals.stamps = map.stamps;
+    return interval_fields(intervals, file);
+  };
+  Field time = time_of_table(map.stamps, file);
+  time.about = "how instants are written in from, to and files of intervals; TAI, iso where it is left out";
+  return {std::move(time),
+          required(section(
+              "packets", file, "[telemetry.packets]", "space packets",
+              [&packets] {
+                return Fields{required(name_of_something("file", packets.file, "space packets, one after the other")),
+                              whole("apid", packets.apid, limits::kApid,
+                                    "APID of the gyros; the star trackers have the following ones"),
+                              whole("gyros", packets.gyros, limits::kGyrosOfPackets, "how many gyros there are")};
+              })),
+          list("exclude", file, map.exclude, "files of intervals that are left out", interval),
+          instant("from", map.from, map.stamps, "what is earlier is left out; in the scale of [telemetry.time]"),
+          instant("to", map.to, map.stamps, "what is later is left out")};
+}
+
+/// What parse_packets() gives for the columns.
+void map_packets(TelemetryMap& map, std::size_t star_trackers) {
+  map.gyro.units.clear();
+  const std::vector<std::string> names = direction_names(map.packets->gyros);
+  for (auto name = names.begin(); name != names.end(); name += 3) {
+    map.gyro.units.emplace_back().columns.assign(name, name + 3);
+  }
+  map.star_trackers.assign(star_trackers, {});
+  for (StarTrackerMap& head : map.star_trackers) {
+    head.quaternion = {"q_x", "q_y", "q_z", "q_w"};
+  }
+}
+
+/// Columns of tables, or space packets.
 Field telemetry(TelemetryMap& map, const fs::path& file) {
-  return required(section("telemetry", file, "[telemetry]", "where the columns are, and what they mean",
-                          [&map, &file] { return telemetry_fields(map, file); }));
+  return required({"telemetry", "where the columns are, and what they mean; or the file of space packets",
+                   [&map, &file] {
+                     return any_of({schema_of(telemetry_fields(map, file)), schema_of(packet_fields(map, file))});
+                   },
+                   [&map, &file](const TomlTable& table, const toml::node& node) {
+                     const toml::table& own = table.as_table(node, "telemetry");
+                     read_fields(own, file, "[telemetry]",
+                                 own.contains("packets") ? packet_fields(map, file) : telemetry_fields(map, file));
+                   }});
 }
 
 }  // namespace
@@ -395,9 +439,18 @@ TelemetryToml parse_telemetry_toml(std::string_view text, const fs::path& file, 
   const TomlTable root(document, file, "the file");
   field.read(root, root.at("telemetry"));  // before the rest: it says how many gyros there are
   field.read = [](const TomlTable&, const toml::node&) {};
-  SettingsOfTelemetry told =
-      read_telemetry_settings(document, file, directory, static_cast<int>(result.map.gyro.units.size()), field);
+  const int gyros = result.map.packets ? result.map.packets->gyros : static_cast<int>(result.map.gyro.units.size());
+  SettingsOfTelemetry told = read_telemetry_settings(document, file, directory, gyros, field);
   const std::size_t heads = told.settings.further_star_trackers.size() + 1;
+  if (result.map.packets) {
+    map_packets(result.map, heads);
+    if (result.map.packets->apid + static_cast<int>(heads) > kLastApid) {
+      throw InputRefused(file, {},
+                         fmt::format("\"apid\" {} leaves no room for {} star trackers up to {}",
+                                     result.map.packets->apid, heads, kLastApid),
+                         "give a smaller one");
+    }
+  }
   if (heads != result.map.star_trackers.size()) {
     throw InputRefused(file, {},
                        fmt::format("[[star_tracker.further]] is there {} times, [[telemetry.further_star_tracker]] {}",
@@ -405,8 +458,9 @@ TelemetryToml parse_telemetry_toml(std::string_view text, const fs::path& file, 
                        "give one of each per further head, in the same order");
   }
   if (told.settings.star_tracker_noise_rad.isZero(0) && result.map.star_trackers.front().sigma.empty()) {
-    root.refuse(root.table_at("star_tracker"), "key \"noise_rad\" is missing in [star_tracker]",
-                "add it, or name the columns of each fix's sigma in [telemetry.star_tracker]");
+    root.refuse(
+        root.table_at("star_tracker"), "key \"noise_rad\" is missing in [star_tracker]",
+        result.map.packets ? "add it" : "add it, or name the columns of each fix's sigma in [telemetry.star_tracker]");
   }
   result.settings = std::move(told.settings);
   result.prior_file = std::move(told.prior_file);

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "trihedron/core/time.hpp"
+#include "trihedron/io/packets.hpp"
 #include "trihedron/io/pass.hpp"
 #include "trihedron/io/time_scale.hpp"
 
@@ -77,8 +78,16 @@ struct IntervalMap : TableMap {
   bool star_trackers = true;
 };
 
+/// Space packets in place of tables: docs/packets.md.
+struct PacketMap {
+  std::string file;         ///< as in TableMap
+  int apid = kDefaultApid;  ///< of the gyros; those of the star trackers follow
+  int gyros = 2;
+};
+
 struct TelemetryMap {
-  Stamps stamps;  ///< of each table that tells none of its own
+  Stamps stamps;                     ///< of each table that tells none of its own
+  std::optional<PacketMap> packets;  ///< the next two are those of its tables then, as parse_packets() gives them
   GyroMap gyro;
   std::vector<StarTrackerMap> star_trackers;  ///< the first head, then the further ones
   std::vector<IntervalMap> exclude;

@@ -160,6 +160,15 @@ TEST(CalibrationJson, KnowsTheCoefficientsOfEachDriftModel) {
   }
 }
 
+TEST(CalibrationJson, RefusesACoefficientWithTheMeaningItHadInEarlierVersions) {
+  Calibration calibration = sample_calibration();
+  GyroCalibration& gyro = calibration.gyros[0];
+  gyro.drift_model = vsh(4);
+  gyro.drift_rad_s.assign(static_cast<std::size_t>(vsh(4).size()), 1e-9);
+  EXPECT_THAT(refusal_of(replaced(format_calibration(calibration), "W(4,4-k0)", "W(4,4)")),
+              HasSubstr("drift_rad_s has W(4,4) of an earlier version; calibrate again"));
+}
+
 TEST(CalibrationJson, RefusesDriftModelsAndEstimatorsThatThereAreNot) {
   EXPECT_THAT(refusal_of(replaced(sample_text(), "\"esg7\"", "\"vsh:9\"")),
               HasSubstr("gyros[0].drift_model is \"vsh:9\", no drift model; give esg7, esg20, or vsh:1"));

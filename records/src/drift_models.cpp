@@ -19,6 +19,10 @@ constexpr std::array<DriftModelRow, 3> kDriftModels = {{
 }};
 
 constexpr std::string_view kCubeDName = "D(k0)";
+/// W(4, 4) less its part in k0. Earlier calibrations have a coefficient "W(4,4)" of the whole of it, and are refused.
+constexpr std::string_view kBesideK0Name = "W(4,4-k0)";
+constexpr DriftCoefficient kBesideK0 = {Member::kW, 4, 4};
+static_assert(BesideK0::is(kBesideK0));
 /// As of DriftHarmonic.
 constexpr int kLargestHarmonic = 20;
 
@@ -94,6 +98,9 @@ std::vector<DriftCoefficient> coefficients_of(const DriftModelId& model) {
 }
 
 std::string name_of(const DriftCoefficient& coefficient) {
+  if (coefficient == kBesideK0) {
+    return std::string(kBesideK0Name);
+  }
   switch (coefficient.member) {
     case Member::kEq1:
       return Esg7::kNames.at(static_cast<std::size_t>(coefficient.degree));
@@ -115,6 +122,9 @@ std::optional<DriftCoefficient> drift_coefficient_named(std::string_view name) {
   if (name == kCubeDName) {
     return DriftCoefficient{Member::kCubeD, 0, 0};
   }
+  if (name == kBesideK0Name) {
+    return kBesideK0;
+  }
   const bool is_w = name.starts_with("W(");
   const std::size_t comma = name.find(',');
   if ((!is_w && !name.starts_with("D(")) || comma == std::string_view::npos || !name.ends_with(')')) {
@@ -125,7 +135,8 @@ std::optional<DriftCoefficient> drift_coefficient_named(std::string_view name) {
   if (!degree || !order || *degree < 1 || *degree > kLargestHarmonic || *order < -*degree || *order > *degree) {
     return std::nullopt;
   }
-  return harmonic(is_w ? Member::kW : Member::kD, *degree, *order);
+  const DriftCoefficient named = harmonic(is_w ? Member::kW : Member::kD, *degree, *order);
+  return named == kBesideK0 ? std::nullopt : std::optional(named);
 }
 
 std::vector<std::string> coefficient_names(const DriftModelId& model) {

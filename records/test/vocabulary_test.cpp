@@ -96,7 +96,7 @@ TEST(Vocabulary, CoefficientsHaveTheNamesOfTheModelOnBoard) {
 
 TEST(Vocabulary, NoCoefficientHasANameThatIsNearlyRight) {
   for (const char* name : {"", "k", "K0", "W", "W(", "W()", "W(1)", "W(1,)", "W(0,0)", "W(1,2)", "W(21,0)", "W(1, 0)",
-                           "W(01,0)", "W(1,0", "X(1,0)", "D(k1)"}) {
+                           "W(01,0)", "W(1,0", "X(1,0)", "D(k1)", "W(4,4)", "D(4,4-k0)"}) {
     EXPECT_FALSE(drift_coefficient_named(name).has_value()) << name;
   }
 }

@@ -440,30 +440,49 @@ PassSolution PassProblem::start(const Gyros& gyros) const {
   solution.gyros = gyros;
   solution.shared.setZero(layout_.shared_size());
   solution.arcs.resize(arcs_.size());
-  for (PassSolution::Arc& arc : solution.arcs) {
-    for (int k = 0; k < kMaxGyros; ++k) {
-      arc.h_in[k] = Vector3d::UnitX();
-      arc.wandering_rad_s[k].setZero();
-    }
-  }
-  const ScreenedPass::Fix& first = *nodes_.front().fix;
-  const Directions h_c = in_c(solution.gyros, gyros_, first.h_b);
-  for (int k = 0; k < gyros_; ++k) {
-    const Vector3d seen = first.used[k] ? h_c[k] : gyros[k].C_c_b.col(0);  // anywhere
-    solution.arcs[0].h_in[k] = (first.fix.q_in_c.normalized() * seen).normalized();
-  }
   const Drift drift = drift_along(solution, nullptr);
-  Moment moment;
+  Directions h_in;
+  for (int k = 0; k < kMaxGyros; ++k) {
+    h_in[k] = k < gyros_ ? Vector3d(gyros[k].C_c_b.col(0)) : Vector3d::UnitX();  // anywhere
+  }
   double unused = 0;
-  for (std::size_t arc = 0; arc + 1 < arcs_.size(); ++arc) {
+  for (std::size_t arc = 0; arc < arcs_.size(); ++arc) {
     check_stop();
-    begin_arc(solution, arc, moment);
-    for (std::size_t i = arcs_[arc].begin; i < arcs_[arc].end; ++i) {
-      step(nodes_[i], nodes_[i + 1], drift, moment, unused);
+    constexpr double kAnyTurn_rad = std::numbers::pi;
+    constexpr double kLittle_rad = 1e-3;  // more than any drift, less than an outlier
+    follow_first_fix(gyros, arc, arc == 0 ? kAnyTurn_rad : kLittle_rad, h_in);
+    PassSolution::Arc& its = solution.arcs[arc];
+    its.h_in = h_in;
+    for (int k = 0; k < kMaxGyros; ++k) {
+      its.wandering_rad_s[k].setZero();
     }
-    solution.arcs[arc + 1].h_in = momenta(moment.gyros, gyros_);
+    if (arc + 1 < arcs_.size()) {
+      Moment moment;
+      begin_arc(solution, arc, moment);
+      for (std::size_t i = arcs_[arc].begin; i < arcs_[arc].end; ++i) {
+        step(nodes_[i], nodes_[i + 1], drift, moment, unused);
+      }
+      h_in = momenta(moment.gyros, gyros_);
+    }
   }
   return solution;
+}
+
+void PassProblem::follow_first_fix(const Gyros& gyros, std::size_t arc, double most_rad, Directions& h_in) const {
+  const auto begin = nodes_.begin() + static_cast<std::ptrdiff_t>(arcs_[arc].begin);
+  const auto end = nodes_.begin() + static_cast<std::ptrdiff_t>(arcs_[arc].end);
+  const auto first = std::find_if(begin, end, [](const Node& node) { return node.fix != nullptr; });
+  if (first == end) {
+    return;
+  }
+  const Directions h_c = in_c(gyros, gyros_, first->fix->h_b);
+  for (int k = 0; k < gyros_; ++k) {
+    if (first->fix->used[k]) {
+      const Vector3d seen = (first->fix->fix.q_in_c.normalized() * h_c[k]).normalized();
+      const Eigen::AngleAxisd apart(Eigen::Quaterniond::FromTwoVectors(h_in[k], seen));
+      h_in[k] = Eigen::AngleAxisd(std::min(apart.angle(), most_rad), apart.axis()) * h_in[k];
+    }
+  }
 }
 
 void PassProblem::go_along(const PassSolution& solution, const std::function<void(const Moment&)>& visit) const {

@@ -90,7 +90,8 @@ class PassProblem {
   [[nodiscard]] std::size_t arcs() const { return arcs_.size(); }
   [[nodiscard]] std::size_t fixes() const { return fixes_; }
 
-  /// Momenta along the pass by these parameters, those at its first fix read from it; no wandering drift.
+  /// Momenta along the pass by these parameters, led by a fix of each arc; no wandering drift. By drift alone they
+  /// would be degrees off at its end, and the linearised problem with them.
   [[nodiscard]] PassSolution start(const Gyros& gyros) const;
 
   /// Linearised at a solution; smooth() estimates truth − solution.
@@ -224,6 +225,8 @@ class PassProblem {
   /// Coefficients outside eq. (1) as the states that stand for them, and back.
   [[nodiscard]] Eigen::VectorXd as_states(int gyro, const Eigen::VectorXd& outside) const;
   [[nodiscard]] Eigen::VectorXd as_coefficients(int gyro, const Eigen::VectorXd& states) const;
+  /// Turns the momenta, by no more than that each, to where the first fix of the arc, if any, shows them.
+  void follow_first_fix(const Gyros& gyros, std::size_t arc, double most_rad, Directions& h_in) const;
   void begin_arc(const PassSolution& solution, std::size_t arc, Moment& moment) const;
   void add_prior(const PassSolution& solution, Linear& linear) const;
   [[nodiscard]] Eigen::MatrixXd prior_covariance() const;

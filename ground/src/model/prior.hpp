@@ -17,8 +17,10 @@ void refuse_incomplete(const GyroCalibration& gyro);
 /// The record of a gyro, with the coefficients at the time when this fraction of their change has taken place.
 [[nodiscard]] GyroCalibration record_of(const Gyro& gyro, const Layout& layout, double part_of_change);
 
-/// From the earlier calibration that pass.toml names, or else from what it says of each gyro. Throws SetupError where
-/// these lack what the layout needs, or name coefficients that the drift model does not have.
+/// From the earlier calibration that pass.toml names, or else from what it says of each gyro. Where that calibration
+/// has a larger drift model, its coefficients are changed to what the smaller one needs along the same flight: by
+/// themselves they are the drift without what is left out, which along that flight may be a large part of it. Throws
+/// SetupError where these lack what the layout needs, or name coefficients that the drift model does not have.
 [[nodiscard]] Prior prior_of(const PassSettings& settings, const Layout& layout);
 
 }  // namespace trihedron::ground

@@ -2,9 +2,11 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 
+#include "model/prior.hpp"
 #include "trihedron/records/drift_models.hpp"
 
 namespace trihedron::ground {
@@ -74,6 +76,45 @@ TEST(DriftOnBoard, MembersOfTheModelHaveTheirSizesAsPriorSigmas) {
   EXPECT_EQ(settings.gyros[0].drift_sigma_rad_s.size(), 6U);
   EXPECT_EQ((settings.gyros[0].drift_sigma_rad_s.at({kW, 1, 0})), 7e-8);  // what the settings say holds
   EXPECT_NEAR((settings.gyros[1].drift_sigma_rad_s.at({kD, 1, -1})), 1e-8, 1e-15);
+}
+
+/// A pass that knows k0 + 3 W(2,1) of gyro 1 far better than either, as along a flight on which both do the same.
+TEST(DriftOnBoard, ItsCoefficientsMakeUpForWhatIsLeftOutAsAlongTheFlight) {
+  Calibration calibration;
+  calibration.gyros.resize(2);
+  for (GyroCalibration& gyro : calibration.gyros) {
+    gyro.drift_model = vsh(2);
+    gyro.drift_rad_s.assign(static_cast<std::size_t>(vsh(2).size()), 0);
+  }
+  calibration.states = drift_and_alignment(vsh(2), 2);
+  const auto size = static_cast<Eigen::Index>(calibration.states.size());
+  const auto index_of = [&](const DriftCoefficient& member) {
+    return std::ranges::find(calibration.states, ParameterId::drift(0, member)) - calibration.states.begin();
+  };
+  const Eigen::Index k0 = index_of(DriftCoefficient::of_eq1(0));
+  const Eigen::Index member = index_of({kW, 2, 1});
+  calibration.gyros[0].drift_rad_s[static_cast<std::size_t>(k0)] = 1e-6;
+  calibration.gyros[0].drift_rad_s[static_cast<std::size_t>(member)] = 2e-8;
+  calibration.covariance = Eigen::MatrixXd::Identity(size, size) * 1e-18;
+  const double variance = 1e-16;
+  calibration.covariance(member, member) = variance;
+  calibration.covariance(k0, member) = calibration.covariance(member, k0) = -3 * variance;
+  calibration.covariance(k0, k0) = 9 * variance + 1e-20;
+
+  PassSettings settings;
+  settings.gyros.resize(2);
+  settings.prior = calibration;
+  Layout layout;
+  const Prior prior = prior_of(settings, layout);
+  EXPECT_NEAR(prior.gyros[0].drift_rad_s(0), 1e-6 + 3 * 2e-8, 1e-14);
+  EXPECT_NEAR(prior.covariance(0, 0), 1e-20, 1e-24);
+  EXPECT_NEAR(prior.covariance(1, 1), 1e-18, 1e-24);
+  EXPECT_EQ(prior.gyros[1].drift_rad_s(0), 0);
+
+  layout.drift_model = vsh(2);  // all of it: as it is
+  const Prior whole = prior_of(settings, layout);
+  EXPECT_EQ(whole.covariance, calibration.covariance);
+  EXPECT_EQ(whole.gyros[0].drift_rad_s(0), 1e-6);
 }
 
 TEST(DriftOnBoard, TakesValueAndSigmaOfACalibration) {

@@ -22,6 +22,8 @@ struct Place {
   std::int64_t line = 0;    ///< of the CSV file, from 1; 0 in a NetCDF file
   std::int64_t sample = 0;  ///< of the table, from 0, as the file has it
   double t_s = 0;           ///< as the file has it; NaN where it has none
+  std::int64_t packet = 0;  ///< number of a space packet, from 1; 0 in other files
+  std::int64_t octet = 0;   ///< of the file, where it begins
 };
 
 /// One kind of defect in one table, with its count and first places. Every row that is left out of a Pass is counted in
@@ -43,6 +45,9 @@ struct Defect {
     kExcluded,         ///< left out: in an interval that was to be left out
     kFlagged,          ///< a quality flag says that it is bad: a fix is left out, a gyro's reading taken as missing
     kLargeSigma,       ///< left out: a fix whose own 1-sigma is too large, or none
+    kPacketDamaged,    ///< left out: a space packet whose CRC is wrong
+    kPacketsMissing,   ///< space packets that are missing by their sequence count; places are of those that follow
+    kOtherPackets,     ///< left out: space packets of another APID, or other reports
     kGap,              ///< more than 1.5 periods without a row, at the ends of the pass too; counts the gaps
   };
   static constexpr std::size_t kPlaces = 5;

@@ -58,6 +58,9 @@ inline constexpr Range kAlignmentSigma_rad{1e-9, 3.15, "rad", "a half turn is al
 inline constexpr Range kHeaderLine{0, 1000, "", "it is the number of a line at the top of the file; 0 is none"};
 inline constexpr Range kCountsPerUnit{1e-9, 1e18, "", "it is the count that stands for 1, or for one unit of an angle"};
 
+inline constexpr Range kApid{0, 2046, "", "it is the number of an application process; 2047 is for idle packets"};
+inline constexpr Range kGyrosOfPackets{2, 4, "", "attitude needs two gyros, and at most four are handled"};
+
 // ---- Settings of the estimators
 
 inline constexpr Range kRandomWalk_rad_sqrt_s{1e-15, 1e-3, "rad/s^0.5", "give 0 where there is none", true};
