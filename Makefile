@@ -10,7 +10,7 @@ SOURCES := $(shell git ls-files '*.cpp' '*.hpp' 2>/dev/null)
 
 .PHONY: help setup build everything demo test flight bench peers slots mutants validation consistency forecasts verdict fuzz fuzz-build fuzz-briefly docs \
   format lint \
-  standard sanitize coverage interop wheel wheel-test python-test install clean
+  standard sanitize coverage interop wheel wheel-test python-test deb deb-test image image-test conan-test install clean
 
 help:
 	@echo 'make demo     install what is missing, build, repeat the experiment of the paper, say where the report is'
@@ -29,6 +29,9 @@ help:
 	@echo 'make interop  whether ccsds-ndm-py, Orekit, SPICE, space_packet_parser and spacepackets read what export writes, and import what they write: a minute'
 	@echo 'make wheel    the Python package, in out/wheel (WHEEL_PYTHON=python3.13: for 3.12 and later); make wheel-test tries it'
 	@echo 'make python-test  the Python package and its tests, which are part of `make test`'
+	@echo 'make deb      Debian packages, in out/deb, and what lintian says of them; make deb-test tries them in fresh roots'
+	@echo 'make image    an OCI image of the program, in out/image, after `make deb`; make image-test tries it'
+	@echo 'make conan-test  the Conan package of the flight library, used by another project'
 	@echo 'make fuzz     each reader against libFuzzer for FUZZ_SECONDS (3600) each, measures again what docs/reliability.md tells: hours'
 	@echo 'make docs     reference of the interfaces and all documents as web pages: out/docs/html/index.html'
 	@echo 'make install  into PREFIX (default /usr/local)'
@@ -91,6 +94,28 @@ wheel-test: build
 	  $$(grep -E '^(mypy|pytest|nbclient|nbformat|ipykernel)=' python/requirements.txt)
 	TRIHEDRON_BUILD=$(abspath $(BUILD)) PYTHONDONTWRITEBYTECODE=1 build-python/fresh/bin/python -m pytest -q -p no:cacheprovider python/test
 
+
+# Debian packages from a copy of the sources. deb-test installs them into a fresh root of Debian.
+deb:
+	@cmake/setup.sh program packaging
+	packaging/deb.sh
+
+deb-test:
+	@cmake/setup.sh packaging
+	packaging/deb-test.sh
+
+# An OCI image with the package of the program, in out/image.
+image:
+	@cmake/setup.sh packaging
+	packaging/image.sh
+
+image-test:
+	@cmake/setup.sh packaging
+	packaging/image-test.sh
+
+conan-test:
+	@cmake/setup.sh program packaging
+	packaging/conan-test.sh
 
 flight:
 	@cmake/setup.sh program tests flight targets
