@@ -350,12 +350,12 @@ TEST(SpreadWork, TakesAFixThatComesWhileTheAnglesAreDealtWith) {
 }
 
 TEST(SpreadWork, OfAFixWhoseGyroSticksAfterItHasNoAttitudeOfTheNavigatorThere) {
-  // The fix at 60.5 s waits for that at 60 s, until 62.5 s. By the end of its turn gyro 2 is known to have stuck.
+  // The fix at 60.5 s waits for that at 60 s, until 62.5 s. By then gyro 2 is known to have stuck.
   Events events = events_of({.duration_s = 80});
   events.fixes.resize(21);
   events.fixes.push_back({Time(from_seconds(60.5)), Eigen::Quaterniond(test::Flight::attitude(60.5, 0.5))});
-  for (std::size_t i = 8 * 62 + 6; i < 8 * 72; ++i) {
-    events.samples[i].h_b[1] = events.samples[8 * 62 + 6].h_b[1];
+  for (std::size_t i = 8 * 62 + 2; i < 8 * 72; ++i) {
+    events.samples[i].h_b[1] = events.samples[8 * 62 + 2].h_b[1];
   }
   const auto on_board = test::PairGiven().on_board({.interval = std::chrono::hours(1), .spread_over = 20});
   std::vector<StepReport> reports;
