@@ -819,6 +819,8 @@ TEST(Samples, FasterThanTheCapacityAreThinnedAndChangeNothing) {
     for (const int ms : {1, 20, 74}) {
       GyroSample between = flight().samples[i];
       between.t += std::chrono::milliseconds(ms);
+      between.h_b[1] = rotated<double>(between.h_b[1], Eigen::Vector3d::UnitX() * 1e-6 * ms);  // live
+      between.h_b[0] = rotated<double>(between.h_b[0], Eigen::Vector3d::UnitY() * 1e-6 * ms);
       EXPECT_EQ(all.on_gyro(between).sample, SampleStatus::kThinned);
     }
   }
@@ -936,7 +938,10 @@ TEST(PairApplication, FitsInto32KiB) { EXPECT_LE(sizeof(PairApplication), 32U * 
 TEST(Forecast, OfAGyroOfAPairThatHasStuckIsThatItIsNotReady) {
   // The fix at 1500 s is the last before it, and is dealt with when it shows.
   PairApplication application = application_in(kNavigating);
-  const auto samples = frozen(1500, 1510);
+  auto samples = frozen(1500, 1510);
+  for (Eigen::Vector3d& h_b : samples[8 * 1498].h_b) {  // a spike, soon after which a stop is not known at once
+    h_b = rotated<double>(h_b, 0.05 * h_b.unitOrthogonal());
+  }
   fly_from(samples, flight().fixes, kAdopted_s, 1500, application);
   EXPECT_GT(application.forecast().ready_s(), 0);
   double ready_s = 1;

@@ -102,7 +102,11 @@ TEST(DriftModel, IsThatOfTheSimulator) {
             potential == DriftHarmonic::Potential::kW) {  // what k0 leaves of (4, 0) and (4, 4)
           its = {{potential, 4, 4, std::sqrt(7.0 / 12)}, {potential, 4, 0, -std::sqrt(5.0 / 12)}};
         }
-        const auto found = std::ranges::find(coefficients, drift_coefficient_named(name(member)).value());
+        const auto its_member =
+            potential == DriftHarmonic::Potential::kW ? DriftCoefficient::Member::kW : DriftCoefficient::Member::kD;
+        const DriftCoefficient coefficient{its_member, static_cast<std::int8_t>(degree),
+                                           static_cast<std::int8_t>(order)};
+        const auto found = std::ranges::find(coefficients, coefficient);
         if (found == coefficients.end()) {
           continue;
         }
