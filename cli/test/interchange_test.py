@@ -142,6 +142,43 @@ def test_calibration_as_message_with_its_covariance(flown, tmp_path, form):
         assert (covariance.covariance.values == calibration["covariance"]["matrix"]).all()
 
 
+@pytest.mark.parametrize("form, scale", [("acm", "UTC"), ("acm-xml", "TT")])
+def test_calibration_comes_back_from_its_message(flown, tmp_path, form, scale):
+    original = flown / "out" / "calibration.json"
+    done("export", original, "--format", form, "-o", tmp_path / "c.acm", "--pass", flown / "pass", "--attitude", flown / "a.csv",
+         "--time-system", scale)
+    said = json.loads(done("--json", "import", tmp_path / "c.acm", "-o", tmp_path / "back.json").stdout)
+    assert (said["output_format"], said["time_system"], said["inertial_frame"]) == ("calibration", scale, "GCRF")
+    expected, back = (json.loads(path.read_text()) for path in (original, tmp_path / "back.json"))
+    assert back["covariance"] == expected["covariance"]
+    for ours, theirs in zip(back["gyros"], expected["gyros"], strict=True):
+        assert list(ours["drift_rad_s"]) == list(theirs["drift_rad_s"])
+        for name in theirs["drift_rad_s"]:
+            assert ours["drift_rad_s"][name] == pytest.approx(theirs["drift_rad_s"][name], rel=1e-15, abs=0)
+    assert [finding["code"] for finding in back["verdict"]["findings"]] == [finding["code"] for finding in expected["verdict"]["findings"]]
+    assert {key for key in expected if key not in back} <= {"forecast"}
+    # Navigation by it is the same to the digits that the message has.
+    done("navigate", flown / "pass", "--calibration", tmp_path / "back.json", "-o", tmp_path / "b.csv")
+    for ours, theirs in zip(numbers(tmp_path / "b.csv"), numbers(flown / "a.csv"), strict=True):
+        assert ours == pytest.approx(theirs, rel=0, abs=1e-12)
+
+
+def test_calibration_from_a_message_without_its_covariance(flown, tmp_path):
+    done("export", flown / "out" / "calibration.json", "--format", "acm", "-o", tmp_path / "c.acm")
+    (tmp_path / "c.covariance.nc").unlink()
+    result = run("import", tmp_path / "c.acm", "-o", tmp_path / "back.json")
+    assert result.returncode == TRUSTWORTHY and not result.stderr
+    assert "covariance diagonal" in result.stdout and "c.covariance.nc is not there" in result.stdout
+    matrix = json.loads((tmp_path / "back.json").read_text())["covariance"]["matrix"]
+    assert all(value == 0 for i, row in enumerate(matrix) for j, value in enumerate(row) if i != j)
+    done("navigate", flown / "pass", "--calibration", tmp_path / "back.json", "-o", tmp_path / "b.csv")
+    text = (tmp_path / "c.acm").read_text()
+    (tmp_path / "d.acm").write_text(text.replace("GYRO1_K0_RAD_S", "GYRO1_K9_RAD_S"))
+    refused(run("import", tmp_path / "d.acm", "-o", tmp_path / "d.json"), INPUT_REFUSED, "d.acm:", "no USER_DEFINED_TRIHEDRON_GYRO1_K0_RAD_S", "; ")
+    refused(run("import", tmp_path / "c.acm", "-o", tmp_path / "d.json", "--pass", flown / "pass"), WRONG_USAGE, "--pass and --epoch")
+    assert not (tmp_path / "d.json").exists()
+
+
 def test_calibration_as_frames(flown, tmp_path):
     text = done("export", flown / "out" / "calibration.json", "--format", "fk", "-o", "-", "--object-name", "RESURS-DK1").stdout
     for words in ("FRAME_RESURS-DK1_GYRO2 = -999002", "TKFRAME_-999002_SPEC = 'MATRIX'", "INS-999001_DRIFT_RAD_S"):
