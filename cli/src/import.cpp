@@ -233,9 +233,9 @@ void import_message(const ImportArguments& arguments, const Common& common) {
 void add_import(CLI::App& program, const Common& common, int& exit_status) {
   auto arguments = std::make_shared<ImportArguments>();
   arguments->time_system = "TAI";
-  CLI::App* command = program.add_subcommand(
-      "import",
-      "Read others' telemetry by a telemetry.toml, another software's attitude (CCSDS AEM), or a calibration (ACM)");
+  CLI::App* command = program.add_subcommand("import",
+                                             "Read others' telemetry by a telemetry.toml, another software's attitude "
+                                             "(CCSDS AEM, APM), or a calibration (ACM)");
   command
       ->add_option("FILE", arguments->file, "telemetry.toml or pass; or message, as text or XML, - for standard input")
       ->required();

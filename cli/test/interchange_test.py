@@ -1,4 +1,5 @@
 """export and import: what they write, refuse, and never replace. Run by CTest with TRIHEDRON_BUILD naming the build directory."""
+import datetime
 import json
 import struct
 import tomllib
@@ -38,6 +39,29 @@ def test_attitude_comes_back(flown, tmp_path, form, scale):
     done("export", flown / "a.csv", "--format", form, "-o", tmp_path / "a", "--pass", flown / "pass", "--time-system", scale)
     done("import", tmp_path / "a", "-o", tmp_path / "b.csv")
     assert numbers(tmp_path / "b.csv") == numbers(flown / "a.csv")
+
+
+@pytest.mark.parametrize("form", ["apm", "apm-xml"])
+def test_attitude_of_one_epoch(flown, tmp_path, form):
+    rows = numbers(flown / "a.csv")
+    export = ("export", flown / "a.csv", "--format", form, "-o", tmp_path / "a", "--pass", flown / "pass", "--time-system", "UTC")
+    done(*export)
+    done("import", tmp_path / "a", "-o", tmp_path / "b.csv")
+    assert numbers(tmp_path / "b.csv") == [rows[-1]]
+    epoch = datetime.datetime.fromisoformat(json.loads(done("--json", "import", tmp_path / "a", "-o", tmp_path / "b.csv").stdout)["epoch_tai"])
+    at = epoch + datetime.timedelta(seconds=rows[7][0] - 34)  # TAI − UTC of 2009
+    done(*export, "--at", at.isoformat())
+    done("import", tmp_path / "a", "-o", tmp_path / "b.csv")
+    assert numbers(tmp_path / "b.csv") == [rows[7]]
+    done("export", tmp_path / "a", "--format", "aem", "-o", tmp_path / "a.aem")
+    done("import", tmp_path / "a.aem", "-o", tmp_path / "b.csv")
+    assert numbers(tmp_path / "b.csv") == [rows[7]]
+    (tmp_path / "a").unlink()
+    refused(run(*export, "--at", (at + datetime.timedelta(seconds=0.1)).isoformat()), WRONG_USAGE, "the nearest is at " + at.isoformat(), "UTC")
+    refused(run(*export, "--at", "now"), WRONG_USAGE, "--at: ")
+    refused(run("export", flown / "a.csv", "--format", "aem", "-o", tmp_path / "a", "--pass", flown / "pass", "--at", at.isoformat()), WRONG_USAGE,
+            "--at is for apm")
+    assert not (tmp_path / "a").exists()
 
 
 def test_a_message_is_an_attitude_wherever_one_is_taken(flown, tmp_path):

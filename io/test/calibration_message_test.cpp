@@ -331,5 +331,91 @@ TEST(Acm, RefusesWhatIsWrong) {
               HasSubstr("without a directory"));
 }
 
+AttitudeMessage one_attitude() {
+  AttitudeMessage message;
+  message.attitude.t = {sample_calibration().epoch + std::chrono::nanoseconds(1500000001)};
+  message.attitude.q_in_c = {Eigen::Quaterniond(0.1, -0.7, 0.5, 0.5).normalized()};
+  message.rate_rad_s = {{1e-3 / 3, -2e-3 / 7, 0.1}};
+  return message;
+}
+
+TEST(Apm, ComesBack) {
+  AttitudeMessage message = one_attitude();
+  for (const bool with_rate : {true, false}) {
+    for (const MessageSyntax syntax : {MessageSyntax::kKvn, MessageSyntax::kXml}) {
+      for (const TimeScale scale :
+           {TimeScale::kTai, TimeScale::kUtc, TimeScale::kGps, TimeScale::kTt, TimeScale::kTdb}) {
+        MessageDescription d = description();
+        d.time_scale = scale;
+        const Time epoch = sample_calibration().epoch;
+        const AttitudeMessage back = parse_attitude_message(format_apm(message, 0, epoch, d, syntax), "a.apm");
+        EXPECT_EQ(back.epoch, epoch);
+        EXPECT_EQ(back.attitude.t, message.attitude.t);
+        EXPECT_LE((back.attitude.q_in_c[0].coeffs() - message.attitude.q_in_c[0].coeffs()).norm(), 1e-15);
+        ASSERT_EQ(back.rate_rad_s.size(), message.rate_rad_s.size());
+        if (with_rate) {
+          EXPECT_LE((back.rate_rad_s[0] - message.rate_rad_s[0]).norm(), 1e-16);  // of 0.1 rad/s, 16 digits
+        }
+        EXPECT_EQ(back.time_system, name_of(scale));
+      }
+    }
+    message.rate_rad_s.clear();
+  }
+}
+
+/// Of the same attitude, told from the other side and in other axes.
+TEST(Apm, IsReadInEitherDirectionAndInTheAxesOfEither) {
+  const AttitudeMessage message = one_attitude();
+  const Eigen::Quaterniond& q = message.attitude.q_in_c[0];
+  const Eigen::Vector3d& rate = message.rate_rad_s[0];
+  for (const bool reversed : {false, true}) {
+    for (const bool in_inertial_axes : {false, true}) {
+      AttitudeMessage told = message;
+      told.attitude.q_in_c[0] = reversed ? q.conjugate() : q;
+      Eigen::Vector3d value = in_inertial_axes ? Eigen::Vector3d(q * rate) : rate;
+      told.rate_rad_s[0] = reversed ? Eigen::Vector3d(-value) : value;
+      std::string text = format_apm(told, 0, message.attitude.t[0], description(), MessageSyntax::kKvn);
+      text = replaced(text, "ANGVEL_FRAME = SC_BODY_1",
+                      in_inertial_axes ? "ANGVEL_FRAME = GCRF" : "ANGVEL_FRAME = SC_BODY_1");
+      if (reversed) {
+        for (int i = 0; i < 2; ++i) {
+          text = replaced(text, "REF_FRAME_A = GCRF\nREF_FRAME_B = SC_BODY_1",
+                          "REF_FRAME_A = SC_BODY_1\nREF_FRAME_B = GCRF");
+        }
+      }
+      const AttitudeMessage back = parse_attitude_message(text, "a.apm");
+      EXPECT_LE((back.attitude.q_in_c[0].coeffs() - q.coeffs()).norm(), 1e-15);
+      EXPECT_LE((back.rate_rad_s[0] - rate).norm(), 1e-15) << reversed << in_inertial_axes;
+      EXPECT_EQ(back.inertial_frame, "GCRF");
+    }
+  }
+}
+
+TEST(Apm, RefusesWhatIsWrong) {
+  const std::string text = format_apm(one_attitude(), 0, Time{}, description(), MessageSyntax::kKvn);
+  const Wrong wrong[] = {
+      {"VERS = 2.0", "VERS = 1.0", "version \"1.0\" of the APM is not known"},
+      {"OBJECT_ID = UNKNOWN\n", "", "metadata has no OBJECT_ID"},
+      {"TIME_SYSTEM = TAI", "TIME_SYSTEM = MET", "time system \"MET\" is not known"},
+      {"EPOCH = 2009-05-20T", "EPOCH = 2009-05-32T", "2009-05-32"},
+      {"\nEPOCH = ", "\nCOMMENT ", "data has no EPOCH"},
+      {"REF_FRAME_A = GCRF", "REF_FRAME_A = LVLH", "\"LVLH\" is neither an inertial frame"},
+      {"REF_FRAME_B = SC_BODY_1", "REF_FRAME_B = SC_BODY_2", "frames of ANGVEL are not those of QUAT"},
+      {"ANGVEL_FRAME = SC_BODY_1", "ANGVEL_FRAME = SC_BODY_2", "is neither of the two frames"},
+      {"[deg/s]", "[rad/s]", "the unit of ANGVEL_X is \"rad/s\""},
+      {"Q3 = ", "Q3 = 9", "the quaternion has the norm"},
+      {"Q2 = ", "Q1 = ", "\"Q1\" is there twice"},
+      {"Q3 = ", "Q4 = ", "\"Q4\" is no keyword of QUAT"},
+      {"QC = ", "QC = ?", "is not a number"},
+      {"QUAT", "SPIN", "ends a block that has not begun"},
+  };
+  for (const Wrong& one : wrong) {
+    const std::string spoilt = replaced(text, one.from, one.to);
+    EXPECT_THAT(refusal([&] { return parse_attitude_message(spoilt, "a.apm"); }),
+                testing::AllOf(testing::StartsWith("a.apm:"), HasSubstr(one.reason), HasSubstr("; ")))
+        << one.from << " -> " << one.to;
+  }
+}
+
 }  // namespace
 }  // namespace trihedron::io::acm_test

@@ -105,6 +105,7 @@ std::vector<std::string> whole_messages() {
   for (const MessageSyntax syntax : {MessageSyntax::kKvn, MessageSyntax::kXml}) {
     whole.push_back(format_aem(message.attitude, message.rate_rad_s, calibration.epoch, description,
                                std::chrono::seconds(10), syntax));
+    whole.push_back(format_apm(message, 3, calibration.epoch, description, syntax));
     whole.push_back(format_acm(calibration, {&message, nullptr, "none.nc"}, description, syntax));
   }
   return whole;
