@@ -22,7 +22,7 @@ constexpr std::array<std::pair<std::string_view, std::string_view>, 6> kApmBlock
                                                                                       {"INERTIA", "inertia"},
                                                                                       {"MAN", "maneuverParameters"}}};
 constexpr std::array<std::string_view, 4> kApmMetadata = {"OBJECT_NAME", "OBJECT_ID", "CENTER_NAME", "TIME_SYSTEM"};
-constexpr NdmKind kApm = {"APM", kApmBlocks, kApmMetadata};
+constexpr NdmKind kApm = {"APM", kApmBlocks, kApmMetadata, false};
 
 constexpr std::array<std::string_view, 10> kOfQuaternion = {"REF_FRAME_A", "REF_FRAME_B", "Q1",     "Q2",     "Q3",
                                                             "QC",          "Q1_DOT",      "Q2_DOT", "Q3_DOT", "QC_DOT"};
@@ -112,11 +112,11 @@ std::string format_apm(const AttitudeMessage& attitude, std::size_t row, Time ep
   NdmText text(syntax);
   TimeText clock(description.time_scale);
   text.header("APM", fmt::format("{}{} TAI", kEpochComment, format_epoch(epoch)), description);
-  text.put("\nMETA_START\n", "<segment>\n<metadata>\n");
+  text.put("\n", "<segment>\n<metadata>\n");
   text.entry("OBJECT_NAME", description.object_name);
   text.entry("OBJECT_ID", description.object_id);
   text.entry("TIME_SYSTEM", name_of(description.time_scale));
-  text.put("META_STOP\n\n", "</metadata>\n<data>\n");
+  text.put("\n", "</metadata>\n<data>\n");
   text.entry("EPOCH", clock.format(attitude.attitude.t.at(row)));
   const auto frames = [&] {
     text.entry("REF_FRAME_A", description.inertial_frame);

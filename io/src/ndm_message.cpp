@@ -41,6 +41,14 @@ class NdmKvnReader {
         read_block(message_.metadata, "META", false);
         outside = &message_.data;
         message_.data.at = lines_.here();
+      } else if (NdmBlock* const begun = begun_without_delimiter(word, outside)) {
+        outside = begun;
+        outside->at = lines_.at(word);
+        if (word.ends_with(kStart)) {
+          begin_block(word);
+        } else {
+          assign(*outside, word);
+        }
       } else if (word.ends_with(kStart) && outside == &message_.data) {
         begin_block(word);
       } else {
@@ -56,6 +64,19 @@ class NdmKvnReader {
  private:
   static constexpr std::string_view kStart = "_START";
   static constexpr std::string_view kStop = "_STOP";
+
+  /// The section that a line begins by its keyword, where the kind of message has no delimiters; else nullptr.
+  NdmBlock* begun_without_delimiter(std::string_view word, const NdmBlock* now) {
+    if (message_.kind_.delimits_metadata || is_comment(word)) {
+      return nullptr;
+    }
+    const std::string_view key = trimmed(word.substr(0, word.find('=')));
+    const bool is_metadata = std::ranges::find(message_.kind_.metadata, key) != message_.kind_.metadata.end();
+    if (now == &message_.header && is_metadata) {
+      return &message_.metadata;
+    }
+    return now == &message_.metadata && !is_metadata ? &message_.data : nullptr;
+  }
 
   void begin_block(std::string_view word) {
     const std::string_view name = word.substr(0, word.size() - kStart.size());

@@ -40,6 +40,7 @@ struct NdmKind {
   /// Names of its blocks in KVN and XML. A block within a block, such as that of a sensor, is not among them.
   std::span<const std::pair<std::string_view, std::string_view>> blocks;
   std::span<const std::string_view> metadata;  ///< its keywords
+  bool delimits_metadata = true;               ///< whether META_START and META_STOP must stand about them in KVN
 };
 
 /// Each function throws InputRefused for what is wrong.

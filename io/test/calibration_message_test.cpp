@@ -391,6 +391,17 @@ TEST(Apm, IsReadInEitherDirectionAndInTheAxesOfEither) {
   }
 }
 
+/// The standard's examples have no delimiters about the metadata, and some writers give them.
+TEST(Apm, MayDelimitItsMetadata) {
+  const std::string text = format_apm(one_attitude(), 0, Time{}, description(), MessageSyntax::kKvn);
+  const std::string delimited = replaced(replaced(text, "OBJECT_NAME", "META_START\nOBJECT_NAME"),
+                                         "TIME_SYSTEM = TAI\n", "TIME_SYSTEM = TAI\nMETA_STOP\n");
+  EXPECT_EQ(parse_attitude_message(delimited, "a.apm").attitude.q_in_c[0].coeffs(),
+            parse_attitude_message(text, "a.apm").attitude.q_in_c[0].coeffs());
+  const std::string without_epoch = replaced(delimited, "\nEPOCH =", "\nCOMMENT");
+  EXPECT_THAT(refusal([&] { return parse_attitude_message(without_epoch, "a.apm"); }), HasSubstr("data has no EPOCH"));
+}
+
 TEST(Apm, RefusesWhatIsWrong) {
   const std::string text = format_apm(one_attitude(), 0, Time{}, description(), MessageSyntax::kKvn);
   const Wrong wrong[] = {
