@@ -1,8 +1,8 @@
 # For users: `make demo`, `make test`. Everything else is CMake; see CMakePresets.json.
 SHELL := bash
 JOBS ?= $(shell nproc)
-# One more than there are processors: some tests wait, for the moment of a signal, a lock, a browser.
-TEST_JOBS ?= $(shell echo $$(($(JOBS) + 1)))
+# Two more than there are processors: some tests wait, for the moment of a signal, a lock, a browser.
+TEST_JOBS ?= $(shell echo $$(($(JOBS) + 2)))
 BUILD := build
 LINT_TOOLS := build-lint/tools
 PYTHON_TOOLS := build-python/tools
@@ -10,7 +10,7 @@ SOURCES := $(shell git ls-files '*.cpp' '*.hpp' 2>/dev/null)
 
 .PHONY: help setup build everything demo test flight bench peers slots mutants validation consistency forecasts verdict fuzz fuzz-build fuzz-briefly docs \
   format lint \
-  standard sanitize coverage interop wheel wheel-test python-test install clean
+  standard sanitize coverage interop wheel wheel-test python-test deb deb-test image image-test conan-test install clean
 
 help:
 	@echo 'make demo     install what is missing, build, repeat the experiment of the paper, say where the report is'
@@ -29,6 +29,9 @@ help:
 	@echo 'make interop  whether ccsds-ndm-py, Orekit, SPICE, space_packet_parser and spacepackets read what export writes, and import what they write: a minute'
 	@echo 'make wheel    the Python package, in out/wheel (WHEEL_PYTHON=python3.13: for 3.12 and later); make wheel-test tries it'
 	@echo 'make python-test  the Python package and its tests, which are part of `make test`'
+	@echo 'make deb      Debian packages, in out/deb, and what lintian says of them; make deb-test tries them in fresh roots'
+	@echo 'make image    an OCI image of the program, in out/image, after `make deb`; make image-test tries it'
+	@echo 'make conan-test  the Conan package of the flight library, used by another project'
 	@echo 'make fuzz     each reader against libFuzzer for FUZZ_SECONDS (3600) each, measures again what docs/reliability.md tells: hours'
 	@echo 'make docs     reference of the interfaces and all documents as web pages: out/docs/html/index.html'
 	@echo 'make install  into PREFIX (default /usr/local)'
@@ -91,6 +94,28 @@ wheel-test: build
 	  $$(grep -E '^(mypy|pytest|nbclient|nbformat|ipykernel)=' python/requirements.txt)
 	TRIHEDRON_BUILD=$(abspath $(BUILD)) PYTHONDONTWRITEBYTECODE=1 build-python/fresh/bin/python -m pytest -q -p no:cacheprovider python/test
 
+
+# Debian packages from a copy of the sources. deb-test installs them into a fresh root of Debian.
+deb:
+	@cmake/setup.sh program packaging
+	packaging/deb.sh
+
+deb-test:
+	@cmake/setup.sh packaging
+	packaging/deb-test.sh
+
+# An OCI image with the package of the program, in out/image.
+image:
+	@cmake/setup.sh packaging
+	packaging/image.sh
+
+image-test:
+	@cmake/setup.sh packaging
+	packaging/image-test.sh
+
+conan-test:
+	@cmake/setup.sh program packaging
+	packaging/conan-test.sh
 
 flight:
 	@cmake/setup.sh program tests flight targets
@@ -178,7 +203,8 @@ verdict: build
 # FUZZ_SECONDS: of processor time for each target. FUZZ_TARGETS: those alone, separated by commas. What is found is in out/fuzz/found, and the
 # corpus, with which the next run goes on, beside it.
 FUZZ_SECONDS ?= 3600
-FUZZ = fuzz/run.py build-sanitize --seconds $(FUZZ_SECONDS) --jobs $(JOBS) $(if $(FUZZ_TARGETS),--targets $(FUZZ_TARGETS))
+FUZZ_JOBS ?= $(JOBS)
+FUZZ = fuzz/run.py build-sanitize --seconds $(FUZZ_SECONDS) --jobs $(FUZZ_JOBS) $(if $(FUZZ_TARGETS),--targets $(FUZZ_TARGETS))
 
 fuzz-build:
 	@cmake/setup.sh program tests sanitizers
@@ -191,7 +217,7 @@ fuzz: fuzz-build
 # The same, for a minute of each, and no document.
 fuzz-briefly: FUZZ_SECONDS = 60
 fuzz-briefly: fuzz-build
-	$(FUZZ)
+	nice $(FUZZ)
 
 # Fails on each warning but those of members and constants that have no comment of their own; see docs/Doxyfile.
 docs:
@@ -219,7 +245,7 @@ standard: $(LINT_TOOLS)/installed
 	$(LINT_TOOLS)/bin/lizard -l cpp core/src core/include -T cyclomatic_complexity=15 -T nloc=60 -T parameter_count=8 -w
 
 # In units of several files: clang-tidy reads Eigen once for each unit instead of once for each file. What runs beside it goes first; see .ci/run.
-# Recursion is forbidden in core alone.
+# Recursion is forbidden in core alone. The kernels are read once, not for each kind of processor.
 UNITS = sed -n 's/^ *"file": "\(.*\/\(Unity\|src\)\/.*\)".*/\1/p' build-lint/compile_commands.json
 TIDY = nice -n 19 xargs -P $(JOBS) -n 1 $(LINT_TOOLS)/bin/clang-tidy --quiet --extra-arg=-Wno-unused-command-line-argument -p build-lint
 
@@ -228,7 +254,7 @@ lint: standard $(PYTHON_TOOLS)/installed
 	@$(LINT_TOOLS)/bin/clang-format --dry-run --Werror $(SOURCES)
 	cmake --preset lint -DTRIHEDRON_BUILD_PYTHON=ON -DPython_EXECUTABLE=$(abspath $(PYTHON_TOOLS)/bin/python)
 	$(UNITS) | grep '/trihedron_core\.dir/' | $(TIDY) --checks=misc-no-recursion
-	$(UNITS) | grep -v '/trihedron_core\.dir/\|/nanobind' | $(TIDY)
+	$(UNITS) | grep -v '/trihedron_core\.dir/\|/nanobind\|_avx2\.dir/' | $(TIDY)
 	$(LINT_TOOLS)/bin/clang-tidy --quiet validation/mutants/mutant.cpp -- -std=c++20  # no build directory has it
 
 install: build

@@ -107,7 +107,8 @@ function(trihedron_test module)
   target_precompile_headers(${module}_test PRIVATE <Eigen/Dense> <gmock/gmock.h> <gtest/gtest.h>)
   # The tests themselves need no speed, and without it compile in two thirds of the time, with clang in a third. What they test is optimised
   # in its own library, which is linked before them: of a function that both hold, one of Eigen or another inline one, the linker takes the first.
-  target_compile_options(${module}_test PRIVATE -O0)
+  # Under sanitizers they take an eighth less without line numbers; those of what is tested stay.
+  target_compile_options(${module}_test PRIVATE -O0 $<$<BOOL:${TRIHEDRON_SANITIZE}>:-g0>)
   trihedron_libraries_of(libraries trihedron::${module} ${arg_LIBRARIES})
   list(TRANSFORM libraries REPLACE "(.+)" "$<TARGET_FILE:\\1>" OUTPUT_VARIABLE files)
   list(JOIN files " " files)

@@ -12,7 +12,7 @@ import pytest
 ROOT = pathlib.Path(__file__).resolve().parent.parent
 DOCUMENTS = ["docs/mathematics.md", "docs/architecture.md", "docs/reliability.md", "CONTRIBUTING.md"]
 FOLDERS = ["core", "records", "sim", "io", "ground", "plan", "campaign", "report", "cli", "flight", "python", "bench", "validation", "fuzz", "examples", "docs",
-           "cmake", ".ci"]
+           "cmake", "debian", "packaging", ".ci"]
 
 
 def paths_named(text):
@@ -38,3 +38,20 @@ def test_tables_of_the_application_are_up_to_date(tmp_path):
     made = sorted(path.relative_to(tmp_path) for path in tmp_path.glob("**/*") if path.is_file())
     assert len(made) == 4
     assert [str(path) for path in made if (tmp_path / path).read_text() != (ROOT / path).read_text()] == []
+
+
+@pytest.mark.parametrize("row, source, pattern", [
+    ("`pass.toml`", "io/src/toml_table.hpp", r"kTomlVersion = (\d+)"),
+    ("`truth.json`", "io/src/truth.cpp", r"kTruthVersion = (\d+)"),
+    ("`calibration.json`", "io/src/calibration.cpp", r"kVersion = (\d+)"),
+    ("catalogue", "io/src/catalogue.cpp", r"kSchemaVersion = (\d+)"),
+    ("`residuals.nc`", "io/src/residuals.cpp", r'"version", "(\d+)"'),
+    ("`runs.nc`", "io/src/run_table.cpp", r'"version", "(\d+)"'),
+    ("journal", "io/src/campaign_journal.cpp", r'"version", (\d+)\}'),
+    ("state of a replay", "core/include/trihedron/core/application.hpp", r"kStateVersion = (\d+)"),
+    ("parameters", "core/interface/tables.toml", r"^version = (\d+)"),
+    ("interface in C", "core/include/trihedron.h", r"TRIHEDRON_INTERFACE_VERSION (\d+)u"),
+])
+def test_page_of_formats_tells_the_versions_of_the_sources(row, source, pattern):
+    told = re.findall(rf"^\| {re.escape(row)}[^|]*\| (\d+) \|", (ROOT / "docs/formats.md").read_text(), re.M)
+    assert told == re.findall(pattern, (ROOT / source).read_text(), re.M)

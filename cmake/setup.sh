@@ -28,13 +28,15 @@ flight=(gcc-arm-none-eabi libnewlib-arm-none-eabi libstdc++-arm-none-eabi-newlib
 targets=(g++-s390x-linux-gnu g++-riscv64-linux-gnu g++-multilib-sparc64-linux-gnu qemu-user)
 # Program and tests under sanitizers, the coverage of core, libFuzzer.
 sanitizers=(clang-16 libclang-rt-16-dev llvm-16)
+# Debian packages and the root of an OCI image, and what tries them.
+packaging=(debhelper fakeroot lintian mmdebstrap buildah python3 python3-venv)
 lint=(git ca-certificates cppcheck python3 python3-venv)
 
 packages=()
 for name in ${*:-program tests sanitizers flight lint python}; do
   case $name in
-    program|tests|sanitizers|flight|targets|lint|docs|interop|python|peers) declare -n members=$name && packages+=("${members[@]}") ;;
-    *) echo "setup: no group \"$name\"; there are program, tests, sanitizers, flight, targets, lint, docs, interop, python, peers" >&2; exit 2 ;;
+    program|tests|sanitizers|flight|targets|lint|docs|interop|python|peers|packaging) declare -n members=$name && packages+=("${members[@]}") ;;
+    *) echo "setup: no group \"$name\"; there are program, tests, sanitizers, flight, targets, lint, docs, interop, python, peers, packaging" >&2; exit 2 ;;
   esac
   if [ "$name" = program ]; then program_wanted=yes; fi
 done

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cctype>
 #include <iterator>
 #include <span>
 #include <utility>
@@ -97,10 +98,6 @@ std::string synopsis_of(const CLI::App& command, const std::string& name) {
   return text + (options_of(command, false).empty() ? "" : " [options]");
 }
 
-std::vector<const CLI::App*> commands_of(const CLI::App& program) {
-  return program.get_subcommands([](const CLI::App* sub) { return !sub->get_name().empty(); });
-}
-
 std::string entry(std::string_view term, std::string_view meaning) {
   std::string text = fmt::format("  {}", term);
   const std::size_t end = 2 + width(term);
@@ -137,6 +134,29 @@ void man_options(std::string& page, const std::vector<const CLI::Option*>& optio
   for (const CLI::Option* option : options) {
     page += fmt::format(".TP\n.B {}\n{}\n", roff(term_of(*option)), roff(meaning_of(*option)));
   }
+}
+
+std::string man_head(std::string_view name, std::string_view about) {
+  std::string title(name);
+  std::ranges::transform(title, title.begin(), [](unsigned char c) { return static_cast<char>(std::toupper(c)); });
+  return fmt::format(".TH {} 1 \"\" \"trihedron {}\" \"User Commands\"\n.ad l\n.SH NAME\n{} \\- {}\n.SH SYNOPSIS\n",
+                     roff(title), roff(TRIHEDRON_VERSION), roff(name), roff(about));
+}
+
+/// As they are.
+std::string man_lines(std::string_view lines) {
+  return lines.empty() ? "" : fmt::format(".PP\n.nf\n{}\n.fi\n", roff(lines));
+}
+
+std::string man_tail() {
+  std::string text = ".SH EXIT STATUS\n";
+  for (const auto& [status, meaning] : kExitStatuses) {
+    text += fmt::format(".TP\n.B {}\n{}\n", status, roff(meaning));
+  }
+  return text +
+         ".SH ENVIRONMENT\n.TP\n.B NO_COLOR\nWhere it is set, nothing is coloured; nothing is anyway where the output "
+         "is no "
+         "terminal.\n";
 }
 
 void markdown_options(std::string& page, const std::vector<const CLI::Option*>& options) {
@@ -211,7 +231,7 @@ _trihedron() {{
     "") words="{}" ;;
 {}    *) ;;
   esac
-  if [[ -z $words && ( $word == -* || $command == schema || $command == completion ) ]]; then words=$options; fi
+  if [[ -z $words && ( $word == -* || $command == schema || $command == man || $command == completion ) ]]; then words=$options; fi
   # Words of options, such as vsh:2, hold a colon, which bash takes for the end of a word: only what follows it is completed.
   COMPREPLY=($(compgen -W "$words" -- "$word"))
   if [[ -z $words ]]; then compopt -o default; fi
@@ -352,32 +372,40 @@ std::string HelpFormatter::make_help(const CLI::App* command, std::string name, 
   return text;
 }
 
+std::vector<const CLI::App*> commands_of(const CLI::App& program) {
+  return program.get_subcommands([](const CLI::App* sub) { return !sub->get_name().empty(); });
+}
+
 std::string man_page(const CLI::App& program) {
-  std::string page = fmt::format(
-      ".TH TRIHEDRON 1 \"\" \"trihedron {}\" \"User Commands\"\n.SH NAME\ntrihedron \\- {}\n.SH SYNOPSIS\n.B "
-      "trihedron\n"
-      ".I COMMAND\n[options]\n.SH OPTIONS OF EVERY COMMAND\n",
-      roff(TRIHEDRON_VERSION), roff(program.get_description()));
+  std::string page = man_head("trihedron", program.get_description());
+  page += ".B trihedron\n.I COMMAND\n[options]\n.SH OPTIONS OF EVERY COMMAND\n";
   man_options(page, options_of(program, false));
   page += ".SH COMMANDS\n";
   for (const CLI::App* command : commands_of(program)) {
-    page += fmt::format(".SS {}\n{}\n.PP\n.nf\n{}\n.fi\n", roff(command->get_name()), roff(command->get_description()),
-                        roff(synopsis_of(*command, "trihedron " + command->get_name())));
+    page += fmt::format(".SS {}\n{}\n", roff(command->get_name()), roff(command->get_description()));
+    page += man_lines(synopsis_of(*command, "trihedron " + command->get_name()));
     man_options(page, options_of(*command, true));
     man_options(page, options_of(*command, false));
-    if (!command->get_footer().empty()) {
-      page += fmt::format(".PP\n.nf\n{}\n.fi\n", roff(command->get_footer()));
-    }
+    page += man_lines(command->get_footer());
   }
-  page += ".SH EXIT STATUS\n";
-  for (const auto& [status, meaning] : kExitStatuses) {
-    page += fmt::format(".TP\n.B {}\n{}\n", status, roff(meaning));
+  page += man_tail();
+  std::string others;
+  for (const CLI::App* command : commands_of(program)) {
+    others += fmt::format("{}.BR {} (1)", others.empty() ? "" : ",\n", roff("trihedron-" + command->get_name()));
   }
-  page +=
-      ".SH ENVIRONMENT\n.TP\n.B NO_COLOR\nWhere it is set, nothing is coloured; nothing is anyway where the output is "
-      "no "
-      "terminal.\n";
-  return page;
+  return page + ".SH SEE ALSO\n" + others + "\n";
+}
+
+std::string man_page(const CLI::App& program, const CLI::App& command) {
+  const std::string& name = command.get_name();
+  std::string page = man_head("trihedron-" + name, command.get_description());
+  page += fmt::format(".B {}\n.SH OPTIONS\n", roff(synopsis_of(command, "trihedron " + name)));
+  man_options(page, options_of(command, true));
+  man_options(page, options_of(command, false));
+  page += ".SH OPTIONS OF EVERY COMMAND\n";
+  man_options(page, options_of(program, false));
+  page += command.get_footer().empty() ? "" : ".SH EXAMPLES\n" + man_lines(command.get_footer());
+  return page + man_tail() + ".SH SEE ALSO\n.BR trihedron (1)\n";
 }
 
 std::string markdown(const CLI::App& program) {

@@ -7,6 +7,7 @@
 #include <span>
 #include <string>
 #include <string_view>
+#include <vector>
 
 namespace trihedron::cli {
 
@@ -19,6 +20,10 @@ class HelpFormatter : public CLI::FormatterBase {
 
 /// trihedron.1, for man.
 [[nodiscard]] std::string man_page(const CLI::App& program);
+/// trihedron-COMMAND.1, of one of its commands.
+[[nodiscard]] std::string man_page(const CLI::App& program, const CLI::App& command);
+/// In the order of the help.
+[[nodiscard]] std::vector<const CLI::App*> commands_of(const CLI::App& program);
 
 /// docs/commands.md.
 [[nodiscard]] std::string markdown(const CLI::App& program);

@@ -49,18 +49,38 @@ void add_schema(CLI::App& program, int& exit_status) {
   });
 }
 
+void add_man(CLI::App& program, int& exit_status) {
+  auto name = std::make_shared<std::string>();
+  auto as_markdown = std::make_shared<bool>(false);
+  CLI::App* man = program.add_subcommand("man", "Print a manual page");
+  // Words for the completion; those of the two commands that are not yet added as well.
+  std::string words;
+  for (const CLI::App* command : commands_of(program)) {
+    words += command->get_name() + "|";
+  }
+  man->add_option("COMMAND", *name, "Of which; without it the page of all")->type_name(words + "completion");
+  man->add_flag("--markdown", *as_markdown, "All as Markdown, docs/commands.md");
+  man->footer(
+      "trihedron man > trihedron.1 && man ./trihedron.1\ntrihedron man calibrate > calibrate.1 && man ./calibrate.1");
+  man->callback([&program, &exit_status, name, as_markdown] {
+    const std::vector<const CLI::App*> commands = commands_of(program);
+    const auto command = std::ranges::find(commands, *name, [](const CLI::App* its) { return its->get_name(); });
+    if (!name->empty() && (command == commands.end() || *as_markdown)) {
+      throw io::UsageError(*as_markdown ? "--markdown is of all commands; leave out COMMAND"
+                                        : fmt::format("there is no command {}; see trihedron --help", *name));
+    }
+    print_data(stdout, *as_markdown    ? markdown(program)
+                       : name->empty() ? man_page(program)
+                                       : man_page(program, **command));
+    exit_status = kTrustworthy;
+  });
+}
+
 }  // namespace
 
 void add_references(CLI::App& program, int& exit_status) {
   add_schema(program, exit_status);
-  auto as_markdown = std::make_shared<bool>(false);
-  CLI::App* man = program.add_subcommand("man", "Print the manual page");
-  man->add_flag("--markdown", *as_markdown, "As Markdown, docs/commands.md");
-  man->footer("trihedron man > trihedron.1 && man ./trihedron.1");
-  man->callback([&program, &exit_status, as_markdown] {
-    print_data(stdout, *as_markdown ? markdown(program) : man_page(program));
-    exit_status = kTrustworthy;
-  });
+  add_man(program, exit_status);
 
   auto shell = std::make_shared<std::string>();
   CLI::App* completions = program.add_subcommand("completion", "Print a script that completes commands and options");

@@ -237,6 +237,7 @@ def test_ten_minutes_say_in_the_first_line_what_they_are_good_for_and_by_the_sta
     assert 'need = "5arcmin for 270min"' in (tmp_path / "out" / "effective-config.toml").read_text()
 
 
+@pytest.mark.long
 def test_navigate_says_how_long_the_attitude_will_hold(calibrated, tmp_path):
     out, _ = calibrated
     options = ("navigate", EXAMPLE, "--calibration", out / "calibration.json", "-o", tmp_path / "attitude.csv")

@@ -223,8 +223,8 @@ def test_a_pass_as_space_packets_is_the_same_pass(flown, tmp_path):
     for name in ("calibration.json", "attitude.csv"):
         assert (tmp_path / "out" / name).read_text() == (flown / "out" / name).read_text()
     # With an earlier calibration, which goes along, and from packets to packets.
-    (tmp_path / "p.toml").write_text(f'[pass]\nprior = "{flown / "out" / "calibration.json"}"\n' +
-                                     (tmp_path / "p.toml").read_text().replace("[pass]\n", ""))
+    (tmp_path / "p.toml").write_text(
+        (tmp_path / "p.toml").read_text().replace("[pass]\n", f'[pass]\nprior = "{flown / "out" / "calibration.json"}"\n', 1))
     done("export", tmp_path / "p.toml", "--format", "packets", "-o", tmp_path / "again.ccsds", "--apid", "40")
     assert (tmp_path / "again.ccsds").read_bytes() == (tmp_path / "p.ccsds").read_bytes()
     assert 'prior = "again.prior.json"' in (tmp_path / "again.toml").read_text()

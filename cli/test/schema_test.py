@@ -231,6 +231,29 @@ def test_values_out_of_range_are_refused_by_schema_and_reader(flown, name, key, 
     assert refused_by_reader(edited, name, flown)
 
 
+@pytest.mark.parametrize("name", ["config", "scenario", "pass"])
+@pytest.mark.parametrize("version", ["0", "2", "1.0", '"1"'])
+def test_another_version_is_refused_with_both(flown, name, version):
+    text = {"config": CONFIG, "scenario": PAPER, "pass": (flown / "pass" / "pass.toml").read_text()}[name]
+    plain_text = re.sub(r"^version = .*\n", "", text, flags=re.MULTILINE)
+    edited = f"version = {version}\n" + plain_text
+    assert is_valid(toml("version = 1\n" + plain_text), name)
+    assert refused_by_reader(edited, name, flown)
+    if version != "1.0":  # the same number in JSON
+        assert not is_valid(toml(edited), name)
+
+
+def test_files_of_another_version_are_refused_with_both_versions(tmp_path):
+    """Those that name other files, and what is asked of a version that no reader here has."""
+    for example, command in ((ROOT / "examples" / "campaign.toml", ("campaign", "-o", tmp_path / "out")),
+                             (ROOT / "examples" / "telemetry" / "telemetry.toml", ("inspect",))):
+        file = tmp_path / example.name
+        file.write_text("version = 2\n" + example.read_text())
+        result = run(command[0], file, *command[1:])
+        assert result.returncode == INPUT_REFUSED
+        assert f'{file}:1:11: "version" is 2, this program reads 1; use the program that wrote the file' in result.stderr
+
+
 @pytest.mark.parametrize("name, key", [("pass", "spacecraft"), ("pass", "duration_s"), ("pass", "readout_noise_rad"), ("pass", "noise_rad")])
 def test_missing_keys_are_refused_by_schema_and_reader(flown, name, key):
     text = re.sub(rf"^{key} = .*\n", "", (flown / "pass" / "pass.toml").read_text(), count=1, flags=re.MULTILINE)

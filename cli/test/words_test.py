@@ -9,7 +9,7 @@ import subprocess
 
 import pytest
 
-from program import DO_NOT_USE, INPUT_REFUSED, MACHINE_FAILED, PROGRAM, ROOT, TOLD, TRUSTWORTHY, WRONG_USAGE, run
+from program import DO_NOT_USE, INPUT_REFUSED, MACHINE_FAILED, PROGRAM, ROOT, TOLD, TRUSTWORTHY, WRONG_USAGE, refused, run
 
 COMMANDS = ["simulate", "inspect", "calibrate", "navigate", "replay", "evaluate", "observe", "campaign", "history", "export", "import",
             "demo", "schema", "man", "completion"]
@@ -76,11 +76,11 @@ NONE = re.compile(r"(?<![a-z])(nan|inf)(?![a-z])", re.IGNORECASE)
     SCENARIO + '[star_tracker]\noutages = [{begin = "30s", end = "20min"}]\n',
     SCENARIO.replace("20min", "61s"),
 ], ids=["every fix wrong", "hardly any fix", "a minute"])
-@pytest.mark.parametrize("estimator", ["invariant", "paper", "batch"])
-def test_a_number_that_is_none_is_said_in_words(flown, tmp_path, scenario, estimator):
+def test_a_number_that_is_none_is_said_in_words(flown, tmp_path, scenario):
     poor = with_scenario(tmp_path, "poor", scenario)
-    for arguments in (("calibrate", poor, "-o", tmp_path / "out", "--estimator", estimator), ("observe", poor),
-                      ("navigate", poor, "--online", "-o", tmp_path / "a.csv"), ("evaluate", poor, "--attitude", tmp_path / "a.csv")):
+    calibrations = [("calibrate", poor, "-o", tmp_path / estimator, "--estimator", estimator) for estimator in ("invariant", "paper", "batch")]
+    for arguments in (*calibrations, ("observe", poor), ("navigate", poor, "--online", "-o", tmp_path / "a.csv"),
+                      ("evaluate", poor, "--attitude", tmp_path / "a.csv")):
         told = () if arguments[0] == "evaluate" else ("--config", flown / "told.toml")
         result = run(*arguments, *told)
         assert result.returncode in (TRUSTWORTHY, DO_NOT_USE, INPUT_REFUSED), result.stderr
@@ -88,9 +88,8 @@ def test_a_number_that_is_none_is_said_in_words(flown, tmp_path, scenario, estim
         as_json = run("--json", *arguments, *told)
         if as_json.returncode != INPUT_REFUSED:
             json.loads(as_json.stdout, parse_constant=pytest.fail)  # no NaN, no Infinity
-    if (tmp_path / "out" / "report.html").exists():
-        page = (tmp_path / "out" / "report.html").read_text()
-        tables = re.sub(r"<script.*?</script>|<style.*?</style>", "", page, flags=re.DOTALL)
+    for report in tmp_path.glob("*/report.html"):
+        tables = re.sub(r"<script.*?</script>|<style.*?</style>", "", report.read_text(), flags=re.DOTALL)
         assert not NONE.search(re.sub(r"<[^>]*>", " ", tables))
 
 
@@ -174,7 +173,32 @@ def test_the_manual_page_has_every_command_and_option():
         assert f".SS {command}\n" in page
     for option in set(re.findall(r"^  (?:-\w, )?(--[\w-]+)", run("calibrate", "--help").stdout, re.MULTILINE)):
         assert option.replace("-", "\\-") in page
-    assert not re.search(r"^['.](?!TH|SH|SS|TP|B |I |PP|nf|fi)", page, re.MULTILINE)
+    assert not re.search(r"^['.](?!TH|ad l|SH|SS|TP|B |BR |I |PP|nf|fi)", page, re.MULTILINE)
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_each_command_has_a_manual_page_with_its_options(command):
+    page = run("man", command).stdout
+    assert page.startswith(f".TH TRIHEDRON\\-{command.upper()} 1 ")
+    assert f".SH NAME\ntrihedron\\-{command} \\- " in page and ".SH EXIT STATUS\n" in page
+    for option in set(re.findall(r"^  (?:-\w, )?(--[\w-]+)", run(command, "--help").stdout, re.MULTILINE)):
+        assert option.replace("-", "\\-") in page, option
+    assert not re.search(r"^['.](?!TH|ad l|SH|TP|B |BR |I |PP|nf|fi)", page, re.MULTILINE)
+
+
+def test_a_manual_page_of_no_command_is_refused():
+    refused(run("man", "calibrat"), WRONG_USAGE, "there is no command calibrat")
+    refused(run("man", "calibrate", "--markdown"), WRONG_USAGE, "leave out COMMAND")
+
+
+@pytest.mark.skipif(not shutil.which("man"), reason="no man here")
+@pytest.mark.parametrize("command", [(), ("calibrate",), ("schema",)])
+def test_manual_pages_are_set_without_a_warning(command, tmp_path):
+    page = tmp_path / "page.1"
+    page.write_text(run("man", *command).stdout)
+    result = subprocess.run(["man", "--warnings=all", "--local-file", page], capture_output=True, text=True,
+                            env={**os.environ, "LC_ALL": "C.UTF-8", "MANWIDTH": "80", "MANROFFOPT": ""})
+    assert result.returncode == 0 and result.stderr == "", result.stderr
 
 
 def completed(*words):
@@ -191,6 +215,7 @@ def test_bash_completes_commands_options_and_their_words():
     assert completed("calibrate", "--estimator", "") == ["invariant", "paper", "batch"]
     assert "continuous" in completed("navigate", "p", "--correction-interval", "")
     assert "history-output" in completed("schema", "hist")
+    assert completed("man", "cal") == ["calibrate"]
     assert completed("completion", "z") == ["zsh"]
 
 

@@ -2,7 +2,9 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <limits>
+#include <random>
 
 #include "trihedron/core/fix_queue.hpp"
 #include "trihedron/core/schedule.hpp"
@@ -134,6 +136,52 @@ TEST(GyroHealth, IsStuckOnlyAfterASecondHoweverManySamplesThereAre) {
   look_on(health, 1, 1.005, 0.02, true);
   EXPECT_EQ(health.states()[1], GyroState::kStuck);
   EXPECT_EQ(health.states()[0], GyroState::kUsed);
+}
+
+/// Readings of one gyro at 8 Hz: turning by `rate` rad/s until it stands at `stops_s`; noise in arcseconds, rounded to
+/// `resolution`. Calls `look` after each.
+template <class Look>
+void turning(double rate_rad_s, double stops_s, double resolution, double until_s, Look&& look) {
+  constexpr double kNoise_rad = 1e-5;
+  GyroHealth health(2);
+  std::mt19937_64 random(3);
+  std::normal_distribution<double> noise(0, kNoise_rad);
+  GyroSample sample;
+  for (double t_s = 0; t_s < until_s; t_s += 0.125) {
+    sample.t = second(t_s);
+    const double angle = rate_rad_s * t_s;
+    const Eigen::Vector3d turned(std::cos(angle), std::sin(angle), 0);
+    const auto reading = [&](const Eigen::Vector3d& h) {
+      Eigen::Vector3d seen = h;
+      for (double& x : seen) {
+        x = std::round((x + noise(random)) / resolution) * resolution;
+      }
+      return seen;
+    };
+    sample.h_b[0] = reading(Eigen::Vector3d::UnitZ());
+    sample.h_b[1] = t_s < stops_s ? reading(turned) : sample.h_b[1];
+    health.look_at(sample);
+    look(t_s, health);
+  }
+}
+
+/// An orbit of 95 minutes turns by 28″ between two samples: a reading that repeats itself twice is stuck. Rounding
+/// alone makes readings repeat themselves, too, moving or not.
+TEST(GyroHealth, IsStuckAtOnceWhenAReadingThatMovedStops) {
+  constexpr double kOrbital_rad_s = 1.1e-3;
+  constexpr double kNever_s = 1e9;
+  turning(kOrbital_rad_s, 60, 1e-12, 61, [](double t_s, const GyroHealth& health) {
+    EXPECT_EQ(health.states()[0], GyroState::kUsed);
+    EXPECT_EQ(health.states()[1], t_s >= 60.375 ? GyroState::kStuck
+                                  : t_s < 60    ? GyroState::kUsed
+                                                : health.states()[1])
+        << t_s;
+  });
+  for (const double resolution : {1e-5, 1e-4, 1e-3}) {
+    turning(kOrbital_rad_s, kNever_s, resolution, 600, [&](double t_s, const GyroHealth& health) {
+      EXPECT_EQ(health.states()[1], GyroState::kUsed) << t_s << " s, rounded to " << resolution;
+    });
+  }
 }
 
 TEST(GyroHealth, TakesStuckStretchesTogetherThatAreNearEachOther) {

@@ -85,22 +85,22 @@ TEST(Precession, SensitivitiesMatchCentralDifferences) {
   constexpr int kSteps = 24000;
 
   // Readings are what was telemetered: they do not move with the model's errors.
+  std::vector<Eigen::Matrix3d> attitudes;
   std::vector<Eigen::Vector3d> readings;
   {
     Gyro g = gyro;
     for (int i = 0; i < kSteps; ++i) {
-      const Eigen::Matrix3d C_in_c = attitude_at((i + 0.5) * kTotal_s / kSteps);
+      const Eigen::Matrix3d C_in_c = attitudes.emplace_back(attitude_at((i + 0.5) * kTotal_s / kSteps));
       readings.emplace_back(g.C_c_b.transpose() * C_in_c.transpose() * g.h_in);
       precess(g, kEq1, C_in_c, readings.back(), 0, kTotal_s / kSteps);
     }
   }
   const auto replay = [&](Gyro g, Sensitivities* s) {
-    for (int i = 0; i < kSteps; ++i) {
-      const Eigen::Matrix3d C_in_c = attitude_at((i + 0.5) * kTotal_s / kSteps);
+    for (std::size_t i = 0; i < readings.size(); ++i) {
       if (s != nullptr) {
-        precess(g, *s, kEq1, C_in_c, readings[static_cast<std::size_t>(i)], 0, kTotal_s / kSteps);
+        precess(g, *s, kEq1, attitudes[i], readings[i], 0, kTotal_s / kSteps);
       } else {
-        precess(g, kEq1, C_in_c, readings[static_cast<std::size_t>(i)], 0, kTotal_s / kSteps);
+        precess(g, kEq1, attitudes[i], readings[i], 0, kTotal_s / kSteps);
       }
     }
     return g.h_in;

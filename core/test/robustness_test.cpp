@@ -474,7 +474,7 @@ TEST(StuckGyro, OfThreeIsLeftOutWhileItIsStuck) {
     stick(stuck.samples, gyro, 900, 1500);
     const auto on_board = every_fix<Full>(kThree);
     const GyroOutcome with = outcome(stuck.samples, flight.pair, *on_board, gyro, 900);
-    EXPECT_NEAR(with.first_not_used_s, 902, 0.2);
+    EXPECT_NEAR(with.first_not_used_s, 900, 0.3);  // it had moved
     EXPECT_EQ(with.too_few + with.too_few_fixes, 0);
     EXPECT_LE(with.rejected, 2);  // those of the seconds before it is known
     EXPECT_GE(with.used, without.used - 2);
@@ -510,16 +510,16 @@ TEST(StuckGyro, OfAPairStopsItUntilItLivesAgain) {
   stick(stuck.samples, 1, 900, 1200);
   const auto on_board = every_fix<Pair>();
   const GyroOutcome sum = outcome(stuck.samples, flight, *on_board, 1, 1200);
-  EXPECT_NEAR(static_cast<double>(sum.too_few), 8 * 298, 8);
+  EXPECT_NEAR(static_cast<double>(sum.too_few), 8 * 300, 3);
   EXPECT_NEAR(static_cast<double>(sum.too_few_fixes), 100, 2);
   EXPECT_GE(sum.used, 801 - 103);
   EXPECT_LE(sum.rejected, 2);
-  EXPECT_LT(momentum_error(*on_board, flight), 2 * test::kArcsecond);
+  EXPECT_LT(momentum_error(*on_board, flight), 2.5 * test::kArcsecond);
   EXPECT_LT(sum.worst_rad, 60 * test::kArcsecond);
 }
 
 TEST(StuckGyro, OfAPairWhenTheAnglesAreDuePutsThemOff) {
-  // The stretch begins half a second before a look, and is known two seconds after its beginning.
+  // The stretch begins half a second before a look.
   test::Flight flight({.duration_s = 400});
   flight.fixes.resize(60);  // until 177 s: looks at 237, 240, … s
   stick(flight.samples, 1, 239.5, 300);

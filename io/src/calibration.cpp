@@ -498,12 +498,6 @@ void check_format(const JsonNode& node) {
   }
 }
 
-void check_version(const JsonNode& node) {
-  if (const double version = node.number(); version != kVersion) {
-    node.refuse(fmt::format("is {}", version), fmt::format("this program reads version {}", kVersion));
-  }
-}
-
 void read_time(const JsonNode& node, Calibration& calibration) {
   const double t_s = node.number(limits::kTimeOfCalibration_s);
   calibration.t = calibration.epoch + from_seconds(t_s);
@@ -559,7 +553,7 @@ Members calibration_members(Calibration& calibration) {
   const Json statistic = {{"type", Json::array({"number", "null"})}};
   return {
       {"format", "", {{"const", kFormat}}, check_format},
-      {"version", "", {{"const", kVersion}}, check_version},
+      version_member(kVersion),
       {"estimator", "how it was made", estimator_schema(),
        [&](const JsonNode& node) { calibration.estimator = parse_estimator(node); }},
       {"epoch_tai", "start of the pass, TAI", epoch_schema(),

@@ -672,8 +672,8 @@ Json campaign_schema() {
   Origin calibration;
   const toml::table* vary = nullptr;
   const fs::path file;
-  return document_schema("Campaign", "Monte Carlo over scenarios: what is drawn for each run (TOML).",
-                         schema_of(campaign_fields(head, base, calibration, vary, file)));
+  return toml_file_schema("Campaign", "Monte Carlo over scenarios: what is drawn for each run (TOML).",
+                          schema_of(campaign_fields(head, base, calibration, vary, file)));
 }
 
 }  // namespace trihedron::io

@@ -9,6 +9,7 @@
 #include <array>
 #include <cerrno>
 #include <cmath>
+#include <fstream>
 #include <map>
 #include <system_error>
 #include <utility>
@@ -127,6 +128,14 @@ SQLite::Database opened_to_write(const fs::path& file) {
   return database;
 }
 
+/// Whether the head of the database says so: its byte 18 is the version of the format to write by, of which 1 and 2 are
+/// known.
+bool must_not_be_written(const fs::path& file) {
+  std::array<char, 19> head{};
+  return std::ifstream(file, std::ios::binary).read(head.data(), head.size()) &&
+         static_cast<unsigned char>(head.back()) > 2;
+}
+
 /// Calls `work` and turns the faults of SQLite into those of this module: InputRefused for a file that is no whole
 /// database, MachineFailed when the disk fails or another program holds the file.
 template <class Work>
@@ -145,7 +154,8 @@ auto told_of(const fs::path& file, const Work& work) {
         throw InputRefused(file, {}, fmt::format("is damaged or no database: {}", fault.what()),
                            "restore it from a copy, or give the name of a new one");
       case SQLITE_READONLY:
-        if (::access(file.c_str(), W_OK) == 0) {  // the head of the file says so itself
+        // Also where the disk let SQLite open the file for reading alone.
+        if (must_not_be_written(file)) {
           throw InputRefused(file, {}, "can only be read: it is damaged, or of a later SQLite",
                              "restore it from a copy, or give the name of a new one");
         }

@@ -232,13 +232,14 @@ Json config_table_schema() {
 }
 
 Json config_schema() {
-  return document_schema("Settings", "What --config takes (TOML). What is left out keeps its default.",
-                         config_table_schema());
+  return toml_file_schema("Settings", "What --config takes (TOML). What is left out keeps its default.",
+                          config_table_schema());
 }
 
 std::string format_config(const CalibrationOptions& options) {
   const Json schema = config_schema();
   Writer out(schema);
+  out.number(kVersionKey, kTomlVersion);
   out.word("estimator", name_of(options.estimator));
   out.word("drift_model", drift_model_word(options));
   out.word(kNeed, options.need ? format_need(*options.need) : std::string(kNoNeed));

@@ -104,6 +104,14 @@ Member optional_member(Member member) {
   return member;
 }
 
+Member version_member(int version) {
+  return {"version", "of the format", {{"const", version}}, [version](const JsonNode& node) {
+            if (const double found = node.number(); found != version) {
+              node.refuse(fmt::format("is {}", found), fmt::format("this program reads version {}", version));
+            }
+          }};
+}
+
 Json document_schema(std::string_view title, std::string_view about, const Json& schema) {
   Json document = {
       {"$schema", "https://json-schema.org/draft/2020-12/schema"}, {"title", title}, {"description", about}};

@@ -63,6 +63,9 @@ void read_members(const JsonNode& object, const Members& members);
 /// Schema of an object with these members, and others.
 [[nodiscard]] Json schema_of(const Members& members);
 
+/// "version", of the format of the file, which must be this one.
+[[nodiscard]] Member version_member(int version);
+
 [[nodiscard]] Member optional_member(Member member);
 
 /// The schema of a whole file.

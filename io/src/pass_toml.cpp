@@ -373,8 +373,8 @@ Json pass_schema() {
   PassSettings settings;
   std::optional<std::string> prior_name;
   const fs::path file;
-  return document_schema("Pass", "pass.toml: when and how the telemetry was taken, and what is known before.",
-                         schema_of(file_fields(settings, prior_name, file, Told::kAll)));
+  return toml_file_schema("Pass", "pass.toml: when and how the telemetry was taken, and what is known before.",
+                          schema_of(file_fields(settings, prior_name, file, Told::kAll)));
 }
 
 void check_prior(const Calibration& prior, const fs::path& prior_file, int gyros) {
@@ -394,8 +394,9 @@ std::string format_text(const std::string& text) {
 std::string format_pass_toml(const PassSettings& settings, std::string_view prior_file) {
   const GyroPrior common = settings.gyros.empty() ? GyroPrior{} : settings.gyros.front();
   std::string text =
-      fmt::format("# One pass of telemetry.\n[pass]\nspacecraft = {}\nepoch_tai = \"{}\"\nduration_s = {}\n",
-                  format_text(settings.spacecraft), format_epoch(settings.epoch), format_seconds(settings.duration));
+      fmt::format("# One pass of telemetry.\n{} = {}\n\n[pass]\nspacecraft = {}\nepoch_tai = \"{}\"\nduration_s = {}\n",
+                  kVersionKey, kTomlVersion, format_text(settings.spacecraft), format_epoch(settings.epoch),
+                  format_seconds(settings.duration));
   if (!settings.inertial_frame.empty()) {
     text += fmt::format("{} = {}\n", kInertialFrame, format_text(settings.inertial_frame));
   }

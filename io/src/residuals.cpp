@@ -10,6 +10,8 @@ namespace trihedron::io {
 void write_residuals(const std::filesystem::path& path, Time epoch, std::span<const Table> tables) {
   NetcdfWriter file(path);
   file.write_attribute("", "Conventions", "CF-1.8");
+  file.write_attribute("", "format", "trihedron-residuals");
+  file.write_attribute("", "version", "1");
   file.write_attribute("", "title", "Residuals of a gyro calibration");
   file.write_attribute("", "epoch_tai", format_epoch(epoch));
   for (const Table& table : tables) {

@@ -149,6 +149,8 @@ void write_run_table(const fs::path& file, const CampaignPlan& plan, std::string
 
   NetcdfWriter writer(file);
   writer.write_attribute("", "Conventions", "CF-1.10");
+  writer.write_attribute("", "format", "trihedron-campaign-runs");
+  writer.write_attribute("", "version", "1");
   writer.write_attribute("", "title", plan.name);
   writer.write_attribute("", "source",
                          "trihedron campaign: simulated passes, calibrated and compared with their truth");

@@ -377,10 +377,10 @@ Json scenario_table_schema() {
 }
 
 Json scenario_schema() {
-  return document_schema("Scenario",
-                         "What a simulated pass is made of (TOML). What is left out keeps its default, which is the "
-                         "paper's experiment.",
-                         scenario_table_schema());
+  return toml_file_schema("Scenario",
+                          "What a simulated pass is made of (TOML). What is left out keeps its default, which is the "
+                          "paper's experiment.",
+                          scenario_table_schema());
 }
 
 }  // namespace trihedron::io

@@ -472,7 +472,7 @@ Json telemetry_schema() {
   PassSettings settings;
   std::optional<std::string> prior_name;
   const fs::path file;
-  return document_schema(
+  return toml_file_schema(
       "Telemetry", "telemetry.toml: where the columns of a pass are and what they mean, beside what pass.toml says.",
       schema_of(telemetry_settings_fields(settings, prior_name, file) + Fields{telemetry(map, file)}));
 }

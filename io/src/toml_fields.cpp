@@ -64,6 +64,13 @@ Json schema_of(const Fields& fields) {
   return schema;
 }
 
+Json toml_file_schema(std::string_view title, std::string_view about, const Json& schema) {
+  Json document = document_schema(title, about, schema);
+  document["properties"][std::string(kVersionKey)] = {{"const", kTomlVersion},
+                                                      {"description", "of the format; before all tables"}};
+  return document;
+}
+
 Field required(Field field) {
   field.is_required = true;
   return field;

@@ -39,6 +39,9 @@ void read_fields(const toml::table& table, const std::filesystem::path& file, co
 /// Schema of a table with these keys and no other.
 [[nodiscard]] Json schema_of(const Fields& fields);
 
+/// Of a whole file, whose tables are `schema`.
+[[nodiscard]] Json toml_file_schema(std::string_view title, std::string_view about, const Json& schema);
+
 [[nodiscard]] Field required(Field field);
 
 // Values. A target is written when the key is read, and must live until then.

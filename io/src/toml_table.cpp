@@ -32,6 +32,18 @@ std::string_view type_of(const toml::node& node) {
   }
 }
 
+void check_version(const TomlTable& root, const toml::node& node) {
+  const auto* const version = node.as_integer();
+  if (version == nullptr) {
+    root.refuse(node, fmt::format("\"{}\" is {}", kVersionKey, type_of(node)),
+                fmt::format("make it a whole number, {}", kTomlVersion));
+  }
+  if (version->get() != kTomlVersion) {
+    root.refuse(node, fmt::format("\"{}\" is {}, this program reads {}", kVersionKey, version->get(), kTomlVersion),
+                "use the program that wrote the file, or a newer one");
+  }
+}
+
 }  // namespace
 
 void TomlTable::expect_known(const std::vector<std::string_view>& known) const {
@@ -102,7 +114,12 @@ void TomlTable::refuse(const toml::node& node, std::string reason, std::string c
 
 toml::table parse_toml(std::string_view text, const std::filesystem::path& file) {
   try {
-    return toml::parse(text, file.string());
+    toml::table document = toml::parse(text, file.string());
+    if (const toml::node* const version = document.get(kVersionKey)) {
+      check_version(TomlTable(document, file, "the file"), *version);
+      document.erase(kVersionKey);
+    }
+    return document;
   } catch (const toml::parse_error& error) {
     throw InputRefused(file, position_of(error.source()), std::string(error.description()), "repair the TOML syntax");
   }

@@ -46,7 +46,12 @@ class TomlTable {
   std::string name_;
 };
 
-/// Throws InputRefused with the place of a syntax error.
+/// The key before all tables that holds the version of the format, and the one that is read and written;
+/// docs/formats.md.
+inline constexpr std::string_view kVersionKey = "version";
+inline constexpr std::int64_t kTomlVersion = 1;
+
+/// Without the version, which is checked. Throws InputRefused with the place of a syntax error, or of another version.
 [[nodiscard]] toml::table parse_toml(std::string_view text, const std::filesystem::path& file);
 
 }  // namespace trihedron::io

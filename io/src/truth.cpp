@@ -13,6 +13,7 @@
 namespace trihedron::io {
 namespace {
 
+constexpr int kTruthVersion = 1;
 constexpr const char* kConvention =
     "v_c = Exp([lambda x]) v_b; q rotates c to in, Hamilton, scalar last; drift order k0 mu12 mu23 mu31 nu12 nu23 nu31";
 
@@ -110,7 +111,8 @@ Members truth_members(Truth& truth) {
   Truth::StarTracker head;
   std::vector<double> unmodelled;
   std::vector<std::string> names;
-  return {optional_member({"convention", "", text_schema(), [](const JsonNode&) {}}),
+  return {optional_member(version_member(kTruthVersion)),
+          optional_member({"convention", "", text_schema(), [](const JsonNode&) {}}),
           optional_member({"orbital_rate_rad_s", "of the mean argument of latitude", number_schema(),
                            [&truth](const JsonNode& node) { truth.orbital_rate_rad_s = node.number(); }}),
           {"gyros", "one element per gyro", array_of(schema_of(gyro_members(gyro, unmodelled, names))),
@@ -148,9 +150,10 @@ std::string format_truth_parameters(const Truth& truth) {
     heads.push_back(star_tracker_json(head));
   }
   return fmt::format(
-      "{{\n \"convention\": \"{}\",\n \"orbital_rate_rad_s\": {},\n \"gyros\": [{}\n ],\n \"star_trackers\": [{}\n "
+      "{{\n \"version\": {},\n \"convention\": \"{}\",\n \"orbital_rate_rad_s\": {},\n \"gyros\": [{}\n ],\n "
+      "\"star_trackers\": [{}\n "
       "]\n}}\n",
-      kConvention, dump(Json(truth.orbital_rate_rad_s)), lines_of(gyros), lines_of(heads));
+      kTruthVersion, kConvention, dump(Json(truth.orbital_rate_rad_s)), lines_of(gyros), lines_of(heads));
 }
 
 Json truth_schema() {

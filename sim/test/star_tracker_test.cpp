@@ -153,12 +153,12 @@ TEST_F(StarTracker, FixStampedTHoldsTheAttitudeOfTheClockOffsetLater) {
   head.clock_offset_s = 0.25;
   head.latency_s = 0.1;
   const StarTrackerTelemetry all = fixes(head);
+  const std::vector<Vector3d> error = errors(all);
   double most = 0;
-  for (std::size_t i = 0; i < all.size(); ++i) {
+  for (std::size_t i = 0; i < all.size(); i += 101) {
     const Rot<In, C> fix = Rot<In, C>::assume(all.q_in_c[i]);
     ASSERT_LT((attitude_.at(t_s(all.t[i]) + 0.15).inverse() * fix).log().norm(), 1e-15);
-    most = std::max(most, errors(all)[i].norm());
-    i += 100;
+    most = std::max(most, error[i].norm());
   }
   EXPECT_GT(most, 1e-4);  // 1.1e-3 rad/s × 0.15 s: it does show
 }

@@ -17,6 +17,12 @@ class GyroHealth {
   /// noise, and so many equal values are no chance even in coarse telemetry.
   static constexpr int kStuckSamples = 16;
   static constexpr Duration kStuckTime = std::chrono::seconds(1);
+  /// Sooner where a reading that moved stops between two samples: it is stuck when it should have gone on by so many
+  /// times what noise and resolution have lately added to its steps.
+  static constexpr double kStepsMissing = 4;
+  /// Over which the motion of a reading is averaged, and steps after which it is known.
+  static constexpr double kMotionTime_s = 1;
+  static constexpr int kStepsOfMotion = 8;
   /// Consecutive suspicions of the same gyro after which it is isolated.
   static constexpr int kVerdicts = 5;
   /// Stuck stretches closer than this are merged.
@@ -33,11 +39,13 @@ class GyroHealth {
       if (its.alike > 0 && (h_b == its.last || (!h_b.allFinite() && !its.last.allFinite()))) {
         ++its.alike;
       } else {
+        its.follow(h_b, sample.t, last_t_);
         its.alike = 1;
         its.since = sample.t;
         its.last = h_b;
       }
-      its.stuck = its.alike >= kStuckSamples && sample.t - its.since >= kStuckTime;
+      its.stuck = its.alike > 1 &&
+                  ((its.alike >= kStuckSamples && sample.t - its.since >= kStuckTime) || its.has_stopped(sample.t));
       if (its.stuck) {
         if (!(its.stuck_from <= its.since && its.since - its.stuck_until <= kMemory)) {
           its.stuck_from = its.since;
@@ -45,6 +53,7 @@ class GyroHealth {
         its.stuck_until = sample.t;
       }
     }
+    last_t_ = sample.t;
   }
 
   /// Takes the result of a fix, or of an update by the angles: the gyro that alone does not agree with the rest, or
@@ -90,7 +99,7 @@ class GyroHealth {
   /// The clock has been set back; `t` is the time now.
   void set_clock(Time t) {
     for (Readings& its : readings_) {
-      its.since = t;
+      its.since = last_t_ = t;
       its.stuck_from = Time::max();
       its.stuck_until = Time::min();
     }
@@ -104,9 +113,35 @@ class GyroHealth {
     Time since{};  ///< of the first of them
     Time stuck_from = Time::max();
     Time stuck_until = Time::min();
+    Eigen::Vector3d motion = Eigen::Vector3d::Zero();  ///< per second, average
+    double jitter = 0;                                 ///< of late the largest part of a step that is not motion
+    int steps = 0;                                     ///< that the motion is known by
+
+    /// A reading other than the last ones, which came until `until`. The step after a stretch in which it was stuck is
+    /// not one of motion.
+    void follow(const Eigen::Vector3d& h_b, Time t, Time until) {
+      const double dt_s = to_seconds(t - since);
+      const Eigen::Vector3d step = h_b - last;
+      if (alike == 0 || stuck || !(dt_s > 0) || !step.allFinite()) {
+        return;
+      }
+      const double part = dt_s < kMotionTime_s ? dt_s / kMotionTime_s : 1;
+      // A live reading that stood still: by its resolution.
+      const double missing = motion.norm() * to_seconds(until - since);
+      const double off = (step - motion * dt_s).norm();
+      const double before = (1 - part) * jitter;
+      jitter = missing > off && missing > before ? missing : off > before ? off : before;
+      motion += part * (step / dt_s - motion);
+      steps += steps < kStepsOfMotion ? 1 : 0;
+    }
+    [[nodiscard]] bool has_stopped(Time t) const {
+      return steps == kStepsOfMotion && last.allFinite() &&
+             motion.norm() * to_seconds(t - since) > kStepsMissing * jitter;
+    }
   };
 
   int gyros_ = 0;
+  Time last_t_{};
   PerGyro<Readings> readings_;
   GyroMask selected_{};
   GyroMask isolated_{};

@@ -1,0 +1,12 @@
+# Writes into OUTPUT what PROGRAM says of itself: trihedron.1, trihedron-COMMAND.1 of each command, trihedron.bash, trihedron.zsh, trihedron.fish.
+file(REMOVE_RECURSE ${OUTPUT})
+file(MAKE_DIRECTORY ${OUTPUT})
+execute_process(COMMAND ${PROGRAM} man OUTPUT_FILE ${OUTPUT}/trihedron.1 COMMAND_ERROR_IS_FATAL ANY)
+file(STRINGS ${OUTPUT}/trihedron.1 commands REGEX "^\\.SS ")
+foreach(command IN LISTS commands)
+  string(REPLACE ".SS " "" command ${command})
+  execute_process(COMMAND ${PROGRAM} man ${command} OUTPUT_FILE ${OUTPUT}/trihedron-${command}.1 COMMAND_ERROR_IS_FATAL ANY)
+endforeach()
+foreach(shell bash zsh fish)
+  execute_process(COMMAND ${PROGRAM} completion ${shell} OUTPUT_FILE ${OUTPUT}/trihedron.${shell} COMMAND_ERROR_IS_FATAL ANY)
+endforeach()
