@@ -78,6 +78,15 @@ void write_seeds(const fs::path& directory, const fs::path& examples) {
         io::format_aem(attitude, given, truth.t.front(), description, Duration::max(), io::MessageSyntax::kXml));
   }
 
+  io::AttitudeMessage message;
+  message.attitude = attitude;
+  message.rate_rad_s = rates;
+  for (const bool xml : {false, true}) {
+    io::write_text(at("attitude_message", xml ? "one.xml" : "one.apm"),
+                   io::format_apm(message, 0, truth.t.front(), description,
+                                  xml ? io::MessageSyntax::kXml : io::MessageSyntax::kKvn));
+  }
+
   const CatalogueEntry entry{"Resurs-DK1", "pass-a", "2009-05-20", 1, io::sample_calibration()};
   fs::remove(at("catalogue", "one.db"));
   io::add_to_catalogue(at("catalogue", "one.db"), {&entry, 1});

@@ -1,6 +1,7 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include <algorithm>
 #include <filesystem>
 #include <memory>
 #include <optional>
@@ -37,6 +38,7 @@ struct ExportArguments {
   io::MessageDescription description;
   std::string gap;
   std::string attitude;
+  std::string at;
   int naif_id = io::SpiceObject{}.naif_id;
   int apid = io::kDefaultApid;
 };
@@ -132,6 +134,28 @@ void put_out(const ExportArguments& arguments, const std::string& text) {
   }
 }
 
+/// The row that --at names, or the last.
+std::size_t row_of(const ExportArguments& arguments, const io::AttitudeMessage& message, io::TimeScale scale) {
+  const std::vector<Time>& t = message.attitude.t;
+  if (arguments.at.empty()) {
+    return t.size() - 1;
+  }
+  io::TimeText::Fault fault;
+  io::TimeText clock(scale);
+  const std::optional<Time> at = clock.parse(arguments.at, fault);
+  if (!at) {
+    throw io::UsageError(fmt::format("--at: {}; {}", fault.reason, fault.cure));
+  }
+  const auto found = std::ranges::lower_bound(t, *at);
+  if (found == t.end() || *found != *at) {
+    const auto nearest =
+        found == t.end() || (found != t.begin() && *at - *(found - 1) < *found - *at) ? found - 1 : found;
+    throw io::UsageError(fmt::format("--at {}: there is no attitude at this epoch; the nearest is at {} {}",
+                                     arguments.at, clock.format(*nearest), io::name_of(scale)));
+  }
+  return static_cast<std::size_t>(found - t.begin());
+}
+
 void export_attitude(const ExportArguments& arguments, const Common& common) {
   const EpochSource epoch_source = epoch_of(arguments.epoch);
   const io::MessageDescription description = description_of(arguments, epoch_source);
@@ -152,6 +176,7 @@ void export_attitude(const ExportArguments& arguments, const Common& common) {
                              "",
                              description.object_name,
                              description.object_id};
+  const bool parameters = arguments.format.starts_with("apm");
   if (arguments.format == "ck") {
     const io::SpiceObject object = spice_object(arguments, description);
     const io::SpiceClock clock = io::SpiceClock::of(read.attitude);
@@ -159,10 +184,15 @@ void export_attitude(const ExportArguments& arguments, const Common& common) {
                                 io::format_sclk(clock, object), io::format_ck_frames(object)});
     summary.body_frame = object.frame_name();
   } else {
-    const bool xml = arguments.format == "aem-xml";
-    put_out(arguments, io::format_aem(read.attitude, read.rate_rad_s, epoch, description, gap,
-                                      xml ? io::MessageSyntax::kXml : io::MessageSyntax::kKvn));
-    summary.output_format = fmt::format("CCSDS AEM version 2, {}", xml ? "XML" : "KVN");
+    const bool xml = arguments.format.ends_with("-xml");
+    const io::MessageSyntax syntax = xml ? io::MessageSyntax::kXml : io::MessageSyntax::kKvn;
+    if (parameters) {
+      const std::size_t row = row_of(arguments, read, description.time_scale);
+      put_out(arguments, io::format_apm(read, row, epoch, description, syntax));
+    } else {
+      put_out(arguments, io::format_aem(read.attitude, read.rate_rad_s, epoch, description, gap, syntax));
+    }
+    summary.output_format = fmt::format("CCSDS {} version 2, {}", parameters ? "APM" : "AEM", xml ? "XML" : "KVN");
     summary.time_system = io::name_of(description.time_scale);
     summary.inertial_frame = description.inertial_frame;
     summary.body_frame = description.body_frame;
@@ -275,11 +305,12 @@ void add_export(CLI::App& program, const Common& common, int& exit_status) {
           "FILE", arguments->file,
           "Attitude file (CSV) or message, for acm and fk calibration.json, - for standard input; for packets a pass")
       ->required();
-  const std::vector<std::string> formats = {"aem", "aem-xml", "ck", "acm", "acm-xml", "fk", kPackets};
+  const std::vector<std::string> formats = {"aem", "aem-xml", "apm", "apm-xml", "ck", "acm", "acm-xml", "fk", kPackets};
   command
       ->add_option(
           "--format", arguments->format,
-          "What to write: of an attitude aem (text), aem-xml or ck (with .tsc and .tf beside it), of a "
+          "What to write: of an attitude aem (text), aem-xml, apm or apm-xml (of one epoch) or ck (with .tsc and .tf "
+          "beside it), of a "
           "calibration acm (text), acm-xml (with .covariance.nc beside it) or fk, of a pass packets (space packets, "
           "with .toml and .xtce.xml beside it)")
       ->required()
@@ -318,6 +349,11 @@ void add_export(CLI::App& program, const Common& common, int& exit_status) {
       ->add_option("--attitude", arguments->attitude,
                    "For acm: attitude to give as well, with its sigmas as covariance")
       ->type_name("FILE");
+  command
+      ->add_option("--at", arguments->at,
+                   "For apm: its epoch, in the time system of --time-system, at which there must be an attitude "
+                   "(default: the last)")
+      ->type_name("TIME");
   command->add_option("--naif-id", arguments->naif_id, "For ck and fk: number of the spacecraft in SPICE")
       ->capture_default_str()
       ->type_name("N");
@@ -328,12 +364,16 @@ void add_export(CLI::App& program, const Common& common, int& exit_status) {
       ->type_name("TIME");
   command->footer(
       "trihedron export attitude.csv --format aem -o attitude.aem --pass pass.nc --time-system UTC\n"
+      "trihedron export attitude.csv --format apm -o now.apm --pass pass.nc --at 2009-05-20T00:10:00\n"
       "trihedron export attitude.csv --format ck -o attitude.bc --pass pass.nc --naif-id -28380\n"
       "trihedron export out/calibration.json --format acm -o out.acm --pass pass.nc --attitude a.csv\n"
       "trihedron export out/calibration.json --format fk -o gyros.tf --object-name RESURS-DK1\n"
       "trihedron export pass.nc --format packets -o telemetry.ccsds  # read again by telemetry.toml");
   command->callback([&common, &exit_status, arguments] {
     expect_places(*arguments);
+    if (!arguments->at.empty() && !arguments->format.starts_with("apm")) {
+      throw io::UsageError("--at is for apm, which is of one epoch");
+    }
     if (arguments->format == kPackets) {
       export_pass(*arguments, common);
     } else if (arguments->format.starts_with("acm") || arguments->format == "fk") {

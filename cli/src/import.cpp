@@ -6,6 +6,7 @@
 #include <optional>
 #include <string>
 #include <system_error>
+#include <variant>
 #include <vector>
 
 #include "decisions.hpp"
@@ -15,6 +16,8 @@
 #include "trihedron/io/atomic_file.hpp"
 #include "trihedron/io/attitude.hpp"
 #include "trihedron/io/attitude_message.hpp"
+#include "trihedron/io/calibration.hpp"
+#include "trihedron/io/calibration_message.hpp"
 #include "trihedron/io/error.hpp"
 #include "trihedron/io/named_pass.hpp"
 #include "trihedron/io/time_scale.hpp"
@@ -63,9 +66,12 @@ void show_interchange(const Common& common, const InterchangeSummary& summary) {
                                   {"object_id", summary.object_id}};
   };
   show(common, as_json, [&] {
-    std::string text =
-        fmt::format("Read        {}: {}, {} epochs in {} segment{}\n", printable(summary.input), summary.input_format,
-                    summary.epochs, summary.segments, summary.segments == 1 ? "" : "s");
+    std::string text = fmt::format("Read        {}: {}", printable(summary.input), summary.input_format);
+    if (summary.segments > 0) {
+      text += fmt::format(", {} epochs in {} segment{}", summary.epochs, summary.segments,
+                          summary.segments == 1 ? "" : "s");
+    }
+    text += "\n";
     if (summary.left_out > 0) {
       text += fmt::format("  left out  {} epochs outside the useable spans\n", summary.left_out);
     }
@@ -74,7 +80,7 @@ void show_interchange(const Common& common, const InterchangeSummary& summary) {
                     printable(summary.object_name), printable(summary.object_id), printable(summary.body_frame),
                     printable(summary.inertial_frame), printable(summary.time_system), io::format_epoch(summary.epoch));
     for (const std::string& file : summary.written) {
-      text += fmt::format("Written     {}: {}\n", printable(file), summary.output_format);
+      text += fmt::format("Written     {}: {}\n", printable(file), printable(summary.output_format));
     }
     return text;
   });
@@ -147,25 +153,18 @@ void import_pass(const ImportArguments& arguments, const Common& common) {
       [&] { return fmt::format("{}Written     {}\n", pass_text(loaded), printable(arguments.output)); });
 }
 
-void import_attitude(const ImportArguments& arguments, const Common& common) {
-  if (!arguments.from.empty() || !arguments.to.empty() || !arguments.exclude.empty()) {
-    throw io::UsageError("--from, --to and --exclude are for a pass, and this is taken for an attitude");
-  }
-  const std::filesystem::path written = arguments.output;
-  const bool to_stdout = arguments.output == kStandardStream;
-  if (!to_stdout) {
-    const std::vector<std::filesystem::path> inputs = {arguments.file, arguments.epoch.pass};
-    io::expect_apart(inputs, {&written, 1});
-  }
-  const std::optional<Time> told = epoch_of(arguments.epoch).epoch;
-  const io::AttitudeMessage message = io::read_attitude_message(source(arguments.file));
-  const Time epoch = told.value_or(message.epoch.value_or(message.attitude.t.front()));
-  const std::string text = io::format_attitude(epoch, message.attitude, io::AttitudeDigits::kAll, message.rate_rad_s);
-  if (to_stdout) {
+void put_imported(const ImportArguments& arguments, const std::string& text) {
+  if (arguments.output == kStandardStream) {
     print_data(stdout, text);
   } else {
-    io::write_file(written, text);
+    io::write_file(arguments.output, text);
   }
+}
+
+void import_attitude(const ImportArguments& arguments, const Common& common, const io::AttitudeMessage& message) {
+  const std::optional<Time> told = epoch_of(arguments.epoch).epoch;
+  const Time epoch = told.value_or(message.epoch.value_or(message.attitude.t.front()));
+  put_imported(arguments, io::format_attitude(epoch, message.attitude, io::AttitudeDigits::kAll, message.rate_rad_s));
   show_interchange(beside(arguments.output, common), {arguments.file,
                                                       message.format,
                                                       {arguments.output},
@@ -181,21 +180,70 @@ void import_attitude(const ImportArguments& arguments, const Common& common) {
                                                       message.object_id});
 }
 
+void import_calibration(const ImportArguments& arguments, const Common& common, const io::CalibrationMessage& message) {
+  if (!arguments.epoch.pass.empty() || !arguments.epoch.epoch.empty()) {
+    throw io::UsageError("--pass and --epoch are for an attitude; the epoch of a calibration is in its message");
+  }
+  if (arguments.output != kStandardStream) {
+    const std::filesystem::path output = arguments.output;
+    io::expect_apart({&message.covariance_file, 1}, {&output, 1});
+  }
+  std::string written = "calibration";
+  if (!message.has_full_covariance) {
+    written +=
+        fmt::format(", its covariance diagonal, of the 1-sigma values: {}",
+                    message.covariance_file.empty() ? "the message names no covariance file"
+                                                    : fmt::format("{} is not there", message.covariance_file.string()));
+  }
+  put_imported(arguments, io::format_calibration(message.calibration));
+  show_interchange(beside(arguments.output, common), {arguments.file,
+                                                      message.format,
+                                                      {arguments.output},
+                                                      written,
+                                                      0,
+                                                      0,
+                                                      0,
+                                                      message.calibration.epoch,
+                                                      message.time_system,
+                                                      message.inertial_frame,
+                                                      message.body_frame,
+                                                      message.object_name,
+                                                      message.object_id});
+}
+
+void import_message(const ImportArguments& arguments, const Common& common) {
+  if (!arguments.from.empty() || !arguments.to.empty() || !arguments.exclude.empty()) {
+    throw io::UsageError("--from, --to and --exclude are for a pass, and this is taken for a message");
+  }
+  if (arguments.output != kStandardStream) {
+    const std::filesystem::path written = arguments.output;
+    const std::vector<std::filesystem::path> inputs = {arguments.file, arguments.epoch.pass};
+    io::expect_apart(inputs, {&written, 1});
+  }
+  const auto message = io::read_message(source(arguments.file));
+  if (const auto* const calibration = std::get_if<io::CalibrationMessage>(&message)) {
+    import_calibration(arguments, common, *calibration);
+  } else {
+    import_attitude(arguments, common, std::get<io::AttitudeMessage>(message));
+  }
+}
+
 }  // namespace
 
 void add_import(CLI::App& program, const Common& common, int& exit_status) {
   auto arguments = std::make_shared<ImportArguments>();
   arguments->time_system = "TAI";
-  CLI::App* command = program.add_subcommand(
-      "import", "Read others' telemetry by a telemetry.toml, or another software's attitude: CCSDS AEM");
+  CLI::App* command = program.add_subcommand("import",
+                                             "Read others' telemetry by a telemetry.toml, another software's attitude "
+                                             "(CCSDS AEM, APM), or a calibration (ACM)");
   command
       ->add_option("FILE", arguments->file, "telemetry.toml or pass; or message, as text or XML, - for standard input")
       ->required();
   command
       ->add_option(
           "-o,--output", arguments->output,
-          "Pass to write: a directory, or a NetCDF file by a name in .nc; of a message the attitude file (CSV), "
-          "- for standard output")
+          "Pass to write: a directory, or a NetCDF file by a name in .nc; of a message the attitude file (CSV) "
+          "or calibration.json, - for standard output")
       ->required()
       ->type_name("OUTPUT");
   command->add_option("--from", arguments->from, "Leave out what is earlier: 2009-05-20T00:00:00")->type_name("TIME");
@@ -215,6 +263,8 @@ void add_import(CLI::App& program, const Common& common, int& exit_status) {
       "# A part of it, without manoeuvres\n"
       "trihedron import telemetry.toml -o pass.nc --from 2009-05-20T00:10:00 --exclude slews.csv\n"
       "trihedron import attitude.aem -o attitude.csv --pass pass.nc\n"
+      "# A calibration that export wrote, with its covariance file beside it\n"
+      "trihedron import calibration.acm -o calibration.json\n"
       "# Other commands read telemetry.toml and messages themselves\n"
       "trihedron inspect telemetry.toml\n"
       "trihedron evaluate pass.nc --attitude attitude.aem");
@@ -222,7 +272,7 @@ void add_import(CLI::App& program, const Common& common, int& exit_status) {
     if (is_pass(arguments->file)) {
       import_pass(*arguments, common);
     } else {
-      import_attitude(*arguments, common);
+      import_message(*arguments, common);
     }
     exit_status = kTrustworthy;
   });

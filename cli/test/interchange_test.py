@@ -1,4 +1,5 @@
 """export and import: what they write, refuse, and never replace. Run by CTest with TRIHEDRON_BUILD naming the build directory."""
+import datetime
 import json
 import struct
 import tomllib
@@ -38,6 +39,29 @@ def test_attitude_comes_back(flown, tmp_path, form, scale):
     done("export", flown / "a.csv", "--format", form, "-o", tmp_path / "a", "--pass", flown / "pass", "--time-system", scale)
     done("import", tmp_path / "a", "-o", tmp_path / "b.csv")
     assert numbers(tmp_path / "b.csv") == numbers(flown / "a.csv")
+
+
+@pytest.mark.parametrize("form", ["apm", "apm-xml"])
+def test_attitude_of_one_epoch(flown, tmp_path, form):
+    rows = numbers(flown / "a.csv")
+    export = ("export", flown / "a.csv", "--format", form, "-o", tmp_path / "a", "--pass", flown / "pass", "--time-system", "UTC")
+    done(*export)
+    done("import", tmp_path / "a", "-o", tmp_path / "b.csv")
+    assert numbers(tmp_path / "b.csv") == [rows[-1]]
+    epoch = datetime.datetime.fromisoformat(json.loads(done("--json", "import", tmp_path / "a", "-o", tmp_path / "b.csv").stdout)["epoch_tai"])
+    at = epoch + datetime.timedelta(seconds=rows[7][0] - 34)  # TAI − UTC of 2009
+    done(*export, "--at", at.isoformat())
+    done("import", tmp_path / "a", "-o", tmp_path / "b.csv")
+    assert numbers(tmp_path / "b.csv") == [rows[7]]
+    done("export", tmp_path / "a", "--format", "aem", "-o", tmp_path / "a.aem")
+    done("import", tmp_path / "a.aem", "-o", tmp_path / "b.csv")
+    assert numbers(tmp_path / "b.csv") == [rows[7]]
+    (tmp_path / "a").unlink()
+    refused(run(*export, "--at", (at + datetime.timedelta(seconds=0.1)).isoformat()), WRONG_USAGE, "the nearest is at " + at.isoformat(), "UTC")
+    refused(run(*export, "--at", "now"), WRONG_USAGE, "--at: ")
+    refused(run("export", flown / "a.csv", "--format", "aem", "-o", tmp_path / "a", "--pass", flown / "pass", "--at", at.isoformat()), WRONG_USAGE,
+            "--at is for apm")
+    assert not (tmp_path / "a").exists()
 
 
 def test_a_message_is_an_attitude_wherever_one_is_taken(flown, tmp_path):
@@ -140,6 +164,43 @@ def test_calibration_as_message_with_its_covariance(flown, tmp_path, form):
     with xarray.open_dataset(tmp_path / "c.covariance.nc") as covariance:
         assert list(covariance.state.values) == calibration["covariance"]["states"]
         assert (covariance.covariance.values == calibration["covariance"]["matrix"]).all()
+
+
+@pytest.mark.parametrize("form, scale", [("acm", "UTC"), ("acm-xml", "TT")])
+def test_calibration_comes_back_from_its_message(flown, tmp_path, form, scale):
+    original = flown / "out" / "calibration.json"
+    done("export", original, "--format", form, "-o", tmp_path / "c.acm", "--pass", flown / "pass", "--attitude", flown / "a.csv",
+         "--time-system", scale)
+    said = json.loads(done("--json", "import", tmp_path / "c.acm", "-o", tmp_path / "back.json").stdout)
+    assert (said["output_format"], said["time_system"], said["inertial_frame"]) == ("calibration", scale, "GCRF")
+    expected, back = (json.loads(path.read_text()) for path in (original, tmp_path / "back.json"))
+    assert back["covariance"] == expected["covariance"]
+    for ours, theirs in zip(back["gyros"], expected["gyros"], strict=True):
+        assert list(ours["drift_rad_s"]) == list(theirs["drift_rad_s"])
+        for name in theirs["drift_rad_s"]:
+            assert ours["drift_rad_s"][name] == pytest.approx(theirs["drift_rad_s"][name], rel=1e-15, abs=0)
+    assert [finding["code"] for finding in back["verdict"]["findings"]] == [finding["code"] for finding in expected["verdict"]["findings"]]
+    assert {key for key in expected if key not in back} <= {"forecast"}
+    # Navigation by it is the same to the digits that the message has.
+    done("navigate", flown / "pass", "--calibration", tmp_path / "back.json", "-o", tmp_path / "b.csv")
+    for ours, theirs in zip(numbers(tmp_path / "b.csv"), numbers(flown / "a.csv"), strict=True):
+        assert ours == pytest.approx(theirs, rel=0, abs=1e-12)
+
+
+def test_calibration_from_a_message_without_its_covariance(flown, tmp_path):
+    done("export", flown / "out" / "calibration.json", "--format", "acm", "-o", tmp_path / "c.acm")
+    (tmp_path / "c.covariance.nc").unlink()
+    result = run("import", tmp_path / "c.acm", "-o", tmp_path / "back.json")
+    assert result.returncode == TRUSTWORTHY and not result.stderr
+    assert "covariance diagonal" in result.stdout and "c.covariance.nc is not there" in result.stdout
+    matrix = json.loads((tmp_path / "back.json").read_text())["covariance"]["matrix"]
+    assert all(value == 0 for i, row in enumerate(matrix) for j, value in enumerate(row) if i != j)
+    done("navigate", flown / "pass", "--calibration", tmp_path / "back.json", "-o", tmp_path / "b.csv")
+    text = (tmp_path / "c.acm").read_text()
+    (tmp_path / "d.acm").write_text(text.replace("GYRO1_K0_RAD_S", "GYRO1_K9_RAD_S"))
+    refused(run("import", tmp_path / "d.acm", "-o", tmp_path / "d.json"), INPUT_REFUSED, "d.acm:", "no USER_DEFINED_TRIHEDRON_GYRO1_K0_RAD_S", "; ")
+    refused(run("import", tmp_path / "c.acm", "-o", tmp_path / "d.json", "--pass", flown / "pass"), WRONG_USAGE, "--pass and --epoch")
+    assert not (tmp_path / "d.json").exists()
 
 
 def test_calibration_as_frames(flown, tmp_path):

@@ -64,7 +64,9 @@ class Originals:
         self.run("calibrate", "pass", "-o", "out", "--config", "told.toml", "--catalogue", "catalogue.db")
         self.run("calibrate", "second", "-o", "out2", "--config", "told.toml", "--catalogue", "catalogue.db")
         self.run("navigate", "pass", "--online", "-o", "attitude.csv")
-        for form in ("aem", "aem-xml"):
+        for form in ("acm", "acm-xml"):
+            self.run("export", "out/calibration.json", "--format", form, "-o", f"calibration.{form}", "--attitude", "attitude.csv")
+        for form in ("aem", "aem-xml", "apm", "apm-xml"):
             self.run("export", "attitude.csv", "--format", form, "-o", f"attitude.{form}", "--pass", "pass", "--time-system", "UTC")
         for name in ("pass", "four"):
             (directory / f"{name}_packets").mkdir()
@@ -216,7 +218,10 @@ TARGETS = [
     *[Target(f"attitude.{form}", spoil_text, ["pass"], [
         ("import", f"{{in}}/attitude.{form}", "-o", "{out}/a.csv"), ("--json", "import", f"{{in}}/attitude.{form}", "-o", "{out}/a.csv"),
         ("evaluate", "{in}/pass", "--attitude", f"{{in}}/attitude.{form}"),
-        ("export", f"{{in}}/attitude.{form}", "--format", "ck", "-o", "{out}/a.bc")]) for form in ("aem", "aem-xml")],
+        ("export", f"{{in}}/attitude.{form}", "--format", "ck", "-o", "{out}/a.bc")]) for form in ("aem", "aem-xml", "apm", "apm-xml")],
+    *[Target(f"calibration.{form}", spoil_text, ["calibration.covariance.nc"], [
+        ("import", f"{{in}}/calibration.{form}", "-o", "{out}/c.json"),
+        ("--json", "import", f"{{in}}/calibration.{form}", "-o", "{out}/c.json")]) for form in ("acm", "acm-xml")],
     Target("attitude.csv", spoil_table, ["pass"], [
         ("export", "{in}/attitude.csv", "--format", form, "-o", "{out}/a.x", "--pass", "{in}/pass") for form in ("aem", "aem-xml", "ck")]),
     Target("calibration.json", spoil_text, ["pass", "attitude.csv"], [

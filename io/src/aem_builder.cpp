@@ -45,10 +45,8 @@ void AemBuilder::refuse(Position at, std::string reason, std::string cure) const
 }
 
 void AemBuilder::comment(std::string_view text) {
-  if (text.starts_with(kEpochComment) && !message_.epoch) {
-    std::string_view epoch = trimmed(text.substr(kEpochComment.size()));
-    epoch.remove_suffix(epoch.ends_with(" TAI") ? 4 : 0);
-    message_.epoch = parse_epoch(epoch);
+  if (!message_.epoch) {
+    message_.epoch = epoch_in_comment(text);
   }
 }
 

@@ -5,53 +5,13 @@
 
 #include "aem_builder.hpp"
 #include "aem_syntax.hpp"
-#include "trihedron/records/stop.hpp"
+#include "ndm_places.hpp"
 #include "wording.hpp"
 
 namespace trihedron::io {
 namespace {
 
 constexpr std::size_t kMostFields = 9;  // of a data line
-
-/// The lines of a text, which end with CR, LF, CRLF or LFCR.
-class Lines {
- public:
-  explicit Lines(std::string_view text) : rest_(text) {}
-
-  /// The next line that is not blank; nothing at the end.
-  std::optional<std::string_view> next() {
-    while (!rest_.empty()) {
-      check_stop();
-      ++number_;
-      const std::size_t end = std::min(rest_.find_first_of("\r\n"), rest_.size());
-      const std::string_view line = rest_.substr(0, end);
-      std::size_t skipped = end;
-      if (end < rest_.size()) {
-        const bool two = end + 1 < rest_.size() && rest_[end + 1] != rest_[end] &&
-                         (rest_[end + 1] == '\r' || rest_[end + 1] == '\n');
-        skipped += two ? 2 : 1;
-      }
-      begin_ = line.data();
-      rest_.remove_prefix(skipped);
-      if (!trimmed(line).empty()) {
-        return line;
-      }
-    }
-    ++number_;
-    begin_ = nullptr;
-    return std::nullopt;
-  }
-
-  [[nodiscard]] Position at(std::string_view word) const {
-    return {number_, begin_ == nullptr ? 0 : word.data() - begin_ + 1};
-  }
-  [[nodiscard]] Position here() const { return {number_, 0}; }
-
- private:
-  std::string_view rest_;
-  const char* begin_ = nullptr;
-  std::int64_t number_ = 0;
-};
 
 /// One AEM as text, line by line.
 class Kvn {
@@ -172,7 +132,7 @@ class Kvn {
     builder.row({fields.data(), count});
   }
 
-  Lines lines_;
+  NdmLines lines_;
   const std::filesystem::path& file_;
 };
 

@@ -7,6 +7,7 @@
 
 #include "aem_builder.hpp"
 #include "aem_syntax.hpp"
+#include "ndm_places.hpp"
 #include "wording.hpp"
 
 namespace trihedron::io {
@@ -16,33 +17,6 @@ constexpr std::array<std::string_view, 9> kQuaternionTags = {"EPOCH",  "Q1",    
                                                              "Q1_DOT", "Q2_DOT", "Q3_DOT", "QC_DOT"};
 constexpr std::array<std::string_view, 8> kAngularVelocityTags = {"EPOCH", "Q1",       "Q2",       "Q3",
                                                                   "QC",    "ANGVEL_X", "ANGVEL_Y", "ANGVEL_Z"};
-
-/// Where bytes of a text stand.
-class Places {
- public:
-  explicit Places(std::string_view text) {
-    lines_.push_back(0);
-    for (std::size_t i = text.find('\n'); i != std::string_view::npos; i = text.find('\n', i + 1)) {
-      lines_.push_back(i + 1);
-    }
-  }
-  [[nodiscard]] Position of(std::ptrdiff_t offset) const {
-    const auto byte = static_cast<std::size_t>(std::max<std::ptrdiff_t>(offset, 0));
-    const auto after = std::ranges::upper_bound(lines_, byte);
-    return {after - lines_.begin(), static_cast<std::int64_t>(byte - *(after - 1)) + 1};
-  }
-
- private:
-  std::vector<std::size_t> lines_;
-};
-
-/// Without the prefix of a namespace.
-std::string_view name_of(const pugi::xml_node& node) {
-  const std::string_view name = node.name();
-  return name.substr(name.find(':') + 1);  // npos + 1 == 0
-}
-
-bool is_element(const pugi::xml_node& node) { return node.type() == pugi::node_element; }
 
 /// One AEM as XML.
 class Xml {
@@ -87,7 +61,7 @@ class Xml {
   }
 
   void expect(const pugi::xml_node& node, std::string_view name) const {
-    if (!is_element(node) || name_of(node) != name) {
+    if (!is_ndm_element(node) || ndm_name(node) != name) {
       refuse(node, fmt::format("{} where <{}> should stand", in_quotes(node.name()), name),
              "give an AEM of the standard's structure");
     }
@@ -97,7 +71,7 @@ class Xml {
   [[nodiscard]] pugi::xml_node only(const pugi::xml_node& node, std::string_view first, std::string_view second) const {
     const pugi::xml_node child = node.first_child();
     const pugi::xml_node next = child.next_sibling();
-    if (name_of(child) != first || name_of(next) != second || !next.next_sibling().empty()) {
+    if (ndm_name(child) != first || ndm_name(next) != second || !next.next_sibling().empty()) {
       refuse(node, fmt::format("<{}> does not consist of <{}> and <{}>", node.name(), first, second),
              "give an AEM of the standard's structure");
     }
@@ -107,10 +81,10 @@ class Xml {
   /// The message, which may stand alone within <ndm>.
   [[nodiscard]] pugi::xml_node root() const {
     pugi::xml_node node = document_.document_element();
-    if (name_of(node) == "ndm") {
+    if (ndm_name(node) == "ndm") {
       pugi::xml_node aem;
       for (const pugi::xml_node& child : node.children()) {
-        if (name_of(child) == "aem") {
+        if (ndm_name(child) == "aem") {
           if (!aem.empty()) {
             refuse(child, "there are several AEM in it", "give each a file of its own");
           }
@@ -119,7 +93,7 @@ class Xml {
       }
       node = aem.empty() ? node : aem;
     }
-    if (name_of(node) != "aem") {
+    if (ndm_name(node) != "aem") {
       refuse(node, fmt::format("its root is {}", in_quotes(node.name())), "give an attitude ephemeris message, <aem>");
     }
     return node;
@@ -143,10 +117,10 @@ class Xml {
   }
 
   void take(AemBuilder& builder, const pugi::xml_node& entry, Taker taker) const {
-    if (name_of(entry) == "COMMENT") {
+    if (ndm_name(entry) == "COMMENT") {
       builder.comment(text_of(entry).text);
     } else {
-      (builder.*taker)({name_of(entry), at(entry)}, text_of(entry));
+      (builder.*taker)({ndm_name(entry), at(entry)}, text_of(entry));
     }
   }
 
@@ -159,7 +133,7 @@ class Xml {
     builder.end_metadata(at(metadata));
     const pugi::xml_node data = metadata.next_sibling();
     for (const pugi::xml_node& child : data.children()) {
-      if (name_of(child) != "COMMENT") {
+      if (ndm_name(child) != "COMMENT") {
         expect(child, "attitudeState");
         read_state(builder, child);
       }
@@ -169,7 +143,7 @@ class Xml {
 
   void read_state(AemBuilder& builder, const pugi::xml_node& state) const {
     const pugi::xml_node type = state.first_child();
-    if (!type.next_sibling().empty() || !name_of(type).starts_with("quaternion")) {
+    if (!type.next_sibling().empty() || !ndm_name(type).starts_with("quaternion")) {
       refuse(state, "<attitudeState> does not hold one quaternion",
              "give quaternionEphemeris, quaternionDerivative or quaternionAngVel, as ATTITUDE_TYPE says");
     }
@@ -182,10 +156,10 @@ class Xml {
     std::array<AemField, kQuaternionTags.size()> fields;
     std::array<bool, kQuaternionTags.size()> there{};
     const auto take_leaf = [&](const pugi::xml_node& leaf) {
-      const auto found = std::ranges::find(tags.first(count), name_of(leaf));
+      const auto found = std::ranges::find(tags.first(count), ndm_name(leaf));
       const auto index = static_cast<std::size_t>(found - tags.begin());
       if (index == count) {
-        if (rates_ignored && name_of(leaf).ends_with("_RATE")) {
+        if (rates_ignored && ndm_name(leaf).ends_with("_RATE")) {
           return;
         }
         refuse(leaf, fmt::format("<{}> is no part of this ATTITUDE_TYPE", leaf.name()),
@@ -199,7 +173,7 @@ class Xml {
       fields.at(index) = text_of(leaf);
     };
     for (const pugi::xml_node& child : type.children()) {
-      const std::string_view name = name_of(child);
+      const std::string_view name = ndm_name(child);
       if (name == "quaternion" || name == "quaternionDot" || name == "quaternionRate" || name == "angVel" ||
           name == "rotationRates") {
         for (const pugi::xml_node& leaf : child.children()) {
@@ -221,7 +195,7 @@ class Xml {
   /// Where units are told they must be those of the standard.
   void expect_units(const pugi::xml_node& leaf, std::size_t index) const {
     const pugi::xml_attribute units = leaf.attribute("units");
-    const std::string_view name = name_of(leaf);
+    const std::string_view name = ndm_name(leaf);
     const std::string_view expected = index < 5 ? "" : name.ends_with("_DOT") ? "1/s" : "deg/s";
     if (!units.empty() && units.value() != expected) {
       refuse(leaf, fmt::format("the unit of <{}> is {}", leaf.name(), in_quotes(units.value())),
@@ -230,7 +204,7 @@ class Xml {
   }
 
   pugi::xml_document document_;
-  Places places_;
+  NdmPlaces places_;
   const std::filesystem::path& file_;
   std::size_t size_;
 };

@@ -6,8 +6,10 @@
 #include <cmath>
 
 #include "aem_syntax.hpp"
+#include "apm.hpp"
 #include "attitude_rules.hpp"
 #include "ccsds_frames.hpp"
+#include "ndm_message.hpp"
 #include "ndm_text.hpp"
 #include "text_file.hpp"
 #include "trihedron/io/error.hpp"
@@ -155,6 +157,9 @@ std::string format_aem(const AttitudeHistory& attitude, std::span<const Eigen::V
 bool is_attitude_message(std::string_view text) { return is_xml(text) || without_lead(text).starts_with("CCSDS_"); }
 
 AttitudeMessage parse_attitude_message(std::string_view text, const std::filesystem::path& file) {
+  if (ndm_kind(text) == "APM") {
+    return parse_apm(text, file);
+  }
   return is_xml(text) ? parse_aem_xml(text, file) : parse_aem_kvn(text, file);
 }
 

@@ -7,6 +7,7 @@
 #include <cctype>
 #include <cmath>
 
+#include "acm_keywords.hpp"
 #include "ndm_text.hpp"
 #include "trihedron/io/atomic_file.hpp"
 #include "trihedron/io/error.hpp"
@@ -14,10 +15,8 @@
 #include "trihedron/records/stop.hpp"
 
 namespace trihedron::io {
-namespace {
 
-/// "K0", "W_2_M1" for W(2,-1): what may stand in a keyword.
-std::string keyword_of(std::string_view name) {
+std::string acm_keyword(std::string_view name) {
   std::string result;
   for (const char c : name) {
     if (c == '-') {
@@ -30,6 +29,12 @@ std::string keyword_of(std::string_view name) {
   }
   return result;
 }
+
+std::string acm_field_level(int gyro, DriftCoefficient::Member potential, int degree) {
+  return fmt::format("GYRO{}_FIELD_{}{}", gyro + 1, potential == DriftCoefficient::Member::kW ? 'W' : 'D', degree);
+}
+
+namespace {
 
 std::string number(double value) { return fmt::format("{:.15e}", value); }
 
@@ -177,7 +182,7 @@ class AcmWriter {
 
   void user(const std::string& key, std::string_view value) {
     if (text_.kvn()) {
-      text_.entry("USER_DEFINED_TRIHEDRON_" + key, value);
+      text_.entry(std::string(kAcmPrefix) + key, value);
     } else {
       text_.put(
           fmt::format("<USER_DEFINED parameter=\"TRIHEDRON_{}\">{}</USER_DEFINED>\n", key, escaped_for_xml(value)));
@@ -225,18 +230,55 @@ class AcmWriter {
     }
   }
 
+  /// Of stamps, and noise and drift field that the calibration went by.
+  void clocks() {
+    if (const std::optional<ClockCorrection>& clocks = calibration_.clocks) {
+      user("CLOCKS_OFFSET_S", number(clocks->offset_s));
+      user("CLOCKS_RATE_S_S", number(clocks->rate_s_s));
+      for (std::size_t k = 0; k < calibration_.gyros.size(); ++k) {
+        user(fmt::format("GYRO{}_LATE_S", k + 1), number(clocks->late_s[static_cast<int>(k)]));
+      }
+    }
+  }
+
+  void levels() {
+    if (const std::optional<CalibrationNoise>& noise = calibration_.noise) {
+      user("NOISE_DIRECTION_RANDOM_WALK_RAD_SQRT_S", number(noise->direction_random_walk_rad_sqrt_s));
+      user("NOISE_WANDERING_DRIFT_RAD_S", number(noise->wandering_drift_rad_s));
+      user("NOISE_WANDERING_TIME_S", number(noise->wandering_time_s));
+      if (noise->star_tracker_noise_rad) {
+        const Eigen::Vector3d& found = *noise->star_tracker_noise_rad;
+        user("NOISE_STAR_TRACKER_RAD",
+             fmt::format("{} {} {}", number(found.x()), number(found.y()), number(found.z())));
+      }
+    }
+    for (const DriftFieldLevel& level : calibration_.drift_field) {
+      const std::string owner = acm_field_level(level.gyro, level.potential, level.degree);
+      user(owner + "_RMS_RAD_S", number(level.rms_rad_s));
+      user(owner + "_SIGMA_FACTOR", number(level.sigma_factor));
+    }
+  }
+
   void user_defined() {
     text_.put("\nUSER_START\n", "<user>\n");
     user("VERDICT", calibration_.verdict.trustworthy ? "TRUSTWORTHY" : "DO NOT USE");
-    std::vector<std::string> findings;
+    std::vector<std::string_view> findings;
+    std::vector<std::string_view> severities;
     for (const Finding& finding : calibration_.verdict.findings) {
-      findings.emplace_back(name_of(finding.code));
+      findings.push_back(name_of(finding.code));
+      severities.push_back(
+          std::ranges::find(kFindingSeverities, finding.severity, &FindingSeverityRow::severity)->name);
     }
     if (!findings.empty()) {
       user("FINDINGS", fmt::format("{}", fmt::join(findings, " ")));
+      user("SEVERITIES", fmt::format("{}", fmt::join(severities, " ")));
     }
     user("ESTIMATOR", name_of(calibration_.estimator));
     user("EPOCH_S", relative(calibration_.t));
+    if (!calibration_.start_up.empty()) {
+      expect_plain(calibration_.start_up, "the name of the start-up of the rotors,");
+      user("START_UP", calibration_.start_up);
+    }
     if (!context_.covariance_file.empty()) {
       user("COVARIANCE_FILE", context_.covariance_file);
     }
@@ -248,7 +290,7 @@ class AcmWriter {
       user(owner + "DRIFT_MODEL", name_of(gyro.drift_model));
       const std::vector<DriftCoefficient> coefficients = coefficients_of(gyro.drift_model);
       for (std::size_t i = 0; i < coefficients.size(); ++i) {
-        state(owner + keyword_of(name_of(coefficients[i])), "_RAD_S", gyro.drift_rad_s.at(i),
+        state(owner + acm_keyword(name_of(coefficients[i])), "_RAD_S", gyro.drift_rad_s.at(i),
               sigma_of(calibration_, ParameterId::drift(k, coefficients[i])));
       }
       for (int axis = 0; axis < 3; ++axis) {
@@ -256,10 +298,22 @@ class AcmWriter {
         state(fmt::format("{}ALIGN_{}", owner, letter), "_RAD", gyro.alignment_rotation_vector_rad(axis),
               sigma_of(calibration_, ParameterId::alignment(k, axis)));
         user(fmt::format("{}MOMENTUM_IN_{}", owner, letter), number(gyro.momentum_in(axis)));
+        user(fmt::format("{}COSINE_BIAS_{}", owner, letter), number(gyro.readout_bias(axis)));
       }
     }
     for (const FurtherEstimate& further : calibration_.further) {
-      state(keyword_of(name_of(further.parameter)), "", further.value, further.sigma);
+      state(acm_keyword(name_of(further.parameter)), "", further.value, further.sigma);
+    }
+    clocks();
+    levels();
+    if (calibration_.determined) {
+      user("DETERMINED", std::to_string(calibration_.determined->coefficients));
+      user("DETERMINED_OF", std::to_string(calibration_.determined->of));
+    }
+    for (const auto& [name, value] : named_values(calibration_.statistics)) {
+      if (std::isfinite(value)) {
+        user(std::string(kAcmStatistic) + acm_keyword(name), number(value));
+      }
     }
     text_.put("USER_STOP\n", "</user>\n");
   }

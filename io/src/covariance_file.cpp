@@ -1,9 +1,11 @@
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <netcdf.h>
 
 #include <string>
 #include <vector>
 
+#include "acm_keywords.hpp"
 #include "trihedron/io/atomic_file.hpp"
 #include "trihedron/io/calibration_message.hpp"
 #include "trihedron/io/error.hpp"
@@ -56,6 +58,7 @@ void write_covariance(const std::filesystem::path& path, const Calibration& cali
   };
   attribute(NC_GLOBAL, "title", "Covariance of a calibration of electrostatic gyros, as in calibration.json");
   attribute(NC_GLOBAL, "epoch_tai", format_epoch(calibration.t));
+  attribute(NC_GLOBAL, kCovarianceStates, fmt::format("{}", fmt::join(names, " ")));
   attribute(covariance, "long_name", "covariance of the errors, estimate - truth; alignments about c x, y, z");
   check(nc_enddef(id));
   if (n > 0) {

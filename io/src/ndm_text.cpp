@@ -69,7 +69,7 @@ void NdmText::header(std::string_view kind, std::string_view comment, const Mess
 
 void NdmText::end(std::string_view kind) {
   if (!kvn_) {
-    fmt::format_to(fmt::appender(out_), "</body>\n</{}>\n", kind == "AEM" ? "aem" : "acm");
+    fmt::format_to(fmt::appender(out_), "</body>\n</{}>\n", kind == "AEM" ? "aem" : kind == "APM" ? "apm" : "acm");
   }
 }
 

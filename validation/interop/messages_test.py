@@ -149,3 +149,35 @@ def test_peers_read_a_calibration(calibrated, calibration, tmp_path, form):
             assert abs(float(user[f"TRIHEDRON_GYRO{index}_{name.upper()}_RAD_S"]) - value) <= 1e-15 * abs(value)
     assert user["TRIHEDRON_VERDICT"] == ("TRUSTWORTHY" if calibration["verdict"]["trustworthy"] else "DO NOT USE")
     assert (tmp_path / user["TRIHEDRON_COVARIANCE_FILE"]).exists()
+
+
+@pytest.mark.parametrize("scale", SCALES)
+@pytest.mark.parametrize("form", ("apm", "apm-xml"))
+def test_peers_read_and_write_an_attitude_of_one_epoch(attitude, tmp_path, form, scale):
+    rates = np.array([1e-3, -2e-3, 0.1]) / 3
+    rated = tmp_path / "rated.csv"
+    row = 100
+    rated.write_text("t_s,q_x,q_y,q_z,q_w,rate_x_rad_s,rate_y_rad_s,rate_z_rad_s\n" + ",".join(
+        [f"{attitude.t_ns[row] / 1e9:.9f}", *(f"{value:.17g}" for value in (*attitude.q[row], *rates))]) + "\n")
+    path = tmp_path / f"a.{form}"
+    run("--quiet", "export", rated, "--format", form, "-o", path, "--epoch", EPOCH, "--time-system", scale, "--object-id", "2006-021A")
+    theirs = ccsds_ndm.Apm.from_file(str(path))
+    theirs.validate()
+    orekit = ParserBuilder().buildApmParser().parseMessage(DataSource(str(path)))
+    data = orekit.getSegments().get(0).getData()
+    epoch = AbsoluteDate(EPOCH, TimeScalesFactory.getTAI())
+    assert round(data.getEpoch().durationFrom(epoch) * 1e9) == attitude.t_ns[row]
+    q = data.getQuaternionBlock().getQuaternion()
+    assert np.abs(np.array([q.getQ1(), q.getQ2(), q.getQ3(), q.getQ0()]) - attitude.q[row]).max() <= 1e-15
+    velocity = data.getAngularVelocityBlock()
+    got = np.array([velocity.getAngVelX(), velocity.getAngVelY(), velocity.getAngVelZ()])
+    assert np.abs(got - rates).max() <= 1e-16
+    text = StringBuilder()
+    generator = KvnGenerator(text, 0, "a", 0.0, 0) if form == "apm" else XmlGenerator(text, 2, "a", 0.0, True, None)
+    WriterBuilder().buildApmWriter().writeMessage(generator, orekit)
+    generator.close()
+    for written in (theirs.to_str("kvn"), theirs.to_str("xml"), str(text.toString())):
+        (tmp_path / "theirs").write_text(written)
+        run("--quiet", "import", tmp_path / "theirs", "-o", tmp_path / "back.csv", "--epoch", EPOCH)
+        t_ns, back = read_attitude(tmp_path / "back.csv")
+        assert t_ns == [attitude.t_ns[row]] and np.abs(back - attitude.q[row]).max() <= 1e-15

@@ -1,5 +1,6 @@
 #pragma once
-/// Attitude ephemeris messages: CCSDS 504.0-B-2, AEM version 2, as text (KVN) and XML; version 1 is read as well.
+/// Attitude ephemeris and parameter messages: CCSDS 504.0-B-2, AEM and APM version 2, as text (KVN) and XML; an AEM of
+/// version 1 is read as well.
 /// docs/interchange.md has the conventions.
 ///
 /// The quaternion "from REF_FRAME_A to REF_FRAME_B" of the standard (annex F) turns components in B into components in
@@ -64,11 +65,16 @@ struct AttitudeMessage {
   std::size_t left_out = 0;  ///< rows outside the useable span of their segment, or that the next segment has again
 };
 
+/// An APM version 2 of the epoch of one row: quaternion and, where there are rates, angular velocity. `epoch` as in
+/// format_aem(). Throws UsageError as that.
+[[nodiscard]] std::string format_apm(const AttitudeMessage& attitude, std::size_t row, Time epoch,
+                                     const MessageDescription& description, MessageSyntax syntax);
+
 /// Whether a text is meant as such a message, by its beginning.
 [[nodiscard]] bool is_attitude_message(std::string_view text);
 
-/// Reads every segment. Throws InputRefused with line, reason and cure for all that is not an AEM of quaternions
-/// between one inertial frame and one of the spacecraft's.
+/// Reads every segment. Throws InputRefused with line, reason and cure for all that is not an AEM, or an APM version 2,
+/// of quaternions between one inertial frame and one of the spacecraft's.
 [[nodiscard]] AttitudeMessage parse_attitude_message(std::string_view text, const std::filesystem::path& file);
 [[nodiscard]] AttitudeMessage read_attitude_message(const std::filesystem::path& file);
 /// Same, or an attitude file (CSV), which needs the epoch that its t_s counts from: throws UsageError where that is not

@@ -4,6 +4,8 @@
 
 #include <filesystem>
 #include <string>
+#include <string_view>
+#include <variant>
 
 #include "trihedron/io/attitude_message.hpp"
 #include "trihedron/records/calibration.hpp"
@@ -22,6 +24,32 @@ struct CalibrationContext {
 /// TDB, in which seconds are not those of the calibration.
 [[nodiscard]] std::string format_acm(const Calibration& calibration, const CalibrationContext& context,
                                      const MessageDescription& description, MessageSyntax syntax);
+
+/// A calibration as read from such a message.
+struct CalibrationMessage {
+  Calibration calibration;
+  std::string format;  ///< for people: "CCSDS ACM version 2, KVN"
+  std::string object_name;
+  std::string object_id;
+  std::string inertial_frame;
+  std::string body_frame;
+  std::string time_system;
+  /// Beside the message; empty where it names none.
+  std::filesystem::path covariance_file;
+  /// Whether the covariance is that of the file; else it is diagonal, from the sigmas in the message.
+  bool has_full_covariance = false;
+};
+
+/// Whether a text says that it is an ACM.
+[[nodiscard]] bool is_calibration_message(std::string_view text);
+
+/// Reads what format_acm() writes. A covariance file that is named but not there is no error. Not in a message, hence
+/// lost: the forecast, the texts of findings, statistics that are not finite. Throws InputRefused with line, reason
+/// and cure.
+[[nodiscard]] CalibrationMessage parse_calibration_message(std::string_view text, const std::filesystem::path& file);
+
+/// Same, or attitude, by what the file says it is.
+[[nodiscard]] std::variant<AttitudeMessage, CalibrationMessage> read_message(const std::filesystem::path& file);
 
 /// NetCDF-4: `covariance(state, state_2)` in the units of its states, with their names and units as `state` and
 /// `units`. Throws MachineFailed.
