@@ -66,7 +66,7 @@ void add_simulate(CLI::App& program, const Common& common, int& exit_status) {
       "# The paper's experiment\n"
       "trihedron simulate examples/paper.toml -o pass.nc\n"
       "# Two hours of it, without a file of its own\n"
-      "printf '[scenario]\\nduration = \"2h\"\\n' | trihedron simulate - -o pass");
+      "echo 'scenario.duration = \"2h\"' | trihedron simulate - -o pass");
   command->callback([&common, &exit_status, arguments] {
     simulate_pass(source(arguments->scenario), arguments->scenario, arguments->pass, common);
     exit_status = kTrustworthy;

@@ -8,9 +8,9 @@
 
 namespace trihedron {
 
-/// A matrix that is only read, of any size. Unlike Eigen::Ref<const Eigen::MatrixXd> it never holds a copy, so that
-/// nothing refers to the heap.
+/// A matrix that is only read. Unlike Eigen::Ref<const Eigen::MatrixXd> it holds no copy: nothing refers to the heap.
 using MatrixView = Eigen::Map<const Eigen::MatrixXd, 0, Eigen::OuterStride<>>;
+/// That of a matrix stored by columns.
 template <class Derived>
 [[nodiscard]] MatrixView matrix_of(const Eigen::PlainObjectBase<Derived>& matrix) {
   static_assert(!Derived::IsRowMajor);

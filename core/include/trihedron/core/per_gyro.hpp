@@ -43,7 +43,7 @@ inline constexpr int kNoGyro = -1;
   }
   return mask;
 }
-
+/// How many are in it.
 [[nodiscard]] constexpr int count(const GyroMask& mask) {
   int used = 0;
   for (const bool it : mask) {
@@ -51,7 +51,7 @@ inline constexpr int kNoGyro = -1;
   }
   return used;
 }
-
+/// Those that are in both.
 [[nodiscard]] constexpr GyroMask both(const GyroMask& a, const GyroMask& b) {
   GyroMask mask;
   for (int k = 0; k < kMaxGyros; ++k) {

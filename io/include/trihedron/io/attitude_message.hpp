@@ -39,7 +39,7 @@ void expect_writable_description(const MessageDescription& description);
 [[nodiscard]] Duration usual_gap(const AttitudeHistory& attitude);
 /// Where the stretches without a gap begin: rows, and the number of rows at the end. A gap is a step longer than `gap`.
 [[nodiscard]] std::vector<std::size_t> stretches(const AttitudeHistory& attitude, Duration gap);
-
+/// The two forms of a CCSDS navigation data message.
 enum class MessageSyntax { kKvn, kXml };
 
 /// An AEM version 2 with one segment for each stretch without a gap: QUATERNION/ANGVEL where there are rates (of c with
@@ -76,7 +76,7 @@ struct AttitudeMessage {
 /// Reads every segment. Throws InputRefused with line, reason and cure for all that is not an AEM, or an APM version 2,
 /// of quaternions between one inertial frame and one of the spacecraft's.
 [[nodiscard]] AttitudeMessage parse_attitude_message(std::string_view text, const std::filesystem::path& file);
-[[nodiscard]] AttitudeMessage read_attitude_message(const std::filesystem::path& file);
+[[nodiscard]] AttitudeMessage read_attitude_message(const std::filesystem::path& file);  ///< Of a file.
 /// Same, or an attitude file (CSV), which needs the epoch that its t_s counts from: throws UsageError where that is not
 /// given.
 [[nodiscard]] AttitudeMessage read_attitude_of_any_format(const std::filesystem::path& path,

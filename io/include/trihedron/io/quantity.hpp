@@ -28,7 +28,7 @@ namespace trihedron::io {
 [[nodiscard]] Need parse_need(std::string_view text);
 /// One of these, within a range; throws UsageError with the range and the reason for it. Durations are in seconds.
 [[nodiscard]] double within(const Range& range, double value, std::string_view text);
-[[nodiscard]] Duration within(const Range& range, Duration value, std::string_view text);
+[[nodiscard]] Duration within(const Range& range, Duration value, std::string_view text);  ///< Likewise.
 /// A pure number, finite.
 [[nodiscard]] double parse_number(std::string_view text);
 

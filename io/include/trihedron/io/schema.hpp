@@ -6,12 +6,12 @@
 #include <vector>
 
 namespace trihedron::io {
-
+/// A JSON schema.
 struct Schema {
   std::string name;  ///< "pass", "calibration"
   std::string text;  ///< JSON
 };
-
+/// Of each JSON and TOML file that is read or written.
 [[nodiscard]] std::vector<Schema> schemas();
 
 }  // namespace trihedron::io

@@ -59,7 +59,7 @@ struct SpiceClock {
                                     std::span<const std::size_t> stretches);
 /// Text kernels.
 [[nodiscard]] std::string format_sclk(const SpiceClock& clock, const SpiceObject& object);
-[[nodiscard]] std::string format_ck_frames(const SpiceObject& object);
+[[nodiscard]] std::string format_ck_frames(const SpiceObject& object);  ///< Frame c of the CK.
 /// Frame c, the case axes of each gyro as TK frame (class 4) relative to it, and the calibration as pool variables of
 /// these frames.
 [[nodiscard]] std::string format_calibration_frames(const Calibration& calibration, const SpiceObject& object);

@@ -15,7 +15,7 @@ enum class TimeScale { kTai, kUtc, kGps, kTt, kTdb };
 
 inline constexpr std::array<std::string_view, 5> kTimeScales = {"TAI", "UTC", "GPS", "TT", "TDB"};
 
-[[nodiscard]] std::string name_of(TimeScale scale);
+[[nodiscard]] std::string name_of(TimeScale scale);  ///< As in messages and options.
 /// Case does not matter.
 [[nodiscard]] std::optional<TimeScale> time_scale_named(std::string_view name);
 

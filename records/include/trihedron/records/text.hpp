@@ -8,9 +8,9 @@
 
 namespace trihedron {
 
-/// `text` as valid UTF-8 on one line, fit for a terminal, for JSON and for HTML: bytes that are no UTF-8 as \xff,
-/// control characters (those of a terminal begin with one), line ends and marks of writing direction as \x1b or
-/// \u{202e}. Everything else stays.
+/// `text` as valid UTF-8 on one line, fit for a terminal, for JSON and for HTML: bytes that are no UTF-8 as \\xff,
+/// control characters (those of a terminal begin with one), line ends and marks of writing direction as \\x1b or
+/// \\u{202e}. Everything else stays.
 [[nodiscard]] std::string printable(std::string_view text);
 
 /// The same of several lines: '\n' stays.

@@ -17,7 +17,7 @@ enum class AttitudeRule : std::uint8_t {
   kTrihedron,  ///< on the first two, as the paper's filter does
   kAllAlike,   ///< by least squares, as the navigator does
 };
-[[nodiscard]] AttitudeRule attitude_rule_of(Estimator estimator);
+[[nodiscard]] AttitudeRule attitude_rule_of(Estimator estimator);  ///< The rule that goes with an estimator.
 
 /// Attitude at those of `epochs` (increasing) from t on where there are gyro readings, by the momenta and parameters
 /// that `gyros` hold at t. No astro-correction after it. Throws SetupError for gyros of an unknown drift model.
