@@ -315,7 +315,7 @@ void add_export(CLI::App& program, const Common& common, int& exit_status) {
           "with .toml and .xtce.xml beside it)")
       ->required()
       ->type_name(fmt::format("{}", fmt::join(formats, "|")))
-      ->check(CLI::IsMember(formats));
+      ->check(CLI::IsMember(formats).description(""));
   command->add_option("-o,--output", arguments->output, "File to write; - for standard output")
       ->required()
       ->type_name("FILE");
