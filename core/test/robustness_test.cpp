@@ -519,10 +519,12 @@ TEST(StuckGyro, OfAPairStopsItUntilItLivesAgain) {
 }
 
 TEST(StuckGyro, OfAPairWhenTheAnglesAreDuePutsThemOff) {
-  // The stretch begins half a second before a look.
+  // The stretch begins half a second before a look. A spike not long before keeps it from being known at once.
   test::Flight flight({.duration_s = 400});
   flight.fixes.resize(60);  // until 177 s: looks at 237, 240, … s
   stick(flight.samples, 1, 239.5, 300);
+  Eigen::Vector3d& spiked = flight.samples[8 * 235].h_b[1];
+  spiked = rotated<double>(spiked, 0.05 * spiked.unitOrthogonal());
   const auto on_board = make_on_board<Pair>();
   std::vector<double> looks_s;
   test::fly(flight, *on_board, [&](const StepReport& report) {

@@ -2,6 +2,7 @@
 /// Which gyros can be used, and over which times: detection of stuck readings and isolation of faulty gyros.
 
 #include <Eigen/Core>
+#include <algorithm>
 #include <chrono>
 
 #include "trihedron/core/per_gyro.hpp"
@@ -129,8 +130,7 @@ class GyroHealth {
       // A live reading that stood still: by its resolution.
       const double missing = motion.norm() * to_seconds(until - since);
       const double off = (step - motion * dt_s).norm();
-      const double before = (1 - part) * jitter;
-      jitter = missing > off && missing > before ? missing : off > before ? off : before;
+      jitter = std::max({missing, off, (1 - part) * jitter});
       motion += part * (step / dt_s - motion);
       steps += steps < kStepsOfMotion ? 1 : 0;
     }
