@@ -71,7 +71,7 @@ void show_interchange(const Common& common, const InterchangeSummary& summary) {
       text += fmt::format(", {} epochs in {} segment{}", summary.epochs, summary.segments,
                           summary.segments == 1 ? "" : "s");
     }
-    text += "\n";
+    text += '\n';
     if (summary.left_out > 0) {
       text += fmt::format("  left out  {} epochs outside the useable spans\n", summary.left_out);
     }
