@@ -13,7 +13,7 @@ mkdir -p "$out"
 packaging/root.sh "$out/root" trihedron
 container=$("${buildah[@]}" from scratch)
 "${buildah[@]}" add --quiet "$container" "$out/root" / > /dev/null
-"${buildah[@]}" config --entrypoint '["/usr/bin/trihedron"]' --cmd --help --workingdir /work --env LANG=C.UTF-8 \
+"${buildah[@]}" config --entrypoint '["/usr/bin/trihedron"]' --cmd --help --workingdir /data --env LANG=C.UTF-8 \
   --label org.opencontainers.image.title=trihedron --label "org.opencontainers.image.version=$version" \
   --label org.opencontainers.image.licenses=Apache-2.0 "$container"
 "${buildah[@]}" commit --quiet --disable-compression=false "$container" "oci-archive:$out/trihedron-$version.oci.tar:trihedron:$version" > /dev/null
