@@ -178,5 +178,5 @@ def test_memory_is_linear_in_time(tmp_path, period):
         scenario = f'[scenario]\nduration = "{hours}h"\n[gyro]\nperiod = "{period}"\n'
         return peak_mb("calibrate", simulated(tmp_path, "pass.nc", scenario), "-o", tmp_path / "out", "--estimator", "batch")
 
-    two, four, eight = peak(2), peak(4), peak(8)
-    assert eight - four < 2 * (four - two) * 1.3
+    three, six, twelve = peak(3), peak(6), peak(12)
+    assert twelve - six < 2 * (six - three) * 1.3
