@@ -286,16 +286,20 @@ class AcmReader {
     }
   }
 
+  DriftModelId drift_model(const std::string& key) {
+    const NdmEntry& model = needed(key);
+    const std::optional<DriftModelId> found = drift_model_named(model.value);
+    if (!found) {
+      message_.refuse(model.at, fmt::format("{} is {}, no drift model", key, in_quotes(model.value)),
+                      fmt::format("give {}", drift_model_choices()));
+    }
+    return *found;
+  }
+
   void take_gyro(std::size_t k) {
     GyroCalibration& gyro = calibration().gyros.emplace_back();
     const std::string owner = fmt::format("GYRO{}_", k + 1);
-    const NdmEntry& model = needed(owner + "DRIFT_MODEL");
-    const std::optional<DriftModelId> found = drift_model_named(model.value);
-    if (!found) {
-      message_.refuse(model.at, fmt::format("{}DRIFT_MODEL is {}, no drift model", owner, in_quotes(model.value)),
-                      fmt::format("give {}", drift_model_choices()));
-    }
-    gyro.drift_model = *found;
+    gyro.drift_model = drift_model(owner + "DRIFT_MODEL");
     Range drift_sigma = limits::kDriftSigma_rad_s;
     Range alignment_sigma = limits::kAlignmentSigma_rad;
     drift_sigma.least = alignment_sigma.least = 0;  // as in calibration.json
@@ -381,6 +385,16 @@ class AcmReader {
     std::ranges::sort(levels, {}, [](const auto& level) { return std::pair(level.first.line, level.first.column); });
     for (const auto& [at, level] : levels) {
       calibration().drift_field.push_back(level);
+    }
+    if (const NdmEntry* model = optional("ON_BOARD_DRIFT_MODEL")) {
+      OnBoardDrift& on_board = calibration().on_board_drift.emplace();
+      on_board.drift_model = drift_model("ON_BOARD_DRIFT_MODEL");
+      if (on_board.drift_model.degree > DriftModelId::kMaxDegreeOnBoard) {
+        message_.refuse(model->at, fmt::format("ON_BOARD_DRIFT_MODEL is {}", in_quotes(model->value)),
+                        fmt::format("there is room for degree {} and less", DriftModelId::kMaxDegreeOnBoard));
+      }
+      on_board.random_walk_rad_sqrt_s =
+          number("ON_BOARD_RANDOM_WALK_RAD_SQRT_S", limits::kRandomWalk_rad_sqrt_s);
     }
   }
 

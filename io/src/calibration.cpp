@@ -296,6 +296,20 @@ Members level_members(DriftFieldLevel& level, std::size_t gyros) {
        [&level](const JsonNode& node) { level.sigma_factor = node.number(limits::kSigmaFactor); }}};
 }
 
+Members on_board_members(OnBoardDrift& drift) {
+  return {{"drift_model", "it has room for", drift_model_schema(), [&drift](const JsonNode& node) {
+             drift.drift_model = parse_drift_model(node);
+             if (drift.drift_model.degree > DriftModelId::kMaxDegreeOnBoard) {
+               node.refuse(fmt::format("is {}", in_quotes(name_of(drift.drift_model))),
+                           fmt::format("there is room for degree {} and less", DriftModelId::kMaxDegreeOnBoard));
+             }
+           }},
+          {"random_walk_rad_sqrt_s", "of each momentum, per axis across it, for what it leaves out",
+           number_schema(limits::kRandomWalk_rad_sqrt_s), [&drift](const JsonNode& node) {
+             drift.random_walk_rad_sqrt_s = node.number(limits::kRandomWalk_rad_sqrt_s);
+           }}};
+}
+
 Json level_json(const DriftFieldLevel& level) {
   return {{"gyro", level.gyro + 1},
           {"potential", kPotentials[level.potential == DriftCoefficient::Member::kW ? 0 : 1]},
@@ -542,6 +556,7 @@ Members calibration_members(Calibration& calibration) {
   CalibrationNoise noise;
   ClockCorrection clocks;
   DriftFieldLevel level;
+  OnBoardDrift on_board;
   Determined determined;
   OpenLoopForecast forecast;
   std::vector<std::string> names;
@@ -579,6 +594,11 @@ Members calibration_members(Calibration& calibration) {
                            read_members(element, level_members(calibration.drift_field.emplace_back(),
                                                                calibration.gyros.size()));
                          }
+                       }}),
+      optional_member({"drift_on_board", "what an estimator on board takes of the field",
+                       schema_of(on_board_members(on_board)),
+                       [&](const JsonNode& node) {
+                         read_members(node, on_board_members(calibration.on_board_drift.emplace()));
                        }}),
       optional_member(
           {"determined", "how many drift coefficients the pass determines", schema_of(determined_members(determined)),
@@ -669,6 +689,12 @@ std::string format_calibration(const Calibration& calibration) {
     levels.push_back(level_json(level));
   }
   const std::string field = levels.empty() ? "" : fmt::format(" \"drift_field\": {},\n", lines(levels));
+  const std::string on_board =
+      calibration.on_board_drift
+          ? fmt::format(" \"drift_on_board\": {},\n",
+                        dump({{"drift_model", name_of(calibration.on_board_drift->drift_model)},
+                              {"random_walk_rad_sqrt_s", calibration.on_board_drift->random_walk_rad_sqrt_s}}))
+          : "";
   const std::string determined =
       calibration.determined
           ? fmt::format(" \"determined\": {},\n", dump({{"coefficients", calibration.determined->coefficients},
@@ -684,13 +710,13 @@ std::string format_calibration(const Calibration& calibration) {
       "{{\"format\": \"{}\", \"version\": {},\n"
       " \"estimator\": {}, \"epoch_tai\": \"{}\",{} \"t_s\": {},\n"
       " \"gyros\": {},\n"
-      " \"further\": {},\n{}{}{}{}{}"
+      " \"further\": {},\n{}{}{}{}{}{}"
       " \"covariance\": {{\n  \"states\": {},\n  \"matrix\": {}}},\n"
       " \"verdict\": {{\"trustworthy\": {}, \"findings\": {}}},\n"
       " \"statistics\": {}}}\n",
       kFormat, kVersion, dump(Json(name_of(calibration.estimator))), format_epoch(calibration.epoch), start_up,
       dump(Json(to_seconds(calibration.t - calibration.epoch))), lines(gyros), dump(further), clocks, noise, field,
-      determined, forecast, dump(states), lines(matrix), calibration.verdict.trustworthy, lines(findings),
+      on_board, determined, forecast, dump(states), lines(matrix), calibration.verdict.trustworthy, lines(findings),
       dump(statistics));
 }
 

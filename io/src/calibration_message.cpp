@@ -257,6 +257,10 @@ class AcmWriter {
       user(owner + "_RMS_RAD_S", number(level.rms_rad_s));
       user(owner + "_SIGMA_FACTOR", number(level.sigma_factor));
     }
+    if (const std::optional<OnBoardDrift>& on_board = calibration_.on_board_drift) {
+      user("ON_BOARD_DRIFT_MODEL", name_of(on_board->drift_model));
+      user("ON_BOARD_RANDOM_WALK_RAD_SQRT_S", number(on_board->random_walk_rad_sqrt_s));
+    }
   }
 
   void user_defined() {

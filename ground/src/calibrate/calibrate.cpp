@@ -9,6 +9,7 @@
 #include <optional>
 #include <utility>
 
+#include "batch/left_out_walk.hpp"
 #include "batch/pass_setup.hpp"
 #include "batch/refine.hpp"
 #include "choose/decide.hpp"
@@ -98,7 +99,8 @@ CalibrationOptions options_of_on_board_run(const PassSettings& settings, Calibra
   options.estimator = Estimator::kInvariant;
   options.further_states[FurtherState::kCoefficientChange] = FurtherStateOptions::Choice::kOff;
   if (settings.prior && options.drift_field) {
-    use(drift_on_board(mean_squares_of(*settings.prior)), options);
+    options.drift_model.reset();
+    use_on_board(*settings.prior, options);
   }
   options.drift_field = false;
   if (options.drift_model && options.drift_model->family == DriftModelId::Family::kVsh && !settings.prior) {
@@ -279,6 +281,11 @@ CalibrationRun calibrate_as_stamped(const Pass& pass, const CalibrationOptions& 
   if (smoothed) {
     run.drift_models = std::move(smoothed->drift_models);
     std::move(smoothed->refinement).put_into(run);
+    if (decision.options.drift_field) {
+      const LeftOut left_out(run.calibration, drift_on_board(mean_squares_of(run.calibration)).drift_model);
+      run.calibration.on_board_drift = {left_out.kept_model(), left_out_walk_rad_sqrt_s(left_out, run.calibration,
+                                                                                      decision.screened->pass)};
+    }
     if (decision.options.drift_field && !decision.field) {  // the spectrum is that of the earlier calibration
       run.calibration.drift_field = pass.settings.prior->drift_field;
     }
@@ -287,8 +294,14 @@ CalibrationRun calibrate_as_stamped(const Pass& pass, const CalibrationOptions& 
     ++run.fix_counts[fix.status];
   }
   add_statistics(run.fixes, run.calibration.statistics);
-  run.calibration.determined = determined(run);
   run.calibration.forecast = forecast_of(run);
+  if (decision.left_out) {
+    run.calibration.on_board_drift = {decision.left_out->kept_model(), 0};
+    run.calibration = decision.left_out->completed(std::move(run.calibration));
+    run.parameters = decision.left_out->completed(run.parameters);
+    run.known_before = decision.left_out->completed_prior(run.known_before);
+  }
+  run.calibration.determined = determined(run);
   return run;
 }
 

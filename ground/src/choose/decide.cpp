@@ -12,6 +12,7 @@
 #include <utility>
 #include <vector>
 
+#include "batch/left_out_walk.hpp"
 #include "choose/constancy.hpp"
 #include "choose/noise_search.hpp"
 #include "model/drift_on_board.hpp"
@@ -194,6 +195,14 @@ CalibrationOptions wandering_like(const NoiseFit& walking, CalibrationOptions op
   return options;
 }
 
+/// Keeps the field that a trial finds, if any, and its members.
+void keep_field(const Trial& trial, Decision& decision) {
+  decision.field = trial.field_prior();
+  if (decision.field) {
+    decision.members = trial.calibration(*decision.field);
+  }
+}
+
 /// The noise is larger than the settings say, so the states were decided with too small a noise. Decides again, with
 /// the noise found while all states are free, and decides whether the drift wanders. `everything`: the trial with all
 /// states free and the noise of the settings; `walk`: the noise found with the states decided first. Where the largest
@@ -246,7 +255,7 @@ void decide_again_with_more_noise(const Pass& pass, const Screened& screened, co
   } else {
     use_walk(with_most_likely_walk(decided, options).noise, options);
   }
-  decision.field = decided.field_prior();
+  keep_field(decided, decision);
   decision.changes = changes_over(decided);
   if (wandering) {
     decision.evidence.push_back(*wandering);
@@ -275,7 +284,7 @@ std::optional<ProcessNoise> walk_by_eq1(const Pass& pass, const Screened& screen
 /// Decides by the data of the pass.
 Decision decide_by_pass(const Pass& pass, const Screened& screened, const CalibrationOptions& asked,
                         const DriftModelId& largest_model) {
-  Decision decision{asked, {}, {}, {}, {}, {}, {}, {}};
+  Decision decision{asked, {}, {}, {}, {}, {}, {}, {}, {}, {}};
   CalibrationOptions& options = decision.options;
   const bool wandering_is_open = options.further_states[FurtherState::kWanderingDrift] == Choice::kAuto;
   if (wandering_is_open) {
@@ -292,7 +301,7 @@ Decision decide_by_pass(const Pass& pass, const Screened& screened, const Calibr
     settle_states(everything, pass.settings, asked, decision);
     decision.changes = changes_over(everything);
     if (options.drift_field) {
-      decision.field = Trial(pass, screened, options, noise).field_prior();
+      keep_field(Trial(pass, screened, options, noise), decision);
     }
     return decision;
   }
@@ -312,7 +321,7 @@ Decision decide_by_pass(const Pass& pass, const Screened& screened, const Calibr
                                  walking, decision);
   } else {
     use_walk(walking.noise, options);
-    decision.field = decided.field_prior();
+    keep_field(decided, decision);
     decision.changes = changes_over(decided);
   }
   return decision;
@@ -377,8 +386,7 @@ CalibrationOptions settled_before(const PassSettings& settings, CalibrationOptio
   if (is_of_field && by_batch && options.drift_model == prior->gyros.at(0).drift_model) {
     options.drift_field = true;
   } else if (is_of_field && options.estimator != Estimator::kPaper) {
-    const MeanSquares members = mean_squares_of(*prior);
-    use(options.drift_model ? drift_on_board(members, *options.drift_model) : drift_on_board(members), options);
+    use_on_board(*prior, options);
   }
   options.find_noise = false;
   leave_out_what_is_open(options);
@@ -397,7 +405,7 @@ Decision decide(const Pass& pass, const CalibrationOptions& asked_for) {
   }
   settle_by_estimator(asked);
   if (pass.settings.prior || asked.estimator == Estimator::kPaper) {
-    return {settled_before(pass.settings, asked), {}, {}, {}, {}, {}, {}, {}};
+    return {settled_before(pass.settings, asked), {}, {}, {}, {}, {}, {}, {}, {}, {}};
   }
   const bool on_board = asked.estimator != Estimator::kBatch;
   const bool by_field = !asked.drift_model && !knows_of_drift_outside(pass.settings);
@@ -406,7 +414,7 @@ Decision decide(const Pass& pass, const CalibrationOptions& asked_for) {
     asked.drift_model = kLargestDriftModel;
     asked.estimator = Estimator::kBatch;
   }
-  Decision decision{asked, {}, {}, {}, {}, {}, {}, {}};
+  Decision decision{asked, {}, {}, {}, {}, {}, {}, {}, {}, {}};
   CalibrationOptions& options = decision.options;
   options.find_noise = false;
   const bool states_are_settled =
@@ -432,12 +440,20 @@ Decision decide(const Pass& pass, const CalibrationOptions& asked_for) {
     decided.evidence.push_back({{}, log_evidence, log_evidence > kLogOddsToAccept});
     const DriftOnBoard drift =
         log_evidence > kLogOddsToAccept ? drift_on_board(decided.field->members) : DriftOnBoard{kEsg7, 0};
-    use(drift, decided.options);
     decided.settings = pass.settings;
-    use(decided.field->members, drift.drift_model, *decided.settings);
+    decided.options.drift_field = false;
+    decided.options.drift_model = drift.drift_model;
+    MeanSquares members = decided.field->members;
     if (drift.drift_model != kEsg7) {
+      const LeftOut left_out(*decided.members, drift.drift_model);
+      add_made_up(left_out, *decided.members, members);
+      double& walk = decided.options.direction_random_walk_rad_sqrt_s;
+      walk = std::hypot(walk, left_out_walk_rad_sqrt_s(left_out, *decided.members, screened.pass));
+      decided.left_out = left_out;
       decided.levels = std::move(decided.field->levels);
     }
+    use(members, drift.drift_model, *decided.settings);
+    decided.members.reset();
     decided.field.reset();
     return decided;
   }

@@ -6,6 +6,7 @@
 
 #include "batch/drift_field.hpp"
 #include "choose/forecast.hpp"
+#include "model/left_out.hpp"
 #include "onboard/screen.hpp"
 #include "trihedron/ground/choose/settled.hpp"
 #include "trihedron/records/run.hpp"
@@ -22,6 +23,8 @@ struct Decision {
   std::vector<Change> changes;      ///< what moves during the pass
   /// Those of the pass with what it shows of the size of members outside eq. (1), for an estimator on board.
   std::optional<PassSettings> settings;
+  std::optional<Calibration> members;   ///< all coefficients of the field as the trial finds them, and alignments
+  std::optional<LeftOut> left_out;      ///< what an estimator on board leaves out of these
   std::vector<DriftFieldLevel> levels;  ///< of the field of which that estimator has the members
   std::optional<Screened> screened;     ///< the screened pass by which it was decided, where it was
 };

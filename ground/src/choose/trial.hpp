@@ -7,6 +7,7 @@
 
 #include "batch/batch.hpp"
 #include "batch/drift_field.hpp"
+#include "batch/members.hpp"
 #include "choose/forecast.hpp"
 #include "onboard/screen.hpp"
 
@@ -36,6 +37,10 @@ class Trial {
 
   /// Prior of the drift field, where the drift is one.
   [[nodiscard]] std::optional<FieldPrior> field_prior() const;
+  /// All coefficients and alignments as the trial finds them, with the uncertainty that the spectrum of a field adds.
+  [[nodiscard]] Calibration calibration(const FieldPrior& field) const {
+    return calibration_of(problem_, kappa_and_delta(problem_, found_, field.more_covariance));
+  }
 
   /// ln of the Bayes factor of these states, which the trial must have; not of drift that wanders.
   [[nodiscard]] double log_evidence(FurtherState state) const;

@@ -75,6 +75,17 @@ DriftOnBoard drift_on_board(const MeanSquares& members) {
   return found;
 }
 
+void add_made_up(const LeftOut& left_out, const Calibration& all, MeanSquares& members) {
+  const Eigen::VectorXd more =
+      (left_out.made_up() * left_out.mean_squares() * left_out.made_up().transpose()).diagonal();
+  for (std::size_t i = 0; i < left_out.kept().size(); ++i) {
+    const ParameterId& state = all.states[static_cast<std::size_t>(left_out.kept()[i])];
+    if (const auto its = members[state.gyro()].find(state.coefficient); its != members[state.gyro()].end()) {
+      its->second += more(static_cast<Eigen::Index>(i));
+    }
+  }
+}
+
 void use(const DriftOnBoard& drift, CalibrationOptions& options) {
   options.drift_field = false;
   options.drift_model = drift.drift_model;
@@ -84,6 +95,19 @@ void use(const DriftOnBoard& drift, CalibrationOptions& options) {
     states[FurtherState::kWanderingDrift] = FurtherStateOptions::Choice::kOn;
     states.wandering_drift_rad_s = std::hypot(before, drift.left_out_rad_s);
   }
+}
+
+void use_on_board(const Calibration& field, CalibrationOptions& options) {
+  const std::optional<OnBoardDrift>& found = field.on_board_drift;
+  if (found && (!options.drift_model || options.drift_model == found->drift_model)) {
+    options.drift_field = false;
+    options.drift_model = found->drift_model;
+    double& walk = options.direction_random_walk_rad_sqrt_s;
+    walk = std::hypot(walk, found->random_walk_rad_sqrt_s);
+    return;
+  }
+  const MeanSquares members = mean_squares_of(field);
+  use(options.drift_model ? drift_on_board(members, *options.drift_model) : drift_on_board(members), options);
 }
 
 void use(const MeanSquares& members, const DriftModelId& model, PassSettings& settings) {

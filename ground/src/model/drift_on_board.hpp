@@ -5,6 +5,7 @@
 #include <map>
 #include <vector>
 
+#include "model/left_out.hpp"
 #include "trihedron/core/drift_model.hpp"
 #include "trihedron/records/calibration.hpp"
 #include "trihedron/records/options.hpp"
@@ -35,8 +36,16 @@ struct DriftOnBoard {
 /// What this model leaves out.
 [[nodiscard]] DriftOnBoard drift_on_board(const MeanSquares& members, const DriftModelId& model);
 
+/// Adds to the members that are kept what makes up for those left out, so that these are mean squares of coefficients
+/// that do. `all`: the calibration that is reduced.
+void add_made_up(const LeftOut& left_out, const Calibration& all, MeanSquares& members);
+
 /// The model and, beside the noise that the options have, what it leaves out.
 void use(const DriftOnBoard& drift, CalibrationOptions& options);
+
+/// What an estimator on board takes of a calibration with a drift field: the model and the noise that it says, or, of a
+/// calibration that does not, drift that wanders for what the model leaves out.
+void use_on_board(const Calibration& field, CalibrationOptions& options);
 
 /// The prior sigmas of the members of the model; those that the settings have stay.
 void use(const MeanSquares& members, const DriftModelId& model, PassSettings& settings);

@@ -3,14 +3,13 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <map>
 #include <string>
 #include <vector>
 
+#include "model/left_out.hpp"
 #include "trihedron/ground/model/setup_error.hpp"
 #include "trihedron/records/drift_models.hpp"
 
@@ -57,77 +56,13 @@ void put_prior(const GyroPrior& prior, int number, const Layout& layout, Gyro& m
   sigma.tail<3>() = prior.alignment_sigma_rad;
 }
 
-/// The states of a calibration, by number.
-struct Parts {
-  std::vector<Eigen::Index> rows;  ///< of coefficients that a model keeps and alignments, in the order of the layout
-  std::vector<Eigen::Index> kept;  ///< coefficients alone
-  std::vector<Eigen::Index> left_out;
-  std::vector<Eigen::Index> alignments;
-};
-
-Parts parts_of(const Calibration& calibration, const DriftModelId& model) {
-  Parts parts;
-  for (const ParameterId& state : drift_and_alignment(model, calibration.gyros.size())) {
-    const auto found = std::ranges::find(calibration.states, state);
-    if (found == calibration.states.end()) {
-      throw SetupError(fmt::format("the earlier calibration has no covariance of '{}'", name_of(state)),
-                       "use a calibration of these gyros, made with the same drift model");
-    }
-    parts.rows.push_back(found - calibration.states.begin());
-    (state.is_drift() ? parts.kept : parts.alignments).push_back(parts.rows.back());
-  }
-  for (std::size_t i = 0; i < calibration.states.size(); ++i) {
-    const auto row = static_cast<Eigen::Index>(i);
-    if (calibration.states[i].is_drift() && std::ranges::find(parts.kept, row) == parts.kept.end()) {
-      parts.left_out.push_back(row);
-    }
-  }
-  return parts;
-}
-
-/// By how much the coefficients that a model keeps go with those that it leaves out, the alignments being the same:
-/// along the pass that all were found by they make up for each other. Rows: kept; columns: left out.
-Eigen::MatrixXd kept_by_left_out(const Calibration& calibration, const Parts& parts) {
-  std::vector<Eigen::Index> given = parts.left_out;
-  given.insert(given.end(), parts.alignments.begin(), parts.alignments.end());
-  // In units of the sigmas, which differ by many powers of ten.
-  const Eigen::VectorXd sigma =
-      calibration.covariance.diagonal().cwiseSqrt().cwiseMax(std::numeric_limits<double>::min());
-  const Eigen::MatrixXd correlation =
-      sigma.cwiseInverse().asDiagonal() * calibration.covariance * sigma.cwiseInverse().asDiagonal();
-  const Eigen::MatrixXd by_given =
-      correlation(given, given).ldlt().solve(Eigen::MatrixXd(correlation(given, parts.kept))).transpose();
-  return sigma(parts.kept).asDiagonal() * by_given.leftCols(static_cast<Eigen::Index>(parts.left_out.size())) *
-         sigma(parts.left_out).cwiseInverse().asDiagonal();
-}
-
-Eigen::VectorXd values_of(const Calibration& calibration, const std::vector<Eigen::Index>& states) {
-  Eigen::VectorXd values(static_cast<Eigen::Index>(states.size()));
-  std::ranges::transform(states, values.begin(), [&](Eigen::Index state) {
-    return value_of(calibration, calibration.states[static_cast<std::size_t>(state)]);
-  });
-  return values;
-}
-
 Prior prior_of_calibration(const Calibration& earlier, const Layout& layout) {
-  const Parts parts = parts_of(earlier, layout.drift_model);
+  const Calibration reduced = LeftOut(earlier, layout.drift_model).reduced();
   Prior prior;
+  prior.covariance = reduced.covariance;
   for (int k = 0; k < layout.gyros; ++k) {
-    prior.gyros[k] = gyro_of(earlier.gyros[static_cast<std::size_t>(k)], layout);
+    prior.gyros[k] = gyro_of(reduced.gyros[static_cast<std::size_t>(k)], layout);
   }
-  if (parts.left_out.empty()) {
-    prior.covariance = earlier.covariance(parts.rows, parts.rows);
-    return prior;
-  }
-  const Eigen::MatrixXd by_left_out = kept_by_left_out(earlier, parts);
-  const Eigen::VectorXd made_up_for = by_left_out * values_of(earlier, parts.left_out);
-  const int size = layout.drift_size();
-  for (int k = 0; k < layout.gyros; ++k) {
-    prior.gyros[k].drift_rad_s.head(size) -= made_up_for.segment(static_cast<Eigen::Index>(k) * size, size);
-  }
-  Eigen::MatrixXd map = Eigen::MatrixXd::Identity(earlier.covariance.rows(), earlier.covariance.cols());
-  map(parts.kept, parts.left_out) = -by_left_out;
-  prior.covariance = (map * earlier.covariance * map.transpose())(parts.rows, parts.rows);
   return prior;
 }
 

@@ -43,6 +43,14 @@ struct DriftFieldLevel {
   double sigma_factor = 1;  ///< its 1-sigma: from rms/factor to rms · factor
 };
 
+/// The drift model that an estimator on board takes of a drift field.
+struct OnBoardDrift {
+  DriftModelId drift_model;
+  /// Stands for what its coefficients cannot make up for of all others, beside the noise of the calibration, per axis
+  /// across each momentum; 0 where the calibration was made with this model, and its noise has it.
+  double random_walk_rad_sqrt_s = 0;
+};
+
 /// The noise levels that a calibration used.
 struct CalibrationNoise {
   double direction_random_walk_rad_sqrt_s = 0;  ///< of each momentum across itself, per axis
@@ -70,6 +78,7 @@ struct Calibration {
   std::optional<ClockCorrection> clocks;
   std::optional<CalibrationNoise> noise;
   std::vector<DriftFieldLevel> drift_field;  ///< empty where the drift is not estimated as a field
+  std::optional<OnBoardDrift> on_board_drift;  ///< where it is
   std::optional<Determined> determined;
   std::optional<OpenLoopForecast> forecast;
   Verdict verdict;

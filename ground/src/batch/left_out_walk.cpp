@@ -1,0 +1,92 @@
+#include "batch/left_out_walk.hpp"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+#include <vector>
+
+#include "trihedron/core/columns.hpp"
+#include "trihedron/core/drift.hpp"
+#include "trihedron/core/frames.hpp"
+
+namespace trihedron::ground {
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+
+/// Between the directions that are taken: members of degree 8 change in minutes.
+constexpr Duration kStep = std::chrono::seconds(30);
+/// Over a longer gap nothing is added.
+constexpr Duration kGap = std::chrono::minutes(5);
+
+}  // namespace
+
+double left_out_walk_rad_sqrt_s(const LeftOut& left_out, const Calibration& all, const ScreenedPass& pass) {
+  if (left_out.nothing()) {
+    return 0;
+  }
+  // What is left of each member, as coefficients of all states, in units of what is expected of the members.
+  MatrixXd size = left_out.mean_squares();
+  const Eigen::VectorXd scale = size.diagonal().cwiseSqrt();
+  size = scale.cwiseInverse().asDiagonal() * size * scale.cwiseInverse().asDiagonal();
+  size.diagonal().array() += 1e-12;
+  const MatrixXd root = scale.asDiagonal() * MatrixXd(size.llt().matrixL());
+  MatrixXd rest = MatrixXd::Zero(std::ssize(all.states), root.cols());
+  rest(left_out.kept(), Eigen::all) = -left_out.made_up() * root;
+  rest(left_out.left_out(), Eigen::all) = root;
+
+  const DriftModel drift(all.gyros.front().drift_model, {});
+  const int columns = drift.columns();
+  Columns<DriftModel::kMaxMembers> basis;
+  double most = 0;
+  for (std::size_t k = 0; k < all.gyros.size(); ++k) {
+    const Eigen::Matrix3d C_c_b = Rot<C, B<1>>::exp(Vec<C>::assume(all.gyros[k].alignment_rotation_vector_rad)).raw();
+    const Index first = rows_of(all, {ParameterId::drift(k, drift.member(0))}).front();
+    std::vector<Time> t;
+    std::vector<MatrixXd> turned;  // 3 × members
+    MatrixXd rate_before;
+    const auto gyro = static_cast<int>(k);
+    for (const ScreenedPass::Fix& fix : pass.fixes) {
+      if (fix.fix.head != 0 || !fix.used[gyro] || (!t.empty() && fix.fix.t - t.back() < kStep)) {
+        continue;
+      }
+      drift.basis(fix.h_b[gyro], 0, basis.view(columns));
+      const Eigen::Matrix3d C_in_b = fix.fix.q_in_c.normalized().toRotationMatrix() * C_c_b;
+      const Eigen::Matrix3d across = C_in_b - C_in_b * fix.h_b[gyro] * fix.h_b[gyro].transpose();
+      MatrixXd rate = across * (basis.first(columns) * rest.middleRows(first, columns));
+      MatrixXd now = turned.empty() ? MatrixXd::Zero(3, rest.cols()) : turned.back();
+      if (!t.empty() && fix.fix.t - t.back() < kGap) {
+        now += to_seconds(fix.fix.t - t.back()) / 2 * (rate_before + rate);
+      }
+      t.push_back(fix.fix.t);
+      turned.push_back(std::move(now));
+      rate_before = std::move(rate);
+    }
+    for (const Duration lag : {std::chrono::minutes(2), std::chrono::minutes(5), std::chrono::minutes(10), std::chrono::minutes(22), std::chrono::minutes(45), std::chrono::minutes(90), std::chrono::minutes(180), std::chrono::minutes(270)}) {
+      double square = 0;
+      double seconds = 0;
+      for (std::size_t i = 0, j = 0; i < t.size(); ++i) {
+        while (j < t.size() && t[j] - t[i] < lag) {
+          ++j;
+        }
+        if (j == t.size()) {
+          break;
+        }
+        square += (turned[j] - turned[i]).squaredNorm() / 2;
+        seconds += to_seconds(t[j] - t[i]);
+      }
+      if (seconds > 0 && std::getenv("WALK"))
+        std::printf("gyro %zu lag %ld q %.3g angle %.3g as\n", k, long(to_seconds(lag)), std::sqrt(square / seconds), std::sqrt(square / seconds * to_seconds(lag)) * 206265);
+      if (seconds > 0 && lag >= std::chrono::minutes(10)) {
+        most = std::max(most, square / seconds);
+      }
+    }
+  }
+  return std::sqrt(most);
+}
+
+}  // namespace trihedron::ground
