@@ -393,8 +393,7 @@ class AcmReader {
         message_.refuse(model->at, fmt::format("ON_BOARD_DRIFT_MODEL is {}", in_quotes(model->value)),
                         fmt::format("there is room for degree {} and less", DriftModelId::kMaxDegreeOnBoard));
       }
-      on_board.random_walk_rad_sqrt_s =
-          number("ON_BOARD_RANDOM_WALK_RAD_SQRT_S", limits::kRandomWalk_rad_sqrt_s);
+      on_board.random_walk_rad_sqrt_s = number("ON_BOARD_RANDOM_WALK_RAD_SQRT_S", limits::kRandomWalk_rad_sqrt_s);
     }
   }
 

@@ -297,7 +297,8 @@ Members level_members(DriftFieldLevel& level, std::size_t gyros) {
 }
 
 Members on_board_members(OnBoardDrift& drift) {
-  return {{"drift_model", "it has room for", drift_model_schema(), [&drift](const JsonNode& node) {
+  return {{"drift_model", "it has room for", drift_model_schema(),
+           [&drift](const JsonNode& node) {
              drift.drift_model = parse_drift_model(node);
              if (drift.drift_model.degree > DriftModelId::kMaxDegreeOnBoard) {
                node.refuse(fmt::format("is {}", in_quotes(name_of(drift.drift_model))),
@@ -595,11 +596,9 @@ Members calibration_members(Calibration& calibration) {
                                                                calibration.gyros.size()));
                          }
                        }}),
-      optional_member({"drift_on_board", "what an estimator on board takes of the field",
-                       schema_of(on_board_members(on_board)),
-                       [&](const JsonNode& node) {
-                         read_members(node, on_board_members(calibration.on_board_drift.emplace()));
-                       }}),
+      optional_member(
+          {"drift_on_board", "what an estimator on board takes of the field", schema_of(on_board_members(on_board)),
+           [&](const JsonNode& node) { read_members(node, on_board_members(calibration.on_board_drift.emplace())); }}),
       optional_member(
           {"determined", "how many drift coefficients the pass determines", schema_of(determined_members(determined)),
            [&](const JsonNode& node) { read_members(node, determined_members(calibration.determined.emplace())); }}),

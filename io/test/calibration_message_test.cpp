@@ -150,6 +150,9 @@ void expect_same(const Calibration& a, const Calibration& b) {
   for (int axis = 0; axis < 3; ++axis) {
     expect_near((*a.noise->star_tracker_noise_rad)(axis), (*b.noise->star_tracker_noise_rad)(axis));
   }
+  ASSERT_TRUE(b.on_board_drift);
+  EXPECT_EQ(a.on_board_drift->drift_model, b.on_board_drift->drift_model);
+  expect_near(a.on_board_drift->random_walk_rad_sqrt_s, b.on_board_drift->random_walk_rad_sqrt_s);
   ASSERT_EQ(a.drift_field.size(), b.drift_field.size());
   for (std::size_t i = 0; i < a.drift_field.size(); ++i) {
     EXPECT_EQ(a.drift_field[i].gyro, b.drift_field[i].gyro);
@@ -294,6 +297,9 @@ TEST(Acm, RefusesWhatIsWrong) {
       {"CLOCK_OFFSET_S =", "CLOCK_DRIFT_S =", "is no keyword of a calibration; did you mean"},
       {"EPOCH_S = 32400.125", "EPOCH_S = 32400.125 [s]", "has a unit in brackets"},
       {"NOISE_STAR_TRACKER_RAD = ", "NOISE_STAR_TRACKER_RAD = 1 ", "NOISE_STAR_TRACKER_RAD has 4 values"},
+      {"ON_BOARD_DRIFT_MODEL = vsh:3", "ON_BOARD_DRIFT_MODEL = vsh:9",
+       "ON_BOARD_DRIFT_MODEL is 'vsh:9', no drift model"},
+      {"ON_BOARD_DRIFT_MODEL = vsh:3", "ON_BOARD_DRIFT_MODEL = vsh:8", "there is room for degree 6 and less"},
       {"STATISTIC_NIS_MEAN = ", "STATISTIC_NIS_MEAN = x", "is not a number"},
   };
   for (const Wrong& one : wrong) {

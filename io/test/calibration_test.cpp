@@ -18,6 +18,7 @@
 namespace trihedron::io {
 namespace {
 
+using testing::AllOf;
 using testing::HasSubstr;
 
 std::string refusal_of(std::string_view text) {
@@ -119,6 +120,9 @@ TEST(CalibrationJson, ComesBackFromAFileWhole) {
   EXPECT_EQ(back.noise->star_tracker_noise_rad, calibration.noise->star_tracker_noise_rad);
   EXPECT_EQ(back.noise->wandering_drift_rad_s, calibration.noise->wandering_drift_rad_s);
   EXPECT_EQ(back.noise->wandering_time_s, calibration.noise->wandering_time_s);
+  ASSERT_TRUE(back.on_board_drift.has_value());
+  EXPECT_EQ(back.on_board_drift->drift_model, calibration.on_board_drift->drift_model);
+  EXPECT_EQ(back.on_board_drift->random_walk_rad_sqrt_s, calibration.on_board_drift->random_walk_rad_sqrt_s);
   EXPECT_EQ(back.states, calibration.states);
   EXPECT_EQ(back.covariance, calibration.covariance);
   EXPECT_FALSE(back.verdict.trustworthy);
@@ -235,6 +239,16 @@ TEST(CalibrationJson, RefusesNoiseThatIsNone) {
   calibration.noise = CalibrationNoise{0, Eigen::Vector3d(1e-5, 0, 1e-5), 0, 0};
   EXPECT_THAT(refusal_of(format_calibration(calibration)),
               HasSubstr("noise.star_tracker_noise_rad[1] is 0 rad, outside"));
+}
+
+TEST(CalibrationJson, RefusesWhatNoEstimatorOnBoardHasRoomFor) {
+  Calibration calibration = sample_calibration();
+  calibration.on_board_drift = OnBoardDrift{vsh(7), 0};
+  EXPECT_THAT(refusal_of(format_calibration(calibration)),
+              AllOf(HasSubstr("drift_on_board.drift_model is 'vsh:7'"), HasSubstr("room for degree 6")));
+  calibration.on_board_drift = OnBoardDrift{vsh(6), -1e-9};
+  EXPECT_THAT(refusal_of(format_calibration(calibration)),
+              HasSubstr("drift_on_board.random_walk_rad_sqrt_s is -1e-09"));
 }
 
 TEST(CalibrationJson, RefusesNumbersThatNoGyroHas) {

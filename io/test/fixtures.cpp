@@ -163,6 +163,7 @@ Calibration sample_calibration() {
   calibration.further = {{ParameterId::further(FurtherState::kClockOffset, 0, 0), 1e-2 / 3, 1e-4 / 7},
                          {ParameterId::further(FurtherState::kOrbitalError, 0, 0), -1e-5 / 3, 1e-6}};
   calibration.noise = CalibrationNoise{1e-8 / 3, Eigen::Vector3d(1e-5, 2e-5, 1e-4) / 7, 1e-7 / 3, 1200};
+  calibration.on_board_drift = OnBoardDrift{vsh(3), 1e-9 / 3};
   const Eigen::Index n = 20;
   calibration.covariance = Eigen::MatrixXd::Identity(n, n) * (1e-12 / 3);
   calibration.covariance(3, 4) = calibration.covariance(4, 3) = 1e-13 / 7;

@@ -2,10 +2,11 @@
 
 #include <Eigen/Cholesky>
 #include <algorithm>
+#include <array>
 #include <chrono>
 #include <cmath>
-#include <cstdio>
-#include <cstdlib>
+#include <limits>
+#include <utility>
 #include <vector>
 
 #include "trihedron/core/columns.hpp"
@@ -23,18 +24,41 @@ constexpr Duration kStep = std::chrono::seconds(30);
 /// Over a longer gap nothing is added.
 constexpr Duration kGap = std::chrono::minutes(5);
 
+/// For which a random walk stands; what comes back within a shorter time stays below the noise of a fix.
+constexpr std::array<Duration, 5> kLags = {std::chrono::minutes(10), std::chrono::minutes(22), std::chrono::minutes(45),
+                                           std::chrono::minutes(90), std::chrono::minutes(270)};
+
+/// Mean square, per axis across the momentum, of the change over a time, for each second of it, rad²/s; 0 of a pass
+/// that is shorter.
+double variance_rate(const std::vector<Time>& t, const std::vector<MatrixXd>& turned, Duration lag) {
+  double square = 0;
+  double seconds = 0;
+  for (std::size_t i = 0, j = 0; i < t.size(); ++i) {
+    while (j < t.size() && t[j] - t[i] < lag) {
+      ++j;
+    }
+    if (j == t.size()) {
+      break;
+    }
+    square += (turned[j] - turned[i]).squaredNorm() / 2;
+    seconds += to_seconds(t[j] - t[i]);
+  }
+  return seconds > 0 ? square / seconds : 0;
+}
+
 }  // namespace
 
 double left_out_walk_rad_sqrt_s(const LeftOut& left_out, const Calibration& all, const ScreenedPass& pass) {
   if (left_out.nothing()) {
     return 0;
   }
-  // What is left of each member, as coefficients of all states, in units of what is expected of the members.
-  MatrixXd size = left_out.mean_squares();
-  const Eigen::VectorXd scale = size.diagonal().cwiseSqrt();
-  size = scale.cwiseInverse().asDiagonal() * size * scale.cwiseInverse().asDiagonal();
-  size.diagonal().array() += 1e-12;
-  const MatrixXd root = scale.asDiagonal() * MatrixXd(size.llt().matrixL());
+  // What is left of independent draws of the members, as coefficients of all states. In units of their sizes, which
+  // differ by many powers of ten; rounding may have made the matrix indefinite.
+  const MatrixXd squares = left_out.mean_squares();
+  const Eigen::VectorXd size = squares.diagonal().cwiseSqrt().cwiseMax(std::numeric_limits<double>::min());
+  MatrixXd scaled = size.cwiseInverse().asDiagonal() * squares * size.cwiseInverse().asDiagonal();
+  scaled.diagonal().array() += 1e-12;
+  const MatrixXd root = size.asDiagonal() * MatrixXd(scaled.llt().matrixL());
   MatrixXd rest = MatrixXd::Zero(std::ssize(all.states), root.cols());
   rest(left_out.kept(), Eigen::all) = -left_out.made_up() * root;
   rest(left_out.left_out(), Eigen::all) = root;
@@ -66,24 +90,8 @@ double left_out_walk_rad_sqrt_s(const LeftOut& left_out, const Calibration& all,
       turned.push_back(std::move(now));
       rate_before = std::move(rate);
     }
-    for (const Duration lag : {std::chrono::minutes(2), std::chrono::minutes(5), std::chrono::minutes(10), std::chrono::minutes(22), std::chrono::minutes(45), std::chrono::minutes(90), std::chrono::minutes(180), std::chrono::minutes(270)}) {
-      double square = 0;
-      double seconds = 0;
-      for (std::size_t i = 0, j = 0; i < t.size(); ++i) {
-        while (j < t.size() && t[j] - t[i] < lag) {
-          ++j;
-        }
-        if (j == t.size()) {
-          break;
-        }
-        square += (turned[j] - turned[i]).squaredNorm() / 2;
-        seconds += to_seconds(t[j] - t[i]);
-      }
-      if (seconds > 0 && std::getenv("WALK"))
-        std::printf("gyro %zu lag %ld q %.3g angle %.3g as\n", k, long(to_seconds(lag)), std::sqrt(square / seconds), std::sqrt(square / seconds * to_seconds(lag)) * 206265);
-      if (seconds > 0 && lag >= std::chrono::minutes(10)) {
-        most = std::max(most, square / seconds);
-      }
+    for (const Duration lag : kLags) {
+      most = std::max(most, variance_rate(t, turned, lag));
     }
   }
   return std::sqrt(most);

@@ -81,7 +81,8 @@ KappaAndDelta with_members(const PassProblem& problem, const MatrixXd& more_cova
 KappaAndDelta kappa_and_delta(const PassProblem& problem, const BatchResult& result, const MatrixXd& more_covariance) {
   const Layout& layout = problem.layout();
   const int size = layout.parameters();
-  KappaAndDelta found{result.solution.gyros, square(MatrixXd(result.errors.last_root.middleRows(layout.drift(0), size))),
+  KappaAndDelta found{result.solution.gyros,
+                      square(MatrixXd(result.errors.last_root.middleRows(layout.drift(0), size))),
                       MatrixXd::Identity(size, size)};
   return problem.modes() ? with_members(problem, more_covariance, found) : found;
 }

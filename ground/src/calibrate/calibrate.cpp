@@ -283,8 +283,8 @@ CalibrationRun calibrate_as_stamped(const Pass& pass, const CalibrationOptions& 
     std::move(smoothed->refinement).put_into(run);
     if (decision.options.drift_field) {
       const LeftOut left_out(run.calibration, drift_on_board(mean_squares_of(run.calibration)).drift_model);
-      run.calibration.on_board_drift = {left_out.kept_model(), left_out_walk_rad_sqrt_s(left_out, run.calibration,
-                                                                                      decision.screened->pass)};
+      run.calibration.on_board_drift = {left_out.kept_model(),
+                                        left_out_walk_rad_sqrt_s(left_out, run.calibration, decision.screened->pass)};
     }
     if (decision.options.drift_field && !decision.field) {  // the spectrum is that of the earlier calibration
       run.calibration.drift_field = pass.settings.prior->drift_field;

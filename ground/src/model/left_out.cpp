@@ -59,17 +59,15 @@ LeftOut::LeftOut(const Calibration& all, const DriftModelId& kept) : all_(all), 
     return;
   }
   mean_.resize(std::ssize(left_out_));
-  std::ranges::transform(left_out_, mean_.begin(), [&](Index row) {
-    return value_of(all, all.states[static_cast<std::size_t>(row)]);
-  });
+  std::ranges::transform(left_out_, mean_.begin(),
+                         [&](Index row) { return value_of(all, all.states[static_cast<std::size_t>(row)]); });
   // The regression of those kept on those left out, the alignments being the same, with the sign turned. In units of
   // the sigmas, which differ by many powers of ten.
   std::vector<Index> given = left_out_;
   given.insert(given.end(), alignments_.begin(), alignments_.end());
   const VectorXd sigma = all.covariance.diagonal().cwiseSqrt().cwiseMax(std::numeric_limits<double>::min());
   const MatrixXd correlation = sigma.cwiseInverse().asDiagonal() * all.covariance * sigma.cwiseInverse().asDiagonal();
-  const MatrixXd by_given =
-      correlation(given, given).ldlt().solve(MatrixXd(correlation(given, kept_))).transpose();
+  const MatrixXd by_given = correlation(given, given).ldlt().solve(MatrixXd(correlation(given, kept_))).transpose();
   made_up_ = -(sigma(kept_).asDiagonal() * by_given.leftCols(std::ssize(left_out_)) *
                sigma(left_out_).cwiseInverse().asDiagonal());
 }

@@ -6,6 +6,8 @@
 #include <cmath>
 #include <numbers>
 
+#include "batch/left_out_walk.hpp"
+#include "model/left_out.hpp"
 #include "model/prior.hpp"
 #include "trihedron/records/drift_models.hpp"
 
@@ -78,8 +80,12 @@ TEST(DriftOnBoard, MembersOfTheModelHaveTheirSizesAsPriorSigmas) {
   EXPECT_NEAR((settings.gyros[1].drift_sigma_rad_s.at({kD, 1, -1})), 1e-8, 1e-15);
 }
 
+Eigen::Index row_of(const Calibration& calibration, const DriftCoefficient& member) {
+  return rows_of(calibration, {ParameterId::drift(0, member)}).front();
+}
+
 /// A pass that knows k0 + 3 W(2,1) of gyro 1 far better than either, as along a flight on which both do the same.
-TEST(DriftOnBoard, ItsCoefficientsMakeUpForWhatIsLeftOutAsAlongTheFlight) {
+Calibration by_a_flight_on_which_k0_acts_as_three_times_a_member() {
   Calibration calibration;
   calibration.gyros.resize(2);
   for (GyroCalibration& gyro : calibration.gyros) {
@@ -88,11 +94,8 @@ TEST(DriftOnBoard, ItsCoefficientsMakeUpForWhatIsLeftOutAsAlongTheFlight) {
   }
   calibration.states = drift_and_alignment(vsh(2), 2);
   const auto size = static_cast<Eigen::Index>(calibration.states.size());
-  const auto index_of = [&](const DriftCoefficient& member) {
-    return std::ranges::find(calibration.states, ParameterId::drift(0, member)) - calibration.states.begin();
-  };
-  const Eigen::Index k0 = index_of(DriftCoefficient::of_eq1(0));
-  const Eigen::Index member = index_of({kW, 2, 1});
+  const Eigen::Index k0 = row_of(calibration, DriftCoefficient::of_eq1(0));
+  const Eigen::Index member = row_of(calibration, {kW, 2, 1});
   calibration.gyros[0].drift_rad_s[static_cast<std::size_t>(k0)] = 1e-6;
   calibration.gyros[0].drift_rad_s[static_cast<std::size_t>(member)] = 2e-8;
   calibration.covariance = Eigen::MatrixXd::Identity(size, size) * 1e-18;
@@ -100,7 +103,11 @@ TEST(DriftOnBoard, ItsCoefficientsMakeUpForWhatIsLeftOutAsAlongTheFlight) {
   calibration.covariance(member, member) = variance;
   calibration.covariance(k0, member) = calibration.covariance(member, k0) = -3 * variance;
   calibration.covariance(k0, k0) = 9 * variance + 1e-20;
+  return calibration;
+}
 
+TEST(DriftOnBoard, ItsCoefficientsMakeUpForWhatIsLeftOutAsAlongTheFlight) {
+  const Calibration calibration = by_a_flight_on_which_k0_acts_as_three_times_a_member();
   PassSettings settings;
   settings.gyros.resize(2);
   settings.prior = calibration;
@@ -115,6 +122,131 @@ TEST(DriftOnBoard, ItsCoefficientsMakeUpForWhatIsLeftOutAsAlongTheFlight) {
   const Prior whole = prior_of(settings, layout);
   EXPECT_EQ(whole.covariance, calibration.covariance);
   EXPECT_EQ(whole.gyros[0].drift_rad_s(0), 1e-6);
+}
+
+TEST(LeftOut, IsInTheCalibrationAgainWhichReducedIsWhatWasEstimated) {
+  const Calibration all = by_a_flight_on_which_k0_acts_as_three_times_a_member();
+  const LeftOut left_out(all, kEsg7);
+  ASSERT_EQ(left_out.left_out().size(), static_cast<std::size_t>(2 * (vsh(2).size() - kEsg7.size())));
+  Calibration estimated = left_out.reduced();
+  EXPECT_NEAR(value_of(estimated, ParameterId::drift(0, DriftCoefficient::of_eq1(0))), 1e-6 + 3 * 2e-8, 1e-14);
+  estimated.gyros[0].drift_rad_s[0] += 5e-9;  // by an estimator on board, along the same flight
+  estimated.gyros[0].alignment_rotation_vector_rad.x() = 1e-3;
+  estimated.covariance(0, 0) *= 4;
+  const Eigen::Index align = kEsg7.size();
+  estimated.covariance(0, align) = estimated.covariance(align, 0) = 1e-20;
+
+  const Calibration completed = left_out.completed(estimated);
+  EXPECT_EQ(completed.states, all.states);
+  EXPECT_NEAR(value_of(completed, ParameterId::drift(0, DriftCoefficient::of_eq1(0))), 1e-6 + 5e-9, 1e-14);
+  EXPECT_EQ(value_of(completed, ParameterId::drift(0, {kW, 2, 1})), 2e-8);
+  // k0 itself is as uncertain as what it makes up for.
+  EXPECT_NEAR(sigma_of(completed, ParameterId::drift(0, DriftCoefficient::of_eq1(0))), std::sqrt(9e-16 + 4e-20), 1e-14);
+  const Calibration again = LeftOut(completed, kEsg7).reduced();
+  EXPECT_NEAR(again.gyros[0].drift_rad_s[0], estimated.gyros[0].drift_rad_s[0], 1e-18);
+  EXPECT_EQ(again.gyros[0].alignment_rotation_vector_rad, estimated.gyros[0].alignment_rotation_vector_rad);
+  EXPECT_LT((again.covariance - estimated.covariance).cwiseAbs().maxCoeff(), 1e-26);
+}
+
+TEST(LeftOut, IsInTheHistoryAndThePriorAsUncertainAsItIs) {
+  const Calibration all = by_a_flight_on_which_k0_acts_as_three_times_a_member();
+  const LeftOut left_out(all, kEsg7);
+  const Eigen::Index k0 = row_of(all, DriftCoefficient::of_eq1(0));
+  const Eigen::Index member = row_of(all, {kW, 2, 1});
+  const std::size_t states = drift_and_alignment(kEsg7, 2).size();
+  const ParameterHistory history =
+      left_out.completed(ParameterHistory{{Time{}}, {std::vector(states, 2e-6)}, {std::vector(states, 4e-8)}});
+  ASSERT_EQ(history.value.at(0).size(), all.states.size());
+  EXPECT_NEAR(history.value[0][static_cast<std::size_t>(k0)], 2e-6 - 6e-8, 1e-14);
+  EXPECT_NEAR(history.sigma[0][static_cast<std::size_t>(k0)], 5e-8, 1e-12);
+  EXPECT_TRUE(std::isnan(history.value[0][static_cast<std::size_t>(member)]));
+  EXPECT_NEAR(history.sigma[0][static_cast<std::size_t>(member)], 1e-8, 1e-14);
+
+  Calibration prior = left_out.reduced();
+  prior.covariance.setIdentity();
+  const Calibration completed = left_out.completed_prior(prior);
+  EXPECT_EQ(completed.states, all.states);
+  EXPECT_EQ(completed.covariance(k0, k0), 1);
+  EXPECT_NEAR(completed.covariance(member, member), 1e-16 + 4e-16, 1e-22);
+}
+
+TEST(LeftOut, IsNothingByTheSameModel) {
+  const Calibration all = by_a_flight_on_which_k0_acts_as_three_times_a_member();
+  const LeftOut left_out(all, vsh(2));
+  EXPECT_TRUE(left_out.nothing());
+  EXPECT_EQ(left_out.reduced().covariance, all.covariance);
+  EXPECT_EQ(left_out.completed(all).covariance, all.covariance);
+  EXPECT_EQ(left_out.completed_prior(all).states, all.states);
+  EXPECT_EQ(left_out.completed(ParameterHistory{{Time{}}, {{1}}, {{2}}}).value,
+            (std::vector<std::vector<double>>{{1}}));
+  EXPECT_EQ(left_out_walk_rad_sqrt_s(left_out, all, ScreenedPass()), 0);
+}
+
+/// A pass of two gyros whose momenta turn in their cases once in 5400 s, in the plane of x and y.
+ScreenedPass orbits(Duration length) {
+  ScreenedPass pass;
+  for (Duration t{}; t < length; t += std::chrono::seconds(10)) {
+    ScreenedPass::Fix& fix = pass.fixes.emplace_back();
+    const double angle = 2 * std::numbers::pi * to_seconds(t) / 5400;
+    fix.fix.t = Time(t);
+    fix.fix.q_in_c = Eigen::AngleAxisd(-angle, Eigen::Vector3d::UnitZ());
+    fix.used[0] = fix.used[1] = true;
+    fix.h_b[0] = {std::cos(angle), std::sin(angle), 0};
+    fix.h_b[1] = Eigen::Vector3d::UnitX();
+  }
+  return pass;
+}
+
+TEST(LeftOut, WalksAsFarAsNothingMakesUpForIt) {
+  Calibration all;
+  all.gyros.resize(2);
+  for (GyroCalibration& gyro : all.gyros) {
+    gyro.drift_model = vsh(1);
+    gyro.drift_rad_s.assign(static_cast<std::size_t>(vsh(1).size()), 0);
+  }
+  all.states = drift_and_alignment(vsh(1), 2);
+  const auto size = static_cast<Eigen::Index>(all.states.size());
+  all.covariance = Eigen::MatrixXd::Identity(size, size) * 1e-30;
+  const Eigen::Index member = row_of(all, {kW, 1, 0});
+  const double sigma = 1e-9;
+  all.covariance(member, member) = sigma * sigma;
+  // W(1, 0) = sqrt(3/4π) z turns the momentum about z by its amplitude: the same way all the time, so that over the
+  // longest time, 270 min, it is most of a random walk; only one of the two axes moves.
+  const LeftOut left_out(all, kEsg7);
+  const double rate = sigma * std::sqrt(3 / (4 * std::numbers::pi));
+  EXPECT_NEAR(left_out_walk_rad_sqrt_s(left_out, all, orbits(std::chrono::hours(9))), rate * std::sqrt(270 * 60 / 2.0),
+              1e-3 * rate * std::sqrt(270 * 60 / 2.0));
+  EXPECT_NEAR(left_out_walk_rad_sqrt_s(left_out, all, orbits(std::chrono::hours(1))), rate * std::sqrt(45 * 60 / 2.0),
+              1e-2 * rate * std::sqrt(45 * 60 / 2.0));
+  EXPECT_EQ(left_out_walk_rad_sqrt_s(left_out, all, orbits(std::chrono::minutes(5))), 0);
+}
+
+TEST(DriftOnBoard, IsWhatACalibrationWithAFieldSays) {
+  Calibration field = by_a_flight_on_which_k0_acts_as_three_times_a_member();
+  field.on_board_drift = OnBoardDrift{vsh(1), 3e-9};
+  CalibrationOptions options;
+  options.direction_random_walk_rad_sqrt_s = 4e-9;
+  use_on_board(field, options);
+  EXPECT_EQ(options.drift_model, vsh(1));
+  EXPECT_NEAR(options.direction_random_walk_rad_sqrt_s, 5e-9, 1e-15);
+  EXPECT_FALSE(options.further_states.is_on(FurtherState::kWanderingDrift));
+  // By another model nobody has said what it leaves out.
+  options.drift_model = kEsg7;
+  use_on_board(field, options);
+  EXPECT_EQ(options.drift_model, kEsg7);
+  EXPECT_TRUE(options.further_states.is_on(FurtherState::kWanderingDrift));
+}
+
+TEST(DriftOnBoard, SizesOfMembersThatMakeUpForOthersGrowByThat) {
+  Calibration all = by_a_flight_on_which_k0_acts_as_three_times_a_member();
+  const Eigen::Index first = row_of(all, {kW, 1, 0});
+  const Eigen::Index member = row_of(all, {kW, 2, 1});
+  all.covariance(first, member) = all.covariance(member, first) = -2e-17;
+  MeanSquares members = mean_squares_of(all);
+  const double before = members[0].at({kW, 1, 0});
+  add_made_up(LeftOut(all, vsh(1)), all, members);
+  EXPECT_NEAR(members[0].at({kW, 1, 0}), before + 0.2 * 0.2 * (1e-16 + 4e-16), 1e-22);
+  EXPECT_EQ(members[1].at({kW, 1, 0}), 1e-18);
 }
 
 TEST(DriftOnBoard, TakesValueAndSigmaOfACalibration) {

@@ -77,7 +77,7 @@ struct Calibration {
   /// are right.
   std::optional<ClockCorrection> clocks;
   std::optional<CalibrationNoise> noise;
-  std::vector<DriftFieldLevel> drift_field;  ///< empty where the drift is not estimated as a field
+  std::vector<DriftFieldLevel> drift_field;    ///< empty where the drift is not estimated as a field
   std::optional<OnBoardDrift> on_board_drift;  ///< where it is
   std::optional<Determined> determined;
   std::optional<OpenLoopForecast> forecast;
