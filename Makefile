@@ -223,6 +223,7 @@ fuzz-briefly: fuzz-build
 
 # Fails on each warning, but Doxygen's of members and constants that have no comment of their own (see docs/Doxyfile), and on each broken link.
 docs: build $(DOCS_TOOLS)/installed
+	@cmake/setup.sh docs
 	@mkdir -p out/docs/cpp
 	doxygen docs/Doxyfile
 	@! grep -vE 'Member .* (of (struct|class)|\((variable|typedef)\) of namespace) .* is not documented' out/docs/warnings.txt

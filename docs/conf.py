@@ -38,5 +38,31 @@ copybutton_line_continuation_character = "\\"
 autodoc_mock_imports = ["trihedron._native", "h5netcdf", "h5py", "tomli_w"]
 autodoc_member_order = "bysource"
 autodoc_typehints = "signature"
-autodoc_class_signature = "separated"
+autodoc_type_aliases = {"npt.ArrayLike": "ArrayLike", "PathLike": "PathLike", "Progress": "Progress", "Doubles": "Doubles"}
 python_use_unqualified_type_names = True
+add_module_names = False
+default_role = "code"
+
+
+def arguments_are_a_list(_app, _what, _name, _object, _options, lines):
+    """Lines of a docstring that begin with the name of an argument, "seed: …", as a list."""
+    inside = False
+    for index, line in enumerate(lines):
+        begins = re.match(r"([a-z_]+(?:, [a-z_]+)*): (.*)", line)
+        if begins:
+            lines[index] = f"- **{begins[1]}**: {begins[2]}"
+            if not inside:
+                lines[index] = "\n" + lines[index]
+        inside = bool(begins) or (inside and line.strip() != "")
+        if inside and not begins:
+            lines[index] = "  " + line
+    lines[:] = "\n".join(lines).split("\n")
+
+
+def names_of_types_are_short(_app, _what, _name, _object, _options, signature, returns):
+    return tuple(its and re.sub(r"TypeAliasForwardRef\('(\w+)'\)|trihedron\._native\.(\w+)", r"\1\2", its) for its in (signature, returns))
+
+
+def setup(app):
+    app.connect("autodoc-process-signature", names_of_types_are_short)
+    app.connect("autodoc-process-docstring", arguments_are_a_list)

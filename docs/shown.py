@@ -43,12 +43,12 @@ def pages():
 
 
 def blocks(text):
-    """(kind, lines) of the text: "prose", "console" or "file", the fences with it."""
+    """(kind, lines) of the text: "prose", "console", "file" or "sh", the fences with it."""
     result, lines, fence = [], [], None
     for line in text.splitlines():
-        if fence is None and (opening := re.match(r"(`{3,})(console$|\{code-block\})?", line)):
+        if fence is None and (opening := re.match(r"(`{3,})(console$|sh$|\{code-block\})?", line)):
             result.append(("prose", lines))
-            fence, kind, lines = opening[1], {"console": "console", "{code-block}": "file"}.get(opening[2], "prose"), [line]
+            fence, kind, lines = opening[1], {"{code-block}": "file", None: "prose"}.get(opening[2], opening[2]), [line]
         elif fence is not None and line == fence:
             result.append((kind, [*lines, line]))
             fence, lines = None, []

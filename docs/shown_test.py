@@ -71,8 +71,9 @@ def test_a_number_may_differ_by_one_in_its_last_digit(a, b, same):
 def commands_elsewhere():
     """Lines with our program in code blocks that are not run with their output, (page, line), without comments and with one of alternatives."""
     for path in DOCUMENTS:
-        prose = "\n".join("\n".join(lines) for kind, lines in shown.blocks(path.read_text()) if kind == "prose")
-        joined = re.sub(r"(\\|\|)\n\s+", r"\1 ", prose)
+        texts = ["\n".join(f"    {line}" if kind == "sh" else line for line in lines) for kind, lines in shown.blocks(path.read_text())
+                 if kind in ("prose", "sh")]
+        joined = re.sub(r"\|\n\s+", "| ", "\n".join(texts))
         for line in re.findall(r"^(?: {4}|\$ )((?:build/)?trihedron [^\n]*|[^\n]*\| trihedron [^\n]*)", joined, re.MULTILINE):
             if "[options]" not in line:
                 line = re.sub(r"\s+# .*", "", line).replace("build/trihedron", "trihedron")
@@ -103,6 +104,16 @@ def test_targets_that_the_documents_name_exist():
              for target in line.split()}
     assert len(named) > 40
     assert sorted(its for its in named if its[1] not in targets) == []
+
+
+def test_documents_that_documents_name_exist_and_are_in_the_navigation():
+    named = {path for document in DOCUMENTS for path in re.findall(r"`(docs/[\w/.-]+\.md)`", document.read_text())}
+    assert len(named) > 40
+    assert sorted(path for path in named if not (ROOT / path).exists()) == []
+    listed = {(index.parent / entry).resolve() for index in DOCUMENTS for tree in re.findall(r"```\{toctree\}(.*?)```", index.read_text(), re.DOTALL)
+              for entry in re.findall(r"^[\w/.*-]+$", tree, re.MULTILINE)}
+    pages = {path.with_suffix("") for path in DOCUMENTS[2:]} - {ROOT / "docs" / "index"}
+    assert sorted(str(page) for page in pages - listed if page.parent / "*" not in listed) == []
 
 
 def test_page_of_findings_has_those_of_the_program():

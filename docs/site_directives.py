@@ -131,9 +131,49 @@ class Keys(SphinxDirective):
 
     def run(self):
         name = self.arguments[0]
+        self.env.note_dependency(str(PROGRAM))
         text = subprocess.run([PROGRAM, "schema", name], capture_output=True, check=True, text=True).stdout
         is_toml = name in ("pass", "telemetry", "config", "scenario", "campaign")
         return self.parse_text_to_nodes("\n".join(tables_of(json.loads(text), is_toml=is_toml)), allow_section_headings=True)
+
+
+LITERALS = r'((?:"(?:[^"\\]|\\.)*"\s*)+)'
+
+
+def in_one(literals):
+    """The text of C++ literals that stand one after another."""
+    return "".join(re.findall(r'"((?:[^"\\]|\\.)*)"', literals))
+
+
+def records_of(source):
+    """{class: (text, {member: text})} of what nanobind is told in a source."""
+    result = {}
+    for part in source.split("nb::class_<")[1:]:
+        name = re.match(r'[^(]*\(module, "(\w+)",\s*' + LITERALS, part)
+        members = {}
+        for definition in part[name.end():].split(".def_")[1:] if name else []:
+            member = re.match(r'(?:ro|prop_ro)\(\s*"(\w+)"', definition)
+            if member:
+                told = re.findall(r",\s*" + LITERALS + r"\)", re.split(r"\n\s*\.def\(|;\n\s*\n|;\n  (?:nb::|\w)", definition[member.end():])[0])
+                members[member[1]] = in_one(told[-1]) if told else ""
+        if name:
+            result[name[1]] = (in_one(name[2]), members)
+    return result
+
+
+class Records(SphinxDirective):
+    """Records that the part of the Python package in C++ gives, each with its members, by their texts in its sources."""
+
+    has_content = True
+
+    def run(self):
+        records = records_of("".join(path.read_text() for path in sorted((ROOT / "python" / "src").glob("*.cpp"))))
+        lines = []
+        for name in self.content:
+            text, members = records[name]
+            lines += [f":::{{py:class}} {name}", ":module: trihedron._native", "", f"{text}.", "", "| member | what it is |", "|---|---|",
+                      *(f"| `{key}` | {told} |" for key, told in members.items()), ":::", ""]
+        return self.parse_text_to_nodes("\n".join(lines))
 
 
 @functools.cache
@@ -164,6 +204,7 @@ class Drawn(SphinxDirective):
             caption = nodes.caption()
             caption += self.parse_inline("\n".join(self.content))[0]
             figure += caption
+        self.env.note_dependency(str(PROGRAM))
         self.env.note_dependency(str(ROOT / "docs" / "figures.py"))
         return [figure]
 
@@ -171,5 +212,6 @@ class Drawn(SphinxDirective):
 def setup(app):
     app.add_transform(PathsAreLinks)
     app.add_directive("keys", Keys)
+    app.add_directive("records", Records)
     app.add_directive("drawn", Drawn)
     return {"parallel_read_safe": True}
