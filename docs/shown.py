@@ -115,15 +115,16 @@ NUMBER = re.compile(r"(?<![\w.])[-−+]?\d+(?:\.\d+)?(?:[eE][-+]?\d+)?")
 
 
 def agree(shown, printed):
-    """Whether two lines say the same. A number with a decimal point may differ by one in its last digit: where it is rounded at the middle
-    of two, the last bit of a processor's or library's sine decides."""
+    """Whether two lines say the same. A number with a decimal point may differ by one in its last digit, or by a millionth: on another processor
+    sums have another order, and the last bit of a sine may decide how a number is rounded."""
     if NUMBER.sub("#", shown) != NUMBER.sub("#", printed):
         return False
     for ours, theirs in zip(NUMBER.findall(shown), NUMBER.findall(printed)):
         if ours != theirs:
-            mantissa, _, exponent = ours.replace("−", "-").lower().partition("e")
+            a, b = (float(its.replace("−", "-")) for its in (ours, theirs))
+            mantissa, _, exponent = ours.lower().partition("e")
             digits = len(mantissa.partition(".")[2])
-            if not digits or abs(float(ours.replace("−", "-")) - float(theirs.replace("−", "-"))) > 1.001 * 10.0 ** (int(exponent or 0) - digits):
+            if not digits or abs(a - b) > max(1.001 * 10.0 ** (int(exponent or 0) - digits), 1e-6 * abs(a)):
                 return False
     return True
 
