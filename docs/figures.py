@@ -116,3 +116,16 @@ def adoption(work):
     adopted = re.search(r"([\d.]+) min  calibration adopted", (work / "replay.txt").read_text())
     ax.axvline(float(adopted[1]), color=INK, linestyle="--", linewidth=1)
     return figure
+
+
+def forecast(work):
+    figure, ax = axes()
+    told = json.loads((work / "good/calibration.json").read_text())["forecast"]
+    hours = np.array(told["after_s"]) / 3600
+    for key, label, colour in (("error_997_rad", "99.7 %", ORANGE), ("error_95_rad", "95 %", GREEN), ("error_68_rad", "68 %", BLUE)):
+        ax.plot(hours, np.array(told[key]) / ARCSECOND, color=colour, label=f"not exceeded in {label}")
+    ax.set_xlabel("hours after a correction")
+    ax.set_ylabel("attitude error, ″")
+    ax.set_ylim(bottom=0)
+    ax.legend(loc="upper left")
+    return figure

@@ -6,6 +6,7 @@ import os
 import pathlib
 import re
 import subprocess
+import zlib
 import xml.etree.ElementTree
 
 from docutils import nodes
@@ -33,13 +34,17 @@ def cpp_pages():
 
 
 class PathsAreLinks(SphinxTransform):
-    """`docs/formats.md` in a text is a link with the title of that page, `core/include/trihedron.h` leads to the reference of that header."""
+    """`docs/formats.md` in a text is a link with the title of that page, `core/include/trihedron.h` leads to the reference of that header. And a
+    block that begins with >>> is coloured as Python."""
 
     default_priority = 400
     pages = {"README.md": "index", "CONTRIBUTING.md": "explanation/contributing", "CHANGELOG.md": "reference/changelog",
              "docs/adr/": "explanation/decisions"}
 
     def apply(self, **_):
+        for block in self.document.findall(nodes.literal_block):
+            if block.astext().startswith(">>> "):
+                block["language"] = "pycon"
         for literal in list(self.document.findall(nodes.literal)):
             path = literal.astext()
             if isinstance(literal.parent, (nodes.reference, addnodes.pending_xref, nodes.title)):
@@ -214,4 +219,5 @@ def setup(app):
     app.add_directive("keys", Keys)
     app.add_directive("records", Records)
     app.add_directive("drawn", Drawn)
-    return {"parallel_read_safe": True}
+    # Pages are read again where this file is another one.
+    return {"parallel_read_safe": True, "env_version": zlib.crc32(pathlib.Path(__file__).read_bytes())}
