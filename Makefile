@@ -6,9 +6,10 @@ TEST_JOBS ?= $(shell echo $$(($(JOBS) + 2)))
 BUILD := build
 LINT_TOOLS := build-lint/tools
 PYTHON_TOOLS := build-python/tools
+DOCS_TOOLS := build-docs/tools
 SOURCES := $(shell git ls-files '*.cpp' '*.hpp' 2>/dev/null)
 
-.PHONY: help setup build everything demo test flight bench peers slots mutants validation consistency forecasts verdict fuzz fuzz-build fuzz-briefly docs \
+.PHONY: help setup build everything demo test flight bench peers slots mutants validation consistency forecasts verdict fuzz fuzz-build fuzz-briefly docs shown \
   format lint \
   standard sanitize coverage interop wheel wheel-test python-test deb deb-test image image-test conan-test install clean
 
@@ -33,7 +34,8 @@ help:
 	@echo 'make image    an OCI image of the program, in out/image, after `make deb`; make image-test tries it'
 	@echo 'make conan-test  the Conan package of the flight library, used by another project'
 	@echo 'make fuzz     each reader against libFuzzer for FUZZ_SECONDS (3600) each, measures again what docs/reliability.md tells: hours'
-	@echo 'make docs     reference of the interfaces and all documents as web pages: out/docs/html/index.html'
+	@echo 'make docs     the site of all documents: tutorials, how-to, reference, explanation, in out/docs/index.html'
+	@echo 'make shown    run the commands that the documents show, and write what they print into them'
 	@echo 'make install  into PREFIX (default /usr/local)'
 	@echo 'make sanitize build with clang under address and undefined-behaviour sanitizers, and run the tests that are not long'
 	@echo 'make coverage the same, then the lines and branches of core that its own tests take'
@@ -219,13 +221,24 @@ fuzz-briefly: FUZZ_SECONDS = 60
 fuzz-briefly: fuzz-build
 	nice $(FUZZ)
 
-# Fails on each warning but those of members and constants that have no comment of their own; see docs/Doxyfile.
-docs:
+# Fails on each warning, but Doxygen's of members and constants that have no comment of their own (see docs/Doxyfile), and on each broken link.
+docs: build $(DOCS_TOOLS)/installed
 	@cmake/setup.sh docs
-	@mkdir -p out/docs
+	@mkdir -p out/docs/cpp
 	doxygen docs/Doxyfile
 	@! grep -vE 'Member .* (of (struct|class)|\((variable|typedef)\) of namespace) .* is not documented' out/docs/warnings.txt
-	@echo 'out/docs/html/index.html'
+	TRIHEDRON_BUILD=$(abspath $(BUILD)) $(DOCS_TOOLS)/bin/python -m sphinx --quiet --fail-on-warning --doctree-dir build-docs/doctrees docs out/docs
+	docs/links.py out/docs
+	@echo 'out/docs/index.html'
+
+$(DOCS_TOOLS)/installed: docs/requirements.txt
+	@cmake/setup.sh docs
+	/usr/bin/python3 -m venv $(DOCS_TOOLS)
+	$(DOCS_TOOLS)/bin/pip install --quiet --disable-pip-version-check --requirement $<
+	touch $@
+
+shown: build
+	docs/shown.py $(BUILD) --write
 
 format: $(LINT_TOOLS)/installed
 	@$(LINT_TOOLS)/bin/clang-format -i $(SOURCES)

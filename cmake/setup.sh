@@ -15,7 +15,8 @@ tests=(
   chromium-headless-shell
   valgrind python3 python3-pytest python3-xarray python3-h5netcdf python3-jsonschema
 )
-docs=(doxygen)
+# The site of the documents; what it needs of PyPI is in docs/requirements.txt.
+docs=(doxygen python3 python3-venv)
 # Other software that reads what the program writes: Orekit runs on Java, the rest comes from PyPI.
 interop=(default-jre-headless python3 python3-venv)
 # The Python package; what it needs of PyPI is in python/requirements.txt.

@@ -423,9 +423,11 @@ std::string markdown(const CLI::App& program) {
                         synopsis_of(*command, "trihedron " + command->get_name()));
     markdown_options(page, options_of(*command, true));
     markdown_options(page, options_of(*command, false));
+    page += "```sh\n";
     for (const std::string& line : CLI::detail::split(command->get_footer(), '\n')) {
-      page += line.empty() ? "" : fmt::format("    {}\n", line);
+      page += line.empty() ? "" : line + "\n";
     }
+    page += "```\n";
   }
   return page;
 }

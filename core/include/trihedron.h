@@ -22,18 +22,25 @@ extern "C" {
 #define TRIHEDRON_INTERFACE_VERSION 1u
 /** As compiled into the library; to be compared with TRIHEDRON_INTERFACE_VERSION and TRIHEDRON_TABLES_VERSION. */
 uint32_t trihedron_interface_version(void);
+/** The same of the tables. */
 uint32_t trihedron_tables_version(void);
 
-/** Memory that is enough for an object of two or three gyros, and for its snapshots, bytes; and its alignment. */
+/** Memory that is enough for an object of two gyros, bytes. */
 #define TRIHEDRON_SIZE_OF_2_GYROS 32768u
+/** Of three gyros. */
 #define TRIHEDRON_SIZE_OF_3_GYROS 61440u
+/** Memory that is enough for the snapshots of two gyros, bytes. */
 #define TRIHEDRON_SNAPSHOTS_SIZE_OF_2_GYROS 65664u
+/** Of three gyros. */
 #define TRIHEDRON_SNAPSHOTS_SIZE_OF_3_GYROS 122944u
+/** Alignment that is enough for an object, bytes. */
 #define TRIHEDRON_ALIGNMENT 32u
 
-/** What is needed exactly, bytes; 0 for a number of gyros that there is nothing for. Snapshots need no alignment. */
+/** What an object needs exactly, bytes; 0 for a number of gyros that there is nothing for. */
 size_t trihedron_size(uint32_t gyros);
+/** The alignment that it needs, bytes. */
 size_t trihedron_alignment(void);
+/** What its snapshots need, bytes, at any alignment; 0 as above. */
 size_t trihedron_snapshots_size(uint32_t gyros);
 
 /** The object, in the caller's memory. It has no pointers and may be moved as bytes between two calls. */
@@ -66,6 +73,7 @@ uint32_t trihedron_on_fix(trihedron_application* its, const trihedron_star_fix* 
 /** The attitude at the latest sample. 1, or 0 where there is none, and nothing is written. */
 uint32_t trihedron_get_attitude(const trihedron_application* its, trihedron_attitude* attitude);
 
+/** What the application tells of itself, in any mode. */
 void trihedron_get_housekeeping(const trihedron_application* its, trihedron_housekeeping* housekeeping);
 
 /** Writes a snapshot into one of two slots in `memory`; its sequence number, or 0 where the memory is too small. */

@@ -93,6 +93,7 @@ struct CampaignFinding {
   FindingSeverity severity = FindingSeverity::kWarning;
 };
 
+/// What the runs of a campaign say together.
 struct CampaignSummary {
   std::array<std::size_t, 3> outcomes{};        ///< by RunOutcome
   std::map<std::string, std::size_t> findings;  ///< runs by the codes of their findings
