@@ -77,9 +77,14 @@ def directory(target, build):
 
 
 def built(target, build):
-    """Compiles core and the program that flies it; where that is."""
+    """Compiles core and the program that flies it; where that is.
+
+    By the compiler itself: a cache of objects (CMAKE_CXX_COMPILER_LAUNCHER of the environment) would give back the object without the call graph
+    that is written beside it.
+    """
     place = directory(target, build)
-    run(["cmake", "-S", HERE, "-B", place, "-G", "Ninja", "--toolchain", HERE / target.name / "toolchain.cmake"], stdout=subprocess.DEVNULL)
+    run(["cmake", "-S", HERE, "-B", place, "-G", "Ninja", "--toolchain", HERE / target.name / "toolchain.cmake", "-DCMAKE_CXX_COMPILER_LAUNCHER="],
+        stdout=subprocess.DEVNULL)
     run(["cmake", "--build", place], stdout=subprocess.DEVNULL)
     return place / "fly"
 
@@ -174,7 +179,8 @@ INDIRECT = "__indirect_call"
 
 
 def call_graph(build):
-    return CallGraph(sorted(directory(CORTEX_M7, build).rglob("*.ci")))
+    """Of each object file that the program is linked of. FileNotFoundError, with its name, where the compiler has written no graph beside one."""
+    return CallGraph(sorted(file.with_suffix(".ci") for file in directory(CORTEX_M7, build).rglob("*.obj")))
 
 
 def text_bytes(build):
