@@ -6,7 +6,7 @@ import subprocess
 
 import pytest
 
-from program import DO_NOT_USE, INPUT_REFUSED, MACHINE_FAILED, PROGRAM, TOLD, TRUSTWORTHY, WRONG_USAGE, refused, run
+from program import DO_NOT_USE, INPUT_REFUSED, MACHINE_FAILED, PROGRAM, TRUSTWORTHY, WRONG_USAGE, refused, run
 
 ESTIMATORS = ("invariant", "paper", "batch")
 
@@ -171,17 +171,13 @@ def test_nine_hours_take_bounded_memory(tmp_path, name, estimator):
     assert peak_mb(2, "calibrate", nine_hours, "-o", tmp_path / "out", "--estimator", estimator) < 150
 
 
-# On one processor, and with nothing left to decide: what is decided is tried side by side, and how many trials are in memory at the same time
-# depends on what else the machine does. All of that together has its bound above.
+# On one processor: on two, fits are made side by side, and how many are in memory at the same time depends on what else the machine does.
 @pytest.mark.long
 @pytest.mark.parametrize("period", ["125ms", "1s"])
 def test_memory_is_linear_in_time(tmp_path, period):
-    (tmp_path / "told.toml").write_text(TOLD)
-
     def peak(hours):
         scenario = f'[scenario]\nduration = "{hours}h"\n[gyro]\nperiod = "{period}"\n'
-        return peak_mb(1, "calibrate", simulated(tmp_path, "pass.nc", scenario), "-o", tmp_path / "out", "--estimator", "batch", "--config",
-                       tmp_path / "told.toml")
+        return peak_mb(1, "calibrate", simulated(tmp_path, "pass.nc", scenario), "-o", tmp_path / "out", "--estimator", "batch")
 
     three, six, twelve = peak(3), peak(6), peak(12)
     assert twelve - six < 2 * (six - three) * 1.3
