@@ -6,9 +6,9 @@
 #   makes the target trihedron_<name> with the alias trihedron::<name>; MODULES must be allowed by the table below.
 # trihedron_test(<module> <file.cpp>… [LIBRARIES …] [LONG <Suite.Name>…] [SAMPLE_PASSES <Suite.Name>…])
 #   makes the Google Test program <module>_test, linked with the module if there is one of that name, and registers its tests as
-#   <module>.<Suite>.<Name>; those that match LONG (with * and ?) get the label `long`: they fly many times for a statistic, take no
-#   path of their own, and are left out under the sanitizers, where they would take an hour. Those that match SAMPLE_PASSES are long
-#   as well, and CTest makes the passes of validation/passes before them.
+#   <module>.<Suite>.<Name>, under the sanitizers as <module>.part_0 to part_3. Those that match LONG (with * and ?) get the label `long`:
+#   they fly many times for a statistic, take no path of their own, and are left out under the sanitizers, where they would take an hour.
+#   Those that match SAMPLE_PASSES are long as well, and CTest makes the passes of validation/passes before them.
 # trihedron_pytest(<name> <file.py>)
 #   registers the tests of a Python file as one test; they find the build directory in TRIHEDRON_BUILD. Those marked `long` are
 #   left out under the sanitizers as well.
@@ -115,27 +115,39 @@ function(trihedron_test module)
   target_link_options(${module}_test PRIVATE "SHELL:-Wl,--whole-archive ${files} -Wl,--no-whole-archive")
   set(discovery TEST_PREFIX ${module}. DISCOVERY_TIMEOUT 60)
   set(properties PROPERTIES TIMEOUT 300)
+  set(environment)
   if(TRIHEDRON_COVERAGE AND module MATCHES "^core")
     # One file for each program, to which its processes add their counts one after another.
-    list(APPEND properties ENVIRONMENT "LLVM_PROFILE_FILE=${PROJECT_BINARY_DIR}/coverage/%m.profraw")
+    set(environment "LLVM_PROFILE_FILE=${PROJECT_BINARY_DIR}/coverage/%m.profraw")
+    list(APPEND properties ENVIRONMENT ${environment})
   endif()
   string(JOIN ":" long ${arg_LONG})
   string(JOIN ":" on_passes ${arg_SAMPLE_PASSES})
-  gtest_discover_tests(${module}_test ${discovery} TEST_FILTER "-${long}:${on_passes}" ${properties})
+  set(others "-${long}:${on_passes}")
+  if(TRIHEDRON_SANITIZE)
+    # In four processes. The start of one takes longer than most of these tests do.
+    foreach(part RANGE 3)
+      add_test(NAME ${module}.part_${part} COMMAND ${module}_test "--gtest_filter=${others}")
+      set_tests_properties(${module}.part_${part} PROPERTIES TIMEOUT 900
+        ENVIRONMENT "GTEST_TOTAL_SHARDS=4;GTEST_SHARD_INDEX=${part};${environment}")
+    endforeach()
+  else()
+    gtest_discover_tests(${module}_test ${discovery} TEST_FILTER "${others}" ${properties})
+  endif()
   if(arg_LONG)
-    gtest_discover_tests(${module}_test ${discovery} TEST_FILTER "${long}" TEST_LIST ${module}_long_tests ${properties} LABELS long)
+    gtest_discover_tests(${module}_test ${discovery} TEST_FILTER "${long}" TEST_LIST ${module}_long_tests ${properties} LABELS long COST 100)
   endif()
   if(arg_SAMPLE_PASSES)
     target_link_libraries(${module}_test PRIVATE trihedron_sample_passes)
     gtest_discover_tests(${module}_test ${discovery} TEST_FILTER "${on_passes}" TEST_LIST ${module}_tests_on_passes
-      ${properties} LABELS long FIXTURES_REQUIRED sample_passes)
+      ${properties} LABELS long COST 200 FIXTURES_REQUIRED sample_passes)
   endif()
 endfunction()
 
 function(trihedron_pytest name file)
   add_test(NAME ${name}.pytest COMMAND ${TRIHEDRON_PYTHON} -m pytest -q -p no:cacheprovider -o markers=long
     -m "$<IF:$<BOOL:${TRIHEDRON_SANITIZE}>,not long,>" ${file})
-  # The cost lets CTest start these first: begun last, they would run on alone for minutes.
+  # The cost lets CTest start these first, and those that are long before others: begun last, they would run on alone for minutes.
   set_tests_properties(${name}.pytest PROPERTIES TIMEOUT 900 COST 1000
     ENVIRONMENT "TRIHEDRON_BUILD=${PROJECT_BINARY_DIR};PYTHONDONTWRITEBYTECODE=1")
 endfunction()

@@ -91,6 +91,7 @@ def test_the_table_is_read_by_xarray(finished):
         assert (runs.nees >= largest**2 * (1 - 1e-9)).all()
 
 
+@pytest.mark.long
 def test_a_kill_loses_no_finished_run_and_repeats_none(finished):
     out = finished / "killed"
     process = subprocess.Popen([PROGRAM, "campaign", finished / "c.toml", "-o", out, "--jobs", "1"], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
@@ -124,7 +125,7 @@ def test_a_record_that_is_damaged_is_performed_again_and_the_others_stay(finishe
     assert table(out) == table(finished / "out")
 
 
-@pytest.mark.parametrize("with_signal", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("with_signal", [signal.SIGINT, pytest.param(signal.SIGTERM, marks=pytest.mark.long)])
 def test_a_stop_keeps_what_is_finished_and_says_how_to_go_on(finished, tmp_path, with_signal):
     out = tmp_path / "out"
     process = subprocess.Popen([PROGRAM, "campaign", finished / "c.toml", "-o", out, "--jobs", "1"], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)

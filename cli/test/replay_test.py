@@ -175,6 +175,7 @@ def test_a_screen_fits_its_terminal(minutes):
         assert len(lines) <= 11 and max(map(len, lines)) < 40
 
 
+@pytest.mark.long
 def test_no_colour_and_a_dumb_terminal(two_hours, minutes):
     arguments = ("replay", two_hours, "--speed", "max", *SOON)
     for environment, is_coloured in (({}, True), ({"NO_COLOR": "1"}, False)):

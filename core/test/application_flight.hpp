@@ -2,6 +2,7 @@
 /// Flights of the on-board application: its parameters, and what happens to it.
 
 #include <Eigen/Core>
+#include <algorithm>
 #include <cstdint>
 #include <functional>
 #include <memory>
@@ -28,18 +29,18 @@ template <class Application>
   return made;
 }
 
-/// Events of a flight from `from_s` up to `to_s`, in time order; with_fixes: those for which it is true.
+/// The samples or fixes, which are in time order, from `from_s` up to `to_s`.
+template <class Row>
+std::vector<Row> between(const std::vector<Row>& rows, double from_s, double to_s) {
+  const auto at = [&](double t_s) { return std::ranges::lower_bound(rows, Time(from_seconds(t_s)), {}, &Row::t); };
+  return std::vector<Row>(at(from_s), at(to_s));
+}
+
+/// Events of a flight from `from_s` up to `to_s`.
 template <class Application>
 void fly_from(const std::vector<GyroSample>& samples, const std::vector<StarFix>& fixes, double from_s, double to_s,
               Application& application, const OnReport& on_report = kIgnore) {
-  const auto is_within = [&](Time t) { return t >= Time(from_seconds(from_s)) && t < Time(from_seconds(to_s)); };
-  std::vector<GyroSample> some_samples;
-  std::copy_if(samples.begin(), samples.end(), std::back_inserter(some_samples),
-               [&](const GyroSample& sample) { return is_within(sample.t); });
-  std::vector<StarFix> some_fixes;
-  std::copy_if(fixes.begin(), fixes.end(), std::back_inserter(some_fixes),
-               [&](const StarFix& fix) { return is_within(fix.t); });
-  fly(some_samples, some_fixes, application, on_report);
+  fly(between(samples, from_s, to_s), between(fixes, from_s, to_s), application, on_report);
 }
 template <class Application>
 void fly_from(const Flight& flight, double from_s, double to_s, Application& application,

@@ -76,10 +76,15 @@ def directory(target, build):
     return pathlib.Path(build) / "flight" / target.name
 
 
-def built(target, build):
-    """Compiles core and the program that flies it; where that is."""
+def built(target, build, *options):
+    """Compiles core and the program that flies it, with further options of CMake; where that is.
+
+    By the compiler itself: a cache of objects (CMAKE_CXX_COMPILER_LAUNCHER of the environment) would give back the object without the call graph
+    that is written beside it.
+    """
     place = directory(target, build)
-    run(["cmake", "-S", HERE, "-B", place, "-G", "Ninja", "--toolchain", HERE / target.name / "toolchain.cmake"], stdout=subprocess.DEVNULL)
+    run(["cmake", "-S", HERE, "-B", place, "-G", "Ninja", "--toolchain", HERE / target.name / "toolchain.cmake", "-DCMAKE_CXX_COMPILER_LAUNCHER=", *options],
+        stdout=subprocess.DEVNULL)
     run(["cmake", "--build", place], stdout=subprocess.DEVNULL)
     return place / "fly"
 
@@ -131,9 +136,9 @@ def in_byte_order(records, byte_order):
     return parameters.astype(head.newbyteorder(byte_order)).tobytes() + numpy.frombuffer(records, "u8", offset=head.itemsize).astype(f"{byte_order}u8").tobytes()
 
 
-def flown(target, build, records):
+def flown(target, build, records, *options):
     """Of the records that replayed() wrote."""
-    program = built(target, build)
+    program = built(target, build, *options)
     its_records = directory(target, build) / records.name
     its_records.write_bytes(in_byte_order(records.read_bytes(), target.byte_order))
     result = its_records.with_suffix(".result")
@@ -174,7 +179,8 @@ INDIRECT = "__indirect_call"
 
 
 def call_graph(build):
-    return CallGraph(sorted(directory(CORTEX_M7, build).rglob("*.ci")))
+    """Of each object file that the program is linked of. FileNotFoundError, with its name, where the compiler has written no graph beside one."""
+    return CallGraph(sorted(file.with_suffix(".ci") for file in directory(CORTEX_M7, build).rglob("*.obj")))
 
 
 def text_bytes(build):

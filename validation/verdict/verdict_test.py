@@ -168,16 +168,21 @@ def test_the_document_has_a_place_for_each_table(tmp_path):
     assert "| slews | · | · | · | 2 | 1.25 | 2.00 |" in document.read_text()
 
 
-# What holds whatever else: nominal passes are right and trusted, and telemetry on the wrong side never gives a result that is trusted.
-# One seed, so that the test takes seconds; the shares are in docs/verdict.md.
+# What holds whatever else: nominal passes are right and trusted, and telemetry on the wrong side never gives a result that is trusted, however
+# long the pass is. One seed, so that the test takes seconds; the shares are in docs/verdict.md.
 @pytest.mark.long
-@pytest.mark.parametrize("world, trusted", [("slews", True), ("scalar-first", False), ("conjugate", False), ("axis-mirrored", False)])
-def test_a_few_worlds(world, trusted):
+def test_a_nominal_pass_is_right_and_trusted():
+    [found] = verdict.outcomes_of(PROGRAM, "slews", 1, ["invariant"])
+    assert found["status"] == 0 and found["wrong"] == [], found
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("world", ["scalar-first", "conjugate", "axis-mirrored"])
+def test_telemetry_on_the_wrong_side_is_not_trusted(monkeypatch, world):
+    monkeypatch.setattr(verdict, "PASS_S", 2 * 3600.0)
+    monkeypatch.setattr(verdict, "FORECAST_S", 1800.0)
     [found] = verdict.outcomes_of(PROGRAM, world, 1, ["invariant"])
-    if trusted:
-        assert found["status"] == 0 and found["wrong"] == [], found
-    else:
-        assert found["status"] != 0, found
+    assert found["status"] != 0, found
 
 
 @pytest.mark.long
