@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "batch/drift_field.hpp"
+#include "batch/pass_setup.hpp"
 #include "choose/forecast.hpp"
 #include "onboard/screen.hpp"
 #include "trihedron/ground/choose/settled.hpp"
@@ -24,6 +25,7 @@ struct Decision {
   std::optional<PassSettings> settings;
   std::vector<DriftFieldLevel> levels;  ///< of the field of which that estimator has the members
   std::optional<Screened> screened;     ///< the screened pass by which it was decided, where it was
+  std::optional<Nearby> nearby;         ///< what was found with it
 };
 
 /// Settles each choice that is left to the program by the whole pass. Estimator paper has no further states; where the
