@@ -43,7 +43,8 @@ BatchResult most_likely(const PassProblem& problem, PassSolution first, double c
     result.linear = problem.linearise_by_parts(result.before);
     result.errors = solved([&] { return smooth(result.linear.prior, result.linear.prior_y, result.linear.stages); });
     problem.correct(result.errors, result.solution);
-    result.converged = step_of_constants(problem.layout(), result.errors) < converged;
+    result.step = step_of_constants(problem.layout(), result.errors);
+    result.converged = result.step < converged;
   }
   return result;
 }

@@ -11,6 +11,7 @@ struct BatchResult {
   PassProblem::Linear linear;  ///< there
   SmootherResult errors;       ///< of that; x is the last step
   int iterations = 0;
+  double step = 0;  ///< of the constants, the last one: root mean square in their sigmas
   bool converged = false;
 };
 

@@ -406,13 +406,22 @@ MovedByModes PassProblem::moved_by_coefficients(const PassSolution& solution) co
   return table;
 }
 
-void PassProblem::use(DriftModes modes, const MovedByModes& by_coefficients) {
+void PassProblem::take(DriftModes modes) {
   modes_ = std::move(modes);
   layout_.drift_modes = modes_->size();
   on_board_.drift_model = kEsg7;
   without_modes_ = layout_;
   without_modes_.drift_model = kEsg7;
   without_modes_.drift_modes = -1;
+}
+
+void PassProblem::use_modes_of(const PassProblem& other) {
+  take(*other.modes_);
+  moved_by_modes_ = other.moved_by_modes_;
+}
+
+void PassProblem::use(DriftModes modes, const MovedByModes& by_coefficients) {
+  take(std::move(modes));
   moved_by_modes_ = {};
   for (std::size_t arc = 0; arc < arcs_.size(); ++arc) {
     check_stop();

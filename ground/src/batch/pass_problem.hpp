@@ -81,6 +81,8 @@ class PassProblem {
   /// again when the solution is corrected.
   [[nodiscard]] MovedByModes moved_by_coefficients(const PassSolution& solution) const;
   void use(DriftModes modes, const MovedByModes& by_coefficients);
+  /// Those of another problem of the pass with the same steps and arcs, which has them.
+  void use_modes_of(const PassProblem& other);
   void set_noise(const ProcessNoise& noise) {
     setup_.on_board.direction_random_walk_rad_sqrt_s = noise.direction_random_walk_rad_sqrt_s;
     setup_.on_board.wandering_drift = noise.wandering_drift;
@@ -231,6 +233,8 @@ class PassProblem {
   void add_prior(const PassSolution& solution, Linear& linear) const;
   [[nodiscard]] Eigen::MatrixXd prior_covariance() const;
   void end_arc(const PassSolution& solution, const Moment& moment, double extra_variance_rad2, Linear& linear) const;
+
+  void take(DriftModes modes);
 
   PassSetup setup_;
   Layout layout_;

@@ -13,4 +13,12 @@ namespace trihedron::ground {
 /// The starting point of the iteration.
 [[nodiscard]] PassSolution first_solution(const PassProblem& problem, const Screened& screened);
 
+/// What one choice of states has found, from which the iteration of another is shorter.
+struct Nearby {
+  Layout layout;  ///< of the set-up on board
+  PassSolution solution;
+};
+/// The same from there. What the other layout does not have begins at zero.
+[[nodiscard]] PassSolution first_solution(const PassProblem& problem, const Nearby& nearby);
+
 }  // namespace trihedron::ground

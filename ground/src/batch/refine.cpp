@@ -201,8 +201,8 @@ PassProblem problem_of(const Screened& screened, PassSetup setup) {
 
 /// The first solution, with the modes of the field in use.
 PassSolution begin(PassProblem& problem, const Screened& screened, const CalibrationOptions& options,
-                   const std::optional<FieldPrior>& field) {
-  PassSolution first = first_solution(problem, screened);
+                   const std::optional<FieldPrior>& field, const std::optional<Nearby>& nearby) {
+  PassSolution first = nearby ? first_solution(problem, *nearby) : first_solution(problem, screened);
   if (options.drift_field) {
     if (!field) {  // the prior is an earlier calibration's: estimates begin there
       for (int k = 0; k < problem.layout().gyros; ++k) {
@@ -218,10 +218,10 @@ PassSolution begin(PassProblem& problem, const Screened& screened, const Calibra
 }  // namespace
 
 Refinement::Refinement(const Screened& screened, PassSetup setup, const CalibrationOptions& options,
-                       const std::optional<FieldPrior>& field)
+                       const std::optional<FieldPrior>& field, const std::optional<Nearby>& nearby)
     : problem_(problem_of(screened, std::move(setup))),
       field_(field),
-      result_(most_likely(problem_, begin(problem_, screened, options, field_))),
+      result_(most_likely(problem_, begin(problem_, screened, options, field_, nearby))),
       halves_(compare_halves(problem_, result_)),
       roots_(roots_of(result_)) {
   const SmoothedAttitude smoothed(screened.pass, problem_, result_.solution, roots_);

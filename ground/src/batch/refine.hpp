@@ -6,6 +6,7 @@
 
 #include "batch/batch.hpp"
 #include "batch/drift_field.hpp"
+#include "batch/pass_setup.hpp"
 #include "batch/smoothed_attitude.hpp"
 #include "onboard/screen.hpp"
 #include "trihedron/records/run.hpp"
@@ -22,9 +23,9 @@ struct Halves {
 class Refinement {
  public:
   /// Solves the problem. `field`: what a trial has found of the drift field, where the drift is one; the setup has its
-  /// variances. Keeps a reference to `screened`. Throws SetupError.
+  /// variances. `nearby`: where to begin. Keeps a reference to `screened`. Throws SetupError.
   Refinement(const Screened& screened, PassSetup setup, const CalibrationOptions& options,
-             const std::optional<FieldPrior>& field = std::nullopt);
+             const std::optional<FieldPrior>& field, const std::optional<Nearby>& nearby);
 
   /// What the smoothed pass shows at the fixes.
   [[nodiscard]] const SmoothedCourse& course() const { return course_; }

@@ -122,7 +122,7 @@ Smoothed smooth(const Pass& pass, Decision& decision) {
   }
   PassSetup setup = pass_setup(pass.settings, decision.options);
   setup.prior = prior_by(pass.settings, setup.layout(), decision.field);
-  Refinement refinement(*decision.screened, std::move(setup), decision.options, decision.field);
+  Refinement refinement(*decision.screened, std::move(setup), decision.options, decision.field, decision.nearby);
   std::vector<DriftModelForecast> drift_models = flown(decision.forecasts, refinement.course());
   return {std::move(refinement), std::move(drift_models)};
 }

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <optional>
 #include <utility>
 
 #include "batch/gram.hpp"
@@ -347,7 +348,11 @@ std::vector<Change> changes_over(const Trial& trial) {
   // In steady flight an alignment is as unknown as before, and what it makes with the drift is of second order: a fifth
   // of its sigma, enough for a decision, would look like something that moves.
   constexpr double kConverged = 0.01;
-  const BatchResult found = most_likely(problem, trial.found().solution, kConverged);
+  std::optional<BatchResult> further;
+  if (trial.found().step > kConverged) {
+    further = most_likely(problem, trial.found().solution, kConverged);
+  }
+  const BatchResult& found = further ? *further : trial.found();
   const Constancy pass(problem, found);
   const Layout& layout = problem.layout();
   const Index steps = pass.steps();

@@ -207,25 +207,23 @@ void keep_field(const Trial& trial, Decision& decision) {
 /// the noise found while all states are free, and decides whether the drift wanders. `everything`: the trial with all
 /// states free and the noise of the settings; `walk`: the noise found with the states decided first. Where the largest
 /// drift model with its own noise is likelier than these, it is kept: noise in place of the members that the smaller
-/// one lacks, which act at every orbit alike, would make its sigmas wrong, though its forecasts are as good.
+/// one lacks, which act at every orbit alike, would make its sigmas wrong, though its forecasts are as good. `walked`:
+/// the trial that found it.
 void decide_again_with_more_noise(const Pass& pass, const Screened& screened, const CalibrationOptions& asked,
                                   const DriftModelId& largest_model, bool wandering_is_open, Trial everything,
-                                  const NoiseFit& walk, Decision& decision) {
+                                  const Trial& walked, const NoiseFit& walk, Decision& decision) {
   CalibrationOptions& options = decision.options;
   const CalibrationOptions free = with_everything(options, asked, largest_model);
   const CalibrationOptions like = wandering_like(walk, free);
   // Waited for only where a walk was accepted; otherwise it does not matter whether the trial failed.
   std::packaged_task<std::pair<Trial, NoiseFit>()> try_wandering([&] {
-    Trial trial(pass, screened, like);
+    Trial trial(pass, screened, like, {}, &walked);
     const NoiseFit likely = with_most_likely_wandering(trial, like);
     return std::pair(std::move(trial), likely);
   });
   NoiseFit walking;
   side_by_side(
-      [&] {
-        everything.refit(everything.problem().setup().noise());
-        walking = with_most_likely_walk(everything, free);
-      },
+      [&] { walking = with_most_likely_walk(everything, free); },
       [&] {
         if (wandering_is_open) {
           try_wandering();
@@ -249,13 +247,14 @@ void decide_again_with_more_noise(const Pass& pass, const Screened& screened, co
   if (wanders) {
     use_wandering(*wanders, options);
   }
-  Trial decided(pass, screened, options, wanders.value_or(walking.noise));
+  Trial decided(pass, screened, options, wanders.value_or(walking.noise), &everything);
   if (wanders) {
     use_wandering(with_most_likely_wandering(decided, options).noise, options);
   } else {
     use_walk(with_most_likely_walk(decided, options).noise, options);
   }
   keep_field(decided, decision);
+  decision.nearby = decided.nearby();
   decision.changes = changes_over(decided);
   if (wandering) {
     decision.evidence.push_back(*wandering);
@@ -271,57 +270,70 @@ void leave_out_what_is_open(CalibrationOptions& options) {
   options.drift_model = options.drift_model.value_or(kEsg7);
 }
 
-/// The random walk that makes the pass most likely by eq. (1) alone, where it is more than the settings say. By less
-/// noise than there is a drift field is fitted to the noise, with members of any size; this is enough beside any field.
-std::optional<ProcessNoise> walk_by_eq1(const Pass& pass, const Screened& screened, const CalibrationOptions& asked) {
+/// A trial by eq. (1) alone, with everything else free.
+struct ByEq1 {
+  Trial trial;
+  /// The random walk that makes the pass most likely, where it is more than the settings say. By less noise than there
+  /// is a drift field is fitted to the noise, with members of any size; this is enough beside any field.
+  std::optional<ProcessNoise> walk;
+};
+
+ByEq1 try_eq1(const Pass& pass, const Screened& screened, const CalibrationOptions& asked) {
   CalibrationOptions options = with_everything(asked, asked, kEsg7);
   options.drift_field = false;
-  Trial trial(pass, screened, options);
-  const NoiseFit walk = with_most_likely_walk(trial, options);
-  return walk.gain > kLogOddsToAccept ? std::optional(walk.noise) : std::nullopt;
+  ByEq1 found{Trial(pass, screened, options), {}};
+  if (const NoiseFit walk = with_most_likely_walk(found.trial, options); walk.gain > kLogOddsToAccept) {
+    found.walk = walk.noise;
+  }
+  found.trial.release();
+  return found;
 }
 
 /// Decides by the data of the pass.
 Decision decide_by_pass(const Pass& pass, const Screened& screened, const CalibrationOptions& asked,
                         const DriftModelId& largest_model) {
-  Decision decision{asked, {}, {}, {}, {}, {}, {}, {}, {}, {}};
+  Decision decision{asked, {}, {}, {}, {}, {}, {}, {}, {}, {}, {}};
   CalibrationOptions& options = decision.options;
   const bool wandering_is_open = options.further_states[FurtherState::kWanderingDrift] == Choice::kAuto;
   if (wandering_is_open) {
     options.further_states[FurtherState::kWanderingDrift] = Choice::kOff;
   }
+  std::optional<ByEq1> by_eq1;
   std::optional<ProcessNoise> noise;
   if (options.drift_field && asked.find_noise) {
-    noise = walk_by_eq1(pass, screened, options);
+    by_eq1 = try_eq1(pass, screened, options);
+    noise = by_eq1->walk;
   }
-  Trial everything(pass, screened, with_everything(options, asked, largest_model), noise);
+  Trial everything(pass, screened, with_everything(options, asked, largest_model), noise,
+                   by_eq1 ? &by_eq1->trial : nullptr);
   const std::vector<Eigen::Vector3d> changes = everything.changes_rad();
   options.find_noise = asked.find_noise && changes.size() >= kLeastFixPairs;
   if (!options.find_noise) {
     settle_states(everything, pass.settings, asked, decision);
     decision.changes = changes_over(everything);
+    decision.nearby = everything.nearby();
     if (options.drift_field) {
-      keep_field(Trial(pass, screened, options, noise), decision);
+      keep_field(Trial(pass, screened, options, noise, &everything), decision);
     }
     return decision;
   }
   options.star_tracker_noise_rad = other_star_tracker_noise(pass, changes);
   if (options.star_tracker_noise_rad) {
-    everything = Trial(pass, screened, with_everything(options, asked, largest_model), noise);
+    everything = Trial(pass, screened, with_everything(options, asked, largest_model), noise, &everything);
   }
   if (noise) {
     noise = with_most_likely_walk(everything, with_everything(options, asked, largest_model)).noise;
   }
   settle_states(everything, pass.settings, asked, decision);
-  everything.release();
-  Trial decided(pass, screened, options, noise);
+  Trial decided(pass, screened, options, noise, &everything);
   const NoiseFit walking = with_most_likely_walk(decided, options);
   if (walking.gain > kLogOddsToAccept) {
     decide_again_with_more_noise(pass, screened, asked, largest_model, wandering_is_open, std::move(everything),
-                                 walking, decision);
+                                 decided, walking, decision);
   } else {
     use_walk(walking.noise, options);
     keep_field(decided, decision);
+    decision.nearby = decided.nearby();
     decision.changes = changes_over(decided);
   }
   return decision;
@@ -405,7 +417,7 @@ Decision decide(const Pass& pass, const CalibrationOptions& asked_for) {
   }
   settle_by_estimator(asked);
   if (pass.settings.prior || asked.estimator == Estimator::kPaper) {
-    return {settled_before(pass.settings, asked), {}, {}, {}, {}, {}, {}, {}, {}, {}};
+    return {settled_before(pass.settings, asked), {}, {}, {}, {}, {}, {}, {}, {}, {}, {}};
   }
   const bool on_board = asked.estimator != Estimator::kBatch;
   const bool by_field = !asked.drift_model && !knows_of_drift_outside(pass.settings);
@@ -414,7 +426,7 @@ Decision decide(const Pass& pass, const CalibrationOptions& asked_for) {
     asked.drift_model = kLargestDriftModel;
     asked.estimator = Estimator::kBatch;
   }
-  Decision decision{asked, {}, {}, {}, {}, {}, {}, {}, {}, {}};
+  Decision decision{asked, {}, {}, {}, {}, {}, {}, {}, {}, {}, {}};
   CalibrationOptions& options = decision.options;
   options.find_noise = false;
   const bool states_are_settled =

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "batch/drift_field.hpp"
+#include "batch/pass_setup.hpp"
 #include "choose/forecast.hpp"
 #include "model/left_out.hpp"
 #include "onboard/screen.hpp"
@@ -27,6 +28,7 @@ struct Decision {
   std::optional<LeftOut> left_out;      ///< what an estimator on board leaves out of these
   std::vector<DriftFieldLevel> levels;  ///< of the field of which that estimator has the members
   std::optional<Screened> screened;     ///< the screened pass by which it was decided, where it was
+  std::optional<Nearby> nearby;         ///< what was found with it
 };
 
 /// Settles each choice that is left to the program by the whole pass. Estimator paper has no further states; where the

@@ -78,13 +78,13 @@ GaussMarkov wandering_of(const CalibrationOptions& options) {
 const std::vector<Search::Point> kAllLevels = {{0, 0}, {3, 0}, {6, 0}, {9, 0}};
 
 /// Alternates the search for the noise and a refit with it, because the noise decides which fixes are outliers, until a
-/// search finds that of the last refit again. Which of several maxima is the largest the first search tells.
+/// search finds that of the last fit again. Which of several maxima is the largest the first search tells.
 NoiseFit converge(Trial& trial, const Search::At& at, std::vector<Search::Point> starts, const Search::Point& lowest,
                   const Search::Point& highest) {
   constexpr int kRounds = 3;
   NoiseFit likely;
   for (int round = 0; round < kRounds; ++round) {
-    const ProcessNoise before = likely.noise;
+    const ProcessNoise before = trial.problem().setup().noise();
     const Search search(trial, at, starts, lowest, highest);
     starts = {{0, 0}};
     if (search.best_point() != starts.front()) {

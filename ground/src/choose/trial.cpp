@@ -54,7 +54,7 @@ PassSetup coarse(PassSetup setup) {
 }  // namespace
 
 Trial::Trial(const Pass& pass, const Screened& screened, const CalibrationOptions& options,
-             const std::optional<ProcessNoise>& noise)
+             const std::optional<ProcessNoise>& noise, const Trial* nearby)
     : drift_model_(*options.drift_model), problem_(screened.pass, coarse(pass_setup(pass.settings, options))) {
   if (options.drift_field) {
     field_.emplace(problem_.layout());
@@ -62,7 +62,13 @@ Trial::Trial(const Pass& pass, const Screened& screened, const CalibrationOption
   if (noise) {
     problem_.set_noise(*noise);
   }
-  fit(first_solution(problem_, screened));
+  if (field_ && nearby != nullptr && nearby->field_) {
+    problem_.use_modes_of(nearby->problem_);
+    field_level_ = nearby->field_level_;
+    spectrum_ = nearby->spectrum_;
+    put_spectrum_into_prior();
+  }
+  fit(nearby != nullptr ? first_solution(problem_, nearby->nearby()) : first_solution(problem_, screened));
 }
 
 /// Modes for a field of this level, and the solution by them.
@@ -80,42 +86,63 @@ void Trial::use_modes(Eigen::VectorXd level, PassSolution& solution) {
   field_level_ = std::move(level);
 }
 
+void Trial::put_spectrum_into_prior() {
+  Prior prior = problem_.setup().prior;
+  put_sigma(problem_.setup().layout(), *field_, field_->sigma(spectrum_.log_rms), prior);
+  problem_.set_prior(std::move(prior));
+}
+
 /// Finds the spectrum of the field and gives the problem its variances. Where it is larger than the modes are for, or
-/// much smaller, they are chosen again.
+/// much smaller, they are chosen again. Where it is the spectrum that was there before, and the solution found is near
+/// enough, that is the fit.
 PassSolution Trial::with_likely_field(PassSolution first) {
   constexpr int kMostRounds = 4;
+  constexpr double kSameSpectrum = 0.1;
   const double room = std::log(3.0);
   const double more_than_enough = 2 * room;
+  const Eigen::VectorXd before = spectrum_.log_rms;
+  bool is_fit = false;
+  double enough = room / 2;  // of modes that were chosen for a spectrum near this one
   if (!problem_.modes()) {
     use_modes(field_->expected().array() + std::log(kFirstFieldLevel), first);
+    enough = room;
   }
   for (int round = 0; round < kMostRounds; ++round) {
-    if (found_.linear.stages.empty()) {
+    const bool is_new = found_.linear.stages.empty();
+    if (is_new) {
       found_ = most_likely(problem_, std::move(first), kOneIteration);
       first = found_.solution;
     }
     spectrum_ =
         most_likely_spectrum(*field_, field_information(found_.linear, problem_.setup().noise()), spectrum_.log_rms);
     const Eigen::VectorXd above = field_level_ - spectrum_.log_rms;
-    if ((above.array() > room).all()) {
+    if ((above.array() > enough).all()) {
       if ((above.array() > more_than_enough).all()) {
         use_modes(spectrum_.log_rms.array() + room, first);
+      } else {
+        is_fit = is_new && before.size() > 0 && found_.step < kNearEnough &&
+                 ((spectrum_.log_rms - before).array().abs() < kSameSpectrum).all();
       }
       break;
     }
     use_modes(field_level_.cwiseMax((spectrum_.log_rms.array() + more_than_enough).matrix()), first);
+    enough = room;
     found_ = {};
   }
   moved_.reset();  // long; seldom needed again
-  Prior prior = problem_.setup().prior;
-  put_sigma(problem_.setup().layout(), *field_, field_->sigma(spectrum_.log_rms), prior);
-  problem_.set_prior(std::move(prior));
+  put_spectrum_into_prior();
+  if (!is_fit) {
+    found_ = {};
+  }
   return first;
 }
 
 void Trial::fit(PassSolution first) {
   if (field_) {
     first = with_likely_field(std::move(first));
+    if (!found_.linear.stages.empty()) {
+      return;
+    }
   }
   found_ = {};  // long: one at a time
   found_ = most_likely(problem_, std::move(first), kNearEnough);

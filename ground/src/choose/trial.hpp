@@ -8,6 +8,7 @@
 #include "batch/batch.hpp"
 #include "batch/drift_field.hpp"
 #include "batch/members.hpp"
+#include "batch/pass_setup.hpp"
 #include "choose/forecast.hpp"
 #include "onboard/screen.hpp"
 
@@ -17,16 +18,19 @@ namespace trihedron::ground {
 /// instead of zero.
 class Trial {
  public:
-  /// `noise`: where it is other than the options say. Refers to `screened`, which needs a fix. Throws SetupError.
+  /// `noise`: where it is other than the options say; `nearby`: another choice for the pass, where the fit begins.
+  /// Refers to `screened`, which needs a fix. Throws SetupError.
   Trial(const Pass& pass, const Screened& screened, const CalibrationOptions& options,
-        const std::optional<ProcessNoise>& noise = {});
+        const std::optional<ProcessNoise>& noise = {}, const Trial* nearby = nullptr);
 
   /// Fits again, with other noise. The spectrum of a field is found by the last linearisation, from which the last step
   /// was a fraction of the sigmas.
   void refit(const ProcessNoise& noise);
   /// Takes noise that is other by so little that the fit is good enough.
   void set_noise(const ProcessNoise& noise) { problem_.set_noise(noise); }
-  /// Frees what is large. Until it is fitted again, the trial is to be asked for nothing.
+  /// Where the fit of another choice of states can begin.
+  [[nodiscard]] Nearby nearby() const { return {problem_.setup().on_board.layout, found_.solution}; }
+  /// Frees what is large. Until it is fitted again, the trial is to be asked for nothing but nearby().
   void release() { found_.linear = {}, found_.errors = {}; }
 
   [[nodiscard]] const PassProblem& problem() const { return problem_; }
@@ -54,6 +58,7 @@ class Trial {
  private:
   void fit(PassSolution first);
   void use_modes(Eigen::VectorXd level, PassSolution& solution);
+  void put_spectrum_into_prior();
   [[nodiscard]] PassSolution with_likely_field(PassSolution first);
   [[nodiscard]] FieldInformation field_information(const PassProblem::Linear& linear, const ProcessNoise& noise) const {
     return information_on_field(problem_, found_.before, linear, noise, *field_);
