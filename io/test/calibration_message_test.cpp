@@ -298,7 +298,7 @@ TEST(Acm, RefusesWhatIsWrong) {
       {"EPOCH_S = 32400.125", "EPOCH_S = 32400.125 [s]", "has a unit in brackets"},
       {"NOISE_STAR_TRACKER_RAD = ", "NOISE_STAR_TRACKER_RAD = 1 ", "NOISE_STAR_TRACKER_RAD has 4 values"},
       {"ON_BOARD_DRIFT_MODEL = vsh:3", "ON_BOARD_DRIFT_MODEL = vsh:9",
-       "ON_BOARD_DRIFT_MODEL is 'vsh:9', no drift model"},
+       "ON_BOARD_DRIFT_MODEL is \"vsh:9\", no drift model"},
       {"ON_BOARD_DRIFT_MODEL = vsh:3", "ON_BOARD_DRIFT_MODEL = vsh:8", "there is room for degree 6 and less"},
       {"STATISTIC_NIS_MEAN = ", "STATISTIC_NIS_MEAN = x", "is not a number"},
   };

@@ -245,7 +245,7 @@ TEST(CalibrationJson, RefusesWhatNoEstimatorOnBoardHasRoomFor) {
   Calibration calibration = sample_calibration();
   calibration.on_board_drift = OnBoardDrift{vsh(7), 0};
   EXPECT_THAT(refusal_of(format_calibration(calibration)),
-              AllOf(HasSubstr("drift_on_board.drift_model is 'vsh:7'"), HasSubstr("room for degree 6")));
+              AllOf(HasSubstr("drift_on_board.drift_model is \"vsh:7\""), HasSubstr("room for degree 6")));
   calibration.on_board_drift = OnBoardDrift{vsh(6), -1e-9};
   EXPECT_THAT(refusal_of(format_calibration(calibration)),
               HasSubstr("drift_on_board.random_walk_rad_sqrt_s is -1e-09"));

@@ -20,7 +20,7 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 
 /// Between the directions that are taken: members of degree 8 change in minutes.
-constexpr Duration kStep = std::chrono::seconds(30);
+constexpr Duration kStep = std::chrono::minutes(1);
 /// Over a longer gap nothing is added.
 constexpr Duration kGap = std::chrono::minutes(5);
 

@@ -22,9 +22,13 @@ std::string causes_in_words(const std::vector<ErrorCause>& causes) {
   return text;
 }
 
-/// By what the error is made of most.
+/// By whether more than half of the error is noise; what the parameters make of it, a longer pass makes smaller.
 std::string cure_of_need(const NeedForecast& need) {
-  const bool by_parameter = need.causes.empty() || need.causes.front().is_parameter;
+  double noise = 0;
+  for (const ErrorCause& cause : need.causes) {
+    noise += cause.is_parameter ? 0 : cause.share;
+  }
+  const bool by_parameter = noise < 0.5;
   const std::string better = by_parameter
                                  ? "Calibrate on a longer pass, with slews, or on several passes of this start-up."
                                  : "A longer pass will not help: it is noise of the gyros.";

@@ -101,12 +101,13 @@ TEST(Calibrate, OnBoardTheDriftFieldIsItsLargeMembersWhichMakeUpForTheOthers) {
   const sim::SimulatedPass simulated = sim::simulate(with_drift_outside(5, std::chrono::hours(4)));
   const CalibrationRun run = calibrate(simulated.pass, with_drift_open(Estimator::kInvariant));
   EXPECT_LT(nees_of(simulated.truth, run.calibration), 45);
-  // The calibration has all members; what those on board leave of the others is next to nothing along the flight.
+  // The calibration has all members; what those on board cannot make up for is less than the noise of a fix in an
+  // orbit.
   EXPECT_EQ(run.calibration.gyros.at(0).drift_model, kLargestDriftModel);
   ASSERT_TRUE(run.calibration.on_board_drift);
   EXPECT_EQ(run.calibration.on_board_drift->drift_model, vsh(DriftModelId::kMaxDegreeOnBoard));
   EXPECT_FALSE(run.options.further_states.is_on(FurtherState::kWanderingDrift));
-  EXPECT_LT(run.options.direction_random_walk_rad_sqrt_s, 3e-8);
+  EXPECT_LT(run.options.direction_random_walk_rad_sqrt_s * std::sqrt(5400), 2 * kArcsecond);
 }
 
 /// Its degrees 7 and 8 find no room on board, and its 326 parameters are states of the batch as modes.
