@@ -236,6 +236,7 @@ ConstantsInformation eliminate_moving(const MatrixXd& prior, const VectorXd& pri
   refuse_singular(moving);
   found.log_root_determinant += log_determinant(moving);
   found.squares = forward.constants().take();
+  found.moving = forward.moving();
   return found;
 }
 

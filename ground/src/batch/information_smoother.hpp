@@ -54,7 +54,8 @@ struct SmootherResult {
 
 /// What is known of the constants when all states that move are eliminated.
 struct ConstantsInformation {
-  Eigen::MatrixXd squares;          ///< products of the columns of their rows, right side last; lower triangle
+  LongRows moving;          ///< about the states of the last stage, right side last: what is known of those that move
+  Eigen::MatrixXd squares;  ///< products of the columns of their rows, right side last; lower triangle
   double log_root_determinant = 0;  ///< ln |det R| of d of the last stage and of all w
 };
 

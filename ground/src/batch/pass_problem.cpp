@@ -63,7 +63,8 @@ bool turned_little(const Directions& from, const Directions& to, const GyroMask&
 /// not turned by more than that, are replaced by their weighted mean. Rows about modes are made once for each mean.
 class PassProblem::FixMerger {
  public:
-  explicit FixMerger(const PassProblem& problem) : problem_(problem) {}
+  /// `beside`: columns of rows that are not about states; may be none.
+  explicit FixMerger(const PassProblem& problem, Beside beside = {}) : problem_(problem), beside_(std::move(beside)) {}
 
   /// `whitened`: rows as on board, right side last.
   void add(const Moment& moment, const Rows& whitened, double weight) {
@@ -97,7 +98,23 @@ class PassProblem::FixMerger {
         sum.add_moved(at.before + 1, square * at.part, about_states, problem_.on_board_);
       }
     }
-    sum.H += square * problem_.by_states_but_modes(moment, about_states);
+    const MatrixXd by_states = problem_.by_states_but_modes(moment, about_states);
+    sum.H += square * by_states;
+    if (beside_) {
+      const MatrixXd columns = square * beside_(moment, problem_.without_modes_, by_states);
+      sum.beside = first ? columns : MatrixXd(sum.beside + columns);
+    }
+  }
+
+  /// The columns beside the rows that put_into() writes.
+  [[nodiscard]] MatrixXd beside() const {
+    MatrixXd columns(size_, sums_.empty() ? 0 : sums_.front().beside.cols());
+    Eigen::Index row = 0;
+    for (const Sum& sum : sums_) {
+      columns.middleRows(row, sum.y.size()) = sum.beside / std::sqrt(sum.weight);
+      row += sum.y.size();
+    }
+    return columns;
   }
 
   /// Writes the rows; returns the sum of squares about the means, which the rows do not contain.
@@ -150,6 +167,7 @@ class PassProblem::FixMerger {
     GyroMask used{};
     double weight = 0;
     MatrixXd H;  ///< without modes
+    MatrixXd beside;
     VectorXd y;
     std::vector<Moved> moved;
 
@@ -167,6 +185,7 @@ class PassProblem::FixMerger {
     }
   };
   const PassProblem& problem_;
+  Beside beside_;
   Time last_t_{};
   double turned_rad_ = 0;  ///< since the first of the last sum
   std::vector<Sum> sums_;
@@ -191,6 +210,9 @@ PassProblem::PassProblem(const ScreenedPass& pass, PassSetup setup)
       gyros_(layout_.gyros),
       samples_(&pass.samples),
       fixes_(pass.fixes.size()) {
+  for (std::size_t components = 1; components < gates_.size(); ++components) {
+    gates_[components] = gate_of_freedom(static_cast<int>(components), setup_.on_board.gate_nis);
+  }
   const Time first = pass.fixes.front().fix.t;
   auto fix = pass.fixes.begin();
   Time taken = first;
@@ -577,10 +599,6 @@ PassProblem::FixRows PassProblem::compare(const PassSolution& solution, const Mo
 
 double PassProblem::FixRows::nis() const { return y.dot(R.llt().solve(y)); }
 
-double PassProblem::gate_of(Eigen::Index components) const {
-  return gate_of_freedom(std::max(static_cast<int>(components), 1), setup_.on_board.gate_nis);
-}
-
 bool PassProblem::is_outlier(const FixRows& rows) const { return rows.nis() > gate_of(rows.y.size()); }
 
 MatrixXd PassProblem::prior_covariance() const {
@@ -733,19 +751,9 @@ PassProblem::Linear PassProblem::linearise(const PassSolution& solution, bool by
   std::size_t part = 0;
   Moment moment;
   for (std::size_t arc = 0; arc < arcs_.size(); ++arc) {
-    check_stop();
-    begin_arc(solution, arc, moment);
     double extra_variance_rad2 = 0;
     FixMerger nearby(*this);
-    for (std::size_t i = arcs_[arc].begin; i < arcs_[arc].end; ++i) {
-      moment.fix = nodes_[i].fix;
-      if (moment.fix != nullptr) {
-        linear.cost_outside_rows += add_fix(compare_now(solution, moment), moment, scale, nearby);
-      }
-      if (i + 1 < nodes_.size()) {
-        step(nodes_[i], nodes_[i + 1], drift, moment, extra_variance_rad2);
-      }
-    }
+    linear.cost_outside_rows += add_arc(solution, arc, drift, scale, moment, extra_variance_rad2, nearby);
     SmootherStage& stage = linear.stages[arc];
     linear.cost_outside_rows += nearby.put_into(arc, stage);
     if (by_parts) {
@@ -770,6 +778,41 @@ PassProblem::Linear PassProblem::linearise(const PassSolution& solution, bool by
     put_noise(solution, setup_.noise(), arc, linear.ends[arc], linear.stages[arc]);
   }
   return linear;
+}
+
+double PassProblem::add_arc(const PassSolution& solution, std::size_t arc, const Drift& drift, double scale,
+                            Moment& moment, double& extra_variance_rad2, FixMerger& nearby) const {
+  check_stop();
+  begin_arc(solution, arc, moment);
+  double cost = 0;
+  for (std::size_t i = arcs_[arc].begin; i < arcs_[arc].end; ++i) {
+    moment.fix = nodes_[i].fix;
+    if (moment.fix != nullptr) {
+      cost += add_fix(compare_now(solution, moment), moment, scale, nearby);
+    }
+    if (i + 1 < nodes_.size()) {
+      step(nodes_[i], nodes_[i + 1], drift, moment, extra_variance_rad2);
+    }
+  }
+  return cost;
+}
+
+void PassProblem::for_each_arc(const PassSolution& solution, const Beside& beside,
+                               const std::function<void(std::size_t, const MatrixXd&)>& use) const {
+  const double scale = scale_of_misfits(solution);
+  const Drift drift = drift_along(solution, &sensitive());
+  Moment moment;
+  SmootherStage stage;
+  for (std::size_t arc = 0; arc < arcs_.size(); ++arc) {
+    double unused = 0;
+    FixMerger nearby(*this, beside);
+    static_cast<void>(add_arc(solution, arc, drift, scale, moment, unused, nearby));
+    static_cast<void>(nearby.put_into(arc, stage));
+    const MatrixXd columns = nearby.beside();
+    MatrixXd rows(stage.H.rows(), stage.H.cols() + columns.cols() + 1);
+    rows << stage.H, columns, stage.y;
+    use(arc, rows);
+  }
 }
 
 double PassProblem::add_fix(Compared fix, const Moment& moment, double scale, FixMerger& nearby) const {

@@ -3,6 +3,7 @@
 /// noise the directions and the wandering drift at the beginning of each arc.
 
 #include <Eigen/Core>
+#include <array>
 #include <chrono>
 #include <functional>
 #include <optional>
@@ -117,6 +118,14 @@ class PassProblem {
   /// The same with the rows about the constants alone as a triangle in the last arc of each part of the pass: a
   /// fraction of the rows, for whom only the ends of the parts matter.
   [[nodiscard]] Linear linearise_by_parts(const PassSolution& solution) const;
+  /// Columns of the rows of a fix that are about something else than states, by these at a moment about the states of
+  /// its arc, of a layout without modes.
+  struct Moment;
+  using Beside = std::function<Eigen::MatrixXd(const Moment&, const Layout&, const Eigen::MatrixXd&)>;
+  /// The fixes of each arc in turn as the rows of linearise(), before these are reduced: columns about its states,
+  /// those `beside`, of which there is one at least, and the misfit.
+  void for_each_arc(const PassSolution& solution, const Beside& beside,
+                    const std::function<void(std::size_t, const Eigen::MatrixXd&)>& use) const;
   static constexpr std::size_t kParts = 6;
   /// The arc after the last one of that many parts.
   [[nodiscard]] std::size_t end_of(std::size_t parts) const { return parts * arcs_.size() / kParts; }
@@ -207,9 +216,12 @@ class PassProblem {
   /// Adds the rows of a fix, whitened, with the weight that its misfit leaves it: beyond the gate, `scale` times that
   /// of its NIS, its influence falls with the third power. Returns the part of the cost that the rows do not contain.
   double add_fix(Compared fix, const Moment& moment, double scale, FixMerger& nearby) const;
+  /// Those of an arc, and goes on to the beginning of the next; returns the sum of what add_fix() does.
+  double add_arc(const PassSolution& solution, std::size_t arc, const Drift& drift, double scale, Moment& moment,
+                 double& extra_variance_rad2, FixMerger& nearby) const;
   [[nodiscard]] Linear linearise(const PassSolution& solution, bool by_parts) const;
 
-  [[nodiscard]] double gate_of(Eigen::Index components) const;
+  [[nodiscard]] double gate_of(Eigen::Index components) const { return gates_[static_cast<std::size_t>(components)]; }
   /// How far the misfits are beyond their noise as a rule, by the first fixes of each arc: the square of it, 1 or more.
   [[nodiscard]] double scale_of_misfits(const PassSolution& solution) const;
   [[nodiscard]] Reading reading_at(const Node& node) const;
@@ -247,6 +259,7 @@ class PassProblem {
   DriftModel drift_;
   DriftModel drift_of_eq1_;
   int gyros_;
+  std::array<double, kMaxComponents + 1> gates_{};  ///< by the number of components
   const ScreenedSamples* samples_;
   std::vector<Node> nodes_;
   std::vector<ArcNodes> arcs_;

@@ -41,7 +41,7 @@ void RotorDrift::add(DriftCoefficient::Member potential, int degree, int order, 
   // Of d^m P_l / dz^m.
   const double norm = std::sqrt((2 * degree + 1) / (4 * std::numbers::pi) * (m > 0 ? 2 : 1) *
                                 std::tgamma(degree - m + 1) / std::tgamma(degree + m + 1));
-  const std::size_t place = (potential == DriftCoefficient::Member::kW ? 0U : 2U) + (order < 0 ? 1U : 0U);
+  const int place = (potential == DriftCoefficient::Member::kW ? 0 : 2) + (order < 0 ? 1 : 0);
   outside_[static_cast<std::size_t>(m)][static_cast<std::size_t>(degree)][place] += norm * amplitude;
   degree_ = std::max(degree_, degree);
 }
@@ -82,10 +82,8 @@ Vector3d RotorDrift::rate(const Vector3d& h, double part_of_change) const {
         q[l] = ((2 * ll - 1) * z * q[l - 1] - (l > m + 1 ? (ll + order - 1) * q[l - 2] : 0)) * kInverse[l - m];
       }
       const OfOrder& its = outside_[m][l];
-      for (std::size_t i = 0; i < its.size(); ++i) {
-        value[i] += its[i] * q[l];
-        slope[i] += its[i] * above[l];
-      }
+      value += q[l] * its;
+      slope += above[l] * its;
     }
     if (m > 0) {
       const double re_below = order * re[m - 1];

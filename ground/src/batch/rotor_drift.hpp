@@ -23,7 +23,7 @@ class RotorDrift {
  private:
   static constexpr int kOrders = DriftModelId::kMaxDegree + 1;
   /// W and D, each with Re and Im of (x + iy)^m.
-  using OfOrder = std::array<double, 4>;
+  using OfOrder [[gnu::vector_size(4 * sizeof(double))]] = double;
 
   /// A harmonic more.
   void add(DriftCoefficient::Member potential, int degree, int order, double amplitude);

@@ -94,8 +94,9 @@ Calibration known_before(const PassSettings& settings, const CalibrationOptions&
 }
 
 /// Options of the on-board run at the time of the batch: without what only a whole pass shows, and with esg20 in place
-/// of a larger drift model.
-CalibrationOptions options_of_on_board_run(const PassSettings& settings, CalibrationOptions options) {
+/// of a larger drift model, or eq. (1) where the pass gives no evidence of more.
+CalibrationOptions options_of_on_board_run(const PassSettings& settings, const Decision& decision) {
+  CalibrationOptions options = decision.options;
   options.estimator = Estimator::kInvariant;
   options.further_states[FurtherState::kCoefficientChange] = FurtherStateOptions::Choice::kOff;
   if (settings.prior && options.drift_field) {
@@ -104,7 +105,8 @@ CalibrationOptions options_of_on_board_run(const PassSettings& settings, Calibra
   }
   options.drift_field = false;
   if (options.drift_model && options.drift_model->family == DriftModelId::Family::kVsh && !settings.prior) {
-    options.drift_model = kEsg20;
+    const bool no_more_than_eq1 = decision.field && decision.field->log_evidence <= kLogOddsToAccept;
+    options.drift_model = no_more_than_eq1 ? kEsg7 : kEsg20;
   }
   return options;
 }
@@ -249,7 +251,7 @@ CalibrationRun calibrate_as_stamped(const Pass& pass, const CalibrationOptions& 
   Decision decision = decide(pass, options);
   const bool by_batch = decision.options.estimator == Estimator::kBatch;
   const PassSettings& settings = decision.settings ? *decision.settings : pass.settings;
-  Pipeline pipeline(settings, by_batch ? options_of_on_board_run(settings, decision.options) : decision.options);
+  Pipeline pipeline(settings, by_batch ? options_of_on_board_run(settings, decision) : decision.options);
   Recorder recorder;
   ProgressMeter meter(progress, pass.gyro.size());
   const auto on_board = [&] {

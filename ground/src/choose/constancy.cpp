@@ -25,65 +25,82 @@ using Eigen::VectorXd;
 constexpr Index kOfGyro = Layout::kEq1 + 3;
 constexpr int kOfAberration = 9;
 
-/// Sums of squares as forms zᵀ Q z of variables z of which the last is 1. The variables of a stretch of the pass: the
-/// noise w of a step, states that move at the beginning and now, constants, shapes of errors of the fixes, 1.
-class StretchForm {
+/// A stretch of the pass as a sum of squares, a form zᵀ Q z of the states that move at its beginning and at its end, of
+/// constants, of shapes of errors of the fixes, and of 1. What moves at the beginning counts as constant in it.
+class Stretch {
  public:
-  StretchForm(Index moving, Index constants, Index shapes)
-      : d_(moving), Q_(MatrixXd::Zero(3 * moving + constants + shapes + 1, 3 * moving + constants + shapes + 1)) {}
+  Stretch(Index moving, Index constants, Index shapes) : d_(moving), rest_(constants + shapes) {}
 
-  /// `arc`: of the states that move now, constants, shapes and 1.
-  void measure(const MatrixXd& arc) {
-    const Index rest = arc.rows() - d_;
-    const Index d = moved_ ? 2 * d_ : d_;
-    Q_.block(d, d, d_, d_) += arc.topLeftCorner(d_, d_);
-    Q_.block(d, 3 * d_, d_, rest) += arc.topRightCorner(d_, rest);
-    Q_.block(3 * d_, d, rest, d_) += arc.bottomLeftCorner(rest, d_);
-    Q_.bottomRightCorner(rest, rest) += arc.bottomRightCorner(rest, rest);
+  /// Rows about the states of the arc that it has come to, constants, shapes, and what they are compared with; unit
+  /// noise.
+  void measure(const MatrixXd& rows) {
+    MatrixXd its = MatrixXd::Zero(rows.rows(), 2 * d_ + rest_);
+    its.middleCols(stages_.empty() ? d_ : 0, d_) = rows.leftCols(d_);
+    its.rightCols(rest_) = rows.middleCols(d_, rest_);
+    if (stages_.empty()) {
+      add_to_prior(its, rows.rightCols(1));
+    } else {
+      stages_.back().H = std::move(its);
+      stages_.back().y = rows.rightCols(1);
+    }
   }
 
   /// Goes on to the beginning of the next arc.
-  void move(const SmootherStage& stage) {
+  void move(const SmootherStage& its) {
     constexpr double kLeastNoise_rad = 1e-9;  // 0.2 mas: no reading shows it
-    const Index constants = stage.B.cols();
-    MatrixXd to = MatrixXd::Zero(d_, Q_.cols());
-    if (!moved_) {  // w = (d' − A d − B c − m) / noise
-      to.middleCols(d_, d_) = -stage.A_inverse.inverse();
-      to.middleCols(2 * d_, d_).setIdentity();
-      to.middleCols(3 * d_, constants) = -stage.B;
-      to.rightCols(1) = -stage.m;
-      to = stage.noise.cwiseMax(kLeastNoise_rad).cwiseInverse().asDiagonal() * to;
-      Q_.noalias() += to.transpose() * to;
-      moved_ = true;
-      return;
+    LongRows B = LongRows::Zero(d_, d_ + rest_);
+    B.middleCols(d_, its.B.cols()) = its.B;
+    if (stages_.empty()) {  // w = (d' − A d − B c − m) / noise
+      MatrixXd rows(d_, 2 * d_ + rest_);
+      rows << MatrixXd::Identity(d_, d_), -its.A_inverse.inverse(), -B.rightCols(rest_);
+      const VectorXd weight = its.noise.cwiseMax(kLeastNoise_rad).cwiseInverse();
+      add_to_prior(weight.asDiagonal() * rows, weight.cwiseProduct(its.m));
+    } else {
+      SmootherStage& stage = stages_.back();
+      stage.A_inverse = its.A_inverse;
+      stage.B = std::move(B);
+      stage.m = its.m;
+      stage.noise = its.noise;
     }
-    // d = A⁻¹ (d' − B c − m − noise w), of which w is then eliminated.
-    to.leftCols(d_) = -stage.A_inverse * stage.noise.asDiagonal();
-    to.middleCols(2 * d_, d_) = stage.A_inverse;
-    to.middleCols(3 * d_, constants) = -stage.A_inverse * stage.B;
-    to.rightCols(1) = -stage.A_inverse * stage.m;
-    MatrixXd rows = Q_.middleRows(2 * d_, d_);
-    const MatrixXd own = rows.middleCols(2 * d_, d_);
-    rows.middleCols(2 * d_, d_) = own / 2;
-    Q_.middleRows(2 * d_, d_).setZero();
-    Q_.middleCols(2 * d_, d_).setZero();
-    rows.middleCols(2 * d_, d_).setZero();
-    const MatrixXd crossed = to.transpose() * (rows + own * to / 2);
-    Q_ += crossed + crossed.transpose();
-    const MatrixXd by_w = Q_.topRows(d_);
-    const MatrixXd w = by_w.leftCols(d_) + MatrixXd::Identity(d_, d_);
-    Q_.noalias() -= by_w.transpose() * w.llt().solve(by_w);
-    Q_.topRows(d_).setZero();
-    Q_.leftCols(d_).setZero();
+    SmootherStage& next = stages_.emplace_back();
+    next.H.setZero(0, 2 * d_ + rest_);
+    next.m.setZero(d_);
   }
 
-  /// Without w.
-  [[nodiscard]] MatrixXd form() const { return Q_.bottomRightCorner(Q_.rows() - d_, Q_.cols() - d_); }
+  /// `is_last`: of the states at its end nothing more will be known, and they are eliminated.
+  [[nodiscard]] MatrixXd form(bool is_last) {
+    const ConstantsInformation found =
+        eliminate_moving(prior_, prior_y_, stages_.size(), [this](std::size_t i) { return std::move(stages_[i]); });
+    MatrixXd form = MatrixXd::Zero(2 * d_ + rest_ + 1, 2 * d_ + rest_ + 1);
+    const MatrixXd squares = found.squares.selfadjointView<Eigen::Lower>();
+    form.topLeftCorner(d_, d_) = squares.topLeftCorner(d_, d_);
+    form.topRightCorner(d_, rest_ + 1) = squares.topRightCorner(d_, rest_ + 1);
+    form.bottomLeftCorner(rest_ + 1, d_) = squares.bottomLeftCorner(rest_ + 1, d_);
+    form.bottomRightCorner(rest_ + 1, rest_ + 1) = squares.bottomRightCorner(rest_ + 1, rest_ + 1);
+    if (!is_last) {
+      MatrixXd rows(d_, form.cols());
+      rows << found.moving.middleCols(d_, d_), found.moving.leftCols(d_), found.moving.rightCols(rest_ + 1);
+      form.noalias() += rows.transpose() * rows;
+    }
+    form.rightCols(1) *= -1;
+    form.bottomRows(1) *= -1;
+    return form;
+  }
 
  private:
+  void add_to_prior(const MatrixXd& rows, const VectorXd& y) {
+    const Index before = prior_.rows();
+    prior_.conservativeResize(before + rows.rows(), rows.cols());
+    prior_.bottomRows(rows.rows()) = rows;
+    prior_y_.conservativeResize(prior_.rows());
+    prior_y_.tail(rows.rows()) = y;
+  }
+
   Index d_;
-  MatrixXd Q_;
-  bool moved_ = false;  ///< beyond its first arc
+  Index rest_;
+  MatrixXd prior_;  ///< of its second arc: all of the first, and how the pass goes on from there
+  VectorXd prior_y_;
+  std::vector<SmootherStage> stages_;  ///< from the second arc on
 };
 
 /// Removes the first variables of a form, to their likeliest values. `follow`: how these follow the others, negated.
@@ -107,70 +124,29 @@ Matrix3d cross(const Vector3d& v) {
   return m;
 }
 
-/// Calls `use(arc, form)` for each arc in turn with its fixes as a form of the states of the arc, shapes and 1. The
-/// shapes: aberration by a velocity that is constant, and by two at orbital period, over the speed of light, in axes;
-/// relative errors of scale of the direction cosines, gyro by gyro. Each moves the directions as a small rotation of
-/// the cases would, an alignment.
-template <class Use>
-void for_each_arc(const PassProblem& problem, const PassSolution& solution, const Use& use) {
-  const Layout& layout = problem.layout();
-  const CalibrationSetup& setup = problem.setup().on_board;
-  const Index n = layout.size();
-  const Index shapes = kOfAberration + 3L * layout.gyros;
-  MatrixXd form = MatrixXd::Zero(n + shapes + 1, n + shapes + 1);
-  // Rows of fixes of one arc, until there are enough of them that a product is worth its beginning.
-  constexpr Index kTogether = 64;
-  constexpr Index kMostRows = 2L * kMaxGyros;
-  MatrixXd gathered(n + shapes + 1, kTogether + kMostRows);
-  Index count = 0;
-  const auto put_into_form = [&] {
-    if (count > 0) {
-      add_gram(gathered.leftCols(count), 1, form);
-      count = 0;
+/// Shapes of errors of a fix, columns beside its rows: aberration by a velocity that is constant, and by two at orbital
+/// period, over the speed of light, in axes; relative errors of scale of the direction cosines, gyro by gyro. Each
+/// moves the directions as a small rotation of the cases would, an alignment.
+MatrixXd shapes_of(const CalibrationSetup& setup, const PassProblem::Moment& moment, const Layout& layout,
+                   const MatrixXd& rows) {
+  MatrixXd shapes = MatrixXd::Zero(rows.rows(), kOfAberration + 3L * layout.gyros);
+  const Matrix3d C_c_in = moment.fix->fix.q_in_c.normalized().toRotationMatrix().transpose();
+  const Matrix3d aberrated = cross(Vector3d::UnitZ()) * C_c_in;
+  const double phase = setup.orbital_rate_rad_s * to_seconds(moment.t - setup.orbital_phase_zero);
+  for (int k = 0; k < layout.gyros; ++k) {
+    const auto by_alignment = rows.middleCols<3>(layout.alignment(k));
+    if (moment.fix->fix.head == 0) {
+      const Eigen::Matrix<double, Eigen::Dynamic, 3> by_velocity = by_alignment.lazyProduct(aberrated);
+      shapes.middleCols<3>(0) += by_velocity;
+      shapes.middleCols<3>(3) += std::cos(phase) * by_velocity;
+      shapes.middleCols<3>(6) += std::sin(phase) * by_velocity;
     }
-  };
-  std::size_t arc = 0;
-  const auto go_on_to = [&](std::size_t next) {
-    for (; arc < next; ++arc) {
-      put_into_form();
-      use(arc, MatrixXd(form.selfadjointView<Eigen::Lower>()));
-      form.setZero();
-    }
-  };
-  problem.go_along(solution, [&](const PassProblem::Moment& moment) {
-    if (moment.fix == nullptr) {
-      return;
-    }
-    PassProblem::FixRows rows = problem.compare(solution, moment);
-    if (rows.y.size() == 0 || problem.is_outlier(rows)) {
-      return;
-    }
-    go_on_to(moment.arc);
-    MatrixXd all(rows.y.size(), n + shapes + 1);
-    all << rows.H, MatrixXd::Zero(rows.y.size(), shapes), -rows.y;
-    const Matrix3d C_c_in = moment.fix->fix.q_in_c.normalized().toRotationMatrix().transpose();
-    const Matrix3d aberrated = cross(Vector3d::UnitZ()) * C_c_in;
-    const double phase = setup.orbital_rate_rad_s * to_seconds(moment.t - setup.orbital_phase_zero);
-    for (int k = 0; k < layout.gyros; ++k) {
-      const auto by_alignment = rows.H.middleCols<3>(layout.alignment(k));
-      if (moment.fix->fix.head == 0) {
-        const MatrixXd by_velocity = by_alignment * aberrated;
-        all.middleCols<3>(n) += by_velocity;
-        all.middleCols<3>(n + 3) += std::cos(phase) * by_velocity;
-        all.middleCols<3>(n + 6) += std::sin(phase) * by_velocity;
-      }
-      const Matrix3d& C_c_b = moment.gyros[k].C_c_b;
-      const Vector3d& h_b = moment.fix->h_b[k];
-      all.middleCols<3>(n + kOfAberration + 3L * k) = by_alignment * cross(-(C_c_b * h_b)) * C_c_b * h_b.asDiagonal();
-    }
-    rows.R.llt().matrixL().solveInPlace(all);
-    if (count >= kTogether) {
-      put_into_form();
-    }
-    gathered.middleCols(count, all.rows()) = all.transpose();
-    count += all.rows();
-  });
-  go_on_to(problem.arcs());
+    const Matrix3d& C_c_b = moment.gyros[k].C_c_b;
+    const Vector3d& h_b = moment.fix->h_b[k];
+    const Matrix3d by_scale = cross(-(C_c_b * h_b)) * C_c_b * h_b.asDiagonal();
+    shapes.middleCols<3>(kOfAberration + 3L * k) = by_alignment.lazyProduct(by_scale);
+  }
+  return shapes;
 }
 
 /// The whole pass as a form of what may move, all else eliminated. The pass is cut into stretches; the variables are
@@ -208,7 +184,7 @@ class Constancy {
       std::vector<Index> place(static_cast<std::size_t>(2 * d + n - d + shapes + 1));
       for (Index j = 0; j < d; ++j) {
         place[static_cast<std::size_t>(j)] = i * d + j;
-        place[static_cast<std::size_t>(d + j)] = std::min(i + 1, count - 1) * d + j;  // of the last there is nothing
+        place[static_cast<std::size_t>(d + j)] = std::min(i + 1, count - 1) * d + j;  // of the last zeros
       }
       const auto constant = [&](Index c) -> Index& { return place[static_cast<std::size_t>(d + c)]; };
       for (std::size_t j = 0; j < others.size(); ++j) {
@@ -234,16 +210,21 @@ class Constancy {
         whole.block(step, step, directions, directions) += form.block(d, d, directions, directions);
       }
     };
-    StretchForm stretch(d, n - d, shapes);
+    Stretch stretch(d, n - d, shapes);
+    stretch.measure(prior_rows(linear, shapes));
     Index at_stretch = 0;
-    for_each_arc(problem_, found.before, [&](std::size_t arc, const MatrixXd& fixes) {
-      stretch.measure(arc == 0 ? MatrixXd(fixes + prior_form(linear, n, shapes)) : fixes);
-      if (arc + 1 < problem_.arcs()) {
+    const auto beside = [this](const PassProblem::Moment& moment, const Layout& layout, const MatrixXd& rows) {
+      return shapes_of(problem_.setup().on_board, moment, layout, rows);
+    };
+    problem_.for_each_arc(found.before, beside, [&](std::size_t arc, const MatrixXd& fixes) {
+      stretch.measure(fixes);
+      const bool is_last = arc + 1 == problem_.arcs();
+      if (!is_last) {
         stretch.move(linear.stages[arc]);
       }
       if (arc + 1 == begins_[static_cast<std::size_t>(at_stretch) + 1]) {
-        add_stretch(at_stretch++, stretch.form());
-        stretch = StretchForm(d, n - d, shapes);
+        add_stretch(at_stretch++, stretch.form(is_last));
+        stretch = Stretch(d, n - d, shapes);
       }
     });
     // Steps in place of the values of each stretch: a step changes all that follows.
@@ -322,11 +303,10 @@ class Constancy {
  private:
   [[nodiscard]] Index of_stretch() const { return (kOfGyro + 2) * layout_.gyros; }
 
-  static MatrixXd prior_form(const PassProblem::Linear& linear, Index n, Index shapes) {
-    MatrixXd rows = MatrixXd::Zero(linear.prior.rows(), n + shapes + 1);
-    rows.leftCols(n) = linear.prior;
-    rows.rightCols(1) = -linear.prior_y;
-    return rows.transpose() * rows;
+  static MatrixXd prior_rows(const PassProblem::Linear& linear, Index shapes) {
+    MatrixXd rows(linear.prior.rows(), linear.prior.cols() + shapes + 1);
+    rows << linear.prior, MatrixXd::Zero(linear.prior.rows(), shapes), linear.prior_y;
+    return rows;
   }
 
   const PassProblem& problem_;

@@ -32,8 +32,6 @@ bool is_judged_by_trial(const FurtherStateRow& row) {
   return !row.key.empty() && row.state != FurtherState::kWanderingDrift;
 }
 
-/// Log of the odds, 20 to 1, from which on a state or model is accepted.
-constexpr double kLogOddsToAccept = 3;
 /// Smallest number of pairs of fixes from which the noise of the star tracker is estimated, to some percent.
 constexpr std::size_t kLeastFixPairs = 1000;
 
@@ -222,13 +220,12 @@ void decide_again_with_more_noise(const Pass& pass, const Screened& screened, co
     return std::pair(std::move(trial), likely);
   });
   NoiseFit walking;
-  side_by_side(
-      [&] { walking = with_most_likely_walk(everything, free); },
-      [&] {
-        if (wandering_is_open) {
-          try_wandering();
-        }
-      });
+  side_by_side([&] { walking = with_most_likely_walk(everything, free); },
+               [&] {
+                 if (wandering_is_open) {
+                   try_wandering();
+                 }
+               });
   std::optional<Evidence> wandering;
   std::optional<ProcessNoise> wanders;
   if (wandering_is_open && walking.gain > kLogOddsToAccept) {

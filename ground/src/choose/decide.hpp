@@ -14,6 +14,9 @@
 
 namespace trihedron::ground {
 
+/// Log of the odds, 20 to 1, from which on a state or model is accepted.
+inline constexpr double kLogOddsToAccept = 3;
+
 /// Options in which nothing is left to decide (`find_noise` says whether the noise was found), and the evidence for
 /// them.
 struct Decision {
