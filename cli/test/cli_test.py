@@ -2,7 +2,6 @@
 import atexit
 import csv
 import json
-import os
 import pathlib
 import resource
 import signal
@@ -479,16 +478,6 @@ def test_passes_of_two_start_ups_are_not_to_be_used_together(start_ups, tmp_path
     assert result.returncode == DO_NOT_USE
     assert "coefficients-moved" in result.stdout and "alignment-moved" not in result.stdout
     assert "The drift coefficients of third are not those of the passes before." in result.stdout
-
-
-def test_passes_of_the_same_name_get_directories_of_their_own(start_ups, tmp_path):
-    directory, _ = start_ups
-    os.makedirs(tmp_path / "other")
-    os.symlink(directory / "second.nc", tmp_path / "other" / "first.nc")
-    result = run("--quiet", "calibrate", directory / "first.nc", tmp_path / "other" / "first.nc", "-o", tmp_path / "out",
-                 "--config", directory / "told.toml")
-    assert result.returncode == TRUSTWORTHY, result.stderr
-    assert (tmp_path / "out" / "first" / "calibration.json").exists() and (tmp_path / "out" / "first-2" / "calibration.json").exists()
 
 
 def test_passes_that_overlap_are_refused_with_the_pass_and_the_reason(start_ups, tmp_path):
