@@ -111,6 +111,7 @@ def test_what_is_read_is_never_replaced(tmp_path):
     assert (tmp_path / "star_tracker.csv").read_bytes() == before["star_tracker.csv"]
 
 
+@pytest.mark.long
 def test_the_schema_describes_the_example_and_refuses_what_the_reader_refuses(tmp_path):
     schema = json.loads(done("schema", "telemetry").stdout)
     validator = jsonschema.Draft202012Validator(schema)

@@ -176,6 +176,7 @@ def test_the_manual_page_has_every_command_and_option():
     assert not re.search(r"^['.](?!TH|ad l|SH|SS|TP|B |BR |I |PP|nf|fi)", page, re.MULTILINE)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("command", COMMANDS)
 def test_each_command_has_a_manual_page_with_its_options(command):
     page = run("man", command).stdout
