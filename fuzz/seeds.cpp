@@ -87,6 +87,10 @@ void write_seeds(const fs::path& directory, const fs::path& examples) {
                                   xml ? io::MessageSyntax::kXml : io::MessageSyntax::kKvn));
   }
 
+  for (const bool xml : {false, true}) {
+    io::write_text(at("orbit_message", xml ? "round.xml" : "round.oem"), io::orbit_message(xml));
+  }
+
   const CatalogueEntry entry{"Resurs-DK1", "pass-a", "2009-05-20", 1, io::sample_calibration()};
   fs::remove(at("catalogue", "one.db"));
   io::add_to_catalogue(at("catalogue", "one.db"), {&entry, 1});
