@@ -235,6 +235,11 @@ void export_calibration(const ExportArguments& arguments, const Common& common) 
     io::CalibrationContext context;
     context.attitude = attitude ? &*attitude : nullptr;
     context.pass = pass ? &pass->pass().settings : nullptr;
+    if (attitude) {
+      const Duration gap =
+          arguments.gap.empty() ? io::usual_gap(attitude->attitude) : io::parse_duration(arguments.gap);
+      context.manoeuvres = io::slews_of(attitude->attitude, gap);
+    }
     context.covariance_file = std::filesystem::path(summary.written[1]).filename().string();
     const std::string text =
         io::format_acm(calibration, context, description, xml ? io::MessageSyntax::kXml : io::MessageSyntax::kKvn);

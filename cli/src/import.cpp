@@ -195,6 +195,10 @@ void import_calibration(const ImportArguments& arguments, const Common& common, 
                     message.covariance_file.empty() ? "the message names no covariance file"
                                                     : fmt::format("{} is not there", message.covariance_file.string()));
   }
+  if (!message.manoeuvres.empty()) {
+    written += fmt::format("; of its {} manoeuvre{} a calibration says nothing", message.manoeuvres.size(),
+                           message.manoeuvres.size() == 1 ? "" : "s");
+  }
   put_imported(arguments, io::format_calibration(message.calibration));
   show_interchange(beside(arguments.output, common), {arguments.file,
                                                       message.format,

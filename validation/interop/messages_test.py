@@ -142,6 +142,8 @@ def test_peers_read_a_calibration(calibrated, calibration, tmp_path, form):
     assert str(determination.getMethod()) == "EKF"
     if form == "acm":
         assert [str(determination.getSensorsUsed().get(i).getSensorUsed()) for i in range(3)] == ["AST", "GYRO", "GYRO"]
+    turned = data.getManeuverBlocks()
+    assert turned is None or turned.isEmpty()  # four minutes without a slew
     user = {str(key): str(data.getUserDefinedBlock().getParameters().get(key))
             for key in data.getUserDefinedBlock().getParameters().keySet()}
     for index, gyro in enumerate(calibration["gyros"], start=1):
@@ -149,6 +151,35 @@ def test_peers_read_a_calibration(calibrated, calibration, tmp_path, form):
             assert abs(float(user[f"TRIHEDRON_GYRO{index}_{name.upper()}_RAD_S"]) - value) <= 1e-15 * abs(value)
     assert user["TRIHEDRON_VERDICT"] == ("TRUSTWORTHY" if calibration["verdict"]["trustworthy"] else "DO NOT USE")
     assert (tmp_path / user["TRIHEDRON_COVARIANCE_FILE"]).exists()
+
+
+@pytest.mark.parametrize("form", ("acm", "acm-xml"))
+def test_peers_read_slews_as_manoeuvres(calibrated, tmp_path, form):
+    """A turn of 20° about x in 40 s, from 100 s on."""
+    rows = []
+    for i in range(81):
+        half = 0.175 * min(max((3 * i - 100) / 40, 0), 1)
+        rows.append(f"{3 * i},{np.sin(half):.17g},0,0,{np.cos(half):.17g}")
+    (tmp_path / "turned.csv").write_text("t_s,q_x,q_y,q_z,q_w\n" + "\n".join(rows) + "\n")
+    path = tmp_path / f"slews.{form}"
+    run("--quiet", "export", calibrated / "out" / "calibration.json", "--format", form, "-o", path, "--attitude", tmp_path / "turned.csv")
+    ccsds_ndm.Acm.from_file(str(path)).validate()
+    data = ParserBuilder().buildAcmParser().parseMessage(DataSource(str(path))).getSegments().get(0).getData()
+    assert data.getManeuverBlocks().size() == 1
+    slew = data.getManeuverBlocks().get(0)
+    assert (slew.getBeginTime(), slew.getEndTime()) == (99, 141)
+    q = slew.getTargetAttitude()
+    assert abs(q.getQ1() - np.sin(0.175)) < 1e-15 and abs(abs(q.getQ0()) - np.cos(0.175)) < 1e-15
+    assert "1 manoeuvre" in run("import", path, "-o", tmp_path / "back.json")
+
+
+@pytest.fixture(scope="module")
+def earth():
+    """The centre of an OEM, of which Orekit asks little, and for which it would want an ephemeris of the planets."""
+    import jpype
+    body = jpype.JProxy("org.orekit.bodies.CelestialBody", dict={"getName": lambda: "Earth", "getGM": lambda: 3.986004418e14})
+    loader = jpype.JProxy("org.orekit.bodies.CelestialBodyLoader", dict={"loadCelestialBody": lambda name: body})
+    DataContext.getDefault().getCelestialBodies().addCelestialBodyLoader("Earth", loader)
 
 
 def ellipse(t_s):
