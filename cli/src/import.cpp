@@ -239,7 +239,7 @@ void add_import(CLI::App& program, const Common& common, int& exit_status) {
   arguments->time_system = "TAI";
   CLI::App* command = program.add_subcommand("import",
                                              "Read others' telemetry by a telemetry.toml, another software's attitude "
-                                             "(CCSDS AEM, APM), or a calibration (ACM)");
+                                             "(CCSDS AEM, APM, SPICE CK), or a calibration (ACM)");
   command
       ->add_option("FILE", arguments->file, "telemetry.toml or pass; or message, as text or XML, - for standard input")
       ->required();

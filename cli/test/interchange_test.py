@@ -75,11 +75,12 @@ def test_a_message_is_an_attitude_wherever_one_is_taken(flown, tmp_path):
     rows = "".join(f"{t},0,0,0.6,0.8\n" for t in range(-1, 243))
     (tmp_path / "rest.csv").write_text("t_s,q_x,q_y,q_z,q_w\n" + rows)
     done("export", tmp_path / "rest.csv", "--format", "aem-xml", "-o", tmp_path / "rest.xml", "--pass", flown / "pass")
-    for form in ("csv", "xml"):
+    done("export", tmp_path / "rest.csv", "--format", "ck", "-o", tmp_path / "rest.bc", "--pass", flown / "pass")
+    for form in ("csv", "xml", "bc"):
         (tmp_path / f"{form}.toml").write_text(SCENARIO + f'[attitude]\nreference = "recorded"\nrecorded = "rest.{form}"\n')
         done("simulate", tmp_path / f"{form}.toml", "-o", tmp_path / form)
-    truth = [(tmp_path / form / "truth.csv").read_bytes() for form in ("csv", "xml")]
-    assert truth[0] == truth[1] and len(truth[0].splitlines()) > 2
+    truth = [(tmp_path / form / "truth.csv").read_bytes() for form in ("csv", "xml", "bc")]
+    assert truth[0] == truth[1] == truth[2] and len(truth[0].splitlines()) > 2
 
 
 def test_streams(flown, tmp_path):
@@ -114,6 +115,21 @@ def test_wrong_options_are_refused(flown, tmp_path, arguments, words):
     epoch = ("--epoch", "2009-05-20T00:00:00") if "--epoch" not in arguments else ()
     refused(run("export", flown / "a.csv", "-o", tmp_path / "a.aem", *given, *epoch, *arguments), WRONG_USAGE, *words)
     assert not (tmp_path / "a.aem").exists()
+
+
+def test_a_c_kernel_is_an_attitude_wherever_one_is_taken(flown, tmp_path):
+    done("export", flown / "a.csv", "--format", "ck", "-o", tmp_path / "a.bc", "--pass", flown / "pass")
+    said = json.loads(done("--json", "import", tmp_path / "a.bc", "-o", tmp_path / "b.csv", "--pass", flown / "pass").stdout)
+    assert said["epochs"] == len(numbers(flown / "a.csv")) and said["inertial_frame"] == "J2000"
+    for row, back in zip(numbers(flown / "a.csv"), numbers(tmp_path / "b.csv"), strict=True):
+        assert back == pytest.approx(row, rel=0, abs=1e-12)  # of twelve decimals, normalised
+    of_truth = [json.loads(done("--json", "evaluate", flown / "pass", "--attitude", flown / "a.csv", *truth).stdout)
+                for truth in ((), ("--truth", flown / "pass" / "truth.csv"), ("--truth", tmp_path / "a.bc"))]
+    assert of_truth[0] == of_truth[1]
+    assert list(of_truth[2]["whole"]["max"].values()) == pytest.approx([0, 0, 0], abs=1e-11)
+    (tmp_path / "a.tsc").unlink()
+    refused(run("import", tmp_path / "a.bc", "-o", tmp_path / "b.csv"), INPUT_REFUSED, "a.tsc is not there")
+    refused(run("evaluate", flown / "pass", "--attitude", flown / "a.csv", "--truth", tmp_path / "b"), INPUT_REFUSED)
 
 
 @pytest.mark.parametrize("naif_id", ["0", "5", "-2000001"])

@@ -69,6 +69,7 @@ class Originals:
             self.run("export", "out/calibration.json", "--format", form, "-o", f"calibration.{form}", "--attitude", "attitude.csv")
         for form in ("aem", "aem-xml", "apm", "apm-xml"):
             self.run("export", "attitude.csv", "--format", form, "-o", f"attitude.{form}", "--pass", "pass", "--time-system", "UTC")
+        self.run("export", "attitude.csv", "--format", "ck", "-o", "attitude.bc", "--pass", "pass")
         for name in ("pass", "four"):
             (directory / f"{name}_packets").mkdir()
             self.run("export", name, "--format", "packets", "-o", f"{name}_packets/telemetry.ccsds")
@@ -236,6 +237,10 @@ TARGETS = [
         ("import", f"{{in}}/attitude.{form}", "-o", "{out}/a.csv"), ("--json", "import", f"{{in}}/attitude.{form}", "-o", "{out}/a.csv"),
         ("evaluate", "{in}/pass", "--attitude", f"{{in}}/attitude.{form}"),
         ("export", f"{{in}}/attitude.{form}", "--format", "ck", "-o", "{out}/a.bc")]) for form in ("aem", "aem-xml", "apm", "apm-xml")],
+    *[Target(f"attitude.{ending}", spoil, ["pass", f"attitude.{other}"], [
+        ("import", "{in}/attitude.bc", "-o", "{out}/a.csv"), ("evaluate", "{in}/pass", "--attitude", "{in}/attitude.bc"),
+        ("export", "{in}/attitude.bc", "--format", "aem", "-o", "{out}/a.aem")])
+      for ending, spoil, other in (("bc", spoil_bytes, "tsc"), ("tsc", spoil_text, "bc"))],
     *[Target(f"calibration.{form}", spoil_text, ["calibration.covariance.nc"], [
         ("import", f"{{in}}/calibration.{form}", "-o", "{out}/c.json"),
         ("--json", "import", f"{{in}}/calibration.{form}", "-o", "{out}/c.json")]) for form in ("acm", "acm-xml")],

@@ -10,6 +10,7 @@
 #include "acm_keywords.hpp"
 #include "attitude_rules.hpp"
 #include "ccsds_frames.hpp"
+#include "ck_reader.hpp"
 #include "ndm_message.hpp"
 #include "netcdf_input.hpp"
 #include "text_file.hpp"
@@ -613,6 +614,9 @@ CalibrationMessage parse_calibration_message(std::string_view text, const std::f
 
 std::variant<AttitudeMessage, CalibrationMessage> read_message(const std::filesystem::path& file) {
   const TextFile content(file);
+  if (is_c_kernel(content.text())) {
+    return read_c_kernel(content.text(), file);
+  }
   if (is_calibration_message(content.text())) {
     return parse_calibration_message(content.text(), file);
   }

@@ -87,7 +87,7 @@ Field inertial_attitude(AttitudeScenario& attitude) {
 }
 
 Field recorded_attitude(AttitudeScenario& attitude, const fs::path& file, Time epoch) {
-  return {"recorded", "of reference recorded: an attitude file (CSV), beside this one",
+  return {"recorded", "of reference recorded: an attitude file (CSV), CCSDS AEM or SPICE CK, beside this one",
           text_schema, [&attitude, &file, epoch](const TomlTable& table, const toml::node& node) {
             const AttitudeHistory history = read_attitude(file.parent_path() / table.text(node, "recorded"), epoch);
             attitude.recorded.clear();
