@@ -60,7 +60,7 @@ def test_attitude_of_one_epoch(flown, tmp_path, form):
     refused(run(*export, "--at", (at + datetime.timedelta(seconds=0.1)).isoformat()), WRONG_USAGE, "the nearest is at " + at.isoformat(), "UTC")
     refused(run(*export, "--at", "now"), WRONG_USAGE, "--at: ")
     refused(run("export", flown / "a.csv", "--format", "aem", "-o", tmp_path / "a", "--pass", flown / "pass", "--at", at.isoformat()), WRONG_USAGE,
-            "--at is for apm")
+            "--at", "only to apm")
     assert not (tmp_path / "a").exists()
 
 
@@ -130,6 +130,21 @@ def test_a_c_kernel_is_an_attitude_wherever_one_is_taken(flown, tmp_path):
     (tmp_path / "a.tsc").unlink()
     refused(run("import", tmp_path / "a.bc", "-o", tmp_path / "b.csv"), INPUT_REFUSED, "a.tsc is not there")
     refused(run("evaluate", flown / "pass", "--attitude", flown / "a.csv", "--truth", tmp_path / "b"), INPUT_REFUSED)
+
+
+@pytest.mark.parametrize("form, option, value, of", [
+    ("aem", "--at", "2009-05-20T00:00:00", "apm"), ("apm", "--gap", "1s", "aem, ck, acm"), ("ck", "--time-system", "UTC", "aem, apm, acm"),
+    ("ck", "--apid", "40", "packets"), ("aem-xml", "--naif-id", "-28380", "ck, fk"), ("fk", "--attitude", "a.csv", "acm"),
+    ("fk", "--epoch", "2009-05-20T00:00:00", "aem, apm, ck"), ("acm-xml", "--naif-id", "-28380", "ck, fk"),
+    ("packets", "--body-frame", "SC_BODY_1", "aem, apm, acm"), ("packets", "--object-name", "X", "aem, apm, ck, acm, fk")])
+def test_options_of_other_formats_are_refused(flown, tmp_path, form, option, value, of):
+    of_calibration = form in ("acm-xml", "fk")
+    file = flown / "pass" if form == "packets" else flown / "out" / "calibration.json" if of_calibration else flown / "a.csv"
+    epoch = () if of_calibration or form == "packets" else ("--pass", flown / "pass")
+    refused(run("export", file, "--format", form, "-o", tmp_path / "x", *epoch, option, value), WRONG_USAGE, f"{option} is of no use to --format {form}",
+            f"only to {of}: leave it out")
+    refused(run("export", flown / "out" / "calibration.json", "--format", "acm", "-o", tmp_path / "x", "--gap", "1s"), WRONG_USAGE, "--attitude")
+    assert not list(tmp_path.iterdir())
 
 
 @pytest.mark.parametrize("naif_id", ["0", "5", "-2000001"])
