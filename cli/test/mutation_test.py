@@ -244,6 +244,7 @@ TARGETS = [
     *[Target(f"calibration.{form}", spoil_text, ["calibration.covariance.nc"], [
         ("import", f"{{in}}/calibration.{form}", "-o", "{out}/c.json"),
         ("--json", "import", f"{{in}}/calibration.{form}", "-o", "{out}/c.json")]) for form in ("acm", "acm-xml")],
+    Target("calibration.covariance.nc", spoil_netcdf, ["calibration.acm"], [("import", "{in}/calibration.acm", "-o", "{out}/c.json")]),
     Target("attitude.csv", spoil_table, ["pass"], [
         ("export", "{in}/attitude.csv", "--format", form, "-o", "{out}/a.x", "--pass", "{in}/pass") for form in ("aem", "aem-xml", "ck")]),
     Target("calibration.json", spoil_text, ["pass", "attitude.csv"], [
