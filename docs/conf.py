@@ -1,4 +1,4 @@
-"""The site that `make docs` makes of the documents: Sphinx, docs/adr/0019-site.md. Its own directives are in docs/site_directives.py."""
+"""The site that `make docs` makes of the documents: Sphinx, docs/adr/0020-site.md. Its own directives are in docs/site_directives.py."""
 import pathlib
 import re
 import sys

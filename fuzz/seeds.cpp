@@ -13,6 +13,7 @@
 #include "trihedron/io/config.hpp"
 #include "trihedron/io/packets.hpp"
 #include "trihedron/io/pass.hpp"
+#include "trihedron/io/spice_kernels.hpp"
 
 namespace {
 
@@ -85,6 +86,15 @@ void write_seeds(const fs::path& directory, const fs::path& examples) {
     io::write_text(at("attitude_message", xml ? "one.xml" : "one.apm"),
                    io::format_apm(message, 0, truth.t.front(), description,
                                   xml ? io::MessageSyntax::kXml : io::MessageSyntax::kKvn));
+  }
+
+  const io::SpiceClock clock = io::SpiceClock::of(attitude);
+  const io::SpiceObject object{-28380, "TEST"};
+  io::write_text(at("c_kernel", "short"),
+                 io::format_sclk(clock, object) + '\0' +
+                     io::format_ck(attitude, rates, clock, object, io::stretches(attitude, std::chrono::seconds(4))));
+  for (const bool xml : {false, true}) {
+    io::write_text(at("orbit_message", xml ? "round.xml" : "round.oem"), io::orbit_message(xml));
   }
 
   const CatalogueEntry entry{"Resurs-DK1", "pass-a", "2009-05-20", 1, io::sample_calibration()};

@@ -20,18 +20,26 @@ void add_evaluate(CLI::App& program, const Common& common, int& exit_status) {
     std::string pass;
     std::string attitude;
     std::string before;
+    std::string truth;
     std::string limit = io::format_angle(ground::kAttitudeLimit_rad);
   };
   auto arguments = std::make_shared<Arguments>();
   CLI::App* command =
       program.add_subcommand("evaluate", "Measure an attitude against the truth, or else the star tracker");
   command->add_option("PASS", arguments->pass, "Directory or NetCDF file")->required();
-  command->add_option("--attitude", arguments->attitude, "Attitude file (CSV) or CCSDS AEM; - for standard input")
+  command
+      ->add_option("--attitude", arguments->attitude,
+                   "Attitude file (CSV), CCSDS AEM or SPICE CK; - for standard input")
       ->required()
       ->type_name("FILE");
   command
       ->add_option("--before", arguments->before,
                    "Attitude file made with the values known before: gives the extension of the correction interval")
+      ->type_name("FILE");
+  command
+      ->add_option("--truth", arguments->truth,
+                   "Attitude, in any of these forms, that is taken for the truth at the epochs that both have "
+                   "(default: the truth of the pass, else the star tracker)")
       ->type_name("FILE");
   command->add_option("--limit", arguments->limit, "Error that ends a correction interval")
       ->capture_default_str()
@@ -47,14 +55,23 @@ void add_evaluate(CLI::App& program, const Common& common, int& exit_status) {
         io::within(limits::kAttitudeLimit_rad, io::parse_angle_rad(arguments->limit), "--limit " + arguments->limit);
     const io::NamedPass pass = io::read_named_pass(arguments->pass);
     const Time epoch = pass.pass().settings.epoch;
+    Truth told;
+    if (!arguments->truth.empty()) {
+      const AttitudeHistory truth = io::read_attitude(arguments->truth, epoch);
+      told.t = truth.t;
+      told.q_in_c = truth.q_in_c;
+    }
+    const Truth* const truth = arguments->truth.empty() ? pass.truth_or_null() : &told;
     const auto evaluation_of = [&](const std::string& file) {
-      ground::AttitudeEvaluation evaluation = ground::evaluate_attitude(
-          pass.pass(), io::read_attitude(source(file), epoch), pass.truth_or_null(), limit_rad);
+      ground::AttitudeEvaluation evaluation =
+          ground::evaluate_attitude(pass.pass(), io::read_attitude(source(file), epoch), truth, limit_rad);
       if (evaluation.errors.t.empty()) {
-        throw io::InputRefused(
-            file, {},
-            fmt::format("it has no epoch in common with the {} of {}", name_of(evaluation.reference), arguments->pass),
-            "give an attitude of this pass");
+        throw io::InputRefused(file, {},
+                               arguments->truth.empty()
+                                   ? fmt::format("it has no epoch in common with the {} of {}",
+                                                 name_of(evaluation.reference), arguments->pass)
+                                   : fmt::format("it has no epoch in common with {}", arguments->truth),
+                               "give an attitude of this pass");
       }
       return evaluation;
     };

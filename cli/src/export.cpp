@@ -6,6 +6,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "decisions.hpp"
@@ -42,6 +43,40 @@ struct ExportArguments {
   int naif_id = io::SpiceObject{}.naif_id;
   int apid = io::kDefaultApid;
 };
+
+struct OptionOfFormats {
+  std::string_view option;
+  std::vector<std::string_view> formats;  ///< without "-xml", which takes what the other syntax does
+};
+
+/// Refuses options that the format that is asked for has no use of.
+void expect_of_format(const CLI::App& command, std::string_view format) {
+  const std::vector<std::string_view> messages = {"aem", "apm", "acm"};
+  const std::vector<OptionOfFormats> options = {{"--pass", {"aem", "apm", "ck", "acm", "fk"}},
+                                                {"--epoch", {"aem", "apm", "ck"}},
+                                                {"--time-system", messages},
+                                                {"--inertial-frame", messages},
+                                                {"--body-frame", messages},
+                                                {"--object-name", {"aem", "apm", "ck", "acm", "fk"}},
+                                                {"--object-id", messages},
+                                                {"--originator", messages},
+                                                {"--created", messages},
+                                                {"--gap", {"aem", "ck", "acm"}},
+                                                {"--attitude", {"acm"}},
+                                                {"--at", {"apm"}},
+                                                {"--naif-id", {"ck", "fk"}},
+                                                {"--apid", {kPackets}}};
+  const std::string_view kind = format.substr(0, format.find('-'));
+  for (const OptionOfFormats& its : options) {
+    if (command.count(std::string(its.option)) > 0 && std::ranges::find(its.formats, kind) == its.formats.end()) {
+      throw io::UsageError(fmt::format("{} is of no use to --format {}, only to {}: leave it out", its.option, format,
+                                       fmt::join(its.formats, ", ")));
+    }
+  }
+  if (kind == "acm" && command.count("--gap") > 0 && command.count("--attitude") == 0) {
+    throw io::UsageError("--gap is of the attitude of an acm: give one by --attitude, or leave --gap out");
+  }
+}
 
 /// What is written beside the output: its name with another ending.
 std::string beside_output(const ExportArguments& arguments, const char* ending) {
@@ -235,6 +270,11 @@ void export_calibration(const ExportArguments& arguments, const Common& common) 
     io::CalibrationContext context;
     context.attitude = attitude ? &*attitude : nullptr;
     context.pass = pass ? &pass->pass().settings : nullptr;
+    if (attitude) {
+      const Duration gap =
+          arguments.gap.empty() ? io::usual_gap(attitude->attitude) : io::parse_duration(arguments.gap);
+      context.manoeuvres = io::slews_of(attitude->attitude, gap);
+    }
     context.covariance_file = std::filesystem::path(summary.written[1]).filename().string();
     const std::string text =
         io::format_acm(calibration, context, description, xml ? io::MessageSyntax::kXml : io::MessageSyntax::kKvn);
@@ -252,9 +292,6 @@ void export_calibration(const ExportArguments& arguments, const Common& common) 
 }
 
 void export_pass(const ExportArguments& arguments, const Common& common) {
-  if (!arguments.epoch.pass.empty() || !arguments.epoch.epoch.empty()) {
-    throw io::UsageError("--pass and --epoch are for an attitude; FILE is the pass that packets are made of");
-  }
   const io::LoadedPass loaded = io::read_pass(arguments.file);
   log_pass(common.log, arguments.file, loaded);
   const Pass& pass = loaded.pass;
@@ -369,11 +406,9 @@ void add_export(CLI::App& program, const Common& common, int& exit_status) {
       "trihedron export out/calibration.json --format acm -o out.acm --pass pass.nc --attitude a.csv\n"
       "trihedron export out/calibration.json --format fk -o gyros.tf --object-name RESURS-DK1\n"
       "trihedron export pass.nc --format packets -o telemetry.ccsds  # read again by telemetry.toml");
-  command->callback([&common, &exit_status, arguments] {
+  command->callback([&common, &exit_status, arguments, command] {
+    expect_of_format(*command, arguments->format);
     expect_places(*arguments);
-    if (!arguments->at.empty() && !arguments->format.starts_with("apm")) {
-      throw io::UsageError("--at is for apm, which is of one epoch");
-    }
     if (arguments->format == kPackets) {
       export_pass(*arguments, common);
     } else if (arguments->format.starts_with("acm") || arguments->format == "fk") {

@@ -195,6 +195,10 @@ void import_calibration(const ImportArguments& arguments, const Common& common, 
                     message.covariance_file.empty() ? "the message names no covariance file"
                                                     : fmt::format("{} is not there", message.covariance_file.string()));
   }
+  if (!message.manoeuvres.empty()) {
+    written += fmt::format("; of its {} manoeuvre{} a calibration says nothing", message.manoeuvres.size(),
+                           message.manoeuvres.size() == 1 ? "" : "s");
+  }
   put_imported(arguments, io::format_calibration(message.calibration));
   show_interchange(beside(arguments.output, common), {arguments.file,
                                                       message.format,
@@ -235,7 +239,7 @@ void add_import(CLI::App& program, const Common& common, int& exit_status) {
   arguments->time_system = "TAI";
   CLI::App* command = program.add_subcommand("import",
                                              "Read others' telemetry by a telemetry.toml, another software's attitude "
-                                             "(CCSDS AEM, APM), or a calibration (ACM)");
+                                             "(CCSDS AEM, APM, SPICE CK), or a calibration (ACM)");
   command
       ->add_option("FILE", arguments->file, "telemetry.toml or pass; or message, as text or XML, - for standard input")
       ->required();

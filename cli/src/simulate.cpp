@@ -35,7 +35,8 @@ sim::SimulatedPass simulated_by(const Scenario& scenario, const std::string& nam
 void simulate_pass(const std::filesystem::path& scenario_file, const std::string& name,
                    const std::filesystem::path& pass, const Common& common) {
   const Scenario scenario = io::read_scenario(scenario_file);
-  const std::vector<std::filesystem::path> inputs = {scenario_file, io::recorded_attitude_of(scenario_file)};
+  std::vector<std::filesystem::path> inputs = io::files_of_scenario(scenario_file);
+  inputs.push_back(scenario_file);
   std::vector<std::filesystem::path> outputs = io::files_of_pass(pass, 1 + scenario.further_star_trackers.size());
   outputs.push_back(pass);
   io::expect_apart(inputs, outputs);

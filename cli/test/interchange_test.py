@@ -60,7 +60,7 @@ def test_attitude_of_one_epoch(flown, tmp_path, form):
     refused(run(*export, "--at", (at + datetime.timedelta(seconds=0.1)).isoformat()), WRONG_USAGE, "the nearest is at " + at.isoformat(), "UTC")
     refused(run(*export, "--at", "now"), WRONG_USAGE, "--at: ")
     refused(run("export", flown / "a.csv", "--format", "aem", "-o", tmp_path / "a", "--pass", flown / "pass", "--at", at.isoformat()), WRONG_USAGE,
-            "--at is for apm")
+            "--at", "only to apm")
     assert not (tmp_path / "a").exists()
 
 
@@ -75,11 +75,12 @@ def test_a_message_is_an_attitude_wherever_one_is_taken(flown, tmp_path):
     rows = "".join(f"{t},0,0,0.6,0.8\n" for t in range(-1, 243))
     (tmp_path / "rest.csv").write_text("t_s,q_x,q_y,q_z,q_w\n" + rows)
     done("export", tmp_path / "rest.csv", "--format", "aem-xml", "-o", tmp_path / "rest.xml", "--pass", flown / "pass")
-    for form in ("csv", "xml"):
+    done("export", tmp_path / "rest.csv", "--format", "ck", "-o", tmp_path / "rest.bc", "--pass", flown / "pass")
+    for form in ("csv", "xml", "bc"):
         (tmp_path / f"{form}.toml").write_text(SCENARIO + f'[attitude]\nreference = "recorded"\nrecorded = "rest.{form}"\n')
         done("simulate", tmp_path / f"{form}.toml", "-o", tmp_path / form)
-    truth = [(tmp_path / form / "truth.csv").read_bytes() for form in ("csv", "xml")]
-    assert truth[0] == truth[1] and len(truth[0].splitlines()) > 2
+    truth = [(tmp_path / form / "truth.csv").read_bytes() for form in ("csv", "xml", "bc")]
+    assert truth[0] == truth[1] == truth[2] and len(truth[0].splitlines()) > 2
 
 
 def test_streams(flown, tmp_path):
@@ -114,6 +115,36 @@ def test_wrong_options_are_refused(flown, tmp_path, arguments, words):
     epoch = ("--epoch", "2009-05-20T00:00:00") if "--epoch" not in arguments else ()
     refused(run("export", flown / "a.csv", "-o", tmp_path / "a.aem", *given, *epoch, *arguments), WRONG_USAGE, *words)
     assert not (tmp_path / "a.aem").exists()
+
+
+def test_a_c_kernel_is_an_attitude_wherever_one_is_taken(flown, tmp_path):
+    done("export", flown / "a.csv", "--format", "ck", "-o", tmp_path / "a.bc", "--pass", flown / "pass")
+    said = json.loads(done("--json", "import", tmp_path / "a.bc", "-o", tmp_path / "b.csv", "--pass", flown / "pass").stdout)
+    assert said["epochs"] == len(numbers(flown / "a.csv")) and said["inertial_frame"] == "J2000"
+    for row, back in zip(numbers(flown / "a.csv"), numbers(tmp_path / "b.csv"), strict=True):
+        assert back == pytest.approx(row, rel=0, abs=1e-12)  # of twelve decimals, normalised
+    of_truth = [json.loads(done("--json", "evaluate", flown / "pass", "--attitude", flown / "a.csv", *truth).stdout)
+                for truth in ((), ("--truth", flown / "pass" / "truth.csv"), ("--truth", tmp_path / "a.bc"))]
+    assert of_truth[0] == of_truth[1]
+    assert list(of_truth[2]["whole"]["max"].values()) == pytest.approx([0, 0, 0], abs=1e-11)
+    (tmp_path / "a.tsc").unlink()
+    refused(run("import", tmp_path / "a.bc", "-o", tmp_path / "b.csv"), INPUT_REFUSED, "a.tsc is not there")
+    refused(run("evaluate", flown / "pass", "--attitude", flown / "a.csv", "--truth", tmp_path / "b"), INPUT_REFUSED)
+
+
+@pytest.mark.parametrize("form, option, value, of", [
+    ("aem", "--at", "2009-05-20T00:00:00", "apm"), ("apm", "--gap", "1s", "aem, ck, acm"), ("ck", "--time-system", "UTC", "aem, apm, acm"),
+    ("ck", "--apid", "40", "packets"), ("aem-xml", "--naif-id", "-28380", "ck, fk"), ("fk", "--attitude", "a.csv", "acm"),
+    ("fk", "--epoch", "2009-05-20T00:00:00", "aem, apm, ck"), ("acm-xml", "--naif-id", "-28380", "ck, fk"),
+    ("packets", "--body-frame", "SC_BODY_1", "aem, apm, acm"), ("packets", "--object-name", "X", "aem, apm, ck, acm, fk")])
+def test_options_of_other_formats_are_refused(flown, tmp_path, form, option, value, of):
+    of_calibration = form in ("acm-xml", "fk")
+    file = flown / "pass" if form == "packets" else flown / "out" / "calibration.json" if of_calibration else flown / "a.csv"
+    epoch = () if of_calibration or form == "packets" else ("--pass", flown / "pass")
+    refused(run("export", file, "--format", form, "-o", tmp_path / "x", *epoch, option, value), WRONG_USAGE, f"{option} is of no use to --format {form}",
+            f"only to {of}: leave it out")
+    refused(run("export", flown / "out" / "calibration.json", "--format", "acm", "-o", tmp_path / "x", "--gap", "1s"), WRONG_USAGE, "--attitude")
+    assert not list(tmp_path.iterdir())
 
 
 @pytest.mark.parametrize("naif_id", ["0", "5", "-2000001"])

@@ -10,6 +10,7 @@ import argparse
 import collections
 import concurrent.futures
 import json
+import math
 import os
 import pathlib
 import random
@@ -68,6 +69,7 @@ class Originals:
             self.run("export", "out/calibration.json", "--format", form, "-o", f"calibration.{form}", "--attitude", "attitude.csv")
         for form in ("aem", "aem-xml", "apm", "apm-xml"):
             self.run("export", "attitude.csv", "--format", form, "-o", f"attitude.{form}", "--pass", "pass", "--time-system", "UTC")
+        self.run("export", "attitude.csv", "--format", "ck", "-o", "attitude.bc", "--pass", "pass")
         for name in ("pass", "four"):
             (directory / f"{name}_packets").mkdir()
             self.run("export", name, "--format", "packets", "-o", f"{name}_packets/telemetry.ccsds")
@@ -82,10 +84,25 @@ class Originals:
         (directory / "recorded.toml").write_text(SHORT.format(seed=1) +
                                                  '[attitude]\nreference = "recorded"\nrecorded = "attitude.csv"\n')
 
+        (directory / "orbit.oem").write_text(round_orbit())
+        (directory / "orbit.toml").write_text(SHORT.format(seed=1) + '[orbit]\nephemeris = "orbit.oem"\n')
+
     def run(self, *arguments):
         done = subprocess.run([self.program, "--quiet", *arguments], cwd=self.directory, capture_output=True, text=True, timeout=60)
         if done.returncode not in (TRUSTWORTHY, DO_NOT_USE):
             raise SystemExit(f"cannot make the inputs: trihedron {' '.join(arguments)}: status {done.returncode}: {done.stderr}")
+
+
+def round_orbit():
+    """An OEM from five minutes before the epoch of a scenario on, for forty minutes."""
+    lines = ["CCSDS_OEM_VERS = 2.0", "CREATION_DATE = 2026-01-02T03:04:05", "ORIGINATOR = TEST", "META_START", "OBJECT_NAME = TEST",
+             "OBJECT_ID = 2026-001A", "CENTER_NAME = EARTH", "REF_FRAME = EME2000", "TIME_SYSTEM = TAI", "START_TIME = 2009-05-19T23:55:00",
+             "STOP_TIME = 2009-05-20T00:35:00", "INTERPOLATION = LAGRANGE", "INTERPOLATION_DEGREE = 7", "META_STOP"]
+    for minute in range(-5, 36):
+        angle = 1.0780076e-3 * 60 * minute
+        stamp = f"2009-05-20T00:{minute:02d}:00" if minute >= 0 else f"2009-05-19T23:{60 + minute:02d}:00"
+        lines.append(f"{stamp} {7000 * math.cos(angle):.9f} {7000 * math.sin(angle):.9f} 0 {-7.546 * math.sin(angle):.12f} {7.546 * math.cos(angle):.12f} 0")
+    return "\n".join(lines) + "\n"
 
 
 # Mutations that know something of a binary format; each takes and returns bytes.
@@ -212,6 +229,7 @@ TARGETS = [
     *[Target(f"{scenario}.toml", spoil_text, ["attitude.csv"], [
         ("simulate", f"{{in}}/{scenario}.toml", "-o", "{out}/pass"), ("simulate", f"{{in}}/{scenario}.toml", "-o", "{out}/pass.nc"),
         ("observe", f"{{in}}/{scenario}.toml")]) for scenario in ("every", "every", "four", "recorded")],
+    Target("orbit.oem", spoil_text, ["orbit.toml"], [("simulate", "{in}/orbit.toml", "-o", "{out}/pass")]),
     Target("attitude.csv", spoil_table, ["pass", "recorded.toml"], [
         ("evaluate", "{in}/pass", "--attitude", "{in}/attitude.csv"),
         ("simulate", "{in}/recorded.toml", "-o", "{out}/pass")]),
@@ -219,9 +237,14 @@ TARGETS = [
         ("import", f"{{in}}/attitude.{form}", "-o", "{out}/a.csv"), ("--json", "import", f"{{in}}/attitude.{form}", "-o", "{out}/a.csv"),
         ("evaluate", "{in}/pass", "--attitude", f"{{in}}/attitude.{form}"),
         ("export", f"{{in}}/attitude.{form}", "--format", "ck", "-o", "{out}/a.bc")]) for form in ("aem", "aem-xml", "apm", "apm-xml")],
+    *[Target(f"attitude.{ending}", spoil, ["pass", f"attitude.{other}"], [
+        ("import", "{in}/attitude.bc", "-o", "{out}/a.csv"), ("evaluate", "{in}/pass", "--attitude", "{in}/attitude.bc"),
+        ("export", "{in}/attitude.bc", "--format", "aem", "-o", "{out}/a.aem")])
+      for ending, spoil, other in (("bc", spoil_bytes, "tsc"), ("tsc", spoil_text, "bc"))],
     *[Target(f"calibration.{form}", spoil_text, ["calibration.covariance.nc"], [
         ("import", f"{{in}}/calibration.{form}", "-o", "{out}/c.json"),
         ("--json", "import", f"{{in}}/calibration.{form}", "-o", "{out}/c.json")]) for form in ("acm", "acm-xml")],
+    Target("calibration.covariance.nc", spoil_netcdf, ["calibration.acm"], [("import", "{in}/calibration.acm", "-o", "{out}/c.json")]),
     Target("attitude.csv", spoil_table, ["pass"], [
         ("export", "{in}/attitude.csv", "--format", form, "-o", "{out}/a.x", "--pass", "{in}/pass") for form in ("aem", "aem-xml", "ck")]),
     Target("calibration.json", spoil_text, ["pass", "attitude.csv"], [

@@ -317,7 +317,7 @@ void Application<Estimator>::note_navigated(const StepReport& report) {
     const Eigen::Vector3d off =
         (report.navigated->C_in_c.inverse() * Rot<In, C>::assume(fix.q_in_c.normalized())).log().raw();
     Eigen::Vector3d white = off;
-    const Eigen::Matrix3d noise = fix_noise(on_board_.estimator().setup(), fix.head);
+    const Eigen::Matrix3d noise = fix_noise(on_board_.estimator().setup(), fix);
     const Eigen::Matrix3d root = cholesky_root<3>(report.navigated->covariance_rad2 + noise);
     solve_factorized(matrix_of(root), white);
     navigation_residuals_.add(off.dot(white) / 3);

@@ -27,8 +27,13 @@ FixBySharedStates fix_by_shared_states(const CalibrationSetup& setup, const Star
   return by;
 }
 
-Eigen::Matrix3d fix_noise(const CalibrationSetup& setup, int head) {
-  const StarTrackerSetup& its = setup.star_trackers[static_cast<std::size_t>(head)];
+Eigen::Matrix3d fix_noise(const CalibrationSetup& setup, const StarFix& fix) {
+  const StarTrackerSetup& its = setup.star_trackers[static_cast<std::size_t>(fix.head)];
+  if (fix.covariance.is_told()) {
+    const Eigen::Matrix3d told = fix.covariance.matrix();
+    const auto factor = setup.over_told_covariance.asDiagonal();
+    return fix.head == 0 ? Eigen::Matrix3d(factor * told * factor) : told;
+  }
   const Eigen::Matrix3d root = its.C_c_s * its.noise_rad.asDiagonal();
   return root * root.transpose();
 }

@@ -108,8 +108,13 @@ void PaperEstimator::update_covariance_to_now(const QuasiInertial& now) {
 }
 
 auto PaperEstimator::measure(const Gyros& gyros, const QuasiInertial& qi, const Eigen::Matrix3d& C_in_c,
-                             const Directions& h_b, const CalibrationSetup& setup) -> Measurement {
+                             const Directions& h_b, const CalibrationSetup& setup, const FixCovariance& covariance)
+    -> Measurement {
   // y = Δh − (C_in_c δ) × h + noise
+  Eigen::Matrix3d fix_root = setup.star_trackers[0].noise_rad.asDiagonal();
+  if (covariance.is_told()) {
+    fix_root = setup.over_told_covariance.asDiagonal() * cholesky_root<3>(covariance.matrix());
+  }
   Measurement measurement;
   Eigen::Matrix<double, kMeasurements, 3 + 3 * kGyros> noise =
       Eigen::Matrix<double, kMeasurements, 3 + 3 * kGyros>::Zero();
@@ -120,7 +125,7 @@ auto PaperEstimator::measure(const Gyros& gyros, const QuasiInertial& qi, const 
     measurement.innovation.segment<2>(row) = qi.components[k] * (reference_in - gyros[k].h_in);
     measurement.H.block<2, 2>(row, row).setIdentity();
     measurement.H.block<2, 3>(row, States::alignment(k)) = cross_h * C_in_c;
-    noise.block<2, 3>(row, 0) = cross_h * C_in_c * setup.star_trackers[0].noise_rad.asDiagonal();
+    noise.block<2, 3>(row, 0) = cross_h * C_in_c * fix_root;
     noise.block<2, 3>(row, 3 + 3 * k) = setup.readout_noise_rad[k] * cross_h;
   }
   measurement.R = noise * noise.transpose();
@@ -170,7 +175,7 @@ FixReport PaperEstimator::take(const StarFix& fix, const FixReadings& readings) 
   } else {
     qi_ = now;
   }
-  const Measurement measurement = measure(gyros_, now, C_in_c, readings.h_b, setup_);
+  const Measurement measurement = measure(gyros_, now, C_in_c, readings.h_b, setup_, fix.covariance);
   ComparedRows<kMaxStates> rows(kMeasurements, kMaxStates + 1);
   rows << measurement.H, measurement.innovation;
   ComponentCovariance L = measurement.R;

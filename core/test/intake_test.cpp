@@ -273,6 +273,23 @@ TEST(FixQueue, GivesFixesInTheOrderOfTheirTimes) {
   EXPECT_EQ(queue.size(), 0);
 }
 
+TEST(FixQueue, KeepsTheCovarianceOfEachFix) {
+  FixQueue<1, true> queue;
+  for (const double t_s : {3.0, 1.0, 2.0}) {
+    EXPECT_EQ(queue.push({second(t_s), Eigen::Quaterniond::Identity(), 0, {{t_s, 0, 0, 0, 0, -t_s}}}),
+              FixStatus::kPending);
+  }
+  for (const double t_s : {1.0, 2.0, 3.0}) {
+    const StarFix fix = queue.pop();
+    EXPECT_EQ(fix.covariance.rad2.front(), t_s);
+    EXPECT_EQ(fix.covariance.rad2.back(), -t_s);
+  }
+  // Where there is no room for them, none is told.
+  FixQueue<1> without;
+  EXPECT_EQ(without.push({second(1), Eigen::Quaterniond::Identity(), 0, {{1, 1, 1, 0, 0, 0}}}), FixStatus::kPending);
+  EXPECT_FALSE(without.pop().covariance.is_told());
+}
+
 TEST(FixQueue, HasRoomForSoMany) {
   FixQueue<1> queue;
   const Eigen::Quaterniond q = Eigen::Quaterniond::Identity();

@@ -140,10 +140,24 @@ TEST(FixNoise, IsAboutTheAxesOfItsStarTracker) {
   setup.star_trackers[1].noise_rad = {1e-5, 2e-5, 3e-5};
   setup.star_trackers[1].C_c_s = test::turn(0.4, -0.7, 1.1);
   const Eigen::Matrix3d in_s =
-      setup.star_trackers[1].C_c_s.transpose() * fix_noise(setup, 1) * setup.star_trackers[1].C_c_s;
+      setup.star_trackers[1].C_c_s.transpose() * fix_noise(setup, {.head = 1}) * setup.star_trackers[1].C_c_s;
   const Eigen::Matrix3d expected = Eigen::Vector3d(1e-10, 4e-10, 9e-10).asDiagonal();
   EXPECT_LT((in_s - expected).norm(), 1e-24);
-  EXPECT_LT((fix_noise(setup, 0) - 1e-8 * Eigen::Matrix3d::Identity()).norm(), 1e-22);
+  EXPECT_LT((fix_noise(setup, {}) - 1e-8 * Eigen::Matrix3d::Identity()).norm(), 1e-22);
+}
+
+TEST(FixNoise, IsThatOfTheFixWhereItComesWithOne) {
+  CalibrationSetup setup;
+  setup.star_trackers[0].noise_rad = {1, 1, 1};
+  const StarFix fix{.covariance = {{4e-10, 9e-10, 1e-10, 1e-10, -5e-11, 2e-11}}};
+  Eigen::Matrix3d expected;
+  expected << 4e-10, 1e-10, -5e-11, 1e-10, 9e-10, 2e-11, -5e-11, 2e-11, 1e-10;
+  EXPECT_EQ(fix_noise(setup, fix), expected);
+  setup.over_told_covariance = {2, 1, 3};  // found to scatter so much more
+  EXPECT_EQ(fix_noise(setup, fix)(0, 0), 4 * 4e-10);
+  EXPECT_EQ(fix_noise(setup, fix)(0, 2), 6 * -5e-11);
+  EXPECT_EQ(fix_noise(setup, fix)(2, 1), 3 * 2e-11);
+  EXPECT_EQ(fix_noise(setup, {.head = 1, .covariance = fix.covariance}), expected);  // found of the first alone
 }
 
 TEST(FixBySharedStates, IsHowTheFixFollowsThem) {

@@ -22,7 +22,7 @@ using Large = test::FullEstimator;
 const Part kParts[] = {
     {"on-board object", sizeof(PairOnBoard), sizeof(FullOnBoard)},
     {"  intake", sizeof(Intake), sizeof(Intake)},
-    {"  queue of fixes", sizeof(FixQueue<Small::kStarTrackers>), sizeof(FixQueue<Large::kStarTrackers>)},
+    {"  queue of fixes", sizeof(FixQueue<Small::kStarTrackers>), sizeof(FixQueue<Large::kStarTrackers, true>)},
     {"  frozen fixes", sizeof(FrozenFixes<Small::kStarTrackers, Small::Gyros::capacity()>),
      sizeof(FrozenFixes<Large::kStarTrackers, Large::Gyros::capacity()>)},
     {"  readings", sizeof(Readings<Small::Gyros::capacity()>), sizeof(Readings<Large::Gyros::capacity()>)},

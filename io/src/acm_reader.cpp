@@ -8,7 +8,9 @@
 #include <system_error>
 
 #include "acm_keywords.hpp"
+#include "attitude_rules.hpp"
 #include "ccsds_frames.hpp"
+#include "ck_reader.hpp"
 #include "ndm_message.hpp"
 #include "netcdf_input.hpp"
 #include "text_file.hpp"
@@ -55,6 +57,7 @@ class AcmReader {
   CalibrationMessage read() {
     take_metadata();
     take_rows();
+    take_manoeuvres();
     user_ = message_.block("USER");
     if (user_ == nullptr) {
       message_.refuse(message_.end, "the message has no block USER, which holds the calibration",
@@ -184,6 +187,64 @@ class AcmReader {
         }
       }
     }
+  }
+
+  void take_manoeuvres() {
+    constexpr std::array<std::string_view, 11> kKnown = {
+        "MAN_ID",        "MAN_PREV_ID",     "MAN_PURPOSE",      "MAN_BEGIN_TIME",  "MAN_END_TIME",   "MAN_DURATION",
+        "ACTUATOR_USED", "TARGET_MOMENTUM", "TARGET_MOM_FRAME", "TARGET_ATTITUDE", "TARGET_SPINRATE"};
+    for (const NdmBlock& block : message_.blocks) {
+      if (block.name != "MAN") {
+        continue;
+      }
+      for (const auto& [key, entry] : block.entries) {
+        if (std::ranges::find(kKnown, key) == kKnown.end()) {
+          message_.refuse(entry.at, fmt::format("{} is no keyword of MAN of an ACM", in_quotes(key)),
+                          suggestion(key, kKnown));
+        }
+      }
+      static_cast<void>(message_.needed(block, "MAN_PURPOSE"));
+      Manoeuvre its;
+      its.begin = time_of_manoeuvre(block, "MAN_BEGIN_TIME");
+      const bool has_duration = block.entries.contains("MAN_DURATION");
+      const NdmEntry& end = message_.needed(block, has_duration ? "MAN_DURATION" : "MAN_END_TIME");
+      if (has_duration == block.entries.contains("MAN_END_TIME")) {
+        message_.refuse(end.at, "MAN_END_TIME and MAN_DURATION are both there", "keep one of them");
+      }
+      if (has_duration) {
+        const double duration_s = message_.number(block, "MAN_DURATION", "s");
+        if (!limits::kTimeOfCalibration_s.holds(duration_s)) {
+          message_.refuse(end.at, fmt::format("MAN_DURATION is {}", end.value), "give it in seconds");
+        }
+        its.end = its.begin + from_seconds(duration_s);
+      } else {
+        its.end = time_of_manoeuvre(block, "MAN_END_TIME");
+      }
+      if (its.end < its.begin) {
+        message_.refuse(end.at, "the manoeuvre ends before it begins", "correct its times");
+      }
+      if (const auto target = block.entries.find("TARGET_ATTITUDE"); target != block.entries.end()) {
+        const std::vector<std::string_view> words = words_of(target->second.value);
+        Eigen::Quaterniond q(0, 0, 0, 0);
+        for (std::size_t i = 0; i < words.size() && i < 4; ++i) {
+          q.coeffs()(static_cast<int>(i)) = message_.number(words[i], target->second.at);
+        }
+        if (words.size() != 4 || !is_unit(q)) {
+          message_.refuse(target->second.at, fmt::format("TARGET_ATTITUDE is {}", in_quotes(target->second.value)),
+                          "give a unit quaternion, Q1 Q2 Q3 QC");
+        }
+        its.target_q_in_c = q;
+      }
+      result_.manoeuvres.push_back(its);
+    }
+  }
+
+  [[nodiscard]] Time time_of_manoeuvre(const NdmBlock& block, std::string_view key) {
+    const NdmEntry& entry = message_.needed(block, key);
+    if (!entry.units.empty() && entry.units != "s") {
+      message_.refuse(entry.at, fmt::format("the unit of {} is {}", key, in_quotes(entry.units)), "give it in s");
+    }
+    return instant(entry.value, entry.at);
   }
 
   [[nodiscard]] const NdmEntry* optional(std::string_view key) {
@@ -566,6 +627,9 @@ CalibrationMessage parse_calibration_message(std::string_view text, const std::f
 
 std::variant<AttitudeMessage, CalibrationMessage> read_message(const std::filesystem::path& file) {
   const TextFile content(file);
+  if (is_c_kernel(content.text())) {
+    return read_c_kernel(content.text(), file);
+  }
   if (is_calibration_message(content.text())) {
     return parse_calibration_message(content.text(), file);
   }

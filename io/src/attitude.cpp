@@ -8,6 +8,7 @@
 #include <stdexcept>
 
 #include "attitude_rules.hpp"
+#include "ck_reader.hpp"
 #include "csv.hpp"
 #include "text_file.hpp"
 #include "trihedron/io/atomic_file.hpp"
@@ -38,6 +39,9 @@ AttitudeHistory read_attitude(const std::filesystem::path& path, Time epoch) {
 
 AttitudeMessage read_attitude_of_any_format(const std::filesystem::path& path, std::optional<Time> given_epoch) {
   const TextFile content(path);
+  if (is_c_kernel(content.text())) {
+    return read_c_kernel(content.text(), path);
+  }
   if (is_attitude_message(content.text())) {
     return parse_attitude_message(content.text(), path);
   }

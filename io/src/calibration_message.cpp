@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cctype>
+#include <chrono>
 #include <cmath>
 
 #include "acm_keywords.hpp"
@@ -62,6 +63,7 @@ class AcmWriter {
     if (has_covariance()) {
       covariance();
     }
+    manoeuvres();
     determination();
     user_defined();
     text_.put("", "</data>\n</segment>\n");
@@ -82,7 +84,8 @@ class AcmWriter {
     text_.entry("TIME_SYSTEM", name_of(description_.time_scale));
     text_.entry("EPOCH_TZERO", time_.format(calibration_.epoch));
     text_.entry("ACM_DATA_ELEMENTS",
-                fmt::format("{}{}AD, USER", has_attitude() ? "ATT, " : "", has_covariance() ? "COV, " : ""));
+                fmt::format("{}{}{}AD, USER", has_attitude() ? "ATT, " : "", has_covariance() ? "COV, " : "",
+                            context_.manoeuvres.empty() ? "" : "MAN, "));
     Time start = calibration_.t;
     Time stop = calibration_.t;
     if (has_attitude()) {
@@ -140,6 +143,22 @@ class AcmWriter {
       }
     }
     text_.put("COV_STOP\n", "</cov>\n");
+  }
+
+  void manoeuvres() {
+    int number = 0;
+    for (const Manoeuvre& its : context_.manoeuvres) {
+      text_.put("\nMAN_START\n", "<man>\n");
+      text_.entry("MAN_ID", fmt::format("SLEW_{}", ++number));
+      text_.entry("MAN_PURPOSE", "ATT_ADJUST");
+      text_.entry("MAN_BEGIN_TIME", relative(its.begin));
+      text_.entry("MAN_END_TIME", relative(its.end));
+      if (its.target_q_in_c) {
+        const Eigen::Quaterniond& q = *its.target_q_in_c;
+        text_.entry("TARGET_ATTITUDE", fmt::format("{:.15e} {:.15e} {:.15e} {:.15e}", q.x(), q.y(), q.z(), q.w()));
+      }
+      text_.put("MAN_STOP\n", "</man>\n");
+    }
   }
 
   /// As text only: the standard's text, its schema and Orekit name the element of XML differently.
@@ -331,6 +350,36 @@ class AcmWriter {
 };
 
 }  // namespace
+
+std::vector<Manoeuvre> slews_of(const AttitudeHistory& attitude, Duration gap) {
+  constexpr double kLeast_rad_s = 1e-3;
+  constexpr double kTimesUsual = 2;
+  constexpr Duration kSame = std::chrono::minutes(1);
+  std::vector<double> rates_rad_s;  // of the steps; none over a gap
+  for (std::size_t i = 1; i < attitude.size(); ++i) {
+    const Duration step = attitude.t[i] - attitude.t[i - 1];
+    rates_rad_s.push_back(step > gap ? 0
+                                     : attitude.q_in_c[i - 1].angularDistance(attitude.q_in_c[i]) / to_seconds(step));
+  }
+  if (rates_rad_s.empty()) {
+    return {};
+  }
+  std::vector<double> sorted = rates_rad_s;
+  const auto middle = sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2);
+  std::ranges::nth_element(sorted, middle);
+  const double limit_rad_s = std::max(kTimesUsual * *middle, kLeast_rad_s);
+  std::vector<Manoeuvre> slews;
+  for (std::size_t i = 0; i < rates_rad_s.size(); ++i) {
+    if (rates_rad_s[i] > limit_rad_s) {
+      if (slews.empty() || attitude.t[i] - slews.back().end > kSame) {
+        slews.push_back({attitude.t[i], {}, {}});
+      }
+      slews.back().end = attitude.t[i + 1];
+      slews.back().target_q_in_c = attitude.q_in_c[i + 1].normalized();
+    }
+  }
+  return slews;
+}
 
 std::string format_acm(const Calibration& calibration, const CalibrationContext& context,
                        const MessageDescription& description, MessageSyntax syntax) {

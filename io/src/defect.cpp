@@ -50,6 +50,9 @@ Words words(Defect::Kind kind) {
     case kLargeSigma:
       return {"large-sigma", "fix whose sigma is too large or missing", "fixes whose sigma is too large or missing",
               "left out"};
+    case kNoCovariance:
+      return {"no-covariance", "fix without a covariance that can be used",
+              "fixes without a covariance that can be used", "taken with the noise of the settings"};
     case kPacketDamaged:
       return {"packet-damaged", "packet whose CRC is wrong", "packets whose CRC is wrong", "left out"};
     case kPacketsMissing:

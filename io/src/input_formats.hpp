@@ -16,7 +16,7 @@ namespace trihedron::io {
 struct UnscreenedPass {
   PassSettings settings;
   Series gyro;                        ///< columns h1_x, h1_y, h1_z, h2_x …
-  std::vector<Series> star_trackers;  ///< columns q_x, q_y, q_z, q_w; the first head, then the further ones
+  std::vector<Series> star_trackers;  ///< columns q_x, q_y, q_z, q_w, covariances; the first head, then the rest
   std::filesystem::path prior_file;   ///< that the settings name; empty where they name none
   // Of telemetry.toml alone.
   std::vector<Defect> left_out{};                ///< rows that its flags and sigmas have taken out
@@ -31,6 +31,7 @@ struct UnscreenedPass {
 [[nodiscard]] UnscreenedPass read_raw_netcdf(const std::filesystem::path& file);
 /// A telemetry.toml, which says where others' files have the columns.
 [[nodiscard]] UnscreenedPass read_raw_telemetry(const std::filesystem::path& file);
+[[nodiscard]] UnscreenedPass read_raw_telemetry(const std::filesystem::path& file, const ReadParquet& parquet);
 [[nodiscard]] bool is_telemetry_map(const std::filesystem::path& path);
 
 struct InputFormat {

@@ -153,11 +153,13 @@ void NetcdfReader::check_time_units(const std::string& group, int id, int variab
   }
 }
 
-void NetcdfReader::check_no_units(const std::string& group, int id, int variable, const std::string& name) const {
+void NetcdfReader::check_units(const std::string& group, int id, int variable, const std::string& name) const {
   const std::optional<std::string> units = text_attribute(id, variable, "units");
-  if (units && *units != "1" && !units->empty()) {
+  const bool is_covariance = std::ranges::count(covariance_names(), name) > 0;
+  if (units && *units != (is_covariance ? "rad2" : "1") && !units->empty()) {
     refuse(fmt::format("group {}: {} has units {}", in_quotes(group), name, in_quotes(*units)),
-           "direction cosines and quaternions have none: convert the values, and give units \"1\"");
+           is_covariance ? "convert the values to rad², and give units \"rad2\""
+                         : "direction cosines and quaternions have none: convert the values, and give units \"1\"");
   }
 }
 
@@ -251,7 +253,7 @@ Series NetcdfReader::read_group(const std::string& group, Time epoch, ChooseRule
       check_time_units(group, id, ids[i], epoch);
       series.t_s = column;
     } else {
-      check_no_units(group, id, ids[i], present[i].name);
+      check_units(group, id, ids[i], present[i].name);
       for (std::size_t row = 0; row < rows; ++row) {
         series.values[row * width + static_cast<std::size_t>(plan.target[i])] = column[row];
       }

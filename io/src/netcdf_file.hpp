@@ -51,7 +51,7 @@ class NetcdfReader {
   /// Refuses a group that declares more rows than the file can hold of these variables, however it is compressed.
   void check_rows(const std::string& group, int id, std::span<const int> variables, std::size_t rows) const;
   /// Throws InputRefused where a column that is a pure number claims a unit, such as degrees.
-  void check_no_units(const std::string& group, int id, int variable, const std::string& name) const;
+  void check_units(const std::string& group, int id, int variable, const std::string& name) const;
   void read_column(int id, int variable, std::vector<double>& values) const;
   void unpack(int id, int variable, std::vector<double>& values) const;
 

@@ -50,14 +50,15 @@ std::optional<rlim_t> data_bytes_now() {
   return file ? std::optional(pages.back() * static_cast<rlim_t>(::sysconf(_SC_PAGESIZE))) : std::nullopt;
 }
 
-/// What the size of the file explains: of processor time ten seconds for the library to begin with and one for each
-/// megabyte, of memory a quarter of a gigabyte and sixteen times the file.
+/// What the size of the file explains: of processor time two seconds for the library to begin with, a hundred times
+/// what it takes for a small file, and one for each megabyte; of memory a quarter of a gigabyte and sixteen times the
+/// file.
 Limits limits_for(const fs::path& file) {
   std::error_code ignored;
   const std::uintmax_t size = fs::file_size(file, ignored);
   const rlim_t bytes = ignored ? 0 : static_cast<rlim_t>(size);
   const std::optional<rlim_t> now = data_bytes_now();
-  return {10 + (bytes >> 20), now ? *now + (rlim_t{256} << 20) + 16 * bytes : RLIM_INFINITY};
+  return {2 + (bytes >> 20), now ? *now + (rlim_t{256} << 20) + 16 * bytes : RLIM_INFINITY};
 }
 
 /// In the new process: nothing of it is seen outside, and it ends with this one.

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <iterator>
+#include <limits>
 #include <system_error>
 #include <utility>
 
@@ -107,6 +108,40 @@ std::vector<double> quaternion_values(const std::vector<Eigen::Quaterniond>& qua
   return values;
 }
 
+/// Six columns; NaN where it is not told.
+std::vector<double> covariance_values(const std::vector<FixCovariance>& covariances) {
+  std::vector<double> values;
+  values.reserve(covariances.size() * covariance_names().size());
+  for (const FixCovariance& its : covariances) {
+    for (const double value : its.rad2) {
+      values.push_back(its.is_told() ? value : std::numeric_limits<double>::quiet_NaN());
+    }
+  }
+  return values;
+}
+
+/// As a table of the pass has them.
+std::string csv_text(Time epoch, const StarTrackerTelemetry& fixes, int decimals) {
+  if (fixes.covariances.empty()) {
+    return csv_text(epoch, kQuaternionNames, fixes.t, quaternion_values(fixes.q_in_c), decimals);
+  }
+  std::vector<std::string> columns = kQuaternionNames;
+  std::ranges::copy(covariance_names(), std::back_inserter(columns));
+  fmt::memory_buffer out;
+  append_header(out, columns);
+  for (std::size_t i = 0; i < fixes.size(); ++i) {
+    check_stop();
+    const Eigen::Quaterniond& q = fixes.q_in_c[i];
+    fmt::format_to(fmt::appender(out), "{},{:.{}f},{:.{}f},{:.{}f},{:.{}f}", format_seconds(fixes.t[i] - epoch), q.x(),
+                   decimals, q.y(), decimals, q.z(), decimals, q.w(), decimals);
+    for (const double value : fixes.covariances[i].rad2) {
+      fmt::format_to(fmt::appender(out), ",{}", fixes.covariances[i].is_told() ? fmt::to_string(value) : "");
+    }
+    out.push_back('\n');
+  }
+  return fmt::to_string(out);
+}
+
 std::vector<std::string> truth_names(const Truth& truth) {
   std::vector<std::string> names = kQuaternionNames;
   for (std::string& name : direction_names(static_cast<int>(truth.gyros.size()))) {
@@ -139,8 +174,7 @@ void write_directory(StagedDirectory& staged, const Pass& pass, const Truth* tru
   add(kGyroFile, csv_text(epoch, direction_names(pass.gyro.gyros), pass.gyro.t, pass.gyro.h, kGyroDecimals));
   for (std::size_t head = 0; head <= pass.further_star_trackers.size(); ++head) {
     const StarTrackerTelemetry& fixes = star_tracker_of(pass, head);
-    add(star_tracker_name(head) + ".csv",
-        csv_text(epoch, kQuaternionNames, fixes.t, quaternion_values(fixes.q_in_c), kFixDecimals));
+    add(star_tracker_name(head) + ".csv", csv_text(epoch, fixes, kFixDecimals));
   }
   // What the pass that was here before had more is not of this one.
   if (pass.settings.prior) {
@@ -159,6 +193,10 @@ void write_directory(StagedDirectory& staged, const Pass& pass, const Truth* tru
 }
 
 std::string long_name(const std::string& column, bool measured) {
+  if (column.front() == 'c') {
+    return fmt::format("covariance of the error of the fix about the axes {} of c, true = given exp(-error)",
+                       column.substr(4, 2));
+  }
   if (column.front() == 'q') {
     return fmt::format("attitude quaternion from star-tracker to inertial axes, {} component (Hamilton)",
                        column.back());
@@ -173,7 +211,7 @@ std::vector<PackedColumn> columns_of(const std::vector<std::string>& names, cons
   const std::size_t width = names.size();
   std::vector<PackedColumn> columns(width);
   for (std::size_t j = 0; j < width; ++j) {
-    columns[j] = {{names[j], "1", long_name(names[j], measured), {}}, step};
+    columns[j] = {{names[j], names[j].front() == 'c' ? "rad2" : "1", long_name(names[j], measured), {}}, step};
     columns[j].values.reserve(values.size() / width);
     for (std::size_t k = j; k < values.size(); k += width) {
       columns[j].values.push_back(values[k]);
@@ -197,8 +235,12 @@ void write_netcdf(const fs::path& path, const Pass& pass, const Truth* truth, co
                    columns_of(direction_names(pass.gyro.gyros), pass.gyro.h, format.direction_step, true));
   for (std::size_t head = 0; head <= pass.further_star_trackers.size(); ++head) {
     const StarTrackerTelemetry& fixes = star_tracker_of(pass, head);
-    file.write_group(star_tracker_name(head), epoch, fixes.t,
-                     columns_of(kQuaternionNames, quaternion_values(fixes.q_in_c), 0, true));
+    std::vector<PackedColumn> columns = columns_of(kQuaternionNames, quaternion_values(fixes.q_in_c), 0, true);
+    if (!fixes.covariances.empty()) {
+      std::ranges::move(columns_of(covariance_names(), covariance_values(fixes.covariances), 0, true),
+                        std::back_inserter(columns));
+    }
+    file.write_group(star_tracker_name(head), epoch, fixes.t, columns);
   }
   if (truth != nullptr) {
     file.write_group(kTruthGroup, epoch, truth->t, columns_of(truth_names(*truth), truth_values(*truth), 0, false));
@@ -236,6 +278,22 @@ TableInMemory in_memory(std::string name, Time epoch, const std::vector<Time>& t
   TableInMemory table{std::move(name), {}, std::move(values)};
   table.t_s.reserve(t.size());
   std::ranges::transform(t, std::back_inserter(table.t_s), [&](Time at) { return to_seconds(at - epoch); });
+  return table;
+}
+
+TableInMemory fixes_in_memory(std::string name, Time epoch, const StarTrackerTelemetry& fixes) {
+  TableInMemory table = in_memory(std::move(name), epoch, fixes.t, quaternion_values(fixes.q_in_c));
+  table.has_covariances = !fixes.covariances.empty();
+  if (table.has_covariances) {
+    const std::vector<double> quaternions = std::exchange(table.values, {});
+    const std::vector<double> covariances = covariance_values(fixes.covariances);
+    for (std::size_t i = 0; i < fixes.size(); ++i) {
+      const auto q = quaternions.begin() + static_cast<std::ptrdiff_t>(4 * i);
+      const auto covariance = covariances.begin() + static_cast<std::ptrdiff_t>(6 * i);
+      table.values.insert(table.values.end(), q, q + 4);
+      table.values.insert(table.values.end(), covariance, covariance + 6);
+    }
+  }
   return table;
 }
 
@@ -334,11 +392,30 @@ LoadedPass read_pass(const fs::path& path, const Selection& selection) {
   return screened(format->read(path), path, selection);
 }
 
+LoadedPass read_telemetry(const fs::path& file, const ReadParquet& parquet) {
+  check_there(file);
+  return screened(read_raw_telemetry(file, parquet), file, {});
+}
+
 PassInMemory read_tables(const fs::path& directory) {
   check_there(directory);
   UnscreenedPass raw = read_raw_directory(directory);
   const auto table = [](Series&& series) {
     return TableInMemory{std::move(series.name), std::move(series.t_s), std::move(series.values)};
+  };
+  const auto table_of_fixes = [&](Series&& series) {
+    // Variances alone get the covariances that they stand for.
+    const std::size_t width = series.columns.size();
+    std::vector<double> values = series.values;
+    if (width == kQuaternionNames.size() + kVariances) {
+      values.clear();
+      for (std::size_t row = 0; row < series.rows(); ++row) {
+        values.insert(values.end(), series.row(row), series.row(row) + width);
+        values.insert(values.end(), kVariances, 0.0);
+      }
+    }
+    return TableInMemory{std::move(series.name), std::move(series.t_s), std::move(values),
+                         width > kQuaternionNames.size()};
   };
   PassInMemory tables;
   tables.name = directory;
@@ -347,7 +424,7 @@ PassInMemory read_tables(const fs::path& directory) {
   tables.gyros = gyros_of(raw.gyro);
   tables.gyro = table(std::move(raw.gyro));
   for (Series& fixes : raw.star_trackers) {
-    tables.star_trackers.push_back(table(std::move(fixes)));
+    tables.star_trackers.push_back(table_of_fixes(std::move(fixes)));
   }
   return tables;
 }
@@ -373,7 +450,11 @@ LoadedPass screened(PassInMemory tables, const Selection& selection) {
   }
   raw.gyro = series_of(std::move(tables.gyro), direction_names(tables.gyros), tables.name);
   for (TableInMemory& fixes : tables.star_trackers) {
-    raw.star_trackers.push_back(series_of(std::move(fixes), kQuaternionNames, tables.name));
+    std::vector<std::string> columns = kQuaternionNames;
+    if (fixes.has_covariances) {
+      std::ranges::copy(covariance_names(), std::back_inserter(columns));
+    }
+    raw.star_trackers.push_back(series_of(std::move(fixes), std::move(columns), tables.name));
   }
   return screened(std::move(raw), tables.name, selection);
 }
@@ -390,7 +471,7 @@ PassInMemory tables_of(const Pass& pass, double direction_step) {
   }
   for (std::size_t head = 0; head <= pass.further_star_trackers.size(); ++head) {
     const StarTrackerTelemetry& fixes = star_tracker_of(pass, head);
-    tables.star_trackers.push_back(in_memory(star_tracker_name(head), epoch, fixes.t, quaternion_values(fixes.q_in_c)));
+    tables.star_trackers.push_back(fixes_in_memory(star_tracker_name(head), epoch, fixes));
   }
   return tables;
 }

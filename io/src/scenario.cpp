@@ -5,6 +5,7 @@
 #include <array>
 #include <utility>
 
+#include "oem.hpp"
 #include "schemas.hpp"
 #include "settings_tables.hpp"
 #include "text_file.hpp"
@@ -29,8 +30,17 @@ Fields scenario_fields(Scenario& scenario) {
           duration("duration", scenario.duration, limits::kPassDuration_s, "of the pass")};
 }
 
-Fields orbit_fields(OrbitScenario& orbit) {
+Field ephemeris(OrbitScenario& orbit, const fs::path& file, Time epoch) {
+  return {"ephemeris", "in place of the elements: an orbit ephemeris message (CCSDS OEM), beside this file",
+          text_schema, [&orbit, &file, epoch](const TomlTable& table, const toml::node& node) {
+            const fs::path oem = file.parent_path() / table.text(node, "ephemeris");
+            orbit.ephemeris = parse_orbit_message(TextFile(oem).text(), oem, epoch).segments;
+          }};
+}
+
+Fields orbit_fields(OrbitScenario& orbit, const fs::path& file, Time epoch) {
   return {
+      ephemeris(orbit, file, epoch),
       quantity("perigee_altitude", orbit.perigee_altitude_m, kLength, "above the equatorial radius"),
       quantity("apogee_altitude", orbit.apogee_altitude_m, kLength, "above the equatorial radius"),
       quantity("inclination", orbit.inclination_rad, kAngle, "mean element at the start of the pass"),
@@ -77,8 +87,8 @@ Field inertial_attitude(AttitudeScenario& attitude) {
 }
 
 Field recorded_attitude(AttitudeScenario& attitude, const fs::path& file, Time epoch) {
-  return {"recorded", "of reference recorded: an attitude file (CSV), beside this one", text_schema,
-          [&attitude, &file, epoch](const TomlTable& table, const toml::node& node) {
+  return {"recorded", "of reference recorded: an attitude file (CSV), CCSDS AEM or SPICE CK, beside this one",
+          text_schema, [&attitude, &file, epoch](const TomlTable& table, const toml::node& node) {
             const AttitudeHistory history = read_attitude(file.parent_path() / table.text(node, "recorded"), epoch);
             attitude.recorded.clear();
             for (std::size_t i = 0; i < history.size(); ++i) {
@@ -327,13 +337,26 @@ void read_star_trackers(const toml::table& table, const fs::path& file, Scenario
   }
 }
 
-/// In this order: a recorded attitude needs the epoch.
+/// Elements, or an ephemeris.
+Field orbit(Scenario& scenario, const fs::path& file) {
+  Field field = section("orbit", file, "[orbit]", "Kepler's motion with the secular rates of J2, or as it is told",
+                        [&] { return orbit_fields(scenario.orbit, file, scenario.epoch); });
+  field.read = [read = std::move(field.read)](const TomlTable& table, const toml::node& node) {
+    read(table, node);
+    const toml::table& own = *node.as_table();
+    if (own.contains("ephemeris") && own.size() > 1) {
+      table.refuse(node, "\"ephemeris\" and elements of the orbit are both there", "keep one of them");
+    }
+  };
+  return field;
+}
+
+/// In this order: what is read from other files needs the epoch.
 Fields file_fields(Scenario& scenario, const fs::path& file) {
   const auto gyro = [&scenario, &file] { return schema_of(gyro_fields(scenario, scenario.gyros.front(), file)); };
   const auto star_tracker = [&scenario, &file] { return schema_of(star_tracker_fields(scenario, file)); };
   return {section("scenario", file, "[scenario]", "the pass", [&] { return scenario_fields(scenario); }),
-          section("orbit", file, "[orbit]", "Kepler's motion with the secular rates of J2",
-                  [&] { return orbit_fields(scenario.orbit); }),
+          orbit(scenario, file),
           section("attitude", file, "[attitude]", "how the spacecraft is pointed",
                   [&] { return attitude_fields(scenario.attitude, file, scenario.epoch); }),
           {"gyro", "of all gyros", gyro,
@@ -363,11 +386,17 @@ Scenario read_scenario(const fs::path& file) {
   return parse_scenario(content.text(), file);
 }
 
-fs::path recorded_attitude_of(const fs::path& scenario_file) {
+std::vector<fs::path> files_of_scenario(const fs::path& scenario_file) {
   const TextFile content(scenario_file);
   const toml::table document = parse_toml(content.text(), scenario_file);
-  const auto name = document["attitude"]["recorded"].value<std::string>();
-  return name ? scenario_file.parent_path() / *name : fs::path();
+  std::vector<fs::path> files;
+  for (const auto& name :
+       {document["attitude"]["recorded"].value<std::string>(), document["orbit"]["ephemeris"].value<std::string>()}) {
+    if (name) {
+      files.push_back(scenario_file.parent_path() / *name);
+    }
+  }
+  return files;
 }
 
 Json scenario_table_schema() {

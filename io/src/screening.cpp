@@ -8,6 +8,7 @@
 #include <limits>
 #include <utility>
 
+#include "trihedron/records/limits.hpp"
 #include "unusable.hpp"
 
 namespace trihedron::io {
@@ -274,6 +275,21 @@ void screen_one_gyro(const Series& series, const Kept& kept, std::size_t gyro, s
   silent.report(defects);
 }
 
+/// Of a row of a star tracker, whose quaternion comes first; not told where it is no covariance, or an impossible one.
+FixCovariance covariance_of(const double* row, std::size_t columns) {
+  constexpr std::size_t kQuaternion = 4;
+  constexpr double kLeastDeterminant = 1e-9;  // of the correlations: rounding alone leaves less of a singular matrix
+  FixCovariance its;
+  std::copy_n(row + kQuaternion, columns - kQuaternion, its.rad2.begin());
+  const Eigen::Matrix3d covariance = its.matrix();
+  const Eigen::Vector3d sigma = covariance.diagonal().cwiseSqrt();
+  const Eigen::Matrix3d correlation = covariance.cwiseQuotient(sigma * sigma.transpose());
+  const bool is_usual =
+      std::ranges::all_of(sigma, [](double value) { return limits::kStarTrackerNoise_rad.holds(value); });
+  const bool is_positive = std::abs(correlation(0, 1)) < 1 && correlation.determinant() > kLeastDeterminant;
+  return is_usual && is_positive ? its : FixCovariance{};
+}
+
 }  // namespace
 
 std::vector<std::size_t> longest_increasing(const std::vector<Time>& t, std::vector<std::size_t> rows) {
@@ -329,6 +345,8 @@ StarTrackerTelemetry screen_star_tracker(Series series, const PassSettings& sett
   check_period(series, kept.t, settings.star_tracker_period, "star_tracker");
   NormTallies norms(series, series.name);
   Tally flips(series, Defect::Kind::kSignFlip, series.name);
+  Tally without(series, Defect::Kind::kNoCovariance, series.name);
+  const std::size_t columns = series.columns.size();
   StarTrackerTelemetry fixes;
   std::size_t usable = 0;
   bool comparable = false;  // over a gap, or after a bad fix, a change of hemisphere can be true motion
@@ -344,6 +362,12 @@ StarTrackerTelemetry screen_star_tracker(Series series, const PassSettings& sett
     comparable = norm == Norm::kGood;
     usable += comparable ? 1 : 0;
     fixes.q_in_c.push_back(q_in_c);
+    if (columns > std::size_t{4}) {
+      fixes.covariances.push_back(covariance_of(row, columns));
+      if (!fixes.covariances.back().is_told()) {
+        without.add(kept.rows[i]);
+      }
+    }
   }
   if (usable == 0) {
     throw InputRefused(series.file, {}, fmt::format("{} has no fix at all that can be used", series.name),
@@ -352,6 +376,7 @@ StarTrackerTelemetry screen_star_tracker(Series series, const PassSettings& sett
   }
   norms.report(defects);
   flips.report(defects);
+  without.report(defects);
   fixes.t = std::move(kept.t);
   return fixes;
 }

@@ -60,8 +60,23 @@ ColumnRules gyro_columns(const fs::path& file, std::span<const ColumnName> prese
   return {direction_names(count_gyros(file, present)), {}};
 }
 
-ColumnRules star_tracker_columns(const fs::path& /*file*/, std::span<const ColumnName> /*present*/) {
-  return {kQuaternion, {}};
+const std::vector<std::string>& covariance_names() {
+  static const std::vector<std::string> names = {"cov_xx_rad2", "cov_yy_rad2", "cov_zz_rad2",
+                                                 "cov_xy_rad2", "cov_xz_rad2", "cov_yz_rad2"};
+  return names;
+}
+
+ColumnRules star_tracker_columns(const fs::path& /*file*/, std::span<const ColumnName> present) {
+  const std::vector<std::string>& names = covariance_names();
+  std::size_t needed = 0;
+  for (std::size_t i = 0; i < names.size(); ++i) {
+    if (std::ranges::count(present, names[i], &ColumnName::name) > 0) {
+      needed = i < kVariances ? std::max(needed, kVariances) : names.size();
+    }
+  }
+  ColumnRules rules{kQuaternion, {}};
+  rules.required.insert(rules.required.end(), names.begin(), names.begin() + static_cast<std::ptrdiff_t>(needed));
+  return rules;
 }
 
 ColumnRules truth_columns(const fs::path& file, std::span<const ColumnName> present) {

@@ -35,6 +35,11 @@ ColumnRules attitude_columns(const std::filesystem::path& file, std::span<const 
 /// "h1_x", "h1_y", "h1_z", "h2_x" …
 [[nodiscard]] std::vector<std::string> direction_names(int gyros);
 
+/// Of the covariance of a fix: "cov_xx_rad2", yy, zz, then xy, xz, yz.
+[[nodiscard]] const std::vector<std::string>& covariance_names();
+/// Of them the first three alone may be there: the others are 0 then.
+inline constexpr std::size_t kVariances = 3;
+
 /// Rows exactly as in the file: nothing is left out, and times need not increase.
 struct Series {
   std::filesystem::path file;

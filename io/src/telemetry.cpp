@@ -17,6 +17,7 @@
 #include "telemetry_table.hpp"
 #include "text_file.hpp"
 #include "toml_table.hpp"
+#include "trihedron/core/frames.hpp"
 #include "trihedron/io/time_text.hpp"
 #include "trihedron/records/limits.hpp"
 
@@ -71,8 +72,9 @@ Flag flag_of(const FlagMap& map, Wanted& wanted) {
   return {map.column.empty() ? std::nullopt : std::optional(wanted.place(map.column)), map.good};
 }
 
-ForeignTable read_table(const TableMap& map, const fs::path& directory, const Wanted& wanted) {
-  ForeignTable table = read_foreign_table(map, directory, {map.time_column}, wanted.names());
+ForeignTable read_table(const TableMap& map, const fs::path& directory, const Wanted& wanted,
+                        const ReadParquet& parquet) {
+  ForeignTable table = read_foreign_table(map, directory, {map.time_column}, wanted.names(), parquet);
   if (table.rows() > 0 && std::ranges::all_of(table.stamps.front(), [](Time t) { return t == kNoTime; })) {
     throw InputRefused(table.file, {table.first_line, 0},
                        fmt::format("not one value of column \"{}\" is a time", map.time_column),
@@ -164,8 +166,10 @@ Series gyro_series(const GyroSource& source, Time epoch, std::vector<Defect>& de
 
 struct StarTrackerSource {
   std::vector<Part> quaternion;  ///< x, y, z, w of q_in_c
-  std::vector<Part> sigma;       ///< empty where there is none
+  std::vector<Part> sigma;       ///< empty where there is none; of a covariance the diagonal
   bool is_variance = false;
+  std::vector<Part> covariance;                         ///< xy, xz, yz; empty where there is none
+  Eigen::Matrix3d C_c_s = Eigen::Matrix3d::Identity();  ///< from the axes of the head, as designed
   double largest_sigma_rad = std::numeric_limits<double>::infinity();
   Flag flag;
   ForeignTable table;
@@ -180,6 +184,17 @@ struct StarTrackerSource {
     }
     return result;
   }
+  /// Of its error, c axes.
+  [[nodiscard]] Eigen::Matrix3d covariance_rad2(std::size_t row) const {
+    Eigen::Matrix3d its = sigma_rad(row).cwiseAbs2().asDiagonal();
+    constexpr std::array<std::array<int, 2>, 3> kPlaces = {{{0, 1}, {0, 2}, {1, 2}}};
+    for (std::size_t i = 0; i < covariance.size(); ++i) {
+      const auto [a, b] = kPlaces[i];
+      its(a, b) = covariance[i].factor * table.numbers[covariance[i].place][row];
+      its(b, a) = its(a, b);
+    }
+    return C_c_s * its * C_c_s.transpose();
+  }
   [[nodiscard]] bool is_sure(std::size_t row) const {
     if (sigma.empty()) {
       return true;
@@ -189,8 +204,9 @@ struct StarTrackerSource {
   }
 };
 
-StarTrackerSource read_star_tracker(const StarTrackerMap& map, const ReadTable& read) {
+StarTrackerSource read_star_tracker(const StarTrackerMap& map, const Eigen::Matrix3d& C_c_s, const ReadTable& read) {
   StarTrackerSource source;
+  source.C_c_s = C_c_s;
   Wanted wanted;
   source.quaternion = wanted.parts(map.quaternion, 1 / map.counts_per_unit);
   if (map.scalar_first) {
@@ -201,6 +217,12 @@ StarTrackerSource read_star_tracker(const StarTrackerMap& map, const ReadTable& 
   }
   source.sigma = wanted.parts(map.sigma, map.sigma_unit_rad);
   source.is_variance = map.is_variance;
+  if (!map.covariance.empty()) {
+    const auto off_diagonal = map.covariance.begin() + kVariances;
+    source.sigma = wanted.parts({map.covariance.begin(), off_diagonal}, map.sigma_unit_rad);
+    source.is_variance = true;
+    source.covariance = wanted.parts({off_diagonal, map.covariance.end()}, map.sigma_unit_rad * map.sigma_unit_rad);
+  }
   source.largest_sigma_rad = map.largest_sigma_rad.value_or(source.largest_sigma_rad);
   source.flag = flag_of(map.flag, wanted);
   source.table = read(map, wanted);
@@ -209,7 +231,11 @@ StarTrackerSource read_star_tracker(const StarTrackerMap& map, const ReadTable& 
 
 Series star_tracker_series(const StarTrackerSource& source, Time epoch, std::vector<Defect>& defects) {
   const ForeignTable& table = source.table;
-  Series series = series_of(table, epoch, {"q_x", "q_y", "q_z", "q_w"});
+  std::vector<std::string> columns = {"q_x", "q_y", "q_z", "q_w"};
+  if (!source.sigma.empty()) {
+    std::ranges::copy(covariance_names(), std::back_inserter(columns));
+  }
+  Series series = series_of(table, epoch, std::move(columns));
   std::vector<bool> is_good;
   std::vector<bool> is_sure;  // of those that are good
   for (std::size_t row = 0; row < table.rows(); ++row) {
@@ -219,6 +245,10 @@ Series star_tracker_series(const StarTrackerSource& source, Time epoch, std::vec
     }
     for (const Part& part : source.quaternion) {
       series.values.push_back(table.numbers[part.place][row] * part.factor);
+    }
+    if (!source.sigma.empty()) {
+      const Eigen::Matrix3d its = source.covariance_rad2(row);
+      series.values.insert(series.values.end(), {its(0, 0), its(1, 1), its(2, 2), its(0, 1), its(0, 2), its(1, 2)});
     }
   }
   leave_out(
@@ -378,7 +408,9 @@ bool is_telemetry_toml(const fs::path& file) {
 
 bool is_telemetry_map(const fs::path& path) { return path.extension() == ".toml"; }
 
-UnscreenedPass read_raw_telemetry(const fs::path& file) {
+UnscreenedPass read_raw_telemetry(const fs::path& file) { return read_raw_telemetry(file, {}); }
+
+UnscreenedPass read_raw_telemetry(const fs::path& file, const ReadParquet& parquet) {
   const TextFile text(file);
   const fs::path directory = file.parent_path();
   TelemetryToml told = parse_telemetry_toml(text.text(), file, directory);
@@ -390,7 +422,7 @@ UnscreenedPass read_raw_telemetry(const fs::path& file) {
   raw.selection.to = map.to;
   for (const IntervalMap& intervals : map.exclude) {
     raw.sources.push_back(directory / intervals.file);
-    std::ranges::copy(read_intervals(intervals, directory), std::back_inserter(raw.selection.exclude));
+    std::ranges::copy(read_intervals(intervals, directory, parquet), std::back_inserter(raw.selection.exclude));
   }
   PacketTables packets;
   if (map.packets) {
@@ -406,12 +438,17 @@ UnscreenedPass read_raw_telemetry(const fs::path& file) {
       return std::move(packets.tables.at(given++));
     }
     raw.sources.push_back(directory / table.file);
-    return read_table(table, directory, wanted);
+    return read_table(table, directory, wanted, parquet);
   };
   const GyroSource gyros = read_gyros(map.gyro, read);
   std::vector<StarTrackerSource> heads;
   for (const StarTrackerMap& head : map.star_trackers) {
-    heads.push_back(read_star_tracker(head, read));
+    Eigen::Matrix3d C_c_s = Eigen::Matrix3d::Identity();
+    if (!heads.empty()) {
+      const FurtherStarTracker& its = raw.settings.further_star_trackers.at(heads.size() - 1);
+      C_c_s = Rot<C, C>::exp(Vec<C>::assume(its.mounting_rotation_vector_rad)).raw();
+    }
+    heads.push_back(read_star_tracker(head, C_c_s, read));
   }
   raw.columns = columns_read(map);
   measure(raw.settings, gyros, heads.front(), file);

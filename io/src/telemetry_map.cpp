@@ -268,7 +268,7 @@ Fields gyro_fields(GyroMap& map, const fs::path& file) {
 }
 
 Field unit_of_sigma(double& unit_rad) {
-  return choice("sigma_unit", unit_rad, "of sigma; variances are in its square",
+  return choice("sigma_unit", unit_rad, "of sigma; variances and covariances are in its square",
                 {{"deg", units::kDegree},
                  {"arcmin", units::kArcMinute},
                  {"arcsec", units::kArcSecond},
@@ -290,6 +290,8 @@ Fields star_tracker_fields(StarTrackerMap& map, const fs::path& file) {
                                 {{"tracker-to-inertial", false}, {"inertial-to-tracker", true}})),
                 counts(map.counts_per_unit),
                 column_names("sigma", map.sigma, 3, "columns of each fix's 1-sigma about the axes x, y, z of the head"),
+                column_names("covariance", map.covariance, 6,
+                             "columns of each fix's covariance about the axes of the head: xx, yy, zz, xy, xz, yz"),
                 choice("sigma_is", map.is_variance, "what these columns hold", {{"sigma", false}, {"variance", true}}),
                 unit_of_sigma(map.sigma_unit_rad),
                 {"largest_sigma_rad", "fixes with a larger one are left out",
@@ -303,14 +305,19 @@ Fields star_tracker_fields(StarTrackerMap& map, const fs::path& file) {
 void check_star_tracker(const StarTrackerMap& map, const TomlTable& table, const toml::node& node) {
   check_flag(map.flag, table, node);
   const toml::table& own = *node.as_table();
-  if (map.sigma.empty() != !own.contains("sigma_unit")) {
-    table.refuse(node, "\"sigma\" and \"sigma_unit\" belong together", "give both, or none");
+  if (!map.sigma.empty() && !map.covariance.empty()) {
+    table.refuse(*own.get("sigma"), "\"sigma\" and \"covariance\" are both there", "name the columns of one of them");
   }
-  for (const char* const key : {"sigma_is", "largest_sigma_rad"}) {
-    if (map.sigma.empty() && own.contains(key)) {
-      table.refuse(*own.get(key), fmt::format("\"{}\" is there without \"sigma\"", key),
-                   "name the columns of the sigmas");
-    }
+  const bool has_noise = !map.sigma.empty() || !map.covariance.empty();
+  if (has_noise != own.contains("sigma_unit")) {
+    table.refuse(node, "\"sigma\" or \"covariance\", and \"sigma_unit\" belong together", "give both, or none");
+  }
+  if (map.sigma.empty() && own.contains("sigma_is")) {
+    table.refuse(*own.get("sigma_is"), "\"sigma_is\" is there without \"sigma\"", "name the columns of the sigmas");
+  }
+  if (!has_noise && own.contains("largest_sigma_rad")) {
+    table.refuse(*own.get("largest_sigma_rad"), "\"largest_sigma_rad\" is there without \"sigma\" or \"covariance\"",
+                 "name the columns of the sigmas");
   }
 }
 
@@ -457,7 +464,8 @@ TelemetryToml parse_telemetry_toml(std::string_view text, const fs::path& file, 
                                    heads - 1, result.map.star_trackers.size() - 1),
                        "give one of each per further head, in the same order");
   }
-  if (told.settings.star_tracker_noise_rad.isZero(0) && result.map.star_trackers.front().sigma.empty()) {
+  if (told.settings.star_tracker_noise_rad.isZero(0) && result.map.star_trackers.front().sigma.empty() &&
+      result.map.star_trackers.front().covariance.empty()) {
     root.refuse(
         root.table_at("star_tracker"), "key \"noise_rad\" is missing in [star_tracker]",
         result.map.packets ? "add it" : "add it, or name the columns of each fix's sigma in [telemetry.star_tracker]");

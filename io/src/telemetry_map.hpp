@@ -65,7 +65,8 @@ struct StarTrackerMap : TableMap {
   bool is_inverse = false;  ///< it maps inertial components to those of the tracker
   double counts_per_unit = 1;
   FlagMap flag;
-  std::vector<std::string> sigma;  ///< 1-sigma about x, y, z of the head; empty: there are none
+  std::vector<std::string> sigma;       ///< 1-sigma about x, y, z of the head; empty: there are none
+  std::vector<std::string> covariance;  ///< in its place: xx, yy, zz, xy, xz, yz about these axes, in that unit squared
   double sigma_unit_rad = 1;
   bool is_variance = false;  ///< `sigma` are variances, in that unit squared
   std::optional<double> largest_sigma_rad;

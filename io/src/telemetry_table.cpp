@@ -28,6 +28,11 @@ bool is_netcdf(const fs::path& file) {
   return extension == ".nc" || extension == ".nc4" || extension == ".cdf";
 }
 
+bool is_parquet(const fs::path& file) {
+  const fs::path extension = file.extension();
+  return extension == ".parquet" || extension == ".pq";
+}
+
 /// A field of a line: its text without blanks and quotation marks around it, and where it begins, from 0.
 struct CsvField {
   std::string_view text;
@@ -179,6 +184,24 @@ ForeignTable read_netcdf_table(const fs::path& file, const TableMap& map, const 
   return table;
 }
 
+ForeignTable read_parquet_table(const fs::path& file, const TableMap& map, const std::vector<std::string>& stamps,
+                                const std::vector<std::string>& numbers, const ReadParquet& parquet) {
+  if (!parquet) {
+    throw InputRefused(file, {}, "is Parquet, for which this program has no library",
+                       "make a pass of it with the Python package (pip install 'trihedron[parquet]'): python3 -c "
+                       "\"import trihedron; trihedron.read_pass('telemetry.toml').to_netcdf('pass.nc')\"");
+  }
+  std::vector<std::string> columns = stamps;
+  columns.insert(columns.end(), numbers.begin(), numbers.end());
+  TableMap as_written;  // commas, names in the first line
+  as_written.stamps = map.stamps;
+  as_written.missing = map.missing;
+  ForeignTable table = parse_foreign_csv(parquet(file, columns), file, as_written, stamps, numbers);
+  table.first_line = 0;  // its rows have no lines
+  table.row_in_file.clear();
+  return table;
+}
+
 }  // namespace
 
 StampReader::StampReader(const Stamps& stamps) : stamps_(stamps), clock_(stamps.scale) {}
@@ -308,8 +331,11 @@ ForeignTable parse_foreign_csv(std::string_view text, const fs::path& file, cons
 }
 
 ForeignTable read_foreign_table(const TableMap& map, const fs::path& directory, const std::vector<std::string>& stamps,
-                                const std::vector<std::string>& numbers) {
+                                const std::vector<std::string>& numbers, const ReadParquet& parquet) {
   const fs::path file = directory / map.file;
+  if (is_parquet(file)) {
+    return read_parquet_table(file, map, stamps, numbers, parquet);
+  }
   return is_netcdf(file) ? read_netcdf_table(file, map, stamps, numbers)
                          : parse_foreign_csv(TextFile(file).text(), file, map, stamps, numbers);
 }

@@ -3,6 +3,9 @@
 #include <fmt/format.h>
 #include <gmock/gmock.h>
 
+#include <algorithm>
+#include <cmath>
+
 #include "fixtures.hpp"
 #include "trihedron/io/calibration.hpp"
 #include "trihedron/io/error.hpp"
@@ -52,6 +55,88 @@ TEST(Acm, HoldsAttitudeAndDiagonalCovariance) {
   EXPECT_THAT(text, Not(HasSubstr("nan")));
   EXPECT_THAT(format_acm(calibration, {&attitude, nullptr, ""}, description(), MessageSyntax::kXml),
               HasSubstr("<covLine>1.500 3.282806e-07"));
+}
+
+/// Ten minutes at the rate of an orbit, with a turn of 20° in 60 s after 200 s, and back after 400 s.
+AttitudeHistory with_slews() {
+  AttitudeHistory attitude;
+  for (int i = 0; i <= 200; ++i) {
+    const double t_s = 3.0 * i;
+    const double part = std::clamp((t_s - 200) / 60, 0.0, 1.0) - std::clamp((t_s - 400) / 60, 0.0, 1.0);
+    attitude.t.push_back(sample_calibration().epoch + from_seconds(t_s));
+    attitude.q_in_c.push_back(Eigen::Quaterniond(Eigen::AngleAxisd(1.1e-3 * t_s, Eigen::Vector3d::UnitY()) *
+                                                 Eigen::AngleAxisd(0.35 * part, Eigen::Vector3d::UnitX())));
+  }
+  return attitude;
+}
+
+TEST(Slews, AreWhereTheBodyTurnsFast) {
+  AttitudeHistory attitude = with_slews();
+  std::vector<Manoeuvre> slews = slews_of(attitude, std::chrono::seconds(5));
+  ASSERT_EQ(slews.size(), 2U);
+  const Time epoch = sample_calibration().epoch;
+  EXPECT_NEAR(to_seconds(slews[0].begin - epoch), 200, 3);
+  EXPECT_NEAR(to_seconds(slews[0].end - epoch), 260, 3);
+  EXPECT_NEAR(to_seconds(slews[1].begin - epoch), 400, 3);
+  const auto after = static_cast<std::size_t>(std::ranges::find(attitude.t, slews[0].end) - attitude.t.begin());
+  EXPECT_EQ(slews[0].target_q_in_c->coeffs(), attitude.q_in_c[after].normalized().coeffs());
+  // Of what happens in a gap nothing is known; in steady flight there is none.
+  const auto cut = [&](double begin_s, double end_s) {
+    for (std::size_t i = attitude.size(); i-- > 0;) {
+      const double t_s = to_seconds(attitude.t[i] - epoch);
+      if (t_s > begin_s && t_s < end_s) {
+        attitude.t.erase(attitude.t.begin() + static_cast<std::ptrdiff_t>(i));
+        attitude.q_in_c.erase(attitude.q_in_c.begin() + static_cast<std::ptrdiff_t>(i));
+      }
+    }
+  };
+  cut(190, 270);
+  EXPECT_EQ(slews_of(attitude, std::chrono::seconds(5)).size(), 1U);
+  cut(390, 1000);
+  EXPECT_TRUE(slews_of(attitude, std::chrono::seconds(5)).empty());
+  EXPECT_TRUE(slews_of({}, std::chrono::seconds(5)).empty());
+}
+
+/// With two slews; the covariance is diagonal.
+std::string with_manoeuvres(MessageSyntax syntax) {
+  const Calibration calibration = sample_calibration();
+  AttitudeMessage attitude;
+  attitude.attitude = with_slews();
+  return format_acm(calibration, {&attitude, nullptr, "", slews_of(attitude.attitude, std::chrono::seconds(5))},
+                    description(), syntax);
+}
+
+TEST(Acm, HoldsSlewsAsManoeuvres) {
+  const std::vector<Manoeuvre> slews = slews_of(with_slews(), std::chrono::seconds(5));
+  for (const MessageSyntax syntax : {MessageSyntax::kKvn, MessageSyntax::kXml}) {
+    const std::string text = with_manoeuvres(syntax);
+    EXPECT_THAT(text, HasSubstr("ATT, MAN, AD, USER"));
+    const std::vector<Manoeuvre> back = parse_calibration_message(text, "c.acm").manoeuvres;
+    ASSERT_EQ(back.size(), slews.size());
+    for (std::size_t i = 0; i < back.size(); ++i) {
+      EXPECT_EQ(back[i].begin, slews[i].begin);
+      EXPECT_EQ(back[i].end, slews[i].end);
+      EXPECT_LT(back[i].target_q_in_c->angularDistance(*slews[i].target_q_in_c), 1e-14);
+    }
+  }
+  const std::string lasting = replaced(with_manoeuvres(MessageSyntax::kKvn), "MAN_END_TIME = 261", "MAN_DURATION = 64");
+  EXPECT_EQ(to_seconds(parse_calibration_message(lasting, "c.acm").manoeuvres[0].end - slews[0].begin), 64);
+}
+
+TEST(Acm, RefusesManoeuvresThatMakeNoSense) {
+  const auto refused = [](std::string_view from, std::string_view to) {
+    return refusal([&] {
+      static_cast<void>(parse_calibration_message(replaced(with_manoeuvres(MessageSyntax::kKvn), from, to), "c.acm"));
+    });
+  };
+  EXPECT_THAT(refused("MAN_PURPOSE = ATT_ADJUST\n", ""), HasSubstr("MAN has no MAN_PURPOSE"));
+  EXPECT_THAT(refused("MAN_PURPOSE", "MAN_PORPOSE"), HasSubstr("is no keyword of MAN"));
+  EXPECT_THAT(refused("MAN_END_TIME = 261", "MAN_END_TIME = 1"), HasSubstr("ends before it begins"));
+  EXPECT_THAT(refused("MAN_END_TIME = 261.000", "MAN_END_TIME = 261.000 [min]"), HasSubstr("the unit of"));
+  EXPECT_THAT(refused("MAN_END_TIME", "MAN_DURATION = 1 [h]\nMAN_ID2"), HasSubstr("is no keyword of MAN"));
+  EXPECT_THAT(refused("MAN_END_TIME", "MAN_DURATION = 1\nMAN_END_TIME"), HasSubstr("are both there"));
+  EXPECT_THAT(refused("MAN_END_TIME = 261.000", "MAN_DURATION = 1e99"), HasSubstr("MAN_DURATION is 1e99"));
+  EXPECT_THAT(refused("TARGET_ATTITUDE = ", "TARGET_ATTITUDE = 1 "), HasSubstr("give a unit quaternion"));
 }
 
 TEST(Acm, IsNotInTdb) {

@@ -6,6 +6,7 @@
 #include <sstream>
 
 #include "fixtures.hpp"
+#include "oem.hpp"
 #include "trihedron/io/attitude_message.hpp"
 #include "trihedron/io/calibration_message.hpp"
 
@@ -107,12 +108,15 @@ std::vector<std::string> whole_messages() {
                                std::chrono::seconds(10), syntax));
     whole.push_back(format_apm(message, 3, calibration.epoch, description, syntax));
     whole.push_back(format_acm(calibration, {&message, nullptr, "none.nc"}, description, syntax));
+    whole.push_back(orbit_message(syntax == MessageSyntax::kXml));
   }
   return whole;
 }
 
 void read_any(const std::string& text) {
-  if (is_calibration_message(text)) {
+  if (is_orbit_message(text)) {
+    static_cast<void>(parse_orbit_message(text, "spoilt", sample_calibration().epoch));
+  } else if (is_calibration_message(text)) {
     static_cast<void>(parse_calibration_message(text, "spoilt"));
   } else {
     static_cast<void>(parse_attitude_message(text, "spoilt"));

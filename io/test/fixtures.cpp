@@ -10,6 +10,7 @@
 #include <iterator>
 
 #include "trihedron/core/drift.hpp"
+#include "trihedron/io/time_scale.hpp"
 
 namespace trihedron::io {
 namespace fs = std::filesystem;
@@ -187,6 +188,49 @@ std::string replaced(std::string text, std::string_view from, std::string_view t
   const std::size_t at = text.find(from);
   EXPECT_NE(at, std::string::npos) << from;
   return at == std::string::npos ? text : text.replace(at, from.size(), to);
+}
+
+std::string orbit_message(bool xml) {
+  TimeText utc(TimeScale::kUtc);
+  const auto stamp = [&](double t_s) {
+    return utc.format(sample_calibration().epoch + from_seconds(t_s)).substr(0, 19);
+  };
+  const auto entry = [&](std::string_view key, std::string_view value) {
+    return xml ? fmt::format("<{0}>{1}</{0}>\n", key, value) : fmt::format("{} = {}\n", key, value);
+  };
+  const auto put = [&](std::string_view kvn, std::string_view tags) { return std::string(xml ? tags : kvn); };
+  std::string text = put("CCSDS_OEM_VERS = 2.0\nCOMMENT round\n",
+                         "<?xml version=\"1.0\"?>\n<oem id=\"CCSDS_OEM_VERS\" version=\"2.0\">\n<header>\n");
+  text += entry("CREATION_DATE", "2026-01-02T03:04:05Z") + entry("ORIGINATOR", "TEST") + put("", "</header>\n<body>\n");
+  constexpr double kRadius_km = 7000;
+  constexpr double kRate_rad_s = 1.0780076e-3;
+  for (const int segment : {0, 1}) {
+    const double begin_s = segment == 0 ? 0 : 480;
+    const double end_s = segment == 0 ? 600 : 1200;
+    text += put("META_START\n", "<segment>\n<metadata>\n");
+    text += entry("OBJECT_NAME", "TEST") + entry("OBJECT_ID", "2026-001A") + entry("CENTER_NAME", "EARTH") +
+            entry("REF_FRAME", "EME2000") + entry("TIME_SYSTEM", "UTC") + entry("START_TIME", stamp(begin_s));
+    text += segment == 0 ? entry("USEABLE_STOP_TIME", stamp(540)) : entry("USEABLE_START_TIME", stamp(540));
+    text += entry("STOP_TIME", stamp(end_s));
+    if (segment == 0) {
+      text += entry("INTERPOLATION", "LAGRANGE") + entry("INTERPOLATION_DEGREE", "5");
+    }
+    text += put("META_STOP\nCOMMENT states\n", "</metadata>\n<data>\n<COMMENT>states</COMMENT>\n");
+    for (double t_s = begin_s; t_s <= end_s; t_s += 60) {
+      const double c = std::cos(kRate_rad_s * t_s);
+      const double s = std::sin(kRate_rad_s * t_s);
+      const double speed = kRate_rad_s * kRadius_km;
+      const std::string state = xml ? "<stateVector><EPOCH>{}</EPOCH><X>{:.9f}</X><Y units=\"km\">{:.9f}</Y><Z>{}</Z>"
+                                      "<X_DOT>{:.12f}</X_DOT><Y_DOT>{:.12f}</Y_DOT><Z_DOT>{}</Z_DOT></stateVector>\n"
+                                    : "{} {:.9f} {:.9f} {} {:.12f} {:.12f} {}\n";
+      text += fmt::format(fmt::runtime(state), stamp(t_s), kRadius_km * c, kRadius_km * s, 0, -speed * s, speed * c, 0);
+    }
+    if (!xml && segment == 0) {
+      text += "COVARIANCE_START\nEPOCH = " + stamp(0) + "\n1\nCOVARIANCE_STOP\n";
+    }
+    text += put("", "</data>\n</segment>\n");
+  }
+  return text + put("", "</body>\n</oem>\n");
 }
 
 void expect_same_pass(const Pass& a, const Pass& b, double h_tolerance, double q_tolerance) {

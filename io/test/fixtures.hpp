@@ -83,6 +83,9 @@ struct RawPass {
 [[nodiscard]] Truth clean_truth();
 [[nodiscard]] Calibration sample_calibration();
 
+/// An OEM of twenty minutes of a round orbit from the epoch of clean_pass() on, in two segments, KVN or XML.
+[[nodiscard]] std::string orbit_message(bool xml);
+
 /// what() of the InputRefused that `action` throws; empty when it throws none.
 template <class Action>
 std::string refusal(Action action) {

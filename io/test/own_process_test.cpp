@@ -59,6 +59,23 @@ TEST(OwnProcess, RefusesAFileThatTakesMoreMemoryThanItsSizeExplains) {
       AnyOf(HasSubstr("takes more memory than its size explains"), HasSubstr("is damaged")));  // by its sanitizer
 }
 
+TEST(OwnProcess, HasTwoSecondsForASmallFileAndOneForEachMegabyte) {
+  const TemporaryDirectory directory;
+  for (const std::int64_t megabytes : {0, 3}) {
+    write_text(directory / "pass.nc", std::string(static_cast<std::size_t>(megabytes) << 20, ' '));
+    std::int64_t most_s = 0;
+    in_own_process(
+        directory / "pass.nc",
+        [](Sink& sink) {
+          rlimit limit{};
+          ::getrlimit(RLIMIT_CPU, &limit);
+          sink.put(static_cast<std::int64_t>(limit.rlim_cur));
+        },
+        [&](Source& source) { most_s = source.number(); });
+    EXPECT_EQ(most_s, 2 + megabytes);
+  }
+}
+
 TEST(OwnProcess, RefusesAFileThatEndsIt) {
   const auto refused = [](const auto& end) { return refusal([&] { work_apart([&](Sink&) { end(); }); }); };
   for (const int signal : {SIGSEGV, SIGABRT, SIGFPE, SIGBUS}) {
@@ -66,7 +83,7 @@ TEST(OwnProcess, RefusesAFileThatEndsIt) {
                 HasSubstr("pass.nc: is damaged in a way that the NetCDF library"));
   }
   EXPECT_THAT(refused([] { ::_exit(0); }), HasSubstr("is damaged"));
-  EXPECT_THAT(refused([] { std::raise(SIGXCPU); }), HasSubstr("busy for more than 10 s"));
+  EXPECT_THAT(refused([] { std::raise(SIGXCPU); }), HasSubstr("busy for more than 2 s"));
 }
 
 TEST(OwnProcess, RefusesHalfAResult) {

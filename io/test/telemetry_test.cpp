@@ -193,6 +193,64 @@ TEST(Telemetry, SigmasMayBeVariances) {
               1e-18);
 }
 
+TEST(Telemetry, TheSigmasOfAFixAreItsCovariance) {
+  Foreign foreign;
+  foreign.stars = replaced(foreign.stars, ",0,2,2,20\n", ",0,3,5,40\n");
+  const double arcsec = std::numbers::pi / 648000;
+  const std::vector<FixCovariance> its = foreign.load().pass.star_tracker.covariances;
+  ASSERT_EQ(its.size(), 31U);
+  EXPECT_NEAR(its[0].rad2[1], 25 * arcsec * arcsec, 1e-25);
+  EXPECT_NEAR(its[0].rad2[2], 1600 * arcsec * arcsec, 1e-23);
+  EXPECT_NEAR(its[1].rad2[2], 400 * arcsec * arcsec, 1e-23);
+  EXPECT_EQ(its[1].rad2[3], 0);
+}
+
+/// Six columns in place of the sigmas.
+void take_covariances(Foreign& foreign) {
+  foreign.toml = replaced(foreign.toml, "sigma = [\"sx\", \"sy\", \"sz\"]",
+                          R"(covariance = ["sx", "sy", "sz", "xy", "-xz", "yz"])");
+  foreign.stars = replaced(foreign.stars, ",sx,sy,sz\n", ",sx,sy,sz,xy,xz,yz\n");
+  for (int i = 0; i < 31; ++i) {
+    foreign.stars = replaced(foreign.stars, ",0,2,2,20\n", ",0,4,9,400,1,6,-2\n");
+  }
+}
+
+TEST(Telemetry, ACovarianceIsAboutTheAxesOfItsHead) {
+  Foreign foreign;
+  take_covariances(foreign);
+  foreign.toml = replaced(foreign.toml, "noise_rad = [1e-05, 2e-05, 9e-05]", "");
+  const double arcsec2 = std::pow(std::numbers::pi / 648000, 2);
+  Eigen::Matrix3d expected;
+  expected << 4, 1, -6, 1, 9, -2, -6, -2, 400;
+  const LoadedPass loaded = foreign.load();
+  ASSERT_EQ(loaded.pass.star_tracker.covariances.size(), 31U);
+  EXPECT_LT((loaded.pass.star_tracker.covariances[7].matrix() / arcsec2 - expected).norm(), 1e-10);
+  EXPECT_NEAR(loaded.pass.settings.star_tracker_noise_rad.y(), 3 * std::sqrt(arcsec2), 1e-18);
+
+  // Of a further head, turned by +90° about z, it is turned into the axes c.
+  const std::string table = foreign.toml.substr(foreign.toml.find("file = \"stars.csv\""));
+  foreign.toml =
+      replaced(foreign.toml, "[star_tracker]\n",
+               "[star_tracker]\n[[star_tracker.further]]\nnoise_rad = [1e-5, 1e-5, 1e-5]\n"
+               "mounting_rotation_vector_rad = [0, 0, 1.5707963267948966]\nalignment_prior_sigma_rad = 1e-3\n");
+  foreign.toml += "\n[[telemetry.further_star_tracker]]\n" + table;
+  expected << 9, -1, 2, -1, 4, -6, 2, -6, 400;
+  const Pass pass = foreign.load().pass;
+  ASSERT_EQ(pass.further_star_trackers.front().covariances.size(), 31U);
+  EXPECT_LT((pass.further_star_trackers.front().covariances[7].matrix() / arcsec2 - expected).norm(), 1e-10);
+}
+
+TEST(Telemetry, FixesAreLeftOutByTheirCovarianceAsBySigmas) {
+  Foreign foreign;
+  take_covariances(foreign);
+  foreign.stars = replaced(foreign.stars, ",0,4,9,400,1,6,-2\n", ",0,4,9,1e6,1,6,-2\n");
+  foreign.stars = replaced(foreign.stars, ",0,4,9,400,1,6,-2\n", ",0,4,9,400,7,6,-2\n");  // x and y correlated by 1.2
+  const LoadedPass loaded = foreign.load();
+  EXPECT_EQ(only(loaded.defects, Kind::kLargeSigma).first.front().line, 2);
+  EXPECT_EQ(only(loaded.defects, Kind::kNoCovariance).first.front().line, 3);
+  EXPECT_FALSE(loaded.pass.star_tracker.covariances.front().is_told());
+}
+
 TEST(Telemetry, MissingValuesAndACutLineAreCounted) {
   Foreign foreign;
   foreign.gyros = replaced(foreign.gyros, "32768;1;", "-9999;1;");
@@ -450,6 +508,12 @@ INSTANTIATE_TEST_SUITE_P(
         Spoilt{"maps = \"inertial-to-tracker\"", "maps = \"J2000\"", "\"maps\" cannot be \"J2000\""},
         Spoilt{"sigma_unit = \"arcsec\"", "", "belong together"},
         Spoilt{"sigma = [\"sx\", \"sy\", \"sz\"]\nsigma_unit = \"arcsec\"", "", "is there without \"sigma\""},
+        Spoilt{"sigma = ", "covariance = [\"1\", \"2\", \"3\", \"4\", \"5\", \"6\"]\nsigma = ", "are both there"},
+        Spoilt{"sigma = [", "covariance = [", "is not a list of 6 names"},
+        Spoilt{"sigma = [\"sx\", \"sy\", \"sz\"]\nsigma_unit = \"arcsec\"\n", "sigma_is = \"variance\"\n",
+               "\"sigma_is\" is there without"},
+        Spoilt{"\"gyros.txt\"", "\"gyros.parquet\"",
+               "gyros.parquet: is Parquet, for which this program has no library"},
         Spoilt{"largest_sigma_rad = 1e-3", "largest_sigma_rad = 10", "largest_sigma_rad"},
         Spoilt{"stars.csv", "nowhere.csv", "nowhere.csv"}, Spoilt{"stars.csv", "stars.nc", "stars.nc"},
         Spoilt{"[star_tracker]\n",

@@ -1,6 +1,7 @@
 #include "trihedron/io/pass.hpp"
 
 #include <nanobind/nanobind.h>
+#include <nanobind/stl/function.h>
 #include <nanobind/stl/optional.h>
 #include <nanobind/stl/pair.h>
 #include <nanobind/stl/shared_ptr.h>
@@ -8,6 +9,7 @@
 #include <nanobind/stl/vector.h>
 
 #include <algorithm>
+#include <functional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -27,7 +29,7 @@ using nb::literals::operator""_a;
 namespace {
 
 io::TableInMemory table_of(const std::string& name, const GivenVector& t_s, const GivenMatrix& values) {
-  return {name, {t_s.data(), t_s.data() + t_s.size()}, {values.data(), values.data() + values.size()}};
+  return {name, {t_s.data(), t_s.data() + t_s.size()}, {values.data(), values.data() + values.size()}, false};
 }
 
 struct Simulated {
@@ -72,6 +74,7 @@ void bind_pass(nb::module_& module) {
         return view(self.p->values, columns, self.h);
       },
       "columns"_a, "Shape (rows, columns)");
+  table.def_ro("has_covariances", &io::TableInMemory::has_covariances, "Whether its fixes have six more columns");
 
   nb::class_<io::PassInMemory>(module, "Tables", "Settings and tables of a pass as a file has them")
       .def(
@@ -83,10 +86,11 @@ void bind_pass(nb::module_& module) {
           "name"_a, "settings"_a, "prior"_a, "gyros"_a, "t_s"_a, "directions"_a)
       .def(
           "add_star_tracker",
-          [](io::PassInMemory& self, const std::string& name, const GivenVector& t_s, const GivenMatrix& q_in_c) {
-            self.star_trackers.push_back(table_of(name, t_s, q_in_c));
+          [](io::PassInMemory& self, const std::string& name, const GivenVector& t_s, const GivenMatrix& fixes) {
+            self.star_trackers.push_back(table_of(name, t_s, fixes));
+            self.star_trackers.back().has_covariances = fixes.shape(1) > 4;
           },
-          "name"_a, "t_s"_a, "q_in_c"_a)
+          "name"_a, "t_s"_a, "fixes"_a, "Rows of q_in_c, or of q_in_c and a covariance: 4 or 10 columns")
       .def_ro("settings", &io::PassInMemory::settings, "Text of a pass.toml")
       .def_ro("prior", &io::PassInMemory::prior, "Text of a calibration.json, or empty")
       .def_ro("gyros", &io::PassInMemory::gyros)
@@ -150,8 +154,33 @@ void bind_pass(nb::module_& module) {
             const Pass& pass = self.p->pass();
             return view(head == 0 ? pass.star_tracker.q_in_c : pass.further_star_trackers.at(head - 1).q_in_c, self.h);
           },
-          "head"_a);
+          "head"_a)
+      .def(
+          "covariances_rad2",
+          [](nb::pointer_and_handle<ScreenedPass> self, std::size_t head) -> std::optional<Doubles> {
+            const Pass& pass = self.p->pass();
+            const StarTrackerTelemetry& fixes = head == 0 ? pass.star_tracker : pass.further_star_trackers.at(head - 1);
+            static_assert(sizeof(FixCovariance) == 6 * sizeof(double));
+            return fixes.covariances.empty()
+                       ? std::nullopt
+                       : std::optional(Doubles(fixes.covariances.front().rad2.data(), {fixes.size(), 6}, self.h));
+          },
+          "head"_a, "xx, yy, zz, xy, xz, yz; zeros where a fix has none");
 
+  module.def(
+      "read_telemetry",
+      [](const std::string& file, const std::function<std::string(std::string, std::vector<std::string>)>& parquet) {
+        const io::LoadedPass loaded =
+            io::read_telemetry(file, [&](const std::filesystem::path& path, const std::vector<std::string>& columns) {
+              return parquet(path.string(), columns);
+            });
+        io::PassInMemory tables = io::tables_of(loaded.pass, io::PassFormat{}.direction_step);
+        tables.name = file;
+        return std::pair(std::move(tables), loaded.defects);
+      },
+      "file"_a, "parquet"_a,
+      "The pass of a telemetry.toml, screened, and what was wrong with it. parquet: gives columns of a Parquet file as "
+      "CSV");
   module.def(
       "read_tables", [](const std::string& directory) { return io::read_tables(directory); }, "directory"_a,
       nb::call_guard<nb::gil_scoped_release>(), "The tables of a pass directory");

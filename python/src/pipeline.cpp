@@ -80,11 +80,15 @@ class PipelineOfPass {
     last_ = t;
     return reports_of(pipeline_.feed(sample));
   }
-  std::vector<Report> push_fix(Time t, const GivenVector& q, int head) {
+  std::vector<Report> push_fix(Time t, const GivenVector& q, int head, const std::optional<GivenMatrix>& covariance) {
     StarFix fix;
     fix.t = t;
     fix.q_in_c = Eigen::Quaterniond(q(3), q(0), q(1), q(2));
     fix.head = head;
+    if (covariance) {
+      const GivenMatrix& its = *covariance;
+      fix.covariance.rad2 = {its(0, 0), its(1, 1), its(2, 2), its(0, 1), its(0, 2), its(1, 2)};
+    }
     return reports_of(pipeline_.feed(fix));
   }
   std::vector<Report> finish() { return reports_of(pipeline_.finish()); }
@@ -170,10 +174,11 @@ void bind_pipeline(nb::module_& module) {
           "t_ns"_a, "directions"_a)
       .def(
           "push_fix",
-          [](PipelineOfPass& self, std::int64_t t_ns, const GivenVector& q_in_c, int head) {
-            return self.push_fix(Time(Duration(t_ns)), q_in_c, head);
+          [](PipelineOfPass& self, std::int64_t t_ns, const GivenVector& q_in_c, int head,
+             const std::optional<GivenMatrix>& covariance_rad2) {
+            return self.push_fix(Time(Duration(t_ns)), q_in_c, head, covariance_rad2);
           },
-          "t_ns"_a, "q_in_c"_a, "head"_a)
+          "t_ns"_a, "q_in_c"_a, "head"_a, "covariance_rad2"_a.none())
       .def("finish", &PipelineOfPass::finish)
       .def_prop_ro("attitude", &PipelineOfPass::attitude)
       .def_prop_ro("started", [](const PipelineOfPass& its) { return its.pipeline().started(); })

@@ -158,7 +158,7 @@ def test_files_that_are_no_pass_are_refused(work):
     assert refusal(trihedron.read_pass, work / "none").file == str(work / "none")
     assert refusal(trihedron.read_pass, work)  # a directory without pass.toml
     (work / "telemetry.toml").write_text("[telemetry]\n")
-    assert "trihedron import" in refusal(trihedron.read_pass, work / "telemetry.toml").cure
+    assert '"time" is missing' in refusal(trihedron.read_pass, work / "telemetry.toml").reason
     wrong = work / "wrong.nc"
     wrong.write_bytes(b"CDF or not")
     assert refusal(trihedron.read_pass, wrong).file == str(wrong)

@@ -17,12 +17,16 @@ import xarray as xr
 from . import _native
 from ._arrays import Doubles, datetime_of, doubles, seconds_of_datetimes, seconds_since
 from ._errors import InputRefused, MachineFailed
+from ._parquet import parquet_as_csv
 from ._settings import PathLike, toml_text
 
 AXES = ("x", "y", "z")
 COMPONENTS = ("q_x", "q_y", "q_z", "q_w")
+COVARIANCES = ("cov_xx_rad2", "cov_yy_rad2", "cov_zz_rad2", "cov_xy_rad2", "cov_xz_rad2", "cov_yz_rad2")
 _TIME_COMMENT = "time scale TAI: every second is counted, there are no leap seconds"
 _PACKED_FILL = -(2**31)
+#: Places of COVARIANCES in a matrix.
+_SIX_AS_MATRIX = np.array([[0, 3, 4], [3, 1, 5], [4, 5, 2]])
 
 
 class GyroSample(NamedTuple):
@@ -38,6 +42,7 @@ class StarFix(NamedTuple):
     t_s: float  #: since the epoch of the pass
     q_in_c: Doubles  #: x, y, z, w, Hamilton
     head: int = 0  #: which star tracker
+    covariance_rad2: Doubles | None = None  #: shape (3, 3), of its error, c axes; None: that of the settings
 
 
 @dataclass(frozen=True)
@@ -86,6 +91,12 @@ def _attributes(column: str, measured: bool) -> dict[str, str]:
             "long_name": f"attitude quaternion from star-tracker to inertial axes, {column[-1]} component (Hamilton)",
             "frame": "in_c: v_in = q v_c q*",
         }
+    if column in COVARIANCES:
+        return {
+            "units": "rad2",
+            "long_name": f"covariance of the error of the fix about the axes {column[4:6]} of c, true = given exp(-error)",
+            "frame": "c",
+        }
     gyro = column[1:-2]
     return {
         "units": "1",
@@ -119,7 +130,8 @@ class Pass:
     """One stretch of telemetry: datasets over the dimension `time`, with units and frames in their attributes.
 
     gyro: h1_x, h1_y, h1_z, h2_x …, direction cosines of the momenta, each in the case axes of its gyro.
-    star_trackers: q_x, q_y, q_z, q_w of each head, q_in_c, Hamilton, scalar last.
+    star_trackers: q_x, q_y, q_z, q_w of each head, q_in_c, Hamilton, scalar last; and cov_xx_rad2, yy, zz, xy, xz, yz
+        where each fix has its covariance, c axes.
     truth: q_x … and h1_x …, inertial axes, where a simulator wrote them.
     settings: what pass.toml says.
 
@@ -141,6 +153,7 @@ class Pass:
         self.star_trackers = [star_tracker] if isinstance(star_tracker, xr.Dataset) else list(star_tracker)
         self.truth = truth
         self.name = name
+        self._left_out: list[_native.Defect] = []  # when it was read
         if not isinstance(settings, Settings):
             toml = settings if isinstance(settings, str) else toml_text(settings, "the settings of the pass")
             settings = Settings(toml, _gyros_of(gyro, name), _json_text(prior))
@@ -196,7 +209,10 @@ class Pass:
         epoch_ns = settings.epoch_ns
         directions = _direction_names(tables.gyros)
         gyro = _dataset(tables.gyro.t_s, _columns(tables.gyro.values(len(directions)), directions), epoch_ns)
-        heads = [_dataset(its.t_s, _columns(its.values(4), COMPONENTS), epoch_ns) for its in tables.star_trackers]
+        heads = []
+        for its in tables.star_trackers:
+            columns = [*COMPONENTS, *(COVARIANCES if its.has_covariances else ())]
+            heads.append(_dataset(its.t_s, _columns(its.values(len(columns)), columns), epoch_ns))
         true = None
         if truth is not None:
             names = [*COMPONENTS, *_direction_names(truth.gyros)]
@@ -217,7 +233,7 @@ class Pass:
     @property
     def defects(self) -> list[_native.Defect]:
         """What is wrong with the telemetry, by kind and place: rows that are left out, and rows that are not usable."""
-        return self._screened().defects
+        return [*self._left_out, *self._screened().defects]
 
     def events(self) -> Iterator[GyroSample | StarFix]:
         """The screened telemetry as the spacecraft has it: in time order, a fix after the gyro sample of the same time."""
@@ -232,12 +248,16 @@ class Pass:
         row = np.concatenate([np.arange(len(screened.gyro_ns)), *(np.arange(len(screened.fix_ns(head))) for head in heads)])
         directions = screened.directions
         quaternions = [screened.q_in_c(head) for head in heads]
+        covariances = [screened.covariances_rad2(head) for head in heads]
         for i in np.lexsort((kind, t_ns)):
             t_s = float(seconds_since(t_ns[i], epoch_ns))
             if kind[i] == 0:
                 yield GyroSample(t_s, directions[row[i]])
             else:
-                yield StarFix(t_s, quaternions[kind[i] - 1][row[i]], int(kind[i] - 1))
+                head = int(kind[i] - 1)
+                six = covariances[head]
+                covariance = six[row[i]][_SIX_AS_MATRIX] if six is not None and six[row[i], 0] > 0 else None
+                yield StarFix(t_s, quaternions[head][row[i]], head, covariance)
 
     def to_datatree(self) -> xr.DataTree:
         """Groups laid out as in pass.nc."""
@@ -279,7 +299,12 @@ class Pass:
         tables = _native.Tables(self.name, self.settings.toml, self.settings.prior, self.settings.gyros, t_s, values)
         for head, dataset in enumerate(self.star_trackers):
             name = _star_tracker_name(head)
-            tables.add_star_tracker(name, *_rows(dataset, COMPONENTS, name, epoch_ns))
+            if not any(column in dataset.variables for column in COVARIANCES):
+                tables.add_star_tracker(name, *_rows(dataset, COMPONENTS, name, epoch_ns))
+                continue
+            diagonal = not any(column in dataset.variables for column in COVARIANCES[3:])
+            t_s, values = _rows(dataset, [*COMPONENTS, *(COVARIANCES[:3] if diagonal else COVARIANCES)], name, epoch_ns)
+            tables.add_star_tracker(name, t_s, np.hstack([values, np.zeros((len(t_s), 3))]) if diagonal else values)
         return _native.screened(tables)
 
     def _truth_table(self) -> _native.TruthTable | None:
@@ -321,7 +346,7 @@ def _with_frames(dataset: xr.Dataset, settings: Settings, measured: bool) -> xr.
     """With attributes for what a file leaves to its format."""
     dataset = dataset.copy()
     for name in dataset.data_vars:
-        if str(name) in (*COMPONENTS, *_direction_names(settings.gyros)):
+        if str(name) in (*COMPONENTS, *COVARIANCES, *_direction_names(settings.gyros)):
             dataset[name].attrs = {**_attributes(str(name), measured), **dataset[name].attrs}
     return dataset
 
@@ -332,11 +357,14 @@ def _rows(dataset: xr.Dataset, names: Sequence[str], what: str, epoch_ns: int) -
     if missing:
         raise InputRefused(f"lacks the variable {missing[0]}", f"give {', '.join(('t_s', *names))}", what)
     for name in names:
-        units = dataset[name].attrs.get("units", "1")
-        if units not in ("1", ""):
+        expected = "rad2" if name in COVARIANCES else "1"
+        units = dataset[name].attrs.get("units", expected)
+        if units not in (expected, ""):
             raise InputRefused(
                 f"{name} has units {units!r}",
-                'direction cosines and quaternions have none: convert the values, and give units "1"',
+                'convert the values to rad², and give units "rad2"'
+                if name in COVARIANCES
+                else 'direction cosines and quaternions have none: convert the values, and give units "1"',
                 what,
             )
     raw = dataset["t_s"].values
@@ -361,7 +389,8 @@ def _expect_units_of_time(units: str, epoch_ns: int, what: str) -> None:
 
 
 def read_pass(path: PathLike) -> Pass:
-    """Reads a pass: a directory with pass.toml, gyro.csv and star_tracker.csv, or a NetCDF-4 file, by xarray.
+    """Reads a pass: a directory with pass.toml, gyro.csv and star_tracker.csv, a NetCDF-4 file, by xarray, or a
+    telemetry.toml, which says where others' CSV and Parquet files have its columns; Parquet needs pyarrow.
 
     Raises InputRefused for what cannot be understood, with file, line, reason and cure.
     """
@@ -372,15 +401,14 @@ def read_pass(path: PathLike) -> Pass:
     if not file.is_file():
         raise InputRefused(
             "there is no such file or directory",
-            "give a pass: a directory with pass.toml, gyro.csv and star_tracker.csv, or a NetCDF-4 file",
+            "give a pass: a directory with pass.toml, gyro.csv and star_tracker.csv, a NetCDF-4 file, or a telemetry.toml",
             str(file),
         )
     if file.suffix == ".toml":
-        raise InputRefused(
-            "is TOML, and only the program reads a telemetry.toml",
-            "make a pass of it: trihedron import telemetry.toml -o pass.nc",
-            str(file),
-        )
+        tables, left_out = _native.read_telemetry(str(file), parquet_as_csv)
+        its = Pass._from_tables(tables, None, str(file))
+        its._left_out = left_out
+        return its
     try:
         groups = {
             key.strip("/"): its.load() for key, its in xr.open_groups(file, engine="h5netcdf", decode_times=False).items()

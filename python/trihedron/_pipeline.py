@@ -7,6 +7,7 @@ import tomllib
 from collections.abc import Iterable, Iterator, Mapping
 from typing import Any, Unpack
 
+import numpy as np
 import numpy.typing as npt
 
 from . import _native
@@ -47,12 +48,23 @@ class Pipeline:
         h = doubles(directions, "directions", (self._gyros, 3))
         return self._native.push_gyro(nanoseconds(t_s, self._epoch_ns, "t_s"), h)
 
-    def push_fix(self, t_s: float, q_in_c: npt.ArrayLike, head: int = 0) -> list[_native.StepReport]:
-        """A fix at t_s: x, y, z, w, of star tracker `head`. It is dealt with some samples later."""
+    def push_fix(
+        self, t_s: float, q_in_c: npt.ArrayLike, head: int = 0, covariance_rad2: npt.ArrayLike | None = None
+    ) -> list[_native.StepReport]:
+        """A fix at t_s: x, y, z, w, of star tracker `head`. It is dealt with some samples later.
+
+        covariance_rad2: (3, 3), of its error, c axes; without one the noise of the settings is that of the fix.
+        """
         q = doubles(q_in_c, "q_in_c", (4,))
         if isinstance(head, bool) or not isinstance(head, int) or not 0 <= head < self._native.star_trackers:
             raise InputRefused(f"head is {head!r}", f"give 0 … {self._native.star_trackers - 1}, as the settings have them")
-        return self._native.push_fix(nanoseconds(t_s, self._epoch_ns, "t_s"), q, head)
+        covariance = None
+        if covariance_rad2 is not None:
+            covariance = doubles(covariance_rad2, "covariance_rad2", (3, 3))
+            symmetric = np.allclose(covariance, covariance.T, rtol=1e-9, atol=0)
+            if not (symmetric and np.isfinite(covariance).all() and (np.linalg.eigvalsh(covariance) > 0).all()):
+                raise InputRefused("covariance_rad2 is no covariance", "give a symmetric, positive definite matrix, rad²")
+        return self._native.push_fix(nanoseconds(t_s, self._epoch_ns, "t_s"), q, head, covariance)
 
     def finish(self) -> list[_native.StepReport]:
         """After the last event: deals with the fixes that still wait."""
@@ -64,7 +76,7 @@ class Pipeline:
             if isinstance(event, GyroSample):
                 yield from self.push_gyro(event.t_s, event.directions)
             elif isinstance(event, StarFix):
-                yield from self.push_fix(event.t_s, event.q_in_c, event.head)
+                yield from self.push_fix(event.t_s, event.q_in_c, event.head, event.covariance_rad2)
             else:
                 raise InputRefused(f"an event is a {type(event).__name__}", "give a GyroSample or a StarFix")
         yield from self.finish()

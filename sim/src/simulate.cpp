@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <memory>
 #include <stdexcept>
 #include <string>
 
@@ -153,7 +154,8 @@ SimulatedPass simulate(const Scenario& scenario) {
     margin_s = std::max(margin_s, std::abs(gyro.readout.latency_s));
   }
 
-  const KeplerJ2 orbit(scenario.orbit);
+  const std::unique_ptr<Ephemeris> ephemeris = ephemeris_of(scenario.orbit, -margin_s, duration_s + margin_s);
+  const Ephemeris& orbit = *ephemeris;
   const AttitudeProgramme attitude(scenario.attitude, orbit, scenario.seed, -margin_s, duration_s + margin_s);
 
   const Sky sky(scenario.epoch, -margin_s, duration_s + margin_s);

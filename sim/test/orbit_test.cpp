@@ -110,5 +110,75 @@ TEST(Orbit, RefusesApsesThatMakeNoSense) {
   EXPECT_THROW(KeplerJ2{orbit}, std::invalid_argument);
 }
 
+using Interpolation = EphemerisSegment::Interpolation;
+
+/// States of the default orbit, whose velocity is not the derivative of its position to the last.
+EphemerisSegment told(double begin_s, double end_s, double step_s, Interpolation interpolation, int degree) {
+  const KeplerJ2 orbit{OrbitScenario{}};
+  EphemerisSegment its{begin_s, end_s, interpolation, degree, {}, {}, {}};
+  for (double t_s = begin_s; t_s <= end_s; t_s += step_s) {
+    its.t_s.push_back(t_s);
+    its.position_m.push_back(orbit.at(t_s).position_m.raw());
+    its.velocity_m_s.push_back(orbit.at(t_s).velocity_m_s.raw());
+  }
+  return its;
+}
+
+TEST(ToldEphemeris, GoesThroughItsStatesAndAPolynomialOfItsDegree) {
+  for (const auto interpolation : {Interpolation::kHermite, Interpolation::kLagrange}) {
+    for (const int degree : {1, 2, 3, 6, 7, 8}) {
+      // A polynomial of that degree on top of an orbit's radius, at uneven steps; Lagrange takes the velocity by
+      // itself.
+      EphemerisSegment its{0, 1000, interpolation, degree, {}, {}, {}};
+      const auto position = [&](double t_s) {
+        return Eigen::Vector3d(7e6 + 1e5 * std::pow(t_s / 1000, degree), 2e5 * t_s / 1000, -3e4);
+      };
+      const auto velocity = [&](double t_s) {
+        return Eigen::Vector3d(100 * degree * std::pow(t_s / 1000, degree - 1), 200, 0);
+      };
+      for (const double t_s : {0.0, 50.0, 130.0, 200.0, 330.0, 410.0, 500.0, 640.0, 700.0, 810.0, 940.0, 1000.0}) {
+        its.t_s.push_back(t_s);
+        its.position_m.push_back(position(t_s));
+        its.velocity_m_s.push_back(velocity(t_s));
+      }
+      const ToldEphemeris orbit({its}, 0, 1000);
+      for (double t_s = 0; t_s <= 1000; t_s += 12.5) {
+        EXPECT_LT((orbit.at(t_s).position_m.raw() - position(t_s)).norm(), 1e-5) << degree << " " << t_s;
+        EXPECT_LT((orbit.at(t_s).velocity_m_s.raw() - velocity(t_s)).norm(), 1e-6) << degree << " " << t_s;
+      }
+    }
+  }
+}
+
+TEST(ToldEphemeris, IsTheOrbitThatItWasTakenFrom) {
+  const KeplerJ2 truth{OrbitScenario{}};
+  const ToldEphemeris orbit(
+      {told(-60, 6000, 60, Interpolation::kLagrange, 9), told(6000, 12060, 60, Interpolation::kLagrange, 9)}, 0, 12000);
+  for (double t_s = 0; t_s <= 12000; t_s += 7) {
+    EXPECT_LT((orbit.at(t_s).position_m.raw() - truth.at(t_s).position_m.raw()).norm(), 1e-2);
+    EXPECT_LT((orbit.at(t_s).velocity_m_s.raw() - truth.at(t_s).velocity_m_s.raw()).norm(), 1e-5);
+  }
+  // Two revolutions, within which perigee turns by 0.2°; it changes the time of one by 2 e of that.
+  EXPECT_NEAR(orbit.mean_rate_rad_s() / truth.mean_rate_rad_s(), 1, 3e-5);
+  // Of a part of a revolution the size of the orbit says it; J2 and the place on it matter then.
+  const ToldEphemeris part({told(0, 600, 60, Interpolation::kHermite, 7)}, 0, 600);
+  EXPECT_NEAR(part.mean_rate_rad_s() / truth.mean_rate_rad_s(), 1, 3e-3);
+}
+
+TEST(ToldEphemeris, ThatDoesNotReachIsRefused) {
+  const auto one = told(0, 600, 60, Interpolation::kHermite, 7);
+  const auto later = told(660, 1200, 60, Interpolation::kHermite, 7);
+  EXPECT_NO_THROW(ToldEphemeris({one}, 0, 600));
+  EXPECT_THROW(ToldEphemeris({one}, -1, 600), std::invalid_argument);
+  EXPECT_THROW(ToldEphemeris({one}, 0, 601), std::invalid_argument);
+  EXPECT_THROW(ToldEphemeris({one, later}, 0, 1200), std::invalid_argument);  // a gap
+  EXPECT_THROW(ToldEphemeris({}, 0, 1), std::invalid_argument);
+  EphemerisSegment leaving = one;
+  for (Eigen::Vector3d& velocity : leaving.velocity_m_s) {
+    velocity *= 2;
+  }
+  EXPECT_THROW(ToldEphemeris({leaving}, 0, 600), std::invalid_argument);
+}
+
 }  // namespace
 }  // namespace trihedron::sim

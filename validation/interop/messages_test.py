@@ -142,6 +142,8 @@ def test_peers_read_a_calibration(calibrated, calibration, tmp_path, form):
     assert str(determination.getMethod()) == "EKF"
     if form == "acm":
         assert [str(determination.getSensorsUsed().get(i).getSensorUsed()) for i in range(3)] == ["AST", "GYRO", "GYRO"]
+    turned = data.getManeuverBlocks()
+    assert turned is None or turned.isEmpty()  # four minutes without a slew
     user = {str(key): str(data.getUserDefinedBlock().getParameters().get(key))
             for key in data.getUserDefinedBlock().getParameters().keySet()}
     for index, gyro in enumerate(calibration["gyros"], start=1):
@@ -149,6 +151,88 @@ def test_peers_read_a_calibration(calibrated, calibration, tmp_path, form):
             assert abs(float(user[f"TRIHEDRON_GYRO{index}_{name.upper()}_RAD_S"]) - value) <= 1e-15 * abs(value)
     assert user["TRIHEDRON_VERDICT"] == ("TRUSTWORTHY" if calibration["verdict"]["trustworthy"] else "DO NOT USE")
     assert (tmp_path / user["TRIHEDRON_COVARIANCE_FILE"]).exists()
+
+
+@pytest.mark.parametrize("form", ("acm", "acm-xml"))
+def test_peers_read_slews_as_manoeuvres(calibrated, tmp_path, form):
+    """A turn of 20° about x in 40 s, from 100 s on."""
+    rows = []
+    for i in range(81):
+        half = 0.175 * min(max((3 * i - 100) / 40, 0), 1)
+        rows.append(f"{3 * i},{np.sin(half):.17g},0,0,{np.cos(half):.17g}")
+    (tmp_path / "turned.csv").write_text("t_s,q_x,q_y,q_z,q_w\n" + "\n".join(rows) + "\n")
+    path = tmp_path / f"slews.{form}"
+    run("--quiet", "export", calibrated / "out" / "calibration.json", "--format", form, "-o", path, "--attitude", tmp_path / "turned.csv")
+    ccsds_ndm.Acm.from_file(str(path)).validate()
+    data = ParserBuilder().buildAcmParser().parseMessage(DataSource(str(path))).getSegments().get(0).getData()
+    assert data.getManeuverBlocks().size() == 1
+    slew = data.getManeuverBlocks().get(0)
+    assert (slew.getBeginTime(), slew.getEndTime()) == (99, 141)
+    q = slew.getTargetAttitude()
+    assert abs(q.getQ1() - np.sin(0.175)) < 1e-15 and abs(abs(q.getQ0()) - np.cos(0.175)) < 1e-15
+    assert "1 manoeuvre" in run("import", path, "-o", tmp_path / "back.json")
+
+
+@pytest.fixture(scope="module")
+def earth():
+    """The centre of an OEM, of which Orekit asks little, and for which it would want an ephemeris of the planets."""
+    import jpype
+    body = jpype.JProxy("org.orekit.bodies.CelestialBody", dict={"getName": lambda: "Earth", "getGM": lambda: 3.986004418e14})
+    loader = jpype.JProxy("org.orekit.bodies.CelestialBodyLoader", dict={"loadCelestialBody": lambda name: body})
+    DataContext.getDefault().getCelestialBodies().addCelestialBodyLoader("Earth", loader)
+
+
+def ellipse(t_s):
+    """Position and velocity, km and km/s, of Kepler's motion on an inclined ellipse."""
+    a, e, rate = 6860.0, 0.018, np.sqrt(398600.4418 / 6860.0**3)
+    anomaly = mean = rate * t_s + 0.3
+    for _ in range(30):
+        anomaly = mean + e * np.sin(anomaly)
+    c, s, minor = np.cos(anomaly), np.sin(anomaly), np.sqrt(1 - e * e)
+    p, q = np.array([0.6, 0.48, 0.64]), np.array([-0.8, 0.36, 0.48])
+    return a * ((c - e) * p + minor * s * q), a * rate / (1 - e * c) * (minor * c * q - s * p)
+
+
+@pytest.mark.parametrize("method", (("HERMITE", 7), ("LAGRANGE", 9), None))
+@pytest.mark.parametrize("scale", SCALES)
+@pytest.mark.parametrize("form", ("kvn", "xml"))
+def test_an_orbit_that_orekit_writes_is_flown_as_orekit_interpolates_it(earth, tmp_path, form, scale, method):
+    minutes = [f"2008-12-31T{23 + (50 + i) // 60:02d}:{(50 + i) % 60:02d}:00" if i < 10 else f"2009-01-01T00:{i - 10:02d}:00" for i in range(21)]
+    ours = ["CCSDS_OEM_VERS = 2.0", "CREATION_DATE = 2026-01-02T03:04:05", "ORIGINATOR = TEST", "META_START", "OBJECT_NAME = TEST",
+            "OBJECT_ID = 2026-001A", "CENTER_NAME = EARTH", "REF_FRAME = EME2000", f"TIME_SYSTEM = {scale}", f"START_TIME = {minutes[0]}",
+            f"STOP_TIME = {minutes[-1]}", *([f"INTERPOLATION = {method[0]}", f"INTERPOLATION_DEGREE = {method[1]}"] if method else []), "META_STOP"]
+    parser = ParserBuilder().buildOemParser()
+    epoch = AbsoluteDate(EPOCH, TimeScalesFactory.getTAI())
+    scales = {"TAI": TimeScalesFactory.getTAI, "UTC": TimeScalesFactory.getUTC, "GPS": TimeScalesFactory.getGPS, "TT": TimeScalesFactory.getTT}
+    for minute in minutes:
+        position, velocity = ellipse(AbsoluteDate(minute, scales[scale]()).durationFrom(epoch))
+        ours.append(" ".join([minute, *(f"{value:.12f}" for value in (*position, *velocity))]))
+    (tmp_path / "ours.oem").write_text("\n".join(ours) + "\n")
+    oem = parser.parseMessage(DataSource(str(tmp_path / "ours.oem")))
+    text = StringBuilder()
+    generator = KvnGenerator(text, 0, "a", 0.0, 0) if form == "kvn" else XmlGenerator(text, 2, "a", 0.0, True, None)
+    WriterBuilder().buildOemWriter().writeMessage(generator, oem)
+    generator.close()
+    (tmp_path / "theirs.oem").write_text(str(text.toString()))
+    (tmp_path / "scenario.toml").write_text(
+        f'[scenario]\nepoch_tai = "{EPOCH}"\nduration = "4min"\n[gyro]\nperiod = "1s"\n[orbit]\nephemeris = "theirs.oem"\n'
+        '[attitude]\nslews = "none"\njitter = "0arcsec"\n')
+    run("--quiet", "simulate", tmp_path / "scenario.toml", "-o", tmp_path / "pass")
+    t_ns, q = read_attitude(tmp_path / "pass" / "truth.csv")
+    propagator = oem.getSegments().get(0).getPropagator() if method else None
+    for t_s, (x, y, z, w) in zip(t_ns * 1e-9, q):
+        if propagator is None:
+            position, velocity = ellipse(t_s)
+        else:
+            pv = propagator.propagate(epoch.shiftedBy(float(t_s))).getPVCoordinates()
+            position = np.array([pv.getPosition().getX(), pv.getPosition().getY(), pv.getPosition().getZ()])
+            velocity = np.array([pv.getVelocity().getX(), pv.getVelocity().getY(), pv.getVelocity().getZ()])
+        normal = np.cross(position, velocity)
+        c_y = [2 * (x * y - w * z), 1 - 2 * (x * x + z * z), 2 * (y * z + w * x)]
+        c_z = [2 * (x * z + w * y), 2 * (y * z - w * x), 1 - 2 * (x * x + y * y)]
+        # Truth has twelve decimals. Orekit interpolates velocity with position, so of Lagrange's it is another polynomial.
+        assert np.linalg.norm(np.cross(c_z, position / np.linalg.norm(position))) < 1e-10
+        assert np.linalg.norm(np.cross(c_y, normal / np.linalg.norm(normal))) < 1e-9
 
 
 @pytest.mark.parametrize("scale", SCALES)

@@ -2,7 +2,7 @@
 import numpy as np
 import pytest
 import spiceypy
-from conftest import EPOCH, run
+from conftest import EPOCH, read_attitude, run
 
 ID = -28380
 # The constants of NAIF's leap second kernels, and the leap second that matters here.
@@ -134,3 +134,52 @@ def test_file_is_whole_for_spice(kernels):
     assert spiceypy.daffna()
     assert not spiceypy.daffna()
     spiceypy.dafcls(handle)
+
+
+SCLK = """KPL/SCLK
+\\begindata
+SCLK_DATA_TYPE_77      = ( 1 )
+SCLK01_TIME_SYSTEM_77  = ( {system} )
+SCLK01_N_FIELDS_77     = ( 2 )
+SCLK01_MODULI_77       = ( 4294967296 65536 )
+SCLK01_OFFSETS_77      = ( 0 0 )
+SCLK01_OUTPUT_DELIM_77 = ( 1 )
+SCLK_PARTITION_START_77 = ( 0.0000000000000E+00 )
+SCLK_PARTITION_END_77   = ( 2.8147497671065E+14 )
+SCLK01_COEFFICIENTS_77 = ( 0.0 284000000.0 1.0
+                           65536000000.0  285000000.25 1.0000001D0 )
+\\begintext
+"""
+
+
+@pytest.mark.parametrize("system", (1, 2), ids=("TDB", "TDT"))
+@pytest.mark.parametrize("form", (1, 3))
+def test_what_cspice_writes_is_read(tmp_path, form, system):
+    """Attitudes of a clock that runs at two rates, with angular velocities, in two segments of the kernel."""
+    generator = np.random.default_rng(4)
+    (tmp_path / "leap.tls").write_text(LEAP_SECONDS)
+    (tmp_path / "a.tsc").write_text(SCLK.format(system=system))
+    spiceypy.kclear()
+    for name in ("leap.tls", "a.tsc"):
+        spiceypy.furnsh(str(tmp_path / name))
+    ticks = np.sort(generator.choice(4 * 10**6, 260, replace=False)) * 16384.0 + 65534000000.0
+    quaternions = generator.standard_normal((260, 4))
+    quaternions /= np.linalg.norm(quaternions, axis=1)[:, None]
+    rates = 1e-3 * generator.standard_normal((260, 3))
+    handle = spiceypy.ckopn(str(tmp_path / "a.bc"), "test", 0)
+    for part in (slice(0, 101), slice(101, 260)):
+        t = ticks[part]
+        if form == 1:
+            spiceypy.ckw01(handle, t[0], t[-1], -77000, "J2000", True, "part", len(t), t, quaternions[part], rates[part])
+        else:
+            spiceypy.ckw03(handle, t[0], t[-1], -77000, "J2000", True, "part", len(t), t, quaternions[part], rates[part], 2, [t[0], t[50]])
+    spiceypy.ckcls(handle)
+    run("--quiet", "import", tmp_path / "a.bc", "-o", tmp_path / "a.csv", "--epoch", "2009-01-01T00:00:00")
+    t_ns, q = read_attitude(tmp_path / "a.csv")
+    et = np.array([spiceypy.sct2e(-77, tick) for tick in ticks])
+    tdt = np.array([spiceypy.unitim(value, "TDB", "TDT") for value in et])
+    ours = t_ns * 1e-9 + (3288 - 0.5) * 86400 + 32.184  # TT of 2009-01-01T00:00:00 TAI since J2000
+    # Ephemeris time is a double of 6e-8 s; TDB of CSPICE is a shorter series than ours.
+    assert np.abs(ours - tdt).max() < (2e-7 if system == 2 else 6e-5)
+    assert np.abs(np.abs((q * (quaternions[:, [1, 2, 3, 0]] * [-1, -1, -1, 1])).sum(axis=1)) - 1).max() < 1e-14
+    spiceypy.kclear()

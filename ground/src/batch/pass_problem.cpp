@@ -60,7 +60,8 @@ bool turned_little(const Directions& from, const Directions& to, const GyroMask&
 }  // namespace
 
 /// Collects whitened rows of fixes of an arc; consecutive fixes closer than the setup says, between which the body has
-/// not turned by more than that, are replaced by their weighted mean. Rows about modes are made once for each mean.
+/// not turned by more than that, and with the same covariance, are replaced by their weighted mean. Rows about modes
+/// are made once for each mean.
 class PassProblem::FixMerger {
  public:
   /// `beside`: columns of rows that are not about states; may be none.
@@ -74,6 +75,7 @@ class PassProblem::FixMerger {
     last_t_ = fix.fix.t;
     const bool first = sums_.empty() || fix.fix.t - sums_.back().t >= setup.fixes_together ||
                        turned_rad_ > setup.turn_together_rad || sums_.back().head != fix.fix.head ||
+                       sums_.back().covariance != fix.fix.covariance.rad2 ||
                        !std::equal(fix.used.begin(), fix.used.end(), sums_.back().used.begin());
     turned_rad_ = first ? 0 : turned_rad_;
     Sum& sum = first ? sums_.emplace_back() : sums_.back();
@@ -84,6 +86,7 @@ class PassProblem::FixMerger {
     if (first) {
       sum.t = fix.fix.t;
       sum.head = fix.fix.head;
+      sum.covariance = fix.fix.covariance.rad2;
       sum.used = fix.used;
       sum.H.setZero(y.size(), problem_.without_modes_.size());
       sum.y.setZero(y.size());
@@ -164,6 +167,7 @@ class PassProblem::FixMerger {
   struct Sum {
     Time t{};  ///< of the first
     int head = 0;
+    decltype(FixCovariance::rad2) covariance{};
     GyroMask used{};
     double weight = 0;
     MatrixXd H;  ///< without modes
@@ -581,7 +585,7 @@ PassProblem::Compared PassProblem::compare_now(const PassSolution& solution, con
     noise_rad[k] = setup.readout_noise_rad[k] * fix.noise_factor * sharing;
   }
   return {rows_about_states_now<kPassCapacity.states>(on_board_, comparison),
-          noise_of(comparison, fix_noise(setup, fix.fix.head), noise_rad)};
+          noise_of(comparison, fix_noise(setup, fix.fix), noise_rad)};
 }
 
 PassProblem::FixRows PassProblem::compare(const PassSolution& solution, const Moment& moment) const {

@@ -192,9 +192,10 @@ std::vector<Forecast> Trial::forecasts() const {
 
 std::vector<Eigen::Vector3d> Trial::changes_rad() const {
   constexpr Duration kClose = std::chrono::seconds(10);  // over which nothing slow changes
+  const CalibrationSetup& setup = problem_.setup().on_board;
   std::vector<Eigen::Vector3d> changes;
   std::optional<Eigen::Quaterniond> last;
-  Time last_t{};
+  StarFix last_fix;
   problem_.go_along_momenta(found_.solution, [&](const PassProblem::Moment& moment) {
     if (moment.fix == nullptr || moment.fix->fix.head != 0) {
       return;
@@ -205,11 +206,16 @@ std::vector<Eigen::Vector3d> Trial::changes_rad() const {
     }
     const Eigen::Quaterniond apart =
         by_gyros.value().C_in_c.quaternion().conjugate() * moment.fix->fix.q_in_c.normalized();
-    if (last && moment.t - last_t < kClose) {
-      changes.emplace_back(Rot<C, C>::assume(last->conjugate() * apart).log().raw());
+    const StarFix& fix = moment.fix->fix;
+    if (last && fix.t - last_fix.t < kClose) {
+      Eigen::Vector3d& change = changes.emplace_back(Rot<C, C>::assume(last->conjugate() * apart).log().raw());
+      if (fix.covariance.is_told() || last_fix.covariance.is_told()) {
+        const Eigen::Vector3d variance = (fix_noise(setup, fix) + fix_noise(setup, last_fix)).diagonal() / 2;
+        change = change.cwiseProduct(setup.star_trackers[0].noise_rad).cwiseQuotient(variance.cwiseSqrt());
+      }
     }
     last = apart;
-    last_t = moment.t;
+    last_fix = fix;
   });
   return changes;
 }

@@ -82,6 +82,9 @@ CalibrationSetup setup_of(const PassSettings& settings, const CalibrationOptions
     setup.readout_noise_rad[k] = settings.gyros[static_cast<std::size_t>(k)].readout_noise_rad;
   }
   setup.star_trackers[0].noise_rad = options.star_tracker_noise_rad.value_or(settings.star_tracker_noise_rad);
+  if (options.star_tracker_noise_rad) {
+    setup.over_told_covariance = options.star_tracker_noise_rad->cwiseQuotient(settings.star_tracker_noise_rad);
+  }
   for (int head = 1; head < setup.layout.star_trackers; ++head) {
     const FurtherStarTracker& tracker = settings.further_star_trackers[static_cast<std::size_t>(head - 1)];
     StarTrackerSetup& its = setup.star_trackers[static_cast<std::size_t>(head)];

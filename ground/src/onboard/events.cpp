@@ -46,7 +46,7 @@ std::optional<Events::Event> Events::next() {
   }
   const auto which = static_cast<std::size_t>(head);
   const std::uint64_t i = position_.fixes[which]++;
-  return StarFix{heads_[which]->t[i], heads_[which]->q_in_c[i], head};
+  return heads_[which]->fix(i, head);
 }
 
 }  // namespace trihedron::ground

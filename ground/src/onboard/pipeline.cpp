@@ -194,7 +194,7 @@ OpenLoopEnd Pipeline::compare(const AttitudeSolution& attitude, const ComparedFi
           corrected(its.fix, fix_by_shared_states(estimator.setup(), its.fix, its.readings.rate_c), estimator.shared());
     }
     const Eigen::Vector3d apart_rad = (by_fix.inverse() * attitude.C_in_c).log().raw();
-    const Eigen::Matrix3d covariance = attitude.covariance_rad2 + fix_noise(estimator.setup(), its.fix.head);
+    const Eigen::Matrix3d covariance = attitude.covariance_rad2 + fix_noise(estimator.setup(), its.fix);
     return OpenLoopEnd{its.fix.t, apart_rad.norm(), apart_rad.dot(covariance.llt().solve(apart_rad))};
   });
 }

@@ -5,6 +5,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <type_traits>
 
 #include "trihedron/core/assert.hpp"
 #include "trihedron/core/status.hpp"
@@ -13,8 +14,8 @@
 namespace trihedron {
 
 /// In the order of their times; there is room for the fixes of kStarTrackers at 20 Hz with gyros at 1 Hz, whose
-/// readings come up to 5 s later.
-template <int kStarTrackers>
+/// readings come up to 5 s later. Covariances of the fixes are kept where kCovariances says so.
+template <int kStarTrackers, bool kCovariances = false>
 class FixQueue {
  public:
   static constexpr int kCapacity = 100 * kStarTrackers;
@@ -50,10 +51,16 @@ class FixQueue {
       times_[slot(i)] = times_[slot(i - 1)];
       heads_[slot(i)] = heads_[slot(i - 1)];
       q_in_c_[slot(i)] = q_in_c_[slot(i - 1)];
+      if constexpr (kCovariances) {
+        covariances_[slot(i)] = covariances_[slot(i - 1)];
+      }
     }
     times_[slot(place)] = fix.t;
     heads_[slot(place)] = static_cast<std::int8_t>(fix.head);
     std::copy_n(fix.q_in_c.coeffs().data(), fix.q_in_c.coeffs().size(), q_in_c_[slot(place)].begin());
+    if constexpr (kCovariances) {
+      covariances_[slot(place)] = fix.covariance;
+    }
     ++size_;
     return FixStatus::kPending;
   }
@@ -62,7 +69,10 @@ class FixQueue {
   [[nodiscard]] StarFix pop() {
     TRIHEDRON_ASSERT(size_ > 0);
     const std::size_t its = slot(0);
-    const StarFix fix{times_[its], Eigen::Quaterniond(q_in_c_[its].data()), heads_[its]};
+    StarFix fix{times_[its], Eigen::Quaterniond(q_in_c_[its].data()), heads_[its], {}};
+    if constexpr (kCovariances) {
+      fix.covariance = covariances_[its];
+    }
     first_ = (first_ + 1) % kCapacity;
     --size_;
     return fix;
@@ -85,6 +95,8 @@ class FixQueue {
   Slots<std::array<double, 4>> q_in_c_{};
   Slots<Time> times_{};
   Slots<std::int8_t> heads_{};
+  struct None {};
+  [[no_unique_address]] std::conditional_t<kCovariances, Slots<FixCovariance>, None> covariances_{};
   int first_ = 0;
   int size_ = 0;
 };

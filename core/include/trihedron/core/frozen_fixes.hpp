@@ -76,7 +76,7 @@ class FrozenFixes {
   template <class Gyros>
   [[nodiscard]] bool has_turned(const Last& last, const StarFix& fix, const FixReadings& readings,
                                 const CalibrationSetup& setup, const Gyros& gyros) const {
-    const Eigen::Matrix3d R_c = fix_noise(setup, fix.head);
+    const Eigen::Matrix3d R_c = fix_noise(setup, fix);
     const double drift_rad = drift_rad_s_ * to_seconds(fix.t - last.t);
     const GyroMask used = both(last.used, readings.used);
     for (int k = 0; k < setup.layout.gyros; ++k) {

@@ -36,6 +36,7 @@ class InvariantEstimator {
   static constexpr int kMaxDynamic = kCapacity.dynamic;
   static constexpr int kMaxErrors = kMaxStates;
   static constexpr int kStarTrackers = kCapacity.star_trackers;  ///< at most
+  static constexpr bool kFixCovariances = kCapacity.fix_covariances;
   static constexpr bool kUsesAngles = true;
   static constexpr bool kTakesSamplesTogether = true;
   using Gyro = GyroModel<kCapacity.drift_columns>;

@@ -172,9 +172,11 @@ struct Capacity {
   int states = 0;
   int dynamic = 0;  ///< of the states, those that move
   int star_trackers = 0;
+  bool fix_covariances = false;  ///< each fix may come with its own; else the noise of the set-up is that of all
 
-  [[nodiscard]] static constexpr Capacity of(const Layout& largest) {
-    return {largest.gyros, largest.drift_columns(), largest.size(), largest.dynamic(), largest.star_trackers};
+  [[nodiscard]] static constexpr Capacity of(const Layout& largest, bool fix_covariances = false) {
+    return {largest.gyros,     largest.drift_columns(), largest.size(),
+            largest.dynamic(), largest.star_trackers,   fix_covariances};
   }
   [[nodiscard]] constexpr bool holds(const Layout& layout) const {
     return layout.gyros >= 2 && layout.gyros <= gyros && layout.drift_columns() <= drift_columns &&
@@ -192,7 +194,7 @@ inline constexpr Layout kLargestLayout{.gyros = kMaxGyros,
                                        .drift_model = vsh(DriftModelId::kMaxDegreeOnBoard),
                                        .further = kAllFurtherStates,
                                        .star_trackers = kMaxStarTrackers};
-inline constexpr Capacity kFullCapacity = Capacity::of(kLargestLayout);
+inline constexpr Capacity kFullCapacity = Capacity::of(kLargestLayout, true);
 /// Everything that is estimated by a whole pass.
 inline constexpr Capacity kPassCapacity = Capacity::of({.gyros = kMaxGyros,
                                                         .drift_model = vsh(DriftModelId::kMaxDegree),

@@ -20,8 +20,8 @@ using SharedStates = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, kMaxSharedState
 [[nodiscard]] FixBySharedStates fix_by_shared_states(const CalibrationSetup& setup, const StarFix& fix,
                                                      const Eigen::Vector3d& rate_c);
 
-/// Covariance of a fix's noise, c axes, rad².
-[[nodiscard]] Eigen::Matrix3d fix_noise(const CalibrationSetup& setup, int head);
+/// Covariance of a fix's noise, c axes, rad²: its own, or where it comes without one that of its star tracker.
+[[nodiscard]] Eigen::Matrix3d fix_noise(const CalibrationSetup& setup, const StarFix& fix);
 
 /// The fix with the estimate of its error taken off.
 [[nodiscard]] Rot<In, C> corrected(const StarFix& fix, const FixBySharedStates& by_shared, const SharedStates& shared);

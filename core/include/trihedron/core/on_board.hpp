@@ -211,7 +211,7 @@ class OnBoard {
   }
 
   Intake intake_;
-  FixQueue<Estimator::kStarTrackers> fixes_;
+  FixQueue<Estimator::kStarTrackers, Estimator::kFixCovariances> fixes_;
   FrozenFixes<Estimator::kStarTrackers, Gyros::capacity()> frozen_fixes_;
   Readings<Gyros::capacity()> readings_;
   Schedule schedule_;

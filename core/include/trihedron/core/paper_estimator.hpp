@@ -36,6 +36,7 @@ class PaperEstimator {
   };
   static constexpr int kGyros = 2;
   static constexpr int kStarTrackers = 1;
+  static constexpr bool kFixCovariances = true;
   static constexpr int kMaxStates = States::kSize;
   static constexpr int kMaxErrors = Layout{}.size();
   static constexpr int kMeasurements = 4;
@@ -115,14 +116,15 @@ class PaperEstimator {
   [[nodiscard]] static QuasiInertial quasi_inertial(const Trihedron<In>& t);
 
   /// Eq. (3), components 2–5 with the sign turned: y = h_et − h_R = H x + noise, noise covariance R. The tracker's
-  /// error is common to all four components, each readout's to its own two.
+  /// error is common to all four components, each readout's to its own two. `covariance`: of the fix.
   struct Measurement {
     Eigen::Matrix<double, kMeasurements, 1> innovation = Eigen::Matrix<double, kMeasurements, 1>::Zero();
     Eigen::Matrix<double, kMeasurements, kMaxStates> H = Eigen::Matrix<double, kMeasurements, kMaxStates>::Zero();
     Eigen::Matrix<double, kMeasurements, kMeasurements> R = Eigen::Matrix<double, kMeasurements, kMeasurements>::Zero();
   };
   [[nodiscard]] static Measurement measure(const Gyros& gyros, const QuasiInertial& qi, const Eigen::Matrix3d& C_in_c,
-                                           const Directions& h_b, const CalibrationSetup& setup);
+                                           const Directions& h_b, const CalibrationSetup& setup,
+                                           const FixCovariance& covariance = {});
 
  private:
   using Information = SquareRootInformation<kMaxStates, States::kDynamic>;

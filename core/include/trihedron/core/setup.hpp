@@ -63,6 +63,8 @@ struct CalibrationSetup {
   Layout layout;
   PerGyro<double> readout_noise_rad{};  ///< 1-sigma per direction cosine
   std::array<StarTrackerSetup, kMaxStarTrackers> star_trackers{};
+  /// About c x, y, z: 1-sigma of fixes of the first star tracker that come with a covariance over what that says.
+  Eigen::Vector3d over_told_covariance{1, 1, 1};
   Duration gyro_period = std::chrono::milliseconds(125);
   double direction_random_walk_rad_sqrt_s = 0;  ///< process noise of each momentum, per axis across it
 

@@ -3,6 +3,7 @@
 
 #include <Eigen/Core>
 #include <Eigen/Geometry>
+#include <array>
 
 #include "trihedron/core/per_gyro.hpp"
 #include "trihedron/core/time.hpp"
@@ -19,11 +20,24 @@ struct GyroSample {
   Directions h_b;
 };
 
+/// Covariance of the error e of a fix, c axes: as given = true · exp([e×]).
+struct FixCovariance {
+  std::array<double, 6> rad2{};  ///< xx, yy, zz, xy, xz, yz; all zero where the fix comes without one
+
+  [[nodiscard]] bool is_told() const { return rad2[0] > 0; }
+  [[nodiscard]] Eigen::Matrix3d matrix() const {
+    Eigen::Matrix3d its;
+    its << rad2[0], rad2[3], rad2[4], rad2[3], rad2[1], rad2[5], rad2[4], rad2[5], rad2[2];
+    return its;
+  }
+};
+
 /// Star-tracker fix q_in_c, Hamilton; as telemetered, of either sign.
 struct StarFix {
   Time t{};
   Eigen::Quaterniond q_in_c = Eigen::Quaterniond::Identity();  ///< of a further head: by its mounting as designed
   int head = 0;                                                ///< which star tracker; the axes of the first are c
+  FixCovariance covariance{};                                  ///< positive definite; not told: noise of the set-up
 };
 
 /// Whether the length is within kNormTolerance of one; false for NaN.

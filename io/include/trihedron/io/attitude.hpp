@@ -18,8 +18,8 @@ namespace trihedron::io {
 
 /// Further columns are skipped; without the sigma columns `sigma_rad` is empty, without age_s `age_s`. A sigma may be
 /// NaN (unknown). Throws InputRefused for everything else that is not a clean solution: times that do not increase, a q
-/// that is no unit quaternion, no row at all. A message (attitude_message.hpp) is read as well, whatever the file is
-/// called; it has epochs of its own, and its inertial frame is taken for that of the pass.
+/// that is no unit quaternion, no row at all. A message (attitude_message.hpp) or C-kernel is read as well, whatever
+/// the file is called; it has epochs of its own, and its inertial frame is taken for that of the pass.
 [[nodiscard]] AttitudeHistory read_attitude(const std::filesystem::path& path, Time epoch);
 
 /// Of the components of q.

@@ -77,8 +77,8 @@ struct AttitudeMessage {
 /// of quaternions between one inertial frame and one of the spacecraft's.
 [[nodiscard]] AttitudeMessage parse_attitude_message(std::string_view text, const std::filesystem::path& file);
 [[nodiscard]] AttitudeMessage read_attitude_message(const std::filesystem::path& file);  ///< Of a file.
-/// Same, or an attitude file (CSV), which needs the epoch that its t_s counts from: throws UsageError where that is not
-/// given.
+/// Same, a C-kernel of SPICE with its clock beside it, or an attitude file (CSV), which needs the epoch that its t_s
+/// counts from: throws UsageError where that is not given.
 [[nodiscard]] AttitudeMessage read_attitude_of_any_format(const std::filesystem::path& path,
                                                           std::optional<Time> given_epoch);
 

@@ -2,10 +2,13 @@
 /// A calibration as CCSDS attitude comprehensive message (ACM version 2, 504.0-B-2), with its covariance beside it.
 /// docs/interchange.md has the names of the user-defined keywords.
 
+#include <Eigen/Geometry>
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <variant>
+#include <vector>
 
 #include "trihedron/io/attitude_message.hpp"
 #include "trihedron/records/calibration.hpp"
@@ -13,11 +16,23 @@
 
 namespace trihedron::io {
 
+/// A slew: begin, end, and the attitude that it leads to.
+struct Manoeuvre {
+  Time begin{};
+  Time end{};
+  std::optional<Eigen::Quaterniond> target_q_in_c{};
+};
+
+/// Slews that an attitude shows: where it turns more than twice as fast as it does usually (the median), and faster
+/// than 1e-3 rad/s. Nothing is said of steps longer than `gap`; turns less than a minute apart are one.
+[[nodiscard]] std::vector<Manoeuvre> slews_of(const AttitudeHistory& attitude, Duration gap);
+
 /// What a message may have beside the calibration.
 struct CalibrationContext {
   const AttitudeMessage* attitude = nullptr;  ///< states and, where it has sigmas, their covariance
   const PassSettings* pass = nullptr;         ///< noise and periods of the sensors
   std::string covariance_file;                ///< name that the message gives for the full covariance
+  std::vector<Manoeuvre> manoeuvres{};        ///< in order
 };
 
 /// Relative times count from the epoch of the calibration. Throws UsageError as expect_writable_description(), and for
@@ -38,6 +53,7 @@ struct CalibrationMessage {
   std::filesystem::path covariance_file;
   /// Whether the covariance is that of the file; else it is diagonal, from the sigmas in the message.
   bool has_full_covariance = false;
+  std::vector<Manoeuvre> manoeuvres{};  ///< its blocks MAN; of no meaning to the calibration
 };
 
 /// Whether a text says that it is an ACM.

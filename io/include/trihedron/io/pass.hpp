@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <optional>
 #include <string>
 #include <vector>
@@ -45,10 +46,11 @@ struct Defect {
     kExcluded,         ///< left out: in an interval that was to be left out
     kFlagged,          ///< a quality flag says that it is bad: a fix is left out, a gyro's reading taken as missing
     kLargeSigma,       ///< left out: a fix whose own 1-sigma is too large, or none
-    kPacketDamaged,    ///< left out: a space packet whose CRC is wrong
-    kPacketsMissing,   ///< space packets that are missing by their sequence count; places are of those that follow
-    kOtherPackets,     ///< left out: space packets of another APID, or other reports
-    kGap,              ///< more than 1.5 periods without a row, at the ends of the pass too; counts the gaps
+    kNoCovariance,  ///< kept: a fix of a table with covariances that has none which can be used; noise_rad is its noise
+    kPacketDamaged,   ///< left out: a space packet whose CRC is wrong
+    kPacketsMissing,  ///< space packets that are missing by their sequence count; places are of those that follow
+    kOtherPackets,    ///< left out: space packets of another APID, or other reports
+    kGap,             ///< more than 1.5 periods without a row, at the ends of the pass too; counts the gaps
   };
   static constexpr std::size_t kPlaces = 5;
 
@@ -104,11 +106,20 @@ struct LoadedPass {
 /// NetCDF.
 [[nodiscard]] LoadedPass read_pass(const std::filesystem::path& path, const Selection& selection = {});
 
+/// Gives columns of a Parquet file as the text of a CSV file: their names in the first line, commas, an empty field
+/// where there is no value, timestamps as ISO dates and times. Where it lacks one, the names that it has, without rows.
+using ReadParquet =
+    std::function<std::string(const std::filesystem::path& file, const std::vector<std::string>& names)>;
+
+/// Reads the pass of a telemetry.toml as read_pass() does, and tables in Parquet as well, by `parquet`.
+[[nodiscard]] LoadedPass read_telemetry(const std::filesystem::path& file, const ReadParquet& parquet);
+
 /// A table of a pass in memory, as a file has it before it is screened: rows may be as dirty as telemetry is.
 struct TableInMemory {
-  std::string name;            ///< for messages: "gyro"
-  std::vector<double> t_s;     ///< since the epoch of the pass
-  std::vector<double> values;  ///< row by row; NaN where missing
+  std::string name;              ///< for messages: "gyro"
+  std::vector<double> t_s;       ///< since the epoch of the pass
+  std::vector<double> values;    ///< row by row; NaN where missing
+  bool has_covariances = false;  ///< of fixes
 };
 
 /// A pass in memory, for programs that have read it themselves.
@@ -118,7 +129,8 @@ struct PassInMemory {
   std::string prior;                         ///< the text of a calibration.json; empty where there is none
   int gyros = 0;                             ///< 2 or more
   TableInMemory gyro;                        ///< h1_x, h1_y, h1_z, h2_x …
-  std::vector<TableInMemory> star_trackers;  ///< q_x, q_y, q_z, q_w; the first head, then the further ones
+  std::vector<TableInMemory> star_trackers;  ///< q_x, q_y, q_z, q_w, and cov_xx_rad2, yy, zz, xy, xz, yz if
+                                             ///< any; the first head, then the further ones
 };
 
 /// Settings, the text of a pass.toml of so many gyros, with an earlier calibration, the text of a calibration.json, or

@@ -4,6 +4,7 @@
 
 #include <filesystem>
 #include <string_view>
+#include <vector>
 
 #include "trihedron/records/scenario.hpp"
 
@@ -14,11 +15,10 @@ namespace trihedron::io {
 /// say.
 [[nodiscard]] Scenario read_scenario(const std::filesystem::path& file);
 
-/// Same, from text; `file` is for messages, and a recorded attitude is looked up beside it.
+/// Same, from text; `file` is for messages, and what the scenario names is looked up beside it.
 [[nodiscard]] Scenario parse_scenario(std::string_view text, const std::filesystem::path& file);
 
-/// The file that `recorded` of a scenario names; empty where it names none. Throws as read_scenario where that is no
-/// TOML.
-[[nodiscard]] std::filesystem::path recorded_attitude_of(const std::filesystem::path& scenario_file);
+/// The files that a scenario names: an attitude, an orbit. Throws as read_scenario where it is no TOML.
+[[nodiscard]] std::vector<std::filesystem::path> files_of_scenario(const std::filesystem::path& scenario_file);
 
 }  // namespace trihedron::io

@@ -98,6 +98,10 @@ inline constexpr Range kAngle_rad{-kFullTurn_rad, kFullTurn_rad, "rad", "it is a
 inline constexpr Range kInterval_s{-kYear_s, kYear_s, "s", "it is at most a year"};
 inline constexpr Range kPureNumber{-1e3, 1e3, "", "no fraction or component is so large"};
 
+inline constexpr Range kOrbitRadius_m{6.3e6, 2e9, "m", "an orbit goes round the Earth, whose radius is 6378 km"};
+inline constexpr Range kOrbitSpeed_m_s{1, 2e4, "m/s", "what is faster than 11 km/s leaves the Earth"};
+inline constexpr Range kInterpolationDegree{1, 25, "", "polynomials of higher degree swing between the states"};
+
 // ---- Options
 
 inline constexpr Range kAttitudeLimit_rad{1e-9, 3.15, "rad", "an error has no sign, and is at most a half turn"};

@@ -86,8 +86,12 @@ struct GyroTelemetry {
 struct StarTrackerTelemetry {
   std::vector<Time> t;
   std::vector<Eigen::Quaterniond> q_in_c;
+  std::vector<FixCovariance> covariances{};  ///< of each, told or not; empty where none is told
 
   [[nodiscard]] std::size_t size() const { return t.size(); }
+  [[nodiscard]] StarFix fix(std::size_t i, int head) const {
+    return {t[i], q_in_c[i], head, covariances.empty() ? FixCovariance{} : covariances[i]};
+  }
 };
 
 /// Settings and telemetry of one pass.

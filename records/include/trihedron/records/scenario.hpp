@@ -29,6 +29,27 @@ struct Interval {
   double end_s = 0;
 };
 
+/// States of an orbit as they are told, about the Earth's centre, axes `in`, and how to interpolate between them. Times
+/// are seconds from the start of the pass, and increase; where begin_s ≤ t ≤ end_s they may be used.
+struct EphemerisSegment {
+  enum class Interpolation {
+    kHermite,  ///< through positions and velocities
+    kLagrange  ///< of each component of position and velocity by itself
+  };
+  double begin_s = 0;
+  double end_s = 0;
+  Interpolation interpolation = Interpolation::kHermite;
+  int degree = 7;  ///< of the polynomial
+  std::vector<double> t_s{};
+  std::vector<Eigen::Vector3d> position_m{};
+  std::vector<Eigen::Vector3d> velocity_m_s{};
+
+  /// How many states the polynomial goes through.
+  [[nodiscard]] std::size_t nodes() const {
+    return static_cast<std::size_t>(interpolation == Interpolation::kHermite ? (degree + 2) / 2 : degree + 1);
+  }
+};
+
 /// Mean elements at the start of the pass; equator and equinox of `in`. Kepler's motion with the secular rates of J2.
 struct OrbitScenario {
   double perigee_altitude_m = 360e3;  ///< above the equatorial radius
@@ -37,6 +58,8 @@ struct OrbitScenario {
   double ascending_node_rad = 40 * kDegree;
   double argument_of_perigee_rad = 60 * kDegree;
   double mean_anomaly_rad = 0;
+  std::vector<EphemerisSegment>
+      ephemeris{};  ///< in place of the elements where there is one; in order, not overlapping
 };
 
 /// From `begin_s` on, turn about one fixed axis to these angles from the reference attitude, at rest at both ends, and

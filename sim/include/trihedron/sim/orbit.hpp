@@ -1,6 +1,9 @@
 #pragma once
 /// Where the spacecraft is.
 
+#include <memory>
+#include <vector>
+
 #include "trihedron/core/frames.hpp"
 #include "trihedron/records/scenario.hpp"
 
@@ -18,8 +21,7 @@ struct OrbitState {
   Vec<In> velocity_m_s;  ///< relative to the Earth's centre
 };
 
-/// Interface to a source of position; others than KeplerJ2 may follow (CCSDS OEM, two-line elements). Times are seconds
-/// from the start of the pass.
+/// Interface to a source of position. Times are seconds from the start of the pass.
 class Ephemeris {
  public:
   virtual ~Ephemeris() = default;
@@ -56,6 +58,25 @@ class KeplerJ2 final : public Ephemeris {
   double cos_inclination_;
   double sin_inclination_;
 };
+
+/// States that are told, interpolated.
+class ToldEphemeris final : public Ephemeris {
+ public:
+  /// Throws std::invalid_argument unless they reach from begin_s to end_s.
+  ToldEphemeris(const std::vector<EphemerisSegment>& segments, double begin_s, double end_s);
+
+  /// At a time outside what is told that of the nearest end is taken.
+  [[nodiscard]] OrbitState at(double t_s) const override;
+  /// Over whole revolutions, or where there is none by the size of the orbit.
+  [[nodiscard]] double mean_rate_rad_s() const override { return mean_rate_rad_s_; }
+
+ private:
+  std::vector<EphemerisSegment> segments_;
+  double mean_rate_rad_s_;
+};
+
+/// That of a scenario, which is to be known from begin_s to end_s. Throws std::invalid_argument.
+[[nodiscard]] std::unique_ptr<Ephemeris> ephemeris_of(const OrbitScenario& orbit, double begin_s, double end_s);
 
 /// E with E − e sin E = M, |error| < 1e-14 rad for 0 ≤ e < 1.
 [[nodiscard]] double eccentric_anomaly(double mean_anomaly_rad, double eccentricity);

@@ -1,0 +1,104 @@
+// Fixes that come with a covariance of their own.
+
+#include <gtest/gtest.h>
+
+#include <Eigen/Cholesky>
+#include <cmath>
+#include <random>
+
+#include "passes.hpp"
+#include "trihedron/core/frames.hpp"
+#include "trihedron/ground/calibrate/calibrate.hpp"
+#include "trihedron/ground/onboard/pipeline.hpp"
+#include "trihedron/records/run.hpp"
+
+namespace trihedron::ground {
+namespace {
+
+FixCovariance told_as(const Eigen::Matrix3d& its) {
+  return {{its(0, 0), its(1, 1), its(2, 2), its(0, 1), its(0, 2), its(1, 2)}};
+}
+
+/// Two hours, in which every other ten minutes the fixes are much noisier about an axis that is none of c; each comes
+/// with its covariance.
+Pass noisy_by_turns() {
+  Pass pass = two_hours().pass;
+  const Eigen::Vector3d own = pass.settings.star_tracker_noise_rad;
+  const Eigen::Vector3d axis = Eigen::Vector3d(2, -1, 0.5).normalized();
+  constexpr double kMore_rad = 40 * kArcsecond;
+  std::mt19937_64 random(7);
+  std::normal_distribution<double> normal;
+  for (std::size_t i = 0; i < pass.star_tracker.size(); ++i) {
+    Eigen::Matrix3d covariance = own.cwiseAbs2().asDiagonal();
+    if (i / 200 % 2 == 1) {
+      covariance += kMore_rad * kMore_rad * axis * axis.transpose();
+      const Eigen::Vector3d error = kMore_rad * normal(random) * axis;
+      pass.star_tracker.q_in_c[i] = pass.star_tracker.q_in_c[i] * Rot<C, C>::exp(Vec<C>::assume(error)).quaternion();
+    }
+    pass.star_tracker.covariances.push_back(told_as(covariance));
+  }
+  return pass;
+}
+
+CalibrationOptions with(Estimator estimator) {
+  CalibrationOptions options = told();
+  options.estimator = estimator;
+  return options;
+}
+
+class FixCovariances : public testing::TestWithParam<Estimator> {};
+
+TEST_P(FixCovariances, OfTheSettingsNoiseChangeNoBit) {
+  Pass pass = two_hours().pass;
+  const auto before = calibrate(pass, with(GetParam())).calibration;
+  const Eigen::Vector3d square =
+      pass.settings.star_tracker_noise_rad.cwiseProduct(pass.settings.star_tracker_noise_rad);
+  pass.star_tracker.covariances.assign(pass.star_tracker.size(), told_as(square.asDiagonal()));
+  const auto after = calibrate(pass, with(GetParam())).calibration;
+  EXPECT_EQ(after.covariance, before.covariance);
+  for (std::size_t k = 0; k < 2; ++k) {
+    EXPECT_EQ(after.gyros[k].drift_rad_s, before.gyros[k].drift_rad_s);
+    EXPECT_EQ(after.gyros[k].momentum_in, before.gyros[k].momentum_in);
+  }
+}
+
+TEST_P(FixCovariances, GiveEachFixItsWeight) {
+  Pass pass = noisy_by_turns();
+  const auto run = calibrate(pass, with(GetParam()));
+  // 2400 fixes of χ² with 4 degrees of freedom: 0.058 of the mean is one sigma.
+  EXPECT_NEAR(run.calibration.statistics.nis_mean.value(), 4, 0.3);
+  if (GetParam() != Estimator::kPaper) {                         // which is known not to be consistent
+    EXPECT_LT(nees_of(two_hours().truth, run.calibration), 45);  // χ² of 20, once in 1000
+  }
+  // Weighed alike, with the noise that they have on the whole, they give less.
+  pass.star_tracker.covariances.clear();
+  const double more = 40 * kArcsecond / std::sqrt(2);
+  pass.settings.star_tracker_noise_rad = (pass.settings.star_tracker_noise_rad.array().square() + more * more).sqrt();
+  const auto alike = calibrate(pass, with(GetParam()));
+  const auto sigma = [](const CalibrationRun& its) { return std::sqrt(its.calibration.covariance(9, 9)); };
+  EXPECT_LT(sigma(run), 0.7 * sigma(alike));
+}
+
+INSTANTIATE_TEST_SUITE_P(Estimators, FixCovariances,
+                         testing::Values(Estimator::kInvariant, Estimator::kPaper, Estimator::kBatch));
+
+TEST(FindNoise, OfCovariancesThatAreTooSmall) {
+  Pass pass = noisy_by_turns();
+  pass.settings.star_tracker_noise_rad /= 2;
+  for (FixCovariance& its : pass.star_tracker.covariances) {
+    for (double& element : its.rad2) {
+      element /= 4;
+    }
+  }
+  CalibrationOptions options = told();
+  options.find_noise = true;
+  const auto run = calibrate(pass, options);
+  ASSERT_TRUE(run.options.star_tracker_noise_rad.has_value());
+  const Eigen::Vector3d factor =
+      run.options.star_tracker_noise_rad->cwiseQuotient(pass.settings.star_tracker_noise_rad);
+  EXPECT_LT((factor - Eigen::Vector3d(2, 2, 2)).cwiseAbs().maxCoeff(), 0.15) << factor.transpose();
+  EXPECT_NEAR(run.calibration.statistics.nis_mean.value(), 4, 0.4);
+}
+
+}  // namespace
+}  // namespace trihedron::ground
