@@ -28,7 +28,7 @@ flight=(gcc-arm-none-eabi libnewlib-arm-none-eabi libstdc++-arm-none-eabi-newlib
 # The further targets of `make flight`.
 targets=(g++-s390x-linux-gnu g++-riscv64-linux-gnu g++-multilib-sparc64-linux-gnu qemu-user)
 # Program and tests under sanitizers, the coverage of core, libFuzzer.
-sanitizers=(clang-16 libclang-rt-16-dev llvm-16)
+sanitizers=(clang-16 libclang-rt-16-dev lld-16 llvm-16)
 # Debian packages and the root of an OCI image, and what tries them.
 packaging=(debhelper fakeroot lintian mmdebstrap buildah python3 python3-venv)
 lint=(git ca-certificates cppcheck python3 python3-venv)
