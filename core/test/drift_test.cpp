@@ -219,8 +219,9 @@ TEST(DriftModel, MembersAreIndependent) {
       gram.selfadjointView<Eigen::Lower>().rankUpdate(moves.transpose());
     }
     const Eigen::VectorXd scale = gram.diagonal().cwiseSqrt().cwiseInverse();
-    const Eigen::VectorXd eigenvalues =
-        Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(scale.asDiagonal() * gram * scale.asDiagonal(), Eigen::EigenvaluesOnly).eigenvalues();
+    const Eigen::VectorXd eigenvalues = Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(
+                                            scale.asDiagonal() * gram * scale.asDiagonal(), Eigen::EigenvaluesOnly)
+                                            .eigenvalues();
     EXPECT_GT(eigenvalues.minCoeff(), 1e-3) << model.size();
   }
 }
