@@ -164,7 +164,9 @@ ToldEphemeris::ToldEphemeris(const std::vector<EphemerisSegment>& segments, doub
   const double first = argument_of_latitude(at(begin_s));
   double swept = 0;
   double last = first;
-  for (double t_s = begin_s + step_s; t_s <= end_s; t_s += step_s) {
+  const auto steps = static_cast<int>((end_s - begin_s) / step_s);
+  for (int i = 1; i <= steps; ++i) {
+    const double t_s = begin_s + i * step_s;
     const double now = argument_of_latitude(at(t_s));
     const double turned = std::remainder(now - last, 2 * std::numbers::pi);
     const double before = swept;

@@ -246,6 +246,18 @@ ClockCorrection clocks_before(const PassSettings& settings) {
   return left;
 }
 
+/// What an estimator on board left out of the field that the pass showed, or of that of the earlier calibration; nothing
+/// where a model was asked for.
+std::optional<LeftOut> left_out_by(const PassSettings& settings, const CalibrationOptions& asked,
+                                   const Decision& decision) {
+  if (decision.left_out || decision.options.estimator != Estimator::kInvariant || asked.drift_model ||
+      !settings.prior) {
+    return decision.left_out;
+  }
+  LeftOut left_out(*settings.prior, *decision.options.drift_model);
+  return left_out.nothing() ? std::nullopt : std::optional(std::move(left_out));
+}
+
 /// `pass`: with its stamps corrected. Without a verdict.
 CalibrationRun calibrate_as_stamped(const Pass& pass, const CalibrationOptions& options, const Progress& progress) {
   Decision decision = decide(pass, options);
@@ -297,11 +309,15 @@ CalibrationRun calibrate_as_stamped(const Pass& pass, const CalibrationOptions& 
   }
   add_statistics(run.fixes, run.calibration.statistics);
   run.calibration.forecast = forecast_of(run);
-  if (decision.left_out) {
-    run.calibration.on_board_drift = {decision.left_out->kept_model(), 0};
-    run.calibration = decision.left_out->completed(std::move(run.calibration));
-    run.parameters = decision.left_out->completed(run.parameters);
-    run.known_before = decision.left_out->completed_prior(run.known_before);
+  if (const std::optional<LeftOut> left_out = left_out_by(pass.settings, options, decision)) {
+    run.calibration.on_board_drift = {left_out->kept_model(), 0};
+    run.calibration = left_out->completed(std::move(run.calibration));
+    run.parameters = left_out->completed(run.parameters);
+    run.known_before = pass.settings.prior ? left_out->completed(std::move(run.known_before))
+                                           : left_out->completed_prior(std::move(run.known_before));
+    if (pass.settings.prior) {
+      run.calibration.drift_field = pass.settings.prior->drift_field;
+    }
   }
   run.calibration.determined = determined(run);
   return run;
