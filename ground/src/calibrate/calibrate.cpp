@@ -246,13 +246,16 @@ ClockCorrection clocks_before(const PassSettings& settings) {
   return left;
 }
 
-/// What an estimator on board left out of the field that the pass showed, or of that of the earlier calibration; nothing
-/// where a model was asked for.
+/// What an estimator on board left out of the field that the pass showed, or of that of the earlier calibration;
+/// nothing where another model was asked for.
 std::optional<LeftOut> left_out_by(const PassSettings& settings, const CalibrationOptions& asked,
                                    const Decision& decision) {
-  if (decision.left_out || decision.options.estimator != Estimator::kInvariant || asked.drift_model ||
-      !settings.prior) {
+  if (decision.left_out || decision.options.estimator != Estimator::kInvariant || !settings.prior) {
     return decision.left_out;
+  }
+  const std::optional<OnBoardDrift>& on_board = settings.prior->on_board_drift;
+  if (asked.drift_model && !(on_board && on_board->drift_model == *asked.drift_model)) {
+    return std::nullopt;
   }
   LeftOut left_out(*settings.prior, *decision.options.drift_model);
   return left_out.nothing() ? std::nullopt : std::optional(std::move(left_out));
@@ -263,7 +266,10 @@ CalibrationRun calibrate_as_stamped(const Pass& pass, const CalibrationOptions& 
   Decision decision = decide(pass, options);
   const bool by_batch = decision.options.estimator == Estimator::kBatch;
   const PassSettings& settings = decision.settings ? *decision.settings : pass.settings;
-  Pipeline pipeline(settings, by_batch ? options_of_on_board_run(settings, decision) : decision.options);
+  CalibrationOptions flown = by_batch ? options_of_on_board_run(settings, decision) : decision.options;
+  flown.direction_random_walk_rad_sqrt_s =
+      std::hypot(flown.direction_random_walk_rad_sqrt_s, decision.left_out_walk_rad_sqrt_s);
+  Pipeline pipeline(settings, flown);
   Recorder recorder;
   ProgressMeter meter(progress, pass.gyro.size());
   const auto on_board = [&] {
@@ -310,7 +316,10 @@ CalibrationRun calibrate_as_stamped(const Pass& pass, const CalibrationOptions& 
   add_statistics(run.fixes, run.calibration.statistics);
   run.calibration.forecast = forecast_of(run);
   if (const std::optional<LeftOut> left_out = left_out_by(pass.settings, options, decision)) {
-    run.calibration.on_board_drift = {left_out->kept_model(), 0};
+    run.calibration.on_board_drift = {left_out->kept_model(), decision.left_out_walk_rad_sqrt_s};
+    if (run.calibration.noise) {  // what the pass needs: what stands for the members left out is beside it
+      run.calibration.noise->direction_random_walk_rad_sqrt_s = decision.options.direction_random_walk_rad_sqrt_s;
+    }
     run.calibration = left_out->completed(std::move(run.calibration));
     run.parameters = left_out->completed(run.parameters);
     run.known_before = pass.settings.prior ? left_out->completed(std::move(run.known_before))

@@ -8,6 +8,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "model/left_out.hpp"
 #include "trihedron/ground/calibrate/calibrate.hpp"
 #include "trihedron/ground/judge/verdict.hpp"
 #include "trihedron/ground/model/setup_error.hpp"
@@ -72,8 +73,16 @@ struct Comparison {
   Agreement alignments;
 };
 
-/// `earlier`: the calibration of the passes before.
-Comparison compare(const CalibrationRun& earlier, const CalibrationRun& later) {
+/// `before`: the calibration of the passes before; of one with more members than the later one has, what makes up for
+/// these is compared.
+Comparison compare(const CalibrationRun& before, const CalibrationRun& later) {
+  struct {
+    Calibration calibration, known_before;
+  } earlier{before.calibration, before.known_before};
+  const DriftModelId& model = later.calibration.gyros.front().drift_model;
+  if (model.size() < before.calibration.gyros.front().drift_model.size()) {
+    earlier = {LeftOut(before.calibration, model).reduced(), LeftOut(before.known_before, model).reduced()};
+  }
   const Likelihood a = likelihood_of(earlier.known_before, earlier.calibration);
   const Likelihood b = likelihood_of(later.known_before, later.calibration);
   const VectorXd moved =

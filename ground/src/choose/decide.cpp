@@ -289,7 +289,7 @@ ByEq1 try_eq1(const Pass& pass, const Screened& screened, const CalibrationOptio
 /// Decides by the data of the pass.
 Decision decide_by_pass(const Pass& pass, const Screened& screened, const CalibrationOptions& asked,
                         const DriftModelId& largest_model) {
-  Decision decision{asked, {}, {}, {}, {}, {}, {}, {}, {}, {}, {}};
+  Decision decision{asked, {}, {}, {}, {}, {}, {}, {}, 0, {}, {}, {}};
   CalibrationOptions& options = decision.options;
   const bool wandering_is_open = options.further_states[FurtherState::kWanderingDrift] == Choice::kAuto;
   if (wandering_is_open) {
@@ -414,7 +414,7 @@ Decision decide(const Pass& pass, const CalibrationOptions& asked_for) {
   }
   settle_by_estimator(asked);
   if (pass.settings.prior || asked.estimator == Estimator::kPaper) {
-    return {settled_before(pass.settings, asked), {}, {}, {}, {}, {}, {}, {}, {}, {}, {}};
+    return {settled_before(pass.settings, asked), {}, {}, {}, {}, {}, {}, {}, 0, {}, {}, {}};
   }
   const bool on_board = asked.estimator != Estimator::kBatch;
   const bool by_field = !asked.drift_model && !knows_of_drift_outside(pass.settings);
@@ -423,7 +423,7 @@ Decision decide(const Pass& pass, const CalibrationOptions& asked_for) {
     asked.drift_model = kLargestDriftModel;
     asked.estimator = Estimator::kBatch;
   }
-  Decision decision{asked, {}, {}, {}, {}, {}, {}, {}, {}, {}, {}};
+  Decision decision{asked, {}, {}, {}, {}, {}, {}, {}, 0, {}, {}, {}};
   CalibrationOptions& options = decision.options;
   options.find_noise = false;
   const bool states_are_settled =
@@ -456,8 +456,7 @@ Decision decide(const Pass& pass, const CalibrationOptions& asked_for) {
     if (drift.drift_model != kEsg7) {
       const LeftOut left_out(*decided.members, drift.drift_model);
       add_made_up(left_out, *decided.members, members);
-      double& walk = decided.options.direction_random_walk_rad_sqrt_s;
-      walk = std::hypot(walk, left_out_walk_rad_sqrt_s(left_out, *decided.members, screened.pass));
+      decided.left_out_walk_rad_sqrt_s = left_out_walk_rad_sqrt_s(left_out, *decided.members, screened.pass);
       decided.left_out = left_out;
       decided.levels = std::move(decided.field->levels);
     }

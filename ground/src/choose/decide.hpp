@@ -29,6 +29,7 @@ struct Decision {
   std::optional<PassSettings> settings;
   std::optional<Calibration> members;   ///< all coefficients of the field as the trial finds them, and alignments
   std::optional<LeftOut> left_out;      ///< what an estimator on board leaves out of these
+  double left_out_walk_rad_sqrt_s = 0;  ///< random walk of the momenta for that, beside the noise of the options
   std::vector<DriftFieldLevel> levels;  ///< of the field of which that estimator has the members
   std::optional<Screened> screened;     ///< the screened pass by which it was decided, where it was
   std::optional<Nearby> nearby;         ///< what was found with it

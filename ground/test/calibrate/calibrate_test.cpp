@@ -107,7 +107,7 @@ TEST(Calibrate, OnBoardTheDriftFieldIsItsLargeMembersWhichMakeUpForTheOthers) {
   ASSERT_TRUE(run.calibration.on_board_drift);
   EXPECT_EQ(run.calibration.on_board_drift->drift_model, vsh(DriftModelId::kMaxDegreeOnBoard));
   EXPECT_FALSE(run.options.further_states.is_on(FurtherState::kWanderingDrift));
-  EXPECT_LT(run.options.direction_random_walk_rad_sqrt_s * std::sqrt(5400), 2 * kArcsecond);
+  EXPECT_LT(run.calibration.on_board_drift->random_walk_rad_sqrt_s * std::sqrt(5400), 2 * kArcsecond);
 }
 
 /// Its degrees 7 and 8 find no room on board, and its 326 parameters are states of the batch as modes.

@@ -48,6 +48,31 @@ SeveralPasses after_two_hours_and(const Pass& second) {
   return passes;
 }
 
+/// One of the two has more members than an estimator on board: what makes up for these is compared.
+TEST(SeveralPasses, WithADriftFieldAgreeByWhatIsFlownOnBoard) {
+  const auto with_field = [](Scenario scenario) {
+    for (GyroScenario& gyro : scenario.gyros) {
+      gyro.drift.harmonics.push_back({DriftHarmonic::Potential::kW, 1, 1, 4e-8});
+    }
+    return scenario;
+  };
+  const sim::SimulatedPass first = sim::simulate(with_field(scenario_in_eq1(5, hours(2))));
+  const sim::SimulatedPass second = sim::simulate(with_field(with_gyros_of(first.truth, 6, hours(9))));
+  CalibrationOptions options = told();
+  options.drift_model.reset();
+  SeveralPasses passes(options);
+  passes.add("first", first.pass);
+  const PassAlone& later = passes.add("second", second.pass);
+  EXPECT_TRUE(later.coefficients.holds()) << later.coefficients.text();
+  EXPECT_TRUE(later.alignments.holds()) << later.alignments.text();
+  EXPECT_GT(later.alignments.degrees_of_freedom, 0);
+  const Calibration& together = passes.combined().calibration;
+  EXPECT_EQ(together.gyros.at(0).drift_model, kLargestDriftModel);
+  ASSERT_TRUE(together.on_board_drift);
+  EXPECT_EQ(together.states.size(), static_cast<std::size_t>(together.covariance.rows()));
+  EXPECT_FALSE(together.drift_field.empty());
+}
+
 auto has_finding(FindingCode code) { return Contains(Field(&Finding::code, code)); }
 
 std::string refusal_of(const Pass& second) {

@@ -47,7 +47,7 @@ struct DriftFieldLevel {
 struct OnBoardDrift {
   DriftModelId drift_model;
   /// Stands for what its coefficients cannot make up for of all others, beside the noise of the calibration, per axis
-  /// across each momentum; 0 where the calibration was made with this model, and its noise has it.
+  /// across each momentum; 0 where that noise has it, as after an earlier calibration with a field.
   double random_walk_rad_sqrt_s = 0;
 };
 
