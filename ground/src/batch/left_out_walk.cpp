@@ -20,9 +20,9 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 
 /// Between the directions that are taken: members of degree 8 change in minutes.
-constexpr Duration kStep = std::chrono::minutes(1);
+constexpr Duration kBetweenDirections = std::chrono::minutes(1);
 /// Over a longer gap nothing is added.
-constexpr Duration kGap = std::chrono::minutes(5);
+constexpr Duration kLongestUnread = std::chrono::minutes(5);
 
 /// For which a random walk stands; what comes back within a shorter time stays below the noise of a fix.
 constexpr std::array<Duration, 5> kLags = {std::chrono::minutes(10), std::chrono::minutes(22), std::chrono::minutes(45),
@@ -75,7 +75,7 @@ double left_out_walk_rad_sqrt_s(const LeftOut& left_out, const Calibration& all,
     MatrixXd rate_before;
     const auto gyro = static_cast<int>(k);
     for (const ScreenedPass::Fix& fix : pass.fixes) {
-      if (fix.fix.head != 0 || !fix.used[gyro] || (!t.empty() && fix.fix.t - t.back() < kStep)) {
+      if (fix.fix.head != 0 || !fix.used[gyro] || (!t.empty() && fix.fix.t - t.back() < kBetweenDirections)) {
         continue;
       }
       drift.basis(fix.h_b[gyro], 0, basis.view(columns));
@@ -83,7 +83,7 @@ double left_out_walk_rad_sqrt_s(const LeftOut& left_out, const Calibration& all,
       const Eigen::Matrix3d across = C_in_b - C_in_b * fix.h_b[gyro] * fix.h_b[gyro].transpose();
       MatrixXd rate = across * (basis.first(columns) * rest.middleRows(first, columns));
       MatrixXd now = turned.empty() ? MatrixXd::Zero(3, rest.cols()) : turned.back();
-      if (!t.empty() && fix.fix.t - t.back() < kGap) {
+      if (!t.empty() && fix.fix.t - t.back() < kLongestUnread) {
         now += to_seconds(fix.fix.t - t.back()) / 2 * (rate_before + rate);
       }
       t.push_back(fix.fix.t);
