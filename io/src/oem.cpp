@@ -65,7 +65,7 @@ struct RawMessage {
   }
 
   void add(Entries& entries, std::span<const std::string_view> known, std::string_view section, const Word& key,
-           Word value) const {
+           const Word& value) const {
     if (std::ranges::find(known, key.text) == known.end()) {
       refuse(key.at, fmt::format("{} is no keyword of the {} of an OEM", in_quotes(key.text), section),
              suggestion(key.text, known));
@@ -73,7 +73,7 @@ struct RawMessage {
     if (value.text.empty()) {
       refuse(key.at, fmt::format("{} has no value", key.text), "give one, or remove the line");
     }
-    if (!entries.try_emplace(key.text, std::move(value)).second) {
+    if (!entries.try_emplace(key.text, value).second) {
       refuse(key.at, fmt::format("{} is there twice", key.text), "keep one");
     }
   }
@@ -486,9 +486,9 @@ class Meaning {
     }
     Eigen::Vector3d position_m;
     Eigen::Vector3d velocity_m_s;
-    for (int i = 0; i < 3; ++i) {
-      position_m(i) = kKilometre * number(state.fields.at(static_cast<std::size_t>(1 + i)));
-      velocity_m_s(i) = kKilometre * number(state.fields.at(static_cast<std::size_t>(4 + i)));
+    for (std::size_t i = 0; i < 3; ++i) {
+      position_m(static_cast<Eigen::Index>(i)) = kKilometre * number(state.fields.at(1 + i));
+      velocity_m_s(static_cast<Eigen::Index>(i)) = kKilometre * number(state.fields.at(4 + i));
     }
     for (const auto& [value, range, place, what] :
          {std::tuple{position_m.norm(), limits::kOrbitRadius_m, 1, "the distance from the Earth's centre"},
