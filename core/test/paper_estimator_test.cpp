@@ -76,6 +76,16 @@ TEST(PaperMeasurement, NoiseIsThatOfTrackerAndReadouts) {
       test::central_differences<decltype(innovation)&, 9>(innovation, Eigen::Matrix<double, 9, 1>::Zero(), 1e-5);
   const Eigen::Matrix4d expected = by_cause * sigma.cwiseAbs2().asDiagonal() * by_cause.transpose();
   test::expect_jacobian(Paper::measure(moment.gyros, qi, moment.C_in_c, moment.h_b, setup).R, expected, 1e-7);
+
+  // Of a fix that comes with a covariance, that, by how much the noise is larger than told about each axis.
+  const FixCovariance told{{4e-10, 9e-10, 1e-8, 1e-10, -2e-10, 3e-10}};
+  setup.over_told_covariance = {1, 2, 1.5};
+  Eigen::Matrix<double, 9, 9> causes = sigma.cwiseAbs2().asDiagonal();
+  const auto over = setup.over_told_covariance.asDiagonal();
+  causes.topLeftCorner<3, 3>() = over * told.matrix() * over;
+  const Eigen::Matrix4d expected_as_told = by_cause * causes * by_cause.transpose();
+  test::expect_jacobian(Paper::measure(moment.gyros, qi, moment.C_in_c, moment.h_b, setup, told).R, expected_as_told,
+                        1e-7);
 }
 
 TEST(PaperMeasurement, AngleIsAFunctionOfTheOtherFour) {
