@@ -5,13 +5,13 @@ set -euo pipefail
 cd "$(dirname "$0")/.."
 
 program=(
-  g++ cmake ninja-build pkg-config
+  clang-16 cmake ninja-build pkg-config
   libeigen3-dev libhdf5-dev libcli11-dev libtomlplusplus-dev libfmt-dev nlohmann-json3-dev libspdlog-dev libnetcdf-dev libfast-float-dev libsqlitecpp-dev
   libtbb-dev libboost-dev liberfa-dev libpugixml-dev ca-certificates
 )
 # Tests, benches, validation.
 tests=(
-  libgtest-dev libgmock-dev librapidcheck-dev libbenchmark-dev
+  g++ libgtest-dev libgmock-dev librapidcheck-dev libbenchmark-dev
   chromium-headless-shell
   valgrind python3 python3-pytest python3-xarray python3-h5netcdf python3-jsonschema
 )
@@ -20,7 +20,7 @@ docs=(doxygen python3 python3-venv)
 # Other software that reads what the program writes: Orekit runs on Java, the rest comes from PyPI.
 interop=(default-jre-headless python3 python3-venv)
 # The Python package; what it needs of PyPI is in python/requirements.txt.
-python=(python3 python3-dev python3-venv)
+python=(g++ python3 python3-dev python3-venv)
 # Filters in Python, whose packages come from PyPI.
 peers=(python3 python3-venv)
 # ARM Cortex-M7 without an operating system, emulated: a short flight is among the tests.
@@ -28,9 +28,9 @@ flight=(gcc-arm-none-eabi libnewlib-arm-none-eabi libstdc++-arm-none-eabi-newlib
 # The further targets of `make flight`.
 targets=(g++-s390x-linux-gnu g++-riscv64-linux-gnu g++-multilib-sparc64-linux-gnu qemu-user)
 # Program and tests under sanitizers, the coverage of core, libFuzzer.
-sanitizers=(clang-16 libclang-rt-16-dev lld-16 llvm-16)
+sanitizers=(libclang-rt-16-dev lld-16 llvm-16)
 # Debian packages and the root of an OCI image, and what tries them.
-packaging=(debhelper fakeroot lintian mmdebstrap buildah python3 python3-venv)
+packaging=(g++ debhelper fakeroot lintian mmdebstrap buildah python3 python3-venv)
 lint=(git ca-certificates cppcheck python3 python3-venv)
 
 packages=()

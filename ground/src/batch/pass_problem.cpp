@@ -514,8 +514,9 @@ void PassProblem::follow_first_fix(const Gyros& gyros, std::size_t arc, double m
   for (int k = 0; k < gyros_; ++k) {
     if (first->fix->used[k]) {
       const Vector3d seen = (first->fix->fix.q_in_c.normalized() * h_c[k]).normalized();
-      const Eigen::AngleAxisd apart(Eigen::Quaterniond::FromTwoVectors(h_in[k], seen));
-      h_in[k] = Eigen::AngleAxisd(std::min(apart.angle(), most_rad), apart.axis()) * h_in[k];
+      const Vector3d across = h_in[k].cross(seen);
+      const double apart_rad = std::atan2(across.norm(), h_in[k].dot(seen));
+      h_in[k] = Eigen::AngleAxisd(std::min(apart_rad, most_rad), across.normalized()) * h_in[k];
     }
   }
 }
