@@ -299,6 +299,16 @@ void put_gaps(const ReportInput& input, json& values) {
   values["more_gaps"] = gaps.size() > kShown ? std::to_string(gaps.size() - kShown) : "";
 }
 
+/// The drift model of the calibration; where an estimator on board flies a smaller one, both.
+std::string drift_model_of(const CalibrationRun& run) {
+  const DriftModelId its = run.calibration.gyros.front().drift_model;
+  const std::optional<OnBoardDrift>& on_board = run.calibration.on_board_drift;
+  return !on_board || on_board->drift_model == its
+             ? drift_model_word(run.options)
+             : fmt::format("{}; on board {}, whose coefficients make up for the members that it leaves out",
+                           name_of(its), name_of(on_board->drift_model));
+}
+
 json settings_of(const ReportInput& input) {
   const CalibrationOptions& options = input.run.options;
   json rows = json::array();
@@ -306,7 +316,7 @@ json settings_of(const ReportInput& input) {
     rows.push_back({{"name", name}, {"value", value}});
   };
   put("Estimator", std::string(name_of(input.run.calibration.estimator)));
-  put("Drift model", drift_model_word(options));
+  put("Drift model", drift_model_of(input.run));
   put("Noise", options.find_noise ? "found from the pass" : "given, by settings or an earlier calibration");
   put("Process noise of each momentum",
       fmt::format("{}″ per √h", significant(options.direction_random_walk_rad_sqrt_s * 60 / kArcsecond_rad, 2)));
@@ -441,7 +451,7 @@ json facts_of(const ReportInput& input) {
                                     number(static_cast<double>(input.pass.gyro.size()), 0))),
           fact("Star tracker", counted(static_cast<long>(input.pass.star_tracker.size()), "fix", "fixes")),
           fact("Estimator", fmt::format("{}, drift model {}", name_of(input.run.calibration.estimator),
-                                        drift_model_word(input.run.options)))};
+                                        drift_model_of(input.run)))};
 }
 
 }  // namespace

@@ -28,6 +28,12 @@ const test::SyntheticRun& nine_hours() {
 
 test::SyntheticRun short_run() { return test::synthetic_run({.duration = std::chrono::minutes(30)}); }
 
+TEST(Report, NamesTheDriftModelThatIsFlownOnBoard) {
+  test::SyntheticRun run = short_run();
+  run.run.calibration.on_board_drift = OnBoardDrift{.drift_model = kEsg20};
+  EXPECT_EQ(occurrences(render(run.judged()), "esg7; on board esg20, whose coefficients"), 2U);
+}
+
 TEST(Report, OfNineHoursStaysBelow6MB) { EXPECT_LT(render(nine_hours().judged()).size(), 6'000'000U); }
 
 TEST(Report, IsTheSameForTheSameInput) { EXPECT_EQ(render(short_run().judged()), render(short_run().judged())); }
