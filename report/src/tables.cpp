@@ -450,8 +450,8 @@ json facts_of(const ReportInput& input) {
           fact("Gyros", fmt::format("{}, {} samples", input.pass.gyro.gyros,
                                     number(static_cast<double>(input.pass.gyro.size()), 0))),
           fact("Star tracker", counted(static_cast<long>(input.pass.star_tracker.size()), "fix", "fixes")),
-          fact("Estimator", fmt::format("{}, drift model {}", name_of(input.run.calibration.estimator),
-                                        drift_model_of(input.run)))};
+          fact("Estimator",
+               fmt::format("{}, drift model {}", name_of(input.run.calibration.estimator), drift_model_of(input.run)))};
 }
 
 }  // namespace
