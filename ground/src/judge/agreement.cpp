@@ -29,9 +29,10 @@ Rot<C, B<1>> C_c_b(const Calibration& calibration, std::size_t gyro) {
 }  // namespace
 
 std::string Agreement::text() const {
+  // To two digits: rounding alone moves it by a percent where axes of the covariance differ by a factor of a million.
   return degrees_of_freedom == 0
              ? "nothing that both determine"
-             : fmt::format("chi-square {:.3g} of {} degrees of freedom; 99.9 % of agreeing ones lie below {:.3g}",
+             : fmt::format("chi-square {:.2g} of {} degrees of freedom; 99.9 % of agreeing ones lie below {:.3g}",
                            chi_square, degrees_of_freedom, limit);
 }
 
