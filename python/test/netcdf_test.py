@@ -107,6 +107,7 @@ def program_refuses(path):
     return done.stderr
 
 
+@pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")  # h5netcdf closes what it could not open
 def test_damaged_files_are_read_or_refused(directory):
     whole = (directory / "slews.cdf").read_bytes()  # intervals are read before the tables
     (directory / "damaged.toml").write_text(MAP.replace("slews.cdf", "damaged.nc"))

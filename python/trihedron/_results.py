@@ -170,8 +170,8 @@ class Calibration(_Result):
     @property
     def drift_models(self) -> xr.Dataset:
         """That were compared, by model: coefficients of each gyro, forecast_error_rad (rms of the attitude in open loop over
-        the next part of the pass), and log_likelihood of the rest of the pass, above that of the smallest. Without models
-        where one was told."""
+        the next part of the pass), and log_likelihood of the rest of the pass, above that of the smallest. None where the
+        drift is a field, or the smallest was told."""
         names, coefficients, errors, likelihoods = zip(*self._its.drift_models) if self._its.drift_models else ((), (), (), ())
         return xr.Dataset(
             {

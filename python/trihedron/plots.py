@@ -98,7 +98,7 @@ def histogram(result: Calibration) -> Figure:
     names = [str(name) for name in fixes.data_vars if str(name).startswith("innovation") and not str(name).endswith("sigma")]
     normalised = np.concatenate([(fixes[name] / fixes[f"{name}_sigma"]).values for name in names])
     figure, axes = _figure(1, height=3)
-    axes[0].hist(normalised[np.isfinite(normalised)], bins=np.arange(-5, 5.25, 0.25), density=True, label="innovations")
+    axes[0].hist(normalised[np.isfinite(normalised)], bins=list(np.arange(-5, 5.25, 0.25)), density=True, label="innovations")
     x = np.linspace(-5, 5, 201)
     axes[0].plot(x, np.exp(-x * x / 2) / np.sqrt(2 * np.pi), "k-", linewidth=1, label="normal")
     axes[0].set_ylabel("density")
@@ -216,7 +216,7 @@ def drift_models(result: Calibration) -> Figure:
     """Forecast error of each drift model that was compared, by its coefficients; the one used is filled."""
     models = result.drift_models
     if not models.sizes["model"]:
-        raise ValueError("the result compares no drift models: its settings tell one")
+        raise ValueError('the result compares no drift models; estimator="batch" does those up to the one that drift_model tells')
     used = result.to_dict()["gyros"][0]["drift_model"]
     figure, axes = _figure(1, height=3)
     errors = models.forecast_error_rad.values * _ARCSEC
