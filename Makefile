@@ -92,7 +92,7 @@ wheel-test: build
 	@cmake/setup.sh python
 	rm -rf build-python/fresh
 	$(WHEEL_PYTHON) -m venv build-python/fresh
-	build-python/fresh/bin/pip install --quiet --disable-pip-version-check "$$(ls $(abspath out/wheel)/*.whl)[plots]" \
+	build-python/fresh/bin/pip install --quiet --disable-pip-version-check "$$(ls $(abspath out/wheel)/*.whl)[plots,parquet]" \
 	  $$(grep -E '^(mypy|pytest|nbclient|nbformat|ipykernel)=' python/requirements.txt)
 	TRIHEDRON_BUILD=$(abspath $(BUILD)) PYTHONDONTWRITEBYTECODE=1 build-python/fresh/bin/python -m pytest -q -p no:cacheprovider python/test
 

@@ -11,6 +11,7 @@
 
 #include "decisions.hpp"
 #include "interchange.hpp"
+#include "trihedron/ground/evaluate/equivalent_bias.hpp"
 #include "trihedron/io/apart.hpp"
 #include "trihedron/io/atomic_file.hpp"
 #include "trihedron/io/attitude_message.hpp"
@@ -274,6 +275,7 @@ void export_calibration(const ExportArguments& arguments, const Common& common) 
       const Duration gap =
           arguments.gap.empty() ? io::usual_gap(attitude->attitude) : io::parse_duration(arguments.gap);
       context.manoeuvres = io::slews_of(attitude->attitude, gap);
+      context.gyro_bias_rad_s = ground::equivalent_gyro_bias_rad_s(calibration, attitude->attitude);
     }
     context.covariance_file = std::filesystem::path(summary.written[1]).filename().string();
     const std::string text =

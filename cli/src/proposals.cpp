@@ -48,13 +48,14 @@ std::string rearranged(const std::vector<std::string>& columns, const std::array
   return fmt::format("[{}]", fmt::join(names, ", "));
 }
 
-/// What an arrangement of so many components among the first three is, in words.
-std::string arrangement_of_axes(std::span<const SignedComponent> components, int first) {
+/// What an arrangement of the first three components is, in words. `scalar_from`: where the fourth is; 3 of a
+/// direction.
+std::string arrangement_of_axes(std::span<const SignedComponent> components, int scalar_from) {
   constexpr std::string_view kAxes = "xyz";
   std::string moved;
   std::string mirrored;
   for (std::size_t i = 0; i < 3; ++i) {
-    const int from = components[i].from - first;
+    const int from = ground::axis_of(components[i], scalar_from);
     if (from != static_cast<int>(i)) {
       moved += fmt::format("{}{} is {}", moved.empty() ? "" : ", ", kAxes[static_cast<std::size_t>(from)], kAxes[i]);
     }
@@ -75,9 +76,10 @@ std::string arrangement_of_axes(std::span<const SignedComponent> components, int
 std::string words_for_quaternion(const Mistake& mistake) {
   std::array<SignedComponent, 4> components = mistake.components;
   std::vector<std::string> words;
-  const bool scalar_first = components[3].from == 0;
-  if (scalar_first) {
-    words.emplace_back("the scalar is the first component");
+  const int scalar_from = components[3].from;
+  if (scalar_from != 3) {
+    words.emplace_back(scalar_from == 0 ? "the scalar is the first component"
+                                        : "the scalar is the last component, and told as the first");
   }
   const bool is_conjugate = std::all_of(components.begin(), components.begin() + 3,
                                         [](const SignedComponent& part) { return part.sign < 0; });
@@ -87,7 +89,7 @@ std::string words_for_quaternion(const Mistake& mistake) {
       part.sign = 1;
     }
   }
-  const std::string axes = arrangement_of_axes(components, scalar_first ? 1 : 0);
+  const std::string axes = arrangement_of_axes(components, scalar_from);
   if (!axes.empty()) {
     words.push_back(axes);
   }
@@ -99,7 +101,7 @@ std::string words_for(const Mistake& mistake) {
     case Mistake::Kind::kQuaternion:
       return words_for_quaternion(mistake);
     case Mistake::Kind::kGyroAxes:
-      return fmt::format("readings of gyro {}: {}", mistake.gyro + 1, arrangement_of_axes(mistake.components, 0));
+      return fmt::format("readings of gyro {}: {}", mistake.gyro + 1, arrangement_of_axes(mistake.components, 3));
     case Mistake::Kind::kGyrosExchanged:
       return "gyros 1 and 2 have each other's readings";
     case Mistake::Kind::kClock:

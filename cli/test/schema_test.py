@@ -213,6 +213,15 @@ def test_unknown_keys_and_wrong_types_are_refused_by_schema_and_reader(whole, fl
     assert tried > 15
 
 
+def test_an_orbit_by_its_file_is_refused_by_schema_and_reader_alike(flown):
+    """In place of the elements that the whole scenario has."""
+    text = '[orbit]\nephemeris = "orbit.oem"\n'
+    assert is_valid(toml(text), "scenario")
+    for edited in edits(text):
+        assert not is_valid(toml(edited), "scenario"), edited
+        assert refused_by_reader(edited, "scenario", flown), edited
+
+
 @pytest.mark.parametrize("name, key, value", [
     ("config", "gate_nis", "-1"), ("config", "gate_nis", "1e300"), ("config", "student_t_freedom", "-2"), ("config", "reopen_after_rejections", "0"),
     ("config", "reopen_after_rejections", "1.5"), ("config", "noise", '"maybe"'), ("config", "estimator", '"magic"'),

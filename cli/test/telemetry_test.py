@@ -126,6 +126,9 @@ def test_the_schema_describes_the_example_and_refuses_what_the_reader_refuses(tm
             edits.append("\n".join([*lines[:i + 1], "not_a_key = 1", *lines[i + 1:]]))
         elif " = " in line and not line.startswith("#"):
             edits.append("\n".join([*lines[:i], line.split(" = ")[0] + " = true", *lines[i + 1:]]))
+    # In place of the sigmas.
+    edits.append(text.replace('sigma = ["SX", "SY", "SZ"]', "covariance = true"))
+    validator.validate(tomllib.loads(text.replace('sigma = ["SX", "SY", "SZ"]', 'covariance = ["SX", "SY", "SZ", "SX", "SY", "SZ"]')))
     assert len(edits) > 40
     for edited in edits:
         assert not validator.is_valid(tomllib.loads(edited)), edited
@@ -184,6 +187,8 @@ def spoil_gyro(edit):
 
 MISTAKES = {
     "scalar first": (spoil_fixes(lambda q: [q[3], *q[:3]]), "star_tracker", "the scalar is the first"),
+    "scalar last, told as first": (spoil_fixes(list), "star_tracker", "the scalar is the last component, and told as the first",
+                                   RIGHT | {"star_tracker": RIGHT["star_tracker"].replace('"last"', '"first"')}),
     "conjugate": (spoil_fixes(lambda q: [-q[0], -q[1], -q[2], q[3]]), "star_tracker", "(conjugate)"),
     "axes in turn": (spoil_fixes(lambda q: [q[1], q[2], q[0], q[3]]), "star_tracker", "another order (what is told as z is x, x is y, y is z)"),
     "mirrored": (spoil_fixes(lambda q: [q[0], -q[1], q[2], q[3]]), "star_tracker", "mirrored along y"),
@@ -195,11 +200,11 @@ MISTAKES = {
 
 @pytest.mark.parametrize("mistake", MISTAKES)
 def test_the_lines_that_inspect_proposes_mend_the_pass(flown, tmp_path, mistake):
-    spoil, part, words = MISTAKES[mistake]
+    spoil, part, words, *told_wrongly = MISTAKES[mistake]
     gyro, fixes = spoil(rows(flown / "gyro.csv"), rows(flown / "star_tracker.csv"))
     write_rows(tmp_path / "gyro.csv", ["t_s", "h1_x", "h1_y", "h1_z", "h2_x", "h2_y", "h2_z"], gyro)
     write_rows(tmp_path / "star_tracker.csv", ["t_s", "q_x", "q_y", "q_z", "q_w"], fixes)
-    (tmp_path / "telemetry.toml").write_text(MAP.format(**RIGHT))
+    (tmp_path / "telemetry.toml").write_text(MAP.format(**(told_wrongly or [RIGHT])[0]))
     told = json.loads(done("--json", "inspect", tmp_path / "telemetry.toml").stdout)["consistency"]
     assert not told["consistent"] and len(told["mistakes"]) == 1, told
     assert words in told["mistakes"][0]["text"], told

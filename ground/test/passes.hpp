@@ -2,6 +2,7 @@
 /// Simulated passes that several tests look at, and what they ask of a calibration.
 
 #include <Eigen/Cholesky>
+#include <vector>
 
 #include "trihedron/core/frames.hpp"
 #include "trihedron/ground/evaluate/evaluate.hpp"
@@ -25,6 +26,21 @@ inline Scenario scenario_in_eq1(std::uint64_t seed, Duration duration) {
 inline const sim::SimulatedPass& two_hours() {
   static const sim::SimulatedPass simulated = sim::simulate(scenario_in_eq1(5, std::chrono::hours(2)));
   return simulated;
+}
+
+/// The gyros as the simulator made them, with their momenta at this row of the truth.
+inline std::vector<GyroCalibration> true_gyros(const Truth& truth, std::size_t row) {
+  std::vector<GyroCalibration> gyros;
+  for (std::size_t k = 0; k < 2; ++k) {
+    const double* h = &truth.h_in[(row * 2 + k) * 3];
+    GyroCalibration& gyro = gyros.emplace_back();
+    for (const auto& [coefficient, value] : truth.gyros[k].drift_rad_s) {
+      gyro.drift_rad_s.push_back(value);
+    }
+    gyro.alignment_rotation_vector_rad = truth.gyros[k].alignment_rotation_vector_rad;
+    gyro.momentum_in = {h[0], h[1], h[2]};
+  }
+  return gyros;
 }
 
 /// Nothing left to decide, which takes runs of its own.

@@ -101,27 +101,34 @@ class AcmWriter {
     text_.put(text_.kvn() ? values + "\n" : fmt::format("<{0}>{1}</{0}>\n", tag, values));
   }
 
+  /// The rates of an attitude have their place in AEM and APM: a message may hold an attitude once only.
   void attitude() {
     const AttitudeHistory& attitude = context_.attitude->attitude;
-    const std::vector<Eigen::Vector3d>& rates = context_.attitude->rate_rad_s;
+    const std::vector<Eigen::Vector3d>& bias = context_.gyro_bias_rad_s;
     text_.put("\nATT_START\n", "<att>\n");
+    if (!bias.empty()) {
+      text_.entry(
+          "COMMENT",
+          "GYRO_BIAS is the drift as its equivalent: angular velocity by momenta that are taken to stand still, "
+          "less the true one");
+    }
     text_.entry("ATT_BASIS", "DETERMINED_GND");
     text_.entry("ATT_BASIS_ID", id_);
     text_.entry("REF_FRAME_A", description_.inertial_frame);
     text_.entry("REF_FRAME_B", description_.body_frame);
-    text_.entry("NUMBER_STATES", rates.empty() ? "4" : "7");
+    text_.entry("NUMBER_STATES", bias.empty() ? "4" : "7");
     text_.entry("ATT_TYPE", "QUATERNION");
-    if (!rates.empty()) {
-      text_.entry("RATE_TYPE", "ANGVEL");
+    if (!bias.empty()) {
+      text_.entry("RATE_TYPE", "GYRO_BIAS");
     }
     for (std::size_t i = 0; i < attitude.size(); ++i) {
       check_stop();
       const Eigen::Quaterniond& q = attitude.q_in_c[i];
       std::string values =
           fmt::format("{} {:.15e} {:.15e} {:.15e} {:.15e}", relative(attitude.t[i]), q.x(), q.y(), q.z(), q.w());
-      if (!rates.empty()) {
-        const Eigen::Vector3d rate = rates[i] * kDegreesPerRadian;
-        values += fmt::format(" {:.15e} {:.15e} {:.15e}", rate.x(), rate.y(), rate.z());
+      if (!bias.empty()) {
+        const Eigen::Vector3d deg_s = bias[i] * kDegreesPerRadian;
+        values += fmt::format(" {:.6e} {:.6e} {:.6e}", deg_s.x(), deg_s.y(), deg_s.z());
       }
       line("attLine", values);
     }

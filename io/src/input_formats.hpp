@@ -31,7 +31,7 @@ struct UnscreenedPass {
 [[nodiscard]] UnscreenedPass read_raw_netcdf(const std::filesystem::path& file);
 /// A telemetry.toml, which says where others' files have the columns.
 [[nodiscard]] UnscreenedPass read_raw_telemetry(const std::filesystem::path& file);
-[[nodiscard]] UnscreenedPass read_raw_telemetry(const std::filesystem::path& file, const ReadParquet& parquet);
+[[nodiscard]] UnscreenedPass read_raw_telemetry(const std::filesystem::path& file, const ReadColumns& others);
 [[nodiscard]] bool is_telemetry_map(const std::filesystem::path& path);
 
 struct InputFormat {

@@ -392,9 +392,9 @@ LoadedPass read_pass(const fs::path& path, const Selection& selection) {
   return screened(format->read(path), path, selection);
 }
 
-LoadedPass read_telemetry(const fs::path& file, const ReadParquet& parquet) {
+LoadedPass read_telemetry(const fs::path& file, const ReadColumns& others) {
   check_there(file);
-  return screened(read_raw_telemetry(file, parquet), file, {});
+  return screened(read_raw_telemetry(file, others), file, {});
 }
 
 PassInMemory read_tables(const fs::path& directory) {

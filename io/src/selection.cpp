@@ -94,8 +94,8 @@ void select(UnscreenedPass& raw, const fs::path& path, std::vector<Defect>& defe
   settings.duration = end - begin;
 }
 
-std::vector<LeftOut> read_intervals(const IntervalMap& map, const fs::path& directory, const ReadParquet& parquet) {
-  const ForeignTable table = read_foreign_table(map, directory, {map.time_column, map.end_column}, {}, parquet);
+std::vector<LeftOut> read_intervals(const IntervalMap& map, const fs::path& directory, const ReadColumns& others) {
+  const ForeignTable table = read_foreign_table(map, directory, {map.time_column, map.end_column}, {}, others);
   if (table.cut_line > 0) {
     throw InputRefused(table.file, {table.cut_line, 0}, "the last line is cut short", "write the file again");
   }

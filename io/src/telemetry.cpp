@@ -73,8 +73,8 @@ Flag flag_of(const FlagMap& map, Wanted& wanted) {
 }
 
 ForeignTable read_table(const TableMap& map, const fs::path& directory, const Wanted& wanted,
-                        const ReadParquet& parquet) {
-  ForeignTable table = read_foreign_table(map, directory, {map.time_column}, wanted.names(), parquet);
+                        const ReadColumns& others) {
+  ForeignTable table = read_foreign_table(map, directory, {map.time_column}, wanted.names(), others);
   if (table.rows() > 0 && std::ranges::all_of(table.stamps.front(), [](Time t) { return t == kNoTime; })) {
     throw InputRefused(table.file, {table.first_line, 0},
                        fmt::format("not one value of column \"{}\" is a time", map.time_column),
@@ -410,7 +410,7 @@ bool is_telemetry_map(const fs::path& path) { return path.extension() == ".toml"
 
 UnscreenedPass read_raw_telemetry(const fs::path& file) { return read_raw_telemetry(file, {}); }
 
-UnscreenedPass read_raw_telemetry(const fs::path& file, const ReadParquet& parquet) {
+UnscreenedPass read_raw_telemetry(const fs::path& file, const ReadColumns& others) {
   const TextFile text(file);
   const fs::path directory = file.parent_path();
   TelemetryToml told = parse_telemetry_toml(text.text(), file, directory);
@@ -422,7 +422,7 @@ UnscreenedPass read_raw_telemetry(const fs::path& file, const ReadParquet& parqu
   raw.selection.to = map.to;
   for (const IntervalMap& intervals : map.exclude) {
     raw.sources.push_back(directory / intervals.file);
-    std::ranges::copy(read_intervals(intervals, directory, parquet), std::back_inserter(raw.selection.exclude));
+    std::ranges::copy(read_intervals(intervals, directory, others), std::back_inserter(raw.selection.exclude));
   }
   PacketTables packets;
   if (map.packets) {
@@ -438,7 +438,7 @@ UnscreenedPass read_raw_telemetry(const fs::path& file, const ReadParquet& parqu
       return std::move(packets.tables.at(given++));
     }
     raw.sources.push_back(directory / table.file);
-    return read_table(table, directory, wanted, parquet);
+    return read_table(table, directory, wanted, others);
   };
   const GyroSource gyros = read_gyros(map.gyro, read);
   std::vector<StarTrackerSource> heads;

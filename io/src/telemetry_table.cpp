@@ -163,10 +163,6 @@ Time time_in(const CsvField& field, const TableMap& map, StampReader& reader, co
 
 ForeignTable read_netcdf_table(const fs::path& file, const TableMap& map, const std::vector<std::string>& stamps,
                                const std::vector<std::string>& numbers) {
-  if (map.stamps.format == Stamps::Format::kIso) {
-    throw InputRefused(file, {}, "is NetCDF, where stamps are numbers, and the format of time is iso",
-                       "give format = \"s\" or another unit, and since, as the attribute units of the variable has it");
-  }
   std::vector<std::string> paths = stamps;
   paths.insert(paths.end(), numbers.begin(), numbers.end());
   std::vector<std::vector<double>> columns = NetcdfInput(file).read_variables(paths);
@@ -184,19 +180,15 @@ ForeignTable read_netcdf_table(const fs::path& file, const TableMap& map, const 
   return table;
 }
 
-ForeignTable read_parquet_table(const fs::path& file, const TableMap& map, const std::vector<std::string>& stamps,
-                                const std::vector<std::string>& numbers, const ReadParquet& parquet) {
-  if (!parquet) {
-    throw InputRefused(file, {}, "is Parquet, for which this program has no library",
-                       "make a pass of it with the Python package (pip install 'trihedron[parquet]'): python3 -c "
-                       "\"import trihedron; trihedron.read_pass('telemetry.toml').to_netcdf('pass.nc')\"");
-  }
+/// Of a file that `others` reads.
+ForeignTable read_table_of_others(const fs::path& file, const TableMap& map, const std::vector<std::string>& stamps,
+                                  const std::vector<std::string>& numbers, const ReadColumns& others) {
   std::vector<std::string> columns = stamps;
   columns.insert(columns.end(), numbers.begin(), numbers.end());
   TableMap as_written;  // commas, names in the first line
   as_written.stamps = map.stamps;
   as_written.missing = map.missing;
-  ForeignTable table = parse_foreign_csv(parquet(file, columns), file, as_written, stamps, numbers);
+  ForeignTable table = parse_foreign_csv(others(file, columns), file, as_written, stamps, numbers);
   table.first_line = 0;  // its rows have no lines
   table.row_in_file.clear();
   return table;
@@ -331,10 +323,19 @@ ForeignTable parse_foreign_csv(std::string_view text, const fs::path& file, cons
 }
 
 ForeignTable read_foreign_table(const TableMap& map, const fs::path& directory, const std::vector<std::string>& stamps,
-                                const std::vector<std::string>& numbers, const ReadParquet& parquet) {
+                                const std::vector<std::string>& numbers, const ReadColumns& others) {
   const fs::path file = directory / map.file;
-  if (is_parquet(file)) {
-    return read_parquet_table(file, map, stamps, numbers, parquet);
+  if (is_netcdf(file) && map.stamps.format == Stamps::Format::kIso) {
+    throw InputRefused(file, {}, "is NetCDF, where stamps are numbers, and the format of time is iso",
+                       "give format = \"s\" or another unit, and since, as the attribute units of the variable has it");
+  }
+  if (is_parquet(file) && !others) {
+    throw InputRefused(file, {}, "is Parquet, for which this program has no library",
+                       "make a pass of it with the Python package (pip install 'trihedron[parquet]'): python3 -c "
+                       "\"import trihedron; trihedron.read_pass('telemetry.toml').to_netcdf('pass.nc')\"");
+  }
+  if (others && (is_parquet(file) || is_netcdf(file))) {
+    return read_table_of_others(file, map, stamps, numbers, others);
   }
   return is_netcdf(file) ? read_netcdf_table(file, map, stamps, numbers)
                          : parse_foreign_csv(TextFile(file).text(), file, map, stamps, numbers);

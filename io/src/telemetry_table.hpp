@@ -43,14 +43,14 @@ struct ForeignTable {
 };
 
 /// Columns of instants and columns of numbers by their names. `directory`: where a relative name of the file stands.
-/// Throws InputRefused with line and column, for a Parquet file where there is no `parquet` too.
+/// Throws InputRefused with line and column, for a Parquet file where there are no `others` too.
 [[nodiscard]] ForeignTable read_foreign_table(const TableMap& map, const std::filesystem::path& directory,
                                               const std::vector<std::string>& stamps,
-                                              const std::vector<std::string>& numbers, const ReadParquet& parquet);
+                                              const std::vector<std::string>& numbers, const ReadColumns& others);
 
 /// Intervals that a file of the map holds. Throws InputRefused.
 [[nodiscard]] std::vector<LeftOut> read_intervals(const IntervalMap& map, const std::filesystem::path& directory,
-                                                  const ReadParquet& parquet = {});
+                                                  const ReadColumns& others = {});
 
 /// The same of the text of a CSV file; `file` is for messages.
 [[nodiscard]] ForeignTable parse_foreign_csv(std::string_view text, const std::filesystem::path& file,

@@ -55,6 +55,14 @@ TEST(Acm, HoldsAttitudeAndDiagonalCovariance) {
   EXPECT_THAT(text, Not(HasSubstr("nan")));
   EXPECT_THAT(format_acm(calibration, {&attitude, nullptr, ""}, description(), MessageSyntax::kXml),
               HasSubstr("<covLine>1.500 3.282806e-07"));
+  EXPECT_THAT(text, Not(HasSubstr("RATE_TYPE")));
+  const std::vector<Eigen::Vector3d> bias_rad_s = {{1e-6, 0, -2e-6}, {0, 0, 0}};
+  for (const MessageSyntax syntax : {MessageSyntax::kKvn, MessageSyntax::kXml}) {
+    const std::string biased = format_acm(calibration, {&attitude, nullptr, "", {}, bias_rad_s}, description(), syntax);
+    EXPECT_THAT(biased, HasSubstr("8.000000000000000e-01 5.729578e-05 0.000000e+00 -1.145916e-04"));  // deg/s
+    EXPECT_THAT(biased, HasSubstr("GYRO_BIAS"));
+    EXPECT_EQ(refusal([&] { static_cast<void>(parse_calibration_message(biased, "c.acm")); }), "");
+  }
 }
 
 /// Ten minutes at the rate of an orbit, with a turn of 20° in 60 s after 200 s, and back after 400 s.

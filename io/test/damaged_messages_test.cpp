@@ -107,7 +107,8 @@ std::vector<std::string> whole_messages() {
     whole.push_back(format_aem(message.attitude, message.rate_rad_s, calibration.epoch, description,
                                std::chrono::seconds(10), syntax));
     whole.push_back(format_apm(message, 3, calibration.epoch, description, syntax));
-    whole.push_back(format_acm(calibration, {&message, nullptr, "none.nc"}, description, syntax));
+    whole.push_back(
+        format_acm(calibration, {&message, nullptr, "none.nc", {}, message.rate_rad_s}, description, syntax));
     whole.push_back(orbit_message(syntax == MessageSyntax::kXml));
   }
   return whole;

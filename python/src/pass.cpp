@@ -169,18 +169,19 @@ void bind_pass(nb::module_& module) {
 
   module.def(
       "read_telemetry",
-      [](const std::string& file, const std::function<std::string(std::string, std::vector<std::string>)>& parquet) {
+      [](const std::string& file, const std::function<std::string(std::string, std::vector<std::string>)>& others) {
         const io::LoadedPass loaded =
             io::read_telemetry(file, [&](const std::filesystem::path& path, const std::vector<std::string>& columns) {
-              return parquet(path.string(), columns);
+              return others(path.string(), columns);
             });
         io::PassInMemory tables = io::tables_of(loaded.pass, io::PassFormat{}.direction_step);
         tables.name = file;
         return std::pair(std::move(tables), loaded.defects);
       },
-      "file"_a, "parquet"_a,
-      "The pass of a telemetry.toml, screened, and what was wrong with it. parquet: gives columns of a Parquet file as "
-      "CSV");
+      "file"_a, "others"_a,
+      "The pass of a telemetry.toml, screened, and what was wrong with it. others: gives columns of a Parquet or "
+      "NetCDF "
+      "file as CSV");
   module.def(
       "read_tables", [](const std::string& directory) { return io::read_tables(directory); }, "directory"_a,
       nb::call_guard<nb::gil_scoped_release>(), "The tables of a pass directory");

@@ -6,10 +6,12 @@
 #include <nanobind/stl/shared_ptr.h>
 #include <nanobind/stl/string.h>
 #include <nanobind/stl/string_view.h>
+#include <nanobind/stl/tuple.h>
 #include <nanobind/stl/vector.h>
 
 #include <algorithm>
 #include <string>
+#include <tuple>
 #include <utility>
 #include <vector>
 
@@ -191,6 +193,17 @@ void bind_calibration(nb::module_& module) {
       .def_prop_ro(
           "settings", [](const CalibrationResult& its) { return io::format_config(its.run.options); },
           "As decided: the text of a settings file")
+      .def_prop_ro(
+          "drift_models",
+          [](const CalibrationResult& its) {
+            std::vector<std::tuple<std::string, int, double, double>> models;
+            for (const DriftModelForecast& model : its.run.drift_models) {
+              models.emplace_back(name_of(model.drift_model), model.drift_model.size(), model.open_loop_rms_rad,
+                                  model.log_likelihood);
+            }
+            return models;
+          },
+          "That were compared: name, coefficients of each gyro, forecast error in rad, ln likelihood")
       .def_prop_ro("attitude", [](Self self) { return attitude_view(self.p->run.attitude, self.h); })
       .def_prop_ro("definitive_attitude",
                    [](Self self) { return attitude_view(self.p->run.definitive_attitude, self.h); })

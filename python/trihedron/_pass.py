@@ -17,6 +17,7 @@ import xarray as xr
 from . import _native
 from ._arrays import Doubles, datetime_of, doubles, seconds_of_datetimes, seconds_since
 from ._errors import InputRefused, MachineFailed
+from ._netcdf import netcdf_as_csv, open_groups
 from ._parquet import parquet_as_csv
 from ._settings import PathLike, toml_text
 
@@ -388,9 +389,14 @@ def _expect_units_of_time(units: str, epoch_ns: int, what: str) -> None:
         )
 
 
+def _table_as_csv(file: str, names: Sequence[str]) -> str:
+    is_parquet = pathlib.Path(file).suffix in (".parquet", ".pq")
+    return parquet_as_csv(file, names) if is_parquet else netcdf_as_csv(file, names)
+
+
 def read_pass(path: PathLike) -> Pass:
     """Reads a pass: a directory with pass.toml, gyro.csv and star_tracker.csv, a NetCDF-4 file, by xarray, or a
-    telemetry.toml, which says where others' CSV and Parquet files have its columns; Parquet needs pyarrow.
+    telemetry.toml, which says where others' CSV, NetCDF and Parquet files have its columns; Parquet needs pyarrow.
 
     Raises InputRefused for what cannot be understood, with file, line, reason and cure.
     """
@@ -405,22 +411,13 @@ def read_pass(path: PathLike) -> Pass:
             str(file),
         )
     if file.suffix == ".toml":
-        tables, left_out = _native.read_telemetry(str(file), parquet_as_csv)
+        tables, left_out = _native.read_telemetry(str(file), _table_as_csv)
         its = Pass._from_tables(tables, None, str(file))
         its._left_out = left_out
         return its
-    try:
-        groups = {
-            key.strip("/"): its.load() for key, its in xr.open_groups(file, engine="h5netcdf", decode_times=False).items()
-        }
-    except (OSError, ValueError, KeyError, RuntimeError) as error:
-        raise InputRefused(
-            f"is no NetCDF-4 file that xarray can read ({error})",
-            "give a pass: a directory with pass.toml, gyro.csv and star_tracker.csv, or a NetCDF-4 file",
-            str(file),
-        ) from error
-    for dataset in groups.values():
-        dataset.close()
+    groups = open_groups(
+        str(file), "give a pass: a directory with pass.toml, gyro.csv and star_tracker.csv, or a NetCDF-4 file", decode_times=False
+    )
     return Pass._from_groups(dict(groups.pop("").attrs), groups, str(file))
 
 

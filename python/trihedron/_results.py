@@ -168,6 +168,21 @@ class Calibration(_Result):
         return self._table("angle")
 
     @property
+    def drift_models(self) -> xr.Dataset:
+        """That were compared, by model: coefficients of each gyro, forecast_error_rad (rms of the attitude in open loop over
+        the next part of the pass), and log_likelihood of the rest of the pass, above that of the smallest. None where the
+        drift is a field, or the smallest was told."""
+        names, coefficients, errors, likelihoods = zip(*self._its.drift_models) if self._its.drift_models else ((), (), (), ())
+        return xr.Dataset(
+            {
+                "coefficients": ("model", np.array(coefficients, dtype=int)),
+                "forecast_error_rad": ("model", np.array(errors, dtype=float), {"units": "rad"}),
+                "log_likelihood": ("model", np.array(likelihoods, dtype=float), {"units": "1"}),
+            },
+            {"model": np.array(names, dtype=str)},
+        )
+
+    @property
     def fix_counts(self) -> dict[str, int]:
         """Fixes by what was done with them."""
         return self._its.fix_counts

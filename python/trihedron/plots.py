@@ -1,4 +1,4 @@
-"""The main figures of the report, by matplotlib: `pip install trihedron[plots]`. Each gives a figure of its own."""
+"""The figures of the report, by matplotlib: `pip install trihedron[plots]`. Each gives a figure of its own."""
 
 from __future__ import annotations
 
@@ -16,7 +16,20 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-__all__ = ["attitude_uncertainty", "forecast", "open_loop", "parameters", "residuals"]
+__all__ = [
+    "angle",
+    "attitude_uncertainty",
+    "correlation",
+    "drift_models",
+    "forecast",
+    "histogram",
+    "navigation",
+    "open_loop",
+    "parameters",
+    "residuals",
+    "telemetry",
+    "tracks",
+]
 
 _HOUR = 3600.0
 _ARCSEC = 180 * 3600 / np.pi
@@ -79,6 +92,23 @@ def residuals(result: Calibration) -> Figure:
     return figure
 
 
+def histogram(result: Calibration) -> Figure:
+    """Innovations of the fixes that were used over their sigmas, with the normal density that they should have."""
+    fixes = result.residuals.isel(time=result.residuals.used.values > 0)
+    names = [str(name) for name in fixes.data_vars if str(name).startswith("innovation") and not str(name).endswith("sigma")]
+    normalised = np.concatenate([(fixes[name] / fixes[f"{name}_sigma"]).values for name in names])
+    figure, axes = _figure(1, height=3)
+    axes[0].hist(normalised[np.isfinite(normalised)], bins=list(np.arange(-5, 5.25, 0.25)), density=True, label="innovations")
+    x = np.linspace(-5, 5, 201)
+    axes[0].plot(x, np.exp(-x * x / 2) / np.sqrt(2 * np.pi), "k-", linewidth=1, label="normal")
+    axes[0].set_ylabel("density")
+    axes[0].legend()
+    _finish(axes)
+    axes[0].set_xlabel("innovation over its sigma")
+    figure.suptitle("Innovations of the fixes used")
+    return figure
+
+
 def parameters(result: Calibration) -> Figure:
     """Estimates along the pass with their 3-sigma bounds: drift coefficients and alignments of each gyro."""
     history = result.history
@@ -132,6 +162,21 @@ def open_loop(evaluation: Evaluation) -> Figure:
     return figure
 
 
+def navigation(evaluation: Evaluation) -> Figure:
+    """Errors of the navigator about c x, y, z; dotted: its astro-corrections, from the calibration until then."""
+    errors = evaluation.navigation
+    corrections = [loop.corrected_s / _HOUR for loop in evaluation.open_loops]
+    figure, axes = _figure(3)
+    for axis, (name, label) in zip(axes, _AXES.items()):
+        axis.plot(_hours(errors), errors[f"error_{name}_rad"].values * _ARCMIN, linewidth=0.7)
+        for corrected in corrections:
+            axis.axvline(corrected, color="k", linestyle=":", linewidth=0.7)
+        axis.set_ylabel(f"{label}, ′")
+    _finish(axes)
+    figure.suptitle(f"Navigator between astro-corrections, against the {evaluation.reference}")
+    return figure
+
+
 def attitude_uncertainty(evaluation: Evaluation) -> Figure:
     """Errors of the attitude of a calibration about c x, y, z, with the 3-sigma bounds that it claims."""
     errors = evaluation.attitude
@@ -164,4 +209,94 @@ def forecast(result: Calibration | Navigation) -> Figure:
     _finish(axes)
     axes[0].set_xlabel("time since the correction, h")
     figure.suptitle("Predicted attitude error of an open loop")
+    return figure
+
+
+def drift_models(result: Calibration) -> Figure:
+    """Forecast error of each drift model that was compared, by its coefficients; the one used is filled."""
+    models = result.drift_models
+    if not models.sizes["model"]:
+        raise ValueError('the result compares no drift models; estimator="batch" does those up to the one that drift_model tells')
+    used = result.to_dict()["gyros"][0]["drift_model"]
+    figure, axes = _figure(1, height=3)
+    errors = models.forecast_error_rad.values * _ARCSEC
+    axes[0].plot(models.coefficients, errors, "C0-", linewidth=0.7)
+    for name, coefficients, error in zip(models.model.values, models.coefficients.values, errors):
+        axes[0].plot(coefficients, error, "C0o", fillstyle="full" if name == used else "none", label=name)
+        axes[0].annotate(str(name), (coefficients, error), textcoords="offset points", xytext=(0, 6), ha="center", fontsize=7)
+    axes[0].set_ylabel("forecast error, rms, ″")
+    axes[0].set_ylim(bottom=0)
+    _finish(axes)
+    axes[0].set_xlabel("coefficients of each gyro")
+    figure.suptitle("Drift models compared")
+    return figure
+
+
+def correlation(result: Calibration) -> Figure:
+    """Correlations of the parameters at the end of the pass, without those members of a drift field that eq. (1) lacks."""
+    followed = set(map(str, result.history.data_vars))
+    rows = [row for row, name in enumerate(result.states) if name.replace(".", "_") in followed or not followed]
+    rho = (result.covariance / np.outer(result.sigmas, result.sigmas))[np.ix_(rows, rows)]
+    figure, axes = _figure(1, height=7)
+    image = axes[0].imshow(rho, cmap="PuOr_r", vmin=-1, vmax=1)
+    names = [result.states[row] for row in rows]
+    axes[0].set_xticks(range(len(rows)), names, rotation=90, fontsize=6)
+    axes[0].set_yticks(range(len(rows)), names, fontsize=6)
+    figure.colorbar(image, ax=axes[0])
+    figure.suptitle("Correlation at the end of the pass")
+    return figure
+
+
+def tracks(result: Calibration) -> Figure:
+    """Where each momentum pointed in the axes of its case: circle at the start, square at the end."""
+    directions = result.of._screened().directions
+    figure = _shown_by_notebooks()(figsize=(9.0, 5.0), layout="constrained")
+    for gyro in range(directions.shape[1]):
+        axis = figure.add_subplot(1, directions.shape[1], gyro + 1, projection="3d")
+        h = directions[:: max(1, len(directions) // 5000), gyro]
+        h = h[np.abs(np.linalg.norm(h, axis=1) - 1) < 0.01]  # NaN is not
+        axis.plot(*h.T, linewidth=0.7)
+        for place, marker in ((h[:1], "o"), (h[-1:], "s")):
+            axis.plot(*place.T, marker)
+        axis.set(xlim=(-1, 1), ylim=(-1, 1), zlim=(-1, 1), xlabel="x", ylabel="y", zlabel="z", title=f"gyro {gyro + 1}")
+        axis.set_box_aspect((1, 1, 1))
+    figure.suptitle("Track of each momentum in its case")
+    return figure
+
+
+def angle(result: Calibration) -> Figure:
+    """Residual of the cosine of the angle between the momenta, z1 of eq. (3): least and greatest of each three seconds."""
+    found = result.angle
+    figure, axes = _figure(1, height=3)
+    for values in (found.residual_min.values, found.residual_max.values):
+        axes[0].plot(_hours(found), values * 1e6, "C0", linewidth=0.5)
+    axes[0].set_ylabel("z₁, 10⁻⁶")
+    _finish(axes)
+    figure.suptitle("Residual of the angle between the momenta")
+    return figure
+
+
+def telemetry(result: Calibration) -> Figure:
+    """Gyro samples and fixes of the first star tracker, in percent of those that their periods let expect."""
+    settings = result.of.settings.to_dict()
+    screened = result.of._screened()
+    sample_s = (screened.gyro_ns - result.of.settings.epoch_ns) * 1e-9
+    good = np.all(np.abs(np.linalg.norm(screened.directions, axis=2) - 1) < 0.01, axis=1)
+    fixes = result.residuals
+    used = fixes.used.values > 0
+    duration_s = float(settings["pass"]["duration_s"])
+    edges = np.append(np.arange(0, duration_s, max(60.0, duration_s / 180)), duration_s)
+    figure, axes = _figure(2)
+    shown = (
+        (axes[0], "gyro", {"good": sample_s[good], "bad": sample_s[~good]}, "gyro samples, %"),
+        (axes[1], "star_tracker", {"used": fixes.t_s.values[used], "not used": fixes.t_s.values[~used]}, "fixes, %"),
+    )
+    for axis, table, kinds, label in shown:
+        expected = np.diff(edges) / float(settings[table]["period_s"])
+        shares = [100 * np.histogram(times, edges)[0] / expected for times in kinds.values()]
+        axis.stackplot(edges[:-1] / _HOUR, shares, labels=list(kinds), step="post")
+        axis.set_ylabel(label)
+        axis.legend(loc="lower right")
+    _finish(axes)
+    figure.suptitle("Samples and fixes that came, and what was done with them")
     return figure

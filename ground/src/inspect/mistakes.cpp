@@ -246,19 +246,19 @@ std::vector<std::array<SignedComponent, Size>> all_arrangements() {
   return all;
 }
 
-/// How unusual an arrangement is: 2 for each mistake that it takes. Of a quaternion these are scalar first, conjugate
-/// (1 beside the first, which often come together), axes in another order, and each axis mirrored.
+/// How unusual an arrangement is: 2 for each mistake that it takes. Of a quaternion these are the scalar at the other
+/// end, conjugate (1 beside the first, which often come together), axes in another order, and each axis mirrored.
 int cost_of(const ComponentOrder& components) {
-  const bool scalar_first = components[3].from == 0;
+  const bool is_scalar_as_told = components[3].from == 3;
   int moved = 0;
   int minus = 0;
   for (int i = 0; i < 3; ++i) {
     const SignedComponent& part = components[static_cast<std::size_t>(i)];
-    moved += part.from != (scalar_first ? i + 1 : i) ? 1 : 0;
+    moved += axis_of(part, components[3].from) != i ? 1 : 0;
     minus += part.sign != components[3].sign ? 1 : 0;
   }
-  const int conjugate = scalar_first ? 1 : 2;
-  return (scalar_first ? 2 : 0) + (moved > 0 ? 2 : 0) + (minus == 3 ? conjugate : 2 * minus);
+  const int conjugate = is_scalar_as_told ? 2 : 1;
+  return (is_scalar_as_told ? 0 : 2) + (moved > 0 ? 2 : 0) + (minus == 3 ? conjugate : 2 * minus);
 }
 
 int cost_of(const AxisOrder& axes) {
@@ -309,7 +309,7 @@ std::vector<Explanation<Arrangement>> usual_explanations(const std::vector<Arran
 void try_quaternions(const Scene& scene, std::vector<Mistake>& mistakes) {
   std::vector<ComponentOrder> all;
   for (const ComponentOrder& components : all_arrangements<4>()) {
-    if (components[3].sign > 0 && (components[3].from == 0 || components[3].from == 3)) {
+    if (components[3].sign > 0 && components[3].from != 1) {
       all.push_back(components);
     }
   }

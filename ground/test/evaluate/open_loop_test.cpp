@@ -5,6 +5,7 @@
 #include <chrono>
 #include <limits>
 
+#include "passes.hpp"
 #include "trihedron/ground/calibrate/calibrate.hpp"
 #include "trihedron/ground/model/setup_error.hpp"
 #include "trihedron/sim/simulate.hpp"
@@ -31,21 +32,7 @@ const sim::SimulatedPass& three_hours() {
   return simulated;
 }
 
-/// The gyros as the simulator made them.
-std::vector<GyroCalibration> true_gyros(std::size_t epoch) {
-  const Truth& truth = three_hours().truth;
-  std::vector<GyroCalibration> gyros;
-  for (std::size_t k = 0; k < 2; ++k) {
-    const double* h = &truth.h_in[(epoch * 2 + k) * 3];
-    GyroCalibration& gyro = gyros.emplace_back();
-    for (const auto& [coefficient, value] : truth.gyros[k].drift_rad_s) {
-      gyro.drift_rad_s.push_back(value);
-    }
-    gyro.alignment_rotation_vector_rad = truth.gyros[k].alignment_rotation_vector_rad;
-    gyro.momentum_in = {h[0], h[1], h[2]};
-  }
-  return gyros;
-}
+std::vector<GyroCalibration> true_gyros(std::size_t row) { return ground::true_gyros(three_hours().truth, row); }
 
 TEST(OpenLoop, WithTheTrueGyrosStaysWithinTheReadoutNoise) {
   const auto& [pass, truth, events] = three_hours();

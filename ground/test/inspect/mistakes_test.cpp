@@ -105,6 +105,7 @@ struct QuaternionCase {
 
 const std::vector<QuaternionCase> kQuaternionCases = {
     {"ScalarFirst", {{{3, 1}, {0, 1}, {1, 1}, {2, 1}}}},
+    {"ScalarLastToldAsFirst", {{{1, 1}, {2, 1}, {3, 1}, {0, 1}}}},
     {"Conjugate", {{{0, -1}, {1, -1}, {2, -1}, {3, 1}}}},
     {"ScalarFirstConjugate", {{{3, 1}, {0, -1}, {1, -1}, {2, -1}}}},
     {"AxesInTurn", {{{1, 1}, {2, 1}, {0, 1}, {3, 1}}}},

@@ -33,6 +33,9 @@ struct CalibrationContext {
   const PassSettings* pass = nullptr;         ///< noise and periods of the sensors
   std::string covariance_file;                ///< name that the message gives for the full covariance
   std::vector<Manoeuvre> manoeuvres{};        ///< in order
+  /// At each attitude the drift as the bias of rate gyros (ground::equivalent_gyro_bias_rad_s), c axes; empty: none is
+  /// written.
+  std::vector<Eigen::Vector3d> gyro_bias_rad_s{};
 };
 
 /// Relative times count from the epoch of the calibration. Throws UsageError as expect_writable_description(), and for

@@ -106,13 +106,14 @@ struct LoadedPass {
 /// NetCDF.
 [[nodiscard]] LoadedPass read_pass(const std::filesystem::path& path, const Selection& selection = {});
 
-/// Gives columns of a Parquet file as the text of a CSV file: their names in the first line, commas, an empty field
-/// where there is no value, timestamps as ISO dates and times. Where it lacks one, the names that it has, without rows.
-using ReadParquet =
+/// Gives columns of a Parquet or NetCDF file as the text of a CSV file: their names in the first line, commas, an empty
+/// field or nan where there is no value, timestamps as ISO dates and times. Where it lacks one, the names that it has,
+/// without rows.
+using ReadColumns =
     std::function<std::string(const std::filesystem::path& file, const std::vector<std::string>& names)>;
 
-/// Reads the pass of a telemetry.toml as read_pass() does, and tables in Parquet as well, by `parquet`.
-[[nodiscard]] LoadedPass read_telemetry(const std::filesystem::path& file, const ReadParquet& parquet);
+/// Reads the pass of a telemetry.toml as read_pass() does, but tables in Parquet and NetCDF by `others`.
+[[nodiscard]] LoadedPass read_telemetry(const std::filesystem::path& file, const ReadColumns& others);
 
 /// A table of a pass in memory, as a file has it before it is screened: rows may be as dirty as telemetry is.
 struct TableInMemory {

@@ -20,6 +20,13 @@ struct SignedComponent {
   [[nodiscard]] bool operator==(const SignedComponent&) const = default;
 };
 
+/// Where the scalar of a quaternion is, of x, y, z, w as told: there; in the place of x, it is the first component and
+/// told as the last; in that of z, the last and told as the first. The others follow in their order, beginning anew
+/// after w. The axis, 0 to 2, in whose place a component stands then.
+[[nodiscard]] inline int axis_of(const SignedComponent& part, int scalar_from) {
+  return (part.from + 3 - scalar_from) % 4;
+}
+
 /// What was taken for something else.
 struct Mistake {
   enum class Kind {
