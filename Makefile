@@ -53,7 +53,7 @@ build:
 	cmake --build $(BUILD) --parallel $(JOBS) --target trihedron
 
 everything: $(PYTHON_TOOLS)/installed
-	@cmake/setup.sh program tests flight
+	@cmake/setup.sh program tests flight mpi
 	cmake --preset release -DTRIHEDRON_BUILD_PYTHON=ON -DPython_EXECUTABLE=$(abspath $(PYTHON_TOOLS)/bin/python) $(CMAKE_FLAGS)
 	cmake --build $(BUILD) --parallel $(JOBS)
 

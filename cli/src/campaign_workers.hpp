@@ -1,0 +1,47 @@
+#pragma once
+/// A campaign in the processes of a job: rank 0 has the journal and hands out the runs, each rank has processes that
+/// perform them (docs/adr/0021-mpi.md).
+
+#include <cstddef>
+#include <memory>
+#include <string>
+
+#include "transport.hpp"
+#include "trihedron/campaign/distribute.hpp"
+#include "trihedron/io/campaign.hpp"
+
+namespace trihedron::cli {
+
+/// Performs the runs whose numbers come on standard input, a line each, and prints the digest of the campaign and then
+/// the record of each as a line, up to the end of the input. Throws UsageError for what is no number of a run.
+void serve(const io::CampaignFile& file, const CampaignIdentity& identity, const campaign::ScenarioOf& scenario_of);
+
+/// The job that this process is a rank of. Its end waits for the other ranks, unless this process has been stopped:
+/// then they are stopped as well.
+class Job {
+ public:
+  /// Throws MachineFailed where what carries the messages is not there.
+  Job();
+  Job(const Job&) = delete;
+  Job& operator=(const Job&) = delete;
+  ~Job();
+
+  [[nodiscard]] Transport& transport() const { return transport_; }
+  /// Of rank 0: tells the others that there is nothing more to do, at the end of the job at the latest.
+  void end();
+
+ private:
+  Transport& transport_;
+  bool has_ended_ = false;
+};
+
+/// What every rank but 0 does in place of the campaign: has runs performed by `jobs` processes, until rank 0 tells the
+/// end. Throws MachineFailed, Stopped, and std::runtime_error where rank 0 is no more.
+void serve_rank(Transport& transport, const std::string& campaign_file, std::size_t jobs);
+
+/// Those of all ranks, `jobs` of each. For rank 0.
+[[nodiscard]] std::unique_ptr<campaign::Workers> workers_of_all_ranks(Transport& transport,
+                                                                      const std::string& campaign_file,
+                                                                      std::size_t jobs, std::string digest);
+
+}  // namespace trihedron::cli
