@@ -27,7 +27,7 @@ fs::path library() {
 }  // namespace
 
 // By PMIx, which Open MPI's mpirun and Slurm's srun speak.
-bool is_in_a_job() { return std::getenv("PMIX_RANK") != nullptr; }
+bool is_in_a_job() { return std::getenv("PMIX_RANK") != nullptr; }  // NOLINT(concurrency-mt-unsafe): nothing sets it
 
 Transport& transport_of_the_job() {
   const fs::path file = library();
