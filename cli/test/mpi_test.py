@@ -9,7 +9,7 @@ import time
 import pytest
 
 from campaign_test import CAMPAIGN, records, table, until
-from program import BUILD, DO_NOT_USE, INPUT_REFUSED, MACHINE_FAILED, PROGRAM, TRUSTWORTHY, WRONG_USAGE, refused, run
+from program import BUILD, DO_NOT_USE, INPUT_REFUSED, MACHINE_FAILED, PROGRAM, ROOT, TRUSTWORTHY, WRONG_USAGE, refused, run
 
 MPIRUN = shutil.which("mpirun")
 needs_mpi = pytest.mark.skipif(not (MPIRUN and (BUILD / "trihedron-mpi.so").exists()),
@@ -136,6 +136,20 @@ def test_a_kill_of_all_ranks_loses_no_finished_run_and_repeats_none(alone, tmp_p
     assert (out / "runs.journal").read_text().startswith(kept)
     assert records(out) == 12
     assert table(out) == table(directory / "out")
+
+
+@needs_mpi
+@pytest.mark.long
+def test_the_batch_file_begins_and_goes_on(alone, tmp_path):
+    """As Slurm runs it, but for its ranks, which are those of this machine."""
+    directory, status = alone
+    environment = {**os.environ, "PATH": f"{BUILD}:{os.environ['PATH']}", "OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1"}
+    for _ in range(2):
+        result = subprocess.run(["bash", ROOT / "examples" / "campaign.sbatch", directory / "c.toml", tmp_path / "out"], env=environment,
+                                capture_output=True, text=True)
+        assert result.returncode == status, result.stderr
+    assert table(tmp_path / "out") == table(directory / "out")
+    assert records(tmp_path / "out") == 12
 
 
 @needs_mpi
