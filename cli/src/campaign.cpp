@@ -283,12 +283,16 @@ ExitStatus run_campaign(const CampaignArguments& arguments, const Common& common
     serve(file, file.identity(TRIHEDRON_VERSION), scenarios_of(file));
     return kTrustworthy;
   }
-  if (arguments.only || !is_in_a_job()) {
+  if (!is_in_a_job()) {
     return carry_out(arguments, common, nullptr);
+  }
+  if (arguments.only) {
+    throw io::UsageError("--only performs one run: start it without mpirun");
   }
   Job job;
   if (job.transport().rank() > 0) {
     serve_rank(job.transport(), arguments.file, jobs_of_a_rank(arguments));
+    job.end();
     return kTrustworthy;
   }
   return carry_out(arguments, common, &job);

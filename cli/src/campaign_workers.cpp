@@ -30,13 +30,13 @@ namespace {
 /// processor for those who look.
 constexpr std::chrono::milliseconds kPatience(2);
 
-// Rank 0 says kBegin, then "WORKER RUN", at last kEnd; the others "WORKER said LINE" and "WORKER ended HOW"; all
-// kAlive.
-constexpr std::string_view kBegin = "begin";
-constexpr std::string_view kEnd = "end";
-constexpr std::string_view kAlive = "alive";
-constexpr std::string_view kSaid = "said";
-constexpr std::string_view kEnded = "ended";
+// Rank 0 says kSayBegin, then "WORKER RUN", at last kSayEnd; the others "WORKER said LINE" and "WORKER ended HOW"; all
+// kSayAlive.
+constexpr std::string_view kSayBegin = "begin";
+constexpr std::string_view kSayEnd = "end";
+constexpr std::string_view kSayAlive = "alive";
+constexpr std::string_view kSayLine = "said";
+constexpr std::string_view kSayEnded = "ended";
 
 std::optional<std::uint64_t> number(std::string_view text) {
   std::uint64_t value = 0;
@@ -53,16 +53,16 @@ std::string_view word_of(std::string_view& text) {
 }
 
 std::string text_of(const WorkerNews& news) {
-  return fmt::format("{} {} {}", news.worker, news.ended ? kEnded : kSaid, news.text);
+  return fmt::format("{} {} {}", news.worker, news.ended ? kSayEnded : kSayLine, news.text);
 }
 
 WorkerNews news_of(std::string_view text) {
   const std::optional<std::uint64_t> worker = number(word_of(text));
   const std::string_view kind = word_of(text);
-  if (!worker || (kind != kSaid && kind != kEnded)) {
+  if (!worker || (kind != kSayLine && kind != kSayEnded)) {
     throw std::logic_error("a rank says what no rank says");
   }
-  return {*worker, kind == kEnded, std::string(text)};
+  return {*worker, kind == kSayEnded, std::string(text)};
 }
 
 using Clock = std::chrono::steady_clock;
@@ -113,7 +113,7 @@ class RankedWorkers : public campaign::Workers {
         own_(campaign_file, jobs),
         silence_(transport.size()),
         is_lost_(static_cast<std::size_t>(transport.size())) {
-    send_to_all(kBegin);
+    send_to_all(kSayBegin);
   }
 
   void give(std::uint64_t worker, std::uint64_t run) override {
@@ -133,12 +133,12 @@ class RankedWorkers : public campaign::Workers {
         events.push_back(event_of(0, news));
       }
       if (silence_.turn()) {
-        send_to_all(kAlive);
+        send_to_all(kSayAlive);
       }
       while (const std::optional<Message> message = transport_.receive()) {
         silence_.hear(message->from);
         // What a rank says that was given up comes too late: others have its runs.
-        if (message->text != kAlive && !is_lost_[static_cast<std::size_t>(message->from)]) {
+        if (message->text != kSayAlive && !is_lost_[static_cast<std::size_t>(message->from)]) {
           events.push_back(event_of(message->from, news_of(message->text)));
         }
       }
@@ -237,10 +237,10 @@ void serve_rank(Transport& transport, const std::string& campaign_file, std::siz
   while (true) {
     check_stop();
     if (const std::optional<Message> message = transport.receive()) {
-      if (message->text == kEnd) {
+      if (message->text == kSayEnd) {
         return;
       }
-      break;  // kBegin
+      break;  // kSayBegin
     }
     std::this_thread::sleep_for(kPatience);
   }
@@ -252,14 +252,14 @@ void serve_rank(Transport& transport, const std::string& campaign_file, std::siz
       transport.send(0, text_of(news));
     }
     if (silence.turn()) {
-      transport.send(0, kAlive);
+      transport.send(0, kSayAlive);
     }
     while (const std::optional<Message> message = transport.receive()) {
       silence.hear(0);
-      if (message->text == kEnd) {
+      if (message->text == kSayEnd) {
         return;
       }
-      if (message->text != kAlive) {
+      if (message->text != kSayAlive) {
         std::string_view text = message->text;
         const std::optional<std::uint64_t> worker = number(word_of(text));
         processes.give(worker.value(), number(text).value());
@@ -273,16 +273,18 @@ Job::Job() : transport_(transport_of_the_job()) {}
 
 Job::~Job() {
   const StopRequest* const request = StopScope::current();
-  if (request != nullptr && request->made()) {
-    return;
+  const bool is_stopped = request != nullptr && request->made();
+  if (transport_.rank() == 0 && !is_stopped) {
+    end();
   }
-  end();
-  transport_.finish();
+  if (has_ended_) {
+    transport_.finish();
+  }
 }
 
 void Job::end() {
   for (int rank = 1; rank < transport_.size() && transport_.rank() == 0 && !has_ended_; ++rank) {
-    transport_.send(rank, kEnd);
+    transport_.send(rank, kSayEnd);
   }
   has_ended_ = true;
 }

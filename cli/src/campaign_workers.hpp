@@ -16,8 +16,8 @@ namespace trihedron::cli {
 /// the record of each as a line, up to the end of the input. Throws UsageError for what is no number of a run.
 void serve(const io::CampaignFile& file, const CampaignIdentity& identity, const campaign::ScenarioOf& scenario_of);
 
-/// The job that this process is a rank of. Its end waits for the other ranks, unless this process has been stopped:
-/// then they are stopped as well.
+/// The job that this process is a rank of. Its end waits for the other ranks, unless this process has been stopped, as
+/// they are then, or is another than rank 0 and has failed: mpirun then ends the job.
 class Job {
  public:
   /// Throws MachineFailed where what carries the messages is not there.
@@ -27,7 +27,7 @@ class Job {
   ~Job();
 
   [[nodiscard]] Transport& transport() const { return transport_; }
-  /// Of rank 0: tells the others that there is nothing more to do, at the end of the job at the latest.
+  /// To be called when there is nothing more to do. Rank 0 tells it to the others, when it fails as well.
   void end();
 
  private:

@@ -1,6 +1,7 @@
 """`campaign` in processes of its own (--serve), and as a job of mpirun. Run by CTest with TRIHEDRON_BUILD naming the build directory."""
 import os
 import pathlib
+import re
 import shutil
 import signal
 import subprocess
@@ -78,10 +79,19 @@ def test_serve_goes_with_no_output(alone):
 
 def test_a_job_without_the_library_is_refused_with_the_cure(alone, tmp_path):
     shutil.copy(PROGRAM, tmp_path / "trihedron")
-    result = subprocess.run([tmp_path / "trihedron", "campaign", alone[0] / "c.toml", "-o", tmp_path / "out"], env={**os.environ, "PMIX_RANK": "0"},
-                            capture_output=True, text=True)
+    command = [tmp_path / "trihedron", "campaign", alone[0] / "c.toml", "-o", tmp_path / "out"]
+    environment = {**os.environ, "PMIX_RANK": "0"}
+    result = subprocess.run(command, env=environment, capture_output=True, text=True)
     refused(result, MACHINE_FAILED, "trihedron-mpi.so", "install trihedron-mpi")
+    another = re.search(r"libz\S* => (\S+)", subprocess.run(["ldd", PROGRAM], check=True, capture_output=True, text=True).stdout)[1]
+    shutil.copy(another, tmp_path / "trihedron-mpi.so")
+    result = subprocess.run(command, env=environment, capture_output=True, text=True)
+    refused(result, MACHINE_FAILED, "another version", "install trihedron-mpi")
     assert not (tmp_path / "out").exists()
+
+
+def test_a_run_alone_is_no_job(alone):
+    refused(run("campaign", alone[0] / "c.toml", "--only", "1", env={**os.environ, "PMIX_RANK": "0"}), WRONG_USAGE, "--only", "without mpirun")
 
 
 # With MPI.
@@ -136,6 +146,21 @@ def test_a_kill_of_all_ranks_loses_no_finished_run_and_repeats_none(alone, tmp_p
     assert (out / "runs.journal").read_text().startswith(kept)
     assert records(out) == 12
     assert table(out) == table(directory / "out")
+
+
+@needs_mpi
+@pytest.mark.long
+@pytest.mark.parametrize("other, words", [("other.toml", "rank 1 reads another campaign than rank 0"), ("nowhere.toml", "nowhere.toml")])
+def test_a_rank_with_other_files_ends_the_job(tmp_path, other, words):
+    long = CAMPAIGN.replace("repeats = 2", "repeats = 20")
+    (tmp_path / "c.toml").write_text(long)
+    (tmp_path / "other.toml").write_text(long.replace("seed = 5", "seed = 6"))
+    command = mpirun(1, "campaign", tmp_path / "c.toml", "-o", tmp_path / "out")
+    command += [":", *mpirun(1, "campaign", tmp_path / other, "-o", tmp_path / "out")[3:]]
+    result = subprocess.run(command, capture_output=True, text=True, timeout=60)
+    assert result.returncode == MACHINE_FAILED, result.stderr
+    assert words in result.stderr
+    assert not (tmp_path / "out" / "runs.nc").exists()
 
 
 @needs_mpi
