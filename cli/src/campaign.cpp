@@ -167,8 +167,8 @@ class Campaign {
     };
     try {
       if (job_ != nullptr) {
-        const auto workers = workers_of_all_ranks(job_->transport(), arguments_.file, jobs_of_a_rank(arguments_),
-                                                  io::digest_of(identity_));
+        const auto workers =
+            workers_of_all_ranks(*job_, arguments_.file, jobs_of_a_rank(arguments_), io::digest_of(identity_));
         campaign::distribute(plan(), missing, *workers, collect);
         job_->end();
       } else {
@@ -291,8 +291,7 @@ ExitStatus run_campaign(const CampaignArguments& arguments, const Common& common
   }
   Job job;
   if (job.transport().rank() > 0) {
-    serve_rank(job.transport(), arguments.file, jobs_of_a_rank(arguments));
-    job.end();
+    serve_rank(job, arguments.file, jobs_of_a_rank(arguments));
     return kTrustworthy;
   }
   return carry_out(arguments, common, &job);

@@ -30,10 +30,11 @@ namespace {
 /// processor for those who look.
 constexpr std::chrono::milliseconds kPatience(2);
 
-// Rank 0 says kSayBegin, then "WORKER RUN", at last kSayEnd; the others "WORKER said LINE" and "WORKER ended HOW"; all
-// kSayAlive.
+// Rank 0 says kSayBegin, then "WORKER RUN", at last kSayEnd, or kSayLeave where a rank is lost; the others "WORKER said
+// LINE" and "WORKER ended HOW"; all kSayAlive.
 constexpr std::string_view kSayBegin = "begin";
 constexpr std::string_view kSayEnd = "end";
+constexpr std::string_view kSayLeave = "leave";
 constexpr std::string_view kSayAlive = "alive";
 constexpr std::string_view kSayLine = "said";
 constexpr std::string_view kSayEnded = "ended";
@@ -107,12 +108,13 @@ class Silence {
 /// Of rank 0 and of the others alike.
 class RankedWorkers : public campaign::Workers {
  public:
-  RankedWorkers(Transport& transport, const std::string& campaign_file, std::size_t jobs, std::string digest)
-      : transport_(transport),
+  RankedWorkers(Job& job, const std::string& campaign_file, std::size_t jobs, std::string digest)
+      : job_(job),
+        transport_(job.transport()),
         digest_(std::move(digest)),
         own_(campaign_file, jobs),
-        silence_(transport.size()),
-        is_lost_(static_cast<std::size_t>(transport.size())) {
+        silence_(transport_.size()),
+        is_lost_(static_cast<std::size_t>(transport_.size())) {
     send_to_all(kSayBegin);
   }
 
@@ -164,6 +166,7 @@ class RankedWorkers : public campaign::Workers {
 
   void lose(int rank, std::vector<campaign::WorkerEvent>& events) {
     is_lost_[static_cast<std::size_t>(rank)] = true;
+    job_.lose_a_rank();
     say(fmt::format("trihedron: rank {} says nothing any more; others get its runs\n", rank));
     for (auto its = numbers_.lower_bound({rank, 0}); its != numbers_.end() && its->first.first == rank;) {
       events.push_back({its->second, campaign::WorkerEvent::Kind::kEnded, {}, "the end of its rank"});
@@ -202,6 +205,7 @@ class RankedWorkers : public campaign::Workers {
     }
   }
 
+  Job& job_;
   Transport& transport_;
   std::string digest_;
   WorkerProcesses own_;
@@ -233,11 +237,13 @@ void serve(const io::CampaignFile& file, const CampaignIdentity& identity, const
   check_stop();
 }
 
-void serve_rank(Transport& transport, const std::string& campaign_file, std::size_t jobs) {
+void serve_rank(Job& job, const std::string& campaign_file, std::size_t jobs) {
+  Transport& transport = job.transport();
   while (true) {
     check_stop();
     if (const std::optional<Message> message = transport.receive()) {
       if (message->text == kSayEnd) {
+        job.end();
         return;
       }
       break;  // kSayBegin
@@ -257,6 +263,10 @@ void serve_rank(Transport& transport, const std::string& campaign_file, std::siz
     while (const std::optional<Message> message = transport.receive()) {
       silence.hear(0);
       if (message->text == kSayEnd) {
+        job.end();
+        return;
+      }
+      if (message->text == kSayLeave) {
         return;
       }
       if (message->text != kSayAlive) {
@@ -277,21 +287,21 @@ Job::~Job() {
   if (transport_.rank() == 0 && !is_stopped) {
     end();
   }
-  if (has_ended_) {
+  if (has_ended_ && !has_lost_a_rank_) {
     transport_.finish();
   }
 }
 
 void Job::end() {
   for (int rank = 1; rank < transport_.size() && transport_.rank() == 0 && !has_ended_; ++rank) {
-    transport_.send(rank, kSayEnd);
+    transport_.send(rank, has_lost_a_rank_ ? kSayLeave : kSayEnd);
   }
   has_ended_ = true;
 }
 
-std::unique_ptr<campaign::Workers> workers_of_all_ranks(Transport& transport, const std::string& campaign_file,
-                                                        std::size_t jobs, std::string digest) {
-  return std::make_unique<RankedWorkers>(transport, campaign_file, jobs, std::move(digest));
+std::unique_ptr<campaign::Workers> workers_of_all_ranks(Job& job, const std::string& campaign_file, std::size_t jobs,
+                                                        std::string digest) {
+  return std::make_unique<RankedWorkers>(job, campaign_file, jobs, std::move(digest));
 }
 
 }  // namespace trihedron::cli

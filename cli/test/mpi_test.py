@@ -193,31 +193,42 @@ def test_what_is_refused_is_refused_once_and_nothing_is_left_behind(alone, tmp_p
     assert not workers_of(process.pid)
 
 
-def process_of(group, rank):
-    """The rank of this session, without its worker, which has the same environment."""
+def processes_of(group, rank):
+    """Of the session: the rank itself and its worker, which has the same environment; None where it is not there yet."""
+    its, worker = None, None
     for pid in map(int, subprocess.run(["pgrep", "--session", str(group)], capture_output=True, text=True).stdout.split()):
-        process = pathlib.Path(f"/proc/{pid}")
-        if f"PMIX_RANK={rank}".encode() in (process / "environ").read_bytes().split(b"\0") and pid not in workers_of(group):
-            return pid
-    return None
+        try:
+            of_rank = f"PMIX_RANK={rank}".encode() in pathlib.Path(f"/proc/{pid}/environ").read_bytes().split(b"\0")
+        except OSError:
+            continue
+        if of_rank and pid in workers_of(group):
+            worker = pid
+        elif of_rank:
+            its = pid
+    return its, worker
+
+
+def written_by(pid):
+    return int(re.search(r"wchar: (\d+)", pathlib.Path(f"/proc/{pid}/io").read_text())[1])
 
 
 @needs_mpi
 @pytest.mark.long
 def test_a_rank_that_is_killed_loses_its_run_only_where_mpirun_lets_the_job_go_on(tmp_path):
     """With --continuous; without it mpirun ends the whole job, and --resume carries on."""
-    (tmp_path / "c.toml").write_text(CAMPAIGN.replace("repeats = 2", "repeats = 10"))
+    (tmp_path / "c.toml").write_text(CAMPAIGN.replace("repeats = 2", "repeats = 20"))
     run("--quiet", "campaign", tmp_path / "c.toml", "-o", tmp_path / "alone")
     command = mpirun(3, "campaign", tmp_path / "c.toml", "-o", tmp_path / "out")
     process = started([command[0], "--continuous", *command[1:]])
-    until(tmp_path / "out" / "runs.journal", 1, process)
-    lost = process_of(process.pid, 2)
-    os.kill(lost, signal.SIGSTOP)  # with a run in its hands: all others are performed meanwhile
-    until(tmp_path / "out" / "runs.journal", 59, process)
+    worker = None
+    while worker is None or written_by(worker) < 1000:  # it has told of a run, and is given the next
+        lost, worker = processes_of(process.pid, 2)
+    os.kill(lost, signal.SIGSTOP)  # all others are performed meanwhile
+    until(tmp_path / "out" / "runs.journal", 119, process)
     os.kill(lost, signal.SIGKILL)
     _, stderr = process.communicate(timeout=120)
     assert process.returncode == 0, stderr  # mpirun's own: with --continuous it does not give that of rank 0
     assert "rank 2 says nothing any more" in stderr
     assert table(tmp_path / "out") == table(tmp_path / "alone")
-    assert records(tmp_path / "out") == 60
+    assert records(tmp_path / "out") == 120
     assert not workers_of(process.pid)
