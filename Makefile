@@ -9,7 +9,7 @@ PYTHON_TOOLS := build-python/tools
 DOCS_TOOLS := build-docs/tools
 SOURCES := $(shell git ls-files '*.cpp' '*.hpp' 2>/dev/null)
 
-.PHONY: help setup build everything demo test flight bench peers slots mutants validation consistency forecasts verdict fuzz fuzz-build fuzz-briefly docs shown \
+.PHONY: help setup build everything demo test flight bench peers slots mutants validation campaign consistency forecasts verdict fuzz fuzz-build fuzz-briefly docs shown \
   format lint \
   standard sanitize coverage interop wheel wheel-test python-test deb deb-test image image-test conan-test install clean
 
@@ -23,6 +23,7 @@ help:
 	@echo 'make slots    count the instructions of each slot of the on-board application'
 	@echo 'make flight   fly core on an emulated Cortex-M7 and three other processors; writes the tables of docs/flight.md'
 	@echo 'make validation  measure again what docs/validation.md tells'
+	@echo 'make campaign  fly the campaign that docs/validation.md tells of; goes on where it was interrupted'
 	@echo 'make consistency  measure again what docs/consistency.md tells: hours; goes on where it was interrupted'
 	@echo 'make forecasts  measure again what docs/forecasts.md tells: hours; goes on where it was interrupted'
 	@echo 'make verdict  measure again what docs/verdict.md tells (WORLDS=pattern, SEEDS=number); goes on where it was interrupted'
@@ -53,7 +54,7 @@ build:
 	cmake --build $(BUILD) --parallel $(JOBS) --target trihedron
 
 everything: $(PYTHON_TOOLS)/installed
-	@cmake/setup.sh program tests flight
+	@cmake/setup.sh program tests flight mpi
 	cmake --preset release -DTRIHEDRON_BUILD_PYTHON=ON -DPython_EXECUTABLE=$(abspath $(PYTHON_TOOLS)/bin/python) $(CMAKE_FLAGS)
 	cmake --build $(BUILD) --parallel $(JOBS)
 
@@ -151,6 +152,11 @@ slots:
 
 validation: everything
 	validation/validate.py $(BUILD)/trihedron docs/validation.md
+
+campaign: build
+	@cmake/setup.sh tests
+	@mkdir -p out
+	validation/validate.py $(BUILD)/trihedron docs/validation.md --campaign out/campaign
 
 interop: build
 	@cmake/setup.sh interop

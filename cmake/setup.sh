@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# cmake/setup.sh [GROUP…]: installs what is missing of these groups on Debian 12, of program, tests, sanitizers, flight, lint and python where none
+# cmake/setup.sh [GROUP…]: installs what is missing of these groups on Debian 12, of program, tests, sanitizers, flight, lint, mpi and python where none
 # is named; does nothing, quickly, when nothing is.
 set -euo pipefail
 cd "$(dirname "$0")/.."
@@ -21,6 +21,8 @@ docs=(doxygen python3 python3-venv)
 interop=(default-jre-headless python3 python3-venv)
 # The Python package; what it needs of PyPI is in python/requirements.txt.
 python=(g++ python3 python3-dev python3-venv)
+# Campaigns under mpirun.
+mpi=(openmpi-bin libopenmpi-dev)
 # Filters in Python, whose packages come from PyPI.
 peers=(python3 python3-venv)
 # ARM Cortex-M7 without an operating system, emulated: a short flight is among the tests.
@@ -34,10 +36,10 @@ packaging=(g++ debhelper fakeroot lintian mmdebstrap buildah python3 python3-ven
 lint=(git ca-certificates cppcheck python3 python3-venv)
 
 packages=()
-for name in ${*:-program tests sanitizers flight lint python}; do
+for name in ${*:-program tests sanitizers flight lint mpi python}; do
   case $name in
-    program|tests|sanitizers|flight|targets|lint|docs|interop|python|peers|packaging) declare -n members=$name && packages+=("${members[@]}") ;;
-    *) echo "setup: no group \"$name\"; there are program, tests, sanitizers, flight, targets, lint, docs, interop, python, peers, packaging" >&2; exit 2 ;;
+    program|tests|sanitizers|flight|targets|lint|docs|interop|python|peers|mpi|packaging) declare -n members=$name && packages+=("${members[@]}") ;;
+    *) echo "setup: no group \"$name\"; there are program, tests, sanitizers, flight, targets, lint, docs, interop, python, peers, mpi, packaging" >&2; exit 2 ;;
   esac
   if [ "$name" = program ]; then program_wanted=yes; fi
 done

@@ -37,6 +37,15 @@ def test_installed_program_tells_the_version_of_the_project(prefix):
     assert VERSION in (prefix / "share/man/man1/trihedron.1").read_text().splitlines()[0]
 
 
+def test_what_needs_mpi_is_installed_apart(prefix, tmp_path):
+    if not (BUILD / "trihedron-mpi.so").exists():
+        pytest.skip("built without MPI: cmake/setup.sh mpi installs it")
+    subprocess.run(["cmake", "--install", BUILD, "--component", "mpi", "--prefix", tmp_path], check=True, capture_output=True)
+    assert [path.name for path in tmp_path.rglob("*") if path.is_file()] == ["trihedron-mpi.so"]
+    for program, needs in ((prefix / "bin/trihedron", False), (next(tmp_path.rglob("trihedron-mpi.so")), True)):
+        assert ("libmpi" in subprocess.run(["readelf", "-d", program], check=True, capture_output=True, text=True).stdout) is needs
+
+
 @pytest.mark.long
 def test_installed_program_simulates_and_calibrates(prefix, tmp_path):
     """Away from the sources and the build directory."""
@@ -58,5 +67,6 @@ def test_version_stands_in_one_place():
 def test_build_dependencies_of_the_debian_package_are_those_that_setup_installs():
     declared = re.search(r"^Build-Depends:(.*?)^\S", (ROOT / "debian/control").read_text(), re.M | re.S)[1]
     declared = {re.sub(r"\(.*?\)", "", package).strip() for package in declared.split(",")} - {"debhelper-compat"}
-    installed = re.search(r"^program=\((.*?)^\)", (ROOT / "cmake/setup.sh").read_text(), re.M | re.S)[1].split()
-    assert declared == set(installed) - {"clang-16", "ca-certificates"}  # it is compiled by g++, which build-essential has
+    groups = dict(re.findall(r"^(program|mpi)=\((.*?)\)$", (ROOT / "cmake/setup.sh").read_text(), re.M | re.S))
+    installed = set(groups["program"].split() + groups["mpi"].split())
+    assert declared == installed - {"clang-16", "ca-certificates", "openmpi-bin"}  # compiled by g++, which build-essential has; mpirun is for those who run it

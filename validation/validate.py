@@ -1,8 +1,10 @@
 #!/usr/bin/python3
-"""Measures what docs/validation.md tells, and writes its tables: validate.py PROGRAM DOCUMENT.
+"""Measures what docs/validation.md tells, and writes its tables: validate.py PROGRAM DOCUMENT [--campaign OUT].
 
-Each table stands between `<!-- NAME -->` and `<!-- end -->`; the text around it is left alone.
+Each table stands between `<!-- NAME -->` and `<!-- end -->`; the text around it is left alone. With --campaign that of the campaign alone, whose
+runs are in OUT; those that are missing there are performed first.
 """
+import argparse
 import functools
 import json
 import math
@@ -178,24 +180,61 @@ def steady(bench):
     return table(["seed", "pitch alignment error, gyro 1", "claimed 1σ", "trustworthy"], rows)
 
 
+def measured(value, unit):
+    if value is None:
+        return "never"
+    return angle_of_two(value) if unit == "rad" else f"{value / 60:.0f} min" if unit == "s" else f"{value:.1f}"
+
+
+def angle_of_two(rad):
+    return f"{rad / ARCSECOND:.2f}″" if rad < 10 * ARCSECOND else angle(rad)
+
+
+def campaign(bench, out):
+    arguments = ["--json", "campaign", CAMPAIGN, "-o", out] + (["--resume"] if (out / "runs.journal").exists() else [])
+    told = json.loads(bench.run(*arguments))
+    rows = []
+    for key, what in MEASURES.items():
+        measure = told["measures"][key]
+        bound = measure["quantiles"][-1]["lower" if key in ("interval_after", "extension") else "upper"]
+        rows.append([what, *(measured(one["value"], measure["unit"]) for one in measure["quantiles"]),
+                     measured(bound, measure["unit"]) if bound is not None else "too few runs"])
+    consistency = [f"{name} {its['mean']:.{digits}f} of {its['degrees_of_freedom']:.{digits}f} ({its['usual_low']:.{digits}f} … {its['usual_high']:.{digits}f} in 95 % "
+                   f"of consistent campaigns)" for name, its, digits in (("NEES", told["nees"], 2), ("NIS", told["nis"], 4))]
+    counts = told["outcomes"]
+    findings = ", ".join(finding["code"] for finding in told["findings"]) or "none"
+    return (f"{told['runs']} runs: {counts['trustworthy']} trustworthy, {counts['do_not_use']} do not use, {counts['failed']} failed. {'; '.join(consistency)}. "
+            f"Findings of the campaign: {findings}.\n\n" + table(["", "50 %", "90 %", "95 %", "99.7 %", "99.7 %, with 90 % confidence"], rows))
+
+
+CAMPAIGN = pathlib.Path(__file__).resolve().parent / "campaign.toml"
+MEASURES = {"alignment_error": "alignment error, worst gyro", "attitude_rms": "attitude of the calibration, rms",
+            "navigation_error": "navigator, corrected every 90 min, largest error", "open_loop_error": "open loop of 90 min, largest error",
+            "open_loop_error_to_end": "open loop to the end of the pass, largest error", "drift_settled": "drift coefficients settled",
+            "alignment_settled": "alignments settled", "extension": "correction interval extended, at least"}
 TABLES = {"paper-claims": functools.partial(claims, estimator="invariant"),
           "paper-claims-by-its-filter": functools.partial(claims, estimator="paper"), 
           "seeds": seeds, "one-degree": one_degree, "steady": steady}
 
 
 def main():
-    program, document = pathlib.Path(sys.argv[1]).resolve(), pathlib.Path(sys.argv[2])
-    text = document.read_text()
+    parser = argparse.ArgumentParser()
+    parser.add_argument("program", type=pathlib.Path)
+    parser.add_argument("document", type=pathlib.Path)
+    parser.add_argument("--campaign", metavar="OUT", type=pathlib.Path)
+    given = parser.parse_args()
+    tables = {"campaign": functools.partial(campaign, out=given.campaign.resolve())} if given.campaign else TABLES
+    text = given.document.read_text()
     with tempfile.TemporaryDirectory() as directory:
-        bench = Bench(program, pathlib.Path(directory))
-        for name, measure in TABLES.items():
+        bench = Bench(given.program.resolve(), pathlib.Path(directory))
+        for name, measure in tables.items():
             pattern = re.compile(rf"(<!-- {name} -->\n).*?(<!-- end -->)", re.DOTALL)
             if not pattern.search(text):
-                sys.exit(f"{document}: has no place for the table {name}")
-            measured = measure(bench)
-            text = pattern.sub(lambda place: place[1] + measured + "\n" + place[2], text)
-            print(f"{name}\n{measured}\n", flush=True)
-    document.write_text(text)
+                sys.exit(f"{given.document}: has no place for the table {name}")
+            found = measure(bench)
+            text = pattern.sub(lambda place: place[1] + found + "\n" + place[2], text)
+            print(f"{name}\n{found}\n", flush=True)
+    given.document.write_text(text)
 
 
 if __name__ == "__main__":

@@ -201,6 +201,18 @@ RunRecord record_of(const Flight& flight, std::size_t gyros) {
   return record;
 }
 
+RunRecord failed(const CampaignPlan& plan, std::uint64_t run, std::string reason) {
+  RunRecord record;
+  record.run = run;
+  record.seed = seed_of_run(plan, run);
+  record.draws = draws_of_run(plan, run);
+  record.reason = std::move(reason);
+  for (const RunQuantityRow& row : kRunQuantityRows) {
+    record[row.quantity].assign(size_of(row.shape, plan.gyros), kNone);
+  }
+  return record;
+}
+
 RunRecord perform(const CampaignPlan& plan, std::uint64_t run, const ScenarioOf& scenario_of,
                   const CalibrationOptions& options, const std::function<void(Flight&&)>& flown) {
   const auto begun = std::chrono::steady_clock::now();
@@ -208,18 +220,11 @@ RunRecord perform(const CampaignPlan& plan, std::uint64_t run, const ScenarioOf&
   const std::uint64_t seed = seed_of_run(plan, run);
   const std::vector<double> draws = draws_of_run(plan, run);
   RunRecord record;
-  const auto failed = [&](const std::string& reason) {
-    record = {};
-    record.reason = reason;
-    for (const RunQuantityRow& row : kRunQuantityRows) {
-      record[row.quantity].assign(size_of(row.shape, plan.gyros), kNone);
-    }
-  };
   std::optional<Scenario> scenario;
   try {
     scenario = scenario_of(seed, draws);
   } catch (const std::invalid_argument& error) {
-    failed(error.what());
+    record = failed(plan, run, error.what());
   }
   if (scenario) {
     try {
@@ -233,9 +238,9 @@ RunRecord perform(const CampaignPlan& plan, std::uint64_t run, const ScenarioOf&
     } catch (const std::bad_alloc&) {
       throw;  // it says nothing of the run
     } catch (const ground::SetupError& error) {
-      failed(std::string(error.what()) + "; " + error.cure());
+      record = failed(plan, run, std::string(error.what()) + "; " + error.cure());
     } catch (const std::exception& error) {
-      failed(error.what());
+      record = failed(plan, run, error.what());
     }
   }
   record.run = run;
@@ -247,15 +252,15 @@ RunRecord perform(const CampaignPlan& plan, std::uint64_t run, const ScenarioOf&
 }
 
 void perform_all(const CampaignPlan& plan, std::span<const std::uint64_t> runs, const ScenarioOf& scenario_of,
-                 const CalibrationOptions& options, unsigned jobs, const std::function<void(RunRecord&&)>& collect) {
+                 const CalibrationOptions& options, unsigned jobs, const Collect& collect) {
   std::mutex one_at_a_time;
   ground::with_cores(jobs, [&] {
     ground::for_each_on_all_cores(runs.size(), [&](std::size_t i) {
-      RunRecord record;
+      std::vector<RunRecord> records;
       // Many runs keep all cores busy; within a run nothing is gained by more than one, and its CPU time is its own.
-      ground::with_cores(1, [&] { record = perform(plan, runs[i], scenario_of, options); });
+      ground::with_cores(1, [&] { records.push_back(perform(plan, runs[i], scenario_of, options)); });
       const std::scoped_lock lock(one_at_a_time);
-      collect(std::move(record));
+      collect(std::move(records));
     });
   });
 }

@@ -15,11 +15,13 @@
 #include <vector>
 
 #include "campaign_view.hpp"
+#include "campaign_workers.hpp"
 #include "commands.hpp"
 #include "progress.hpp"
 #include "standard_streams.hpp"
 #include "steps.hpp"
 #include "terminal.hpp"
+#include "transport.hpp"
 #include "trihedron/campaign/perform.hpp"
 #include "trihedron/campaign/sampling.hpp"
 #include "trihedron/campaign/summary.hpp"
@@ -47,7 +49,8 @@ struct CampaignArguments {
   std::string out;
   bool resume = false;
   std::optional<std::uint64_t> only;
-  unsigned jobs = 0;  ///< 0: one per core
+  bool serve = false;
+  unsigned jobs = 0;  ///< 0: one per core, in a job of mpirun one per rank
 };
 
 campaign::ScenarioOf scenarios_of(const io::CampaignFile& file) {
@@ -85,13 +88,17 @@ std::optional<io::Journal> journal_in(const fs::path& out, const CampaignIdentit
   return journal;
 }
 
+std::size_t jobs_of_a_rank(const CampaignArguments& arguments) { return std::max(arguments.jobs, 1U); }
+
 /// Carries a campaign on to its end, whatever of it is there.
 class Campaign {
  public:
-  Campaign(const io::CampaignFile& file, const CampaignArguments& arguments, const Common& common)
+  /// job: null for one that no mpirun has started.
+  Campaign(const io::CampaignFile& file, const CampaignArguments& arguments, const Common& common, Job* job)
       : file_(file),
         arguments_(arguments),
         common_(common),
+        job_(job),
         identity_(file.identity(TRIHEDRON_VERSION)),
         staged_(arguments.out) {
     staged_.expect_places(std::array<fs::path, 3>{kTableFile, kTimesFile, kCampaignReport});
@@ -149,15 +156,25 @@ class Campaign {
     common_.log.say(
         fmt::format("campaign {}: {} of {} runs are to be performed", plan().name, missing.size(), plan().runs));
     RunCounter counter("campaign", records_.size(), plan().runs, common_.quiet);
-    const unsigned jobs = arguments_.jobs > 0 ? arguments_.jobs : std::max(std::thread::hardware_concurrency(), 1U);
-    try {
-      campaign::perform_all(plan(), missing, scenarios_of(file_), file_.options(), jobs, [&](RunRecord&& record) {
-        writer_->add(record);
+    const auto collect = [&](std::vector<RunRecord>&& records) {
+      writer_->add(records);
+      for (RunRecord& record : records) {
         common_.log.say(fmt::format("run {}: {}{}{}", record.run, name_of(record.outcome),
                                     record.reason.empty() ? "" : ": ", record.reason));
         records_.push_back(std::move(record));
         counter.add();
-      });
+      }
+    };
+    try {
+      if (job_ != nullptr) {
+        const auto workers =
+            workers_of_all_ranks(*job_, arguments_.file, jobs_of_a_rank(arguments_), io::digest_of(identity_));
+        campaign::distribute(plan(), missing, *workers, collect);
+        job_->end();
+      } else {
+        const unsigned jobs = arguments_.jobs > 0 ? arguments_.jobs : std::max(std::thread::hardware_concurrency(), 1U);
+        campaign::perform_all(plan(), missing, scenarios_of(file_), file_.options(), jobs, collect);
+      }
     } catch (const Stopped&) {
       say(fmt::format("{}trihedron: stopped; {} of {} runs are kept: go on with {} --resume\n",
                       is_screen(stderr) ? "\r\033[K" : "", records_.size(), plan().runs,
@@ -170,6 +187,7 @@ class Campaign {
   const io::CampaignFile& file_;
   const CampaignArguments& arguments_;
   const Common& common_;
+  Job* job_;
   CampaignIdentity identity_;
   io::StagedDirectory staged_;
   std::optional<io::JournalWriter> writer_;
@@ -242,7 +260,8 @@ ExitStatus replay_run(const io::CampaignFile& file, const CampaignArguments& arg
   return record.outcome == RunOutcome::kTrustworthy ? kTrustworthy : kDoNotUse;
 }
 
-ExitStatus run_campaign(const CampaignArguments& arguments, const Common& common) {
+/// job: null for one that no mpirun has started.
+ExitStatus carry_out(const CampaignArguments& arguments, const Common& common, Job* job) {
   const io::CampaignFile file(arguments.file, sim::expect_possible);
   const fs::path out = arguments.out;
   if (!out.empty()) {
@@ -255,7 +274,27 @@ ExitStatus run_campaign(const CampaignArguments& arguments, const Common& common
   if (arguments.only) {
     return replay_run(file, arguments, common);
   }
-  return Campaign(file, arguments, common).carry_out();
+  return Campaign(file, arguments, common, job).carry_out();
+}
+
+ExitStatus run_campaign(const CampaignArguments& arguments, const Common& common) {
+  if (arguments.serve) {
+    const io::CampaignFile file(arguments.file, sim::expect_possible);
+    serve(file, file.identity(TRIHEDRON_VERSION), scenarios_of(file));
+    return kTrustworthy;
+  }
+  if (!is_in_a_job()) {
+    return carry_out(arguments, common, nullptr);
+  }
+  if (arguments.only) {
+    throw io::UsageError("--only performs one run: start it without mpirun");
+  }
+  Job job;
+  if (job.transport().rank() > 0) {
+    serve_rank(job, arguments.file, jobs_of_a_rank(arguments));
+    return kTrustworthy;
+  }
+  return carry_out(arguments, common, &job);
 }
 
 }  // namespace
@@ -276,18 +315,32 @@ void add_campaign(CLI::App& program, const Common& common, int& exit_status) {
                                        "scenario, pass, calibration and report")
                           ->type_name("NUMBER")
                           ->excludes(resume);
-  command->add_option("--jobs", arguments->jobs, "Runs at the same time; one per core without it")
-      ->check(whole(trihedron::limits::kJobs))
-      ->type_name("NUMBER");
+  CLI::Option* jobs =
+      command
+          ->add_option("--jobs", arguments->jobs,
+                       "Runs at the same time, under mpirun of each rank; without it one per core, under mpirun one")
+          ->check(whole(trihedron::limits::kJobs))
+          ->type_name("NUMBER");
+  CLI::Option* serve =
+      command
+          ->add_flag("--serve", arguments->serve,
+                     "Perform the runs whose numbers come on standard input, one a line, and print the "
+                     "digest of the campaign and the record of each run, as the journal has it")
+          ->excludes(out)
+          ->excludes(resume)
+          ->excludes(only)
+          ->excludes(jobs);
   command->footer(
       "trihedron campaign examples/campaign.toml -o out\n"
       "# After a break, whatever it was\n"
       "trihedron campaign examples/campaign.toml -o out --resume\n"
+      "# On several machines\n"
+      "mpirun -n 64 trihedron campaign examples/campaign.toml -o out\n"
       "# A run to be looked at\n"
       "trihedron campaign examples/campaign.toml -o out --only 17\n"
       "python3 -c 'import xarray; print(xarray.open_dataset(\"out/runs.nc\"))'");
-  command->callback([&common, &exit_status, arguments, out, only] {
-    if (out->count() == 0 && only->count() == 0) {
+  command->callback([&common, &exit_status, arguments, out, only, serve] {
+    if (out->count() == 0 && only->count() == 0 && serve->count() == 0) {
       throw io::UsageError("-o is required: a campaign writes its runs into a directory; --only N can do without");
     }
     exit_status = run_campaign(*arguments, common);

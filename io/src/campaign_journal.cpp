@@ -209,8 +209,12 @@ JournalWriter::JournalWriter(const fs::path& file, const CampaignIdentity& ident
 JournalWriter::JournalWriter(const fs::path& file, const Journal& journal)
     : file_(GrowingFile::carry_on(file, journal.size, journal.crc)) {}
 
-void JournalWriter::add(const RunRecord& record) {
-  file_.append(format_record(record) + "\n");
+void JournalWriter::add(std::span<const RunRecord> records) {
+  std::string lines;
+  for (const RunRecord& record : records) {
+    lines += format_record(record) + "\n";
+  }
+  file_.append(lines);
   file_.synchronise();
 }
 

@@ -5,6 +5,8 @@
 #include <cstdint>
 #include <functional>
 #include <span>
+#include <string>
+#include <vector>
 
 #include "trihedron/ground/evaluate/calibration_evaluation.hpp"
 #include "trihedron/records/campaign.hpp"
@@ -31,15 +33,21 @@ struct Flight {
 /// What is measured of it, and its verdict. Without number, seed, draws and times.
 [[nodiscard]] RunRecord record_of(const Flight& flight, std::size_t gyros);
 
+/// The record of a run that has failed: without times.
+[[nodiscard]] RunRecord failed(const CampaignPlan& plan, std::uint64_t run, std::string reason);
+
 /// `flown`, which may be null, is given what was flown where the run did not fail. Does not throw for a run that
 /// fails; throws Stopped, std::bad_alloc, and what `scenario_of` throws.
 [[nodiscard]] RunRecord perform(const CampaignPlan& plan, std::uint64_t run, const ScenarioOf& scenario_of,
                                 const CalibrationOptions& options,
                                 const std::function<void(Flight&&)>& flown = nullptr);
 
-/// Performs runs side by side, each on one core, and hands over each record when it is there: one at a time, in no
-/// order. jobs: 1 or more threads. Throws as perform(), and what `collect` throws.
+/// Takes over records as they come: one call at a time, in no order.
+using Collect = std::function<void(std::vector<RunRecord>&& records)>;
+
+/// Performs runs side by side, each on one core, and hands over each record when it is there. jobs: 1 or more threads.
+/// Throws as perform(), and what `collect` throws.
 void perform_all(const CampaignPlan& plan, std::span<const std::uint64_t> runs, const ScenarioOf& scenario_of,
-                 const CalibrationOptions& options, unsigned jobs, const std::function<void(RunRecord&&)>& collect);
+                 const CalibrationOptions& options, unsigned jobs, const Collect& collect);
 
 }  // namespace trihedron::campaign

@@ -84,8 +84,8 @@ class JournalWriter {
   /// Carries on with one that was read; what comes after its last whole line is cut off.
   JournalWriter(const std::filesystem::path& file, const Journal& journal);
 
-  /// Returns when it is on the disk. Throws MachineFailed.
-  void add(const RunRecord& record);
+  /// Returns when all of them are on the disk. Throws MachineFailed.
+  void add(std::span<const RunRecord> records);
 
  private:
   GrowingFile file_;

@@ -1,0 +1,234 @@
+"""`campaign` in processes of its own (--serve), and as a job of mpirun. Run by CTest with TRIHEDRON_BUILD naming the build directory."""
+import os
+import pathlib
+import re
+import shutil
+import signal
+import subprocess
+import time
+
+import pytest
+
+from campaign_test import CAMPAIGN, records, table, until
+from program import BUILD, DO_NOT_USE, INPUT_REFUSED, MACHINE_FAILED, PROGRAM, ROOT, TRUSTWORTHY, WRONG_USAGE, refused, run
+
+MPIRUN = shutil.which("mpirun")
+needs_mpi = pytest.mark.skipif(not (MPIRUN and (BUILD / "trihedron-mpi.so").exists()),
+                               reason="no MPI: cmake/setup.sh mpi installs it, and then the program is built with it")
+
+
+@pytest.fixture(scope="module")
+def alone(tmp_path_factory):
+    """The campaign by one process."""
+    directory = tmp_path_factory.mktemp("mpi")
+    (directory / "c.toml").write_text(CAMPAIGN)
+    result = run("--quiet", "campaign", directory / "c.toml", "-o", directory / "out")
+    assert result.returncode in (TRUSTWORTHY, DO_NOT_USE), result.stderr
+    return directory, result.returncode
+
+
+def mpirun(ranks, *arguments):
+    """As any user, on however many processors: options that tests need and users do not."""
+    return [MPIRUN, "--allow-run-as-root", "--oversubscribe", "-n", str(ranks), PROGRAM, *map(str, arguments)]
+
+
+def started(command, **options):
+    return subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True, **options)
+
+
+def workers_of(group):
+    """Processes that perform runs, of this session."""
+    found = []
+    for process in pathlib.Path("/proc").iterdir():
+        try:
+            if process.name.isdigit() and os.getsid(int(process.name)) == group and b"--serve" in (process / "cmdline").read_bytes().split(b"\0"):
+                found.append(int(process.name))
+        except (OSError, ProcessLookupError):
+            pass
+    return found
+
+
+# Without MPI.
+
+def test_serve_performs_the_runs_that_it_is_given(alone):
+    directory, _ = alone
+    result = run("campaign", directory / "c.toml", "--serve", input="7\n2\n")
+    assert result.returncode == TRUSTWORTHY and not result.stderr
+    digest, *lines = result.stdout.splitlines()
+    assert len(digest) == 16 and len(lines) == 2
+    journal = (directory / "out" / "runs.journal").read_text().splitlines()
+    assert digest in journal[0]
+    for line in lines:
+        assert any(untimed(line) == untimed(other) for other in journal[1:]), line
+
+
+def untimed(line):
+    return line[9:].split('"cpu_s"')[0]
+
+
+@pytest.mark.parametrize("given", ["12\n", "-1\n", "1 2\n", "x\n", "\n"])
+def test_serve_refuses_what_is_no_run(alone, given):
+    result = run("campaign", alone[0] / "c.toml", "--serve", input=given)
+    assert result.returncode == WRONG_USAGE
+    assert "0 to 11" in result.stderr and result.stdout.count("\n") == 1
+
+
+def test_serve_goes_with_no_output(alone):
+    refused(run("campaign", alone[0] / "c.toml", "--serve", "-o", "out"), WRONG_USAGE, "--serve")
+
+
+def test_a_job_without_the_library_is_refused_with_the_cure(alone, tmp_path):
+    shutil.copy(PROGRAM, tmp_path / "trihedron")
+    command = [tmp_path / "trihedron", "campaign", alone[0] / "c.toml", "-o", tmp_path / "out"]
+    environment = {**os.environ, "PMIX_RANK": "0"}
+    result = subprocess.run(command, env=environment, capture_output=True, text=True)
+    refused(result, MACHINE_FAILED, "trihedron-mpi.so", "install trihedron-mpi")
+    another = re.search(r"libz\S* => (\S+)", subprocess.run(["ldd", PROGRAM], check=True, capture_output=True, text=True).stdout)[1]
+    shutil.copy(another, tmp_path / "trihedron-mpi.so")
+    result = subprocess.run(command, env=environment, capture_output=True, text=True)
+    refused(result, MACHINE_FAILED, "another version", "install trihedron-mpi")
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_run_alone_is_no_job(alone):
+    refused(run("campaign", alone[0] / "c.toml", "--only", "1", env={**os.environ, "PMIX_RANK": "0"}), WRONG_USAGE, "--only", "without mpirun")
+
+
+# With MPI.
+
+@needs_mpi
+@pytest.mark.long
+@pytest.mark.parametrize("ranks, jobs", [(1, "1"), (3, "2")])
+def test_a_job_gives_the_table_of_one_process(alone, tmp_path, ranks, jobs):
+    directory, status = alone
+    result = subprocess.run(mpirun(ranks, "campaign", directory / "c.toml", "-o", tmp_path / "out", "--jobs", jobs), capture_output=True, text=True)
+    assert result.returncode == status, result.stderr
+    assert result.stdout.count("Test: 12 runs") == 1
+    assert table(tmp_path / "out") == table(directory / "out")
+    assert sorted(os.listdir(tmp_path / "out")) == ["report.html", "runs.journal", "runs.nc", "times.csv"]
+
+
+@needs_mpi
+@pytest.mark.long
+def test_a_worker_that_is_killed_loses_its_run_only_and_the_campaign_goes_on(alone, tmp_path):
+    directory, status = alone
+    out = tmp_path / "out"
+    process = started(mpirun(2, "campaign", directory / "c.toml", "-o", out))
+    until(out / "runs.journal", 1, process)
+    killed = workers_of(process.pid)
+    for worker in killed:
+        os.kill(worker, signal.SIGKILL)
+    stdout, stderr = process.communicate(timeout=120)
+    assert killed
+    assert process.returncode == status, stderr
+    assert table(out) == table(directory / "out")
+    assert records(out) == 12
+
+
+@needs_mpi
+@pytest.mark.long
+def test_a_kill_of_all_ranks_loses_no_finished_run_and_repeats_none(alone, tmp_path):
+    directory, status = alone
+    out = tmp_path / "out"
+    process = started(mpirun(3, "campaign", directory / "c.toml", "-o", out))
+    until(out / "runs.journal", 3, process)
+    os.killpg(process.pid, signal.SIGKILL)
+    process.communicate(timeout=60)
+    for _ in range(1000):
+        if not workers_of(process.pid):
+            break
+        time.sleep(0.01)
+    kept = (out / "runs.journal").read_text()
+    kept = kept[: kept.rindex("\n") + 1]
+    assert not (out / "runs.nc").exists()
+    result = subprocess.run(mpirun(2, "campaign", directory / "c.toml", "-o", out, "--resume"), capture_output=True, text=True)
+    assert result.returncode == status, result.stderr
+    assert (out / "runs.journal").read_text().startswith(kept)
+    assert records(out) == 12
+    assert table(out) == table(directory / "out")
+
+
+@needs_mpi
+@pytest.mark.long
+@pytest.mark.parametrize("other, words", [("other.toml", "rank 1 reads another campaign than rank 0"), ("nowhere.toml", "nowhere.toml")])
+def test_a_rank_with_other_files_ends_the_job(tmp_path, other, words):
+    long = CAMPAIGN.replace("repeats = 2", "repeats = 20")
+    (tmp_path / "c.toml").write_text(long)
+    (tmp_path / "other.toml").write_text(long.replace("seed = 5", "seed = 6"))
+    command = mpirun(1, "campaign", tmp_path / "c.toml", "-o", tmp_path / "out")
+    command += [":", *mpirun(1, "campaign", tmp_path / other, "-o", tmp_path / "out")[3:]]
+    result = subprocess.run(command, capture_output=True, text=True, timeout=60)
+    assert result.returncode == MACHINE_FAILED, result.stderr
+    assert words in result.stderr
+    assert not (tmp_path / "out" / "runs.nc").exists()
+
+
+@needs_mpi
+@pytest.mark.long
+def test_the_batch_file_begins_and_goes_on(alone, tmp_path):
+    """As Slurm runs it, but for its ranks, which are those of this machine."""
+    directory, status = alone
+    environment = {**os.environ, "PATH": f"{BUILD}:{os.environ['PATH']}", "OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1"}
+    for _ in range(2):
+        result = subprocess.run(["bash", ROOT / "examples" / "campaign.sbatch", directory / "c.toml", tmp_path / "out"], env=environment,
+                                capture_output=True, text=True)
+        assert result.returncode == status, result.stderr
+    assert table(tmp_path / "out") == table(directory / "out")
+    assert records(tmp_path / "out") == 12
+
+
+@needs_mpi
+@pytest.mark.long
+def test_what_is_refused_is_refused_once_and_nothing_is_left_behind(alone, tmp_path):
+    directory, _ = alone
+    (tmp_path / "c.toml").write_text(CAMPAIGN.replace("seed = 5", "sed = 5"))
+    process = started(mpirun(3, "campaign", tmp_path / "c.toml", "-o", tmp_path / "out"))
+    _, stderr = process.communicate(timeout=60)
+    assert process.returncode == INPUT_REFUSED
+    assert stderr.count('did you mean "seed"') == 1
+    assert not (tmp_path / "out").exists()
+    process = started(mpirun(2, "campaign", directory / "c.toml", "-o", directory / "out"))
+    _, stderr = process.communicate(timeout=60)
+    assert process.returncode == INPUT_REFUSED and stderr.count("--resume") == 1
+    assert not workers_of(process.pid)
+
+
+def processes_of(group, rank):
+    """Of the session: the rank itself and its worker, which has the same environment; None where it is not there yet."""
+    its, worker = None, None
+    for pid in map(int, subprocess.run(["pgrep", "--session", str(group)], capture_output=True, text=True).stdout.split()):
+        try:
+            of_rank = f"PMIX_RANK={rank}".encode() in pathlib.Path(f"/proc/{pid}/environ").read_bytes().split(b"\0")
+        except OSError:
+            continue
+        if of_rank and pid in workers_of(group):
+            worker = pid
+        elif of_rank:
+            its = pid
+    return its, worker
+
+
+def written_by(pid):
+    return int(re.search(r"wchar: (\d+)", pathlib.Path(f"/proc/{pid}/io").read_text())[1])
+
+
+@needs_mpi
+@pytest.mark.long
+def test_a_rank_that_is_killed_loses_its_run_only_where_mpirun_lets_the_job_go_on(tmp_path):
+    """With --continuous; without it mpirun ends the whole job, and --resume carries on."""
+    (tmp_path / "c.toml").write_text(CAMPAIGN.replace("repeats = 2", "repeats = 20"))
+    run("--quiet", "campaign", tmp_path / "c.toml", "-o", tmp_path / "alone")
+    command = mpirun(3, "campaign", tmp_path / "c.toml", "-o", tmp_path / "out")
+    process = started([command[0], "--continuous", *command[1:]])
+    worker = None
+    while worker is None or written_by(worker) < 1000:  # it has told of a run, and is given the next
+        lost, worker = processes_of(process.pid, 2)
+    os.kill(lost, signal.SIGSTOP)  # all others are performed meanwhile
+    until(tmp_path / "out" / "runs.journal", 119, process)
+    os.kill(lost, signal.SIGKILL)
+    _, stderr = process.communicate(timeout=120)
+    assert process.returncode == 0, stderr  # mpirun's own: with --continuous it does not give that of rank 0
+    assert "rank 2 says nothing any more" in stderr
+    assert table(tmp_path / "out") == table(tmp_path / "alone")
+    assert records(tmp_path / "out") == 120
+    assert not workers_of(process.pid)
