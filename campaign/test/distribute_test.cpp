@@ -16,7 +16,7 @@ using testing::ElementsAre;
 using testing::HasSubstr;
 using testing::UnorderedElementsAre;
 
-CampaignPlan plan_of(std::uint64_t runs) {
+CampaignPlan runs_without_draws(std::uint64_t runs) {
   CampaignPlan plan;
   plan.seed = 3;
   plan.runs = runs;
@@ -73,21 +73,21 @@ std::map<std::uint64_t, RunRecord> all_of(const CampaignPlan& plan, std::vector<
 TEST(Distribute, GivesEachRunOnceToWorkersThatHaveNothingToDo) {
   Fake workers({ready(7), ready(3)},
                [](std::uint64_t worker, std::uint64_t run) { return std::vector{performed(worker, run)}; });
-  const auto all = all_of(plan_of(9), {1, 4, 5, 8}, workers);
+  const auto all = all_of(runs_without_draws(9), {1, 4, 5, 8}, workers);
   EXPECT_EQ(all.size(), 4U);
   EXPECT_THAT(workers.given(), ElementsAre(std::pair(7, 1), std::pair(3, 4), std::pair(7, 5), std::pair(3, 8)));
 }
 
 TEST(Distribute, WaitsForNobodyWhereNothingIsToBeDone) {
   Fake workers({}, nullptr);
-  EXPECT_TRUE(all_of(plan_of(9), {}, workers).empty());
+  EXPECT_TRUE(all_of(runs_without_draws(9), {}, workers).empty());
 }
 
 TEST(Distribute, GivesTheRunOfAWorkerThatEndedToTheNext) {
   Fake workers({ready(0), ready(1)}, [](std::uint64_t worker, std::uint64_t run) {
     return worker == 0 ? std::vector{ended(0), ready(2)} : std::vector{performed(worker, run)};
   });
-  const auto all = all_of(plan_of(3), {0, 1, 2}, workers);
+  const auto all = all_of(runs_without_draws(3), {0, 1, 2}, workers);
   EXPECT_EQ(all.size(), 3U);
   for (const auto& [run, record] : all) {
     EXPECT_EQ(record.outcome, RunOutcome::kTrustworthy) << run;
@@ -100,25 +100,25 @@ TEST(Distribute, ARunThatEndsTwoProcessesHasFailedAndTheOthersGoOn) {
   Fake workers({ready(0)}, [&](std::uint64_t worker, std::uint64_t run) {
     return run == 1 ? std::vector{ended(worker), ready(++next)} : std::vector{performed(worker, run)};
   });
-  const auto all = all_of(plan_of(3), {0, 1, 2}, workers);
+  const auto all = all_of(runs_without_draws(3), {0, 1, 2}, workers);
   ASSERT_EQ(all.size(), 3U);
   EXPECT_EQ(all.at(1).outcome, RunOutcome::kFailed);
   EXPECT_THAT(all.at(1).reason, HasSubstr("ended its process 2 times, at last by signal 9"));
-  EXPECT_EQ(all.at(1).seed, failed(plan_of(3), 1, "").seed);
+  EXPECT_EQ(all.at(1).seed, failed(runs_without_draws(3), 1, "").seed);
   EXPECT_EQ(all.at(2).outcome, RunOutcome::kTrustworthy);
 }
 
 TEST(Distribute, AWorkerThatEndsWithNothingToDoCostsNothing) {
   Fake workers({ready(0), ended(0), ready(1)},
                [](std::uint64_t worker, std::uint64_t run) { return std::vector{performed(worker, run)}; });
-  EXPECT_EQ(all_of(plan_of(2), {0, 1}, workers).size(), 2U);
+  EXPECT_EQ(all_of(runs_without_draws(2), {0, 1}, workers).size(), 2U);
   EXPECT_THAT(workers.given(), UnorderedElementsAre(std::pair(1, 0), std::pair(1, 1)));
 }
 
 TEST(Distribute, RefusesARecordThatNobodyAskedFor) {
   Fake workers({ready(0)},
                [](std::uint64_t worker, std::uint64_t run) { return std::vector{performed(worker, run + 1)}; });
-  EXPECT_THROW(all_of(plan_of(3), {0}, workers), std::logic_error);
+  EXPECT_THROW(all_of(runs_without_draws(3), {0}, workers), std::logic_error);
 }
 
 }  // namespace

@@ -14,7 +14,7 @@ namespace trihedron::ground {
 namespace {
 
 /// As of open loops: the body turns by a third of a degree over it.
-constexpr Duration kStep = std::chrono::seconds(5);
+constexpr Duration kPathStep = std::chrono::seconds(5);
 
 /// The gyros of a calibration along an attitude.
 class Drifting {
@@ -32,7 +32,7 @@ class Drifting {
   void go_to(Time t) {
     while (now_ != t) {
       check_stop();
-      const Duration step = std::clamp<Duration>(t - now_, -kStep, kStep);
+      const Duration step = std::clamp<Duration>(t - now_, -kPathStep, kPathStep);
       const Eigen::Matrix3d C_in_c = motion_.C_in_c(now_ + step / 2);
       for (auto& [gyro, drift] : gyros_) {
         precess(gyro, drift, C_in_c, reading(gyro, C_in_c), 0, to_seconds(step));
