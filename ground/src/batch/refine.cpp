@@ -227,7 +227,7 @@ Refinement::Refinement(const Screened& screened, PassSetup setup, const Calibrat
   const SmoothedAttitude smoothed(screened.pass, problem_, result_.solution, roots_);
   course_ = smoothed.course();
   if (options.definitive_attitude) {
-    definitive_attitude_ = smoothed.definitive();
+    definitive_attitude_ = smoothed.definitive(course_.misfit);
   }
 }
 

@@ -20,7 +20,40 @@ using Eigen::Vector3d;
 constexpr std::array<Duration, 3> kReaches = {std::chrono::milliseconds(3000), std::chrono::milliseconds(1400),
                                               std::chrono::milliseconds(700)};
 
+/// Over so long to both sides of a time fixes are averaged, some tens of them.
+constexpr Duration kMisfitReach = std::chrono::minutes(1);
+/// Of the mean; by chance it is beyond in one of a hundred places.
+constexpr double kMisfitSigmas = 2.5;
+
+Vector3d with_misfit(const Vector3d& sigma_rad, const Vector3d& square_rad2) {
+  return (sigma_rad.cwiseAbs2() + square_rad2).cwiseSqrt();
+}
+
 }  // namespace
+
+void LocalMisfit::add(Time t, const Vector3d& off_rad, const Vector3d& sigma_rad) {
+  constexpr double kOutlierSigmas = 5;
+  if ((off_rad.array().abs() > kOutlierSigmas * sigma_rad.array()).any()) {
+    return;
+  }
+  const Vector3d weight = sigma_rad.cwiseAbs2().cwiseInverse();
+  t_.push_back(t);
+  weights_.emplace_back(weights_.back() + weight);
+  weighted_.emplace_back(weighted_.back() + weight.cwiseProduct(off_rad));
+}
+
+Vector3d LocalMisfit::square_rad2(Time t) const {
+  const auto first = std::ranges::lower_bound(t_, t - kMisfitReach) - t_.begin();
+  const auto end = std::ranges::upper_bound(t_, t + kMisfitReach) - t_.begin();
+  if (first >= end) {
+    return Vector3d::Zero();
+  }
+  const auto from = static_cast<std::size_t>(first);
+  const auto to = static_cast<std::size_t>(end);
+  const Eigen::Array3d variance = (weights_[to] - weights_[from]).cwiseInverse();
+  const Eigen::Array3d square = (variance * (weighted_[to] - weighted_[from]).array()).square();
+  return (square > kMisfitSigmas * kMisfitSigmas * variance).select(square - variance, 0.0).matrix();
+}
 
 SmoothReadings::At SmoothReadings::at(Time t, const At& otherwise) const {
   for (const Duration reach : kReaches) {
@@ -100,6 +133,7 @@ void SmoothedAttitude::append(const At& attitude, Time t, AttitudeHistory& histo
 SmoothedCourse SmoothedAttitude::course() const {
   SmoothedCourse course;
   const int gyros = problem_.layout().gyros;
+  const CalibrationSetup& setup = problem_.setup().on_board;
   course.readings.gyros = gyros;
   // Those of an arc together, because their sigmas are one large product.
   std::vector<Rows> of_arc;
@@ -129,6 +163,12 @@ SmoothedCourse SmoothedAttitude::course() const {
       take_sigmas();
       arc = moment.arc;
     }
+    if (moment.fix->fix.head == 0) {
+      const FixBySharedStates by_shared = fix_by_shared_states(setup, moment.fix->fix, moment.fix->rate_c);
+      const Rot<In, C> fix = corrected(moment.fix->fix, by_shared, solution_.shared);
+      course.misfit.add(moment.t, (rows->C_in_c.inverse() * fix).log().raw(),
+                        fix_noise(setup, moment.fix->fix).diagonal().cwiseSqrt());
+    }
     course.attitude.t.push_back(moment.t);
     course.attitude.q_in_c.push_back(rows->C_in_c.quaternion());
     course.readings.t.push_back(moment.t);
@@ -139,6 +179,10 @@ SmoothedCourse SmoothedAttitude::course() const {
     of_arc.push_back(*std::move(rows));
   });
   take_sigmas();
+  for (std::size_t i = 0; i < course.attitude.t.size(); ++i) {
+    Vector3d& sigma_rad = course.attitude.sigma_rad[i];
+    sigma_rad = with_misfit(sigma_rad, course.misfit.square_rad2(course.attitude.t[i]));
+  }
   return course;
 }
 
@@ -160,7 +204,7 @@ AttitudeHistory SmoothedAttitude::between(const PassProblem::Moment& from, const
   return history;
 }
 
-AttitudeHistory SmoothedAttitude::definitive() const {
+AttitudeHistory SmoothedAttitude::definitive(const LocalMisfit& misfit) const {
   constexpr std::size_t kNodesAtOnce = 1000;  // a node takes some kilobytes
   AttitudeHistory whole;
   std::vector<PassProblem::Moment> nodes;
@@ -184,6 +228,9 @@ AttitudeHistory SmoothedAttitude::definitive() const {
     }
   });
   take();
+  for (std::size_t i = 0; i < whole.t.size(); ++i) {
+    whole.sigma_rad[i] = with_misfit(whole.sigma_rad[i], misfit.square_rad2(whole.t[i]));
+  }
   return whole;
 }
 

@@ -32,9 +32,28 @@ class SmoothReadings {
   const CalibrationSetup& setup_;
 };
 
+/// By how much fixes of about two minutes together are off the smoothed attitude beyond what their noise explains:
+/// where drift changes faster than the process that stands for it, as in a slew, the covariance does not say so.
+class LocalMisfit {
+ public:
+  /// Of the next fix: the rotation from the smoothed attitude to it, and its 1-sigma, rad, c axes. Outliers are left
+  /// out.
+  void add(Time t, const Eigen::Vector3d& off_rad, const Eigen::Vector3d& sigma_rad);
+  /// Square of the error of the smoothed attitude about c x, y, z that the fixes up to a minute from t show, rad²; 0
+  /// where their mean is within 2.5 of its sigmas.
+  [[nodiscard]] Eigen::Vector3d square_rad2(Time t) const;
+
+ private:
+  std::vector<Time> t_;
+  // Of the fixes before each, and of all at the end.
+  std::vector<Eigen::Vector3d> weights_{Eigen::Vector3d::Zero()};  ///< 1/rad²
+  std::vector<Eigen::Vector3d> weighted_{Eigen::Vector3d::Zero()};
+};
+
 /// What the smoothed pass shows at the fixes.
 struct SmoothedCourse {
   AttitudeHistory attitude;
+  LocalMisfit misfit;      ///< already in the sigmas of the attitude
   GyroTelemetry readings;  ///< of gyros without noise and bias
 };
 
@@ -52,8 +71,8 @@ class SmoothedAttitude {
 
   /// At the fixes.
   [[nodiscard]] SmoothedCourse course() const;
-  /// At each gyro sample from the first fix on.
-  [[nodiscard]] AttitudeHistory definitive() const;
+  /// At each gyro sample from the first fix on. `misfit`: that of the course.
+  [[nodiscard]] AttitudeHistory definitive(const LocalMisfit& misfit) const;
 
  private:
   struct At {

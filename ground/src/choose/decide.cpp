@@ -140,12 +140,19 @@ const Forecast* best_of(const std::vector<Forecast>& forecasts, const PassSettin
   return best;
 }
 
-/// Decides the open choices and the drift model by the evidence of a trial with all states free.
+/// Log of the odds from which on an error of the star tracker at orbital period is accepted where the pass needs noise
+/// for drift that no model has: such drift comes back with the orbit, which no noise does, and looks alike.
+constexpr double kLogOddsBesideOtherDrift = 10;
+
+/// Decides the open choices and the drift model by the evidence of a trial with all states free. `other_drift`: whether
+/// there is drift that no model has.
 void settle_states(const Trial& everything, const PassSettings& settings, const CalibrationOptions& asked,
-                   Decision& decision) {
+                   bool other_drift, Decision& decision) {
   decision.evidence.clear();
   const auto settle = [&](std::optional<FurtherState> state, double log_bayes_factor) {
-    decision.evidence.push_back({state, log_bayes_factor, log_bayes_factor > kLogOddsToAccept});
+    const bool looks_alike = other_drift && state == FurtherState::kOrbitalError;
+    const double enough = looks_alike ? kLogOddsBesideOtherDrift : kLogOddsToAccept;
+    decision.evidence.push_back({state, log_bayes_factor, log_bayes_factor > enough});
     return decision.evidence.back().accepted;
   };
   for (const FurtherStateRow& row : kFurtherStates) {
@@ -237,7 +244,7 @@ void decide_again_with_more_noise(const Pass& pass, const Screened& screened, co
       everything = std::move(trial);
     }
   }
-  settle_states(everything, pass.settings, asked, decision);
+  settle_states(everything, pass.settings, asked, true, decision);
   if (!asked.drift_model && walking.log_likelihood > walk.log_likelihood + kLogOddsToAccept) {
     options.drift_model = largest_model;
   }
@@ -306,7 +313,7 @@ Decision decide_by_pass(const Pass& pass, const Screened& screened, const Calibr
   const std::vector<Eigen::Vector3d> changes = everything.changes_rad();
   options.find_noise = asked.find_noise && changes.size() >= kLeastFixPairs;
   if (!options.find_noise) {
-    settle_states(everything, pass.settings, asked, decision);
+    settle_states(everything, pass.settings, asked, false, decision);
     decision.changes = changes_over(everything);
     decision.nearby = everything.nearby();
     if (options.drift_field) {
@@ -321,7 +328,7 @@ Decision decide_by_pass(const Pass& pass, const Screened& screened, const Calibr
   if (noise) {
     noise = with_most_likely_walk(everything, with_everything(options, asked, largest_model)).noise;
   }
-  settle_states(everything, pass.settings, asked, decision);
+  settle_states(everything, pass.settings, asked, false, decision);
   Trial decided(pass, screened, options, noise, &everything);
   const NoiseFit walking = with_most_likely_walk(decided, options);
   if (walking.gain > kLogOddsToAccept) {

@@ -267,6 +267,13 @@ void judge_halves(const Statistics& statistics, std::vector<Finding>& findings) 
         fmt::format("chi-square {:.0f} of {} degrees of freedom", square, freedom),
         "Let the coefficients change (coefficient_change = \"on\" in [further_states]), give more process noise, or "
         "calibrate a shorter pass.");
+    // Of coefficients that are found to change it is no other evidence: what that makes of them is in their sigmas.
+    const bool is_told = std::ranges::any_of(findings, [](const Finding& finding) {
+      return finding.code == FindingCode::kCoefficientsNotConstant && finding.severity != Severity::kDoNotUse;
+    });
+    if (is_told) {
+      findings.back().severity = Severity::kWarning;
+    }
   }
 }
 
@@ -623,10 +630,10 @@ Verdict judge(const Pass& pass, const CalibrationRun& run) {
   judge_noise(pass, run, findings);
   judge_whiteness(pass, run, findings);
   judge_drift_left(pass, run, findings);
-  judge_halves(statistics, findings);
   judge_drift_model(run, findings);
   judge_change(run, findings);
   judge_changes(run, findings);
+  judge_halves(statistics, findings);
   judge_clocks(pass, run, findings);
   judge_star_tracker_errors(run, findings);
   judge_determination(run, findings);

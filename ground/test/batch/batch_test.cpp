@@ -10,6 +10,7 @@
 
 #include "batch/pass_problem.hpp"
 #include "batch/pass_setup.hpp"
+#include "batch/smoothed_attitude.hpp"
 #include "onboard/screen.hpp"
 #include "passes.hpp"
 #include "trihedron/core/optimal_attitude.hpp"
@@ -280,6 +281,27 @@ TEST(Batch, FindsThatCoefficientsChange) {
     const double kappa = *simulated.truth.gyros[i / 7].drift(DriftCoefficient::of_eq1(static_cast<int>(i % 7)));
     EXPECT_NEAR(estimate.value, change * kappa, 4 * estimate.sigma + 3e-9) << name_of(estimate.parameter);
   }
+}
+
+TEST(LocalMisfit, TellsWhereFixesAreOffTheAttitudeAlike) {
+  const Eigen::Vector3d sigma_rad(1e-5, 1e-5, 1e-4);
+  LocalMisfit misfit;
+  EXPECT_EQ(misfit.square_rad2(Time{}), Eigen::Vector3d::Zero());
+  for (int i = 0; i <= 200; ++i) {
+    const std::chrono::seconds t(3 * i);
+    Eigen::Vector3d off_rad = (i % 2 == 0 ? 1 : -1) * sigma_rad;
+    off_rad.x() += t >= std::chrono::seconds(240) && t <= std::chrono::seconds(360) ? 2e-5 : 0;
+    off_rad.y() = i == 20 ? 1 : off_rad.y();  // an outlier
+    misfit.add(Time(t), off_rad, sigma_rad);
+  }
+  const Eigen::Vector3d there = misfit.square_rad2(Time(std::chrono::seconds(300)));
+  EXPECT_NEAR(std::sqrt(there.x()), 2e-5, 1e-6);
+  EXPECT_EQ(there.tail<2>(), Eigen::Vector2d::Zero());
+  // A mean of 41 fixes of which 14 are off.
+  EXPECT_GT(misfit.square_rad2(Time(std::chrono::seconds(380))).x(), 0);
+  EXPECT_EQ(misfit.square_rad2(Time(std::chrono::seconds(60))), Eigen::Vector3d::Zero());
+  EXPECT_EQ(misfit.square_rad2(Time(std::chrono::seconds(500))), Eigen::Vector3d::Zero());
+  EXPECT_EQ(misfit.square_rad2(Time(std::chrono::hours(1))), Eigen::Vector3d::Zero());
 }
 
 TEST(Batch, ComparesTheHalvesOfThePass) {

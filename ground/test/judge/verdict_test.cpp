@@ -177,6 +177,18 @@ TEST(Verdict, FindsHalvesThatDisagree) {
   EXPECT_FALSE(judge(good_pass(), run).trustworthy);
 }
 
+// They disagree because the coefficients change, and what that makes of these is in their sigmas.
+TEST(Verdict, LeavesHalvesThatDisagreeToCoefficientsThatChange) {
+  for (const double alignment_sigmas : {1.0, 3.0}) {
+    auto run = with_coefficients_off(10, alignment_sigmas);
+    run.calibration.statistics.halves_degrees_of_freedom = 18;
+    run.calibration.statistics.halves_chi_square = 60;
+    const Verdict verdict = judge(good_pass(), run);
+    EXPECT_THAT(codes(verdict), ElementsAre("coefficients-not-constant", "halves-disagree"));
+    EXPECT_EQ(verdict.trustworthy, alignment_sigmas < 2);
+  }
+}
+
 TEST(Verdict, FindsADriftModelThatIsTooSmallOrTooLarge) {
   auto run = good_run();
   run.drift_models = {{kEsg7, 0, 1e-4}, {vsh(1), 5, 2e-5}, {vsh(2), -8, 3e-5}};
