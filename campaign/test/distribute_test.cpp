@@ -37,7 +37,9 @@ class Fake : public Workers {
  public:
   using Becomes = std::function<std::vector<WorkerEvent>(std::uint64_t worker, std::uint64_t run)>;
 
-  Fake(const std::vector<WorkerEvent>& first, Becomes becomes) : becomes_(std::move(becomes)) { events_.push_back(first); }
+  Fake(const std::vector<WorkerEvent>& first, Becomes becomes) : becomes_(std::move(becomes)) {
+    events_.push_back(first);
+  }
 
   void give(std::uint64_t worker, std::uint64_t run) override {
     given_.emplace_back(worker, run);
