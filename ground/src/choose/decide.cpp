@@ -296,7 +296,8 @@ ByEq1 try_eq1(const Pass& pass, const Screened& screened, const CalibrationOptio
 /// Decides by the data of the pass.
 Decision decide_by_pass(const Pass& pass, const Screened& screened, const CalibrationOptions& asked,
                         const DriftModelId& largest_model) {
-  Decision decision{asked, {}, {}, {}, {}, {}, {}, {}, 0, {}, {}, {}};
+  Decision decision;
+  decision.options = asked;
   CalibrationOptions& options = decision.options;
   const bool wandering_is_open = options.further_states[FurtherState::kWanderingDrift] == Choice::kAuto;
   if (wandering_is_open) {
@@ -421,7 +422,9 @@ Decision decide(const Pass& pass, const CalibrationOptions& asked_for) {
   }
   settle_by_estimator(asked);
   if (pass.settings.prior || asked.estimator == Estimator::kPaper) {
-    return {settled_before(pass.settings, asked), {}, {}, {}, {}, {}, {}, {}, 0, {}, {}, {}};
+    Decision settled;
+    settled.options = settled_before(pass.settings, asked);
+    return settled;
   }
   const bool on_board = asked.estimator != Estimator::kBatch;
   const bool by_field = !asked.drift_model && !knows_of_drift_outside(pass.settings);
@@ -430,7 +433,8 @@ Decision decide(const Pass& pass, const CalibrationOptions& asked_for) {
     asked.drift_model = kLargestDriftModel;
     asked.estimator = Estimator::kBatch;
   }
-  Decision decision{asked, {}, {}, {}, {}, {}, {}, {}, 0, {}, {}, {}};
+  Decision decision;
+  decision.options = asked;
   CalibrationOptions& options = decision.options;
   options.find_noise = false;
   const bool states_are_settled =
