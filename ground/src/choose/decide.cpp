@@ -141,11 +141,12 @@ const Forecast* best_of(const std::vector<Forecast>& forecasts, const PassSettin
 }
 
 /// Log of the odds from which on an error of the star tracker at orbital period is accepted where the pass needs noise
-/// for drift that no model has: such drift comes back with the orbit, which no noise does, and looks alike.
+/// for drift that no member of the field has: such drift comes back with the orbit, which no noise does, and looks
+/// alike. Of a drift model that was asked for, the states of that error may hold what it does not have.
 constexpr double kLogOddsBesideOtherDrift = 10;
 
 /// Decides the open choices and the drift model by the evidence of a trial with all states free. `other_drift`: whether
-/// there is drift that no model has.
+/// there is drift that no member of the field has.
 void settle_states(const Trial& everything, const PassSettings& settings, const CalibrationOptions& asked,
                    bool other_drift, Decision& decision) {
   decision.evidence.clear();
@@ -244,7 +245,7 @@ void decide_again_with_more_noise(const Pass& pass, const Screened& screened, co
       everything = std::move(trial);
     }
   }
-  settle_states(everything, pass.settings, asked, true, decision);
+  settle_states(everything, pass.settings, asked, asked.drift_field, decision);
   if (!asked.drift_model && walking.log_likelihood > walk.log_likelihood + kLogOddsToAccept) {
     options.drift_model = largest_model;
   }
