@@ -11,7 +11,12 @@ while read -r test depends; do
   packaging/root.sh "$root" $depends
   mkdir "$root/tests"
   cp "debian/tests/$test" "$root/tests/"
+  # By it a program finds what is installed beside it.
+  mount --types proc proc "$root/proc"
+  trap 'umount "$root/proc"' EXIT
   chroot "$root" "/tests/$test" < /dev/null
+  umount "$root/proc"
+  trap - EXIT
   rm -rf "$root"
   echo "$test: passed"
 done < <(sed -n 's/^Tests: *//p; s/^Depends: *//p' debian/tests/control | tr -d , | paste -d ' ' - -)
