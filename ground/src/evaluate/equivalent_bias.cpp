@@ -13,7 +13,7 @@
 namespace trihedron::ground {
 namespace {
 
-/// As of open loops: the body turns by a third of a degree over it.
+/// Over it the body turns by a third of a degree, and directions of drift with it.
 constexpr Duration kPathStep = std::chrono::seconds(5);
 
 /// The gyros of a calibration along an attitude.
