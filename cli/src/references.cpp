@@ -35,7 +35,7 @@ void add_schema(CLI::App& program, int& exit_status) {
     std::vector<std::string_view> known;
     for (const io::Schema& schema : all_schemas()) {
       if (schema.name == *name) {
-        print_data(stdout, schema.text + "\n");
+        print_data(stdout, schema.text() + "\n");
         exit_status = kTrustworthy;
         return;
       }

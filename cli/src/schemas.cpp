@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 #include <string>
 #include <utility>
+#include <vector>
 
 namespace trihedron::cli {
 namespace {
@@ -82,6 +83,14 @@ Json consistency() {
   return schema;
 }
 
+/// That of the file, as a part of another schema.
+Json calibration() {
+  const std::vector<io::Schema> schemas = io::schemas();
+  Json schema = Json::parse(std::ranges::find(schemas, "calibration", &io::Schema::name)->text());
+  schema.erase("$schema");
+  return schema;
+}
+
 Json pass() {
   const Json defect = object({{"kind", text()}, {"where", text()}, {"count", count()}, {"text", text()}});
   return object({{"spacecraft", text()},
@@ -133,7 +142,7 @@ Json agreement() {
   return object({{"chi_square", number()}, {"degrees_of_freedom", count()}, {"limit", number()}, {"holds", flag()}});
 }
 
-Json calibrate_output(const Json& calibration) {
+Json calibrate_output() {
   const Json of_pass = object({{"name", text()},
                                {"epoch_tai", text()},
                                {"verdict", verdict()},
@@ -147,7 +156,7 @@ Json calibrate_output(const Json& calibration) {
   const Json state = object({{"determined", flag()}, {"settled_s", number()}});
   return object(
       {{"pass", pass()},
-       {"calibration", calibration},
+       {"calibration", calibration()},
        {"fixes", by_name(count())},
        {"samples", by_name(count())},
        {"navigation", evaluation()},
@@ -226,12 +235,12 @@ Json observe_output() {
                  {"advice?", advice}});
 }
 
-Json history_output(const Json& calibration) {
+Json history_output() {
   const Json entry = object({{"spacecraft", text()},
                              {"pass", text()},
                              {"start_up", text()},
                              {"passes", count()},
-                             {"calibration", calibration}});
+                             {"calibration", calibration()}});
   const Json change = object({{"from", text()},
                               {"to", text()},
                               {"coefficients", agreement()},
@@ -263,6 +272,10 @@ Json interchange_output() {
                  {"body_frame", text()},
                  {"object_name", text()},
                  {"object_id", text()}});
+}
+
+Json import_output() {
+  return {{"anyOf", Json::array({interchange_output(), with(pass(), object({{"written", text()}}))})}};
 }
 
 Json campaign_output() {
@@ -324,33 +337,31 @@ Json run_output() {
                  {"values", by_name(array(number()))}});
 }
 
-io::Schema output(const std::string& command, const std::string& about, const Json& schema) {
-  Json document = {{"$schema", "https://json-schema.org/draft/2020-12/schema"},
-                   {"title", "Output of " + command},
-                   {"description", about + " SI units, angles in radians; null where there is no number."}};
-  document.update(schema);
-  return {command + "-output", document.dump(1)};
+io::Schema output(const std::string& command, const std::string& about, Json (*schema)()) {
+  return {command + "-output", [command, about, schema] {
+            Json document = {{"$schema", "https://json-schema.org/draft/2020-12/schema"},
+                             {"title", "Output of " + command},
+                             {"description", about + " SI units, angles in radians; null where there is no number."}};
+            document.update(schema());
+            return document.dump(1);
+          }};
 }
 
 }  // namespace
 
 std::vector<io::Schema> all_schemas() {
   std::vector<io::Schema> schemas = io::schemas();
-  Json calibration = Json::parse(std::ranges::find(schemas, "calibration", &io::Schema::name)->text);
-  calibration.erase("$schema");
-  schemas.push_back(output("inspect", "What inspect and simulate print with --json.", pass()));
-  schemas.push_back(output("calibrate", "What calibrate and demo print with --json.", calibrate_output(calibration)));
-  schemas.push_back(output("navigate", "What navigate prints with --json.", navigate_output()));
-  schemas.push_back(output("replay", "What replay prints with --json.", replay_output()));
-  schemas.push_back(output("evaluate", "What evaluate prints with --json.", evaluate_output()));
-  schemas.push_back(output("observe", "What observe prints with --json.", observe_output()));
-  schemas.push_back(output("history", "What history prints with --json.", history_output(calibration)));
-  schemas.push_back(output("export", "What export prints with --json.", interchange_output()));
-  schemas.push_back(
-      output("import", "What import prints with --json: of an attitude, or of a pass.",
-             {{"anyOf", Json::array({interchange_output(), with(pass(), object({{"written", text()}}))})}}));
-  schemas.push_back(output("campaign", "What campaign prints with --json.", campaign_output()));
-  schemas.push_back(output("campaign-run", "What campaign --only prints with --json, and run.json.", run_output()));
+  schemas.push_back(output("inspect", "What inspect and simulate print with --json.", pass));
+  schemas.push_back(output("calibrate", "What calibrate and demo print with --json.", calibrate_output));
+  schemas.push_back(output("navigate", "What navigate prints with --json.", navigate_output));
+  schemas.push_back(output("replay", "What replay prints with --json.", replay_output));
+  schemas.push_back(output("evaluate", "What evaluate prints with --json.", evaluate_output));
+  schemas.push_back(output("observe", "What observe prints with --json.", observe_output));
+  schemas.push_back(output("history", "What history prints with --json.", history_output));
+  schemas.push_back(output("export", "What export prints with --json.", interchange_output));
+  schemas.push_back(output("import", "What import prints with --json: of an attitude, or of a pass.", import_output));
+  schemas.push_back(output("campaign", "What campaign prints with --json.", campaign_output));
+  schemas.push_back(output("campaign-run", "What campaign --only prints with --json, and run.json.", run_output));
   return schemas;
 }
 

@@ -5,10 +5,13 @@
 namespace trihedron::io {
 
 std::vector<Schema> schemas() {
-  return {{"pass", pass_schema().dump(1)},         {"telemetry", telemetry_schema().dump(1)},
-          {"config", config_schema().dump(1)},     {"scenario", scenario_schema().dump(1)},
-          {"campaign", campaign_schema().dump(1)}, {"calibration", calibration_schema().dump(1)},
-          {"truth", truth_schema().dump(1)}};
+  const auto schema = [](const char* name, Json (*document)()) {
+    return Schema{name, [document] { return document().dump(1); }};
+  };
+  return {schema("pass", pass_schema),         schema("telemetry", telemetry_schema),
+          schema("config", config_schema),     schema("scenario", scenario_schema),
+          schema("campaign", campaign_schema), schema("calibration", calibration_schema),
+          schema("truth", truth_schema)};
 }
 
 }  // namespace trihedron::io
