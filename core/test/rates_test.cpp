@@ -94,6 +94,11 @@ TEST_P(AtGyroRate, EveryFixIsUsedAndErrorsAreTrue) {
 INSTANTIATE_TEST_SUITE_P(Hz, AtGyroRate, testing::Values(1.0, 2.0, 8.0, 25.0, 50.0, 200.0),
                          [](const auto& rate) { return "Of" + std::to_string(static_cast<int>(rate.param)) + "Hz"; });
 
+TEST(SlowSamples, EveryFixIsUsedOfTenBetweenTwoOfThem) {
+  const AtRate at = fly_at(2, 20, 1, 1);
+  EXPECT_EQ(at.count(FixStatus::kUsed) + at.count(FixStatus::kStarted), static_cast<long>(at.expected));
+}
+
 TEST(Thinning, KeepsSamplesThatThereIsRoomForAndTellsOfTheOthers) {
   const test::Mission mission({.duration_s = 30, .gyro_period_s = 0.005});
   const auto on_board = mission.given.on_board();

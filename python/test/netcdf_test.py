@@ -112,7 +112,7 @@ def test_damaged_files_are_read_or_refused(directory):
     whole = (directory / "slews.cdf").read_bytes()  # intervals are read before the tables
     (directory / "damaged.toml").write_text(MAP.replace("slews.cdf", "damaged.nc"))
     refused = 0
-    for seed in range(300):
+    for seed in range(100):
         random = np.random.default_rng(seed)
         damaged = bytearray(whole if seed % 2 else whole[: random.integers(1, len(whole))])
         for _ in range(random.integers(1, 4)):
@@ -123,4 +123,4 @@ def test_damaged_files_are_read_or_refused(directory):
         except trihedron.InputRefused as error:
             assert "damaged" in str(error) and error.cure
             refused += 1
-    assert refused > 150
+    assert refused > 50

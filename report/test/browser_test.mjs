@@ -63,21 +63,20 @@ test("nine hours open in a small multiple of what the plotting library alone tak
 
 for (const colorScheme of ["light", "dark"]) {
   test(`the theme is ${colorScheme} where the reader's is, until he chooses the other`, () =>
-    openAndRead("troubled.html", { colorScheme }, async (page, complaints) => {
+    open("troubled.html", { colorScheme }, async (page, complaints) => {
       const theme = () => page.evaluate(() => document.documentElement.dataset.theme);
       assert.equal(await theme(), colorScheme);
-      await page.screenshot({ path: path.join(directory, `${colorScheme}.png`), fullPage: true });
       await page.click("#theme");
       assert.notEqual(await theme(), colorScheme);
       assert.deepEqual(complaints, []);
     }));
 }
 
-for (const width of [360, 768, 1920]) {
+for (const [width, colorScheme] of [[360, "light"], [768, "dark"], [1920, "light"]]) {
   test(`fits a screen of ${width} pixels`, () =>
-    openAndRead("troubled.html", { width }, async (page, complaints) => {
+    openAndRead("troubled.html", { width, colorScheme }, async (page, complaints) => {
       assert.ok((await overflow(page)) <= 0, `wider by ${await overflow(page)} pixels`);
-      await page.screenshot({ path: path.join(directory, `width-${width}.png`), fullPage: true });
+      await page.screenshot({ path: path.join(directory, `width-${width}-${colorScheme}.png`), fullPage: true });
       assert.deepEqual(complaints, []);
     }));
 }

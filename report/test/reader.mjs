@@ -58,7 +58,7 @@ export class Reader {
 
 /** Scrolls through the report, so that every figure is drawn. */
 export const readThrough = (page) => page.evaluate(async () => {
-  for (let y = 0; y < document.body.scrollHeight; y += 300) {
+  for (let y = 0; y < document.body.scrollHeight; y += 600) {
     scrollTo({ top: y, behavior: "instant" });
     await new Promise((done) => { requestAnimationFrame(() => setTimeout(done, 20)); });
   }
