@@ -24,6 +24,9 @@ io::MachineFailed not_started(const std::string& why) {
   return {kThisProgram, fmt::format("cannot be started to perform runs: {}", why), "close some programs"};
 }
 
+/// Processes one after another that were killed before their first line: then the next would be as well.
+constexpr int kMostKilledAtStart = 3;
+
 /// As waitpid() gives it.
 int status_of(pid_t id) {
   int status = 0;
@@ -108,11 +111,12 @@ void WorkerProcesses::listen(Process& process, std::vector<WorkerNews>& news) {
     return;
   }
   if (got <= 0) {
-    const std::string how = how_it_ended(status_of(std::exchange(process.id, -1)));
-    if (!process.is_ready) {
-      throw not_started(how);
+    const int status = status_of(std::exchange(process.id, -1));
+    if (process.is_ready) {
+      news.push_back({process.number, true, how_it_ended(status)});
+    } else if (!WIFSIGNALED(status) || ++killed_at_start_ == kMostKilledAtStart) {
+      throw not_started(how_it_ended(status));
     }
-    news.push_back({process.number, true, how});
     process = start();
     return;
   }
@@ -121,6 +125,7 @@ void WorkerProcesses::listen(Process& process, std::vector<WorkerNews>& news) {
     news.push_back({process.number, false, process.said.substr(0, end)});
     process.said.erase(0, end + 1);
     process.is_ready = true;
+    killed_at_start_ = 0;
   }
 }
 

@@ -31,8 +31,8 @@ class WorkerProcesses {
 
   /// worker: one that has said a line and has been given nothing since. What is given to one that has ended is lost.
   void give(std::uint64_t worker, std::uint64_t run);
-  /// What has come; waits for it at most `patience`. Throws MachineFailed where a process ends before its first line,
-  /// since the next would do the same.
+  /// What has come; waits for it at most `patience`. Throws MachineFailed where a process ends by itself before its
+  /// first line, or the third in turn is killed before it, since the next would end the same way.
   std::vector<WorkerNews> wait(std::chrono::milliseconds patience);
 
  private:
@@ -49,6 +49,7 @@ class WorkerProcesses {
 
   std::string campaign_file_;
   std::uint64_t started_ = 0;
+  int killed_at_start_ = 0;  ///< since one has said a line
   std::vector<Process> processes_;
 };
 

@@ -127,6 +127,22 @@ def test_a_worker_that_is_killed_loses_its_run_only_and_the_campaign_goes_on(alo
 
 @needs_mpi
 @pytest.mark.long
+@pytest.mark.parametrize("most", [2, 1000])
+def test_a_worker_that_is_killed_while_it_starts_is_followed_by_another_but_not_for_ever(alone, tmp_path, most):
+    directory, status = alone
+    process = started(mpirun(1, "campaign", directory / "c.toml", "-o", tmp_path / "out", "--jobs", "1"))
+    killed = set()
+    while process.poll() is None and len(killed) < most:
+        for worker in set(workers_of(process.pid)) - killed:
+            os.kill(worker, signal.SIGKILL)
+            killed.add(worker)
+    _, stderr = process.communicate(timeout=120)
+    assert process.returncode == (status if most == 2 else MACHINE_FAILED), stderr
+    assert len(killed) == most or "cannot be started to perform runs: signal 9" in stderr
+
+
+@needs_mpi
+@pytest.mark.long
 def test_a_kill_of_all_ranks_loses_no_finished_run_and_repeats_none(alone, tmp_path):
     directory, status = alone
     out = tmp_path / "out"
