@@ -2,7 +2,7 @@
 
 #include "target.hpp"
 
-void trihedron::fuzz::read(std::string_view bytes) {
+void trihedron::fuzz::read_attitude_message(std::string_view bytes) {
   const io::AttitudeMessage message = io::parse_attitude_message(bytes, "attitude.aem");
   expect(!message.attitude.t.empty() && message.attitude.q_in_c.size() == message.attitude.size(),
          "an attitude for each time");

@@ -2,7 +2,7 @@
 #include "target.hpp"
 
 /// The text of the clock, a zero, and the pointing.
-void trihedron::fuzz::read(std::string_view bytes) {
+void trihedron::fuzz::read_c_kernel(std::string_view bytes) {
   const std::size_t end = std::min(bytes.find('\0'), bytes.size());
   const std::string_view pointing = bytes.substr(std::min(end + 1, bytes.size()));
   const io::AttitudeMessage message = io::parse_c_kernel(pointing, "a.bc", bytes.substr(0, end), "a.tsc");

@@ -3,7 +3,7 @@
 #include "fixtures.hpp"
 #include "target.hpp"
 
-void trihedron::fuzz::read(std::string_view bytes) {
+void trihedron::fuzz::read_catalogue(std::string_view bytes) {
   const DirectoryFile file(bytes);
   const CatalogueEntry entry{"Resurs-DK1", "another", "2009-05-21", 1, io::sample_calibration()};
   std::size_t before = 0;

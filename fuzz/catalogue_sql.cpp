@@ -33,7 +33,7 @@ void work_on(const std::filesystem::path& file, const std::string& statements) {
 
 }  // namespace
 
-void trihedron::fuzz::read(std::string_view bytes) {
+void trihedron::fuzz::read_catalogue_sql(std::string_view bytes) {
   static const std::string original = [] {
     const DirectoryFile file("");
     const CatalogueEntry entry{"Resurs-DK1", "pass-a", "2009-05-20", 1, io::sample_calibration()};

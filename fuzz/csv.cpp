@@ -6,22 +6,7 @@
 #include "screening.hpp"
 #include "target.hpp"
 
-namespace {
-
-using trihedron::io::InputRefused;
-
-/// Whether the table is one of this kind at all.
-template <class Work>
-void unless_refused(const Work& work) {
-  try {
-    work();
-  } catch (const InputRefused&) {
-  }
-}
-
-}  // namespace
-
-void trihedron::fuzz::read(std::string_view bytes) {
+void trihedron::fuzz::read_csv(std::string_view bytes) {
   static const PassSettings settings = io::parse_pass_toml(io::clean_pass().toml, "pass.toml", "/", 2);
   const MemoryFile file(bytes);
   std::vector<io::Defect> defects;

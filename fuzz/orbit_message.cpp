@@ -1,7 +1,7 @@
 #include "oem.hpp"
 #include "target.hpp"
 
-void trihedron::fuzz::read(std::string_view bytes) {
+void trihedron::fuzz::read_orbit_message(std::string_view bytes) {
   const io::OrbitMessage message =
       io::parse_orbit_message(bytes, "orbit.oem", Time(Duration(1'621'468'800'000'000'000)));
   expect(!message.segments.empty(), "segments");

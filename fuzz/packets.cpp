@@ -25,7 +25,7 @@ void seal(std::string& bytes) {
 
 }  // namespace
 
-void trihedron::fuzz::read(std::string_view bytes) {
+void trihedron::fuzz::read_packets(std::string_view bytes) {
   const bool is_sealed = !bytes.empty() && (static_cast<unsigned char>(bytes.front()) & 1U) != 0;
   std::string packets(bytes.substr(std::min<std::size_t>(1, bytes.size())));
   if (is_sealed) {

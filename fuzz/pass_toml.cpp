@@ -3,7 +3,7 @@
 #include "target.hpp"
 #include "trihedron/io/error.hpp"
 
-void trihedron::fuzz::read(std::string_view bytes) {
+void trihedron::fuzz::read_pass_toml(std::string_view bytes) {
   for (const int gyros : {2, 4}) {
     try {
       PassSettings settings = io::parse_pass_toml(bytes, "pass.toml", "/dev/null", gyros);

@@ -1,7 +1,7 @@
 #include "target.hpp"
 #include "trihedron/io/config.hpp"
 
-void trihedron::fuzz::read(std::string_view bytes) {
+void trihedron::fuzz::read_settings(std::string_view bytes) {
   const MemoryFile file(bytes);
   const CalibrationOptions options = io::read_config(file.path());
   // What was read can be written, and read again.

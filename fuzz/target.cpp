@@ -2,10 +2,13 @@
 
 #include <fcntl.h>
 #include <fmt/format.h>
+#include <pthread.h>
+#include <sanitizer/common_interface_defs.h>
 #include <sys/mman.h>
 #include <unistd.h>
 
 #include <algorithm>
+#include <array>
 #include <chrono>
 #include <cstdint>
 #include <cstdio>
@@ -17,6 +20,28 @@
 
 namespace trihedron::fuzz {
 namespace {
+
+struct Target {
+  std::string_view name;
+  void (*read)(std::string_view bytes);
+};
+constexpr std::array<Target, 16> kTargets = {{{"attitude", read_attitude},
+                                              {"attitude_message", read_attitude_message},
+                                              {"c_kernel", read_c_kernel},
+                                              {"calibration", read_calibration},
+                                              {"catalogue", read_catalogue},
+                                              {"catalogue_sql", read_catalogue_sql},
+                                              {"csv", read_csv},
+                                              {"netcdf", read_netcdf},
+                                              {"netcdf_layout", read_netcdf_layout},
+                                              {"orbit_message", read_orbit_message},
+                                              {"packets", read_packets},
+                                              {"pass_toml", read_pass_toml},
+                                              {"scenario", read_scenario},
+                                              {"settings", read_settings},
+                                              {"telemetry", read_telemetry},
+                                              {"truth", read_truth}}};
+const Target* target = nullptr;  ///< that the program is called by
 
 /// Of all inputs; libFuzzer itself counts whole seconds.
 class WorstTime {
@@ -70,11 +95,23 @@ void expect(bool condition, const char* what) {
 
 }  // namespace trihedron::fuzz
 
+extern "C" int LLVMFuzzerInitialize(int* /*argc*/, char*** argv) {
+  using namespace trihedron::fuzz;
+  const std::string program = std::filesystem::path((*argv)[0]).filename();
+  target = std::ranges::find(kTargets, program, [](const Target& its) { return fmt::format("fuzz_{}", its.name); });
+  expect(target != kTargets.end(), "a program of the name of a target");
+  // A library that crashes in the process made for it is no crash of the reader.
+  return ::pthread_atfork(nullptr, nullptr, [] {
+    __sanitizer_set_death_callback([] { ::_exit(1); });
+    ::close(STDERR_FILENO);
+  });
+}
+
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   static trihedron::fuzz::WorstTime worst_time;
   worst_time.measure([&] {
     try {
-      trihedron::fuzz::read({reinterpret_cast<const char*>(data), size});
+      trihedron::fuzz::target->read({reinterpret_cast<const char*>(data), size});
     } catch (const trihedron::io::InputRefused& refused) {
       const std::string_view message = refused.what();
       trihedron::fuzz::expect(!refused.reason().empty() && !refused.cure().empty(), "a reason and a cure");

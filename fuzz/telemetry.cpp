@@ -4,7 +4,7 @@
 #include "telemetry_map.hpp"
 #include "telemetry_table.hpp"
 
-void trihedron::fuzz::read(std::string_view bytes) {
+void trihedron::fuzz::read_telemetry(std::string_view bytes) {
   const std::size_t end = std::min(bytes.find('\0'), bytes.size());
   const io::TelemetryToml told = io::parse_telemetry_toml(bytes.substr(0, end), "telemetry.toml", "/dev/null");
   const io::GyroMap& map = told.map.gyro;

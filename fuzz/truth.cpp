@@ -4,7 +4,7 @@
 #include "fixtures.hpp"
 #include "target.hpp"
 
-void trihedron::fuzz::read(std::string_view bytes) {
+void trihedron::fuzz::read_truth(std::string_view bytes) {
   // The parameters, and the table behind a NUL, as the seeds have them.
   const std::size_t end = std::min(bytes.find('\0'), bytes.size());
   const MemoryFile table(bytes.substr(std::min(end + 1, bytes.size())));
