@@ -1,5 +1,4 @@
 // The report of the demonstration in headless Chromium: node demo_browser_test.mjs CHROMIUM PROGRAM DIRECTORY
-// Screenshots in both themes stay beside it.
 
 import assert from "node:assert/strict";
 import { execFileSync } from "node:child_process";
@@ -24,7 +23,6 @@ test("the demonstration's report draws every figure in both themes and asks for 
         assert.ok(figures.some((figure) => figure.name === name), `no ${name}`);
       }
       assert.match(await page.locator(".verdict .word").textContent(), /Trustworthy/);
-      await page.screenshot({ path: path.join(directory, `${colorScheme}.png`), fullPage: true });
       assert.deepEqual(complaints, []);
     });
   }
