@@ -103,12 +103,22 @@ function(trihedron_test module)
     target_link_libraries(${module}_test PRIVATE trihedron::${module})
   endif()
   target_link_libraries(${module}_test PRIVATE ${arg_LIBRARIES} GTest::gmock GTest::gtest_main rapidcheck trihedron_warnings)
-  # Compiled file by file, tests take the compiler twice the time without these.
-  target_precompile_headers(${module}_test PRIVATE <Eigen/Dense> <gmock/gmock.h> <gtest/gtest.h>)
   # The tests themselves need no speed, and without it compile in two thirds of the time, with clang in a third. What they test is optimised
   # in its own library, which is linked before them: of a function that both hold, one of Eigen or another inline one, the linker takes the first.
   # Under sanitizers they take an eighth less without line numbers; those of what is tested stay.
-  target_compile_options(${module}_test PRIVATE -O0 $<$<BOOL:${TRIHEDRON_SANITIZE}>:-g0>)
+  set(as_tests -O0 $<$<BOOL:${TRIHEDRON_SANITIZE}>:-g0>)
+  # These the compiler reads once for all tests, also where files are compiled in units.
+  if(NOT TARGET trihedron_test_headers)
+    file(CONFIGURE OUTPUT ${PROJECT_BINARY_DIR}/test_headers.cpp CONTENT "")
+    add_library(trihedron_test_headers OBJECT ${PROJECT_BINARY_DIR}/test_headers.cpp)
+    target_link_libraries(trihedron_test_headers PRIVATE trihedron::core GTest::gmock GTest::gtest trihedron_warnings)
+    target_compile_options(trihedron_test_headers PRIVATE ${as_tests})
+    target_precompile_headers(trihedron_test_headers PRIVATE <Eigen/Dense> <gmock/gmock.h> <gtest/gtest.h>)
+    set_target_properties(trihedron_test_headers PROPERTIES DISABLE_PRECOMPILE_HEADERS OFF)
+  endif()
+  target_precompile_headers(${module}_test REUSE_FROM trihedron_test_headers)
+  set_target_properties(${module}_test PROPERTIES DISABLE_PRECOMPILE_HEADERS OFF)
+  target_compile_options(${module}_test PRIVATE ${as_tests})
   trihedron_libraries_of(libraries trihedron::${module} ${arg_LIBRARIES})
   list(TRANSFORM libraries REPLACE "(.+)" "$<TARGET_FILE:\\1>" OUTPUT_VARIABLE files)
   list(JOIN files " " files)
