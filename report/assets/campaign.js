@@ -61,7 +61,7 @@ FIGURES.influences = (data, look) => {
   const traces = [{
     type: "heatmap", z: rho, x: measures.map((_, i) => i), y: keys.map((_, i) => i), zmin: -1, zmax: 1, xgap: 1, ygap: 1,
     colorscale: [[0, colour["correlation-minus"]], [0.5, colour["correlation-zero"]], [1, colour["correlation-plus"]]],
-    text: marks, texttemplate: "%{text}", textfont: { size: 11 },
+    text: marks, texttemplate: "%{text}", textfont: { size: Math.min(11, (look.width - layout.margin.l - layout.margin.r) / measures.length / 3.2) },
     customdata: keys.map((key) => measures.map((measure) => `${key}, ${measure}`)),
     hovertemplate: "%{customdata}: %{z:+.2f}<extra></extra>",
     colorbar: { thickness: 12, outlinewidth: 0, tickvals: [-1, -0.5, 0, 0.5, 1], ticktext: ["−1", "−0.5", "0", "+0.5", "+1"] },
