@@ -22,9 +22,10 @@ fs::path library() {
   std::error_code fault;
   const fs::path program = fs::read_symlink(kThisProgram, fault);
   if (fault) {
-    throw io::MachineFailed(kThisProgram,
-                            fmt::format("cannot be read ({}); {} is looked for beside the program", fault.message(), kLibrary),
-                            "mount /proc, or start the campaign without mpirun");
+    throw io::MachineFailed(
+        kThisProgram,
+        fmt::format("cannot be read ({}); {} is looked for beside the program", fault.message(), kLibrary),
+        "mount /proc, or start the campaign without mpirun");
   }
   const fs::path beside = program.parent_path() / kLibrary;
   return fs::exists(beside, fault) ? beside : program.parent_path() / TRIHEDRON_LIBRARIES / kLibrary;

@@ -84,7 +84,8 @@ json verdict_of_campaign(const CampaignSummary& summary) {
   const auto worst = std::ranges::max_element(summary.campaign_findings, {}, &campaign::CampaignFinding::severity);
   if (worst == summary.campaign_findings.end() || worst->severity == FindingSeverity::kNote) {
     std::string lead = "All runs came to their end.";
-    const auto larger = std::ranges::find(summary.campaign_findings, "nees-below-bounds", &campaign::CampaignFinding::code);
+    const auto larger =
+        std::ranges::find(summary.campaign_findings, "nees-below-bounds", &campaign::CampaignFinding::code);
     if (larger != summary.campaign_findings.end()) {
       lead += " " + larger->text;
     } else if (summary.nees) {
@@ -180,11 +181,12 @@ std::string watched_text(const CampaignReportInput& input) {
     return record.outcome == RunOutcome::kTrustworthy && record.at(RunQuantity::kIntervalAfterIsLowerBound) == 1;
   });
   return count == 0 ? ""
-                    : fmt::format("In {} of the {} trustworthy runs the attitude error was within {} for as long as the "
-                                  "pass let it be watched: their correction intervals and extensions are lower bounds.",
-                                  number(static_cast<double>(count), 0),
-                                  number(static_cast<double>(input.summary.count(RunOutcome::kTrustworthy)), 0),
-                                  limit_text(input.plan.limit_rad));
+                    : fmt::format(
+                          "In {} of the {} trustworthy runs the attitude error was within {} for as long as the "
+                          "pass let it be watched: their correction intervals and extensions are lower bounds.",
+                          number(static_cast<double>(count), 0),
+                          number(static_cast<double>(input.summary.count(RunOutcome::kTrustworthy)), 0),
+                          limit_text(input.plan.limit_rad));
 }
 
 json quantile_heads() {
@@ -202,8 +204,8 @@ json parameter_rows(const CampaignSummary& summary) {
       continue;
     }
     const auto as_shown = [](double ratio) { return std::round(1000 * ratio); };
-    const bool off = as_shown(its.normalised) > as_shown(its.usual.high) ||
-                     as_shown(its.normalised) < as_shown(its.usual.low);
+    const bool off =
+        as_shown(its.normalised) > as_shown(its.usual.high) || as_shown(its.normalised) < as_shown(its.usual.low);
     const auto sized = [&](double value) {
       return its.is_alignment ? angle(value, 3) : significant(value / kNanoradian, 3) + " · 10⁻⁹ rad/s";
     };
@@ -340,11 +342,7 @@ json cumulative(const Measure& measure, const CampaignReportInput& input) {
     };
     bounds.push_back({{"share", share}, {"lower", finite(quantile.lower)}, {"upper", finite(quantile.upper)}});
   }
-  return {{"label", measure.label},
-          {"unit", drawn_unit(measure)},
-          {"x", x},
-          {"y", y},
-          {"bounds", bounds}};
+  return {{"label", measure.label}, {"unit", drawn_unit(measure)}, {"x", x}, {"y", y}, {"bounds", bounds}};
 }
 
 /// The distribution that the NEES of a consistent estimator has.
@@ -450,7 +448,10 @@ std::string render_campaign(const CampaignReportInput& input) {
       data["expected"] = expected_nees(summary);
     }
     if (!data.is_null()) {
-      drawn_measures.push_back({{"key", measure.key}, {"label", measure.label}, {"about", measure.about}, {"is_nees", measure.key == "nees"}});
+      drawn_measures.push_back({{"key", measure.key},
+                                {"label", measure.label},
+                                {"about", measure.about},
+                                {"is_nees", measure.key == "nees"}});
       figures["ecdf"][std::string(measure.key)] = std::move(data);
     }
   }

@@ -28,8 +28,8 @@ int main(int argc, char** argv) {
 
   const test::SyntheticCampaign campaign = test::synthetic_campaign(900, 20);
   const auto summary = campaign::summarise(campaign.plan, campaign.records);
-  std::ofstream(directory / "campaign.html", std::ios::binary)
-      << render_campaign({campaign.plan, campaign.records, summary, "trihedron campaign FILE -o " + std::string(60, 'x')});
+  std::ofstream(directory / "campaign.html", std::ios::binary) << render_campaign(
+      {campaign.plan, campaign.records, summary, "trihedron campaign FILE -o " + std::string(60, 'x')});
 
   const Finding not_determined{
       FindingCode::kNotDetermined, "The data do not determine gyro2.nu12. Its value and sigma are those of the prior.",

@@ -1,5 +1,6 @@
 #pragma once
-/// A plausible calibration, catalogue and campaign made of formulas, to try the report on: what a run looks like, not what an estimator does.
+/// A plausible calibration, catalogue and campaign made of formulas, to try the report on: what a run looks like, not
+/// what an estimator does.
 
 #include <chrono>
 #include <string>
