@@ -76,7 +76,9 @@ bool is_there(const fs::path& path) {
 /// The runs that OUT has of this campaign; nothing where there is no journal. Refuses that of another campaign.
 std::optional<io::Journal> journal_in(const fs::path& out, const CampaignIdentity& identity) {
   const fs::path file = out / kJournalFile;
-  if (!is_there(file)) {
+  std::error_code ignored;
+  // It is empty where the campaign was killed before it had written its first line.
+  if (!is_there(file) || fs::is_empty(file, ignored)) {
     return std::nullopt;
   }
   io::Journal journal = io::read_journal(file);

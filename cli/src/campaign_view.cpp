@@ -30,6 +30,7 @@ std::string measure_text(const Measure& measure, double value) {
       return angle_text(value);
     case Measure::Unit::kSecond:
       return fmt::format("{:.0f} min", value / 60);
+    case Measure::Unit::kRatio:
     case Measure::Unit::kNone:
       return three_digits(value);
   }
@@ -260,9 +261,8 @@ std::string run_text(const CampaignPlan& plan, const RunRecord& record) {
   for (std::size_t i = 0; i < plan.inputs.size(); ++i) {
     const CampaignInput& input = plan.inputs[i];
     text += fmt::format("  {} = {}\n", input.key,
-                        input.distribution.has_options()
-                            ? printable(input.options[static_cast<std::size_t>(record.draws[i])])
-                            : fmt::format("{:.6g}{}", record.draws[i], input.unit));
+                        input.is_number() ? fmt::format("{:.6g}{}", input.shown(record.draws[i]), input.unit)
+                                          : printable(input.options[static_cast<std::size_t>(record.draws[i])]));
   }
   if (record.outcome != RunOutcome::kFailed) {
     text += fmt::format("NEES        {} of {:.0f}; NIS {:.3f}\n", three_digits(record.at(RunQuantity::kNees)),
@@ -278,8 +278,8 @@ ordered_json run_json(const CampaignPlan& plan, const RunRecord& record) {
   ordered_json draws = ordered_json::object();
   for (std::size_t i = 0; i < plan.inputs.size(); ++i) {
     const CampaignInput& input = plan.inputs[i];
-    draws[input.key] = input.distribution.has_options() ? input.options[static_cast<std::size_t>(record.draws[i])]
-                                                        : fmt::format("{}{}", record.draws[i], input.unit);
+    draws[input.key] = input.is_number() ? fmt::format("{}{}", input.shown(record.draws[i]), input.unit)
+                                         : input.options[static_cast<std::size_t>(record.draws[i])];
   }
   ordered_json values = ordered_json::object();
   for (const RunQuantityRow& row : kRunQuantityRows) {

@@ -524,7 +524,7 @@ void add_replay(CLI::App& program, const Common& common, int& exit_status) {
                    "Samples over which the work of a fix is spread, so that no call takes long; 0, it is done at once, "
                    "as navigate does it")
       ->capture_default_str()
-      ->check(CLI::Range(0, 10'000))
+      ->check(whole(limits::kSpreadOver))
       ->type_name("SAMPLES");
   const auto settle = [arguments] {
     CalibrationOptions options = settings_of(arguments->config);

@@ -8,6 +8,7 @@
 #include <system_error>
 
 #include "trihedron/io/error.hpp"
+#include "worker_processes.hpp"
 
 namespace trihedron::cli {
 namespace {
@@ -16,12 +17,18 @@ namespace fs = std::filesystem;
 
 constexpr const char* kLibrary = "trihedron-mpi.so";
 
-/// Beside the program, as it is built, or where it is installed.
+/// Beside the program, as it is built, or where it is installed. Throws MachineFailed.
 fs::path library() {
   std::error_code fault;
-  const fs::path folder = fs::read_symlink("/proc/self/exe", fault).parent_path();
-  const fs::path beside = folder / kLibrary;
-  return fs::exists(beside, fault) ? beside : folder / TRIHEDRON_LIBRARIES / kLibrary;
+  const fs::path program = fs::read_symlink(kThisProgram, fault);
+  if (fault) {
+    throw io::MachineFailed(
+        kThisProgram,
+        fmt::format("cannot be read ({}); {} is looked for beside the program", fault.message(), kLibrary),
+        "mount /proc, or start the campaign without mpirun");
+  }
+  const fs::path beside = program.parent_path() / kLibrary;
+  return fs::exists(beside, fault) ? beside : program.parent_path() / TRIHEDRON_LIBRARIES / kLibrary;
 }
 
 }  // namespace

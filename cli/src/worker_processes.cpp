@@ -11,21 +11,25 @@
 #include <array>
 #include <cerrno>
 #include <csignal>
+#include <system_error>
 #include <utility>
 
 #include "trihedron/io/error.hpp"
+#include "trihedron/records/stop.hpp"
 
 namespace trihedron::cli {
 namespace {
 
-constexpr const char* kThisProgram = "/proc/self/exe";
+constexpr const char* kCloseSome = "close some programs";
 
-io::MachineFailed not_started(const std::string& why) {
-  return {kThisProgram, fmt::format("cannot be started to perform runs: {}", why), "close some programs"};
+io::MachineFailed not_started(const std::string& why, const char* cure) {
+  return {kThisProgram, fmt::format("cannot be started to perform runs: {}", why), cure};
 }
 
 /// Processes one after another that were killed before their first line: then the next would be as well.
 constexpr int kMostKilledAtStart = 3;
+
+std::string text_of_error(int error) { return std::generic_category().message(error); }
 
 /// As waitpid() gives it.
 int status_of(pid_t id) {
@@ -61,7 +65,7 @@ WorkerProcesses::~WorkerProcesses() {
 WorkerProcesses::Process WorkerProcesses::start() {
   std::array<int, 2> ends{};
   if (::socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, ends.data()) != 0) {
-    throw not_started("no socket is left");
+    throw not_started(text_of_error(errno), kCloseSome);
   }
   Process process{started_++, -1, io::Descriptor(ends[0]), {}, false};
   const io::Descriptor its(ends[1]);
@@ -75,7 +79,7 @@ WorkerProcesses::Process WorkerProcesses::start() {
   const int fault = ::posix_spawn(&process.id, kThisProgram, &actions, nullptr, arguments.data(), environ);
   ::posix_spawn_file_actions_destroy(&actions);
   if (fault != 0) {
-    throw not_started(fmt::format("error {}", fault));
+    throw not_started(text_of_error(fault), fault == ENOENT ? "mount /proc" : kCloseSome);
   }
   return process;
 }
@@ -114,8 +118,14 @@ void WorkerProcesses::listen(Process& process, std::vector<WorkerNews>& news) {
     const int status = status_of(std::exchange(process.id, -1));
     if (process.is_ready) {
       news.push_back({process.number, true, how_it_ended(status)});
-    } else if (!WIFSIGNALED(status) || ++killed_at_start_ == kMostKilledAtStart) {
-      throw not_started(how_it_ended(status));
+    } else {
+      check_stop();  // which has perhaps reached that process as well
+      if (!WIFSIGNALED(status)) {
+        throw not_started(how_it_ended(status), "look for what it has said");
+      }
+      if (++killed_at_start_ == kMostKilledAtStart) {
+        throw not_started(how_it_ended(status), kCloseSome);
+      }
     }
     process = start();
     return;

@@ -12,6 +12,9 @@
 
 namespace trihedron::cli {
 
+/// By which the kernel tells a process its own program; there where /proc is mounted.
+inline constexpr const char* kThisProgram = "/proc/self/exe";
+
 /// What a worker process has said, or that it has ended.
 struct WorkerNews {
   std::uint64_t worker = 0;
@@ -32,7 +35,8 @@ class WorkerProcesses {
   /// worker: one that has said a line and has been given nothing since. What is given to one that has ended is lost.
   void give(std::uint64_t worker, std::uint64_t run);
   /// What has come; waits for it at most `patience`. Throws MachineFailed where a process ends by itself before its
-  /// first line, or the third in turn is killed before it, since the next would end the same way.
+  /// first line, or the third in turn is killed before it, since the next would end the same way; Stopped where this
+  /// process is to stop as well.
   std::vector<WorkerNews> wait(std::chrono::milliseconds patience);
 
  private:

@@ -5,7 +5,7 @@ import { execFileSync } from "node:child_process";
 import { statSync } from "node:fs";
 import path from "node:path";
 import { test } from "node:test";
-import { Reader, expectDrawn, figurePoints, readThrough } from "../../report/test/reader.mjs";
+import { Reader, allDrawn, expectDrawn, figurePoints } from "../../report/test/reader.mjs";
 
 const [executablePath, program, directory] = process.argv.slice(2);
 
@@ -16,7 +16,7 @@ test("the demonstration's report draws every figure in both themes and asks for 
   const reader = await Reader.start(executablePath);
   for (const colorScheme of ["light", "dark"]) {
     await reader.open(report, { colorScheme }, async (page, complaints) => {
-      await readThrough(page);
+      await allDrawn(page);
       const figures = await figurePoints(page);
       expectDrawn(figures);
       for (const name of ["figure-k0", "figure-alignment", "figure-navigation", "figure-open-loops", "figure-innovations", "figure-nis"]) {

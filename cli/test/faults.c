@@ -1,6 +1,6 @@
 // Makes system calls on files below one directory fail, fall short, or come with a signal: preloaded by outputs_test.py.
 //   FAULTS_BELOW   that directory, absolute and without links
-//   FAULTS_CALLS   kinds of calls that count, separated by commas: read write sync open create name
+//   FAULTS_CALLS   kinds of calls that count, separated by commas: read write sync open create name link spawn
 //   FAULTS_FIRST   number of the first call that is hit, from 1
 //   FAULTS_LAST    number of the last one
 //   FAULTS_DO      "errno N", "short", "signal N"
@@ -11,6 +11,7 @@
 #include <fcntl.h>
 #include <limits.h>
 #include <signal.h>
+#include <spawn.h>
 #include <stdarg.h>
 #include <stdatomic.h>
 #include <stdio.h>
@@ -142,4 +143,11 @@ int unlinkat(int directory, const char* path, int flags) {
 }
 int fchmodat(int directory, const char* path, mode_t mode, int flags) {
   return meet("name", is_below(path)) == FAIL ? -1 : NEXT(fchmodat)(directory, path, mode, flags);
+}
+ssize_t readlink(const char* path, char* target, size_t size) {
+  return meet("link", is_below(path)) == FAIL ? -1 : NEXT(readlink)(path, target, size);
+}
+int posix_spawn(pid_t* process, const char* path, const posix_spawn_file_actions_t* actions, const posix_spawnattr_t* attributes,
+                char* const arguments[], char* const environment[]) {
+  return meet("spawn", is_below(path)) == FAIL ? errno : NEXT(posix_spawn)(process, path, actions, attributes, arguments, environment);
 }

@@ -99,6 +99,7 @@ def test_the_ends_of_the_ranges_end_in_a_status(edited, tmp_path, key, values, e
     (("observe", "s.toml", "--advise", "--slews", "0"), "is not a whole number from 1 to 100;"),
     (("observe", "s.toml", "--advise", "--slews", "-3"), "is not a whole number from 1 to 100;"),
     (("observe", "s.toml", "--advise", "--confirm", "10000000"), "is not a whole number from 1 to 1000000;"),
+    (("replay", "p", "--spread-over", "-1"), "is not a whole number from 0 to 10000;"),
     (("observe", "s.toml", "--advise", "--max-angle", "-1deg"), "--max-angle -1deg"),
     (("observe", "s.toml", "--advise", "--max-rate", "1e9deg/s"), "outside 1e-06 to 1 rad/s"),
     (("observe", "s.toml", "--advise", "--manoeuvre-time", "0s"), "--manoeuvre-time 0s"),

@@ -1,4 +1,5 @@
 """`campaign` in processes of its own (--serve), and as a job of mpirun. Run by CTest with TRIHEDRON_BUILD naming the build directory."""
+import errno
 import os
 import pathlib
 import re
@@ -10,6 +11,7 @@ import time
 import pytest
 
 from campaign_test import CAMPAIGN, records, table, until
+from outputs_test import faults
 from program import BUILD, DO_NOT_USE, INPUT_REFUSED, MACHINE_FAILED, PROGRAM, ROOT, TRUSTWORTHY, WRONG_USAGE, refused, run
 
 MPIRUN = shutil.which("mpirun")
@@ -88,6 +90,16 @@ def test_a_job_without_the_library_is_refused_with_the_cure(alone, tmp_path):
     result = subprocess.run(command, env=environment, capture_output=True, text=True)
     refused(result, MACHINE_FAILED, "another version", "install trihedron-mpi")
     assert not (tmp_path / "out").exists()
+
+
+def without_proc(library, calls):
+    return {**os.environ, "LD_PRELOAD": str(library), "FAULTS_BELOW": "/proc/self/exe", "FAULTS_CALLS": calls, "FAULTS_FIRST": "1",
+            "FAULTS_LAST": "1000", "FAULTS_DO": f"errno {errno.ENOENT}"}
+
+
+def test_without_proc_a_job_says_why_the_library_is_not_found(alone, faults, tmp_path):
+    result = run("campaign", alone[0] / "c.toml", "-o", tmp_path / "out", env={**without_proc(faults, "link"), "PMIX_RANK": "0"})
+    refused(result, MACHINE_FAILED, "/proc/self/exe", "No such file", "trihedron-mpi.so", "mount /proc")
 
 
 def test_a_run_alone_is_no_job(alone):
@@ -177,6 +189,15 @@ def test_a_rank_with_other_files_ends_the_job(tmp_path, other, words):
     assert result.returncode == MACHINE_FAILED, result.stderr
     assert words in result.stderr
     assert not (tmp_path / "out" / "runs.nc").exists()
+
+
+@needs_mpi
+@pytest.mark.long
+def test_without_proc_a_job_says_why_no_run_can_be_performed(alone, faults, tmp_path):
+    result = subprocess.run(mpirun(1, "campaign", alone[0] / "c.toml", "-o", tmp_path / "out"), env=without_proc(faults, "spawn"),
+                            capture_output=True, text=True, timeout=60)
+    assert result.returncode == MACHINE_FAILED
+    assert "/proc/self/exe: cannot be started to perform runs: No such file" in result.stderr and "mount /proc" in result.stderr
 
 
 @needs_mpi

@@ -10,6 +10,17 @@ import trihedron
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 SCENARIO = ROOT / "python" / "test" / "scenario.toml"
 
+# What each telemetry.toml of the tests begins with; keys of [star_tracker] may follow.
+MAP_HEAD = """
+[pass]
+spacecraft = "TEST"
+[gyro]
+readout_noise_rad = 9.7e-6
+drift_prior_sigma_rad_s = 2e-6
+alignment_prior_sigma_rad = 8.73e-3
+[star_tracker]
+"""
+
 
 def program(*arguments, status=(0, 1)):
     """Runs the program; 1 is its verdict that a short pass is not to be used."""

@@ -4,18 +4,10 @@ import pytest
 import xarray as xr
 
 import trihedron
-from conftest import program
+from conftest import MAP_HEAD, program
 from same_as_program_test import same_telemetry
 
-MAP = """
-[pass]
-spacecraft = "TEST"
-[gyro]
-readout_noise_rad = 9.7e-6
-drift_prior_sigma_rad_s = 2e-6
-alignment_prior_sigma_rad = 8.73e-3
-[star_tracker]
-noise_rad = [1.5e-5, 1.5e-5, 9.7e-5]
+MAP = MAP_HEAD + """noise_rad = [1.5e-5, 1.5e-5, 9.7e-5]
 [telemetry.time]
 scale = "GPS"
 format = "ms"

@@ -6,18 +6,10 @@ import pyarrow.parquet
 import pytest
 
 import trihedron
-from conftest import program
+from conftest import MAP_HEAD, program
 from same_as_program_test import same_telemetry
 
-MAP = """
-[pass]
-spacecraft = "TEST"
-[gyro]
-readout_noise_rad = 9.7e-6
-drift_prior_sigma_rad_s = 2e-6
-alignment_prior_sigma_rad = 8.73e-3
-[star_tracker]
-[telemetry.time]
+MAP = MAP_HEAD + """[telemetry.time]
 scale = "UTC"
 format = "iso"
 [telemetry.gyro]

@@ -6,15 +6,24 @@ function shownUnit(unit, values) {
   return angleUnit(Math.max(...values.map(Math.abs)));
 }
 
+const isWide = (values) => Math.min(...values) > 0 && Math.max(...values) > 30 * Math.min(...values);
+
+/** Of a logarithmic axis: 1, 2 and 5 of each power of ten near the values, powers alone where there are many. */
+function logarithmicTicks(values) {
+  const first = Math.floor(Math.log10(Math.min(...values)));
+  const last = Math.ceil(Math.log10(Math.max(...values)));
+  const steps = last - first > 3 ? [1] : [1, 2, 5];
+  const tickvals = Array.from({ length: last - first + 1 }, (_, i) => steps.map((step) => Number(`${step}e${first + i}`))).flat();
+  return { type: "log", tickvals, ticktext: tickvals.map(String) };
+}
+
 FIGURES.ecdf = (data, look, { name }) => {
   const { colour } = look;
   const { label, unit, x, y, bounds, expected } = data.ecdf[name];
   const { symbol, size } = shownUnit(unit, x);
   const shown = scaled(x, 1 / size);
   const layout = baseLayout(look, look.print ? 260 : 320);
-  const least = Math.min(...shown);
-  const isWide = least > 0 && Math.max(...shown) > 30 * least;
-  layout.xaxis = { ...axisStyle(colour), type: isWide ? "log" : "linear", title: axisTitle(`${label}${symbol === "" ? "" : `, ${symbol.trim()}`}`, 8) };
+  layout.xaxis = { ...axisStyle(colour), ...(isWide(shown) ? logarithmicTicks(shown) : {}), title: axisTitle(`${label}${symbol === "" ? "" : `, ${symbol.trim()}`}`, 8) };
   layout.yaxis = { ...axisStyle(colour), range: [-0.02, 1.04], title: axisTitle("share of the runs", 6), tickformat: ".0%" };
   const traces = [{
     ...line(shown, y, panel(0), { name: "runs", line: { color: colour.blue, shape: "hv", width: 2 } }), showlegend: expected !== undefined,
@@ -26,13 +35,14 @@ FIGURES.ecdf = (data, look, { name }) => {
   }
   const known = bounds.filter(({ lower, upper }) => lower !== null || upper !== null);
   const [left, right] = [Math.min(...shown), Math.max(...shown)];
+  const bound = (value) => (value === null ? "no bound" : `${Number((value / size).toPrecision(4))}${symbol}`);
   known.forEach(({ share, lower, upper }) => {
     const from = lower === null ? left : lower / size;
     const to = upper === null ? right : upper / size;
     traces.push({
       x: [from, to], y: [share, share], mode: "lines+markers", showlegend: false, line: { color: colour.vermillion, width: 2 },
       marker: { symbol: "line-ns-open", size: 10, color: colour.vermillion, opacity: [lower === null ? 0 : 1, upper === null ? 0 : 1] },
-      hovertemplate: `${+(100 * share).toPrecision(3)} %: ${lower === null ? "too few runs" : "from"} … ${upper === null ? "too few runs" : "to"} %{x:.4~g}${symbol}<extra></extra>`,
+      hovertemplate: `${+(100 * share).toPrecision(3)} %: ${bound(lower)} … ${bound(upper)}<extra></extra>`,
     });
   });
   return { traces, layout };
@@ -44,14 +54,14 @@ FIGURES.influences = (data, look) => {
   const longest = Math.max(...keys.map((key) => key.length));
   const left = Math.min(7 * longest + 20, 0.42 * look.width);
   const letters = Math.floor((left - 20) / 7);
-  const layout = { ...baseLayout(look, 34 * keys.length + 250), margin: { l: left, r: 70, t: 14, b: 220 } };
+  const layout = { ...baseLayout(look, 34 * keys.length + 270), margin: { l: left, r: look.print ? 70 : 110, t: 14, b: 240 } };
   const short = (key) => (key.length <= letters ? key : `…${key.slice(1 - letters)}`);
   layout.xaxis = { ...axisStyle(colour), tickvals: measures.map((_, i) => i), ticktext: measures, tickangle: -45, showgrid: false, ticks: "", showline: false };
   layout.yaxis = { ...axisStyle(colour), tickvals: keys.map((_, i) => i), ticktext: keys.map(short), autorange: "reversed", showgrid: false, ticks: "", showline: false };
   const traces = [{
     type: "heatmap", z: rho, x: measures.map((_, i) => i), y: keys.map((_, i) => i), zmin: -1, zmax: 1, xgap: 1, ygap: 1,
     colorscale: [[0, colour["correlation-minus"]], [0.5, colour["correlation-zero"]], [1, colour["correlation-plus"]]],
-    text: marks, texttemplate: "%{text}", textfont: { size: 11 },
+    text: marks, texttemplate: "%{text}", textfont: { size: Math.min(11, (look.width - layout.margin.l - layout.margin.r) / measures.length / 3.2) },
     customdata: keys.map((key) => measures.map((measure) => `${key}, ${measure}`)),
     hovertemplate: "%{customdata}: %{z:+.2f}<extra></extra>",
     colorbar: { thickness: 12, outlinewidth: 0, tickvals: [-1, -0.5, 0, 0.5, 1], ticktext: ["−1", "−0.5", "0", "+0.5", "+1"] },
@@ -65,11 +75,12 @@ FIGURES.scatter = (data, look, { name }) => {
   const { symbol, size } = shownUnit(unit, y);
   const shown = scaled(y, 1 / size);
   const layout = baseLayout(look, look.print ? 260 : 320);
-  layout.xaxis = { ...axisStyle(colour), type: log ? "log" : "linear", title: axisTitle(`${key}${key_unit ? `, ${key_unit}` : ""}`, 8) };
+  layout.xaxis = { ...axisStyle(colour), ...(log ? logarithmicTicks(x) : {}), title: axisTitle(`${key}${key_unit ? `, ${key_unit}` : ""}`, 8) };
   if (words) Object.assign(layout.xaxis, { tickvals: words.map((_, i) => i), ticktext: words });
-  const least = Math.min(...shown);
-  layout.yaxis = { ...axisStyle(colour), type: least > 0 && Math.max(...shown) > 30 * least ? "log" : "linear", title: axisTitle(symbol.trim() === "" ? label : symbol.trim(), 6) };
-  layout.annotations.push({ text: `ρ = ${rho.toFixed(2).replace("-", "−")}`, xref: "paper", yref: "paper", x: 1, y: 1, xanchor: "right", yanchor: "bottom",
+  // The caption has the name of the measure, which may be longer than the axis.
+  const title = { angle: `error, ${symbol}`, min: "time, min" }[unit] ?? label;
+  layout.yaxis = { ...axisStyle(colour), ...(isWide(shown) ? logarithmicTicks(shown) : {}), title: axisTitle(title, 6) };
+  layout.annotations.push({ text: `ρ = ${rho.toFixed(2).replace("-", "−")}`, xref: "paper", yref: "paper", x: 0, y: 1, xanchor: "left", yanchor: "bottom",
     showarrow: false, font: { size: 13, color: colour.ink } });
   return {
     traces: [{ x, y: shown, customdata: run, mode: "markers", showlegend: false, marker: { color: faded(colour.blue, 0.55), size: 5 },

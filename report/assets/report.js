@@ -1,4 +1,5 @@
-// The page: draws a figure when it comes near, and again when its width, the theme or the choice of view changes.
+// The page: draws what the window shows at once, the other figures one after another when there is time, and all again when
+// its width, the theme or the choice of view changes.
 
 {
   const data = JSON.parse(document.getElementById("data").textContent);
@@ -41,19 +42,29 @@
   }
 
   function draw(figure, width) {
+    figure.dataset.drawn = "true";
     if (figure.dataset.figure === "tracks") drawSpheres(figure);
     else drawPlot(figure, width);
-    figure.dataset.drawn = "true";
   }
 
   const redraw = () => figures.filter((figure) => figure.dataset.drawn && !figure.hidden).forEach((figure) => draw(figure));
 
   // ---- When to draw
 
-  const nearing = new IntersectionObserver((entries) => {
-    for (const { isIntersecting, target } of entries) if (isIntersecting && !target.dataset.drawn) draw(target);
-  }, { rootMargin: "300px" });
-  figures.forEach((figure) => nearing.observe(figure));
+  const missing = () => figures.find((figure) => !figure.dataset.drawn && !figure.hidden);
+  let isDrawing = false;
+  /** Without waiting for the reader to scroll: whoever makes a picture or a copy of the page does not. */
+  function drawMissing() {
+    if (isDrawing || !missing()) return;
+    isDrawing = true;
+    // In a task for each, so that the page answers meanwhile.
+    setTimeout(() => {
+      isDrawing = false;
+      const figure = missing();
+      if (!figure) return;
+      try { draw(figure); } finally { drawMissing(); }
+    });
+  }
 
   let lastWidth = innerWidth;
   addEventListener("resize", () => {
@@ -83,6 +94,7 @@
     for (const figure of figures.filter(({ dataset }) => dataset.figure === "coefficient")) {
       figure.hidden = !chosen.has(figure.dataset.name);
     }
+    drawMissing();
   }
   if (choice) {
     // After a reload the browser may restore ticked boxes.
@@ -123,6 +135,9 @@
     }
   }, { rootMargin: "-20% 0px -70%" });
   document.querySelectorAll("main section").forEach((section) => reading.observe(section));
+
+  drawMissing();
+  for (let figure = missing(); figure?.getBoundingClientRect().top < innerHeight; figure = missing()) draw(figure);
 
   performance.mark("report-ready");
 }

@@ -29,6 +29,8 @@ constexpr std::size_t kDrawnSteps = 400;
 constexpr std::size_t kDrawnPoints = 1500;
 constexpr std::size_t kScatters = 6;
 constexpr std::size_t kShownReasons = 10;
+/// Errors of coefficients are shown in it: they are a thousandth of the coefficients.
+constexpr double kNanoradian = 1e-9;
 
 const char* word_of_severity(FindingSeverity severity) {
   return severity == FindingSeverity::kNote ? "Note" : severity == FindingSeverity::kWarning ? "Warning" : "Do not use";
@@ -40,17 +42,27 @@ const char* style_of_severity(FindingSeverity severity) {
 
 std::string shown(const Measure& measure, double value) {
   if (!std::isfinite(value)) {
-    return std::string(kNoEntry);
+    return std::isinf(value) ? "not in the pass" : std::string(kNoEntry);
   }
   switch (measure.unit) {
     case Measure::Unit::kRadian:
       return angle(value, 3);
     case Measure::Unit::kSecond:
       return number(value / 60, 0) + " min";
+    case Measure::Unit::kRatio:
+      return "×" + significant(value, 3);
     case Measure::Unit::kNone:
       return significant(value, 3);
   }
   return {};
+}
+
+/// Of the true quantile: that side which matters.
+std::string bound_text(const Measure& measure, const campaign::QuantileBounds& quantile) {
+  const std::optional<double>& bound = measure.large_is_bad ? quantile.upper : quantile.lower;
+  return !bound                  ? "too few runs"
+         : std::isfinite(*bound) ? (measure.large_is_bad ? "≤ " : "≥ ") + shown(measure, *bound)
+                                 : "no bound";
 }
 
 json finding_rows(const std::vector<campaign::CampaignFinding>& findings) {
@@ -71,9 +83,15 @@ json finding_rows(const std::vector<campaign::CampaignFinding>& findings) {
 json verdict_of_campaign(const CampaignSummary& summary) {
   const auto worst = std::ranges::max_element(summary.campaign_findings, {}, &campaign::CampaignFinding::severity);
   if (worst == summary.campaign_findings.end() || worst->severity == FindingSeverity::kNote) {
-    return {{"style", "good"},
-            {"word", "Trustworthy"},
-            {"lead", "All runs came to their end, and the sigmas are as large as the errors."}};
+    std::string lead = "All runs came to their end.";
+    const auto larger =
+        std::ranges::find(summary.campaign_findings, "nees-below-bounds", &campaign::CampaignFinding::code);
+    if (larger != summary.campaign_findings.end()) {
+      lead += " " + larger->text;
+    } else if (summary.nees) {
+      lead += " The sigmas of the parameters are as large as the errors.";
+    }
+    return {{"style", "good"}, {"word", "Trustworthy"}, {"lead", lead}};
   }
   if (worst->severity == FindingSeverity::kWarning) {
     return {{"style", "caution"}, {"word", "Trustworthy, with warnings"}, {"lead", worst->text}};
@@ -90,21 +108,21 @@ json consistency_number(const char* name, const std::optional<Consistency>& cons
       {"name", name},
       {"value", number(its.mean, digits)},
       {"unit", fmt::format(" of {}", significant(its.freedom, 3))},
-      {"note", fmt::format("mean of {} trustworthy runs; of a consistent estimator {} … {} in 95 %", its.runs,
+      {"note", fmt::format("mean of {} trustworthy runs; of a consistent estimator {} … {} in 95\u00a0%", its.runs,
                            number(its.usual.low * its.freedom, digits), number(its.usual.high * its.freedom, digits))}};
 }
 
 json quantile_number(const MeasureStatistics& statistics, double p) {
   const auto quantile = std::ranges::find(statistics.quantiles, p, &campaign::QuantileBounds::p);
   const Measure& measure = *statistics.measure;
-  json row = {{"name", fmt::format("{}, {} % of the runs", measure.label, 100 * p)},
+  json row = {{"name", fmt::format("{}, {}\u00a0% of the runs", measure.label, 100 * p)},
               {"value", "—"},
               {"unit", ""},
               {"note", "in no run"}};
   if (quantile != statistics.quantiles.end()) {
     const std::optional<double>& bound = measure.large_is_bad ? quantile->upper : quantile->lower;
     row["value"] = shown(measure, quantile->estimate);
-    row["note"] = bound ? fmt::format("{} {} with 90 % confidence", measure.large_is_bad ? "at most" : "at least",
+    row["note"] = bound ? fmt::format("{} {} with 90\u00a0% confidence", measure.large_is_bad ? "at most" : "at least",
                                       shown(measure, *bound))
                         : fmt::format("too few runs for a bound: {} are needed", campaign::runs_needed(p));
   }
@@ -149,14 +167,26 @@ json measure_rows(const std::vector<MeasureStatistics>& statistics) {
     }
     json cells = json::array();
     for (const campaign::QuantileBounds& quantile : its.quantiles) {
-      const std::optional<double>& bound = its.measure->large_is_bad ? quantile.upper : quantile.lower;
-      cells.push_back({{"value", shown(*its.measure, quantile.estimate)},
-                       {"bound", bound ? (its.measure->large_is_bad ? "≤ " : "≥ ") + shown(*its.measure, *bound)
-                                       : std::string("too few runs")}});
+      cells.push_back(
+          {{"value", shown(*its.measure, quantile.estimate)}, {"bound", bound_text(*its.measure, quantile)}});
     }
     rows.push_back({{"label", its.measure->label}, {"runs", its.runs}, {"cells", cells}});
   }
   return rows;
+}
+
+/// What correction intervals cannot show; empty where they show all.
+std::string watched_text(const CampaignReportInput& input) {
+  const auto count = std::ranges::count_if(input.records, [](const RunRecord& record) {
+    return record.outcome == RunOutcome::kTrustworthy && record.at(RunQuantity::kIntervalAfterIsLowerBound) == 1;
+  });
+  return count == 0 ? ""
+                    : fmt::format(
+                          "In {} of the {} trustworthy runs the attitude error was within {} for as long as the "
+                          "pass let it be watched: their correction intervals and extensions are lower bounds.",
+                          number(static_cast<double>(count), 0),
+                          number(static_cast<double>(input.summary.count(RunOutcome::kTrustworthy)), 0),
+                          limit_text(input.plan.limit_rad));
 }
 
 json quantile_heads() {
@@ -173,9 +203,11 @@ json parameter_rows(const CampaignSummary& summary) {
     if (its.runs == 0) {
       continue;
     }
-    const bool off = its.normalised > its.usual.high || its.normalised < its.usual.low;
+    const auto as_shown = [](double ratio) { return std::round(1000 * ratio); };
+    const bool off =
+        as_shown(its.normalised) > as_shown(its.usual.high) || as_shown(its.normalised) < as_shown(its.usual.low);
     const auto sized = [&](double value) {
-      return its.is_alignment ? angle(value, 3) : significant(value / kMicroradian, 3) + " · 10⁻⁶ rad/s";
+      return its.is_alignment ? angle(value, 3) : significant(value / kNanoradian, 3) + " · 10⁻⁹ rad/s";
     };
     rows.push_back({{"name", its.name},
                     {"rms", sized(its.rms)},
@@ -220,8 +252,8 @@ std::string amount(double value, const std::string& unit) { return fmt::format("
 std::string distribution_text(const CampaignInput& input) {
   const Distribution& its = input.distribution;
   std::string options;
-  for (const std::string& option : input.options) {
-    options += (options.empty() ? "" : ", ") + option;
+  for (std::size_t i = 0; i < input.options.size(); ++i) {
+    options += (i == 0 ? "" : ", ") + (input.is_number() ? amount(input.numbers[i], input.unit) : input.options[i]);
   }
   switch (its.kind) {
     case Distribution::Kind::kUniform:
@@ -266,10 +298,15 @@ double drawn(const Measure& measure, double value) {
       return value / kArcsecond_rad;
     case Measure::Unit::kSecond:
       return value / 60;
+    case Measure::Unit::kRatio:
     case Measure::Unit::kNone:
       return value;
   }
   return value;
+}
+
+const char* drawn_unit(const Measure& measure) {
+  return measure.unit == Measure::Unit::kRadian ? "angle" : measure.unit == Measure::Unit::kSecond ? "min" : "";
 }
 
 /// Share of the trustworthy runs that do not exceed a value; infinite values only count.
@@ -305,13 +342,7 @@ json cumulative(const Measure& measure, const CampaignReportInput& input) {
     };
     bounds.push_back({{"share", share}, {"lower", finite(quantile.lower)}, {"upper", finite(quantile.upper)}});
   }
-  return {{"label", measure.label},
-          {"unit", measure.unit == Measure::Unit::kRadian   ? "angle"
-                   : measure.unit == Measure::Unit::kSecond ? "min"
-                                                            : ""},
-          {"x", x},
-          {"y", y},
-          {"bounds", bounds}};
+  return {{"label", measure.label}, {"unit", drawn_unit(measure)}, {"x", x}, {"y", y}, {"bounds", bounds}};
 }
 
 /// The distribution that the NEES of a consistent estimator has.
@@ -387,9 +418,7 @@ json scatters_of(const CampaignReportInput& input) {
                    {"words", varied.is_number() ? json(nullptr) : json(varied.options)},
                    {"log", kind == Distribution::Kind::kLoguniform || kind == Distribution::Kind::kLognormal},
                    {"label", influence.measure->label},
-                   {"unit", influence.measure->unit == Measure::Unit::kRadian   ? "angle"
-                            : influence.measure->unit == Measure::Unit::kSecond ? "min"
-                                                                                : ""},
+                   {"unit", drawn_unit(*influence.measure)},
                    {"rho", influence.correlation.rho},
                    {"x", x},
                    {"y", y},
@@ -403,7 +432,7 @@ json facts_of_campaign(const CampaignPlan& plan) {
     return {{"name", name}, {"value", std::move(value)}};
   };
   return {fact("Runs", number(static_cast<double>(plan.runs), 0)), fact("Seed", std::to_string(plan.seed)),
-          fact("Sampling", plan.latin_hypercube ? "Latin hypercube" : "each run for itself"),
+          fact("Sampling", plan.latin_hypercube ? "Latin hypercube" : "random"),
           fact("Values drawn", std::to_string(plan.inputs.size())), fact("Error limit", limit_text(plan.limit_rad))};
 }
 
@@ -415,11 +444,14 @@ std::string render_campaign(const CampaignReportInput& input) {
   json drawn_measures = json::array();
   for (const Measure& measure : campaign::measures()) {
     json data = cumulative(measure, input);
-    if (!data.is_null() && measure.key == "nees") {
+    if (!data.is_null() && measure.key == "nees" && summary.nees) {
       data["expected"] = expected_nees(summary);
     }
     if (!data.is_null()) {
-      drawn_measures.push_back({{"key", measure.key}, {"label", measure.label}, {"is_nees", measure.key == "nees"}});
+      drawn_measures.push_back({{"key", measure.key},
+                                {"label", measure.label},
+                                {"about", measure.about},
+                                {"is_nees", measure.key == "nees"}});
       figures["ecdf"][std::string(measure.key)] = std::move(data);
     }
   }
@@ -439,6 +471,7 @@ std::string render_campaign(const CampaignReportInput& input) {
                  {"measures", measure_rows(summary.trustworthy)},
                  {"has_all", summary.count(RunOutcome::kDoNotUse) > 0},
                  {"all", measure_rows(summary.all)},
+                 {"watched", watched_text(input)},
                  {"needed", campaign::runs_needed(campaign::kReportedQuantiles.back())},
                  {"parameters", parameter_rows(summary)},
                  {"drawn", drawn_measures},

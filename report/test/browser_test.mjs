@@ -8,7 +8,7 @@ import assert from "node:assert/strict";
 import { writeFile } from "node:fs/promises";
 import path from "node:path";
 import { test as unlimitedTest, before, after } from "node:test";
-import { Reader, expectDrawn, figurePoints, readThrough } from "./reader.mjs";
+import { Reader, allDrawn, expectDrawn, figurePoints } from "./reader.mjs";
 
 const [executablePath, directory] = process.argv.slice(2);
 const test = (name, body) => unlimitedTest(name, { timeout: 300_000 }, body);
@@ -17,8 +17,8 @@ let reader;
 before(async () => { reader = await Reader.start(executablePath); });
 after(() => reader.close());
 const open = (name, options, visit) => reader.open(path.resolve(directory, name), options, visit);
-const openAndRead = (name, options, visit) => open(name, options, async (page, complaints) => {
-  await readThrough(page);
+const openAndDraw = (name, options, visit) => open(name, options, async (page, complaints) => {
+  await allDrawn(page);
   await visit(page, complaints);
 });
 
@@ -26,20 +26,37 @@ const overflow = (page) => page.evaluate(() => document.documentElement.scrollWi
 
 for (const name of ["good.html", "troubled.html", "alone.html"]) {
   test(`${name} draws every figure, says nothing on the console and asks for nothing`, () =>
-    openAndRead(name, {}, async (page, complaints) => {
+    openAndDraw(name, {}, async (page, complaints) => {
       expectDrawn(await figurePoints(page));
       assert.deepEqual(complaints, []);
     }));
 }
 
 test("a history draws each parameter of each gyro, on a screen and on paper", () =>
-  openAndRead("history.html", { width: 768 }, async (page, complaints) => {
+  openAndDraw("history.html", { width: 768 }, async (page, complaints) => {
     const points = await page.evaluate(() => [...document.querySelectorAll('figure[data-figure="trend"] .plot')].map(({ data }) =>
       data.flatMap(({ y }) => y).filter((v) => v !== null).length));
     assert.deepEqual(points, [...Array(7).fill(18), 1, ...Array(3).fill(18)]);
     assert.ok((await overflow(page)) <= 0, `wider by ${await overflow(page)} pixels`);
     await page.pdf({ path: path.join(directory, "history.pdf"), preferCSSPageSize: true, printBackground: true });
     assert.deepEqual(complaints, []);
+  }));
+
+test("a campaign draws each figure, on a screen and on paper", () =>
+  openAndDraw("campaign.html", { width: 768 }, async (page, complaints) => {
+    const figures = await figurePoints(page);
+    assert.ok(figures.length > 13, `only ${figures.length} figures`);
+    for (const { name, points } of figures) assert.ok(points >= 30, `${name} holds ${points} points`);
+    assert.ok((await overflow(page)) <= 0, `wider by ${await overflow(page)} pixels`);
+    await page.pdf({ path: path.join(directory, "campaign.pdf"), preferCSSPageSize: true, printBackground: true });
+    assert.deepEqual(complaints, []);
+  }));
+
+test("what a window shows is drawn before the page has loaded", () =>
+  open("campaign.html", { height: 8000 }, async (page) => {
+    const blank = await page.evaluate(() => [...document.querySelectorAll("figure")].filter((figure) =>
+      !figure.dataset.drawn && figure.getBoundingClientRect().top < innerHeight).length);
+    assert.equal(blank, 0);
   }));
 
 test("nine hours open in a small multiple of what the plotting library alone takes", async () => {
@@ -74,7 +91,7 @@ for (const colorScheme of ["light", "dark"]) {
 
 for (const [width, colorScheme] of [[360, "light"], [768, "dark"], [1920, "light"]]) {
   test(`fits a screen of ${width} pixels`, () =>
-    openAndRead("troubled.html", { width, colorScheme }, async (page, complaints) => {
+    openAndDraw("troubled.html", { width, colorScheme }, async (page, complaints) => {
       assert.ok((await overflow(page)) <= 0, `wider by ${await overflow(page)} pixels`);
       assert.deepEqual(complaints, []);
     }));
@@ -84,7 +101,7 @@ test("shows any coefficient, and enlarged", () =>
   open("good.html", {}, async (page, complaints) => {
     await page.click("#all-coefficients");
     await page.check('input[name="view"][value="detail"]');
-    await readThrough(page);
+    await allDrawn(page);
     const coefficients = (await figurePoints(page)).filter(({ name }) => /k0|mu|nu/.test(name));
     assert.equal(coefficients.length, 7);
     await page.locator("#coefficients").screenshot({ path: path.join(directory, "coefficients-enlarged.png") });
@@ -94,7 +111,7 @@ test("shows any coefficient, and enlarged", () =>
   }));
 
 test("a sphere turns with the keyboard", () =>
-  openAndRead("good.html", {}, async (page) => {
+  openAndDraw("good.html", {}, async (page) => {
     const track = () => page.locator(".sphere path.track").first().getAttribute("d");
     const start = await track();
     await page.locator(".sphere svg").first().focus();

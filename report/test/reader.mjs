@@ -1,4 +1,4 @@
-// A reader of reports: headless Chromium that scrolls through them and notes what they complain of.
+// A reader of reports: headless Chromium that opens them and notes what they complain of.
 
 import assert from "node:assert/strict";
 import { createRequire } from "node:module";
@@ -56,14 +56,9 @@ export class Reader {
   }
 }
 
-/** Scrolls through the report, so that every figure is drawn. */
-export const readThrough = (page) => page.evaluate(async () => {
-  for (let y = 0; y < document.body.scrollHeight; y += 600) {
-    scrollTo({ top: y, behavior: "instant" });
-    await new Promise((done) => { requestAnimationFrame(() => setTimeout(done, 20)); });
-  }
-  scrollTo({ top: 0, behavior: "instant" });
-});
+/** Waits until every figure that is shown is drawn, for which nobody has to scroll. Not by frames, which may not come. */
+export const allDrawn = (page) =>
+  page.waitForFunction(() => !document.querySelector("figure[data-figure]:not([hidden], [data-drawn])"), null, { polling: 50 });
 
 /** Per figure that is shown: its name and the number of points drawn. */
 export const figurePoints = (page) => page.evaluate(() =>

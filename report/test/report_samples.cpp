@@ -4,6 +4,8 @@
 #include <fstream>
 
 #include "synthetic_run.hpp"
+#include "trihedron/campaign/summary.hpp"
+#include "trihedron/report/campaign.hpp"
 #include "trihedron/report/history.hpp"
 
 int main(int argc, char** argv) {
@@ -23,6 +25,11 @@ int main(int argc, char** argv) {
   const auto catalogue = test::synthetic_catalogue(good.run.calibration);
   std::ofstream(directory / "history.html", std::ios::binary)
       << render_history(catalogue, ground::compare_start_ups(catalogue));
+
+  const test::SyntheticCampaign campaign = test::synthetic_campaign(900, 20);
+  const auto summary = campaign::summarise(campaign.plan, campaign.records);
+  std::ofstream(directory / "campaign.html", std::ios::binary) << render_campaign(
+      {campaign.plan, campaign.records, summary, "trihedron campaign FILE -o " + std::string(60, 'x')});
 
   const Finding not_determined{
       FindingCode::kNotDetermined, "The data do not determine gyro2.nu12. Its value and sigma are those of the prior.",

@@ -350,4 +350,44 @@ std::vector<CatalogueEntry> synthetic_catalogue(const Calibration& like) {
   return catalogue;
 }
 
+SyntheticCampaign synthetic_campaign(std::size_t runs, double nees) {
+  using Kind = Distribution::Kind;
+  SyntheticCampaign campaign;
+  CampaignPlan& plan = campaign.plan;
+  plan.name = "What a designer does not know";
+  plan.runs = runs;
+  plan.inputs = {{"gyro.readout.noise", {.kind = Kind::kLoguniform, .a = 1, .b = 8}, "arcsec", {}, {}},
+                 {"star_tracker.dropout_probability",
+                  {.kind = Kind::kChoice, .options = 3},
+                  "",
+                  {"0", "0.050000000000000003", "0.20000000000000001"},
+                  {0, 0.05, 0.2}},
+                 {"attitude.programme", {.kind = Kind::kChoice, .options = 2}, "", {"orbital", "yaw-steered"}, {}}};
+  std::mt19937_64 random(3);
+  std::normal_distribution<double> normal;
+  for (std::size_t run = 0; run < runs; ++run) {
+    const double part = (static_cast<double>(run) + 0.5) / static_cast<double>(runs);
+    RunRecord record;
+    record.run = run;
+    record.outcome = RunOutcome::kTrustworthy;
+    record.draws = {std::pow(8, part), static_cast<double>(run % 3), static_cast<double>(run % 2)};
+    for (const RunQuantityRow& row : kRunQuantityRows) {
+      for (std::size_t i = 0; i < size_of(row.shape, plan.gyros); ++i) {
+        const double size = row.unit == "rad" ? 1e-5 : row.unit == "rad s-1" ? 2e-9 : row.unit == "s" ? 9000 : 1;
+        record[row.quantity].push_back(size * record.draws[0] * (1 + 0.1 * normal(random)));
+      }
+    }
+    record[RunQuantity::kNees] = {nees + 4 * std::clamp(normal(random), -2.0, 2.0)};
+    record[RunQuantity::kNeesFreedom] = {20};
+    record[RunQuantity::kNisMean] = record[RunQuantity::kNisFreedom] = {4};
+    record[RunQuantity::kNisFixes] = {10000};
+    record[RunQuantity::kIntervalAfterIsLowerBound] = {run % 4 == 0 ? 1.0 : 0.0};
+    if (run % 200 == 199) {
+      record[RunQuantity::kDriftSettled] = {std::numeric_limits<double>::quiet_NaN()};
+    }
+    campaign.records.push_back(std::move(record));
+  }
+  return campaign;
+}
+
 }  // namespace trihedron::report::test

@@ -19,9 +19,10 @@ namespace trihedron::campaign {
 
 /// One number of a run that is looked at over all runs.
 struct Measure {
-  enum class Unit : std::uint8_t { kRadian, kSecond, kNone };
+  enum class Unit : std::uint8_t { kRadian, kSecond, kRatio, kNone };
   std::string_view key;    ///< for programs
   std::string_view label;  ///< for people
+  std::string_view about;  ///< what it is, as a sentence without its stop
   Unit unit = Unit::kNone;
   bool large_is_bad = true;
   /// NaN where a run has none; infinity where it did not get there.

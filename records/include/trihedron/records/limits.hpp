@@ -116,6 +116,7 @@ inline constexpr Range kRequiredInterval_s{1, 3.1e7, "s",
 inline constexpr Range kFlights{1, 1e6, "", "it is a number of flights"};
 /// A row of a campaign takes a kilobyte of memory when its table is written.
 inline constexpr Range kCampaignRuns{1, 1e6, "", "it is a number of runs"};
+inline constexpr Range kSpreadOver{0, 1e4, "", "it is a number of samples, 8 a second"};
 inline constexpr Range kJobs{1, 1024, "", "it is a number of threads"};
 
 }  // namespace limits
