@@ -12,6 +12,7 @@
 #include "batch/left_out_walk.hpp"
 #include "batch/pass_setup.hpp"
 #include "batch/refine.hpp"
+#include "calibrate/calibrate_after.hpp"
 #include "choose/decide.hpp"
 #include "judge/changes.hpp"
 #include "model/drift_on_board.hpp"
@@ -314,6 +315,7 @@ CalibrationRun calibrate_as_stamped(const Pass& pass, const CalibrationOptions& 
     ++run.fix_counts[fix.status];
   }
   add_statistics(run.fixes, run.calibration.statistics);
+  put_changes_into_errors(run);
   run.calibration.forecast = forecast_of(run);
   if (const std::optional<LeftOut> left_out = left_out_by(pass.settings, options, decision)) {
     run.calibration.on_board_drift = {left_out->kept_model(), decision.left_out_walk_rad_sqrt_s};
@@ -335,6 +337,11 @@ CalibrationRun calibrate_as_stamped(const Pass& pass, const CalibrationOptions& 
 }  // namespace
 
 CalibrationRun calibrate(const Pass& pass, const CalibrationOptions& options, const Progress& progress) {
+  return calibrate_after(pass, options, progress, std::nullopt);
+}
+
+CalibrationRun calibrate_after(const Pass& pass, const CalibrationOptions& options, const Progress& progress,
+                               std::optional<Calibration> known_before) {
   const std::optional<Clocks> clocks = clocks_of(pass);
   const ClockCorrection correction = clocks ? wanted_correction(*clocks, pass.settings, options) : ClockCorrection{};
   std::optional<Pass> corrected;
@@ -348,6 +355,10 @@ CalibrationRun calibrate(const Pass& pass, const CalibrationOptions& options, co
   run.clock_correction = correction;
   add_to_estimates(correction, run.calibration.further);
   run.calibration.clocks = clocks_found(pass.settings, correction, run.calibration.further);
+  if (known_before) {
+    run.known_before = *std::move(known_before);
+  }
+  // What changes is judged by the sigmas that are claimed without it.
   run.calibration.verdict = judge(stamped, run);
   put_changes_into_covariance(run);
   return run;

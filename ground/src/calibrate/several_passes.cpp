@@ -8,9 +8,8 @@
 #include <algorithm>
 #include <utility>
 
+#include "calibrate/calibrate_after.hpp"
 #include "model/left_out.hpp"
-#include "trihedron/ground/calibrate/calibrate.hpp"
-#include "trihedron/ground/judge/verdict.hpp"
 #include "trihedron/ground/model/setup_error.hpp"
 
 namespace trihedron::ground {
@@ -155,9 +154,8 @@ Verdict judge_together(const Verdict& last, const std::vector<PassAlone>& passes
 void SeveralPasses::combine(const Pass& pass, const CalibrationOptions& options, const Progress& progress) {
   Pass next = pass;
   next.settings.prior = combined_.calibration;
-  CalibrationRun together = calibrate(next, options, progress);
-  together.known_before = std::move(combined_.known_before);
-  together.calibration.verdict = judge_together(judge(next, together), passes_);
+  CalibrationRun together = calibrate_after(next, options, progress, std::move(combined_.known_before));
+  together.calibration.verdict = judge_together(together.calibration.verdict, passes_);
   combined_ = std::move(together);
 }
 

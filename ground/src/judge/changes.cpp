@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 #include <string>
 
 #include "trihedron/core/layout.hpp"
@@ -146,13 +147,37 @@ const Change* change_found(const CalibrationRun& run) {
   return run.changes.empty() || run.changes.front().log_odds < kLogOddsOfChange ? nullptr : &run.changes.front();
 }
 
+/// What the parameters may be off, where coefficients are found to change.
+std::optional<Eigen::VectorXd> off_by_coefficients(const CalibrationRun& run) {
+  const Change* const change = change_found(run);
+  if (change == nullptr || change->moving != Moving::kCoefficients) {
+    return std::nullopt;
+  }
+  return kMoreThanFound * parameters_off(run.calibration, *change);
+}
+
 }  // namespace
 
 void put_changes_into_covariance(CalibrationRun& run) {
-  if (const Change* const change = change_found(run); change != nullptr && change->moving == Moving::kCoefficients) {
-    const Eigen::VectorXd off = kMoreThanFound * parameters_off(run.calibration, *change);
-    run.calibration.covariance += off * off.transpose();
+  if (const auto off = off_by_coefficients(run)) {
+    run.calibration.covariance += *off * off->transpose();
   }
+}
+
+void put_changes_into_errors(CalibrationRun& run) {
+  const auto off = off_by_coefficients(run);
+  if (!off || !run.errors.is_known() || run.attitude.size() == 0) {
+    return;
+  }
+  const Layout& layout = run.errors.layout;
+  Eigen::VectorXd errors = Eigen::VectorXd::Zero(run.errors.covariance.rows());
+  errors.segment(layout.drift(0), layout.parameters()) = *off;
+  for (int k = 0; k < layout.gyros; ++k) {
+    // Fixes give the attitude: where the alignment is off, so is the momentum.
+    errors.segment<3>(layout.direction(k)) =
+        run.attitude.q_in_c.back() * off->segment<3>(layout.alignment(k) - layout.drift(0));
+  }
+  run.errors.covariance += errors * errors.transpose();
 }
 
 void judge_changes(const CalibrationRun& run, std::vector<Finding>& findings) {

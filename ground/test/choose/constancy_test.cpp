@@ -122,6 +122,9 @@ TEST(Constancy, PutsCoefficientsThatChangeIntoTheirSigmas) {
     if (!state.is_drift() || state.coefficient.is_in_eq1()) {
       EXPECT_LT(std::abs(errors(i)), 4 * std::sqrt(found.covariance(i, i))) << i;
     }
+    // What is predicted of open loops begins with the same.
+    const Eigen::Index begins_with = run.errors.layout.drift(0) + i;
+    EXPECT_NEAR(run.errors.covariance(begins_with, begins_with), found.covariance(i, i), 1e-6 * found.covariance(i, i));
   }
 }
 
