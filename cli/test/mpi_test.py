@@ -127,11 +127,9 @@ def test_a_worker_that_is_killed_loses_its_run_only_and_the_campaign_goes_on(alo
     out = tmp_path / "out"
     process = started(mpirun(2, "campaign", directory / "c.toml", "-o", out))
     until(out / "runs.journal", 1, process)
-    killed = workers_of(process.pid)
-    for worker in killed:
-        os.kill(worker, signal.SIGKILL)
-    stdout, stderr = process.communicate(timeout=120)
-    assert killed
+    # One alone: a run that another gets, which is killed as well, is a row without a result.
+    os.kill(workers_of(process.pid)[0], signal.SIGKILL)
+    _, stderr = process.communicate(timeout=120)
     assert process.returncode == status, stderr
     assert table(out) == table(directory / "out")
     assert records(out) == 12
