@@ -30,7 +30,7 @@ constexpr std::size_t kDrawnPoints = 1500;
 constexpr std::size_t kScatters = 6;
 constexpr std::size_t kShownReasons = 10;
 /// Errors of coefficients are shown in it: they are a thousandth of the coefficients.
-constexpr double kNanoradian = 1e-9;
+constexpr double kNanoradianPerSecond = 1e-9;
 
 const char* word_of_severity(FindingSeverity severity) {
   return severity == FindingSeverity::kNote ? "Note" : severity == FindingSeverity::kWarning ? "Warning" : "Do not use";
@@ -207,7 +207,7 @@ json parameter_rows(const CampaignSummary& summary) {
     const bool off =
         as_shown(its.normalised) > as_shown(its.usual.high) || as_shown(its.normalised) < as_shown(its.usual.low);
     const auto sized = [&](double value) {
-      return its.is_alignment ? angle(value, 3) : significant(value / kNanoradian, 3) + " · 10⁻⁹ rad/s";
+      return its.is_alignment ? angle(value, 3) : significant(value / kNanoradianPerSecond, 3) + " · 10⁻⁹ rad/s";
     };
     rows.push_back({{"name", its.name},
                     {"rms", sized(its.rms)},
