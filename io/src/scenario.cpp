@@ -242,11 +242,15 @@ Fields unit_fields(GyroScenario& gyro, const fs::path& file) {
 
 /// `unit`: of one gyro. Its tables are read after what [gyro] says of all.
 Fields gyro_fields(Scenario& scenario, GyroScenario& gyro, const fs::path& file) {
-  const auto units = [&gyro, &file] { return array_of(schema_of(unit_fields(gyro, file))); };
-  return Fields{
-             duration("period", scenario.gyro_period, limits::kGyroPeriod_s, "of the samples"),
-             list("gaps", file, scenario.gyro_gaps, "without any sample", interval_fields),
-             {"unit", "one per gyro, two to four: what differs", units, [](const TomlTable&, const toml::node&) {}}} +
+  const auto units = [&gyro, &file] {
+    Json several = array_of(schema_of(unit_fields(gyro, file)));
+    several["minItems"] = 2;
+    several["maxItems"] = kMaxGyros;
+    return several;
+  };
+  return Fields{duration("period", scenario.gyro_period, limits::kGyroPeriod_s, "of the samples"),
+                list("gaps", file, scenario.gyro_gaps, "without any sample", interval_fields),
+                {"unit", "one per gyro: what differs", units, [](const TomlTable&, const toml::node&) {}}} +
          unit_fields(gyro, file);
 }
 
@@ -255,8 +259,15 @@ void read_gyros(const toml::table& table, const fs::path& file, Scenario& scenar
   const toml::node* units = table.get("unit");
   std::vector<const toml::table*> tables;
   if (units != nullptr) {
-    tables =
-        tables_of(TomlTable(table, file, "[gyro]"), *units, "unit", "begin the part of each gyro with [[gyro.unit]]");
+    const TomlTable of_all(table, file, "[gyro]");
+    const std::string cure = "begin the part of each gyro with [[gyro.unit]]";
+    tables = tables_of(of_all, *units, "unit", cure);
+    if (tables.size() < 2 || tables.size() > std::size_t{kMaxGyros}) {
+      of_all.refuse(*units,
+                    fmt::format("\"unit\" tells {} gyros; attitude needs two, and at most {} are handled",
+                                tables.size(), kMaxGyros),
+                    cure);
+    }
     scenario.gyros.resize(tables.size());
   }
   for (std::size_t i = 0; i < scenario.gyros.size(); ++i) {

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <charconv>
 
+#include "trihedron/core/per_gyro.hpp"
 #include "wording.hpp"
 
 namespace trihedron::io {
@@ -13,7 +14,6 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr int kFewestGyros = 2;
-constexpr int kMostGyros = 4;
 
 /// K of "hK_x", "hK_y", "hK_z"; 0 for any other name.
 int gyro_number(std::string_view name) {
@@ -31,9 +31,9 @@ int count_gyros(const fs::path& file, std::span<const ColumnName> present) {
   int gyros = 0;
   for (const ColumnName& column : present) {
     gyros = std::max(gyros, gyro_number(column.name));
-    if (gyros > kMostGyros) {
+    if (gyros > kMaxGyros) {
       throw InputRefused(file, column.position, fmt::format("{} is of a fifth or later gyro", in_quotes(column.name)),
-                         fmt::format("at most {} gyros are handled", kMostGyros));
+                         fmt::format("at most {} gyros are handled", kMaxGyros));
     }
   }
   if (gyros == 1) {

@@ -204,6 +204,9 @@ TEST(ScenarioToml, RefusalNamesPlaceReasonAndCure) {
   EXPECT_THAT(why_refused("[scenario]\nepoch_tai = \"yesterday\""), HasSubstr("not an ISO date and time"));
   EXPECT_THAT(why_refused("[star_tracker]\nnoise = [\"1arcsec\"]"), HasSubstr("[x, y, z]"));
   EXPECT_THAT(why_refused("[gyro]\nunit = 3"), HasSubstr("[[gyro.unit]]"));
+  EXPECT_THAT(why_refused("[gyro]\nunit = []"), HasSubstr("scenario.toml:2:8: \"unit\" tells 0 gyros"));
+  EXPECT_THAT(why_refused("[gyro]\nunit = [{}]"), HasSubstr("at most 4 are handled"));
+  EXPECT_THAT(why_refused("[gyro]\nunit = [{}, {}, {}, {}, {}]"), HasSubstr("at most 4 are handled"));
   EXPECT_THAT(why_refused("[scenario]\nseed = -1"), HasSubstr("whole number"));
 }
 
