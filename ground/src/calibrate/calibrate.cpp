@@ -330,7 +330,6 @@ CalibrationRun calibrate_as_stamped(const Pass& pass, const CalibrationOptions& 
       run.calibration.drift_field = pass.settings.prior->drift_field;
     }
   }
-  run.calibration.determined = determined(run);
   return run;
 }
 
@@ -358,6 +357,7 @@ CalibrationRun calibrate_after(const Pass& pass, const CalibrationOptions& optio
   if (known_before) {
     run.known_before = *std::move(known_before);
   }
+  run.calibration.determined = determined(run);
   // What changes is judged by the sigmas that are claimed without it.
   run.calibration.verdict = judge(stamped, run);
   put_changes_into_covariance(run);

@@ -112,6 +112,8 @@ TEST(SeveralPasses, OfOneStartUpAgreeAndAreBetterThanOne) {
   EXPECT_TRUE(combined.verdict.trustworthy);
   // The second pass alone would leave the parameters as it found them, within a factor of two.
   EXPECT_THAT(combined.verdict.findings, Not(has_finding(FindingCode::kNotDetermined)));
+  ASSERT_TRUE(combined.determined);
+  EXPECT_EQ(combined.determined->coefficients, 14);
 }
 
 TEST(SeveralPasses, OfTwoStartUpsAreNotToBeUsedTogether) {
