@@ -216,9 +216,7 @@ bool InvariantEstimator<kCapacity>::prior_allows_estimates() const {
 template <Capacity kCapacity>
 void InvariantEstimator<kCapacity>::predict(const Eigen::Matrix3d& C_in_c, const Directions& h_b, Time t, double dt_s) {
   const double part = setup_.part_of_change(t - from_seconds(dt_s / 2));
-  for (int k = 0; k < layout().gyros; ++k) {
-    precess(gyros_[k], since_fix_[k], drift_, C_in_c, h_b[k], part, dt_s);
-  }
+  precess_all(gyros_, since_fix_, layout().gyros, drift_, C_in_c, h_b, part, dt_s);
   time_since_fix_s_ += dt_s;
   gate_.elapse(dt_s);
 }

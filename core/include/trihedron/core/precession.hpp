@@ -84,6 +84,48 @@ Eigen::Vector3d precess(GyroModel<Max>& gyro, Sensitivity<Max>& sensitivity, con
   return turn;
 }
 
+/// One of two gyros that are predicted together: its numbers where they lie, 3 × 3 matrices column by column.
+struct PrecessingGyro {
+  double* h_in;
+  const double* kappa;  ///< of eq. (1)
+  const double* C_c_b;
+  const double* readout_bias;
+  const double* h_b;
+  double* by_start;
+  double* by_alignment;
+  ColumnsView by_drift;
+};
+
+/// The last precess() for two gyros side by side whose drift is eq. (1) alone: the same bits in half the instructions.
+void precess_two_by_eq1(const PrecessingGyro& a, const PrecessingGyro& b, const Eigen::Matrix3d& C_in_c, double dt_s);
+
+/// The last precess() for the first `count` of the gyros, with their readings.
+template <class Gyros, class Sensitivities>
+void precess_all(Gyros& gyros, Sensitivities& sensitivities, int count, const DriftModel& drift,
+                 const Eigen::Matrix3d& C_in_c, const Directions& h_b, double part_of_change, double dt_s) {
+  int k = 0;
+  if (drift.columns() == Esg7::kSize) {
+    const auto its = [&](int i) {
+      auto& gyro = gyros[i];
+      auto& since = sensitivities[i];
+      return PrecessingGyro{gyro.h_in.data(),
+                            gyro.drift_rad_s.data(),
+                            gyro.C_c_b.data(),
+                            gyro.readout_bias.data(),
+                            h_b[i].data(),
+                            since.by_start.data(),
+                            since.by_alignment.data(),
+                            since.by_drift.view(Esg7::kSize)};
+    };
+    for (; k + 1 < count; k += 2) {
+      precess_two_by_eq1(its(k), its(k + 1), C_in_c, dt_s);
+    }
+  }
+  for (; k < count; ++k) {
+    precess(gyros[k], sensitivities[k], drift, C_in_c, h_b[k], part_of_change, dt_s);
+  }
+}
+
 /// exp([δ×]) C_c_b, through the quaternion, so that rounding cannot accumulate in the matrix over months of fixes.
 [[nodiscard]] Eigen::Matrix3d turned(const Eigen::Matrix3d& C_c_b, const Eigen::Vector3d& delta);
 
