@@ -6,6 +6,7 @@
 #include <iterator>
 
 #include "trihedron/core/assert.hpp"
+#include "trihedron/core/lanes.hpp"
 
 namespace trihedron {
 namespace {
@@ -15,10 +16,22 @@ namespace {
 template <std::size_t M>
 void reflect(double* __restrict r, double* const (&rows)[M], const double (&v)[M], double v0, double beta,
              int columns) {
-#ifndef __clang__
-#pragma GCC ivdep  // the rows do not overlap
-#endif
-  for (int k = 1; k < columns; ++k) {
+  int k = 1;
+  for (; k + 1 < columns; k += 2) {
+    const Lanes its = load2(r + k);
+    Lanes below[M];
+    Lanes s = v0 * its;
+    for (std::size_t i = 0; i < M; ++i) {
+      below[i] = load2(rows[i] + k);
+      s += v[i] * below[i];
+    }
+    s *= beta;
+    store2(its - v0 * s, r + k);
+    for (std::size_t i = 0; i < M; ++i) {
+      store2(below[i] - v[i] * s, rows[i] + k);
+    }
+  }
+  if (k < columns) {
     double s = v0 * r[k];
     for (std::size_t i = 0; i < M; ++i) {
       s += v[i] * rows[i][k];
@@ -124,13 +137,16 @@ void solve_rows_together(ConstRowsView root, RowsView rows) {
       value[i] = x[i][j] /= R[j];
       next[i] = x[i][j + 1] = (x[i][j + 1] - value[i] * R[j + 1]) / next_R[j + 1];
     }
-#ifndef __clang__
-#pragma GCC ivdep  // the rows do not overlap
-#endif
-    for (int k = j + 2; k < n; ++k) {
+    int k = j + 2;
+    for (; k + 1 < n; k += 2) {
+      const Lanes its = load2(R + k);
+      const Lanes next_its = load2(next_R + k);
       for (std::size_t i = 0; i < M; ++i) {
-        x[i][k] = (x[i][k] - value[i] * R[k]) - next[i] * next_R[k];
+        store2((load2(x[i] + k) - value[i] * its) - next[i] * next_its, x[i] + k);
       }
+    }
+    for (std::size_t i = 0; k < n && i < M; ++i) {
+      x[i][k] = (x[i][k] - value[i] * R[k]) - next[i] * next_R[k];
     }
   }
   for (std::size_t i = 0; j < n && i < M; ++i) {

@@ -17,6 +17,12 @@ struct Lanes3 {
 [[nodiscard]] inline Lanes both_lanes(double value) { return Lanes{value, value}; }
 /// The numbers at two places.
 [[nodiscard]] inline Lanes load(const double* first, const double* second) { return Lanes{*first, *second}; }
+/// Two that lie one after the other.
+[[nodiscard]] inline Lanes load2(const double* at) { return Lanes{at[0], at[1]}; }
+inline void store2(Lanes lanes, double* at) {
+  at[0] = lanes[0];
+  at[1] = lanes[1];
+}
 /// Three that lie one after the other, each with its counterpart.
 [[nodiscard]] inline Lanes3 load3(const double* first, const double* second) {
   return {load(first, second), load(first + 1, second + 1), load(first + 2, second + 2)};
