@@ -91,6 +91,14 @@ Eigen::Matrix3d InvariantEstimator<kCapacity>::covariance_of(Rows3 by_states) co
 }
 
 template <Capacity kCapacity>
+template <class Rows>
+Eigen::Matrix3d InvariantEstimator<kCapacity>::covariance_from(int first, const Rows& some) const {
+  Rows3 rows = Rows3::Zero(3, layout().size() - first);
+  rows.leftCols(some.cols()) = some;
+  return covariance_of(rows);
+}
+
+template <Capacity kCapacity>
 double InvariantEstimator<kCapacity>::second_order_rad(const Eigen::Matrix3d& A, const Eigen::Matrix3d& B) {
   // E|a × b|² = tr A tr B − tr AB, over the two axes across a momentum.
   const double square = A.trace() * B.trace() - A.cwiseProduct(B).sum();
@@ -106,14 +114,11 @@ auto InvariantEstimator<kCapacity>::prediction_noise(const Eigen::Matrix3d& C_in
   for (int k = 0; k < layout.gyros; ++k) {
     // This error keeps its sign until the estimates change, so its sigma adds up, not its variance
     // (docs/mathematics.md, section 8).
-    Rows3 rows = Rows3::Zero(3, layout.size());
-    rows.template middleCols<3>(layout.alignment(k)) = C_in_c;
-    const Eigen::Matrix3d alignment = covariance_of(rows);
-    rows.setZero();
-    rows.middleCols(layout.drift(k), layout.drift_size()) =
-        since_fix_[k].by_drift.first(layout.drift_columns()).leftCols(layout.drift_size());
+    const Eigen::Matrix3d alignment = covariance_from(layout.alignment(k), C_in_c);
+    const Eigen::Matrix3d drift = covariance_from(
+        layout.drift(k), since_fix_[k].by_drift.first(layout.drift_columns()).leftCols(layout.drift_size()));
     const double before = second_order_rad_[k];
-    second_order_rad_[k] += second_order_rad(alignment, covariance_of(rows));
+    second_order_rad_[k] += second_order_rad(alignment, drift);
     noise_rad[k] = std::sqrt(walk * walk * time_since_fix_s_ + extra_variance_rad2_ +
                              second_order_rad_[k] * second_order_rad_[k] - before * before);
   }
@@ -250,9 +255,9 @@ PerGyro<double> InvariantEstimator<kCapacity>::reading_noise(const Eigen::Matrix
   // Without a fix between them these errors keep their sign: n readings must not average them away.
   const double in_a_row = std::sqrt(static_cast<double>(n));
   for (int k = 0; k < layout().gyros; ++k) {
+    const Eigen::Matrix3d alignment = covariance_from(layout().alignment(k), -C_linear);
     Rows3 rows = Rows3::Zero(3, layout().size());
     rows.template middleCols<3>(layout().alignment(k)) = -C_linear;
-    const Eigen::Matrix3d alignment = covariance_of(rows);
     rows.template middleCols<3>(layout().direction(k)).setIdentity();
     noise_rad[k] =
         elementary::root_of_squares(noise_rad[k], in_a_row * second_order_rad(alignment, covariance_of(rows)));
@@ -302,7 +307,12 @@ void InvariantEstimator<kCapacity>::put_innovation(White& white) const {
   information_.see_through_uncertainty({through.data(), components, layout().size(), layout().size() + 1});
   const auto H = through.leftCols(layout().size());
   white.covariance = ComponentCovariance::Identity(components, components);
-  white.covariance += H.lazyProduct(H.transpose());
+  for (int i = 0; i < components; ++i) {
+    for (int j = 0; j <= i; ++j) {
+      white.covariance(i, j) += H.row(i).dot(H.row(j));
+      white.covariance(j, i) = white.covariance(i, j);
+    }
+  }
   ComponentCovariance root = white.covariance;
   static_cast<void>(factorize(root));
   FixReport::Innovation y = white.rows.col(layout().size());

@@ -116,7 +116,45 @@ void triangularise(RowsView rows, int columns) {
 
 namespace {
 
-/// solve_rows() of M rows, side by side, two columns at a time.
+/// Of solve_rows(): P columns from j on, of M rows side by side, and what they take off all further columns.
+template <int P, std::size_t M>
+void solve_columns(ConstRowsView root, int j, double* const (&x)[M]) {
+  const double* R[P];
+  for (int p = 0; p < P; ++p) {
+    R[p] = root.row(j + p);
+  }
+  double value[M][P];
+  for (std::size_t i = 0; i < M; ++i) {
+    for (int p = 0; p < P; ++p) {
+      double rest = x[i][j + p];
+      for (int q = 0; q < p; ++q) {
+        rest -= value[i][q] * R[q][j + p];
+      }
+      value[i][p] = x[i][j + p] = rest / R[p][j + p];
+    }
+  }
+  int k = j + P;
+  for (; k + 1 < root.rows; k += 2) {
+    Lanes its[P];
+    for (int p = 0; p < P; ++p) {
+      its[p] = load2(R[p] + k);
+    }
+    for (std::size_t i = 0; i < M; ++i) {
+      Lanes rest = load2(x[i] + k);
+      for (int p = 0; p < P; ++p) {
+        rest -= value[i][p] * its[p];
+      }
+      store2(rest, x[i] + k);
+    }
+  }
+  for (std::size_t i = 0; k < root.rows && i < M; ++i) {
+    for (int p = 0; p < P; ++p) {
+      x[i][k] -= value[i][p] * R[p][k];
+    }
+  }
+}
+
+/// solve_rows() of M rows, side by side, four columns at a time.
 template <std::size_t M>
 void solve_rows_together(ConstRowsView root, RowsView rows) {
   double* x[M];
@@ -128,29 +166,36 @@ void solve_rows_together(ConstRowsView root, RowsView rows) {
   while (j < n && std::all_of(std::begin(x), std::end(x), [&](const double* row) { return row[j] == 0; })) {
     ++j;
   }
-  for (; j + 1 < n; j += 2) {
-    const double* __restrict R = root.row(j);
-    const double* __restrict next_R = root.row(j + 1);
-    double value[M];
-    double next[M];
-    for (std::size_t i = 0; i < M; ++i) {
-      value[i] = x[i][j] /= R[j];
-      next[i] = x[i][j + 1] = (x[i][j + 1] - value[i] * R[j + 1]) / next_R[j + 1];
-    }
-    int k = j + 2;
-    for (; k + 1 < n; k += 2) {
-      const Lanes its = load2(R + k);
-      const Lanes next_its = load2(next_R + k);
-      for (std::size_t i = 0; i < M; ++i) {
-        store2((load2(x[i] + k) - value[i] * its) - next[i] * next_its, x[i] + k);
-      }
-    }
-    for (std::size_t i = 0; k < n && i < M; ++i) {
-      x[i][k] = (x[i][k] - value[i] * R[k]) - next[i] * next_R[k];
-    }
+  for (; j + 3 < n; j += 4) {
+    solve_columns<4>(root, j, x);
   }
-  for (std::size_t i = 0; j < n && i < M; ++i) {
-    x[i][j] /= root(j, j);
+  for (; j + 1 < n; j += 2) {
+    solve_columns<2>(root, j, x);
+  }
+  if (j < n) {
+    solve_columns<1>(root, j, x);
+  }
+}
+
+/// take_off() of so many rows.
+template <int Rows>
+void take_off_rows(const double* factors, std::ptrdiff_t stride, ConstRowsView b, double* rest) {
+  double by[Rows];
+  const double* row[Rows];
+  for (int i = 0; i < Rows; ++i) {
+    by[i] = factors[i * stride];
+    row[i] = b.row(i);
+  }
+  int j = 0;
+  for (; j + 1 < b.columns; j += 2) {
+    Lanes left = load2(rest + j);
+    for (int i = 0; i < Rows; ++i) {
+      left -= by[i] * load2(row[i] + j);
+    }
+    store2(left, rest + j);
+  }
+  for (int i = 0; j < b.columns && i < Rows; ++i) {
+    rest[j] -= by[i] * row[i][j];
   }
 }
 
@@ -188,6 +233,16 @@ void multiply(ConstRowsView a, ConstRowsView b, RowsView product) {
         row[j] += by * its[j];
       }
     }
+  }
+}
+
+void take_off(const double* factors, std::ptrdiff_t stride, ConstRowsView b, double* rest) {
+  int k = 0;
+  for (; k + 2 < b.rows; k += 3) {
+    take_off_rows<3>(factors + k * stride, stride, {b.row(k), 3, b.columns, b.stride}, rest);
+  }
+  for (; k < b.rows; ++k) {
+    take_off_rows<1>(factors + k * stride, stride, {b.row(k), 1, b.columns, b.stride}, rest);
   }
 }
 

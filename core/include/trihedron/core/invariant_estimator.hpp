@@ -182,6 +182,9 @@ class InvariantEstimator {
               const FixReport& report);
   void judge_angles(Correction& correction, const FixReadings& readings, AngleReport& report);
   [[nodiscard]] Eigen::Matrix3d covariance_of(Rows3 by_states) const;
+  /// Of what depends on the states from the `first` on alone, by these columns and no further ones.
+  template <class Rows>
+  [[nodiscard]] Eigen::Matrix3d covariance_from(int first, const Rows& some) const;
   /// The attitude by gyros and fix together, weighted by what is known of both. Needs the covariance at the fix.
   [[nodiscard]] Eigen::Matrix3d fused_attitude(const AttitudeByDirections& by_gyros, const Rot<In, C>& by_fix,
                                                const Eigen::Matrix3d& R_c, const FixReadings& readings) const;
