@@ -85,6 +85,12 @@ Pair the_two(const GyroMask& used) {
   return two;
 }
 
+/// By which two of those used the attitude is found; at least two are.
+[[gnu::always_inline]] inline TwoDirections two_of(const Directions& h_in, const Directions& h_c, const GyroMask& used) {
+  const auto [first, second] = count(used) == 2 ? the_two(used) : best_pair(h_in, used);
+  return {h_in, h_c, first, second};
+}
+
 /// 1 − h hᵀ.
 Eigen::Matrix3d across(const Eigen::Vector3d& h) { return Eigen::Matrix3d::Identity() - h * h.transpose(); }
 
@@ -151,13 +157,17 @@ Result<Rot<In, C>, DirectionsFault> optimal_rotation(const Directions& h_in, con
   if (directions < 2) {
     return DirectionsFault::kTooFew;
   }
-  const auto [first, second] = directions == 2 ? the_two(used) : best_pair(h_in, used);
-  const TwoDirections two(h_in, h_c, first, second);
+  const TwoDirections two = two_of(h_in, h_c, used);
   if (const auto fault = two.fault()) {
     return *fault;
   }
   const Rot<In, C> by_pair = two.rotation();
   return directions > 2 ? refined(by_pair, h_in, h_c, used) : by_pair;
+}
+
+std::optional<DirectionsFault> fault_of_directions(const Directions& h_in, const Directions& h_c,
+                                                   const GyroMask& used) {
+  return count(used) < 2 ? DirectionsFault::kTooFew : two_of(h_in, h_c, used).fault();
 }
 
 Result<AttitudeByDirections, DirectionsFault> optimal_attitude(const Directions& h_in, const Directions& h_c,

@@ -24,13 +24,45 @@ Lanes3 rotated(const Lanes3& u, const Lanes3& v) {
   return u + a * c + b * cross(v, c);
 }
 
-}  // namespace
-
-void precess_two_by_eq1(const PrecessingGyro& a, const PrecessingGyro& b, const Eigen::Matrix3d& C_in_c, double dt_s) {
-  // The reading without its bias.
+/// As GyroReadout::corrected().
+Lanes3 corrected(const PrecessingGyro& a, const PrecessingGyro& b) {
   const Lanes3 read = load3(a.h_b, b.h_b);
   const Lanes3 bias = load3(a.readout_bias, b.readout_bias);
-  const Lanes3 h = read - (bias - dot(read, bias) * read);
+  return read - (bias - dot(read, bias) * read);
+}
+
+/// m times v, m by its columns.
+Lanes3 product(const Lanes3 (&m)[3], const Lanes3& v) {
+  return {m[0].x * v.x + (m[1].x * v.y + m[2].x * v.z), m[0].y * v.x + (m[1].y * v.y + m[2].y * v.z),
+          m[0].z * v.x + (m[1].z * v.y + m[2].z * v.z)};
+}
+
+[[gnu::always_inline]] inline void turn_momenta(const PrecessingGyro& a, const PrecessingGyro& b, const Lanes3& turn) {
+  store3(normalized(rotated(load3(a.h_in, b.h_in), turn)), a.h_in, b.h_in);
+}
+
+}  // namespace
+
+void precess_two(const PrecessingGyro& a, const PrecessingGyro& b, const Eigen::Matrix3d& C_in_c, double dt_s) {
+  const Lanes3 h = corrected(a, b);
+  Esg7::Coefficients<Lanes> kappa;
+  for (int i = 0; i < Esg7::kSize; ++i) {
+    kappa(i) = load(a.kappa + i, b.kappa + i);
+  }
+  const Vector3<Lanes> rate = Esg7::rate<Lanes>({h.x, h.y, h.z}, kappa);
+  Lanes3 alignment[3];
+  Lanes3 attitude[3];
+  for (int j = 0; j < 3; ++j) {
+    alignment[j] = load3(a.C_c_b + 3L * j, b.C_c_b + 3L * j);
+    attitude[j] = {both_lanes(C_in_c(0, j)), both_lanes(C_in_c(1, j)), both_lanes(C_in_c(2, j))};
+  }
+  const Lanes3 omega_in = product(attitude, product(alignment, {0.0 + rate(0), 0.0 + rate(1), 0.0 + rate(2)}));
+  turn_momenta(a, b, both_lanes(dt_s) * omega_in);
+}
+
+void precess_two(const PrecessingGyro& a, const PrecessingGyro& b, const SensitivityOfEq1& since_a,
+                 const SensitivityOfEq1& since_b, const Eigen::Matrix3d& C_in_c, double dt_s) {
+  const Lanes3 h = corrected(a, b);
   // The columns of eq. (1) that are not zero.
   const Lanes sx = h.x * h.x, sy = h.y * h.y, sz = h.z * h.z;
   const Lanes qx = sx * sx, qy = sy * sy, qz = sz * sz;
@@ -57,23 +89,20 @@ void precess_two_by_eq1(const PrecessingGyro& a, const PrecessingGyro& b, const 
   rate.x = rate.x + x_mu12 * kappa(Esg7::kMu12) + x_mu31 * kappa(Esg7::kMu31) + x_nu23 * kappa(Esg7::kNu23);
   rate.y = rate.y + y_mu12 * kappa(Esg7::kMu12) + y_mu23 * kappa(Esg7::kMu23) + y_nu31 * kappa(Esg7::kNu31);
   rate.z = rate.z + z_mu23 * kappa(Esg7::kMu23) + z_mu31 * kappa(Esg7::kMu31) + z_nu12 * kappa(Esg7::kNu12);
-  const auto turned = [&](Lanes x, Lanes y, Lanes z) { return x + (y + z); };
-  const Lanes3 turn{turned(m[0].x * rate.x, m[1].x * rate.y, m[2].x * rate.z),
-                    turned(m[0].y * rate.x, m[1].y * rate.y, m[2].y * rate.z),
-                    turned(m[0].z * rate.x, m[1].z * rate.y, m[2].z * rate.z)};
-  store3(normalized(rotated(load3(a.h_in, b.h_in), turn)), a.h_in, b.h_in);
+  const Lanes3 turn = product(m, rate);
+  turn_momenta(a, b, turn);
 
   for (int j = 0; j < 3; ++j) {
-    const Lanes3 phi = load3(a.by_start + 3L * j, b.by_start + 3L * j);
-    store3(phi + cross(turn, phi), a.by_start + 3L * j, b.by_start + 3L * j);
-    const Lanes3 by_alignment = load3(a.by_alignment + 3L * j, b.by_alignment + 3L * j);
+    const Lanes3 phi = load3(since_a.by_start + 3L * j, since_b.by_start + 3L * j);
+    store3(phi + cross(turn, phi), since_a.by_start + 3L * j, since_b.by_start + 3L * j);
+    const Lanes3 by_alignment = load3(since_a.by_alignment + 3L * j, since_b.by_alignment + 3L * j);
     const Lanes3 C{both_lanes(C_in_c(0, j)), both_lanes(C_in_c(1, j)), both_lanes(C_in_c(2, j))};
-    store3(by_alignment + cross(turn, by_alignment - C), a.by_alignment + 3L * j, b.by_alignment + 3L * j);
+    store3(by_alignment + cross(turn, by_alignment - C), since_a.by_alignment + 3L * j, since_b.by_alignment + 3L * j);
   }
   const auto advance = [&](int column, const Lanes3& added) {
-    double* const x[2] = {a.by_drift.row(0) + column, b.by_drift.row(0) + column};
-    double* const y[2] = {a.by_drift.row(1) + column, b.by_drift.row(1) + column};
-    double* const z[2] = {a.by_drift.row(2) + column, b.by_drift.row(2) + column};
+    double* const x[2] = {since_a.by_drift.row(0) + column, since_b.by_drift.row(0) + column};
+    double* const y[2] = {since_a.by_drift.row(1) + column, since_b.by_drift.row(1) + column};
+    double* const z[2] = {since_a.by_drift.row(2) + column, since_b.by_drift.row(2) + column};
     const Lanes3 phi{load(x[0], x[1]), load(y[0], y[1]), load(z[0], z[1])};
     const Lanes3 next = phi + cross(turn, phi) + added;
     store(next.x, x[0], x[1]);

@@ -82,6 +82,10 @@ class InvariantEstimator {
                                                              const GyroMask& used) const {
     return optimal_rotation(momenta(gyros, layout().gyros), in_c(gyros, layout().gyros, h_b), used);
   }
+  /// Whether there is one.
+  [[nodiscard]] bool gives_attitude(const Gyros& gyros, const Directions& h_b, const GyroMask& used) const {
+    return !fault_of_directions(momenta(gyros, layout().gyros), in_c(gyros, layout().gyros, h_b), used);
+  }
 
   /// Square root of the covariance of all states, or of the first of them, at the last fix. Needs started().
   void error_root(RowsView root) const { information_.inverse_root(root); }

@@ -84,45 +84,63 @@ Eigen::Vector3d precess(GyroModel<Max>& gyro, Sensitivity<Max>& sensitivity, con
   return turn;
 }
 
-/// One of two gyros that are predicted together: its numbers where they lie, 3 × 3 matrices column by column.
+/// What moves the momentum of one of two gyros that are predicted together, and the momentum itself: where the numbers
+/// lie, matrices column by column.
 struct PrecessingGyro {
   double* h_in;
   const double* kappa;  ///< of eq. (1)
   const double* C_c_b;
   const double* readout_bias;
   const double* h_b;
+
+  template <int Max>
+  PrecessingGyro(GyroModel<Max>& gyro, const Eigen::Vector3d& reading)
+      : h_in(gyro.h_in.data()),
+        kappa(gyro.drift_rad_s.data()),
+        C_c_b(gyro.C_c_b.data()),
+        readout_bias(gyro.readout_bias.data()),
+        h_b(reading.data()) {}
+};
+/// Its sensitivities.
+struct SensitivityOfEq1 {
   double* by_start;
   double* by_alignment;
   ColumnsView by_drift;
+
+  template <int Max>
+  explicit SensitivityOfEq1(Sensitivity<Max>& its)
+      : by_start(its.by_start.data()), by_alignment(its.by_alignment.data()), by_drift(its.by_drift.view(Esg7::kSize)) {}
 };
 
-/// The last precess() for two gyros side by side whose drift is eq. (1) alone: the same bits in half the instructions.
-void precess_two_by_eq1(const PrecessingGyro& a, const PrecessingGyro& b, const Eigen::Matrix3d& C_in_c, double dt_s);
+/// precess() of two gyros side by side whose drift is eq. (1) alone, without and with sensitivities: the same bits in
+/// half the instructions.
+void precess_two(const PrecessingGyro& a, const PrecessingGyro& b, const Eigen::Matrix3d& C_in_c, double dt_s);
+void precess_two(const PrecessingGyro& a, const PrecessingGyro& b, const SensitivityOfEq1& since_a,
+                 const SensitivityOfEq1& since_b, const Eigen::Matrix3d& C_in_c, double dt_s);
 
-/// The last precess() for the first `count` of the gyros, with their readings.
-template <class Gyros, class Sensitivities>
-void precess_all(Gyros& gyros, Sensitivities& sensitivities, int count, const DriftModel& drift,
-                 const Eigen::Matrix3d& C_in_c, const Directions& h_b, double part_of_change, double dt_s) {
+/// precess() of the first `count` gyros.
+template <class Gyros>
+void precess_all(Gyros& gyros, int count, const DriftModel& drift, const Eigen::Matrix3d& C_in_c,
+                 const Directions& h_b, double part_of_change, double dt_s) {
   int k = 0;
-  if (drift.columns() == Esg7::kSize) {
-    const auto its = [&](int i) {
-      auto& gyro = gyros[i];
-      auto& since = sensitivities[i];
-      return PrecessingGyro{gyro.h_in.data(),
-                            gyro.drift_rad_s.data(),
-                            gyro.C_c_b.data(),
-                            gyro.readout_bias.data(),
-                            h_b[i].data(),
-                            since.by_start.data(),
-                            since.by_alignment.data(),
-                            since.by_drift.view(Esg7::kSize)};
-    };
-    for (; k + 1 < count; k += 2) {
-      precess_two_by_eq1(its(k), its(k + 1), C_in_c, dt_s);
-    }
+  for (; drift.columns() == Esg7::kSize && k + 1 < count; k += 2) {
+    precess_two({gyros[k], h_b[k]}, {gyros[k + 1], h_b[k + 1]}, C_in_c, dt_s);
   }
   for (; k < count; ++k) {
-    precess(gyros[k], sensitivities[k], drift, C_in_c, h_b[k], part_of_change, dt_s);
+    precess(gyros[k], drift, C_in_c, h_b[k], part_of_change, dt_s);
+  }
+}
+/// The same with their sensitivities.
+template <class Gyros, class Sensitivities>
+void precess_all(Gyros& gyros, Sensitivities& since, int count, const DriftModel& drift, const Eigen::Matrix3d& C_in_c,
+                 const Directions& h_b, double part_of_change, double dt_s) {
+  int k = 0;
+  for (; drift.columns() == Esg7::kSize && k + 1 < count; k += 2) {
+    precess_two({gyros[k], h_b[k]}, {gyros[k + 1], h_b[k + 1]}, SensitivityOfEq1(since[k]),
+                SensitivityOfEq1(since[k + 1]), C_in_c, dt_s);
+  }
+  for (; k < count; ++k) {
+    precess(gyros[k], since[k], drift, C_in_c, h_b[k], part_of_change, dt_s);
   }
 }
 
