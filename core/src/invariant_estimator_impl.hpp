@@ -474,7 +474,7 @@ void InvariantEstimator<kCapacity>::ask_gate(const FixComparison& comparison, co
 
 template <Capacity kCapacity>
 int InvariantEstimator<kCapacity>::cost(const Correction& correction) {
-  constexpr std::array<int, 10> kCosts = {25, 120, 185, 85, 150, 140, 420, 300, 190, 0};
+  constexpr std::array<int, 10> kCosts = {10, 50, 120, 80, 95, 130, 350, 250, 195, 0};
   return kCosts[static_cast<std::size_t>(correction.stage)];
 }
 

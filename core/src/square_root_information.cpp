@@ -117,38 +117,41 @@ void triangularise(RowsView rows, int columns) {
 namespace {
 
 /// Of solve_rows(): P columns from j on, of M rows side by side, and what they take off all further columns.
-template <int P, std::size_t M>
-void solve_columns(ConstRowsView root, int j, double* const (&x)[M]) {
+template <std::size_t P, std::size_t M>
+void solve_columns(ConstRowsView root, int j, double* const (&rows)[M]) {
   const double* R[P];
-  for (int p = 0; p < P; ++p) {
-    R[p] = root.row(j + p);
+  for (std::size_t p = 0; p < P; ++p) {
+    R[p] = root.row(j + static_cast<int>(p)) + j;
   }
+  double* x[M];
   double value[M][P];
   for (std::size_t i = 0; i < M; ++i) {
-    for (int p = 0; p < P; ++p) {
-      double rest = x[i][j + p];
-      for (int q = 0; q < p; ++q) {
-        rest -= value[i][q] * R[q][j + p];
+    x[i] = rows[i] + j;
+    for (std::size_t p = 0; p < P; ++p) {
+      double rest = x[i][p];
+      for (std::size_t q = 0; q < p; ++q) {
+        rest -= value[i][q] * R[q][p];
       }
-      value[i][p] = x[i][j + p] = rest / R[p][j + p];
+      value[i][p] = x[i][p] = rest / R[p][p];
     }
   }
-  int k = j + P;
-  for (; k + 1 < root.rows; k += 2) {
+  const int columns = root.rows - j;
+  int k = P;
+  for (; k + 1 < columns; k += 2) {
     Lanes its[P];
-    for (int p = 0; p < P; ++p) {
+    for (std::size_t p = 0; p < P; ++p) {
       its[p] = load2(R[p] + k);
     }
     for (std::size_t i = 0; i < M; ++i) {
       Lanes rest = load2(x[i] + k);
-      for (int p = 0; p < P; ++p) {
+      for (std::size_t p = 0; p < P; ++p) {
         rest -= value[i][p] * its[p];
       }
       store2(rest, x[i] + k);
     }
   }
-  for (std::size_t i = 0; k < root.rows && i < M; ++i) {
-    for (int p = 0; p < P; ++p) {
+  for (std::size_t i = 0; k < columns && i < M; ++i) {
+    for (std::size_t p = 0; p < P; ++p) {
       x[i][k] -= value[i][p] * R[p][k];
     }
   }
@@ -178,23 +181,24 @@ void solve_rows_together(ConstRowsView root, RowsView rows) {
 }
 
 /// take_off() of so many rows.
-template <int Rows>
+template <std::size_t Rows>
 void take_off_rows(const double* factors, std::ptrdiff_t stride, ConstRowsView b, double* rest) {
   double by[Rows];
   const double* row[Rows];
-  for (int i = 0; i < Rows; ++i) {
-    by[i] = factors[i * stride];
-    row[i] = b.row(i);
+  for (std::size_t i = 0; i < Rows; ++i) {
+    const int its = static_cast<int>(i);
+    by[i] = factors[its * stride];
+    row[i] = b.row(its);
   }
   int j = 0;
   for (; j + 1 < b.columns; j += 2) {
     Lanes left = load2(rest + j);
-    for (int i = 0; i < Rows; ++i) {
+    for (std::size_t i = 0; i < Rows; ++i) {
       left -= by[i] * load2(row[i] + j);
     }
     store2(left, rest + j);
   }
-  for (int i = 0; j < b.columns && i < Rows; ++i) {
+  for (std::size_t i = 0; j < b.columns && i < Rows; ++i) {
     rest[j] -= by[i] * row[i][j];
   }
 }
