@@ -474,7 +474,7 @@ void InvariantEstimator<kCapacity>::ask_gate(const FixComparison& comparison, co
 
 template <Capacity kCapacity>
 int InvariantEstimator<kCapacity>::cost(const Correction& correction) {
-  constexpr std::array<int, 10> kCosts = {10, 50, 120, 80, 95, 130, 350, 250, 195, 0};
+  constexpr std::array<int, 10> kCosts = {25, 120, 185, 85, 150, 140, 420, 300, 190, 0};
   return kCosts[static_cast<std::size_t>(correction.stage)];
 }
 
@@ -654,8 +654,7 @@ template <Capacity kCapacity>
 void InvariantEstimator<kCapacity>::look_for_fault(Correction& correction, const Seen& its, const FixReadings& readings,
                                                    FixReport& report) const {
   FixComparison comparison = compared(its, correction, readings);
-  report.odd_gyro =
-      gyro_at_fault(comparison, rotation_now(readings), readings, its.R_c, correction.reading_noise_rad);
+  report.odd_gyro = gyro_at_fault(comparison, rotation_now(readings), readings, its.R_c, correction.reading_noise_rad);
   use_all_the_same(correction, report);
 }
 
@@ -693,8 +692,7 @@ void InvariantEstimator<kCapacity>::take_angles(Correction& correction, const Fi
       correction.stage = Stage::kNoise;
       break;
     case Stage::kNoise:
-      correction.reading_noise_rad =
-          reading_noise(rotation_now(readings), readings.noise_factor, ++angles_since_fix_);
+      correction.reading_noise_rad = reading_noise(rotation_now(readings), readings.noise_factor, ++angles_since_fix_);
       correction.stage = Stage::kJudgement;
       break;
     case Stage::kJudgement:

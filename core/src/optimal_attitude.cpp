@@ -86,7 +86,8 @@ Pair the_two(const GyroMask& used) {
 }
 
 /// By which two of those used the attitude is found; at least two are.
-[[gnu::always_inline]] inline TwoDirections two_of(const Directions& h_in, const Directions& h_c, const GyroMask& used) {
+[[gnu::always_inline]] inline TwoDirections two_of(const Directions& h_in, const Directions& h_c,
+                                                   const GyroMask& used) {
   const auto [first, second] = count(used) == 2 ? the_two(used) : best_pair(h_in, used);
   return {h_in, h_c, first, second};
 }

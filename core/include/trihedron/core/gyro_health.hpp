@@ -89,8 +89,8 @@ class GyroHealth {
   [[nodiscard]] GyroMask usable_at(Time a, Time b) const {
     GyroMask mask;
     for (int k = 0; k < gyros_; ++k) {
-      mask[k] = selected_[k] && !isolated_[k] && !readings_[k].is_stuck_within(a, a) &&
-                !readings_[k].is_stuck_within(b, b);
+      mask[k] =
+          selected_[k] && !isolated_[k] && !readings_[k].is_stuck_within(a, a) && !readings_[k].is_stuck_within(b, b);
     }
     return mask;
   }

@@ -1,6 +1,6 @@
 #pragma once
-/// Two doubles side by side, such as the same component of two gyros: where the processor has instructions for that, one
-/// works on both. Each is rounded as a double alone, so that the bits are those of two scalars.
+/// Two doubles side by side, such as the same component of two gyros: where the processor has instructions for that,
+/// one works on both. Each is rounded as a double alone, so that the bits are those of two scalars.
 
 #include <cmath>
 

@@ -57,8 +57,7 @@ class OnBoard {
   void select(const GyroMask& gyros) { intake_.health().select(gyros); }
   /// Whether these gyros give an attitude by the readings of the latest sample.
   [[nodiscard]] bool can_see_with(const GyroMask& gyros) const {
-    return readings_.size() > 0 &&
-           estimator_.gives_attitude(estimator_.gyros(), readings_.latest_directions(), gyros);
+    return readings_.size() > 0 && estimator_.gives_attitude(estimator_.gyros(), readings_.latest_directions(), gyros);
   }
   /// How errors at its beginning have changed the directions at its end, over the stretches between all fixes that have
   /// been dealt with since begin_stretch().
@@ -137,12 +136,12 @@ class OnBoard {
   };
   /// What takes how long, about, in 100 instructions on two gyros with eq. (1).
   struct Cost {
-    static constexpr int kSample = 19;
-    static constexpr int kBeginning = 115;
-    static constexpr int kCalibrated = 80;
-    static constexpr int kNavigatedSample = 11;
-    static constexpr int kTakingOver = 200;
-    static constexpr int kNavigated = 145;
+    static constexpr int kSample = 32;
+    static constexpr int kBeginning = 170;
+    static constexpr int kCalibrated = 90;
+    static constexpr int kNavigatedSample = 16;
+    static constexpr int kTakingOver = 250;
+    static constexpr int kNavigated = 135;
     static constexpr int kReport = 215;  ///< what is made of the report, such as a forecast
   };
   /// Fixes that have become due wait for the one that is dealt with: with one of them, its work has so many samples

@@ -109,7 +109,9 @@ struct SensitivityOfEq1 {
 
   template <int Max>
   explicit SensitivityOfEq1(Sensitivity<Max>& its)
-      : by_start(its.by_start.data()), by_alignment(its.by_alignment.data()), by_drift(its.by_drift.view(Esg7::kSize)) {}
+      : by_start(its.by_start.data()),
+        by_alignment(its.by_alignment.data()),
+        by_drift(its.by_drift.view(Esg7::kSize)) {}
 };
 
 /// precess() of two gyros side by side whose drift is eq. (1) alone, without and with sensitivities: the same bits in
@@ -120,8 +122,8 @@ void precess_two(const PrecessingGyro& a, const PrecessingGyro& b, const Sensiti
 
 /// precess() of the first `count` gyros.
 template <class Gyros>
-void precess_all(Gyros& gyros, int count, const DriftModel& drift, const Eigen::Matrix3d& C_in_c,
-                 const Directions& h_b, double part_of_change, double dt_s) {
+void precess_all(Gyros& gyros, int count, const DriftModel& drift, const Eigen::Matrix3d& C_in_c, const Directions& h_b,
+                 double part_of_change, double dt_s) {
   int k = 0;
   for (; drift.columns() == Esg7::kSize && k + 1 < count; k += 2) {
     precess_two({gyros[k], h_b[k]}, {gyros[k + 1], h_b[k + 1]}, C_in_c, dt_s);
