@@ -16,8 +16,7 @@ namespace {
 template <std::size_t M>
 void reflect(double* __restrict r, double* const (&rows)[M], const double (&v)[M], double v0, double beta,
              int columns) {
-  int k = 1;
-  for (; k + 1 < columns; k += 2) {
+  for (int k = 1; k + 1 < columns; k += 2) {
     const Lanes its = load2(r + k);
     Lanes below[M];
     Lanes s = v0 * its;
@@ -31,15 +30,16 @@ void reflect(double* __restrict r, double* const (&rows)[M], const double (&v)[M
       store2(below[i] - v[i] * s, rows[i] + k);
     }
   }
-  if (k < columns) {
-    double s = v0 * r[k];
+  if (columns % 2 == 0) {
+    const int last = columns - 1;
+    double s = v0 * r[last];
     for (std::size_t i = 0; i < M; ++i) {
-      s += v[i] * rows[i][k];
+      s += v[i] * rows[i][last];
     }
     s *= beta;
-    r[k] -= v0 * s;
+    r[last] -= v0 * s;
     for (std::size_t i = 0; i < M; ++i) {
-      rows[i][k] -= v[i] * s;
+      rows[i][last] -= v[i] * s;
     }
   }
 }
@@ -136,8 +136,7 @@ void solve_columns(ConstRowsView root, int j, double* const (&rows)[M]) {
     }
   }
   const int columns = root.rows - j;
-  int k = P;
-  for (; k + 1 < columns; k += 2) {
+  for (int k = P; k + 1 < columns; k += 2) {
     Lanes its[P];
     for (std::size_t p = 0; p < P; ++p) {
       its[p] = load2(R[p] + k);
@@ -150,9 +149,10 @@ void solve_columns(ConstRowsView root, int j, double* const (&rows)[M]) {
       store2(rest, x[i] + k);
     }
   }
-  for (std::size_t i = 0; k < columns && i < M; ++i) {
+  const int last = columns - 1;
+  for (std::size_t i = 0; (columns - static_cast<int>(P)) % 2 != 0 && i < M; ++i) {
     for (std::size_t p = 0; p < P; ++p) {
-      x[i][k] -= value[i][p] * R[p][k];
+      x[i][last] -= value[i][p] * R[p][last];
     }
   }
 }
@@ -169,14 +169,15 @@ void solve_rows_together(ConstRowsView root, RowsView rows) {
   while (j < n && std::all_of(std::begin(x), std::end(x), [&](const double* row) { return row[j] == 0; })) {
     ++j;
   }
+  const int rest = (n - j) % 4;
   for (; j + 3 < n; j += 4) {
     solve_columns<4>(root, j, x);
   }
-  for (; j + 1 < n; j += 2) {
+  if (rest >= 2) {
     solve_columns<2>(root, j, x);
   }
-  if (j < n) {
-    solve_columns<1>(root, j, x);
+  if (rest % 2 != 0) {
+    solve_columns<1>(root, n - 1, x);
   }
 }
 
@@ -190,16 +191,16 @@ void take_off_rows(const double* factors, std::ptrdiff_t stride, ConstRowsView b
     by[i] = factors[its * stride];
     row[i] = b.row(its);
   }
-  int j = 0;
-  for (; j + 1 < b.columns; j += 2) {
+  for (int j = 0; j + 1 < b.columns; j += 2) {
     Lanes left = load2(rest + j);
     for (std::size_t i = 0; i < Rows; ++i) {
       left -= by[i] * load2(row[i] + j);
     }
     store2(left, rest + j);
   }
-  for (std::size_t i = 0; j < b.columns && i < Rows; ++i) {
-    rest[j] -= by[i] * row[i][j];
+  const int last = b.columns - 1;
+  for (std::size_t i = 0; b.columns % 2 != 0 && i < Rows; ++i) {
+    rest[last] -= by[i] * row[i][last];
   }
 }
 
@@ -241,11 +242,11 @@ void multiply(ConstRowsView a, ConstRowsView b, RowsView product) {
 }
 
 void take_off(const double* factors, std::ptrdiff_t stride, ConstRowsView b, double* rest) {
-  int k = 0;
-  for (; k + 2 < b.rows; k += 3) {
+  const int together = b.rows - b.rows % 3;
+  for (int k = 0; k < together; k += 3) {
     take_off_rows<3>(factors + k * stride, stride, {b.row(k), 3, b.columns, b.stride}, rest);
   }
-  for (; k < b.rows; ++k) {
+  for (int k = together; k < b.rows; ++k) {
     take_off_rows<1>(factors + k * stride, stride, {b.row(k), 1, b.columns, b.stride}, rest);
   }
 }

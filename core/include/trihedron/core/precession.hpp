@@ -124,11 +124,11 @@ void precess_two(const PrecessingGyro& a, const PrecessingGyro& b, const Sensiti
 template <class Gyros>
 void precess_all(Gyros& gyros, int count, const DriftModel& drift, const Eigen::Matrix3d& C_in_c, const Directions& h_b,
                  double part_of_change, double dt_s) {
-  int k = 0;
-  for (; drift.columns() == Esg7::kSize && k + 1 < count; k += 2) {
+  const int in_pairs = drift.columns() == Esg7::kSize ? count - count % 2 : 0;
+  for (int k = 0; k < in_pairs; k += 2) {
     precess_two({gyros[k], h_b[k]}, {gyros[k + 1], h_b[k + 1]}, C_in_c, dt_s);
   }
-  for (; k < count; ++k) {
+  for (int k = in_pairs; k < count; ++k) {
     precess(gyros[k], drift, C_in_c, h_b[k], part_of_change, dt_s);
   }
 }
@@ -136,12 +136,12 @@ void precess_all(Gyros& gyros, int count, const DriftModel& drift, const Eigen::
 template <class Gyros, class Sensitivities>
 void precess_all(Gyros& gyros, Sensitivities& since, int count, const DriftModel& drift, const Eigen::Matrix3d& C_in_c,
                  const Directions& h_b, double part_of_change, double dt_s) {
-  int k = 0;
-  for (; drift.columns() == Esg7::kSize && k + 1 < count; k += 2) {
+  const int in_pairs = drift.columns() == Esg7::kSize ? count - count % 2 : 0;
+  for (int k = 0; k < in_pairs; k += 2) {
     precess_two({gyros[k], h_b[k]}, {gyros[k + 1], h_b[k + 1]}, SensitivityOfEq1(since[k]),
                 SensitivityOfEq1(since[k + 1]), C_in_c, dt_s);
   }
-  for (; k < count; ++k) {
+  for (int k = in_pairs; k < count; ++k) {
     precess(gyros[k], since[k], drift, C_in_c, h_b[k], part_of_change, dt_s);
   }
 }
