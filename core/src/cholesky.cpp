@@ -2,6 +2,8 @@
 
 #include <cmath>
 
+#include "trihedron/core/square_root_information.hpp"
+
 namespace trihedron {
 namespace {
 
@@ -70,14 +72,8 @@ void solve_factorized(const MatrixView& L, Eigen::Ref<Eigen::MatrixXd> b) {
 
 void solve_lower(const MatrixView& L, RowsView b) {
   for (int i = 0; i < b.rows; ++i) {
-    double* __restrict row = b.row(i);
-    for (int j = 0; j < i; ++j) {
-      const double by = L(i, j);
-      const double* __restrict above = b.row(j);
-      for (int k = 0; k < b.columns; ++k) {
-        row[k] -= by * above[k];
-      }
-    }
+    double* row = b.row(i);
+    take_off(L.data() + i, L.outerStride(), {b.data, i, b.columns, b.stride}, row);
     const double by = 1 / L(i, i);
     for (int k = 0; k < b.columns; ++k) {
       row[k] *= by;

@@ -46,7 +46,7 @@ void DirectionsFit::add(Time t, const Directions& h_b) {
 FittedDirections DirectionsFit::solve() const {
   const Eigen::Matrix<double, kTerms, kTerms> L = cholesky_root<kTerms>(normal_);
   Right coefficients = right_;
-  solve_factorized(matrix_of(L), coefficients);
+  solve_factorized(matrix_of(L), coefficients.leftCols(3L * gyros_));
   FittedDirections result;
   result.freedom = 2 * (samples_ - terms_);
   for (int k = 0; k < gyros_; ++k) {

@@ -102,9 +102,8 @@ void Intake::set_clock(Time t) {
 }
 
 GyroMask Intake::used_over(Time from, Time to) const {
-  const GyroMask at_end = health_.usable(to, to);
-  const GyroMask at_both = both(health_.usable(from, from), at_end);
-  return count(at_both) >= 2 ? at_both : at_end;
+  const GyroMask at_both = health_.usable_at(from, to);
+  return count(at_both) >= 2 ? at_both : health_.usable(to, to);
 }
 
 }  // namespace trihedron

@@ -91,6 +91,14 @@ Eigen::Matrix3d InvariantEstimator<kCapacity>::covariance_of(Rows3 by_states) co
 }
 
 template <Capacity kCapacity>
+template <class Rows>
+Eigen::Matrix3d InvariantEstimator<kCapacity>::covariance_from(int first, const Rows& some) const {
+  Rows3 rows = Rows3::Zero(3, layout().size() - first);
+  rows.leftCols(some.cols()) = some;
+  return covariance_of(rows);
+}
+
+template <Capacity kCapacity>
 double InvariantEstimator<kCapacity>::second_order_rad(const Eigen::Matrix3d& A, const Eigen::Matrix3d& B) {
   // E|a × b|² = tr A tr B − tr AB, over the two axes across a momentum.
   const double square = A.trace() * B.trace() - A.cwiseProduct(B).sum();
@@ -106,14 +114,11 @@ auto InvariantEstimator<kCapacity>::prediction_noise(const Eigen::Matrix3d& C_in
   for (int k = 0; k < layout.gyros; ++k) {
     // This error keeps its sign until the estimates change, so its sigma adds up, not its variance
     // (docs/mathematics.md, section 8).
-    Rows3 rows = Rows3::Zero(3, layout.size());
-    rows.template middleCols<3>(layout.alignment(k)) = C_in_c;
-    const Eigen::Matrix3d alignment = covariance_of(rows);
-    rows.setZero();
-    rows.middleCols(layout.drift(k), layout.drift_size()) =
-        since_fix_[k].by_drift.first(layout.drift_columns()).leftCols(layout.drift_size());
+    const Eigen::Matrix3d alignment = covariance_from(layout.alignment(k), C_in_c);
+    const Eigen::Matrix3d drift = covariance_from(
+        layout.drift(k), since_fix_[k].by_drift.first(layout.drift_columns()).leftCols(layout.drift_size()));
     const double before = second_order_rad_[k];
-    second_order_rad_[k] += second_order_rad(alignment, covariance_of(rows));
+    second_order_rad_[k] += second_order_rad(alignment, drift);
     noise_rad[k] = std::sqrt(walk * walk * time_since_fix_s_ + extra_variance_rad2_ +
                              second_order_rad_[k] * second_order_rad_[k] - before * before);
   }
@@ -155,8 +160,8 @@ void InvariantEstimator<kCapacity>::propagate(const PerGyro<double, kCapacity.gy
 }
 
 template <Capacity kCapacity>
-void InvariantEstimator<kCapacity>::start(const Eigen::Matrix3d& C_in_c, const FixReadings& readings,
-                                          const Eigen::Matrix3d& R_c, const FixBySharedStates& by_shared) {
+void InvariantEstimator<kCapacity>::start(const Seen& its, const FixReadings& readings) {
+  const Eigen::Matrix3d& C_in_c = its.C_in_c.raw();
   // φ_k = C (δ_k − e) + readout: the momentum is read through the alignment at the fix, whose error e is common.
   constexpr int kMaxRows = 3 * kCapacity.gyros;
   const Layout& layout = setup_.layout;
@@ -164,7 +169,7 @@ void InvariantEstimator<kCapacity>::start(const Eigen::Matrix3d& C_in_c, const F
   Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor, kMaxRows, kMaxStates> H(rows, layout.size());
   Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, kMaxRows, kMaxRows> R(rows, rows);
   H.setZero();
-  const Eigen::Matrix3d R_in = C_in_c * R_c * C_in_c.transpose();
+  const Eigen::Matrix3d R_in = C_in_c * its.R_c * C_in_c.transpose();
   for (int k = 0; k < layout.gyros; ++k) {
     const int row = 3 * k;
     if (readings.used[k]) {
@@ -174,7 +179,7 @@ void InvariantEstimator<kCapacity>::start(const Eigen::Matrix3d& C_in_c, const F
     H.template block<3, 3>(row, layout.alignment(k)) = -C_in_c;
     H.block(row, layout.readout(k), 3, layout.readout_size()) =
         by_readout_errors(layout, C_in_c * skew<double>(gyros_[k].in_c(readings.h_b[k])), gyros_[k], readings.h_b[k]);
-    H.block(row, layout.shared(), 3, layout.shared_size()) = C_in_c.lazyProduct(by_shared);
+    H.block(row, layout.shared(), 3, layout.shared_size()) = C_in_c.lazyProduct(its.by_shared);
     for (int j = 0; j < layout.gyros; ++j) {
       R.template block<3, 3>(row, 3 * j) = R_in;
     }
@@ -216,22 +221,20 @@ bool InvariantEstimator<kCapacity>::prior_allows_estimates() const {
 template <Capacity kCapacity>
 void InvariantEstimator<kCapacity>::predict(const Eigen::Matrix3d& C_in_c, const Directions& h_b, Time t, double dt_s) {
   const double part = setup_.part_of_change(t - from_seconds(dt_s / 2));
-  for (int k = 0; k < layout().gyros; ++k) {
-    precess(gyros_[k], since_fix_[k], drift_, C_in_c, h_b[k], part, dt_s);
-  }
+  precess_all(gyros_, since_fix_, layout().gyros, drift_, C_in_c, h_b, part, dt_s);
   time_since_fix_s_ += dt_s;
   gate_.elapse(dt_s);
 }
 
 template <Capacity kCapacity>
-Eigen::Matrix3d InvariantEstimator<kCapacity>::fused_attitude(const AttitudeByDirections& by_gyros,
-                                                              const Rot<In, C>& by_fix, const Eigen::Matrix3d& R_c,
-                                                              const FixReadings& readings) const {
+Eigen::Matrix3d InvariantEstimator<kCapacity>::fused_attitude(const AttitudeByDirections& by_gyros, const Seen& its,
+                                                              const StarFix& fix, const FixReadings& readings) const {
   const Eigen::Matrix3d spread =
       covariance_of(attitude_by_states_now<kMaxStates>(layout(), by_gyros, gyros_, readings.h_b));
   const Eigen::Matrix3d P =
       with_covariance(by_gyros, spread, readout_noise(readings.noise_factor), layout().gyros, 0).covariance_rad2;
-  Eigen::Vector3d weighted = (by_gyros.C_in_c.inverse() * by_fix).log().raw();
+  Eigen::Vector3d weighted = (by_gyros.C_in_c.inverse() * its.C_in_c).log().raw();
+  const Eigen::Matrix3d R_c = its.R_c + misalignment_of(fix, readings);
   solve_factorized(matrix_of(cholesky_root<3>(P + R_c)), weighted);
   return (by_gyros.C_in_c * Rot<C, C>::exp(Vec<C>::assume(P * weighted))).raw();
 }
@@ -252,9 +255,9 @@ PerGyro<double> InvariantEstimator<kCapacity>::reading_noise(const Eigen::Matrix
   // Without a fix between them these errors keep their sign: n readings must not average them away.
   const double in_a_row = std::sqrt(static_cast<double>(n));
   for (int k = 0; k < layout().gyros; ++k) {
+    const Eigen::Matrix3d alignment = covariance_from(layout().alignment(k), -C_linear);
     Rows3 rows = Rows3::Zero(3, layout().size());
     rows.template middleCols<3>(layout().alignment(k)) = -C_linear;
-    const Eigen::Matrix3d alignment = covariance_of(rows);
     rows.template middleCols<3>(layout().direction(k)).setIdentity();
     noise_rad[k] =
         elementary::root_of_squares(noise_rad[k], in_a_row * second_order_rad(alignment, covariance_of(rows)));
@@ -274,8 +277,7 @@ PerGyro<double> InvariantEstimator<kCapacity>::fix_reading_noise(const Eigen::Ma
 }
 
 template <Capacity kCapacity>
-void InvariantEstimator<kCapacity>::restart(const Eigen::Matrix3d& C_in_c, const FixReadings& readings,
-                                            const Eigen::Matrix3d& R_c, const FixBySharedStates& by_shared) {
+void InvariantEstimator<kCapacity>::restart(const Seen& its, const FixReadings& readings) {
   // The information was gathered about estimates that are far off: restart from the present ones, and where that is no
   // better, from the prior.
   restarted_from_estimates_ = !restarted_from_estimates_ && prior_allows_estimates();
@@ -283,17 +285,16 @@ void InvariantEstimator<kCapacity>::restart(const Eigen::Matrix3d& C_in_c, const
     gyros_ = prior_gyros_;
     shared_.setZero();
   }
-  start(C_in_c, readings, R_c, by_shared);
+  start(its, readings);
 }
 
 template <Capacity kCapacity>
-Eigen::Matrix3d InvariantEstimator<kCapacity>::misalignment_of(const StarFix& fix,
-                                                               const FixBySharedStates& by_shared) const {
+Eigen::Matrix3d InvariantEstimator<kCapacity>::misalignment_of(const StarFix& fix, const FixReadings& readings) const {
   if (fix.head == 0) {
     return Eigen::Matrix3d::Zero();  // its axes are c
   }
   Rows3 rows = Rows3::Zero(3, layout().size());
-  rows.rightCols(layout().shared_size()) = by_shared;
+  rows.rightCols(layout().shared_size()) = fix_by_shared_states(setup_, fix, readings.rate_c);
   return covariance_of(rows);
 }
 
@@ -304,7 +305,12 @@ void InvariantEstimator<kCapacity>::put_innovation(White& white) const {
   information_.see_through_uncertainty({through.data(), components, layout().size(), layout().size() + 1});
   const auto H = through.leftCols(layout().size());
   white.covariance = ComponentCovariance::Identity(components, components);
-  white.covariance += H.lazyProduct(H.transpose());
+  for (int i = 0; i < components; ++i) {
+    for (int j = 0; j <= i; ++j) {
+      white.covariance(i, j) += H.row(i).dot(H.row(j));
+      white.covariance(j, i) = white.covariance(i, j);
+    }
+  }
   ComponentCovariance root = white.covariance;
   static_cast<void>(factorize(root));
   FixReport::Innovation y = white.rows.col(layout().size());
@@ -542,14 +548,13 @@ template <Capacity kCapacity>
 void InvariantEstimator<kCapacity>::take(Correction& correction, const StarFix& fix, const FixReadings& readings,
                                          FixReport& report) {
   using Stage = typename Correction::Stage;
-  const Seen its = seen(fix, readings);
   switch (correction.stage) {
     case Stage::kBegin:
-      begin(correction, its, fix, readings, report);
+      begin(correction, fix, readings, report);
       break;
     case Stage::kSecondOrder:
       correction.prediction_noise_rad =
-          prediction_noise(correction.reopened ? correction.C_linear : attitude_now(readings).C_in_c.raw());
+          prediction_noise(correction.reopened ? correction.C_linear : rotation_now(readings));
       correction.stage = Stage::kPropagation;
       break;
     case Stage::kPropagation:
@@ -557,28 +562,27 @@ void InvariantEstimator<kCapacity>::take(Correction& correction, const StarFix& 
       correction.stage = correction.reopened ? Stage::kUpdate : Stage::kAttitude;
       break;
     case Stage::kAttitude:
-      correction.C_linear =
-          fused_attitude(attitude_now(readings), its.C_in_c, its.R_c + misalignment_of(fix, its.by_shared), readings);
+      correction.C_linear = fused_attitude(attitude_now(readings), seen(fix, readings), fix, readings);
       correction.stage = Stage::kNoise;
       break;
     case Stage::kNoise:
       correction.reading_noise_rad =
-          fix_reading_noise(correction.C_linear, readings.noise_factor, misalignment_of(fix, its.by_shared));
+          fix_reading_noise(correction.C_linear, readings.noise_factor, misalignment_of(fix, readings));
       correction.stage = Stage::kJudgement;
       break;
     case Stage::kJudgement:
-      judge(correction, its, readings, report);
+      judge(correction, seen(fix, readings), readings, report);
       break;
     case Stage::kFault:
-      look_for_fault(correction, its, readings, report);
+      look_for_fault(correction, seen(fix, readings), readings, report);
       break;
     case Stage::kRestart:
-      restart(its.C_in_c.raw(), readings, its.R_c, its.by_shared);
+      restart(seen(fix, readings), readings);
       report.weight = 1;
       correction.stage = Stage::kDone;
       break;
     case Stage::kUpdate:
-      update(correction, its, fix, readings, report);
+      update(correction, seen(fix, readings), fix, readings, report);
       break;
     default:
       correction.stage = Stage::kDone;
@@ -587,18 +591,18 @@ void InvariantEstimator<kCapacity>::take(Correction& correction, const StarFix& 
 }
 
 template <Capacity kCapacity>
-void InvariantEstimator<kCapacity>::begin(Correction& correction, const Seen& its, const StarFix& fix,
-                                          const FixReadings& readings, FixReport& report) {
+void InvariantEstimator<kCapacity>::begin(Correction& correction, const StarFix& fix, const FixReadings& readings,
+                                          FixReport& report) {
   report.t = fix.t;
   report.head = fix.head;
   correction.stage = Correction::Stage::kDone;
   if (!started_) {
-    start(its.C_in_c.raw(), readings, its.R_c, its.by_shared);
-    started_ = attitude(gyros_, readings.h_b, all_gyros(layout().gyros)).ok();
+    start(seen(fix, readings), readings);
+    started_ = gives_attitude(gyros_, readings.h_b, all_gyros(layout().gyros));
     used_fix_t_ = {};
     used_fix_t_[static_cast<std::size_t>(fix.head)] = fix.t;
     report.status = started_ ? FixStatus::kStarted : FixStatus::kRejectedGeometry;
-  } else if (!attitude(gyros_, readings.h_b, readings.used)) {
+  } else if (!gives_attitude(gyros_, readings.h_b, readings.used)) {
     report.status = FixStatus::kRejectedGeometry;
   } else {
     correction.stage = Correction::Stage::kSecondOrder;
@@ -650,8 +654,7 @@ template <Capacity kCapacity>
 void InvariantEstimator<kCapacity>::look_for_fault(Correction& correction, const Seen& its, const FixReadings& readings,
                                                    FixReport& report) const {
   FixComparison comparison = compared(its, correction, readings);
-  report.odd_gyro =
-      gyro_at_fault(comparison, attitude_now(readings).C_in_c.raw(), readings, its.R_c, correction.reading_noise_rad);
+  report.odd_gyro = gyro_at_fault(comparison, rotation_now(readings), readings, its.R_c, correction.reading_noise_rad);
   use_all_the_same(correction, report);
 }
 
@@ -673,7 +676,7 @@ void InvariantEstimator<kCapacity>::take_angles(Correction& correction, const Fi
   using Stage = typename Correction::Stage;
   switch (correction.stage) {
     case Stage::kBegin:
-      if (attitude(gyros_, readings.h_b, readings.used)) {
+      if (gives_attitude(gyros_, readings.h_b, readings.used)) {
         correction.stage = Stage::kSecondOrder;
       } else {
         report.status = FixStatus::kRejectedGeometry;
@@ -681,7 +684,7 @@ void InvariantEstimator<kCapacity>::take_angles(Correction& correction, const Fi
       }
       break;
     case Stage::kSecondOrder:
-      correction.prediction_noise_rad = prediction_noise(attitude_now(readings).C_in_c.raw());
+      correction.prediction_noise_rad = prediction_noise(rotation_now(readings));
       correction.stage = Stage::kPropagation;
       break;
     case Stage::kPropagation:
@@ -689,8 +692,7 @@ void InvariantEstimator<kCapacity>::take_angles(Correction& correction, const Fi
       correction.stage = Stage::kNoise;
       break;
     case Stage::kNoise:
-      correction.reading_noise_rad =
-          reading_noise(attitude_now(readings).C_in_c.raw(), readings.noise_factor, ++angles_since_fix_);
+      correction.reading_noise_rad = reading_noise(rotation_now(readings), readings.noise_factor, ++angles_since_fix_);
       correction.stage = Stage::kJudgement;
       break;
     case Stage::kJudgement:
@@ -706,7 +708,7 @@ template <Capacity kCapacity>
 void InvariantEstimator<kCapacity>::judge_angles(Correction& correction, const FixReadings& readings,
                                                  AngleReport& report) {
   correction.stage = Correction::Stage::kDone;
-  const Eigen::Matrix3d C_in_c = attitude_now(readings).C_in_c.raw();
+  const Eigen::Matrix3d C_in_c = rotation_now(readings);
   FixComparison comparison = compare(layout(), gyros_, C_in_c, C_in_c, readings.h_b, readings.used,
                                      FixBySharedStates::Zero(3, layout().shared_size()));
   White white = angles_of(comparison, correction.reading_noise_rad);

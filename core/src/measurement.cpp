@@ -72,9 +72,16 @@ AttitudeSolution with_covariance(const AttitudeByDirections& attitude, const Eig
   AttitudeSolution solution;
   solution.C_in_c = attitude.C_in_c;
   for (int k = 0; k < gyros; ++k) {
-    const Eigen::Matrix3d by_phi = attitude.by_direction(k);
     const double white = readout_noise_rad[k] * readout_noise_rad[k] + walk_variance_rad2;
-    solution.covariance_rad2 += white * by_phi * by_phi.transpose();
+    const double* by_phi = attitude.by_direction(k).data();  // column by column
+    for (int i = 0; i < 3; ++i) {
+      const double x = white * by_phi[i];
+      const double y = white * by_phi[i + 3];
+      const double z = white * by_phi[i + 6];
+      for (int j = 0; j < 3; ++j) {
+        solution.covariance_rad2(i, j) += x * by_phi[j] + (y * by_phi[j + 3] + z * by_phi[j + 6]);
+      }
+    }
   }
   solution.covariance_rad2 += spread_square;
   return solution;

@@ -82,7 +82,8 @@ StepReport OnBoard<Estimator>::on_gyro(const GyroSample& sample) {
   StepReport report;
   report.t = sample.t;
   GyroSample screened = sample;
-  report.sample = let_in(screened, report);
+  std::optional<Step> to_it;
+  report.sample = let_in(screened, to_it, report);
   report.gyros = intake_.health().states();
   if (report.sample == SampleStatus::kRejectedTooFewGyros) {
     calibrate_until(sample.t - reach(), report);  // fixes that wait for samples get none; deal with them now
@@ -93,8 +94,8 @@ StepReport OnBoard<Estimator>::on_gyro(const GyroSample& sample) {
     return report;
   }
   report.fixes_dropped = std::exchange(fixes_dropped_, 0);
-  if (navigator_.started() && readings_.size() > 0) {
-    navigate(readings_.latest_t(), readings_.latest_directions(), screened.t, screened.h_b, navigator_.state());
+  if (navigator_.started() && to_it) {
+    navigate(*to_it, navigator_.state());
   }
   if (is_too_far_behind()) {
     slots_left_ = 0;
@@ -166,7 +167,7 @@ StepReport OnBoard<Estimator>::flush() {
 // ---- What comes in
 
 template <class Estimator>
-SampleStatus OnBoard<Estimator>::let_in(GyroSample& sample, StepReport& report) {
+SampleStatus OnBoard<Estimator>::let_in(GyroSample& sample, std::optional<Step>& to_it, StepReport& report) {
   switch (intake_.look_at_clock(sample.t, readings_.latest())) {
     case Intake::Clock::kOutOfOrder:
       return SampleStatus::kRejectedOutOfOrder;
@@ -182,9 +183,10 @@ SampleStatus OnBoard<Estimator>::let_in(GyroSample& sample, StepReport& report) 
   if (readings_.too_soon(sample.t)) {
     return SampleStatus::kThinned;
   }
-  if (estimator_.started() && readings_.size() > 0) {  // the prediction to it is made with the middle of the step
-    const Step to_it = step(readings_.latest_t(), readings_.latest_directions(), sample.t, sample.h_b);
-    if (!estimator_.rotation(estimator_.gyros(), to_it.middle, to_it.used)) {
+  if (readings_.size() > 0) {
+    to_it = step(readings_.latest_t(), readings_.latest_directions(), sample.t, sample.h_b);
+    // The prediction to it is made with the middle of the step.
+    if (estimator_.started() && !estimator_.gives_attitude(estimator_.gyros(), to_it->middle, to_it->used)) {
       return SampleStatus::kRejectedGeometry;
     }
   }
@@ -617,7 +619,8 @@ void OnBoard<Estimator>::catch_up(int samples) {
   Directions from = work_.state_t == work_.t ? work_.its.readings.h_b : readings_.directions(std::max(first, 1) - 1);
   for (int i = first; i < end; ++i) {
     const Directions to = readings_.directions(i);
-    navigate(work_.state_t, from, readings_.time(i), to, work_.state);
+    Step to_it = step(work_.state_t, from, readings_.time(i), to);
+    navigate(to_it, work_.state);
     work_.state_t = readings_.time(i);
     from = to;
   }
@@ -726,12 +729,10 @@ void OnBoard<Estimator>::follow(Time t, const Directions& h_b) {
 }
 
 template <class Estimator>
-void OnBoard<Estimator>::navigate(Time from_t, const Directions& from, Time to_t, const Directions& to,
-                                  typename Navigator<Estimator>::State& state) const {
-  Step step = this->step(from_t, from, to_t, to);
+void OnBoard<Estimator>::navigate(Step& step, typename Navigator<Estimator>::State& state) const {
   if (const auto C_in_c = attitude_of(state.gyros, step)) {
-    Navigator<Estimator>::predict(estimator_, *C_in_c, step.middle, to_t, step.dt_s(), state);
-    if (to_t - from_t > estimator_.setup().max_interpolation()) {
+    Navigator<Estimator>::predict(estimator_, *C_in_c, step.middle, step.to_t, step.dt_s(), state);
+    if (step.to_t - step.from_t > estimator_.setup().max_interpolation()) {
       state.extra_variance_rad2 += variance_of_long_step(step);
     }
   }
@@ -852,13 +853,10 @@ void Navigator<Estimator>::predict(const Estimator& estimator, const Eigen::Matr
                                    Time t, double dt_s, State& state) {
   const Layout& layout = estimator.layout();
   const double part = estimator.setup().part_of_change(t - from_seconds(dt_s / 2));
-  for (int k = 0; k < layout.gyros; ++k) {
-    auto& gyro = state.gyros[k];
-    precess(gyro, estimator.drift(), C_in_c, h_b[k], part, dt_s);
-    if (layout.further.wandering_drift) {
-      gyro.drift_rad_s.template segment<3>(layout.wandering_column()) *=
-          elementary::exp(-dt_s / estimator.setup().wandering_drift.time_s);
-    }
+  precess_all(state.gyros, layout.gyros, estimator.drift(), C_in_c, h_b, part, dt_s);
+  for (int k = 0; layout.further.wandering_drift && k < layout.gyros; ++k) {
+    state.gyros[k].drift_rad_s.template segment<3>(layout.wandering_column()) *=
+        elementary::exp(-dt_s / estimator.setup().wandering_drift.time_s);
   }
   state.time_s += dt_s;
 }

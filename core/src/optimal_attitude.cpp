@@ -2,27 +2,57 @@
 
 #include <Eigen/LU>
 #include <cmath>
+#include <optional>
+
+#include "trihedron/core/lanes.hpp"
 
 namespace trihedron {
 namespace {
 
-/// Axes on two directions in which both have equal weight: their normal, the bisector, and the third.
-Result<Eigen::Matrix3d, DirectionsFault> bisecting_axes(const Eigen::Vector3d& h1, const Eigen::Vector3d& h2) {
-  const Eigen::Vector3d normal = h1.cross(h2);
-  const double area_square = normal.squaredNorm();
-  const double lengths_square = h1.squaredNorm() * h2.squaredNorm();
-  if (!(area_square >= kMinSine * kMinSine * lengths_square)) {
-    return std::isfinite(area_square) ? DirectionsFault::kMomentaNearlyParallel : DirectionsFault::kNotFinite;
+/// Two of the directions in `in` and, in the second lane, in c.
+struct TwoDirections {
+  Lanes3 first;
+  Lanes3 second;
+  Lanes3 normal;
+  Lanes area_square;
+
+  TwoDirections(const Directions& h_in, const Directions& h_c, int j, int k)
+      : first(load3(h_in[j].data(), h_c[j].data())),
+        second(load3(h_in[k].data(), h_c[k].data())),
+        normal(cross(first, second)),
+        area_square(dot(normal, normal)) {}
+
+  [[nodiscard]] std::optional<DirectionsFault> fault() const {
+    const Lanes lengths_square = dot(first, first) * dot(second, second);
+    const Lanes least_square = kMinSine * kMinSine * lengths_square;
+    for (int i = 0; i < 2; ++i) {
+      if (!(area_square[i] >= least_square[i])) {
+        return std::isfinite(area_square[i]) ? DirectionsFault::kMomentaNearlyParallel : DirectionsFault::kNotFinite;
+      }
+      if (!(lengths_square[i] > 0)) {
+        return DirectionsFault::kNotFinite;
+      }
+    }
+    return std::nullopt;
   }
-  if (!(lengths_square > 0)) {
-    return DirectionsFault::kNotFinite;
+
+  /// By the axes on them in which both have equal weight: their normal, the bisector, and the third. Needs no fault().
+  [[nodiscard]] Rot<In, C> rotation() const {
+    const Lanes area = root(area_square);
+    const Lanes3 x{normal.x / area, normal.y / area, normal.z / area};
+    const Lanes3 y = normalized(first + second);
+    const Lanes3 z = cross(x, y);
+    const auto row = [](Lanes i, Lanes j, Lanes k, const Lanes3& a, const Lanes3& b, const Lanes3& c) {
+      const auto column = [&](Lanes p, Lanes q, Lanes r) { return i[0] * p[1] + (j[0] * q[1] + k[0] * r[1]); };
+      return Eigen::RowVector3d(column(a.x, b.x, c.x), column(a.y, b.y, c.y), column(a.z, b.z, c.z));
+    };
+    Eigen::Matrix3d C_in_c;
+    C_in_c.row(0) = row(x.x, y.x, z.x, x, y, z);
+    C_in_c.row(1) = row(x.y, y.y, z.y, x, y, z);
+    C_in_c.row(2) = row(x.z, y.z, z.z, x, y, z);
+    return Rot<In, C>::assume(C_in_c);
   }
-  Eigen::Matrix3d axes;
-  axes.col(0) = normal / std::sqrt(area_square);
-  axes.col(1) = (h1 + h2).normalized();
-  axes.col(2) = axes.col(0).cross(axes.col(1));
-  return axes;
-}
+};
 
 /// Two of the directions; the solution for two is exact.
 struct Pair {
@@ -53,6 +83,13 @@ Pair the_two(const GyroMask& used) {
     }
   }
   return two;
+}
+
+/// By which two of those used the attitude is found; at least two are.
+[[gnu::always_inline]] inline TwoDirections two_of(const Directions& h_in, const Directions& h_c,
+                                                   const GyroMask& used) {
+  const auto [first, second] = count(used) == 2 ? the_two(used) : best_pair(h_in, used);
+  return {h_in, h_c, first, second};
 }
 
 /// 1 − h hᵀ.
@@ -121,17 +158,17 @@ Result<Rot<In, C>, DirectionsFault> optimal_rotation(const Directions& h_in, con
   if (directions < 2) {
     return DirectionsFault::kTooFew;
   }
-  const auto [first, second] = directions == 2 ? the_two(used) : best_pair(h_in, used);
-  const auto in = bisecting_axes(h_in[first], h_in[second]);
-  if (!in) {
-    return in.fault();
+  const TwoDirections two = two_of(h_in, h_c, used);
+  if (const auto fault = two.fault()) {
+    return *fault;
   }
-  const auto c = bisecting_axes(h_c[first], h_c[second]);
-  if (!c) {
-    return c.fault();
-  }
-  const Rot<In, C> by_pair = Rot<In, C>::assume(Eigen::Matrix3d(in.value() * c.value().transpose()));
+  const Rot<In, C> by_pair = two.rotation();
   return directions > 2 ? refined(by_pair, h_in, h_c, used) : by_pair;
+}
+
+std::optional<DirectionsFault> fault_of_directions(const Directions& h_in, const Directions& h_c,
+                                                   const GyroMask& used) {
+  return count(used) < 2 ? DirectionsFault::kTooFew : two_of(h_in, h_c, used).fault();
 }
 
 Result<AttitudeByDirections, DirectionsFault> optimal_attitude(const Directions& h_in, const Directions& h_c,

@@ -5,8 +5,118 @@
 #include <numbers>
 
 #include "trihedron/core/elementary.hpp"
+#include "trihedron/core/lanes.hpp"
 
 namespace trihedron {
+namespace {
+
+/// exp([v×]) u, as rotated().
+Lanes3 rotated(const Lanes3& u, const Lanes3& v) {
+  const Lanes angle2 = dot(v, v);
+  Lanes a;
+  Lanes b;
+  for (int i = 0; i < 2; ++i) {
+    const auto [its_a, its_b] = detail::rodrigues_coefficients(angle2[i]);
+    a[i] = its_a;
+    b[i] = its_b;
+  }
+  const Lanes3 c = cross(v, u);
+  return u + a * c + b * cross(v, c);
+}
+
+/// As GyroReadout::corrected().
+Lanes3 corrected(const PrecessingGyro& a, const PrecessingGyro& b) {
+  const Lanes3 read = load3(a.h_b, b.h_b);
+  const Lanes3 bias = load3(a.readout_bias, b.readout_bias);
+  return read - (bias - dot(read, bias) * read);
+}
+
+/// m times v, m by its columns.
+Lanes3 product(const Lanes3 (&m)[3], const Lanes3& v) {
+  return {m[0].x * v.x + (m[1].x * v.y + m[2].x * v.z), m[0].y * v.x + (m[1].y * v.y + m[2].y * v.z),
+          m[0].z * v.x + (m[1].z * v.y + m[2].z * v.z)};
+}
+
+[[gnu::always_inline]] inline void turn_momenta(const PrecessingGyro& a, const PrecessingGyro& b, const Lanes3& turn) {
+  store3(normalized(rotated(load3(a.h_in, b.h_in), turn)), a.h_in, b.h_in);
+}
+
+}  // namespace
+
+void precess_two(const PrecessingGyro& a, const PrecessingGyro& b, const Eigen::Matrix3d& C_in_c, double dt_s) {
+  const Lanes3 h = corrected(a, b);
+  Esg7::Coefficients<Lanes> kappa;
+  for (int i = 0; i < Esg7::kSize; ++i) {
+    kappa(i) = load(a.kappa + i, b.kappa + i);
+  }
+  const Vector3<Lanes> rate = Esg7::rate<Lanes>({h.x, h.y, h.z}, kappa);
+  Lanes3 alignment[3];
+  Lanes3 attitude[3];
+  for (int j = 0; j < 3; ++j) {
+    alignment[j] = load3(a.C_c_b + 3L * j, b.C_c_b + 3L * j);
+    attitude[j] = {both_lanes(C_in_c(0, j)), both_lanes(C_in_c(1, j)), both_lanes(C_in_c(2, j))};
+  }
+  const Lanes3 omega_in = product(attitude, product(alignment, {0.0 + rate(0), 0.0 + rate(1), 0.0 + rate(2)}));
+  turn_momenta(a, b, both_lanes(dt_s) * omega_in);
+}
+
+void precess_two(const PrecessingGyro& a, const PrecessingGyro& b, const SensitivityOfEq1& since_a,
+                 const SensitivityOfEq1& since_b, const Eigen::Matrix3d& C_in_c, double dt_s) {
+  const Lanes3 h = corrected(a, b);
+  // The columns of eq. (1) that are not zero.
+  const Lanes sx = h.x * h.x, sy = h.y * h.y, sz = h.z * h.z;
+  const Lanes qx = sx * sx, qy = sy * sy, qz = sz * sz;
+  const Lanes3 k0{h.x * (qx - sx + qy + qz), h.y * (qy - sy + qz + qx), h.z * (qz - sz + qx + qy)};
+  const Lanes x_mu12 = h.x * sy, y_mu12 = -h.y * sx;
+  const Lanes y_mu23 = h.y * sz, z_mu23 = -h.z * sy;
+  const Lanes x_mu31 = -h.x * sz, z_mu31 = h.z * sx;
+  const Lanes z_nu12 = h.x * h.y, x_nu23 = h.y * h.z, y_nu31 = h.z * h.x;
+
+  const Eigen::Matrix3d dt_C = dt_s * C_in_c;
+  Lanes3 m[3];  // columns of dt C_in_b
+  for (int j = 0; j < 3; ++j) {
+    const Lanes3 alignment = load3(a.C_c_b + 3L * j, b.C_c_b + 3L * j);
+    Lanes column[3];
+    for (int i = 0; i < 3; ++i) {
+      const Lanes3 row{both_lanes(dt_C(i, 0)), both_lanes(dt_C(i, 1)), both_lanes(dt_C(i, 2))};
+      column[i] = dot(row, alignment);
+    }
+    m[j] = {column[0], column[1], column[2]};
+  }
+  const auto kappa = [&](int i) { return load(a.kappa + i, b.kappa + i); };
+  Lanes3 rate = kappa(Esg7::kK0) * k0;
+  rate = {0.0 + rate.x, 0.0 + rate.y, 0.0 + rate.z};  // a zero without sign, as the sum that begins with one
+  rate.x = rate.x + x_mu12 * kappa(Esg7::kMu12) + x_mu31 * kappa(Esg7::kMu31) + x_nu23 * kappa(Esg7::kNu23);
+  rate.y = rate.y + y_mu12 * kappa(Esg7::kMu12) + y_mu23 * kappa(Esg7::kMu23) + y_nu31 * kappa(Esg7::kNu31);
+  rate.z = rate.z + z_mu23 * kappa(Esg7::kMu23) + z_mu31 * kappa(Esg7::kMu31) + z_nu12 * kappa(Esg7::kNu12);
+  const Lanes3 turn = product(m, rate);
+  turn_momenta(a, b, turn);
+
+  for (int j = 0; j < 3; ++j) {
+    const Lanes3 phi = load3(since_a.by_start + 3L * j, since_b.by_start + 3L * j);
+    store3(phi + cross(turn, phi), since_a.by_start + 3L * j, since_b.by_start + 3L * j);
+    const Lanes3 by_alignment = load3(since_a.by_alignment + 3L * j, since_b.by_alignment + 3L * j);
+    const Lanes3 C{both_lanes(C_in_c(0, j)), both_lanes(C_in_c(1, j)), both_lanes(C_in_c(2, j))};
+    store3(by_alignment + cross(turn, by_alignment - C), since_a.by_alignment + 3L * j, since_b.by_alignment + 3L * j);
+  }
+  const auto advance = [&](int column, const Lanes3& added) {
+    double* const x[2] = {since_a.by_drift.row(0) + column, since_b.by_drift.row(0) + column};
+    double* const y[2] = {since_a.by_drift.row(1) + column, since_b.by_drift.row(1) + column};
+    double* const z[2] = {since_a.by_drift.row(2) + column, since_b.by_drift.row(2) + column};
+    const Lanes3 phi{load(x[0], x[1]), load(y[0], y[1]), load(z[0], z[1])};
+    const Lanes3 next = phi + cross(turn, phi) + added;
+    store(next.x, x[0], x[1]);
+    store(next.y, y[0], y[1]);
+    store(next.z, z[0], z[1]);
+  };
+  advance(Esg7::kK0, k0.x * m[0] + k0.y * m[1] + k0.z * m[2]);
+  advance(Esg7::kMu12, x_mu12 * m[0] + y_mu12 * m[1]);
+  advance(Esg7::kMu23, y_mu23 * m[1] + z_mu23 * m[2]);
+  advance(Esg7::kMu31, x_mu31 * m[0] + z_mu31 * m[2]);
+  advance(Esg7::kNu12, z_nu12 * m[2]);
+  advance(Esg7::kNu23, x_nu23 * m[0]);
+  advance(Esg7::kNu31, y_nu31 * m[1]);
+}
 
 void advance_by_drift(ColumnsView by_drift, ColumnsView basis, const Eigen::Matrix3d& dt_C_in_b,
                       const Eigen::Vector3d& turn) {

@@ -6,6 +6,7 @@
 #include <iterator>
 
 #include "trihedron/core/assert.hpp"
+#include "trihedron/core/lanes.hpp"
 
 namespace trihedron {
 namespace {
@@ -15,18 +16,30 @@ namespace {
 template <std::size_t M>
 void reflect(double* __restrict r, double* const (&rows)[M], const double (&v)[M], double v0, double beta,
              int columns) {
-#ifndef __clang__
-#pragma GCC ivdep  // the rows do not overlap
-#endif
-  for (int k = 1; k < columns; ++k) {
-    double s = v0 * r[k];
+  for (int k = 1; k + 1 < columns; k += 2) {
+    const Lanes its = load2(r + k);
+    Lanes below[M];
+    Lanes s = v0 * its;
     for (std::size_t i = 0; i < M; ++i) {
-      s += v[i] * rows[i][k];
+      below[i] = load2(rows[i] + k);
+      s += v[i] * below[i];
     }
     s *= beta;
-    r[k] -= v0 * s;
+    store2(its - v0 * s, r + k);
     for (std::size_t i = 0; i < M; ++i) {
-      rows[i][k] -= v[i] * s;
+      store2(below[i] - v[i] * s, rows[i] + k);
+    }
+  }
+  if (columns % 2 == 0) {
+    const int last = columns - 1;
+    double s = v0 * r[last];
+    for (std::size_t i = 0; i < M; ++i) {
+      s += v[i] * rows[i][last];
+    }
+    s *= beta;
+    r[last] -= v0 * s;
+    for (std::size_t i = 0; i < M; ++i) {
+      rows[i][last] -= v[i] * s;
     }
   }
 }
@@ -103,7 +116,48 @@ void triangularise(RowsView rows, int columns) {
 
 namespace {
 
-/// solve_rows() of M rows, side by side, two columns at a time.
+/// Of solve_rows(): P columns from j on, of M rows side by side, and what they take off all further columns.
+template <std::size_t P, std::size_t M>
+void solve_columns(ConstRowsView root, int j, double* const (&rows)[M]) {
+  const double* R[P];
+  for (std::size_t p = 0; p < P; ++p) {
+    R[p] = root.row(j + static_cast<int>(p)) + j;
+  }
+  double* x[M];
+  double value[M][P];
+  for (std::size_t i = 0; i < M; ++i) {
+    x[i] = rows[i] + j;
+    for (std::size_t p = 0; p < P; ++p) {
+      double rest = x[i][p];
+      for (std::size_t q = 0; q < p; ++q) {
+        rest -= value[i][q] * R[q][p];
+      }
+      value[i][p] = x[i][p] = rest / R[p][p];
+    }
+  }
+  const int columns = root.rows - j;
+  for (int k = P; k + 1 < columns; k += 2) {
+    Lanes its[P];
+    for (std::size_t p = 0; p < P; ++p) {
+      its[p] = load2(R[p] + k);
+    }
+    for (std::size_t i = 0; i < M; ++i) {
+      Lanes rest = load2(x[i] + k);
+      for (std::size_t p = 0; p < P; ++p) {
+        rest -= value[i][p] * its[p];
+      }
+      store2(rest, x[i] + k);
+    }
+  }
+  const int last = columns - 1;
+  for (std::size_t i = 0; (columns - static_cast<int>(P)) % 2 != 0 && i < M; ++i) {
+    for (std::size_t p = 0; p < P; ++p) {
+      x[i][last] -= value[i][p] * R[p][last];
+    }
+  }
+}
+
+/// solve_rows() of M rows, side by side, four columns at a time.
 template <std::size_t M>
 void solve_rows_together(ConstRowsView root, RowsView rows) {
   double* x[M];
@@ -115,26 +169,38 @@ void solve_rows_together(ConstRowsView root, RowsView rows) {
   while (j < n && std::all_of(std::begin(x), std::end(x), [&](const double* row) { return row[j] == 0; })) {
     ++j;
   }
-  for (; j + 1 < n; j += 2) {
-    const double* __restrict R = root.row(j);
-    const double* __restrict next_R = root.row(j + 1);
-    double value[M];
-    double next[M];
-    for (std::size_t i = 0; i < M; ++i) {
-      value[i] = x[i][j] /= R[j];
-      next[i] = x[i][j + 1] = (x[i][j + 1] - value[i] * R[j + 1]) / next_R[j + 1];
-    }
-#ifndef __clang__
-#pragma GCC ivdep  // the rows do not overlap
-#endif
-    for (int k = j + 2; k < n; ++k) {
-      for (std::size_t i = 0; i < M; ++i) {
-        x[i][k] = (x[i][k] - value[i] * R[k]) - next[i] * next_R[k];
-      }
-    }
+  const int rest = (n - j) % 4;
+  for (; j + 3 < n; j += 4) {
+    solve_columns<4>(root, j, x);
   }
-  for (std::size_t i = 0; j < n && i < M; ++i) {
-    x[i][j] /= root(j, j);
+  if (rest >= 2) {
+    solve_columns<2>(root, j, x);
+  }
+  if (rest % 2 != 0) {
+    solve_columns<1>(root, n - 1, x);
+  }
+}
+
+/// take_off() of so many rows.
+template <std::size_t Rows>
+void take_off_rows(const double* factors, std::ptrdiff_t stride, ConstRowsView b, double* rest) {
+  double by[Rows];
+  const double* row[Rows];
+  for (std::size_t i = 0; i < Rows; ++i) {
+    const int its = static_cast<int>(i);
+    by[i] = factors[its * stride];
+    row[i] = b.row(its);
+  }
+  for (int j = 0; j + 1 < b.columns; j += 2) {
+    Lanes left = load2(rest + j);
+    for (std::size_t i = 0; i < Rows; ++i) {
+      left -= by[i] * load2(row[i] + j);
+    }
+    store2(left, rest + j);
+  }
+  const int last = b.columns - 1;
+  for (std::size_t i = 0; b.columns % 2 != 0 && i < Rows; ++i) {
+    rest[last] -= by[i] * row[i][last];
   }
 }
 
@@ -172,6 +238,16 @@ void multiply(ConstRowsView a, ConstRowsView b, RowsView product) {
         row[j] += by * its[j];
       }
     }
+  }
+}
+
+void take_off(const double* factors, std::ptrdiff_t stride, ConstRowsView b, double* rest) {
+  const int together = b.rows - b.rows % 3;
+  for (int k = 0; k < together; k += 3) {
+    take_off_rows<3>(factors + k * stride, stride, {b.row(k), 3, b.columns, b.stride}, rest);
+  }
+  for (int k = together; k < b.rows; ++k) {
+    take_off_rows<1>(factors + k * stride, stride, {b.row(k), 1, b.columns, b.stride}, rest);
   }
 }
 

@@ -101,6 +101,14 @@ TEST(OptimalAttitude, NeedsTwoDirectionsApart) {
   EXPECT_EQ(optimal_attitude(in_space(), in, all_gyros(2)).fault(), DirectionsFault::kNotFinite);
 }
 
+TEST(OptimalAttitude, FaultIsThatOfTheRotation) {
+  Directions parallel = in_space();
+  parallel[1] = parallel[0];
+  EXPECT_FALSE(fault_of_directions(in_space(), in_body(), kAll));
+  EXPECT_EQ(fault_of_directions(in_space(), in_body(), all_but({1, 2})), DirectionsFault::kTooFew);
+  EXPECT_EQ(fault_of_directions(in_space(), parallel, all_gyros(2)), DirectionsFault::kMomentaNearlyParallel);
+}
+
 TEST(OptimalAttitude, OfTwoAlikeIsExactHoweverTheyDisagree) {
   // Both lie in one plane, with one middle.
   Directions in;

@@ -156,6 +156,48 @@ TEST(Sensitivity, OfTwoStretchesIsTheirChain) {
   EXPECT_LT((chained.by_alignment - whole.by_alignment).norm(), 1e-10 * whole.by_alignment.norm());
 }
 
+/// A reading that turns, bias and alignment, and a drift by which a momentum turns by up to half a radian in a step.
+TEST(PrecessAll, GivesTheBitsOfEachGyroAlone) {
+  constexpr int kCount = 3;  // two side by side, and one alone
+  for (const double times : {1.0, 5e3}) {
+    PerGyro<Gyro> together;
+    for (int k = 0; k < kCount; ++k) {
+      Gyro& gyro = together[k];
+      gyro.h_in = Eigen::Vector3d(0.5, 0.6 - k, 0.62).normalized();
+      gyro.drift_rad_s << -2e-6, -4e-7, -5e-8, -1.2e-6 * k, 1.8e-6, 7e-7, -8e-7;
+      gyro.drift_rad_s *= times;
+      gyro.C_c_b = Rot<C, B<1>>::exp(Vec<C>::assume(2e-3, -4e-3 * k, -7e-3)).raw();
+      gyro.readout_bias << 1e-4, -2e-4 * k, 3e-5;
+    }
+    PerGyro<Gyro> alone = together;
+    PerGyro<Gyro> navigated = together;
+    PerGyro<Gyro> navigated_alone = together;
+    PerGyro<Sensitivities> since;
+    PerGyro<Sensitivities> since_alone;
+    for (int i = 0; i < 50; ++i) {
+      const Eigen::Matrix3d C_in_c = attitude_at(i);
+      Directions h_b;
+      for (int k = 0; k < kCount; ++k) {
+        h_b[k] = C_in_c.transpose() * together[k].h_in;
+      }
+      const double dt_s = i % 2 == 0 ? 0.125 : 0.1;
+      precess_all(together, since, kCount, kEq1, C_in_c, h_b, 0, dt_s * times);
+      precess_all(navigated, kCount, kEq1, C_in_c, h_b, 0, dt_s * times);
+      for (int k = 0; k < kCount; ++k) {
+        precess(alone[k], since_alone[k], kEq1, C_in_c, h_b[k], 0, dt_s * times);
+        precess(navigated_alone[k], kEq1, C_in_c, h_b[k], 0, dt_s * times);
+      }
+    }
+    for (int k = 0; k < kCount; ++k) {
+      EXPECT_EQ(together[k].h_in, alone[k].h_in);
+      EXPECT_EQ(navigated[k].h_in, navigated_alone[k].h_in);
+      EXPECT_EQ(since[k].by_start, since_alone[k].by_start);
+      EXPECT_EQ(since[k].by_alignment, since_alone[k].by_alignment);
+      EXPECT_EQ(since[k].by_drift.first(kColumns), since_alone[k].by_drift.first(kColumns));
+    }
+  }
+}
+
 TEST(LongStep, MissesTheDriftTimesTheTurnThatMayHaveBeen) {
   const Eigen::Vector3d from = Eigen::Vector3d::UnitX();
   const Eigen::Vector3d to(std::cos(0.4), std::sin(0.4), 0);

@@ -45,7 +45,7 @@ struct Esg7 {
   template <class S>
   [[nodiscard]] static Vector3<S> rate(const Vector3<S>& h, const Coefficients<S>& kappa) {
     const Vector3<S> s = h.cwiseProduct(h);
-    const S sum4 = s.squaredNorm();
+    const S sum4 = s(0) * s(0) + (s(1) * s(1) + s(2) * s(2));
     return {
         h(0) * (kappa(kK0) * (sum4 - s(0)) + kappa(kMu12) * s(1) - kappa(kMu31) * s(2)) + kappa(kNu23) * h(1) * h(2),
         h(1) * (kappa(kK0) * (sum4 - s(1)) + kappa(kMu23) * s(2) - kappa(kMu12) * s(0)) + kappa(kNu31) * h(2) * h(0),

@@ -81,7 +81,16 @@ class GyroHealth {
   [[nodiscard]] GyroMask usable(Time from, Time to) const {
     GyroMask mask;
     for (int k = 0; k < gyros_; ++k) {
-      mask[k] = selected_[k] && !isolated_[k] && !(readings_[k].stuck_from <= to && from <= readings_[k].stuck_until);
+      mask[k] = selected_[k] && !isolated_[k] && !readings_[k].is_stuck_within(from, to);
+    }
+    return mask;
+  }
+  /// Those whose readings can be used at both of these times, whatever they were between.
+  [[nodiscard]] GyroMask usable_at(Time a, Time b) const {
+    GyroMask mask;
+    for (int k = 0; k < gyros_; ++k) {
+      mask[k] =
+          selected_[k] && !isolated_[k] && !readings_[k].is_stuck_within(a, a) && !readings_[k].is_stuck_within(b, b);
     }
     return mask;
   }
@@ -134,6 +143,7 @@ class GyroHealth {
       motion += part * (step / dt_s - motion);
       steps += steps < kStepsOfMotion ? 1 : 0;
     }
+    [[nodiscard]] bool is_stuck_within(Time from, Time to) const { return stuck_from <= to && from <= stuck_until; }
     [[nodiscard]] bool has_stopped(Time t) const {
       return steps == kStepsOfMotion && last.allFinite() &&
              motion.norm() * to_seconds(t - since) > kStepsMissing * jitter;

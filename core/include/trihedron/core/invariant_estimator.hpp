@@ -82,6 +82,10 @@ class InvariantEstimator {
                                                              const GyroMask& used) const {
     return optimal_rotation(momenta(gyros, layout().gyros), in_c(gyros, layout().gyros, h_b), used);
   }
+  /// Whether there is one.
+  [[nodiscard]] bool gives_attitude(const Gyros& gyros, const Directions& h_b, const GyroMask& used) const {
+    return !fault_of_directions(momenta(gyros, layout().gyros), in_c(gyros, layout().gyros, h_b), used);
+  }
 
   /// Square root of the covariance of all states, or of the first of them, at the last fix. Needs started().
   void error_root(RowsView root) const { information_.inverse_root(root); }
@@ -172,8 +176,7 @@ class InvariantEstimator {
   [[nodiscard]] FixComparison compared(const Seen& its, const Correction& correction,
                                        const FixReadings& readings) const;
   /// The stages of take(), as they are named.
-  void begin(Correction& correction, const Seen& its, const StarFix& fix, const FixReadings& readings,
-             FixReport& report);
+  void begin(Correction& correction, const StarFix& fix, const FixReadings& readings, FixReport& report);
   void judge(Correction& correction, const Seen& its, const FixReadings& readings, FixReport& report);
   /// Of a fix above the gate: whether a lower weight takes it.
   static void use_all_the_same(Correction& correction, FixReport& report);
@@ -182,13 +185,14 @@ class InvariantEstimator {
               const FixReport& report);
   void judge_angles(Correction& correction, const FixReadings& readings, AngleReport& report);
   [[nodiscard]] Eigen::Matrix3d covariance_of(Rows3 by_states) const;
+  /// Of what depends on the states from the `first` on alone, by these columns and no further ones.
+  template <class Rows>
+  [[nodiscard]] Eigen::Matrix3d covariance_from(int first, const Rows& some) const;
   /// The attitude by gyros and fix together, weighted by what is known of both. Needs the covariance at the fix.
-  [[nodiscard]] Eigen::Matrix3d fused_attitude(const AttitudeByDirections& by_gyros, const Rot<In, C>& by_fix,
-                                               const Eigen::Matrix3d& R_c, const FixReadings& readings) const;
-  void start(const Eigen::Matrix3d& C_in_c, const FixReadings& readings, const Eigen::Matrix3d& R_c,
-             const FixBySharedStates& by_shared);
-  void restart(const Eigen::Matrix3d& C_in_c, const FixReadings& readings, const Eigen::Matrix3d& R_c,
-               const FixBySharedStates& by_shared);
+  [[nodiscard]] Eigen::Matrix3d fused_attitude(const AttitudeByDirections& by_gyros, const Seen& its,
+                                               const StarFix& fix, const FixReadings& readings) const;
+  void start(const Seen& its, const FixReadings& readings);
+  void restart(const Seen& its, const FixReadings& readings);
   /// 1-sigma per axis of the second-order term ½ a × b, which the linear model leaves out, by the covariances of a and
   /// b.
   [[nodiscard]] static double second_order_rad(const Eigen::Matrix3d& A, const Eigen::Matrix3d& B);
@@ -201,7 +205,7 @@ class InvariantEstimator {
                                                   const Eigen::Matrix3d& misalignment) const;
   /// Covariance of what is not known of the error of a further star tracker's fix, noise apart: its first fix finds its
   /// alignment, and until then it is no attitude to linearise at.
-  [[nodiscard]] Eigen::Matrix3d misalignment_of(const StarFix& fix, const FixBySharedStates& by_shared) const;
+  [[nodiscard]] Eigen::Matrix3d misalignment_of(const StarFix& fix, const FixReadings& readings) const;
   [[nodiscard]] White whitened(const FixComparison& comparison, const Eigen::Matrix3d& R_c,
                                const PerGyro<double>& noise_rad) const;
   /// The rows of whitened() for the update by a fix that shares its samples with others, `sharing` of them with itself,
@@ -225,6 +229,9 @@ class InvariantEstimator {
   /// The attitude of these readings by the estimate, which has been found to exist.
   [[nodiscard]] AttitudeByDirections attitude_now(const FixReadings& readings) const {
     return attitude(gyros_, readings.h_b, readings.used).value();
+  }
+  [[nodiscard]] Eigen::Matrix3d rotation_now(const FixReadings& readings) const {
+    return rotation(gyros_, readings.h_b, readings.used).value().raw();
   }
   /// Noise of the prediction since the last fix, the second-order term with it.
   [[nodiscard]] PerGyro<double, kCapacity.gyros> prediction_noise(const Eigen::Matrix3d& C_in_c);

@@ -57,7 +57,7 @@ class OnBoard {
   void select(const GyroMask& gyros) { intake_.health().select(gyros); }
   /// Whether these gyros give an attitude by the readings of the latest sample.
   [[nodiscard]] bool can_see_with(const GyroMask& gyros) const {
-    return readings_.size() > 0 && estimator_.rotation(estimator_.gyros(), readings_.latest_directions(), gyros).ok();
+    return readings_.size() > 0 && estimator_.gives_attitude(estimator_.gyros(), readings_.latest_directions(), gyros);
   }
   /// How errors at its beginning have changed the directions at its end, over the stretches between all fixes that have
   /// been dealt with since begin_stretch().
@@ -100,7 +100,8 @@ class OnBoard {
   [[nodiscard]] std::optional<Eigen::Matrix3d> attitude_of(const Gyros& gyros, Step& step) const;
   [[nodiscard]] double variance_of_long_step(const Step& step) const;
 
-  [[nodiscard]] SampleStatus let_in(GyroSample& sample, StepReport& report);
+  /// `to_it`: the step from the latest sample, if there is one and this one is of use.
+  [[nodiscard]] SampleStatus let_in(GyroSample& sample, std::optional<Step>& to_it, StepReport& report);
   void set_clock(Time t, StepReport& report);
   void calibrate_until(Time limit, StepReport& report);
   void calibrate_at_once(Time limit, StepReport& report);
@@ -192,8 +193,7 @@ class OnBoard {
 
   /// After a fix, with what has passed since the one before it.
   void end_stretch(const typename Estimator::Sensitivities& stretch, double duration_s);
-  void navigate(Time from_t, const Directions& from, Time to_t, const Directions& to,
-                typename Navigator<Estimator>::State& state) const;
+  void navigate(Step& step, typename Navigator<Estimator>::State& state) const;
   void follow(Time t, const Directions& h_b);
   void follow_next_sample();
   [[nodiscard]] std::optional<FixReadings> readings_at(Time t) const {

@@ -2,6 +2,8 @@
 /// Attitude from N equally weighted directions (Wahba's problem), and the trihedron, which takes the first of two as
 /// reference.
 
+#include <optional>
+
 #include "trihedron/core/attitude.hpp"
 #include "trihedron/core/per_gyro.hpp"
 
@@ -52,6 +54,10 @@ template <class Gyros>
 /// than asin(kMinSine) from one line.
 [[nodiscard]] Result<Rot<In, C>, DirectionsFault> optimal_rotation(const Directions& h_in, const Directions& h_c,
                                                                    const GyroMask& used);
+
+/// Why these directions give no optimal_rotation(), if they do not.
+[[nodiscard]] std::optional<DirectionsFault> fault_of_directions(const Directions& h_in, const Directions& h_c,
+                                                                 const GyroMask& used);
 
 /// optimal_rotation(), and how errors of the directions move it.
 [[nodiscard]] Result<AttitudeByDirections, DirectionsFault> optimal_attitude(const Directions& h_in,

@@ -80,6 +80,11 @@ class PaperEstimator {
   void prior_error_root(RowsView root) const;
   [[nodiscard]] Eigen::Matrix3d covariance_of_errors(const Rows3& by_errors) const;
 
+  /// Whether there is one.
+  [[nodiscard]] static bool gives_attitude(const Gyros& gyros, const Directions& h_b, const GyroMask& used) {
+    return rotation(gyros, h_b, used).ok();
+  }
+
   /// Prediction of both momenta over one step that ends at t, attitude and readings of its middle. Needs started().
   void predict(const Eigen::Matrix3d& C_in_c, const Directions& h_b, Time t, double dt_s);
 

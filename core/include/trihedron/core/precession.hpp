@@ -84,6 +84,68 @@ Eigen::Vector3d precess(GyroModel<Max>& gyro, Sensitivity<Max>& sensitivity, con
   return turn;
 }
 
+/// What moves the momentum of one of two gyros that are predicted together, and the momentum itself: where the numbers
+/// lie, matrices column by column.
+struct PrecessingGyro {
+  double* h_in;
+  const double* kappa;  ///< of eq. (1)
+  const double* C_c_b;
+  const double* readout_bias;
+  const double* h_b;
+
+  template <int Max>
+  PrecessingGyro(GyroModel<Max>& gyro, const Eigen::Vector3d& reading)
+      : h_in(gyro.h_in.data()),
+        kappa(gyro.drift_rad_s.data()),
+        C_c_b(gyro.C_c_b.data()),
+        readout_bias(gyro.readout_bias.data()),
+        h_b(reading.data()) {}
+};
+/// Its sensitivities.
+struct SensitivityOfEq1 {
+  double* by_start;
+  double* by_alignment;
+  ColumnsView by_drift;
+
+  template <int Max>
+  explicit SensitivityOfEq1(Sensitivity<Max>& its)
+      : by_start(its.by_start.data()),
+        by_alignment(its.by_alignment.data()),
+        by_drift(its.by_drift.view(Esg7::kSize)) {}
+};
+
+/// precess() of two gyros side by side whose drift is eq. (1) alone, without and with sensitivities: the same bits in
+/// half the instructions.
+void precess_two(const PrecessingGyro& a, const PrecessingGyro& b, const Eigen::Matrix3d& C_in_c, double dt_s);
+void precess_two(const PrecessingGyro& a, const PrecessingGyro& b, const SensitivityOfEq1& since_a,
+                 const SensitivityOfEq1& since_b, const Eigen::Matrix3d& C_in_c, double dt_s);
+
+/// precess() of the first `count` gyros.
+template <class Gyros>
+void precess_all(Gyros& gyros, int count, const DriftModel& drift, const Eigen::Matrix3d& C_in_c, const Directions& h_b,
+                 double part_of_change, double dt_s) {
+  const int in_pairs = drift.columns() == Esg7::kSize ? count - count % 2 : 0;
+  for (int k = 0; k < in_pairs; k += 2) {
+    precess_two({gyros[k], h_b[k]}, {gyros[k + 1], h_b[k + 1]}, C_in_c, dt_s);
+  }
+  for (int k = in_pairs; k < count; ++k) {
+    precess(gyros[k], drift, C_in_c, h_b[k], part_of_change, dt_s);
+  }
+}
+/// The same with their sensitivities.
+template <class Gyros, class Sensitivities>
+void precess_all(Gyros& gyros, Sensitivities& since, int count, const DriftModel& drift, const Eigen::Matrix3d& C_in_c,
+                 const Directions& h_b, double part_of_change, double dt_s) {
+  const int in_pairs = drift.columns() == Esg7::kSize ? count - count % 2 : 0;
+  for (int k = 0; k < in_pairs; k += 2) {
+    precess_two({gyros[k], h_b[k]}, {gyros[k + 1], h_b[k + 1]}, SensitivityOfEq1(since[k]),
+                SensitivityOfEq1(since[k + 1]), C_in_c, dt_s);
+  }
+  for (int k = in_pairs; k < count; ++k) {
+    precess(gyros[k], since[k], drift, C_in_c, h_b[k], part_of_change, dt_s);
+  }
+}
+
 /// exp([δ×]) C_c_b, through the quaternion, so that rounding cannot accumulate in the matrix over months of fixes.
 [[nodiscard]] Eigen::Matrix3d turned(const Eigen::Matrix3d& C_c_b, const Eigen::Vector3d& delta);
 

@@ -32,6 +32,9 @@ void invert_triangle(ConstRowsView root, RowsView inverse);
 /// product = a · b, all of them apart in memory.
 void multiply(ConstRowsView a, ConstRowsView b, RowsView product);
 
+/// rest ← rest − factors · b, apart from b in memory; the factors, one for each row of b, lie `stride` apart.
+void take_off(const double* factors, std::ptrdiff_t stride, ConstRowsView b, double* rest);
+
 /// An upper triangle that is only kept: half the room. There is room for Max rows.
 template <int Max>
 class PackedTriangle {
@@ -128,16 +131,8 @@ class SquareRootInformation {
         moved(i, j) = -sum * noise(j);
       }
       double* constants = &moved(i, d) + d;
-      for (int j = 0; j < c; ++j) {
-        constants[j] = R[d + j];
-      }
-      for (int k = 0; k < d; ++k) {
-        const double by = moved(i, d + k);
-        const double* row = B.data() + static_cast<std::ptrdiff_t>(k) * c;
-        for (int j = 0; j < c; ++j) {
-          constants[j] -= by * row[j];
-        }
-      }
+      std::copy_n(R + d, c, constants);
+      take_off(&moved(i, d), 1, {B.data(), d, c, c}, constants);
     }
     Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor, MaxDynamic, MaxDynamic + Max> white(
         d, d + states_);
@@ -154,8 +149,13 @@ class SquareRootInformation {
   }
 
   /// In place: rows of H become H R⁻¹, seen through the present uncertainty: H P Hᵀ is the product of the result with
-  /// its transpose. Not finite unless regular().
-  void see_through_uncertainty(RowsView H) const { solve_rows(root(), H); }
+  /// its transpose. H has a column for each state, or for the last of them. Not finite unless regular().
+  void see_through_uncertainty(RowsView H) const {
+    const ConstRowsView R = root();
+    const int columns = std::min(H.columns, states_);
+    const int first = states_ - columns;
+    solve_rows({R.row(first) + first, columns, columns, R.stride}, H);
+  }
 
   /// Measurement update with rows (H, y), y = H x + unit white noise, which are used up; y is the last column. Returns
   /// the correction, to be fed back; not finite unless regular() after it.
