@@ -171,21 +171,22 @@ Gyro::Gyro(const GyroScenario& scenario, const Rot<In, C>& C_in_c, std::uint64_t
       C_c_b_at_start_(true_alignment(scenario, seed, static_cast<std::uint64_t>(gyro))),
       C_c_b_(C_c_b_at_start_),
       C_in_b_(C_in_c * C_c_b_),
-      h_in_(C_in_c * start_direction(scenario)) {}
+      h_in_(C_in_c * start_direction(scenario)),
+      h_b_(C_in_b_.inverse() * h_in_) {}
 
 void Gyro::advance(double t_s, double step_s, const Rot<In, C>& middle, const Rot<In, C>& end, bool sunlit) {
   DriftModulation::Flight flight{0, sunlit};
   if (drift_.is_modulated()) {
     flight.body_rate_rad_s = (C_in_b_.inverse() * (end * C_c_b_)).log().raw().norm() / step_s;
   }
-  drift_.next_step(t_s, step_s, momentum_in_case(), flight);
+  drift_.next_step(t_s, step_s, h_b_, flight);
   if (mounting_change_.is_there()) {
     C_c_b_ = Rot<C, C>::exp(Vec<C>::assume(mounting_change_.at(t_s + step_s))) * C_c_b_at_start_;
   }
   const Rot<In, Case> C_in_b[3] = {C_in_b_, middle * C_c_b_, end * C_c_b_};
   const auto omega_in = [&](int stage, const Vector3d& h) -> Vector3d {
     const Rot<In, Case>& C_in_b_now = C_in_b[stage];
-    return (C_in_b_now * drift_.rate(C_in_b_now.inverse() * Vec<In>::assume(h))).raw();
+    return (C_in_b_now * drift_.rate(stage == 0 ? h_b_ : C_in_b_now.inverse() * Vec<In>::assume(h))).raw();
   };
   Vector3d h = precess<double>(h_in_.raw(), step_s, omega_in);
   if (drift_.walk()) {
@@ -193,6 +194,7 @@ void Gyro::advance(double t_s, double step_s, const Rot<In, C>& middle, const Ro
   }
   h_in_ = Vec<In>::assume(h);
   C_in_b_ = C_in_b[2];
+  h_b_ = C_in_b_.inverse() * h_in_;
 }
 
 Truth::Gyro Gyro::truth() const {

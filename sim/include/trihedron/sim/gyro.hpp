@@ -103,7 +103,7 @@ class Gyro {
   void advance(double t_s, double step_s, const Rot<In, C>& middle, const Rot<In, C>& end, bool sunlit = false);
 
   [[nodiscard]] const Vec<In>& momentum() const { return h_in_; }
-  [[nodiscard]] Vec<Case> momentum_in_case() const { return C_in_b_.inverse() * h_in_; }
+  [[nodiscard]] Vec<Case> momentum_in_case() const { return h_b_; }
   /// The same in the case of a body that stands at C_in_c.
   [[nodiscard]] Vec<Case> momentum_in_case(const Rot<In, C>& C_in_c) const {
     return (C_in_c * C_c_b_).inverse() * h_in_;
@@ -120,6 +120,7 @@ class Gyro {
   Rot<C, Case> C_c_b_;
   Rot<In, Case> C_in_b_;
   Vec<In> h_in_;
+  Vec<Case> h_b_;  ///< the same in case axes
 };
 
 }  // namespace trihedron::sim
