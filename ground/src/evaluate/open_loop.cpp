@@ -162,25 +162,28 @@ AttitudeRule attitude_rule_of(Estimator estimator) {
 }
 
 std::vector<OpenLoops> fly_open_loops(const Pass& pass, const CalibrationRun& run, const std::vector<Time>& reference_t,
-                                      const std::vector<Eigen::Quaterniond>& reference_q_in_c, double limit_rad) {
+                                      const std::vector<Eigen::Quaterniond>& reference_q_in_c, double limit_rad,
+                                      OpenLoopScope scope) {
   const AttitudeRule rule = attitude_rule_of(run.calibration.estimator);
   const auto errors_of = [&](Time t, const std::vector<GyroCalibration>& gyros) {
     return attitude_errors(fly_open_loop(pass, t, gyros, reference_t, rule), reference_t, reference_q_in_c);
   };
   std::optional<BodyMotion> motion;
-  if (run.attitude.size() > 0) {
+  if (scope == OpenLoopScope::kAll && run.attitude.size() > 0) {
     motion.emplace(run.attitude.t, run.attitude.q_in_c);
   }
   std::vector<OpenLoops> all;
   for (const Correction& correction : run.corrections) {
-    OpenLoops loops;
+    OpenLoops& loops = all.emplace_back();
+    if (scope == OpenLoopScope::kExtension && all.size() == 1) {
+      continue;
+    }
     loops.known_before = errors_of(correction.t, correction.known_before);
     loops.calibrated = errors_of(correction.t, correction.calibrated);
     if (motion && correction.errors.is_known()) {
       loops.predicted = predicted(correction, *motion, rule);
     }
     loops.intervals = {interval_of(loops.known_before, limit_rad), interval_of(loops.calibrated, limit_rad)};
-    all.push_back(std::move(loops));
   }
   return all;
 }
