@@ -175,6 +175,24 @@ TEST(Calibrate, RecordsEveryFixAndSample) {
       2.9e-4);
 }
 
+TEST(Calibrate, FliesOnceWhereWhatIsDecidedIsWhatThePassWasScreenedWith) {
+  const Pass& pass = two_hours().pass;
+  std::vector<double> parts;
+  const auto progress = [&](double part) { parts.push_back(part); };
+  const CalibrationRun decided = calibrate(pass, {}, progress);
+  EXPECT_EQ(parts, std::vector<double>{1});
+  CalibrationOptions options = decided.options;
+  options.find_noise = false;
+  const CalibrationRun flown = calibrate(pass, options, progress);
+  EXPECT_GT(parts.size(), 50U);
+  EXPECT_EQ(decided.calibration.estimator, Estimator::kInvariant);
+  EXPECT_EQ(decided.calibration.gyros[1].drift_rad_s, flown.calibration.gyros[1].drift_rad_s);
+  EXPECT_EQ(decided.calibration.covariance, flown.calibration.covariance);
+  EXPECT_EQ(decided.attitude.sigma_rad, flown.attitude.sigma_rad);
+  EXPECT_EQ(decided.navigation.t, flown.navigation.t);
+  EXPECT_EQ(decided.navigation.sigma_rad, flown.navigation.sigma_rad);
+}
+
 TEST(Calibrate, StartsFromAnEarlierCalibration) {
   const auto first = calibrate(two_hours().pass, told());
   Pass pass = two_hours().pass;
