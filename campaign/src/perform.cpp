@@ -176,8 +176,7 @@ void measure_open_loops(const ground::CalibrationEvaluation& evaluation, RunReco
 
 }  // namespace
 
-Flight fly(const Scenario& scenario, const CalibrationOptions& options, double limit_rad,
-           ground::OpenLoopScope scope) {
+Flight fly(const Scenario& scenario, const CalibrationOptions& options, double limit_rad, ground::OpenLoopScope scope) {
   Flight flight{sim::simulate(scenario), {}, {}};
   flight.run = ground::calibrate(flight.simulated.pass, options);
   flight.evaluation =

@@ -364,9 +364,8 @@ std::optional<DriftModelId> larger_model(const DriftModelId& model) {
 /// Whether what is decided may be what the pass is screened with: eq. (1) without further states.
 bool may_be_screened_with(const CalibrationOptions& asked) {
   return (asked.drift_field || !asked.drift_model || asked.drift_model == kEsg7) &&
-         std::ranges::none_of(kFurtherStates, [&](const FurtherStateRow& row) {
-           return asked.further_states.is_on(row.state);
-         });
+         std::ranges::none_of(kFurtherStates,
+                              [&](const FurtherStateRow& row) { return asked.further_states.is_on(row.state); });
 }
 
 /// Turns on what star trackers and rotors usually have; the priors allow for its absence.

@@ -297,8 +297,8 @@ struct Unknowns {
 class TurnFit {
   static constexpr std::size_t kThinned = 4;  ///< of the turns one in so many, at first
   static constexpr int kMostRows = 2 * kMaxGyros;
-  using Rows = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor, kMostRows,
-                             Unknowns{kMaxGyros}.size() + 1>;
+  using Rows =
+      Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor, kMostRows, Unknowns{kMaxGyros}.size() + 1>;
 
  public:
   TurnFit(const Pass& pass, const GyroReadings& readings, double offset_s)
