@@ -176,11 +176,11 @@ void measure_open_loops(const ground::CalibrationEvaluation& evaluation, RunReco
 
 }  // namespace
 
-Flight fly(const Scenario& scenario, const CalibrationOptions& options, double limit_rad) {
+Flight fly(const Scenario& scenario, const CalibrationOptions& options, double limit_rad, ground::OpenLoopScope scope) {
   Flight flight{sim::simulate(scenario), {}, {}};
   flight.run = ground::calibrate(flight.simulated.pass, options);
   flight.evaluation =
-      ground::evaluate_calibration(flight.simulated.pass, flight.run, &flight.simulated.truth, limit_rad);
+      ground::evaluate_calibration(flight.simulated.pass, flight.run, &flight.simulated.truth, limit_rad, scope);
   return flight;
 }
 
@@ -228,7 +228,8 @@ RunRecord perform(const CampaignPlan& plan, std::uint64_t run, const ScenarioOf&
   }
   if (scenario) {
     try {
-      Flight flight = fly(*scenario, options, plan.limit_rad);
+      Flight flight = fly(*scenario, options, plan.limit_rad,
+                          flown ? ground::OpenLoopScope::kAll : ground::OpenLoopScope::kExtension);
       record = record_of(flight, plan.gyros);
       if (flown) {
         flown(std::move(flight));

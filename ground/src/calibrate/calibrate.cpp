@@ -270,23 +270,30 @@ CalibrationRun calibrate_as_stamped(const Pass& pass, const CalibrationOptions& 
   CalibrationOptions flown = by_batch ? options_of_on_board_run(settings, decision) : decision.options;
   flown.direction_random_walk_rad_sqrt_s =
       std::hypot(flown.direction_random_walk_rad_sqrt_s, decision.left_out_walk_rad_sqrt_s);
-  Pipeline pipeline(settings, flown);
-  Recorder recorder;
-  ProgressMeter meter(progress, pass.gyro.size());
-  const auto on_board = [&] {
-    replay(pass, pipeline, [&](const StepReport& report) {
-      recorder.add(report, pipeline);
-      meter.step(report);
-    });
+  const bool is_flown = decision.run && decision.run->is_of(settings, flown);
+  OnBoardRun on_board = is_flown ? *std::move(decision.run) : OnBoardRun{Pipeline(settings, flown), {}};
+  decision.run.reset();
+  Pipeline& pipeline = on_board.pipeline;
+  Recorder& recorder = on_board.recorder;
+  const auto fly = [&] {
+    ProgressMeter meter(progress, pass.gyro.size());
+    if (!is_flown) {
+      replay(pass, pipeline, [&](const StepReport& report) {
+        recorder.add(report, pipeline);
+        meter.step(report);
+      });
+    } else if (progress) {
+      progress(1);
+    }
     if (!pipeline.started()) {
       throw nothing_used(recorder.run().fixes);
     }
   };
   std::optional<Smoothed> smoothed;
   if (by_batch) {
-    side_by_side(on_board, [&] { smoothed.emplace(smooth(pass, decision)); });
+    side_by_side(fly, [&] { smoothed.emplace(smooth(pass, decision)); });
   } else {
-    on_board();
+    fly();
   }
   CalibrationRun run = std::move(recorder).take();
   run.options = decision.options;

@@ -361,6 +361,13 @@ std::optional<DriftModelId> larger_model(const DriftModelId& model) {
   return is_there ? std::optional(vsh(model.degree + 1)) : std::nullopt;
 }
 
+/// Whether what is decided may be what the pass is screened with: eq. (1) without further states.
+bool may_be_screened_with(const CalibrationOptions& asked) {
+  return (asked.drift_field || !asked.drift_model || asked.drift_model == kEsg7) &&
+         std::ranges::none_of(kFurtherStates,
+                              [&](const FurtherStateRow& row) { return asked.further_states.is_on(row.state); });
+}
+
 /// Turns on what star trackers and rotors usually have; the priors allow for its absence.
 CalibrationOptions with_usual_states(CalibrationOptions options) {
   options.drift_model = options.drift_model.value_or(kEsg20);
@@ -446,7 +453,8 @@ Decision decide(const Pass& pass, const CalibrationOptions& asked_for) {
     leave_out_what_is_open(options);
     return decision;
   }
-  Screened screened = screen(pass, options);
+  Screened screened = screen(pass, options, may_be_screened_with(asked));
+  std::optional<OnBoardRun> run = std::exchange(screened.run, std::nullopt);
   if (screened.pass.fixes.empty()) {
     options.estimator = asked_for.estimator;
     options.drift_field = asked_for.drift_field;
@@ -475,6 +483,7 @@ Decision decide(const Pass& pass, const CalibrationOptions& asked_for) {
     use(members, drift.drift_model, *decided.settings);
     decided.members.reset();
     decided.field.reset();
+    decided.run = std::move(run);
     return decided;
   }
   DriftModelId largest_model = largest_to_compare(asked);
@@ -487,6 +496,7 @@ Decision decide(const Pass& pass, const CalibrationOptions& asked_for) {
       if (pass.settings.gyros.size() == 2) {  // which of more gyros is at fault is judged by the noise found
         decided.screened = std::move(screened);
       }
+      decided.run = std::move(run);
       return decided;
     }
     largest_model = *larger;

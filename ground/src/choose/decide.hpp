@@ -33,6 +33,7 @@ struct Decision {
   std::vector<DriftFieldLevel> levels;  ///< of the field of which that estimator has the members
   std::optional<Screened> screened;     ///< the screened pass by which it was decided, where it was
   std::optional<Nearby> nearby;         ///< what was found with it
+  std::optional<OnBoardRun> run;        ///< the run that screened it, where what is decided may be what it flew with
 };
 
 /// Settles each choice that is left to the program by the whole pass. Estimator paper has no further states; where the

@@ -3,6 +3,7 @@
 #include <Eigen/Cholesky>
 #include <Eigen/Core>
 #include <algorithm>
+#include <array>
 #include <chrono>
 #include <cmath>
 #include <limits>
@@ -70,10 +71,11 @@ class GyroReadings {
     Directions h_c;
     for (int k = 0; k < gyros_; ++k) {
       const Vector3d h_b = pass_.gyro.direction(i, k);
-      if (!(std::abs(h_b.norm() - 1) < 0.1)) {
+      const double norm = h_b.norm();
+      if (!(std::abs(norm - 1) < 0.1)) {
         return std::nullopt;
       }
-      h_c[k] = C_c_b_[k] * h_b.normalized();
+      h_c[k] = C_c_b_[k] * (h_b / norm);
     }
     return h_c;
   }
@@ -172,17 +174,19 @@ Matrix3d triad(const Vector3d& h1, const Vector3d& h2) {
 struct RateGrid {
   Time begin{};
   double step_s = 0;
-  std::vector<Vector3d> rate_c;
+  std::array<std::vector<double>, 3> rate_c;  ///< of each axis
+
+  [[nodiscard]] long size() const { return static_cast<long>(rate_c[0].size()); }
 };
 
 /// Mean rates over `span_s` from each time of the grid on, by the trihedron of the first two momenta.
 RateGrid rates_by_gyros(const GyroReadings& readings, double step_s, double span_s) {
   RateGrid grid{readings.t(0), step_s, {}};
-  const Vector3d unknown = Vector3d::Constant(std::numeric_limits<double>::quiet_NaN());
+  constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
   const double length_s = to_seconds(readings.t(readings.size() - 1) - grid.begin);
   const auto steps = static_cast<std::size_t>(length_s / step_s) + 1;
-  std::vector<Matrix3d> C_c_g(steps, Matrix3d::Constant(unknown(0)));
-  std::vector<double> at_s(steps, unknown(0));
+  std::vector<Matrix3d> C_c_g(steps, Matrix3d::Constant(kUnknown));
+  std::vector<double> at_s(steps, kUnknown);
   std::size_t i = 0;
   for (std::size_t n = 0; n < steps; ++n) {
     const Time t = grid.begin + from_seconds(static_cast<double>(n) * step_s);
@@ -197,11 +201,14 @@ RateGrid rates_by_gyros(const GyroReadings& readings, double step_s, double span
     }
   }
   const auto apart = std::max<std::size_t>(static_cast<std::size_t>(std::lround(span_s / step_s)), 1);
-  grid.rate_c.assign(steps, unknown);
+  grid.rate_c.fill(std::vector<double>(steps, kUnknown));
   for (std::size_t n = 0; n + apart < steps; ++n) {
     const Matrix3d turn = C_c_g[n] * C_c_g[n + apart].transpose();
     if (turn.allFinite()) {
-      grid.rate_c[n] = Rot<C, C>::assume(turn).log().raw() / (at_s[n + apart] - at_s[n]);
+      const Vector3d rate_c = Rot<C, C>::assume(turn).log().raw() / (at_s[n + apart] - at_s[n]);
+      for (int axis = 0; axis < 3; ++axis) {
+        grid.rate_c[static_cast<std::size_t>(axis)][n] = rate_c(axis);
+      }
     }
   }
   return grid;
@@ -220,43 +227,46 @@ double rough_offset_s(const Pass& pass, const GyroReadings& readings) {
     return 0;
   }
   const RateGrid grid = rates_by_gyros(readings, step_s, period_s);
-  struct Seen {
-    long place;
-    Vector3d rate_c;
-    Vector3d weight;
-  };
-  std::vector<Seen> seen;
+  const long farthest = std::lround(kFarthest_s / step_s);
+  const long lags = 2 * farthest + 1;
+  std::vector<double> costs(static_cast<std::size_t>(lags));
+  std::vector<double> counts(costs.size());
   const double alignment_rad = largest_alignment_sigma(pass.settings);
   const double readout_rad = pass.settings.gyros.front().readout_noise_rad;
   const std::size_t every = turns.size() / kMostTurns + 1;
+  double seen = 0;
   for (std::size_t i = 0; i < turns.size(); i += every) {
     const Turn& turn = turns[i];
     const double span_s = to_seconds(turn.second - turn.first);
     const Eigen::Array3d variance = 2 * pass.settings.star_tracker_noise_rad.array().square() +
                                     4 * readout_rad * readout_rad + std::pow(alignment_rad * turn.angle_rad, 2);
-    seen.push_back({std::lround(to_seconds(turn.first - grid.begin) / step_s),
-                    Rot<C, C>::assume(turn.C_first_second).log().raw() / span_s, span_s * span_s / variance});
-  }
-  const long farthest = std::lround(kFarthest_s / step_s);
-  const auto size = static_cast<long>(grid.rate_c.size());
-  std::vector<double> costs;
-  for (long lag = -farthest; lag <= farthest; ++lag) {
-    double cost = 0;
-    long count = 0;
-    for (const Seen& its : seen) {
-      const long place = its.place + lag;
-      if (place < 0 || place >= size) {
-        continue;
-      }
-      const Vector3d off = its.rate_c - grid.rate_c[static_cast<std::size_t>(place)];
-      const double square = off.cwiseAbs2().dot(its.weight);
-      if (square >= 0) {  // both known
-        cost += std::min(square, kGate * kGate);
-        ++count;
-      }
+    const Vector3d rate_c = Rot<C, C>::assume(turn.C_first_second).log().raw() / span_s;
+    const Vector3d weight = span_s * span_s / variance;
+    ++seen;
+    // All lags at once, from the first to the last that the grid has a place for.
+    const long first_place = std::lround(to_seconds(turn.first - grid.begin) / step_s) - farthest;
+    const long first_lag = std::clamp(-first_place, 0L, lags);
+    const long count = std::min(lags, grid.size() - first_place) - first_lag;
+    if (count <= 0) {
+      continue;
     }
-    costs.push_back(2 * count >= static_cast<long>(seen.size()) ? cost / static_cast<double>(count)
-                                                                : std::numeric_limits<double>::infinity());
+    const double* x = &grid.rate_c[0][static_cast<std::size_t>(first_place + first_lag)];
+    const double* y = &grid.rate_c[1][static_cast<std::size_t>(first_place + first_lag)];
+    const double* z = &grid.rate_c[2][static_cast<std::size_t>(first_place + first_lag)];
+    double* cost = &costs[static_cast<std::size_t>(first_lag)];
+    double* known = &counts[static_cast<std::size_t>(first_lag)];
+    const double rate[] = {rate_c.x(), rate_c.y(), rate_c.z()};
+    const double w[] = {weight.x(), weight.y(), weight.z()};
+    for (long lag = 0; lag < count; ++lag) {
+      const double off[] = {rate[0] - x[lag], rate[1] - y[lag], rate[2] - z[lag]};
+      const double square = off[0] * off[0] * w[0] + (off[1] * off[1] * w[1] + off[2] * off[2] * w[2]);
+      const bool are_known = square >= 0;
+      cost[lag] += are_known ? std::min(square, kGate * kGate) : 0;
+      known[lag] += are_known ? 1 : 0;
+    }
+  }
+  for (std::size_t lag = 0; lag < costs.size(); ++lag) {
+    costs[lag] = 2 * counts[lag] >= seen ? costs[lag] / counts[lag] : std::numeric_limits<double>::infinity();
   }
   const auto best = std::ranges::min_element(costs);
   std::vector<double> sorted = costs;
@@ -287,7 +297,8 @@ struct Unknowns {
 class TurnFit {
   static constexpr std::size_t kThinned = 4;  ///< of the turns one in so many, at first
   static constexpr int kMostRows = 2 * kMaxGyros;
-  using Rows = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, kMostRows, Unknowns{kMaxGyros}.size() + 1>;
+  using Rows =
+      Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor, kMostRows, Unknowns{kMaxGyros}.size() + 1>;
 
  public:
   TurnFit(const Pass& pass, const GyroReadings& readings, double offset_s)
@@ -353,6 +364,10 @@ class TurnFit {
     for (std::size_t i = 0; i < turns_.size(); i += roughly ? kThinned : 1) {
       needed[turns_[i].first_fix] = needed[turns_[i].second_fix] = true;
     }
+    PerGyro<Matrix3d> align;
+    for (int k = 0; k < unknowns_.gyros; ++k) {
+      align[k] = Rot<C, C>::exp(Vec<C>::assume(x_.segment<3>(unknowns_.alignment(k)))).raw();
+    }
     std::size_t from = 0;
     for (std::size_t i = 0; i < fixes.size(); ++i) {
       if (!needed[i]) {
@@ -365,53 +380,51 @@ class TurnFit {
       if (!its || std::abs(clock_s - its->clock_s) > kNear_s) {
         its = Fitted{clock_s, readings_.at(fixes.t[i] + from_seconds(clock_s), from)};
       }
-      at_fix_[i] = its->directions;
-      for (int k = 0; at_fix_[i] && k < unknowns_.gyros; ++k) {
-        Vector3d& h_b = at_fix_[i]->h_b[k];
-        h_b = (h_b + (clock_s - its->clock_s) * at_fix_[i]->h_b_rate[k]).normalized();
+      AtFix& at = at_fix_[i];
+      at.is_there = its->directions.has_value();
+      if (!at.is_there) {
+        continue;
       }
+      for (int k = 0; k < unknowns_.gyros; ++k) {
+        const Vector3d& rate = its->directions->h_b_rate[k];
+        const double late_s = k == 0 ? 0 : x_(Unknowns::late(k));
+        at.h[k] = (its->directions->h_b[k] + (clock_s - its->clock_s) * rate).normalized();
+        at.aligned[k] = align[k] * (at.h[k] + late_s * rate);
+        at.aligned_rate[k] = align[k] * rate;
+      }
+      at.trihedron = triad(align[0] * at.h[0], align[1] * at.h[1]);
     }
   }
 
   /// Rows of one turn about the unknowns and right of them the residual, white; and how large the square of those about
   /// the offset would be in a flight that does not show it. False where a reading is missing.
   bool rows_of(const Turn& turn, bool roughly, Rows& rows, double& noise_square) const {
-    const auto& first = at_fix_[turn.first_fix];
-    const auto& second = at_fix_[turn.second_fix];
-    if (!first || !second) {
+    const AtFix& first = at_fix_[turn.first_fix];
+    const AtFix& second = at_fix_[turn.second_fix];
+    if (!first.is_there || !second.is_there) {
       return false;
     }
     const double span_s = to_seconds(turn.second - turn.first);
     const double ages_s[] = {to_seconds(turn.first - middle_), to_seconds(turn.second - middle_)};
     const Matrix3d back = turn.C_first_second.transpose();
-    PerGyro<Matrix3d> align;
-    for (int k = 0; k < unknowns_.gyros; ++k) {
-      align[k] = Rot<C, C>::exp(Vec<C>::assume(x_.segment<3>(unknowns_.alignment(k)))).raw();
-    }
     // Derivatives at the turn by the gyros: the noise of that by the fixes is in the residual as well, and their
     // product would not average out.
-    const auto trihedron = [&](const FittedDirections& fit) {
-      return triad(align[0] * fit.h_b[0], align[1] * fit.h_b[1]);
-    };
-    const Matrix3d smooth = trihedron(*second) * trihedron(*first).transpose();
+    const Matrix3d smooth = second.trihedron * first.trihedron.transpose();
     const int n = unknowns_.size();
     rows.setZero(2L * unknowns_.gyros, n + 1);
     Eigen::Matrix<double, Eigen::Dynamic, 3, 0, kMostRows, 3> by_fix(rows.rows(), 3);
     Eigen::Matrix<double, Eigen::Dynamic, 1, 0, kMostRows, 1> white(rows.rows());
     for (int k = 0; k < unknowns_.gyros; ++k) {
-      const double late_s = k == 0 ? 0 : x_(Unknowns::late(k));
-      const auto moved = [&](const FittedDirections& fit) {
-        return std::pair<Vector3d, Vector3d>(align[k] * (fit.h_b[k] + late_s * fit.h_b_rate[k]),
-                                             align[k] * fit.h_b_rate[k]);
-      };
-      const auto [h1, rate1] = moved(*first);
-      const auto [h2, rate2] = moved(*second);
+      const Vector3d& h1 = first.aligned[k];
+      const Vector3d& h2 = second.aligned[k];
+      const Vector3d& rate1 = first.aligned_rate[k];
+      const Vector3d& rate2 = second.aligned_rate[k];
       // Two directions across h.
       Eigen::Matrix<double, 2, 3> across;
       across.row(0) = h2.unitOrthogonal().transpose();
       across.row(1) = h2.cross(across.row(0).transpose()).transpose();
       const Esg7::Basis<double> by_drift =
-          span_s / 2 * (smooth * readings_.drift_basis(k, first->h_b[k]) + readings_.drift_basis(k, second->h_b[k]));
+          span_s / 2 * (smooth * readings_.drift_basis(k, first.h[k]) + readings_.drift_basis(k, second.h[k]));
       const Vector3d drift = by_drift * x_.segment<Esg7::kSize>(unknowns_.drift(k));
       const Vector3d off = h2 - back * h1 - drift.cross(h2);
       auto its = rows.middleRows<2>(2L * k);
@@ -434,11 +447,20 @@ class TurnFit {
         by_fix * noise.asDiagonal() * by_fix.transpose();
     R.diagonal() += white;
     const auto root = R.llt();
-    root.matrixL().solveInPlace(rows);
+    const auto whiten = [&](auto& its) {
+      for (Eigen::Index row = 0; row < its.rows(); ++row) {
+        for (Eigen::Index above = 0; above < row; ++above) {
+          its.row(row) -= root.matrixLLT()(row, above) * its.row(above);
+        }
+        its.row(row) *= 1 / root.matrixLLT()(row, row);
+      }
+    };
+    whiten(rows);
     // What the noise of the rates alone would make of the derivative by the offset.
     const double readout_rad = pass_.settings.gyros.front().readout_noise_rad;
-    noise_square = 2 * readings_.rate_variance() * readout_rad * readout_rad *
-                   root.solve(decltype(R)::Identity(rows.rows(), rows.rows())).trace();
+    decltype(R) unit = decltype(R)::Identity(rows.rows(), rows.rows());
+    whiten(unit);
+    noise_square = 2 * readings_.rate_variance() * readout_rad * readout_rad * unit.squaredNorm();
     return rows.allFinite();
   }
 
@@ -455,6 +477,7 @@ class TurnFit {
     scores_.clear();
     shown_ = shown_by_noise_ = 0;
     VectorXd score = VectorXd::Zero(n);
+    VectorXd of_turn(n);
     VectorXd sum = VectorXd::Zero(n);
     long stretch = 0;
     long used = 0;
@@ -498,7 +521,11 @@ class TurnFit {
       if (count >= kTogether) {
         put_into_normal();
       }
-      score.noalias() += rows.leftCols(n).transpose() * rows.col(n);
+      of_turn = rows(0, n) * rows.row(0).head(n).transpose();
+      for (Eigen::Index row = 1; row < rows.rows(); ++row) {
+        of_turn += rows(row, n) * rows.row(row).head(n).transpose();
+      }
+      score += of_turn;
       ++used;
     }
     close();
@@ -572,7 +599,16 @@ class TurnFit {
     std::optional<FittedDirections> directions;
   };
   std::vector<std::optional<Fitted>> fitted_;
-  std::vector<std::optional<FittedDirections>> at_fix_;
+  /// The readings at a fix by the clocks as they are now, with their rates; c axes by the alignments known before, and
+  /// by those that are fitted.
+  struct AtFix {
+    bool is_there = false;
+    Directions h;
+    Directions aligned;  ///< and by how late each gyro is
+    Directions aligned_rate;
+    Matrix3d trihedron;
+  };
+  std::vector<AtFix> at_fix_;
   double scale_ = 1;
   double shown_ = 0;  ///< square sum of the derivatives by the offset; and what noise alone would make of it
   double shown_by_noise_ = 0;

@@ -93,12 +93,8 @@ CorrectionInterval interval_of(const AttitudeErrors& errors, double limit_rad) {
   return intervals.empty() ? CorrectionInterval{} : intervals.front();
 }
 
-/// Every ten minutes up to the end of the pass.
-std::vector<PredictedError> predicted(const CalibrationRun& run, const Correction& correction, AttitudeRule rule) {
-  if (!correction.errors.is_known() || run.attitude.size() == 0) {
-    return {};
-  }
-  const BodyMotion motion(run.attitude.t, run.attitude.q_in_c);
+/// Every ten minutes up to the end of the motion, which is that of the pass.
+std::vector<PredictedError> predicted(const Correction& correction, const BodyMotion& motion, AttitudeRule rule) {
   GyroMask used{};
   used[0] = used[1] = true;
   std::vector<Duration> after;
@@ -143,10 +139,12 @@ AttitudeHistory fly_open_loop(const Pass& pass, Time t, const std::vector<GyroCa
         last = h_b;
         last_t = now;
       }
-      if (const auto attitude = flown.attitude(*h_b); attitude && now == *epoch) {
-        history.t.push_back(now);
-        history.q_in_c.push_back(attitude.value().C_in_c.quaternion());
-        history.age_s.push_back(to_seconds(now - t));
+      if (now == *epoch) {
+        if (const auto attitude = flown.attitude(*h_b)) {
+          history.t.push_back(now);
+          history.q_in_c.push_back(attitude.value().C_in_c.quaternion());
+          history.age_s.push_back(to_seconds(now - t));
+        }
       }
     }
     if (now == *epoch) {
@@ -164,19 +162,28 @@ AttitudeRule attitude_rule_of(Estimator estimator) {
 }
 
 std::vector<OpenLoops> fly_open_loops(const Pass& pass, const CalibrationRun& run, const std::vector<Time>& reference_t,
-                                      const std::vector<Eigen::Quaterniond>& reference_q_in_c, double limit_rad) {
+                                      const std::vector<Eigen::Quaterniond>& reference_q_in_c, double limit_rad,
+                                      OpenLoopScope scope) {
   const AttitudeRule rule = attitude_rule_of(run.calibration.estimator);
   const auto errors_of = [&](Time t, const std::vector<GyroCalibration>& gyros) {
     return attitude_errors(fly_open_loop(pass, t, gyros, reference_t, rule), reference_t, reference_q_in_c);
   };
+  std::optional<BodyMotion> motion;
+  if (scope == OpenLoopScope::kAll && run.attitude.size() > 0) {
+    motion.emplace(run.attitude.t, run.attitude.q_in_c);
+  }
   std::vector<OpenLoops> all;
   for (const Correction& correction : run.corrections) {
-    OpenLoops loops;
+    OpenLoops& loops = all.emplace_back();
+    if (scope == OpenLoopScope::kExtension && all.size() == 1) {
+      continue;
+    }
     loops.known_before = errors_of(correction.t, correction.known_before);
     loops.calibrated = errors_of(correction.t, correction.calibrated);
-    loops.predicted = predicted(run, correction, rule);
+    if (motion && correction.errors.is_known()) {
+      loops.predicted = predicted(correction, *motion, rule);
+    }
     loops.intervals = {interval_of(loops.known_before, limit_rad), interval_of(loops.calibrated, limit_rad)};
-    all.push_back(std::move(loops));
   }
   return all;
 }

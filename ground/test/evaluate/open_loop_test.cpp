@@ -94,6 +94,14 @@ TEST(OpenLoops, MeasureTheExtensionFromTheSecondCorrectionOn) {
   EXPECT_TRUE(extension->is_lower_bound);
   // The third is at the end of the pass: nothing to watch.
   EXPECT_EQ(loops[2].intervals.extension(), std::nullopt);
+
+  const auto alone = fly_open_loops(pass, run, truth.t, truth.q_in_c, kLimit, OpenLoopScope::kExtension);
+  ASSERT_EQ(alone.size(), 3U);
+  EXPECT_TRUE(alone[0].calibrated.t.empty());
+  EXPECT_EQ(alone[1].calibrated.error_rad, loops[1].calibrated.error_rad);
+  EXPECT_FALSE(loops[1].predicted.empty());
+  EXPECT_TRUE(alone[1].predicted.empty());
+  EXPECT_EQ(median_extension(alone)->factor, extension->factor);
 }
 
 TEST(OpenLoops, WithBetterCoefficientsLastLonger) {

@@ -28,7 +28,8 @@ struct Flight {
 };
 
 /// Simulates, calibrates, compares with the truth. Throws std::invalid_argument and ground::SetupError.
-[[nodiscard]] Flight fly(const Scenario& scenario, const CalibrationOptions& options, double limit_rad);
+[[nodiscard]] Flight fly(const Scenario& scenario, const CalibrationOptions& options, double limit_rad,
+                         ground::OpenLoopScope scope);
 
 /// What is measured of it, and its verdict. Without number, seed, draws and times.
 [[nodiscard]] RunRecord record_of(const Flight& flight, std::size_t gyros);

@@ -29,6 +29,7 @@ struct CalibrationEvaluation {
 /// `run`: a calibration of this pass. Without a truth, which may be null, the reference is the fixes that the
 /// calibration used, and parameters are compared with their final values.
 [[nodiscard]] CalibrationEvaluation evaluate_calibration(const Pass& pass, const CalibrationRun& run,
-                                                         const Truth* truth, double limit_rad = kAttitudeLimit_rad);
+                                                         const Truth* truth, double limit_rad = kAttitudeLimit_rad,
+                                                         OpenLoopScope scope = OpenLoopScope::kAll);
 
 }  // namespace trihedron::ground

@@ -33,11 +33,15 @@ struct OpenLoops {
   std::vector<PredictedError> predicted;  ///< of `calibrated`, by the covariance at the correction
 };
 
+/// Which open loops are flown: all, with what is predicted of them, or those that the extension is told by, from the
+/// second correction on, without predictions. The others are left empty.
+enum class OpenLoopScope { kAll, kExtension };
+
 /// From each of the run's corrections, against a reference attitude.
 [[nodiscard]] std::vector<OpenLoops> fly_open_loops(const Pass& pass, const CalibrationRun& run,
                                                     const std::vector<Time>& reference_t,
                                                     const std::vector<Eigen::Quaterniond>& reference_q_in_c,
-                                                    double limit_rad);
+                                                    double limit_rad, OpenLoopScope scope = OpenLoopScope::kAll);
 
 /// Over the corrections from the second on: at the first nothing is calibrated yet.
 [[nodiscard]] std::optional<Extension> median_extension(const std::vector<OpenLoops>& loops);
