@@ -29,6 +29,8 @@ FORECAST_S = 270 * 60.0
 NEED_RAD = math.radians(5 / 60)
 NEED = "5arcmin for 270min"
 LIMIT_SIGMAS = 4
+# The last is FORECAST_S.
+FORECASTS_MIN = (90, 270)
 # Of the epochs of an attitude history. By normal errors 4 sigmas of one of three axes are passed at 2 in 10 000; neighbours are alike.
 ROWS_BEYOND = 0.01
 ESTIMATORS = ("invariant", "batch")
@@ -131,12 +133,24 @@ def nees_of(errors, calibration):
     return math.fsum(value * value for value in white)
 
 
-def attitude_errors(truth, file):
-    """At the epochs of both: (error, rad; error of the worst axis in its sigmas)."""
-    for t, row in rows_of(file, QUATERNION + SIGMAS).items():
-        if t in truth.attitude:
-            off = logarithm(product(inverse(truth.attitude[t]), tuple(row[:4])))
-            yield math.sqrt(sum(x * x for x in off)), max(abs(x) / sigma for x, sigma in zip(off, row[4:]))
+def errors_by_axis(truth, file):
+    """At the epochs of both: {milliseconds: (errors about x, y and z; their sigmas)}, rad."""
+    return {t: (logarithm(product(inverse(truth.attitude[t]), tuple(row[:4]))), row[4:])
+            for t, row in rows_of(file, QUATERNION + SIGMAS).items() if t in truth.attitude}
+
+
+def attitude_errors(errors):
+    """Of each epoch of errors_by_axis(): (error, rad; error of the worst axis in its sigmas)."""
+    for off, sigmas in errors.values():
+        yield math.sqrt(sum(x * x for x in off)), max(abs(x) / sigma for x, sigma in zip(off, sigmas))
+
+
+def forecast_at(errors, after_min):
+    """Errors and sigmas by axis, arcseconds, at the last epoch of the minute before the forecast is so old; None where it has none."""
+    end = round((PASS_S + 60 * after_min) * 1000)
+    last = max((t for t in errors if end - 60_000 <= t <= end), default=None)
+    return None if last is None else {name: [rounded(x / ARCSECOND) for x in values]
+                                      for name, values in zip(("error_arcsec", "sigma_arcsec"), errors[last])}
 
 
 def judged(program, directory, truth, estimator):
@@ -155,7 +169,7 @@ def judged(program, directory, truth, estimator):
     if not alignment_sigmas <= LIMIT_SIGMAS:
         wrong.append("alignment")
 
-    history = list(attitude_errors(truth, out / "attitude.csv"))
+    history = list(attitude_errors(errors_by_axis(truth, out / "attitude.csv")))
     beyond = sum(not sigmas <= LIMIT_SIGMAS for _, sigmas in history) / len(history) if history else 0
     worst_rad = max((error for error, sigmas in history if not sigmas <= LIMIT_SIGMAS), default=0)
     if beyond > ROWS_BEYOND or worst_rad > NEED_RAD:
@@ -164,7 +178,8 @@ def judged(program, directory, truth, estimator):
     # The fixes of the rest are there for the first one alone.
     flown, _ = call(program, "--json", "navigate", directory / "later", "--calibration", out / "calibration.json",
                     "--correction-interval", "none", "-o", forecast)
-    ahead = list(attitude_errors(truth, forecast)) if flown != 3 else []
+    by_axis = errors_by_axis(truth, forecast) if flown != 3 else {}
+    ahead = list(attitude_errors(by_axis))
     forecast_rad = max((error for error, _ in ahead), default=math.inf)
     forecast_sigmas = max((sigmas for _, sigmas in ahead), default=math.inf)
     # Half of the epochs: what navigates falls away where the calibration is of another world.
@@ -178,12 +193,20 @@ def judged(program, directory, truth, estimator):
             "drift_sigmas": rounded(max(abs(error) / sigma for error, sigma in drift)), "nees": rounded(nees_of(drift + alignment, calibration)),
             "nees_states": len(drift + alignment), "rows_beyond": rounded(beyond), "attitude_arcsec": rounded(worst_rad / ARCSECOND),
             "forecast_sigmas": rounded(forecast_sigmas), "forecast_arcsec": rounded(forecast_rad / ARCSECOND),
-            "predicted_arcsec": rounded(predicted_rad(calibration) / ARCSECOND)}
+            "predicted_arcsec": rounded(predicted_rad(calibration) / ARCSECOND), "predicted_causes": predicted_causes(calibration),
+            "wandering": [calibration.get("noise", {}).get(f"wandering_{what}") for what in ("drift_rad_s", "time_s")],
+            "forecast_at": {str(after_min): forecast_at(by_axis, after_min) for after_min in FORECASTS_MIN}}
 
 
 def predicted_rad(calibration):
     """That the error is said to stay below over the need, 99.7 %."""
     return calibration.get("forecast", {}).get("need", {}).get("error_997_rad", math.inf)
+
+
+def predicted_causes(calibration):
+    """{cause: its share of the mean square of the error that is predicted at the end of the need}; they overlap, the smallest are left out."""
+    causes = calibration.get("forecast", {}).get("need", {}).get("causes", [])
+    return {cause["name"]: rounded(cause["share"]) for cause in causes}
 
 
 def rounded(value):
@@ -361,6 +384,23 @@ def predictions(outcomes):
     return table(["estimator", "forecasts of needs not met", "median", "largest", "below 0.1"], rows)
 
 
+def widths(outcomes):
+    """Root mean square over passes and axes of the errors of forecasts in their sigmas, as `navigate` claims them: 1 where these are right."""
+    rows = []
+    for world in WORLDS:
+        cells = []
+        for estimator in ESTIMATORS:
+            its = [o["forecast_at"] for o in outcomes if o["world"] == world.name and o["estimator"] == estimator and o.get("forecast_at")]
+            for after_min in map(str, FORECASTS_MIN):
+                ratios = [error / sigma for ages in its if ages[after_min] for error, sigma in zip(*ages[after_min].values())]
+                cells += ([f"{math.sqrt(math.fsum(ratio * ratio for ratio in ratios) / len(ratios)):.2f}", f"{max(map(abs, ratios)):.1f}"]
+                          if ratios else ["·", "·"])
+        if any(cell != "·" for cell in cells):
+            rows.append([world.name, *cells])
+    return table(["world"] + [head for estimator in ESTIMATORS for after_min in FORECASTS_MIN
+                              for head in (f"{estimator}, {after_min} min", "largest")], rows)
+
+
 def table(heads, rows):
     return "\n".join("| " + " | ".join(row) + " |" for row in [heads, ["---"] * len(heads), *rows])
 
@@ -413,7 +453,7 @@ def consistency(outcomes):
 def write(document, outcomes):
     """Each table stands between `<!-- NAME -->` and `<!-- end -->`; the text around it is left alone."""
     text = document.read_text()
-    for name, made in (("in-all", in_all(outcomes)), ("predictions", predictions(outcomes)), ("per-world", per_world(outcomes)),
+    for name, made in (("in-all", in_all(outcomes)), ("predictions", predictions(outcomes)), ("widths", widths(outcomes)), ("per-world", per_world(outcomes)),
                        ("consistency", consistency(outcomes))):
         text, places = re.subn(rf"(<!-- {name} -->\n).*?(<!-- end -->)", lambda place: place[1] + made + "\n" + place[2], text, flags=re.DOTALL)
         if places != 1:

@@ -130,8 +130,25 @@ def test_errors_of_attitude_are_in_their_sigmas_and_of_the_fixes_alone(truth, tm
     file = tmp_path / "attitude.csv"
     file.write_text("t_s,q_x,q_y,q_z,q_w,sigma_x_rad,sigma_y_rad,sigma_z_rad\n0.125,1,0,0,0,1,1,1\n3.000,"
                     + ",".join(f"{x:.15f}" for x in q) + ",1e-5,1e-5,1e-5\n")
-    [(error, sigmas)] = verdict.attitude_errors(truth, file)
+    by_axis = verdict.errors_by_axis(truth, file)
+    [(error, sigmas)] = verdict.attitude_errors(by_axis)
     assert error == pytest.approx(2e-5, rel=1e-6) and sigmas == pytest.approx(2, rel=1e-6)
+    [(errors, claimed)] = by_axis.values()
+    assert errors == pytest.approx((0, 2e-5, 0), abs=1e-11) and claimed == [1e-5] * 3
+
+
+def test_a_forecast_is_seen_at_its_last_epoch_of_the_minute():
+    def at(after_s):
+        return round((worlds.PASS_S + after_s) * 1000)
+    errors = {at(5300): ((9, 9, 9), [9, 9, 9]), at(5391): ((2 * verdict.ARCSECOND, 0, 0), [verdict.ARCSECOND] * 3), at(5403): ((9, 9, 9), [9, 9, 9])}
+    assert verdict.forecast_at(errors, 90) == {"error_arcsec": [2, 0, 0], "sigma_arcsec": [1, 1, 1]}
+    assert verdict.forecast_at(errors, 270) is None
+
+
+def test_errors_of_forecasts_are_told_in_their_sigmas_by_world():
+    def flown(seed, error):
+        return outcome(seed=seed) | {"forecast_at": {"90": {"error_arcsec": [error, 0, 0], "sigma_arcsec": [2, 1, 1]}, "270": None}}
+    assert "| slews | · | · | · | · | 2.00 | 4.0 | · | · |" in verdict.widths([flown(1, 8), flown(2, -4 * 2 ** 0.5), outcome(seed=3), outcome("steady")])
 
 
 def test_what_has_moved_is_judged_where_it_is(truth, tmp_path):
