@@ -156,6 +156,16 @@ TEST(Sensitivity, OfTwoStretchesIsTheirChain) {
   EXPECT_LT((chained.by_alignment - whole.by_alignment).norm(), 1e-10 * whole.by_alignment.norm());
 }
 
+/// The same bits, but where sanitizers have Eigen add in another order (CMakeLists.txt): there to rounding.
+template <class Matrix>
+void expect_same_bits(const Matrix& a, const Matrix& b) {
+#ifdef EIGEN_UNROLLING_LIMIT
+  EXPECT_LT((a - b).norm(), 1e-13 * (1 + b.norm()));
+#else
+  EXPECT_EQ(a, b);
+#endif
+}
+
 /// A reading that turns, bias and alignment, and a drift by which a momentum turns by up to half a radian in a step.
 TEST(PrecessAll, GivesTheBitsOfEachGyroAlone) {
   constexpr int kCount = 3;  // two side by side, and one alone
@@ -189,11 +199,11 @@ TEST(PrecessAll, GivesTheBitsOfEachGyroAlone) {
       }
     }
     for (int k = 0; k < kCount; ++k) {
-      EXPECT_EQ(together[k].h_in, alone[k].h_in);
-      EXPECT_EQ(navigated[k].h_in, navigated_alone[k].h_in);
-      EXPECT_EQ(since[k].by_start, since_alone[k].by_start);
-      EXPECT_EQ(since[k].by_alignment, since_alone[k].by_alignment);
-      EXPECT_EQ(since[k].by_drift.first(kColumns), since_alone[k].by_drift.first(kColumns));
+      expect_same_bits(together[k].h_in, alone[k].h_in);
+      expect_same_bits(navigated[k].h_in, navigated_alone[k].h_in);
+      expect_same_bits(since[k].by_start, since_alone[k].by_start);
+      expect_same_bits(since[k].by_alignment, since_alone[k].by_alignment);
+      expect_same_bits(since[k].by_drift.first(kColumns).eval(), since_alone[k].by_drift.first(kColumns).eval());
     }
   }
 }
