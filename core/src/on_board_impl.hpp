@@ -356,7 +356,7 @@ int OnBoard<Estimator>::cost_of_stage() const {
       break;
     case Work::Stage::kFix:
     case Work::Stage::kAngles:
-      return Estimator::cost(work_.correction);
+      return estimator_.started() ? Estimator::cost(work_.correction) : Cost::kStarting;
     case Work::Stage::kCalibrated:
       return Cost::kCalibrated;
     case Work::Stage::kCatchingUp:

@@ -138,6 +138,7 @@ class OnBoard {
   struct Cost {
     static constexpr int kSample = 32;
     static constexpr int kBeginning = 170;
+    static constexpr int kStarting = 300;  ///< the filter, by its first fix
     static constexpr int kCalibrated = 90;
     static constexpr int kNavigatedSample = 16;
     static constexpr int kTakingOver = 250;
