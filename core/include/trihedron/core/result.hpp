@@ -15,7 +15,8 @@ class [[nodiscard]] Result {
   [[nodiscard]] bool ok() const { return ok_; }
   [[nodiscard]] explicit operator bool() const { return ok_; }
   /// The value; asserts ok().
-  /// Always inline: of what g++ splits off from it in several places it keeps one, and the call graph lacks the others.
+  /// Always inline: g++ would split off the failing branch and merge those of several types into one, and the call
+  /// graph would name functions that it has no frame of.
   [[nodiscard]] [[gnu::always_inline]] const T& value() const {
     TRIHEDRON_ASSERT(ok_);
     return value_;
