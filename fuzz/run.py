@@ -4,14 +4,16 @@
     fuzz/run.py BUILD [--seconds 3600] [--jobs 2] [--targets csv,netcdf] [--corpus DIRECTORY] [--document docs/reliability.md]
 
 Begins with the seeds that BUILD/trihedron_fuzz_seeds writes, the inputs of fuzz/regressions, and what earlier runs have left in the corpus.
-A target goes on after a crash until it has had its time of a processor. Exit status 1 where anything was found; the inputs that did it are in the corpus'
-directory `found`, and are tried again by: BUILD/fuzz_TARGET FILE.
+A target goes on after a crash until it has had its time of a processor. libFuzzer tells a hang by the clock, which other work on the machine sets
+forward: each is tried again alone, and counts where it takes as long of a processor. Exit status 1 where anything was found; the inputs that did it are
+in the corpus' directory `found`, and are tried again by: BUILD/fuzz_TARGET FILE.
 """
 import argparse
 import concurrent.futures
 import os
 import pathlib
 import re
+import resource
 import subprocess
 import sys
 
@@ -29,6 +31,15 @@ def targets(build):
 def figure(name, text):
     found = re.findall(rf"stat::{name}: +([\d.]+)", text)
     return float(found[-1]) if found else 0.0
+
+
+def hangs(build, target, file):
+    """Whether one input takes LIMIT_S of a processor, or never ends."""
+    try:
+        return subprocess.run([build / f"fuzz_{target}", file], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, env={**os.environ, **SANITIZERS},
+                              preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_CPU, (LIMIT_S, LIMIT_S)), timeout=60 * LIMIT_S).returncode != 0
+    except subprocess.TimeoutExpired:
+        return True
 
 
 def fuzz(build, target, corpus, seconds):
@@ -52,6 +63,9 @@ def fuzz(build, target, corpus, seconds):
         row["inputs"] += int(figure("number_of_executed_units", said))
         row["worst_ms"] = max(row["worst_ms"], figure("worst_time_ms", said), 1000 * figure("slowest_unit_time_sec", said))
         row["worst_mb"] = max(row["worst_mb"], figure("peak_rss_mb", said))
+    for path in found.glob(f"{target}-timeout*"):
+        if path.name not in before and not hangs(build, target, path):
+            path.unlink()
     new = [path.name for path in found.iterdir() if path.name.startswith(target + "-") and path.name not in before]
     row["crashes"] = sum(name.startswith((f"{target}-crash", f"{target}-leak")) for name in new)
     row["hangs"] = sum(name.startswith((f"{target}-timeout", f"{target}-slow")) for name in new)
