@@ -53,7 +53,7 @@ def fuzz(build, target, corpus, seconds):
     while (left := seconds - row["seconds"]) >= 1:
         command = [build / f"fuzz_{target}", own, *seeds, f"-max_total_time={int(left)}", f"-timeout={LIMIT_S}", f"-rss_limit_mb={LIMIT_MB}",
                    f"-max_len={LONGEST.get(target, 4096)}", f"-artifact_prefix={found}/{target}-", "-print_final_stats=1", "-verbosity=1",
-                   "-close_fd_mask=1", "-use_value_profile=1"]
+                   "-close_fd_mask=1", "-use_value_profile=1", "-reload=0"]  # no other process adds to the corpus
         log = corpus / f"{target}.log"
         with log.open("wb") as stderr:
             running = subprocess.Popen([str(word) for word in command], stdout=subprocess.DEVNULL, stderr=stderr, env={**os.environ, **SANITIZERS})

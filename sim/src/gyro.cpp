@@ -1,12 +1,16 @@
 #include "trihedron/sim/gyro.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <functional>
 #include <limits>
 #include <numbers>
 #include <stdexcept>
+#include <type_traits>
 
 #include "trihedron/sim/precession.hpp"
+#include "trihedron/sim/two.hpp"
 
 namespace trihedron::sim {
 namespace {
@@ -48,6 +52,34 @@ Vec<C> start_direction(const GyroScenario& scenario) {
     throw std::invalid_argument("gyro: the start direction must have a length");
   }
   return Vec<C>::assume(scenario.start_direction_c / length);
+}
+
+template <class S>
+constexpr std::size_t kLanes = 1;
+template <>
+constexpr std::size_t kLanes<Two> = 2;
+
+/// The matrices or vectors that `of` finds in each of the items, side by side.
+template <class S, class Item, class Of>
+auto of_each(std::span<Item> items, const Of& of) {
+  using Raw = std::remove_cvref_t<decltype(of(items[0]))>;
+  if constexpr (std::is_same_v<S, double>) {
+    return Raw(of(items[0]));
+  } else {
+    return Eigen::Matrix<S, Raw::RowsAtCompileTime, Raw::ColsAtCompileTime>(
+        of(items[0]).binaryExpr(of(items[1]), [](double first, double second) { return S(first, second); }));
+  }
+}
+
+/// That of one of them.
+template <class Raw>
+auto of_lane(const Raw& all, std::size_t lane) {
+  using One = Eigen::Matrix<double, Raw::RowsAtCompileTime, Raw::ColsAtCompileTime>;
+  if constexpr (std::is_same_v<typename Raw::Scalar, double>) {
+    return One(all);
+  } else {
+    return One(all.unaryExpr([lane](const Two& two) { return two[static_cast<int>(lane)]; }));
+  }
 }
 
 }  // namespace
@@ -175,6 +207,24 @@ Gyro::Gyro(const GyroScenario& scenario, const Rot<In, C>& C_in_c, std::uint64_t
       h_b_(C_in_b_.inverse() * h_in_) {}
 
 void Gyro::advance(double t_s, double step_s, const Rot<In, C>& middle, const Rot<In, C>& end, bool sunlit) {
+  begin_step(t_s, step_s, end, sunlit);
+  turn<double>({this, 1}, step_s, middle, end);
+}
+
+void Gyro::advance_all(std::span<Gyro> gyros, double t_s, double step_s, const Rot<In, C>& middle,
+                       const Rot<In, C>& end, bool sunlit) {
+  for (Gyro& gyro : gyros) {
+    gyro.begin_step(t_s, step_s, end, sunlit);
+  }
+  for (; gyros.size() >= 2; gyros = gyros.subspan(2)) {
+    turn<Two>(gyros.first(2), step_s, middle, end);
+  }
+  if (!gyros.empty()) {
+    turn<double>(gyros, step_s, middle, end);
+  }
+}
+
+void Gyro::begin_step(double t_s, double step_s, const Rot<In, C>& end, bool sunlit) {
   DriftModulation::Flight flight{0, sunlit};
   if (drift_.is_modulated()) {
     flight.body_rate_rad_s = (C_in_b_.inverse() * (end * C_c_b_)).log().raw().norm() / step_s;
@@ -183,18 +233,46 @@ void Gyro::advance(double t_s, double step_s, const Rot<In, C>& middle, const Ro
   if (mounting_change_.is_there()) {
     C_c_b_ = Rot<C, C>::exp(Vec<C>::assume(mounting_change_.at(t_s + step_s))) * C_c_b_at_start_;
   }
-  const Rot<In, Case> C_in_b[3] = {C_in_b_, middle * C_c_b_, end * C_c_b_};
-  const auto omega_in = [&](int stage, const Vector3d& h) -> Vector3d {
-    const Rot<In, Case>& C_in_b_now = C_in_b[stage];
-    return (C_in_b_now * drift_.rate(stage == 0 ? h_b_ : C_in_b_now.inverse() * Vec<In>::assume(h))).raw();
+}
+
+template <class S>
+void Gyro::turn(std::span<Gyro> gyros, double step_s, const Rot<In, C>& middle, const Rot<In, C>& end) {
+  const Matrix3<S> C_c_b = of_each<S>(
+      gyros, [](const Gyro& gyro) -> auto& { return gyro.C_c_b_.raw(); });
+  const Matrix3<S> C_in_b[3] = {of_each<S>(
+                                    gyros, [](const Gyro& gyro) -> auto& { return gyro.C_in_b_.raw(); }),
+                                middle.raw().cast<S>() * C_c_b, end.raw().cast<S>() * C_c_b};
+  const Vector3<S> h_in = of_each<S>(
+      gyros, [](const Gyro& gyro) -> auto& { return gyro.h_in_.raw(); });
+  const Vector3<S> h_b = of_each<S>(
+      gyros, [](const Gyro& gyro) -> auto& { return gyro.h_b_.raw(); });
+  const Esg7::Coefficients<S> kappa_rad_s = of_each<S>(
+      gyros, [](const Gyro& gyro) -> auto& { return gyro.drift_.kappa_rad_s(); });
+  const bool has_more = std::ranges::any_of(gyros, [](const Gyro& gyro) { return gyro.drift_.has_outside_eq1(); });
+  const auto omega_in = [&](int stage, const Vector3<S>& h) -> Vector3<S> {
+    const Vector3<S> now_b = stage == 0 ? h_b : Vector3<S>(C_in_b[stage].transpose() * h);
+    Vector3<S> rate = Esg7::rate<S>(now_b, kappa_rad_s);
+    if (has_more) {
+      std::array<Vector3d, kLanes<S>> each;
+      for (std::size_t i = 0; i < gyros.size(); ++i) {
+        each[i] = of_lane(rate, i);
+        gyros[i].drift_.add_outside_eq1(of_lane(now_b, i), each[i]);
+      }
+      rate = of_each<S>(std::span<const Vector3d>(each), std::identity());
+    }
+    return C_in_b[stage] * rate;
   };
-  Vector3d h = precess<double>(h_in_.raw(), step_s, omega_in);
-  if (drift_.walk()) {
-    h = rotated<double>((C_in_b[2] * *drift_.walk()).raw(), h);
+  const Vector3<S> turned = precess<S>(h_in, S(step_s), omega_in);
+  for (std::size_t i = 0; i < gyros.size(); ++i) {
+    Gyro& gyro = gyros[i];
+    gyro.C_in_b_ = Rot<In, Case>::assume(of_lane(C_in_b[2], i));
+    Vector3d h = of_lane(turned, i);
+    if (gyro.drift_.walk()) {
+      h = rotated<double>((gyro.C_in_b_ * *gyro.drift_.walk()).raw(), h);
+    }
+    gyro.h_in_ = Vec<In>::assume(h);
+    gyro.h_b_ = gyro.C_in_b_.inverse() * gyro.h_in_;
   }
-  h_in_ = Vec<In>::assume(h);
-  C_in_b_ = C_in_b[2];
-  h_b_ = C_in_b_.inverse() * h_in_;
 }
 
 Truth::Gyro Gyro::truth() const {

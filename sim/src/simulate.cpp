@@ -205,9 +205,7 @@ SimulatedPass simulate(const Scenario& scenario) {
     const Rot<In, C> middle = attitude.at(t_s + step_s / 2);
     const Rot<In, C> end = attitude.at(t_s + step_s);
     const bool sunlit = is_warmed && is_sunlit(orbit.at(t_s).position_m, sky.at(t_s).sun_m);
-    for (Gyro& gyro : gyros) {
-      gyro.advance(t_s, step_s, middle, end, sunlit);
-    }
+    Gyro::advance_all(gyros, t_s, step_s, middle, end, sunlit);
     C_in_c = end;
   }
   for (const Gyro& gyro : gyros) {

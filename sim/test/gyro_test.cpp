@@ -426,6 +426,53 @@ TEST(Gyro, MisalignmentTurnsTheMountedCaseInTrackerAxes) {
   EXPECT_LT((expected * gyro.momentum_in_case().raw() - gyro.momentum().raw()).norm(), 1e-15);
 }
 
+TEST(Gyro, TwoAtATimeHaveTheBitsOfEachAlone) {
+  const KeplerJ2 orbit{OrbitScenario{}};
+  const AttitudeProgramme attitude(AttitudeScenario{}, orbit, 3, 0, 2000);
+  GyroScenario only_eq1;
+  only_eq1.drift.outside_sigma_rad_s = 0;
+  GyroScenario with_more;
+  with_more.drift.outside_sigma_rad_s = 1e-7;
+  with_more.drift.markov_sigma_rad_s = 1e-8;
+  with_more.drift.bump_rad_s = 1e-7;
+  with_more.drift.direction_walk_rad_sqrt_s = 1e-8;
+  // The first pair has eq. (1) alone, the second more as well, the last gyro stands alone.
+  std::vector<Gyro> together;
+  for (const GyroScenario& scenario : {only_eq1, only_eq1, with_more, only_eq1, with_more}) {
+    together.emplace_back(scenario, attitude.at(0), 3, static_cast<int>(together.size()));
+  }
+  std::vector<Gyro> alone = together;
+  for (int i = 0; i < 100; ++i) {
+    const double t = 600 + i * kStep_s;
+    Gyro::advance_all(together, t, kStep_s, attitude.at(t + kStep_s / 2), attitude.at(t + kStep_s), false);
+    for (Gyro& gyro : alone) {
+      gyro.advance(t, kStep_s, attitude.at(t + kStep_s / 2), attitude.at(t + kStep_s));
+    }
+  }
+  for (std::size_t i = 0; i < alone.size(); ++i) {
+    EXPECT_EQ(together[i].momentum().raw(), alone[i].momentum().raw()) << i;
+    EXPECT_EQ(together[i].momentum_in_case().raw(), alone[i].momentum_in_case().raw()) << i;
+  }
+}
+
+TEST(Gyro, TwoAtATimeTurnAsFarAsTheyShould) {
+  // So far in one step that the series of small angles does not do.
+  GyroScenario fast;
+  fast.misalignment_rad = Vector3d::Zero();
+  fast.start_direction_c = Vector3d::UnitX();
+  fast.drift = no_drift();
+  fast.drift.harmonics = {{DriftHarmonic::Potential::kD, 1, 0, 1}};
+  std::vector<Gyro> together;
+  together.emplace_back(fast, Rot<In, C>(), 1, 0);
+  together.emplace_back(fast, Rot<In, C>(), 1, 1);
+  Gyro alone = together[0];
+  Gyro::advance_all(together, 0, 0.5, {}, {}, false);
+  alone.advance(0, 0.5, {}, {});
+  EXPECT_GT((alone.momentum().raw() - Vector3d::UnitX()).norm(), 0.01);
+  EXPECT_EQ(together[0].momentum().raw(), alone.momentum().raw());
+  EXPECT_EQ(together[1].momentum().raw(), alone.momentum().raw());
+}
+
 TEST(Gyro, IntegrationIsThatOfAHundredTimesFinerStep) {
   const KeplerJ2 orbit{OrbitScenario{}};
   const AttitudeProgramme attitude(AttitudeScenario{}, orbit, 3, 0, 2000);

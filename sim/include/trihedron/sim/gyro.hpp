@@ -2,6 +2,7 @@
 /// One gyro: the momentum that precesses in inertial space, and its readout in case axes.
 
 #include <optional>
+#include <span>
 #include <vector>
 
 #include "trihedron/core/drift.hpp"
@@ -30,14 +31,24 @@ class Drift {
 
   /// ω_b(h), rad/s, during the step. h: unit.
   [[nodiscard]] Vec<Case> rate(const Vec<Case>& h) const {
-    Vector3<double> rate = Esg7::rate<double>(h.raw(), kappa_now_rad_s_) + field_.rate<double>(h.raw()) + markov_rad_s_;
+    Vector3<double> rate = Esg7::rate<double>(h.raw(), kappa_now_rad_s_);
+    add_outside_eq1(h.raw(), rate);
+    return Vec<Case>::assume(rate);
+  }
+  /// Adds to the rate by eq. (1) what else there is.
+  void add_outside_eq1(const Vector3<double>& h, Vector3<double>& rate) const {
+    rate += field_.rate<double>(h);
+    rate += markov_rad_s_;
     if (bump_) {
-      rate += bump_->rate(h.raw());
+      rate += bump_->rate(h);
     }
     if (hysteresis_) {
-      rate += hysteresis_->rate(h.raw());
+      rate += hysteresis_->rate(h);
     }
-    return Vec<Case>::assume(rate);
+  }
+  /// Whether there is anything else.
+  [[nodiscard]] bool has_outside_eq1() const {
+    return !field_.members().empty() || scenario_.markov_sigma_rad_s > 0 || bump_ || hysteresis_;
   }
   /// The random rotation that the momentum takes during the step beside its drift, rad, if there is one.
   [[nodiscard]] const std::optional<Vec<Case>>& walk() const { return walk_rad_; }
@@ -101,6 +112,9 @@ class Gyro {
   /// Integrates over one step that begins at t_s, from where the last one ended; C_in_c in its middle and at its end.
   /// sunlit: whether the Sun shines on the spacecraft.
   void advance(double t_s, double step_s, const Rot<In, C>& middle, const Rot<In, C>& end, bool sunlit = false);
+  /// The same of all of a pass, two at a time, to the same bits.
+  static void advance_all(std::span<Gyro> gyros, double t_s, double step_s, const Rot<In, C>& middle,
+                          const Rot<In, C>& end, bool sunlit);
 
   [[nodiscard]] const Vec<In>& momentum() const { return h_in_; }
   [[nodiscard]] Vec<Case> momentum_in_case() const { return h_b_; }
@@ -114,11 +128,17 @@ class Gyro {
   [[nodiscard]] Truth::Gyro truth() const;
 
  private:
+  /// What changes at the beginning of a step.
+  void begin_step(double t_s, double step_s, const Rot<In, C>& end, bool sunlit);
+  /// The step of as many gyros as a scalar holds.
+  template <class S>
+  static void turn(std::span<Gyro> gyros, double step_s, const Rot<In, C>& middle, const Rot<In, C>& end);
+
   Drift drift_;
   MountingChange mounting_change_;
   Rot<C, Case> C_c_b_at_start_;
   Rot<C, Case> C_c_b_;
-  Rot<In, Case> C_in_b_;
+  Rot<In, Case> C_in_b_;  ///< where the last step ended
   Vec<In> h_in_;
   Vec<Case> h_b_;  ///< the same in case axes
 };
