@@ -196,11 +196,12 @@ TEST(Readings, OfAStuckGyroAreNotUsed) {
 struct Spiked {
   SomeReadings buffer;
 
-  Spiked(const std::vector<int>& spikes, int gyro, const Eigen::Vector3d& axis, int last = 40) {
+  Spiked(const std::vector<int>& spikes, int gyro, const Eigen::Vector3d& axis, int last = 40,
+         double size_rad = 0.017) {
     for (int i = 0; i <= last; ++i) {
       GyroSample s = turning_sample(0.125 * i);
       if (std::ranges::find(spikes, i) != spikes.end()) {
-        s.h_b[gyro] = rotated<double>(s.h_b[gyro], 0.017 * axis);
+        s.h_b[gyro] = rotated<double>(s.h_b[gyro], size_rad * axis);
       }
       buffer.readings.push(s);
     }
@@ -256,6 +257,19 @@ TEST(Readings, OfASpikeAreNotUsedAtAFix) {
   EXPECT_FALSE(Spiked({19, 20, 21}, 1, z).used_at(2.5)[1]);  // by the angle to the other momentum
   // … and neither does one that nothing can be compared with.
   EXPECT_EQ(count(Spiked({2}, 0, y, 2).used_at(0.25)), 2);
+}
+
+TEST(Readings, OfASpikeOfFifteenSigmasAreNotUsed) {
+  const Eigen::Vector3d y = Eigen::Vector3d::UnitY();
+  constexpr double kFifteenSigmas_rad = 15 * kReadingNoise_rad;
+  constexpr int kLast = 40;
+  EXPECT_FALSE(Spiked({kLast}, 0, y, kLast, kFifteenSigmas_rad).used_now()[0]);
+  EXPECT_TRUE(Spiked({kLast}, 0, y, kLast, kFifteenSigmas_rad).used_now()[1]);
+  EXPECT_FALSE(Spiked({20}, 0, y, kLast, kFifteenSigmas_rad).used_at(2.5)[0]);
+  // By the half of the samples before it that has none, …
+  EXPECT_FALSE(Spiked({kLast - 12, kLast}, 0, y, kLast, kFifteenSigmas_rad).used_now()[0]);
+  // … but not where every stretch has one: by three of them alone it may be noise.
+  EXPECT_TRUE(Spiked({kLast - 3, kLast}, 0, y, kLast, kFifteenSigmas_rad).used_now()[0]);
 }
 
 /// Samples of three gyros, the third of which is not selected; those of the first two from `first` on are turned, each

@@ -104,7 +104,7 @@ TYPED_TEST(SpikedGyro, GivesNoAttitudeInPlaceOfAWrongOne) {
           worst, error.cwiseQuotient(attitude.value().covariance_rad2.diagonal().cwiseSqrt()).cwiseAbs().maxCoeff());
     }
   });
-  EXPECT_LT(worst, 10);  // a spike is a thousand; half a minute of arc may still pass for noise of an extrapolation
+  EXPECT_LT(worst, 10);  // a spike is a thousand
   EXPECT_GT(given, 0.97 * samples);
   EXPECT_LT(given, 0.99 * samples);
 }

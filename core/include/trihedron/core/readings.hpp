@@ -106,7 +106,7 @@ class Readings {
       return std::nullopt;
     }
     if (!fit(t, reach_, after, 3, setup, health, gyros, readings)) {
-      leave_out_spikes(after - 1, before_t == t ? after - 1 : after, setup, gyros, readings);
+      leave_out_spikes(after - 1, before_t == t ? after - 1 : after, t + reach_, setup, gyros, readings);
     }
     return readings;
   }
@@ -177,6 +177,9 @@ class Readings {
   static constexpr double kSpike = 30;
   /// Samples before one that it is compared with, or spacings of them.
   static constexpr int kCompared = 4;
+  /// Samples on one side of a reading through which a parabola is laid, or half as many.
+  static constexpr int kNeighbours = 16;
+  static constexpr int kQuadratic = 2;
 
   /// Leaves out each gyro whose latest reading leads elsewhere. Where the one before it did so as well, the body may
   /// have begun to move in another way: it then turns all momenta alike, and the angles between them stay.
@@ -185,7 +188,7 @@ class Readings {
     const int latest = size_ - 1;
     const GyroMask used = readings.used;
     const auto continues = [&](int i, int k) {
-      const Agreement found = with_neighbours(i, -1, k, setup.readout_noise_rad[k], setup.recent());
+      const Agreement found = with_neighbours(i, -1, k, setup, latest_t());
       return found.agree >= std::min(found.compared, 2);
     };
     for (int k = 0; k < gyros_; ++k) {
@@ -195,16 +198,15 @@ class Readings {
   }
 
   /// Leaves out each gyro whose reading in one of the samples `first` and `last` leads elsewhere both than those before
-  /// it and than those after it. Where the samples beside it do so as well, the body moves in a way that no parabola
-  /// follows, and again the angles stay.
+  /// it and than those after it, up to `until`. Where the samples beside it do so as well, the body moves in a way that
+  /// no parabola follows, and again the angles stay.
   template <class Gyros>
-  void leave_out_spikes(int first, int last, const CalibrationSetup& setup, const Gyros& gyros,
+  void leave_out_spikes(int first, int last, Time until, const CalibrationSetup& setup, const Gyros& gyros,
                         FixReadings& readings) const {
     const GyroMask used = readings.used;
     const auto belongs = [&](int i, int k) {
-      const double noise_rad = setup.readout_noise_rad[k];
-      const Agreement before = with_neighbours(i, -1, k, noise_rad, setup.recent());
-      const Agreement after = with_neighbours(i, 1, k, noise_rad, setup.recent());
+      const Agreement before = with_neighbours(i, -1, k, setup, until);
+      const Agreement after = with_neighbours(i, 1, k, setup, until);
       const auto agrees = [](const Agreement& side) {
         return side.compared > 0 && side.agree >= std::min(side.compared, 2);
       };
@@ -224,15 +226,29 @@ class Readings {
     int agree = 0;
   };
 
-  /// The reading of a gyro in sample i, compared with the parabolas through some three before it (`side` −1) or after
-  /// it (1), one, two … samples apart and not further away than `within`. Two that agree are enough, so that a spike
-  /// among its neighbours does not count, and one where there are no more.
-  [[nodiscard]] Agreement with_neighbours(int i, int side, int gyro, double noise_rad, Duration within) const {
+  /// The reading of a gyro in sample i, compared with those before it (`side` −1) or after it (1), as far as
+  /// setup.recent() and not after `until`. With one parabola through them all, if it explains them: it tells the most.
+  /// Otherwise with those through some three of them, one, two … samples apart: two that agree are enough, so that a
+  /// spike among the neighbours does not count, and one where there are no more.
+  [[nodiscard]] Agreement with_neighbours(int i, int side, int gyro, const CalibrationSetup& setup, Time until) const {
+    const double noise_square = setup.readout_noise_rad[gyro] * setup.readout_noise_rad[gyro];
+    const auto within = [&](int j) {
+      return j >= 0 && j < size_ && (time(j) - time(i)) * side <= setup.recent() && time(j) <= until;
+    };
+    for (int most = kNeighbours; most >= DirectionsFit::least_samples(kQuadratic); most /= 2) {
+      int count = 0;
+      for (int next = 1; next <= most && within(i + side * next); ++next) {
+        count = next;
+      }
+      if (const auto found = by_all_neighbours(i, side, count, gyro, setup)) {
+        return *found;
+      }
+    }
     Agreement found;
     for (int apart = 1; apart <= kCompared; ++apart) {
       const int step = side * apart;
       const int farthest = i + 3 * step;
-      if (farthest < 0 || farthest >= size_ || (time(farthest) - time(i)) * side > within) {
+      if (!within(farthest)) {
         break;
       }
       const double t = to_seconds(time(i + step) - time(i));
@@ -242,11 +258,35 @@ class Readings {
                                     t * u / ((t - v) * (u - v)));
       const Eigen::Vector3d off = at(i).h_b[gyro] - weights(0) * at(i + step).h_b[gyro] -
                                   weights(1) * at(i + 2 * step).h_b[gyro] - weights(2) * at(farthest).h_b[gyro];
-      const double limit = kSpike * noise_rad * noise_rad * (1 + weights.squaredNorm());
+      const double limit = kSpike * noise_square * (1 + weights.squaredNorm());
       found.agree += off.squaredNorm() <= limit ? 1 : 0;
       ++found.compared;
     }
     return found;
+  }
+
+  /// With the parabola through the `count` samples next to it on one side; nothing where they are too few or it does
+  /// not explain them.
+  [[nodiscard]] std::optional<Agreement> by_all_neighbours(int i, int side, int count, int gyro,
+                                                           const CalibrationSetup& setup) const {
+    if (count < DirectionsFit::least_samples(kQuadratic)) {
+      return std::nullopt;
+    }
+    // As the only gyro.
+    DirectionsFit fit(time(i), time(i + side), time(i + side * count), count, kQuadratic, 1);
+    Directions its;
+    for (int j = 1; j <= count; ++j) {
+      its[0] = at(i + side * j).h_b[gyro];
+      fit.add(time(i + side * j), its);
+    }
+    const FittedDirections fitted = fit.solve();
+    PerGyro<double> noise_rad{};
+    noise_rad[0] = setup.readout_noise_rad[gyro];
+    if (!fitted.explains(all_gyros(1), noise_rad)) {
+      return std::nullopt;
+    }
+    const double limit = kSpike * noise_rad[0] * noise_rad[0] * (1 + fitted.noise_factor * fitted.noise_factor);
+    return Agreement{1, (at(i).h_b[gyro] - fitted.h_b[0]).squaredNorm() <= limit ? 1 : 0};
   }
 
   /// Whether the angle of a gyro's momentum to one of the others, by the readings of sample i, is that by two of the
