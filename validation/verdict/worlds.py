@@ -245,6 +245,8 @@ WORLDS = [
     World("thermal-0.5", "drift outside eq. (1)", drifting(thermal_fraction=0.5), faults=NOT_CONSTANT),
     World("thermal-0.05", "drift outside eq. (1)", drifting(thermal_fraction=0.05), faults=NOT_CONSTANT),
     World("walk", "drift outside eq. (1)", drifting(coefficient_walk='"1e-10rad/s/s^0.5"'), faults=NOT_CONSTANT),
+    World("wander-20min", "drift outside eq. (1)", drifting(markov_sigma='"5e-8rad/s"', markov_time='"20min"')),
+    World("wander-3h", "drift outside eq. (1)", drifting(markov_sigma='"3e-8rad/s"', markov_time='"3h"')),
     World("warm-up-0.3", "drift outside eq. (1)", drifting(warm_up_fraction=0.3), faults=NOT_CONSTANT),
 
     World("dirty", "dirty telemetry", constant(DIRTY)),

@@ -28,10 +28,12 @@ class Search {
     for (std::optional<Point> last; last != best_;) {
       last = best_;
       const auto [i, j] = best_;
-      look_at({{std::max(i - 1, lowest.first), j},
-               {std::min(i + 1, highest.first), j},
-               {i, std::max(j - 1, lowest.second)},
-               {i, std::min(j + 1, highest.second)}});
+      const int less = std::max(i - 1, lowest.first);
+      const int more = std::min(i + 1, highest.first);
+      const int shorter = std::max(j - 1, lowest.second);
+      const int longer = std::min(j + 1, highest.second);
+      // Both together as well: what drift that wanders does within minutes is alike where both are more or both less.
+      look_at({{less, j}, {more, j}, {i, shorter}, {i, longer}, {less, shorter}, {more, longer}});
     }
   }
 
@@ -132,7 +134,13 @@ NoiseFit with_most_likely_wandering(Trial& trial, const CalibrationOptions& opti
   };
   const int shorter = given.wandering_drift.time_s > kShortest_s ? times_within(kShortest_s) : 0;
   const int longer = given.wandering_drift.time_s < kLongest_s ? times_within(kLongest_s) : 0;
-  return converge(trial, at, {{0, 0}, {2, 0}, {4, 0}, {6, 0}}, {-3, -shorter}, {9, longer});
+  std::vector<Search::Point> starts;
+  for (int time = -shorter; time <= longer; ++time) {
+    for (const int level : {0, 2, 4, 6}) {
+      starts.emplace_back(level, time);
+    }
+  }
+  return converge(trial, at, starts, {-3, -shorter}, {9, longer});
 }
 
 }  // namespace trihedron::ground

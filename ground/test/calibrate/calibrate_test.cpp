@@ -525,6 +525,22 @@ TEST(Calibrate, FindsTheBiasOfTheReadoutsAndDriftThatWanders) {
   }
 }
 
+TEST(Calibrate, FindsLevelAndTimeOfDriftThatWanders) {
+  // Within minutes such drift is alike where both are larger or both smaller; forecasts of hours are not.
+  for (const double time_s : {1200.0, 10800.0}) {
+    Scenario scenario = scenario_in_eq1(3, std::chrono::hours(9));
+    scenario.gyro_period = std::chrono::milliseconds(500);
+    for (GyroScenario& gyro : scenario.gyros) {
+      gyro.drift.markov_sigma_rad_s = 5e-8;
+      gyro.drift.markov_time_s = time_s;
+    }
+    const auto run = calibrate(sim::simulate(scenario).pass, {});
+    const FurtherStateOptions& found = run.options.further_states;
+    EXPECT_EQ(to_seconds(found.wandering_time), time_s);  // of 400 s, 20 min, 1 h and 3 h
+    EXPECT_LT(std::abs(std::log(found.wandering_drift_rad_s / 5e-8)), std::log(1.5)) << time_s;
+  }
+}
+
 TEST(Calibrate, KnowsTheRateOfTheOrbitFromTheAttitude) {
   // An attitude that stands still in space does not show it; the filter must not fall over that.
   Scenario scenario;
