@@ -13,7 +13,7 @@ namespace trihedron::sim {
 class Two {
  public:
   Two() = default;
-  Two(double of_both) : lanes_(both_lanes(of_both)) {}  // NOLINT(google-explicit-constructor): as a double is
+  explicit Two(double of_both) : lanes_(both_lanes(of_both)) {}
   Two(double first, double second) : lanes_{first, second} {}
 
   [[nodiscard]] double operator[](int gyro) const { return lanes_[gyro]; }
