@@ -4,7 +4,6 @@
 
 #include <Eigen/Core>
 #include <cmath>
-#include <type_traits>
 
 #include "trihedron/core/lanes.hpp"
 
