@@ -207,8 +207,7 @@ Gyro::Gyro(const GyroScenario& scenario, const Rot<In, C>& C_in_c, std::uint64_t
       h_b_(C_in_b_.inverse() * h_in_) {}
 
 void Gyro::advance(double t_s, double step_s, const Rot<In, C>& middle, const Rot<In, C>& end, bool sunlit) {
-  begin_step(t_s, step_s, end, sunlit);
-  turn<double>({this, 1}, step_s, middle, end);
+  advance_all({this, 1}, t_s, step_s, middle, end, sunlit);
 }
 
 void Gyro::advance_all(std::span<Gyro> gyros, double t_s, double step_s, const Rot<In, C>& middle,
@@ -251,16 +250,14 @@ void Gyro::turn(std::span<Gyro> gyros, double step_s, const Rot<In, C>& middle, 
   const bool has_more = std::ranges::any_of(gyros, [](const Gyro& gyro) { return gyro.drift_.has_outside_eq1(); });
   const auto omega_in = [&](int stage, const Vector3<S>& h) -> Vector3<S> {
     const Vector3<S> now_b = stage == 0 ? h_b : Vector3<S>(C_in_b[stage].transpose() * h);
-    Vector3<S> rate = Esg7::rate<S>(now_b, kappa_rad_s);
-    if (has_more) {
-      std::array<Vector3d, kLanes<S>> each;
-      for (std::size_t i = 0; i < gyros.size(); ++i) {
-        each[i] = of_lane(rate, i);
-        gyros[i].drift_.add_outside_eq1(of_lane(now_b, i), each[i]);
-      }
-      rate = of_each<S>(std::span<const Vector3d>(each), std::identity());
+    if (!has_more) {
+      return C_in_b[stage] * Esg7::rate<S>(now_b, kappa_rad_s);
     }
-    return C_in_b[stage] * rate;
+    std::array<Vector3d, kLanes<S>> rates;
+    for (std::size_t i = 0; i < gyros.size(); ++i) {
+      rates[i] = gyros[i].drift_.rate(Vec<Case>::assume(of_lane(now_b, i))).raw();
+    }
+    return C_in_b[stage] * of_each<S>(std::span<const Vector3d>(rates), std::identity());
   };
   const Vector3<S> turned = precess<S>(h_in, S(step_s), omega_in);
   for (std::size_t i = 0; i < gyros.size(); ++i) {

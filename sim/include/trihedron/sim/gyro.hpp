@@ -31,22 +31,16 @@ class Drift {
 
   /// ω_b(h), rad/s, during the step. h: unit.
   [[nodiscard]] Vec<Case> rate(const Vec<Case>& h) const {
-    Vector3<double> rate = Esg7::rate<double>(h.raw(), kappa_now_rad_s_);
-    add_outside_eq1(h.raw(), rate);
-    return Vec<Case>::assume(rate);
-  }
-  /// Adds to the rate by eq. (1) what else there is.
-  void add_outside_eq1(const Vector3<double>& h, Vector3<double>& rate) const {
-    rate += field_.rate<double>(h);
-    rate += markov_rad_s_;
+    Vector3<double> rate = Esg7::rate<double>(h.raw(), kappa_now_rad_s_) + field_.rate<double>(h.raw()) + markov_rad_s_;
     if (bump_) {
-      rate += bump_->rate(h);
+      rate += bump_->rate(h.raw());
     }
     if (hysteresis_) {
-      rate += hysteresis_->rate(h);
+      rate += hysteresis_->rate(h.raw());
     }
+    return Vec<Case>::assume(rate);
   }
-  /// Whether there is anything else.
+  /// Whether it is more than eq. (1) with kappa_rad_s().
   [[nodiscard]] bool has_outside_eq1() const {
     return !field_.members().empty() || scenario_.markov_sigma_rad_s > 0 || bump_ || hysteresis_;
   }
