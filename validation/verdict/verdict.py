@@ -384,17 +384,43 @@ def predictions(outcomes):
     return table(["estimator", "forecasts of needs not met", "median", "largest", "below 0.1"], rows)
 
 
+def forecast_ratios(outcomes, world, estimator, after_min):
+    """Errors of forecasts over their sigmas, as `navigate` claims them, of all passes and axes."""
+    its = [o["forecast_at"] for o in outcomes if o["world"] == world.name and o["estimator"] == estimator and o.get("forecast_at")]
+    return [error / sigma for ages in its if ages[str(after_min)] for error, sigma in zip(*ages[str(after_min)].values())]
+
+
+def root_mean_square(values):
+    return math.sqrt(math.fsum(value * value for value in values) / len(values))
+
+
+def with_right_widths(outcomes):
+    """Of right results, how many are told that their need is not met, and how many would be if each prediction were made as wide as the errors
+    of its world and estimator turn out to be."""
+    rows = []
+    for estimator in ESTIMATORS:
+        right, told, would_be = 0, 0, 0
+        for world in WORLDS:
+            its = [o for o in outcomes if (o["world"], o["estimator"]) == (world.name, estimator) and o["status"] != 3 and not is_wrong(o)]
+            ratios = forecast_ratios(outcomes, world, estimator, FORECASTS_MIN[-1])
+            factor = root_mean_square(ratios) if ratios else 1
+            right += len(its)
+            told += sum(NEED_NOT_MET in o["findings"] for o in its)
+            would_be += sum(factor * (o.get("predicted_arcsec") or math.inf) * ARCSECOND > NEED_RAD for o in its)
+        if right:
+            rows.append([estimator, str(right), str(told), str(would_be)])
+    return table(["estimator", "right results", "told that the need is not met", "with the widths that are right in each world"], rows)
+
+
 def widths(outcomes):
-    """Root mean square over passes and axes of the errors of forecasts in their sigmas, as `navigate` claims them: 1 where these are right."""
+    """Root mean square over passes and axes of the errors of forecasts in their sigmas: 1 where these are right."""
     rows = []
     for world in WORLDS:
         cells = []
         for estimator in ESTIMATORS:
-            its = [o["forecast_at"] for o in outcomes if o["world"] == world.name and o["estimator"] == estimator and o.get("forecast_at")]
-            for after_min in map(str, FORECASTS_MIN):
-                ratios = [error / sigma for ages in its if ages[after_min] for error, sigma in zip(*ages[after_min].values())]
-                cells += ([f"{math.sqrt(math.fsum(ratio * ratio for ratio in ratios) / len(ratios)):.2f}", f"{max(map(abs, ratios)):.1f}"]
-                          if ratios else ["·", "·"])
+            for after_min in FORECASTS_MIN:
+                ratios = forecast_ratios(outcomes, world, estimator, after_min)
+                cells += [f"{root_mean_square(ratios):.2f}", f"{max(map(abs, ratios)):.1f}"] if ratios else ["·", "·"]
         if any(cell != "·" for cell in cells):
             rows.append([world.name, *cells])
     return table(["world"] + [head for estimator in ESTIMATORS for after_min in FORECASTS_MIN
@@ -453,7 +479,7 @@ def consistency(outcomes):
 def write(document, outcomes):
     """Each table stands between `<!-- NAME -->` and `<!-- end -->`; the text around it is left alone."""
     text = document.read_text()
-    for name, made in (("in-all", in_all(outcomes)), ("predictions", predictions(outcomes)), ("widths", widths(outcomes)), ("per-world", per_world(outcomes)),
+    for name, made in (("in-all", in_all(outcomes)), ("predictions", predictions(outcomes)), ("right-widths", with_right_widths(outcomes)), ("widths", widths(outcomes)), ("per-world", per_world(outcomes)),
                        ("consistency", consistency(outcomes))):
         text, places = re.subn(rf"(<!-- {name} -->\n).*?(<!-- end -->)", lambda place: place[1] + made + "\n" + place[2], text, flags=re.DOTALL)
         if places != 1:

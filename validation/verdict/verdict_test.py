@@ -151,6 +151,16 @@ def test_errors_of_forecasts_are_told_in_their_sigmas_by_world():
     assert "| slews | · | · | · | · | 2.00 | 4.0 | · | · |" in verdict.widths([flown(1, 8), flown(2, -4 * 2 ** 0.5), outcome(seed=3), outcome("steady")])
 
 
+def test_refusals_for_widths_are_told_from_those_for_needs():
+    def flown(predicted, sigma, *findings):
+        return outcome() | {"forecast_at": {"90": None, "270": {"error_arcsec": [10, 10, 10], "sigma_arcsec": [sigma] * 3}},
+                            "predicted_arcsec": predicted, "findings": list(findings)}
+    # Errors are half of their sigmas: 500″ ought to be 250″, 700″ be 350″, beyond 5′.
+    flights = [flown(500, 20, "need-not-met"), flown(700, 20, "need-not-met"), flown(100, 20)]
+    assert "| batch | 3 | 2 | 1 |" in verdict.with_right_widths(flights)
+    assert "| batch | 2 | 2 | 1 |" in verdict.with_right_widths([*flights[:2], flights[2] | {"wrong": ["need"]}])
+
+
 def test_what_has_moved_is_judged_where_it_is(truth, tmp_path):
     moved = worlds.Moved(gyro=exponential((1e-4, 0, 0)))
     there = verdict.Truth(tmp_path / "whole", moved)

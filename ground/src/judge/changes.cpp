@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 #include <optional>
 #include <string>
 
@@ -147,13 +148,14 @@ const Change* change_found(const CalibrationRun& run) {
   return run.changes.empty() || run.changes.front().log_odds < kLogOddsOfChange ? nullptr : &run.changes.front();
 }
 
-/// What the parameters may be off, where coefficients are found to change.
+/// What the parameters are off, 1-sigma, where coefficients are found to change: any factor up to kMoreThanFound is as
+/// likely as another, and an even distribution over ± a has the sigma a / √3.
 std::optional<Eigen::VectorXd> off_by_coefficients(const CalibrationRun& run) {
   const Change* const change = change_found(run);
   if (change == nullptr || change->moving != Moving::kCoefficients) {
     return std::nullopt;
   }
-  return kMoreThanFound * parameters_off(run.calibration, *change);
+  return kMoreThanFound / std::numbers::sqrt3 * parameters_off(run.calibration, *change);
 }
 
 }  // namespace
