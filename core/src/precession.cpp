@@ -156,6 +156,26 @@ double GaussMarkov::kept(double dt_s) const { return std::max(elementary::exp(-d
 
 double GaussMarkov::noise(double kept) const { return sigma * std::sqrt(1 - kept * kept); }
 
+double CourseOfChange::since_begin(Time t) const {
+  const double after_s = std::max(to_seconds(t - begin), 0.0);
+  if (kind == Kind::kJump) {
+    return after_s < time_s ? 0 : 1;
+  }
+  return (1 - elementary::exp(-after_s / time_s)) / (1 - elementary::exp(-duration_s / time_s));
+}
+
+double CourseOfChange::part(Time t) const {
+  return kind == Kind::kEven ? to_seconds(t - zero_at) / duration_s : since_begin(t) - since_begin(zero_at);
+}
+
+double CourseOfChange::mean_part(Time from, Time to) const {
+  if (kind != Kind::kJump) {
+    return part(from + (to - from) / 2);
+  }
+  const double after_s = to_seconds(to - begin) - time_s;
+  return std::clamp(after_s / to_seconds(to - from), 0.0, 1.0) - since_begin(zero_at);
+}
+
 double missed_by_long_step_rad(double drift_rad, const Eigen::Vector3d& from, const Eigen::Vector3d& to, double dt_s) {
   const double turn_rad = dt_s < kQuarterOrbit_s ? angle_between<double>(from, to) : std::numbers::pi;
   return drift_rad * turn_rad;

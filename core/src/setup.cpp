@@ -18,6 +18,10 @@ bool is_usable(const StarTrackerSetup& its) {
   return (its.noise_rad.array() > 0).all() && its.noise_rad.allFinite() && is_rotation(its.C_c_s);
 }
 
+bool is_usable(const CourseOfChange& change) {
+  return positive(change.duration_s) && (change.kind != CourseOfChange::Kind::kWarmUp || positive(change.time_s));
+}
+
 bool noise_is_usable(const CalibrationSetup& setup) {
   for (int k = 0; k < setup.layout.gyros; ++k) {
     if (!(setup.readout_noise_rad[k] > 0 && setup.readout_noise_rad[k] < 1)) {
@@ -38,7 +42,7 @@ bool further_states_are_usable(const CalibrationSetup& setup) {
   const FurtherStates& further = setup.layout.further;
   const GaussMarkov& wandering = setup.wandering_drift;
   if ((further.wandering_drift && !(positive(wandering.sigma) && positive(wandering.time_s))) ||
-      (further.coefficient_change && !positive(setup.change_time_s)) ||
+      (further.coefficient_change && !is_usable(setup.change)) ||
       (further.orbital_error && !std::isfinite(setup.orbital_rate_rad_s))) {
     return false;
   }

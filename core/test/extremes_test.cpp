@@ -121,7 +121,7 @@ TEST(Extremes, SetUpWithAllFurtherStatesEndsInAFaultOrAStatus) {
       [](Given& given, double value) { given.setup.star_trackers[0].noise_rad.setConstant(value); },
       [](Given& given, double value) { given.setup.wandering_drift.sigma = value; },
       [](Given& given, double value) { given.setup.wandering_drift.time_s = value; },
-      [](Given& given, double value) { given.setup.change_time_s = value; },
+      [](Given& given, double value) { given.setup.change.duration_s = value; },
       [](Given& given, double value) { given.setup.orbital_rate_rad_s = value; }};
   for (const FurtherStateKind& kind : kFurtherStateKinds) {
     things.emplace_back([state = kind.state](Given& given, double value) { given.setup.further_sigma[state] = value; });

@@ -16,8 +16,8 @@ CalibrationSetup setup_of(const MissionPlan& plan) {
   setup.gyro_period = from_seconds(plan.gyro_period_s);
   setup.wandering_drift = {2e-7, 300};
   setup.further_sigma[FurtherState::kCoefficientChange] = 2e-6;
-  setup.change_time_s = 600;
-  setup.no_change_at = Time(from_seconds(100));
+  setup.change.duration_s = 600;
+  setup.change.zero_at = Time(from_seconds(100));
   setup.orbital_rate_rad_s = 0.02;
   for (int head = 0; head < kMaxStarTrackers; ++head) {
     setup.star_trackers[static_cast<std::size_t>(head)].C_c_s = turn(0.9 * head, 0.3 * head, 0);

@@ -218,6 +218,35 @@ TEST(LongStep, MissesTheDriftTimesTheTurnThatMayHaveBeen) {
   EXPECT_NEAR(missed_by_long_step_rad(1e-3, from, from, 1.01 * kQuarterOrbit_s), 1e-3 * std::numbers::pi, 1e-15);
 }
 
+TEST(CourseOfChange, IsTheWholeOverItsTime) {
+  const Time begin{from_seconds(1000)};
+  const auto at = [&](double s) { return begin + from_seconds(s); };
+  for (const auto kind :
+       {CourseOfChange::Kind::kEven, CourseOfChange::Kind::kWarmUp, CourseOfChange::Kind::kJump}) {
+    CourseOfChange course{.kind = kind, .begin = begin, .duration_s = 3000, .time_s = 700, .zero_at = begin};
+    EXPECT_EQ(course.part(begin), 0);
+    EXPECT_NEAR(course.part(at(3000)), 1, 1e-14);
+    course.zero_at = at(3000);
+    EXPECT_NEAR(course.part(begin), -1, 1e-14);
+    EXPECT_NEAR(course.mean_part(at(100), at(104)), course.part(at(102)), 1e-14);
+  }
+}
+
+TEST(CourseOfChange, OfAWarmUpDecays) {
+  const CourseOfChange course{.kind = CourseOfChange::Kind::kWarmUp, .duration_s = 3000, .time_s = 700};
+  const auto left = [&](double s) { return course.part(Time(from_seconds(1e6))) - course.part(Time(from_seconds(s))); };
+  EXPECT_NEAR(left(700) / left(0), std::exp(-1.0), 1e-14);
+  EXPECT_NEAR(left(2100) / left(700), std::exp(-2.0), 1e-13);
+  EXPECT_EQ(course.part(Time(from_seconds(-1e9))), 0);  // before it, nothing has changed
+}
+
+TEST(CourseOfChange, OfAJumpIsAllAtOnce) {
+  const CourseOfChange course{.kind = CourseOfChange::Kind::kJump, .time_s = 700};
+  EXPECT_EQ(course.part(Time(from_seconds(699.9))), 0);
+  EXPECT_EQ(course.part(Time(from_seconds(700))), 1);
+  EXPECT_NEAR(course.mean_part(Time(from_seconds(699)), Time(from_seconds(703))), 0.75, 1e-14);
+}
+
 /// dw = −w/T dt + dn: a value decays exponentially, and the noise of density 2σ²/T that comes meanwhile is that decayed
 /// too, here summed up over a thousand small pieces.
 TEST(GaussMarkov, IsTheSolutionOfItsDifferentialEquation) {

@@ -120,10 +120,23 @@ const Described kDescribed[] = {
     {&FurtherStates::wandering_drift, [](CalibrationSetup& s) -> double& { return s.wandering_drift.time_s; }},
     {&FurtherStates::readout_bias, sigma_of<FurtherState::kReadoutBias>},
     {&FurtherStates::coefficient_change, sigma_of<FurtherState::kCoefficientChange>},
-    {&FurtherStates::coefficient_change, [](CalibrationSetup& s) -> double& { return s.change_time_s; }},
+    {&FurtherStates::coefficient_change, [](CalibrationSetup& s) -> double& { return s.change.duration_s; }},
     {&FurtherStates::clock_offset, sigma_of<FurtherState::kClockOffset>},
     {&FurtherStates::orbital_error, sigma_of<FurtherState::kOrbitalError>},
 };
+
+TEST(SetUp, RefusesAWarmUpWithoutATime) {
+  for (const double bad : {0.0, -1.0, kNotANumber, kInfinite}) {
+    const auto of = [&](CourseOfChange::Kind kind) {
+      return fault_after([&](FullGiven& given) {
+        given.setup.change.kind = kind;
+        given.setup.change.time_s = bad;
+      });
+    };
+    EXPECT_EQ(of(CourseOfChange::Kind::kWarmUp), SetupFault::kPriorNotPositiveDefinite) << bad;
+    EXPECT_EQ(of(CourseOfChange::Kind::kEven), std::nullopt) << bad;
+  }
+}
 
 TEST(SetUp, RefusesFurtherStatesThatNothingIsKnownOf) {
   for (const Described& described : kDescribed) {

@@ -26,10 +26,21 @@ constexpr std::string_view kEachFix = "continuous";
 constexpr std::string_view kNeed = "need";
 constexpr std::string_view kNoNeed = "none";
 constexpr std::string_view kWanderingTime = "wandering_time";
+constexpr std::string_view kChangeCourse = "change_course";
+constexpr std::string_view kChangeTime = "change_time";
 
 using Choice = FurtherStateOptions::Choice;
 constexpr std::array<std::pair<std::string_view, Choice>, 3> kChoices = {
     {{"auto", Choice::kAuto}, {"off", Choice::kOff}, {"on", Choice::kOn}}};
+
+constexpr std::array<std::pair<std::string_view, CourseOfChange::Kind>, 3> kCourses = {
+    {{"even", CourseOfChange::Kind::kEven},
+     {"warm-up", CourseOfChange::Kind::kWarmUp},
+     {"jump", CourseOfChange::Kind::kJump}}};
+
+std::string_view name_of(CourseOfChange::Kind course) {
+  return std::ranges::find(kCourses, course, &std::pair<std::string_view, CourseOfChange::Kind>::second)->first;
+}
 
 std::string_view name_of(Choice choice) {
   return std::ranges::find(kChoices, choice, &std::pair<std::string_view, Choice>::second)->first;
@@ -135,6 +146,11 @@ Fields further_state_fields(FurtherStateOptions& states) {
   }
   fields.push_back(duration(kWanderingTime, states.wandering_time, limits::kWanderingTime_s,
                             "correlation time of the drift that wanders"));
+  fields.push_back(choice<CourseOfChange::Kind>(kChangeCourse, states.change_course,
+                                                "of the coefficients, where their change is on",
+                                                {kCourses.begin(), kCourses.end()}));
+  fields.push_back(duration(kChangeTime, states.change_time, limits::kChangeTime_s,
+                            "of a warm-up, until 1/e of it is left; of a jump, from the epoch of the pass on"));
   return fields;
 }
 
@@ -264,6 +280,8 @@ std::string format_config(const CalibrationOptions& options) {
     }
   }
   out.word(kWanderingTime, format_duration(states.wandering_time));
+  out.word(kChangeCourse, std::string(name_of(states.change_course)));
+  out.word(kChangeTime, format_duration(states.change_time));
 
   out.section("corrections");
   out.word("interval", format_correction_interval(options.corrections));

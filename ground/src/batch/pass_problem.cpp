@@ -241,8 +241,8 @@ PassProblem::PassProblem(const ScreenedPass& pass, PassSetup setup)
   }
   add_fixes_until(Time::max());
   // The coefficients are those of the end of the pass; their change is that over the whole pass.
-  setup_.on_board.no_change_at = nodes_.back().t;
-  setup_.on_board.change_time_s = to_seconds(nodes_.back().t - nodes_.front().t);
+  setup_.on_board.change.zero_at = nodes_.back().t;
+  setup_.on_board.change.duration_s = to_seconds(nodes_.back().t - nodes_.front().t);
   for (std::size_t i = 0; i < nodes_.size(); ++i) {
     if (arcs_.empty() || nodes_[i].after_gap || nodes_[i].t - nodes_[arcs_.back().begin].t >= setup_.arc) {
       arcs_.push_back({i, i});
@@ -286,7 +286,7 @@ void PassProblem::step(const Node& from_node, const Node& to_node, const Drift& 
   const double dt_s = to_seconds(dt);
   const Reading from = reading_at(from_node);
   const Reading to = reading_at(to_node);
-  const double part = setup_.on_board.part_of_change(from_node.t + dt / 2);
+  const double part = setup_.on_board.change.mean_part(from_node.t, to_node.t);
   moment.t = to_node.t;
   // Gyros that can be used at both ends; where those are too few, at its end.
   const GyroMask at_both = both(from.used, to.used);

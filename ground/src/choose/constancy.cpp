@@ -412,8 +412,9 @@ std::vector<Change> changes_over(const Trial& trial) {
     consider(what(moving, Motion::kRamp, k), along(k, Layout::kEq1, 3, true, evenly), sigmas(3, kMoves_rad));
     consider(what(Moving::kCoefficients, Motion::kRamp, k), along(k, 0, Layout::kEq1, false, evenly), coefficients(k));
     for (const double time : {0.05, 0.1, 0.2, 0.4}) {
-      consider(what(Moving::kCoefficients, Motion::kDecay, k), along(k, 0, Layout::kEq1, false, decaying(time)),
-               coefficients(k));
+      Change decay = what(Moving::kCoefficients, Motion::kDecay, k);
+      decay.decay = from_seconds(time * problem.setup().on_board.change.duration_s);
+      consider(decay, along(k, 0, Layout::kEq1, false, decaying(time)), coefficients(k));
     }
     for (Index step = 0; step < steps; ++step) {
       const Time from = pass.middle(step);

@@ -5,8 +5,11 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <functional>
 #include <future>
+#include <iterator>
 #include <limits>
+#include <map>
 #include <numbers>
 #include <optional>
 #include <utility>
@@ -253,10 +256,13 @@ void decide_again_with_more_noise(const Pass& pass, const Screened& screened, co
     use_wandering(*wanders, options);
   }
   Trial decided(pass, screened, options, wanders.value_or(walking.noise), &everything);
+  const NoiseFit likely =
+      wanders ? with_most_likely_wandering(decided, options) : with_most_likely_walk(decided, options);
+  decision.log_likelihood = likely.log_likelihood;
   if (wanders) {
-    use_wandering(with_most_likely_wandering(decided, options).noise, options);
+    use_wandering(likely.noise, options);
   } else {
-    use_walk(with_most_likely_walk(decided, options).noise, options);
+    use_walk(likely.noise, options);
   }
   keep_field(decided, decision);
   decision.nearby = decided.nearby();
@@ -337,12 +343,157 @@ Decision decide_by_pass(const Pass& pass, const Screened& screened, const Calibr
     decide_again_with_more_noise(pass, screened, asked, largest_model, wandering_is_open, std::move(everything),
                                  decided, walking, decision);
   } else {
+    decision.log_likelihood = walking.log_likelihood;
     use_walk(walking.noise, options);
     keep_field(decided, decision);
     decision.nearby = decided.nearby();
     decision.changes = changes_over(decided);
   }
   return decision;
+}
+
+/// A course by which the coefficients are found to change.
+struct FoundCourse {
+  CourseOfChange::Kind kind;
+  double time_s;
+  double least_s, most_s;  ///< between which the time is
+};
+
+/// Of what moves most likely, where it is a warm-up or a jump of the coefficients.
+std::optional<FoundCourse> course_of(const std::vector<Change>& changes, Time epoch) {
+  if (changes.empty() || !changes.front().is_found() || changes.front().moving != Moving::kCoefficients) {
+    return std::nullopt;
+  }
+  const Change& change = changes.front();
+  if (change.motion == Motion::kDecay) {
+    const double decay_s = to_seconds(change.decay);
+    return FoundCourse{CourseOfChange::Kind::kWarmUp, decay_s, decay_s / 2, decay_s * 2};
+  }
+  if (change.motion == Motion::kStep) {
+    const double from_s = to_seconds(change.from - epoch);
+    const double until_s = to_seconds(change.until - epoch);
+    return FoundCourse{CourseOfChange::Kind::kJump, (from_s + until_s) / 2, from_s, until_s};
+  }
+  return std::nullopt;
+}
+
+void use_course(CourseOfChange::Kind kind, double time_s, CalibrationOptions& options) {
+  options.further_states[FurtherState::kCoefficientChange] = Choice::kOn;
+  options.further_states.change_course = kind;
+  options.further_states.change_time = from_seconds(time_s);
+}
+
+/// The largest of a function of one peak, among what was tried of it.
+class Peak {
+ public:
+  Peak(std::function<double(double)> of, double least, double middle, double most) : of_(std::move(of)) {
+    for (const double x : {least, middle, most}) {
+      tried_[x] = of_(x);
+    }
+  }
+
+  /// Tries once more: at the vertex of the parabola through the largest and its neighbours, or half-way to the farther
+  /// neighbour where that is too near what was tried.
+  void narrow(double too_near) {
+    const auto [a, x, b] = around();
+    const double left = (tried_[x] - tried_[a]) / (x - a);
+    const double right = (tried_[b] - tried_[x]) / (b - x);
+    double next = ((a + x) * right - (x + b) * left) / (2 * (right - left));
+    if (!(next > a + too_near && next < b - too_near && std::abs(next - x) > too_near)) {
+      next = (x + (x - a > b - x ? a : b)) / 2;
+    }
+    tried_[next] = of_(next);
+  }
+  [[nodiscard]] double at() const {
+    return std::ranges::max_element(tried_, {}, [](const auto& one) { return one.second; })->first;
+  }
+  /// Between the neighbours of the largest.
+  [[nodiscard]] double width() const {
+    const auto [a, x, b] = around();
+    return b - a;
+  }
+
+ private:
+  /// The largest between its neighbours; of the outermost the one inside.
+  [[nodiscard]] std::array<double, 3> around() const {
+    auto middle = tried_.find(at());
+    middle = middle == tried_.begin() ? std::next(middle) : middle;
+    middle = std::next(middle) == tried_.end() ? std::prev(middle) : middle;
+    return {std::prev(middle)->first, middle->first, std::next(middle)->first};
+  }
+
+  std::function<double(double)> of_;
+  std::map<double, double> tried_;
+};
+
+/// The time of a course that makes the pass most likely with these options but for the noise: what was found without
+/// the course stands for a part of it, and goes as the time is told better. A random walk is enough for that.
+double most_likely_time_s(const Pass& pass, const Screened& screened, CalibrationOptions options,
+                          const FoundCourse& course) {
+  constexpr int kMostRounds = 6;
+  constexpr int kMostTries = 6;
+  const double near_enough_s = 0.001 * (course.most_s - course.least_s);
+  double least_s = course.least_s;
+  double time_s = course.time_s;
+  double most_s = course.most_s;
+  const double least_walk = options.direction_random_walk_rad_sqrt_s;
+  options.further_states[FurtherState::kWanderingDrift] = Choice::kOff;
+  std::optional<Trial> last;
+  const auto fit = [&](double at_s) {
+    use_course(course.kind, at_s, options);
+    Trial trial(pass, screened, options, {}, last ? &*last : nullptr);
+    last.emplace(std::move(trial));
+  };
+  const auto find_noise = [&] {
+    options.direction_random_walk_rad_sqrt_s = least_walk;
+    use_walk(with_most_likely_walk(*last, options).noise, options);
+  };
+  fit(time_s);
+  find_noise();
+  for (int round = 0; round < kMostRounds; ++round) {
+    Peak peak(
+        [&](double at_s) {
+          fit(at_s);
+          return last->log_likelihood(last->found().linear, last->problem().setup().noise());
+        },
+        least_s, time_s, most_s);
+    for (int i = 0; i < kMostTries && peak.width() > 2 * near_enough_s; ++i) {
+      peak.narrow(near_enough_s);
+    }
+    const double moved_s = std::abs(peak.at() - time_s);
+    time_s = peak.at();
+    fit(time_s);
+    if (round > 0 && moved_s < near_enough_s) {
+      break;
+    }
+    find_noise();
+    const double reach_s = (course.most_s - course.least_s) / (4 << round);
+    least_s = std::max(course.least_s, time_s - reach_s);
+    most_s = std::min(course.most_s, time_s + reach_s);
+    time_s = std::clamp(time_s, least_s + reach_s / 8, most_s - reach_s / 8);
+  }
+  return time_s;
+}
+
+/// Decides by the data of the pass. `change_is_open`: whether the coefficients may be found to change; then a warm-up
+/// or a jump of them is looked for.
+Decision decide_with_course(const Pass& pass, const Screened& screened, const CalibrationOptions& asked,
+                            const DriftModelId& largest_model, bool change_is_open) {
+  Decision decision = decide_by_pass(pass, screened, asked, largest_model);
+  const std::optional<FoundCourse> course =
+      change_is_open ? course_of(decision.changes, pass.settings.epoch) : std::nullopt;
+  if (!course) {
+    return decision;
+  }
+  CalibrationOptions with = asked;
+  use_course(course->kind, most_likely_time_s(pass, screened, decision.options, *course), with);
+  Decision changing = decide_by_pass(pass, screened, with, largest_model);
+  const double gain = changing.log_likelihood - decision.log_likelihood;
+  const Evidence evidence{FurtherState::kCoefficientChange, gain, gain > kLogOddsToAccept};
+  Decision& better = evidence.accepted ? changing : decision;
+  std::erase_if(better.evidence, [](const Evidence& its) { return its.state == FurtherState::kCoefficientChange; });
+  better.evidence.push_back(evidence);
+  return std::move(better);
 }
 
 /// The largest drift model that is tried at first.
@@ -428,6 +579,7 @@ Decision decide(const Pass& pass, const CalibrationOptions& asked_for) {
   if (!asked.orbital_rate_rad_s) {
     asked.orbital_rate_rad_s = orbital_rate_rad_s(pass.star_tracker);
   }
+  const bool change_is_open = asked.further_states[FurtherState::kCoefficientChange] == Choice::kAuto;
   settle_by_estimator(asked);
   if (pass.settings.prior || asked.estimator == Estimator::kPaper) {
     Decision settled;
@@ -463,7 +615,7 @@ Decision decide(const Pass& pass, const CalibrationOptions& asked_for) {
     return decision;
   }
   if (by_field && on_board) {
-    Decision decided = decide_by_pass(pass, screened, asked, kLargestDriftModel);
+    Decision decided = decide_with_course(pass, screened, asked, kLargestDriftModel, change_is_open);
     decided.options.estimator = asked_for.estimator;
     const double log_evidence = decided.field->log_evidence;
     decided.evidence.push_back({{}, log_evidence, log_evidence > kLogOddsToAccept});
@@ -488,7 +640,7 @@ Decision decide(const Pass& pass, const CalibrationOptions& asked_for) {
   }
   DriftModelId largest_model = largest_to_compare(asked);
   for (;;) {
-    Decision decided = decide_by_pass(pass, screened, asked, largest_model);
+    Decision decided = decide_with_course(pass, screened, asked, largest_model, change_is_open);
     const std::optional<DriftModelId> larger = larger_model(largest_model);
     // There are no forecasts where the pass is too short.
     if (!larger || decided.forecasts.empty() ||

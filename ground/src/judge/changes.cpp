@@ -14,9 +14,7 @@
 namespace trihedron::ground {
 namespace {
 
-/// ln of the odds from which on something counts as moving: at most 1 in 20 000 passes in which nothing does.
-constexpr double kLogOddsOfChange = 9.9;
-/// … and up to which less likely explanations are named beside the likeliest.
+/// ln of the odds over the likeliest up to which other explanations are named beside it.
 constexpr double kCannotBeTold = 5;
 /// The error is up to so many times what a change is found to make, because the noise found and the drift model have
 /// followed a part of it.
@@ -145,7 +143,7 @@ double sigmas_off(const Calibration& calibration, const Change& change, bool ali
 
 /// The likeliest, where it counts as there.
 const Change* change_found(const CalibrationRun& run) {
-  return run.changes.empty() || run.changes.front().log_odds < kLogOddsOfChange ? nullptr : &run.changes.front();
+  return run.changes.empty() || !run.changes.front().is_found() ? nullptr : &run.changes.front();
 }
 
 /// What the parameters are off, 1-sigma, where coefficients are found to change: any factor up to kMoreThanFound is as

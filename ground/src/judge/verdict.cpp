@@ -324,10 +324,30 @@ void judge_change(const CalibrationRun& run, std::vector<Finding>& findings) {
                            state.value, state.sigma);
     }
   }
-  if (!names.empty()) {
-    add(findings, FindingCode::kCoefficientsChanged,
-        "Drift coefficients changed over the pass; those given are of its end, and may go on changing.", names,
-        "Calibrate again soon: the rotors may still be warming up.");
+  if (names.empty()) {
+    return;
+  }
+  const FurtherStateOptions& states = run.options.further_states;
+  const double minutes = to_seconds(states.change_time) / 60;
+  switch (states.change_course) {
+    case CourseOfChange::Kind::kEven:
+      add(findings, FindingCode::kCoefficientsChanged,
+          "Drift coefficients changed over the pass; those given are of its end, and may go on changing.", names,
+          "Calibrate again soon: the rotors may still be warming up.");
+      break;
+    case CourseOfChange::Kind::kWarmUp:
+      add(findings, FindingCode::kCoefficientsChanged,
+          fmt::format("Drift coefficients changed as in a warm-up, of which 1/e was left after {:.1f} min; those given "
+                      "are of the end of the pass.",
+                      minutes),
+          names, "What is still to come of it is in the errors that are predicted; look for what warmed the rotors.");
+      break;
+    case CourseOfChange::Kind::kJump:
+      add(findings, FindingCode::kCoefficientsChanged,
+          fmt::format("Drift coefficients jumped {:.1f} min after the start of the pass; those given hold since.",
+                      minutes),
+          names, "Look for what happened then.");
+      break;
   }
 }
 

@@ -14,7 +14,7 @@ OpenLoopStart open_loop_start(const CalibrationSetup& setup, const Layout& layou
   start.readout_noise_rad = setup.readout_noise_rad;
   start.direction_random_walk_rad_sqrt_s = setup.direction_random_walk_rad_sqrt_s;
   start.wandering_drift = setup.wandering_drift;
-  start.change_time_s = setup.change_time_s;
+  start.change = setup.change;
   for (int k = 0; k < layout.gyros; ++k) {
     if (layout.further.wandering_drift) {
       // What was estimated of it is part of the error of a loop that begins without it.

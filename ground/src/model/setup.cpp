@@ -15,6 +15,8 @@ namespace {
 
 /// Prior sigma of the change of a coefficient over a pass, as a fraction of that of the coefficient.
 constexpr double kChangeSigma = 0.05;
+/// The same of a course that was found: a warm-up, or a jump.
+constexpr double kFoundChangeSigma = 0.3;
 
 /// The largest sigma of a component of the bias that an earlier calibration has left; 0 without it.
 double bias_sigma_before(const std::optional<Calibration>& earlier) {
@@ -102,10 +104,15 @@ CalibrationSetup setup_of(const PassSettings& settings, const CalibrationOptions
   if (const double sigma = bias_sigma_before(settings.prior); sigma > 0) {
     setup.further_sigma[FurtherState::kReadoutBias] = sigma;
   }
-  setup.further_sigma[FurtherState::kCoefficientChange] = kChangeSigma * settings.gyros[0].drift_common_sigma_rad_s;
-  setup.no_change_at = settings.epoch;
+  setup.change.kind = states.change_course;
+  setup.further_sigma[FurtherState::kCoefficientChange] =
+      (setup.change.kind == CourseOfChange::Kind::kEven ? kChangeSigma : kFoundChangeSigma) *
+      settings.gyros[0].drift_common_sigma_rad_s;
+  setup.change.begin = settings.epoch;
+  setup.change.time_s = to_seconds(states.change_time);
+  setup.change.zero_at = settings.epoch;
   if (settings.duration > Duration::zero()) {
-    setup.change_time_s = to_seconds(settings.duration);
+    setup.change.duration_s = to_seconds(settings.duration);
   }
   setup.orbital_rate_rad_s = options.orbital_rate_rad_s.value_or(setup.orbital_rate_rad_s);
   setup.orbital_phase_zero = settings.epoch;

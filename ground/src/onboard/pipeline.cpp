@@ -154,7 +154,10 @@ OpenLoopStart Pipeline::errors() const {
   return program_->visit([&](const auto& its) {
     const auto& estimator = its.estimator();
     const Layout layout = estimator.error_layout();
-    return open_loop_start(estimator.setup(), layout, program_->gyros(), error_covariance(estimator, part_of_change()));
+    OpenLoopStart start =
+        open_loop_start(estimator.setup(), layout, program_->gyros(), error_covariance(estimator, part_of_change()));
+    start.change.zero_at = its.t();
+    return start;
   });
 }
 

@@ -98,35 +98,84 @@ TEST(Constancy, NamesTheStarTrackerThatTurnsSlowly) {
 TEST(Constancy, NamesCoefficientsThatChange) {
   const CalibrationRun run = calibrated(4, [](Scenario& scenario) {
     for (GyroScenario& gyro : scenario.gyros) {
-      gyro.drift.warm_up_fraction = 0.3;
+      gyro.drift.coefficient_walk_rad_s_sqrt_s = 2e-9;
     }
   });
   EXPECT_TRUE(names(run, FindingCode::kCoefficientsNotConstant));
 }
 
-// A jump by a twentieth of what coefficients are is many of the sigmas that are claimed where they are taken for
-// constant. The alignment does not suffer.
-TEST(Constancy, PutsCoefficientsThatChangeIntoTheirSigmas) {
-  Scenario scenario = scenario_in_eq1(7, std::chrono::hours(6));
-  for (GyroScenario& gyro : scenario.gyros) {
-    gyro.drift.jump_sigma_rad_s = 1e-7;
-    gyro.drift.jump_at_s = kMiddle_s;
-  }
-  const sim::SimulatedPass simulated = sim::simulate(scenario);
-  const CalibrationRun run = calibrate(simulated.pass, CalibrationOptions());
-  EXPECT_TRUE(names(run, FindingCode::kCoefficientsNotConstant));
-  const Calibration& found = run.calibration;
-  const Eigen::VectorXd errors = estimate_minus_truth(found, simulated.truth);
+/// Whether each coefficient of eq. (1) and each alignment is within four sigmas.
+void expect_within_sigmas(const Calibration& found, const Truth& truth) {
+  const Eigen::VectorXd errors = estimate_minus_truth(found, truth);
   for (Eigen::Index i = 0; i < errors.size(); ++i) {
     const ParameterId& state = found.states[static_cast<std::size_t>(i)];
     if (!state.is_drift() || state.coefficient.is_in_eq1()) {
       EXPECT_LT(std::abs(errors(i)), 4 * std::sqrt(found.covariance(i, i))) << i;
     }
+  }
+}
+
+// A walk by a twentieth of what coefficients are is many of the sigmas that are claimed where they are taken for
+// constant. The alignment does not suffer.
+TEST(Constancy, PutsCoefficientsThatChangeIntoTheirSigmas) {
+  Scenario scenario = scenario_in_eq1(7, std::chrono::hours(6));
+  for (GyroScenario& gyro : scenario.gyros) {
+    gyro.drift.coefficient_walk_rad_s_sqrt_s = 7e-10;
+  }
+  const sim::SimulatedPass simulated = sim::simulate(scenario);
+  const CalibrationRun run = calibrate(simulated.pass, CalibrationOptions());
+  EXPECT_TRUE(names(run, FindingCode::kCoefficientsNotConstant));
+  const Calibration& found = run.calibration;
+  expect_within_sigmas(found, simulated.truth);
+  for (Eigen::Index i = 0; i < found.covariance.rows(); ++i) {
     // What is predicted of open loops begins with the same.
     const Eigen::Index begins_with = run.errors.layout.drift(0) + i;
     EXPECT_NEAR(run.errors.covariance(begins_with, begins_with), found.covariance(i, i), 1e-6 * found.covariance(i, i));
   }
 }
+
+class FoundCourse : public testing::TestWithParam<Estimator> {
+ protected:
+  /// Six hours with slews, in which the coefficients change.
+  static CalibrationRun flown(const std::function<void(DriftScenario&)>& change) {
+    Scenario scenario = scenario_in_eq1(7, std::chrono::hours(6));
+    for (GyroScenario& gyro : scenario.gyros) {
+      change(gyro.drift);
+    }
+    const sim::SimulatedPass simulated = sim::simulate(scenario);
+    CalibrationOptions options;
+    options.estimator = GetParam();
+    CalibrationRun run = calibrate(simulated.pass, options);
+    expect_within_sigmas(run.calibration, simulated.truth);
+    EXPECT_TRUE(run.calibration.verdict.trustworthy);
+    EXPECT_TRUE(names(run, FindingCode::kCoefficientsChanged));
+    EXPECT_FALSE(names(run, FindingCode::kDriftNotExplained));  // no noise stands for it
+    return run;
+  }
+};
+
+TEST_P(FoundCourse, OfAWarmUp) {
+  constexpr double kTime_s = 2400;
+  const CalibrationRun run = flown([](DriftScenario& drift) {
+    drift.warm_up_fraction = 0.3;
+    drift.warm_up_time_s = kTime_s;
+  });
+  EXPECT_EQ(run.options.further_states.change_course, CourseOfChange::Kind::kWarmUp);
+  EXPECT_NEAR(to_seconds(run.options.further_states.change_time), kTime_s, 0.05 * kTime_s);
+}
+
+TEST_P(FoundCourse, OfAJump) {
+  constexpr double kAt_s = 2.3 * 3600;
+  const CalibrationRun run = flown([](DriftScenario& drift) {
+    drift.jump_sigma_rad_s = 1e-6;
+    drift.jump_at_s = kAt_s;
+  });
+  EXPECT_EQ(run.options.further_states.change_course, CourseOfChange::Kind::kJump);
+  EXPECT_NEAR(to_seconds(run.options.further_states.change_time), kAt_s, 10);
+}
+
+INSTANTIATE_TEST_SUITE_P(Constancy, FoundCourse, testing::Values(Estimator::kInvariant, Estimator::kBatch),
+                         [](const auto& its) { return std::string(name_of(its.param)); });
 
 TEST(Constancy, NamesAberration) {
   const CalibrationRun run = calibrated(

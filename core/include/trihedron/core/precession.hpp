@@ -3,12 +3,14 @@
 /// (docs/mathematics.md, section 6).
 
 #include <Eigen/Core>
+#include <cstdint>
 
 #include "trihedron/core/columns.hpp"
 #include "trihedron/core/drift.hpp"
 #include "trihedron/core/frames.hpp"
 #include "trihedron/core/gyro_readout.hpp"
 #include "trihedron/core/per_gyro.hpp"
+#include "trihedron/core/time.hpp"
 
 namespace trihedron {
 
@@ -158,6 +160,30 @@ struct GaussMarkov {
   [[nodiscard]] double kept(double dt_s) const;
   /// 1-sigma of the noise that has come in its place.
   [[nodiscard]] double noise(double kept) const;
+};
+
+/// How far a change of the coefficients has got, as a fraction of the whole; less than none before the time for which
+/// the coefficients stand.
+struct CourseOfChange {
+  enum class Kind : std::uint8_t {
+    kEven,    ///< linear in time
+    kWarmUp,  ///< fast at first, towards a steady value
+    kJump,    ///< all at once
+  };
+
+  Kind kind = Kind::kEven;
+  Time begin{};               ///< of the stretch of time over which the change is told
+  double duration_s = 32400;  ///< of that stretch
+  /// Of kWarmUp, in which what is left of it decays to 1/e; of kJump, from the beginning on until it happens.
+  double time_s = 0;
+  Time zero_at{};  ///< the coefficients stand for this time
+
+  [[nodiscard]] double part(Time t) const;
+  /// Its mean over a short step.
+  [[nodiscard]] double mean_part(Time from, Time to) const;
+
+ private:
+  [[nodiscard]] double since_begin(Time t) const;
 };
 
 /// Longest step over which the change of the readings tells how far the body turned.

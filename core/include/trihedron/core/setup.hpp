@@ -70,10 +70,9 @@ struct CalibrationSetup {
 
   // Of the further states, where the layout has them.
   GaussMarkov wandering_drift;  ///< rad/s per case axis
-  /// 1-sigma of each component before anything is measured, rad, rad/s, s or s/s; of the change over change_time_s.
+  /// 1-sigma of each component before anything is measured, rad, rad/s, s or s/s; of the change, of the whole of it.
   PerFurtherState<double> further_sigma = default_further_sigmas();
-  double change_time_s = 32400;
-  Time no_change_at{};                 ///< the coefficients stand for this time
+  CourseOfChange change;               ///< of the coefficients
   double orbital_rate_rad_s = 1.1e-3;  ///< n
   Time orbital_phase_zero{};           ///< where nt = 0, and for which the clock offset stands
 
@@ -102,7 +101,7 @@ struct CalibrationSetup {
   [[nodiscard]] std::optional<SetupFault> fault() const;
 
   /// The fraction of the change of the coefficients that has taken place at `t`.
-  [[nodiscard]] double part_of_change(Time t) const { return to_seconds(t - no_change_at) / change_time_s; }
+  [[nodiscard]] double part_of_change(Time t) const { return change.part(t); }
 
   [[nodiscard]] Duration max_interpolation() const { return trihedron::max_interpolation(gyro_period); }
   /// How far to both sides of a fix readings are fitted together: at one fix every 3 s no reading is shared. For slow

@@ -56,7 +56,7 @@ inline constexpr std::array<FurtherStateRow, kFurtherStateCount> kFurtherStates 
     {FurtherState::kReadoutBias, "readout_bias", "Bias of the direction cosines", "of the direction cosines",
      Unit::kRadian, further_state_components::kReadoutBias},
     {FurtherState::kCoefficientChange, "coefficient_change", "Change of the coefficients",
-     "of eq. (1), evenly over the pass, by estimator batch", Unit::kRadianPerSecond,
+     "of eq. (1), over the pass", Unit::kRadianPerSecond,
      further_state_components::kCoefficientChange},
     {FurtherState::kWanderingDrift,
      "wandering_drift",

@@ -74,6 +74,7 @@ inline constexpr Range kNeededInterval_s{1, 3.2e6, "s",
                                          "it is the time between two astro-corrections, a month at most"};
 inline constexpr Range kWanderingDrift_rad_s{1e-15, 1e-2, "rad/s", "give auto, off, or a 1-sigma like 0.01deg/h"};
 inline constexpr Range kWanderingTime_s{1, kYear_s, "s", "an hour is usual"};
+inline constexpr Range kChangeTime_s{1, kYear_s, "s", "rotors warm up in an hour or two"};
 
 // ---- Calibrations
 

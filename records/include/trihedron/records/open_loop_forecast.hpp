@@ -33,7 +33,7 @@ struct OpenLoopStart {
   PerGyro<double> readout_noise_rad{};
   double direction_random_walk_rad_sqrt_s = 0;
   GaussMarkov wandering_drift;
-  double change_time_s = 1;  ///< over which the change of the coefficients is told
+  CourseOfChange change;  ///< of the coefficients, which stand for its zero_at, the time of the correction
 
   [[nodiscard]] bool is_known() const { return covariance.size() > 0; }
 };

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "trihedron/core/drift_model.hpp"
+#include "trihedron/core/precession.hpp"
 #include "trihedron/core/time.hpp"
 #include "trihedron/records/estimator.hpp"
 #include "trihedron/records/further_state.hpp"
@@ -34,6 +35,8 @@ struct FurtherStateOptions {
 
   double wandering_drift_rad_s = 1e-8;  ///< 1-sigma of the wandering drift, where on
   Duration wandering_time = std::chrono::hours(1);
+  CourseOfChange::Kind change_course = CourseOfChange::Kind::kEven;  ///< of the change of the coefficients, where on
+  Duration change_time = std::chrono::hours(1);                      ///< CourseOfChange::time_s
 
   [[nodiscard]] constexpr Choice& operator[](FurtherState state) { return choices_[static_cast<std::size_t>(state)]; }
   [[nodiscard]] constexpr Choice operator[](FurtherState state) const {

@@ -103,6 +103,7 @@ struct Change {
   Motion motion = Motion::kStep;
   int gyro = -1;         ///< from 0; −1: all
   Time from{}, until{};  ///< between which a step lies
+  Duration decay{};      ///< of kDecay, until 1/e of it is left
   double log_odds = 0;   ///< ln of the Bayes factor for it against nothing that moves, less ln of the number of tries
   /// Size and 1-sigma: rotation vector, rad, c axes (kInertialAxes: in axes; kMomentum: two components across the
   /// momentum); coefficients, rad/s, gyro by gyro; over the pass. For kWalk one number, the root of the sum of
@@ -111,6 +112,12 @@ struct Change {
   /// Coefficients of eq. (1) and alignment of each gyro at the end of the pass, less what is estimated without the
   /// change: rad/s, rad.
   Eigen::VectorXd parameters_off;
+
+  /// Whether it counts as there: at most in 1 of 20 000 passes in which nothing moves.
+  [[nodiscard]] bool is_found() const {
+    constexpr double kLogOdds = 9.9;
+    return log_odds >= kLogOdds;
+  }
 };
 
 /// A calibration of a pass, and everything that was recorded on the way.
