@@ -255,8 +255,8 @@ void PassProblem::begin_arc(const PassSolution& solution, std::size_t arc, Momen
   moment.arc = arc;
   moment.t = nodes_[arcs_[arc].begin].t;
   moment.gyros = solution.gyros;
-  moment.since = {};
   for (int k = 0; k < gyros_; ++k) {
+    moment.since[k].begin(drift_.columns());
     Gyro& gyro = moment.gyros[k];
     gyro.h_in = solution.arcs[arc].h_in[k];
     if (layout_.further.wandering_drift) {
