@@ -41,27 +41,10 @@ Lanes3 product(const Lanes3 (&m)[3], const Lanes3& v) {
   store3(normalized(rotated(load3(a.h_in, b.h_in), turn)), a.h_in, b.h_in);
 }
 
-}  // namespace
-
-void precess_two(const PrecessingGyro& a, const PrecessingGyro& b, const Eigen::Matrix3d& C_in_c, double dt_s) {
-  const Lanes3 h = corrected(a, b);
-  Esg7::Coefficients<Lanes> kappa;
-  for (int i = 0; i < Esg7::kSize; ++i) {
-    kappa(i) = load(a.kappa + i, b.kappa + i);
-  }
-  const Vector3<Lanes> rate = Esg7::rate<Lanes>({h.x, h.y, h.z}, kappa);
-  Lanes3 alignment[3];
-  Lanes3 attitude[3];
-  for (int j = 0; j < 3; ++j) {
-    alignment[j] = load3(a.C_c_b + 3L * j, b.C_c_b + 3L * j);
-    attitude[j] = {both_lanes(C_in_c(0, j)), both_lanes(C_in_c(1, j)), both_lanes(C_in_c(2, j))};
-  }
-  const Lanes3 omega_in = product(attitude, product(alignment, {0.0 + rate(0), 0.0 + rate(1), 0.0 + rate(2)}));
-  turn_momenta(a, b, both_lanes(dt_s) * omega_in);
-}
-
-void precess_two(const PrecessingGyro& a, const PrecessingGyro& b, const SensitivityOfEq1& since_a,
-                 const SensitivityOfEq1& since_b, const Eigen::Matrix3d& C_in_c, double dt_s) {
+/// precess_two() with sensitivities; `given`: the rates, or null where eq. (1) makes them.
+[[gnu::always_inline]] inline void precess_two(const PrecessingGyro& a, const PrecessingGyro& b,
+                                               const SensitivityOfEq1& since_a, const SensitivityOfEq1& since_b,
+                                               const Eigen::Matrix3d& C_in_c, double dt_s, const Lanes3* given) {
   const Lanes3 h = corrected(a, b);
   // The columns of eq. (1) that are not zero.
   const Lanes sx = h.x * h.x, sy = h.y * h.y, sz = h.z * h.z;
@@ -83,12 +66,17 @@ void precess_two(const PrecessingGyro& a, const PrecessingGyro& b, const Sensiti
     }
     m[j] = {column[0], column[1], column[2]};
   }
-  const auto kappa = [&](int i) { return load(a.kappa + i, b.kappa + i); };
-  Lanes3 rate = kappa(Esg7::kK0) * k0;
-  rate = {0.0 + rate.x, 0.0 + rate.y, 0.0 + rate.z};  // a zero without sign, as the sum that begins with one
-  rate.x = rate.x + x_mu12 * kappa(Esg7::kMu12) + x_mu31 * kappa(Esg7::kMu31) + x_nu23 * kappa(Esg7::kNu23);
-  rate.y = rate.y + y_mu12 * kappa(Esg7::kMu12) + y_mu23 * kappa(Esg7::kMu23) + y_nu31 * kappa(Esg7::kNu31);
-  rate.z = rate.z + z_mu23 * kappa(Esg7::kMu23) + z_mu31 * kappa(Esg7::kMu31) + z_nu12 * kappa(Esg7::kNu12);
+  Lanes3 rate;
+  if (given != nullptr) {
+    rate = *given;
+  } else {
+    const auto kappa = [&](int i) { return load(a.kappa + i, b.kappa + i); };
+    rate = kappa(Esg7::kK0) * k0;
+    rate = {0.0 + rate.x, 0.0 + rate.y, 0.0 + rate.z};  // a zero without sign, as the sum that begins with one
+    rate.x = rate.x + x_mu12 * kappa(Esg7::kMu12) + x_mu31 * kappa(Esg7::kMu31) + x_nu23 * kappa(Esg7::kNu23);
+    rate.y = rate.y + y_mu12 * kappa(Esg7::kMu12) + y_mu23 * kappa(Esg7::kMu23) + y_nu31 * kappa(Esg7::kNu31);
+    rate.z = rate.z + z_mu23 * kappa(Esg7::kMu23) + z_mu31 * kappa(Esg7::kMu31) + z_nu12 * kappa(Esg7::kNu12);
+  }
   const Lanes3 turn = product(m, rate);
   turn_momenta(a, b, turn);
 
@@ -116,6 +104,37 @@ void precess_two(const PrecessingGyro& a, const PrecessingGyro& b, const Sensiti
   advance(Esg7::kNu12, z_nu12 * m[2]);
   advance(Esg7::kNu23, x_nu23 * m[0]);
   advance(Esg7::kNu31, y_nu31 * m[1]);
+}
+
+}  // namespace
+
+void precess_two(const PrecessingGyro& a, const PrecessingGyro& b, const Eigen::Matrix3d& C_in_c, double dt_s) {
+  const Lanes3 h = corrected(a, b);
+  Esg7::Coefficients<Lanes> kappa;
+  for (int i = 0; i < Esg7::kSize; ++i) {
+    kappa(i) = load(a.kappa + i, b.kappa + i);
+  }
+  const Vector3<Lanes> rate = Esg7::rate<Lanes>({h.x, h.y, h.z}, kappa);
+  Lanes3 alignment[3];
+  Lanes3 attitude[3];
+  for (int j = 0; j < 3; ++j) {
+    alignment[j] = load3(a.C_c_b + 3L * j, b.C_c_b + 3L * j);
+    attitude[j] = {both_lanes(C_in_c(0, j)), both_lanes(C_in_c(1, j)), both_lanes(C_in_c(2, j))};
+  }
+  const Lanes3 omega_in = product(attitude, product(alignment, {0.0 + rate(0), 0.0 + rate(1), 0.0 + rate(2)}));
+  turn_momenta(a, b, both_lanes(dt_s) * omega_in);
+}
+
+void precess_two(const PrecessingGyro& a, const PrecessingGyro& b, const SensitivityOfEq1& since_a,
+                 const SensitivityOfEq1& since_b, const Eigen::Matrix3d& C_in_c, double dt_s) {
+  precess_two(a, b, since_a, since_b, C_in_c, dt_s, nullptr);
+}
+
+void precess_two(const PrecessingGyro& a, const PrecessingGyro& b, const SensitivityOfEq1& since_a,
+                 const SensitivityOfEq1& since_b, const Eigen::Matrix3d& C_in_c, double dt_s,
+                 const Eigen::Vector3d& rate_a, const Eigen::Vector3d& rate_b) {
+  const Lanes3 rates = load3(rate_a.data(), rate_b.data());
+  precess_two(a, b, since_a, since_b, C_in_c, dt_s, &rates);
 }
 
 void advance_by_drift(ColumnsView by_drift, ColumnsView basis, const Eigen::Matrix3d& dt_C_in_b,

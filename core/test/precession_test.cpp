@@ -182,8 +182,13 @@ TEST(PrecessAll, GivesTheBitsOfEachGyroAlone) {
     PerGyro<Gyro> alone = together;
     PerGyro<Gyro> navigated = together;
     PerGyro<Gyro> navigated_alone = together;
+    PerGyro<Gyro> by_rates = together;  // has no coefficients of its own
     PerGyro<Sensitivities> since;
     PerGyro<Sensitivities> since_alone;
+    PerGyro<Sensitivities> since_by_rates;
+    for (Gyro& gyro : by_rates) {
+      gyro.drift_rad_s.setZero();
+    }
     for (int i = 0; i < 50; ++i) {
       const Eigen::Matrix3d C_in_c = attitude_at(i);
       Directions h_b;
@@ -193,6 +198,14 @@ TEST(PrecessAll, GivesTheBitsOfEachGyroAlone) {
       const double dt_s = i % 2 == 0 ? 0.125 : 0.1;
       precess_all(together, since, kCount, kEq1, C_in_c, h_b, 0, dt_s * times);
       precess_all(navigated, kCount, kEq1, C_in_c, h_b, 0, dt_s * times);
+      Eigen::Vector3d rates[2];
+      for (int k = 0; k < 2; ++k) {
+        Columns<kColumns> columns;
+        kEq1.basis(alone[k].corrected(h_b[k]), 0, columns.view(kColumns));
+        rates[k] = columns.view(kColumns).times(alone[k].drift_rad_s.data());
+      }
+      precess_two({by_rates[0], h_b[0]}, {by_rates[1], h_b[1]}, SensitivityOfEq1(since_by_rates[0]),
+                  SensitivityOfEq1(since_by_rates[1]), C_in_c, dt_s * times, rates[0], rates[1]);
       for (int k = 0; k < kCount; ++k) {
         precess(alone[k], since_alone[k], kEq1, C_in_c, h_b[k], 0, dt_s * times);
         precess(navigated_alone[k], kEq1, C_in_c, h_b[k], 0, dt_s * times);
@@ -204,6 +217,13 @@ TEST(PrecessAll, GivesTheBitsOfEachGyroAlone) {
       expect_same_bits(since[k].by_start, since_alone[k].by_start);
       expect_same_bits(since[k].by_alignment, since_alone[k].by_alignment);
       expect_same_bits(since[k].by_drift.first(kColumns).eval(), since_alone[k].by_drift.first(kColumns).eval());
+    }
+    for (int k = 0; k < 2; ++k) {
+      expect_same_bits(by_rates[k].h_in, alone[k].h_in);
+      expect_same_bits(since_by_rates[k].by_start, since_alone[k].by_start);
+      expect_same_bits(since_by_rates[k].by_alignment, since_alone[k].by_alignment);
+      expect_same_bits(since_by_rates[k].by_drift.first(kColumns).eval(),
+                       since_alone[k].by_drift.first(kColumns).eval());
     }
   }
 }

@@ -315,6 +315,12 @@ void PassProblem::step(const Node& from_node, const Node& to_node, const Drift& 
     return;
   }
   const Matrix3d C_in_c = attitude.value().raw();
+  const bool by_eq1 = drift.sensitive != nullptr && drift.sensitive->columns() == Layout::kEq1;
+  if (by_eq1 && gyros_ == 2 && used[0] && used[1] && !to_node.after_gap) {  // nearly all steps of a pair
+    precess_two({moment.gyros[0], middle[0]}, {moment.gyros[1], middle[1]}, SensitivityOfEq1(moment.since[0]),
+                SensitivityOfEq1(moment.since[1]), C_in_c, dt_s, omega_b[0], omega_b[1]);
+    return;
+  }
   double largest_rad = 0;
   for (int k = 0; k < gyros_; ++k) {
     Gyro& gyro = moment.gyros[k];

@@ -121,6 +121,10 @@ struct SensitivityOfEq1 {
 void precess_two(const PrecessingGyro& a, const PrecessingGyro& b, const Eigen::Matrix3d& C_in_c, double dt_s);
 void precess_two(const PrecessingGyro& a, const PrecessingGyro& b, const SensitivityOfEq1& since_a,
                  const SensitivityOfEq1& since_b, const Eigen::Matrix3d& C_in_c, double dt_s);
+/// The same of two whose drift has more than the sensitivities to eq. (1) are about: rates ω_b, rad/s, case axes.
+void precess_two(const PrecessingGyro& a, const PrecessingGyro& b, const SensitivityOfEq1& since_a,
+                 const SensitivityOfEq1& since_b, const Eigen::Matrix3d& C_in_c, double dt_s,
+                 const Eigen::Vector3d& rate_a, const Eigen::Vector3d& rate_b);
 
 /// precess() of the first `count` gyros.
 template <class Gyros>
