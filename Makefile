@@ -19,7 +19,7 @@ help:
 	@echo 'make build    the program alone, at $(BUILD)/trihedron'
 	@echo 'make everything  with tests and benches'
 	@echo 'make bench    measure again what docs/performance.md tells: half an hour; goes on where it was interrupted'
-	@echo 'make peers    fly the filters of others over the same pass (PEERS: further programs): two minutes'
+	@echo 'make peers    fly the filters of others, and the batch with Ceres, over the same pass (PEERS: further programs): two minutes'
 	@echo 'make slots    count the instructions of each slot of the on-board application'
 	@echo 'make flight   fly core on an emulated Cortex-M7 and three other processors; writes the tables of docs/flight.md'
 	@echo 'make validation  measure again what docs/validation.md tells'
@@ -138,7 +138,7 @@ bench:
 peers:
 	@cmake/setup.sh program tests peers
 	cmake --preset release $(CMAKE_FLAGS)
-	cmake --build $(BUILD) --parallel $(JOBS) --target trihedron trihedron_peer_ours trihedron_peer_dense trihedron_peer_dense_native
+	cmake --build $(BUILD) --parallel $(JOBS) --target trihedron trihedron_peers
 	@test -e build-peers/bin/pip || python3 -m venv build-peers
 	@build-peers/bin/pip install --quiet --disable-pip-version-check --requirement bench/peers/requirements.txt
 	build-peers/bin/python bench/peers/peers.py $(BUILD) out/bench/peers.json $(PEERS)

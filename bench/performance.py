@@ -3,7 +3,7 @@
 
 Times are Google Benchmark's, of the processor; instructions are callgrind's, and exact. Both are kept as JSON in DIRECTORY (out/bench);
 what is there and newer than the programs is not measured again, so that an interrupted run goes on. What bench/peers/peers.py
-has left there of the filters of others is put in as well.
+has left there of the filters and batches of others is put in as well.
 """
 import argparse
 import json
@@ -169,13 +169,26 @@ def scaling_table(times, counts):
     return table(["", "states", "ms", "µs a sample", "million instructions"], rows)
 
 
-def peers_table(found):
+def agreement_of(peer):
+    return "" if "difference_sigmas" not in peer else f"{peer['difference_sigmas']:.0e} σ, sigmas to {peer['sigma_ratio']:.0e}"
+
+
+def filters_table(found):
     ours = next(peer for peer in found if peer["peer"] == "trihedron, the filter of the paper")
-    rows = []
-    for peer in found:
-        agrees = "" if "difference_sigmas" not in peer else f"{peer['difference_sigmas']:.0e} σ, sigmas to {peer['sigma_ratio']:.0e}"
-        rows.append([peer["peer"], peer.get("built", ""), f"{peer['seconds'] * 1e3:.0f}", f"{peer['seconds'] / ours['seconds']:.1f}", agrees])
+    rows = [[peer["peer"], peer.get("built", ""), f"{peer['seconds'] * 1e3:.0f}", f"{peer['seconds'] / ours['seconds']:.1f}", agreement_of(peer)] for peer in found]
     return table(["filter", "built", "ms", "times ours", "greatest difference of a parameter"], rows, right=2)
+
+
+def batches_table(found):
+    """trihedron's sigmas are part of its solution."""
+    rows = []
+    for ours in (peer for peer in found if peer["peer"] == "trihedron, the batch"):
+        walk = ours["walk_rad_sqrt_s"]
+        for peer in (peer for peer in found if peer["walk_rad_sqrt_s"] == walk):
+            whole = peer["seconds"] + peer.get("sigmas_seconds", 0)
+            rows.append([peer["peer"], f"walk of {walk:.0e} rad/√s" if walk else "none", peer["built"], f"{peer['seconds'] * 1e3:.0f}", f"{peer['seconds'] / ours['seconds']:.1f}",
+                         f"{whole * 1e3:.0f}", f"{whole / ours['seconds']:.1f}", agreement_of(peer)])
+    return table(["batch", "process noise", "built", "ms", "times ours", "ms with sigmas", "times ours", "greatest difference of a parameter"], rows, right=3)
 
 
 def place_of(table_name):
@@ -188,7 +201,7 @@ def main():
     parser.add_argument("document", type=pathlib.Path)
     parser.add_argument("--kept", type=pathlib.Path, default=pathlib.Path("out/bench"))
     arguments = parser.parse_args()
-    if missing := [name for name in ("parts", "goals", "floor", "scaling", "peers") if not place_of(name).search(arguments.document.read_text())]:
+    if missing := [name for name in ("parts", "goals", "floor", "scaling", "peers", "batches") if not place_of(name).search(arguments.document.read_text())]:
         sys.exit(f"{arguments.document}: has no place for {', '.join(missing)}")
     build, directory = arguments.build.resolve(), arguments.kept
     directory.mkdir(parents=True, exist_ok=True)
@@ -200,7 +213,8 @@ def main():
     tables = {"parts": parts_table(names, times, counts), "goals": goals_table(times), "floor": floor_table(counts), "scaling": scaling_table(times, counts)}
     peers = directory / "peers.json"
     if peers.exists():
-        tables["peers"] = peers_table(json.loads(peers.read_text()))
+        found = json.loads(peers.read_text())
+        tables |= {"peers": filters_table(found["filters"]), "batches": batches_table(found["batches"])}
     text = arguments.document.read_text()
     for name, measured in tables.items():
         text = place_of(name).sub(lambda place: place[1] + measured + "\n" + place[2], text)

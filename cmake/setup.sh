@@ -23,8 +23,8 @@ interop=(default-jre-headless python3 python3-venv)
 python=(g++ python3 python3-dev python3-venv)
 # Campaigns under mpirun.
 mpi=(openmpi-bin libopenmpi-dev)
-# Filters in Python, whose packages come from PyPI.
-peers=(python3 python3-venv)
+# Filters in Python, whose packages come from PyPI, and the batch with Ceres.
+peers=(python3 python3-venv libceres-dev)
 # ARM Cortex-M7 without an operating system, emulated: a short flight is among the tests.
 flight=(gcc-arm-none-eabi libnewlib-arm-none-eabi libstdc++-arm-none-eabi-newlib qemu-system-arm)
 # The further targets of `make flight`.

@@ -98,6 +98,17 @@ inline Matrix3d trihedron(const Vector3d& h1, const Vector3d& h2) {
   return q;
 }
 
+/// B of eq. (1).
+inline Eigen::Matrix<double, 3, 7> drift_basis(const Vector3d& h) {
+  const Vector3d s = h.cwiseProduct(h);
+  const double sum = s.squaredNorm();
+  Eigen::Matrix<double, 3, 7> B;
+  B << h(0) * (sum - s(0)), h(0) * s(1), 0, -h(0) * s(2), 0, h(1) * h(2), 0,  //
+      h(1) * (sum - s(1)), -h(1) * s(0), h(1) * s(2), 0, 0, 0, h(2) * h(0),   //
+      h(2) * (sum - s(2)), 0, -h(2) * s(1), h(2) * s(0), h(0) * h(1), 0, 0;
+  return B;
+}
+
 struct Gyro {
   Vector3d h_in = Vector3d::UnitX();
   Eigen::Matrix<double, 7, 1> kappa = Eigen::Matrix<double, 7, 1>::Zero();
@@ -212,16 +223,6 @@ class Model {
   }
 
  private:
-  static Eigen::Matrix<double, 3, 7> drift_basis(const Vector3d& h) {
-    const Vector3d s = h.cwiseProduct(h);
-    const double sum = s.squaredNorm();
-    Eigen::Matrix<double, 3, 7> B;
-    B << h(0) * (sum - s(0)), h(0) * s(1), 0, -h(0) * s(2), 0, h(1) * h(2), 0,  //
-        h(1) * (sum - s(1)), -h(1) * s(0), h(1) * s(2), 0, 0, 0, h(2) * h(0),   //
-        h(2) * (sum - s(2)), 0, -h(2) * s(1), h(2) * s(0), h(0) * h(1), 0, 0;
-    return B;
-  }
-
   Gyro gyros_[2];
   Basis basis_;
 };
