@@ -176,9 +176,9 @@ void measure_open_loops(const ground::CalibrationEvaluation& evaluation, RunReco
 
 }  // namespace
 
-Flight fly(const Scenario& scenario, const CalibrationOptions& options, double limit_rad, ground::OpenLoopScope scope) {
-  Flight flight{sim::simulate(scenario), {}, {}};
-  flight.run = ground::calibrate(flight.simulated.pass, options);
+Flight fly(const RunSetup& setup, double limit_rad, ground::OpenLoopScope scope) {
+  Flight flight{sim::simulate(setup.scenario), {}, {}};
+  flight.run = ground::calibrate(flight.simulated.pass, setup.options);
   flight.evaluation =
       ground::evaluate_calibration(flight.simulated.pass, flight.run, &flight.simulated.truth, limit_rad, scope);
   return flight;
@@ -213,23 +213,23 @@ RunRecord failed(const CampaignPlan& plan, std::uint64_t run, std::string reason
   return record;
 }
 
-RunRecord perform(const CampaignPlan& plan, std::uint64_t run, const ScenarioOf& scenario_of,
-                  const CalibrationOptions& options, const std::function<void(Flight&&)>& flown) {
+RunRecord perform(const CampaignPlan& plan, std::uint64_t run, const SetupOf& setup_of,
+                  const std::function<void(Flight&&)>& flown) {
   const auto begun = std::chrono::steady_clock::now();
   const double cpu_before_s = thread_cpu_s();
   const std::uint64_t seed = seed_of_run(plan, run);
   const std::vector<double> draws = draws_of_run(plan, run);
   RunRecord record;
-  std::optional<Scenario> scenario;
+  std::optional<RunSetup> setup;
   try {
-    scenario = scenario_of(seed, draws);
+    setup = setup_of(seed, draws);
   } catch (const std::invalid_argument& error) {
     record = failed(plan, run, error.what());
   }
-  if (scenario) {
+  if (setup) {
     try {
-      Flight flight = fly(*scenario, options, plan.limit_rad,
-                          flown ? ground::OpenLoopScope::kAll : ground::OpenLoopScope::kExtension);
+      Flight flight =
+          fly(*setup, plan.limit_rad, flown ? ground::OpenLoopScope::kAll : ground::OpenLoopScope::kExtension);
       record = record_of(flight, plan.gyros);
       if (flown) {
         flown(std::move(flight));
@@ -252,14 +252,14 @@ RunRecord perform(const CampaignPlan& plan, std::uint64_t run, const ScenarioOf&
   return record;
 }
 
-void perform_all(const CampaignPlan& plan, std::span<const std::uint64_t> runs, const ScenarioOf& scenario_of,
-                 const CalibrationOptions& options, unsigned jobs, const Collect& collect) {
+void perform_all(const CampaignPlan& plan, std::span<const std::uint64_t> runs, const SetupOf& setup_of, unsigned jobs,
+                 const Collect& collect) {
   std::mutex one_at_a_time;
   ground::with_cores(jobs, [&] {
     ground::for_each_on_all_cores(runs.size(), [&](std::size_t i) {
       std::vector<RunRecord> records;
       // Many runs keep all cores busy; within a run nothing is gained by more than one, and its CPU time is its own.
-      ground::with_cores(1, [&] { records.push_back(perform(plan, runs[i], scenario_of, options)); });
+      ground::with_cores(1, [&] { records.push_back(perform(plan, runs[i], setup_of)); });
       const std::scoped_lock lock(one_at_a_time);
       collect(std::move(records));
     });

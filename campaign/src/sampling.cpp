@@ -41,22 +41,42 @@ double truncated_normal(double u, double from, double to) {
   return p > 0 && p < 1 ? std::clamp(boost::math::quantile(standard, p), from, to) : (p > 0 ? to : from);
 }
 
-std::uint64_t grid_points(const CampaignPlan& plan) {
+/// Points of the grids over settings, or of those over values of the scenario.
+std::uint64_t grid_points(const CampaignPlan& plan, bool of_settings) {
   std::uint64_t points = 1;
   for (const CampaignInput& input : plan.inputs) {
-    points *= input.distribution.kind == Distribution::Kind::kGrid ? input.distribution.options : 1;
+    if (input.distribution.kind == Distribution::Kind::kGrid && input.is_setting() == of_settings) {
+      points *= input.distribution.options;
+    }
   }
   return points;
 }
 
+/// A point of some grids, taken apart into the options of each: the last grid changes first.
+struct GridPoint {
+  std::uint64_t left = 0;   ///< number of the point among those that the grids before leave
+  std::uint64_t below = 1;  ///< points that the grids before leave
+
+  std::uint64_t option_of(const Distribution& grid) {
+    below /= grid.options;
+    const std::uint64_t option = left / below;
+    left %= below;
+    return option;
+  }
+};
+
 }  // namespace
 
+std::uint64_t flights_of(const CampaignPlan& plan) { return plan.runs / grid_points(plan, true); }
+
+std::uint64_t flight_of_run(const CampaignPlan& plan, std::uint64_t run) { return run % flights_of(plan); }
+
 std::uint64_t seed_of_run(const CampaignPlan& plan, std::uint64_t run) {
-  return mixed(plan.seed, run, hash_of("scenario.seed")) >> 1U;
+  return mixed(plan.seed, flight_of_run(plan, run), hash_of("scenario.seed")) >> 1U;
 }
 
-double uniform_of(std::uint64_t seed, std::uint64_t run, std::string_view key) {
-  return (static_cast<double>(mixed(seed, run, hash_of(key)) >> 11U) + 0.5) * 0x1p-53;
+double uniform_of(std::uint64_t seed, std::uint64_t flight, std::string_view key) {
+  return (static_cast<double>(mixed(seed, flight, hash_of(key)) >> 11U) + 0.5) * 0x1p-53;
 }
 
 double quantile_of(const Distribution& distribution, double u) {
@@ -83,6 +103,7 @@ double quantile_of(const Distribution& distribution, double u) {
       return static_cast<double>(i);
     }
     case Distribution::Kind::kGrid:
+    case Distribution::Kind::kFollows:
       break;
   }
   return 0;
@@ -106,23 +127,30 @@ std::uint64_t permuted(std::uint64_t i, std::uint64_t count, std::uint64_t key) 
 }
 
 std::vector<double> draws_of_run(const CampaignPlan& plan, std::uint64_t run) {
+  using Kind = Distribution::Kind;
+  const std::uint64_t flights = flights_of(plan);
+  const std::uint64_t flight = flight_of_run(plan, run);
+  GridPoint of_scenario{flight / plan.repeats, grid_points(plan, false)};
+  GridPoint of_settings{run / flights, grid_points(plan, true)};
   std::vector<double> draws;
-  std::uint64_t below = grid_points(plan);
-  std::uint64_t point = run / plan.repeats;
   for (const CampaignInput& input : plan.inputs) {
-    if (input.distribution.kind == Distribution::Kind::kGrid) {
-      // The last key changes first.
-      below /= input.distribution.options;
-      draws.push_back(static_cast<double>(point / below));
-      point %= below;
+    if (input.distribution.kind == Kind::kGrid) {
+      GridPoint& point = input.is_setting() ? of_settings : of_scenario;
+      draws.push_back(static_cast<double>(point.option_of(input.distribution)));
       continue;
     }
-    double u = uniform_of(plan.seed, run, input.key);
+    double u = uniform_of(plan.seed, flight, input.key);
     if (plan.latin_hypercube) {
-      const std::uint64_t stratum = permuted(run, plan.runs, mixed(plan.seed, 0, hash_of("order of " + input.key)));
-      u = (static_cast<double>(stratum) + u) / static_cast<double>(plan.runs);
+      const std::uint64_t stratum = permuted(flight, flights, mixed(plan.seed, 0, hash_of("order of " + input.key)));
+      u = (static_cast<double>(stratum) + u) / static_cast<double>(flights);
     }
     draws.push_back(quantile_of(input.distribution, u));
+  }
+  for (std::size_t i = 0; i < draws.size(); ++i) {
+    const CampaignInput& input = plan.inputs[i];
+    if (input.distribution.kind == Kind::kFollows) {
+      draws[i] = input.distribution.a * plan.inputs[input.followed].shown(draws[input.followed]);
+    }
   }
   return draws;
 }

@@ -211,8 +211,12 @@ std::vector<ParameterErrors> errors_of_parameters(std::size_t gyros, const Recor
   return all;
 }
 
-/// Words have no order; of two words the correlation is that of belonging to the second.
-bool has_order(const CampaignInput& input) { return input.is_number() || input.distribution.options == 2; }
+/// Words have no order; of two words the correlation is that of belonging to the second. What follows another input
+/// has its correlations.
+bool has_order(const CampaignInput& input) {
+  return input.distribution.kind != Distribution::Kind::kFollows &&
+         (input.is_number() || input.distribution.options == 2);
+}
 
 void find_influences(const CampaignPlan& plan, const Records& records, CampaignSummary& summary) {
   for (std::size_t i = 0; i < plan.inputs.size(); ++i) {
@@ -240,6 +244,50 @@ void find_influences(const CampaignPlan& plan, const Records& records, CampaignS
   }
   std::ranges::stable_sort(summary.influences, std::ranges::greater{},
                            [](const Influence& influence) { return std::abs(influence.correlation.rho); });
+}
+
+GridCell cell_of(std::vector<double> point, std::span<const RunRecord> records) {
+  GridCell cell;
+  cell.point = std::move(point);
+  Records trustworthy;
+  for (const RunRecord& record : records) {
+    ++(record.outcome == RunOutcome::kFailed ? cell.failed : cell.finished);
+    if (record.outcome == RunOutcome::kTrustworthy) {
+      trustworthy.push_back(&record);
+    }
+  }
+  cell.trustworthy = trustworthy.size();
+  cell.nees = nees_of(trustworthy);
+  cell.nis = nis_of(trustworthy);
+  for (const std::string_view key : kCellMeasures) {
+    cell.measures.push_back(statistics_of(*std::ranges::find(kMeasures, key, &Measure::key), trustworthy));
+  }
+  return cell;
+}
+
+/// A point's runs come one after the other.
+void find_cells(const CampaignPlan& plan, std::span<const RunRecord> records, CampaignSummary& summary) {
+  for (std::size_t i = 0; i < plan.inputs.size(); ++i) {
+    if (plan.inputs[i].distribution.kind == Distribution::Kind::kGrid) {
+      summary.grid.push_back(i);
+    }
+  }
+  if (summary.grid.empty() || plan.repeats < 2) {
+    return;
+  }
+  for (std::size_t begin = 0; begin < records.size();) {
+    const std::uint64_t cell = records[begin].run / plan.repeats;
+    std::size_t end = begin;
+    while (end < records.size() && records[end].run / plan.repeats == cell) {
+      ++end;
+    }
+    std::vector<double> point;
+    for (const std::size_t input : summary.grid) {
+      point.push_back(records[begin].draws[input]);
+    }
+    summary.cells.push_back(cell_of(std::move(point), records.subspan(begin, end - begin)));
+    begin = end;
+  }
 }
 
 void find_worst(std::span<const RunRecord> records, const Records& finished, CampaignSummary& summary) {
@@ -401,7 +449,19 @@ void judge_number(const Records& trustworthy, CampaignSummary& summary) {
 
 std::span<const Measure> measures() { return kMeasures; }
 
+std::string text_of_draw(const CampaignInput& input, double draw) {
+  return input.is_number() ? fmt::format("{:.6g}{}", input.shown(draw), input.unit)
+                           : input.options[static_cast<std::size_t>(draw)];
+}
+
 double Consistency::sigma_factor() const { return std::sqrt(mean / freedom); }
+
+int Consistency::side() const { return mean < usual.low * freedom ? -1 : mean <= usual.high * freedom ? 0 : 1; }
+
+std::optional<double> quantile_of(const MeasureStatistics& statistics, double p) {
+  const auto found = std::ranges::find(statistics.quantiles, p, &QuantileBounds::p);
+  return found != statistics.quantiles.end() ? std::optional(found->estimate) : std::nullopt;
+}
 
 bool CampaignSummary::trustworthy_campaign() const {
   return std::ranges::find(campaign_findings, FindingSeverity::kDoNotUse, &CampaignFinding::severity) ==
@@ -435,6 +495,7 @@ CampaignSummary summarise(const CampaignPlan& plan, std::span<const RunRecord> r
   }
   summary.parameters = errors_of_parameters(plan.gyros, trustworthy);
   find_influences(plan, finished, summary);
+  find_cells(plan, records, summary);
   find_worst(records, finished, summary);
   judge_failures(records, summary);
   judge_verdicts(trustworthy, finished.size(), summary);

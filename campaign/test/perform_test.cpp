@@ -27,16 +27,6 @@ CampaignPlan six_runs() {
   return plan;
 }
 
-Scenario short_scenario(std::uint64_t seed, std::span<const double> draws) {
-  Scenario scenario;
-  scenario.seed = seed;
-  scenario.duration = std::chrono::minutes(5);
-  for (GyroScenario& gyro : scenario.gyros) {
-    gyro.readout.noise_rad = draws[0] * kArcsecond;
-  }
-  return scenario;
-}
-
 CalibrationOptions told() {
   CalibrationOptions options;
   options.drift_model = kEsg7;
@@ -45,14 +35,24 @@ CalibrationOptions told() {
   return options;
 }
 
+RunSetup short_flight(std::uint64_t seed, std::span<const double> draws) {
+  Scenario scenario;
+  scenario.seed = seed;
+  scenario.duration = std::chrono::minutes(5);
+  for (GyroScenario& gyro : scenario.gyros) {
+    gyro.readout.noise_rad = draws[0] * kArcsecond;
+  }
+  return {scenario, told()};
+}
+
 /// In the order of their numbers.
-std::vector<RunRecord> performed(const CampaignPlan& plan, unsigned jobs, const ScenarioOf& scenario_of) {
+std::vector<RunRecord> performed(const CampaignPlan& plan, unsigned jobs, const SetupOf& setup_of) {
   std::vector<std::uint64_t> numbers;
   for (std::uint64_t run = 0; run < plan.runs; ++run) {
     numbers.push_back(run);
   }
   std::vector<RunRecord> records;
-  perform_all(plan, numbers, scenario_of, told(), jobs,
+  perform_all(plan, numbers, setup_of, jobs,
               [&](std::vector<RunRecord>&& its) { records.insert(records.end(), its.begin(), its.end()); });
   std::ranges::sort(records, {}, &RunRecord::run);
   return records;
@@ -76,20 +76,20 @@ void expect_same(const RunRecord& a, const RunRecord& b) {
 
 TEST(Campaign, GivesTheSameBitsOnAnyNumberOfThreadsAndForARunAlone) {
   const CampaignPlan plan = six_runs();
-  const std::vector<RunRecord> one = performed(plan, 1, short_scenario);
-  const std::vector<RunRecord> three = performed(plan, 3, short_scenario);
+  const std::vector<RunRecord> one = performed(plan, 1, short_flight);
+  const std::vector<RunRecord> three = performed(plan, 3, short_flight);
   ASSERT_EQ(one.size(), 6U);
   ASSERT_EQ(three.size(), 6U);
   for (std::size_t i = 0; i < one.size(); ++i) {
     expect_same(one[i], three[i]);
   }
-  expect_same(one[4], perform(plan, 4, short_scenario, told()));
+  expect_same(one[4], perform(plan, 4, short_flight));
   EXPECT_NE(one[4].at(RunQuantity::kNees), one[5].at(RunQuantity::kNees));
 }
 
 TEST(Campaign, MeasuresARunAgainstItsTruth) {
   const CampaignPlan plan = six_runs();
-  const RunRecord record = perform(plan, 0, short_scenario, told());
+  const RunRecord record = perform(plan, 0, short_flight);
   EXPECT_EQ(record.at(RunQuantity::kNeesFreedom), 20);
   EXPECT_GT(record.at(RunQuantity::kNees), 0);
   EXPECT_EQ(record[RunQuantity::kAlignmentError].size(), 6U);
@@ -102,11 +102,11 @@ TEST(Campaign, MeasuresARunAgainstItsTruth) {
 
 TEST(Campaign, MakesARowWithItsReasonOfARunThatFails) {
   const auto fails = [](std::uint64_t seed, std::span<const double> draws) {
-    Scenario scenario = short_scenario(seed, draws);
+    RunSetup setup = short_flight(seed, draws);
     if (draws[0] > 2) {
-      scenario.star_tracker.dropout_probability = 1;
+      setup.scenario.star_tracker.dropout_probability = 1;
     }
-    return scenario;
+    return setup;
   };
   const std::vector<RunRecord> records = performed(six_runs(), 2, fails);
   ASSERT_EQ(records.size(), 6U);
@@ -118,14 +118,14 @@ TEST(Campaign, MakesARowWithItsReasonOfARunThatFails) {
       EXPECT_EQ(record[RunQuantity::kDriftSigma].size(), 14U);
     }
   }
-  const auto impossible = [](std::uint64_t /*seed*/, std::span<const double> /*draws*/) -> Scenario {
+  const auto impossible = [](std::uint64_t /*seed*/, std::span<const double> /*draws*/) -> RunSetup {
     throw std::invalid_argument("no such scenario");
   };
-  EXPECT_EQ(perform(six_runs(), 0, impossible, told()).reason, "no such scenario");
+  EXPECT_EQ(perform(six_runs(), 0, impossible).reason, "no such scenario");
 }
 
 TEST(Campaign, EndsByAMachineThatFailsAndByAStop) {
-  const auto exhausted = [](std::uint64_t /*seed*/, std::span<const double> /*draws*/) -> Scenario {
+  const auto exhausted = [](std::uint64_t /*seed*/, std::span<const double> /*draws*/) -> RunSetup {
     throw std::bad_alloc();
   };
   EXPECT_THROW(performed(six_runs(), 2, exhausted), std::bad_alloc);
@@ -133,7 +133,7 @@ TEST(Campaign, EndsByAMachineThatFailsAndByAStop) {
   const StopScope scope(&request);
   std::vector<std::uint64_t> numbers = {0, 1, 2, 3, 4, 5};
   std::size_t collected = 0;
-  EXPECT_THROW(perform_all(six_runs(), numbers, short_scenario, told(), 1,
+  EXPECT_THROW(perform_all(six_runs(), numbers, short_flight, 1,
                            [&](std::vector<RunRecord>&& records) {
                              EXPECT_LT(records.at(0).run, 2U);
                              if (++collected == 2) {

@@ -181,10 +181,11 @@ TEST(Sampling, OfARunDependsOnNoOtherKeyAndNoOtherRun) {
   other.seed = 4;
   EXPECT_NE(draws_of_run(plan, 17), draws_of_run(other, 17));
   EXPECT_NE(draws_of_run(plan, 17), draws_of_run(plan, 18));
+  larger.runs = 10000;
   std::set<std::uint64_t> seeds;
-  for (std::uint64_t run = 0; run < 10000; ++run) {
-    EXPECT_LT(seed_of_run(plan, run), std::uint64_t{1} << 63U);
-    seeds.insert(seed_of_run(plan, run));
+  for (std::uint64_t run = 0; run < larger.runs; ++run) {
+    EXPECT_LT(seed_of_run(larger, run), std::uint64_t{1} << 63U);
+    seeds.insert(seed_of_run(larger, run));
   }
   EXPECT_EQ(seeds.size(), 10000U);
 }
@@ -206,6 +207,33 @@ TEST(Sampling, OfAGridTakesEachPointAsOftenAsItIsRepeated) {
   }
   EXPECT_EQ(draws_of_run(plan, 2)[2], 1);  // the last key changes first
   EXPECT_EQ(draws_of_run(plan, 2)[0], 0);
+}
+
+/// Two estimators over the same flights, and a value that another follows.
+TEST(Sampling, CalibratesEachFlightByAllSettings) {
+  CampaignPlan plan;
+  plan.repeats = 2;
+  plan.runs = 12;
+  CampaignInput follows = input_of("gyro.alignment_prior_sigma", {.kind = Kind::kFollows, .a = 0.5});
+  follows.followed = 3;
+  plan.inputs = {input_of("calibration.estimator", {.kind = Kind::kGrid, .options = 2}), follows, uniform("b", 0, 1),
+                 input_of("c", {.kind = Kind::kGrid, .options = 3})};
+  plan.inputs[3].numbers = {10, 20, 60};
+  ASSERT_EQ(flights_of(plan), 6U);
+  CampaignPlan one_estimator = plan;
+  one_estimator.inputs.erase(one_estimator.inputs.begin());
+  one_estimator.inputs.front().followed = 2;
+  one_estimator.runs = 6;
+  for (std::uint64_t run = 0; run < plan.runs; ++run) {
+    const std::vector<double> draws = draws_of_run(plan, run);
+    EXPECT_EQ(draws[0], run < 6 ? 0 : 1);
+    EXPECT_EQ(draws[1], plan.inputs[3].numbers[static_cast<std::size_t>(draws[3])] / 2);
+    EXPECT_EQ(flight_of_run(plan, run), run % 6);
+    EXPECT_EQ(seed_of_run(plan, run), seed_of_run(one_estimator, run % 6));
+    EXPECT_EQ(std::vector<double>(draws.begin() + 1, draws.end()), draws_of_run(one_estimator, run % 6));
+  }
+  plan.latin_hypercube = true;
+  EXPECT_EQ(draws_of_run(plan, 1)[2], draws_of_run(plan, 7)[2]);
 }
 
 }  // namespace

@@ -233,5 +233,69 @@ TEST(CampaignSummary, CountsTheQuantilesOfAnExtensionFromAbove) {
   EXPECT_GT(*ninety.upper, 11);
 }
 
+/// A grid of two by three, two runs at each point.
+CampaignPlan grid_of_six() {
+  CampaignPlan plan;
+  plan.repeats = 2;
+  plan.runs = 12;
+  for (const std::size_t options : {2U, 3U}) {
+    CampaignInput input;
+    input.key = options == 2 ? "attitude" : "gyro.readout.noise";
+    input.distribution = {.kind = Distribution::Kind::kGrid, .options = options};
+    plan.inputs.push_back(input);
+  }
+  plan.inputs[0].options = {"slews", "none"};
+  plan.inputs[1].options = {"1arcsec", "2arcsec", "4arcsec"};
+  plan.inputs[1].numbers = {1, 2, 4};
+  plan.inputs[1].unit = "arcsec";
+  return plan;
+}
+
+std::vector<RunRecord> runs_of_grid() {
+  std::vector<RunRecord> records = runs_of(12);
+  for (RunRecord& record : records) {
+    record.draws = {std::floor(static_cast<double>(record.run) / 6), static_cast<double>(record.run / 2 % 3)};
+  }
+  return records;
+}
+
+TEST(CampaignSummary, TellsEachPointOfAGridApart) {
+  const CampaignPlan plan = grid_of_six();
+  std::vector<RunRecord> records = runs_of_grid();
+  records[4][RunQuantity::kNees] = {40};
+  records[5][RunQuantity::kNees] = {60};
+  records[6].outcome = RunOutcome::kDoNotUse;
+  records[6][RunQuantity::kNees] = {1e6};
+  records[8].outcome = records[9].outcome = RunOutcome::kFailed;
+  const CampaignSummary summary = summarise(plan, records);
+  ASSERT_EQ(summary.cells.size(), 6U);
+  EXPECT_THAT(summary.grid, testing::ElementsAre(0, 1));
+  EXPECT_THAT(summary.cells[2].point, testing::ElementsAre(0, 2));
+  EXPECT_EQ(text_of_draw(plan.inputs[0], summary.cells[2].point[0]), "slews");
+  EXPECT_EQ(text_of_draw(plan.inputs[1], summary.cells[2].point[1]), "4arcsec");
+  EXPECT_EQ(summary.cells[2].nees->mean, 50);
+  EXPECT_EQ(summary.cells[2].nees->side(), 1);
+  EXPECT_EQ(quantile_of(summary.cells[2].measures[1], 0.5), 1e-4 + 4e-6);  // of two the smaller
+  EXPECT_EQ(quantile_of(summary.cells[2].measures[1], kCellQuantile), 1e-4 + 5e-6);
+  EXPECT_EQ(summary.cells[0].nees->mean, 20);
+  EXPECT_EQ(summary.cells[0].nees->side(), 0);
+  // 40 degrees of freedom of two runs: 95 % between 24.433 and 59.342.
+  EXPECT_NEAR(summary.cells[0].nees->usual.low * 20, 24.433 / 2, 1e-3);
+  EXPECT_NEAR(summary.cells[0].nees->usual.high * 20, 59.342 / 2, 1e-3);
+  EXPECT_EQ(summary.cells[3].nees->mean, 20);  // of the trustworthy run alone
+  EXPECT_EQ(summary.cells[3].trustworthy, 1U);
+  EXPECT_EQ(summary.cells[3].finished, 2U);
+  EXPECT_EQ(summary.cells[4].failed, 2U);
+  EXPECT_FALSE(summary.cells[4].nees.has_value());
+  EXPECT_FALSE(quantile_of(summary.cells[4].measures[0], 0.5).has_value());
+}
+
+TEST(CampaignSummary, HasNoCellsOfSingleRunsOrWithoutAGrid) {
+  CampaignPlan plan = grid_of_six();
+  plan.repeats = 1;
+  EXPECT_TRUE(summarise(plan, runs_of_grid()).cells.empty());
+  EXPECT_TRUE(summarise(plan_of(12), runs_of(12)).cells.empty());
+}
+
 }  // namespace
 }  // namespace trihedron::campaign

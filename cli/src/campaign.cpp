@@ -53,10 +53,10 @@ struct CampaignArguments {
   unsigned jobs = 0;  ///< 0: one per core, in a job of mpirun one per rank
 };
 
-campaign::ScenarioOf scenarios_of(const io::CampaignFile& file) {
+campaign::SetupOf setups_of(const io::CampaignFile& file) {
   return [&file](std::uint64_t seed, std::span<const double> draws) {
     try {
-      return file.scenario(seed, draws);
+      return campaign::RunSetup{file.scenario(seed, draws), file.options(draws)};
     } catch (const io::InputRefused& refused) {
       throw std::invalid_argument(refused.reason());
     }
@@ -175,7 +175,7 @@ class Campaign {
         job_->end();
       } else {
         const unsigned jobs = arguments_.jobs > 0 ? arguments_.jobs : std::max(std::thread::hardware_concurrency(), 1U);
-        campaign::perform_all(plan(), missing, scenarios_of(file_), file_.options(), jobs, collect);
+        campaign::perform_all(plan(), missing, setups_of(file_), jobs, collect);
       }
     } catch (const Stopped&) {
       say(fmt::format("{}trihedron: stopped; {} of {} runs are kept: go on with {} --resume\n",
@@ -210,7 +210,7 @@ void stage_flight(io::StagedDirectory& staged, const io::CampaignFile& file, con
   io::NamedPass pass{staged.path() / "pass.nc", fmt::format("run-{}", record.run), {}, {}};
   pass.loaded.pass = std::move(flight.simulated.pass);
   pass.truth = std::move(flight.simulated.truth);
-  stage_calibration(staged, pass, flight.run, std::move(flight.evaluation), file.options());
+  stage_calibration(staged, pass, flight.run, std::move(flight.evaluation), file.options(record.draws));
 }
 
 ExitStatus replay_run(const io::CampaignFile& file, const CampaignArguments& arguments, const Common& common) {
@@ -227,7 +227,7 @@ ExitStatus replay_run(const io::CampaignFile& file, const CampaignArguments& arg
     staged.emplace(directory);
   }
   std::optional<campaign::Flight> flight;
-  const RunRecord record = campaign::perform(plan, run, scenarios_of(file), file.options(),
+  const RunRecord record = campaign::perform(plan, run, setups_of(file),
                                              [&](campaign::Flight&& flown) { flight.emplace(std::move(flown)); });
   std::string comparison;
   if (journal) {
@@ -282,7 +282,7 @@ ExitStatus carry_out(const CampaignArguments& arguments, const Common& common, J
 ExitStatus run_campaign(const CampaignArguments& arguments, const Common& common) {
   if (arguments.serve) {
     const io::CampaignFile file(arguments.file, sim::expect_possible);
-    serve(file, file.identity(TRIHEDRON_VERSION), scenarios_of(file));
+    serve(file, file.identity(TRIHEDRON_VERSION), setups_of(file));
     return kTrustworthy;
   }
   if (!is_in_a_job()) {

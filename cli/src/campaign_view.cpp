@@ -20,6 +20,7 @@ using campaign::MeasureStatistics;
 using nlohmann::ordered_json;
 
 constexpr std::size_t kShownInfluences = 10;
+constexpr std::size_t kShownCells = 60;
 
 std::string measure_text(const Measure& measure, double value) {
   if (!std::isfinite(value)) {
@@ -37,11 +38,13 @@ std::string measure_text(const Measure& measure, double value) {
   return {};
 }
 
+std::size_t characters_of(const std::string& text) {
+  return static_cast<std::size_t>(std::ranges::count_if(text, [](unsigned char c) { return (c & 0xC0U) != 0x80U; }));
+}
+
 /// Fills the columns by characters, not by bytes.
 std::string right(const std::string& text, std::size_t columns) {
-  const auto characters =
-      static_cast<std::size_t>(std::ranges::count_if(text, [](unsigned char c) { return (c & 0xC0U) != 0x80U; }));
-  return std::string(columns - std::min(columns, characters), ' ') + text;
+  return std::string(columns - std::min(columns, characters_of(text)), ' ') + text;
 }
 
 std::string consistency_text(const char* name, const std::optional<Consistency>& consistency, int digits) {
@@ -79,6 +82,68 @@ std::string measures_text(const std::vector<MeasureStatistics>& statistics, cons
     text += fmt::format("{} {:>6}\n{}\n", row, its.runs, bound);
   }
   return text;
+}
+
+/// An arrow where the mean is outside of what 95 % of consistent campaigns have.
+std::string marked(const std::optional<Consistency>& consistency, int digits) {
+  return consistency ? fmt::format("{:.{}f} {}", consistency->mean, digits,
+                                   consistency->side() < 0   ? "↓"
+                                   : consistency->side() > 0 ? "↑"
+                                                             : " ")
+                     : std::string(kNoEntry) + "  ";
+}
+
+std::string cells_text(const CampaignPlan& plan, const CampaignSummary& summary) {
+  if (summary.cells.empty()) {
+    return "";
+  }
+  std::vector<std::vector<std::string>> rows = {{}};
+  for (const std::size_t input : summary.grid) {
+    rows.front().push_back(printable(plan.inputs[input].key));
+  }
+  for (const char* const head : {"runs", "trust", "NEES  ", "NIS  "}) {
+    rows.front().emplace_back(head);
+  }
+  for (const std::string_view key : campaign::kCellMeasures) {
+    rows.front().emplace_back(key);
+  }
+  for (const campaign::GridCell& cell : summary.cells) {
+    if (rows.size() > kShownCells) {
+      break;
+    }
+    std::vector<std::string>& row = rows.emplace_back();
+    for (std::size_t i = 0; i < summary.grid.size(); ++i) {
+      row.push_back(printable(campaign::text_of_draw(plan.inputs[summary.grid[i]], cell.point[i])));
+    }
+    row.push_back(std::to_string(cell.finished + cell.failed));
+    row.push_back(std::to_string(cell.trustworthy));
+    row.push_back(marked(cell.nees, 1));
+    row.push_back(marked(cell.nis, 3));
+    for (const MeasureStatistics& its : cell.measures) {
+      const std::optional<double> value = campaign::quantile_of(its, campaign::kCellQuantile);
+      row.push_back(value ? measure_text(*its.measure, *value) : std::string(kNoEntry));
+    }
+  }
+  std::vector<std::size_t> widths(rows.front().size());
+  for (const std::vector<std::string>& row : rows) {
+    for (std::size_t i = 0; i < row.size(); ++i) {
+      widths[i] = std::max(widths[i], characters_of(row[i]));
+    }
+  }
+  std::string text = fmt::format(
+      "\nBy the grid: means over the trustworthy runs, ↑ ↓ where they are outside of what 95 % of consistent "
+      "estimators "
+      "have; errors that {0:g} % of the runs do not exceed, extensions that {0:g} % reach\n",
+      100 * campaign::kCellQuantile);
+  for (const std::vector<std::string>& row : rows) {
+    for (std::size_t i = 0; i < row.size(); ++i) {
+      text += "  " + right(row[i], widths[i]);
+    }
+    text += "\n";
+  }
+  return text + (summary.cells.size() > kShownCells ? fmt::format("  … and {} more, in report.html and with --json\n",
+                                                                  summary.cells.size() - kShownCells)
+                                                    : "");
 }
 
 std::string influences_text(const CampaignPlan& plan, const CampaignSummary& summary) {
@@ -167,6 +232,26 @@ ordered_json counts_json(const std::map<std::string, std::size_t>& counts) {
   return json;
 }
 
+ordered_json cells_json(const CampaignPlan& plan, const CampaignSummary& summary) {
+  ordered_json cells = ordered_json::array();
+  for (const campaign::GridCell& cell : summary.cells) {
+    ordered_json values = ordered_json::object();
+    for (std::size_t i = 0; i < summary.grid.size(); ++i) {
+      const CampaignInput& input = plan.inputs[summary.grid[i]];
+      values[input.key] = campaign::text_of_draw(input, cell.point[i]);
+    }
+    cells.push_back({{"values", values},
+                     {"outcomes",
+                      {{"trustworthy", cell.trustworthy},
+                       {"do_not_use", cell.finished - cell.trustworthy},
+                       {"failed", cell.failed}}},
+                     {"nees", consistency_json(cell.nees)},
+                     {"nis", consistency_json(cell.nis)},
+                     {"measures", measures_json(cell.measures)}});
+  }
+  return cells;
+}
+
 }  // namespace
 
 std::string campaign_text(const CampaignPlan& plan, const CampaignSummary& summary, const std::string& command) {
@@ -187,7 +272,7 @@ std::string campaign_text(const CampaignPlan& plan, const CampaignSummary& summa
   } else if (summary.count(RunOutcome::kDoNotUse) > 0) {
     text += measures_text(summary.all, "finished");
   }
-  return text + influences_text(plan, summary) + worst_text(summary, command) + "\n";
+  return text + cells_text(plan, summary) + influences_text(plan, summary) + worst_text(summary, command) + "\n";
 }
 
 ordered_json campaign_json(const CampaignPlan& plan, const CampaignSummary& summary, const std::string& command) {
@@ -241,6 +326,7 @@ ordered_json campaign_json(const CampaignPlan& plan, const CampaignSummary& summ
           {"measures", measures_json(summary.trustworthy)},
           {"measures_of_all", measures_json(summary.all)},
           {"parameters", parameters},
+          {"cells", cells_json(plan, summary)},
           {"influences", influences},
           {"worst", worst}};
 }
@@ -260,9 +346,7 @@ std::string run_text(const CampaignPlan& plan, const RunRecord& record) {
   }
   for (std::size_t i = 0; i < plan.inputs.size(); ++i) {
     const CampaignInput& input = plan.inputs[i];
-    text += fmt::format("  {} = {}\n", input.key,
-                        input.is_number() ? fmt::format("{:.6g}{}", input.shown(record.draws[i]), input.unit)
-                                          : printable(input.options[static_cast<std::size_t>(record.draws[i])]));
+    text += fmt::format("  {} = {}\n", input.key, printable(campaign::text_of_draw(input, record.draws[i])));
   }
   if (record.outcome != RunOutcome::kFailed) {
     text += fmt::format("NEES        {} of {:.0f}; NIS {:.3f}\n", three_digits(record.at(RunQuantity::kNees)),

@@ -217,7 +217,7 @@ class RankedWorkers : public campaign::Workers {
 
 }  // namespace
 
-void serve(const io::CampaignFile& file, const CampaignIdentity& identity, const campaign::ScenarioOf& scenario_of) {
+void serve(const io::CampaignFile& file, const CampaignIdentity& identity, const campaign::SetupOf& setup_of) {
   const auto say_line = [](const std::string& line) {
     print_data(stdout, line + "\n");
     std::fflush(stdout);
@@ -230,8 +230,7 @@ void serve(const io::CampaignFile& file, const CampaignIdentity& identity, const
       throw io::UsageError(fmt::format("--serve: \"{}\" is no number of a run, 0 to {}", line, file.plan().runs - 1));
     }
     std::string record;
-    ground::with_cores(
-        1, [&] { record = io::format_record(campaign::perform(file.plan(), *run, scenario_of, file.options())); });
+    ground::with_cores(1, [&] { record = io::format_record(campaign::perform(file.plan(), *run, setup_of)); });
     say_line(record);
   }
   check_stop();

@@ -305,13 +305,19 @@ Json campaign_output() {
                                  {"rank_correlation", number()},
                                  {"p_value", number()},
                                  {"significant", flag()}});
+  const Json outcomes = object({{"trustworthy", count()}, {"do_not_use", count()}, {"failed", count()}});
+  const Json cell = object({{"values", by_name(text())},
+                            {"outcomes", outcomes},
+                            {"nees", consistency},
+                            {"nis", consistency},
+                            {"measures", measures}});
   const Json worst =
       object({{"run", count()}, {"why", text()}, {"command", text()}, {"measure?", text()}, {"value?", number()}});
   return object({{"campaign", text()},
                  {"seed", count()},
                  {"runs", count()},
                  {"trustworthy", flag()},
-                 {"outcomes", object({{"trustworthy", count()}, {"do_not_use", count()}, {"failed", count()}})},
+                 {"outcomes", outcomes},
                  {"findings", array(finding)},
                  {"findings_of_runs", by_name(count())},
                  {"reasons_of_failures", by_name(count())},
@@ -322,6 +328,7 @@ Json campaign_output() {
                  {"measures", measures},
                  {"measures_of_all", measures},
                  {"parameters", by_name(parameter)},
+                 {"cells", array(cell)},
                  {"influences", array(influence)},
                  {"worst", array(worst)}});
 }

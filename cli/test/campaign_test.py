@@ -220,6 +220,50 @@ def test_runs_that_fail_are_rows_and_the_exit_status_says_so(tmp_path):
     assert run("campaign", tmp_path / "c.toml", "--only", "2").returncode == DO_NOT_USE
 
 
+# Settings that differ over the same flights, and a value that follows another.
+SETTINGS = CAMPAIGN.replace('attitude.reference = {choice = ["orbital", "yaw-steered"]}', """
+calibration.estimator = {grid = ["paper", "invariant"]}
+attitude = {grid = [{}, {reference = "yaw-steered"}], names = ["along track", "yaw-steered"]}
+gyro.alignment_prior_sigma = {of = "gyro.misalignment_magnitude", times = 0.5}
+gyro.drift.direction_walk = {choice = ["2e-8rad/s^0.5", "5e-8rad/s^0.5"]}
+calibration.filter.direction_random_walk = {of = "gyro.drift.direction_walk"}
+""")
+
+
+def test_settings_of_a_grid_are_tried_over_the_same_flights(tmp_path):
+    (tmp_path / "c.toml").write_text(SETTINGS)
+    out = tmp_path / "out"
+    shown = json.loads(run("--quiet", "--json", "campaign", tmp_path / "c.toml", "-o", out).stdout)
+    with xarray.open_dataset(out / "runs.nc") as runs:
+        assert runs.sizes["run"] == 48
+        paper, invariant = runs.isel(run=slice(0, 24)), runs.isel(run=slice(24, 48))
+        assert set(paper.input_calibration_estimator.values) == {"paper"} and set(invariant.input_calibration_estimator.values) == {"invariant"}
+        assert len(set(paper.seed.values)) == 24
+        for name in ("seed", "input_gyro_readout_noise", "input_gyro_misalignment_magnitude", "input_attitude"):
+            assert (paper[name].values == invariant[name].values).all()
+        assert (paper.nees.values != invariant.nees.values).all()
+        assert (runs.input_gyro_alignment_prior_sigma == runs.input_gyro_misalignment_magnitude / 2).all()
+        assert (runs.input_calibration_filter_direction_random_walk == runs.input_gyro_drift_direction_walk).all()
+        trusted = runs.where(runs.outcome == 0)
+        for cell in shown["cells"]:
+            here = trusted.where((runs.input_calibration_estimator == cell["values"]["calibration.estimator"]) &
+                                 (runs.input_attitude == cell["values"]["attitude"]) &
+                                 (runs.input_gyro_readout_noise == float(cell["values"]["gyro.readout.noise"].removesuffix("arcsec"))) &
+                                 (runs.input_star_tracker_dropout_probability == float(cell["values"]["star_tracker.dropout_probability"])))
+            assert int(here.nees.count()) == cell["outcomes"]["trustworthy"]
+            if cell["nees"] is not None:
+                assert cell["nees"]["mean"] == pytest.approx(float(here.nees.mean()), rel=1e-12)
+    assert len(shown["cells"]) == 24 and shown["cells"][0]["values"].keys() == {
+        "attitude", "calibration.estimator", "gyro.readout.noise", "star_tracker.dropout_probability"}
+    shown = run("campaign", tmp_path / "c.toml", "-o", out, "--resume").stdout
+    assert "By the grid" in shown and "along track" in shown
+    alone = run("campaign", tmp_path / "c.toml", "-o", out, "--only", "30")
+    assert "bit for bit" in alone.stdout
+    assert 'estimator = "invariant"' in (out / "run-30" / "effective-config.toml").read_text()
+    walk = json.loads((out / "run-30" / "run.json").read_text())["draws"]["gyro.drift.direction_walk"]
+    assert f'direction_random_walk = "{walk}"' in (out / "run-30" / "effective-config.toml").read_text()
+
+
 # What is refused before the work.
 
 
@@ -252,6 +296,17 @@ def with_key(line):
     (with_key('gyro.unit.3.readout.noise = {uniform = ["1arcsec", "2arcsec"]}'), ["c.toml:23:", "unit", "base scenario"]),
     (with_key("scenario.seed = {choice = [1, 2]}"), ["c.toml:23:", "seed of its own"]),
     (with_key('"gyro.readout" = {choice = [{}]}'), ["c.toml", "same value"]),
+    (with_key("calibration.estimater = {grid = [\"paper\"]}"), ["c.toml:23:", "did you mean \"estimator\""]),
+    (with_key("calibration.estimator = {grid = [\"newspaper\"]}"), ["c.toml:23:", "newspaper", "can be drawn"]),
+    (with_key('calibration.filter.direction_random_walk = {uniform = ["1s", "2s"]}'), ["c.toml:23:", "unit"]),
+    (with_key('gyro.readout.spike = {of = "gyro.readout.nose"}'), ["c.toml:23:", "no numbers are drawn"]),
+    (with_key('gyro.readout.spike = {of = "attitude.reference"}'), ["c.toml:23:", "no numbers are drawn"]),
+    (with_key('gyro.readout.spike = {of = "gyro.readout.noise", times = "2arcsec"}'), ["c.toml:23:", "times"]),
+    (with_key('gyro.readout.spike_probability = {of = "star_tracker.dropout_probability", times = 20}'), ["c.toml:23:", "can be drawn", "0 … 1"]),
+    (with_key('gyro.drift.direction_walk = {of = "calibration.filter.direction_random_walk"}\ncalibration.filter.direction_random_walk = {choice = ["1e-9rad/s^0.5", "1e-8rad/s^0.5"]}'),
+     ["c.toml:23:", "follows a setting"]),
+    (with_key('gyro.readout.spike = {uniform = ["1arcsec", "2arcsec"], times = 2}'), ["c.toml:23:", "no meaning"]),
+    (with_key('gyro.readout.spike = {choice = ["1arcsec", "2arcsec"], names = ["small"]}'), ["c.toml:23:", "names"]),
     (CAMPAIGN.replace("repeats = 2", "runs = 10"), ["c.toml:4:", "grid", "repeats"]),
     (CAMPAIGN.replace("repeats = 2", "repeats = 0"), ["c.toml:4:", "repeats"]),
     (CAMPAIGN.replace("repeats = 2", "repeat = 2"), ["c.toml:4:", "did you mean \"repeats\""]),

@@ -25,13 +25,14 @@
 
 namespace trihedron::io {
 
-/// An input, and what is needed to put its draws into a scenario.
+/// An input, and what is needed to put its draws into a scenario or settings.
 struct Varied {  // NOLINT(misc-use-internal-linkage): a member of CampaignFile has vectors of it
   CampaignInput input;
-  std::vector<std::string> path;
+  std::vector<std::string> path;      ///< of a setting without the first part
   std::vector<toml::array> options;   ///< each an array of the one value
   toml::table as_given;               ///< the distribution
   const toml::node* place = nullptr;  ///< in the document
+  std::string followed;               ///< key of the input that it follows
 };
 
 namespace {
@@ -42,17 +43,18 @@ using Kind = Distribution::Kind;
 /// A normal is cut here, so that all it can draw can be tried before the work; beyond lie 2e-9 of it.
 constexpr double kMostSigmas = 6;
 
-constexpr std::array<std::pair<std::string_view, Kind>, 6> kKinds = {{{"uniform", Kind::kUniform},
+constexpr std::array<std::pair<std::string_view, Kind>, 7> kKinds = {{{"uniform", Kind::kUniform},
                                                                       {"loguniform", Kind::kLoguniform},
                                                                       {"normal", Kind::kNormal},
                                                                       {"lognormal", Kind::kLognormal},
                                                                       {"choice", Kind::kChoice},
-                                                                      {"grid", Kind::kGrid}}};
-constexpr std::array<std::string_view, 9> kDistributionKeys = {"uniform", "loguniform", "normal", "lognormal", "choice",
-                                                               "grid",    "weights",    "min",    "max"};
+                                                                      {"grid", Kind::kGrid},
+                                                                      {"of", Kind::kFollows}}};
+constexpr std::array<std::string_view, 12> kDistributionKeys = {
+    "uniform", "loguniform", "normal", "lognormal", "choice", "grid", "of", "weights", "names", "times", "min", "max"};
 constexpr std::string_view kForms =
     "write one of {uniform = [from, to]}, {loguniform = [from, to]}, {normal = [mean, sigma]}, "
-    "{lognormal = [median, factor]}, {choice = [a, b]}, {grid = [a, b]}";
+    "{lognormal = [median, factor]}, {choice = [a, b]}, {grid = [a, b]}, {of = \"another.key\", times = factor}";
 
 std::vector<std::string> parts_of(std::string_view path) {
   std::vector<std::string> parts;
@@ -162,6 +164,9 @@ class DistributionReader {
       : table_(table), reader_(table, file, fmt::format("the distribution of {}", in_quotes(key))) {
     varied_.input.key = key;
     varied_.path = parts_of(key);
+    if (varied_.input.is_setting()) {
+      varied_.path.erase(varied_.path.begin());
+    }
     varied_.as_given = table;
     varied_.place = &table;
   }
@@ -183,11 +188,19 @@ class DistributionReader {
     if (parameters == nullptr) {
       refuse(table_, "there is no distribution", std::string(kForms));
     }
-    for (const auto& [key, needs] : {std::pair{"weights", distribution.kind == Kind::kChoice},
-                                     std::pair{"min", is_unbounded()}, std::pair{"max", is_unbounded()}}) {
+    for (const auto& [key, needs] :
+         {std::pair{"weights", distribution.kind == Kind::kChoice}, std::pair{"names", distribution.has_options()},
+          std::pair{"times", distribution.kind == Kind::kFollows}, std::pair{"min", is_unbounded()},
+          std::pair{"max", is_unbounded()}}) {
       if (const toml::node* node = table_.get(key); node != nullptr && !needs) {
         refuse(*node, fmt::format("\"{}\" has no meaning beside \"{}\"", key, word_), "leave it out");
       }
+    }
+    if (distribution.kind == Kind::kFollows) {
+      varied_.followed = reader_.text(*parameters, "of");
+      const toml::node* times = table_.get("times");
+      distribution.a = times != nullptr ? reader_.number(*times, "times") : 1;
+      return std::move(varied_);
     }
     const toml::array* list = parameters->as_array();
     if (list == nullptr || list->empty()) {
@@ -308,10 +321,27 @@ class DistributionReader {
       input.unit.clear();
     }
     input.distribution.options = list.size();
+    if (const toml::node* names = table_.get("names")) {
+      read_names(*names);
+    }
     if (input.distribution.kind == Kind::kChoice) {
       read_weights();
     }
     input.distribution.most = static_cast<double>(list.size() - 1);
+  }
+
+  /// What people call the options, in place of their values.
+  void read_names(const toml::node& node) {
+    const toml::array* names = node.as_array();
+    if (names == nullptr || names->size() != varied_.options.size()) {
+      refuse(node, "\"names\" is not a list as long as that of the values", "give one name per value, or leave it out");
+    }
+    CampaignInput& input = varied_.input;
+    input.numbers.clear();
+    input.unit.clear();
+    for (std::size_t i = 0; i < names->size(); ++i) {
+      input.options[i] = reader_.text((*names)[i], "names");
+    }
   }
 
   void read_weights() {
@@ -436,8 +466,8 @@ Fields campaign_fields(Head& head, Origin& base, Origin& calibration, const toml
       origin("calibration", calibration, "the settings: a file, or its tables; without it those of the program",
              config_table_schema),
       {"vary",
-       "by the path of a key of the scenario, parts joined by points, elements of lists counted from 1: a table "
-       "with one of uniform, loguniform, normal, lognormal, choice, grid",
+       "by the path of a key of the scenario, or after \"calibration.\" of the settings, parts joined by points, "
+       "elements of lists counted from 1: a table with one of uniform, loguniform, normal, lognormal, choice, grid, of",
        vary_schema, [&vary](const TomlTable& table, const toml::node& node) { vary = &table.as_table(node, "vary"); }}};
 }
 
@@ -449,7 +479,10 @@ struct CampaignFile::Content {
   fs::path scenario_file;  ///< that positions and a recorded attitude of the base are of
   toml::table base;
   std::vector<fs::path> inputs;
-  CalibrationOptions options;
+  CalibrationOptions options;  ///< before any is drawn
+  fs::path settings_file;      ///< that positions of the settings are of
+  std::string settings_name;
+  toml::table settings;
   CampaignPlan plan;
   std::vector<Varied> varied;
   std::string recorded;  ///< attitude that the base flies, as text
@@ -457,10 +490,22 @@ struct CampaignFile::Content {
   [[nodiscard]] toml::table table_of(std::uint64_t seed, std::span<const double> draws) const {
     toml::table scenario = base;
     put(scenario, {"scenario", "seed"}, toml::value<std::int64_t>(static_cast<std::int64_t>(seed)));
-    for (std::size_t i = 0; i < varied.size(); ++i) {
-      put_draw(scenario, varied[i], draws[i]);
-    }
+    put_draws(scenario, draws, false);
     return scenario;
+  }
+
+  [[nodiscard]] CalibrationOptions options_of(std::span<const double> draws) const {
+    toml::table drawn = settings;
+    put_draws(drawn, draws, true);
+    return config_of_table(drawn, settings_file, settings_name);
+  }
+
+  void put_draws(toml::table& table, std::span<const double> draws, bool of_settings) const {
+    for (std::size_t i = 0; i < varied.size(); ++i) {
+      if (varied[i].input.is_setting() == of_settings) {
+        put_draw(table, varied[i], draws[i]);
+      }
+    }
   }
 
   static void put_draw(toml::table& scenario, const Varied& varied, double draw) {
@@ -482,10 +527,14 @@ struct CampaignFile::Content {
     const std::string what = one.input.distribution.has_options() ? one.input.options[static_cast<std::size_t>(draw)]
                                                                   : fmt::format("{}{}", draw, one.input.unit);
     const std::string drawn = fmt::format("{} = {}", one.input.key, in_quotes(what));
+    toml::table drawn_into = one.input.is_setting() ? settings : base;
     try {
-      toml::table scenario = base;
-      put_draw(scenario, one, draw);
-      check(scenario_of_table(scenario, scenario_file, "the scenario"));
+      put_draw(drawn_into, one, draw);
+      if (one.input.is_setting()) {
+        static_cast<void>(config_of_table(drawn_into, settings_file, settings_name));
+      } else {
+        check(scenario_of_table(drawn_into, scenario_file, "the scenario"));
+      }
     } catch (const NoPlace& none) {
       refuse(*one.place, fmt::format("{}: {}", drawn, none.reason), none.cure);
     } catch (const InputRefused& refused) {
@@ -527,12 +576,55 @@ struct CampaignFile::Content {
   }
 
   void read_options(const Origin& origin) {
-    if (origin.table != nullptr) {
-      options = config_of_table(*origin.table, file, "[calibration]");
-    } else if (!origin.file.empty()) {
-      inputs.push_back(file.parent_path() / origin.file);
-      options = read_config(inputs.back());
+    settings_file = file;
+    settings_name = "[calibration]";
+    toml::table parsed;
+    if (origin.table == nullptr && !origin.file.empty()) {
+      settings_file = file.parent_path() / origin.file;
+      settings_name = "the file";
+      inputs.push_back(settings_file);
+      parsed = parse_toml(TextFile(settings_file).text(), settings_file);
     }
+    const toml::table& read = origin.table != nullptr ? *origin.table : parsed;
+    options = config_of_table(read, settings_file, settings_name);
+    settings = read;  // a copy does not know its place in the file
+  }
+
+  /// Finds what an input follows, and where its draws end.
+  void follow(Varied& one) const {
+    CampaignInput& input = one.input;
+    const auto its = std::ranges::find(varied, one.followed, [](const Varied& other) { return other.input.key; });
+    if (its == varied.end() || its->input.distribution.kind == Kind::kFollows || !its->input.is_number()) {
+      refuse(
+          *one.place,
+          fmt::format("{} follows {}, for which no numbers are drawn", in_quotes(input.key), in_quotes(one.followed)),
+          "name a key in [vary] that has a distribution of numbers");
+    }
+    if (its->input.is_setting() && !input.is_setting()) {
+      refuse(*one.place, fmt::format("{} of the scenario follows a setting", in_quotes(input.key)),
+             "let the setting follow it: each flight is calibrated by all settings");
+    }
+    input.followed = static_cast<std::size_t>(its - varied.begin());
+    input.unit = its->input.unit;
+  }
+
+  /// Least and most that can be drawn, or each option.
+  [[nodiscard]] std::vector<double> ends_of(const Varied& one) const {
+    const Distribution& its = one.input.distribution;
+    std::vector<double> ends;
+    if (its.has_options()) {
+      for (std::size_t option = 0; option < its.options; ++option) {
+        ends.push_back(static_cast<double>(option));
+      }
+    } else if (its.kind == Kind::kFollows) {
+      const Varied& followed = varied[one.input.followed];
+      for (const double end : ends_of(followed)) {
+        ends.push_back(its.a * followed.input.shown(end));
+      }
+    } else {
+      ends = {its.least, its.most};
+    }
+    return ends;
   }
 
   void expect_different_keys() const {
@@ -614,14 +706,14 @@ CampaignFile::CampaignFile(const fs::path& file, const ScenarioCheck& check) {
   content->plan.seed = head.seed;
   content->plan.limit_rad = head.limit_rad;
   content->plan.latin_hypercube = head.sampling == Head::Sampling::kLatinHypercube;
+  for (Varied& one : content->varied) {
+    if (one.input.distribution.kind == Kind::kFollows) {
+      content->follow(one);
+    }
+  }
   for (const Varied& one : content->varied) {
-    if (one.input.distribution.has_options()) {
-      for (std::size_t option = 0; option < one.input.distribution.options; ++option) {
-        content->try_draw(one, static_cast<double>(option), check);
-      }
-    } else {
-      content->try_draw(one, one.input.distribution.least, check);
-      content->try_draw(one, one.input.distribution.most, check);
+    for (const double end : content->ends_of(one)) {
+      content->try_draw(one, end, check);
     }
     content->plan.inputs.push_back(one.input);
   }
@@ -631,7 +723,6 @@ CampaignFile::CampaignFile(const fs::path& file, const ScenarioCheck& check) {
 CampaignFile::~CampaignFile() = default;
 
 const CampaignPlan& CampaignFile::plan() const { return content_->plan; }
-const CalibrationOptions& CampaignFile::options() const { return content_->options; }
 std::vector<fs::path> CampaignFile::inputs() const { return content_->inputs; }
 
 CampaignIdentity CampaignFile::identity(std::string_view version) const {
@@ -659,6 +750,8 @@ CampaignIdentity CampaignFile::identity(std::string_view version) const {
 Scenario CampaignFile::scenario(std::uint64_t seed, std::span<const double> draws) const {
   return scenario_of_table(content_->table_of(seed, draws), content_->scenario_file, "the scenario");
 }
+
+CalibrationOptions CampaignFile::options(std::span<const double> draws) const { return content_->options_of(draws); }
 
 std::string CampaignFile::scenario_text(std::uint64_t seed, std::span<const double> draws) const {
   std::ostringstream stream;

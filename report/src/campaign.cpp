@@ -29,6 +29,7 @@ constexpr std::size_t kDrawnSteps = 400;
 constexpr std::size_t kDrawnPoints = 1500;
 constexpr std::size_t kScatters = 6;
 constexpr std::size_t kShownReasons = 10;
+constexpr std::size_t kShownCells = 500;
 /// Errors of coefficients are shown in it: they are a thousandth of the coefficients.
 constexpr double kNanoradianPerSecond = 1e-9;
 
@@ -220,6 +221,55 @@ json parameter_rows(const CampaignSummary& summary) {
   return rows;
 }
 
+std::string mean_text(const std::optional<Consistency>& consistency, int digits) {
+  return consistency ? number(consistency->mean, digits) : std::string(kNoEntry);
+}
+
+json cell_heads(const CampaignReportInput& input) {
+  json heads = json::array();
+  for (const std::size_t i : input.summary.grid) {
+    heads.push_back(input.plan.inputs[i].key);
+  }
+  return heads;
+}
+
+json cell_measures() {
+  json labels = json::array();
+  for (const std::string_view key : campaign::kCellMeasures) {
+    labels.push_back(std::ranges::find(campaign::measures(), key, &Measure::key)->label);
+  }
+  return labels;
+}
+
+json cell_rows(const CampaignReportInput& input) {
+  const CampaignSummary& summary = input.summary;
+  json rows = json::array();
+  for (std::size_t i = 0; i < std::min(kShownCells, summary.cells.size()); ++i) {
+    const campaign::GridCell& cell = summary.cells[i];
+    json point = json::array();
+    for (std::size_t k = 0; k < summary.grid.size(); ++k) {
+      point.push_back(campaign::text_of_draw(input.plan.inputs[summary.grid[k]], cell.point[k]));
+    }
+    json measures = json::array();
+    for (const MeasureStatistics& its : cell.measures) {
+      const std::optional<double> value = campaign::quantile_of(its, campaign::kCellQuantile);
+      measures.push_back(value ? shown(*its.measure, *value) : std::string(kNoEntry));
+    }
+    rows.push_back(
+        {{"point", point},
+         {"trustworthy", fmt::format("{} of {}", cell.trustworthy, cell.finished + cell.failed)},
+         {"nees", mean_text(cell.nees, 1)},
+         {"nees_off", cell.nees && cell.nees->side() != 0},
+         {"nees_band", cell.nees ? fmt::format("{} … {}", number(cell.nees->usual.low * cell.nees->freedom, 1),
+                                               number(cell.nees->usual.high * cell.nees->freedom, 1))
+                                 : ""},
+         {"nis", mean_text(cell.nis, 3)},
+         {"nis_off", cell.nis && cell.nis->side() != 0},
+         {"measures", measures}});
+  }
+  return rows;
+}
+
 json influence_rows(const CampaignReportInput& input) {
   json rows = json::array();
   for (const campaign::Influence& influence : input.summary.influences) {
@@ -249,7 +299,7 @@ json worst_rows(const CampaignReportInput& input) {
 
 std::string amount(double value, const std::string& unit) { return fmt::format("{:.6g}{}", value, unit); }
 
-std::string distribution_text(const CampaignInput& input) {
+std::string distribution_text(const CampaignPlan& plan, const CampaignInput& input) {
   const Distribution& its = input.distribution;
   std::string options;
   for (std::size_t i = 0; i < input.options.size(); ++i) {
@@ -269,6 +319,8 @@ std::string distribution_text(const CampaignInput& input) {
       return "one of " + options;
     case Distribution::Kind::kGrid:
       return "each of " + options;
+    case Distribution::Kind::kFollows:
+      return (its.a == 1 ? "" : amount(its.a, "") + " times ") + plan.inputs[input.followed].key;
   }
   return {};
 }
@@ -276,7 +328,7 @@ std::string distribution_text(const CampaignInput& input) {
 json input_rows(const CampaignPlan& plan) {
   json rows = json::array();
   for (const CampaignInput& input : plan.inputs) {
-    rows.push_back({{"key", input.key}, {"distribution", distribution_text(input)}});
+    rows.push_back({{"key", input.key}, {"distribution", distribution_text(plan, input)}});
   }
   return rows;
 }
@@ -474,6 +526,14 @@ std::string render_campaign(const CampaignReportInput& input) {
                  {"watched", watched_text(input)},
                  {"needed", campaign::runs_needed(campaign::kReportedQuantiles.back())},
                  {"parameters", parameter_rows(summary)},
+                 {"has_cells", !summary.cells.empty()},
+                 {"cell_heads", cell_heads(input)},
+                 {"cell_measures", cell_measures()},
+                 {"cells", cell_rows(input)},
+                 {"more_cells", summary.cells.size() > kShownCells
+                                    ? fmt::format("The first {} of {} points are here; --json has all.", kShownCells,
+                                                  summary.cells.size())
+                                    : ""},
                  {"drawn", drawn_measures},
                  {"draws_influences", figures.contains("influences")},
                  {"influences", influence_rows(input)},

@@ -50,5 +50,34 @@ TEST(CampaignReport, ShowsNumbersAsPeopleWriteThem) {
   EXPECT_THAT(html, HasSubstr(" · 10⁻⁹ rad/s"));
 }
 
+TEST(CampaignReport, HasARowForEachPointOfAGrid) {
+  test::SyntheticCampaign made = test::synthetic_campaign(800, 20);
+  EXPECT_THAT(report_of(made), Not(HasSubstr("By the grid")));
+  CampaignInput& grid = made.plan.inputs[2];
+  grid.key = "calibration.estimator";
+  grid.distribution.kind = Distribution::Kind::kGrid;
+  grid.options = {"paper", "invariant"};
+  made.plan.repeats = 400;
+  CampaignInput follows{"gyro.alignment_prior_sigma", {.kind = Distribution::Kind::kFollows, .a = 0.5}, "", {}, {}};
+  made.plan.inputs.push_back(follows);
+  for (RunRecord& record : made.records) {
+    record.draws[2] = record.run < 400 ? 0 : 1;
+    record.draws.push_back(record.draws[0] / 2);
+    if (record.run < 400) {
+      record[RunQuantity::kNees] = {30};
+    }
+  }
+  const std::string html = report_of(made);
+  EXPECT_THAT(html, HasSubstr("By the grid"));
+  // 8000 degrees of freedom: ± 1.96 √(2/8000) of 20.
+  EXPECT_THAT(
+      html,
+      HasSubstr(
+          R"(<td class="words">paper</td><td>400 of 400</td><td>30.0 <span class="flag">outside</span></td><td>19.4 … 20.6</td>)"));
+  EXPECT_THAT(html,
+              testing::ContainsRegex(R"(<td class="words">invariant</td><td>400 of 400</td><td>(19|20)\.[0-9]</td>)"));
+  EXPECT_THAT(html, HasSubstr("0.5 times gyro.readout.noise"));
+}
+
 }  // namespace
 }  // namespace trihedron::report

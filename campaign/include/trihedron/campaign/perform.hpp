@@ -16,9 +16,15 @@
 
 namespace trihedron::campaign {
 
-/// The scenario of a run by its seed and draws. Called from several threads. Throws std::invalid_argument for draws
-/// that make no scenario; that run has failed. Whatever else it throws ends the campaign.
-using ScenarioOf = std::function<Scenario(std::uint64_t seed, std::span<const double> draws)>;
+/// What a run flies, and how that is calibrated.
+struct RunSetup {
+  Scenario scenario;
+  CalibrationOptions options;
+};
+
+/// That of a run by its seed and draws. Called from several threads. Throws std::invalid_argument for draws that make
+/// no scenario or no settings; that run has failed. Whatever else it throws ends the campaign.
+using SetupOf = std::function<RunSetup(std::uint64_t seed, std::span<const double> draws)>;
 
 /// All of a run: for one that is looked at alone.
 struct Flight {
@@ -28,8 +34,7 @@ struct Flight {
 };
 
 /// Simulates, calibrates, compares with the truth. Throws std::invalid_argument and ground::SetupError.
-[[nodiscard]] Flight fly(const Scenario& scenario, const CalibrationOptions& options, double limit_rad,
-                         ground::OpenLoopScope scope);
+[[nodiscard]] Flight fly(const RunSetup& setup, double limit_rad, ground::OpenLoopScope scope);
 
 /// What is measured of it, and its verdict. Without number, seed, draws and times.
 [[nodiscard]] RunRecord record_of(const Flight& flight, std::size_t gyros);
@@ -38,9 +43,8 @@ struct Flight {
 [[nodiscard]] RunRecord failed(const CampaignPlan& plan, std::uint64_t run, std::string reason);
 
 /// `flown`, which may be null, is given what was flown where the run did not fail. Does not throw for a run that
-/// fails; throws Stopped, std::bad_alloc, and what `scenario_of` throws.
-[[nodiscard]] RunRecord perform(const CampaignPlan& plan, std::uint64_t run, const ScenarioOf& scenario_of,
-                                const CalibrationOptions& options,
+/// fails; throws Stopped, std::bad_alloc, and what `setup_of` throws.
+[[nodiscard]] RunRecord perform(const CampaignPlan& plan, std::uint64_t run, const SetupOf& setup_of,
                                 const std::function<void(Flight&&)>& flown = nullptr);
 
 /// Takes over records as they come: one call at a time, in no order.
@@ -48,7 +52,7 @@ using Collect = std::function<void(std::vector<RunRecord>&& records)>;
 
 /// Performs runs side by side, each on one core, and hands over each record when it is there. jobs: 1 or more threads.
 /// Throws as perform(), and what `collect` throws.
-void perform_all(const CampaignPlan& plan, std::span<const std::uint64_t> runs, const ScenarioOf& scenario_of,
-                 const CalibrationOptions& options, unsigned jobs, const Collect& collect);
+void perform_all(const CampaignPlan& plan, std::span<const std::uint64_t> runs, const SetupOf& setup_of, unsigned jobs,
+                 const Collect& collect);
 
 }  // namespace trihedron::campaign

@@ -56,6 +56,8 @@ struct Consistency {
 
   /// By which the sigmas would have to be multiplied.
   [[nodiscard]] double sigma_factor() const;
+  /// −1 where the mean is below `usual`, 1 where it is above or no number.
+  [[nodiscard]] int side() const;
 };
 
 /// The errors of one parameter.
@@ -68,6 +70,9 @@ struct ParameterErrors {
   double normalised = 0;    ///< rms of error/sigma: 1 for honest sigmas
   ChiSquareBounds usual{};  ///< of `normalised`, that hold 95 %
 };
+
+/// Its estimate of one of kReportedQuantiles; nothing where no run has the measure.
+[[nodiscard]] std::optional<double> quantile_of(const MeasureStatistics& statistics, double p);
 
 /// How a value that was drawn and a measure go together.
 struct Influence {
@@ -94,6 +99,21 @@ struct CampaignFinding {
   FindingSeverity severity = FindingSeverity::kWarning;
 };
 
+/// The runs at one point of the grids.
+struct GridCell {
+  std::vector<double> point;  ///< by CampaignSummary::grid: the place of an option
+  std::size_t failed = 0;
+  std::size_t finished = 0;  ///< all that did not fail
+  std::size_t trustworthy = 0;
+  std::optional<Consistency> nees;  ///< of trustworthy runs, as all that follows
+  std::optional<Consistency> nis;
+  std::vector<MeasureStatistics> measures;  ///< by kCellMeasures
+};
+/// Of measures(), those that are shown for each cell.
+inline constexpr std::array<std::string_view, 3> kCellMeasures = {"alignment_error", "open_loop_error", "extension"};
+/// Quantile of them that is shown.
+inline constexpr double kCellQuantile = 0.95;
+
 /// What the runs of a campaign say together.
 struct CampaignSummary {
   std::array<std::size_t, 3> outcomes{};        ///< by RunOutcome
@@ -108,6 +128,8 @@ struct CampaignSummary {
   std::vector<Influence> influences;            ///< strongest first; of all that did not fail
   std::size_t pairs = 0;                        ///< that were looked at for an influence
   std::vector<WorstRun> worst;
+  std::vector<std::size_t> grid;  ///< of CampaignPlan::inputs those that are grids
+  std::vector<GridCell> cells;    ///< in the order of the runs; empty without a grid, or with one run at each point
   std::vector<CampaignFinding> campaign_findings;
 
   [[nodiscard]] std::size_t count(RunOutcome outcome) const { return outcomes[static_cast<std::size_t>(outcome)]; }
@@ -115,7 +137,10 @@ struct CampaignSummary {
   [[nodiscard]] bool trustworthy_campaign() const;
 };
 
-/// records: of this plan.
+/// What was drawn, as people read it: a number in its unit, or a word.
+[[nodiscard]] std::string text_of_draw(const CampaignInput& input, double draw);
+
+/// records: of this plan, in the order of their numbers.
 [[nodiscard]] CampaignSummary summarise(const CampaignPlan& plan, std::span<const RunRecord> records);
 
 }  // namespace trihedron::campaign

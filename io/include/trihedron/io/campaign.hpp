@@ -27,15 +27,15 @@ using ScenarioCheck = std::function<void(const Scenario&)>;
 class CampaignFile {
  public:
   /// Reads the file, and the files of scenario and settings that it names. Every key that varies is tried at the ends
-  /// of what can be drawn for it: read as a scenario is read, and given to `check`. Throws InputRefused with line,
-  /// column, reason and cure for what is not known, has another unit or is out of range; MachineFailed.
+  /// of what can be drawn for it: read as a scenario is read, and given to `check`, or as settings are read. Throws
+  /// InputRefused with line, column, reason and cure for what is not known, has another unit or is out of range;
+  /// MachineFailed.
   CampaignFile(const std::filesystem::path& file, const ScenarioCheck& check);
   CampaignFile(const CampaignFile&) = delete;
   CampaignFile& operator=(const CampaignFile&) = delete;
   ~CampaignFile();
 
   [[nodiscard]] const CampaignPlan& plan() const;
-  [[nodiscard]] const CalibrationOptions& options() const;
   /// All that results depend on, of this file and those it names, and of the program by its `version`.
   [[nodiscard]] CampaignIdentity identity(std::string_view version) const;
   /// All files that were read.
@@ -44,6 +44,8 @@ class CampaignFile {
   /// The scenario of a run, by CampaignPlan and what was drawn. May be called from several threads. Throws
   /// InputRefused where the draws together make no scenario.
   [[nodiscard]] Scenario scenario(std::uint64_t seed, std::span<const double> draws) const;
+  /// Settings of its calibration, likewise.
+  [[nodiscard]] CalibrationOptions options(std::span<const double> draws) const;
   /// The same as a scenario file (TOML), which reads back to it, bit for bit.
   [[nodiscard]] std::string scenario_text(std::uint64_t seed, std::span<const double> draws) const;
 

@@ -13,6 +13,9 @@
 
 namespace trihedron {
 
+/// Keys that begin so are settings of the calibration; all others are of the scenario.
+inline constexpr std::string_view kSettingKeys = "calibration.";
+
 /// How one value of the scenario is drawn. `a` and `b`, `least` and `most` are in the unit of CampaignInput.
 struct Distribution {
   enum class Kind : std::uint8_t {
@@ -21,7 +24,8 @@ struct Distribution {
     kNormal,      ///< mean a, 1-sigma b
     kLognormal,   ///< its logarithm is normal: median a, 1-sigma a factor b
     kChoice,      ///< one of the options, by their weights
-    kGrid         ///< each of the options in turn
+    kGrid,        ///< each of the options in turn
+    kFollows      ///< a times what is drawn for another input
   };
   Kind kind = Kind::kUniform;
   double a = 0;
@@ -34,14 +38,19 @@ struct Distribution {
   [[nodiscard]] bool has_options() const { return kind == Kind::kChoice || kind == Kind::kGrid; }
 };
 
-/// A value of the scenario that is not the same in all runs.
+/// A value of the scenario, or a setting of the calibration, that is not the same in all runs.
 struct CampaignInput {
-  std::string key;  ///< its path in the scenario: "gyro.readout.noise", "gyro.unit.2.drift.prior_sigma"
+  /// Its path: of a scenario "gyro.readout.noise", "gyro.unit.2.drift.prior_sigma", of a setting
+  /// "calibration.estimator".
+  std::string key;
   Distribution distribution;
   std::string unit;                  ///< as the campaign file has it: "arcsec"; empty where there is none
-  std::vector<std::string> options;  ///< of kChoice and kGrid, as the file has them
+  std::vector<std::string> options;  ///< of kChoice and kGrid, as the file has or names them
   std::vector<double> numbers;       ///< the same as numbers in `unit`; empty where one is none
+  std::size_t followed = 0;          ///< of kFollows: which input, of numbers, that follows none itself
 
+  /// Whether it is a setting: it then leaves the flight as it is.
+  [[nodiscard]] bool is_setting() const { return key.starts_with(kSettingKeys); }
   /// Whether its draws have an order: false for words.
   [[nodiscard]] bool is_number() const { return !distribution.has_options() || !numbers.empty(); }
   /// What was drawn, as people read it: a number in `unit`, or for words their place among the options.
@@ -54,7 +63,7 @@ struct CampaignInput {
 struct CampaignPlan {
   std::string name;
   std::uint64_t seed = 0;
-  std::uint64_t runs = 0;     ///< of a grid: points × repeats
+  std::uint64_t runs = 0;     ///< flights × points of the grids over settings
   std::uint64_t repeats = 1;  ///< runs at each point of a grid
   bool latin_hypercube = false;
   double limit_rad = 5 * kArcminute;  ///< attitude error that ends a correction interval
