@@ -54,13 +54,15 @@ double quantile(const std::vector<double>& sorted, double p) {
 }
 
 /// Parameters of eq. (1) and alignments, with their errors.
-void measure_parameters(const Flight& flight, std::size_t gyros, RunRecord& record) {
+void measure_parameters(const Flight& flight, const CampaignPlan& plan, RunRecord& record) {
+  const std::size_t gyros = plan.gyros;
   const Calibration& calibration = flight.run.calibration;
   record[RunQuantity::kDriftError].assign(gyros * kCampaignCoefficients, kNone);
   record[RunQuantity::kDriftSigma].assign(gyros * kCampaignCoefficients, kNone);
   record[RunQuantity::kAlignmentError].assign(3 * gyros, kNone);
   record[RunQuantity::kAlignmentSigma].assign(3 * gyros, kNone);
   std::vector<Eigen::Index> rows;
+  std::vector<std::pair<std::size_t, Eigen::Index>> parameters;  // their numbers and rows
   for (std::size_t i = 0; i < calibration.states.size(); ++i) {
     const ParameterId& state = calibration.states[i];
     const auto row = static_cast<Eigen::Index>(i);
@@ -80,11 +82,24 @@ void measure_parameters(const Flight& flight, std::size_t gyros, RunRecord& reco
     }
     const double error = flight.evaluation.estimate_minus_truth(row);
     const bool of_alignment = state.is_alignment();
+    parameters.emplace_back(state.gyro() * kCampaignParameters + (of_alignment ? kCampaignCoefficients : 0) + *place -
+                                state.gyro() * (of_alignment ? 3 : kCampaignCoefficients),
+                            row);
     record[of_alignment ? RunQuantity::kAlignmentError : RunQuantity::kDriftError][*place] = error;
     record[of_alignment ? RunQuantity::kAlignmentSigma : RunQuantity::kDriftSigma][*place] =
         std::sqrt(calibration.covariance(row, row));
     if (std::isfinite(error)) {
       rows.push_back(row);
+    }
+  }
+  if (plan.keeps_covariance) {
+    std::vector<double>& kept = record[RunQuantity::kCovariance];
+    const std::size_t size = kCampaignParameters * gyros;
+    kept.assign(size * size, kNone);
+    for (const auto& [a, row] : parameters) {
+      for (const auto& [b, column] : parameters) {
+        kept[a * size + b] = calibration.covariance(row, column);
+      }
     }
   }
   // Scaled by the sigmas, which differ by ten orders of magnitude.
@@ -96,10 +111,21 @@ void measure_parameters(const Flight& flight, std::size_t gyros, RunRecord& reco
   record[RunQuantity::kNeesFreedom] = {static_cast<double>(rows.size())};
 }
 
-void measure_fixes(const Statistics& statistics, RunRecord& record) {
+void measure_fixes(const CalibrationRun& run, RunRecord& record) {
+  const Statistics& statistics = run.calibration.statistics;
   record[RunQuantity::kNisMean] = {statistics.nis_mean.value_or(kNone)};
   record[RunQuantity::kNisFreedom] = {statistics.nis_degrees_of_freedom};
   record[RunQuantity::kNisFixes] = {static_cast<double>(statistics.nis_count)};
+  double sum = 0;
+  double count = 0;
+  for (const FixRecord& fix : run.fixes) {
+    if (fix.status == FixStatus::kRejectedByGate || (fix.used() && fix.status != FixStatus::kStarted)) {
+      sum += fix.nis;
+      count += 1;
+    }
+  }
+  record[RunQuantity::kNisMeanOfAll] = {count > 0 ? sum / count : kNone};
+  record[RunQuantity::kNisFixesOfAll] = {count};
 }
 
 void measure_attitude(const ground::CalibrationEvaluation& evaluation, RunRecord& record) {
@@ -184,7 +210,7 @@ Flight fly(const RunSetup& setup, double limit_rad, ground::OpenLoopScope scope)
   return flight;
 }
 
-RunRecord record_of(const Flight& flight, std::size_t gyros) {
+RunRecord record_of(const Flight& flight, const CampaignPlan& plan) {
   RunRecord record;
   const Calibration& calibration = flight.run.calibration;
   record.outcome = calibration.verdict.trustworthy ? RunOutcome::kTrustworthy : RunOutcome::kDoNotUse;
@@ -192,8 +218,8 @@ RunRecord record_of(const Flight& flight, std::size_t gyros) {
   for (const Finding& finding : calibration.verdict.findings) {
     record.findings.emplace_back(name_of(finding.code));
   }
-  measure_parameters(flight, gyros, record);
-  measure_fixes(calibration.statistics, record);
+  measure_parameters(flight, plan, record);
+  measure_fixes(flight.run, record);
   measure_attitude(flight.evaluation, record);
   measure_open_loops(flight.evaluation, record);
   record[RunQuantity::kDriftSettled] = {seconds(flight.evaluation.drift_settled)};
@@ -208,7 +234,9 @@ RunRecord failed(const CampaignPlan& plan, std::uint64_t run, std::string reason
   record.draws = draws_of_run(plan, run);
   record.reason = std::move(reason);
   for (const RunQuantityRow& row : kRunQuantityRows) {
-    record[row.quantity].assign(size_of(row.shape, plan.gyros), kNone);
+    if (plan.has(row.quantity)) {
+      record[row.quantity].assign(size_of(row.shape, plan.gyros), kNone);
+    }
   }
   return record;
 }
@@ -230,7 +258,7 @@ RunRecord perform(const CampaignPlan& plan, std::uint64_t run, const SetupOf& se
     try {
       Flight flight =
           fly(*setup, plan.limit_rad, flown ? ground::OpenLoopScope::kAll : ground::OpenLoopScope::kExtension);
-      record = record_of(flight, plan.gyros);
+      record = record_of(flight, plan);
       if (flown) {
         flown(std::move(flight));
       }

@@ -111,8 +111,17 @@ MeasureStatistics statistics_of(const Measure& measure, const Records& records) 
   return result;
 }
 
+/// within: how many runs lie within the 95 % of their own χ².
+Consistency over_runs(double sum, double freedom, double count, std::size_t runs, std::size_t within) {
+  Consistency result = consistency_of(sum, freedom, count);
+  result.runs = runs;
+  result.within = static_cast<double>(within) / static_cast<double>(runs);
+  return result;
+}
+
 std::optional<Consistency> nees_of(const Records& records) {
-  Consistency result;
+  std::size_t runs = 0;
+  std::size_t within = 0;
   double sum = 0;
   double freedom = 0;
   for (const RunRecord* record : records) {
@@ -121,27 +130,22 @@ std::optional<Consistency> nees_of(const Records& records) {
     if (!std::isfinite(nees) || !(of_run > 0)) {
       continue;
     }
-    ++result.runs;
+    ++runs;
     sum += nees;
     freedom += of_run;
     const double share = chi_square_share(nees, of_run);
-    result.within += share >= (1 - kUsual) / 2 && share <= (1 + kUsual) / 2 ? 1 : 0;
+    within += share >= (1 - kUsual) / 2 && share <= (1 + kUsual) / 2 ? 1U : 0U;
   }
-  if (result.runs == 0) {
+  if (runs == 0) {
     return std::nullopt;
   }
-  const auto n = static_cast<double>(result.runs);
-  result.mean = sum / n;
-  result.freedom = freedom / n;
-  result.within /= n;
-  result.usual = chi_square_bounds(freedom, kUsual);
-  result.limit = chi_square_bounds(freedom, kLimit);
-  return result;
+  return over_runs(sum, freedom, static_cast<double>(runs), runs, within);
 }
 
 /// Per fix.
 std::optional<Consistency> nis_of(const Records& records) {
-  Consistency result;
+  std::size_t runs = 0;
+  std::size_t within = 0;
   double sum = 0;
   double freedom = 0;
   double fixes = 0;
@@ -152,22 +156,17 @@ std::optional<Consistency> nis_of(const Records& records) {
     if (!std::isfinite(nis) || !(count > 0) || !(of_fix > 0)) {
       continue;
     }
-    ++result.runs;
+    ++runs;
     sum += nis * count;
     freedom += of_fix * count;
     fixes += count;
     const double share = chi_square_share(nis * count, of_fix * count);
-    result.within += share >= (1 - kUsual) / 2 && share <= (1 + kUsual) / 2 ? 1 : 0;
+    within += share >= (1 - kUsual) / 2 && share <= (1 + kUsual) / 2 ? 1U : 0U;
   }
-  if (result.runs == 0) {
+  if (runs == 0) {
     return std::nullopt;
   }
-  result.mean = sum / fixes;
-  result.freedom = freedom / fixes;
-  result.within /= static_cast<double>(result.runs);
-  result.usual = chi_square_bounds(freedom, kUsual);
-  result.limit = chi_square_bounds(freedom, kLimit);
-  return result;
+  return over_runs(sum, freedom, fixes, runs, within);
 }
 
 ParameterErrors parameter_errors(std::string name, bool is_alignment, std::size_t place, const Records& records) {
@@ -448,6 +447,13 @@ void judge_number(const Records& trustworthy, CampaignSummary& summary) {
 }  // namespace
 
 std::span<const Measure> measures() { return kMeasures; }
+
+Consistency consistency_of(double sum, double freedom, double count) {
+  return {.freedom = freedom / count,
+          .mean = sum / count,
+          .usual = chi_square_bounds(freedom, kUsual),
+          .limit = chi_square_bounds(freedom, kLimit)};
+}
 
 std::string text_of_draw(const CampaignInput& input, double draw) {
   return input.is_number() ? fmt::format("{:.6g}{}", input.shown(draw), input.unit)

@@ -100,6 +100,22 @@ TEST(Campaign, MeasuresARunAgainstItsTruth) {
   EXPECT_TRUE(std::isnan(record.at(RunQuantity::kOpenLoopError)));
 }
 
+TEST(Campaign, TellsTheInnovationsOfRejectedFixesApart) {
+  const auto with_outliers = [](std::uint64_t seed, std::span<const double> draws) {
+    RunSetup setup = short_flight(seed, draws);
+    setup.scenario.star_tracker.outlier_probability = 0.1;
+    return setup;
+  };
+  const RunRecord record = perform(six_runs(), 0, with_outliers);
+  EXPECT_EQ(record.at(RunQuantity::kNisFixesOfAll), 100);  // of 101 in five minutes the first starts the filter
+  EXPECT_LT(record.at(RunQuantity::kNisFixes), 97);
+  EXPECT_LT(record.at(RunQuantity::kNisMean), 6);
+  EXPECT_GT(record.at(RunQuantity::kNisMeanOfAll), 100);
+  const RunRecord clean = perform(six_runs(), 0, short_flight);
+  EXPECT_EQ(clean.at(RunQuantity::kNisMeanOfAll), clean.at(RunQuantity::kNisMean));
+  EXPECT_TRUE(clean[RunQuantity::kCovariance].empty());
+}
+
 TEST(Campaign, MakesARowWithItsReasonOfARunThatFails) {
   const auto fails = [](std::uint64_t seed, std::span<const double> draws) {
     RunSetup setup = short_flight(seed, draws);

@@ -297,5 +297,23 @@ TEST(CampaignSummary, HasNoCellsOfSingleRunsOrWithoutAGrid) {
   EXPECT_TRUE(summarise(plan_of(12), runs_of(12)).cells.empty());
 }
 
+TEST(Consistency, TellsTheSideAndDoesNotTakeNaNForInside) {
+  // χ² of one run with 20 degrees of freedom: 9.591 … 34.170.
+  EXPECT_EQ(consistency_of(9.5, 20, 1).side(), -1);
+  EXPECT_EQ(consistency_of(9.6, 20, 1).side(), 0);
+  EXPECT_EQ(consistency_of(34.1, 20, 1).side(), 0);
+  EXPECT_EQ(consistency_of(34.2, 20, 1).side(), 1);
+  EXPECT_EQ(consistency_of(std::nan(""), 20, 1).side(), 1);
+}
+
+TEST(Consistency, OfManyHasTheBoundsOfTheNormalDistribution) {
+  const Consistency many = consistency_of(4e6, 4e6, 1e6);
+  EXPECT_EQ(many.mean, 4);
+  EXPECT_EQ(many.freedom, 4);
+  const double half = 1.959964 * std::sqrt(8 / 1e6);
+  EXPECT_NEAR(many.usual.low * 4, 4 - half, 1e-2 * half);
+  EXPECT_NEAR(many.usual.high * 4, 4 + half, 1e-2 * half);
+}
+
 }  // namespace
 }  // namespace trihedron::campaign

@@ -8,6 +8,7 @@ import subprocess
 import time
 
 import jsonschema
+import numpy
 import pytest
 import xarray
 
@@ -264,6 +265,23 @@ def test_settings_of_a_grid_are_tried_over_the_same_flights(tmp_path):
     assert f'direction_random_walk = "{walk}"' in (out / "run-30" / "effective-config.toml").read_text()
 
 
+def test_covariances_are_kept_where_they_are_asked_for(finished, tmp_path):
+    (tmp_path / "c.toml").write_text(CAMPAIGN.replace("seed = 5", 'seed = 5\ncovariance = "kept"'))
+    run("--quiet", "campaign", tmp_path / "c.toml", "-o", tmp_path / "out")
+    with xarray.open_dataset(tmp_path / "out" / "runs.nc") as runs, xarray.open_dataset(finished / "out" / "runs.nc") as without:
+        assert "covariance" not in without and (runs.nees == without.nees).all()
+        assert list(runs.parameter.values[[0, 7, 10, 19]]) == ["gyro1.k0", "gyro1.align_x", "gyro2.k0", "gyro2.align_z"]
+        for number in runs.run.values:
+            one = runs.sel(run=number)
+            errors = numpy.concatenate([one.drift_error.values, one.alignment_error.values], axis=1).ravel()
+            sigmas = numpy.concatenate([one.drift_sigma.values, one.alignment_sigma.values], axis=1).ravel()
+            assert numpy.sqrt(numpy.diag(one.covariance)) == pytest.approx(sigmas, rel=1e-14)
+            scaled = one.covariance.values / numpy.outer(sigmas, sigmas)
+            assert (errors / sigmas) @ numpy.linalg.solve(scaled, errors / sigmas) == pytest.approx(float(one.nees), rel=1e-6)
+    alone = run("campaign", tmp_path / "c.toml", "-o", tmp_path / "out", "--only", "1")
+    assert "bit for bit" in alone.stdout
+
+
 # What is refused before the work.
 
 
@@ -309,6 +327,7 @@ def with_key(line):
     (with_key('gyro.readout.spike = {choice = ["1arcsec", "2arcsec"], names = ["small"]}'), ["c.toml:23:", "names"]),
     (CAMPAIGN.replace("repeats = 2", "runs = 10"), ["c.toml:4:", "grid", "repeats"]),
     (CAMPAIGN.replace("repeats = 2", "repeats = 0"), ["c.toml:4:", "repeats"]),
+    (CAMPAIGN.replace("seed = 5", 'covariance = "yes"'), ["c.toml:5:", "kept"]),
     (CAMPAIGN.replace("repeats = 2", "repeat = 2"), ["c.toml:4:", "did you mean \"repeats\""]),
     (CAMPAIGN.replace("repeats = 2", "repeats = 1000000"), ["c.toml:2:", "6e+06 runs", "latin-hypercube"]),
     (with_key("\n".join(f'gyro.readout.{key} = {{grid = [{", ".join(["0"] * 100)}]}}' for key in

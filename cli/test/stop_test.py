@@ -7,9 +7,8 @@ import time
 
 import pytest
 
-from program import BUILD, PROGRAM, TOLD
+from program import PROGRAM, TOLD
 
-CONSISTENCY = BUILD / "trihedron_consistency"
 SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 # A tenth of a second where nothing else runs.
 LIMIT_S = 2
@@ -125,14 +124,3 @@ def test_a_signal_that_is_ignored_stays_ignored(two_hours, tmp_path):
     process.send_signal(signal.SIGHUP)
     assert process.wait(timeout=60) in (0, 1)
     assert (tmp_path / "out" / "report.html").exists()
-
-
-@pytest.mark.long
-@pytest.mark.skipif(not CONSISTENCY.exists(), reason="not built: TRIHEDRON_BUILD_BENCH is off")
-def test_the_grid_of_flights_ends_at_once(tmp_path):
-    for after_s, with_signal in ((0.1, signal.SIGTERM), (2, signal.SIGINT)):
-        process = begin(CONSISTENCY, "--runs", 100)
-        time.sleep(after_s)
-        assert process.poll() is None, process.communicate()
-        assert stop(process, with_signal) < LIMIT_S
-        assert process.returncode == -with_signal

@@ -402,6 +402,7 @@ struct Head {
   std::uint64_t repeats = 0;
   enum class Sampling { kRandom, kLatinHypercube } sampling = Sampling::kRandom;
   double limit_rad = CampaignPlan{}.limit_rad;
+  bool keeps_covariance = false;
 };
 
 Field count(std::string_view key, std::uint64_t& target, std::string_view about) {
@@ -431,7 +432,9 @@ Fields head_fields(Head& head) {
                            "of the distributions: each run for itself, or each key in as many equal parts as there are "
                            "runs, one run in each",
                            {{"random", Sampling::kRandom}, {"latin-hypercube", Sampling::kLatinHypercube}}),
-          limit(head.limit_rad)};
+          limit(head.limit_rad),
+          choice<bool>("covariance", head.keeps_covariance, "of the parameters of each run: whether the table has it",
+                       {{"left-out", false}, {"kept", true}})};
 }
 
 /// A table, or the name of a file beside the campaign's.
@@ -705,6 +708,7 @@ CampaignFile::CampaignFile(const fs::path& file, const ScenarioCheck& check) {
   content->plan.name = head.name;
   content->plan.seed = head.seed;
   content->plan.limit_rad = head.limit_rad;
+  content->plan.keeps_covariance = head.keeps_covariance;
   content->plan.latin_hypercube = head.sampling == Head::Sampling::kLatinHypercube;
   for (Varied& one : content->varied) {
     if (one.input.distribution.kind == Kind::kFollows) {
@@ -733,7 +737,8 @@ CampaignIdentity CampaignFile::identity(std::string_view version) const {
                             {"campaign.runs", std::to_string(plan.runs)},
                             {"campaign.repeats", std::to_string(plan.repeats)},
                             {"campaign.sampling", plan.latin_hypercube ? "latin-hypercube" : "random"},
-                            {"campaign.limit", format_angle(plan.limit_rad)}};
+                            {"campaign.limit", format_angle(plan.limit_rad)},
+                            {"campaign.covariance", plan.keeps_covariance ? "kept" : "left-out"}};
   for (const Varied& one : content_->varied) {
     lines.push_back({"vary." + one.input.key, text_of(one.as_given)});
   }

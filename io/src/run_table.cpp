@@ -32,6 +32,8 @@ std::vector<std::string> dimensions_of(RunShape shape) {
       return {"gyro", "axis"};
     case RunShape::kGyroAndCoefficient:
       return {"gyro", "coefficient"};
+    case RunShape::kTwoParameters:
+      return {"parameter", "other_parameter"};
   }
   return {};
 }
@@ -87,15 +89,29 @@ ShapedVariable quantity_variable(const CampaignPlan& plan, const RunQuantityRow&
           {{"units", std::string(row.unit)}, {"long_name", std::string(row.about)}}};
 }
 
+/// As covariance has them: "gyro1.k0".
+std::vector<std::string> names_of_parameters(std::size_t gyros) {
+  std::vector<std::string> names;
+  for (std::size_t gyro = 1; gyro <= gyros; ++gyro) {
+    for (const auto& name : Esg7::kNames) {
+      names.push_back(fmt::format("gyro{}.{}", gyro, name));
+    }
+    for (const char axis : {'x', 'y', 'z'}) {
+      names.push_back(fmt::format("gyro{}.align_{}", gyro, axis));
+    }
+  }
+  return names;
+}
+
 }  // namespace
 
 void write_run_table(const fs::path& file, const CampaignPlan& plan, std::string_view digest,
                      std::span<const RunRecord> records) {
-  const std::vector<std::pair<std::string, std::size_t>> dimensions = {{kRun, records.size()},
-                                                                       {"gyro", plan.gyros},
-                                                                       {"axis", 3},
-                                                                       {"coefficient", kCampaignCoefficients},
-                                                                       {"quantile", kErrorQuantiles.size()}};
+  std::vector<std::pair<std::string, std::size_t>> dimensions = {{kRun, records.size()},
+                                                                 {"gyro", plan.gyros},
+                                                                 {"axis", 3},
+                                                                 {"coefficient", kCampaignCoefficients},
+                                                                 {"quantile", kErrorQuantiles.size()}};
   std::vector<std::int64_t> gyros;
   for (std::size_t k = 0; k < plan.gyros; ++k) {
     gyros.push_back(static_cast<std::int64_t>(k) + 1);
@@ -143,8 +159,20 @@ void write_run_table(const fs::path& file, const CampaignPlan& plan, std::string
   for (std::size_t i = 0; i < plan.inputs.size(); ++i) {
     variables.push_back(input_variable(plan, i, name_of_input(plan.inputs[i].key, taken), records));
   }
+  if (plan.keeps_covariance) {
+    const std::vector<std::string> names = names_of_parameters(plan.gyros);
+    for (const char* const dimension : {"parameter", "other_parameter"}) {
+      dimensions.emplace_back(dimension, names.size());
+      variables.push_back({dimension,
+                           {dimension},
+                           names,
+                           {{"long_name", "drift coefficient of eq. (1), or alignment about an axis of c"}}});
+    }
+  }
   for (const RunQuantityRow& row : kRunQuantityRows) {
-    variables.push_back(quantity_variable(plan, row, records));
+    if (plan.has(row.quantity)) {
+      variables.push_back(quantity_variable(plan, row, records));
+    }
   }
 
   NetcdfWriter writer(file);

@@ -1,185 +1,123 @@
-// trihedron_consistency: simulates a grid of flights and tabulates whether the estimators' covariances are consistent.
+// trihedron_consistency: tabulates from the runs of a campaign whether the estimators' covariances are consistent, how
+// good they are, and whether they agree.
 
 #include <fmt/core.h>
 
 #include <CLI/CLI.hpp>
-#include <algorithm>
+#include <cstdint>
 #include <exception>
 #include <filesystem>
-#include <mutex>
+#include <limits>
+#include <map>
 #include <regex>
+#include <stdexcept>
 #include <string>
-#include <thread>
 #include <vector>
 
-#include "consistency/band.hpp"
-#include "consistency/flight.hpp"
-#include "consistency/grid.hpp"
-#include "consistency/results.hpp"
-#include "stop_on_signals.hpp"
+#include "consistency/bound.hpp"
+#include "consistency/tables.hpp"
 #include "trihedron/ground/tasks/on_all_cores.hpp"
-#include "trihedron/records/stop.hpp"
+#include "trihedron/io/campaign.hpp"
+#include "trihedron/sim/simulate.hpp"
 
 namespace {
 
-using namespace trihedron::consistency;
 using namespace trihedron;
+using namespace trihedron::consistency;
 
 constexpr const char* kEstimatorsTable = "estimators";
 constexpr const char* kObservableTable = "observable";
 constexpr const char* kAgreementTable = "agreement";
 
 struct Options {
-  int runs = 100;
-  int paper_runs = 20;  // fewer runs suffice: its NEES is far from consistent
-  std::string cells;
-  std::vector<std::string> estimators{std::string(name_of(Estimator::kPaper)),
-                                      std::string(name_of(Estimator::kInvariant))};
-  unsigned threads = std::max(1U, std::thread::hardware_concurrency());
-  std::filesystem::path resume;
+  std::string campaign;
+  std::filesystem::path out;
   std::filesystem::path document;
   std::string place = "consistency";
   std::string table = kEstimatorsTable;
+  std::string cells;
+  std::size_t runs = std::numeric_limits<std::size_t>::max();
 };
 
-std::vector<std::string> estimator_names() {
-  std::vector<std::string> names;
-  for (const EstimatorRow& row : kEstimators) {
-    names.emplace_back(row.name);
-  }
-  return names;
-}
-
-/// A flight still to be simulated, and the estimators to run on it.
-struct Task {
-  const Cell& cell;
-  int run;
-  std::vector<std::string> estimators;
-};
-
-std::vector<Column> columns_of(const Options& options) {
-  if (options.table == kAgreementTable) {
-    return {{std::string(name_of(Estimator::kBatch)), options.runs}};
-  }
-  std::vector<Column> columns;
-  for (const std::string& estimator : options.estimators) {
-    const bool is_paper = estimator_named(estimator) == Estimator::kPaper;
-    columns.push_back({estimator, is_paper ? std::min(options.runs, options.paper_runs) : options.runs});
-  }
-  return columns;
-}
-
-/// Ordered by run, then by cell, so that an interrupted campaign leaves a complete table of fewer runs.
-std::vector<Task> missing(const Results& results, const std::vector<Cell>& cells, const std::vector<Column>& columns,
-                          int runs) {
-  std::vector<Task> tasks;
-  for (int run = 1; run <= runs; ++run) {
-    for (const Cell& cell : cells) {
-      Task task{cell, run, {}};
-      for (const auto& [estimator, its_runs] : columns) {
-        if (run <= its_runs && !results.contains({cell.name(), run, estimator})) {
-          task.estimators.push_back(estimator);
-        }
-      }
-      if (!task.estimators.empty()) {
-        tasks.push_back(task);
-      }
+/// Of the flights of all these runs without process noise, by the seed, which each flight has for itself.
+std::map<std::uint64_t, ParameterErrors> bounds_of(const Campaign& campaign, const io::CampaignFile& file) {
+  std::map<std::uint64_t, const RunRecord*> flights;
+  for (const Cell& cell : campaign.cells) {
+    for (const RunRecord* run : cell.by_estimator.front()) {
+      flights[run->seed] = run;
     }
   }
-  return tasks;
+  std::map<std::uint64_t, ParameterErrors> bounds;
+  std::vector<const RunRecord*> runs;
+  for (const auto& [seed, run] : flights) {
+    bounds[seed].setConstant(std::numeric_limits<double>::quiet_NaN());
+    runs.push_back(run);
+  }
+  ground::for_each_on_all_cores(runs.size(), [&](std::size_t i) {
+    const Scenario scenario = file.scenario(runs[i]->seed, runs[i]->draws);
+    if (scenario.gyros.front().drift.direction_walk_rad_sqrt_s > 0) {
+      return;
+    }
+    const sim::SimulatedPass flown = sim::simulate(scenario);
+    bounds.at(runs[i]->seed) = parameter_bound(flown.pass.settings, flown.truth).diagonal();
+  });
+  return bounds;
 }
 
-/// Makes the flights on all threads; which of them makes which does not matter.
-void fly_all(const std::vector<Task>& tasks, unsigned threads, Results& results) {
-  std::size_t done = 0;
-  std::mutex one_at_a_time;
-  const auto fly_one = [&](std::size_t i) {
-    const Task& task = tasks[i];
-    std::vector<Estimator> estimators;
-    for (const std::string& name : task.estimators) {
-      estimators.push_back(estimator_named(name).value());
-    }
-    const std::vector<Outcome> outcomes = fly(task.cell, task.run, estimators);
-    const std::scoped_lock lock(one_at_a_time);
-    for (std::size_t k = 0; k < outcomes.size(); ++k) {
-      results.add({task.cell.name(), task.run, task.estimators[k]}, outcomes[k]);
-    }
-    fmt::print(stderr, "\r{} of {} flights", ++done, tasks.size());
-  };
-  using namespace trihedron::ground;
-  with_cores(threads, [&] { for_each_on_all_cores(tasks.size(), fly_one); });
-}
-
-std::string measured(const Options& options) {
-  std::vector<Cell> cells = grid();
+std::string table(const Options& options) {
+  const io::CampaignFile file(options.campaign, sim::expect_possible);
+  const io::Journal journal = io::read_journal(options.out / "runs.journal");
+  const std::string difference = io::difference_between(journal.identity, file.identity(journal.identity.at(0).text));
+  if (!difference.empty()) {
+    throw std::runtime_error(options.out.string() + " is of another campaign: " + difference);
+  }
+  Campaign campaign = campaign_of(file.plan(), journal.records, options.runs);
   const std::regex pattern(options.cells);
-  std::erase_if(cells, [&](const Cell& cell) { return !std::regex_search(cell.name(), pattern); });
-  Results results(options.resume);
-  const std::vector<Column> columns = columns_of(options);
-  fly_all(missing(results, cells, columns, options.runs), options.threads, results);
-  fmt::print(stderr, "\n");
+  std::erase_if(campaign.cells, [&](const Cell& cell) { return !std::regex_search(cell.name(), pattern); });
+  if (campaign.cells.empty()) {
+    throw std::runtime_error("no cell has a name like " + options.cells);
+  }
   if (options.table == kAgreementTable) {
-    return fmt::format("{} runs per row.\n\n", options.runs) + results.agreement_table(cells, options.runs);
+    return agreement_table(campaign);
   }
-  const bool observable = options.table == kObservableTable;
-  std::string text;
-  for (const auto& [estimator, runs] : columns) {
-    text += fmt::format("{}: {} runs per row", estimator, runs);
-    if (!observable) {
-      const Band nees = band_of_mean(kParameters, runs);
-      text += fmt::format("; 95 % of the means of a consistent estimator's NEES lie in {:.1f} … {:.1f}", nees.low,
-                          nees.high);
-    }
-    text += ".  \n";
+  if (options.table == kObservableTable) {
+    return observable_table(campaign,
+                            [&](const RunRecord& run) { return prior_covariance(file.scenario(run.seed, run.draws)); });
   }
-  return text + "\n" + (observable ? results.observable_table(cells, columns) : results.table(cells, columns));
+  const std::map<std::uint64_t, ParameterErrors> bounds = bounds_of(campaign, file);
+  return estimators_table(campaign, [&](const RunRecord& run) { return bounds.at(run.seed); });
 }
 
-int run(int argc, char** argv) {
+}  // namespace
+
+int main(int argc, char** argv) {
   try {
     Options options;
     CLI::App program(
-        "Flies a grid of simulated passes: whether the estimators' covariances hold, how good they are, and "
-        "whether they agree.");
+        "Tabulates a campaign over a grid of simulated passes: whether the estimators' covariances hold, how good they "
+        "are, and whether they agree.");
+    program.add_option("campaign", options.campaign, "The file that the campaign was flown by")->required();
+    program.add_option("out", options.out, "What trihedron campaign -o wrote")->required();
     program.add_option("document", options.document, "Write the table into it, not to standard output");
     program.add_option("--place", options.place, "Of the table in the document")->capture_default_str();
     program
         .add_option("--table", options.table,
                     "estimators: NEES, NIS, error over bound; observable: NEES of what the flights make observable; "
-                    "agreement: of estimators invariant and batch")
+                    "agreement: of both estimators")
         ->check(CLI::IsMember({kEstimatorsTable, kObservableTable, kAgreementTable}))
         ->capture_default_str();
-    program.add_option("--runs", options.runs, "Flights per cell")->check(CLI::PositiveNumber)->capture_default_str();
-    program.add_option("--paper-runs", options.paper_runs, "Those of them that estimator paper sees")
-        ->check(CLI::PositiveNumber)
-        ->capture_default_str();
-    program.add_option("--cells", options.cells, "Only cells with a name like this, e.g. '^steady/.*/300arcmin'");
-    program.add_option("--estimators", options.estimators, "Which")
-        ->check(CLI::IsMember(estimator_names()))
-        ->delimiter(',')
-        ->capture_default_str();
-    program.add_option("--threads", options.threads, "How many at once")
-        ->check(CLI::PositiveNumber)
-        ->capture_default_str();
-    program.add_option("--resume", options.resume, "Keep the outcome of each flight in this file, and go on from it");
+    program.add_option("--cells", options.cells, "Only cells with a name like this, e.g. '^none/.*/300arcmin'");
+    program.add_option("--runs", options.runs, "Of each cell the first so many")->check(CLI::PositiveNumber);
     CLI11_PARSE(program, argc, argv);
-    const std::string text = measured(options);
+    const std::string text = table(options);
     if (options.document.empty()) {
       fmt::print("{}", text);
     } else {
       write_between_markers(options.document, options.place, text);
     }
     return 0;
-  } catch (const trihedron::Stopped&) {
-    throw;
   } catch (const std::exception& error) {
     fmt::print(stderr, "trihedron_consistency: {}\n", error.what());
     return 1;
   }
-}
-
-}  // namespace
-
-int main(int argc, char** argv) {
-  return trihedron::cli::stopped_by_signals([argc, argv] { return run(argc, argv); });
 }

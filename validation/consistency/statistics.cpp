@@ -28,6 +28,28 @@ double nees(const ParameterErrors& errors, const ParameterCovariance& covariance
   return in_sigmas.dot(scaled.correlation.solve(in_sigmas));
 }
 
+ParameterCovariance prior_covariance(const Scenario& scenario) {
+  ParameterErrors variance;
+  for (int k = 0; k < kGyros; ++k) {
+    const GyroScenario& gyro = scenario.gyros[static_cast<std::size_t>(k)];
+    variance.segment<Esg7::kSize>(Parameters::drift(k)).setConstant(std::pow(gyro.drift.prior_sigma_rad_s, 2));
+    variance.segment<3>(Parameters::alignment(k)).setConstant(std::pow(gyro.alignment_prior_sigma_rad, 2));
+  }
+  return variance.asDiagonal();
+}
+
+Difference& Difference::operator+=(const Difference& other) {
+  square += other.square;
+  variance_ratio += other.variance_ratio;
+  return *this;
+}
+
+Difference& Difference::operator/=(double count) {
+  square /= count;
+  variance_ratio /= count;
+  return *this;
+}
+
 Nees observable_nees(const ParameterErrors& errors, const ParameterCovariance& covariance,
                      const ParameterCovariance& prior) {
   // Of a combination with ratio s the covariance by both is 1/(1 + s²) of the prior's.

@@ -3,6 +3,7 @@
 #include <Eigen/Core>
 
 #include "consistency/bound.hpp"
+#include "trihedron/records/scenario.hpp"
 
 namespace trihedron::consistency {
 
@@ -12,11 +13,14 @@ using ParameterErrors = Eigen::Matrix<double, Parameters::kSize, 1>;
 /// eᵀP⁻¹e over some combinations of the parameters.
 struct Nees {
   double value = 0;
-  double freedom = 0;  ///< how many combinations; of a mean over flights their mean
+  double freedom = 0;  ///< how many combinations
 };
 
 /// Of all parameters.
 [[nodiscard]] double nees(const ParameterErrors& errors, const ParameterCovariance& covariance);
+
+/// Of the parameters of two gyros before a flight.
+[[nodiscard]] ParameterCovariance prior_covariance(const Scenario& scenario);
 
 /// Over the combinations that the flight made observable: prior sigma over that by the measurements alone above
 /// ground::Observability::kUnobservable. Both covariances positive definite; `prior` is what `covariance` came from.
@@ -27,6 +31,9 @@ struct Nees {
 struct Difference {
   double square = 0;          ///< mean of the squared difference
   double variance_ratio = 0;  ///< mean of the variance of the first
+
+  Difference& operator+=(const Difference& other);
+  Difference& operator/=(double count);
 };
 
 /// Means over the parameters, one by one. `difference`: first less second.

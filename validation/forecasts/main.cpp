@@ -20,7 +20,7 @@
 #include <tuple>
 #include <vector>
 
-#include "consistency/results.hpp"
+#include "consistency/tables.hpp"
 #include "forecasts/flight.hpp"
 #include "stop_on_signals.hpp"
 #include "trihedron/ground/tasks/on_all_cores.hpp"

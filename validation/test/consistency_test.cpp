@@ -5,68 +5,104 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
-#include <filesystem>
-#include <fstream>
+#include <cstdint>
+#include <map>
 #include <random>
 #include <set>
+#include <span>
 #include <stdexcept>
 #include <string>
+#include <tuple>
 #include <utility>
 #include <vector>
 
-#include "consistency/band.hpp"
 #include "consistency/bound.hpp"
-#include "consistency/flight.hpp"
-#include "consistency/grid.hpp"
-#include "consistency/results.hpp"
 #include "consistency/statistics.hpp"
+#include "consistency/tables.hpp"
+#include "trihedron/campaign/perform.hpp"
+#include "trihedron/campaign/sampling.hpp"
+#include "trihedron/campaign/statistics.hpp"
 #include "trihedron/core/drift.hpp"
 #include "trihedron/ground/calibrate/calibrate.hpp"
+#include "trihedron/io/campaign.hpp"
 #include "trihedron/sim/simulate.hpp"
 
 namespace trihedron::consistency {
 namespace {
 
-TEST(Band, OfOneValueIsTheTabulatedOneOfChiSquare) {
-  const Band band = band_of_mean(20, 1);
-  EXPECT_NEAR(band.low, 9.591, 1e-3);
-  EXPECT_NEAR(band.high, 34.170, 1e-3);
+io::CampaignFile campaign_file(const std::string& name) {
+  return io::CampaignFile(std::string(TRIHEDRON_VALIDATION) + "/consistency/" + name, sim::expect_possible);
 }
 
-TEST(Band, OfManyIsTheNormalOne) {
-  const Band band = band_of_mean(4, 1000000);
-  const double half = 1.959964 * std::sqrt(8 / 1e6);
-  EXPECT_NEAR(band.low, 4 - half, 1e-2 * half);
-  EXPECT_NEAR(band.high, 4 + half, 1e-2 * half);
-}
-
-TEST(Band, TellsTheSideAndDoesNotTakeNaNForInside) {
-  const Band band{1, 2};
-  EXPECT_EQ(band.side(0.5), -1);
-  EXPECT_EQ(band.side(1), 0);
-  EXPECT_EQ(band.side(2), 0);
-  EXPECT_EQ(band.side(2.5), 1);
-  EXPECT_EQ(band.side(std::nan("")), 1);
-}
-
-TEST(Band, OfDifferentFreedomsIsThatOfTheirSum) {
-  const Band band = band_of_mean(18.5, 2);
-  EXPECT_NEAR(band.low, 22.106 / 2, 1e-3);
-  EXPECT_NEAR(band.high, 55.668 / 2, 1e-3);
-}
-
-TEST(Grid, HasEachOf216CellsOnce) {
-  std::set<std::string> names;
-  for (const Cell& cell : grid()) {
-    names.insert(cell.name());
+/// The first run in this cell by this estimator.
+std::uint64_t run_in(const CampaignPlan& plan, const std::vector<std::string>& cell, const std::string& estimator) {
+  const auto setting = std::ranges::find(plan.inputs, "calibration.estimator", &CampaignInput::key);
+  for (std::uint64_t run = 0; run < plan.runs; run += plan.repeats) {
+    const std::vector<double> draws = campaign::draws_of_run(plan, run);
+    const auto by = static_cast<std::size_t>(draws[static_cast<std::size_t>(setting - plan.inputs.begin())]);
+    if (values_of(plan, draws) == cell && setting->options[by] == estimator) {
+      return run;
+    }
   }
-  EXPECT_EQ(names.size(), 216U);
+  throw std::runtime_error("no such cell");
+}
+
+/// A flight in this cell, of another seed than the campaign gives it, and its calibration.
+RunRecord flown(const io::CampaignFile& file, const std::vector<std::string>& cell, const std::string& estimator,
+                std::uint64_t seed) {
+  const std::uint64_t run = run_in(file.plan(), cell, estimator);
+  const auto setup_of = [&](std::uint64_t /*of_campaign*/, std::span<const double> draws) {
+    return campaign::RunSetup{file.scenario(seed, draws), file.options(draws)};
+  };
+  return campaign::perform(file.plan(), run, setup_of);
+}
+
+const std::vector<std::string> kFirstCell = {"slews", "plane-normal", "1e-07rad/s", "1arcmin", "0rad/s^0.5"};
+
+Scenario first_scenario() {
+  const io::CampaignFile file = campaign_file("filters.toml");
+  const std::vector<double> draws = campaign::draws_of_run(file.plan(), run_in(file.plan(), kFirstCell, "invariant"));
+  return file.scenario(1'000'001, draws);
+}
+
+TEST(Campaigns, HaveEachOfTheirCellsAsOftenByEachEstimator) {
+  for (const auto& [name, cells, runs] :
+       {std::tuple("filters.toml", 216U, 100U), {"whole-pass.toml", 12U, 100U}, {"steady.toml", 18U, 20U}}) {
+    const io::CampaignFile file = campaign_file(name);
+    std::map<std::vector<std::string>, unsigned> found;
+    for (std::uint64_t run = 0; run < file.plan().runs; ++run) {
+      ++found[values_of(file.plan(), campaign::draws_of_run(file.plan(), run))];
+    }
+    EXPECT_EQ(found.size(), cells) << name;
+    for (const auto& [cell, count] : found) {
+      EXPECT_EQ(count, 2 * runs) << name;
+    }
+  }
+}
+
+/// So that the NEES of an honest estimator is χ².
+TEST(Campaigns, TellTheEstimatorTheTruth) {
+  const io::CampaignFile file = campaign_file("filters.toml");
+  std::set<double> walks;
+  for (std::uint64_t run = 0; run < file.plan().runs; run += file.plan().repeats) {
+    const std::vector<double> draws = campaign::draws_of_run(file.plan(), run);
+    const Scenario scenario = file.scenario(1, draws);
+    const CalibrationOptions options = file.options(draws);
+    EXPECT_FALSE(options.find_noise);
+    for (const GyroScenario& gyro : scenario.gyros) {
+      EXPECT_EQ(options.direction_random_walk_rad_sqrt_s, gyro.drift.direction_walk_rad_sqrt_s);
+      EXPECT_NEAR(gyro.alignment_prior_sigma_rad * std::sqrt(3.0) / gyro.misalignment_magnitude_rad, 1, 1e-15);
+      EXPECT_EQ(gyro.drift.outside_sigma_rad_s, 0);
+      walks.insert(gyro.drift.direction_walk_rad_sqrt_s);
+    }
+  }
+  EXPECT_EQ(walks, (std::set<double>{0, 1e-8, 1e-7}));
 }
 
 /// At rest and without drift the momenta stand still in the case: each reading is φ0 − δ + B Δκ t, a straight line in
 /// time. Its beginning is free, so that nothing is learned of the alignment and the drift has its slope's information.
 TEST(Bound, AtRestIsThatOfAStraightLine) {
-  Scenario scenario = grid().front().scenario(1);
+  Scenario scenario = first_scenario();
   scenario.duration = std::chrono::minutes(20);
   scenario.attitude.reference = AttitudeScenario::Reference::kInertial;
   scenario.attitude.jitter_rad = 0;
@@ -127,7 +163,7 @@ TEST(Bound, AtRestIsThatOfAStraightLine) {
 
 /// Where the first, wrong values are off by little, the filter's linearisation is that of the truth.
 TEST(Bound, IsTheCovarianceOfTheFilterForSmallMisalignments) {
-  Scenario scenario = grid().front().scenario(1);  // slews, 1e-7 rad/s, 1′
+  Scenario scenario = first_scenario();  // slews, 1e-7 rad/s, 1′
   scenario.duration = std::chrono::hours(2);
   const sim::SimulatedPass flown = sim::simulate(scenario);
   CalibrationOptions options;
@@ -184,7 +220,9 @@ TEST(ObservableNees, OfDrawnErrorsIsTheSquareOfWhatWasDrawn) {
     ASSERT_NEAR(nees.value, drawn.tail<18>().squaredNorm(), 1e-4 * nees.value);  // 1e-16 of the prior in 1e-9 of it
     mean += nees.value / kRuns;
   }
-  EXPECT_EQ(band_of_mean(18, kRuns).side(mean), 0) << mean;
+  const campaign::ChiSquareBounds band = campaign::chi_square_bounds(18 * kRuns, 0.95);
+  EXPECT_GE(mean / 18, band.low);
+  EXPECT_LE(mean / 18, band.high);
 }
 
 TEST(ObservableNees, DoesNotCountWhatStaysAtItsPrior) {
@@ -247,76 +285,162 @@ TEST(Difference, MayBeAThirdOfASigmaBesideWhatTheFirstSaysToKnowLess) {
   EXPECT_FALSE(agrees({std::nan(""), 1}));
 }
 
-std::vector<Cell> first_cell() { return {grid().front()}; }
+/// Two flights in each of two cells, by two estimators, with errors of a sigma in each of 20 parameters.
+struct Flown {
+  Flown() {
+    plan.repeats = 2;
+    plan.runs = 8;
+    plan.keeps_covariance = true;
+    add("attitude", {"slews", "none"}, false);
+    add("calibration.estimator", {"invariant", "batch"}, false);
+    add("gyro.drift.direction_walk", {"0"}, true);
+    add("gyro.drift.prior_sigma", {"1"}, true);
+    add("gyro.misalignment_magnitude", {"30"}, true);
+    add("gyro.unit", {"oblique"}, false);
+    for (std::uint64_t run = 0; run < plan.runs; ++run) {
+      RunRecord record;
+      record.run = run;
+      record.seed = campaign::seed_of_run(plan, run);
+      record.draws = campaign::draws_of_run(plan, run);
+      record.outcome = RunOutcome::kTrustworthy;
+      record[RunQuantity::kNees] = {20};
+      record[RunQuantity::kNisMeanOfAll] = {4};
+      record[RunQuantity::kNisFixesOfAll] = {10800};
+      record[RunQuantity::kDriftError].assign(14, 1e-9);
+      record[RunQuantity::kAlignmentError].assign(6, 1e-5);
+      set_covariance(record, covariance());
+      records.push_back(std::move(record));
+    }
+  }
 
-TEST(Results, ComeBackFromTheFile) {
-  const std::filesystem::path file = std::filesystem::path(testing::TempDir()) / "consistency_results.txt";
-  std::filesystem::remove(file);
-  const std::string cell = first_cell().front().name();
-  Outcome outcome;
-  outcome.nees = 21;
-  outcome.observable = {17.5, 18};
-  outcome.nis = 4.001;
-  outcome.fixes = 10800;
-  outcome.error_over_bound_square = std::nan("");
-  outcome.by_parameter = {0.04, 1.21};
-  outcome.by_combination = {0.09, 1.44};
-  Results written(file);
-  written.add({cell, 1, "batch"}, outcome);
-  const Results read(file);
-  ASSERT_TRUE(read.contains({cell, 1, "batch"}));
-  EXPECT_EQ(read.table(first_cell(), {{"batch", 1}}), written.table(first_cell(), {{"batch", 1}}));
-  EXPECT_EQ(read.observable_table(first_cell(), {{"batch", 1}}),
-            written.observable_table(first_cell(), {{"batch", 1}}));
-  EXPECT_NE(read.observable_table(first_cell(), {{"batch", 1}}).find("| 17.5 | 18.00 | 8.2 … 31.5 |"),
-            std::string::npos);
-  EXPECT_NE(read.agreement_table(first_cell(), 1).find("| 0.20 | 1.100 | 0.30 | 1.200 |"), std::string::npos);
+  void add(const std::string& key, const std::vector<std::string>& options, bool numbers) {
+    CampaignInput& input = plan.inputs.emplace_back();
+    input.key = key;
+    input.distribution = {.kind = Distribution::Kind::kGrid, .options = options.size()};
+    input.options = options;
+    if (numbers) {
+      input.numbers = {std::stod(options.front())};
+    }
+  }
 
-  std::ofstream(file, std::ios::app) << cell << " 2 batch 10800 21 what\n";
-  EXPECT_THROW(Results{file}, std::runtime_error);
+  static ParameterCovariance covariance() {
+    ParameterErrors sigma = ParameterErrors::Constant(1e-9);
+    for (int k = 0; k < 2; ++k) {
+      sigma.segment<3>(Parameters::alignment(k)).setConstant(1e-5);
+    }
+    return sigma.cwiseAbs2().asDiagonal();
+  }
+
+  static void set_covariance(RunRecord& record, const ParameterCovariance& covariance) {
+    record[RunQuantity::kCovariance].assign(covariance.data(), covariance.data() + covariance.size());
+  }
+
+  [[nodiscard]] Campaign campaign() const { return campaign_of(plan, records, 100); }
+
+  CampaignPlan plan;
+  std::vector<RunRecord> records;
+};
+
+TEST(Tables, MarkWhatLiesOutsideItsBand) {
+  Flown flown;
+  // Runs 0 … 3 are of the first estimator, in cells slews and none, 4 … 7 of the second.
+  flown.records[2][RunQuantity::kNees] = {45};
+  flown.records[3][RunQuantity::kNees] = {46};
+  flown.records[4][RunQuantity::kNees] = {std::nan("")};
+  flown.records[6][RunQuantity::kNisMeanOfAll] = {3.9};
+  const std::string table = estimators_table(flown.campaign(), [](const RunRecord& run) {
+    const double ratio = run.draws[1] == 0 ? 1 : 2;  // of the second estimator the variances are a quarter
+    return ParameterErrors(Flown::covariance().diagonal() / (ratio * ratio));
+  });
+  EXPECT_NE(table.find("95 % of the means of a consistent estimator's NEES lie in 12.2 … 29.7"), std::string::npos)
+      << table;  // χ² of 40: 24.433 and 59.342
+  EXPECT_NE(table.find("| slews | oblique | 1 | 30 | 0 | 20.0 | 4.000 | 1.00 | nan ↑ | 4.000 | 2.00 |"),
+            std::string::npos)
+      << table;
+  EXPECT_NE(table.find("| none | oblique | 1 | 30 | 0 | 45.5 ↑ | 4.000 | 1.00 | 20.0 | 3.950 ↓ | 2.00 |"),
+            std::string::npos)
+      << table;
+  EXPECT_NE(table.find("NEES, batch: outside its band in 1 of 2 rows up to 1°, in 0 of 0 beyond."), std::string::npos);
 }
 
-TEST(Results, TellWhichEstimatesDoNotAgree) {
-  Results results;
-  Outcome outcome;
-  outcome.by_parameter = {0.1, 1};
-  outcome.by_combination = {0.5, 1.1};
-  results.add({first_cell().front().name(), 1, "batch"}, outcome);
-  const std::string table = results.agreement_table(first_cell(), 1);
-  EXPECT_NE(table.find("| 0.32 | 1.000 | 0.71 ↑ | 1.049 |"), std::string::npos) << table;
-  EXPECT_NE(table.find("by parameter 0, by combination 1 of 1 rows"), std::string::npos) << table;
+TEST(Tables, LeaveOutWhatTheFlightsDoNotMakeObservable) {
+  const Flown flown;
+  const std::string table = observable_table(flown.campaign(), [](const RunRecord& /*run*/) {
+    ParameterErrors variance = 1e6 * Flown::covariance().diagonal();
+    variance.head<2>() /= 1e6;  // of the prior nothing is left to know
+    return ParameterCovariance(variance.asDiagonal());
+  });
+  EXPECT_NE(table.find("| 18.0 | 18.00 | 10.7 … 27.2 |"), std::string::npos) << table;  // χ² of 36: 21.336 and 54.437
+}
+
+TEST(Tables, TellWhichEstimatesDoNotAgree) {
+  Flown flown;
+  for (std::size_t run = 0; run < 4; ++run) {
+    Flown::set_covariance(flown.records[run], (run < 2 ? 1.21 : 1) * Flown::covariance());
+    for (double& error : flown.records[run][RunQuantity::kAlignmentError]) {
+      error *= run < 2 ? 1.5 : 2;
+    }
+  }
+  const std::string table = agreement_table(flown.campaign());
+  EXPECT_NE(table.find("| slews | oblique | 1 | 30 | 0 | 0.27 | 1.100 | 0.27 | 1.100 |"), std::string::npos) << table;
+  EXPECT_NE(table.find("| none | oblique | 1 | 30 | 0 | 0.55 ↑ | 1.000 | 0.55 ↑ | 1.000 |"), std::string::npos)
+      << table;
+  EXPECT_NE(table.find("by parameter 1, by combination 1 of 2 rows"), std::string::npos) << table;
+}
+
+TEST(Tables, AreOfWholeCampaignsOverTheGridAlone) {
+  Flown flown;
+  EXPECT_EQ(campaign_of(flown.plan, flown.records, 1).cells.front().by_estimator.front().size(), 1U);
+  flown.records.pop_back();
+  EXPECT_THROW((void)flown.campaign(), std::runtime_error);
+  Flown other;
+  other.plan.inputs.back().key = "gyro.unit.1";
+  EXPECT_THROW((void)other.campaign(), std::runtime_error);
 }
 
 /// Misalignments of degrees, and drift ten times that of a good gyro: first estimates far enough off that the filter
 /// has to begin anew, once or more.
 TEST(Flights, WithWrongFirstEstimatesAreNotLost) {
-  const std::vector<std::pair<std::string, int>> flights = {
-      {"slews/plane-normal/1e-05/60arcmin/0e+00", 10},  {"slews/plane-normal/1e-05/300arcmin/0e+00", 12},
-      {"slews/plane-plane/1e-07/300arcmin/1e-07", 11},  {"steady/plane-plane/1e-07/300arcmin/0e+00", 1},
-      {"steady/plane-plane/1e-05/300arcmin/0e+00", 14}, {"slews/plane-normal/1e-05/300arcmin/1e-07", 11},
-      {"slews/plane-plane/1e-05/300arcmin/1e-08", 9},   {"slews/plane-plane/1e-06/300arcmin/0e+00", 45},
-      {"slews/plane-plane/1e-06/300arcmin/0e+00", 52},  {"slews/plane-plane/1e-06/300arcmin/1e-08", 46}};
-  const std::vector<Cell> cells = grid();
-  for (const auto& [name, run] : flights) {
-    const auto cell = std::find_if(cells.begin(), cells.end(), [&](const Cell& c) { return c.name() == name; });
-    ASSERT_NE(cell, cells.end()) << name;
-    const Outcome outcome = fly(*cell, run, {Estimator::kInvariant}).front();
-    EXPECT_EQ(outcome.fixes, 10800) << name;
-    EXPECT_LT(outcome.nees, 50) << name;  // χ² of 20, once in 5000
+  const io::CampaignFile file = campaign_file("filters.toml");
+  using Values = std::vector<std::string>;
+  const std::vector<std::pair<Values, std::uint64_t>> flights = {
+      {{"slews", "plane-normal", "1e-05rad/s", "60arcmin", "0rad/s^0.5"}, 31'000'010},
+      {{"slews", "plane-normal", "1e-05rad/s", "300arcmin", "0rad/s^0.5"}, 34'000'012},
+      {{"slews", "plane-plane", "1e-07rad/s", "300arcmin", "1e-07rad/s^0.5"}, 48'000'011},
+      {{"none", "plane-plane", "1e-07rad/s", "300arcmin", "0rad/s^0.5"}, 154'000'001},
+      {{"none", "plane-plane", "1e-05rad/s", "300arcmin", "0rad/s^0.5"}, 178'000'014},
+      {{"slews", "plane-normal", "1e-05rad/s", "300arcmin", "1e-07rad/s^0.5"}, 36'000'011},
+      {{"slews", "plane-plane", "1e-05rad/s", "300arcmin", "1e-08rad/s^0.5"}, 71'000'009},
+      {{"slews", "plane-plane", "1e-06rad/s", "300arcmin", "0rad/s^0.5"}, 58'000'045},
+      {{"slews", "plane-plane", "1e-06rad/s", "300arcmin", "0rad/s^0.5"}, 58'000'052},
+      {{"slews", "plane-plane", "1e-06rad/s", "300arcmin", "1e-08rad/s^0.5"}, 59'000'046}};
+  for (const auto& [cell, seed] : flights) {
+    const RunRecord run = flown(file, cell, "invariant", seed);
+    EXPECT_EQ(run.at(RunQuantity::kNisFixesOfAll), 10800) << seed;
+    EXPECT_LT(run.at(RunQuantity::kNees), 50) << seed;  // χ² of 20, once in 5000
   }
 }
 
 TEST(Flights, OfFilterAndBatchAgree) {
-  const std::vector<Cell> cells = grid();
-  const auto cell = std::find_if(cells.begin(), cells.end(),
-                                 [](const Cell& c) { return c.name() == "steady/plane-plane/1e-06/30arcmin/0e+00"; });
-  ASSERT_NE(cell, cells.end());
-  const std::vector<Outcome> outcomes = fly(*cell, 1, {Estimator::kInvariant, Estimator::kBatch});
-  EXPECT_TRUE(agrees(outcomes[1].by_parameter));
-  EXPECT_TRUE(agrees(outcomes[1].by_combination));
-  for (const Outcome& outcome : outcomes) {
-    EXPECT_EQ(outcome.observable.freedom, 18);  // about the orbit normal the alignment of neither gyro
-    EXPECT_EQ(band_of_mean(kInnovations, outcome.fixes).side(outcome.nis), 0) << outcome.nis;
+  const io::CampaignFile file = campaign_file("whole-pass.toml");
+  const std::vector<std::string> cell = {"none", "plane-plane", "1e-06rad/s", "30arcmin", "0rad/s^0.5"};
+  constexpr std::uint64_t kSeed = 160'000'001;
+  const RunRecord filter = flown(file, cell, "invariant", kSeed);
+  const RunRecord batch = flown(file, cell, "batch", kSeed);
+  const ParameterErrors difference = errors_of(batch) - errors_of(filter);
+  EXPECT_TRUE(agrees(difference_by_parameter(difference, covariance_of(filter), covariance_of(batch))));
+  EXPECT_TRUE(agrees(difference_by_combination(difference, covariance_of(filter), covariance_of(batch))));
+  const ParameterCovariance prior = prior_covariance(file.scenario(kSeed, filter.draws));
+  for (const RunRecord& run : {filter, batch}) {
+    // About the orbit normal the alignment of neither gyro.
+    EXPECT_EQ(observable_nees(errors_of(run), covariance_of(run), prior).freedom, 18);
+    EXPECT_NEAR(nees(errors_of(run), covariance_of(run)), run.at(RunQuantity::kNees),
+                1e-6 * run.at(RunQuantity::kNees));
+    const double fixes = run.at(RunQuantity::kNisFixesOfAll);
+    const campaign::ChiSquareBounds band = campaign::chi_square_bounds(4 * fixes, 0.95);
+    EXPECT_GE(run.at(RunQuantity::kNisMeanOfAll) / 4, band.low);
+    EXPECT_LE(run.at(RunQuantity::kNisMeanOfAll) / 4, band.high);
+    EXPECT_GE(fixes, 10700);
   }
 }
 

@@ -37,7 +37,7 @@ struct Flight {
 [[nodiscard]] Flight fly(const RunSetup& setup, double limit_rad, ground::OpenLoopScope scope);
 
 /// What is measured of it, and its verdict. Without number, seed, draws and times.
-[[nodiscard]] RunRecord record_of(const Flight& flight, std::size_t gyros);
+[[nodiscard]] RunRecord record_of(const Flight& flight, const CampaignPlan& plan);
 
 /// The record of a run that has failed: without times.
 [[nodiscard]] RunRecord failed(const CampaignPlan& plan, std::uint64_t run, std::string reason);

@@ -60,6 +60,9 @@ struct Consistency {
   [[nodiscard]] int side() const;
 };
 
+/// Of a sum of χ² with so many degrees of freedom together, over `count` runs or fixes. Without `runs` and `within`.
+[[nodiscard]] Consistency consistency_of(double sum, double freedom, double count);
+
 /// The errors of one parameter.
 struct ParameterErrors {
   std::string name;  ///< "gyro1.k0"

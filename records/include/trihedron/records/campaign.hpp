@@ -59,18 +59,6 @@ struct CampaignInput {
   }
 };
 
-/// What a campaign does, apart from its base scenario and the settings of the calibration.
-struct CampaignPlan {
-  std::string name;
-  std::uint64_t seed = 0;
-  std::uint64_t runs = 0;     ///< flights × points of the grids over settings
-  std::uint64_t repeats = 1;  ///< runs at each point of a grid
-  bool latin_hypercube = false;
-  double limit_rad = 5 * kArcminute;  ///< attitude error that ends a correction interval
-  std::vector<CampaignInput> inputs;
-  std::size_t gyros = 2;  ///< of the base scenario
-};
-
 /// What a run is measured by; kRunQuantityRows has their names.
 enum class RunQuantity : std::uint8_t {
   kNees,
@@ -78,10 +66,13 @@ enum class RunQuantity : std::uint8_t {
   kNisMean,
   kNisFreedom,
   kNisFixes,
+  kNisMeanOfAll,
+  kNisFixesOfAll,
   kDriftError,
   kDriftSigma,
   kAlignmentError,
   kAlignmentSigma,
+  kCovariance,
   kAttitudeRms,
   kAttitudeNormalisedSquare,
   kNavigationError,
@@ -97,16 +88,18 @@ enum class RunQuantity : std::uint8_t {
   kExtension,
   kExtensionIsLowerBound,
 };
-inline constexpr std::size_t kRunQuantities = 23;
+inline constexpr std::size_t kRunQuantities = 26;
 
 /// How many values a quantity has in each run, and in which order.
-enum class RunShape : std::uint8_t { kOne, kAxis, kQuantile, kGyroAndAxis, kGyroAndCoefficient };
+enum class RunShape : std::uint8_t { kOne, kAxis, kQuantile, kGyroAndAxis, kGyroAndCoefficient, kTwoParameters };
 
 /// Quantiles of the errors of a run's epochs. The last is the largest error.
 inline constexpr std::array<double, 4> kErrorQuantiles = {0.5, 0.95, 0.997, 1};
 
 /// Drift coefficients of eq. (1).
 inline constexpr std::size_t kCampaignCoefficients = 7;
+/// Parameters of a gyro: these and the alignment about c x, y, z.
+inline constexpr std::size_t kCampaignParameters = kCampaignCoefficients + 3;
 
 /// A quantity, its name in files, its UDUNITS unit and what it is.
 struct RunQuantityRow {
@@ -123,12 +116,17 @@ inline constexpr std::array<RunQuantityRow, kRunQuantities> kRunQuantityRows = {
     {RunQuantity::kNisMean, "nis_mean", RunShape::kOne, "1", "mean squared innovation of a fix by its covariance"},
     {RunQuantity::kNisFreedom, "nis_degrees_of_freedom", RunShape::kOne, "1", "mean degrees of freedom of a fix"},
     {RunQuantity::kNisFixes, "nis_fixes", RunShape::kOne, "1", "fixes that nis_mean is over"},
+    {RunQuantity::kNisMeanOfAll, "nis_mean_of_all", RunShape::kOne, "1",
+     "the same over all fixes but the first: those as well that were rejected or that made the filter begin anew"},
+    {RunQuantity::kNisFixesOfAll, "nis_fixes_of_all", RunShape::kOne, "1", "fixes that nis_mean_of_all is over"},
     {RunQuantity::kDriftError, "drift_error", RunShape::kGyroAndCoefficient, "rad s-1",
      "error of the coefficients of eq. (1), estimate - truth"},
     {RunQuantity::kDriftSigma, "drift_sigma", RunShape::kGyroAndCoefficient, "rad s-1", "its 1-sigma"},
     {RunQuantity::kAlignmentError, "alignment_error", RunShape::kGyroAndAxis, "rad",
      "error of the alignment, estimate - truth, small rotation about c axes"},
     {RunQuantity::kAlignmentSigma, "alignment_sigma", RunShape::kGyroAndAxis, "rad", "its 1-sigma"},
+    {RunQuantity::kCovariance, "covariance", RunShape::kTwoParameters, "1",
+     "covariance of these errors in SI units, coefficients and then alignment of each gyro in turn"},
     {RunQuantity::kAttitudeRms, "attitude_rms", RunShape::kAxis, "rad",
      "rms error of the attitude of the calibration, about c axes: roll, pitch, heading"},
     {RunQuantity::kAttitudeNormalisedSquare, "attitude_normalised_square", RunShape::kOne, "1",
@@ -177,9 +175,29 @@ inline constexpr std::array<RunQuantityRow, kRunQuantities> kRunQuantityRows = {
       return 3 * gyros;
     case RunShape::kGyroAndCoefficient:
       return kCampaignCoefficients * gyros;
+    case RunShape::kTwoParameters:
+      return kCampaignParameters * gyros * kCampaignParameters * gyros;
   }
   return 0;
 }
+
+/// What a campaign does, apart from its base scenario and the settings of the calibration.
+struct CampaignPlan {
+  std::string name;
+  std::uint64_t seed = 0;
+  std::uint64_t runs = 0;     ///< flights × points of the grids over settings
+  std::uint64_t repeats = 1;  ///< runs at each point of a grid
+  bool latin_hypercube = false;
+  double limit_rad = 5 * kArcminute;  ///< attitude error that ends a correction interval
+  bool keeps_covariance = false;      ///< RunQuantity::kCovariance, which is larger than all others together
+  std::vector<CampaignInput> inputs;
+  std::size_t gyros = 2;  ///< of the base scenario
+
+  /// Whether its runs have this quantity.
+  [[nodiscard]] bool has(RunQuantity quantity) const {
+    return keeps_covariance || quantity != RunQuantity::kCovariance;
+  }
+};
 
 /// Whether a run came to its end, and what it thought of its result.
 enum class RunOutcome : std::uint8_t { kTrustworthy, kDoNotUse, kFailed };
