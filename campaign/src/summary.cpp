@@ -267,7 +267,8 @@ GridCell cell_of(std::vector<double> point, std::span<const RunRecord> records) 
 /// A point's runs come one after the other.
 void find_cells(const CampaignPlan& plan, std::span<const RunRecord> records, CampaignSummary& summary) {
   for (std::size_t i = 0; i < plan.inputs.size(); ++i) {
-    if (plan.inputs[i].distribution.kind == Distribution::Kind::kGrid) {
+    const Distribution& its = plan.inputs[i].distribution;
+    if (its.kind == Distribution::Kind::kGrid && its.options > 1) {
       summary.grid.push_back(i);
     }
   }

@@ -294,6 +294,9 @@ TEST(CampaignSummary, HasNoCellsOfSingleRunsOrWithoutAGrid) {
   CampaignPlan plan = grid_of_six();
   plan.repeats = 1;
   EXPECT_TRUE(summarise(plan, runs_of_grid()).cells.empty());
+  CampaignPlan of_one = grid_of_six();
+  of_one.inputs.front().distribution.options = 1;
+  EXPECT_EQ(summarise(of_one, runs_of_grid()).grid, (std::vector<std::size_t>{1}));
   EXPECT_TRUE(summarise(plan_of(12), runs_of(12)).cells.empty());
 }
 

@@ -131,7 +131,7 @@ struct CampaignSummary {
   std::vector<Influence> influences;            ///< strongest first; of all that did not fail
   std::size_t pairs = 0;                        ///< that were looked at for an influence
   std::vector<WorstRun> worst;
-  std::vector<std::size_t> grid;  ///< of CampaignPlan::inputs those that are grids
+  std::vector<std::size_t> grid;  ///< of CampaignPlan::inputs the grids of several values
   std::vector<GridCell> cells;    ///< in the order of the runs; empty without a grid, or with one run at each point
   std::vector<CampaignFinding> campaign_findings;
 
