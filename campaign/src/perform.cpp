@@ -53,48 +53,50 @@ double quantile(const std::vector<double>& sorted, double p) {
   return sorted[std::clamp<std::size_t>(rank, 1, sorted.size()) - 1];
 }
 
+/// Which of its gyro's parameters a state is, coefficients before alignment; nothing for any other state.
+std::optional<std::size_t> parameter_of(const ParameterId& state) {
+  if (state.is_alignment()) {
+    return kCampaignCoefficients + state.component;
+  }
+  for (std::size_t k = 0; k < kCampaignCoefficients; ++k) {
+    if (state == ParameterId::drift(state.gyro(), coefficients_of(kEsg7)[k])) {
+      return k;
+    }
+  }
+  return std::nullopt;
+}
+
 /// Parameters of eq. (1) and alignments, with their errors.
 void measure_parameters(const Flight& flight, const CampaignPlan& plan, RunRecord& record) {
-  const std::size_t gyros = plan.gyros;
   const Calibration& calibration = flight.run.calibration;
-  record[RunQuantity::kDriftError].assign(gyros * kCampaignCoefficients, kNone);
-  record[RunQuantity::kDriftSigma].assign(gyros * kCampaignCoefficients, kNone);
-  record[RunQuantity::kAlignmentError].assign(3 * gyros, kNone);
-  record[RunQuantity::kAlignmentSigma].assign(3 * gyros, kNone);
+  record[RunQuantity::kDriftError].assign(plan.gyros * kCampaignCoefficients, kNone);
+  record[RunQuantity::kDriftSigma].assign(plan.gyros * kCampaignCoefficients, kNone);
+  record[RunQuantity::kAlignmentError].assign(3 * plan.gyros, kNone);
+  record[RunQuantity::kAlignmentSigma].assign(3 * plan.gyros, kNone);
   std::vector<Eigen::Index> rows;
   std::vector<std::pair<std::size_t, Eigen::Index>> parameters;  // their numbers and rows
   for (std::size_t i = 0; i < calibration.states.size(); ++i) {
     const ParameterId& state = calibration.states[i];
     const auto row = static_cast<Eigen::Index>(i);
-    const auto place = [&]() -> std::optional<std::size_t> {
-      if (state.is_alignment()) {
-        return 3 * state.gyro() + state.component;
-      }
-      for (std::size_t k = 0; k < kCampaignCoefficients; ++k) {
-        if (state == ParameterId::drift(state.gyro(), coefficients_of(kEsg7)[k])) {
-          return kCampaignCoefficients * state.gyro() + k;
-        }
-      }
-      return std::nullopt;
-    }();
-    if (!place || state.gyro() >= gyros) {
+    const std::optional<std::size_t> parameter = parameter_of(state);
+    if (!parameter || state.gyro() >= plan.gyros) {
       continue;
     }
+    parameters.emplace_back(state.gyro() * kCampaignParameters + *parameter, row);
     const double error = flight.evaluation.estimate_minus_truth(row);
     const bool of_alignment = state.is_alignment();
-    parameters.emplace_back(state.gyro() * kCampaignParameters + (of_alignment ? kCampaignCoefficients : 0) + *place -
-                                state.gyro() * (of_alignment ? 3 : kCampaignCoefficients),
-                            row);
-    record[of_alignment ? RunQuantity::kAlignmentError : RunQuantity::kDriftError][*place] = error;
-    record[of_alignment ? RunQuantity::kAlignmentSigma : RunQuantity::kDriftSigma][*place] =
+    const std::size_t place =
+        of_alignment ? 3 * state.gyro() + state.component : kCampaignCoefficients * state.gyro() + *parameter;
+    record[of_alignment ? RunQuantity::kAlignmentError : RunQuantity::kDriftError][place] = error;
+    record[of_alignment ? RunQuantity::kAlignmentSigma : RunQuantity::kDriftSigma][place] =
         std::sqrt(calibration.covariance(row, row));
     if (std::isfinite(error)) {
       rows.push_back(row);
     }
   }
   if (plan.keeps_covariance) {
+    const std::size_t size = plan.gyros * kCampaignParameters;
     std::vector<double>& kept = record[RunQuantity::kCovariance];
-    const std::size_t size = kCampaignParameters * gyros;
     kept.assign(size * size, kNone);
     for (const auto& [a, row] : parameters) {
       for (const auto& [b, column] : parameters) {

@@ -131,15 +131,14 @@ std::string cells_text(const CampaignPlan& plan, const CampaignSummary& summary)
     }
   }
   std::string text = fmt::format(
-      "\nBy the grid: means over the trustworthy runs, ↑ ↓ where they are outside of what 95 % of consistent "
-      "estimators "
-      "have; errors that {0:g} % of the runs do not exceed, extensions that {0:g} % reach\n",
+      "\nBy the grid: means over the trustworthy runs, ↑ ↓ outside of what 95 % of consistent estimators have; errors "
+      "that {0:g} % of the runs do not exceed, extensions that {0:g} % reach\n",
       100 * campaign::kCellQuantile);
   for (const std::vector<std::string>& row : rows) {
     for (std::size_t i = 0; i < row.size(); ++i) {
       text += "  " + right(row[i], widths[i]);
     }
-    text += "\n";
+    text += '\n';
   }
   return text + (summary.cells.size() > kShownCells ? fmt::format("  … and {} more, in report.html and with --json\n",
                                                                   summary.cells.size() - kShownCells)
