@@ -74,8 +74,7 @@ TEST(CampaignReport, HasARowForEachPointOfAGrid) {
       html,
       HasSubstr(
           R"(<td>paper</td><td>400 of 400</td><td>30.0 <span class="flag">outside</span></td><td>19.4 … 20.6</td>)"));
-  EXPECT_THAT(html,
-              testing::ContainsRegex(R"(<td>invariant</td><td>400 of 400</td><td>(19|20)\.[0-9]</td>)"));
+  EXPECT_THAT(html, testing::ContainsRegex(R"(<td>invariant</td><td>400 of 400</td><td>(19|20)\.[0-9]</td>)"));
   EXPECT_THAT(html, HasSubstr("0.5 times gyro.readout.noise"));
 }
 
