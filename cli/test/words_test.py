@@ -251,6 +251,8 @@ readout_bias = "on"
 coefficient_change = "off"
 wandering_drift = "3e-09rad/s"
 wandering_time = "47min"
+change_course = "warm-up"
+change_time = "83min"
 [corrections]
 interval = "continuous"
 """

@@ -24,6 +24,7 @@ using Eigen::VectorXd;
 /// Coefficients of eq. (1) and the alignment of one gyro.
 constexpr Index kOfGyro = Layout::kEq1 + 3;
 constexpr int kOfAberration = 9;
+constexpr int kOfReadout = 6;
 
 /// A stretch of the pass as a sum of squares, a form zᵀ Q z of the states that move at its beginning and at its end, of
 /// constants, of shapes of errors of the fixes, and of 1. What moves at the beginning counts as constant in it.
@@ -125,11 +126,12 @@ Matrix3d cross(const Vector3d& v) {
 }
 
 /// Shapes of errors of a fix, columns beside its rows: aberration by a velocity that is constant, and by two at orbital
-/// period, over the speed of light, in axes; relative errors of scale of the direction cosines, gyro by gyro. Each
-/// moves the directions as a small rotation of the cases would, an alignment.
+/// period, over the speed of light, in axes; gyro by gyro what the scales of the direction cosines are off 1, and the
+/// angles between their axes off right angles. Each moves the directions as a small rotation of the cases would, an
+/// alignment.
 MatrixXd shapes_of(const CalibrationSetup& setup, const PassProblem::Moment& moment, const Layout& layout,
                    const MatrixXd& rows) {
-  MatrixXd shapes = MatrixXd::Zero(rows.rows(), kOfAberration + 3L * layout.gyros);
+  MatrixXd shapes = MatrixXd::Zero(rows.rows(), kOfAberration + Index{kOfReadout} * layout.gyros);
   const Matrix3d C_c_in = moment.fix->fix.q_in_c.normalized().toRotationMatrix().transpose();
   const Matrix3d aberrated = cross(Vector3d::UnitZ()) * C_c_in;
   const double phase = setup.orbital_rate_rad_s * to_seconds(moment.t - setup.orbital_phase_zero);
@@ -143,8 +145,12 @@ MatrixXd shapes_of(const CalibrationSetup& setup, const PassProblem::Moment& mom
     }
     const Matrix3d& C_c_b = moment.gyros[k].C_c_b;
     const Vector3d& h_b = moment.fix->h_b[k];
-    const Matrix3d by_scale = cross(-(C_c_b * h_b)) * C_c_b * h_b.asDiagonal();
-    shapes.middleCols<3>(kOfAberration + 3L * k) = by_alignment.lazyProduct(by_scale);
+    Eigen::Matrix<double, 3, kOfReadout> read;  // what a reading is off by
+    read << h_b.x(), 0, 0, h_b.y(), 0, h_b.z(),  //
+        0, h_b.y(), 0, h_b.x(), h_b.z(), 0,      //
+        0, 0, h_b.z(), 0, h_b.y(), h_b.x();
+    const Eigen::Matrix<double, 3, kOfReadout> by_readout = cross(-(C_c_b * h_b)) * C_c_b * read;
+    shapes.middleCols<kOfReadout>(kOfAberration + Index{kOfReadout} * k) = by_alignment.lazyProduct(by_readout);
   }
   return shapes;
 }
@@ -162,7 +168,7 @@ class Constancy {
     const auto count = static_cast<Index>(begins_.size()) - 1;
     const Index d = layout_.dynamic();
     const Index n = layout_.size();
-    const Index shapes = kOfAberration + 3L * layout_.gyros;
+    const Index shapes = kOfAberration + Index{kOfReadout} * layout_.gyros;
     std::vector<Index> parameters;
     std::vector<Index> others;
     for (Index c = d; c < n; ++c) {
@@ -265,7 +271,7 @@ class Constancy {
     return step * of_stretch() + kOfGyro * layout_.gyros + 2L * gyro;
   }
   [[nodiscard]] Index aberration() const { return at_shapes_; }
-  [[nodiscard]] Index scale(int gyro) const { return at_shapes_ + kOfAberration + 3L * gyro; }
+  [[nodiscard]] Index readout(int gyro) const { return at_shapes_ + kOfAberration + Index{kOfReadout} * gyro; }
   [[nodiscard]] Index size() const { return form_.rows() - 1; }
   /// Middle of a stretch, of the pass from 0 to 1.
   [[nodiscard]] double part(Index stretch) const {
@@ -450,7 +456,7 @@ std::vector<Change> changes_over(const Trial& trial) {
   velocity.head<3>().setConstant(kAnnual);
   consider(what(Moving::kAberration, Motion::kPresent, -1), shape(pass.aberration(), kOfAberration), velocity);
   for (int k = 0; k < layout.gyros; ++k) {
-    consider(what(Moving::kReadoutScale, Motion::kPresent, k), shape(pass.scale(k), 3), sigmas(3, kScale));
+    consider(what(Moving::kReadoutScale, Motion::kPresent, k), shape(pass.readout(k), kOfReadout), sigmas(kOfReadout, kScale));
   }
   for (const double part : {0.01, 0.03, 0.1, 0.3, 1.0}) {
     Entries entries;

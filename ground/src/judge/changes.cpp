@@ -48,7 +48,7 @@ std::string described(const Change& change) {
     case Moving::kAberration:
       return "aberration of starlight in the fixes";
     case Moving::kReadoutScale:
-      return fmt::format("errors of scale of the direction cosines of {}", of_gyro(change));
+      return fmt::format("errors of scale, or of right angles, of the direction cosines of {}", of_gyro(change));
   }
   return {};
 }
@@ -90,8 +90,8 @@ std::string_view cure_of(const Change& change) {
     case Moving::kAberration:
       return "Correct aberration in the star tracker, or in its fixes before they come here.";
     case Moving::kReadoutScale:
-      return "Correct the scales of the direction cosines; check that each reading is a unit vector before it is "
-             "scaled.";
+      return "Correct the scales of the direction cosines and the angles between their axes; check that each reading "
+             "is a unit vector before it is scaled.";
   }
   return {};
 }

@@ -258,7 +258,8 @@ void judge_whiteness(const Pass& pass, const CalibrationRun& run, std::vector<Fi
   }
 }
 
-void judge_halves(const Statistics& statistics, std::vector<Finding>& findings) {
+void judge_halves(const CalibrationRun& run, std::vector<Finding>& findings) {
+  const Statistics& statistics = run.calibration.statistics;
   const double square = statistics.halves_chi_square.value_or(0);
   const int freedom = statistics.halves_degrees_of_freedom.value_or(0);
   if (!is_chance(square, freedom)) {
@@ -267,9 +268,12 @@ void judge_halves(const Statistics& statistics, std::vector<Finding>& findings) 
         fmt::format("chi-square {:.0f} of {} degrees of freedom", square, freedom),
         "Let the coefficients change (coefficient_change = \"on\" in [further_states]), give more process noise, or "
         "calibrate a shorter pass.");
-    // Of coefficients that are found to change it is no other evidence: what that makes of them is in their sigmas.
-    const bool is_told = std::ranges::any_of(findings, [](const Finding& finding) {
-      return finding.code == FindingCode::kCoefficientsNotConstant && finding.severity != Severity::kDoNotUse;
+    // Of coefficients that are found to change it is no other evidence: what that makes of them is in their sigmas, or
+    // their course is followed, of which half a pass may not show much.
+    const bool is_followed = run.options.further_states.change_course != CourseOfChange::Kind::kEven;
+    const bool is_told = std::ranges::any_of(findings, [&](const Finding& finding) {
+      return (finding.code == FindingCode::kCoefficientsNotConstant && finding.severity != Severity::kDoNotUse) ||
+             (finding.code == FindingCode::kCoefficientsChanged && is_followed);
     });
     if (is_told) {
       findings.back().severity = Severity::kWarning;
@@ -398,6 +402,32 @@ void judge_determination(const CalibrationRun& run, std::vector<Finding>& findin
     add(findings, FindingCode::kNotDetermined,
         "The data do not determine " + names + "; value and sigma are about those of the prior.",
         "posterior sigma above half of the prior sigma", "Calibrate on a longer pass, with slews.");
+  }
+}
+
+/// An earlier calibration is judged elsewhere; parameters that a prior holds too tightly pull others away with them.
+void judge_prior_sigmas(const Pass& pass, const CalibrationRun& run, std::vector<Finding>& findings) {
+  constexpr double kSigmas = 5;
+  if (pass.settings.prior) {
+    return;
+  }
+  std::string names;
+  for (std::size_t i = 0; i < run.calibration.states.size(); ++i) {
+    const ParameterId& state = run.calibration.states[i];
+    if (!state.is_alignment() && !(state.is_drift() && state.coefficient.is_in_eq1())) {
+      continue;
+    }
+    const double off = value_of(run.calibration, state) - value_of(run.known_before, state);
+    const double sigmas = std::abs(off) / std::sqrt(run.known_before.covariance.diagonal()(static_cast<Eigen::Index>(i)));
+    if (sigmas > kSigmas) {
+      names += fmt::format("{}{} by {:.0f}", names.empty() ? "" : ", ", name_of(state), sigmas);
+    }
+  }
+  if (!names.empty()) {
+    add(findings, FindingCode::kPriorContradicted,
+        "Parameters are found outside what the settings say of them before the pass: they are held too tightly, and "
+        "others are off with them.",
+        "in prior sigmas: " + names, "Give larger prior sigmas in pass.toml, and check their units.");
   }
 }
 
@@ -653,10 +683,11 @@ Verdict judge(const Pass& pass, const CalibrationRun& run) {
   judge_drift_model(run, findings);
   judge_change(run, findings);
   judge_changes(run, findings);
-  judge_halves(statistics, findings);
+  judge_halves(run, findings);
   judge_clocks(pass, run, findings);
   judge_star_tracker_errors(run, findings);
   judge_determination(run, findings);
+  judge_prior_sigmas(pass, run, findings);
   judge_steadiness(pass, run, findings);
   judge_pair(run, findings);
   judge_star_tracker(statistics, findings);

@@ -190,6 +190,20 @@ TEST(Verdict, LeavesHalvesThatDisagreeToCoefficientsThatChange) {
   }
 }
 
+TEST(Verdict, LeavesHalvesThatDisagreeToACourseThatIsFollowed) {
+  for (const auto course : {CourseOfChange::Kind::kEven, CourseOfChange::Kind::kWarmUp, CourseOfChange::Kind::kJump}) {
+    auto run = good_run();
+    run.options.further_states.change_course = course;
+    run.calibration.further.push_back(
+        {ParameterId::further(FurtherState::kCoefficientChange, 0, Esg7::kMu12), 1e-6, 1e-9});
+    run.calibration.statistics.halves_degrees_of_freedom = 18;
+    run.calibration.statistics.halves_chi_square = 60;
+    const Verdict verdict = judge(good_pass(), run);
+    EXPECT_THAT(codes(verdict), ElementsAre("coefficients-changed", "halves-disagree"));
+    EXPECT_EQ(verdict.trustworthy, course != CourseOfChange::Kind::kEven);
+  }
+}
+
 TEST(Verdict, FindsADriftModelThatIsTooSmallOrTooLarge) {
   auto run = good_run();
   run.drift_models = {{kEsg7, 0, 1e-4}, {vsh(1), 5, 2e-5}, {vsh(2), -8, 3e-5}};
@@ -284,6 +298,19 @@ TEST(Verdict, NamesTheParametersThatTheDataDoNotDetermine) {
   EXPECT_THAT(codes(verdict), ElementsAre("not-determined"));
   EXPECT_NE(verdict.findings[0].text.find("gyro1.align_x"), std::string::npos);
   EXPECT_EQ(verdict.findings[0].text.find("gyro1.k0"), std::string::npos);
+}
+
+TEST(Verdict, FindsAPriorThatIsContradicted) {
+  auto run = good_run();
+  run.known_before.gyros = run.calibration.gyros;
+  EXPECT_THAT(codes(judge(good_pass(), run)), IsEmpty());
+  run.known_before.gyros[0].drift_rad_s[0] -= 5.1 * 2e-6;
+  const Verdict verdict = judge(good_pass(), run);
+  EXPECT_THAT(codes(verdict), ElementsAre("prior-contradicted"));
+  EXPECT_NE(verdict.findings[0].evidence.find("gyro1.k0 by 5"), std::string::npos);
+  EXPECT_FALSE(verdict.trustworthy);
+  run.known_before.gyros[0].drift_rad_s[0] += 0.2 * 2e-6;
+  EXPECT_THAT(codes(judge(good_pass(), run)), IsEmpty());
 }
 
 TEST(Verdict, FindsSteadyFlightAndNamesItsAxis) {

@@ -85,7 +85,7 @@ enum class Moving : std::uint8_t {
   kInertialAxes,  ///< what the star tracker takes for `in`: all momenta alike
   kCoefficients,  ///< drift coefficients of eq. (1), of a gyro or of all
   kAberration,    ///< fixes are off as starlight is by the motion of the spacecraft
-  kReadoutScale,  ///< the scales of a gyro's direction cosines are off
+  kReadoutScale,  ///< the scales of a gyro's direction cosines are off, or the right angles of their axes
 };
 
 /// How it does.
