@@ -241,8 +241,7 @@ TEST(LongStep, MissesTheDriftTimesTheTurnThatMayHaveBeen) {
 TEST(CourseOfChange, IsTheWholeOverItsTime) {
   const Time begin{from_seconds(1000)};
   const auto at = [&](double s) { return begin + from_seconds(s); };
-  for (const auto kind :
-       {CourseOfChange::Kind::kEven, CourseOfChange::Kind::kWarmUp, CourseOfChange::Kind::kJump}) {
+  for (const auto kind : {CourseOfChange::Kind::kEven, CourseOfChange::Kind::kWarmUp, CourseOfChange::Kind::kJump}) {
     CourseOfChange course{.kind = kind, .begin = begin, .duration_s = 3000, .time_s = 700, .zero_at = begin};
     EXPECT_EQ(course.part(begin), 0);
     EXPECT_NEAR(course.part(at(3000)), 1, 1e-14);

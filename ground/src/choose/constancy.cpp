@@ -145,7 +145,7 @@ MatrixXd shapes_of(const CalibrationSetup& setup, const PassProblem::Moment& mom
     }
     const Matrix3d& C_c_b = moment.gyros[k].C_c_b;
     const Vector3d& h_b = moment.fix->h_b[k];
-    Eigen::Matrix<double, 3, kOfReadout> read;  // what a reading is off by
+    Eigen::Matrix<double, 3, kOfReadout> read;   // what a reading is off by
     read << h_b.x(), 0, 0, h_b.y(), 0, h_b.z(),  //
         0, h_b.y(), 0, h_b.x(), h_b.z(), 0,      //
         0, 0, h_b.z(), 0, h_b.y(), h_b.x();
@@ -456,7 +456,8 @@ std::vector<Change> changes_over(const Trial& trial) {
   velocity.head<3>().setConstant(kAnnual);
   consider(what(Moving::kAberration, Motion::kPresent, -1), shape(pass.aberration(), kOfAberration), velocity);
   for (int k = 0; k < layout.gyros; ++k) {
-    consider(what(Moving::kReadoutScale, Motion::kPresent, k), shape(pass.readout(k), kOfReadout), sigmas(kOfReadout, kScale));
+    consider(what(Moving::kReadoutScale, Motion::kPresent, k), shape(pass.readout(k), kOfReadout),
+             sigmas(kOfReadout, kScale));
   }
   for (const double part : {0.01, 0.03, 0.1, 0.3, 1.0}) {
     Entries entries;

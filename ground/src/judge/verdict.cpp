@@ -418,7 +418,8 @@ void judge_prior_sigmas(const Pass& pass, const CalibrationRun& run, std::vector
       continue;
     }
     const double off = value_of(run.calibration, state) - value_of(run.known_before, state);
-    const double sigmas = std::abs(off) / std::sqrt(run.known_before.covariance.diagonal()(static_cast<Eigen::Index>(i)));
+    const double sigmas =
+        std::abs(off) / std::sqrt(run.known_before.covariance.diagonal()(static_cast<Eigen::Index>(i)));
     if (sigmas > kSigmas) {
       names += fmt::format("{}{} by {:.0f}", names.empty() ? "" : ", ", name_of(state), sigmas);
     }
