@@ -5,6 +5,7 @@
 #include <chrono>
 #include <cmath>
 #include <iterator>
+#include <utility>
 
 #include "trihedron/core/directions_fit.hpp"
 #include "trihedron/core/optimal_attitude.hpp"
@@ -24,6 +25,14 @@ constexpr std::array<Duration, 3> kReaches = {std::chrono::milliseconds(3000), s
 constexpr Duration kMisfitReach = std::chrono::minutes(1);
 /// Of the mean; by chance it is beyond in one of a hundred places.
 constexpr double kMisfitSigmas = 2.5;
+/// … and readings at the fixes, some hundreds of them.
+constexpr Duration kReadingsReach = std::chrono::minutes(5);
+
+/// Which of the times are within `reach` of t: the first, and the one after the last.
+std::pair<std::size_t, std::size_t> within(const std::vector<Time>& times, Time t, Duration reach) {
+  return {static_cast<std::size_t>(std::ranges::lower_bound(times, t - reach) - times.begin()),
+          static_cast<std::size_t>(std::ranges::upper_bound(times, t + reach) - times.begin())};
+}
 
 Vector3d with_misfit(const Vector3d& sigma_rad, const Vector3d& square_rad2) {
   return (sigma_rad.cwiseAbs2() + square_rad2).cwiseSqrt();
@@ -42,17 +51,25 @@ void LocalMisfit::add(Time t, const Vector3d& off_rad, const Vector3d& sigma_rad
   weighted_.emplace_back(weighted_.back() + weight.cwiseProduct(off_rad));
 }
 
+void LocalMisfit::add_readings(Time t, const Vector3d& square_rad2, const Vector3d& sigma_rad2) {
+  readings_t_.push_back(t);
+  squares_.emplace_back(squares_.back() + square_rad2);
+  variances_.emplace_back(variances_.back() + sigma_rad2.cwiseAbs2());
+}
+
 Vector3d LocalMisfit::square_rad2(Time t) const {
-  const auto first = std::ranges::lower_bound(t_, t - kMisfitReach) - t_.begin();
-  const auto end = std::ranges::upper_bound(t_, t + kMisfitReach) - t_.begin();
-  if (first >= end) {
-    return Vector3d::Zero();
+  Vector3d found = Vector3d::Zero();
+  if (const auto [from, to] = within(t_, t, kMisfitReach); from < to) {
+    const Eigen::Array3d variance = (weights_[to] - weights_[from]).cwiseInverse();
+    const Eigen::Array3d square = (variance * (weighted_[to] - weighted_[from]).array()).square();
+    found += (square > kMisfitSigmas * kMisfitSigmas * variance).select(square - variance, 0.0).matrix();
   }
-  const auto from = static_cast<std::size_t>(first);
-  const auto to = static_cast<std::size_t>(end);
-  const Eigen::Array3d variance = (weights_[to] - weights_[from]).cwiseInverse();
-  const Eigen::Array3d square = (variance * (weighted_[to] - weighted_[from]).array()).square();
-  return (square > kMisfitSigmas * kMisfitSigmas * variance).select(square - variance, 0.0).matrix();
+  if (const auto [from, to] = within(readings_t_, t, kReadingsReach); from < to) {
+    const Eigen::Array3d sum = squares_[to] - squares_[from];
+    const Eigen::Array3d by_chance = (variances_[to] - variances_[from]).cwiseSqrt();
+    found += (sum > kMisfitSigmas * by_chance).select(sum / static_cast<double>(to - from), 0.0).matrix();
+  }
+  return found;
 }
 
 SmoothReadings::At SmoothReadings::at(Time t, const At& otherwise) const {
@@ -62,6 +79,23 @@ SmoothReadings::At SmoothReadings::at(Time t, const At& otherwise) const {
     }
   }
   return otherwise;
+}
+
+// Of two fits of which one is by a part of the samples of the other, the difference has the difference of the
+// variances.
+std::optional<SmoothReadings::Misfit> SmoothReadings::misfit(Time t, const At& at) const {
+  const std::optional<At> shortest = fit(t, at.used, kReaches.back());
+  if (!shortest || shortest->noise_factor <= at.noise_factor) {
+    return std::nullopt;
+  }
+  Misfit misfit;
+  for (int k = 0; k < gyros_; ++k) {
+    const double noise_rad = setup_.readout_noise_rad[k];
+    misfit.sigma_rad2[k] =
+        noise_rad * noise_rad * (shortest->noise_factor * shortest->noise_factor - at.noise_factor * at.noise_factor);
+    misfit.square_rad2[k] = (at.h_b[k] - shortest->h_b[k]).squaredNorm() / 2 - misfit.sigma_rad2[k];
+  }
+  return misfit;
 }
 
 std::optional<SmoothReadings::At> SmoothReadings::fit(Time t, const GyroMask& used, Duration reach) const {
@@ -104,11 +138,15 @@ std::optional<SmoothedAttitude::Rows> SmoothedAttitude::rows_at(const PassProble
   if (!attitude) {
     return std::nullopt;
   }
-  Rows rows{attitude.value().C_in_c, problem_.attitude_by_states(moment, attitude.value(), reading.h_b),
-            Vector3d::Zero()};
+  Rows rows{attitude.value().C_in_c,
+            problem_.attitude_by_states(moment, attitude.value(), reading.h_b),
+            Vector3d::Zero(),
+            reading,
+            {}};
   for (int k = 0; k < problem_.layout().gyros; ++k) {
     const double noise_rad = problem_.setup().on_board.readout_noise_rad[k] * reading.noise_factor;
-    rows.readout_variance_rad2 += noise_rad * noise_rad * attitude.value().by_direction(k).rowwise().squaredNorm();
+    rows.by_reading[k] = attitude.value().by_direction(k).rowwise().squaredNorm();
+    rows.readout_variance_rad2 += noise_rad * noise_rad * rows.by_reading[k];
   }
   return rows;
 }
@@ -158,6 +196,15 @@ SmoothedCourse SmoothedAttitude::course() const {
     std::optional<Rows> rows = rows_at(moment, {moment.fix->h_b, moment.fix->used, moment.fix->noise_factor});
     if (!rows) {
       return;
+    }
+    if (const auto misfit = readings_.misfit(moment.t, rows->reading)) {
+      Vector3d square_rad2 = Vector3d::Zero();
+      Vector3d sigma_rad2 = Vector3d::Zero();
+      for (int k = 0; k < gyros; ++k) {
+        square_rad2 += misfit->square_rad2[k] * rows->by_reading[k];
+        sigma_rad2 += misfit->sigma_rad2[k] * rows->by_reading[k];
+      }
+      course.misfit.add_readings(moment.t, square_rad2, sigma_rad2);
     }
     if (moment.arc != arc) {
       take_sigmas();

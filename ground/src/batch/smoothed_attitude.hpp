@@ -23,6 +23,13 @@ class SmoothReadings {
   };
   /// Returns `otherwise` where no polynomial fits; only the gyros that it uses are fitted.
   [[nodiscard]] At at(Time t, const At& otherwise) const;
+  /// Square of what the polynomial of at() is off one over the shortest time, less what noise makes of that: per gyro
+  /// and component, rad²; and its 1-sigma by chance. Nothing where it is that one.
+  struct Misfit {
+    PerGyro<double> square_rad2{};
+    PerGyro<double> sigma_rad2{};
+  };
+  [[nodiscard]] std::optional<Misfit> misfit(Time t, const At& at) const;
 
  private:
   [[nodiscard]] std::optional<At> fit(Time t, const GyroMask& used, Duration reach) const;
@@ -32,15 +39,19 @@ class SmoothReadings {
   const CalibrationSetup& setup_;
 };
 
-/// By how much fixes of about two minutes together are off the smoothed attitude beyond what their noise explains:
-/// where drift changes faster than the process that stands for it, as in a slew, the covariance does not say so.
+/// By how much the smoothed attitude is off beyond what its covariance says. Fixes of about two minutes together tell
+/// of drift that changes faster than the process that stands for it, as in a slew; shorter polynomials through the
+/// readings, those of ten minutes together, of a body that moves otherwise than the longer ones.
 class LocalMisfit {
  public:
   /// Of the next fix: the rotation from the smoothed attitude to it, and its 1-sigma, rad, c axes. Outliers are left
   /// out.
   void add(Time t, const Eigen::Vector3d& off_rad, const Eigen::Vector3d& sigma_rad);
-  /// Square of the error of the smoothed attitude about c x, y, z that the fixes up to a minute from t show, rad²; 0
-  /// where their mean is within 2.5 of its sigmas.
+  /// Of the readings next: the square of the error of the attitude about c x, y, z that they show, which may be
+  /// negative, and its 1-sigma by chance, rad².
+  void add_readings(Time t, const Eigen::Vector3d& square_rad2, const Eigen::Vector3d& sigma_rad2);
+  /// Square of the error of the smoothed attitude about c x, y, z that the fixes up to a minute and the readings up to
+  /// five minutes from t show, rad²; 0 for either where their mean is within 2.5 of its sigmas.
   [[nodiscard]] Eigen::Vector3d square_rad2(Time t) const;
 
  private:
@@ -48,6 +59,10 @@ class LocalMisfit {
   // Of the fixes before each, and of all at the end.
   std::vector<Eigen::Vector3d> weights_{Eigen::Vector3d::Zero()};  ///< 1/rad²
   std::vector<Eigen::Vector3d> weighted_{Eigen::Vector3d::Zero()};
+  std::vector<Time> readings_t_;
+  // Of the readings before each, and of all at the end.
+  std::vector<Eigen::Vector3d> squares_{Eigen::Vector3d::Zero()};    ///< rad²
+  std::vector<Eigen::Vector3d> variances_{Eigen::Vector3d::Zero()};  ///< rad⁴
 };
 
 /// What the smoothed pass shows at the fixes.
@@ -84,6 +99,8 @@ class SmoothedAttitude {
     Rot<In, C> C_in_c;
     Eigen::MatrixXd by_states;              ///< its error, c axes, by the states of the arc
     Eigen::Vector3d readout_variance_rad2;  ///< of the noise of the readings
+    SmoothReadings::At reading;
+    PerGyro<Eigen::Vector3d> by_reading;  ///< squares of what an error of a reading, per component, makes of it
   };
   [[nodiscard]] std::optional<Rows> rows_at(const PassProblem::Moment& moment,
                                             const SmoothReadings::At& otherwise) const;

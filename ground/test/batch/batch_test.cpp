@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <random>
 
 #include "batch/pass_problem.hpp"
 #include "batch/pass_setup.hpp"
@@ -281,6 +282,23 @@ TEST(Batch, FindsThatCoefficientsChange) {
     const double kappa = *simulated.truth.gyros[i / 7].drift(DriftCoefficient::of_eq1(static_cast<int>(i % 7)));
     EXPECT_NEAR(estimate.value, change * kappa, 4 * estimate.sigma + 3e-9) << name_of(estimate.parameter);
   }
+}
+
+TEST(LocalMisfit, TellsWhereLongPolynomialsAreOffShorterOnes) {
+  constexpr double kByChance_rad2 = 1e-12;
+  LocalMisfit misfit;
+  std::mt19937 random(3);
+  std::normal_distribution<double> normal;
+  for (int i = 0; i < 1200; ++i) {  // an hour, in whose last half there is something about y
+    const double by_chance = kByChance_rad2 * (std::pow(normal(random), 2) + std::pow(normal(random), 2) - 2) / 2;
+    misfit.add_readings(Time(from_seconds(3 * i)), {by_chance, by_chance + (i < 600 ? 0 : 4e-13), by_chance},
+                        Eigen::Vector3d::Constant(kByChance_rad2));
+  }
+  EXPECT_EQ(misfit.square_rad2(Time(from_seconds(900))), Eigen::Vector3d::Zero());
+  const Eigen::Vector3d late = misfit.square_rad2(Time(from_seconds(2700)));
+  EXPECT_NEAR(late.y(), 4e-13, 2e-13);
+  EXPECT_EQ(late.x(), 0);
+  EXPECT_EQ(misfit.square_rad2(Time(from_seconds(1e5))), Eigen::Vector3d::Zero());  // nothing is near
 }
 
 TEST(LocalMisfit, TellsWhereFixesAreOffTheAttitudeAlike) {

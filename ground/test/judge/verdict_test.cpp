@@ -302,6 +302,7 @@ TEST(Verdict, NamesTheParametersThatTheDataDoNotDetermine) {
 
 TEST(Verdict, FindsAPriorThatIsContradicted) {
   auto run = good_run();
+  run.calibration.gyros[0].drift_rad_s.assign(Layout::kEq1, 1e-6);
   run.known_before.gyros = run.calibration.gyros;
   EXPECT_THAT(codes(judge(good_pass(), run)), IsEmpty());
   run.known_before.gyros[0].drift_rad_s[0] -= 5.1 * 2e-6;
