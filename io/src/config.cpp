@@ -280,7 +280,7 @@ std::string format_config(const CalibrationOptions& options) {
     }
   }
   out.word(kWanderingTime, format_duration(states.wandering_time));
-  out.word(kChangeCourse, std::string(name_of(states.change_course)));
+  out.word(kChangeCourse, name_of(states.change_course));
   out.word(kChangeTime, format_duration(states.change_time));
 
   out.section("corrections");
