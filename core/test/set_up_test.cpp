@@ -126,16 +126,17 @@ const Described kDescribed[] = {
 };
 
 TEST(SetUp, RefusesAWarmUpWithoutATime) {
+  const auto fault_of = [](CourseOfChange::Kind kind, double time_s) {
+    return fault_after([&](FullGiven& given) {
+      given.setup.change.kind = kind;
+      given.setup.change.time_s = time_s;
+    });
+  };
   for (const double bad : {0.0, -1.0, kNotANumber, kInfinite}) {
-    const auto of = [&](CourseOfChange::Kind kind) {
-      return fault_after([&](FullGiven& given) {
-        given.setup.change.kind = kind;
-        given.setup.change.time_s = bad;
-      });
-    };
-    EXPECT_EQ(of(CourseOfChange::Kind::kWarmUp), SetupFault::kPriorNotPositiveDefinite) << bad;
-    EXPECT_EQ(of(CourseOfChange::Kind::kEven), std::nullopt) << bad;
+    EXPECT_EQ(fault_of(CourseOfChange::Kind::kWarmUp, bad), SetupFault::kPriorNotPositiveDefinite) << bad;
+    EXPECT_EQ(fault_of(CourseOfChange::Kind::kEven, bad), std::nullopt) << bad;
   }
+  EXPECT_EQ(fault_of(CourseOfChange::Kind::kWarmUp, 3600), std::nullopt);
 }
 
 TEST(SetUp, RefusesFurtherStatesThatNothingIsKnownOf) {

@@ -441,6 +441,9 @@ double most_likely_time_s(const Pass& pass, const Screened& screened, Calibratio
   std::optional<Trial> last;
   const auto fit = [&](double at_s) {
     use_course(course.kind, at_s, options);
+    if (last) {
+      last->release();
+    }
     Trial trial(pass, screened, options, {}, last ? &*last : nullptr);
     last.emplace(std::move(trial));
   };
@@ -489,11 +492,11 @@ Decision decide_with_course(const Pass& pass, const Screened& screened, const Ca
   use_course(course->kind, most_likely_time_s(pass, screened, decision.options, *course), with);
   Decision changing = decide_by_pass(pass, screened, with, largest_model);
   const double gain = changing.log_likelihood - decision.log_likelihood;
-  const Evidence evidence{FurtherState::kCoefficientChange, gain, gain > kLogOddsToAccept};
-  Decision& better = evidence.accepted ? changing : decision;
-  std::erase_if(better.evidence, [](const Evidence& its) { return its.state == FurtherState::kCoefficientChange; });
-  better.evidence.push_back(evidence);
-  return std::move(better);
+  if (gain <= kLogOddsToAccept) {
+    return decision;
+  }
+  changing.evidence.push_back({FurtherState::kCoefficientChange, gain, true});
+  return changing;
 }
 
 /// The largest drift model that is tried at first.
