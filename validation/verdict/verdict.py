@@ -86,6 +86,15 @@ class Truth:
             self.attitude = {t: product(q, moved.tracker) if t > PASS_S * 1000 else q for t, q in self.attitude.items()}
 
 
+def sigma_of(matrix, at):
+    """0 where the covariance has no number, so that no error is within it."""
+    return math.sqrt(matrix[at][at] or 0)
+
+
+def worst_in_sigmas(errors):
+    return max(abs(error) / sigma if sigma > 0 else math.inf for error, sigma in errors)
+
+
 def alignment_errors(truth, calibration):
     """Of each axis of each gyro: (error, sigma), rad."""
     matrix, states = calibration["covariance"]["matrix"], calibration["covariance"]["states"]
@@ -94,7 +103,7 @@ def alignment_errors(truth, calibration):
         off = logarithm(product(true, inverse(exponential(gyro["alignment_rotation_vector_rad"]))))
         for axis, error in zip("xyz", off):
             at = states.index(f"gyro{number}.align_{axis}")
-            errors.append((error, math.sqrt(matrix[at][at])))
+            errors.append((error, sigma_of(matrix, at)))
     return errors
 
 
@@ -108,7 +117,7 @@ def drift_errors(truth, calibration):
     for number, (true, gyro) in enumerate(zip(truth.gyros, calibration["gyros"]), 1):
         for name, value in zip(EQ1, true["drift_rad_s"]):
             at = states.index(f"gyro{number}.{name}")
-            errors.append((value - gyro["drift_rad_s"][name], math.sqrt(matrix[at][at])))
+            errors.append((value - gyro["drift_rad_s"][name], sigma_of(matrix, at)))
     return errors
 
 
@@ -120,6 +129,8 @@ def nees_of(errors, calibration):
     at = [states.index(f"gyro{number}.{name}") for number in numbers for name in EQ1]
     at += [states.index(f"gyro{number}.align_{axis}") for number in numbers for axis in "xyz"]
     sigmas = [sigma for _, sigma in errors]
+    if not all(sigmas):
+        return None
     rows, white = [], []
     for i, (error, sigma) in enumerate(errors):
         row = []
@@ -165,7 +176,7 @@ def judged(program, directory, truth, estimator):
     wrong = []
 
     alignment = alignment_errors(truth, calibration)
-    alignment_sigmas = max(abs(error) / sigma for error, sigma in alignment)
+    alignment_sigmas = worst_in_sigmas(alignment)
     if not alignment_sigmas <= LIMIT_SIGMAS:
         wrong.append("alignment")
 
@@ -190,7 +201,7 @@ def judged(program, directory, truth, estimator):
     return {"status": status, "findings": sorted(findings), "do_not_use": sorted(code for code, severity in findings.items() if severity == "do-not-use"),
             "wrong": wrong, "alignment_sigmas": rounded(alignment_sigmas),
             "alignment_arcsec": rounded(max(abs(error) for error, _ in alignment) / ARCSECOND),
-            "drift_sigmas": rounded(max(abs(error) / sigma for error, sigma in drift)), "nees": rounded(nees_of(drift + alignment, calibration)),
+            "drift_sigmas": rounded(worst_in_sigmas(drift)), "nees": rounded(nees_of(drift + alignment, calibration)),
             "nees_states": len(drift + alignment), "rows_beyond": rounded(beyond), "attitude_arcsec": rounded(worst_rad / ARCSECOND),
             "forecast_sigmas": rounded(forecast_sigmas), "forecast_arcsec": rounded(forecast_rad / ARCSECOND),
             "predicted_arcsec": rounded(predicted_rad(calibration) / ARCSECOND), "predicted_causes": predicted_causes(calibration),
@@ -456,7 +467,7 @@ def per_world(outcomes):
             refused = sum(o["status"] == 3 for o in its)
             why = sorted({code for o in its for code in o.get("do_not_use", [])})
             what = sorted({reason for o in its if is_trusted(o) for reason in o["wrong"]})
-            off = [o for o in its if o.get("drift_sigmas", 0) > LIMIT_SIGMAS]
+            off = [o for o in its if (sigmas := o.get("drift_sigmas", 0)) is None or sigmas > LIMIT_SIGMAS]
             told = sum(not is_trusted(o) or "drift-not-explained" in o["findings"] for o in off)
             rows.append([world.name, estimator, *(str(count) if count else "·" for count in (*counts, refused)),
                          f"{len(off)}, {told}" if off else "·", ", ".join(what), ", ".join(why)])

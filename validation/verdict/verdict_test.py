@@ -113,6 +113,15 @@ def test_errors_of_alignment_are_in_their_sigmas(truth, tmp_path):
     assert all(error == 0 for error, _ in verdict.drift_errors(truth, calibration(tmp_path, truth)))
 
 
+def test_a_covariance_without_numbers_covers_no_error(truth, tmp_path):
+    found = calibration(tmp_path, truth)
+    at = found["covariance"]["states"].index("gyro1.align_x")
+    found["covariance"]["matrix"][at][at] = None
+    errors = verdict.alignment_errors(truth, found)
+    assert verdict.worst_in_sigmas(errors) == verdict.worst_in_sigmas(errors[::-1]) == math.inf
+    assert verdict.nees_of(verdict.drift_errors(truth, found) + errors, found) is None
+
+
 def test_nees_takes_the_correlations_into_account(truth, tmp_path):
     found = calibration(tmp_path, truth, off=5e-6)
     errors = verdict.drift_errors(truth, found) + verdict.alignment_errors(truth, found)

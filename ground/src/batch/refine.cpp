@@ -235,6 +235,11 @@ void Refinement::put_into(CalibrationRun& run) && {
   const Layout& layout = problem_.setup().on_board.layout;
   Calibration& calibration = run.calibration;
   const KappaAndDelta parameters = kappa_and_delta(problem_, result_, field_ ? field_->more_covariance : MatrixXd());
+  // Rounding has taken what little the fixes say, where they contradict each other beyond any noise.
+  if (!parameters.covariance.allFinite()) {
+    throw SetupError("the fixes and samples that can be used do not determine the parameters",
+                     "look at the telemetry with `trihedron inspect`: axes, units, the order of quaternions");
+  }
   if (field_) {
     calibration.drift_field = field_->levels;
   }
