@@ -19,7 +19,7 @@ bool is_usable(const StarTrackerSetup& its) {
 }
 
 bool is_usable(const CourseOfChange& change) {
-  return positive(change.duration_s) && (change.kind != CourseOfChange::Kind::kWarmUp || positive(change.time_s));
+  return positive(change.duration_s) && (change.kind == CourseOfChange::Kind::kEven || positive(change.time_s));
 }
 
 bool noise_is_usable(const CalibrationSetup& setup) {

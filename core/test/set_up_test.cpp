@@ -125,7 +125,7 @@ const Described kDescribed[] = {
     {&FurtherStates::orbital_error, sigma_of<FurtherState::kOrbitalError>},
 };
 
-TEST(SetUp, RefusesAWarmUpWithoutATime) {
+TEST(SetUp, RefusesACourseWithoutATime) {
   const auto fault_of = [](CourseOfChange::Kind kind, double time_s) {
     return fault_after([&](FullGiven& given) {
       given.setup.change.kind = kind;
@@ -134,6 +134,7 @@ TEST(SetUp, RefusesAWarmUpWithoutATime) {
   };
   for (const double bad : {0.0, -1.0, kNotANumber, kInfinite}) {
     EXPECT_EQ(fault_of(CourseOfChange::Kind::kWarmUp, bad), SetupFault::kPriorNotPositiveDefinite) << bad;
+    EXPECT_EQ(fault_of(CourseOfChange::Kind::kJump, bad), SetupFault::kPriorNotPositiveDefinite) << bad;
     EXPECT_EQ(fault_of(CourseOfChange::Kind::kEven, bad), std::nullopt) << bad;
   }
   EXPECT_EQ(fault_of(CourseOfChange::Kind::kWarmUp, 3600), std::nullopt);

@@ -38,13 +38,12 @@ constexpr std::array<std::pair<std::string_view, CourseOfChange::Kind>, 3> kCour
      {"warm-up", CourseOfChange::Kind::kWarmUp},
      {"jump", CourseOfChange::Kind::kJump}}};
 
-std::string_view name_of(CourseOfChange::Kind course) {
-  return std::ranges::find(kCourses, course, &std::pair<std::string_view, CourseOfChange::Kind>::second)->first;
+template <class T, std::size_t N>
+std::string_view word_of(const std::array<std::pair<std::string_view, T>, N>& words, T value) {
+  return std::ranges::find(words, value, &std::pair<std::string_view, T>::second)->first;
 }
 
-std::string_view name_of(Choice choice) {
-  return std::ranges::find(kChoices, choice, &std::pair<std::string_view, Choice>::second)->first;
-}
+std::string_view name_of(Choice choice) { return word_of(kChoices, choice); }
 
 Field estimator(CalibrationOptions& options) {
   return {"estimator", "how the calibration is made", estimator_schema,
@@ -280,7 +279,7 @@ std::string format_config(const CalibrationOptions& options) {
     }
   }
   out.word(kWanderingTime, format_duration(states.wandering_time));
-  out.word(kChangeCourse, name_of(states.change_course));
+  out.word(kChangeCourse, word_of(kCourses, states.change_course));
   out.word(kChangeTime, format_duration(states.change_time));
 
   out.section("corrections");
