@@ -4,12 +4,11 @@
 
 #include <algorithm>
 #include <array>
+#include <boost/math/tools/minima.hpp>
 #include <cmath>
-#include <functional>
+#include <cstdint>
 #include <future>
-#include <iterator>
 #include <limits>
-#include <map>
 #include <numbers>
 #include <optional>
 #include <utility>
@@ -383,55 +382,13 @@ void use_course(CourseOfChange::Kind kind, double time_s, CalibrationOptions& op
   options.further_states.change_time = from_seconds(time_s);
 }
 
-/// The largest of a function of one peak, among what was tried of it.
-class Peak {
- public:
-  Peak(std::function<double(double)> of, double least, double middle, double most) : of_(std::move(of)) {
-    for (const double x : {least, middle, most}) {
-      tried_[x] = of_(x);
-    }
-  }
-
-  /// Tries once more: at the vertex of the parabola through the largest and its neighbours, or half-way to the farther
-  /// neighbour where that is too near what was tried.
-  void narrow(double too_near) {
-    const auto [a, x, b] = around();
-    const double left = (tried_[x] - tried_[a]) / (x - a);
-    const double right = (tried_[b] - tried_[x]) / (b - x);
-    double next = ((a + x) * right - (x + b) * left) / (2 * (right - left));
-    if (!(next > a + too_near && next < b - too_near && std::abs(next - x) > too_near)) {
-      next = (x + (x - a > b - x ? a : b)) / 2;
-    }
-    tried_[next] = of_(next);
-  }
-  [[nodiscard]] double at() const {
-    return std::ranges::max_element(tried_, {}, [](const auto& one) { return one.second; })->first;
-  }
-  /// Between the neighbours of the largest.
-  [[nodiscard]] double width() const {
-    const auto [a, x, b] = around();
-    return b - a;
-  }
-
- private:
-  /// The largest between its neighbours; of the outermost the one inside.
-  [[nodiscard]] std::array<double, 3> around() const {
-    auto middle = tried_.find(at());
-    middle = middle == tried_.begin() ? std::next(middle) : middle;
-    middle = std::next(middle) == tried_.end() ? std::prev(middle) : middle;
-    return {std::prev(middle)->first, middle->first, std::next(middle)->first};
-  }
-
-  std::function<double(double)> of_;
-  std::map<double, double> tried_;
-};
-
 /// The time of a course that makes the pass most likely with these options but for the noise: what was found without
 /// the course stands for a part of it, and goes as the time is told better. A random walk is enough for that.
 double most_likely_time_s(const Pass& pass, const Screened& screened, CalibrationOptions options,
                           const FoundCourse& course) {
   constexpr int kMostRounds = 6;
-  constexpr int kMostTries = 6;
+  constexpr std::uintmax_t kMostTries = 9;
+  constexpr int kBits = 10;  // of the part of the range
   const double near_enough_s = 0.001 * (course.most_s - course.least_s);
   double least_s = course.least_s;
   double time_s = course.time_s;
@@ -454,17 +411,18 @@ double most_likely_time_s(const Pass& pass, const Screened& screened, Calibratio
   fit(time_s);
   find_noise();
   for (int round = 0; round < kMostRounds; ++round) {
-    Peak peak(
-        [&](double at_s) {
-          fit(at_s);
-          return last->log_likelihood(last->found().linear, last->problem().setup().noise());
-        },
-        least_s, time_s, most_s);
-    for (int i = 0; i < kMostTries && peak.width() > 2 * near_enough_s; ++i) {
-      peak.narrow(near_enough_s);
-    }
-    const double moved_s = std::abs(peak.at() - time_s);
-    time_s = peak.at();
+    std::uintmax_t tries = kMostTries;
+    const double found_s =
+        least_s +
+        (most_s - least_s) * boost::math::tools::brent_find_minima(
+                                 [&](double part) {
+                                   fit(least_s + part * (most_s - least_s));
+                                   return -last->log_likelihood(last->found().linear, last->problem().setup().noise());
+                                 },
+                                 0.0, 1.0, kBits, tries)
+                                 .first;
+    const double moved_s = std::abs(found_s - time_s);
+    time_s = found_s;
     fit(time_s);
     if (round > 0 && moved_s < near_enough_s) {
       break;
@@ -473,7 +431,6 @@ double most_likely_time_s(const Pass& pass, const Screened& screened, Calibratio
     const double reach_s = (course.most_s - course.least_s) / (4 << round);
     least_s = std::max(course.least_s, time_s - reach_s);
     most_s = std::min(course.most_s, time_s + reach_s);
-    time_s = std::clamp(time_s, least_s + reach_s / 8, most_s - reach_s / 8);
   }
   return time_s;
 }
