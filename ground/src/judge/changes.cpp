@@ -14,7 +14,7 @@
 namespace trihedron::ground {
 namespace {
 
-/// ln of the odds over the likeliest up to which other explanations are named beside it.
+/// An explanation is named beside the likeliest where its ln of the odds is less by no more than this.
 constexpr double kCannotBeTold = 5;
 /// The error is up to so many times what a change is found to make, because the noise found and the drift model have
 /// followed a part of it.
