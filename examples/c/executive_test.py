@@ -2,6 +2,7 @@
 
 Run by CTest: python3 -m pytest executive_test.py, with TRIHEDRON_BUILD naming the build directory.
 """
+import contextlib
 import os
 import pathlib
 import re
@@ -14,6 +15,7 @@ import pytest
 
 EXECUTIVE = pathlib.Path(os.environ["TRIHEDRON_BUILD"]) / "executive"
 HEADER = (pathlib.Path(__file__).resolve().parents[2] / "core" / "include" / "trihedron_tables.h").read_text()
+TIMEOUT_S = 60
 FORMATS = {"int64_t": "q", "double": "d", "uint32_t": "I", "uint8_t": "B"}
 
 
@@ -48,7 +50,7 @@ class Ground:
     def bound():
         its = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         its.bind(("127.0.0.1", 0))
-        its.settimeout(20)
+        its.settimeout(TIMEOUT_S)
         return its
 
     def start(self, *arguments):
@@ -64,13 +66,21 @@ class Ground:
             if condition(record):
                 return record
 
+    def forget(self):
+        """Drops records of a process that has ended: the next one is of a process that listens for commands."""
+        self.telemetry.setblocking(False)
+        with contextlib.suppress(BlockingIOError):
+            while True:
+                self.record()
+        self.telemetry.settimeout(TIMEOUT_S)
+
     def command(self, command, argument=0):
         self.commands.sendto(struct.pack("=2I", command, argument), ("127.0.0.1", self.command_port))
         return struct.unpack("=I", self.commands.recv(4))[0]
 
     def end(self, process):
         cycles = self.command(0xFFFFFFFF)
-        output, _ = process.communicate(timeout=20)
+        output, _ = process.communicate(timeout=TIMEOUT_S)
         assert process.returncode == 0
         return cycles, output
 
@@ -106,6 +116,7 @@ def test_killed_it_goes_on_from_its_snapshots(ground, tmp_path):
     before = ground.record_when(lambda its: its["fixes_used"] >= 30)
     process.send_signal(signal.SIGKILL)
     process.communicate()
+    ground.forget()
     process = ground.start(*snapshots)
     after = ground.record_when(lambda its: its["fixes_used"] >= 40)
     _, output = ground.end(process)
@@ -115,4 +126,4 @@ def test_killed_it_goes_on_from_its_snapshots(ground, tmp_path):
 
 @pytest.mark.parametrize("arguments", [["--speed", "0"], ["--speed", "fast"], ["--port"], ["--command", "70000"], ["--duration"]])
 def test_wrong_options_are_refused(arguments):
-    assert subprocess.run([EXECUTIVE, *arguments], capture_output=True, timeout=20).returncode == 2
+    assert subprocess.run([EXECUTIVE, *arguments], capture_output=True, timeout=TIMEOUT_S).returncode == 2
