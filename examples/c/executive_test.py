@@ -45,6 +45,7 @@ class Ground:
         self.commands = self.bound()
         with self.bound() as free:
             self.command_port = free.getsockname()[1]
+        self.processes = []
 
     @staticmethod
     def bound():
@@ -54,8 +55,10 @@ class Ground:
         return its
 
     def start(self, *arguments):
-        return subprocess.Popen([EXECUTIVE, "--speed", "100", "--telemetry", str(self.telemetry.getsockname()[1]), "--command",
-                                 str(self.command_port), *arguments], stdout=subprocess.PIPE, text=True)
+        process = subprocess.Popen([EXECUTIVE, "--speed", "100", "--telemetry", str(self.telemetry.getsockname()[1]), "--command",
+                                    str(self.command_port), *arguments], stdout=subprocess.PIPE, text=True)
+        self.processes.append(process)
+        return process
 
     def record(self):
         return housekeeping(self.telemetry.recv(4096))
@@ -89,6 +92,10 @@ class Ground:
 def ground():
     its = Ground()
     yield its
+    for process in its.processes:  # where a test has failed, it still flies
+        process.kill()
+        process.wait()
+        process.stdout.close()
     its.telemetry.close()
     its.commands.close()
 
