@@ -144,6 +144,21 @@ def tracker_moves(rotation_vector_of):
     return edit
 
 
+def tracker_wanders(sigma_rad, time_s):
+    """A fix is C_in_c exp([e×]), each component of e a Gauss–Markov process."""
+    def edit(telemetry, random):
+        def moved(rows):
+            e, last_s = [random.gauss(0, sigma_rad) for _ in range(3)], rows[0][0]
+            for row in rows:
+                kept = math.exp(-(row[0] - last_s) / time_s)
+                e = [kept * x + random.gauss(0, sigma_rad * math.sqrt(1 - kept * kept)) for x in e]
+                last_s = row[0]
+                row[1:5] = product(tuple(row[1:5]), exponential(tuple(e)))
+            return rows
+        telemetry.rewrite("star_tracker.csv", moved)
+    return edit
+
+
 def unit(random):
     v = [random.gauss(0, 1) for _ in range(3)]
     size = math.sqrt(sum(x * x for x in v))
@@ -267,6 +282,7 @@ WORLDS = [
     World("frozen-tracker-1h", "faults", constant(SLEWS), frozen(3600)),
     World("tracker-slip-20", "faults", constant(SLEWS), tracker_moves(lambda t, axis: scaled(axis, 20 * ARCSECOND if t > PASS_S / 2 else 0)), faults=("star-tracker-moved",)),
     World("tracker-ramp-60", "faults", constant(SLEWS), tracker_moves(lambda t, axis: scaled(axis, 60 * ARCSECOND * t / PASS_S)), faults=("star-tracker-moved",)),
+    World("tracker-wanders-5", "faults", constant(SLEWS), tracker_wanders(5 * ARCSECOND, 600), faults=("star-tracker-wanders",)),
     World("gyro-case-step-20", "faults", constant(SLEWS), case_steps(20 * ARCSECOND), faults=("gyro-mounting-moved",)),
     World("gyro-case-step-60", "faults", constant(SLEWS), case_steps(60 * ARCSECOND), faults=("gyro-mounting-moved",)),
     World("gyro-spikes", "faults", constant(SLEWS), spikes(0.01, math.radians(1))),

@@ -9,7 +9,9 @@
 #include <string>
 #include <vector>
 
+#include "judge/wander_by_angle.hpp"
 #include "model/orbital_rate.hpp"
+#include "trihedron/records/text.hpp"
 
 namespace trihedron::ground {
 namespace {
@@ -40,6 +42,26 @@ std::vector<OfGyro> by_gyro(const std::vector<FixRecord>& fixes) {
     }
   }
   return all;
+}
+
+/// Process noise that was found and is more than gyros have; empty where there is none.
+std::string noise_that_stands_for_drift(const CalibrationRun& run) {
+  // Over an orbit a random walk as large moves a momentum by 0.5 arcseconds, as the sigmas of a calibration are.
+  constexpr double kUsualWalk_rad_sqrt_s = 3e-8;
+  if (!run.options.find_noise) {
+    return {};
+  }
+  if (std::ranges::any_of(run.evidence, [](const Evidence& its) {
+        return its.state == FurtherState::kWanderingDrift && its.accepted;
+      })) {
+    const FurtherStateOptions& states = run.options.further_states;
+    return fmt::format("drift of {:.1e} rad/s, 1-sigma, that wanders in {:.0f} min was needed beside the model",
+                       states.wandering_drift_rad_s, to_seconds(states.wandering_time) / 60);
+  }
+  const double walk = run.options.direction_random_walk_rad_sqrt_s;
+  return walk > kUsualWalk_rad_sqrt_s
+             ? fmt::format("a random walk of the momenta of {:.1e} rad/s^0.5 was needed beside the model", walk)
+             : std::string();
 }
 
 }  // namespace
@@ -92,8 +114,8 @@ void judge_drift_left(const Pass& pass, const CalibrationRun& run, std::vector<F
   // Periods down to a tenth of an orbit: drift of low degree makes no shorter ones.
   constexpr double kMultiples = 10;
   constexpr double kUsualOrbit_s = 5400;
-  // Over an orbit a random walk as large moves a momentum by 0.5 arcseconds, as the sigmas of a calibration are.
-  constexpr double kUsualWalk_rad_sqrt_s = 3e-8;
+  // Of a star tracker whose errors wander, a few in a million passes without them.
+  constexpr double kLogOdds = 10;
 
   const bool told = std::ranges::any_of(findings, [](const Finding& finding) {
     return finding.code == FindingCode::kInnovationsNotWhite || finding.code == FindingCode::kOrbitalLine;
@@ -108,19 +130,20 @@ void judge_drift_left(const Pass& pass, const CalibrationRun& run, std::vector<F
         "below 1e{:.0f}",
         line->gyro + 1, line->period_s / 60, line->amplitude, std::ceil(line->log_chance / std::numbers::ln10));
   }
-  if (run.options.find_noise) {
-    const bool wanders = std::ranges::any_of(
-        run.evidence, [](const Evidence& its) { return its.state == FurtherState::kWanderingDrift && its.accepted; });
-    const double walk = run.options.direction_random_walk_rad_sqrt_s;
-    const std::string separator = evidence.empty() ? "" : "; ";
-    if (wanders) {
-      const FurtherStateOptions& states = run.options.further_states;
-      evidence +=
-          fmt::format("{}drift of {:.1e} rad/s, 1-sigma, that wanders in {:.0f} min was needed beside the model",
-                      separator, states.wandering_drift_rad_s, to_seconds(states.wandering_time) / 60);
-    } else if (walk > kUsualWalk_rad_sqrt_s) {
-      evidence += fmt::format("{}a random walk of the momenta of {:.1e} rad/s^0.5 was needed beside the model",
-                              separator, walk);
+  if (const std::string noise = noise_that_stands_for_drift(run); !noise.empty()) {
+    const auto by_angle = wander_by_angle(pass.gyro, run.calibration);
+    if (by_angle && by_angle->log_odds > kLogOdds) {
+      findings.push_back(
+          {FindingCode::kStarTrackerWanders,
+           "The star tracker has errors that come and go slowly, and the calibration takes them for "
+           "drift: the angle between the momenta, which the gyros read without it, stands still. Attitude "
+           "and alignment follow these errors, and their sigmas are wrong.",
+           fmt::format("{}; it would move the angle by {}, root mean square, which moves by {}", noise,
+                       angle_text(by_angle->expected_rad), angle_text(by_angle->seen_rad)),
+           "Look for what the star tracker's errors follow: the place of the stars in its field, heads "
+           "that take turns, heat, its clock; correct them before its fixes come here."});
+    } else {
+      evidence += (evidence.empty() ? "" : "; ") + noise;
     }
   }
   if (!evidence.empty()) {

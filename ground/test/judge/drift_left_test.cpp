@@ -6,6 +6,8 @@
 #include <numbers>
 #include <random>
 
+#include "passes.hpp"
+
 namespace trihedron::ground {
 namespace {
 
@@ -107,6 +109,20 @@ TEST(DriftNotExplained, IsSaidOfNoiseThatStandsForDrift) {
   run.evidence = {{FurtherState::kWanderingDrift, 50, true}};
   ASSERT_EQ(found(run).size(), 1U);
   EXPECT_THAT(found(run)[0].evidence, HasSubstr("drift of 2.0e-07 rad/s"));
+}
+
+TEST(DriftNotExplained, IsSaidOfTheStarTrackerWhereTheMomentaKeepTheirAngle) {
+  const sim::SimulatedPass& quiet = two_hours();
+  CalibrationRun run = run_of({});
+  run.evidence = {{FurtherState::kWanderingDrift, 50, true}};
+  run.calibration.gyros = ground::true_gyros(quiet.truth, 0);
+  run.calibration.noise = CalibrationNoise{.wandering_drift_rad_s = 2e-7, .wandering_time_s = 600};
+  std::vector<Finding> findings;
+  judge_drift_left(quiet.pass, run, findings);
+  ASSERT_EQ(findings.size(), 1U);
+  EXPECT_EQ(findings[0].code, FindingCode::kStarTrackerWanders);
+  EXPECT_EQ(findings[0].severity, FindingSeverity::kDoNotUse);
+  EXPECT_THAT(findings[0].evidence, HasSubstr("that wanders in"));
 }
 
 }  // namespace

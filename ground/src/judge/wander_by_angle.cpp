@@ -1,0 +1,232 @@
+#include "judge/wander_by_angle.hpp"
+
+#include <Eigen/Eigenvalues>
+#include <Eigen/QR>
+#include <algorithm>
+#include <array>
+#include <boost/math/tools/minima.hpp>
+#include <cmath>
+#include <iterator>
+#include <limits>
+#include <vector>
+
+#include "trihedron/core/drift.hpp"
+#include "trihedron/core/frames.hpp"
+#include "trihedron/core/gyro_readout.hpp"
+#include "trihedron/core/telemetry.hpp"
+
+namespace trihedron::ground {
+namespace {
+
+constexpr double kStep_s = 1;  ///< over which drift is integrated, at least
+/// Of the blocks over which medians of the angle are taken, the shortest; and how many there may be.
+constexpr double kBlock_s = 60;
+constexpr double kMostBlocks = 600;
+constexpr Eigen::Index kFewestLeft = 30;  ///< blocks more than what is fitted
+/// Fitted whatever the drift model of the calibration: eq. (1) and all else of the first two degrees.
+constexpr DriftModelId kFitted = kEsg20;
+constexpr int kFittedCoefficients = 2 * kFitted.size();
+constexpr int kConstants = kFittedCoefficients + 6;
+
+/// Medians and means over a block of time.
+struct Block {
+  Eigen::Index number = 0;  ///< of all blocks of the pass, of which some have no samples
+  int stretch = 0;          ///< of samples without a gap as long as a block
+  double angle_rad = 0;
+  Eigen::RowVectorXd by_constants;                     ///< derivative of the angle by κ and δ of both gyros
+  Eigen::Vector3d normal_c = Eigen::Vector3d::Zero();  ///< of the plane of the momenta
+};
+
+/// The angle along the pass, θ, with dθ/dt = (ω2 − ω1) · n, n = h1 × h2 / sin θ.
+class Angle {
+ public:
+  Angle(const GyroTelemetry& telemetry, const Calibration& calibration) {
+    for (std::size_t k = 0; k < 2; ++k) {
+      const GyroCalibration& record = calibration.gyros[k];
+      readouts_[k].C_c_b = Rot<C, B<1>>::exp(Vec<C>::assume(record.alignment_rotation_vector_rad)).raw();
+      readouts_[k].readout_bias = record.readout_bias;
+    }
+    block_s_ = std::max(kBlock_s, to_seconds(telemetry.t.back() - telemetry.t.front()) / kMostBlocks);
+    for (std::size_t i = 0; i < telemetry.size(); ++i) {
+      const double t_s = to_seconds(telemetry.t[i] - telemetry.t.front());
+      const Eigen::Vector3d first = telemetry.direction(i, 0);
+      const Eigen::Vector3d second = telemetry.direction(i, 1);
+      if (nearly_unit(first.norm()) && nearly_unit(second.norm())) {
+        add(t_s, {first.normalized(), second.normalized()});
+      }
+    }
+    close_block();
+  }
+
+  [[nodiscard]] const std::vector<Block>& blocks() const { return blocks_; }
+  [[nodiscard]] double block_s() const { return block_s_; }
+
+ private:
+  void add(double t_s, const std::array<Eigen::Vector3d, 2>& h_b) {
+    const Eigen::Vector3d h_c[2] = {readouts_[0].in_c(h_b[0]), readouts_[1].in_c(h_b[1])};
+    const Eigen::Vector3d across = h_c[0].cross(h_c[1]);
+    if (rate_.size() == 0 || t_s - t_s_ >= kStep_s) {
+      step(t_s, h_b, across.normalized());
+    }
+    angles_.push_back(std::atan2(across.norm(), h_c[0].dot(h_c[1])));
+  }
+
+  void step(double t_s, const std::array<Eigen::Vector3d, 2>& h_b, const Eigen::Vector3d& normal_c) {
+    Eigen::RowVectorXd rate(kFittedCoefficients);
+    for (std::size_t k = 0; k < 2; ++k) {
+      Columns<kFitted.size()> columns;
+      drift_.basis(readouts_[k].corrected(h_b[k]), 0, columns.view(kFitted.size()));
+      rate.segment<kFitted.size()>(static_cast<Eigen::Index>(k) * kFitted.size()) =
+          (k == 0 ? -normal_c : normal_c).transpose() * readouts_[k].C_c_b * columns.first(kFitted.size());
+    }
+    const auto number = static_cast<Eigen::Index>(t_s / block_s_);
+    if (rate_.size() == 0) {
+      integral_.setZero(kFittedCoefficients);
+    } else {
+      integral_ += (t_s - t_s_) / 2 * (rate_ + rate);
+      if (number != current_.number) {
+        close_block();
+      }
+      current_.stretch += t_s - t_s_ > block_s_ ? 1 : 0;
+    }
+    t_s_ = t_s;
+    rate_ = rate;
+
+    if (angles_.empty()) {
+      steps_ = 0;
+      current_.number = number;
+      current_.by_constants.setZero(kConstants);
+      current_.normal_c.setZero();
+    }
+    Eigen::RowVectorXd by_constants(kConstants);
+    by_constants << integral_, -normal_c.transpose(), normal_c.transpose();
+    current_.by_constants += by_constants;
+    current_.normal_c += normal_c;
+    ++steps_;
+  }
+
+  void close_block() {
+    constexpr std::size_t kFewSamples = 10;
+    if (angles_.size() >= kFewSamples) {
+      blocks_.push_back(current_);
+      Block& block = blocks_.back();
+      const auto middle = angles_.begin() + static_cast<std::ptrdiff_t>(angles_.size() / 2);
+      std::ranges::nth_element(angles_, middle);
+      block.angle_rad = *middle;
+      block.by_constants /= steps_;
+      block.normal_c.normalize();
+    }
+    angles_.clear();
+  }
+
+  double block_s_ = kBlock_s;
+  std::array<GyroReadout, 2> readouts_;
+  DriftModel drift_{kFitted, {}};
+  std::vector<Block> blocks_;
+  Block current_;
+  std::vector<double> angles_;  ///< of the block that is being filled, at all its samples
+  int steps_ = 0;               ///< in it
+  double t_s_ = 0;
+  Eigen::RowVectorXd rate_, integral_;  ///< of the angle by κ, at t_s_; rad/s and rad per rad/s
+};
+
+/// What is fitted: κ, δ, and a constant for each stretch of samples. Columns of unit length.
+Eigen::MatrixXd fitted_columns(const std::vector<Block>& blocks) {
+  const auto n = static_cast<Eigen::Index>(blocks.size());
+  Eigen::MatrixXd columns = Eigen::MatrixXd::Zero(n, kConstants + blocks.back().stretch + 1);
+  for (Eigen::Index i = 0; i < n; ++i) {
+    const Block& block = blocks[static_cast<std::size_t>(i)];
+    columns.row(i).head<kConstants>() = block.by_constants;
+    columns(i, kConstants + block.stretch) = 1;
+  }
+  return columns.array().rowwise() / columns.colwise().norm().array().max(std::numeric_limits<double>::min());
+}
+
+/// Covariance of the angle at the blocks by the drift that wanders and the random walk of both momenta, from zero on.
+Eigen::MatrixXd covariance_of_angle(const std::vector<Block>& blocks, double block_s, const CalibrationNoise& noise) {
+  const Eigen::Index all = blocks.back().number + 1;
+  Eigen::Matrix3Xd normal(3, all);
+  for (Eigen::Index number = 0; const Block& block : blocks) {
+    for (; number <= block.number; ++number) {
+      normal.col(number) = block.normal_c;
+    }
+  }
+  const double walk = noise.direction_random_walk_rad_sqrt_s;
+  Eigen::MatrixXd of_rate(all, all);
+  for (Eigen::Index i = 0; i < all; ++i) {
+    for (Eigen::Index j = 0; j < all; ++j) {
+      const double apart_s = block_s * static_cast<double>(i > j ? i - j : j - i);
+      const double kept = noise.wandering_time_s > 0 ? std::exp(-apart_s / noise.wandering_time_s) : 0;
+      of_rate(i, j) =
+          2 * std::pow(noise.wandering_drift_rad_s, 2) * kept * normal.col(i).dot(normal.col(j)) +  // of two gyros
+          (i == j ? 2 * walk * walk / block_s : 0);
+    }
+  }
+  const auto integrate_columns = [block_s](Eigen::MatrixXd& rates) {
+    Eigen::RowVectorXd sum = Eigen::RowVectorXd::Zero(rates.cols());
+    for (Eigen::Index i = 0; i < rates.rows(); ++i) {
+      const Eigen::RowVectorXd half = block_s / 2 * rates.row(i);
+      rates.row(i) = sum + half;
+      sum += 2 * half;
+    }
+  };
+  integrate_columns(of_rate);
+  of_rate.transposeInPlace();
+  integrate_columns(of_rate);
+  std::vector<Eigen::Index> rows;
+  std::ranges::transform(blocks, std::back_inserter(rows), &Block::number);
+  return of_rate(rows, rows);
+}
+
+}  // namespace
+
+std::optional<WanderByAngle> wander_by_angle(const GyroTelemetry& telemetry, const Calibration& calibration) {
+  if (calibration.gyros.size() < 2 || telemetry.size() == 0 || !calibration.noise) {
+    return std::nullopt;
+  }
+  const Angle angle(telemetry, calibration);
+  const std::vector<Block>& blocks = angle.blocks();
+  const auto n = static_cast<Eigen::Index>(blocks.size());
+  if (n == 0 || n < kConstants + blocks.back().stretch + 1 + kFewestLeft) {
+    return std::nullopt;
+  }
+  // What no values of the constants can make, along the axes of its covariance by the noise of the calibration.
+  const Eigen::ColPivHouseholderQR<Eigen::MatrixXd> fit(fitted_columns(blocks));
+  const Eigen::MatrixXd left = Eigen::MatrixXd(fit.householderQ()).rightCols(n - fit.rank());
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> axes(
+      left.transpose() * covariance_of_angle(blocks, angle.block_s(), *calibration.noise) * left);
+  const Eigen::ArrayXd variances = axes.eigenvalues().array().max(0);
+  Eigen::VectorXd seen(n);
+  std::ranges::transform(blocks, seen.begin(), &Block::angle_rad);
+  seen = left.transpose() * (seen.array() - seen.mean()).matrix();
+  const Eigen::ArrayXd squares = (axes.eigenvectors().transpose() * seen).array().square();
+
+  // ln of the likelihood with the best white noise of the readings.
+  const double readout = std::log(squares.mean() + std::numeric_limits<double>::min());
+  const auto likelihood = [&](double part) {
+    const auto cost = [&](double log_variance) {
+      const Eigen::ArrayXd variance = part * variances + std::exp(log_variance);
+      return (variance.log() + squares / variance).sum() / 2;
+    };
+    constexpr double kDown = 14;  // a thousandth of the angle's scatter
+    return -boost::math::tools::brent_find_minima(cost, readout - kDown, readout + 1, 16).second;
+  };
+  constexpr double kLeast = 1.0 / 4096;
+  constexpr double kMost = 64;
+  WanderByAngle result{0, 0, std::sqrt(squares.mean()), std::sqrt(variances.mean())};
+  double quiet = likelihood(0);
+  double best = quiet;
+  double moving = likelihood(WanderByAngle::kQuiet);
+  for (double part = kLeast; part <= kMost; part *= 2) {
+    const double its = likelihood(part);
+    (part <= WanderByAngle::kQuiet ? quiet : moving) = std::max(part <= WanderByAngle::kQuiet ? quiet : moving, its);
+    if (its > best) {
+      best = its;
+      result.part = part;
+    }
+  }
+  result.log_odds = quiet - moving;
+  return result;
+}
+
+}  // namespace trihedron::ground
