@@ -1,6 +1,7 @@
 #include "judge/drift_left.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <cmath>
@@ -22,6 +23,7 @@ constexpr std::size_t kComponents = 2;  ///< of an innovation per gyro
 struct OfGyro {
   std::vector<double> t_s;
   std::vector<double> z[kComponents];
+  double sigmas_rad[kComponents] = {};  ///< their sum
 };
 
 std::vector<OfGyro> by_gyro(const std::vector<FixRecord>& fixes) {
@@ -38,6 +40,8 @@ std::vector<OfGyro> by_gyro(const std::vector<FixRecord>& fixes) {
         all[k].t_s.push_back(to_seconds(fix.t - fixes.front().t));
         all[k].z[0].push_back(y[0] / sigma[0]);
         all[k].z[1].push_back(y[1] / sigma[1]);
+        all[k].sigmas_rad[0] += sigma[0];
+        all[k].sigmas_rad[1] += sigma[1];
       }
     }
   }
@@ -91,13 +95,15 @@ std::optional<SlowLine> strongest_slow_line(const std::vector<FixRecord>& fixes,
         sum[0] += its.z[0][i] * turn[i];
         sum[1] += its.z[1][i] * turn[i];
       }
-      for (const std::complex<double>& of_component : sum) {
+      for (std::size_t component = 0; component < kComponents; ++component) {
         ++tried;
         // Exponentially distributed, of mean 1, where the innovations are white.
-        const double power = std::norm(of_component) / static_cast<double>(n);
+        const double power = std::norm(sum[component]) / static_cast<double>(n);
         if (power > most) {
           most = power;
-          strongest = {static_cast<int>(k), span_s / line, 2 * std::abs(of_component) / static_cast<double>(n), 0};
+          const double amplitude = 2 * std::abs(sum[component]) / static_cast<double>(n);
+          strongest = {static_cast<int>(k), span_s / line, amplitude,
+                       amplitude * its.sigmas_rad[component] / static_cast<double>(n), 0};
         }
       }
     }
@@ -122,36 +128,49 @@ void judge_drift_left(const Pass& pass, const CalibrationRun& run, std::vector<F
   });
   const double rate_rad_s = std::abs(orbital_rate_rad_s(pass.star_tracker));
   const double orbit_s = rate_rad_s > 0 ? 2 * std::numbers::pi / rate_rad_s : kUsualOrbit_s;
-  std::string evidence;
-  if (const auto line = strongest_slow_line(run.fixes, orbit_s / kMultiples);
-      line && line->log_chance < limit && !told) {
-    evidence = fmt::format(
-        "the innovations of gyro {} have a line of {:.0f} min, amplitude {:.2f} sigma; the chance of one as strong is "
-        "below 1e{:.0f}",
-        line->gyro + 1, line->period_s / 60, line->amplitude, std::ceil(line->log_chance / std::numbers::ln10));
+  std::vector<std::string> drift;
+  std::vector<std::string> star_tracker;
+  const std::optional<SlowLine> line = strongest_slow_line(run.fixes, orbit_s / kMultiples);
+  const bool is_line = line && line->log_chance < limit && !told;
+  const std::string noise = noise_that_stands_for_drift(run);
+  const auto by_angle =
+      is_line || !noise.empty() ? wander_by_angle(pass.gyro, run.calibration) : std::optional<WanderByAngle>();
+  if (is_line) {
+    // What esg20 can make of a line, a calibration has fitted: what is left would move the angle, of any two
+    // components.
+    constexpr double kLessThanDrift = 0.5;
+    const bool moves_angle =
+        !by_angle || std::numbers::sqrt2 * by_angle->seen_rad > kLessThanDrift * line->amplitude_rad;
+    (moves_angle ? drift : star_tracker)
+        .push_back(fmt::format("the innovations of gyro {} have a line of {:.0f} min, amplitude {:.2f} sigma, {}; the "
+                               "chance of one as strong is below 1e{:.0f}",
+                               line->gyro + 1, line->period_s / 60, line->amplitude, angle_text(line->amplitude_rad),
+                               std::ceil(line->log_chance / std::numbers::ln10)));
   }
-  if (const std::string noise = noise_that_stands_for_drift(run); !noise.empty()) {
-    const auto by_angle = wander_by_angle(pass.gyro, run.calibration);
+  if (!noise.empty()) {
     if (by_angle && by_angle->log_odds > kLogOdds) {
-      findings.push_back(
-          {FindingCode::kStarTrackerWanders,
-           "The star tracker has errors that come and go slowly, and the calibration takes them for "
-           "drift: the angle between the momenta, which the gyros read without it, stands still. Attitude "
-           "and alignment follow these errors, and their sigmas are wrong.",
-           fmt::format("{}; it would move the angle by {}, root mean square, which moves by {}", noise,
-                       angle_text(by_angle->expected_rad), angle_text(by_angle->seen_rad)),
-           "Look for what the star tracker's errors follow: the place of the stars in its field, heads "
-           "that take turns, heat, its clock; correct them before its fixes come here."});
+      star_tracker.push_back(
+          noise + fmt::format("; it would move the angle by {}, root mean square", angle_text(by_angle->expected_rad)));
     } else {
-      evidence += (evidence.empty() ? "" : "; ") + noise;
+      drift.push_back(noise);
     }
   }
-  if (!evidence.empty()) {
+  if (!star_tracker.empty()) {
+    findings.push_back(
+        {FindingCode::kStarTrackerWanders,
+         "The star tracker has errors that come and go slowly: the angle between the momenta, which the "
+         "gyros read without it, does not move as drift would move it. Attitude and alignment follow "
+         "these errors, and their sigmas are wrong.",
+         fmt::format("{}; it moves by {}", fmt::join(star_tracker, "; "), angle_text(by_angle->seen_rad)),
+         "Look for what the star tracker's errors follow: day and night, the place of the stars in its "
+         "field, heads that take turns, its clock; correct them before its fixes come here."});
+  }
+  if (!drift.empty()) {
     findings.push_back({FindingCode::kDriftNotExplained,
                         "A part of the drift is in no coefficient of the model. The noise that stands for it is in the "
                         "sigmas of alignment and attitude; single coefficients may be off by many of theirs, as where "
                         "drift depends on place, history or temperature.",
-                        evidence,
+                        fmt::format("{}", fmt::join(drift, "; ")),
                         "Do not carry single coefficients to another flight. Estimator batch with a larger drift model "
                         "may explain it; an error of the star tracker can look alike."});
   }

@@ -17,7 +17,8 @@ namespace trihedron::ground {
 struct SlowLine {
   int gyro = 0;
   double period_s = 0;
-  double amplitude = 0;   ///< of its stronger component, in sigmas of an innovation
+  double amplitude = 0;  ///< of its stronger component, in sigmas of an innovation
+  double amplitude_rad = 0;
   double log_chance = 0;  ///< ln of the probability, bounded from above, that white innovations have one as strong
 };
 
@@ -27,7 +28,8 @@ struct SlowLine {
                                                           double shortest_period_s);
 
 /// Finds drift that is a function of place or history: in what the model and its noise leave in the innovations, unless
-/// `findings` tell already that these are not white, or in the noise that was needed to explain the rest.
+/// `findings` tell already that these are not white, or in the noise that was needed to explain the rest. Where the
+/// angle between the momenta does not move as either would move it, it is an error of the star tracker.
 void judge_drift_left(const Pass& pass, const CalibrationRun& run, std::vector<Finding>& findings);
 
 }  // namespace trihedron::ground
