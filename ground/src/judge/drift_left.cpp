@@ -10,7 +10,7 @@
 #include <string>
 #include <vector>
 
-#include "judge/wander_by_angle.hpp"
+#include "judge/angle_between_momenta.hpp"
 #include "model/orbital_rate.hpp"
 #include "trihedron/records/text.hpp"
 
@@ -133,14 +133,14 @@ void judge_drift_left(const Pass& pass, const CalibrationRun& run, std::vector<F
   const std::optional<SlowLine> line = strongest_slow_line(run.fixes, orbit_s / kMultiples);
   const bool is_line = line && line->log_chance < limit && !told;
   const std::string noise = noise_that_stands_for_drift(run);
-  const auto by_angle =
-      is_line || !noise.empty() ? wander_by_angle(pass.gyro, run.calibration) : std::optional<WanderByAngle>();
+  std::optional<AngleBetweenMomenta> angle;
+  if (is_line || !noise.empty()) {
+    angle = AngleBetweenMomenta::of(pass.gyro, run.calibration.gyros);
+  }
   if (is_line) {
-    // What esg20 can make of a line, a calibration has fitted: what is left would move the angle, of any two
-    // components.
     constexpr double kLessThanDrift = 0.5;
     const bool moves_angle =
-        !by_angle || std::numbers::sqrt2 * by_angle->seen_rad > kLessThanDrift * line->amplitude_rad;
+        !angle || angle->left_rad() > kLessThanDrift * line->amplitude_rad * angle->left_of_line(line->period_s);
     (moves_angle ? drift : star_tracker)
         .push_back(fmt::format("the innovations of gyro {} have a line of {:.0f} min, amplitude {:.2f} sigma, {}; the "
                                "chance of one as strong is below 1e{:.0f}",
@@ -148,22 +148,23 @@ void judge_drift_left(const Pass& pass, const CalibrationRun& run, std::vector<F
                                std::ceil(line->log_chance / std::numbers::ln10)));
   }
   if (!noise.empty()) {
-    if (by_angle && by_angle->log_odds > kLogOdds) {
+    const std::optional<AngleBetweenMomenta::Wander> wander =
+        angle && run.calibration.noise ? std::optional(angle->wander(*run.calibration.noise)) : std::nullopt;
+    if (wander && wander->log_odds > kLogOdds) {
       star_tracker.push_back(
-          noise + fmt::format("; it would move the angle by {}, root mean square", angle_text(by_angle->expected_rad)));
+          noise + fmt::format("; it would move the angle by {}, root mean square", angle_text(wander->expected_rad)));
     } else {
       drift.push_back(noise);
     }
   }
   if (!star_tracker.empty()) {
-    findings.push_back(
-        {FindingCode::kStarTrackerWanders,
-         "The star tracker has errors that come and go slowly: the angle between the momenta, which the "
-         "gyros read without it, does not move as drift would move it. Attitude and alignment follow "
-         "these errors, and their sigmas are wrong.",
-         fmt::format("{}; it moves by {}", fmt::join(star_tracker, "; "), angle_text(by_angle->seen_rad)),
-         "Look for what the star tracker's errors follow: day and night, the place of the stars in its "
-         "field, heads that take turns, its clock; correct them before its fixes come here."});
+    findings.push_back({FindingCode::kStarTrackerWanders,
+                        "The star tracker has errors that come and go slowly: the angle between the momenta, which the "
+                        "gyros read without it, does not move as drift would move it. Attitude and alignment follow "
+                        "these errors, and their sigmas are wrong.",
+                        fmt::format("{}; it moves by {}", fmt::join(star_tracker, "; "), angle_text(angle->left_rad())),
+                        "Look for what the star tracker's errors follow: day and night, the place of the stars in its "
+                        "field, heads that take turns, its clock; correct them before its fixes come here."});
   }
   if (!drift.empty()) {
     findings.push_back({FindingCode::kDriftNotExplained,

@@ -127,20 +127,20 @@ TEST(DriftNotExplained, IsSaidOfTheStarTrackerWhereTheMomentaKeepTheirAngle) {
 
 TEST(DriftNotExplained, IsSaidOfTheStarTrackerWhereALineIsInTheFixesAlone) {
   const sim::SimulatedPass& quiet = two_hours();
-  CalibrationRun run = run_of(innovations(1, 1));
+  CalibrationRun run = run_of(innovations(1, 1, 600));
   run.calibration.gyros = ground::true_gyros(quiet.truth, 0);
   run.calibration.noise = CalibrationNoise{.direction_random_walk_rad_sqrt_s = 3e-9};
   std::vector<Finding> findings;
   judge_drift_left(quiet.pass, run, findings);
   ASSERT_EQ(findings.size(), 1U);
   EXPECT_EQ(findings[0].code, FindingCode::kStarTrackerWanders);
-  EXPECT_THAT(findings[0].evidence, HasSubstr("line of 30 min"));
+  EXPECT_THAT(findings[0].evidence, HasSubstr("line of 10 min"));
 
   // Drift of gyro 2 that moves the angle as far.
   Pass moved = quiet.pass;
   for (std::size_t i = 0; i < moved.gyro.size(); ++i) {
     const double turn_rad =
-        kSigma_rad * std::sin(2 * std::numbers::pi * to_seconds(moved.gyro.t[i] - moved.gyro.t[0]) / 1800);
+        kSigma_rad * std::sin(2 * std::numbers::pi * to_seconds(moved.gyro.t[i] - moved.gyro.t[0]) / 600);
     const Eigen::Vector3d normal = moved.gyro.direction(i, 0).cross(moved.gyro.direction(i, 1));
     Eigen::Map<Eigen::Vector3d>(&moved.gyro.h[6 * i + 3]) += turn_rad * normal.cross(moved.gyro.direction(i, 1));
   }

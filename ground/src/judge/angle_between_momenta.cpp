@@ -1,4 +1,4 @@
-#include "judge/wander_by_angle.hpp"
+#include "judge/angle_between_momenta.hpp"
 
 #include <Eigen/Eigenvalues>
 #include <Eigen/QR>
@@ -6,8 +6,8 @@
 #include <array>
 #include <boost/math/tools/minima.hpp>
 #include <cmath>
-#include <iterator>
 #include <limits>
+#include <numbers>
 #include <vector>
 
 #include "trihedron/core/drift.hpp"
@@ -38,11 +38,11 @@ struct Block {
 };
 
 /// The angle along the pass, θ, with dθ/dt = (ω2 − ω1) · n, n = h1 × h2 / sin θ.
-class Angle {
+class Blocks {
  public:
-  Angle(const GyroTelemetry& telemetry, const Calibration& calibration) {
+  Blocks(const GyroTelemetry& telemetry, const std::vector<GyroCalibration>& gyros) {
     for (std::size_t k = 0; k < 2; ++k) {
-      const GyroCalibration& record = calibration.gyros[k];
+      const GyroCalibration& record = gyros[k];
       readouts_[k].C_c_b = Rot<C, B<1>>::exp(Vec<C>::assume(record.alignment_rotation_vector_rad)).raw();
       readouts_[k].readout_bias = record.readout_bias;
     }
@@ -58,7 +58,7 @@ class Angle {
     close_block();
   }
 
-  [[nodiscard]] const std::vector<Block>& blocks() const { return blocks_; }
+  [[nodiscard]] const std::vector<Block>& all() const { return blocks_; }
   [[nodiscard]] double block_s() const { return block_s_; }
 
  private:
@@ -142,65 +142,80 @@ Eigen::MatrixXd fitted_columns(const std::vector<Block>& blocks) {
   return columns.array().rowwise() / columns.colwise().norm().array().max(std::numeric_limits<double>::min());
 }
 
-/// Covariance of the angle at the blocks by the drift that wanders and the random walk of both momenta, from zero on.
-Eigen::MatrixXd covariance_of_angle(const std::vector<Block>& blocks, double block_s, const CalibrationNoise& noise) {
-  const Eigen::Index all = blocks.back().number + 1;
-  Eigen::Matrix3Xd normal(3, all);
-  for (Eigen::Index number = 0; const Block& block : blocks) {
-    for (; number <= block.number; ++number) {
-      normal.col(number) = block.normal_c;
-    }
-  }
-  const double walk = noise.direction_random_walk_rad_sqrt_s;
-  Eigen::MatrixXd of_rate(all, all);
-  for (Eigen::Index i = 0; i < all; ++i) {
-    for (Eigen::Index j = 0; j < all; ++j) {
-      const double apart_s = block_s * static_cast<double>(i > j ? i - j : j - i);
-      const double kept = noise.wandering_time_s > 0 ? std::exp(-apart_s / noise.wandering_time_s) : 0;
-      of_rate(i, j) =
-          2 * std::pow(noise.wandering_drift_rad_s, 2) * kept * normal.col(i).dot(normal.col(j)) +  // of two gyros
-          (i == j ? 2 * walk * walk / block_s : 0);
-    }
-  }
-  const auto integrate_columns = [block_s](Eigen::MatrixXd& rates) {
-    Eigen::RowVectorXd sum = Eigen::RowVectorXd::Zero(rates.cols());
-    for (Eigen::Index i = 0; i < rates.rows(); ++i) {
-      const Eigen::RowVectorXd half = block_s / 2 * rates.row(i);
-      rates.row(i) = sum + half;
-      sum += 2 * half;
-    }
-  };
-  integrate_columns(of_rate);
-  of_rate.transposeInPlace();
-  integrate_columns(of_rate);
-  std::vector<Eigen::Index> rows;
-  std::ranges::transform(blocks, std::back_inserter(rows), &Block::number);
-  return of_rate(rows, rows);
-}
-
 }  // namespace
 
-std::optional<WanderByAngle> wander_by_angle(const GyroTelemetry& telemetry, const Calibration& calibration) {
-  if (calibration.gyros.size() < 2 || telemetry.size() == 0 || !calibration.noise) {
+std::optional<AngleBetweenMomenta> AngleBetweenMomenta::of(const GyroTelemetry& telemetry,
+                                                           const std::vector<GyroCalibration>& gyros) {
+  if (gyros.size() < 2 || telemetry.size() == 0) {
     return std::nullopt;
   }
-  const Angle angle(telemetry, calibration);
-  const std::vector<Block>& blocks = angle.blocks();
+  const Blocks found(telemetry, gyros);
+  const std::vector<Block>& blocks = found.all();
   const auto n = static_cast<Eigen::Index>(blocks.size());
   if (n == 0 || n < kConstants + blocks.back().stretch + 1 + kFewestLeft) {
     return std::nullopt;
   }
-  // What no values of the constants can make, along the axes of its covariance by the noise of the calibration.
+  AngleBetweenMomenta angle;
+  angle.block_s_ = found.block_s();
+  angle.normal_c_.resize(3, blocks.back().number + 1);
+  Eigen::VectorXd seen_rad(n);
+  for (Eigen::Index i = 0; const Block& block : blocks) {
+    for (Eigen::Index number = i == 0 ? 0 : angle.blocks_.back() + 1; number <= block.number; ++number) {
+      angle.normal_c_.col(number) = block.normal_c;
+    }
+    angle.blocks_.push_back(block.number);
+    seen_rad(i++) = block.angle_rad;
+  }
   const Eigen::ColPivHouseholderQR<Eigen::MatrixXd> fit(fitted_columns(blocks));
-  const Eigen::MatrixXd left = Eigen::MatrixXd(fit.householderQ()).rightCols(n - fit.rank());
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> axes(
-      left.transpose() * covariance_of_angle(blocks, angle.block_s(), *calibration.noise) * left);
-  const Eigen::ArrayXd variances = axes.eigenvalues().array().max(0);
-  Eigen::VectorXd seen(n);
-  std::ranges::transform(blocks, seen.begin(), &Block::angle_rad);
-  seen = left.transpose() * (seen.array() - seen.mean()).matrix();
-  const Eigen::ArrayXd squares = (axes.eigenvectors().transpose() * seen).array().square();
+  angle.outside_ = Eigen::MatrixXd(fit.householderQ()).rightCols(n - fit.rank());
+  angle.left_rad_ = angle.outside_.transpose() * (seen_rad.array() - seen_rad.mean()).matrix();
+  return angle;
+}
 
+double AngleBetweenMomenta::left_rad() const { return std::sqrt(left_rad_.array().square().mean()); }
+
+double AngleBetweenMomenta::left_of_line(double period_s) const {
+  Eigen::MatrixX2d line(static_cast<Eigen::Index>(blocks_.size()), 2);
+  for (Eigen::Index i = 0; i < line.rows(); ++i) {
+    const double phase =
+        2 * std::numbers::pi * block_s_ * static_cast<double>(blocks_[static_cast<std::size_t>(i)]) / period_s;
+    line.row(i) << std::cos(phase), std::sin(phase);
+  }
+  return std::sqrt((outside_.transpose() * line).array().square().mean());
+}
+
+/// Of the angle at the blocks by the drift that wanders and the random walk of both momenta, from zero on.
+Eigen::MatrixXd AngleBetweenMomenta::covariance(const CalibrationNoise& noise) const {
+  const Eigen::Index all = normal_c_.cols();
+  const double walk = noise.direction_random_walk_rad_sqrt_s;
+  Eigen::MatrixXd rates(all, all);
+  for (Eigen::Index i = 0; i < all; ++i) {
+    for (Eigen::Index j = 0; j < all; ++j) {
+      const double apart_s = block_s_ * static_cast<double>(i > j ? i - j : j - i);
+      const double kept = noise.wandering_time_s > 0 ? std::exp(-apart_s / noise.wandering_time_s) : 0;
+      const double wandering = std::pow(noise.wandering_drift_rad_s, 2) * kept * normal_c_.col(i).dot(normal_c_.col(j));
+      rates(i, j) = 2 * (wandering + (i == j ? walk * walk / block_s_ : 0));  // of two gyros
+    }
+  }
+  const auto integrate_columns = [&] {
+    Eigen::RowVectorXd sum = Eigen::RowVectorXd::Zero(all);
+    for (Eigen::Index i = 0; i < all; ++i) {
+      const Eigen::RowVectorXd half = block_s_ / 2 * rates.row(i);
+      rates.row(i) = sum + half;
+      sum += 2 * half;
+    }
+  };
+  integrate_columns();
+  rates.transposeInPlace();
+  integrate_columns();
+  return rates(blocks_, blocks_);
+}
+
+auto AngleBetweenMomenta::wander(const CalibrationNoise& noise) const -> Wander {
+  // Along the axes of its covariance by the noise.
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> axes(outside_.transpose() * covariance(noise) * outside_);
+  const Eigen::ArrayXd variances = axes.eigenvalues().array().max(0);
+  const Eigen::ArrayXd squares = (axes.eigenvectors().transpose() * left_rad_).array().square();
   // ln of the likelihood with the best white noise of the readings.
   const double readout = std::log(squares.mean() + std::numeric_limits<double>::min());
   const auto likelihood = [&](double part) {
@@ -213,20 +228,17 @@ std::optional<WanderByAngle> wander_by_angle(const GyroTelemetry& telemetry, con
   };
   constexpr double kLeast = 1.0 / 4096;
   constexpr double kMost = 64;
-  WanderByAngle result{0, 0, std::sqrt(squares.mean()), std::sqrt(variances.mean())};
+  Wander found{0, 0, std::sqrt(variances.mean())};
   double quiet = likelihood(0);
-  double best = quiet;
-  double moving = likelihood(WanderByAngle::kQuiet);
+  double moving = likelihood(Wander::kQuiet);
   for (double part = kLeast; part <= kMost; part *= 2) {
     const double its = likelihood(part);
-    (part <= WanderByAngle::kQuiet ? quiet : moving) = std::max(part <= WanderByAngle::kQuiet ? quiet : moving, its);
-    if (its > best) {
-      best = its;
-      result.part = part;
-    }
+    found.part = its > std::max(quiet, moving) ? part : found.part;
+    double& best = part <= Wander::kQuiet ? quiet : moving;
+    best = std::max(best, its);
   }
-  result.log_odds = quiet - moving;
-  return result;
+  found.log_odds = quiet - moving;
+  return found;
 }
 
 }  // namespace trihedron::ground

@@ -1,0 +1,51 @@
+#pragma once
+/// The angle between the momenta of two gyros, which tells drift from errors of the star tracker.
+
+#include <Eigen/Core>
+#include <optional>
+#include <vector>
+
+#include "trihedron/records/calibration.hpp"
+#include "trihedron/records/pass.hpp"
+
+namespace trihedron::ground {
+
+/// The gyros alone read it: neither the fixes nor the attitude have a part in it. Drift of two gyros that wanders moves
+/// it as it moves the momenta; an error of the star tracker that wanders, and that a calibration takes for such drift,
+/// leaves it as it is. Medians over minutes are fitted by drift of esg20 and alignments, any values of them, so that it
+/// does not matter what the star tracker has made of those of the calibration.
+class AngleBetweenMomenta {
+ public:
+  /// Of the first two gyros. Nothing where there are not two, or where a fit leaves too little.
+  [[nodiscard]] static std::optional<AngleBetweenMomenta> of(const GyroTelemetry& telemetry,
+                                                             const std::vector<GyroCalibration>& gyros);
+
+  /// Root mean square of what the fit leaves.
+  [[nodiscard]] double left_rad() const;
+  /// Root mean square of what it leaves of a line of this period, amplitude 1, of any phase.
+  [[nodiscard]] double left_of_line(double period_s) const;
+
+  /// How it moves, beside how process noise moves it.
+  struct Wander {
+    /// The largest part of that noise, as a variance, with which the drift of the gyros is taken to be quiet: a third
+    /// of what wanders.
+    static constexpr double kQuiet = 0.1;
+
+    double part = 0;          ///< the likeliest; over 1 where drift wanders more than told, or otherwise
+    double log_odds = 0;      ///< ln of the largest likelihood up to kQuiet, less that of the largest beyond it
+    double expected_rad = 0;  ///< root mean square of what the fit leaves of the noise
+  };
+  [[nodiscard]] Wander wander(const CalibrationNoise& noise) const;
+
+ private:
+  AngleBetweenMomenta() = default;
+  [[nodiscard]] Eigen::MatrixXd covariance(const CalibrationNoise& noise) const;
+
+  double block_s_ = 0;
+  std::vector<Eigen::Index> blocks_;  ///< those that have samples, from the begin of the pass on
+  Eigen::Matrix3Xd normal_c_;         ///< of the plane of the momenta, at every block
+  Eigen::MatrixXd outside_;           ///< orthonormal columns that no values of the constants can make
+  Eigen::VectorXd left_rad_;          ///< of the angle along these
+};
+
+}  // namespace trihedron::ground
