@@ -280,7 +280,7 @@ class Constancy {
   }
 
   /// What moves as these columns times numbers of this 1-sigma; gets log_odds (of one try), and where these are above
-  /// `worth_more_than`, size, sigma and parameters_off.
+  /// `worth_more_than`, size, sigma and what is off by it.
   void put_into(Change& change, const Eigen::SparseMatrix<double>& columns, const VectorXd& prior_sigma,
                 double worth_more_than) const {
     const MatrixXd by_form = form_.topLeftCorner(size(), size()) * columns;
@@ -299,11 +299,13 @@ class Constancy {
     MatrixXd inverse = MatrixXd::Identity(prior_sigma.size(), prior_sigma.size());
     solve_lower(root, inverse);
     change.sigma = D * VectorXd(inverse.colwise().norm().transpose());
-    const VectorXd moved = columns * change.size;
-    change.parameters_off = -(follow_.leftCols(size()) * moved);
+    MatrixXd to_end = -(follow_.leftCols(size()) * columns);
     for (Index step = 0; step < steps(); ++step) {
-      change.parameters_off += moved.segment(parameter(step, 0, 0), change.parameters_off.size());
+      to_end += columns.middleRows(parameter(step, 0, 0), to_end.rows());
     }
+    change.parameters_off = to_end * change.size;
+    const MatrixXd half = inverse * (D * to_end.transpose());
+    change.parameters_off_covariance = half.transpose() * half;
   }
 
  private:

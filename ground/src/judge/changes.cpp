@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 #include <optional>
 #include <string>
 
@@ -110,21 +109,28 @@ std::string size_text(const Change& change) {
   return text + ", ";
 }
 
+/// For a parameter of Calibration::states, where Change tells of it; nothing outside eq. (1).
+std::optional<Eigen::Index> place_in_change(const ParameterId& state) {
+  constexpr Eigen::Index kOwnParameters = Layout::kEq1 + 3;
+  const Eigen::Index at = kOwnParameters * static_cast<Eigen::Index>(state.gyro());
+  if (state.is_alignment()) {
+    return at + Layout::kEq1 + state.component;
+  }
+  for (int member = 0; state.is_drift() && member < Layout::kEq1; ++member) {
+    if (state.coefficient == DriftCoefficient::of_eq1(member)) {
+      return at + member;
+    }
+  }
+  return std::nullopt;
+}
+
 /// Of the parameters in the order of Calibration::states; 0 for those that Change does not tell of.
 Eigen::VectorXd parameters_off(const Calibration& calibration, const Change& change) {
-  constexpr int kOwnParameters = Layout::kEq1 + 3;
   Eigen::VectorXd off = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(calibration.states.size()));
   for (std::size_t row = 0; row < calibration.states.size(); ++row) {
-    const ParameterId& state = calibration.states[row];
-    int i = state.is_alignment() ? Layout::kEq1 + state.component : Layout::kEq1;
-    for (int member = 0; state.is_drift() && member < Layout::kEq1; ++member) {
-      i = state.coefficient == DriftCoefficient::of_eq1(member) ? member : i;
+    if (const auto place = place_in_change(calibration.states[row])) {
+      off(static_cast<Eigen::Index>(row)) = change.parameters_off(*place);
     }
-    if (state.is_drift() && i == Layout::kEq1) {
-      continue;  // outside eq. (1)
-    }
-    off(static_cast<Eigen::Index>(row)) =
-        change.parameters_off(kOwnParameters * static_cast<Eigen::Index>(state.gyro()) + i);
   }
   return off;
 }
@@ -146,21 +152,31 @@ const Change* change_found(const CalibrationRun& run) {
   return run.changes.empty() || !run.changes.front().is_found() ? nullptr : &run.changes.front();
 }
 
-/// What the parameters are off, 1-sigma, where coefficients are found to change: any factor up to kMoreThanFound is as
-/// likely as another, and an even distribution over ± a has the sigma a / √3.
-std::optional<Eigen::VectorXd> off_by_coefficients(const CalibrationRun& run) {
+/// Mean square of what the parameters are off where coefficients are found to change: by what is found of it, and by
+/// what is not known of that.
+std::optional<Eigen::MatrixXd> off_by_coefficients(const CalibrationRun& run) {
   const Change* const change = change_found(run);
   if (change == nullptr || change->moving != Moving::kCoefficients) {
     return std::nullopt;
   }
-  return kMoreThanFound / std::numbers::sqrt3 * parameters_off(run.calibration, *change);
+  const std::vector<ParameterId>& states = run.calibration.states;
+  const auto n = static_cast<Eigen::Index>(states.size());
+  const Eigen::MatrixXd square =
+      change->parameters_off * change->parameters_off.transpose() + change->parameters_off_covariance;
+  Eigen::MatrixXd by_change = Eigen::MatrixXd::Zero(n, square.rows());
+  for (Eigen::Index row = 0; row < n; ++row) {
+    if (const auto place = place_in_change(states[static_cast<std::size_t>(row)])) {
+      by_change(row, *place) = 1;
+    }
+  }
+  return by_change * square * by_change.transpose();
 }
 
 }  // namespace
 
 void put_changes_into_covariance(CalibrationRun& run) {
   if (const auto off = off_by_coefficients(run)) {
-    run.calibration.covariance += *off * off->transpose();
+    run.calibration.covariance += *off;
   }
 }
 
@@ -170,14 +186,14 @@ void put_changes_into_errors(CalibrationRun& run) {
     return;
   }
   const Layout& layout = run.errors.layout;
-  Eigen::VectorXd errors = Eigen::VectorXd::Zero(run.errors.covariance.rows());
-  errors.segment(layout.drift(0), layout.parameters()) = *off;
+  Eigen::MatrixXd by_parameters = Eigen::MatrixXd::Zero(run.errors.covariance.rows(), off->rows());
+  by_parameters.middleRows(layout.drift(0), layout.parameters()).setIdentity();
   for (int k = 0; k < layout.gyros; ++k) {
     // Fixes give the attitude: where the alignment is off, so is the momentum.
-    errors.segment<3>(layout.direction(k)) =
-        run.attitude.q_in_c.back() * off->segment<3>(layout.alignment(k) - layout.drift(0));
+    by_parameters.block<3, 3>(layout.direction(k), layout.alignment(k) - layout.drift(0)) =
+        run.attitude.q_in_c.back().toRotationMatrix();
   }
-  run.errors.covariance += errors * errors.transpose();
+  run.errors.covariance += by_parameters * *off * by_parameters.transpose();
 }
 
 void judge_changes(const CalibrationRun& run, std::vector<Finding>& findings) {

@@ -132,6 +132,8 @@ CalibrationRun with_coefficients_off(double coefficient_sigmas, double alignment
   change.parameters_off = Eigen::VectorXd::Zero(20);
   change.parameters_off(0) = coefficient_sigmas * 1e-9;
   change.parameters_off(7) = alignment_sigmas * 1e-6;
+  change.parameters_off_covariance = Eigen::MatrixXd::Zero(20, 20);
+  change.parameters_off_covariance(0, 0) = 9e-18;
   return run;
 }
 
@@ -140,11 +142,10 @@ TEST(Verdict, CountsCoefficientsThatChangeInTheirSigmas) {
   EXPECT_THAT(codes(judge(good_pass(), run)), ElementsAre("coefficients-not-constant"));
   EXPECT_TRUE(judge(good_pass(), run).trustworthy);
   put_changes_into_covariance(run);
-  // Any factor up to two of what was found, to either side.
-  const double factor = 2 / std::sqrt(3.0);
-  EXPECT_NEAR(std::sqrt(run.calibration.covariance(0, 0)), std::hypot(1.0, 10 * factor) * 1e-9, 1e-15);
-  EXPECT_NEAR(std::sqrt(run.calibration.covariance(1, 1)), std::hypot(1.0, factor) * 1e-6, 1e-12);
-  EXPECT_NEAR(run.calibration.covariance(0, 1), 10e-9 * 1e-6 * factor * factor, 1e-21);
+  // What was claimed, what was found to be off, and what is not known of that.
+  EXPECT_NEAR(std::sqrt(run.calibration.covariance(0, 0)), std::hypot(1.0, 10.0, 3.0) * 1e-9, 1e-15);
+  EXPECT_NEAR(std::sqrt(run.calibration.covariance(1, 1)), std::hypot(1.0, 1.0) * 1e-6, 1e-12);
+  EXPECT_NEAR(run.calibration.covariance(0, 1), 10e-9 * 1e-6, 1e-21);
 }
 
 TEST(Verdict, ForbidsCoefficientsThatChangeWhereTheAlignmentIsOffByThem) {

@@ -112,6 +112,7 @@ struct Change {
   /// Coefficients of eq. (1) and alignment of each gyro at the end of the pass, less what is estimated without the
   /// change: rad/s, rad.
   Eigen::VectorXd parameters_off;
+  Eigen::MatrixXd parameters_off_covariance;  ///< of what is not known of it
 
   /// Whether it counts as there: at most in 1 of 20 000 passes in which nothing moves.
   [[nodiscard]] bool is_found() const {
