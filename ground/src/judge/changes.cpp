@@ -152,17 +152,22 @@ const Change* change_found(const CalibrationRun& run) {
   return run.changes.empty() || !run.changes.front().is_found() ? nullptr : &run.changes.front();
 }
 
-/// Mean square of what the parameters are off where coefficients are found to change: by what is found of it, and by
-/// what is not known of that.
+/// Mean square of what the parameters are off by coefficients that change, where that is the likeliest of all changes:
+/// by what is found of it and by what is not known of that, times the probability that it is there.
 std::optional<Eigen::MatrixXd> off_by_coefficients(const CalibrationRun& run) {
-  const Change* const change = change_found(run);
-  if (change == nullptr || change->moving != Moving::kCoefficients) {
+  constexpr double kNegligible = 0.01;
+  if (run.changes.empty() || run.changes.front().moving != Moving::kCoefficients) {
+    return std::nullopt;
+  }
+  const Change& change = run.changes.front();
+  const double probability = 1 / (1 + std::exp(-change.log_odds));
+  if (probability < kNegligible) {
     return std::nullopt;
   }
   const std::vector<ParameterId>& states = run.calibration.states;
   const auto n = static_cast<Eigen::Index>(states.size());
   const Eigen::MatrixXd square =
-      change->parameters_off * change->parameters_off.transpose() + change->parameters_off_covariance;
+      probability * (change.parameters_off * change.parameters_off.transpose() + change.parameters_off_covariance);
   Eigen::MatrixXd by_change = Eigen::MatrixXd::Zero(n, square.rows());
   for (Eigen::Index row = 0; row < n; ++row) {
     if (const auto place = place_in_change(states[static_cast<std::size_t>(row)])) {

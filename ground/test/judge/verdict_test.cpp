@@ -154,7 +154,7 @@ TEST(Verdict, ForbidsCoefficientsThatChangeWhereTheAlignmentIsOffByThem) {
 
 TEST(Verdict, LeavesTheCovarianceWhereNoCoefficientChanges) {
   auto run = with_coefficients_off(10, 1);
-  run.changes.front().log_odds = 5;
+  run.changes.front().log_odds = -5;
   put_changes_into_covariance(run);
   EXPECT_EQ(run.calibration.covariance(0, 0), good_run().calibration.covariance(0, 0));
   run.changes.front().log_odds = 100;
