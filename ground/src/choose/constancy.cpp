@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numbers>
 #include <optional>
 #include <utility>
 
@@ -279,6 +280,11 @@ class Constancy {
     return static_cast<double>(begins_[at] + begins_[at + 1]) / 2 / static_cast<double>(begins_.back());
   }
 
+  /// The part of the pass that is after a step.
+  [[nodiscard]] double part_after(Index step) const {
+    return 1 - static_cast<double>(arc(step)) / static_cast<double>(begins_.back());
+  }
+
   /// What moves as these columns times numbers of this 1-sigma; gets log_odds (of one try), and where these are above
   /// `worth_more_than`, size, sigma and what is off by it.
   void put_into(Change& change, const Eigen::SparseMatrix<double>& columns, const VectorXd& prior_sigma,
@@ -299,12 +305,13 @@ class Constancy {
     MatrixXd inverse = MatrixXd::Identity(prior_sigma.size(), prior_sigma.size());
     solve_lower(root, inverse);
     change.sigma = D * VectorXd(inverse.colwise().norm().transpose());
-    MatrixXd to_end = -(follow_.leftCols(size()) * columns);
+    MatrixXd off_by = -(follow_.leftCols(size()) * columns);
     for (Index step = 0; step < steps(); ++step) {
-      to_end += columns.middleRows(parameter(step, 0, 0), to_end.rows());
+      const double after = change.motion == Motion::kOrbital ? part_after(step) : 1;
+      off_by += after * columns.middleRows(parameter(step, 0, 0), off_by.rows());
     }
-    change.parameters_off = to_end * change.size;
-    const MatrixXd half = inverse * (D * to_end.transpose());
+    change.parameters_off = off_by * change.size;
+    const MatrixXd half = inverse * (D * off_by.transpose());
     change.parameters_off_covariance = half.transpose() * half;
   }
 
@@ -415,10 +422,23 @@ std::vector<Change> changes_over(const Trial& trial) {
         [&pass, time](Index step) { return std::exp(-pass.part(step) / time) - std::exp(-pass.part(step + 1) / time); };
   };
 
+  const auto at_orbital_rate = [&](double quarter) {
+    return [&pass, quarter, rate_rad_s = problem.setup().on_board.orbital_rate_rad_s](Index step) {
+      const auto phase = [&](Index stretch) { return rate_rad_s * to_seconds(pass.middle(stretch) - pass.middle(0)); };
+      return std::cos(phase(step + 1) - quarter) - std::cos(phase(step) - quarter);
+    };
+  };
+
   for (int k = -1; k < layout.gyros; ++k) {
     const Moving moving = k < 0 ? Moving::kStarTracker : Moving::kGyroCase;
     consider(what(moving, Motion::kRamp, k), along(k, Layout::kEq1, 3, true, evenly), sigmas(3, kMoves_rad));
     consider(what(Moving::kCoefficients, Motion::kRamp, k), along(k, 0, Layout::kEq1, false, evenly), coefficients(k));
+    const VectorXd sigma = coefficients(k);
+    Entries to_and_fro = along(k, 0, Layout::kEq1, false, at_orbital_rate(0));
+    for (const auto& sine : along(k, 0, Layout::kEq1, false, at_orbital_rate(std::numbers::pi / 2))) {
+      to_and_fro.emplace_back(sine.row(), sine.col() + sigma.size(), sine.value());
+    }
+    consider(what(Moving::kCoefficients, Motion::kOrbital, k), to_and_fro, sigma.replicate(2, 1));
     for (const double time : {0.05, 0.1, 0.2, 0.4}) {
       Change decay = what(Moving::kCoefficients, Motion::kDecay, k);
       decay.decay = from_seconds(time * problem.setup().on_board.change.duration_s);

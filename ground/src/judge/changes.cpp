@@ -39,10 +39,11 @@ std::string described(const Change& change) {
       return "a jump of the inertial axes of the star tracker";
     case Moving::kCoefficients:
       return fmt::format("{} of the coefficients of {}",
-                         change.motion == Motion::kStep    ? "a jump"
-                         : change.motion == Motion::kWalk  ? "a random walk"
-                         : change.motion == Motion::kDecay ? "a warm-up"
-                                                           : "an even change",
+                         change.motion == Motion::kStep      ? "a jump"
+                         : change.motion == Motion::kWalk    ? "a random walk"
+                         : change.motion == Motion::kDecay   ? "a warm-up"
+                         : change.motion == Motion::kOrbital ? "a change to and fro, at orbital rate,"
+                                                             : "an even change",
                          of_gyro(change));
     case Moving::kAberration:
       return "aberration of starlight in the fixes";
@@ -83,9 +84,11 @@ std::string_view cure_of(const Change& change) {
                  : "Look for what warms the mounting; calibrate on a shorter pass.";
     case Moving::kCoefficients:
       return change.motion == Motion::kStep ? "Cut the pass there and calibrate on the parts apart."
-                                            : "Use estimator batch with coefficient_change = \"on\" in "
-                                              "[further_states], or calibrate on a shorter "
-                                              "and later part of the pass.";
+             : change.motion == Motion::kOrbital
+                 ? "Look for what warms the gyros by day; keep their temperature, or take the sigmas as they are."
+                 : "Use estimator batch with coefficient_change = \"on\" in "
+                   "[further_states], or calibrate on a shorter "
+                   "and later part of the pass.";
     case Moving::kAberration:
       return "Correct aberration in the star tracker, or in its fixes before they come here.";
     case Moving::kReadoutScale:
@@ -156,7 +159,8 @@ const Change* change_found(const CalibrationRun& run) {
 /// by what is found of it and by what is not known of that, times the probability that it is there.
 std::optional<Eigen::MatrixXd> off_by_coefficients(const CalibrationRun& run) {
   constexpr double kNegligible = 0.01;
-  if (run.changes.empty() || run.changes.front().moving != Moving::kCoefficients) {
+  if (run.changes.empty() || run.changes.front().moving != Moving::kCoefficients ||
+      run.changes.front().motion == Motion::kOrbital) {
     return std::nullopt;
   }
   const Change& change = run.changes.front();

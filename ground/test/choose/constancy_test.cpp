@@ -64,6 +64,19 @@ TEST(Constancy, TakesDriftOutsideEq1ForWhatItIs) {
   }
 }
 
+TEST(Constancy, TellsDayAndNightFromOtherCoursesOfTheCoefficients) {
+  const CalibrationRun run = calibrated(1, [](Scenario& scenario) {
+    for (GyroScenario& gyro : scenario.gyros) {
+      gyro.drift.thermal_fraction = 0.5;
+    }
+  });
+  const Change& change = run.changes.front();
+  EXPECT_EQ(change.moving, Moving::kCoefficients);
+  EXPECT_EQ(change.motion, Motion::kOrbital);
+  EXPECT_TRUE(change.is_found());
+  EXPECT_TRUE(names(run, FindingCode::kCoefficientsNotConstant));
+}
+
 TEST(Constancy, NamesTheCaseThatSlippedAndWhen) {
   const CalibrationRun run = calibrated(1, [](Scenario& scenario) {
     scenario.gyros[0].mounting_change = {.step_rad = 20 * kArcsecond * kAxis, .step_at_s = kMiddle_s};

@@ -158,6 +158,9 @@ TEST(Verdict, LeavesTheCovarianceWhereNoCoefficientChanges) {
   put_changes_into_covariance(run);
   EXPECT_EQ(run.calibration.covariance(0, 0), good_run().calibration.covariance(0, 0));
   run.changes.front().log_odds = 100;
+  run.changes.front().motion = Motion::kOrbital;
+  put_changes_into_covariance(run);
+  EXPECT_EQ(run.calibration.covariance(0, 0), good_run().calibration.covariance(0, 0));
   run.changes.front().moving = Moving::kGyroCase;
   put_changes_into_covariance(run);
   EXPECT_EQ(run.calibration.covariance(0, 0), good_run().calibration.covariance(0, 0));

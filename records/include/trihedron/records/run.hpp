@@ -94,6 +94,7 @@ enum class Motion : std::uint8_t {
   kRamp,     ///< evenly
   kDecay,    ///< fast at first, towards a steady value
   kWalk,     ///< by steps at random
+  kOrbital,  ///< to and fro at the orbital rate, as by day and night
   kPresent,  ///< it is there all the time
 };
 
@@ -106,11 +107,11 @@ struct Change {
   Duration decay{};      ///< of kDecay, until 1/e of it is left
   double log_odds = 0;   ///< ln of the Bayes factor for it against nothing that moves, less ln of the number of tries
   /// Size and 1-sigma: rotation vector, rad, c axes (kInertialAxes: in axes; kMomentum: two components across the
-  /// momentum); coefficients, rad/s, gyro by gyro; over the pass. For kWalk one number, the root of the sum of
+  /// momentum); coefficients, rad/s, gyro by gyro, for kOrbital of cosine and sine; over the pass. For kWalk one number, the root of the sum of
   /// squares of all steps.
   Eigen::VectorXd size, sigma;
-  /// Coefficients of eq. (1) and alignment of each gyro at the end of the pass, less what is estimated without the
-  /// change: rad/s, rad.
+  /// Coefficients of eq. (1) and alignment of each gyro at the end of the pass, for kOrbital their mean over it, less
+  /// what is estimated without the change: rad/s, rad.
   Eigen::VectorXd parameters_off;
   Eigen::MatrixXd parameters_off_covariance;  ///< of what is not known of it
 
