@@ -14,7 +14,7 @@ inline constexpr double kNoiseTolerance = 0.1;
 struct NoiseFit {
   ProcessNoise noise;
   double log_likelihood = 0;
-  double gain = 0;  ///< log likelihood over that of the starting point of the grid
+  double gain = 0;  ///< log likelihood over that of the starting point of the grid; ∞ where surely above kLogOddsToAccept
 };
 
 /// A random walk, by factors of two above that of the options; drift that wanders as these say. Leaves the trial
@@ -25,5 +25,7 @@ struct NoiseFit {
 /// time stays between 400 s, some arcs, below which it would be a random walk, and 3 h, or is that of the options.
 /// Leaves the trial refitted with it.
 [[nodiscard]] NoiseFit with_most_likely_wandering(Trial& trial, const CalibrationOptions& options);
+/// The same from those of the options on, which another trial has found.
+[[nodiscard]] NoiseFit with_most_likely_wandering_near(Trial& trial, const CalibrationOptions& options);
 
 }  // namespace trihedron::ground

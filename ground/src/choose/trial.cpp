@@ -7,6 +7,7 @@
 #include <cmath>
 #include <limits>
 #include <optional>
+#include <utility>
 
 #include "batch/pass_setup.hpp"
 #include "model/setup.hpp"
@@ -153,9 +154,16 @@ void Trial::refit(const ProcessNoise& noise) {
   fit(PassSolution(found_.solution));
 }
 
-double Trial::log_likelihood(const PassProblem::Linear& linear, const ProcessNoise& noise) const {
-  return field_ ? most_likely_spectrum(*field_, field_information(linear, noise), spectrum_.log_rms).log_likelihood
-                : ground::log_likelihood(problem_, found_.before, linear, noise);
+Trial::ByNoise Trial::by_noise(const PassProblem::Linear& linear, const ProcessNoise& noise) const {
+  if (!field_) {
+    return {ground::log_likelihood(problem_, found_.before, linear, noise), {}};
+  }
+  FieldInformation information = field_information(linear, noise);
+  return {information.log_likelihood, std::move(information)};
+}
+
+double Trial::log_likelihood(const ByNoise& by) const {
+  return by.field ? most_likely_spectrum(*field_, *by.field, spectrum_.log_rms).log_likelihood : by.at_most;
 }
 
 std::optional<FieldPrior> Trial::field_prior() const {

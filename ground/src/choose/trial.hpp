@@ -35,9 +35,19 @@ class Trial {
 
   [[nodiscard]] const PassProblem& problem() const { return problem_; }
   [[nodiscard]] const BatchResult& found() const { return found_; }
-  /// `linear`: that of found(), also after gather_constants(). Where the drift is a field, by the spectrum of it
-  /// that is most likely with this noise.
-  [[nodiscard]] double log_likelihood(const PassProblem::Linear& linear, const ProcessNoise& noise) const;
+  /// The pass by other process noise, before the spectrum of a field is found for it.
+  struct ByNoise {
+    double at_most = 0;  ///< ln of the likelihood; where the drift is a field, of the spectrum that would fit it wholly
+    std::optional<FieldInformation> field;
+  };
+  /// `linear`: that of found(), also after gather_constants().
+  [[nodiscard]] ByNoise by_noise(const PassProblem::Linear& linear, const ProcessNoise& noise) const;
+  /// Where the drift is a field, by the spectrum of it that is most likely with that noise.
+  [[nodiscard]] double log_likelihood(const ByNoise& by) const;
+  /// With the noise of the fit.
+  [[nodiscard]] double log_likelihood() const {
+    return log_likelihood(by_noise(found_.linear, problem_.setup().noise()));
+  }
 
   /// Prior of the drift field, where the drift is one.
   [[nodiscard]] std::optional<FieldPrior> field_prior() const;
