@@ -400,16 +400,22 @@ void use_course(CourseOfChange::Kind kind, double time_s, CalibrationOptions& op
   options.further_states.change_time = from_seconds(time_s);
 }
 
-/// The time of a course, within `reach_s` of the one found, that makes the pass most likely with these options but for
-/// the noise: what was found without the course stands for a part of it, and goes as the time is told better. A random
-/// walk is enough for that.
-double most_likely_time_s(const Pass& pass, const Screened& screened, CalibrationOptions options,
-                          const FoundCourse& course, double reach_s) {
+/// The time of a course that makes the pass most likely, with the random walk that is then likeliest.
+struct LikelyCourse {
+  double time_s;
+  double walk_rad_sqrt_s;
+};
+
+/// Looks for it with these options but for the noise, from a first one on, at first within `reach_s`. What noise was
+/// found without the course stands for a part of it, and goes as the time is told better. A random walk is enough for
+/// that.
+LikelyCourse most_likely_course(const Pass& pass, const Screened& screened, CalibrationOptions options,
+                                const FoundCourse& course, LikelyCourse likely, double reach_s) {
   constexpr int kMostRounds = 6;
   constexpr std::uintmax_t kMostTries = 9;
   const double near_enough_s = 0.001 * (course.most_s - course.least_s);
-  double time_s = course.time_s;
   const double least_walk = options.direction_random_walk_rad_sqrt_s;
+  options.direction_random_walk_rad_sqrt_s = likely.walk_rad_sqrt_s;
   options.further_states[FurtherState::kWanderingDrift] = Choice::kOff;
   std::optional<Trial> last;
   const auto fit = [&](double at_s) {
@@ -422,16 +428,17 @@ double most_likely_time_s(const Pass& pass, const Screened& screened, Calibratio
   };
   /// Whether it is other than before.
   const auto find_noise = [&] {
-    const double before = options.direction_random_walk_rad_sqrt_s;
+    const double before = likely.walk_rad_sqrt_s;
     options.direction_random_walk_rad_sqrt_s = least_walk;
     use_walk(with_most_likely_walk(*last, options).noise, options);
-    return std::abs(options.direction_random_walk_rad_sqrt_s - before) > kNoiseTolerance * before;
+    likely.walk_rad_sqrt_s = options.direction_random_walk_rad_sqrt_s;
+    return std::abs(likely.walk_rad_sqrt_s - before) > kNoiseTolerance * before;
   };
-  fit(time_s);
+  fit(likely.time_s);
   static_cast<void>(find_noise());
   for (int round = 0; round < kMostRounds; ++round) {
-    const double least_s = std::max(course.least_s, time_s - reach_s);
-    const double most_s = std::min(course.most_s, time_s + reach_s);
+    const double least_s = std::max(course.least_s, likely.time_s - reach_s);
+    const double most_s = std::min(course.most_s, likely.time_s + reach_s);
     const auto bits = static_cast<int>(std::ceil(std::log2((most_s - least_s) / near_enough_s)));
     std::uintmax_t tries = kMostTries;
     const double part = boost::math::tools::brent_find_minima(
@@ -441,31 +448,31 @@ double most_likely_time_s(const Pass& pass, const Screened& screened, Calibratio
                             },
                             0.0, 1.0, bits, tries)
                             .first;
-    const double found_s = least_s + part * (most_s - least_s);
-    const double moved_s = std::abs(found_s - time_s);
-    time_s = found_s;
-    fit(time_s);
+    const double moved_s = std::abs(least_s + part * (most_s - least_s) - likely.time_s);
+    likely.time_s = least_s + part * (most_s - least_s);
+    fit(likely.time_s);
     if ((round > 0 && moved_s < near_enough_s) || !find_noise()) {
       break;
     }
     reach_s = std::min(reach_s, (course.most_s - course.least_s) / (4 << round));
   }
-  return time_s;
+  return likely;
 }
 
-/// The same from all that is told of the course. By eq. (1) alone it takes a fraction of the work, so that a field has
-/// only the rest of the way to go.
+/// The same from what moves on. By eq. (1) alone it takes a fraction of the work, so that a field has only the rest of
+/// the way to go.
 double most_likely_time_s(const Pass& pass, const Screened& screened, const CalibrationOptions& options,
-                          FoundCourse course) {
+                          const FoundCourse& course) {
   const double range_s = course.most_s - course.least_s;
+  const LikelyCourse first{course.time_s, options.direction_random_walk_rad_sqrt_s};
   if (!options.drift_field) {
-    return most_likely_time_s(pass, screened, options, course, range_s);
+    return most_likely_course(pass, screened, options, course, first, range_s).time_s;
   }
   CalibrationOptions by_eq1 = options;
   by_eq1.drift_field = false;
   by_eq1.drift_model = kEsg7;
-  course.time_s = most_likely_time_s(pass, screened, by_eq1, course, range_s);
-  return most_likely_time_s(pass, screened, options, course, range_s / 32);
+  const LikelyCourse near = most_likely_course(pass, screened, by_eq1, course, first, range_s);
+  return most_likely_course(pass, screened, options, course, near, range_s / 32).time_s;
 }
 
 /// Decides by the data of the pass. `change_is_open`: whether the coefficients may be found to change; then a warm-up
