@@ -439,7 +439,7 @@ LikelyCourse most_likely_course(const Pass& pass, const Screened& screened, Cali
   for (int round = 0; round < kMostRounds; ++round) {
     const double least_s = std::max(course.least_s, likely.time_s - reach_s);
     const double most_s = std::min(course.most_s, likely.time_s + reach_s);
-    const auto bits = static_cast<int>(std::ceil(std::log2((most_s - least_s) / near_enough_s)));
+    const auto bits = static_cast<int>(std::ceil(std::log2(4 * (most_s - least_s) / near_enough_s)));
     std::uintmax_t tries = kMostTries;
     const double part = boost::math::tools::brent_find_minima(
                             [&](double at) {
@@ -451,7 +451,8 @@ LikelyCourse most_likely_course(const Pass& pass, const Screened& screened, Cali
     const double moved_s = std::abs(least_s + part * (most_s - least_s) - likely.time_s);
     likely.time_s = least_s + part * (most_s - least_s);
     fit(likely.time_s);
-    if ((round > 0 && moved_s < near_enough_s) || !find_noise()) {
+    const bool is_within = moved_s < 0.9 * reach_s;
+    if ((round > 0 && moved_s < near_enough_s) || (!find_noise() && is_within)) {
       break;
     }
     reach_s = std::min(reach_s, (course.most_s - course.least_s) / (4 << round));
@@ -472,7 +473,7 @@ double most_likely_time_s(const Pass& pass, const Screened& screened, const Cali
   by_eq1.drift_field = false;
   by_eq1.drift_model = kEsg7;
   const LikelyCourse near = most_likely_course(pass, screened, by_eq1, course, first, range_s);
-  return most_likely_course(pass, screened, options, course, near, range_s / 32).time_s;
+  return most_likely_course(pass, screened, options, course, near, range_s / 64).time_s;
 }
 
 /// Decides by the data of the pass. `change_is_open`: whether the coefficients may be found to change; then a warm-up

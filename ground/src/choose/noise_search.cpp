@@ -112,10 +112,7 @@ NoiseFit converge(Trial& trial, const Search::At& at, std::vector<Search::Point>
       starts.push_back(search.best_point());
     }
     likely = search.best();
-    const auto same = [](double a, double b) { return std::abs(a - b) <= kNoiseTolerance * b; };
-    if (same(before.direction_random_walk_rad_sqrt_s, likely.noise.direction_random_walk_rad_sqrt_s) &&
-        same(before.wandering_drift.sigma, likely.noise.wandering_drift.sigma) &&
-        same(before.wandering_drift.time_s, likely.noise.wandering_drift.time_s)) {
+    if (alike(before, likely.noise)) {
       trial.set_noise(likely.noise);
       break;
     }

@@ -7,8 +7,6 @@ namespace trihedron::ground {
 
 /// Process noise below this is lost in the readout noise; a search begins here.
 inline constexpr double kLeastWalk_rad_sqrt_s = 3e-9;
-/// Relative difference below which two noise levels count as equal.
-inline constexpr double kNoiseTolerance = 0.1;
 
 /// Process noise, and how likely it makes the pass.
 struct NoiseFit {

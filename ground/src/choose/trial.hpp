@@ -14,6 +14,10 @@
 
 namespace trihedron::ground {
 
+/// Relative difference below which two noise levels count as equal.
+inline constexpr double kNoiseTolerance = 0.1;
+[[nodiscard]] bool alike(const ProcessNoise& a, const ProcessNoise& b);
+
 /// The whole pass with one choice of states. Further states are judged by ln of the Bayes factor for their being free
 /// instead of zero.
 class Trial {
@@ -66,10 +70,10 @@ class Trial {
   [[nodiscard]] std::vector<Eigen::Vector3d> changes_rad() const;
 
  private:
-  void fit(PassSolution first);
+  void fit(PassSolution first, bool is_near);
   void use_modes(Eigen::VectorXd level, PassSolution& solution);
   void put_spectrum_into_prior();
-  [[nodiscard]] PassSolution with_likely_field(PassSolution first);
+  void find_field(PassSolution& first);
   [[nodiscard]] FieldInformation field_information(const PassProblem::Linear& linear, const ProcessNoise& noise) const {
     return information_on_field(problem_, found_.before, linear, noise, *field_);
   }
