@@ -223,8 +223,8 @@ void keep_field(const Trial& trial, Decision& decision) {
 /// the noise found while all states are free, and decides whether the drift wanders. `everything`: the trial with all
 /// states free, and the noise found by it, if that was looked for; `walked`, `walk`: the trial with the states decided
 /// first, and the noise found by it. Where the largest drift model with its own noise is likelier than these, it is
-/// kept: noise in place of the members that the smaller one lacks, which act at every orbit alike, would make its sigmas
-/// wrong, though its forecasts are as good.
+/// kept: noise in place of the members that the smaller one lacks, which act at every orbit alike, would make its
+/// sigmas wrong, though its forecasts are as good.
 void decide_again_with_more_noise(const Pass& pass, const Screened& screened, const CalibrationOptions& asked,
                                   const DriftModelId& largest_model, bool wandering_is_open, Trial everything,
                                   std::optional<NoiseFit> walking, Trial walked, const NoiseFit& walk,

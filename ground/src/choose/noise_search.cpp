@@ -56,8 +56,8 @@ class Search {
   }
 
  private:
-  /// `best_matters`: points are left out that are surely less likely than another by kLogOddsToAccept. With noise that is
-  /// far too small no field fits, and long is looked for one.
+  /// `best_matters`: points are left out that are surely less likely than another by kLogOddsToAccept. With noise that
+  /// is far too small no field fits, and the search for its spectrum is long.
   void look_at(const std::vector<Point>& points, bool best_matters = false) {
     std::vector<Point> untried;
     std::ranges::copy_if(points, std::back_inserter(untried),

@@ -12,7 +12,9 @@ inline constexpr double kLeastWalk_rad_sqrt_s = 3e-9;
 struct NoiseFit {
   ProcessNoise noise;
   double log_likelihood = 0;
-  double gain = 0;  ///< log likelihood over that of the starting point of the grid; ∞ where surely above kLogOddsToAccept
+  /// Log likelihood over that of the starting point of the grid; infinite where that was left out of the search, which
+  /// it is only where this is surely above kLogOddsToAccept.
+  double gain = 0;
 };
 
 /// A random walk, by factors of two above that of the options; drift that wanders as these say. Leaves the trial
