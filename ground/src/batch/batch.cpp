@@ -32,18 +32,28 @@ double step_of_constants(const Layout& layout, const SmootherResult& found) {
 
 }  // namespace
 
+BatchResult step_from(const PassProblem& problem, PassSolution before, PassProblem::Linear linear) {
+  BatchResult result;
+  result.before = std::move(before);
+  result.linear = std::move(linear);
+  result.errors = solved([&] { return smooth(result.linear.prior, result.linear.prior_y, result.linear.stages); });
+  result.solution = result.before;
+  problem.correct(result.errors, result.solution);
+  result.iterations = 1;
+  result.step = step_of_constants(problem.layout(), result.errors);
+  return result;
+}
+
 BatchResult most_likely(const PassProblem& problem, PassSolution first, double converged) {
   BatchResult result;
   result.solution = std::move(first);
   while (result.iterations < kMostIterations && !result.converged) {
-    ++result.iterations;
-    result.before = result.solution;
-    result.linear = {};  // long: one at a time
-    result.errors = {};
-    result.linear = problem.linearise_by_parts(result.before);
-    result.errors = solved([&] { return smooth(result.linear.prior, result.linear.prior_y, result.linear.stages); });
-    problem.correct(result.errors, result.solution);
-    result.step = step_of_constants(problem.layout(), result.errors);
+    const int before = result.iterations;
+    PassSolution from = std::move(result.solution);
+    result = {};  // long: one at a time
+    PassProblem::Linear linear = problem.linearise_by_parts(from);
+    result = step_from(problem, std::move(from), std::move(linear));
+    result.iterations += before;
     result.converged = result.step < converged;
   }
   return result;

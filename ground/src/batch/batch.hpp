@@ -20,6 +20,9 @@ struct BatchResult {
 /// of their sigmas. Throws SetupError where they are not determined.
 [[nodiscard]] BatchResult most_likely(const PassProblem& problem, PassSolution first, double converged = 0.02);
 
+/// One step of it from `before`, by the problem linearised there. Throws as most_likely().
+[[nodiscard]] BatchResult step_from(const PassProblem& problem, PassSolution before, PassProblem::Linear linear);
+
 /// ln of the likelihood of the process noise, all states integrated over (Laplace); `linear`: the problem linearised
 /// near the solution. Up to a constant of the pass. Throws SetupError as most_likely().
 [[nodiscard]] double log_likelihood(const PassProblem& problem, const PassSolution& solution,

@@ -134,23 +134,37 @@ class Posteriors {
     return found;
   }
 
-  /// Derivative of the log likelihood by ln of the root mean squares, and the information on these that is expected.
-  void differentiate(const VectorXd& log_rms, const Likelihood& by, VectorXd& gradient, MatrixXd& information) const {
+  /// Derivatives of the log likelihood by ln of the root mean squares.
+  struct Slope {
+    VectorXd first;
+    MatrixXd expected;  ///< information on them: of the negative second derivative what is expected,
+    MatrixXd observed;  ///< what it is,
+    MatrixXd mean;      ///< and a mean of both that is always positive definite
+  };
+  [[nodiscard]] Slope slope(const VectorXd& log_rms, const Likelihood& by) const {
     const Posterior at = posterior(by);
     MatrixXd learnt = MatrixXd::Zero(members_.size(), members_.size());
     add_gram(at.white.transpose(), 1, learnt);
-    gradient = -prior_ * (log_rms - prior_mean_);
-    information = MatrixXd::Zero(prior_.rows(), prior_.cols());
     const std::vector<Index>& group = members_.group_of();
+    VectorXd first = VectorXd::Zero(prior_.rows());
+    MatrixXd squares = MatrixXd::Zero(prior_.rows(), prior_.cols());
+    MatrixXd products = squares;
     for (Index j = 0; j < members_.size(); ++j) {
       const Index g = group[static_cast<std::size_t>(j)];
-      gradient(g) += at.mean(j) * at.mean(j) - learnt(j, j);
-      information(g, g) += learnt(j, j) * learnt(j, j);
-      for (Index i = j + 1; i < members_.size(); ++i) {
-        information(group[static_cast<std::size_t>(i)], g) += 2 * learnt(i, j) * learnt(i, j);
+      first(g) += at.mean(j) * at.mean(j) - learnt(j, j);
+      for (Index i = j; i < members_.size(); ++i) {
+        const Index h = group[static_cast<std::size_t>(i)];
+        const double both = i == j ? 1 : 2;
+        squares(h, g) += both * learnt(i, j) * learnt(i, j);
+        products(h, g) += both * at.mean(i) * learnt(i, j) * at.mean(j);
       }
     }
-    information = MatrixXd(information + information.transpose()) + prior_;
+    squares = MatrixXd(squares + squares.transpose());
+    products = MatrixXd(products + products.transpose());
+    Slope slope{first - prior_ * (log_rms - prior_mean_), squares + prior_, 2 * products - squares + prior_,
+                products + prior_};
+    slope.observed.diagonal() -= 2 * first;
+    return slope;
   }
 
  private:
@@ -344,21 +358,46 @@ FieldInformation information_on_field(const PassProblem& problem, const PassSolu
   return information;
 }
 
+namespace {
+
+/// Newton's step uphill; of groups that are as large as they may be, and would be larger, none.
+VectorXd step_from(const VectorXd& log_rms, const Posteriors::Slope& slope) {
+  const auto held = (log_rms.array() >= std::log(kMostRms_rad_s) && slope.first.array() > 0).eval();
+  const VectorXd first = held.select(0, slope.first);
+  for (const MatrixXd* second : {&slope.observed, &slope.mean}) {
+    MatrixXd curvature = *second;
+    for (Index g = 0; g < held.size(); ++g) {
+      if (held(g)) {
+        curvature.row(g).setZero();
+        curvature.col(g).setZero();
+        curvature(g, g) = 1;
+      }
+    }
+    const Eigen::LLT<MatrixXd> root(curvature);
+    if (root.info() == Eigen::Success) {
+      return root.solve(first);
+    }
+  }
+  return VectorXd::Zero(first.size());  // of numbers that are none
+}
+
+}  // namespace
+
 FieldSpectrum most_likely_spectrum(const FieldMembers& members, const FieldInformation& information,
                                    const VectorXd& first) {
   constexpr int kMostSteps = 60;
-  constexpr double kLongestStep = 2;    // of any logarithm: a factor of seven
-  constexpr double kNearEnough = 0.01;  // in the log likelihood
+  constexpr double kLongestStep = 2;     // of any logarithm: a factor of seven
+  constexpr double kNearEnough = 0.001;  // in the log likelihood
   constexpr int kMostHalvings = 10;
   const Posteriors posteriors(members, information);
   FieldSpectrum spectrum;
   spectrum.log_rms = first.size() > 0 ? first : members.expected();
   Likelihood here = posteriors.at(spectrum.log_rms);
   for (int i = 0; i < kMostSteps; ++i) {
-    VectorXd gradient;
-    posteriors.differentiate(spectrum.log_rms, here, gradient, spectrum.information);
-    VectorXd step = spectrum.information.llt().solve(gradient);
-    if (step.dot(gradient) < kNearEnough) {
+    const Posteriors::Slope slope = posteriors.slope(spectrum.log_rms, here);
+    spectrum.information = slope.expected;
+    VectorXd step = step_from(spectrum.log_rms, slope);
+    if (step.dot(slope.first) < kNearEnough) {
       break;
     }
     step *= std::min(1.0, kLongestStep / step.cwiseAbs().maxCoeff());

@@ -80,7 +80,7 @@ struct FieldSpectrum {
   double log_likelihood = 0;    ///< of the pass, with the prior density of the spectrum; up to a constant of the pass
 };
 
-/// By Fisher's scoring. `first`: where it begins; empty: at the expected one.
+/// By Newton's method. `first`: where it begins; empty: at the expected one. No group becomes larger than 1e-5 rad/s.
 [[nodiscard]] FieldSpectrum most_likely_spectrum(const FieldMembers& members, const FieldInformation& information,
                                                  const Eigen::VectorXd& first = {});
 

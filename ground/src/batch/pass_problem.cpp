@@ -755,7 +755,6 @@ PassProblem::Linear PassProblem::linearise(const PassSolution& solution, bool by
   // Far from the solution all fixes have large misfits: outliers are those far above the median.
   const double scale = scale_of_misfits(solution);
   Linear linear;
-  add_prior(solution, linear);
   linear.stages.resize(arcs_.size());
   const Drift drift = drift_along(solution, &sensitive());
   ConstantSquares constants(layout_.constants() + 1);
@@ -784,11 +783,16 @@ PassProblem::Linear PassProblem::linearise(const PassSolution& solution, bool by
       stage.m.setZero(layout_.dynamic());
     }
   }
+  renew(solution, linear);
+  return linear;
+}
+
+void PassProblem::renew(const PassSolution& solution, Linear& linear) const {
+  add_prior(solution, linear);
   put_noise(solution, setup_.noise(), linear.prior, linear.prior_y);
   for (std::size_t arc = 0; arc < linear.ends.size(); ++arc) {
     put_noise(solution, setup_.noise(), arc, linear.ends[arc], linear.stages[arc]);
   }
-  return linear;
 }
 
 double PassProblem::add_arc(const PassSolution& solution, std::size_t arc, const Drift& drift, double scale,

@@ -129,6 +129,8 @@ class PassProblem {
   static constexpr std::size_t kParts = 6;
   /// The arc after the last one of that many parts.
   [[nodiscard]] std::size_t end_of(std::size_t parts) const { return parts * arcs_.size() / kParts; }
+  /// Puts the prior and the process noise that the problem has now into what was linearised at this solution.
+  void renew(const PassSolution& solution, Linear& linear) const;
   /// The same with other process noise than that of the setup: of the prior, and of one of the stages.
   void put_noise(const PassSolution& solution, const ProcessNoise& noise, Eigen::MatrixXd& prior,
                  Eigen::VectorXd& prior_y) const;

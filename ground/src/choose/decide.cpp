@@ -20,6 +20,7 @@
 #include "model/drift_on_board.hpp"
 #include "model/orbital_rate.hpp"
 #include "model/prior.hpp"
+#include "model/setup.hpp"
 #include "trihedron/ground/model/setup_error.hpp"
 #include "trihedron/ground/tasks/on_all_cores.hpp"
 
@@ -203,6 +204,13 @@ CalibrationOptions wandering_like(const NoiseFit& walking, CalibrationOptions op
   return options;
 }
 
+/// Whether a trial has the states of these options.
+bool has_states_of(const Trial& trial, const PassSettings& settings, const CalibrationOptions& options) {
+  const Layout& its = trial.problem().setup().on_board.layout;
+  const Layout wanted = layout_of(settings, options);
+  return its.further == wanted.further && its.drift_model == wanted.drift_model;
+}
+
 /// Keeps the field that a trial finds, if any, and its members.
 void keep_field(const Trial& trial, Decision& decision) {
   decision.field = trial.field_prior();
@@ -213,15 +221,17 @@ void keep_field(const Trial& trial, Decision& decision) {
 
 /// The noise is larger than the settings say, so the states were decided with too small a noise. Decides again, with
 /// the noise found while all states are free, and decides whether the drift wanders. `everything`: the trial with all
-/// states free and the noise of the settings; `walk`: the noise found with the states decided first. Where the largest
-/// drift model with its own noise is likelier than these, it is kept: noise in place of the members that the smaller
-/// one lacks, which act at every orbit alike, would make its sigmas wrong, though its forecasts are as good. `walked`:
-/// the trial that found it.
+/// states free, and the noise found by it, if that was looked for; `walked`, `walk`: the trial with the states decided
+/// first, and the noise found by it. Where the largest drift model with its own noise is likelier than these, it is
+/// kept: noise in place of the members that the smaller one lacks, which act at every orbit alike, would make its
+/// sigmas wrong, though its forecasts are as good.
 void decide_again_with_more_noise(const Pass& pass, const Screened& screened, const CalibrationOptions& asked,
                                   const DriftModelId& largest_model, bool wandering_is_open, Trial everything,
-                                  const Trial& walked, const NoiseFit& walk, Decision& decision) {
+                                  std::optional<NoiseFit> walking, Trial walked, const NoiseFit& walk,
+                                  Decision& decision) {
   CalibrationOptions& options = decision.options;
   const CalibrationOptions free = with_everything(options, asked, largest_model);
+  const bool may_wander = wandering_is_open && (!walking || walking->gain > kLogOddsToAccept);
   const CalibrationOptions like = wandering_like(walk, free);
   // Waited for only where a walk was accepted; otherwise it does not matter whether the trial failed.
   std::packaged_task<std::pair<Trial, NoiseFit>()> try_wandering([&] {
@@ -229,18 +239,22 @@ void decide_again_with_more_noise(const Pass& pass, const Screened& screened, co
     const NoiseFit likely = with_most_likely_wandering(trial, like);
     return std::pair(std::move(trial), likely);
   });
-  NoiseFit walking;
-  side_by_side([&] { walking = with_most_likely_walk(everything, free); },
-               [&] {
-                 if (wandering_is_open) {
-                   try_wandering();
-                 }
-               });
+  side_by_side(
+      [&] {
+        if (!walking) {
+          walking = with_most_likely_walk(everything, free);
+        }
+      },
+      [&] {
+        if (may_wander) {
+          try_wandering();
+        }
+      });
   std::optional<Evidence> wandering;
   std::optional<ProcessNoise> wanders;
-  if (wandering_is_open && walking.gain > kLogOddsToAccept) {
+  if (may_wander && walking->gain > kLogOddsToAccept) {
     auto [trial, likely] = try_wandering.get_future().get();
-    const double gain = likely.log_likelihood - walking.log_likelihood;
+    const double gain = likely.log_likelihood - walking->log_likelihood;
     wandering = Evidence{FurtherState::kWanderingDrift, gain, gain > kLogOddsToAccept};
     if (wandering->accepted) {
       wanders = likely.noise;
@@ -248,24 +262,26 @@ void decide_again_with_more_noise(const Pass& pass, const Screened& screened, co
     }
   }
   settle_states(everything, pass.settings, asked, asked.drift_field, decision);
-  if (!asked.drift_model && walking.log_likelihood > walk.log_likelihood + kLogOddsToAccept) {
+  if (!asked.drift_model && walking->log_likelihood > walk.log_likelihood + kLogOddsToAccept) {
     options.drift_model = largest_model;
   }
+  NoiseFit likely = walk;
   if (wanders) {
     use_wandering(*wanders, options);
-  }
-  Trial decided(pass, screened, options, wanders.value_or(walking.noise), &everything);
-  const NoiseFit likely =
-      wanders ? with_most_likely_wandering(decided, options) : with_most_likely_walk(decided, options);
-  decision.log_likelihood = likely.log_likelihood;
-  if (wanders) {
+    walked = Trial(pass, screened, options, wanders, &everything);
+    likely = with_most_likely_wandering_near(walked, options);
     use_wandering(likely.noise, options);
   } else {
+    if (!has_states_of(walked, pass.settings, options)) {
+      walked = Trial(pass, screened, options, walking->noise, &everything);
+      likely = with_most_likely_walk(walked, options);
+    }
     use_walk(likely.noise, options);
   }
-  keep_field(decided, decision);
-  decision.nearby = decided.nearby();
-  decision.changes = changes_over(decided);
+  decision.log_likelihood = likely.log_likelihood;
+  keep_field(walked, decision);
+  decision.nearby = walked.nearby();
+  decision.changes = changes_over(walked);
   if (wandering) {
     decision.evidence.push_back(*wandering);
   }
@@ -332,18 +348,20 @@ Decision decide_by_pass(const Pass& pass, const Screened& screened, const Calibr
   if (options.star_tracker_noise_rad) {
     everything = Trial(pass, screened, with_everything(options, asked, largest_model), noise, &everything);
   }
+  std::optional<NoiseFit> walking;
   if (noise) {
-    noise = with_most_likely_walk(everything, with_everything(options, asked, largest_model)).noise;
+    walking = with_most_likely_walk(everything, with_everything(options, asked, largest_model));
+    noise = walking->noise;
   }
   settle_states(everything, pass.settings, asked, false, decision);
   Trial decided(pass, screened, options, noise, &everything);
-  const NoiseFit walking = with_most_likely_walk(decided, options);
-  if (walking.gain > kLogOddsToAccept) {
+  const NoiseFit walk = with_most_likely_walk(decided, options);
+  if (walk.gain > kLogOddsToAccept) {
     decide_again_with_more_noise(pass, screened, asked, largest_model, wandering_is_open, std::move(everything),
-                                 decided, walking, decision);
+                                 std::move(walking), std::move(decided), walk, decision);
   } else {
-    decision.log_likelihood = walking.log_likelihood;
-    use_walk(walking.noise, options);
+    decision.log_likelihood = walk.log_likelihood;
+    use_walk(walk.noise, options);
     keep_field(decided, decision);
     decision.nearby = decided.nearby();
     decision.changes = changes_over(decided);
@@ -382,18 +400,22 @@ void use_course(CourseOfChange::Kind kind, double time_s, CalibrationOptions& op
   options.further_states.change_time = from_seconds(time_s);
 }
 
-/// The time of a course that makes the pass most likely with these options but for the noise: what was found without
-/// the course stands for a part of it, and goes as the time is told better. A random walk is enough for that.
-double most_likely_time_s(const Pass& pass, const Screened& screened, CalibrationOptions options,
-                          const FoundCourse& course) {
+/// The time of a course that makes the pass most likely, with the random walk that is then likeliest.
+struct LikelyCourse {
+  double time_s;
+  double walk_rad_sqrt_s;
+};
+
+/// Looks for it with these options but for the noise, from a first one on, at first within `reach_s`. What noise was
+/// found without the course stands for a part of it, and goes as the time is told better. A random walk is enough for
+/// that.
+LikelyCourse most_likely_course(const Pass& pass, const Screened& screened, CalibrationOptions options,
+                                const FoundCourse& course, LikelyCourse likely, double reach_s) {
   constexpr int kMostRounds = 6;
   constexpr std::uintmax_t kMostTries = 9;
-  constexpr int kBits = 10;  // of the part of the range
   const double near_enough_s = 0.001 * (course.most_s - course.least_s);
-  double least_s = course.least_s;
-  double time_s = course.time_s;
-  double most_s = course.most_s;
   const double least_walk = options.direction_random_walk_rad_sqrt_s;
+  options.direction_random_walk_rad_sqrt_s = likely.walk_rad_sqrt_s;
   options.further_states[FurtherState::kWanderingDrift] = Choice::kOff;
   std::optional<Trial> last;
   const auto fit = [&](double at_s) {
@@ -404,35 +426,54 @@ double most_likely_time_s(const Pass& pass, const Screened& screened, Calibratio
     Trial trial(pass, screened, options, {}, last ? &*last : nullptr);
     last.emplace(std::move(trial));
   };
+  /// Whether it is other than before.
   const auto find_noise = [&] {
+    const double before = likely.walk_rad_sqrt_s;
     options.direction_random_walk_rad_sqrt_s = least_walk;
     use_walk(with_most_likely_walk(*last, options).noise, options);
+    likely.walk_rad_sqrt_s = options.direction_random_walk_rad_sqrt_s;
+    return std::abs(likely.walk_rad_sqrt_s - before) > kNoiseTolerance * before;
   };
-  fit(time_s);
-  find_noise();
+  fit(likely.time_s);
+  static_cast<void>(find_noise());
   for (int round = 0; round < kMostRounds; ++round) {
+    const double least_s = std::max(course.least_s, likely.time_s - reach_s);
+    const double most_s = std::min(course.most_s, likely.time_s + reach_s);
+    const auto bits = static_cast<int>(std::ceil(std::log2(4 * (most_s - least_s) / near_enough_s)));
     std::uintmax_t tries = kMostTries;
-    const double found_s =
-        least_s +
-        (most_s - least_s) * boost::math::tools::brent_find_minima(
-                                 [&](double part) {
-                                   fit(least_s + part * (most_s - least_s));
-                                   return -last->log_likelihood(last->found().linear, last->problem().setup().noise());
-                                 },
-                                 0.0, 1.0, kBits, tries)
-                                 .first;
-    const double moved_s = std::abs(found_s - time_s);
-    time_s = found_s;
-    fit(time_s);
-    if (round > 0 && moved_s < near_enough_s) {
+    const double part = boost::math::tools::brent_find_minima(
+                            [&](double at) {
+                              fit(least_s + at * (most_s - least_s));
+                              return -last->log_likelihood();
+                            },
+                            0.0, 1.0, bits, tries)
+                            .first;
+    const double moved_s = std::abs(least_s + part * (most_s - least_s) - likely.time_s);
+    likely.time_s = least_s + part * (most_s - least_s);
+    fit(likely.time_s);
+    const bool is_within = moved_s < 0.9 * reach_s;
+    if ((round > 0 && moved_s < near_enough_s) || (!find_noise() && is_within)) {
       break;
     }
-    find_noise();
-    const double reach_s = (course.most_s - course.least_s) / (4 << round);
-    least_s = std::max(course.least_s, time_s - reach_s);
-    most_s = std::min(course.most_s, time_s + reach_s);
+    reach_s = std::min(reach_s, (course.most_s - course.least_s) / (4 << round));
   }
-  return time_s;
+  return likely;
+}
+
+/// The same from what moves on. By eq. (1) alone it takes a fraction of the work, so that a field has only the rest of
+/// the way to go.
+double most_likely_time_s(const Pass& pass, const Screened& screened, const CalibrationOptions& options,
+                          const FoundCourse& course) {
+  const double range_s = course.most_s - course.least_s;
+  const LikelyCourse first{course.time_s, options.direction_random_walk_rad_sqrt_s};
+  if (!options.drift_field) {
+    return most_likely_course(pass, screened, options, course, first, range_s).time_s;
+  }
+  CalibrationOptions by_eq1 = options;
+  by_eq1.drift_field = false;
+  by_eq1.drift_model = kEsg7;
+  const LikelyCourse near = most_likely_course(pass, screened, by_eq1, course, first, range_s);
+  return most_likely_course(pass, screened, options, course, near, range_s / 64).time_s;
 }
 
 /// Decides by the data of the pass. `change_is_open`: whether the coefficients may be found to change; then a warm-up

@@ -4,11 +4,13 @@
 #include <cmath>
 #include <functional>
 #include <iterator>
+#include <limits>
 #include <map>
 #include <optional>
 #include <utility>
 #include <vector>
 
+#include "choose/decide.hpp"
 #include "trihedron/ground/tasks/on_all_cores.hpp"
 
 namespace trihedron::ground {
@@ -24,7 +26,7 @@ class Search {
   Search(const Trial& trial, At at, const std::vector<Point>& starts, const Point& lowest, const Point& highest)
       : trial_(trial), linear_(trial.found().linear), at_(std::move(at)) {
     gather_constants(linear_.prior, linear_.prior_y, linear_.stages);
-    look_at(starts);
+    look_at(starts, true);
     for (std::optional<Point> last; last != best_;) {
       last = best_;
       const auto [i, j] = best_;
@@ -48,19 +50,36 @@ class Search {
     if (below != tried_.end() && above != tried_.end()) {
       offset = (above->second - below->second) / (4 * peak - 2 * below->second - 2 * above->second);
     }
-    return {at_(i + offset, j), peak, peak - tried_.at({0, 0})};
+    const auto start = tried_.find({0, 0});
+    const double gain = start == tried_.end() ? std::numeric_limits<double>::infinity() : peak - start->second;
+    return {at_(i + offset, j), peak, gain};
   }
 
  private:
-  void look_at(const std::vector<Point>& points) {
+  /// `best_matters`: points are left out that are surely less likely than another by kLogOddsToAccept. With noise that
+  /// is far too small no field fits, and the search for its spectrum is long.
+  void look_at(const std::vector<Point>& points, bool best_matters = false) {
     std::vector<Point> untried;
     std::ranges::copy_if(points, std::back_inserter(untried),
                          [this](const Point& point) { return !tried_.contains(point); });
-    const std::vector<double> found = on_all_cores(untried.size(), [&](std::size_t i) {
-      return trial_.log_likelihood(linear_, at_(untried[i].first, untried[i].second));
+    const std::vector<Trial::ByNoise> by_noise = on_all_cores(untried.size(), [&](std::size_t i) {
+      return trial_.by_noise(linear_, at_(untried[i].first, untried[i].second));
+    });
+    const auto first = std::ranges::max_element(by_noise, {}, &Trial::ByNoise::at_most);
+    const double likely = best_matters ? trial_.log_likelihood(*first) : 0;
+    const auto found = on_all_cores(untried.size(), [&](std::size_t i) -> std::optional<double> {
+      const Trial::ByNoise& its = by_noise[i];
+      if (best_matters && &its == &*first) {
+        return likely;
+      }
+      return best_matters && its.field && its.at_most < likely - kLogOddsToAccept
+                 ? std::nullopt
+                 : std::optional(trial_.log_likelihood(its));
     });
     for (std::size_t i = 0; i < untried.size(); ++i) {
-      tried_[untried[i]] = found[i];
+      if (found[i]) {
+        tried_[untried[i]] = *found[i];
+      }
     }
     best_ = std::ranges::max_element(tried_, [](const auto& a, const auto& b) { return a.second < b.second; })->first;
   }
@@ -93,10 +112,7 @@ NoiseFit converge(Trial& trial, const Search::At& at, std::vector<Search::Point>
       starts.push_back(search.best_point());
     }
     likely = search.best();
-    const auto same = [](double a, double b) { return std::abs(a - b) <= kNoiseTolerance * b; };
-    if (same(before.direction_random_walk_rad_sqrt_s, likely.noise.direction_random_walk_rad_sqrt_s) &&
-        same(before.wandering_drift.sigma, likely.noise.wandering_drift.sigma) &&
-        same(before.wandering_drift.time_s, likely.noise.wandering_drift.time_s)) {
+    if (alike(before, likely.noise)) {
       trial.set_noise(likely.noise);
       break;
     }
@@ -118,7 +134,11 @@ NoiseFit with_most_likely_walk(Trial& trial, const CalibrationOptions& options) 
   return converge(trial, at, kAllLevels, {0, 0}, {9, 0});
 }
 
-NoiseFit with_most_likely_wandering(Trial& trial, const CalibrationOptions& options) {
+namespace {
+
+/// `levels` of drift that wanders to start from, at each time or at that of the options alone.
+NoiseFit wandering_from(const std::vector<int>& levels, bool at_each_time, Trial& trial,
+                        const CalibrationOptions& options) {
   constexpr double kShortest_s = 400;
   constexpr double kLongest_s = 3 * 3600;
   const ProcessNoise given{options.direction_random_walk_rad_sqrt_s, wandering_of(options)};
@@ -135,12 +155,22 @@ NoiseFit with_most_likely_wandering(Trial& trial, const CalibrationOptions& opti
   const int shorter = given.wandering_drift.time_s > kShortest_s ? times_within(kShortest_s) : 0;
   const int longer = given.wandering_drift.time_s < kLongest_s ? times_within(kLongest_s) : 0;
   std::vector<Search::Point> starts;
-  for (int time = -shorter; time <= longer; ++time) {
-    for (const int level : {0, 2, 4, 6}) {
+  for (int time = at_each_time ? -shorter : 0; time <= (at_each_time ? longer : 0); ++time) {
+    for (const int level : levels) {
       starts.emplace_back(level, time);
     }
   }
   return converge(trial, at, starts, {-3, -shorter}, {9, longer});
+}
+
+}  // namespace
+
+NoiseFit with_most_likely_wandering(Trial& trial, const CalibrationOptions& options) {
+  return wandering_from({0, 2, 4, 6}, true, trial, options);
+}
+
+NoiseFit with_most_likely_wandering_near(Trial& trial, const CalibrationOptions& options) {
+  return wandering_from({0}, false, trial, options);
 }
 
 }  // namespace trihedron::ground

@@ -7,14 +7,14 @@ namespace trihedron::ground {
 
 /// Process noise below this is lost in the readout noise; a search begins here.
 inline constexpr double kLeastWalk_rad_sqrt_s = 3e-9;
-/// Relative difference below which two noise levels count as equal.
-inline constexpr double kNoiseTolerance = 0.1;
 
 /// Process noise, and how likely it makes the pass.
 struct NoiseFit {
   ProcessNoise noise;
   double log_likelihood = 0;
-  double gain = 0;  ///< log likelihood over that of the starting point of the grid
+  /// Log likelihood over that of the starting point of the grid; infinite where that was left out of the search, which
+  /// it is only where this is surely above kLogOddsToAccept.
+  double gain = 0;
 };
 
 /// A random walk, by factors of two above that of the options; drift that wanders as these say. Leaves the trial
@@ -25,5 +25,7 @@ struct NoiseFit {
 /// time stays between 400 s, some arcs, below which it would be a random walk, and 3 h, or is that of the options.
 /// Leaves the trial refitted with it.
 [[nodiscard]] NoiseFit with_most_likely_wandering(Trial& trial, const CalibrationOptions& options);
+/// The same from those of the options on, which another trial has found.
+[[nodiscard]] NoiseFit with_most_likely_wandering_near(Trial& trial, const CalibrationOptions& options);
 
 }  // namespace trihedron::ground

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <limits>
 #include <optional>
+#include <utility>
 
 #include "batch/pass_setup.hpp"
 #include "model/setup.hpp"
@@ -40,8 +41,8 @@ std::vector<DriftModelId> models_up_to(const DriftModelId& model) {
 constexpr double kNearEnough = 0.2;
 /// So many times the drift that is expected are the modes of a field for at first.
 constexpr double kFirstFieldLevel = 4;
-/// No step is longer.
-constexpr double kOneIteration = std::numeric_limits<double>::infinity();
+/// ln of what modes are to be for over what is found: three times.
+constexpr double kRoom = 1.0986;
 
 /// Coarser steps, for speed: over some seconds the body turns by some degrees at most.
 PassSetup coarse(PassSetup setup) {
@@ -52,6 +53,13 @@ PassSetup coarse(PassSetup setup) {
 }
 
 }  // namespace
+
+bool alike(const ProcessNoise& a, const ProcessNoise& b) {
+  const auto same = [](double one, double other) { return std::abs(one - other) <= kNoiseTolerance * other; };
+  return same(a.direction_random_walk_rad_sqrt_s, b.direction_random_walk_rad_sqrt_s) &&
+         same(a.wandering_drift.sigma, b.wandering_drift.sigma) &&
+         same(a.wandering_drift.time_s, b.wandering_drift.time_s);
+}
 
 Trial::Trial(const Pass& pass, const Screened& screened, const CalibrationOptions& options,
              const std::optional<ProcessNoise>& noise, const Trial* nearby)
@@ -68,7 +76,10 @@ Trial::Trial(const Pass& pass, const Screened& screened, const CalibrationOption
     spectrum_ = nearby->spectrum_;
     put_spectrum_into_prior();
   }
-  fit(nearby != nullptr ? first_solution(problem_, nearby->nearby()) : first_solution(problem_, screened));
+  const bool is_near = field_ && nearby != nullptr && nearby->field_ &&
+                       alike(nearby->problem_.setup().noise(), problem_.setup().noise()) &&
+                       nearby->problem_.layout().dynamic() == problem_.layout().dynamic();
+  fit(nearby != nullptr ? first_solution(problem_, nearby->nearby()) : first_solution(problem_, screened), is_near);
 }
 
 /// Modes for a field of this level, and the solution by them.
@@ -92,55 +103,48 @@ void Trial::put_spectrum_into_prior() {
   problem_.set_prior(std::move(prior));
 }
 
-/// Finds the spectrum of the field and gives the problem its variances. Where it is larger than the modes are for, or
-/// much smaller, they are chosen again. Where it is the spectrum that was there before, and the solution found is near
-/// enough, that is the fit.
-PassSolution Trial::with_likely_field(PassSolution first) {
+/// Linearises where that is not yet done, finds the spectrum of the field by it, and gives the problem its variances.
+/// Where it is larger than the modes are for, they are chosen again.
+void Trial::find_field(PassSolution& first) {
   constexpr int kMostRounds = 4;
-  constexpr double kSameSpectrum = 0.1;
-  const double room = std::log(3.0);
-  const double more_than_enough = 2 * room;
-  const Eigen::VectorXd before = spectrum_.log_rms;
-  bool is_fit = false;
-  double enough = room / 2;  // of modes that were chosen for a spectrum near this one
+  double enough = kRoom / 2;  // of modes that were chosen for a spectrum near this one
   if (!problem_.modes()) {
     use_modes(field_->expected().array() + std::log(kFirstFieldLevel), first);
-    enough = room;
+    enough = kRoom;
   }
-  for (int round = 0; round < kMostRounds; ++round) {
-    const bool is_new = found_.linear.stages.empty();
-    if (is_new) {
-      found_ = most_likely(problem_, std::move(first), kOneIteration);
-      first = found_.solution;
+  for (int round = 0;; ++round) {
+    if (found_.linear.stages.empty()) {
+      found_.before = first;
+      found_.linear = problem_.linearise_by_parts(first);
     }
     spectrum_ =
         most_likely_spectrum(*field_, field_information(found_.linear, problem_.setup().noise()), spectrum_.log_rms);
     const Eigen::VectorXd above = field_level_ - spectrum_.log_rms;
-    if ((above.array() > enough).all()) {
-      if ((above.array() > more_than_enough).all()) {
-        use_modes(spectrum_.log_rms.array() + room, first);
-      } else {
-        is_fit = is_new && before.size() > 0 && found_.step < kNearEnough &&
-                 ((spectrum_.log_rms - before).array().abs() < kSameSpectrum).all();
-      }
+    if ((above.array() > enough).all() || round == kMostRounds) {
       break;
     }
-    use_modes(field_level_.cwiseMax((spectrum_.log_rms.array() + more_than_enough).matrix()), first);
-    enough = room;
+    first = step_from(problem_, std::move(found_.before), std::move(found_.linear)).solution;
     found_ = {};
+    use_modes(field_level_.cwiseMax((spectrum_.log_rms.array() + 2 * kRoom).matrix()), first);
+    enough = kRoom;
   }
-  moved_.reset();  // long; seldom needed again
   put_spectrum_into_prior();
-  if (!is_fit) {
-    found_ = {};
-  }
-  return first;
 }
 
-void Trial::fit(PassSolution first) {
+/// `is_near`: `first` is of nearly the same states and noise, so that the momenta follow the fixes as they should.
+void Trial::fit(PassSolution first, bool is_near) {
   if (field_) {
-    first = with_likely_field(std::move(first));
-    if (!found_.linear.stages.empty()) {
+    find_field(first);
+    problem_.renew(found_.before, found_.linear);
+    found_ = step_from(problem_, std::move(found_.before), std::move(found_.linear));
+    first = std::move(found_.solution);
+    const bool too_many = ((field_level_ - spectrum_.log_rms).array() > 2 * kRoom).all();
+    if (too_many) {
+      use_modes(spectrum_.log_rms.array() + kRoom, first);
+    }
+    moved_.reset();  // long; seldom needed again
+    if (is_near && !too_many && found_.step < kNearEnough) {
+      found_.solution = std::move(first);
       return;
     }
   }
@@ -150,12 +154,19 @@ void Trial::fit(PassSolution first) {
 
 void Trial::refit(const ProcessNoise& noise) {
   problem_.set_noise(noise);
-  fit(PassSolution(found_.solution));
+  fit(PassSolution(found_.solution), false);
 }
 
-double Trial::log_likelihood(const PassProblem::Linear& linear, const ProcessNoise& noise) const {
-  return field_ ? most_likely_spectrum(*field_, field_information(linear, noise), spectrum_.log_rms).log_likelihood
-                : ground::log_likelihood(problem_, found_.before, linear, noise);
+Trial::ByNoise Trial::by_noise(const PassProblem::Linear& linear, const ProcessNoise& noise) const {
+  if (!field_) {
+    return {ground::log_likelihood(problem_, found_.before, linear, noise), {}};
+  }
+  FieldInformation information = field_information(linear, noise);
+  return {information.log_likelihood, std::move(information)};
+}
+
+double Trial::log_likelihood(const ByNoise& by) const {
+  return by.field ? most_likely_spectrum(*field_, *by.field, spectrum_.log_rms).log_likelihood : by.at_most;
 }
 
 std::optional<FieldPrior> Trial::field_prior() const {

@@ -14,6 +14,10 @@
 
 namespace trihedron::ground {
 
+/// Relative difference below which two noise levels count as equal.
+inline constexpr double kNoiseTolerance = 0.1;
+[[nodiscard]] bool alike(const ProcessNoise& a, const ProcessNoise& b);
+
 /// The whole pass with one choice of states. Further states are judged by ln of the Bayes factor for their being free
 /// instead of zero.
 class Trial {
@@ -35,9 +39,19 @@ class Trial {
 
   [[nodiscard]] const PassProblem& problem() const { return problem_; }
   [[nodiscard]] const BatchResult& found() const { return found_; }
-  /// `linear`: that of found(), also after gather_constants(). Where the drift is a field, by the spectrum of it
-  /// that is most likely with this noise.
-  [[nodiscard]] double log_likelihood(const PassProblem::Linear& linear, const ProcessNoise& noise) const;
+  /// The pass by other process noise, before the spectrum of a field is found for it.
+  struct ByNoise {
+    double at_most = 0;  ///< ln of the likelihood; where the drift is a field, of the spectrum that would fit it wholly
+    std::optional<FieldInformation> field;
+  };
+  /// `linear`: that of found(), also after gather_constants().
+  [[nodiscard]] ByNoise by_noise(const PassProblem::Linear& linear, const ProcessNoise& noise) const;
+  /// Where the drift is a field, by the spectrum of it that is most likely with that noise.
+  [[nodiscard]] double log_likelihood(const ByNoise& by) const;
+  /// With the noise of the fit.
+  [[nodiscard]] double log_likelihood() const {
+    return log_likelihood(by_noise(found_.linear, problem_.setup().noise()));
+  }
 
   /// Prior of the drift field, where the drift is one.
   [[nodiscard]] std::optional<FieldPrior> field_prior() const;
@@ -56,10 +70,10 @@ class Trial {
   [[nodiscard]] std::vector<Eigen::Vector3d> changes_rad() const;
 
  private:
-  void fit(PassSolution first);
+  void fit(PassSolution first, bool is_near);
   void use_modes(Eigen::VectorXd level, PassSolution& solution);
   void put_spectrum_into_prior();
-  [[nodiscard]] PassSolution with_likely_field(PassSolution first);
+  void find_field(PassSolution& first);
   [[nodiscard]] FieldInformation field_information(const PassProblem::Linear& linear, const ProcessNoise& noise) const {
     return information_on_field(problem_, found_.before, linear, noise, *field_);
   }

@@ -1,5 +1,7 @@
 // Estimator batch: least squares over the whole pass.
 
+#include "batch/batch.hpp"
+
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -8,6 +10,7 @@
 #include <chrono>
 #include <cmath>
 #include <random>
+#include <utility>
 
 #include "batch/pass_problem.hpp"
 #include "batch/pass_setup.hpp"
@@ -437,6 +440,24 @@ TEST(PassProblem, TellsTheSameByParts) {
     const Eigen::MatrixXd apart = of_whole[i].triangularView<Eigen::Upper>().solve<Eigen::OnTheRight>(of_parts[i]);
     EXPECT_LT((apart.transpose() * apart - Eigen::MatrixXd::Identity(apart.rows(), apart.cols())).norm(), 1e-5) << i;
   }
+}
+
+TEST(PassProblem, TakesOtherNoiseAndAnotherPriorWithoutLinearisingAgain) {
+  const Screened screened = screen(two_hours().pass, batch());
+  PassProblem problem(screened.pass, pass_setup(two_hours().pass.settings, batch()));
+  const PassSolution solution = first_solution(problem, screened);
+  PassProblem::Linear renewed = problem.linearise_by_parts(solution);
+  problem.set_noise({.direction_random_walk_rad_sqrt_s = 5e-8, .wandering_drift = {}});
+  Prior prior = problem.setup().prior;
+  prior.covariance *= 0.25;
+  problem.set_prior(prior);
+  problem.renew(solution, renewed);
+  const BatchResult by_renewed = step_from(problem, solution, std::move(renewed));
+  const BatchResult anew = step_from(problem, solution, problem.linearise_by_parts(solution));
+  EXPECT_EQ(by_renewed.step, anew.step);
+  EXPECT_EQ(by_renewed.errors.x.back(), anew.errors.x.back());
+  EXPECT_EQ(by_renewed.errors.last_root, anew.errors.last_root);
+  EXPECT_EQ(by_renewed.solution.arcs[30].h_in[1], anew.solution.arcs[30].h_in[1]);
 }
 
 TEST(PassProblem, LosesLittleByFixesTakenTogether) {

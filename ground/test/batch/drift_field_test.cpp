@@ -181,6 +181,28 @@ TEST(DriftField, TheSpectrumIsTheMostLikelyOne) {
   }
 }
 
+TEST(DriftField, TheSpectrumIsTheSameFromWhereverItsSearchBegins) {
+  std::mt19937_64 random(15);
+  const FieldMembers members(Layout{.drift_model = vsh(4)});
+  const FieldInformation information = seen_with(1e-9, normal_matrix(members.size(), 1, random).col(0) * 3e-9, random);
+  const FieldSpectrum found = most_likely_spectrum(members, information);
+  for (const double rms_rad_s : {1e-12, 1e-8, 1e-6}) {
+    const VectorXd first = VectorXd::Constant(found.log_rms.size(), std::log(rms_rad_s));
+    const FieldSpectrum other = most_likely_spectrum(members, information, first);
+    EXPECT_NEAR(other.log_likelihood, found.log_likelihood, 0.002) << rms_rad_s;
+    EXPECT_LT((other.log_rms - found.log_rms).cwiseAbs().maxCoeff(), 0.1) << rms_rad_s;
+  }
+}
+
+TEST(DriftField, OfDriftBeyondMeasureEachGroupIsAsLargeAsItMayBe) {
+  std::mt19937_64 random(17);
+  const FieldMembers members(kSmall);
+  const FieldInformation information = seen_with(1e-9, normal_matrix(members.size(), 1, random).col(0) * 1e-3, random);
+  const FieldSpectrum found = most_likely_spectrum(members, information);
+  EXPECT_LT((found.log_rms.array() - std::log(1e-5)).abs().maxCoeff(), 1e-9);
+  EXPECT_LT(found.log_likelihood, information.log_likelihood);
+}
+
 TEST(DriftField, WithoutEvidenceItIsSmallAndNotNothing) {
   std::mt19937_64 random(9);
   const FieldMembers members(kSmall);
