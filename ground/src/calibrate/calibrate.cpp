@@ -13,6 +13,7 @@
 #include "batch/pass_setup.hpp"
 #include "batch/refine.hpp"
 #include "calibrate/calibrate_after.hpp"
+#include "calibrate/contradicted_fixes.hpp"
 #include "choose/decide.hpp"
 #include "judge/changes.hpp"
 #include "model/drift_on_board.hpp"
@@ -295,7 +296,12 @@ CalibrationRun calibrate_as_stamped(const Pass& pass, const CalibrationOptions& 
   } else {
     fly();
   }
+  std::vector<FixRecord> contradicted;
+  if (!by_batch) {
+    contradicted = fly_without_contradicted(pass, settings, flown, decision, on_board);
+  }
   CalibrationRun run = std::move(recorder).take();
+  put_into(run.fixes, std::move(contradicted));
   run.options = decision.options;
   run.evidence = decision.evidence;
   run.changes = decision.changes;
