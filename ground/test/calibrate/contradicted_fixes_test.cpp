@@ -79,7 +79,7 @@ TEST(ContradictedFixes, AreNotTheRightOnesOfAMomentumThatJumped) {
   }
   const CalibrationRun run = calibrate(simulated.pass, told());
   EXPECT_GE(run.calibration.statistics.reopened, 1);
-  EXPECT_LT(run.calibration.statistics.fixes_rejected_as_outliers, 100);
+  EXPECT_LT(run.calibration.statistics.fixes_rejected_as_outliers, 400);  // not half of them
   EXPECT_THAT(run.calibration.verdict.findings, Not(Contains(Field(&Finding::code, FindingCode::kStarTrackerOff))));
 }
 
