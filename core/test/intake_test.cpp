@@ -241,6 +241,16 @@ TEST(GyroHealth, IsStuckWhenASingleComponentIs) {
   }
 }
 
+TEST(GyroHealth, ToldOfASingleComponentOnlyWhereItMatters) {
+  // It sticks on a body at rest, and is wrong from when that turns.
+  turning_about(Eigen::Vector3d::UnitY(), 60, 1e-9, 0, 30, 1e9, 120,
+                [](double t_s, GyroState state, const GyroHealth<>&) {
+                  if (t_s <= 31 || t_s >= 61) {
+                    EXPECT_EQ(state, t_s >= 61 ? GyroState::kStuck : GyroState::kUsed) << t_s;
+                  }
+                });
+}
+
 /// That of a body that turns about its axis keeps its value but for noise, and rounding may hide that; so it may where
 /// the component is at its largest.
 TEST(GyroHealth, IsNotStuckWhereAComponentMayStandStill) {
