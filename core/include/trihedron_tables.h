@@ -7,7 +7,7 @@
 /* C has no `using`, and constants are to be known to the preprocessor. NOLINTBEGIN(modernize-*) */
 
 /** Of the tables in this file. */
-#define TRIHEDRON_TABLES_VERSION 2u
+#define TRIHEDRON_TABLES_VERSION 3u
 /** There is room for so many in the tables. */
 #define TRIHEDRON_MAX_GYROS 3
 
@@ -150,12 +150,14 @@ enum trihedron_fix {
 /** Whether a gyro is used. */
 enum trihedron_gyro {
   TRIHEDRON_GYRO_USED = 0,
-  /** Its readings do not change; used again when they do. */
+  /** Its readings, or one component, do not change; used again when they do. */
   TRIHEDRON_GYRO_STUCK = 1,
   /** Left out for good: it alone did not agree with the rest. */
   TRIHEDRON_GYRO_ISOLATED = 2,
   /** Left out by command. */
-  TRIHEDRON_GYRO_NOT_SELECTED = 3
+  TRIHEDRON_GYRO_NOT_SELECTED = 3,
+  /** Its readings are where no body turns to between two samples; used again when they are back, or after an hour. */
+  TRIHEDRON_GYRO_LEAPT = 4
 };
 
 /** What a slot for snapshots holds. */

@@ -43,7 +43,7 @@ template <class Estimator>
 void OnBoard<Estimator>::reset() {
   const CalibrationSetup& setup = estimator_.setup();
   estimator_.forget();
-  intake_ = Intake(setup);
+  intake_ = decltype(intake_)(setup);
   fixes_.clear();
   frozen_fixes_.forget();
   readings_ = Readings<Gyros::capacity()>(setup, Estimator::kTakesSamplesTogether);
@@ -169,12 +169,12 @@ StepReport OnBoard<Estimator>::flush() {
 template <class Estimator>
 SampleStatus OnBoard<Estimator>::let_in(GyroSample& sample, std::optional<Step>& to_it, StepReport& report) {
   switch (intake_.look_at_clock(sample.t, readings_.latest())) {
-    case Intake::Clock::kOutOfOrder:
+    case decltype(intake_)::Clock::kOutOfOrder:
       return SampleStatus::kRejectedOutOfOrder;
-    case Intake::Clock::kSetBack:
+    case decltype(intake_)::Clock::kSetBack:
       set_clock(sample.t, report);
       break;
-    case Intake::Clock::kRunsOn:
+    case decltype(intake_)::Clock::kRunsOn:
       break;
   }
   if (const SampleStatus status = intake_.screen(sample); !is_used(status)) {

@@ -77,7 +77,8 @@ static_assert(static_cast<std::uint32_t>(GyroState::kUsed) == TRIHEDRON_GYRO_USE
 static_assert(static_cast<std::uint32_t>(GyroState::kStuck) == TRIHEDRON_GYRO_STUCK);
 static_assert(static_cast<std::uint32_t>(GyroState::kIsolated) == TRIHEDRON_GYRO_ISOLATED);
 static_assert(static_cast<std::uint32_t>(GyroState::kNotSelected) == TRIHEDRON_GYRO_NOT_SELECTED);
-static_assert(kGyroStates == 4);
+static_assert(static_cast<std::uint32_t>(GyroState::kLeapt) == TRIHEDRON_GYRO_LEAPT);
+static_assert(kGyroStates == 5);
 static_assert(static_cast<std::uint32_t>(SnapshotAnswer::kRestored) == TRIHEDRON_SNAPSHOT_RESTORED);
 static_assert(static_cast<std::uint32_t>(SnapshotAnswer::kOlder) == TRIHEDRON_SNAPSHOT_OLDER);
 static_assert(static_cast<std::uint32_t>(SnapshotAnswer::kForeign) == TRIHEDRON_SNAPSHOT_FOREIGN);

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <random>
@@ -31,7 +32,7 @@ GyroSample live_sample(double t_s) {
   return sample;
 }
 
-using Clock = Intake::Clock;
+using Clock = Intake<>::Clock;
 
 TEST(IntakeClock, RunsOnWithSamplesThatComeLater) {
   Intake intake(intake_setup());
@@ -60,12 +61,12 @@ TEST(IntakeClock, BelievesALeapOnlyWhenTheNextSampleConfirmsIt) {
 TEST(IntakeClock, IsSetBackBySixteenSamplesThatRunWell) {
   Intake intake(intake_setup());
   const auto behind = [&](double t_s) { return intake.look_at_clock(second(t_s), second(1000)); };
-  for (int i = 1; i < Intake::kSetBackSamples; ++i) {
+  for (int i = 1; i < Intake<>::kSetBackSamples; ++i) {
     EXPECT_EQ(behind(0.125 * i), Clock::kOutOfOrder) << i;
   }
   EXPECT_EQ(behind(2), Clock::kSetBack);
   // A time from which no difference can be told is none.
-  for (const Time t : {Time::min(), Time::max(), Time(Intake::kMaxTime + Duration(1))}) {
+  for (const Time t : {Time::min(), Time::max(), Time(Intake<>::kMaxTime + Duration(1))}) {
     EXPECT_EQ(intake.look_at_clock(t, std::nullopt), Clock::kOutOfOrder);
     EXPECT_EQ(intake.look_at_clock(t, second(1000)), Clock::kOutOfOrder);
   }
@@ -119,7 +120,7 @@ TEST(Intake, RejectsSamplesAndFixesOfTooFewGyros) {
 }
 
 /// Samples from `from_s` up to `to_s`, in which gyro 1 reads the same all the time if `sticks`.
-void look_on(GyroHealth& health, double from_s, double to_s, double period_s, bool sticks) {
+void look_on(GyroHealth<>& health, double from_s, double to_s, double period_s, bool sticks) {
   for (int i = 0; from_s + i * period_s < to_s; ++i) {
     GyroSample sample = live_sample(from_s + i * period_s);
     if (sticks) {
@@ -170,7 +171,7 @@ void turning(double rate_rad_s, double stops_s, double resolution, double until_
 TEST(GyroHealth, IsStuckAtOnceWhenAReadingThatMovedStops) {
   constexpr double kOrbital_rad_s = 1.1e-3;
   constexpr double kNever_s = 1e9;
-  turning(kOrbital_rad_s, 60, 1e-12, 61, [](double t_s, const GyroHealth& health) {
+  turning(kOrbital_rad_s, 60, 1e-12, 61, [](double t_s, const GyroHealth<>& health) {
     EXPECT_EQ(health.states()[0], GyroState::kUsed);
     EXPECT_EQ(health.states()[1], t_s >= 60.375 ? GyroState::kStuck
                                   : t_s < 60    ? GyroState::kUsed
@@ -178,7 +179,7 @@ TEST(GyroHealth, IsStuckAtOnceWhenAReadingThatMovedStops) {
         << t_s;
   });
   for (const double resolution : {1e-5, 1e-4, 1e-3}) {
-    turning(kOrbital_rad_s, kNever_s, resolution, 600, [&](double t_s, const GyroHealth& health) {
+    turning(kOrbital_rad_s, kNever_s, resolution, 600, [&](double t_s, const GyroHealth<>& health) {
       EXPECT_EQ(health.states()[1], GyroState::kUsed) << t_s << " s, rounded to " << resolution;
     });
   }
@@ -196,9 +197,152 @@ TEST(GyroHealth, TakesStuckStretchesTogetherThatAreNearEachOther) {
   }
 }
 
+/// Readings of gyro 1 at 8 Hz, noise of 1e-5, rounded to `resolution` and then to nine decimals, of a body that
+/// from `rests_s` on turns once in an orbit about `axis`; one component repeats itself from `sticks_s` to `lives_s`.
+template <class Look>
+void turning_about(const Eigen::Vector3d& axis, double rests_s, double resolution, int component, double sticks_s,
+                   double lives_s, double until_s, Look&& look) {
+  constexpr double kOrbital_rad_s = 1.1e-3;
+  PerGyro<double> noise_rad;
+  noise_rad[0] = noise_rad[1] = 1e-5;
+  GyroHealth<> health(2, noise_rad);
+  std::mt19937_64 random(5);
+  std::normal_distribution<double> noise(0, 1e-5);
+  double held = 0;
+  for (int i = 0; 0.125 * i < until_s; ++i) {
+    const double t_s = 0.125 * i;
+    GyroSample sample = live_sample(t_s);
+    const double angle = kOrbital_rad_s * std::max(t_s - rests_s, 0.0);
+    sample.h_b[1] = rotated<double>(Eigen::Vector3d(0.48, 0.6, 0.64), Eigen::Vector3d(-angle * axis));
+    for (double& x : sample.h_b[1]) {
+      x = std::round(std::round((x + noise(random)) / resolution) * resolution * 1e9) / 1e9;
+    }
+    double& its = sample.h_b[1](component);
+    held = t_s <= sticks_s ? its : held;
+    its = t_s > sticks_s && t_s < lives_s ? held : its;
+    health.look_at(sample);
+    look(t_s, health.states()[1], health);
+  }
+}
+
+TEST(GyroHealth, IsStuckWhenASingleComponentIs) {
+  for (int component = 0; component < 3; ++component) {
+    const Eigen::Vector3d axis = Eigen::Vector3d::Unit((component + 1) % 3);
+    turning_about(axis, 30, 1e-9, component, 60, 120, 180, [&](double t_s, GyroState state, const GyroHealth<>& health) {
+      const bool is_stuck = t_s > 60 && t_s < 120;
+      if (t_s <= 60 || t_s >= 60.75) {
+        EXPECT_EQ(state, is_stuck ? GyroState::kStuck : GyroState::kUsed) << t_s << " s, component " << component;
+      }
+      if (t_s == 61) {  // known since, whatever was said before
+        EXPECT_FALSE(health.usable(second(60), second(60))[1]);
+        EXPECT_TRUE(health.usable(second(59.875), second(59.875))[1]);
+      }
+    });
+  }
+}
+
+TEST(GyroHealth, ToldOfASingleComponentOnlyWhereItMatters) {
+  // It sticks on a body at rest, and is wrong from when that turns.
+  turning_about(Eigen::Vector3d::UnitY(), 60, 1e-9, 0, 30, 1e9, 120,
+                [](double t_s, GyroState state, const GyroHealth<>&) {
+                  if (t_s <= 31 || t_s >= 61) {
+                    EXPECT_EQ(state, t_s >= 61 ? GyroState::kStuck : GyroState::kUsed) << t_s;
+                  }
+                });
+}
+
+/// That of a body that turns about its axis keeps its value but for noise, and rounding may hide that; so it may where
+/// the component is at its largest.
+TEST(GyroHealth, IsNotStuckWhereAComponentMayStandStill) {
+  for (int component = 0; component < 3; ++component) {
+    for (const double resolution : {1e-9, 1e-7, 1e-6, 1e-5, 1e-4, 1e-3}) {
+      turning_about(Eigen::Vector3d::Unit(component), 0, resolution, component, 1e9, 1e9, 300,
+                    [&](double t_s, GyroState state, const GyroHealth<>&) {
+                      EXPECT_EQ(state, GyroState::kUsed) << t_s << " s, rounded to " << resolution;
+                    });
+      turning_about(Eigen::Vector3d(0.6, 0, -0.8), 0, resolution, component, 1e9, 1e9, 1500,
+                    [&](double t_s, GyroState state, const GyroHealth<>&) {
+                      EXPECT_EQ(state, GyroState::kUsed) << t_s << " s, rounded to " << resolution;
+                    });
+    }
+  }
+}
+
+/// Readings of gyro 1 at 8 Hz, turned by an angle about z from some sample to another.
+template <class Look>
+void leaping(double angle_rad, int from, int to, int until, Look&& look) {
+  GyroHealth<> health(2);
+  for (int i = 0; i < until; ++i) {
+    GyroSample sample = live_sample(0.125 * i);
+    const double turn = 0.125 * i * 1.1e-3 + (i >= from && i < to ? angle_rad : 0);
+    sample.h_b[1] = rotated<double>(sample.h_b[1], Eigen::Vector3d(0, 0, turn));
+    health.look_at(sample);
+    look(i, health);
+  }
+}
+
+TEST(GyroHealth, HasLeaptWhenNoBodyTurnsSoFar) {
+  const int end = 8 * 60 * 10;
+  for (const double angle_rad : {0.2, 1.5, 3.0}) {
+    leaping(angle_rad, 100, end, end + 100, [&](int i, const GyroHealth<>& health) {
+      EXPECT_EQ(health.states()[1], i > 100 && i < end ? GyroState::kLeapt : GyroState::kUsed) << i;
+      EXPECT_EQ(health.states()[0], GyroState::kUsed);
+      if (i == 101) {  // the first one is known by the second
+        EXPECT_FALSE(health.usable(second(12.5), second(12.5))[1]);
+        EXPECT_TRUE(health.usable(second(12.375), second(12.375))[1]);
+      }
+    });
+  }
+}
+
+TEST(GyroHealth, HasNotLeaptWhereABodyMayHaveTurned) {
+  const auto expect_used = [](int i, const GyroHealth<>& health) {
+    EXPECT_EQ(health.states()[1], GyroState::kUsed) << i;
+  };
+  leaping(0.06, 100, 200, 300, expect_used);   // half a radian in a second
+  leaping(3.0, 100, 101, 300, expect_used);    // a single one is left to others
+  leaping(3.0, 0, 1, 300, expect_used);        // the first of all is off
+  leaping(3.0, 5, 1000, 2000, [](int i, const GyroHealth<>& health) {  // hardly begun: any may be the right ones
+    EXPECT_EQ(health.states()[1], i > 1000 ? GyroState::kLeapt : GyroState::kUsed) << i;
+  });
+}
+
+TEST(GyroHealth, OfReadingsThatHaveLeaptIsGoodAgainAfterAnHourOrOnceSelected) {
+  GyroHealth<> health(2);
+  const auto look = [&](double from_s, double to_s, const Eigen::Vector3d& turn) {
+    for (double t_s = from_s; t_s < to_s; t_s += 1) {
+      GyroSample sample = live_sample(t_s);
+      sample.h_b[1] = rotated<double>(sample.h_b[1], turn);
+      health.look_at(sample);
+    }
+  };
+  const Eigen::Vector3d away(0, 0, 2);
+  look(0, 20, Eigen::Vector3d::Zero());
+  look(20, 3620, away);
+  EXPECT_EQ(health.states()[1], GyroState::kLeapt);
+  look(3620, 3621, away);
+  EXPECT_EQ(health.states()[1], GyroState::kUsed);
+  look(3621, 3640, away);
+  look(3640, 3700, Eigen::Vector3d::Zero());
+  EXPECT_EQ(health.states()[1], GyroState::kLeapt);
+  health.select(all_gyros(2));
+  EXPECT_EQ(health.states()[1], GyroState::kUsed);
+  // One that was stuck comes back wherever the body has turned to; so it does after a gap.
+  for (int i = 0; i < 40; ++i) {
+    GyroSample sample = live_sample(3700 + i);
+    sample.h_b[1] = Eigen::Vector3d(0.6, 0, 0.8);
+    health.look_at(sample);
+  }
+  look(3740, 3742, away);
+  EXPECT_EQ(health.states()[1], GyroState::kUsed);
+  look(3742, 3760, away);
+  look(3762, 3764, Eigen::Vector3d::Zero());
+  EXPECT_EQ(health.states()[1], GyroState::kUsed);
+}
+
 TEST(GyroHealth, IsNotThatOfAFaultWhileNowThisGyroIsSuspectedAndNowThat) {
   GyroHealth health(3);
-  for (int i = 0; i < 10 * GyroHealth::kVerdicts; ++i) {
+  for (int i = 0; i < 10 * GyroHealth<>::kVerdicts; ++i) {
     health.judge(i % 5 == 4 ? kNoGyro : i / 4 % 3);
   }
   for (int k = 0; k < 3; ++k) {
@@ -208,7 +352,7 @@ TEST(GyroHealth, IsNotThatOfAFaultWhileNowThisGyroIsSuspectedAndNowThat) {
 
 TEST(GyroHealth, OfAnIsolatedGyroIsGoodAgainOnceItIsSelected) {
   GyroHealth health(3);
-  for (int i = 0; i < GyroHealth::kVerdicts; ++i) {
+  for (int i = 0; i < GyroHealth<>::kVerdicts; ++i) {
     EXPECT_EQ(health.states()[2], GyroState::kUsed);
     health.judge(2);
   }

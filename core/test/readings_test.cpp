@@ -39,7 +39,7 @@ GyroSample turning_sample(double t_s) {
 struct SomeReadings {
   explicit SomeReadings(bool together = true) : readings(buffer_setup(), together) {}
   PairReadings readings;
-  GyroHealth health{2};
+  GyroHealth<2> health{2};
   PerGyro<GyroModel<7>, 2> gyros;
 
   void push(double t_s) {
@@ -279,7 +279,7 @@ GyroMask used_of_three(int first, const std::array<Eigen::Vector3d, 3>& axes) {
   setup.layout.gyros = 3;
   setup.readout_noise_rad[2] = kReadingNoise_rad;
   Readings<3> readings(setup, true);
-  GyroHealth health(3);
+  GyroHealth<3> health(3);
   health.select(all_gyros(2));
   for (int i = 0; i <= 40; ++i) {
     GyroSample s = turning_sample(0.125 * i);

@@ -21,7 +21,7 @@ using Small = test::PairEstimator;
 using Large = test::FullEstimator;
 const Part kParts[] = {
     {"on-board object", sizeof(PairOnBoard), sizeof(FullOnBoard)},
-    {"  intake", sizeof(Intake), sizeof(Intake)},
+    {"  intake", sizeof(Intake<Small::Gyros::capacity()>), sizeof(Intake<Large::Gyros::capacity()>)},
     {"  queue of fixes", sizeof(FixQueue<Small::kStarTrackers>), sizeof(FixQueue<Large::kStarTrackers, true>)},
     {"  frozen fixes", sizeof(FrozenFixes<Small::kStarTrackers, Small::Gyros::capacity()>),
      sizeof(FrozenFixes<Large::kStarTrackers, Large::Gyros::capacity()>)},

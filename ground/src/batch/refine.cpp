@@ -231,6 +231,10 @@ Refinement::Refinement(const Screened& screened, PassSetup setup, const Calibrat
   }
 }
 
+void Refinement::judge(std::vector<FixRecord>& fixes) const {
+  use_residuals(problem_, result_.solution, roots_, fixes);
+}
+
 void Refinement::put_into(CalibrationRun& run) && {
   const Layout& layout = problem_.setup().on_board.layout;
   Calibration& calibration = run.calibration;
@@ -268,7 +272,7 @@ void Refinement::put_into(CalibrationRun& run) && {
   }
   calibration.statistics.batch_iterations = result_.iterations;
   calibration.statistics.batch_converged = result_.converged;
-  use_residuals(problem_, result_.solution, roots_, run.fixes);
+  judge(run.fixes);
   run.attitude = std::move(course_.attitude);
   run.definitive_attitude = std::move(definitive_attitude_);
 }

@@ -13,12 +13,14 @@
 #include "batch/pass_setup.hpp"
 #include "batch/refine.hpp"
 #include "calibrate/calibrate_after.hpp"
+#include "calibrate/contradicted_fixes.hpp"
 #include "choose/decide.hpp"
 #include "judge/changes.hpp"
 #include "model/drift_on_board.hpp"
 #include "model/prior.hpp"
 #include "model/setup.hpp"
 #include "trihedron/ground/clocks/clocks.hpp"
+#include "trihedron/ground/clocks/regular_stamps.hpp"
 #include "trihedron/ground/evaluate/convergence.hpp"
 #include "trihedron/ground/evaluate/open_loop_forecast.hpp"
 #include "trihedron/ground/judge/verdict.hpp"
@@ -295,7 +297,12 @@ CalibrationRun calibrate_as_stamped(const Pass& pass, const CalibrationOptions& 
   } else {
     fly();
   }
+  std::vector<FixRecord> contradicted;
+  if (!by_batch) {
+    contradicted = fly_without_contradicted(pass, settings, flown, decision, on_board);
+  }
   CalibrationRun run = std::move(recorder).take();
+  put_into(run.fixes, std::move(contradicted));
   run.options = decision.options;
   run.evidence = decision.evidence;
   run.changes = decision.changes;
@@ -340,14 +347,34 @@ CalibrationRun calibrate_as_stamped(const Pass& pass, const CalibrationOptions& 
   return run;
 }
 
+/// With regular stamps of the gyros. What stamps that scatter are off in the mean they do not tell, but those of the star
+/// tracker do, up to about as much as they scatter.
+Pass with_stamps(Pass pass, const RegularStamps& regular) {
+  constexpr double kSure = 5;
+  constexpr double kLikeScatter = 3;
+  pass.gyro.t = regular.t;
+  const std::optional<Clocks> clocks = clocks_of(pass);
+  if (!clocks || !clocks->mid_offset_s.is_sure(kSure) ||
+      std::abs(clocks->mid_offset_s.value) > kLikeScatter * regular.scatter_s) {
+    return pass;
+  }
+  for (Time& t : pass.gyro.t) {
+    t -= from_seconds(clocks->mid_offset_s.value);
+  }
+  return pass;
+}
+
 }  // namespace
 
 CalibrationRun calibrate(const Pass& pass, const CalibrationOptions& options, const Progress& progress) {
   return calibrate_after(pass, options, progress, std::nullopt);
 }
 
-CalibrationRun calibrate_after(const Pass& pass, const CalibrationOptions& options, const Progress& progress,
+CalibrationRun calibrate_after(const Pass& as_given, const CalibrationOptions& options, const Progress& progress,
                                std::optional<Calibration> known_before) {
+  const std::optional<RegularStamps> regular = regular_stamps(as_given);
+  const std::optional<Pass> with_regular = regular ? std::optional(with_stamps(as_given, *regular)) : std::nullopt;
+  const Pass& pass = with_regular ? *with_regular : as_given;
   const std::optional<Clocks> clocks = clocks_of(pass);
   const ClockCorrection correction = clocks ? wanted_correction(*clocks, pass.settings, options) : ClockCorrection{};
   std::optional<Pass> corrected;
@@ -359,6 +386,7 @@ CalibrationRun calibrate_after(const Pass& pass, const CalibrationOptions& optio
   CalibrationRun run = calibrate_as_stamped(stamped, with_clock_states(options, correction), progress);
   run.clocks = clocks;
   run.clock_correction = correction;
+  run.gyro_stamps_off_s = regular ? regular->scatter_s : 0;
   add_to_estimates(correction, run.calibration.further);
   run.calibration.clocks = clocks_found(pass.settings, correction, run.calibration.further);
   if (known_before) {
@@ -398,6 +426,9 @@ NavigationRun navigate(const Pass& pass, const CalibrationOptions& options, cons
   run.forecast = forecast_of(options, pipeline, run.attitude);
   run.clock_correction = correction;
   run.clocks = clocks_of(stamped);
+  if (const std::optional<RegularStamps> regular = regular_stamps(pass)) {
+    run.gyro_stamps_off_s = regular->scatter_s;
+  }
   run.verdict = judge_navigation(stamped, run);
   return run;
 }

@@ -18,6 +18,8 @@ constexpr double kTooMuchChange_s = 0.05;
 /// … and so is a gyro that is late against another.
 constexpr double kSeenLate_s = 2e-3;
 constexpr double kTooLate_s = 0.01;
+/// In orbital motion such stamps move a reading by the noise of the paper's gyros.
+constexpr double kTooScattered_s = 0.01;
 
 /// Where the calibration in use had something to say of them.
 constexpr const char* kAfterCorrection = " though they were corrected as the calibration in use says";
@@ -95,9 +97,23 @@ void tell_correction(const PassSettings& settings, const ClockCorrection& correc
   }
 }
 
+/// `what_then`: what became of it.
+void judge_gyro_stamps(double off_s, Finding::Severity severity, const char* what_then,
+                       std::vector<Finding>& findings) {
+  if (off_s > 0) {
+    add(findings, FindingCode::kGyroStampsScatter, severity,
+        fmt::format("The stamps of the gyro samples scatter about regular times, at which the readings were taken{}.",
+                    what_then),
+        fmt::format("{:.1f} ms (root mean square)", 1e3 * off_s),
+        "Stamp the samples when they are taken, not when they are sent or received.");
+  }
+}
+
 }  // namespace
 
 void judge_clocks(const Pass& pass, const CalibrationRun& run, std::vector<Finding>& findings) {
+  judge_gyro_stamps(run.gyro_stamps_off_s, Finding::Severity::kWarning, "; the calibration has used these times",
+                    findings);
   const ClockCorrection& correction = run.clock_correction;
   const bool corrected = correction.of_star_tracker();
   double offset_s = sure_value_of(run, FurtherState::kClockOffset);
@@ -145,6 +161,9 @@ void judge_clocks(const Pass& pass, const CalibrationRun& run, std::vector<Findi
 void judge_clocks(const Pass& pass, const NavigationRun& run, std::vector<Finding>& findings) {
   const bool corrected = run.clock_correction.of_star_tracker() || run.clock_correction.of_gyros();
   tell_correction(pass.settings, run.clock_correction, findings);
+  judge_gyro_stamps(run.gyro_stamps_off_s,
+                    run.gyro_stamps_off_s > kTooScattered_s ? Finding::Severity::kDoNotUse : Finding::Severity::kWarning,
+                    ", which is in the attitude", findings);
   if (!run.clocks) {
     return;
   }

@@ -118,9 +118,10 @@ void judge_batch(const Statistics& statistics, std::vector<Finding>& findings) {
 void judge_star_tracker(const Statistics& statistics, std::vector<Finding>& findings) {
   if (statistics.fixes_off_in_a_row > 0) {
     add(findings, FindingCode::kStarTrackerOff,
-        "For a while the star tracker was off by more than any drift can cause; its fixes were not used.",
+        "For a while the star tracker was off by more than any drift can cause, or contradicted the rest of the pass; "
+        "its fixes were not used.",
         fmt::format("{} fixes, 20 and more in a row", statistics.fixes_off_in_a_row),
-        "Look at its telemetry there: a wrong identification, or a head that was moved.");
+        "Look at its telemetry there: a wrong identification, a head that was moved, a clock that was off.");
   }
   if (statistics.fixes_frozen > 0) {
     add(findings, FindingCode::kStarTrackerFrozen,
@@ -153,8 +154,12 @@ void judge_gyros(const Pass& pass, const CalibrationRun& run, std::vector<Findin
     findings.back().severity = Severity::kDoNotUse;
   }
   add_events(GyroState::kStuck, FindingCode::kGyroStuck,
-             "Readings of a gyro stood still, not even moved by noise; they were not used.",
+             "Readings of a gyro, or one component of them, stood still, not even moved by noise; they were not used.",
              "Look at the telemetry there: a frozen readout, or the last value repeated in a gap.");
+  add_events(GyroState::kLeapt, FindingCode::kGyroLeapt,
+             "Readings of a gyro leapt farther than a body turns from one sample to the next; they were not used until "
+             "they were back.",
+             "Look at the telemetry there: columns or gyros exchanged, a sign, samples of another time.");
 }
 
 void judge_gyro_rate(const Pass& pass, const CalibrationRun& run, std::vector<Finding>& findings) {

@@ -398,6 +398,25 @@ TEST(Verdict, FindsAGyroThatStoodStill) {
   EXPECT_TRUE(verdict.trustworthy);
 }
 
+TEST(Verdict, FindsAGyroThatLeapt) {
+  auto run = good_run();
+  run.gyro_events = {{Time(std::chrono::minutes(3)), 1, GyroState::kLeapt},
+                     {Time(std::chrono::minutes(8)), 1, GyroState::kUsed}};
+  const Verdict verdict = judge(good_pass(), run);
+  EXPECT_THAT(codes(verdict), ElementsAre("gyro-leapt"));
+  EXPECT_EQ(verdict.findings[0].evidence, "gyro 2 leapt at 3.0 min");
+  EXPECT_TRUE(verdict.trustworthy);
+}
+
+TEST(Verdict, FindsStampsOfGyrosThatScatter) {
+  auto run = good_run();
+  run.gyro_stamps_off_s = 0.017;
+  const Verdict verdict = judge(good_pass(), run);
+  EXPECT_THAT(codes(verdict), ElementsAre("gyro-stamps-scatter"));
+  EXPECT_EQ(verdict.findings[0].evidence, "17.0 ms (root mean square)");
+  EXPECT_TRUE(verdict.trustworthy);
+}
+
 TEST(Verdict, FindsAStarTrackerThatWasOff) {
   auto run = good_run();
   run.calibration.statistics.fixes_off_in_a_row = 100;
@@ -429,6 +448,15 @@ NavigationRun good_navigation() {
   run.corrections = 7;
   run.open_loops.assign(7, {.t = {}, .error_rad = 1e-4, .square = 3});
   return run;
+}
+
+TEST(Verdict, OfANavigationForbidsStampsThatScatterMuch) {
+  NavigationRun run = good_navigation();
+  run.gyro_stamps_off_s = 0.003;
+  EXPECT_THAT(codes(judge_navigation(good_pass(), run)), ElementsAre("gyro-stamps-scatter"));
+  EXPECT_TRUE(judge_navigation(good_pass(), run).trustworthy);
+  run.gyro_stamps_off_s = 0.017;
+  EXPECT_FALSE(judge_navigation(good_pass(), run).trustworthy);
 }
 
 TEST(Verdict, OfANavigationSaysWhetherTheParametersFit) {

@@ -1,9 +1,13 @@
 #pragma once
-/// Which gyros can be used, and over which times: detection of stuck readings and isolation of faulty gyros.
+/// Which gyros can be used, and over which times: detection of readings that stick or leap, and isolation of faulty
+/// gyros.
 
 #include <Eigen/Core>
 #include <algorithm>
+#include <array>
 #include <chrono>
+#include <cmath>
+#include <limits>
 
 #include "trihedron/core/per_gyro.hpp"
 #include "trihedron/core/status.hpp"
@@ -11,7 +15,8 @@
 
 namespace trihedron {
 
-/// State of each gyro from repeated readings and from the fault suspicions of rejected fixes.
+/// With room for kGyros of them: state of each gyro from readings that repeat themselves or leap, and from the fault suspicions of rejected fixes.
+template <int kGyros = kMaxGyros>
 class GyroHealth {
  public:
   /// Identical consecutive samples, and the time over which they came, that mean a stuck gyro: a live reading has
@@ -21,22 +26,46 @@ class GyroHealth {
   /// Sooner where a reading that moved stops between two samples: it is stuck when it should have gone on by so many
   /// times what noise and resolution have lately added to its steps.
   static constexpr double kStepsMissing = 4;
+  /// A single component is stuck when it repeats itself so many times, while the others change and the reading moves by
+  /// so many sigmas, though it has shown steps finer than this part of its noise: each repetition would be a chance of
+  /// one in two hundred. Where its resolution is coarser or not known, a component of a live reading may stand still.
+  static constexpr int kRepetitions = 4;
+  static constexpr double kResolvedPart = 1.0 / 64;
+  static constexpr double kSigmasMoved = 10;
+  /// Below which a step is one of rounding in the arithmetic.
+  static constexpr double kRounding = 1e-12;
   /// Over which the motion of a reading is averaged, and steps after which it is known.
   static constexpr double kMotionTime_s = 1;
   static constexpr int kStepsOfMotion = 8;
+  /// No body turns by more than this from one sample to the next: two readings in a row that are farther from the one
+  /// before them have leapt. A momentum does not leap; what reads it does.
+  static constexpr double kLargestTurn_rad_s = 0.5;
+  static constexpr double kLargestJolt_rad = 0.02;
+  /// Steps in a row without a leap before one is believed: a first reading may be the one that is off.
+  static constexpr int kStepsToLeap = 8;
+  /// The longest step that tells a leap.
+  static constexpr Duration kLongestStep = std::chrono::milliseconds(1500);
+  /// After which readings that have leapt are used again, wherever they are: by then the fixes must judge.
+  static constexpr Duration kLeapTime = std::chrono::hours(1);
   /// Consecutive suspicions of the same gyro after which it is isolated.
   static constexpr int kVerdicts = 5;
   /// Stuck stretches closer than this are merged.
   static constexpr Duration kMemory = std::chrono::seconds(10);
 
   GyroHealth() = default;
-  explicit GyroHealth(int gyros) : gyros_(gyros), selected_(all_gyros(gyros)) {}
+  /// `readout_noise_rad`: 1-sigma of each component; without it no single component is taken for stuck.
+  explicit GyroHealth(int gyros, const PerGyro<double>& readout_noise_rad = {})
+      : gyros_(gyros), selected_(all_gyros(gyros)) {
+    std::copy_n(readout_noise_rad.begin(), kGyros, readout_noise_rad_.begin());
+  }
 
   /// Takes the next sample; in time order.
   void look_at(const GyroSample& sample) {
     for (int k = 0; k < gyros_; ++k) {
       Readings& its = readings_[k];
       const Eigen::Vector3d& h_b = sample.h_b[k];
+      its.look_for_leap(h_b, sample.t, last_t_);
+      its.follow_components(h_b, sample.t, readout_noise_rad_[k]);
       if (its.alike > 0 && (h_b == its.last || (!h_b.allFinite() && !its.last.allFinite()))) {
         ++its.alike;
       } else {
@@ -47,9 +76,14 @@ class GyroHealth {
       }
       its.stuck = its.alike > 1 &&
                   ((its.alike >= kStuckSamples && sample.t - its.since >= kStuckTime) || its.has_stopped(sample.t));
+      Time since = its.stuck ? its.since : sample.t;
+      for (const Component& component : its.components) {
+        its.stuck = its.stuck || component.stuck;
+        since = component.stuck ? std::min(since, component.since) : since;
+      }
       if (its.stuck) {
-        if (!(its.stuck_from <= its.since && its.since - its.stuck_until <= kMemory)) {
-          its.stuck_from = its.since;
+        if (!(its.stuck_from <= since && since - its.stuck_until <= kMemory)) {
+          its.stuck_from = since;
         }
         its.stuck_until = sample.t;
       }
@@ -72,6 +106,7 @@ class GyroHealth {
     for (int k = 0; k < gyros_; ++k) {
       selected_[k] = selected[k];
       isolated_[k] = false;
+      readings_[k].leap = {};
     }
     suspect_ = kNoGyro;
     verdicts_ = 0;
@@ -81,7 +116,7 @@ class GyroHealth {
   [[nodiscard]] GyroMask usable(Time from, Time to) const {
     GyroMask mask;
     for (int k = 0; k < gyros_; ++k) {
-      mask[k] = selected_[k] && !isolated_[k] && !readings_[k].is_stuck_within(from, to);
+      mask[k] = selected_[k] && !isolated_[k] && !readings_[k].is_dead_within(from, to);
     }
     return mask;
   }
@@ -90,7 +125,7 @@ class GyroHealth {
     GyroMask mask;
     for (int k = 0; k < gyros_; ++k) {
       mask[k] =
-          selected_[k] && !isolated_[k] && !readings_[k].is_stuck_within(a, a) && !readings_[k].is_stuck_within(b, b);
+          selected_[k] && !isolated_[k] && !readings_[k].is_dead_within(a, a) && !readings_[k].is_dead_within(b, b);
     }
     return mask;
   }
@@ -98,10 +133,11 @@ class GyroHealth {
   [[nodiscard]] PerGyro<GyroState> states() const {
     PerGyro<GyroState> states;
     for (int k = 0; k < gyros_; ++k) {
-      states[k] = !selected_[k]        ? GyroState::kNotSelected
-                  : isolated_[k]       ? GyroState::kIsolated
-                  : readings_[k].stuck ? GyroState::kStuck
-                                       : GyroState::kUsed;
+      states[k] = !selected_[k]              ? GyroState::kNotSelected
+                  : isolated_[k]             ? GyroState::kIsolated
+                  : readings_[k].stuck       ? GyroState::kStuck
+                  : readings_[k].leap.proven ? GyroState::kLeapt
+                                             : GyroState::kUsed;
     }
     return states;
   }
@@ -112,10 +148,30 @@ class GyroHealth {
       its.since = last_t_ = t;
       its.stuck_from = Time::max();
       its.stuck_until = Time::min();
+      its.leap = {};
+      its.components = {};
     }
   }
 
  private:
+  /// One component of the readings.
+  struct Component {
+    int repetitions = 0;  ///< of its value in a row, while others changed
+    bool stuck = false;
+    Time since{};  ///< of the first with that value
+    double finest_step = std::numeric_limits<double>::max();
+  };
+
+  /// Readings that are where they cannot have come to.
+  struct Leap {
+    bool suspected = false;  ///< one reading has leapt
+    bool proven = false;     ///< and the next one as well
+    int steps_without = 0;
+    Eigen::Vector3d before = Eigen::Vector3d::Zero();
+    Time from = Time::max();
+    Time until = Time::min();
+  };
+
   struct Readings {
     Eigen::Vector3d last = Eigen::Vector3d::Zero();
     int alike = 0;  ///< in a row
@@ -126,6 +182,8 @@ class GyroHealth {
     Eigen::Vector3d motion = Eigen::Vector3d::Zero();  ///< per second, average
     double jitter = 0;                                 ///< of late the largest part of a step that is not motion
     int steps = 0;                                     ///< that the motion is known by
+    std::array<Component, 3> components{};
+    Leap leap;
 
     /// A reading other than the last ones, which came until `until`. The step after a stretch in which it was stuck is
     /// not one of motion.
@@ -143,7 +201,51 @@ class GyroHealth {
       motion += part * (step / dt_s - motion);
       steps += steps < kStepsOfMotion ? 1 : 0;
     }
-    [[nodiscard]] bool is_stuck_within(Time from, Time to) const { return stuck_from <= to && from <= stuck_until; }
+    /// A component may stand still where the body turns about its axis; then its noise moves it. Where the whole reading
+    /// repeats itself, that says nothing of one component.
+    void follow_components(const Eigen::Vector3d& h_b, Time t, double noise_rad) {
+      for (int axis = 0; axis < 3 && alike > 0; ++axis) {
+        Component& its = components[static_cast<std::size_t>(axis)];
+        const double step = std::abs(h_b(axis) - last(axis));
+        if (step == 0) {
+          its.repetitions += h_b == last ? 0 : 1;
+          const double across_rad = noise_rad * std::sqrt(std::max(1 - h_b(axis) * h_b(axis), 0.0));
+          its.stuck = its.stuck || (its.repetitions >= kRepetitions && its.finest_step < kResolvedPart * across_rad &&
+                                    motion.norm() * to_seconds(t - its.since) > kSigmasMoved * noise_rad);
+          continue;
+        }
+        if (step > kRounding) {
+          its.finest_step = std::min(its.finest_step, step);
+        }
+        its.repetitions = 0;
+        its.stuck = false;
+        its.since = t;
+      }
+    }
+    /// A single reading that is off is left to those who compare it with its neighbours. Readings that have leapt are
+    /// used again once they leap back.
+    void look_for_leap(const Eigen::Vector3d& h_b, Time t, Time last_t) {
+      if (!nearly_unit(h_b.norm()) || !nearly_unit(last.norm())) {
+        return;
+      }
+      const bool leaps = !stuck && t - last_t <= kLongestStep && is_beyond_reach(last, h_b, t - last_t);
+      if (leap.proven) {
+        leap.proven = !leaps && t - leap.from < kLeapTime;
+      } else if (leap.suspected) {
+        leap.proven = is_beyond_reach(leap.before, h_b, 2 * std::min(t - leap.from, kLongestStep));
+        leap.suspected = false;
+      } else if (leaps && leap.steps_without >= kStepsToLeap) {
+        leap = {.suspected = true, .before = last, .from = t};
+      }
+      leap.steps_without = leaps ? 0 : std::min(leap.steps_without + 1, kStepsToLeap);
+      leap.until = leap.proven ? t : leap.until;
+    }
+    [[nodiscard]] static bool is_beyond_reach(const Eigen::Vector3d& from, const Eigen::Vector3d& to, Duration time) {
+      return (to - from).norm() > kLargestJolt_rad + kLargestTurn_rad_s * to_seconds(time);
+    }
+    [[nodiscard]] bool is_dead_within(Time from, Time to) const {
+      return (stuck_from <= to && from <= stuck_until) || (leap.from <= to && from <= leap.until);
+    }
     [[nodiscard]] bool has_stopped(Time t) const {
       return steps == kStepsOfMotion && last.allFinite() &&
              motion.norm() * to_seconds(t - since) > kStepsMissing * jitter;
@@ -151,8 +253,9 @@ class GyroHealth {
   };
 
   int gyros_ = 0;
+  PerGyro<double, kGyros> readout_noise_rad_{};
   Time last_t_{};
-  PerGyro<Readings> readings_;
+  PerGyro<Readings, kGyros> readings_;
   GyroMask selected_{};
   GyroMask isolated_{};
   int suspect_ = kNoGyro;

@@ -70,7 +70,7 @@ class OnBoard {
 
   [[nodiscard]] const Estimator& estimator() const { return estimator_; }
   [[nodiscard]] const Navigator<Estimator>& navigator() const { return navigator_; }
-  [[nodiscard]] const GyroHealth& health() const { return intake_.health(); }
+  [[nodiscard]] const GyroHealth<Estimator::Gyros::capacity()>& health() const { return intake_.health(); }
   /// Time of the latest sample used; needs one.
   [[nodiscard]] Time t() const { return readings_.latest_t(); }
   /// The same, if there is one since the start or since the clock was set back.
@@ -211,7 +211,7 @@ class OnBoard {
     return behind_ > 0 ? readings_.time(readings_.size() - behind_) : Time::max();
   }
 
-  Intake intake_;
+  Intake<Estimator::Gyros::capacity()> intake_;
   FixQueue<Estimator::kStarTrackers, Estimator::kFixCovariances> fixes_;
   FrozenFixes<Estimator::kStarTrackers, Gyros::capacity()> frozen_fixes_;
   Readings<Gyros::capacity()> readings_;

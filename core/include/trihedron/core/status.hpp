@@ -57,10 +57,11 @@ inline constexpr std::size_t kFixStatuses = 16;
 /// Whether a gyro is used.
 enum class GyroState : std::uint8_t {
   kUsed,
-  kStuck,        ///< its readings do not change, not even by noise; used again when they do
+  kStuck,        ///< its readings, or one component, do not change, not even by noise; used again when they do
   kIsolated,     ///< left out for good: several times in a row it alone did not agree with the rest
   kNotSelected,  ///< left out by command
+  kLeapt,        ///< its readings are where no body turns to between two samples; used again when they are back
 };
-inline constexpr std::size_t kGyroStates = 4;
+inline constexpr std::size_t kGyroStates = 5;
 
 }  // namespace trihedron

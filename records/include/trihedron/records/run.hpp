@@ -127,6 +127,7 @@ struct CalibrationRun {
   CalibrationOptions options;                    ///< as decided
   std::optional<Clocks> clocks;                  ///< where the pass shows them, by its stamps as they are given
   ClockCorrection clock_correction;              ///< of the stamps, made before the calibration
+  double gyro_stamps_off_s = 0;                  ///< rms off the regular times that were used in their place, or 0
   std::vector<Evidence> evidence;                ///< of what was left to the program to decide
   std::vector<DriftModelForecast> drift_models;  ///< that were compared, smallest first
   Calibration known_before;                      ///< values and covariance before the pass; states as in `calibration`
@@ -162,6 +163,7 @@ struct NavigationRun {
   long corrections = 0;                 ///< astro-corrections made
   long corrections_missed = 0;          ///< intervals over which there were fixes, but none that could correct
   ClockCorrection clock_correction;     ///< of the stamps, by the calibration in use
+  double gyro_stamps_off_s = 0;         ///< rms off the regular times that the samples are of, or 0
   std::optional<Clocks> clocks;         ///< where the pass shows them, behind this correction
   std::vector<OpenLoopEnd> open_loops;  ///< where fixes could be compared with it
   Statistics statistics;

@@ -51,6 +51,7 @@ inline constexpr std::array<StatusRow<GyroState>, kGyroStates> kGyroStateRows = 
     {GyroState::kStuck, "stuck"},
     {GyroState::kIsolated, "left out for good"},
     {GyroState::kNotSelected, "left out by command"},
+    {GyroState::kLeapt, "leapt"},
 }};
 
 /// Its name in the table.
