@@ -13,9 +13,10 @@ namespace {
 constexpr double kMiddle_s = 1.5 * 3600;
 const Eigen::Vector3d kAxis{0.6, -0.64, 0.48};
 
-/// Three hours with slews in which something moves.
-CalibrationRun calibrated(std::uint64_t seed, const std::function<void(Scenario&)>& change) {
-  Scenario scenario = scenario_in_eq1(seed, std::chrono::hours(3));
+/// A pass with slews in which something moves.
+CalibrationRun calibrated(std::uint64_t seed, const std::function<void(Scenario&)>& change,
+                          Duration duration = std::chrono::hours(3)) {
+  Scenario scenario = scenario_in_eq1(seed, duration);
   change(scenario);
   return calibrate(sim::simulate(scenario).pass, CalibrationOptions());
 }
@@ -65,11 +66,12 @@ TEST(Constancy, TakesDriftOutsideEq1ForWhatItIs) {
 }
 
 TEST(Constancy, TellsDayAndNightFromOtherCoursesOfTheCoefficients) {
-  const CalibrationRun run = calibrated(1, [](Scenario& scenario) {
+  const auto by_day = [](Scenario& scenario) {
     for (GyroScenario& gyro : scenario.gyros) {
       gyro.drift.thermal_fraction = 0.5;
     }
-  });
+  };
+  const CalibrationRun run = calibrated(1, by_day, std::chrono::hours(6));
   const Change& change = run.changes.front();
   EXPECT_EQ(change.moving, Moving::kCoefficients);
   EXPECT_EQ(change.motion, Motion::kOrbital);
