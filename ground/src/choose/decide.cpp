@@ -439,7 +439,8 @@ LikelyCourse most_likely_course(const Pass& pass, const Screened& screened, Cali
   for (int round = 0; round < kMostRounds; ++round) {
     const double least_s = std::max(course.least_s, likely.time_s - reach_s);
     const double most_s = std::min(course.most_s, likely.time_s + reach_s);
-    const auto bits = static_cast<int>(std::ceil(std::log2(4 * (most_s - least_s) / near_enough_s)));
+    // To a fraction of what is near enough: the uncertainty of the time is in no sigma.
+    const auto bits = static_cast<int>(std::ceil(std::log2(16 * (most_s - least_s) / near_enough_s)));
     std::uintmax_t tries = kMostTries;
     const double part = boost::math::tools::brent_find_minima(
                             [&](double at) {
