@@ -228,16 +228,17 @@ void turning_about(const Eigen::Vector3d& axis, double rests_s, double resolutio
 TEST(GyroHealth, IsStuckWhenASingleComponentIs) {
   for (int component = 0; component < 3; ++component) {
     const Eigen::Vector3d axis = Eigen::Vector3d::Unit((component + 1) % 3);
-    turning_about(axis, 30, 1e-9, component, 60, 120, 180, [&](double t_s, GyroState state, const GyroHealth<>& health) {
-      const bool is_stuck = t_s > 60 && t_s < 120;
-      if (t_s <= 60 || t_s >= 60.75) {
-        EXPECT_EQ(state, is_stuck ? GyroState::kStuck : GyroState::kUsed) << t_s << " s, component " << component;
-      }
-      if (t_s == 61) {  // known since, whatever was said before
-        EXPECT_FALSE(health.usable(second(60), second(60))[1]);
-        EXPECT_TRUE(health.usable(second(59.875), second(59.875))[1]);
-      }
-    });
+    turning_about(
+        axis, 30, 1e-9, component, 60, 120, 180, [&](double t_s, GyroState state, const GyroHealth<>& health) {
+          const bool is_stuck = t_s > 60 && t_s < 120;
+          if (t_s <= 60 || t_s >= 60.75) {
+            EXPECT_EQ(state, is_stuck ? GyroState::kStuck : GyroState::kUsed) << t_s << " s, component " << component;
+          }
+          if (t_s == 61) {  // known since, whatever was said before
+            EXPECT_FALSE(health.usable(second(60), second(60))[1]);
+            EXPECT_TRUE(health.usable(second(59.875), second(59.875))[1]);
+          }
+        });
   }
 }
 
@@ -299,9 +300,9 @@ TEST(GyroHealth, HasNotLeaptWhereABodyMayHaveTurned) {
   const auto expect_used = [](int i, const GyroHealth<>& health) {
     EXPECT_EQ(health.states()[1], GyroState::kUsed) << i;
   };
-  leaping(0.06, 100, 200, 300, expect_used);   // half a radian in a second
-  leaping(3.0, 100, 101, 300, expect_used);    // a single one is left to others
-  leaping(3.0, 0, 1, 300, expect_used);        // the first of all is off
+  leaping(0.06, 100, 200, 300, expect_used);                           // half a radian in a second
+  leaping(3.0, 100, 101, 300, expect_used);                            // a single one is left to others
+  leaping(3.0, 0, 1, 300, expect_used);                                // the first of all is off
   leaping(3.0, 5, 1000, 2000, [](int i, const GyroHealth<>& health) {  // hardly begun: any may be the right ones
     EXPECT_EQ(health.states()[1], i > 1000 ? GyroState::kLeapt : GyroState::kUsed) << i;
   });

@@ -30,7 +30,8 @@ class Refinement {
   /// What the smoothed pass shows at the fixes.
   [[nodiscard]] const SmoothedCourse& course() const { return course_; }
 
-  /// Judges fixes, used ones and outliers, by the smoothed pass, and puts their residuals in place of their innovations.
+  /// Judges fixes, used ones and outliers, by the smoothed pass, and puts their residuals in place of their
+  /// innovations.
   void judge(std::vector<FixRecord>& fixes) const;
 
   /// Puts the most likely values and their covariance in place of those of `run`, which was made on board, and the

@@ -14,7 +14,8 @@ namespace trihedron::ground {
 void judge_changes(const CalibrationRun& run, std::vector<Finding>& findings);
 
 /// Adds what the estimates are off by coefficients that change to the covariance, of all parameters together, by the
-/// probability that they do; nothing where something else is likelier to move. To be called once, after the verdict, which compares with the claimed sigmas.
+/// probability that they do; nothing where something else is likelier to move. To be called once, after the verdict,
+/// which compares with the claimed sigmas.
 void put_changes_into_covariance(CalibrationRun& run);
 /// The same of the errors that an open loop begins with (CalibrationRun::errors). To be called once, before they are
 /// predicted, while the calibration has the parameters of their layout.

@@ -114,7 +114,8 @@ class Readings {
   /// Readings at the latest sample; needs one. Where no polynomial explains the samples up to it, a gyro whose latest
   /// reading alone leads elsewhere than those before it is not used.
   template <class Gyros>
-  [[nodiscard]] FixReadings now(const CalibrationSetup& setup, const GyroHealth<kGyros>& health, const Gyros& gyros) const {
+  [[nodiscard]] FixReadings now(const CalibrationSetup& setup, const GyroHealth<kGyros>& health,
+                                const Gyros& gyros) const {
     FixReadings readings;
     readings.used = health.usable(latest_t(), latest_t());
     readings.h_b = latest_directions();
@@ -136,8 +137,8 @@ class Readings {
   /// Fits a polynomial to the samples within `reach` to both sides of `t`, if they are more than it needs and it
   /// explains them; whether it does. `after`: the first of them after `t`.
   template <class Gyros>
-  bool fit(Time t, Duration reach, int after, int degree, const CalibrationSetup& setup, const GyroHealth<kGyros>& health,
-           const Gyros& gyros, FixReadings& readings) const {
+  bool fit(Time t, Duration reach, int after, int degree, const CalibrationSetup& setup,
+           const GyroHealth<kGyros>& health, const Gyros& gyros, FixReadings& readings) const {
     const auto adjacent = [&](int i) { return time(i + 1) - time(i) <= max_interpolation_; };
     int begin = after - 1;
     while (begin > 0 && t - time(begin - 1) <= reach && adjacent(begin - 1)) {
