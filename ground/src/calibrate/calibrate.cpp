@@ -347,8 +347,8 @@ CalibrationRun calibrate_as_stamped(const Pass& pass, const CalibrationOptions& 
   return run;
 }
 
-/// With regular stamps of the gyros. What stamps that scatter are off in the mean they do not tell, but those of the star
-/// tracker do, up to about as much as they scatter.
+/// With regular stamps of the gyros. What stamps that scatter are off in the mean they do not tell, but those of the
+/// star tracker do, up to about as much as they scatter.
 Pass with_stamps(Pass pass, const RegularStamps& regular) {
   constexpr double kSure = 5;
   constexpr double kLikeScatter = 3;

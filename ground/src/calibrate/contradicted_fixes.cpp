@@ -14,8 +14,8 @@ namespace {
 
 /// Fewer outliers in a row are left to the filter's own gate.
 constexpr std::ptrdiff_t kInARow = 20;
-/// Where more than this part of the fixes is contradicted by the others, it is not the star tracker that was wrong for a
-/// while.
+/// Where more than this part of the fixes is contradicted by the others, it is not the star tracker that was wrong for
+/// a while.
 constexpr double kFew = 0.2;
 
 long times_set_free(const OnBoardRun& run) {
@@ -95,7 +95,8 @@ std::vector<FixRecord> fly_without_contradicted(const Pass& pass, const PassSett
     return {};
   }
   std::vector<FixRecord> fixes = contradicted(pass, settings, decision, run.recorder.run().fixes);
-  if (fixes.empty() || static_cast<double>(fixes.size()) > kFew * static_cast<double>(run.recorder.run().fixes.size())) {
+  const auto all = static_cast<double>(run.recorder.run().fixes.size());
+  if (fixes.empty() || static_cast<double>(fixes.size()) > kFew * all) {
     return {};
   }
   OnBoardRun again{Pipeline(settings, flown), {}};

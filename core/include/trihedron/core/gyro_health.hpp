@@ -15,7 +15,8 @@
 
 namespace trihedron {
 
-/// With room for kGyros of them: state of each gyro from readings that repeat themselves or leap, and from the fault suspicions of rejected fixes.
+/// State of each gyro, with room for kGyros of them, from readings that repeat themselves or leap, and from the fault
+/// suspicions of rejected fixes.
 template <int kGyros = kMaxGyros>
 class GyroHealth {
  public:
@@ -201,8 +202,8 @@ class GyroHealth {
       motion += part * (step / dt_s - motion);
       steps += steps < kStepsOfMotion ? 1 : 0;
     }
-    /// A component may stand still where the body turns about its axis; then its noise moves it. Where the whole reading
-    /// repeats itself, that says nothing of one component.
+    /// A component may stand still where the body turns about its axis; then its noise moves it. Where the whole
+    /// reading repeats itself, that says nothing of one component.
     void follow_components(const Eigen::Vector3d& h_b, Time t, double noise_rad) {
       for (int axis = 0; axis < 3 && alike > 0; ++axis) {
         Component& its = components[static_cast<std::size_t>(axis)];
