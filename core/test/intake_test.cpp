@@ -228,17 +228,17 @@ void turning_about(const Eigen::Vector3d& axis, double rests_s, double resolutio
 TEST(GyroHealth, IsStuckWhenASingleComponentIs) {
   for (int component = 0; component < 3; ++component) {
     const Eigen::Vector3d axis = Eigen::Vector3d::Unit((component + 1) % 3);
-    turning_about(
-        axis, 30, 1e-9, component, 60, 120, 180, [&](double t_s, GyroState state, const GyroHealth<>& health) {
-          const bool is_stuck = t_s > 60 && t_s < 120;
-          if (t_s <= 60 || t_s >= 60.75) {
-            EXPECT_EQ(state, is_stuck ? GyroState::kStuck : GyroState::kUsed) << t_s << " s, component " << component;
-          }
-          if (t_s == 61) {  // known since, whatever was said before
-            EXPECT_FALSE(health.usable(second(60), second(60))[1]);
-            EXPECT_TRUE(health.usable(second(59.875), second(59.875))[1]);
-          }
-        });
+    const auto expect_stuck = [&](double t_s, GyroState state, const GyroHealth<>& health) {
+      const bool is_stuck = t_s > 60 && t_s < 120;
+      if (t_s <= 60 || t_s >= 60.75) {
+        EXPECT_EQ(state, is_stuck ? GyroState::kStuck : GyroState::kUsed) << t_s << " s, component " << component;
+      }
+      if (t_s == 61) {  // known since, whatever was said before
+        EXPECT_FALSE(health.usable(second(60), second(60))[1]);
+        EXPECT_TRUE(health.usable(second(59.875), second(59.875))[1]);
+      }
+    };
+    turning_about(axis, 30, 1e-9, component, 60, 120, 180, expect_stuck);
   }
 }
 

@@ -95,8 +95,8 @@ std::vector<FixRecord> fly_without_contradicted(const Pass& pass, const PassSett
     return {};
   }
   std::vector<FixRecord> fixes = contradicted(pass, settings, decision, run.recorder.run().fixes);
-  if (fixes.empty() ||
-      static_cast<double>(fixes.size()) > kFew * static_cast<double>(run.recorder.run().fixes.size())) {
+  const auto all = static_cast<double>(run.recorder.run().fixes.size());
+  if (fixes.empty() || static_cast<double>(fixes.size()) > kFew * all) {
     return {};
   }
   OnBoardRun again{Pipeline(settings, flown), {}};

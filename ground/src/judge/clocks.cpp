@@ -161,10 +161,9 @@ void judge_clocks(const Pass& pass, const CalibrationRun& run, std::vector<Findi
 void judge_clocks(const Pass& pass, const NavigationRun& run, std::vector<Finding>& findings) {
   const bool corrected = run.clock_correction.of_star_tracker() || run.clock_correction.of_gyros();
   tell_correction(pass.settings, run.clock_correction, findings);
-  judge_gyro_stamps(
-      run.gyro_stamps_off_s,
-      run.gyro_stamps_off_s > kTooScattered_s ? Finding::Severity::kDoNotUse : Finding::Severity::kWarning,
-      ", which is in the attitude", findings);
+  const bool too_scattered = run.gyro_stamps_off_s > kTooScattered_s;
+  judge_gyro_stamps(run.gyro_stamps_off_s, too_scattered ? Finding::Severity::kDoNotUse : Finding::Severity::kWarning,
+                    ", which is in the attitude", findings);
   if (!run.clocks) {
     return;
   }

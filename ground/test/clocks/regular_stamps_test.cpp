@@ -63,8 +63,8 @@ TEST(RegularStamps, AreNothingWhereStampsAreRegularOrRight) {
   const std::vector<Time> stamps = scattered(pass.gyro.t, 0.03);
   Pass irregular = pass;
   for (std::size_t i = 1; i + 1 < stamps.size(); ++i) {
-    const double part =
-        to_seconds(stamps[i] - pass.gyro.t[i - 1]) / to_seconds(pass.gyro.t[i + 1] - pass.gyro.t[i - 1]);
+    const Time from = pass.gyro.t[i - 1];
+    const double part = to_seconds(stamps[i] - from) / to_seconds(pass.gyro.t[i + 1] - from);
     for (int k = 0; k < 2; ++k) {
       const Eigen::Vector3d before = pass.gyro.direction(i - 1, k);
       const Eigen::Vector3d moved = (part - 0.5) * (pass.gyro.direction(i + 1, k) - before);

@@ -15,7 +15,7 @@
 
 namespace trihedron {
 
-/// With room for kGyros of them: state of each gyro from readings that repeat themselves or leap, and from the fault
+/// State of each gyro, with room for kGyros of them, from readings that repeat themselves or leap, and from the fault
 /// suspicions of rejected fixes.
 template <int kGyros = kMaxGyros>
 class GyroHealth {
