@@ -395,6 +395,7 @@ CalibrationRun calibrate_after(const Pass& as_given, const CalibrationOptions& o
   run.calibration.determined = determined(run);
   // What changes is judged by the sigmas that are claimed without it.
   run.calibration.verdict = judge(stamped, run);
+  run.covariance_of_constants = run.calibration.covariance;
   put_changes_into_covariance(run);
   return run;
 }

@@ -72,18 +72,25 @@ struct Comparison {
   Agreement alignments;
 };
 
+/// What the data of a pass say is told only by the covariance with which they were used.
+Calibration of_constants(const CalibrationRun& run) {
+  Calibration calibration = run.calibration;
+  calibration.covariance = run.covariance_of_constants;
+  return calibration;
+}
+
 /// `before`: the calibration of the passes before; of one with more members than the later one has, what makes up for
 /// these is compared.
 Comparison compare(const CalibrationRun& before, const CalibrationRun& later) {
   struct {
     Calibration calibration, known_before;
-  } earlier{before.calibration, before.known_before};
+  } earlier{of_constants(before), before.known_before};
   const DriftModelId& model = later.calibration.gyros.front().drift_model;
   if (model.size() < before.calibration.gyros.front().drift_model.size()) {
-    earlier = {LeftOut(before.calibration, model).reduced(), LeftOut(before.known_before, model).reduced()};
+    earlier = {LeftOut(earlier.calibration, model).reduced(), LeftOut(earlier.known_before, model).reduced()};
   }
   const Likelihood a = likelihood_of(earlier.known_before, earlier.calibration);
-  const Likelihood b = likelihood_of(later.known_before, later.calibration);
+  const Likelihood b = likelihood_of(later.known_before, of_constants(later));
   const VectorXd moved =
       difference(earlier.calibration, later.calibration, later.calibration.states) + b.shift - a.shift;
   const MatrixXd covariance = a.covariance + b.covariance;

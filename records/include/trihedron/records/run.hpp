@@ -132,7 +132,9 @@ struct CalibrationRun {
   std::vector<DriftModelForecast> drift_models;  ///< that were compared, smallest first
   Calibration known_before;                      ///< values and covariance before the pass; states as in `calibration`
   Calibration calibration;                       ///< with verdict and statistics
-  OpenLoopStart errors;                          ///< of the calibration
+  /// Of its states, taken for constant: without what coefficients that may have changed add.
+  Eigen::MatrixXd covariance_of_constants;
+  OpenLoopStart errors;  ///< of the calibration
   std::vector<FixRecord> fixes;
   ParameterHistory parameters;
   std::vector<Correction> corrections;  ///< at the first used fix, and then every 90 min
