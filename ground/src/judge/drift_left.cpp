@@ -138,6 +138,7 @@ void judge_drift_left(const Pass& pass, const CalibrationRun& run, std::vector<F
     angle = AngleBetweenMomenta::of(pass.gyro, run.calibration.gyros);
   }
   if (is_line) {
+    // Drift moves all components about alike, and the angle as one of them.
     constexpr double kLessThanDrift = 0.5;
     const bool moves_angle =
         !angle || angle->left_rad() > kLessThanDrift * line->amplitude_rad * angle->left_of_line(line->period_s);
