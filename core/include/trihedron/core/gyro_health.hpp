@@ -75,19 +75,7 @@ class GyroHealth {
         its.since = sample.t;
         its.last = h_b;
       }
-      its.stuck = its.alike > 1 &&
-                  ((its.alike >= kStuckSamples && sample.t - its.since >= kStuckTime) || its.has_stopped(sample.t));
-      Time since = its.stuck ? its.since : sample.t;
-      for (const Component& component : its.components) {
-        its.stuck = its.stuck || component.stuck;
-        since = component.stuck ? std::min(since, component.since) : since;
-      }
-      if (its.stuck) {
-        if (!(its.stuck_from <= since && since - its.stuck_until <= kMemory)) {
-          its.stuck_from = since;
-        }
-        its.stuck_until = sample.t;
-      }
+      its.decide_whether_stuck(sample.t);
     }
     last_t_ = sample.t;
   }
@@ -243,6 +231,20 @@ class GyroHealth {
     }
     [[nodiscard]] static bool is_beyond_reach(const Eigen::Vector3d& from, const Eigen::Vector3d& to, Duration time) {
       return (to - from).norm() > kLargestJolt_rad + kLargestTurn_rad_s * to_seconds(time);
+    }
+    void decide_whether_stuck(Time t) {
+      stuck = alike > 1 && ((alike >= kStuckSamples && t - since >= kStuckTime) || has_stopped(t));
+      Time begin = stuck ? since : t;
+      for (const Component& component : components) {
+        stuck = stuck || component.stuck;
+        begin = component.stuck ? std::min(begin, component.since) : begin;
+      }
+      if (stuck) {
+        if (!(stuck_from <= begin && begin - stuck_until <= kMemory)) {
+          stuck_from = begin;
+        }
+        stuck_until = t;
+      }
     }
     [[nodiscard]] bool is_dead_within(Time from, Time to) const {
       return (stuck_from <= to && from <= stuck_until) || (leap.from <= to && from <= leap.until);
