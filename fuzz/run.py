@@ -63,7 +63,7 @@ def fuzz(build, target, corpus, seconds):
         row["inputs"] += int(figure("number_of_executed_units", said))
         row["worst_ms"] = max(row["worst_ms"], figure("worst_time_ms", said), 1000 * figure("slowest_unit_time_sec", said))
         row["worst_mb"] = max(row["worst_mb"], figure("peak_rss_mb", said))
-    for path in found.glob(f"{target}-timeout*"):
+    for path in (*found.glob(f"{target}-timeout*"), *found.glob(f"{target}-slow*")):
         if path.name not in before and not hangs(build, target, path):
             path.unlink()
     new = [path.name for path in found.iterdir() if path.name.startswith(target + "-") and path.name not in before]

@@ -8,7 +8,7 @@ namespace trihedron::ground {
 
 /// As calibrate(), of the last of several passes; `known_before`: what was known before the first of them, by which
 /// all of them together are judged.
-[[nodiscard]] CalibrationRun calibrate_after(const Pass& pass, const CalibrationOptions& options,
+[[nodiscard]] CalibrationRun calibrate_after(const Pass& as_given, const CalibrationOptions& options,
                                              const Progress& progress, std::optional<Calibration> known_before);
 
 }  // namespace trihedron::ground

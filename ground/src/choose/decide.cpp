@@ -358,7 +358,7 @@ Decision decide_by_pass(const Pass& pass, const Screened& screened, const Calibr
   const NoiseFit walk = with_most_likely_walk(decided, options);
   if (walk.gain > kLogOddsToAccept) {
     decide_again_with_more_noise(pass, screened, asked, largest_model, wandering_is_open, std::move(everything),
-                                 std::move(walking), std::move(decided), walk, decision);
+                                 walking, std::move(decided), walk, decision);
   } else {
     decision.log_likelihood = walk.log_likelihood;
     use_walk(walk.noise, options);

@@ -226,12 +226,13 @@ auto AngleBetweenMomenta::wander(const CalibrationNoise& noise) const -> Wander 
     constexpr double kDown = 14;  // a thousandth of the angle's scatter
     return -boost::math::tools::brent_find_minima(cost, readout - kDown, readout + 1, 16).second;
   };
-  constexpr double kLeast = 1.0 / 4096;
-  constexpr double kMost = 64;
+  constexpr int kLeast = -12;  // powers of 2
+  constexpr int kMost = 6;
   Wander found{0, 0, std::sqrt(variances.mean())};
   double quiet = likelihood(0);
   double moving = likelihood(Wander::kQuiet);
-  for (double part = kLeast; part <= kMost; part *= 2) {
+  for (int power = kLeast; power <= kMost; ++power) {
+    const double part = std::ldexp(1.0, power);
     const double its = likelihood(part);
     found.part = its > std::max(quiet, moving) ? part : found.part;
     double& best = part <= Wander::kQuiet ? quiet : moving;
