@@ -173,7 +173,7 @@ TEST(GyroHealth, IsStuckAtOnceWhenAReadingThatMovedStops) {
   constexpr double kNever_s = 1e9;
   turning(kOrbital_rad_s, 60, 1e-12, 61, [](double t_s, const GyroHealth<>& health) {
     EXPECT_EQ(health.states()[0], GyroState::kUsed);
-    EXPECT_EQ(health.states()[1], t_s >= 60.375 ? GyroState::kStuck
+    EXPECT_EQ(health.states()[1], t_s >= 60.125 ? GyroState::kStuck
                                   : t_s < 60    ? GyroState::kUsed
                                                 : health.states()[1])
         << t_s;
