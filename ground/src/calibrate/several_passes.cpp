@@ -72,7 +72,8 @@ struct Comparison {
   Agreement alignments;
 };
 
-/// What the data of a pass say is told only by the covariance with which they were used.
+/// With the covariance that the data alone leave: what is added to it for coefficients that may have changed would look
+/// like data that say less than nothing.
 Calibration of_constants(const CalibrationRun& run) {
   Calibration calibration = run.calibration;
   calibration.covariance = run.covariance_of_constants;

@@ -120,7 +120,7 @@ void judge_drift_left(const Pass& pass, const CalibrationRun& run, std::vector<F
   // Periods down to a tenth of an orbit: drift of low degree makes no shorter ones.
   constexpr double kMultiples = 10;
   constexpr double kUsualOrbit_s = 5400;
-  // Of a star tracker whose errors wander, a few in a million passes without them.
+  // By so much likelier that the gyros are quiet than that they move as the noise says.
   constexpr double kLogOdds = 10;
 
   const bool told = std::ranges::any_of(findings, [](const Finding& finding) {
