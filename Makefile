@@ -215,7 +215,7 @@ verdict: build
 # corpus, with which the next run goes on, beside it.
 FUZZ_SECONDS ?= 3600
 FUZZ_JOBS ?= $(JOBS)
-FUZZ = fuzz/run.py build-sanitize --seconds $(FUZZ_SECONDS) --jobs $(FUZZ_JOBS) $(if $(FUZZ_TARGETS),--targets $(FUZZ_TARGETS))
+FUZZ = fuzz/run.py build-sanitize --jobs $(FUZZ_JOBS) $(if $(FUZZ_TARGETS),--targets $(FUZZ_TARGETS))
 
 fuzz-build:
 	@cmake/setup.sh program tests sanitizers
@@ -223,13 +223,12 @@ fuzz-build:
 	cmake --build build-sanitize --parallel $(JOBS) --target trihedron_fuzz
 
 fuzz: fuzz-build
-	$(FUZZ) --document docs/reliability.md
+	$(FUZZ) --seconds $(FUZZ_SECONDS) --document docs/reliability.md
 
-# The same, for a minute of each, and no document. At a priority that gives it a seventh of a processor beside two other processes: a quarter
-# of a second, which the longest inputs take, is then far from what counts as a hang.
-fuzz-briefly: FUZZ_SECONDS = 60
+# The same, for a minute or less of each, and no document. At a priority that gives it a quarter of a processor beside two other processes: a
+# quarter of a second, which the longest inputs take, is then far from what counts as a hang.
 fuzz-briefly: fuzz-build
-	nice -n 5 $(FUZZ)
+	nice -n 5 $(FUZZ) --briefly
 
 # Fails on each warning, but Doxygen's of members and constants that have no comment of their own (see docs/Doxyfile), and on each broken link.
 docs: build $(DOCS_TOOLS)/installed

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Runs every fuzz target for a time, and prints what came of it: inputs tried, crashes, hangs, worst time, worst memory.
 
-    fuzz/run.py BUILD [--seconds 3600] [--jobs 2] [--targets csv,netcdf] [--corpus DIRECTORY] [--document docs/reliability.md]
+    fuzz/run.py BUILD [--seconds 3600 | --briefly] [--jobs 2] [--targets csv,netcdf] [--corpus DIRECTORY] [--document docs/reliability.md]
 
 Begins with the seeds that BUILD/trihedron_fuzz_seeds writes, the inputs of fuzz/regressions, and what earlier runs have left in the corpus.
 A target goes on after a crash until it has had its time of a processor. libFuzzer tells a hang by the clock, which other work on the machine sets
@@ -21,6 +21,8 @@ ROOT = pathlib.Path(__file__).resolve().parents[1]
 LIMIT_S = 10
 LIMIT_MB = 1024  # resident, with all that the sanitizers add
 LONGEST = {"netcdf": 200_000, "catalogue": 100_000, "calibration": 40_000, "truth": 40_000, "csv": 20_000, "scenario": 20_000}  # bytes
+# What every user gives the program; the others are of formats of exchange, or other ways into these.
+EVERYDAY = ("calibration", "catalogue", "csv", "netcdf", "pass_toml", "scenario", "settings")
 SANITIZERS = {"ASAN_OPTIONS": "allocator_may_return_null=0:detect_stack_use_after_return=0", "UBSAN_OPTIONS": "print_stacktrace=1"}
 
 
@@ -108,7 +110,9 @@ def place_in(document, row, all_targets):
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("build", type=pathlib.Path)
-    parser.add_argument("--seconds", type=float, default=3600, help="of processor time for each target")
+    time = parser.add_mutually_exclusive_group()
+    time.add_argument("--seconds", type=float, default=3600, help="of processor time for each target")
+    time.add_argument("--briefly", action="store_true", help="a minute for each of " + ", ".join(EVERYDAY) + "; five seconds for each other")
     parser.add_argument("--jobs", type=int, default=os.cpu_count())
     parser.add_argument("--targets", help="separated by commas; all where none is named")
     parser.add_argument("--corpus", type=pathlib.Path, default=ROOT / "out/fuzz")
@@ -118,9 +122,10 @@ def main():
     chosen = arguments.targets.split(",") if arguments.targets else targets(build)
     arguments.corpus.mkdir(parents=True, exist_ok=True)
     subprocess.run([build / "trihedron_fuzz_seeds", arguments.corpus / "seeds", ROOT / "examples"], check=True)
+    seconds = (lambda target: 60 if target in EVERYDAY else 5) if arguments.briefly else (lambda target: arguments.seconds)
     rows = []
     with concurrent.futures.ThreadPoolExecutor(arguments.jobs) as pool:
-        for running in concurrent.futures.as_completed(pool.submit(fuzz, build, target, arguments.corpus, arguments.seconds) for target in chosen):
+        for running in concurrent.futures.as_completed(pool.submit(fuzz, build, target, arguments.corpus, seconds(target)) for target in chosen):
             rows.append(running.result())
             if arguments.document:
                 place_in(arguments.document, rows[-1], targets(build))
