@@ -1,6 +1,5 @@
 #include "trihedron/campaign/perform.hpp"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <chrono>
 #include <cmath>
@@ -104,12 +103,8 @@ void measure_parameters(const Flight& flight, const CampaignPlan& plan, RunRecor
       }
     }
   }
-  // Scaled by the sigmas, which differ by ten orders of magnitude.
-  const Eigen::VectorXd sigma = calibration.covariance.diagonal().cwiseSqrt()(rows);
-  const Eigen::MatrixXd correlation =
-      sigma.cwiseInverse().asDiagonal() * calibration.covariance(rows, rows) * sigma.cwiseInverse().asDiagonal();
-  const Eigen::VectorXd scaled = flight.evaluation.estimate_minus_truth(rows).cwiseQuotient(sigma);
-  record[RunQuantity::kNees] = {scaled.dot(correlation.llt().solve(scaled))};
+  record[RunQuantity::kNees] = {
+      ground::normalised_square(flight.evaluation.estimate_minus_truth(rows), calibration.covariance(rows, rows))};
   record[RunQuantity::kNeesFreedom] = {static_cast<double>(rows.size())};
 }
 

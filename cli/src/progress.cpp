@@ -5,6 +5,7 @@
 
 #include <chrono>
 #include <string>
+#include <string_view>
 #include <utility>
 
 #include "standard_streams.hpp"
@@ -20,14 +21,16 @@ ProgressBar::~ProgressBar() {
   }
 }
 
-std::function<void(double)> ProgressBar::meter() const {
+Progress ProgressBar::meter() const {
   if (!shown_) {
     return {};
   }
-  return [this](double fraction) {
+  return [this](std::string_view doing, double fraction) {
     constexpr int kWidth = 40;
+    const std::string label = doing.empty() ? what_ : fmt::format("{}: {}", what_, doing);
     const int full = static_cast<int>(fraction * kWidth);
-    say(fmt::format("\r{} [{:=<{}}{: <{}}] {:3.0f} %", what_, "", full, "", kWidth - full, 100 * fraction));
+    say(fraction > 0 ? fmt::format("\r\033[K{} [{:=<{}}{: <{}}] {:3.0f} %", label, "", full, "", kWidth - full, 100 * fraction)
+                     : fmt::format("\r\033[K{} …", label));
   };
 }
 

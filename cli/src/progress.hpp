@@ -2,8 +2,9 @@
 
 #include <chrono>
 #include <cstddef>
-#include <functional>
 #include <string>
+
+#include "trihedron/records/progress.hpp"
 
 namespace trihedron::cli {
 
@@ -15,8 +16,7 @@ class ProgressBar {
   ProgressBar(const ProgressBar&) = delete;
   ProgressBar& operator=(const ProgressBar&) = delete;
 
-  /// To be called with the fraction done, 0 … 1.
-  [[nodiscard]] std::function<void(double)> meter() const;
+  [[nodiscard]] Progress meter() const;
 
  private:
   std::string what_;

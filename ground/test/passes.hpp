@@ -1,7 +1,6 @@
 #pragma once
 /// Simulated passes that several tests look at, and what they ask of a calibration.
 
-#include <Eigen/Cholesky>
 #include <vector>
 
 #include "trihedron/core/frames.hpp"
@@ -63,7 +62,7 @@ inline Eigen::Vector3d alignment_error(const Calibration& calibration, const Tru
 inline double nees_of(const Truth& truth, const Calibration& calibration) {
   const auto rows = rows_of(calibration, drift_and_alignment(kEsg7, calibration.gyros.size()));
   const Eigen::VectorXd errors = estimate_minus_truth(calibration, truth)(rows);
-  return errors.dot(Eigen::MatrixXd(calibration.covariance(rows, rows)).llt().solve(errors));
+  return normalised_square(errors, calibration.covariance(rows, rows));
 }
 
 }  // namespace trihedron::ground

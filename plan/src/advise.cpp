@@ -161,7 +161,7 @@ class Search {
     done_ += plans.size();
     if (progress_) {
       const double all = kRounds * limits_.slews * (limits_.slews + 1) / 2.0 * (14 + 7 + 10);
-      progress_(std::min(static_cast<double>(done_) / all, 1.0));
+      progress_({}, std::min(static_cast<double>(done_) / all, 1.0));
     }
     return squares;
   }

@@ -1,6 +1,5 @@
 #include "trihedron/plan/confirm.hpp"
 
-#include <Eigen/Cholesky>
 #include <cmath>
 #include <mutex>
 #include <utility>
@@ -35,12 +34,7 @@ Outcome fly(const Scenario& scenario, const CalibrationOptions& options) {
   const sim::SimulatedPass flown = sim::simulate(scenario);
   const Calibration calibration = ground::calibrate(flown.pass, options).calibration;
   Outcome outcome{ground::estimate_minus_truth(calibration, flown.truth, ground::UnnamedDrift::kIsZero)};
-  // Scaled by the sigmas, which differ by ten orders of magnitude.
-  const Eigen::VectorXd sigma = calibration.covariance.diagonal().cwiseSqrt();
-  const Eigen::MatrixXd correlation =
-      sigma.cwiseInverse().asDiagonal() * calibration.covariance * sigma.cwiseInverse().asDiagonal();
-  const Eigen::VectorXd scaled = outcome.errors.cwiseQuotient(sigma);
-  outcome.nees = scaled.dot(correlation.llt().solve(scaled));
+  outcome.nees = ground::normalised_square(outcome.errors, calibration.covariance);
   return outcome;
 }
 
@@ -57,7 +51,7 @@ Confirmation confirm(const Scenario& scenario, const std::vector<ground::Combina
     const std::scoped_lock lock(one_at_a_time);
     done += 1;
     if (progress) {
-      progress(done / runs);
+      progress({}, done / runs);
     }
     return outcome;
   });

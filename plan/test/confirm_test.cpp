@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <string_view>
 
 #include "flights.hpp"
 #include "trihedron/sim/simulate.hpp"
@@ -29,7 +30,7 @@ TEST(Confirmation, AgreesWithThePrediction) {
   ASSERT_EQ(harmful.size(), 2U);
   double last = 0;
   const Confirmation confirmation =
-      confirm(scenario, harmful, predicted, 12, [&](double fraction) { last = fraction; });
+      confirm(scenario, harmful, predicted, 12, [&](std::string_view, double fraction) { last = fraction; });
   EXPECT_EQ(last, 1);
   EXPECT_EQ(confirmation.runs, 12);
   EXPECT_EQ(confirmation.parameters, 20);

@@ -5,6 +5,7 @@
 #include <condition_variable>
 #include <exception>
 #include <mutex>
+#include <string_view>
 #include <thread>
 
 #include "trihedron/records/stop.hpp"
@@ -23,7 +24,7 @@ class Worker {
       : thread_([this, &work] {
           const StopScope scope(&stop_);
           try {
-            work([this](double fraction) { fraction_.store(fraction, std::memory_order_relaxed); });
+            work([this](std::string_view /*doing*/, double fraction) { fraction_.store(fraction, std::memory_order_relaxed); });
           } catch (...) {
             failure_ = std::current_exception();
           }

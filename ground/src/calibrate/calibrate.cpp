@@ -7,6 +7,7 @@
 #include <chrono>
 #include <cmath>
 #include <optional>
+#include <string_view>
 #include <utility>
 
 #include "batch/left_out_walk.hpp"
@@ -35,9 +36,10 @@
 namespace trihedron::ground {
 namespace {
 
-/// Reports progress about a hundred times over a pass.
+/// Reports progress about a hundred times over the estimation of a pass.
 class ProgressMeter {
  public:
+  static constexpr std::string_view kDoing = "estimates";
   ProgressMeter(const Progress& progress, std::size_t steps)
       : progress_(progress), steps_(steps), every_(std::max<std::size_t>(steps / 100, 1)) {}
   void step(const StepReport& report) {
@@ -45,7 +47,7 @@ class ProgressMeter {
       return;
     }
     if (++done_ % every_ == 0 && progress_) {
-      progress_(static_cast<double>(done_) / static_cast<double>(steps_));
+      progress_(kDoing, static_cast<double>(done_) / static_cast<double>(steps_));
     }
   }
 
@@ -266,7 +268,7 @@ std::optional<LeftOut> left_out_by(const PassSettings& settings, const Calibrati
 
 /// `pass`: with its stamps corrected. Without a verdict.
 CalibrationRun calibrate_as_stamped(const Pass& pass, const CalibrationOptions& options, const Progress& progress) {
-  Decision decision = decide(pass, options);
+  Decision decision = decide(pass, options, progress);
   const bool by_batch = decision.options.estimator == Estimator::kBatch;
   const PassSettings& settings = decision.settings ? *decision.settings : pass.settings;
   CalibrationOptions flown = by_batch ? options_of_on_board_run(settings, decision) : decision.options;
@@ -285,7 +287,7 @@ CalibrationRun calibrate_as_stamped(const Pass& pass, const CalibrationOptions& 
         meter.step(report);
       });
     } else if (progress) {
-      progress(1);
+      progress(ProgressMeter::kDoing, 1);
     }
     if (!pipeline.started()) {
       throw nothing_used(recorder.run().fixes);
@@ -372,6 +374,7 @@ CalibrationRun calibrate(const Pass& pass, const CalibrationOptions& options, co
 
 CalibrationRun calibrate_after(const Pass& as_given, const CalibrationOptions& options, const Progress& progress,
                                std::optional<Calibration> known_before) {
+  begin(progress, "looks at the clocks");
   const std::optional<RegularStamps> regular = regular_stamps(as_given);
   const std::optional<Pass> with_regular = regular ? std::optional(with_stamps(as_given, *regular)) : std::nullopt;
   const Pass& pass = with_regular ? *with_regular : as_given;

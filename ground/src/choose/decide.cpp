@@ -317,7 +317,7 @@ ByEq1 try_eq1(const Pass& pass, const Screened& screened, const CalibrationOptio
 
 /// Decides by the data of the pass.
 Decision decide_by_pass(const Pass& pass, const Screened& screened, const CalibrationOptions& asked,
-                        const DriftModelId& largest_model) {
+                        const DriftModelId& largest_model, const Progress& progress) {
   Decision decision;
   decision.options = asked;
   CalibrationOptions& options = decision.options;
@@ -328,9 +328,11 @@ Decision decide_by_pass(const Pass& pass, const Screened& screened, const Calibr
   std::optional<ByEq1> by_eq1;
   std::optional<ProcessNoise> noise;
   if (options.drift_field && asked.find_noise) {
+    begin(progress, "decides by eq. (1) alone");
     by_eq1 = try_eq1(pass, screened, options);
     noise = by_eq1->walk;
   }
+  begin(progress, "decides what is there");
   Trial everything(pass, screened, with_everything(options, asked, largest_model), noise,
                    by_eq1 ? &by_eq1->trial : nullptr);
   const std::vector<Eigen::Vector3d> changes = everything.changes_rad();
@@ -354,9 +356,11 @@ Decision decide_by_pass(const Pass& pass, const Screened& screened, const Calibr
     noise = walking->noise;
   }
   settle_states(everything, pass.settings, asked, false, decision);
+  begin(progress, "finds the noise");
   Trial decided(pass, screened, options, noise, &everything);
   const NoiseFit walk = with_most_likely_walk(decided, options);
   if (walk.gain > kLogOddsToAccept) {
+    begin(progress, "decides again with more noise");
     decide_again_with_more_noise(pass, screened, asked, largest_model, wandering_is_open, std::move(everything),
                                  walking, std::move(decided), walk, decision);
   } else {
@@ -480,16 +484,17 @@ double most_likely_time_s(const Pass& pass, const Screened& screened, const Cali
 /// Decides by the data of the pass. `change_is_open`: whether the coefficients may be found to change; then a warm-up
 /// or a jump of them is looked for.
 Decision decide_with_course(const Pass& pass, const Screened& screened, const CalibrationOptions& asked,
-                            const DriftModelId& largest_model, bool change_is_open) {
-  Decision decision = decide_by_pass(pass, screened, asked, largest_model);
+                            const DriftModelId& largest_model, bool change_is_open, const Progress& progress) {
+  Decision decision = decide_by_pass(pass, screened, asked, largest_model, progress);
   const std::optional<FoundCourse> course =
       change_is_open ? course_of(decision.changes, pass.settings.epoch) : std::nullopt;
   if (!course) {
     return decision;
   }
+  begin(progress, "looks for the time of a change");
   CalibrationOptions with = asked;
   use_course(course->kind, most_likely_time_s(pass, screened, decision.options, *course), with);
-  Decision changing = decide_by_pass(pass, screened, with, largest_model);
+  Decision changing = decide_by_pass(pass, screened, with, largest_model, progress);
   const double gain = changing.log_likelihood - decision.log_likelihood;
   if (gain <= kLogOddsToAccept) {
     return decision;
@@ -571,7 +576,7 @@ CalibrationOptions settled_before(const PassSettings& settings, CalibrationOptio
   return options;
 }
 
-Decision decide(const Pass& pass, const CalibrationOptions& asked_for) {
+Decision decide(const Pass& pass, const CalibrationOptions& asked_for, const Progress& progress) {
   CalibrationOptions asked = asked_for;
   if (pass.gyro.gyros < static_cast<int>(pass.settings.gyros.size())) {
     throw SetupError(fmt::format("the telemetry has {} gyros; the settings speak of {}", pass.gyro.gyros,
@@ -607,6 +612,7 @@ Decision decide(const Pass& pass, const CalibrationOptions& asked_for) {
     leave_out_what_is_open(options);
     return decision;
   }
+  begin(progress, "screens the samples");
   Screened screened = screen(pass, options, may_be_screened_with(asked));
   std::optional<OnBoardRun> run = std::exchange(screened.run, std::nullopt);
   if (screened.pass.fixes.empty()) {
@@ -617,7 +623,7 @@ Decision decide(const Pass& pass, const CalibrationOptions& asked_for) {
     return decision;
   }
   if (by_field && on_board) {
-    Decision decided = decide_with_course(pass, screened, asked, kLargestDriftModel, change_is_open);
+    Decision decided = decide_with_course(pass, screened, asked, kLargestDriftModel, change_is_open, progress);
     decided.options.estimator = asked_for.estimator;
     const double log_evidence = decided.field->log_evidence;
     decided.evidence.push_back({{}, log_evidence, log_evidence > kLogOddsToAccept});
@@ -642,7 +648,7 @@ Decision decide(const Pass& pass, const CalibrationOptions& asked_for) {
   }
   DriftModelId largest_model = largest_to_compare(asked);
   for (;;) {
-    Decision decided = decide_with_course(pass, screened, asked, largest_model, change_is_open);
+    Decision decided = decide_with_course(pass, screened, asked, largest_model, change_is_open, progress);
     const std::optional<DriftModelId> larger = larger_model(largest_model);
     // There are no forecasts where the pass is too short.
     if (!larger || decided.forecasts.empty() ||

@@ -10,6 +10,7 @@
 #include "model/left_out.hpp"
 #include "onboard/screen.hpp"
 #include "trihedron/ground/choose/settled.hpp"
+#include "trihedron/records/progress.hpp"
 #include "trihedron/records/run.hpp"
 
 namespace trihedron::ground {
@@ -44,6 +45,6 @@ struct Decision {
 /// were found. Where the coefficients are found to warm up or to jump, their change has that course, and its likeliest
 /// time. The noise is found where it is asked for, on a pass that is long enough and has no prior calibration.
 /// Throws SetupError.
-[[nodiscard]] Decision decide(const Pass& pass, const CalibrationOptions& asked);
+[[nodiscard]] Decision decide(const Pass& pass, const CalibrationOptions& asked, const Progress& progress = {});
 
 }  // namespace trihedron::ground

@@ -1,7 +1,9 @@
 #include "trihedron/ground/evaluate/evaluate.hpp"
 
+#include <Eigen/Cholesky>
 #include <algorithm>
 #include <chrono>
+#include <limits>
 
 #include "trihedron/core/frames.hpp"
 
@@ -78,6 +80,14 @@ std::optional<double> true_value(const Truth& truth, const ParameterId& paramete
   const Truth::Gyro& gyro = truth.gyros[parameter.gyro()];
   return parameter.is_alignment() ? gyro.alignment_rotation_vector_rad(parameter.component)
                                   : gyro.drift(parameter.coefficient);
+}
+
+double normalised_square(const Eigen::VectorXd& error, const Eigen::MatrixXd& covariance) {
+  const Eigen::VectorXd per_sigma = covariance.diagonal().cwiseSqrt().cwiseInverse();
+  const Eigen::VectorXd scaled = per_sigma.cwiseProduct(error);
+  const Eigen::LLT<Eigen::MatrixXd> correlation(per_sigma.asDiagonal() * covariance * per_sigma.asDiagonal());
+  return correlation.info() == Eigen::Success ? scaled.dot(correlation.solve(scaled))
+                                              : std::numeric_limits<double>::quiet_NaN();
 }
 
 Eigen::VectorXd estimate_minus_truth(const Calibration& calibration, const Truth& truth, UnnamedDrift unnamed) {

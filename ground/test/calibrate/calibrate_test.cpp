@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
+#include <string>
+#include <string_view>
 #include <vector>
 
 #include "named.hpp"
@@ -36,7 +38,7 @@ Pass beginning(Pass pass, Duration duration) {
 
 TEST(Calibrate, FindsTheTruthWithinItsSigmas) {
   std::vector<double> progress;
-  const auto run = calibrate(two_hours().pass, {}, [&](double fraction) { progress.push_back(fraction); });
+  const auto run = calibrate(two_hours().pass, {}, [&](std::string_view, double fraction) { progress.push_back(fraction); });
   const Calibration& result = run.calibration;
   ASSERT_EQ(result.states.size(), 20U);
   EXPECT_EQ(result.states[9], parameter("gyro1.align_z"));
@@ -177,9 +179,18 @@ TEST(Calibrate, RecordsEveryFixAndSample) {
 TEST(Calibrate, FliesOnceWhereWhatIsDecidedIsWhatThePassWasScreenedWith) {
   const Pass& pass = two_hours().pass;
   std::vector<double> parts;
-  const auto progress = [&](double part) { parts.push_back(part); };
+  std::vector<std::string> stages;
+  const auto progress = [&](std::string_view doing, double part) {
+    if (part > 0) {
+      parts.push_back(part);
+    } else {
+      stages.emplace_back(doing);
+    }
+  };
   const CalibrationRun decided = calibrate(pass, {}, progress);
   EXPECT_EQ(parts, std::vector<double>{1});
+  EXPECT_EQ(stages, (std::vector<std::string>{"looks at the clocks", "screens the samples", "decides by eq. (1) alone",
+                                              "decides what is there", "finds the noise"}));
   CalibrationOptions options = decided.options;
   options.find_noise = false;
   const CalibrationRun flown = calibrate(pass, options, progress);

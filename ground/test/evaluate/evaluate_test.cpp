@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <chrono>
+#include <cmath>
 #include <limits>
 
 #include "named.hpp"
@@ -185,6 +186,17 @@ TEST(ParameterErrors, AreTheRotationFromTheTrueAlignmentToTheEstimate) {
       (Rot<C, C>::exp(Vec<C>::assume(delta)) * C_c_b(truth.gyros[0].alignment_rotation_vector_rad)).log().raw();
   calibration.states = parameters({"gyro1.align_x", "gyro1.align_y", "gyro1.align_z"});
   EXPECT_LT((estimate_minus_truth(calibration, truth) - delta).norm(), 1e-12);
+}
+
+TEST(NormalisedSquare, IsThatOfAnyUnitsAndNoNumberWhereTheCovarianceIsNone) {
+  const Eigen::Vector2d error(2e-9, 3e-3);
+  Eigen::Matrix2d covariance;
+  covariance << 1e-18, 0.5e-12, 0.5e-12, 1e-6;
+  // (4 - 2 · 0.5 · 2 · 3 + 9) / (1 - 0.5²)
+  EXPECT_NEAR(normalised_square(error, covariance), 28.0 / 3, 1e-12);
+  covariance(0, 1) = covariance(1, 0) = 1.1e-12;
+  EXPECT_TRUE(std::isnan(normalised_square(error, covariance)));
+  EXPECT_TRUE(std::isnan(normalised_square(error, Eigen::Matrix2d::Zero())));
 }
 
 TEST(AttitudeErrors, AreSolutionLessReference) {

@@ -1,10 +1,18 @@
 #pragma once
 
 #include <functional>
+#include <string_view>
 
 namespace trihedron {
 
-/// Called now and then with the fraction done, 0 … 1.
-using Progress = std::function<void(double)>;
+/// Called now and then with what is being done, empty where the work is of one kind, and the fraction done of that, 0 … 1;
+/// 0 as long as it is not known.
+using Progress = std::function<void(std::string_view doing, double fraction)>;
+
+inline void begin(const Progress& progress, std::string_view doing) {
+  if (progress) {
+    progress(doing, 0);
+  }
+}
 
 }  // namespace trihedron

@@ -36,6 +36,10 @@ enum class UnnamedDrift : std::uint8_t { kIsUnknown, kIsZero };
 [[nodiscard]] Eigen::VectorXd estimate_minus_truth(const Calibration& calibration, const Truth& truth,
                                                    UnnamedDrift unnamed = UnnamedDrift::kIsUnknown);
 
+/// eᵀ P⁻¹ e (NEES) of errors e with covariance P, whose units may differ by any powers of ten. NaN where P is not
+/// positive definite.
+[[nodiscard]] double normalised_square(const Eigen::VectorXd& error, const Eigen::MatrixXd& covariance);
+
 /// Errors over a stretch of time.
 struct ErrorStatistics {
   Time from{};
