@@ -15,6 +15,7 @@
 #include "batch/refine.hpp"
 #include "calibrate/calibrate_after.hpp"
 #include "calibrate/contradicted_fixes.hpp"
+#include "calibrate/readout_noise.hpp"
 #include "choose/decide.hpp"
 #include "judge/changes.hpp"
 #include "model/drift_on_board.hpp"
@@ -134,9 +135,9 @@ Smoothed smooth(const Pass& pass, Decision& decision) {
   return {std::move(refinement), std::move(drift_models)};
 }
 
-/// With the calibrated parameters from the end of the pass on.
-std::optional<OpenLoopForecast> forecast_of(const CalibrationRun& run) {
-  if (run.attitude.size() == 0) {
+/// With the calibrated parameters from the last sample of the pass on, at `end`; nothing where there is no pair then.
+std::optional<OpenLoopForecast> forecast_of(const CalibrationRun& run, Time end) {
+  if (run.attitude.size() == 0 || !has_pair_at_end(run, end)) {
     return std::nullopt;
   }
   const BodyMotion motion(run.attitude.t, run.attitude.q_in_c);
@@ -332,7 +333,7 @@ CalibrationRun calibrate_as_stamped(const Pass& pass, const CalibrationOptions& 
   }
   add_statistics(run.fixes, run.calibration.statistics);
   put_changes_into_errors(run);
-  run.calibration.forecast = forecast_of(run);
+  run.calibration.forecast = forecast_of(run, pass.gyro.t.back());
   if (const std::optional<LeftOut> left_out = left_out_by(pass.settings, options, decision)) {
     run.calibration.on_board_drift = {left_out->kept_model(), decision.left_out_walk_rad_sqrt_s};
     if (run.calibration.noise) {  // what the pass needs: what stands for the members left out is beside it
@@ -374,10 +375,14 @@ CalibrationRun calibrate(const Pass& pass, const CalibrationOptions& options, co
 
 CalibrationRun calibrate_after(const Pass& as_given, const CalibrationOptions& options, const Progress& progress,
                                std::optional<Calibration> known_before) {
-  begin(progress, "looks at the clocks");
+  begin_stage(progress, "looks at the clocks");
   const std::optional<RegularStamps> regular = regular_stamps(as_given);
   const std::optional<Pass> with_regular = regular ? std::optional(with_stamps(as_given, *regular)) : std::nullopt;
-  const Pass& pass = with_regular ? *with_regular : as_given;
+  const Pass& in_time = with_regular ? *with_regular : as_given;
+  const bool finds_noise = options.find_noise && options.estimator != Estimator::kPaper;
+  const std::optional<ReadoutNoise> noise = finds_noise ? other_readout_noise(in_time) : std::nullopt;
+  const std::optional<Pass> with_noise = noise ? std::optional(with(*noise, in_time)) : std::nullopt;
+  const Pass& pass = with_noise ? *with_noise : in_time;
   const std::optional<Clocks> clocks = clocks_of(pass);
   const ClockCorrection correction = clocks ? wanted_correction(*clocks, pass.settings, options) : ClockCorrection{};
   std::optional<Pass> corrected;
@@ -389,6 +394,7 @@ CalibrationRun calibrate_after(const Pass& as_given, const CalibrationOptions& o
   CalibrationRun run = calibrate_as_stamped(stamped, with_clock_states(options, correction), progress);
   run.clocks = clocks;
   run.clock_correction = correction;
+  run.readout_noise = noise;
   run.gyro_stamps_off_s = regular ? regular->scatter_s : 0;
   add_to_estimates(correction, run.calibration.further);
   run.calibration.clocks = clocks_found(pass.settings, correction, run.calibration.further);
@@ -410,7 +416,10 @@ NavigationRun navigate(const Pass& pass, const CalibrationOptions& options, cons
     corrected = pass;
     correct(*corrected, correction);
   }
-  const Pass& stamped = corrected ? *corrected : pass;
+  const Pass& in_time = corrected ? *corrected : pass;
+  const std::optional<ReadoutNoise> noise = options.find_noise ? other_readout_noise(in_time) : std::nullopt;
+  const std::optional<Pass> with_noise = noise ? std::optional(with(*noise, in_time)) : std::nullopt;
+  const Pass& stamped = with_noise ? *with_noise : in_time;
   Pipeline pipeline(stamped.settings, settled_before(stamped.settings, options));
   NavigationRecorder recorder;
   ProgressMeter meter(progress, stamped.gyro.size());
@@ -429,6 +438,7 @@ NavigationRun navigate(const Pass& pass, const CalibrationOptions& options, cons
   }
   run.forecast = forecast_of(options, pipeline, run.attitude);
   run.clock_correction = correction;
+  run.readout_noise = noise;
   run.clocks = clocks_of(stamped);
   if (const std::optional<RegularStamps> regular = regular_stamps(pass)) {
     run.gyro_stamps_off_s = regular->scatter_s;

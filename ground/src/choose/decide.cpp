@@ -20,6 +20,7 @@
 #include "model/drift_on_board.hpp"
 #include "model/orbital_rate.hpp"
 #include "model/prior.hpp"
+#include "model/scatter.hpp"
 #include "model/setup.hpp"
 #include "trihedron/ground/model/setup_error.hpp"
 #include "trihedron/ground/tasks/on_all_cores.hpp"
@@ -38,17 +39,29 @@ bool is_judged_by_trial(const FurtherStateRow& row) {
 /// Smallest number of pairs of fixes from which the noise of the star tracker is estimated, to some percent.
 constexpr std::size_t kLeastFixPairs = 1000;
 
-/// 1-sigma of the star tracker by the changes of a trial; the median makes it robust against outliers. Needs changes.
+/// 1-sigma of the star tracker by the changes of a trial, in the order of their times. Needs changes. Noise may be more
+/// for a part of the pass: the root mean square over stretches, without outliers, of which no stretch counts as more
+/// than three times the median of all.
 Eigen::Vector3d star_tracker_noise_rad(const std::vector<Eigen::Vector3d>& changes_rad) {
-  constexpr double kMedianOfNormal = 0.6744897501960817;
+  constexpr double kMost = 3;
+  const std::size_t stretches = std::max<std::size_t>(changes_rad.size() / kLeastFixPairs, 1);
   Eigen::Vector3d noise_rad;
   for (int axis = 0; axis < 3; ++axis) {
-    std::vector<double> changes(changes_rad.size());
-    std::ranges::transform(changes_rad, changes.begin(),
-                           [axis](const Eigen::Vector3d& change) { return std::abs(change(axis)); });
-    const auto middle = changes.begin() + static_cast<std::ptrdiff_t>(changes.size() / 2);
-    std::nth_element(changes.begin(), middle, changes.end());
-    noise_rad(axis) = *middle / kMedianOfNormal / std::numbers::sqrt2;
+    std::vector<double> sigmas;
+    for (std::size_t n = 0; n < stretches; ++n) {
+      std::vector<double> sizes;
+      for (std::size_t i = n * changes_rad.size() / stretches; i < (n + 1) * changes_rad.size() / stretches; ++i) {
+        sizes.push_back(std::abs(changes_rad[i](axis)) / std::numbers::sqrt2);
+      }
+      sigmas.push_back(sigma_without_outliers(sizes));
+    }
+    std::ranges::sort(sigmas);
+    const double most = kMost * sigmas[sigmas.size() / 2];
+    double square = 0;
+    for (const double sigma : sigmas) {
+      square += std::pow(std::min(sigma, most), 2) / static_cast<double>(stretches);
+    }
+    noise_rad(axis) = std::sqrt(square);
   }
   return noise_rad;
 }
@@ -328,11 +341,11 @@ Decision decide_by_pass(const Pass& pass, const Screened& screened, const Calibr
   std::optional<ByEq1> by_eq1;
   std::optional<ProcessNoise> noise;
   if (options.drift_field && asked.find_noise) {
-    begin(progress, "decides by eq. (1) alone");
+    begin_stage(progress, "decides by eq. (1) alone");
     by_eq1 = try_eq1(pass, screened, options);
     noise = by_eq1->walk;
   }
-  begin(progress, "decides what is there");
+  begin_stage(progress, "decides what is there");
   Trial everything(pass, screened, with_everything(options, asked, largest_model), noise,
                    by_eq1 ? &by_eq1->trial : nullptr);
   const std::vector<Eigen::Vector3d> changes = everything.changes_rad();
@@ -356,11 +369,11 @@ Decision decide_by_pass(const Pass& pass, const Screened& screened, const Calibr
     noise = walking->noise;
   }
   settle_states(everything, pass.settings, asked, false, decision);
-  begin(progress, "finds the noise");
+  begin_stage(progress, "finds the noise");
   Trial decided(pass, screened, options, noise, &everything);
   const NoiseFit walk = with_most_likely_walk(decided, options);
   if (walk.gain > kLogOddsToAccept) {
-    begin(progress, "decides again with more noise");
+    begin_stage(progress, "decides again with more noise");
     decide_again_with_more_noise(pass, screened, asked, largest_model, wandering_is_open, std::move(everything),
                                  walking, std::move(decided), walk, decision);
   } else {
@@ -491,7 +504,7 @@ Decision decide_with_course(const Pass& pass, const Screened& screened, const Ca
   if (!course) {
     return decision;
   }
-  begin(progress, "looks for the time of a change");
+  begin_stage(progress, "looks for the time of a change");
   CalibrationOptions with = asked;
   use_course(course->kind, most_likely_time_s(pass, screened, decision.options, *course), with);
   Decision changing = decide_by_pass(pass, screened, with, largest_model, progress);
@@ -612,7 +625,7 @@ Decision decide(const Pass& pass, const CalibrationOptions& asked_for, const Pro
     leave_out_what_is_open(options);
     return decision;
   }
-  begin(progress, "screens the samples");
+  begin_stage(progress, "screens the samples");
   Screened screened = screen(pass, options, may_be_screened_with(asked));
   std::optional<OnBoardRun> run = std::exchange(screened.run, std::nullopt);
   if (screened.pass.fixes.empty()) {

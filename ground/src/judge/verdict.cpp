@@ -132,27 +132,42 @@ void judge_star_tracker(const Statistics& statistics, std::vector<Finding>& find
   }
 }
 
-void judge_gyros(const Pass& pass, const CalibrationRun& run, std::vector<Finding>& findings) {
-  const auto add_events = [&](GyroState state, FindingCode code, const char* text, const char* cure) {
-    std::vector<GyroEvent> events;
-    std::ranges::copy_if(run.gyro_events, std::back_inserter(events),
-                         [&](const GyroEvent& event) { return event.state == state; });
-    if (!events.empty()) {
-      add(findings, code, text, fmt::format("{}", fmt::join(texts_of(events, pass.settings.epoch), "; ")), cure);
-    }
-    return !events.empty();
-  };
-  const auto isolated = std::count_if(run.gyro_events.begin(), run.gyro_events.end(),
-                                      [](const GyroEvent& event) { return event.state == GyroState::kIsolated; });
-  const bool enough = static_cast<long>(run.calibration.gyros.size()) - isolated >= 2;
-  const bool added =
-      add_events(GyroState::kIsolated, FindingCode::kGyroIsolated,
-                 enough ? "A gyro alone did not agree with the rest, time after time; the others went on without it."
-                        : "A gyro alone did not agree with the rest, time after time; without it there is no pair.",
-                 "Look at its telemetry from there on. Its estimates are those of before.");
-  if (added && !enough) {
-    findings.back().severity = Severity::kDoNotUse;
+/// The events by which gyros were left out for good, or until the end of the pass.
+std::vector<GyroEvent> losses(const CalibrationRun& run, Time end) {
+  constexpr Duration kForMore = std::chrono::minutes(5);
+  PerGyro<GyroEvent> last{};
+  for (const GyroEvent& event : run.gyro_events) {
+    last[event.gyro] = event;
   }
+  std::vector<GyroEvent> lost;
+  std::copy_if(last.begin(), last.end(), std::back_inserter(lost), [&](const GyroEvent& event) {
+    const bool is_off = event.state == GyroState::kStuck || event.state == GyroState::kLeapt;
+    return event.state == GyroState::kIsolated || (is_off && end - event.t > kForMore);
+  });
+  return lost;
+}
+
+void judge_gyros(const Pass& pass, const CalibrationRun& run, std::vector<Finding>& findings) {
+  const std::vector<GyroEvent> lost = losses(run, pass.gyro.t.back());
+  const bool has_pair = has_pair_at_end(run, pass.gyro.t.back());
+  const auto add_events = [&](GyroState state, FindingCode code, std::string text, const char* cure) {
+    const auto is_of_state = [&](const GyroEvent& event) { return event.state == state; };
+    std::vector<GyroEvent> events;
+    std::ranges::copy_if(run.gyro_events, std::back_inserter(events), is_of_state);
+    if (events.empty()) {
+      return;
+    }
+    const bool breaks_pair = !has_pair && std::ranges::any_of(lost, is_of_state);
+    text += breaks_pair ? " Without it there is no pair at the end of the pass, and no attitude but at fixes." : "";
+    add(findings, code, std::move(text), fmt::format("{}", fmt::join(texts_of(events, pass.settings.epoch), "; ")),
+        cure);
+    if (breaks_pair) {
+      findings.back().severity = Severity::kDoNotUse;
+    }
+  };
+  add_events(GyroState::kIsolated, FindingCode::kGyroIsolated,
+             "A gyro alone did not agree with the rest, time after time, and was left out.",
+             "Look at its telemetry from there on. Its estimates are those of before.");
   add_events(GyroState::kStuck, FindingCode::kGyroStuck,
              "Readings of a gyro, or one component of them, stood still, not even moved by noise; they were not used.",
              "Look at the telemetry there: a frozen readout, or the last value repeated in a gap.");
@@ -221,6 +236,8 @@ void judge_nis(const Statistics& statistics, const std::string& what_is_wrong, s
 
 /// Probability of a false alarm on a good pass.
 constexpr double kFalseAlarm = 1e-5;
+/// Twenty standard deviations of the mean of white innovations of a pass of nine hours.
+constexpr double kAlternating = 0.2;
 /// Correlations and lines below these limits do no harm, however significant.
 constexpr double kCorrelated = 0.05;
 constexpr double kLineInSigmas = 0.1;
@@ -237,8 +254,15 @@ void judge_whiteness(const Pass& pass, const CalibrationRun& run, std::vector<Fi
   constexpr const char* kCure =
       "Look for drift or a star-tracker error that the model does not have: more of [further_states], a larger drift "
       "model, estimator batch.";
-  if (std::abs(found.largest_correlation) > kCorrelated &&
-      !is_chance(found.correlation_square, found.degrees_of_freedom)) {
+  if (found.alternation > kAlternating) {
+    add(findings, FindingCode::kInnovationsNotWhite,
+        "Fixes are off to one side and the other by turns, as those of two star trackers that are not aligned to each "
+        "other: which of them is right, the pass does not tell.",
+        fmt::format("{:.2f} sigma to either side", found.alternation),
+        "Give the fixes of each star tracker in a file of its own.");
+    findings.back().severity = Severity::kDoNotUse;
+  } else if (std::abs(found.largest_correlation) > kCorrelated &&
+             !is_chance(found.correlation_square, found.degrees_of_freedom)) {
     add(findings, FindingCode::kInnovationsNotWhite,
         "Fixes that follow each other are off alike: something is left in them that the model does not have, and its "
         "sigmas are too small.",
@@ -373,11 +397,27 @@ void judge_star_tracker_errors(const CalibrationRun& run, std::vector<Finding>& 
       sureness = std::abs(state.value / state.sigma);
     }
   }
-  if (orbital_rad != 0) {
-    add(findings, FindingCode::kOrbitalErrorFound,
-        "The star tracker has an error at orbital period; the calibration has taken account of it.",
-        fmt::format("largest component {:.1f}″, {:.0f} sigmas", orbital_rad / kArcsecond, sureness),
-        "None needed; look for what warms its mounting.");
+  if (orbital_rad == 0) {
+    return;
+  }
+  const auto is_accepted = [&](FurtherState state) {
+    return std::ranges::any_of(
+        run.evidence, [&](const Evidence& evidence) { return evidence.state == state && evidence.accepted; });
+  };
+  // Drift that turns both momenta alike looks like it, and members of the drift field hold the rest of such drift.
+  const bool may_be_drift = is_accepted(FurtherState::kOrbitalError) && is_accepted(FurtherState::kWanderingDrift);
+  add(findings, FindingCode::kOrbitalErrorFound,
+      may_be_drift ? "The star tracker has an error at orbital period, or the gyros have drift at it: both look alike, and "
+                     "there is drift that no coefficient explains. Taken for an error of the star tracker, which is in no "
+                     "sigma."
+                   : "The star tracker has an error at orbital period; the calibration has taken account of it.",
+      fmt::format("largest component {:.1f}″, {:.0f} sigmas", orbital_rad / kArcsecond, sureness),
+      may_be_drift ? "Look for what follows the orbit: the temperature of the mounting, or that of the gyros, a magnetic "
+                     "field. Where the star tracker is known to have no such error: orbital_error = \"off\" in "
+                     "[further_states]."
+                   : "None needed; look for what warms its mounting.");
+  if (may_be_drift) {
+    findings.back().severity = Severity::kDoNotUse;
   }
 }
 
@@ -390,6 +430,27 @@ void judge_noise(const Pass& pass, const CalibrationRun& run, std::vector<Findin
         fmt::format("{:.1f}″ {:.1f}″ {:.1f}″ found, {:.1f}″ {:.1f}″ {:.1f}″ in pass.toml", now.x(), now.y(), now.z(),
                     given.x(), given.y(), given.z()),
         "Correct the noise figures of the star tracker in pass.toml.");
+  }
+}
+
+void judge_readout_noise(const std::optional<ReadoutNoise>& noise, std::vector<Finding>& findings) {
+  if (noise) {
+    const auto text = [&](const PerGyro<double>& noise_rad) {
+      std::string all;
+      for (int k = 0; k < noise->gyros; ++k) {
+        all += fmt::format("{}{:.2g}″", k == 0 ? "" : " ", noise_rad[k] / kArcsecond);
+      }
+      return all;
+    };
+    add(findings, FindingCode::kReadoutNoise,
+        "The readings of the gyros do not scatter as pass.toml says; the noise found was used.",
+        fmt::format("{} found, up to {} for an hour, {} in pass.toml", text(noise->found_rad), text(noise->most_rad),
+                    text(noise->told_rad)),
+        noise->is_steady() ? "Correct the noise figures of the gyros in pass.toml."
+                           : "Look for what makes the readings noisier for a part of the pass, and cut that part off.");
+    if (!noise->is_steady()) {
+      findings.back().severity = Severity::kDoNotUse;
+    }
   }
 }
 
@@ -621,6 +682,10 @@ void judge_prior(const PassSettings& settings, const NavigationRun& run, std::ve
 
 }  // namespace
 
+bool has_pair_at_end(const CalibrationRun& run, Time end) {
+  return run.calibration.gyros.size() >= losses(run, end).size() + 2;
+}
+
 std::vector<std::string> texts_of(const std::vector<GyroEvent>& events, Time epoch) {
   struct Seen {
     long times = 0;
@@ -684,6 +749,7 @@ Verdict judge(const Pass& pass, const CalibrationRun& run) {
   judge_rejections(statistics, findings);
   judge_nis(statistics, "its model is incomplete or the noise is understated", findings);
   judge_noise(pass, run, findings);
+  judge_readout_noise(run.readout_noise, findings);
   judge_whiteness(pass, run, findings);
   judge_drift_left(pass, run, findings);
   judge_drift_model(run, findings);
@@ -722,6 +788,7 @@ Verdict judge_navigation(const Pass& pass, const NavigationRun& run) {
   judge_open_loops(run, findings);
   judge_rejections(run.statistics, findings);
   judge_star_tracker(run.statistics, findings);
+  judge_readout_noise(run.readout_noise, findings);
   judge_nis(run.statistics, "the calibration in use does not fit this pass, or the model is incomplete", findings);
   judge_need(run.forecast, findings);
   return verdict_of(std::move(findings));

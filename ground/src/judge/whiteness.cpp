@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <complex>
+#include <numeric>
 
 namespace trihedron::ground {
 namespace {
@@ -70,6 +71,21 @@ Whiteness::Line line_of(const std::vector<Series>& all, int multiple, double orb
   return line;
 }
 
+/// Mean of the numbers with their signs changed by turns, where none is missing between them.
+double alternation(const Series& series) {
+  std::vector<double> steps_s(series.t_s.size());
+  std::adjacent_difference(series.t_s.begin(), series.t_s.end(), steps_s.begin());
+  const auto middle = steps_s.begin() + static_cast<std::ptrdiff_t>(steps_s.size() / 2);
+  std::ranges::nth_element(steps_s, middle);
+  const double step_s = *middle;
+  double sum = 0;
+  for (std::size_t i = 0; i < series.z.size(); ++i) {
+    const bool is_odd = std::lround((series.t_s[i] - series.t_s.front()) / step_s) % 2 != 0;
+    sum += is_odd ? -series.z[i] : series.z[i];
+  }
+  return std::abs(sum) / static_cast<double>(series.z.size());
+}
+
 }  // namespace
 
 Whiteness whiteness(const std::vector<FixRecord>& fixes, double orbital_rate_rad_s) {
@@ -77,6 +93,7 @@ Whiteness whiteness(const std::vector<FixRecord>& fixes, double orbital_rate_rad
   Whiteness result;
   for (const Series& series : all) {
     result.variance_of_mean = std::max(result.variance_of_mean, variance_of_mean(series.z));
+    result.alternation = std::max(result.alternation, alternation(series));
     for (int lag = 1; lag <= Whiteness::kLags; ++lag) {
       const double r = correlation(series.z, lag);
       result.correlation_square += static_cast<double>(series.z.size()) * r * r;

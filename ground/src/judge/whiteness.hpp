@@ -16,6 +16,9 @@ struct Whiteness {
   /// Of the component with the most: by how much the variance of a mean of many is larger than if they were white.
   double variance_of_mean = 1;
 
+  /// Of the component with the most, in its sigma: by how much fixes are off to one side and the other by turns.
+  double alternation = 0;
+
   /// At a multiple of the orbital rate. Twice the power is χ² of `degrees_of_freedom` where there is no line.
   struct Line {
     int multiple = 1;

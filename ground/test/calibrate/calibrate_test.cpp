@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
+#include <random>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -607,6 +608,26 @@ TEST(Calibrate, DecidesOfThreeGyrosForDriftModelAndFurtherStates) {
   EXPECT_LT(std::abs(offset.value - 0.01), 4 * offset.sigma);
   EXPECT_LT(offset.sigma, 5e-4);
   EXPECT_TRUE(run.gyro_events.empty());
+}
+
+TEST(Calibrate, TakesNoiseOfTheStarTrackerThatIsMoreForAPartOfThePassForItsMean) {
+  Pass pass = two_hours().pass;
+  const Eigen::Vector3d told_rad = pass.settings.star_tracker_noise_rad;
+  std::mt19937_64 random(4);
+  std::normal_distribution<double> normal;
+  for (std::size_t i = pass.star_tracker.size() / 2; i < pass.star_tracker.size(); ++i) {
+    const Eigen::Vector3d more_rad = std::sqrt(3.0) * told_rad.cwiseProduct(Eigen::Vector3d::NullaryExpr([&] {
+      return normal(random);
+    }));
+    pass.star_tracker.q_in_c[i] *= Rot<C, C>::exp(Vec<C>::assume(more_rad)).quaternion();
+  }
+  const CalibrationRun run = calibrate(pass, {});
+  ASSERT_TRUE(run.options.star_tracker_noise_rad.has_value());
+  const Eigen::Array3d ratio = run.options.star_tracker_noise_rad->cwiseQuotient(told_rad).array();
+  EXPECT_LT((ratio - std::sqrt(2.5)).abs().maxCoeff(), 0.1) << ratio.transpose();
+  EXPECT_NEAR(run.calibration.statistics.nis_mean.value(), 4, 0.3);
+  EXPECT_TRUE(run.calibration.verdict.trustworthy);
+  EXPECT_LT(nees_of(two_hours().truth, run.calibration), 40);
 }
 
 TEST(Calibrate, FindsTheNoiseOfThreeGyros) {

@@ -122,6 +122,40 @@ TEST(Verdict, ForbidsSigmasThatAreTooSmallBecauseFixesAreOffAlike) {
   EXPECT_TRUE(judge(good_pass(), with_innovations(-0.5, 0)).trustworthy);
 }
 
+TEST(Verdict, ForbidsFixesThatAreOffByTurns) {
+  for (const double off : {0.1, 0.4}) {
+    auto run = with_innovations(0, 0);
+    for (std::size_t i = 0; i < run.fixes.size(); ++i) {
+      for (std::size_t k = 0; k < run.fixes[i].innovation.size(); ++k) {
+        run.fixes[i].innovation[k] += (i % 2 == 0 ? off : -off) * run.fixes[i].innovation_sigma[k];
+      }
+    }
+    // A fix that is missing changes no turns.
+    run.fixes.erase(run.fixes.begin() + 1000);
+    const Verdict verdict = judge(good_pass(), run);
+    EXPECT_EQ(verdict.trustworthy, off < 0.2);
+    if (off > 0.2) {
+      ASSERT_THAT(codes(verdict), Contains("innovations-not-white"));
+      EXPECT_THAT(verdict.findings[0].text, HasSubstr("by turns"));
+      EXPECT_EQ(verdict.findings.size(), 1U);
+    }
+  }
+}
+
+TEST(Verdict, ForbidsAnErrorAtOrbitalPeriodThatMayBeDrift) {
+  auto pass = good_pass();
+  pass.gyro.h.assign(6 * pass.gyro.size(), 0);
+  auto run = good_run();
+  run.calibration.further = {{parameter("orbital_sine_x_rad"), 1e-4, 1e-6}};
+  run.evidence = {{FurtherState::kOrbitalError, 100, true}, {FurtherState::kWanderingDrift, 2, false}};
+  EXPECT_THAT(codes(judge(pass, run)), ElementsAre("orbital-error-found"));
+  EXPECT_TRUE(judge(pass, run).trustworthy);
+  run.evidence[1].accepted = true;
+  EXPECT_FALSE(judge(pass, run).trustworthy);
+  run.evidence.erase(run.evidence.begin());  // it was asked for
+  EXPECT_TRUE(judge(pass, run).trustworthy);
+}
+
 /// With the coefficient of its first gyro, and its alignment, off by so many sigmas because the coefficients change.
 CalibrationRun with_coefficients_off(double coefficient_sigmas, double alignment_sigmas) {
   auto run = good_run();
@@ -391,11 +425,46 @@ TEST(Verdict, FindsAGyroThatStoodStill) {
   auto run = good_run();
   run.gyro_events = {{Time(std::chrono::minutes(3)), 0, GyroState::kStuck},
                      {Time(std::chrono::minutes(4)), 0, GyroState::kUsed},
-                     {Time(std::chrono::minutes(5)), 0, GyroState::kStuck}};
+                     {Time(std::chrono::minutes(5)), 0, GyroState::kStuck},
+                     {Time(std::chrono::minutes(6)), 0, GyroState::kUsed}};
   const Verdict verdict = judge(good_pass(), run);
   EXPECT_THAT(codes(verdict), ElementsAre("gyro-stuck"));
   EXPECT_EQ(verdict.findings[0].evidence, "gyro 1 stuck 2 times, first at 3.0 min");
   EXPECT_TRUE(verdict.trustworthy);
+}
+
+TEST(Verdict, FindsReadingsThatScatterOtherwiseThanTold) {
+  auto run = good_run();
+  run.readout_noise = {.gyros = 2, .found_rad = {}, .most_rad = {}, .told_rad = {}};
+  for (int k = 0; k < 2; ++k) {
+    run.readout_noise->found_rad[k] = run.readout_noise->most_rad[k] = 2e-5;
+    run.readout_noise->told_rad[k] = 1e-5;
+  }
+  const Verdict steady = judge(good_pass(), run);
+  EXPECT_THAT(codes(steady), ElementsAre("readout-noise"));
+  EXPECT_EQ(steady.findings[0].evidence, "4.1″ 4.1″ found, up to 4.1″ 4.1″ for an hour, 2.1″ 2.1″ in pass.toml");
+  EXPECT_TRUE(steady.trustworthy);
+  run.readout_noise->most_rad[1] = 4e-5;
+  EXPECT_FALSE(judge(good_pass(), run).trustworthy);
+}
+
+TEST(Verdict, FindsThatThereIsNoPairAtTheEnd) {
+  auto run = good_run();
+  auto pass = good_pass();
+  const Time end = pass.gyro.t.back();
+  for (const GyroState state : {GyroState::kStuck, GyroState::kLeapt}) {
+    run.gyro_events = {{end - std::chrono::minutes(6), 0, state}};
+    EXPECT_FALSE(has_pair_at_end(run, end));
+    EXPECT_FALSE(judge(pass, run).trustworthy);
+    EXPECT_THAT(judge(pass, run).findings.at(0).text, HasSubstr("no pair at the end"));
+    run.gyro_events[0].t = end - std::chrono::minutes(4);  // it may come back
+    EXPECT_TRUE(has_pair_at_end(run, end));
+    EXPECT_TRUE(judge(pass, run).trustworthy);
+  }
+  run.gyro_events = {{end - std::chrono::hours(1), 1, GyroState::kStuck}};
+  run.calibration.gyros.push_back(run.calibration.gyros[0]);
+  pass.gyro.gyros = 3;
+  EXPECT_TRUE(judge(pass, run).trustworthy);
 }
 
 TEST(Verdict, FindsAGyroThatLeapt) {

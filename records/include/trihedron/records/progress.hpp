@@ -9,7 +9,7 @@ namespace trihedron {
 /// 0 as long as it is not known.
 using Progress = std::function<void(std::string_view doing, double fraction)>;
 
-inline void begin(const Progress& progress, std::string_view doing) {
+inline void begin_stage(const Progress& progress, std::string_view doing) {
   if (progress) {
     progress(doing, 0);
   }

@@ -2,6 +2,7 @@
 /// Everything that a calibration or navigation of a pass records.
 
 #include <Eigen/Core>
+#include <algorithm>
 #include <chrono>
 #include <cstdint>
 #include <optional>
@@ -122,12 +123,27 @@ struct Change {
   }
 };
 
+/// Noise of the gyro readings where a pass shows another than its settings tell: 1-sigma per direction cosine.
+struct ReadoutNoise {
+  int gyros = 0;
+  PerGyro<double> found_rad{};  ///< the median of the hours of the pass
+  PerGyro<double> most_rad{};   ///< in one of them
+  PerGyro<double> told_rad{};
+
+  [[nodiscard]] bool is_steady() const {
+    constexpr double kSteady = 1.5;
+    return std::equal(found_rad.begin(), found_rad.begin() + gyros, most_rad.begin(),
+                      [](double found, double most) { return most <= kSteady * found; });
+  }
+};
+
 /// A calibration of a pass, and everything that was recorded on the way.
 struct CalibrationRun {
   CalibrationOptions options;                    ///< as decided
   std::optional<Clocks> clocks;                  ///< where the pass shows them, by its stamps as they are given
   ClockCorrection clock_correction;              ///< of the stamps, made before the calibration
   double gyro_stamps_off_s = 0;                  ///< rms off the regular times that were used in their place, or 0
+  std::optional<ReadoutNoise> readout_noise;     ///< that was used in the place of that of the settings
   std::vector<Evidence> evidence;                ///< of what was left to the program to decide
   std::vector<DriftModelForecast> drift_models;  ///< that were compared, smallest first
   Calibration known_before;                      ///< values and covariance before the pass; states as in `calibration`
@@ -166,6 +182,7 @@ struct NavigationRun {
   long corrections_missed = 0;          ///< intervals over which there were fixes, but none that could correct
   ClockCorrection clock_correction;     ///< of the stamps, by the calibration in use
   double gyro_stamps_off_s = 0;         ///< rms off the regular times that the samples are of, or 0
+  std::optional<ReadoutNoise> readout_noise;  ///< that was used in the place of that of the settings
   std::optional<Clocks> clocks;         ///< where the pass shows them, behind this correction
   std::vector<OpenLoopEnd> open_loops;  ///< where fixes could be compared with it
   Statistics statistics;

@@ -9,6 +9,9 @@ namespace trihedron::ground {
 /// Whether the attitude covers the pass and agrees with the fixes, and whether the parameters in use fit it.
 [[nodiscard]] Verdict judge_navigation(const Pass& pass, const NavigationRun& run);
 
+/// Whether two gyros and more were used until the last sample of the pass, at `end`, but for less than five minutes.
+[[nodiscard]] bool has_pair_at_end(const CalibrationRun& run, Time end);
+
 /// One for each gyro and state: how often, and when first, in minutes from `epoch`.
 [[nodiscard]] std::vector<std::string> texts_of(const std::vector<GyroEvent>& events, Time epoch);
 

@@ -1,0 +1,26 @@
+#include "model/scatter.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+
+namespace trihedron::ground {
+
+double sigma_without_outliers(std::vector<double>& sizes) {
+  constexpr double kMedianOfNormal = 0.6744897501960817;
+  constexpr double kWithin = 4;
+  const auto middle = sizes.begin() + static_cast<std::ptrdiff_t>(sizes.size() / 2);
+  std::ranges::nth_element(sizes, middle);
+  const double most = kWithin * *middle / kMedianOfNormal;
+  double squares = 0;
+  double count = 0;
+  for (const double size : sizes) {
+    if (size <= most) {
+      squares += size * size;
+      count += 1;
+    }
+  }
+  return std::sqrt(squares / count);
+}
+
+}  // namespace trihedron::ground

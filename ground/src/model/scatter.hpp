@@ -1,0 +1,11 @@
+#pragma once
+
+#include <vector>
+
+namespace trihedron::ground {
+
+/// 1-sigma of normal numbers of mean 0 among which there are outliers, by their sizes, of which there is one at least:
+/// the root mean square of those within four of the sigmas that the median tells. Changes the order.
+[[nodiscard]] double sigma_without_outliers(std::vector<double>& sizes);
+
+}  // namespace trihedron::ground

@@ -1,0 +1,169 @@
+#include "calibrate/readout_noise.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <array>
+#include <chrono>
+#include <cmath>
+#include <random>
+
+#include "passes.hpp"
+#include "trihedron/ground/calibrate/calibrate.hpp"
+
+namespace trihedron::ground {
+namespace {
+
+constexpr double kTold_rad = 1e-5;
+
+/// Momenta in a body that goes round once in 94 min and slews for a tenth of the time. `noise_rad(gyro)` is added to
+/// every component.
+template <class Noise>
+Pass turning(Duration period, Duration length, Noise noise_rad) {
+  Pass pass;
+  pass.settings.gyro_period = period;
+  pass.settings.gyros.resize(2);
+  pass.gyro.gyros = 2;
+  for (int k = 0; k < 2; ++k) {
+    pass.settings.gyros[static_cast<std::size_t>(k)].readout_noise_rad = kTold_rad;
+  }
+  double angle = 0;
+  double across = 0;
+  for (Time t{}; t < Time{} + length; t += period) {
+    const double dt_s = to_seconds(period);
+    angle += 1.11e-3 * dt_s;
+    across += std::fmod(to_seconds(t - Time{}), 600) < 60 ? 0.01 * dt_s : 0;
+    pass.gyro.t.push_back(t);
+    const Eigen::Matrix3d turn =
+        (Eigen::AngleAxisd(angle, Eigen::Vector3d::UnitY()) * Eigen::AngleAxisd(across, Eigen::Vector3d::UnitX()))
+            .toRotationMatrix();
+    const Eigen::Vector3d axes[] = {{0.98, 0.1, 0.17}, {0.14, 0.98, 0.1}};
+    for (int k = 0; k < 2; ++k) {
+      Eigen::Vector3d h = turn.transpose() * axes[k].normalized();
+      for (double& component : h) {
+        component += noise_rad(k);
+      }
+      h.normalize();
+      pass.gyro.h.insert(pass.gyro.h.end(), h.begin(), h.end());
+    }
+  }
+  return pass;
+}
+
+struct White {
+  std::array<double, 2> sigma_rad;
+  std::mt19937_64 random{7};
+  std::normal_distribution<double> normal{};
+  double operator()(int gyro) { return sigma_rad.at(static_cast<std::size_t>(gyro)) * normal(random); }
+};
+
+TEST(ReadoutNoise, IsFoundForEachGyro) {
+  for (const Duration period : {Duration(std::chrono::milliseconds(125)), Duration(std::chrono::seconds(1))}) {
+    const auto noise =
+        other_readout_noise(turning(period, std::chrono::hours(2), White{.sigma_rad = {1.02e-5, 1e-4}}));
+    ASSERT_TRUE(noise);
+    EXPECT_EQ(noise->gyros, 2);
+    EXPECT_NEAR(noise->found_rad[0], 1.02e-5, 0.03e-5);
+    EXPECT_NEAR(noise->found_rad[1], 1e-4, 0.03e-4);
+    EXPECT_EQ(noise->told_rad[1], kTold_rad);
+  }
+  const auto less = other_readout_noise(
+      turning(std::chrono::milliseconds(125), std::chrono::hours(1), White{.sigma_rad = {1e-6, 1e-6}}));
+  ASSERT_TRUE(less);
+  EXPECT_NEAR(less->found_rad[0], 1e-6, 0.03e-6);
+}
+
+TEST(ReadoutNoise, IsThatOfTheSettingsWhereThePassShowsThatOrTooLittle) {
+  const White as_told{.sigma_rad = {1.1e-5, 0.9e-5}};
+  EXPECT_FALSE(other_readout_noise(turning(std::chrono::milliseconds(125), std::chrono::hours(2), as_told)));
+  const White more{.sigma_rad = {1e-4, 1e-4}};
+  EXPECT_FALSE(other_readout_noise(turning(std::chrono::seconds(2), std::chrono::hours(2), more)));  // a slew bends
+  EXPECT_FALSE(other_readout_noise(turning(std::chrono::milliseconds(125), std::chrono::seconds(50), more)));
+  Pass uneven = turning(std::chrono::milliseconds(125), std::chrono::hours(1), more);
+  std::mt19937 random(5);
+  for (Time& t : uneven.gyro.t) {
+    t += std::chrono::milliseconds(random() % 60);
+  }
+  EXPECT_FALSE(other_readout_noise(uneven));
+  EXPECT_FALSE(other_readout_noise(Pass{}));
+}
+
+TEST(ReadoutNoise, IsNotMovedBySpikesGapsAndReadingsThatStandStill) {
+  const double nan = std::nan("");
+  Pass pass = turning(std::chrono::milliseconds(125), std::chrono::hours(3), White{.sigma_rad = {3e-5, 1e-5}});
+  std::mt19937_64 random(3);
+  const std::size_t size = pass.gyro.size();
+  for (std::size_t i = 0; i < size; ++i) {
+    double* h = &pass.gyro.h[6 * i];
+    if (random() % 200 == 0) {
+      h[0] += 1e-2;
+    } else if (random() % 200 == 0) {
+      h[1] = nan;
+    } else if (i > size / 3 && i < 2 * size / 3) {
+      std::copy_n(&pass.gyro.h[6 * (i - 1)], 3, h);
+    }
+  }
+  const auto noise = other_readout_noise(pass);
+  ASSERT_TRUE(noise);
+  EXPECT_NEAR(noise->found_rad[0], 3e-5, 0.1e-5);
+  EXPECT_NEAR(noise->found_rad[1], 1e-5, 0.03e-5);
+}
+
+TEST(ReadoutNoise, ThatIsMoreForAnHourIsTold) {
+  struct Growing {
+    White white{.sigma_rad = {1e-5, 1e-5}};
+    std::size_t calls = 0;
+    double operator()(int gyro) {
+      const bool last = calls++ / 6 >= 3 * 3600 * 8;
+      return (last && gyro == 1 ? 3 : 1) * white(gyro);
+    }
+  };
+  const auto noise = other_readout_noise(turning(std::chrono::milliseconds(125), std::chrono::hours(4), Growing{}));
+  ASSERT_TRUE(noise);
+  EXPECT_FALSE(noise->is_steady());
+  EXPECT_NEAR(noise->found_rad[1], 1e-5, 0.03e-5);
+  EXPECT_NEAR(noise->most_rad[1], 3e-5, 0.1e-5);
+  EXPECT_NEAR(noise->most_rad[0], 1e-5, 0.05e-5);
+}
+
+TEST(ReadoutNoise, ThatHasPassedAFilterIsNotTakenForLess) {
+  // The mean of the last four: half the noise, of which neighbours share most.
+  struct Filtered {
+    White white{.sigma_rad = {2e-5, 2e-5}};
+    std::array<std::array<double, 4>, 6> last{};  // of each component
+    std::size_t calls = 0;
+    double operator()(int gyro) {
+      std::array<double, 4>& its = last.at(calls % 6);
+      its.at(calls++ / 6 % 4) = white(gyro);
+      return (its[0] + its[1] + its[2] + its[3]) / 4;
+    }
+  };
+  EXPECT_FALSE(other_readout_noise(turning(std::chrono::milliseconds(125), std::chrono::hours(2), Filtered{})));
+}
+
+TEST(ReadoutNoise, ToldWrongIsReplacedByThatFoundAndNamed) {
+  Pass pass = two_hours().pass;
+  const CalibrationRun right = calibrate(pass, {});
+  EXPECT_FALSE(right.readout_noise);
+  for (const double factor : {0.1, 5.0}) {
+    pass.settings.gyros[0].readout_noise_rad = factor * two_hours().pass.settings.gyros[0].readout_noise_rad;
+    const CalibrationRun run = calibrate(pass, {});
+    EXPECT_NEAR(run.calibration.statistics.nis_mean.value(), right.calibration.statistics.nis_mean.value(), 0.02);
+    EXPECT_NEAR(run.calibration.covariance.diagonal().sum(), right.calibration.covariance.diagonal().sum(),
+                0.05 * right.calibration.covariance.diagonal().sum());
+    const auto is_it = [](const Finding& finding) { return finding.code == FindingCode::kReadoutNoise; };
+    EXPECT_EQ(std::ranges::count_if(run.calibration.verdict.findings, is_it), 1) << factor;
+    EXPECT_EQ(run.calibration.verdict.trustworthy, right.calibration.verdict.trustworthy);
+    CalibrationOptions told;
+    told.find_noise = false;
+    EXPECT_FALSE(calibrate(pass, told).readout_noise);
+    pass.settings.prior = run.calibration;
+    const NavigationRun flown = navigate(pass, {});
+    pass.settings.prior.reset();
+    ASSERT_TRUE(flown.readout_noise);
+    EXPECT_EQ(std::ranges::count_if(flown.verdict.findings, is_it), 1) << factor;
+  }
+}
+
+}  // namespace
+}  // namespace trihedron::ground
