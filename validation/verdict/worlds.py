@@ -8,7 +8,7 @@ import math
 import random
 from collections.abc import Callable
 
-from rotations import exponential, inverse, product
+from rotations import exponential, inverse, product, rotated
 
 ARCSECOND = math.pi / 180 / 3600
 PASS_S = 9 * 3600.0
@@ -134,6 +134,58 @@ def stamps_of_fixes(change):
     return lambda telemetry, random: telemetry.rewrite("star_tracker.csv", lambda rows: [[change(row[0]), *row[1:]] for row in rows])
 
 
+def attitudes(telemetry):
+    """Those of the fixes: (t_s, quaternion)."""
+    for line in (telemetry.directory / "star_tracker.csv").read_text().splitlines()[1:]:
+        cells = [float(cell) for cell in line.split(",")]
+        yield cells[0], tuple(cells[1:5])
+
+
+def drifts_at_orbital_period(sigma_rad_s):
+    """Each momentum by a drift of sine and cosine about each body axis, as of a temperature or the Earth's magnetic field."""
+    rate_rad_s = 1.11e-3
+    def edit(telemetry, random):
+        amplitudes = [[[random.gauss(0, sigma_rad_s) for _ in range(3)] for _ in range(2)] for gyro in range(2)]
+        turned, last_s = [[0.0] * 3, [0.0] * 3], None
+        turns = []  # t_s; of each gyro in body axes, as a quaternion
+        for t_s, q in attitudes(telemetry):
+            phase = rate_rad_s * t_s
+            for gyro, (sine, cosine) in enumerate(amplitudes):
+                rate = [math.sin(phase) * s + math.cos(phase) * c for s, c in zip(sine, cosine)]
+                step_s = 0 if last_s is None else t_s - last_s
+                moved = rotated(q, scaled(rate, step_s))
+                turned[gyro] = [a + b for a, b in zip(turned[gyro], moved)]
+            last_s = t_s
+            turns.append((t_s, [exponential(rotated(inverse(q), turn)) for turn in turned]))
+        at = 0
+        def change(t_s, h):
+            nonlocal at
+            while at + 1 < len(turns) and turns[at + 1][0] <= t_s:
+                at += 1
+            return [x for gyro, turn in enumerate(turns[at][1]) for x in rotated(turn, h[3 * gyro:3 * gyro + 3])]
+        telemetry.readings(change)
+    return edit
+
+
+def readout_noise_told(factor):
+    def edit(telemetry, random):
+        for line in (telemetry.directory / "pass.toml").read_text().splitlines():
+            if line.startswith("readout_noise_rad"):
+                telemetry.settings((line, f"readout_noise_rad = {float(line.split('=')[1].split('#')[0]) * factor!r}"))
+    return edit
+
+
+def tracker_noise_grows(factor, noise_rad):
+    """From mid-pass on."""
+    def edit(telemetry, random):
+        more = math.sqrt(factor * factor - 1)
+        def change(t_s, q):
+            error = tuple(random.gauss(0, more * sigma) for sigma in noise_rad)
+            return product(q, exponential(error)) if t_s >= PASS_S / 2 else q
+        telemetry.fixes(change)
+    return edit
+
+
 def tracker_moves(rotation_vector_of):
     """A fix is C_in_c exp([e×]), e = rotation_vector_of(t_s, random axis)."""
     def edit(telemetry, random):
@@ -220,10 +272,7 @@ def late(seconds):
 def inertial_step(size_rad):
     """From mid-pass on the momentum of gyro 1 is another one: turned in inertial space, at the attitude of the nearest fix."""
     def edit(telemetry, random):
-        fixes = {}
-        for line in (telemetry.directory / "star_tracker.csv").read_text().splitlines()[1:]:
-            cells = [float(cell) for cell in line.split(",")]
-            fixes[round(cells[0] / 3)] = tuple(cells[1:5])
+        fixes = {round(t_s / 3): q for t_s, q in attitudes(telemetry)}
         turn = exponential(scaled(unit(random), size_rad))
         def change(t_s, h):
             if t_s < PASS_S / 2:
@@ -262,6 +311,7 @@ WORLDS = [
     World("walk", "drift outside eq. (1)", drifting(coefficient_walk='"1e-10rad/s/s^0.5"'), faults=NOT_CONSTANT),
     World("wander-20min", "drift outside eq. (1)", drifting(markov_sigma='"5e-8rad/s"', markov_time='"20min"')),
     World("wander-3h", "drift outside eq. (1)", drifting(markov_sigma='"3e-8rad/s"', markov_time='"3h"')),
+    World("orbital-drift-3e-8", "drift outside eq. (1)", constant(SLEWS), drifts_at_orbital_period(3e-8)),
     World("warm-up-0.3", "drift outside eq. (1)", drifting(warm_up_fraction=0.3), faults=NOT_CONSTANT),
 
     World("dirty", "dirty telemetry", constant(DIRTY)),
@@ -269,9 +319,11 @@ WORLDS = [
     World("clock-offset-20ms", "dirty telemetry", tracker(clock_offset='"20ms"')),
     World("orbital-error-15", "dirty telemetry", tracker(orbital_sine='["15arcsec", "-10arcsec", "5arcsec"]', orbital_cosine='["5arcsec", "10arcsec", "-15arcsec"]')),
     World("field-error", "dirty telemetry", tracker(field_error='["2arcsec", "2arcsec", "10arcsec"]'), faults=("innovations-not-white",)),
+    World("tracker-noise-doubles", "dirty telemetry", constant(SLEWS), tracker_noise_grows(2, [3 * ARCSECOND, 3 * ARCSECOND, 20 * ARCSECOND])),
     World("blinded", "dirty telemetry", tracker(sun_exclusion='"40deg"', earth_exclusion='"25deg"')),
 
     World("noise-in-degrees", "wrong units and sides", constant(SLEWS), in_degrees, faults=("nis-out-of-bounds",)),
+    World("readout-noise-told-third", "wrong units and sides", constant(SLEWS), readout_noise_told(1 / 3)),
     World("scalar-first", "wrong units and sides", constant(SLEWS), fixes_by(lambda q: (q[3], q[0], q[1], q[2]))),
     World("conjugate", "wrong units and sides", constant(SLEWS), fixes_by(inverse)),
     World("gyros-exchanged", "wrong units and sides", constant(SLEWS), exchanged),

@@ -308,6 +308,7 @@ CalibrationRun calibrate_as_stamped(const Pass& pass, const CalibrationOptions& 
   put_into(run.fixes, std::move(contradicted));
   run.options = decision.options;
   run.evidence = decision.evidence;
+  run.orbital_error_over_drift = decision.orbital_error_over_drift;
   run.changes = decision.changes;
   run.known_before = known_before(settings, decision.options, decision.field);
   const Statistics recorded = run.calibration.statistics;

@@ -156,6 +156,56 @@ MatrixXd shapes_of(const CalibrationSetup& setup, const PassProblem::Moment& mom
   return shapes;
 }
 
+/// How far drift of 1 rad/s about each axis of the body, times sine and cosine of the orbital phase, has turned a
+/// momentum, in axes.
+class OrbitalDrift {
+ public:
+  OrbitalDrift(double rate_rad_s, Time phase_zero) : rate_rad_s_(rate_rad_s), phase_zero_(phase_zero) {}
+
+  /// To a later time. Between them the body turns evenly.
+  void go_to(Time t, const Eigen::Quaterniond& q_in_c) {
+    constexpr double kStep_s = 5;
+    if (last_) {
+      const double span_s = to_seconds(t - *last_);
+      const auto steps = static_cast<int>(std::ceil(span_s / kStep_s));
+      for (int i = 0; i < steps; ++i) {
+        const double part = (i + 0.5) / steps;
+        const Matrix3d by_time = span_s / steps * last_q_.slerp(part, q_in_c).toRotationMatrix();
+        const double phase = rate_rad_s_ * (to_seconds(*last_ - phase_zero_) + part * span_s);
+        turned_.leftCols<3>() += std::sin(phase) * by_time;
+        turned_.rightCols<3>() += std::cos(phase) * by_time;
+      }
+    }
+    last_ = t;
+    last_q_ = q_in_c;
+  }
+  [[nodiscard]] const Eigen::Matrix<double, 3, 6>& turned_in() const { return turned_; }
+
+ private:
+  double rate_rad_s_;
+  Time phase_zero_;
+  std::optional<Time> last_;
+  Eigen::Quaterniond last_q_ = Eigen::Quaterniond::Identity();
+  Eigen::Matrix<double, 3, 6> turned_ = Eigen::Matrix<double, 3, 6>::Zero();
+};
+
+MatrixXd prior_rows(const PassProblem::Linear& linear, Index shapes) {
+  MatrixXd rows(linear.prior.rows(), linear.prior.cols() + shapes + 1);
+  rows << linear.prior, MatrixXd::Zero(linear.prior.rows(), shapes), linear.prior_y;
+  return rows;
+}
+
+/// The form of a last stretch, which has none of the states at its end, without their place.
+MatrixXd without_states_at_end(const MatrixXd& form, Index states) {
+  std::vector<Index> others;
+  for (Index i = 0; i < form.rows(); ++i) {
+    if (i < states || i >= 2 * states) {
+      others.push_back(i);
+    }
+  }
+  return form(others, others);
+}
+
 /// The whole pass as a form of what may move, all else eliminated. The pass is cut into stretches; the variables are
 /// the steps of the parameters at the beginning of each stretch but the first, those of the momenta, the shapes, 1.
 class Constancy {
@@ -317,12 +367,6 @@ class Constancy {
 
  private:
   [[nodiscard]] Index of_stretch() const { return (kOfGyro + 2) * layout_.gyros; }
-
-  static MatrixXd prior_rows(const PassProblem::Linear& linear, Index shapes) {
-    MatrixXd rows(linear.prior.rows(), linear.prior.cols() + shapes + 1);
-    rows << linear.prior, MatrixXd::Zero(linear.prior.rows(), shapes), linear.prior_y;
-    return rows;
-  }
 
   const PassProblem& problem_;
   Layout layout_;
@@ -505,6 +549,53 @@ std::vector<Change> changes_over(const Trial& trial) {
   }
   std::ranges::sort(best, [](const Change& a, const Change& b) { return a.log_odds > b.log_odds; });
   return best;
+}
+
+double orbital_error_over_drift(const Trial& trial) {
+  const PassProblem& problem = trial.problem();
+  const BatchResult& found = trial.found();
+  const CalibrationSetup& setup = problem.setup().on_board;
+  const double rate_rad_s = setup.orbital_rate_rad_s;
+  const int gyros = problem.layout().gyros;
+  constexpr Index kError = 6;  // of sine and cosine about c x, y, z; so is the drift of a gyro
+  OrbitalDrift drift(rate_rad_s, setup.orbital_phase_zero);
+  const auto beside = [&](const PassProblem::Moment& moment, const Layout& layout, const MatrixXd& rows) {
+    MatrixXd shapes = MatrixXd::Zero(rows.rows(), kError * (1 + gyros));
+    const double phase = rate_rad_s * to_seconds(moment.t - setup.orbital_phase_zero);
+    const Eigen::Quaterniond q_in_c = moment.fix->fix.q_in_c.normalized();
+    drift.go_to(moment.t, q_in_c);
+    const Eigen::Matrix<double, 3, kError> turned_c = q_in_c.conjugate().toRotationMatrix() * drift.turned_in();
+    for (int k = 0; k < gyros; ++k) {
+      const auto by_alignment = rows.middleCols<3>(layout.alignment(k));
+      if (moment.fix->fix.head == 0) {
+        shapes.leftCols<3>() += std::sin(phase) * by_alignment;
+        shapes.middleCols<3>(3) += std::cos(phase) * by_alignment;
+      }
+      shapes.middleCols<kError>(kError * (1 + k)) = by_alignment.lazyProduct(turned_c);
+    }
+    return shapes;
+  };
+  const Index d = problem.layout().dynamic();
+  const Index constants = problem.layout().size() - d;
+  const Index shapes = kError * (1 + gyros);
+  Stretch whole(d, constants, shapes);
+  whole.measure(prior_rows(found.linear, shapes));
+  problem.for_each_arc(found.before, beside, [&](std::size_t arc, const MatrixXd& fixes) {
+    whole.measure(fixes);
+    if (arc + 1 < problem.arcs()) {
+      whole.move(found.linear.stages[arc]);
+    }
+  });
+  const MatrixXd form = without_first(without_states_at_end(whole.form(true), d), d + constants);
+  const auto log_odds = [&](Index at, Index size, double sigma) {
+    const MatrixXd squares = sigma * sigma * form.block(at, at, size, size);
+    const Eigen::LLT<MatrixXd> root(squares + MatrixXd::Identity(size, size));
+    const VectorXd y = sigma * form.col(shapes).segment(at, size);
+    return root.matrixL().solve(y).squaredNorm() / 2 -
+           root.matrixLLT().diagonal().array().log().sum();
+  };
+  const double error_rad = kind_of(FurtherState::kOrbitalError).prior_sigma;
+  return log_odds(0, kError, error_rad) - log_odds(kError, kError * gyros, rate_rad_s * error_rad);
 }
 
 }  // namespace trihedron::ground

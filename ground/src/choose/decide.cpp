@@ -232,6 +232,19 @@ void keep_field(const Trial& trial, Decision& decision) {
   }
 }
 
+/// Compares an error of the star tracker at orbital period that was accepted with drift that looks like it. `decided`:
+/// the trial with it.
+void compare_with_drift(const Pass& pass, const Screened& screened, const CalibrationOptions& asked,
+                        const Trial& decided, const Progress& progress, Decision& decision) {
+  constexpr FurtherState kError = FurtherState::kOrbitalError;
+  if (asked.further_states[kError] == Choice::kAuto && decision.options.further_states.is_on(kError)) {
+    begin_stage(progress, "looks for drift at orbital period");
+    CalibrationOptions without = decision.options;
+    without.further_states[kError] = Choice::kOff;
+    decision.orbital_error_over_drift = orbital_error_over_drift(Trial(pass, screened, without, {}, &decided));
+  }
+}
+
 /// The noise is larger than the settings say, so the states were decided with too small a noise. Decides again, with
 /// the noise found while all states are free, and decides whether the drift wanders. `everything`: the trial with all
 /// states free, and the noise found by it, if that was looked for; `walked`, `walk`: the trial with the states decided
@@ -241,7 +254,7 @@ void keep_field(const Trial& trial, Decision& decision) {
 void decide_again_with_more_noise(const Pass& pass, const Screened& screened, const CalibrationOptions& asked,
                                   const DriftModelId& largest_model, bool wandering_is_open, Trial everything,
                                   std::optional<NoiseFit> walking, Trial walked, const NoiseFit& walk,
-                                  Decision& decision) {
+                                  const Progress& progress, Decision& decision) {
   CalibrationOptions& options = decision.options;
   const CalibrationOptions free = with_everything(options, asked, largest_model);
   const bool may_wander = wandering_is_open && (!walking || walking->gain > kLogOddsToAccept);
@@ -295,6 +308,7 @@ void decide_again_with_more_noise(const Pass& pass, const Screened& screened, co
   keep_field(walked, decision);
   decision.nearby = walked.nearby();
   decision.changes = changes_over(walked);
+  compare_with_drift(pass, screened, asked, walked, progress, decision);
   if (wandering) {
     decision.evidence.push_back(*wandering);
   }
@@ -375,13 +389,14 @@ Decision decide_by_pass(const Pass& pass, const Screened& screened, const Calibr
   if (walk.gain > kLogOddsToAccept) {
     begin_stage(progress, "decides again with more noise");
     decide_again_with_more_noise(pass, screened, asked, largest_model, wandering_is_open, std::move(everything),
-                                 walking, std::move(decided), walk, decision);
+                                 walking, std::move(decided), walk, progress, decision);
   } else {
     decision.log_likelihood = walk.log_likelihood;
     use_walk(walk.noise, options);
     keep_field(decided, decision);
     decision.nearby = decided.nearby();
     decision.changes = changes_over(decided);
+    compare_with_drift(pass, screened, asked, decided, progress, decision);
   }
   return decision;
 }
@@ -496,9 +511,18 @@ double most_likely_time_s(const Pass& pass, const Screened& screened, const Cali
 
 /// Decides by the data of the pass. `change_is_open`: whether the coefficients may be found to change; then a warm-up
 /// or a jump of them is looked for.
-Decision decide_with_course(const Pass& pass, const Screened& screened, const CalibrationOptions& asked,
+Decision decide_with_course(const Pass& pass, const Screened& screened, CalibrationOptions asked,
                             const DriftModelId& largest_model, bool change_is_open, const Progress& progress) {
   Decision decision = decide_by_pass(pass, screened, asked, largest_model, progress);
+  if (decision.orbital_error_over_drift.value_or(0) < -kLogOddsToAccept) {  // it is the drift that has this period
+    asked.further_states[FurtherState::kOrbitalError] = Choice::kOff;
+    const std::optional<double> over_drift = decision.orbital_error_over_drift;
+    decision = decide_by_pass(pass, screened, asked, largest_model, progress);
+    decision.orbital_error_over_drift = over_drift;
+    decision.evidence.push_back({FurtherState::kOrbitalError, *over_drift, false});
+    // Drift at this period looks like aberration as well.
+    std::erase_if(decision.changes, [](const Change& change) { return change.moving == Moving::kAberration; });
+  }
   const std::optional<FoundCourse> course =
       change_is_open ? course_of(decision.changes, pass.settings.epoch) : std::nullopt;
   if (!course) {

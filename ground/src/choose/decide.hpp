@@ -27,6 +27,8 @@ struct Decision {
   std::vector<Forecast> forecasts;  ///< of the drift models that were compared
   std::optional<FieldPrior> field;  ///< where the drift is estimated as one
   std::vector<Change> changes;      ///< what moves during the pass
+  /// Where an error of the star tracker at orbital period is accepted: ln of its odds against such drift.
+  std::optional<double> orbital_error_over_drift;
   /// Those of the pass with what it shows of the size of members outside eq. (1), for an estimator on board.
   std::optional<PassSettings> settings;
   std::optional<Calibration> members;   ///< all coefficients of the field as the trial finds them, and alignments

@@ -148,9 +148,16 @@ void judge_drift_left(const Pass& pass, const CalibrationRun& run, std::vector<F
                                line->gyro + 1, line->period_s / 60, line->amplitude, angle_text(line->amplitude_rad),
                                std::ceil(line->log_chance / std::numbers::ln10)));
   }
+  // Then what wanders is what is left of that drift.
+  const bool has_orbital_period =
+      run.orbital_error_over_drift && !run.options.further_states.is_on(FurtherState::kOrbitalError);
+  if (has_orbital_period) {
+    drift.push_back(fmt::format("drift at orbital period: ln of its odds against an error of the star tracker {:.1f}",
+                                -*run.orbital_error_over_drift));
+  }
   if (!noise.empty()) {
     const std::optional<AngleBetweenMomenta::Wander> wander =
-        angle && run.calibration.noise ? std::optional(angle->wander(*run.calibration.noise)) : std::nullopt;
+        angle && !has_orbital_period && run.calibration.noise ? std::optional(angle->wander(*run.calibration.noise)) : std::nullopt;
     if (wander && wander->log_odds > kLogOdds) {
       star_tracker.push_back(
           noise + fmt::format("; it would move the angle by {}, root mean square", angle_text(wander->expected_rad)));

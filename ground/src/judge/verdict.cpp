@@ -400,18 +400,15 @@ void judge_star_tracker_errors(const CalibrationRun& run, std::vector<Finding>& 
   if (orbital_rad == 0) {
     return;
   }
-  const auto is_accepted = [&](FurtherState state) {
-    return std::ranges::any_of(
-        run.evidence, [&](const Evidence& evidence) { return evidence.state == state && evidence.accepted; });
-  };
-  // Drift that turns both momenta alike looks like it, and members of the drift field hold the rest of such drift.
-  const bool may_be_drift = is_accepted(FurtherState::kOrbitalError) && is_accepted(FurtherState::kWanderingDrift);
+  constexpr double kSureLogOdds = 5;
+  const std::optional<double>& over_drift = run.orbital_error_over_drift;
+  const bool may_be_drift = over_drift && *over_drift < kSureLogOdds;
   add(findings, FindingCode::kOrbitalErrorFound,
       may_be_drift ? "The star tracker has an error at orbital period, or the gyros have drift at it: both look alike, and "
-                     "there is drift that no coefficient explains. Taken for an error of the star tracker, which is in no "
-                     "sigma."
+                     "it was taken for an error of the star tracker. Sigmas do not tell of drift."
                    : "The star tracker has an error at orbital period; the calibration has taken account of it.",
-      fmt::format("largest component {:.1f}″, {:.0f} sigmas", orbital_rad / kArcsecond, sureness),
+      fmt::format("largest component {:.1f}″, {:.0f} sigmas{}", orbital_rad / kArcsecond, sureness,
+                  over_drift ? fmt::format("; ln of its odds against drift at that period {:+.1f}", *over_drift) : ""),
       may_be_drift ? "Look for what follows the orbit: the temperature of the mounting, or that of the gyros, a magnetic "
                      "field. Where the star tracker is known to have no such error: orbital_error = \"off\" in "
                      "[further_states]."

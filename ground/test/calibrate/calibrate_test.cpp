@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "named.hpp"
+#include "orbital_drift.hpp"
 #include "passes.hpp"
 #include "trihedron/core/frames.hpp"
 #include "trihedron/ground/evaluate/evaluate.hpp"
@@ -482,6 +483,32 @@ TEST(Calibrate, DecidesByItselfForClockOffsetAndErrorAtOrbitalPeriod) {
     EXPECT_LT(std::abs(estimate.value - expected), 4 * estimate.sigma) << name_of(estimate.parameter);
   }
   EXPECT_LT(run.calibration.further[0].sigma, 5e-4);
+  EXPECT_GT(run.orbital_error_over_drift.value(), 5);
+}
+
+TEST(Calibrate, DoesNotTakeDriftAtOrbitalPeriodForAnErrorOfTheStarTracker) {
+  Scenario scenario;
+  scenario.seed = 1;
+  scenario.duration = std::chrono::hours(9);
+  const auto simulated = sim::simulate(scenario);
+  Pass pass = simulated.pass;
+  add_orbital_drift(simulated.truth, {4e-8, -3e-8, 2e-8}, {-2e-8, 3e-8, 5e-8}, 0, pass.gyro);
+  add_orbital_drift(simulated.truth, {-3e-8, 5e-8, 1e-8}, {4e-8, 2e-8, -3e-8}, 1, pass.gyro);
+  const auto run = calibrate(pass, {});
+  EXPECT_LT(run.orbital_error_over_drift.value(), -5);
+  EXPECT_TRUE(run.calibration.verdict.has(FindingCode::kDriftNotExplained));
+  EXPECT_FALSE(run.calibration.verdict.has(FindingCode::kOrbitalErrorFound));
+  const auto errors = attitude_errors(run.attitude, simulated.truth.t, simulated.truth.q_in_c);
+  double beyond = 0;
+  for (std::size_t i = 0; i < errors.t.size(); ++i) {
+    beyond += errors.error_rad[i].cwiseQuotient(errors.sigma_rad[i]).cwiseAbs().maxCoeff() > 4 ? 1 : 0;
+  }
+  EXPECT_LT(beyond, 0.01 * static_cast<double>(errors.t.size()));
+  for (std::size_t gyro = 0; gyro < 2; ++gyro) {
+    const Eigen::Array3d error = alignment_error(run.calibration, simulated.truth, gyro).array();
+    const Eigen::Index row = rows_of(run.calibration, {ParameterId::alignment(gyro, 0)})[0];
+    EXPECT_LT((error / run.calibration.covariance.diagonal().segment<3>(row).array().sqrt()).abs().maxCoeff(), 4);
+  }
 }
 
 TEST(Calibrate, DoesNotTakeARandomWalkForDriftThatWanders) {

@@ -145,6 +145,8 @@ struct CalibrationRun {
   double gyro_stamps_off_s = 0;                  ///< rms off the regular times that were used in their place, or 0
   std::optional<ReadoutNoise> readout_noise;     ///< that was used in the place of that of the settings
   std::vector<Evidence> evidence;                ///< of what was left to the program to decide
+  /// Where an error of the star tracker at orbital period was accepted: ln of its odds against drift at that period.
+  std::optional<double> orbital_error_over_drift;
   std::vector<DriftModelForecast> drift_models;  ///< that were compared, smallest first
   Calibration known_before;                      ///< values and covariance before the pass; states as in `calibration`
   Calibration calibration;                       ///< with verdict and statistics
