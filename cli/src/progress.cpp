@@ -29,8 +29,9 @@ Progress ProgressBar::meter() const {
     constexpr int kWidth = 40;
     const std::string label = doing.empty() ? what_ : fmt::format("{}: {}", what_, doing);
     const int full = static_cast<int>(fraction * kWidth);
-    say(fraction > 0 ? fmt::format("\r\033[K{} [{:=<{}}{: <{}}] {:3.0f} %", label, "", full, "", kWidth - full, 100 * fraction)
-                     : fmt::format("\r\033[K{} …", label));
+    say(fraction > 0
+            ? fmt::format("\r\033[K{} [{:=<{}}{: <{}}] {:3.0f} %", label, "", full, "", kWidth - full, 100 * fraction)
+            : fmt::format("\r\033[K{} …", label));
   };
 }
 

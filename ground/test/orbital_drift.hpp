@@ -9,8 +9,8 @@
 namespace trihedron::ground {
 
 /// Turns the momenta of a pass as drift about each body axis at orbital period does.
-inline void add_orbital_drift(const Truth& truth, const Eigen::Vector3d& sine_rad_s, const Eigen::Vector3d& cosine_rad_s,
-                       int gyro, GyroTelemetry& readings) {
+inline void add_orbital_drift(const Truth& truth, const Eigen::Vector3d& sine_rad_s,
+                              const Eigen::Vector3d& cosine_rad_s, int gyro, GyroTelemetry& readings) {
   constexpr double kRate_rad_s = 1.11e-3;
   Eigen::Vector3d turned_in(0, 0, 0);
   std::size_t at = 0;
@@ -24,8 +24,8 @@ inline void add_orbital_drift(const Truth& truth, const Eigen::Vector3d& sine_ra
     turned_in += to_seconds(readings.t[i] - readings.t[i - 1]) *
                  (q_in_c * Eigen::Vector3d(std::sin(phase) * sine_rad_s + std::cos(phase) * cosine_rad_s));
     // Axes of the case are those of the body but for some minutes of arc.
-    Eigen::Map<Eigen::Vector3d> h_b(&readings.h[3 * (i * static_cast<std::size_t>(readings.gyros) +
-                                                     static_cast<std::size_t>(gyro))]);
+    Eigen::Map<Eigen::Vector3d> h_b(
+        &readings.h[3 * (i * static_cast<std::size_t>(readings.gyros) + static_cast<std::size_t>(gyro))]);
     h_b = (h_b + (q_in_c.conjugate() * turned_in).cross(h_b)).normalized();
   }
 }

@@ -24,7 +24,9 @@ class Worker {
       : thread_([this, &work] {
           const StopScope scope(&stop_);
           try {
-            work([this](std::string_view /*doing*/, double fraction) { fraction_.store(fraction, std::memory_order_relaxed); });
+            work([this](std::string_view /*doing*/, double fraction) {
+              fraction_.store(fraction, std::memory_order_relaxed);
+            });
           } catch (...) {
             failure_ = std::current_exception();
           }

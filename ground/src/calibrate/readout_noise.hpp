@@ -8,10 +8,10 @@
 
 namespace trihedron::ground {
 
-/// Where the noise of a gyro is another than the settings tell, or in some hour another than in most: that of all gyros, by third differences of their
-/// readings, to which no turn of a body adds. Of readings up to half a second apart those that show most count: noise
-/// that has passed a filter is small between neighbours. What lasts longer is not seen. Nothing of samples more than a
-/// second apart, or of few.
+/// Where the noise of a gyro is another than the settings tell, or in some hour another than in most: that of all
+/// gyros, by third differences of their readings, to which no turn of a body adds. Of readings up to half a second
+/// apart those that show most count: noise that has passed a filter is small between neighbours. What lasts longer is
+/// not seen. Nothing of samples more than a second apart, or of few.
 [[nodiscard]] std::optional<ReadoutNoise> other_readout_noise(const Pass& pass);
 
 /// The pass with settings that tell this noise.

@@ -591,8 +591,7 @@ double orbital_error_over_drift(const Trial& trial) {
     const MatrixXd squares = sigma * sigma * form.block(at, at, size, size);
     const Eigen::LLT<MatrixXd> root(squares + MatrixXd::Identity(size, size));
     const VectorXd y = sigma * form.col(shapes).segment(at, size);
-    return root.matrixL().solve(y).squaredNorm() / 2 -
-           root.matrixLLT().diagonal().array().log().sum();
+    return root.matrixL().solve(y).squaredNorm() / 2 - root.matrixLLT().diagonal().array().log().sum();
   };
   const double error_rad = kind_of(FurtherState::kOrbitalError).prior_sigma;
   return log_odds(0, kError, error_rad) - log_odds(kError, kError * gyros, rate_rad_s * error_rad);

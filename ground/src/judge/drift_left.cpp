@@ -156,8 +156,9 @@ void judge_drift_left(const Pass& pass, const CalibrationRun& run, std::vector<F
                                 -*run.orbital_error_over_drift));
   }
   if (!noise.empty()) {
-    const std::optional<AngleBetweenMomenta::Wander> wander =
-        angle && !has_orbital_period && run.calibration.noise ? std::optional(angle->wander(*run.calibration.noise)) : std::nullopt;
+    const std::optional<AngleBetweenMomenta::Wander> wander = angle && !has_orbital_period && run.calibration.noise
+                                                                  ? std::optional(angle->wander(*run.calibration.noise))
+                                                                  : std::nullopt;
     if (wander && wander->log_odds > kLogOdds) {
       star_tracker.push_back(
           noise + fmt::format("; it would move the angle by {}, root mean square", angle_text(wander->expected_rad)));

@@ -404,15 +404,17 @@ void judge_star_tracker_errors(const CalibrationRun& run, std::vector<Finding>& 
   const std::optional<double>& over_drift = run.orbital_error_over_drift;
   const bool may_be_drift = over_drift && *over_drift < kSureLogOdds;
   add(findings, FindingCode::kOrbitalErrorFound,
-      may_be_drift ? "The star tracker has an error at orbital period, or the gyros have drift at it: both look alike, and "
-                     "it was taken for an error of the star tracker. Sigmas do not tell of drift."
-                   : "The star tracker has an error at orbital period; the calibration has taken account of it.",
+      may_be_drift
+          ? "The star tracker has an error at orbital period, or the gyros have drift at it: both look alike, and "
+            "it was taken for an error of the star tracker. Sigmas do not tell of drift."
+          : "The star tracker has an error at orbital period; the calibration has taken account of it.",
       fmt::format("largest component {:.1f}″, {:.0f} sigmas{}", orbital_rad / kArcsecond, sureness,
                   over_drift ? fmt::format("; ln of its odds against drift at that period {:+.1f}", *over_drift) : ""),
-      may_be_drift ? "Look for what follows the orbit: the temperature of the mounting, or that of the gyros, a magnetic "
-                     "field. Where the star tracker is known to have no such error: orbital_error = \"off\" in "
-                     "[further_states]."
-                   : "None needed; look for what warms its mounting.");
+      may_be_drift
+          ? "Look for what follows the orbit: the temperature of the mounting, or that of the gyros, a magnetic "
+            "field. Where the star tracker is known to have no such error: orbital_error = \"off\" in "
+            "[further_states]."
+          : "None needed; look for what warms its mounting.");
   if (may_be_drift) {
     findings.back().severity = Severity::kDoNotUse;
   }

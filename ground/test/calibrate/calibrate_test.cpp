@@ -40,7 +40,8 @@ Pass beginning(Pass pass, Duration duration) {
 
 TEST(Calibrate, FindsTheTruthWithinItsSigmas) {
   std::vector<double> progress;
-  const auto run = calibrate(two_hours().pass, {}, [&](std::string_view, double fraction) { progress.push_back(fraction); });
+  const auto run =
+      calibrate(two_hours().pass, {}, [&](std::string_view, double fraction) { progress.push_back(fraction); });
   const Calibration& result = run.calibration;
   ASSERT_EQ(result.states.size(), 20U);
   EXPECT_EQ(result.states[9], parameter("gyro1.align_z"));
@@ -643,9 +644,8 @@ TEST(Calibrate, TakesNoiseOfTheStarTrackerThatIsMoreForAPartOfThePassForItsMean)
   std::mt19937_64 random(4);
   std::normal_distribution<double> normal;
   for (std::size_t i = pass.star_tracker.size() / 2; i < pass.star_tracker.size(); ++i) {
-    const Eigen::Vector3d more_rad = std::sqrt(3.0) * told_rad.cwiseProduct(Eigen::Vector3d::NullaryExpr([&] {
-      return normal(random);
-    }));
+    const Eigen::Vector3d more_rad =
+        std::sqrt(3.0) * told_rad.cwiseProduct(Eigen::Vector3d::NullaryExpr([&] { return normal(random); }));
     pass.star_tracker.q_in_c[i] *= Rot<C, C>::exp(Vec<C>::assume(more_rad)).quaternion();
   }
   const CalibrationRun run = calibrate(pass, {});

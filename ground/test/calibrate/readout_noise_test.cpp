@@ -59,8 +59,7 @@ struct White {
 
 TEST(ReadoutNoise, IsFoundForEachGyro) {
   for (const Duration period : {Duration(std::chrono::milliseconds(125)), Duration(std::chrono::seconds(1))}) {
-    const auto noise =
-        other_readout_noise(turning(period, std::chrono::hours(2), White{.sigma_rad = {1.02e-5, 1e-4}}));
+    const auto noise = other_readout_noise(turning(period, std::chrono::hours(2), White{.sigma_rad = {1.02e-5, 1e-4}}));
     ASSERT_TRUE(noise);
     EXPECT_EQ(noise->gyros, 2);
     EXPECT_NEAR(noise->found_rad[0], 1.02e-5, 0.03e-5);

@@ -139,12 +139,12 @@ struct ReadoutNoise {
 
 /// A calibration of a pass, and everything that was recorded on the way.
 struct CalibrationRun {
-  CalibrationOptions options;                    ///< as decided
-  std::optional<Clocks> clocks;                  ///< where the pass shows them, by its stamps as they are given
-  ClockCorrection clock_correction;              ///< of the stamps, made before the calibration
-  double gyro_stamps_off_s = 0;                  ///< rms off the regular times that were used in their place, or 0
-  std::optional<ReadoutNoise> readout_noise;     ///< that was used in the place of that of the settings
-  std::vector<Evidence> evidence;                ///< of what was left to the program to decide
+  CalibrationOptions options;                 ///< as decided
+  std::optional<Clocks> clocks;               ///< where the pass shows them, by its stamps as they are given
+  ClockCorrection clock_correction;           ///< of the stamps, made before the calibration
+  double gyro_stamps_off_s = 0;               ///< rms off the regular times that were used in their place, or 0
+  std::optional<ReadoutNoise> readout_noise;  ///< that was used in the place of that of the settings
+  std::vector<Evidence> evidence;             ///< of what was left to the program to decide
   /// Where an error of the star tracker at orbital period was accepted: ln of its odds against drift at that period.
   std::optional<double> orbital_error_over_drift;
   std::vector<DriftModelForecast> drift_models;  ///< that were compared, smallest first
@@ -179,14 +179,14 @@ struct OpenLoopEnd {
 struct NavigationRun {
   AttitudeHistory attitude;  ///< at every gyro sample used
   std::vector<FixRecord> fixes;
-  SampleCounts samples;                 ///< from that of the first attitude on, by what was done with them
-  long corrections = 0;                 ///< astro-corrections made
-  long corrections_missed = 0;          ///< intervals over which there were fixes, but none that could correct
-  ClockCorrection clock_correction;     ///< of the stamps, by the calibration in use
-  double gyro_stamps_off_s = 0;         ///< rms off the regular times that the samples are of, or 0
+  SampleCounts samples;                       ///< from that of the first attitude on, by what was done with them
+  long corrections = 0;                       ///< astro-corrections made
+  long corrections_missed = 0;                ///< intervals over which there were fixes, but none that could correct
+  ClockCorrection clock_correction;           ///< of the stamps, by the calibration in use
+  double gyro_stamps_off_s = 0;               ///< rms off the regular times that the samples are of, or 0
   std::optional<ReadoutNoise> readout_noise;  ///< that was used in the place of that of the settings
-  std::optional<Clocks> clocks;         ///< where the pass shows them, behind this correction
-  std::vector<OpenLoopEnd> open_loops;  ///< where fixes could be compared with it
+  std::optional<Clocks> clocks;               ///< where the pass shows them, behind this correction
+  std::vector<OpenLoopEnd> open_loops;        ///< where fixes could be compared with it
   Statistics statistics;
   /// Where parameters are held: (estimated − held)ᵀ P⁻¹ (estimated − held), P the covariance they were given with, and
   /// its 99.9 % limit.
