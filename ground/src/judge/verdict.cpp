@@ -140,7 +140,7 @@ std::vector<GyroEvent> losses(const CalibrationRun& run, Time end) {
     last[event.gyro] = event;
   }
   std::vector<GyroEvent> lost;
-  std::copy_if(last.begin(), last.end(), std::back_inserter(lost), [&](const GyroEvent& event) {
+  std::ranges::copy_if(last, std::back_inserter(lost), [&](const GyroEvent& event) {
     const bool is_off = event.state == GyroState::kStuck || event.state == GyroState::kLeapt;
     return event.state == GyroState::kIsolated || (is_off && end - event.t > kForMore);
   });
