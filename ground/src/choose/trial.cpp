@@ -52,6 +52,24 @@ PassSetup coarse(PassSetup setup) {
   return setup;
 }
 
+/// Covariance of the attitude by the readings at a fix, c axes, rad²; 0 where it shares them with the fix before, from
+/// which it then is not independent.
+Eigen::Matrix3d noise_by_readout(const CalibrationSetup& setup, const PassProblem::Moment& moment) {
+  const ScreenedPass::Fix& fix = *moment.fix;
+  if (setup.fixes_sharing_a_sample(fix.since_last) > 1) {
+    return Eigen::Matrix3d::Zero();
+  }
+  Eigen::Matrix3d information = Eigen::Matrix3d::Zero();
+  for (int k = 0; k < setup.layout.gyros; ++k) {
+    if (fix.used[k]) {
+      const Eigen::Vector3d h_c = moment.gyros[k].C_c_b * fix.h_b[k];
+      information += (Eigen::Matrix3d::Identity() - h_c * h_c.transpose()) /
+                     std::pow(setup.readout_noise_rad[k] * fix.noise_factor, 2);
+    }
+  }
+  return information.inverse();
+}
+
 }  // namespace
 
 bool alike(const ProcessNoise& a, const ProcessNoise& b) {
@@ -206,7 +224,8 @@ std::vector<Eigen::Vector3d> Trial::changes_rad() const {
   const CalibrationSetup& setup = problem_.setup().on_board;
   std::vector<Eigen::Vector3d> changes;
   std::optional<Eigen::Quaterniond> last;
-  StarFix last_fix;
+  Time last_fix_t{};
+  Eigen::Vector3d last_variance{0, 0, 0};
   problem_.go_along_momenta(found_.solution, [&](const PassProblem::Moment& moment) {
     if (moment.fix == nullptr || moment.fix->fix.head != 0) {
       return;
@@ -218,15 +237,15 @@ std::vector<Eigen::Vector3d> Trial::changes_rad() const {
     const Eigen::Quaterniond apart =
         by_gyros.value().C_in_c.quaternion().conjugate() * moment.fix->fix.q_in_c.normalized();
     const StarFix& fix = moment.fix->fix;
-    if (last && fix.t - last_fix.t < kClose) {
-      Eigen::Vector3d& change = changes.emplace_back(Rot<C, C>::assume(last->conjugate() * apart).log().raw());
-      if (fix.covariance.is_told() || last_fix.covariance.is_told()) {
-        const Eigen::Vector3d variance = (fix_noise(setup, fix) + fix_noise(setup, last_fix)).diagonal() / 2;
-        change = change.cwiseProduct(setup.star_trackers[0].noise_rad).cwiseQuotient(variance.cwiseSqrt());
-      }
+    const Eigen::Vector3d variance = (fix_noise(setup, fix) + noise_by_readout(setup, moment)).diagonal();
+    if (last && fix.t - last_fix_t < kClose) {
+      const Eigen::Vector3d change = Rot<C, C>::assume(last->conjugate() * apart).log().raw();
+      const Eigen::Vector3d expected = ((variance + last_variance) / 2).cwiseSqrt();
+      changes.emplace_back(change.cwiseProduct(setup.star_trackers[0].noise_rad).cwiseQuotient(expected));
     }
     last = apart;
-    last_fix = fix;
+    last_fix_t = fix.t;
+    last_variance = variance;
   });
   return changes;
 }
