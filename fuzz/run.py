@@ -3,7 +3,7 @@
 
     fuzz/run.py BUILD [--seconds 3600 | --briefly] [--jobs 2] [--targets csv,netcdf] [--corpus DIRECTORY] [--document docs/reliability.md]
 
-Begins with the seeds that BUILD/trihedron_fuzz_seeds writes, the inputs of fuzz/regressions, and what earlier runs have left in the corpus.
+Begins with the seeds that BUILD/trihedron_fuzz_seeds writes, the inputs of fuzz/corpus, and what earlier runs have left in the corpus.
 A target goes on after a crash until it has had its time of a processor. libFuzzer tells a hang by the clock, which other work on the machine sets
 forward: each is tried again alone, and counts where it takes as long of a processor. Exit status 1 where anything was found; the inputs that did it are
 in the corpus' directory `found`, and are tried again by: BUILD/fuzz_TARGET FILE.
@@ -50,7 +50,7 @@ def fuzz(build, target, corpus, seconds):
     for directory in (own, found):
         directory.mkdir(parents=True, exist_ok=True)
     before = {path.name for path in found.iterdir()}
-    seeds = [path for path in (corpus / "seeds" / target, ROOT / "fuzz" / "regressions" / target) if path.exists()]
+    seeds = [path for path in (corpus / "seeds" / target, ROOT / "fuzz" / "corpus" / target) if path.exists()]
     row = {"target": target, "inputs": 0, "seconds": 0.0, "worst_ms": 0.0, "worst_mb": 0.0}
     while (left := seconds - row["seconds"]) >= 1:
         command = [build / f"fuzz_{target}", own, *seeds, f"-max_total_time={int(left)}", f"-timeout={LIMIT_S}", f"-rss_limit_mb={LIMIT_MB}",
