@@ -11,7 +11,7 @@ namespace trihedron::ground {
 /// Turns the momenta of a pass as drift about each body axis at orbital period does.
 inline void add_orbital_drift(const Truth& truth, const Eigen::Vector3d& sine_rad_s,
                               const Eigen::Vector3d& cosine_rad_s, int gyro, GyroTelemetry& readings) {
-  constexpr double kRate_rad_s = 1.11e-3;
+  constexpr double kOrbitalRate_rad_s = 1.11e-3;
   Eigen::Vector3d turned_in(0, 0, 0);
   std::size_t at = 0;
   for (std::size_t i = 1; i < readings.size(); ++i) {
@@ -20,7 +20,7 @@ inline void add_orbital_drift(const Truth& truth, const Eigen::Vector3d& sine_ra
     }
     const double part = to_seconds(readings.t[i] - truth.t[at]) / to_seconds(truth.t[at + 1] - truth.t[at]);
     const Eigen::Quaterniond q_in_c = truth.q_in_c[at].slerp(part, truth.q_in_c[at + 1]);
-    const double phase = kRate_rad_s * to_seconds(readings.t[i] - truth.t.front());
+    const double phase = kOrbitalRate_rad_s * to_seconds(readings.t[i] - truth.t.front());
     turned_in += to_seconds(readings.t[i] - readings.t[i - 1]) *
                  (q_in_c * Eigen::Vector3d(std::sin(phase) * sine_rad_s + std::cos(phase) * cosine_rad_s));
     // Axes of the case are those of the body but for some minutes of arc.
