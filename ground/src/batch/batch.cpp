@@ -1,27 +1,12 @@
 #include "batch/batch.hpp"
 
 #include <cmath>
-#include <stdexcept>
 #include <utility>
-
-#include "trihedron/ground/model/setup_error.hpp"
 
 namespace trihedron::ground {
 namespace {
 
 constexpr int kMostIterations = 12;
-
-/// What `smoother` returns.
-template <class Smoother>
-auto solved(Smoother&& smoother) {
-  try {
-    return smoother();
-  } catch (const std::invalid_argument&) {
-    throw SetupError("the fixes and samples that can be used do not determine the momenta of all gyros",
-                     "calibrate a part of the pass in which all gyros work, or use estimator invariant with noise = "
-                     "\"told\" and all further states on or off");
-  }
-}
 
 /// Root mean square of the step of the constants, in their sigmas.
 double step_of_constants(const Layout& layout, const SmootherResult& found) {
@@ -36,7 +21,7 @@ BatchResult step_from(const PassProblem& problem, PassSolution before, PassProbl
   BatchResult result;
   result.before = std::move(before);
   result.linear = std::move(linear);
-  result.errors = solved([&] { return smooth(result.linear.prior, result.linear.prior_y, result.linear.stages); });
+  result.errors = smooth(result.linear.prior, result.linear.prior_y, result.linear.stages);
   result.solution = result.before;
   problem.correct(result.errors, result.solution);
   result.iterations = 1;
@@ -72,7 +57,7 @@ double log_likelihood(const PassProblem& problem, const PassSolution& solution, 
     }
     return stage;
   };
-  const SmootherLikelihood found = solved([&] { return likelihood(prior, prior_y, linear.stages.size(), stage_at); });
+  const SmootherLikelihood found = likelihood(prior, prior_y, linear.stages.size(), stage_at);
   // Of the directions at the start nothing is known before; the rest of the prior is triangular. Rows that
   // gather_constants() has added stand below that triangle.
   const Eigen::Index directions = 2L * layout.gyros;

@@ -4,11 +4,11 @@
 #include <algorithm>
 #include <cmath>
 #include <optional>
-#include <stdexcept>
 #include <utility>
 
 #include "batch/gram.hpp"
 #include "batch/householder.hpp"
+#include "trihedron/ground/model/setup_error.hpp"
 #include "trihedron/records/stop.hpp"
 
 namespace trihedron::ground {
@@ -203,10 +203,12 @@ Forward<Constants> go_forward(const MatrixXd& prior, const VectorXd& prior_y, st
   return *std::move(forward);
 }
 
-/// Throws std::invalid_argument where a state has no information.
+/// Throws SetupError where a state has no information.
 void refuse_singular(const Eigen::Ref<const MatrixXd>& root) {
   if (!((root.diagonal().array().abs() > 0).all() && root.allFinite())) {
-    throw std::invalid_argument("smoother: a state without any information");
+    throw SetupError("the fixes and samples that can be used do not determine the momenta of all gyros",
+                     "calibrate a part of the pass in which all gyros work, or use estimator invariant with noise = "
+                     "\"told\" and all further states on or off");
   }
 }
 

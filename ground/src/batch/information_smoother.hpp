@@ -43,7 +43,7 @@ struct SmootherResult {
 };
 
 /// Estimates all stages. `prior`: rows and right side of the prior of the first stage, unit noise. Throws
-/// std::invalid_argument where a state has no information.
+/// SetupError where a state has no information.
 [[nodiscard]] SmootherResult smooth(const Eigen::MatrixXd& prior, const Eigen::VectorXd& prior_y,
                                     const std::vector<SmootherStage>& stages);
 

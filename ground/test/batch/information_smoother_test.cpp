@@ -6,7 +6,8 @@
 #include <Eigen/LU>
 #include <cmath>
 #include <random>
-#include <stdexcept>
+
+#include "trihedron/ground/model/setup_error.hpp"
 
 namespace trihedron::ground {
 namespace {
@@ -236,7 +237,14 @@ TEST(InformationSmoother, RefusesWhatNothingIsKnownOf) {
     stage.H.col(4).setZero();
     stage.B.col(2).setZero();
   }
-  EXPECT_THROW((void)smooth(system.prior, system.prior_y, system.stages), std::invalid_argument);
+  EXPECT_THROW((void)smooth(system.prior, system.prior_y, system.stages), SetupError);
+  system.prior.leftCols(kDynamic).setZero();
+  for (SmootherStage& stage : system.stages) {
+    stage.H.leftCols(kDynamic).setZero();
+  }
+  EXPECT_THROW((void)eliminate_moving(system.prior, system.prior_y, system.stages.size(),
+                                      [&](std::size_t i) { return system.stages[i]; }),
+               SetupError);
 }
 
 }  // namespace
