@@ -134,7 +134,7 @@ void dense_covariance_at_8_hz(benchmark::State& state) {
       Matrix F = Matrix::Identity();
       for (int k = 0; k < 2; ++k) {
         Sensitivity<Esg7::kSize> step;
-        precess(gyros[k], step, drift, C_in_c, sample.h_b[k], 0, 0.125);
+        precess(gyros[k], step, drift, C_in_c, sample.h_b[k], {}, 0.125);
         const Eigen::Matrix<double, 2, 3> components = -qi.components[k] * skew<double>(gyros[k].h_in);
         const int row = Estimator::States::direction(k);
         F.block<2, 7>(row, Estimator::States::drift(k)) = components.lazyProduct(step.by_drift.first(Esg7::kSize));

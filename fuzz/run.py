@@ -4,9 +4,9 @@
     fuzz/run.py BUILD [--seconds 3600 | --briefly] [--jobs 2] [--targets csv,netcdf] [--corpus DIRECTORY] [--document docs/reliability.md]
 
 Begins with the seeds that BUILD/trihedron_fuzz_seeds writes, the inputs of fuzz/corpus, and what earlier runs have left in the corpus.
-A target goes on after a crash until it has had its time of a processor. libFuzzer tells a hang by the clock, which other work on the machine sets
-forward: each is tried again alone, and counts where it takes as long of a processor. Exit status 1 where anything was found; the inputs that did it are
-in the corpus' directory `found`, and are tried again by: BUILD/fuzz_TARGET FILE.
+A target goes on after a crash until it has had its time: of a processor, or --briefly by the clock, beside other work. libFuzzer tells a hang by the
+clock, which other work on the machine sets forward: each is tried again alone, and counts where it takes as long of a processor. Exit status 1 where
+anything was found; the inputs that did it are in the corpus' directory `found`, and are tried again by: BUILD/fuzz_TARGET FILE.
 """
 import argparse
 import concurrent.futures
@@ -16,6 +16,7 @@ import re
 import resource
 import subprocess
 import sys
+import time
 
 ROOT = pathlib.Path(__file__).resolve().parents[1]
 LIMIT_S = 10
@@ -44,15 +45,16 @@ def hangs(build, target, file):
         return True
 
 
-def fuzz(build, target, corpus, seconds):
-    """One row of the table."""
+def fuzz(build, target, corpus, seconds, by_clock):
+    """One row of the table. `seconds`: of a processor, or by the clock."""
     own, found = corpus / target, corpus / "found"
     for directory in (own, found):
         directory.mkdir(parents=True, exist_ok=True)
     before = {path.name for path in found.iterdir()}
     seeds = [path for path in (corpus / "seeds" / target, ROOT / "fuzz" / "corpus" / target) if path.exists()]
     row = {"target": target, "inputs": 0, "seconds": 0.0, "worst_ms": 0.0, "worst_mb": 0.0}
-    while (left := seconds - row["seconds"]) >= 1:
+    began = time.monotonic()
+    while (left := seconds - (time.monotonic() - began if by_clock else row["seconds"])) >= 1:
         command = [build / f"fuzz_{target}", own, *seeds, f"-max_total_time={int(left)}", f"-timeout={LIMIT_S}", f"-rss_limit_mb={LIMIT_MB}",
                    f"-max_len={LONGEST.get(target, 4096)}", f"-artifact_prefix={found}/{target}-", "-print_final_stats=1", "-verbosity=1",
                    "-close_fd_mask=1", "-use_value_profile=1", "-reload=0"]  # no other process adds to the corpus
@@ -110,9 +112,9 @@ def place_in(document, row, all_targets):
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("build", type=pathlib.Path)
-    time = parser.add_mutually_exclusive_group()
-    time.add_argument("--seconds", type=float, default=3600, help="of processor time for each target")
-    time.add_argument("--briefly", action="store_true", help="a minute for each of " + ", ".join(EVERYDAY) + "; five seconds for each other")
+    how_long = parser.add_mutually_exclusive_group()
+    how_long.add_argument("--seconds", type=float, default=3600, help="of processor time for each target")
+    how_long.add_argument("--briefly", action="store_true", help="a minute by the clock for each of " + ", ".join(EVERYDAY) + "; five seconds for each other")
     parser.add_argument("--jobs", type=int, default=os.cpu_count())
     parser.add_argument("--targets", help="separated by commas; all where none is named")
     parser.add_argument("--corpus", type=pathlib.Path, default=ROOT / "out/fuzz")
@@ -125,7 +127,7 @@ def main():
     seconds = (lambda target: 60 if target in EVERYDAY else 5) if arguments.briefly else (lambda target: arguments.seconds)
     rows = []
     with concurrent.futures.ThreadPoolExecutor(arguments.jobs) as pool:
-        for running in concurrent.futures.as_completed(pool.submit(fuzz, build, target, arguments.corpus, seconds(target)) for target in chosen):
+        for running in concurrent.futures.as_completed(pool.submit(fuzz, build, target, arguments.corpus, seconds(target), arguments.briefly) for target in chosen):
             rows.append(running.result())
             if arguments.document:
                 place_in(arguments.document, rows[-1], targets(build))

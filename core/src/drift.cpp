@@ -30,7 +30,10 @@ Eigen::Vector3d gradient(const Harmonics& harmonics, const DriftCoefficient& its
 }  // namespace
 
 DriftModel::DriftModel(DriftModelId id, const FurtherStates& further)
-    : harmonics_(max_degree_of(id)), wandering_(further.wandering_drift), change_(further.coefficient_change) {
+    : harmonics_(max_degree_of(id)),
+      wandering_(further.wandering_drift),
+      change_(further.coefficient_change),
+      orbital_(further.orbital_drift) {
   size_ = 0;
   for (int number = 0; number < Esg7::kSize; ++number) {
     members_[static_cast<std::size_t>(size_++)] = DriftCoefficient::of_eq1(number);
@@ -63,7 +66,7 @@ void DriftModel::add(Member member, int degree, int order) {
                                                  static_cast<std::int8_t>(order)};
 }
 
-void DriftModel::basis(const Eigen::Vector3d& h, double part_of_change, ColumnsView B) const {
+void DriftModel::basis(const Eigen::Vector3d& h, const DriftTime& time, ColumnsView B) const {
   const Eigen::Matrix<double, 3, Esg7::kSize> eq1 = Esg7::basis<double>(h);
   for (int i = 0; i < 3; ++i) {
     double* row = B.row(i);
@@ -96,25 +99,37 @@ void DriftModel::basis(const Eigen::Vector3d& h, double part_of_change, ColumnsV
   }
   if (change_) {
     for (int i = 0; i < Esg7::kSize; ++i) {
-      B.set_column(column++, part_of_change * eq1.col(i));
+      B.set_column(column++, time.part_of_change * eq1.col(i));
+    }
+  }
+  if (orbital_) {
+    for (int i = 0; i < 3; ++i) {
+      B.set_column(column + i, time.orbital_sine * Eigen::Vector3d::Unit(i));
+      B.set_column(column + 3 + i, time.orbital_cosine * Eigen::Vector3d::Unit(i));
     }
   }
   B.pad();
 }
 
-Eigen::Vector3d DriftModel::rate(const Eigen::Vector3d& h, double part_of_change, const double* coefficients) const {
+Eigen::Vector3d DriftModel::rate(const Eigen::Vector3d& h, const DriftTime& time, const double* coefficients) const {
   using Eq1 = Esg7::Coefficients<double>;
   Eq1 kappa = Eigen::Map<const Eq1>(coefficients);
   int column = size_;
-  Eigen::Vector3d wandering = Eigen::Vector3d::Zero();
+  using Eigen::Vector3d;
+  Vector3d beside = Vector3d::Zero();  // drift that does not depend on the direction
   if (wandering_) {
-    wandering = Eigen::Map<const Eigen::Vector3d>(coefficients + column);
+    beside = Eigen::Map<const Vector3d>(coefficients + column);
     column += 3;
   }
   if (change_) {
-    kappa += part_of_change * Eigen::Map<const Eq1>(coefficients + column);
+    kappa += time.part_of_change * Eigen::Map<const Eq1>(coefficients + column);
+    column += Esg7::kSize;
   }
-  Eigen::Vector3d rate = Esg7::rate<double>(h, kappa) + wandering;
+  if (orbital_) {
+    beside += time.orbital_sine * Eigen::Map<const Vector3d>(coefficients + column) +
+              time.orbital_cosine * Eigen::Map<const Vector3d>(coefficients + column + 3);
+  }
+  Vector3d rate = Esg7::rate<double>(h, kappa) + beside;
   if (size_ > Esg7::kSize) {
     const auto harmonics = harmonics_.at<double>(h);
     Eigen::Vector3d w = Eigen::Vector3d::Zero();

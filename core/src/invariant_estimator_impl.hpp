@@ -29,13 +29,14 @@ std::optional<SetupFault> InvariantEstimator<kCapacity>::set_up(const Calibratio
   information.reset(layout.size(), layout.dynamic());
   const int first = layout.drift(0);
   const RowsView R = information.root();
-  if (!information_root(covariance, {&R(first, first), layout.parameters(), layout.parameters(), R.stride})) {
+  const int together = covariance.rows() == layout.drift_parameters() ? layout.drift_parameters() : layout.parameters();
+  if (!information_root(covariance, {&R(first, first), together, together, R.stride})) {
     return SetupFault::kPriorNotPositiveDefinite;
   }
   for (int i = layout.direction(layout.gyros); i < layout.dynamic(); ++i) {
     R(i, i) = 1 / setup.wandering_drift.sigma;
   }
-  for (int i = layout.readout(0); i < layout.size(); ++i) {
+  for (int i = first + together; i < layout.size(); ++i) {
     R(i, i) = 1 / prior_sigma_of_further_state(setup, i);
   }
   setup_ = setup;
@@ -145,6 +146,10 @@ void InvariantEstimator<kCapacity>::propagate(const PerGyro<double, kCapacity.gy
     if (layout.further.coefficient_change) {
       B.block(row, layout.change(k) - d, 3, Layout::kEq1) = by_drift.middleCols(layout.change_column(), Layout::kEq1);
     }
+    if (layout.further.orbital_drift) {
+      B.block(row, layout.orbital_drift(k) - d, 3, Layout::kOrbitalDrift) =
+          by_drift.middleCols(layout.orbital_column(), Layout::kOrbitalDrift);
+    }
     noise.template segment<3>(row).setConstant(noise_rad[k]);
     if (layout.further.wandering_drift) {
       const int wandering = layout.wandering(k);
@@ -220,8 +225,8 @@ bool InvariantEstimator<kCapacity>::prior_allows_estimates() const {
 
 template <Capacity kCapacity>
 void InvariantEstimator<kCapacity>::predict(const Eigen::Matrix3d& C_in_c, const Directions& h_b, Time t, double dt_s) {
-  const double part = setup_.part_of_change(t - from_seconds(dt_s / 2));
-  precess_all(gyros_, since_fix_, layout().gyros, drift_, C_in_c, h_b, part, dt_s);
+  const DriftTime time = setup_.drift_time(t - from_seconds(dt_s / 2));
+  precess_all(gyros_, since_fix_, layout().gyros, drift_, C_in_c, h_b, time, dt_s);
   time_since_fix_s_ += dt_s;
   gate_.elapse(dt_s);
 }

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "trihedron/core/directions_fit.hpp"
+#include "trihedron/core/elementary.hpp"
 #include "trihedron/core/fix_report.hpp"
 
 namespace trihedron {
@@ -43,10 +44,10 @@ bool further_states_are_usable(const CalibrationSetup& setup) {
   const GaussMarkov& wandering = setup.wandering_drift;
   if ((further.wandering_drift && !(positive(wandering.sigma) && positive(wandering.time_s))) ||
       (further.coefficient_change && !is_usable(setup.change)) ||
-      (further.orbital_error && !std::isfinite(setup.orbital_rate_rad_s))) {
+      ((further.orbital_error || further.orbital_drift) && !std::isfinite(setup.orbital_rate_rad_s))) {
     return false;
   }
-  for (int state = setup.layout.readout(0); state < setup.layout.size(); ++state) {
+  for (int state = setup.layout.behind_parameters(); state < setup.layout.size(); ++state) {
     if (!positive(prior_sigma_of_further_state(setup, state))) {
       return false;
     }
@@ -73,6 +74,16 @@ std::optional<SetupFault> CalibrationSetup::fault() const {
 Duration max_interpolation(Duration gyro_period) {
   constexpr Duration kLeast = std::chrono::milliseconds(500);
   return std::max(kLeast, gyro_period * 5 / 2);
+}
+
+DriftTime CalibrationSetup::drift_time(Time t) const {
+  DriftTime time{part_of_change(t)};
+  if (layout.further.orbital_drift) {
+    const double phase = orbital_rate_rad_s * to_seconds(t - orbital_phase_zero);
+    time.orbital_sine = elementary::sin(phase);
+    time.orbital_cosine = elementary::cos(phase);
+  }
+  return time;
 }
 
 Duration CalibrationSetup::reach() const {

@@ -116,9 +116,9 @@ RC_GTEST_PROP(Esg7, JacobiansMatchCentralDifferences, ()) {
 
 const DriftModelId kModels[] = {kEsg7, kEsg20, vsh(1), vsh(2), vsh(3), vsh(4), vsh(5), vsh(6), vsh(8)};
 
-Eigen::MatrixXd basis_of(const DriftModel& model, const Eigen::Vector3d& h, double part_of_change = 0) {
+Eigen::MatrixXd basis_of(const DriftModel& model, const Eigen::Vector3d& h, const DriftTime& time = {}) {
   Columns<kMaxDriftColumns> columns;
-  model.basis(h, part_of_change, columns.view(model.columns()));
+  model.basis(h, time, columns.view(model.columns()));
   return columns.first(model.columns());
 }
 
@@ -156,24 +156,30 @@ TEST(DriftModel, BeginsWithEquation1) {
 
 TEST(DriftModel, RateIsTheBasisTimesTheCoefficients) {
   for (const DriftModelId id : kModels) {
-    for (int further = 0; further < 4; ++further) {
-      const DriftModel model(id, {.wandering_drift = (further & 1) != 0, .coefficient_change = (further & 2) != 0});
+    for (int further = 0; further < 8; ++further) {
+      const DriftModel model(id, {.wandering_drift = (further & 1) != 0,
+                                  .coefficient_change = (further & 2) != 0,
+                                  .orbital_drift = (further & 4) != 0});
       const Eigen::VectorXd kappa = some_coefficients(model.columns());
       for (const Eigen::Vector3d& h : some_directions(7)) {
-        const Eigen::Vector3d rate = model.rate(h, 0.3, kappa.data());
-        EXPECT_LT((rate - basis_of(model, h, 0.3) * kappa).norm(), 1e-13 * rate.norm()) << model.columns();
+        const DriftTime time{0.3, -0.6, 0.8};
+        const Eigen::Vector3d rate = model.rate(h, time, kappa.data());
+        EXPECT_LT((rate - basis_of(model, h, time) * kappa).norm(), 1e-13 * rate.norm()) << model.columns();
       }
     }
   }
 }
 
-TEST(DriftModel, HasTheDriftThatWandersAndTheChangeBehindItsMembers) {
-  const DriftModel model(vsh(2), {.wandering_drift = true, .coefficient_change = true});
+TEST(DriftModel, HasWhatDependsOnTimeBehindItsMembers) {
+  const DriftModel model(vsh(2), {.wandering_drift = true, .coefficient_change = true, .orbital_drift = true});
   const Eigen::Vector3d h = Eigen::Vector3d(0.3, -0.5, 0.7).normalized();
-  const Eigen::MatrixXd basis = basis_of(model, h, 0.25);
-  ASSERT_EQ(basis.cols(), vsh(2).size() + 3 + Esg7::kSize);
+  const Eigen::MatrixXd basis = basis_of(model, h, {0.25, -0.6, 0.8});
+  const int change = vsh(2).size() + 3;
+  ASSERT_EQ(basis.cols(), change + Esg7::kSize + 6);
   EXPECT_EQ(basis.middleCols<3>(vsh(2).size()), Eigen::Matrix3d::Identity());
-  EXPECT_EQ(basis.rightCols(Esg7::kSize), 0.25 * Esg7::basis<double>(h));
+  EXPECT_EQ(basis.middleCols<Esg7::kSize>(change), 0.25 * Esg7::basis<double>(h));
+  EXPECT_EQ(basis.middleCols<3>(change + Esg7::kSize), -0.6 * Eigen::Matrix3d::Identity());
+  EXPECT_EQ(basis.rightCols(3), 0.8 * Eigen::Matrix3d::Identity());
 }
 
 TEST(DriftModel, MembersAreThoseOfTheirPotentials) {

@@ -17,9 +17,9 @@
 namespace trihedron {
 namespace {
 
-constexpr std::size_t kFactors = 8;
+constexpr std::size_t kFactors = 9;
 /// How many choices there are of gyros, drift model, star trackers, and each of the further states.
-constexpr std::array<int, kFactors> kChoices = {3, 6, 3, 2, 2, 2, 2, 2};
+constexpr std::array<int, kFactors> kChoices = {3, 6, 3, 2, 2, 2, 2, 2, 2};
 using Choice = std::array<int, kFactors>;
 
 Layout layout_of(const Choice& choice) {
@@ -28,7 +28,12 @@ Layout layout_of(const Choice& choice) {
   layout.gyros = 2 + choice[0];
   layout.drift_model = models[choice[1]];
   layout.star_trackers = 1 + choice[2];
-  layout.further = {choice[3] != 0, choice[4] != 0, choice[5] != 0, choice[6] != 0, choice[7] != 0};
+  layout.further = {.wandering_drift = choice[3] != 0,
+                    .readout_bias = choice[4] != 0,
+                    .coefficient_change = choice[5] != 0,
+                    .clock_offset = choice[6] != 0,
+                    .orbital_error = choice[7] != 0,
+                    .orbital_drift = choice[8] != 0};
   return layout;
 }
 
@@ -113,7 +118,8 @@ void expect_that_it_works(const Layout& layout, unsigned seed, Sum& sum) {
                                   << layout.star_trackers << " star trackers, wandering drift "
                                   << layout.further.wandering_drift << ", readout bias " << layout.further.readout_bias
                                   << ", change " << layout.further.coefficient_change << ", clock offset "
-                                  << layout.further.clock_offset << ", orbital error " << layout.further.orbital_error);
+                                  << layout.further.clock_offset << ", orbital error " << layout.further.orbital_error
+                                  << ", orbital drift " << layout.further.orbital_drift);
   const test::Mission mission({.layout = layout, .duration_s = 300, .seed = seed});
   const auto on_board = mission.given.on_board();
   std::size_t used = 0;

@@ -78,7 +78,7 @@ Flight::Flight(const FlightPlan& plan) {
     for (int k = 0; k < 2; ++k) {
       const Eigen::Matrix3d middle = attitude(t_s + kPeriod_s / 2, plan.slews_rad, plan.steady_until_s);
       precess(truth[k], eq1, middle, Eigen::Vector3d(truth[k].C_c_b.transpose() * middle.transpose() * truth[k].h_in),
-              0, kPeriod_s);
+              {}, kPeriod_s);
     }
   }
 }

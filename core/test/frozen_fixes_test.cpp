@@ -201,7 +201,7 @@ struct Rest {
       for (int k = 0; k < 2; ++k) {
         const Eigen::Matrix3d C_b_in = truth[k].C_c_b.transpose() * attitude(t_s).transpose();
         sample.h_b[k] = C_b_in * truth[k].h_in + test::Flight::kReadout_rad * test::white(random, normal);
-        precess(truth[k], eq1, attitude(t_s + 0.0625), Eigen::Vector3d(C_b_in * truth[k].h_in), 0, 0.125);
+        precess(truth[k], eq1, attitude(t_s + 0.0625), Eigen::Vector3d(C_b_in * truth[k].h_in), {}, 0.125);
       }
     }
     flight.truth = truth;

@@ -8,7 +8,7 @@ namespace trihedron {
 namespace {
 
 constexpr DriftModelId kEachDriftModel[] = {kEsg7, kEsg20, vsh(1), vsh(2), vsh(3), vsh(4), vsh(5), vsh(6)};
-constexpr int kSets = 64;  // of further states
+constexpr int kSets = 128;  // of further states
 
 constexpr FurtherStates set_of_further_states(int number) {
   return {.wandering_drift = (number & 1) != 0,
@@ -16,7 +16,8 @@ constexpr FurtherStates set_of_further_states(int number) {
           .coefficient_change = (number & 4) != 0,
           .clock_offset = (number & 8) != 0,
           .orbital_error = (number & 16) != 0,
-          .clock_rate = (number & 32) != 0};
+          .clock_rate = (number & 32) != 0,
+          .orbital_drift = (number & 64) != 0};
 }
 
 /// Whether `predicate` holds for every layout that there is; where the compiler counts its steps, of one star tracker
@@ -92,8 +93,9 @@ constexpr bool parts_are_in_their_order(const Layout& layout) {
   const int last = layout.gyros - 1;
   // What moves, then the parameters, then what else the gyros have, then what they share.
   return layout.direction(0) == 0 && layout.dynamic() >= layout.direction(layout.gyros) &&
-         layout.drift(0) == layout.dynamic() && layout.drift(0) + layout.parameters() == layout.readout(0) &&
-         layout.alignment(last) + 3 == layout.readout(0) && layout.readout(0) <= layout.shared() &&
+         layout.drift(0) == layout.dynamic() && layout.drift(0) + layout.parameters() == layout.behind_parameters() &&
+         layout.alignment(last) + 3 == layout.behind_parameters() &&
+         layout.drift(0) + layout.drift_parameters() == layout.readout(0) && layout.readout(0) <= layout.shared() &&
          layout.shared() + layout.shared_size() == layout.size() &&
          layout.dynamic() + layout.constants() == layout.size();
 }
@@ -101,9 +103,11 @@ constexpr bool parts_are_in_their_order(const Layout& layout) {
 constexpr bool columns_of_drift_fill(const Layout& layout) {
   const int wandering = layout.further.wandering_drift ? 3 : 0;
   const int change = layout.further.coefficient_change ? Layout::kEq1 : 0;
+  const int orbital = layout.further.orbital_drift ? 6 : 0;
   return layout.wandering_column() == layout.drift_size() &&
          layout.change_column() == layout.drift_size() + wandering &&
-         layout.drift_columns() == layout.change_column() + change;
+         layout.orbital_column() == layout.change_column() + change &&
+         layout.drift_columns() == layout.orbital_column() + orbital;
 }
 static_assert(for_every_layout(columns_of_drift_fill));
 

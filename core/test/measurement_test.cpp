@@ -232,6 +232,7 @@ TEST(CarryBack, IsTheChainWithTheSensitivities) {
     phi.middleCols(layout.drift(k), layout.drift_size()) = by_drift.leftCols(layout.drift_size());
     phi.middleCols<3>(layout.wandering(k)) = by_drift.middleCols<3>(layout.wandering_column());
     phi.middleCols<7>(layout.change(k)) = by_drift.middleCols<7>(layout.change_column());
+    phi.middleCols<6>(layout.orbital_drift(k)) = by_drift.middleCols<6>(layout.orbital_column());
   }
   Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor, 4, kMaxStates> rows(4, layout.size());
   rows = Eigen::MatrixXd::NullaryExpr(4, layout.size(), some);
@@ -239,6 +240,7 @@ TEST(CarryBack, IsTheChainWithTheSensitivities) {
     rows.middleCols(layout.drift(k), layout.drift_size()).setZero();
     rows.middleCols<3>(layout.wandering(k)).setZero();
     rows.middleCols<7>(layout.change(k)).setZero();
+    rows.middleCols<6>(layout.orbital_drift(k)).setZero();
   }
   const Eigen::MatrixXd chain = rows * now;
   carry_back(layout, since, rows);

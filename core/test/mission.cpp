@@ -16,6 +16,7 @@ CalibrationSetup setup_of(const MissionPlan& plan) {
   setup.gyro_period = from_seconds(plan.gyro_period_s);
   setup.wandering_drift = {2e-7, 300};
   setup.further_sigma[FurtherState::kCoefficientChange] = 2e-6;
+  setup.further_sigma[FurtherState::kOrbitalDrift] = 1e-6;
   setup.change.duration_s = 600;
   setup.change.zero_at = Time(from_seconds(100));
   setup.orbital_rate_rad_s = 0.02;
@@ -45,6 +46,10 @@ Mission::Mission(const MissionPlan& plan) : given(plan.layout) {
     gyro.C_c_b = turn(plan.calibration_sigma * kAlignmentSigma_rad * white());
     if (layout.further.wandering_drift) {
       gyro.drift_rad_s.segment<3>(layout.wandering_column()) = setup.wandering_drift.sigma * white();
+    }
+    if (layout.further.orbital_drift) {
+      const double sigma = setup.further_sigma[FurtherState::kOrbitalDrift];
+      gyro.drift_rad_s.segment<6>(layout.orbital_column()) << sigma * white(), sigma * white();
     }
     if (layout.further.readout_bias) {
       gyro.readout_bias = setup.further_sigma[FurtherState::kReadoutBias] * white();
@@ -107,12 +112,12 @@ Mission::Mission(const MissionPlan& plan) : given(plan.layout) {
       break;
     }
     const Eigen::Matrix3d middle = attitude(t_s + plan.gyro_period_s / 2);
-    const double part = setup.part_of_change(Time(from_seconds(t_s + plan.gyro_period_s / 2)));
+    const DriftTime time = setup.drift_time(Time(from_seconds(t_s + plan.gyro_period_s / 2)));
     const double kept = setup.wandering_drift.kept(plan.gyro_period_s);
     for (int k = 0; k < layout.gyros; ++k) {
       auto& gyro = truth[k];
       precess(gyro, drift, middle,
-              Eigen::Vector3d(gyro.C_c_b.transpose() * middle.transpose() * gyro.h_in) + gyro.readout_bias, part,
+              Eigen::Vector3d(gyro.C_c_b.transpose() * middle.transpose() * gyro.h_in) + gyro.readout_bias, time,
               plan.gyro_period_s);
       if (layout.further.wandering_drift) {
         auto its = gyro.drift_rad_s.segment<3>(layout.wandering_column());
@@ -139,6 +144,9 @@ Eigen::VectorXd Mission::errors(const FullEstimator& estimator, std::size_t last
     }
     if (layout.further.coefficient_change) {
       errors.segment<7>(layout.change(k)) = drift.segment<7>(layout.change_column());
+    }
+    if (layout.further.orbital_drift) {
+      errors.segment<6>(layout.orbital_drift(k)) = drift.segment<6>(layout.orbital_column());
     }
   }
   errors.tail(layout.shared_size()) = shared - estimator.shared();

@@ -33,9 +33,9 @@ Gyro flown(Gyro gyro, double total_s, int steps, Sensitivities* sensitivity = nu
     // The rotor drifts by the true case axes: alignment is part of the model under test.
     const Eigen::Vector3d h_b = gyro.C_c_b.transpose() * C_in_c.transpose() * gyro.h_in;
     if (sensitivity != nullptr) {
-      precess(gyro, *sensitivity, kEq1, C_in_c, h_b, 0, dt);
+      precess(gyro, *sensitivity, kEq1, C_in_c, h_b, {}, dt);
     } else {
-      precess(gyro, kEq1, C_in_c, h_b, 0, dt);
+      precess(gyro, kEq1, C_in_c, h_b, {}, dt);
     }
   }
   return gyro;
@@ -53,7 +53,7 @@ TEST(Precession, MatchesTheClosedFormOfOneDissipativeCoefficient) {
   for (int i = 0; i < steps; ++i) {
     // Reading of the middle of the step, by the closed form itself.
     const double middle = std::atan(std::tan(a0) * std::exp(nu12 * (i + 0.5) * total_s / steps));
-    precess(gyro, kEq1, Eigen::Matrix3d::Identity(), {std::cos(middle), std::sin(middle), 0}, 0, total_s / steps);
+    precess(gyro, kEq1, Eigen::Matrix3d::Identity(), {std::cos(middle), std::sin(middle), 0}, {}, total_s / steps);
   }
   const double expected = std::atan(std::tan(a0) * std::exp(nu12 * total_s));
   // Midpoint rule: error of order (ν Δt)² / 24 of the whole turn.
@@ -71,7 +71,7 @@ TEST(Precession, IsExactForConstantAngularVelocity) {
   const Eigen::Vector3d omega = Esg7::rate<double>(h_b, gyro.drift_rad_s);
   const Eigen::Vector3d expected = Rot<In, In>::exp(Vec<In>::assume(omega * 1e5)).raw() * gyro.h_in;
   for (int i = 0; i < 10; ++i) {
-    precess(gyro, kEq1, Eigen::Matrix3d::Identity(), h_b, 0, 1e4);
+    precess(gyro, kEq1, Eigen::Matrix3d::Identity(), h_b, {}, 1e4);
   }
   EXPECT_LT((gyro.h_in - expected).norm(), 1e-15);
 }
@@ -92,15 +92,15 @@ TEST(Precession, SensitivitiesMatchCentralDifferences) {
     for (int i = 0; i < kSteps; ++i) {
       const Eigen::Matrix3d C_in_c = attitudes.emplace_back(attitude_at((i + 0.5) * kTotal_s / kSteps));
       readings.emplace_back(g.C_c_b.transpose() * C_in_c.transpose() * g.h_in);
-      precess(g, kEq1, C_in_c, readings.back(), 0, kTotal_s / kSteps);
+      precess(g, kEq1, C_in_c, readings.back(), {}, kTotal_s / kSteps);
     }
   }
   const auto replay = [&](Gyro g, Sensitivities* s) {
     for (std::size_t i = 0; i < readings.size(); ++i) {
       if (s != nullptr) {
-        precess(g, *s, kEq1, attitudes[i], readings[i], 0, kTotal_s / kSteps);
+        precess(g, *s, kEq1, attitudes[i], readings[i], {}, kTotal_s / kSteps);
       } else {
-        precess(g, kEq1, attitudes[i], readings[i], 0, kTotal_s / kSteps);
+        precess(g, kEq1, attitudes[i], readings[i], {}, kTotal_s / kSteps);
       }
     }
     return g.h_in;
@@ -146,7 +146,7 @@ TEST(Sensitivity, OfTwoStretchesIsTheirChain) {
   for (int i = 0; i < 4800; ++i) {
     const Eigen::Matrix3d C_in_c = attitude_at((i + 0.5) * 0.125);
     const Eigen::Vector3d h_b = C_in_c.transpose() * g.h_in;
-    precess(g, i < 2000 ? first : second, kEq1, C_in_c, h_b, 0, 0.125);
+    precess(g, i < 2000 ? first : second, kEq1, C_in_c, h_b, {}, 0.125);
   }
   Sensitivities chained = first;
   chained.append(second, kColumns);
@@ -196,19 +196,19 @@ TEST(PrecessAll, GivesTheBitsOfEachGyroAlone) {
         h_b[k] = C_in_c.transpose() * together[k].h_in;
       }
       const double dt_s = i % 2 == 0 ? 0.125 : 0.1;
-      precess_all(together, since, kCount, kEq1, C_in_c, h_b, 0, dt_s * times);
-      precess_all(navigated, kCount, kEq1, C_in_c, h_b, 0, dt_s * times);
+      precess_all(together, since, kCount, kEq1, C_in_c, h_b, {}, dt_s * times);
+      precess_all(navigated, kCount, kEq1, C_in_c, h_b, {}, dt_s * times);
       Eigen::Vector3d rates[2];
       for (int k = 0; k < 2; ++k) {
         Columns<kColumns> columns;
-        kEq1.basis(alone[k].corrected(h_b[k]), 0, columns.view(kColumns));
+        kEq1.basis(alone[k].corrected(h_b[k]), {}, columns.view(kColumns));
         rates[k] = columns.view(kColumns).times(alone[k].drift_rad_s.data());
       }
       precess_two({by_rates[0], h_b[0]}, {by_rates[1], h_b[1]}, SensitivityOfEq1(since_by_rates[0]),
                   SensitivityOfEq1(since_by_rates[1]), C_in_c, dt_s * times, rates[0], rates[1]);
       for (int k = 0; k < kCount; ++k) {
-        precess(alone[k], since_alone[k], kEq1, C_in_c, h_b[k], 0, dt_s * times);
-        precess(navigated_alone[k], kEq1, C_in_c, h_b[k], 0, dt_s * times);
+        precess(alone[k], since_alone[k], kEq1, C_in_c, h_b[k], {}, dt_s * times);
+        precess(navigated_alone[k], kEq1, C_in_c, h_b[k], {}, dt_s * times);
       }
     }
     for (int k = 0; k < kCount; ++k) {

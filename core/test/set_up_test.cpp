@@ -106,6 +106,30 @@ TEST(SetUp, RefusesPriorsThatAreNotPositiveDefinite) {
   EXPECT_EQ(fault_after([](FullGiven& given) { given.covariance.resize(0, 0); }), kFault);
 }
 
+TEST(SetUp, TakesACommonPriorOfParametersAndDriftAtOrbitalPeriod) {
+  const Layout layout{.further = {.readout_bias = true, .orbital_drift = true}};
+  FullGiven given(layout);
+  const int parameters = layout.parameters();
+  const Eigen::VectorXd sigma = (Eigen::VectorXd(layout.drift_parameters()) << given.covariance.diagonal().cwiseSqrt(),
+                                 Eigen::VectorXd::Constant(12, 3e-8))
+                                    .finished();
+  Eigen::MatrixXd correlation = Eigen::MatrixXd::Identity(sigma.size(), sigma.size());
+  correlation(parameters + 2, 4) = correlation(4, parameters + 2) = -0.9;
+  const Eigen::MatrixXd common = sigma.asDiagonal() * correlation * sigma.asDiagonal();
+  const auto estimator = std::make_unique<test::FullEstimator>();
+  ASSERT_FALSE(estimator->set_up(given.setup, given.prior, common));
+  const int size = layout.size() - layout.direction(layout.gyros);
+  Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> root(size, size);
+  estimator->prior_error_root(rows_of(root));
+  const Eigen::MatrixXd found = root * root.transpose();
+  EXPECT_TRUE(found.topLeftCorner(sigma.size(), sigma.size()).isApprox(common, 1e-12));
+  const double bias = given.setup.further_sigma[FurtherState::kReadoutBias];
+  EXPECT_TRUE(found.bottomRightCorner(6, 6).isApprox(bias * bias * Eigen::MatrixXd::Identity(6, 6), 1e-12));
+  // Of another size it is none.
+  EXPECT_EQ(estimator->set_up(given.setup, given.prior, common.topLeftCorner(parameters + 6, parameters + 6)),
+            SetupFault::kPriorNotPositiveDefinite);
+}
+
 /// The one thing that each further state is described by.
 struct Described {
   bool FurtherStates::*flag;
@@ -123,6 +147,7 @@ const Described kDescribed[] = {
     {&FurtherStates::coefficient_change, [](CalibrationSetup& s) -> double& { return s.change.duration_s; }},
     {&FurtherStates::clock_offset, sigma_of<FurtherState::kClockOffset>},
     {&FurtherStates::orbital_error, sigma_of<FurtherState::kOrbitalError>},
+    {&FurtherStates::orbital_drift, sigma_of<FurtherState::kOrbitalDrift>},
 };
 
 TEST(SetUp, RefusesACourseWithoutATime) {
@@ -153,8 +178,16 @@ TEST(SetUp, RefusesFurtherStatesThatNothingIsKnownOf) {
       EXPECT_EQ(given.fault(), std::nullopt) << bad;
     }
   }
-  EXPECT_EQ(fault_after([](FullGiven& given) { given.setup.orbital_rate_rad_s = kNotANumber; }),
-            SetupFault::kPriorNotPositiveDefinite);
+  for (const bool error : {false, true}) {
+    for (const bool drift : {false, true}) {
+      Layout layout = kEverything;
+      layout.further.orbital_error = error;
+      layout.further.orbital_drift = drift;
+      FullGiven given(layout);
+      given.setup.orbital_rate_rad_s = kNotANumber;
+      EXPECT_EQ(given.fault() == SetupFault::kPriorNotPositiveDefinite, error || drift);
+    }
+  }
   EXPECT_EQ(fault_after([](FullGiven& given) { given.setup.star_trackers[1].alignment_sigma_rad = 0; }),
             SetupFault::kPriorNotPositiveDefinite);
   // The first star tracker has no alignment.

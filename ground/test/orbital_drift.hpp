@@ -8,10 +8,11 @@
 
 namespace trihedron::ground {
 
+inline constexpr double kOrbitalRate_rad_s = 1.11e-3;
+
 /// Turns the momenta of a pass as drift about each body axis at orbital period does.
 inline void add_orbital_drift(const Truth& truth, const Eigen::Vector3d& sine_rad_s,
                               const Eigen::Vector3d& cosine_rad_s, int gyro, GyroTelemetry& readings) {
-  constexpr double kOrbitalRate_rad_s = 1.11e-3;
   Eigen::Vector3d turned_in(0, 0, 0);
   std::size_t at = 0;
   for (std::size_t i = 1; i < readings.size(); ++i) {

@@ -71,17 +71,29 @@ Member vector_member(std::string_view key, Eigen::Vector3d& target, const Range&
           [&target, range](const JsonNode& node) { target = node.vector3(range); }};
 }
 
+Members orbital_drift_members(OrbitalDrift& drift) {
+  return {vector_member("sine_rad_s", drift.sine_rad_s, limits::kDrift_rad_s, "about the case axes"),
+          vector_member("cosine_rad_s", drift.cosine_rad_s, limits::kDrift_rad_s, "about the case axes"),
+          {"rate_rad_s", "of the phase, which is 0 at the epoch", number_schema(limits::kOrbitalRate_rad_s),
+           [&drift](const JsonNode& node) { drift.rate_rad_s = node.number(limits::kOrbitalRate_rad_s); }}};
+}
+
 Members gyro_members(GyroCalibration& gyro) {
-  return {{"drift_model", "of eq. (1) or beyond it", drift_model_schema(),
-           [&gyro](const JsonNode& node) { gyro.drift_model = parse_drift_model(node); }},
-          {"drift_rad_s", "by coefficient of the model", object_of({}, number_schema(limits::kDrift_rad_s)),
-           [&gyro](const JsonNode& node) { read_drift(node, gyro); }},
-          vector_member("alignment_rotation_vector_rad", gyro.alignment_rotation_vector_rad, limits::kRotation_rad,
-                        "v_c = exp([this x]) v_b"),
-          optional_member(
-              vector_member("readout_bias", gyro.readout_bias, limits::kReadoutBias, "of the direction cosines")),
-          {"momentum_in", "its direction at t_s, a unit vector", three_of(number_schema()),
-           [&gyro](const JsonNode& node) { gyro.momentum_in = parse_momentum(node); }}};
+  OrbitalDrift orbital;
+  return {
+      {"drift_model", "of eq. (1) or beyond it", drift_model_schema(),
+       [&gyro](const JsonNode& node) { gyro.drift_model = parse_drift_model(node); }},
+      {"drift_rad_s", "by coefficient of the model", object_of({}, number_schema(limits::kDrift_rad_s)),
+       [&gyro](const JsonNode& node) { read_drift(node, gyro); }},
+      vector_member("alignment_rotation_vector_rad", gyro.alignment_rotation_vector_rad, limits::kRotation_rad,
+                    "v_c = exp([this x]) v_b"),
+      optional_member(
+          vector_member("readout_bias", gyro.readout_bias, limits::kReadoutBias, "of the direction cosines")),
+      optional_member(
+          {"orbital_drift", "drift that comes back with each orbit", schema_of(orbital_drift_members(orbital)),
+           [&gyro](const JsonNode& node) { read_members(node, orbital_drift_members(gyro.orbital_drift.emplace())); }}),
+      {"momentum_in", "its direction at t_s, a unit vector", three_of(number_schema()),
+       [&gyro](const JsonNode& node) { gyro.momentum_in = parse_momentum(node); }}};
 }
 
 /// A state "gyroN.…" must name a gyro and be there once; other states may be added.
@@ -134,6 +146,20 @@ Eigen::MatrixXd parse_matrix(const JsonNode& node, std::size_t size) {
   return matrix;
 }
 
+/// Names, among the states of the covariance, of the amplitudes of the drift at orbital period of all gyros that have
+/// it.
+std::vector<std::string> orbital_drift_of(const Calibration& calibration) {
+  std::vector<std::string> amplitudes;
+  for (std::size_t k = 0; k < calibration.gyros.size(); ++k) {
+    for (const std::string_view component : further_state_components::kOrbitalDrift) {
+      if (calibration.gyros[k].orbital_drift) {
+        amplitudes.push_back(fmt::format("gyro{}.{}", k + 1, component));
+      }
+    }
+  }
+  return amplitudes;
+}
+
 const Range& range_of_sigma(const ParameterId& state) {
   return state.is_drift()       ? limits::kDriftSigma_rad_s
          : state.is_alignment() ? limits::kAlignmentSigma_rad
@@ -145,13 +171,32 @@ const Range& range_of_sigma(const ParameterId& state) {
 void read_matrix(const JsonNode& node, const std::vector<std::string>& names, Calibration& calibration) {
   const Eigen::MatrixXd matrix = parse_matrix(node, names.size());
   std::vector<Eigen::Index> rows;
+  std::vector<Eigen::Index> orbital;
   for (std::size_t i = 0; i < names.size(); ++i) {
-    if (const std::optional<ParameterId> state = parameter_named(names[i])) {
+    const std::optional<ParameterId> state = parameter_named(names[i]);
+    if (state) {
       calibration.states.push_back(*state);
       rows.push_back(static_cast<Eigen::Index>(i));
     }
   }
+  std::string missing;
+  for (const std::string& amplitude : orbital_drift_of(calibration)) {
+    const auto row = std::ranges::find(names, amplitude) - names.begin();
+    if (row < std::ssize(names)) {
+      orbital.push_back(row);
+    } else {
+      missing = amplitude;
+    }
+  }
+  if (!orbital.empty() && !missing.empty()) {
+    node.refuse(fmt::format("has no row of {}", in_quotes(missing)), "this is no whole covariance: calibrate again");
+  }
   calibration.covariance = matrix(rows, rows);
+  calibration.orbital_drift_covariance.resize(std::ssize(orbital),
+                                              orbital.empty() ? 0 : std::ssize(rows) + std::ssize(orbital));
+  if (!orbital.empty()) {
+    calibration.orbital_drift_covariance << matrix(orbital, rows), matrix(orbital, orbital);
+  }
   for (Eigen::Index i = 0; i < calibration.covariance.rows(); ++i) {
     const Range& range = range_of_sigma(calibration.states[static_cast<std::size_t>(i)]);
     const double sigma = std::sqrt(calibration.covariance(i, i));
@@ -256,17 +301,24 @@ Json finding_json(const Finding& finding) {
           {"severity", severity->name}};
 }
 
-Json gyro_json(const GyroCalibration& gyro) {
+Json gyro_json(const GyroCalibration& gyro, Time epoch) {
   Json drift = Json::object();
   const std::vector<std::string> names = coefficient_names(gyro.drift_model);
   for (std::size_t i = 0; i < gyro.drift_rad_s.size(); ++i) {
     drift[names.at(i)] = gyro.drift_rad_s[i];
   }
-  return {{"drift_model", name_of(gyro.drift_model)},
-          {"drift_rad_s", drift},
-          {"alignment_rotation_vector_rad", to_json_array(gyro.alignment_rotation_vector_rad)},
-          {"readout_bias", to_json_array(gyro.readout_bias)},
-          {"momentum_in", to_json_array(gyro.momentum_in)}};
+  Json json = {{"drift_model", name_of(gyro.drift_model)},
+               {"drift_rad_s", drift},
+               {"alignment_rotation_vector_rad", to_json_array(gyro.alignment_rotation_vector_rad)},
+               {"readout_bias", to_json_array(gyro.readout_bias)},
+               {"momentum_in", to_json_array(gyro.momentum_in)}};
+  if (gyro.orbital_drift) {
+    const OrbitalDrift orbital = gyro.orbital_drift->from(epoch);
+    json["orbital_drift"] = {{"sine_rad_s", to_json_array(orbital.sine_rad_s)},
+                             {"cosine_rad_s", to_json_array(orbital.cosine_rad_s)},
+                             {"rate_rad_s", orbital.rate_rad_s}};
+  }
+  return json;
 }
 
 constexpr std::array<std::string_view, 2> kPotentials = {"W", "D"};
@@ -525,6 +577,17 @@ void read_gyros(const JsonNode& node, Calibration& calibration) {
   if (calibration.gyros.empty()) {
     node.refuse("is empty", "give one element per gyro");
   }
+  const auto rate = [](const GyroCalibration& gyro) {
+    return gyro.orbital_drift ? std::optional(gyro.orbital_drift->rate_rad_s) : std::nullopt;
+  };
+  for (GyroCalibration& gyro : calibration.gyros) {
+    if (rate(gyro) != rate(calibration.gyros.front())) {
+      node.refuse("has drift at orbital period of different rates", "give it to all gyros, of one rate, or to none");
+    }
+    if (gyro.orbital_drift) {
+      gyro.orbital_drift->zero_at = calibration.epoch;
+    }
+  }
 }
 
 void read_further(const JsonNode& node, Calibration& calibration) {
@@ -631,6 +694,19 @@ std::string lines(const Json& array) {
   return "[" + text + "]";
 }
 
+/// With the drift at orbital period behind the states, as it is told from the epoch.
+Eigen::MatrixXd covariance_of_all(const Calibration& calibration) {
+  const Eigen::MatrixXd& orbital = calibration.orbital_drift_covariance;
+  const Eigen::Index states = calibration.covariance.rows();
+  Eigen::MatrixXd all(states + orbital.rows(), states + orbital.rows());
+  all.topLeftCorner(states, states) = calibration.covariance;
+  if (orbital.size() > 0) {
+    all.bottomRows(orbital.rows()) = orbital;
+    all.topRightCorner(states, orbital.rows()) = orbital.leftCols(states).transpose();
+  }
+  return all;
+}
+
 }  // namespace
 
 Calibration read_calibration(const std::filesystem::path& path) {
@@ -656,11 +732,12 @@ Json calibration_schema() {
 std::string format_calibration(const Calibration& calibration) {
   Json gyros = Json::array();
   for (const GyroCalibration& gyro : calibration.gyros) {
-    gyros.push_back(gyro_json(gyro));
+    gyros.push_back(gyro_json(gyro, calibration.epoch));
   }
   Json matrix = Json::array();
-  for (Eigen::Index i = 0; i < calibration.covariance.rows(); ++i) {
-    const Eigen::RowVectorXd row = calibration.covariance.row(i);
+  const Eigen::MatrixXd covariance = covariance_of_all(calibration);
+  for (Eigen::Index i = 0; i < covariance.rows(); ++i) {
+    const Eigen::RowVectorXd row = covariance.row(i);
     matrix.push_back(std::vector<double>(row.begin(), row.end()));
   }
   Json further = Json::object();
@@ -670,6 +747,11 @@ std::string format_calibration(const Calibration& calibration) {
   Json states = Json::array();
   for (const ParameterId& state : calibration.states) {
     states.push_back(name_of(state));
+  }
+  if (calibration.orbital_drift_covariance.size() > 0) {
+    for (const std::string& amplitude : orbital_drift_of(calibration)) {
+      states.push_back(amplitude);
+    }
   }
   Json statistics = Json::object();
   for (const auto& [name, value] : named_values(calibration.statistics)) {

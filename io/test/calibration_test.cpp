@@ -91,6 +91,39 @@ TEST(CalibrationJson, NamesTheStartUpWhereItIsKnown) {
   EXPECT_EQ(parse_calibration(format_calibration(calibration), "c.json").start_up, calibration.start_up);
 }
 
+TEST(CalibrationJson, HasDriftAtOrbitalPeriodAmongTheStatesOfItsCovariance) {
+  Calibration calibration = sample_calibration();
+  const Time told_from = calibration.epoch + std::chrono::minutes(7);
+  for (GyroCalibration& gyro : calibration.gyros) {
+    gyro.orbital_drift = {{4e-8, -3e-8, 2e-8}, {-2e-8, 3e-8, 5e-8}, 1.1e-3, told_from};
+  }
+  const Eigen::Index states = calibration.covariance.rows();
+  calibration.orbital_drift_covariance.setZero(12, states + 12);
+  calibration.orbital_drift_covariance.rightCols(12) = 1e-18 * Eigen::MatrixXd::Identity(12, 12);
+  calibration.orbital_drift_covariance(3, 0) = 1e-20;
+  const std::string text = format_calibration(calibration);
+  const Calibration back = parse_calibration(text, "c.json");
+  EXPECT_EQ(back.states, calibration.states);
+  EXPECT_EQ(back.covariance, calibration.covariance);
+  EXPECT_EQ(back.orbital_drift_covariance, calibration.orbital_drift_covariance);
+  ASSERT_TRUE(back.gyros[1].orbital_drift);
+  EXPECT_EQ(back.gyros[1].orbital_drift->zero_at, calibration.epoch);
+  const OrbitalDrift as_before = back.gyros[1].orbital_drift->from(told_from);
+  EXPECT_TRUE(as_before.sine_rad_s.isApprox(calibration.gyros[1].orbital_drift->sine_rad_s, 1e-12));
+  EXPECT_TRUE(as_before.cosine_rad_s.isApprox(calibration.gyros[1].orbital_drift->cosine_rad_s, 1e-12));
+
+  const auto refusal_with = [](std::string changed, const std::string& from, const std::string& to) {
+    changed.replace(changed.find(from), from.size(), to);
+    return refusal_of(changed);
+  };
+  EXPECT_THAT(refusal_with(text, "gyro1.orbital_drift_cosine_z_rad_s", "gyro1.other"), HasSubstr("has no row of"));
+  EXPECT_THAT(refusal_with(text, "\"rate_rad_s\":0.0011", "\"rate_rad_s\":0.0012"), HasSubstr("different rates"));
+  EXPECT_THAT(refusal_with(text, "\"rate_rad_s\":0.0011", "\"rate_rad_s\":1.1"), HasSubstr("outside"));
+  // Without it, the sigmas of the further states are what is known.
+  calibration.orbital_drift_covariance.resize(0, 0);
+  EXPECT_EQ(parse_calibration(format_calibration(calibration), "c.json").orbital_drift_covariance.size(), 0);
+}
+
 TEST(CalibrationJson, ComesBackFromAFileWhole) {
   const TemporaryDirectory directory;
   const Calibration calibration = sample_calibration();

@@ -11,6 +11,12 @@ constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
 
 }  // namespace
 
+OrbitalDrift OrbitalDrift::from(Time zero) const {
+  const double sine = std::sin(phase(zero));
+  const double cosine = std::cos(phase(zero));
+  return {cosine * sine_rad_s - sine * cosine_rad_s, sine * sine_rad_s + cosine * cosine_rad_s, rate_rad_s, zero};
+}
+
 double value_of(const Calibration& calibration, const ParameterId& state) {
   if (state.gyro() >= calibration.gyros.size() || state.kind == ParameterId::Kind::kFurtherState) {
     return kNone;

@@ -78,7 +78,7 @@ double left_out_walk_rad_sqrt_s(const LeftOut& left_out, const Calibration& all,
       if (fix.fix.head != 0 || !fix.used[gyro] || (!t.empty() && fix.fix.t - t.back() < kBetweenDirections)) {
         continue;
       }
-      drift.basis(fix.h_b[gyro], 0, basis.view(columns));
+      drift.basis(fix.h_b[gyro], {}, basis.view(columns));
       const Eigen::Matrix3d C_in_b = fix.fix.q_in_c.normalized().toRotationMatrix() * C_c_b;
       const Eigen::Matrix3d across = C_in_b - C_in_b * fix.h_b[gyro] * fix.h_b[gyro].transpose();
       MatrixXd rate = across * (basis.first(columns) * rest.middleRows(first, columns));

@@ -43,8 +43,9 @@ KappaAndDelta with_members(const PassProblem& problem, const MatrixXd& more_cova
         Rot<C, C>::assume(Eigen::Matrix3d(after.C_c_b * before.C_c_b.transpose())).log().raw();
   }
   // In units of the prior sigmas, which differ by many powers of ten.
-  const Eigen::VectorXd sigma = prior.covariance.diagonal().cwiseSqrt();
-  const MatrixXd scaled = sigma.cwiseInverse().asDiagonal() * prior.covariance * sigma.cwiseInverse().asDiagonal();
+  const MatrixXd known = prior.covariance.topLeftCorner(members.parameters(), members.parameters());
+  const Eigen::VectorXd sigma = known.diagonal().cwiseSqrt();
+  const MatrixXd scaled = sigma.cwiseInverse().asDiagonal() * known * sigma.cwiseInverse().asDiagonal();
   const MatrixXd by_parameters = parameters_by_parameters(modes, members, amplitudes) * sigma.asDiagonal();
   const MatrixXd before = multiply(by_parameters, scaled);
   const MatrixXd follow =
@@ -57,7 +58,7 @@ KappaAndDelta with_members(const PassProblem& problem, const MatrixXd& more_cova
         prior.gyros[k].drift_rad_s.segment(Layout::kEq1, size) + errors.segment(row, size);
   }
   // What the modes leave open: of members alone, since modes, coefficients of eq. (1) and alignments are among them.
-  found.covariance = prior.covariance - multiply(follow, before) * sigma.asDiagonal();
+  found.covariance = known - multiply(follow, before) * sigma.asDiagonal();
   for (int k = 0; k < members.gyros; ++k) {
     const int row = members.drift(k) - members.drift(0);
     for (const auto& [first, count] : {std::pair(row, Layout::kEq1), std::pair(row + members.drift_size(), 3)}) {
@@ -91,7 +92,7 @@ Calibration calibration_of(const PassProblem& problem, const KappaAndDelta& para
   const Layout& layout = problem.setup().on_board.layout;
   Calibration calibration;
   for (int k = 0; k < layout.gyros; ++k) {
-    calibration.gyros.push_back(record_of(parameters.gyros[k], layout, 0));
+    calibration.gyros.push_back(record_of(parameters.gyros[k], problem.setup().on_board, 0));
   }
   calibration.states = drift_and_alignment(layout.drift_model, static_cast<std::size_t>(layout.gyros));
   calibration.covariance = parameters.covariance;

@@ -38,9 +38,9 @@ void compress(SmootherStage& stage) {
 Vector3d turn(const Vector3d& from, const Vector3d& to) { return from.cross(to); }
 
 /// ω_b of a gyro in an arc.
-Vector3d rate_of(const RotorDrift& rotor, const Gyro& gyro, const Vector3d& h, double part_of_change,
+Vector3d rate_of(const RotorDrift& rotor, const Gyro& gyro, const Vector3d& h, const DriftTime& time,
                  const Layout& layout) {
-  const Vector3d rate = rotor.rate(h, part_of_change);
+  const Vector3d rate = rotor.rate(h, time);
   return layout.further.wandering_drift ? Vector3d(rate + gyro.drift_rad_s.segment<3>(layout.wandering_column()))
                                         : rate;
 }
@@ -286,7 +286,8 @@ void PassProblem::step(const Node& from_node, const Node& to_node, const Drift& 
   const double dt_s = to_seconds(dt);
   const Reading from = reading_at(from_node);
   const Reading to = reading_at(to_node);
-  const double part = setup_.on_board.change.mean_part(from_node.t, to_node.t);
+  DriftTime time = setup_.on_board.drift_time(from_node.t + dt / 2);
+  time.part_of_change = setup_.on_board.change.mean_part(from_node.t, to_node.t);
   moment.t = to_node.t;
   // Gyros that can be used at both ends; where those are too few, at its end.
   const GyroMask at_both = both(from.used, to.used);
@@ -298,7 +299,7 @@ void PassProblem::step(const Node& from_node, const Node& to_node, const Drift& 
   Directions omega_b = {};
   for (int k = 0; k < gyros_; ++k) {
     const Gyro& gyro = moment.gyros[k];
-    omega_b[k] = rate_of(drift.rotors[k], gyro, gyro.corrected(middle[k]), part, columns);
+    omega_b[k] = rate_of(drift.rotors[k], gyro, gyro.corrected(middle[k]), time, columns);
   }
   // The momenta in the middle of the step; those at its begin would be half a step of drift behind.
   const Directions seen_c = in_c(moment.gyros, gyros_, middle);
@@ -326,7 +327,7 @@ void PassProblem::step(const Node& from_node, const Node& to_node, const Drift& 
     Gyro& gyro = moment.gyros[k];
     if (!used[k]) {  // its momentum turns all the same: what it would read at the attitude of the others
       middle[k] = gyro.reading_of(C_in_c.transpose() * gyro.h_in);
-      omega_b[k] = rate_of(drift.rotors[k], gyro, gyro.corrected(middle[k]), part, columns);
+      omega_b[k] = rate_of(drift.rotors[k], gyro, gyro.corrected(middle[k]), time, columns);
     }
     const Vector3d reading = gyro.corrected(middle[k]);
     const Matrix3d dt_C_in_b = dt_s * (C_in_c * gyro.C_c_b);
@@ -334,7 +335,7 @@ void PassProblem::step(const Node& from_node, const Node& to_node, const Drift& 
     gyro.h_in = rotated<double>(gyro.h_in, turned).normalized();
     if (drift.sensitive != nullptr) {
       Columns<kMaxDriftColumns> basis;
-      drift.sensitive->basis(reading, part, basis.view(drift.sensitive->columns()));
+      drift.sensitive->basis(reading, time, basis.view(drift.sensitive->columns()));
       moment.since[k].advance(basis.view(drift.sensitive->columns()), C_in_c, dt_C_in_b, turned);
     }
     if (to_node.after_gap) {
@@ -367,7 +368,7 @@ void PassProblem::put_beside_modes(const MatrixXd& rows, Eigen::Ref<MatrixXd> al
     all.middleCols(layout_.drift(k), size) = rows.middleCols(from.drift(k), size);
     all.middleCols<3>(layout_.alignment(k)) = rows.middleCols<3>(from.alignment(k));
   }
-  const int rest = layout_.size() - layout_.readout(0);
+  const int rest = layout_.size() - layout_.behind_parameters();
   all.rightCols(rest) = rows.rightCols(rest);
 }
 
@@ -620,15 +621,20 @@ MatrixXd PassProblem::prior_covariance() const {
   for (int k = 0; k < gyros_; ++k) {
     amplitudes[k] = modes_->gyros[k].amplitudes;
   }
-  const MatrixXd map = parameters_by_parameters(layout_, setup_.layout(), amplitudes);
-  return multiply(multiply(map, setup_.prior.covariance), map.transpose());
+  const MatrixXd& given = setup_.prior.covariance;
+  const MatrixXd of_parameters = parameters_by_parameters(layout_, setup_.layout(), amplitudes);
+  const Index beside = given.cols() - of_parameters.cols();  // amplitudes of the drift at orbital period
+  MatrixXd map = MatrixXd::Zero(of_parameters.rows() + beside, given.cols());
+  map.topLeftCorner(of_parameters.rows(), of_parameters.cols()) = of_parameters;
+  map.bottomRightCorner(beside, beside).setIdentity();
+  return multiply(multiply(map, given), map.transpose());
 }
 
 void PassProblem::add_prior(const PassSolution& solution, Linear& linear) const {
   const CalibrationSetup& setup = setup_.on_board;
-  const int fewer = setup.layout.readout(0) - layout_.readout(0);  // of the states before
+  const int fewer = setup.layout.behind_parameters() - layout_.behind_parameters();
   VectorXd sigma = VectorXd::Constant(layout_.size(), kUnknown_rad);
-  for (int state = layout_.readout(0); state < layout_.size(); ++state) {
+  for (int state = layout_.behind_parameters(); state < layout_.size(); ++state) {
     sigma(state) = prior_sigma_of_further_state(setup, state + fewer);
   }
   VectorXd apart = VectorXd::Zero(layout_.size());  // prior mean − solution
@@ -645,6 +651,10 @@ void PassProblem::add_prior(const PassSolution& solution, Linear& linear) const 
     if (layout_.further.coefficient_change) {
       apart.segment<Layout::kEq1>(layout_.change(k)) = drift.segment<Layout::kEq1>(setup.layout.change_column());
     }
+    if (layout_.further.orbital_drift) {
+      apart.segment<Layout::kOrbitalDrift>(layout_.orbital_drift(k)) =
+          drift.segment<Layout::kOrbitalDrift>(setup.layout.orbital_column());
+    }
   }
   apart.tail(solution.shared.size()) = -solution.shared;
   linear.prior = sigma.cwiseInverse().asDiagonal();
@@ -654,8 +664,8 @@ void PassProblem::add_prior(const PassSolution& solution, Linear& linear) const 
       linear.prior.middleRows<2>(layout_.direction(k)).setZero();
     }
   }
-  const int size = layout_.parameters();
   MatrixXd root = prior_covariance();
+  const Index size = root.rows();
   if (!to_root(root)) {
     root.setConstant(std::nan(""));  // which smooth() refuses
   }
@@ -856,7 +866,7 @@ void PassProblem::correct(const SmootherResult& found, PassSolution& solution) c
   // As errors of the states on board.
   const Layout& on_board = setup_.on_board.layout;
   VectorXd errors = VectorXd::Zero(on_board.size());
-  const int rest = layout_.size() - layout_.readout(0);
+  const int rest = layout_.size() - layout_.behind_parameters();
   errors.tail(rest) = x.tail(rest);
   for (int k = 0; k < gyros_; ++k) {
     errors.segment<Layout::kEq1>(on_board.drift(k)) = x.segment<Layout::kEq1>(layout_.drift(k));

@@ -45,6 +45,10 @@ PassSolution first_solution(const PassProblem& problem, const Nearby& nearby) {
       gyros[k].drift_rad_s.segment<Layout::kEq1>(to.change_column()) =
           gyro.drift_rad_s.segment<Layout::kEq1>(from.change_column());
     }
+    if (from.further.orbital_drift && to.further.orbital_drift) {
+      gyros[k].drift_rad_s.segment<Layout::kOrbitalDrift>(to.orbital_column()) =
+          gyro.drift_rad_s.segment<Layout::kOrbitalDrift>(from.orbital_column());
+    }
     if (to.further.readout_bias) {
       gyros[k].readout_bias = gyro.readout_bias;
     }

@@ -178,8 +178,8 @@ OpenLoopStart errors_at_end(const PassProblem& problem, const BatchResult& resul
   const int wandering = own.drift(0) - own.wandering(0);
   by_states.block(layout.wandering(0), own.wandering(0), wandering, wandering).setIdentity();
   by_states.block(layout.drift(0), own.drift(0), layout.parameters(), own.parameters()) = parameters.by_states;
-  const int rest = layout.shared() - layout.readout(0);
-  by_states.block(layout.readout(0), own.readout(0), rest, rest).setIdentity();
+  const int rest = layout.shared() - layout.behind_parameters();
+  by_states.block(layout.behind_parameters(), own.behind_parameters(), rest, rest).setIdentity();
   const MatrixXd root = multiply(by_states, result.errors.last_root);
   MatrixXd covariance = square(root);
   // As much as it is larger, the errors of the parameters have nothing in common with those of the momenta.
@@ -257,7 +257,8 @@ void Refinement::put_into(CalibrationRun& run) && {
   for (int k = 0; k < layout.gyros; ++k) {
     GyroCalibration& gyro = calibration.gyros[static_cast<std::size_t>(k)];
     const Eigen::Vector3d momentum_in = gyro.momentum_in;
-    gyro = record_of(parameters.gyros[k], layout, 0);  // the coefficients stand for the end of the pass
+    gyro =
+        record_of(parameters.gyros[k], problem_.setup().on_board, 0);  // the coefficients stand for the end of the pass
     gyro.momentum_in = momentum_in;
   }
   calibration.estimator = Estimator::kBatch;

@@ -18,8 +18,12 @@ static_assert(kInverse.size() == DriftModelId::kMaxDegree + 1);
 
 RotorDrift::RotorDrift(const DriftModel& model, const double* coefficients) {
   eq1_ = Eigen::Map<const Esg7::Coefficients<double>>(coefficients);
-  if (model.columns() >= model.size() + Esg7::kSize) {
-    change_ = Eigen::Map<const Esg7::Coefficients<double>>(coefficients + model.columns() - Esg7::kSize);
+  if (model.orbital_column() > model.change_column()) {
+    change_ = Eigen::Map<const Esg7::Coefficients<double>>(coefficients + model.change_column());
+  }
+  if (model.columns() > model.orbital_column()) {
+    orbital_sine_ = Eigen::Map<const Vector3d>(coefficients + model.orbital_column());
+    orbital_cosine_ = Eigen::Map<const Vector3d>(coefficients + model.orbital_column() + 3);
   }
   for (int i = Esg7::kSize; i < model.size(); ++i) {
     const DriftCoefficient& its = model.member(i);
@@ -46,8 +50,9 @@ void RotorDrift::add(DriftCoefficient::Member potential, int degree, int order, 
   degree_ = std::max(degree_, degree);
 }
 
-Vector3d RotorDrift::rate(const Vector3d& h, double part_of_change) const {
-  Vector3d rate = Esg7::rate<double>(h, eq1_ + part_of_change * change_);
+Vector3d RotorDrift::rate(const Vector3d& h, const DriftTime& time) const {
+  Vector3d rate = Esg7::rate<double>(h, eq1_ + time.part_of_change * change_) + time.orbital_sine * orbital_sine_ +
+                  time.orbital_cosine * orbital_cosine_;
   if (cube_d_ != 0) {
     rate += cube_d_ * h.cross(h.cwiseProduct(h).cwiseProduct(h));
   }

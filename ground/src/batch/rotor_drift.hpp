@@ -18,7 +18,7 @@ class RotorDrift {
   RotorDrift(const DriftModel& model, const double* coefficients);
 
   /// ω_b(h), rad/s, case axes, without drift that wanders; h unit.
-  [[nodiscard]] Eigen::Vector3d rate(const Eigen::Vector3d& h, double part_of_change) const;
+  [[nodiscard]] Eigen::Vector3d rate(const Eigen::Vector3d& h, const DriftTime& time) const;
 
  private:
   static constexpr int kOrders = DriftModelId::kMaxDegree + 1;
@@ -30,6 +30,8 @@ class RotorDrift {
 
   Esg7::Coefficients<double> eq1_ = Esg7::Coefficients<double>::Zero();
   Esg7::Coefficients<double> change_ = Esg7::Coefficients<double>::Zero();
+  Eigen::Vector3d orbital_sine_ = Eigen::Vector3d::Zero();
+  Eigen::Vector3d orbital_cosine_ = Eigen::Vector3d::Zero();
   double cube_d_ = 0;
   int degree_ = 0;
   /// By order and degree, with the norm of the harmonic.

@@ -85,18 +85,38 @@ Prior prior_by(const PassSettings& settings, const Layout& layout, const std::op
 /// The prior as a calibration: values and covariance.
 Calibration known_before(const PassSettings& settings, const CalibrationOptions& options,
                          const std::optional<FieldPrior>& field) {
-  const Layout layout = layout_of(settings, options);
+  const CalibrationSetup setup = setup_of(settings, options);
+  const Layout& layout = setup.layout;
   const Prior prior = prior_by(settings, layout, field);
   Calibration before;
   before.estimator = options.estimator;
   before.epoch = before.t = settings.epoch;
   for (int k = 0; k < layout.gyros; ++k) {
-    before.gyros.push_back(record_of(prior.gyros[k], layout, 0));
+    before.gyros.push_back(record_of(prior.gyros[k], setup, 0));
     before.gyros.back().momentum_in.setZero();
   }
   before.states = drift_and_alignment(layout.drift_model, static_cast<std::size_t>(layout.gyros));
-  before.covariance = prior.covariance;
+  before.covariance = prior.covariance.topLeftCorner(layout.parameters(), layout.parameters());
   return before;
+}
+
+/// Of the calibration; members of the drift that were left out have nothing in common with what was estimated.
+Eigen::MatrixXd orbital_drift_covariance(const CalibrationRun& run) {
+  const Layout& layout = run.errors.layout;
+  if (!run.errors.is_known() || !layout.further.orbital_drift) {
+    return {};
+  }
+  const std::vector<ParameterId> own = drift_and_alignment(layout.drift_model, static_cast<std::size_t>(layout.gyros));
+  const std::vector<ParameterId>& states = run.calibration.states;
+  const int size = Layout::kOrbitalDrift * layout.gyros;
+  const auto rows = run.errors.covariance.middleRows(layout.orbital_drift(0), size);
+  Eigen::MatrixXd found = Eigen::MatrixXd::Zero(size, std::ssize(states) + size);
+  for (std::size_t i = 0; i < own.size(); ++i) {
+    const auto column = std::ranges::find(states, own[i]) - states.begin();
+    found.col(column) = rows.col(layout.drift(0) + static_cast<Eigen::Index>(i));
+  }
+  found.rightCols(size) = rows.middleCols(layout.orbital_drift(0), size);
+  return found;
 }
 
 /// Options of the on-board run at the time of the batch: without what only a whole pass shows, and with esg20 in place
@@ -348,6 +368,7 @@ CalibrationRun calibrate_as_stamped(const Pass& pass, const CalibrationOptions& 
       run.calibration.drift_field = pass.settings.prior->drift_field;
     }
   }
+  run.calibration.orbital_drift_covariance = orbital_drift_covariance(run);
   return run;
 }
 

@@ -158,9 +158,9 @@ MatrixXd shapes_of(const CalibrationSetup& setup, const PassProblem::Moment& mom
 
 /// How far drift of 1 rad/s about each axis of the body, times sine and cosine of the orbital phase, has turned a
 /// momentum, in axes.
-class OrbitalDrift {
+class TurnedByOrbitalDrift {
  public:
-  OrbitalDrift(double rate_rad_s, Time phase_zero) : rate_rad_s_(rate_rad_s), phase_zero_(phase_zero) {}
+  TurnedByOrbitalDrift(double rate_rad_s, Time phase_zero) : rate_rad_s_(rate_rad_s), phase_zero_(phase_zero) {}
 
   /// To a later time. Between them the body turns evenly.
   void go_to(Time t, const Eigen::Quaterniond& q_in_c) {
@@ -551,14 +551,14 @@ std::vector<Change> changes_over(const Trial& trial) {
   return best;
 }
 
-double orbital_error_over_drift(const Trial& trial) {
+OrbitalOdds orbital_odds(const Trial& trial) {
   const PassProblem& problem = trial.problem();
   const BatchResult& found = trial.found();
   const CalibrationSetup& setup = problem.setup().on_board;
   const double rate_rad_s = setup.orbital_rate_rad_s;
   const int gyros = problem.layout().gyros;
   constexpr Index kError = 6;  // of sine and cosine about c x, y, z; so is the drift of a gyro
-  OrbitalDrift drift(rate_rad_s, setup.orbital_phase_zero);
+  TurnedByOrbitalDrift drift(rate_rad_s, setup.orbital_phase_zero);
   const auto beside = [&](const PassProblem::Moment& moment, const Layout& layout, const MatrixXd& rows) {
     MatrixXd shapes = MatrixXd::Zero(rows.rows(), kError * (1 + gyros));
     const double phase = rate_rad_s * to_seconds(moment.t - setup.orbital_phase_zero);
@@ -594,7 +594,7 @@ double orbital_error_over_drift(const Trial& trial) {
     return root.matrixL().solve(y).squaredNorm() / 2 - root.matrixLLT().diagonal().array().log().sum();
   };
   const double error_rad = kind_of(FurtherState::kOrbitalError).prior_sigma;
-  return log_odds(0, kError, error_rad) - log_odds(kError, kError * gyros, rate_rad_s * error_rad);
+  return {log_odds(0, kError, error_rad), log_odds(kError, kError * gyros, std::abs(rate_rad_s) * error_rad)};
 }
 
 }  // namespace trihedron::ground

@@ -12,10 +12,15 @@ namespace trihedron::ground {
 /// Derived in docs/mathematics.md, section 12.
 [[nodiscard]] std::vector<Change> changes_over(const Trial& trial);
 
-/// ln of the odds of an error of the star tracker at orbital period against drift about the case axes of each gyro at
-/// it, as of a temperature or of a magnetic field, that would move the momenta as far. Both turn directions alike, but
-/// in slews the error stays in the body and the drift in space, and drift of one gyro is not that of the other. Of a
-/// trial with neither.
-[[nodiscard]] double orbital_error_over_drift(const Trial& trial);
+/// ln of the odds, against neither, of what comes back with the orbit: an error of the star tracker, or drift about the
+/// case axes of each gyro, as of a temperature or of a magnetic field, that would move the momenta as far. Both turn
+/// directions alike, but in slews the error stays in the body and the drift in space, and drift of one gyro is not that
+/// of the other.
+struct OrbitalOdds {
+  double error = 0;
+  double drift = 0;
+};
+/// Of a trial with neither, with the noise and the spectrum of the drift field that were found by it.
+[[nodiscard]] OrbitalOdds orbital_odds(const Trial& trial);
 
 }  // namespace trihedron::ground

@@ -8,6 +8,7 @@
 #include <cmath>
 #include <cstdint>
 #include <future>
+#include <iterator>
 #include <limits>
 #include <numbers>
 #include <optional>
@@ -15,7 +16,6 @@
 #include <vector>
 
 #include "batch/left_out_walk.hpp"
-#include "choose/constancy.hpp"
 #include "choose/noise_search.hpp"
 #include "model/drift_on_board.hpp"
 #include "model/orbital_rate.hpp"
@@ -31,9 +31,10 @@ namespace {
 using Choice = FurtherStateOptions::Choice;
 
 /// Whether a trial with everything shows the evidence of a state: of those that are a choice all but the wandering
-/// drift, which the search for the noise decides.
+/// drift, which the search for the noise decides, and the drift at orbital period, which looks like an error of the
+/// star tracker and is compared with it.
 bool is_judged_by_trial(const FurtherStateRow& row) {
-  return !row.key.empty() && row.state != FurtherState::kWanderingDrift;
+  return !row.key.empty() && row.state != FurtherState::kWanderingDrift && row.state != FurtherState::kOrbitalDrift;
 }
 
 /// Smallest number of pairs of fixes from which the noise of the star tracker is estimated, to some percent.
@@ -99,6 +100,9 @@ CalibrationOptions as_before(CalibrationOptions options, const Calibration& prio
     if (Choice& choice = options.further_states[row.state]; choice == Choice::kAuto) {
       choice = on ? Choice::kOn : Choice::kOff;
     }
+  }
+  if (const auto& drift = prior.gyros.at(0).orbital_drift) {
+    options.orbital_rate_rad_s = drift->rate_rad_s;
   }
   return options;
 }
@@ -232,17 +236,22 @@ void keep_field(const Trial& trial, Decision& decision) {
   }
 }
 
-/// Compares an error of the star tracker at orbital period that was accepted with drift that looks like it. `decided`:
-/// the trial with it.
+/// Compares an error of the star tracker at orbital period with drift that looks like it. `decided`: the trial with
+/// what was decided.
 void compare_with_drift(const Pass& pass, const Screened& screened, const CalibrationOptions& asked,
                         const Trial& decided, const Progress& progress, Decision& decision) {
   constexpr FurtherState kError = FurtherState::kOrbitalError;
-  if (asked.further_states[kError] == Choice::kAuto && decision.options.further_states.is_on(kError)) {
-    begin_stage(progress, "looks for drift at orbital period");
-    CalibrationOptions without = decision.options;
-    without.further_states[kError] = Choice::kOff;
-    decision.orbital_error_over_drift = orbital_error_over_drift(Trial(pass, screened, without, {}, &decided));
+  if (asked.further_states.is_on(FurtherState::kOrbitalDrift) || asked.further_states.is_on(kError)) {
+    return;
   }
+  if (!decision.options.further_states.is_on(kError)) {
+    decision.orbital_odds = orbital_odds(decided);
+    return;
+  }
+  begin_stage(progress, "compares errors and drift at orbital period");
+  CalibrationOptions without = decision.options;
+  without.further_states[kError] = Choice::kOff;
+  decision.orbital_odds = orbital_odds(Trial(pass, screened, without, {}, &decided));
 }
 
 /// The noise is larger than the settings say, so the states were decided with too small a noise. Decides again, with
@@ -509,20 +518,63 @@ double most_likely_time_s(const Pass& pass, const Screened& screened, const Cali
   return most_likely_course(pass, screened, options, course, near, range_s / 64).time_s;
 }
 
+/// Decides by the data of the pass, and whether there is drift at orbital period: once more with it where there may be.
+/// Then `asked` has it as well.
+Decision decide_on_orbital_drift(const Pass& pass, const Screened& screened, CalibrationOptions& asked,
+                                 const DriftModelId& largest_model, const Progress& progress) {
+  constexpr FurtherState kError = FurtherState::kOrbitalError;
+  constexpr FurtherState kDrift = FurtherState::kOrbitalDrift;
+  // Members of the field, or noise, that were found without it have taken a part of it: its odds are larger than these.
+  constexpr double kMayBeThere = -10;
+  constexpr double kMayBeDrift = 20;
+  constexpr double kLeastPhase = 3 * std::numbers::pi;
+  const bool is_open = asked.further_states[kDrift] == Choice::kAuto;
+  if (is_open) {
+    asked.further_states[kDrift] = Choice::kOff;
+  }
+  Decision decision = decide_by_pass(pass, screened, asked, largest_model, progress);
+  if (!decision.orbital_odds) {
+    return decision;
+  }
+  const OrbitalOdds odds = *decision.orbital_odds;
+  CalibrationOptions with = asked;
+  const bool has_error = decision.options.further_states.is_on(kError);
+  if (has_error) {
+    decision.orbital_error_over_drift = odds.error - odds.drift;
+    with.further_states[kError] = Choice::kOff;
+  }
+  const double phase = std::abs(*asked.orbital_rate_rad_s) *
+                       to_seconds(screened.pass.fixes.back().fix.t - screened.pass.fixes.front().fix.t);
+  const bool is_worth_a_try =
+      is_open ? phase > kLeastPhase && odds.drift > kMayBeThere && odds.drift > odds.error - kMayBeDrift
+              : has_error && odds.drift > odds.error + kLogOddsToAccept;
+  if (!is_worth_a_try) {
+    return decision;
+  }
+  if (is_open) {
+    begin_stage(progress, "looks for drift at orbital period");
+    with.further_states[kDrift] = Choice::kOn;
+  }
+  Decision by_drift = decide_by_pass(pass, screened, with, largest_model, progress);
+  const double gain = is_open ? by_drift.log_likelihood - decision.log_likelihood : odds.drift - odds.error;
+  if (has_error) {
+    decision.orbital_error_over_drift = by_drift.orbital_error_over_drift = -gain;
+  }
+  if (gain <= kLogOddsToAccept) {
+    return decision;
+  }
+  by_drift.evidence.push_back({kDrift, gain, is_open});
+  // Drift at this period looks like aberration as well.
+  std::erase_if(by_drift.changes, [](const Change& change) { return change.moving == Moving::kAberration; });
+  asked = with;
+  return by_drift;
+}
+
 /// Decides by the data of the pass. `change_is_open`: whether the coefficients may be found to change; then a warm-up
 /// or a jump of them is looked for.
 Decision decide_with_course(const Pass& pass, const Screened& screened, CalibrationOptions asked,
                             const DriftModelId& largest_model, bool change_is_open, const Progress& progress) {
-  Decision decision = decide_by_pass(pass, screened, asked, largest_model, progress);
-  if (decision.orbital_error_over_drift.value_or(0) < -kLogOddsToAccept) {  // it is the drift that has this period
-    asked.further_states[FurtherState::kOrbitalError] = Choice::kOff;
-    const std::optional<double> over_drift = decision.orbital_error_over_drift;
-    decision = decide_by_pass(pass, screened, asked, largest_model, progress);
-    decision.orbital_error_over_drift = over_drift;
-    decision.evidence.push_back({FurtherState::kOrbitalError, *over_drift, false});
-    // Drift at this period looks like aberration as well.
-    std::erase_if(decision.changes, [](const Change& change) { return change.moving == Moving::kAberration; });
-  }
+  Decision decision = decide_on_orbital_drift(pass, screened, asked, largest_model, progress);
   const std::optional<FoundCourse> course =
       change_is_open ? course_of(decision.changes, pass.settings.epoch) : std::nullopt;
   if (!course) {
@@ -536,6 +588,9 @@ Decision decide_with_course(const Pass& pass, const Screened& screened, Calibrat
   if (gain <= kLogOddsToAccept) {
     return decision;
   }
+  std::ranges::copy_if(decision.evidence, std::back_inserter(changing.evidence),
+                       [](const Evidence& evidence) { return evidence.state == FurtherState::kOrbitalDrift; });
+  changing.orbital_error_over_drift = decision.orbital_error_over_drift;
   changing.evidence.push_back({FurtherState::kCoefficientChange, gain, true});
   return changing;
 }

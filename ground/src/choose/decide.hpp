@@ -6,6 +6,7 @@
 
 #include "batch/drift_field.hpp"
 #include "batch/pass_setup.hpp"
+#include "choose/constancy.hpp"
 #include "choose/forecast.hpp"
 #include "model/left_out.hpp"
 #include "onboard/screen.hpp"
@@ -22,12 +23,13 @@ inline constexpr double kLogOddsToAccept = 3;
 /// them.
 struct Decision {
   CalibrationOptions options;
-  double log_likelihood = 0;        ///< of the pass, with the noise that was found
-  std::vector<Evidence> evidence;   ///< empty where nothing was to be decided
-  std::vector<Forecast> forecasts;  ///< of the drift models that were compared
-  std::optional<FieldPrior> field;  ///< where the drift is estimated as one
-  std::vector<Change> changes;      ///< what moves during the pass
-  /// Where an error of the star tracker at orbital period is accepted: ln of its odds against such drift.
+  double log_likelihood = 0;                ///< of the pass, with the noise that was found
+  std::vector<Evidence> evidence;           ///< empty where nothing was to be decided
+  std::vector<Forecast> forecasts;          ///< of the drift models that were compared
+  std::optional<FieldPrior> field;          ///< where the drift is estimated as one
+  std::vector<Change> changes;              ///< what moves during the pass
+  std::optional<OrbitalOdds> orbital_odds;  ///< where it was asked for
+  /// Where an error of the star tracker at orbital period was accepted: ln of its odds against such drift.
   std::optional<double> orbital_error_over_drift;
   /// Those of the pass with what it shows of the size of members outside eq. (1), for an estimator on board.
   std::optional<PassSettings> settings;

@@ -68,6 +68,8 @@ Forecast forecast(const PassProblem& problem, const PassSolution& solution, cons
       value(state) = solution.gyros[k].drift_rad_s(i);
     }
   }
+  CalibrationSetup its_setup = problem.setup().on_board;
+  its_setup.layout = {.gyros = layout.gyros, .drift_model = model};
   Forecast result{model, 0, {}};
   for (std::size_t part = 0; part < ends.size(); ++part) {
     const Restricted known = restricted(triangles[part], kept, value);
@@ -87,7 +89,7 @@ Forecast forecast(const PassProblem& problem, const PassSolution& solution, cons
         const auto found = std::ranges::find(coefficients, smaller[i]);
         own.drift_rad_s(static_cast<Index>(i)) = gyro.drift_rad_s(found - coefficients.begin());
       }
-      fit.gyros.push_back(record_of(own, Layout{.gyros = layout.gyros, .drift_model = model}, 0));
+      fit.gyros.push_back(record_of(own, its_setup, 0));
     }
   }
   return result;

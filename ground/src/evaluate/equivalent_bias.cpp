@@ -23,8 +23,8 @@ class Drifting {
       : motion_(attitude.t, attitude.q_in_c), now_(std::clamp(calibration.t, attitude.t.front(), attitude.t.back())) {
     for (const GyroCalibration& record : calibration.gyros) {
       refuse_incomplete(record);
-      const Layout layout{.drift_model = record.drift_model};
-      gyros_.push_back({gyro_of(record, layout), DriftModel(layout.drift_model, layout.further)});
+      const Layout layout = layout_of(record);
+      gyros_.push_back({record, gyro_of(record, layout), DriftModel(layout.drift_model, layout.further)});
     }
   }
 
@@ -34,8 +34,8 @@ class Drifting {
       check_stop();
       const Duration step = std::clamp<Duration>(t - now_, -kPathStep, kPathStep);
       const Eigen::Matrix3d C_in_c = motion_.C_in_c(now_ + step / 2);
-      for (auto& [gyro, drift] : gyros_) {
-        precess(gyro, drift, C_in_c, reading(gyro, C_in_c), 0, to_seconds(step));
+      for (auto& [record, gyro, drift] : gyros_) {
+        precess(gyro, drift, C_in_c, reading(gyro, C_in_c), drift_time(record, now_ + step / 2), to_seconds(step));
       }
       now_ += step;
     }
@@ -45,8 +45,9 @@ class Drifting {
     const Eigen::Matrix3d C_in_c = motion_.C_in_c(now_);
     Eigen::Matrix3d across = Eigen::Matrix3d::Zero();
     Eigen::Vector3d turned = Eigen::Vector3d::Zero();
-    for (const auto& [gyro, drift] : gyros_) {
-      const Eigen::Vector3d omega_b = drift.rate(gyro.corrected(reading(gyro, C_in_c)), 0, gyro.drift_rad_s.data());
+    for (const auto& [record, gyro, drift] : gyros_) {
+      const Eigen::Vector3d omega_b =
+          drift.rate(gyro.corrected(reading(gyro, C_in_c)), drift_time(record, now_), gyro.drift_rad_s.data());
       const Eigen::Matrix3d projector = Eigen::Matrix3d::Identity() - gyro.h_in * gyro.h_in.transpose();
       across += projector;
       turned += projector * (C_in_c * (gyro.C_c_b * omega_b));
@@ -62,6 +63,7 @@ class Drifting {
 
  private:
   struct One {
+    GyroCalibration record;
     Gyro gyro;
     DriftModel drift;
   };

@@ -63,6 +63,7 @@ class Readings {
 
 /// A gyro propagated with given parameters.
 struct OpenLoopGyro {
+  const GyroCalibration* record;
   Gyro gyro;
   DriftModel drift;
 };
@@ -116,8 +117,8 @@ AttitudeHistory fly_open_loop(const Pass& pass, Time t, const std::vector<GyroCa
   for (int k = 0; k < kPair; ++k) {
     const GyroCalibration& record = gyros[static_cast<std::size_t>(k)];
     refuse_incomplete(record);
-    const Layout layout{.drift_model = record.drift_model};
-    flown.gyros.push_back({gyro_of(record, layout), DriftModel(layout.drift_model, layout.further)});
+    const Layout layout = layout_of(record);
+    flown.gyros.push_back({&record, gyro_of(record, layout), DriftModel(layout.drift_model, layout.further)});
   }
   AttitudeHistory history;
   Readings readings(pass.gyro, max_interpolation(pass.settings.gyro_period));
@@ -133,8 +134,9 @@ AttitudeHistory fly_open_loop(const Pass& pass, Time t, const std::vector<GyroCa
       }
       if (const auto attitude = flown.attitude(middle)) {
         for (int k = 0; k < kPair; ++k) {
-          auto& [gyro, drift] = flown.gyros[static_cast<std::size_t>(k)];
-          precess(gyro, drift, attitude.value().C_in_c.raw(), middle[k], 0, to_seconds(now - last_t));
+          auto& [record, gyro, drift] = flown.gyros[static_cast<std::size_t>(k)];
+          precess(gyro, drift, attitude.value().C_in_c.raw(), middle[k],
+                  drift_time(*record, last_t + (now - last_t) / 2), to_seconds(now - last_t));
         }
         last = h_b;
         last_t = now;

@@ -75,7 +75,7 @@ class Blocks {
     Eigen::RowVectorXd rate(kFittedCoefficients);
     for (std::size_t k = 0; k < 2; ++k) {
       Columns<kFitted.size()> columns;
-      drift_.basis(readouts_[k].corrected(h_b[k]), 0, columns.view(kFitted.size()));
+      drift_.basis(readouts_[k].corrected(h_b[k]), {}, columns.view(kFitted.size()));
       rate.segment<kFitted.size()>(static_cast<Eigen::Index>(k) * kFitted.size()) =
           (k == 0 ? -normal_c : normal_c).transpose() * readouts_[k].C_c_b * columns.first(kFitted.size());
     }

@@ -149,8 +149,9 @@ void judge_drift_left(const Pass& pass, const CalibrationRun& run, std::vector<F
                                std::ceil(line->log_chance / std::numbers::ln10)));
   }
   // Then what wanders is what is left of that drift.
-  const bool has_orbital_period =
-      run.orbital_error_over_drift && !run.options.further_states.is_on(FurtherState::kOrbitalError);
+  const bool has_orbital_period = run.orbital_error_over_drift &&
+                                  !run.options.further_states.is_on(FurtherState::kOrbitalError) &&
+                                  !run.options.further_states.is_on(FurtherState::kOrbitalDrift);
   if (has_orbital_period) {
     drift.push_back(fmt::format("drift at orbital period: ln of its odds against an error of the star tracker {:.1f}",
                                 -*run.orbital_error_over_drift));

@@ -384,23 +384,53 @@ void judge_change(const CalibrationRun& run, std::vector<Finding>& findings) {
   }
 }
 
-void judge_star_tracker_errors(const CalibrationRun& run, std::vector<Finding>& findings) {
+/// ln of the odds from which on an error of the star tracker at orbital period is told from drift at it.
+constexpr double kSureLogOdds = 5;
+
+/// Of the states of a kind that are sure the largest; null where none is.
+const FurtherEstimate* largest_of(const CalibrationRun& run, FurtherState kind) {
   constexpr double kSigmasToReport = 5;
-  double orbital_rad = 0;
-  double sureness = 0;
+  const FurtherEstimate* largest = nullptr;
   for (const FurtherEstimate& state : run.calibration.further) {
-    if (std::abs(state.value) < kSigmasToReport * state.sigma) {
-      continue;
-    }
-    if (state.parameter.is_further(FurtherState::kOrbitalError) && std::abs(state.value) > std::abs(orbital_rad)) {
-      orbital_rad = state.value;
-      sureness = std::abs(state.value / state.sigma);
+    const bool is_sure = state.parameter.is_further(kind) && std::abs(state.value) >= kSigmasToReport * state.sigma;
+    if (is_sure && (largest == nullptr || std::abs(state.value) > std::abs(largest->value))) {
+      largest = &state;
     }
   }
-  if (orbital_rad == 0) {
+  return largest;
+}
+
+void judge_orbital_drift(const CalibrationRun& run, std::vector<Finding>& findings) {
+  const FurtherEstimate* const largest = largest_of(run, FurtherState::kOrbitalDrift);
+  if (largest == nullptr) {
     return;
   }
-  constexpr double kSureLogOdds = 5;
+  const std::optional<double>& over_drift = run.orbital_error_over_drift;
+  const bool may_be_error = over_drift && *over_drift > -kSureLogOdds;
+  add(findings, FindingCode::kOrbitalDriftFound,
+      may_be_error ? "The gyros have drift at orbital period, or the star tracker has an error at it: both look alike, "
+                     "and it was "
+                     "taken for drift. Sigmas do not tell of the error."
+                   : "The gyros have drift at orbital period; the calibration has taken account of it.",
+      fmt::format(
+          "largest component {} {:.1e} rad/s, {:.0f} sigmas{}", name_of(largest->parameter), largest->value,
+          std::abs(largest->value / largest->sigma),
+          over_drift ? fmt::format("; ln of its odds against an error of the star tracker {:+.1f}", -*over_drift) : ""),
+      may_be_error
+          ? "Look for what follows the orbit: the temperature of the gyros, a magnetic field, or the temperature "
+            "of the star tracker's mounting. Where the gyros are known to have no such drift: orbital_drift = "
+            "\"off\" in [further_states]."
+          : "None needed; look for what follows the orbit: the temperature of the gyros, a magnetic field.");
+  if (may_be_error) {
+    findings.back().severity = Severity::kDoNotUse;
+  }
+}
+
+void judge_star_tracker_errors(const CalibrationRun& run, std::vector<Finding>& findings) {
+  const FurtherEstimate* const largest = largest_of(run, FurtherState::kOrbitalError);
+  if (largest == nullptr) {
+    return;
+  }
   const std::optional<double>& over_drift = run.orbital_error_over_drift;
   const bool may_be_drift = over_drift && *over_drift < kSureLogOdds;
   add(findings, FindingCode::kOrbitalErrorFound,
@@ -408,7 +438,8 @@ void judge_star_tracker_errors(const CalibrationRun& run, std::vector<Finding>& 
           ? "The star tracker has an error at orbital period, or the gyros have drift at it: both look alike, and "
             "it was taken for an error of the star tracker. Sigmas do not tell of drift."
           : "The star tracker has an error at orbital period; the calibration has taken account of it.",
-      fmt::format("largest component {:.1f}″, {:.0f} sigmas{}", orbital_rad / kArcsecond, sureness,
+      fmt::format("largest component {:.1f}″, {:.0f} sigmas{}", largest->value / kArcsecond,
+                  std::abs(largest->value / largest->sigma),
                   over_drift ? fmt::format("; ln of its odds against drift at that period {:+.1f}", *over_drift) : ""),
       may_be_drift
           ? "Look for what follows the orbit: the temperature of the mounting, or that of the gyros, a magnetic "
@@ -757,6 +788,7 @@ Verdict judge(const Pass& pass, const CalibrationRun& run) {
   judge_halves(run, findings);
   judge_clocks(pass, run, findings);
   judge_star_tracker_errors(run, findings);
+  judge_orbital_drift(run, findings);
   judge_determination(run, findings);
   judge_prior_sigmas(pass, run, findings);
   judge_steadiness(pass, run, findings);

@@ -13,8 +13,10 @@ using Gyros = PerGyro<Gyro>;
 
 /// Prior of the gyros; their momenta have no meaning.
 struct Prior {
-  Gyros gyros;                 ///< means
-  Eigen::MatrixXd covariance;  ///< of κ and δ, gyro by gyro
+  Gyros gyros;  ///< means
+  /// Of κ and δ, gyro by gyro; by an earlier calibration also of the amplitudes of the drift at orbital period, behind
+  /// them.
+  Eigen::MatrixXd covariance;
 };
 
 }  // namespace trihedron::ground

@@ -35,8 +35,9 @@ OpenLoopStart start_with_held_parameters(const CalibrationSetup& setup, const Gy
                                          const Eigen::Matrix3d& attitude_rad2) {
   const Layout& layout = setup.layout;
   Eigen::MatrixXd covariance = Eigen::MatrixXd::Zero(layout.shared(), layout.shared());
-  covariance.block(layout.drift(0), layout.drift(0), layout.parameters(), layout.parameters()) = parameters;
-  for (int state = layout.readout(0); state < layout.shared(); ++state) {
+  const auto known = static_cast<int>(parameters.rows());
+  covariance.block(layout.drift(0), layout.drift(0), known, known) = parameters;
+  for (int state = layout.drift(0) + known; state < layout.shared(); ++state) {
     const double sigma = prior_sigma_of_further_state(setup, state);
     covariance(state, state) = sigma * sigma;
   }

@@ -56,12 +56,37 @@ void put_prior(const GyroPrior& prior, int number, const Layout& layout, Gyro& m
   sigma.tail<3>() = prior.alignment_sigma_rad;
 }
 
-Prior prior_of_calibration(const Calibration& earlier, const Layout& layout) {
+/// Drift at orbital period is told from the epoch of the pass on, as in the set-up.
+Prior prior_of_calibration(const Calibration& earlier, const Layout& layout, Time epoch) {
   const Calibration reduced = LeftOut(earlier, layout.drift_model).reduced();
   Prior prior;
   prior.covariance = reduced.covariance;
+  const Eigen::MatrixXd& orbital = reduced.orbital_drift_covariance;
+  if (layout.further.orbital_drift && orbital.size() > 0) {
+    // Told from another time, sine and cosine turn into each other.
+    const Eigen::Index amplitudes = orbital.rows();
+    const Eigen::Index known = layout.parameters();
+    const double phase = reduced.gyros[0].orbital_drift->phase(epoch);
+    Eigen::MatrixXd turn = Eigen::MatrixXd::Zero(amplitudes, amplitudes);
+    for (Eigen::Index first = 0; first < amplitudes; first += Layout::kOrbitalDrift) {
+      turn.block<3, 3>(first, first) = turn.block<3, 3>(first + 3, first + 3) =
+          std::cos(phase) * Eigen::Matrix3d::Identity();
+      turn.block<3, 3>(first + 3, first) = std::sin(phase) * Eigen::Matrix3d::Identity();
+      turn.block<3, 3>(first, first + 3) = -std::sin(phase) * Eigen::Matrix3d::Identity();
+    }
+    prior.covariance.conservativeResize(known + amplitudes, known + amplitudes);
+    prior.covariance.bottomLeftCorner(amplitudes, known) = turn * orbital.leftCols(known);
+    prior.covariance.topRightCorner(known, amplitudes) =
+        prior.covariance.bottomLeftCorner(amplitudes, known).transpose();
+    prior.covariance.bottomRightCorner(amplitudes, amplitudes) =
+        turn * orbital.rightCols(amplitudes) * turn.transpose();
+  }
   for (int k = 0; k < layout.gyros; ++k) {
-    prior.gyros[k] = gyro_of(reduced.gyros[static_cast<std::size_t>(k)], layout);
+    GyroCalibration record = reduced.gyros[static_cast<std::size_t>(k)];
+    if (record.orbital_drift) {
+      record.orbital_drift = record.orbital_drift->from(epoch);
+    }
+    prior.gyros[k] = gyro_of(record, layout);
   }
   return prior;
 }
@@ -96,10 +121,15 @@ Gyro gyro_of(const GyroCalibration& record, const Layout& layout) {
   gyro.h_in = record.momentum_in;
   gyro.C_c_b = Rot<C, B<1>>::exp(Vec<C>::assume(record.alignment_rotation_vector_rad)).raw();
   gyro.readout_bias = record.readout_bias;
+  if (layout.further.orbital_drift && record.orbital_drift) {
+    gyro.drift_rad_s.segment<Layout::kOrbitalDrift>(layout.orbital_column()) << record.orbital_drift->sine_rad_s,
+        record.orbital_drift->cosine_rad_s;
+  }
   return gyro;
 }
 
-GyroCalibration record_of(const Gyro& gyro, const Layout& layout, double part_of_change) {
+GyroCalibration record_of(const Gyro& gyro, const CalibrationSetup& setup, double part_of_change) {
+  const Layout& layout = setup.layout;
   GyroCalibration record;
   record.drift_model = layout.drift_model;
   Eigen::VectorXd drift = gyro.drift_rad_s.head(layout.drift_size());
@@ -110,12 +140,29 @@ GyroCalibration record_of(const Gyro& gyro, const Layout& layout, double part_of
   record.alignment_rotation_vector_rad = Rot<C, B<1>>::assume(gyro.C_c_b).log().raw();
   record.readout_bias = gyro.readout_bias;
   record.momentum_in = gyro.h_in;
+  if (layout.further.orbital_drift) {
+    const int column = layout.orbital_column();
+    record.orbital_drift = {gyro.drift_rad_s.segment<3>(column), gyro.drift_rad_s.segment<3>(column + 3),
+                            setup.orbital_rate_rad_s, setup.orbital_phase_zero};
+  }
   return record;
+}
+
+DriftTime drift_time(const GyroCalibration& record, Time t) {
+  if (!record.orbital_drift) {
+    return {};
+  }
+  const double phase = record.orbital_drift->phase(t);
+  return {0, std::sin(phase), std::cos(phase)};
+}
+
+Layout layout_of(const GyroCalibration& record) {
+  return {.drift_model = record.drift_model, .further = {.orbital_drift = record.orbital_drift.has_value()}};
 }
 
 Prior prior_of(const PassSettings& settings, const Layout& layout) {
   if (settings.prior) {
-    return prior_of_calibration(*settings.prior, layout);
+    return prior_of_calibration(*settings.prior, layout, settings.epoch);
   }
   Prior prior;
   Eigen::VectorXd sigma(layout.parameters());

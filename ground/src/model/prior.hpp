@@ -3,6 +3,7 @@
 
 #include "model/gyro.hpp"
 #include "trihedron/core/layout.hpp"
+#include "trihedron/core/setup.hpp"
 #include "trihedron/records/pass.hpp"
 
 namespace trihedron::ground {
@@ -12,10 +13,16 @@ void refuse_unknown(const DriftModelId& drift_model);
 /// Throws SetupError where the record does not have as many coefficients as its model.
 void refuse_incomplete(const GyroCalibration& gyro);
 
-/// The gyro of a record, with its momentum; coefficients of the layout that the record lacks are zero.
+/// The gyro of a record, with its momentum; what the layout has and the record lacks is zero. Drift at orbital period
+/// is told from when the record has it told from.
 [[nodiscard]] Gyro gyro_of(const GyroCalibration& record, const Layout& layout);
-/// The record of a gyro, with the coefficients at the time when this fraction of their change has taken place.
-[[nodiscard]] GyroCalibration record_of(const Gyro& gyro, const Layout& layout, double part_of_change);
+/// The record of a gyro in the layout of the set-up, with the coefficients at the time when this fraction of their
+/// change has taken place.
+[[nodiscard]] GyroCalibration record_of(const Gyro& gyro, const CalibrationSetup& setup, double part_of_change);
+/// What the drift of a record depends on besides the direction, at a time.
+[[nodiscard]] DriftTime drift_time(const GyroCalibration& record, Time t);
+/// Of the drift of a record alone.
+[[nodiscard]] Layout layout_of(const GyroCalibration& record);
 
 /// From the earlier calibration that pass.toml names, or else from what it says of each gyro. Where that calibration
 /// has a larger drift model, its coefficients are changed to what the smaller one needs along the same flight: by

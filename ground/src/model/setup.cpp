@@ -17,13 +17,15 @@ namespace {
 constexpr double kChangeSigma = 0.05;
 /// The same of a course that was found: a warm-up, or a jump.
 constexpr double kFoundChangeSigma = 0.3;
+/// Prior sigma of each amplitude of the drift at orbital period, as a fraction of that of a coefficient.
+constexpr double kOrbitalDriftSigma = 0.05;
 
-/// The largest sigma of a component of the bias that an earlier calibration has left; 0 without it.
-double bias_sigma_before(const std::optional<Calibration>& earlier) {
+/// The largest sigma of a component of such a state that an earlier calibration has left; 0 without it.
+double sigma_before(const std::optional<Calibration>& earlier, FurtherState state) {
   double sigma = 0;
   if (earlier) {
     for (const FurtherEstimate& estimate : earlier->further) {
-      sigma = estimate.parameter.is_further(FurtherState::kReadoutBias) ? std::max(sigma, estimate.sigma) : sigma;
+      sigma = estimate.parameter.is_further(state) ? std::max(sigma, estimate.sigma) : sigma;
     }
   }
   return sigma;
@@ -101,8 +103,11 @@ CalibrationSetup setup_of(const PassSettings& settings, const CalibrationOptions
 
   const FurtherStateOptions& states = options.further_states;
   setup.wandering_drift = {states.wandering_drift_rad_s, to_seconds(states.wandering_time)};
-  if (const double sigma = bias_sigma_before(settings.prior); sigma > 0) {
-    setup.further_sigma[FurtherState::kReadoutBias] = sigma;
+  setup.further_sigma[FurtherState::kOrbitalDrift] = kOrbitalDriftSigma * settings.gyros[0].drift_common_sigma_rad_s;
+  for (const FurtherState of_gyros : {FurtherState::kReadoutBias, FurtherState::kOrbitalDrift}) {
+    if (const double sigma = sigma_before(settings.prior, of_gyros); sigma > 0) {
+      setup.further_sigma[of_gyros] = sigma;
+    }
   }
   setup.change.kind = states.change_course;
   setup.further_sigma[FurtherState::kCoefficientChange] =
@@ -167,6 +172,9 @@ double value_of(const Layout& layout, const Gyros& gyros, const SharedStates& sh
   const int state = state_of(layout, parameter);
   if (parameter.further_state == FurtherState::kWanderingDrift) {
     return gyro.drift_rad_s(layout.wandering_column() + parameter.component);
+  }
+  if (parameter.further_state == FurtherState::kOrbitalDrift) {
+    return gyro.drift_rad_s(layout.orbital_column() + parameter.component);
   }
   if (state < layout.change(0)) {
     return gyro.errors(layout)(state - layout.readout(parameter.owner));

@@ -60,11 +60,12 @@ template <class Estimator>
 
 /// The gyros as records, with the coefficients of that time.
 template <class Gyros>
-[[nodiscard]] std::vector<GyroCalibration> records_of(const Gyros& gyros, const Layout& layout, double part_of_change) {
-  const auto roomy = with_room<ground::Gyros>(gyros, layout);
+[[nodiscard]] std::vector<GyroCalibration> records_of(const Gyros& gyros, const CalibrationSetup& setup,
+                                                      double part_of_change) {
+  const auto roomy = with_room<ground::Gyros>(gyros, setup.layout);
   std::vector<GyroCalibration> records;
-  for (int k = 0; k < layout.gyros; ++k) {
-    records.push_back(record_of(roomy[k], layout, part_of_change));
+  for (int k = 0; k < setup.layout.gyros; ++k) {
+    records.push_back(record_of(roomy[k], setup, part_of_change));
   }
   return records;
 }
@@ -79,7 +80,7 @@ template <class Estimator>
   Calibration result;
   result.epoch = epoch;
   result.t = on_board.t();
-  result.gyros = records_of(estimator.gyros(), layout, part_of_change);
+  result.gyros = records_of(estimator.gyros(), estimator.setup(), part_of_change);
   result.states = drift_and_alignment(layout.drift_model, static_cast<std::size_t>(layout.gyros));
   const Roots root = parameter_root(estimator, part_of_change);
   result.covariance = root * root.transpose();

@@ -128,10 +128,12 @@ double Pipeline::part_of_change() const {
 
 std::vector<GyroCalibration> Pipeline::gyros() const {
   return program_->visit(
-      [&](const auto& its) { return records_of(its.estimator().gyros(), layout(), part_of_change()); });
+      [&](const auto& its) { return records_of(its.estimator().gyros(), its.estimator().setup(), part_of_change()); });
 }
 
-std::vector<GyroCalibration> Pipeline::gyros_before() const { return records_of(program_->prior.gyros, layout(), 0); }
+std::vector<GyroCalibration> Pipeline::gyros_before() const {
+  return records_of(program_->prior.gyros, setup_of(settings_, options_), 0);
+}
 
 Eigen::VectorXd Pipeline::state_sigmas() const {
   return program_->visit([&](const auto& its) -> Eigen::VectorXd {
@@ -170,7 +172,7 @@ Pipeline::Held Pipeline::held_at(const Rot<In, C>& C_in_c, const Eigen::Matrix3d
     held[k].h_in = (C_in_c.raw() * held[k].in_c(h_b)).normalized();
   }
   const CalibrationSetup setup = setup_of(settings_, options_);
-  return {records_of(held, layout(), 0),
+  return {records_of(held, setup, 0),
           start_with_held_parameters(setup, held, program_->prior.covariance, C_in_c.raw(), covariance_rad2)};
 }
 
@@ -185,7 +187,8 @@ double Pipeline::squared_distance_from_prior() const {
     moved.segment<3>(row + layout().drift_size()) =
         Rot<C, C>::assume(Eigen::Matrix3d(gyros[k].C_c_b * held.C_c_b.transpose())).log().raw();
   }
-  return moved.dot(program_->prior.covariance.llt().solve(moved));
+  const Eigen::Index size = moved.size();
+  return moved.dot(program_->prior.covariance.topLeftCorner(size, size).llt().solve(moved));
 }
 
 OpenLoopEnd Pipeline::compare(const AttitudeSolution& attitude, const ComparedFix& its) const {

@@ -52,7 +52,7 @@ bool is_left_by_half_turns(const DriftModel& model, Index member) {
   const Eigen::Vector3d h = Eigen::Vector3d(0.3, -0.5, 0.7).normalized();
   const auto across_h = [&](const Eigen::Vector3d& direction) {
     Columns<kMaxDriftColumns> columns;
-    model.basis(direction, 0, columns.view(model.columns()));
+    model.basis(direction, {}, columns.view(model.columns()));
     const Eigen::Vector3d drift = columns.first(model.size()).col(member);
     return Eigen::Vector3d(drift - direction * direction.dot(drift));
   };
@@ -109,7 +109,7 @@ TEST(DriftField, SigmasMakeDriftOfTheRootMeanSquare) {
   for (int i = 0; i < kDirections; ++i) {
     const Eigen::Vector3d h = normal_matrix(3, 1, random).col(0).head<3>().normalized();
     Columns<kMaxDriftColumns> columns;
-    model.basis(h, 0, columns.view(model.columns()));
+    model.basis(h, {}, columns.view(model.columns()));
     const MatrixXd basis = columns.first(model.size());
     for (Index j = 0; j < members.size() / 2; ++j) {
       const Eigen::Vector3d column = basis.col(Layout::kEq1 + j);

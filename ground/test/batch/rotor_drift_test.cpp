@@ -14,8 +14,9 @@ TEST(RotorDrift, IsTheDriftModelWithItsCoefficients) {
   std::mt19937_64 random(5);
   std::normal_distribution<double> normal;
   for (const DriftModelId& id : {kEsg7, kEsg20, vsh(1), vsh(3), vsh(8)}) {
-    for (const FurtherStates& further : {FurtherStates{}, FurtherStates{.wandering_drift = true},
-                                         FurtherStates{.coefficient_change = true}, kAllFurtherStates}) {
+    for (const FurtherStates& further :
+         {FurtherStates{}, FurtherStates{.wandering_drift = true}, FurtherStates{.coefficient_change = true},
+          FurtherStates{.orbital_drift = true}, kAllFurtherStates}) {
       const DriftModel model(id, further);
       Eigen::VectorXd coefficients = Eigen::VectorXd::NullaryExpr(model.columns(), [&] { return normal(random); });
       if (further.wandering_drift) {
@@ -25,10 +26,10 @@ TEST(RotorDrift, IsTheDriftModelWithItsCoefficients) {
       for (int i = 0; i < 20; ++i) {
         const Eigen::Vector3d h = i < 3 ? Eigen::Vector3d::Unit(i)  // poles among them
                                         : Eigen::Vector3d(normal(random), normal(random), normal(random)).normalized();
-        const double part = normal(random);
-        const Eigen::Vector3d across = model.rate(h, part, coefficients.data()).cross(h);
+        const DriftTime time{normal(random), normal(random), normal(random)};
+        const Eigen::Vector3d across = model.rate(h, time, coefficients.data()).cross(h);
         // Parts along h move nothing, and depend on how the polynomials are written.
-        EXPECT_LT((rotor.rate(h, part).cross(h) - across).norm(), 1e-13 * (1 + coefficients.norm())) << i;
+        EXPECT_LT((rotor.rate(h, time).cross(h) - across).norm(), 1e-13 * (1 + coefficients.norm())) << i;
       }
     }
   }

@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <functional>
 #include <random>
@@ -497,8 +498,10 @@ TEST(Calibrate, DoesNotTakeDriftAtOrbitalPeriodForAnErrorOfTheStarTracker) {
   add_orbital_drift(simulated.truth, {-3e-8, 5e-8, 1e-8}, {4e-8, 2e-8, -3e-8}, 1, pass.gyro);
   const auto run = calibrate(pass, {});
   EXPECT_LT(run.orbital_error_over_drift.value(), -5);
-  EXPECT_TRUE(run.calibration.verdict.has(FindingCode::kDriftNotExplained));
-  EXPECT_FALSE(run.calibration.verdict.has(FindingCode::kOrbitalErrorFound));
+  EXPECT_THAT(run.calibration.verdict.findings,
+              ElementsAre(testing::Field(&Finding::code, FindingCode::kOrbitalDriftFound)));
+  ASSERT_EQ(run.calibration.further.size(), 12U);
+  EXPECT_LT(run.calibration.further[0].sigma, 1e-8);
   const auto errors = attitude_errors(run.attitude, simulated.truth.t, simulated.truth.q_in_c);
   double beyond = 0;
   for (std::size_t i = 0; i < errors.t.size(); ++i) {
@@ -509,6 +512,72 @@ TEST(Calibrate, DoesNotTakeDriftAtOrbitalPeriodForAnErrorOfTheStarTracker) {
     const Eigen::Array3d error = alignment_error(run.calibration, simulated.truth, gyro).array();
     const Eigen::Index row = rows_of(run.calibration, {ParameterId::alignment(gyro, 0)})[0];
     EXPECT_LT((error / run.calibration.covariance.diagonal().segment<3>(row).array().sqrt()).abs().maxCoeff(), 4);
+  }
+}
+
+TEST(Calibrate, CarriesDriftAtOrbitalPeriodOnToAnotherPass) {
+  sim::SimulatedPass first = sim::simulate(scenario_in_eq1(6, std::chrono::hours(3)));
+  const Time epoch = first.pass.settings.epoch;
+  const std::array<OrbitalDrift, 2> truth = {
+      OrbitalDrift{{4e-8, -3e-8, 2e-8}, {-2e-8, 3e-8, 5e-8}, kOrbitalRate_rad_s, epoch},
+      OrbitalDrift{{-3e-8, 5e-8, 1e-8}, {4e-8, 2e-8, -3e-8}, kOrbitalRate_rad_s, epoch}};
+  const auto add = [&truth](sim::SimulatedPass& to) {
+    for (int k = 0; k < 2; ++k) {
+      const OrbitalDrift its = truth[static_cast<std::size_t>(k)].from(to.pass.settings.epoch);
+      add_orbital_drift(to.truth, its.sine_rad_s, its.cosine_rad_s, k, to.pass.gyro);
+    }
+  };
+  add(first);
+  // Another flight, at another phase of the orbit.
+  Scenario scenario = scenario_in_eq1(7, std::chrono::hours(3));
+  scenario.epoch += std::chrono::minutes(437);
+  for (std::size_t k = 0; k < scenario.gyros.size(); ++k) {
+    auto& kappa = scenario.gyros[k].drift.kappa_rad_s.emplace();
+    for (std::size_t i = 0; i < kappa.size(); ++i) {
+      kappa[i] = first.truth.gyros[k].drift_rad_s[i].second;
+    }
+    scenario.gyros[k].misalignment_rad = first.truth.gyros[k].alignment_rotation_vector_rad;
+  }
+  sim::SimulatedPass next = sim::simulate(scenario);
+  add(next);
+  CalibrationOptions options = told();
+  options.orbital_rate_rad_s = kOrbitalRate_rad_s;
+  options.further_states[FurtherState::kOrbitalDrift] = FurtherStateOptions::Choice::kOn;
+  for (const Estimator estimator : {Estimator::kInvariant, Estimator::kBatch}) {
+    options.estimator = estimator;
+    const Calibration before = calibrate(first.pass, options).calibration;
+    EXPECT_EQ(before.orbital_drift_covariance.rows(), 12);
+    EXPECT_EQ(before.orbital_drift_covariance.cols(), 32);
+    next.pass.settings.prior = before;
+    CalibrationOptions again;
+    again.estimator = estimator;
+    const Calibration after = calibrate(next.pass, again).calibration;
+    ASSERT_EQ(after.further.size(), 12U);
+    for (std::size_t i = 0; i < 12; ++i) {
+      const FurtherEstimate& its = after.further[i];
+      const OrbitalDrift told = truth[its.parameter.owner].from(next.pass.settings.epoch);
+      const int component = its.parameter.component;
+      const double expected = component < 3 ? told.sine_rad_s(component) : told.cosine_rad_s(component - 3);
+      EXPECT_LT(std::abs(its.value - expected), 4.5 * its.sigma) << name_of(its.parameter);
+      EXPECT_LT(its.sigma, before.further[i].sigma) << name_of(its.parameter);
+    }
+    EXPECT_LT(nees_of(next.truth, after), 45);
+    // One fix, then three hours by what the first pass has found.
+    CalibrationOptions open_loop;
+    open_loop.estimator = estimator;
+    open_loop.corrections.when = CorrectionOptions::When::kOnlyFirst;
+    Pass one_fix = next.pass;
+    one_fix.star_tracker.t.resize(1);
+    one_fix.star_tracker.q_in_c.resize(1);
+    const NavigationRun flown = navigate(one_fix, open_loop);
+    const AttitudeErrors errors = attitude_errors(flown.attitude, next.truth.t, next.truth.q_in_c);
+    const Eigen::Vector3d last_sigma_rad = errors.sigma_rad.back();
+    EXPECT_LT(errors.error_rad.back().cwiseQuotient(last_sigma_rad).cwiseAbs().maxCoeff(), 4);
+    EXPECT_LT(last_sigma_rad.maxCoeff(), kArcminute);
+    // Without what the estimates have in common it would know less.
+    one_fix.settings.prior->orbital_drift_covariance.resize(0, 0);
+    const NavigationRun apart = navigate(one_fix, open_loop);
+    EXPECT_GT(apart.attitude.sigma_rad.back().maxCoeff(), 1.08 * last_sigma_rad.maxCoeff());
   }
 }
 

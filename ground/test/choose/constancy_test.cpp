@@ -223,14 +223,15 @@ TEST(Constancy, NamesInertialAxesThatJump) {
   EXPECT_TRUE(names(run, FindingCode::kInertialAxesTurned));
 }
 
-TEST(OrbitalErrorOverDrift, TellsTheOneFromTheOther) {
+TEST(OrbitalOdds, TellAnErrorOfTheStarTrackerFromDrift) {
   const auto over_drift = [](const Pass& pass) {
     CalibrationOptions options = told();
     options.estimator = Estimator::kBatch;
     options.drift_model = kEsg7;
     options.orbital_rate_rad_s = orbital_rate_rad_s(pass.star_tracker);
     const Screened screened = screen(pass, options);
-    return orbital_error_over_drift(Trial(pass, screened, options));
+    const OrbitalOdds odds = orbital_odds(Trial(pass, screened, options));
+    return odds.error - odds.drift;
   };
   Scenario scenario = scenario_in_eq1(6, std::chrono::hours(3));
   const sim::SimulatedPass quiet = sim::simulate(scenario);

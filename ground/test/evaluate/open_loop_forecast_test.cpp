@@ -86,8 +86,8 @@ class Loop {
       const Eigen::Matrix3d estimated = attitude(h_b);
       const double dt_s = to_seconds(step);
       for (int k = 0; k < kGyros; ++k) {
-        precess(truth_[k], drift_, C_in_c, h_b[k], 0, dt_s);
-        precess(estimate_[k], drift_, estimated, h_b[k], 0, dt_s);
+        precess(truth_[k], drift_, C_in_c, h_b[k], {}, dt_s);
+        precess(estimate_[k], drift_, estimated, h_b[k], {}, dt_s);
         if (noisy) {
           truth_[k].h_in = rotated<double>(truth_[k].h_in, Eigen::Vector3d(start_.direction_random_walk_rad_sqrt_s *
                                                                            std::sqrt(dt_s) * normal()))

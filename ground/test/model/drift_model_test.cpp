@@ -26,7 +26,7 @@ constexpr int kPoints = 100;
 
 MatrixXd basis_of(const DriftModel& model, const Vector3d& h) {
   Columns<kMaxDriftColumns> columns;
-  model.basis(h, 0, columns.view(model.columns()));
+  model.basis(h, {}, columns.view(model.columns()));
   return columns.first(model.size());
 }
 

@@ -94,8 +94,16 @@ struct BesideK0 {
   }
 };
 
+/// What drift depends on besides the direction, at one time.
+struct DriftTime {
+  double part_of_change = 0;  ///< the fraction of the change of the coefficients that has taken place
+  double orbital_sine = 0;    ///< sin nt
+  double orbital_cosine = 0;  ///< cos nt
+};
+
 /// Drift of one gyro as a table of columns: ω_b = B(h) κ, κ the coefficients of the members of the model; then, where
-/// the layout has them, the drift that wanders, about the case axes, and the change of the coefficients of eq. (1).
+/// the layout has them, the drift that wanders, about the case axes, the change of the coefficients of eq. (1), and the
+/// drift at orbital period, about the case axes.
 class DriftModel {
  public:
   static constexpr int kMaxMembers = vsh(DriftModelId::kMaxDegree).size();
@@ -105,16 +113,18 @@ class DriftModel {
 
   /// The coefficients of the model; with all that follows them.
   [[nodiscard]] int size() const { return size_; }
-  [[nodiscard]] int columns() const { return size_ + (wandering_ ? 3 : 0) + (change_ ? Esg7::kSize : 0); }
+  [[nodiscard]] int change_column() const { return size_ + (wandering_ ? 3 : 0); }
+  [[nodiscard]] int orbital_column() const { return change_column() + (change_ ? Esg7::kSize : 0); }
+  [[nodiscard]] int columns() const { return orbital_column() + (orbital_ ? Layout::kOrbitalDrift : 0); }
   /// Which member of the family column i is; i < size().
   [[nodiscard]] const DriftCoefficient& member(int i) const { return members_[static_cast<std::size_t>(i)]; }
 
-  /// The columns at a direction h in case axes, unit. `part_of_change`: the fraction of the change that has taken
-  /// place. Parts along h move nothing and are left in. B: of columns(), and is padded.
-  void basis(const Eigen::Vector3d& h, double part_of_change, ColumnsView B) const;
+  /// The columns at a direction h in case axes, unit. Parts along h move nothing and are left in. B: of columns(), and
+  /// is padded.
+  void basis(const Eigen::Vector3d& h, const DriftTime& time, ColumnsView B) const;
 
   /// ω_b(h), rad/s, case axes, by a gyro's coefficients of all columns.
-  [[nodiscard]] Eigen::Vector3d rate(const Eigen::Vector3d& h, double part_of_change, const double* coefficients) const;
+  [[nodiscard]] Eigen::Vector3d rate(const Eigen::Vector3d& h, const DriftTime& time, const double* coefficients) const;
 
  private:
   void add(DriftCoefficient::Member member, int degree, int order);
@@ -124,6 +134,7 @@ class DriftModel {
   int size_ = Esg7::kSize;
   bool wandering_ = false;
   bool change_ = false;
+  bool orbital_ = false;
 };
 
 }  // namespace trihedron

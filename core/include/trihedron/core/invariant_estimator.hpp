@@ -47,8 +47,9 @@ class InvariantEstimator {
   using Rows3 = StateRows3<kMaxStates>;
 
   /// Makes it ready. `prior`: means of drift coefficients, alignments, biases; the momenta come from the first fix.
-  /// `covariance`: of κ and δ, gyro by gyro, rad/s and rad, positive definite; only its lower triangle is used. Nothing
-  /// is changed where there is a fault.
+  /// `covariance`: of κ and δ, gyro by gyro, rad/s and rad, positive definite; only its lower triangle is used. Behind
+  /// them it may have the amplitudes of the drift at orbital period, whose prior is then this and not that of the
+  /// set-up. Nothing is changed where there is a fault.
   [[nodiscard]] std::optional<SetupFault> set_up(const CalibrationSetup& setup, const Gyros& prior,
                                                  const Eigen::Ref<const Eigen::MatrixXd>& covariance);
 

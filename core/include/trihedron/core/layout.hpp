@@ -21,10 +21,11 @@ enum class FurtherState : std::uint8_t {
   kOrbitalError,          ///< of the first star tracker: exp([(p_s sin nt + p_c cos nt)×]) in c
   kStarTrackerAlignment,  ///< of the star trackers other than the first; always there for those of the layout
   kReadoutBias,           ///< of the direction cosines of each gyro
-  kCoefficientChange,     ///< of the coefficients of eq. (1) of each gyro, linear in time
+  kCoefficientChange,     ///< of the coefficients of eq. (1) of each gyro, by the course of the set-up
+  kOrbitalDrift,          ///< v_s sin nt + v_c cos nt about the case axes of each gyro
   kWanderingDrift,        ///< first-order Gauss–Markov drift about the case axes of each gyro
 };
-inline constexpr std::size_t kFurtherStateCount = 7;
+inline constexpr std::size_t kFurtherStateCount = 8;
 
 /// Which of them are estimated; alignments of star trackers are not a choice.
 struct FurtherStates {
@@ -34,15 +35,17 @@ struct FurtherStates {
   bool clock_offset = false;
   bool orbital_error = false;
   bool clock_rate = false;
+  bool orbital_drift = false;
 
   friend constexpr bool operator==(const FurtherStates&, const FurtherStates&) = default;
 };
 
-inline constexpr FurtherStates kAllFurtherStates{true, true, true, true, true, true};
+inline constexpr FurtherStates kAllFurtherStates{true, true, true, true, true, true, true};
 
 /// First the states that move, then the constants gyro by gyro, then those that the gyros share.
 struct Layout {
-  static constexpr int kEq1 = 7;  ///< coefficients of eq. (1), the first ones of each drift model
+  static constexpr int kEq1 = 7;           ///< coefficients of eq. (1), the first ones of each drift model
+  static constexpr int kOrbitalDrift = 6;  ///< amplitudes of the drift at orbital period
 
   int gyros = 2;
   DriftModelId drift_model{};
@@ -58,12 +61,16 @@ struct Layout {
 
   /// κ of one gyro.
   [[nodiscard]] constexpr int drift_size() const { return drift_modes < 0 ? drift_model.size() : kEq1 + drift_modes; }
-  /// Columns of its drift: κ, then the drift that wanders, then the change of the coefficients of eq. (1).
+  /// Columns of its drift: κ, then the drift that wanders, then the change of the coefficients of eq. (1), then the
+  /// drift at orbital period, sine before cosine.
   [[nodiscard]] constexpr int drift_columns() const {
-    return drift_size() + (further.wandering_drift ? 3 : 0) + (further.coefficient_change ? kEq1 : 0);
+    return orbital_column() + (further.orbital_drift ? kOrbitalDrift : 0);
   }
   [[nodiscard]] constexpr int wandering_column() const { return drift_size(); }
   [[nodiscard]] constexpr int change_column() const { return drift_size() + (further.wandering_drift ? 3 : 0); }
+  [[nodiscard]] constexpr int orbital_column() const {
+    return change_column() + (further.coefficient_change ? kEq1 : 0);
+  }
 
   [[nodiscard]] constexpr int direction(int gyro) const { return direction_size * gyro; }
   [[nodiscard]] constexpr int wandering(int gyro) const { return direction(gyros) + 3 * gyro; }
@@ -71,9 +78,14 @@ struct Layout {
   [[nodiscard]] constexpr int dynamic() const { return wandering(further.wandering_drift ? gyros : 0); }
   [[nodiscard]] constexpr int drift(int gyro) const { return dynamic() + gyro * (drift_size() + 3); }
   [[nodiscard]] constexpr int alignment(int gyro) const { return drift(gyro) + drift_size(); }
+  /// The amplitudes of the drift at orbital period of one gyro. With κ and δ, behind which they are, they have a common
+  /// prior.
+  [[nodiscard]] constexpr int orbital_drift(int gyro) const { return drift(gyros) + kOrbitalDrift * gyro; }
   /// The errors of the direction cosines of one gyro, those that GyroReadout knows; so far the bias alone.
   [[nodiscard]] constexpr int readout_size() const { return further.readout_bias ? 3 : 0; }
-  [[nodiscard]] constexpr int readout(int gyro) const { return drift(gyros) + readout_size() * gyro; }
+  [[nodiscard]] constexpr int readout(int gyro) const {
+    return orbital_drift(further.orbital_drift ? gyros : 0) + readout_size() * gyro;
+  }
   [[nodiscard]] constexpr int readout_bias(int gyro) const { return readout(gyro); }
   [[nodiscard]] constexpr int change(int gyro) const { return readout(gyros) + kEq1 * gyro; }
   /// The first state that the gyros share; those before it are the errors that move an attitude by the gyros.
@@ -94,6 +106,10 @@ struct Layout {
   [[nodiscard]] constexpr int shared_size() const { return size() - shared(); }
   /// κ and δ of all gyros: what calibration.json lists.
   [[nodiscard]] constexpr int parameters() const { return drift(gyros) - dynamic(); }
+  /// With the amplitudes of the drift at orbital period.
+  [[nodiscard]] constexpr int drift_parameters() const { return readout(0) - dynamic(); }
+  /// The first constant behind κ and δ.
+  [[nodiscard]] constexpr int behind_parameters() const { return drift(gyros); }
 
   /// Whether states of this kind are there.
   [[nodiscard]] constexpr bool has(FurtherState state) const;
@@ -137,6 +153,8 @@ inline constexpr std::array<FurtherStateKind, kFurtherStateCount> kFurtherStateK
      1e-4},
     {FurtherState::kCoefficientChange, &FurtherStates::coefficient_change, FurtherStateKind::Owner::kGyro, Layout::kEq1,
      &Layout::change, 1e-7},
+    {FurtherState::kOrbitalDrift, &FurtherStates::orbital_drift, FurtherStateKind::Owner::kGyro, Layout::kOrbitalDrift,
+     &Layout::orbital_drift, 1e-7},
     {FurtherState::kWanderingDrift, &FurtherStates::wandering_drift, FurtherStateKind::Owner::kGyro, 3,
      &Layout::wandering, 0},
 }};

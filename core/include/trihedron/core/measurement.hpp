@@ -109,6 +109,10 @@ void put_drift_columns(const Layout& layout, int gyro, const M& m, Rows&& rows) 
   if (layout.further.coefficient_change) {
     rows.middleCols(layout.change(gyro), Layout::kEq1) = m.middleCols(layout.change_column(), Layout::kEq1);
   }
+  if (layout.further.orbital_drift) {
+    rows.middleCols(layout.orbital_drift(gyro), Layout::kOrbitalDrift) =
+        m.middleCols(layout.orbital_column(), Layout::kOrbitalDrift);
+  }
 }
 
 /// The comparison as rows (H, y) about the states at its time.
@@ -172,6 +176,10 @@ void add_parameter_errors(const Layout& layout, int gyro, const Vector& x, Gyro&
   its.drift_rad_s.head(layout.drift_size()) += x.segment(layout.drift(gyro), layout.drift_size());
   if (layout.further.coefficient_change) {
     its.drift_rad_s.segment(layout.change_column(), Layout::kEq1) += x.segment(layout.change(gyro), Layout::kEq1);
+  }
+  if (layout.further.orbital_drift) {
+    its.drift_rad_s.segment(layout.orbital_column(), Layout::kOrbitalDrift) +=
+        x.segment(layout.orbital_drift(gyro), Layout::kOrbitalDrift);
   }
   its.add_errors(layout, x.segment(layout.readout(gyro), layout.readout_size()));
   its.C_c_b = turned(its.C_c_b, Eigen::Vector3d(x.segment(layout.alignment(gyro), 3)));

@@ -62,11 +62,11 @@ struct Sensitivity {
 };
 
 /// Turns one momentum by its drift over `dt_s`, with attitude and reading of the middle of the step (midpoint rule;
-/// exact for constant ω_in). C_in_c: attitude; h_b: reading, unit; part_of_change: as of DriftModel.
+/// exact for constant ω_in). C_in_c: attitude; h_b: reading, unit.
 template <int Max>
 void precess(GyroModel<Max>& gyro, const DriftModel& drift, const Eigen::Matrix3d& C_in_c, const Eigen::Vector3d& h_b,
-             double part_of_change, double dt_s) {
-  const Eigen::Vector3d omega_b = drift.rate(gyro.corrected(h_b), part_of_change, gyro.drift_rad_s.data());
+             const DriftTime& time, double dt_s) {
+  const Eigen::Vector3d omega_b = drift.rate(gyro.corrected(h_b), time, gyro.drift_rad_s.data());
   const Eigen::Vector3d omega_in = C_in_c * (gyro.C_c_b * omega_b);
   gyro.h_in = rotated<double>(gyro.h_in, omega_in * dt_s).normalized();
 }
@@ -75,10 +75,10 @@ void precess(GyroModel<Max>& gyro, const DriftModel& drift, const Eigen::Matrix3
 /// the momentum made, rad.
 template <int Max>
 Eigen::Vector3d precess(GyroModel<Max>& gyro, Sensitivity<Max>& sensitivity, const DriftModel& drift,
-                        const Eigen::Matrix3d& C_in_c, const Eigen::Vector3d& h_b, double part_of_change, double dt_s) {
+                        const Eigen::Matrix3d& C_in_c, const Eigen::Vector3d& h_b, const DriftTime& time, double dt_s) {
   Columns<Max> columns;
   const int size = drift.columns();
-  drift.basis(gyro.corrected(h_b), part_of_change, columns.view(size));
+  drift.basis(gyro.corrected(h_b), time, columns.view(size));
   const Eigen::Matrix3d dt_C_in_b = dt_s * (C_in_c * gyro.C_c_b);
   const Eigen::Vector3d turn = dt_C_in_b * columns.view(size).times(gyro.drift_rad_s.data());
   gyro.h_in = rotated<double>(gyro.h_in, turn).normalized();
@@ -129,26 +129,26 @@ void precess_two(const PrecessingGyro& a, const PrecessingGyro& b, const Sensiti
 /// precess() of the first `count` gyros.
 template <class Gyros>
 void precess_all(Gyros& gyros, int count, const DriftModel& drift, const Eigen::Matrix3d& C_in_c, const Directions& h_b,
-                 double part_of_change, double dt_s) {
+                 const DriftTime& time, double dt_s) {
   const int in_pairs = drift.columns() == Esg7::kSize ? count - count % 2 : 0;
   for (int k = 0; k < in_pairs; k += 2) {
     precess_two({gyros[k], h_b[k]}, {gyros[k + 1], h_b[k + 1]}, C_in_c, dt_s);
   }
   for (int k = in_pairs; k < count; ++k) {
-    precess(gyros[k], drift, C_in_c, h_b[k], part_of_change, dt_s);
+    precess(gyros[k], drift, C_in_c, h_b[k], time, dt_s);
   }
 }
 /// The same with their sensitivities.
 template <class Gyros, class Sensitivities>
 void precess_all(Gyros& gyros, Sensitivities& since, int count, const DriftModel& drift, const Eigen::Matrix3d& C_in_c,
-                 const Directions& h_b, double part_of_change, double dt_s) {
+                 const Directions& h_b, const DriftTime& time, double dt_s) {
   const int in_pairs = drift.columns() == Esg7::kSize ? count - count % 2 : 0;
   for (int k = 0; k < in_pairs; k += 2) {
     precess_two({gyros[k], h_b[k]}, {gyros[k + 1], h_b[k + 1]}, SensitivityOfEq1(since[k]),
                 SensitivityOfEq1(since[k + 1]), C_in_c, dt_s);
   }
   for (int k = in_pairs; k < count; ++k) {
-    precess(gyros[k], since[k], drift, C_in_c, h_b[k], part_of_change, dt_s);
+    precess(gyros[k], since[k], drift, C_in_c, h_b[k], time, dt_s);
   }
 }
 

@@ -102,6 +102,8 @@ struct CalibrationSetup {
 
   /// The fraction of the change of the coefficients that has taken place at `t`.
   [[nodiscard]] double part_of_change(Time t) const { return change.part(t); }
+  /// Of the drift at `t`; without the phase where the layout has no drift at orbital period.
+  [[nodiscard]] DriftTime drift_time(Time t) const;
 
   [[nodiscard]] Duration max_interpolation() const { return trihedron::max_interpolation(gyro_period); }
   /// How far to both sides of a fix readings are fitted together: at one fix every 3 s no reading is shared. For slow
@@ -139,7 +141,7 @@ template <class Gyros>
 }
 
 /// 1-sigma of one further state before anything is measured, rad, rad/s, s or s/s. `state`: its position, from
-/// layout.readout(0) on.
+/// layout.behind_parameters() on.
 [[nodiscard]] double prior_sigma_of_further_state(const CalibrationSetup& setup, int state);
 
 }  // namespace trihedron

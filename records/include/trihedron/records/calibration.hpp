@@ -17,6 +17,19 @@
 
 namespace trihedron {
 
+/// Drift about the case axes that comes back with each orbit: sine_rad_s sin n(t − zero_at) + cosine_rad_s cos n(t −
+/// zero_at).
+struct OrbitalDrift {
+  Eigen::Vector3d sine_rad_s{0, 0, 0};
+  Eigen::Vector3d cosine_rad_s{0, 0, 0};
+  double rate_rad_s = 0;  ///< n
+  Time zero_at{};         ///< in calibration.json the epoch of the pass
+
+  [[nodiscard]] double phase(Time t) const { return rate_rad_s * to_seconds(t - zero_at); }
+  /// The same drift, told from another time on.
+  [[nodiscard]] OrbitalDrift from(Time zero) const;
+};
+
 /// The parameters of one gyro, and its momentum.
 struct GyroCalibration {
   DriftModelId drift_model;
@@ -24,6 +37,7 @@ struct GyroCalibration {
   Eigen::Vector3d alignment_rotation_vector_rad{0, 0, 0};  ///< Λ: C_c_b = exp([Λ×])
   Eigen::Vector3d momentum_in{0, 0, 0};                    ///< h_in at `t`, unit
   Eigen::Vector3d readout_bias{0, 0, 0};                   ///< of the direction cosines: h_b is read as h_b + bias
+  std::optional<OrbitalDrift> orbital_drift;               ///< where it is estimated
 };
 
 /// A component of a further state.
@@ -73,6 +87,10 @@ struct Calibration {
   /// axes.
   Eigen::MatrixXd covariance;
   std::vector<FurtherEstimate> further;  ///< empty where none was estimated
+  /// Of the amplitudes of the drift at orbital period, gyro by gyro, sine before cosine: a row each, columns about
+  /// `states` and then about these amplitudes. Empty where it is not estimated. In calibration.json it is a part of the
+  /// covariance.
+  Eigen::MatrixXd orbital_drift_covariance;
   /// Of stamps as they are telemetered, at and since `epoch`; what pass.toml says of them is in it. Empty where they
   /// are right.
   std::optional<ClockCorrection> clocks;

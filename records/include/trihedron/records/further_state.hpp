@@ -41,6 +41,9 @@ inline constexpr std::array<std::string_view, 3> kReadoutBias = {"readout_bias_x
 inline constexpr std::array<std::string_view, 7> kCoefficientChange = {
     "k0_change_rad_s",   "mu12_change_rad_s", "mu23_change_rad_s", "mu31_change_rad_s",
     "nu12_change_rad_s", "nu23_change_rad_s", "nu31_change_rad_s"};
+inline constexpr std::array<std::string_view, 6> kOrbitalDrift = {
+    "orbital_drift_sine_x_rad_s",   "orbital_drift_sine_y_rad_s",   "orbital_drift_sine_z_rad_s",
+    "orbital_drift_cosine_x_rad_s", "orbital_drift_cosine_y_rad_s", "orbital_drift_cosine_z_rad_s"};
 }  // namespace further_state_components
 
 /// One row for each kind, in the order of FurtherState.
@@ -57,6 +60,8 @@ inline constexpr std::array<FurtherStateRow, kFurtherStateCount> kFurtherStates 
      Unit::kRadian, further_state_components::kReadoutBias},
     {FurtherState::kCoefficientChange, "coefficient_change", "Change of the coefficients", "of eq. (1), over the pass",
      Unit::kRadianPerSecond, further_state_components::kCoefficientChange},
+    {FurtherState::kOrbitalDrift, "orbital_drift", "Drift at orbital period", "about each case axis, at orbital period",
+     Unit::kRadianPerSecond, further_state_components::kOrbitalDrift},
     {FurtherState::kWanderingDrift,
      "wandering_drift",
      "Drift that wanders",

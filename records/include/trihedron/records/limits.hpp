@@ -78,6 +78,7 @@ inline constexpr Range kChangeTime_s{1, kYear_s, "s", "rotors warm up in an hour
 
 // ---- Calibrations
 
+inline constexpr Range kOrbitalRate_rad_s{-0.01, 0.01, "rad/s", "a low orbit has 1.1e-3"};
 inline constexpr Range kReadoutBias{-0.1, 0.1, "", "it is the error of a direction cosine, which is at most 1"};
 /// Clock offset in seconds, errors of a star tracker in rad, drift in rad/s.
 inline constexpr Range kFurtherState{-1e3, 1e3, "", "no error of a star tracker or gyro is so large"};
