@@ -697,13 +697,14 @@ std::string lines(const Json& array) {
 /// With the drift at orbital period behind the states, as it is told from the epoch.
 Eigen::MatrixXd covariance_of_all(const Calibration& calibration) {
   const Eigen::MatrixXd& orbital = calibration.orbital_drift_covariance;
+  if (orbital.size() == 0) {
+    return calibration.covariance;
+  }
   const Eigen::Index states = calibration.covariance.rows();
   Eigen::MatrixXd all(states + orbital.rows(), states + orbital.rows());
   all.topLeftCorner(states, states) = calibration.covariance;
-  if (orbital.size() > 0) {
-    all.bottomRows(orbital.rows()) = orbital;
-    all.topRightCorner(states, orbital.rows()) = orbital.leftCols(states).transpose();
-  }
+  all.bottomRows(orbital.rows()) = orbital;
+  all.topRightCorner(states, orbital.rows()) = orbital.leftCols(states).transpose();
   return all;
 }
 

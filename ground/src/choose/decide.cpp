@@ -236,16 +236,19 @@ void keep_field(const Trial& trial, Decision& decision) {
   }
 }
 
-/// Compares an error of the star tracker at orbital period with drift that looks like it. `decided`: the trial with
-/// what was decided.
+/// Compares an error of the star tracker at orbital period with drift that looks like it, where there is either, or
+/// drift outside eq. (1) that may be it: a field or, `more_noise`, noise. `decided`: the trial with what was decided.
 void compare_with_drift(const Pass& pass, const Screened& screened, const CalibrationOptions& asked,
-                        const Trial& decided, const Progress& progress, Decision& decision) {
+                        const Trial& decided, bool more_noise, const Progress& progress, Decision& decision) {
   constexpr FurtherState kError = FurtherState::kOrbitalError;
   if (asked.further_states.is_on(FurtherState::kOrbitalDrift) || asked.further_states.is_on(kError)) {
     return;
   }
   if (!decision.options.further_states.is_on(kError)) {
-    decision.orbital_odds = orbital_odds(decided);
+    const bool is_eq1_alone = decision.field && decision.field->log_evidence <= kLogOddsToAccept;
+    if (more_noise || !is_eq1_alone) {
+      decision.orbital_odds = orbital_odds(decided);
+    }
     return;
   }
   begin_stage(progress, "compares errors and drift at orbital period");
@@ -317,7 +320,7 @@ void decide_again_with_more_noise(const Pass& pass, const Screened& screened, co
   keep_field(walked, decision);
   decision.nearby = walked.nearby();
   decision.changes = changes_over(walked);
-  compare_with_drift(pass, screened, asked, walked, progress, decision);
+  compare_with_drift(pass, screened, asked, walked, true, progress, decision);
   if (wandering) {
     decision.evidence.push_back(*wandering);
   }
@@ -405,7 +408,7 @@ Decision decide_by_pass(const Pass& pass, const Screened& screened, const Calibr
     keep_field(decided, decision);
     decision.nearby = decided.nearby();
     decision.changes = changes_over(decided);
-    compare_with_drift(pass, screened, asked, decided, progress, decision);
+    compare_with_drift(pass, screened, asked, decided, false, progress, decision);
   }
   return decision;
 }
@@ -518,8 +521,36 @@ double most_likely_time_s(const Pass& pass, const Screened& screened, const Cali
   return most_likely_course(pass, screened, options, course, near, range_s / 64).time_s;
 }
 
+/// Drift at this period looks like aberration as well.
+Decision without_aberration(Decision decision) {
+  std::erase_if(decision.changes, [](const Change& change) { return change.moving == Moving::kAberration; });
+  return decision;
+}
+
+/// Whether what noise there is beside drift at orbital period is a tenth of it at most. Drift of another kind comes
+/// back with the orbit too, but not as a sine: it leaves noise of its own size, and coefficients told from it would be
+/// too sure.
+bool is_all_that_is_left(const Decision& by_drift) {
+  constexpr double kMost = 0.1;
+  const CalibrationOptions& options = by_drift.options;
+  const Layout& layout = by_drift.nearby->layout;
+  double square = 0;
+  for (int k = 0; k < layout.gyros; ++k) {
+    square += by_drift.nearby->solution.gyros[k]
+                  .drift_rad_s.segment<Layout::kOrbitalDrift>(layout.orbital_column())
+                  .squaredNorm();
+  }
+  const double drift_rad_s = std::sqrt(square / (Layout::kOrbitalDrift * layout.gyros));
+  // A random walk as drift that wanders for as long as the phase takes for a radian.
+  const double walk_rad_s =
+      options.direction_random_walk_rad_sqrt_s * std::sqrt(std::abs(*options.orbital_rate_rad_s) / 2);
+  const bool wanders = options.further_states.is_on(FurtherState::kWanderingDrift);
+  return std::max(walk_rad_s, wanders ? options.further_states.wandering_drift_rad_s : 0) < kMost * drift_rad_s;
+}
+
 /// Decides by the data of the pass, and whether there is drift at orbital period: once more with it where there may be.
-/// Then `asked` has it as well.
+/// Then `asked` has it as well. Where it is not all that is there, but likelier than an error of the star tracker,
+/// there is no such error, and a field and noise stand for the drift.
 Decision decide_on_orbital_drift(const Pass& pass, const Screened& screened, CalibrationOptions& asked,
                                  const DriftModelId& largest_model, const Progress& progress) {
   constexpr FurtherState kError = FurtherState::kOrbitalError;
@@ -537,37 +568,35 @@ Decision decide_on_orbital_drift(const Pass& pass, const Screened& screened, Cal
     return decision;
   }
   const OrbitalOdds odds = *decision.orbital_odds;
-  CalibrationOptions with = asked;
+  CalibrationOptions without_error = asked;
   const bool has_error = decision.options.further_states.is_on(kError);
   if (has_error) {
     decision.orbital_error_over_drift = odds.error - odds.drift;
-    with.further_states[kError] = Choice::kOff;
+    without_error.further_states[kError] = Choice::kOff;
   }
   const double phase = std::abs(*asked.orbital_rate_rad_s) *
                        to_seconds(screened.pass.fixes.back().fix.t - screened.pass.fixes.front().fix.t);
-  const bool is_worth_a_try =
-      is_open ? phase > kLeastPhase && odds.drift > kMayBeThere && odds.drift > odds.error - kMayBeDrift
-              : has_error && odds.drift > odds.error + kLogOddsToAccept;
-  if (!is_worth_a_try) {
-    return decision;
-  }
-  if (is_open) {
+  if (is_open && phase > kLeastPhase && odds.drift > kMayBeThere && odds.drift > odds.error - kMayBeDrift) {
     begin_stage(progress, "looks for drift at orbital period");
+    CalibrationOptions with = without_error;
     with.further_states[kDrift] = Choice::kOn;
+    Decision by_drift = decide_by_pass(pass, screened, with, largest_model, progress);
+    const double gain = by_drift.log_likelihood - decision.log_likelihood;
+    if (gain > kLogOddsToAccept && is_all_that_is_left(by_drift)) {
+      by_drift.evidence.push_back({kDrift, gain, true});
+      by_drift.orbital_error_over_drift = has_error ? std::optional(-gain) : std::nullopt;
+      asked = with;
+      return without_aberration(std::move(by_drift));
+    }
   }
-  Decision by_drift = decide_by_pass(pass, screened, with, largest_model, progress);
-  const double gain = is_open ? by_drift.log_likelihood - decision.log_likelihood : odds.drift - odds.error;
-  if (has_error) {
-    decision.orbital_error_over_drift = by_drift.orbital_error_over_drift = -gain;
-  }
-  if (gain <= kLogOddsToAccept) {
+  if (!has_error || odds.drift < odds.error + kLogOddsToAccept) {
     return decision;
   }
-  by_drift.evidence.push_back({kDrift, gain, is_open});
-  // Drift at this period looks like aberration as well.
-  std::erase_if(by_drift.changes, [](const Change& change) { return change.moving == Moving::kAberration; });
-  asked = with;
-  return by_drift;
+  Decision without = decide_by_pass(pass, screened, without_error, largest_model, progress);
+  without.evidence.push_back({kError, odds.error - odds.drift, false});
+  without.orbital_error_over_drift = odds.error - odds.drift;
+  asked = without_error;
+  return without_aberration(std::move(without));
 }
 
 /// Decides by the data of the pass. `change_is_open`: whether the coefficients may be found to change; then a warm-up

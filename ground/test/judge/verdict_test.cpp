@@ -153,6 +153,22 @@ TEST(Verdict, ForbidsAnErrorAtOrbitalPeriodThatMayBeDrift) {
   EXPECT_FALSE(judge(good_pass(), run).trustworthy);
 }
 
+TEST(Verdict, ForbidsDriftAtOrbitalPeriodThatMayBeAnErrorOfTheStarTracker) {
+  auto run = good_run();
+  const ParameterId amplitude = ParameterId::further(FurtherState::kOrbitalDrift, 1, 4);
+  run.calibration.further = {{amplitude, 1e-9, 1e-9}};
+  EXPECT_THAT(codes(judge(good_pass(), run)), IsEmpty());
+  run.calibration.further = {{amplitude, -4e-8, 1e-9}};
+  const Verdict found = judge(good_pass(), run);
+  ASSERT_THAT(codes(found), ElementsAre("orbital-drift-found"));
+  EXPECT_TRUE(found.trustworthy);
+  EXPECT_THAT(found.findings[0].evidence, HasSubstr("gyro2_orbital_drift_cosine_y_rad_s -4.0e-08 rad/s, 40 sigmas"));
+  run.orbital_error_over_drift = -7;
+  EXPECT_TRUE(judge(good_pass(), run).trustworthy);
+  run.orbital_error_over_drift = -3;
+  EXPECT_FALSE(judge(good_pass(), run).trustworthy);
+}
+
 /// With the coefficient of its first gyro, and its alignment, off by so many sigmas because the coefficients change.
 CalibrationRun with_coefficients_off(double coefficient_sigmas, double alignment_sigmas) {
   auto run = good_run();
