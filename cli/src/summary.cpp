@@ -227,10 +227,14 @@ std::string calibration_text(const CalibrationRun& run, const Eigen::VectorXd& e
     }
   }
   const Statistics& statistics = calibration.statistics;
+  std::size_t width = 24;
   for (const FurtherEstimate& estimate : calibration.further) {
-    fmt::format_to(out, "{}  {:<24} {:>13} {:>12}\n",
+    width = std::max(width, name_of(estimate.parameter).size());
+  }
+  for (const FurtherEstimate& estimate : calibration.further) {
+    fmt::format_to(out, "{}  {:<{}} {:>13} {:>12}\n",
                    &estimate == calibration.further.data() ? "\nFurther states\n" : "", name_of(estimate.parameter),
-                   figure("{:+.4e}", estimate.value), figure("{:.1e}", estimate.sigma));
+                   width, figure("{:+.4e}", estimate.value), figure("{:.1e}", estimate.sigma));
   }
   for (const DriftFieldLevel& level : calibration.drift_field) {
     fmt::format_to(out, "{}  gyro {} {}, degree {}     {:>13} rad/s, to a factor of {:.2g}\n",

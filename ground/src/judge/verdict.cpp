@@ -413,8 +413,9 @@ void judge_orbital_drift(const CalibrationRun& run, std::vector<Finding>& findin
                      "taken for drift. Sigmas do not tell of the error."
                    : "The gyros have drift at orbital period; the calibration has taken account of it.",
       fmt::format(
-          "largest component {} {:.1e} rad/s, {:.0f} sigmas{}", name_of(largest->parameter), largest->value,
-          std::abs(largest->value / largest->sigma),
+          "largest amplitude {:.1e} rad/s, the {} about axis {} of gyro {}, {:.0f} sigmas{}", largest->value,
+          largest->parameter.component < 3 ? "sine" : "cosine", "xyz"[largest->parameter.component % 3],
+          largest -> parameter.gyro() + 1, std::abs(largest->value / largest->sigma),
           over_drift ? fmt::format("; ln of its odds against an error of the star tracker {:+.1f}", -*over_drift) : ""),
       may_be_error
           ? "Look for what follows the orbit: the temperature of the gyros, a magnetic field, or the temperature "

@@ -162,7 +162,8 @@ TEST(Verdict, ForbidsDriftAtOrbitalPeriodThatMayBeAnErrorOfTheStarTracker) {
   const Verdict found = judge(good_pass(), run);
   ASSERT_THAT(codes(found), ElementsAre("orbital-drift-found"));
   EXPECT_TRUE(found.trustworthy);
-  EXPECT_THAT(found.findings[0].evidence, HasSubstr("gyro2_orbital_drift_cosine_y_rad_s -4.0e-08 rad/s, 40 sigmas"));
+  EXPECT_THAT(found.findings[0].evidence,
+              HasSubstr("largest amplitude -4.0e-08 rad/s, the cosine about axis y of gyro 2, 40 sigmas"));
   run.orbital_error_over_drift = -7;
   EXPECT_TRUE(judge(good_pass(), run).trustworthy);
   run.orbital_error_over_drift = -3;
