@@ -82,6 +82,12 @@ class AcmReader {
                                   static_cast<int>(count("DETERMINED_OF", kMost, 0))};
     }
     ignore_sensors();
+    if (optional("ORBITAL_RATE_RAD_S") != nullptr) {
+      for (GyroCalibration& gyro : calibration().gyros) {
+        gyro.orbital_drift = OrbitalDrift{
+            {0, 0, 0}, {0, 0, 0}, number("ORBITAL_RATE_RAD_S", limits::kOrbitalRate_rad_s), calibration().epoch};
+      }
+    }
     take_rest();
     take_covariance();
     // What the message says one by one must fit together as calibration.json must.
@@ -501,6 +507,16 @@ class AcmReader {
     std::ranges::sort(further, {}, [](const auto& one) { return std::pair(one.first.line, one.first.column); });
     for (const auto& [at, estimate] : further) {
       calibration().further.push_back(estimate);
+      if (!estimate.parameter.is_further(FurtherState::kOrbitalDrift)) {
+        continue;
+      }
+      std::optional<OrbitalDrift>& drift = calibration().gyros[estimate.parameter.owner].orbital_drift;
+      if (!drift) {
+        message_.refuse(at, "there is drift at orbital period, and no ORBITAL_RATE_RAD_S",
+                        "give one that export --format acm wrote");
+      }
+      const int component = estimate.parameter.component;
+      (component < 3 ? drift->sine_rad_s : drift->cosine_rad_s)(component % 3) = estimate.value;
     }
   }
 

@@ -331,6 +331,9 @@ class AcmWriter {
         user(fmt::format("{}COSINE_BIAS_{}", owner, letter), number(gyro.readout_bias(axis)));
       }
     }
+    if (const std::optional<OrbitalDrift>& orbital = calibration_.gyros.front().orbital_drift) {
+      user("ORBITAL_RATE_RAD_S", number(orbital->rate_rad_s));
+    }
     for (const FurtherEstimate& further : calibration_.further) {
       state(acm_keyword(name_of(further.parameter)), "", further.value, further.sigma);
     }

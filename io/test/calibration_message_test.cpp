@@ -187,6 +187,16 @@ Calibration full_calibration() {
   calibration.clocks->late_s[1] = 1e-3 / 3;
   calibration.drift_field = {{1, DriftCoefficient::Member::kD, 3, 1e-9 / 3, 1.5},
                              {0, DriftCoefficient::Member::kW, 2, 0, 7}};
+  for (std::size_t k = 0; k < 2; ++k) {
+    OrbitalDrift& drift = calibration.gyros[k].orbital_drift.emplace();
+    drift.rate_rad_s = 1.1e-3 / 3;
+    drift.zero_at = calibration.epoch;
+    for (int i = 0; i < 6; ++i) {
+      const double value = 1e-8 * (i - 2.0 + 4.0 * static_cast<double>(k)) / 3;
+      (i < 3 ? drift.sine_rad_s : drift.cosine_rad_s)(i % 3) = value;
+      calibration.further.push_back({ParameterId::further(FurtherState::kOrbitalDrift, k, i), value, 1e-9 / 3});
+    }
+  }
   calibration.determined = Determined{13, 14};
   calibration.statistics.innovation_rms_rad = {1e-5 / 3, 2e-5, 3e-5, 4e-5 / 7};
   return calibration;
@@ -220,6 +230,15 @@ void expect_same(const Calibration& a, const Calibration& b) {
       expect_near(a.gyros[k].alignment_rotation_vector_rad(axis), b.gyros[k].alignment_rotation_vector_rad(axis));
       expect_near(a.gyros[k].momentum_in(axis), b.gyros[k].momentum_in(axis));
       expect_near(a.gyros[k].readout_bias(axis), b.gyros[k].readout_bias(axis));
+    }
+    ASSERT_EQ(a.gyros[k].orbital_drift.has_value(), b.gyros[k].orbital_drift.has_value());
+    if (a.gyros[k].orbital_drift) {
+      expect_near(a.gyros[k].orbital_drift->rate_rad_s, b.gyros[k].orbital_drift->rate_rad_s);
+      EXPECT_EQ(a.gyros[k].orbital_drift->zero_at, b.gyros[k].orbital_drift->zero_at);
+      for (int axis = 0; axis < 3; ++axis) {
+        expect_near(a.gyros[k].orbital_drift->sine_rad_s(axis), b.gyros[k].orbital_drift->sine_rad_s(axis));
+        expect_near(a.gyros[k].orbital_drift->cosine_rad_s(axis), b.gyros[k].orbital_drift->cosine_rad_s(axis));
+      }
     }
   }
   EXPECT_EQ(a.states, b.states);
@@ -290,6 +309,14 @@ TEST(Acm, ComesBack) {
       }
     }
   }
+}
+
+TEST(Acm, RefusesDriftAtOrbitalPeriodWithoutItsRate) {
+  std::string text = format_acm(full_calibration(), {nullptr, nullptr, "c.nc"}, description(), MessageSyntax::kKvn);
+  const std::size_t begin = text.rfind('\n', text.find("ORBITAL_RATE_RAD_S"));
+  text.erase(begin, text.find('\n', begin + 1) - begin);
+  EXPECT_THAT(refusal([&] { static_cast<void>(parse_calibration_message(text, "c.acm")); }),
+              HasSubstr("no ORBITAL_RATE_RAD_S"));
 }
 
 TEST(Acm, WithoutItsCovarianceFileHasTheSigmas) {
