@@ -92,15 +92,11 @@ TEST(CalibrationJson, NamesTheStartUpWhereItIsKnown) {
 }
 
 TEST(CalibrationJson, HasDriftAtOrbitalPeriodAmongTheStatesOfItsCovariance) {
-  Calibration calibration = sample_calibration();
+  Calibration calibration = sample_with_orbital_drift();
   const Time told_from = calibration.epoch + std::chrono::minutes(7);
   for (GyroCalibration& gyro : calibration.gyros) {
-    gyro.orbital_drift = {{4e-8, -3e-8, 2e-8}, {-2e-8, 3e-8, 5e-8}, 1.1e-3, told_from};
+    gyro.orbital_drift->zero_at = told_from;
   }
-  const Eigen::Index states = calibration.covariance.rows();
-  calibration.orbital_drift_covariance.setZero(12, states + 12);
-  calibration.orbital_drift_covariance.rightCols(12) = 1e-18 * Eigen::MatrixXd::Identity(12, 12);
-  calibration.orbital_drift_covariance(3, 0) = 1e-20;
   const std::string text = format_calibration(calibration);
   const Calibration back = parse_calibration(text, "c.json");
   EXPECT_EQ(back.states, calibration.states);

@@ -178,6 +178,20 @@ Calibration sample_calibration() {
   return calibration;
 }
 
+Calibration sample_with_orbital_drift() {
+  Calibration calibration = sample_calibration();
+  for (std::size_t k = 0; k < calibration.gyros.size(); ++k) {
+    calibration.gyros[k].orbital_drift = {{4e-8, -3e-8, 2e-8}, {-2e-8, 3e-8, 5e-8}, 1.1e-3, calibration.epoch};
+    for (int i = 0; i < Layout::kOrbitalDrift; ++i) {
+      calibration.further.push_back({ParameterId::further(FurtherState::kOrbitalDrift, k, i), 3e-8, 1e-9});
+    }
+  }
+  calibration.orbital_drift_covariance.setZero(12, calibration.covariance.rows() + 12);
+  calibration.orbital_drift_covariance.rightCols(12) = 1e-18 * Eigen::MatrixXd::Identity(12, 12);
+  calibration.orbital_drift_covariance(3, 0) = 1e-20;
+  return calibration;
+}
+
 Defect only(const std::vector<Defect>& defects, Defect::Kind kind) {
   EXPECT_EQ(std::ranges::count(defects, kind, &Defect::kind), 1);
   const auto found = std::ranges::find(defects, kind, &Defect::kind);

@@ -82,6 +82,8 @@ struct RawPass {
 [[nodiscard]] RawPass clean_pass();
 [[nodiscard]] Truth clean_truth();
 [[nodiscard]] Calibration sample_calibration();
+/// With drift at orbital period of both gyros, told from its epoch on, and what it has in common with a coefficient.
+[[nodiscard]] Calibration sample_with_orbital_drift();
 
 /// An OEM of twenty minutes of a round orbit from the epoch of clean_pass() on, in two segments, KVN or XML.
 [[nodiscard]] std::string orbit_message(bool xml);
