@@ -22,6 +22,19 @@ inline Scenario scenario_in_eq1(std::uint64_t seed, Duration duration) {
   return scenario;
 }
 
+/// Another flight with the gyros of this one, that much later.
+inline Scenario with_gyros_of(const Truth& truth, Scenario scenario, Duration later) {
+  scenario.epoch += later;
+  for (std::size_t k = 0; k < scenario.gyros.size(); ++k) {
+    auto& kappa = scenario.gyros[k].drift.kappa_rad_s.emplace();
+    for (std::size_t i = 0; i < kappa.size(); ++i) {
+      kappa[i] = truth.gyros[k].drift_rad_s[i].second;
+    }
+    scenario.gyros[k].misalignment_rad = truth.gyros[k].alignment_rotation_vector_rad;
+  }
+  return scenario;
+}
+
 inline const sim::SimulatedPass& two_hours() {
   static const sim::SimulatedPass simulated = sim::simulate(scenario_in_eq1(5, std::chrono::hours(2)));
   return simulated;

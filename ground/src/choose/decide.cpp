@@ -236,8 +236,9 @@ void keep_field(const Trial& trial, Decision& decision) {
   }
 }
 
-/// Compares an error of the star tracker at orbital period with drift that looks like it, where there is either, or
-/// drift outside eq. (1) that may be it: a field or, `more_noise`, noise. `decided`: the trial with what was decided.
+/// Looks for what comes back with the orbit, an error of the star tracker or drift, where that error was found, or what
+/// may be such drift: a drift field, or more noise than the settings tell (`more_noise`). `decided`: the trial with
+/// what was decided.
 void compare_with_drift(const Pass& pass, const Screened& screened, const CalibrationOptions& asked,
                         const Trial& decided, bool more_noise, const Progress& progress, Decision& decision) {
   constexpr FurtherState kError = FurtherState::kOrbitalError;

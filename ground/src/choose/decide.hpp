@@ -28,7 +28,7 @@ struct Decision {
   std::vector<Forecast> forecasts;          ///< of the drift models that were compared
   std::optional<FieldPrior> field;          ///< where the drift is estimated as one
   std::vector<Change> changes;              ///< what moves during the pass
-  std::optional<OrbitalOdds> orbital_odds;  ///< where it was asked for
+  std::optional<OrbitalOdds> orbital_odds;  ///< where the pass was looked at for them
   /// Where an error of the star tracker at orbital period was accepted: ln of its odds against such drift.
   std::optional<double> orbital_error_over_drift;
   /// Those of the pass with what it shows of the size of members outside eq. (1), for an estimator on board.

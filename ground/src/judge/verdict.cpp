@@ -384,70 +384,77 @@ void judge_change(const CalibrationRun& run, std::vector<Finding>& findings) {
   }
 }
 
-/// ln of the odds from which on an error of the star tracker at orbital period is told from drift at it.
-constexpr double kSureLogOdds = 5;
+/// What is said of states that come back with the orbit.
+struct AtOrbitalPeriod {
+  FurtherState state;
+  FindingCode code;
+  std::string_view found;
+  std::string_view cause;  ///< what to look for
+  std::string_view alike;  ///< that it may be the other
+  std::string_view causes_of_both;
+  std::string_view other;
+};
 
-/// Of the states of a kind that are sure the largest; null where none is.
-const FurtherEstimate* largest_of(const CalibrationRun& run, FurtherState kind) {
-  constexpr double kSigmasToReport = 5;
+constexpr AtOrbitalPeriod kErrorAtOrbitalPeriod = {
+    FurtherState::kOrbitalError,
+    FindingCode::kOrbitalErrorFound,
+    "The star tracker has an error at orbital period; the calibration has taken account of it.",
+    "None needed; look for what warms its mounting.",
+    "The star tracker has an error at orbital period, or the gyros have drift at it: both look alike, and it was taken "
+    "for an error of the star tracker. Sigmas do not tell of drift.",
+    "Look for what follows the orbit: the temperature of the mounting, or that of the gyros, a magnetic field. Where "
+    "the "
+    "star tracker is known to have no such error: orbital_error = \"off\" in [further_states].",
+    "drift at that period"};
+
+constexpr AtOrbitalPeriod kDriftAtOrbitalPeriod = {
+    FurtherState::kOrbitalDrift,
+    FindingCode::kOrbitalDriftFound,
+    "The gyros have drift at orbital period; the calibration has taken account of it.",
+    "None needed; look for what follows the orbit: the temperature of the gyros, a magnetic field.",
+    "The gyros have drift at orbital period, or the star tracker has an error at it: both look alike, and it was taken "
+    "for drift. Sigmas do not tell of the error.",
+    "Look for what follows the orbit: the temperature of the gyros, a magnetic field, or the temperature of the star "
+    "tracker's mounting. Where the gyros are known to have no such drift: orbital_drift = \"off\" in [further_states].",
+    "an error of the star tracker"};
+
+/// The largest of the states of a kind, of those that are so many sigmas; null where none is.
+const FurtherEstimate* largest_of(const CalibrationRun& run, FurtherState kind, double least_sigmas) {
   const FurtherEstimate* largest = nullptr;
   for (const FurtherEstimate& state : run.calibration.further) {
-    const bool is_sure = state.parameter.is_further(kind) && std::abs(state.value) >= kSigmasToReport * state.sigma;
-    if (is_sure && (largest == nullptr || std::abs(state.value) > std::abs(largest->value))) {
+    const bool counts = state.parameter.is_further(kind) && std::abs(state.value) >= least_sigmas * state.sigma;
+    if (counts && (largest == nullptr || std::abs(state.value) > std::abs(largest->value))) {
       largest = &state;
     }
   }
   return largest;
 }
 
-void judge_orbital_drift(const CalibrationRun& run, std::vector<Finding>& findings) {
-  const FurtherEstimate* const largest = largest_of(run, FurtherState::kOrbitalDrift);
+void judge_at_orbital_period(const AtOrbitalPeriod& its, const CalibrationRun& run, std::vector<Finding>& findings) {
+  constexpr double kSureLogOdds = 5;
+  constexpr double kSigmasToReport = 5;
+  const bool is_error = its.state == FurtherState::kOrbitalError;
+  std::optional<double> over_other = run.orbital_error_over_drift;
+  if (over_other && !is_error) {
+    over_other = -*over_other;
+  }
+  const bool may_be_other = over_other && *over_other < kSureLogOdds;
+  // What may be the other is told however small it is: where it is the other, its sigmas mean nothing.
+  const FurtherEstimate* const largest = largest_of(run, its.state, may_be_other ? 0 : kSigmasToReport);
   if (largest == nullptr) {
     return;
   }
-  const std::optional<double>& over_drift = run.orbital_error_over_drift;
-  const bool may_be_error = over_drift && *over_drift > -kSureLogOdds;
-  add(findings, FindingCode::kOrbitalDriftFound,
-      may_be_error ? "The gyros have drift at orbital period, or the star tracker has an error at it: both look alike, "
-                     "and it was "
-                     "taken for drift. Sigmas do not tell of the error."
-                   : "The gyros have drift at orbital period; the calibration has taken account of it.",
-      fmt::format(
-          "largest amplitude {:.1e} rad/s, the {} about axis {} of gyro {}, {:.0f} sigmas{}", largest->value,
-          largest->parameter.component < 3 ? "sine" : "cosine", "xyz"[largest->parameter.component % 3],
-          largest -> parameter.gyro() + 1, std::abs(largest->value / largest->sigma),
-          over_drift ? fmt::format("; ln of its odds against an error of the star tracker {:+.1f}", -*over_drift) : ""),
-      may_be_error
-          ? "Look for what follows the orbit: the temperature of the gyros, a magnetic field, or the temperature "
-            "of the star tracker's mounting. Where the gyros are known to have no such drift: orbital_drift = "
-            "\"off\" in [further_states]."
-          : "None needed; look for what follows the orbit: the temperature of the gyros, a magnetic field.");
-  if (may_be_error) {
-    findings.back().severity = Severity::kDoNotUse;
-  }
-}
-
-void judge_star_tracker_errors(const CalibrationRun& run, std::vector<Finding>& findings) {
-  const FurtherEstimate* const largest = largest_of(run, FurtherState::kOrbitalError);
-  if (largest == nullptr) {
-    return;
-  }
-  const std::optional<double>& over_drift = run.orbital_error_over_drift;
-  const bool may_be_drift = over_drift && *over_drift < kSureLogOdds;
-  add(findings, FindingCode::kOrbitalErrorFound,
-      may_be_drift
-          ? "The star tracker has an error at orbital period, or the gyros have drift at it: both look alike, and "
-            "it was taken for an error of the star tracker. Sigmas do not tell of drift."
-          : "The star tracker has an error at orbital period; the calibration has taken account of it.",
-      fmt::format("largest component {:.1f}″, {:.0f} sigmas{}", largest->value / kArcsecond,
-                  std::abs(largest->value / largest->sigma),
-                  over_drift ? fmt::format("; ln of its odds against drift at that period {:+.1f}", *over_drift) : ""),
-      may_be_drift
-          ? "Look for what follows the orbit: the temperature of the mounting, or that of the gyros, a magnetic "
-            "field. Where the star tracker is known to have no such error: orbital_error = \"off\" in "
-            "[further_states]."
-          : "None needed; look for what warms its mounting.");
-  if (may_be_drift) {
+  const ParameterId& parameter = largest->parameter;
+  const std::string size = is_error ? fmt::format("largest component {:.1f}″", largest->value / kArcsecond)
+                                    : fmt::format("largest amplitude {:.1e} rad/s, the {} about axis {} of gyro {}",
+                                                  largest->value, parameter.component < 3 ? "sine" : "cosine",
+                                                  "xyz"[parameter.component % 3], parameter.gyro() + 1);
+  const std::string odds =
+      over_other ? fmt::format("; ln of its odds against {} {:+.1f}", its.other, *over_other) : std::string();
+  add(findings, its.code, std::string(may_be_other ? its.alike : its.found),
+      fmt::format("{}, {:.0f} sigmas{}", size, std::abs(largest->value / largest->sigma), odds),
+      std::string(may_be_other ? its.causes_of_both : its.cause));
+  if (may_be_other) {
     findings.back().severity = Severity::kDoNotUse;
   }
 }
@@ -788,8 +795,8 @@ Verdict judge(const Pass& pass, const CalibrationRun& run) {
   judge_changes(run, findings);
   judge_halves(run, findings);
   judge_clocks(pass, run, findings);
-  judge_star_tracker_errors(run, findings);
-  judge_orbital_drift(run, findings);
+  judge_at_orbital_period(kErrorAtOrbitalPeriod, run, findings);
+  judge_at_orbital_period(kDriftAtOrbitalPeriod, run, findings);
   judge_determination(run, findings);
   judge_prior_sigmas(pass, run, findings);
   judge_steadiness(pass, run, findings);

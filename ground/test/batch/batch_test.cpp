@@ -514,7 +514,7 @@ TEST(PassProblem, CarriesErrorsAlongAsTheFlightCodeDoes) {
     const auto near = [](const auto& a, const auto& b, double size) { return (a - b).norm() <= 1.5e-4 * size; };
     const double turned_rad = angle_between<double>(solution.arcs[0].h_in[0], gyros[0].h_in);
     const double since_s = to_seconds(moment.t - screened.samples.t(0));
-    const int columns = layout.drift_columns();
+    const int columns = layout.drift_columns();  // the norm is over all of them
     for (int k = 0; k < 2; ++k) {
       const Sensitivity<kMaxDriftColumns>& its = moment.since[k];
       EXPECT_TRUE(near(moment.gyros[k].h_in, gyros[k].h_in, 0.1));

@@ -119,16 +119,8 @@ TEST(Calibrate, OnBoardTheDriftFieldIsItsLargeMembersWhichMakeUpForTheOthers) {
 TEST(Calibrate, ADriftFieldIsThePriorOfEitherEstimator) {
   const sim::SimulatedPass first = sim::simulate(with_drift_outside(5, std::chrono::hours(4)));
   const Calibration before = calibrate(first.pass, with_drift_open(Estimator::kBatch)).calibration;
-  Scenario scenario = with_drift_outside(6, std::chrono::hours(2));
-  scenario.epoch += std::chrono::hours(24);
-  for (std::size_t k = 0; k < scenario.gyros.size(); ++k) {
-    auto& kappa = scenario.gyros[k].drift.kappa_rad_s.emplace();
-    for (std::size_t i = 0; i < kappa.size(); ++i) {
-      kappa[i] = first.truth.gyros[k].drift_rad_s[i].second;
-    }
-    scenario.gyros[k].misalignment_rad = first.truth.gyros[k].alignment_rotation_vector_rad;
-  }
-  sim::SimulatedPass next = sim::simulate(scenario);
+  sim::SimulatedPass next =
+      sim::simulate(with_gyros_of(first.truth, with_drift_outside(6, std::chrono::hours(2)), std::chrono::hours(24)));
   next.pass.settings.prior = before;
   for (const Estimator estimator : {Estimator::kBatch, Estimator::kInvariant}) {
     const Calibration after = calibrate(next.pass, with_drift_open(estimator)).calibration;
@@ -529,16 +521,8 @@ TEST(Calibrate, CarriesDriftAtOrbitalPeriodOnToAnotherPass) {
   };
   add(first);
   // Another flight, at another phase of the orbit.
-  Scenario scenario = scenario_in_eq1(7, std::chrono::hours(3));
-  scenario.epoch += std::chrono::minutes(437);
-  for (std::size_t k = 0; k < scenario.gyros.size(); ++k) {
-    auto& kappa = scenario.gyros[k].drift.kappa_rad_s.emplace();
-    for (std::size_t i = 0; i < kappa.size(); ++i) {
-      kappa[i] = first.truth.gyros[k].drift_rad_s[i].second;
-    }
-    scenario.gyros[k].misalignment_rad = first.truth.gyros[k].alignment_rotation_vector_rad;
-  }
-  sim::SimulatedPass next = sim::simulate(scenario);
+  sim::SimulatedPass next =
+      sim::simulate(with_gyros_of(first.truth, scenario_in_eq1(7, std::chrono::hours(3)), std::chrono::minutes(437)));
   add(next);
   CalibrationOptions options = told();
   options.orbital_rate_rad_s = kOrbitalRate_rad_s;
@@ -574,7 +558,7 @@ TEST(Calibrate, CarriesDriftAtOrbitalPeriodOnToAnotherPass) {
     const Eigen::Vector3d last_sigma_rad = errors.sigma_rad.back();
     EXPECT_LT(errors.error_rad.back().cwiseQuotient(last_sigma_rad).cwiseAbs().maxCoeff(), 4);
     EXPECT_LT(last_sigma_rad.maxCoeff(), kArcminute);
-    // Without what the estimates have in common it would know less.
+    // Without what the estimates have in common it would know less, here by an eighth.
     one_fix.settings.prior->orbital_drift_covariance.resize(0, 0);
     const NavigationRun apart = navigate(one_fix, open_loop);
     EXPECT_GT(apart.attitude.sigma_rad.back().maxCoeff(), 1.08 * last_sigma_rad.maxCoeff());

@@ -24,16 +24,7 @@ using testing::Not;
 
 /// A pass `later` than two_hours(), with the gyros as `truth` has them.
 Scenario with_gyros_of(const Truth& truth, std::uint64_t seed, Duration later) {
-  Scenario scenario = scenario_in_eq1(seed, hours(2));
-  scenario.epoch += later;
-  for (std::size_t k = 0; k < scenario.gyros.size(); ++k) {
-    auto& kappa = scenario.gyros[k].drift.kappa_rad_s.emplace();
-    for (std::size_t i = 0; i < kappa.size(); ++i) {
-      kappa[i] = truth.gyros[k].drift_rad_s[i].second;
-    }
-    scenario.gyros[k].misalignment_rad = truth.gyros[k].alignment_rotation_vector_rad;
-  }
-  return scenario;
+  return ground::with_gyros_of(truth, scenario_in_eq1(seed, hours(2)), later);
 }
 
 const sim::SimulatedPass& of_the_same_start_up() {

@@ -224,17 +224,22 @@ TEST(Constancy, NamesInertialAxesThatJump) {
 }
 
 TEST(OrbitalOdds, TellAnErrorOfTheStarTrackerFromDrift) {
-  const auto over_drift = [](const Pass& pass) {
+  const auto odds_of = [](const Pass& pass) {
     CalibrationOptions options = told();
     options.estimator = Estimator::kBatch;
     options.drift_model = kEsg7;
     options.orbital_rate_rad_s = orbital_rate_rad_s(pass.star_tracker);
     const Screened screened = screen(pass, options);
-    const OrbitalOdds odds = orbital_odds(Trial(pass, screened, options));
+    return orbital_odds(Trial(pass, screened, options));
+  };
+  const auto over_drift = [&](const Pass& pass) {
+    const OrbitalOdds odds = odds_of(pass);
     return odds.error - odds.drift;
   };
   Scenario scenario = scenario_in_eq1(6, std::chrono::hours(3));
   const sim::SimulatedPass quiet = sim::simulate(scenario);
+  EXPECT_LT(odds_of(quiet.pass).drift, -10);  // from there on it is worth a try
+  EXPECT_LT(odds_of(quiet.pass).error, 0);
   Pass drifting = quiet.pass;
   add_orbital_drift(quiet.truth, {4e-8, -3e-8, 2e-8}, {-2e-8, 3e-8, 5e-8}, 0, drifting.gyro);
   add_orbital_drift(quiet.truth, {-3e-8, 5e-8, 1e-8}, {4e-8, 2e-8, -3e-8}, 1, drifting.gyro);

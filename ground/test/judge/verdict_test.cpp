@@ -155,9 +155,14 @@ TEST(Verdict, ForbidsAnErrorAtOrbitalPeriodThatMayBeDrift) {
 
 TEST(Verdict, ForbidsDriftAtOrbitalPeriodThatMayBeAnErrorOfTheStarTracker) {
   auto run = good_run();
+  run.options.further_states[FurtherState::kOrbitalDrift] = FurtherStateOptions::Choice::kOn;
   const ParameterId amplitude = ParameterId::further(FurtherState::kOrbitalDrift, 1, 4);
   run.calibration.further = {{amplitude, 1e-9, 1e-9}};
   EXPECT_THAT(codes(judge(good_pass(), run)), IsEmpty());
+  run.orbital_error_over_drift = -3;  // what may be the other is told however small it is
+  EXPECT_THAT(codes(judge(good_pass(), run)), ElementsAre("orbital-drift-found"));
+  EXPECT_FALSE(judge(good_pass(), run).trustworthy);
+  run.orbital_error_over_drift.reset();
   run.calibration.further = {{amplitude, -4e-8, 1e-9}};
   const Verdict found = judge(good_pass(), run);
   ASSERT_THAT(codes(found), ElementsAre("orbital-drift-found"));
