@@ -113,8 +113,8 @@ bool has_field(const Calibration& calibration) {
   return model.family == DriftModelId::Family::kVsh && model.degree > DriftModelId::kMaxDegreeOnBoard;
 }
 
-/// Throws SetupError where the earlier calibration is of other gyros, or of another drift model; of one with a drift
-/// field a smaller model takes a part.
+/// Throws SetupError where the earlier calibration is of other gyros, or has drift that the estimator has not: another
+/// model, or drift at orbital period for estimator paper. Of one with a drift field a smaller model takes a part.
 void refuse_prior_of_others(const PassSettings& settings, const CalibrationOptions& asked) {
   const std::optional<Calibration>& prior = settings.prior;
   if (!prior) {
@@ -135,6 +135,12 @@ void refuse_prior_of_others(const PassSettings& settings, const CalibrationOptio
                        "use a calibration made with the same drift model");
     }
     refuse_incomplete(gyro);
+    if (asked.estimator == Estimator::kPaper && gyro.orbital_drift) {
+      throw SetupError(
+          fmt::format("the earlier calibration of gyro {} has drift at orbital period; estimator paper has none",
+                      k + 1),
+          "use estimator invariant, or an earlier calibration with orbital_drift off");
+    }
   }
 }
 

@@ -457,6 +457,13 @@ TEST(SetupError, NamesWhatIsWrongWithAnEarlierCalibration) {
   pass.settings.prior = good;
   pass.settings.prior->covariance.setZero();
   EXPECT_THAT(setup_error(pass), HasSubstr("positive definite"));
+  pass.settings.prior = good;
+  pass.settings.prior->gyros[1].orbital_drift.emplace();
+  CalibrationOptions paper;
+  paper.estimator = Estimator::kPaper;
+  EXPECT_THROW(static_cast<void>(navigate(pass, paper)), SetupError);
+  pass.settings.prior->gyros[1].orbital_drift.reset();
+  EXPECT_NO_THROW(static_cast<void>(navigate(pass, paper)));
 }
 
 TEST(Calibrate, DecidesByItselfForClockOffsetAndErrorAtOrbitalPeriod) {
