@@ -7,7 +7,7 @@
 #include <algorithm>
 #include <cmath>
 #include <fstream>
-#include <iterator>
+#include <sstream>
 
 #include "trihedron/core/drift.hpp"
 #include "trihedron/io/time_scale.hpp"
@@ -62,8 +62,9 @@ void write_text(const fs::path& file, std::string_view text) {
 }
 
 std::string read_text(const fs::path& file) {
-  std::ifstream stream(file, std::ios::binary);
-  return {std::istreambuf_iterator<char>(stream), {}};
+  std::ostringstream text;
+  text << std::ifstream(file, std::ios::binary).rdbuf();
+  return std::move(text).str();
 }
 
 std::string RawTable::csv() const {
