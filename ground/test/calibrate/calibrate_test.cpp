@@ -158,7 +158,7 @@ TEST(Calibrate, RecordsEveryFixAndSample) {
   EXPECT_EQ(run.fixes.size(), two_hours().pass.star_tracker.size());
   EXPECT_EQ(run.samples[SampleStatus::kUsed], static_cast<long>(two_hours().pass.gyro.size()));
   EXPECT_EQ(run.fix_counts[FixStatus::kUsed], static_cast<long>(run.fixes.size()) - 1);
-  EXPECT_EQ(run.parameters.t.size(), (run.fixes.size() + 3) / 4);  // each fourth is 12 s after the last
+  EXPECT_EQ(run.parameters.t.size(), (run.fixes.size() + 9) / 10);  // each tenth is 30 s after the last
   EXPECT_EQ(run.attitude.size(), run.fixes.size());
   EXPECT_EQ(run.navigation.age_s.size(), run.fixes.size());
   EXPECT_GE(run.angle_t.size(), run.fixes.size() - 1);

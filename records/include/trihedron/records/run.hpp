@@ -38,7 +38,7 @@ struct FixRecord {
 /// Estimates along the pass, for the figures of the paper: rows after used fixes, those nearer than kStep to the last
 /// one left out; columns as in Calibration::states.
 struct ParameterHistory {
-  static constexpr Duration kStep = std::chrono::seconds(10);
+  static constexpr Duration kStep = std::chrono::seconds(30);
   std::vector<Time> t;
   std::vector<std::vector<double>> value;  ///< [row][state]; alignment as rotation vector, rad; drift rad/s
   std::vector<std::vector<double>> sigma;
