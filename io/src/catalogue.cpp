@@ -100,13 +100,14 @@ void distrust(SQLite::Database& database) {
 /// Refuses one with a write-ahead log before SQLite looks into it: even a reader then leaves files beside it. Asked of
 /// SQLite's own descriptor, because the lock of this process goes when any other of the file is closed.
 void expect_no_log(SQLite::Database& database, const fs::path& file) {
-  constexpr std::size_t kWriteVersion = 18;  // the database file format, section 1.3; 1 is the rollback journal
+  // The database file format, section 1.3; 1 is the rollback journal. SQLite goes by this byte alone, whatever the
+  // version to write by, before it, says.
   constexpr std::size_t kReadVersion = 19;
   std::array<unsigned char, 100> header{};
   sqlite3_file* open_file = nullptr;
   sqlite3_file_control(database.getHandle(), "main", SQLITE_FCNTL_FILE_POINTER, static_cast<void*>(&open_file));
   const int status = open_file->pMethods->xRead(open_file, header.data(), static_cast<int>(header.size()), 0);
-  if (status == SQLITE_OK && header[kWriteVersion] == 2 && header[kReadVersion] == 2) {
+  if (status == SQLITE_OK && header[kReadVersion] == 2) {
     throw InputRefused(file, {}, "keeps a write-ahead log, as no catalogue does",
                        "give it to sqlite3 with \"PRAGMA journal_mode = DELETE\"");
   }
