@@ -44,6 +44,9 @@ for name in ${*:-program tests sanitizers flight lint mpi python}; do
   if [ "$name" = program ]; then program_wanted=yes; fi
 done
 
+# One at a time, where several are asked for beside each other: apt-get does not wait.
+exec 9<cmake/setup.sh
+flock 9
 missing=()
 for package in "${packages[@]}"; do
   dpkg-query -W -f '${db:Status-Status}' "$package" 2>/dev/null | grep -qx installed || missing+=("$package")
