@@ -196,6 +196,15 @@ def tracker_moves(rotation_vector_of):
     return edit
 
 
+def tracker_off_at_times(part, size_rad):
+    """This part of the fixes, drawn one by one, is off about one axis across the boresight."""
+    def edit(telemetry, random):
+        angle = random.uniform(0, 2 * math.pi)
+        off = exponential((size_rad * math.cos(angle), size_rad * math.sin(angle), 0))
+        telemetry.fixes(lambda t_s, q: product(q, off) if random.random() < part else q)
+    return edit
+
+
 def tracker_wanders(sigma_rad, time_s):
     """A fix is C_in_c exp([e×]), each component of e a Gauss–Markov process."""
     def edit(telemetry, random):
@@ -335,6 +344,8 @@ WORLDS = [
     World("tracker-slip-20", "faults", constant(SLEWS), tracker_moves(lambda t, axis: scaled(axis, 20 * ARCSECOND if t > PASS_S / 2 else 0)), faults=("star-tracker-moved",)),
     World("tracker-ramp-60", "faults", constant(SLEWS), tracker_moves(lambda t, axis: scaled(axis, 60 * ARCSECOND * t / PASS_S)), faults=("star-tracker-moved",)),
     World("tracker-wanders-5", "faults", constant(SLEWS), tracker_wanders(5 * ARCSECOND, 600), faults=("star-tracker-wanders",)),
+    World("one-sided-errors", "faults", constant(SLEWS), tracker_off_at_times(0.1, 12 * ARCSECOND), faults=("star-tracker-errors-not-normal",)),
+    World("two-heads-mixed", "faults", constant(SLEWS), tracker_off_at_times(0.5, 10 * ARCSECOND), faults=("star-tracker-errors-not-normal",)),
     World("gyro-case-step-20", "faults", constant(SLEWS), case_steps(20 * ARCSECOND), faults=("gyro-mounting-moved",)),
     World("gyro-case-step-60", "faults", constant(SLEWS), case_steps(60 * ARCSECOND), faults=("gyro-mounting-moved",)),
     World("gyro-spikes", "faults", constant(SLEWS), spikes(0.01, math.radians(1))),

@@ -16,6 +16,7 @@
 #include "judge/clocks.hpp"
 #include "judge/drift_left.hpp"
 #include "judge/need.hpp"
+#include "judge/shape_of_errors.hpp"
 #include "judge/whiteness.hpp"
 #include "model/orbital_rate.hpp"
 #include "trihedron/core/directions_fit.hpp"
@@ -283,6 +284,40 @@ void judge_whiteness(const Pass& pass, const CalibrationRun& run, std::vector<Fi
           fmt::format("amplitude up to {:.2f} sigma; twice the power {:.0f} of {} degrees of freedom", line.amplitude,
                       2 * line.power, line.degrees_of_freedom),
           kCure);
+    }
+  }
+}
+
+/// Skewness and kurtosis below these limits do little harm, however significant; symmetric and normal errors have less
+/// than so many of their standard deviations.
+constexpr double kLopsided = 0.25;
+constexpr double kTwoHeaps = 0.25;
+constexpr double kShapeByChance = 6;
+
+void judge_shape_of_errors(const Pass& pass, const CalibrationRun& run, std::vector<Finding>& findings) {
+  for (int head = 0; head <= static_cast<int>(pass.further_star_trackers.size()); ++head) {
+    const std::optional<ShapeOfErrors> shape = shape_of_errors(run.fixes, head);
+    if (!shape) {
+      continue;
+    }
+    const auto fixes = static_cast<double>(shape->fixes);
+    const std::string name =
+        pass.further_star_trackers.empty() ? "the star tracker" : fmt::format("star tracker {}", head + 1);
+    if (shape->skewness > std::max(kLopsided, kShapeByChance * shape->skewness_sigma)) {
+      add(findings, FindingCode::kStarTrackerErrorsNotNormal,
+          fmt::format("The errors of {} lie more to one side than to the other, as outliers too small to be rejected "
+                      "make them. Alignments are found by their mean, which is farther off than the sigmas say.",
+                      name),
+          fmt::format("skewness {:.2f} of {} fixes, of normal errors 0; mean and median {} apart", shape->skewness,
+                      shape->fixes, angle_text(shape->mean_off_median_rad.norm())),
+          "Find what makes these errors, as stray light or wrong stars, and leave such fixes out.");
+    } else if (shape->least_kurtosis < -std::max(kTwoHeaps, kShapeByChance * std::sqrt(24 / fixes))) {
+      add(findings, FindingCode::kStarTrackerErrorsNotNormal,
+          fmt::format("The errors of {} lie in two heaps, as those of two star trackers that are not aligned to each "
+                      "other: which of them is right, the pass does not tell.",
+                      name),
+          fmt::format("kurtosis {:.2f} of {} fixes, of normal errors 0", shape->least_kurtosis, shape->fixes),
+          "Give the fixes of each star tracker in a file of its own.");
     }
   }
 }
@@ -789,6 +824,7 @@ Verdict judge(const Pass& pass, const CalibrationRun& run) {
   judge_noise(pass, run, findings);
   judge_readout_noise(run.readout_noise, findings);
   judge_whiteness(pass, run, findings);
+  judge_shape_of_errors(pass, run, findings);
   judge_drift_left(pass, run, findings);
   judge_drift_model(run, findings);
   judge_change(run, findings);

@@ -191,17 +191,23 @@ double Pipeline::squared_distance_from_prior() const {
   return moved.dot(program_->prior.covariance.topLeftCorner(size, size).llt().solve(moved));
 }
 
-OpenLoopEnd Pipeline::compare(const AttitudeSolution& attitude, const ComparedFix& its) const {
-  return program_->visit([&](const auto& on_board) {
+Eigen::Vector3d Pipeline::apart_rad(const AttitudeSolution& attitude, const ComparedFix& its) const {
+  return program_->visit([&](const auto& on_board) -> Eigen::Vector3d {
     const auto& estimator = on_board.estimator();
     Rot<In, C> by_fix = Rot<In, C>::assume(its.fix.q_in_c.normalized());
     if constexpr (requires { estimator.shared(); }) {
       by_fix =
           corrected(its.fix, fix_by_shared_states(estimator.setup(), its.fix, its.readings.rate_c), estimator.shared());
     }
-    const Eigen::Vector3d apart_rad = (by_fix.inverse() * attitude.C_in_c).log().raw();
-    const Eigen::Matrix3d covariance = attitude.covariance_rad2 + fix_noise(estimator.setup(), its.fix);
-    return OpenLoopEnd{its.fix.t, apart_rad.norm(), apart_rad.dot(covariance.llt().solve(apart_rad))};
+    return (attitude.C_in_c.inverse() * by_fix).log().raw();
+  });
+}
+
+OpenLoopEnd Pipeline::compare(const AttitudeSolution& attitude, const ComparedFix& its) const {
+  return program_->visit([&](const auto& on_board) {
+    const Eigen::Vector3d apart = apart_rad(attitude, its);
+    const Eigen::Matrix3d covariance = attitude.covariance_rad2 + fix_noise(on_board.estimator().setup(), its.fix);
+    return OpenLoopEnd{its.fix.t, apart.norm(), apart.dot(covariance.llt().solve(apart))};
   });
 }
 

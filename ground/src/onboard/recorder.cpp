@@ -139,7 +139,10 @@ void Recorder::add(const StepReport& report, const Pipeline& pipeline) {
 }
 
 void Recorder::add_fix(const StepReport& report, const Pipeline& pipeline) {
-  run_.fixes.push_back(record_of(report, pipeline.layout().gyros));
+  FixRecord& fix = run_.fixes.emplace_back(record_of(report, pipeline.layout().gyros));
+  if (report.navigated && report.compared) {
+    fix.off_navigator_rad = pipeline.apart_rad(*report.navigated, *report.compared);
+  }
   corrected_ = report.corrected ? report.fix.t : corrected_;
   ParameterHistory& parameters = run_.parameters;
   if (report.fix.used() && (parameters.t.empty() || report.fix.t - parameters.t.back() >= ParameterHistory::kStep)) {

@@ -31,6 +31,9 @@ struct FixRecord {
   int degrees_of_freedom = 0;  ///< of the NIS: two per gyro that could be used
   bool jumped = false;         ///< its misfit came at once and is more than drift can make
   bool corrected_navigator = false;
+  /// Rotation vector from the attitude of the open-loop navigator to that of the fix, c axes, rad; where both are
+  /// there.
+  std::optional<Eigen::Vector3d> off_navigator_rad;
 
   [[nodiscard]] bool used() const { return is_used(status); }
 };

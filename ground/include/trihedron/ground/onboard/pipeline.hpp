@@ -62,6 +62,9 @@ class Pipeline {
 
   /// Open-loop attitude at the latest sample; nothing where there is none yet.
   [[nodiscard]] std::optional<AttitudeSolution> navigation_attitude() const;
+  /// Rotation vector from an attitude at the time of a fix to that of the fix, c axes, rad; the fix as the states that
+  /// the gyros share correct it.
+  [[nodiscard]] Eigen::Vector3d apart_rad(const AttitudeSolution& attitude, const ComparedFix& its) const;
   /// How far an attitude at the time of a fix of the first star tracker is off that fix, by the angle and by both
   /// covariances.
   [[nodiscard]] OpenLoopEnd compare(const AttitudeSolution& attitude, const ComparedFix& its) const;
