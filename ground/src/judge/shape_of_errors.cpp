@@ -69,7 +69,7 @@ Eigen::Matrix3Xd from_fix_to_fix(const std::vector<Eigen::Matrix3Xd>& off) {
   return quick.leftCols(kept);
 }
 
-/// Evenly over half a sphere, 5° from each other: a golden spiral.
+/// Evenly over half a sphere, some 7° from each other: a golden spiral.
 std::vector<Eigen::Vector3d> directions() {
   constexpr int kCount = 400;
   std::vector<Eigen::Vector3d> found;
