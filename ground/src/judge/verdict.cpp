@@ -438,8 +438,7 @@ constexpr AtOrbitalPeriod kErrorAtOrbitalPeriod = {
     "The star tracker has an error at orbital period, or the gyros have drift at it: both look alike, and it was taken "
     "for an error of the star tracker. Sigmas do not tell of drift.",
     "Look for what follows the orbit: the temperature of the mounting, or that of the gyros, a magnetic field. Where "
-    "the "
-    "star tracker is known to have no such error: orbital_error = \"off\" in [further_states].",
+    "the star tracker is known to have no such error: orbital_error = \"off\" in [further_states].",
     "drift at that period"};
 
 constexpr AtOrbitalPeriod kDriftAtOrbitalPeriod = {
