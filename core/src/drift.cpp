@@ -33,7 +33,8 @@ DriftModel::DriftModel(DriftModelId id, const FurtherStates& further)
     : harmonics_(max_degree_of(id)),
       wandering_(further.wandering_drift),
       change_(further.coefficient_change),
-      orbital_(further.orbital_drift) {
+      orbital_(further.orbital_drift),
+      polhode_(further.polhode) {
   size_ = 0;
   for (int number = 0; number < Esg7::kSize; ++number) {
     members_[static_cast<std::size_t>(size_++)] = DriftCoefficient::of_eq1(number);
@@ -107,6 +108,13 @@ void DriftModel::basis(const Eigen::Vector3d& h, const DriftTime& time, ColumnsV
       B.set_column(column + i, time.orbital_sine * Eigen::Vector3d::Unit(i));
       B.set_column(column + 3 + i, time.orbital_cosine * Eigen::Vector3d::Unit(i));
     }
+    column += Layout::kOrbitalDrift;
+  }
+  if (polhode_) {
+    for (int i = 0; i < Esg7::kSize; ++i) {
+      B.set_column(column + i, time.polhode_sine * eq1.col(i));
+      B.set_column(column + Esg7::kSize + i, time.polhode_cosine * eq1.col(i));
+    }
   }
   B.pad();
 }
@@ -128,6 +136,11 @@ Eigen::Vector3d DriftModel::rate(const Eigen::Vector3d& h, const DriftTime& time
   if (orbital_) {
     beside += time.orbital_sine * Eigen::Map<const Vector3d>(coefficients + column) +
               time.orbital_cosine * Eigen::Map<const Vector3d>(coefficients + column + 3);
+    column += Layout::kOrbitalDrift;
+  }
+  if (polhode_) {
+    kappa += time.polhode_sine * Eigen::Map<const Eq1>(coefficients + column) +
+             time.polhode_cosine * Eigen::Map<const Eq1>(coefficients + column + Esg7::kSize);
   }
   Vector3d rate = Esg7::rate<double>(h, kappa) + beside;
   if (size_ > Esg7::kSize) {

@@ -143,12 +143,8 @@ void InvariantEstimator<kCapacity>::propagate(const PerGyro<double, kCapacity.gy
     A_inverse.template block<3, 3>(row, row) = to_start;
     B.block(row, layout.drift(k) - d, 3, layout.drift_size()) = by_drift.leftCols(layout.drift_size());
     B.template block<3, 3>(row, layout.alignment(k) - d) = since.by_alignment;
-    if (layout.further.coefficient_change) {
-      B.block(row, layout.change(k) - d, 3, Layout::kEq1) = by_drift.middleCols(layout.change_column(), Layout::kEq1);
-    }
-    if (layout.further.orbital_drift) {
-      B.block(row, layout.orbital_drift(k) - d, 3, Layout::kOrbitalDrift) =
-          by_drift.middleCols(layout.orbital_column(), Layout::kOrbitalDrift);
+    for (const Layout::Block& its : layout.beside_kappa(k)) {
+      B.block(row, its.state - d, 3, its.size) = by_drift.middleCols(its.column, its.size);
     }
     noise.template segment<3>(row).setConstant(noise_rad[k]);
     if (layout.further.wandering_drift) {
@@ -225,8 +221,8 @@ bool InvariantEstimator<kCapacity>::prior_allows_estimates() const {
 
 template <Capacity kCapacity>
 void InvariantEstimator<kCapacity>::predict(const Eigen::Matrix3d& C_in_c, const Directions& h_b, Time t, double dt_s) {
-  const DriftTime time = setup_.drift_time(t - from_seconds(dt_s / 2));
-  precess_all(gyros_, since_fix_, layout().gyros, drift_, C_in_c, h_b, time, dt_s);
+  const DriftTimes times = setup_.drift_times(t - from_seconds(dt_s / 2));
+  precess_all(gyros_, since_fix_, layout().gyros, drift_, C_in_c, h_b, times, dt_s);
   time_since_fix_s_ += dt_s;
   gate_.elapse(dt_s);
 }

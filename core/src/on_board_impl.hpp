@@ -852,8 +852,8 @@ template <class Estimator>
 void Navigator<Estimator>::predict(const Estimator& estimator, const Eigen::Matrix3d& C_in_c, const Directions& h_b,
                                    Time t, double dt_s, State& state) {
   const Layout& layout = estimator.layout();
-  const DriftTime time = estimator.setup().drift_time(t - from_seconds(dt_s / 2));
-  precess_all(state.gyros, layout.gyros, estimator.drift(), C_in_c, h_b, time, dt_s);
+  const DriftTimes times = estimator.setup().drift_times(t - from_seconds(dt_s / 2));
+  precess_all(state.gyros, layout.gyros, estimator.drift(), C_in_c, h_b, times, dt_s);
   for (int k = 0; layout.further.wandering_drift && k < layout.gyros; ++k) {
     state.gyros[k].drift_rad_s.template segment<3>(layout.wandering_column()) *=
         elementary::exp(-dt_s / estimator.setup().wandering_drift.time_s);

@@ -195,6 +195,21 @@ double CourseOfChange::mean_part(Time from, Time to) const {
   return std::clamp(after_s / to_seconds(to - from), 0.0, 1.0) - since_begin(zero_at);
 }
 
+double Polhode::angle_rad(double since_s) const {
+  const auto period = static_cast<double>(period_s);
+  const auto rate = static_cast<double>(period_rate);
+  // ∫ dt / period = ln(1 + x) / rate, x the relative change of the period; ln(1 + x) = 2 artanh z, z = x / (2 + x).
+  const double x = std::clamp(rate * since_s / period, -0.5, 1.0);
+  const double changing_s = rate == 0 ? since_s : x * period / rate;
+  const double z = x / (2 + x);
+  double series = 0;
+  for (int n = 33; n > 0; n -= 2) {
+    series = series * z * z + 1.0 / n;
+  }
+  const double turns = changing_s * 2 / (2 + x) * series / period + (since_s - changing_s) / (period * (1 + x));
+  return 2 * std::numbers::pi * turns;
+}
+
 double missed_by_long_step_rad(double drift_rad, const Eigen::Vector3d& from, const Eigen::Vector3d& to, double dt_s) {
   const double turn_rad = dt_s < kQuarterOrbit_s ? angle_between<double>(from, to) : std::numbers::pi;
   return drift_rad * turn_rad;

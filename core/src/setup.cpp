@@ -23,6 +23,8 @@ bool is_usable(const CourseOfChange& change) {
   return positive(change.duration_s) && (change.kind == CourseOfChange::Kind::kEven || positive(change.time_s));
 }
 
+bool is_usable(const Polhode& polhode) { return positive(static_cast<double>(polhode.period_s)) && std::isfinite(polhode.period_rate); }
+
 bool noise_is_usable(const CalibrationSetup& setup) {
   for (int k = 0; k < setup.layout.gyros; ++k) {
     if (!(setup.readout_noise_rad[k] > 0 && setup.readout_noise_rad[k] < 1)) {
@@ -46,6 +48,11 @@ bool further_states_are_usable(const CalibrationSetup& setup) {
       (further.coefficient_change && !is_usable(setup.change)) ||
       ((further.orbital_error || further.orbital_drift) && !std::isfinite(setup.orbital_rate_rad_s))) {
     return false;
+  }
+  for (int k = 0; further.polhode && k < setup.layout.gyros; ++k) {
+    if (!is_usable(setup.polhodes[k])) {
+      return false;
+    }
   }
   for (int state = setup.layout.behind_parameters(); state < setup.layout.size(); ++state) {
     if (!positive(prior_sigma_of_further_state(setup, state))) {
@@ -76,14 +83,26 @@ Duration max_interpolation(Duration gyro_period) {
   return std::max(kLeast, gyro_period * 5 / 2);
 }
 
-DriftTime CalibrationSetup::drift_time(Time t) const {
-  DriftTime time{part_of_change(t)};
+DriftTimes CalibrationSetup::drift_times(Time t) const {
+  DriftTime common;
+  if (layout.further.coefficient_change) {
+    common.part_of_change = part_of_change(t);
+  }
   if (layout.further.orbital_drift) {
     const double phase = orbital_rate_rad_s * to_seconds(t - orbital_phase_zero);
-    time.orbital_sine = elementary::sin(phase);
-    time.orbital_cosine = elementary::cos(phase);
+    common.orbital_sine = elementary::sin(phase);
+    common.orbital_cosine = elementary::cos(phase);
   }
-  return time;
+  DriftTimes times;
+  for (int k = 0; k < layout.gyros; ++k) {
+    times[k] = common;
+    if (layout.further.polhode) {
+      const double angle = polhodes[k].angle_rad(to_seconds(t - orbital_phase_zero));
+      times[k].polhode_sine = elementary::sin(angle);
+      times[k].polhode_cosine = elementary::cos(angle);
+    }
+  }
+  return times;
 }
 
 Duration CalibrationSetup::reach() const {

@@ -112,12 +112,12 @@ Mission::Mission(const MissionPlan& plan) : given(plan.layout) {
       break;
     }
     const Eigen::Matrix3d middle = attitude(t_s + plan.gyro_period_s / 2);
-    const DriftTime time = setup.drift_time(Time(from_seconds(t_s + plan.gyro_period_s / 2)));
+    const DriftTimes times = setup.drift_times(Time(from_seconds(t_s + plan.gyro_period_s / 2)));
     const double kept = setup.wandering_drift.kept(plan.gyro_period_s);
     for (int k = 0; k < layout.gyros; ++k) {
       auto& gyro = truth[k];
       precess(gyro, drift, middle,
-              Eigen::Vector3d(gyro.C_c_b.transpose() * middle.transpose() * gyro.h_in) + gyro.readout_bias, time,
+              Eigen::Vector3d(gyro.C_c_b.transpose() * middle.transpose() * gyro.h_in) + gyro.readout_bias, times[k],
               plan.gyro_period_s);
       if (layout.further.wandering_drift) {
         auto its = gyro.drift_rad_s.segment<3>(layout.wandering_column());

@@ -386,6 +386,11 @@ class AcmReader {
         gyro.readout_bias(axis) = number(bias, limits::kReadoutBias);
       }
     }
+    if (const std::string period = owner + "POLHODE_PERIOD_S"; optional(period) != nullptr) {
+      const double period_s = number(period, limits::kPolhodePeriod_s);
+      const double rate = number(owner + "POLHODE_PERIOD_RATE", limits::kPolhodePeriodRate);
+      gyro.polhode = PolhodeDrift{{static_cast<float>(period_s), static_cast<float>(rate)}, calibration().epoch};
+    }
     if (!(std::abs(gyro.momentum_in.norm() - 1) <= 1e-6)) {
       message_.refuse(needed(owner + "MOMENTUM_IN_X").at, fmt::format("{}MOMENTUM_IN is not a unit vector", owner),
                       "repair its components");
@@ -507,6 +512,15 @@ class AcmReader {
     std::ranges::sort(further, {}, [](const auto& one) { return std::pair(one.first.line, one.first.column); });
     for (const auto& [at, estimate] : further) {
       calibration().further.push_back(estimate);
+      const int component = estimate.parameter.component;
+      if (estimate.parameter.is_further(FurtherState::kPolhode)) {
+        std::optional<PolhodeDrift>& drift = calibration().gyros[estimate.parameter.owner].polhode;
+        if (!drift) {
+          message_.refuse(at, "there are coefficients that come and go with a polhode, and no POLHODE_PERIOD_S",
+                          "give one that export --format acm wrote");
+        }
+        (component < Layout::kEq1 ? drift->sine_rad_s : drift->cosine_rad_s)(component % Layout::kEq1) = estimate.value;
+      }
       if (!estimate.parameter.is_further(FurtherState::kOrbitalDrift)) {
         continue;
       }
@@ -515,7 +529,6 @@ class AcmReader {
         message_.refuse(at, "there is drift at orbital period, and no ORBITAL_RATE_RAD_S",
                         "give one that export --format acm wrote");
       }
-      const int component = estimate.parameter.component;
       (component < 3 ? drift->sine_rad_s : drift->cosine_rad_s)(component % 3) = estimate.value;
     }
   }

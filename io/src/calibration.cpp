@@ -78,8 +78,32 @@ Members orbital_drift_members(OrbitalDrift& drift) {
            [&drift](const JsonNode& node) { drift.rate_rad_s = node.number(limits::kOrbitalRate_rad_s); }}};
 }
 
+using OfEq1 = Esg7::Coefficients<double>;
+
+Member eq1_member(std::string_view key, OfEq1& target) {
+  return {key, "by coefficient of eq. (1)", object_of({}, number_schema(limits::kDrift_rad_s)),
+          [&target](const JsonNode& node) {
+            for (int i = 0; i < Esg7::kSize; ++i) {
+              target(i) = node.at(name_of(DriftCoefficient::of_eq1(i))).number(limits::kDrift_rad_s);
+            }
+          }};
+}
+
+/// A number that is kept as float.
+Member float_member(std::string_view key, float& target, const Range& range, std::string_view about) {
+  return {key, about, number_schema(range),
+          [&target, range](const JsonNode& node) { target = static_cast<float>(node.number(range)); }};
+}
+
+Members polhode_members(PolhodeDrift& drift) {
+  return {float_member("period_s", drift.polhode.period_s, limits::kPolhodePeriod_s, "at the epoch, where its angle is 0"),
+          float_member("period_rate", drift.polhode.period_rate, limits::kPolhodePeriodRate, "seconds per second"),
+          eq1_member("sine_rad_s", drift.sine_rad_s), eq1_member("cosine_rad_s", drift.cosine_rad_s)};
+}
+
 Members gyro_members(GyroCalibration& gyro) {
   OrbitalDrift orbital;
+  PolhodeDrift polhode;
   return {
       {"drift_model", "of eq. (1) or beyond it", drift_model_schema(),
        [&gyro](const JsonNode& node) { gyro.drift_model = parse_drift_model(node); }},
@@ -92,6 +116,9 @@ Members gyro_members(GyroCalibration& gyro) {
       optional_member(
           {"orbital_drift", "drift that comes back with each orbit", schema_of(orbital_drift_members(orbital)),
            [&gyro](const JsonNode& node) { read_members(node, orbital_drift_members(gyro.orbital_drift.emplace())); }}),
+      optional_member(
+          {"polhode", "coefficients that come and go with the polhode of the rotor", schema_of(polhode_members(polhode)),
+           [&gyro](const JsonNode& node) { read_members(node, polhode_members(gyro.polhode.emplace())); }}),
       {"momentum_in", "its direction at t_s, a unit vector", three_of(number_schema()),
        [&gyro](const JsonNode& node) { gyro.momentum_in = parse_momentum(node); }}};
 }
@@ -146,16 +173,21 @@ Eigen::MatrixXd parse_matrix(const JsonNode& node, std::size_t size) {
   return matrix;
 }
 
-/// Names, among the states of the covariance, of the amplitudes of the drift at orbital period of all gyros that have
-/// it.
-std::vector<std::string> orbital_drift_of(const Calibration& calibration) {
+/// Names, among the states of the covariance, of the amplitudes of drift that comes back, of all gyros that have it.
+std::vector<std::string> amplitudes_of(const Calibration& calibration) {
   std::vector<std::string> amplitudes;
-  for (std::size_t k = 0; k < calibration.gyros.size(); ++k) {
-    for (const std::string_view component : further_state_components::kOrbitalDrift) {
-      if (calibration.gyros[k].orbital_drift) {
+  const auto add = [&](std::size_t k, bool is_there, std::span<const std::string_view> components) {
+    for (const std::string_view component : components) {
+      if (is_there) {
         amplitudes.push_back(fmt::format("gyro{}.{}", k + 1, component));
       }
     }
+  };
+  for (std::size_t k = 0; k < calibration.gyros.size(); ++k) {
+    add(k, calibration.gyros[k].orbital_drift.has_value(), further_state_components::kOrbitalDrift);
+  }
+  for (std::size_t k = 0; k < calibration.gyros.size(); ++k) {
+    add(k, calibration.gyros[k].polhode.has_value(), further_state_components::kPolhode);
   }
   return amplitudes;
 }
@@ -171,7 +203,7 @@ const Range& range_of_sigma(const ParameterId& state) {
 void read_matrix(const JsonNode& node, const std::vector<std::string>& names, Calibration& calibration) {
   const Eigen::MatrixXd matrix = parse_matrix(node, names.size());
   std::vector<Eigen::Index> rows;
-  std::vector<Eigen::Index> orbital;
+  std::vector<Eigen::Index> amplitudes;
   for (std::size_t i = 0; i < names.size(); ++i) {
     const std::optional<ParameterId> state = parameter_named(names[i]);
     if (state) {
@@ -180,22 +212,22 @@ void read_matrix(const JsonNode& node, const std::vector<std::string>& names, Ca
     }
   }
   std::string missing;
-  for (const std::string& amplitude : orbital_drift_of(calibration)) {
+  for (const std::string& amplitude : amplitudes_of(calibration)) {
     const auto row = std::ranges::find(names, amplitude) - names.begin();
     if (row < std::ssize(names)) {
-      orbital.push_back(row);
+      amplitudes.push_back(row);
     } else {
       missing = amplitude;
     }
   }
-  if (!orbital.empty() && !missing.empty()) {
+  if (!amplitudes.empty() && !missing.empty()) {
     node.refuse(fmt::format("has no row of {}", in_quotes(missing)), "this is no whole covariance: calibrate again");
   }
   calibration.covariance = matrix(rows, rows);
-  calibration.orbital_drift_covariance.resize(std::ssize(orbital),
-                                              orbital.empty() ? 0 : std::ssize(rows) + std::ssize(orbital));
-  if (!orbital.empty()) {
-    calibration.orbital_drift_covariance << matrix(orbital, rows), matrix(orbital, orbital);
+  calibration.amplitude_covariance.resize(std::ssize(amplitudes),
+                                          amplitudes.empty() ? 0 : std::ssize(rows) + std::ssize(amplitudes));
+  if (!amplitudes.empty()) {
+    calibration.amplitude_covariance << matrix(amplitudes, rows), matrix(amplitudes, amplitudes);
   }
   for (Eigen::Index i = 0; i < calibration.covariance.rows(); ++i) {
     const Range& range = range_of_sigma(calibration.states[static_cast<std::size_t>(i)]);
@@ -317,6 +349,20 @@ Json gyro_json(const GyroCalibration& gyro, Time epoch) {
     json["orbital_drift"] = {{"sine_rad_s", to_json_array(orbital.sine_rad_s)},
                              {"cosine_rad_s", to_json_array(orbital.cosine_rad_s)},
                              {"rate_rad_s", orbital.rate_rad_s}};
+  }
+  if (gyro.polhode) {
+    const PolhodeDrift its = gyro.polhode->from(epoch);
+    const auto by_name = [](const OfEq1& coefficients) {
+      Json all = Json::object();
+      for (int i = 0; i < Esg7::kSize; ++i) {
+        all[name_of(DriftCoefficient::of_eq1(i))] = coefficients(i);
+      }
+      return all;
+    };
+    json["polhode"] = {{"period_s", its.polhode.period_s},
+                       {"period_rate", its.polhode.period_rate},
+                       {"sine_rad_s", by_name(its.sine_rad_s)},
+                       {"cosine_rad_s", by_name(its.cosine_rad_s)}};
   }
   return json;
 }
@@ -587,6 +633,12 @@ void read_gyros(const JsonNode& node, Calibration& calibration) {
     if (gyro.orbital_drift) {
       gyro.orbital_drift->zero_at = calibration.epoch;
     }
+    if (gyro.polhode.has_value() != calibration.gyros.front().polhode.has_value()) {
+      node.refuse("has coefficients that come and go with the polhode of some gyros alone", "give it to all gyros, or to none");
+    }
+    if (gyro.polhode) {
+      gyro.polhode->zero_at = calibration.epoch;
+    }
   }
 }
 
@@ -694,17 +746,17 @@ std::string lines(const Json& array) {
   return "[" + text + "]";
 }
 
-/// With the drift at orbital period behind the states, as it is told from the epoch.
+/// With the amplitudes of drift that comes back behind the states, as it is told from the epoch.
 Eigen::MatrixXd covariance_of_all(const Calibration& calibration) {
-  const Eigen::MatrixXd& orbital = calibration.orbital_drift_covariance;
-  if (orbital.size() == 0) {
+  const Eigen::MatrixXd& amplitudes = calibration.amplitude_covariance;
+  if (amplitudes.size() == 0) {
     return calibration.covariance;
   }
   const Eigen::Index states = calibration.covariance.rows();
-  Eigen::MatrixXd all(states + orbital.rows(), states + orbital.rows());
+  Eigen::MatrixXd all(states + amplitudes.rows(), states + amplitudes.rows());
   all.topLeftCorner(states, states) = calibration.covariance;
-  all.bottomRows(orbital.rows()) = orbital;
-  all.topRightCorner(states, orbital.rows()) = orbital.leftCols(states).transpose();
+  all.bottomRows(amplitudes.rows()) = amplitudes;
+  all.topRightCorner(states, amplitudes.rows()) = amplitudes.leftCols(states).transpose();
   return all;
 }
 
@@ -749,8 +801,8 @@ std::string format_calibration(const Calibration& calibration) {
   for (const ParameterId& state : calibration.states) {
     states.push_back(name_of(state));
   }
-  if (calibration.orbital_drift_covariance.size() > 0) {
-    for (const std::string& amplitude : orbital_drift_of(calibration)) {
+  if (calibration.amplitude_covariance.size() > 0) {
+    for (const std::string& amplitude : amplitudes_of(calibration)) {
       states.push_back(amplitude);
     }
   }

@@ -330,6 +330,10 @@ class AcmWriter {
         user(fmt::format("{}MOMENTUM_IN_{}", owner, letter), number(gyro.momentum_in(axis)));
         user(fmt::format("{}COSINE_BIAS_{}", owner, letter), number(gyro.readout_bias(axis)));
       }
+      if (gyro.polhode) {
+        user(owner + "POLHODE_PERIOD_S", number(static_cast<double>(gyro.polhode->polhode.period_s)));
+        user(owner + "POLHODE_PERIOD_RATE", number(static_cast<double>(gyro.polhode->polhode.period_rate)));
+      }
     }
     if (const std::optional<OrbitalDrift>& orbital = calibration_.gyros.front().orbital_drift) {
       user("ORBITAL_RATE_RAD_S", number(orbital->rate_rad_s));

@@ -28,6 +28,8 @@ constexpr std::string_view kNoNeed = "none";
 constexpr std::string_view kWanderingTime = "wandering_time";
 constexpr std::string_view kChangeCourse = "change_course";
 constexpr std::string_view kChangeTime = "change_time";
+constexpr std::string_view kPolhodePeriod = "polhode_period";
+constexpr std::string_view kPolhodePeriodRate = "polhode_period_rate";
 
 using Choice = FurtherStateOptions::Choice;
 constexpr std::array<std::pair<std::string_view, Choice>, 3> kChoices = {
@@ -134,6 +136,49 @@ Field wandering_drift(const FurtherStateRow& row, FurtherStateOptions& states) {
           }};
 }
 
+/// One value for each gyro; the last one is that of all further ones as well.
+template <class Read>
+void read_for_each_gyro(const TomlTable& table, const toml::node& node, std::string_view key, const Read& read) {
+  const toml::array* const values = node.as_array();
+  if (values == nullptr || values->empty() || values->size() > kMaxGyros) {
+    table.refuse(node, fmt::format("\"{}\" is no list of one to {} values", key, kMaxGyros),
+                 "give one for each gyro, or one for all");
+  }
+  for (int k = 0; k < kMaxGyros; ++k) {
+    read(k, (*values)[std::min(static_cast<std::size_t>(k), values->size() - 1)]);
+  }
+}
+
+Fields polhode_fields(FurtherStateOptions& states) {
+  return {{kPolhodePeriod, "of the polhode of each rotor, at the epoch of the pass",
+           [] { return array_of(quantity_schema(kDuration)); },
+           [&states](const TomlTable& table, const toml::node& node) {
+             read_for_each_gyro(table, node, kPolhodePeriod, [&](int k, const toml::node& value) {
+               const std::string given = quantity_text(table, value, kPolhodePeriod);
+               const Duration period = within(limits::kPolhodePeriod_s, parse_duration(given), given);
+               states.polhodes[k].period_s = static_cast<float>(to_seconds(period));
+             });
+           }},
+          {kPolhodePeriodRate, "seconds per second by which the period of each grows",
+           [] { return array_of(number_schema(limits::kPolhodePeriodRate)); },
+           [&states](const TomlTable& table, const toml::node& node) {
+             read_for_each_gyro(table, node, kPolhodePeriodRate, [&](int k, const toml::node& value) {
+               states.polhodes[k].period_rate =
+                   static_cast<float>(table.number(value, kPolhodePeriodRate, limits::kPolhodePeriodRate));
+             });
+           }}};
+}
+
+/// Of all gyros, as read_for_each_gyro() takes them.
+template <class Text>
+std::string for_each_gyro(const Text& text) {
+  std::string all;
+  for (int k = 0; k < kMaxGyros; ++k) {
+    all += fmt::format("{}{}", k == 0 ? "" : ", ", text(k));
+  }
+  return fmt::format("[{}]", all);
+}
+
 Fields further_state_fields(FurtherStateOptions& states) {
   Fields fields;
   for (const FurtherStateRow& row : kFurtherStates) {
@@ -150,7 +195,7 @@ Fields further_state_fields(FurtherStateOptions& states) {
                                                 {kCourses.begin(), kCourses.end()}));
   fields.push_back(duration(kChangeTime, states.change_time, limits::kChangeTime_s,
                             "of a warm-up, until 1/e of it is left; of a jump, from the epoch of the pass on"));
-  return fields;
+  return std::move(fields) + polhode_fields(states);
 }
 
 Fields correction_fields(CorrectionOptions& corrections) {
@@ -281,6 +326,11 @@ std::string format_config(const CalibrationOptions& options) {
   out.word(kWanderingTime, format_duration(states.wandering_time));
   out.word(kChangeCourse, word_of(kCourses, states.change_course));
   out.word(kChangeTime, format_duration(states.change_time));
+  out.number(kPolhodePeriod, for_each_gyro([&](int k) {
+               const auto period_s = static_cast<double>(states.polhodes[k].period_s);
+               return fmt::format("\"{}\"", format_duration(from_seconds(period_s)));
+             }));
+  out.number(kPolhodePeriodRate, for_each_gyro([&](int k) { return fmt::format("{}", states.polhodes[k].period_rate); }));
 
   out.section("corrections");
   out.word("interval", format_correction_interval(options.corrections));

@@ -42,9 +42,9 @@ void refuse_what_has_no_room(const PassSettings& settings) {
       throw SetupError("the prior has a bias of the readouts, which the on-board application has not",
                        "use an earlier calibration with readout_bias off");
     }
-    if (settings.prior->gyros[k].orbital_drift) {
-      throw SetupError("the prior has drift at orbital period, which the on-board application has not",
-                       "use an earlier calibration with orbital_drift off");
+    if (settings.prior->gyros[k].orbital_drift || settings.prior->gyros[k].polhode) {
+      throw SetupError("the prior has drift that comes back, which the on-board application has not",
+                       "use an earlier calibration with orbital_drift and polhode off");
     }
   }
 }

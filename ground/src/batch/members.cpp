@@ -92,7 +92,7 @@ Calibration calibration_of(const PassProblem& problem, const KappaAndDelta& para
   const Layout& layout = problem.setup().on_board.layout;
   Calibration calibration;
   for (int k = 0; k < layout.gyros; ++k) {
-    calibration.gyros.push_back(record_of(parameters.gyros[k], problem.setup().on_board, 0));
+    calibration.gyros.push_back(record_of(parameters.gyros[k], k, problem.setup().on_board, 0));
   }
   calibration.states = drift_and_alignment(layout.drift_model, static_cast<std::size_t>(layout.gyros));
   calibration.covariance = parameters.covariance;

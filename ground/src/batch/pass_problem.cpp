@@ -286,8 +286,10 @@ void PassProblem::step(const Node& from_node, const Node& to_node, const Drift& 
   const double dt_s = to_seconds(dt);
   const Reading from = reading_at(from_node);
   const Reading to = reading_at(to_node);
-  DriftTime time = setup_.on_board.drift_time(from_node.t + dt / 2);
-  time.part_of_change = setup_.on_board.change.mean_part(from_node.t, to_node.t);
+  DriftTimes times = setup_.on_board.drift_times(from_node.t + dt / 2);
+  for (DriftTime& time : times) {
+    time.part_of_change = setup_.on_board.change.mean_part(from_node.t, to_node.t);
+  }
   moment.t = to_node.t;
   // Gyros that can be used at both ends; where those are too few, at its end.
   const GyroMask at_both = both(from.used, to.used);
@@ -299,7 +301,7 @@ void PassProblem::step(const Node& from_node, const Node& to_node, const Drift& 
   Directions omega_b = {};
   for (int k = 0; k < gyros_; ++k) {
     const Gyro& gyro = moment.gyros[k];
-    omega_b[k] = rate_of(drift.rotors[k], gyro, gyro.corrected(middle[k]), time, columns);
+    omega_b[k] = rate_of(drift.rotors[k], gyro, gyro.corrected(middle[k]), times[k], columns);
   }
   // The momenta in the middle of the step; those at its begin would be half a step of drift behind.
   const Directions seen_c = in_c(moment.gyros, gyros_, middle);
@@ -327,7 +329,7 @@ void PassProblem::step(const Node& from_node, const Node& to_node, const Drift& 
     Gyro& gyro = moment.gyros[k];
     if (!used[k]) {  // its momentum turns all the same: what it would read at the attitude of the others
       middle[k] = gyro.reading_of(C_in_c.transpose() * gyro.h_in);
-      omega_b[k] = rate_of(drift.rotors[k], gyro, gyro.corrected(middle[k]), time, columns);
+      omega_b[k] = rate_of(drift.rotors[k], gyro, gyro.corrected(middle[k]), times[k], columns);
     }
     const Vector3d reading = gyro.corrected(middle[k]);
     const Matrix3d dt_C_in_b = dt_s * (C_in_c * gyro.C_c_b);
@@ -335,7 +337,7 @@ void PassProblem::step(const Node& from_node, const Node& to_node, const Drift& 
     gyro.h_in = rotated<double>(gyro.h_in, turned).normalized();
     if (drift.sensitive != nullptr) {
       Columns<kMaxDriftColumns> basis;
-      drift.sensitive->basis(reading, time, basis.view(drift.sensitive->columns()));
+      drift.sensitive->basis(reading, times[k], basis.view(drift.sensitive->columns()));
       moment.since[k].advance(basis.view(drift.sensitive->columns()), C_in_c, dt_C_in_b, turned);
     }
     if (to_node.after_gap) {
@@ -623,7 +625,7 @@ MatrixXd PassProblem::prior_covariance() const {
   }
   const MatrixXd& given = setup_.prior.covariance;
   const MatrixXd of_parameters = parameters_by_parameters(layout_, setup_.layout(), amplitudes);
-  const Index beside = given.cols() - of_parameters.cols();  // amplitudes of the drift at orbital period
+  const Index beside = given.cols() - of_parameters.cols();  // amplitudes of drift that comes back
   MatrixXd map = MatrixXd::Zero(of_parameters.rows() + beside, given.cols());
   map.topLeftCorner(of_parameters.rows(), of_parameters.cols()) = of_parameters;
   map.bottomRightCorner(beside, beside).setIdentity();
@@ -648,12 +650,10 @@ void PassProblem::add_prior(const PassSolution& solution, Linear& linear) const 
     apart.segment<3>(layout_.alignment(k)) =
         Rot<C, C>::assume(Matrix3d(prior.C_c_b * gyro.C_c_b.transpose())).log().raw();
     apart.segment(layout_.readout(k), layout_.readout_size()) = prior.errors(layout_) - gyro.errors(layout_);
-    if (layout_.further.coefficient_change) {
-      apart.segment<Layout::kEq1>(layout_.change(k)) = drift.segment<Layout::kEq1>(setup.layout.change_column());
-    }
-    if (layout_.further.orbital_drift) {
-      apart.segment<Layout::kOrbitalDrift>(layout_.orbital_drift(k)) =
-          drift.segment<Layout::kOrbitalDrift>(setup.layout.orbital_column());
+    const auto its_columns = setup.layout.beside_kappa(k);
+    const auto its_states = layout_.beside_kappa(k);
+    for (std::size_t i = 0; i < its_states.size(); ++i) {
+      apart.segment(its_states[i].state, its_states[i].size) = drift.segment(its_columns[i].column, its_states[i].size);
     }
   }
   apart.tail(solution.shared.size()) = -solution.shared;

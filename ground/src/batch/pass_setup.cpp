@@ -41,13 +41,11 @@ PassSolution first_solution(const PassProblem& problem, const Nearby& nearby) {
         gyros[k].drift_rad_s(static_cast<Eigen::Index>(i)) = gyro.drift_rad_s(same - its.begin());
       }
     }
-    if (from.further.coefficient_change && to.further.coefficient_change) {
-      gyros[k].drift_rad_s.segment<Layout::kEq1>(to.change_column()) =
-          gyro.drift_rad_s.segment<Layout::kEq1>(from.change_column());
-    }
-    if (from.further.orbital_drift && to.further.orbital_drift) {
-      gyros[k].drift_rad_s.segment<Layout::kOrbitalDrift>(to.orbital_column()) =
-          gyro.drift_rad_s.segment<Layout::kOrbitalDrift>(from.orbital_column());
+    const auto here = to.beside_kappa(k);
+    const auto there = from.beside_kappa(k);
+    for (std::size_t i = 0; i < here.size(); ++i) {
+      const int size = std::min(here[i].size, there[i].size);
+      gyros[k].drift_rad_s.segment(here[i].column, size) = gyro.drift_rad_s.segment(there[i].column, size);
     }
     if (to.further.readout_bias) {
       gyros[k].readout_bias = gyro.readout_bias;

@@ -258,7 +258,7 @@ void Refinement::put_into(CalibrationRun& run) && {
     GyroCalibration& gyro = calibration.gyros[static_cast<std::size_t>(k)];
     const Eigen::Vector3d momentum_in = gyro.momentum_in;
     gyro =
-        record_of(parameters.gyros[k], problem_.setup().on_board, 0);  // the coefficients stand for the end of the pass
+        record_of(parameters.gyros[k], k, problem_.setup().on_board, 0);  // the coefficients stand for the end of the pass
     gyro.momentum_in = momentum_in;
   }
   calibration.estimator = Estimator::kBatch;

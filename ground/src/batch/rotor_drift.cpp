@@ -21,9 +21,13 @@ RotorDrift::RotorDrift(const DriftModel& model, const double* coefficients) {
   if (model.orbital_column() > model.change_column()) {
     change_ = Eigen::Map<const Esg7::Coefficients<double>>(coefficients + model.change_column());
   }
-  if (model.columns() > model.orbital_column()) {
+  if (model.polhode_column() > model.orbital_column()) {
     orbital_sine_ = Eigen::Map<const Vector3d>(coefficients + model.orbital_column());
     orbital_cosine_ = Eigen::Map<const Vector3d>(coefficients + model.orbital_column() + 3);
+  }
+  if (model.columns() > model.polhode_column()) {
+    polhode_sine_ = Eigen::Map<const Esg7::Coefficients<double>>(coefficients + model.polhode_column());
+    polhode_cosine_ = Eigen::Map<const Esg7::Coefficients<double>>(coefficients + model.polhode_column() + Esg7::kSize);
   }
   for (int i = Esg7::kSize; i < model.size(); ++i) {
     const DriftCoefficient& its = model.member(i);
@@ -51,8 +55,10 @@ void RotorDrift::add(DriftCoefficient::Member potential, int degree, int order, 
 }
 
 Vector3d RotorDrift::rate(const Vector3d& h, const DriftTime& time) const {
-  Vector3d rate = Esg7::rate<double>(h, eq1_ + time.part_of_change * change_) + time.orbital_sine * orbital_sine_ +
-                  time.orbital_cosine * orbital_cosine_;
+  const Esg7::Coefficients<double> eq1 = eq1_ + time.part_of_change * change_ + time.polhode_sine * polhode_sine_ +
+                                         time.polhode_cosine * polhode_cosine_;
+  Vector3d rate =
+      Esg7::rate<double>(h, eq1) + time.orbital_sine * orbital_sine_ + time.orbital_cosine * orbital_cosine_;
   if (cube_d_ != 0) {
     rate += cube_d_ * h.cross(h.cwiseProduct(h).cwiseProduct(h));
   }

@@ -32,6 +32,8 @@ class RotorDrift {
   Esg7::Coefficients<double> change_ = Esg7::Coefficients<double>::Zero();
   Eigen::Vector3d orbital_sine_ = Eigen::Vector3d::Zero();
   Eigen::Vector3d orbital_cosine_ = Eigen::Vector3d::Zero();
+  Esg7::Coefficients<double> polhode_sine_ = Esg7::Coefficients<double>::Zero();
+  Esg7::Coefficients<double> polhode_cosine_ = Esg7::Coefficients<double>::Zero();
   double cube_d_ = 0;
   int degree_ = 0;
   /// By order and degree, with the norm of the harmonic.

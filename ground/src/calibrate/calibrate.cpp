@@ -92,7 +92,7 @@ Calibration known_before(const PassSettings& settings, const CalibrationOptions&
   before.estimator = options.estimator;
   before.epoch = before.t = settings.epoch;
   for (int k = 0; k < layout.gyros; ++k) {
-    before.gyros.push_back(record_of(prior.gyros[k], setup, 0));
+    before.gyros.push_back(record_of(prior.gyros[k], k, setup, 0));
     before.gyros.back().momentum_in.setZero();
   }
   before.states = drift_and_alignment(layout.drift_model, static_cast<std::size_t>(layout.gyros));
@@ -101,21 +101,21 @@ Calibration known_before(const PassSettings& settings, const CalibrationOptions&
 }
 
 /// Of the calibration; members of the drift that were left out have nothing in common with what was estimated.
-Eigen::MatrixXd orbital_drift_covariance(const CalibrationRun& run) {
+Eigen::MatrixXd amplitude_covariance(const CalibrationRun& run) {
   const Layout& layout = run.errors.layout;
-  if (!run.errors.is_known() || !layout.further.orbital_drift) {
+  const int size = layout.amplitudes_size();
+  if (!run.errors.is_known() || size == 0) {
     return {};
   }
   const std::vector<ParameterId> own = drift_and_alignment(layout.drift_model, static_cast<std::size_t>(layout.gyros));
   const std::vector<ParameterId>& states = run.calibration.states;
-  const int size = Layout::kOrbitalDrift * layout.gyros;
-  const auto rows = run.errors.covariance.middleRows(layout.orbital_drift(0), size);
+  const auto rows = run.errors.covariance.middleRows(layout.amplitudes(), size);
   Eigen::MatrixXd found = Eigen::MatrixXd::Zero(size, std::ssize(states) + size);
   for (std::size_t i = 0; i < own.size(); ++i) {
     const auto column = std::ranges::find(states, own[i]) - states.begin();
     found.col(column) = rows.col(layout.drift(0) + static_cast<Eigen::Index>(i));
   }
-  found.rightCols(size) = rows.middleCols(layout.orbital_drift(0), size);
+  found.rightCols(size) = rows.middleCols(layout.amplitudes(), size);
   return found;
 }
 
@@ -368,7 +368,7 @@ CalibrationRun calibrate_as_stamped(const Pass& pass, const CalibrationOptions& 
       run.calibration.drift_field = pass.settings.prior->drift_field;
     }
   }
-  run.calibration.orbital_drift_covariance = orbital_drift_covariance(run);
+  run.calibration.amplitude_covariance = amplitude_covariance(run);
   return run;
 }
 

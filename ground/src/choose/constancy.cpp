@@ -378,7 +378,103 @@ class Constancy {
 
 }  // namespace
 
-std::vector<Change> changes_over(const Trial& trial) {
+namespace {
+
+/// Looks for the polhode of each rotor, along the steps of its coefficients: first for the number of turns in the pass,
+/// then for how the period changes as well.
+class PolhodeSearch {
+ public:
+  /// `sigma`: prior of each amplitude, gyro by gyro.
+  PolhodeSearch(const Constancy& pass, const PassProblem& problem, VectorXd sigma)
+      : pass_(pass),
+        zero_at_(problem.setup().on_board.orbital_phase_zero),
+        begin_s_(to_seconds(pass.middle(0) - zero_at_)),
+        span_s_(to_seconds(pass.middle(pass.steps()) - pass.middle(0))),
+        sigma_(std::move(sigma)) {}
+
+  [[nodiscard]] LikelyPolhode of_gyro(int gyro) const {
+    constexpr double kStep = 0.25;        // of a turn: half a turn apart, one is a quarter as likely to be seen
+    constexpr double kStretchesATurn = 4;  // at least
+    constexpr double kMostChange = 0.5;   // of the period, over the pass
+    constexpr double kWorthMore = 3;
+    Found best{1, 0, -std::numeric_limits<double>::infinity()};
+    int tries = 0;
+    const auto consider = [&](double turns, double change) {
+      ++tries;
+      const double odds = log_odds(gyro, turns, change);
+      const bool is_better = odds > best.log_odds;
+      if (is_better) {
+        best = {turns, change, odds};
+      }
+      return is_better;
+    };
+    const double most = static_cast<double>(pass_.steps() + 1) / kStretchesATurn;
+    for (double turns = 1; turns <= most; turns += kStep) {
+      consider(turns, 0);
+    }
+    const int coarse = tries;
+    if (best.log_odds - std::log(coarse) > kWorthMore) {
+      const Found first = best;
+      for (const double change : {-0.4, -0.3, -0.2, -0.1, 0.1, 0.2, 0.3, 0.4}) {
+        for (const double turns : {first.turns - kStep, first.turns, first.turns + kStep}) {
+          consider(turns, change);
+        }
+      }
+      for (double step = kStep / 2; step > 1e-3;) {
+        const Found at = best;
+        const bool is_better = consider(at.turns - step, at.change) || consider(at.turns + step, at.change) ||
+                               (std::abs(at.change) < kMostChange && (consider(at.turns, at.change - step / 2) ||
+                                                                      consider(at.turns, at.change + step / 2)));
+        step /= is_better ? 1 : 2;
+      }
+    }
+    return {polhode(best.turns, best.change), best.log_odds - std::log(coarse)};
+  }
+
+ private:
+  struct Found {
+    double turns;   ///< in the span
+    double change;  ///< of the period over the span, of that in its middle
+    double log_odds;
+  };
+
+  [[nodiscard]] Polhode polhode(double turns, double change) const {
+    const double period_s = span_s_ / turns;
+    const double rate = change * period_s / span_s_;
+    const double middle_s = begin_s_ + span_s_ / 2;
+    return {static_cast<float>(period_s - rate * middle_s), static_cast<float>(rate)};
+  }
+
+  [[nodiscard]] double log_odds(int gyro, double turns, double change) const {
+    const Polhode its = polhode(turns, change);
+    const auto angle = [&](Index stretch) { return its.angle_rad(to_seconds(pass_.middle(stretch) - zero_at_)); };
+    std::vector<Eigen::Triplet<double>> entries;
+    for (Index step = 0; step < pass_.steps(); ++step) {
+      const double from = angle(step);
+      const double to = angle(step + 1);
+      for (int i = 0; i < Layout::kEq1; ++i) {
+        entries.emplace_back(pass_.parameter(step, gyro, i), i, std::sin(to) - std::sin(from));
+        entries.emplace_back(pass_.parameter(step, gyro, i), Layout::kEq1 + i, std::cos(to) - std::cos(from));
+      }
+    }
+    Eigen::SparseMatrix<double> columns(pass_.size(), Layout::kPolhode);
+    columns.setFromTriplets(entries.begin(), entries.end());
+    Change its_odds;
+    pass_.put_into(its_odds, columns, sigma_.segment<Layout::kEq1>(Index{Layout::kEq1} * gyro).replicate(2, 1),
+                   std::numeric_limits<double>::infinity());
+    return its_odds.log_odds;
+  }
+
+  const Constancy& pass_;
+  Time zero_at_;
+  double begin_s_;
+  double span_s_;
+  VectorXd sigma_;
+};
+
+}  // namespace
+
+Moves moves_over(const Trial& trial) {
   constexpr std::size_t kEnoughStretches = 6;
   const PassProblem& problem = trial.problem();
   if (Constancy::stretches(problem.arcs()) < kEnoughStretches) {
@@ -400,6 +496,7 @@ std::vector<Change> changes_over(const Trial& trial) {
   // calibration.
   constexpr double kMoves_rad = 60.0 / 206265;
   constexpr double kPartOfCoefficients = 0.1;
+  constexpr double kPolhodeOverChange = 3;
   constexpr double kAnnual = 6e-5;
   constexpr double kOrbital = 1.5e-5;
   constexpr double kScale = 1e-3;
@@ -548,7 +645,12 @@ std::vector<Change> changes_over(const Trial& trial) {
     }
   }
   std::ranges::sort(best, [](const Change& a, const Change& b) { return a.log_odds > b.log_odds; });
-  return best;
+  Moves moves{std::move(best), {}};
+  const PolhodeSearch search(pass, problem, kPolhodeOverChange * coefficient_sigma);
+  for (int k = 0; k < layout.gyros; ++k) {
+    moves.polhodes[k] = search.of_gyro(k);
+  }
+  return moves;
 }
 
 OrbitalOdds orbital_odds(const Trial& trial) {

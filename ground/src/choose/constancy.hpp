@@ -8,9 +8,20 @@
 
 namespace trihedron::ground {
 
-/// What may move, the likeliest first, each kind at its likeliest time. Empty where the pass is shorter than an hour.
-/// Derived in docs/mathematics.md, section 12.
-[[nodiscard]] std::vector<Change> changes_over(const Trial& trial);
+/// The polhode of one rotor with which its coefficients most likely come and go.
+struct LikelyPolhode {
+  Polhode polhode;      ///< from the epoch of the pass on
+  double log_odds = 0;  ///< ln of the Bayes factor against coefficients that stay, less ln of the number of tries
+};
+
+/// What may not stand still.
+struct Moves {
+  std::vector<Change> changes;  ///< the likeliest first, each kind at its likeliest time
+  PerGyro<LikelyPolhode> polhodes;
+};
+
+/// By a trial. Without any where the pass is shorter than an hour. Derived in docs/mathematics.md, section 12.
+[[nodiscard]] Moves moves_over(const Trial& trial);
 
 /// ln of the odds, against neither, of what comes back with the orbit: an error of the star tracker, or drift about the
 /// case axes of each gyro, as of a temperature or of a magnetic field, that would move the momenta as far. Both turn

@@ -34,7 +34,8 @@ using Choice = FurtherStateOptions::Choice;
 /// drift, which the search for the noise decides, and the drift at orbital period, which looks like an error of the
 /// star tracker and is compared with it.
 bool is_judged_by_trial(const FurtherStateRow& row) {
-  return !row.key.empty() && row.state != FurtherState::kWanderingDrift && row.state != FurtherState::kOrbitalDrift;
+  return !row.key.empty() && row.state != FurtherState::kWanderingDrift && row.state != FurtherState::kOrbitalDrift &&
+         row.state != FurtherState::kPolhode;
 }
 
 /// Smallest number of pairs of fixes from which the noise of the star tracker is estimated, to some percent.
@@ -90,7 +91,7 @@ void use_noise(const CalibrationNoise& noise, CalibrationOptions& options) {
 }
 
 /// Settles open choices as the prior calibration has them.
-CalibrationOptions as_before(CalibrationOptions options, const Calibration& prior) {
+CalibrationOptions as_before(CalibrationOptions options, const Calibration& prior, Time epoch) {
   for (const FurtherStateRow& row : kFurtherStates) {
     // How the coefficients changed over an earlier pass says nothing of this one.
     const bool lasts = row.state != FurtherState::kCoefficientChange;
@@ -103,6 +104,11 @@ CalibrationOptions as_before(CalibrationOptions options, const Calibration& prio
   }
   if (const auto& drift = prior.gyros.at(0).orbital_drift) {
     options.orbital_rate_rad_s = drift->rate_rad_s;
+  }
+  for (std::size_t k = 0; k < prior.gyros.size(); ++k) {
+    if (const auto& drift = prior.gyros[k].polhode) {
+      options.further_states.polhodes[static_cast<int>(k)] = drift->from(epoch).polhode;
+    }
   }
   return options;
 }
@@ -135,11 +141,10 @@ void refuse_prior_of_others(const PassSettings& settings, const CalibrationOptio
                        "use a calibration made with the same drift model");
     }
     refuse_incomplete(gyro);
-    if (asked.estimator == Estimator::kPaper && gyro.orbital_drift) {
+    if (asked.estimator == Estimator::kPaper && (gyro.orbital_drift || gyro.polhode)) {
       throw SetupError(
-          fmt::format("the earlier calibration of gyro {} has drift at orbital period; estimator paper has none",
-                      k + 1),
-          "use estimator invariant, or an earlier calibration with orbital_drift off");
+          fmt::format("the earlier calibration of gyro {} has drift that comes back; estimator paper has none", k + 1),
+          "use estimator invariant, or an earlier calibration with orbital_drift and polhode off");
     }
   }
 }
@@ -170,6 +175,9 @@ const Forecast* best_of(const std::vector<Forecast>& forecasts, const PassSettin
 /// for drift that no member of the field has: such drift comes back with the orbit, which no noise does, and looks
 /// alike. Of a drift model that was asked for, the states of that error may hold what it does not have.
 constexpr double kLogOddsBesideOtherDrift = 10;
+
+/// The same from which on polhodes are tried.
+constexpr double kLogOddsOfPolhode = 10;
 
 /// Decides the open choices and the drift model by the evidence of a trial with all states free. `other_drift`: whether
 /// there is drift that no member of the field has.
@@ -326,7 +334,7 @@ void decide_again_with_more_noise(const Pass& pass, const Screened& screened, co
   decision.log_likelihood = likely.log_likelihood;
   keep_field(walked, decision);
   decision.nearby = walked.nearby();
-  decision.changes = changes_over(walked);
+  decision.use(moves_over(walked));
   compare_with_drift(pass, screened, asked, walked, true, progress, decision);
   if (wandering) {
     decision.evidence.push_back(*wandering);
@@ -385,7 +393,7 @@ Decision decide_by_pass(const Pass& pass, const Screened& screened, const Calibr
   options.find_noise = asked.find_noise && changes.size() >= kLeastFixPairs;
   if (!options.find_noise) {
     settle_states(everything, pass.settings, asked, false, decision);
-    decision.changes = changes_over(everything);
+    decision.use(moves_over(everything));
     decision.nearby = everything.nearby();
     if (options.drift_field) {
       keep_field(Trial(pass, screened, options, noise, &everything), decision);
@@ -414,7 +422,7 @@ Decision decide_by_pass(const Pass& pass, const Screened& screened, const Calibr
     use_walk(walk.noise, options);
     keep_field(decided, decision);
     decision.nearby = decided.nearby();
-    decision.changes = changes_over(decided);
+    decision.use(moves_over(decided));
     compare_with_drift(pass, screened, asked, decided, false, progress, decision);
   }
   return decision;
@@ -534,9 +542,8 @@ Decision without_aberration(Decision decision) {
   return decision;
 }
 
-/// Whether what noise there is beside drift at orbital period is a tenth of it at most. Drift of another kind comes
-/// back with the orbit too, but not as a sine: it leaves noise of its own size, and coefficients told from it would be
-/// too sure.
+/// Whether what noise there is beside drift that comes back is a tenth of it at most. Drift of another kind comes back
+/// too, but not as a sine: it leaves noise of its own size, and coefficients told from it would be too sure.
 bool is_all_that_is_left(const Decision& by_drift) {
   constexpr double kMost = 0.1;
   const CalibrationOptions& options = by_drift.options;
@@ -544,10 +551,10 @@ bool is_all_that_is_left(const Decision& by_drift) {
   double square = 0;
   for (int k = 0; k < layout.gyros; ++k) {
     square += by_drift.nearby->solution.gyros[k]
-                  .drift_rad_s.segment<Layout::kOrbitalDrift>(layout.orbital_column())
+                  .drift_rad_s.segment(layout.orbital_column(), layout.drift_columns() - layout.orbital_column())
                   .squaredNorm();
   }
-  const double drift_rad_s = std::sqrt(square / (Layout::kOrbitalDrift * layout.gyros));
+  const double drift_rad_s = std::sqrt(square / layout.amplitudes_size());
   // A random walk as drift that wanders for as long as the phase takes for a radian.
   const double walk_rad_s =
       options.direction_random_walk_rad_sqrt_s * std::sqrt(std::abs(*options.orbital_rate_rad_s) / 2);
@@ -606,13 +613,118 @@ Decision decide_on_orbital_drift(const Pass& pass, const Screened& screened, Cal
   return without_aberration(std::move(without));
 }
 
+/// A polhode by the number of turns in a pass, and the change of the period over it, of that in its middle.
+struct Turns {
+  double turns;
+  double change;
+
+  Turns(const Polhode& polhode, double span_s) {
+    const double middle_s = static_cast<double>(polhode.after(span_s / 2).period_s);
+    turns = span_s / middle_s;
+    change = static_cast<double>(polhode.period_rate) * turns;
+  }
+  [[nodiscard]] Polhode polhode(double span_s) const {
+    const double middle_s = span_s / turns;
+    const double rate = change / turns;
+    return {static_cast<float>(middle_s - rate * span_s / 2), static_cast<float>(rate)};
+  }
+};
+
+/// The polhodes with which the pass is most likely by eq. (1), from those on that the changes of the coefficients show:
+/// for each rotor the vertex of a parabola along turns and change in turn, with the random walk that is then likeliest.
+/// What noise was found without them stands for a part of them, and goes as they are told better.
+PerGyro<Polhode> most_likely_polhodes(const Pass& pass, const Screened& screened, CalibrationOptions options,
+                                      PerGyro<Polhode> polhodes) {
+  constexpr int kRounds = 2;
+  const double span_s = to_seconds(screened.pass.fixes.back().fix.t - pass.settings.epoch);
+  const double least_walk = options.direction_random_walk_rad_sqrt_s;
+  options.drift_field = false;
+  options.drift_model = kEsg7;
+  options.further_states[FurtherState::kPolhode] = Choice::kOn;
+  options.further_states[FurtherState::kWanderingDrift] = Choice::kOff;
+  options.further_states.polhodes = polhodes;
+  std::optional<Trial> last;
+  const auto fit = [&] {
+    if (last) {
+      last->release();
+    }
+    Trial trial(pass, screened, options, {}, last ? &*last : nullptr);
+    last.emplace(std::move(trial));
+    return last->log_likelihood();
+  };
+  double step = 0.05;  // of a turn
+  for (int round = 0; round < kRounds; ++round, step /= 5) {
+    options.direction_random_walk_rad_sqrt_s = least_walk;
+    fit();
+    use_walk(with_most_likely_walk(*last, options).noise, options);
+    double here = fit();
+    for (std::size_t k = 0; k < pass.settings.gyros.size(); ++k) {
+      Polhode& polhode = options.further_states.polhodes[static_cast<int>(k)];
+      for (double Turns::*along : {&Turns::turns, &Turns::change}) {
+        const Turns middle(polhode, span_s);
+        const double size = along == &Turns::turns ? step : 8 * step / middle.turns;
+        const auto at = [&](double by) {
+          Turns moved = middle;
+          moved.*along += by * size;
+          polhode = moved.polhode(span_s);
+          return fit();
+        };
+        const double before = at(-1);
+        const double after = at(1);
+        const double bend = 2 * here - before - after;
+        const double by = bend > 0 ? std::clamp((after - before) / (2 * bend), -2.0, 2.0) : after > before ? 1 : -1;
+        if (const double there = at(by); there > here) {
+          here = there;
+        } else {
+          polhode = middle.polhode(span_s);
+        }
+      }
+    }
+  }
+  return options.further_states.polhodes;
+}
+
+/// Decides by the data of the pass, and once more with coefficients that come and go with the polhodes of the rotors
+/// where these may. Then `asked` has them as well.
+Decision decide_on_polhodes(const Pass& pass, const Screened& screened, CalibrationOptions& asked,
+                            const DriftModelId& largest_model, const Progress& progress) {
+  constexpr FurtherState kPolhode = FurtherState::kPolhode;
+  const bool is_open = asked.further_states[kPolhode] == Choice::kAuto;
+  if (is_open) {
+    asked.further_states[kPolhode] = Choice::kOff;
+  }
+  Decision decision = decide_on_orbital_drift(pass, screened, asked, largest_model, progress);
+  const auto is_found = [](const LikelyPolhode& likely) { return likely.log_odds > kLogOddsOfPolhode; };
+  if (!is_open || std::ranges::none_of(decision.polhodes, is_found)) {
+    return decision;
+  }
+  begin_stage(progress, "looks for the polhodes of the rotors");
+  PerGyro<Polhode> first;
+  const auto likeliest = std::ranges::max_element(decision.polhodes, {}, &LikelyPolhode::log_odds);
+  for (int k = 0; k < PerGyro<Polhode>::capacity(); ++k) {
+    first[k] = (is_found(decision.polhodes[k]) ? decision.polhodes[k] : *likeliest).polhode;
+  }
+  CalibrationOptions with = asked;
+  with.further_states[kPolhode] = Choice::kOn;
+  with.further_states.polhodes = most_likely_polhodes(pass, screened, decision.options, first);
+  Decision by_polhodes = decide_by_pass(pass, screened, with, largest_model, progress);
+  const double gain = by_polhodes.log_likelihood - decision.log_likelihood;
+  if (gain <= kLogOddsToAccept || !is_all_that_is_left(by_polhodes)) {
+    return decision;
+  }
+  by_polhodes.evidence.push_back({kPolhode, gain, true});
+  asked = with;
+  return by_polhodes;
+}
+
 /// Decides by the data of the pass. `change_is_open`: whether the coefficients may be found to change; then a warm-up
-/// or a jump of them is looked for.
+/// or a jump of them is looked for, unless they come and go with the polhodes.
 Decision decide_with_course(const Pass& pass, const Screened& screened, CalibrationOptions asked,
                             const DriftModelId& largest_model, bool change_is_open, const Progress& progress) {
-  Decision decision = decide_on_orbital_drift(pass, screened, asked, largest_model, progress);
+  Decision decision = decide_on_polhodes(pass, screened, asked, largest_model, progress);
+  const bool is_told = decision.options.further_states.is_on(FurtherState::kPolhode);
   const std::optional<FoundCourse> course =
-      change_is_open ? course_of(decision.changes, pass.settings.epoch) : std::nullopt;
+      change_is_open && !is_told ? course_of(decision.changes, pass.settings.epoch) : std::nullopt;
   if (!course) {
     return decision;
   }
@@ -692,7 +804,7 @@ CalibrationOptions settled_before(const PassSettings& settings, CalibrationOptio
     if (prior && prior->noise && options.find_noise) {
       use_noise(*prior->noise, options);
     }
-    options = prior ? as_before(options, *prior) : with_usual_states(options);
+    options = prior ? as_before(options, *prior, settings.epoch) : with_usual_states(options);
   }
   if (is_of_field && by_batch && options.drift_model == prior->gyros.at(0).drift_model) {
     options.drift_field = true;

@@ -2,6 +2,7 @@
 /// Which states beyond alignment and eq. (1), and which noise, a pass gives evidence of.
 
 #include <optional>
+#include <utility>
 #include <vector>
 
 #include "batch/drift_field.hpp"
@@ -28,6 +29,7 @@ struct Decision {
   std::vector<Forecast> forecasts;          ///< of the drift models that were compared
   std::optional<FieldPrior> field;          ///< where the drift is estimated as one
   std::vector<Change> changes;              ///< what moves during the pass
+  PerGyro<LikelyPolhode> polhodes;          ///< with which coefficients most likely come and go, of each rotor
   std::optional<OrbitalOdds> orbital_odds;  ///< where the pass was looked at for them
   /// Where an error of the star tracker at orbital period was accepted: ln of its odds against such drift.
   std::optional<double> orbital_error_over_drift;
@@ -40,6 +42,11 @@ struct Decision {
   std::optional<Screened> screened;     ///< the screened pass by which it was decided, where it was
   std::optional<Nearby> nearby;         ///< what was found with it
   std::optional<OnBoardRun> run;        ///< the run that screened it, where what is decided may be what it flew with
+
+  void use(Moves moves) {
+    changes = std::move(moves.changes);
+    polhodes = moves.polhodes;
+  }
 };
 
 /// Settles each choice that is left to the program by the whole pass. Estimator paper has no further states; where the

@@ -89,7 +89,7 @@ Forecast forecast(const PassProblem& problem, const PassSolution& solution, cons
         const auto found = std::ranges::find(coefficients, smaller[i]);
         own.drift_rad_s(static_cast<Index>(i)) = gyro.drift_rad_s(found - coefficients.begin());
       }
-      fit.gyros.push_back(record_of(own, its_setup, 0));
+      fit.gyros.push_back(record_of(own, k, its_setup, 0));
     }
   }
   return result;

@@ -117,7 +117,7 @@ struct OpenLoopPrediction::State {
   const BodyMotion& motion;
   AttitudeRule rule;
   GyroMask used;
-  GyroCalibration first;  ///< of which the phase of the drift at orbital period is that of all
+  std::vector<GyroCalibration> records;  ///< for the phases of drift that comes back
   std::vector<ParameterId> parameters;
   DriftModel drift;
   Gyros gyros;
@@ -146,7 +146,7 @@ OpenLoopPrediction::OpenLoopPrediction(const OpenLoopStart& start, const std::ve
                                            motion,
                                            rule,
                                            used,
-                                           gyros.at(0),
+                                           gyros,
                                            {},
                                            DriftModel(start.layout.drift_model, start.layout.further),
                                            {},
@@ -173,11 +173,11 @@ void OpenLoopPrediction::State::step(Duration dt) {
   const Layout& layout = start.layout;
   const double dt_s = to_seconds(dt);
   const double middle_s = to_seconds(now) + dt_s / 2;
-  DriftTime time = drift_time(first, t + now + dt / 2);
-  time.part_of_change = start.change.part(start.change.zero_at + now + dt / 2);
   const Eigen::Matrix3d C_in_c = motion.C_in_c(t + now + dt / 2);
   for (int k = 0; k < layout.gyros; ++k) {
     Gyro& gyro = gyros[k];
+    DriftTime time = drift_time(records[static_cast<std::size_t>(k)], t + now + dt / 2);
+    time.part_of_change = start.change.part(start.change.zero_at + now + dt / 2);
     const Eigen::Vector3d h_b = gyro.reading_of(C_in_c.transpose() * gyro.h_in).normalized();
     const Eigen::Vector3d turn = precess(gyro, since[k], drift, C_in_c, h_b, time, dt_s);
     if (layout.further.wandering_drift) {

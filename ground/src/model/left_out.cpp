@@ -39,11 +39,11 @@ Calibration with_model(Calibration calibration, const DriftModelId& model) {
   return other;
 }
 
-/// Of the drift at orbital period, with these columns of those about the other states.
-MatrixXd with_columns(const MatrixXd& orbital, const std::vector<Index>& kept) {
-  MatrixXd with(orbital.rows(), orbital.size() > 0 ? std::ssize(kept) + orbital.rows() : 0);
-  if (orbital.size() > 0) {
-    with << orbital(Eigen::all, kept), orbital.rightCols(orbital.rows());
+/// Of the amplitudes of drift that comes back, with these columns of those about the other states.
+MatrixXd with_columns(const MatrixXd& amplitudes, const std::vector<Index>& kept) {
+  MatrixXd with(amplitudes.rows(), amplitudes.size() > 0 ? std::ssize(kept) + amplitudes.rows() : 0);
+  if (amplitudes.size() > 0) {
+    with << amplitudes(Eigen::all, kept), amplitudes.rightCols(amplitudes.rows());
   }
   return with;
 }
@@ -87,7 +87,7 @@ Calibration LeftOut::reduced() const {
   Calibration reduced = with_model(all_, kept_model_);
   if (nothing()) {
     reduced.covariance = all_.covariance(rows_, rows_);
-    reduced.orbital_drift_covariance = with_columns(all_.orbital_drift_covariance, rows_);
+    reduced.amplitude_covariance = with_columns(all_.amplitude_covariance, rows_);
     return reduced;
   }
   const VectorXd more = made_up_ * mean_;
@@ -97,11 +97,11 @@ Calibration LeftOut::reduced() const {
   MatrixXd map = MatrixXd::Identity(all_.covariance.rows(), all_.covariance.cols());
   map(kept_, left_out_) = made_up_;
   reduced.covariance = (map * all_.covariance * map.transpose())(rows_, rows_);
-  MatrixXd orbital = all_.orbital_drift_covariance;
-  if (orbital.size() > 0) {
-    orbital.leftCols(map.cols()) *= map.transpose();
+  MatrixXd amplitudes = all_.amplitude_covariance;
+  if (amplitudes.size() > 0) {
+    amplitudes.leftCols(map.cols()) *= map.transpose();
   }
-  reduced.orbital_drift_covariance = with_columns(orbital, rows_);
+  reduced.amplitude_covariance = with_columns(amplitudes, rows_);
   return reduced;
 }
 

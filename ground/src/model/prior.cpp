@@ -56,35 +56,53 @@ void put_prior(const GyroPrior& prior, int number, const Layout& layout, Gyro& m
   sigma.tail<3>() = prior.alignment_sigma_rad;
 }
 
-/// Drift at orbital period is told from the epoch of the pass on, as in the set-up.
+/// What drift that comes back becomes where it is told from the epoch on: by its angle then, sine and cosine turn into
+/// each other.
+Eigen::MatrixXd turn_of_amplitudes(const Calibration& earlier, const Layout& layout, Time epoch) {
+  Eigen::MatrixXd turn = Eigen::MatrixXd::Identity(layout.amplitudes_size(), layout.amplitudes_size());
+  const auto put = [&](Eigen::Index first, Eigen::Index half, double angle) {
+    const auto unit = Eigen::MatrixXd::Identity(half, half);
+    turn.block(first, first, half, half) = turn.block(first + half, first + half, half, half) = std::cos(angle) * unit;
+    turn.block(first + half, first, half, half) = std::sin(angle) * unit;
+    turn.block(first, first + half, half, half) = -std::sin(angle) * unit;
+  };
+  for (int k = 0; k < layout.gyros; ++k) {
+    const GyroCalibration& gyro = earlier.gyros[static_cast<std::size_t>(k)];
+    if (layout.further.orbital_drift && gyro.orbital_drift) {
+      put(layout.orbital_drift(k) - layout.amplitudes(), Layout::kOrbitalDrift / 2, gyro.orbital_drift->phase(epoch));
+    }
+    if (layout.further.polhode && gyro.polhode) {
+      put(layout.polhode(k) - layout.amplitudes(), Layout::kEq1, gyro.polhode->angle_rad(epoch));
+    }
+  }
+  return turn;
+}
+
+/// Drift that comes back is told from the epoch of the pass on, as in the set-up. Its amplitudes have a common prior
+/// with the other parameters where the earlier calibration has those of the layout.
 Prior prior_of_calibration(const Calibration& earlier, const Layout& layout, Time epoch) {
   const Calibration reduced = LeftOut(earlier, layout.drift_model).reduced();
   Prior prior;
   prior.covariance = reduced.covariance;
-  const Eigen::MatrixXd& orbital = reduced.orbital_drift_covariance;
-  if (layout.further.orbital_drift && orbital.size() > 0) {
-    // Told from another time, sine and cosine turn into each other.
-    const Eigen::Index amplitudes = orbital.rows();
+  const Eigen::Index amplitudes = layout.amplitudes_size();
+  const Eigen::MatrixXd& of_amplitudes = reduced.amplitude_covariance;
+  if (amplitudes > 0 && of_amplitudes.rows() == amplitudes) {
+    const Eigen::MatrixXd turn = turn_of_amplitudes(reduced, layout, epoch);
     const Eigen::Index known = layout.parameters();
-    const double phase = reduced.gyros[0].orbital_drift->phase(epoch);
-    Eigen::MatrixXd turn = Eigen::MatrixXd::Zero(amplitudes, amplitudes);
-    for (Eigen::Index first = 0; first < amplitudes; first += Layout::kOrbitalDrift) {
-      turn.block<3, 3>(first, first) = turn.block<3, 3>(first + 3, first + 3) =
-          std::cos(phase) * Eigen::Matrix3d::Identity();
-      turn.block<3, 3>(first + 3, first) = std::sin(phase) * Eigen::Matrix3d::Identity();
-      turn.block<3, 3>(first, first + 3) = -std::sin(phase) * Eigen::Matrix3d::Identity();
-    }
     prior.covariance.conservativeResize(known + amplitudes, known + amplitudes);
-    prior.covariance.bottomLeftCorner(amplitudes, known) = turn * orbital.leftCols(known);
+    prior.covariance.bottomLeftCorner(amplitudes, known) = turn * of_amplitudes.leftCols(known);
     prior.covariance.topRightCorner(known, amplitudes) =
         prior.covariance.bottomLeftCorner(amplitudes, known).transpose();
     prior.covariance.bottomRightCorner(amplitudes, amplitudes) =
-        turn * orbital.rightCols(amplitudes) * turn.transpose();
+        turn * of_amplitudes.rightCols(amplitudes) * turn.transpose();
   }
   for (int k = 0; k < layout.gyros; ++k) {
     GyroCalibration record = reduced.gyros[static_cast<std::size_t>(k)];
     if (record.orbital_drift) {
       record.orbital_drift = record.orbital_drift->from(epoch);
+    }
+    if (record.polhode) {
+      record.polhode = record.polhode->from(epoch);
     }
     prior.gyros[k] = gyro_of(record, layout);
   }
@@ -125,10 +143,14 @@ Gyro gyro_of(const GyroCalibration& record, const Layout& layout) {
     gyro.drift_rad_s.segment<Layout::kOrbitalDrift>(layout.orbital_column()) << record.orbital_drift->sine_rad_s,
         record.orbital_drift->cosine_rad_s;
   }
+  if (layout.further.polhode && record.polhode) {
+    gyro.drift_rad_s.segment<Layout::kPolhode>(layout.polhode_column()) << record.polhode->sine_rad_s,
+        record.polhode->cosine_rad_s;
+  }
   return gyro;
 }
 
-GyroCalibration record_of(const Gyro& gyro, const CalibrationSetup& setup, double part_of_change) {
+GyroCalibration record_of(const Gyro& gyro, int k, const CalibrationSetup& setup, double part_of_change) {
   const Layout& layout = setup.layout;
   GyroCalibration record;
   record.drift_model = layout.drift_model;
@@ -145,19 +167,32 @@ GyroCalibration record_of(const Gyro& gyro, const CalibrationSetup& setup, doubl
     record.orbital_drift = {gyro.drift_rad_s.segment<3>(column), gyro.drift_rad_s.segment<3>(column + 3),
                             setup.orbital_rate_rad_s, setup.orbital_phase_zero};
   }
+  if (layout.further.polhode) {
+    const int column = layout.polhode_column();
+    record.polhode = {setup.polhodes[k], setup.orbital_phase_zero, gyro.drift_rad_s.segment<Layout::kEq1>(column),
+                      gyro.drift_rad_s.segment<Layout::kEq1>(column + Layout::kEq1)};
+  }
   return record;
 }
 
 DriftTime drift_time(const GyroCalibration& record, Time t) {
-  if (!record.orbital_drift) {
-    return {};
+  DriftTime time;
+  if (record.orbital_drift) {
+    const double phase = record.orbital_drift->phase(t);
+    time.orbital_sine = std::sin(phase);
+    time.orbital_cosine = std::cos(phase);
   }
-  const double phase = record.orbital_drift->phase(t);
-  return {0, std::sin(phase), std::cos(phase)};
+  if (record.polhode) {
+    const double angle = record.polhode->angle_rad(t);
+    time.polhode_sine = std::sin(angle);
+    time.polhode_cosine = std::cos(angle);
+  }
+  return time;
 }
 
 Layout layout_of(const GyroCalibration& record) {
-  return {.drift_model = record.drift_model, .further = {.orbital_drift = record.orbital_drift.has_value()}};
+  return {.drift_model = record.drift_model,
+          .further = {.orbital_drift = record.orbital_drift.has_value(), .polhode = record.polhode.has_value()}};
 }
 
 Prior prior_of(const PassSettings& settings, const Layout& layout) {

@@ -13,12 +13,12 @@ void refuse_unknown(const DriftModelId& drift_model);
 /// Throws SetupError where the record does not have as many coefficients as its model.
 void refuse_incomplete(const GyroCalibration& gyro);
 
-/// The gyro of a record, with its momentum; what the layout has and the record lacks is zero. Drift at orbital period
+/// The gyro of a record, with its momentum; what the layout has and the record lacks is zero. Drift that comes back
 /// is told from when the record has it told from.
 [[nodiscard]] Gyro gyro_of(const GyroCalibration& record, const Layout& layout);
-/// The record of a gyro in the layout of the set-up, with the coefficients at the time when this fraction of their
+/// The record of gyro `k` in the layout of the set-up, with the coefficients at the time when this fraction of their
 /// change has taken place.
-[[nodiscard]] GyroCalibration record_of(const Gyro& gyro, const CalibrationSetup& setup, double part_of_change);
+[[nodiscard]] GyroCalibration record_of(const Gyro& gyro, int k, const CalibrationSetup& setup, double part_of_change);
 /// What the drift of a record depends on besides the direction, at a time.
 [[nodiscard]] DriftTime drift_time(const GyroCalibration& record, Time t);
 /// Of the drift of a record alone.

@@ -15,7 +15,7 @@ namespace {
 
 /// Prior sigma of the change of a coefficient over a pass, as a fraction of that of the coefficient.
 constexpr double kChangeSigma = 0.05;
-/// The same of a course that was found: a warm-up, or a jump.
+/// The same of a course that was found: a warm-up, a jump, or the polhode.
 constexpr double kFoundChangeSigma = 0.3;
 /// Prior sigma of each amplitude of the drift at orbital period, as a fraction of that of a coefficient.
 constexpr double kOrbitalDriftSigma = 0.05;
@@ -104,7 +104,9 @@ CalibrationSetup setup_of(const PassSettings& settings, const CalibrationOptions
   const FurtherStateOptions& states = options.further_states;
   setup.wandering_drift = {states.wandering_drift_rad_s, to_seconds(states.wandering_time)};
   setup.further_sigma[FurtherState::kOrbitalDrift] = kOrbitalDriftSigma * settings.gyros[0].drift_common_sigma_rad_s;
-  for (const FurtherState of_gyros : {FurtherState::kReadoutBias, FurtherState::kOrbitalDrift}) {
+  setup.further_sigma[FurtherState::kPolhode] = kFoundChangeSigma * settings.gyros[0].drift_common_sigma_rad_s;
+  for (const FurtherState of_gyros :
+       {FurtherState::kReadoutBias, FurtherState::kOrbitalDrift, FurtherState::kPolhode}) {
     if (const double sigma = sigma_before(settings.prior, of_gyros); sigma > 0) {
       setup.further_sigma[of_gyros] = sigma;
     }
@@ -121,6 +123,7 @@ CalibrationSetup setup_of(const PassSettings& settings, const CalibrationOptions
   }
   setup.orbital_rate_rad_s = options.orbital_rate_rad_s.value_or(setup.orbital_rate_rad_s);
   setup.orbital_phase_zero = settings.epoch;
+  setup.polhodes = states.polhodes;
 
   setup.gate_nis = options.gate_nis;
   setup.reopen_after_rejections = options.reopen_after_rejections;
@@ -175,6 +178,9 @@ double value_of(const Layout& layout, const Gyros& gyros, const SharedStates& sh
   }
   if (parameter.further_state == FurtherState::kOrbitalDrift) {
     return gyro.drift_rad_s(layout.orbital_column() + parameter.component);
+  }
+  if (parameter.further_state == FurtherState::kPolhode) {
+    return gyro.drift_rad_s(layout.polhode_column() + parameter.component);
   }
   if (state < layout.change(0)) {
     return gyro.errors(layout)(state - layout.readout(parameter.owner));

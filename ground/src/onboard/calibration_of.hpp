@@ -65,7 +65,7 @@ template <class Gyros>
   const auto roomy = with_room<ground::Gyros>(gyros, setup.layout);
   std::vector<GyroCalibration> records;
   for (int k = 0; k < setup.layout.gyros; ++k) {
-    records.push_back(record_of(roomy[k], setup, part_of_change));
+    records.push_back(record_of(roomy[k], k, setup, part_of_change));
   }
   return records;
 }

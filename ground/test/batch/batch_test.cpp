@@ -500,7 +500,7 @@ TEST(PassProblem, CarriesErrorsAlongAsTheFlightCodeDoes) {
     for (; screened.samples[followed].t < moment.t; ++followed) {
       const ScreenedSamples::Sample from = screened.samples[followed];
       const ScreenedSamples::Sample to = screened.samples[followed + 1];
-      const DriftTime time = problem.setup().on_board.drift_time(from.t + (to.t - from.t) / 2);
+      const DriftTimes times = problem.setup().on_board.drift_times(from.t + (to.t - from.t) / 2);
       Directions middle;
       for (int k = 0; k < 2; ++k) {
         middle[k] = (from.h_b[k] + to.h_b[k]).normalized();
@@ -508,7 +508,7 @@ TEST(PassProblem, CarriesErrorsAlongAsTheFlightCodeDoes) {
       const Eigen::Matrix3d C_in_c =
           optimal_rotation(momenta(gyros, 2), in_c(gyros, 2, middle), all_gyros(2)).value().raw();
       for (int k = 0; k < 2; ++k) {
-        precess(gyros[k], since[k], drift, C_in_c, middle[k], time, to_seconds(to.t - from.t));
+        precess(gyros[k], since[k], drift, C_in_c, middle[k], times[k], to_seconds(to.t - from.t));
       }
     }
     const auto near = [](const auto& a, const auto& b, double size) { return (a - b).norm() <= 1.5e-4 * size; };

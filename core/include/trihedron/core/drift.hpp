@@ -94,16 +94,19 @@ struct BesideK0 {
   }
 };
 
-/// What drift depends on besides the direction, at one time.
+/// What the drift of one gyro depends on besides the direction, at one time.
 struct DriftTime {
   double part_of_change = 0;  ///< the fraction of the change of the coefficients that has taken place
   double orbital_sine = 0;    ///< sin nt
   double orbital_cosine = 0;  ///< cos nt
+  double polhode_sine = 0;    ///< sin θ
+  double polhode_cosine = 0;  ///< cos θ
 };
+using DriftTimes = PerGyro<DriftTime>;
 
 /// Drift of one gyro as a table of columns: ω_b = B(h) κ, κ the coefficients of the members of the model; then, where
-/// the layout has them, the drift that wanders, about the case axes, the change of the coefficients of eq. (1), and the
-/// drift at orbital period, about the case axes.
+/// the layout has them, the drift that wanders, about the case axes, the change of the coefficients of eq. (1), the drift
+/// at orbital period, about the case axes, and the coefficients of eq. (1) that come and go with the polhode.
 class DriftModel {
  public:
   static constexpr int kMaxMembers = vsh(DriftModelId::kMaxDegree).size();
@@ -115,7 +118,8 @@ class DriftModel {
   [[nodiscard]] int size() const { return size_; }
   [[nodiscard]] int change_column() const { return size_ + (wandering_ ? 3 : 0); }
   [[nodiscard]] int orbital_column() const { return change_column() + (change_ ? Esg7::kSize : 0); }
-  [[nodiscard]] int columns() const { return orbital_column() + (orbital_ ? Layout::kOrbitalDrift : 0); }
+  [[nodiscard]] int polhode_column() const { return orbital_column() + (orbital_ ? Layout::kOrbitalDrift : 0); }
+  [[nodiscard]] int columns() const { return polhode_column() + (polhode_ ? Layout::kPolhode : 0); }
   /// Which member of the family column i is; i < size().
   [[nodiscard]] const DriftCoefficient& member(int i) const { return members_[static_cast<std::size_t>(i)]; }
 
@@ -135,6 +139,7 @@ class DriftModel {
   bool wandering_ = false;
   bool change_ = false;
   bool orbital_ = false;
+  bool polhode_ = false;
 };
 
 }  // namespace trihedron

@@ -23,9 +23,10 @@ enum class FurtherState : std::uint8_t {
   kReadoutBias,           ///< of the direction cosines of each gyro
   kCoefficientChange,     ///< of the coefficients of eq. (1) of each gyro, by the course of the set-up
   kOrbitalDrift,          ///< v_s sin nt + v_c cos nt about the case axes of each gyro
+  kPolhode,               ///< of the coefficients of eq. (1) of each gyro: a_s sin θ + a_c cos θ, θ of its polhode
   kWanderingDrift,        ///< first-order Gauss–Markov drift about the case axes of each gyro
 };
-inline constexpr std::size_t kFurtherStateCount = 8;
+inline constexpr std::size_t kFurtherStateCount = 9;
 
 /// Which of them are estimated; alignments of star trackers are not a choice.
 struct FurtherStates {
@@ -36,16 +37,18 @@ struct FurtherStates {
   bool orbital_error = false;
   bool clock_rate = false;
   bool orbital_drift = false;
+  bool polhode = false;
 
   friend constexpr bool operator==(const FurtherStates&, const FurtherStates&) = default;
 };
 
-inline constexpr FurtherStates kAllFurtherStates{true, true, true, true, true, true, true};
+inline constexpr FurtherStates kAllFurtherStates{true, true, true, true, true, true, true, true};
 
 /// First the states that move, then the constants gyro by gyro, then those that the gyros share.
 struct Layout {
   static constexpr int kEq1 = 7;           ///< coefficients of eq. (1), the first ones of each drift model
   static constexpr int kOrbitalDrift = 6;  ///< amplitudes of the drift at orbital period
+  static constexpr int kPolhode = 2 * kEq1;  ///< amplitudes of the coefficients with the polhode
 
   int gyros = 2;
   DriftModelId drift_model{};
@@ -62,14 +65,17 @@ struct Layout {
   /// κ of one gyro.
   [[nodiscard]] constexpr int drift_size() const { return drift_modes < 0 ? drift_model.size() : kEq1 + drift_modes; }
   /// Columns of its drift: κ, then the drift that wanders, then the change of the coefficients of eq. (1), then the
-  /// drift at orbital period, sine before cosine.
+  /// drift at orbital period and the coefficients with the polhode, sine before cosine.
   [[nodiscard]] constexpr int drift_columns() const {
-    return orbital_column() + (further.orbital_drift ? kOrbitalDrift : 0);
+    return polhode_column() + (further.polhode ? kPolhode : 0);
   }
   [[nodiscard]] constexpr int wandering_column() const { return drift_size(); }
   [[nodiscard]] constexpr int change_column() const { return drift_size() + (further.wandering_drift ? 3 : 0); }
   [[nodiscard]] constexpr int orbital_column() const {
     return change_column() + (further.coefficient_change ? kEq1 : 0);
+  }
+  [[nodiscard]] constexpr int polhode_column() const {
+    return orbital_column() + (further.orbital_drift ? kOrbitalDrift : 0);
   }
 
   [[nodiscard]] constexpr int direction(int gyro) const { return direction_size * gyro; }
@@ -78,13 +84,16 @@ struct Layout {
   [[nodiscard]] constexpr int dynamic() const { return wandering(further.wandering_drift ? gyros : 0); }
   [[nodiscard]] constexpr int drift(int gyro) const { return dynamic() + gyro * (drift_size() + 3); }
   [[nodiscard]] constexpr int alignment(int gyro) const { return drift(gyro) + drift_size(); }
-  /// The amplitudes of the drift at orbital period of one gyro. With κ and δ, behind which they are, they have a common
-  /// prior.
+  /// The amplitudes of the drift at orbital period of one gyro, and behind those of all gyros those of the polhode. With
+  /// κ and δ, behind which they are, they have a common prior.
   [[nodiscard]] constexpr int orbital_drift(int gyro) const { return drift(gyros) + kOrbitalDrift * gyro; }
+  [[nodiscard]] constexpr int polhode(int gyro) const {
+    return orbital_drift(further.orbital_drift ? gyros : 0) + kPolhode * gyro;
+  }
   /// The errors of the direction cosines of one gyro, those that GyroReadout knows; so far the bias alone.
   [[nodiscard]] constexpr int readout_size() const { return further.readout_bias ? 3 : 0; }
   [[nodiscard]] constexpr int readout(int gyro) const {
-    return orbital_drift(further.orbital_drift ? gyros : 0) + readout_size() * gyro;
+    return polhode(further.polhode ? gyros : 0) + readout_size() * gyro;
   }
   [[nodiscard]] constexpr int readout_bias(int gyro) const { return readout(gyro); }
   [[nodiscard]] constexpr int change(int gyro) const { return readout(gyros) + kEq1 * gyro; }
@@ -106,10 +115,25 @@ struct Layout {
   [[nodiscard]] constexpr int shared_size() const { return size() - shared(); }
   /// κ and δ of all gyros: what calibration.json lists.
   [[nodiscard]] constexpr int parameters() const { return drift(gyros) - dynamic(); }
-  /// With the amplitudes of the drift at orbital period.
+  /// With the amplitudes of drift that comes back, at orbital period and with the polhode.
   [[nodiscard]] constexpr int drift_parameters() const { return readout(0) - dynamic(); }
   /// The first constant behind κ and δ.
   [[nodiscard]] constexpr int behind_parameters() const { return drift(gyros); }
+  /// These amplitudes: the first, and how many.
+  [[nodiscard]] constexpr int amplitudes() const { return drift(gyros); }
+  [[nodiscard]] constexpr int amplitudes_size() const { return readout(0) - amplitudes(); }
+
+  /// Constants of a gyro's drift beside κ: their columns of its drift, and their states.
+  struct Block {
+    int column;
+    int state;
+    int size;  ///< 0: not there
+  };
+  [[nodiscard]] constexpr std::array<Block, 3> beside_kappa(int gyro) const {
+    return {{{change_column(), change(gyro), further.coefficient_change ? kEq1 : 0},
+             {orbital_column(), orbital_drift(gyro), further.orbital_drift ? kOrbitalDrift : 0},
+             {polhode_column(), polhode(gyro), further.polhode ? kPolhode : 0}}};
+  }
 
   /// Whether states of this kind are there.
   [[nodiscard]] constexpr bool has(FurtherState state) const;
@@ -155,6 +179,8 @@ inline constexpr std::array<FurtherStateKind, kFurtherStateCount> kFurtherStateK
      &Layout::change, 1e-7},
     {FurtherState::kOrbitalDrift, &FurtherStates::orbital_drift, FurtherStateKind::Owner::kGyro, Layout::kOrbitalDrift,
      &Layout::orbital_drift, 1e-7},
+    {FurtherState::kPolhode, &FurtherStates::polhode, FurtherStateKind::Owner::kGyro, Layout::kPolhode, &Layout::polhode,
+     6e-7},
     {FurtherState::kWanderingDrift, &FurtherStates::wandering_drift, FurtherStateKind::Owner::kGyro, 3,
      &Layout::wandering, 0},
 }};

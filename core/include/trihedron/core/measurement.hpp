@@ -106,12 +106,8 @@ void put_drift_columns(const Layout& layout, int gyro, const M& m, Rows&& rows) 
   if (layout.further.wandering_drift) {
     rows.middleCols(layout.wandering(gyro), 3) = m.middleCols(layout.wandering_column(), 3);
   }
-  if (layout.further.coefficient_change) {
-    rows.middleCols(layout.change(gyro), Layout::kEq1) = m.middleCols(layout.change_column(), Layout::kEq1);
-  }
-  if (layout.further.orbital_drift) {
-    rows.middleCols(layout.orbital_drift(gyro), Layout::kOrbitalDrift) =
-        m.middleCols(layout.orbital_column(), Layout::kOrbitalDrift);
+  for (const Layout::Block& its : layout.beside_kappa(gyro)) {
+    rows.middleCols(its.state, its.size) = m.middleCols(its.column, its.size);
   }
 }
 
@@ -174,12 +170,8 @@ void carry_back(const Layout& layout, const Sensitivities& since, Rows& rows) {
 template <class Vector, class Gyro>
 void add_parameter_errors(const Layout& layout, int gyro, const Vector& x, Gyro& its) {
   its.drift_rad_s.head(layout.drift_size()) += x.segment(layout.drift(gyro), layout.drift_size());
-  if (layout.further.coefficient_change) {
-    its.drift_rad_s.segment(layout.change_column(), Layout::kEq1) += x.segment(layout.change(gyro), Layout::kEq1);
-  }
-  if (layout.further.orbital_drift) {
-    its.drift_rad_s.segment(layout.orbital_column(), Layout::kOrbitalDrift) +=
-        x.segment(layout.orbital_drift(gyro), Layout::kOrbitalDrift);
+  for (const Layout::Block& block : layout.beside_kappa(gyro)) {
+    its.drift_rad_s.segment(block.column, block.size) += x.segment(block.state, block.size);
   }
   its.add_errors(layout, x.segment(layout.readout(gyro), layout.readout_size()));
   its.C_c_b = turned(its.C_c_b, Eigen::Vector3d(x.segment(layout.alignment(gyro), 3)));

@@ -129,26 +129,26 @@ void precess_two(const PrecessingGyro& a, const PrecessingGyro& b, const Sensiti
 /// precess() of the first `count` gyros.
 template <class Gyros>
 void precess_all(Gyros& gyros, int count, const DriftModel& drift, const Eigen::Matrix3d& C_in_c, const Directions& h_b,
-                 const DriftTime& time, double dt_s) {
+                 const DriftTimes& times, double dt_s) {
   const int in_pairs = drift.columns() == Esg7::kSize ? count - count % 2 : 0;
   for (int k = 0; k < in_pairs; k += 2) {
     precess_two({gyros[k], h_b[k]}, {gyros[k + 1], h_b[k + 1]}, C_in_c, dt_s);
   }
   for (int k = in_pairs; k < count; ++k) {
-    precess(gyros[k], drift, C_in_c, h_b[k], time, dt_s);
+    precess(gyros[k], drift, C_in_c, h_b[k], times[k], dt_s);
   }
 }
 /// The same with their sensitivities.
 template <class Gyros, class Sensitivities>
 void precess_all(Gyros& gyros, Sensitivities& since, int count, const DriftModel& drift, const Eigen::Matrix3d& C_in_c,
-                 const Directions& h_b, const DriftTime& time, double dt_s) {
+                 const Directions& h_b, const DriftTimes& times, double dt_s) {
   const int in_pairs = drift.columns() == Esg7::kSize ? count - count % 2 : 0;
   for (int k = 0; k < in_pairs; k += 2) {
     precess_two({gyros[k], h_b[k]}, {gyros[k + 1], h_b[k + 1]}, SensitivityOfEq1(since[k]),
                 SensitivityOfEq1(since[k + 1]), C_in_c, dt_s);
   }
   for (int k = in_pairs; k < count; ++k) {
-    precess(gyros[k], since[k], drift, C_in_c, h_b[k], time, dt_s);
+    precess(gyros[k], since[k], drift, C_in_c, h_b[k], times[k], dt_s);
   }
 }
 
@@ -188,6 +188,21 @@ struct CourseOfChange {
 
  private:
   [[nodiscard]] double since_begin(Time t) const;
+};
+
+/// The angle θ by which a rotor has gone along its polhode: 2π ∫ dt / period, the period changing evenly, from half to
+/// twice what it was; beyond that it stays.
+struct Polhode {
+  // Known to parts in ten thousand at best; as floats the object of a pair stays within 32 KiB.
+  float period_s = 7200;  ///< where θ = 0
+  float period_rate = 0;  ///< seconds per second
+
+  /// θ so long after it was 0.
+  [[nodiscard]] double angle_rad(double since_s) const;
+  /// The same polhode, told from a later time on; its angles differ by a constant.
+  [[nodiscard]] Polhode after(double since_s) const {
+    return {static_cast<float>(static_cast<double>(period_s) + static_cast<double>(period_rate) * since_s), period_rate};
+  }
 };
 
 /// Longest step over which the change of the readings tells how far the body turned.

@@ -73,8 +73,9 @@ struct CalibrationSetup {
   /// 1-sigma of each component before anything is measured, rad, rad/s, s or s/s; of the change, of the whole of it.
   PerFurtherState<double> further_sigma = default_further_sigmas();
   CourseOfChange change;               ///< of the coefficients
+  PerGyro<Polhode> polhodes{};         ///< from orbital_phase_zero on
   double orbital_rate_rad_s = 1.1e-3;  ///< n
-  Time orbital_phase_zero{};           ///< where nt = 0, and for which the clock offset stands
+  Time orbital_phase_zero{};           ///< where nt = 0 and θ = 0, and for which the clock offset stands
 
   /// A fix with a NIS above this is rejected; χ² of 4 degrees of freedom passes 30 once in 2e5 good fixes. That of a
   /// pair: of more gyros a gate that good fixes pass as often.
@@ -102,8 +103,8 @@ struct CalibrationSetup {
 
   /// The fraction of the change of the coefficients that has taken place at `t`.
   [[nodiscard]] double part_of_change(Time t) const { return change.part(t); }
-  /// Of the drift at `t`; without the phase where the layout has no drift at orbital period.
-  [[nodiscard]] DriftTime drift_time(Time t) const;
+  /// What the drift of each gyro depends on at `t`, as far as the layout has such drift.
+  [[nodiscard]] DriftTimes drift_times(Time t) const;
 
   [[nodiscard]] Duration max_interpolation() const { return trihedron::max_interpolation(gyro_period); }
   /// How far to both sides of a fix readings are fitted together: at one fix every 3 s no reading is shared. For slow

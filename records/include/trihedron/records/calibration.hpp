@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "trihedron/core/precession.hpp"
 #include "trihedron/core/time.hpp"
 #include "trihedron/records/clock_correction.hpp"
 #include "trihedron/records/drift_models.hpp"
@@ -30,6 +31,19 @@ struct OrbitalDrift {
   [[nodiscard]] OrbitalDrift from(Time zero) const;
 };
 
+/// Coefficients of eq. (1) that come and go with the polhode of a rotor: sine_rad_s sin θ + cosine_rad_s cos θ, θ its
+/// angle.
+struct PolhodeDrift {
+  Polhode polhode;  ///< at zero_at
+  Time zero_at{};   ///< where θ = 0; in calibration.json the epoch of the pass
+  Esg7::Coefficients<double> sine_rad_s = Esg7::Coefficients<double>::Zero();
+  Esg7::Coefficients<double> cosine_rad_s = Esg7::Coefficients<double>::Zero();
+
+  [[nodiscard]] double angle_rad(Time t) const { return polhode.angle_rad(to_seconds(t - zero_at)); }
+  /// The same drift, told from another time on.
+  [[nodiscard]] PolhodeDrift from(Time zero) const;
+};
+
 /// The parameters of one gyro, and its momentum.
 struct GyroCalibration {
   DriftModelId drift_model;
@@ -38,6 +52,7 @@ struct GyroCalibration {
   Eigen::Vector3d momentum_in{0, 0, 0};                    ///< h_in at `t`, unit
   Eigen::Vector3d readout_bias{0, 0, 0};                   ///< of the direction cosines: h_b is read as h_b + bias
   std::optional<OrbitalDrift> orbital_drift;               ///< where it is estimated
+  std::optional<PolhodeDrift> polhode;                     ///< where it is estimated
 };
 
 /// A component of a further state.
@@ -87,10 +102,10 @@ struct Calibration {
   /// axes.
   Eigen::MatrixXd covariance;
   std::vector<FurtherEstimate> further;  ///< empty where none was estimated
-  /// Of the amplitudes of the drift at orbital period, gyro by gyro, sine before cosine: a row each, columns about
-  /// `states` and then about these amplitudes. Empty where it is not estimated. In calibration.json it is a part of the
-  /// covariance.
-  Eigen::MatrixXd orbital_drift_covariance;
+  /// Of the amplitudes of drift that comes back: at orbital period, gyro by gyro, sine before cosine; then with the
+  /// polhode. A row each, columns about `states` and then about these amplitudes. Empty where none is estimated. In
+  /// calibration.json it is a part of the covariance.
+  Eigen::MatrixXd amplitude_covariance;
   /// Of stamps as they are telemetered, at and since `epoch`; what pass.toml says of them is in it. Empty where they
   /// are right.
   std::optional<ClockCorrection> clocks;

@@ -44,6 +44,11 @@ inline constexpr std::array<std::string_view, 7> kCoefficientChange = {
 inline constexpr std::array<std::string_view, 6> kOrbitalDrift = {
     "orbital_drift_sine_x_rad_s",   "orbital_drift_sine_y_rad_s",   "orbital_drift_sine_z_rad_s",
     "orbital_drift_cosine_x_rad_s", "orbital_drift_cosine_y_rad_s", "orbital_drift_cosine_z_rad_s"};
+inline constexpr std::array<std::string_view, 14> kPolhode = {
+    "k0_polhode_sine_rad_s",     "mu12_polhode_sine_rad_s",   "mu23_polhode_sine_rad_s",   "mu31_polhode_sine_rad_s",
+    "nu12_polhode_sine_rad_s",   "nu23_polhode_sine_rad_s",   "nu31_polhode_sine_rad_s",   "k0_polhode_cosine_rad_s",
+    "mu12_polhode_cosine_rad_s", "mu23_polhode_cosine_rad_s", "mu31_polhode_cosine_rad_s", "nu12_polhode_cosine_rad_s",
+    "nu23_polhode_cosine_rad_s", "nu31_polhode_cosine_rad_s"};
 }  // namespace further_state_components
 
 /// One row for each kind, in the order of FurtherState.
@@ -62,6 +67,8 @@ inline constexpr std::array<FurtherStateRow, kFurtherStateCount> kFurtherStates 
      Unit::kRadianPerSecond, further_state_components::kCoefficientChange},
     {FurtherState::kOrbitalDrift, "orbital_drift", "Drift at orbital period", "about each case axis, at orbital period",
      Unit::kRadianPerSecond, further_state_components::kOrbitalDrift},
+    {FurtherState::kPolhode, "polhode", "Change with the polhode", "of eq. (1), with the polhode of each rotor",
+     Unit::kRadianPerSecond, further_state_components::kPolhode},
     {FurtherState::kWanderingDrift,
      "wandering_drift",
      "Drift that wanders",

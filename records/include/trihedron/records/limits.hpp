@@ -75,6 +75,8 @@ inline constexpr Range kNeededInterval_s{1, 3.2e6, "s",
 inline constexpr Range kWanderingDrift_rad_s{1e-15, 1e-2, "rad/s", "give auto, off, or a 1-sigma like 0.01deg/h"};
 inline constexpr Range kWanderingTime_s{1, kYear_s, "s", "an hour is usual"};
 inline constexpr Range kChangeTime_s{1, kYear_s, "s", "rotors warm up in an hour or two"};
+inline constexpr Range kPolhodePeriod_s{60, kYear_s, "s", "a polhode takes minutes to days"};
+inline constexpr Range kPolhodePeriodRate{-0.5, 0.5, "", "it is the change of the period in seconds per second"};
 
 // ---- Calibrations
 

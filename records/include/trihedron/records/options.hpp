@@ -37,6 +37,8 @@ struct FurtherStateOptions {
   Duration wandering_time = std::chrono::hours(1);
   CourseOfChange::Kind change_course = CourseOfChange::Kind::kEven;  ///< of the change of the coefficients, where on
   Duration change_time = std::chrono::hours(1);                      ///< CourseOfChange::time_s
+  /// Of the rotor of each gyro, from the epoch of the pass on; where the change with it is on.
+  PerGyro<Polhode> polhodes{};
 
   [[nodiscard]] constexpr Choice& operator[](FurtherState state) { return choices_[static_cast<std::size_t>(state)]; }
   [[nodiscard]] constexpr Choice operator[](FurtherState state) const {
