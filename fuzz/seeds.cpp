@@ -55,7 +55,7 @@ void write_seeds(const fs::path& directory, const fs::path& examples) {
                  io::read_text(others / "telemetry.toml") + '\0' + io::read_text(others / "gyros.csv").substr(0, 1000));
   const fs::path calibration = at("calibration", "calibration.json");
   io::write_calibration(calibration, io::sample_calibration());
-  io::write_calibration(at("calibration", "orbital-drift.json"), io::sample_with_orbital_drift());
+  io::write_calibration(at("calibration", "drift-that-comes-back.json"), io::sample_with_drift_that_comes_back());
 
   AttitudeHistory attitude;
   for (const Time t : truth.t) {

@@ -23,7 +23,9 @@ bool is_usable(const CourseOfChange& change) {
   return positive(change.duration_s) && (change.kind == CourseOfChange::Kind::kEven || positive(change.time_s));
 }
 
-bool is_usable(const Polhode& polhode) { return positive(static_cast<double>(polhode.period_s)) && std::isfinite(polhode.period_rate); }
+bool is_usable(const Polhode& polhode) {
+  return positive(static_cast<double>(polhode.period_s)) && std::isfinite(polhode.period_rate);
+}
 
 bool noise_is_usable(const CalibrationSetup& setup) {
   for (int k = 0; k < setup.layout.gyros; ++k) {

@@ -156,13 +156,14 @@ TEST(DriftModel, BeginsWithEquation1) {
 
 TEST(DriftModel, RateIsTheBasisTimesTheCoefficients) {
   for (const DriftModelId id : kModels) {
-    for (int further = 0; further < 8; ++further) {
+    for (int further = 0; further < 16; ++further) {
       const DriftModel model(id, {.wandering_drift = (further & 1) != 0,
                                   .coefficient_change = (further & 2) != 0,
-                                  .orbital_drift = (further & 4) != 0});
+                                  .orbital_drift = (further & 4) != 0,
+                                  .polhode = (further & 8) != 0});
       const Eigen::VectorXd kappa = some_coefficients(model.columns());
       for (const Eigen::Vector3d& h : some_directions(7)) {
-        const DriftTime time{0.3, -0.6, 0.8};
+        const DriftTime time{0.3, -0.6, 0.8, 0.28, -0.96};
         const Eigen::Vector3d rate = model.rate(h, time, kappa.data());
         EXPECT_LT((rate - basis_of(model, h, time) * kappa).norm(), 1e-13 * rate.norm()) << model.columns();
       }
@@ -171,15 +172,19 @@ TEST(DriftModel, RateIsTheBasisTimesTheCoefficients) {
 }
 
 TEST(DriftModel, HasWhatDependsOnTimeBehindItsMembers) {
-  const DriftModel model(vsh(2), {.wandering_drift = true, .coefficient_change = true, .orbital_drift = true});
+  const DriftModel model(vsh(2),
+                         {.wandering_drift = true, .coefficient_change = true, .orbital_drift = true, .polhode = true});
   const Eigen::Vector3d h = Eigen::Vector3d(0.3, -0.5, 0.7).normalized();
-  const Eigen::MatrixXd basis = basis_of(model, h, {0.25, -0.6, 0.8});
+  const Eigen::MatrixXd basis = basis_of(model, h, {0.25, -0.6, 0.8, 0.28, -0.96});
   const int change = vsh(2).size() + 3;
-  ASSERT_EQ(basis.cols(), change + Esg7::kSize + 6);
+  const int polhode = change + Esg7::kSize + 6;
+  ASSERT_EQ(basis.cols(), polhode + 2 * Esg7::kSize);
   EXPECT_EQ(basis.middleCols<3>(vsh(2).size()), Eigen::Matrix3d::Identity());
   EXPECT_EQ(basis.middleCols<Esg7::kSize>(change), 0.25 * Esg7::basis<double>(h));
   EXPECT_EQ(basis.middleCols<3>(change + Esg7::kSize), -0.6 * Eigen::Matrix3d::Identity());
-  EXPECT_EQ(basis.rightCols(3), 0.8 * Eigen::Matrix3d::Identity());
+  EXPECT_EQ(basis.middleCols<3>(polhode - 3), 0.8 * Eigen::Matrix3d::Identity());
+  EXPECT_EQ(basis.middleCols<Esg7::kSize>(polhode), 0.28 * Esg7::basis<double>(h));
+  EXPECT_EQ(basis.rightCols<Esg7::kSize>(), -0.96 * Esg7::basis<double>(h));
 }
 
 TEST(DriftModel, MembersAreThoseOfTheirPotentials) {

@@ -17,9 +17,9 @@
 namespace trihedron {
 namespace {
 
-constexpr std::size_t kFactors = 9;
+constexpr std::size_t kFactors = 10;
 /// How many choices there are of gyros, drift model, star trackers, and each of the further states.
-constexpr std::array<int, kFactors> kChoices = {3, 6, 3, 2, 2, 2, 2, 2, 2};
+constexpr std::array<int, kFactors> kChoices = {3, 6, 3, 2, 2, 2, 2, 2, 2, 2};
 using Choice = std::array<int, kFactors>;
 
 Layout layout_of(const Choice& choice) {
@@ -33,7 +33,8 @@ Layout layout_of(const Choice& choice) {
                     .coefficient_change = choice[5] != 0,
                     .clock_offset = choice[6] != 0,
                     .orbital_error = choice[7] != 0,
-                    .orbital_drift = choice[8] != 0};
+                    .orbital_drift = choice[8] != 0,
+                    .polhode = choice[9] != 0};
   return layout;
 }
 
@@ -119,7 +120,8 @@ void expect_that_it_works(const Layout& layout, unsigned seed, Sum& sum) {
                                   << layout.further.wandering_drift << ", readout bias " << layout.further.readout_bias
                                   << ", change " << layout.further.coefficient_change << ", clock offset "
                                   << layout.further.clock_offset << ", orbital error " << layout.further.orbital_error
-                                  << ", orbital drift " << layout.further.orbital_drift);
+                                  << ", orbital drift " << layout.further.orbital_drift << ", polhode "
+                                  << layout.further.polhode);
   const test::Mission mission({.layout = layout, .duration_s = 300, .seed = seed});
   const auto on_board = mission.given.on_board();
   std::size_t used = 0;

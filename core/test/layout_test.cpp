@@ -8,7 +8,7 @@ namespace trihedron {
 namespace {
 
 constexpr DriftModelId kEachDriftModel[] = {kEsg7, kEsg20, vsh(1), vsh(2), vsh(3), vsh(4), vsh(5), vsh(6)};
-constexpr int kSets = 128;  // of further states
+constexpr int kSets = 256;  // of further states
 
 constexpr FurtherStates set_of_further_states(int number) {
   return {.wandering_drift = (number & 1) != 0,
@@ -17,7 +17,8 @@ constexpr FurtherStates set_of_further_states(int number) {
           .clock_offset = (number & 8) != 0,
           .orbital_error = (number & 16) != 0,
           .clock_rate = (number & 32) != 0,
-          .orbital_drift = (number & 64) != 0};
+          .orbital_drift = (number & 64) != 0,
+          .polhode = (number & 128) != 0};
 }
 
 /// Whether `predicate` holds for every layout that there is; where the compiler counts its steps, of one star tracker
@@ -95,7 +96,9 @@ constexpr bool parts_are_in_their_order(const Layout& layout) {
   return layout.direction(0) == 0 && layout.dynamic() >= layout.direction(layout.gyros) &&
          layout.drift(0) == layout.dynamic() && layout.drift(0) + layout.parameters() == layout.behind_parameters() &&
          layout.alignment(last) + 3 == layout.behind_parameters() &&
-         layout.drift(0) + layout.drift_parameters() == layout.readout(0) && layout.readout(0) <= layout.shared() &&
+         layout.drift(0) + layout.drift_parameters() == layout.readout(0) &&
+         layout.amplitudes() == layout.behind_parameters() &&
+         layout.amplitudes() + layout.amplitudes_size() == layout.readout(0) && layout.readout(0) <= layout.shared() &&
          layout.shared() + layout.shared_size() == layout.size() &&
          layout.dynamic() + layout.constants() == layout.size();
 }
@@ -104,12 +107,33 @@ constexpr bool columns_of_drift_fill(const Layout& layout) {
   const int wandering = layout.further.wandering_drift ? 3 : 0;
   const int change = layout.further.coefficient_change ? Layout::kEq1 : 0;
   const int orbital = layout.further.orbital_drift ? 6 : 0;
+  const int polhode = layout.further.polhode ? 2 * Layout::kEq1 : 0;
   return layout.wandering_column() == layout.drift_size() &&
          layout.change_column() == layout.drift_size() + wandering &&
          layout.orbital_column() == layout.change_column() + change &&
-         layout.drift_columns() == layout.orbital_column() + orbital;
+         layout.polhode_column() == layout.orbital_column() + orbital &&
+         layout.drift_columns() == layout.polhode_column() + polhode;
 }
 static_assert(for_every_layout(columns_of_drift_fill));
+
+constexpr bool blocks_are_those_of_their_states(const Layout& layout) {
+  constexpr FurtherState kStates[] = {FurtherState::kCoefficientChange, FurtherState::kOrbitalDrift,
+                                      FurtherState::kPolhode};
+  for (int k = 0; k < layout.gyros; ++k) {
+    int column = layout.change_column();
+    for (std::size_t i = 0; i < 3; ++i) {
+      const Layout::Block block = layout.beside_kappa(k)[i];
+      const FurtherState state = kStates[i];
+      if (block.size != (layout.has(state) ? kind_of(state).size : 0) || block.state != layout.first(state, k) ||
+          block.column != column) {
+        return false;
+      }
+      column += block.size;
+    }
+  }
+  return true;
+}
+static_assert(for_every_layout(blocks_are_those_of_their_states));
 
 static_assert(for_every_layout([](const Layout& layout) { return kFullCapacity.holds(layout); }));
 static_assert(for_every_layout([](const Layout& layout) {

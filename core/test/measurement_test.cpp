@@ -233,6 +233,7 @@ TEST(CarryBack, IsTheChainWithTheSensitivities) {
     phi.middleCols<3>(layout.wandering(k)) = by_drift.middleCols<3>(layout.wandering_column());
     phi.middleCols<7>(layout.change(k)) = by_drift.middleCols<7>(layout.change_column());
     phi.middleCols<6>(layout.orbital_drift(k)) = by_drift.middleCols<6>(layout.orbital_column());
+    phi.middleCols<14>(layout.polhode(k)) = by_drift.middleCols<14>(layout.polhode_column());
   }
   Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor, 4, kMaxStates> rows(4, layout.size());
   rows = Eigen::MatrixXd::NullaryExpr(4, layout.size(), some);
@@ -241,6 +242,7 @@ TEST(CarryBack, IsTheChainWithTheSensitivities) {
     rows.middleCols<3>(layout.wandering(k)).setZero();
     rows.middleCols<7>(layout.change(k)).setZero();
     rows.middleCols<6>(layout.orbital_drift(k)).setZero();
+    rows.middleCols<14>(layout.polhode(k)).setZero();
   }
   const Eigen::MatrixXd chain = rows * now;
   carry_back(layout, since, rows);

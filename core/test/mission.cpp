@@ -17,6 +17,10 @@ CalibrationSetup setup_of(const MissionPlan& plan) {
   setup.wandering_drift = {2e-7, 300};
   setup.further_sigma[FurtherState::kCoefficientChange] = 2e-6;
   setup.further_sigma[FurtherState::kOrbitalDrift] = 1e-6;
+  setup.further_sigma[FurtherState::kPolhode] = 1e-6;
+  for (int k = 0; k < plan.layout.gyros; ++k) {
+    setup.polhodes[k] = {static_cast<float>(100 + 30 * k), 0.1F};
+  }
   setup.change.duration_s = 600;
   setup.change.zero_at = Time(from_seconds(100));
   setup.orbital_rate_rad_s = 0.02;
@@ -50,6 +54,10 @@ Mission::Mission(const MissionPlan& plan) : given(plan.layout) {
     if (layout.further.orbital_drift) {
       const double sigma = setup.further_sigma[FurtherState::kOrbitalDrift];
       gyro.drift_rad_s.segment<6>(layout.orbital_column()) << sigma * white(), sigma * white();
+    }
+    if (layout.further.polhode) {
+      auto its = gyro.drift_rad_s.segment<Layout::kPolhode>(layout.polhode_column());
+      its = setup.further_sigma[FurtherState::kPolhode] / (plan.calibration_sigma * kDriftSigma_rad_s) * its;
     }
     if (layout.further.readout_bias) {
       gyro.readout_bias = setup.further_sigma[FurtherState::kReadoutBias] * white();
@@ -147,6 +155,9 @@ Eigen::VectorXd Mission::errors(const FullEstimator& estimator, std::size_t last
     }
     if (layout.further.orbital_drift) {
       errors.segment<6>(layout.orbital_drift(k)) = drift.segment<6>(layout.orbital_column());
+    }
+    if (layout.further.polhode) {
+      errors.segment<14>(layout.polhode(k)) = drift.segment<14>(layout.polhode_column());
     }
   }
   errors.tail(layout.shared_size()) = shared - estimator.shared();

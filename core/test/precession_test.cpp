@@ -266,6 +266,37 @@ TEST(CourseOfChange, OfAJumpIsAllAtOnce) {
   EXPECT_NEAR(course.mean_part(Time(from_seconds(699)), Time(from_seconds(703))), 0.75, 1e-14);
 }
 
+TEST(Polhode, TurnsByTheIntegralOverItsPeriod) {
+  for (const float rate : {0.0F, 0.02F, -0.02F, 1e-9F}) {
+    const Polhode polhode{7200, rate};
+    for (const double end_s : {-9000.0, 0.0, 700.0, 32400.0, 150000.0}) {
+      constexpr int kPieces = 1000;
+      double turned = 0;
+      for (int i = 0; i < kPieces; ++i) {
+        const double at_s = (i + 0.5) * end_s / kPieces;
+        const double period_s = 7200 + static_cast<double>(rate) * at_s;
+        turned += 2 * std::numbers::pi * end_s / kPieces / period_s;
+      }
+      EXPECT_NEAR(polhode.angle_rad(end_s), turned, 2e-6 * std::abs(turned)) << rate << " " << end_s;
+      // From another time on, the period as it is then.
+      const double more = polhode.angle_rad(end_s + 5000) - polhode.angle_rad(end_s);
+      EXPECT_NEAR(polhode.after(end_s).angle_rad(5000), more, 1e-6) << rate << " " << end_s;
+    }
+  }
+}
+
+TEST(Polhode, ItsPeriodStaysBetweenHalfAndTwiceWhatItWas) {
+  for (const double times : {0.5, 2.0}) {
+    const double rate = times > 1 ? 0.1 : -0.05;
+    const Polhode polhode{7200, static_cast<float>(rate)};
+    const double reached_s = 7200 * (times - 1) / rate;
+    const double from = polhode.angle_rad(reached_s);
+    EXPECT_NEAR(from, 2 * std::numbers::pi * std::log(times) / rate, 1e-5);
+    EXPECT_NEAR(polhode.angle_rad(reached_s + 7200 * times) - from, 2 * std::numbers::pi, 1e-9);
+    EXPECT_NEAR(polhode.angle_rad(reached_s + 7200000 * times) - from, 2000 * std::numbers::pi, 1e-6);
+  }
+}
+
 /// dw = −w/T dt + dn: a value decays exponentially, and the noise of density 2σ²/T that comes meanwhile is that decayed
 /// too, here summed up over a thousand small pieces.
 TEST(GaussMarkov, IsTheSolutionOfItsDifferentialEquation) {

@@ -106,12 +106,12 @@ TEST(SetUp, RefusesPriorsThatAreNotPositiveDefinite) {
   EXPECT_EQ(fault_after([](FullGiven& given) { given.covariance.resize(0, 0); }), kFault);
 }
 
-TEST(SetUp, TakesACommonPriorOfParametersAndDriftAtOrbitalPeriod) {
-  const Layout layout{.further = {.readout_bias = true, .orbital_drift = true}};
+TEST(SetUp, TakesACommonPriorOfParametersAndDriftThatComesBack) {
+  const Layout layout{.further = {.readout_bias = true, .orbital_drift = true, .polhode = true}};
   FullGiven given(layout);
   const int parameters = layout.parameters();
   const Eigen::VectorXd sigma = (Eigen::VectorXd(layout.drift_parameters()) << given.covariance.diagonal().cwiseSqrt(),
-                                 Eigen::VectorXd::Constant(12, 3e-8))
+                                 Eigen::VectorXd::Constant(layout.amplitudes_size(), 3e-8))
                                     .finished();
   Eigen::MatrixXd correlation = Eigen::MatrixXd::Identity(sigma.size(), sigma.size());
   correlation(parameters + 2, 4) = correlation(4, parameters + 2) = -0.9;
@@ -148,6 +148,7 @@ const Described kDescribed[] = {
     {&FurtherStates::clock_offset, sigma_of<FurtherState::kClockOffset>},
     {&FurtherStates::orbital_error, sigma_of<FurtherState::kOrbitalError>},
     {&FurtherStates::orbital_drift, sigma_of<FurtherState::kOrbitalDrift>},
+    {&FurtherStates::polhode, sigma_of<FurtherState::kPolhode>},
 };
 
 TEST(SetUp, RefusesACourseWithoutATime) {
@@ -163,6 +164,23 @@ TEST(SetUp, RefusesACourseWithoutATime) {
     EXPECT_EQ(fault_of(CourseOfChange::Kind::kEven, bad), std::nullopt) << bad;
   }
   EXPECT_EQ(fault_of(CourseOfChange::Kind::kWarmUp, 3600), std::nullopt);
+}
+
+TEST(SetUp, RefusesAPolhodeWithoutAPeriod) {
+  constexpr float kNoNumber = std::numeric_limits<float>::quiet_NaN();
+  const auto fault_of = [](Polhode polhode) {
+    return fault_after([&](FullGiven& given) { given.setup.polhodes[1] = polhode; });
+  };
+  for (const float bad : {0.0F, -1.0F, kNoNumber, std::numeric_limits<float>::infinity()}) {
+    EXPECT_EQ(fault_of({bad, 0}), SetupFault::kPriorNotPositiveDefinite) << bad;
+  }
+  EXPECT_EQ(fault_of({7200, kNoNumber}), SetupFault::kPriorNotPositiveDefinite);
+  EXPECT_EQ(fault_of({7200, -0.1F}), std::nullopt);
+  Layout without = kEverything;
+  without.further.polhode = false;
+  FullGiven given(without);
+  given.setup.polhodes[1].period_s = 0;
+  EXPECT_EQ(given.fault(), std::nullopt);
 }
 
 TEST(SetUp, RefusesFurtherStatesThatNothingIsKnownOf) {

@@ -96,9 +96,10 @@ Member float_member(std::string_view key, float& target, const Range& range, std
 }
 
 Members polhode_members(PolhodeDrift& drift) {
-  return {float_member("period_s", drift.polhode.period_s, limits::kPolhodePeriod_s, "at the epoch, where its angle is 0"),
-          float_member("period_rate", drift.polhode.period_rate, limits::kPolhodePeriodRate, "seconds per second"),
-          eq1_member("sine_rad_s", drift.sine_rad_s), eq1_member("cosine_rad_s", drift.cosine_rad_s)};
+  return {
+      float_member("period_s", drift.polhode.period_s, limits::kPolhodePeriod_s, "at the epoch, where its angle is 0"),
+      float_member("period_rate", drift.polhode.period_rate, limits::kPolhodePeriodRate, "seconds per second"),
+      eq1_member("sine_rad_s", drift.sine_rad_s), eq1_member("cosine_rad_s", drift.cosine_rad_s)};
 }
 
 Members gyro_members(GyroCalibration& gyro) {
@@ -116,9 +117,9 @@ Members gyro_members(GyroCalibration& gyro) {
       optional_member(
           {"orbital_drift", "drift that comes back with each orbit", schema_of(orbital_drift_members(orbital)),
            [&gyro](const JsonNode& node) { read_members(node, orbital_drift_members(gyro.orbital_drift.emplace())); }}),
-      optional_member(
-          {"polhode", "coefficients that come and go with the polhode of the rotor", schema_of(polhode_members(polhode)),
-           [&gyro](const JsonNode& node) { read_members(node, polhode_members(gyro.polhode.emplace())); }}),
+      optional_member({"polhode", "coefficients that come and go with the polhode of the rotor",
+                       schema_of(polhode_members(polhode)),
+                       [&gyro](const JsonNode& node) { read_members(node, polhode_members(gyro.polhode.emplace())); }}),
       {"momentum_in", "its direction at t_s, a unit vector", three_of(number_schema()),
        [&gyro](const JsonNode& node) { gyro.momentum_in = parse_momentum(node); }}};
 }
@@ -634,7 +635,8 @@ void read_gyros(const JsonNode& node, Calibration& calibration) {
       gyro.orbital_drift->zero_at = calibration.epoch;
     }
     if (gyro.polhode.has_value() != calibration.gyros.front().polhode.has_value()) {
-      node.refuse("has coefficients that come and go with the polhode of some gyros alone", "give it to all gyros, or to none");
+      node.refuse("has coefficients that come and go with the polhode of some gyros alone",
+                  "give it to all gyros, or to none");
     }
     if (gyro.polhode) {
       gyro.polhode->zero_at = calibration.epoch;

@@ -330,7 +330,8 @@ std::string format_config(const CalibrationOptions& options) {
                const auto period_s = static_cast<double>(states.polhodes[k].period_s);
                return fmt::format("\"{}\"", format_duration(from_seconds(period_s)));
              }));
-  out.number(kPolhodePeriodRate, for_each_gyro([&](int k) { return fmt::format("{}", states.polhodes[k].period_rate); }));
+  out.number(kPolhodePeriodRate,
+             for_each_gyro([&](int k) { return fmt::format("{}", states.polhodes[k].period_rate); }));
 
   out.section("corrections");
   out.word("interval", format_correction_interval(options.corrections));

@@ -196,6 +196,14 @@ Calibration full_calibration() {
       (i < 3 ? drift.sine_rad_s : drift.cosine_rad_s)(i % 3) = value;
       calibration.further.push_back({ParameterId::further(FurtherState::kOrbitalDrift, k, i), value, 1e-9 / 3});
     }
+    PolhodeDrift& polhode = calibration.gyros[k].polhode.emplace();
+    polhode.polhode = {5000.3F + 700.0F * static_cast<float>(k), 0.03F};
+    polhode.zero_at = calibration.epoch;
+    for (int i = 0; i < Layout::kPolhode; ++i) {
+      const double value = 1e-8 * (i - 5.0 + 3.0 * static_cast<double>(k)) / 3;
+      (i < Layout::kEq1 ? polhode.sine_rad_s : polhode.cosine_rad_s)(i % Layout::kEq1) = value;
+      calibration.further.push_back({ParameterId::further(FurtherState::kPolhode, k, i), value, 1e-9 / 3});
+    }
   }
   calibration.determined = Determined{13, 14};
   calibration.statistics.innovation_rms_rad = {1e-5 / 3, 2e-5, 3e-5, 4e-5 / 7};
@@ -238,6 +246,16 @@ void expect_same(const Calibration& a, const Calibration& b) {
       for (int axis = 0; axis < 3; ++axis) {
         expect_near(a.gyros[k].orbital_drift->sine_rad_s(axis), b.gyros[k].orbital_drift->sine_rad_s(axis));
         expect_near(a.gyros[k].orbital_drift->cosine_rad_s(axis), b.gyros[k].orbital_drift->cosine_rad_s(axis));
+      }
+    }
+    ASSERT_EQ(a.gyros[k].polhode.has_value(), b.gyros[k].polhode.has_value());
+    if (a.gyros[k].polhode) {
+      EXPECT_EQ(a.gyros[k].polhode->polhode.period_s, b.gyros[k].polhode->polhode.period_s);
+      EXPECT_EQ(a.gyros[k].polhode->polhode.period_rate, b.gyros[k].polhode->polhode.period_rate);
+      EXPECT_EQ(a.gyros[k].polhode->zero_at, b.gyros[k].polhode->zero_at);
+      for (int i = 0; i < Layout::kEq1; ++i) {
+        expect_near(a.gyros[k].polhode->sine_rad_s(i), b.gyros[k].polhode->sine_rad_s(i));
+        expect_near(a.gyros[k].polhode->cosine_rad_s(i), b.gyros[k].polhode->cosine_rad_s(i));
       }
     }
   }

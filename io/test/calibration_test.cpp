@@ -91,22 +91,30 @@ TEST(CalibrationJson, NamesTheStartUpWhereItIsKnown) {
   EXPECT_EQ(parse_calibration(format_calibration(calibration), "c.json").start_up, calibration.start_up);
 }
 
-TEST(CalibrationJson, HasDriftAtOrbitalPeriodAmongTheStatesOfItsCovariance) {
-  Calibration calibration = sample_with_orbital_drift();
+TEST(CalibrationJson, HasDriftThatComesBackAmongTheStatesOfItsCovariance) {
+  Calibration calibration = sample_with_drift_that_comes_back();
   const Time told_from = calibration.epoch + std::chrono::minutes(7);
   for (GyroCalibration& gyro : calibration.gyros) {
-    gyro.orbital_drift->zero_at = told_from;
+    gyro.orbital_drift->zero_at = gyro.polhode->zero_at = told_from;
   }
   const std::string text = format_calibration(calibration);
   const Calibration back = parse_calibration(text, "c.json");
   EXPECT_EQ(back.states, calibration.states);
   EXPECT_EQ(back.covariance, calibration.covariance);
-  EXPECT_EQ(back.orbital_drift_covariance, calibration.orbital_drift_covariance);
+  EXPECT_EQ(back.amplitude_covariance, calibration.amplitude_covariance);
   ASSERT_TRUE(back.gyros[1].orbital_drift);
   EXPECT_EQ(back.gyros[1].orbital_drift->zero_at, calibration.epoch);
   const OrbitalDrift as_before = back.gyros[1].orbital_drift->from(told_from);
   EXPECT_TRUE(as_before.sine_rad_s.isApprox(calibration.gyros[1].orbital_drift->sine_rad_s, 1e-12));
   EXPECT_TRUE(as_before.cosine_rad_s.isApprox(calibration.gyros[1].orbital_drift->cosine_rad_s, 1e-12));
+  const PolhodeDrift& told = *calibration.gyros[1].polhode;
+  ASSERT_TRUE(back.gyros[1].polhode);
+  EXPECT_EQ(back.gyros[1].polhode->zero_at, calibration.epoch);
+  const PolhodeDrift polhode = back.gyros[1].polhode->from(told_from);
+  EXPECT_NEAR(polhode.polhode.period_s, told.polhode.period_s, 1e-3);
+  EXPECT_EQ(polhode.polhode.period_rate, told.polhode.period_rate);
+  EXPECT_TRUE(polhode.sine_rad_s.isApprox(told.sine_rad_s, 1e-6));
+  EXPECT_TRUE(polhode.cosine_rad_s.isApprox(told.cosine_rad_s, 1e-6));
 
   const auto refusal_with = [](std::string changed, const std::string& from, const std::string& to) {
     changed.replace(changed.find(from), from.size(), to);
@@ -115,9 +123,12 @@ TEST(CalibrationJson, HasDriftAtOrbitalPeriodAmongTheStatesOfItsCovariance) {
   EXPECT_THAT(refusal_with(text, "gyro1.orbital_drift_cosine_z_rad_s", "gyro1.other"), HasSubstr("has no row of"));
   EXPECT_THAT(refusal_with(text, "\"rate_rad_s\":0.0011", "\"rate_rad_s\":0.0012"), HasSubstr("different rates"));
   EXPECT_THAT(refusal_with(text, "\"rate_rad_s\":0.0011", "\"rate_rad_s\":1.1"), HasSubstr("outside"));
+  EXPECT_THAT(refusal_with(text, "gyro2.nu31_polhode_cosine_rad_s", "gyro2.other"), HasSubstr("has no row of"));
+  EXPECT_THAT(refusal_with(text, "\"period_rate\":0.03125", "\"period_rate\":1.5"), HasSubstr("outside"));
+  EXPECT_THAT(refusal_with(text, "\"polhode\"", "\"other\""), HasSubstr("polhode of some gyros alone"));
   // Without it, the sigmas of the further states are what is known.
-  calibration.orbital_drift_covariance.resize(0, 0);
-  EXPECT_EQ(parse_calibration(format_calibration(calibration), "c.json").orbital_drift_covariance.size(), 0);
+  calibration.amplitude_covariance.resize(0, 0);
+  EXPECT_EQ(parse_calibration(format_calibration(calibration), "c.json").amplitude_covariance.size(), 0);
 }
 
 TEST(CalibrationJson, ComesBackFromAFileWhole) {

@@ -179,7 +179,7 @@ Calibration sample_calibration() {
   return calibration;
 }
 
-Calibration sample_with_orbital_drift() {
+Calibration sample_with_drift_that_comes_back() {
   Calibration calibration = sample_calibration();
   for (std::size_t k = 0; k < calibration.gyros.size(); ++k) {
     calibration.gyros[k].orbital_drift = {{4e-8, -3e-8, 2e-8}, {-2e-8, 3e-8, 5e-8}, 1.1e-3, calibration.epoch};
@@ -187,9 +187,24 @@ Calibration sample_with_orbital_drift() {
       calibration.further.push_back({ParameterId::further(FurtherState::kOrbitalDrift, k, i), 3e-8, 1e-9});
     }
   }
-  calibration.orbital_drift_covariance.setZero(12, calibration.covariance.rows() + 12);
-  calibration.orbital_drift_covariance.rightCols(12) = 1e-18 * Eigen::MatrixXd::Identity(12, 12);
-  calibration.orbital_drift_covariance(3, 0) = 1e-20;
+  for (std::size_t k = 0; k < calibration.gyros.size(); ++k) {
+    PolhodeDrift& drift = calibration.gyros[k].polhode.emplace();
+    drift.polhode = {static_cast<float>(5000 + 700 * k), 0.03125F};
+    drift.zero_at = calibration.epoch;
+    for (int i = 0; i < Layout::kEq1; ++i) {
+      drift.sine_rad_s(i) = 1e-8 * (i - 3);
+      drift.cosine_rad_s(i) = 2e-8 * (i + 1);
+    }
+    for (int i = 0; i < Layout::kPolhode; ++i) {
+      const double value = i < Layout::kEq1 ? drift.sine_rad_s(i) : drift.cosine_rad_s(i - Layout::kEq1);
+      calibration.further.push_back({ParameterId::further(FurtherState::kPolhode, k, i), value, 1e-9});
+    }
+  }
+  constexpr Eigen::Index kAmplitudes = 2 * (Layout::kOrbitalDrift + Layout::kPolhode);
+  calibration.amplitude_covariance.setZero(kAmplitudes, calibration.covariance.rows() + kAmplitudes);
+  calibration.amplitude_covariance.rightCols(kAmplitudes) = 1e-18 * Eigen::MatrixXd::Identity(kAmplitudes, kAmplitudes);
+  calibration.amplitude_covariance(3, 0) = 1e-20;
+  calibration.amplitude_covariance(17, 2) = -1e-20;
   return calibration;
 }
 

@@ -83,7 +83,8 @@ struct RawPass {
 [[nodiscard]] Truth clean_truth();
 [[nodiscard]] Calibration sample_calibration();
 /// With drift at orbital period of both gyros, told from its epoch on, and what it has in common with a coefficient.
-[[nodiscard]] Calibration sample_with_orbital_drift();
+/// At orbital period, and with the polhodes.
+[[nodiscard]] Calibration sample_with_drift_that_comes_back();
 
 /// An OEM of twenty minutes of a round orbit from the epoch of clean_pass() on, in two segments, KVN or XML.
 [[nodiscard]] std::string orbit_message(bool xml);

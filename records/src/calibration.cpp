@@ -20,7 +20,8 @@ OrbitalDrift OrbitalDrift::from(Time zero) const {
 PolhodeDrift PolhodeDrift::from(Time zero) const {
   const double sine = std::sin(angle_rad(zero));
   const double cosine = std::cos(angle_rad(zero));
-  return {polhode.after(to_seconds(zero - zero_at)), zero, cosine * sine_rad_s - sine * cosine_rad_s, sine * sine_rad_s + cosine * cosine_rad_s};
+  return {polhode.after(to_seconds(zero - zero_at)), zero, cosine * sine_rad_s - sine * cosine_rad_s,
+          sine * sine_rad_s + cosine * cosine_rad_s};
 }
 
 double value_of(const Calibration& calibration, const ParameterId& state) {

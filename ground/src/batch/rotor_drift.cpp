@@ -55,8 +55,8 @@ void RotorDrift::add(DriftCoefficient::Member potential, int degree, int order, 
 }
 
 Vector3d RotorDrift::rate(const Vector3d& h, const DriftTime& time) const {
-  const Esg7::Coefficients<double> eq1 = eq1_ + time.part_of_change * change_ + time.polhode_sine * polhode_sine_ +
-                                         time.polhode_cosine * polhode_cosine_;
+  const Esg7::Coefficients<double> eq1 =
+      eq1_ + time.part_of_change * change_ + time.polhode_sine * polhode_sine_ + time.polhode_cosine * polhode_cosine_;
   Vector3d rate =
       Esg7::rate<double>(h, eq1) + time.orbital_sine * orbital_sine_ + time.orbital_cosine * orbital_cosine_;
   if (cube_d_ != 0) {

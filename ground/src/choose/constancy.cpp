@@ -393,9 +393,9 @@ class PolhodeSearch {
         sigma_(std::move(sigma)) {}
 
   [[nodiscard]] LikelyPolhode of_gyro(int gyro) const {
-    constexpr double kStep = 0.25;        // of a turn: half a turn apart, one is a quarter as likely to be seen
+    constexpr double kStep = 0.25;         // of a turn: half a turn apart, one is a quarter as likely to be seen
     constexpr double kStretchesATurn = 4;  // at least
-    constexpr double kMostChange = 0.5;   // of the period, over the pass
+    constexpr double kMostChange = 0.5;    // of the period, over the pass
     constexpr double kWorthMore = 3;
     Found best{1, 0, -std::numeric_limits<double>::infinity()};
     int tries = 0;
@@ -423,8 +423,8 @@ class PolhodeSearch {
       for (double step = kStep / 2; step > 1e-3;) {
         const Found at = best;
         const bool is_better = consider(at.turns - step, at.change) || consider(at.turns + step, at.change) ||
-                               (std::abs(at.change) < kMostChange && (consider(at.turns, at.change - step / 2) ||
-                                                                      consider(at.turns, at.change + step / 2)));
+                               (std::abs(at.change) < kMostChange &&
+                                (consider(at.turns, at.change - step / 2) || consider(at.turns, at.change + step / 2)));
         step /= is_better ? 1 : 2;
       }
     }

@@ -1,6 +1,7 @@
 #include "trihedron/ground/judge/verdict.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <Eigen/Eigenvalues>
 #include <algorithm>
@@ -493,6 +494,25 @@ void judge_at_orbital_period(const AtOrbitalPeriod& its, const CalibrationRun& r
   }
 }
 
+void judge_polhodes(const CalibrationRun& run, std::vector<Finding>& findings) {
+  constexpr double kSigmasToReport = 5;
+  const FurtherEstimate* const largest = largest_of(run, FurtherState::kPolhode, kSigmasToReport);
+  if (largest == nullptr) {
+    return;
+  }
+  std::vector<double> periods_min;
+  for (std::size_t k = 0; k < run.calibration.gyros.size(); ++k) {
+    periods_min.push_back(static_cast<double>(run.options.further_states.polhodes[static_cast<int>(k)].period_s) / 60);
+  }
+  add(findings, FindingCode::kPolhodeFound,
+      "The coefficients come and go as with the polhode of each rotor; the calibration has taken account of it.",
+      fmt::format("periods at the start of the pass {:.1f} min; largest amplitude {:.1e} rad/s, {}, {:.0f} sigmas",
+                  fmt::join(periods_min, " and "), largest->value, name_of(largest->parameter),
+                  std::abs(largest->value / largest->sigma)),
+      "None needed. The periods change, and what is not known of them is in no sigma: calibrate again after some of "
+      "them.");
+}
+
 void judge_noise(const Pass& pass, const CalibrationRun& run, std::vector<Finding>& findings) {
   if (const auto& found = run.options.star_tracker_noise_rad; found && run.options.find_noise) {
     const Eigen::Vector3d given = pass.settings.star_tracker_noise_rad / kArcsecond;
@@ -832,6 +852,7 @@ Verdict judge(const Pass& pass, const CalibrationRun& run) {
   judge_clocks(pass, run, findings);
   judge_at_orbital_period(kErrorAtOrbitalPeriod, run, findings);
   judge_at_orbital_period(kDriftAtOrbitalPeriod, run, findings);
+  judge_polhodes(run, findings);
   judge_determination(run, findings);
   judge_prior_sigmas(pass, run, findings);
   judge_steadiness(pass, run, findings);

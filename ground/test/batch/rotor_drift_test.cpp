@@ -16,7 +16,7 @@ TEST(RotorDrift, IsTheDriftModelWithItsCoefficients) {
   for (const DriftModelId& id : {kEsg7, kEsg20, vsh(1), vsh(3), vsh(8)}) {
     for (const FurtherStates& further :
          {FurtherStates{}, FurtherStates{.wandering_drift = true}, FurtherStates{.coefficient_change = true},
-          FurtherStates{.orbital_drift = true}, kAllFurtherStates}) {
+          FurtherStates{.orbital_drift = true}, FurtherStates{.polhode = true}, kAllFurtherStates}) {
       const DriftModel model(id, further);
       Eigen::VectorXd coefficients = Eigen::VectorXd::NullaryExpr(model.columns(), [&] { return normal(random); });
       if (further.wandering_drift) {
@@ -26,7 +26,7 @@ TEST(RotorDrift, IsTheDriftModelWithItsCoefficients) {
       for (int i = 0; i < 20; ++i) {
         const Eigen::Vector3d h = i < 3 ? Eigen::Vector3d::Unit(i)  // poles among them
                                         : Eigen::Vector3d(normal(random), normal(random), normal(random)).normalized();
-        const DriftTime time{normal(random), normal(random), normal(random)};
+        const DriftTime time{normal(random), normal(random), normal(random), normal(random), normal(random)};
         const Eigen::Vector3d across = model.rate(h, time, coefficients.data()).cross(h);
         // Parts along h move nothing, and depend on how the polynomials are written.
         EXPECT_LT((rotor.rate(h, time).cross(h) - across).norm(), 1e-13 * (1 + coefficients.norm())) << i;

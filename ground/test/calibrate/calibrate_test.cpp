@@ -11,8 +11,8 @@
 #include <string_view>
 #include <vector>
 
+#include "added_drift.hpp"
 #include "named.hpp"
-#include "orbital_drift.hpp"
 #include "passes.hpp"
 #include "trihedron/core/frames.hpp"
 #include "trihedron/ground/evaluate/evaluate.hpp"
@@ -463,6 +463,9 @@ TEST(SetupError, NamesWhatIsWrongWithAnEarlierCalibration) {
   paper.estimator = Estimator::kPaper;
   EXPECT_THROW(static_cast<void>(navigate(pass, paper)), SetupError);
   pass.settings.prior->gyros[1].orbital_drift.reset();
+  pass.settings.prior->gyros[1].polhode.emplace();
+  EXPECT_THROW(static_cast<void>(navigate(pass, paper)), SetupError);
+  pass.settings.prior->gyros[1].polhode.reset();
   EXPECT_NO_THROW(static_cast<void>(navigate(pass, paper)));
 }
 
@@ -487,6 +490,13 @@ TEST(Calibrate, DecidesByItselfForClockOffsetAndErrorAtOrbitalPeriod) {
   EXPECT_GT(run.orbital_error_over_drift.value(), 5);
 }
 
+/// Error of the alignment of a gyro, about the worst axis.
+double worst_in_sigmas(const Calibration& calibration, const Truth& truth, std::size_t gyro) {
+  const Eigen::Array3d error = alignment_error(calibration, truth, gyro).array();
+  const Eigen::Index row = rows_of(calibration, {ParameterId::alignment(gyro, 0)})[0];
+  return (error / calibration.covariance.diagonal().segment<3>(row).array().sqrt()).abs().maxCoeff();
+}
+
 TEST(Calibrate, DoesNotTakeDriftAtOrbitalPeriodForAnErrorOfTheStarTracker) {
   Scenario scenario;
   scenario.seed = 1;
@@ -508,9 +518,91 @@ TEST(Calibrate, DoesNotTakeDriftAtOrbitalPeriodForAnErrorOfTheStarTracker) {
   }
   EXPECT_LT(beyond, 0.01 * static_cast<double>(errors.t.size()));
   for (std::size_t gyro = 0; gyro < 2; ++gyro) {
-    const Eigen::Array3d error = alignment_error(run.calibration, simulated.truth, gyro).array();
-    const Eigen::Index row = rows_of(run.calibration, {ParameterId::alignment(gyro, 0)})[0];
-    EXPECT_LT((error / run.calibration.covariance.diagonal().segment<3>(row).array().sqrt()).abs().maxCoeff(), 4);
+    EXPECT_LT(worst_in_sigmas(run.calibration, simulated.truth, gyro), 4);
+  }
+}
+
+/// Polhodes of two rotors.
+std::array<PolhodeDrift, 2> two_polhodes(Time epoch) {
+  std::array<PolhodeDrift, 2> polhodes;
+  polhodes[0].polhode = {4200, 0.02F};
+  polhodes[0].sine_rad_s << 2e-7, -1e-7, 3e-7, 1e-7, -2e-7, 2e-7, 1e-7;
+  polhodes[0].cosine_rad_s << -1e-7, 2e-7, 1e-7, -2e-7, 3e-7, 1e-7, -1e-7;
+  polhodes[1].polhode = {6100, -0.01F};
+  polhodes[1].sine_rad_s << -1e-7, 3e-7, 2e-7, -2e-7, 1e-7, -1e-7, 2e-7;
+  polhodes[1].cosine_rad_s << 2e-7, 1e-7, -1e-7, 3e-7, 2e-7, -2e-7, 1e-7;
+  polhodes[0].zero_at = polhodes[1].zero_at = epoch;
+  return polhodes;
+}
+
+/// Of the amplitudes with the polhodes, told from the epoch of the calibration on.
+void expect_amplitudes(const Calibration& calibration, const std::array<PolhodeDrift, 2>& truth) {
+  ASSERT_EQ(calibration.further.size(), 28U);
+  for (const FurtherEstimate& its : calibration.further) {
+    const PolhodeDrift told = truth[its.parameter.owner].from(calibration.epoch);
+    const int component = its.parameter.component;
+    const double expected = component < 7 ? told.sine_rad_s(component) : told.cosine_rad_s(component - 7);
+    EXPECT_LT(std::abs(its.value - expected), 4.5 * its.sigma) << name_of(its.parameter);
+  }
+}
+
+TEST(Calibrate, FindsThePolhodeOfEachRotor) {
+  sim::SimulatedPass simulated = sim::simulate(scenario_in_eq1(8, std::chrono::hours(6)));
+  const std::array<PolhodeDrift, 2> truth = two_polhodes(simulated.pass.settings.epoch);
+  for (int k = 0; k < 2; ++k) {
+    add_polhode(simulated.truth, truth[static_cast<std::size_t>(k)], k, simulated.pass.gyro);
+  }
+  const CalibrationRun run = calibrate(simulated.pass, {});
+  EXPECT_THAT(run.calibration.verdict.findings,
+              ElementsAre(testing::Field(&Finding::code, FindingCode::kPolhodeFound)));
+  EXPECT_TRUE(run.calibration.verdict.trustworthy);
+  for (std::size_t k = 0; k < 2; ++k) {
+    const Polhode& found = run.calibration.gyros[k].polhode.value().polhode;
+    EXPECT_NEAR(found.period_s, truth[k].polhode.period_s, 30);
+    EXPECT_NEAR(found.period_rate, truth[k].polhode.period_rate, 0.003);
+    EXPECT_LT(worst_in_sigmas(run.calibration, simulated.truth, k), 4);
+  }
+}
+
+TEST(Calibrate, CarriesThePolhodesOnToAnotherPass) {
+  sim::SimulatedPass first = sim::simulate(scenario_in_eq1(6, std::chrono::hours(3)));
+  const std::array<PolhodeDrift, 2> truth = two_polhodes(first.pass.settings.epoch);
+  // Another flight, at other angles of the polhodes.
+  sim::SimulatedPass next =
+      sim::simulate(with_gyros_of(first.truth, scenario_in_eq1(7, std::chrono::hours(3)), std::chrono::minutes(437)));
+  CalibrationOptions options = told();
+  options.further_states[FurtherState::kPolhode] = FurtherStateOptions::Choice::kOn;
+  for (int k = 0; k < 2; ++k) {
+    const PolhodeDrift& its = truth[static_cast<std::size_t>(k)];
+    options.further_states.polhodes[k] = its.polhode;
+    add_polhode(first.truth, its, k, first.pass.gyro);
+    add_polhode(next.truth, its.from(next.pass.settings.epoch), k, next.pass.gyro);
+  }
+  for (const Estimator estimator : {Estimator::kInvariant, Estimator::kBatch}) {
+    options.estimator = estimator;
+    const Calibration before = calibrate(first.pass, options).calibration;
+    EXPECT_EQ(before.amplitude_covariance.rows(), 28);
+    EXPECT_EQ(before.amplitude_covariance.cols(), 48);
+    expect_amplitudes(before, truth);
+    next.pass.settings.prior = before;
+    CalibrationOptions again;
+    again.estimator = estimator;
+    const Calibration after = calibrate(next.pass, again).calibration;
+    expect_amplitudes(after, truth);
+    EXPECT_LT(after.further[0].sigma, before.further[0].sigma);
+    EXPECT_LT(nees_of(next.truth, after), 45);
+    // One fix, then three hours by what the first pass has found.
+    CalibrationOptions open_loop;
+    open_loop.estimator = estimator;
+    open_loop.corrections.when = CorrectionOptions::When::kOnlyFirst;
+    Pass one_fix = next.pass;
+    one_fix.star_tracker.t.resize(1);
+    one_fix.star_tracker.q_in_c.resize(1);
+    const NavigationRun flown = navigate(one_fix, open_loop);
+    const AttitudeErrors errors = attitude_errors(flown.attitude, next.truth.t, next.truth.q_in_c);
+    const Eigen::Vector3d last_sigma_rad = errors.sigma_rad.back();
+    EXPECT_LT(errors.error_rad.back().cwiseQuotient(last_sigma_rad).cwiseAbs().maxCoeff(), 4);
+    EXPECT_LT(last_sigma_rad.maxCoeff(), kArcminute);
   }
 }
 
@@ -537,8 +629,8 @@ TEST(Calibrate, CarriesDriftAtOrbitalPeriodOnToAnotherPass) {
   for (const Estimator estimator : {Estimator::kInvariant, Estimator::kBatch}) {
     options.estimator = estimator;
     const Calibration before = calibrate(first.pass, options).calibration;
-    EXPECT_EQ(before.orbital_drift_covariance.rows(), 12);
-    EXPECT_EQ(before.orbital_drift_covariance.cols(), 32);
+    EXPECT_EQ(before.amplitude_covariance.rows(), 12);
+    EXPECT_EQ(before.amplitude_covariance.cols(), 32);
     next.pass.settings.prior = before;
     CalibrationOptions again;
     again.estimator = estimator;
@@ -566,7 +658,7 @@ TEST(Calibrate, CarriesDriftAtOrbitalPeriodOnToAnotherPass) {
     EXPECT_LT(errors.error_rad.back().cwiseQuotient(last_sigma_rad).cwiseAbs().maxCoeff(), 4);
     EXPECT_LT(last_sigma_rad.maxCoeff(), kArcminute);
     // Without what the estimates have in common it would know less, here by an eighth.
-    one_fix.settings.prior->orbital_drift_covariance.resize(0, 0);
+    one_fix.settings.prior->amplitude_covariance.resize(0, 0);
     const NavigationRun apart = navigate(one_fix, open_loop);
     EXPECT_GT(apart.attitude.sigma_rad.back().maxCoeff(), 1.08 * last_sigma_rad.maxCoeff());
   }

@@ -12,7 +12,7 @@
 #include <tuple>
 #include <vector>
 
-#include "orbital_drift.hpp"
+#include "added_drift.hpp"
 #include "passes.hpp"
 #include "trihedron/core/layout.hpp"
 #include "trihedron/ground/calibrate/calibrate.hpp"
@@ -26,7 +26,7 @@ struct Spacecraft {
   DriftModelId drift_model;
   int star_trackers;
   FurtherStates further;  ///< wandering drift, readout bias, coefficient change, clock offset, error at orbital
-                          ///< period, clock rate, drift at orbital period
+                          ///< period, clock rate, drift at orbital period, polhode
 };
 
 /// Each choice of one is together with each choice of any other somewhere.
@@ -34,35 +34,35 @@ const std::vector<Spacecraft>& combinations() {
   static const std::vector<Spacecraft> all = {
       {2, kEsg7, 3, {false, true, false, false, true, false, true}},
       {3, kEsg7, 2, {true, false, true, true, false}},
-      {4, kEsg7, 1, {false, true, true, false, false}},
+      {4, kEsg7, 1, {false, true, true, false, false, false, false, true}},
       {2, kEsg20, 1, {true, false, true, true, true, false, true}},
       {3, kEsg20, 3, {true, true, false, false, false}},
-      {4, kEsg20, 2, {false, false, false, true, true, false, true}},
+      {4, kEsg20, 2, {false, false, false, true, true, false, true, true}},
       {2, vsh(1), 3, {false, false, true, false, false}},
-      {3, vsh(1), 2, {false, true, false, true, true}},
-      {4, vsh(1), 1, {true, false, false, false, true, false, true}},
-      {2, vsh(2), 2, {false, false, true, false, true, false, true}},
+      {3, vsh(1), 2, {false, true, false, true, true, false, false, true}},
+      {4, vsh(1), 1, {true, false, false, false, true, false, true, true}},
+      {2, vsh(2), 2, {false, false, true, false, true, false, true, true}},
       {3, vsh(2), 1, {true, true, false, true, false}},
       {4, vsh(2), 3, {false, true, false, true, false, false, true}},
       {2, vsh(3), 3, {false, true, true, false, true}},
-      {3, vsh(3), 1, {true, false, false, true, false, false, true}},
-      {4, vsh(3), 2, {true, false, false, true, true, false, true}},
+      {3, vsh(3), 1, {true, false, false, true, false, false, true, true}},
+      {4, vsh(3), 2, {true, false, false, true, true, false, true, true}},
       {2, vsh(4), 1, {true, false, true, true, true}},
       {3, vsh(4), 2, {false, true, false, false, false, false, true}},
-      {4, vsh(4), 3, {false, false, false, true, true}},
+      {4, vsh(4), 3, {false, false, false, true, true, false, false, true}},
       {2, vsh(5), 2, {true, true, true, false, true}},
-      {3, vsh(5), 1, {false, false, false, true, false, false, true}},
-      {4, vsh(5), 3, {true, true, false, false, false, false, true}},
+      {3, vsh(5), 1, {false, false, false, true, false, false, true, true}},
+      {4, vsh(5), 3, {true, true, false, false, false, false, true, true}},
       {2, vsh(6), 2, {true, true, true, false, false}},
-      {3, vsh(6), 1, {false, false, false, true, true}},
-      {4, vsh(6), 3, {true, false, false, true, true, false, true}},
+      {3, vsh(6), 1, {false, false, false, true, true, false, false, true}},
+      {4, vsh(6), 3, {true, false, false, true, true, false, true, true}},
   };
   return all;
 }
 
 /// The choices of a combination as numbers from 0, and how many there are of each.
-constexpr std::array<int, 9> kChoices = {3, 3, 8, 2, 2, 2, 2, 2, 2};
-std::array<int, 9> choices_of(const Spacecraft& its) {
+constexpr std::array<int, 10> kChoices = {3, 3, 8, 2, 2, 2, 2, 2, 2, 2};
+std::array<int, 10> choices_of(const Spacecraft& its) {
   const int model = its.drift_model == kEsg7 ? 0 : its.drift_model == kEsg20 ? 1 : 1 + its.drift_model.degree;
   const auto number = [](bool is_on) { return is_on ? 1 : 0; };
   return {its.gyros - 2,
@@ -73,7 +73,8 @@ std::array<int, 9> choices_of(const Spacecraft& its) {
           number(its.further.coefficient_change),
           number(its.further.clock_offset),
           number(its.further.orbital_error),
-          number(its.further.orbital_drift)};
+          number(its.further.orbital_drift),
+          number(its.further.polhode)};
 }
 
 TEST(Combinations, HaveEachChoiceTogetherWithEachOther) {
@@ -106,6 +107,14 @@ const Eigen::Vector3d kReadoutBias = Eigen::Vector3d(10, -15, 20) * kArcsecond;
 const Eigen::Vector3d kOrbitalSine = Eigen::Vector3d(6, -5, 8) * kArcsecond;
 const Eigen::Vector3d kOrbitalDriftSine = {6e-8, -4e-8, 9e-8};
 const Eigen::Vector3d kOrbitalDriftCosine = {-5e-8, 8e-8, 3e-8};
+/// A polhode of minutes.
+PolhodeDrift polhode_of(int gyro) {
+  PolhodeDrift drift;
+  drift.polhode = {static_cast<float>(400 + 60 * gyro), 0.05F};
+  drift.sine_rad_s << 2e-7, -1e-7, 3e-7, 1e-7, -2e-7, 2e-7, 1e-7;
+  drift.cosine_rad_s << -1e-7, 2e-7, 1e-7, -2e-7, 3e-7, 1e-7, -1e-7;
+  return drift;
+}
 const Eigen::Vector3d kHeadMisalignment = Eigen::Vector3d(2e-4, -1e-4, 1e-4);
 
 /// Drift beside eq. (1) as large as the priors of its coefficients say.
@@ -171,6 +180,10 @@ CalibrationOptions options_of(const Spacecraft& its, Estimator estimator) {
   turn_on(FurtherState::kClockOffset, its.further.clock_offset);
   turn_on(FurtherState::kOrbitalError, its.further.orbital_error);
   turn_on(FurtherState::kOrbitalDrift, its.further.orbital_drift);
+  turn_on(FurtherState::kPolhode, its.further.polhode);
+  for (int k = 0; k < its.gyros; ++k) {
+    options.further_states.polhodes[k] = polhode_of(k).polhode;
+  }
   options.further_states.wandering_drift_rad_s = kWandering_rad_s;
   options.further_states.wandering_time = kWanderingTime;
   return options;
@@ -194,6 +207,11 @@ double truth_of(const ParameterId& parameter, const Truth& truth) {
     case FurtherState::kOrbitalDrift:
       return parameter.component < 3 ? kOrbitalDriftSine(parameter.component)
                                      : kOrbitalDriftCosine(parameter.component - 3);
+    case FurtherState::kPolhode: {
+      const PolhodeDrift drift = polhode_of(parameter.owner);
+      return parameter.component < 7 ? drift.sine_rad_s(parameter.component)
+                                     : drift.cosine_rad_s(parameter.component - 7);
+    }
     case FurtherState::kClockRate:
     case FurtherState::kWanderingDrift:
       break;
@@ -206,7 +224,7 @@ std::size_t further_components(const Spacecraft& its) {
          3U * static_cast<std::size_t>(its.star_trackers - 1) +
          static_cast<std::size_t>(its.gyros) *
              ((its.further.readout_bias ? 3U : 0U) + (its.further.coefficient_change ? 7U : 0U) +
-              (its.further.orbital_drift ? 6U : 0U));
+              (its.further.orbital_drift ? 6U : 0U) + (its.further.polhode ? 14U : 0U));
 }
 
 using CombinationAndEstimator = std::tuple<int, Estimator>;
@@ -232,6 +250,9 @@ TEST_P(AnyCombination, IsCalibratedWithinItsSigmas) {
   auto simulated = sim::simulate(scenario_of(its, 300 + static_cast<std::uint64_t>(number)));
   for (int k = 0; its.further.orbital_drift && k < its.gyros; ++k) {
     add_orbital_drift(simulated.truth, kOrbitalDriftSine, kOrbitalDriftCosine, k, simulated.pass.gyro);
+  }
+  for (int k = 0; its.further.polhode && k < its.gyros; ++k) {
+    add_polhode(simulated.truth, polhode_of(k), k, simulated.pass.gyro);
   }
   const CalibrationRun run = calibrate(simulated.pass, options_of(its, estimator));
   const Calibration& found = run.calibration;

@@ -4,9 +4,9 @@
 
 #include <functional>
 
+#include "added_drift.hpp"
 #include "model/orbital_rate.hpp"
 #include "onboard/screen.hpp"
-#include "orbital_drift.hpp"
 #include "passes.hpp"
 #include "trihedron/ground/calibrate/calibrate.hpp"
 

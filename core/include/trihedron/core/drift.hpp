@@ -105,8 +105,8 @@ struct DriftTime {
 using DriftTimes = PerGyro<DriftTime>;
 
 /// Drift of one gyro as a table of columns: ω_b = B(h) κ, κ the coefficients of the members of the model; then, where
-/// the layout has them, the drift that wanders, about the case axes, the change of the coefficients of eq. (1), the drift
-/// at orbital period, about the case axes, and the coefficients of eq. (1) that come and go with the polhode.
+/// the layout has them, the drift that wanders, about the case axes, the change of the coefficients of eq. (1), the
+/// drift at orbital period, about the case axes, and the coefficients of eq. (1) that come and go with the polhode.
 class DriftModel {
  public:
   static constexpr int kMaxMembers = vsh(DriftModelId::kMaxDegree).size();

@@ -46,8 +46,8 @@ inline constexpr FurtherStates kAllFurtherStates{true, true, true, true, true, t
 
 /// First the states that move, then the constants gyro by gyro, then those that the gyros share.
 struct Layout {
-  static constexpr int kEq1 = 7;           ///< coefficients of eq. (1), the first ones of each drift model
-  static constexpr int kOrbitalDrift = 6;  ///< amplitudes of the drift at orbital period
+  static constexpr int kEq1 = 7;             ///< coefficients of eq. (1), the first ones of each drift model
+  static constexpr int kOrbitalDrift = 6;    ///< amplitudes of the drift at orbital period
   static constexpr int kPolhode = 2 * kEq1;  ///< amplitudes of the coefficients with the polhode
 
   int gyros = 2;
@@ -66,9 +66,7 @@ struct Layout {
   [[nodiscard]] constexpr int drift_size() const { return drift_modes < 0 ? drift_model.size() : kEq1 + drift_modes; }
   /// Columns of its drift: κ, then the drift that wanders, then the change of the coefficients of eq. (1), then the
   /// drift at orbital period and the coefficients with the polhode, sine before cosine.
-  [[nodiscard]] constexpr int drift_columns() const {
-    return polhode_column() + (further.polhode ? kPolhode : 0);
-  }
+  [[nodiscard]] constexpr int drift_columns() const { return polhode_column() + (further.polhode ? kPolhode : 0); }
   [[nodiscard]] constexpr int wandering_column() const { return drift_size(); }
   [[nodiscard]] constexpr int change_column() const { return drift_size() + (further.wandering_drift ? 3 : 0); }
   [[nodiscard]] constexpr int orbital_column() const {
@@ -84,8 +82,8 @@ struct Layout {
   [[nodiscard]] constexpr int dynamic() const { return wandering(further.wandering_drift ? gyros : 0); }
   [[nodiscard]] constexpr int drift(int gyro) const { return dynamic() + gyro * (drift_size() + 3); }
   [[nodiscard]] constexpr int alignment(int gyro) const { return drift(gyro) + drift_size(); }
-  /// The amplitudes of the drift at orbital period of one gyro, and behind those of all gyros those of the polhode. With
-  /// κ and δ, behind which they are, they have a common prior.
+  /// The amplitudes of the drift at orbital period of one gyro, and behind those of all gyros those of the polhode.
+  /// With κ and δ, behind which they are, they have a common prior.
   [[nodiscard]] constexpr int orbital_drift(int gyro) const { return drift(gyros) + kOrbitalDrift * gyro; }
   [[nodiscard]] constexpr int polhode(int gyro) const {
     return orbital_drift(further.orbital_drift ? gyros : 0) + kPolhode * gyro;
@@ -179,8 +177,8 @@ inline constexpr std::array<FurtherStateKind, kFurtherStateCount> kFurtherStateK
      &Layout::change, 1e-7},
     {FurtherState::kOrbitalDrift, &FurtherStates::orbital_drift, FurtherStateKind::Owner::kGyro, Layout::kOrbitalDrift,
      &Layout::orbital_drift, 1e-7},
-    {FurtherState::kPolhode, &FurtherStates::polhode, FurtherStateKind::Owner::kGyro, Layout::kPolhode, &Layout::polhode,
-     6e-7},
+    {FurtherState::kPolhode, &FurtherStates::polhode, FurtherStateKind::Owner::kGyro, Layout::kPolhode,
+     &Layout::polhode, 6e-7},
     {FurtherState::kWanderingDrift, &FurtherStates::wandering_drift, FurtherStateKind::Owner::kGyro, 3,
      &Layout::wandering, 0},
 }};

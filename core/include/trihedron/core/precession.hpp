@@ -201,7 +201,8 @@ struct Polhode {
   [[nodiscard]] double angle_rad(double since_s) const;
   /// The same polhode, told from a later time on; its angles differ by a constant.
   [[nodiscard]] Polhode after(double since_s) const {
-    return {static_cast<float>(static_cast<double>(period_s) + static_cast<double>(period_rate) * since_s), period_rate};
+    return {static_cast<float>(static_cast<double>(period_s) + static_cast<double>(period_rate) * since_s),
+            period_rate};
   }
 };
 
