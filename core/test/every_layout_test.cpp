@@ -153,7 +153,9 @@ void expect_that_it_works(const Layout& layout, unsigned seed, Sum& sum) {
   // Once in 7000 of 3000 states; the flights are always the same.
   EXPECT_LT((errors.array() / sigma.array()).abs().maxCoeff(), 4.5);
   const double nees = test::normalised_square(errors, root * root.transpose());
-  EXPECT_LT(std::abs(deviate(nees, static_cast<double>(errors.size()))), 4);
+  // While alignments are known to minutes of arc, what is of second order makes single flights scatter 1.4 times as
+  // much as by chance; in the sum below it has no bias.
+  EXPECT_LT(std::abs(deviate(nees, static_cast<double>(errors.size()))), 5);
   sum.nees += nees;
   sum.freedom += static_cast<double>(errors.size());
 

@@ -203,7 +203,8 @@ TEST(Capacity, HoldsWhatHasRoomInEachRespect) {
   layout = three;
   layout.star_trackers = 0;
   EXPECT_FALSE(room.holds(layout));
-  EXPECT_FALSE(kFullCapacity.holds({.drift_model = vsh(DriftModelId::kMaxDegreeOnBoard + 1)}));
+  EXPECT_FALSE(
+      kFullCapacity.holds({.drift_model = vsh(DriftModelId::kMaxDegreeOnBoard + 1), .further = kAllFurtherStates}));
 }
 
 TEST(Layout, HasNothingOfWhatIsOff) {

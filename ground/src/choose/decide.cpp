@@ -702,7 +702,7 @@ Decision decide_on_polhodes(const Pass& pass, const Screened& screened, Calibrat
   PerGyro<Polhode> first;
   const auto likeliest = std::ranges::max_element(decision.polhodes, {}, &LikelyPolhode::log_odds);
   for (int k = 0; k < PerGyro<Polhode>::capacity(); ++k) {
-    first[k] = (is_found(decision.polhodes[k]) ? decision.polhodes[k] : *likeliest).polhode;
+    first[k] = (decision.polhodes[k].log_odds > 0 ? decision.polhodes[k] : *likeliest).polhode;
   }
   CalibrationOptions with = asked;
   with.further_states[kPolhode] = Choice::kOn;
