@@ -80,9 +80,9 @@ void DriftModulation::next_step(double t_s, double step_s, const Flight& flight)
   // The phase is 2π ∫ dt / (period + rate t).
   const double relative = scenario_.polhode_period_rate * t_s / scenario_.polhode_period_s;
   const double turns = t_s / scenario_.polhode_period_s * (relative == 0 ? 1 : std::log1p(relative) / relative);
-  now_ = scenario_.slew_fraction * since_slew_ + scenario_.thermal_fraction * (2 * warmth_ - 1) +
-         scenario_.polhode_fraction * std::cos(phase_rad_ + 2 * std::numbers::pi * turns);
-  sum_s_ += now_ * step_s;
+  const double but_polhode = scenario_.slew_fraction * since_slew_ + scenario_.thermal_fraction * (2 * warmth_ - 1);
+  now_ = but_polhode + scenario_.polhode_fraction * std::cos(phase_rad_ + 2 * std::numbers::pi * turns);
+  sum_s_ += but_polhode * step_s;
   time_s_ += step_s;
 }
 

@@ -107,6 +107,7 @@ TEST(DriftModulation, PolhodeTurnsWithAPeriodThatGrows) {
     turns += step_s / (1000 + 0.1 * (t + step_s / 2));
   }
   EXPECT_NEAR(turns, std::log(1.5) / 0.1, 1e-6);
+  EXPECT_EQ(modulation.mean(), 0);  // it comes back
 }
 
 TEST(DriftModulation, FollowsLightAndShadowWithItsTimeConstant) {

@@ -496,6 +496,8 @@ void judge_at_orbital_period(const AtOrbitalPeriod& its, const CalibrationRun& r
 
 void judge_polhodes(const CalibrationRun& run, std::vector<Finding>& findings) {
   constexpr double kSigmasToReport = 5;
+  constexpr double kLowOrbit_rad_s = 1.1e-3;
+  constexpr double kNearlyAlike = 0.1;
   const FurtherEstimate* const largest = largest_of(run, FurtherState::kPolhode, kSigmasToReport);
   if (largest == nullptr) {
     return;
@@ -504,8 +506,14 @@ void judge_polhodes(const CalibrationRun& run, std::vector<Finding>& findings) {
   for (std::size_t k = 0; k < run.calibration.gyros.size(); ++k) {
     periods_min.push_back(static_cast<double>(run.options.further_states.polhodes[static_cast<int>(k)].period_s) / 60);
   }
+  const double orbit_min =
+      2 * std::numbers::pi / std::abs(run.options.orbital_rate_rad_s.value_or(kLowOrbit_rad_s)) / 60;
+  const bool may_be_orbit = std::ranges::any_of(
+      periods_min, [&](double period_min) { return std::abs(period_min / orbit_min - 1) < kNearlyAlike; });
   add(findings, FindingCode::kPolhodeFound,
-      "The coefficients come and go as with the polhode of each rotor; the calibration has taken account of it.",
+      fmt::format("The coefficients come and go as with the polhode of each rotor{}; the calibration has taken account "
+                  "of it.",
+                  may_be_orbit ? ", or with day and night" : ""),
       fmt::format("periods at the start of the pass {:.1f} min; largest amplitude {:.1e} rad/s, {}, {:.0f} sigmas",
                   fmt::join(periods_min, " and "), largest->value, name_of(largest->parameter),
                   std::abs(largest->value / largest->sigma)),

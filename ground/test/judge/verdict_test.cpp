@@ -6,6 +6,7 @@
 #include <chrono>
 #include <cmath>
 #include <limits>
+#include <numbers>
 #include <random>
 
 #include "judge/changes.hpp"
@@ -173,6 +174,25 @@ TEST(Verdict, ForbidsDriftAtOrbitalPeriodThatMayBeAnErrorOfTheStarTracker) {
   EXPECT_TRUE(judge(good_pass(), run).trustworthy);
   run.orbital_error_over_drift = -3;
   EXPECT_FALSE(judge(good_pass(), run).trustworthy);
+}
+
+TEST(Verdict, TellsOfPolhodesAndOfPeriodsThatMayBeThoseOfTheOrbit) {
+  auto run = good_run();
+  run.options.orbital_rate_rad_s = 2 * std::numbers::pi / 6000;
+  run.options.further_states.polhodes[0].period_s = 7200;
+  run.options.further_states.polhodes[1].period_s = 5000;
+  const ParameterId amplitude = ParameterId::further(FurtherState::kPolhode, 1, 9);
+  run.calibration.further = {{amplitude, 4e-9, 1e-9}};
+  EXPECT_THAT(codes(judge(good_pass(), run)), IsEmpty());
+  run.calibration.further = {{amplitude, -4e-8, 1e-9}};
+  const Verdict found = judge(good_pass(), run);
+  ASSERT_THAT(codes(found), ElementsAre("polhode-found"));
+  EXPECT_TRUE(found.trustworthy);
+  EXPECT_THAT(found.findings[0].evidence, HasSubstr("120.0 and 83.3 min; largest amplitude -4.0e-08 rad/s"));
+  EXPECT_THAT(found.findings[0].evidence, HasSubstr("gyro2_mu23_polhode_cosine_rad_s, 40 sigmas"));
+  EXPECT_THAT(found.findings[0].text, Not(HasSubstr("day and night")));
+  run.options.further_states.polhodes[0].period_s = 6100;
+  EXPECT_THAT(judge(good_pass(), run).findings[0].text, HasSubstr("day and night"));
 }
 
 /// With the coefficient of its first gyro, and its alignment, off by so many sigmas because the coefficients change.
