@@ -393,18 +393,20 @@ class PolhodeSearch {
         sigma_(std::move(sigma)) {}
 
   [[nodiscard]] LikelyPolhode of_gyro(int gyro) const {
-    constexpr double kStep = 0.25;         // of a turn: half a turn apart, one is a quarter as likely to be seen
+    constexpr double kStep = 0.25;         // of a turn: at the ends the angle is off by 23° at most
     constexpr double kStretchesATurn = 4;  // at least
     constexpr double kMostChange = 0.5;    // of the period, over the pass
     constexpr double kWorthMore = 3;
-    Found best{1, 0, -std::numeric_limits<double>::infinity()};
+    TurnsOfPolhode best{1, 0};
+    double best_log_odds = -std::numeric_limits<double>::infinity();
     int tries = 0;
     const auto consider = [&](double turns, double change) {
       ++tries;
-      const double odds = log_odds(gyro, turns, change);
-      const bool is_better = odds > best.log_odds;
+      const double odds = log_odds(gyro, {turns, change});
+      const bool is_better = odds > best_log_odds;
       if (is_better) {
-        best = {turns, change, odds};
+        best = {turns, change};
+        best_log_odds = odds;
       }
       return is_better;
     };
@@ -413,40 +415,27 @@ class PolhodeSearch {
       consider(turns, 0);
     }
     const int coarse = tries;
-    if (best.log_odds - std::log(coarse) > kWorthMore) {
-      const Found first = best;
+    if (best_log_odds - std::log(coarse) > kWorthMore) {
+      const TurnsOfPolhode first = best;
       for (const double change : {-0.4, -0.3, -0.2, -0.1, 0.1, 0.2, 0.3, 0.4}) {
         for (const double turns : {first.turns - kStep, first.turns, first.turns + kStep}) {
           consider(turns, change);
         }
       }
       for (double step = kStep / 2; step > 1e-3;) {
-        const Found at = best;
+        const TurnsOfPolhode at = best;
         const bool is_better = consider(at.turns - step, at.change) || consider(at.turns + step, at.change) ||
                                (std::abs(at.change) < kMostChange &&
                                 (consider(at.turns, at.change - step / 2) || consider(at.turns, at.change + step / 2)));
         step /= is_better ? 1 : 2;
       }
     }
-    return {polhode(best.turns, best.change), best.log_odds - std::log(coarse)};
+    return {best.polhode(begin_s_, span_s_), best_log_odds - std::log(coarse)};
   }
 
  private:
-  struct Found {
-    double turns;   ///< in the span
-    double change;  ///< of the period over the span, of that in its middle
-    double log_odds;
-  };
-
-  [[nodiscard]] Polhode polhode(double turns, double change) const {
-    const double period_s = span_s_ / turns;
-    const double rate = change * period_s / span_s_;
-    const double middle_s = begin_s_ + span_s_ / 2;
-    return {static_cast<float>(period_s - rate * middle_s), static_cast<float>(rate)};
-  }
-
-  [[nodiscard]] double log_odds(int gyro, double turns, double change) const {
-    const Polhode its = polhode(turns, change);
+  [[nodiscard]] double log_odds(int gyro, const TurnsOfPolhode& turns) const {
+    const Polhode its = turns.polhode(begin_s_, span_s_);
     const auto angle = [&](Index stretch) { return its.angle_rad(to_seconds(pass_.middle(stretch) - zero_at_)); };
     std::vector<Eigen::Triplet<double>> entries;
     for (Index step = 0; step < pass_.steps(); ++step) {
@@ -473,6 +462,16 @@ class PolhodeSearch {
 };
 
 }  // namespace
+
+TurnsOfPolhode TurnsOfPolhode::of(const Polhode& polhode, double begin_s, double span_s) {
+  const double turns = span_s / static_cast<double>(polhode.after(begin_s + span_s / 2).period_s);
+  return {turns, static_cast<double>(polhode.period_rate) * turns};
+}
+
+Polhode TurnsOfPolhode::polhode(double begin_s, double span_s) const {
+  const double rate = change / turns;
+  return {static_cast<float>(span_s / turns - rate * (begin_s + span_s / 2)), static_cast<float>(rate)};
+}
 
 Moves moves_over(const Trial& trial) {
   constexpr std::size_t kEnoughStretches = 6;

@@ -8,6 +8,17 @@
 
 namespace trihedron::ground {
 
+/// A polhode over a span of time by its turns in it, and how the period changes over it, as a part of that in its
+/// middle: what a pass tells of it one by one.
+struct TurnsOfPolhode {
+  double turns;
+  double change;
+
+  /// begin_s: of the span, since the angle was 0.
+  [[nodiscard]] static TurnsOfPolhode of(const Polhode& polhode, double begin_s, double span_s);
+  [[nodiscard]] Polhode polhode(double begin_s, double span_s) const;
+};
+
 /// The polhode of one rotor with which its coefficients most likely come and go.
 struct LikelyPolhode {
   Polhode polhode;      ///< from the epoch of the pass on

@@ -613,22 +613,12 @@ Decision decide_on_orbital_drift(const Pass& pass, const Screened& screened, Cal
   return without_aberration(std::move(without));
 }
 
-/// A polhode by the number of turns in a pass, and the change of the period over it, of that in its middle.
-struct Turns {
-  double turns;
-  double change;
-
-  Turns(const Polhode& polhode, double span_s) {
-    const double middle_s = static_cast<double>(polhode.after(span_s / 2).period_s);
-    turns = span_s / middle_s;
-    change = static_cast<double>(polhode.period_rate) * turns;
-  }
-  [[nodiscard]] Polhode polhode(double span_s) const {
-    const double middle_s = span_s / turns;
-    const double rate = change / turns;
-    return {static_cast<float>(middle_s - rate * span_s / 2), static_cast<float>(rate)};
-  }
-};
+/// What was decided of drift at orbital period stays, with its evidence, when all else is decided again.
+void keep_what_comes_back(const Decision& before, Decision& again) {
+  std::ranges::copy_if(before.evidence, std::back_inserter(again.evidence),
+                       [](const Evidence& evidence) { return evidence.state == FurtherState::kOrbitalDrift; });
+  again.orbital_error_over_drift = before.orbital_error_over_drift;
+}
 
 /// The polhodes with which the pass is most likely by eq. (1), from those on that the changes of the coefficients show:
 /// for each rotor the vertex of a parabola along turns and change in turn, with the random walk that is then likeliest.
@@ -660,13 +650,13 @@ PerGyro<Polhode> most_likely_polhodes(const Pass& pass, const Screened& screened
     double here = fit();
     for (std::size_t k = 0; k < pass.settings.gyros.size(); ++k) {
       Polhode& polhode = options.further_states.polhodes[static_cast<int>(k)];
-      for (double Turns::*along : {&Turns::turns, &Turns::change}) {
-        const Turns middle(polhode, span_s);
-        const double size = along == &Turns::turns ? step : 8 * step / middle.turns;
+      for (double TurnsOfPolhode::*along : {&TurnsOfPolhode::turns, &TurnsOfPolhode::change}) {
+        const TurnsOfPolhode middle = TurnsOfPolhode::of(polhode, 0, span_s);
+        const double size = along == &TurnsOfPolhode::turns ? step : 8 * step / middle.turns;
         const auto at = [&](double by) {
-          Turns moved = middle;
+          TurnsOfPolhode moved = middle;
           moved.*along += by * size;
-          polhode = moved.polhode(span_s);
+          polhode = moved.polhode(0, span_s);
           return fit();
         };
         const double before = at(-1);
@@ -676,7 +666,7 @@ PerGyro<Polhode> most_likely_polhodes(const Pass& pass, const Screened& screened
         if (const double there = at(by); there > here) {
           here = there;
         } else {
-          polhode = middle.polhode(span_s);
+          polhode = middle.polhode(0, span_s);
         }
       }
     }
@@ -712,6 +702,7 @@ Decision decide_on_polhodes(const Pass& pass, const Screened& screened, Calibrat
   if (gain <= kLogOddsToAccept || !is_all_that_is_left(by_polhodes)) {
     return decision;
   }
+  keep_what_comes_back(decision, by_polhodes);
   by_polhodes.evidence.push_back({kPolhode, gain, true});
   asked = with;
   return by_polhodes;
@@ -736,9 +727,7 @@ Decision decide_with_course(const Pass& pass, const Screened& screened, Calibrat
   if (gain <= kLogOddsToAccept) {
     return decision;
   }
-  std::ranges::copy_if(decision.evidence, std::back_inserter(changing.evidence),
-                       [](const Evidence& evidence) { return evidence.state == FurtherState::kOrbitalDrift; });
-  changing.orbital_error_over_drift = decision.orbital_error_over_drift;
+  keep_what_comes_back(decision, changing);
   changing.evidence.push_back({FurtherState::kCoefficientChange, gain, true});
   return changing;
 }
