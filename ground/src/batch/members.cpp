@@ -46,11 +46,12 @@ KappaAndDelta with_members(const PassProblem& problem, const MatrixXd& more_cova
   const MatrixXd known = prior.covariance.topLeftCorner(members.parameters(), members.parameters());
   const Eigen::VectorXd sigma = known.diagonal().cwiseSqrt();
   const MatrixXd scaled = sigma.cwiseInverse().asDiagonal() * known * sigma.cwiseInverse().asDiagonal();
-  const MatrixXd by_parameters = parameters_by_parameters(modes, members, amplitudes) * sigma.asDiagonal();
+  const MatrixXd to_modes = parameters_by_parameters(modes, members, amplitudes);
+  const MatrixXd by_parameters = to_modes * sigma.asDiagonal();
   const MatrixXd before = multiply(by_parameters, scaled);
   const MatrixXd follow =
       sigma.asDiagonal() * MatrixXd(multiply(before, by_parameters.transpose()).ldlt().solve(before).transpose());
-  KappaAndDelta found{by_modes.gyros, {}, follow};
+  KappaAndDelta found{by_modes.gyros, {}, follow, to_modes, {}};
   const Eigen::VectorXd errors = follow * moved;
   for (int k = 0; k < members.gyros; ++k) {
     const int row = members.drift(k) - members.drift(0) + Layout::kEq1;
@@ -72,7 +73,8 @@ KappaAndDelta with_members(const PassProblem& problem, const MatrixXd& more_cova
     MatrixXd root = found.covariance;
     static_cast<void>(to_root(root));  // positive definite, since the pass has a solution
     root.triangularView<Eigen::StrictlyUpper>().setZero();
-    found.covariance += positive_part(more_covariance, root);
+    found.added = positive_part(more_covariance, root);
+    found.covariance += found.added;
   }
   return found;
 }
@@ -84,7 +86,9 @@ KappaAndDelta kappa_and_delta(const PassProblem& problem, const BatchResult& res
   const int size = layout.parameters();
   KappaAndDelta found{result.solution.gyros,
                       square(MatrixXd(result.errors.last_root.middleRows(layout.drift(0), size))),
-                      MatrixXd::Identity(size, size)};
+                      MatrixXd::Identity(size, size),
+                      MatrixXd::Identity(size, size),
+                      {}};
   return problem.modes() ? with_members(problem, more_covariance, found) : found;
 }
 

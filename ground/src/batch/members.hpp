@@ -14,6 +14,8 @@ struct KappaAndDelta {
   Gyros gyros;
   Eigen::MatrixXd covariance;
   Eigen::MatrixXd by_states;  ///< their errors by those of κ and δ along the pass
+  Eigen::MatrixXd to_states;  ///< κ and δ along the pass by them
+  Eigen::MatrixXd added;      ///< part of the covariance, for the uncertainty of the spectrum; empty: none
 };
 
 /// `more_covariance`: of κ and δ, for the uncertainty of the spectrum of a drift field; empty: none.

@@ -1,6 +1,7 @@
 #include "batch/refine.hpp"
 
 #include <Eigen/Cholesky>
+#include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
 #include <map>
@@ -165,6 +166,16 @@ std::vector<FurtherEstimate> further_of(const PassProblem& problem, const BatchR
   return further;
 }
 
+/// What the uncertainty of the spectrum adds. With κ and δ given, what the pass tells of the other errors depends on no
+/// spectrum: they follow κ and δ as they do along the pass. `root`: of all errors.
+MatrixXd added_by_spectrum(const Layout& layout, const KappaAndDelta& parameters, const MatrixXd& root,
+                           const MatrixXd& root_along) {
+  const MatrixXd by_those_along = MatrixXd(root_along.transpose()).householderQr().solve(root.transpose()).transpose();
+  MatrixXd by_parameters = multiply(by_those_along, parameters.to_states);
+  by_parameters.middleRows(layout.drift(0), layout.parameters()).setIdentity();
+  return multiply(multiply(by_parameters, parameters.added), by_parameters.transpose());
+}
+
 /// What is known of the errors at the last moment of the pass.
 OpenLoopStart errors_at_end(const PassProblem& problem, const BatchResult& result, const PassProblem::Moment& last,
                             const KappaAndDelta& parameters) {
@@ -182,7 +193,11 @@ OpenLoopStart errors_at_end(const PassProblem& problem, const BatchResult& resul
   by_states.block(layout.behind_parameters(), own.behind_parameters(), rest, rest).setIdentity();
   const MatrixXd root = multiply(by_states, result.errors.last_root);
   MatrixXd covariance = square(root);
-  // As much as it is larger, the errors of the parameters have nothing in common with those of the momenta.
+  if (parameters.added.size() > 0) {
+    covariance +=
+        added_by_spectrum(layout, parameters, root, result.errors.last_root.middleRows(own.drift(0), own.parameters()));
+  }
+  // What the modes leave open of the members has moved no momentum.
   covariance.block(layout.drift(0), layout.drift(0), layout.parameters(), layout.parameters()) = parameters.covariance;
   return open_loop_start(setup, layout, last.gyros, std::move(covariance));
 }

@@ -103,6 +103,21 @@ TEST(Calibrate, ADriftFieldKeepsTheSigmasHonest) {
   EXPECT_GT(nees_of(simulated.truth, calibrate(simulated.pass, options).calibration), 1000);
 }
 
+/// What steady flight does not tell of an alignment is in the momenta as well, since the fixes gave them through it;
+/// also what the uncertainty of the spectrum adds.
+TEST(Calibrate, InSteadyFlightPredictsTheAttitudeBetterThanItKnowsTheAlignments) {
+  Scenario scenario;
+  scenario.seed = 6;
+  scenario.duration = std::chrono::hours(2);
+  scenario.attitude.slews = std::vector<Slew>{};
+  const Calibration calibration =
+      calibrate(sim::simulate(scenario).pass, with_drift_open(Estimator::kBatch)).calibration;
+  EXPECT_GT(sigma_of(calibration, ParameterId::alignment(0, 1)), kArcminute);
+  ASSERT_TRUE(calibration.forecast);
+  const PredictedError& now = calibration.forecast->errors.front();
+  EXPECT_LT(std::sqrt(now.covariance_rad2.diagonal().maxCoeff()), 5 * kArcsecond);
+}
+
 TEST(Calibrate, OnBoardTheDriftFieldIsItsLargeMembersWhichMakeUpForTheOthers) {
   const sim::SimulatedPass simulated = sim::simulate(with_drift_outside(5, std::chrono::hours(4)));
   const CalibrationRun run = calibrate(simulated.pass, with_drift_open(Estimator::kInvariant));
