@@ -395,14 +395,16 @@ class PolhodeSearch {
   [[nodiscard]] LikelyPolhode of_gyro(int gyro) const {
     constexpr double kStep = 0.25;         // of a turn: at the ends the angle is off by 23° at most
     constexpr double kStretchesATurn = 4;  // at least
-    constexpr double kMostChange = 0.5;    // of the period, over the pass
+    constexpr double kMostChange = 0.4;    // of the period, over the pass
+    constexpr double kLeastTurns = 1.5;    // less looks like a warm-up or a jump
     constexpr double kWorthMore = 3;
-    TurnsOfPolhode best{1, 0};
+    TurnsOfPolhode best{kLeastTurns, 0};
     double best_log_odds = -std::numeric_limits<double>::infinity();
     int tries = 0;
     const auto consider = [&](double turns, double change) {
       ++tries;
-      const double odds = log_odds(gyro, {turns, change});
+      const bool is_one = turns >= kLeastTurns && std::abs(change) <= kMostChange;
+      const double odds = is_one ? log_odds(gyro, {turns, change}) : best_log_odds;
       const bool is_better = odds > best_log_odds;
       if (is_better) {
         best = {turns, change};
@@ -411,7 +413,7 @@ class PolhodeSearch {
       return is_better;
     };
     const double most = static_cast<double>(pass_.steps() + 1) / kStretchesATurn;
-    for (double turns = 1; turns <= most; turns += kStep) {
+    for (double turns = kLeastTurns; turns <= most; turns += kStep) {
       consider(turns, 0);
     }
     const int coarse = tries;
@@ -425,8 +427,7 @@ class PolhodeSearch {
       for (double step = kStep / 2; step > 1e-3;) {
         const TurnsOfPolhode at = best;
         const bool is_better = consider(at.turns - step, at.change) || consider(at.turns + step, at.change) ||
-                               (std::abs(at.change) < kMostChange &&
-                                (consider(at.turns, at.change - step / 2) || consider(at.turns, at.change + step / 2)));
+                               consider(at.turns, at.change - step / 2) || consider(at.turns, at.change + step / 2);
         step /= is_better ? 1 : 2;
       }
     }

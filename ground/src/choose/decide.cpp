@@ -675,7 +675,7 @@ PerGyro<Polhode> most_likely_polhodes(const Pass& pass, const Screened& screened
 }
 
 /// Decides by the data of the pass, and once more with coefficients that come and go with the polhodes of the rotors
-/// where these may. Then `asked` has them as well.
+/// where these are likelier than anything else that moves. If they stay, `asked` has them as well.
 Decision decide_on_polhodes(const Pass& pass, const Screened& screened, CalibrationOptions& asked,
                             const DriftModelId& largest_model, const Progress& progress) {
   constexpr FurtherState kPolhode = FurtherState::kPolhode;
@@ -684,8 +684,12 @@ Decision decide_on_polhodes(const Pass& pass, const Screened& screened, Calibrat
     asked.further_states[kPolhode] = Choice::kOff;
   }
   Decision decision = decide_on_orbital_drift(pass, screened, asked, largest_model, progress);
-  const auto is_found = [](const LikelyPolhode& likely) { return likely.log_odds > kLogOddsOfPolhode; };
-  if (!is_open || std::ranges::none_of(decision.polhodes, is_found)) {
+  double log_odds = 0;  // of those of all rotors
+  for (const LikelyPolhode& likely : decision.polhodes) {
+    log_odds += std::max(likely.log_odds, 0.0);
+  }
+  const bool is_likeliest = decision.changes.empty() || log_odds > decision.changes.front().log_odds;
+  if (!is_open || log_odds < kLogOddsOfPolhode || !is_likeliest) {
     return decision;
   }
   begin_stage(progress, "looks for the polhodes of the rotors");
