@@ -84,6 +84,13 @@ def bump(amplitude):
     return lambda random: per_gyro(random, lambda random, gyro: f'bump = "{amplitude}rad/s"\nbump_centre = {list(centre(random, gyro))}')
 
 
+def polhodes_apart(fraction):
+    """Each rotor with a polhode of its own, whose period grows or shrinks."""
+    return lambda random: per_gyro(random, lambda random, gyro: "\n".join((
+        f"polhode_fraction = {fraction}", f'polhode_period = "{random.uniform(70, 240):.1f}min"',
+        f"polhode_period_rate = {random.uniform(-0.02, 0.02):.4f}")))
+
+
 def drifting(**keys):
     return constant(toml(gyro_drift=QUIET | keys))
 
@@ -315,6 +322,7 @@ WORLDS = [
     World("jump-1e-7", "drift outside eq. (1)", drifting(jump_sigma='"1e-7rad/s"'), faults=NOT_CONSTANT),
     World("polhode-0.5", "drift outside eq. (1)", drifting(polhode_fraction=0.5), faults=NOT_CONSTANT),
     World("polhode-0.05", "drift outside eq. (1)", drifting(polhode_fraction=0.05), faults=NOT_CONSTANT),
+    World("polhodes-apart-0.2", "drift outside eq. (1)", polhodes_apart(0.2), faults=NOT_CONSTANT),
     World("thermal-0.5", "drift outside eq. (1)", drifting(thermal_fraction=0.5), faults=NOT_CONSTANT),
     World("thermal-0.05", "drift outside eq. (1)", drifting(thermal_fraction=0.05), faults=NOT_CONSTANT),
     World("walk", "drift outside eq. (1)", drifting(coefficient_walk='"1e-10rad/s/s^0.5"'), faults=NOT_CONSTANT),
