@@ -620,12 +620,19 @@ void keep_what_comes_back(const Decision& before, Decision& again) {
   again.orbital_error_over_drift = before.orbital_error_over_drift;
 }
 
+/// From the middle of three places a step apart to the largest value, by a parabola; two steps at most.
+double towards_vertex(double before, double here, double after) {
+  const double bend = 2 * here - before - after;
+  return bend > 0 ? std::clamp((after - before) / (2 * bend), -2.0, 2.0) : after > before ? 1 : -1;
+}
+
 /// The polhodes with which the pass is most likely by eq. (1), from those on that the changes of the coefficients show:
 /// for each rotor the vertex of a parabola along turns and change in turn, with the random walk that is then likeliest.
 /// What noise was found without them stands for a part of them, and goes as they are told better.
 PerGyro<Polhode> most_likely_polhodes(const Pass& pass, const Screened& screened, CalibrationOptions options,
                                       PerGyro<Polhode> polhodes) {
-  constexpr int kRounds = 2;
+  constexpr int kMostRounds = 6;
+  constexpr double kNearEnough = 0.005;  // of a turn
   const double span_s = to_seconds(screened.pass.fixes.back().fix.t - pass.settings.epoch);
   const double least_walk = options.direction_random_walk_rad_sqrt_s;
   options.drift_field = false;
@@ -643,7 +650,8 @@ PerGyro<Polhode> most_likely_polhodes(const Pass& pass, const Screened& screened
     return last->log_likelihood();
   };
   double step = 0.05;  // of a turn
-  for (int round = 0; round < kRounds; ++round, step /= 5) {
+  for (int round = 0; round < kMostRounds && step > kNearEnough; ++round) {
+    double most_moved = 0;  // in steps
     options.direction_random_walk_rad_sqrt_s = least_walk;
     fit();
     use_walk(with_most_likely_walk(*last, options).noise, options);
@@ -660,16 +668,16 @@ PerGyro<Polhode> most_likely_polhodes(const Pass& pass, const Screened& screened
           return fit();
         };
         const double before = at(-1);
-        const double after = at(1);
-        const double bend = 2 * here - before - after;
-        const double by = bend > 0 ? std::clamp((after - before) / (2 * bend), -2.0, 2.0) : after > before ? 1 : -1;
+        const double by = towards_vertex(before, here, at(1));
         if (const double there = at(by); there > here) {
           here = there;
+          most_moved = std::max(most_moved, std::abs(by));
         } else {
           polhode = middle.polhode(0, span_s);
         }
       }
     }
+    step /= most_moved < 1 ? 5 : 1;
   }
   return options.further_states.polhodes;
 }
