@@ -144,7 +144,9 @@ void InvariantEstimator<kCapacity>::propagate(const PerGyro<double, kCapacity.gy
     B.block(row, layout.drift(k) - d, 3, layout.drift_size()) = by_drift.leftCols(layout.drift_size());
     B.template block<3, 3>(row, layout.alignment(k) - d) = since.by_alignment;
     for (const Layout::Block& its : layout.beside_kappa(k)) {
-      B.block(row, its.state - d, 3, its.size) = by_drift.middleCols(its.column, its.size);
+      if (its.size > 0) {
+        B.block(row, its.state - d, 3, its.size) = by_drift.middleCols(its.column, its.size);
+      }
     }
     noise.template segment<3>(row).setConstant(noise_rad[k]);
     if (layout.further.wandering_drift) {

@@ -124,8 +124,10 @@ constexpr bool blocks_are_those_of_their_states(const Layout& layout) {
     for (std::size_t i = 0; i < 3; ++i) {
       const Layout::Block block = layout.beside_kappa(k)[i];
       const FurtherState state = kStates[i];
-      if (block.size != (layout.has(state) ? kind_of(state).size : 0) || block.state != layout.first(state, k) ||
-          block.column != column) {
+      const bool is_there = layout.has(state);
+      if (block.size != (is_there ? kind_of(state).size : 0) ||
+          (is_there && (block.state != layout.first(state, k) || block.column != column)) ||
+          block.state + block.size > layout.size() || block.column + block.size > layout.drift_columns()) {
         return false;
       }
       column += block.size;

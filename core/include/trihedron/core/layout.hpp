@@ -123,14 +123,14 @@ struct Layout {
 
   /// Constants of a gyro's drift beside κ: their columns of its drift, and their states.
   struct Block {
-    int column;
-    int state;
-    int size;  ///< 0: not there
+    int column = 0;
+    int state = 0;
+    int size = 0;  ///< 0: not there
   };
   [[nodiscard]] constexpr std::array<Block, 3> beside_kappa(int gyro) const {
-    return {{{change_column(), change(gyro), further.coefficient_change ? kEq1 : 0},
-             {orbital_column(), orbital_drift(gyro), further.orbital_drift ? kOrbitalDrift : 0},
-             {polhode_column(), polhode(gyro), further.polhode ? kPolhode : 0}}};
+    return {further.coefficient_change ? Block{change_column(), change(gyro), kEq1} : Block{},
+            further.orbital_drift ? Block{orbital_column(), orbital_drift(gyro), kOrbitalDrift} : Block{},
+            further.polhode ? Block{polhode_column(), polhode(gyro), kPolhode} : Block{}};
   }
 
   /// Whether states of this kind are there.

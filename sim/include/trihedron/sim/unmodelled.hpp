@@ -77,8 +77,8 @@ class DriftModulation {
 
   /// Fraction that is added to the coefficients now.
   [[nodiscard]] double now() const { return now_; }
-  /// Its mean over the steps so far, but for the polhode, which comes back about 0 as often as the flight lasts; 0 before
-  /// the first.
+  /// Its mean over the steps so far, but for the polhode, which comes back about 0 as often as the flight lasts; 0
+  /// before the first.
   [[nodiscard]] double mean() const { return time_s_ > 0 ? sum_s_ / time_s_ : 0; }
 
   /// A body that turns faster slews: twice the rate of a low orbit.
