@@ -413,8 +413,8 @@ class PolhodeSearch {
       return is_better;
     };
     const double most = static_cast<double>(pass_.steps() + 1) / kStretchesATurn;
-    for (double turns = kLeastTurns; turns <= most; turns += kStep) {
-      consider(turns, 0);
+    for (int steps = 0; kLeastTurns + kStep * steps <= most; ++steps) {
+      consider(kLeastTurns + kStep * steps, 0);
     }
     const int coarse = tries;
     if (best_log_odds - std::log(coarse) > kWorthMore) {
