@@ -337,6 +337,16 @@ TEST(Acm, RefusesDriftAtOrbitalPeriodWithoutItsRate) {
               HasSubstr("no ORBITAL_RATE_RAD_S"));
 }
 
+TEST(Acm, RefusesAmplitudesOfAPolhodeWithoutItsPeriod) {
+  std::string text = format_acm(full_calibration(), {nullptr, nullptr, "c.nc"}, description(), MessageSyntax::kKvn);
+  for (const std::string key : {"GYRO2_POLHODE_PERIOD_S", "GYRO2_POLHODE_PERIOD_RATE"}) {
+    const std::size_t begin = text.rfind('\n', text.find(key));
+    text.erase(begin, text.find('\n', begin + 1) - begin);
+  }
+  EXPECT_THAT(refusal([&] { static_cast<void>(parse_calibration_message(text, "c.acm")); }),
+              HasSubstr("no POLHODE_PERIOD_S"));
+}
+
 TEST(Acm, WithoutItsCovarianceFileHasTheSigmas) {
   const TemporaryDirectory directory;
   const Calibration calibration = full_calibration();

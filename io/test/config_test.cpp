@@ -76,5 +76,32 @@ TEST(Config, RefusesNumbersOutsideTheirRanges) {
   EXPECT_THAT(refused_config("[corrections]\ninterval = \"0s\"\n"), HasSubstr("must be positive; say continuous"));
 }
 
+TEST(Config, HasAPolhodeForEachGyro) {
+  CalibrationOptions options;
+  for (int k = 0; k < kMaxGyros; ++k) {
+    options.further_states.polhodes[k] = {5000.25F + 100.0F * static_cast<float>(k), 0.01F * static_cast<float>(k)};
+  }
+  const FurtherStateOptions back = read_config_text(format_config(options)).further_states;
+  for (int k = 0; k < kMaxGyros; ++k) {
+    EXPECT_EQ(back.polhodes[k].period_s, options.further_states.polhodes[k].period_s);
+    EXPECT_EQ(back.polhodes[k].period_rate, options.further_states.polhodes[k].period_rate);
+  }
+  // The last one stands for all further gyros.
+  const std::string text = "[further_states]\npolhode_period = [\"2h\", \"90min\"]\npolhode_period_rate = [0.5]\n";
+  const FurtherStateOptions two = read_config_text(text).further_states;
+  EXPECT_EQ(two.polhodes[0].period_s, 7200);
+  EXPECT_EQ(two.polhodes[3].period_s, 5400);
+  EXPECT_EQ(two.polhodes[3].period_rate, 0.5);
+  const auto refused_period = [](const std::string& value) {
+    return refused_config("[further_states]\npolhode_period = " + value + "\n");
+  };
+  for (const std::string list : {"\"2h\"", "[]", "[\"1h\", \"1h\", \"1h\", \"1h\", \"1h\"]"}) {
+    EXPECT_THAT(refused_period(list), HasSubstr("no list of one to 4 values")) << list;
+  }
+  EXPECT_THAT(refused_period("[\"2h\", \"3\"]"), HasSubstr("unit is missing"));
+  EXPECT_THAT(refused_period("[\"10s\"]"), HasSubstr("outside 60"));
+  EXPECT_THAT(refused_config("[further_states]\npolhode_period_rate = [0.9]\n"), HasSubstr("outside -0.5 to 0.5"));
+}
+
 }  // namespace
 }  // namespace trihedron::io
