@@ -135,7 +135,6 @@ constexpr bool blocks_are_those_of_their_states(const Layout& layout) {
   }
   return true;
 }
-static_assert(for_every_layout(blocks_are_those_of_their_states));
 
 static_assert(for_every_layout([](const Layout& layout) { return kFullCapacity.holds(layout); }));
 static_assert(for_every_layout([](const Layout& layout) {
@@ -159,6 +158,10 @@ static_assert(Layout{}.size() == 26 && Layout{}.parameters() == 20);
 static_assert(Layout{.direction_size = 2}.size() == 24);
 
 TEST(Layout, FillsItsPositionsWithoutOverlap) { EXPECT_TRUE(for_every_layout(positions_fill_without_overlap, 1)); }
+
+TEST(Layout, HasBlocksBesideTheCoefficientsWhereTheirStatesAre) {
+  EXPECT_TRUE(for_every_layout(blocks_are_those_of_their_states, 1));
+}
 
 TEST(Layout, HasItsPartsInTheirOrder) { EXPECT_TRUE(for_every_layout(parts_are_in_their_order, 1)); }
 
