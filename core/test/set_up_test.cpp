@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <chrono>
+#include <cmath>
 #include <limits>
 
 #include "flight.hpp"
@@ -164,6 +165,22 @@ TEST(SetUp, RefusesACourseWithoutATime) {
     EXPECT_EQ(fault_of(CourseOfChange::Kind::kEven, bad), std::nullopt) << bad;
   }
   EXPECT_EQ(fault_of(CourseOfChange::Kind::kWarmUp, 3600), std::nullopt);
+}
+
+TEST(SetUp, HasThePolhodeOfEachGyro) {
+  FullGiven given(kEverything);
+  CalibrationSetup& setup = given.setup;
+  setup.orbital_phase_zero = Time(from_seconds(1000));
+  for (int k = 0; k < setup.layout.gyros; ++k) {
+    setup.polhodes[k] = {1000.0F * static_cast<float>(k + 1), 0.02F};
+  }
+  const DriftTimes times = setup.drift_times(Time(from_seconds(1700)));
+  for (int k = 0; k < setup.layout.gyros; ++k) {
+    const double angle = setup.polhodes[k].angle_rad(700);
+    EXPECT_NEAR(times[k].polhode_sine, std::sin(angle), 1e-14) << k;
+    EXPECT_NEAR(times[k].polhode_cosine, std::cos(angle), 1e-14) << k;
+    EXPECT_NEAR(times[k].orbital_sine, std::sin(700 * setup.orbital_rate_rad_s), 1e-14) << k;
+  }
 }
 
 TEST(SetUp, RefusesAPolhodeWithoutAPeriod) {
