@@ -223,7 +223,7 @@ bool InvariantEstimator<kCapacity>::prior_allows_estimates() const {
 
 template <Capacity kCapacity>
 void InvariantEstimator<kCapacity>::predict(const Eigen::Matrix3d& C_in_c, const Directions& h_b, Time t, double dt_s) {
-  const DriftTimes times = setup_.drift_times(t - from_seconds(dt_s / 2));
+  const auto times = [&] { return setup_.drift_times(t - from_seconds(dt_s / 2)); };
   precess_all(gyros_, since_fix_, layout().gyros, drift_, C_in_c, h_b, times, dt_s);
   time_since_fix_s_ += dt_s;
   gate_.elapse(dt_s);

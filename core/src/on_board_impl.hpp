@@ -852,7 +852,7 @@ template <class Estimator>
 void Navigator<Estimator>::predict(const Estimator& estimator, const Eigen::Matrix3d& C_in_c, const Directions& h_b,
                                    Time t, double dt_s, State& state) {
   const Layout& layout = estimator.layout();
-  const DriftTimes times = estimator.setup().drift_times(t - from_seconds(dt_s / 2));
+  const auto times = [&] { return estimator.setup().drift_times(t - from_seconds(dt_s / 2)); };
   precess_all(state.gyros, layout.gyros, estimator.drift(), C_in_c, h_b, times, dt_s);
   for (int k = 0; layout.further.wandering_drift && k < layout.gyros; ++k) {
     state.gyros[k].drift_rad_s.template segment<3>(layout.wandering_column()) *=

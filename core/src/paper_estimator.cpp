@@ -72,7 +72,8 @@ auto PaperEstimator::quasi_inertial(const Trihedron<In>& t) -> QuasiInertial {
 }
 
 void PaperEstimator::predict(const Eigen::Matrix3d& C_in_c, const Directions& h_b, Time /*t*/, double dt_s) {
-  precess_all(gyros_, since_fix_, kGyros, drift_, C_in_c, h_b, {}, dt_s);
+  precess_all(
+      gyros_, since_fix_, kGyros, drift_, C_in_c, h_b, [] { return DriftTimes{}; }, dt_s);
   time_since_fix_s_ += dt_s;
   gate_.elapse(dt_s);
 }

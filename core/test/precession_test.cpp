@@ -189,6 +189,7 @@ TEST(PrecessAll, GivesTheBitsOfEachGyroAlone) {
     for (Gyro& gyro : by_rates) {
       gyro.drift_rad_s.setZero();
     }
+    const auto no_times = [] { return DriftTimes{}; };
     for (int i = 0; i < 50; ++i) {
       const Eigen::Matrix3d C_in_c = attitude_at(i);
       Directions h_b;
@@ -196,8 +197,8 @@ TEST(PrecessAll, GivesTheBitsOfEachGyroAlone) {
         h_b[k] = C_in_c.transpose() * together[k].h_in;
       }
       const double dt_s = i % 2 == 0 ? 0.125 : 0.1;
-      precess_all(together, since, kCount, kEq1, C_in_c, h_b, {}, dt_s * times);
-      precess_all(navigated, kCount, kEq1, C_in_c, h_b, {}, dt_s * times);
+      precess_all(together, since, kCount, kEq1, C_in_c, h_b, no_times, dt_s * times);
+      precess_all(navigated, kCount, kEq1, C_in_c, h_b, no_times, dt_s * times);
       Eigen::Vector3d rates[2];
       for (int k = 0; k < 2; ++k) {
         Columns<kColumns> columns;

@@ -272,8 +272,8 @@ void Refinement::put_into(CalibrationRun& run) && {
   for (int k = 0; k < layout.gyros; ++k) {
     GyroCalibration& gyro = calibration.gyros[static_cast<std::size_t>(k)];
     const Eigen::Vector3d momentum_in = gyro.momentum_in;
-    gyro = record_of(parameters.gyros[k], k, problem_.setup().on_board,
-                     0);  // the coefficients stand for the end of the pass
+    // The coefficients stand for the end of the pass.
+    gyro = record_of(parameters.gyros[k], k, problem_.setup().on_board, 0);
     gyro.momentum_in = momentum_in;
   }
   calibration.estimator = Estimator::kBatch;

@@ -376,10 +376,6 @@ class Constancy {
   Index at_shapes_ = 0;
 };
 
-}  // namespace
-
-namespace {
-
 /// Looks for the polhode of each rotor, along the steps of its coefficients: first for the number of turns in the pass,
 /// then for how the period changes as well.
 class PolhodeSearch {
@@ -397,12 +393,10 @@ class PolhodeSearch {
     constexpr double kStretchesATurn = 4;  // at least
     constexpr double kMostChange = 0.4;    // of the period, over the pass
     constexpr double kLeastTurns = 1.5;    // less looks like a warm-up or a jump
-    constexpr double kWorthMore = 3;
+    constexpr double kWorthMore = 3;       // ln of the odds
     TurnsOfPolhode best{kLeastTurns, 0};
     double best_log_odds = -std::numeric_limits<double>::infinity();
-    int tries = 0;
     const auto consider = [&](double turns, double change) {
-      ++tries;
       const bool is_one = turns >= kLeastTurns && std::abs(change) <= kMostChange;
       const double odds = is_one ? log_odds(gyro, {turns, change}) : best_log_odds;
       const bool is_better = odds > best_log_odds;
@@ -413,11 +407,11 @@ class PolhodeSearch {
       return is_better;
     };
     const double most = static_cast<double>(pass_.steps() + 1) / kStretchesATurn;
-    for (int steps = 0; kLeastTurns + kStep * steps <= most; ++steps) {
-      consider(kLeastTurns + kStep * steps, 0);
+    int tries = 0;  // those from here on are about the same polhode
+    for (; kLeastTurns + kStep * tries <= most; ++tries) {
+      consider(kLeastTurns + kStep * tries, 0);
     }
-    const int coarse = tries;
-    if (best_log_odds - std::log(coarse) > kWorthMore) {
+    if (best_log_odds - std::log(tries) > kWorthMore) {
       const TurnsOfPolhode first = best;
       for (const double change : {-0.4, -0.3, -0.2, -0.1, 0.1, 0.2, 0.3, 0.4}) {
         for (const double turns : {first.turns - kStep, first.turns, first.turns + kStep}) {
@@ -431,7 +425,7 @@ class PolhodeSearch {
         step /= is_better ? 1 : 2;
       }
     }
-    return {best.polhode(begin_s_, span_s_), best_log_odds - std::log(coarse)};
+    return {best.polhode(begin_s_, span_s_), best_log_odds - std::log(tries)};
   }
 
  private:
@@ -496,7 +490,7 @@ Moves moves_over(const Trial& trial) {
   // calibration.
   constexpr double kMoves_rad = 60.0 / 206265;
   constexpr double kPartOfCoefficients = 0.1;
-  constexpr double kPolhodeOverChange = 3;
+  constexpr double kPolhodeOverChange = 3;  // its states have a prior of 0.3 of that of the coefficients
   constexpr double kAnnual = 6e-5;
   constexpr double kOrbital = 1.5e-5;
   constexpr double kScale = 1e-3;

@@ -31,8 +31,8 @@ namespace {
 using Choice = FurtherStateOptions::Choice;
 
 /// Whether a trial with everything shows the evidence of a state: of those that are a choice all but the wandering
-/// drift, which the search for the noise decides, and the drift at orbital period, which looks like an error of the
-/// star tracker and is compared with it.
+/// drift, which the search for the noise decides, the drift at orbital period, which looks like an error of the star
+/// tracker and is compared with it, and the polhodes, whose periods have to be found first.
 bool is_judged_by_trial(const FurtherStateRow& row) {
   return !row.key.empty() && row.state != FurtherState::kWanderingDrift && row.state != FurtherState::kOrbitalDrift &&
          row.state != FurtherState::kPolhode;
@@ -176,7 +176,7 @@ const Forecast* best_of(const std::vector<Forecast>& forecasts, const PassSettin
 /// alike. Of a drift model that was asked for, the states of that error may hold what it does not have.
 constexpr double kLogOddsBesideOtherDrift = 10;
 
-/// The same from which on polhodes are tried.
+/// ln of the odds of the polhodes of all rotors together from which on they are tried.
 constexpr double kLogOddsOfPolhode = 10;
 
 /// Decides the open choices and the drift model by the evidence of a trial with all states free. `other_drift`: whether

@@ -126,29 +126,36 @@ void precess_two(const PrecessingGyro& a, const PrecessingGyro& b, const Sensiti
                  const SensitivityOfEq1& since_b, const Eigen::Matrix3d& C_in_c, double dt_s,
                  const Eigen::Vector3d& rate_a, const Eigen::Vector3d& rate_b);
 
-/// precess() of the first `count` gyros.
-template <class Gyros>
+/// precess() of the first `count` gyros. times(): DriftTimes, what the drift of each depends on; asked only where some
+/// gyro does not go in a pair, since the drift of these is eq. (1) alone.
+template <class Gyros, class Times>
 void precess_all(Gyros& gyros, int count, const DriftModel& drift, const Eigen::Matrix3d& C_in_c, const Directions& h_b,
-                 const DriftTimes& times, double dt_s) {
+                 const Times& times, double dt_s) {
   const int in_pairs = drift.columns() == Esg7::kSize ? count - count % 2 : 0;
   for (int k = 0; k < in_pairs; k += 2) {
     precess_two({gyros[k], h_b[k]}, {gyros[k + 1], h_b[k + 1]}, C_in_c, dt_s);
   }
-  for (int k = in_pairs; k < count; ++k) {
-    precess(gyros[k], drift, C_in_c, h_b[k], times[k], dt_s);
+  if (in_pairs < count) {
+    const DriftTimes now = times();
+    for (int k = in_pairs; k < count; ++k) {
+      precess(gyros[k], drift, C_in_c, h_b[k], now[k], dt_s);
+    }
   }
 }
 /// The same with their sensitivities.
-template <class Gyros, class Sensitivities>
+template <class Gyros, class Sensitivities, class Times>
 void precess_all(Gyros& gyros, Sensitivities& since, int count, const DriftModel& drift, const Eigen::Matrix3d& C_in_c,
-                 const Directions& h_b, const DriftTimes& times, double dt_s) {
+                 const Directions& h_b, const Times& times, double dt_s) {
   const int in_pairs = drift.columns() == Esg7::kSize ? count - count % 2 : 0;
   for (int k = 0; k < in_pairs; k += 2) {
     precess_two({gyros[k], h_b[k]}, {gyros[k + 1], h_b[k + 1]}, SensitivityOfEq1(since[k]),
                 SensitivityOfEq1(since[k + 1]), C_in_c, dt_s);
   }
-  for (int k = in_pairs; k < count; ++k) {
-    precess(gyros[k], since[k], drift, C_in_c, h_b[k], times[k], dt_s);
+  if (in_pairs < count) {
+    const DriftTimes now = times();
+    for (int k = in_pairs; k < count; ++k) {
+      precess(gyros[k], since[k], drift, C_in_c, h_b[k], now[k], dt_s);
+    }
   }
 }
 
