@@ -140,12 +140,9 @@ class SquareRootInformation {
     white.leftCols(d).setIdentity();
     rotate_into(rows_of(white), rows_of(moved), d);
     for (int i = 0; i < d; ++i) {
-      double* R = root().row(i);
-      for (int j = 0; j < states_; ++j) {
-        R[j] = 0;
-      }
+      std::copy_n(&moved(i, d), states_, root().row(i));
     }
-    rotate_into({data_.data(), d, states_, states_ + 1}, {moved.data() + d, d, states_, d + states_}, d);
+    triangularise({data_.data(), d, states_, states_ + 1}, d);
   }
 
   /// In place: rows of H become H R⁻¹, seen through the present uncertainty: H P Hᵀ is the product of the result with
