@@ -1,37 +1,71 @@
 #include "trihedron/core/square_root_information.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstddef>
+#include <cstring>
+#include <functional>
 #include <iterator>
 
 #include "trihedron/core/assert.hpp"
 #include "trihedron/core/lanes.hpp"
 
+// Long rows are worked on four numbers at a time where the processor can: the same operations in the same order for
+// each number, so that the bits are the same. Rows of 26 states end before it pays.
+#if defined(__x86_64__) && defined(__GNUC__)
+#define TRIHEDRON_WIDE_LANES 1
+#else
+#define TRIHEDRON_WIDE_LANES 0
+#endif
+
 namespace trihedron {
 namespace {
 
+// Everything here is inlined into the functions at the end, one of which may be compiled for another processor.
+
+using Lanes4 = double __attribute__((vector_size(32)));
+
+[[gnu::always_inline]] inline void get(const double* at, Lanes& lanes) { lanes = load2(at); }
+[[gnu::always_inline]] inline void put(const Lanes& lanes, double* at) { store2(lanes, at); }
+[[gnu::always_inline]] inline void get(const double* at, Lanes4& lanes) { std::memcpy(&lanes, at, sizeof lanes); }
+[[gnu::always_inline]] inline void put(const Lanes4& lanes, double* at) { std::memcpy(at, &lanes, sizeof lanes); }
+
+template <class L>
+constexpr int kWidth = sizeof(L) / sizeof(double);
+
+/// Calls work() for the columns that are left behind the last lanes, fewer than these have.
+template <class L, class Work>
+[[gnu::always_inline]] inline void for_the_rest(int first, int columns, const Work& work) {
+  for (int i = 0; i < kWidth<L> - 1; ++i) {
+    if (first + i < columns) {
+      work(first + i);
+    }
+  }
+}
+
 /// One Householder reflection of row `r` and M rows below each other, all columns from 1 on; v: the M entries of the
 /// first column.
-template <std::size_t M>
-void reflect(double* __restrict r, double* const (&rows)[M], const double (&v)[M], double v0, double beta,
-             int columns) {
-  for (int k = 1; k + 1 < columns; k += 2) {
-    const Lanes its = load2(r + k);
-    Lanes below[M];
-    Lanes s = v0 * its;
+template <class L, std::size_t M>
+[[gnu::always_inline]] inline void reflect(double* __restrict r, double* const (&rows)[M], const double (&v)[M],
+                                           double v0, double beta, int columns) {
+  int k = 1;
+  for (; k + kWidth<L> <= columns; k += kWidth<L>) {
+    L its;
+    get(r + k, its);
+    L below[M];
+    L s = v0 * its;
     for (std::size_t i = 0; i < M; ++i) {
-      below[i] = load2(rows[i] + k);
+      get(rows[i] + k, below[i]);
       s += v[i] * below[i];
     }
     s *= beta;
-    store2(its - v0 * s, r + k);
+    put(its - v0 * s, r + k);
     for (std::size_t i = 0; i < M; ++i) {
-      store2(below[i] - v[i] * s, rows[i] + k);
+      put(below[i] - v[i] * s, rows[i] + k);
     }
   }
-  if (columns % 2 == 0) {
-    const int last = columns - 1;
+  for_the_rest<L>(k, columns, [&](int last) {
     double s = v0 * r[last];
     for (std::size_t i = 0; i < M; ++i) {
       s += v[i] * rows[i][last];
@@ -41,11 +75,11 @@ void reflect(double* __restrict r, double* const (&rows)[M], const double (&v)[M
     for (std::size_t i = 0; i < M; ++i) {
       rows[i][last] -= v[i] * s;
     }
-  }
+  });
 }
 
-template <std::size_t M>
-void rotate_rows_into(RowsView root, RowsView extra, int eliminated) {
+template <class L, std::size_t M>
+[[gnu::always_inline]] inline void rotate_rows_into(RowsView root, RowsView extra, int eliminated) {
   for (int j = 0; j < eliminated; ++j) {
     double v[M];
     double* rows[M];
@@ -62,7 +96,7 @@ void rotate_rows_into(RowsView root, RowsView extra, int eliminated) {
     const double norm = std::sqrt(*r * *r + below);
     const double alpha = *r > 0 ? -norm : norm;
     const double v0 = *r - alpha;
-    reflect<M>(r, rows, v, v0, -1 / (alpha * v0), root.columns - j);
+    reflect<L, M>(r, rows, v, v0, -1 / (alpha * v0), root.columns - j);
     *r = alpha;
     for (double* row : rows) {
       *row = 0;
@@ -70,55 +104,43 @@ void rotate_rows_into(RowsView root, RowsView extra, int eliminated) {
   }
 }
 
-}  // namespace
-
-void rotate_into(RowsView root, RowsView extra, int eliminated) {
-  TRIHEDRON_ASSERT(root.columns == extra.columns && eliminated <= root.rows && eliminated <= root.columns);
+template <class L>
+[[gnu::always_inline]] inline void rotate_all_into(RowsView root, RowsView extra, int eliminated) {
   constexpr int kAtOnce = 8;
   for (int first = 0; first < extra.rows; first += kAtOnce) {
     const RowsView some{extra.row(first), std::min(extra.rows - first, kAtOnce), extra.columns, extra.stride};
     switch (some.rows) {
       case 1:
-        rotate_rows_into<1>(root, some, eliminated);
+        rotate_rows_into<L, 1>(root, some, eliminated);
         break;
       case 2:
-        rotate_rows_into<2>(root, some, eliminated);
+        rotate_rows_into<L, 2>(root, some, eliminated);
         break;
       case 3:
-        rotate_rows_into<3>(root, some, eliminated);
+        rotate_rows_into<L, 3>(root, some, eliminated);
         break;
       case 4:
-        rotate_rows_into<4>(root, some, eliminated);
+        rotate_rows_into<L, 4>(root, some, eliminated);
         break;
       case 5:
-        rotate_rows_into<5>(root, some, eliminated);
+        rotate_rows_into<L, 5>(root, some, eliminated);
         break;
       case 6:
-        rotate_rows_into<6>(root, some, eliminated);
+        rotate_rows_into<L, 6>(root, some, eliminated);
         break;
       case 7:
-        rotate_rows_into<7>(root, some, eliminated);
+        rotate_rows_into<L, 7>(root, some, eliminated);
         break;
       default:
-        rotate_rows_into<8>(root, some, eliminated);
+        rotate_rows_into<L, 8>(root, some, eliminated);
         break;
     }
   }
 }
 
-void triangularise(RowsView rows, int columns) {
-  for (int j = 0; j < columns && j + 1 < rows.rows; ++j) {
-    const int rest = rows.columns - j;
-    rotate_into({rows.row(j) + j, 1, rest, rows.stride}, {rows.row(j + 1) + j, rows.rows - j - 1, rest, rows.stride},
-                1);
-  }
-}
-
-namespace {
-
 /// Of solve_rows(): P columns from j on, of M rows side by side, and what they take off all further columns.
-template <std::size_t P, std::size_t M>
-void solve_columns(ConstRowsView root, int j, double* const (&rows)[M]) {
+template <class L, std::size_t P, std::size_t M>
+[[gnu::always_inline]] inline void solve_columns(ConstRowsView root, int j, double* const (&rows)[M]) {
   const double* R[P];
   for (std::size_t p = 0; p < P; ++p) {
     R[p] = root.row(j + static_cast<int>(p)) + j;
@@ -136,30 +158,33 @@ void solve_columns(ConstRowsView root, int j, double* const (&rows)[M]) {
     }
   }
   const int columns = root.rows - j;
-  for (int k = P; k + 1 < columns; k += 2) {
-    Lanes its[P];
+  int k = P;
+  for (; k + kWidth<L> <= columns; k += kWidth<L>) {
+    L its[P];
     for (std::size_t p = 0; p < P; ++p) {
-      its[p] = load2(R[p] + k);
+      get(R[p] + k, its[p]);
     }
     for (std::size_t i = 0; i < M; ++i) {
-      Lanes rest = load2(x[i] + k);
+      L rest;
+      get(x[i] + k, rest);
       for (std::size_t p = 0; p < P; ++p) {
         rest -= value[i][p] * its[p];
       }
-      store2(rest, x[i] + k);
+      put(rest, x[i] + k);
     }
   }
-  const int last = columns - 1;
-  for (std::size_t i = 0; (columns - static_cast<int>(P)) % 2 != 0 && i < M; ++i) {
-    for (std::size_t p = 0; p < P; ++p) {
-      x[i][last] -= value[i][p] * R[p][last];
+  for_the_rest<L>(k, columns, [&](int last) {
+    for (std::size_t i = 0; i < M; ++i) {
+      for (std::size_t p = 0; p < P; ++p) {
+        x[i][last] -= value[i][p] * R[p][last];
+      }
     }
-  }
+  });
 }
 
 /// solve_rows() of M rows, side by side, four columns at a time.
-template <std::size_t M>
-void solve_rows_together(ConstRowsView root, RowsView rows) {
+template <class L, std::size_t M>
+[[gnu::always_inline]] inline void solve_rows_together(ConstRowsView root, RowsView rows) {
   double* x[M];
   for (std::size_t i = 0; i < M; ++i) {
     x[i] = rows.row(static_cast<int>(i));
@@ -171,19 +196,42 @@ void solve_rows_together(ConstRowsView root, RowsView rows) {
   }
   const int rest = (n - j) % 4;
   for (; j + 3 < n; j += 4) {
-    solve_columns<4>(root, j, x);
+    solve_columns<L, 4>(root, j, x);
   }
   if (rest >= 2) {
-    solve_columns<2>(root, j, x);
+    solve_columns<L, 2>(root, j, x);
   }
   if (rest % 2 != 0) {
-    solve_columns<1>(root, n - 1, x);
+    solve_columns<L, 1>(root, n - 1, x);
+  }
+}
+
+template <class L>
+[[gnu::always_inline]] inline void solve_all_rows(ConstRowsView root, RowsView rows) {
+  constexpr int kAtOnce = 4;
+  for (int first = 0; first < rows.rows; first += kAtOnce) {
+    const RowsView some{rows.row(first), std::min(rows.rows - first, kAtOnce), rows.columns, rows.stride};
+    switch (some.rows) {
+      case 1:
+        solve_rows_together<L, 1>(root, some);
+        break;
+      case 2:
+        solve_rows_together<L, 2>(root, some);
+        break;
+      case 3:
+        solve_rows_together<L, 3>(root, some);
+        break;
+      default:
+        solve_rows_together<L, 4>(root, some);
+        break;
+    }
   }
 }
 
 /// take_off() of so many rows.
-template <std::size_t Rows>
-void take_off_rows(const double* factors, std::ptrdiff_t stride, ConstRowsView b, double* rest) {
+template <class L, std::size_t Rows>
+[[gnu::always_inline]] inline void take_off_rows(const double* factors, std::ptrdiff_t stride, ConstRowsView b,
+                                                 double* rest) {
   double by[Rows];
   const double* row[Rows];
   for (std::size_t i = 0; i < Rows; ++i) {
@@ -191,39 +239,114 @@ void take_off_rows(const double* factors, std::ptrdiff_t stride, ConstRowsView b
     by[i] = factors[its * stride];
     row[i] = b.row(its);
   }
-  for (int j = 0; j + 1 < b.columns; j += 2) {
-    Lanes left = load2(rest + j);
+  int j = 0;
+  for (; j + kWidth<L> <= b.columns; j += kWidth<L>) {
+    L left;
+    get(rest + j, left);
     for (std::size_t i = 0; i < Rows; ++i) {
-      left -= by[i] * load2(row[i] + j);
+      L its;
+      get(row[i] + j, its);
+      left -= by[i] * its;
     }
-    store2(left, rest + j);
+    put(left, rest + j);
   }
-  const int last = b.columns - 1;
-  for (std::size_t i = 0; b.columns % 2 != 0 && i < Rows; ++i) {
-    rest[last] -= by[i] * row[i][last];
+  for_the_rest<L>(j, b.columns, [&](int last) {
+    for (std::size_t i = 0; i < Rows; ++i) {
+      rest[last] -= by[i] * row[i][last];
+    }
+  });
+}
+
+template <class L>
+[[gnu::always_inline]] inline void take_off_all(const double* factors, std::ptrdiff_t stride, ConstRowsView b,
+                                                double* rest) {
+  const int together = b.rows - b.rows % 3;
+  for (int k = 0; k < together; k += 3) {
+    take_off_rows<L, 3>(factors + k * stride, stride, {b.row(k), 3, b.columns, b.stride}, rest);
+  }
+  for (int k = together; k < b.rows; ++k) {
+    take_off_rows<L, 1>(factors + k * stride, stride, {b.row(k), 1, b.columns, b.stride}, rest);
   }
 }
 
+/// Of solve_column(): the rows `last`, last − 1, …, so many; what comes below is known. Side by side, since each sum is
+/// a chain of operations that wait for one another.
+template <std::size_t Rows>
+void solve_column_up(ConstRowsView root, int last, double* x) {
+  const int n = root.rows;
+  const double* row[Rows];
+  double rest[Rows];
+  for (std::size_t i = 0; i < Rows; ++i) {
+    row[i] = root.row(last - static_cast<int>(i));
+    rest[i] = row[i][n];
+  }
+  for (int j = last + 1; j < n; ++j) {
+    for (std::size_t i = 0; i < Rows; ++i) {
+      rest[i] -= row[i][j] * x[j];
+    }
+  }
+  for (std::size_t i = 0; i < Rows; ++i) {
+    const int its = last - static_cast<int>(i);
+    for (int j = last; j > its; --j) {
+      rest[i] -= row[i][j] * x[j];
+    }
+    x[its] = rest[i] / row[i][its];
+  }
+}
+
+#if TRIHEDRON_WIDE_LANES
+constexpr int kLongRow = 48;
+
+[[nodiscard]] bool is_wide(int columns) { return columns >= kLongRow && __builtin_cpu_supports("avx2") != 0; }
+
+[[gnu::target("avx2")]] void rotate_wide_into(RowsView root, RowsView extra, int eliminated) {
+  rotate_all_into<Lanes4>(root, extra, eliminated);
+}
+[[gnu::target("avx2")]] void solve_wide_rows(ConstRowsView root, RowsView rows) { solve_all_rows<Lanes4>(root, rows); }
+[[gnu::target("avx2")]] void take_off_wide(const double* factors, std::ptrdiff_t stride, ConstRowsView b,
+                                           double* rest) {
+  take_off_all<Lanes4>(factors, stride, b, rest);
+}
+#endif
+
 }  // namespace
 
+void rotate_into(RowsView root, RowsView extra, int eliminated) {
+  TRIHEDRON_ASSERT(root.columns == extra.columns && eliminated <= root.rows && eliminated <= root.columns);
+#if TRIHEDRON_WIDE_LANES
+  if (is_wide(root.columns)) {
+    rotate_wide_into(root, extra, eliminated);
+    return;
+  }
+#endif
+  rotate_all_into<Lanes>(root, extra, eliminated);
+}
+
+void triangularise(RowsView rows, int columns) {
+  for (int j = 0; j < columns && j + 1 < rows.rows; ++j) {
+    const int rest = rows.columns - j;
+    rotate_into({rows.row(j) + j, 1, rest, rows.stride}, {rows.row(j + 1) + j, rows.rows - j - 1, rest, rows.stride},
+                1);
+  }
+}
+
 void solve_rows(ConstRowsView root, RowsView rows) {
-  constexpr int kAtOnce = 4;
-  for (int first = 0; first < rows.rows; first += kAtOnce) {
-    const RowsView some{rows.row(first), std::min(rows.rows - first, kAtOnce), rows.columns, rows.stride};
-    switch (some.rows) {
-      case 1:
-        solve_rows_together<1>(root, some);
-        break;
-      case 2:
-        solve_rows_together<2>(root, some);
-        break;
-      case 3:
-        solve_rows_together<3>(root, some);
-        break;
-      default:
-        solve_rows_together<4>(root, some);
-        break;
-    }
+#if TRIHEDRON_WIDE_LANES
+  if (is_wide(root.rows)) {
+    solve_wide_rows(root, rows);
+    return;
+  }
+#endif
+  solve_all_rows<Lanes>(root, rows);
+}
+
+void solve_column(ConstRowsView root, double* x) {
+  int last = root.rows - 1;
+  for (; last >= 3; last -= 4) {
+    solve_column_up<4>(root, last, x);
+  }
+  for (; last >= 0; --last) {
+    solve_column_up<1>(root, last, x);
   }
 }
 
@@ -231,6 +354,13 @@ void multiply(ConstRowsView a, ConstRowsView b, RowsView product) {
   for (int i = 0; i < product.rows; ++i) {
     double* __restrict row = product.row(i);
     std::fill(row, row + product.columns, 0.0);
+#if TRIHEDRON_WIDE_LANES
+    if (is_wide(b.columns)) {  // taken off, then with the other sign: the same bits
+      take_off_wide(a.row(i), 1, b, row);
+      std::transform(row, row + product.columns, row, std::negate<>());
+      continue;
+    }
+#endif
     for (int k = 0; k < b.rows; ++k) {
       const double by = a(i, k);
       const double* __restrict its = b.row(k);
@@ -242,13 +372,13 @@ void multiply(ConstRowsView a, ConstRowsView b, RowsView product) {
 }
 
 void take_off(const double* factors, std::ptrdiff_t stride, ConstRowsView b, double* rest) {
-  const int together = b.rows - b.rows % 3;
-  for (int k = 0; k < together; k += 3) {
-    take_off_rows<3>(factors + k * stride, stride, {b.row(k), 3, b.columns, b.stride}, rest);
+#if TRIHEDRON_WIDE_LANES
+  if (is_wide(b.columns)) {
+    take_off_wide(factors, stride, b, rest);
+    return;
   }
-  for (int k = together; k < b.rows; ++k) {
-    take_off_rows<1>(factors + k * stride, stride, {b.row(k), 1, b.columns, b.stride}, rest);
-  }
+#endif
+  take_off_all<Lanes>(factors, stride, b, rest);
 }
 
 void invert_triangle(ConstRowsView root, RowsView inverse) {

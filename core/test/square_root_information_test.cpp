@@ -191,6 +191,66 @@ TEST(RotateInto, TakesAnyNumberOfRows) {
   }
 }
 
+TEST(SolveColumn, IsTheSolution) {
+  std::mt19937 random(8);
+  for (int n = 1; n <= 9; ++n) {
+    RowMajor root = random_matrix(n, n + 1, random);
+    root.leftCols(n).triangularView<Eigen::StrictlyLower>().setZero();
+    root.diagonal().array() += 3;
+    Eigen::VectorXd x(n);
+    solve_column(view_of(root), x.data());
+    EXPECT_LT((root.leftCols(n) * x - root.col(n)).norm(), 1e-13 * root.norm()) << n;
+  }
+}
+
+/// What is done to a column does not depend on those right of it: the same bits, however many there are and however
+/// many are worked on together.
+TEST(LongRows, HaveTheBitsOfShortOnes) {
+  std::mt19937 random(7);
+  for (const int columns : {48, 49, 50, 51, 101}) {
+    constexpr int kShort = 20;
+    for (int rows = 1; rows <= 9; ++rows) {
+      RowMajor root = random_matrix(columns, columns, random);
+      root.triangularView<Eigen::StrictlyLower>().setZero();
+      root.diagonal().array() += 5;
+      const RowMajor extra = random_matrix(rows, columns, random);
+
+      RowMajor long_root = root;
+      RowMajor long_extra = extra;
+      rotate_into(rows_of(long_root), rows_of(long_extra), columns);
+      RowMajor short_root = root.topLeftCorner(kShort, kShort);
+      RowMajor short_extra = extra.leftCols(kShort);
+      rotate_into(rows_of(short_root), rows_of(short_extra), kShort);
+      EXPECT_EQ(long_root.topLeftCorner(kShort, kShort), short_root) << columns << ' ' << rows;
+      EXPECT_EQ(long_extra.norm(), 0);
+
+      RowMajor long_solved = extra;
+      solve_rows(view_of(root), rows_of(long_solved));
+      EXPECT_LT((long_solved * root - extra).norm(), 1e-10 * extra.norm());
+      const RowMajor corner = root.topLeftCorner(kShort, kShort);
+      RowMajor short_solved = extra.leftCols(kShort);
+      solve_rows(view_of(corner), rows_of(short_solved));
+      EXPECT_EQ(long_solved.leftCols(kShort), short_solved) << columns << ' ' << rows;
+
+      const RowMajor factors = random_matrix(1, columns, random);
+      RowMajor long_rest = extra;
+      take_off(factors.data(), 1, view_of(root), long_rest.data());
+      const RowMajor expected = extra.row(0) - factors * root;
+      EXPECT_LT((long_rest.row(0) - expected).norm(), 1e-13 * expected.norm());
+      RowMajor short_rest = extra.leftCols(kShort);
+      take_off(factors.data(), 1, {root.data(), columns, kShort, columns}, short_rest.data());
+      EXPECT_EQ(long_rest.row(0).head(kShort), short_rest.row(0)) << columns << ' ' << rows;
+
+      RowMajor long_product(rows, columns);
+      multiply(view_of(extra), view_of(root), rows_of(long_product));
+      const RowMajor some = root.leftCols(kShort);
+      RowMajor short_product(rows, kShort);
+      multiply(view_of(extra), view_of(some), rows_of(short_product));
+      EXPECT_EQ(long_product.leftCols(kShort), short_product) << columns << ' ' << rows;
+    }
+  }
+}
+
 TEST(Multiply, IsTheProduct) {
   std::mt19937 random(6);
   const RowMajor a = random_matrix(3, 7, random);

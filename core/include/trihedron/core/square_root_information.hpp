@@ -26,6 +26,9 @@ void triangularise(RowsView rows, int columns);
 /// afterwards.
 void solve_rows(ConstRowsView root, RowsView rows);
 
+/// x = R⁻¹ z, R the upper triangle of `root`, z the column right of it.
+void solve_column(ConstRowsView root, double* x);
+
 /// The first rows of the inverse of the upper triangle of `root`, as many as `inverse` has; zero below the diagonal.
 void invert_triangle(ConstRowsView root, RowsView inverse);
 
@@ -160,14 +163,7 @@ class SquareRootInformation {
     RowsView whole{data_.data(), states_, states_ + 1, states_ + 1};
     rotate_into(whole, rows, states_);
     Vector x(states_);
-    for (int i = states_ - 1; i >= 0; --i) {
-      const double* R = whole.row(i);
-      double sum = R[states_];
-      for (int j = i + 1; j < states_; ++j) {
-        sum -= R[j] * x(j);
-      }
-      x(i) = sum / R[i];
-    }
+    solve_column({data_.data(), states_, states_ + 1, states_ + 1}, x.data());
     for (int i = 0; i < states_; ++i) {
       whole(i, states_) = 0;
     }
