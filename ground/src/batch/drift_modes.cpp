@@ -19,10 +19,7 @@ MatrixXd parameters_by_parameters(const Layout& to, const Layout& from, const Pe
   return map;
 }
 
-void MovedByModes::add(std::size_t arc, Time t, Columns moved) {
-  arcs_.resize(std::max(arcs_.size(), arc + 1));
-  arcs_[arc].push_back({t, std::move(moved)});
-}
+void MovedByModes::add(std::size_t arc, Time t, Columns moved) { arcs_.at(arc).push_back({t, std::move(moved)}); }
 
 MovedByModes::Place MovedByModes::place(std::size_t arc, Time t) const {
   const std::vector<Moment>& its = arcs_.at(arc);

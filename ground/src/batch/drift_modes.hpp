@@ -32,7 +32,11 @@ class MovedByModes {
  public:
   using Columns = PerGyro<Eigen::MatrixXf>;  ///< 3 × modes, `in`, s; to seven digits, to take half the memory
 
-  /// Of a further moment of the pass; an arc begins with zeros.
+  MovedByModes() = default;
+  /// Of a pass of so many arcs.
+  explicit MovedByModes(std::size_t arcs) : arcs_(arcs) {}
+
+  /// Of a further moment of an arc, which begins with zeros. Moments of several arcs may be added at the same time.
   void add(std::size_t arc, Time t, Columns moved);
   /// φ of a momentum by the amplitudes of its modes, 3 × modes, at a moment of an arc: linear between those added.
   [[nodiscard]] Eigen::MatrixXd at(std::size_t arc, Time t, int gyro) const;

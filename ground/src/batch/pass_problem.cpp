@@ -5,10 +5,12 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <numeric>
 #include <utility>
 
 #include "batch/gram.hpp"
 #include "trihedron/core/outlier_gate.hpp"
+#include "trihedron/ground/tasks/on_all_cores.hpp"
 #include "trihedron/records/stop.hpp"
 
 namespace trihedron::ground {
@@ -251,6 +253,10 @@ PassProblem::PassProblem(const ScreenedPass& pass, PassSetup setup)
   }
 }
 
+void PassProblem::for_each_part(const std::function<void(std::size_t, std::size_t, std::size_t)>& work) const {
+  for_each_on_all_cores(kParts, [&](std::size_t part) { work(part, end_of(part), end_of(part + 1)); });
+}
+
 void PassProblem::begin_arc(const PassSolution& solution, std::size_t arc, Moment& moment) const {
   moment.arc = arc;
   moment.t = nodes_[arcs_[arc].begin].t;
@@ -406,38 +412,40 @@ MovedByModes PassProblem::moved_by_coefficients(const PassSolution& solution) co
   constexpr Duration kApart = std::chrono::seconds(10);     // over which the drift turns a momentum evenly
   constexpr Duration kTableStep = std::chrono::seconds(3);  // a third of that, unless the body turns fast
   const Drift drift = drift_along(solution, &drift_);
-  MovedByModes table;
-  Moment moment;
-  double unused = 0;
-  for (std::size_t arc = 0; arc < arcs_.size(); ++arc) {
-    check_stop();
-    begin_arc(solution, arc, moment);
-    const std::size_t last = std::min(arcs_[arc].end, nodes_.size() - 1);
-    Time taken = moment.t - kApart;
-    std::size_t from = arcs_[arc].begin;
-    Reading read = reading_at(nodes_[from]);
-    for (std::size_t i = from; i <= last; ++i) {
-      if (i > from) {
-        const Reading next = i < last ? reading_at(nodes_[i + 1]) : Reading{};
-        if (i < last && nodes_[i + 1].t - nodes_[from].t <= kTableStep &&
-            turned_little(read.h_b, next.h_b, both(read.used, next.used), gyros_)) {
-          continue;
+  MovedByModes table(arcs_.size());
+  for_each_part([&](std::size_t /*part*/, std::size_t begin, std::size_t end) {
+    Moment moment;
+    double unused = 0;
+    for (std::size_t arc = begin; arc < end; ++arc) {
+      check_stop();
+      begin_arc(solution, arc, moment);
+      const std::size_t last = std::min(arcs_[arc].end, nodes_.size() - 1);
+      Time taken = moment.t - kApart;
+      std::size_t from = arcs_[arc].begin;
+      Reading read = reading_at(nodes_[from]);
+      for (std::size_t i = from; i <= last; ++i) {
+        if (i > from) {
+          const Reading next = i < last ? reading_at(nodes_[i + 1]) : Reading{};
+          if (i < last && nodes_[i + 1].t - nodes_[from].t <= kTableStep &&
+              turned_little(read.h_b, next.h_b, both(read.used, next.used), gyros_)) {
+            continue;
+          }
+          step(nodes_[from], nodes_[i], drift, moment, unused);
+          from = i;
+          read = reading_at(nodes_[i]);
         }
-        step(nodes_[from], nodes_[i], drift, moment, unused);
-        from = i;
-        read = reading_at(nodes_[i]);
-      }
-      if (i == last || moment.t - taken >= kApart) {
-        taken = moment.t;
-        MovedByModes::Columns moved;
-        for (int k = 0; k < gyros_; ++k) {
-          const auto by_drift = moment.since[k].by_drift.first(drift_.size());
-          moved[k] = by_drift.rightCols(drift_.size() - Layout::kEq1).cast<float>();
+        if (i == last || moment.t - taken >= kApart) {
+          taken = moment.t;
+          MovedByModes::Columns moved;
+          for (int k = 0; k < gyros_; ++k) {
+            const auto by_drift = moment.since[k].by_drift.first(drift_.size());
+            moved[k] = by_drift.rightCols(drift_.size() - Layout::kEq1).cast<float>();
+          }
+          table.add(arc, moment.t, std::move(moved));
         }
-        table.add(arc, moment.t, std::move(moved));
       }
     }
-  }
+  });
   return table;
 }
 
@@ -457,26 +465,28 @@ void PassProblem::use_modes_of(const PassProblem& other) {
 
 void PassProblem::use(DriftModes modes, const MovedByModes& by_coefficients) {
   take(std::move(modes));
-  moved_by_modes_ = {};
-  for (std::size_t arc = 0; arc < arcs_.size(); ++arc) {
-    check_stop();
-    const std::size_t size = by_coefficients.size(arc);
-    PerGyro<MatrixXd> moved;  // of the whole arc
-    for (int k = 0; k < gyros_; ++k) {
-      MatrixXd rows(3 * static_cast<Eigen::Index>(size), modes_->gyros[k].coefficients.rows());
-      for (std::size_t i = 0; i < size; ++i) {
-        rows.middleRows<3>(3 * static_cast<Eigen::Index>(i)) = by_coefficients.added(arc, i, k).cast<double>();
-      }
-      moved[k] = multiply(rows, modes_->gyros[k].coefficients);
-    }
-    for (std::size_t i = 0; i < size; ++i) {
-      MovedByModes::Columns columns;
+  moved_by_modes_ = MovedByModes(arcs_.size());
+  for_each_part([&](std::size_t /*part*/, std::size_t begin, std::size_t end) {
+    for (std::size_t arc = begin; arc < end; ++arc) {
+      check_stop();
+      const std::size_t size = by_coefficients.size(arc);
+      PerGyro<MatrixXd> moved;  // of the whole arc
       for (int k = 0; k < gyros_; ++k) {
-        columns[k] = moved[k].middleRows<3>(3 * static_cast<Eigen::Index>(i)).cast<float>();
+        MatrixXd rows(3 * static_cast<Eigen::Index>(size), modes_->gyros[k].coefficients.rows());
+        for (std::size_t i = 0; i < size; ++i) {
+          rows.middleRows<3>(3 * static_cast<Eigen::Index>(i)) = by_coefficients.added(arc, i, k).cast<double>();
+        }
+        moved[k] = multiply(rows, modes_->gyros[k].coefficients);
       }
-      moved_by_modes_.add(arc, by_coefficients.t(arc, i), std::move(columns));
+      for (std::size_t i = 0; i < size; ++i) {
+        MovedByModes::Columns columns;
+        for (int k = 0; k < gyros_; ++k) {
+          columns[k] = moved[k].middleRows<3>(3 * static_cast<Eigen::Index>(i)).cast<float>();
+        }
+        moved_by_modes_.add(arc, by_coefficients.t(arc, i), std::move(columns));
+      }
     }
-  }
+  });
 }
 
 PassSolution PassProblem::start(const Gyros& gyros) const {
@@ -679,7 +689,7 @@ void PassProblem::end_arc(const PassSolution& solution, const Moment& moment, do
                           Linear& linear) const {
   const int d = layout_.dynamic();
   SmootherStage& stage = linear.stages[moment.arc];
-  Linear::ArcEnd& end = linear.ends.emplace_back();
+  Linear::ArcEnd& end = linear.ends[moment.arc];
   end.duration_s = to_seconds(moment.t - nodes_[arcs_[moment.arc].begin].t);
   end.extra_variance_rad2 = extra_variance_rad2;
   stage.m.setZero(d);
@@ -727,25 +737,31 @@ double PassProblem::scale_of_misfits(const PassSolution& solution) const {
   constexpr double kMedianOfFour = 0.84;  // of χ²/n; nearer to 1 for more
   constexpr std::size_t kEnough = 100;
   const std::size_t of_one_arc = 1 + kEnough / arcs_.size();
-  std::vector<double> nis_per_component;
+  std::vector<std::vector<double>> of_part(kParts);
   const Drift drift = drift_along(solution, nullptr);
-  Moment moment;
-  double unused = 0;
-  for (std::size_t arc = 0; arc < arcs_.size(); ++arc) {
-    begin_arc(solution, arc, moment);
-    std::size_t left = of_one_arc;
-    for (std::size_t i = arcs_[arc].begin; i < arcs_[arc].end && left > 0; ++i) {
-      if (i > arcs_[arc].begin) {
-        step(nodes_[i - 1], nodes_[i], drift, moment, unused);
-      }
-      moment.fix = nodes_[i].fix;
-      Compared fix = moment.fix != nullptr ? compare_now(solution, moment) : Compared{};
-      if (const Eigen::Index components = fix.rows.rows(); components > 0) {
-        whiten(fix.R, rows_of(fix.rows));
-        nis_per_component.push_back(fix.rows.col(on_board_.size()).squaredNorm() / static_cast<double>(components));
-        --left;
+  for_each_part([&](std::size_t part, std::size_t begin, std::size_t end) {
+    Moment moment;
+    double unused = 0;
+    for (std::size_t arc = begin; arc < end; ++arc) {
+      begin_arc(solution, arc, moment);
+      std::size_t left = of_one_arc;
+      for (std::size_t i = arcs_[arc].begin; i < arcs_[arc].end && left > 0; ++i) {
+        if (i > arcs_[arc].begin) {
+          step(nodes_[i - 1], nodes_[i], drift, moment, unused);
+        }
+        moment.fix = nodes_[i].fix;
+        Compared fix = moment.fix != nullptr ? compare_now(solution, moment) : Compared{};
+        if (const Eigen::Index components = fix.rows.rows(); components > 0) {
+          whiten(fix.R, rows_of(fix.rows));
+          of_part[part].push_back(fix.rows.col(on_board_.size()).squaredNorm() / static_cast<double>(components));
+          --left;
+        }
       }
     }
+  });
+  std::vector<double> nis_per_component;
+  for (const std::vector<double>& its : of_part) {
+    nis_per_component.insert(nis_per_component.end(), its.begin(), its.end());
   }
   if (nis_per_component.empty()) {
     return 1;
@@ -766,33 +782,34 @@ PassProblem::Linear PassProblem::linearise(const PassSolution& solution, bool by
   const double scale = scale_of_misfits(solution);
   Linear linear;
   linear.stages.resize(arcs_.size());
+  linear.ends.resize(arcs_.size() - 1);
   const Drift drift = drift_along(solution, &sensitive());
-  ConstantSquares constants(layout_.constants() + 1);
-  std::size_t part = 0;
-  Moment moment;
-  for (std::size_t arc = 0; arc < arcs_.size(); ++arc) {
-    double extra_variance_rad2 = 0;
-    FixMerger nearby(*this);
-    linear.cost_outside_rows += add_arc(solution, arc, drift, scale, moment, extra_variance_rad2, nearby);
-    SmootherStage& stage = linear.stages[arc];
-    linear.cost_outside_rows += nearby.put_into(arc, stage);
-    if (by_parts) {
-      take_constants(stage, layout_.dynamic(), constants);
-      while (part < kParts && end_of(part + 1) <= arc) {
-        ++part;
+  std::vector<double> outside_rows(arcs_.size());
+  for_each_part([&](std::size_t /*part*/, std::size_t begin, std::size_t end) {
+    ConstantSquares constants(by_parts ? layout_.constants() + 1 : 0);
+    Moment moment;
+    for (std::size_t arc = begin; arc < end; ++arc) {
+      double extra_variance_rad2 = 0;
+      FixMerger nearby(*this);
+      outside_rows[arc] = add_arc(solution, arc, drift, scale, moment, extra_variance_rad2, nearby);
+      SmootherStage& stage = linear.stages[arc];
+      outside_rows[arc] += nearby.put_into(arc, stage);
+      if (!by_parts) {
+        compress(stage);
+      } else {
+        take_constants(stage, layout_.dynamic(), constants);
+        if (arc + 1 == end) {
+          put_back(constants, layout_.dynamic(), stage);
+        }
       }
-      if (arc + 1 == end_of(part + 1)) {
-        put_back(constants, layout_.dynamic(), stage);
+      if (arc + 1 < arcs_.size()) {
+        end_arc(solution, moment, extra_variance_rad2, linear);
+      } else {
+        stage.m.setZero(layout_.dynamic());
       }
-    } else {
-      compress(stage);
     }
-    if (arc + 1 < arcs_.size()) {
-      end_arc(solution, moment, extra_variance_rad2, linear);
-    } else {
-      stage.m.setZero(layout_.dynamic());
-    }
-  }
+  });
+  linear.cost_outside_rows = std::accumulate(outside_rows.begin(), outside_rows.end(), 0.0);
   renew(solution, linear);
   return linear;
 }
