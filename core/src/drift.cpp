@@ -18,14 +18,32 @@ constexpr int max_degree_of(DriftModelId id) {
                                                      : 0;
 }
 
-/// Of the potential of a member.
+/// Gradients of the potentials of members, those of one degree at a time: W and D of a harmonic are made of the same,
+/// and come degree by degree.
 template <class Harmonics>
-Eigen::Vector3d gradient(const Harmonics& harmonics, const DriftCoefficient& its) {
-  const Eigen::Vector3d own = harmonics.polynomial_gradient(its.degree, its.order);
-  return BesideK0::is(its)
-             ? Eigen::Vector3d(BesideK0::kOf44 * own + BesideK0::kOf40 * harmonics.polynomial_gradient(4, 0))
-             : own;
-}
+class Gradients {
+ public:
+  explicit Gradients(const Harmonics& harmonics) : harmonics_(harmonics) {}
+
+  [[nodiscard]] Eigen::Vector3d of(const DriftCoefficient& member) {
+    if (member.degree != degree_) {
+      degree_ = member.degree;
+      for (int order = -degree_; order <= degree_; ++order) {
+        at(order) = harmonics_.polynomial_gradient(degree_, order);
+      }
+    }
+    return BesideK0::is(member) ? Eigen::Vector3d(BesideK0::kOf44 * at(4) + BesideK0::kOf40 * at(0)) : at(member.order);
+  }
+
+ private:
+  [[nodiscard]] Eigen::Vector3d& at(int order) {
+    return of_degree_[static_cast<std::size_t>(DriftModelId::kMaxDegree + order)];
+  }
+
+  const Harmonics& harmonics_;
+  int degree_ = 0;
+  std::array<Eigen::Vector3d, 2 * DriftModelId::kMaxDegree + 1> of_degree_;
+};
 
 }  // namespace
 
@@ -77,14 +95,15 @@ void DriftModel::basis(const Eigen::Vector3d& h, const DriftTime& time, ColumnsV
   }
   if (size_ > Esg7::kSize) {
     const auto harmonics = harmonics_.at<double>(h);
+    Gradients gradients(harmonics);
     for (int i = Esg7::kSize; i < size_; ++i) {
       const DriftCoefficient& its = member(i);
       switch (its.member) {
         case Member::kW:
-          B.set_column(i, -gradient(harmonics, its));
+          B.set_column(i, -gradients.of(its));
           break;
         case Member::kD:
-          B.set_column(i, h.cross(gradient(harmonics, its)));
+          B.set_column(i, h.cross(gradients.of(its)));
           break;
         default:
           B.set_column(i, h.cross(h.cwiseProduct(h).cwiseProduct(h)));
@@ -145,6 +164,7 @@ Eigen::Vector3d DriftModel::rate(const Eigen::Vector3d& h, const DriftTime& time
   Vector3d rate = Esg7::rate<double>(h, kappa) + beside;
   if (size_ > Esg7::kSize) {
     const auto harmonics = harmonics_.at<double>(h);
+    Gradients gradients(harmonics);
     Eigen::Vector3d w = Eigen::Vector3d::Zero();
     Eigen::Vector3d d = Eigen::Vector3d::Zero();
     for (int i = Esg7::kSize; i < size_; ++i) {
@@ -152,7 +172,7 @@ Eigen::Vector3d DriftModel::rate(const Eigen::Vector3d& h, const DriftTime& time
       if (its.member == Member::kCubeD) {
         d += coefficients[i] * h.cwiseProduct(h).cwiseProduct(h);
       } else {
-        (its.member == Member::kW ? w : d) += coefficients[i] * gradient(harmonics, its);
+        (its.member == Member::kW ? w : d) += coefficients[i] * gradients.of(its);
       }
     }
     rate += h.cross(d) - w;
