@@ -28,8 +28,10 @@ class Gradients {
   [[nodiscard]] Eigen::Vector3d of(const DriftCoefficient& member) {
     if (member.degree != degree_) {
       degree_ = member.degree;
-      for (int order = -degree_; order <= degree_; ++order) {
-        at(order) = harmonics_.polynomial_gradient(degree_, order);
+      for (int order = 0; order <= degree_; ++order) {
+        const auto gradients = harmonics_.polynomial_gradients(degree_, order);
+        at(-order) = gradients[1];
+        at(order) = gradients[0];
       }
     }
     return BesideK0::is(member) ? Eigen::Vector3d(BesideK0::kOf44 * at(4) + BesideK0::kOf40 * at(0)) : at(member.order);
@@ -164,18 +166,23 @@ Eigen::Vector3d DriftModel::rate(const Eigen::Vector3d& h, const DriftTime& time
   Vector3d rate = Esg7::rate<double>(h, kappa) + beside;
   if (size_ > Esg7::kSize) {
     const auto harmonics = harmonics_.at<double>(h);
-    Gradients gradients(harmonics);
-    Eigen::Vector3d w = Eigen::Vector3d::Zero();
-    Eigen::Vector3d d = Eigen::Vector3d::Zero();
+    using Sum = HarmonicTableOf<DriftModelId::kMaxDegree>::At<double>::Sum;
+    Sum w(harmonics);
+    Sum d(harmonics);
+    double of_cube = 0;
     for (int i = Esg7::kSize; i < size_; ++i) {
       const DriftCoefficient& its = member(i);
+      const double factor = coefficients[i];
       if (its.member == Member::kCubeD) {
-        d += coefficients[i] * h.cwiseProduct(h).cwiseProduct(h);
+        of_cube = factor;
+      } else if (BesideK0::is(its)) {
+        w.add(4, 4, BesideK0::kOf44 * factor);
+        w.add(4, 0, BesideK0::kOf40 * factor);
       } else {
-        (its.member == Member::kW ? w : d) += coefficients[i] * gradients.of(its);
+        (its.member == Member::kW ? w : d).add(its.degree, its.order, factor);
       }
     }
-    rate += h.cross(d) - w;
+    rate += h.cross(d.gradient() + of_cube * h.cwiseProduct(h).cwiseProduct(h)) - w.gradient();
   }
   return rate;
 }

@@ -87,17 +87,61 @@ class HarmonicTableOf {
     /// Gradient of the polynomial in space; its part along h depends on how the polynomial is written and means
     /// nothing.
     [[nodiscard]] Vector3<S> polynomial_gradient(int degree, int order) const {
-      const int m = order < 0 ? -order : order;
+      return polynomial_gradients(degree, order < 0 ? -order : order)[order < 0 ? 1 : 0];
+    }
+    /// Those of an order m ≥ 0 and of −m.
+    [[nodiscard]] std::array<Vector3<S>, 2> polynomial_gradients(int degree, int m) const {
       const auto mu = static_cast<std::size_t>(m);
-      const S dq = m < degree ? S(table_.slope_[index(degree, m)]) * q_[index(degree, m + 1)] : S(0);
+      const S dq = slope(degree, m);
       const S mq = S(m) * q_[index(degree, m)];
       const S re_below = m > 0 ? re_[mu - 1] : S(0);
       const S im_below = m > 0 ? im_[mu - 1] : S(0);
-      return order >= 0 ? Vector3<S>(mq * re_below, -mq * im_below, dq * re_[mu])
-                        : Vector3<S>(mq * im_below, mq * re_below, dq * im_[mu]);
+      return {Vector3<S>(mq * re_below, -mq * im_below, dq * re_[mu]),
+              Vector3<S>(mq * im_below, mq * re_below, dq * im_[mu])};
     }
 
+    /// A sum of multiples of the polynomials. Its gradient takes a fraction of the work of all of theirs.
+    class Sum {
+     public:
+      explicit Sum(const At& at) : at_(at) {}
+
+      void add(int degree, int order, S factor) {
+        const int m = order < 0 ? -order : order;
+        OfOrder& its = (order < 0 ? sines_ : cosines_)[static_cast<std::size_t>(m)];
+        its.q += factor * at_.q_[index(degree, m)];
+        its.slope += factor * at_.slope(degree, m);
+      }
+
+      /// As polynomial_gradient().
+      [[nodiscard]] Vector3<S> gradient() const {
+        Vector3<S> sum(S(0), S(0), cosines_[0].slope);
+        for (int order = 1; order <= at_.table_.max_degree_; ++order) {
+          const auto m = static_cast<std::size_t>(order);
+          const S cosine = S(order) * cosines_[m].q;
+          const S sine = S(order) * sines_[m].q;
+          sum.x() += cosine * at_.re_[m - 1] + sine * at_.im_[m - 1];
+          sum.y() += sine * at_.re_[m - 1] - cosine * at_.im_[m - 1];
+          sum.z() += cosines_[m].slope * at_.re_[m] + sines_[m].slope * at_.im_[m];
+        }
+        return sum;
+      }
+
+     private:
+      struct OfOrder {
+        S q{};
+        S slope{};
+      };
+      const At& at_;
+      std::array<OfOrder, kOrders> cosines_{};  ///< m ≥ 0
+      std::array<OfOrder, kOrders> sines_{};    ///< m < 0
+    };
+
    private:
+    /// Derivative of Q_lm by z.
+    [[nodiscard]] S slope(int degree, int m) const {
+      return m < degree ? S(table_.slope_[index(degree, m)]) * q_[index(degree, m + 1)] : S(0);
+    }
+
     const HarmonicTableOf& table_;
     Vector3<S> h_;
     std::array<S, kOrders> re_;  ///< Re (x + iy)^m
