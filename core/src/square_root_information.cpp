@@ -5,7 +5,6 @@
 #include <cmath>
 #include <cstddef>
 #include <cstring>
-#include <functional>
 #include <iterator>
 
 #include "trihedron/core/assert.hpp"
@@ -13,11 +12,6 @@
 
 // Long rows are worked on four numbers at a time where the processor can: the same operations in the same order for
 // each number, so that the bits are the same. Rows of 26 states end before it pays.
-#if defined(__x86_64__) && defined(__GNUC__)
-#define TRIHEDRON_WIDE_LANES 1
-#else
-#define TRIHEDRON_WIDE_LANES 0
-#endif
 
 namespace trihedron {
 namespace {
@@ -49,8 +43,8 @@ template <class L, class Work>
 template <class L, std::size_t M>
 [[gnu::always_inline]] inline void reflect(double* __restrict r, double* const (&rows)[M], const double (&v)[M],
                                            double v0, double beta, int columns) {
-  int k = 1;
-  for (; k + kWidth<L> <= columns; k += kWidth<L>) {
+  const int whole = 1 + (columns - 1) / kWidth<L> * kWidth<L>;
+  for (int k = 1; k < whole; k += kWidth<L>) {
     L its;
     get(r + k, its);
     L below[M];
@@ -65,7 +59,7 @@ template <class L, std::size_t M>
       put(below[i] - v[i] * s, rows[i] + k);
     }
   }
-  for_the_rest<L>(k, columns, [&](int last) {
+  for_the_rest<L>(whole, columns, [&](int last) {
     double s = v0 * r[last];
     for (std::size_t i = 0; i < M; ++i) {
       s += v[i] * rows[i][last];
@@ -158,8 +152,9 @@ template <class L, std::size_t P, std::size_t M>
     }
   }
   const int columns = root.rows - j;
-  int k = P;
-  for (; k + kWidth<L> <= columns; k += kWidth<L>) {
+  constexpr int kFirst = P;
+  const int whole = kFirst + (columns - kFirst) / kWidth<L> * kWidth<L>;
+  for (int k = kFirst; k < whole; k += kWidth<L>) {
     L its[P];
     for (std::size_t p = 0; p < P; ++p) {
       get(R[p] + k, its[p]);
@@ -173,7 +168,7 @@ template <class L, std::size_t P, std::size_t M>
       put(rest, x[i] + k);
     }
   }
-  for_the_rest<L>(k, columns, [&](int last) {
+  for_the_rest<L>(whole, columns, [&](int last) {
     for (std::size_t i = 0; i < M; ++i) {
       for (std::size_t p = 0; p < P; ++p) {
         x[i][last] -= value[i][p] * R[p][last];
@@ -239,8 +234,8 @@ template <class L, std::size_t Rows>
     by[i] = factors[its * stride];
     row[i] = b.row(its);
   }
-  int j = 0;
-  for (; j + kWidth<L> <= b.columns; j += kWidth<L>) {
+  const int whole = b.columns / kWidth<L> * kWidth<L>;
+  for (int j = 0; j < whole; j += kWidth<L>) {
     L left;
     get(rest + j, left);
     for (std::size_t i = 0; i < Rows; ++i) {
@@ -250,7 +245,7 @@ template <class L, std::size_t Rows>
     }
     put(left, rest + j);
   }
-  for_the_rest<L>(j, b.columns, [&](int last) {
+  for_the_rest<L>(whole, b.columns, [&](int last) {
     for (std::size_t i = 0; i < Rows; ++i) {
       rest[last] -= by[i] * row[i][last];
     }
@@ -294,7 +289,7 @@ void solve_column_up(ConstRowsView root, int last, double* x) {
   }
 }
 
-#if TRIHEDRON_WIDE_LANES
+#ifdef __x86_64__
 constexpr int kLongRow = 48;
 
 [[nodiscard]] bool is_wide(int columns) { return columns >= kLongRow && __builtin_cpu_supports("avx2") != 0; }
@@ -313,7 +308,7 @@ constexpr int kLongRow = 48;
 
 void rotate_into(RowsView root, RowsView extra, int eliminated) {
   TRIHEDRON_ASSERT(root.columns == extra.columns && eliminated <= root.rows && eliminated <= root.columns);
-#if TRIHEDRON_WIDE_LANES
+#ifdef __x86_64__
   if (is_wide(root.columns)) {
     rotate_wide_into(root, extra, eliminated);
     return;
@@ -331,7 +326,7 @@ void triangularise(RowsView rows, int columns) {
 }
 
 void solve_rows(ConstRowsView root, RowsView rows) {
-#if TRIHEDRON_WIDE_LANES
+#ifdef __x86_64__
   if (is_wide(root.rows)) {
     solve_wide_rows(root, rows);
     return;
@@ -341,11 +336,10 @@ void solve_rows(ConstRowsView root, RowsView rows) {
 }
 
 void solve_column(ConstRowsView root, double* x) {
-  int last = root.rows - 1;
-  for (; last >= 3; last -= 4) {
+  for (int last = root.rows - 1; last >= 3; last -= 4) {
     solve_column_up<4>(root, last, x);
   }
-  for (; last >= 0; --last) {
+  for (int last = root.rows % 4 - 1; last >= 0; --last) {
     solve_column_up<1>(root, last, x);
   }
 }
@@ -354,10 +348,10 @@ void multiply(ConstRowsView a, ConstRowsView b, RowsView product) {
   for (int i = 0; i < product.rows; ++i) {
     double* __restrict row = product.row(i);
     std::fill(row, row + product.columns, 0.0);
-#if TRIHEDRON_WIDE_LANES
+#ifdef __x86_64__
     if (is_wide(b.columns)) {  // taken off, then with the other sign: the same bits
       take_off_wide(a.row(i), 1, b, row);
-      std::transform(row, row + product.columns, row, std::negate<>());
+      std::transform(row, row + product.columns, row, [](double its) { return -its; });
       continue;
     }
 #endif
@@ -372,7 +366,7 @@ void multiply(ConstRowsView a, ConstRowsView b, RowsView product) {
 }
 
 void take_off(const double* factors, std::ptrdiff_t stride, ConstRowsView b, double* rest) {
-#if TRIHEDRON_WIDE_LANES
+#ifdef __x86_64__
   if (is_wide(b.columns)) {
     take_off_wide(factors, stride, b, rest);
     return;

@@ -10,7 +10,6 @@
 #include <utility>
 #include <vector>
 
-#include "batch/gram.hpp"
 #include "trihedron/core/directions_fit.hpp"
 #include "trihedron/core/drift.hpp"
 #include "trihedron/core/frames.hpp"
@@ -488,7 +487,7 @@ class TurnFit {
     Eigen::Index count = 0;
     const auto put_into_normal = [&] {
       if (count > 0) {
-        add_gram(gathered.leftCols(count), 1, normal);
+        normal.selfadjointView<Eigen::Lower>().rankUpdate(gathered.leftCols(count));
         count = 0;
       }
     };
