@@ -37,10 +37,14 @@ struct TwoDirections {
   }
 
   /// By the axes on them in which both have equal weight: their normal, the bisector, and the third. Needs no fault().
-  [[nodiscard]] Rot<In, C> rotation() const {
+  [[nodiscard]] Rot<In, C> rotation() const { return by_axes(normalized(first + second)); }
+  /// By their trihedra (paper Fig. 4), whose second axis is the first direction. Needs no fault().
+  [[nodiscard]] Rot<In, C> by_trihedra() const { return by_axes(normalized(first)); }
+
+  /// By the normal, y, which is across it, and the third.
+  [[nodiscard]] Rot<In, C> by_axes(const Lanes3& y) const {
     const Lanes area = root(area_square);
     const Lanes3 x{normal.x / area, normal.y / area, normal.z / area};
-    const Lanes3 y = normalized(first + second);
     const Lanes3 z = cross(x, y);
     const auto row = [](Lanes i, Lanes j, Lanes k, const Lanes3& a, const Lanes3& b, const Lanes3& c) {
       const auto column = [&](Lanes p, Lanes q, Lanes r) { return i[0] * p[1] + (j[0] * q[1] + k[0] * r[1]); };
@@ -141,15 +145,11 @@ Result<AttitudeByDirections, DirectionsFault> trihedron_attitude(const Direction
 }
 
 Result<Rot<In, C>, DirectionsFault> trihedron_rotation(const Directions& h_in, const Directions& h_c) {
-  const auto in = make_trihedron(Vec<In>::assume(h_in[0]), Vec<In>::assume(h_in[1]));
-  if (!in) {
-    return in.fault();
+  const TwoDirections two(h_in, h_c, 0, 1);
+  if (const auto fault = two.fault()) {
+    return *fault;
   }
-  const auto c = make_trihedron(Vec<C>::assume(h_c[0]), Vec<C>::assume(h_c[1]));
-  if (!c) {
-    return c.fault();
-  }
-  return attitude(in.value(), c.value());
+  return two.by_trihedra();
 }
 
 Result<Rot<In, C>, DirectionsFault> optimal_rotation(const Directions& h_in, const Directions& h_c,

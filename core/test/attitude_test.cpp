@@ -4,8 +4,10 @@
 
 #include <limits>
 #include <numbers>
+#include <utility>
 
 #include "numerical_jacobian.hpp"
+#include "trihedron/core/optimal_attitude.hpp"
 
 namespace trihedron {
 namespace {
@@ -45,11 +47,41 @@ TEST(Trihedron, RejectsWhatIsNoDirection) {
   }
 }
 
+Directions two(const Eigen::Vector3d& first, const Eigen::Vector3d& second) {
+  Directions directions;
+  directions[0] = first;
+  directions[1] = second;
+  return directions;
+}
+Rot<In, C> attitude(const Vec<In>& h1_in, const Vec<In>& h2_in, const Vec<C>& h1_c, const Vec<C>& h2_c) {
+  return trihedron_rotation(two(h1_in.raw(), h2_in.raw()), two(h1_c.raw(), h2_c.raw())).value();
+}
+
+TEST(Attitude, LaysTheFirstDirectionsAndThePlanesOnEachOther) {
+  const Eigen::Vector3d h2_c = kH2.raw() + Eigen::Vector3d(0, 0.01, 0.02);  // at another angle from the first
+  const Eigen::Matrix3d C_in_c = attitude(kH1, kH2, Vec<C>::assume(kH1.raw()), Vec<C>::assume(h2_c)).raw();
+  EXPECT_LT((C_in_c * kH1.raw() - kH1.raw()).norm(), 1e-15);
+  EXPECT_NEAR((C_in_c * h2_c).dot(kH1.raw().cross(kH2.raw())), 0, 1e-15);
+  EXPECT_GT((C_in_c * h2_c).dot(kH2.raw()), 0);
+}
+
+TEST(Attitude, SaysWhyThereIsNone) {
+  const Directions good = two(kH1.raw(), kH2.raw());
+  const Directions parallel = two(kH1.raw(), kH1.raw() + 0.01 * kH2.raw());
+  const Directions bad = two(kH1.raw(), {0, std::numeric_limits<double>::quiet_NaN(), 1});
+  const Directions zero = two(kH1.raw(), Eigen::Vector3d::Zero());
+  for (const auto& [its, fault] :
+       {std::pair(parallel, DirectionsFault::kMomentaNearlyParallel), std::pair(bad, DirectionsFault::kNotFinite),
+        std::pair(zero, DirectionsFault::kNotFinite)}) {
+    EXPECT_EQ(trihedron_rotation(its, good).fault(), fault);
+    EXPECT_EQ(trihedron_rotation(good, its).fault(), fault);
+  }
+}
+
 TEST(Attitude, IsRecoveredFromTwoDirections) {
   const auto C_in_c = Rot<In, C>::exp(Vec<In>::assume(1, -2, 0.5));
-  const auto in = make_trihedron(kH1, kH2).value();
-  const auto c = make_trihedron(C_in_c.inverse() * kH1, C_in_c.inverse() * kH2).value();
-  EXPECT_LT((attitude(in, c).inverse() * C_in_c).log().norm(), 1e-15);
+  EXPECT_LT((attitude(kH1, kH2, C_in_c.inverse() * kH1, C_in_c.inverse() * kH2).inverse() * C_in_c).log().norm(),
+            1e-15);
 }
 
 TEST(Attitude, ErrorFollowsErrorsOfTheDirections) {
@@ -62,8 +94,8 @@ TEST(Attitude, ErrorFollowsErrorsOfTheDirections) {
     const auto turned = [&](const Vec<In>& h, const Eigen::Vector3d& by_c) {
       return Vec<In>::assume(rotated<double>(h.raw(), C_in_c.raw() * by_c));
     };
-    const auto in = make_trihedron(turned(kH1, rho.head<3>()), turned(kH2, rho.tail<3>())).value();
-    return Eigen::Vector3d((C_in_c.inverse() * attitude(in, c)).log().raw());
+    const auto found = attitude(turned(kH1, rho.head<3>()), turned(kH2, rho.tail<3>()), h1_c, h2_c);
+    return Eigen::Vector3d((C_in_c.inverse() * found).log().raw());
   };
   test::expect_jacobian(
       attitude_by_directions(c),

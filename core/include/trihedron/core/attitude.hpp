@@ -48,12 +48,6 @@ template <class F, class S>
   return Trihedron<F, S>{Rot<F, G, S>::assume(axes), h1.dot(h2) / (length1 * length2), sine};
 }
 
-/// C_in_c from the momenta known in `in` and seen in c: the two trihedra are laid on each other.
-template <class S>
-[[nodiscard]] Rot<In, C, S> attitude(const Trihedron<In, S>& in, const Trihedron<C, S>& c) {
-  return in.C_f_g * c.C_f_g.inverse();
-}
-
 /// Error of the attitude, true C_in_c = exp([ε×]) est with ε in the axes of F, by the errors of the two directions: ε =
 /// J (ρ1, ρ2), ρ_k: small rotation from the estimated to the true direction k in the frame F, minus that in the other
 /// frame. 3 × 6. Columns along each direction are zero. Its size grows with 1/sinθ.
