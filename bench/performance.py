@@ -125,9 +125,9 @@ def table(header, rows, right=1):
     return "\n".join(lines + ["| " + " | ".join(row) + " |" for row in rows])
 
 
-def milliseconds(its):
-    """Of the processor. Google Benchmark's own figure is in the unit of the benchmark."""
-    return its["cpu_time"] * {"ns": 1e-6, "us": 1e-3, "ms": 1, "s": 1e3}[its["time_unit"]]
+def milliseconds(its, which="cpu_time"):
+    """Of the processor, or by the clock ("real_time"). Google Benchmark's own figure is in the unit of the benchmark."""
+    return its[which] * {"ns": 1e-6, "us": 1e-3, "ms": 1, "s": 1e3}[its["time_unit"]]
 
 
 def parts_table(names, times, counts):
@@ -140,13 +140,14 @@ def parts_table(names, times, counts):
 
 def goals_table(times):
     def of(*names):
-        return sum(milliseconds(times[f"nine hours/{name}"]) for name in names)
+        return [sum(milliseconds(times[f"nine hours/{name}"], which) for name in names) for which in ("cpu_time", "real_time")]
     files = ("read NetCDF", "report", "write results")
     goals = [("nine hours through the default filter: 26 states, a fix each 3 s, a prediction at each sample", 40, of("filter")),
              ("`calibrate` from NetCDF to written results, decisions included", 250, of("calibrate", *files)),
              ("the same by estimator batch", 500, of("batch", *files))]
-    return table(["", "goal, ms", "now, ms", ""],
-                 [[what, f"{goal}", f"{now:.0f}", "met" if now <= goal else f"{now / goal:.1f} times the goal"] for what, goal, now in goals])
+    return table(["", "goal, ms", "now, ms", "by the clock, ms", ""],
+                 [[what, f"{goal}", f"{now:.0f}", f"{elapsed:.0f}", "met" if now <= goal else f"{now / goal:.1f} times the goal"]
+                  for what, goal, (now, elapsed) in goals])
 
 
 def floor_table(counts):

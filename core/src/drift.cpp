@@ -18,8 +18,8 @@ constexpr int max_degree_of(DriftModelId id) {
                                                      : 0;
 }
 
-/// Gradients of the potentials of members, those of one degree at a time: W and D of a harmonic are made of the same,
-/// and come degree by degree.
+/// Gradients of the potentials of members, kept for one degree at a time: W and D of a harmonic are made of the same.
+/// Members that come degree by degree make each once.
 template <class Harmonics>
 class Gradients {
  public:
@@ -31,7 +31,7 @@ class Gradients {
       for (int order = 0; order <= degree_; ++order) {
         const auto gradients = harmonics_.polynomial_gradients(degree_, order);
         at(-order) = gradients[1];
-        at(order) = gradients[0];
+        at(order) = gradients[0];  // last: order 0 has a cosine alone
       }
     }
     return BesideK0::is(member) ? Eigen::Vector3d(BesideK0::kOf44 * at(4) + BesideK0::kOf40 * at(0)) : at(member.order);
@@ -43,7 +43,7 @@ class Gradients {
   }
 
   const Harmonics& harmonics_;
-  int degree_ = 0;
+  int degree_ = 0;  ///< none yet
   std::array<Eigen::Vector3d, 2 * DriftModelId::kMaxDegree + 1> of_degree_;
 };
 

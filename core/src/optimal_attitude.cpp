@@ -36,9 +36,10 @@ struct TwoDirections {
     return std::nullopt;
   }
 
-  /// By the axes on them in which both have equal weight: their normal, the bisector, and the third. Needs no fault().
+  /// By the axes on them in which both have equal weight: their normal, the bisector, and the third. Only where
+  /// fault() finds none.
   [[nodiscard]] Rot<In, C> rotation() const { return by_axes(normalized(first + second)); }
-  /// By their trihedra (paper Fig. 4), whose second axis is the first direction. Needs no fault().
+  /// By their trihedra (paper Fig. 4), whose second axis is the first direction. Only where fault() finds none.
   [[nodiscard]] Rot<In, C> by_trihedra() const { return by_axes(normalized(first)); }
 
   /// By the normal, y, which is across it, and the third.
@@ -140,6 +141,9 @@ Result<AttitudeByDirections, DirectionsFault> trihedron_attitude(const Direction
   }
   AttitudeByDirections by_directions{rotation.value()};
   const auto c = make_trihedron(Vec<C>::assume(h_c[0]), Vec<C>::assume(h_c[1]));
+  if (!c) {  // at the limit, by rounding
+    return c.fault();
+  }
   by_directions.by_directions.leftCols<6>() = attitude_by_directions(c.value());
   return by_directions;
 }

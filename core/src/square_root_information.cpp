@@ -1,7 +1,6 @@
 #include "trihedron/core/square_root_information.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <cstddef>
 #include <cstring>
@@ -11,12 +10,13 @@
 #include "trihedron/core/lanes.hpp"
 
 // Long rows are worked on four numbers at a time where the processor can: the same operations in the same order for
-// each number, so that the bits are the same. Rows of 26 states end before it pays.
+// each number, so that the bits are the same. Rows of 26 states are too short to gain.
 
 namespace trihedron {
 namespace {
 
-// Everything here is inlined into the functions at the end, one of which may be compiled for another processor.
+// What has the template parameter L is always inlined, also into the functions *_wide, which are compiled for AVX2.
+// What is not inlined there is compiled for any processor.
 
 using Lanes4 = double __attribute__((vector_size(32)));
 
@@ -223,15 +223,15 @@ template <class L>
   }
 }
 
-/// take_off() of so many rows.
-template <class L, std::size_t Rows>
-[[gnu::always_inline]] inline void take_off_rows(const double* factors, std::ptrdiff_t stride, ConstRowsView b,
-                                                 double* rest) {
+/// rest ← rest ± factors · b, for so many rows of b.
+template <class L, bool kAdds, std::size_t Rows>
+[[gnu::always_inline]] inline void combine_rows(const double* factors, std::ptrdiff_t stride, ConstRowsView b,
+                                                double* rest) {
   double by[Rows];
   const double* row[Rows];
   for (std::size_t i = 0; i < Rows; ++i) {
     const int its = static_cast<int>(i);
-    by[i] = factors[its * stride];
+    by[i] = kAdds ? -factors[its * stride] : factors[its * stride];  // x − (−f) y is x + f y to the bit
     row[i] = b.row(its);
   }
   const int whole = b.columns / kWidth<L> * kWidth<L>;
@@ -252,15 +252,15 @@ template <class L, std::size_t Rows>
   });
 }
 
-template <class L>
-[[gnu::always_inline]] inline void take_off_all(const double* factors, std::ptrdiff_t stride, ConstRowsView b,
-                                                double* rest) {
+template <class L, bool kAdds>
+[[gnu::always_inline]] inline void combine(const double* factors, std::ptrdiff_t stride, ConstRowsView b,
+                                           double* rest) {
   const int together = b.rows - b.rows % 3;
   for (int k = 0; k < together; k += 3) {
-    take_off_rows<L, 3>(factors + k * stride, stride, {b.row(k), 3, b.columns, b.stride}, rest);
+    combine_rows<L, kAdds, 3>(factors + k * stride, stride, {b.row(k), 3, b.columns, b.stride}, rest);
   }
   for (int k = together; k < b.rows; ++k) {
-    take_off_rows<L, 1>(factors + k * stride, stride, {b.row(k), 1, b.columns, b.stride}, rest);
+    combine_rows<L, kAdds, 1>(factors + k * stride, stride, {b.row(k), 1, b.columns, b.stride}, rest);
   }
 }
 
@@ -292,7 +292,9 @@ void solve_column_up(ConstRowsView root, int last, double* x) {
 #ifdef __x86_64__
 constexpr int kLongRow = 48;
 
-[[nodiscard]] bool is_wide(int columns) { return columns >= kLongRow && __builtin_cpu_supports("avx2") != 0; }
+[[nodiscard]] bool is_wide(int columns) {
+  return columns >= kLongRow && static_cast<int>(__builtin_cpu_supports("avx2")) != 0;
+}
 
 [[gnu::target("avx2")]] void rotate_wide_into(RowsView root, RowsView extra, int eliminated) {
   rotate_all_into<Lanes4>(root, extra, eliminated);
@@ -300,7 +302,10 @@ constexpr int kLongRow = 48;
 [[gnu::target("avx2")]] void solve_wide_rows(ConstRowsView root, RowsView rows) { solve_all_rows<Lanes4>(root, rows); }
 [[gnu::target("avx2")]] void take_off_wide(const double* factors, std::ptrdiff_t stride, ConstRowsView b,
                                            double* rest) {
-  take_off_all<Lanes4>(factors, stride, b, rest);
+  combine<Lanes4, false>(factors, stride, b, rest);
+}
+[[gnu::target("avx2")]] void add_wide(const double* factors, ConstRowsView b, double* sum) {
+  combine<Lanes4, true>(factors, 1, b, sum);
 }
 #endif
 
@@ -349,9 +354,8 @@ void multiply(ConstRowsView a, ConstRowsView b, RowsView product) {
     double* __restrict row = product.row(i);
     std::fill(row, row + product.columns, 0.0);
 #ifdef __x86_64__
-    if (is_wide(b.columns)) {  // taken off, then with the other sign: the same bits
-      take_off_wide(a.row(i), 1, b, row);
-      std::transform(row, row + product.columns, row, [](double its) { return -its; });
+    if (is_wide(b.columns)) {
+      add_wide(a.row(i), b, row);
       continue;
     }
 #endif
@@ -372,7 +376,7 @@ void take_off(const double* factors, std::ptrdiff_t stride, ConstRowsView b, dou
     return;
   }
 #endif
-  take_off_all<Lanes>(factors, stride, b, rest);
+  combine<Lanes, false>(factors, stride, b, rest);
 }
 
 void invert_triangle(ConstRowsView root, RowsView inverse) {

@@ -75,7 +75,12 @@ TEST(Attitude, SaysWhyThereIsNone) {
         std::pair(zero, DirectionsFault::kNotFinite)}) {
     EXPECT_EQ(trihedron_rotation(its, good).fault(), fault);
     EXPECT_EQ(trihedron_rotation(good, its).fault(), fault);
+    EXPECT_EQ(trihedron_attitude(good, its).fault(), fault);
   }
+  // At the limit, where its sine is as large or not as it is rounded.
+  const Directions at_limit = two({0.718178032093961, -0.393032092674096, 0.5762657921680244},
+                                  {0.6875298403850421, -0.42034011105443464, 0.6061327139872755});
+  EXPECT_EQ(trihedron_attitude(at_limit, at_limit).fault(), DirectionsFault::kMomentaNearlyParallel);
 }
 
 TEST(Attitude, IsRecoveredFromTwoDirections) {

@@ -36,7 +36,8 @@ class MovedByModes {
   /// Of a pass of so many arcs.
   explicit MovedByModes(std::size_t arcs) : arcs_(arcs) {}
 
-  /// Of a further moment of an arc, which begins with zeros. Moments of several arcs may be added at the same time.
+  /// Adds a later moment of an arc; the first is its beginning, where all is zero. Different threads may add to
+  /// different arcs.
   void add(std::size_t arc, Time t, Columns moved);
   /// φ of a momentum by the amplitudes of its modes, 3 × modes, at a moment of an arc: linear between those added.
   [[nodiscard]] Eigen::MatrixXd at(std::size_t arc, Time t, int gyro) const;

@@ -254,7 +254,11 @@ PassProblem::PassProblem(const ScreenedPass& pass, PassSetup setup)
 }
 
 void PassProblem::for_each_part(const std::function<void(std::size_t, std::size_t, std::size_t)>& work) const {
-  for_each_on_all_cores(kParts, [&](std::size_t part) { work(part, end_of(part), end_of(part + 1)); });
+  for_each_on_all_cores(kParts, [&](std::size_t part) {
+    if (end_of(part) < end_of(part + 1)) {
+      work(part, end_of(part), end_of(part + 1));
+    }
+  });
 }
 
 void PassProblem::begin_arc(const PassSolution& solution, std::size_t arc, Moment& moment) const {
@@ -743,6 +747,7 @@ double PassProblem::scale_of_misfits(const PassSolution& solution) const {
     Moment moment;
     double unused = 0;
     for (std::size_t arc = begin; arc < end; ++arc) {
+      check_stop();
       begin_arc(solution, arc, moment);
       std::size_t left = of_one_arc;
       for (std::size_t i = arcs_[arc].begin; i < arcs_[arc].end && left > 0; ++i) {

@@ -5,12 +5,14 @@
 #include <Eigen/Cholesky>
 #include <Eigen/LU>
 #include <Eigen/QR>
+#include <chrono>
 #include <cmath>
 #include <random>
 
 #include "batch/batch.hpp"
 #include "batch/pass_setup.hpp"
 #include "passes.hpp"
+#include "trihedron/ground/tasks/on_all_cores.hpp"
 #include "trihedron/records/drift_models.hpp"
 
 namespace trihedron::ground {
@@ -317,6 +319,42 @@ TEST(DriftField, ItsModesTellWhatAllMembersTell) {
     const Eigen::Vector3d apart =
         Rot<C, C>::assume(Eigen::Matrix3d(by_few.solution.gyros[k].C_c_b * C_c_b.transpose())).log().raw();
     EXPECT_LT(apart.cwiseQuotient(sigma).cwiseAbs().maxCoeff(), 0.03);
+  }
+}
+
+/// With modes; all that works on the parts of a pass beside each other.
+PassProblem::Linear linearised(const Screened& screened, const PassSetup& setup, bool by_parts) {
+  PassProblem problem(screened.pass, setup);
+  const PassSolution first = first_solution(problem, screened);
+  const MovedByModes by_coefficients = problem.moved_by_coefficients(first);
+  problem.use(modes_of(problem, by_coefficients), by_coefficients);
+  return by_parts ? problem.linearise_by_parts(first) : problem.linearise(first);
+}
+
+/// Also where there are fewer arcs than parts.
+TEST(PassProblem, IsLinearisedTheSameOnAnyNumberOfCores) {
+  CalibrationOptions options = told();
+  options.estimator = Estimator::kBatch;
+  options.drift_model = vsh(2);
+  const Screened screened = screen(two_hours().pass, options);
+  PassSetup setup = pass_setup(two_hours().pass.settings, options);
+  for (const Duration arc : {setup.arc, Duration(std::chrono::minutes(50)), Duration(std::chrono::hours(3))}) {
+    setup.arc = arc;
+    for (const bool by_parts : {false, true}) {
+      const PassProblem::Linear on_all = linearised(screened, setup, by_parts);
+      PassProblem::Linear on_one;
+      with_cores(1, [&] { on_one = linearised(screened, setup, by_parts); });
+      ASSERT_EQ(on_all.stages.size(), on_one.stages.size());
+      EXPECT_EQ(on_all.cost_outside_rows, on_one.cost_outside_rows);
+      for (std::size_t i = 0; i < on_all.stages.size(); ++i) {
+        ASSERT_EQ(on_all.stages[i].H, on_one.stages[i].H) << i;
+        ASSERT_EQ(on_all.stages[i].y, on_one.stages[i].y) << i;
+      }
+      for (std::size_t i = 0; i < on_all.ends.size(); ++i) {
+        ASSERT_EQ(on_all.ends[i].A, on_one.ends[i].A) << i;
+        ASSERT_EQ(on_all.stages[i].B, on_one.stages[i].B) << i;
+      }
+    }
   }
 }
 

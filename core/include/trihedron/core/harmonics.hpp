@@ -103,6 +103,7 @@ class HarmonicTableOf {
     /// A sum of multiples of the polynomials. Its gradient takes a fraction of the work of all of theirs.
     class Sum {
      public:
+      /// Refers to it.
       explicit Sum(const At& at) : at_(at) {}
 
       void add(int degree, int order, S factor) {
