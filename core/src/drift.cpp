@@ -1,5 +1,9 @@
 #include "trihedron/core/drift.hpp"
 
+#include <array>
+#include <cstddef>
+#include <cstdint>
+
 namespace trihedron {
 namespace {
 
@@ -39,11 +43,12 @@ class Gradients {
 
  private:
   [[nodiscard]] Eigen::Vector3d& at(int order) {
-    return of_degree_[static_cast<std::size_t>(DriftModelId::kMaxDegree + order)];
+    const int place = DriftModelId::kMaxDegree + order;
+    return of_degree_[static_cast<std::size_t>(place)];
   }
 
   const Harmonics& harmonics_;
-  int degree_ = 0;  ///< none yet
+  std::int8_t degree_ = 0;  ///< none yet
   std::array<Eigen::Vector3d, 2 * DriftModelId::kMaxDegree + 1> of_degree_;
 };
 

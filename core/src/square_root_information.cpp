@@ -26,12 +26,15 @@ using Lanes4 = double __attribute__((vector_size(32)));
 [[gnu::always_inline]] inline void put(const Lanes4& lanes, double* at) { std::memcpy(at, &lanes, sizeof lanes); }
 
 template <class L>
-constexpr int kWidth = sizeof(L) / sizeof(double);
+constexpr int width() {
+  return static_cast<int>(sizeof(L) / sizeof(double));
+}
 
 /// Calls work() for the columns that are left behind the last lanes, fewer than these have.
 template <class L, class Work>
 [[gnu::always_inline]] inline void for_the_rest(int first, int columns, const Work& work) {
-  for (int i = 0; i < kWidth<L> - 1; ++i) {
+  constexpr int kMost = width<L>() - 1;
+  for (int i = 0; i < kMost; ++i) {
     if (first + i < columns) {
       work(first + i);
     }
@@ -43,8 +46,8 @@ template <class L, class Work>
 template <class L, std::size_t M>
 [[gnu::always_inline]] inline void reflect(double* __restrict r, double* const (&rows)[M], const double (&v)[M],
                                            double v0, double beta, int columns) {
-  const int whole = 1 + (columns - 1) / kWidth<L> * kWidth<L>;
-  for (int k = 1; k < whole; k += kWidth<L>) {
+  const int whole = 1 + (columns - 1) / width<L>() * width<L>();
+  for (int k = 1; k < whole; k += width<L>()) {
     L its;
     get(r + k, its);
     L below[M];
@@ -153,8 +156,8 @@ template <class L, std::size_t P, std::size_t M>
   }
   const int columns = root.rows - j;
   constexpr int kFirst = P;
-  const int whole = kFirst + (columns - kFirst) / kWidth<L> * kWidth<L>;
-  for (int k = kFirst; k < whole; k += kWidth<L>) {
+  const int whole = kFirst + (columns - kFirst) / width<L>() * width<L>();
+  for (int k = kFirst; k < whole; k += width<L>()) {
     L its[P];
     for (std::size_t p = 0; p < P; ++p) {
       get(R[p] + k, its[p]);
@@ -234,8 +237,8 @@ template <class L, bool kAdds, std::size_t Rows>
     by[i] = kAdds ? -factors[its * stride] : factors[its * stride];  // x − (−f) y is x + f y to the bit
     row[i] = b.row(its);
   }
-  const int whole = b.columns / kWidth<L> * kWidth<L>;
-  for (int j = 0; j < whole; j += kWidth<L>) {
+  const int whole = b.columns / width<L>() * width<L>();
+  for (int j = 0; j < whole; j += width<L>()) {
     L left;
     get(rest + j, left);
     for (std::size_t i = 0; i < Rows; ++i) {

@@ -1,5 +1,6 @@
 #pragma once
-/// The gyro trihedron and how the attitude that it gives depends on the directions (docs/mathematics.md, section 5; paper Fig. 4).
+/// The gyro trihedron and how the attitude that it gives depends on the directions (docs/mathematics.md, section 5;
+/// paper Fig. 4).
 
 #include "trihedron/core/frames.hpp"
 #include "trihedron/core/result.hpp"
