@@ -42,7 +42,7 @@ def fix_operations(n=26, d=6, m=4):
     """Of the square-root information filter, n states of which d move, m components."""
     propagate = 2 * (d * d * d // 2 + d * d * (n - d))  # R A⁻¹, and its constants
     noise = sum(4 * d * (d + n - j) for j in range(d))  # w eliminated by reflections
-    triangle = sum(4 * (d + 1) * (n - j) for j in range(d))
+    triangle = sum(4 * (d - j) * (n - j) for j in range(d - 1))
     update = sum(4 * (m + 1) * (n + 1 - j) for j in range(n))
     # What is seen through the uncertainty: innovation, attitude, and the four terms of second order of each gyro.
     rows = [(m, n), (3, n), (3, n), (3, n - 3), (3, n - d), (3, 10), (3, 13), (3, 3), (3, 13), (3, 3)]
