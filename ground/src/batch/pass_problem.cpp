@@ -253,10 +253,10 @@ PassProblem::PassProblem(const ScreenedPass& pass, PassSetup setup)
   }
 }
 
-void PassProblem::for_each_part(const std::function<void(std::size_t, std::size_t, std::size_t)>& work) const {
+void PassProblem::for_each_part(const std::function<void(std::size_t, std::size_t)>& work) const {
   for_each_on_all_cores(kParts, [&](std::size_t part) {
     if (end_of(part) < end_of(part + 1)) {
-      work(part, end_of(part), end_of(part + 1));
+      work(end_of(part), end_of(part + 1));
     }
   });
 }
@@ -417,7 +417,7 @@ MovedByModes PassProblem::moved_by_coefficients(const PassSolution& solution) co
   constexpr Duration kTableStep = std::chrono::seconds(3);  // a third of that, unless the body turns fast
   const Drift drift = drift_along(solution, &drift_);
   MovedByModes table(arcs_.size());
-  for_each_part([&](std::size_t /*part*/, std::size_t begin, std::size_t end) {
+  for_each_part([&](std::size_t begin, std::size_t end) {
     Moment moment;
     double unused = 0;
     for (std::size_t arc = begin; arc < end; ++arc) {
@@ -470,7 +470,7 @@ void PassProblem::use_modes_of(const PassProblem& other) {
 void PassProblem::use(DriftModes modes, const MovedByModes& by_coefficients) {
   take(std::move(modes));
   moved_by_modes_ = MovedByModes(arcs_.size());
-  for_each_part([&](std::size_t /*part*/, std::size_t begin, std::size_t end) {
+  for_each_part([&](std::size_t begin, std::size_t end) {
     for (std::size_t arc = begin; arc < end; ++arc) {
       check_stop();
       const std::size_t size = by_coefficients.size(arc);
@@ -741,9 +741,9 @@ double PassProblem::scale_of_misfits(const PassSolution& solution) const {
   constexpr double kMedianOfFour = 0.84;  // of χ²/n; nearer to 1 for more
   constexpr std::size_t kEnough = 100;
   const std::size_t of_one_arc = 1 + kEnough / arcs_.size();
-  std::vector<std::vector<double>> of_part(kParts);
+  std::vector<std::vector<double>> of_arcs(arcs_.size());
   const Drift drift = drift_along(solution, nullptr);
-  for_each_part([&](std::size_t part, std::size_t begin, std::size_t end) {
+  for_each_part([&](std::size_t begin, std::size_t end) {
     Moment moment;
     double unused = 0;
     for (std::size_t arc = begin; arc < end; ++arc) {
@@ -758,14 +758,14 @@ double PassProblem::scale_of_misfits(const PassSolution& solution) const {
         Compared fix = moment.fix != nullptr ? compare_now(solution, moment) : Compared{};
         if (const Eigen::Index components = fix.rows.rows(); components > 0) {
           whiten(fix.R, rows_of(fix.rows));
-          of_part[part].push_back(fix.rows.col(on_board_.size()).squaredNorm() / static_cast<double>(components));
+          of_arcs[arc].push_back(fix.rows.col(on_board_.size()).squaredNorm() / static_cast<double>(components));
           --left;
         }
       }
     }
   });
   std::vector<double> nis_per_component;
-  for (const std::vector<double>& its : of_part) {
+  for (const std::vector<double>& its : of_arcs) {
     nis_per_component.insert(nis_per_component.end(), its.begin(), its.end());
   }
   if (nis_per_component.empty()) {
@@ -790,7 +790,7 @@ PassProblem::Linear PassProblem::linearise(const PassSolution& solution, bool by
   linear.ends.resize(arcs_.size() - 1);
   const Drift drift = drift_along(solution, &sensitive());
   std::vector<double> outside_rows(arcs_.size());
-  for_each_part([&](std::size_t /*part*/, std::size_t begin, std::size_t end) {
+  for_each_part([&](std::size_t begin, std::size_t end) {
     ConstantSquares constants(by_parts ? layout_.constants() + 1 : 0);
     Moment moment;
     for (std::size_t arc = begin; arc < end; ++arc) {

@@ -244,9 +244,9 @@ class PassProblem {
   /// Turns the momenta, by no more than that each, to where the first fix of the arc, if any, shows them.
   void follow_first_fix(const Gyros& gyros, std::size_t arc, double most_rad, Directions& h_in) const;
   void begin_arc(const PassSolution& solution, std::size_t arc, Moment& moment) const;
-  /// work(part, its first arc, the one after its last), for each part that has arcs, on all cores: it may write only
-  /// what belongs to its part or its arcs.
-  void for_each_part(const std::function<void(std::size_t, std::size_t, std::size_t)>& work) const;
+  /// work(first arc, the one after the last) of each part that has arcs, on all cores: it may write only what belongs
+  /// to its arcs.
+  void for_each_part(const std::function<void(std::size_t, std::size_t)>& work) const;
   void add_prior(const PassSolution& solution, Linear& linear) const;
   [[nodiscard]] Eigen::MatrixXd prior_covariance() const;
   void end_arc(const PassSolution& solution, const Moment& moment, double extra_variance_rad2, Linear& linear) const;

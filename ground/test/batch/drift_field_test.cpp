@@ -288,13 +288,18 @@ TEST(DriftField, PutsItsVariancesIntoThePrior) {
   EXPECT_EQ(prior.covariance(kSmall.drift_size(), kSmall.drift_size()), 1);
 }
 
+CalibrationOptions told_batch(const DriftModelId& model) {
+  CalibrationOptions options = told();
+  options.estimator = Estimator::kBatch;
+  options.drift_model = model;
+  return options;
+}
+
 /// What modes leave out cannot be seen: eq. (1), alignment and their sigmas are those of all members. At the level of
 /// this prior each mode that is left out moves all fixes together by less than a tenth of their noise, which is worth a
 /// hundredth of a sigma, of some modes next to the limit.
 TEST(DriftField, ItsModesTellWhatAllMembersTell) {
-  CalibrationOptions options = told();
-  options.estimator = Estimator::kBatch;
-  options.drift_model = vsh(6);
+  const CalibrationOptions options = told_batch(vsh(6));
   const Screened screened = screen(two_hours().pass, options);
   PassSetup setup = pass_setup(two_hours().pass.settings, options);
   const FieldMembers members(setup.layout());
@@ -333,9 +338,7 @@ PassProblem::Linear linearised(const Screened& screened, const PassSetup& setup,
 
 /// Also where there are fewer arcs than parts.
 TEST(PassProblem, IsLinearisedTheSameOnAnyNumberOfCores) {
-  CalibrationOptions options = told();
-  options.estimator = Estimator::kBatch;
-  options.drift_model = vsh(2);
+  const CalibrationOptions options = told_batch(vsh(2));
   const Screened screened = screen(two_hours().pass, options);
   PassSetup setup = pass_setup(two_hours().pass.settings, options);
   for (const Duration arc : {setup.arc, Duration(std::chrono::minutes(50)), Duration(std::chrono::hours(3))}) {
