@@ -111,15 +111,19 @@ auto InvariantEstimator<kCapacity>::prediction_noise(const Eigen::Matrix3d& C_in
     -> PerGyro<double, kCapacity.gyros> {
   const Layout& layout = setup_.layout;
   const double walk = setup_.direction_random_walk_rad_sqrt_s;
+  second_order_.hold_s -= time_since_fix_s_;
   PerGyro<double, kCapacity.gyros> noise_rad;
   for (int k = 0; k < layout.gyros; ++k) {
+    if (second_order_.hold_s <= 0 && time_since_fix_s_ > 0) {
+      const Eigen::Matrix3d alignment = covariance_from(layout.alignment(k), C_in_c);
+      const Eigen::Matrix3d drift = covariance_from(
+          layout.drift(k), since_fix_[k].by_drift.first(layout.drift_columns()).leftCols(layout.drift_size()));
+      second_order_.prediction_rad_s[k] = second_order_rad(alignment, drift) / time_since_fix_s_;
+    }
     // This error keeps its sign until the estimates change, so its sigma adds up, not its variance
     // (docs/mathematics.md, section 8).
-    const Eigen::Matrix3d alignment = covariance_from(layout.alignment(k), C_in_c);
-    const Eigen::Matrix3d drift = covariance_from(
-        layout.drift(k), since_fix_[k].by_drift.first(layout.drift_columns()).leftCols(layout.drift_size()));
     const double before = second_order_rad_[k];
-    second_order_rad_[k] += second_order_rad(alignment, drift);
+    second_order_rad_[k] += second_order_.prediction_rad_s[k] * time_since_fix_s_;
     noise_rad[k] = std::sqrt(walk * walk * time_since_fix_s_ + extra_variance_rad2_ +
                              second_order_rad_[k] * second_order_rad_[k] - before * before);
   }
@@ -192,6 +196,7 @@ void InvariantEstimator<kCapacity>::start(const Seen& its, const FixReadings& re
   information_.reset(layout.size(), layout.dynamic());
   prior_.unpack(information_.root());
   std::ranges::fill(second_order_rad_, 0.0);
+  second_order_ = {};
   static_cast<void>(factorize(R));
   solve_lower(matrix_of(R), rows_of(H));
   information_.add_information(rows_of(H));
@@ -252,29 +257,51 @@ PerGyro<double> InvariantEstimator<kCapacity>::readout_noise(double noise_factor
 }
 
 template <Capacity kCapacity>
-PerGyro<double> InvariantEstimator<kCapacity>::reading_noise(const Eigen::Matrix3d& C_linear, double noise_factor,
-                                                             int n) const {
-  PerGyro<double> noise_rad = readout_noise(noise_factor);
-  // Without a fix between them these errors keep their sign: n readings must not average them away.
-  const double in_a_row = std::sqrt(static_cast<double>(n));
+auto InvariantEstimator<kCapacity>::second_order_of_reading(const Eigen::Matrix3d& C_linear) const
+    -> PerGyro<double, kCapacity.gyros> {
+  PerGyro<double, kCapacity.gyros> second_order;
   for (int k = 0; k < layout().gyros; ++k) {
     const Eigen::Matrix3d alignment = covariance_from(layout().alignment(k), -C_linear);
     Rows3 rows = Rows3::Zero(3, layout().size());
     rows.template middleCols<3>(layout().alignment(k)) = -C_linear;
     rows.template middleCols<3>(layout().direction(k)).setIdentity();
-    noise_rad[k] =
-        elementary::root_of_squares(noise_rad[k], in_a_row * second_order_rad(alignment, covariance_of(rows)));
+    second_order[k] = second_order_rad(alignment, covariance_of(rows));
+  }
+  return second_order;
+}
+
+template <Capacity kCapacity>
+PerGyro<double> InvariantEstimator<kCapacity>::reading_noise(const Eigen::Matrix3d& C_linear, double noise_factor,
+                                                             int n) const {
+  PerGyro<double> noise_rad = readout_noise(noise_factor);
+  const PerGyro<double, kCapacity.gyros> second_order = second_order_of_reading(C_linear);
+  // Without a fix between them these errors keep their sign: n readings must not average them away.
+  const double in_a_row = std::sqrt(static_cast<double>(n));
+  for (int k = 0; k < layout().gyros; ++k) {
+    noise_rad[k] = elementary::root_of_squares(noise_rad[k], in_a_row * second_order[k]);
   }
   return noise_rad;
 }
 
 template <Capacity kCapacity>
 PerGyro<double> InvariantEstimator<kCapacity>::fix_reading_noise(const Eigen::Matrix3d& C_linear, double noise_factor,
-                                                                 const Eigen::Matrix3d& misalignment) const {
-  PerGyro<double> noise_rad = reading_noise(C_linear, noise_factor, 1);
+                                                                 const Eigen::Matrix3d& misalignment) {
+  PerGyro<double> noise_rad = readout_noise(noise_factor);
+  if (second_order_.hold_s <= 0) {
+    second_order_.reading_rad = second_order_of_reading(C_linear);
+    bool all_small = true;
+    for (int k = 0; k < layout().gyros; ++k) {
+      const double most =
+          std::max(second_order_.reading_rad[k], second_order_.prediction_rad_s[k] * kHoldSecondOrder_s);
+      all_small = all_small && most < kSmallSecondOrder * noise_rad[k];
+    }
+    second_order_.hold_s = all_small ? kHoldSecondOrder_s : 0;
+  }
   // Of the second order, and not normal: three times its sigma costs nothing but the weight of the first such fix.
-  for (double& its : noise_rad) {
-    its = elementary::root_of_squares(its, 3 * second_order_rad(misalignment, misalignment));
+  const double of_fix = 3 * second_order_rad(misalignment, misalignment);
+  for (int k = 0; k < layout().gyros; ++k) {
+    noise_rad[k] = elementary::root_of_squares(noise_rad[k], second_order_.reading_rad[k]);
+    noise_rad[k] = elementary::root_of_squares(noise_rad[k], of_fix);
   }
   return noise_rad;
 }

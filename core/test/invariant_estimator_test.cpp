@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <functional>
 #include <limits>
 #include <map>
 #include <memory>
@@ -123,6 +124,51 @@ TEST(InvariantEstimator, KnowsTheSecondOrderOfItsErrors) {
   const auto covariance = estimator.correct(s.fix(600), s.readings).innovation_covariance;
   for (int k = 0; k < 2; ++k) {
     EXPECT_NEAR((covariance.block<2, 2>(2L * k, 2L * k).trace()) / expected[k], 1, 0.03) << k;
+  }
+}
+
+/// The calibration by the samples of a flight, without the on-board step. before_fix(): called before each correction.
+std::unique_ptr<test::PairEstimator> filtered(const test::Flight& flight, const PairGiven& given,
+                                              const std::function<void(test::PairEstimator&)>& before_fix) {
+  auto estimator = given.estimator();
+  FixReadings readings;
+  readings.used = all_gyros(2);
+  auto fix = flight.fixes.begin();
+  for (const GyroSample& sample : flight.samples) {
+    if (estimator->started()) {
+      const auto C_in_c = estimator->rotation(estimator->gyros(), sample.h_b, readings.used);
+      estimator->predict(C_in_c.value().raw(), sample.h_b, sample.t, 0.125);
+    }
+    if (fix != flight.fixes.end() && fix->t <= sample.t) {
+      before_fix(*estimator);
+      readings.h_b = sample.h_b;
+      static_cast<void>(estimator->correct(*fix++, readings));
+    }
+  }
+  return estimator;
+}
+
+TEST(InvariantEstimator, LosesNothingByTermsOfSecondOrderThatHoldForAWhile) {
+  // With five degrees of misalignment they are larger than the noise in the first minutes, and are to be followed then.
+  test::Flight flight({.duration_s = 3600, .misalignment = 10});
+  std::erase_if(flight.fixes, [](const StarFix& fix) {
+    return fix.t > Time(std::chrono::seconds(1800)) && fix.t < Time(std::chrono::seconds(2400));
+  });
+  PairGiven given;
+  given.set_alignment_sigma(0.0873);
+  const auto held = filtered(flight, given, [](test::PairEstimator&) {});
+  // A variance, even of zero, has them worked out anew.
+  const auto at_each_fix = filtered(flight, given, [](test::PairEstimator& its) { its.add_direction_variance(0); });
+  const Eigen::MatrixXd root = test::state_root(*at_each_fix);
+  const Eigen::VectorXd sigma = root.rowwise().norm();
+  const Eigen::VectorXd of_held = test::state_root(*held).rowwise().norm();
+  EXPECT_LT((of_held.cwiseQuotient(sigma).array() - 1).abs().maxCoeff(), 0.01);
+  EXPECT_GT((of_held.cwiseQuotient(sigma).array() - 1).abs().maxCoeff(), 0);
+  for (int k = 0; k < 2; ++k) {
+    const Eigen::VectorXd moved = held->gyros()[k].drift_rad_s - at_each_fix->gyros()[k].drift_rad_s;
+    EXPECT_LT(moved.cwiseQuotient(sigma.segment<7>(Layout{}.drift(k))).cwiseAbs().maxCoeff(), 0.04) << k;
+    const Eigen::Vector3d turned = alignment_error(at_each_fix->gyros()[k], held->gyros()[k]);
+    EXPECT_LT(turned.cwiseQuotient(sigma.segment<3>(Layout{}.alignment(k))).cwiseAbs().maxCoeff(), 0.04) << k;
   }
 }
 

@@ -98,7 +98,10 @@ class InvariantEstimator {
   /// Prediction of all momenta over one step that ends at t, attitude and readings of its middle. Needs started().
   void predict(const Eigen::Matrix3d& C_in_c, const Directions& h_b, Time t, double dt_s);
   /// Widens the directions: `variance_rad2` per axis for what a step too long for its readings may have missed.
-  void add_direction_variance(double variance_rad2) { extra_variance_rad2_ += variance_rad2; }
+  void add_direction_variance(double variance_rad2) {
+    extra_variance_rad2_ += variance_rad2;
+    second_order_.hold_s = 0;
+  }
 
   /// A correction of the estimate, and what its stages leave for one another. Between two of them the estimate is not
   /// predicted; all else may be asked, and is that of the stages that have been carried out.
@@ -167,6 +170,15 @@ class InvariantEstimator {
   /// carry_on() before sound() is asked.
   void take(Correction& correction, const StarFix& fix, const FixReadings& readings, FixReport& report);
   void take_angles(Correction& correction, const FixReadings& readings, AngleReport& report);
+  /// The terms of second order as they were last worked out. Where they are small they are not worked out for each fix,
+  /// since that takes a third of all that a fix does.
+  struct SecondOrder {
+    PerGyro<double, kCapacity.gyros> prediction_rad_s{};
+    PerGyro<double, kCapacity.gyros> reading_rad{};
+    double hold_s = 0;  ///< how long they still hold
+  };
+  static constexpr double kHoldSecondOrder_s = 30;
+  static constexpr double kSmallSecondOrder = 0.1;  ///< of the noise of a reading
   /// A fix as it is compared.
   struct Seen {
     FixBySharedStates by_shared;
@@ -197,13 +209,15 @@ class InvariantEstimator {
   /// 1-sigma per axis of the second-order term ½ a × b, which the linear model leaves out, by the covariances of a and
   /// b.
   [[nodiscard]] static double second_order_rad(const Eigen::Matrix3d& A, const Eigen::Matrix3d& B);
+  /// The same of a reading, for each gyro.
+  [[nodiscard]] PerGyro<double, kCapacity.gyros> second_order_of_reading(const Eigen::Matrix3d& C_linear) const;
   /// 1-sigma of the readings, `noise_factor` times that of a single one.
   [[nodiscard]] PerGyro<double> readout_noise(double noise_factor) const;
   /// The same with the second-order term; n: consecutive measurements without a fix between them.
   [[nodiscard]] PerGyro<double> reading_noise(const Eigen::Matrix3d& C_linear, double noise_factor, int n) const;
   /// The same for a fix, of whose error this is not known, noise apart.
   [[nodiscard]] PerGyro<double> fix_reading_noise(const Eigen::Matrix3d& C_linear, double noise_factor,
-                                                  const Eigen::Matrix3d& misalignment) const;
+                                                  const Eigen::Matrix3d& misalignment);
   /// Covariance of what is not known of the error of a further star tracker's fix, noise apart: its first fix finds its
   /// alignment, and until then it is no attitude to linearise at.
   [[nodiscard]] Eigen::Matrix3d misalignment_of(const StarFix& fix, const FixReadings& readings) const;
@@ -258,9 +272,10 @@ class InvariantEstimator {
   Information information_;
   PackedTriangle<kMaxStates> prior_;  ///< root of the information, without anything of the directions
   OutlierGate gate_;
-  std::array<std::optional<Time>, kMaxStarTrackers> used_fix_t_;
-  PerGyro<double>
-      second_order_rad_{};  ///< 1-sigma of the second-order terms left out of the prediction since the start
+  std::array<std::optional<Time>, kStarTrackers> used_fix_t_;
+  /// 1-sigma of the second-order terms left out of the prediction since the start.
+  PerGyro<double, kCapacity.gyros> second_order_rad_{};
+  SecondOrder second_order_;
   double time_since_fix_s_ = 0;
   double extra_variance_rad2_ = 0;
   int angles_since_fix_ = 0;
