@@ -193,6 +193,23 @@ TEST(RotateInto, TakesAnyNumberOfRows) {
   }
 }
 
+TEST(SolveRows, IsTheSolutionAlsoOfRowsThatBeginWithZerosOrHaveNothingElse) {
+  std::mt19937 random(9);
+  for (int n = 1; n <= 9; ++n) {
+    RowMajor root = random_matrix(n, n, random);
+    root.triangularView<Eigen::StrictlyLower>().setZero();
+    root.diagonal().array() += 3;
+    for (int zeros = 0; zeros <= n; ++zeros) {
+      RowMajor rows = random_matrix(3, n, random);
+      rows.leftCols(zeros).setZero();
+      RowMajor solved = rows;
+      solve_rows(view_of(root), rows_of(solved));
+      EXPECT_LT((solved * root - rows).norm(), 1e-13 * root.norm()) << n;
+      EXPECT_EQ(solved.leftCols(zeros).cwiseAbs().sum(), 0) << n;
+    }
+  }
+}
+
 TEST(SolveColumn, IsTheSolution) {
   std::mt19937 random(8);
   for (int n = 1; n <= 9; ++n) {
