@@ -3,6 +3,7 @@
 /// (parts_bench.cpp), and once under callgrind for its instructions (count_parts.cpp).
 
 #include <functional>
+#include <iterator>
 #include <string>
 #include <vector>
 
@@ -36,6 +37,12 @@ struct Events {
 /// The paper's scenario over another time, without drift outside eq. (1).
 [[nodiscard]] Scenario scenario_of(double hours);
 
+/// Of the body relative to `in` between two fixes, rad/s.
+[[nodiscard]] inline Eigen::Vector3d rate_c(const StarFix& from, const StarFix& to) {
+  return (Rot<C, In>::assume(from.q_in_c.conjugate()) * Rot<In, C>::assume(to.q_in_c)).log().raw() /
+         to_seconds(to.t - from.t);
+}
+
 /// The filter alone, of a pair with eq. (1): attitude and prediction at each sample, update at each fix.
 template <class Estimator>
 [[nodiscard]] Run filter(std::shared_ptr<const Events> events, bool use_fixes = true) {
@@ -54,6 +61,9 @@ template <class Estimator>
       if (fix != events->fixes.end() && fix->t <= sample.t) {
         if (use_fixes || !estimator->started()) {
           readings.h_b = sample.h_b;
+          if (fix != events->fixes.begin()) {
+            readings.rate_c = rate_c(*std::prev(fix), *fix);
+          }
           static_cast<void>(estimator->correct(*fix, readings));
         }
         ++fix;

@@ -107,14 +107,30 @@ double InvariantEstimator<kCapacity>::second_order_rad(const Eigen::Matrix3d& A,
 }
 
 template <Capacity kCapacity>
+void InvariantEstimator<kCapacity>::look_at_second_order(const FixReadings& readings) {
+  constexpr double kLonger = 1.5;
+  constexpr float kOtherwise = 0.5F;
+  const Eigen::Vector3f rate_c = readings.rate_c.cast<float>();
+  second_order_.hold_s -= time_since_fix_s_;
+  const bool holds = second_order_.hold_s > 0 && second_order_.hold_s <= kHoldSecondOrder_s &&
+                     time_since_fix_s_ <= kLonger * second_order_.interval_s &&
+                     (rate_c - second_order_.rate_c).norm() < kOtherwise * second_order_.rate_c.norm();
+  if (!holds) {
+    second_order_.hold_s = 0;
+    second_order_.interval_s = time_since_fix_s_;
+    second_order_.rate_c = rate_c;
+  }
+}
+
+template <Capacity kCapacity>
 auto InvariantEstimator<kCapacity>::prediction_noise(const Eigen::Matrix3d& C_in_c)
     -> PerGyro<double, kCapacity.gyros> {
   const Layout& layout = setup_.layout;
   const double walk = setup_.direction_random_walk_rad_sqrt_s;
-  second_order_.hold_s -= time_since_fix_s_;
+  const bool to_be_worked_out = !(second_order_.hold_s > 0);
   PerGyro<double, kCapacity.gyros> noise_rad;
   for (int k = 0; k < layout.gyros; ++k) {
-    if (second_order_.hold_s <= 0 && time_since_fix_s_ > 0) {
+    if (to_be_worked_out && time_since_fix_s_ > 0) {
       const Eigen::Matrix3d alignment = covariance_from(layout.alignment(k), C_in_c);
       const Eigen::Matrix3d drift = covariance_from(
           layout.drift(k), since_fix_[k].by_drift.first(layout.drift_columns()).leftCols(layout.drift_size()));
@@ -287,7 +303,7 @@ template <Capacity kCapacity>
 PerGyro<double> InvariantEstimator<kCapacity>::fix_reading_noise(const Eigen::Matrix3d& C_linear, double noise_factor,
                                                                  const Eigen::Matrix3d& misalignment) {
   PerGyro<double> noise_rad = readout_noise(noise_factor);
-  if (second_order_.hold_s <= 0) {
+  if (!(second_order_.hold_s > 0)) {
     second_order_.reading_rad = second_order_of_reading(C_linear);
     bool all_small = true;
     for (int k = 0; k < layout().gyros; ++k) {
@@ -583,6 +599,7 @@ void InvariantEstimator<kCapacity>::take(Correction& correction, const StarFix& 
       begin(correction, fix, readings, report);
       break;
     case Stage::kSecondOrder:
+      look_at_second_order(readings);
       correction.prediction_noise_rad =
           prediction_noise(correction.reopened ? correction.C_linear : rotation_now(readings));
       correction.stage = Stage::kPropagation;
@@ -647,6 +664,9 @@ void InvariantEstimator<kCapacity>::judge(Correction& correction, const Seen& it
   const double misfit_rad = detail::misfit_rad(comparison);
   ask_gate(comparison, whitened(comparison, its.R_c, correction.reading_noise_rad), misfit_rad, report);
   correction.stage = Stage::kUpdate;
+  if (report.status != FixStatus::kUsed) {
+    second_order_.hold_s = 0;  // the next fix is further from the last that was used
+  }
   switch (report.status) {
     case FixStatus::kRejectedByGate:
       if (is_fault(report.nis, misfit_rad, count(readings.used))) {
@@ -714,6 +734,9 @@ void InvariantEstimator<kCapacity>::take_angles(Correction& correction, const Fi
       }
       break;
     case Stage::kSecondOrder:
+      // After angles an attitude has not been seen for long: nothing is held.
+      second_order_.hold_s = 0;
+      look_at_second_order(readings);
       correction.prediction_noise_rad = prediction_noise(rotation_now(readings));
       correction.stage = Stage::kPropagation;
       break;

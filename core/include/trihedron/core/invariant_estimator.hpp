@@ -24,7 +24,7 @@ namespace trihedron {
 /// y_k = h_k × h_et,k = (φ_k − C_in_c δ_k + h_k × C_in_b Δb_k)⊥ + noise; dφ_k/dt = ω × φ_k + C_in_b B Δκ_k + (C_in_c
 /// δ_k) × ω. The attitude in H is not the tracker's but the fused one, so that noise does not pass for information. The
 /// terms of second order, ½ C_in_c δ_k × (φ_k − C_in_c δ_k) and ½ C_in_c δ_k × C_in_b B Δκ_k, count as noise of the
-/// size that the present covariance gives them (docs/adr/0004), so that early measurements are not weighted more than
+/// size that the covariance gives them (docs/adr/0004), so that early measurements are not weighted more than
 /// their linearisation about the first, wrong values allows.
 ///
 /// Which states there are is given by the layout of the set-up; kCapacity is the room for them. One plain object, no
@@ -170,12 +170,14 @@ class InvariantEstimator {
   /// carry_on() before sound() is asked.
   void take(Correction& correction, const StarFix& fix, const FixReadings& readings, FixReport& report);
   void take_angles(Correction& correction, const FixReadings& readings, AngleReport& report);
-  /// The terms of second order as they were last worked out. Where they are small they are not worked out for each fix,
-  /// since that takes a third of all that a fix does.
+  /// The terms of second order as they were last worked out: a third of all that a fix does. Where they are small they
+  /// hold for a while, as long as fixes come and the body turns as they did then (docs/mathematics.md, section 8).
   struct SecondOrder {
-    PerGyro<double, kCapacity.gyros> prediction_rad_s{};
-    PerGyro<double, kCapacity.gyros> reading_rad{};
-    double hold_s = 0;  ///< how long they still hold
+    PerGyro<double, kCapacity.gyros> prediction_rad_s{};  ///< 1-sigma per axis, of each second without a fix
+    PerGyro<double, kCapacity.gyros> reading_rad{};       ///< 1-sigma per axis
+    double hold_s = 0;                                    ///< how long they still hold; zero: to be worked out
+    double interval_s = 0;                                ///< they stand for a fix so long after the one before,
+    Eigen::Vector3f rate_c{0, 0, 0};                      ///< and for this rate of the body, rad/s
   };
   static constexpr double kHoldSecondOrder_s = 30;
   static constexpr double kSmallSecondOrder = 0.1;  ///< of the noise of a reading
@@ -209,7 +211,7 @@ class InvariantEstimator {
   /// 1-sigma per axis of the second-order term ½ a × b, which the linear model leaves out, by the covariances of a and
   /// b.
   [[nodiscard]] static double second_order_rad(const Eigen::Matrix3d& A, const Eigen::Matrix3d& B);
-  /// The same of a reading, for each gyro.
+  /// 1-sigma per axis of the second-order term of a reading, of each gyro.
   [[nodiscard]] PerGyro<double, kCapacity.gyros> second_order_of_reading(const Eigen::Matrix3d& C_linear) const;
   /// 1-sigma of the readings, `noise_factor` times that of a single one.
   [[nodiscard]] PerGyro<double> readout_noise(double noise_factor) const;
@@ -248,6 +250,9 @@ class InvariantEstimator {
   [[nodiscard]] Eigen::Matrix3d rotation_now(const FixReadings& readings) const {
     return rotation(gyros_, readings.h_b, readings.used).value().raw();
   }
+  /// Whether the terms of second order still hold at the time of these readings; where they do not, they are to be
+  /// worked out.
+  void look_at_second_order(const FixReadings& readings);
   /// Noise of the prediction since the last fix, the second-order term with it.
   [[nodiscard]] PerGyro<double, kCapacity.gyros> prediction_noise(const Eigen::Matrix3d& C_in_c);
   void propagate(const PerGyro<double, kCapacity.gyros>& noise_rad);
