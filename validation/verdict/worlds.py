@@ -12,6 +12,7 @@ from rotations import exponential, inverse, product, rotated
 
 ARCSECOND = math.pi / 180 / 3600
 PASS_S = 9 * 3600.0
+ORBITAL_RATE_RAD_S = 1.11e-3
 
 
 @dataclasses.dataclass(frozen=True)
@@ -150,7 +151,7 @@ def attitudes(telemetry):
 
 def drifts_at_orbital_period(sigma_rad_s):
     """Each momentum by a drift of sine and cosine about each body axis, as of a temperature or the Earth's magnetic field."""
-    rate_rad_s = 1.11e-3
+    rate_rad_s = ORBITAL_RATE_RAD_S
     def edit(telemetry, random):
         amplitudes = [[[random.gauss(0, sigma_rad_s) for _ in range(3)] for _ in range(2)] for gyro in range(2)]
         turned, last_s = [[0.0] * 3, [0.0] * 3], None
@@ -351,6 +352,7 @@ WORLDS = [
     World("frozen-tracker-1h", "faults", constant(SLEWS), frozen(3600)),
     World("tracker-slip-20", "faults", constant(SLEWS), tracker_moves(lambda t, axis: scaled(axis, 20 * ARCSECOND if t > PASS_S / 2 else 0)), faults=("star-tracker-moved",)),
     World("tracker-ramp-60", "faults", constant(SLEWS), tracker_moves(lambda t, axis: scaled(axis, 60 * ARCSECOND * t / PASS_S)), faults=("star-tracker-moved",)),
+    World("tracker-sine-2n-4", "faults", constant(SLEWS), tracker_moves(lambda t, axis: scaled(axis, 4 * ARCSECOND * math.sin(2 * ORBITAL_RATE_RAD_S * t))), faults=("star-tracker-wanders",)),
     World("tracker-wanders-5", "faults", constant(SLEWS), tracker_wanders(5 * ARCSECOND, 600), faults=("star-tracker-wanders",)),
     World("one-sided-errors", "faults", constant(SLEWS), tracker_off_at_times(0.1, 12 * ARCSECOND), faults=("star-tracker-errors-not-normal",)),
     World("two-heads-mixed", "faults", constant(SLEWS), tracker_off_at_times(0.5, 10 * ARCSECOND), faults=("star-tracker-errors-not-normal",)),

@@ -26,6 +26,10 @@ using Eigen::VectorXd;
 constexpr Index kOfGyro = Layout::kEq1 + 3;
 constexpr int kOfAberration = 9;
 constexpr int kOfReadout = 6;
+/// Sine and cosine about the three axes of a star tracker, for each multiple of the orbital rate from 2 on.
+constexpr int kOfMultiple = 6;
+constexpr int kMultiplesOfRate = 2;
+constexpr int kBeforeReadout = kOfAberration + kMultiplesOfRate * kOfMultiple;
 
 /// A stretch of the pass as a sum of squares, a form zᵀ Q z of the states that move at its beginning and at its end, of
 /// constants, of shapes of errors of the fixes, and of 1. What moves at the beginning counts as constant in it.
@@ -127,12 +131,12 @@ Matrix3d cross(const Vector3d& v) {
 }
 
 /// Shapes of errors of a fix, columns beside its rows: aberration by a velocity that is constant, and by two at orbital
-/// period, over the speed of light, in axes; gyro by gyro what the scales of the direction cosines are off 1, and the
-/// angles between their axes off right angles. Each moves the directions as a small rotation of the cases would, an
-/// alignment.
+/// period, over the speed of light, in axes; rotations of the star tracker that go to and fro at multiples of the
+/// orbital rate; gyro by gyro what the scales of the direction cosines are off 1, and the angles between their axes off
+/// right angles. Each moves the directions as a small rotation of the cases would, an alignment.
 MatrixXd shapes_of(const CalibrationSetup& setup, const PassProblem::Moment& moment, const Layout& layout,
                    const MatrixXd& rows) {
-  MatrixXd shapes = MatrixXd::Zero(rows.rows(), kOfAberration + Index{kOfReadout} * layout.gyros);
+  MatrixXd shapes = MatrixXd::Zero(rows.rows(), kBeforeReadout + Index{kOfReadout} * layout.gyros);
   const Matrix3d C_c_in = moment.fix->fix.q_in_c.normalized().toRotationMatrix().transpose();
   const Matrix3d aberrated = cross(Vector3d::UnitZ()) * C_c_in;
   const double phase = setup.orbital_rate_rad_s * to_seconds(moment.t - setup.orbital_phase_zero);
@@ -143,6 +147,11 @@ MatrixXd shapes_of(const CalibrationSetup& setup, const PassProblem::Moment& mom
       shapes.middleCols<3>(0) += by_velocity;
       shapes.middleCols<3>(3) += std::cos(phase) * by_velocity;
       shapes.middleCols<3>(6) += std::sin(phase) * by_velocity;
+      for (int i = 0; i < kMultiplesOfRate; ++i) {
+        const Index at = kOfAberration + Index{kOfMultiple} * i;
+        shapes.middleCols<3>(at) += std::sin((i + 2) * phase) * by_alignment;
+        shapes.middleCols<3>(at + 3) += std::cos((i + 2) * phase) * by_alignment;
+      }
     }
     const Matrix3d& C_c_b = moment.gyros[k].C_c_b;
     const Vector3d& h_b = moment.fix->h_b[k];
@@ -151,7 +160,7 @@ MatrixXd shapes_of(const CalibrationSetup& setup, const PassProblem::Moment& mom
         0, h_b.y(), 0, h_b.x(), h_b.z(), 0,      //
         0, 0, h_b.z(), 0, h_b.y(), h_b.x();
     const Eigen::Matrix<double, 3, kOfReadout> by_readout = cross(-(C_c_b * h_b)) * C_c_b * read;
-    shapes.middleCols<kOfReadout>(kOfAberration + Index{kOfReadout} * k) = by_alignment.lazyProduct(by_readout);
+    shapes.middleCols<kOfReadout>(kBeforeReadout + Index{kOfReadout} * k) = by_alignment.lazyProduct(by_readout);
   }
   return shapes;
 }
@@ -219,7 +228,7 @@ class Constancy {
     const auto count = static_cast<Index>(begins_.size()) - 1;
     const Index d = layout_.dynamic();
     const Index n = layout_.size();
-    const Index shapes = kOfAberration + Index{kOfReadout} * layout_.gyros;
+    const Index shapes = kBeforeReadout + Index{kOfReadout} * layout_.gyros;
     std::vector<Index> parameters;
     std::vector<Index> others;
     for (Index c = d; c < n; ++c) {
@@ -322,7 +331,8 @@ class Constancy {
     return step * of_stretch() + kOfGyro * layout_.gyros + 2L * gyro;
   }
   [[nodiscard]] Index aberration() const { return at_shapes_; }
-  [[nodiscard]] Index readout(int gyro) const { return at_shapes_ + kOfAberration + Index{kOfReadout} * gyro; }
+  [[nodiscard]] Index multiple(int i) const { return at_shapes_ + kOfAberration + Index{kOfMultiple} * i; }
+  [[nodiscard]] Index readout(int gyro) const { return at_shapes_ + kBeforeReadout + Index{kOfReadout} * gyro; }
   [[nodiscard]] Index size() const { return form_.rows() - 1; }
   /// Middle of a stretch, of the pass from 0 to 1.
   [[nodiscard]] double part(Index stretch) const {
@@ -493,6 +503,7 @@ Moves moves_over(const Trial& trial) {
   constexpr double kPolhodeOverChange = 3;  // its states have a prior of 0.3 of that of the coefficients
   constexpr double kAnnual = 6e-5;
   constexpr double kOrbital = 1.5e-5;
+  constexpr double kFaster_rad = 5.0 / 206265;  // errors of low frequency of a good star tracker
   constexpr double kScale = 1e-3;
   VectorXd coefficient_sigma(Index{Layout::kEq1} * layout.gyros);
   for (int k = 0; k < layout.gyros; ++k) {
@@ -612,6 +623,10 @@ Moves moves_over(const Trial& trial) {
   VectorXd velocity = sigmas(kOfAberration, kOrbital);
   velocity.head<3>().setConstant(kAnnual);
   consider(what(Moving::kAberration, Motion::kPresent, -1), shape(pass.aberration(), kOfAberration), velocity);
+  for (int i = 0; i < kMultiplesOfRate; ++i) {
+    consider(what(Moving::kStarTracker, Motion::kFaster, -1), shape(pass.multiple(i), kOfMultiple),
+             sigmas(kOfMultiple, kFaster_rad));
+  }
   for (int k = 0; k < layout.gyros; ++k) {
     consider(what(Moving::kReadoutScale, Motion::kPresent, k), shape(pass.readout(k), kOfReadout),
              sigmas(kOfReadout, kScale));

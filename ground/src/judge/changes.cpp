@@ -32,7 +32,9 @@ std::string described(const Change& change) {
                          of_gyro(change));
     case Moving::kStarTracker:
       return change.motion == Motion::kStep ? "a step of the star tracker's mounting"
-                                            : "a slow turn of the star tracker's mounting";
+             : change.motion == Motion::kFaster
+                 ? "errors of the star tracker, or drift, at twice or three times the orbital rate"
+                 : "a slow turn of the star tracker's mounting";
     case Moving::kMomentum:
       return fmt::format("a jump of the momentum of {}", of_gyro(change));
     case Moving::kInertialAxes:
@@ -53,12 +55,12 @@ std::string described(const Change& change) {
   return {};
 }
 
-FindingCode code_of(Moving moving) {
-  switch (moving) {
+FindingCode code_of(const Change& change) {
+  switch (change.moving) {
     case Moving::kGyroCase:
       return FindingCode::kGyroMountingMoved;
     case Moving::kStarTracker:
-      return FindingCode::kStarTrackerMoved;
+      return change.motion == Motion::kFaster ? FindingCode::kStarTrackerWanders : FindingCode::kStarTrackerMoved;
     case Moving::kMomentum:
       return FindingCode::kMomentumJumped;
     case Moving::kInertialAxes:
@@ -81,6 +83,9 @@ std::string_view cure_of(const Change& change) {
     case Moving::kInertialAxes:
       return change.motion == Motion::kStep
                  ? "Cut the pass there and calibrate on the parts apart; look for what happened at that time."
+             : change.motion == Motion::kFaster
+                 ? "Correct the fixes by what the star tracker is known to be off, as its field of view or its "
+                   "temperature makes it."
                  : "Look for what warms the mounting; calibrate on a shorter pass.";
     case Moving::kCoefficients:
       return change.motion == Motion::kStep ? "Cut the pass there and calibrate on the parts apart."
@@ -150,6 +155,16 @@ double sigmas_off(const Calibration& calibration, const Change& change, bool ali
   return worst;
 }
 
+/// The amplitude of errors of the star tracker, which are taken for the attitude, the largest in its claimed sigmas.
+double sigmas_off_attitude(const CalibrationRun& run, const Change& change) {
+  if (change.motion != Motion::kFaster || run.attitude.sigma_rad.empty()) {
+    return 0;
+  }
+  const Eigen::Array3d sine = change.size.head<3>();
+  const Eigen::Array3d cosine = change.size.tail<3>();
+  return ((sine.square() + cosine.square()).sqrt() / run.attitude.sigma_rad.back().array()).maxCoeff();
+}
+
 /// The likeliest, where it counts as there.
 const Change* change_found(const CalibrationRun& run) {
   return run.changes.empty() || !run.changes.front().is_found() ? nullptr : &run.changes.front();
@@ -217,9 +232,11 @@ void judge_changes(const CalibrationRun& run, std::vector<Finding>& findings) {
       others += (others.empty() ? "; nearly as likely: " : ", ") + described(change);
     }
   }
-  const double off = sigmas_off(run.calibration, likeliest, false);
-  const bool in_covariance = likeliest.moving == Moving::kCoefficients;
-  const bool is_wrong = (in_covariance ? sigmas_off(run.calibration, likeliest, true) : off) > kSigmasOfWrong;
+  const double off_attitude = sigmas_off_attitude(run, likeliest);
+  const double off = std::max(sigmas_off(run.calibration, likeliest, false), off_attitude);
+  const bool of_coefficients = likeliest.moving == Moving::kCoefficients;
+  const bool is_in_sigmas = of_coefficients && likeliest.motion != Motion::kOrbital;
+  const bool is_wrong = (of_coefficients ? sigmas_off(run.calibration, likeliest, true) : off) > kSigmasOfWrong;
   const auto minutes = [&](Time t) { return to_seconds(t - run.calibration.epoch) / 60; };
   std::string when;
   if (likeliest.motion == Motion::kStep) {
@@ -227,14 +244,15 @@ void judge_changes(const CalibrationRun& run, std::vector<Finding>& findings) {
   }
   std::string what = described(likeliest);
   what.front() = static_cast<char>(what.front() - 'a' + 'A');
-  Finding finding{code_of(likeliest.moving),
+  Finding finding{code_of(likeliest),
                   fmt::format("{}{}: the estimates take what moves for constant{}.", what, when,
-                              is_wrong        ? ", and their sigmas are wrong"
-                              : in_covariance ? "; what that makes of the coefficients is in their sigmas"
-                                              : ""),
-                  fmt::format("{}likelier than nothing by e^{:.0f}; the largest effect on a parameter is {:.1f} of its "
+                              is_wrong       ? ", and their sigmas are wrong"
+                              : is_in_sigmas ? "; what that makes of the coefficients is in their sigmas"
+                                             : ""),
+                  fmt::format("{}likelier than nothing by e^{:.0f}; the largest effect on {} is {:.1f} of its "
                               "sigmas{}",
-                              size_text(likeliest), likeliest.log_odds, off, others),
+                              size_text(likeliest), likeliest.log_odds,
+                              off_attitude > 0 && off == off_attitude ? "the attitude" : "a parameter", off, others),
                   std::string(cure_of(likeliest))};
   if (!is_wrong) {
     finding.severity = FindingSeverity::kWarning;

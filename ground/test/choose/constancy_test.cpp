@@ -30,7 +30,7 @@ bool names_a_change(const CalibrationRun& run) {
   for (const FindingCode code :
        {FindingCode::kGyroMountingMoved, FindingCode::kStarTrackerMoved, FindingCode::kMomentumJumped,
         FindingCode::kInertialAxesTurned, FindingCode::kCoefficientsNotConstant, FindingCode::kAberrationNotCorrected,
-        FindingCode::kReadoutScaleOff}) {
+        FindingCode::kReadoutScaleOff, FindingCode::kStarTrackerWanders}) {
     if (names(run, code)) {
       return true;
     }
@@ -117,6 +117,24 @@ CalibrationOptions with_constant_coefficients() {
   CalibrationOptions options;
   options.further_states[FurtherState::kCoefficientChange] = FurtherStateOptions::Choice::kOff;
   return options;
+}
+
+TEST(Constancy, NamesErrorsOfTheStarTrackerFasterThanTheOrbit) {
+  for (const int times : {2, 3}) {
+    Pass pass = sim::simulate(scenario_in_eq1(12, std::chrono::hours(6))).pass;
+    const double rate_rad_s = times * orbital_rate_rad_s(pass.star_tracker);
+    StarTrackerTelemetry& fixes = pass.star_tracker;
+    for (std::size_t i = 0; i < fixes.size(); ++i) {
+      const double angle_rad = 4.0 / 206265 * std::sin(rate_rad_s * to_seconds(fixes.t[i] - fixes.t[0]));
+      fixes.q_in_c[i] = fixes.q_in_c[i] * Eigen::Quaterniond(Eigen::AngleAxisd(angle_rad, Eigen::Vector3d::UnitX()));
+    }
+    const CalibrationRun run = calibrate(pass, CalibrationOptions());
+    EXPECT_TRUE(names(run, FindingCode::kStarTrackerWanders)) << times;
+    EXPECT_FALSE(run.calibration.verdict.trustworthy) << times;
+    const Change& change = run.changes.front();
+    EXPECT_EQ(change.motion, Motion::kFaster) << times;
+    EXPECT_NEAR(std::hypot(change.size(0), change.size(3)), 4.0 / 206265, 1.0 / 206265) << times;
+  }
 }
 
 TEST(Constancy, NamesCoefficientsThatChange) {
