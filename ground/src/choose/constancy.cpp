@@ -30,6 +30,9 @@ constexpr int kOfReadout = 6;
 constexpr int kOfMultiple = 6;
 constexpr int kMultiplesOfRate = 2;
 constexpr int kBeforeReadout = kOfAberration + kMultiplesOfRate * kOfMultiple;
+/// Sine and cosine about the three axes of the body by which a gyro's case goes to and fro at the orbital rate.
+constexpr int kOfCase = 6;
+constexpr int kOfShapesOfGyro = kOfReadout + kOfCase;
 
 /// A stretch of the pass as a sum of squares, a form zᵀ Q z of the states that move at its beginning and at its end, of
 /// constants, of shapes of errors of the fixes, and of 1. What moves at the beginning counts as constant in it.
@@ -136,7 +139,7 @@ Matrix3d cross(const Vector3d& v) {
 /// right angles. Each moves the directions as a small rotation of the cases would, an alignment.
 MatrixXd shapes_of(const CalibrationSetup& setup, const PassProblem::Moment& moment, const Layout& layout,
                    const MatrixXd& rows) {
-  MatrixXd shapes = MatrixXd::Zero(rows.rows(), kBeforeReadout + Index{kOfReadout} * layout.gyros);
+  MatrixXd shapes = MatrixXd::Zero(rows.rows(), kBeforeReadout + Index{kOfShapesOfGyro} * layout.gyros);
   const Matrix3d C_c_in = moment.fix->fix.q_in_c.normalized().toRotationMatrix().transpose();
   const Matrix3d aberrated = cross(Vector3d::UnitZ()) * C_c_in;
   const double phase = setup.orbital_rate_rad_s * to_seconds(moment.t - setup.orbital_phase_zero);
@@ -160,7 +163,10 @@ MatrixXd shapes_of(const CalibrationSetup& setup, const PassProblem::Moment& mom
         0, h_b.y(), 0, h_b.x(), h_b.z(), 0,      //
         0, 0, h_b.z(), 0, h_b.y(), h_b.x();
     const Eigen::Matrix<double, 3, kOfReadout> by_readout = cross(-(C_c_b * h_b)) * C_c_b * read;
-    shapes.middleCols<kOfReadout>(kBeforeReadout + Index{kOfReadout} * k) = by_alignment.lazyProduct(by_readout);
+    const Index own = kBeforeReadout + Index{kOfShapesOfGyro} * k;
+    shapes.middleCols<3>(own + kOfReadout) = std::sin(phase) * by_alignment;
+    shapes.middleCols<3>(own + kOfReadout + 3) = std::cos(phase) * by_alignment;
+    shapes.middleCols<kOfReadout>(own) = by_alignment.lazyProduct(by_readout);
   }
   return shapes;
 }
@@ -228,7 +234,7 @@ class Constancy {
     const auto count = static_cast<Index>(begins_.size()) - 1;
     const Index d = layout_.dynamic();
     const Index n = layout_.size();
-    const Index shapes = kBeforeReadout + Index{kOfReadout} * layout_.gyros;
+    const Index shapes = kBeforeReadout + Index{kOfShapesOfGyro} * layout_.gyros;
     std::vector<Index> parameters;
     std::vector<Index> others;
     for (Index c = d; c < n; ++c) {
@@ -332,7 +338,8 @@ class Constancy {
   }
   [[nodiscard]] Index aberration() const { return at_shapes_; }
   [[nodiscard]] Index multiple(int i) const { return at_shapes_ + kOfAberration + Index{kOfMultiple} * i; }
-  [[nodiscard]] Index readout(int gyro) const { return at_shapes_ + kBeforeReadout + Index{kOfReadout} * gyro; }
+  [[nodiscard]] Index readout(int gyro) const { return at_shapes_ + kBeforeReadout + Index{kOfShapesOfGyro} * gyro; }
+  [[nodiscard]] Index case_of(int gyro) const { return readout(gyro) + kOfReadout; }
   [[nodiscard]] Index size() const { return form_.rows() - 1; }
   /// Middle of a stretch, of the pass from 0 to 1.
   [[nodiscard]] double part(Index stretch) const {
@@ -503,7 +510,8 @@ Moves moves_over(const Trial& trial) {
   constexpr double kPolhodeOverChange = 3;  // its states have a prior of 0.3 of that of the coefficients
   constexpr double kAnnual = 6e-5;
   constexpr double kOrbital = 1.5e-5;
-  constexpr double kFaster_rad = 5.0 / 206265;  // errors of low frequency of a good star tracker
+  constexpr double kToAndFro_rad =
+      5.0 / 206265;  // errors of low frequency of a good star tracker, and of a good mounting
   constexpr double kScale = 1e-3;
   VectorXd coefficient_sigma(Index{Layout::kEq1} * layout.gyros);
   for (int k = 0; k < layout.gyros; ++k) {
@@ -625,11 +633,13 @@ Moves moves_over(const Trial& trial) {
   consider(what(Moving::kAberration, Motion::kPresent, -1), shape(pass.aberration(), kOfAberration), velocity);
   for (int i = 0; i < kMultiplesOfRate; ++i) {
     consider(what(Moving::kStarTracker, Motion::kFaster, -1), shape(pass.multiple(i), kOfMultiple),
-             sigmas(kOfMultiple, kFaster_rad));
+             sigmas(kOfMultiple, kToAndFro_rad));
   }
   for (int k = 0; k < layout.gyros; ++k) {
     consider(what(Moving::kReadoutScale, Motion::kPresent, k), shape(pass.readout(k), kOfReadout),
              sigmas(kOfReadout, kScale));
+    consider(what(Moving::kGyroCase, Motion::kOrbital, k), shape(pass.case_of(k), kOfCase),
+             sigmas(kOfCase, kToAndFro_rad));
   }
   for (const double part : {0.01, 0.03, 0.1, 0.3, 1.0}) {
     Entries entries;

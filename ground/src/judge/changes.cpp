@@ -28,7 +28,10 @@ std::string of_gyro(const Change& change) {
 std::string described(const Change& change) {
   switch (change.moving) {
     case Moving::kGyroCase:
-      return fmt::format("{} of the case of {}", change.motion == Motion::kStep ? "a step" : "a slow turn",
+      return fmt::format("{} of the case of {}",
+                         change.motion == Motion::kStep      ? "a step"
+                         : change.motion == Motion::kOrbital ? "a turn to and fro, at orbital rate,"
+                                                             : "a slow turn",
                          of_gyro(change));
     case Moving::kStarTracker:
       return change.motion == Motion::kStep ? "a step of the star tracker's mounting"
@@ -155,9 +158,12 @@ double sigmas_off(const Calibration& calibration, const Change& change, bool ali
   return worst;
 }
 
-/// The amplitude of errors of the star tracker, which are taken for the attitude, the largest in its claimed sigmas.
+/// The amplitude of rotations to and fro of the star tracker or of a case, which are taken for the attitude, the
+/// largest in its claimed sigmas.
 double sigmas_off_attitude(const CalibrationRun& run, const Change& change) {
-  if (change.motion != Motion::kFaster || run.attitude.sigma_rad.empty()) {
+  const bool is_to_and_fro =
+      change.motion == Motion::kFaster || (change.motion == Motion::kOrbital && change.moving == Moving::kGyroCase);
+  if (!is_to_and_fro || run.attitude.sigma_rad.empty()) {
     return 0;
   }
   const Eigen::Array3d sine = change.size.head<3>();

@@ -125,7 +125,7 @@ TEST(Constancy, NamesErrorsOfTheStarTrackerFasterThanTheOrbit) {
     const double rate_rad_s = times * orbital_rate_rad_s(pass.star_tracker);
     StarTrackerTelemetry& fixes = pass.star_tracker;
     for (std::size_t i = 0; i < fixes.size(); ++i) {
-      const double angle_rad = 4.0 / 206265 * std::sin(rate_rad_s * to_seconds(fixes.t[i] - fixes.t[0]));
+      const double angle_rad = 4 * kArcsecond * std::sin(rate_rad_s * to_seconds(fixes.t[i] - fixes.t[0]));
       fixes.q_in_c[i] = fixes.q_in_c[i] * Eigen::Quaterniond(Eigen::AngleAxisd(angle_rad, Eigen::Vector3d::UnitX()));
     }
     const CalibrationRun run = calibrate(pass, CalibrationOptions());
@@ -133,8 +133,22 @@ TEST(Constancy, NamesErrorsOfTheStarTrackerFasterThanTheOrbit) {
     EXPECT_FALSE(run.calibration.verdict.trustworthy) << times;
     const Change& change = run.changes.front();
     EXPECT_EQ(change.motion, Motion::kFaster) << times;
-    EXPECT_NEAR(std::hypot(change.size(0), change.size(3)), 4.0 / 206265, 1.0 / 206265) << times;
+    EXPECT_NEAR(std::hypot(change.size(0), change.size(3)), 4 * kArcsecond, kArcsecond) << times;
   }
+}
+
+TEST(Constancy, NamesTheCaseThatGoesToAndFroAtTheOrbitalRate) {
+  Pass pass = sim::simulate(scenario_in_eq1(13, std::chrono::hours(6))).pass;
+  const double rate_rad_s = orbital_rate_rad_s(pass.star_tracker);
+  for (std::size_t i = 0; i < pass.gyro.size(); ++i) {
+    const double angle_rad = 4 * kArcsecond * std::sin(rate_rad_s * to_seconds(pass.gyro.t[i] - pass.gyro.t[0]));
+    Eigen::Map<Eigen::Vector3d> h(&pass.gyro.h[3 * static_cast<std::size_t>(pass.gyro.gyros) * i]);
+    h = (Eigen::AngleAxisd(angle_rad, kAxis) * h).eval();
+  }
+  const CalibrationRun run = calibrate(pass, CalibrationOptions());
+  EXPECT_TRUE(names(run, FindingCode::kGyroMountingMoved));
+  EXPECT_FALSE(run.calibration.verdict.trustworthy);
+  EXPECT_EQ(run.changes.front().motion, Motion::kOrbital);
 }
 
 TEST(Constancy, NamesCoefficientsThatChange) {

@@ -112,8 +112,8 @@ struct Change {
   Duration decay{};      ///< of kDecay, until 1/e of it is left
   double log_odds = 0;   ///< ln of the Bayes factor for it against nothing that moves, less ln of the number of tries
   /// Size and 1-sigma: rotation vector, rad, c axes (kInertialAxes: in axes; kMomentum: two components across the
-  /// momentum); coefficients, rad/s, gyro by gyro, for kOrbital of cosine and sine; over the pass. For kFaster
-  /// sine and cosine. For kWalk one number, the root of the sum of squares of all steps.
+  /// momentum); coefficients, rad/s, gyro by gyro, for kOrbital of cosine and sine; over the pass. For kFaster,
+  /// and for kOrbital of a case, of sine and cosine. For kWalk one number, the root of the sum of squares of all steps.
   Eigen::VectorXd size, sigma;
   /// Coefficients of eq. (1) and alignment of each gyro at the end of the pass, for kOrbital their mean over it, less
   /// what is estimated without the change: rad/s, rad.
