@@ -136,7 +136,8 @@ Matrix3d cross(const Vector3d& v) {
 /// Shapes of errors of a fix, columns beside its rows: aberration by a velocity that is constant, and by two at orbital
 /// period, over the speed of light, in axes; rotations of the star tracker that go to and fro at multiples of the
 /// orbital rate; gyro by gyro what the scales of the direction cosines are off 1, and the angles between their axes off
-/// right angles. Each moves the directions as a small rotation of the cases would, an alignment.
+/// right angles, then rotations of the case that go to and fro at the orbital rate. Each moves the directions as a small
+/// rotation of the cases would, an alignment.
 MatrixXd shapes_of(const CalibrationSetup& setup, const PassProblem::Moment& moment, const Layout& layout,
                    const MatrixXd& rows) {
   MatrixXd shapes = MatrixXd::Zero(rows.rows(), kBeforeReadout + Index{kOfShapesOfGyro} * layout.gyros);
@@ -510,8 +511,7 @@ Moves moves_over(const Trial& trial) {
   constexpr double kPolhodeOverChange = 3;  // its states have a prior of 0.3 of that of the coefficients
   constexpr double kAnnual = 6e-5;
   constexpr double kOrbital = 1.5e-5;
-  constexpr double kToAndFro_rad =
-      5.0 / 206265;  // errors of low frequency of a good star tracker, and of a good mounting
+  constexpr double kToAndFro_rad = 5.0 / 206265;  // a good star tracker, a good mounting
   constexpr double kScale = 1e-3;
   VectorXd coefficient_sigma(Index{Layout::kEq1} * layout.gyros);
   for (int k = 0; k < layout.gyros; ++k) {
