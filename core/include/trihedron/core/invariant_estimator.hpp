@@ -128,8 +128,8 @@ class InvariantEstimator {
   };
   /// Stages of a correction, at most; those of a reopening come twice.
   static constexpr int kMostStages = 12;
-  /// What the next stage takes, about, in 100 instructions on two gyros with eq. (1); and all from it on, as it usually
-  /// goes.
+  /// What the next stage takes, about, in 100 instructions on two gyros with eq. (1), where no term of second order is
+  /// held; and all from it on, as it usually goes.
   [[nodiscard]] static int cost(const Correction& correction);
   [[nodiscard]] static int cost_to_end(const Correction& correction);
 
