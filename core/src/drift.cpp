@@ -1,5 +1,6 @@
 #include "trihedron/core/drift.hpp"
 
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <cstdint>
@@ -15,6 +16,8 @@ constexpr bool is_in_eq1(Member potential, int degree, int order) {
          (degree == 4 && order == 0 && potential == Member::kW);
 }
 
+constexpr int kMaxDegreeOfEq1 = 4;
+
 constexpr int max_degree_of(DriftModelId id) {
   constexpr int kEsg20Degree = 2;
   return id.family == DriftModelId::Family::kVsh     ? id.degree
@@ -22,74 +25,135 @@ constexpr int max_degree_of(DriftModelId id) {
                                                      : 0;
 }
 
-/// Gradients of the potentials of members, kept for one degree at a time: W and D of a harmonic are made of the same.
-/// Members that come degree by degree make each once.
-template <class Harmonics>
-class Gradients {
- public:
-  explicit Gradients(const Harmonics& harmonics) : harmonics_(harmonics) {}
+/// How many members of a degree and potential a model has: all orders that are not in eq. (1).
+constexpr int members_of(Member potential, int degree) {
+  int count = 2 * degree + 1;
+  for (int order = -degree; order <= degree && degree <= kMaxDegreeOfEq1; ++order) {
+    count -= is_in_eq1(potential, degree, order) ? 1 : 0;
+  }
+  return count;
+}
 
-  [[nodiscard]] Eigen::Vector3d of(const DriftCoefficient& member) {
-    if (member.degree != degree_) {
-      degree_ = member.degree;
-      for (int order = 0; order <= degree_; ++order) {
-        const auto gradients = harmonics_.polynomial_gradients(degree_, order);
-        at(-order) = gradients[1];
-        at(order) = gradients[0];  // last: order 0 has a cosine alone
-      }
+/// Calls work(degree, w, d) for each degree of a model: the first columns of its members W and of its members D.
+template <class Work>
+void for_each_degree(DriftModelId id, const Work& work) {
+  constexpr int kAllOfEsg20 = members_of(Member::kW, 1) + members_of(Member::kW, 2);  // W before D
+  const int max_degree = max_degree_of(id);
+  int w = Esg7::kSize;
+  for (int degree = 1; degree <= max_degree; ++degree) {
+    const int so_many = members_of(Member::kW, degree);
+    const int d = w + (id == kEsg20 ? kAllOfEsg20 : so_many);
+    work(degree, w, d);
+    w = id == kEsg20 ? w + so_many : d + members_of(Member::kD, degree);
+  }
+}
+
+using Harmonics = HarmonicTableOf<DriftModelId::kMaxDegree>::At<double>;
+using ByOrder = Harmonics::ByOrder;
+
+/// Puts the numbers of all orders of a degree, from −degree on, into the columns of its members, from `to` on.
+void put_members(Member potential, int degree, const ByOrder& numbers, double* to) {
+  if (degree > kMaxDegreeOfEq1) {
+    std::copy_n(numbers.data(), 2 * degree + 1, to);
+    return;
+  }
+  for (int order = -degree; order <= degree; ++order) {
+    if (!is_in_eq1(potential, degree, order)) {
+      *to++ = numbers[static_cast<std::size_t>(degree + order)];
     }
-    return BesideK0::is(member) ? Eigen::Vector3d(BesideK0::kOf44 * at(4) + BesideK0::kOf40 * at(0)) : at(member.order);
   }
+}
 
- private:
-  [[nodiscard]] Eigen::Vector3d& at(int order) {
-    const int place = DriftModelId::kMaxDegree + order;
-    return of_degree_[static_cast<std::size_t>(place)];
+/// The coefficients of all orders of a degree, from −degree on, of those of its members, which begin at `from`.
+/// `room`: where they lie if they do not as they are.
+const double* by_order(Member potential, int degree, const double* from, ByOrder& room) {
+  if (degree > kMaxDegreeOfEq1) {
+    return from;
   }
-
-  const Harmonics& harmonics_;
-  std::int8_t degree_ = 0;  ///< none yet
-  std::array<Eigen::Vector3d, 2 * DriftModelId::kMaxDegree + 1> of_degree_;
-};
+  for (int order = -degree; order <= degree; ++order) {
+    room[static_cast<std::size_t>(degree + order)] = is_in_eq1(potential, degree, order) ? 0.0 : *from++;
+  }
+  if (potential == Member::kW && degree == BesideK0::kDegree) {
+    const double its = room[2 * BesideK0::kDegree];
+    room[BesideK0::kDegree] = BesideK0::kOf40 * its;
+    room[2 * BesideK0::kDegree] = BesideK0::kOf44 * its;
+  }
+  return room.data();
+}
 
 }  // namespace
 
 DriftModel::DriftModel(DriftModelId id, const FurtherStates& further)
     : harmonics_(max_degree_of(id)),
+      id_(id),
+      size_(static_cast<std::int16_t>(id.size())),
       wandering_(further.wandering_drift),
       change_(further.coefficient_change),
       orbital_(further.orbital_drift),
       polhode_(further.polhode) {
-  size_ = 0;
   for (int number = 0; number < Esg7::kSize; ++number) {
-    members_[static_cast<std::size_t>(size_++)] = DriftCoefficient::of_eq1(number);
+    members_[static_cast<std::size_t>(number)] = DriftCoefficient::of_eq1(number);
   }
-  const int max_degree = max_degree_of(id);
-  const auto add_degrees = [&](int from, int to, Member potential) {
-    for (int degree = from; degree <= to; ++degree) {
-      for (int order = -degree; order <= degree; ++order) {
-        if (!is_in_eq1(potential, degree, order)) {
-          add(potential, degree, order);
-        }
+  const auto add = [this](Member potential, int degree, int column) {
+    for (int order = -degree; order <= degree; ++order) {
+      if (!is_in_eq1(potential, degree, order)) {
+        members_[static_cast<std::size_t>(column++)] = {potential, static_cast<std::int8_t>(degree),
+                                                        static_cast<std::int8_t>(order)};
       }
     }
   };
-  if (id.family == DriftModelId::Family::kEsg20) {  // W before D
-    add_degrees(1, max_degree, Member::kW);
-    add_degrees(1, max_degree, Member::kD);
-    add(Member::kCubeD, 0, 0);
-  } else {  // degree by degree
-    for (int degree = 1; degree <= max_degree; ++degree) {
-      add_degrees(degree, degree, Member::kW);
-      add_degrees(degree, degree, Member::kD);
-    }
+  for_each_degree(id, [&](int degree, int w, int d) {
+    add(Member::kW, degree, w);
+    add(Member::kD, degree, d);
+  });
+  if (id == kEsg20) {
+    members_[static_cast<std::size_t>(size_ - 1)] = {Member::kCubeD, 0, 0};
   }
-  TRIHEDRON_ASSERT(size_ == id.size());
 }
 
-void DriftModel::add(Member member, int degree, int order) {
-  members_[static_cast<std::size_t>(size_++)] = {member, static_cast<std::int8_t>(degree),
-                                                 static_cast<std::int8_t>(order)};
+/// The columns of members beside eq. (1).
+void DriftModel::put_beside_eq1(const Eigen::Vector3d& h, ColumnsView B) const {
+  const Harmonics harmonics = harmonics_.at<double>(h);
+  for_each_degree(id_, [&](int degree, int w, int d) {
+    const auto [x, y, z] = harmonics.polynomial_gradients_by_order(degree);
+    std::array<ByOrder, 3> of_w;
+    std::array<ByOrder, 3> of_d;
+    for (std::size_t i = 0; static_cast<int>(i) < 2 * degree + 1; ++i) {
+      of_w[0][i] = -x[i];
+      of_w[1][i] = -y[i];
+      of_w[2][i] = -z[i];
+      of_d[0][i] = h.y() * z[i] - h.z() * y[i];
+      of_d[1][i] = h.z() * x[i] - h.x() * z[i];
+      of_d[2][i] = h.x() * y[i] - h.y() * x[i];
+    }
+    for (int i = 0; i < 3; ++i) {
+      ByOrder& its_w = of_w[static_cast<std::size_t>(i)];
+      if (degree == BesideK0::kDegree) {
+        double& of_44 = its_w[2 * BesideK0::kDegree];
+        of_44 = BesideK0::kOf44 * of_44 + BesideK0::kOf40 * its_w[BesideK0::kDegree];
+      }
+      put_members(Member::kW, degree, its_w, B.row(i) + w);
+      put_members(Member::kD, degree, of_d[static_cast<std::size_t>(i)], B.row(i) + d);
+    }
+  });
+  if (id_ == kEsg20) {
+    B.set_column(size_ - 1, h.cross(h.cwiseProduct(h).cwiseProduct(h)));
+  }
+}
+
+/// What they add to the rate.
+Eigen::Vector3d DriftModel::rate_beside_eq1(const Eigen::Vector3d& h, const double* coefficients) const {
+  const Harmonics harmonics = harmonics_.at<double>(h);
+  Harmonics::Sum w_sum(harmonics);
+  Harmonics::Sum d_sum(harmonics);
+  for_each_degree(id_, [&](int degree, int w, int d) {
+    const Harmonics::Degree its = harmonics.of_degree(degree);
+    ByOrder room;
+    w_sum.add(its, by_order(Member::kW, degree, coefficients + w, room));
+    d_sum.add(its, by_order(Member::kD, degree, coefficients + d, room));
+  });
+  const double of_cube = id_ == kEsg20 ? coefficients[size_ - 1] : 0;
+  return h.cross(d_sum.gradient() + of_cube * h.cwiseProduct(h).cwiseProduct(h)) - w_sum.gradient();
 }
 
 void DriftModel::basis(const Eigen::Vector3d& h, const DriftTime& time, ColumnsView B) const {
@@ -101,22 +165,7 @@ void DriftModel::basis(const Eigen::Vector3d& h, const DriftTime& time, ColumnsV
     }
   }
   if (size_ > Esg7::kSize) {
-    const auto harmonics = harmonics_.at<double>(h);
-    Gradients gradients(harmonics);
-    for (int i = Esg7::kSize; i < size_; ++i) {
-      const DriftCoefficient& its = member(i);
-      switch (its.member) {
-        case Member::kW:
-          B.set_column(i, -gradients.of(its));
-          break;
-        case Member::kD:
-          B.set_column(i, h.cross(gradients.of(its)));
-          break;
-        default:
-          B.set_column(i, h.cross(h.cwiseProduct(h).cwiseProduct(h)));
-          break;
-      }
-    }
+    put_beside_eq1(h, B);
   }
   int column = size_;
   if (wandering_) {
@@ -170,24 +219,7 @@ Eigen::Vector3d DriftModel::rate(const Eigen::Vector3d& h, const DriftTime& time
   }
   Vector3d rate = Esg7::rate<double>(h, kappa) + beside;
   if (size_ > Esg7::kSize) {
-    const auto harmonics = harmonics_.at<double>(h);
-    using Sum = HarmonicTableOf<DriftModelId::kMaxDegree>::At<double>::Sum;
-    Sum w(harmonics);
-    Sum d(harmonics);
-    double of_cube = 0;
-    for (int i = Esg7::kSize; i < size_; ++i) {
-      const DriftCoefficient& its = member(i);
-      const double factor = coefficients[i];
-      if (its.member == Member::kCubeD) {
-        of_cube = factor;
-      } else if (BesideK0::is(its)) {
-        w.add(4, 4, BesideK0::kOf44 * factor);
-        w.add(4, 0, BesideK0::kOf40 * factor);
-      } else {
-        (its.member == Member::kW ? w : d).add(its.degree, its.order, factor);
-      }
-    }
-    rate += h.cross(d.gradient() + of_cube * h.cwiseProduct(h).cwiseProduct(h)) - w.gradient();
+    rate += rate_beside_eq1(h, coefficients);
   }
   return rate;
 }

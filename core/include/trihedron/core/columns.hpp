@@ -33,15 +33,25 @@ struct ColumnsView {
       std::fill(row(i) + columns, row(i) + padded(columns), 0.0);
     }
   }
-  /// The sum of the columns, each times its coefficient.
+  /// The sum of the columns, each times its coefficient; of every kPad-th by itself first, since each sum is a chain of
+  /// operations that wait for one another.
   [[nodiscard]] Eigen::Vector3d times(const double* factors) const {
-    Eigen::Vector3d sum = Eigen::Vector3d::Zero();
-    for (int j = 0; j < columns; ++j) {
+    double sums[3][kPad] = {};
+    const int whole = columns - columns % kPad;
+    for (int j = 0; j < whole; j += kPad) {
       for (int i = 0; i < 3; ++i) {
-        sum(i) += row(i)[j] * factors[j];
+        for (int k = 0; k < kPad; ++k) {
+          sums[i][k] += row(i)[j + k] * factors[j + k];
+        }
       }
     }
-    return sum;
+    for (int j = whole; j < columns; ++j) {
+      for (int i = 0; i < 3; ++i) {
+        sums[i][j - whole] += row(i)[j] * factors[j];
+      }
+    }
+    const auto sum = [&](int i) { return (sums[i][0] + sums[i][1]) + (sums[i][2] + sums[i][3]); };
+    return {sum(0), sum(1), sum(2)};
   }
 };
 

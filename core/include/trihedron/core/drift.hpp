@@ -86,11 +86,12 @@ struct Esg7 {
 /// The member W(4, 4) of a model stands for what k0 leaves of W(4, 0) and W(4, 4), orthogonal to it over the sphere: Σ
 /// h⁴ is √7 Y(4, 0) + √5 Y(4, 4), but for a factor and a constant.
 struct BesideK0 {
+  static constexpr int kDegree = 4;
   static constexpr double kOf40 = -0.6454972243679028;  ///< −√(5/12)
   static constexpr double kOf44 = 0.7637626158259733;   ///< √(7/12)
 
   [[nodiscard]] static constexpr bool is(const DriftCoefficient& member) {
-    return member.member == DriftCoefficient::Member::kW && member.degree == 4 && member.order == 4;
+    return member.member == DriftCoefficient::Member::kW && member.degree == kDegree && member.order == kDegree;
   }
 };
 
@@ -131,11 +132,13 @@ class DriftModel {
   [[nodiscard]] Eigen::Vector3d rate(const Eigen::Vector3d& h, const DriftTime& time, const double* coefficients) const;
 
  private:
-  void add(DriftCoefficient::Member member, int degree, int order);
+  void put_beside_eq1(const Eigen::Vector3d& h, ColumnsView B) const;
+  [[nodiscard]] Eigen::Vector3d rate_beside_eq1(const Eigen::Vector3d& h, const double* coefficients) const;
 
   std::array<DriftCoefficient, kMaxMembers> members_{};
   HarmonicTableOf<DriftModelId::kMaxDegree> harmonics_;
-  int size_ = Esg7::kSize;
+  DriftModelId id_;
+  std::int16_t size_;
   bool wandering_ = false;
   bool change_ = false;
   bool orbital_ = false;

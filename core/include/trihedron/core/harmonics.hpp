@@ -58,23 +58,29 @@ class HarmonicTableOf {
   class At {
    public:
     At(const HarmonicTableOf& table, const Vector3<S>& h) : table_(table), h_(h) {
-      const int degree = table.max_degree_;
+      const S x = h.x();
+      const S y = h.y();
+      const S z = h.z();
+      const auto degrees = static_cast<std::size_t>(table.max_degree_);
       re_[0] = S(1);
       im_[0] = S(0);
-      for (std::size_t m = 1; m <= static_cast<std::size_t>(degree); ++m) {
-        re_[m] = h.x() * re_[m - 1] - h.y() * im_[m - 1];
-        im_[m] = h.x() * im_[m - 1] + h.y() * re_[m - 1];
+      for (std::size_t m = 1; m <= degrees; ++m) {
+        re_[m] = x * re_[m - 1] - y * im_[m - 1];
+        im_[m] = x * im_[m - 1] + y * re_[m - 1];
       }
       // By degree, because the orders of one degree do not wait for each other.
-      for (int l = 0; l <= degree; ++l) {
-        for (int m = 0; m < l - 1; ++m) {
-          const std::size_t i = index(l, m);
-          q_[i] = S(table.up_[i]) * h.z() * q_[index(l - 1, m)] - S(table.up_two_[i]) * q_[index(l - 2, m)];
+      q_[0] = S(table.diagonal_[0]);
+      std::size_t two_below = 0;
+      std::size_t below = 0;
+      for (std::size_t l = 1; l <= degrees; ++l) {
+        const std::size_t row = below + l;  // where its orders begin
+        for (std::size_t m = 0; m + 1 < l; ++m) {
+          q_[row + m] = S(table.up_[row + m]) * z * q_[below + m] - S(table.up_two_[row + m]) * q_[two_below + m];
         }
-        if (l > 0) {
-          q_[index(l, l - 1)] = S(table.up_[index(l, l - 1)]) * h.z() * q_[index(l - 1, l - 1)];
-        }
-        q_[index(l, l)] = S(table.diagonal_[static_cast<std::size_t>(l)]);
+        q_[row + l - 1] = S(table.up_[row + l - 1]) * z * q_[below + l - 1];
+        q_[row + l] = S(table.diagonal_[l]);
+        two_below = below;
+        below = row;
       }
     }
 
@@ -100,41 +106,76 @@ class HarmonicTableOf {
               Vector3<S>(mq * im_below, mq * re_below, dq * im_[mu])};
     }
 
+    /// One number for each order of a degree l, from −l on; 2l + 1 of them.
+    using ByOrder = std::array<S, 2 * Max + 1>;
+
+    /// The three components of polynomial_gradient() of all orders of a degree.
+    [[nodiscard]] std::array<ByOrder, 3> polynomial_gradients_by_order(int degree) const {
+      std::array<ByOrder, 3> its;
+      for (int m = 0; m <= degree; ++m) {
+        const auto [cosine, sine] = polynomial_gradients(degree, m);
+        const auto last = static_cast<std::size_t>(degree + m);
+        const auto first = static_cast<std::size_t>(degree - m);
+        for (std::size_t i = 0; i < 3; ++i) {
+          its[i][first] = sine(static_cast<Eigen::Index>(i));
+          its[i][last] = cosine(static_cast<Eigen::Index>(i));  // after the sine: order 0 has a cosine alone
+        }
+      }
+      return its;
+    }
+
+    /// What all polynomials of a degree are made of: Q_l|m|(z) and its derivative.
+    struct Degree {
+      int degree;
+      ByOrder q, slope;
+    };
+    [[nodiscard]] Degree of_degree(int degree) const {
+      Degree its;
+      its.degree = degree;
+      for (int m = 0; m <= degree; ++m) {
+        const auto last = static_cast<std::size_t>(degree + m);
+        const auto first = static_cast<std::size_t>(degree - m);
+        its.q[first] = its.q[last] = q_[index(degree, m)];
+        its.slope[first] = its.slope[last] = slope(degree, m);
+      }
+      return its;
+    }
+
     /// A sum of multiples of the polynomials. Its gradient takes a fraction of the work of all of theirs.
     class Sum {
      public:
       /// Refers to it.
       explicit Sum(const At& at) : at_(at) {}
 
-      void add(int degree, int order, S factor) {
-        const int m = order < 0 ? -order : order;
-        OfOrder& its = (order < 0 ? sines_ : cosines_)[static_cast<std::size_t>(m)];
-        its.q += factor * at_.q_[index(degree, m)];
-        its.slope += factor * at_.slope(degree, m);
+      /// factors: of its orders from −degree on.
+      void add(const Degree& its, const S* factors) {
+        S* const q = q_.data() + (Max - its.degree);
+        S* const slope = slope_.data() + (Max - its.degree);
+        for (int i = 0; i < 2 * its.degree + 1; ++i) {
+          const auto k = static_cast<std::size_t>(i);
+          q[k] += factors[k] * its.q[k];
+          slope[k] += factors[k] * its.slope[k];
+        }
       }
 
       /// As polynomial_gradient().
       [[nodiscard]] Vector3<S> gradient() const {
-        Vector3<S> sum(S(0), S(0), cosines_[0].slope);
+        Vector3<S> sum(S(0), S(0), slope_[Max]);
         for (int order = 1; order <= at_.table_.max_degree_; ++order) {
           const auto m = static_cast<std::size_t>(order);
-          const S cosine = S(order) * cosines_[m].q;
-          const S sine = S(order) * sines_[m].q;
+          const S cosine = S(order) * q_[Max + m];
+          const S sine = S(order) * q_[Max - m];
           sum.x() += cosine * at_.re_[m - 1] + sine * at_.im_[m - 1];
           sum.y() += sine * at_.re_[m - 1] - cosine * at_.im_[m - 1];
-          sum.z() += cosines_[m].slope * at_.re_[m] + sines_[m].slope * at_.im_[m];
+          sum.z() += slope_[Max + m] * at_.re_[m] + slope_[Max - m] * at_.im_[m];
         }
         return sum;
       }
 
      private:
-      struct OfOrder {
-        S q{};
-        S slope{};
-      };
       const At& at_;
-      std::array<OfOrder, kOrders> cosines_{};  ///< m ≥ 0
-      std::array<OfOrder, kOrders> sines_{};    ///< m < 0
+      ByOrder q_{};  ///< of orders from −Max on
+      ByOrder slope_{};
     };
 
    private:
