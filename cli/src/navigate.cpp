@@ -27,7 +27,7 @@ namespace trihedron::cli {
 
 ExitStatus navigate_pass(const std::filesystem::path& pass, const NavigationFiles& files,
                          const CalibrationOptions& options, const Common& common) {
-  io::NamedPass named = io::read_named_pass(pass);
+  io::NamedPass named = io::read_named_pass(pass, io::TruthUse::kToCompare);
   io::LoadedPass& loaded = named.loaded;
   log_pass(common.log, pass.string(), loaded);
   log_settings(common.log, options);

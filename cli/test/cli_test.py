@@ -716,6 +716,19 @@ def test_a_truth_of_another_number_of_gyros_is_refused(csv_pass):
     refused(run("evaluate", directory, "--attitude", directory / "attitude.csv"), INPUT_REFUSED, "3 gyros")
 
 
+@pytest.mark.parametrize("name", ["truth.csv", "truth.json"])
+def test_a_truth_of_which_a_part_is_missing_keeps_no_pass_from_being_calibrated(csv_pass, tmp_path, name):
+    directory = csv_pass(30)
+    without = run("--json", "calibrate", directory, "-o", tmp_path / "without", "--estimator", "paper")
+    (directory / name).write_text("t_s,q_x,q_y,q_z,q_w\n0,0,0,0,1\n" if name == "truth.csv" else '{"gyros": []}')
+    said = run("calibrate", directory, "-o", tmp_path / "out", "--estimator", "paper")
+    assert said.returncode == without.returncode
+    assert "truth that cannot be read, nothing is compared with it" in said.stdout
+    assert (tmp_path / "out/calibration.json").read_text() == (tmp_path / "without/calibration.json").read_text()
+    flown = run("navigate", directory, "--prior", "-o", tmp_path / "attitude.csv")
+    assert "truth that cannot be read" in flown.stdout
+
+
 def test_a_read_only_directory_is_a_machine_failure():
     refused(run("calibrate", EXAMPLE, "-o", "/proc/trihedron", "--estimator", "paper"), MACHINE_FAILED, "/proc/trihedron")
 

@@ -84,15 +84,32 @@ std::string name_of_pass(const std::filesystem::path& path) {
   return text.empty() ? "pass" : text;  // the root has no name
 }
 
+std::optional<Truth> read_truth_of(const NamedPass& pass) {
+  std::optional<Truth> truth = read_truth(pass.path);
+  if (truth && truth->gyros.size() != static_cast<std::size_t>(pass.pass().gyro.gyros)) {
+    throw InputRefused(
+        pass.path, {},
+        fmt::format("the truth has {} gyros, the telemetry {}", truth->gyros.size(), pass.pass().gyro.gyros),
+        "give the truth of this pass, or none");
+  }
+  return truth;
+}
+
 }  // namespace
 
-NamedPass read_named_pass(const std::filesystem::path& path) {
-  NamedPass named{path, name_of_pass(path), read_pass(path), read_truth(path)};
-  if (named.truth && named.truth->gyros.size() != static_cast<std::size_t>(named.pass().gyro.gyros)) {
-    throw InputRefused(
-        path, {},
-        fmt::format("the truth has {} gyros, the telemetry {}", named.truth->gyros.size(), named.pass().gyro.gyros),
-        "give the truth of this pass, or none");
+NamedPass read_named_pass(const std::filesystem::path& path, TruthUse use) {
+  NamedPass named{path, name_of_pass(path), read_pass(path), {}};
+  try {
+    named.truth = read_truth_of(named);
+  } catch (const InputRefused& refused) {
+    if (use == TruthUse::kNeeded) {
+      throw;
+    }
+    Defect defect;
+    defect.kind = Defect::Kind::kTruthRefused;
+    defect.where = fmt::format("{} ({})", printable(refused.file().filename().string()), refused.reason());
+    defect.count = 1;
+    named.loaded.defects.push_back(std::move(defect));
   }
   return named;
 }
@@ -100,7 +117,7 @@ NamedPass read_named_pass(const std::filesystem::path& path) {
 std::vector<NamedPass> read_passes(const std::vector<std::string>& paths, std::span<const std::string_view> reserved) {
   std::vector<NamedPass> passes;
   for (const std::string& path : paths) {
-    passes.push_back(read_named_pass(path));
+    passes.push_back(read_named_pass(path, TruthUse::kToCompare));
   }
   // A pass keeps its name unless one before it has it; a number leads to none that a later pass has of its own.
   std::set<std::string, std::less<>> own;

@@ -119,5 +119,18 @@ TEST_F(NamedPasses, RefuseATruthOfAnotherNumberOfGyros) {
               HasSubstr("the truth has 3 gyros, the telemetry 2"));
 }
 
+TEST_F(NamedPasses, AreReadWithoutATruthThatCannotBeWhereItIsOnlyCompared) {
+  save("pass", "00");
+  write_file(directory_ / "pass" / "truth.csv", "t_s,q_x,q_y,q_z,q_w\n0,0,0,0,1\n");
+  EXPECT_THAT(refusal([&] { static_cast<void>(read_named_pass(directory_ / "pass")); }), HasSubstr("truth.json"));
+  const NamedPass pass = read_named_pass(directory_ / "pass", TruthUse::kToCompare);
+  EXPECT_EQ(pass.truth_or_null(), nullptr);
+  ASSERT_FALSE(pass.loaded.defects.empty());
+  EXPECT_EQ(pass.loaded.defects.back().kind, Defect::Kind::kTruthRefused);
+  EXPECT_THAT(pass.loaded.defects.back().text(),
+              HasSubstr("truth.json (cannot be opened: No such file or directory): 1 truth that cannot be read, "
+                        "nothing is compared with it."));
+}
+
 }  // namespace
 }  // namespace trihedron::io

@@ -11,6 +11,7 @@
 #include <limits>
 #include <map>
 #include <numbers>
+#include <span>
 #include <utility>
 
 #include "judge/changes.hpp"
@@ -39,7 +40,8 @@ constexpr double kArcsecond = std::numbers::pi / 180 / 3600;
 /// Relative deviation of the mean NIS from its expectation above which the noise settings are wrong, whatever the
 /// number of fixes; its sigmas are then off by half of it.
 constexpr double kNisTolerance = 0.025;
-/// … and by more than this part, that the model is wrong; the error is then absorbed by the parameters.
+/// … and above which the model is wrong; the error is then absorbed by the parameters. What scatters less than expected
+/// has sigmas that are too large, and is right.
 constexpr double kNisWrong = 0.25;
 /// Two nominal alignment accuracies of the system.
 constexpr double kWeakAlignment_rad = 20 * kArcsecond;
@@ -134,6 +136,56 @@ void judge_star_tracker(const Statistics& statistics, std::vector<Finding>& find
   }
 }
 
+/// The one gyro that rejected fixes contradict; -1 where they contradict none or several.
+int contradicted_alone(std::span<const FixRecord> fixes) {
+  constexpr double kContradicted = 18.4;  // 99.99 % of two components
+  constexpr double kAlmostAll = 0.9;
+  const std::size_t gyros = fixes.front().innovation.size() / 2;
+  const auto count = static_cast<double>(fixes.size());
+  int alone = -1;
+  for (std::size_t k = 0; k < gyros; ++k) {
+    const auto beyond = static_cast<double>(std::ranges::count_if(fixes, [&](const FixRecord& fix) {
+      double square = 0;
+      for (std::size_t i = 2 * k; i < 2 * k + 2 && i < fix.innovation.size(); ++i) {
+        square += fix.innovation_sigma[i] > 0 ? std::pow(fix.innovation[i] / fix.innovation_sigma[i], 2) : 0;
+      }
+      return square > kContradicted;
+    }));
+    if (beyond > kAlmostAll * count) {
+      if (alone >= 0) {
+        return -1;
+      }
+      alone = static_cast<int>(k);
+    } else if (beyond > (1 - kAlmostAll) * count) {
+      return -1;
+    }
+  }
+  return alone;
+}
+
+/// Fixes that were rejected up to the end of the pass show what a test over the whole pass does not see, since they are
+/// in no fit. A star tracker that is off contradicts all gyros, but for a turn about the momentum of one.
+void judge_end(const Pass& pass, const CalibrationRun& run, std::vector<Finding>& findings) {
+  constexpr std::ptrdiff_t kInARow = 20;
+  const auto is_rejected = [](const FixRecord& fix) { return fix.status == FixStatus::kRejectedByGate; };
+  const auto last_other = std::ranges::find_if_not(run.fixes.rbegin(), run.fixes.rend(), is_rejected);
+  const auto first = last_other.base();
+  const bool is_known = std::ranges::any_of(
+      findings, [](const Finding& finding) { return finding.code == FindingCode::kGyroMountingMoved; });
+  if (is_known || run.fixes.end() - first < kInARow) {
+    return;
+  }
+  const int gyro = contradicted_alone({first, run.fixes.end()});
+  if (gyro >= 0) {
+    add(findings, FindingCode::kGyroMountingMoved,
+        "Up to the end of the pass all fixes contradict one gyro alone, and were rejected: its case has moved, or the "
+        "star tracker has turned about the momentum of the other.",
+        fmt::format("gyro {}, {} fixes from {:.1f} min on", gyro + 1, run.fixes.end() - first,
+                    to_seconds(first->t - pass.settings.epoch) / 60),
+        "Cut the pass there and calibrate on the parts apart; look for what happened at that time.");
+  }
+}
+
 /// The events by which gyros were left out for good, or until the end of the pass.
 std::vector<GyroEvent> losses(const CalibrationRun& run, Time end) {
   constexpr Duration kForMore = std::chrono::minutes(5);
@@ -221,7 +273,6 @@ void judge_nis(const Statistics& statistics, const std::string& what_is_wrong, s
     return;
   }
   const bool above = nis > freedom;
-  const bool wrong = nis > freedom * (1 + kNisWrong) || nis < freedom * (1 - kNisWrong);
   add(findings, FindingCode::kNisOutOfBounds,
       above ? "The fixes scatter more than the filter expects: " + what_is_wrong + ", and its sigmas are too small."
             : "The fixes scatter less than the filter expects: the noise is overstated, and its sigmas are too large.",
@@ -231,7 +282,7 @@ void judge_nis(const Statistics& statistics, const std::string& what_is_wrong, s
               "noise figures or "
               "raise the process noise."
             : "Correct the noise figures in pass.toml.");
-  if (wrong) {
+  if (nis > freedom * (1 + kNisWrong)) {
     findings.back().severity = Severity::kDoNotUse;
   }
 }
@@ -866,6 +917,7 @@ Verdict judge(const Pass& pass, const CalibrationRun& run) {
   judge_steadiness(pass, run, findings);
   judge_pair(run, findings);
   judge_star_tracker(statistics, findings);
+  judge_end(pass, run, findings);
   judge_batch(statistics, findings);
   judge_gyros(pass, run, findings);
   judge_gyro_rate(pass, run, findings);

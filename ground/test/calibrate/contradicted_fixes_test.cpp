@@ -83,5 +83,26 @@ TEST(ContradictedFixes, AreNotTheRightOnesOfAMomentumThatJumped) {
   EXPECT_THAT(run.calibration.verdict.findings, Not(Contains(Field(&Finding::code, FindingCode::kStarTrackerOff))));
 }
 
+TEST(ContradictedFixes, UpToTheEndByWhichTheStarTrackerIsRightNameTheGyroWhoseCaseMoved) {
+  Pass pass = two_hours().pass;
+  const Eigen::Quaterniond by(Eigen::AngleAxisd(600 * kArcsecond, Eigen::Vector3d(1, -2, 2).normalized()));
+  for (std::size_t i = 0; i < pass.gyro.size(); ++i) {
+    if (pass.gyro.t[i] - pass.settings.epoch >= std::chrono::minutes(112)) {
+      Eigen::Map<Eigen::Vector3d> h_b(&pass.gyro.h[3 * (2 * i + 1)]);
+      h_b = (by * h_b).eval();
+    }
+  }
+  for (const Estimator estimator : {Estimator::kInvariant, Estimator::kBatch}) {
+    CalibrationOptions options = told();
+    options.estimator = estimator;
+    const Verdict verdict = calibrate(pass, options).calibration.verdict;
+    EXPECT_FALSE(verdict.trustworthy);
+    const auto moved = std::ranges::find(verdict.findings, FindingCode::kGyroMountingMoved, &Finding::code);
+    ASSERT_NE(moved, verdict.findings.end());
+    EXPECT_THAT(moved->evidence, testing::StartsWith("gyro 2, "));
+    EXPECT_THAT(moved->evidence, testing::EndsWith(" fixes from 112.0 min on"));
+  }
+}
+
 }  // namespace
 }  // namespace trihedron::ground

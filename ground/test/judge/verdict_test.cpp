@@ -354,7 +354,7 @@ TEST(Verdict, FindsThatTheFilterWasReopened) {
 TEST(Verdict, FindsNisOutOfBoundsOnBothSides) {
   auto run = good_run();
   for (const auto& [nis, trustworthy] :
-       {std::pair(4.4, true), std::pair(5.1, false), std::pair(3.5, true), std::pair(2.9, false)}) {
+       {std::pair(4.4, true), std::pair(5.1, false), std::pair(3.5, true), std::pair(2.0, true)}) {
     run.calibration.statistics.nis_mean = nis;
     const Verdict verdict = judge(good_pass(), run);
     EXPECT_THAT(codes(verdict), ElementsAre("nis-out-of-bounds")) << nis;
@@ -523,6 +523,28 @@ TEST(Verdict, FindsStampsOfGyrosThatScatter) {
   EXPECT_THAT(codes(verdict), ElementsAre("gyro-stamps-scatter"));
   EXPECT_EQ(verdict.findings[0].evidence, "17.0 ms (root mean square)");
   EXPECT_TRUE(verdict.trustworthy);
+}
+
+TEST(Verdict, NamesTheOneGyroThatTheLastFixesContradict) {
+  // So many of the last fixes, and by how many sigmas they contradict each of three gyros.
+  const auto with_end = [](std::size_t count, std::array<double, 3> sigmas) {
+    auto run = good_run();
+    for (std::size_t i = run.fixes.size() - count; i < run.fixes.size(); ++i) {
+      run.fixes[i].status = FixStatus::kRejectedByGate;
+      run.fixes[i].innovation_sigma.assign(6, 1e-5);
+      for (const double off : sigmas) {
+        run.fixes[i].innovation.insert(run.fixes[i].innovation.end(), {0, off * 1e-5});
+      }
+    }
+    return judge(good_pass(), run);
+  };
+  const Verdict verdict = with_end(20, {0, 5, 1});
+  EXPECT_THAT(codes(verdict), ElementsAre("gyro-mounting-moved"));
+  EXPECT_EQ(verdict.findings[0].evidence, "gyro 2, 20 fixes from 179.1 min on");
+  EXPECT_FALSE(verdict.trustworthy);
+  EXPECT_THAT(codes(with_end(19, {0, 5, 1})), IsEmpty());  // too few
+  EXPECT_THAT(codes(with_end(20, {5, 5, 5})), IsEmpty());  // the star tracker
+  EXPECT_THAT(codes(with_end(20, {0, 4, 1})), IsEmpty());  // no more than chance and the gate allow
 }
 
 TEST(Verdict, FindsAStarTrackerThatWasOff) {

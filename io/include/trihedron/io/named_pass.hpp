@@ -27,11 +27,17 @@ struct NamedPass {
   [[nodiscard]] const Truth* truth_or_null() const { return truth ? &*truth : nullptr; }
 };
 
-/// Throws as read_pass and read_truth, and InputRefused for a truth of another number of gyros.
-[[nodiscard]] NamedPass read_named_pass(const std::filesystem::path& path);
+/// What becomes of a truth that is there and cannot be read, or is of another number of gyros.
+enum class TruthUse {
+  kNeeded,     ///< InputRefused
+  kToCompare,  ///< a defect of the pass, which then has no truth
+};
 
-/// In the order of their epochs, with names that differ from each other and from the `reserved`. Throws as
-/// read_named_pass.
+/// Throws as read_pass and, where the truth is needed, as read_truth.
+[[nodiscard]] NamedPass read_named_pass(const std::filesystem::path& path, TruthUse use = TruthUse::kNeeded);
+
+/// In the order of their epochs, with names that differ from each other and from the `reserved`, their truth to
+/// compare. Throws as read_pass.
 [[nodiscard]] std::vector<NamedPass> read_passes(const std::vector<std::string>& paths,
                                                  std::span<const std::string_view> reserved = {});
 

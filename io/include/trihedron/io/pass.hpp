@@ -50,6 +50,7 @@ struct Defect {
     kPacketDamaged,   ///< left out: a space packet whose CRC is wrong
     kPacketsMissing,  ///< space packets that are missing by their sequence count; places are of those that follow
     kOtherPackets,    ///< left out: space packets of another APID, or other reports
+    kTruthRefused,    ///< left out: a truth that cannot be read; `where` says why
     kGap,             ///< more than 1.5 periods without a row, at the ends of the pass too; counts the gaps
   };
   static constexpr std::size_t kPlaces = 5;
