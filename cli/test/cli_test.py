@@ -723,10 +723,10 @@ def test_a_truth_of_which_a_part_is_missing_keeps_no_pass_from_being_calibrated(
     (directory / name).write_text("t_s,q_x,q_y,q_z,q_w\n0,0,0,0,1\n" if name == "truth.csv" else '{"gyros": []}')
     said = run("calibrate", directory, "-o", tmp_path / "out", "--estimator", "paper")
     assert said.returncode == without.returncode
-    assert "truth that cannot be read, nothing is compared with it" in said.stdout
+    assert "truth that is not whole, nothing is compared with it" in said.stdout
     assert (tmp_path / "out/calibration.json").read_text() == (tmp_path / "without/calibration.json").read_text()
     flown = run("navigate", directory, "--prior", "-o", tmp_path / "attitude.csv")
-    assert "truth that cannot be read" in flown.stdout
+    assert "truth that is not whole" in flown.stdout
 
 
 def test_a_read_only_directory_is_a_machine_failure():

@@ -60,8 +60,8 @@ Words words(Defect::Kind kind) {
               "not filled"};
     case kOtherPackets:
       return {"other-packets", "packet of something else", "packets of something else", "skipped"};
-    case kTruthRefused:
-      return {"truth-refused", "truth that cannot be read", "truths that cannot be read",
+    case kTruthIncomplete:
+      return {"truth-incomplete", "truth that is not whole", "truths that are not whole",
               "nothing is compared with it"};
     case kGap:
       return {"gap", "gap", "gaps", "not filled"};

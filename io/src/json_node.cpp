@@ -25,7 +25,7 @@ Json parse_json(std::string_view text, const std::filesystem::path& file) {
 JsonNode JsonNode::at(const std::string& key) const {
   const std::optional<JsonNode> member = find(key);
   if (!member) {
-    refuse(fmt::format("lacks key \"{}\"", key), "add it");
+    throw InputIncomplete(file_, {}, at_path(fmt::format("lacks key \"{}\"", key)), "add it");
   }
   return *member;
 }
@@ -119,7 +119,11 @@ Eigen::Vector3d JsonNode::vector3(const Range& range) const {
 }
 
 void JsonNode::refuse(const std::string& reason, std::string cure) const {
-  throw InputRefused(file_, {}, path_.empty() ? reason : fmt::format("{} {}", path_, reason), std::move(cure));
+  throw InputRefused(file_, {}, at_path(reason), std::move(cure));
+}
+
+std::string JsonNode::at_path(const std::string& reason) const {
+  return path_.empty() ? reason : fmt::format("{} {}", path_, reason);
 }
 
 std::string dump(const Json& value) { return value.dump(-1, ' ', false, Json::error_handler_t::replace); }

@@ -47,6 +47,9 @@ class JsonNode {
   [[noreturn]] void refuse(const std::string& reason, std::string cure) const;
 
  private:
+  /// The reason, after the path of this node.
+  [[nodiscard]] std::string at_path(const std::string& reason) const;
+
   const Json* value_;
   std::filesystem::path file_;
   std::string path_;

@@ -101,12 +101,12 @@ NamedPass read_named_pass(const std::filesystem::path& path, TruthUse use) {
   NamedPass named{path, name_of_pass(path), read_pass(path), {}};
   try {
     named.truth = read_truth_of(named);
-  } catch (const InputRefused& refused) {
+  } catch (const InputIncomplete& refused) {
     if (use == TruthUse::kNeeded) {
       throw;
     }
     Defect defect;
-    defect.kind = Defect::Kind::kTruthRefused;
+    defect.kind = Defect::Kind::kTruthIncomplete;
     defect.where = fmt::format("{} ({})", printable(refused.file().filename().string()), refused.reason());
     defect.count = 1;
     named.loaded.defects.push_back(std::move(defect));

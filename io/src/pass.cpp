@@ -264,8 +264,15 @@ std::optional<Truth> read_truth_netcdf(const fs::path& file) {
 std::optional<Truth> read_truth_directory(const fs::path& directory) {
   const fs::path table = directory / kTruthFile;
   const fs::path parameters_file = directory / kTruthParametersFile;
-  if (!fs::exists(table) && !fs::exists(parameters_file)) {
+  const bool has_table = fs::exists(table);
+  const bool has_parameters = fs::exists(parameters_file);
+  if (!has_table && !has_parameters) {
     return std::nullopt;
+  }
+  if (!has_table || !has_parameters) {
+    throw InputIncomplete(has_table ? parameters_file : table, {},
+                          fmt::format("is missing beside {}", has_table ? kTruthFile : kTruthParametersFile),
+                          "give both, or none");
   }
   const TextFile parameters(parameters_file);
   const Series series = read_csv(table, truth_columns);

@@ -126,9 +126,9 @@ ColumnPlan plan_columns(const fs::path& file, std::span<const ColumnName> presen
   }
   for (const std::string_view name : known) {
     if (!is_present(std::string(name))) {
-      throw InputRefused(file, present.empty() ? Position{} : Position{present.front().position.line, 0},
-                         fmt::format("lacks column {}", in_quotes(name)),
-                         fmt::format("its columns must be {}", fmt::join(known, ",")));
+      throw InputIncomplete(file, present.empty() ? Position{} : Position{present.front().position.line, 0},
+                            fmt::format("lacks column {}", in_quotes(name)),
+                            fmt::format("its columns must be {}", fmt::join(known, ",")));
     }
   }
   return plan;

@@ -119,17 +119,31 @@ TEST_F(NamedPasses, RefuseATruthOfAnotherNumberOfGyros) {
               HasSubstr("the truth has 3 gyros, the telemetry 2"));
 }
 
-TEST_F(NamedPasses, AreReadWithoutATruthThatCannotBeWhereItIsOnlyCompared) {
+TEST_F(NamedPasses, AreReadWithoutATruthOfWhichAPartIsMissingWhereItIsOnlyCompared) {
   save("pass", "00");
+  const auto expect_told = [&](const char* what) {
+    EXPECT_THAT(refusal([&] { static_cast<void>(read_named_pass(directory_ / "pass")); }), HasSubstr("; "));
+    const NamedPass pass = read_named_pass(directory_ / "pass", TruthUse::kToCompare);
+    EXPECT_EQ(pass.truth_or_null(), nullptr);
+    ASSERT_FALSE(pass.loaded.defects.empty());
+    EXPECT_EQ(pass.loaded.defects.back().kind, Defect::Kind::kTruthIncomplete);
+    EXPECT_EQ(pass.loaded.defects.back().text(),
+              std::string(what) + ": 1 truth that is not whole, nothing is compared with it.");
+  };
   write_file(directory_ / "pass" / "truth.csv", "t_s,q_x,q_y,q_z,q_w\n0,0,0,0,1\n");
-  EXPECT_THAT(refusal([&] { static_cast<void>(read_named_pass(directory_ / "pass")); }), HasSubstr("truth.json"));
-  const NamedPass pass = read_named_pass(directory_ / "pass", TruthUse::kToCompare);
-  EXPECT_EQ(pass.truth_or_null(), nullptr);
-  ASSERT_FALSE(pass.loaded.defects.empty());
-  EXPECT_EQ(pass.loaded.defects.back().kind, Defect::Kind::kTruthRefused);
-  EXPECT_THAT(pass.loaded.defects.back().text(),
-              HasSubstr("truth.json (cannot be opened: No such file or directory): 1 truth that cannot be read, "
-                        "nothing is compared with it."));
+  expect_told("truth.json (is missing beside truth.csv)");
+  write_file(directory_ / "pass" / "truth.json", "{}");
+  expect_told("truth.csv (lacks column \"h1_x\")");
+  write_file(directory_ / "pass" / "truth.csv",
+             "t_s,q_x,q_y,q_z,q_w,h1_x,h1_y,h1_z,h2_x,h2_y,h2_z\n0,0,0,0,1,1,0,0,0,1,0\n");
+  expect_told("truth.json (lacks key \"gyros\")");
+  std::filesystem::remove(directory_ / "pass" / "truth.csv");
+  expect_told("truth.csv (is missing beside truth.json)");
+  // What is broken is refused.
+  write_file(directory_ / "pass" / "truth.csv",
+             "t_s,q_x,q_y,q_z,q_w,h1_x,h1_y,h1_z,h2_x,h2_y,h2_z\n0,x,0,0,1,1,0,0,0,1,0\n");
+  write_file(directory_ / "pass" / "truth.json", "{");
+  EXPECT_THROW(static_cast<void>(read_named_pass(directory_ / "pass", TruthUse::kToCompare)), InputRefused);
 }
 
 }  // namespace

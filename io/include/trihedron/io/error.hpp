@@ -31,6 +31,12 @@ class InputRefused : public std::runtime_error {
   std::string cure_;
 };
 
+/// A file that lacks what it has to have: a column, a key, another file beside it.
+class InputIncomplete : public InputRefused {
+ public:
+  using InputRefused::InputRefused;
+};
+
 /// The disk or the system failed while a file was read or written. what() is `file: reason; cure`.
 class MachineFailed : public std::runtime_error {
  public:

@@ -27,7 +27,8 @@ struct NamedPass {
   [[nodiscard]] const Truth* truth_or_null() const { return truth ? &*truth : nullptr; }
 };
 
-/// What becomes of a truth that is there and cannot be read, or is of another number of gyros.
+/// What becomes of a truth of which a part is missing: a file, a column, a key. One that is broken, or of another
+/// number of gyros, is refused in any case.
 enum class TruthUse {
   kNeeded,     ///< InputRefused
   kToCompare,  ///< a defect of the pass, which then has no truth

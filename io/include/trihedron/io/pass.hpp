@@ -47,11 +47,11 @@ struct Defect {
     kFlagged,          ///< a quality flag says that it is bad: a fix is left out, a gyro's reading taken as missing
     kLargeSigma,       ///< left out: a fix whose own 1-sigma is too large, or none
     kNoCovariance,  ///< kept: a fix of a table with covariances that has none which can be used; noise_rad is its noise
-    kPacketDamaged,   ///< left out: a space packet whose CRC is wrong
-    kPacketsMissing,  ///< space packets that are missing by their sequence count; places are of those that follow
-    kOtherPackets,    ///< left out: space packets of another APID, or other reports
-    kTruthRefused,    ///< left out: a truth that cannot be read; `where` says why
-    kGap,             ///< more than 1.5 periods without a row, at the ends of the pass too; counts the gaps
+    kPacketDamaged,    ///< left out: a space packet whose CRC is wrong
+    kPacketsMissing,   ///< space packets that are missing by their sequence count; places are of those that follow
+    kOtherPackets,     ///< left out: space packets of another APID, or other reports
+    kTruthIncomplete,  ///< left out: a truth of which a part is missing; `where` says which
+    kGap,              ///< more than 1.5 periods without a row, at the ends of the pass too; counts the gaps
   };
   static constexpr std::size_t kPlaces = 5;
 
