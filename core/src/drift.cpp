@@ -50,6 +50,9 @@ void for_each_degree(DriftModelId id, const Work& work) {
 
 using Harmonics = HarmonicTableOf<DriftModelId::kMaxDegree>::At<double>;
 using ByOrder = Harmonics::ByOrder;
+/// Of W(4, 0) and W(4, 4) among all orders of their degree.
+constexpr std::size_t kPlaceOf40 = 4;
+constexpr std::size_t kPlaceOf44 = 8;
 
 /// Puts the numbers of all orders of a degree, from −degree on, into the columns of its members, from `to` on.
 void put_members(Member potential, int degree, const ByOrder& numbers, double* to) {
@@ -57,10 +60,12 @@ void put_members(Member potential, int degree, const ByOrder& numbers, double* t
     std::copy_n(numbers.data(), 2 * degree + 1, to);
     return;
   }
+  std::size_t place = 0;
   for (int order = -degree; order <= degree; ++order) {
     if (!is_in_eq1(potential, degree, order)) {
-      *to++ = numbers[static_cast<std::size_t>(degree + order)];
+      *to++ = numbers[place];
     }
+    ++place;
   }
 }
 
@@ -70,13 +75,15 @@ const double* by_order(Member potential, int degree, const double* from, ByOrder
   if (degree > kMaxDegreeOfEq1) {
     return from;
   }
+  std::size_t place = 0;
   for (int order = -degree; order <= degree; ++order) {
-    room[static_cast<std::size_t>(degree + order)] = is_in_eq1(potential, degree, order) ? 0.0 : *from++;
+    room[place] = is_in_eq1(potential, degree, order) ? 0.0 : *from++;
+    ++place;
   }
   if (potential == Member::kW && degree == BesideK0::kDegree) {
-    const double its = room[2 * BesideK0::kDegree];
-    room[BesideK0::kDegree] = BesideK0::kOf40 * its;
-    room[2 * BesideK0::kDegree] = BesideK0::kOf44 * its;
+    const double its = room[kPlaceOf44];
+    room[kPlaceOf40] = BesideK0::kOf40 * its;
+    room[kPlaceOf44] = BesideK0::kOf44 * its;
   }
   return room.data();
 }
@@ -129,8 +136,8 @@ void DriftModel::put_beside_eq1(const Eigen::Vector3d& h, ColumnsView B) const {
     for (int i = 0; i < 3; ++i) {
       ByOrder& its_w = of_w[static_cast<std::size_t>(i)];
       if (degree == BesideK0::kDegree) {
-        double& of_44 = its_w[2 * BesideK0::kDegree];
-        of_44 = BesideK0::kOf44 * of_44 + BesideK0::kOf40 * its_w[BesideK0::kDegree];
+        double& of_44 = its_w[kPlaceOf44];
+        of_44 = BesideK0::kOf44 * of_44 + BesideK0::kOf40 * its_w[kPlaceOf40];
       }
       put_members(Member::kW, degree, its_w, B.row(i) + w);
       put_members(Member::kD, degree, of_d[static_cast<std::size_t>(i)], B.row(i) + d);

@@ -114,8 +114,8 @@ class HarmonicTableOf {
       std::array<ByOrder, 3> its;
       for (int m = 0; m <= degree; ++m) {
         const auto [cosine, sine] = polynomial_gradients(degree, m);
-        const auto last = static_cast<std::size_t>(degree + m);
-        const auto first = static_cast<std::size_t>(degree - m);
+        const std::size_t last = static_cast<std::size_t>(degree) + static_cast<std::size_t>(m);
+        const std::size_t first = static_cast<std::size_t>(degree) - static_cast<std::size_t>(m);
         for (std::size_t i = 0; i < 3; ++i) {
           its[i][first] = sine(static_cast<Eigen::Index>(i));
           its[i][last] = cosine(static_cast<Eigen::Index>(i));  // after the sine: order 0 has a cosine alone
@@ -133,8 +133,8 @@ class HarmonicTableOf {
       Degree its;
       its.degree = degree;
       for (int m = 0; m <= degree; ++m) {
-        const auto last = static_cast<std::size_t>(degree + m);
-        const auto first = static_cast<std::size_t>(degree - m);
+        const std::size_t last = static_cast<std::size_t>(degree) + static_cast<std::size_t>(m);
+        const std::size_t first = static_cast<std::size_t>(degree) - static_cast<std::size_t>(m);
         its.q[first] = its.q[last] = q_[index(degree, m)];
         its.slope[first] = its.slope[last] = slope(degree, m);
       }
