@@ -53,11 +53,11 @@ TEST_F(TruthFiles, AbsenceIsNoError) {
 TEST_F(TruthFiles, HalfATruthIsRefused) {
   std::filesystem::remove(directory_ / "truth.csv");
   EXPECT_THAT(refusal([&] { static_cast<void>(read_truth(directory_.path())); }),
-              HasSubstr("truth.csv: cannot be opened"));
+              HasSubstr("truth.csv: is missing beside truth.json; give both, or none"));
   write_text(directory_ / "truth.csv", kTable);
   std::filesystem::remove(directory_ / "truth.json");
   EXPECT_THAT(refusal([&] { static_cast<void>(read_truth(directory_.path())); }),
-              HasSubstr("truth.json: cannot be opened"));
+              HasSubstr("truth.json: is missing beside truth.csv; give both, or none"));
 }
 
 TEST_F(TruthFiles, BrokenParametersAreRefused) {
