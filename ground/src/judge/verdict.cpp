@@ -11,6 +11,7 @@
 #include <limits>
 #include <map>
 #include <numbers>
+#include <optional>
 #include <span>
 #include <utility>
 
@@ -136,13 +137,13 @@ void judge_star_tracker(const Statistics& statistics, std::vector<Finding>& find
   }
 }
 
-/// The one gyro that rejected fixes contradict; -1 where they contradict none or several.
-int contradicted_alone(std::span<const FixRecord> fixes) {
+/// The one gyro that rejected fixes contradict; none where they contradict several, or not that clearly.
+std::optional<std::size_t> contradicted_alone(std::span<const FixRecord> fixes) {
   constexpr double kContradicted = 18.4;  // 99.99 % of two components
   constexpr double kAlmostAll = 0.9;
   const std::size_t gyros = fixes.front().innovation.size() / 2;
   const auto count = static_cast<double>(fixes.size());
-  int alone = -1;
+  std::optional<std::size_t> alone;
   for (std::size_t k = 0; k < gyros; ++k) {
     const auto beyond = static_cast<double>(std::ranges::count_if(fixes, [&](const FixRecord& fix) {
       double square = 0;
@@ -152,12 +153,12 @@ int contradicted_alone(std::span<const FixRecord> fixes) {
       return square > kContradicted;
     }));
     if (beyond > kAlmostAll * count) {
-      if (alone >= 0) {
-        return -1;
+      if (alone) {
+        return std::nullopt;
       }
-      alone = static_cast<int>(k);
+      alone = k;
     } else if (beyond > (1 - kAlmostAll) * count) {
-      return -1;
+      return std::nullopt;
     }
   }
   return alone;
@@ -175,12 +176,11 @@ void judge_end(const Pass& pass, const CalibrationRun& run, std::vector<Finding>
   if (is_known || run.fixes.end() - first < kInARow) {
     return;
   }
-  const int gyro = contradicted_alone({first, run.fixes.end()});
-  if (gyro >= 0) {
+  if (const std::optional<std::size_t> gyro = contradicted_alone({first, run.fixes.end()})) {
     add(findings, FindingCode::kGyroMountingMoved,
         "Up to the end of the pass all fixes contradict one gyro alone, and were rejected: its case has moved, or the "
         "star tracker has turned about the momentum of the other.",
-        fmt::format("gyro {}, {} fixes from {:.1f} min on", gyro + 1, run.fixes.end() - first,
+        fmt::format("gyro {}, {} fixes from {:.1f} min on", *gyro + 1, run.fixes.end() - first,
                     to_seconds(first->t - pass.settings.epoch) / 60),
         "Cut the pass there and calibrate on the parts apart; look for what happened at that time.");
   }
