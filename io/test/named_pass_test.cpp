@@ -121,14 +121,14 @@ TEST_F(NamedPasses, RefuseATruthOfAnotherNumberOfGyros) {
 
 TEST_F(NamedPasses, AreReadWithoutATruthOfWhichAPartIsMissingWhereItIsOnlyCompared) {
   save("pass", "00");
-  const auto expect_told = [&](const char* what) {
-    EXPECT_THAT(refusal([&] { static_cast<void>(read_named_pass(directory_ / "pass")); }), HasSubstr("; "));
+  const auto expect_told = [&](const std::string& what) {
+    EXPECT_THAT(refusal([&] { static_cast<void>(read_named_pass(directory_ / "pass")); }),
+                HasSubstr(what.substr(0, what.find(' '))));
     const NamedPass pass = read_named_pass(directory_ / "pass", TruthUse::kToCompare);
     EXPECT_EQ(pass.truth_or_null(), nullptr);
     ASSERT_FALSE(pass.loaded.defects.empty());
     EXPECT_EQ(pass.loaded.defects.back().kind, Defect::Kind::kTruthIncomplete);
-    EXPECT_EQ(pass.loaded.defects.back().text(),
-              std::string(what) + ": 1 truth that is not whole, nothing is compared with it.");
+    EXPECT_EQ(pass.loaded.defects.back().text(), what + ": 1 truth that is not whole, nothing is compared with it.");
   };
   write_file(directory_ / "pass" / "truth.csv", "t_s,q_x,q_y,q_z,q_w\n0,0,0,0,1\n");
   expect_told("truth.json (is missing beside truth.csv)");

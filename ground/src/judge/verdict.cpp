@@ -41,8 +41,8 @@ constexpr double kArcsecond = std::numbers::pi / 180 / 3600;
 /// Relative deviation of the mean NIS from its expectation above which the noise settings are wrong, whatever the
 /// number of fixes; its sigmas are then off by half of it.
 constexpr double kNisTolerance = 0.025;
-/// … and above which the model is wrong; the error is then absorbed by the parameters. What scatters less than expected
-/// has sigmas that are too large, and is right.
+/// … and above which the model is wrong; the error is then absorbed by the parameters. Where fixes scatter less than
+/// expected, sigmas are too large, which alone makes no result wrong.
 constexpr double kNisWrong = 0.25;
 /// Two nominal alignment accuracies of the system.
 constexpr double kWeakAlignment_rad = 20 * kArcsecond;
