@@ -35,14 +35,13 @@ void add_inspect(CLI::App& program, const Common& common, int& exit_status) {
         [&] {
           nlohmann::ordered_json json = pass_json(loaded);
           json["periods"] = periods_json(periods);
-          json["clocks"] = clocks_json(clocks, loaded.pass.gyro.gyros);
+          json["clocks"] = clocks_json(clocks, loaded.pass);
           json["consistency"] = consistency_json(consistency, loaded);
           return json;
         },
         [&] {
           return pass_text(loaded) + (loaded.defects.empty() ? "            no defects\n" : "") +
-                 periods_text(periods) + clocks_text(clocks, loaded.pass.gyro.gyros) +
-                 consistency_text(consistency, loaded);
+                 periods_text(periods) + clocks_text(clocks, loaded.pass) + consistency_text(consistency, loaded);
         });
     exit_status = kTrustworthy;
   });

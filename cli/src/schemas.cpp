@@ -56,8 +56,14 @@ const Json& number() {
   return schema;
 }
 
-/// Of inspect; null where the pass does not show them.
+/// Of inspect; null where the pass does not show them. The step: of gyro 0 that of the star tracker.
 Json clocks() {
+  Json step = object({{"gyro", count()},
+                      {"from_s", number()},
+                      {"until_s", number()},
+                      {"change_s", number()},
+                      {"change_sigma_s", number()}});
+  step["type"] = Json::array({"object", "null"});
   Json schema = object({{"mid_offset_s", number()},
                         {"mid_offset_sigma_s", number()},
                         {"offset_s", number()},
@@ -66,7 +72,8 @@ Json clocks() {
                         {"rate_sigma_s_s", number()},
                         {"reference_gyro", count()},
                         {"gyros_late_s", array(number())},
-                        {"gyros_late_sigma_s", array(number())}});
+                        {"gyros_late_sigma_s", array(number())},
+                        {"step", step}});
   schema["type"] = Json::array({"object", "null"});
   return schema;
 }

@@ -88,7 +88,9 @@ std::string pass_text(const io::LoadedPass& loaded) {
   return text;
 }
 
-std::string clocks_text(const std::optional<Clocks>& clocks, int gyros) {
+std::string clocks_text(const std::optional<Clocks>& clocks, const Pass& pass) {
+  const int gyros = pass.gyro.gyros;
+  const Time epoch = pass.settings.epoch;
   if (!clocks) {
     return "Clocks      not shown by this pass: the body turns too evenly, or the pass is too short\n";
   }
@@ -103,6 +105,14 @@ std::string clocks_text(const std::optional<Clocks>& clocks, int gyros) {
       text += fmt::format("            gyro {} is stamped {:+.2f} ± {:.2f} ms late against gyro {}\n", k + 1,
                           1e3 * clocks->late_s[k].value, 1e3 * clocks->late_s[k].sigma, clocks->reference + 1);
     }
+  }
+  if (clocks->step) {
+    const ClockStep& step = *clocks->step;
+    text += fmt::format(
+        "            between t = {:.0f} s and {:.0f} s {} {:+.2f} ± {:.2f} ms later than over the rest\n",
+        to_seconds(step.from - epoch), to_seconds(step.until - epoch),
+        step.gyro < 0 ? std::string("fixes hold the attitude") : fmt::format("gyro {} is stamped", step.gyro + 1),
+        1e3 * step.change_s.value, 1e3 * step.change_s.sigma);
   }
   return text;
 }
@@ -424,7 +434,8 @@ nlohmann::ordered_json pass_json(const io::LoadedPass& loaded) {
   return json;
 }
 
-nlohmann::ordered_json clocks_json(const std::optional<Clocks>& clocks, int gyros) {
+nlohmann::ordered_json clocks_json(const std::optional<Clocks>& clocks, const Pass& pass) {
+  const int gyros = pass.gyro.gyros;
   if (!clocks) {
     return nullptr;
   }
@@ -434,11 +445,21 @@ nlohmann::ordered_json clocks_json(const std::optional<Clocks>& clocks, int gyro
     late_s.push_back(clocks->late_s[k].value);
     late_sigma_s.push_back(clocks->late_s[k].sigma);
   }
-  return {{"mid_offset_s", clocks->mid_offset_s.value}, {"mid_offset_sigma_s", clocks->mid_offset_s.sigma},
-          {"offset_s", clocks->offset_s.value},         {"offset_sigma_s", clocks->offset_s.sigma},
-          {"rate_s_s", clocks->rate_s_s.value},         {"rate_sigma_s_s", clocks->rate_s_s.sigma},
-          {"reference_gyro", clocks->reference + 1},    {"gyros_late_s", late_s},
-          {"gyros_late_sigma_s", late_sigma_s}};
+  nlohmann::ordered_json json = {
+      {"mid_offset_s", clocks->mid_offset_s.value}, {"mid_offset_sigma_s", clocks->mid_offset_s.sigma},
+      {"offset_s", clocks->offset_s.value},         {"offset_sigma_s", clocks->offset_s.sigma},
+      {"rate_s_s", clocks->rate_s_s.value},         {"rate_sigma_s_s", clocks->rate_s_s.sigma},
+      {"reference_gyro", clocks->reference + 1},    {"gyros_late_s", late_s},
+      {"gyros_late_sigma_s", late_sigma_s},         {"step", nullptr}};
+  if (clocks->step) {
+    const ClockStep& step = *clocks->step;
+    json["step"] = {{"gyro", step.gyro + 1},
+                    {"from_s", to_seconds(step.from - pass.settings.epoch)},
+                    {"until_s", to_seconds(step.until - pass.settings.epoch)},
+                    {"change_s", step.change_s.value},
+                    {"change_sigma_s", step.change_s.sigma}};
+  }
+  return json;
 }
 
 nlohmann::ordered_json findings_json(const std::vector<Finding>& findings) {

@@ -23,7 +23,7 @@ namespace trihedron::cli {
 
 [[nodiscard]] std::string pass_text(const io::LoadedPass& loaded);
 /// How far the clocks of a pass with so many gyros are apart.
-[[nodiscard]] std::string clocks_text(const std::optional<Clocks>& clocks, int gyros);
+[[nodiscard]] std::string clocks_text(const std::optional<Clocks>& clocks, const Pass& pass);
 [[nodiscard]] std::string finding_text(const Finding& finding);
 [[nodiscard]] std::string verdict_text(const Verdict& verdict);
 [[nodiscard]] std::string findings_text(const Verdict& verdict);
@@ -46,7 +46,7 @@ namespace trihedron::cli {
 [[nodiscard]] nlohmann::ordered_json statistics_json(const Statistics& statistics);
 [[nodiscard]] nlohmann::ordered_json pass_json(const io::LoadedPass& loaded);
 /// null where the pass does not show its clocks.
-[[nodiscard]] nlohmann::ordered_json clocks_json(const std::optional<Clocks>& clocks, int gyros);
+[[nodiscard]] nlohmann::ordered_json clocks_json(const std::optional<Clocks>& clocks, const Pass& pass);
 [[nodiscard]] nlohmann::ordered_json findings_json(const std::vector<Finding>& findings);
 /// Whether a need is met, how long the usual limit is kept, s.
 [[nodiscard]] nlohmann::ordered_json readiness_json(const OpenLoopForecast& forecast);

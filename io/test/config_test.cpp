@@ -67,7 +67,7 @@ TEST(Config, RefusesNamesThatThereAreNot) {
 
 TEST(Config, RefusesNumbersOutsideTheirRanges) {
   EXPECT_THAT(refused_config("[filter]\ndirection_random_walk = \"1rad/s^0.5\"\n"),
-              HasSubstr("outside 0 and 1e-15 to 0.001 rad/s^0.5: give 0 where there is none"));
+              HasSubstr("outside 0 and 1e-15 to 0.1 rad/s^0.5: give 0 where there is none"));
   EXPECT_THAT(refused_config("[filter]\ngate_nis = 0\n"), HasSubstr("\"gate_nis\" is 0, outside 0.1 to 1e+12"));
   EXPECT_THAT(refused_config("[filter]\nstudent_t_freedom = 0.5\n"), HasSubstr("0 for the gate alone"));
   EXPECT_THAT(refused_config("[filter]\nreopen_after_rejections = 0\n"), HasSubstr("it is a number of fixes"));

@@ -1,14 +1,18 @@
 #include "trihedron/records/clocks.hpp"
 
 #include <algorithm>
+#include <cstddef>
 #include <limits>
+#include <utility>
 #include <vector>
 
 namespace trihedron {
 namespace {
 
-/// The readings of one gyro at the stamps of all, from those that it gave `late_s` later.
-void interpolate(GyroTelemetry& telemetry, int gyro, double late_s, Duration period) {
+/// The readings of one gyro at the stamps of all from `from` on and before `until`, from those that it gave `late_s`
+/// later.
+void interpolate(GyroTelemetry& telemetry, int gyro, double late_s, Duration period, Time from = Time::min(),
+                 Time until = Time::max()) {
   const Duration farthest = 3 * period / 2;
   const std::vector<double> given = telemetry.h;
   const auto place = [&](std::size_t sample) {
@@ -16,6 +20,9 @@ void interpolate(GyroTelemetry& telemetry, int gyro, double late_s, Duration per
   };
   std::size_t after = 0;
   for (std::size_t i = 0; i < telemetry.size(); ++i) {
+    if (telemetry.t[i] < from || telemetry.t[i] >= until) {
+      continue;
+    }
     const Time t = telemetry.t[i] + from_seconds(late_s);
     while (after < telemetry.size() && telemetry.t[after] < t) {
       ++after;
@@ -53,6 +60,30 @@ void correct(Pass& pass, const ClockCorrection& correction) {
       interpolate(pass.gyro, k, correction.late_s[k], pass.settings.gyro_period);
     }
   }
+}
+
+void correct(Pass& pass, const ClockStep& step) {
+  if (step.gyro >= 0) {
+    interpolate(pass.gyro, step.gyro, step.change_s.value, pass.settings.gyro_period, step.from, step.until);
+    return;
+  }
+  const auto mend = [&](StarTrackerTelemetry& fixes) {
+    StarTrackerTelemetry mended;
+    for (std::size_t i = 0; i < fixes.size(); ++i) {
+      const bool is_off = fixes.t[i] >= step.from && fixes.t[i] < step.until;
+      const Time t = fixes.t[i] + (is_off ? from_seconds(step.change_s.value) : Duration{});
+      if (mended.t.empty() || t > mended.t.back()) {
+        mended.t.push_back(t);
+        mended.q_in_c.push_back(fixes.q_in_c[i]);
+        if (!fixes.covariances.empty()) {
+          mended.covariances.push_back(fixes.covariances[i]);
+        }
+      }
+    }
+    fixes = std::move(mended);
+  };
+  mend(pass.star_tracker);
+  std::ranges::for_each(pass.further_star_trackers, mend);
 }
 
 }  // namespace trihedron

@@ -365,5 +365,6 @@ WORLDS = [
     World("gyro-late-125ms", "faults", constant(SLEWS), late(0.125)),
     World("stamps-3s-late", "faults", constant(SLEWS), stamps_of_fixes(lambda t: t + 3)),
     World("clock-100ppm", "faults", constant(SLEWS), stamps_of_fixes(lambda t: t * (1 + 1e-4))),
+    World("clock-steps-50ms", "faults", constant(SLEWS), stamps_of_fixes(lambda t: t + 0.05 if 3 * 3600 <= t < 5 * 3600 else t), faults=("clock-stepped",)),
     World("clock-1ppm", "faults", constant(SLEWS), stamps_of_fixes(lambda t: t * (1 + 1e-6))),
 ]

@@ -16,6 +16,7 @@
 namespace trihedron::ground {
 namespace {
 
+using Eigen::Index;
 using Eigen::Matrix3d;
 using Eigen::MatrixXd;
 using Eigen::Vector3d;

@@ -193,6 +193,13 @@ ClockCorrection wanted_correction(const Clocks& clocks, const PassSettings& sett
   return correction;
 }
 
+/// A step that is taken off the stamps. Of several heads one may be the only one that steps, and which is not told.
+std::optional<ClockStep> wanted_step(const Clocks& clocks, const Pass& pass, const CalibrationOptions& options) {
+  const bool is_off = options.further_states[FurtherState::kClockOffset] == FurtherStateOptions::Choice::kOff;
+  const bool of_star_tracker = clocks.step && clocks.step->gyro < 0;
+  return of_star_tracker && (is_off || !pass.further_star_trackers.empty()) ? std::nullopt : clocks.step;
+}
+
 /// With states for what the correction of the stamps leaves of the star tracker's clock.
 CalibrationOptions with_clock_states(CalibrationOptions options, const ClockCorrection& correction) {
   const auto turn_on = [&](FurtherState state, bool wanted) {
@@ -404,8 +411,16 @@ CalibrationRun calibrate_after(const Pass& as_given, const CalibrationOptions& o
   const bool finds_noise = options.find_noise && options.estimator != Estimator::kPaper;
   const std::optional<ReadoutNoise> noise = finds_noise ? other_readout_noise(in_time) : std::nullopt;
   const std::optional<Pass> with_noise = noise ? std::optional(with(*noise, in_time)) : std::nullopt;
-  const Pass& pass = with_noise ? *with_noise : in_time;
-  const std::optional<Clocks> clocks = clocks_of(pass);
+  const Pass& as_stamped = with_noise ? *with_noise : in_time;
+  std::optional<Clocks> clocks = clocks_of(as_stamped);
+  std::optional<Pass> without_step;
+  const std::optional<ClockStep> step = clocks ? wanted_step(*clocks, as_stamped, options) : std::nullopt;
+  if (step) {
+    without_step = as_stamped;
+    correct(*without_step, *step);
+    clocks = clocks_of(*without_step);
+  }
+  const Pass& pass = without_step ? *without_step : as_stamped;
   const ClockCorrection correction = clocks ? wanted_correction(*clocks, pass.settings, options) : ClockCorrection{};
   std::optional<Pass> corrected;
   if (correction.of_star_tracker() || correction.of_gyros()) {
@@ -415,6 +430,7 @@ CalibrationRun calibrate_after(const Pass& as_given, const CalibrationOptions& o
   const Pass& stamped = corrected ? *corrected : pass;
   CalibrationRun run = calibrate_as_stamped(stamped, with_clock_states(options, correction), progress);
   run.clocks = clocks;
+  run.corrected_step = step;
   run.clock_correction = correction;
   run.readout_noise = noise;
   run.gyro_stamps_off_s = regular ? regular->scatter_s : 0;

@@ -75,6 +75,25 @@ void judge_late_gyros(const PassSettings& settings, const Clocks& clocks, const 
   }
 }
 
+/// A clock that is off by more or less over a part of the pass. `what_of_it`: what becomes of that.
+void judge_step(const Pass& pass, const ClockStep& step, Finding::Severity severity, const char* what_of_it,
+                std::vector<Finding>& findings) {
+  const auto minutes = [&](Time t) { return std::lround(to_seconds(t - pass.settings.epoch) / 60); };
+  const double more_s = step.change_s.value;
+  const std::string size = fmt::format("{} ± {:.2f} ms", offset_text(more_s), 1e3 * step.change_s.sigma);
+  const bool of_star_tracker = step.gyro < 0;
+  const std::string whose = of_star_tracker ? "the star tracker" : fmt::format("gyro {}", step.gyro + 1);
+  add(findings, FindingCode::kClockStepped, severity,
+      fmt::format("The clock of {} is off by another amount between {} and {} min than over the rest of the pass{}.",
+                  whose, minutes(step.from), minutes(step.until), what_of_it),
+      of_star_tracker ? fmt::format("there fixes hold the attitude {} later after their stamp", size)
+                      : fmt::format("there its stamps are {} later", size),
+      fmt::format(
+          "Add {:+.4f} s to the stamps of {} there, or cut the pass there and calibrate on the parts apart; look "
+          "for what happened to its clock.",
+          of_star_tracker ? more_s : -more_s, whose));
+}
+
 /// What the navigation corrected by the calibration in use.
 void tell_correction(const PassSettings& settings, const ClockCorrection& correction, std::vector<Finding>& findings) {
   constexpr const char* kNone = "None needed while the clocks stay as they are.";
@@ -141,8 +160,17 @@ void judge_clocks(const Pass& pass, const CalibrationRun& run, std::vector<Findi
                     rate > 0 ? "fall behind" : "gain", 3.6e6 * std::abs(rate)),
         cure);
   }
+  if (run.corrected_step) {
+    judge_step(pass, *run.corrected_step, Finding::Severity::kWarning, "; the calibration has taken account of it",
+               findings);
+  }
   if (!run.clocks) {
     return;
+  }
+  if (run.clocks->step) {
+    const bool is_wrong = std::abs(run.clocks->step->change_s.value) > kTooLate_s;
+    judge_step(pass, *run.clocks->step, is_wrong ? Finding::Severity::kDoNotUse : Finding::Severity::kWarning,
+               "; the estimates take it for constant", findings);
   }
   judge_late_gyros(pass.settings, *run.clocks, correction.late_s, findings, Finding::Severity::kWarning,
                    "; the calibration has interpolated them");
@@ -168,6 +196,11 @@ void judge_clocks(const Pass& pass, const NavigationRun& run, std::vector<Findin
     return;
   }
   const Clocks& clocks = *run.clocks;
+  if (clocks.step) {
+    const bool is_wrong = std::abs(clocks.step->change_s.value) > kTooMuchChange_s;
+    judge_step(pass, *clocks.step, is_wrong ? Finding::Severity::kDoNotUse : Finding::Severity::kWarning,
+               ", which is in the attitude", findings);
+  }
   const Measured& middle = clocks.mid_offset_s;
   const double change_s =
       clocks.rate_s_s.is_sure(kSigmasToTell) ? clocks.rate_s_s.value * to_seconds(pass.settings.duration) : 0;

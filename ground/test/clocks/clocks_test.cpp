@@ -4,6 +4,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
+#include <optional>
 #include <vector>
 
 #include "passes.hpp"
@@ -46,6 +48,7 @@ TEST(Clocks, ThatAgreeAreLeftAlone) {
     expect_within(clocks.rate_s_s, 0, kSigmas);
     expect_within(clocks.late_s[1 - clocks.reference], 0, kSigmas);
     EXPECT_LT(clocks.mid_offset_s.sigma, 5e-4);
+    EXPECT_FALSE(clocks.step.has_value()) << seed;
     const ClockCorrection correction = correction_by(clocks, sim::simulate(scenario).pass.settings);
     EXPECT_FALSE(correction.of_star_tracker() || correction.of_gyros()) << seed;
   }
@@ -147,6 +150,117 @@ TEST(Clocks, CorrectionGivesThePassOfStampsThatAgree) {
     const double before_s = to_seconds(good.star_tracker.t[i] - good.settings.epoch);
     EXPECT_NEAR(to_seconds(late.star_tracker.t[i] - good.settings.epoch), before_s * (1 + 1e-3) + 2, 2e-9);
   }
+}
+
+Time minutes_in(const Pass& pass, int minutes) { return pass.settings.epoch + std::chrono::minutes(minutes); }
+
+/// With fixes stamped late over a part of the pass.
+Pass with_late_fixes(Pass pass, int from_min, int until_min, double late_s) {
+  for (Time& t : pass.star_tracker.t) {
+    if (t >= minutes_in(pass, from_min) && t < minutes_in(pass, until_min)) {
+      t += from_seconds(late_s);
+    }
+  }
+  return pass;
+}
+
+/// Over a part of the pass the readings of one gyro as they are where all of them are stamped late.
+Pass with_late_readings(const Scenario& scenario, std::size_t gyro, int from_min, int until_min, double late_s) {
+  Pass pass = sim::simulate(scenario).pass;
+  Scenario late = scenario;
+  late.gyros[gyro].readout.latency_s = late_s;
+  const Pass of_late = sim::simulate(late).pass;
+  for (std::size_t i = 0; i < pass.gyro.size(); ++i) {
+    if (pass.gyro.t[i] >= minutes_in(pass, from_min) && pass.gyro.t[i] < minutes_in(pass, until_min)) {
+      const std::size_t place = (2 * i + gyro) * 3;
+      std::copy_n(&of_late.gyro.h[place], 3, &pass.gyro.h[place]);
+    }
+  }
+  return pass;
+}
+
+/// The step is told of the part that does not hold the end of the pass. Slews are ten minutes apart.
+void expect_step(const std::optional<ClockStep>& step, const Pass& pass, int gyro, int from_min, int until_min,
+                 double change_s) {
+  ASSERT_TRUE(step.has_value());
+  EXPECT_EQ(step->gyro, gyro);
+  expect_within(step->change_s, change_s, kSigmas);
+  constexpr double kBetweenSlews_s = 1200;
+  EXPECT_NEAR(to_seconds(step->from - minutes_in(pass, from_min)), 0, kBetweenSlews_s);
+  EXPECT_NEAR(to_seconds(step->until - minutes_in(pass, until_min)), 0, kBetweenSlews_s);
+}
+
+struct LateFixes {
+  int from_min;
+  int until_min;
+  double late_s;
+};
+
+TEST(Clocks, OfAStarTrackerThatStepsAreFound) {
+  for (const LateFixes& late : {LateFixes{60, 150, 0.02}, {60, 150, -0.2}, {0, 120, 1.0}, {0, 60, -5.0}}) {
+    const Pass pass = with_late_fixes(sim::simulate(four_hours(13)).pass, late.from_min, late.until_min, late.late_s);
+    const auto clocks = ground::clocks_of(pass);
+    expect_step(clocks.value().step, pass, -1, late.from_min, late.until_min, -late.late_s);
+    expect_within(clocks->mid_offset_s, 0, kSigmas);
+  }
+}
+
+TEST(Clocks, ThatStepForGoodHaveSteppedBefore) {
+  const Pass pass = with_late_fixes(sim::simulate(four_hours(14)).pass, 180, 240, 0.05);
+  const auto clocks = ground::clocks_of(pass);
+  expect_step(clocks.value().step, pass, -1, 0, 180, 0.05);
+  expect_within(clocks->mid_offset_s, -0.05, kSigmas);
+}
+
+TEST(Clocks, OfAGyroThatStepsAreFound) {
+  for (const std::size_t gyro : {0U, 1U}) {
+    const Pass pass = with_late_readings(four_hours(16), gyro, 60, 150, 0.03);
+    const auto clocks = ground::clocks_of(pass);
+    expect_step(clocks.value().step, pass, static_cast<int>(gyro), 60, 150, 0.03);
+  }
+}
+
+TEST(Clocks, StepIsTakenOffTheStampsOfItsPart) {
+  const Pass good = sim::simulate(scenario_in_eq1(12, std::chrono::minutes(20))).pass;
+  ClockStep step{-1, minutes_in(good, 5), minutes_in(good, 10), {-2, 0.01}};
+  Pass late = with_late_fixes(good, 5, 10, 2);
+  late.star_tracker.covariances.resize(late.star_tracker.size());
+  correct(late, step);
+  EXPECT_EQ(late.star_tracker.t, good.star_tracker.t);
+  EXPECT_EQ(late.star_tracker.covariances.size(), good.star_tracker.size());
+  step.change_s.value = 20;
+  correct(late, step);
+  EXPECT_EQ(late.star_tracker.size(), good.star_tracker.size() - 6);  // after the part, of 20 s of fixes, each 3 s
+  EXPECT_EQ(std::ranges::adjacent_find(late.star_tracker.t, std::ranges::greater_equal{}), late.star_tracker.t.end());
+}
+
+TEST(Calibrate, TakesAccountOfAClockThatSteps) {
+  const auto simulated = sim::simulate(four_hours(3));
+  CalibrationOptions options = told();
+  options.further_states[FurtherState::kClockOffset] = FurtherStateOptions::Choice::kAuto;
+  const auto run = calibrate(with_late_fixes(simulated.pass, 0, 120, 0.1), options);
+  EXPECT_LT(nees_of(simulated.truth, run.calibration), 45);
+  EXPECT_TRUE(run.calibration.verdict.trustworthy);
+  expect_finding(run.calibration.verdict, FindingCode::kClockStepped, "Add -0.1");
+  const Pass of_gyro = with_late_readings(four_hours(3), 1, 60, 150, 0.05);
+  const auto of_gyro_run = calibrate(of_gyro, options);
+  EXPECT_LT(nees_of(simulated.truth, of_gyro_run.calibration), 45);
+  EXPECT_TRUE(of_gyro_run.calibration.verdict.trustworthy);
+  expect_finding(of_gyro_run.calibration.verdict, FindingCode::kClockStepped, "of gyro 2 there");
+}
+
+TEST(Calibrate, LeavesAStepThatItMayNotTakeOffAndSaysSo) {
+  Pass pass = with_late_fixes(sim::simulate(four_hours(3)).pass, 0, 120, 0.1);
+  CalibrationOptions options = told();
+  options.further_states[FurtherState::kClockOffset] = FurtherStateOptions::Choice::kOff;
+  const Verdict of_calibration = calibrate(pass, options).calibration.verdict;
+  EXPECT_FALSE(of_calibration.trustworthy);
+  expect_finding(of_calibration, FindingCode::kClockStepped, "Add -0.1");
+  CalibrationOptions in_eq1;
+  in_eq1.drift_model = kEsg7;
+  const Verdict of_navigation = navigate(pass, in_eq1).verdict;
+  EXPECT_FALSE(of_navigation.trustworthy);
+  expect_finding(of_navigation, FindingCode::kClockStepped, "Add -0.1");
 }
 
 /// A fault of the clocks, what names it, and the line that mends it.

@@ -63,7 +63,7 @@ inline constexpr Range kGyrosOfPackets{2, 4, "", "attitude needs two gyros, and 
 
 // ---- Settings of the estimators
 
-inline constexpr Range kRandomWalk_rad_sqrt_s{1e-15, 1e-3, "rad/s^0.5", "give 0 where there is none", true};
+inline constexpr Range kRandomWalk_rad_sqrt_s{1e-15, 0.1, "rad/s^0.5", "give 0 where there is none", true};
 inline constexpr Range kGateNis{0.1, 1e12, "", "30 passes good fixes; a large number lets all pass"};
 inline constexpr Range kStudentTFreedom{1, 1e6, "", "give 5 to 20, or 0 for the gate alone", true};
 inline constexpr Range kRejections{1, 1e6, "", "it is a number of fixes"};
