@@ -11,7 +11,7 @@
 namespace trihedron::ground {
 namespace {
 
-/// What is corrected by itself, or told.
+/// In sigmas: what is corrected, and a step that is told.
 constexpr double kCertain = 6;
 
 /// The rough offset by the fixes of a part of the pass, or by the others.
