@@ -20,7 +20,7 @@ constexpr double kLag_s = 30;
 /// A turn counts for no more than this many sigmas where a step is looked for.
 constexpr double kBound = 2;
 /// The fewest stretches of the pass from which a scatter is told.
-constexpr std::size_t kLeastStretches = 8;
+constexpr long kLeastStretches = 8;
 
 /// Of one value and more, whose order it changes.
 double median_of(std::vector<double>& values) {
@@ -95,7 +95,7 @@ bool TurnFit::converge() {
   }
   // In steady flight the rate of the body stays as it is, and noise takes the place of what would tell the offset.
   constexpr double kShown = 100;
-  return stretches_.size() >= kLeastStretches && shown_ > kShown * shown_by_noise_;
+  return used_stretches() >= kLeastStretches && shown_ > kShown * shown_by_noise_;
 }
 
 /// What the gyros read at each fix that step() asks for, by the clocks as they are now.
@@ -281,6 +281,7 @@ bool TurnFit::step(bool roughly) {
       put_into_normal();
     }
     stretch.score += of_turn;
+    stretch.is_used = true;
   }
   close();
   if (squares.size() < kLeastPairs / kThinned) {
@@ -298,9 +299,11 @@ TurnFit::Stretch::Stretch(int n)
       bounded_score(VectorXd::Zero(n)),
       rejected_normal(MatrixXd::Zero(n, n)) {}
 
+long TurnFit::used_stretches() const { return std::ranges::count_if(stretches_, &Stretch::is_used); }
+
 /// Of each function a of the unknowns: Σ (aᵀ N⁻¹ g)² over the scores g of the stretches.
 Measured TurnFit::measured(const VectorXd& a) const {
-  const auto count = static_cast<double>(stretches_.size());
+  const auto count = static_cast<double>(used_stretches());
   const VectorXd by_score = normal_.solve(a);
   double variance = 0;
   for (const Stretch& stretch : stretches_) {

@@ -71,6 +71,7 @@ class TurnFit {
   /// What one stretch of the pass says of the unknowns.
   struct Stretch {
     Interval interval;
+    bool is_used = false;  ///< whether any turn of it is
     Eigen::VectorXd score;
     Eigen::MatrixXd normal;           ///< lower triangle
     Eigen::VectorXd bounded_score;    ///< of all turns, those as well that are not used, none with more than its bound
@@ -102,6 +103,7 @@ class TurnFit {
   [[nodiscard]] Eigen::VectorXd unit(int unknown) const { return Eigen::VectorXd::Unit(size(), unknown); }
   [[nodiscard]] Eigen::VectorXd offset_of(int gyro) const;
   [[nodiscard]] Eigen::VectorXd by_stepping(int gyro) const;
+  [[nodiscard]] long used_stretches() const;
   [[nodiscard]] Measured measured(const Eigen::VectorXd& a) const;
   [[nodiscard]] std::vector<double> bounded_squares();
 

@@ -84,10 +84,10 @@ void judge_step(const Pass& pass, const ClockStep& step, Finding::Severity sever
   const bool of_star_tracker = step.gyro < 0;
   const std::string whose = of_star_tracker ? "the star tracker" : fmt::format("gyro {}", step.gyro + 1);
   add(findings, FindingCode::kClockStepped, severity,
-      fmt::format("The clock of {} is off by another amount between {} and {} min than over the rest of the pass{}.",
-                  whose, minutes(step.from), minutes(step.until), what_of_it),
-      of_star_tracker ? fmt::format("there fixes hold the attitude {} later after their stamp", size)
-                      : fmt::format("there its stamps are {} later", size),
+      fmt::format("Between {} and {} min the clock of {} is off by another amount than over the rest of the pass{}.",
+                  minutes(step.from), minutes(step.until), whose, what_of_it),
+      fmt::format("there {} later than over the rest, by {}",
+                  of_star_tracker ? "fixes hold the attitude" : "its stamps are", size),
       fmt::format(
           "Add {:+.4f} s to the stamps of {} there, or cut the pass there and calibrate on the parts apart; look "
           "for what happened to its clock.",
