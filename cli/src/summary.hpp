@@ -22,7 +22,7 @@ namespace trihedron::cli {
 [[nodiscard]] std::string figure(fmt::format_string<const double&> format, double value);
 
 [[nodiscard]] std::string pass_text(const io::LoadedPass& loaded);
-/// How far the clocks of a pass with so many gyros are apart.
+/// How far the clocks of the pass are apart.
 [[nodiscard]] std::string clocks_text(const std::optional<Clocks>& clocks, const Pass& pass);
 [[nodiscard]] std::string finding_text(const Finding& finding);
 [[nodiscard]] std::string verdict_text(const Verdict& verdict);

@@ -114,10 +114,10 @@ void TurnFit::read(bool roughly) {
     if (!needed[i]) {
       continue;
     }
-    const int stepping = stepping_ ? stepping_->gyro : 0;
     const double more_s = steps(fixes.t[i]) ? x_(place_of_step()) : 0;
-    const double clock_s =
-        x_(Unknowns::offset()) + x_(Unknowns::rate()) * to_seconds(fixes.t[i] - middle_) + (stepping <= 0 ? more_s : 0);
+    const bool of_star_tracker = stepping_ && stepping_->gyro < 0;
+    const double clock_s = x_(Unknowns::offset()) + x_(Unknowns::rate()) * to_seconds(fixes.t[i] - middle_) +
+                           (of_star_tracker ? more_s : 0);
     // Over a millisecond even a slew that begins bends by 1e-9 rad.
     constexpr double kNear_s = 1e-3;
     std::optional<Fitted>& its = fitted_[i];
@@ -131,8 +131,8 @@ void TurnFit::read(bool roughly) {
     }
     for (int k = 0; k < unknowns_.gyros; ++k) {
       const Vector3d& rate = its->directions->h_b_rate[k];
-      const double late_more_s = k == stepping ? more_s : stepping == 0 ? -more_s : 0;
-      const double late_s = k == 0 ? 0 : x_(Unknowns::late(k)) + late_more_s;
+      const double late_more_s = stepping_ && stepping_->gyro == k ? more_s : 0;
+      const double late_s = (k == 0 ? 0 : x_(Unknowns::late(k))) + late_more_s;
       at.h[k] = (its->directions->h_b[k] + (clock_s - its->clock_s) * rate).normalized();
       at.aligned[k] = align[k] * (at.h[k] + late_s * rate);
       at.aligned_rate[k] = align[k] * rate;
@@ -241,7 +241,7 @@ bool TurnFit::step(bool roughly) {
   };
   const auto close = [&] {
     put_into_normal();
-    if (stretch.interval.until != Time{}) {
+    if (stretch.turns > 0) {
       sum += stretch.score;
       normal += stretch.normal;
       stretches_.push_back(stretch);
@@ -264,7 +264,7 @@ bool TurnFit::step(bool roughly) {
     for (Eigen::Index row = 1; row < rows.rows(); ++row) {
       of_turn += rows(row, n) * rows.row(row).head(n).transpose();
     }
-    if (stretch.interval.until == Time{}) {
+    if (stretch.turns++ == 0) {
       stretch.interval.from = turn.first;
     }
     stretch.interval.until = turn.second;
@@ -360,7 +360,7 @@ std::optional<Stepping> TurnFit::suspected_step() const {
   // u = dᵀ (g_P − N_P N⁻¹ g) with the variance v = dᵀ (N_P − N_P N⁻¹ N_P) d, where nothing else explains it.
   constexpr double kLeastShare = 1e-3;  // of what the pass tells of a clock, for a stretch that tells of it
   constexpr double kLeastPart = 1e-2;   // the same of a part
-  constexpr double kUnlikely = 50;      // of u²/v: the largest of all parts of a pass of noise is 20
+  constexpr double kUnlikely = 50;      // of u²/v: of some thousand parts noise has 20
   constexpr std::size_t kLeastTelling = 8;
   // N has all turns, as the scores have.
   const std::size_t count = stretches_.size();

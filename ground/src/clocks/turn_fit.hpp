@@ -39,6 +39,7 @@ struct Stepping {
   Interval part;
 };
 
+/// Derived in docs/mathematics.md, section 7.
 class TurnFit {
   static constexpr std::size_t kThinned = 4;  ///< of the turns one in so many, at first
   static constexpr int kMostRows = 2 * kMaxGyros;
@@ -71,7 +72,8 @@ class TurnFit {
   /// What one stretch of the pass says of the unknowns.
   struct Stretch {
     Interval interval;
-    bool is_used = false;  ///< whether any turn of it is
+    int turns = 0;
+    bool is_used = false;  ///< whether any turn is
     Eigen::VectorXd score;
     Eigen::MatrixXd normal;           ///< lower triangle
     Eigen::VectorXd bounded_score;    ///< of all turns, those as well that are not used, none with more than its bound

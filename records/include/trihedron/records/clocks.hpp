@@ -20,10 +20,9 @@ struct Measured {
 
 /// A clock that is off by more over a part of the pass than over the rest, which holds the end of the pass.
 struct ClockStep {
-  int gyro =
-      -1;  ///< whose stamps are later by `change_s`; −1: fixes hold the attitude so much later after their stamps
-  Time from{};  ///< of the first fix of the part, and of the first after it, by their stamps
-  Time until{};
+  int gyro = -1;  ///< whose stamps are later; −1: fixes hold the attitude later after their stamps
+  Time from{};    ///< fixes with stamps from here on …
+  Time until{};   ///< … and before
   Measured change_s;
 };
 
