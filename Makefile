@@ -10,7 +10,7 @@ DOCS_TOOLS := build-docs/tools
 SOURCES := $(shell git ls-files '*.cpp' '*.hpp' 2>/dev/null)
 
 .PHONY: help setup build everything demo test flight bench peers slots mutants validation campaign consistency forecasts verdict fuzz fuzz-build fuzz-briefly docs shown \
-  format lint \
+  format lint lint-core \
   standard sanitize coverage interop wheel wheel-test python-test deb deb-test image image-test conan-test install clean
 
 help:
@@ -39,7 +39,7 @@ help:
 	@echo 'make shown    run the commands that the documents show, and write what they print into them'
 	@echo 'make install  into PREFIX (default /usr/local)'
 	@echo 'make sanitize build with clang under address and undefined-behaviour sanitizers, and run the tests that are not long'
-	@echo 'make coverage the same, then the lines and branches of core that its own tests take'
+	@echo 'make coverage the tests of core in that build, and the lines and branches of core that they take'
 	@echo 'make setup | format | lint | clean'
 	@echo 'Files are compiled in units of 32, which makes a whole build shorter. Who edits one is served sooner with'
 	@echo 'CMAKE_FLAGS=-DCMAKE_UNITY_BUILD=OFF, which compiles each on its own.'
@@ -168,15 +168,18 @@ mutants:
 	@cmake/setup.sh program tests
 	validation/mutants/mutants.py build-mutants out/mutants.jsonl --document docs/flight-standard.md --jobs $(JOBS)
 
-# Counts the lines and branches of core on the way, for `coverage`.
 sanitize:
 	@cmake/setup.sh program tests sanitizers
 	cmake --preset sanitize $(CMAKE_FLAGS)
 	cmake --build build-sanitize --parallel $(JOBS)
-	rm -rf build-sanitize/coverage
 	ctest --test-dir build-sanitize --output-on-failure --parallel $(TEST_JOBS) -LE long
 
-coverage: sanitize
+coverage:
+	@cmake/setup.sh program tests sanitizers
+	cmake --preset sanitize $(CMAKE_FLAGS)
+	cmake --build build-sanitize --parallel $(JOBS) --target core_test core_application_test core_no_heap_test
+	rm -rf build-sanitize/coverage
+	ctest --test-dir build-sanitize --output-on-failure --parallel $(TEST_JOBS) -R '^core' -LE long
 	core/test/coverage.py build-sanitize
 
 # The runs of a campaign outlive an interruption, not a change of the program. Status 1: it says of itself "do not use", as estimator paper makes it.
@@ -271,11 +274,15 @@ standard: $(LINT_TOOLS)/installed
 UNITS = sed -n 's/^ *"file": "\(.*\/\(Unity\|src\)\/.*\)".*/\1/p' build-lint/compile_commands.json
 TIDY = nice -n 19 xargs -P $(JOBS) -n 1 $(LINT_TOOLS)/bin/clang-tidy --quiet --extra-arg=-Wno-unused-command-line-argument -p build-lint
 
-lint: standard $(PYTHON_TOOLS)/installed
+# What clang-tidy finds in core and what is quick, for .ci/run.
+lint-core: standard
 	@cmake/setup.sh program
 	@$(LINT_TOOLS)/bin/clang-format --dry-run --Werror $(SOURCES)
-	cmake --preset lint -DTRIHEDRON_BUILD_PYTHON=ON -DPython_EXECUTABLE=$(abspath $(PYTHON_TOOLS)/bin/python)
+	cmake --preset lint
 	$(UNITS) | grep '/trihedron_core\.dir/' | $(TIDY) --checks=misc-no-recursion
+
+lint: lint-core $(PYTHON_TOOLS)/installed
+	cmake --preset lint -DTRIHEDRON_BUILD_PYTHON=ON -DPython_EXECUTABLE=$(abspath $(PYTHON_TOOLS)/bin/python)
 	$(UNITS) | grep -v '/trihedron_core\.dir/\|/nanobind\|_avx2\.dir/' | $(TIDY)
 	$(LINT_TOOLS)/bin/clang-tidy --quiet validation/mutants/mutant.cpp -- -std=c++20  # no build directory has it
 

@@ -142,6 +142,20 @@ def test_outputs_have_only_what_is_described(calibrated):
     check(json.loads(simulated.stdout), "inspect-output")
 
 
+def test_a_clock_that_steps_is_described(tmp_path):
+    """One star tracker, stamps 0.1 s later for half an hour: fixes hold the attitude that much before their stamp."""
+    assert run("--quiet", "simulate", "-", "-o", tmp_path / "pass", input='[scenario]\nseed = 3\nduration = "100min"\n').returncode == TRUSTWORTHY
+    fixes = tmp_path / "pass" / "star_tracker.csv"
+    header, *lines = fixes.read_text().splitlines()
+    rows = [line.split(",", 1) for line in lines]
+    late = [f"{float(t) + (0.1 if 2400 <= float(t) < 4200 else 0):.6f},{rest}" for t, rest in rows]
+    fixes.write_text("\n".join([header, *late]) + "\n")
+    told = json.loads(run("--json", "inspect", tmp_path / "pass").stdout)
+    check(told, "inspect-output", only_described=True)
+    step = told["clocks"]["step"]
+    assert step["gyro"] == 0 and step["change_s"] == pytest.approx(-0.1, abs=4 * step["change_sigma_s"])
+
+
 @pytest.mark.long
 def test_outputs_of_several_passes_and_of_advice_have_only_what_is_described(flown, tmp_path):
     told = ("--config", flown / "told.toml")
