@@ -503,15 +503,15 @@ Moves moves_over(const Trial& trial) {
   const Constancy pass(problem, found);
   const Layout& layout = problem.layout();
   const Index steps = pass.steps();
-  // What may be expected of each, 1-sigma: a case or a head that slips, coefficients that change by a tenth of what is
-  // expected of them, the Earth's orbital velocity over that of light and a spacecraft's, scales as of a first ground
-  // calibration.
-  constexpr double kMoves_rad = 60.0 / 206265;
+  // What may be expected of each, 1-sigma: a case or a head that slips, a good one that creeps or goes to and fro,
+  // coefficients that change by a tenth of what is expected of them, the Earth's orbital velocity over that of light
+  // and a spacecraft's, scales as of a first ground calibration.
+  constexpr double kSlips_rad = 60.0 / 206265;
+  constexpr double kCreeps_rad = 5.0 / 206265;
   constexpr double kPartOfCoefficients = 0.1;
   constexpr double kPolhodeOverChange = 3;  // its states have a prior of 0.3 of that of the coefficients
   constexpr double kAnnual = 6e-5;
   constexpr double kOrbital = 1.5e-5;
-  constexpr double kToAndFro_rad = 5.0 / 206265;  // a good star tracker, a good mounting
   constexpr double kScale = 1e-3;
   VectorXd coefficient_sigma(Index{Layout::kEq1} * layout.gyros);
   for (int k = 0; k < layout.gyros; ++k) {
@@ -532,6 +532,7 @@ Moves moves_over(const Trial& trial) {
     change.until = until;
     return change;
   };
+  constexpr double kTimesOfDecay[] = {0.05, 0.1, 0.2, 0.4};  // of the pass
   using Entries = std::vector<Eigen::Triplet<double>>;
   std::vector<Change> best;
   int tries = 0;
@@ -576,6 +577,12 @@ Moves moves_over(const Trial& trial) {
         [&pass, time](Index step) { return std::exp(-pass.part(step) / time) - std::exp(-pass.part(step + 1) / time); };
   };
 
+  const auto decays = [&](Moving moving, int gyro, double time) {
+    Change decay = what(moving, Motion::kDecay, gyro);
+    decay.decay = from_seconds(time * problem.setup().on_board.change.duration_s);
+    return decay;
+  };
+
   const auto at_orbital_rate = [&](double quarter) {
     return [&pass, quarter, rate_rad_s = problem.setup().on_board.orbital_rate_rad_s](Index step) {
       const auto phase = [&](Index stretch) { return rate_rad_s * to_seconds(pass.middle(stretch) - pass.middle(0)); };
@@ -585,7 +592,12 @@ Moves moves_over(const Trial& trial) {
 
   for (int k = -1; k < layout.gyros; ++k) {
     const Moving moving = k < 0 ? Moving::kStarTracker : Moving::kGyroCase;
-    consider(what(moving, Motion::kRamp, k), along(k, Layout::kEq1, 3, true, evenly), sigmas(3, kMoves_rad));
+    for (const double rad : {kSlips_rad, kCreeps_rad}) {
+      consider(what(moving, Motion::kRamp, k), along(k, Layout::kEq1, 3, true, evenly), sigmas(3, rad));
+      for (const double time : kTimesOfDecay) {
+        consider(decays(moving, k, time), along(k, Layout::kEq1, 3, true, decaying(time)), sigmas(3, rad));
+      }
+    }
     consider(what(Moving::kCoefficients, Motion::kRamp, k), along(k, 0, Layout::kEq1, false, evenly), coefficients(k));
     const VectorXd sigma = coefficients(k);
     Entries to_and_fro = along(k, 0, Layout::kEq1, false, at_orbital_rate(0));
@@ -593,16 +605,17 @@ Moves moves_over(const Trial& trial) {
       to_and_fro.emplace_back(sine.row(), sine.col() + sigma.size(), sine.value());
     }
     consider(what(Moving::kCoefficients, Motion::kOrbital, k), to_and_fro, sigma.replicate(2, 1));
-    for (const double time : {0.05, 0.1, 0.2, 0.4}) {
-      Change decay = what(Moving::kCoefficients, Motion::kDecay, k);
-      decay.decay = from_seconds(time * problem.setup().on_board.change.duration_s);
-      consider(decay, along(k, 0, Layout::kEq1, false, decaying(time)), coefficients(k));
+    for (const double time : kTimesOfDecay) {
+      consider(decays(Moving::kCoefficients, k, time), along(k, 0, Layout::kEq1, false, decaying(time)),
+               coefficients(k));
     }
     for (Index step = 0; step < steps; ++step) {
       const Time from = pass.middle(step);
       const Time until = pass.middle(step + 1);
-      consider(what(moving, Motion::kStep, k, from, until), along(k, Layout::kEq1, 3, true, once_at(step)),
-               sigmas(3, kMoves_rad));
+      for (const double rad : {kSlips_rad, kCreeps_rad}) {
+        consider(what(moving, Motion::kStep, k, from, until), along(k, Layout::kEq1, 3, true, once_at(step)),
+                 sigmas(3, rad));
+      }
       consider(what(Moving::kCoefficients, Motion::kStep, k, from, until),
                along(k, 0, Layout::kEq1, false, once_at(step)), coefficients(k));
       Entries entries;
@@ -618,7 +631,7 @@ Moves moves_over(const Trial& trial) {
         }
       }
       consider(what(k < 0 ? Moving::kInertialAxes : Moving::kMomentum, Motion::kStep, k, from, until), entries,
-               sigmas(k < 0 ? 3 : 2, kMoves_rad));
+               sigmas(k < 0 ? 3 : 2, kSlips_rad));
     }
   }
   const auto shape = [](Index at, Index size) {
@@ -633,13 +646,13 @@ Moves moves_over(const Trial& trial) {
   consider(what(Moving::kAberration, Motion::kPresent, -1), shape(pass.aberration(), kOfAberration), velocity);
   for (int i = 0; i < kMultiplesOfRate; ++i) {
     consider(what(Moving::kStarTracker, Motion::kFaster, -1), shape(pass.multiple(i), kOfMultiple),
-             sigmas(kOfMultiple, kToAndFro_rad));
+             sigmas(kOfMultiple, kCreeps_rad));
   }
   for (int k = 0; k < layout.gyros; ++k) {
     consider(what(Moving::kReadoutScale, Motion::kPresent, k), shape(pass.readout(k), kOfReadout),
              sigmas(kOfReadout, kScale));
     consider(what(Moving::kGyroCase, Motion::kOrbital, k), shape(pass.case_of(k), kOfCase),
-             sigmas(kOfCase, kToAndFro_rad));
+             sigmas(kOfCase, kCreeps_rad));
   }
   for (const double part : {0.01, 0.03, 0.1, 0.3, 1.0}) {
     Entries entries;

@@ -31,13 +31,15 @@ std::string described(const Change& change) {
       return fmt::format("{} of the case of {}",
                          change.motion == Motion::kStep      ? "a step"
                          : change.motion == Motion::kOrbital ? "a turn to and fro, at orbital rate,"
+                         : change.motion == Motion::kDecay   ? "a turn that settles"
                                                              : "a slow turn",
                          of_gyro(change));
     case Moving::kStarTracker:
       return change.motion == Motion::kStep ? "a step of the star tracker's mounting"
              : change.motion == Motion::kFaster
                  ? "errors of the star tracker, or drift, at twice or three times the orbital rate"
-                 : "a slow turn of the star tracker's mounting";
+             : change.motion == Motion::kDecay ? "a turn of the star tracker's mounting that settles"
+                                               : "a slow turn of the star tracker's mounting";
     case Moving::kMomentum:
       return fmt::format("a jump of the momentum of {}", of_gyro(change));
     case Moving::kInertialAxes:
@@ -89,7 +91,8 @@ std::string_view cure_of(const Change& change) {
              : change.motion == Motion::kFaster
                  ? "Correct the fixes by what the star tracker is known to be off, as its field of view or its "
                    "temperature makes it."
-                 : "Look for what warms the mounting; calibrate on a shorter pass.";
+             : change.motion == Motion::kDecay ? "Let the mounting settle; calibrate on a later part of the pass."
+                                               : "Look for what warms the mounting; calibrate on a shorter pass.";
     case Moving::kCoefficients:
       return change.motion == Motion::kStep ? "Cut the pass there and calibrate on the parts apart."
              : change.motion == Motion::kOrbital
@@ -176,12 +179,14 @@ const Change* change_found(const CalibrationRun& run) {
   return run.changes.empty() || !run.changes.front().is_found() ? nullptr : &run.changes.front();
 }
 
-/// Mean square of what the parameters are off by coefficients that change, where that is the likeliest of all changes:
-/// by what is found of it and by what is not known of that, times the probability that it is there.
-std::optional<Eigen::MatrixXd> off_by_coefficients(const CalibrationRun& run) {
+/// What goes to and fro at the orbital rate acts as other constants would, and is known apart from them too badly.
+bool has_part_in_covariance(const Change& change) { return change.motion != Motion::kOrbital; }
+
+/// Mean square of what the parameters are off by the likeliest of all changes: by what is found of it and by what is
+/// not known of that, times the probability that it is there.
+std::optional<Eigen::MatrixXd> off_by_change(const CalibrationRun& run) {
   constexpr double kNegligible = 0.01;
-  if (run.changes.empty() || run.changes.front().moving != Moving::kCoefficients ||
-      run.changes.front().motion == Motion::kOrbital) {
+  if (run.changes.empty() || !has_part_in_covariance(run.changes.front())) {
     return std::nullopt;
   }
   const Change& change = run.changes.front();
@@ -205,13 +210,13 @@ std::optional<Eigen::MatrixXd> off_by_coefficients(const CalibrationRun& run) {
 }  // namespace
 
 void put_changes_into_covariance(CalibrationRun& run) {
-  if (const auto off = off_by_coefficients(run)) {
+  if (const auto off = off_by_change(run)) {
     run.calibration.covariance += *off;
   }
 }
 
 void put_changes_into_errors(CalibrationRun& run) {
-  const auto off = off_by_coefficients(run);
+  const auto off = off_by_change(run);
   if (!off || !run.errors.is_known() || run.attitude.size() == 0) {
     return;
   }
@@ -241,7 +246,6 @@ void judge_changes(const CalibrationRun& run, std::vector<Finding>& findings) {
   const double off_attitude = sigmas_off_attitude(run, likeliest);
   const double off = std::max(sigmas_off(run.calibration, likeliest, false), off_attitude);
   const bool of_coefficients = likeliest.moving == Moving::kCoefficients;
-  const bool is_in_sigmas = of_coefficients && likeliest.motion != Motion::kOrbital;
   const bool is_wrong = (of_coefficients ? sigmas_off(run.calibration, likeliest, true) : off) > kSigmasOfWrong;
   const auto minutes = [&](Time t) { return to_seconds(t - run.calibration.epoch) / 60; };
   std::string when;
@@ -252,9 +256,9 @@ void judge_changes(const CalibrationRun& run, std::vector<Finding>& findings) {
   what.front() = static_cast<char>(what.front() - 'a' + 'A');
   Finding finding{code_of(likeliest),
                   fmt::format("{}{}: the estimates take what moves for constant{}.", what, when,
-                              is_wrong       ? ", and their sigmas are wrong"
-                              : is_in_sigmas ? "; what that makes of the coefficients is in their sigmas"
-                                             : ""),
+                              is_wrong                            ? ", and their sigmas are wrong"
+                              : has_part_in_covariance(likeliest) ? "; what that makes of them is in their sigmas"
+                                                                  : ""),
                   fmt::format("{}likelier than nothing by e^{:.0f}; the largest effect on {} is {:.1f} of its "
                               "sigmas{}",
                               size_text(likeliest), likeliest.log_odds,

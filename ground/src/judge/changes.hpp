@@ -13,9 +13,9 @@ namespace trihedron::ground {
 /// what they are off themselves is put into the covariance.
 void judge_changes(const CalibrationRun& run, std::vector<Finding>& findings);
 
-/// Adds what the estimates are off by coefficients that change to the covariance, of all parameters together, by the
-/// probability that they do; nothing where something else is likelier to move. To be called once, after the verdict,
-/// which compares with the claimed sigmas.
+/// Adds what the estimates are off by the likeliest of the changes to the covariance, of all parameters together, by
+/// the probability that it is there; nothing where that goes to and fro at the orbital rate. To be called once, after
+/// the verdict, which compares with the claimed sigmas.
 void put_changes_into_covariance(CalibrationRun& run);
 /// The same of the errors that an open loop begins with (CalibrationRun::errors). To be called once, before they are
 /// predicted, while the calibration has the parameters of their layout.

@@ -622,23 +622,49 @@ void judge_determination(const CalibrationRun& run, std::vector<Finding>& findin
   }
 }
 
-/// An earlier calibration is judged elsewhere; parameters that a prior holds too tightly pull others away with them.
+/// Root mean square over the sphere of the drift outside eq. (1) that a field was found to make, rad/s; gyro by gyro.
+std::vector<double> rms_outside_eq1(const Calibration& calibration) {
+  std::vector<double> square(calibration.gyros.size(), 0.0);
+  for (const DriftFieldLevel& level : calibration.drift_field) {
+    square[static_cast<std::size_t>(level.gyro)] += level.rms_rad_s * level.rms_rad_s;
+  }
+  std::ranges::transform(square, square.begin(), [](double its) { return std::sqrt(its); });
+  return square;
+}
+
+/// An earlier calibration is judged elsewhere. Parameters that a prior holds too tightly pull others away with them, or
+/// leave what they should be to drift outside eq. (1), which is a small part of it where priors are right.
 void judge_prior_sigmas(const Pass& pass, const CalibrationRun& run, std::vector<Finding>& findings) {
   constexpr double kSigmas = 5;
+  constexpr double kSigmasOfField = 3;
   if (pass.settings.prior) {
     return;
   }
   std::string names;
+  const auto name = [&](const std::string& what, double sigmas) {
+    names += fmt::format("{}{} by {:.0f}", names.empty() ? "" : ", ", what, sigmas);
+  };
+  std::vector<double> largest_sigma(run.calibration.gyros.size(), 0.0);  // of coefficients of eq. (1)
   for (std::size_t i = 0; i < run.calibration.states.size(); ++i) {
     const ParameterId& state = run.calibration.states[i];
-    if (!state.is_alignment() && !(state.is_drift() && state.coefficient.is_in_eq1())) {
+    const bool is_coefficient = state.is_drift() && state.coefficient.is_in_eq1();
+    if (!state.is_alignment() && !is_coefficient) {
       continue;
     }
-    const double off = value_of(run.calibration, state) - value_of(run.known_before, state);
-    const double sigmas =
-        std::abs(off) / std::sqrt(run.known_before.covariance.diagonal()(static_cast<Eigen::Index>(i)));
-    if (sigmas > kSigmas) {
-      names += fmt::format("{}{} by {:.0f}", names.empty() ? "" : ", ", name_of(state), sigmas);
+    const double sigma = std::sqrt(run.known_before.covariance.diagonal()(static_cast<Eigen::Index>(i)));
+    if (is_coefficient) {
+      largest_sigma[state.gyro()] = std::max(largest_sigma[state.gyro()], sigma);
+    }
+    const double off = std::abs(value_of(run.calibration, state) - value_of(run.known_before, state));
+    if (off > kSigmas * sigma) {
+      name(name_of(state), off / sigma);
+    }
+  }
+  const std::vector<double> outside = rms_outside_eq1(run.calibration);
+  for (std::size_t k = 0; k < outside.size(); ++k) {
+    if (largest_sigma[k] > 0 && outside[k] > kSigmasOfField * largest_sigma[k]) {
+      name(fmt::format("drift of gyro {} outside eq. (1), against that of a coefficient of eq. (1),", k + 1),
+           outside[k] / largest_sigma[k]);
     }
   }
   if (!names.empty()) {

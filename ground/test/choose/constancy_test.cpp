@@ -113,6 +113,32 @@ TEST(Constancy, NamesTheStarTrackerThatTurnsSlowly) {
   EXPECT_FALSE(run.calibration.verdict.trustworthy);
 }
 
+/// By an angle that depends on the time since the first fix.
+void turn_fixes(StarTrackerTelemetry& fixes, const Eigen::Vector3d& axis,
+                const std::function<double(double)>& angle_rad) {
+  for (std::size_t i = 0; i < fixes.size(); ++i) {
+    const double t_s = to_seconds(fixes.t[i] - fixes.t.front());
+    fixes.q_in_c[i] = fixes.q_in_c[i] * Eigen::Quaterniond(Eigen::AngleAxisd(angle_rad(t_s), axis));
+  }
+}
+
+TEST(Constancy, NamesTheStarTrackerThatCreepsOrSettlesByArcseconds) {
+  constexpr double kDuration_s = 9 * 3600;
+  const auto creeps = [](double t_s) { return 6 * kArcsecond * t_s / kDuration_s; };
+  const auto settles = [](double t_s) { return 8 * kArcsecond * (1 - std::exp(-t_s / (0.15 * kDuration_s))); };
+  const std::vector<std::pair<Motion, std::function<double(double)>>> courses = {{Motion::kRamp, creeps},
+                                                                                 {Motion::kDecay, settles}};
+  for (const auto& [motion, angle_rad] : courses) {
+    Pass pass = sim::simulate(scenario_in_eq1(14, from_seconds(kDuration_s))).pass;
+    turn_fixes(pass.star_tracker, Eigen::Vector3d::UnitZ(), angle_rad);
+    const CalibrationRun run = calibrate(pass, CalibrationOptions());
+    EXPECT_TRUE(names(run, FindingCode::kStarTrackerMoved));
+    EXPECT_FALSE(run.calibration.verdict.trustworthy);
+    EXPECT_EQ(run.changes.front().motion, motion);
+    EXPECT_NEAR(run.changes.front().size.z(), angle_rad(kDuration_s), 2 * kArcsecond);
+  }
+}
+
 CalibrationOptions with_constant_coefficients() {
   CalibrationOptions options;
   options.further_states[FurtherState::kCoefficientChange] = FurtherStateOptions::Choice::kOff;
@@ -123,11 +149,8 @@ TEST(Constancy, NamesErrorsOfTheStarTrackerFasterThanTheOrbit) {
   for (const int times : {2, 3}) {
     Pass pass = sim::simulate(scenario_in_eq1(12, std::chrono::hours(6))).pass;
     const double rate_rad_s = times * orbital_rate_rad_s(pass.star_tracker);
-    StarTrackerTelemetry& fixes = pass.star_tracker;
-    for (std::size_t i = 0; i < fixes.size(); ++i) {
-      const double angle_rad = 4 * kArcsecond * std::sin(rate_rad_s * to_seconds(fixes.t[i] - fixes.t[0]));
-      fixes.q_in_c[i] = fixes.q_in_c[i] * Eigen::Quaterniond(Eigen::AngleAxisd(angle_rad, Eigen::Vector3d::UnitX()));
-    }
+    turn_fixes(pass.star_tracker, Eigen::Vector3d::UnitX(),
+               [&](double t_s) { return 4 * kArcsecond * std::sin(rate_rad_s * t_s); });
     const CalibrationRun run = calibrate(pass, CalibrationOptions());
     EXPECT_TRUE(names(run, FindingCode::kStarTrackerWanders)) << times;
     EXPECT_FALSE(run.calibration.verdict.trustworthy) << times;

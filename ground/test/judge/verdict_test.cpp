@@ -225,7 +225,17 @@ TEST(Verdict, ForbidsCoefficientsThatChangeWhereTheAlignmentIsOffByThem) {
   EXPECT_FALSE(judge(good_pass(), with_coefficients_off(10, 3)).trustworthy);
 }
 
-TEST(Verdict, LeavesTheCovarianceWhereNoCoefficientChanges) {
+// A turn of the mounting that is there as likely as not.
+TEST(Verdict, CountsWhatMayMoveInTheSigmasByItsProbability) {
+  auto run = with_coefficients_off(0, 2);
+  run.changes.front().moving = Moving::kStarTracker;
+  run.changes.front().motion = Motion::kRamp;
+  run.changes.front().log_odds = 0;
+  put_changes_into_covariance(run);
+  EXPECT_NEAR(std::sqrt(run.calibration.covariance(1, 1)), std::hypot(1.0, 2.0 / std::sqrt(2)) * 1e-6, 1e-12);
+}
+
+TEST(Verdict, LeavesTheCovarianceWhereNothingMovesOrGoesToAndFro) {
   auto run = with_coefficients_off(10, 1);
   run.changes.front().log_odds = -5;
   put_changes_into_covariance(run);
@@ -389,6 +399,18 @@ TEST(Verdict, FindsAPriorThatIsContradicted) {
   EXPECT_FALSE(verdict.trustworthy);
   run.known_before.gyros[0].drift_rad_s[0] += 0.2 * 2e-6;
   EXPECT_THAT(codes(judge(good_pass(), run)), IsEmpty());
+}
+
+TEST(Verdict, FindsAPriorSoTightThatDriftOutsideEq1StandsForTheCoefficients) {
+  auto run = good_run();
+  run.calibration.drift_field = {{.gyro = 0, .degree = 2, .rms_rad_s = 4e-6},
+                                 {.gyro = 0, .degree = 4, .rms_rad_s = 4e-6}};
+  EXPECT_THAT(codes(judge(good_pass(), run)), IsEmpty());
+  run.calibration.drift_field.back().rms_rad_s = 5e-6;
+  const Verdict verdict = judge(good_pass(), run);
+  EXPECT_THAT(codes(verdict), ElementsAre("prior-contradicted"));
+  EXPECT_THAT(verdict.findings[0].evidence, HasSubstr("drift of gyro 1 outside eq. (1)"));
+  EXPECT_FALSE(verdict.trustworthy);
 }
 
 TEST(Verdict, FindsSteadyFlightAndNamesItsAxis) {
