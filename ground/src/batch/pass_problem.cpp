@@ -37,6 +37,9 @@ void compress(SmootherStage& stage) {
   }
 }
 
+/// Of a misfit with this covariance.
+double nis_of(const VectorXd& y, const MatrixXd& R) { return y.dot(R.llt().solve(y)); }
+
 /// Small rotation, across `from`, that turns it into `to`.
 Vector3d turn(const Vector3d& from, const Vector3d& to) { return from.cross(to); }
 
@@ -604,13 +607,26 @@ PassProblem::Compared PassProblem::compare_now(const PassSolution& solution, con
   // Linearised at the attitude by the gyros, which has no noise of the fix.
   const FixComparison comparison =
       trihedron::compare(on_board_, moment.gyros, C_fix.raw(), by_gyros.value().raw(), fix.h_b, fix.used, by_shared);
-  PerGyro<double> noise_rad;
-  const double sharing = std::sqrt(setup.fixes_sharing_a_sample(fix.since_last));
-  for (int k = 0; k < gyros_; ++k) {
-    noise_rad[k] = setup.readout_noise_rad[k] * fix.noise_factor * sharing;
+  const auto noise = [&](double sharing) {
+    PerGyro<double> noise_rad;
+    for (int k = 0; k < gyros_; ++k) {
+      noise_rad[k] = setup.readout_noise_rad[k] * fix.noise_factor * std::sqrt(sharing);
+    }
+    return noise_of(comparison, fix_noise(setup, fix.fix), noise_rad);
+  };
+  const double sharing = setup.fixes_sharing_a_sample(fix.since_last);
+  Compared compared{rows_about_states_now<kPassCapacity.states>(on_board_, comparison), noise(sharing), {}};
+  if (sharing > 1) {
+    compared.R_alone = noise(1);
   }
-  return {rows_about_states_now<kPassCapacity.states>(on_board_, comparison),
-          noise_of(comparison, fix_noise(setup, fix.fix), noise_rad)};
+  return compared;
+}
+
+double PassProblem::whiten_rows(Compared& fix) const {
+  const Index last = on_board_.size();
+  const double alone = fix.R_alone ? nis_of(fix.rows.col(last), *fix.R_alone) : 0;
+  whiten(fix.R, rows_of(fix.rows));
+  return fix.R_alone ? alone : fix.rows.col(last).squaredNorm();
 }
 
 PassProblem::FixRows PassProblem::compare(const PassSolution& solution, const Moment& moment) const {
@@ -623,12 +639,13 @@ PassProblem::FixRows PassProblem::compare(const PassSolution& solution, const Mo
   rows.y = compared.rows.col(on_board_.size());
   rows.H = by_states_of_arc(moment, compared.rows.leftCols(on_board_.size()));
   rows.R = compared.R;
+  rows.R_alone = compared.R_alone.value_or(compared.R);
   return rows;
 }
 
-double PassProblem::FixRows::nis() const { return y.dot(R.llt().solve(y)); }
-
-bool PassProblem::is_outlier(const FixRows& rows) const { return rows.nis() > gate_of(rows.y.size()); }
+bool PassProblem::is_outlier(const FixRows& rows) const {
+  return nis_of(rows.y, rows.R_alone) > gate_of(rows.y.size());
+}
 
 MatrixXd PassProblem::prior_covariance() const {
   if (!modes_) {
@@ -758,8 +775,7 @@ double PassProblem::scale_of_misfits(const PassSolution& solution) const {
         moment.fix = nodes_[i].fix;
         Compared fix = moment.fix != nullptr ? compare_now(solution, moment) : Compared{};
         if (const Eigen::Index components = fix.rows.rows(); components > 0) {
-          whiten(fix.R, rows_of(fix.rows));
-          of_arcs[arc].push_back(fix.rows.col(on_board_.size()).squaredNorm() / static_cast<double>(components));
+          of_arcs[arc].push_back(whiten_rows(fix) / static_cast<double>(components));
           --left;
         }
       }
@@ -868,8 +884,7 @@ double PassProblem::add_fix(Compared fix, const Moment& moment, double scale, Fi
     return 0;
   }
   const double gate = scale * gate_of(fix.rows.rows());
-  whiten(fix.R, rows_of(fix.rows));
-  const double nis = fix.rows.col(on_board_.size()).squaredNorm();
+  const double nis = whiten_rows(fix);
   nearby.add(moment, fix.rows, nis > gate ? gate / nis : 1);
   return nis > gate ? 2 * gate * (1 - gate / nis) : 0;
 }

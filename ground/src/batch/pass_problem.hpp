@@ -164,8 +164,8 @@ class PassProblem {
   struct FixRows {
     Eigen::MatrixXd H;
     Eigen::VectorXd y;
-    Eigen::MatrixXd R;
-    [[nodiscard]] double nis() const;
+    Eigen::MatrixXd R;        ///< with what others claim of the samples that they share
+    Eigen::MatrixXd R_alone;  ///< by which it agrees or not
   };
   [[nodiscard]] FixRows compare(const PassSolution& solution, const Moment& moment) const;
 
@@ -212,8 +212,11 @@ class PassProblem {
   struct Compared {
     Rows rows;
     ComponentCovariance R;
+    std::optional<ComponentCovariance> R_alone;  ///< where it is another
   };
   [[nodiscard]] Compared compare_now(const PassSolution& solution, const Moment& moment) const;
+  /// Divides the rows by their noise; returns the NIS, by the noise of the fix alone.
+  double whiten_rows(Compared& fix) const;
   class FixMerger;
   /// Adds the rows of a fix, whitened, with the weight that its misfit leaves it: beyond the gate, `scale` times that
   /// of its NIS, its influence falls with the third power. Returns the part of the cost that the rows do not contain.

@@ -61,6 +61,12 @@ void use_residuals(const PassProblem& problem, const PassSolution& solution, con
         const auto spread = spreads.middleRows(row, rows.y.size());
         covariance -= spread * spread.transpose();
       }
+      if (rows.R_alone != rows.R) {  // what is left of the noise of the fix alone: the same part of it
+        const MatrixXd root = rows.R.llt().matrixL();
+        const MatrixXd root_alone = rows.R_alone.llt().matrixL();
+        const MatrixXd to_alone = root.triangularView<Eigen::Lower>().solve<Eigen::OnTheRight>(root_alone);
+        covariance = to_alone * covariance * to_alone.transpose();
+      }
       row += rows.y.size();
       fix.nis = rows.y.dot(covariance.ldlt().solve(rows.y));
       fix.degrees_of_freedom = static_cast<int>(rows.y.size());

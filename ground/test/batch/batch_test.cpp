@@ -132,6 +132,16 @@ TEST(Batch, DoesNotBelieveOutliers) {
   EXPECT_LT(apart.dot(clean.covariance.llt().solve(apart)), 0.5 * 20);
 }
 
+// In the update their noise is larger; whether a fix agrees is judged by its own.
+TEST(Batch, JudgesFixesThatShareSamplesByTheirOwnNoise) {
+  Scenario scenario = scenario_in_eq1(7, std::chrono::hours(1));
+  scenario.star_tracker_period = 2 * scenario.gyro_period;
+  const auto simulated = sim::simulate(scenario);
+  const auto calibration = calibrate(simulated.pass, batch()).calibration;
+  EXPECT_NEAR(calibration.statistics.nis_mean.value() / calibration.statistics.nis_degrees_of_freedom, 1, 0.03);
+  EXPECT_LT(nees_of(simulated.truth, calibration), 45);
+}
+
 /// 20 min without samples and fixes, and a fix on the time of the first sample after it: how the body moved is unknown.
 TEST(Batch, KnowsThatAGapOfTheGyrosTellsNothingOfTheDrift) {
   Pass pass = two_hours().pass;
