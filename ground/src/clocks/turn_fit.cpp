@@ -2,8 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
-#include <numeric>
 
 #include "trihedron/core/frames.hpp"
 
@@ -437,59 +435,86 @@ Measured TurnFit::change() const {
   return found;
 }
 
-/// Of the residuals of each turn, none more than where it is not used; not a number where a reading is missing.
-std::vector<double> TurnFit::bounded_squares() {
-  read(false);
+TurnFit::Squares TurnFit::squares_by_ends() {
   const double most = kGate * kGate * 2 * unknowns_.gyros * std::max(scale_, 1e-3);
-  std::vector<double> squares(turns_.size(), std::numeric_limits<double>::quiet_NaN());
+  const Interval fitted = stepping_->part;
+  stepping_->part = {};
+  read(false);
+  const std::vector<AtFix> outside = at_fix_;
+  stepping_->part = {begin_, pass_.star_tracker.t.back() + Duration(1)};
+  read(false);
+  const std::vector<AtFix> inside = at_fix_;
+  stepping_->part = fitted;
+  Squares squares;
   Rows rows;
   double noise_square = 0;
-  for (std::size_t i = 0; i < turns_.size(); ++i) {
-    if (rows_of(turns_[i], false, rows, noise_square)) {
-      squares[i] = std::min(most, rows.col(size()).squaredNorm());
+  for (const Turn& turn : turns_) {
+    Eigen::Array4d its;
+    for (int ends = 0; ends < 4; ++ends) {
+      at_fix_[turn.first_fix] = (ends == kLeaves || ends == kInside ? inside : outside)[turn.first_fix];
+      at_fix_[turn.second_fix] = (ends == kEnters || ends == kInside ? inside : outside)[turn.second_fix];
+      its(ends) = rows_of(turn, false, rows, noise_square) ? std::min(most, rows.col(size()).squaredNorm()) : 0;
     }
+    squares.push_back(its);
   }
   return squares;
 }
 
-Interval TurnFit::part_with_step() {
-  constexpr double kNoSay = 20;  // of ln of the likelihood, twice
-  const Interval all{begin_, pass_.star_tracker.t.back() + Duration(1)};
-  const Interval fitted = stepping_->part;
-  stepping_->part = {};
-  const std::vector<double> without = bounded_squares();
-  stepping_->part = all;
-  std::vector<double> gains = bounded_squares();
-  stepping_->part = fitted;
-  for (std::size_t i = 0; i < gains.size(); ++i) {
-    const double gain = without[i] - gains[i];
-    gains[i] = std::isfinite(gain) ? gain : 0;
-  }
-  // The turns in a row that gain the most.
+/// The turns in a row, from one of them to before another, that gain the most by the step.
+std::pair<std::size_t, std::size_t> TurnFit::turns_with_step(const Squares& squares) {
   std::size_t first = 0;
-  std::size_t from = 0;
-  std::size_t until = 0;
+  std::pair<std::size_t, std::size_t> found{0, 0};
   double gain = 0;
   double most = 0;
-  for (std::size_t i = 0; i < gains.size(); ++i) {
+  for (std::size_t i = 0; i < squares.size(); ++i) {
     if (gain <= 0) {
       gain = 0;
       first = i;
     }
-    gain += gains[i];
+    gain += squares[i](kOutside) - squares[i](kInside);
     if (gain > most) {
       most = gain;
-      from = first;
-      until = i + 1;
+      found = {first, i + 1};
     }
   }
+  return found;
+}
+
+std::size_t TurnFit::edge(const Squares& squares, std::size_t from, std::size_t until, Ends before, Ends across,
+                          Ends after) const {
+  const std::size_t fixes = pass_.star_tracker.size();
+  // The sum of squares for each place of the edge, by what it is more than for the place before.
+  std::vector<double> more(fixes + 2, 0.0);
+  for (std::size_t i = from; i < until; ++i) {
+    more[turns_[i].first_fix + 1] += squares[i](across) - squares[i](after);
+    more[turns_[i].second_fix + 1] += squares[i](before) - squares[i](across);
+  }
+  std::size_t best = 0;
+  double sum = 0;
+  double least = 0;
+  for (std::size_t place = 1; place <= fixes; ++place) {
+    sum += more[place];
+    if (sum < least) {
+      least = sum;
+      best = place;
+    }
+  }
+  constexpr double kNoSay = 20;  // of ln of the likelihood, twice
+  const bool may_be_at_begin = -least < kNoSay;
+  const bool may_be_at_end = sum - least < kNoSay;
+  return may_be_at_begin ? 0 : may_be_at_end ? fixes : best;
+}
+
+Interval TurnFit::part_with_step() {
+  const Squares squares = squares_by_ends();
+  const auto [from, until] = turns_with_step(squares);
   if (until == 0) {
     return {};
   }
-  const auto place = [&](std::size_t i) { return gains.begin() + static_cast<std::ptrdiff_t>(i); };
-  const bool from_begin = std::accumulate(gains.begin(), place(from), 0.0) > -kNoSay;
-  const bool to_end = std::accumulate(place(until), gains.end(), 0.0) > -kNoSay;
-  return {from_begin ? all.from : turns_[from].first, to_end ? all.until : turns_[until - 1].second};
+  const std::vector<Time>& t = pass_.star_tracker.t;
+  const std::size_t first = edge(squares, 0, until, kOutside, kEnters, kInside);
+  const std::size_t last = edge(squares, from, squares.size(), kInside, kLeaves, kOutside);
+  return {first < t.size() ? t[first] : t.back(), last < t.size() ? t[last] : t.back() + Duration(1)};
 }
 
 }  // namespace trihedron::ground

@@ -4,7 +4,9 @@
 
 #include <Eigen/Cholesky>
 #include <Eigen/Core>
+#include <cstdint>
 #include <optional>
+#include <utility>
 #include <vector>
 
 #include "clocks/turns.hpp"
@@ -64,8 +66,8 @@ class TurnFit {
 
   /// The size of the step.
   [[nodiscard]] Measured change() const;
-  /// The part of the pass whose turns are likelier with the step than without, turn by turn; up to the begin and the
-  /// end of the pass where no turn says otherwise.
+  /// The part of the pass whose turns are likelier with the step than without; up to the begin and the end of the pass
+  /// where no turn says otherwise.
   [[nodiscard]] Interval part_with_step();
 
  private:
@@ -107,7 +109,16 @@ class TurnFit {
   [[nodiscard]] Eigen::VectorXd by_stepping(int gyro) const;
   [[nodiscard]] long used_stretches() const;
   [[nodiscard]] Measured measured(const Eigen::VectorXd& a) const;
-  [[nodiscard]] std::vector<double> bounded_squares();
+  /// Where the fixes of a turn are, in time: before the step, in it.
+  enum Ends : std::uint8_t { kOutside, kEnters, kLeaves, kInside };
+  /// Of the residuals of each turn by Ends, none more than where a turn is not used; zeros where a reading is missing.
+  using Squares = std::vector<Eigen::Array4d>;
+  [[nodiscard]] Squares squares_by_ends();
+  [[nodiscard]] static std::pair<std::size_t, std::size_t> turns_with_step(const Squares& squares);
+  /// The first fix behind the likeliest edge, by the turns from one to before another: as they lie before, across and
+  /// after it. The begin or the end of the pass where it may be there.
+  [[nodiscard]] std::size_t edge(const Squares& squares, std::size_t from, std::size_t until, Ends before, Ends across,
+                                 Ends after) const;
 
   const Pass& pass_;
   const GyroReadings& readings_;
