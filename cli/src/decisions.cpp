@@ -29,8 +29,7 @@ void log_verdict(const Log& log, const Verdict& verdict) {
 
 void log_run(const Log& log, const CalibrationRun& run) {
   for (const Evidence& evidence : run.evidence) {
-    log.say(fmt::format("{} is {}: ln of the Bayes factor for estimating it is {}", evidence.key(),
-                        evidence.accepted ? "estimated" : "taken as zero",
+    log.say(fmt::format("{} is {}: ln of the Bayes factor for estimating it is {}", evidence.key(), evidence.outcome(),
                         figure("{:+.1f}", evidence.log_bayes_factor)));
   }
   const DriftModelId& used = run.calibration.gyros.front().drift_model;

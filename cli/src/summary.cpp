@@ -255,7 +255,7 @@ std::string calibration_text(const CalibrationRun& run, const Eigen::VectorXd& e
   for (const Evidence& evidence : run.evidence) {
     fmt::format_to(out, "{}  {:<24} ln Bayes factor {:>9}: {}\n",
                    &evidence == run.evidence.data() ? "\nEvidence\n" : "", evidence.key(),
-                   figure("{:+.1f}", evidence.log_bayes_factor), evidence.accepted ? "estimated" : "taken as zero");
+                   figure("{:+.1f}", evidence.log_bayes_factor), evidence.outcome());
   }
   for (const DriftModelForecast& model : run.drift_models) {
     fmt::format_to(out, "{}  {:<8} {:>4} coefficients, forecast error {:>9}, ln likelihood {:>10}{}\n",

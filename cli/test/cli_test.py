@@ -339,7 +339,7 @@ def test_extension_of_the_correction_interval_by_attitude_files(calibrated, tmp_
 @pytest.mark.long
 def test_calibrate_measures_convergence_and_extension(outcome):
     assert 0 < outcome["convergence"]["alignment_s"] < 90 * 60
-    assert len(outcome["convergence"]["states"]) == 20
+    assert sum("(" not in name for name in outcome["convergence"]["states"]) == 20  # beside the members outside eq. (1)
     assert [c["t_s"] for c in outcome["extension"]["corrections"]] == [0, 5400, 10800, 16200]
     assert outcome["extension"]["factor"] > 3
 

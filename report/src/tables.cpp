@@ -392,8 +392,8 @@ json further_of(const ReportInput& input) {
 json states_decided(const ReportInput& input) {
   json sentences = json::array();
   for (const Evidence& evidence : input.run.evidence) {
-    sentences.push_back(fmt::format("{}: {} ({}).", evidence.label(), evidence.accepted ? "estimated" : "taken as zero",
-                                    signed_number(evidence.log_bayes_factor, 1)));
+    sentences.push_back(
+        fmt::format("{}: {} ({}).", evidence.label(), evidence.outcome(), signed_number(evidence.log_bayes_factor, 1)));
   }
   return sentences;
 }

@@ -168,6 +168,7 @@ TEST(Bound, IsTheCovarianceOfTheFilterForSmallMisalignments) {
   const sim::SimulatedPass flown = sim::simulate(scenario);
   CalibrationOptions options;
   options.estimator = Estimator::kInvariant;
+  options.drift_model = kEsg7;
   options.direction_random_walk_rad_sqrt_s = 0;
   const Eigen::MatrixXd covariance = ground::calibrate(flown.pass, options).calibration.covariance;
   const ParameterCovariance bound = parameter_bound(flown.pass.settings, flown.truth);

@@ -867,20 +867,22 @@ Decision decide(const Pass& pass, const CalibrationOptions& asked_for, const Pro
     Decision decided = decide_with_course(pass, screened, asked, kLargestDriftModel, change_is_open, progress);
     decided.options.estimator = asked_for.estimator;
     const double log_evidence = decided.field->log_evidence;
-    decided.evidence.push_back({{}, log_evidence, log_evidence > kLogOddsToAccept});
-    const DriftOnBoard drift =
-        log_evidence > kLogOddsToAccept ? drift_on_board(decided.field->members) : DriftOnBoard{kEsg7, 0};
+    const bool is_evident = log_evidence > kLogOddsToAccept;
+    decided.evidence.push_back({{}, log_evidence, is_evident});
+    // Without evidence the coefficients of eq. (1) make up for what there may be of it all the same, and are off by as
+    // much: that is in their covariance.
+    const DriftOnBoard drift = is_evident ? drift_on_board(decided.field->members) : DriftOnBoard{kEsg7, 0};
     decided.settings = pass.settings;
     decided.options.drift_field = false;
     decided.options.drift_model = drift.drift_model;
     MeanSquares members = decided.field->members;
-    if (drift.drift_model != kEsg7) {
-      const LeftOut left_out(*decided.members, drift.drift_model);
+    const LeftOut left_out(*decided.members, drift.drift_model);
+    if (is_evident) {
       add_made_up(left_out, *decided.members, members);
       decided.left_out_walk_rad_sqrt_s = left_out_walk_rad_sqrt_s(left_out, *decided.members, screened.pass);
-      decided.left_out = left_out;
-      decided.levels = std::move(decided.field->levels);
     }
+    decided.left_out = left_out;
+    decided.levels = std::move(decided.field->levels);
     use(members, drift.drift_model, *decided.settings);
     decided.members.reset();
     decided.field.reset();

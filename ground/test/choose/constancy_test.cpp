@@ -45,7 +45,7 @@ TEST(Constancy, FindsNothingWhereNothingMoves) {
   const auto steady = [](Scenario& scenario) { scenario.attitude.slews = std::vector<Slew>{}; };
   const CalibrationRun run = calibrated(4, steady);
   EXPECT_FALSE(names_a_change(run));
-  EXPECT_EQ(run.calibration.gyros[0].drift_model, kEsg7);
+  EXPECT_EQ(run.calibration.on_board_drift.value().drift_model, kEsg7);
 }
 
 // A pass in which eq. (1) alone is 110 sigmas off in alignment, though it forecasts as well as more, and looks like
@@ -203,7 +203,9 @@ TEST(Constancy, PutsCoefficientsThatChangeIntoTheirSigmas) {
     gyro.drift.jump_at_s = kMiddle_s;
   }
   const sim::SimulatedPass simulated = sim::simulate(scenario);
-  const CalibrationRun run = calibrate(simulated.pass, with_constant_coefficients());
+  CalibrationOptions options = with_constant_coefficients();
+  options.drift_model = kEsg7;
+  const CalibrationRun run = calibrate(simulated.pass, options);
   EXPECT_TRUE(names(run, FindingCode::kCoefficientsNotConstant));
   const Calibration& found = run.calibration;
   expect_within_sigmas(found, simulated.truth);

@@ -72,6 +72,10 @@ struct Evidence {
   [[nodiscard]] std::string_view key() const { return state ? row_of(*state).key : "drift_outside_eq1"; }
   /// For people.
   [[nodiscard]] std::string_view label() const { return state ? row_of(*state).label : "Drift outside eq. (1)"; }
+  /// What is made of it, for people.
+  [[nodiscard]] std::string_view outcome() const {
+    return accepted ? "estimated" : state ? "taken as zero" : "in the sigmas alone";
+  }
 };
 
 /// A drift model, fitted to the beginning of the pass and judged by what comes next. Of estimator batch.
