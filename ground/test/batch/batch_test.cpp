@@ -132,7 +132,8 @@ TEST(Batch, DoesNotBelieveOutliers) {
   EXPECT_LT(apart.dot(clean.covariance.llt().solve(apart)), 0.5 * 20);
 }
 
-// In the update their noise is larger; whether a fix agrees is judged by its own.
+// In the update their noise is larger; whether a fix agrees is judged by its own. The mean of 14 400 fixes of four
+// components scatters by 0.006, a little more where neighbours share noise.
 TEST(Batch, JudgesFixesThatShareSamplesByTheirOwnNoise) {
   Scenario scenario = scenario_in_eq1(7, std::chrono::hours(1));
   scenario.star_tracker_period = 2 * scenario.gyro_period;

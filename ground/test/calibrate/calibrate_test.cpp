@@ -105,7 +105,7 @@ TEST(Calibrate, ADriftFieldKeepsTheSigmasHonest) {
 /// What steady flight does not tell of an alignment is in the momenta as well, since the fixes gave them through it;
 /// also what the uncertainty of the spectrum adds.
 // A body that stands still in space shows the drift at a few directions alone, which eq. (1) explains whatever it is:
-// coefficients had been off by hundreds of sigmas.
+// its coefficients are off by what they make up for.
 TEST(Calibrate, CoefficientsThatMakeUpForDriftWithoutEvidenceOfItHaveItInTheirSigmas) {
   Scenario scenario;  // drift outside eq. (1) of a hundredth
   scenario.seed = 5000;
