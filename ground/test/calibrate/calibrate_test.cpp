@@ -102,10 +102,8 @@ TEST(Calibrate, ADriftFieldKeepsTheSigmasHonest) {
   EXPECT_GT(nees_of(simulated.truth, calibrate(simulated.pass, options).calibration), 1000);
 }
 
-/// What steady flight does not tell of an alignment is in the momenta as well, since the fixes gave them through it;
-/// also what the uncertainty of the spectrum adds.
-// A body that stands still in space shows the drift at a few directions alone, which eq. (1) explains whatever it is:
-// its coefficients are off by what they make up for.
+/// A body that stands still in space shows the drift at a few directions alone, which eq. (1) explains whatever it is:
+/// its coefficients are off by what they make up for.
 TEST(Calibrate, CoefficientsThatMakeUpForDriftWithoutEvidenceOfItHaveItInTheirSigmas) {
   Scenario scenario;  // drift outside eq. (1) of a hundredth
   scenario.seed = 5000;
@@ -118,6 +116,8 @@ TEST(Calibrate, CoefficientsThatMakeUpForDriftWithoutEvidenceOfItHaveItInTheirSi
   EXPECT_LT(nees_of(simulated.truth, run.calibration), 45);  // χ² of 20, once in 1000
 }
 
+/// What steady flight does not tell of an alignment is in the momenta as well, since the fixes gave them through it;
+/// also what the uncertainty of the spectrum adds.
 TEST(Calibrate, InSteadyFlightPredictsTheAttitudeBetterThanItKnowsTheAlignments) {
   Scenario scenario;
   scenario.seed = 6;
