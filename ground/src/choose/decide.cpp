@@ -4,9 +4,7 @@
 
 #include <algorithm>
 #include <array>
-#include <boost/math/tools/minima.hpp>
 #include <cmath>
-#include <cstdint>
 #include <future>
 #include <iterator>
 #include <limits>
@@ -226,12 +224,13 @@ void use_wandering(const ProcessNoise& noise, CalibrationOptions& options) {
   options.further_states.wandering_time = from_seconds(noise.wandering_drift.time_s);
 }
 
-/// Drift that wanders as fast as this random walk: walk² = 2 σ² τ.
+/// Drift that wanders as far over ten minutes as this random walk: walk² t = σ² t². By drift that wanders less a field
+/// is fitted to the noise, with members of any size, which takes long.
 CalibrationOptions wandering_like(const NoiseFit& walking, CalibrationOptions options) {
+  constexpr double kOver_s = 600;
   FurtherStateOptions& states = options.further_states;
   states[FurtherState::kWanderingDrift] = Choice::kOn;
-  states.wandering_drift_rad_s =
-      walking.noise.direction_random_walk_rad_sqrt_s / std::sqrt(2 * to_seconds(states.wandering_time));
+  states.wandering_drift_rad_s = walking.noise.direction_random_walk_rad_sqrt_s / std::sqrt(kOver_s);
   return options;
 }
 
@@ -459,20 +458,27 @@ void use_course(CourseOfChange::Kind kind, double time_s, CalibrationOptions& op
   options.further_states.change_time = from_seconds(time_s);
 }
 
+/// From the middle of three places a step apart to the largest value, by a parabola; two steps at most.
+double towards_vertex(double before, double here, double after) {
+  const double bend = 2 * here - before - after;
+  return bend > 0 ? std::clamp((after - before) / (2 * bend), -2.0, 2.0) : after > before ? 1 : -1;
+}
+
 /// The time of a course that makes the pass most likely, with the random walk that is then likeliest.
 struct LikelyCourse {
   double time_s;
+  double sigma_s;  ///< of the time; before it is known, how far it may be from the likeliest
   double walk_rad_sqrt_s;
 };
 
-/// Looks for it with these options but for the noise, from a first one on, at first within `reach_s`. What noise was
-/// found without the course stands for a part of it, and goes as the time is told better. A random walk is enough for
-/// that.
+/// Looks for it with these options but for the noise, from a first one on: again and again the vertex of a parabola
+/// through three times a sigma apart. What noise was found without the course stands for a part of it, and goes as the
+/// time is told better. A random walk is enough for that.
 LikelyCourse most_likely_course(const Pass& pass, const Screened& screened, CalibrationOptions options,
-                                const FoundCourse& course, LikelyCourse likely, double reach_s) {
-  constexpr int kMostRounds = 6;
-  constexpr std::uintmax_t kMostTries = 9;
-  const double near_enough_s = 0.001 * (course.most_s - course.least_s);
+                                const FoundCourse& course, LikelyCourse likely) {
+  constexpr int kMostRounds = 12;
+  constexpr double kEnough = 0.005;  // ln, a tenth of a sigma of the time, whose uncertainty is in no other sigma
+  constexpr double kAtOnce = 4;      // times as large a step where the vertex is far, as small where it is no better
   const double least_walk = options.direction_random_walk_rad_sqrt_s;
   options.direction_random_walk_rad_sqrt_s = likely.walk_rad_sqrt_s;
   options.further_states[FurtherState::kWanderingDrift] = Choice::kOff;
@@ -484,38 +490,35 @@ LikelyCourse most_likely_course(const Pass& pass, const Screened& screened, Cali
     }
     Trial trial(pass, screened, options, {}, last ? &*last : nullptr);
     last.emplace(std::move(trial));
+    return last->log_likelihood();
   };
-  /// Whether it is other than before.
-  const auto find_noise = [&] {
-    const double before = likely.walk_rad_sqrt_s;
+  const auto within = [&](double at_s) { return std::clamp(at_s, course.least_s, course.most_s); };
+  fit(likely.time_s);
+  for (int round = 0; round < kMostRounds; ++round) {
+    const double walk_before = likely.walk_rad_sqrt_s;
     options.direction_random_walk_rad_sqrt_s = least_walk;
     use_walk(with_most_likely_walk(*last, options).noise, options);
     likely.walk_rad_sqrt_s = options.direction_random_walk_rad_sqrt_s;
-    return std::abs(likely.walk_rad_sqrt_s - before) > kNoiseTolerance * before;
-  };
-  fit(likely.time_s);
-  static_cast<void>(find_noise());
-  for (int round = 0; round < kMostRounds; ++round) {
-    const double least_s = std::max(course.least_s, likely.time_s - reach_s);
-    const double most_s = std::min(course.most_s, likely.time_s + reach_s);
-    // To a fraction of what is near enough: the uncertainty of the time is in no sigma.
-    const auto bits = static_cast<int>(std::ceil(std::log2(16 * (most_s - least_s) / near_enough_s)));
-    std::uintmax_t tries = kMostTries;
-    const double part = boost::math::tools::brent_find_minima(
-                            [&](double at) {
-                              fit(least_s + at * (most_s - least_s));
-                              return -last->log_likelihood();
-                            },
-                            0.0, 1.0, bits, tries)
-                            .first;
-    const double moved_s = std::abs(least_s + part * (most_s - least_s) - likely.time_s);
-    likely.time_s = least_s + part * (most_s - least_s);
-    fit(likely.time_s);
-    const bool is_within = moved_s < 0.9 * reach_s;
-    if ((round > 0 && moved_s < near_enough_s) || (!find_noise() && is_within)) {
+    const bool other_noise = std::abs(likely.walk_rad_sqrt_s - walk_before) > kNoiseTolerance * walk_before;
+    const double step_s = likely.sigma_s;
+    const double here = last->log_likelihood();
+    const double before = fit(within(likely.time_s - step_s));
+    const double after = fit(within(likely.time_s + step_s));
+    const double bend = 2 * here - before - after;  // one, of a step of a sigma
+    const double by = towards_vertex(before, here, after);
+    const double vertex_s = within(likely.time_s + by * step_s);
+    const bool is_better = fit(vertex_s) > here;
+    if (is_better) {
+      likely.time_s = vertex_s;
+      likely.sigma_s *= bend > 0 ? std::clamp(1 / std::sqrt(bend), 1 / kAtOnce, kAtOnce) : kAtOnce;
+    } else {
+      likely.sigma_s /= kAtOnce;
+      fit(likely.time_s);
+    }
+    const double expected_gain = by * ((after - before) - by * bend) / 2;
+    if (expected_gain < kEnough && !other_noise) {
       break;
     }
-    reach_s = std::min(reach_s, (course.most_s - course.least_s) / (4 << round));
   }
   return likely;
 }
@@ -524,16 +527,14 @@ LikelyCourse most_likely_course(const Pass& pass, const Screened& screened, Cali
 /// the way to go.
 double most_likely_time_s(const Pass& pass, const Screened& screened, const CalibrationOptions& options,
                           const FoundCourse& course) {
-  const double range_s = course.most_s - course.least_s;
-  const LikelyCourse first{course.time_s, options.direction_random_walk_rad_sqrt_s};
-  if (!options.drift_field) {
-    return most_likely_course(pass, screened, options, course, first, range_s).time_s;
+  LikelyCourse likely{course.time_s, (course.most_s - course.least_s) / 4, options.direction_random_walk_rad_sqrt_s};
+  if (options.drift_field) {
+    CalibrationOptions by_eq1 = options;
+    by_eq1.drift_field = false;
+    by_eq1.drift_model = kEsg7;
+    likely = most_likely_course(pass, screened, by_eq1, course, likely);
   }
-  CalibrationOptions by_eq1 = options;
-  by_eq1.drift_field = false;
-  by_eq1.drift_model = kEsg7;
-  const LikelyCourse near = most_likely_course(pass, screened, by_eq1, course, first, range_s);
-  return most_likely_course(pass, screened, options, course, near, range_s / 64).time_s;
+  return most_likely_course(pass, screened, options, course, likely).time_s;
 }
 
 /// Drift at this period looks like aberration as well.
@@ -618,12 +619,6 @@ void keep_what_comes_back(const Decision& before, Decision& again) {
   std::ranges::copy_if(before.evidence, std::back_inserter(again.evidence),
                        [](const Evidence& evidence) { return evidence.state == FurtherState::kOrbitalDrift; });
   again.orbital_error_over_drift = before.orbital_error_over_drift;
-}
-
-/// From the middle of three places a step apart to the largest value, by a parabola; two steps at most.
-double towards_vertex(double before, double here, double after) {
-  const double bend = 2 * here - before - after;
-  return bend > 0 ? std::clamp((after - before) / (2 * bend), -2.0, 2.0) : after > before ? 1 : -1;
 }
 
 /// The polhodes with which the pass is most likely by eq. (1), from those on that the changes of the coefficients show:

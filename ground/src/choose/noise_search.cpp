@@ -160,13 +160,13 @@ NoiseFit wandering_from(const std::vector<int>& levels, bool at_each_time, Trial
       starts.emplace_back(level, time);
     }
   }
-  return converge(trial, at, starts, {-3, -shorter}, {9, longer});
+  return converge(trial, at, starts, {-5, -shorter}, {7, longer});
 }
 
 }  // namespace
 
 NoiseFit with_most_likely_wandering(Trial& trial, const CalibrationOptions& options) {
-  return wandering_from({0, 2, 4, 6}, true, trial, options);
+  return wandering_from({-2, 0, 2, 4}, true, trial, options);
 }
 
 NoiseFit with_most_likely_wandering_near(Trial& trial, const CalibrationOptions& options) {
