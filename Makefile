@@ -228,7 +228,7 @@ fuzz-build:
 fuzz: fuzz-build
 	$(FUZZ) --seconds $(FUZZ_SECONDS) --document docs/reliability.md
 
-# The same, for a minute or less of each, and no document. At a priority that gives it a quarter of a processor beside two other processes: a
+# The same, for twenty seconds or less of each, and no document. At a priority that gives it a quarter of a processor beside two other processes: a
 # quarter of a second, which the longest inputs take, is then far from what counts as a hang.
 fuzz-briefly: fuzz-build
 	nice -n 5 $(FUZZ) --briefly

@@ -114,7 +114,7 @@ def main():
     parser.add_argument("build", type=pathlib.Path)
     how_long = parser.add_mutually_exclusive_group()
     how_long.add_argument("--seconds", type=float, default=3600, help="of processor time for each target")
-    how_long.add_argument("--briefly", action="store_true", help="a minute by the clock for each of " + ", ".join(EVERYDAY) + "; five seconds for each other")
+    how_long.add_argument("--briefly", action="store_true", help="twenty seconds by the clock for each of " + ", ".join(EVERYDAY) + "; five seconds for each other")
     parser.add_argument("--jobs", type=int, default=os.cpu_count())
     parser.add_argument("--targets", help="separated by commas; all where none is named")
     parser.add_argument("--corpus", type=pathlib.Path, default=ROOT / "out/fuzz")
@@ -124,7 +124,7 @@ def main():
     chosen = arguments.targets.split(",") if arguments.targets else targets(build)
     arguments.corpus.mkdir(parents=True, exist_ok=True)
     subprocess.run([build / "trihedron_fuzz_seeds", arguments.corpus / "seeds", ROOT / "examples"], check=True)
-    seconds = (lambda target: 60 if target in EVERYDAY else 5) if arguments.briefly else (lambda target: arguments.seconds)
+    seconds = (lambda target: 20 if target in EVERYDAY else 5) if arguments.briefly else (lambda target: arguments.seconds)
     rows = []
     with concurrent.futures.ThreadPoolExecutor(arguments.jobs) as pool:
         for running in concurrent.futures.as_completed(pool.submit(fuzz, build, target, arguments.corpus, seconds(target), arguments.briefly) for target in chosen):

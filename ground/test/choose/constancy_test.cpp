@@ -74,7 +74,7 @@ TEST(Constancy, TellsDayAndNightFromOtherCoursesOfTheCoefficients) {
       gyro.drift.thermal_fraction = 0.5;
     }
   };
-  const CalibrationRun run = calibrated(1, by_day, std::chrono::hours(6));
+  const CalibrationRun run = calibrated(1, by_day, std::chrono::hours(5));
   const Change& change = run.changes.front();
   EXPECT_EQ(change.moving, Moving::kCoefficients);
   EXPECT_EQ(change.motion, Motion::kOrbital);
