@@ -497,7 +497,9 @@ LikelyCourse most_likely_course(const Pass& pass, const Screened& screened, Cali
   for (int round = 0; round < kMostRounds; ++round) {
     const double walk_before = likely.walk_rad_sqrt_s;
     options.direction_random_walk_rad_sqrt_s = least_walk;
-    use_walk(with_most_likely_walk(*last, options).noise, options);
+    const NoiseFit walk =
+        round == 0 ? with_most_likely_walk(*last, options) : with_most_likely_walk_near(*last, options);
+    use_walk(walk.noise, options);
     likely.walk_rad_sqrt_s = options.direction_random_walk_rad_sqrt_s;
     const bool other_noise = std::abs(likely.walk_rad_sqrt_s - walk_before) > kNoiseTolerance * walk_before;
     const double step_s = likely.sigma_s;

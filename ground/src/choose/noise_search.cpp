@@ -22,7 +22,7 @@ class Search {
   using Point = std::pair<int, int>;
   using At = std::function<ProcessNoise(double, int)>;
 
-  /// Goes from the best of `starts`, which contains (0, 0), to the best of its neighbours and so on, within the bounds.
+  /// Goes from the best of `starts` to the best of its neighbours and so on, within the bounds.
   Search(const Trial& trial, At at, const std::vector<Point>& starts, const Point& lowest, const Point& highest)
       : trial_(trial), linear_(trial.found().linear), at_(std::move(at)) {
     gather_constants(linear_.prior, linear_.prior_y, linear_.stages);
@@ -97,6 +97,7 @@ GaussMarkov wandering_of(const CalibrationOptions& options) {
 
 /// Starting levels; several, because with an incomplete model the likelihood has more than one maximum.
 const std::vector<Search::Point> kAllLevels = {{0, 0}, {3, 0}, {6, 0}, {9, 0}};
+constexpr int kMostLevel = 9;
 
 /// Alternates the search for the noise and a refit with it, because the noise decides which fixes are outliers, until a
 /// search finds that of the last fit again. Which of several maxima is the largest the first search tells.
@@ -107,8 +108,8 @@ NoiseFit converge(Trial& trial, const Search::At& at, std::vector<Search::Point>
   for (int round = 0; round < kRounds; ++round) {
     const ProcessNoise before = trial.problem().setup().noise();
     const Search search(trial, at, starts, lowest, highest);
-    starts = {{0, 0}};
-    if (search.best_point() != starts.front()) {
+    std::erase_if(starts, [](const Search::Point& point) { return point != Search::Point(0, 0); });
+    if (search.best_point() != Search::Point(0, 0) || starts.empty()) {
       starts.push_back(search.best_point());
     }
     likely = search.best();
@@ -121,20 +122,18 @@ NoiseFit converge(Trial& trial, const Search::At& at, std::vector<Search::Point>
   return likely;
 }
 
-}  // namespace
-
-NoiseFit with_most_likely_walk(Trial& trial, const CalibrationOptions& options) {
-  const ProcessNoise least{std::max(options.direction_random_walk_rad_sqrt_s, kLeastWalk_rad_sqrt_s),
-                           wandering_of(options)};
+NoiseFit walk_from(std::vector<Search::Point> starts, Trial& trial, const ProcessNoise& least) {
   const auto at = [least](double level, int) {
     ProcessNoise noise = least;
     noise.direction_random_walk_rad_sqrt_s *= std::pow(2, level);
     return noise;
   };
-  return converge(trial, at, kAllLevels, {0, 0}, {9, 0});
+  return converge(trial, at, std::move(starts), {0, 0}, {kMostLevel, 0});
 }
 
-namespace {
+ProcessNoise least_walk(const CalibrationOptions& options) {
+  return {std::max(options.direction_random_walk_rad_sqrt_s, kLeastWalk_rad_sqrt_s), wandering_of(options)};
+}
 
 /// `levels` of drift that wanders to start from, at each time or at that of the options alone.
 NoiseFit wandering_from(const std::vector<int>& levels, bool at_each_time, Trial& trial,
@@ -164,6 +163,17 @@ NoiseFit wandering_from(const std::vector<int>& levels, bool at_each_time, Trial
 }
 
 }  // namespace
+
+NoiseFit with_most_likely_walk(Trial& trial, const CalibrationOptions& options) {
+  return walk_from(kAllLevels, trial, least_walk(options));
+}
+
+NoiseFit with_most_likely_walk_near(Trial& trial, const CalibrationOptions& options) {
+  const ProcessNoise least = least_walk(options);
+  const double now_rad_sqrt_s = trial.problem().setup().noise().direction_random_walk_rad_sqrt_s;
+  const double level = std::log2(now_rad_sqrt_s / least.direction_random_walk_rad_sqrt_s);
+  return walk_from({{std::clamp(static_cast<int>(std::lround(level)), 0, kMostLevel), 0}}, trial, least);
+}
 
 NoiseFit with_most_likely_wandering(Trial& trial, const CalibrationOptions& options) {
   return wandering_from({-2, 0, 2, 4}, true, trial, options);
