@@ -44,19 +44,26 @@ for name in ${*:-program tests sanitizers flight lint mpi python}; do
   if [ "$name" = program ]; then program_wanted=yes; fi
 done
 
-# One at a time, where several are asked for beside each other: apt-get does not wait.
-exec 9<cmake/setup.sh
-flock 9
-missing=()
-for package in "${packages[@]}"; do
-  dpkg-query -W -f '${db:Status-Status}' "$package" 2>/dev/null | grep -qx installed || missing+=("$package")
-done
+look_for_missing() {
+  missing=()
+  for package in "${packages[@]}"; do
+    dpkg-query -W -f '${db:Status-Status}' "$package" 2>/dev/null | grep -qx installed || missing+=("$package")
+  done
+}
 
 # Node and npm, which fetch what the report draws with and run its tests: those of the machine, else of PyPI. Debian's npm needs hundreds
 # of packages, minutes of a first build.
 needs_node() {
   [ -n "${program_wanted:-}" ] && ! { command -v node && command -v npm; } >/dev/null && ! [ -e build-node/installed ]
 }
+look_for_missing
+if [ ${#missing[@]} -eq 0 ] && ! needs_node; then
+  exit  # also while others are installed
+fi
+# One at a time, where several are asked for beside each other: apt-get does not wait.
+exec 9<cmake/setup.sh
+flock 9
+look_for_missing
 if needs_node; then
   dpkg-query -W -f '${db:Status-Status}' python3-venv 2>/dev/null | grep -qx installed || missing+=(python3-venv)
 fi
