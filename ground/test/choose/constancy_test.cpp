@@ -147,7 +147,7 @@ CalibrationOptions with_constant_coefficients() {
 
 TEST(Constancy, NamesErrorsOfTheStarTrackerFasterThanTheOrbit) {
   for (const int times : {2, 3}) {
-    Pass pass = sim::simulate(scenario_in_eq1(12, std::chrono::hours(6))).pass;
+    Pass pass = sim::simulate(scenario_in_eq1(12, std::chrono::hours(4))).pass;
     const double rate_rad_s = times * orbital_rate_rad_s(pass.star_tracker);
     turn_fixes(pass.star_tracker, Eigen::Vector3d::UnitX(),
                [&](double t_s) { return 4 * kArcsecond * std::sin(rate_rad_s * t_s); });
