@@ -71,7 +71,7 @@ def test_definitive_attitude_is_that_of_the_program(flown, pass_nc, work):
     result = trihedron.calibrate(flown, definitive=True)
     result.write_attitude(work / "definitive.csv", definitive=True)
     assert (work / "definitive.csv").read_bytes() == (work / "definitive" / "definitive-attitude.csv").read_bytes()
-    assert result.definitive_attitude.sizes["time"] > 8 * 60 * 45
+    assert result.definitive_attitude.sizes["time"] > 8 * 60 * 24
 
 
 @pytest.mark.parametrize("interval", [None, "10min", "continuous"])
@@ -98,7 +98,7 @@ def test_simulate_is_that_of_the_program(flown):
     same_telemetry(simulated, flown)
     assert_same_tables(simulated.truth, flown.truth)
     assert simulated.truth.attrs["truth_json"] == flown.truth.attrs["truth_json"]
-    same_telemetry(trihedron.simulate({"scenario": {"duration": "50min"}}, seed=7), flown)
+    same_telemetry(trihedron.simulate({"scenario": {"duration": "25min"}}, seed=7), flown)
     other = trihedron.simulate(SCENARIO, seed=8)
     assert not np.array_equal(other.gyro.h1_x.values, flown.gyro.h1_x.values)
 
@@ -171,7 +171,7 @@ def test_feed_reports_every_event(flown):
     assert pipeline.attitude is None and pipeline.calibration is None
     reports = list(pipeline.feed(flown.events()))
     assert sum(report.sample != "" for report in reports) == flown.gyro.sizes["time"]
-    assert sum(report.fix == "used" for report in reports) > 900
+    assert sum(report.fix == "used" for report in reports) > 450
     assert pipeline.calibration["covariance"]["states"][0] == "gyro1.k0"
     assert pipeline.attitude.covariance_rad2.shape == (3, 3)
 
