@@ -82,7 +82,7 @@ def commands_elsewhere():
 
 def test_commands_that_are_shown_without_their_output_are_understood(tmp_path):
     """In a directory without any file: an input that is not there is refused (3), a command that is not understood is wrong usage (2)."""
-    lines = [(page, line) for page, line in commands_elsewhere() if not re.match("trihedron demo", line)]  # cli.DemoBrowser runs that
+    lines = [(page, line) for page, line in commands_elsewhere() if not re.match("trihedron demo", line)]  # demo_test.py runs that
     assert len(lines) > 60
     (tmp_path / "bin").mkdir()
     wrapper = tmp_path / "bin" / "trihedron"

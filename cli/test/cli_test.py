@@ -365,20 +365,6 @@ def test_calibrate_measures_convergence_and_extension(outcome):
     assert outcome["extension"]["factor"] > 3
 
 
-@pytest.mark.long
-def test_demo_repeats_the_papers_experiment(tmp_path):
-    result = run("demo", "-o", tmp_path / "demo")
-    assert result.returncode == TRUSTWORTHY, result.stderr + result.stdout
-    assert "gyro 1 D, degree 1" in result.stdout  # a drift that eq. (1) does not contain
-    assert f"The report is {tmp_path / 'demo' / 'report.html'}" in result.stdout
-    assert sorted(f.name for f in (tmp_path / "demo").iterdir()) == [
-        "attitude.csv", "calibration.json", "effective-config.toml", "navigation.csv", "pass.nc", "report.html", "residuals.nc",
-        "scenario.toml"]
-    again = run("--quiet", "simulate", tmp_path / "demo" / "scenario.toml", "-o", tmp_path / "again.nc")
-    assert again.returncode == TRUSTWORTHY
-    assert (tmp_path / "again.nc").read_bytes() == (tmp_path / "demo" / "pass.nc").read_bytes()
-
-
 # Nine hours of paper.toml are calibrated by the demonstration, of steady-flight.toml as a pass of validation/passes: here four of the others, which
 # hold what they have happen, with nothing to decide: decisions on a pass as dirty are tested with those of validation/passes. The pages of docs/ fly
 # short.toml.

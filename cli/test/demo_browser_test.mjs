@@ -1,16 +1,14 @@
-// The report of the demonstration in headless Chromium: node demo_browser_test.mjs CHROMIUM PROGRAM DIRECTORY
+// The report of the demonstration, which demo_test.py has made, in headless Chromium: node demo_browser_test.mjs CHROMIUM DIRECTORY
 
 import assert from "node:assert/strict";
-import { execFileSync } from "node:child_process";
 import { statSync } from "node:fs";
 import path from "node:path";
 import { test } from "node:test";
 import { Reader, allDrawn, expectDrawn, figurePoints } from "../../report/test/reader.mjs";
 
-const [executablePath, program, directory] = process.argv.slice(2);
+const [executablePath, directory] = process.argv.slice(2);
 
 test("the demonstration's report draws every figure in both themes and asks for nothing", { timeout: 500_000 }, async () => {
-  execFileSync(program, ["--quiet", "demo", "-o", directory]);
   const report = path.resolve(directory, "report.html");
   assert.ok(statSync(report).size < 6e6);
   const reader = await Reader.start(executablePath);
