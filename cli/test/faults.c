@@ -4,7 +4,7 @@
 //   FAULTS_FIRST   number of the first call that is hit, from 1
 //   FAULTS_LAST    number of the last one
 //   FAULTS_DO      "errno N", "short", "signal N"
-//   FAULTS_COUNT   file that gets the number of calls at the end, for a run without FAULTS_FIRST
+//   FAULTS_LOG     file that gets a line for each call, its kind and what it concerns, for a run without FAULTS_FIRST
 #define _GNU_SOURCE
 #include <dlfcn.h>
 #include <errno.h>
@@ -25,17 +25,19 @@ enum outcome { GO_ON, FAIL, SHORTEN };
 
 static atomic_long calls;
 
-static int is_below(const char* path) {
+// The path where it is below that directory, else none.
+static const char* if_below(const char* path) {
   const char* below = getenv("FAULTS_BELOW");
-  return below != NULL && strncmp(path, below, strlen(below)) == 0;
+  return below != NULL && strncmp(path, below, strlen(below)) == 0 ? path : NULL;
 }
 
-static int is_open_below(int descriptor) {
-  char link[64], path[PATH_MAX + 1];
+static const char* if_open_below(int descriptor) {
+  static _Thread_local char path[PATH_MAX + 1];
+  char link[64];
   snprintf(link, sizeof link, "/proc/self/fd/%d", descriptor);
   const ssize_t size = readlink(link, path, PATH_MAX);
   path[size > 0 ? size : 0] = '\0';
-  return is_below(path);
+  return if_below(path);
 }
 
 static int counts(const char* kind) {
@@ -49,14 +51,24 @@ static long number(const char* name) {
   return text != NULL ? atol(text) : 0;
 }
 
-// What is to become of a call of this kind.
-static enum outcome meet(const char* kind, int concerned) {
+static void tell(const char* kind, const char* path) {
+  const char* name = getenv("FAULTS_LOG");
+  FILE* file = name != NULL ? fopen(name, "a") : NULL;
+  if (file != NULL) {
+    fprintf(file, "%s %s\n", kind, path);
+    fclose(file);
+  }
+}
+
+// What is to become of a call of this kind. Without a path it does not concern us.
+static enum outcome meet(const char* kind, const char* path) {
   const int saved = errno;
-  if (!concerned || !counts(kind)) {
+  if (path == NULL || !counts(kind)) {
     errno = saved;
     return GO_ON;
   }
   const long call = atomic_fetch_add(&calls, 1) + 1;
+  tell(kind, path);
   const char* what = getenv("FAULTS_DO");
   errno = saved;
   if (what == NULL || call < number("FAULTS_FIRST") || call > number("FAULTS_LAST")) {
@@ -73,25 +85,16 @@ static enum outcome meet(const char* kind, int concerned) {
   return SHORTEN;
 }
 
-__attribute__((destructor)) static void tell(void) {
-  const char* name = getenv("FAULTS_COUNT");
-  FILE* file = name != NULL ? fopen(name, "w") : NULL;
-  if (file != NULL) {
-    fprintf(file, "%ld\n", atomic_load(&calls));
-    fclose(file);
-  }
-}
-
 #define NEXT(name) ((__typeof__(&name))dlsym(RTLD_NEXT, #name))
 
 #define TRANSFER(name, kind, buffer)                                    \
   ssize_t name(int descriptor, buffer bytes, size_t size) {             \
-    const enum outcome is = meet(kind, is_open_below(descriptor));      \
+    const enum outcome is = meet(kind, if_open_below(descriptor));      \
     return is == FAIL ? -1 : NEXT(name)(descriptor, bytes, is == SHORTEN ? (size + 1) / 2 : size); \
   }
 #define TRANSFER_AT(name, kind, buffer)                                 \
   ssize_t name(int descriptor, buffer bytes, size_t size, off_t at) {   \
-    const enum outcome is = meet(kind, is_open_below(descriptor));      \
+    const enum outcome is = meet(kind, if_open_below(descriptor));      \
     return is == FAIL ? -1 : NEXT(name)(descriptor, bytes, is == SHORTEN ? (size + 1) / 2 : size, at); \
   }
 TRANSFER(read, "read", void*)
@@ -103,14 +106,14 @@ TRANSFER_AT(pwrite64, "write", const void*)
 
 #define OF_DESCRIPTOR(name, kind)                                       \
   int name(int descriptor) {                                            \
-    return meet(kind, is_open_below(descriptor)) == FAIL ? -1 : NEXT(name)(descriptor); \
+    return meet(kind, if_open_below(descriptor)) == FAIL ? -1 : NEXT(name)(descriptor); \
   }
 OF_DESCRIPTOR(fsync, "sync")
 OF_DESCRIPTOR(fdatasync, "sync")
 
 #define TRUNCATE(name)                                                  \
   int name(int descriptor, off_t size) {                                \
-    return meet("write", is_open_below(descriptor)) == FAIL ? -1 : NEXT(name)(descriptor, size); \
+    return meet("write", if_open_below(descriptor)) == FAIL ? -1 : NEXT(name)(descriptor, size); \
   }
 TRUNCATE(ftruncate)
 TRUNCATE(ftruncate64)
@@ -121,33 +124,33 @@ TRUNCATE(ftruncate64)
     va_start(rest, flags);                                              \
     const mode_t mode = (flags & O_CREAT) != 0 ? va_arg(rest, mode_t) : 0; \
     va_end(rest);                                                       \
-    return meet((flags & O_CREAT) != 0 ? "create" : "open", is_below(path)) == FAIL ? -1 : NEXT(name)(path, flags, mode); \
+    return meet((flags & O_CREAT) != 0 ? "create" : "open", if_below(path)) == FAIL ? -1 : NEXT(name)(path, flags, mode); \
   }
 OPEN(open)
 OPEN(open64)
 
 #define OF_NAME(name, kind)                                             \
-  int name(const char* path) { return meet(kind, is_below(path)) == FAIL ? -1 : NEXT(name)(path); }
+  int name(const char* path) { return meet(kind, if_below(path)) == FAIL ? -1 : NEXT(name)(path); }
 OF_NAME(unlink, "name")
 OF_NAME(rmdir, "name")
 OF_NAME(remove, "name")
 
 #define OF_TWO_NAMES(name, kind)                                        \
-  int name(const char* from, const char* to) { return meet(kind, is_below(to)) == FAIL ? -1 : NEXT(name)(from, to); }
+  int name(const char* from, const char* to) { return meet(kind, if_below(to)) == FAIL ? -1 : NEXT(name)(from, to); }
 OF_TWO_NAMES(rename, "name")
 OF_TWO_NAMES(link, "create")
 
-int mkdir(const char* path, mode_t mode) { return meet("create", is_below(path)) == FAIL ? -1 : NEXT(mkdir)(path, mode); }
+int mkdir(const char* path, mode_t mode) { return meet("create", if_below(path)) == FAIL ? -1 : NEXT(mkdir)(path, mode); }
 int unlinkat(int directory, const char* path, int flags) {
-  return meet("name", is_open_below(directory) || is_below(path)) == FAIL ? -1 : NEXT(unlinkat)(directory, path, flags);
+  return meet("name", if_open_below(directory) ?: if_below(path)) == FAIL ? -1 : NEXT(unlinkat)(directory, path, flags);
 }
 int fchmodat(int directory, const char* path, mode_t mode, int flags) {
-  return meet("name", is_below(path)) == FAIL ? -1 : NEXT(fchmodat)(directory, path, mode, flags);
+  return meet("name", if_below(path)) == FAIL ? -1 : NEXT(fchmodat)(directory, path, mode, flags);
 }
 ssize_t readlink(const char* path, char* target, size_t size) {
-  return meet("link", is_below(path)) == FAIL ? -1 : NEXT(readlink)(path, target, size);
+  return meet("link", if_below(path)) == FAIL ? -1 : NEXT(readlink)(path, target, size);
 }
 int posix_spawn(pid_t* process, const char* path, const posix_spawn_file_actions_t* actions, const posix_spawnattr_t* attributes,
                 char* const arguments[], char* const environment[]) {
-  return meet("spawn", is_below(path)) == FAIL ? errno : NEXT(posix_spawn)(process, path, actions, attributes, arguments, environment);
+  return meet("spawn", if_below(path)) == FAIL ? errno : NEXT(posix_spawn)(process, path, actions, attributes, arguments, environment);
 }
