@@ -21,7 +21,7 @@ def simulated(directory, name, scenario):
 
 @pytest.fixture(scope="module")
 def short_pass(tmp_path_factory):
-    return simulated(tmp_path_factory.mktemp("short"), "pass", '[scenario]\nduration = "10min"\n')
+    return simulated(tmp_path_factory.mktemp("short"), "pass", '[scenario]\nduration = "4min"\n')
 
 
 @pytest.fixture
@@ -180,5 +180,5 @@ def test_memory_is_linear_in_time(tmp_path):
         scenario = f'[scenario]\nduration = "{hours}h"\n[gyro]\nperiod = "1s"\n'
         return peak_mb(1, "calibrate", simulated(tmp_path, "pass.nc", scenario), "-o", tmp_path / "out", "--estimator", "batch")
 
-    three, six, twelve = peak(3), peak(6), peak(12)
-    assert twelve - six < 2 * (six - three) * 1.3
+    two, four, eight = peak(2), peak(4), peak(8)
+    assert eight - four < 2 * (four - two) * 1.3
