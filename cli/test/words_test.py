@@ -17,7 +17,7 @@ COMMANDS = ["simulate", "inspect", "calibrate", "navigate", "replay", "evaluate"
 SCENARIO = """
 [scenario]
 seed = 5
-duration = "20min"
+duration = "8min"
 [gyro.drift]
 outside_sigma = "0rad/s"
 """
@@ -73,8 +73,8 @@ NONE = re.compile(r"(?<![a-z])(nan|inf)(?![a-z])", re.IGNORECASE)
 
 @pytest.mark.parametrize("scenario", [
     SCENARIO + "[star_tracker]\noutlier_probability = 1\n",
-    SCENARIO + '[star_tracker]\noutages = [{begin = "30s", end = "20min"}]\n',
-    SCENARIO.replace("20min", "61s"),
+    SCENARIO + '[star_tracker]\noutages = [{begin = "30s", end = "8min"}]\n',
+    SCENARIO.replace("8min", "61s"),
 ], ids=["every fix wrong", "hardly any fix", "a minute"])
 def test_a_number_that_is_none_is_said_in_words(flown, tmp_path, scenario):
     poor = with_scenario(tmp_path, "poor", scenario)
