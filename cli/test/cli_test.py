@@ -764,9 +764,9 @@ start_direction_c = [0.050, 0.124, 0.991]
 def observe(tmp_path):
     """Runs `observe` on the steady flight, with these slews, or on something else."""
 
-    def go(*arguments, slews='"none"', of=None):
+    def go(*arguments, slews='"none"', of=None, duration="80min"):
         (tmp_path / "told.toml").write_text(TOLD)
-        (tmp_path / "steady.toml").write_text(STEADY.replace("{slews}", slews))
+        (tmp_path / "steady.toml").write_text(STEADY.replace("{slews}", slews).replace("80min", duration))
         return run("observe", of or tmp_path / "steady.toml", "--config", tmp_path / "told.toml", *arguments)
 
     return go
@@ -802,14 +802,14 @@ def test_observe_finds_nothing_missing_in_a_pass_with_slews(observe):
 @pytest.mark.long
 def test_advice_can_be_pasted_and_is_confirmed(observe):
     result = observe("--advise", "--slews", "1", "--manoeuvre-time", "8min", "--max-angle", "20deg", "--max-rate", "0.4deg/s",
-                     "--confirm", "2")
+                     "--confirm", "2", duration="50min")
     assert result.returncode == TRUSTWORTHY
     assert "by 2 simulated flights" in result.stdout
     assert 'max_slew_rate = "0.4deg/s"' in result.stdout
     slews = result.stdout.split("slews = ")[1].split("]")[0] + "]"
-    assert observe(slews=slews).returncode == TRUSTWORTHY
+    assert observe(slews=slews, duration="50min").returncode == TRUSTWORTHY
 
-    result = observe("--json", "--advise", "--slews", "1", "--manoeuvre-time", "8min", "--confirm", "2")
+    result = observe("--json", "--advise", "--slews", "1", "--manoeuvre-time", "8min", "--confirm", "2", duration="50min")
     assert result.returncode == TRUSTWORTHY
     advice = json.loads(result.stdout)["advice"]
     assert len(advice["slews"]) == 2

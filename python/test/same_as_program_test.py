@@ -178,10 +178,10 @@ def test_feed_reports_every_event(flown):
 
 THREE_GYROS_AND_TWO_HEADS = """
 [scenario]
-duration = "15min"
+duration = "8min"
 seed = 11
 [gyro]
-gaps = [{begin = "5min", end = "6min"}]
+gaps = [{begin = "3min", end = "4min"}]
 [[gyro.unit]]
 start_direction_c = [0.995, 0.087, 0.045]
 [[gyro.unit]]
