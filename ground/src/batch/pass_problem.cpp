@@ -643,6 +643,20 @@ PassProblem::FixRows PassProblem::compare(const PassSolution& solution, const Mo
   return rows;
 }
 
+MatrixXd PassProblem::rows_about_alignments(const PassSolution& solution, const Moment& moment) const {
+  Compared fix = compare_now(solution, moment);
+  const Index count = fix.rows.rows();
+  if (count == 0 || whiten_rows(fix) > gate_of(count)) {
+    return {};
+  }
+  MatrixXd rows(count, 3L * gyros_ + 1);
+  for (int k = 0; k < gyros_; ++k) {
+    rows.middleCols<3>(3L * k) = fix.rows.middleCols<3>(on_board_.alignment(k));
+  }
+  rows.rightCols<1>() = fix.rows.col(on_board_.size());
+  return rows;
+}
+
 bool PassProblem::is_outlier(const FixRows& rows) const {
   return nis_of(rows.y, rows.R_alone) > gate_of(rows.y.size());
 }

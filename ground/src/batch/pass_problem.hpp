@@ -168,6 +168,9 @@ class PassProblem {
     Eigen::MatrixXd R_alone;  ///< by which it agrees or not
   };
   [[nodiscard]] FixRows compare(const PassSolution& solution, const Moment& moment) const;
+  /// The same by the alignments alone: rows of unit noise, three columns of each gyro, and the misfit; none of a fix
+  /// that cannot be compared or is an outlier. A moment of go_along_momenta() is enough.
+  [[nodiscard]] Eigen::MatrixXd rows_about_alignments(const PassSolution& solution, const Moment& moment) const;
 
   /// Whether its weight is reduced because it is beyond the gate.
   [[nodiscard]] bool is_outlier(const FixRows& rows) const;

@@ -11,6 +11,7 @@
 #include <utility>
 
 #include "batch/gram.hpp"
+#include "choose/jumps.hpp"
 #include "trihedron/core/frames.hpp"
 
 namespace trihedron::ground {
@@ -34,6 +35,18 @@ constexpr int kBeforeReadout = kOfAberration + kMultiplesOfRate * kOfMultiple;
 constexpr int kOfCase = 6;
 constexpr int kOfShapesOfGyro = kOfReadout + kOfCase;
 
+/// Columns of the shapes of one jump: rotations of all cases, of each, steps of each momentum, rotations of the
+/// inertial axes.
+struct ColumnsOfJump {
+  int gyros;
+
+  [[nodiscard]] Index all_cases() const { return 0; }
+  [[nodiscard]] Index case_of(int gyro) const { return 3 + 3L * gyro; }
+  [[nodiscard]] Index momentum(int gyro) const { return 3 + 3L * gyros + 2L * gyro; }
+  [[nodiscard]] Index axes() const { return 3 + 5L * gyros; }
+  [[nodiscard]] Index size() const { return 6 + 5L * gyros; }
+};
+
 /// A stretch of the pass as a sum of squares, a form zᵀ Q z of the states that move at its beginning and at its end, of
 /// constants, of shapes of errors of the fixes, and of 1. What moves at the beginning counts as constant in it.
 class Stretch {
@@ -54,11 +67,13 @@ class Stretch {
     }
   }
 
-  /// Goes on to the beginning of the next arc.
-  void move(const SmootherStage& its) {
+  /// Goes on to the beginning of the next arc. `by_shapes`: of its states, by those shapes of which a part happens in
+  /// this one, the last of all.
+  void move(const SmootherStage& its, const MatrixXd& by_shapes) {
     constexpr double kLeastNoise_rad = 1e-9;  // 0.2 mas: no reading shows it
     LongRows B = LongRows::Zero(d_, d_ + rest_);
     B.middleCols(d_, its.B.cols()) = its.B;
+    B.rightCols(by_shapes.cols()) = by_shapes;
     if (stages_.empty()) {  // w = (d' − A d − B c − m) / noise
       MatrixXd rows(d_, 2 * d_ + rest_);
       rows << MatrixXd::Identity(d_, d_), -its.A_inverse.inverse(), -B.rightCols(rest_);
@@ -137,10 +152,10 @@ Matrix3d cross(const Vector3d& v) {
 /// period, over the speed of light, in axes; rotations of the star tracker that go to and fro at multiples of the
 /// orbital rate; gyro by gyro what the scales of the direction cosines are off 1, and the angles between their axes off
 /// right angles, then rotations of the case that go to and fro at the orbital rate. Each moves the directions as a
-/// small rotation of the cases would, an alignment.
+/// small rotation of the cases would, an alignment. Then `more` columns of zero.
 MatrixXd shapes_of(const CalibrationSetup& setup, const PassProblem::Moment& moment, const Layout& layout,
-                   const MatrixXd& rows) {
-  MatrixXd shapes = MatrixXd::Zero(rows.rows(), kBeforeReadout + Index{kOfShapesOfGyro} * layout.gyros);
+                   const MatrixXd& rows, Index more) {
+  MatrixXd shapes = MatrixXd::Zero(rows.rows(), kBeforeReadout + Index{kOfShapesOfGyro} * layout.gyros + more);
   const Matrix3d C_c_in = moment.fix->fix.q_in_c.normalized().toRotationMatrix().transpose();
   const Matrix3d aberrated = cross(Vector3d::UnitZ()) * C_c_in;
   const double phase = setup.orbital_rate_rad_s * to_seconds(moment.t - setup.orbital_phase_zero);
@@ -227,7 +242,8 @@ MatrixXd without_states_at_end(const MatrixXd& form, Index states) {
 class Constancy {
  public:
   /// `found`: converged, so that its rows are about what is most likely.
-  Constancy(const PassProblem& problem, const BatchResult& found) : problem_(problem), layout_(problem_.layout()) {
+  Constancy(const PassProblem& problem, const BatchResult& found, const std::vector<Jump>& jumps)
+      : problem_(problem), layout_(problem_.layout()), jump_{layout_.gyros} {
     const PassProblem::Linear& linear = found.linear;
     for (std::size_t i = 0; i <= stretches(problem_.arcs()); ++i) {
       begins_.push_back(i * problem_.arcs() / stretches(problem_.arcs()));
@@ -235,7 +251,9 @@ class Constancy {
     const auto count = static_cast<Index>(begins_.size()) - 1;
     const Index d = layout_.dynamic();
     const Index n = layout_.size();
-    const Index shapes = kBeforeReadout + Index{kOfShapesOfGyro} * layout_.gyros;
+    const Index lasting = kBeforeReadout + Index{kOfShapesOfGyro} * layout_.gyros;
+    const Index of_jumps = static_cast<Index>(jumps.size()) * jump_.size();
+    const Index shapes = lasting + of_jumps;
     std::vector<Index> parameters;
     std::vector<Index> others;
     for (Index c = d; c < n; ++c) {
@@ -286,14 +304,55 @@ class Constancy {
     Stretch stretch(d, n - d, shapes);
     stretch.measure(prior_rows(linear, shapes));
     Index at_stretch = 0;
-    const auto beside = [this](const PassProblem::Moment& moment, const Layout& layout, const MatrixXd& rows) {
-      return shapes_of(problem_.setup().on_board, moment, layout, rows);
+    const auto momentum_by_axes = [&](std::size_t arc, int gyro) -> Eigen::Matrix<double, 2, 3> {
+      return across(found.before.arcs[arc].h_in[gyro]).transpose();
+    };
+    const auto is_in = [&](const Jump& jump, std::size_t arc) {
+      return problem_.begin_of(arc) <= jump.after &&
+             (arc + 1 == problem_.arcs() || jump.after < problem_.begin_of(arc + 1));
+    };
+    const auto beside = [&](const PassProblem::Moment& moment, const Layout& layout, const MatrixXd& rows) {
+      MatrixXd columns = shapes_of(problem_.setup().on_board, moment, layout, rows, of_jumps);
+      for (std::size_t j = 0; j < jumps.size(); ++j) {
+        if (moment.t < jumps[j].after) {
+          continue;
+        }
+        auto own = columns.middleCols(lasting + static_cast<Index>(j) * jump_.size(), jump_.size());
+        for (int k = 0; k < layout.gyros; ++k) {
+          const auto by_alignment = rows.middleCols<3>(layout.alignment(k));
+          own.middleCols<3>(jump_.all_cases()) += by_alignment;
+          own.middleCols<3>(jump_.case_of(k)) = by_alignment;
+          if (is_in(jumps[j], moment.arc)) {
+            const Eigen::Matrix<double, Eigen::Dynamic, 2> by_momentum = rows.middleCols<2>(layout.direction(k));
+            own.middleCols<2>(jump_.momentum(k)) = by_momentum;
+            own.middleCols<3>(jump_.axes()) += by_momentum.lazyProduct(momentum_by_axes(moment.arc, k));
+          }
+        }
+      }
+      return columns;
+    };
+    // How the states after an arc follow the jumps in it.
+    const auto moved_by_jumps = [&](std::size_t arc) {
+      MatrixXd moved = MatrixXd::Zero(d, of_jumps);
+      for (std::size_t j = 0; j < jumps.size(); ++j) {
+        if (is_in(jumps[j], arc)) {
+          const MatrixXd A = linear.stages[arc].A_inverse.inverse();
+          for (int k = 0; k < layout_.gyros; ++k) {
+            const auto at = layout_.direction(k);
+            const Index own = static_cast<Index>(j) * jump_.size();
+            const Eigen::Matrix2d kept = A.block<2, 2>(at, at);
+            moved.block<2, 2>(at, own + jump_.momentum(k)) = kept;
+            moved.block<2, 3>(at, own + jump_.axes()) = kept * momentum_by_axes(arc, k);
+          }
+        }
+      }
+      return moved;
     };
     problem_.for_each_arc(found.before, beside, [&](std::size_t arc, const MatrixXd& fixes) {
       stretch.measure(fixes);
       const bool is_last = arc + 1 == problem_.arcs();
       if (!is_last) {
-        stretch.move(linear.stages[arc]);
+        stretch.move(linear.stages[arc], moved_by_jumps(arc));
       }
       if (arc + 1 == begins_[static_cast<std::size_t>(at_stretch) + 1]) {
         add_stretch(at_stretch++, stretch.form(is_last));
@@ -317,6 +376,7 @@ class Constancy {
     form_ = without_first(rest, static_cast<Index>(others.size()) + of_stretch(), &follow);
     follow_ = follow.middleRows(static_cast<Index>(others.size()), own);
     at_shapes_ = (count - 1) * of_stretch();
+    at_jumps_ = at_shapes_ + lasting;
   }
 
   static std::size_t stretches(std::size_t arcs) {
@@ -341,6 +401,9 @@ class Constancy {
   [[nodiscard]] Index multiple(int i) const { return at_shapes_ + kOfAberration + Index{kOfMultiple} * i; }
   [[nodiscard]] Index readout(int gyro) const { return at_shapes_ + kBeforeReadout + Index{kOfShapesOfGyro} * gyro; }
   [[nodiscard]] Index case_of(int gyro) const { return readout(gyro) + kOfReadout; }
+  /// Of the shapes of a jump, whose columns these are.
+  [[nodiscard]] Index of_jump(std::size_t j) const { return at_jumps_ + static_cast<Index>(j) * jump_.size(); }
+  [[nodiscard]] const ColumnsOfJump& jump() const { return jump_; }
   [[nodiscard]] Index size() const { return form_.rows() - 1; }
   /// Middle of a stretch, of the pass from 0 to 1.
   [[nodiscard]] double part(Index stretch) const {
@@ -354,9 +417,10 @@ class Constancy {
   }
 
   /// What moves as these columns times numbers of this 1-sigma; gets log_odds (of one try), and where these are above
-  /// `worth_more_than`, size, sigma and what is off by it.
+  /// `worth_more_than`, size, sigma and what is off by it. `after`: what it makes of the parameters, where the columns
+  /// are of shapes.
   void put_into(Change& change, const Eigen::SparseMatrix<double>& columns, const VectorXd& prior_sigma,
-                double worth_more_than) const {
+                double worth_more_than, const MatrixXd* after = nullptr) const {
     const MatrixXd by_form = form_.topLeftCorner(size(), size()) * columns;
     const auto D = prior_sigma.asDiagonal();
     MatrixXd root =
@@ -375,8 +439,11 @@ class Constancy {
     change.sigma = D * VectorXd(inverse.colwise().norm().transpose());
     MatrixXd off_by = -(follow_.leftCols(size()) * columns);
     for (Index step = 0; step < steps(); ++step) {
-      const double after = change.motion == Motion::kOrbital ? part_after(step) : 1;
-      off_by += after * columns.middleRows(parameter(step, 0, 0), off_by.rows());
+      const double part = change.motion == Motion::kOrbital ? part_after(step) : 1;
+      off_by += part * columns.middleRows(parameter(step, 0, 0), off_by.rows());
+    }
+    if (after != nullptr) {
+      off_by += *after;
     }
     change.parameters_off = off_by * change.size;
     const MatrixXd half = inverse * (D * off_by.transpose());
@@ -391,7 +458,9 @@ class Constancy {
   std::vector<std::size_t> begins_;  ///< arcs where stretches begin, and their number
   MatrixXd form_;
   MatrixXd follow_;  ///< parameters by the variables, negated
+  ColumnsOfJump jump_;
   Index at_shapes_ = 0;
+  Index at_jumps_ = 0;
 };
 
 /// Looks for the polhode of each rotor, along the steps of its coefficients: first for the number of turns in the pass,
@@ -500,7 +569,8 @@ Moves moves_over(const Trial& trial) {
     further = most_likely(problem, trial.found().solution, kConverged);
   }
   const BatchResult& found = further ? *further : trial.found();
-  const Constancy pass(problem, found);
+  const Jumps jumps = jumps_over(trial);
+  const Constancy pass(problem, found, jumps.jumps);
   const Layout& layout = problem.layout();
   const Index steps = pass.steps();
   // What may be expected of each, 1-sigma: a case or a head that slips, a good one that creeps or goes to and fro,
@@ -536,7 +606,8 @@ Moves moves_over(const Trial& trial) {
   using Entries = std::vector<Eigen::Triplet<double>>;
   std::vector<Change> best;
   int tries = 0;
-  const auto consider = [&](Change change, const Entries& entries, const VectorXd& sigma) {
+  const auto consider = [&](Change change, const Entries& entries, const VectorXd& sigma, double among = 1,
+                            const MatrixXd* after = nullptr) {
     ++tries;
     Eigen::SparseMatrix<double> columns(pass.size(), sigma.size());
     columns.setFromTriplets(entries.begin(), entries.end());
@@ -544,7 +615,9 @@ Moves moves_over(const Trial& trial) {
       return other.moving == change.moving && other.motion == change.motion && other.gyro == change.gyro;
     });
     const bool is_first = same == best.end();
-    pass.put_into(change, columns, sigma, is_first ? -std::numeric_limits<double>::infinity() : same->log_odds);
+    const double worth_more_than = is_first ? -std::numeric_limits<double>::infinity() : same->log_odds;
+    pass.put_into(change, columns, sigma, worth_more_than + std::log(among), after);
+    change.log_odds -= std::log(among);
     if (is_first) {
       best.push_back(std::move(change));
     } else if (change.log_odds > same->log_odds) {
@@ -654,6 +727,25 @@ Moves moves_over(const Trial& trial) {
     consider(what(Moving::kGyroCase, Motion::kOrbital, k), shape(pass.case_of(k), kOfCase),
              sigmas(kOfCase, kCreeps_rad));
   }
+  for (std::size_t j = 0; j < jumps.jumps.size(); ++j) {
+    const auto& [from, until] = jumps.jumps[j];
+    const auto among = static_cast<double>(jumps.among);
+    for (int k = -1; k < layout.gyros; ++k) {
+      MatrixXd after = MatrixXd::Zero(kOfGyro * layout.gyros, 3);
+      for (int gyro = std::max(k, 0); gyro < (k < 0 ? layout.gyros : k + 1); ++gyro) {
+        after.middleRows<3>(kOfGyro * gyro + Layout::kEq1).setIdentity();
+      }
+      const Index of_case = pass.of_jump(j) + (k < 0 ? pass.jump().all_cases() : pass.jump().case_of(k));
+      for (const double rad : {kSlips_rad, kCreeps_rad}) {
+        consider(what(k < 0 ? Moving::kStarTracker : Moving::kGyroCase, Motion::kStep, k, from, until),
+                 shape(of_case, 3), sigmas(3, rad), among, &after);
+      }
+      const Index of_momentum = pass.of_jump(j) + (k < 0 ? pass.jump().axes() : pass.jump().momentum(k));
+      const Index size = k < 0 ? 3 : 2;
+      consider(what(k < 0 ? Moving::kInertialAxes : Moving::kMomentum, Motion::kStep, k, from, until),
+               shape(of_momentum, size), sigmas(size, kSlips_rad), among);
+    }
+  }
   for (const double part : {0.01, 0.03, 0.1, 0.3, 1.0}) {
     Entries entries;
     VectorXd sigma(steps * coefficient_sigma.size());
@@ -717,7 +809,7 @@ OrbitalOdds orbital_odds(const Trial& trial) {
   problem.for_each_arc(found.before, beside, [&](std::size_t arc, const MatrixXd& fixes) {
     whole.measure(fixes);
     if (arc + 1 < problem.arcs()) {
-      whole.move(found.linear.stages[arc]);
+      whole.move(found.linear.stages[arc], MatrixXd(d, 0));
     }
   });
   const MatrixXd form = without_first(without_states_at_end(whole.form(true), d), d + constants);

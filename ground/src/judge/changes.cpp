@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <chrono>
 #include <cmath>
 #include <optional>
 #include <string>
@@ -250,7 +251,10 @@ void judge_changes(const CalibrationRun& run, std::vector<Finding>& findings) {
   const auto minutes = [&](Time t) { return to_seconds(t - run.calibration.epoch) / 60; };
   std::string when;
   if (likeliest.motion == Motion::kStep) {
-    when = fmt::format(" between {:.0f} and {:.0f} min", minutes(likeliest.from), minutes(likeliest.until));
+    constexpr Duration kToTheMinute = std::chrono::minutes(1);
+    when = likeliest.until - likeliest.from < kToTheMinute
+               ? fmt::format(" at {:.1f} min", minutes(likeliest.until))
+               : fmt::format(" between {:.0f} and {:.0f} min", minutes(likeliest.from), minutes(likeliest.until));
   }
   std::string what = described(likeliest);
   what.front() = static_cast<char>(what.front() - 'a' + 'A');

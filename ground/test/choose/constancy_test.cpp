@@ -105,6 +105,33 @@ TEST(Constancy, NamesTheStarTrackerThatSlipped) {
   EXPECT_FALSE(run.calibration.verdict.trustworthy);
 }
 
+// Drift outside eq. (1), or that wanders, would be taken for so small a step, were it not between two fixes.
+TEST(Constancy, NamesMountingsThatSlipByArcsecondsAndTheSecondOfIt) {
+  constexpr double kAt_s = 3096;
+  const auto slips = [](Scenario& scenario, MountingChange& mounting, const Eigen::Vector3d& step_rad) {
+    mounting = {.step_rad = step_rad, .step_at_s = kAt_s};
+    const CalibrationRun run = calibrate(sim::simulate(scenario).pass, CalibrationOptions());
+    const Change& change = run.changes.front();
+    EXPECT_TRUE(change.is_found());
+    EXPECT_EQ(change.motion, Motion::kStep);
+    const Time at = run.calibration.epoch + from_seconds(kAt_s);
+    EXPECT_EQ(change.until, at);
+    EXPECT_EQ(change.from, at - scenario.star_tracker_period);
+    EXPECT_LT(((change.size - step_rad).array() / change.sigma.array()).abs().maxCoeff(), 4);
+    return change;
+  };
+  Scenario scenario;
+  scenario.seed = 1;
+  scenario.duration = std::chrono::hours(2);
+  scenario.gyro_period = std::chrono::milliseconds(250);
+  Scenario other = scenario;
+  EXPECT_EQ(slips(scenario, scenario.star_tracker.mounting_change, {0, 12 * kArcsecond, 0}).moving,
+            Moving::kStarTracker);
+  const Change of_case = slips(other, other.gyros[1].mounting_change, {12 * kArcsecond, 0, 0});
+  EXPECT_EQ(of_case.moving, Moving::kGyroCase);
+  EXPECT_EQ(of_case.gyro, 1);
+}
+
 TEST(Constancy, NamesTheStarTrackerThatTurnsSlowly) {
   const CalibrationRun run = calibrated(3, [](Scenario& scenario) {
     scenario.star_tracker.mounting_change.rate_rad_s = 60 * kArcsecond / (2 * kMiddle_s) * kAxis;
