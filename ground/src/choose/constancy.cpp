@@ -40,8 +40,8 @@ constexpr int kOfShapesOfGyro = kOfReadout + kOfCase;
 struct ColumnsOfJump {
   int gyros;
 
-  [[nodiscard]] Index all_cases() const { return 0; }
-  [[nodiscard]] Index case_of(int gyro) const { return 3 + 3L * gyro; }
+  static constexpr Index kAllCases = 0;
+  [[nodiscard]] static Index case_of(int gyro) { return 3 + 3L * gyro; }
   [[nodiscard]] Index momentum(int gyro) const { return 3 + 3L * gyros + 2L * gyro; }
   [[nodiscard]] Index axes() const { return 3 + 5L * gyros; }
   [[nodiscard]] Index size() const { return 6 + 5L * gyros; }
@@ -320,8 +320,8 @@ class Constancy {
         auto own = columns.middleCols(lasting + static_cast<Index>(j) * jump_.size(), jump_.size());
         for (int k = 0; k < layout.gyros; ++k) {
           const auto by_alignment = rows.middleCols<3>(layout.alignment(k));
-          own.middleCols<3>(jump_.all_cases()) += by_alignment;
-          own.middleCols<3>(jump_.case_of(k)) = by_alignment;
+          own.middleCols<3>(ColumnsOfJump::kAllCases) += by_alignment;
+          own.middleCols<3>(ColumnsOfJump::case_of(k)) = by_alignment;
           if (is_in(jumps[j], moment.arc)) {
             const Eigen::Matrix<double, Eigen::Dynamic, 2> by_momentum = rows.middleCols<2>(layout.direction(k));
             own.middleCols<2>(jump_.momentum(k)) = by_momentum;
@@ -735,7 +735,7 @@ Moves moves_over(const Trial& trial) {
       for (int gyro = std::max(k, 0); gyro < (k < 0 ? layout.gyros : k + 1); ++gyro) {
         after.middleRows<3>(kOfGyro * gyro + Layout::kEq1).setIdentity();
       }
-      const Index of_case = pass.of_jump(j) + (k < 0 ? pass.jump().all_cases() : pass.jump().case_of(k));
+      const Index of_case = pass.of_jump(j) + (k < 0 ? ColumnsOfJump::kAllCases : ColumnsOfJump::case_of(k));
       for (const double rad : {kSlips_rad, kCreeps_rad}) {
         consider(what(k < 0 ? Moving::kStarTracker : Moving::kGyroCase, Motion::kStep, k, from, until),
                  shape(of_case, 3), sigmas(3, rad), among, &after);
