@@ -162,17 +162,29 @@ double sigmas_off(const Calibration& calibration, const Change& change, bool ali
   return worst;
 }
 
-/// The amplitude of rotations to and fro of the star tracker or of a case, which are taken for the attitude, the
-/// largest in its claimed sigmas.
+/// What moves the attitude by the fixes, in its claimed sigmas, the largest of its axes: the amplitude of rotations to
+/// and fro of the star tracker or of a case, which are taken for the attitude; how far the star tracker or its inertial
+/// axes have moved, by which the attitude before differs from that after.
 double sigmas_off_attitude(const CalibrationRun& run, const Change& change) {
-  const bool is_to_and_fro =
-      change.motion == Motion::kFaster || (change.motion == Motion::kOrbital && change.moving == Moving::kGyroCase);
-  if (!is_to_and_fro || run.attitude.sigma_rad.empty()) {
+  if (run.attitude.sigma_rad.empty()) {
     return 0;
   }
-  const Eigen::Array3d sine = change.size.head<3>();
-  const Eigen::Array3d cosine = change.size.tail<3>();
-  return ((sine.square() + cosine.square()).sqrt() / run.attitude.sigma_rad.back().array()).maxCoeff();
+  const Eigen::Array3d sigma_rad = run.attitude.sigma_rad.back().array();
+  const bool is_to_and_fro =
+      change.motion == Motion::kFaster || (change.motion == Motion::kOrbital && change.moving == Moving::kGyroCase);
+  if (is_to_and_fro) {
+    const Eigen::Array3d sine = change.size.head<3>();
+    const Eigen::Array3d cosine = change.size.tail<3>();
+    return ((sine.square() + cosine.square()).sqrt() / sigma_rad).maxCoeff();
+  }
+  if (change.moving == Moving::kStarTracker) {
+    return (change.size.array() / sigma_rad).abs().maxCoeff();
+  }
+  if (change.moving == Moving::kInertialAxes) {
+    const Eigen::Vector3d size_c = run.attitude.q_in_c.back().conjugate() * Eigen::Vector3d(change.size);
+    return (size_c.array() / sigma_rad).abs().maxCoeff();
+  }
+  return 0;
 }
 
 /// The likeliest, where it counts as there.
