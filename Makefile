@@ -34,7 +34,7 @@ help:
 	@echo 'make deb      Debian packages, in out/deb, and what lintian says of them; make deb-test tries them in fresh roots'
 	@echo 'make image    an OCI image of the program, in out/image, after `make deb`; make image-test tries it'
 	@echo 'make conan-test  the Conan package of the flight library, used by another project'
-	@echo 'make fuzz-briefly  each reader against libFuzzer for twenty seconds or less: three minutes'
+	@echo 'make fuzz-briefly  each reader against libFuzzer for twenty seconds or less'
 	@echo 'make fuzz     each reader against libFuzzer for FUZZ_SECONDS (3600) each, measures again what docs/reliability.md tells: hours'
 	@echo 'make docs     the site of all documents: tutorials, how-to, reference, explanation, in out/docs/index.html'
 	@echo 'make shown    run the commands that the documents show, and write what they print into them'

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <functional>
 
 #include "added_drift.hpp"
@@ -118,6 +119,11 @@ TEST(Constancy, NamesMountingsThatSlipByArcsecondsAndTheSecondOfIt) {
     EXPECT_EQ(change.until, at);
     EXPECT_EQ(change.from, at - scenario.star_tracker_period);
     EXPECT_LT(((change.size - step_rad).array() / change.sigma.array()).abs().maxCoeff(), 4);
+    // Attitudes before and after are apart by many of their sigmas, whatever the parameters are.
+    const bool forbids_use = std::ranges::any_of(run.calibration.verdict.findings, [](const Finding& finding) {
+      return finding.code == FindingCode::kStarTrackerMoved && finding.severity == FindingSeverity::kDoNotUse;
+    });
+    EXPECT_EQ(forbids_use, change.moving == Moving::kStarTracker);
     return change;
   };
   Scenario scenario;
