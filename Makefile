@@ -42,7 +42,7 @@ help:
 	@echo 'make sanitize build with clang under address and undefined-behaviour sanitizers, and run the tests that are not long'
 	@echo 'make coverage the tests of core in that build, and the lines and branches of core that they take'
 	@echo 'make setup | format | lint | clean'
-	@echo 'Files are compiled in units of 32, which makes a whole build shorter. Who edits one is served sooner with'
+	@echo 'All files of a module are compiled in one unit, which makes a whole build shorter. Who edits one is served sooner with'
 	@echo 'CMAKE_FLAGS=-DCMAKE_UNITY_BUILD=OFF, which compiles each on its own.'
 
 setup:

@@ -68,7 +68,8 @@ void check_there(const fs::path& path) {
 
 int gyros_of(const Series& gyro) { return static_cast<int>(gyro.columns.size() / 3); }
 
-const std::string& required(const std::optional<std::string>& attribute, const fs::path& file, const char* name) {
+const std::string& required_attribute(const std::optional<std::string>& attribute, const fs::path& file,
+                                      const char* name) {
   if (!attribute) {
     throw InputRefused(file, {}, fmt::format("lacks the attribute \"{}\"", name),
                        "write it as `trihedron simulate` does");
@@ -256,8 +257,9 @@ std::optional<Truth> read_truth_netcdf(const fs::path& file) {
   }
   const auto parameters = reader.text_attributes(kTruthGroup, {kTruthAttribute}).front();
   const auto settings = reader.text_attributes("", {kSettingsAttribute}).front();
-  const Time epoch = parse_pass_epoch(required(settings, file, kSettingsAttribute), inside(file, kSettingsAttribute));
-  return make_truth(required(parameters, file, kTruthAttribute), inside(file, kTruthAttribute),
+  const Time epoch =
+      parse_pass_epoch(required_attribute(settings, file, kSettingsAttribute), inside(file, kSettingsAttribute));
+  return make_truth(required_attribute(parameters, file, kTruthAttribute), inside(file, kTruthAttribute),
                     reader.read_group(kTruthGroup, epoch, truth_columns), epoch);
 }
 
@@ -376,7 +378,7 @@ UnscreenedPass read_raw_directory(const fs::path& directory) {
 UnscreenedPass read_raw_netcdf(const fs::path& file) {
   const NetcdfInput reader(file);
   const auto attributes = reader.text_attributes("", {kSettingsAttribute, kPriorAttribute});
-  const std::string& settings_text = required(attributes[0], file, kSettingsAttribute);
+  const std::string& settings_text = required_attribute(attributes[0], file, kSettingsAttribute);
   const Time epoch = parse_pass_epoch(settings_text, inside(file, kSettingsAttribute));
   UnscreenedPass raw;
   raw.gyro = reader.read_group(kGyroGroup, epoch, gyro_columns);

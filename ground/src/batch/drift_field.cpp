@@ -77,7 +77,7 @@ bool is_symmetric(const DriftCoefficient& member) {
 }
 
 /// The pass by one spectrum.
-struct Likelihood {
+struct FieldLikelihood {
   VectorXd sigma;  ///< of the members, rad/s
   MatrixXd L;      ///< root of the covariance of y
   VectorXd y;      ///< white
@@ -107,9 +107,9 @@ class Posteriors {
         prior_mean_(prior_mean(members.groups())),
         prior_(prior_information(members.groups())) {}
 
-  [[nodiscard]] Likelihood at(const VectorXd& log_rms) const {
+  [[nodiscard]] FieldLikelihood at(const VectorXd& log_rms) const {
     check_stop();
-    Likelihood found;
+    FieldLikelihood found;
     found.sigma = members_.sigma(log_rms);
     // y by its own covariance: there are fewer of it than of the members.
     MatrixXd covariance = MatrixXd::Identity(information_.R.rows(), information_.R.rows());
@@ -125,7 +125,7 @@ class Posteriors {
     return found;
   }
 
-  [[nodiscard]] Posterior posterior(const Likelihood& by) const {
+  [[nodiscard]] Posterior posterior(const FieldLikelihood& by) const {
     Posterior found;
     found.sigma = by.sigma;
     found.white = information_.R * by.sigma.asDiagonal();
@@ -141,7 +141,7 @@ class Posteriors {
     MatrixXd observed;  ///< what it is,
     MatrixXd mean;      ///< and a mean of both that is always positive definite
   };
-  [[nodiscard]] Slope slope(const VectorXd& log_rms, const Likelihood& by) const {
+  [[nodiscard]] Slope slope(const VectorXd& log_rms, const FieldLikelihood& by) const {
     const Posterior at = posterior(by);
     MatrixXd learnt = MatrixXd::Zero(members_.size(), members_.size());
     add_gram(at.white.transpose(), 1, learnt);
@@ -392,7 +392,7 @@ FieldSpectrum most_likely_spectrum(const FieldMembers& members, const FieldInfor
   const Posteriors posteriors(members, information);
   FieldSpectrum spectrum;
   spectrum.log_rms = first.size() > 0 ? first : members.expected();
-  Likelihood here = posteriors.at(spectrum.log_rms);
+  FieldLikelihood here = posteriors.at(spectrum.log_rms);
   for (int i = 0; i < kMostSteps; ++i) {
     const Posteriors::Slope slope = posteriors.slope(spectrum.log_rms, here);
     spectrum.information = slope.expected;
@@ -402,7 +402,7 @@ FieldSpectrum most_likely_spectrum(const FieldMembers& members, const FieldInfor
     }
     step *= std::min(1.0, kLongestStep / step.cwiseAbs().maxCoeff());
     step = (spectrum.log_rms + step).cwiseMin(std::log(kMostRms_rad_s)) - spectrum.log_rms;
-    Likelihood next = posteriors.at(spectrum.log_rms + step);
+    FieldLikelihood next = posteriors.at(spectrum.log_rms + step);
     for (int halving = 0; halving < kMostHalvings && !(next.log_likelihood > here.log_likelihood); ++halving) {
       step /= 2;
       next = posteriors.at(spectrum.log_rms + step);
@@ -449,7 +449,7 @@ VectorXd log_of_mean_squares(const Posteriors& posteriors, const FieldSpectrum& 
 MatrixXd covariance_of_spectrum(const FieldMembers& members, const FieldInformation& information,
                                 const FieldSpectrum& spectrum) {
   const Posteriors posteriors(members, information);
-  const Likelihood likelihood = posteriors.at(spectrum.log_rms);
+  const FieldLikelihood likelihood = posteriors.at(spectrum.log_rms);
   const Posterior most_likely = posteriors.posterior(likelihood);
   const Posterior mean =
       posteriors.posterior(posteriors.at(log_of_mean_squares(posteriors, spectrum, likelihood.log_likelihood)));
@@ -463,8 +463,9 @@ MatrixXd covariance_of_spectrum(const FieldMembers& members, const FieldInformat
 namespace {
 
 /// `added`: to the variances of the amplitudes, by the uncertainty of the spectrum.
-MeanSquares mean_squares_of(const Layout& layout, const FieldMembers& members, const FieldInformation& information,
-                            const FieldSpectrum& spectrum, const VectorXd& added) {
+MeanSquares posterior_mean_squares(const Layout& layout, const FieldMembers& members,
+                                   const FieldInformation& information, const FieldSpectrum& spectrum,
+                                   const VectorXd& added) {
   const Posteriors posteriors(members, information);
   const Posterior found = posteriors.posterior(posteriors.at(spectrum.log_rms));
   const VectorXd learnt = found.white.colwise().squaredNorm();
@@ -525,7 +526,7 @@ FieldPrior field_prior(const PassProblem& problem, const FieldMembers& members, 
   prior.sigma_rad_s = members.sigma(spectrum.log_rms);
   const MatrixXd added = covariance_of_spectrum(members, information, spectrum);
   prior.log_evidence = spectrum.log_likelihood - (information.log_likelihood - information.y.squaredNorm() / 2);
-  prior.members = mean_squares_of(layout, members, information, spectrum, added.diagonal());
+  prior.members = posterior_mean_squares(layout, members, information, spectrum, added.diagonal());
   MatrixXd by_members = MatrixXd::Zero(layout.parameters(), members.size());
   std::vector<bool> is_member(static_cast<std::size_t>(layout.parameters()), false);
   for (Index i = 0; i < members.size(); ++i) {

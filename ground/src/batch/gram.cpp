@@ -9,22 +9,22 @@ namespace {
 using Eigen::MatrixXd;
 
 struct GramKernels {
-  decltype(&kernels::gram_baseline::add_gram) add_gram;
-  decltype(&kernels::gram_baseline::solve_lower) solve_lower;
-  decltype(&kernels::gram_baseline::to_root) to_root;
-  decltype(&kernels::gram_baseline::to_axes) to_axes;
-  decltype(&kernels::gram_baseline::multiply) multiply;
-  decltype(&kernels::gram_baseline::subtract_product) subtract_product;
+  decltype(&kernels::for_baseline::add_gram) add_gram;
+  decltype(&kernels::for_baseline::solve_lower) solve_lower;
+  decltype(&kernels::for_baseline::to_root) to_root;
+  decltype(&kernels::for_baseline::to_axes) to_axes;
+  decltype(&kernels::for_baseline::multiply) multiply;
+  decltype(&kernels::for_baseline::subtract_product) subtract_product;
 };
 
 const GramKernels& gram_kernels() {
-  static constexpr GramKernels kBaseline{kernels::gram_baseline::add_gram, kernels::gram_baseline::solve_lower,
-                                         kernels::gram_baseline::to_root,  kernels::gram_baseline::to_axes,
-                                         kernels::gram_baseline::multiply, kernels::gram_baseline::subtract_product};
+  static constexpr GramKernels kBaseline{kernels::for_baseline::add_gram, kernels::for_baseline::solve_lower,
+                                         kernels::for_baseline::to_root,  kernels::for_baseline::to_axes,
+                                         kernels::for_baseline::multiply, kernels::for_baseline::subtract_product};
 #ifdef TRIHEDRON_HAS_AVX2
-  static constexpr GramKernels kAvx2{kernels::gram_avx2::add_gram, kernels::gram_avx2::solve_lower,
-                                     kernels::gram_avx2::to_root,  kernels::gram_avx2::to_axes,
-                                     kernels::gram_avx2::multiply, kernels::gram_avx2::subtract_product};
+  static constexpr GramKernels kAvx2{kernels::for_avx2::add_gram, kernels::for_avx2::solve_lower,
+                                     kernels::for_avx2::to_root,  kernels::for_avx2::to_axes,
+                                     kernels::for_avx2::multiply, kernels::for_avx2::subtract_product};
   static const GramKernels chosen = of_this_processor(kBaseline, kAvx2);
   return chosen;
 #else

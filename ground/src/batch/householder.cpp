@@ -7,15 +7,14 @@ namespace trihedron::ground {
 namespace {
 
 struct Rotations {
-  decltype(&kernels::householder_baseline::rotate_up) rotate_up;
-  decltype(&kernels::householder_baseline::rotate_rows_up) rotate_rows_up;
+  decltype(&kernels::for_baseline::rotate_up) rotate_up;
+  decltype(&kernels::for_baseline::rotate_rows_up) rotate_rows_up;
 };
 
 const Rotations& rotations() {
-  static constexpr Rotations kBaseline{kernels::householder_baseline::rotate_up,
-                                       kernels::householder_baseline::rotate_rows_up};
+  static constexpr Rotations kBaseline{kernels::for_baseline::rotate_up, kernels::for_baseline::rotate_rows_up};
 #ifdef TRIHEDRON_HAS_AVX2
-  static constexpr Rotations kAvx2{kernels::householder_avx2::rotate_up, kernels::householder_avx2::rotate_rows_up};
+  static constexpr Rotations kAvx2{kernels::for_avx2::rotate_up, kernels::for_avx2::rotate_rows_up};
   static const Rotations chosen = of_this_processor(kBaseline, kAvx2);
   return chosen;
 #else

@@ -5,14 +5,14 @@ namespace trihedron::ground::kernels {
 
 inline constexpr long kColumnsTogether = 64;
 
-namespace householder_baseline {
+namespace for_baseline {
 void rotate_up(double* a, long rows, long all_columns, long columns);
 void rotate_rows_up(double* a, long rows, long all_columns, long columns);
-}  // namespace householder_baseline
+}  // namespace for_baseline
 
-namespace householder_avx2 {
+namespace for_avx2 {
 void rotate_up(double* a, long rows, long all_columns, long columns);
 void rotate_rows_up(double* a, long rows, long all_columns, long columns);
-}  // namespace householder_avx2
+}  // namespace for_avx2
 
 }  // namespace trihedron::ground::kernels

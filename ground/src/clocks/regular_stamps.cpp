@@ -10,16 +10,16 @@ namespace {
 /// Samples to both sides over which stamps are averaged.
 constexpr std::size_t kAverage = 2048;
 /// Periods that two samples of a stretch may be apart.
-constexpr double kMostMissing = 10;
+constexpr double kMostPeriodsApart = 10;
 /// Part of the period below which nothing is to be gained.
 constexpr double kRegular = 2e-3;
 /// Of the sum of differences, in its sigmas; neighbours have readings in common.
-constexpr double kSure = 10;
+constexpr double kSureSigmas = 10;
 /// Noises of a reading beyond which it is off for another reason.
-constexpr double kMost = 30;
+constexpr double kMostNoises = 30;
 
 /// Samples `begin` to `end`, each so many whole periods after the first.
-struct Stretch {
+struct SampleStretch {
   std::size_t begin = 0;
   std::vector<double> periods;
 };
@@ -34,22 +34,22 @@ double median_step_s(const std::vector<Time>& t) {
   return *middle;
 }
 
-std::vector<Stretch> stretches_of(const std::vector<Time>& t, double period_s) {
-  std::vector<Stretch> stretches = {{0, {0}}};
+std::vector<SampleStretch> stretches_of(const std::vector<Time>& t, double period_s) {
+  std::vector<SampleStretch> stretches = {{0, {0}}};
   for (std::size_t i = 1; i < t.size(); ++i) {
     const double periods = std::round(to_seconds(t[i] - t[i - 1]) / period_s);
-    if (periods >= 1 && periods <= kMostMissing) {
+    if (periods >= 1 && periods <= kMostPeriodsApart) {
       stretches.back().periods.push_back(stretches.back().periods.back() + periods);
     } else {
       stretches.push_back({i, {0}});
     }
   }
-  std::erase_if(stretches, [](const Stretch& its) { return its.periods.size() < 2 * kAverage; });
+  std::erase_if(stretches, [](const SampleStretch& its) { return its.periods.size() < 2 * kAverage; });
   return stretches;
 }
 
 /// The line through its stamps, and along it the mean of what they are off.
-void make_regular(const Stretch& its, std::vector<Time>& t) {
+void make_regular(const SampleStretch& its, std::vector<Time>& t) {
   const std::size_t size = its.periods.size();
   const auto count = static_cast<double>(size);
   const Time first = t[its.begin];
@@ -89,13 +89,13 @@ double square_off(const GyroTelemetry& gyro, const std::vector<Time>& t, std::si
 }
 
 /// Whether the directions are sure to go on more evenly by `regular` than by the stamps.
-bool are_more_even(const Pass& pass, const std::vector<Stretch>& stretches, const std::vector<Time>& regular) {
+bool are_more_even(const Pass& pass, const std::vector<SampleStretch>& stretches, const std::vector<Time>& regular) {
   double sum = 0;
   double squares = 0;
   for (int k = 0; k < pass.gyro.gyros; ++k) {
     const double noise_rad = pass.settings.gyros[static_cast<std::size_t>(k)].readout_noise_rad;
-    const double most = kMost * kMost * noise_rad * noise_rad;
-    for (const Stretch& its : stretches) {
+    const double most = kMostNoises * kMostNoises * noise_rad * noise_rad;
+    for (const SampleStretch& its : stretches) {
       for (std::size_t i = its.begin + 1; i + 1 < its.begin + its.periods.size(); ++i) {
         const double by_stamps = square_off(pass.gyro, pass.gyro.t, i, k);
         const double by_regular = square_off(pass.gyro, regular, i, k);
@@ -107,7 +107,7 @@ bool are_more_even(const Pass& pass, const std::vector<Stretch>& stretches, cons
       }
     }
   }
-  return sum > kSure * std::sqrt(squares);
+  return sum > kSureSigmas * std::sqrt(squares);
 }
 
 }  // namespace
@@ -121,11 +121,11 @@ std::optional<RegularStamps> regular_stamps(const Pass& pass) {
   if (!(period_s > 0)) {
     return std::nullopt;
   }
-  const std::vector<Stretch> stretches = stretches_of(t, period_s);
+  const std::vector<SampleStretch> stretches = stretches_of(t, period_s);
   RegularStamps found{t, 0};
   double squares = 0;
   double count = 0;
-  for (const Stretch& its : stretches) {
+  for (const SampleStretch& its : stretches) {
     make_regular(its, found.t);
     for (std::size_t i = its.begin; i < its.begin + its.periods.size(); ++i) {
       squares += std::pow(to_seconds(t[i] - found.t[i]), 2);

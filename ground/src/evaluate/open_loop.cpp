@@ -20,12 +20,12 @@ namespace {
 constexpr int kPair = 2;
 
 /// Step of the integration. The drift turns by nanoradians over it: the midpoint rule loses nothing even in a slew.
-constexpr Duration kStep = std::chrono::seconds(3);
+constexpr Duration kIntegrationStep = std::chrono::seconds(3);
 
 /// Directions at any time, interpolated between samples; asked for in ascending order.
-class Readings {
+class InterpolatedReadings {
  public:
-  Readings(const GyroTelemetry& telemetry, Duration max_interpolation)
+  InterpolatedReadings(const GyroTelemetry& telemetry, Duration max_interpolation)
       : telemetry_(telemetry), max_interpolation_(max_interpolation) {}
 
   /// Nothing in a gap, or where a sample is no direction.
@@ -121,11 +121,11 @@ AttitudeHistory fly_open_loop(const Pass& pass, Time t, const std::vector<GyroCa
     flown.gyros.push_back({&record, gyro_of(record, layout), DriftModel(layout.drift_model, layout.further)});
   }
   AttitudeHistory history;
-  Readings readings(pass.gyro, max_interpolation(pass.settings.gyro_period));
+  InterpolatedReadings readings(pass.gyro, max_interpolation(pass.settings.gyro_period));
   std::optional<Directions> last = readings.at(t);
   Time last_t = t;
   auto epoch = std::ranges::lower_bound(epochs, t);
-  for (Time now = t; epoch != epochs.end(); now = std::min(now + kStep, *epoch)) {
+  for (Time now = t; epoch != epochs.end(); now = std::min(now + kIntegrationStep, *epoch)) {
     check_stop();
     if (const std::optional<Directions> h_b = readings.at(now)) {
       Directions middle = *h_b;

@@ -54,7 +54,6 @@ constexpr double kMostlyRejected = 0.2;
 /// One in twenty.
 constexpr double kManyRejected = 0.05;
 constexpr double kBadlyPlacedSine = 0.5;
-constexpr int kPair = 2;
 /// Degree of the polynomial through the samples round a fix.
 constexpr int kCubic = 3;
 /// The paper: alignment settles within one orbit.
@@ -238,7 +237,7 @@ void judge_gyro_rate(const Pass& pass, const CalibrationRun& run, std::vector<Fi
         fmt::format(
             "The gyros were sampled faster than the calibration uses: up to {} samples per second are used, the "
             "others were left out.",
-            std::chrono::seconds(1) / Readings<kPair>::kMinSpacing),
+            std::chrono::seconds(1) / Readings<2>::kMinSpacing),
         fmt::format("{} of {} samples left out; sampled every {:.3g} s", thinned, pass.gyro.size(), period_s),
         "None needed.");
   }

@@ -1,5 +1,6 @@
 #include "trihedron/ground/tasks/on_all_cores.hpp"
 
+#include <tbb/info.h>
 #include <tbb/parallel_for.h>
 #include <tbb/task_arena.h>
 #include <tbb/task_group.h>
@@ -75,7 +76,8 @@ void side_by_side(const std::function<void()>& first, const std::function<void()
 
 void with_cores(unsigned cores, const std::function<void()>& work) {
   const StopRequest* const request = StopScope::current();
-  tbb::task_arena arena(static_cast<int>(cores));
+  // Threads beyond the processors that the process may use TBB does not start, and says so on the standard error stream.
+  tbb::task_arena arena(std::min(static_cast<int>(cores), tbb::info::default_concurrency()));
   arena.execute([&] {
     const StopScope scope(request);
     work();
