@@ -898,7 +898,18 @@ Result<AttitudeSolution, DirectionsFault> Navigator<Estimator>::attitude(const E
   append(estimator, estimator.since_fix(), since);
   carry_back(layout, since, rows);
   StateRows3<Estimator::kMaxStates> spread(3, error_columns_);
-  multiply(view_of(rows), {errors_.data(), error_rows_, error_columns_, error_columns_}, rows_of(spread));
+  // After the momenta each row begins a column further than the one above, whatever made the errors: see take_over().
+  const int momenta = layout.direction(layout.gyros);
+  const double* parameters = &errors_[static_cast<std::size_t>(momenta * error_columns_)];
+  const int begin = static_cast<int>(
+      std::find_if(parameters, parameters + error_columns_, [](double error) { return error != 0; }) - parameters);
+  const ConstRowsView by_errors = view_of(rows);
+  const RowsView found = rows_of(spread);
+  multiply({by_errors.data, 3, momenta, by_errors.stride}, {errors_.data(), momenta, error_columns_, error_columns_},
+           found);
+  add_product_of_triangle({by_errors.data + momenta, 3, error_rows_ - momenta, by_errors.stride},
+                          {parameters + begin, error_rows_ - momenta, error_columns_ - begin, error_columns_},
+                          {found.data + begin, 3, error_columns_ - begin, found.stride});
   PerGyro<double> noise_rad;
   for (int k = 0; k < layout.gyros; ++k) {
     noise_rad[k] = readings.noise_factor * setup.readout_noise_rad[k];

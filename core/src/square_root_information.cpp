@@ -255,15 +255,36 @@ template <class L, bool kAdds, std::size_t Rows>
   });
 }
 
-template <class L, bool kAdds>
-[[gnu::always_inline]] inline void combine(const double* factors, std::ptrdiff_t stride, ConstRowsView b,
-                                           double* rest) {
+template <class L>
+[[gnu::always_inline]] inline void take_off_all(const double* factors, std::ptrdiff_t stride, ConstRowsView b,
+                                                double* rest) {
   const int together = b.rows - b.rows % 3;
   for (int k = 0; k < together; k += 3) {
-    combine_rows<L, kAdds, 3>(factors + k * stride, stride, {b.row(k), 3, b.columns, b.stride}, rest);
+    combine_rows<L, false, 3>(factors + k * stride, stride, {b.row(k), 3, b.columns, b.stride}, rest);
   }
   for (int k = together; k < b.rows; ++k) {
-    combine_rows<L, kAdds, 1>(factors + k * stride, stride, {b.row(k), 1, b.columns, b.stride}, rest);
+    combine_rows<L, false, 1>(factors + k * stride, stride, {b.row(k), 1, b.columns, b.stride}, rest);
+  }
+}
+
+/// product ← product + a b, `b` with zeros below its diagonal where it is a `kTriangle`. Few rows of b at a time, for
+/// all rows of a, so that those are read once.
+template <class L, bool kTriangle>
+[[gnu::always_inline]] inline void add_product(ConstRowsView a, ConstRowsView b, RowsView product) {
+  const int together = b.rows - b.rows % 3;
+  for (int k = 0; k < together; k += 3) {
+    const int first = kTriangle ? k : 0;
+    for (int i = 0; i < a.rows; ++i) {
+      combine_rows<L, true, 3>(a.row(i) + k, 1, {b.row(k) + first, 3, b.columns - first, b.stride},
+                               product.row(i) + first);
+    }
+  }
+  for (int k = together; k < b.rows; ++k) {
+    const int first = kTriangle ? k : 0;
+    for (int i = 0; i < a.rows; ++i) {
+      combine_rows<L, true, 1>(a.row(i) + k, 1, {b.row(k) + first, 1, b.columns - first, b.stride},
+                               product.row(i) + first);
+    }
   }
 }
 
@@ -305,10 +326,13 @@ constexpr int kLongRow = 48;
 [[gnu::target("avx2")]] void solve_wide_rows(ConstRowsView root, RowsView rows) { solve_all_rows<Lanes4>(root, rows); }
 [[gnu::target("avx2")]] void take_off_wide(const double* factors, std::ptrdiff_t stride, ConstRowsView b,
                                            double* rest) {
-  combine<Lanes4, false>(factors, stride, b, rest);
+  take_off_all<Lanes4>(factors, stride, b, rest);
 }
-[[gnu::target("avx2")]] void add_wide(const double* factors, ConstRowsView b, double* sum) {
-  combine<Lanes4, true>(factors, 1, b, sum);
+[[gnu::target("avx2")]] void add_wide_product(ConstRowsView a, ConstRowsView b, RowsView product) {
+  add_product<Lanes4, false>(a, b, product);
+}
+[[gnu::target("avx2")]] void add_wide_product_of_triangle(ConstRowsView a, ConstRowsView b, RowsView product) {
+  add_product<Lanes4, true>(a, b, product);
 }
 #endif
 
@@ -354,22 +378,25 @@ void solve_column(ConstRowsView root, double* x) {
 
 void multiply(ConstRowsView a, ConstRowsView b, RowsView product) {
   for (int i = 0; i < product.rows; ++i) {
-    double* __restrict row = product.row(i);
-    std::fill(row, row + product.columns, 0.0);
-#ifdef __x86_64__
-    if (is_wide(b.columns)) {
-      add_wide(a.row(i), b, row);
-      continue;
-    }
-#endif
-    for (int k = 0; k < b.rows; ++k) {
-      const double by = a(i, k);
-      const double* __restrict its = b.row(k);
-      for (int j = 0; j < product.columns; ++j) {
-        row[j] += by * its[j];
-      }
-    }
+    std::fill_n(product.row(i), product.columns, 0.0);
   }
+#ifdef __x86_64__
+  if (is_wide(b.columns)) {
+    add_wide_product(a, b, product);
+    return;
+  }
+#endif
+  add_product<Lanes, false>(a, b, product);
+}
+
+void add_product_of_triangle(ConstRowsView a, ConstRowsView triangle, RowsView product) {
+#ifdef __x86_64__
+  if (is_wide(triangle.columns)) {
+    add_wide_product_of_triangle(a, triangle, product);
+    return;
+  }
+#endif
+  add_product<Lanes, true>(a, triangle, product);
 }
 
 void take_off(const double* factors, std::ptrdiff_t stride, ConstRowsView b, double* rest) {
@@ -379,7 +406,7 @@ void take_off(const double* factors, std::ptrdiff_t stride, ConstRowsView b, dou
     return;
   }
 #endif
-  combine<Lanes, false>(factors, stride, b, rest);
+  take_off_all<Lanes>(factors, stride, b, rest);
 }
 
 void invert_triangle(ConstRowsView root, RowsView inverse) {

@@ -418,6 +418,22 @@ TEST(InvariantEstimator, FindsTheBiasOfTheDirectionCosines) {
   EXPECT_LT(attitude_error.norm(), 4 * std::sqrt(solution.covariance_rad2.trace()));
 }
 
+TEST(OnBoardOfInvariant, NavigatorKnowsTheAttitudeAtACorrectionAsTheEstimatorDoes) {
+  const test::Flight flight({.duration_s = 300});
+  const auto on_board = test::flown(flight, FullGiven(kWithAll), {.interval = CorrectionPolicy::kEveryFix});
+  const auto& estimator = on_board->estimator();
+  const Directions& h_b = flight.samples.back().h_b;
+  const auto by_gyros = estimator.attitude(estimator.gyros(), h_b, all_gyros(2)).value();
+  auto by_errors = attitude_by_states_now<test::FullEstimator::kMaxErrors>(kWithAll, by_gyros, estimator.gyros(), h_b);
+  carry_back(kWithAll, estimator.since_fix(), by_errors);
+  const Eigen::Matrix3d expected =
+      with_covariance(by_gyros, estimator.covariance_of_errors(by_errors), estimator.setup().readout_noise_rad, 2, 0)
+          .covariance_rad2;
+  const Eigen::Matrix3d found = on_board->navigation_attitude().value().covariance_rad2;
+  // But for the noise of the readings, of which the navigator takes several together.
+  EXPECT_LT((found - expected).norm(), 0.02 * expected.norm());
+}
+
 TEST(InvariantEstimator, SeesThroughItsUncertaintyWhatTheWholeRootSays) {
   const test::Flight flight({.duration_s = 300});
   const auto on_board = test::flown(flight, FullGiven(kWithAll));

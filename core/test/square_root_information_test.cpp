@@ -293,5 +293,20 @@ TEST(Multiply, IsTheProduct) {
   EXPECT_LT((product - a * b).norm(), 1e-14);
 }
 
+TEST(AddProductOfTriangle, AddsTheBitsOfTheProductWithZerosBelowTheDiagonal) {
+  std::mt19937 random(7);
+  for (const int size : {7, 60}) {
+    const RowMajor a = random_matrix(3, size - 2, random);
+    const RowMajor triangle = random_matrix(size - 2, size, random).triangularView<Eigen::Upper>();
+    RowMajor expected(3, size);
+    multiply(view_of(a), view_of(triangle), rows_of(expected));
+    RowMajor found = RowMajor::Zero(3, size);
+    add_product_of_triangle(view_of(a), view_of(triangle), rows_of(found));
+    EXPECT_TRUE(same_bits(found, expected)) << size;
+    add_product_of_triangle(view_of(a), view_of(triangle), rows_of(found));
+    EXPECT_LT((found - 2 * expected).norm(), 1e-13) << size;
+  }
+}
+
 }  // namespace
 }  // namespace trihedron

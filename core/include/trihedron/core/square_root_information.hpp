@@ -35,6 +35,10 @@ void invert_triangle(ConstRowsView root, RowsView inverse);
 /// product = a · b, all of them apart in memory.
 void multiply(ConstRowsView a, ConstRowsView b, RowsView product);
 
+/// product ← product + a · triangle, which has zeros below its diagonal, and may be wider than it is high; all of them
+/// apart in memory.
+void add_product_of_triangle(ConstRowsView a, ConstRowsView triangle, RowsView product);
+
 /// rest ← rest − factors · b, apart from b in memory; the factors, one for each row of b, lie `stride` apart.
 void take_off(const double* factors, std::ptrdiff_t stride, ConstRowsView b, double* rest);
 
