@@ -76,7 +76,8 @@ void side_by_side(const std::function<void()>& first, const std::function<void()
 
 void with_cores(unsigned cores, const std::function<void()>& work) {
   const StopRequest* const request = StopScope::current();
-  // Threads beyond the processors that the process may use TBB does not start, and says so on the standard error stream.
+  // Threads beyond the processors that the process may use TBB does not start, and says so on the standard error
+  // stream.
   tbb::task_arena arena(std::min(static_cast<int>(cores), tbb::info::default_concurrency()));
   arena.execute([&] {
     const StopScope scope(request);
