@@ -80,6 +80,16 @@ Calibration of_constants(const CalibrationRun& run) {
   return calibration;
 }
 
+/// Its coefficients of eq. (1) and alignments alone. Of the members of a drift field the prior is found from the pass,
+/// so that it cannot be taken off again.
+Calibration without_members(Calibration calibration) {
+  std::vector<ParameterId> states = drift_and_alignment(kEsg7, calibration.gyros.size());
+  const auto rows = rows_of(calibration, states);
+  calibration.covariance = calibration.covariance(rows, rows).eval();
+  calibration.states = std::move(states);
+  return calibration;
+}
+
 /// `before`: the calibration of the passes before; of one with more members than the later one has, what makes up for
 /// these is compared.
 Comparison compare(const CalibrationRun& before, const CalibrationRun& later) {
@@ -90,14 +100,16 @@ Comparison compare(const CalibrationRun& before, const CalibrationRun& later) {
   if (model.size() < before.calibration.gyros.front().drift_model.size()) {
     earlier = {LeftOut(earlier.calibration, model).reduced(), LeftOut(earlier.known_before, model).reduced()};
   }
-  const Likelihood a = likelihood_of(earlier.known_before, earlier.calibration);
-  const Likelihood b = likelihood_of(later.known_before, of_constants(later));
-  const VectorXd moved =
-      difference(earlier.calibration, later.calibration, later.calibration.states) + b.shift - a.shift;
+  const Calibration known_before = without_members(earlier.known_before);
+  const Calibration first = without_members(earlier.calibration);
+  const Calibration second = without_members(of_constants(later));
+  const Likelihood a = likelihood_of(known_before, first);
+  const Likelihood b = likelihood_of(without_members(later.known_before), second);
+  const VectorXd moved = difference(first, second, second.states) + b.shift - a.shift;
   const MatrixXd covariance = a.covariance + b.covariance;
   const auto among = [&](bool alignments) {
-    const auto rows = rows_of(later.calibration, common_states(later.calibration, earlier.calibration, alignments));
-    return agreement_within(moved(rows), covariance(rows, rows), earlier.known_before.covariance(rows, rows));
+    const auto rows = rows_of(second, common_states(second, first, alignments));
+    return agreement_within(moved(rows), covariance(rows, rows), known_before.covariance(rows, rows));
   };
   return {among(false), among(true)};
 }

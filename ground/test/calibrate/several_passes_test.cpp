@@ -64,6 +64,30 @@ TEST(SeveralPasses, WithADriftFieldAgreeByWhatIsFlownOnBoard) {
   EXPECT_FALSE(together.drift_field.empty());
 }
 
+/// The prior of the members of a field is found from each pass.
+TEST(SeveralPasses, OfABatchWithADriftFieldAreComparedByEq1AndAlignments) {
+  CalibrationOptions options = told();
+  options.estimator = Estimator::kBatch;
+  options.drift_model.reset();
+  SeveralPasses passes(options);
+  passes.add("first", two_hours().pass);
+  const PassAlone second = passes.add("second", of_the_same_start_up().pass);
+  EXPECT_EQ(passes.combined().calibration.gyros.at(0).drift_model, kLargestDriftModel);
+  EXPECT_TRUE(second.coefficients.holds()) << second.coefficients.text();
+  EXPECT_TRUE(second.alignments.holds()) << second.alignments.text();
+  EXPECT_GT(second.coefficients.degrees_of_freedom, 10);
+  EXPECT_EQ(second.alignments.degrees_of_freedom, 6);
+  EXPECT_TRUE(passes.combined().calibration.verdict.trustworthy);
+
+  Scenario other = with_gyros_of(two_hours().truth, 7, hours(18));
+  for (GyroScenario& gyro : other.gyros) {
+    gyro.drift.kappa_rad_s.reset();
+  }
+  const PassAlone third = passes.add("third", sim::simulate(other).pass);
+  EXPECT_FALSE(third.coefficients.holds()) << third.coefficients.text();
+  EXPECT_FALSE(passes.combined().calibration.verdict.trustworthy);
+}
+
 auto has_finding(FindingCode code) { return Contains(Field(&Finding::code, code)); }
 
 std::string refusal_of(const Pass& second) {
