@@ -23,10 +23,11 @@ constexpr double kStep_s = 1;  ///< over which drift is integrated, at least
 constexpr double kBlock_s = 60;
 constexpr double kMostBlocks = 600;
 constexpr Eigen::Index kFewestLeft = 30;  ///< blocks more than what is fitted
-/// Fitted whatever the drift model of the calibration: eq. (1) and all else of the first two degrees.
+/// Fitted whatever the drift model of the calibration: at most eq. (1) and all else of the first two degrees.
 constexpr DriftModelId kFitted = kEsg20;
 constexpr int kFittedCoefficients = 2 * kFitted.size();
 constexpr int kConstants = kFittedCoefficients + 6;
+static_assert(kEsg7.size() == 7, "eq. (1) comes first in each model");
 
 /// Medians and means over a block of time.
 struct Block {
@@ -130,14 +131,17 @@ class Blocks {
   Eigen::RowVectorXd rate_, integral_;  ///< of the angle by κ, at t_s_; rad/s and rad per rad/s
 };
 
-/// What is fitted: κ, δ, and a constant for each stretch of samples. Columns of unit length.
-Eigen::MatrixXd fitted_columns(const std::vector<Block>& blocks) {
+/// What is fitted: κ of this model, δ, and a constant for each stretch of samples. Columns of unit length.
+Eigen::MatrixXd fitted_columns(const std::vector<Block>& blocks, const DriftModelId& model) {
   const auto n = static_cast<Eigen::Index>(blocks.size());
-  Eigen::MatrixXd columns = Eigen::MatrixXd::Zero(n, kConstants + blocks.back().stretch + 1);
+  const int kappa = model.size();
+  Eigen::MatrixXd columns = Eigen::MatrixXd::Zero(n, 2 * kappa + 6 + blocks.back().stretch + 1);
   for (Eigen::Index i = 0; i < n; ++i) {
     const Block& block = blocks[static_cast<std::size_t>(i)];
-    columns.row(i).head<kConstants>() = block.by_constants;
-    columns(i, kConstants + block.stretch) = 1;
+    columns.row(i).head(kappa) = block.by_constants.head(kappa);
+    columns.row(i).segment(kappa, kappa) = block.by_constants.segment(kFitted.size(), kappa);
+    columns.row(i).segment<6>(2 * kappa) = block.by_constants.tail<6>();
+    columns(i, 2 * kappa + 6 + block.stretch) = 1;
   }
   return columns.array().rowwise() / columns.colwise().norm().array().max(std::numeric_limits<double>::min());
 }
@@ -166,13 +170,17 @@ std::optional<AngleBetweenMomenta> AngleBetweenMomenta::of(const GyroTelemetry& 
     angle.blocks_.push_back(block.number);
     seen_rad(i++) = block.angle_rad;
   }
-  const Eigen::ColPivHouseholderQR<Eigen::MatrixXd> fit(fitted_columns(blocks));
-  angle.outside_ = Eigen::MatrixXd(fit.householderQ()).rightCols(n - fit.rank());
-  angle.left_rad_ = angle.outside_.transpose() * (seen_rad.array() - seen_rad.mean()).matrix();
+  const auto left_by = [&](const DriftModelId& model) {
+    const Eigen::ColPivHouseholderQR<Eigen::MatrixXd> fit(fitted_columns(blocks, model));
+    const Eigen::MatrixXd outside = Eigen::MatrixXd(fit.householderQ()).rightCols(n - fit.rank());
+    return Left{outside, outside.transpose() * (seen_rad.array() - seen_rad.mean()).matrix()};
+  };
+  angle.by_all_ = left_by(kFitted);
+  angle.by_eq1_ = left_by(kEsg7);
   return angle;
 }
 
-double AngleBetweenMomenta::left_rad() const { return std::sqrt(left_rad_.array().square().mean()); }
+double AngleBetweenMomenta::left_rad() const { return std::sqrt(by_all_.left_rad.array().square().mean()); }
 
 double AngleBetweenMomenta::left_of_line(double period_s) const {
   Eigen::MatrixX2d line(static_cast<Eigen::Index>(blocks_.size()), 2);
@@ -181,7 +189,7 @@ double AngleBetweenMomenta::left_of_line(double period_s) const {
         2 * std::numbers::pi * block_s_ * static_cast<double>(blocks_[static_cast<std::size_t>(i)]) / period_s;
     line.row(i) << std::cos(phase), std::sin(phase);
   }
-  return std::sqrt((outside_.transpose() * line).array().square().mean());
+  return std::sqrt((by_all_.outside.transpose() * line).array().square().mean());
 }
 
 /// Of the angle at the blocks by the drift that wanders and the random walk of both momenta, from zero on.
@@ -212,10 +220,16 @@ Eigen::MatrixXd AngleBetweenMomenta::covariance(const CalibrationNoise& noise) c
 }
 
 auto AngleBetweenMomenta::wander(const CalibrationNoise& noise) const -> Wander {
+  const Eigen::MatrixXd by_noise = covariance(noise);
+  return std::max(wander(by_all_, by_noise), wander(by_eq1_, by_noise),
+                  [](const Wander& a, const Wander& b) { return a.log_odds < b.log_odds; });
+}
+
+auto AngleBetweenMomenta::wander(const Left& left, const Eigen::MatrixXd& by_noise) -> Wander {
   // Along the axes of its covariance by the noise.
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> axes(outside_.transpose() * covariance(noise) * outside_);
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> axes(left.outside.transpose() * by_noise * left.outside);
   const Eigen::ArrayXd variances = axes.eigenvalues().array().max(0);
-  const Eigen::ArrayXd squares = (axes.eigenvectors().transpose() * left_rad_).array().square();
+  const Eigen::ArrayXd squares = (axes.eigenvectors().transpose() * left.left_rad).array().square();
   // ln of the likelihood with the best white noise of the readings.
   const double readout = std::log(squares.mean() + std::numeric_limits<double>::min());
   const auto likelihood = [&](double part) {

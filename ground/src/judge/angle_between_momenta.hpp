@@ -13,14 +13,15 @@ namespace trihedron::ground {
 /// The gyros alone read it: neither the fixes nor the attitude have a part in it. Drift of two gyros that wanders moves
 /// it as it moves the momenta; an error of the star tracker that wanders, and that a calibration takes for such drift,
 /// leaves it as it is. Medians over minutes are fitted by drift of esg20 and alignments, any values of them, so that it
-/// does not matter what the star tracker has made of those of the calibration.
+/// does not matter what the star tracker has made of those of the calibration; and by eq. (1) and alignments, which
+/// leave more of what wanders.
 class AngleBetweenMomenta {
  public:
   /// Of the first two gyros. Nothing where there are not two, or where a fit leaves too little.
   [[nodiscard]] static std::optional<AngleBetweenMomenta> of(const GyroTelemetry& telemetry,
                                                              const std::vector<GyroCalibration>& gyros);
 
-  /// Root mean square of what the fit leaves.
+  /// Root mean square of what the fit by esg20 leaves.
   [[nodiscard]] double left_rad() const;
   /// Root mean square of what it leaves of a line of this period, amplitude 1, of any phase.
   [[nodiscard]] double left_of_line(double period_s) const;
@@ -35,17 +36,25 @@ class AngleBetweenMomenta {
     double log_odds = 0;      ///< ln of the largest likelihood up to kQuiet, less that of the largest beyond it
     double expected_rad = 0;  ///< root mean square of what the fit leaves of the noise
   };
+  /// By that of the two fits that speaks most for quiet gyros: drift that is not in it speaks for what moves.
   [[nodiscard]] Wander wander(const CalibrationNoise& noise) const;
 
  private:
+  /// What no values of the constants that are fitted can make.
+  struct Left {
+    Eigen::MatrixXd outside;   ///< orthonormal columns
+    Eigen::VectorXd left_rad;  ///< of the angle along these
+  };
+
   AngleBetweenMomenta() = default;
   [[nodiscard]] Eigen::MatrixXd covariance(const CalibrationNoise& noise) const;
+  [[nodiscard]] static Wander wander(const Left& left, const Eigen::MatrixXd& by_noise);
 
   double block_s_ = 0;
   std::vector<Eigen::Index> blocks_;  ///< those that have samples, from the begin of the pass on
   Eigen::Matrix3Xd normal_c_;         ///< of the plane of the momenta, at every block
-  Eigen::MatrixXd outside_;           ///< orthonormal columns that no values of the constants can make
-  Eigen::VectorXd left_rad_;          ///< of the angle along these
+  Left by_all_;                       ///< fitted by esg20 and alignments
+  Left by_eq1_;                       ///< by eq. (1) and alignments
 };
 
 }  // namespace trihedron::ground

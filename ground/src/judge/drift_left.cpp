@@ -68,6 +68,19 @@ std::string noise_that_stands_for_drift(const CalibrationRun& run) {
              : std::string();
 }
 
+/// 1-sigma of how far this noise moves a momentum in a pass, per axis.
+double moved_by_noise_rad(const CalibrationNoise& noise, double duration_s) {
+  const double x = noise.wandering_time_s > 0 ? duration_s / noise.wandering_time_s : 0;
+  // Variance of the integral of a Gauss-Markov process.
+  const double wandering = std::sqrt(2 * (x - 1 + std::exp(-x))) * noise.wandering_drift_rad_s * noise.wandering_time_s;
+  return std::hypot(wandering, noise.direction_random_walk_rad_sqrt_s * std::sqrt(duration_s));
+}
+
+/// That of the last attitude, in its largest claimed sigmas; 0 where there is none.
+double in_sigmas_of_attitude(const CalibrationRun& run, double moved_rad) {
+  return run.attitude.sigma_rad.empty() ? 0 : moved_rad / run.attitude.sigma_rad.back().minCoeff();
+}
+
 }  // namespace
 
 std::optional<SlowLine> strongest_slow_line(const std::vector<FixRecord>& fixes, double shortest_period_s) {
@@ -120,8 +133,12 @@ void judge_drift_left(const Pass& pass, const CalibrationRun& run, std::vector<F
   // Periods down to a tenth of an orbit: drift of low degree makes no shorter ones.
   constexpr double kMultiples = 10;
   constexpr double kUsualOrbit_s = 5400;
-  // By so much likelier that the gyros are quiet than that they move as the noise says.
+  // By so much likelier that the gyros are quiet than that they move as the noise says; and by so much less likely,
+  // twenty to one, that it is drift.
   constexpr double kLogOdds = 10;
+  constexpr double kLogOddsOfDrift = -3;
+  // Of the attitude, by which an error of the star tracker would be off that the sigmas do not tell.
+  constexpr double kMostSigmasOff = 3;
 
   const bool told = std::ranges::any_of(findings, [](const Finding& finding) {
     return finding.code == FindingCode::kInnovationsNotWhite || finding.code == FindingCode::kOrbitalLine;
@@ -130,6 +147,7 @@ void judge_drift_left(const Pass& pass, const CalibrationRun& run, std::vector<F
   const double orbit_s = rate_rad_s > 0 ? 2 * std::numbers::pi / rate_rad_s : kUsualOrbit_s;
   std::vector<std::string> drift;
   std::vector<std::string> star_tracker;
+  std::string either;
   const std::optional<SlowLine> line = strongest_slow_line(run.fixes, orbit_s / kMultiples);
   const bool is_line = line && line->log_chance < limit && !told;
   const std::string noise = noise_that_stands_for_drift(run);
@@ -164,7 +182,16 @@ void judge_drift_left(const Pass& pass, const CalibrationRun& run, std::vector<F
       star_tracker.push_back(
           noise + fmt::format("; it would move the angle by {}, root mean square", angle_text(wander->expected_rad)));
     } else {
-      drift.push_back(noise);
+      const double moved_rad =
+          wander ? moved_by_noise_rad(*run.calibration.noise, to_seconds(pass.gyro.t.back() - pass.gyro.t.front())) : 0;
+      if (wander && wander->log_odds > kLogOddsOfDrift && in_sigmas_of_attitude(run, moved_rad) > kMostSigmasOff) {
+        either = fmt::format(
+            "{}; ln of the odds for gyros that are quiet, by the angle between the momenta, {:.1f}; such noise moves a "
+            "momentum by {} in this pass",
+            noise, wander->log_odds, angle_text(moved_rad));
+      } else {
+        drift.push_back(noise);
+      }
     }
   }
   if (!star_tracker.empty()) {
@@ -175,6 +202,17 @@ void judge_drift_left(const Pass& pass, const CalibrationRun& run, std::vector<F
                         fmt::format("{}; it moves by {}", fmt::join(star_tracker, "; "), angle_text(angle->left_rad())),
                         "Look for what the star tracker's errors follow: day and night, the place of the stars in its "
                         "field, heads that take turns, its clock; correct them before its fixes come here."});
+  }
+  if (!either.empty()) {
+    findings.push_back({FindingCode::kDriftNotExplained,
+                        "There is drift that wanders, or an error of the star tracker that comes and goes slowly: the "
+                        "angle between the momenta, which the gyros read without it, does not tell which. Where it is "
+                        "the star tracker, attitude and alignment follow it, and their sigmas are wrong.",
+                        either,
+                        "Calibrate on a longer pass, which tells them apart, or of other passes of this start-up. Look "
+                        "for what the star tracker's errors may follow: warming up, day and night, the place of the "
+                        "stars in its field, heads that take turns.",
+                        Finding::Severity::kDoNotUse});
   }
   if (!drift.empty()) {
     findings.push_back({FindingCode::kDriftNotExplained,

@@ -125,6 +125,29 @@ TEST(DriftNotExplained, IsSaidOfTheStarTrackerWhereTheMomentaKeepTheirAngle) {
   EXPECT_THAT(findings[0].evidence, HasSubstr("that wanders in"));
 }
 
+TEST(DriftNotExplained, ForbidsUseWhereTheAngleDoesNotTellItFromTheStarTracker) {
+  // So slow that what is fitted to the angle takes up most of it.
+  CalibrationRun run = run_of({});
+  run.evidence = {{FurtherState::kWanderingDrift, 50, true}};
+  run.calibration.gyros = ground::true_gyros(two_hours().truth, 0);
+  run.calibration.noise = CalibrationNoise{.wandering_drift_rad_s = 6e-9, .wandering_time_s = 10'800};
+  run.attitude.sigma_rad = {Eigen::Vector3d::Constant(5e-6)};
+  std::vector<Finding> findings;
+  judge_drift_left(two_hours().pass, run, findings);
+  ASSERT_EQ(findings.size(), 1U);
+  EXPECT_EQ(findings[0].code, FindingCode::kDriftNotExplained);
+  EXPECT_EQ(findings[0].severity, FindingSeverity::kDoNotUse);
+  // 2 (x - 1 + e^-x) with x = 2/3: 1-sigma of 6e-9 rad/s over 10 800 s times 0.603, 39.1 µrad.
+  EXPECT_THAT(findings[0].evidence, HasSubstr("moves a momentum by 8.06″"));
+
+  // Where the attitude is not known as well as it moves, an error of the star tracker as large does no harm.
+  run.attitude.sigma_rad = {Eigen::Vector3d::Constant(2e-5)};
+  findings.clear();
+  judge_drift_left(two_hours().pass, run, findings);
+  ASSERT_EQ(findings.size(), 1U);
+  EXPECT_EQ(findings[0].severity, FindingSeverity::kWarning);
+}
+
 TEST(DriftNotExplained, IsSaidOfTheStarTrackerWhereALineIsInTheFixesAlone) {
   const sim::SimulatedPass& quiet = two_hours();
   CalibrationRun run = run_of(innovations(1, 1, 600));
