@@ -56,7 +56,7 @@ std::string cut(std::string_view text, std::size_t most) {
 }
 
 /// With "%1B" in place of a control character or of a byte that is not part of UTF-8.
-std::string printable(std::string_view name) {
+std::string percent_encoded(std::string_view name) {
   std::string text;
   while (!name.empty()) {
     const auto first = static_cast<unsigned char>(name.front());
@@ -77,7 +77,7 @@ std::string name_of_pass(const std::filesystem::path& path) {
     named = std::filesystem::canonical(path, fault);
   }
   const std::filesystem::path name = std::filesystem::is_directory(path, fault) ? named.filename() : named.stem();
-  std::string text = cut(printable(name.string()), kLongestName);
+  std::string text = cut(percent_encoded(name.string()), kLongestName);
   if (std::string_view(text).starts_with(kHidden)) {
     text.erase(0, 1);
   }
@@ -107,7 +107,7 @@ NamedPass read_named_pass(const std::filesystem::path& path, TruthUse use) {
     }
     Defect defect;
     defect.kind = Defect::Kind::kTruthIncomplete;
-    defect.where = fmt::format("{} ({})", printable(refused.file().filename().string()), refused.reason());
+    defect.where = fmt::format("{} ({})", percent_encoded(refused.file().filename().string()), refused.reason());
     defect.count = 1;
     named.loaded.defects.push_back(std::move(defect));
   }

@@ -137,8 +137,8 @@ TEST(DriftNotExplained, ForbidsUseWhereTheAngleDoesNotTellItFromTheStarTracker) 
   ASSERT_EQ(findings.size(), 1U);
   EXPECT_EQ(findings[0].code, FindingCode::kDriftNotExplained);
   EXPECT_EQ(findings[0].severity, FindingSeverity::kDoNotUse);
-  // 2 (x - 1 + e^-x) with x = 2/3: 1-sigma of 6e-9 rad/s over 10 800 s times 0.603, 39.1 µrad.
-  EXPECT_THAT(findings[0].evidence, HasSubstr("moves a momentum by 8.06″"));
+  // 2 (x - 1 + e^-x) with x = 2/3: 1-sigma of 6e-9 rad/s over 10 800 s times 0.600, 38.9 µrad.
+  EXPECT_THAT(findings[0].evidence, HasSubstr("moves a momentum by 8.02″"));
 
   // Where the attitude is not known as well as it moves, an error of the star tracker as large does no harm.
   run.attitude.sigma_rad = {Eigen::Vector3d::Constant(2e-5)};
