@@ -182,14 +182,17 @@ std::optional<AngleBetweenMomenta> AngleBetweenMomenta::of(const GyroTelemetry& 
 
 double AngleBetweenMomenta::left_rad() const { return std::sqrt(by_all_.left_rad.array().square().mean()); }
 
-double AngleBetweenMomenta::left_of_line(double period_s) const {
+double AngleBetweenMomenta::largest_line_rad(double period_s) const {
   Eigen::MatrixX2d line(static_cast<Eigen::Index>(blocks_.size()), 2);
   for (Eigen::Index i = 0; i < line.rows(); ++i) {
     const double phase =
         2 * std::numbers::pi * block_s_ * static_cast<double>(blocks_[static_cast<std::size_t>(i)]) / period_s;
     line.row(i) << std::cos(phase), std::sin(phase);
   }
-  return std::sqrt((by_all_.outside.transpose() * line).array().square().mean());
+  const auto by = [&](const Left& left) {
+    return std::sqrt(left.left_rad.array().square().mean() / (left.outside.transpose() * line).array().square().mean());
+  };
+  return std::min(by(by_all_), by(by_eq1_));
 }
 
 /// Of the angle at the blocks by the drift that wanders and the random walk of both momenta, from zero on.

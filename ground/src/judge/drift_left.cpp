@@ -158,8 +158,7 @@ void judge_drift_left(const Pass& pass, const CalibrationRun& run, std::vector<F
   if (is_line) {
     // Drift moves all components about alike, and the angle as one of them.
     constexpr double kLessThanDrift = 0.5;
-    const bool moves_angle =
-        !angle || angle->left_rad() > kLessThanDrift * line->amplitude_rad * angle->left_of_line(line->period_s);
+    const bool moves_angle = !angle || angle->largest_line_rad(line->period_s) > kLessThanDrift * line->amplitude_rad;
     (moves_angle ? drift : star_tracker)
         .push_back(fmt::format("the innovations of gyro {} have a line of {:.0f} min, amplitude {:.2f} sigma, {}; the "
                                "chance of one as strong is below 1e{:.0f}",

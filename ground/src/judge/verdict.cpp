@@ -200,6 +200,15 @@ std::vector<GyroEvent> losses(const CalibrationRun& run, Time end) {
   return lost;
 }
 
+/// Whether a gyro has readings after this event, but none that is a direction.
+bool is_silent(const GyroTelemetry& telemetry, const GyroEvent& event) {
+  std::size_t i = telemetry.size();
+  while (i > 0 && telemetry.t[i - 1] > event.t && !nearly_unit(telemetry.direction(i - 1, event.gyro).norm())) {
+    --i;
+  }
+  return i < telemetry.size() && (i == 0 || telemetry.t[i - 1] <= event.t);
+}
+
 void judge_gyros(const Pass& pass, const CalibrationRun& run, std::vector<Finding>& findings) {
   const std::vector<GyroEvent> lost = losses(run, pass.gyro.t.back());
   const bool has_pair = has_pair_at_end(run, pass.gyro.t.back());
@@ -221,9 +230,15 @@ void judge_gyros(const Pass& pass, const CalibrationRun& run, std::vector<Findin
   add_events(GyroState::kIsolated, FindingCode::kGyroIsolated,
              "A gyro alone did not agree with the rest, time after time, and was left out.",
              "Look at its telemetry from there on. Its estimates are those of before.");
+  const bool is_off = std::ranges::all_of(run.gyro_events, [&](const GyroEvent& event) {
+    return event.state != GyroState::kStuck || is_silent(pass.gyro, event);
+  });
   add_events(GyroState::kStuck, FindingCode::kGyroStuck,
-             "Readings of a gyro, or one component of them, stood still, not even moved by noise; they were not used.",
-             "Look at the telemetry there: a frozen readout, or the last value repeated in a gap.");
+             is_off ? "A gyro gives no readings any more, or none that are a direction."
+                    : "Readings of a gyro, or one component of them, stood still, not even moved by noise; they were "
+                      "not used.",
+             is_off ? "Look for why it is off; calibrate the part of the pass before."
+                    : "Look at the telemetry there: a frozen readout, or the last value repeated in a gap.");
   add_events(GyroState::kLeapt, FindingCode::kGyroLeapt,
              "Readings of a gyro leapt farther than a body turns from one sample to the next; they were not used until "
              "they were back.",
@@ -288,8 +303,10 @@ void judge_nis(const Statistics& statistics, const std::string& what_is_wrong, s
 
 /// Probability of a false alarm on a good pass.
 constexpr double kFalseAlarm = 1e-5;
-/// Twenty standard deviations of the mean of white innovations of a pass of nine hours.
+/// Twenty standard deviations of the mean of white innovations of a pass of nine hours; of one with few fixes that is
+/// chance.
 constexpr double kAlternating = 0.2;
+constexpr double kAlternatingSure = 5;
 /// Correlations and lines below these limits do no harm, however significant.
 constexpr double kCorrelated = 0.05;
 constexpr double kLineInSigmas = 0.1;
@@ -306,7 +323,7 @@ void judge_whiteness(const Pass& pass, const CalibrationRun& run, std::vector<Fi
   constexpr const char* kCure =
       "Look for drift or a star-tracker error that the model does not have: more of [further_states], a larger drift "
       "model, estimator batch.";
-  if (found.alternation > kAlternating) {
+  if (found.alternation > std::max(kAlternating, kAlternatingSure * found.alternation_sigma)) {
     add(findings, FindingCode::kInnovationsNotWhite,
         "Fixes are off to one side and the other by turns, as those of two star trackers that are not aligned to each "
         "other: which of them is right, the pass does not tell.",

@@ -93,7 +93,10 @@ Whiteness whiteness(const std::vector<FixRecord>& fixes, double orbital_rate_rad
   Whiteness result;
   for (const Series& series : all) {
     result.variance_of_mean = std::max(result.variance_of_mean, variance_of_mean(series.z));
-    result.alternation = std::max(result.alternation, alternation(series));
+    if (const double its = alternation(series); its > result.alternation) {
+      result.alternation = its;
+      result.alternation_sigma = 1 / std::sqrt(static_cast<double>(series.z.size()));
+    }
     for (int lag = 1; lag <= Whiteness::kLags; ++lag) {
       const double r = correlation(series.z, lag);
       result.correlation_square += static_cast<double>(series.z.size()) * r * r;

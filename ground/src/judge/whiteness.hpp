@@ -18,6 +18,7 @@ struct Whiteness {
 
   /// Of the component with the most, in its sigma: by how much fixes are off to one side and the other by turns.
   double alternation = 0;
+  double alternation_sigma = 0;  ///< 1-sigma of that by chance
 
   /// At a multiple of the orbital rate. Twice the power is χ² of `degrees_of_freedom` where there is no line.
   struct Line {

@@ -72,8 +72,8 @@ TEST(AngleBetweenMomenta, DoesNotDependOnTheAlignmentsOfTheCalibration) {
 TEST(AngleBetweenMomenta, LeavesOfALineWhatDriftAtItsPeriodCannotMake) {
   const AngleBetweenMomenta angle = angle_of(wandering(4, 0));
   // Of a whole line the root mean square is √½. Drift of eq. (1) makes lines at the orbital rate and twice it.
-  EXPECT_NEAR(angle.left_of_line(600), std::sqrt(0.5), 0.1);
-  EXPECT_LT(angle.left_of_line(5700), 0.2);
+  EXPECT_NEAR(angle.largest_line_rad(600), std::sqrt(2) * angle.left_rad(), 0.2 * angle.left_rad());
+  EXPECT_GT(angle.largest_line_rad(5700), 3 * angle.largest_line_rad(600));
 }
 
 TEST(AngleBetweenMomenta, OutlastsSpikesAndGaps) {
