@@ -23,11 +23,11 @@ constexpr double kStep_s = 1;  ///< over which drift is integrated, at least
 constexpr double kBlock_s = 60;
 constexpr double kMostBlocks = 600;
 constexpr Eigen::Index kFewestLeft = 30;  ///< blocks more than what is fitted
-/// Fitted whatever the drift model of the calibration: at most eq. (1) and all else of the first two degrees.
+/// Fitted whatever the drift model of the calibration: at most eq. (1), whose coefficients come first, and all else of
+/// the first two degrees.
 constexpr DriftModelId kFitted = kEsg20;
 constexpr int kFittedCoefficients = 2 * kFitted.size();
 constexpr int kConstants = kFittedCoefficients + 6;
-static_assert(kEsg7.size() == 7, "eq. (1) comes first in each model");
 
 /// Medians and means over a block of time.
 struct Block {

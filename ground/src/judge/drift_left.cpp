@@ -72,11 +72,12 @@ std::string noise_that_stands_for_drift(const CalibrationRun& run) {
 double moved_by_noise_rad(const CalibrationNoise& noise, double duration_s) {
   const double x = noise.wandering_time_s > 0 ? duration_s / noise.wandering_time_s : 0;
   // Variance of the integral of a Gauss-Markov process.
-  const double wandering = std::sqrt(2 * (x - 1 + std::exp(-x))) * noise.wandering_drift_rad_s * noise.wandering_time_s;
+  const double wandering =
+      std::sqrt(std::max(2 * (x - 1 + std::exp(-x)), 0.0)) * noise.wandering_drift_rad_s * noise.wandering_time_s;
   return std::hypot(wandering, noise.direction_random_walk_rad_sqrt_s * std::sqrt(duration_s));
 }
 
-/// That of the last attitude, in its largest claimed sigmas; 0 where there is none.
+/// In the smallest sigma of the last attitude; 0 where there is none.
 double in_sigmas_of_attitude(const CalibrationRun& run, double moved_rad) {
   return run.attitude.sigma_rad.empty() ? 0 : moved_rad / run.attitude.sigma_rad.back().minCoeff();
 }
