@@ -900,7 +900,7 @@ Result<AttitudeSolution, DirectionsFault> Navigator<Estimator>::attitude(const E
   StateRows3<Estimator::kMaxStates> spread(3, error_columns_);
   // After the momenta each row begins a column further than the one above, whatever made the errors: see take_over().
   const int momenta = layout.direction(layout.gyros);
-  const double* parameters = &errors_[static_cast<std::size_t>(momenta * error_columns_)];
+  const double* parameters = errors_.data() + static_cast<std::ptrdiff_t>(momenta) * error_columns_;
   const int begin = static_cast<int>(
       std::find_if(parameters, parameters + error_columns_, [](double error) { return error != 0; }) - parameters);
   const ConstRowsView by_errors = view_of(rows);

@@ -134,7 +134,7 @@ class Blocks {
 /// What is fitted: κ of this model, δ, and a constant for each stretch of samples. Columns of unit length.
 Eigen::MatrixXd fitted_columns(const std::vector<Block>& blocks, const DriftModelId& model) {
   const auto n = static_cast<Eigen::Index>(blocks.size());
-  const int kappa = model.size();
+  const Eigen::Index kappa = model.size();
   Eigen::MatrixXd columns = Eigen::MatrixXd::Zero(n, 2 * kappa + 6 + blocks.back().stretch + 1);
   for (Eigen::Index i = 0; i < n; ++i) {
     const Block& block = blocks[static_cast<std::size_t>(i)];
