@@ -23,8 +23,8 @@ class AngleBetweenMomenta {
 
   /// Root mean square of what the fit by esg20 leaves.
   [[nodiscard]] double left_rad() const;
-  /// Amplitude of a line of this period, of any phase, of which a fit leaves as much as it leaves of the angle: the less
-  /// of both fits. No larger one moves the angle.
+  /// Amplitude of a line of this period, of any phase, of which a fit leaves as much as it leaves of the angle: the
+  /// less of both fits. No larger one moves the angle.
   [[nodiscard]] double largest_line_rad(double period_s) const;
 
   /// How it moves, beside how process noise moves it.
