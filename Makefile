@@ -9,8 +9,8 @@ PYTHON_TOOLS := build-python/tools
 DOCS_TOOLS := build-docs/tools
 SOURCES := $(shell git ls-files '*.cpp' '*.hpp' 2>/dev/null)
 
-.PHONY: help setup build everything demo test flight bench peers slots mutants validation campaign consistency forecasts verdict fuzz fuzz-build fuzz-briefly docs shown \
-  format lint lint-core \
+.PHONY: help setup build everything demo test flight bench peers slots mutants validation campaign consistency forecasts verdict fuzz fuzz-build fuzz-briefly thorough docs shown \
+  format lint \
   standard sanitize coverage interop wheel wheel-test python-test deb deb-test image image-test conan-test install clean
 
 help:
@@ -35,6 +35,7 @@ help:
 	@echo 'make image    an OCI image of the program, in out/image, after `make deb`; make image-test tries it'
 	@echo 'make conan-test  the Conan package of the flight library, used by another project'
 	@echo 'make fuzz-briefly  each reader against libFuzzer for twenty seconds or less'
+	@echo 'make thorough  lint, sanitize, coverage, interop and fuzz-briefly: what .ci/run has no time for, before a change is handed in'
 	@echo 'make fuzz     each reader against libFuzzer for FUZZ_SECONDS (3600) each, measures again what docs/reliability.md tells: hours'
 	@echo 'make docs     the site of all documents: tutorials, how-to, reference, explanation, in out/docs/index.html'
 	@echo 'make shown    run the commands that the documents show, and write what they print into them'
@@ -234,6 +235,8 @@ fuzz: fuzz-build
 fuzz-briefly: fuzz-build
 	nice -n 5 $(FUZZ) --briefly
 
+thorough: lint sanitize coverage interop fuzz-briefly
+
 # Fails on each warning, but Doxygen's of members and constants that have no comment of their own (see docs/Doxyfile), and on each broken link.
 docs: build $(DOCS_TOOLS)/installed
 	@cmake/setup.sh docs
@@ -270,20 +273,16 @@ standard: $(LINT_TOOLS)/installed
 	  --error-exitcode=1 -I core/include core/src
 	$(LINT_TOOLS)/bin/lizard -l cpp core/src core/include -T cyclomatic_complexity=15 -T nloc=60 -T parameter_count=8 -w
 
-# In units of several files: clang-tidy reads Eigen once for each unit instead of once for each file. What runs beside it goes first; see .ci/run.
+# In units of several files: clang-tidy reads Eigen once for each unit instead of once for each file.
 # Recursion is forbidden in core alone. The kernels are read once, not for each kind of processor.
 UNITS = sed -n 's/^ *"file": "\(.*\/\(Unity\|src\)\/.*\)".*/\1/p' build-lint/compile_commands.json
-TIDY = nice -n 19 xargs -P $(JOBS) -n 1 $(LINT_TOOLS)/bin/clang-tidy --quiet --extra-arg=-Wno-unused-command-line-argument -p build-lint
+TIDY = xargs -P $(JOBS) -n 1 $(LINT_TOOLS)/bin/clang-tidy --quiet --extra-arg=-Wno-unused-command-line-argument -p build-lint
 
-# What clang-tidy finds in core and what is quick, for .ci/run.
-lint-core: standard
+lint: standard $(PYTHON_TOOLS)/installed
 	@cmake/setup.sh program
 	@$(LINT_TOOLS)/bin/clang-format --dry-run --Werror $(SOURCES)
-	cmake --preset lint
-	$(UNITS) | grep '/trihedron_core\.dir/' | $(TIDY) --checks=misc-no-recursion
-
-lint: lint-core $(PYTHON_TOOLS)/installed
 	cmake --preset lint -DTRIHEDRON_BUILD_PYTHON=ON -DPython_EXECUTABLE=$(abspath $(PYTHON_TOOLS)/bin/python)
+	$(UNITS) | grep '/trihedron_core\.dir/' | $(TIDY) --checks=misc-no-recursion
 	$(UNITS) | grep -v '/trihedron_core\.dir/\|/nanobind\|_avx2\.dir/' | $(TIDY)
 	$(LINT_TOOLS)/bin/clang-tidy --quiet validation/mutants/mutant.cpp -- -std=c++20  # no build directory has it
 

@@ -131,6 +131,22 @@ def readings_by(change):
     return lambda telemetry, random: telemetry.readings(lambda t_s, h: change(h))
 
 
+def cubic(factor):
+    """Each cosine off by its cube times a factor, in a reading that is a unit vector."""
+    def off(h):
+        longer = [x + factor * x ** 3 for x in h]
+        return [x / math.hypot(*longer) for x in longer]
+    return readings_by(lambda h: [c for k in range(0, len(h), 3) for c in off(h[k:k + 3])])
+
+
+def harmonic(amplitude_rad, turns):
+    """Off about the axis y of a case by a sine of the angle about it, so many times a turn."""
+    def off(h):
+        angle = amplitude_rad * math.sin(turns * math.atan2(h[2], h[0]) + 0.5)
+        return rotated(exponential([0, angle, 0]), h)
+    return readings_by(lambda h: [c for k in range(0, len(h), 3) for c in off(h[k:k + 3])])
+
+
 def exchanged(telemetry, random):
     """No telemetry can tell: where both are mounted alike, only their names are wrong."""
     telemetry.readings(lambda t_s, h: h[3:] + h[:3])
@@ -362,6 +378,8 @@ WORLDS = [
     World("inertial-step-1deg", "faults", constant(SLEWS), inertial_step(math.radians(1)), faults=("momentum-jumped",)),
     World("aberration", "faults", tracker(aberration='"uncorrected"'), faults=("aberration-not-corrected",)),
     World("cosine-scale", "faults", constant(toml(gyro_drift={}, gyro_readout={"scale": "[5e-4, -5e-4, 0]"})), faults=("readout-scale-off",)),
+    World("readout-cubic-4", "faults", constant(SLEWS), cubic(4 * ARCSECOND), faults=("readout-error-by-direction",)),
+    World("readout-harmonic-1", "faults", constant(SLEWS), harmonic(1 * ARCSECOND, 2), faults=("readout-error-by-direction",)),
     World("gyro-late-125ms", "faults", constant(SLEWS), late(0.125)),
     World("stamps-3s-late", "faults", constant(SLEWS), stamps_of_fixes(lambda t: t + 3)),
     World("clock-100ppm", "faults", constant(SLEWS), stamps_of_fixes(lambda t: t * (1 + 1e-4))),

@@ -33,7 +33,9 @@ constexpr int kMultiplesOfRate = 2;
 constexpr int kBeforeReadout = kOfAberration + kMultiplesOfRate * kOfMultiple;
 /// Sine and cosine about the three axes of the body by which a gyro's case goes to and fro at the orbital rate.
 constexpr int kOfCase = 6;
-constexpr int kOfShapesOfGyro = kOfReadout + kOfCase;
+/// Errors of the readings of a gyro as functions of the direction: fields on the sphere up to this degree.
+constexpr DriftModelId kFields = vsh(4);
+constexpr int kOfShapesOfGyro = kOfReadout + kOfCase + kFields.size();
 
 /// Columns of the shapes of one jump: rotations of all cases, of each, steps of each momentum, rotations of the
 /// inertial axes.
@@ -153,8 +155,8 @@ Matrix3d cross(const Vector3d& v) {
 /// orbital rate; gyro by gyro what the scales of the direction cosines are off 1, and the angles between their axes off
 /// right angles, then rotations of the case that go to and fro at the orbital rate. Each moves the directions as a
 /// small rotation of the cases would, an alignment. Then `more` columns of zero.
-MatrixXd shapes_of(const CalibrationSetup& setup, const PassProblem::Moment& moment, const Layout& layout,
-                   const MatrixXd& rows, Index more) {
+MatrixXd shapes_of(const CalibrationSetup& setup, const DriftModel& model_of_fields, const PassProblem::Moment& moment,
+                   const Layout& layout, const MatrixXd& rows, Index more) {
   MatrixXd shapes = MatrixXd::Zero(rows.rows(), kBeforeReadout + Index{kOfShapesOfGyro} * layout.gyros + more);
   const Matrix3d C_c_in = moment.fix->fix.q_in_c.normalized().toRotationMatrix().transpose();
   const Matrix3d aberrated = cross(Vector3d::UnitZ()) * C_c_in;
@@ -178,8 +180,13 @@ MatrixXd shapes_of(const CalibrationSetup& setup, const PassProblem::Moment& mom
     read << h_b.x(), 0, 0, h_b.y(), 0, h_b.z(),  //
         0, h_b.y(), 0, h_b.x(), h_b.z(), 0,      //
         0, 0, h_b.z(), 0, h_b.y(), h_b.x();
-    const Eigen::Matrix<double, 3, kOfReadout> by_readout = cross(-(C_c_b * h_b)) * C_c_b * read;
+    const Matrix3d turned_by_reading = cross(-(C_c_b * h_b)) * C_c_b;
+    const Eigen::Matrix<double, 3, kOfReadout> by_readout = turned_by_reading * read;
     const Index own = kBeforeReadout + Index{kOfShapesOfGyro} * k;
+    Columns<kFields.size()> fields;
+    model_of_fields.basis(h_b, {}, fields.view(kFields.size()));
+    const Eigen::Matrix<double, 3, kFields.size()> by_fields = turned_by_reading * fields.first(kFields.size());
+    shapes.middleCols<kFields.size()>(own + kOfReadout + kOfCase) = by_alignment.lazyProduct(by_fields);
     shapes.middleCols<3>(own + kOfReadout) = std::sin(phase) * by_alignment;
     shapes.middleCols<3>(own + kOfReadout + 3) = std::cos(phase) * by_alignment;
     shapes.middleCols<kOfReadout>(own) = by_alignment.lazyProduct(by_readout);
@@ -219,6 +226,22 @@ class TurnedByOrbitalDrift {
   Eigen::Quaterniond last_q_ = Eigen::Quaterniond::Identity();
   Eigen::Matrix<double, 3, 6> turned_ = Eigen::Matrix<double, 3, 6>::Zero();
 };
+
+/// Root mean square over the sphere of each member of the fields whose amplitude is 1; infinite for rotations, which
+/// the alignment has.
+VectorXd rms_of_fields() {
+  const DriftModel model(kFields, {});
+  VectorXd rms(kFields.size());
+  for (int i = 0; i < kFields.size(); ++i) {
+    const DriftCoefficient& member = model.member(i);
+    constexpr double kOfEq1 = 0.23;  // of k0 0.195, of the others 0.239
+    const bool is_rotation = member.member == DriftCoefficient::Member::kD && member.degree == 1;
+    rms(i) = is_rotation          ? std::numeric_limits<double>::infinity()
+             : member.is_in_eq1() ? kOfEq1
+                                  : std::sqrt(member.degree * (member.degree + 1) / (4 * std::numbers::pi));
+  }
+  return rms;
+}
 
 MatrixXd prior_rows(const PassProblem::Linear& linear, Index shapes) {
   MatrixXd rows(linear.prior.rows(), linear.prior.cols() + shapes + 1);
@@ -311,8 +334,9 @@ class Constancy {
       return problem_.begin_of(arc) <= jump.after &&
              (arc + 1 == problem_.arcs() || jump.after < problem_.begin_of(arc + 1));
     };
+    const DriftModel model_of_fields(kFields, {});
     const auto beside = [&](const PassProblem::Moment& moment, const Layout& layout, const MatrixXd& rows) {
-      MatrixXd columns = shapes_of(problem_.setup().on_board, moment, layout, rows, of_jumps);
+      MatrixXd columns = shapes_of(problem_.setup().on_board, model_of_fields, moment, layout, rows, of_jumps);
       for (std::size_t j = 0; j < jumps.size(); ++j) {
         if (moment.t < jumps[j].after) {
           continue;
@@ -401,6 +425,7 @@ class Constancy {
   [[nodiscard]] Index multiple(int i) const { return at_shapes_ + kOfAberration + Index{kOfMultiple} * i; }
   [[nodiscard]] Index readout(int gyro) const { return at_shapes_ + kBeforeReadout + Index{kOfShapesOfGyro} * gyro; }
   [[nodiscard]] Index case_of(int gyro) const { return readout(gyro) + kOfReadout; }
+  [[nodiscard]] Index fields(int gyro) const { return case_of(gyro) + kOfCase; }
   /// Of the shapes of a jump, whose columns these are.
   [[nodiscard]] Index of_jump(std::size_t j) const { return at_jumps_ + static_cast<Index>(j) * jump_.size(); }
   [[nodiscard]] const ColumnsOfJump& jump() const { return jump_; }
@@ -583,6 +608,9 @@ Moves moves_over(const Trial& trial) {
   constexpr double kAnnual = 6e-5;
   constexpr double kOrbital = 1.5e-5;
   constexpr double kScale = 1e-3;
+  constexpr double kFieldLarge_rad = 5.0 / 206265;
+  constexpr double kFieldSmall_rad = 1.0 / 206265;
+  const VectorXd member_rms = rms_of_fields();
   VectorXd coefficient_sigma(Index{Layout::kEq1} * layout.gyros);
   for (int k = 0; k < layout.gyros; ++k) {
     for (int i = 0; i < Layout::kEq1; ++i) {
@@ -727,6 +755,18 @@ Moves moves_over(const Trial& trial) {
     consider(what(Moving::kGyroCase, Motion::kOrbital, k), shape(pass.case_of(k), kOfCase),
              sigmas(kOfCase, kCreeps_rad));
   }
+  for (const double rad : {kFieldLarge_rad, kFieldSmall_rad}) {
+    const VectorXd sigma = rad / std::sqrt(static_cast<double>(kFields.size())) * member_rms.cwiseInverse();
+    Entries of_all;
+    for (int k = 0; k < layout.gyros; ++k) {
+      const Entries own = shape(pass.fields(k), kFields.size());
+      consider(what(Moving::kReadoutField, Motion::kPresent, k), own, sigma);
+      for (const auto& entry : own) {
+        of_all.emplace_back(entry.row(), entry.col() + kFields.size() * k, entry.value());
+      }
+    }
+    consider(what(Moving::kReadoutField, Motion::kPresent, -1), of_all, sigma.replicate(layout.gyros, 1));
+  }
   for (std::size_t j = 0; j < jumps.jumps.size(); ++j) {
     const auto& [from, until] = jumps.jumps[j];
     const auto among = static_cast<double>(jumps.among);
@@ -766,6 +806,15 @@ Moves moves_over(const Trial& trial) {
     } else if (change.motion == Motion::kWalk) {
       change.size = VectorXd::Constant(1, change.size.norm());
       change.sigma = VectorXd::Constant(1, change.sigma.norm());
+    } else if (change.moving == Moving::kReadoutField) {
+      const auto rms = [&](const VectorXd& amplitudes) {  // of the gyros together, as of one
+        const Eigen::Index gyros = amplitudes.size() / member_rms.size();
+        const Eigen::ArrayXd each = member_rms.replicate(gyros, 1).array();
+        return each.isFinite().select(each * amplitudes.array(), 0.0).matrix().norm() /
+               std::sqrt(static_cast<double>(gyros));
+      };
+      change.size = VectorXd::Constant(1, rms(change.size));
+      change.sigma = VectorXd::Constant(1, rms(change.sigma));
     }
   }
   std::ranges::sort(best, [](const Change& a, const Change& b) { return a.log_odds > b.log_odds; });

@@ -57,6 +57,8 @@ std::string described(const Change& change) {
       return "aberration of starlight in the fixes";
     case Moving::kReadoutScale:
       return fmt::format("errors of scale, or of right angles, of the direction cosines of {}", of_gyro(change));
+    case Moving::kReadoutField:
+      return fmt::format("errors of the readings of {} that depend on the direction of its momentum", of_gyro(change));
   }
   return {};
 }
@@ -77,6 +79,8 @@ FindingCode code_of(const Change& change) {
       return FindingCode::kAberrationNotCorrected;
     case Moving::kReadoutScale:
       return FindingCode::kReadoutScaleOff;
+    case Moving::kReadoutField:
+      return FindingCode::kReadoutErrorByDirection;
   }
   return FindingCode::kOther;
 }
@@ -106,6 +110,8 @@ std::string_view cure_of(const Change& change) {
     case Moving::kReadoutScale:
       return "Correct the scales of the direction cosines and the angles between their axes; check that each reading "
              "is a unit vector before it is scaled.";
+    case Moving::kReadoutField:
+      return "Correct the readings by a calibration of the readout over all directions.";
   }
   return {};
 }
@@ -163,8 +169,8 @@ double sigmas_off(const Calibration& calibration, const Change& change, bool ali
 }
 
 /// What moves the attitude by the fixes, in its claimed sigmas, the largest of its axes: the amplitude of rotations to
-/// and fro of the star tracker or of a case, which are taken for the attitude; how far the star tracker or its inertial
-/// axes have moved, by which the attitude before differs from that after.
+/// and fro of the star tracker or of a case, which are taken for the attitude; what the readings are off; how far the
+/// star tracker or its inertial axes have moved, by which the attitude before differs from that after.
 double sigmas_off_attitude(const CalibrationRun& run, const Change& change) {
   if (run.attitude.sigma_rad.empty()) {
     return 0;
@@ -176,6 +182,9 @@ double sigmas_off_attitude(const CalibrationRun& run, const Change& change) {
     const Eigen::Array3d sine = change.size.head<3>();
     const Eigen::Array3d cosine = change.size.tail<3>();
     return ((sine.square() + cosine.square()).sqrt() / sigma_rad).maxCoeff();
+  }
+  if (change.moving == Moving::kReadoutField) {
+    return (change.size.value() / sigma_rad).maxCoeff();
   }
   if (change.moving == Moving::kStarTracker) {
     return (change.size.array() / sigma_rad).abs().maxCoeff();
@@ -270,16 +279,18 @@ void judge_changes(const CalibrationRun& run, std::vector<Finding>& findings) {
   }
   std::string what = described(likeliest);
   what.front() = static_cast<char>(what.front() - 'a' + 'A');
-  Finding finding{code_of(likeliest),
-                  fmt::format("{}{}: the estimates take what moves for constant{}.", what, when,
-                              is_wrong                            ? ", and their sigmas are wrong"
-                              : has_part_in_covariance(likeliest) ? "; what that makes of them is in their sigmas"
-                                                                  : ""),
-                  fmt::format("{}likelier than nothing by e^{:.0f}; the largest effect on {} is {:.1f} of its "
-                              "sigmas{}",
-                              size_text(likeliest), likeliest.log_odds,
-                              off_attitude > 0 && off == off_attitude ? "the attitude" : "a parameter", off, others),
-                  std::string(cure_of(likeliest))};
+  Finding finding{
+      code_of(likeliest),
+      fmt::format("{}{}: the estimates {}{}.", what, when,
+                  likeliest.motion == Motion::kPresent ? "know nothing of it" : "take what moves for constant",
+                  is_wrong                            ? ", and their sigmas are wrong"
+                  : has_part_in_covariance(likeliest) ? "; what that makes of them is in their sigmas"
+                                                      : ""),
+      fmt::format("{}likelier than nothing by e^{:.0f}; the largest effect on {} is {:.1f} of its "
+                  "sigmas{}",
+                  size_text(likeliest), likeliest.log_odds,
+                  off_attitude > 0 && off == off_attitude ? "the attitude" : "a parameter", off, others),
+      std::string(cure_of(likeliest))};
   if (!is_wrong) {
     finding.severity = FindingSeverity::kWarning;
   }

@@ -633,7 +633,7 @@ void judge_determination(const CalibrationRun& run, std::vector<Finding>& findin
   }
   if (!names.empty()) {
     add(findings, FindingCode::kNotDetermined,
-        "The data do not determine " + names + "; value and sigma are about those of the prior.",
+        "The data do not determine " + names + "; they are hardly better known than before.",
         "posterior sigma above half of the prior sigma", "Calibrate on a longer pass, with slews.");
   }
 }

@@ -31,7 +31,7 @@ bool names_a_change(const CalibrationRun& run) {
   for (const FindingCode code :
        {FindingCode::kGyroMountingMoved, FindingCode::kStarTrackerMoved, FindingCode::kMomentumJumped,
         FindingCode::kInertialAxesTurned, FindingCode::kCoefficientsNotConstant, FindingCode::kAberrationNotCorrected,
-        FindingCode::kReadoutScaleOff, FindingCode::kStarTrackerWanders}) {
+        FindingCode::kReadoutScaleOff, FindingCode::kReadoutErrorByDirection, FindingCode::kStarTrackerWanders}) {
     if (names(run, code)) {
       return true;
     }
@@ -295,6 +295,17 @@ TEST(Constancy, NamesAxesOfAReadoutThatAreNotAtRightAngles) {
     h = (skewed * h).normalized().eval();
   }
   EXPECT_TRUE(names(calibrate(pass, CalibrationOptions()), FindingCode::kReadoutScaleOff));
+}
+
+TEST(Constancy, NamesReadingsThatAreNotLinear) {
+  Pass pass = sim::simulate(scenario_in_eq1(8, std::chrono::hours(3))).pass;
+  for (std::size_t i = 0; i < pass.gyro.h.size(); i += 3) {
+    Eigen::Map<Eigen::Vector3d> h(&pass.gyro.h[i]);
+    h = (h + 10 * kArcsecond * Eigen::Vector3d(h.array().cube())).normalized().eval();
+  }
+  const CalibrationRun run = calibrate(pass, CalibrationOptions());
+  EXPECT_TRUE(names(run, FindingCode::kReadoutErrorByDirection));
+  EXPECT_FALSE(run.calibration.verdict.trustworthy);
 }
 
 TEST(Constancy, NamesAberration) {

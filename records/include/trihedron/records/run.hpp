@@ -94,6 +94,7 @@ enum class Moving : std::uint8_t {
   kCoefficients,  ///< drift coefficients of eq. (1), of a gyro or of all
   kAberration,    ///< fixes are off as starlight is by the motion of the spacecraft
   kReadoutScale,  ///< the scales of a gyro's direction cosines are off, or the right angles of their axes
+  kReadoutField,  ///< the readings of a gyro are off by another function of the direction
 };
 
 /// How it does.
@@ -117,7 +118,8 @@ struct Change {
   double log_odds = 0;   ///< ln of the Bayes factor for it against nothing that moves, less ln of the number of tries
   /// Size and 1-sigma: rotation vector, rad, c axes (kInertialAxes: in axes; kMomentum: two components across the
   /// momentum); coefficients, rad/s, gyro by gyro, for kOrbital of cosine and sine; over the pass. For kFaster,
-  /// and for kOrbital of a case, of sine and cosine. For kWalk one number, the root of the sum of squares of all steps.
+  /// and for kOrbital of a case, of sine and cosine. For kWalk one number, the root of the sum of squares of all steps;
+  /// for kReadoutField the root mean square over all directions, rad.
   Eigen::VectorXd size, sigma;
   /// Coefficients of eq. (1) and alignment of each gyro at the end of the pass, for kOrbital their mean over it, less
   /// what is estimated without the change: rad/s, rad.
