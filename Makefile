@@ -15,7 +15,7 @@ SOURCES := $(shell git ls-files '*.cpp' '*.hpp' 2>/dev/null)
 
 help:
 	@echo 'make demo     install what is missing, build, repeat the experiment of the paper, say where the report is'
-	@echo 'make test     build and run all tests'
+	@echo 'make test     build and run the tests, all but a few that fly longest'
 	@echo 'make build    the program alone, at $(BUILD)/trihedron'
 	@echo 'make everything  with tests and benches'
 	@echo 'make bench    measure again what docs/performance.md tells: half an hour; goes on where it was interrupted'
@@ -35,7 +35,7 @@ help:
 	@echo 'make image    an OCI image of the program, in out/image, after `make deb`; make image-test tries it'
 	@echo 'make conan-test  the Conan package of the flight library, used by another project'
 	@echo 'make fuzz-briefly  each reader against libFuzzer for twenty seconds or less'
-	@echo 'make thorough  lint, sanitize, coverage, interop and fuzz-briefly: what .ci/run has no time for, before a change is handed in'
+	@echo 'make thorough  before a change is handed in, what .ci/run has no time for: the tests that fly longest, lint, sanitize, coverage, interop, fuzz-briefly'
 	@echo 'make fuzz     each reader against libFuzzer for FUZZ_SECONDS (3600) each, measures again what docs/reliability.md tells: hours'
 	@echo 'make docs     the site of all documents: tutorials, how-to, reference, explanation, in out/docs/index.html'
 	@echo 'make shown    run the commands that the documents show, and write what they print into them'
@@ -64,7 +64,7 @@ demo: build
 	$(BUILD)/trihedron demo -o out/demo
 
 test: everything
-	ctest --test-dir $(BUILD) --output-on-failure --parallel $(TEST_JOBS)
+	ctest --test-dir $(BUILD) --output-on-failure --parallel $(TEST_JOBS) -LE thorough
 
 # What the Python package is built with, needs and is tested with.
 $(PYTHON_TOOLS)/installed: python/requirements.txt
@@ -235,7 +235,8 @@ fuzz: fuzz-build
 fuzz-briefly: fuzz-build
 	nice -n 5 $(FUZZ) --briefly
 
-thorough: lint sanitize coverage interop fuzz-briefly
+thorough: everything lint sanitize coverage interop fuzz-briefly
+	ctest --test-dir $(BUILD) --output-on-failure --parallel $(JOBS) -L thorough
 
 # Fails on each warning, but Doxygen's of members and constants that have no comment of their own (see docs/Doxyfile), and on each broken link.
 docs: build $(DOCS_TOOLS)/installed

@@ -4,10 +4,12 @@
 #
 # trihedron_module(<name> [SOURCES …] [MODULES …] [LIBRARIES …] [PRIVATE_LIBRARIES …])
 #   makes the target trihedron_<name> with the alias trihedron::<name>; MODULES must be allowed by the table below.
-# trihedron_test(<module> <file.cpp>… [LIBRARIES …] [LONG <Suite.Name>…] [SAMPLE_PASSES <Suite.Name>…])
+# trihedron_test(<module> <file.cpp>… [LIBRARIES …] [LONG <Suite.Name>…] [THOROUGH <Suite.Name>…]
+#     [SAMPLE_PASSES <Suite.Name>…])
 #   makes the Google Test program <module>_test, linked with the module if there is one of that name, and registers its tests as
 #   <module>.<Suite>.<Name>, under the sanitizers as <module>.part_0 to part_3. Those that match LONG (with * and ?) get the label `long`:
 #   they fly many times for a statistic, take no path of their own, and are left out under the sanitizers, where they would take an hour.
+#   Those that match THOROUGH, by name or all with *, are long, and left out of `make test`: see `make thorough`.
 #   Those that match SAMPLE_PASSES are long as well, and CTest makes the passes of validation/passes before them.
 # trihedron_pytest(<name> <file.py>)
 #   registers the tests of a Python file as one test; they find the build directory in TRIHEDRON_BUILD. Those marked `long` are
@@ -97,7 +99,7 @@ function(trihedron_test module)
   if(NOT TRIHEDRON_BUILD_TESTS)
     return()
   endif()
-  cmake_parse_arguments(arg "" "" "LIBRARIES;LONG;SAMPLE_PASSES" ${ARGN})
+  cmake_parse_arguments(arg "" "" "LIBRARIES;LONG;THOROUGH;SAMPLE_PASSES" ${ARGN})
   add_executable(${module}_test ${arg_UNPARSED_ARGUMENTS})
   if(TARGET trihedron::${module})
     target_link_libraries(${module}_test PRIVATE trihedron::${module})
@@ -132,8 +134,9 @@ function(trihedron_test module)
     list(APPEND properties ENVIRONMENT ${environment})
   endif()
   string(JOIN ":" long ${arg_LONG})
+  string(JOIN ":" thorough ${arg_THOROUGH})
   string(JOIN ":" on_passes ${arg_SAMPLE_PASSES})
-  set(others "-${long}:${on_passes}")
+  set(others "-${long}:${thorough}:${on_passes}")
   if(TRIHEDRON_SANITIZE)
     # In four processes. The start of one takes longer than most of these tests do.
     foreach(part RANGE 3)
@@ -145,7 +148,11 @@ function(trihedron_test module)
     gtest_discover_tests(${module}_test ${discovery} TEST_FILTER "${others}" ${properties})
   endif()
   if(arg_LONG)
-    gtest_discover_tests(${module}_test ${discovery} TEST_FILTER "${long}" TEST_LIST ${module}_long_tests ${properties} LABELS long COST 100)
+    gtest_discover_tests(${module}_test ${discovery} TEST_FILTER "${long}-${thorough}" TEST_LIST ${module}_long_tests ${properties} LABELS long COST 100)
+  endif()
+  if(arg_THOROUGH)
+    gtest_discover_tests(${module}_test ${discovery} TEST_FILTER "${thorough}" TEST_LIST ${module}_thorough_tests
+      ${properties} LABELS "long;thorough" COST 300)
   endif()
   if(arg_SAMPLE_PASSES)
     target_link_libraries(${module}_test PRIVATE trihedron_sample_passes)

@@ -58,7 +58,7 @@ std::string described(const Change& change) {
     case Moving::kReadoutScale:
       return fmt::format("errors of scale, or of right angles, of the direction cosines of {}", of_gyro(change));
     case Moving::kReadoutField:
-      return fmt::format("errors of the readings of {} that depend on the direction of its momentum", of_gyro(change));
+      return fmt::format("errors of the readings of {} that depend on the direction in the case", of_gyro(change));
   }
   return {};
 }
@@ -120,6 +120,9 @@ std::string_view cure_of(const Change& change) {
 std::string size_text(const Change& change) {
   if (change.motion == Motion::kWalk) {
     return {};
+  }
+  if (change.moving == Moving::kReadoutField) {
+    return fmt::format("{} in the mean of all directions, ", angle_text(change.size.value()));
   }
   const double size = change.size.norm();
   const double sigma = change.sigma.norm();
