@@ -9,7 +9,7 @@
 #   makes the Google Test program <module>_test, linked with the module if there is one of that name, and registers its tests as
 #   <module>.<Suite>.<Name>, under the sanitizers as <module>.part_0 to part_3. Those that match LONG (with * and ?) get the label `long`:
 #   they fly many times for a statistic, take no path of their own, and are left out under the sanitizers, where they would take an hour.
-#   Those that match THOROUGH, by name or all with *, are long, and left out of `make test`: see `make thorough`.
+#   Those that match THOROUGH, by name or all with *, get the label `long-thorough`, and `make test` leaves them to `make thorough`.
 #   Those that match SAMPLE_PASSES are long as well, and CTest makes the passes of validation/passes before them.
 # trihedron_pytest(<name> <file.py>)
 #   registers the tests of a Python file as one test; they find the build directory in TRIHEDRON_BUILD. Those marked `long` are
@@ -152,7 +152,7 @@ function(trihedron_test module)
   endif()
   if(arg_THOROUGH)
     gtest_discover_tests(${module}_test ${discovery} TEST_FILTER "${thorough}" TEST_LIST ${module}_thorough_tests
-      ${properties} LABELS "long;thorough" COST 300)
+      ${properties} LABELS long-thorough COST 300)
   endif()
   if(arg_SAMPLE_PASSES)
     target_link_libraries(${module}_test PRIVATE trihedron_sample_passes)
