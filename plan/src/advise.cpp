@@ -6,7 +6,9 @@
 #include <cmath>
 #include <iterator>
 #include <limits>
+#include <map>
 #include <numbers>
+#include <utility>
 
 #include "design_flight.hpp"
 #include "trihedron/ground/model/setup_error.hpp"
@@ -154,10 +156,23 @@ class Search {
     vary(free_times(plan, excursion), &Excursion::begin_s);
   }
 
-  /// Mean square of the attitude error that each plan leaves.
+  /// Mean square of the attitude error that each plan leaves. The search comes back to many a plan.
   [[nodiscard]] std::vector<double> errors(const std::vector<Plan>& plans) {
-    const std::vector<double> squares = ground::on_all_cores(
-        plans.size(), [&](std::size_t i) { return (metric_ * flight_.covariance_after(slews_of(plans[i]))).trace(); });
+    std::vector<std::vector<Slew>> unknown;
+    for (const Plan& plan : plans) {
+      if (std::vector<Slew> slews = slews_of(plan); known_.try_emplace(key_of(slews)).second) {
+        unknown.push_back(std::move(slews));
+      }
+    }
+    const std::vector<double> found = ground::on_all_cores(
+        unknown.size(), [&](std::size_t i) { return (metric_ * flight_.covariance_after(unknown[i])).trace(); });
+    for (std::size_t i = 0; i < unknown.size(); ++i) {
+      known_[key_of(unknown[i])] = found[i];
+    }
+    std::vector<double> squares;
+    for (const Plan& plan : plans) {
+      squares.push_back(known_.at(key_of(slews_of(plan))));
+    }
     done_ += plans.size();
     if (progress_) {
       const double all = kRounds * limits_.slews * (limits_.slews + 1) / 2.0 * (14 + 7 + 10);
@@ -166,7 +181,17 @@ class Search {
     return squares;
   }
 
+  using Key = std::vector<std::array<double, 4>>;
+  [[nodiscard]] static Key key_of(const std::vector<Slew>& slews) {
+    Key key;
+    for (const Slew& slew : slews) {
+      key.push_back({slew.begin_s, slew.roll_rad, slew.pitch_rad, slew.yaw_rad});
+    }
+    return key;
+  }
+
   DesignFlight flight_;
+  std::map<Key, double> known_;  ///< by the slews
   const Eigen::MatrixXd& metric_;
   const AttitudeScenario& attitude_;
   double duration_s_;

@@ -1,5 +1,7 @@
 #include "design_flight.hpp"
 
+#include <algorithm>
+#include <chrono>
 #include <cmath>
 
 #include "trihedron/core/directions_fit.hpp"
@@ -10,8 +12,10 @@
 namespace trihedron::plan {
 namespace {
 
-/// Samples, and fixes, that one stands for.
+/// Fixes that one stands for.
 constexpr int kGroup = 4;
+/// Of the samples.
+constexpr Duration kSamplePeriod = std::chrono::seconds(1);
 /// 1-sigma of the mean of a group over that of one.
 constexpr double kNoiseOfGroup = 0.5;
 
@@ -73,10 +77,7 @@ DesignFlight::DesignFlight(const Scenario& scenario, const CalibrationOptions& o
     *options_.star_tracker_noise_rad *= kNoiseOfGroup;
   }
   scenario_.star_tracker_period *= kGroup;
-  // Samples further apart would count as gaps.
-  if (kGroup * scenario.gyro_period <= max_interpolation(scenario.gyro_period)) {
-    scenario_.gyro_period *= kGroup;
-  }
+  scenario_.gyro_period *= std::max<Duration::rep>(kSamplePeriod / scenario.gyro_period, 1);
 }
 
 Eigen::MatrixXd DesignFlight::covariance_after(const std::vector<Slew>& slews) const {

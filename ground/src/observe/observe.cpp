@@ -3,6 +3,7 @@
 #include <Eigen/QR>
 #include <Eigen/SVD>
 #include <algorithm>
+#include <chrono>
 #include <cmath>
 #include <limits>
 #include <utility>
@@ -281,7 +282,8 @@ Observability observe(const Pass& pass, const CalibrationOptions& asked, const M
 }
 
 Eigen::MatrixXd predicted_covariance(const Pass& exact, const CalibrationOptions& options) {
-  const PassSetup setup = pass_setup(exact.settings, options);
+  PassSetup setup = pass_setup(exact.settings, options);
+  setup.sample_step = std::chrono::seconds(3);  // of slews half a degree is enough by far
   const ScreenedPass screened = as_it_is(exact, setup.layout().gyros, setup.layout().star_trackers);
   if (screened.fixes.empty()) {
     throw no_fix();
