@@ -14,8 +14,8 @@ namespace {
 
 /// Fixes that one stands for.
 constexpr int kGroup = 4;
-/// Of the samples.
-constexpr Duration kSamplePeriod = std::chrono::seconds(1);
+/// Between samples.
+constexpr Duration kLongestPeriod = std::chrono::seconds(1);
 /// 1-sigma of the mean of a group over that of one.
 constexpr double kNoiseOfGroup = 0.5;
 
@@ -77,7 +77,12 @@ DesignFlight::DesignFlight(const Scenario& scenario, const CalibrationOptions& o
     *options_.star_tracker_noise_rad *= kNoiseOfGroup;
   }
   scenario_.star_tracker_period *= kGroup;
-  scenario_.gyro_period *= std::max<Duration::rep>(kSamplePeriod / scenario.gyro_period, 1);
+  // A reading at each fix: in a slew another would be off by more than any noise.
+  Duration::rep samples = std::max<Duration::rep>(kLongestPeriod / scenario.gyro_period, 1);
+  while (samples > 1 && scenario_.star_tracker_period % (samples * scenario.gyro_period) != Duration::zero()) {
+    --samples;
+  }
+  scenario_.gyro_period *= samples;
 }
 
 Eigen::MatrixXd DesignFlight::covariance_after(const std::vector<Slew>& slews) const {

@@ -40,6 +40,18 @@ TEST(DesignFlight, KnowsTheCovarianceOfASimulatedFlight) {
   EXPECT_LT(ratio.maxCoeff(), 1.25);
 }
 
+/// One second is no multiple of the period of these samples, and 0.9 s are no divisor of that of the fixes.
+TEST(DesignFlight, HasAReadingAtEachFix) {
+  Scenario scenario = advised().scenario;
+  scenario.gyro_period = std::chrono::milliseconds(300);
+  const ground::Observability observed = ground::observe(sim::simulate(scenario).pass, advised().after.options);
+  const DesignFlight flight(scenario, observed.options);
+  const Eigen::VectorXd ratio =
+      flight.covariance_after(advised().slews()).diagonal().cwiseQuotient(observed.covariance.diagonal()).cwiseSqrt();
+  EXPECT_GT(ratio.minCoeff(), 0.8);
+  EXPECT_LT(ratio.maxCoeff(), 1.25);
+}
+
 TEST(Advice, MakesTheUnobservableObservable) {
   EXPECT_TRUE(advised().before.is_harmful());
   EXPECT_FALSE(advised().after.is_harmful());
