@@ -153,8 +153,9 @@ Matrix3d cross(const Vector3d& v) {
 /// Shapes of errors of a fix, columns beside its rows: aberration by a velocity that is constant, and by two at orbital
 /// period, over the speed of light, in axes; rotations of the star tracker that go to and fro at multiples of the
 /// orbital rate; gyro by gyro what the scales of the direction cosines are off 1, and the angles between their axes off
-/// right angles, then rotations of the case that go to and fro at the orbital rate. Each moves the directions as a
-/// small rotation of the cases would, an alignment. Then `more` columns of zero.
+/// right angles, then rotations of the case that go to and fro at the orbital rate, then fields of the readings
+/// (kFields). Each moves the directions as a small rotation of the cases would, an alignment. Then `more` columns of
+/// zero.
 MatrixXd shapes_of(const CalibrationSetup& setup, const DriftModel& model_of_fields, const PassProblem::Moment& moment,
                    const Layout& layout, const MatrixXd& rows, Index more) {
   MatrixXd shapes = MatrixXd::Zero(rows.rows(), kBeforeReadout + Index{kOfShapesOfGyro} * layout.gyros + more);

@@ -283,7 +283,7 @@ Observability observe(const Pass& pass, const CalibrationOptions& asked, const M
 
 Eigen::MatrixXd predicted_covariance(const Pass& exact, const CalibrationOptions& options) {
   PassSetup setup = pass_setup(exact.settings, options);
-  setup.sample_step = std::chrono::seconds(3);  // of slews half a degree is enough by far
+  setup.sample_step = std::chrono::seconds(3);  // in slews a body turns by a degree or two
   const ScreenedPass screened = as_it_is(exact, setup.layout().gyros, setup.layout().star_trackers);
   if (screened.fixes.empty()) {
     throw no_fix();
