@@ -17,9 +17,9 @@ namespace {
 using Eigen::MatrixXd;
 using Eigen::Vector3d;
 
-/// Half-widths of the fit, longest first; a shorter one is taken where a cubic does not fit over a longer one.
-constexpr std::array<Duration, 3> kReaches = {std::chrono::milliseconds(3000), std::chrono::milliseconds(1400),
-                                              std::chrono::milliseconds(700)};
+/// Half-widths of the fit, shortest first.
+constexpr std::array<Duration, 3> kReaches = {std::chrono::milliseconds(700), std::chrono::milliseconds(1400),
+                                              std::chrono::milliseconds(3000)};
 
 /// Over so long to both sides of a time fixes are averaged, some tens of them.
 constexpr Duration kMisfitReach = std::chrono::minutes(1);
@@ -72,27 +72,51 @@ Vector3d LocalMisfit::square_rad2(Time t) const {
   return found;
 }
 
-SmoothReadings::At SmoothReadings::at(Time t, const At& otherwise) const {
-  for (const Duration reach : kReaches) {
-    if (const auto fitted = fit(t, otherwise.used, reach)) {
-      return *fitted;
-    }
-  }
-  return otherwise;
-}
-
 // Of two fits of which one is by a part of the samples of the other, the difference has the difference of the
 // variances.
+double SmoothReadings::variance_apart(const At& longer, const At& shorter) {
+  return shorter.noise_factor * shorter.noise_factor - longer.noise_factor * longer.noise_factor;
+}
+
+// Where the readings bend, the longest that agrees with all that are shorter (Lepski 1991): residuals that pass for
+// those of the readout may be those of a cubic that is off by several of its sigmas.
+SmoothReadings::At SmoothReadings::at(Time t, const At& otherwise) const {
+  if (const std::optional<At> longest = fit(t, otherwise.used, kReaches.back()); longest && !longest->bends) {
+    return *longest;
+  }
+  std::vector<At> taken;
+  for (const Duration reach : kReaches) {
+    const std::optional<At> longer = fit(t, otherwise.used, reach);
+    if (longer && std::ranges::all_of(taken, [&](const At& shorter) { return agree(*longer, shorter); })) {
+      taken.push_back(*longer);
+    }
+  }
+  return taken.empty() ? otherwise : taken.back();
+}
+
+bool SmoothReadings::agree(const At& longer, const At& shorter) const {
+  constexpr double kSigmas = 3;
+  double square = 0;
+  int freedom = 0;
+  for (int k = 0; k < gyros_; ++k) {
+    if (longer.used[k] && shorter.used[k]) {
+      const double noise_rad = setup_.readout_noise_rad[k];
+      square += (longer.h_b[k] - shorter.h_b[k]).squaredNorm() / (noise_rad * noise_rad);
+      freedom += 2;
+    }
+  }
+  return square <= (freedom + kSigmas * std::sqrt(2.0 * freedom)) * variance_apart(longer, shorter);
+}
+
 std::optional<SmoothReadings::Misfit> SmoothReadings::misfit(Time t, const At& at) const {
-  const std::optional<At> shortest = fit(t, at.used, kReaches.back());
+  const std::optional<At> shortest = fit(t, at.used, kReaches.front());
   if (!shortest || shortest->noise_factor <= at.noise_factor) {
     return std::nullopt;
   }
   Misfit misfit;
   for (int k = 0; k < gyros_; ++k) {
     const double noise_rad = setup_.readout_noise_rad[k];
-    misfit.sigma_rad2[k] =
-        noise_rad * noise_rad * (shortest->noise_factor * shortest->noise_factor - at.noise_factor * at.noise_factor);
+    misfit.sigma_rad2[k] = noise_rad * noise_rad * variance_apart(at, *shortest);
     misfit.square_rad2[k] = (at.h_b[k] - shortest->h_b[k]).squaredNorm() / 2 - misfit.sigma_rad2[k];
   }
   return misfit;
@@ -128,7 +152,23 @@ std::optional<SmoothReadings::At> SmoothReadings::fit(Time t, const GyroMask& us
   if (!fitted.explains(at.used, setup_.readout_noise_rad)) {
     return std::nullopt;
   }
+  at.bends = bends(at, t, first, end - 1);
   return count(at.used) >= 2 ? std::optional(at) : std::nullopt;
+}
+
+bool SmoothReadings::bends(const At& at, Time t, std::size_t first, std::size_t last) const {
+  constexpr double kSigmas = 5;
+  const double part = to_seconds(t - samples_.t(first)) / to_seconds(samples_.t(last) - samples_.t(first));
+  const Directions begin = samples_.h_b(first);
+  const Directions end = samples_.h_b(last);
+  double square = 0;
+  for (int k = 0; k < gyros_; ++k) {
+    if (at.used[k]) {
+      const double noise_rad = setup_.readout_noise_rad[k];
+      square += (at.h_b[k] - begin[k] - part * (end[k] - begin[k])).squaredNorm() / (noise_rad * noise_rad);
+    }
+  }
+  return square > kSigmas * kSigmas;
 }
 
 std::optional<SmoothedAttitude::Rows> SmoothedAttitude::rows_at(const PassProblem::Moment& moment,

@@ -20,8 +20,10 @@ class SmoothReadings {
     Directions h_b;
     GyroMask used{};
     double noise_factor = 1;
+    bool bends = false;  ///< whether they leave the line between the samples at the ends by more than noise
   };
-  /// Returns `otherwise` where no polynomial fits; only the gyros that it uses are fitted.
+  /// By the longest polynomial that fits, and where the readings bend agrees with those over shorter times. Returns
+  /// `otherwise` where none fits; only the gyros that it uses are fitted.
   [[nodiscard]] At at(Time t, const At& otherwise) const;
   /// Square of what the polynomial of at() is off one over the shortest time, less what noise makes of that: per gyro
   /// and component, rad²; and its 1-sigma by chance. Nothing where it is that one.
@@ -33,6 +35,11 @@ class SmoothReadings {
 
  private:
   [[nodiscard]] std::optional<At> fit(Time t, const GyroMask& used, Duration reach) const;
+  [[nodiscard]] bool bends(const At& at, Time t, std::size_t first, std::size_t last) const;
+  /// Variance by which two fits at one time differ by chance, over that of a reading.
+  [[nodiscard]] static double variance_apart(const At& longer, const At& shorter);
+  /// Whether they differ by no more than three sigmas of the χ² that chance makes.
+  [[nodiscard]] bool agree(const At& longer, const At& shorter) const;
 
   const ScreenedSamples& samples_;
   int gyros_;

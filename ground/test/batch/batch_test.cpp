@@ -298,6 +298,48 @@ TEST(Batch, FindsThatCoefficientsChange) {
   }
 }
 
+/// A body at rest that begins to turn about z, evenly faster: no cubic is what it does, and residuals of two or three
+/// arcseconds pass for noise of two, where the one over six seconds is off by seven of its sigmas.
+TEST(SmoothReadings, AreNotOffByMuchMoreThanTheyAreNoisyWhereABodyBeginsToTurn) {
+  constexpr double kNoise_rad = 2 * kArcsecond;
+  CalibrationSetup setup;
+  setup.gyro_period = from_seconds(0.125);
+  setup.readout_noise_rad[0] = setup.readout_noise_rad[1] = kNoise_rad;
+  for (const double acceleration_rad_s2 : {20 * kArcsecond, 40 * kArcsecond, 80 * kArcsecond, 160 * kArcsecond}) {
+    const auto directions = [&](double t_s) {
+      const double angle_rad = acceleration_rad_s2 / 2 * std::pow(std::max(t_s - 20, 0.0), 2);
+      Directions h_b;
+      h_b[0] = {std::cos(angle_rad), -std::sin(angle_rad), 0};
+      h_b[1] = {std::sin(angle_rad), std::cos(angle_rad), 0};
+      return h_b;
+    };
+    GyroTelemetry telemetry;
+    telemetry.gyros = 2;
+    for (int i = 0; i <= 320; ++i) {
+      telemetry.t.emplace_back(from_seconds(0.125 * i));
+      for (int k = 0; k < 2; ++k) {
+        const Eigen::Vector3d h_b = directions(0.125 * i)[k];
+        telemetry.h.insert(telemetry.h.end(), h_b.begin(), h_b.end());
+      }
+    }
+    ScreenedPass pass(telemetry, 2);
+    for (std::size_t i = 0; i < telemetry.t.size(); ++i) {
+      pass.samples.add(i, all_gyros(2));
+    }
+    const SmoothReadings readings(pass, setup);
+    double least_factor = 1;
+    for (double t_s = 5; t_s < 35; t_s += 0.125) {
+      const auto found = readings.at(Time(from_seconds(t_s)), {directions(t_s), all_gyros(2), 1});
+      least_factor = std::min(least_factor, found.noise_factor);
+      for (int k = 0; k < 2; ++k) {
+        EXPECT_LT((found.h_b[k] - directions(t_s)[k]).norm(), 4 * found.noise_factor * kNoise_rad)
+            << acceleration_rad_s2 << ' ' << t_s;
+      }
+    }
+    EXPECT_LT(least_factor, 0.22);  // at rest all six seconds are taken
+  }
+}
+
 TEST(LocalMisfit, TellsWhereLongPolynomialsAreOffShorterOnes) {
   constexpr double kByChance_rad2 = 1e-12;
   LocalMisfit misfit;
