@@ -29,7 +29,7 @@ set(TRIHEDRON_python_MAY_USE core records sim io ground)
 # Within ground, from room to room.
 set(TRIHEDRON_ground_tasks_MAY_USE)
 set(TRIHEDRON_ground_model_MAY_USE)
-set(TRIHEDRON_ground_clocks_MAY_USE)
+set(TRIHEDRON_ground_clocks_MAY_USE model)
 set(TRIHEDRON_ground_evaluate_MAY_USE model)
 set(TRIHEDRON_ground_onboard_MAY_USE tasks model)
 set(TRIHEDRON_ground_batch_MAY_USE tasks model onboard)

@@ -4,7 +4,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <limits>
+#include <map>
 #include <set>
 #include <utility>
 
@@ -339,24 +341,43 @@ void judge_failures(std::span<const RunRecord> records, CampaignSummary& summary
        FindingSeverity::kDoNotUse});
 }
 
-void judge_verdicts(const Records& trustworthy, std::size_t finished, CampaignSummary& summary) {
-  const std::size_t refused = finished - trustworthy.size();
-  if (refused == 0) {
+std::map<std::string, std::size_t> runs_by_finding(const Records& records) {
+  std::map<std::string, std::size_t> runs;
+  for (const RunRecord* record : records) {
+    for (const std::string& code : std::set<std::string>(record->findings.begin(), record->findings.end())) {
+      ++runs[code];
+    }
+  }
+  return runs;
+}
+
+void judge_verdicts(const Records& trustworthy, const Records& finished, CampaignSummary& summary) {
+  Records refused;
+  std::ranges::copy_if(finished, std::back_inserter(refused),
+                       [](const RunRecord* record) { return record->outcome == RunOutcome::kDoNotUse; });
+  if (refused.empty()) {
     return;
   }
-  std::string most_often;
-  std::size_t most = 0;
-  for (const auto& [code, count] : summary.findings) {
-    const FindingCode known = finding_code_named(code);
-    if (count > most && row_of(known).severity == FindingSeverity::kDoNotUse) {
-      most = count;
-      most_often = fmt::format("; most often {}, in {} runs", code, count);
+  // A finding that trustworthy runs have as well does not tell why runs are refused.
+  const std::map<std::string, std::size_t> of_trusted = runs_by_finding(trustworthy);
+  std::string why;
+  double most = 0;
+  for (const auto& [code, count] : runs_by_finding(refused)) {
+    const auto trusted = of_trusted.find(code);
+    const double share_of_trusted =
+        trusted == of_trusted.end() ? 0
+                                    : static_cast<double>(trusted->second) / static_cast<double>(trustworthy.size());
+    const double more = static_cast<double>(count) - share_of_trusted * static_cast<double>(refused.size());
+    if (more > most) {
+      most = more;
+      why = fmt::format("; most often {}, in {} of these", code, count);
     }
   }
   summary.campaign_findings.push_back(
-      {"runs-not-trustworthy", fmt::format("{} of {} calibrations say of themselves: do not use.", refused, finished),
-       fmt::format("{:.1f} % of the runs{}", 100.0 * static_cast<double>(refused) / static_cast<double>(finished),
-                   most_often),
+      {"runs-not-trustworthy",
+       fmt::format("{} of {} calibrations say of themselves: do not use.", refused.size(), finished.size()),
+       fmt::format("{:.1f} % of the runs{}",
+                   100.0 * static_cast<double>(refused.size()) / static_cast<double>(finished.size()), why),
        "Plan for so many passes without a calibration, or for better ones: observe --advise finds slews.",
        trustworthy.empty() ? FindingSeverity::kDoNotUse : FindingSeverity::kWarning});
 }
@@ -489,10 +510,8 @@ CampaignSummary summarise(const CampaignPlan& plan, std::span<const RunRecord> r
     if (record.outcome == RunOutcome::kTrustworthy) {
       trustworthy.push_back(&record);
     }
-    for (const std::string& code : std::set<std::string>(record.findings.begin(), record.findings.end())) {
-      ++summary.findings[code];
-    }
   }
+  summary.findings = runs_by_finding(finished);
   summary.nees = nees_of(trustworthy);
   summary.nees_of_all = nees_of(finished);
   summary.nis = nis_of(trustworthy);
@@ -505,7 +524,7 @@ CampaignSummary summarise(const CampaignPlan& plan, std::span<const RunRecord> r
   find_cells(plan, records, summary);
   find_worst(records, finished, summary);
   judge_failures(records, summary);
-  judge_verdicts(trustworthy, finished.size(), summary);
+  judge_verdicts(trustworthy, finished, summary);
   judge_nees(trustworthy, summary);
   judge_nis(summary);
   judge_number(trustworthy, summary);

@@ -198,6 +198,25 @@ TEST(CampaignSummary, WithoutATrustworthyRunIsNotToBeUsed) {
   EXPECT_EQ(summary.nees_of_all->runs, 10U);
 }
 
+/// Not a finding that many trustworthy runs have as well.
+TEST(CampaignSummary, NamesWhyRunsAreRefused) {
+  std::vector<RunRecord> records = runs_of(800);
+  for (RunRecord& record : records) {
+    record.findings = {"weak-alignment-axis"};
+  }
+  for (const std::size_t i : {3U, 4U, 5U}) {
+    records[i].outcome = RunOutcome::kDoNotUse;
+  }
+  const auto evidence = [&] {
+    const CampaignSummary summary = summarise(plan_of(800), records);
+    EXPECT_THAT(codes_of(summary), testing::ElementsAre("runs-not-trustworthy"));
+    return summary.campaign_findings.front().evidence;
+  };
+  EXPECT_EQ(evidence(), "0.4 % of the runs");
+  records[4].findings = {"gyro-stuck", "gyro-stuck", "weak-alignment-axis"};
+  EXPECT_THAT(evidence(), testing::HasSubstr("most often gyro-stuck, in 1 of these"));
+}
+
 TEST(CampaignSummary, FindsWhatMatters) {
   const CampaignSummary summary = summarise(plan_of(100), runs_of(100));
   ASSERT_FALSE(summary.influences.empty());

@@ -302,6 +302,9 @@ void add_calibrate(CLI::App& program, const Common& common, int& exit_status) {
       options.need = io::parse_need(arguments->need);
     }
     if (arguments->definitive) {
+      if (!arguments->estimator.empty() && options.estimator != Estimator::kBatch) {
+        throw io::UsageError("--definitive is of estimator batch: leave out --estimator, or give batch");
+      }
       options.estimator = Estimator::kBatch;
       options.definitive_attitude = true;
     }

@@ -233,12 +233,15 @@ ExitStatus replay_run(const io::CampaignFile& file, const CampaignArguments& arg
   if (journal) {
     const auto row = std::ranges::find(journal->records, run, &RunRecord::run);
     if (row != journal->records.end()) {
-      if (!is_same(record, *row)) {
+      if (row->outcome == RunOutcome::kFailed && record.outcome != RunOutcome::kFailed) {
+        comparison = fmt::format("Campaign    failed there: {}\n", printable(row->reason));
+      } else if (!is_same(record, *row)) {
         throw io::MachineFailed(fs::path(arguments.out) / kJournalFile,
                                 fmt::format("run {} has another result there than now", run),
                                 "compare program and machine with those of the campaign; memory may be faulty");
+      } else {
+        comparison = "Campaign    the same result, bit for bit\n";
       }
-      comparison = "Campaign    the same result, bit for bit\n";
     }
   }
   if (staged) {

@@ -3,9 +3,11 @@ build directory."""
 import json
 import os
 import pty
+import shutil
 import signal
 import subprocess
 import time
+import zlib
 
 import jsonschema
 import numpy
@@ -263,6 +265,23 @@ def test_settings_of_a_grid_are_tried_over_the_same_flights(tmp_path):
     assert 'estimator = "invariant"' in (out / "run-30" / "effective-config.toml").read_text()
     walk = json.loads((out / "run-30" / "run.json").read_text())["draws"]["gyro.drift.direction_walk"]
     assert f'direction_random_walk = "{walk}"' in (out / "run-30" / "effective-config.toml").read_text()
+
+
+def test_a_run_that_was_lost_with_its_process_is_performed_alone(finished, tmp_path):
+    shutil.copytree(finished / "out", tmp_path / "out")
+    journal = tmp_path / "out" / "runs.journal"
+    lines = journal.read_text().splitlines()
+    for number, line in enumerate(lines[1:], 1):
+        record = json.loads(line[9:])
+        if record["run"] == 7:
+            record.update(outcome=2, reason="ended its process 2 times, at last by signal 9")
+            text = json.dumps(record, separators=(",", ":"))
+            lines[number] = f"{zlib.crc32(text.encode()):08x} {text}"
+    journal.write_text("\n".join(lines) + "\n")
+    result = run("campaign", finished / "c.toml", "-o", tmp_path / "out", "--only", "7")
+    assert result.returncode in (TRUSTWORTHY, DO_NOT_USE), result.stderr
+    assert "failed there: ended its process 2 times" in result.stdout
+    assert (tmp_path / "out" / "run-7" / "report.html").exists()
 
 
 def test_covariances_are_kept_where_they_are_asked_for(finished, tmp_path):

@@ -543,6 +543,7 @@ def test_a_catalogue_that_cannot_be_written_is_a_machine_failure(start_ups, tmp_
     (("history",), "CATALOGUE"),
     (("calibrate", EXAMPLE, "-o", "x", "--estimator", "magic"), "magic"),
     (("calibrate", EXAMPLE, "-o", "x", "--drift-model", "vsh:9"), "vsh:8"),
+    (("calibrate", EXAMPLE, "-o", "x", "--estimator", "paper", "--definitive"), "--estimator"),
     (("navigate", EXAMPLE, "-o", "x"), "--online"),
     (("navigate", EXAMPLE, "-o", "x", "--online", "--calibration", "y"), "--online"),
     (("navigate", EXAMPLE, "-o", "x", "--online", "--correction-interval", "90"), "unit"),

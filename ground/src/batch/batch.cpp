@@ -50,14 +50,9 @@ double log_likelihood(const PassProblem& problem, const PassSolution& solution, 
   Eigen::MatrixXd prior = linear.prior;
   Eigen::VectorXd prior_y = linear.prior_y;
   problem.put_noise(solution, noise, prior, prior_y);
-  const auto stage_at = [&](std::size_t arc) {
-    SmootherStage stage = linear.stages[arc];
-    if (arc < linear.ends.size()) {
-      problem.put_noise(solution, noise, arc, linear.ends[arc], stage);
-    }
-    return stage;
-  };
-  const SmootherLikelihood found = likelihood(prior, prior_y, linear.stages.size(), stage_at);
+  const SmootherLikelihood found = likelihood(prior, prior_y, linear.stages.size(), [&](std::size_t arc) {
+    return problem.stage(solution, linear, arc, noise);
+  });
   // Of the directions at the start nothing is known before; the rest of the prior is triangular. Rows that
   // gather_constants() has added stand below that triangle.
   const Eigen::Index directions = 2L * layout.gyros;

@@ -302,11 +302,7 @@ FieldInformation information_on_field(const PassProblem& problem, const PassSolu
     }
   }
   const ConstantsInformation found = eliminate_moving(prior, prior_y, linear.stages.size(), [&](std::size_t arc) {
-    SmootherStage stage = linear.stages[arc];
-    if (arc < linear.ends.size()) {
-      problem.put_noise(solution, noise, arc, linear.ends[arc], stage);
-    }
-    return stage;
+    return problem.stage(solution, linear, arc, noise);
   });
 
   // The modes after all others, then the right side, with the error of the solution made the amplitude itself.

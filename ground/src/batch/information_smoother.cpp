@@ -275,20 +275,24 @@ SmootherResult smooth(const MatrixXd& prior, const VectorXd& prior_y, const std:
   return result;
 }
 
+/// Adds rows about the constants, which stand after `d` others, with their right side: those of a triangle.
+void append_constants(ConstantSquares& constants, Index d, MatrixXd& rows, VectorXd& y) {
+  const MatrixXd triangle = lower_root(constants.take()).transpose();
+  const Index c = triangle.cols() - 1;
+  rows.conservativeResize(rows.rows() + triangle.rows(), d + c);
+  rows.bottomRows(triangle.rows()) << MatrixXd::Zero(triangle.rows(), d), triangle.leftCols(c);
+  y.conservativeResize(rows.rows());
+  y.tail(triangle.rows()) = triangle.rightCols(1);
+}
+
 void gather_constants(MatrixXd& prior, VectorXd& prior_y, std::vector<SmootherStage>& stages) {
-  const Index n = prior.cols();
   const Index d = stages.front().m.size();
-  ConstantSquares constants(n - d + 1);
+  ConstantSquares constants(prior.cols() - d + 1);
   for (SmootherStage& stage : stages) {
     check_stop();
     take_constants(stage, d, constants);
   }
-  const MatrixXd triangle = lower_root(constants.take()).transpose();
-  const Index before = prior.rows();
-  prior.conservativeResize(before + triangle.rows(), n);
-  prior.bottomRows(triangle.rows()) << MatrixXd::Zero(triangle.rows(), d), triangle.leftCols(n - d);
-  prior_y.conservativeResize(prior.rows());
-  prior_y.tail(triangle.rows()) = triangle.rightCols(1);
+  append_constants(constants, d, prior, prior_y);
 }
 
 void take_constants(SmootherStage& stage, Index d, ConstantSquares& constants) {
@@ -305,13 +309,7 @@ void take_constants(SmootherStage& stage, Index d, ConstantSquares& constants) {
 }
 
 void put_back(ConstantSquares& constants, Index d, SmootherStage& stage) {
-  const MatrixXd triangle = lower_root(constants.take()).transpose();
-  const Index c = triangle.cols() - 1;
-  const Index before = stage.H.rows();
-  stage.H.conservativeResize(before + triangle.rows(), d + c);
-  stage.H.bottomRows(triangle.rows()) << MatrixXd::Zero(triangle.rows(), d), triangle.leftCols(c);
-  stage.y.conservativeResize(stage.H.rows());
-  stage.y.tail(triangle.rows()) = triangle.rightCols(1);
+  append_constants(constants, d, stage.H, stage.y);
 }
 
 std::vector<MatrixXd> triangles_after(const MatrixXd& prior, const VectorXd& prior_y,

@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "batch/gram.hpp"
+#include "model/scatter.hpp"
 #include "trihedron/core/outlier_gate.hpp"
 #include "trihedron/ground/tasks/on_all_cores.hpp"
 #include "trihedron/records/stop.hpp"
@@ -769,6 +770,15 @@ void PassProblem::put_noise(const PassSolution& solution, const ProcessNoise& no
   stage.A_inverse = A.inverse();
 }
 
+SmootherStage PassProblem::stage(const PassSolution& solution, const Linear& linear, std::size_t arc,
+                                 const ProcessNoise& noise) const {
+  SmootherStage stage = linear.stages[arc];
+  if (arc < linear.ends.size()) {
+    put_noise(solution, noise, arc, linear.ends[arc], stage);
+  }
+  return stage;
+}
+
 double PassProblem::scale_of_misfits(const PassSolution& solution) const {
   constexpr double kMedianOfFour = 0.84;  // of χ²/n; nearer to 1 for more
   constexpr std::size_t kEnough = 100;
@@ -802,9 +812,7 @@ double PassProblem::scale_of_misfits(const PassSolution& solution) const {
   if (nis_per_component.empty()) {
     return 1;
   }
-  const auto middle = nis_per_component.begin() + static_cast<std::ptrdiff_t>(nis_per_component.size() / 2);
-  std::nth_element(nis_per_component.begin(), middle, nis_per_component.end());
-  return std::max(*middle / kMedianOfFour, 1.0);
+  return std::max(median_of(nis_per_component) / kMedianOfFour, 1.0);
 }
 
 PassProblem::Linear PassProblem::linearise(const PassSolution& solution) const { return linearise(solution, false); }

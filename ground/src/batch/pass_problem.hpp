@@ -77,10 +77,10 @@ class PassProblem {
   /// coefficients outside eq. (1).
   [[nodiscard]] const Layout& layout() const { return layout_; }
   [[nodiscard]] const std::optional<DriftModes>& modes() const { return modes_; }
-  /// How far each coefficient outside eq. (1) turns the momenta along a solution that is near enough to tell, and modes
-  /// by a table of that. It need not be computed
-  /// again when the solution is corrected.
+  /// How far each coefficient outside eq. (1) has turned each momentum since the begin of its arc, along a solution. It
+  /// depends so little on that that it need not be made again when the solution is corrected.
   [[nodiscard]] MovedByModes moved_by_coefficients(const PassSolution& solution) const;
+  /// From now on modes stand for the coefficients outside eq. (1). `by_coefficients`: of moved_by_coefficients().
   void use(DriftModes modes, const MovedByModes& by_coefficients);
   /// Those of another problem of the pass with the same steps and arcs, which has them.
   void use_modes_of(const PassProblem& other);
@@ -118,8 +118,8 @@ class PassProblem {
   /// The same with the rows about the constants alone as a triangle in the last arc of each part of the pass: a
   /// fraction of the rows, for whom only the ends of the parts matter.
   [[nodiscard]] Linear linearise_by_parts(const PassSolution& solution) const;
-  /// Columns of the rows of a fix that are about something else than states, by these at a moment about the states of
-  /// its arc, of a layout without modes.
+  /// Makes further columns of the rows of a fix, for unknowns that are not states. Is given the moment, the layout
+  /// without modes, and the rows about the states of the arc in that layout.
   struct Moment;
   using Beside = std::function<Eigen::MatrixXd(const Moment&, const Layout&, const Eigen::MatrixXd&)>;
   /// The fixes of each arc in turn as the rows of linearise(), before these are reduced: columns about its states,
@@ -136,6 +136,10 @@ class PassProblem {
                  Eigen::VectorXd& prior_y) const;
   void put_noise(const PassSolution& solution, const ProcessNoise& noise, std::size_t arc, const Linear::ArcEnd& end,
                  SmootherStage& stage) const;
+
+  /// A stage of what was linearised at this solution, with this process noise.
+  [[nodiscard]] SmootherStage stage(const PassSolution& solution, const Linear& linear, std::size_t arc,
+                                    const ProcessNoise& noise) const;
 
   [[nodiscard]] Time begin_of(std::size_t arc) const { return nodes_[arcs_[arc].begin].t; }
 

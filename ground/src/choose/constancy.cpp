@@ -13,6 +13,8 @@
 #include "batch/gram.hpp"
 #include "choose/jumps.hpp"
 #include "trihedron/core/frames.hpp"
+#include "trihedron/records/stop.hpp"
+#include "trihedron/records/units.hpp"
 
 namespace trihedron::ground {
 namespace {
@@ -510,6 +512,7 @@ class PolhodeSearch {
     TurnsOfPolhode best{kLeastTurns, 0};
     double best_log_odds = -std::numeric_limits<double>::infinity();
     const auto consider = [&](double turns, double change) {
+      check_stop();
       const bool is_one = turns >= kLeastTurns && std::abs(change) <= kMostChange;
       const double odds = is_one ? log_odds(gyro, {turns, change}) : best_log_odds;
       const bool is_better = odds > best_log_odds;
@@ -602,15 +605,15 @@ Moves moves_over(const Trial& trial) {
   // What may be expected of each, 1-sigma: a case or a head that slips, a good one that creeps or goes to and fro,
   // coefficients that change by a tenth of what is expected of them, the Earth's orbital velocity over that of light
   // and a spacecraft's, scales as of a first ground calibration.
-  constexpr double kSlips_rad = 60.0 / 206265;
-  constexpr double kCreeps_rad = 5.0 / 206265;
+  constexpr double kSlips_rad = 60 * kArcsecond;
+  constexpr double kCreeps_rad = 5 * kArcsecond;
   constexpr double kPartOfCoefficients = 0.1;
   constexpr double kPolhodeOverChange = 3;  // its states have a prior of 0.3 of that of the coefficients
   constexpr double kAnnual = 6e-5;
   constexpr double kOrbital = 1.5e-5;
   constexpr double kScale = 1e-3;
-  constexpr double kFieldLarge_rad = 5.0 / 206265;
-  constexpr double kFieldSmall_rad = 1.0 / 206265;
+  constexpr double kFieldLarge_rad = 5 * kArcsecond;
+  constexpr double kFieldSmall_rad = kArcsecond;
   const VectorXd member_rms = rms_of_fields();
   VectorXd coefficient_sigma(Index{Layout::kEq1} * layout.gyros);
   for (int k = 0; k < layout.gyros; ++k) {
@@ -637,6 +640,7 @@ Moves moves_over(const Trial& trial) {
   int tries = 0;
   const auto consider = [&](Change change, const Entries& entries, const VectorXd& sigma, double among = 1,
                             const MatrixXd* after = nullptr) {
+    check_stop();
     ++tries;
     Eigen::SparseMatrix<double> columns(pass.size(), sigma.size());
     columns.setFromTriplets(entries.begin(), entries.end());

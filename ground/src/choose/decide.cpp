@@ -282,19 +282,19 @@ void decide_again_with_more_noise(const Pass& pass, const Screened& screened, co
                                   std::optional<NoiseFit> walking, Trial walked, const NoiseFit& walk,
                                   const Progress& progress, Decision& decision) {
   CalibrationOptions& options = decision.options;
-  const CalibrationOptions free = with_everything(options, asked, largest_model);
+  const CalibrationOptions all_free = with_everything(options, asked, largest_model);
   const bool may_wander = wandering_is_open && (!walking || walking->gain > kLogOddsToAccept);
-  const CalibrationOptions like = wandering_like(walk, free);
+  const CalibrationOptions all_free_wandering = wandering_like(walk, all_free);
   // Waited for only where a walk was accepted; otherwise it does not matter whether the trial failed.
   std::packaged_task<std::pair<Trial, NoiseFit>()> try_wandering([&] {
-    Trial trial(pass, screened, like, {}, &walked);
-    const NoiseFit likely = with_most_likely_wandering(trial, like);
+    Trial trial(pass, screened, all_free_wandering, {}, &walked);
+    const NoiseFit likely = with_most_likely_wandering(trial, all_free_wandering);
     return std::pair(std::move(trial), likely);
   });
   side_by_side(
       [&] {
         if (!walking) {
-          walking = with_most_likely_walk(everything, free);
+          walking = with_most_likely_walk(everything, all_free);
         }
       },
       [&] {
@@ -722,9 +722,9 @@ Decision decide_on_polhodes(const Pass& pass, const Screened& screened, Calibrat
 Decision decide_with_course(const Pass& pass, const Screened& screened, CalibrationOptions asked,
                             const DriftModelId& largest_model, bool change_is_open, const Progress& progress) {
   Decision decision = decide_on_polhodes(pass, screened, asked, largest_model, progress);
-  const bool is_told = decision.options.further_states.is_on(FurtherState::kPolhode);
+  const bool has_polhodes = decision.options.further_states.is_on(FurtherState::kPolhode);
   const std::optional<FoundCourse> course =
-      change_is_open && !is_told ? course_of(decision.changes, pass.settings.epoch) : std::nullopt;
+      change_is_open && !has_polhodes ? course_of(decision.changes, pass.settings.epoch) : std::nullopt;
   if (!course) {
     return decision;
   }
@@ -784,6 +784,31 @@ void settle_by_estimator(CalibrationOptions& asked) {
     Choice& choice = asked.further_states[FurtherState::kCoefficientChange];
     choice = choice == Choice::kAuto ? Choice::kOff : choice;
   }
+}
+
+/// What was decided with a drift field, for an estimator that has a drift model in its place.
+Decision for_on_board(Decision decided, const Pass& pass, const Screened& screened) {
+  const double log_evidence = decided.field->log_evidence;
+  const bool is_evident = log_evidence > kLogOddsToAccept;
+  decided.evidence.push_back({{}, log_evidence, is_evident});
+  // Without evidence the coefficients of eq. (1) make up for what there may be of it all the same, and are off by as
+  // much: that is in their covariance.
+  const DriftOnBoard drift = is_evident ? drift_on_board(decided.field->members) : DriftOnBoard{kEsg7, 0};
+  decided.settings = pass.settings;
+  decided.options.drift_field = false;
+  decided.options.drift_model = drift.drift_model;
+  MeanSquares members = decided.field->members;
+  const LeftOut left_out(*decided.members, drift.drift_model);
+  if (is_evident) {
+    add_made_up(left_out, *decided.members, members);
+    decided.left_out_walk_rad_sqrt_s = left_out_walk_rad_sqrt_s(left_out, *decided.members, screened.pass);
+  }
+  decided.left_out = left_out;
+  decided.levels = std::move(decided.field->levels);
+  use(members, drift.drift_model, *decided.settings);
+  decided.members.reset();
+  decided.field.reset();
+  return decided;
 }
 
 }  // namespace
@@ -861,28 +886,9 @@ Decision decide(const Pass& pass, const CalibrationOptions& asked_for, const Pro
     return decision;
   }
   if (by_field && on_board) {
-    Decision decided = decide_with_course(pass, screened, asked, kLargestDriftModel, change_is_open, progress);
+    Decision decided = for_on_board(
+        decide_with_course(pass, screened, asked, kLargestDriftModel, change_is_open, progress), pass, screened);
     decided.options.estimator = asked_for.estimator;
-    const double log_evidence = decided.field->log_evidence;
-    const bool is_evident = log_evidence > kLogOddsToAccept;
-    decided.evidence.push_back({{}, log_evidence, is_evident});
-    // Without evidence the coefficients of eq. (1) make up for what there may be of it all the same, and are off by as
-    // much: that is in their covariance.
-    const DriftOnBoard drift = is_evident ? drift_on_board(decided.field->members) : DriftOnBoard{kEsg7, 0};
-    decided.settings = pass.settings;
-    decided.options.drift_field = false;
-    decided.options.drift_model = drift.drift_model;
-    MeanSquares members = decided.field->members;
-    const LeftOut left_out(*decided.members, drift.drift_model);
-    if (is_evident) {
-      add_made_up(left_out, *decided.members, members);
-      decided.left_out_walk_rad_sqrt_s = left_out_walk_rad_sqrt_s(left_out, *decided.members, screened.pass);
-    }
-    decided.left_out = left_out;
-    decided.levels = std::move(decided.field->levels);
-    use(members, drift.drift_model, *decided.settings);
-    decided.members.reset();
-    decided.field.reset();
     decided.run = std::move(run);
     return decided;
   }

@@ -5,6 +5,8 @@
 #include <array>
 #include <cmath>
 
+#include "trihedron/records/units.hpp"
+
 namespace trihedron::ground {
 namespace {
 
@@ -57,7 +59,7 @@ std::vector<Sums> sums_over(const Trial& trial) {
 
 /// How far two sums of fixes are apart, squared, in sigmas. `drift_variance`: of the rotation between them.
 double apart(const Told& before, const Told& after, double drift_variance) {
-  constexpr double kMost_rad = 60.0 / 206265;  // about an axis of which they tell nothing
+  constexpr double kMost_rad = 60 * kArcsecond;  // about an axis of which they tell nothing
   const auto covariance = [](const Told& told) {
     return Matrix3d((told.squares + Matrix3d::Identity() / (kMost_rad * kMost_rad)).inverse());
   };

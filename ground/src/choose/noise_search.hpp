@@ -20,14 +20,16 @@ struct NoiseFit {
 /// A random walk, by factors of two above that of the options; drift that wanders as these say. Leaves the trial
 /// refitted with it.
 [[nodiscard]] NoiseFit with_most_likely_walk(Trial& trial, const CalibrationOptions& options);
-/// The same from that of the trial on, which another trial has found.
+/// The same, but searched from the noise that the trial has now, near which the best one is, since a trial with other
+/// states found it.
 [[nodiscard]] NoiseFit with_most_likely_walk_near(Trial& trial, const CalibrationOptions& options);
 
 /// Level and correlation time of the drift that wanders, by factors of two and three from those of the options. The
 /// time stays between 400 s, some arcs, below which it would be a random walk, and 3 h, or is that of the options.
 /// Leaves the trial refitted with it.
 [[nodiscard]] NoiseFit with_most_likely_wandering(Trial& trial, const CalibrationOptions& options);
-/// The same from those of the options on, which another trial has found.
+/// The same, but searched from level and time of the options, near which the best ones are, since a trial with other
+/// states found them.
 [[nodiscard]] NoiseFit with_most_likely_wandering_near(Trial& trial, const CalibrationOptions& options);
 
 }  // namespace trihedron::ground

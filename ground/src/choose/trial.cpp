@@ -39,9 +39,9 @@ std::vector<DriftModelId> models_up_to(const DriftModelId& model) {
 
 /// Convergence limit of the constants in sigmas: enough for a decision.
 constexpr double kNearEnough = 0.2;
-/// So many times the drift that is expected are the modes of a field for at first.
+/// The first modes are chosen for drift this many times as large as the prior of the field expects.
 constexpr double kFirstFieldLevel = 4;
-/// ln of what modes are to be for over what is found: three times.
+/// ln 3: modes are to be good for drift three times as large as what was found.
 constexpr double kRoom = 1.0986;
 
 /// Coarser steps, for speed: over some seconds the body turns by some degrees at most.

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <cstddef>
 
+#include "model/scatter.hpp"
+
 namespace trihedron::ground {
 namespace {
 
@@ -29,9 +31,7 @@ double median_step_s(const std::vector<Time>& t) {
   for (std::size_t i = 1; i < t.size(); ++i) {
     steps.push_back(to_seconds(t[i] - t[i - 1]));
   }
-  const auto middle = steps.begin() + static_cast<std::ptrdiff_t>(steps.size() / 2);
-  std::ranges::nth_element(steps, middle);
-  return *middle;
+  return median_of(steps);
 }
 
 std::vector<SampleStretch> stretches_of(const std::vector<Time>& t, double period_s) {
@@ -92,7 +92,7 @@ double square_off(const GyroTelemetry& gyro, const std::vector<Time>& t, std::si
 bool are_more_even(const Pass& pass, const std::vector<SampleStretch>& stretches, const std::vector<Time>& regular) {
   double sum = 0;
   double squares = 0;
-  for (int k = 0; k < pass.gyro.gyros; ++k) {
+  for (int k = 0; k < std::min(pass.gyro.gyros, static_cast<int>(pass.settings.gyros.size())); ++k) {
     const double noise_rad = pass.settings.gyros[static_cast<std::size_t>(k)].readout_noise_rad;
     const double most = kMostNoises * kMostNoises * noise_rad * noise_rad;
     for (const SampleStretch& its : stretches) {

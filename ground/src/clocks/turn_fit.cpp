@@ -3,7 +3,9 @@
 #include <algorithm>
 #include <cmath>
 
+#include "model/scatter.hpp"
 #include "trihedron/core/frames.hpp"
+#include "trihedron/records/stop.hpp"
 
 namespace trihedron::ground {
 namespace {
@@ -19,13 +21,6 @@ constexpr double kLag_s = 30;
 constexpr double kBound = 2;
 /// The fewest stretches of the pass from which a scatter is told.
 constexpr long kLeastStretches = 8;
-
-/// Of one value and more, whose order it changes.
-double median_of(std::vector<double>& values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
 
 }  // namespace
 
@@ -80,6 +75,7 @@ bool TurnFit::converge() {
   constexpr double kNear_s = 1e-5;
   constexpr double kNearSigmas = 0.1;
   for (int round = 0; round < kMostRounds; ++round) {
+    check_stop();
     read(round < kRough);
     const VectorXd before = x_;
     if (!step(round < kRough) || std::abs(x_(Unknowns::offset())) > 2 * kFarthestOffset_s ||

@@ -60,8 +60,8 @@ class TurnFit {
   /// After converge(), as all below.
   [[nodiscard]] Clocks clocks() const;
 
-  /// The likeliest step that the fit does not have, to the stretches (a sixtieth of the pass) that this looks at;
-  /// nothing where none is likely.
+  /// The likeliest step that this fit does not have. Its ends are known to a stretch, a sixtieth of the pass. Nothing
+  /// where no step is likely.
   [[nodiscard]] std::optional<Stepping> suspected_step() const;
 
   /// The size of the step.

@@ -25,12 +25,17 @@ struct RateGrid {
   [[nodiscard]] long size() const { return static_cast<long>(rate_c[0].size()); }
 };
 
-/// Mean rates over `span_s` from each time of the grid on, by the trihedron of the first two momenta.
+/// Mean rates over `span_s` from each time of the grid on, by the trihedron of the first two momenta. Empty where the
+/// telemetry spans more than some weeks.
 RateGrid rates_by_gyros(const GyroReadings& readings, double step_s, double span_s) {
   RateGrid grid{readings.t(0), step_s, {}};
   constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
   const double length_s = to_seconds(readings.t(readings.size() - 1) - grid.begin);
   const auto steps = static_cast<std::size_t>(length_s / step_s) + 1;
+  constexpr std::size_t kMostSteps = 2'000'000;  // three weeks: no clock keeps its offset for so long
+  if (steps > kMostSteps) {
+    return grid;
+  }
   std::vector<Matrix3d> C_c_g(steps, Matrix3d::Constant(kUnknown));
   std::vector<double> at_s(steps, kUnknown);
   std::size_t i = 0;
@@ -166,6 +171,9 @@ double rough_offset_s(const Pass& pass, const GyroReadings& readings) {
     return 0;
   }
   const RateGrid grid = rates_by_gyros(readings, step_s, period_s);
+  if (grid.size() == 0) {
+    return 0;
+  }
   const long farthest = std::lround(kFarthestOffset_s / step_s);
   const long lags = 2 * farthest + 1;
   std::vector<double> costs(static_cast<std::size_t>(lags));

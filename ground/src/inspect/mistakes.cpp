@@ -158,7 +158,9 @@ class Scene {
     }
   }
 
-  [[nodiscard]] int gyros() const { return std::min(pass_.gyro.gyros, kMaxGyros); }
+  [[nodiscard]] int gyros() const {
+    return std::min({pass_.gyro.gyros, static_cast<int>(pass_.settings.gyros.size()), kMaxGyros});
+  }
   [[nodiscard]] const PerGyro<double>& motion_rad() const { return motion_rad_; }
   [[nodiscard]] const PerGyro<double>& allowed_rad() const { return allowed_rad_; }
   [[nodiscard]] bool is_usable() const {
@@ -308,6 +310,7 @@ std::vector<Explanation<Arrangement>> usual_explanations(const std::vector<Arran
 
 void try_quaternions(const Scene& scene, std::vector<Mistake>& mistakes) {
   std::vector<ComponentOrder> all;
+  // No format has the scalar second, and all signs turned mean the same rotation.
   for (const ComponentOrder& components : all_arrangements<4>()) {
     if (components[3].sign > 0 && components[3].from != 1) {
       all.push_back(components);

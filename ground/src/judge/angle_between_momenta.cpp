@@ -10,6 +10,7 @@
 #include <numbers>
 #include <vector>
 
+#include "model/scatter.hpp"
 #include "trihedron/core/drift.hpp"
 #include "trihedron/core/frames.hpp"
 #include "trihedron/core/gyro_readout.hpp"
@@ -111,9 +112,7 @@ class Blocks {
     if (angles_.size() >= kFewSamples) {
       blocks_.push_back(current_);
       Block& block = blocks_.back();
-      const auto middle = angles_.begin() + static_cast<std::ptrdiff_t>(angles_.size() / 2);
-      std::ranges::nth_element(angles_, middle);
-      block.angle_rad = *middle;
+      block.angle_rad = median_of(angles_);
       block.by_constants /= steps_;
       block.normal_c.normalize();
     }

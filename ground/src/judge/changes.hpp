@@ -9,7 +9,7 @@ namespace trihedron::ground {
 
 /// Names the likeliest of the changes that the pass gives evidence of (docs/mathematics.md, section 12): what moved,
 /// when, by how much, and what cures it; nothing where none is likely. The result must not be used where it moves a
-/// parameter by more than its claimed sigma allows. Of coefficients that change that is so for the alignments alone:
+/// parameter by more than two of its claimed sigmas. Of coefficients that change that is so for the alignments alone:
 /// what they are off themselves is put into the covariance.
 void judge_changes(const CalibrationRun& run, std::vector<Finding>& findings);
 

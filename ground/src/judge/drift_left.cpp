@@ -12,6 +12,7 @@
 
 #include "judge/angle_between_momenta.hpp"
 #include "model/orbital_rate.hpp"
+#include "trihedron/records/stop.hpp"
 #include "trihedron/records/text.hpp"
 
 namespace trihedron::ground {
@@ -103,6 +104,7 @@ std::optional<SlowLine> strongest_slow_line(const std::vector<FixRecord>& fixes,
                            [span_s](double t_s) { return std::polar(1.0, -2 * std::numbers::pi * t_s / span_s); });
     std::vector<std::complex<double>> turn(n, 1.0);
     for (int line = 1; line <= lines; ++line) {
+      check_stop();
       std::complex<double> sum[kComponents];
       for (std::size_t i = 0; i < n; ++i) {
         turn[i] *= first[i];

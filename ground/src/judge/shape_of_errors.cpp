@@ -5,21 +5,18 @@
 #include <cmath>
 #include <numbers>
 
+#include "model/scatter.hpp"
+
 namespace trihedron::ground {
 namespace {
 
 constexpr Eigen::Index kFewest = 1000;
 
-double median(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::ranges::nth_element(values, middle);
-  return *middle;
-}
-
 Eigen::Vector3d median(const Eigen::Ref<const Eigen::Matrix3Xd>& values) {
   Eigen::Vector3d result;
   for (Eigen::Index axis = 0; axis < 3; ++axis) {
-    result(axis) = median(std::vector<double>(values.row(axis).begin(), values.row(axis).end()));
+    std::vector<double> of_axis(values.row(axis).begin(), values.row(axis).end());
+    result(axis) = median_of(of_axis);
   }
   return result;
 }

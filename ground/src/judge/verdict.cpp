@@ -30,13 +30,12 @@
 #include "trihedron/ground/evaluate/convergence.hpp"
 #include "trihedron/ground/evaluate/used_fixes.hpp"
 #include "trihedron/records/text.hpp"
+#include "trihedron/records/units.hpp"
 
 namespace trihedron::ground {
 namespace {
 
 using Severity = Finding::Severity;
-
-constexpr double kArcsecond = std::numbers::pi / 180 / 3600;
 
 /// Relative deviation of the mean NIS from its expectation above which the noise settings are wrong, whatever the
 /// number of fixes; its sigmas are then off by half of it.
@@ -348,7 +347,7 @@ void judge_whiteness(const Pass& pass, const CalibrationRun& run, std::vector<Fi
   for (const Whiteness::Line& line : found.lines) {
     if (line.amplitude > kLineInSigmas && !is_chance(2 * line.power, line.degrees_of_freedom)) {
       add(findings, FindingCode::kOrbitalLine,
-          fmt::format("The innovations have a line at {} the orbital rate.", line.multiple == 1 ? "" : "twice"),
+          fmt::format("The innovations have a line at {}the orbital rate.", line.multiple == 1 ? "" : "twice "),
           fmt::format("amplitude up to {:.2f} sigma; twice the power {:.0f} of {} degrees of freedom", line.amplitude,
                       2 * line.power, line.degrees_of_freedom),
           kCure);
@@ -444,10 +443,14 @@ void judge_drift_model(const CalibrationRun& run, std::vector<Finding>& findings
         "The drift model has coefficients that the pass does not support: they add their own error to what comes next.",
         evidence(*smaller), fmt::format("Use drift model {}, or {}.", name_of(smaller->drift_model), kAutoDriftModel));
   }
-  if (used + 1 == models.end() && models.size() > 1 && used->drift_model == kLargestDriftModel) {
+  if (used + 1 == models.end() && models.size() > 1 && used->drift_model == kLargestDriftModel &&
+      used->log_likelihood > std::prev(used)->log_likelihood + kLogOddsOfWrongModel) {
+    const DriftModelForecast& next_smaller = *std::prev(used);
     add(findings, FindingCode::kDriftModelAtItsLimit,
         "Even the largest drift model is not clearly enough: there may be drift of still higher degree.",
-        evidence(*std::prev(used)),
+        fmt::format("it is more likely than {} by a factor of e^{:.0f}; forecast error {:.1f}″ in place of {:.1f}″",
+                    name_of(next_smaller.drift_model), used->log_likelihood - next_smaller.log_likelihood,
+                    used->open_loop_rms_rad / kArcsecond, next_smaller.open_loop_rms_rad / kArcsecond),
         "Do not trust single coefficients; the forecast error says what the attitude suffers.");
   }
 }
@@ -563,7 +566,6 @@ void judge_at_orbital_period(const AtOrbitalPeriod& its, const CalibrationRun& r
 
 void judge_polhodes(const CalibrationRun& run, std::vector<Finding>& findings) {
   constexpr double kSigmasToReport = 5;
-  constexpr double kLowOrbit_rad_s = 1.1e-3;
   constexpr double kNearlyAlike = 0.1;
   const FurtherEstimate* const largest = largest_of(run, FurtherState::kPolhode, kSigmasToReport);
   if (largest == nullptr) {

@@ -5,6 +5,8 @@
 #include <complex>
 #include <numeric>
 
+#include "model/scatter.hpp"
+
 namespace trihedron::ground {
 namespace {
 
@@ -75,9 +77,7 @@ Whiteness::Line line_of(const std::vector<Series>& all, int multiple, double orb
 double alternation(const Series& series) {
   std::vector<double> steps_s(series.t_s.size());
   std::adjacent_difference(series.t_s.begin(), series.t_s.end(), steps_s.begin());
-  const auto middle = steps_s.begin() + static_cast<std::ptrdiff_t>(steps_s.size() / 2);
-  std::ranges::nth_element(steps_s, middle);
-  const double step_s = *middle;
+  const double step_s = median_of(steps_s);
   double sum = 0;
   for (std::size_t i = 0; i < series.z.size(); ++i) {
     const bool is_odd = std::lround((series.t_s[i] - series.t_s.front()) / step_s) % 2 != 0;

@@ -1,17 +1,16 @@
 #include "model/orbital_rate.hpp"
 
-#include <algorithm>
 #include <cmath>
 #include <numbers>
 #include <vector>
 
+#include "model/scatter.hpp"
 #include "trihedron/core/frames.hpp"
 
 namespace trihedron::ground {
 
 double orbital_rate_rad_s(const StarTrackerTelemetry& tracker) {
   constexpr double kFastest_rad_s = 0.02;  // beyond, an outlier
-  constexpr double kLowOrbit_rad_s = 1.1e-3;
   // The mean angular velocity in `in`: a slew and the slew back nearly cancel.
   Eigen::Vector3d turned = Eigen::Vector3d::Zero();
   double time_s = 0;
@@ -46,9 +45,7 @@ double orbital_rate_rad_s(const StarTrackerTelemetry& tracker) {
   if (rates.empty()) {
     return rough_rad_s;
   }
-  const auto middle = rates.begin() + static_cast<std::ptrdiff_t>(rates.size() / 2);
-  std::nth_element(rates.begin(), middle, rates.end());
-  return *middle;
+  return median_of(rates);
 }
 
 }  // namespace trihedron::ground

@@ -4,6 +4,9 @@
 
 namespace trihedron::ground {
 
+/// Of a low orbit.
+inline constexpr double kLowOrbit_rad_s = 1.1e-3;
+
 /// The rate of the orbit, from the attitude history. That of a low orbit where the attitude is fixed in space.
 [[nodiscard]] double orbital_rate_rad_s(const StarTrackerTelemetry& tracker);
 

@@ -35,8 +35,10 @@ void put_prior(const GyroPrior& prior, int number, const Layout& layout, Gyro& m
   for (const auto* table : {&prior.drift_rad_s, &prior.drift_sigma_rad_s}) {
     for (const auto& [coefficient, value] : *table) {
       if (std::ranges::find(coefficients, coefficient) == coefficients.end()) {
-        throw SetupError(fmt::format("the prior of gyro {} names drift coefficient '{}'", number, name_of(coefficient)),
-                         fmt::format("the drift model has {}", fmt::join(coefficient_names(layout.drift_model), ", ")));
+        throw SetupError(
+            fmt::format("the prior of gyro {} names drift coefficient '{}'", number, name_of(coefficient)),
+            fmt::format("name a drift model that has it (--drift-model), or take it out; {} has {}",
+                        name_of(layout.drift_model), fmt::join(coefficient_names(layout.drift_model), ", ")));
       }
     }
   }

@@ -6,12 +6,16 @@
 
 namespace trihedron::ground {
 
+double median_of(std::vector<double>& values) {
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::ranges::nth_element(values, middle);
+  return *middle;
+}
+
 double sigma_without_outliers(std::vector<double>& sizes) {
   constexpr double kMedianOfNormal = 0.6744897501960817;
   constexpr double kWithin = 4;
-  const auto middle = sizes.begin() + static_cast<std::ptrdiff_t>(sizes.size() / 2);
-  std::ranges::nth_element(sizes, middle);
-  const double most = kWithin * *middle / kMedianOfNormal;
+  const double most = kWithin * median_of(sizes) / kMedianOfNormal;
   double squares = 0;
   double count = 0;
   for (const double size : sizes) {

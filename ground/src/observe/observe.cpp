@@ -12,6 +12,7 @@
 #include "batch/pass_setup.hpp"
 #include "choose/decide.hpp"
 #include "model/drift_on_board.hpp"
+#include "model/orbital_rate.hpp"
 #include "model/setup.hpp"
 #include "observe/angle_row.hpp"
 #include "observe/attitude_metric.hpp"
@@ -58,7 +59,6 @@ VectorXd sigmas(const MatrixXd& prior_root, const MatrixXd& measured_root) {
 }
 
 BodyRotation mean_rotation(const std::vector<ScreenedPass::Fix>& fixes) {
-  constexpr double kLowOrbit_rad_s = 1.1e-3;
   constexpr double kClose_s = 60;
   Eigen::Vector3d turned_c = Eigen::Vector3d::Zero();
   double time_s = 0;

@@ -121,6 +121,17 @@ Scenario dirty(Duration duration) {
 
 TEST(Navigate, IsCausal) { expect_causal(two_hours().pass, {}, cuts()); }
 
+/// The noise of the readings, which it finds by the whole pass where the settings tell another, is told here.
+TEST(Navigate, IsCausalWithAWrongNoiseThatIsTold) {
+  Pass pass = two_hours().pass;
+  for (GyroPrior& gyro : pass.settings.gyros) {
+    gyro.readout_noise_rad *= 2;
+  }
+  CalibrationOptions options;
+  options.find_noise = false;
+  expect_causal(pass, options, {minutes(50)});
+}
+
 TEST(Navigate, IsCausalOnADirtyPass) {
   Pass pass = sim::simulate(dirty(std::chrono::hours(2))).pass;
   pass.settings.star_tracker_noise_rad /= 1.5;  // what was promised

@@ -321,6 +321,9 @@ TEST(Verdict, FindsADriftModelThatIsTooSmallOrTooLarge) {
   run.drift_models.push_back({kLargestDriftModel, 900, 1e-5});
   run.calibration.gyros[0].drift_model = kLargestDriftModel;
   EXPECT_THAT(codes(judge(good_pass(), run)), ElementsAre("drift-model-at-its-limit"));
+  EXPECT_THAT(judge(good_pass(), run).findings[0].evidence, HasSubstr("than vsh:2 by a factor of e^9"));
+  run.drift_models.back().log_likelihood = run.drift_models[run.drift_models.size() - 2].log_likelihood + 1;
+  EXPECT_THAT(codes(judge(good_pass(), run)), Not(Contains("drift-model-at-its-limit")));
 }
 
 TEST(Verdict, TellsOfErrorsOfTheStarTrackerThatWereFound) {

@@ -9,19 +9,15 @@
 #include <chrono>
 #include <cstdint>
 #include <limits>
-#include <numbers>
 #include <optional>
 #include <string>
 #include <variant>
 #include <vector>
 
 #include "trihedron/core/time.hpp"
+#include "trihedron/records/units.hpp"
 
 namespace trihedron {
-
-inline constexpr double kDegree = std::numbers::pi / 180;  ///< rad
-inline constexpr double kArcminute = kDegree / 60;         ///< rad
-inline constexpr double kArcsecond = kDegree / 3600;       ///< rad
 
 /// A stretch of the pass, seconds from its start; holds begin_s, not end_s.
 struct Interval {
