@@ -87,9 +87,11 @@ bool TurnFit::converge() {
       break;
     }
   }
-  // In steady flight the rate of the body stays as it is, and noise takes the place of what would tell the offset.
+  // In steady flight, or of a body that spins or tumbles evenly, alignments and momenta explain what an offset does, and
+  // what is left to tell it is the noise of the rates.
   constexpr double kShown = 100;
-  return used_stretches() >= kLeastStretches && shown_ > kShown * shown_by_noise_;
+  const double shown = 1 / normal_.solve(unit(Unknowns::offset()))(Unknowns::offset());
+  return used_stretches() >= kLeastStretches && shown > kShown * shown_by_noise_;
 }
 
 /// What the gyros read at each fix that step() asks for, by the clocks as they are now.
@@ -218,7 +220,7 @@ bool TurnFit::step(bool roughly) {
   MatrixXd normal = prior_sigma_.cwiseAbs2().cwiseInverse().asDiagonal();
   const double stretch_s = std::max(2 * kLag_s, to_seconds(pass_.star_tracker.t.back() - begin_) / 60);
   stretches_.clear();
-  shown_ = shown_by_noise_ = 0;
+  shown_by_noise_ = 0;
   Stretch stretch(n);
   VectorXd of_turn(n);
   VectorXd sum = VectorXd::Zero(n);
@@ -267,7 +269,6 @@ bool TurnFit::step(bool roughly) {
       stretch.rejected_normal.selfadjointView<Eigen::Lower>().rankUpdate(rows.leftCols(n).transpose());
       continue;
     }
-    shown_ += rows.col(Unknowns::offset()).squaredNorm();
     shown_by_noise_ += noise_square;
     gathered.middleCols(count, rows.rows()) = rows.leftCols(n).transpose();
     count += rows.rows();

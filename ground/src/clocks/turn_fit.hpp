@@ -132,8 +132,7 @@ class TurnFit {
   std::vector<std::optional<Fitted>> fitted_;
   std::vector<AtFix> at_fix_;
   double scale_ = 1;
-  double shown_ = 0;  ///< square sum of the derivatives by the offset; and what noise alone would make of it
-  double shown_by_noise_ = 0;
+  double shown_by_noise_ = 0;  ///< square sum of the derivatives by the offset that noise alone would make, 1/s²
   Eigen::LLT<Eigen::MatrixXd> normal_;
   std::vector<Stretch> stretches_;
 };

@@ -113,6 +113,26 @@ TEST(Clocks, AreNotInventedWhereTheBodyTurnsEvenly) {
   }
 }
 
+/// Where the attitude is exp([a t×]) C exp([b t×]), with a fixed in space and b in the body, an offset is the same as
+/// other alignments and momenta.
+TEST(Clocks, AreNotInventedWhereTheBodyTumbles) {
+  const auto turned = [](const Eigen::Vector3d& axis, double angle_rad) {
+    return Eigen::Quaterniond(Eigen::AngleAxisd(angle_rad, axis.normalized()));
+  };
+  Scenario scenario = four_hours(12);
+  scenario.attitude.reference = AttitudeScenario::Reference::kRecorded;
+  scenario.attitude.slews = std::vector<Slew>{};
+  scenario.attitude.jitter_rad = 0;
+  for (double t_s = -60; t_s <= to_seconds(scenario.duration) + 60; t_s += 2) {
+    scenario.attitude.recorded.push_back(
+        {t_s, turned({1, 2, 3}, 0.6 * kDegree * t_s) * turned({-2, 1, 2}, 1.1 * kDegree * t_s)});
+  }
+  const sim::SimulatedPass simulated = sim::simulate(scenario);
+  EXPECT_FALSE(ground::clocks_of(simulated.pass).has_value());
+  const CalibrationRun run = calibrate(simulated.pass, told());
+  EXPECT_LT(nees_of(simulated.truth, run.calibration), 45);  // χ² of 20, once in 1000
+}
+
 TEST(Clocks, OfAShortOrEmptyPassAreNotTold) {
   Pass pass = sim::simulate(scenario_in_eq1(1, std::chrono::minutes(2))).pass;
   EXPECT_FALSE(ground::clocks_of(pass).has_value());
