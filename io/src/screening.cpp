@@ -132,12 +132,13 @@ std::string_view unit_mistaken(double factor) {
   return found == kMistakes.end() ? "one of them is wrong" : found->text;
 }
 
-/// Refuses a table that does not fit the period that it is told to have. Gaps and dropouts do not matter: it is refused
-/// where hardly any step is as short as twice that period, or hardly any as long as half of it.
+/// Refuses a table that does not fit the period that it is told to have. Gaps and dropouts do not matter, be they most
+/// of the pass: it is refused where hardly any step is as short as twice that period, or few are as long as half of it.
 void check_period(const Series& series, const std::vector<Time>& t, Duration told, std::string_view section) {
   constexpr std::size_t kLeastSteps = 20;
   constexpr double kFactor = 2;
-  constexpr double kHardlyAny = 0.1;
+  constexpr double kHardlyAny = 0.01;
+  constexpr double kFew = 0.1;
   std::vector<Duration> steps;
   for (std::size_t i = 1; i < t.size(); ++i) {
     steps.push_back(t[i] - t[i - 1]);
@@ -151,7 +152,7 @@ void check_period(const Series& series, const std::vector<Time>& t, Duration tol
     return to_seconds(*place);
   };
   const double told_s = to_seconds(told);
-  if (step_at(kHardlyAny) <= kFactor * told_s && step_at(1 - kHardlyAny) >= told_s / kFactor) {
+  if (step_at(kHardlyAny) <= kFactor * told_s && step_at(1 - kFew) >= told_s / kFactor) {
     return;
   }
   const double measured_s = step_at(0.5);

@@ -62,6 +62,19 @@ TEST_P(Screening, TakesAPeriodOfWhichManyRowsAreMissing) {
   EXPECT_EQ(load().pass.gyro.size(), raw_.gyro.rows.size());
 }
 
+// Fixes mostly a minute apart, as of a star tracker that seldom sees enough stars, and two that follow each other.
+TEST_P(Screening, TakesAPeriodOfWhichNearlyAllRowsAreMissing) {
+  raw_.toml = replaced(raw_.toml, "duration_s = 90", "duration_s = 6000");
+  raw_.star_tracker.rows.resize(2);
+  for (int i = 1; i < 100; ++i) {
+    const double t = 60.0 * i;
+    raw_.star_tracker.rows.push_back({t, 0, 0, std::sin(5e-4 * t), std::cos(5e-4 * t)});
+  }
+  EXPECT_EQ(load().pass.star_tracker.size(), 101U);
+  raw_.star_tracker.rows.erase(raw_.star_tracker.rows.begin() + 1);
+  EXPECT_THAT(load_refused(), HasSubstr("has a row every 60 s"));
+}
+
 TEST_P(Screening, LeavesOutRowsWithoutATime) {
   raw_.gyro.rows[10][0] = kNaN;
   raw_.gyro.rows[20][0] = std::numeric_limits<double>::infinity();

@@ -12,8 +12,6 @@
 namespace trihedron::ground {
 namespace {
 
-/// Fewer outliers in a row are left to the filter's own gate.
-constexpr std::ptrdiff_t kInARow = 20;
 /// Where more than this part of the fixes is contradicted by the others, it is not the star tracker that was wrong for
 /// a while.
 constexpr double kFew = 0.2;
@@ -32,7 +30,7 @@ std::vector<FixRecord> runs_of_outliers(std::vector<FixRecord> fixes) {
     const auto end = std::find_if_not(begin, fixes.end(), [&](const FixRecord& fix) {
       return fix.head == begin->head && fix.status == FixStatus::kRejectedByGate;
     });
-    if (end - begin >= kInARow) {
+    if (end - begin >= Statistics::kInARow) {
       found.insert(found.end(), begin, end);
     }
     begin = std::max(end, std::next(begin));

@@ -12,13 +12,14 @@
 #include <map>
 #include <numbers>
 #include <optional>
-#include <span>
 #include <utility>
 
 #include "judge/changes.hpp"
 #include "judge/clocks.hpp"
+#include "judge/contradictions.hpp"
 #include "judge/drift_left.hpp"
 #include "judge/need.hpp"
+#include "judge/noise_by_rate.hpp"
 #include "judge/shape_of_errors.hpp"
 #include "judge/whiteness.hpp"
 #include "model/orbital_rate.hpp"
@@ -123,7 +124,7 @@ void judge_star_tracker(const Statistics& statistics, std::vector<Finding>& find
     add(findings, FindingCode::kStarTrackerOff,
         "For a while the star tracker was off by more than any drift can cause, or contradicted the rest of the pass; "
         "its fixes were not used.",
-        fmt::format("{} fixes, 20 and more in a row", statistics.fixes_off_in_a_row),
+        fmt::format("{} fixes, {} and more in a row", statistics.fixes_off_in_a_row, Statistics::kInARow),
         "Look at its telemetry there: a wrong identification, a head that was moved, a clock that was off.");
   }
   if (statistics.fixes_frozen > 0) {
@@ -132,55 +133,6 @@ void judge_star_tracker(const Statistics& statistics, std::vector<Finding>& find
         "not used.",
         fmt::format("{} of {} fixes", statistics.fixes_frozen, statistics.fixes),
         "Look at its telemetry there: an output that is held when no stars are identified.");
-  }
-}
-
-/// The one gyro that rejected fixes contradict; none where they contradict several, or not that clearly.
-std::optional<std::size_t> contradicted_alone(std::span<const FixRecord> fixes) {
-  constexpr double kContradicted = 18.4;  // 99.99 % of two components
-  constexpr double kAlmostAll = 0.9;
-  const std::size_t gyros = fixes.front().innovation.size() / 2;
-  const auto count = static_cast<double>(fixes.size());
-  std::optional<std::size_t> alone;
-  for (std::size_t k = 0; k < gyros; ++k) {
-    const auto beyond = static_cast<double>(std::ranges::count_if(fixes, [&](const FixRecord& fix) {
-      double square = 0;
-      for (std::size_t i = 2 * k; i < 2 * k + 2 && i < fix.innovation.size(); ++i) {
-        square += fix.innovation_sigma[i] > 0 ? std::pow(fix.innovation[i] / fix.innovation_sigma[i], 2) : 0;
-      }
-      return square > kContradicted;
-    }));
-    if (beyond > kAlmostAll * count) {
-      if (alone) {
-        return std::nullopt;
-      }
-      alone = k;
-    } else if (beyond > (1 - kAlmostAll) * count) {
-      return std::nullopt;
-    }
-  }
-  return alone;
-}
-
-/// Fixes that were rejected up to the end of the pass show what a test over the whole pass does not see, since they are
-/// in no fit. A star tracker that is off contradicts all gyros, but for a turn about the momentum of one.
-void judge_end(const Pass& pass, const CalibrationRun& run, std::vector<Finding>& findings) {
-  constexpr std::ptrdiff_t kInARow = 20;
-  const auto is_rejected = [](const FixRecord& fix) { return fix.status == FixStatus::kRejectedByGate; };
-  const auto last_other = std::ranges::find_if_not(run.fixes.rbegin(), run.fixes.rend(), is_rejected);
-  const auto first = last_other.base();
-  const bool is_known = std::ranges::any_of(
-      findings, [](const Finding& finding) { return finding.code == FindingCode::kGyroMountingMoved; });
-  if (is_known || run.fixes.end() - first < kInARow) {
-    return;
-  }
-  if (const std::optional<std::size_t> gyro = contradicted_alone({first, run.fixes.end()})) {
-    add(findings, FindingCode::kGyroMountingMoved,
-        "Up to the end of the pass all fixes contradict one gyro alone, and were rejected: its case has moved, or the "
-        "star tracker has turned about the momentum of the other.",
-        fmt::format("gyro {}, {} fixes from {:.1f} min on", *gyro + 1, run.fixes.end() - first,
-                    to_seconds(first->t - pass.settings.epoch) / 60),
-        "Cut the pass there and calibrate on the parts apart; look for what happened at that time.");
   }
 }
 
@@ -962,7 +914,8 @@ Verdict judge(const Pass& pass, const CalibrationRun& run) {
   judge_steadiness(pass, run, findings);
   judge_pair(run, findings);
   judge_star_tracker(statistics, findings);
-  judge_end(pass, run, findings);
+  judge_contradictions(pass, run, findings);
+  judge_noise_by_rate(pass, run, findings);
   judge_batch(statistics, findings);
   judge_gyros(pass, run, findings);
   judge_gyro_rate(pass, run, findings);

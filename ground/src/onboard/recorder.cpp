@@ -12,8 +12,6 @@ namespace {
 
 /// Time between recorded corrections: the correction interval of the paper.
 constexpr Duration kWatchedCorrections = std::chrono::minutes(90);
-/// Consecutive fixes attributed to the star tracker from which on they are no single outliers.
-constexpr long kJumpLength = 20;
 
 /// Estimates in the order of drift_and_alignment().
 std::vector<double> parameter_values(const std::vector<GyroCalibration>& gyros) {
@@ -92,7 +90,9 @@ void FixSums::add(const FixRecord& fix) {
                             fix.status == FixStatus::kEstimateLost;
   reopened_ += was_reopened ? 1 : 0;
   jumped_in_a_row_ = fix.jumped ? jumped_in_a_row_ + 1 : 0;
-  off_in_a_row_ += jumped_in_a_row_ == kJumpLength ? kJumpLength : jumped_in_a_row_ > kJumpLength ? 1 : 0;
+  off_in_a_row_ += jumped_in_a_row_ == Statistics::kInARow  ? Statistics::kInARow
+                   : jumped_in_a_row_ > Statistics::kInARow ? 1
+                                                            : 0;
   if (fix.status == FixStatus::kUsed) {
     nis_ += fix.nis;
     freedom_ += fix.degrees_of_freedom;

@@ -14,7 +14,9 @@ struct Statistics {
   long fixes = 0;  ///< in the telemetry
   long fixes_used = 0;
   long fixes_rejected_as_outliers = 0;
-  /// In runs of 20 and more whose misfits are larger than drift can cause.
+  /// Rejected fixes in a row that are no outliers any more: star tracker or gyros are wrong there.
+  static constexpr long kInARow = 20;
+  /// In runs of so many and more whose misfits are larger than drift can cause.
   long fixes_off_in_a_row = 0;
   /// Refused because the star tracker repeated its quaternion while the body turned.
   long fixes_frozen = 0;

@@ -1,0 +1,67 @@
+#include "judge/noise_by_rate.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <random>
+
+#include "passes.hpp"
+#include "trihedron/ground/calibrate/calibrate.hpp"
+#include "trihedron/records/units.hpp"
+#include "trihedron/sim/simulate.hpp"
+
+namespace trihedron::ground {
+namespace {
+
+/// Three hours with slews, whose fixes have stamps that jitter by so much.
+Pass pass_with_jitter(double jitter_s) {
+  Pass pass = sim::simulate(scenario_in_eq1(4, std::chrono::hours(3))).pass;
+  std::mt19937_64 random(5);
+  std::normal_distribution<double> normal;
+  for (Time& t : pass.star_tracker.t) {
+    t += from_seconds(jitter_s * normal(random));
+  }
+  return pass;
+}
+
+std::vector<Finding> judged_with_jitter(double jitter_s) {
+  const Pass pass = pass_with_jitter(jitter_s);
+  std::vector<Finding> findings;
+  judge_noise_by_rate(pass, calibrate(pass, told()), findings);
+  return findings;
+}
+
+TEST(NoiseByRate, OfANominalPassIsOne) {
+  const Pass pass = pass_with_jitter(0);
+  const auto found = noise_by_rate(pass.star_tracker, calibrate(pass, told()).fixes);
+  ASSERT_TRUE(found.has_value());
+  EXPECT_GT(found->fixes_in_slews, 100);
+  EXPECT_NEAR(found->in_slews / found->at_rest, 1, 0.3);
+  EXPECT_GT(found->rate_rad_s, 0.1 * kDegree);
+  EXPECT_TRUE(judged_with_jitter(0).empty());
+}
+
+TEST(NoiseByRate, OfStampsThatJitterIsNamed) {
+  const std::vector<Finding> little = judged_with_jitter(10e-3);
+  ASSERT_EQ(little.size(), 1U);
+  EXPECT_EQ(little[0].code, FindingCode::kFixesWorseInSlews);
+  EXPECT_EQ(little[0].severity, FindingSeverity::kWarning);
+  const std::vector<Finding> much = judged_with_jitter(40e-3);
+  ASSERT_EQ(much.size(), 1U);
+  EXPECT_EQ(much[0].severity, FindingSeverity::kDoNotUse);
+}
+
+/// Steady flight has no slews; nor are there any where no fix tells of the rate.
+TEST(NoiseByRate, IsNotToldWithoutSlews) {
+  Scenario scenario = scenario_in_eq1(4, std::chrono::hours(2));
+  scenario.attitude.slews = std::vector<Slew>{};
+  Pass pass = sim::simulate(scenario).pass;
+  const std::vector<FixRecord> fixes = calibrate(pass, told()).fixes;
+  EXPECT_FALSE(noise_by_rate(pass.star_tracker, fixes).has_value());
+  pass.star_tracker.t.resize(2);
+  pass.star_tracker.q_in_c.resize(2);
+  EXPECT_FALSE(noise_by_rate(pass.star_tracker, fixes).has_value());
+}
+
+}  // namespace
+}  // namespace trihedron::ground
