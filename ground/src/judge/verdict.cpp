@@ -221,6 +221,10 @@ void judge_gyro_rate(const Pass& pass, const CalibrationRun& run, std::vector<Fi
                           period_s, to_seconds(reach), to_seconds(usual_reach)),
         fmt::format("Sample the gyros every {:.3g} s or more often.",
                     2 * to_seconds(usual_reach) / DirectionsFit::least_samples(kCubic)));
+    // A warning of what may be; here it is, and the attitude is off as the fixes are, which is in no sigma.
+    if (std::ranges::find(findings, FindingCode::kFixesWorseInSlews, &Finding::code) != findings.end()) {
+      findings.back().severity = Severity::kDoNotUse;
+    }
   }
 }
 

@@ -51,6 +51,26 @@ TEST(NoiseByRate, OfStampsThatJitterIsNamed) {
   EXPECT_EQ(much[0].severity, FindingSeverity::kDoNotUse);
 }
 
+/// Samples three seconds apart, with a fix in the middle between two.
+TEST(NoiseByRate, OfReadingsThatAreFarApartForbidsUse) {
+  Pass pass = sim::simulate(scenario_in_eq1(4, std::chrono::hours(3))).pass;
+  GyroTelemetry thinned;
+  thinned.gyros = pass.gyro.gyros;
+  for (std::size_t i = 12; i < pass.gyro.size(); i += 24) {
+    thinned.t.push_back(pass.gyro.t[i]);
+    for (int k = 0; k < thinned.gyros; ++k) {
+      const Eigen::Vector3d h_b = pass.gyro.direction(i, k);
+      thinned.h.insert(thinned.h.end(), h_b.begin(), h_b.end());
+    }
+  }
+  pass.gyro = thinned;
+  pass.settings.gyro_period = std::chrono::seconds(3);
+  const std::vector<Finding> findings = calibrate(pass, told()).calibration.verdict.findings;
+  const auto found = std::ranges::find(findings, FindingCode::kGyroSamplesFarApart, &Finding::code);
+  ASSERT_NE(found, findings.end());
+  EXPECT_EQ(found->severity, FindingSeverity::kDoNotUse);
+}
+
 /// Steady flight has no slews; nor are there any where no fix tells of the rate.
 TEST(NoiseByRate, IsNotToldWithoutSlews) {
   Scenario scenario = scenario_in_eq1(4, std::chrono::hours(2));
