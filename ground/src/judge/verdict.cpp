@@ -192,7 +192,7 @@ void judge_gyros(const Pass& pass, const CalibrationRun& run, std::vector<Findin
                     : "Look at the telemetry there: a frozen readout, or the last value repeated in a gap.");
   add_events(GyroState::kLeapt, FindingCode::kGyroLeapt,
              "Readings of a gyro leapt farther than a body turns from one sample to the next; they were not used until "
-             "they were back.",
+             "they were back, or for an hour.",
              "Look at the telemetry there: columns or gyros exchanged, a sign, samples of another time.");
 }
 
