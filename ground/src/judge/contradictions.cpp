@@ -11,6 +11,7 @@
 #include <optional>
 #include <span>
 #include <string>
+#include <utility>
 
 namespace trihedron::ground {
 namespace {
@@ -96,15 +97,15 @@ std::string extent_text(const Rejected& rejected, Time epoch) {
 
 }  // namespace
 
-void judge_contradictions(const Pass& pass, const CalibrationRun& run, std::vector<Finding>& findings) {
+void judge_contradictions(std::vector<FixRecord> fixes, const std::vector<GyroEvent>& events, Time epoch,
+                          std::vector<Finding>& findings) {
   const auto found = [&](FindingCode code) { return std::ranges::find(findings, code, &Finding::code); };
-  std::vector<FixRecord> fixes = run.fixes;
-  std::ranges::stable_sort(fixes, {}, &FixRecord::head);
+  std::ranges::stable_sort(fixes, {}, [](const FixRecord& fix) { return std::pair(fix.head, fix.t); });
   std::vector<std::string> by_gyros;
   std::size_t given_in_to = 0;
   bool is_star_tracker = false;
   for (const Rejected& rejected : rejected_in_a_row(fixes)) {
-    const std::string extent = extent_text(rejected, pass.settings.epoch);
+    const std::string extent = extent_text(rejected, epoch);
     const std::optional<std::size_t> alone = contradicted_alone(rejected.fixes);
     if (rejected.next == nullptr) {
       // A star tracker that is off contradicts all gyros, but for a turn about the momentum of one.
@@ -118,7 +119,7 @@ void judge_contradictions(const Pass& pass, const CalibrationRun& run, std::vect
       }
       continue;
     }
-    if (follows_a_leap(rejected, run.gyro_events)) {
+    if (follows_a_leap(rejected, events)) {
       by_gyros.push_back(extent + ", after readings that had leapt were used again");
     } else if (alone && is_far_off(rejected.fixes, *alone)) {
       by_gyros.push_back(fmt::format("gyro {}, {}", *alone + 1, extent));

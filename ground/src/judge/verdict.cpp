@@ -918,7 +918,7 @@ Verdict judge(const Pass& pass, const CalibrationRun& run) {
   judge_steadiness(pass, run, findings);
   judge_pair(run, findings);
   judge_star_tracker(statistics, findings);
-  judge_contradictions(pass, run, findings);
+  judge_contradictions(run.fixes, run.gyro_events, pass.settings.epoch, findings);
   judge_noise_by_rate(pass, run, findings);
   judge_batch(statistics, findings);
   judge_gyros(pass, run, findings);
@@ -945,6 +945,7 @@ Verdict judge_navigation(const Pass& pass, const NavigationRun& run) {
   judge_open_loops(run, findings);
   judge_rejections(run.statistics, findings);
   judge_star_tracker(run.statistics, findings);
+  judge_contradictions(run.fixes, run.gyro_events, pass.settings.epoch, findings);
   judge_readout_noise(run.readout_noise, findings);
   judge_nis(run.statistics, "the calibration in use does not fit this pass, or the model is incomplete", findings);
   judge_need(run.forecast, findings);

@@ -163,14 +163,18 @@ void Recorder::add_fix(const StepReport& report, const Pipeline& pipeline) {
   }
 }
 
-void Recorder::add_sample(const StepReport& report, const Pipeline& pipeline) {
-  ++run_.samples[report.sample];
-  for (int k = 0; k < pipeline.layout().gyros; ++k) {
-    if (report.gyros[k] != gyros_before_[k]) {
-      run_.gyro_events.push_back({report.t, k, report.gyros[k]});
+void GyroEvents::add(const StepReport& report, int gyros, std::vector<GyroEvent>& events) {
+  for (int k = 0; k < gyros; ++k) {
+    if (report.gyros[k] != before_[k]) {
+      events.push_back({report.t, k, report.gyros[k]});
     }
   }
-  gyros_before_ = report.gyros;
+  before_ = report.gyros;
+}
+
+void Recorder::add_sample(const StepReport& report, const Pipeline& pipeline) {
+  ++run_.samples[report.sample];
+  gyros_.add(report, pipeline.layout().gyros, run_.gyro_events);
   long& angle_looks =
       run_.calibration.statistics.angle_looks.emplace(run_.calibration.statistics.angle_looks.value_or(0));
   angle_looks += is_used(report.angles.status) ? 1 : 0;
@@ -212,6 +216,9 @@ void CorrectionSums::add(const FixRecord& fix, Duration interval) {
 void NavigationRecorder::add(const StepReport& report, const Pipeline& pipeline) {
   if (report.fix.status != FixStatus::kNone && report.fix.status != FixStatus::kPending) {
     add_fix(report, pipeline);
+  }
+  if (report.sample != SampleStatus::kNone) {
+    gyros_.add(report, pipeline.layout().gyros, run_.gyro_events);
   }
   if (report.sample == SampleStatus::kUsed) {
     if (const std::optional<AttitudeSolution> solution = pipeline.navigation_attitude()) {

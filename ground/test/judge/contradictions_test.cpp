@@ -35,7 +35,7 @@ CalibrationRun run_with(double sigmas1, double sigmas2, FixStatus next, bool jum
 }
 
 std::vector<Finding> judged(const CalibrationRun& run, std::vector<Finding> findings = {}) {
-  judge_contradictions({}, run, findings);
+  judge_contradictions(run.fixes, run.gyro_events, {}, findings);
   return findings;
 }
 

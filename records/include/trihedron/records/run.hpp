@@ -190,7 +190,8 @@ struct OpenLoopEnd {
 struct NavigationRun {
   AttitudeHistory attitude;  ///< at every gyro sample used
   std::vector<FixRecord> fixes;
-  SampleCounts samples;                       ///< from that of the first attitude on, by what was done with them
+  SampleCounts samples;  ///< from that of the first attitude on, by what was done with them
+  std::vector<GyroEvent> gyro_events;
   long corrections = 0;                       ///< astro-corrections made
   long corrections_missed = 0;                ///< intervals over which there were fixes, but none that could correct
   ClockCorrection clock_correction;           ///< of the stamps, by the calibration in use

@@ -42,6 +42,15 @@ class FixSums {
 /// Of fixes; what is not about fixes is left as it is.
 void add_statistics(const std::vector<FixRecord>& fixes, Statistics& statistics);
 
+/// Changes of the states of gyros, from sample to sample.
+class GyroEvents {
+ public:
+  void add(const StepReport& report, int gyros, std::vector<GyroEvent>& events);
+
+ private:
+  PerGyro<GyroState> before_{};
+};
+
 /// Puts everything that a pipeline reports into a run.
 class Recorder {
  public:
@@ -59,7 +68,7 @@ class Recorder {
 
   CalibrationRun run_;
   Time corrected_{};
-  PerGyro<GyroState> gyros_before_{};
+  GyroEvents gyros_;
 };
 
 /// Counts astro-corrections, and the intervals over which fixes were there but none could correct.
@@ -91,6 +100,7 @@ class NavigationRecorder {
 
   NavigationRun run_;
   Time corrected_{};
+  GyroEvents gyros_;
   CorrectionSums corrections_;
   std::vector<OpenLoopEnd> last_compared_;  ///< of each of the last fixes since the last correction
 };
