@@ -87,8 +87,8 @@ bool TurnFit::converge() {
       break;
     }
   }
-  // In steady flight, or of a body that spins or tumbles evenly, alignments and momenta explain what an offset does, and
-  // what is left to tell it is the noise of the rates.
+  // In steady flight, or of a body that spins or tumbles evenly, alignments and momenta explain what an offset does,
+  // and what is left to tell it is the noise of the rates.
   constexpr double kShown = 100;
   const double shown = 1 / normal_.solve(unit(Unknowns::offset()))(Unknowns::offset());
   return used_stretches() >= kLeastStretches && shown > kShown * shown_by_noise_;
