@@ -207,8 +207,9 @@ Forward<Constants> go_forward(const MatrixXd& prior, const VectorXd& prior_y, st
 void refuse_singular(const Eigen::Ref<const MatrixXd>& root) {
   if (!((root.diagonal().array().abs() > 0).all() && root.allFinite())) {
     throw SetupError("the fixes and samples that can be used do not determine the momenta of all gyros",
-                     "calibrate a part of the pass in which all gyros work, or use estimator invariant with noise = "
-                     "\"told\" and all further states on or off");
+                     "look at the telemetry with `trihedron inspect`: axes, signs, which gyro is which; calibrate a "
+                     "part of the pass in which all gyros work, or use estimator invariant with noise = \"told\" and "
+                     "all further states on or off");
   }
 }
 
