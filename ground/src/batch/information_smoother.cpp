@@ -220,6 +220,16 @@ SmootherLikelihood likelihood_by(const MatrixXd& triangle, double log_root_deter
   return {triangle(n, n) * triangle(n, n), log_root_determinant + log_determinant(triangle.topLeftCorner(n, n))};
 }
 
+/// Adds rows about the constants, which stand after `d` others, with their right side: those of a triangle.
+void append_constants(ConstantSquares& constants, Index d, MatrixXd& rows, VectorXd& y) {
+  const MatrixXd triangle = lower_root(constants.take()).transpose();
+  const Index c = triangle.cols() - 1;
+  rows.conservativeResize(rows.rows() + triangle.rows(), d + c);
+  rows.bottomRows(triangle.rows()) << MatrixXd::Zero(triangle.rows(), d), triangle.leftCols(c);
+  y.conservativeResize(rows.rows());
+  y.tail(triangle.rows()) = triangle.rightCols(1);
+}
+
 }  // namespace
 
 SmootherLikelihood likelihood(const MatrixXd& prior, const VectorXd& prior_y, std::size_t stages,
@@ -274,16 +284,6 @@ SmootherResult smooth(const MatrixXd& prior, const VectorXd& prior_y, const std:
         stage.A_inverse * (next.head(d) - stage.B * next.tail(c) - stage.m - stage.noise.cwiseProduct(w));
   }
   return result;
-}
-
-/// Adds rows about the constants, which stand after `d` others, with their right side: those of a triangle.
-void append_constants(ConstantSquares& constants, Index d, MatrixXd& rows, VectorXd& y) {
-  const MatrixXd triangle = lower_root(constants.take()).transpose();
-  const Index c = triangle.cols() - 1;
-  rows.conservativeResize(rows.rows() + triangle.rows(), d + c);
-  rows.bottomRows(triangle.rows()) << MatrixXd::Zero(triangle.rows(), d), triangle.leftCols(c);
-  y.conservativeResize(rows.rows());
-  y.tail(triangle.rows()) = triangle.rightCols(1);
 }
 
 void gather_constants(MatrixXd& prior, VectorXd& prior_y, std::vector<SmootherStage>& stages) {
