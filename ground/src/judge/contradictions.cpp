@@ -136,8 +136,7 @@ void judge_contradictions(std::vector<FixRecord> fixes, const std::vector<GyroEv
     });
     findings.push_back({FindingCode::kGyroContradicted,
                         "For a while the readings of a gyro, not the fixes, were wrong: the fixes contradict it and "
-                        "were rejected, and the "
-                        "attitude there is by these readings.",
+                        "were rejected, and the attitude there is by these readings.",
                         fmt::format("{}", fmt::join(by_gyros, "; ")),
                         "Look at the telemetry of the gyro there, leave that part out and calibrate on the parts "
                         "apart."});
@@ -146,8 +145,7 @@ void judge_contradictions(std::vector<FixRecord> fixes, const std::vector<GyroEv
     reopened->severity = FindingSeverity::kDoNotUse;
     reopened->text =
         "The fixes contradicted the momenta from one moment on, and were rejected until the filter set the momenta "
-        "free: "
-        "whichever was wrong, the attitude until then or from then on is.";
+        "free: whichever was wrong, the attitude until then or from then on is.";
     reopened->evidence += fmt::format("; {} fixes after a jump", given_in_to);
     reopened->cure = "Look what happened there to the star tracker or to a gyro, and calibrate on the parts apart.";
   }

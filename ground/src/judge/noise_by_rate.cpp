@@ -13,14 +13,22 @@
 namespace trihedron::ground {
 namespace {
 
-/// Rate of the body at each fix from the fix before it to the one after it, rad/s; NaN where they are far apart.
+constexpr double kSlowestSlew_rad_s = 0.02 * kDegree;
+
+/// Rate of the body at each fix from the fix before it to the one after it, rad/s; NaN where they are far apart, and
+/// where the way by the fix between is longer by half: no body turns so, and the fixes are wrong.
 std::vector<double> rates_of(const StarTrackerTelemetry& star_tracker) {
   constexpr double kFarthest_s = 60;
+  constexpr double kLonger = 1.5;
+  const std::vector<Eigen::Quaterniond>& q_in_c = star_tracker.q_in_c;
   std::vector<double> rates(star_tracker.size(), std::numeric_limits<double>::quiet_NaN());
   for (std::size_t i = 1; i + 1 < star_tracker.size(); ++i) {
     const double span_s = to_seconds(star_tracker.t[i + 1] - star_tracker.t[i - 1]);
-    if (span_s > 0 && span_s < kFarthest_s) {
-      rates[i] = star_tracker.q_in_c[i + 1].angularDistance(star_tracker.q_in_c[i - 1]) / span_s;
+    const double turn_rad = q_in_c[i + 1].angularDistance(q_in_c[i - 1]);
+    const double way_rad = q_in_c[i].angularDistance(q_in_c[i - 1]) + q_in_c[i + 1].angularDistance(q_in_c[i]);
+    const bool is_slew = turn_rad > kSlowestSlew_rad_s * span_s;
+    if (span_s > 0 && span_s < kFarthest_s && !(is_slew && way_rad > kLonger * turn_rad)) {
+      rates[i] = turn_rad / span_s;
     }
   }
   return rates;
@@ -33,7 +41,6 @@ std::optional<NoiseByRate> noise_by_rate(const StarTrackerTelemetry& star_tracke
   constexpr std::size_t kFewest = 50;
   constexpr double kSlewOverUsual = 3;
   constexpr double kRestOverUsual = 1.5;
-  constexpr double kSlowestSlew_rad_s = 0.02 * kDegree;
   const std::vector<double> rates = rates_of(star_tracker);
   std::vector<double> known;
   std::ranges::copy_if(rates, std::back_inserter(known), [](double rate) { return std::isfinite(rate); });
@@ -46,7 +53,8 @@ std::optional<NoiseByRate> noise_by_rate(const StarTrackerTelemetry& star_tracke
   std::vector<double> in_slews;
   std::vector<double> slew_rates;
   for (const FixRecord& fix : fixes) {
-    const bool is_judged = fix.status == FixStatus::kUsed || fix.status == FixStatus::kRejectedByGate;
+    const bool is_judged =
+        (fix.status == FixStatus::kUsed || fix.status == FixStatus::kRejectedByGate) && std::isfinite(fix.nis);
     const auto its = std::ranges::lower_bound(star_tracker.t, fix.t);
     if (!is_judged || fix.head != 0 || fix.degrees_of_freedom == 0 || its == star_tracker.t.end() || *its != fix.t) {
       continue;
@@ -75,16 +83,15 @@ void judge_noise_by_rate(const Pass& pass, const CalibrationRun& run, std::vecto
     return;
   }
   const double ratio = found->in_slews / found->at_rest;
-  findings.push_back({FindingCode::kFixesWorseInSlews,
-                      "In slews the fixes are off by more than at rest: stamps that jitter, or noise of the star "
-                      "tracker or of the gyros "
-                      "that grows with the rate of the body. One noise figure does not fit both.",
-                      fmt::format("{:.1f} times at {:.2f} °/s, by {} fixes", std::sqrt(ratio),
-                                  found->rate_rad_s / kDegree, found->fixes_in_slews),
-                      "Look at the time stamps of the fixes, and at what the star tracker says of its own noise; leave "
-                      "out its fixes in "
-                      "fast slews, or give each fix its covariance.",
-                      ratio > kMuchMore ? FindingSeverity::kDoNotUse : FindingSeverity::kWarning});
+  findings.push_back(
+      {FindingCode::kFixesWorseInSlews,
+       "In slews the fixes are off by more than at rest: stamps that jitter, or noise of the star "
+       "tracker or of the gyros that grows with the rate of the body. One noise figure does not fit both.",
+       fmt::format("{:.1f} times at {:.2f} °/s, by {} fixes", std::sqrt(ratio), found->rate_rad_s / kDegree,
+                   found->fixes_in_slews),
+       "Look at the time stamps of the fixes, and at what the star tracker says of its own noise; leave "
+       "out its fixes in fast slews, or give each fix its covariance.",
+       ratio > kMuchMore ? FindingSeverity::kDoNotUse : FindingSeverity::kWarning});
 }
 
 }  // namespace trihedron::ground

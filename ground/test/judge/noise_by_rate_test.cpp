@@ -51,6 +51,20 @@ TEST(NoiseByRate, OfStampsThatJitterIsNamed) {
   EXPECT_EQ(much[0].severity, FindingSeverity::kDoNotUse);
 }
 
+/// Fixes at random for a while are no slews.
+TEST(NoiseByRate, IsNotThatOfWrongFixes) {
+  Pass pass = sim::simulate(scenario_in_eq1(4, std::chrono::hours(3))).pass;
+  std::mt19937_64 random(5);
+  std::normal_distribution<double> normal;
+  for (std::size_t i = 2000; i < 2400; ++i) {
+    pass.star_tracker.q_in_c[i] =
+        Eigen::Quaterniond(normal(random), normal(random), normal(random), normal(random)).normalized();
+  }
+  std::vector<Finding> findings;
+  judge_noise_by_rate(pass, calibrate(pass, told()), findings);
+  EXPECT_TRUE(findings.empty());
+}
+
 /// Samples three seconds apart, with a fix in the middle between two.
 TEST(NoiseByRate, OfReadingsThatAreFarApartForbidsUse) {
   Pass pass = sim::simulate(scenario_in_eq1(4, std::chrono::hours(3))).pass;
