@@ -117,6 +117,7 @@ void judge_contradictions(std::vector<FixRecord> fixes, const std::vector<GyroEv
              fmt::format("gyro {}, {}", *alone + 1, extent),
              "Cut the pass there and calibrate on the parts apart; look for what happened at that time."});
       }
+      is_star_tracker = is_star_tracker || !alone;
       continue;
     }
     if (follows_a_leap(rejected, events)) {

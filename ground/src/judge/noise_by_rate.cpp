@@ -74,8 +74,8 @@ std::optional<NoiseByRate> noise_by_rate(const StarTrackerTelemetry& star_tracke
 }
 
 void judge_noise_by_rate(const Pass& pass, const CalibrationRun& run, std::vector<Finding>& findings) {
-  // The median of fifty squares is known to 14 % by chance; with readings of a nominal pair that bend in slews, up to
-  // 3°/s and 1°/s², it is up to 8 % more.
+  // By chance the median of fifty squares is known to 14 %. Slews themselves, up to 3°/s and 1°/s², add nothing that is
+  // seen beside that.
   constexpr double kMore = 2;
   constexpr double kMuchMore = 10;  // from there on the gate rejects half of the fixes in slews
   const std::optional<NoiseByRate> found = noise_by_rate(pass.star_tracker, run.fixes);

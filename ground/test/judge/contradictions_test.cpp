@@ -64,6 +64,16 @@ TEST(Contradictions, OfTheStarTrackerAreLeftToIt) {
   }
 }
 
+TEST(Contradictions, OfAGyroDoNotAcquitAStarTrackerThatIsOffAtTheEnd) {
+  CalibrationRun run = run_with(0, 1000, FixStatus::kUsed);
+  for (std::size_t i = 1100; i < run.fixes.size(); ++i) {
+    run.fixes[i].status = FixStatus::kRejectedByGate;
+    run.fixes[i].innovation.assign(4, 1000 * kInnovationSigma_rad);
+  }
+  EXPECT_THAT(codes_of(judged(run, {finding_of(FindingCode::kStarTrackerOff)})),
+              ElementsAre(FindingCode::kStarTrackerOff, FindingCode::kGyroContradicted));
+}
+
 TEST(Contradictions, AfterALeapAreOfTheGyros) {
   CalibrationRun run = run_with(1000, 1000, FixStatus::kUsed);
   const auto at = [](int s) { return Time(std::chrono::seconds(s)); };

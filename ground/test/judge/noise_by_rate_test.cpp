@@ -41,6 +41,17 @@ TEST(NoiseByRate, OfANominalPassIsOne) {
   EXPECT_TRUE(judged_with_jitter(0).empty());
 }
 
+/// Where no cubic is what the body does for 2.8 s.
+TEST(NoiseByRate, OfSlewsThatBeginAtOnceIsNearlyOne) {
+  Scenario scenario = scenario_in_eq1(4, std::chrono::hours(3));
+  scenario.attitude.max_slew_rate_rad_s = 3 * kDegree;
+  scenario.attitude.max_slew_acceleration_rad_s2 = kDegree;
+  const Pass pass = sim::simulate(scenario).pass;
+  const auto found = noise_by_rate(pass.star_tracker, calibrate(pass, told()).fixes);
+  ASSERT_TRUE(found.has_value());
+  EXPECT_NEAR(found->in_slews / found->at_rest, 1, 0.3);
+}
+
 TEST(NoiseByRate, OfStampsThatJitterIsNamed) {
   const std::vector<Finding> little = judged_with_jitter(10e-3);
   ASSERT_EQ(little.size(), 1U);
