@@ -118,8 +118,7 @@ std::string outcome_text(const Outcome& outcome, const CorrectionOptions& correc
   const Time epoch = outcome.run.calibration.epoch;
   return fmt::format(
       "{}{}{}{}{}{}\n{}\n{}\n", verdict_line(outcome.run.calibration), pass_text(outcome.pass.loaded),
-      findings_text(outcome.run.calibration.verdict),
-      outcome.run.calibration.forecast ? forecast_text(*outcome.run.calibration.forecast) : "",
+      findings_text(outcome.run.calibration.verdict), forecast_text(outcome.run.calibration.forecast),
       calibration_text(outcome.run, outcome.evaluation.estimate_minus_truth),
       course_text(outcome.run, outcome.evaluation),
       evaluation_text(outcome.evaluation.navigation, epoch,

@@ -63,13 +63,13 @@ ExitStatus navigate_pass(const std::filesystem::path& pass, const NavigationFile
   const auto as_json = [&] {
     return nlohmann::ordered_json{{"pass", pass_json(loaded)},
                                   {"verdict", verdict_json(result.verdict)},
-                                  {"readiness", readiness_json(*result.forecast)},
+                                  {"readiness", readiness_json(result.forecast)},
                                   {"statistics", statistics_json(result.statistics)},
                                   {"evaluation", evaluation_json(evaluation, epoch)}};
   };
   show(beside(files.attitude.string(), common), as_json, [&] {
     return fmt::format("{}{}{}\n{}\nWritten     {}: {} epochs\n", pass_text(loaded), verdict_text(result.verdict),
-                       forecast_text(*result.forecast), evaluation_text(evaluation, epoch, "Attitude error"),
+                       forecast_text(result.forecast), evaluation_text(evaluation, epoch, "Attitude error"),
                        printable(files.attitude.string()), result.attitude.size());
   });
   return result.verdict.trustworthy ? kTrustworthy : kDoNotUse;

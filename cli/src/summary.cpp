@@ -162,21 +162,27 @@ std::string verdict_line(const Calibration& calibration) {
                      fmt::join(parts, "; "));
 }
 
-std::string forecast_text(const OpenLoopForecast& forecast) {
-  std::string text = fmt::format("Readiness   {}\n", in_words(forecast.usual));
-  if (forecast.need) {
-    text += fmt::format("            the need of {}: predicted {} by then\n", need_text(*forecast.need),
-                        angle_text(forecast.need->error_997_rad));
+std::string forecast_text(const std::optional<OpenLoopForecast>& forecast) {
+  if (!forecast) {
+    return {};
+  }
+  std::string text = fmt::format("Readiness   {}\n", in_words(forecast->usual));
+  if (forecast->need) {
+    text += fmt::format("            the need of {}: predicted {} by then\n", need_text(*forecast->need),
+                        angle_text(forecast->need->error_997_rad));
   }
   return text;
 }
 
-nlohmann::ordered_json readiness_json(const OpenLoopForecast& forecast) {
-  nlohmann::ordered_json json = {{"limit_rad", forecast.usual.limit_rad},
-                                 {"time_s", to_seconds(forecast.usual.within)},
-                                 {"is_lower_bound", forecast.usual.is_lower_bound}};
-  if (forecast.need) {
-    json["need_met"] = forecast.need->met;
+nlohmann::ordered_json readiness_json(const std::optional<OpenLoopForecast>& forecast) {
+  if (!forecast) {
+    return nullptr;
+  }
+  nlohmann::ordered_json json = {{"limit_rad", forecast->usual.limit_rad},
+                                 {"time_s", to_seconds(forecast->usual.within)},
+                                 {"is_lower_bound", forecast->usual.is_lower_bound}};
+  if (forecast->need) {
+    json["need_met"] = forecast->need->met;
   }
   return json;
 }

@@ -29,8 +29,9 @@ namespace trihedron::cli {
 [[nodiscard]] std::string findings_text(const Verdict& verdict);
 /// In one line whether a calibration may be used, and for what.
 [[nodiscard]] std::string verdict_line(const Calibration& calibration);
-/// How long an accuracy is predicted to be kept, in one line each; and whether a need is met.
-[[nodiscard]] std::string forecast_text(const OpenLoopForecast& forecast);
+/// How long an accuracy is predicted to be kept, in one line each; and whether a need is met. Empty where nothing is
+/// predicted.
+[[nodiscard]] std::string forecast_text(const std::optional<OpenLoopForecast>& forecast);
 /// `estimate_minus_truth`: by row of Calibration::states; empty where there is no truth.
 [[nodiscard]] std::string calibration_text(const CalibrationRun& run, const Eigen::VectorXd& estimate_minus_truth);
 /// When the parameters settled, and how long the attitude holds with them.
@@ -48,8 +49,8 @@ namespace trihedron::cli {
 /// null where the pass does not show its clocks.
 [[nodiscard]] nlohmann::ordered_json clocks_json(const std::optional<Clocks>& clocks, const Pass& pass);
 [[nodiscard]] nlohmann::ordered_json findings_json(const std::vector<Finding>& findings);
-/// Whether a need is met, how long the usual limit is kept, s.
-[[nodiscard]] nlohmann::ordered_json readiness_json(const OpenLoopForecast& forecast);
+/// Whether a need is met, how long the usual limit is kept, s; null where nothing is predicted.
+[[nodiscard]] nlohmann::ordered_json readiness_json(const std::optional<OpenLoopForecast>& forecast);
 [[nodiscard]] nlohmann::ordered_json verdict_json(const Verdict& verdict);
 [[nodiscard]] nlohmann::ordered_json course_json(const CalibrationRun& run,
                                                  const ground::CalibrationEvaluation& evaluation);

@@ -5,6 +5,7 @@ import datetime
 import functools
 import json
 import re
+import shutil
 import tomllib
 
 import jsonschema
@@ -143,6 +144,25 @@ def test_outputs_have_only_what_is_described(calibrated):
         check(json.loads(result.stdout), name, only_described=True)
     simulated = run("--json", "simulate", directory / "scenario.toml", "-o", directory / "again.nc")
     check(json.loads(simulated.stdout), "inspect-output")
+
+
+def test_a_navigation_that_has_lost_a_gyro_tells_no_readiness(flown, tmp_path):
+    shutil.copytree(flown / "pass", tmp_path / "pass")
+    samples = tmp_path / "pass" / "gyro.csv"
+    header, *lines = samples.read_text().splitlines()
+    lost = len(lines) - len(lines) // 5  # 20 minutes before the end the second gyro stands still
+    reading = lines[lost].split(",")[4:]
+    samples.write_text("\n".join([header, *lines[:lost], *(",".join(line.split(",")[:4] + reading) for line in lines[lost:])]) + "\n")
+    arguments = ("navigate", tmp_path / "pass", "--prior", "-o", tmp_path / "a.csv", "--config", flown / "told.toml", "--need", "5arcmin for 1min")
+    result = run("--json", *arguments)
+    assert result.returncode == DO_NOT_USE, result.stderr
+    told = json.loads(result.stdout)
+    check(told, "navigate-output", only_described=True)
+    assert told["readiness"] is None and not told["verdict"]["trustworthy"]
+    assert any(finding["code"] == "gyro-stuck" and "no pair" in finding["text"] for finding in told["verdict"]["findings"])
+    text = run(*arguments)
+    assert text.returncode == DO_NOT_USE and "gyro-stuck" in text.stdout
+    assert "Readiness" not in text.stdout and "the need of" not in text.stdout
 
 
 def test_a_clock_that_steps_is_described(tmp_path):

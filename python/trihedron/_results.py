@@ -84,7 +84,7 @@ class _Result:
 
     @property
     def forecast(self) -> _native.Forecast | None:
-        """Attitude error predicted for an open loop from the end of the pass on."""
+        """Attitude error predicted for an open loop from the end of the pass on; None where no pair of gyros is left there."""
         return self._its.forecast
 
 

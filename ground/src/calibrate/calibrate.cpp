@@ -157,7 +157,8 @@ Smoothed smooth(const Pass& pass, Decision& decision) {
 
 /// With the calibrated parameters from the last sample of the pass on, at `end`; nothing where there is no pair then.
 std::optional<OpenLoopForecast> forecast_of(const CalibrationRun& run, Time end) {
-  if (run.attitude.size() == 0 || !has_pair_at_end(run, end)) {
+  if (run.attitude.size() == 0 ||
+      !has_pair_at_end(run.gyro_events, static_cast<int>(run.calibration.gyros.size()), end)) {
     return std::nullopt;
   }
   const BodyMotion motion(run.attitude.t, run.attitude.q_in_c);
@@ -474,7 +475,10 @@ NavigationRun navigate(const Pass& pass, const CalibrationOptions& options, cons
     run.held_parameters_misfit = pipeline.squared_distance_from_prior();
     run.misfit_limit = boost::math::quantile(boost::math::chi_squared(pipeline.layout().parameters()), 0.999);
   }
-  run.forecast = forecast_of(options, pipeline, run.attitude);
+  run.gyros = pipeline.layout().gyros;
+  if (has_pair_at_end(run.gyro_events, run.gyros, stamped.gyro.t.back())) {
+    run.forecast = forecast_of(options, pipeline, run.attitude);
+  }
   run.clock_correction = correction;
   run.readout_noise = noise;
   run.clocks = clocks_of(stamped);

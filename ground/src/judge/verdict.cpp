@@ -137,10 +137,10 @@ void judge_star_tracker(const Statistics& statistics, std::vector<Finding>& find
 }
 
 /// The events by which gyros were left out for good, or until the end of the pass.
-std::vector<GyroEvent> losses(const CalibrationRun& run, Time end) {
+std::vector<GyroEvent> losses(const std::vector<GyroEvent>& events, Time end) {
   constexpr Duration kForMore = std::chrono::minutes(5);
   PerGyro<GyroEvent> last{};
-  for (const GyroEvent& event : run.gyro_events) {
+  for (const GyroEvent& event : events) {
     last[event.gyro] = event;
   }
   std::vector<GyroEvent> lost;
@@ -160,18 +160,21 @@ bool is_silent(const GyroTelemetry& telemetry, const GyroEvent& event) {
   return i < telemetry.size() && (i == 0 || telemetry.t[i - 1] <= event.t);
 }
 
-void judge_gyros(const Pass& pass, const CalibrationRun& run, std::vector<Finding>& findings) {
-  const std::vector<GyroEvent> lost = losses(run, pass.gyro.t.back());
-  const bool has_pair = has_pair_at_end(run, pass.gyro.t.back());
+/// Of a calibration or a navigation with so many gyros. `without_pair`: what the loss of a gyro means where it leaves no
+/// pair.
+void judge_gyros(const Pass& pass, const std::vector<GyroEvent>& gyro_events, int gyros, const char* without_pair,
+                 std::vector<Finding>& findings) {
+  const std::vector<GyroEvent> lost = losses(gyro_events, pass.gyro.t.back());
+  const bool has_pair = has_pair_at_end(gyro_events, gyros, pass.gyro.t.back());
   const auto add_events = [&](GyroState state, FindingCode code, std::string text, const char* cure) {
     const auto is_of_state = [&](const GyroEvent& event) { return event.state == state; };
     std::vector<GyroEvent> events;
-    std::ranges::copy_if(run.gyro_events, std::back_inserter(events), is_of_state);
+    std::ranges::copy_if(gyro_events, std::back_inserter(events), is_of_state);
     if (events.empty()) {
       return;
     }
     const bool breaks_pair = !has_pair && std::ranges::any_of(lost, is_of_state);
-    text += breaks_pair ? " Without it there is no pair at the end of the pass, and no attitude but at fixes." : "";
+    text += breaks_pair ? without_pair : "";
     add(findings, code, std::move(text), fmt::format("{}", fmt::join(texts_of(events, pass.settings.epoch), "; ")),
         cure);
     if (breaks_pair) {
@@ -181,7 +184,7 @@ void judge_gyros(const Pass& pass, const CalibrationRun& run, std::vector<Findin
   add_events(GyroState::kIsolated, FindingCode::kGyroIsolated,
              "A gyro alone did not agree with the rest, time after time, and was left out.",
              "Look at its telemetry from there on. Its estimates are those of before.");
-  const bool is_off = std::ranges::all_of(run.gyro_events, [&](const GyroEvent& event) {
+  const bool is_off = std::ranges::all_of(gyro_events, [&](const GyroEvent& event) {
     return event.state != GyroState::kStuck || is_silent(pass.gyro, event);
   });
   add_events(GyroState::kStuck, FindingCode::kGyroStuck,
@@ -834,8 +837,8 @@ void judge_prior(const PassSettings& settings, const NavigationRun& run, std::ve
 
 }  // namespace
 
-bool has_pair_at_end(const CalibrationRun& run, Time end) {
-  return run.calibration.gyros.size() >= losses(run, end).size() + 2;
+bool has_pair_at_end(const std::vector<GyroEvent>& gyro_events, int gyros, Time end) {
+  return gyros >= static_cast<int>(losses(gyro_events, end).size()) + 2;
 }
 
 std::vector<std::string> texts_of(const std::vector<GyroEvent>& events, Time epoch) {
@@ -921,7 +924,8 @@ Verdict judge(const Pass& pass, const CalibrationRun& run) {
   judge_contradictions(run.fixes, run.gyro_events, pass.settings.epoch, findings);
   judge_noise_by_rate(pass, run, findings);
   judge_batch(statistics, findings);
-  judge_gyros(pass, run, findings);
+  judge_gyros(pass, run.gyro_events, static_cast<int>(run.calibration.gyros.size()),
+              " Without it there is no pair at the end of the pass, and no attitude but at fixes.", findings);
   judge_gyro_rate(pass, run, findings);
   judge_unused_sensors(pass, run, findings);
   judge_need(run.calibration.forecast, findings);
@@ -946,6 +950,8 @@ Verdict judge_navigation(const Pass& pass, const NavigationRun& run) {
   judge_rejections(run.statistics, findings);
   judge_star_tracker(run.statistics, findings);
   judge_contradictions(run.fixes, run.gyro_events, pass.settings.epoch, findings);
+  judge_gyros(pass, run.gyro_events, run.gyros, " Without it there is no pair at the end of the pass, and no attitude.",
+              findings);
   judge_readout_noise(run.readout_noise, findings);
   judge_nis(run.statistics, "the calibration in use does not fit this pass, or the model is incomplete", findings);
   judge_need(run.forecast, findings);

@@ -220,6 +220,22 @@ TEST(Navigate, WithAnAlignmentFarOffIsNotToBeUsed) {
   EXPECT_FALSE(run.verdict.trustworthy);
 }
 
+TEST(Navigate, OfAPairThatHasLostAGyroPredictsNothing) {
+  Pass pass = two_hours().pass;
+  const CalibrationOptions options = told();
+  EXPECT_TRUE(navigate(pass, options).forecast.has_value());
+  const std::size_t lost = pass.gyro.size() - pass.gyro.size() / 8;  // for a quarter of an hour
+  for (std::size_t i = lost; i < pass.gyro.size(); ++i) {
+    std::copy_n(pass.gyro.h.begin() + static_cast<std::ptrdiff_t>(6 * lost + 3), 3,
+                pass.gyro.h.begin() + static_cast<std::ptrdiff_t>(6 * i + 3));
+  }
+  const NavigationRun run = navigate(pass, options);
+  EXPECT_EQ(run.gyros, 2);
+  EXPECT_FALSE(run.forecast.has_value());
+  EXPECT_FALSE(run.verdict.trustworthy);
+  EXPECT_TRUE(run.verdict.has(FindingCode::kGyroStuck));
+}
+
 TEST(CorrectionSums, CountsIntervalsOverWhichNoFixCouldCorrect) {
   CorrectionSums sums;
   const auto fix = [&](int t_min, bool corrected, Duration interval = minutes(30)) {

@@ -546,11 +546,11 @@ TEST(Verdict, FindsThatThereIsNoPairAtTheEnd) {
   const Time end = pass.gyro.t.back();
   for (const GyroState state : {GyroState::kStuck, GyroState::kLeapt}) {
     run.gyro_events = {{end - std::chrono::minutes(6), 0, state}};
-    EXPECT_FALSE(has_pair_at_end(run, end));
+    EXPECT_FALSE(has_pair_at_end(run.gyro_events, 2, end));
     EXPECT_FALSE(judge(pass, run).trustworthy);
     EXPECT_THAT(judge(pass, run).findings.at(0).text, HasSubstr("no pair at the end"));
     run.gyro_events[0].t = end - std::chrono::minutes(4);  // it may come back
-    EXPECT_TRUE(has_pair_at_end(run, end));
+    EXPECT_TRUE(has_pair_at_end(run.gyro_events, 2, end));
     EXPECT_TRUE(judge(pass, run).trustworthy);
   }
   run.gyro_events = {{end - std::chrono::hours(1), 1, GyroState::kStuck}};
@@ -628,9 +628,32 @@ NavigationRun good_navigation() {
   run.statistics = good_run().calibration.statistics;
   run.samples[SampleStatus::kUsed] = 86400;
   run.attitude.t.resize(86400);
+  run.gyros = 2;
   run.corrections = 7;
   run.open_loops.assign(7, {.t = {}, .error_rad = 1e-4, .square = 3});
   return run;
+}
+
+TEST(Verdict, OfANavigationForbidsUseWithoutAPairAtTheEndAsThatOfACalibrationDoes) {
+  NavigationRun run = good_navigation();
+  const Pass pass = good_pass();
+  const Time end = pass.gyro.t.back();
+  for (const auto& [state, code] : {std::pair(GyroState::kStuck, "gyro-stuck"),
+                                    {GyroState::kLeapt, "gyro-leapt"},
+                                    {GyroState::kIsolated, "gyro-isolated"}}) {
+    run.gyro_events = {{end - std::chrono::hours(1), 1, state}};
+    const Verdict lost = judge_navigation(pass, run);
+    EXPECT_THAT(codes(lost), ElementsAre(code));
+    EXPECT_FALSE(lost.trustworthy) << code;
+    EXPECT_THAT(lost.findings.at(0).text, HasSubstr("no pair at the end of the pass, and no attitude."));
+    run.gyro_events.push_back({end - std::chrono::minutes(30), 1, GyroState::kUsed});
+    const Verdict back = judge_navigation(pass, run);
+    EXPECT_THAT(codes(back), ElementsAre(code));
+    EXPECT_TRUE(back.trustworthy) << code;
+  }
+  run.gyro_events = {{end - std::chrono::hours(1), 1, GyroState::kStuck}};
+  run.gyros = 3;
+  EXPECT_TRUE(judge_navigation(pass, run).trustworthy);
 }
 
 TEST(Verdict, OfANavigationForbidsStampsThatScatterMuch) {

@@ -191,6 +191,7 @@ struct NavigationRun {
   AttitudeHistory attitude;  ///< at every gyro sample used
   std::vector<FixRecord> fixes;
   SampleCounts samples;  ///< from that of the first attitude on, by what was done with them
+  int gyros = 0;         ///< that the estimator works with
   std::vector<GyroEvent> gyro_events;
   long corrections = 0;                       ///< astro-corrections made
   long corrections_missed = 0;                ///< intervals over which there were fixes, but none that could correct
@@ -204,7 +205,7 @@ struct NavigationRun {
   /// its 99.9 % limit.
   std::optional<double> held_parameters_misfit;
   double misfit_limit = 0;
-  std::optional<OpenLoopForecast> forecast;  ///< with the parameters in use at the end
+  std::optional<OpenLoopForecast> forecast;  ///< with the parameters in use at the end; nothing without a pair there
   Verdict verdict;
 };
 

@@ -6,11 +6,13 @@ namespace trihedron::ground {
 
 /// Findings with evidence and cure, and whether the result may be used.
 [[nodiscard]] Verdict judge(const Pass& pass, const CalibrationRun& run);
-/// Whether the attitude covers the pass and agrees with the fixes, and whether the parameters in use fit it.
+/// Whether the attitude covers the pass and agrees with the fixes, whether the parameters in use fit it, and whether
+/// the gyros last until its end, as for a calibration.
 [[nodiscard]] Verdict judge_navigation(const Pass& pass, const NavigationRun& run);
 
-/// Whether two gyros and more were used until the last sample of the pass, at `end`, but for less than five minutes.
-[[nodiscard]] bool has_pair_at_end(const CalibrationRun& run, Time end);
+/// Whether two gyros and more of `gyros` were used until the last sample of the pass, at `end`, but for less than five
+/// minutes.
+[[nodiscard]] bool has_pair_at_end(const std::vector<GyroEvent>& gyro_events, int gyros, Time end);
 
 /// One for each gyro and state: how often, and when first, in minutes from `epoch`.
 [[nodiscard]] std::vector<std::string> texts_of(const std::vector<GyroEvent>& events, Time epoch);
