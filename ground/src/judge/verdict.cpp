@@ -151,17 +151,44 @@ std::vector<GyroEvent> losses(const std::vector<GyroEvent>& events, Time end) {
   return lost;
 }
 
-/// Whether a gyro has readings after this event, but none that is a direction.
+/// Whether the sample of this event has no reading of its gyro, or none that is a direction.
 bool is_silent(const GyroTelemetry& telemetry, const GyroEvent& event) {
-  std::size_t i = telemetry.size();
-  while (i > 0 && telemetry.t[i - 1] > event.t && !nearly_unit(telemetry.direction(i - 1, event.gyro).norm())) {
-    --i;
-  }
-  return i < telemetry.size() && (i == 0 || telemetry.t[i - 1] <= event.t);
+  const auto i = static_cast<std::size_t>(std::ranges::find(telemetry.t, event.t) - telemetry.t.begin());
+  return i < telemetry.size() && !nearly_unit(telemetry.direction(i, event.gyro).norm());
 }
 
-/// Of a calibration or a navigation with so many gyros. `without_pair`: what the loss of a gyro means where it leaves no
-/// pair.
+struct TextAndCure {
+  const char* text;
+  const char* cure;
+};
+
+/// Of gyros that were stuck, by their readings at these events.
+TextAndCure of_stuck(const GyroTelemetry& telemetry, const std::vector<GyroEvent>& events,
+                     const std::vector<GyroEvent>& lost) {
+  const auto is_stuck = [](const GyroEvent& event) { return event.state == GyroState::kStuck; };
+  const auto stuck = std::ranges::count_if(events, is_stuck);
+  const auto silent = std::ranges::count_if(
+      events, [&](const GyroEvent& event) { return is_stuck(event) && is_silent(telemetry, event); });
+  if (silent == 0) {
+    return {"Readings of a gyro, or one component of them, stood still, not even moved by noise; they were not used.",
+            "Look at the telemetry there: a frozen readout, or the last value repeated in a gap."};
+  }
+  if (silent < stuck) {
+    return {
+        "At some times readings of a gyro, or one component of them, stood still, not even moved by noise; at others "
+        "there were none, or none that are a direction. It was not used there.",
+        "Look at the telemetry there: a frozen readout, the last value repeated in a gap, a gyro that was off."};
+  }
+  const bool is_off = std::ranges::all_of(events, [&](const GyroEvent& event) {
+    return !is_stuck(event) || std::ranges::any_of(lost, [&](const GyroEvent& its) { return its.gyro == event.gyro; });
+  });
+  return {is_off ? "A gyro gives no readings any more, or none that are a direction."
+                 : "For a while a gyro gave no readings, or none that are a direction; it was not used there.",
+          is_off ? "Look for why it is off; calibrate the part of the pass before." : "Look for why it was off."};
+}
+
+/// Of a calibration or a navigation with so many gyros. `without_pair`: what the loss of a gyro means where it leaves
+/// no pair.
 void judge_gyros(const Pass& pass, const std::vector<GyroEvent>& gyro_events, int gyros, const char* without_pair,
                  std::vector<Finding>& findings) {
   const std::vector<GyroEvent> lost = losses(gyro_events, pass.gyro.t.back());
@@ -184,15 +211,8 @@ void judge_gyros(const Pass& pass, const std::vector<GyroEvent>& gyro_events, in
   add_events(GyroState::kIsolated, FindingCode::kGyroIsolated,
              "A gyro alone did not agree with the rest, time after time, and was left out.",
              "Look at its telemetry from there on. Its estimates are those of before.");
-  const bool is_off = std::ranges::all_of(gyro_events, [&](const GyroEvent& event) {
-    return event.state != GyroState::kStuck || is_silent(pass.gyro, event);
-  });
-  add_events(GyroState::kStuck, FindingCode::kGyroStuck,
-             is_off ? "A gyro gives no readings any more, or none that are a direction."
-                    : "Readings of a gyro, or one component of them, stood still, not even moved by noise; they were "
-                      "not used.",
-             is_off ? "Look for why it is off; calibrate the part of the pass before."
-                    : "Look at the telemetry there: a frozen readout, or the last value repeated in a gap.");
+  const TextAndCure stuck = of_stuck(pass.gyro, gyro_events, lost);
+  add_events(GyroState::kStuck, FindingCode::kGyroStuck, stuck.text, stuck.cure);
   add_events(GyroState::kLeapt, FindingCode::kGyroLeapt,
              "Readings of a gyro leapt farther than a body turns from one sample to the next; they were not used until "
              "they were back, or for an hour.",

@@ -514,15 +514,33 @@ TEST(Verdict, FindsAGyroThatStoodStill) {
   EXPECT_TRUE(verdict.trustworthy);
 }
 
-TEST(Verdict, TellsAGyroThatGivesNoReadingsFromOneThatStandsStill) {
+TEST(Verdict, TellsAGyroThatGivesNoReadingsFromOneThatStandsStillByTheReadingThere) {
+  using std::chrono::hours;
+  constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
   auto run = good_run();
   auto pass = good_pass();
-  run.gyro_events = {{pass.gyro.t.back() - std::chrono::hours(1), 1, GyroState::kStuck}};
-  EXPECT_THAT(judge(pass, run).findings.at(0).text, HasSubstr("stood still"));
-  for (const double value : {0.0, std::numeric_limits<double>::quiet_NaN()}) {
-    std::fill_n(pass.gyro.h.begin() + 9, 3, value);  // of gyro 2 at the last sample
-    EXPECT_THAT(judge(pass, run).findings.at(0).text, HasSubstr("gives no readings any more"));
+  const Time begin = pass.gyro.t.front();
+  pass.gyro.t = {begin, begin + hours(1), begin + hours(2), begin + hours(3)};
+  pass.gyro.h.assign(24, 1 / std::sqrt(3.0));
+  const auto put = [&](std::size_t sample, double value) {  // of gyro 2
+    std::fill_n(pass.gyro.h.begin() + static_cast<std::ptrdiff_t>(6 * sample + 3), 3, value);
+  };
+  const auto text = [&] { return judge(pass, run).findings.at(0).text; };
+  run.gyro_events = {{pass.gyro.t[2], 1, GyroState::kStuck}};
+  EXPECT_THAT(text(), HasSubstr("stood still"));
+  put(3, kNaN);  // what comes after it is another matter
+  EXPECT_THAT(text(), HasSubstr("stood still"));
+  for (const double value : {0.0, 0.3, kNaN}) {
+    put(2, value);
+    EXPECT_THAT(text(), HasSubstr("gives no readings any more"));
   }
+  put(3, 1 / std::sqrt(3.0));  // that it did not move does not make a reading of none
+  EXPECT_THAT(text(), HasSubstr("gives no readings any more"));
+  run.gyro_events.push_back({pass.gyro.t[3], 1, GyroState::kUsed});
+  EXPECT_THAT(text(), HasSubstr("For a while a gyro gave no readings"));
+  run.gyro_events.insert(run.gyro_events.begin(),
+                         {{pass.gyro.t[0], 0, GyroState::kStuck}, {pass.gyro.t[1], 0, GyroState::kUsed}});
+  EXPECT_THAT(text(), HasSubstr("At some times readings of a gyro"));
 }
 
 TEST(Verdict, FindsReadingsThatScatterOtherwiseThanTold) {
