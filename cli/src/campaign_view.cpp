@@ -277,11 +277,7 @@ std::string campaign_text(const CampaignPlan& plan, const CampaignSummary& summa
 ordered_json campaign_json(const CampaignPlan& plan, const CampaignSummary& summary, const std::string& command) {
   ordered_json findings = ordered_json::array();
   for (const campaign::CampaignFinding& finding : summary.campaign_findings) {
-    findings.push_back({{"code", finding.code},
-                        {"severity", kFindingSeverities[static_cast<std::size_t>(finding.severity)].name},
-                        {"text", finding.text},
-                        {"evidence", finding.evidence},
-                        {"cure", finding.cure}});
+    findings.push_back(finding_json(finding.code, finding.text, finding.evidence, finding.cure, finding.severity));
   }
   ordered_json parameters = ordered_json::object();
   for (const campaign::ParameterErrors& its : summary.parameters) {

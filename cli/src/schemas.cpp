@@ -7,6 +7,8 @@
 #include <utility>
 #include <vector>
 
+#include "trihedron/records/finding.hpp"
+
 namespace trihedron::cli {
 namespace {
 
@@ -141,7 +143,19 @@ Json extension() {
   return object({{"corrections", array(pair)}, {"factor", number()}, {"is_lower_bound?", flag()}});
 }
 
-Json findings() { return array(object({{"code", text()}, {"text", text()}, {"evidence", text()}, {"cure", text()}})); }
+/// The names of kFindingSeverities.
+Json severity() {
+  Json names = Json::array();
+  for (const FindingSeverityRow& row : kFindingSeverities) {
+    names.push_back(row.name);
+  }
+  return {{"enum", names}};
+}
+
+Json findings() {
+  return array(
+      object({{"code", text()}, {"text", text()}, {"evidence", text()}, {"cure", text()}, {"severity", severity()}}));
+}
 
 Json verdict() { return object({{"trustworthy", flag()}, {"findings", findings()}}); }
 
@@ -287,8 +301,6 @@ Json import_output() {
 }
 
 Json campaign_output() {
-  const Json finding =
-      object({{"code", text()}, {"severity", text()}, {"text", text()}, {"evidence", text()}, {"cure", text()}});
   Json consistency = object({{"runs", count()},
                              {"mean", number()},
                              {"degrees_of_freedom", number()},
@@ -326,7 +338,7 @@ Json campaign_output() {
                  {"runs", count()},
                  {"trustworthy", flag()},
                  {"outcomes", outcomes},
-                 {"findings", array(finding)},
+                 {"findings", findings()},
                  {"findings_of_runs", by_name(count())},
                  {"reasons_of_failures", by_name(count())},
                  {"nees", consistency},

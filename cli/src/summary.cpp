@@ -468,13 +468,15 @@ nlohmann::ordered_json clocks_json(const std::optional<Clocks>& clocks, const Pa
   return json;
 }
 
+nlohmann::ordered_json finding_json(std::string_view code, const std::string& text, const std::string& evidence,
+                                    const std::string& cure, FindingSeverity severity) {
+  return {{"code", code}, {"text", text}, {"evidence", evidence}, {"cure", cure}, {"severity", name_of(severity)}};
+}
+
 nlohmann::ordered_json findings_json(const std::vector<Finding>& findings) {
   nlohmann::ordered_json json = nlohmann::ordered_json::array();
   for (const Finding& finding : findings) {
-    json.push_back({{"code", name_of(finding.code)},
-                    {"text", finding.text},
-                    {"evidence", finding.evidence},
-                    {"cure", finding.cure}});
+    json.push_back(finding_json(name_of(finding.code), finding.text, finding.evidence, finding.cure, finding.severity));
   }
   return json;
 }

@@ -7,11 +7,13 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "trihedron/ground/calibrate/several_passes.hpp"
 #include "trihedron/ground/evaluate/calibration_evaluation.hpp"
 #include "trihedron/io/pass.hpp"
+#include "trihedron/records/finding.hpp"
 #include "trihedron/records/run.hpp"
 
 namespace trihedron::cli {
@@ -48,6 +50,10 @@ namespace trihedron::cli {
 [[nodiscard]] nlohmann::ordered_json pass_json(const io::LoadedPass& loaded);
 /// null where the pass does not show its clocks.
 [[nodiscard]] nlohmann::ordered_json clocks_json(const std::optional<Clocks>& clocks, const Pass& pass);
+/// A finding, with the keys that it has in every output and in calibration.json.
+[[nodiscard]] nlohmann::ordered_json finding_json(std::string_view code, const std::string& text,
+                                                  const std::string& evidence, const std::string& cure,
+                                                  FindingSeverity severity);
 [[nodiscard]] nlohmann::ordered_json findings_json(const std::vector<Finding>& findings);
 /// Whether a need is met, how long the usual limit is kept, s; null where nothing is predicted.
 [[nodiscard]] nlohmann::ordered_json readiness_json(const std::optional<OpenLoopForecast>& forecast);

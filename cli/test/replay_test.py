@@ -110,6 +110,7 @@ def test_json_is_one_object_and_quiet_is_quiet(minutes, tmp_path):
     told = json.loads(result.stdout)
     assert told["mode"] == "calibrating" and told["faults"] == [] and told["adoptions"] == 0
     assert told["attitudes"] == len(attitude_of(tmp_path / "a.csv"))
+    assert [(its["code"], its["severity"]) for its in told["verdict"]["findings"]] == [("not-adopted", "do-not-use")]
     assert told["calls"]["count"] > 3800 and 0 < told["calls"]["p50_s"] <= told["calls"]["p99_s"] <= told["calls"]["longest_s"]
     assert run("--quiet", "replay", minutes, "--speed", "max").stdout == ""
 

@@ -326,12 +326,11 @@ Finding parse_finding(const JsonNode& node) {
 }
 
 Json finding_json(const Finding& finding) {
-  const auto* const severity = std::ranges::find(kFindingSeverities, finding.severity, &FindingSeverityRow::severity);
   return {{"code", name_of(finding.code)},
           {"text", finding.text},
           {"evidence", finding.evidence},
           {"cure", finding.cure},
-          {"severity", severity->name}};
+          {"severity", name_of(finding.severity)}};
 }
 
 Json gyro_json(const GyroCalibration& gyro, Time epoch) {

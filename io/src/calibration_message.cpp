@@ -296,8 +296,7 @@ class AcmWriter {
     std::vector<std::string_view> severities;
     for (const Finding& finding : calibration_.verdict.findings) {
       findings.push_back(name_of(finding.code));
-      severities.push_back(
-          std::ranges::find(kFindingSeverities, finding.severity, &FindingSeverityRow::severity)->name);
+      severities.push_back(name_of(finding.severity));
     }
     if (!findings.empty()) {
       user("FINDINGS", fmt::format("{}", fmt::join(findings, " ")));

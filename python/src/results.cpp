@@ -9,7 +9,6 @@
 #include <nanobind/stl/tuple.h>
 #include <nanobind/stl/vector.h>
 
-#include <algorithm>
 #include <string>
 #include <tuple>
 #include <utility>
@@ -30,10 +29,7 @@ namespace {
 /// Of an array whose owner is another than the object that it is a property of.
 constexpr auto kOwned = nb::rv_policy::reference;
 
-std::string severity_of(const Finding& finding) {
-  const auto* const row = std::ranges::find(kFindingSeverities, finding.severity, &FindingSeverityRow::severity);
-  return std::string(row->name);
-}
+std::string severity_of(const Finding& finding) { return std::string(name_of(finding.severity)); }
 
 std::vector<std::string> names_of(const std::vector<ParameterId>& parameters) {
   std::vector<std::string> names;

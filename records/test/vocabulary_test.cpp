@@ -59,6 +59,13 @@ TEST(Vocabulary, AFindingIsAsSevereAsItsCodeUnlessToldOtherwise) {
   EXPECT_EQ((Finding{FindingCode::kTooFewFixes, "", "", "", FindingSeverity::kNote}.severity), FindingSeverity::kNote);
 }
 
+TEST(Vocabulary, SeveritiesHaveTheNamesOfTheirTable) {
+  for (const FindingSeverityRow& row : kFindingSeverities) {
+    EXPECT_EQ(name_of(row.severity), row.name);
+  }
+  EXPECT_EQ(name_of(FindingSeverity::kDoNotUse), "do-not-use");
+}
+
 TEST(Vocabulary, DriftModelsComeBackFromTheirNames) {
   for (const DriftModelId& model : all_drift_models()) {
     EXPECT_EQ(drift_model_named(name_of(model)), model) << name_of(model);

@@ -89,6 +89,11 @@ inline constexpr std::array<FindingSeverityRow, 3> kFindingSeverities = {{{Findi
                                                                           {FindingSeverity::kWarning, "warning"},
                                                                           {FindingSeverity::kDoNotUse, "do-not-use"}}};
 
+/// Its name in the table.
+[[nodiscard]] constexpr std::string_view name_of(FindingSeverity severity) {
+  return kFindingSeverities[static_cast<std::size_t>(severity)].name;
+}
+
 /// A finding, its name and its usual severity.
 struct FindingRow {
   FindingCode code;
