@@ -249,6 +249,7 @@ struct ReplayResult {
   Verdict verdict;
   std::optional<Calibration> calibration;  ///< nothing where no fix could be used
   std::uint64_t attitudes = 0;
+  ground::NotTaken not_taken;
   const ground::Timing& timing;
   const Keeper& keeper;
 };
@@ -277,6 +278,9 @@ nlohmann::ordered_json result_json(const ReplayResult& result) {
       {"samples_rejected", record.samples_rejected},
       {"fixes_used", record.fixes_used},
       {"fixes_rejected", record.fixes_rejected},
+      {"samples_not_taken", result.not_taken.samples},
+      {"fixes_not_taken", result.not_taken.fixes},
+      {"commands_not_taken", result.not_taken.commands},
       {"attitudes", result.attitudes},
       {"snapshots", result.keeper.snapshots()},
       {"calls", durations_json(result.timing.calls)},
@@ -297,6 +301,9 @@ std::string result_text(const ReplayResult& result, const ReplayRequest& request
   fmt::format_to(out, "Samples     {} used, {} thinned, {} rejected\n", record.samples_used, record.samples_thinned,
                  record.samples_rejected);
   fmt::format_to(out, "Fixes       {} used, {} rejected\n", record.fixes_used, record.fixes_rejected);
+  const ground::NotTaken& not_taken = result.not_taken;
+  fmt::format_to(out, "Not taken   {} samples, {} fixes, {} commands\n", not_taken.samples, not_taken.fixes,
+                 not_taken.commands);
   fmt::format_to(out, "Call        {}\n", percentiles_text(result.timing.calls));
   if (result.timing.late.count() > 0) {
     fmt::format_to(out, "Late        {}\n", percentiles_text(result.timing.late));
@@ -425,8 +432,9 @@ ExitStatus replay_pass(const ReplayRequest& request, const Common& common) {
   if (calibration && !request.files.calibration.empty()) {
     io::write_calibration(request.files.calibration, *calibration);
   }
-  const ReplayResult result{loaded, replay.housekeeping(), replay.verdict(), calibration, replay.attitudes(), timing,
-                            keeper};
+  const ReplayResult result{
+      loaded, replay.housekeeping(), replay.verdict(), calibration, replay.attitudes(), replay.not_taken(), timing,
+      keeper};
   log_verdict(common.log, result.verdict);
   show(
       beside_attitude, [&] { return result_json(result); }, [&] { return result_text(result, request); });

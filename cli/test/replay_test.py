@@ -115,6 +115,34 @@ def test_json_is_one_object_and_quiet_is_quiet(minutes, tmp_path):
     assert run("--quiet", "replay", minutes, "--speed", "max").stdout == ""
 
 
+def test_an_application_that_has_failed_is_not_to_be_used(tmp_path):
+    """It navigates by the calibration from the first hour on; five minutes before the end the second gyro stands still."""
+    (tmp_path / "scenario.toml").write_text('[scenario]\nseed = 5\nduration = "80min"\n[gyro]\nperiod = "250ms"\n[gyro.drift]\noutside_sigma = "0rad/s"\n')
+    assert run("--quiet", "simulate", tmp_path / "scenario.toml", "-o", tmp_path / "pass").returncode == TRUSTWORTHY
+    options = ("--speed", "max", *SOON)
+    good = json.loads(run("--json", "replay", tmp_path / "pass", *options).stdout)
+    assert good["verdict"]["trustworthy"] and good["samples_not_taken"] == 0 and good["commands_not_taken"] == 0
+    assert good["samples_used"] + good["samples_thinned"] + good["samples_rejected"] == good["pass"]["gyro_samples"]
+    assert good["fixes_used"] + good["fixes_rejected"] + good["fixes_not_taken"] == good["pass"]["fixes"]
+    samples = tmp_path / "pass" / "gyro.csv"
+    header, *lines = samples.read_text().splitlines()
+    still = lines[-1200].split(",")[4:]
+    samples.write_text("\n".join([header, *lines[:-1200], *(",".join(line.split(",")[:4] + still) for line in lines[-1200:])]) + "\n")
+    result = run("--json", "replay", tmp_path / "pass", *options)
+    assert result.returncode == DO_NOT_USE, result.stderr
+    told = json.loads(result.stdout)
+    assert told["mode"] == "failed" and told["adoptions"] == 1
+    assert not told["verdict"]["trustworthy"]
+    finding, = told["verdict"]["findings"]
+    assert (finding["code"], finding["severity"]) == ("application-failed", "do-not-use")
+    assert 75.9 < float(re.search(r"failed at ([\d.]+) min", finding["text"]).group(1)) < 76.2 and "gyro 2 stuck" in finding["evidence"]
+    assert 900 < told["samples_not_taken"] < 970 and told["fixes_not_taken"] > 50
+    result = run("replay", tmp_path / "pass", *options)
+    assert result.returncode == DO_NOT_USE
+    assert "DO NOT USE" in result.stdout and "application-failed" in result.stdout
+    assert re.search(rf"^Not taken   {told['samples_not_taken']} samples, {told['fixes_not_taken']} fixes, 0 commands$", result.stdout, re.MULTILINE)
+
+
 def test_data_on_standard_output_leave_the_lines_to_standard_error(minutes, tmp_path):
     run("--quiet", "replay", minutes, "--speed", "max", "-o", tmp_path / "a.csv")
     piped = run("replay", minutes, "--speed", "max", "-o", "-")

@@ -15,6 +15,7 @@
 #include "trihedron/ground/model/setup_error.hpp"
 #include "trihedron/ground/onboard/events.hpp"
 #include "trihedron/ground/onboard/recorder.hpp"
+#include "trihedron/records/status.hpp"
 
 namespace trihedron::ground {
 namespace detail {
@@ -36,6 +37,8 @@ class FlownApplication {
   [[nodiscard]] virtual Mode mode() const = 0;
   [[nodiscard]] virtual Housekeeping housekeeping() const = 0;
   [[nodiscard]] virtual std::optional<Calibration> calibration() const = 0;
+  [[nodiscard]] virtual Verdict verdict() const = 0;
+  [[nodiscard]] virtual NotTaken not_taken() const = 0;
   [[nodiscard]] virtual std::uint64_t attitudes() const = 0;
   [[nodiscard]] virtual std::size_t snapshots_size() const = 0;
   virtual Saved save(std::span<std::byte> memory, const ConfirmedOutput& output) = 0;
@@ -120,10 +123,41 @@ std::string_view reason_of(Answer answer) {
   }
 }
 
-Verdict verdict_of(const Housekeeping& record) {
+/// What is left of `given` where so many have been dealt with.
+std::uint64_t left_of(std::uint64_t given, std::uint64_t dealt_with) { return given - std::min(given, dealt_with); }
+
+NotTaken not_taken_of(const Housekeeping& record, const Events::Position& given) {
+  const auto sum = [](auto... counts) { return (std::uint64_t{counts} + ...); };
+  return {left_of(given.samples, sum(record.samples_used, record.samples_thinned, record.samples_rejected)),
+          left_of(given.fixes[0], sum(record.fixes_used, record.fixes_rejected)), record.commands_refused};
+}
+
+/// Why, by the record: the application does not look at anything once it has failed.
+std::string reason_of_failure(const Housekeeping& record, int gyros) {
+  std::string text;
+  for (int k = 0; k < gyros; ++k) {
+    if (const auto state = static_cast<GyroState>(record.gyros[k]); state != GyroState::kUsed) {
+      text += fmt::format("gyro {} {}; ", k + 1, name_of(state));
+    }
+  }
+  return text + fmt::format("the last sample {}", name_of(static_cast<SampleStatus>(record.last_sample)));
+}
+
+Verdict verdict_of(const Housekeeping& record, const Parameters& parameters, Time epoch, const NotTaken& not_taken) {
   Verdict verdict;
-  verdict.trustworthy = record.adopted != 0;
-  if (!verdict.trustworthy) {
+  const bool has_failed = static_cast<Mode>(record.mode) == Mode::kFailed;
+  verdict.trustworthy = record.adopted != 0 && !has_failed;
+  if (has_failed) {
+    verdict.findings.push_back(
+        {FindingCode::kApplicationFailed,
+         fmt::format("The on-board application failed at {:.1f} min: it had been without attitude for longer than "
+                     "{:.3g} s. From then on it took no input.",
+                     to_seconds(Time(Duration(record.time_ns)) - epoch) / 60,
+                     to_seconds(Duration(parameters.failed_after_ns))),
+         fmt::format("{}; not taken: {} samples, {} fixes",
+                     reason_of_failure(record, static_cast<int>(parameters.gyros)), not_taken.samples, not_taken.fixes),
+         "Look at the readings of the gyros before that time; on board only the command reset leads on from here."});
+  } else if (!verdict.trustworthy) {
     verdict.findings.push_back(
         {FindingCode::kNotAdopted, "The on-board application navigates without this calibration.",
          fmt::format("adopted {} times, taken back {} times; {}", record.adoptions, record.withdrawals,
@@ -143,7 +177,7 @@ class FlownAs final : public detail::FlownApplication {
   using Resumed = ApplicationReplay::Resumed;
   using Store = SnapshotStore<State<Application>>;
 
-  FlownAs(const Pass& pass, const Parameters& parameters) : pass_(pass), events_(pass, 1) {
+  FlownAs(const Pass& pass, const Parameters& parameters) : pass_(pass), parameters_(parameters), events_(pass, 1) {
     state_->ground.replay = mark_of(pass, parameters);
     if (const Answer answer = application().load(parameters); answer != Answer::kAccepted) {
       throw SetupError(std::string(reason_of(answer)), "correct settings and requirements");
@@ -191,9 +225,15 @@ class FlownAs final : public detail::FlownApplication {
       calibration.noise->star_tracker_noise_rad = noise_rad;
     }
     state_->ground.fixes.put_into(calibration.statistics);
-    calibration.verdict = verdict_of(housekeeping());
+    calibration.verdict = verdict();
     return calibration;
   }
+
+  [[nodiscard]] Verdict verdict() const override {
+    return verdict_of(housekeeping(), parameters_, pass_.settings.epoch, not_taken());
+  }
+
+  [[nodiscard]] NotTaken not_taken() const override { return not_taken_of(housekeeping(), state_->ground.position); }
 
   [[nodiscard]] std::uint64_t attitudes() const override { return state_->ground.attitudes; }
 
@@ -235,6 +275,7 @@ class FlownAs final : public detail::FlownApplication {
   [[nodiscard]] const Layout& layout() const { return application().on_board().estimator().layout(); }
 
   const Pass& pass_;
+  Parameters parameters_;
   Events events_;
   ZeroedState<State<Application>> state_;
   Step step_;
@@ -258,7 +299,8 @@ std::optional<Time> ApplicationReplay::next_t() const { return flown_->next_t();
 const ApplicationReplay::Step& ApplicationReplay::feed() { return flown_->feed(); }
 Mode ApplicationReplay::mode() const { return flown_->mode(); }
 Housekeeping ApplicationReplay::housekeeping() const { return flown_->housekeeping(); }
-Verdict ApplicationReplay::verdict() const { return verdict_of(housekeeping()); }
+Verdict ApplicationReplay::verdict() const { return flown_->verdict(); }
+NotTaken ApplicationReplay::not_taken() const { return flown_->not_taken(); }
 std::optional<Calibration> ApplicationReplay::calibration() const { return flown_->calibration(); }
 std::uint64_t ApplicationReplay::attitudes() const { return flown_->attitudes(); }
 std::size_t ApplicationReplay::snapshots_size() const { return flown_->snapshots_size(); }

@@ -1,8 +1,10 @@
 #include "trihedron/ground/application/application_replay.hpp"
 
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <chrono>
 #include <cstring>
 #include <functional>
@@ -301,6 +303,86 @@ TEST(ApplicationReplay, TakesThreeGyros) {
   EXPECT_EQ(flown.calibration.gyros.size(), 3U);
   EXPECT_GT(flown.attitude.size(), 4000U);
   EXPECT_TRUE(flown.calibration.verdict.has(FindingCode::kNotAdopted));
+}
+
+TEST(ApplicationReplay, OfAnApplicationThatTakesEverythingHasNothingNotTaken) {
+  ApplicationReplay replay(two_hours().pass, table_of(two_hours().pass));
+  Flown flown;
+  fly(replay, flown);
+  EXPECT_TRUE(replay.verdict().trustworthy);
+  EXPECT_TRUE(replay.verdict().findings.empty());
+  EXPECT_EQ(replay.not_taken().samples, 0U);
+  EXPECT_EQ(replay.not_taken().fixes,
+            two_hours().pass.star_tracker.size() - flown.record.fixes_used - flown.record.fixes_rejected);
+  EXPECT_LE(replay.not_taken().fixes, 1U);  // the last one waits for samples
+  EXPECT_EQ(replay.not_taken().commands, 0U);
+}
+
+TEST(ApplicationReplay, OfAnApplicationThatHasFailedIsNotTrustworthyAndSaysWhenAndWhy) {
+  Pass pass = two_hours().pass;
+  const std::size_t lost = pass.gyro.size() - pass.gyro.size() / 24;  // for five minutes, after the adoption
+  for (std::size_t i = lost; i < pass.gyro.size(); ++i) {
+    std::copy_n(pass.gyro.h.begin() + static_cast<std::ptrdiff_t>(6 * lost + 3), 3,
+                pass.gyro.h.begin() + static_cast<std::ptrdiff_t>(6 * i + 3));
+  }
+  ApplicationReplay replay(pass, table_of(pass));
+  std::optional<Time> failed;
+  while (replay.next_t()) {
+    const ApplicationReplay::Step& step = replay.feed();
+    if (!failed && replay.mode() == Mode::kFailed) {
+      failed = step.report.t;
+    }
+  }
+  ASSERT_TRUE(failed.has_value());
+  const Housekeeping record = replay.housekeeping();
+  EXPECT_EQ(record.adopted, 1);
+  const Verdict verdict = replay.verdict();
+  EXPECT_FALSE(verdict.trustworthy);
+  ASSERT_EQ(verdict.findings.size(), 1U);
+  const Finding& finding = verdict.findings[0];
+  EXPECT_EQ(finding.code, FindingCode::kApplicationFailed);
+  EXPECT_EQ(finding.severity, FindingSeverity::kDoNotUse);
+  EXPECT_THAT(finding.text,
+              testing::HasSubstr(fmt::format("failed at {:.1f} min", to_seconds(*failed - pass.settings.epoch) / 60)));
+  EXPECT_THAT(finding.evidence, testing::StartsWith("gyro 2 stuck; the last sample "));
+  // All after that time, a minute and a little after the loss; fixes that waited then as well.
+  const auto after = [&](const std::vector<Time>& t) {
+    return static_cast<std::uint64_t>(t.end() - std::ranges::upper_bound(t, *failed));
+  };
+  EXPECT_NEAR(to_seconds(*failed - pass.gyro.t[lost]), 60, 3);
+  EXPECT_EQ(replay.not_taken().samples, after(pass.gyro.t));
+  EXPECT_GE(replay.not_taken().fixes, after(pass.star_tracker.t));
+  EXPECT_LE(replay.not_taken().fixes, after(pass.star_tracker.t) + 2);
+  ASSERT_TRUE(replay.calibration().has_value());
+  EXPECT_FALSE(replay.calibration()->verdict.trustworthy);
+  EXPECT_TRUE(replay.calibration()->verdict.has(FindingCode::kApplicationFailed));
+}
+
+TEST(ApplicationReplay, ThatHasFailedAfterASnapshotSaysTheSame) {
+  Pass pass = two_hours().pass;
+  std::fill(pass.gyro.h.begin() + 6000, pass.gyro.h.end(), 0.0);  // no readings after two minutes
+  ApplicationReplay whole_replay(pass, table_of(pass));
+  std::vector<std::byte> memory(whole_replay.snapshots_size());
+  for (int fed = 0; whole_replay.next_t(); ++fed) {
+    if (fed == 10000) {
+      ASSERT_EQ(whole_replay.mode(), Mode::kFailed);
+      static_cast<void>(whole_replay.save(memory, {}));
+    }
+    static_cast<void>(whole_replay.feed());
+  }
+  ApplicationReplay replay(pass, table_of(pass));
+  ASSERT_TRUE(replay.resume(memory).is_of_this_replay);
+  while (replay.next_t()) {
+    static_cast<void>(replay.feed());
+  }
+  const Verdict verdict = replay.verdict();
+  ASSERT_EQ(verdict.findings.size(), 1U);  // it does not navigate, with this calibration or without
+  EXPECT_EQ(verdict.findings[0].code, FindingCode::kApplicationFailed);
+  EXPECT_EQ(verdict.findings[0].text, whole_replay.verdict().findings.at(0).text);
+  EXPECT_EQ(verdict.findings[0].evidence, whole_replay.verdict().findings.at(0).evidence);
+  EXPECT_GT(replay.not_taken().samples, 50000U);
+  EXPECT_EQ(replay.not_taken().samples, whole_replay.not_taken().samples);
+  EXPECT_EQ(replay.not_taken().fixes, whole_replay.not_taken().fixes);
 }
 
 TEST(ParametersOfAPass, RefuseWhatTheTableHasNoRoomFor) {

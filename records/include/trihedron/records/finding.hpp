@@ -72,6 +72,7 @@ enum class FindingCode : std::uint8_t {
   kCoefficientsMoved,
   kPassNotTrustworthy,
   kNotAdopted,
+  kApplicationFailed,
   kNeedNotMet,
   kDriftNotExplained,
   kOther,  ///< of a file, from a program that knows more
@@ -160,6 +161,7 @@ inline constexpr auto kFindings = std::to_array<FindingRow>({
     {FindingCode::kCoefficientsMoved, "coefficients-moved", FindingSeverity::kDoNotUse},
     {FindingCode::kPassNotTrustworthy, "pass-not-trustworthy", FindingSeverity::kDoNotUse},
     {FindingCode::kNotAdopted, "not-adopted", FindingSeverity::kDoNotUse},
+    {FindingCode::kApplicationFailed, "application-failed", FindingSeverity::kDoNotUse},
     {FindingCode::kNeedNotMet, "need-not-met", FindingSeverity::kDoNotUse},
     {FindingCode::kDriftNotExplained, "drift-not-explained", FindingSeverity::kWarning},
     {FindingCode::kOther, "other", FindingSeverity::kWarning},

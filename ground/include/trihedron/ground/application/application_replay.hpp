@@ -27,6 +27,13 @@ struct ConfirmedOutput {
   std::uint32_t is_kept = 0;  ///< 1: there is an output
 };
 
+/// Inputs that the application was given and has done nothing with.
+struct NotTaken {
+  std::uint64_t samples = 0;   ///< it had failed
+  std::uint64_t fixes = 0;     ///< of a mode that looks at none; lost to a jump of the clock; still waiting for samples
+  std::uint64_t commands = 0;  ///< refused
+};
+
 /// A PairApplication or TrioApplication, by the number of gyros. What it gives depends on nothing but the pass and the
 /// parameters, bit for bit: not on when it was broken off and carried on.
 class ApplicationReplay {
@@ -53,8 +60,11 @@ class ApplicationReplay {
 
   [[nodiscard]] Mode mode() const;
   [[nodiscard]] Housekeeping housekeeping() const;
-  /// That of the application itself: trustworthy where it has adopted the calibration.
+  /// That of the application itself: trustworthy where it has adopted the calibration and has not failed. Where it has
+  /// failed, the finding says when and why.
   [[nodiscard]] Verdict verdict() const;
+  /// Of the events fed since the beginning of the pass.
+  [[nodiscard]] NotTaken not_taken() const;
   /// As of the latest sample: values, covariance, statistics of the fixes, verdict. Nothing before the first fix.
   [[nodiscard]] std::optional<Calibration> calibration() const;
   /// Attitudes delivered since the beginning of the pass.
