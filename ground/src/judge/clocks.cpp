@@ -18,6 +18,8 @@ constexpr double kTooMuchChange_s = 0.05;
 /// … and so is a gyro that is late against another.
 constexpr double kSeenLate_s = 2e-3;
 constexpr double kTooLate_s = 0.01;
+/// Both clocks of a pair are off that of the star tracker by more than this: which of them is right is not told.
+constexpr double kNoneAlike_s = 5e-3;
 /// In orbital motion such stamps move a reading by the noise of the paper's gyros.
 constexpr double kTooScattered_s = 0.01;
 
@@ -72,6 +74,25 @@ void judge_late_gyros(const PassSettings& settings, const Clocks& clocks, const 
                     "of gyro {}: "
                     "latency_s = {:.5f}.",
                     k + 1, prior.latency_s + late_s[k]));
+  }
+}
+
+/// Of the gyros of a pair one is late against the other, and that one against the star tracker: of three clocks no two
+/// agree. `late_s`: of which 0 is not there; `offset_s`: of the star tracker against the gyro that is not late.
+bool do_no_two_agree(const PassSettings& settings, const PerGyro<double>& late_s, double offset_s) {
+  return settings.gyros.size() == 2 && std::abs(offset_s) > kNoneAlike_s &&
+         std::max(std::abs(late_s[0]), std::abs(late_s[1])) > kNoneAlike_s;
+}
+
+/// `before`: findings that there were before those of the late gyros.
+void forbid_late_gyros(std::vector<Finding>& findings, std::size_t before, double offset_s) {
+  for (std::size_t i = before; i < findings.size(); ++i) {
+    findings[i].severity = Finding::Severity::kDoNotUse;
+    findings[i].text +=
+        " The clock of the star tracker agrees with neither of the two: which gyro is stamped wrongly, the "
+        "pass does not tell.";
+    findings[i].evidence += fmt::format("; fixes hold the attitude {} after their stamp", offset_text(offset_s));
+    findings[i].cure = "Find out which of the three clocks is right before any is corrected. " + findings[i].cure;
   }
 }
 
@@ -172,9 +193,14 @@ void judge_clocks(const Pass& pass, const CalibrationRun& run, std::vector<Findi
     judge_step(pass, *run.clocks->step, is_wrong ? Finding::Severity::kDoNotUse : Finding::Severity::kWarning,
                "; the estimates take it for constant", findings);
   }
+  const Measured& middle = run.clocks->mid_offset_s;
+  const std::size_t before = findings.size();
   judge_late_gyros(pass.settings, *run.clocks, correction.late_s, findings, Finding::Severity::kWarning,
                    "; the calibration has interpolated them");
-  const Measured& middle = run.clocks->mid_offset_s;
+  const double found_s = offset_s != 0 ? offset_s : middle.is_sure(kSigmasToTell) ? middle.value : 0;
+  if (do_no_two_agree(pass.settings, correction.late_s, found_s)) {
+    forbid_late_gyros(findings, before, found_s);
+  }
   if (!corrected && middle.is_sure(kSigmasToTell) && std::abs(middle.value) > kTooFar_s) {
     add(findings, FindingCode::kClocksApart, Finding::Severity::kDoNotUse,
         fmt::format(
@@ -231,6 +257,10 @@ void judge_clocks(const Pass& pass, const NavigationRun& run, std::vector<Findin
                    ", which is in the attitude");
   for (std::size_t i = before; corrected && i < findings.size(); ++i) {
     findings[i].cure = kCureAfterCorrection;
+  }
+  const double found_s = middle.is_sure(kSigmasToTell) ? middle.value : 0;
+  if (do_no_two_agree(pass.settings, late_s, found_s)) {
+    forbid_late_gyros(findings, before, found_s);
   }
 }
 

@@ -359,6 +359,14 @@ TEST(Navigate, TellsOfClocksThatAreApart) {
   const Verdict late = verdict_with(0, 0, 0.02);
   expect_finding(late, FindingCode::kGyroLate, "latency_s = 0.0");
   EXPECT_FALSE(late.trustworthy);
+  const auto severity_of_late = [](const Verdict& verdict) {
+    const auto found = std::ranges::find(verdict.findings, FindingCode::kGyroLate, &Finding::code);
+    return found == verdict.findings.end() ? FindingSeverity::kNote : found->severity;
+  };
+  EXPECT_EQ(severity_of_late(verdict_with(0, 0, 0.008)), FindingSeverity::kWarning);
+  const Verdict apart = verdict_with(0.03, 0, 0.008);  // from either gyro by 20 ms and more
+  expect_finding(apart, FindingCode::kGyroLate, "which of the three clocks");
+  EXPECT_EQ(severity_of_late(apart), FindingSeverity::kDoNotUse);
 }
 
 /// An open loop over the next hour with what a calibration of the hours before found; `latency_s` of the star tracker

@@ -596,6 +596,41 @@ TEST(Verdict, FindsStampsOfGyrosThatScatter) {
   EXPECT_TRUE(verdict.trustworthy);
 }
 
+TEST(Verdict, ForbidsAPairOfWhichNoClockAgreesWithAnother) {
+  auto pass = good_pass();
+  pass.settings.gyros.resize(2);
+  const auto with_clocks = [&](double late_s, double offset_s) {
+    auto run = good_run();
+    run.clocks.emplace().late_s[1] = {late_s, 1e-4};
+    run.clocks->mid_offset_s = {offset_s, 1e-4};
+    run.clock_correction.late_s[1] = late_s;
+    run.calibration.further = {{parameter("clock_offset_s"), offset_s, 1e-4}};
+    return run;
+  };
+  const auto late_of = [&](const Verdict& verdict) {
+    const auto found = std::ranges::find(verdict.findings, FindingCode::kGyroLate, &Finding::code);
+    return found == verdict.findings.end() ? Finding{} : *found;
+  };
+  for (const double sign : {1.0, -1.0}) {
+    const Finding finding = late_of(judge(pass, with_clocks(sign * 0.006, -0.006)));
+    EXPECT_EQ(finding.severity, FindingSeverity::kDoNotUse);
+    EXPECT_THAT(finding.text, HasSubstr("agrees with neither"));
+    EXPECT_THAT(finding.evidence, HasSubstr("-6.00 ms after their stamp"));
+    EXPECT_THAT(finding.cure, HasSubstr("latency_s = "));
+  }
+  // One of the two agrees with the star tracker, or nearly.
+  EXPECT_EQ(late_of(judge(pass, with_clocks(0.006, 0.004))).severity, FindingSeverity::kWarning);
+  EXPECT_EQ(late_of(judge(pass, with_clocks(0.004, 0.006))).severity, FindingSeverity::kWarning);
+  EXPECT_EQ(late_of(judge(pass, with_clocks(0.02, 0))).severity, FindingSeverity::kWarning);
+  // Without a state of the offset that of the clocks tells it.
+  auto run = with_clocks(0.006, 0.006);
+  run.calibration.further.clear();
+  EXPECT_EQ(late_of(judge(pass, run)).severity, FindingSeverity::kDoNotUse);
+  // A third gyro tells which of the others is late.
+  pass.settings.gyros.resize(3);
+  EXPECT_EQ(late_of(judge(pass, run)).severity, FindingSeverity::kWarning);
+}
+
 TEST(Verdict, NamesTheOneGyroThatTheLastFixesContradict) {
   // So many of the last fixes, and by how many sigmas they contradict each of three gyros.
   const auto with_end = [](std::size_t count, std::array<double, 3> sigmas) {
