@@ -51,6 +51,19 @@ std::vector<ColumnName> parse_header(std::string_view line) {
   return names;
 }
 
+/// Whether the fields of the first line are numbers, or empty: a row in place of the names.
+bool is_row_of_numbers(std::span<const ColumnName> header) {
+  const auto is_empty = [](const ColumnName& column) { return column.name.empty(); };
+  const auto is_number = [](const ColumnName& column) {
+    const std::string field = column.name + '\n';
+    double value = 0;
+    const char* end = parse_field(field.data(), field.data() + field.size(), value);
+    return !column.name.empty() && end == field.data() + column.name.size();
+  };
+  return std::ranges::any_of(header, is_number) &&
+         std::ranges::all_of(header, [&](const ColumnName& column) { return is_empty(column) || is_number(column); });
+}
+
 /// Says what is wrong with a line that does not hold one number per column.
 [[noreturn]] void refuse_line(const fs::path& file, std::int64_t line_number, std::string_view line,
                               std::span<const ColumnName> header) {
@@ -102,6 +115,10 @@ Series parse_csv(const TextFile& content, const fs::path& file, ChooseRules choo
 
   const std::size_t header_end = std::min(text.find('\n'), text.size());
   const std::vector<ColumnName> header = parse_header(text.substr(0, header_end));
+  if (is_row_of_numbers(header)) {
+    throw InputRefused(file, {1, 1}, "the first line holds numbers, where the names of the columns should be",
+                       fmt::format("put this line before it: {}", header_for(file, choose, header.size())));
+  }
   ColumnPlan plan = plan_columns(file, header, choose);
 
   Series series;

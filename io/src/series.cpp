@@ -43,6 +43,7 @@ int count_gyros(const fs::path& file, std::span<const ColumnName> present) {
 }
 
 const std::vector<std::string> kQuaternion = {"q_x", "q_y", "q_z", "q_w"};
+const std::vector<std::string> kSigmas = {"sigma_x_rad", "sigma_y_rad", "sigma_z_rad"};
 
 }  // namespace
 
@@ -87,9 +88,8 @@ ColumnRules truth_columns(const fs::path& file, std::span<const ColumnName> pres
 
 ColumnRules attitude_columns(const fs::path& /*file*/, std::span<const ColumnName> present) {
   ColumnRules rules{kQuaternion, {"age_s"}, true};
-  const std::vector<std::string> sigmas = {"sigma_x_rad", "sigma_y_rad", "sigma_z_rad"};
   const std::vector<std::string> rates = {"rate_x_rad_s", "rate_y_rad_s", "rate_z_rad_s"};
-  for (const std::vector<std::string>* names : {&sigmas, &rates}) {
+  for (const std::vector<std::string>* names : {&kSigmas, &rates}) {
     // All three or none: one alone would be taken for something else.
     const bool any =
         std::ranges::any_of(present, [&](const ColumnName& c) { return std::ranges::count(*names, c.name) > 0; });
@@ -98,6 +98,28 @@ ColumnRules attitude_columns(const fs::path& /*file*/, std::span<const ColumnNam
     }
   }
   return rules;
+}
+
+std::string header_for(const fs::path& file, ChooseRules choose, std::size_t columns) {
+  const auto with = [&](std::span<const std::string> names) {
+    std::vector<ColumnName> present;
+    for (const std::string& name : names) {
+      present.push_back({name, {}});
+    }
+    return choose(file, present).required;
+  };
+  std::vector<std::string> names = with({});
+  std::vector<std::vector<std::string>> more = {kSigmas, covariance_names()};
+  more.emplace_back(covariance_names().begin(), covariance_names().begin() + static_cast<std::ptrdiff_t>(kVariances));
+  for (int gyros = kFewestGyros + 1; gyros <= kMaxGyros; ++gyros) {
+    more.push_back(direction_names(gyros));
+  }
+  for (const std::vector<std::string>& its : more) {
+    if (std::vector<std::string> other = with(its); other.size() + 1 == columns) {
+      names = std::move(other);
+    }
+  }
+  return fmt::format("t_s,{}", fmt::join(names, ","));
 }
 
 ColumnPlan plan_columns(const fs::path& file, std::span<const ColumnName> present, ChooseRules choose) {

@@ -99,6 +99,9 @@ TEST_F(AttitudeCsv, RefusesWhatIsNoCleanSolution) {
   EXPECT_THAT(refusal_of(header + "0,0,0,0.1,1\n"), HasSubstr("a.csv:2: q is not a unit quaternion"));
   EXPECT_THAT(refusal_of(header + "0,0,0,0,1\n1,0,0"), HasSubstr("a.csv:3: the last line is cut short"));
   EXPECT_THAT(refusal_of("t_s,q_x,q_y,q_z\n"), HasSubstr("lacks column \"q_w\""));
+  EXPECT_THAT(refusal_of("0,0,0,0,1\n"), HasSubstr("a.csv:1:1: the first line holds numbers"));
+  EXPECT_THAT(refusal_of("0,0,0,0,1,1e-5,1e-5,1e-5\n"),
+              HasSubstr("put this line before it: t_s,q_x,q_y,q_z,q_w,sigma_x_rad,sigma_y_rad,sigma_z_rad"));
   EXPECT_THAT(refusal_of("t_s,q_x,q_y,q_z,q_w,sigma_x_rad\n"), HasSubstr("lacks column \"sigma_y_rad\""));
   EXPECT_THAT(refusal_of("t_s,q_x,q_y,q_z,q_w,sigma_x_rad,sigma_y_rad,sigma_z_rad\n0,0,0,0,1,1,-1,1\n"),
               HasSubstr("a.csv:2: a sigma is not positive"));

@@ -94,6 +94,31 @@ TEST_F(PassCsv, EmptyAndNanFieldsAreMissingValues) {
   EXPECT_TRUE(std::isnan(loaded.pass.gyro.direction(3, 1).z()));
 }
 
+TEST_F(PassCsv, RefusesATableWithoutItsLineOfNamesAndGivesIt) {
+  const auto without_names = [](const std::string& table) { return table.substr(table.find('\n') + 1); };
+  EXPECT_THAT(refusal_with("gyro.csv", without_names(gyro_)),
+              EndsWith("gyro.csv:1:1: the first line holds numbers, where the names of the columns should be; put this "
+                       "line before it: t_s,h1_x,h1_y,h1_z,h2_x,h2_y,h2_z"));
+  clean_pass().save_directory(directory_.path());
+  EXPECT_THAT(refusal_with("star_tracker.csv", without_names(fixes_)),
+              EndsWith("star_tracker.csv:1:1: the first line holds numbers, where the names of the columns should be; "
+                       "put this line before it: t_s,q_x,q_y,q_z,q_w"));
+  // As many columns as it has.
+  EXPECT_THAT(refusal_with("star_tracker.csv", "0,0,0,0,1,1e-10,1e-10,1e-9\n"),
+              EndsWith("it: t_s,q_x,q_y,q_z,q_w,cov_xx_rad2,cov_yy_rad2,cov_zz_rad2"));
+  EXPECT_THAT(refusal_with("star_tracker.csv", "0,0,0,0,1,1e-10,1e-10,1e-9,0,0,0\n"),
+              EndsWith("cov_zz_rad2,cov_xy_rad2,cov_xz_rad2,cov_yz_rad2"));
+  clean_pass().save_directory(directory_.path());
+  EXPECT_THAT(refusal_with("gyro.csv", "0,1,0,0,0,1,0,0,0,1\n"), EndsWith("h2_z,h3_x,h3_y,h3_z"));
+  EXPECT_THAT(refusal_with("gyro.csv", "0,1,0,0,0,1,0,0,0,1,1,0,0\n"), EndsWith("h3_z,h4_x,h4_y,h4_z"));
+  EXPECT_THAT(refusal_with("gyro.csv", "0,1,0\n"), EndsWith("it: t_s,h1_x,h1_y,h1_z,h2_x,h2_y,h2_z"));
+  // Values that are missing are no names.
+  EXPECT_THAT(refusal_with("gyro.csv", "\xEF\xBB\xBF 0, nan,,,+0,1e-3, -1 \r\n"), HasSubstr("holds numbers"));
+  // A name beside numbers is an unknown column, and a line of nothing has none.
+  EXPECT_THAT(refusal_with("gyro.csv", "t_s,1,0,0,0,1,0\n"), HasSubstr("column \"1\" is not known"));
+  EXPECT_THAT(refusal_with("gyro.csv", ",,,,,,\n"), HasSubstr("column \"\" is not known"));
+}
+
 TEST_F(PassCsv, RefusesMissingFilesNamingThem) {
   EXPECT_THAT(refusal([] { static_cast<void>(read_pass("no-such-pass")); }),
               HasSubstr("no-such-pass: there is no such file or directory; give a pass"));
