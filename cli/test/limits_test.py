@@ -60,7 +60,7 @@ def test_numbers_that_are_no_measurements_are_refused_with_their_bounds(edited, 
 
 
 @pytest.mark.parametrize("told, words", [
-    ("12.5", ("gyro.csv", "has a row every 0.125 s", "is 12.5 s", "set period_s = 0.125")),
+    ("12.5", ("gyro.csv", "has a row every 0.125 s", "pass.toml is 12.5 s", "set period_s = 0.125 there")),
     ("0.000125", ("gyro.csv", "the times t_s look like milliseconds")),
 ])
 def test_a_period_that_the_samples_do_not_have_is_refused(edited, told, words):

@@ -15,9 +15,10 @@ namespace trihedron::io {
 /// Settings and tables as the format holds them, before any screening.
 struct UnscreenedPass {
   PassSettings settings;
-  Series gyro;                        ///< columns h1_x, h1_y, h1_z, h2_x …
-  std::vector<Series> star_trackers;  ///< columns q_x, q_y, q_z, q_w, covariances; the first head, then the rest
-  std::filesystem::path prior_file;   ///< that the settings name; empty where they name none
+  std::filesystem::path settings_file;  ///< that holds them, for messages
+  Series gyro;                          ///< columns h1_x, h1_y, h1_z, h2_x …
+  std::vector<Series> star_trackers;    ///< columns q_x, q_y, q_z, q_w, covariances; the first head, then the rest
+  std::filesystem::path prior_file;     ///< that the settings name; empty where they name none
   // Of telemetry.toml alone.
   std::vector<Defect> left_out{};                ///< rows that its flags and sigmas have taken out
   Selection selection{};                         ///< that it asks for

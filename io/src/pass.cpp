@@ -334,11 +334,11 @@ LoadedPass screened(UnscreenedPass raw, const fs::path& path, const Selection& s
   raw.selection.to = selection.to ? selection.to : raw.selection.to;
   raw.selection.exclude.insert(raw.selection.exclude.end(), selection.exclude.begin(), selection.exclude.end());
   select(raw, path, loaded.defects);
-  loaded.pass.gyro = screen_gyro(std::move(raw.gyro), raw.settings, loaded.defects);
+  loaded.pass.gyro = screen_gyro(std::move(raw.gyro), raw.settings, raw.settings_file, loaded.defects);
   for (std::size_t head = 0; head < raw.star_trackers.size(); ++head) {
     StarTrackerTelemetry& fixes =
         head == 0 ? loaded.pass.star_tracker : loaded.pass.further_star_trackers.emplace_back();
-    fixes = screen_star_tracker(std::move(raw.star_trackers[head]), raw.settings, loaded.defects);
+    fixes = screen_star_tracker(std::move(raw.star_trackers[head]), raw.settings, raw.settings_file, loaded.defects);
   }
   loaded.pass.settings = std::move(raw.settings);
   ClockCorrection gyros;
@@ -367,6 +367,7 @@ UnscreenedPass read_raw_directory(const fs::path& directory) {
   Series gyro = read_csv(directory / kGyroFile, gyro_columns);
   UnscreenedPass raw;
   raw.settings = parse_pass_toml(settings.text(), settings_file, directory, gyros_of(gyro));
+  raw.settings_file = settings_file;
   raw.prior_file = parse_prior_file(settings.text(), settings_file, directory);
   raw.gyro = std::move(gyro);
   for (std::size_t head = 0; head <= raw.settings.further_star_trackers.size(); ++head) {
@@ -384,6 +385,7 @@ UnscreenedPass read_raw_netcdf(const fs::path& file) {
   raw.gyro = reader.read_group(kGyroGroup, epoch, gyro_columns);
   raw.settings =
       parse_pass_toml(settings_text, inside(file, kSettingsAttribute), file.parent_path(), gyros_of(raw.gyro));
+  raw.settings_file = inside(file, kSettingsAttribute);
   raw.prior_file = parse_prior_file(settings_text, inside(file, kSettingsAttribute), file.parent_path());
   for (std::size_t head = 0; head <= raw.settings.further_star_trackers.size(); ++head) {
     raw.star_trackers.push_back(reader.read_group(star_tracker_name(head), epoch, star_tracker_columns));
@@ -450,6 +452,7 @@ PassSettings parse_settings(const std::string& settings, const std::string& prio
 LoadedPass screened(PassInMemory tables, const Selection& selection) {
   UnscreenedPass raw;
   raw.settings = parse_settings(tables.settings, tables.prior, tables.name, tables.gyros);
+  raw.settings_file = inside(tables.name, kSettingsAttribute);
   const std::size_t heads = 1 + raw.settings.further_star_trackers.size();
   if (tables.star_trackers.size() != heads) {
     throw InputRefused(

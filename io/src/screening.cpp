@@ -134,7 +134,8 @@ std::string_view unit_mistaken(double factor) {
 
 /// Refuses a table that does not fit the period that it is told to have. Gaps and dropouts do not matter, be they most
 /// of the pass: it is refused where hardly any step is as short as twice that period, or few are as long as half of it.
-void check_period(const Series& series, const std::vector<Time>& t, Duration told, std::string_view section) {
+void check_period(const Series& series, const std::vector<Time>& t, Duration told, std::string_view section,
+                  const std::filesystem::path& settings_file) {
   constexpr std::size_t kLeastSteps = 20;
   constexpr double kFactor = 2;
   constexpr double kHardlyAny = 0.01;
@@ -156,10 +157,11 @@ void check_period(const Series& series, const std::vector<Time>& t, Duration tol
     return;
   }
   const double measured_s = step_at(0.5);
-  throw InputRefused(series.file, {},
-                     fmt::format("{} has a row every {:g} s, and period_s in [{}] of the settings is {:g} s: {}",
-                                 series.name, measured_s, section, told_s, unit_mistaken(told_s / measured_s)),
-                     fmt::format("both are in seconds: set period_s = {:g}, or correct t_s", measured_s));
+  throw InputRefused(
+      series.file, {},
+      fmt::format("{} has a row every {:g} s, and period_s in [{}] of {} is {:g} s: {}", series.name, measured_s,
+                  section, settings_file.string(), told_s, unit_mistaken(told_s / measured_s)),
+      fmt::format("both are in seconds: set period_s = {:g} there, or correct t_s", measured_s));
 }
 
 /// Leaves the rows that stay, in place.
@@ -322,7 +324,8 @@ std::vector<std::size_t> longest_increasing(const std::vector<Time>& t, std::vec
   return longest;
 }
 
-GyroTelemetry screen_gyro(Series series, const PassSettings& settings, std::vector<Defect>& defects) {
+GyroTelemetry screen_gyro(Series series, const PassSettings& settings, const std::filesystem::path& settings_file,
+                          std::vector<Defect>& defects) {
   Kept kept = keep_increasing(series, settings, settings.gyro_period, defects);
   if (kept.t.empty()) {
     throw InputRefused(series.file, {}, fmt::format("{} has no samples with a time inside the pass", series.name),
@@ -332,7 +335,7 @@ GyroTelemetry screen_gyro(Series series, const PassSettings& settings, std::vect
     throw InputRefused(series.file, {}, fmt::format("{} covers less than a minute", series.name),
                        "give a longer pass: nothing can be calibrated");
   }
-  check_period(series, kept.t, settings.gyro_period, "gyro");
+  check_period(series, kept.t, settings.gyro_period, "gyro", settings_file);
   const std::size_t gyros = series.columns.size() / 3;
   for (std::size_t gyro = 0; gyro < gyros; ++gyro) {
     screen_one_gyro(series, kept, gyro, defects);
@@ -341,9 +344,10 @@ GyroTelemetry screen_gyro(Series series, const PassSettings& settings, std::vect
   return {static_cast<int>(gyros), std::move(kept.t), std::move(series.values)};
 }
 
-StarTrackerTelemetry screen_star_tracker(Series series, const PassSettings& settings, std::vector<Defect>& defects) {
+StarTrackerTelemetry screen_star_tracker(Series series, const PassSettings& settings,
+                                         const std::filesystem::path& settings_file, std::vector<Defect>& defects) {
   Kept kept = keep_increasing(series, settings, settings.star_tracker_period, defects);
-  check_period(series, kept.t, settings.star_tracker_period, "star_tracker");
+  check_period(series, kept.t, settings.star_tracker_period, "star_tracker", settings_file);
   NormTallies norms(series, series.name);
   Tally flips(series, Defect::Kind::kSignFlip, series.name);
   Tally without(series, Defect::Kind::kNoCovariance, series.name);

@@ -12,11 +12,14 @@ namespace trihedron::io {
 inline constexpr Duration kShortestPass = std::chrono::minutes(1);
 
 /// Gyro rows (columns h1_x, h1_y, …) with increasing times; appends the defects found. Throws InputRefused when nothing
-/// can be done with them: no sample, less than a minute, a gyro without one usable direction.
-[[nodiscard]] GyroTelemetry screen_gyro(Series series, const PassSettings& settings, std::vector<Defect>& defects);
+/// can be done with them: no sample, less than a minute, another period than that of the settings, a gyro without one
+/// usable direction. `settings_file`: where the settings stand, for that message.
+[[nodiscard]] GyroTelemetry screen_gyro(Series series, const PassSettings& settings,
+                                        const std::filesystem::path& settings_file, std::vector<Defect>& defects);
 
 /// Fixes (columns q_x, q_y, q_z, q_w), likewise. Throws InputRefused when not one is usable.
 [[nodiscard]] StarTrackerTelemetry screen_star_tracker(Series series, const PassSettings& settings,
+                                                       const std::filesystem::path& settings_file,
                                                        std::vector<Defect>& defects);
 
 /// The rows that can stay so that times strictly increase, as many as possible; of equal times the first. `rows` index

@@ -417,6 +417,7 @@ UnscreenedPass read_raw_telemetry(const fs::path& file, const ReadColumns& other
   const TelemetryMap& map = told.map;
   UnscreenedPass raw;
   raw.settings = std::move(told.settings);
+  raw.settings_file = file;
   raw.prior_file = std::move(told.prior_file);
   raw.selection.from = map.from;
   raw.selection.to = map.to;

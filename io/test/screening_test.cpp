@@ -46,13 +46,15 @@ TEST_P(Screening, FindsNothingInACleanPass) { EXPECT_THAT(load().defects, IsEmpt
 TEST_P(Screening, RefusesAPeriodThatTheRowsDoNotHave) {
   const std::string told = raw_.toml;
   raw_.toml = replaced(told, "period_s = 0.5", "period_s = 50");
-  EXPECT_THAT(load_refused(),
-              HasSubstr(gyro_table() + " has a row every 0.5 s, and period_s in [gyro] of the settings is "
-                                       "50 s: one of them is wrong; both are in seconds: set period_s"));
+  const std::string settings = (directory_ / (csv() ? "pass/pass.toml" : "pass.nc:pass_toml")).string();
+  EXPECT_THAT(load_refused(), HasSubstr(gyro_table() + " has a row every 0.5 s, and period_s in [gyro] of " + settings +
+                                        " is 50 s: one of them is wrong; both are in seconds: set period_s = 0.5 "
+                                        "there, or correct t_s"));
   raw_.toml = replaced(told, "period_s = 0.5", "period_s = 0.0005");
   EXPECT_THAT(load_refused(), HasSubstr("the times t_s look like milliseconds"));
   raw_.toml = replaced(told, "period_s = 3", "period_s = 3000");
-  EXPECT_THAT(load_refused(), HasSubstr("in [star_tracker] of the settings is 3000 s: the period looks like millisec"));
+  EXPECT_THAT(load_refused(),
+              HasSubstr("in [star_tracker] of " + settings + " is 3000 s: the period looks like millisec"));
 }
 
 // Half of the samples and most of the fixes are gone.
