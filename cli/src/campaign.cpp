@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <array>
+#include <charconv>
 #include <filesystem>
 #include <memory>
 #include <optional>
@@ -48,10 +49,22 @@ struct CampaignArguments {
   std::string file;
   std::string out;
   bool resume = false;
-  std::optional<std::uint64_t> only;
+  std::optional<std::int64_t> only;  ///< as given; a number below zero is refused with those of the runs
   bool serve = false;
   unsigned jobs = 0;  ///< 0: one per core, in a job of mpirun one per rank
 };
+
+/// A number that is kept as it is given: CLI11 takes one that is too large for the largest.
+CLI::Validator run_number() {
+  return {[](const std::string& text) {
+            std::int64_t value = 0;
+            const char* const end = text.data() + text.size();
+            const auto [next, fault] = std::from_chars(text.data(), end, value);
+            return fault == std::errc() && next == end ? std::string()
+                                                       : fmt::format("{} is not the number of a run", text);
+          },
+          ""};
+}
 
 campaign::SetupOf setups_of(const io::CampaignFile& file) {
   return [&file](std::uint64_t seed, std::span<const double> draws) {
@@ -215,10 +228,11 @@ void stage_flight(io::StagedDirectory& staged, const io::CampaignFile& file, con
 
 ExitStatus replay_run(const io::CampaignFile& file, const CampaignArguments& arguments, const Common& common) {
   const CampaignPlan& plan = file.plan();
-  const std::uint64_t run = *arguments.only;
-  if (run >= plan.runs) {
-    throw io::UsageError(fmt::format("--only {}: the campaign has runs 0 to {}", run, plan.runs - 1));
+  const std::int64_t asked = *arguments.only;
+  if (asked < 0 || static_cast<std::uint64_t>(asked) >= plan.runs) {
+    throw io::UsageError(fmt::format("--only {}: the campaign has runs 0 to {}", asked, plan.runs - 1));
   }
+  const auto run = static_cast<std::uint64_t>(asked);
   std::optional<io::Journal> journal;
   std::optional<io::StagedDirectory> staged;
   const fs::path directory = fs::path(arguments.out) / fmt::format("run-{}", run);
@@ -318,6 +332,7 @@ void add_campaign(CLI::App& program, const Common& common, int& exit_status) {
                           ->add_option("--only", arguments->only,
                                        "Perform this run alone, from 0; with -o into a directory run-N there, with its "
                                        "scenario, pass, calibration and report")
+                          ->check(run_number())
                           ->type_name("NUMBER")
                           ->excludes(resume);
   CLI::Option* jobs =

@@ -386,7 +386,10 @@ def test_wrong_usage(finished, tmp_path):
     campaign = finished / "c.toml"
     refused(run("campaign", campaign), WRONG_USAGE, "-o")
     refused(run("campaign", campaign, "--only", "12"), WRONG_USAGE, "0 to 11")
-    refused(run("campaign", campaign, "--only", "-1"), WRONG_USAGE, "--only")
+    refused(run("campaign", campaign, "--only", "-1"), WRONG_USAGE, "--only -1: the campaign has runs 0 to 11")
+    refused(run("campaign", campaign, "--only", "9223372036854775807"), WRONG_USAGE, "--only 9223372036854775807: the campaign has runs 0 to 11")
+    for no_run in ("9223372036854775808", "18446744073709551615", "-9223372036854775809", "7.5", "seven"):
+        refused(run("campaign", campaign, "--only", no_run), WRONG_USAGE, f"--only: {no_run} is not the number of a run")
     refused(run("campaign", campaign, "-o", tmp_path / "out", "--jobs", "0"), WRONG_USAGE, "--jobs")
     refused(run("campaign", campaign, "-o", tmp_path / "out", "--resume", "--only", "1"), WRONG_USAGE, "--only")
     refused(run("campaign", campaign, "-o", campaign), WRONG_USAGE, "c.toml")
