@@ -40,11 +40,26 @@ std::vector<Eigen::Matrix3Xd> off_navigator(const std::vector<FixRecord>& fixes,
   return off;
 }
 
-/// Less what moves slowly, and without single outliers.
+/// The size that nine tenths of the values of each row do not exceed.
+Eigen::Array3d size_of_nine_tenths(const Eigen::Ref<const Eigen::Matrix3Xd>& values) {
+  Eigen::Array3d result;
+  for (Eigen::Index axis = 0; axis < 3; ++axis) {
+    const Eigen::ArrayXd sizes = values.row(axis).cwiseAbs().transpose();
+    std::vector<double> sorted(sizes.begin(), sizes.end());
+    const auto at = sorted.begin() + static_cast<std::ptrdiff_t>(0.9 * static_cast<double>(sorted.size() - 1));
+    std::ranges::nth_element(sorted, at);
+    result(axis) = *at;
+  }
+  return result;
+}
+
+/// Less what moves slowly, and without single outliers, which are fewer than one fix in ten. The limit is taken from
+/// the larger errors: where two star trackers of other noise give fixes by turns, the median is that of the better one,
+/// and errors of the other would be outliers by it.
 Eigen::Matrix3Xd from_fix_to_fix(const std::vector<Eigen::Matrix3Xd>& off) {
   constexpr Eigen::Index kWindow = ShapeOfErrors::kNeighbours;
-  constexpr double kOutlier = 6;             // standard deviations
-  constexpr double kDeviation_mad = 1.4826;  // of a normal distribution, over the median of the absolute values
+  constexpr double kOutlier = 6;         // standard deviations
+  constexpr double kNineTenths = 1.645;  // of a normal distribution, in standard deviations
   std::vector<double> found;
   for (const Eigen::Matrix3Xd& its : off) {
     for (Eigen::Index i = 0; i + kWindow <= its.cols(); ++i) {
@@ -56,7 +71,7 @@ Eigen::Matrix3Xd from_fix_to_fix(const std::vector<Eigen::Matrix3Xd>& off) {
   if (quick.cols() == 0) {
     return quick;
   }
-  const Eigen::Array3d limit = kOutlier * kDeviation_mad * median(quick.cwiseAbs()).array();
+  const Eigen::Array3d limit = kOutlier / kNineTenths * size_of_nine_tenths(quick);
   Eigen::Index kept = 0;
   for (Eigen::Index i = 0; i < quick.cols(); ++i) {
     if ((quick.col(i).array().abs() <= limit).all()) {

@@ -41,6 +41,26 @@ Eigen::Vector3d heavy_tails(std::mt19937_64& random) {
   return std::bernoulli_distribution(0.05)(random) ? 4 * normal(random) : Eigen::Vector3d::Zero().eval();
 }
 
+/// With normal errors, those of a star tracker that is three times as noisy, at every other fix.
+Draw three_times_by_turns() {
+  return [is_noisy = false](std::mt19937_64& random) mutable {
+    is_noisy = !is_noisy;
+    return is_noisy ? Eigen::Vector3d(std::sqrt(8.0) * normal(random)) : Eigen::Vector3d::Zero().eval();
+  };
+}
+
+Eigen::Vector3d three_times_at_random(std::mt19937_64& random) {
+  return std::bernoulli_distribution(0.5)(random) ? Eigen::Vector3d(std::sqrt(8.0) * normal(random))
+                                                  : Eigen::Vector3d::Zero().eval();
+}
+
+/// One in twenty is off by 20 sigmas about x, to either side.
+Eigen::Vector3d gross(std::mt19937_64& random) {
+  const double side = std::bernoulli_distribution(0.5)(random) ? 1 : -1;
+  return std::bernoulli_distribution(0.05)(random) ? Eigen::Vector3d(side * 20 * kTrackerNoise_rad.x(), 0, 0)
+                                                   : Eigen::Vector3d::Zero().eval();
+}
+
 /// Fixes of four hours, with these errors beside normal ones, and a navigator that moves off by a minute of arc.
 std::vector<FixRecord> fixes_with(const Draw& more, std::uint64_t seed = 1, int count = 4800) {
   std::mt19937_64 random(seed);
@@ -67,6 +87,30 @@ TEST(ShapeOfErrors, OfHeavyTailsThatAreSymmetricIsNone) {
   const ShapeOfErrors shape = shape_of_errors(fixes_with(heavy_tails), 0).value();
   EXPECT_LT(shape.skewness, 4 * shape.skewness_sigma);
   EXPECT_GT(shape.least_kurtosis, -0.1);
+}
+
+// The errors of the noisier one are no outliers, and the mixture is as symmetric as each.
+TEST(ShapeOfErrors, OfTwoNoisesIsNone) {
+  for (const Draw& two_noises : {three_times_by_turns(), Draw(three_times_at_random)}) {
+    for (const std::uint64_t seed : {1U, 2U, 3U}) {
+      const std::vector<FixRecord> fixes = fixes_with(two_noises, seed);
+      const ShapeOfErrors shape = shape_of_errors(fixes, 0).value();
+      // All after the second correction but half a window at either end.
+      EXPECT_EQ(shape.fixes, fixes.size() - 1 - (ShapeOfErrors::kNeighbours - 1));
+      EXPECT_LT(shape.skewness, 4 * shape.skewness_sigma);
+      EXPECT_GT(shape.least_kurtosis, -0.1);
+    }
+  }
+}
+
+TEST(ShapeOfErrors, LeavesOutOutliers) {
+  const ShapeOfErrors without = shape_of_errors(fixes_with(nothing), 0).value();
+  const ShapeOfErrors shape = shape_of_errors(fixes_with(gross), 0).value();
+  const auto count = static_cast<double>(without.fixes);
+  // A binomial of one in twenty, to three of its standard deviations.
+  EXPECT_NEAR(static_cast<double>(shape.fixes), 0.95 * count, 3 * std::sqrt(0.05 * 0.95 * count));
+  EXPECT_LT(shape.skewness, 0.15);
+  EXPECT_GT(shape.least_kurtosis, -0.25);
 }
 
 // E z³ of a mixture that is off by a in a part p: p (1 − p) (1 − 2 p) a³ / σ³, its mean off by p a.
