@@ -208,7 +208,7 @@ void OnBoard<Estimator>::set_clock(Time t, StepReport& report) {
   worked_t_ += shift;
   schedule_.set_clock(shift);
   frozen_fixes_.set_clock(shift);
-  follower_t_ = t;
+  follower_t_ = passed_t_ = t;
   intake_.set_clock(t);
   fixes_dropped_ += fixes_.clear();
   readings_.clear();
@@ -704,8 +704,38 @@ double OnBoard<Estimator>::variance_of_long_step(const Step& step) const {
 template <class Estimator>
 void OnBoard<Estimator>::follow_next_sample() {
   const int next = readings_.size() - behind_;
-  follow(readings_.time(next), readings_.directions(next));
+  if (can_be_passed_over(next)) {
+    passed_t_ = readings_.time(next);
+    schedule_.followed_to(passed_t_);
+  } else {
+    follow(readings_.time(next), readings_.directions(next));
+  }
   --behind_;
+}
+
+/// Whether the step to the sample after this one can be made at once. Over it the readings turn by so little that their
+/// middle is off by 1e-5 rad at most.
+template <class Estimator>
+bool OnBoard<Estimator>::can_be_passed_over(int sample) const {
+  constexpr Duration kLongest = std::chrono::seconds(1);
+  constexpr double kMostTurned_rad = 0.01;
+  if (!policy_.steps_over_samples || !estimator_.started() || sample + 1 >= readings_.size()) {
+    return false;
+  }
+  const Time t = readings_.time(sample);
+  const Time to_t = readings_.time(sample + 1);
+  const Duration gap = estimator_.setup().max_interpolation();
+  if (to_t - follower_t_ > kLongest || t - passed_t_ > gap || to_t - t > gap ||
+      count(intake_.used_over(follower_t_, to_t)) < gyros()) {
+    return false;
+  }
+  const Directions to = readings_.directions(sample + 1);
+  for (int k = 0; k < gyros(); ++k) {
+    if ((to[k] - follower_h_b_[k]).squaredNorm() > kMostTurned_rad * kMostTurned_rad) {
+      return false;
+    }
+  }
+  return true;
 }
 
 /// The estimator to `t`, with the midpoint of the readings.
@@ -718,12 +748,12 @@ void OnBoard<Estimator>::follow(Time t, const Directions& h_b) {
     Step step = this->step(follower_t_, follower_h_b_, t, h_b);
     if (const auto C_in_c = attitude_of(estimator_.gyros(), step)) {
       estimator_.predict(*C_in_c, step.middle, t, step.dt_s());
-      if (t - follower_t_ > estimator_.setup().max_interpolation()) {
+      if (t - passed_t_ > estimator_.setup().max_interpolation()) {
         estimator_.add_direction_variance(variance_of_long_step(step));
       }
     }
   }
-  follower_t_ = t;
+  follower_t_ = passed_t_ = t;
   schedule_.followed_to(t);
   follower_h_b_ = h_b;
 }

@@ -85,6 +85,34 @@ TEST(OnBoard, FixesBetweenSamplesCalibrateAsWellAsFixesOnThem) {
   EXPECT_LT(worst, 0.5 * test::kArcsecond);
 }
 
+TEST(OnBoard, StepsOverSamplesLeadToTheSameEstimates) {
+  for (const double slews_rad : {0.0, 0.1, 0.5}) {
+    const test::Flight flight({.duration_s = 3600, .slews_rad = slews_rad});
+    const test::PairGiven given;
+    const auto flown = [&](bool steps_over_samples) {
+      auto on_board = given.on_board({.steps_over_samples = steps_over_samples});
+      Log log;
+      test::fly(flight, *on_board, std::ref(log));
+      test::flush(*on_board, std::ref(log));
+      return std::pair(std::move(on_board), log.fixes);
+    };
+    const auto [each, fixes] = flown(false);
+    const auto [over, same_fixes] = flown(true);
+    EXPECT_EQ(fixes, same_fixes);
+    const Eigen::VectorXd moved = test::parameter_errors(flight.truth, each->estimator().gyros()) -
+                                  test::parameter_errors(flight.truth, over->estimator().gyros());
+    const Eigen::MatrixXd root =
+        test::error_root(each->estimator()).middleRows(each->estimator().error_layout().drift(0), moved.size());
+    const double in_sigmas = (moved.array() / root.rowwise().norm().array()).abs().maxCoeff();
+    EXPECT_GT(in_sigmas, 0) << slews_rad;  // fewer steps round otherwise
+    EXPECT_LT(in_sigmas, 0.01) << slews_rad;
+    for (int k = 0; k < 2; ++k) {
+      EXPECT_LT(angle_between<double>(each->estimator().gyros()[k].h_in, over->estimator().gyros()[k].h_in),
+                0.01 * test::kArcsecond);
+    }
+  }
+}
+
 TEST(OnBoard, CorrectsTheNavigatorAsOftenAsTold) {
   const test::Flight flight({.duration_s = 1800});
   const auto corrections = [&](const CorrectionPolicy& policy) {

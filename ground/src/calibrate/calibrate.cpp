@@ -304,7 +304,8 @@ CalibrationRun calibrate_as_stamped(const Pass& pass, const CalibrationOptions& 
   flown.direction_random_walk_rad_sqrt_s =
       std::hypot(flown.direction_random_walk_rad_sqrt_s, decision.left_out_walk_rad_sqrt_s);
   const bool is_flown = decision.run && decision.run->is_of(settings, flown);
-  OnBoardRun on_board = is_flown ? *std::move(decision.run) : OnBoardRun{Pipeline(settings, flown), {}};
+  OnBoardRun on_board =
+      is_flown ? *std::move(decision.run) : OnBoardRun{Pipeline(settings, flown, Pipeline::Steps::kOverSamples), {}};
   decision.run.reset();
   Pipeline& pipeline = on_board.pipeline;
   Recorder& recorder = on_board.recorder;

@@ -97,7 +97,7 @@ std::vector<FixRecord> fly_without_contradicted(const Pass& pass, const PassSett
   if (fixes.empty() || static_cast<double>(fixes.size()) > kFew * all) {
     return {};
   }
-  OnBoardRun again{Pipeline(settings, flown), {}};
+  OnBoardRun again{Pipeline(settings, flown, Pipeline::Steps::kOverSamples), {}};
   replay(without(fixes, pass), again.pipeline,
          [&](const StepReport& report) { again.recorder.add(report, again.pipeline); });
   if (!again.pipeline.started() || times_set_free(again) >= set_free) {

@@ -61,13 +61,14 @@ struct Pipeline::Program {
   }
 };
 
-Pipeline::Pipeline(const PassSettings& settings, const CalibrationOptions& options, bool navigate)
+Pipeline::Pipeline(const PassSettings& settings, const CalibrationOptions& options, Steps steps, bool navigate)
     : settings_(settings), options_(options), program_(std::make_unique<Program>()) {
   const CalibrationSetup setup = setup_of(settings, options);
   program_->layout = setup.layout;
   program_->prior = prior_of(settings, setup.layout);
   CorrectionPolicy policy = policy_of(options.corrections);
   policy.navigate = navigate;
+  policy.steps_over_samples = steps == Steps::kOverSamples;
   if (options.estimator == Estimator::kPaper) {
     program_->set_up<Program::Paper>(setup, policy);
   } else {

@@ -38,7 +38,7 @@ Screened screen(const Pass& pass, const CalibrationOptions& asked, bool keep_run
   if (options.estimator == Estimator::kBatch) {
     options.estimator = Estimator::kInvariant;
   }
-  Pipeline pipeline(pass.settings, options, keep_run);
+  Pipeline pipeline(pass.settings, options, Pipeline::Steps::kOverSamples, keep_run);
   Recorder recorder;
   Screened screened{ScreenedPass(pass.gyro, pipeline.layout().gyros), {}, {}};
   replay(pass, pipeline, [&](const StepReport& report) {

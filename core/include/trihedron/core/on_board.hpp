@@ -197,6 +197,7 @@ class OnBoard {
   void navigate(Step& step, typename Navigator<Estimator>::State& state) const;
   void follow(Time t, const Directions& h_b);
   void follow_next_sample();
+  [[nodiscard]] bool can_be_passed_over(int sample) const;
   [[nodiscard]] std::optional<FixReadings> readings_at(Time t) const {
     return readings_.at(t, estimator_.setup(), intake_.health(), estimator_.gyros());
   }
@@ -227,9 +228,10 @@ class OnBoard {
   int slots_left_ = 0;  ///< samples over which the work that there is is to be spread; 0: it is done at once
   Time worked_t_{};     ///< of the last fix, or angles, dealt with
   bool has_worked_ = false;
-  int behind_ = 0;  ///< samples to which the estimator has not yet been taken
-  Time follower_t_{};
+  int behind_ = 0;     ///< samples to which the estimator has not yet been taken
+  Time follower_t_{};  ///< to which the estimator has been predicted
   Directions follower_h_b_;
+  Time passed_t_{};  ///< of the last sample that was followed or passed over
   Time corrected_t_{};
   int fixes_dropped_ = 0;        ///< not yet reported
   bool clock_set_back_ = false;  ///< no sample has been used since

@@ -20,8 +20,12 @@ namespace trihedron::ground {
 /// Everything that it does is in its reports. Its results depend on nothing but the events that it was given.
 class Pipeline {
  public:
+  /// Whether the calibration predicts to each sample, as on board, or may pass over some
+  /// (CorrectionPolicy::steps_over_samples).
+  enum class Steps { kEachSample, kOverSamples };
   /// Needs options in which nothing is left to decide. `navigate`: whether a navigator runs as well. Throws SetupError.
-  Pipeline(const PassSettings& settings, const CalibrationOptions& options, bool navigate = true);
+  Pipeline(const PassSettings& settings, const CalibrationOptions& options, Steps steps = Steps::kEachSample,
+           bool navigate = true);
   Pipeline(Pipeline&&) noexcept;
   Pipeline& operator=(Pipeline&&) noexcept;
   ~Pipeline();
