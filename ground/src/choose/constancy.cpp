@@ -604,14 +604,14 @@ Moves moves_over(const Trial& trial) {
   const Index steps = pass.steps();
   // What may be expected of each, 1-sigma: a case or a head that slips, a good one that creeps or goes to and fro,
   // coefficients that change by a tenth of what is expected of them, the Earth's orbital velocity over that of light
-  // and a spacecraft's, scales as of a first ground calibration.
+  // and a spacecraft's, scales as of a first ground calibration, or of better ones.
   constexpr double kSlips_rad = 60 * kArcsecond;
   constexpr double kCreeps_rad = 5 * kArcsecond;
   constexpr double kPartOfCoefficients = 0.1;
   constexpr double kPolhodeOverChange = 3;  // its states have a prior of 0.3 of that of the coefficients
   constexpr double kAnnual = 6e-5;
   constexpr double kOrbital = 1.5e-5;
-  constexpr double kScale = 1e-3;
+  constexpr double kScales[] = {1e-3, 1e-4, 2e-5, 5e-6};
   constexpr double kFieldLarge_rad = 5 * kArcsecond;
   constexpr double kFieldSmall_rad = kArcsecond;
   const VectorXd member_rms = rms_of_fields();
@@ -755,8 +755,10 @@ Moves moves_over(const Trial& trial) {
              sigmas(kOfMultiple, kCreeps_rad));
   }
   for (int k = 0; k < layout.gyros; ++k) {
-    consider(what(Moving::kReadoutScale, Motion::kPresent, k), shape(pass.readout(k), kOfReadout),
-             sigmas(kOfReadout, kScale));
+    for (const double scale : kScales) {
+      consider(what(Moving::kReadoutScale, Motion::kPresent, k), shape(pass.readout(k), kOfReadout),
+               sigmas(kOfReadout, scale));
+    }
     consider(what(Moving::kGyroCase, Motion::kOrbital, k), shape(pass.case_of(k), kOfCase),
              sigmas(kOfCase, kCreeps_rad));
   }
