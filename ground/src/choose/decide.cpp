@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <functional>
 #include <future>
 #include <iterator>
 #include <limits>
@@ -177,29 +178,81 @@ constexpr double kLogOddsBesideOtherDrift = 10;
 /// ln of the odds of the polhodes of all rotors together from which on they are tried.
 constexpr double kLogOddsOfPolhode = 10;
 
-/// Decides the open choices and the drift model by the evidence of a trial with all states free. `other_drift`: whether
-/// there is drift that no member of the field has.
+/// Log of the odds from which on a state is accepted. A clock that is off costs more where it is left out than where it
+/// is estimated for nothing. `other_drift`: whether there is drift that no member of the field has.
+double enough_for(FurtherState state, bool other_drift) {
+  switch (state) {
+    case FurtherState::kClockOffset:
+      return 0;
+    case FurtherState::kOrbitalError:
+      return other_drift ? kLogOddsBesideOtherDrift : kLogOddsToAccept;
+    default:
+      return kLogOddsToAccept;
+  }
+}
+
+/// Without an offset the stamps would be right at the very epoch.
+void keep_offset_beside_rate(const CalibrationOptions& asked, CalibrationOptions& options) {
+  if (options.further_states.is_on(FurtherState::kClockRate) &&
+      asked.further_states[FurtherState::kClockOffset] == Choice::kAuto) {
+    options.further_states[FurtherState::kClockOffset] = Choice::kOn;
+  }
+}
+
+/// Decides the open choices and the drift model by the evidence of a trial with all states free.
 void settle_states(const Trial& everything, const PassSettings& settings, const CalibrationOptions& asked,
                    bool other_drift, Decision& decision) {
   decision.evidence.clear();
-  const auto settle = [&](std::optional<FurtherState> state, double log_bayes_factor) {
-    const bool looks_alike = other_drift && state == FurtherState::kOrbitalError;
-    const double enough = looks_alike ? kLogOddsBesideOtherDrift : kLogOddsToAccept;
+  const auto settle = [&](std::optional<FurtherState> state, double log_bayes_factor, double enough) {
     decision.evidence.push_back({state, log_bayes_factor, log_bayes_factor > enough});
     return decision.evidence.back().accepted;
   };
   for (const FurtherStateRow& row : kFurtherStates) {
     if (is_judged_by_trial(row) && asked.further_states[row.state] == Choice::kAuto) {
-      const bool on = settle(row.state, everything.log_evidence(row.state));
+      const bool on = settle(row.state, everything.log_evidence(row.state), enough_for(row.state, other_drift));
       decision.options.further_states[row.state] = on ? Choice::kOn : Choice::kOff;
     }
   }
+  keep_offset_beside_rate(asked, decision.options);
   decision.forecasts = everything.forecasts();
   if (!asked.drift_model) {
     const Forecast* best = best_of(decision.forecasts, settings);
-    settle({}, best == nullptr ? 0 : best->log_likelihood - decision.forecasts.front().log_likelihood);
+    settle({}, best == nullptr ? 0 : best->log_likelihood - decision.forecasts.front().log_likelihood,
+           kLogOddsToAccept);
     decision.options.drift_model = best == nullptr ? kEsg7 : best->drift_model;
   }
+}
+
+/// A state that was left out, though there is evidence of it where the others that were left out are zero.
+struct Doubt {
+  FurtherState state;
+  double log_evidence;
+};
+
+/// The likeliest first. States that look alike in a pass hide one another while all are free.
+std::vector<Doubt> doubts_of(const Trial& everything, const CalibrationOptions& asked, bool other_drift,
+                             const CalibrationOptions& decided) {
+  std::vector<FurtherState> left_out;
+  for (const FurtherStateRow& row : kFurtherStates) {
+    if (is_judged_by_trial(row) && asked.further_states[row.state] == Choice::kAuto &&
+        !decided.further_states.is_on(row.state)) {
+      left_out.push_back(row.state);
+    }
+  }
+  std::vector<Doubt> doubts;
+  for (const FurtherState state : left_out) {
+    if (state == FurtherState::kClockRate && !decided.further_states.is_on(FurtherState::kClockOffset)) {
+      continue;
+    }
+    std::vector<FurtherState> others;
+    std::ranges::remove_copy(left_out, std::back_inserter(others), state);
+    const double log_evidence = everything.log_evidence(state, others);
+    if (log_evidence > enough_for(state, other_drift)) {
+      doubts.push_back({state, log_evidence});
+    }
+  }
+  std::ranges::stable_sort(doubts, std::ranges::greater{}, &Doubt::log_evidence);
+  return doubts;
 }
 
 /// The options with every state free that is on or open, and with the largest drift model.
@@ -271,72 +324,81 @@ void compare_with_drift(const Pass& pass, const Screened& screened, const Calibr
   decision.orbital_odds = orbital_odds(Trial(pass, screened, without, {}, &decided));
 }
 
+/// A trial with all states free, and what was found with it.
+struct AllFree {
+  Trial trial;
+  std::optional<NoiseFit> walking;                      ///< the likeliest random walk, where it was looked for
+  std::optional<std::pair<Trial, NoiseFit>> wandering;  ///< with drift that wanders, where that was looked for
+};
+
+/// What was decided, and the trial with it.
+struct Settled {
+  Decision decision;
+  Trial last;
+  NoiseFit noise;
+  bool more_noise = false;  ///< the pass needs more than the settings tell
+  std::vector<Doubt> doubts;
+};
+
 /// The noise is larger than the settings say, so the states were decided with too small a noise. Decides again, with
-/// the noise found while all states are free, and decides whether the drift wanders. `everything`: the trial with all
-/// states free, and the noise found by it, if that was looked for; `walked`, `walk`: the trial with the states decided
-/// first, and the noise found by it. Where the largest drift model with its own noise is likelier than these, it is
-/// kept: noise in place of the members that the smaller one lacks, which act at every orbit alike, would make its
-/// sigmas wrong, though its forecasts are as good.
+/// the noise found while all states are free, and decides whether the drift wanders. Where the largest drift model with
+/// its own noise is likelier than what was settled, it is kept: noise in place of the members that the smaller one
+/// lacks, which act at every orbit alike, would make its sigmas wrong, though its forecasts are as good.
 void decide_again_with_more_noise(const Pass& pass, const Screened& screened, const CalibrationOptions& asked,
-                                  const DriftModelId& largest_model, bool wandering_is_open, Trial everything,
-                                  std::optional<NoiseFit> walking, Trial walked, const NoiseFit& walk,
-                                  const Progress& progress, Decision& decision) {
-  CalibrationOptions& options = decision.options;
+                                  const DriftModelId& largest_model, bool wandering_is_open, AllFree& free,
+                                  Settled& settled) {
+  CalibrationOptions& options = settled.decision.options;
+  const NoiseFit walk = settled.noise;
   const CalibrationOptions all_free = with_everything(options, asked, largest_model);
-  const bool may_wander = wandering_is_open && (!walking || walking->gain > kLogOddsToAccept);
+  const bool may_wander = wandering_is_open && (!free.walking || free.walking->gain > kLogOddsToAccept);
   const CalibrationOptions all_free_wandering = wandering_like(walk, all_free);
   // Waited for only where a walk was accepted; otherwise it does not matter whether the trial failed.
   std::packaged_task<std::pair<Trial, NoiseFit>()> try_wandering([&] {
-    Trial trial(pass, screened, all_free_wandering, {}, &walked);
+    Trial trial(pass, screened, all_free_wandering, {}, &settled.last);
     const NoiseFit likely = with_most_likely_wandering(trial, all_free_wandering);
     return std::pair(std::move(trial), likely);
   });
   side_by_side(
       [&] {
-        if (!walking) {
-          walking = with_most_likely_walk(everything, all_free);
+        if (!free.walking) {
+          free.walking = with_most_likely_walk(free.trial, all_free);
         }
       },
       [&] {
-        if (may_wander) {
+        if (may_wander && !free.wandering) {
           try_wandering();
         }
       });
   std::optional<Evidence> wandering;
-  std::optional<ProcessNoise> wanders;
-  if (may_wander && walking->gain > kLogOddsToAccept) {
-    auto [trial, likely] = try_wandering.get_future().get();
-    const double gain = likely.log_likelihood - walking->log_likelihood;
-    wandering = Evidence{FurtherState::kWanderingDrift, gain, gain > kLogOddsToAccept};
-    if (wandering->accepted) {
-      wanders = likely.noise;
-      everything = std::move(trial);
+  if (may_wander && free.walking->gain > kLogOddsToAccept) {
+    if (!free.wandering) {
+      free.wandering = try_wandering.get_future().get();
     }
+    const double gain = free.wandering->second.log_likelihood - free.walking->log_likelihood;
+    wandering = Evidence{FurtherState::kWanderingDrift, gain, gain > kLogOddsToAccept};
   }
-  settle_states(everything, pass.settings, asked, asked.drift_field, decision);
-  if (!asked.drift_model && walking->log_likelihood > walk.log_likelihood + kLogOddsToAccept) {
+  const bool wanders = wandering && wandering->accepted;
+  const Trial& everything = wanders ? free.wandering->first : free.trial;
+  settle_states(everything, pass.settings, asked, asked.drift_field, settled.decision);
+  settled.doubts = doubts_of(everything, asked, asked.drift_field, options);
+  if (!asked.drift_model && free.walking->log_likelihood > walk.log_likelihood + kLogOddsToAccept) {
     options.drift_model = largest_model;
   }
-  NoiseFit likely = walk;
   if (wanders) {
-    use_wandering(*wanders, options);
-    walked = Trial(pass, screened, options, wanders, &everything);
-    likely = with_most_likely_wandering_near(walked, options);
-    use_wandering(likely.noise, options);
+    const ProcessNoise& noise = free.wandering->second.noise;
+    use_wandering(noise, options);
+    settled.last = Trial(pass, screened, options, noise, &everything);
+    settled.noise = with_most_likely_wandering_near(settled.last, options);
+    use_wandering(settled.noise.noise, options);
   } else {
-    if (!has_states_of(walked, pass.settings, options)) {
-      walked = Trial(pass, screened, options, walking->noise, &everything);
-      likely = with_most_likely_walk(walked, options);
+    if (!has_states_of(settled.last, pass.settings, options)) {
+      settled.last = Trial(pass, screened, options, free.walking->noise, &everything);
+      settled.noise = with_most_likely_walk(settled.last, options);
     }
-    use_walk(likely.noise, options);
+    use_walk(settled.noise.noise, options);
   }
-  decision.log_likelihood = likely.log_likelihood;
-  keep_field(walked, decision);
-  decision.nearby = walked.nearby();
-  decision.use(moves_over(walked));
-  compare_with_drift(pass, screened, asked, walked, true, progress, decision);
   if (wandering) {
-    decision.evidence.push_back(*wandering);
+    settled.decision.evidence.push_back(*wandering);
   }
 }
 
@@ -368,6 +430,61 @@ ByEq1 try_eq1(const Pass& pass, const Screened& screened, const CalibrationOptio
   return found;
 }
 
+/// Decides states, drift model and noise, on a pass by which the noise can be found. `undecided`: the options with what
+/// is known before.
+Settled settle_with_noise(const Pass& pass, const Screened& screened, const CalibrationOptions& asked,
+                          const DriftModelId& largest_model, bool wandering_is_open,
+                          const CalibrationOptions& undecided, AllFree& free, const Progress& progress) {
+  Decision decision;
+  decision.options = undecided;
+  settle_states(free.trial, pass.settings, asked, false, decision);
+  begin_stage(progress, "finds the noise");
+  const std::optional<ProcessNoise> noise = free.walking ? std::optional(free.walking->noise) : std::nullopt;
+  Trial trial(pass, screened, decision.options, noise, &free.trial);
+  const NoiseFit walk = with_most_likely_walk(trial, decision.options);
+  Settled settled{std::move(decision), std::move(trial), walk, walk.gain > kLogOddsToAccept, {}};
+  if (settled.more_noise) {
+    begin_stage(progress, "decides again with more noise");
+    decide_again_with_more_noise(pass, screened, asked, largest_model, wandering_is_open, free, settled);
+  } else {
+    settled.doubts = doubts_of(free.trial, asked, false, settled.decision.options);
+    use_walk(walk.noise, settled.decision.options);
+  }
+  settled.decision.log_likelihood = settled.noise.log_likelihood;
+  return settled;
+}
+
+/// Settles the states in doubt: one after the other is taken in where the whole pass, with the noise that is then the
+/// likeliest, is by so much likelier with it.
+Settled without_doubt(const Pass& pass, const Screened& screened, CalibrationOptions asked,
+                      const DriftModelId& largest_model, bool wandering_is_open, CalibrationOptions undecided,
+                      AllFree& free, const Progress& progress) {
+  Settled settled =
+      settle_with_noise(pass, screened, asked, largest_model, wandering_is_open, undecided, free, progress);
+  std::vector<Evidence> taken_in;
+  for (std::size_t i = 0; i < settled.doubts.size();) {
+    const FurtherState state = settled.doubts[i].state;
+    begin_stage(progress, "looks at what is in doubt");
+    CalibrationOptions with = asked;
+    CalibrationOptions undecided_with = undecided;
+    with.further_states[state] = undecided_with.further_states[state] = Choice::kOn;
+    Settled other =
+        settle_with_noise(pass, screened, with, largest_model, wandering_is_open, undecided_with, free, progress);
+    const double gain = other.decision.log_likelihood - settled.decision.log_likelihood;
+    if (gain > enough_for(state, settled.more_noise && asked.drift_field)) {
+      taken_in.push_back({state, gain, true});
+      settled = std::move(other);
+      asked = with;
+      undecided = undecided_with;
+      i = 0;
+    } else {
+      ++i;
+    }
+  }
+  settled.decision.evidence.insert(settled.decision.evidence.end(), taken_in.begin(), taken_in.end());
+  return settled;
+}
+
 /// Decides by the data of the pass.
 Decision decide_by_pass(const Pass& pass, const Screened& screened, const CalibrationOptions& asked,
                         const DriftModelId& largest_model, const Progress& progress) {
@@ -386,45 +503,34 @@ Decision decide_by_pass(const Pass& pass, const Screened& screened, const Calibr
     noise = by_eq1->walk;
   }
   begin_stage(progress, "decides what is there");
-  Trial everything(pass, screened, with_everything(options, asked, largest_model), noise,
-                   by_eq1 ? &by_eq1->trial : nullptr);
-  const std::vector<Eigen::Vector3d> changes = everything.changes_rad();
+  AllFree free{
+      Trial(pass, screened, with_everything(options, asked, largest_model), noise, by_eq1 ? &by_eq1->trial : nullptr),
+      {},
+      {}};
+  const std::vector<Eigen::Vector3d> changes = free.trial.changes_rad();
   options.find_noise = asked.find_noise && changes.size() >= kLeastFixPairs;
   if (!options.find_noise) {
-    settle_states(everything, pass.settings, asked, false, decision);
-    decision.use(moves_over(everything));
-    decision.nearby = everything.nearby();
+    settle_states(free.trial, pass.settings, asked, false, decision);
+    decision.use(moves_over(free.trial));
+    decision.nearby = free.trial.nearby();
     if (options.drift_field) {
-      keep_field(Trial(pass, screened, options, noise, &everything), decision);
+      keep_field(Trial(pass, screened, options, noise, &free.trial), decision);
     }
     return decision;
   }
   options.star_tracker_noise_rad = other_star_tracker_noise(pass, changes);
   if (options.star_tracker_noise_rad) {
-    everything = Trial(pass, screened, with_everything(options, asked, largest_model), noise, &everything);
+    free.trial = Trial(pass, screened, with_everything(options, asked, largest_model), noise, &free.trial);
   }
-  std::optional<NoiseFit> walking;
   if (noise) {
-    walking = with_most_likely_walk(everything, with_everything(options, asked, largest_model));
-    noise = walking->noise;
+    free.walking = with_most_likely_walk(free.trial, with_everything(options, asked, largest_model));
   }
-  settle_states(everything, pass.settings, asked, false, decision);
-  begin_stage(progress, "finds the noise");
-  Trial decided(pass, screened, options, noise, &everything);
-  const NoiseFit walk = with_most_likely_walk(decided, options);
-  if (walk.gain > kLogOddsToAccept) {
-    begin_stage(progress, "decides again with more noise");
-    decide_again_with_more_noise(pass, screened, asked, largest_model, wandering_is_open, std::move(everything),
-                                 walking, std::move(decided), walk, progress, decision);
-  } else {
-    decision.log_likelihood = walk.log_likelihood;
-    use_walk(walk.noise, options);
-    keep_field(decided, decision);
-    decision.nearby = decided.nearby();
-    decision.use(moves_over(decided));
-    compare_with_drift(pass, screened, asked, decided, false, progress, decision);
-  }
-  return decision;
+  Settled settled = without_doubt(pass, screened, asked, largest_model, wandering_is_open, options, free, progress);
+  keep_field(settled.last, settled.decision);
+  settled.decision.nearby = settled.last.nearby();
+  settled.decision.use(moves_over(settled.last));
+  compare_with_drift(pass, screened, asked, settled.last, settled.more_noise, progress, settled.decision);
+  return std::move(settled.decision);
 }
 
 /// A course by which the coefficients are found to change.

@@ -3,6 +3,8 @@
 #include <fmt/format.h>
 
 #include <Eigen/Cholesky>
+#include <algorithm>
+#include <array>
 #include <chrono>
 #include <cmath>
 #include <limits>
@@ -16,13 +18,26 @@ namespace trihedron::ground {
 namespace {
 
 /// ln of the Bayes factor for states being free instead of zero (Savage and Dickey): the density at zero before the
-/// data over that after. `root`: a square root of their covariance after.
-double log_bayes_factor(const Eigen::VectorXd& estimate, const Eigen::MatrixXd& root,
-                        const Eigen::VectorXd& prior_sigma) {
-  const Eigen::MatrixXd scaled = prior_sigma.cwiseInverse().asDiagonal() * root;
-  const Eigen::LLT<Eigen::MatrixXd> covariance(scaled * scaled.transpose());
-  const Eigen::VectorXd white = covariance.matrixL().solve(estimate.cwiseQuotient(prior_sigma));
-  return white.squaredNorm() / 2 + covariance.matrixLLT().diagonal().array().log().sum();
+/// data over that after; the mean of the factors with priors as wide as they are, a quarter, and a sixteenth of it, so
+/// that a small state has evidence as well. Estimate and covariance in units of the prior sigmas.
+double log_bayes_factor(const Eigen::VectorXd& estimate, const Eigen::MatrixXd& covariance) {
+  constexpr std::array<double, 3> kSizes = {1, 1.0 / 4, 1.0 / 16};
+  const auto identity = Eigen::MatrixXd::Identity(estimate.size(), estimate.size());
+  const Eigen::MatrixXd information = Eigen::LLT<Eigen::MatrixXd>(covariance).solve(identity);
+  const Eigen::VectorXd y = information * estimate;
+  std::array<double, kSizes.size()> log_factors;
+  for (std::size_t i = 0; i < kSizes.size(); ++i) {
+    const double more = 1 / (kSizes[i] * kSizes[i]) - 1;
+    const Eigen::LLT<Eigen::MatrixXd> with_this_prior(information + more * identity);
+    log_factors[i] = y.dot(with_this_prior.solve(y)) / 2 - with_this_prior.matrixLLT().diagonal().array().log().sum() -
+                     static_cast<double>(estimate.size()) * std::log(kSizes[i]);
+  }
+  const double most = *std::ranges::max_element(log_factors);
+  double sum = 0;
+  for (const double log_factor : log_factors) {
+    sum += std::exp(log_factor - most);
+  }
+  return most + std::log(sum / static_cast<double>(kSizes.size()));
 }
 
 /// The models to compare with a model: those that it contains, from the smallest on, and itself.
@@ -196,23 +211,55 @@ std::optional<FieldPrior> Trial::field_prior() const {
                              most_likely_spectrum(*field_, information, spectrum_.log_rms));
 }
 
-double Trial::log_evidence(FurtherState state) const {
+Trial::InPriorSigmas Trial::in_prior_sigmas(const std::vector<FurtherState>& states) const {
   std::vector<int> rows;
   std::vector<double> values;
   std::vector<double> sigmas;
+  InPriorSigmas found;
   const Layout& layout = problem_.layout();
   const CalibrationSetup& setup = problem_.setup().on_board;
   for (const ParameterId& parameter : further_parameters(layout)) {
-    if (parameter.is_further(state)) {
-      rows.push_back(state_of(layout, parameter));
-      values.push_back(value_of(setup.layout, found_.solution.gyros, found_.solution.shared, parameter));
-      sigmas.push_back(prior_sigma_of_further_state(setup, state_of(setup.layout, parameter)));
+    const auto of = std::ranges::find_if(states, [&](FurtherState state) { return parameter.is_further(state); });
+    if (of == states.end()) {
+      continue;
     }
+    if (of == states.begin()) {
+      found.of_first.push_back(static_cast<Eigen::Index>(rows.size()));
+    }
+    rows.push_back(state_of(layout, parameter));
+    values.push_back(value_of(setup.layout, found_.solution.gyros, found_.solution.shared, parameter));
+    sigmas.push_back(prior_sigma_of_further_state(setup, state_of(setup.layout, parameter)));
   }
   const auto vector = [](const std::vector<double>& numbers) {
-    return Eigen::VectorXd(Eigen::VectorXd::Map(numbers.data(), static_cast<Eigen::Index>(numbers.size())));
+    return Eigen::VectorXd::Map(numbers.data(), static_cast<Eigen::Index>(numbers.size()));
   };
-  return log_bayes_factor(vector(values), found_.errors.last_root(rows, Eigen::all), vector(sigmas));
+  const Eigen::VectorXd scale = vector(sigmas).cwiseInverse();
+  found.estimate = vector(values).cwiseProduct(scale);
+  found.root = scale.asDiagonal() * found_.errors.last_root(rows, Eigen::all);
+  return found;
+}
+
+double Trial::log_evidence(FurtherState state, const std::vector<FurtherState>& zero) const {
+  std::vector<FurtherState> states{state};
+  states.insert(states.end(), zero.begin(), zero.end());
+  const InPriorSigmas found = in_prior_sigmas(states);
+  const Eigen::MatrixXd covariance = found.root * found.root.transpose();
+  const std::vector<Eigen::Index>& its = found.of_first;
+  std::vector<Eigen::Index> others;
+  for (Eigen::Index row = 0; row < found.estimate.size(); ++row) {
+    if (std::ranges::find(its, row) == its.end()) {
+      others.push_back(row);
+    }
+  }
+  Eigen::VectorXd estimate = found.estimate(its);
+  Eigen::MatrixXd its_covariance = covariance(its, its);
+  if (!others.empty()) {
+    const Eigen::MatrixXd gain =
+        Eigen::LLT<Eigen::MatrixXd>(covariance(others, others)).solve(covariance(others, its)).transpose();
+    estimate -= gain * found.estimate(others);
+    its_covariance -= gain * covariance(others, its);
+  }
+  return log_bayes_factor(estimate, its_covariance);
 }
 
 std::vector<Forecast> Trial::forecasts() const {

@@ -60,8 +60,9 @@ class Trial {
     return calibration_of(problem_, kappa_and_delta(problem_, found_, field.more_covariance));
   }
 
-  /// ln of the Bayes factor of these states, which the trial must have; not of drift that wanders.
-  [[nodiscard]] double log_evidence(FurtherState state) const;
+  /// ln of the Bayes factor of this state, which the trial must have, where those of `zero` are zero; of no drift that
+  /// wanders.
+  [[nodiscard]] double log_evidence(FurtherState state, const std::vector<FurtherState>& zero = {}) const;
   /// Forecasts by its drift model and those that it contains; none of a field.
   [[nodiscard]] std::vector<Forecast> forecasts() const;
 
@@ -71,6 +72,13 @@ class Trial {
   [[nodiscard]] std::vector<Eigen::Vector3d> changes_rad() const;
 
  private:
+  /// Estimates of further states, and a square root of their covariance, in units of the 1-sigmas of their prior.
+  struct InPriorSigmas {
+    Eigen::VectorXd estimate;
+    Eigen::MatrixXd root;
+    std::vector<Eigen::Index> of_first;  ///< rows of the first of the states
+  };
+  [[nodiscard]] InPriorSigmas in_prior_sigmas(const std::vector<FurtherState>& states) const;
   void fit(PassSolution first, bool is_near);
   void use_modes(Eigen::VectorXd level, PassSolution& solution);
   void put_spectrum_into_prior();

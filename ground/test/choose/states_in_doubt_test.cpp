@@ -1,0 +1,109 @@
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <initializer_list>
+#include <numbers>
+#include <string>
+
+#include "choose/decide.hpp"
+#include "passes.hpp"
+#include "trihedron/ground/calibrate/calibrate.hpp"
+
+namespace trihedron::ground {
+namespace {
+
+using Choice = FurtherStateOptions::Choice;
+
+CalibrationOptions with(std::initializer_list<FurtherState> states) {
+  CalibrationOptions options = told();
+  options.estimator = Estimator::kBatch;
+  for (const FurtherState state : states) {
+    options.further_states[state] = Choice::kOn;
+  }
+  return options;
+}
+
+/// Keys of the further states that were taken in.
+std::string states_of(const CalibrationRun& run) {
+  std::string keys;
+  for (const FurtherStateRow& row : kFurtherStates) {
+    keys += run.options.further_states.is_on(row.state) ? std::string(row.key) + " " : "";
+  }
+  return keys;
+}
+
+/// A body that follows the orbit and turns about its vertical, by half a turn and back again.
+Scenario turning(std::uint64_t seed, Duration duration, int turns = 1) {
+  Scenario scenario = scenario_in_eq1(seed, duration);
+  std::vector<Slew> slews;
+  for (int turn = 1; turn <= turns; ++turn) {
+    slews.push_back(
+        {.begin_s = turn * to_seconds(duration) / (turns + 1), .yaw_rad = turn % 2 == 1 ? std::numbers::pi : 0});
+  }
+  scenario.attitude.slews = slews;
+  return scenario;
+}
+
+TEST(LogEvidence, IsTheGainInTheLikelihoodOfThePass) {
+  const Pass pass = sim::simulate(turning(5, std::chrono::hours(2))).pass;
+  const Screened screened = screen(pass, with({}));
+  const Trial without(pass, screened, with({}));
+  const Trial one(pass, screened, with({FurtherState::kClockOffset}));
+  const double gain = one.log_likelihood() - without.log_likelihood();
+  // Of an offset of nothing that is known far better than its prior: s⁻¹ times the factor by the prior with s of its
+  // sigma, and the mean of three.
+  EXPECT_NEAR(one.log_evidence(FurtherState::kClockOffset), gain + std::log((1 + 4 + 16) / 3.0), 0.05);
+  // The same of a trial that has others, where these are zero.
+  const Trial all(pass, screened,
+                  with({FurtherState::kClockOffset, FurtherState::kClockRate, FurtherState::kOrbitalError,
+                        FurtherState::kReadoutBias}));
+  const double given_others = all.log_evidence(
+      FurtherState::kClockOffset, {FurtherState::kClockRate, FurtherState::kOrbitalError, FurtherState::kReadoutBias});
+  EXPECT_NEAR(given_others, one.log_evidence(FurtherState::kClockOffset), 0.05);
+  EXPECT_GT(std::abs(given_others - all.log_evidence(FurtherState::kClockOffset)), 0.1);
+}
+
+TEST(StatesInDoubt, AreTakenInWhereOthersHidThem) {
+  Scenario scenario = turning(1, std::chrono::hours(6));
+  scenario.star_tracker.clock_offset_s = 0.01;
+  const sim::SimulatedPass simulated = sim::simulate(scenario);
+  const CalibrationRun run = calibrate(simulated.pass, CalibrationOptions());
+  EXPECT_EQ(states_of(run), "clock_offset ");
+  ASSERT_EQ(run.calibration.further.size(), 1U);
+  EXPECT_NEAR(run.calibration.further[0].value, 0.01, 4 * run.calibration.further[0].sigma);
+  EXPECT_LT(nees_of(simulated.truth, run.calibration), 45);  // χ² of 20: once in 900
+}
+
+TEST(StatesInDoubt, ErrorsAtOrbitalPeriodAreFoundBesideDriftOutsideEquation1) {
+  Scenario scenario;
+  scenario.seed = 2;
+  scenario.duration = std::chrono::hours(6);
+  scenario.star_tracker.orbital_sine_rad = Eigen::Vector3d(3, -2, 0) * kArcsecond;
+  scenario.star_tracker.orbital_cosine_rad = Eigen::Vector3d(-1, 2, 2) * kArcsecond;
+  const sim::SimulatedPass simulated = sim::simulate(scenario);
+  const CalibrationRun run = calibrate(simulated.pass, CalibrationOptions());
+  EXPECT_EQ(states_of(run), "orbital_error ");
+  EXPECT_LT(nees_of(simulated.truth, run.calibration), 45);
+}
+
+TEST(StatesInDoubt, StayOutWhereThereIsNothingButDrift) {
+  for (const double markov_rad_s : {0.0, 3e-8}) {
+    Scenario scenario = turning(3, std::chrono::hours(4));
+    for (GyroScenario& gyro : scenario.gyros) {
+      gyro.drift.markov_sigma_rad_s = markov_rad_s;
+    }
+    const CalibrationRun run = calibrate(sim::simulate(scenario).pass, CalibrationOptions());
+    EXPECT_EQ(states_of(run), markov_rad_s > 0 ? "wandering_drift " : "");
+  }
+}
+
+TEST(StatesInDoubt, ARateOfTheClockIsNoStateWithoutAnOffset) {
+  Scenario scenario = turning(4, std::chrono::hours(6), 6);
+  scenario.star_tracker.clock_offset_s = -0.005;
+  scenario.star_tracker.clock_rate = 2e-6;
+  const CalibrationRun run = calibrate(sim::simulate(scenario).pass, CalibrationOptions());
+  EXPECT_EQ(states_of(run), "clock_offset clock_rate ");
+}
+
+}  // namespace
+}  // namespace trihedron::ground
