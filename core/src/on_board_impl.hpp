@@ -160,6 +160,8 @@ StepReport OnBoard<Estimator>::flush() {
     report.t = readings_.latest_t();
     schedule_.no_angles();  // otherwise the fix would wait for them
     calibrate_at_once(std::max(report.t, fixes_.next_t()), report);
+  } else {
+    follow_all_samples();
   }
   return report;
 }
@@ -201,9 +203,7 @@ void OnBoard<Estimator>::set_clock(Time t, StepReport& report) {
     finish(report);
     report.fix.t += shift;
   }
-  while (behind_ > 0) {
-    follow_next_sample();
-  }
+  follow_all_samples();
   corrected_t_ += shift;
   worked_t_ += shift;
   schedule_.set_clock(shift);
@@ -711,6 +711,13 @@ void OnBoard<Estimator>::follow_next_sample() {
     follow(readings_.time(next), readings_.directions(next));
   }
   --behind_;
+}
+
+template <class Estimator>
+void OnBoard<Estimator>::follow_all_samples() {
+  while (behind_ > 0) {
+    follow_next_sample();
+  }
 }
 
 /// Whether the step to the sample after this one can be made at once. Over it the readings turn by so little that their

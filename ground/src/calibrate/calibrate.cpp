@@ -69,8 +69,11 @@ SetupError nothing_used(const std::vector<FixRecord>& fixes) {
   for (const NamedCount& its : named_counts(counts)) {
     what_became += fmt::format("{}{} {}", what_became.empty() ? "" : ", ", its.count, its.name);
   }
+  const bool are_parallel = !fixes.empty() && counts[FixStatus::kRejectedGeometry] == std::ssize(fixes);
   return {fmt::format("no fix could be used to start from ({})", what_became.empty() ? "there is none" : what_became),
-          "look at the telemetry with `trihedron inspect`"};
+          are_parallel ? "two momenta on one line give no attitude: start the rotors along other directions, or take "
+                         "another pair of gyros"
+                       : "look at the telemetry with `trihedron inspect`"};
 }
 
 /// With the variances of the members of a drift field that the pass has determined.
@@ -338,6 +341,7 @@ CalibrationRun calibrate_as_stamped(const Pass& pass, const CalibrationOptions& 
   run.options = decision.options;
   run.evidence = decision.evidence;
   run.orbital_error_over_drift = decision.orbital_error_over_drift;
+  run.field_over_eq1 = decision.field_over_eq1;
   run.changes = decision.changes;
   run.known_before = known_before(settings, decision.options, decision.field);
   const Statistics recorded = run.calibration.statistics;

@@ -892,6 +892,23 @@ void settle_by_estimator(CalibrationOptions& asked) {
   }
 }
 
+/// ln of the odds of drift as a field against eq. (1), each with states and noise as the pass decides with it. Drift
+/// that comes back, and a course of the coefficients, are those that were found with eq. (1).
+double field_over_eq1(const Pass& pass, const Screened& screened, CalibrationOptions asked, const Decision& by_eq1,
+                      const Progress& progress) {
+  for (const FurtherState state :
+       {FurtherState::kOrbitalDrift, FurtherState::kPolhode, FurtherState::kCoefficientChange}) {
+    asked.further_states[state] = by_eq1.options.further_states[state];
+  }
+  asked.further_states.polhodes = by_eq1.options.further_states.polhodes;
+  asked.further_states.change_course = by_eq1.options.further_states.change_course;
+  asked.further_states.change_time = by_eq1.options.further_states.change_time;
+  asked.drift_field = true;
+  asked.drift_model = kLargestDriftModel;
+  asked.estimator = Estimator::kBatch;
+  return decide_by_pass(pass, screened, asked, kLargestDriftModel, progress).log_likelihood - by_eq1.log_likelihood;
+}
+
 /// What was decided with a drift field, for an estimator that has a drift model in its place.
 Decision for_on_board(Decision decided, const Pass& pass, const Screened& screened) {
   const double log_evidence = decided.field->log_evidence;
@@ -1005,6 +1022,10 @@ Decision decide(const Pass& pass, const CalibrationOptions& asked_for, const Pro
     // There are no forecasts where the pass is too short.
     if (!larger || decided.forecasts.empty() ||
         best_of(decided.forecasts, pass.settings) != &decided.forecasts.back()) {
+      if (asked_for.drift_model == kEsg7 && decided.options.find_noise) {
+        begin_stage(progress, "compares the drift model");
+        decided.field_over_eq1 = field_over_eq1(pass, screened, asked, decided, progress);
+      }
       if (pass.settings.gyros.size() == 2) {  // which of more gyros is at fault is judged by the noise found
         decided.screened = std::move(screened);
       }

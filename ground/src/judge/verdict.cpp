@@ -394,7 +394,8 @@ void judge_halves(const CalibrationRun& run, std::vector<Finding>& findings) {
 /// Log of the odds from which on a model counts as wrong against another.
 constexpr double kLogOddsOfWrongModel = 10;
 
-void judge_drift_model(const CalibrationRun& run, std::vector<Finding>& findings) {
+/// By forecasts, where models were compared by them.
+void judge_drift_model_by_forecasts(const CalibrationRun& run, std::vector<Finding>& findings) {
   const auto& models = run.drift_models;
   const auto used = std::ranges::find_if(models, [&](const DriftModelForecast& model) {
     return model.drift_model == run.calibration.gyros[0].drift_model;
@@ -431,6 +432,19 @@ void judge_drift_model(const CalibrationRun& run, std::vector<Finding>& findings
                     name_of(next_smaller.drift_model), used->log_likelihood - next_smaller.log_likelihood,
                     used->open_loop_rms_rad / kArcsecond, next_smaller.open_loop_rms_rad / kArcsecond),
         "Do not trust single coefficients; the forecast error says what the attitude suffers.");
+  }
+}
+
+void judge_drift_model(const CalibrationRun& run, std::vector<Finding>& findings) {
+  judge_drift_model_by_forecasts(run, findings);
+  const double log_odds = run.field_over_eq1.value_or(0);
+  const bool is_told = std::ranges::find(findings, FindingCode::kDriftModelTooSmall, &Finding::code) != findings.end();
+  if (log_odds > kLogOddsOfWrongModel && !is_told) {
+    add(findings, FindingCode::kDriftModelTooSmall,
+        "The gyros drift in a way that eq. (1) does not contain; its coefficients and sigmas, and other states that "
+        "stand for that drift, are wrong.",
+        fmt::format("the pass is more likely with drift as a field by a factor of e^{:.0f}", log_odds),
+        fmt::format("Use drift model {}.", kAutoDriftModel));
   }
 }
 

@@ -105,5 +105,22 @@ TEST(StatesInDoubt, ARateOfTheClockIsNoStateWithoutAnOffset) {
   EXPECT_EQ(states_of(run), "clock_offset clock_rate ");
 }
 
+// In a flight without slews a bias of the readings makes up for drift outside eq. (1), with coefficients far off.
+TEST(DriftModelTold, IsNotToBeUsedWhereThePassHasDriftThatItDoesNotContain) {
+  for (const Estimator estimator : {Estimator::kInvariant, Estimator::kBatch}) {
+    for (const bool outside : {false, true}) {
+      Scenario scenario = turning(6, std::chrono::hours(4), 0);
+      for (GyroScenario& gyro : scenario.gyros) {
+        gyro.drift.outside_sigma_rad_s = outside ? 1e-8 : 0;
+      }
+      CalibrationOptions options;
+      options.estimator = estimator;
+      options.drift_model = kEsg7;
+      const CalibrationRun run = calibrate(sim::simulate(scenario).pass, options);
+      EXPECT_EQ(run.calibration.verdict.has(FindingCode::kDriftModelTooSmall), outside);
+    }
+  }
+}
+
 }  // namespace
 }  // namespace trihedron::ground

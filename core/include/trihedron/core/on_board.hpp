@@ -44,7 +44,7 @@ class OnBoard {
   StepReport carry_on();
 
   /// After the last sample: deals with one of the fixes that still wait, with the samples that there are. Status kNone
-  /// when none waits.
+  /// when none waits; the momenta of the estimator are then those of the latest sample.
   StepReport flush();
 
   /// The next fix that is used corrects the navigator, whatever the interval.
@@ -197,6 +197,7 @@ class OnBoard {
   void navigate(Step& step, typename Navigator<Estimator>::State& state) const;
   void follow(Time t, const Directions& h_b);
   void follow_next_sample();
+  void follow_all_samples();
   [[nodiscard]] bool can_be_passed_over(int sample) const;
   [[nodiscard]] std::optional<FixReadings> readings_at(Time t) const {
     return readings_.at(t, estimator_.setup(), intake_.health(), estimator_.gyros());

@@ -159,6 +159,8 @@ struct CalibrationRun {
   /// Where an error of the star tracker at orbital period was accepted: ln of its odds against drift at that period.
   std::optional<double> orbital_error_over_drift;
   std::vector<DriftModelForecast> drift_models;  ///< that were compared, smallest first
+  /// Where eq. (1) alone was asked for: ln of the odds of drift as a field against it, by the whole pass.
+  std::optional<double> field_over_eq1;
   Calibration known_before;                      ///< values and covariance before the pass; states as in `calibration`
   Calibration calibration;                       ///< with verdict and statistics
   /// Of its states, taken for constant: without what coefficients that may have changed add.
