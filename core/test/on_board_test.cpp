@@ -122,8 +122,7 @@ TEST(OnBoard, StepsOverSamplesLeadToTheSameEstimates) {
                                   test::parameter_errors(flight.truth, over->estimator().gyros());
     const Eigen::VectorXd sigmas = test::error_root(each->estimator()).rowwise().norm();
     const Layout& layout = each->estimator().layout();
-    const double in_sigmas =
-        (moved.array() / sigmas.segment(layout.drift(0), moved.size()).array()).abs().maxCoeff();
+    const double in_sigmas = (moved.array() / sigmas.segment(layout.drift(0), moved.size()).array()).abs().maxCoeff();
     EXPECT_GT(in_sigmas, 0) << slews_rad;  // fewer steps round otherwise
     EXPECT_LT(in_sigmas, 0.01) << slews_rad;
     for (int k = 0; k < 2; ++k) {

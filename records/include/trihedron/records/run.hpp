@@ -161,8 +161,8 @@ struct CalibrationRun {
   std::vector<DriftModelForecast> drift_models;  ///< that were compared, smallest first
   /// Where eq. (1) alone was asked for: ln of the odds of drift as a field against it, by the whole pass.
   std::optional<double> field_over_eq1;
-  Calibration known_before;                      ///< values and covariance before the pass; states as in `calibration`
-  Calibration calibration;                       ///< with verdict and statistics
+  Calibration known_before;  ///< values and covariance before the pass; states as in `calibration`
+  Calibration calibration;   ///< with verdict and statistics
   /// Of its states, taken for constant: without what coefficients that may have changed add.
   Eigen::MatrixXd covariance_of_constants;
   OpenLoopStart errors;  ///< of the calibration
