@@ -280,7 +280,6 @@ nlohmann::ordered_json result_json(const ReplayResult& result) {
       {"fixes_rejected", record.fixes_rejected},
       {"samples_not_taken", result.not_taken.samples},
       {"fixes_not_taken", result.not_taken.fixes},
-      {"commands_not_taken", result.not_taken.commands},
       {"attitudes", result.attitudes},
       {"snapshots", result.keeper.snapshots()},
       {"calls", durations_json(result.timing.calls)},
@@ -302,8 +301,7 @@ std::string result_text(const ReplayResult& result, const ReplayRequest& request
                  record.samples_rejected);
   fmt::format_to(out, "Fixes       {} used, {} rejected\n", record.fixes_used, record.fixes_rejected);
   const ground::NotTaken& not_taken = result.not_taken;
-  fmt::format_to(out, "Not taken   {} samples, {} fixes, {} commands\n", not_taken.samples, not_taken.fixes,
-                 not_taken.commands);
+  fmt::format_to(out, "Not taken   {} samples, {} fixes\n", not_taken.samples, not_taken.fixes);
   fmt::format_to(out, "Call        {}\n", percentiles_text(result.timing.calls));
   if (result.timing.late.count() > 0) {
     fmt::format_to(out, "Late        {}\n", percentiles_text(result.timing.late));

@@ -219,7 +219,6 @@ Json replay_output() {
                  {"fixes_rejected", count()},
                  {"samples_not_taken", count()},
                  {"fixes_not_taken", count()},
-                 {"commands_not_taken", count()},
                  {"attitudes", count()},
                  {"snapshots", count()},
                  {"calls", durations},

@@ -720,8 +720,8 @@ void OnBoard<Estimator>::follow_all_samples() {
   }
 }
 
-/// Whether the step to the sample after this one can be made at once. Over it the readings turn by so little that their
-/// middle is off by 1e-5 rad at most.
+/// Whether the step to the sample after this one can be made at once. The readings turn by so little over it that their
+/// middle is off by some 1e-5 rad where the body turns evenly.
 template <class Estimator>
 bool OnBoard<Estimator>::can_be_passed_over(int sample) const {
   constexpr Duration kLongest = std::chrono::seconds(1);
@@ -738,7 +738,7 @@ bool OnBoard<Estimator>::can_be_passed_over(int sample) const {
   }
   const Directions to = readings_.directions(sample + 1);
   for (int k = 0; k < gyros(); ++k) {
-    if ((to[k] - follower_h_b_[k]).squaredNorm() > kMostTurned_rad * kMostTurned_rad) {
+    if (!((to[k] - follower_h_b_[k]).squaredNorm() <= kMostTurned_rad * kMostTurned_rad)) {
       return false;
     }
   }

@@ -116,8 +116,10 @@ Series parse_csv(const TextFile& content, const fs::path& file, ChooseRules choo
   const std::size_t header_end = std::min(text.find('\n'), text.size());
   const std::vector<ColumnName> header = parse_header(text.substr(0, header_end));
   if (is_row_of_numbers(header)) {
+    const std::string names = header_for(file, choose, header.size());
     throw InputRefused(file, {1, 1}, "the first line holds numbers, where the names of the columns should be",
-                       fmt::format("put this line before it: {}", header_for(file, choose, header.size())));
+                       names.empty() ? "put a line with the names of its columns before it"
+                                     : fmt::format("put this line before it: {}", names));
   }
   ColumnPlan plan = plan_columns(file, header, choose);
 

@@ -101,25 +101,26 @@ ColumnRules attitude_columns(const fs::path& /*file*/, std::span<const ColumnNam
 }
 
 std::string header_for(const fs::path& file, ChooseRules choose, std::size_t columns) {
-  const auto with = [&](std::span<const std::string> names) {
+  const std::vector<std::string>& covariances = covariance_names();
+  std::vector<std::vector<std::string>> further = {{}, kSigmas, kSigmas, covariances};
+  further[2].emplace_back("age_s");
+  further.emplace_back(covariances.begin(), covariances.begin() + static_cast<std::ptrdiff_t>(kVariances));
+  for (int gyros = kFewestGyros + 1; gyros <= kMaxGyros; ++gyros) {
+    further.push_back(direction_names(gyros));
+  }
+  for (const std::vector<std::string>& names : further) {
     std::vector<ColumnName> present;
     for (const std::string& name : names) {
       present.push_back({name, {}});
     }
-    return choose(file, present).required;
-  };
-  std::vector<std::string> names = with({});
-  std::vector<std::vector<std::string>> more = {kSigmas, covariance_names()};
-  more.emplace_back(covariance_names().begin(), covariance_names().begin() + static_cast<std::ptrdiff_t>(kVariances));
-  for (int gyros = kFewestGyros + 1; gyros <= kMaxGyros; ++gyros) {
-    more.push_back(direction_names(gyros));
-  }
-  for (const std::vector<std::string>& its : more) {
-    if (std::vector<std::string> other = with(its); other.size() + 1 == columns) {
-      names = std::move(other);
+    ColumnRules rules = choose(file, present);
+    std::ranges::copy_if(rules.optional, std::back_inserter(rules.required),
+                         [&](const std::string& name) { return std::ranges::find(names, name) != names.end(); });
+    if (rules.required.size() + 1 == columns) {
+      return fmt::format("t_s,{}", fmt::join(rules.required, ","));
     }
   }
-  return fmt::format("t_s,{}", fmt::join(names, ","));
+  return "";
 }
 
 ColumnPlan plan_columns(const fs::path& file, std::span<const ColumnName> present, ChooseRules choose) {

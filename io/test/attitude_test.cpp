@@ -10,6 +10,7 @@
 namespace trihedron::io {
 namespace {
 
+using testing::EndsWith;
 using testing::HasSubstr;
 
 class AttitudeCsv : public testing::Test {
@@ -101,7 +102,9 @@ TEST_F(AttitudeCsv, RefusesWhatIsNoCleanSolution) {
   EXPECT_THAT(refusal_of("t_s,q_x,q_y,q_z\n"), HasSubstr("lacks column \"q_w\""));
   EXPECT_THAT(refusal_of("0,0,0,0,1\n"), HasSubstr("a.csv:1:1: the first line holds numbers"));
   EXPECT_THAT(refusal_of("0,0,0,0,1,1e-5,1e-5,1e-5\n"),
-              HasSubstr("put this line before it: t_s,q_x,q_y,q_z,q_w,sigma_x_rad,sigma_y_rad,sigma_z_rad"));
+              EndsWith("put this line before it: t_s,q_x,q_y,q_z,q_w,sigma_x_rad,sigma_y_rad,sigma_z_rad"));
+  EXPECT_THAT(refusal_of("0,0,0,0,1,1e-5,1e-5,1e-5,3\n"), EndsWith("q_w,sigma_x_rad,sigma_y_rad,sigma_z_rad,age_s"));
+  EXPECT_THAT(refusal_of("0,0,0,0,1,1e-5,1e-5\n"), HasSubstr("put a line with the names of its columns before it"));
   EXPECT_THAT(refusal_of("t_s,q_x,q_y,q_z,q_w,sigma_x_rad\n"), HasSubstr("lacks column \"sigma_y_rad\""));
   EXPECT_THAT(refusal_of("t_s,q_x,q_y,q_z,q_w,sigma_x_rad,sigma_y_rad,sigma_z_rad\n0,0,0,0,1,1,-1,1\n"),
               HasSubstr("a.csv:2: a sigma is not positive"));

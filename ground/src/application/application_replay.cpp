@@ -129,7 +129,7 @@ std::uint64_t left_of(std::uint64_t given, std::uint64_t dealt_with) { return gi
 NotTaken not_taken_of(const Housekeeping& record, const Events::Position& given) {
   const auto sum = [](auto... counts) { return (std::uint64_t{counts} + ...); };
   return {left_of(given.samples, sum(record.samples_used, record.samples_thinned, record.samples_rejected)),
-          left_of(given.fixes[0], sum(record.fixes_used, record.fixes_rejected)), record.commands_refused};
+          left_of(given.fixes[0], sum(record.fixes_used, record.fixes_rejected))};
 }
 
 /// Why, by the record: the application does not look at anything once it has failed.

@@ -341,7 +341,7 @@ CalibrationRun calibrate_as_stamped(const Pass& pass, const CalibrationOptions& 
   run.options = decision.options;
   run.evidence = decision.evidence;
   run.orbital_error_over_drift = decision.orbital_error_over_drift;
-  run.field_over_eq1 = decision.field_over_eq1;
+  run.against_field = decision.against_field;
   run.changes = decision.changes;
   run.known_before = known_before(settings, decision.options, decision.field);
   const Statistics recorded = run.calibration.statistics;

@@ -192,10 +192,14 @@ double enough_for(FurtherState state, bool other_drift) {
 }
 
 /// Without an offset the stamps would be right at the very epoch.
-void keep_offset_beside_rate(const CalibrationOptions& asked, CalibrationOptions& options) {
-  if (options.further_states.is_on(FurtherState::kClockRate) &&
-      asked.further_states[FurtherState::kClockOffset] == Choice::kAuto) {
-    options.further_states[FurtherState::kClockOffset] = Choice::kOn;
+void keep_offset_beside_rate(const CalibrationOptions& asked, Decision& decision) {
+  constexpr FurtherState kOffset = FurtherState::kClockOffset;
+  FurtherStateOptions& states = decision.options.further_states;
+  if (states.is_on(FurtherState::kClockRate) && asked.further_states[kOffset] == Choice::kAuto) {
+    states[kOffset] = Choice::kOn;
+    for (Evidence& evidence : decision.evidence) {
+      evidence.accepted = evidence.accepted || evidence.state == kOffset;
+    }
   }
 }
 
@@ -209,11 +213,11 @@ void settle_states(const Trial& everything, const PassSettings& settings, const 
   };
   for (const FurtherStateRow& row : kFurtherStates) {
     if (is_judged_by_trial(row) && asked.further_states[row.state] == Choice::kAuto) {
-      const bool on = settle(row.state, everything.log_evidence(row.state), enough_for(row.state, other_drift));
+      const bool on = settle(row.state, everything.log_evidence(row.state).value, enough_for(row.state, other_drift));
       decision.options.further_states[row.state] = on ? Choice::kOn : Choice::kOff;
     }
   }
-  keep_offset_beside_rate(asked, decision.options);
+  keep_offset_beside_rate(asked, decision);
   decision.forecasts = everything.forecasts();
   if (!asked.drift_model) {
     const Forecast* best = best_of(decision.forecasts, settings);
@@ -226,7 +230,7 @@ void settle_states(const Trial& everything, const PassSettings& settings, const 
 /// A state that was left out, though there is evidence of it where the others that were left out are zero.
 struct Doubt {
   FurtherState state;
-  double log_evidence;
+  LogEvidence log_evidence;
 };
 
 /// The likeliest first. States that look alike in a pass hide one another while all are free.
@@ -241,17 +245,18 @@ std::vector<Doubt> doubts_of(const Trial& everything, const CalibrationOptions& 
   }
   std::vector<Doubt> doubts;
   for (const FurtherState state : left_out) {
-    if (state == FurtherState::kClockRate && !decided.further_states.is_on(FurtherState::kClockOffset)) {
+    if (state == FurtherState::kClockRate && asked.further_states[FurtherState::kClockOffset] == Choice::kAuto &&
+        !decided.further_states.is_on(FurtherState::kClockOffset)) {
       continue;
     }
     std::vector<FurtherState> others;
     std::ranges::remove_copy(left_out, std::back_inserter(others), state);
-    const double log_evidence = everything.log_evidence(state, others);
-    if (log_evidence > enough_for(state, other_drift)) {
+    const LogEvidence log_evidence = everything.log_evidence(state, others);
+    if (log_evidence.value > enough_for(state, other_drift)) {
       doubts.push_back({state, log_evidence});
     }
   }
-  std::ranges::stable_sort(doubts, std::ranges::greater{}, &Doubt::log_evidence);
+  std::ranges::stable_sort(doubts, std::ranges::greater{}, [](const Doubt& doubt) { return doubt.log_evidence.value; });
   return doubts;
 }
 
@@ -455,7 +460,8 @@ Settled settle_with_noise(const Pass& pass, const Screened& screened, const Cali
 }
 
 /// Settles the states in doubt: one after the other is taken in where the whole pass, with the noise that is then the
-/// likeliest, is by so much likelier with it.
+/// likeliest, is by so much likelier with it. That likelihood is by the prior as it is: narrower ones add to it what
+/// they add to the evidence.
 Settled without_doubt(const Pass& pass, const Screened& screened, CalibrationOptions asked,
                       const DriftModelId& largest_model, bool wandering_is_open, CalibrationOptions undecided,
                       AllFree& free, const Progress& progress) {
@@ -463,14 +469,15 @@ Settled without_doubt(const Pass& pass, const Screened& screened, CalibrationOpt
       settle_with_noise(pass, screened, asked, largest_model, wandering_is_open, undecided, free, progress);
   std::vector<Evidence> taken_in;
   for (std::size_t i = 0; i < settled.doubts.size();) {
-    const FurtherState state = settled.doubts[i].state;
+    const auto [state, log_evidence] = settled.doubts[i];
     begin_stage(progress, "looks at what is in doubt");
     CalibrationOptions with = asked;
     CalibrationOptions undecided_with = undecided;
     with.further_states[state] = undecided_with.further_states[state] = Choice::kOn;
     Settled other =
         settle_with_noise(pass, screened, with, largest_model, wandering_is_open, undecided_with, free, progress);
-    const double gain = other.decision.log_likelihood - settled.decision.log_likelihood;
+    const double gain = other.decision.log_likelihood - settled.decision.log_likelihood + log_evidence.value -
+                        log_evidence.by_prior_as_it_is;
     if (gain > enough_for(state, settled.more_noise && asked.drift_field)) {
       taken_in.push_back({state, gain, true});
       settled = std::move(other);
@@ -518,8 +525,10 @@ Decision decide_by_pass(const Pass& pass, const Screened& screened, const Calibr
     }
     return decision;
   }
-  options.star_tracker_noise_rad = other_star_tracker_noise(pass, changes);
-  if (options.star_tracker_noise_rad) {
+  if (!asked.star_tracker_noise_rad) {
+    options.star_tracker_noise_rad = other_star_tracker_noise(pass, changes);
+  }
+  if (options.star_tracker_noise_rad && !asked.star_tracker_noise_rad) {
     free.trial = Trial(pass, screened, with_everything(options, asked, largest_model), noise, &free.trial);
   }
   if (noise) {
@@ -892,21 +901,26 @@ void settle_by_estimator(CalibrationOptions& asked) {
   }
 }
 
-/// ln of the odds of drift as a field against eq. (1), each with states and noise as the pass decides with it. Drift
-/// that comes back, and a course of the coefficients, are those that were found with eq. (1).
-double field_over_eq1(const Pass& pass, const Screened& screened, CalibrationOptions asked, const Decision& by_eq1,
-                      const Progress& progress) {
-  for (const FurtherState state :
-       {FurtherState::kOrbitalDrift, FurtherState::kPolhode, FurtherState::kCoefficientChange}) {
-    asked.further_states[state] = by_eq1.options.further_states[state];
+/// Drift as a field against eq. (1), each with states and noise as the pass decides with it; but for the noise of the
+/// star tracker, without which likelihoods cannot be compared. Nothing that comes back is looked for beside the field.
+AgainstField against_field(const Pass& pass, const Screened& screened, CalibrationOptions asked, const Decision& by_eq1,
+                           const Progress& progress) {
+  for (const FurtherState state : {FurtherState::kOrbitalDrift, FurtherState::kPolhode}) {
+    Choice& choice = asked.further_states[state];
+    choice = choice == Choice::kAuto ? Choice::kOff : choice;
   }
-  asked.further_states.polhodes = by_eq1.options.further_states.polhodes;
-  asked.further_states.change_course = by_eq1.options.further_states.change_course;
-  asked.further_states.change_time = by_eq1.options.further_states.change_time;
+  asked.star_tracker_noise_rad = by_eq1.options.star_tracker_noise_rad.value_or(pass.settings.star_tracker_noise_rad);
   asked.drift_field = true;
   asked.drift_model = kLargestDriftModel;
   asked.estimator = Estimator::kBatch;
-  return decide_by_pass(pass, screened, asked, kLargestDriftModel, progress).log_likelihood - by_eq1.log_likelihood;
+  const Decision by_field = decide_by_pass(pass, screened, asked, kLargestDriftModel, progress);
+  AgainstField found{by_field.log_likelihood - by_eq1.log_likelihood, {}};
+  for (const FurtherStateRow& row : kFurtherStates) {
+    if (by_eq1.options.further_states.is_on(row.state) && !by_field.options.further_states.is_on(row.state)) {
+      found.instead.push_back(row.state);
+    }
+  }
+  return found;
 }
 
 /// What was decided with a drift field, for an estimator that has a drift model in its place.
@@ -1024,7 +1038,7 @@ Decision decide(const Pass& pass, const CalibrationOptions& asked_for, const Pro
         best_of(decided.forecasts, pass.settings) != &decided.forecasts.back()) {
       if (asked_for.drift_model == kEsg7 && decided.options.find_noise) {
         begin_stage(progress, "compares the drift model");
-        decided.field_over_eq1 = field_over_eq1(pass, screened, asked, decided, progress);
+        decided.against_field = against_field(pass, screened, asked, decided, progress);
       }
       if (pass.settings.gyros.size() == 2) {  // which of more gyros is at fault is judged by the noise found
         decided.screened = std::move(screened);

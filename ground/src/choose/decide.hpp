@@ -33,8 +33,7 @@ struct Decision {
   std::optional<OrbitalOdds> orbital_odds;  ///< where the pass was looked at for them
   /// Where an error of the star tracker at orbital period was accepted: ln of its odds against such drift.
   std::optional<double> orbital_error_over_drift;
-  /// Where eq. (1) alone was asked for, and the noise was found: ln of the odds of drift as a field against it.
-  std::optional<double> field_over_eq1;
+  std::optional<AgainstField> against_field;  ///< where eq. (1) alone was asked for, and the noise was found
   /// Those of the pass with what it shows of the size of members outside eq. (1), for an estimator on board.
   std::optional<PassSettings> settings;
   std::optional<Calibration> members;   ///< all coefficients of the field as the trial finds them, and alignments

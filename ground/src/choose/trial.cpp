@@ -20,7 +20,7 @@ namespace {
 /// ln of the Bayes factor for states being free instead of zero (Savage and Dickey): the density at zero before the
 /// data over that after; the mean of the factors with priors as wide as they are, a quarter, and a sixteenth of it, so
 /// that a small state has evidence as well. Estimate and covariance in units of the prior sigmas.
-double log_bayes_factor(const Eigen::VectorXd& estimate, const Eigen::MatrixXd& covariance) {
+LogEvidence log_bayes_factor(const Eigen::VectorXd& estimate, const Eigen::MatrixXd& covariance) {
   constexpr std::array<double, 3> kSizes = {1, 1.0 / 4, 1.0 / 16};
   const auto identity = Eigen::MatrixXd::Identity(estimate.size(), estimate.size());
   const Eigen::MatrixXd information = Eigen::LLT<Eigen::MatrixXd>(covariance).solve(identity);
@@ -37,7 +37,7 @@ double log_bayes_factor(const Eigen::VectorXd& estimate, const Eigen::MatrixXd& 
   for (const double log_factor : log_factors) {
     sum += std::exp(log_factor - most);
   }
-  return most + std::log(sum / static_cast<double>(kSizes.size()));
+  return {most + std::log(sum / static_cast<double>(kSizes.size())), log_factors[0]};
 }
 
 /// The models to compare with a model: those that it contains, from the smallest on, and itself.
@@ -239,7 +239,7 @@ Trial::InPriorSigmas Trial::in_prior_sigmas(const std::vector<FurtherState>& sta
   return found;
 }
 
-double Trial::log_evidence(FurtherState state, const std::vector<FurtherState>& zero) const {
+LogEvidence Trial::log_evidence(FurtherState state, const std::vector<FurtherState>& zero) const {
   std::vector<FurtherState> states{state};
   states.insert(states.end(), zero.begin(), zero.end());
   const InPriorSigmas found = in_prior_sigmas(states);

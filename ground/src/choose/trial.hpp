@@ -18,6 +18,12 @@ namespace trihedron::ground {
 inline constexpr double kNoiseTolerance = 0.1;
 [[nodiscard]] bool alike(const ProcessNoise& a, const ProcessNoise& b);
 
+/// ln of the Bayes factor for a state being free instead of zero.
+struct LogEvidence {
+  double value = 0;              ///< of the mean of the factors by priors as wide as they are and narrower
+  double by_prior_as_it_is = 0;  ///< what the likelihood of the pass gains
+};
+
 /// The whole pass with one choice of states. Further states are judged by ln of the Bayes factor for their being free
 /// instead of zero.
 class Trial {
@@ -62,7 +68,7 @@ class Trial {
 
   /// ln of the Bayes factor of this state, which the trial must have, where those of `zero` are zero; of no drift that
   /// wanders.
-  [[nodiscard]] double log_evidence(FurtherState state, const std::vector<FurtherState>& zero = {}) const;
+  [[nodiscard]] LogEvidence log_evidence(FurtherState state, const std::vector<FurtherState>& zero = {}) const;
   /// Forecasts by its drift model and those that it contains; none of a field.
   [[nodiscard]] std::vector<Forecast> forecasts() const;
 

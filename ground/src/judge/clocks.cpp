@@ -197,7 +197,7 @@ void judge_clocks(const Pass& pass, const CalibrationRun& run, std::vector<Findi
   const std::size_t before = findings.size();
   judge_late_gyros(pass.settings, *run.clocks, correction.late_s, findings, Finding::Severity::kWarning,
                    "; the calibration has interpolated them");
-  const double found_s = offset_s != 0 ? offset_s : middle.is_sure(kSigmasToTell) ? middle.value : 0;
+  const double found_s = middle.is_sure(kSigmasToTell) ? middle.value : offset_s;
   if (do_no_two_agree(pass.settings, correction.late_s, found_s)) {
     forbid_late_gyros(findings, before, found_s);
   }

@@ -179,12 +179,12 @@ TextAndCure of_stuck(const GyroTelemetry& telemetry, const std::vector<GyroEvent
         "there were none, or none that are a direction. It was not used there.",
         "Look at the telemetry there: a frozen readout, the last value repeated in a gap, a gyro that was off."};
   }
-  const bool is_off = std::ranges::all_of(events, [&](const GyroEvent& event) {
-    return !is_stuck(event) || std::ranges::any_of(lost, [&](const GyroEvent& its) { return its.gyro == event.gyro; });
+  const bool is_off = std::ranges::any_of(events, [&](const GyroEvent& event) {
+    return is_stuck(event) && std::ranges::any_of(lost, [&](const GyroEvent& its) { return its.gyro == event.gyro; });
   });
   return {is_off ? "A gyro gives no readings any more, or none that are a direction."
                  : "For a while a gyro gave no readings, or none that are a direction; it was not used there.",
-          is_off ? "Look for why it is off; calibrate the part of the pass before." : "Look for why it was off."};
+          is_off ? "Look for why it is off; the part of the pass before can be used." : "Look for why it was off."};
 }
 
 /// Of a calibration or a navigation with so many gyros. `without_pair`: what the loss of a gyro means where it leaves
@@ -210,7 +210,7 @@ void judge_gyros(const Pass& pass, const std::vector<GyroEvent>& gyro_events, in
   };
   add_events(GyroState::kIsolated, FindingCode::kGyroIsolated,
              "A gyro alone did not agree with the rest, time after time, and was left out.",
-             "Look at its telemetry from there on. Its estimates are those of before.");
+             "Look at its telemetry from there on.");
   const TextAndCure stuck = of_stuck(pass.gyro, gyro_events, lost);
   add_events(GyroState::kStuck, FindingCode::kGyroStuck, stuck.text, stuck.cure);
   add_events(GyroState::kLeapt, FindingCode::kGyroLeapt,
@@ -393,6 +393,8 @@ void judge_halves(const CalibrationRun& run, std::vector<Finding>& findings) {
 
 /// Log of the odds from which on a model counts as wrong against another.
 constexpr double kLogOddsOfWrongModel = 10;
+/// Log of the odds, 20 to 1, from which on one of two explanations counts as the right one.
+constexpr double kLogOddsOfExplanation = 3;
 
 /// By forecasts, where models were compared by them.
 void judge_drift_model_by_forecasts(const CalibrationRun& run, std::vector<Finding>& findings) {
@@ -437,14 +439,27 @@ void judge_drift_model_by_forecasts(const CalibrationRun& run, std::vector<Findi
 
 void judge_drift_model(const CalibrationRun& run, std::vector<Finding>& findings) {
   judge_drift_model_by_forecasts(run, findings);
-  const double log_odds = run.field_over_eq1.value_or(0);
   const bool is_told = std::ranges::find(findings, FindingCode::kDriftModelTooSmall, &Finding::code) != findings.end();
-  if (log_odds > kLogOddsOfWrongModel && !is_told) {
+  if (!run.against_field || is_told) {
+    return;
+  }
+  const auto& [log_odds, instead] = *run.against_field;
+  if (log_odds > kLogOddsOfWrongModel) {
     add(findings, FindingCode::kDriftModelTooSmall,
-        "The gyros drift in a way that eq. (1) does not contain; its coefficients and sigmas, and other states that "
-        "stand for that drift, are wrong.",
+        "The gyros drift in a way that eq. (1) does not contain; its coefficients and sigmas are wrong.",
         fmt::format("the pass is more likely with drift as a field by a factor of e^{:.0f}", log_odds),
         fmt::format("Use drift model {}.", kAutoDriftModel));
+  } else if (!instead.empty() && log_odds > -kLogOddsOfExplanation) {
+    std::string keys;
+    for (const FurtherState state : instead) {
+      keys += fmt::format("{}{}", keys.empty() ? "" : ", ", row_of(state).key);
+    }
+    add(findings, FindingCode::kDriftModelTooSmall,
+        "What was found beside eq. (1) may as well be drift that eq. (1) does not contain: then coefficients and "
+        "sigmas are wrong.",
+        fmt::format("{} found; ln of the odds of drift as a field, without it, {:+.1f}", keys, log_odds),
+        fmt::format("Use drift model {}; or, where {} is known to be there, say \"on\" in [further_states].",
+                    kAutoDriftModel, keys));
   }
 }
 

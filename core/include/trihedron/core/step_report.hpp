@@ -22,8 +22,7 @@ struct CorrectionPolicy {
   bool take_parameters = true;  ///< false: the parameters of the set-up are held
   bool navigate = true;         ///< false: the calibration alone, without a navigator
   /// Whether the calibration may predict over several samples in one step, where they are close and the body hardly
-  /// turns meanwhile: a sixth fewer instructions, the same estimates to a hundredth of their sigmas, but more uneven
-  /// slots.
+  /// turns meanwhile. The estimates stay the same to a hundredth of their sigmas.
   bool steps_over_samples = false;
   /// The work of a fix is spread over as many samples, at most kMostSpread, or over those up to the next fix if these
   /// are fewer, so that no call takes much longer than another; 0: it is done at once. What comes out is the same bit

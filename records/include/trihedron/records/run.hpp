@@ -147,6 +147,12 @@ struct ReadoutNoise {
   }
 };
 
+/// Drift as a field against eq. (1) alone, by the whole pass.
+struct AgainstField {
+  double log_odds = 0;                ///< ln of the odds of the field
+  std::vector<FurtherState> instead;  ///< found beside eq. (1), and not beside the field
+};
+
 /// A calibration of a pass, and everything that was recorded on the way.
 struct CalibrationRun {
   CalibrationOptions options;                 ///< as decided
@@ -159,10 +165,9 @@ struct CalibrationRun {
   /// Where an error of the star tracker at orbital period was accepted: ln of its odds against drift at that period.
   std::optional<double> orbital_error_over_drift;
   std::vector<DriftModelForecast> drift_models;  ///< that were compared, smallest first
-  /// Where eq. (1) alone was asked for: ln of the odds of drift as a field against it, by the whole pass.
-  std::optional<double> field_over_eq1;
-  Calibration known_before;  ///< values and covariance before the pass; states as in `calibration`
-  Calibration calibration;   ///< with verdict and statistics
+  std::optional<AgainstField> against_field;     ///< where eq. (1) alone was asked for
+  Calibration known_before;                      ///< values and covariance before the pass; states as in `calibration`
+  Calibration calibration;                       ///< with verdict and statistics
   /// Of its states, taken for constant: without what coefficients that may have changed add.
   Eigen::MatrixXd covariance_of_constants;
   OpenLoopStart errors;  ///< of the calibration

@@ -31,7 +31,6 @@ struct ConfirmedOutput {
 struct NotTaken {
   std::uint64_t samples = 0;   ///< it had failed
   std::uint64_t fixes = 0;     ///< of a mode that looks at none; lost to a jump of the clock; still waiting for samples
-  std::uint64_t commands = 0;  ///< refused
 };
 
 /// A PairApplication or TrioApplication, by the number of gyros. What it gives depends on nothing but the pass and the
