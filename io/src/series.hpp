@@ -64,8 +64,8 @@ struct Series {
 };
 
 /// The line of column names for a table of so many columns, `t_s` included: of the variants of the rules, for other
-/// numbers of gyros, for fixes with their covariance, for attitudes with sigmas and age, the one that has as many. Empty
-/// where none has.
+/// numbers of gyros, for fixes with their covariance, for attitudes with sigmas and age, the one that has as many.
+/// Empty where none has.
 [[nodiscard]] std::string header_for(const std::filesystem::path& file, ChooseRules choose, std::size_t columns);
 
 /// Where each present column goes.

@@ -538,6 +538,13 @@ TEST(Verdict, TellsAGyroThatGivesNoReadingsFromOneThatStandsStillByTheReadingThe
   EXPECT_THAT(text(), HasSubstr("gives no readings any more"));
   run.gyro_events.push_back({pass.gyro.t[3], 1, GyroState::kUsed});
   EXPECT_THAT(text(), HasSubstr("For a while a gyro gave no readings"));
+  run.gyro_events.push_back({pass.gyro.t[3] + hours(1), 1, GyroState::kStuck});  // and again, to the end
+  for (const int later : {1, 2}) {
+    pass.gyro.t.push_back(pass.gyro.t[3] + hours(later));
+    pass.gyro.h.insert(pass.gyro.h.end(), 6, kNaN);
+  }
+  EXPECT_THAT(text(), HasSubstr("gives no readings any more"));
+  run.gyro_events.pop_back();
   run.gyro_events.insert(run.gyro_events.begin(),
                          {{pass.gyro.t[0], 0, GyroState::kStuck}, {pass.gyro.t[1], 0, GyroState::kUsed}});
   EXPECT_THAT(text(), HasSubstr("At some times readings of a gyro"));
@@ -622,6 +629,11 @@ TEST(Verdict, ForbidsAPairOfWhichNoClockAgreesWithAnother) {
   EXPECT_EQ(late_of(judge(pass, with_clocks(0.006, 0.004))).severity, FindingSeverity::kWarning);
   EXPECT_EQ(late_of(judge(pass, with_clocks(0.004, 0.006))).severity, FindingSeverity::kWarning);
   EXPECT_EQ(late_of(judge(pass, with_clocks(0.02, 0))).severity, FindingSeverity::kWarning);
+  // The gyro that is not late was chosen by the middle of the pass; the state is of its begin.
+  auto with_rate = with_clocks(0.02, 0);
+  with_rate.clocks->mid_offset_s = {1e-3, 1e-4};
+  with_rate.calibration.further = {{parameter("clock_offset_s"), -8e-3, 1e-4}};
+  EXPECT_EQ(late_of(judge(pass, with_rate)).severity, FindingSeverity::kWarning);
   // Without a state of the offset that of the clocks tells it.
   auto run = with_clocks(0.006, 0.006);
   run.calibration.further.clear();

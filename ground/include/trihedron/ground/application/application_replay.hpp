@@ -29,8 +29,8 @@ struct ConfirmedOutput {
 
 /// Inputs that the application was given and has done nothing with.
 struct NotTaken {
-  std::uint64_t samples = 0;   ///< it had failed
-  std::uint64_t fixes = 0;     ///< of a mode that looks at none; lost to a jump of the clock; still waiting for samples
+  std::uint64_t samples = 0;  ///< it had failed
+  std::uint64_t fixes = 0;    ///< of a mode that looks at none; lost to a jump of the clock; still waiting for samples
 };
 
 /// A PairApplication or TrioApplication, by the number of gyros. What it gives depends on nothing but the pass and the
