@@ -916,7 +916,12 @@ AgainstField against_field(const Pass& pass, const Screened& screened, Calibrati
   const Decision by_field = decide_by_pass(pass, screened, asked, kLargestDriftModel, progress);
   AgainstField found{by_field.log_likelihood - by_eq1.log_likelihood, {}};
   for (const FurtherStateRow& row : kFurtherStates) {
-    if (by_eq1.options.further_states.is_on(row.state) && !by_field.options.further_states.is_on(row.state)) {
+    // A clock offset is estimated for little: that it is not needed says nothing.
+    const bool is_weak = std::ranges::any_of(by_eq1.evidence, [&](const Evidence& evidence) {
+      return evidence.state == row.state && evidence.log_bayes_factor <= kLogOddsToAccept;
+    });
+    if (!is_weak && by_eq1.options.further_states.is_on(row.state) &&
+        !by_field.options.further_states.is_on(row.state)) {
       found.instead.push_back(row.state);
     }
   }
