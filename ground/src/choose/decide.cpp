@@ -437,12 +437,12 @@ ByEq1 try_eq1(const Pass& pass, const Screened& screened, const CalibrationOptio
 
 /// Decides states, drift model and noise, on a pass by which the noise can be found. `undecided`: the options with what
 /// is known before.
-Settled settle_with_noise(const Pass& pass, const Screened& screened, const CalibrationOptions& asked,
-                          const DriftModelId& largest_model, bool wandering_is_open,
-                          const CalibrationOptions& undecided, AllFree& free, const Progress& progress) {
+Settled settle_with_noise(const Pass& pass, const Screened& screened, const CalibrationOptions& undecided,
+                          const DriftModelId& largest_model, bool wandering_is_open, AllFree& free,
+                          const Progress& progress) {
   Decision decision;
   decision.options = undecided;
-  settle_states(free.trial, pass.settings, asked, false, decision);
+  settle_states(free.trial, pass.settings, undecided, false, decision);
   begin_stage(progress, "finds the noise");
   const std::optional<ProcessNoise> noise = free.walking ? std::optional(free.walking->noise) : std::nullopt;
   Trial trial(pass, screened, decision.options, noise, &free.trial);
@@ -450,9 +450,9 @@ Settled settle_with_noise(const Pass& pass, const Screened& screened, const Cali
   Settled settled{std::move(decision), std::move(trial), walk, walk.gain > kLogOddsToAccept, {}};
   if (settled.more_noise) {
     begin_stage(progress, "decides again with more noise");
-    decide_again_with_more_noise(pass, screened, asked, largest_model, wandering_is_open, free, settled);
+    decide_again_with_more_noise(pass, screened, undecided, largest_model, wandering_is_open, free, settled);
   } else {
-    settled.doubts = doubts_of(free.trial, asked, false, settled.decision.options);
+    settled.doubts = doubts_of(free.trial, undecided, false, settled.decision.options);
     use_walk(walk.noise, settled.decision.options);
   }
   settled.decision.log_likelihood = settled.noise.log_likelihood;
@@ -462,27 +462,23 @@ Settled settle_with_noise(const Pass& pass, const Screened& screened, const Cali
 /// Settles the states in doubt: one after the other is taken in where the whole pass, with the noise that is then the
 /// likeliest, is by so much likelier with it. That likelihood is by the prior as it is: narrower ones add to it what
 /// they add to the evidence.
-Settled without_doubt(const Pass& pass, const Screened& screened, CalibrationOptions asked,
-                      const DriftModelId& largest_model, bool wandering_is_open, CalibrationOptions undecided,
-                      AllFree& free, const Progress& progress) {
-  Settled settled =
-      settle_with_noise(pass, screened, asked, largest_model, wandering_is_open, undecided, free, progress);
+Settled without_doubt(const Pass& pass, const Screened& screened, CalibrationOptions undecided,
+                      const DriftModelId& largest_model, bool wandering_is_open, AllFree& free,
+                      const Progress& progress) {
+  Settled settled = settle_with_noise(pass, screened, undecided, largest_model, wandering_is_open, free, progress);
   std::vector<Evidence> taken_in;
   for (std::size_t i = 0; i < settled.doubts.size();) {
     const auto [state, log_evidence] = settled.doubts[i];
     begin_stage(progress, "looks at what is in doubt");
-    CalibrationOptions with = asked;
-    CalibrationOptions undecided_with = undecided;
-    with.further_states[state] = undecided_with.further_states[state] = Choice::kOn;
-    Settled other =
-        settle_with_noise(pass, screened, with, largest_model, wandering_is_open, undecided_with, free, progress);
+    CalibrationOptions with = undecided;
+    with.further_states[state] = Choice::kOn;
+    Settled other = settle_with_noise(pass, screened, with, largest_model, wandering_is_open, free, progress);
     const double gain = other.decision.log_likelihood - settled.decision.log_likelihood + log_evidence.value -
                         log_evidence.by_prior_as_it_is;
-    if (gain > enough_for(state, settled.more_noise && asked.drift_field)) {
+    if (gain > enough_for(state, settled.more_noise && undecided.drift_field)) {
       taken_in.push_back({state, gain, true});
       settled = std::move(other);
-      asked = with;
-      undecided = undecided_with;
+      undecided = with;
       i = 0;
     } else {
       ++i;
@@ -527,14 +523,14 @@ Decision decide_by_pass(const Pass& pass, const Screened& screened, const Calibr
   }
   if (!asked.star_tracker_noise_rad) {
     options.star_tracker_noise_rad = other_star_tracker_noise(pass, changes);
-  }
-  if (options.star_tracker_noise_rad && !asked.star_tracker_noise_rad) {
-    free.trial = Trial(pass, screened, with_everything(options, asked, largest_model), noise, &free.trial);
+    if (options.star_tracker_noise_rad) {
+      free.trial = Trial(pass, screened, with_everything(options, asked, largest_model), noise, &free.trial);
+    }
   }
   if (noise) {
     free.walking = with_most_likely_walk(free.trial, with_everything(options, asked, largest_model));
   }
-  Settled settled = without_doubt(pass, screened, asked, largest_model, wandering_is_open, options, free, progress);
+  Settled settled = without_doubt(pass, screened, options, largest_model, wandering_is_open, free, progress);
   keep_field(settled.last, settled.decision);
   settled.decision.nearby = settled.last.nearby();
   settled.decision.use(moves_over(settled.last));
