@@ -70,9 +70,11 @@ double left_out_walk_rad_sqrt_s(const LeftOut& left_out, const Calibration& all,
   for (std::size_t k = 0; k < all.gyros.size(); ++k) {
     const Eigen::Matrix3d C_c_b = Rot<C, B<1>>::exp(Vec<C>::assume(all.gyros[k].alignment_rotation_vector_rad)).raw();
     const Index first = rows_of(all, {ParameterId::drift(k, drift.member(0))}).front();
+    const MatrixXd alignment = rest.middleRows<3>(rows_of(all, {ParameterId::alignment(k, 0)}).front());
     std::vector<Time> t;
-    std::vector<MatrixXd> turned;  // 3 × members
+    MatrixXd turn = MatrixXd::Zero(3, rest.cols());  // by the drift, 3 × members
     MatrixXd rate_before;
+    std::vector<MatrixXd> turned;  // as seen by the star tracker through the alignment
     const auto gyro = static_cast<int>(k);
     for (const ScreenedPass::Fix& fix : pass.fixes) {
       if (fix.fix.head != 0 || !fix.used[gyro] || (!t.empty() && fix.fix.t - t.back() < kBetweenDirections)) {
@@ -82,12 +84,11 @@ double left_out_walk_rad_sqrt_s(const LeftOut& left_out, const Calibration& all,
       const Eigen::Matrix3d C_in_b = fix.fix.q_in_c.normalized().toRotationMatrix() * C_c_b;
       const Eigen::Matrix3d across = C_in_b - C_in_b * fix.h_b[gyro] * fix.h_b[gyro].transpose();
       MatrixXd rate = across * (basis.first(columns) * rest.middleRows(first, columns));
-      MatrixXd now = turned.empty() ? MatrixXd::Zero(3, rest.cols()) : turned.back();
       if (!t.empty() && fix.fix.t - t.back() < kLongestUnread) {
-        now += to_seconds(fix.fix.t - t.back()) / 2 * (rate_before + rate);
+        turn += to_seconds(fix.fix.t - t.back()) / 2 * (rate_before + rate);
       }
       t.push_back(fix.fix.t);
-      turned.push_back(std::move(now));
+      turned.push_back(turn - across * C_c_b.transpose() * alignment);
       rate_before = std::move(rate);
     }
     for (const Duration lag : kLags) {

@@ -373,9 +373,9 @@ CalibrationRun calibrate_as_stamped(const Pass& pass, const CalibrationOptions& 
     if (run.calibration.noise) {  // what the pass needs: what stands for the members left out is beside it
       run.calibration.noise->direction_random_walk_rad_sqrt_s = decision.options.direction_random_walk_rad_sqrt_s;
     }
-    run.calibration = left_out->completed(std::move(run.calibration));
+    run.calibration = left_out->completed(std::move(run.calibration), pipeline.navigation_attitude());
     run.parameters = left_out->completed(run.parameters);
-    run.known_before = pass.settings.prior ? left_out->completed(std::move(run.known_before))
+    run.known_before = pass.settings.prior ? left_out->completed(std::move(run.known_before), {})
                                            : left_out->completed_prior(std::move(run.known_before));
     if (pass.settings.prior) {
       run.calibration.drift_field = pass.settings.prior->drift_field;

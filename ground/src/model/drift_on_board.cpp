@@ -80,7 +80,8 @@ void add_made_up(const LeftOut& left_out, const Calibration& all, MeanSquares& m
       (left_out.made_up() * left_out.mean_squares() * left_out.made_up().transpose()).diagonal();
   for (std::size_t i = 0; i < left_out.kept().size(); ++i) {
     const ParameterId& state = all.states[static_cast<std::size_t>(left_out.kept()[i])];
-    if (const auto its = members[state.gyro()].find(state.coefficient); its != members[state.gyro()].end()) {
+    const auto its = members[state.gyro()].find(state.coefficient);
+    if (state.is_drift() && its != members[state.gyro()].end()) {
       its->second += more(static_cast<Eigen::Index>(i));
     }
   }

@@ -136,7 +136,7 @@ TEST(LeftOut, IsInTheCalibrationAgainWhichReducedIsWhatWasEstimated) {
   const Eigen::Index align = kEsg7.size();
   estimated.covariance(0, align) = estimated.covariance(align, 0) = 1e-20;
 
-  const Calibration completed = left_out.completed(estimated);
+  const Calibration completed = left_out.completed(estimated, {});
   EXPECT_EQ(completed.states, all.states);
   EXPECT_NEAR(value_of(completed, ParameterId::drift(0, DriftCoefficient::of_eq1(0))), 1e-6 + 5e-9, 1e-14);
   EXPECT_EQ(value_of(completed, ParameterId::drift(0, {kW, 2, 1})), 2e-8);
@@ -144,8 +144,36 @@ TEST(LeftOut, IsInTheCalibrationAgainWhichReducedIsWhatWasEstimated) {
   EXPECT_NEAR(sigma_of(completed, ParameterId::drift(0, DriftCoefficient::of_eq1(0))), std::sqrt(9e-16 + 4e-20), 1e-14);
   const Calibration again = LeftOut(completed, kEsg7).reduced();
   EXPECT_NEAR(again.gyros[0].drift_rad_s[0], estimated.gyros[0].drift_rad_s[0], 1e-18);
-  EXPECT_EQ(again.gyros[0].alignment_rotation_vector_rad, estimated.gyros[0].alignment_rotation_vector_rad);
+  EXPECT_LT((again.gyros[0].alignment_rotation_vector_rad - estimated.gyros[0].alignment_rotation_vector_rad).norm(),
+            1e-15);
   EXPECT_LT((again.covariance - estimated.covariance).cwiseAbs().maxCoeff(), 1e-26);
+}
+
+/// Where an alignment stood for a part of it, it is known as badly; and the momentum is read through the alignment.
+TEST(LeftOut, IsMadeUpForByAlignmentsWithWhichTheMomentaTurn) {
+  Calibration all = by_a_flight_on_which_k0_acts_as_three_times_a_member();
+  const Eigen::Index member = row_of(all, {kW, 2, 1});
+  const Eigen::Index align_y = rows_of(all, {ParameterId::alignment(1, 1)}).front();
+  const double turn_per_drift = 200;  // 2e-8 rad/s are 4e-6 rad
+  all.covariance(align_y, align_y) += turn_per_drift * turn_per_drift * 1e-16;
+  all.covariance(align_y, member) = all.covariance(member, align_y) = -turn_per_drift * 1e-16;
+  const LeftOut left_out(all, kEsg7);
+  Calibration estimated = left_out.reduced();
+  EXPECT_NEAR(estimated.gyros[1].alignment_rotation_vector_rad.y(), 4e-6, 1e-14);
+  const Eigen::Index kept = kEsg7.size() * 2 + 3 + 1;
+  EXPECT_EQ(estimated.states[static_cast<std::size_t>(kept)], ParameterId::alignment(1, 1));
+  EXPECT_NEAR(std::sqrt(estimated.covariance(kept, kept)), 1e-9, 1e-14);
+
+  estimated.gyros[1].momentum_in = Eigen::Vector3d::UnitX();
+  const AttitudeSolution attitude{
+      Rot<In, C>::assume(Eigen::AngleAxisd(std::numbers::pi / 2, Eigen::Vector3d::UnitX()).toRotationMatrix()), {}};
+  const Calibration completed = left_out.completed(estimated, attitude);
+  EXPECT_LT(completed.gyros[1].alignment_rotation_vector_rad.norm(), 1e-15);
+  EXPECT_NEAR(sigma_of(completed, ParameterId::alignment(1, 1)), std::hypot(2e-6, 1e-9), 1e-12);
+  // −4e-6 rad about y of c, which is z of `in`.
+  EXPECT_LT((completed.gyros[1].momentum_in - Eigen::Vector3d(1, -4e-6, 0)).norm(), 1e-10);
+  EXPECT_EQ(completed.gyros[0].momentum_in, estimated.gyros[0].momentum_in);
+  EXPECT_EQ(left_out.completed(estimated, {}).gyros[1].momentum_in, Eigen::Vector3d::UnitX());
 }
 
 TEST(LeftOut, IsInTheHistoryAndThePriorAsUncertainAsItIs) {
@@ -175,7 +203,7 @@ TEST(LeftOut, IsNothingByTheSameModel) {
   const LeftOut left_out(all, vsh(2));
   EXPECT_TRUE(left_out.nothing());
   EXPECT_EQ(left_out.reduced().covariance, all.covariance);
-  EXPECT_EQ(left_out.completed(all).covariance, all.covariance);
+  EXPECT_EQ(left_out.completed(all, {}).covariance, all.covariance);
   EXPECT_EQ(left_out.completed_prior(all).states, all.states);
   EXPECT_EQ(left_out.completed(ParameterHistory{{Time{}}, {{1}}, {{2}}}).value,
             (std::vector<std::vector<double>>{{1}}));
@@ -219,6 +247,30 @@ TEST(LeftOut, WalksAsFarAsNothingMakesUpForIt) {
   EXPECT_NEAR(left_out_walk_rad_sqrt_s(left_out, all, orbits(std::chrono::hours(1))), rate * std::sqrt(45 * 60 / 2.0),
               1e-2 * rate * std::sqrt(45 * 60 / 2.0));
   EXPECT_EQ(left_out_walk_rad_sqrt_s(left_out, all, orbits(std::chrono::minutes(5))), 0);
+}
+
+/// Drift about y of the case turns the momentum as an error of the alignment about x does, on orbits().
+TEST(LeftOut, WalksNowhereWhereTheAlignmentMakesUpForIt) {
+  Calibration all;
+  all.gyros.resize(2);
+  for (GyroCalibration& gyro : all.gyros) {
+    gyro.drift_model = vsh(1);
+    gyro.drift_rad_s.assign(static_cast<std::size_t>(vsh(1).size()), 0);
+  }
+  all.states = drift_and_alignment(vsh(1), 2);
+  const auto size = static_cast<Eigen::Index>(all.states.size());
+  all.covariance = Eigen::MatrixXd::Identity(size, size) * 1e-30;
+  const Eigen::Index member = row_of(all, {kW, 1, -1});
+  const Eigen::Index align_x = rows_of(all, {ParameterId::alignment(0, 0)}).front();
+  all.covariance(member, member) = 1e-18;
+  const ScreenedPass pass = orbits(std::chrono::hours(9));
+  const double alone = left_out_walk_rad_sqrt_s(LeftOut(all, kEsg7), all, pass);
+  EXPECT_GT(alone, 5e-9);
+  // −∇W(1, −1) = −sqrt(3/4π) y, over one radian of the orbit.
+  const double turn_per_drift = -std::sqrt(3 / (4 * std::numbers::pi)) * 5400 / (2 * std::numbers::pi);
+  all.covariance(align_x, align_x) += turn_per_drift * turn_per_drift * 1e-18;
+  all.covariance(align_x, member) = all.covariance(member, align_x) = -turn_per_drift * 1e-18;
+  EXPECT_LT(left_out_walk_rad_sqrt_s(LeftOut(all, kEsg7), all, pass), 1e-3 * alone);
 }
 
 TEST(DriftOnBoard, IsWhatACalibrationWithAFieldSays) {
