@@ -169,7 +169,8 @@ Json calibrate_output() {
                                {"verdict", verdict()},
                                {"coefficients?", agreement()},
                                {"alignments?", agreement()}});
-  const Json evidence = object({{"states", text()}, {"log_bayes_factor", number()}, {"accepted", flag()}});
+  const Json evidence =
+      object({{"states", text()}, {"log_bayes_factor", number()}, {"accepted", flag()}, {"open_sigma", number()}});
   const Json model = object({{"drift_model", text()},
                              {"coefficients", count()},
                              {"log_likelihood", number()},

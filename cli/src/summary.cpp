@@ -517,7 +517,10 @@ nlohmann::ordered_json course_json(const CalibrationRun& run, const ground::Cali
   }
   nlohmann::ordered_json evidence = nlohmann::ordered_json::array();
   for (const Evidence& its : run.evidence) {
-    evidence.push_back({{"states", its.key()}, {"log_bayes_factor", its.log_bayes_factor}, {"accepted", its.accepted}});
+    evidence.push_back({{"states", its.key()},
+                        {"log_bayes_factor", its.log_bayes_factor},
+                        {"accepted", its.accepted},
+                        {"open_sigma", its.open_sigma ? nlohmann::ordered_json(*its.open_sigma) : nullptr}});
   }
   return {{"evidence", evidence},
           {"drift_models", models},

@@ -227,6 +227,33 @@ void settle_states(const Trial& everything, const PassSettings& settings, const 
   }
 }
 
+/// States that were open and are taken as zero.
+std::vector<FurtherState> left_out_of(const CalibrationOptions& asked, const CalibrationOptions& decided) {
+  std::vector<FurtherState> left_out;
+  for (const FurtherStateRow& row : kFurtherStates) {
+    if (is_judged_by_trial(row) && asked.further_states[row.state] == Choice::kAuto &&
+        !decided.further_states.is_on(row.state)) {
+      left_out.push_back(row.state);
+    }
+  }
+  return left_out;
+}
+
+std::vector<FurtherState> without(FurtherState state, std::vector<FurtherState> states) {
+  std::erase(states, state);
+  return states;
+}
+
+/// Tells what the pass leaves open of the states that are taken as zero.
+void tell_what_is_open(const Trial& everything, const CalibrationOptions& asked, Decision& decision) {
+  const std::vector<FurtherState> left_out = left_out_of(asked, decision.options);
+  for (Evidence& evidence : decision.evidence) {
+    if (evidence.state && std::ranges::find(left_out, *evidence.state) != left_out.end()) {
+      evidence.open_sigma = everything.sigma(*evidence.state, without(*evidence.state, left_out));
+    }
+  }
+}
+
 /// A state that was left out, though there is evidence of it where the others that were left out are zero.
 struct Doubt {
   FurtherState state;
@@ -236,22 +263,14 @@ struct Doubt {
 /// The likeliest first. States that look alike in a pass hide one another while all are free.
 std::vector<Doubt> doubts_of(const Trial& everything, const CalibrationOptions& asked, bool other_drift,
                              const CalibrationOptions& decided) {
-  std::vector<FurtherState> left_out;
-  for (const FurtherStateRow& row : kFurtherStates) {
-    if (is_judged_by_trial(row) && asked.further_states[row.state] == Choice::kAuto &&
-        !decided.further_states.is_on(row.state)) {
-      left_out.push_back(row.state);
-    }
-  }
+  const std::vector<FurtherState> left_out = left_out_of(asked, decided);
   std::vector<Doubt> doubts;
   for (const FurtherState state : left_out) {
     if (state == FurtherState::kClockRate && asked.further_states[FurtherState::kClockOffset] == Choice::kAuto &&
         !decided.further_states.is_on(FurtherState::kClockOffset)) {
       continue;
     }
-    std::vector<FurtherState> others;
-    std::ranges::remove_copy(left_out, std::back_inserter(others), state);
-    const LogEvidence log_evidence = everything.log_evidence(state, others);
+    const LogEvidence log_evidence = everything.log_evidence(state, without(state, left_out));
     if (log_evidence.value > enough_for(state, other_drift)) {
       doubts.push_back({state, log_evidence});
     }
@@ -514,6 +533,7 @@ Decision decide_by_pass(const Pass& pass, const Screened& screened, const Calibr
   options.find_noise = asked.find_noise && changes.size() >= kLeastFixPairs;
   if (!options.find_noise) {
     settle_states(free.trial, pass.settings, asked, false, decision);
+    tell_what_is_open(free.trial, asked, decision);
     decision.use(moves_over(free.trial));
     decision.nearby = free.trial.nearby();
     if (options.drift_field) {
@@ -531,6 +551,8 @@ Decision decide_by_pass(const Pass& pass, const Screened& screened, const Calibr
     free.walking = with_most_likely_walk(free.trial, with_everything(options, asked, largest_model));
   }
   Settled settled = without_doubt(pass, screened, options, largest_model, wandering_is_open, free, progress);
+  const bool wanders = settled.decision.options.further_states.is_on(FurtherState::kWanderingDrift);
+  tell_what_is_open(wanders && free.wandering ? free.wandering->first : free.trial, options, settled.decision);
   keep_field(settled.last, settled.decision);
   settled.decision.nearby = settled.last.nearby();
   settled.decision.use(moves_over(settled.last));

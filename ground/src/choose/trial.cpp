@@ -211,21 +211,20 @@ std::optional<FieldPrior> Trial::field_prior() const {
                              most_likely_spectrum(*field_, information, spectrum_.log_rms));
 }
 
-Trial::InPriorSigmas Trial::in_prior_sigmas(const std::vector<FurtherState>& states) const {
+Trial::InPriorSigmas Trial::in_prior_sigmas(FurtherState state, const std::vector<FurtherState>& zero) const {
   std::vector<int> rows;
   std::vector<double> values;
   std::vector<double> sigmas;
-  InPriorSigmas found;
+  std::vector<Eigen::Index> its;
+  std::vector<Eigen::Index> others;
   const Layout& layout = problem_.layout();
   const CalibrationSetup& setup = problem_.setup().on_board;
   for (const ParameterId& parameter : further_parameters(layout)) {
-    const auto of = std::ranges::find_if(states, [&](FurtherState state) { return parameter.is_further(state); });
-    if (of == states.end()) {
+    const bool is_other = std::ranges::any_of(zero, [&](FurtherState other) { return parameter.is_further(other); });
+    if (!is_other && !parameter.is_further(state)) {
       continue;
     }
-    if (of == states.begin()) {
-      found.of_first.push_back(static_cast<Eigen::Index>(rows.size()));
-    }
+    (is_other ? others : its).push_back(static_cast<Eigen::Index>(rows.size()));
     rows.push_back(state_of(layout, parameter));
     values.push_back(value_of(setup.layout, found_.solution.gyros, found_.solution.shared, parameter));
     sigmas.push_back(prior_sigma_of_further_state(setup, state_of(setup.layout, parameter)));
@@ -234,32 +233,27 @@ Trial::InPriorSigmas Trial::in_prior_sigmas(const std::vector<FurtherState>& sta
     return Eigen::VectorXd::Map(numbers.data(), static_cast<Eigen::Index>(numbers.size()));
   };
   const Eigen::VectorXd scale = vector(sigmas).cwiseInverse();
-  found.estimate = vector(values).cwiseProduct(scale);
-  found.root = scale.asDiagonal() * found_.errors.last_root(rows, Eigen::all);
+  const Eigen::VectorXd estimate = vector(values).cwiseProduct(scale);
+  const Eigen::MatrixXd root = scale.asDiagonal() * found_.errors.last_root(rows, Eigen::all);
+  const Eigen::MatrixXd covariance = root * root.transpose();
+  InPriorSigmas found{estimate(its), covariance(its, its), vector(sigmas)(its)};
+  if (!others.empty()) {
+    const Eigen::MatrixXd gain =
+        Eigen::LLT<Eigen::MatrixXd>(covariance(others, others)).solve(covariance(others, its)).transpose();
+    found.estimate -= gain * estimate(others);
+    found.covariance -= gain * covariance(others, its);
+  }
   return found;
 }
 
 LogEvidence Trial::log_evidence(FurtherState state, const std::vector<FurtherState>& zero) const {
-  std::vector<FurtherState> states{state};
-  states.insert(states.end(), zero.begin(), zero.end());
-  const InPriorSigmas found = in_prior_sigmas(states);
-  const Eigen::MatrixXd covariance = found.root * found.root.transpose();
-  const std::vector<Eigen::Index>& its = found.of_first;
-  std::vector<Eigen::Index> others;
-  for (Eigen::Index row = 0; row < found.estimate.size(); ++row) {
-    if (std::ranges::find(its, row) == its.end()) {
-      others.push_back(row);
-    }
-  }
-  Eigen::VectorXd estimate = found.estimate(its);
-  Eigen::MatrixXd its_covariance = covariance(its, its);
-  if (!others.empty()) {
-    const Eigen::MatrixXd gain =
-        Eigen::LLT<Eigen::MatrixXd>(covariance(others, others)).solve(covariance(others, its)).transpose();
-    estimate -= gain * found.estimate(others);
-    its_covariance -= gain * covariance(others, its);
-  }
-  return log_bayes_factor(estimate, its_covariance);
+  const InPriorSigmas found = in_prior_sigmas(state, zero);
+  return log_bayes_factor(found.estimate, found.covariance);
+}
+
+double Trial::sigma(FurtherState state, const std::vector<FurtherState>& zero) const {
+  const InPriorSigmas found = in_prior_sigmas(state, zero);
+  return found.covariance.diagonal().cwiseSqrt().cwiseProduct(found.prior_sigma).maxCoeff();
 }
 
 std::vector<Forecast> Trial::forecasts() const {

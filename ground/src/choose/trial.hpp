@@ -69,6 +69,8 @@ class Trial {
   /// ln of the Bayes factor of this state, which the trial must have, where those of `zero` are zero; of no drift that
   /// wanders.
   [[nodiscard]] LogEvidence log_evidence(FurtherState state, const std::vector<FurtherState>& zero = {}) const;
+  /// 1-sigma of its largest component then, by the pass and the prior, in the unit of the state.
+  [[nodiscard]] double sigma(FurtherState state, const std::vector<FurtherState>& zero = {}) const;
   /// Forecasts by its drift model and those that it contains; none of a field.
   [[nodiscard]] std::vector<Forecast> forecasts() const;
 
@@ -78,13 +80,14 @@ class Trial {
   [[nodiscard]] std::vector<Eigen::Vector3d> changes_rad() const;
 
  private:
-  /// Estimates of further states, and a square root of their covariance, in units of the 1-sigmas of their prior.
+  /// Estimates of the components of a further state and their covariance, in units of the 1-sigmas of their prior.
   struct InPriorSigmas {
     Eigen::VectorXd estimate;
-    Eigen::MatrixXd root;
-    std::vector<Eigen::Index> of_first;  ///< rows of the first of the states
+    Eigen::MatrixXd covariance;
+    Eigen::VectorXd prior_sigma;  ///< in the unit of the state
   };
-  [[nodiscard]] InPriorSigmas in_prior_sigmas(const std::vector<FurtherState>& states) const;
+  /// With these others at zero.
+  [[nodiscard]] InPriorSigmas in_prior_sigmas(FurtherState state, const std::vector<FurtherState>& zero) const;
   void fit(PassSolution first, bool is_near);
   void use_modes(Eigen::VectorXd level, PassSolution& solution);
   void put_spectrum_into_prior();

@@ -1,9 +1,11 @@
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <initializer_list>
 #include <numbers>
 #include <string>
+#include <vector>
 
 #include "choose/decide.hpp"
 #include "passes.hpp"
@@ -63,6 +65,45 @@ TEST(LogEvidence, IsTheGainInTheLikelihoodOfThePass) {
       FurtherState::kClockOffset, {FurtherState::kClockRate, FurtherState::kOrbitalError, FurtherState::kReadoutBias});
   EXPECT_NEAR(given_others.value, evidence.value, 0.05);
   EXPECT_GT(std::abs(given_others.value - all.log_evidence(FurtherState::kClockOffset).value), 0.1);
+}
+
+TEST(Trial, TellsTheSigmaOfAStateAsAFitWithItAloneDoes) {
+  const Pass pass = sim::simulate(turning(5, std::chrono::hours(2))).pass;
+  const CalibrationRun run = calibrate(pass, with({FurtherState::kClockOffset}));
+  ASSERT_EQ(run.calibration.further.size(), 1U);
+  const double sigma_s = run.calibration.further[0].sigma;
+  const Screened screened = screen(pass, with({}));
+  const std::vector<FurtherState> others{FurtherState::kClockRate, FurtherState::kOrbitalError,
+                                         FurtherState::kReadoutBias};
+  const Trial all(pass, screened,
+                  with({FurtherState::kClockOffset, FurtherState::kClockRate, FurtherState::kOrbitalError,
+                        FurtherState::kReadoutBias}));
+  EXPECT_NEAR(all.sigma(FurtherState::kClockOffset, others), sigma_s, 0.02 * sigma_s);
+  EXPECT_GT(all.sigma(FurtherState::kClockOffset), 1.1 * sigma_s);
+}
+
+TEST(StatesInDoubt, AreToldWhereAFlightWithoutSlewsLeavesThemOpen) {
+  Scenario scenario = scenario_in_eq1(6, std::chrono::hours(3));
+  scenario.attitude.reference = AttitudeScenario::Reference::kYawSteered;
+  const CalibrationRun slewing = calibrate(sim::simulate(scenario).pass, CalibrationOptions());
+  scenario.attitude.slews = std::vector<Slew>{};
+  const Pass steady = sim::simulate(scenario).pass;
+  const CalibrationRun run = calibrate(steady, CalibrationOptions());
+  const auto open_sigma = [](const CalibrationRun& its, FurtherState state) {
+    return std::ranges::find(its.evidence, state, &Evidence::state)->open_sigma.value();
+  };
+  // The priors are 20″ and 0.1 s.
+  EXPECT_LT(open_sigma(slewing, FurtherState::kOrbitalError), 2 * kArcsecond);
+  EXPECT_GT(open_sigma(run, FurtherState::kOrbitalError), 5 * kArcsecond);
+  EXPECT_LT(open_sigma(slewing, FurtherState::kClockOffset), 1e-3);
+  EXPECT_GT(open_sigma(run, FurtherState::kClockOffset), 5e-3);
+  EXPECT_FALSE(slewing.calibration.verdict.has(FindingCode::kStarTrackerErrorsNotShown));
+  EXPECT_TRUE(run.calibration.verdict.has(FindingCode::kStarTrackerErrorsNotShown));
+  // What is said to be none is not open.
+  CalibrationOptions none;
+  none.further_states[FurtherState::kOrbitalError] = Choice::kOff;
+  none.further_states[FurtherState::kClockOffset] = Choice::kOff;
+  EXPECT_FALSE(calibrate(steady, none).calibration.verdict.has(FindingCode::kStarTrackerErrorsNotShown));
 }
 
 TEST(StatesInDoubt, AreTakenInWhereOthersHidThem) {

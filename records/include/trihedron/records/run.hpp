@@ -67,6 +67,9 @@ struct Evidence {
   std::optional<FurtherState> state;  ///< without it: the coefficients that eq. (1) does not have
   double log_bayes_factor = 0;
   bool accepted = false;
+  /// Of a state that is taken as zero: what it may be by the pass and its prior together, were it free and all others
+  /// that are taken as zero were; 1-sigma of its largest component, in its unit.
+  std::optional<double> open_sigma{};
 
   /// For programs: the key of the further state, or "drift_outside_eq1".
   [[nodiscard]] std::string_view key() const { return state ? row_of(*state).key : "drift_outside_eq1"; }

@@ -1,0 +1,62 @@
+#include "judge/not_shown.hpp"
+
+#include <fmt/format.h>
+
+#include <Eigen/Core>
+#include <string>
+
+#include "judge/noise_by_rate.hpp"
+#include "model/scatter.hpp"
+#include "trihedron/records/units.hpp"
+
+namespace trihedron::ground {
+namespace {
+
+/// As far as the state may turn the attitude unseen, 1-sigma about one axis, rad; 0 of one that does not.
+double turns_rad(const Evidence& evidence, double rate_rad_s) {
+  if (!evidence.open_sigma) {
+    return 0;
+  }
+  if (evidence.state == FurtherState::kClockOffset) {
+    return *evidence.open_sigma * rate_rad_s;
+  }
+  return evidence.state == FurtherState::kOrbitalError ? *evidence.open_sigma : 0;
+}
+
+}  // namespace
+
+void judge_what_is_not_shown(const Pass& pass, const CalibrationRun& run, std::vector<Finding>& findings) {
+  constexpr double kSigmas = 3;
+  std::vector<double> claimed;
+  for (const Eigen::Vector3d& sigma_rad : run.attitude.sigma_rad) {
+    claimed.push_back(sigma_rad.minCoeff());
+  }
+  if (claimed.empty()) {
+    return;
+  }
+  const double claimed_rad = median_of(claimed);
+  const double rate_rad_s = usual_rate_rad_s(pass.star_tracker).value_or(0);
+  std::string names;
+  std::string keys;
+  for (const Evidence& evidence : run.evidence) {
+    const double turn_rad = turns_rad(evidence, rate_rad_s);
+    if (turn_rad > kSigmas * claimed_rad) {
+      names += fmt::format("{}{} {:.1f}″", names.empty() ? "" : ", ", evidence.label(), turn_rad / kArcsecond);
+      keys += fmt::format("{}{} = \"off\"", keys.empty() ? "" : ", ", evidence.key());
+    }
+  }
+  if (!names.empty()) {
+    findings.push_back(
+        {FindingCode::kStarTrackerErrorsNotShown,
+         "The flight does not tell an error of the star tracker from alignment and drift: it is taken as zero, and "
+         "what "
+         "there is of it turns the attitude beyond its sigmas.",
+         fmt::format("1σ about an axis that is left open, where {:.1f}″ is claimed about the best known: {}",
+                     claimed_rad / kArcsecond, names),
+         fmt::format("Fly slews about two axes during the calibration; or say in [further_states] of the settings that "
+                     "there is none ({}).",
+                     keys)});
+  }
+}
+
+}  // namespace trihedron::ground
