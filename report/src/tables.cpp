@@ -305,8 +305,9 @@ std::string drift_model_of(const CalibrationRun& run) {
   const std::optional<OnBoardDrift>& on_board = run.calibration.on_board_drift;
   return !on_board || on_board->drift_model == its
              ? drift_model_word(run.options)
-             : fmt::format("{}; on board {}, whose coefficients make up for the members that it leaves out",
-                           name_of(its), name_of(on_board->drift_model));
+             : fmt::format(
+                   "{}; on board {}, whose coefficients and alignments make up for the members that it leaves out",
+                   name_of(its), name_of(on_board->drift_model));
 }
 
 json settings_of(const ReportInput& input) {

@@ -88,7 +88,7 @@ double left_out_walk_rad_sqrt_s(const LeftOut& left_out, const Calibration& all,
         turn += to_seconds(fix.fix.t - t.back()) / 2 * (rate_before + rate);
       }
       t.push_back(fix.fix.t);
-      turned.push_back(turn - across * C_c_b.transpose() * alignment);
+      turned.emplace_back(turn - across * C_c_b.transpose() * alignment);
       rate_before = std::move(rate);
     }
     for (const Duration lag : kLags) {

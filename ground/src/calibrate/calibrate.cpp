@@ -298,6 +298,14 @@ std::optional<LeftOut> left_out_by(const PassSettings& settings, const Calibrati
   return left_out.nothing() ? std::nullopt : std::optional(std::move(left_out));
 }
 
+/// By the latest readings; where they are not those of a pair, at the last fix that was used.
+Rot<In, C> attitude_at_the_end(const Pipeline& pipeline, const CalibrationRun& run) {
+  if (const std::optional<AttitudeSolution> attitude = pipeline.navigation_attitude()) {
+    return attitude->C_in_c;
+  }
+  return run.attitude.size() > 0 ? Rot<In, C>::assume(run.attitude.q_in_c.back()) : Rot<In, C>();
+}
+
 /// `pass`: with its stamps corrected. Without a verdict.
 CalibrationRun calibrate_as_stamped(const Pass& pass, const CalibrationOptions& options, const Progress& progress) {
   Decision decision = decide(pass, options, progress);
@@ -373,7 +381,7 @@ CalibrationRun calibrate_as_stamped(const Pass& pass, const CalibrationOptions& 
     if (run.calibration.noise) {  // what the pass needs: what stands for the members left out is beside it
       run.calibration.noise->direction_random_walk_rad_sqrt_s = decision.options.direction_random_walk_rad_sqrt_s;
     }
-    run.calibration = left_out->completed(std::move(run.calibration), pipeline.navigation_attitude());
+    run.calibration = left_out->completed(std::move(run.calibration), attitude_at_the_end(pipeline, run));
     run.parameters = left_out->completed(run.parameters);
     run.known_before = pass.settings.prior ? left_out->completed(std::move(run.known_before), {})
                                            : left_out->completed_prior(std::move(run.known_before));

@@ -155,6 +155,17 @@ bool has_weak_axis(const PassAlone& pass) {
 }
 
 /// Of the last pass from those before, by what each pass is.
+/// What no pass shows by itself they do not show together, of which only the first was asked.
+void keep_what_is_not_shown(const std::vector<PassAlone>& passes, std::vector<Finding>& findings) {
+  constexpr FindingCode kNotShown = FindingCode::kStarTrackerErrorsNotShown;
+  if (std::ranges::all_of(passes, [](const PassAlone& pass) { return pass.run.calibration.verdict.has(kNotShown); })) {
+    const PassAlone& last = passes.back();
+    Finding& finding =
+        findings.emplace_back(*std::ranges::find(last.run.calibration.verdict.findings, kNotShown, &Finding::code));
+    finding.evidence = fmt::format("in each pass, as in {}: {}", last.name, finding.evidence);
+  }
+}
+
 Verdict judge_together(const Verdict& last, const std::vector<PassAlone>& passes) {
   Verdict verdict;
   for (const PassAlone& pass : passes) {
@@ -164,6 +175,7 @@ Verdict judge_together(const Verdict& last, const std::vector<PassAlone>& passes
   if (!std::ranges::all_of(passes, has_weak_axis)) {
     std::erase_if(verdict.findings, [](const Finding& finding) { return finding.code == kWeakAxis; });
   }
+  keep_what_is_not_shown(passes, verdict.findings);
   verdict.trustworthy = std::ranges::none_of(
       verdict.findings, [](const Finding& finding) { return finding.severity == Severity::kDoNotUse; });
   return verdict;

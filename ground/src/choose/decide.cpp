@@ -951,8 +951,8 @@ Decision for_on_board(Decision decided, const Pass& pass, const Screened& screen
   const double log_evidence = decided.field->log_evidence;
   const bool is_evident = log_evidence > kLogOddsToAccept;
   decided.evidence.push_back({{}, log_evidence, is_evident});
-  // Without evidence the coefficients of eq. (1) make up for what there may be of it all the same, and are off by as
-  // much: that is in their covariance.
+  // Without evidence the coefficients of eq. (1) and the alignments make up for what there may be of it all the same,
+  // and are off by as much: that is in their covariance.
   const DriftOnBoard drift = is_evident ? drift_on_board(decided.field->members) : DriftOnBoard{kEsg7, 0};
   decided.settings = pass.settings;
   decided.options.drift_field = false;

@@ -34,17 +34,7 @@ std::vector<double> rates_of(const StarTrackerTelemetry& star_tracker) {
   return rates;
 }
 
-std::optional<double> median_of_known(const std::vector<double>& rates) {
-  std::vector<double> known;
-  std::ranges::copy_if(rates, std::back_inserter(known), [](double rate) { return std::isfinite(rate); });
-  return known.empty() ? std::nullopt : std::optional(median_of(known));
-}
-
 }  // namespace
-
-std::optional<double> usual_rate_rad_s(const StarTrackerTelemetry& star_tracker) {
-  return median_of_known(rates_of(star_tracker));
-}
 
 std::optional<NoiseByRate> noise_by_rate(const StarTrackerTelemetry& star_tracker,
                                          const std::vector<FixRecord>& fixes) {
@@ -52,11 +42,13 @@ std::optional<NoiseByRate> noise_by_rate(const StarTrackerTelemetry& star_tracke
   constexpr double kSlewOverUsual = 3;
   constexpr double kRestOverUsual = 1.5;
   const std::vector<double> rates = rates_of(star_tracker);
-  const std::optional<double> usual_rad_s = median_of_known(rates);
-  if (!usual_rad_s) {
+  std::vector<double> known;
+  std::ranges::copy_if(rates, std::back_inserter(known), [](double rate) { return std::isfinite(rate); });
+  if (known.empty()) {
     return std::nullopt;
   }
-  const double least_rad_s = std::max(kSlewOverUsual * *usual_rad_s, kSlowestSlew_rad_s);
+  const double usual_rad_s = median_of(known);
+  const double least_rad_s = std::max(kSlewOverUsual * usual_rad_s, kSlowestSlew_rad_s);
   std::vector<double> at_rest;
   std::vector<double> in_slews;
   std::vector<double> slew_rates;
@@ -71,7 +63,7 @@ std::optional<NoiseByRate> noise_by_rate(const StarTrackerTelemetry& star_tracke
     if (rate > least_rad_s) {
       in_slews.push_back(fix.nis / fix.degrees_of_freedom);
       slew_rates.push_back(rate);
-    } else if (rate < kRestOverUsual * *usual_rad_s) {
+    } else if (rate < kRestOverUsual * usual_rad_s) {
       at_rest.push_back(fix.nis / fix.degrees_of_freedom);
     }
   }

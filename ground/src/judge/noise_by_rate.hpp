@@ -17,9 +17,6 @@ struct NoiseByRate {
   double rate_rad_s = 0;  ///< of the body in slews, median
 };
 
-/// Median rate of the body by the fixes; nothing where they are too few, or too far apart.
-[[nodiscard]] std::optional<double> usual_rate_rad_s(const StarTrackerTelemetry& star_tracker);
-
 /// Slews are where the body turns, by the fixes, three times as fast as it mostly does. Nothing where there are too few
 /// fixes in slews.
 [[nodiscard]] std::optional<NoiseByRate> noise_by_rate(const StarTrackerTelemetry& star_tracker,

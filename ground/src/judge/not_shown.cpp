@@ -5,7 +5,6 @@
 #include <Eigen/Core>
 #include <string>
 
-#include "judge/noise_by_rate.hpp"
 #include "model/scatter.hpp"
 #include "trihedron/records/units.hpp"
 
@@ -23,9 +22,21 @@ double turns_rad(const Evidence& evidence, double rate_rad_s) {
   return evidence.state == FurtherState::kOrbitalError ? *evidence.open_sigma : 0;
 }
 
+/// At which the body turns from one fix to the next, the median; 0 where there is no second one.
+double usual_rate_rad_s(const AttitudeHistory& attitude) {
+  std::vector<double> rates;
+  for (std::size_t i = 1; i < attitude.size(); ++i) {
+    const double span_s = to_seconds(attitude.t[i] - attitude.t[i - 1]);
+    if (span_s > 0) {
+      rates.push_back(attitude.q_in_c[i].angularDistance(attitude.q_in_c[i - 1]) / span_s);
+    }
+  }
+  return rates.empty() ? 0 : median_of(rates);
+}
+
 }  // namespace
 
-void judge_what_is_not_shown(const Pass& pass, const CalibrationRun& run, std::vector<Finding>& findings) {
+void judge_what_is_not_shown(const CalibrationRun& run, std::vector<Finding>& findings) {
   constexpr double kSigmas = 3;
   std::vector<double> claimed;
   for (const Eigen::Vector3d& sigma_rad : run.attitude.sigma_rad) {
@@ -35,7 +46,7 @@ void judge_what_is_not_shown(const Pass& pass, const CalibrationRun& run, std::v
     return;
   }
   const double claimed_rad = median_of(claimed);
-  const double rate_rad_s = usual_rate_rad_s(pass.star_tracker).value_or(0);
+  const double rate_rad_s = usual_rate_rad_s(run.attitude);
   std::string names;
   std::string keys;
   for (const Evidence& evidence : run.evidence) {
@@ -48,14 +59,15 @@ void judge_what_is_not_shown(const Pass& pass, const CalibrationRun& run, std::v
   if (!names.empty()) {
     findings.push_back(
         {FindingCode::kStarTrackerErrorsNotShown,
-         "The flight does not tell an error of the star tracker from alignment and drift: it is taken as zero, and "
-         "what "
-         "there is of it turns the attitude beyond its sigmas.",
+         "The flight does not tell errors of the star tracker from alignment and drift. They are taken as zero: what "
+         "there "
+         "is of them turns the attitude beyond the sigmas that are claimed.",
          fmt::format("1σ about an axis that is left open, where {:.1f}″ is claimed about the best known: {}",
                      claimed_rad / kArcsecond, names),
-         fmt::format("Fly slews about two axes during the calibration; or say in [further_states] of the settings that "
-                     "there is none ({}).",
-                     keys)});
+         fmt::format(
+             "Calibrate by a longer pass, with slews about two axes; or say in [further_states] of the settings "
+             "that there are none ({}).",
+             keys)});
   }
 }
 

@@ -4,13 +4,12 @@
 #include <vector>
 
 #include "trihedron/records/finding.hpp"
-#include "trihedron/records/pass.hpp"
 #include "trihedron/records/run.hpp"
 
 namespace trihedron::ground {
 
 /// Finds a clock offset, or an error at orbital period, that is taken as zero though the pass does not tell: what there
 /// is of it turns the attitude by more than its sigmas say. `run`: with its attitude and its evidence.
-void judge_what_is_not_shown(const Pass& pass, const CalibrationRun& run, std::vector<Finding>& findings);
+void judge_what_is_not_shown(const CalibrationRun& run, std::vector<Finding>& findings);
 
 }  // namespace trihedron::ground

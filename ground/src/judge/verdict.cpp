@@ -973,7 +973,7 @@ Verdict judge(const Pass& pass, const CalibrationRun& run) {
   judge_star_tracker(statistics, findings);
   judge_contradictions(run.fixes, run.gyro_events, pass.settings.epoch, findings);
   judge_noise_by_rate(pass, run, findings);
-  judge_what_is_not_shown(pass, run, findings);
+  judge_what_is_not_shown(run, findings);
   judge_batch(statistics, findings);
   judge_gyros(pass, run.gyro_events, static_cast<int>(run.calibration.gyros.size()),
               " Without it there is no pair at the end of the pass, and no attitude but at fixes.", findings);

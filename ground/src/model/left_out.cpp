@@ -18,35 +18,38 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-double& value_in(Calibration& calibration, const ParameterId& drift) {
-  GyroCalibration& gyro = calibration.gyros.at(drift.gyro());
+/// Of a drift coefficient or a component of an alignment.
+double& value_in(Calibration& calibration, const ParameterId& state) {
+  GyroCalibration& gyro = calibration.gyros.at(state.gyro());
+  if (state.is_alignment()) {
+    return gyro.alignment_rotation_vector_rad(static_cast<Index>(state.component));
+  }
   const std::vector<DriftCoefficient> its = coefficients_of(gyro.drift_model);
-  return gyro.drift_rad_s.at(static_cast<std::size_t>(std::ranges::find(its, drift.coefficient) - its.begin()));
+  return gyro.drift_rad_s.at(static_cast<std::size_t>(std::ranges::find(its, state.coefficient) - its.begin()));
 }
 
-/// Of each gyro, as rotation vector in c, rad: what corrections of coefficients and alignments say of the latter.
-std::vector<Eigen::Vector3d> turns_of(const std::vector<ParameterId>& states, const VectorXd& corrections,
-                                      std::size_t gyros) {
-  std::vector<Eigen::Vector3d> turns(gyros, Eigen::Vector3d::Zero());
-  for (std::size_t i = 0; i < states.size(); ++i) {
-    if (states[i].is_alignment()) {
-      turns.at(states[i].gyro())(static_cast<Index>(states[i].component)) = corrections(static_cast<Index>(i));
+/// Values of states in the order of drift_and_alignment(), with the corrections of the alignments as rotations in c
+/// after them: exp(correction) exp(alignment).
+VectorXd corrected(const std::vector<ParameterId>& states, VectorXd values, const VectorXd& corrections) {
+  for (Index i = 0; i < values.size(); ++i) {
+    const ParameterId& state = states[static_cast<std::size_t>(i)];
+    if (state.is_drift()) {
+      values(i) += corrections(i);
+    } else if (state.component == 0) {
+      const auto C_c_b = Rot<C, B<1>>::exp(Vec<C>::assume(values.segment<3>(i)));
+      values.segment<3>(i) = (Rot<C, C>::exp(Vec<C>::assume(corrections.segment<3>(i))) * C_c_b).log().raw();
     }
   }
-  return turns;
+  return values;
 }
 
 void correct(Calibration& calibration, const std::vector<ParameterId>& states, const VectorXd& corrections) {
+  VectorXd values(std::ssize(states));
+  std::ranges::transform(states, values.begin(),
+                         [&](const ParameterId& state) { return value_of(calibration, state); });
+  values = corrected(states, std::move(values), corrections);
   for (std::size_t i = 0; i < states.size(); ++i) {
-    if (states[i].is_drift()) {
-      value_in(calibration, states[i]) += corrections(static_cast<Index>(i));
-    }
-  }
-  const std::vector<Eigen::Vector3d> turns = turns_of(states, corrections, calibration.gyros.size());
-  for (std::size_t k = 0; k < turns.size(); ++k) {
-    Eigen::Vector3d& alignment = calibration.gyros[k].alignment_rotation_vector_rad;
-    const auto C_c_b = Rot<C, B<1>>::exp(Vec<C>::assume(alignment));
-    alignment = (Rot<C, C>::exp(Vec<C>::assume(turns[k])) * C_c_b).log().raw();
+    value_in(calibration, states[i]) = values(static_cast<Index>(i));
   }
 }
 
@@ -127,18 +130,17 @@ Calibration LeftOut::reduced() const {
   return reduced;
 }
 
-Calibration LeftOut::completed(Calibration by_kept, const std::optional<AttitudeSolution>& attitude) const {
+Calibration LeftOut::completed(Calibration by_kept, const Rot<In, C>& C_in_c) const {
   if (nothing()) {
     return by_kept;
   }
   Calibration completed = with_model(std::move(by_kept), all_.gyros.front().drift_model);
   const VectorXd corrections = -made_up_ * mean_;
   correct(completed, states_, corrections);
-  if (attitude) {
-    const std::vector<Eigen::Vector3d> turns = turns_of(states_, corrections, completed.gyros.size());
-    for (std::size_t k = 0; k < turns.size(); ++k) {
-      Eigen::Vector3d& momentum_in = completed.gyros[k].momentum_in;
-      momentum_in = rotated<double>(momentum_in, attitude->C_in_c.raw() * turns[k]);
+  for (std::size_t i = 0; i < states_.size(); ++i) {
+    if (states_[i].is_alignment() && states_[i].component == 0) {
+      Eigen::Vector3d& momentum_in = completed.gyros.at(states_[i].gyro()).momentum_in;
+      momentum_in = rotated<double>(momentum_in, C_in_c.raw() * corrections.segment<3>(static_cast<Index>(i)));
     }
   }
   for (std::size_t i = 0; i < left_out_.size(); ++i) {
@@ -171,23 +173,21 @@ ParameterHistory LeftOut::completed(const ParameterHistory& by_kept) const {
   if (nothing()) {
     return by_kept;
   }
-  const VectorXd less = made_up_ * mean_;
+  const VectorXd corrections = -made_up_ * mean_;
   const MatrixXd left_out = all_.covariance(left_out_, left_out_);
-  VectorXd value = VectorXd::Zero(std::ssize(all_.states));
-  VectorXd variance = value;
-  value(kept_) = -less;
+  VectorXd variance = VectorXd::Zero(std::ssize(all_.states));
   variance(kept_) = (made_up_ * left_out * made_up_.transpose()).diagonal();
-  value(left_out_).setConstant(std::nan(""));
   variance(left_out_) = left_out.diagonal();
   ParameterHistory completed{by_kept.t, {}, {}};
   for (std::size_t i = 0; i < by_kept.t.size(); ++i) {
-    std::vector<double>& values = completed.value.emplace_back(value.begin(), value.end());
+    VectorXd value = VectorXd::Constant(variance.size(), std::nan(""));
+    value(kept_) = corrected(states_, VectorXd::Map(by_kept.value[i].data(), std::ssize(states_)), corrections);
+    completed.value.emplace_back(value.begin(), value.end());
     std::vector<double>& sigmas = completed.sigma.emplace_back(variance.size());
     std::ranges::transform(variance, sigmas.begin(), [](double its) { return std::sqrt(its); });
     for (std::size_t column = 0; column < kept_.size(); ++column) {
-      const auto row = static_cast<std::size_t>(kept_[column]);
-      values[row] += by_kept.value[i][column];
-      sigmas[row] = std::hypot(sigmas[row], by_kept.sigma[i][column]);
+      double& sigma = sigmas[static_cast<std::size_t>(kept_[column])];
+      sigma = std::hypot(sigma, by_kept.sigma[i][column]);
     }
   }
   return completed;

@@ -2,10 +2,9 @@
 /// A calibration and a drift model that has fewer coefficients (docs/mathematics.md, section 12).
 
 #include <Eigen/Core>
-#include <optional>
 #include <vector>
 
-#include "trihedron/core/optimal_attitude.hpp"
+#include "trihedron/core/frames.hpp"
 #include "trihedron/records/calibration.hpp"
 #include "trihedron/records/run.hpp"
 
@@ -21,9 +20,9 @@ class LeftOut {
 
   [[nodiscard]] bool nothing() const { return left_out_.empty(); }
   [[nodiscard]] const DriftModelId& kept_model() const { return kept_model_; }
-  /// Coefficients and alignments among Calibration::states, in the order of drift_and_alignment().
+  /// Coefficients and alignments that are kept, among Calibration::states, in the order of drift_and_alignment().
   [[nodiscard]] const std::vector<Eigen::Index>& kept() const { return kept_; }
-  /// Coefficients among them.
+  /// Coefficients among Calibration::states that are not kept.
   [[nodiscard]] const std::vector<Eigen::Index>& left_out() const { return left_out_; }
   /// M, a row for each of those kept, a column for each of those left out.
   [[nodiscard]] const Eigen::MatrixXd& made_up() const { return made_up_; }
@@ -33,9 +32,9 @@ class LeftOut {
   /// Coefficients and alignments that make up for what is left out, with their covariance.
   [[nodiscard]] Calibration reduced() const;
   /// All coefficients and the alignments, where `by_kept` was estimated along the same pass without those left out;
-  /// these are as `all` has them. The momenta turn with the alignments through which they are read, by the attitude at
-  /// that time; without it they stay as they are.
-  [[nodiscard]] Calibration completed(Calibration by_kept, const std::optional<AttitudeSolution>& attitude) const;
+  /// these are as `all` has them. The momenta turn with the alignments through which they are read; `C_in_c`: the
+  /// attitude at by_kept.t, to degrees.
+  [[nodiscard]] Calibration completed(Calibration by_kept, const Rot<In, C>& C_in_c) const;
   /// Of what was known before the pass: what is left out is as large as `all` has it, either way.
   [[nodiscard]] Calibration completed_prior(Calibration kept) const;
   /// The same of the rows of a history, the columns of which then are the states of `all`; what is left out was not

@@ -116,6 +116,52 @@ TEST(Calibrate, CoefficientsThatMakeUpForDriftWithoutEvidenceOfItHaveItInTheirSi
   EXPECT_LT(nees_of(simulated.truth, run.calibration), 45);  // χ² of 20, once in 1000
 }
 
+/// The momenta are those that readings have through the alignments, also where the alignments of the filter stood for
+/// drift that its model leaves out, here by half a minute of arc; and where the pair was lost before the end.
+TEST(Calibrate, GivesTheMomentaThatAreReadThroughItsAlignments) {
+  Scenario scenario;
+  scenario.seed = 14;
+  scenario.duration = std::chrono::hours(3);
+  scenario.attitude.reference = AttitudeScenario::Reference::kYawSteered;
+  scenario.attitude.slews = std::vector<Slew>{};
+  for (GyroScenario& gyro : scenario.gyros) {
+    gyro.drift.outside_sigma_rad_s = 2e-9;
+  }
+  const sim::SimulatedPass simulated = sim::simulate(scenario);
+  const Truth& truth = simulated.truth;
+  const auto C_c_b = [](const Eigen::Vector3d& rotation_vector_rad) {
+    return Rot<C, B<1>>::exp(Vec<C>::assume(rotation_vector_rad)).raw();
+  };
+  const auto off_rad = [&](const CalibrationRun& run, std::size_t gyro, std::size_t at) {
+    const GyroCalibration& its = run.calibration.gyros.at(gyro);
+    const Eigen::Matrix3d C_in_c = truth.q_in_c.at(at).toRotationMatrix();
+    const Eigen::Vector3d h_in = Eigen::Map<const Eigen::Vector3d>(&truth.h_in.at(6 * at + 3 * gyro));
+    const Eigen::Vector3d h_b = (C_in_c * C_c_b(truth.gyros.at(gyro).alignment_rotation_vector_rad)).transpose() * h_in;
+    return angle_between<double>(its.momentum_in, C_in_c * C_c_b(its.alignment_rotation_vector_rad) * h_b);
+  };
+  const CalibrationRun run = calibrate(simulated.pass, {});
+  ASSERT_EQ(run.calibration.on_board_drift.value().drift_model, kEsg7);
+  EXPECT_EQ(run.calibration.t, truth.t.back());
+  EXPECT_GT(
+      angle_between<double>(run.calibration.gyros[0].momentum_in, run.corrections.back().calibrated[0].momentum_in),
+      10 * kArcsecond);
+  const std::size_t last = truth.t.size() - 1;
+  EXPECT_LT(off_rad(run, 0, last), 2 * kArcsecond);
+  EXPECT_LT(off_rad(run, 1, last), 2 * kArcsecond);
+
+  // Without a pair there is no attitude, without which the momenta stay where they were.
+  Pass lost = simulated.pass;
+  const std::size_t end = lost.gyro.size();
+  for (std::size_t sample = end - std::size_t{8} * 120; sample < end; ++sample) {
+    std::fill_n(&lost.gyro.h[6 * sample + 3], 3, std::nan(""));
+  }
+  const Time until = lost.gyro.t[end - std::size_t{8} * 120 - 1];
+  const auto then = static_cast<std::size_t>(std::ranges::upper_bound(truth.t, until) - truth.t.begin()) - 1;
+  const CalibrationRun without = calibrate(lost, {});
+  EXPECT_LT(off_rad(without, 0, then), 4 * kArcsecond);
+  EXPECT_LT(off_rad(without, 1, then), 4 * kArcsecond);
+}
+
 /// What steady flight does not tell of an alignment is in the momenta as well, since the fixes gave them through it;
 /// also what the uncertainty of the spectrum adds.
 TEST(Calibrate, InSteadyFlightPredictsTheAttitudeBetterThanItKnowsTheAlignments) {

@@ -204,6 +204,25 @@ TEST(SeveralPasses, KnowTheAlignmentInSteadyFlightByThePassWithSlews) {
   EXPECT_TRUE(verdict.trustworthy);
 }
 
+TEST(SeveralPasses, KeepWhatNoneOfThemShows) {
+  const auto steady = [](Scenario scenario) {
+    scenario.attitude.reference = AttitudeScenario::Reference::kYawSteered;
+    scenario.attitude.slews = std::vector<Slew>{};
+    return sim::simulate(scenario);
+  };
+  const sim::SimulatedPass first = steady(scenario_in_eq1(7, hours(2)));
+  SeveralPasses passes{CalibrationOptions()};
+  passes.add("first", first.pass);
+  passes.add("second", steady(with_gyros_of(first.truth, 8, hours(9))).pass);
+  const Verdict& steadily = passes.combined().calibration.verdict;
+  const auto its = std::ranges::find(steadily.findings, FindingCode::kStarTrackerErrorsNotShown, &Finding::code);
+  ASSERT_NE(its, steadily.findings.end());
+  EXPECT_THAT(its->evidence, HasSubstr("in each pass, as in second: 1σ"));
+  passes.add("slews", sim::simulate(with_gyros_of(first.truth, 9, hours(18))).pass);
+  EXPECT_THAT(passes.combined().calibration.verdict.findings,
+              Not(has_finding(FindingCode::kStarTrackerErrorsNotShown)));
+}
+
 TEST(SeveralPasses, GoIntoACatalogueEachAloneAndTogether) {
   SeveralPasses passes(told());
   passes.add("first", two_hours().pass);

@@ -99,6 +99,10 @@ TEST(StatesInDoubt, AreToldWhereAFlightWithoutSlewsLeavesThemOpen) {
   EXPECT_GT(open_sigma(run, FurtherState::kClockOffset), 5e-3);
   EXPECT_FALSE(slewing.calibration.verdict.has(FindingCode::kStarTrackerErrorsNotShown));
   EXPECT_TRUE(run.calibration.verdict.has(FindingCode::kStarTrackerErrorsNotShown));
+  // Without a search for the noise as well.
+  CalibrationOptions by_told_noise;
+  by_told_noise.find_noise = false;
+  EXPECT_GT(open_sigma(calibrate(steady, by_told_noise), FurtherState::kOrbitalError), 5 * kArcsecond);
   // What is said to be none is not open.
   CalibrationOptions none;
   none.further_states[FurtherState::kOrbitalError] = Choice::kOff;
@@ -137,6 +141,11 @@ TEST(StatesInDoubt, StayOutWhereThereIsNothingButDrift) {
     }
     const CalibrationRun run = calibrate(sim::simulate(scenario).pass, CalibrationOptions());
     EXPECT_EQ(states_of(run), markov_rad_s > 0 ? "wandering_drift " : "");
+    for (const Evidence& evidence : run.evidence) {
+      const bool is_left_out = evidence.state && evidence.state != FurtherState::kWanderingDrift;
+      EXPECT_EQ(evidence.open_sigma.has_value(), is_left_out) << evidence.key();
+      EXPECT_GT(evidence.open_sigma.value_or(1), 0) << evidence.key();
+    }
   }
 }
 

@@ -165,15 +165,31 @@ TEST(LeftOut, IsMadeUpForByAlignmentsWithWhichTheMomentaTurn) {
   EXPECT_NEAR(std::sqrt(estimated.covariance(kept, kept)), 1e-9, 1e-14);
 
   estimated.gyros[1].momentum_in = Eigen::Vector3d::UnitX();
-  const AttitudeSolution attitude{
-      Rot<In, C>::assume(Eigen::AngleAxisd(std::numbers::pi / 2, Eigen::Vector3d::UnitX()).toRotationMatrix()), {}};
-  const Calibration completed = left_out.completed(estimated, attitude);
+  const auto C_in_c =
+      Rot<In, C>::assume(Eigen::AngleAxisd(std::numbers::pi / 2, Eigen::Vector3d::UnitX()).toRotationMatrix());
+  const Calibration completed = left_out.completed(estimated, C_in_c);
   EXPECT_LT(completed.gyros[1].alignment_rotation_vector_rad.norm(), 1e-15);
   EXPECT_NEAR(sigma_of(completed, ParameterId::alignment(1, 1)), std::hypot(2e-6, 1e-9), 1e-12);
   // −4e-6 rad about y of c, which is z of `in`.
   EXPECT_LT((completed.gyros[1].momentum_in - Eigen::Vector3d(1, -4e-6, 0)).norm(), 1e-10);
   EXPECT_EQ(completed.gyros[0].momentum_in, estimated.gyros[0].momentum_in);
-  EXPECT_EQ(left_out.completed(estimated, {}).gyros[1].momentum_in, Eigen::Vector3d::UnitX());
+
+  // As rotations in c, also in a history, of a gyro that is mounted by a quarter of a turn.
+  estimated.gyros[1].alignment_rotation_vector_rad = {0, 0, std::numbers::pi / 2};
+  const Calibration mounted = left_out.completed(estimated, {});
+  ParameterHistory history{{Time{}}, {{}}, {std::vector(estimated.states.size(), 1e-9)}};
+  for (const ParameterId& state : estimated.states) {
+    history.value[0].push_back(value_of(estimated, state));
+  }
+  const ParameterHistory also = left_out.completed(history);
+  for (std::size_t i = 0; i < mounted.states.size(); ++i) {
+    if (mounted.states[i].is_alignment()) {
+      EXPECT_NEAR(also.value[0][i], value_of(mounted, mounted.states[i]), 1e-15);
+    }
+  }
+  const Eigen::Matrix3d turn = Rot<C, B<1>>::exp(Vec<C>::assume(mounted.gyros[1].alignment_rotation_vector_rad)).raw() *
+                               Eigen::AngleAxisd(-std::numbers::pi / 2, Eigen::Vector3d::UnitZ());
+  EXPECT_LT((turn - Eigen::AngleAxisd(-4e-6, Eigen::Vector3d::UnitY()).toRotationMatrix()).norm(), 1e-12);
 }
 
 TEST(LeftOut, IsInTheHistoryAndThePriorAsUncertainAsItIs) {

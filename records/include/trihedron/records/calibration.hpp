@@ -75,8 +75,9 @@ struct DriftFieldLevel {
 /// The drift model that an estimator on board takes of a drift field.
 struct OnBoardDrift {
   DriftModelId drift_model;
-  /// Stands for what its coefficients cannot make up for of all others, beside the noise of the calibration, per axis
-  /// across each momentum; 0 where that noise has it, as after an earlier calibration with a field.
+  /// Stands for what its coefficients and the alignments cannot make up for of all others, beside the noise of the
+  /// calibration, per axis across each momentum; 0 where that noise has it, as after an earlier calibration with a
+  /// field.
   double random_walk_rad_sqrt_s = 0;
 };
 

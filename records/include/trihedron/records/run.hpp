@@ -67,8 +67,8 @@ struct Evidence {
   std::optional<FurtherState> state;  ///< without it: the coefficients that eq. (1) does not have
   double log_bayes_factor = 0;
   bool accepted = false;
-  /// Of a state that is taken as zero: what it may be by the pass and its prior together, were it free and all others
-  /// that are taken as zero were; 1-sigma of its largest component, in its unit.
+  /// Of a state that was open and is taken as zero: the largest 1-sigma of its components, in its unit, by the pass and
+  /// its prior together, where it is free and all others that were left out are zero.
   std::optional<double> open_sigma{};
 
   /// For programs: the key of the further state, or "drift_outside_eq1".
