@@ -84,21 +84,27 @@ Eigen::Index row_of(const Calibration& calibration, const DriftCoefficient& memb
   return rows_of(calibration, {ParameterId::drift(0, member)}).front();
 }
 
-/// A pass that knows k0 + 3 W(2,1) of gyro 1 far better than either, as along a flight on which both do the same.
-Calibration by_a_flight_on_which_k0_acts_as_three_times_a_member() {
+/// Coefficients and alignments of nothing, each with this variance by itself.
+Calibration of_two_gyros(const DriftModelId& model, double variance) {
   Calibration calibration;
   calibration.gyros.resize(2);
   for (GyroCalibration& gyro : calibration.gyros) {
-    gyro.drift_model = vsh(2);
-    gyro.drift_rad_s.assign(static_cast<std::size_t>(vsh(2).size()), 0);
+    gyro.drift_model = model;
+    gyro.drift_rad_s.assign(static_cast<std::size_t>(model.size()), 0);
   }
-  calibration.states = drift_and_alignment(vsh(2), 2);
+  calibration.states = drift_and_alignment(model, 2);
   const auto size = static_cast<Eigen::Index>(calibration.states.size());
+  calibration.covariance = Eigen::MatrixXd::Identity(size, size) * variance;
+  return calibration;
+}
+
+/// A pass that knows k0 + 3 W(2,1) of gyro 1 far better than either, as along a flight on which both do the same.
+Calibration by_a_flight_on_which_k0_acts_as_three_times_a_member() {
+  Calibration calibration = of_two_gyros(vsh(2), 1e-18);
   const Eigen::Index k0 = row_of(calibration, DriftCoefficient::of_eq1(0));
   const Eigen::Index member = row_of(calibration, {kW, 2, 1});
   calibration.gyros[0].drift_rad_s[static_cast<std::size_t>(k0)] = 1e-6;
   calibration.gyros[0].drift_rad_s[static_cast<std::size_t>(member)] = 2e-8;
-  calibration.covariance = Eigen::MatrixXd::Identity(size, size) * 1e-18;
   const double variance = 1e-16;
   calibration.covariance(member, member) = variance;
   calibration.covariance(k0, member) = calibration.covariance(member, k0) = -3 * variance;
@@ -242,15 +248,7 @@ ScreenedPass orbits(Duration length) {
 }
 
 TEST(LeftOut, WalksAsFarAsNothingMakesUpForIt) {
-  Calibration all;
-  all.gyros.resize(2);
-  for (GyroCalibration& gyro : all.gyros) {
-    gyro.drift_model = vsh(1);
-    gyro.drift_rad_s.assign(static_cast<std::size_t>(vsh(1).size()), 0);
-  }
-  all.states = drift_and_alignment(vsh(1), 2);
-  const auto size = static_cast<Eigen::Index>(all.states.size());
-  all.covariance = Eigen::MatrixXd::Identity(size, size) * 1e-30;
+  Calibration all = of_two_gyros(vsh(1), 1e-30);
   const Eigen::Index member = row_of(all, {kW, 1, 0});
   const double sigma = 1e-9;
   all.covariance(member, member) = sigma * sigma;
@@ -267,15 +265,7 @@ TEST(LeftOut, WalksAsFarAsNothingMakesUpForIt) {
 
 /// Drift about y of the case turns the momentum as an error of the alignment about x does, on orbits().
 TEST(LeftOut, WalksNowhereWhereTheAlignmentMakesUpForIt) {
-  Calibration all;
-  all.gyros.resize(2);
-  for (GyroCalibration& gyro : all.gyros) {
-    gyro.drift_model = vsh(1);
-    gyro.drift_rad_s.assign(static_cast<std::size_t>(vsh(1).size()), 0);
-  }
-  all.states = drift_and_alignment(vsh(1), 2);
-  const auto size = static_cast<Eigen::Index>(all.states.size());
-  all.covariance = Eigen::MatrixXd::Identity(size, size) * 1e-30;
+  Calibration all = of_two_gyros(vsh(1), 1e-30);
   const Eigen::Index member = row_of(all, {kW, 1, -1});
   const Eigen::Index align_x = rows_of(all, {ParameterId::alignment(0, 0)}).front();
   all.covariance(member, member) = 1e-18;
