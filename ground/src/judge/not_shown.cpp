@@ -59,9 +59,8 @@ void judge_what_is_not_shown(const CalibrationRun& run, std::vector<Finding>& fi
   if (!names.empty()) {
     findings.push_back(
         {FindingCode::kStarTrackerErrorsNotShown,
-         "The flight does not tell errors of the star tracker from alignment and drift. They are taken as zero: what "
-         "there "
-         "is of them turns the attitude beyond the sigmas that are claimed.",
+         "This flight cannot tell errors of the star tracker apart from alignment and drift. They are taken as zero: "
+         "what there is of them turns the attitude beyond the sigmas that are claimed.",
          fmt::format("1σ about an axis that is left open, where {:.1f}″ is claimed about the best known: {}",
                      claimed_rad / kArcsecond, names),
          fmt::format(
