@@ -74,7 +74,7 @@ double left_out_walk_rad_sqrt_s(const LeftOut& left_out, const Calibration& all,
     std::vector<Time> t;
     MatrixXd turn = MatrixXd::Zero(3, rest.cols());  // by the drift, 3 × members
     MatrixXd rate_before;
-    std::vector<MatrixXd> turned;  // as seen by the star tracker through the alignment
+    std::vector<MatrixXd> turned;  // the same, less what the alignment makes up for; `rest` has −M
     const auto gyro = static_cast<int>(k);
     for (const ScreenedPass::Fix& fix : pass.fixes) {
       if (fix.fix.head != 0 || !fix.used[gyro] || (!t.empty() && fix.fix.t - t.back() < kBetweenDirections)) {

@@ -298,7 +298,8 @@ std::optional<LeftOut> left_out_by(const PassSettings& settings, const Calibrati
   return left_out.nothing() ? std::nullopt : std::optional(std::move(left_out));
 }
 
-/// By the latest readings; where they are not those of a pair, at the last fix that was used.
+/// By the latest readings; where they are not those of a pair, without which the momenta stay where they were, at the
+/// last fix that was used.
 Rot<In, C> attitude_at_the_end(const Pipeline& pipeline, const CalibrationRun& run) {
   if (const std::optional<AttitudeSolution> attitude = pipeline.navigation_attitude()) {
     return attitude->C_in_c;

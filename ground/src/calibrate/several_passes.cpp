@@ -149,16 +149,16 @@ void judge_pass(const PassAlone& pass, std::vector<Finding>& findings) {
   }
 }
 
-bool has_weak_axis(const PassAlone& pass) {
-  return std::ranges::any_of(pass.run.calibration.verdict.findings,
-                             [](const Finding& finding) { return finding.code == kWeakAxis; });
+/// Whether each pass has this finding by itself.
+bool each_has(const std::vector<PassAlone>& passes, FindingCode code) {
+  return std::ranges::all_of(passes, [&](const PassAlone& pass) { return pass.run.calibration.verdict.has(code); });
 }
 
-/// Of the last pass from those before, by what each pass is.
-/// What no pass shows by itself they do not show together, of which only the first was asked.
+/// What no pass shows by itself is not known of all together either; the last pass, which has a prior calibration, was
+/// not asked for it.
 void keep_what_is_not_shown(const std::vector<PassAlone>& passes, std::vector<Finding>& findings) {
   constexpr FindingCode kNotShown = FindingCode::kStarTrackerErrorsNotShown;
-  if (std::ranges::all_of(passes, [](const PassAlone& pass) { return pass.run.calibration.verdict.has(kNotShown); })) {
+  if (each_has(passes, kNotShown)) {
     const PassAlone& last = passes.back();
     Finding& finding =
         findings.emplace_back(*std::ranges::find(last.run.calibration.verdict.findings, kNotShown, &Finding::code));
@@ -166,13 +166,14 @@ void keep_what_is_not_shown(const std::vector<PassAlone>& passes, std::vector<Fi
   }
 }
 
+/// Of the last pass from those before, by what each pass is.
 Verdict judge_together(const Verdict& last, const std::vector<PassAlone>& passes) {
   Verdict verdict;
   for (const PassAlone& pass : passes) {
     judge_pass(pass, verdict.findings);
   }
   verdict.findings.insert(verdict.findings.end(), last.findings.begin(), last.findings.end());
-  if (!std::ranges::all_of(passes, has_weak_axis)) {
+  if (!each_has(passes, kWeakAxis)) {
     std::erase_if(verdict.findings, [](const Finding& finding) { return finding.code == kWeakAxis; });
   }
   keep_what_is_not_shown(passes, verdict.findings);

@@ -239,7 +239,7 @@ std::vector<FurtherState> left_out_of(const CalibrationOptions& asked, const Cal
   return left_out;
 }
 
-std::vector<FurtherState> without(FurtherState state, std::vector<FurtherState> states) {
+std::vector<FurtherState> others_than(FurtherState state, std::vector<FurtherState> states) {
   std::erase(states, state);
   return states;
 }
@@ -249,7 +249,7 @@ void tell_what_is_open(const Trial& everything, const CalibrationOptions& asked,
   const std::vector<FurtherState> left_out = left_out_of(asked, decision.options);
   for (Evidence& evidence : decision.evidence) {
     if (evidence.state && std::ranges::find(left_out, *evidence.state) != left_out.end()) {
-      evidence.open_sigma = everything.sigma(*evidence.state, without(*evidence.state, left_out));
+      evidence.open_sigma = everything.sigma(*evidence.state, others_than(*evidence.state, left_out));
     }
   }
 }
@@ -270,7 +270,7 @@ std::vector<Doubt> doubts_of(const Trial& everything, const CalibrationOptions& 
         !decided.further_states.is_on(FurtherState::kClockOffset)) {
       continue;
     }
-    const LogEvidence log_evidence = everything.log_evidence(state, without(state, left_out));
+    const LogEvidence log_evidence = everything.log_evidence(state, others_than(state, left_out));
     if (log_evidence.value > enough_for(state, other_drift)) {
       doubts.push_back({state, log_evidence});
     }

@@ -69,7 +69,8 @@ class Trial {
   /// ln of the Bayes factor of this state, which the trial must have, where those of `zero` are zero; of no drift that
   /// wanders.
   [[nodiscard]] LogEvidence log_evidence(FurtherState state, const std::vector<FurtherState>& zero = {}) const;
-  /// The largest 1-sigma of its components then, by the pass and the prior, in the unit of the state.
+  /// The largest 1-sigma of the components of this state, by the pass and its prior, where those of `zero` are zero; in
+  /// the unit of the state.
   [[nodiscard]] double sigma(FurtherState state, const std::vector<FurtherState>& zero = {}) const;
   /// Forecasts by its drift model and those that it contains; none of a field.
   [[nodiscard]] std::vector<Forecast> forecasts() const;

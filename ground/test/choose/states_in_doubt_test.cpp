@@ -78,6 +78,7 @@ TEST(Trial, TellsTheSigmaOfAStateAsAFitWithItAloneDoes) {
   const Trial all(pass, screened,
                   with({FurtherState::kClockOffset, FurtherState::kClockRate, FurtherState::kOrbitalError,
                         FurtherState::kReadoutBias}));
+  // A trial merges fixes that are near each other.
   EXPECT_NEAR(all.sigma(FurtherState::kClockOffset, others), sigma_s, 0.02 * sigma_s);
   EXPECT_GT(all.sigma(FurtherState::kClockOffset), 1.1 * sigma_s);
 }
