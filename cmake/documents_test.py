@@ -33,6 +33,12 @@ def test_paths_are_found_in_text():
     assert paths_named(text) == ["core/include/a.hpp", "docs/adr/"]
 
 
+def test_each_class_and_function_of_the_libraries_has_a_comment(tmp_path):
+    result = subprocess.run([ROOT / "docs" / "reference.sh", tmp_path], capture_output=True, text=True)
+    assert result.returncode == 0, result.stdout
+    assert (tmp_path / "cpp" / "index.html").exists()
+
+
 def test_tables_of_the_application_are_up_to_date(tmp_path):
     subprocess.run([sys.executable, ROOT / "core" / "interface" / "tables.py", tmp_path], check=True)
     made = sorted(path.relative_to(tmp_path) for path in tmp_path.glob("**/*") if path.is_file())

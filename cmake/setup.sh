@@ -13,7 +13,7 @@ program=(
 tests=(
   g++ libgtest-dev libgmock-dev librapidcheck-dev libbenchmark-dev
   chromium-headless-shell
-  valgrind python3 python3-pytest python3-xarray python3-h5netcdf python3-jsonschema
+  doxygen valgrind python3 python3-pytest python3-xarray python3-h5netcdf python3-jsonschema
 )
 # The site of the documents; what it needs of PyPI is in docs/requirements.txt.
 docs=(doxygen python3 python3-venv)

@@ -116,9 +116,9 @@ struct SensitivityOfEq1 {
         by_drift(its.by_drift.view(Esg7::kSize)) {}
 };
 
-/// precess() of two gyros side by side whose drift is eq. (1) alone, without and with sensitivities: the same bits in
-/// half the instructions.
+/// precess() of two gyros side by side whose drift is eq. (1) alone: the same bits in half the instructions.
 void precess_two(const PrecessingGyro& a, const PrecessingGyro& b, const Eigen::Matrix3d& C_in_c, double dt_s);
+/// The same with sensitivities.
 void precess_two(const PrecessingGyro& a, const PrecessingGyro& b, const SensitivityOfEq1& since_a,
                  const SensitivityOfEq1& since_b, const Eigen::Matrix3d& C_in_c, double dt_s);
 /// The same of two whose drift has more than the sensitivities to eq. (1) are about: rates ω_b, rad/s, case axes.

@@ -9,6 +9,7 @@ namespace trihedron {
 /// 1; 0 as long as it is not known.
 using Progress = std::function<void(std::string_view doing, double fraction)>;
 
+/// Tells that `doing` begins, where anybody is to be told.
 inline void begin_stage(const Progress& progress, std::string_view doing) {
   if (progress) {
     progress(doing, 0);

@@ -9,6 +9,7 @@
 
 namespace trihedron::sim {
 
+/// The same quantity of two gyros.
 class Two {
  public:
   Two() = default;
@@ -42,6 +43,7 @@ class Two {
 
 namespace Eigen {
 
+/// What Eigen asks of a scalar.
 template <>
 struct NumTraits<trihedron::sim::Two> : NumTraits<double> {
   using Real = trihedron::sim::Two;

@@ -8,6 +8,7 @@
 
 namespace trihedron::ground {
 
+/// Stamps that do not scatter.
 struct RegularStamps {
   std::vector<Time> t;   ///< of each sample; as they were where there are too few in a row
   double scatter_s = 0;  ///< root mean square of how far the stamps are off
