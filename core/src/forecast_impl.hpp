@@ -43,7 +43,8 @@ void Forecast<Estimator>::predict(const Estimator& estimator, const GyroMask& us
     ready_by_attitude_s_[place] = 0;
     return;
   }
-  // The rows are a + x g of what is flown x windows ahead, their covariance A + x B + x² G.
+  // The rows are a + x g of what is flown x windows ahead, their covariance A + x B + x² G; with x = t over the window,
+  // the noise of the readings and the walk it is now + t linear + t² quadratic.
   using Rows3 = StateRows3<Estimator::kMaxStates>;
   Rows3 a = attitude_by_states_now<Estimator::kMaxStates>(layout, attitude.value(), gyros, h_b);
   Rows3 g = a;
@@ -51,17 +52,17 @@ void Forecast<Estimator>::predict(const Estimator& estimator, const GyroMask& us
   g -= a;
   estimator.information().see_through_uncertainty(rows_of(a));
   estimator.information().see_through_uncertainty(rows_of(g));
-  const Eigen::Matrix3d A = gram<Estimator::kMaxStates>(a);
-  const Eigen::Matrix3d G = gram<Estimator::kMaxStates>(g);
-  const Eigen::Matrix3d a_g = a.lazyProduct(g.transpose());
   const CalibrationSetup& setup = estimator.setup();
+  const Eigen::Matrix3d now =
+      with_covariance(attitude.value(), gram<Estimator::kMaxStates>(a), setup.readout_noise_rad, layout.gyros, 0)
+          .covariance_rad2;
+  const Eigen::Matrix3d a_g = a.lazyProduct(g.transpose()) / flown_.duration_s;
   const double walk = setup.direction_random_walk_rad_sqrt_s;
+  const Eigen::Matrix3d linear =
+      with_covariance(attitude.value(), a_g + a_g.transpose(), {}, layout.gyros, walk * walk).covariance_rad2;
+  const Eigen::Matrix3d quadratic = gram<Estimator::kMaxStates>(g) / (flown_.duration_s * flown_.duration_s);
   const auto error_after_rad = [&](double time_s) {
-    const double x = time_s / flown_.duration_s;
-    const Eigen::Matrix3d spread = A + x * (a_g + a_g.transpose()) + x * x * G;
-    return error_997_rad(
-        with_covariance(attitude.value(), spread, setup.readout_noise_rad, layout.gyros, walk * walk * time_s)
-            .covariance_rad2);
+    return error_997_rad(now + time_s * (linear + time_s * quadratic));
   };
   error_by_attitude_rad_[place] = error_after_rad(interval_s_);
   // By bisection: from some time on the error only grows.

@@ -520,7 +520,7 @@ void InvariantEstimator<kCapacity>::ask_gate(const FixComparison& comparison, co
 
 template <Capacity kCapacity>
 int InvariantEstimator<kCapacity>::cost(const Correction& correction) {
-  constexpr std::array<int, 10> kCosts = {25, 120, 185, 85, 150, 140, 420, 300, 190, 0};
+  constexpr std::array<int, 11> kCosts = {25, 120, 185, 85, 150, 140, 420, 300, 160, 30, 0};
   return kCosts[static_cast<std::size_t>(correction.stage)];
 }
 
@@ -631,6 +631,10 @@ void InvariantEstimator<kCapacity>::take(Correction& correction, const StarFix& 
     case Stage::kUpdate:
       update(correction, seen(fix, readings), fix, readings, report);
       break;
+    case Stage::kFeedback:
+      feed_back();
+      correction.stage = Stage::kDone;
+      break;
     default:
       correction.stage = Stage::kDone;
       break;
@@ -716,8 +720,9 @@ void InvariantEstimator<kCapacity>::update(Correction& correction, const Seen& i
   used_fix_t_[static_cast<std::size_t>(fix.head)] = fix.t;
   Compared rows = rows_to_use(compared(its, correction, readings), its.R_c, correction.reading_noise_rad,
                               readings.noise_factor, sharing);
-  update(rows, std::sqrt(report.weight));
-  correction.stage = Correction::Stage::kDone;
+  rows *= std::sqrt(report.weight);
+  information_.take(rows_of(rows));
+  correction.stage = Correction::Stage::kFeedback;
 }
 
 template <Capacity kCapacity>
@@ -779,13 +784,13 @@ void InvariantEstimator<kCapacity>::judge_angles(Correction& correction, const F
   }
   report.status = FixStatus::kUsed;
   angle_rejections_in_a_row_ = 0;
-  update(white.rows, 1);
+  information_.take(rows_of(white.rows));
+  feed_back();
 }
 
 template <Capacity kCapacity>
-void InvariantEstimator<kCapacity>::update(Compared& white, double root_weight) {
-  white *= root_weight;
-  const Vector x = information_.update(rows_of(white));
+void InvariantEstimator<kCapacity>::feed_back() {
+  const Vector x = information_.correction();
   const Layout& layout = setup_.layout;
   for (int k = 0; k < layout.gyros; ++k) {
     Gyro& gyro = gyros_[k];

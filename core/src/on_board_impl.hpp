@@ -863,8 +863,10 @@ void Navigator<Estimator>::hold_errors(const Estimator& estimator, const Source&
     // φ = C_in_c (δ + ε − h_c × C_c_b Δb): h_in was read through what is held at the estimated attitude.
     auto phi = errors.template middleRows<3>(layout.direction(k));
     phi = C_in_c.lazyProduct(errors.template middleRows<3>(layout.alignment(k)));
-    phi -= by_readout_errors(layout, C_in_c * skew<double>(gyros[k].in_c(source.h_b[k])), gyros[k], source.h_b[k])
-               .lazyProduct(errors.middleRows(layout.readout(k), layout.readout_size()));
+    if (layout.readout_size() > 0) {
+      phi -= by_readout_errors(layout, C_in_c * skew<double>(gyros[k].in_c(source.h_b[k])), gyros[k], source.h_b[k])
+                 .lazyProduct(errors.middleRows(layout.readout(k), layout.readout_size()));
+    }
     phi.template leftCols<kAttitude>() = C_in_c * attitude_root;
     if (layout.further.wandering_drift && of_calibration) {
       auto wandering = errors.template middleRows<3>(layout.wandering(k));

@@ -213,7 +213,8 @@ FixReport PaperEstimator::take(const StarFix& fix, const FixReadings& readings) 
       break;
   }
   rows *= std::sqrt(report.weight);
-  feed_back(information_.update(rows_of(rows)));
+  information_.take(rows_of(rows));
+  feed_back(information_.correction());
   return report;
 }
 

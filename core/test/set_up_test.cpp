@@ -120,7 +120,8 @@ TEST(SetUp, TakesACommonPriorOfParametersAndDriftThatComesBack) {
   const auto estimator = std::make_unique<test::FullEstimator>();
   ASSERT_FALSE(estimator->set_up(given.setup, given.prior, common));
   const int size = layout.size() - layout.direction(layout.gyros);
-  Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> root(size, size);
+  Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> root;
+  root.setZero(size, size);
   estimator->prior_error_root(rows_of(root));
   const Eigen::MatrixXd found = root * root.transpose();
   EXPECT_TRUE(found.topLeftCorner(sigma.size(), sigma.size()).isApprox(common, 1e-12));

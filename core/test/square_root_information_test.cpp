@@ -60,7 +60,8 @@ template <class F>
 Eigen::VectorXd update(F& filter, const Matrix& H, const Eigen::VectorXd& y) {
   RowMajor rows(H.rows(), H.cols() + 1);
   rows << H, y;
-  return filter.update(rows_of(rows));
+  filter.take(rows_of(rows));
+  return filter.correction();
 }
 
 /// The textbook Kalman filter with a full covariance, beside the filter under test.

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 #include <cstddef>
 
@@ -40,6 +41,21 @@ inline void add_orbital_drift(const Truth& truth, const Eigen::Vector3d& sine_ra
   const auto rate = [&](double since_s, const Eigen::Vector3d&) -> Eigen::Vector3d {
     const double phase = kOrbitalRate_rad_s * since_s;
     return std::sin(phase) * sine_rad_s + std::cos(phase) * cosine_rad_s;
+  };
+  add_drift(truth, rate, gyro, readings);
+}
+
+/// Drift about the magnetic field of a dipole in the plane of the orbit, so much of it at the equator, of a body that
+/// faces the Earth but for its slews.
+inline void add_magnetic_drift(const Truth& truth, double rate_rad_s, int gyro, GyroTelemetry& readings) {
+  const Eigen::Vector3d up_at_start = truth.q_in_c.front() * Eigen::Vector3d::UnitZ();
+  const Eigen::Vector3d dipole = truth.q_in_c.front() * Eigen::Vector3d::UnitX();
+  const double step_s = to_seconds(truth.t[1] - truth.t[0]);
+  const auto rate = [&](double since_s, const Eigen::Vector3d&) -> Eigen::Vector3d {
+    const double phase = kOrbitalRate_rad_s * since_s;
+    const Eigen::Vector3d up = std::cos(phase) * up_at_start + std::sin(phase) * dipole;
+    const auto at = std::min(static_cast<std::size_t>(since_s / step_s), truth.q_in_c.size() - 1);
+    return rate_rad_s * (truth.q_in_c[at].conjugate() * (3 * up.dot(dipole) * up - dipole));
   };
   add_drift(truth, rate, gyro, readings);
 }

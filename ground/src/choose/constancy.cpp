@@ -870,10 +870,7 @@ OrbitalOdds orbital_odds(const Trial& trial) {
   });
   const MatrixXd form = without_first(without_states_at_end(whole.form(true), d), d + constants);
   const auto log_odds = [&](Index at, Index size, double sigma) {
-    const MatrixXd squares = sigma * sigma * form.block(at, at, size, size);
-    const Eigen::LLT<MatrixXd> root(squares + MatrixXd::Identity(size, size));
-    const VectorXd y = sigma * form.col(shapes).segment(at, size);
-    return root.matrixL().solve(y).squaredNorm() / 2 - root.matrixLLT().diagonal().array().log().sum();
+    return log_evidence_of(sigma * sigma * form.block(at, at, size, size), sigma * form.col(shapes).segment(at, size));
   };
   const double error_rad = kind_of(FurtherState::kOrbitalError).prior_sigma;
   return {log_odds(0, kError, error_rad), log_odds(kError, kError * gyros, std::abs(rate_rad_s) * error_rad)};

@@ -39,8 +39,8 @@ struct Moves {
 /// directions alike, but in slews the error stays in the body and the drift in space, and drift of one gyro is not that
 /// of the other.
 struct OrbitalOdds {
-  double error = 0;
-  double drift = 0;
+  LogEvidence error;
+  LogEvidence drift;
 };
 /// Of a trial with neither, with the noise and the spectrum of the drift field that were found by it.
 [[nodiscard]] OrbitalOdds orbital_odds(const Trial& trial);

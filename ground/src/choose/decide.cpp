@@ -718,33 +718,43 @@ Decision decide_on_orbital_drift(const Pass& pass, const Screened& screened, Cal
     return decision;
   }
   const OrbitalOdds odds = *decision.orbital_odds;
+  // Drift that all gyros have alike, as an error of the star tracker looks, is not to be expected by eq. (1) alone.
+  // Beside other drift it is, and of any size.
+  const bool has_other_drift = decision.field && decision.field->log_evidence > kLogOddsToAccept;
+  const auto log_odds = [&](const LogEvidence& of) { return has_other_drift ? of.value : of.by_prior_as_it_is; };
+  const auto by_narrower_priors = [&](const LogEvidence& of) { return log_odds(of) - of.by_prior_as_it_is; };
+  const double error_over_drift = log_odds(odds.error) - log_odds(odds.drift);
   CalibrationOptions without_error = asked;
   const bool has_error = decision.options.further_states.is_on(kError);
   if (has_error) {
-    decision.orbital_error_over_drift = odds.error - odds.drift;
+    decision.orbital_error_over_drift = error_over_drift;
     without_error.further_states[kError] = Choice::kOff;
   }
   const double phase = std::abs(*asked.orbital_rate_rad_s) *
                        to_seconds(screened.pass.fixes.back().fix.t - screened.pass.fixes.front().fix.t);
-  if (is_open && phase > kLeastPhase && odds.drift > kMayBeThere && odds.drift > odds.error - kMayBeDrift) {
+  if (is_open && phase > kLeastPhase && odds.drift.by_prior_as_it_is > kMayBeThere && error_over_drift < kMayBeDrift) {
     begin_stage(progress, "looks for drift at orbital period");
     CalibrationOptions with = without_error;
     with.further_states[kDrift] = Choice::kOn;
     Decision by_drift = decide_by_pass(pass, screened, with, largest_model, progress);
-    const double gain = by_drift.log_likelihood - decision.log_likelihood;
+    const double gain = by_drift.log_likelihood + by_narrower_priors(odds.drift) - decision.log_likelihood -
+                        (has_error ? by_narrower_priors(odds.error) : 0);
     if (gain > kLogOddsToAccept && is_all_that_is_left(by_drift)) {
       by_drift.evidence.push_back({kDrift, gain, true});
       by_drift.orbital_error_over_drift = has_error ? std::optional(-gain) : std::nullopt;
       asked = with;
       return without_aberration(std::move(by_drift));
     }
+    if (has_error) {
+      decision.orbital_error_over_drift = std::min(error_over_drift, -gain);
+    }
   }
-  if (!has_error || odds.drift < odds.error + kLogOddsToAccept) {
+  if (!has_error || error_over_drift > -kLogOddsToAccept) {
     return decision;
   }
   Decision without = decide_by_pass(pass, screened, without_error, largest_model, progress);
-  without.evidence.push_back({kError, odds.error - odds.drift, false});
-  without.orbital_error_over_drift = odds.error - odds.drift;
+  without.evidence.push_back({kError, error_over_drift, false});
+  without.orbital_error_over_drift = error_over_drift;
   asked = without_error;
   return without_aberration(std::move(without));
 }

@@ -17,29 +17,6 @@
 namespace trihedron::ground {
 namespace {
 
-/// ln of the Bayes factor for states being free instead of zero (Savage and Dickey): the density at zero before the
-/// data over that after; the mean of the factors with priors as wide as they are, a quarter, and a sixteenth of it, so
-/// that a small state has evidence as well. Estimate and covariance in units of the prior sigmas.
-LogEvidence log_bayes_factor(const Eigen::VectorXd& estimate, const Eigen::MatrixXd& covariance) {
-  constexpr std::array<double, 3> kSizes = {1, 1.0 / 4, 1.0 / 16};
-  const auto identity = Eigen::MatrixXd::Identity(estimate.size(), estimate.size());
-  const Eigen::MatrixXd information = Eigen::LLT<Eigen::MatrixXd>(covariance).solve(identity);
-  const Eigen::VectorXd y = information * estimate;
-  std::array<double, kSizes.size()> log_factors;
-  for (std::size_t i = 0; i < kSizes.size(); ++i) {
-    const double more = 1 / (kSizes[i] * kSizes[i]) - 1;
-    const Eigen::LLT<Eigen::MatrixXd> with_this_prior(information + more * identity);
-    log_factors[i] = y.dot(with_this_prior.solve(y)) / 2 - with_this_prior.matrixLLT().diagonal().array().log().sum() -
-                     static_cast<double>(estimate.size()) * std::log(kSizes[i]);
-  }
-  const double most = *std::ranges::max_element(log_factors);
-  double sum = 0;
-  for (const double log_factor : log_factors) {
-    sum += std::exp(log_factor - most);
-  }
-  return {most + std::log(sum / static_cast<double>(kSizes.size())), log_factors[0]};
-}
-
 /// The models to compare with a model: those that it contains, from the smallest on, and itself.
 std::vector<DriftModelId> models_up_to(const DriftModelId& model) {
   std::vector<DriftModelId> models{kEsg7};
@@ -86,6 +63,22 @@ Eigen::Matrix3d noise_by_readout(const CalibrationSetup& setup, const PassProble
 }
 
 }  // namespace
+
+LogEvidence log_evidence_of(const Eigen::MatrixXd& information, const Eigen::VectorXd& y) {
+  constexpr std::array<double, 3> kSizes = {1, 1.0 / 4, 1.0 / 16};
+  const auto identity = Eigen::MatrixXd::Identity(y.size(), y.size());
+  std::array<double, kSizes.size()> log_factors;
+  for (std::size_t i = 0; i < kSizes.size(); ++i) {
+    const Eigen::LLT<Eigen::MatrixXd> root(identity + kSizes[i] * kSizes[i] * information);
+    log_factors[i] = kSizes[i] * kSizes[i] * y.dot(root.solve(y)) / 2 - root.matrixLLT().diagonal().array().log().sum();
+  }
+  const double most = *std::ranges::max_element(log_factors);
+  double sum = 0;
+  for (const double log_factor : log_factors) {
+    sum += std::exp(log_factor - most);
+  }
+  return {most + std::log(sum / static_cast<double>(kSizes.size())), log_factors[0]};
+}
 
 bool alike(const ProcessNoise& a, const ProcessNoise& b) {
   const auto same = [](double one, double other) { return std::abs(one - other) <= kNoiseTolerance * other; };
@@ -248,7 +241,9 @@ Trial::InPriorSigmas Trial::in_prior_sigmas(FurtherState state, const std::vecto
 
 LogEvidence Trial::log_evidence(FurtherState state, const std::vector<FurtherState>& zero) const {
   const InPriorSigmas found = in_prior_sigmas(state, zero);
-  return log_bayes_factor(found.estimate, found.covariance);
+  const auto identity = Eigen::MatrixXd::Identity(found.estimate.size(), found.estimate.size());
+  const Eigen::MatrixXd information = Eigen::LLT<Eigen::MatrixXd>(found.covariance).solve(identity);
+  return log_evidence_of(information - identity, information * found.estimate);
 }
 
 double Trial::sigma(FurtherState state, const std::vector<FurtherState>& zero) const {

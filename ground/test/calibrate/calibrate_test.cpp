@@ -607,6 +607,20 @@ TEST(Calibrate, DoesNotTakeDriftAtOrbitalPeriodForAnErrorOfTheStarTracker) {
   }
 }
 
+// As in the magnetic field of the Earth, which turns both momenta nearly alike: no residual contradicts an error of the
+// star tracker.
+TEST(Calibrate, DoesNotTrustAnErrorAtOrbitalPeriodThatMayBeDriftOfAllGyros) {
+  const auto simulated = sim::simulate(scenario_in_eq1(1, std::chrono::hours(9)));
+  Pass pass = simulated.pass;
+  add_magnetic_drift(simulated.truth, 1e-8, 0, pass.gyro);
+  add_magnetic_drift(simulated.truth, 1.2e-8, 1, pass.gyro);
+  const auto run = calibrate(pass, {});
+  EXPECT_LT(run.orbital_error_over_drift.value(), 5);
+  EXPECT_THAT(run.calibration.verdict.findings,
+              Contains(AllOf(testing::Field(&Finding::code, FindingCode::kOrbitalErrorFound),
+                             testing::Field(&Finding::severity, Finding::Severity::kDoNotUse))));
+}
+
 /// One fix, then the whole pass by the earlier calibration: the largest sigma at its end. The error there is within it.
 double sigma_after_one_fix_rad(const sim::SimulatedPass& simulated, Estimator estimator) {
   CalibrationOptions open_loop;

@@ -338,12 +338,12 @@ TEST(OrbitalOdds, TellAnErrorOfTheStarTrackerFromDrift) {
   };
   const auto over_drift = [&](const Pass& pass) {
     const OrbitalOdds odds = odds_of(pass);
-    return odds.error - odds.drift;
+    return odds.error.by_prior_as_it_is - odds.drift.by_prior_as_it_is;
   };
   Scenario scenario = scenario_in_eq1(6, std::chrono::hours(3));
   const sim::SimulatedPass quiet = sim::simulate(scenario);
-  EXPECT_LT(odds_of(quiet.pass).drift, -10);  // from there on it is worth a try
-  EXPECT_LT(odds_of(quiet.pass).error, 0);
+  EXPECT_LT(odds_of(quiet.pass).drift.by_prior_as_it_is, -10);  // from there on it is worth a try
+  EXPECT_LT(odds_of(quiet.pass).error.value, 0);
   Pass drifting = quiet.pass;
   add_orbital_drift(quiet.truth, {4e-8, -3e-8, 2e-8}, {-2e-8, 3e-8, 5e-8}, 0, drifting.gyro);
   add_orbital_drift(quiet.truth, {-3e-8, 5e-8, 1e-8}, {4e-8, 2e-8, -3e-8}, 1, drifting.gyro);

@@ -90,7 +90,7 @@ class InvariantEstimator {
 
   /// Square root of the covariance of all states, or of the first of them, at the last fix. Needs started().
   void error_root(RowsView root) const { information_.inverse_root(root); }
-  /// The same of the prior, rows and columns from the first that is no direction up to the first shared one.
+  /// The same of the prior, rows and columns from the first that is no direction up to the first shared one, into zeros.
   void prior_error_root(RowsView root) const;
   /// Covariance of what depends so on the states at the last fix. Needs started().
   [[nodiscard]] Eigen::Matrix3d covariance_of_errors(const Rows3& by_states) const { return covariance_of(by_states); }
@@ -115,7 +115,8 @@ class InvariantEstimator {
       kJudgement,    ///< innovation and gate; of the angles, also the update
       kFault,        ///< which gyro is at fault
       kRestart,
-      kUpdate,
+      kUpdate,    ///< of the information
+      kFeedback,  ///< of the correction to the estimate
       kDone,
     };
     Stage stage = Stage::kBegin;
@@ -127,7 +128,7 @@ class InvariantEstimator {
     [[nodiscard]] bool done() const { return stage == Stage::kDone; }
   };
   /// Stages of a correction, at most; those of a reopening come twice.
-  static constexpr int kMostStages = 12;
+  static constexpr int kMostStages = 13;
   /// What the next stage takes, about, in 100 instructions on two gyros with eq. (1), where no term of second order is
   /// held; and all from it on, as it usually goes.
   [[nodiscard]] static int cost(const Correction& correction);
@@ -256,8 +257,8 @@ class InvariantEstimator {
   /// Noise of the prediction since the last fix, the second-order term with it.
   [[nodiscard]] PerGyro<double, kCapacity.gyros> prediction_noise(const Eigen::Matrix3d& C_in_c);
   void propagate(const PerGyro<double, kCapacity.gyros>& noise_rad);
-  /// Takes the rows of a comparison, which are used up, with this weight.
-  void update(Compared& white, double root_weight);
+  /// Corrects the estimate by the update that the information has taken.
+  void feed_back();
   /// Whether the gyros agree among themselves. Not inline, so that its stack is free again when a fault is looked for.
   [[nodiscard, gnu::noinline]] bool angles_agree(const Eigen::Matrix3d& C_by_gyros, const FixReadings& readings) const;
   /// The gyro whose fault explains a fix that was rejected; kNoGyro where none does.

@@ -62,11 +62,10 @@ class PackedTriangle {
   /// j ≥ i.
   [[nodiscard]] double operator()(int i, int j) const { return row(i)[j - i]; }
 
-  /// As invert_triangle(), of the rows and columns from `first` on, as many as `inverse` has.
+  /// As invert_triangle(), of the rows and columns from `first` on, as many as `inverse` has, which is zero before.
   void invert(int first, RowsView inverse) const {
     for (int i = 0; i < inverse.rows; ++i) {
       double* x = inverse.row(i);
-      std::fill_n(x, inverse.columns, 0.0);
       x[i] = 1;
       for (int j = i; j < inverse.columns; ++j) {
         const double* R = row(first + j);
@@ -161,13 +160,14 @@ class SquareRootInformation {
     solve_rows({R.row(first) + first, columns, columns, R.stride}, H);
   }
 
-  /// Measurement update with rows (H, y), y = H x + unit white noise, which are used up; y is the last column. Returns
-  /// the correction, to be fed back; not finite unless regular() after it.
-  [[nodiscard]] Vector update(RowsView rows) {
-    RowsView whole{data_.data(), states_, states_ + 1, states_ + 1};
-    rotate_into(whole, rows, states_);
+  /// Measurement update with rows (H, y), y = H x + unit white noise, which are used up; y is the last column. What it
+  /// is to be corrected by is kept for correction(), before which nothing else may change R.
+  void take(RowsView rows) { rotate_into(with_right_side(), rows, states_); }
+  /// Of the update before it, to be fed back; not finite unless regular().
+  [[nodiscard]] Vector correction() {
+    const RowsView whole = with_right_side();
     Vector x(states_);
-    solve_column({data_.data(), states_, states_ + 1, states_ + 1}, x.data());
+    solve_column({whole.data, whole.rows, whole.columns, whole.stride}, x.data());
     for (int i = 0; i < states_; ++i) {
       whole(i, states_) = 0;
     }
@@ -190,9 +190,11 @@ class SquareRootInformation {
   }
 
  private:
+  [[nodiscard]] RowsView with_right_side() { return {data_.data(), states_, states_ + 1, states_ + 1}; }
+
   int states_ = 0;
   int dynamic_ = 0;
-  // R, and right of it z of R x = z, which is zero except within update().
+  // R, and right of it z of R x = z, which is zero except from take() to correction().
   std::array<double, static_cast<std::size_t>(Max) * (Max + 1)> data_{};
 };
 
