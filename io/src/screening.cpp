@@ -132,6 +132,15 @@ std::string_view unit_mistaken(double factor) {
   return found == kMistakes.end() ? "one of them is wrong" : found->text;
 }
 
+/// How many rows in a row have the same time, in the mean.
+double rows_of_a_time(const Series& series) {
+  std::size_t times = 1;
+  for (std::size_t row = 1; row < series.rows(); ++row) {
+    times += series.t_s[row] == series.t_s[row - 1] ? 0 : 1;
+  }
+  return static_cast<double>(series.rows()) / static_cast<double>(times);
+}
+
 /// Refuses a table that does not fit the period that it is told to have. Gaps and dropouts do not matter, be they most
 /// of the pass: it is refused where hardly any step is as short as twice that period, or few are as long as half of it.
 void check_period(const Series& series, const std::vector<Time>& t, Duration told, std::string_view section,
@@ -157,6 +166,17 @@ void check_period(const Series& series, const std::vector<Time>& t, Duration tol
     return;
   }
   const double measured_s = step_at(0.5);
+  constexpr double kPackets = 1.5;
+  if (const double rows = rows_of_a_time(series); rows > kPackets) {
+    throw InputRefused(
+        series.file, {},
+        fmt::format(
+            "{} has about {:.0f} rows of the same t_s, and another t_s every {:g} s, as of packets; period_s in "
+            "[{}] of {} is {:g} s",
+            series.name, rows, measured_s, section, settings_file.string(), told_s),
+        "give each row the time at which it was taken, such as that of the packet and period_s more for "
+        "each further row");
+  }
   throw InputRefused(
       series.file, {},
       fmt::format("{} has a row every {:g} s, and period_s in [{}] of {} is {:g} s: {}", series.name, measured_s,

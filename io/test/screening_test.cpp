@@ -57,6 +57,16 @@ TEST_P(Screening, RefusesAPeriodThatTheRowsDoNotHave) {
               HasSubstr("in [star_tracker] of " + settings + " is 3000 s: the period looks like millisec"));
 }
 
+TEST_P(Screening, RefusesRowsThatHaveTheTimeOfTheirPacket) {
+  for (std::size_t i = 0; i < raw_.gyro.rows.size(); ++i) {
+    raw_.gyro.rows[i][0] = raw_.gyro.rows[i - i % 4][0];
+  }
+  const std::string refused = load_refused();
+  EXPECT_THAT(refused,
+              HasSubstr(gyro_table() + " has about 4 rows of the same t_s, and another t_s every 2 s, as of packets"));
+  EXPECT_THAT(refused, HasSubstr("give each row the time at which it was taken"));
+}
+
 // Half of the samples and most of the fixes are gone.
 TEST_P(Screening, TakesAPeriodOfWhichManyRowsAreMissing) {
   int row = 0;
