@@ -213,8 +213,7 @@ FixReport PaperEstimator::take(const StarFix& fix, const FixReadings& readings) 
       break;
   }
   rows *= std::sqrt(report.weight);
-  information_.take(rows_of(rows));
-  feed_back(information_.correction());
+  feed_back(information_.update(rows_of(rows)));
   return report;
 }
 

@@ -60,8 +60,7 @@ template <class F>
 Eigen::VectorXd update(F& filter, const Matrix& H, const Eigen::VectorXd& y) {
   RowMajor rows(H.rows(), H.cols() + 1);
   rows << H, y;
-  filter.take(rows_of(rows));
-  return filter.correction();
+  return filter.update(rows_of(rows));
 }
 
 /// The textbook Kalman filter with a full covariance, beside the filter under test.

@@ -90,7 +90,8 @@ class InvariantEstimator {
 
   /// Square root of the covariance of all states, or of the first of them, at the last fix. Needs started().
   void error_root(RowsView root) const { information_.inverse_root(root); }
-  /// The same of the prior, rows and columns from the first that is no direction up to the first shared one, into zeros.
+  /// The same of the prior, rows and columns from the first that is no direction up to the first shared one, into
+  /// zeros.
   void prior_error_root(RowsView root) const;
   /// Covariance of what depends so on the states at the last fix. Needs started().
   [[nodiscard]] Eigen::Matrix3d covariance_of_errors(const Rows3& by_states) const { return covariance_of(by_states); }

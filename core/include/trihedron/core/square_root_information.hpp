@@ -174,6 +174,12 @@ class SquareRootInformation {
     return x;
   }
 
+  /// Both.
+  [[nodiscard]] Vector update(RowsView rows) {
+    take(rows);
+    return correction();
+  }
+
   /// R⁻¹, a square root of the covariance, P = R⁻¹ R⁻ᵀ, into `inverse`: its first rows, as many as it has. Not
   /// finite unless regular().
   void inverse_root(RowsView inverse) const { invert_triangle(root(), inverse); }
