@@ -81,10 +81,11 @@ python-test: $(PYTHON_TOOLS)/installed
 
 # With the libraries of this machine that it needs put in. WHEEL_PYTHON: of version 3.12 or later, for one wheel for all of these.
 WHEEL_PYTHON ?= $(PYTHON_TOOLS)/bin/python
+# By the compiler of the program: another one rounds otherwise where the batch multiplies and adds at once.
 wheel: $(PYTHON_TOOLS)/installed
 	@cmake/setup.sh program python
 	rm -rf out/wheel
-	$(WHEEL_PYTHON) -m pip wheel --quiet --no-deps --wheel-dir out/wheel/plain .
+	CC=clang-16 CXX=clang++-16 $(WHEEL_PYTHON) -m pip wheel --quiet --no-deps --wheel-dir out/wheel/plain .
 	PATH=$(abspath $(PYTHON_TOOLS)/bin):$$PATH $(PYTHON_TOOLS)/bin/auditwheel repair --plat auto --wheel-dir out/wheel out/wheel/plain/trihedron-*.whl
 	rm -rf out/wheel/plain
 	@ls -l out/wheel
