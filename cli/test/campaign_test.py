@@ -55,14 +55,17 @@ def finished(tmp_path_factory):
     return directory
 
 
-@pytest.fixture(scope="module")
-def long_one(tmp_path_factory):
-    """The directory with the long campaign, finished, and its exit status."""
-    directory = tmp_path_factory.mktemp("long")
-    (directory / "c.toml").write_text(LONG_CAMPAIGN)
+def flown(directory, campaign):
+    """The directory, with the campaign and what one process makes of it, and its exit status."""
+    (directory / "c.toml").write_text(campaign)
     result = run("--quiet", "campaign", directory / "c.toml", "-o", directory / "out")
     assert result.returncode in (TRUSTWORTHY, DO_NOT_USE), result.stderr
     return directory, result.returncode
+
+
+@pytest.fixture(scope="module")
+def long_one(tmp_path_factory):
+    return flown(tmp_path_factory.mktemp("long"), LONG_CAMPAIGN)
 
 
 def table(out):

@@ -10,9 +10,9 @@ import time
 
 import pytest
 
-from campaign_test import CAMPAIGN, long_one, records, table, until
+from campaign_test import CAMPAIGN, flown, long_one, records, table, until
 from outputs_test import faults
-from program import BUILD, DO_NOT_USE, INPUT_REFUSED, MACHINE_FAILED, PROGRAM, ROOT, TRUSTWORTHY, WRONG_USAGE, refused, run
+from program import BUILD, INPUT_REFUSED, MACHINE_FAILED, PROGRAM, ROOT, TRUSTWORTHY, WRONG_USAGE, refused, run
 
 MPIRUN = shutil.which("mpirun")
 needs_mpi = pytest.mark.skipif(not (MPIRUN and (BUILD / "trihedron-mpi.so").exists()),
@@ -21,12 +21,7 @@ needs_mpi = pytest.mark.skipif(not (MPIRUN and (BUILD / "trihedron-mpi.so").exis
 
 @pytest.fixture(scope="module")
 def alone(tmp_path_factory):
-    """The campaign by one process."""
-    directory = tmp_path_factory.mktemp("mpi")
-    (directory / "c.toml").write_text(CAMPAIGN)
-    result = run("--quiet", "campaign", directory / "c.toml", "-o", directory / "out")
-    assert result.returncode in (TRUSTWORTHY, DO_NOT_USE), result.stderr
-    return directory, result.returncode
+    return flown(tmp_path_factory.mktemp("mpi"), CAMPAIGN)
 
 
 def mpirun(ranks, *arguments):
