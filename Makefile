@@ -81,7 +81,7 @@ python-test: $(PYTHON_TOOLS)/installed
 
 # With the libraries of this machine that it needs put in. WHEEL_PYTHON: of version 3.12 or later, for one wheel for all of these.
 WHEEL_PYTHON ?= $(PYTHON_TOOLS)/bin/python
-# By the compiler of the program: another one rounds otherwise where the batch multiplies and adds at once.
+# By the compiler of the program: by another one the last digits of the ground are others.
 wheel: $(PYTHON_TOOLS)/installed
 	@cmake/setup.sh program python
 	rm -rf out/wheel
