@@ -5,9 +5,13 @@
 #include <chrono>
 #include <cmath>
 #include <cstddef>
+#include <iterator>
+#include <limits>
 #include <vector>
 
 #include "model/scatter.hpp"
+#include "model/slews.hpp"
+#include "trihedron/core/frames.hpp"
 
 namespace trihedron::ground {
 namespace {
@@ -23,59 +27,198 @@ struct Hour {
   std::size_t begin, end;
 };
 
-/// Sizes of the components across the momentum of third differences of readings `lag` samples apart, over their
-/// 1-sigma by noise of 1. Without those over a gap, and of readings that repeat themselves.
-std::vector<double> third_differences(const Pass& pass, int gyro, const Hour& hour, std::size_t lag) {
+using Sizes = std::vector<double>;
+
+/// Sizes of third differences of what is read in samples `lag` apart: add(i, sizes) adds those from sample i on.
+/// Without those over a gap.
+template <class Add>
+Sizes third_differences(const Pass& pass, const Hour& hour, std::size_t lag, const Add& add) {
   const GyroTelemetry& readings = pass.gyro;
   const double period_s = to_seconds(pass.settings.gyro_period);
   const double step_s = static_cast<double>(lag) * period_s;
-  const double per_sigma = 1 / std::sqrt(1.0 + 9 + 9 + 1);
   const std::size_t every = 2 * (hour.end - hour.begin) / kEnoughDifferences + 1;
-  std::vector<double> differences;
+  Sizes sizes;
   for (std::size_t i = hour.begin; i + 3 * lag < hour.end; i += every) {
     const auto is_even = [&](std::size_t j) {
       return std::abs(to_seconds(readings.t[i + (j + 1) * lag] - readings.t[i + j * lag]) - step_s) < kEven * period_s;
     };
-    const auto h = [&](std::size_t j) { return readings.direction(i + j * lag, gyro); };
-    const Eigen::Vector3d difference = per_sigma * (h(3) - h(0) - 3 * (h(2) - h(1)));
-    const bool repeats = h(0) == h(1) && h(1) == h(2) && h(2) == h(3);
-    if (!is_even(0) || !is_even(1) || !is_even(2) || !difference.allFinite() || repeats) {
-      continue;
+    if (is_even(0) && is_even(1) && is_even(2)) {
+      add(i, sizes);
     }
-    const Eigen::Vector3d across = h(1).unitOrthogonal();
-    differences.push_back(std::abs(across.dot(difference)));
-    differences.push_back(std::abs(h(1).normalized().cross(across).dot(difference)));
   }
-  return differences;
+  return sizes;
 }
 
-/// 0 where there are too few readings.
-double noise_over(const Pass& pass, int gyro, const Hour& hour) {
+/// 1-sigma of what is read, by the lag that shows most; 0 where there are too few readings.
+template <class AddOfLag>
+double noise_over(const Pass& pass, const Hour& hour, const AddOfLag& add_of_lag) {
   constexpr double kFarthest_s = 0.5;
-  double noise_rad = 0;
+  const double per_sigma = 1 / std::sqrt(1.0 + 9 + 9 + 1);
+  double noise = 0;
   for (std::size_t lag = 1; lag == 1 || static_cast<double>(lag) * to_seconds(pass.settings.gyro_period) <= kFarthest_s;
        lag *= 2) {
-    std::vector<double> differences = third_differences(pass, gyro, hour, lag);
-    if (differences.size() >= kLeastDifferences) {
-      noise_rad = std::max(noise_rad, sigma_without_outliers(differences));
+    Sizes sizes = third_differences(pass, hour, lag, add_of_lag(lag));
+    if (sizes.size() >= kLeastDifferences) {
+      noise = std::max(noise, per_sigma * sigma_without_outliers(sizes));
+    }
+  }
+  return noise;
+}
+
+/// Of a gyro, by the components across its momentum. Not of readings that repeat themselves.
+double noise_of_gyro(const Pass& pass, int gyro, const Hour& hour) {
+  return noise_over(pass, hour, [&](std::size_t lag) {
+    return [&pass, gyro, lag](std::size_t i, Sizes& sizes) {
+      const auto h = [&](std::size_t j) { return pass.gyro.direction(i + j * lag, gyro); };
+      const Eigen::Vector3d difference = h(3) - h(0) - 3 * (h(2) - h(1));
+      const bool repeats = h(0) == h(1) && h(1) == h(2) && h(2) == h(3);
+      if (difference.allFinite() && !repeats) {
+        const Eigen::Vector3d across = h(1).unitOrthogonal();
+        sizes.push_back(std::abs(across.dot(difference)));
+        sizes.push_back(std::abs(h(1).normalized().cross(across).dot(difference)));
+      }
+    };
+  });
+}
+
+/// Angles between the momentum of each gyro and that of the next one, which no motion of the body changes.
+class Angles {
+ public:
+  Angles(const Pass& pass, int gyros) : readings_(pass.gyro) {
+    for (int k = 0; k < gyros; ++k) {
+      const GyroPrior& prior = pass.settings.gyros[static_cast<std::size_t>(k)];
+      C_c_b_[k] = Rot<C, B<1>>::exp(Vec<C>::assume(prior.alignment_rotation_vector_rad)).raw();
+    }
+  }
+  [[nodiscard]] double at(std::size_t sample, int gyro) const {
+    const Eigen::Vector3d a = C_c_b_[gyro] * readings_.direction(sample, gyro);
+    const Eigen::Vector3d b = C_c_b_[gyro + 1] * readings_.direction(sample, gyro + 1);
+    return std::atan2(a.cross(b).norm(), a.dot(b));
+  }
+
+ private:
+  const GyroTelemetry& readings_;
+  PerGyro<Eigen::Matrix3d> C_c_b_;
+};
+
+double noise_of_angle(const Pass& pass, const Angles& angles, int gyro, const Hour& hour) {
+  return noise_over(pass, hour, [&](std::size_t lag) {
+    return [&angles, gyro, lag](std::size_t i, Sizes& sizes) {
+      const auto angle = [&](std::size_t j) { return angles.at(i + j * lag, gyro); };
+      const double difference = angle(3) - angle(0) - 3 * (angle(2) - angle(1));
+      if (std::isfinite(difference)) {
+        sizes.push_back(std::abs(difference));
+      }
+    };
+  });
+}
+
+/// That of each gyro, for an hour; 0 where there are too few readings. What shakes the body is in none of the angles:
+/// where they show less than the readings, that is divided between the gyros as the settings have it.
+PerGyro<double> noise_of_hour(const Pass& pass, const Angles& angles, int gyros, const Hour& hour) {
+  constexpr double kMoreThanChance = 1.2;
+  const auto told_rad = [&](int k) { return pass.settings.gyros[static_cast<std::size_t>(k)].readout_noise_rad; };
+  PerGyro<double> noise_rad{};
+  for (int k = 0; k < gyros; ++k) {
+    noise_rad[k] = noise_of_gyro(pass, k, hour);
+  }
+  for (int k = 0; k + 1 < gyros; ++k) {
+    const double of_angle = noise_of_angle(pass, angles, k, hour);
+    const double of_readings = std::hypot(noise_rad[k], noise_rad[k + 1]);
+    const double told = std::hypot(told_rad(k), told_rad(k + 1));
+    if (of_angle > 0 && told > 0 && of_readings > kMoreThanChance * of_angle) {
+      noise_rad[k] = of_angle * told_rad(k) / told;
+      noise_rad[k + 1] = of_angle * told_rad(k + 1) / told;
     }
   }
   return noise_rad;
 }
 
-/// Of the hours of the pass that have enough readings.
-std::vector<double> noise_by_hours(const Pass& pass, int gyro) {
+/// Of the hours of the pass that have enough readings, gyro by gyro, in ascending order.
+PerGyro<std::vector<double>> noise_by_hours(const Pass& pass, const Angles& angles, int gyros) {
   const std::size_t size = pass.gyro.size();
   const double hours = static_cast<double>(size) * to_seconds(pass.settings.gyro_period) / 3600;
   const auto stretches = std::max<std::size_t>(static_cast<std::size_t>(hours), 1);
-  std::vector<double> noise_rad;
+  PerGyro<std::vector<double>> noise_rad;
   for (std::size_t n = 0; n < stretches; ++n) {
-    const double its = noise_over(pass, gyro, {n * size / stretches, (n + 1) * size / stretches});
-    if (its > 0) {
-      noise_rad.push_back(its);
+    const PerGyro<double> its = noise_of_hour(pass, angles, gyros, {n * size / stretches, (n + 1) * size / stretches});
+    for (int k = 0; k < gyros; ++k) {
+      if (its[k] > 0) {
+        noise_rad[k].push_back(its[k]);
+      }
     }
   }
+  for (int k = 0; k < gyros; ++k) {
+    std::ranges::sort(noise_rad[k]);
+  }
   return noise_rad;
+}
+
+/// Samples from which a sixth difference is taken.
+constexpr std::size_t kOfSixth = 7;
+
+/// How fast the body turns over a window, as far as the readings show it: rad/s. NaN over a gap.
+double rate_over(const Pass& pass, std::size_t first) {
+  const GyroTelemetry& readings = pass.gyro;
+  const double span_s = (kOfSixth - 1) * to_seconds(pass.settings.gyro_period);
+  const std::size_t last = first + kOfSixth - 1;
+  if (std::abs(to_seconds(readings.t[last] - readings.t[first]) - span_s) > kEven * span_s) {
+    return std::numeric_limits<double>::quiet_NaN();
+  }
+  double turn_rad = 0;
+  for (int k = 0; k < readings.gyros; ++k) {
+    turn_rad = std::max(turn_rad, (readings.direction(last, k) - readings.direction(first, k)).norm());
+  }
+  return turn_rad / span_s;
+}
+
+/// Size of the sixth difference of an angle. What is as smooth as a polynomial of fifth degree is not in it.
+double sixth_difference(const Angles& angles, int gyro, std::size_t first) {
+  constexpr double kBinomial[kOfSixth] = {1, -6, 15, -20, 15, -6, 1};
+  double sum = 0;
+  for (std::size_t i = 0; i < kOfSixth; ++i) {
+    sum += kBinomial[i] * angles.at(first + i, gyro);
+  }
+  return std::abs(sum);
+}
+
+/// Noise of the angles between the momenta where the body turns fast over that where it does not: the most of the pairs
+/// of gyros, 1 where the pass has too few such readings.
+double noise_in_slews_over_rest(const Pass& pass, const Angles& angles, int gyros) {
+  constexpr std::size_t kMostSixths = 20000;
+  constexpr std::size_t kFewestSixths = 300;
+  if (pass.gyro.size() < kOfSixth) {
+    return 1;
+  }
+  const std::size_t windows = pass.gyro.size() - kOfSixth + 1;
+  const std::size_t every = windows / kMostSixths + 1;
+  std::vector<double> rates;
+  for (std::size_t i = 0; i < windows; i += every) {
+    rates.push_back(rate_over(pass, i));
+  }
+  std::vector<double> known;
+  std::ranges::copy_if(rates, std::back_inserter(known), [](double rate) { return std::isfinite(rate); });
+  const double usual_rad_s = known.empty() ? 0 : median_of(known);
+  double most = 1;
+  for (int k = 0; k + 1 < gyros; ++k) {
+    std::vector<double> in_slews;
+    std::vector<double> at_rest;
+    for (std::size_t n = 0; n < rates.size(); ++n) {
+      const double size = sixth_difference(angles, k, n * every);
+      if (!(size > 0)) {  // readings that are missing, or repeat themselves
+        continue;
+      }
+      if (is_in_slew(rates[n], usual_rad_s)) {
+        in_slews.push_back(size);
+      } else if (is_at_rest(rates[n], usual_rad_s)) {
+        at_rest.push_back(size);
+      }
+    }
+    if (in_slews.size() >= kFewestSixths && at_rest.size() >= kFewestSixths) {
+      most = std::max(most, sigma_without_outliers(in_slews) / sigma_without_outliers(at_rest));
+    }
+  }
+  return most;
 }
 
 }  // namespace
@@ -88,18 +231,19 @@ std::optional<ReadoutNoise> other_readout_noise(const Pass& pass) {
   }
   ReadoutNoise noise;
   noise.gyros = std::min({pass.gyro.gyros, static_cast<int>(pass.settings.gyros.size()), kMaxGyros});
+  const Angles angles(pass, noise.gyros);
+  const PerGyro<std::vector<double>> by_hours = noise_by_hours(pass, angles, noise.gyros);
   bool is_other = false;
   for (int k = 0; k < noise.gyros; ++k) {
     noise.told_rad[k] = noise.found_rad[k] = noise.most_rad[k] =
         pass.settings.gyros[static_cast<std::size_t>(k)].readout_noise_rad;
-    std::vector<double> hours = noise_by_hours(pass, k);
-    if (!hours.empty()) {
-      std::ranges::sort(hours);
+    if (const std::vector<double>& hours = by_hours[k]; !hours.empty()) {
       noise.found_rad[k] = hours[hours.size() / 2];
       noise.most_rad[k] = hours.back();
     }
     is_other = is_other || std::abs(noise.found_rad[k] - noise.told_rad[k]) > kTolerance * noise.told_rad[k];
   }
+  noise.in_slews = noise_in_slews_over_rest(pass, angles, noise.gyros);
   return is_other || !noise.is_steady() ? std::optional(noise) : std::nullopt;
 }
 

@@ -869,11 +869,20 @@ OrbitalOdds orbital_odds(const Trial& trial) {
     }
   });
   const MatrixXd form = without_first(without_states_at_end(whole.form(true), d), d + constants);
-  const auto log_odds = [&](Index at, Index size, double sigma) {
-    return log_evidence_of(sigma * sigma * form.block(at, at, size, size), sigma * form.col(shapes).segment(at, size));
-  };
   const double error_rad = kind_of(FurtherState::kOrbitalError).prior_sigma;
-  return {log_odds(0, kError, error_rad), log_odds(kError, kError * gyros, std::abs(rate_rad_s) * error_rad)};
+  const auto log_odds = [](const MatrixXd& its, Index at, Index size, double sigma) {
+    return log_evidence_of(sigma * sigma * its.block(at, at, size, size),
+                           sigma * its.col(its.cols() - 1).segment(at, size));
+  };
+  const Index drifts = kError * gyros;
+  const double drift_rad_s = std::abs(rate_rad_s) * error_rad;
+  const LogEvidence error = log_odds(form, 0, kError, error_rad);
+  MatrixXd with_prior = form;
+  with_prior.diagonal().head<kError>().array() += 1 / (error_rad * error_rad);
+  const LogEvidence beside_error = log_odds(without_first(with_prior, kError), 0, drifts, drift_rad_s);
+  return {error,
+          log_odds(form, kError, drifts, drift_rad_s),
+          {error.by_prior_as_it_is + beside_error.value, error.by_prior_as_it_is + beside_error.by_prior_as_it_is}};
 }
 
 }  // namespace trihedron::ground

@@ -41,6 +41,7 @@ struct Moves {
 struct OrbitalOdds {
   LogEvidence error;
   LogEvidence drift;
+  LogEvidence both;  ///< that of the error by its prior as it is
 };
 /// Of a trial with neither, with the noise and the spectrum of the drift field that were found by it.
 [[nodiscard]] OrbitalOdds orbital_odds(const Trial& trial);

@@ -563,11 +563,11 @@ Decision decide_by_pass(const Pass& pass, const Screened& screened, const Calibr
 /// A course by which the coefficients are found to change.
 struct FoundCourse {
   CourseOfChange::Kind kind;
-  double time_s;
+  double time_s;           ///< an even change has none
   double least_s, most_s;  ///< between which the time is
 };
 
-/// Of what moves most likely, where it is a warm-up or a jump of the coefficients.
+/// Of what moves most likely, where it is a change of the coefficients that has a course.
 std::optional<FoundCourse> course_of(const std::vector<Change>& changes, Time epoch) {
   if (changes.empty() || !changes.front().is_found() || changes.front().moving != Moving::kCoefficients) {
     return std::nullopt;
@@ -582,13 +582,18 @@ std::optional<FoundCourse> course_of(const std::vector<Change>& changes, Time ep
     const double until_s = to_seconds(change.until - epoch);
     return FoundCourse{CourseOfChange::Kind::kJump, (from_s + until_s) / 2, from_s, until_s};
   }
+  if (change.motion == Motion::kRamp) {
+    return FoundCourse{CourseOfChange::Kind::kEven, 0, 0, 0};
+  }
   return std::nullopt;
 }
 
 void use_course(CourseOfChange::Kind kind, double time_s, CalibrationOptions& options) {
   options.further_states[FurtherState::kCoefficientChange] = Choice::kOn;
   options.further_states.change_course = kind;
-  options.further_states.change_time = from_seconds(time_s);
+  if (kind != CourseOfChange::Kind::kEven) {
+    options.further_states.change_time = from_seconds(time_s);
+  }
 }
 
 /// From the middle of three places a step apart to the largest value, by a parabola; two steps at most.
@@ -698,16 +703,106 @@ bool is_all_that_is_left(const Decision& by_drift) {
   return std::max(walk_rad_s, wanders ? options.further_states.wandering_drift_rad_s : 0) < kMost * drift_rad_s;
 }
 
-/// Decides by the data of the pass, and whether there is drift at orbital period: once more with it where there may be.
-/// Then `asked` has it as well. Where it is not all that is there, but likelier than an error of the star tracker,
-/// there is no such error, and a field and noise stand for the drift.
+/// By eq. (1) in place of a field, with the least noise: the field, and noise, have taken a part of what comes back.
+struct ByEq1InsteadOfField {
+  double log_likelihood;
+  OrbitalOdds odds;
+};
+
+ByEq1InsteadOfField by_eq1_instead_of_field(const Pass& pass, const Screened& screened, const CalibrationOptions& asked,
+                                            CalibrationOptions options) {
+  options.drift_field = false;
+  options.drift_model = kEsg7;
+  options.direction_random_walk_rad_sqrt_s = asked.direction_random_walk_rad_sqrt_s;
+  options.further_states[FurtherState::kWanderingDrift] = Choice::kOff;
+  options.further_states[FurtherState::kOrbitalError] = Choice::kOff;
+  const Trial trial(pass, screened, options);
+  return {trial.log_likelihood(), orbital_odds(trial)};
+}
+
+/// What the odds say of an error of the star tracker and of drift at orbital period.
+class AtOrbit {
+ public:
+  /// Of a decision with odds. `instead`: where it has a field.
+  AtOrbit(const Decision& decision, const std::optional<ByEq1InsteadOfField>& instead)
+      : odds_(*decision.orbital_odds),
+        drift_odds_(instead ? instead->odds : odds_),
+        has_field_(instead.has_value()),
+        has_error_(decision.options.further_states.is_on(FurtherState::kOrbitalError)),
+        instead_of_field_(instead ? instead->log_likelihood - decision.log_likelihood
+                                  : -std::numeric_limits<double>::infinity()) {}
+
+  [[nodiscard]] bool has_error() const { return has_error_; }
+  [[nodiscard]] double error_over_drift() const { return log_odds(odds_.error) - log_odds(odds_.drift); }
+  [[nodiscard]] bool may_be_drift() const {
+    constexpr double kMayBeDrift = 20;
+    return (odds_.drift.by_prior_as_it_is > kMayBeThere && error_over_drift() < kMayBeDrift) ||
+           over_field(drift_odds_.drift) > kMayBeThere;
+  }
+  /// `has_one`: one of them was found.
+  [[nodiscard]] bool may_be_both(bool has_one) const {
+    const double over_one =
+        odds_.both.by_prior_as_it_is - std::max(odds_.error.by_prior_as_it_is, odds_.drift.by_prior_as_it_is);
+    return (has_one && over_one > kMayBeThere) ||
+           over_field(drift_odds_.both) > std::max(over_field(drift_odds_.drift), kMayBeThere);
+  }
+  /// By how much more than their likelihoods, which are by the priors as they are, drift or both are likelier than what
+  /// was decided.
+  [[nodiscard]] double more_for_drift() const { return by_narrower(drift_odds_.drift) - of_decided(); }
+  [[nodiscard]] double more_for_both() const { return by_narrower(drift_odds_.both) - of_decided(); }
+
+ private:
+  /// Members of the field, or noise, that were found without what comes back have taken a part of it: its odds are
+  /// larger than these.
+  static constexpr double kMayBeThere = -10;
+
+  /// Drift that all gyros have alike, as an error of the star tracker looks, is not to be expected by eq. (1) alone.
+  /// Beside other drift it is, and of any size.
+  [[nodiscard]] double log_odds(const LogEvidence& of) const { return has_field_ ? of.value : of.by_prior_as_it_is; }
+  [[nodiscard]] double by_narrower(const LogEvidence& of) const { return log_odds(of) - of.by_prior_as_it_is; }
+  [[nodiscard]] double of_decided() const { return has_error_ ? by_narrower(odds_.error) : 0; }
+  [[nodiscard]] double over_field(const LogEvidence& of) const { return instead_of_field_ + log_odds(of); }
+
+  OrbitalOdds odds_;
+  OrbitalOdds drift_odds_;
+  bool has_field_;
+  bool has_error_;
+  double instead_of_field_;  ///< ln of the likelihood by eq. (1) less that of the field
+};
+
+/// What is decided with drift at orbital period.
+struct WithDrift {
+  CalibrationOptions options;  ///< what was asked for, with it
+  Decision decision;
+  double gain;  ///< of the logarithm of the likelihood
+  bool counts;
+
+  [[nodiscard]] Decision take(CalibrationOptions& asked) && {
+    asked = std::move(options);
+    return without_aberration(std::move(decision));
+  }
+};
+
+/// `gain`: beside that of the likelihood; `at_least`: for which it counts.
+WithDrift with_orbital_drift(const Pass& pass, const Screened& screened, CalibrationOptions options,
+                             const DriftModelId& largest_model, const Progress& progress, double gain,
+                             double at_least) {
+  begin_stage(progress, "looks for drift at orbital period");
+  options.further_states[FurtherState::kOrbitalDrift] = Choice::kOn;
+  Decision decision = decide_by_pass(pass, screened, options, largest_model, progress);
+  gain += decision.log_likelihood;
+  const bool counts = gain > at_least && is_all_that_is_left(decision);
+  return {std::move(options), std::move(decision), gain, counts};
+}
+
+/// Decides by the data of the pass, and whether there is drift at orbital period: once more with it where there may be,
+/// in place of an error of the star tracker and beside one. Then `asked` has it as well. Where it is not all that is
+/// there, but likelier than an error of the star tracker, there is no such error, and a field and noise stand for the
+/// drift.
 Decision decide_on_orbital_drift(const Pass& pass, const Screened& screened, CalibrationOptions& asked,
                                  const DriftModelId& largest_model, const Progress& progress) {
   constexpr FurtherState kError = FurtherState::kOrbitalError;
   constexpr FurtherState kDrift = FurtherState::kOrbitalDrift;
-  // Members of the field, or noise, that were found without it have taken a part of it: its odds are larger than these.
-  constexpr double kMayBeThere = -10;
-  constexpr double kMayBeDrift = 20;
   constexpr double kLeastPhase = 3 * std::numbers::pi;
   const bool is_open = asked.further_states[kDrift] == Choice::kAuto;
   if (is_open) {
@@ -717,44 +812,54 @@ Decision decide_on_orbital_drift(const Pass& pass, const Screened& screened, Cal
   if (!decision.orbital_odds) {
     return decision;
   }
-  const OrbitalOdds odds = *decision.orbital_odds;
-  // Drift that all gyros have alike, as an error of the star tracker looks, is not to be expected by eq. (1) alone.
-  // Beside other drift it is, and of any size.
-  const bool has_other_drift = decision.field && decision.field->log_evidence > kLogOddsToAccept;
-  const auto log_odds = [&](const LogEvidence& of) { return has_other_drift ? of.value : of.by_prior_as_it_is; };
-  const auto by_narrower_priors = [&](const LogEvidence& of) { return log_odds(of) - of.by_prior_as_it_is; };
-  const double error_over_drift = log_odds(odds.error) - log_odds(odds.drift);
+  std::optional<ByEq1InsteadOfField> instead;
+  if (decision.field && decision.field->log_evidence > kLogOddsToAccept) {
+    instead = by_eq1_instead_of_field(pass, screened, asked, decision.options);
+  }
+  const AtOrbit at_orbit(decision, instead);
   CalibrationOptions without_error = asked;
-  const bool has_error = decision.options.further_states.is_on(kError);
-  if (has_error) {
-    decision.orbital_error_over_drift = error_over_drift;
+  CalibrationOptions with_error = asked;
+  with_error.further_states[kError] = Choice::kOn;
+  if (at_orbit.has_error()) {
+    decision.orbital_error_over_drift = at_orbit.error_over_drift();
     without_error.further_states[kError] = Choice::kOff;
   }
   const double phase = std::abs(*asked.orbital_rate_rad_s) *
                        to_seconds(screened.pass.fixes.back().fix.t - screened.pass.fixes.front().fix.t);
-  if (is_open && phase > kLeastPhase && odds.drift.by_prior_as_it_is > kMayBeThere && error_over_drift < kMayBeDrift) {
-    begin_stage(progress, "looks for drift at orbital period");
-    CalibrationOptions with = without_error;
-    with.further_states[kDrift] = Choice::kOn;
-    Decision by_drift = decide_by_pass(pass, screened, with, largest_model, progress);
-    const double gain = by_drift.log_likelihood + by_narrower_priors(odds.drift) - decision.log_likelihood -
-                        (has_error ? by_narrower_priors(odds.error) : 0);
-    if (gain > kLogOddsToAccept && is_all_that_is_left(by_drift)) {
-      by_drift.evidence.push_back({kDrift, gain, true});
-      by_drift.orbital_error_over_drift = has_error ? std::optional(-gain) : std::nullopt;
-      asked = with;
-      return without_aberration(std::move(by_drift));
+  if (is_open && phase > kLeastPhase) {
+    const auto with = [&](const CalibrationOptions& options, double more, double at_least) {
+      return with_orbital_drift(pass, screened, options, largest_model, progress, more - decision.log_likelihood,
+                                at_least + kLogOddsToAccept);
+    };
+    std::optional<WithDrift> by_drift;
+    if (at_orbit.may_be_drift()) {
+      by_drift = with(without_error, at_orbit.more_for_drift(), 0);
     }
-    if (has_error) {
-      decision.orbital_error_over_drift = std::min(error_over_drift, -gain);
+    const bool is_drift = by_drift && by_drift->counts;
+    const double gain_of_drift = is_drift ? by_drift->gain : 0;
+    if (at_orbit.may_be_both(at_orbit.has_error() || is_drift)) {
+      WithDrift both = with(with_error, at_orbit.more_for_both(), gain_of_drift);
+      if (both.counts) {
+        both.decision.evidence.push_back({kDrift, both.gain - gain_of_drift, true});
+        return std::move(both).take(asked);
+      }
+    }
+    if (is_drift) {
+      by_drift->decision.evidence.push_back({kDrift, by_drift->gain, true});
+      by_drift->decision.orbital_error_over_drift =
+          at_orbit.has_error() ? std::optional(-by_drift->gain) : std::nullopt;
+      return (*std::move(by_drift)).take(asked);
+    }
+    if (by_drift && at_orbit.has_error()) {
+      decision.orbital_error_over_drift = std::min(at_orbit.error_over_drift(), -by_drift->gain);
     }
   }
-  if (!has_error || error_over_drift > -kLogOddsToAccept) {
+  if (!at_orbit.has_error() || at_orbit.error_over_drift() > -kLogOddsToAccept) {
     return decision;
   }
   Decision without = decide_by_pass(pass, screened, without_error, largest_model, progress);
-  without.evidence.push_back({kError, error_over_drift, false});
-  without.orbital_error_over_drift = error_over_drift;
+  without.evidence.push_back({kError, at_orbit.error_over_drift(), false});
+  without.orbital_error_over_drift = at_orbit.error_over_drift();
   asked = without_error;
   return without_aberration(std::move(without));
 }
@@ -860,8 +965,8 @@ Decision decide_on_polhodes(const Pass& pass, const Screened& screened, Calibrat
   return by_polhodes;
 }
 
-/// Decides by the data of the pass. `change_is_open`: whether the coefficients may be found to change; then a warm-up
-/// or a jump of them is looked for, unless they come and go with the polhodes.
+/// Decides by the data of the pass. `change_is_open`: whether the coefficients may be found to change; then a warm-up,
+/// a jump or an even change of them is looked for, unless they come and go with the polhodes.
 Decision decide_with_course(const Pass& pass, const Screened& screened, CalibrationOptions asked,
                             const DriftModelId& largest_model, bool change_is_open, const Progress& progress) {
   Decision decision = decide_on_polhodes(pass, screened, asked, largest_model, progress);
@@ -873,7 +978,8 @@ Decision decide_with_course(const Pass& pass, const Screened& screened, Calibrat
   }
   begin_stage(progress, "looks for the time of a change");
   CalibrationOptions with = asked;
-  use_course(course->kind, most_likely_time_s(pass, screened, decision.options, *course), with);
+  const bool is_even = course->kind == CourseOfChange::Kind::kEven;
+  use_course(course->kind, is_even ? 0 : most_likely_time_s(pass, screened, decision.options, *course), with);
   Decision changing = decide_by_pass(pass, screened, with, largest_model, progress);
   const double gain = changing.log_likelihood - decision.log_likelihood;
   if (gain <= kLogOddsToAccept) {

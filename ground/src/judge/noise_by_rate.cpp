@@ -7,13 +7,12 @@
 #include <limits>
 
 #include "model/scatter.hpp"
+#include "model/slews.hpp"
 #include "trihedron/core/frames.hpp"
 #include "trihedron/records/units.hpp"
 
 namespace trihedron::ground {
 namespace {
-
-constexpr double kSlowestSlew_rad_s = 0.02 * kDegree;
 
 /// Rate of the body at each fix from the fix before it to the one after it, rad/s; NaN where they are far apart, and
 /// where the way by the fix between is longer by half: no body turns so, and the fixes are wrong.
@@ -39,8 +38,6 @@ std::vector<double> rates_of(const StarTrackerTelemetry& star_tracker) {
 std::optional<NoiseByRate> noise_by_rate(const StarTrackerTelemetry& star_tracker,
                                          const std::vector<FixRecord>& fixes) {
   constexpr std::size_t kFewest = 50;
-  constexpr double kSlewOverUsual = 3;
-  constexpr double kRestOverUsual = 1.5;
   const std::vector<double> rates = rates_of(star_tracker);
   std::vector<double> known;
   std::ranges::copy_if(rates, std::back_inserter(known), [](double rate) { return std::isfinite(rate); });
@@ -48,7 +45,6 @@ std::optional<NoiseByRate> noise_by_rate(const StarTrackerTelemetry& star_tracke
     return std::nullopt;
   }
   const double usual_rad_s = median_of(known);
-  const double least_rad_s = std::max(kSlewOverUsual * usual_rad_s, kSlowestSlew_rad_s);
   std::vector<double> at_rest;
   std::vector<double> in_slews;
   std::vector<double> slew_rates;
@@ -60,10 +56,10 @@ std::optional<NoiseByRate> noise_by_rate(const StarTrackerTelemetry& star_tracke
       continue;
     }
     const double rate = rates[static_cast<std::size_t>(its - star_tracker.t.begin())];
-    if (rate > least_rad_s) {
+    if (is_in_slew(rate, usual_rad_s)) {
       in_slews.push_back(fix.nis / fix.degrees_of_freedom);
       slew_rates.push_back(rate);
-    } else if (rate < kRestOverUsual * usual_rad_s) {
+    } else if (is_at_rest(rate, usual_rad_s)) {
       at_rest.push_back(fix.nis / fix.degrees_of_freedom);
     }
   }

@@ -607,6 +607,35 @@ TEST(Calibrate, DoesNotTakeDriftAtOrbitalPeriodForAnErrorOfTheStarTracker) {
   }
 }
 
+// Each of the two alone is likelier than neither, and the drift is small enough for a field to take up most of it.
+TEST(Calibrate, FindsDriftBesideAnErrorOfTheStarTrackerAtOrbitalPeriod) {
+  Scenario scenario = scenario_in_eq1(4, std::chrono::hours(9));
+  scenario.star_tracker.orbital_sine_rad = Eigen::Vector3d(6, -8, 5) * kArcsecond;
+  const auto simulated = sim::simulate(scenario);
+  Pass pass = simulated.pass;
+  add_orbital_drift(simulated.truth, {1.5e-8, -1e-8, 2e-8}, {-1e-8, 2e-8, 1e-8}, 0, pass.gyro);
+  add_orbital_drift(simulated.truth, {-2e-8, 1e-8, 1e-8}, {1e-8, 1.5e-8, -2e-8}, 1, pass.gyro);
+  const auto run = calibrate(pass, {});
+  EXPECT_THAT(run.calibration.verdict.findings,
+              UnorderedElementsAre(testing::Field(&Finding::code, FindingCode::kOrbitalErrorFound),
+                                   testing::Field(&Finding::code, FindingCode::kOrbitalDriftFound)));
+  EXPECT_LT(nees_of(simulated.truth, run.calibration), 45);
+}
+
+TEST(Calibrate, FollowsCoefficientsThatChangeEvenly) {
+  Scenario scenario = scenario_in_eq1(4, std::chrono::hours(9));
+  for (GyroScenario& gyro : scenario.gyros) {
+    gyro.drift.warm_up_fraction = 0.2;
+    gyro.drift.warm_up_time_s = 1e5;  // of which a pass sees the begin
+  }
+  const auto simulated = sim::simulate(scenario);
+  const auto run = calibrate(simulated.pass, {});
+  EXPECT_THAT(run.calibration.verdict.findings,
+              ElementsAre(testing::Field(&Finding::code, FindingCode::kCoefficientsChanged)));
+  EXPECT_EQ(run.options.further_states.change_course, CourseOfChange::Kind::kEven);
+  EXPECT_LT(nees_of(simulated.truth, run.calibration), 45);
+}
+
 // As in the magnetic field of the Earth, which turns both momenta nearly alike: no residual contradicts an error of the
 // star tracker.
 TEST(Calibrate, DoesNotTrustAnErrorAtOrbitalPeriodThatMayBeDriftOfAllGyros) {

@@ -6,6 +6,7 @@
 #include <array>
 #include <chrono>
 #include <cmath>
+#include <numbers>
 #include <random>
 
 #include "passes.hpp"
@@ -123,6 +124,47 @@ TEST(ReadoutNoise, ThatIsMoreForAnHourIsTold) {
   EXPECT_NEAR(noise->found_rad[1], 1e-5, 0.03e-5);
   EXPECT_NEAR(noise->most_rad[1], 3e-5, 0.1e-5);
   EXPECT_NEAR(noise->most_rad[0], 1e-5, 0.05e-5);
+}
+
+bool slews(Time t) { return std::fmod(to_seconds(t - Time{}), 600) < 60; }
+
+TEST(ReadoutNoise, ThatIsMoreInSlewsIsTold) {
+  struct InSlews {
+    double times;
+    White white{.sigma_rad = {1e-5, 1e-5}};
+    std::size_t calls = 0;
+    double operator()(int gyro) {
+      const Time t = Time{} + static_cast<long>(calls++ / 6) * std::chrono::milliseconds(125);
+      return (slews(t) && gyro == 1 ? times : 1) * white(gyro);
+    }
+  };
+  const auto by = [](double times) {
+    return other_readout_noise(turning(std::chrono::milliseconds(125), std::chrono::hours(2), InSlews{.times = times}));
+  };
+  const auto noise = by(5);
+  ASSERT_TRUE(noise);
+  EXPECT_FALSE(noise->is_steady());
+  EXPECT_NEAR(noise->in_slews, std::sqrt((25 + 1) / 2.0), 0.15);
+  EXPECT_NEAR(noise->found_rad[1], 1.2e-5, 0.1e-5);  // a tenth of the time is in slews
+  EXPECT_FALSE(by(1.5));                             // √((1.5² + 1)/2) of the angle
+}
+
+TEST(ReadoutNoise, IsNotWhatShakesTheBody) {
+  const Pass still = turning(std::chrono::milliseconds(125), std::chrono::hours(2), White{.sigma_rad = {1e-5, 1e-5}});
+  for (const bool in_slews : {false, true}) {
+    Pass pass = still;
+    for (std::size_t i = 0; i < pass.gyro.t.size(); ++i) {
+      const Time t = pass.gyro.t[i];
+      const bool is_shaken = !in_slews || slews(t);
+      const double rad = is_shaken ? 3e-5 * std::sin(2 * std::numbers::pi * 1.1 * to_seconds(t - Time{})) : 0;
+      const Eigen::Matrix3d turn = Eigen::AngleAxisd(rad, Eigen::Vector3d(2, 1, 2) / 3).toRotationMatrix();
+      for (int k = 0; k < 2; ++k) {
+        Eigen::Map<Eigen::Vector3d> h(&pass.gyro.h[6 * i + 3 * static_cast<std::size_t>(k)]);
+        h = (turn * h).eval();
+      }
+    }
+    EXPECT_FALSE(other_readout_noise(pass)) << in_slews;
+  }
 }
 
 TEST(ReadoutNoise, ThatHasPassedAFilterIsNotTakenForLess) {

@@ -552,15 +552,19 @@ TEST(Verdict, TellsAGyroThatGivesNoReadingsFromOneThatStandsStillByTheReadingThe
 
 TEST(Verdict, FindsReadingsThatScatterOtherwiseThanTold) {
   auto run = good_run();
-  run.readout_noise = {.gyros = 2, .found_rad = {}, .most_rad = {}, .told_rad = {}};
+  run.readout_noise.emplace().gyros = 2;
   for (int k = 0; k < 2; ++k) {
     run.readout_noise->found_rad[k] = run.readout_noise->most_rad[k] = 2e-5;
     run.readout_noise->told_rad[k] = 1e-5;
   }
   const Verdict steady = judge(good_pass(), run);
   EXPECT_THAT(codes(steady), ElementsAre("readout-noise"));
-  EXPECT_EQ(steady.findings[0].evidence, "4.1″ 4.1″ found, up to 4.1″ 4.1″ for an hour, 2.1″ 2.1″ in pass.toml");
+  EXPECT_EQ(steady.findings[0].evidence,
+            "4.1″ 4.1″ found, up to 4.1″ 4.1″ for an hour, 1.0 times as much in slews, 2.1″ 2.1″ in pass.toml");
   EXPECT_TRUE(steady.trustworthy);
+  run.readout_noise->in_slews = 4;
+  EXPECT_FALSE(judge(good_pass(), run).trustworthy);
+  run.readout_noise->in_slews = 1;
   run.readout_noise->most_rad[1] = 4e-5;
   EXPECT_FALSE(judge(good_pass(), run).trustworthy);
 }

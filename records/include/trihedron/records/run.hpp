@@ -142,11 +142,12 @@ struct ReadoutNoise {
   PerGyro<double> found_rad{};  ///< the median of the hours of the pass
   PerGyro<double> most_rad{};   ///< in one of them
   PerGyro<double> told_rad{};
+  double in_slews = 1;  ///< times as much while the body turns fast as while it does not
 
   [[nodiscard]] bool is_steady() const {
     constexpr double kSteady = 1.5;
-    return std::equal(found_rad.begin(), found_rad.begin() + gyros, most_rad.begin(),
-                      [](double found, double most) { return most <= kSteady * found; });
+    return in_slews <= kSteady && std::equal(found_rad.begin(), found_rad.begin() + gyros, most_rad.begin(),
+                                             [](double found, double most) { return most <= kSteady * found; });
   }
 };
 
