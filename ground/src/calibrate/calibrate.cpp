@@ -413,6 +413,29 @@ Pass with_stamps(Pass pass, const RegularStamps& regular) {
 
 }  // namespace
 
+namespace {
+
+/// How much later after their stamps the fixes of further star trackers hold the attitude than those of the first.
+std::vector<Measured> further_star_trackers_s(const Pass& pass, const Measured& first_s) {
+  std::vector<Measured> apart_s;
+  Pass of_one;
+  for (std::size_t i = 0; i < pass.further_star_trackers.size(); ++i) {
+    if (i == 0) {
+      of_one.settings = pass.settings;
+      of_one.gyro = pass.gyro;
+    }
+    of_one.settings.star_tracker_noise_rad = pass.settings.further_star_trackers[i].noise_rad;
+    of_one.star_tracker = pass.further_star_trackers[i];
+    const std::optional<Clocks> its = clocks_of(of_one);
+    apart_s.push_back(
+        its ? Measured{its->mid_offset_s.value - first_s.value, std::hypot(its->mid_offset_s.sigma, first_s.sigma)}
+            : Measured{});
+  }
+  return apart_s;
+}
+
+}  // namespace
+
 CalibrationRun calibrate(const Pass& pass, const CalibrationOptions& options, const Progress& progress) {
   return calibrate_after(pass, options, progress, std::nullopt);
 }
@@ -436,6 +459,9 @@ CalibrationRun calibrate_after(const Pass& as_given, const CalibrationOptions& o
     clocks = clocks_of(*without_step);
   }
   const Pass& pass = without_step ? *without_step : as_stamped;
+  if (clocks) {
+    clocks->further_star_trackers_s = further_star_trackers_s(pass, clocks->mid_offset_s);
+  }
   const ClockCorrection correction = clocks ? wanted_correction(*clocks, pass.settings, options) : ClockCorrection{};
   std::optional<Pass> corrected;
   if (correction.of_star_tracker() || correction.of_gyros()) {

@@ -18,6 +18,8 @@ constexpr double kTooMuchChange_s = 0.05;
 /// … and so is a gyro that is late against another.
 constexpr double kSeenLate_s = 2e-3;
 constexpr double kTooLate_s = 0.01;
+/// Alignments follow the mean of two heads that are apart by so much, by several of their sigmas.
+constexpr double kHeadsTooFar_s = 4e-3;
 /// Both clocks of a pair are off that of the star tracker by more than this: which of them is right is not told.
 constexpr double kNoneAlike_s = 5e-3;
 /// In orbital motion such stamps move a reading by the noise of the paper's gyros.
@@ -149,6 +151,23 @@ void judge_gyro_stamps(double off_s, Finding::Severity severity, const char* wha
   }
 }
 
+/// Star trackers whose clocks are not that of the first: a state has one offset for all.
+void judge_further_star_trackers(const std::vector<Measured>& apart_s, std::vector<Finding>& findings) {
+  for (std::size_t i = 0; i < apart_s.size(); ++i) {
+    const double its_s = apart_s[i].value;
+    if (apart_s[i].is_sure(kSigmasToTell) && std::abs(its_s) > kSeenLate_s) {
+      add(findings, FindingCode::kClocksApart,
+          std::abs(its_s) > kHeadsTooFar_s ? Finding::Severity::kDoNotUse : Finding::Severity::kWarning,
+          fmt::format("The stamps of star tracker {} are off those of the first; the calibration takes the clocks of "
+                      "both for one.",
+                      i + 2),
+          fmt::format("its fixes hold the attitude later after their stamp, by {:+.2f} ± {:.2f} ms", 1e3 * its_s,
+                      1e3 * apart_s[i].sigma),
+          fmt::format("Add {:+.4f} s to the stamps of star tracker {}, or correct those of the first.", its_s, i + 2));
+    }
+  }
+}
+
 }  // namespace
 
 void judge_clocks(const Pass& pass, const CalibrationRun& run, std::vector<Finding>& findings) {
@@ -188,6 +207,7 @@ void judge_clocks(const Pass& pass, const CalibrationRun& run, std::vector<Findi
   if (!run.clocks) {
     return;
   }
+  judge_further_star_trackers(run.clocks->further_star_trackers_s, findings);
   if (run.clocks->step) {
     const bool is_wrong = std::abs(run.clocks->step->change_s.value) > kTooLate_s;
     judge_step(pass, *run.clocks->step, is_wrong ? Finding::Severity::kDoNotUse : Finding::Severity::kWarning,

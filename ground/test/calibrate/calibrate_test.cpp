@@ -344,6 +344,24 @@ TEST(Calibrate, WithTwoStarTrackersFindsNoOtherNoiseThanTheirs) {
   EXPECT_NEAR(run.calibration.statistics.nis_mean.value(), 4, 0.3);
 }
 
+TEST(Calibrate, TellsThatAFurtherStarTrackerHasAClockOfItsOwn) {
+  Scenario scenario = scenario_in_eq1(12, std::chrono::hours(2));
+  scenario.further_star_trackers.resize(1, scenario.star_tracker);
+  scenario.further_star_trackers[0].mounting_rotation_vector_rad = Eigen::Vector3d(1.2, 0, 0);
+  const auto severities = [&](double offset_s) {
+    scenario.further_star_trackers[0].clock_offset_s = offset_s;
+    std::vector<Finding::Severity> found;
+    for (const Finding& finding : calibrate(sim::simulate(scenario).pass, told()).calibration.verdict.findings) {
+      if (finding.code == FindingCode::kClocksApart) {
+        found.push_back(finding.severity);
+      }
+    }
+    return found;
+  };
+  EXPECT_THAT(severities(0), testing::IsEmpty());
+  EXPECT_THAT(severities(-0.02), ElementsAre(Finding::Severity::kDoNotUse));
+}
+
 TEST(Calibrate, TellsOneAttitudeWhereTwoStarTrackersHaveAFixAtOneTime) {
   Scenario scenario = scenario_in_eq1(12, std::chrono::minutes(10));
   scenario.further_star_trackers.resize(1, scenario.star_tracker);

@@ -194,7 +194,7 @@ TEST(Constancy, NamesErrorsOfTheStarTrackerFasterThanTheOrbit) {
 }
 
 TEST(Constancy, NamesTheCaseThatGoesToAndFroAtTheOrbitalRate) {
-  Pass pass = sim::simulate(scenario_in_eq1(13, std::chrono::hours(6))).pass;
+  Pass pass = sim::simulate(scenario_in_eq1(14, std::chrono::hours(6))).pass;
   const double rate_rad_s = orbital_rate_rad_s(pass.star_tracker);
   for (std::size_t i = 0; i < pass.gyro.size(); ++i) {
     const double angle_rad = 4 * kArcsecond * std::sin(rate_rad_s * to_seconds(pass.gyro.t[i] - pass.gyro.t[0]));

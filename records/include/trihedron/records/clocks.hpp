@@ -3,6 +3,7 @@
 
 #include <cmath>
 #include <optional>
+#include <vector>
 
 #include "trihedron/core/per_gyro.hpp"
 #include "trihedron/records/clock_correction.hpp"
@@ -34,6 +35,7 @@ struct Clocks {
   PerGyro<Measured> late_s{};  ///< against the reference
   int reference = 0;           ///< index of the gyro whose clock the others are compared with
   std::optional<ClockStep> step{};
+  std::vector<Measured> further_star_trackers_s{};  ///< mid_offset_s of each less that of the first; empty: not known
 };
 
 /// Gives fixes the stamps that they should have, and readings those of the first gyro that is not late: what the others
