@@ -55,8 +55,8 @@ struct Decision {
 /// their absence. Unless a drift model is asked for, or the settings speak of members outside eq. (1), the drift is a
 /// field: of estimator batch as it is; estimator invariant has the model of drift_on_board() with the variances that
 /// were found. Where the coefficients are found to warm up, to jump or to change evenly, their change has that course,
-/// and its likeliest time. The noise is found where it is asked for, on a pass that is long enough and has no prior calibration.
-/// Throws SetupError.
+/// and its likeliest time. The noise is found where it is asked for, on a pass that is long enough and has no prior
+/// calibration. Throws SetupError.
 [[nodiscard]] Decision decide(const Pass& pass, const CalibrationOptions& asked, const Progress& progress = {});
 
 }  // namespace trihedron::ground
