@@ -43,8 +43,8 @@ inline const sim::SimulatedPass& two_hours() {
 /// The gyros as the simulator made them, with their momenta at this row of the truth.
 inline std::vector<GyroCalibration> true_gyros(const Truth& truth, std::size_t row) {
   std::vector<GyroCalibration> gyros;
-  for (std::size_t k = 0; k < 2; ++k) {
-    const double* h = &truth.h_in[(row * 2 + k) * 3];
+  for (std::size_t k = 0; k < truth.gyros.size(); ++k) {
+    const double* h = &truth.h_in[(row * truth.gyros.size() + k) * 3];
     GyroCalibration& gyro = gyros.emplace_back();
     for (const auto& [coefficient, value] : truth.gyros[k].drift_rad_s) {
       gyro.drift_rad_s.push_back(value);

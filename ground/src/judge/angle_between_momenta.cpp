@@ -42,17 +42,17 @@ struct Block {
 /// The angle along the pass, θ, with dθ/dt = (ω2 − ω1) · n, n = h1 × h2 / sin θ.
 class Blocks {
  public:
-  Blocks(const GyroTelemetry& telemetry, const std::vector<GyroCalibration>& gyros) {
+  Blocks(const GyroTelemetry& telemetry, const std::vector<GyroCalibration>& gyros, const std::array<int, 2>& pair) {
     for (std::size_t k = 0; k < 2; ++k) {
-      const GyroCalibration& record = gyros[k];
+      const GyroCalibration& record = gyros[static_cast<std::size_t>(pair[k])];
       readouts_[k].C_c_b = Rot<C, B<1>>::exp(Vec<C>::assume(record.alignment_rotation_vector_rad)).raw();
       readouts_[k].readout_bias = record.readout_bias;
     }
     block_s_ = std::max(kBlock_s, to_seconds(telemetry.t.back() - telemetry.t.front()) / kMostBlocks);
     for (std::size_t i = 0; i < telemetry.size(); ++i) {
       const double t_s = to_seconds(telemetry.t[i] - telemetry.t.front());
-      const Eigen::Vector3d first = telemetry.direction(i, 0);
-      const Eigen::Vector3d second = telemetry.direction(i, 1);
+      const Eigen::Vector3d first = telemetry.direction(i, pair[0]);
+      const Eigen::Vector3d second = telemetry.direction(i, pair[1]);
       if (nearly_unit(first.norm()) && nearly_unit(second.norm())) {
         add(t_s, {first.normalized(), second.normalized()});
       }
@@ -148,11 +148,12 @@ Eigen::MatrixXd fitted_columns(const std::vector<Block>& blocks, const DriftMode
 }  // namespace
 
 std::optional<AngleBetweenMomenta> AngleBetweenMomenta::of(const GyroTelemetry& telemetry,
-                                                           const std::vector<GyroCalibration>& gyros) {
+                                                           const std::vector<GyroCalibration>& gyros, int first,
+                                                           int second) {
   if (gyros.size() < 2 || telemetry.size() == 0) {
     return std::nullopt;
   }
-  const Blocks found(telemetry, gyros);
+  const Blocks found(telemetry, gyros, {first, second});
   const std::vector<Block>& blocks = found.all();
   const auto n = static_cast<Eigen::Index>(blocks.size());
   if (n == 0 || n < kConstants + blocks.back().stretch + 1 + kFewestLeft) {

@@ -17,9 +17,10 @@ namespace trihedron::ground {
 /// leave more of what wanders.
 class AngleBetweenMomenta {
  public:
-  /// Of the first two gyros. Nothing where there are not two, or where a fit leaves too little.
+  /// Of two gyros, by their numbers from 0. Nothing where there are not two, or where a fit leaves too little.
   [[nodiscard]] static std::optional<AngleBetweenMomenta> of(const GyroTelemetry& telemetry,
-                                                             const std::vector<GyroCalibration>& gyros);
+                                                             const std::vector<GyroCalibration>& gyros, int first = 0,
+                                                             int second = 1);
 
   /// Root mean square of what the fit by esg20 leaves.
   [[nodiscard]] double left_rad() const;

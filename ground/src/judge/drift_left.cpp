@@ -78,6 +78,31 @@ double moved_by_noise_rad(const CalibrationNoise& noise, double duration_s) {
   return std::hypot(wandering, noise.direction_random_walk_rad_sqrt_s * std::sqrt(duration_s));
 }
 
+/// Of all pairs of gyros: drift of one moves those that it has a part in.
+std::vector<AngleBetweenMomenta> angles_between(const GyroTelemetry& telemetry,
+                                                const std::vector<GyroCalibration>& gyros) {
+  std::vector<AngleBetweenMomenta> angles;
+  for (int second = 1; second < static_cast<int>(gyros.size()); ++second) {
+    for (int first = 0; first < second; ++first) {
+      if (auto angle = AngleBetweenMomenta::of(telemetry, gyros, first, second)) {
+        angles.push_back(*std::move(angle));
+      }
+    }
+  }
+  return angles;
+}
+
+/// By the angle that speaks most for drift.
+std::optional<AngleBetweenMomenta::Wander> wander_of(const std::vector<AngleBetweenMomenta>& angles,
+                                                     const CalibrationNoise& noise) {
+  std::optional<AngleBetweenMomenta::Wander> least;
+  for (const AngleBetweenMomenta& angle : angles) {
+    const AngleBetweenMomenta::Wander its = angle.wander(noise);
+    least = !least || its.log_odds < least->log_odds ? its : *least;
+  }
+  return least;
+}
+
 /// In the smallest sigma of the last attitude; 0 where there is none.
 double in_sigmas_of_attitude(const CalibrationRun& run, double moved_rad) {
   return run.attitude.sigma_rad.empty() ? 0 : moved_rad / run.attitude.sigma_rad.back().minCoeff();
@@ -154,14 +179,16 @@ void judge_drift_left(const Pass& pass, const CalibrationRun& run, std::vector<F
   const std::optional<SlowLine> line = strongest_slow_line(run.fixes, orbit_s / kMultiples);
   const bool is_line = line && line->log_chance < limit && !told;
   const std::string noise = noise_that_stands_for_drift(run);
-  std::optional<AngleBetweenMomenta> angle;
+  std::vector<AngleBetweenMomenta> angles;
   if (is_line || !noise.empty()) {
-    angle = AngleBetweenMomenta::of(pass.gyro, run.calibration.gyros);
+    angles = angles_between(pass.gyro, run.calibration.gyros);
   }
   if (is_line) {
     // Drift moves all components about alike, and the angle as one of them.
     constexpr double kLessThanDrift = 0.5;
-    const bool moves_angle = !angle || angle->largest_line_rad(line->period_s) > kLessThanDrift * line->amplitude_rad;
+    const bool moves_angle = angles.empty() || std::ranges::any_of(angles, [&](const AngleBetweenMomenta& angle) {
+                               return angle.largest_line_rad(line->period_s) > kLessThanDrift * line->amplitude_rad;
+                             });
     (moves_angle ? drift : star_tracker)
         .push_back(fmt::format("the innovations of gyro {} have a line of {:.0f} min, amplitude {:.2f} sigma, {}; the "
                                "chance of one as strong is below 1e{:.0f}",
@@ -177,9 +204,8 @@ void judge_drift_left(const Pass& pass, const CalibrationRun& run, std::vector<F
                                 -*run.orbital_error_over_drift));
   }
   if (!noise.empty()) {
-    const std::optional<AngleBetweenMomenta::Wander> wander = angle && !has_orbital_period && run.calibration.noise
-                                                                  ? std::optional(angle->wander(*run.calibration.noise))
-                                                                  : std::nullopt;
+    const auto wander =
+        !has_orbital_period && run.calibration.noise ? wander_of(angles, *run.calibration.noise) : std::nullopt;
     if (wander && wander->log_odds > kLogOdds) {
       star_tracker.push_back(
           noise + fmt::format("; it would move the angle by {}, root mean square", angle_text(wander->expected_rad)));
@@ -197,11 +223,15 @@ void judge_drift_left(const Pass& pass, const CalibrationRun& run, std::vector<F
     }
   }
   if (!star_tracker.empty()) {
+    double moved_rad = 0;
+    for (const AngleBetweenMomenta& angle : angles) {
+      moved_rad = std::max(moved_rad, angle.left_rad());
+    }
     findings.push_back({FindingCode::kStarTrackerWanders,
                         "The star tracker has errors that come and go slowly: the angle between the momenta, which the "
                         "gyros read without it, does not move as drift would move it. Attitude and alignment follow "
                         "these errors, and their sigmas are wrong.",
-                        fmt::format("{}; it moves by {}", fmt::join(star_tracker, "; "), angle_text(angle->left_rad())),
+                        fmt::format("{}; it moves by {}", fmt::join(star_tracker, "; "), angle_text(moved_rad)),
                         "Look for what the star tracker's errors follow: day and night, the place of the stars in its "
                         "field, heads that take turns, its clock; correct them before its fixes come here."});
   }

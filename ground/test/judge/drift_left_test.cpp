@@ -125,6 +125,25 @@ TEST(DriftNotExplained, IsSaidOfTheStarTrackerWhereTheMomentaKeepTheirAngle) {
   EXPECT_THAT(findings[0].evidence, HasSubstr("that wanders in"));
 }
 
+TEST(DriftNotExplained, IsNotSaidOfTheStarTrackerWhereTheThirdGyroAloneDrifts) {
+  Scenario scenario = scenario_in_eq1(3, std::chrono::hours(3));
+  scenario.gyros.push_back(scenario.gyros.front());
+  scenario.gyros.back().start_direction_c = {1, 1, 1};
+  for (const double sigma_rad_s : {0.0, 1e-7}) {
+    scenario.gyros.back().drift.markov_sigma_rad_s = sigma_rad_s;
+    scenario.gyros.back().drift.markov_time_s = 600;
+    const auto simulated = sim::simulate(scenario);
+    CalibrationRun run = run_of({});
+    run.evidence = {{FurtherState::kWanderingDrift, 50, true}};
+    run.calibration.gyros = ground::true_gyros(simulated.truth, 0);
+    run.calibration.noise = CalibrationNoise{.wandering_drift_rad_s = 1e-7, .wandering_time_s = 600};
+    std::vector<Finding> findings;
+    judge_drift_left(simulated.pass, run, findings);
+    ASSERT_EQ(findings.size(), 1U);
+    EXPECT_EQ(findings[0].code == FindingCode::kStarTrackerWanders, sigma_rad_s == 0) << sigma_rad_s;
+  }
+}
+
 TEST(DriftNotExplained, ForbidsUseWhereTheAngleDoesNotTellItFromTheStarTracker) {
   // So slow that what is fitted to the angle takes up most of it.
   CalibrationRun run = run_of({});
