@@ -411,10 +411,6 @@ Pass with_stamps(Pass pass, const RegularStamps& regular) {
   return pass;
 }
 
-}  // namespace
-
-namespace {
-
 /// How much later after their stamps the fixes of further star trackers hold the attitude than those of the first.
 std::vector<Measured> further_star_trackers_s(const Pass& pass, const Measured& first_s) {
   std::vector<Measured> apart_s;
