@@ -706,7 +706,7 @@ bool is_all_that_is_left(const Decision& by_drift) {
 /// By eq. (1) in place of a field, with the least noise: the field, and noise, have taken a part of what comes back.
 struct ByEq1InsteadOfField {
   double log_likelihood;
-  OrbitalOdds odds;
+  OrbitalOdds odds;  ///< where the error was found it is there, and those of drift are beside it
 };
 
 ByEq1InsteadOfField by_eq1_instead_of_field(const Pass& pass, const Screened& screened, const CalibrationOptions& asked,
@@ -715,7 +715,6 @@ ByEq1InsteadOfField by_eq1_instead_of_field(const Pass& pass, const Screened& sc
   options.drift_model = kEsg7;
   options.direction_random_walk_rad_sqrt_s = asked.direction_random_walk_rad_sqrt_s;
   options.further_states[FurtherState::kWanderingDrift] = Choice::kOff;
-  options.further_states[FurtherState::kOrbitalError] = Choice::kOff;
   const Trial trial(pass, screened, options);
   return {trial.log_likelihood(), orbital_odds(trial)};
 }
@@ -726,30 +725,39 @@ class AtOrbit {
   /// Of a decision with odds. `instead`: where it has a field.
   AtOrbit(const Decision& decision, const std::optional<ByEq1InsteadOfField>& instead)
       : odds_(*decision.orbital_odds),
-        drift_odds_(instead ? instead->odds : odds_),
+        drift_odds_(odds_.drift),
+        both_odds_(odds_.both),
         has_field_(instead.has_value()),
-        has_error_(decision.options.further_states.is_on(FurtherState::kOrbitalError)),
-        instead_of_field_(instead ? instead->log_likelihood - decision.log_likelihood
-                                  : -std::numeric_limits<double>::infinity()) {}
+        has_error_(decision.options.further_states.is_on(FurtherState::kOrbitalError)) {
+    if (!instead) {
+      return;
+    }
+    const double less = instead->log_likelihood - decision.log_likelihood;
+    both_odds_ = has_error_ ? instead->odds.drift : instead->odds.both;
+    both_over_field_ = less + log_odds(both_odds_);
+    if (!has_error_) {
+      drift_odds_ = instead->odds.drift;
+      drift_over_field_ = less + log_odds(drift_odds_);
+    }
+  }
 
   [[nodiscard]] bool has_error() const { return has_error_; }
   [[nodiscard]] double error_over_drift() const { return log_odds(odds_.error) - log_odds(odds_.drift); }
   [[nodiscard]] bool may_be_drift() const {
     constexpr double kMayBeDrift = 20;
     return (odds_.drift.by_prior_as_it_is > kMayBeThere && error_over_drift() < kMayBeDrift) ||
-           over_field(drift_odds_.drift) > kMayBeThere;
+           drift_over_field_ > kMayBeThere;
   }
   /// `has_one`: one of them was found.
   [[nodiscard]] bool may_be_both(bool has_one) const {
     const double over_one =
         odds_.both.by_prior_as_it_is - std::max(odds_.error.by_prior_as_it_is, odds_.drift.by_prior_as_it_is);
-    return (has_one && over_one > kMayBeThere) ||
-           over_field(drift_odds_.both) > std::max(over_field(drift_odds_.drift), kMayBeThere);
+    return (has_one && over_one > kMayBeThere) || both_over_field_ > std::max(drift_over_field_, kMayBeThere);
   }
   /// By how much more than their likelihoods, which are by the priors as they are, drift or both are likelier than what
   /// was decided.
-  [[nodiscard]] double more_for_drift() const { return by_narrower(drift_odds_.drift) - of_decided(); }
-  [[nodiscard]] double more_for_both() const { return by_narrower(drift_odds_.both) - of_decided(); }
+  [[nodiscard]] double more_for_drift() const { return by_narrower(drift_odds_) - of_decided(); }
+  [[nodiscard]] double more_for_both() const { return by_narrower(both_odds_) - of_decided(); }
 
  private:
   /// Members of the field, or noise, that were found without what comes back have taken a part of it: its odds are
@@ -761,13 +769,15 @@ class AtOrbit {
   [[nodiscard]] double log_odds(const LogEvidence& of) const { return has_field_ ? of.value : of.by_prior_as_it_is; }
   [[nodiscard]] double by_narrower(const LogEvidence& of) const { return log_odds(of) - of.by_prior_as_it_is; }
   [[nodiscard]] double of_decided() const { return has_error_ ? by_narrower(odds_.error) : 0; }
-  [[nodiscard]] double over_field(const LogEvidence& of) const { return instead_of_field_ + log_odds(of); }
 
   OrbitalOdds odds_;
-  OrbitalOdds drift_odds_;
+  LogEvidence drift_odds_;
+  LogEvidence both_odds_;
   bool has_field_;
   bool has_error_;
-  double instead_of_field_;  ///< ln of the likelihood by eq. (1) less that of the field
+  /// ln of the likelihood by eq. (1) with drift, or both, less that of the field.
+  double drift_over_field_ = -std::numeric_limits<double>::infinity();
+  double both_over_field_ = -std::numeric_limits<double>::infinity();
 };
 
 /// What is decided with drift at orbital period.
