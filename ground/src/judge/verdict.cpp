@@ -622,8 +622,9 @@ void judge_readout_noise(const std::optional<ReadoutNoise>& noise, std::vector<F
     };
     add(findings, FindingCode::kReadoutNoise,
         "The readings of the gyros do not scatter as pass.toml says; the noise found was used.",
-        fmt::format("{} found, up to {} for an hour, {:.1f} times as much in slews, {} in pass.toml",
-                    text(noise->found_rad), text(noise->most_rad), noise->in_slews, text(noise->told_rad)),
+        fmt::format("{} found, up to {} for an hour{}, {} in pass.toml", text(noise->found_rad), text(noise->most_rad),
+                    noise->in_slews > 1 ? fmt::format(", {:.1f} times as much in slews", noise->in_slews) : "",
+                    text(noise->told_rad)),
         noise->is_steady() ? "Correct the noise figures of the gyros in pass.toml."
                            : "Look for what makes the readings noisier in slews or for a part of the pass: there the "
                              "attitude is worse than its sigmas. Cut such a part off.");

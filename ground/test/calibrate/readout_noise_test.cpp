@@ -144,9 +144,9 @@ TEST(ReadoutNoise, ThatIsMoreInSlewsIsTold) {
   const auto noise = by(5);
   ASSERT_TRUE(noise);
   EXPECT_FALSE(noise->is_steady());
-  EXPECT_NEAR(noise->in_slews, std::sqrt((25 + 1) / 2.0), 0.15);
-  EXPECT_NEAR(noise->found_rad[1], 1.2e-5, 0.1e-5);  // a tenth of the time is in slews
-  EXPECT_FALSE(by(1.5));                             // √((1.5² + 1)/2) of the angle
+  EXPECT_NEAR(noise->in_slews, std::sqrt((25 + 1) / 2.0), 0.15);  // known to 3 % by the windows in slews
+  EXPECT_NEAR(noise->found_rad[1], 1.2e-5, 0.1e-5);               // a tenth of the time is in slews
+  EXPECT_FALSE(by(1.5));                                          // √((1.5² + 1)/2) of the angle
 }
 
 TEST(ReadoutNoise, IsNotWhatShakesTheBody) {

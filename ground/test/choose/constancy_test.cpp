@@ -193,6 +193,8 @@ TEST(Constancy, NamesErrorsOfTheStarTrackerFasterThanTheOrbit) {
   }
 }
 
+// In this flight the motion moves parameters by many of their sigmas; where it is less than two, it is named as well,
+// and the result may be used.
 TEST(Constancy, NamesTheCaseThatGoesToAndFroAtTheOrbitalRate) {
   Pass pass = sim::simulate(scenario_in_eq1(14, std::chrono::hours(6))).pass;
   const double rate_rad_s = orbital_rate_rad_s(pass.star_tracker);

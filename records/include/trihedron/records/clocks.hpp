@@ -35,7 +35,8 @@ struct Clocks {
   PerGyro<Measured> late_s{};  ///< against the reference
   int reference = 0;           ///< index of the gyro whose clock the others are compared with
   std::optional<ClockStep> step{};
-  std::vector<Measured> further_star_trackers_s{};  ///< mid_offset_s of each less that of the first; empty: not known
+  /// mid_offset_s of each less that of the first; zeros where the pass does not show it, empty where nobody looked.
+  std::vector<Measured> further_star_trackers_s{};
 };
 
 /// Gives fixes the stamps that they should have, and readings those of the first gyro that is not late: what the others

@@ -142,7 +142,7 @@ struct ReadoutNoise {
   PerGyro<double> found_rad{};  ///< the median of the hours of the pass
   PerGyro<double> most_rad{};   ///< in one of them
   PerGyro<double> told_rad{};
-  double in_slews = 1;  ///< times as much while the body turns fast as while it does not
+  double in_slews = 1;  ///< times as much while the body turns fast as while it does not; 1: no more, or not known
 
   [[nodiscard]] bool is_steady() const {
     constexpr double kSteady = 1.5;
