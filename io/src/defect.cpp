@@ -26,6 +26,9 @@ Words words(Defect::Kind kind) {
       return {"repeated-time", "row that repeats a time stamp", "rows that repeat a time stamp", "left out"};
     case kBackwardTime:
       return {"backward-time", "row out of order in time", "rows out of order in time", "left out"};
+    case kLeapingTime:
+      return {"leaping-time", "row whose time leaps while the readings go on",
+              "rows whose times leap while the readings go on", "left out"};
     case kTruncatedLine:
       return {"truncated-line", "last line that is cut short", "last lines that are cut short", "left out"};
     case kMissingValue:

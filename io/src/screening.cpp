@@ -8,6 +8,7 @@
 #include <limits>
 #include <utility>
 
+#include "leaping_stamps.hpp"
 #include "trihedron/records/limits.hpp"
 #include "unusable.hpp"
 
@@ -56,13 +57,16 @@ struct Kept {
   std::vector<Time> t;
 };
 
-Kept keep_increasing(const Series& series, const PassSettings& settings, Duration period,
-                     std::vector<Defect>& defects) {
+/// `of_another_time`: finds among rows whose times increase those that bear the time of others.
+template <class OfAnotherTime>
+Kept keep_increasing(const Series& series, const PassSettings& settings, Duration period, std::vector<Defect>& defects,
+                     const OfAnotherTime& of_another_time) {
   using enum Defect::Kind;
   Tally missing(series, kMissingTime, series.name);
   Tally outside(series, kTimeOutsidePass, series.name);
   Tally repeated(series, kRepeatedTime, series.name);
   Tally backward(series, kBackwardTime, series.name);
+  Tally leaping(series, kLeapingTime, series.name);
 
   const double earliest_s = -to_seconds(period);
   const double latest_s = to_seconds(settings.duration + period);
@@ -83,6 +87,14 @@ Kept keep_increasing(const Series& series, const PassSettings& settings, Duratio
 
   Kept kept;
   kept.rows = longest_increasing(t, candidates);
+  const std::vector<std::size_t> of_others = of_another_time(kept.rows, t);
+  if (!of_others.empty()) {
+    for (const std::size_t row : of_others) {
+      leaping.add(row);
+    }
+    std::erase_if(candidates, [&](std::size_t row) { return std::ranges::binary_search(of_others, row); });
+    kept.rows = longest_increasing(t, candidates);
+  }
   kept.t.reserve(kept.rows.size());
   for (const std::size_t row : kept.rows) {
     kept.t.push_back(t[row]);
@@ -111,7 +123,7 @@ Kept keep_increasing(const Series& series, const PassSettings& settings, Duratio
       last = next;
     }
   }
-  for (Tally* tally : {&missing, &outside, &repeated, &backward, &truncated, &gaps}) {
+  for (Tally* tally : {&missing, &outside, &repeated, &backward, &leaping, &truncated, &gaps}) {
     tally->report(defects);
   }
   return kept;
@@ -346,7 +358,10 @@ std::vector<std::size_t> longest_increasing(const std::vector<Time>& t, std::vec
 
 GyroTelemetry screen_gyro(Series series, const PassSettings& settings, const std::filesystem::path& settings_file,
                           std::vector<Defect>& defects) {
-  Kept kept = keep_increasing(series, settings, settings.gyro_period, defects);
+  Kept kept = keep_increasing(series, settings, settings.gyro_period, defects,
+                              [&](const std::vector<std::size_t>& rows, const std::vector<Time>& t) {
+                                return rows_of_another_time(series, rows, t, settings.gyro_period);
+                              });
   if (kept.t.empty()) {
     throw InputRefused(series.file, {}, fmt::format("{} has no samples with a time inside the pass", series.name),
                        "give gyro telemetry; check t_s, epoch_tai and duration_s");
@@ -366,7 +381,9 @@ GyroTelemetry screen_gyro(Series series, const PassSettings& settings, const std
 
 StarTrackerTelemetry screen_star_tracker(Series series, const PassSettings& settings,
                                          const std::filesystem::path& settings_file, std::vector<Defect>& defects) {
-  Kept kept = keep_increasing(series, settings, settings.star_tracker_period, defects);
+  Kept kept = keep_increasing(
+      series, settings, settings.star_tracker_period, defects,
+      [](const std::vector<std::size_t>&, const std::vector<Time>&) { return std::vector<std::size_t>{}; });
   check_period(series, kept.t, settings.star_tracker_period, "star_tracker", settings_file);
   NormTallies norms(series, series.name);
   Tally flips(series, Defect::Kind::kSignFlip, series.name);

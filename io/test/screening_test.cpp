@@ -127,6 +127,48 @@ TEST_P(Screening, ATimeThatJumpsAheadCostsOnlyItsOwnRow) {
   EXPECT_EQ(only(loaded.defects, Kind::kBackwardTime).count, 1);
 }
 
+// Twenty readings, ten seconds, of a body that turns by 200 arcseconds a second. The others stay, also those whose
+// times they have taken.
+TEST_P(Screening, LeavesOutPacketsThatBearAnotherTime) {
+  const RawPass clean = raw_;
+  for (const double late_s : {5.0, 1.0, -1.0, -5.0}) {
+    SCOPED_TRACE(late_s);
+    raw_ = clean;
+    for (std::size_t i = 60; i < 80; ++i) {
+      raw_.gyro.rows[i][0] += late_s;
+    }
+    const LoadedPass loaded = load();
+    const auto repeated = static_cast<std::int64_t>(2 * std::max(-late_s, 0.0));
+    EXPECT_EQ(only(loaded.defects, Kind::kLeapingTime).count, 20 - repeated);
+    EXPECT_TRUE(repeated == 0 || only(loaded.defects, Kind::kRepeatedTime).count == repeated);
+    EXPECT_EQ(only(loaded.defects, Kind::kGap).longest, from_seconds(10.5));
+    ASSERT_EQ(loaded.pass.gyro.size(), 161U);
+    for (std::size_t i = 0; i < loaded.pass.gyro.size(); ++i) {
+      const auto& row = clean.gyro.rows[i < 60 ? i : i + 20];
+      EXPECT_EQ(to_seconds(loaded.pass.gyro.t[i] - loaded.pass.settings.epoch), row[0]);
+      EXPECT_EQ(loaded.pass.gyro.direction(i, 0).x(), row[1]);
+    }
+  }
+}
+
+// From then on the clock is another: which of its times is the right one does not show.
+TEST_P(Screening, KeepsReadingsFromAClockThatSteps) {
+  raw_.toml = replaced(raw_.toml, "duration_s = 90", "duration_s = 95");
+  for (std::size_t i = 60; i < raw_.gyro.rows.size(); ++i) {
+    raw_.gyro.rows[i][0] += 5;
+  }
+  EXPECT_EQ(load().pass.gyro.size(), 181U);
+}
+
+TEST_P(Screening, KeepsReadingsThatStandStillBetweenGaps) {
+  for (std::size_t i = 0; i < raw_.gyro.rows.size(); ++i) {
+    const auto& row = raw_.gyro.rows[60];
+    std::copy(row.begin() + 1, row.end(), raw_.gyro.rows[i].begin() + 1);
+  }
+  std::erase_if(raw_.gyro.rows, [](const auto& row) { return std::fmod(row[0], 20) > 15; });
+  EXPECT_EQ(load().pass.gyro.size(), raw_.gyro.rows.size());
+}
+
 TEST_P(Screening, LeavesOutTimesOutsideThePass) {
   raw_.star_tracker.rows[5][0] = -4;
   raw_.star_tracker.rows[6][0] = 1e300;

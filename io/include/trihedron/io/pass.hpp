@@ -35,6 +35,7 @@ struct Defect {
     kTimeOutsidePass,  ///< left out: more than a period before the epoch or after the end
     kRepeatedTime,     ///< left out: the first of equal times stays
     kBackwardTime,     ///< left out: as few as possible, so that the times of the others increase
+    kLeapingTime,      ///< left out: directions that bear the time of others, as shown by how the body turns
     kTruncatedLine,    ///< left out: the last line was cut short
     kMissingValue,     ///< kept: NaN, infinity or an empty field in a component
     kZeroNorm,         ///< kept
