@@ -17,9 +17,11 @@ namespace {
 using Eigen::MatrixXd;
 using Eigen::Vector3d;
 
-/// Half-widths of the fit, shortest first.
-constexpr std::array<Duration, 3> kReaches = {std::chrono::milliseconds(700), std::chrono::milliseconds(1400),
-                                              std::chrono::milliseconds(3000)};
+/// Half-widths of the fit.
+constexpr std::array<Duration, SmoothReadings::kReaches> kHalfWidths = {
+    std::chrono::milliseconds(700), std::chrono::milliseconds(1400), std::chrono::milliseconds(3000)};
+
+constexpr int kDegree = 3;
 
 /// Over so long to both sides of a time fixes are averaged, some tens of them.
 constexpr Duration kMisfitReach = std::chrono::minutes(1);
@@ -51,23 +53,31 @@ void LocalMisfit::add(Time t, const Vector3d& off_rad, const Vector3d& sigma_rad
   weighted_.emplace_back(weighted_.back() + weight.cwiseProduct(off_rad));
 }
 
-void LocalMisfit::add_readings(Time t, const Vector3d& square_rad2, const Vector3d& sigma_rad2) {
-  readings_t_.push_back(t);
-  squares_.emplace_back(squares_.back() + square_rad2);
-  variances_.emplace_back(variances_.back() + sigma_rad2.cwiseAbs2());
+void LocalMisfit::Readings::add(Time t, const SmoothReadings::Misfit& misfit) {
+  t_.push_back(t);
+  squares_.push_back(squares_.back() + misfit.square_rad2);
+  variances_.push_back(variances_.back() + misfit.sigma_rad2 * misfit.sigma_rad2);
 }
 
-Vector3d LocalMisfit::square_rad2(Time t) const {
+double LocalMisfit::Readings::square_rad2(Time t) const {
+  const auto [from, to] = within(t_, t, kReadingsReach);
+  const double sum = squares_[to] - squares_[from];
+  const double by_chance = std::sqrt(variances_[to] - variances_[from]);
+  return from < to && sum > kMisfitSigmas * by_chance ? sum / static_cast<double>(to - from) : 0;
+}
+
+Vector3d LocalMisfit::square_rad2(Time t, int reach) const {
   Vector3d found = Vector3d::Zero();
   if (const auto [from, to] = within(t_, t, kMisfitReach); from < to) {
     const Eigen::Array3d variance = (weights_[to] - weights_[from]).cwiseInverse();
     const Eigen::Array3d square = (variance * (weighted_[to] - weighted_[from]).array()).square();
     found += (square > kMisfitSigmas * kMisfitSigmas * variance).select(square - variance, 0.0).matrix();
   }
-  if (const auto [from, to] = within(readings_t_, t, kReadingsReach); from < to) {
-    const Eigen::Array3d sum = squares_[to] - squares_[from];
-    const Eigen::Array3d by_chance = (variances_[to] - variances_[from]).cwiseSqrt();
-    found += (sum > kMisfitSigmas * by_chance).select(sum / static_cast<double>(to - from), 0.0).matrix();
+  if (reach != SmoothReadings::kNone) {
+    found.array() += readings_.front().square_rad2(t);
+  }
+  if (reach > 0) {
+    found.array() += readings_[static_cast<std::size_t>(reach)].square_rad2(t);
   }
   return found;
 }
@@ -81,14 +91,15 @@ double SmoothReadings::variance_apart(const At& longer, const At& shorter) {
 // Where the readings bend, the longest that agrees with all that are shorter (Lepski 1991): residuals that pass for
 // those of the readout may be those of a cubic that is off by several of its sigmas.
 SmoothReadings::At SmoothReadings::at(Time t, const At& otherwise) const {
-  if (const std::optional<At> longest = fit(t, otherwise.used, kReaches.back()); longest && !longest->bends) {
-    return *longest;
+  const std::optional<Fit> longest = fit(t, otherwise.used, kReaches - 1);
+  if (longest && !bends(*longest, t)) {
+    return at(*longest);
   }
   std::vector<At> taken;
-  for (const Duration reach : kReaches) {
-    const std::optional<At> longer = fit(t, otherwise.used, reach);
-    if (longer && std::ranges::all_of(taken, [&](const At& shorter) { return agree(*longer, shorter); })) {
-      taken.push_back(*longer);
+  for (int reach = 0; reach < kReaches; ++reach) {
+    const std::optional<Fit> longer = fit(t, otherwise.used, reach);
+    if (longer && std::ranges::all_of(taken, [&](const At& shorter) { return agree(at(*longer), shorter); })) {
+      taken.push_back(at(*longer));
     }
   }
   return taken.empty() ? otherwise : taken.back();
@@ -108,25 +119,63 @@ bool SmoothReadings::agree(const At& longer, const At& shorter) const {
   return square <= (freedom + kSigmas * std::sqrt(2.0 * freedom)) * variance_apart(longer, shorter);
 }
 
-std::optional<SmoothReadings::Misfit> SmoothReadings::misfit(Time t, const At& at) const {
-  const std::optional<At> shortest = fit(t, at.used, kReaches.front());
-  if (!shortest || shortest->noise_factor <= at.noise_factor) {
+std::optional<SmoothReadings::Misfit> SmoothReadings::off_the_shortest(Time t, const At& longer) const {
+  const std::optional<Fit> shortest = longer.reach > 0 ? fit(t, longer.used, 0) : std::nullopt;
+  if (!shortest) {
     return std::nullopt;
   }
+  const double gyros = count(shortest->used);
   Misfit misfit;
   for (int k = 0; k < gyros_; ++k) {
-    const double noise_rad = setup_.readout_noise_rad[k];
-    misfit.sigma_rad2[k] = noise_rad * noise_rad * variance_apart(at, *shortest);
-    misfit.square_rad2[k] = (at.h_b[k] - shortest->h_b[k]).squaredNorm() / 2 - misfit.sigma_rad2[k];
+    if (shortest->used[k]) {
+      const double variance_rad2 = std::pow(setup_.readout_noise_rad[k], 2) * variance_apart(longer, at(*shortest));
+      misfit.square_rad2 += ((longer.h_b[k] - shortest->its.h_b[k]).squaredNorm() / 2 - variance_rad2) / gyros;
+      misfit.sigma_rad2 = std::hypot(misfit.sigma_rad2, variance_rad2 / gyros);
+    }
   }
   return misfit;
 }
 
-std::optional<SmoothReadings::At> SmoothReadings::fit(Time t, const GyroMask& used, Duration reach) const {
-  constexpr int kDegree = 3;
+// The residuals of two gyros are their noise and the motion, two components each; those of the angle between the
+// momenta, in units of its sine, the sum of the noises of one component each. With variances a and b of the two noises,
+// and n residuals of a component, half of what the mean squares of the former are more has the variance
+// (2 (a + b)² − a² − b²) / 4n.
+std::optional<SmoothReadings::Misfit> SmoothReadings::off_the_readings(Time t, const GyroMask& used,
+                                                                       const PerGyro<Eigen::Matrix3d>& C_c_b) const {
+  constexpr double kLeastSineSquare = 0.1;
+  const std::optional<Fit> shortest = fit(t, used, 0);
+  if (!shortest) {
+    return std::nullopt;
+  }
+  const FittedDirections& fitted = shortest->its;
+  const auto* const first = std::ranges::find(shortest->used, true);
+  const auto one = static_cast<int>(first - shortest->used.begin());
+  const auto other = static_cast<int>(std::find(std::next(first), shortest->used.end(), true) - shortest->used.begin());
+  const auto cosine = [&](const Directions& h_b) { return (C_c_b[one] * h_b[one]).dot(C_c_b[other] * h_b[other]); };
+  const double sine_square = 1 - std::pow(cosine(fitted.h_b), 2);
+  if (sine_square < kLeastSineSquare) {
+    return std::nullopt;
+  }
+  const auto samples = static_cast<int>(shortest->last - shortest->first) + 1;
+  DirectionsFit of_cosine(t, samples_.t(shortest->first), samples_.t(shortest->last), samples, kDegree, 1);
+  for (std::size_t i = shortest->first; i <= shortest->last; ++i) {
+    Directions its;
+    its[0] = {cosine(samples_.h_b(i)), 0, 0};
+    of_cosine.add(samples_.t(i), its);
+  }
+  const double n = fitted.freedom / 2.0;
+  const double by_angle_rad2 = of_cosine.solve().residual_square[0] / (n * sine_square);
+  const double by_readings_rad2 = (fitted.residual_square[one] + fitted.residual_square[other]) / (2 * n);
+  const double a = std::pow(setup_.readout_noise_rad[one], 2);
+  const double b = std::pow(setup_.readout_noise_rad[other], 2);
+  return Misfit{(by_readings_rad2 - by_angle_rad2) / 2, std::sqrt((2 * (a + b) * (a + b) - a * a - b * b) / (4 * n))};
+}
+
+std::optional<SmoothReadings::Fit> SmoothReadings::fit(Time t, const GyroMask& used, int reach) const {
   constexpr int kLeast = DirectionsFit::least_samples(kDegree);
-  const std::size_t first = samples_.from(t - reach);
-  const std::size_t end = samples_.from(t + reach + Duration{1});
+  const Duration half = kHalfWidths[static_cast<std::size_t>(reach)];
+  const std::size_t first = samples_.from(t - half);
+  const std::size_t end = samples_.from(t + half + Duration{1});
   const auto size = static_cast<int>(end - first);
   if (size < kLeast) {
     return std::nullopt;
@@ -142,30 +191,24 @@ std::optional<SmoothReadings::At> SmoothReadings::fit(Time t, const GyroMask& us
   for (std::size_t i = first; i < end; ++i) {
     fit.add(samples_.t(i), samples_.h_b(i));
   }
-  const FittedDirections fitted = fit.solve();
-  At at;
-  at.h_b = fitted.h_b;
-  at.noise_factor = fitted.noise_factor;
+  Fit found{fit.solve(), {}, first, end - 1, reach};
   for (int k = 0; k < gyros_; ++k) {
-    at.used[k] = all_used[k];
+    found.used[k] = all_used[k];
   }
-  if (!fitted.explains(at.used, setup_.readout_noise_rad)) {
-    return std::nullopt;
-  }
-  at.bends = bends(at, t, first, end - 1);
-  return count(at.used) >= 2 ? std::optional(at) : std::nullopt;
+  const bool serves = count(found.used) >= 2 && found.its.explains(found.used, setup_.readout_noise_rad);
+  return serves ? std::optional(found) : std::nullopt;
 }
 
-bool SmoothReadings::bends(const At& at, Time t, std::size_t first, std::size_t last) const {
+bool SmoothReadings::bends(const Fit& fit, Time t) const {
   constexpr double kSigmas = 5;
-  const double part = to_seconds(t - samples_.t(first)) / to_seconds(samples_.t(last) - samples_.t(first));
-  const Directions begin = samples_.h_b(first);
-  const Directions end = samples_.h_b(last);
+  const double part = to_seconds(t - samples_.t(fit.first)) / to_seconds(samples_.t(fit.last) - samples_.t(fit.first));
+  const Directions begin = samples_.h_b(fit.first);
+  const Directions end = samples_.h_b(fit.last);
   double square = 0;
   for (int k = 0; k < gyros_; ++k) {
-    if (at.used[k]) {
+    if (fit.used[k]) {
       const double noise_rad = setup_.readout_noise_rad[k];
-      square += (at.h_b[k] - begin[k] - part * (end[k] - begin[k])).squaredNorm() / (noise_rad * noise_rad);
+      square += (fit.its.h_b[k] - begin[k] - part * (end[k] - begin[k])).squaredNorm() / (noise_rad * noise_rad);
     }
   }
   return square > kSigmas * kSigmas;
@@ -178,22 +221,18 @@ std::optional<SmoothedAttitude::Rows> SmoothedAttitude::rows_at(const PassProble
   if (!attitude) {
     return std::nullopt;
   }
-  Rows rows{attitude.value().C_in_c,
-            problem_.attitude_by_states(moment, attitude.value(), reading.h_b),
-            Vector3d::Zero(),
-            reading,
-            {}};
+  Rows rows{attitude.value().C_in_c, problem_.attitude_by_states(moment, attitude.value(), reading.h_b),
+            Vector3d::Zero(), reading};
   for (int k = 0; k < problem_.layout().gyros; ++k) {
     const double noise_rad = problem_.setup().on_board.readout_noise_rad[k] * reading.noise_factor;
-    rows.by_reading[k] = attitude.value().by_direction(k).rowwise().squaredNorm();
-    rows.readout_variance_rad2 += noise_rad * noise_rad * rows.by_reading[k];
+    rows.readout_variance_rad2 += noise_rad * noise_rad * attitude.value().by_direction(k).rowwise().squaredNorm();
   }
   return rows;
 }
 
 SmoothedAttitude::At SmoothedAttitude::with_sigma(const Rows& rows, const Eigen::Ref<const MatrixXd>& spread) {
   const Vector3d variance_rad2 = spread.rowwise().squaredNorm();
-  return {rows.C_in_c, (variance_rad2 + rows.readout_variance_rad2).cwiseSqrt()};
+  return {rows.C_in_c, (variance_rad2 + rows.readout_variance_rad2).cwiseSqrt(), rows.reading.reach};
 }
 
 std::optional<SmoothedAttitude::At> SmoothedAttitude::at(const PassProblem::Moment& moment,
@@ -213,6 +252,7 @@ SmoothedCourse SmoothedAttitude::course() const {
   const int gyros = problem_.layout().gyros;
   const CalibrationSetup& setup = problem_.setup().on_board;
   course.readings.gyros = gyros;
+  std::vector<int> reaches;
   // Those of an arc together, because their sigmas are one large product.
   std::vector<Rows> of_arc;
   std::size_t arc = 0;
@@ -237,15 +277,17 @@ SmoothedCourse SmoothedAttitude::course() const {
     if (!rows) {
       return;
     }
-    if (const auto misfit = readings_.misfit(moment.t, rows->reading)) {
-      Vector3d square_rad2 = Vector3d::Zero();
-      Vector3d sigma_rad2 = Vector3d::Zero();
-      for (int k = 0; k < gyros; ++k) {
-        square_rad2 += misfit->square_rad2[k] * rows->by_reading[k];
-        sigma_rad2 += misfit->sigma_rad2[k] * rows->by_reading[k];
-      }
-      course.misfit.add_readings(moment.t, square_rad2, sigma_rad2);
+    PerGyro<Eigen::Matrix3d> C_c_b;
+    for (int k = 0; k < gyros; ++k) {
+      C_c_b[k] = moment.gyros[k].C_c_b;
     }
+    if (const auto misfit = readings_.off_the_readings(moment.t, rows->reading.used, C_c_b)) {
+      course.misfit.add_readings(moment.t, 0, *misfit);
+    }
+    if (const auto misfit = readings_.off_the_shortest(moment.t, rows->reading)) {
+      course.misfit.add_readings(moment.t, rows->reading.reach, *misfit);
+    }
+    reaches.push_back(rows->reading.reach);
     if (moment.arc != arc) {
       take_sigmas();
       arc = moment.arc;
@@ -268,12 +310,13 @@ SmoothedCourse SmoothedAttitude::course() const {
   take_sigmas();
   for (std::size_t i = 0; i < course.attitude.t.size(); ++i) {
     Vector3d& sigma_rad = course.attitude.sigma_rad[i];
-    sigma_rad = with_misfit(sigma_rad, course.misfit.square_rad2(course.attitude.t[i]));
+    sigma_rad = with_misfit(sigma_rad, course.misfit.square_rad2(course.attitude.t[i], reaches[i]));
   }
   return course;
 }
 
-AttitudeHistory SmoothedAttitude::between(const PassProblem::Moment& from, const PassProblem::Moment& to) const {
+AttitudeHistory SmoothedAttitude::between(const PassProblem::Moment& from, const PassProblem::Moment& to,
+                                          const LocalMisfit& misfit) const {
   AttitudeHistory history;
   PassProblem::Moment moment = to;
   const ScreenedSamples& samples = screened_.samples;
@@ -284,7 +327,8 @@ AttitudeHistory SmoothedAttitude::between(const PassProblem::Moment& from, const
     for (int k = 0; k < screened_.gyros; ++k) {
       moment.gyros[k].h_in = (from.gyros[k].h_in + part * (to.gyros[k].h_in - from.gyros[k].h_in)).normalized();
     }
-    if (const auto attitude = at(moment, {samples.h_b(i), samples.used(i), 1})) {
+    if (auto attitude = at(moment, {samples.h_b(i), samples.used(i)})) {
+      attitude->sigma_rad = with_misfit(attitude->sigma_rad, misfit.square_rad2(moment.t, attitude->reach));
       append(*attitude, moment.t, history);
     }
   }
@@ -296,7 +340,8 @@ AttitudeHistory SmoothedAttitude::definitive(const LocalMisfit& misfit) const {
   AttitudeHistory whole;
   std::vector<PassProblem::Moment> nodes;
   const auto take = [&] {
-    const auto parts = on_all_cores(nodes.size() - 1, [&](std::size_t i) { return between(nodes[i], nodes[i + 1]); });
+    const auto parts =
+        on_all_cores(nodes.size() - 1, [&](std::size_t i) { return between(nodes[i], nodes[i + 1], misfit); });
     for (const AttitudeHistory& part : parts) {
       whole.t.insert(whole.t.end(), part.t.begin(), part.t.end());
       whole.q_in_c.insert(whole.q_in_c.end(), part.q_in_c.begin(), part.q_in_c.end());
@@ -315,9 +360,6 @@ AttitudeHistory SmoothedAttitude::definitive(const LocalMisfit& misfit) const {
     }
   });
   take();
-  for (std::size_t i = 0; i < whole.t.size(); ++i) {
-    whole.sigma_rad[i] = with_misfit(whole.sigma_rad[i], misfit.square_rad2(whole.t[i]));
-  }
   return whole;
 }
 

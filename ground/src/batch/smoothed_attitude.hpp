@@ -2,10 +2,12 @@
 /// Attitude by all gyro samples and fixes of a pass.
 
 #include <Eigen/Core>
+#include <array>
 #include <optional>
 #include <vector>
 
 #include "batch/pass_problem.hpp"
+#include "trihedron/core/directions_fit.hpp"
 
 namespace trihedron::ground {
 
@@ -16,26 +18,44 @@ class SmoothReadings {
   SmoothReadings(const ScreenedPass& pass, const CalibrationSetup& setup)
       : samples_(pass.samples), gyros_(pass.gyros), setup_(setup) {}
 
+  /// Polynomials over longer and longer times; the first is over the shortest.
+  static constexpr int kReaches = 3;
+  static constexpr int kNone = -1;
   struct At {
     Directions h_b;
     GyroMask used{};
     double noise_factor = 1;
-    bool bends = false;  ///< whether they leave the line between the samples at the ends by more than noise
+    int reach = kNone;  ///< which of the polynomials it is by
   };
   /// By the longest polynomial that fits, and where the readings bend agrees with those over shorter times. Returns
   /// `otherwise` where none fits; only the gyros that it uses are fitted.
   [[nodiscard]] At at(Time t, const At& otherwise) const;
-  /// Square of what the polynomial of at() is off one over the shortest time, less what noise makes of that: per gyro
-  /// and component, rad²; and its 1-sigma by chance. Nothing where it is that one.
+  /// Square of a motion of the body about each axis that a polynomial does not follow, less what noise makes of it,
+  /// rad²; and its 1-sigma by chance.
   struct Misfit {
-    PerGyro<double> square_rad2{};
-    PerGyro<double> sigma_rad2{};
+    double square_rad2 = 0;
+    double sigma_rad2 = 0;
   };
-  [[nodiscard]] std::optional<Misfit> misfit(Time t, const At& at) const;
+  /// What at() is off the polynomial over the shortest time. Nothing where it is that one, or none.
+  [[nodiscard]] std::optional<Misfit> off_the_shortest(Time t, const At& at) const;
+  /// What the readings are off that one by more than the angles between the momenta are, which no motion changes.
+  /// `C_c_b`: alignments.
+  [[nodiscard]] std::optional<Misfit> off_the_readings(Time t, const GyroMask& used,
+                                                       const PerGyro<Eigen::Matrix3d>& C_c_b) const;
 
  private:
-  [[nodiscard]] std::optional<At> fit(Time t, const GyroMask& used, Duration reach) const;
-  [[nodiscard]] bool bends(const At& at, Time t, std::size_t first, std::size_t last) const;
+  /// A polynomial that explains the samples from `first` to `last`.
+  struct Fit {
+    FittedDirections its;
+    GyroMask used{};
+    std::size_t first = 0;
+    std::size_t last = 0;
+    int reach = kNone;
+  };
+  [[nodiscard]] std::optional<Fit> fit(Time t, const GyroMask& used, int reach) const;
+  [[nodiscard]] static At at(const Fit& fit) { return {fit.its.h_b, fit.used, fit.its.noise_factor, fit.reach}; }
+  /// Whether it leaves the line between the samples at the ends by more than noise.
+  [[nodiscard]] bool bends(const Fit& fit, Time t) const;
   /// Variance by which two fits at one time differ by chance, over that of a reading.
   [[nodiscard]] static double variance_apart(const At& longer, const At& shorter);
   /// Whether they differ by no more than three sigmas of the χ² that chance makes.
@@ -47,29 +67,41 @@ class SmoothReadings {
 };
 
 /// By how much the smoothed attitude is off beyond what its covariance says. Fixes of about two minutes together tell
-/// of drift that changes faster than the process that stands for it, as in a slew; shorter polynomials through the
-/// readings, those of ten minutes together, of a body that moves otherwise than the longer ones.
+/// of drift that changes faster than the process that stands for it, as in a slew; the readings, those of ten minutes
+/// together, of a body that moves otherwise than the polynomials through them, as one that shakes.
 class LocalMisfit {
  public:
   /// Of the next fix: the rotation from the smoothed attitude to it, and its 1-sigma, rad, c axes. Outliers are left
   /// out.
   void add(Time t, const Eigen::Vector3d& off_rad, const Eigen::Vector3d& sigma_rad);
-  /// Of the readings next: the square of the error of the attitude about c x, y, z that they show, which may be
-  /// negative, and its 1-sigma by chance, rad².
-  void add_readings(Time t, const Eigen::Vector3d& square_rad2, const Eigen::Vector3d& sigma_rad2);
-  /// Square of the error of the smoothed attitude about c x, y, z that the fixes up to a minute and the readings up to
-  /// five minutes from t show, rad²; 0 for either where their mean is within 2.5 of its sigmas.
-  [[nodiscard]] Eigen::Vector3d square_rad2(Time t) const;
+  /// Of the readings next: what the polynomial `reach` over them is off the one over the shortest time, and this one
+  /// off the readings themselves.
+  void add_readings(Time t, int reach, const SmoothReadings::Misfit& misfit) {
+    readings_[static_cast<std::size_t>(reach)].add(t, misfit);
+  }
+  /// Square of the error about c x, y, z of the smoothed attitude by the polynomial `reach` that the fixes up to a
+  /// minute and the readings up to five minutes from t show, rad²; 0 for each where its mean is within 2.5 of its
+  /// sigmas.
+  [[nodiscard]] Eigen::Vector3d square_rad2(Time t, int reach) const;
 
  private:
   std::vector<Time> t_;
   // Of the fixes before each, and of all at the end.
   std::vector<Eigen::Vector3d> weights_{Eigen::Vector3d::Zero()};  ///< 1/rad²
   std::vector<Eigen::Vector3d> weighted_{Eigen::Vector3d::Zero()};
-  std::vector<Time> readings_t_;
-  // Of the readings before each, and of all at the end.
-  std::vector<Eigen::Vector3d> squares_{Eigen::Vector3d::Zero()};    ///< rad²
-  std::vector<Eigen::Vector3d> variances_{Eigen::Vector3d::Zero()};  ///< rad⁴
+  /// Mean of misfits over some time.
+  class Readings {
+   public:
+    void add(Time t, const SmoothReadings::Misfit& misfit);
+    [[nodiscard]] double square_rad2(Time t) const;
+
+   private:
+    std::vector<Time> t_;
+    // Of the readings before each, and of all at the end.
+    std::vector<double> squares_{0};    ///< rad²
+    std::vector<double> variances_{0};  ///< rad⁴
+  };
+  std::array<Readings, SmoothReadings::kReaches> readings_;  ///< the first: of the shortest off the readings
 };
 
 /// What the smoothed pass shows at the fixes.
@@ -100,6 +132,7 @@ class SmoothedAttitude {
   struct At {
     Rot<In, C> C_in_c;
     Eigen::Vector3d sigma_rad;
+    int reach = SmoothReadings::kNone;
   };
   /// An attitude before its sigmas are known.
   struct Rows {
@@ -107,7 +140,6 @@ class SmoothedAttitude {
     Eigen::MatrixXd by_states;              ///< its error, c axes, by the states of the arc
     Eigen::Vector3d readout_variance_rad2;  ///< of the noise of the readings
     SmoothReadings::At reading;
-    PerGyro<Eigen::Vector3d> by_reading;  ///< squares of what an error of a reading, per component, makes of it
   };
   [[nodiscard]] std::optional<Rows> rows_at(const PassProblem::Moment& moment,
                                             const SmoothReadings::At& otherwise) const;
@@ -116,7 +148,8 @@ class SmoothedAttitude {
   /// `otherwise` as of SmoothReadings. Nothing where the directions give no attitude.
   [[nodiscard]] std::optional<At> at(const PassProblem::Moment& moment, const SmoothReadings::At& otherwise) const;
   /// At the samples after `from`, a node, up to and with `to`, the next one.
-  [[nodiscard]] AttitudeHistory between(const PassProblem::Moment& from, const PassProblem::Moment& to) const;
+  [[nodiscard]] AttitudeHistory between(const PassProblem::Moment& from, const PassProblem::Moment& to,
+                                        const LocalMisfit& misfit) const;
   static void append(const At& attitude, Time t, AttitudeHistory& history);
 
   const ScreenedPass& screened_;

@@ -340,27 +340,95 @@ TEST(SmoothReadings, AreNotOffByMuchMoreThanTheyAreNoisyWhereABodyBeginsToTurn) 
   }
 }
 
-TEST(LocalMisfit, TellsWhereLongPolynomialsAreOffShorterOnes) {
+/// A body that shakes faster than a cubic over 1.4 s follows, and one that is at rest, by noisy readings: the angle
+/// between the momenta has the noise alone. Momenta 60° apart, the second gyro noisier than the first.
+TEST(SmoothReadings, TellHowMuchTheBodyShakesAndHowSureThatIs) {
+  constexpr int kSamples = 40000;
+  CalibrationSetup setup;
+  setup.gyro_period = from_seconds(0.125);
+  setup.readout_noise_rad[0] = 2 * kArcsecond;
+  setup.readout_noise_rad[1] = 3 * kArcsecond;
+  const PerGyro<Eigen::Vector3d> h_c = [] {
+    PerGyro<Eigen::Vector3d> h;
+    h[0] = Eigen::Vector3d::UnitX();
+    h[1] = {0.5, std::sqrt(0.75), 0};
+    return h;
+  }();
+  PerGyro<Eigen::Matrix3d> C_c_b;
+  C_c_b[0].setIdentity();
+  C_c_b[1] = Eigen::AngleAxisd(0.7, Eigen::Vector3d(1, 2, 3).normalized()).toRotationMatrix();
+  for (const double shake_rad : {0.0, 3 * kArcsecond}) {
+    std::mt19937 random(8);
+    std::normal_distribution<double> normal;
+    GyroTelemetry telemetry;
+    telemetry.gyros = 2;
+    for (int i = 0; i < kSamples; ++i) {
+      telemetry.t.emplace_back(from_seconds(0.125 * i));
+      Eigen::Vector3d turn_rad;
+      for (int axis = 0; axis < 3; ++axis) {
+        turn_rad[axis] = std::sqrt(2.0) * shake_rad * std::sin((13.2 + 2.3 * axis) * 0.125 * i + axis);
+      }
+      for (int k = 0; k < 2; ++k) {
+        Eigen::Vector3d h_b = C_c_b[k].transpose() * (h_c[k] - turn_rad.cross(h_c[k]));
+        for (double& component : h_b) {
+          component += setup.readout_noise_rad[k] * normal(random);
+        }
+        h_b.normalize();
+        telemetry.h.insert(telemetry.h.end(), h_b.begin(), h_b.end());
+      }
+    }
+    ScreenedPass pass(telemetry, 2);
+    for (std::size_t i = 0; i < telemetry.t.size(); ++i) {
+      pass.samples.add(i, all_gyros(2));
+    }
+    const SmoothReadings readings(pass, setup);
+    double sum = 0;
+    double squares = 0;
+    double sigma_rad2 = 0;
+    int count = 0;
+    for (int i = 20; i < kSamples - 20; i += 13) {
+      if (const auto misfit =
+              readings.off_the_readings(telemetry.t[static_cast<std::size_t>(i)], all_gyros(2), C_c_b)) {
+        sum += misfit->square_rad2;
+        squares += misfit->square_rad2 * misfit->square_rad2;
+        sigma_rad2 = misfit->sigma_rad2;
+        ++count;
+      }
+    }
+    const double mean = sum / count;
+    if (shake_rad == 0) {
+      EXPECT_NEAR(mean, 0, 3 * sigma_rad2 / std::sqrt(count));
+      EXPECT_NEAR(std::sqrt(squares / count), sigma_rad2, 0.05 * sigma_rad2);
+    } else {
+      EXPECT_NEAR(std::sqrt(mean), shake_rad, 0.2 * shake_rad);
+    }
+  }
+}
+
+TEST(LocalMisfit, TellsWhereTheReadingsMoveOtherwise) {
   constexpr double kByChance_rad2 = 1e-12;
   LocalMisfit misfit;
   std::mt19937 random(3);
   std::normal_distribution<double> normal;
-  for (int i = 0; i < 1200; ++i) {  // an hour, in whose last half there is something about y
+  for (int i = 0; i < 1200; ++i) {  // an hour, in whose last half there is something
     const double by_chance = kByChance_rad2 * (std::pow(normal(random), 2) + std::pow(normal(random), 2) - 2) / 2;
-    misfit.add_readings(Time(from_seconds(3 * i)), {by_chance, by_chance + (i < 600 ? 0 : 4e-13), by_chance},
-                        Eigen::Vector3d::Constant(kByChance_rad2));
+    misfit.add_readings(Time(from_seconds(3 * i)), 1, {by_chance + (i < 600 ? 0 : 4e-13), kByChance_rad2});
+    misfit.add_readings(Time(from_seconds(3 * i)), 0, {i < 600 ? 0 : 1e-12, kByChance_rad2});
   }
-  EXPECT_EQ(misfit.square_rad2(Time(from_seconds(900))), Eigen::Vector3d::Zero());
-  const Eigen::Vector3d late = misfit.square_rad2(Time(from_seconds(2700)));
-  EXPECT_NEAR(late.y(), 4e-13, 2e-13);
-  EXPECT_EQ(late.x(), 0);
-  EXPECT_EQ(misfit.square_rad2(Time(from_seconds(1e5))), Eigen::Vector3d::Zero());  // nothing is near
+  const auto at = [&](double t_s, int reach) { return misfit.square_rad2(Time(from_seconds(t_s)), reach); };
+  EXPECT_EQ(at(900, 1), Eigen::Vector3d::Zero());
+  EXPECT_NEAR(at(2700, 1).x(), 1.4e-12, 2e-13);
+  EXPECT_EQ(at(2700, 1), Eigen::Vector3d::Constant(at(2700, 1).x()));
+  EXPECT_NEAR(at(2700, 0).x(), 1e-12, 1e-20);  // no polynomial is off more than the one over the shortest time
+  EXPECT_NEAR(at(2700, 2).x(), 1e-12, 1e-20);
+  EXPECT_EQ(at(2700, SmoothReadings::kNone), Eigen::Vector3d::Zero());
+  EXPECT_EQ(at(1e5, 1), Eigen::Vector3d::Zero());  // nothing is near
 }
 
 TEST(LocalMisfit, TellsWhereFixesAreOffTheAttitudeAlike) {
   const Eigen::Vector3d sigma_rad(1e-5, 1e-5, 1e-4);
   LocalMisfit misfit;
-  EXPECT_EQ(misfit.square_rad2(Time{}), Eigen::Vector3d::Zero());
+  EXPECT_EQ(misfit.square_rad2(Time{}, SmoothReadings::kNone), Eigen::Vector3d::Zero());
   for (int i = 0; i <= 200; ++i) {
     const std::chrono::seconds t(3 * i);
     Eigen::Vector3d off_rad = (i % 2 == 0 ? 1 : -1) * sigma_rad;
@@ -368,14 +436,14 @@ TEST(LocalMisfit, TellsWhereFixesAreOffTheAttitudeAlike) {
     off_rad.y() = i == 20 ? 1 : off_rad.y();  // an outlier
     misfit.add(Time(t), off_rad, sigma_rad);
   }
-  const Eigen::Vector3d there = misfit.square_rad2(Time(std::chrono::seconds(300)));
+  const Eigen::Vector3d there = misfit.square_rad2(Time(std::chrono::seconds(300)), 0);
   EXPECT_NEAR(std::sqrt(there.x()), 2e-5, 1e-6);
   EXPECT_EQ(there.tail<2>(), Eigen::Vector2d::Zero());
   // A mean of 41 fixes of which 14 are off.
-  EXPECT_GT(misfit.square_rad2(Time(std::chrono::seconds(380))).x(), 0);
-  EXPECT_EQ(misfit.square_rad2(Time(std::chrono::seconds(60))), Eigen::Vector3d::Zero());
-  EXPECT_EQ(misfit.square_rad2(Time(std::chrono::seconds(500))), Eigen::Vector3d::Zero());
-  EXPECT_EQ(misfit.square_rad2(Time(std::chrono::hours(1))), Eigen::Vector3d::Zero());
+  EXPECT_GT(misfit.square_rad2(Time(std::chrono::seconds(380)), 0).x(), 0);
+  EXPECT_EQ(misfit.square_rad2(Time(std::chrono::seconds(60)), 0), Eigen::Vector3d::Zero());
+  EXPECT_EQ(misfit.square_rad2(Time(std::chrono::seconds(500)), 0), Eigen::Vector3d::Zero());
+  EXPECT_EQ(misfit.square_rad2(Time(std::chrono::hours(1)), 0), Eigen::Vector3d::Zero());
 }
 
 TEST(Batch, ComparesTheHalvesOfThePass) {
