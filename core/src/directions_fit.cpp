@@ -26,9 +26,27 @@ DirectionsFit::DirectionsFit(Time t, Time first, Time last, int samples, int max
   normal_.diagonal().tail(kTerms - terms_).setOnes();  // what is not fitted stays zero
 }
 
-void DirectionsFit::add(Time t, const Directions& h_b) {
+// With noises of the variances a and b, and n residuals of a component, half of what the mean
+// squares of the residuals are more has the variance (2 (a + b)² − a² − b²) / 4n.
+UnfollowedMotion FittedDirections::unfollowed(int one, int other, double cosine,
+                                              const PerGyro<double>& readout_noise_rad) const {
+  constexpr double kLeastSineSquare = 0.1;
+  const double sine_square = 1 - cosine * cosine;
+  if (!(sine_square > kLeastSineSquare)) {
+    return {};
+  }
+  const double n = freedom / 2.0;
+  const double by_readings_rad2 = (residual_square[one] + residual_square[other]) / (2 * n);
+  const double a = readout_noise_rad[one] * readout_noise_rad[one];
+  const double b = readout_noise_rad[other] * readout_noise_rad[other];
+  return {(by_readings_rad2 - square_beside / (n * sine_square)) / 2,
+          std::sqrt((2 * (a + b) * (a + b) - a * a - b * b) / (4 * n))};
+}
+
+void DirectionsFit::add(Time t, const Directions& h_b, double beside) {
   if (samples_++ == 0) {
     first_ = h_b;
+    first_beside_ = beside;
   }
   const double x = to_seconds(t - t_) / reach_s_;
   const Eigen::Vector4d powers(1, terms_ > 1 ? x : 0, terms_ > 2 ? x * x : 0, terms_ > 3 ? x * x * x : 0);
@@ -41,12 +59,15 @@ void DirectionsFit::add(Time t, const Directions& h_b) {
       squares_(3 * k + axis) += apart(axis) * apart(axis);
     }
   }
+  const double apart = beside - first_beside_;
+  right_.col(3L * gyros_) += powers * apart;
+  square_beside_ += apart * apart;
 }
 
 FittedDirections DirectionsFit::solve() const {
   const Eigen::Matrix<double, kTerms, kTerms> L = cholesky_root<kTerms>(normal_);
   Right coefficients = right_;
-  solve_factorized(matrix_of(L), coefficients.leftCols(3L * gyros_));
+  solve_factorized(matrix_of(L), coefficients.leftCols(3L * gyros_ + 1));
   FittedDirections result;
   result.freedom = 2 * (samples_ - terms_);
   for (int k = 0; k < gyros_; ++k) {
@@ -62,6 +83,8 @@ FittedDirections DirectionsFit::solve() const {
       result.h_b_rate[k] = rate - result.h_b[k] * result.h_b[k].dot(rate);
     }
   }
+  const auto beside = coefficients.col(3L * gyros_);
+  result.square_beside = std::max(square_beside_ - beside.dot(right_.col(3L * gyros_)), 0.0);
   Eigen::Vector4d at_zero = Eigen::Vector4d::UnitX();
   solve_lower(matrix_of(L), at_zero);
   result.noise_factor = at_zero.norm();

@@ -581,7 +581,9 @@ void InvariantEstimator<kCapacity>::carry_on(Correction& correction, Time t, con
 template <Capacity kCapacity>
 auto InvariantEstimator<kCapacity>::seen(const StarFix& fix, const FixReadings& readings) const -> Seen {
   const FixBySharedStates by_shared = fix_by_shared_states(setup_, fix, readings.rate_c);
-  return {by_shared, corrected(fix, by_shared, shared_), fix_noise(setup_, fix)};
+  Seen its{by_shared, corrected(fix, by_shared, shared_), fix_noise(setup_, fix)};
+  its.R_c.diagonal().array() += static_cast<double>(readings.jitter_rad2);
+  return its;
 }
 
 template <Capacity kCapacity>

@@ -47,6 +47,7 @@ void OnBoard<Estimator>::reset() {
   fixes_.clear();
   frozen_fixes_.forget();
   readings_ = Readings<Gyros::capacity()>(setup, Estimator::kTakesSamplesTogether);
+  jitter_ = {};
   schedule_ = Schedule(reach(), Estimator::kUsesAngles ? setup.angles_after : CalibrationSetup::kNever);
   navigator_ = {};
   parameters_ = policy_.take_parameters ? ParametersInUse::kOfCalibration : ParametersInUse::kOfSetUp;
@@ -406,7 +407,7 @@ bool OnBoard<Estimator>::begin(const StarFix& fix, StepReport& report) {
     report.fix.status = status;
     return false;
   };
-  const std::optional<FixReadings> readings = readings_at(fix.t);
+  const std::optional<FittedReadings> readings = readings_at(fix.t);
   const int used = count(readings ? readings->used : intake_.health().usable(fix.t, fix.t));
   if (used < (estimator_.started() ? 2 : gyros())) {
     return refuse(FixStatus::kRejectedTooFewGyros);
@@ -430,7 +431,7 @@ bool OnBoard<Estimator>::begin(const StarFix& fix, StepReport& report) {
 template <class Estimator>
 bool OnBoard<Estimator>::begin_angles() {
   const Time t = std::max(schedule_.angles_t(), follower_t_);
-  const std::optional<FixReadings> readings = readings_at(t);
+  const std::optional<FittedReadings> readings = readings_at(t);
   if (!readings || count(readings->used) < 2) {  // a gap of the gyros: continue where they are back
     schedule_.put_angles_off(next_sample_t() + reach());
     return false;
@@ -440,12 +441,13 @@ bool OnBoard<Estimator>::begin_angles() {
 }
 
 template <class Estimator>
-void OnBoard<Estimator>::prepare(Time t, const FixReadings& readings, typename Work::Stage stage) {
+void OnBoard<Estimator>::prepare(Time t, const FittedReadings& readings, typename Work::Stage stage) {
   follow(t, readings.h_b);
   work_ = {};
   work_.stage = stage;
   work_.t = t;
-  work_.its.readings = readings;
+  jitter_.add(readings.unfollowed);
+  work_.its.readings = with_jitter(readings);
 }
 
 template <class Estimator>
@@ -791,7 +793,9 @@ std::optional<AttitudeSolution> OnBoard<Estimator>::calibrated(const FixReadings
   const Layout layout = estimator_.error_layout();
   auto rows = attitude_by_states_now<Estimator::kMaxErrors>(layout, attitude.value(), estimator_.gyros(), readings.h_b);
   carry_back(layout, estimator_.since_fix(), rows);
-  return with_covariance(attitude.value(), estimator_.covariance_of_errors(rows), noise_rad, gyros(), 0);
+  Eigen::Matrix3d spread_rad2 = estimator_.covariance_of_errors(rows);
+  spread_rad2.diagonal().array() += static_cast<double>(readings.jitter_rad2);
+  return with_covariance(attitude.value(), spread_rad2, noise_rad, gyros(), 0);
 }
 
 template <class Estimator>
@@ -962,8 +966,9 @@ Result<AttitudeSolution, DirectionsFault> Navigator<Estimator>::attitude(const E
     variance_rad2 +=
         scale_rad * scale_rad * std::max(2 * x - 3 + 4 * elementary::exp(-x) - elementary::exp(-2 * x), 0.0);
   }
-  return with_covariance(by_directions.value(), gram<Estimator::kMaxStates>(spread), noise_rad, layout.gyros,
-                         variance_rad2);
+  Eigen::Matrix3d spread_rad2 = gram<Estimator::kMaxStates>(spread);
+  spread_rad2.diagonal().array() += static_cast<double>(readings.jitter_rad2);
+  return with_covariance(by_directions.value(), spread_rad2, noise_rad, layout.gyros, variance_rad2);
 }
 
 }  // namespace trihedron

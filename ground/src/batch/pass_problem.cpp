@@ -613,7 +613,9 @@ PassProblem::Compared PassProblem::compare_now(const PassSolution& solution, con
     for (int k = 0; k < gyros_; ++k) {
       noise_rad[k] = setup.readout_noise_rad[k] * fix.noise_factor * std::sqrt(sharing);
     }
-    return noise_of(comparison, fix_noise(setup, fix.fix), noise_rad);
+    Eigen::Matrix3d R_c = fix_noise(setup, fix.fix);
+    R_c.diagonal().array() += static_cast<double>(fix.jitter_rad2);
+    return noise_of(comparison, R_c, noise_rad);
   };
   const double sharing = setup.fixes_sharing_a_sample(fix.since_last);
   Compared compared{rows_about_states_now<kPassCapacity.states>(on_board_, comparison), noise(sharing), {}};

@@ -53,7 +53,7 @@ void LocalMisfit::add(Time t, const Vector3d& off_rad, const Vector3d& sigma_rad
   weighted_.emplace_back(weighted_.back() + weight.cwiseProduct(off_rad));
 }
 
-void LocalMisfit::Readings::add(Time t, const SmoothReadings::Misfit& misfit) {
+void LocalMisfit::Readings::add(Time t, const UnfollowedMotion& misfit) {
   t_.push_back(t);
   squares_.push_back(squares_.back() + misfit.square_rad2);
   variances_.push_back(variances_.back() + misfit.sigma_rad2 * misfit.sigma_rad2);
@@ -119,13 +119,13 @@ bool SmoothReadings::agree(const At& longer, const At& shorter) const {
   return square <= (freedom + kSigmas * std::sqrt(2.0 * freedom)) * variance_apart(longer, shorter);
 }
 
-std::optional<SmoothReadings::Misfit> SmoothReadings::off_the_shortest(Time t, const At& longer) const {
+std::optional<UnfollowedMotion> SmoothReadings::off_the_shortest(Time t, const At& longer) const {
   const std::optional<Fit> shortest = longer.reach > 0 ? fit(t, longer.used, 0) : std::nullopt;
   if (!shortest) {
     return std::nullopt;
   }
   const double gyros = count(shortest->used);
-  Misfit misfit;
+  UnfollowedMotion misfit;
   for (int k = 0; k < gyros_; ++k) {
     if (shortest->used[k]) {
       const double variance_rad2 = std::pow(setup_.readout_noise_rad[k], 2) * variance_apart(longer, at(*shortest));
@@ -136,39 +136,9 @@ std::optional<SmoothReadings::Misfit> SmoothReadings::off_the_shortest(Time t, c
   return misfit;
 }
 
-// The residuals of two gyros are their noise and the motion, two components each; those of the angle between the
-// momenta, in units of its sine, the sum of the noises of one component each. With variances a and b of the two noises,
-// and n residuals of a component, half of what the mean squares of the former are more has the variance
-// (2 (a + b)² − a² − b²) / 4n.
-std::optional<SmoothReadings::Misfit> SmoothReadings::off_the_readings(Time t, const GyroMask& used,
-                                                                       const PerGyro<Eigen::Matrix3d>& C_c_b) const {
-  constexpr double kLeastSineSquare = 0.1;
+std::optional<UnfollowedMotion> SmoothReadings::off_the_readings(Time t, const GyroMask& used) const {
   const std::optional<Fit> shortest = fit(t, used, 0);
-  if (!shortest) {
-    return std::nullopt;
-  }
-  const FittedDirections& fitted = shortest->its;
-  const auto* const first = std::ranges::find(shortest->used, true);
-  const auto one = static_cast<int>(first - shortest->used.begin());
-  const auto other = static_cast<int>(std::find(std::next(first), shortest->used.end(), true) - shortest->used.begin());
-  const auto cosine = [&](const Directions& h_b) { return (C_c_b[one] * h_b[one]).dot(C_c_b[other] * h_b[other]); };
-  const double sine_square = 1 - std::pow(cosine(fitted.h_b), 2);
-  if (sine_square < kLeastSineSquare) {
-    return std::nullopt;
-  }
-  const auto samples = static_cast<int>(shortest->last - shortest->first) + 1;
-  DirectionsFit of_cosine(t, samples_.t(shortest->first), samples_.t(shortest->last), samples, kDegree, 1);
-  for (std::size_t i = shortest->first; i <= shortest->last; ++i) {
-    Directions its;
-    its[0] = {cosine(samples_.h_b(i)), 0, 0};
-    of_cosine.add(samples_.t(i), its);
-  }
-  const double n = fitted.freedom / 2.0;
-  const double by_angle_rad2 = of_cosine.solve().residual_square[0] / (n * sine_square);
-  const double by_readings_rad2 = (fitted.residual_square[one] + fitted.residual_square[other]) / (2 * n);
-  const double a = std::pow(setup_.readout_noise_rad[one], 2);
-  const double b = std::pow(setup_.readout_noise_rad[other], 2);
-  return Misfit{(by_readings_rad2 - by_angle_rad2) / 2, std::sqrt((2 * (a + b) * (a + b) - a * a - b * b) / (4 * n))};
+  return shortest && shortest->unfollowed.sigma_rad2 > 0 ? std::optional(shortest->unfollowed) : std::nullopt;
 }
 
 std::optional<SmoothReadings::Fit> SmoothReadings::fit(Time t, const GyroMask& used, int reach) const {
@@ -187,16 +157,27 @@ std::optional<SmoothReadings::Fit> SmoothReadings::fit(Time t, const GyroMask& u
     }
     all_used = both(all_used, samples_.used(i));
   }
-  DirectionsFit fit(t, samples_.t(first), samples_.t(end - 1), size, kDegree, gyros_);
-  for (std::size_t i = first; i < end; ++i) {
-    fit.add(samples_.t(i), samples_.h_b(i));
-  }
-  Fit found{fit.solve(), {}, first, end - 1, reach};
+  Fit found{{}, {}, {}, first, end - 1, reach};
   for (int k = 0; k < gyros_; ++k) {
     found.used[k] = all_used[k];
   }
-  const bool serves = count(found.used) >= 2 && found.its.explains(found.used, setup_.readout_noise_rad);
-  return serves ? std::optional(found) : std::nullopt;
+  if (count(found.used) < 2) {
+    return std::nullopt;
+  }
+  const auto [one, other] = first_two(found.used);
+  const Eigen::Matrix3d C = C_c_b_[one].transpose() * C_c_b_[other];
+  const auto cosine = [&, i = one, j = other](const Directions& h_b) { return h_b[i].dot(C * h_b[j]); };
+  DirectionsFit fit(t, samples_.t(first), samples_.t(end - 1), size, kDegree, gyros_);
+  for (std::size_t i = first; i < end; ++i) {
+    const Directions h_b = samples_.h_b(i);
+    fit.add(samples_.t(i), h_b, cosine(h_b));
+  }
+  found.its = fit.solve();
+  if (!found.its.explains(found.used, setup_.readout_noise_rad)) {
+    return std::nullopt;
+  }
+  found.unfollowed = found.its.unfollowed(one, other, cosine(found.its.h_b), setup_.readout_noise_rad);
+  return found;
 }
 
 bool SmoothReadings::bends(const Fit& fit, Time t) const {
@@ -277,11 +258,7 @@ SmoothedCourse SmoothedAttitude::course() const {
     if (!rows) {
       return;
     }
-    PerGyro<Eigen::Matrix3d> C_c_b;
-    for (int k = 0; k < gyros; ++k) {
-      C_c_b[k] = moment.gyros[k].C_c_b;
-    }
-    if (const auto misfit = readings_.off_the_readings(moment.t, rows->reading.used, C_c_b)) {
+    if (const auto misfit = readings_.off_the_readings(moment.t, rows->reading.used)) {
       course.misfit.add_readings(moment.t, 0, *misfit);
     }
     if (const auto misfit = readings_.off_the_shortest(moment.t, rows->reading)) {

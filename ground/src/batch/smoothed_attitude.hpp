@@ -14,9 +14,9 @@ namespace trihedron::ground {
 /// Readings at any time, by a polynomial through the samples around it.
 class SmoothReadings {
  public:
-  /// Refers to both.
-  SmoothReadings(const ScreenedPass& pass, const CalibrationSetup& setup)
-      : samples_(pass.samples), gyros_(pass.gyros), setup_(setup) {}
+  /// `C_c_b`: alignments. Refers to the others.
+  SmoothReadings(const ScreenedPass& pass, const CalibrationSetup& setup, const PerGyro<Eigen::Matrix3d>& C_c_b)
+      : samples_(pass.samples), gyros_(pass.gyros), setup_(setup), C_c_b_(C_c_b) {}
 
   /// Polynomials over longer and longer times; the first is over the shortest.
   static constexpr int kReaches = 3;
@@ -30,23 +30,16 @@ class SmoothReadings {
   /// By the longest polynomial that fits, and where the readings bend agrees with those over shorter times. Returns
   /// `otherwise` where none fits; only the gyros that it uses are fitted.
   [[nodiscard]] At at(Time t, const At& otherwise) const;
-  /// Square of a motion of the body about each axis that a polynomial does not follow, less what noise makes of it,
-  /// rad²; and its 1-sigma by chance.
-  struct Misfit {
-    double square_rad2 = 0;
-    double sigma_rad2 = 0;
-  };
   /// What at() is off the polynomial over the shortest time. Nothing where it is that one, or none.
-  [[nodiscard]] std::optional<Misfit> off_the_shortest(Time t, const At& at) const;
-  /// What the readings are off that one by more than the angles between the momenta are, which no motion changes.
-  /// `C_c_b`: alignments.
-  [[nodiscard]] std::optional<Misfit> off_the_readings(Time t, const GyroMask& used,
-                                                       const PerGyro<Eigen::Matrix3d>& C_c_b) const;
+  [[nodiscard]] std::optional<UnfollowedMotion> off_the_shortest(Time t, const At& at) const;
+  /// What the readings are off that one. Nothing where there is none.
+  [[nodiscard]] std::optional<UnfollowedMotion> off_the_readings(Time t, const GyroMask& used) const;
 
  private:
   /// A polynomial that explains the samples from `first` to `last`.
   struct Fit {
     FittedDirections its;
+    UnfollowedMotion unfollowed;
     GyroMask used{};
     std::size_t first = 0;
     std::size_t last = 0;
@@ -64,6 +57,7 @@ class SmoothReadings {
   const ScreenedSamples& samples_;
   int gyros_;
   const CalibrationSetup& setup_;
+  PerGyro<Eigen::Matrix3d> C_c_b_;
 };
 
 /// By how much the smoothed attitude is off beyond what its covariance says. Fixes of about two minutes together tell
@@ -76,7 +70,7 @@ class LocalMisfit {
   void add(Time t, const Eigen::Vector3d& off_rad, const Eigen::Vector3d& sigma_rad);
   /// Of the readings next: what the polynomial `reach` over them is off the one over the shortest time, and this one
   /// off the readings themselves.
-  void add_readings(Time t, int reach, const SmoothReadings::Misfit& misfit) {
+  void add_readings(Time t, int reach, const UnfollowedMotion& misfit) {
     readings_[static_cast<std::size_t>(reach)].add(t, misfit);
   }
   /// Square of the error about c x, y, z of the smoothed attitude by the polynomial `reach` that the fixes up to a
@@ -92,7 +86,7 @@ class LocalMisfit {
   /// Mean of misfits over some time.
   class Readings {
    public:
-    void add(Time t, const SmoothReadings::Misfit& misfit);
+    void add(Time t, const UnfollowedMotion& misfit);
     [[nodiscard]] double square_rad2(Time t) const;
 
    private:
@@ -121,7 +115,7 @@ class SmoothedAttitude {
         problem_(problem),
         solution_(solution),
         roots_(roots),
-        readings_(screened, problem.setup().on_board) {}
+        readings_(screened, problem.setup().on_board, alignments(solution.gyros, screened.gyros)) {}
 
   /// At the fixes.
   [[nodiscard]] SmoothedCourse course() const;
@@ -129,6 +123,13 @@ class SmoothedAttitude {
   [[nodiscard]] AttitudeHistory definitive(const LocalMisfit& misfit) const;
 
  private:
+  [[nodiscard]] static PerGyro<Eigen::Matrix3d> alignments(const Gyros& of, int gyros) {
+    PerGyro<Eigen::Matrix3d> C_c_b;
+    for (int k = 0; k < gyros; ++k) {
+      C_c_b[k] = of[k].C_c_b;
+    }
+    return C_c_b;
+  }
   struct At {
     Rot<In, C> C_in_c;
     Eigen::Vector3d sigma_rad;

@@ -76,6 +76,7 @@ struct ScreenedPass {
     Directions h_b = unread();  ///< fitted through several samples
     GyroMask used{};
     double noise_factor = 1;                ///< as of FixReadings
+    float jitter_rad2 = 0;                  ///< same
     Eigen::Vector3d rate_c{0, 0, 0};        ///< of the body relative to `in`, rad/s
     Duration since_last = Duration::max();  ///< fix of the same star tracker
   };
@@ -125,6 +126,7 @@ struct ScreenedPass {
     Fix& fix = fixes.emplace_back();
     fix.fix = star_fix;
     fix.noise_factor = readings.noise_factor;
+    fix.jitter_rad2 = readings.jitter_rad2;
     fix.rate_c = readings.rate_c;
     const auto last = std::find_if(std::next(fixes.rbegin()), fixes.rend(),
                                    [&](const Fix& other) { return other.fix.head == star_fix.head; });

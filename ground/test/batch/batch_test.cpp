@@ -326,7 +326,9 @@ TEST(SmoothReadings, AreNotOffByMuchMoreThanTheyAreNoisyWhereABodyBeginsToTurn) 
     for (std::size_t i = 0; i < telemetry.t.size(); ++i) {
       pass.samples.add(i, all_gyros(2));
     }
-    const SmoothReadings readings(pass, setup);
+    PerGyro<Eigen::Matrix3d> C_c_b;
+    C_c_b[0] = C_c_b[1] = Eigen::Matrix3d::Identity();
+    const SmoothReadings readings(pass, setup, C_c_b);
     double least_factor = 1;
     for (double t_s = 5; t_s < 35; t_s += 0.125) {
       const auto found = readings.at(Time(from_seconds(t_s)), {directions(t_s), all_gyros(2), 1});
@@ -381,14 +383,13 @@ TEST(SmoothReadings, TellHowMuchTheBodyShakesAndHowSureThatIs) {
     for (std::size_t i = 0; i < telemetry.t.size(); ++i) {
       pass.samples.add(i, all_gyros(2));
     }
-    const SmoothReadings readings(pass, setup);
+    const SmoothReadings readings(pass, setup, C_c_b);
     double sum = 0;
     double squares = 0;
     double sigma_rad2 = 0;
     int count = 0;
     for (int i = 20; i < kSamples - 20; i += 13) {
-      if (const auto misfit =
-              readings.off_the_readings(telemetry.t[static_cast<std::size_t>(i)], all_gyros(2), C_c_b)) {
+      if (const auto misfit = readings.off_the_readings(telemetry.t[static_cast<std::size_t>(i)], all_gyros(2))) {
         sum += misfit->square_rad2;
         squares += misfit->square_rad2 * misfit->square_rad2;
         sigma_rad2 = misfit->sigma_rad2;

@@ -40,6 +40,28 @@ Pass beginning(Pass pass, Duration duration) {
   return pass;
 }
 
+// Two arcseconds at up to 2 Hz, of which the readings around a fix show about half beyond the polynomial through them.
+TEST(Calibrate, KnowsHowFarTheAttitudeOfABodyThatShakesIsOff) {
+  Scenario scenario;
+  scenario.duration = std::chrono::hours(1);
+  scenario.attitude.jitter_rad = 2 * kArcsecond;
+  scenario.attitude.jitter_bandwidth_hz = 2;
+  const sim::SimulatedPass simulated = sim::simulate(scenario);
+  const CalibrationRun run = calibrate(simulated.pass, told());
+  const AttitudeErrors errors = attitude_errors(run.attitude, simulated.truth.t, simulated.truth.q_in_c);
+  const std::size_t late = errors.t.size() / 2;
+  double square = 0;
+  double least_sigma_rad = 1;
+  for (std::size_t i = late; i < errors.t.size(); ++i) {
+    square += errors.error_rad[i].cwiseQuotient(errors.sigma_rad[i]).squaredNorm();
+    least_sigma_rad = std::min(least_sigma_rad, errors.sigma_rad[i].minCoeff());
+  }
+  square /= 3 * static_cast<double>(errors.t.size() - late);
+  EXPECT_GT(square, 0.7);
+  EXPECT_LT(square, 1.6);
+  EXPECT_GT(least_sigma_rad, 1 * kArcsecond);
+}
+
 TEST(Calibrate, FindsTheTruthWithinItsSigmas) {
   std::vector<double> progress;
   const auto run =

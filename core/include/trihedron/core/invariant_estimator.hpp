@@ -187,7 +187,7 @@ class InvariantEstimator {
   struct Seen {
     FixBySharedStates by_shared;
     Rot<In, C> C_in_c;
-    Eigen::Matrix3d R_c;
+    Eigen::Matrix3d R_c;  ///< of the fix, and of what the readings do not follow
   };
   [[nodiscard]] Seen seen(const StarFix& fix, const FixReadings& readings) const;
   [[nodiscard]] FixComparison compared(const Seen& its, const Correction& correction,

@@ -80,7 +80,8 @@ class OnBoard {
 
   /// Open-loop attitude at the latest sample. Needs navigator().started().
   [[nodiscard]] Result<AttitudeSolution, DirectionsFault> navigation_attitude() const {
-    return navigator_.attitude(estimator_, readings_.now(estimator_.setup(), intake_.health(), estimator_.gyros()),
+    return navigator_.attitude(estimator_,
+                               with_jitter(readings_.now(estimator_.setup(), intake_.health(), estimator_.gyros())),
                                navigator_.state());
   }
 
@@ -164,7 +165,7 @@ class OnBoard {
   [[nodiscard]] bool begin_angles();
   /// Begins with the fix or the angles that are next, as begin() and begin_angles().
   [[nodiscard]] bool begin_next(Schedule::Next next, StepReport& report);
-  void prepare(Time t, const FixReadings& readings, typename Work::Stage stage);
+  void prepare(Time t, const FittedReadings& readings, typename Work::Stage stage);
   /// The next stage, up to kReport; all of them, and what they come to.
   void work();
   void finish(StepReport& report);
@@ -199,8 +200,13 @@ class OnBoard {
   void follow_next_sample();
   void follow_all_samples();
   [[nodiscard]] bool can_be_passed_over(int sample) const;
-  [[nodiscard]] std::optional<FixReadings> readings_at(Time t) const {
+  [[nodiscard]] std::optional<FittedReadings> readings_at(Time t) const {
     return readings_.at(t, estimator_.setup(), intake_.health(), estimator_.gyros());
+  }
+  /// Readings by a polynomial, with what the latest of them have not followed.
+  [[nodiscard]] FixReadings with_jitter(FixReadings readings) const {
+    readings.jitter_rad2 = readings.noise_factor < 1 ? jitter_.square_rad2() : 0;
+    return readings;
   }
   [[nodiscard]] std::optional<AttitudeSolution> calibrated(const FixReadings& readings) const;
   [[nodiscard]] double angle_residual() const;
@@ -223,20 +229,22 @@ class OnBoard {
   CorrectionPolicy policy_;
   ParametersInUse parameters_{};
   ParametersInUse corrected_by_{};
+  // Short ones together: the state of the flight computer's has no byte to spare.
   bool correction_wanted_ = false;
+  bool has_worked_ = false;
+  bool clock_set_back_ = false;  ///< no sample has been used since
+  bool start_unconfirmed_ = false;
   Stretch stretch_;
   Work work_;
-  int slots_left_ = 0;  ///< samples over which the work that there is is to be spread; 0: it is done at once
-  Time worked_t_{};     ///< of the last fix, or angles, dealt with
-  bool has_worked_ = false;
-  int behind_ = 0;     ///< samples to which the estimator has not yet been taken
-  Time follower_t_{};  ///< to which the estimator has been predicted
+  Jitter jitter_;
+  int slots_left_ = 0;     ///< samples over which the work that there is is to be spread; 0: it is done at once
+  int behind_ = 0;         ///< samples to which the estimator has not yet been taken
+  int fixes_dropped_ = 0;  ///< not yet reported
+  Time worked_t_{};        ///< of the last fix, or angles, dealt with
+  Time follower_t_{};      ///< to which the estimator has been predicted
   Directions follower_h_b_;
   Time passed_t_{};  ///< of the last sample that was followed or passed over
   Time corrected_t_{};
-  int fixes_dropped_ = 0;        ///< not yet reported
-  bool clock_set_back_ = false;  ///< no sample has been used since
-  bool start_unconfirmed_ = false;
 };
 
 /// The flight computer's: two gyros with eq. (1), one star tracker.

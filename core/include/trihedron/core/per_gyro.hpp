@@ -51,6 +51,16 @@ inline constexpr int kNoGyro = -1;
   }
   return used;
 }
+/// The first two that are in it, of which there are as many at least.
+[[nodiscard]] constexpr std::array<int, 2> first_two(const GyroMask& mask) {
+  std::array<int, 2> found{kNoGyro, kNoGyro};
+  for (int k = kMaxGyros - 1; k >= 0; --k) {
+    if (mask[k]) {
+      found = {k, found[0]};
+    }
+  }
+  return found;
+}
 /// Those that are in both.
 [[nodiscard]] constexpr GyroMask both(const GyroMask& a, const GyroMask& b) {
   GyroMask mask;

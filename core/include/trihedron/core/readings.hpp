@@ -86,13 +86,13 @@ class Readings {
   /// none close enough. Where no cubic explains them, a gyro is not used whose reading next to `t` is a spike. `gyros`:
   /// their estimates, for the rate of the body.
   template <class Gyros>
-  [[nodiscard]] std::optional<FixReadings> at(Time t, const CalibrationSetup& setup, const GyroHealth<kGyros>& health,
-                                              const Gyros& gyros) const {
+  [[nodiscard]] std::optional<FittedReadings> at(Time t, const CalibrationSetup& setup,
+                                                 const GyroHealth<kGyros>& health, const Gyros& gyros) const {
     const int after = first_after(t);
     if (after == 0) {
       return std::nullopt;
     }
-    FixReadings readings;
+    FittedReadings readings;
     const Time before_t = time(after - 1);
     if (before_t == t) {
       readings.used = health.usable(before_t, t);
@@ -114,9 +114,9 @@ class Readings {
   /// Readings at the latest sample; needs one. Where no polynomial explains the samples up to it, a gyro whose latest
   /// reading alone leads elsewhere than those before it is not used.
   template <class Gyros>
-  [[nodiscard]] FixReadings now(const CalibrationSetup& setup, const GyroHealth<kGyros>& health,
-                                const Gyros& gyros) const {
-    FixReadings readings;
+  [[nodiscard]] FittedReadings now(const CalibrationSetup& setup, const GyroHealth<kGyros>& health,
+                                   const Gyros& gyros) const {
+    FittedReadings readings;
     readings.used = health.usable(latest_t(), latest_t());
     readings.h_b = latest_directions();
     if (!fit(latest_t(), recent_, size_, 2, setup, health, gyros, readings)) {
@@ -138,7 +138,7 @@ class Readings {
   /// explains them; whether it does. `after`: the first of them after `t`.
   template <class Gyros>
   bool fit(Time t, Duration reach, int after, int degree, const CalibrationSetup& setup,
-           const GyroHealth<kGyros>& health, const Gyros& gyros, FixReadings& readings) const {
+           const GyroHealth<kGyros>& health, const Gyros& gyros, FittedReadings& readings) const {
     const auto adjacent = [&](int i) { return time(i + 1) - time(i) <= max_interpolation_; };
     int begin = after - 1;
     while (begin > 0 && t - time(begin - 1) <= reach && adjacent(begin - 1)) {
@@ -151,15 +151,24 @@ class Readings {
     if (end - begin < DirectionsFit::least_samples(degree)) {
       return false;
     }
-    DirectionsFit fit(t, time(begin), time(end - 1), end - begin, degree, gyros_);
-    for (int i = begin; i < end; ++i) {
-      fit.add(time(i), directions(i));
-    }
-    const FittedDirections fitted = fit.solve();
     const GyroMask used = health.usable(time(begin), time(end - 1));
-    if (count(used) < 2 || !fitted.explains(used, setup.readout_noise_rad)) {
+    if (count(used) < 2) {
       return false;
     }
+    const auto [one, other] = first_two(used);
+    const auto& a = gyros[one];
+    const auto& b = gyros[other];
+    const auto cosine = [&, i = one, j = other](const Directions& h_b) { return a.in_c(h_b[i]).dot(b.in_c(h_b[j])); };
+    DirectionsFit fit(t, time(begin), time(end - 1), end - begin, degree, gyros_);
+    for (int i = begin; i < end; ++i) {
+      const Directions h_b = directions(i);
+      fit.add(time(i), h_b, cosine(h_b));
+    }
+    const FittedDirections fitted = fit.solve();
+    if (!fitted.explains(used, setup.readout_noise_rad)) {
+      return false;
+    }
+    readings.unfollowed = fitted.unfollowed(one, other, cosine(fitted.h_b), setup.readout_noise_rad);
     readings.used = used;
     readings.h_b = fitted.h_b;
     readings.noise_factor = fitted.noise_factor;
