@@ -50,7 +50,7 @@ std::optional<SetupFault> InvariantEstimator<kCapacity>::set_up(const Calibratio
 template <Capacity kCapacity>
 void InvariantEstimator<kCapacity>::forget() {
   gyros_ = prior_gyros_;
-  shared_ = SharedStates::Zero(layout().shared_size());
+  shared_ = Shared::Zero(layout().shared_size());
   information_.reset(layout().size(), layout().dynamic());
   gate_ = OutlierGate(setup_);
   begin_stretch();
@@ -581,7 +581,7 @@ void InvariantEstimator<kCapacity>::carry_on(Correction& correction, Time t, con
 template <Capacity kCapacity>
 auto InvariantEstimator<kCapacity>::seen(const StarFix& fix, const FixReadings& readings) const -> Seen {
   const FixBySharedStates by_shared = fix_by_shared_states(setup_, fix, readings.rate_c);
-  Seen its{by_shared, corrected(fix, by_shared, shared_), fix_noise(setup_, fix)};
+  Seen its{by_shared, corrected(fix, by_shared.lazyProduct(shared_)), fix_noise(setup_, fix)};
   its.R_c.diagonal().array() += static_cast<double>(readings.jitter_rad2);
   return its;
 }

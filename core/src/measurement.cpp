@@ -15,9 +15,9 @@ FixBySharedStates fix_by_shared_states(const CalibrationSetup& setup, const Star
   if (layout.further.clock_rate) {
     by.col(layout.clock_rate() - layout.shared()) = to_seconds(fix.t - setup.orbital_phase_zero) * rate_c;
   }
-  if (layout.further.orbital_error && fix.head == 0) {
+  if (layout.further.orbital_error) {
     const double phase = setup.orbital_rate_rad_s * to_seconds(fix.t - setup.orbital_phase_zero);
-    const int first = layout.orbital_error() - layout.shared();
+    const int first = layout.orbital_error(fix.head) - layout.shared();
     by.middleCols<3>(first) = elementary::sin(phase) * Eigen::Matrix3d::Identity();
     by.middleCols<3>(first + 3) = elementary::cos(phase) * Eigen::Matrix3d::Identity();
   }
@@ -38,9 +38,8 @@ Eigen::Matrix3d fix_noise(const CalibrationSetup& setup, const StarFix& fix) {
   return root * root.transpose();
 }
 
-Rot<In, C> corrected(const StarFix& fix, const FixBySharedStates& by_shared, const SharedStates& shared) {
-  const Eigen::Vector3d known_error = by_shared.lazyProduct(shared);
-  return Rot<In, C>::assume(fix.q_in_c.normalized()) * Rot<C, C>::exp(-Vec<C>::assume(known_error));
+Rot<In, C> corrected(const StarFix& fix, const Eigen::Vector3d& error_rad) {
+  return Rot<In, C>::assume(fix.q_in_c.normalized()) * Rot<C, C>::exp(-Vec<C>::assume(error_rad));
 }
 
 ComponentCovariance noise_of(const FixComparison& comparison, const Eigen::Matrix3d& R_c,

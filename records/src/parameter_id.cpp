@@ -21,6 +21,11 @@ std::string owner_name(Owner owner, std::size_t number) {
       return "";
     case Owner::kGyro:
       return std::string(kGyro) + std::to_string(number) + "_";
+    case Owner::kStarTracker:
+      if (number == 1) {
+        return "";
+      }
+      break;
     case Owner::kFurtherStarTracker:
       break;
   }
@@ -62,13 +67,14 @@ std::optional<ParameterId> further_named(std::string_view name) {
   for (const FurtherStateRow& row : kFurtherStates) {
     std::size_t owner = 0;
     std::string_view component = name;
-    if (const Owner owned_by = kind_of(row.state).owner; owned_by != Owner::kPass) {
-      const std::optional<Numbered>& found = owned_by == Owner::kGyro ? of_a_gyro : of_a_head;
-      if (!found || !found->rest.starts_with('_')) {
-        continue;
-      }
+    const Owner owned_by = kind_of(row.state).owner;
+    const std::optional<Numbered>& found = owned_by == Owner::kGyro ? of_a_gyro : of_a_head;
+    if (found && found->rest.starts_with('_') && owned_by != Owner::kPass) {
       owner = found->index;
       component = found->rest.substr(1);
+    }
+    if (owner_name(owned_by, owner + 1) + std::string(component) != name) {
+      continue;
     }
     for (std::size_t i = 0; i < row.components.size(); ++i) {
       if (row.components[i] == component) {

@@ -131,6 +131,7 @@ TEST(Vocabulary, ParametersHaveTheNamesOfCalibrationJson) {
   EXPECT_EQ(short_name_of(ParameterId::alignment(1, 2)), "align_z");
   EXPECT_EQ(name_of(ParameterId::further(FurtherState::kClockOffset, 0, 0)), "clock_offset_s");
   EXPECT_EQ(name_of(ParameterId::further(FurtherState::kOrbitalError, 0, 4)), "orbital_cosine_y_rad");
+  EXPECT_EQ(name_of(ParameterId::further(FurtherState::kOrbitalError, 1, 4)), "star_tracker_2_orbital_cosine_y_rad");
   EXPECT_EQ(name_of(ParameterId::further(FurtherState::kStarTrackerAlignment, 1, 0)), "star_tracker_2_align_x_rad");
   EXPECT_EQ(name_of(ParameterId::further(FurtherState::kReadoutBias, 1, 1)), "gyro2_readout_bias_y_rad");
   EXPECT_EQ(name_of(ParameterId::further(FurtherState::kCoefficientChange, 0, Esg7::kMu12)), "gyro1_mu12_change_rad_s");
@@ -139,7 +140,8 @@ TEST(Vocabulary, ParametersHaveTheNamesOfCalibrationJson) {
 TEST(Vocabulary, NoParameterHasANameThatIsNearlyRight) {
   for (const char* name : {"", "gyro", "gyro1", "gyro1.", "gyro0.k0", "gyro-1.k0", "gyro999.k0", "gyro1.align_w",
                            "gyro1.align_", "gyro1.align_xx", "gyro1.heat", "clock_offset", "gyro1_clock_offset_s",
-                           "orbital_sine_w_rad", "star_tracker_align_x_rad", "gyro1readout_bias_x_rad"}) {
+                           "orbital_sine_w_rad", "star_tracker_1_orbital_sine_x_rad", "gyro2_orbital_sine_x_rad",
+                           "star_tracker_align_x_rad", "gyro1readout_bias_x_rad"}) {
     EXPECT_FALSE(parameter_named(name).has_value()) << name;
   }
 }

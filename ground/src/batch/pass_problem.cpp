@@ -604,7 +604,7 @@ PassProblem::Compared PassProblem::compare_now(const PassSolution& solution, con
     return {};
   }
   const FixBySharedStates by_shared = fix_by_shared_states(setup, fix.fix, fix.rate_c);
-  const Rot<In, C> C_fix = corrected(fix.fix, by_shared, solution.shared);
+  const Rot<In, C> C_fix = corrected(fix.fix, by_shared.lazyProduct(solution.shared));
   // Linearised at the attitude by the gyros, which has no noise of the fix.
   const FixComparison comparison =
       trihedron::compare(on_board_, moment.gyros, C_fix.raw(), by_gyros.value().raw(), fix.h_b, fix.used, by_shared);

@@ -271,7 +271,7 @@ SmoothedCourse SmoothedAttitude::course() const {
     }
     if (moment.fix->fix.head == 0) {
       const FixBySharedStates by_shared = fix_by_shared_states(setup, moment.fix->fix, moment.fix->rate_c);
-      const Rot<In, C> fix = corrected(moment.fix->fix, by_shared, solution_.shared);
+      const Rot<In, C> fix = corrected(moment.fix->fix, by_shared.lazyProduct(solution_.shared));
       course.misfit.add(moment.t, (rows->C_in_c.inverse() * fix).log().raw(),
                         fix_noise(setup, moment.fix->fix).diagonal().cwiseSqrt());
     }

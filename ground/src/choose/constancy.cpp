@@ -839,27 +839,27 @@ OrbitalOdds orbital_odds(const Trial& trial) {
   const CalibrationSetup& setup = problem.setup().on_board;
   const double rate_rad_s = setup.orbital_rate_rad_s;
   const int gyros = problem.layout().gyros;
-  constexpr Index kError = 6;  // of sine and cosine about c x, y, z; so is the drift of a gyro
+  constexpr Index kOfOne = 6;  // of sine and cosine about c x, y, z; so is the drift of a gyro
+  const Index errors = kOfOne * problem.layout().star_trackers;
   TurnedByOrbitalDrift drift(rate_rad_s, setup.orbital_phase_zero);
   const auto beside = [&](const PassProblem::Moment& moment, const Layout& layout, const MatrixXd& rows) {
-    MatrixXd shapes = MatrixXd::Zero(rows.rows(), kError * (1 + gyros));
+    MatrixXd shapes = MatrixXd::Zero(rows.rows(), errors + kOfOne * gyros);
+    auto error = shapes.middleCols<kOfOne>(kOfOne * moment.fix->fix.head);
     const double phase = rate_rad_s * to_seconds(moment.t - setup.orbital_phase_zero);
     const Eigen::Quaterniond q_in_c = moment.fix->fix.q_in_c.normalized();
     drift.go_to(moment.t, q_in_c);
-    const Eigen::Matrix<double, 3, kError> turned_c = q_in_c.conjugate().toRotationMatrix() * drift.turned_in();
+    const Eigen::Matrix<double, 3, kOfOne> turned_c = q_in_c.conjugate().toRotationMatrix() * drift.turned_in();
     for (int k = 0; k < gyros; ++k) {
       const auto by_alignment = rows.middleCols<3>(layout.alignment(k));
-      if (moment.fix->fix.head == 0) {
-        shapes.leftCols<3>() += std::sin(phase) * by_alignment;
-        shapes.middleCols<3>(3) += std::cos(phase) * by_alignment;
-      }
-      shapes.middleCols<kError>(kError * (1 + k)) = by_alignment.lazyProduct(turned_c);
+      error.leftCols<3>() += std::sin(phase) * by_alignment;
+      error.rightCols<3>() += std::cos(phase) * by_alignment;
+      shapes.middleCols<kOfOne>(errors + kOfOne * k) = by_alignment.lazyProduct(turned_c);
     }
     return shapes;
   };
   const Index d = problem.layout().dynamic();
   const Index constants = problem.layout().size() - d;
-  const Index shapes = kError * (1 + gyros);
+  const Index shapes = errors + kOfOne * gyros;
   Stretch whole(d, constants, shapes);
   whole.measure(prior_rows(found.linear, shapes));
   problem.for_each_arc(found.before, beside, [&](std::size_t arc, const MatrixXd& fixes) {
@@ -874,14 +874,14 @@ OrbitalOdds orbital_odds(const Trial& trial) {
     return log_evidence_of(sigma * sigma * its.block(at, at, size, size),
                            sigma * its.col(its.cols() - 1).segment(at, size));
   };
-  const Index drifts = kError * gyros;
+  const Index drifts = kOfOne * gyros;
   const double drift_rad_s = std::abs(rate_rad_s) * error_rad;
-  const LogEvidence error = log_odds(form, 0, kError, error_rad);
+  const LogEvidence error = log_odds(form, 0, errors, error_rad);
   MatrixXd with_prior = form;
-  with_prior.diagonal().head<kError>().array() += 1 / (error_rad * error_rad);
-  const LogEvidence beside_error = log_odds(without_first(with_prior, kError), 0, drifts, drift_rad_s);
+  with_prior.diagonal().head(errors).array() += 1 / (error_rad * error_rad);
+  const LogEvidence beside_error = log_odds(without_first(with_prior, errors), 0, drifts, drift_rad_s);
   return {error,
-          log_odds(form, kError, drifts, drift_rad_s),
+          log_odds(form, errors, drifts, drift_rad_s),
           {error.by_prior_as_it_is + beside_error.value, error.by_prior_as_it_is + beside_error.by_prior_as_it_is}};
 }
 

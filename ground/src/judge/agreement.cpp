@@ -14,10 +14,10 @@
 namespace trihedron::ground {
 namespace {
 
-Agreement agreement_of(double chi_square, int degrees_of_freedom) {
+Agreement agreement_of(double chi_square, int degrees_of_freedom, double sure = 0.999) {
   Agreement result{chi_square, degrees_of_freedom, 0};
   if (degrees_of_freedom > 0) {
-    result.limit = boost::math::quantile(boost::math::chi_squared(degrees_of_freedom), 0.999);
+    result.limit = boost::math::quantile(boost::math::chi_squared(degrees_of_freedom), sure);
   }
   return result;
 }
@@ -54,6 +54,26 @@ Agreement agreement_within(const Eigen::VectorXd& difference, const Eigen::Matri
     }
   }
   return agreement_of(chi_square, known);
+}
+
+// In the axes in which the prior is 1 and the posterior λ, the estimate lies between the prior and what the data say,
+// and differs from the prior with the variance 1 − λ. A prior off by b moves it by √λ b of its sigmas.
+Agreement agreement_with_prior(const Eigen::VectorXd& difference, const Eigen::MatrixXd& prior,
+                               const Eigen::MatrixXd& posterior, double sure) {
+  constexpr double kPriorTells = 0.02;
+  constexpr double kDataTell = 0.8;
+  const Eigen::GeneralizedSelfAdjointEigenSolver<Eigen::MatrixXd> directions(posterior, prior);
+  double chi_square = 0;
+  int known = 0;
+  for (Eigen::Index i = 0; i < difference.size(); ++i) {
+    const double left = directions.eigenvalues()(i);
+    if (left > kPriorTells && left < kDataTell) {
+      const double along = directions.eigenvectors().col(i).dot(difference);
+      chi_square += along * along / (1 - left);
+      ++known;
+    }
+  }
+  return agreement_of(chi_square, known, sure);
 }
 
 std::vector<ParameterId> common_states(const Calibration& a, const Calibration& b, bool alignments) {

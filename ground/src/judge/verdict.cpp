@@ -8,6 +8,7 @@
 #include <boost/math/distributions/chi_squared.hpp>
 #include <chrono>
 #include <cmath>
+#include <iterator>
 #include <limits>
 #include <map>
 #include <numbers>
@@ -31,6 +32,7 @@
 #include "trihedron/core/telemetry.hpp"
 #include "trihedron/ground/evaluate/convergence.hpp"
 #include "trihedron/ground/evaluate/used_fixes.hpp"
+#include "trihedron/ground/judge/agreement.hpp"
 #include "trihedron/records/text.hpp"
 #include "trihedron/records/units.hpp"
 
@@ -559,7 +561,11 @@ void judge_at_orbital_period(const AtOrbitalPeriod& its, const CalibrationRun& r
     return;
   }
   const ParameterId& parameter = largest->parameter;
-  const std::string size = is_error ? fmt::format("largest component {:.1f}″", largest->value / kArcsecond)
+  const bool has_several = std::ranges::any_of(run.calibration.further, [&](const FurtherEstimate& estimate) {
+    return estimate.parameter.is_further(its.state) && estimate.parameter.owner > 0;
+  });
+  const std::string of_which = has_several ? fmt::format(", of star tracker {}", parameter.owner + 1) : std::string();
+  const std::string size = is_error ? fmt::format("largest component {:.1f}″{}", largest->value / kArcsecond, of_which)
                                     : fmt::format("largest amplitude {:.1e} rad/s, the {} about axis {} of gyro {}",
                                                   largest->value, parameter.component < 3 ? "sine" : "cosine",
                                                   "xyz"[parameter.component % 3], parameter.gyro() + 1);
@@ -661,8 +667,36 @@ std::vector<double> rms_outside_eq1(const Calibration& calibration) {
   return square;
 }
 
-/// An earlier calibration is judged elsewhere. Parameters that a prior holds too tightly pull others away with them, or
-/// leave what they should be to drift outside eq. (1), which is a small part of it where priors are right.
+/// Whether coefficients of eq. (1) and alignments are together where the prior lets them be.
+void judge_prior_as_a_whole(const Pass& pass, const CalibrationRun& run, std::vector<Finding>& findings) {
+  constexpr double kSure = 1 - 1e-6;
+  std::vector<ParameterId> states;
+  std::ranges::copy_if(run.calibration.states, std::back_inserter(states), [](const ParameterId& state) {
+    return state.is_alignment() || (state.is_drift() && state.coefficient.is_in_eq1());
+  });
+  const auto rows = rows_of(run.calibration, states);  // the prior has the same
+  const Eigen::VectorXd off = difference(run.known_before, run.calibration, states);
+  const Agreement agrees =
+      agreement_with_prior(off, run.known_before.covariance(rows, rows), run.calibration.covariance(rows, rows), kSure);
+  if (agrees.holds()) {
+    return;
+  }
+  const bool of_file = pass.settings.prior.has_value();
+  add(findings, FindingCode::kPriorContradicted,
+      of_file
+          ? "The pass contradicts the earlier calibration that it was given as prior: coefficients or alignments are "
+            "others by now, and the result lies between both."
+          : "Coefficients and alignments together are found outside what the settings say of them before the pass, "
+            "and the result is off with it.",
+      fmt::format("chi-square {:.2g} of {} degrees of freedom; all but one in a million lie below {:.3g}",
+                  agrees.chi_square, agrees.degrees_of_freedom, agrees.limit),
+      of_file ? "Calibrate without the prior: coefficients change at every start of a rotor. Where both are of one "
+                "start-up, calibrate both passes together, which tells what has moved."
+              : "Give larger prior sigmas in pass.toml, and check the means and their units.");
+}
+
+/// An earlier calibration is judged as a whole. Parameters that a prior holds too tightly pull others away with them,
+/// or leave what they should be to drift outside eq. (1), which is a small part of it where priors are right.
 void judge_prior_sigmas(const Pass& pass, const CalibrationRun& run, std::vector<Finding>& findings) {
   constexpr double kSigmas = 5;
   constexpr double kSigmasOfField = 3;
@@ -969,7 +1003,11 @@ Verdict judge(const Pass& pass, const CalibrationRun& run) {
   judge_at_orbital_period(kDriftAtOrbitalPeriod, run, findings);
   judge_polhodes(run, findings);
   judge_determination(run, findings);
+  const std::size_t before_priors = findings.size();
   judge_prior_sigmas(pass, run, findings);
+  if (findings.size() == before_priors) {
+    judge_prior_as_a_whole(pass, run, findings);
+  }
   judge_steadiness(pass, run, findings);
   judge_pair(run, findings);
   judge_star_tracker(statistics, findings);

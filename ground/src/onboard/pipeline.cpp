@@ -197,8 +197,8 @@ Eigen::Vector3d Pipeline::apart_rad(const AttitudeSolution& attitude, const Comp
     const auto& estimator = on_board.estimator();
     Rot<In, C> by_fix = Rot<In, C>::assume(its.fix.q_in_c.normalized());
     if constexpr (requires { estimator.shared(); }) {
-      by_fix =
-          corrected(its.fix, fix_by_shared_states(estimator.setup(), its.fix, its.readings.rate_c), estimator.shared());
+      const FixBySharedStates by_shared = fix_by_shared_states(estimator.setup(), its.fix, its.readings.rate_c);
+      by_fix = corrected(its.fix, by_shared.lazyProduct(estimator.shared()));
     }
     return (attitude.C_in_c.inverse() * by_fix).log().raw();
   });

@@ -54,6 +54,7 @@ CalibrationRun good_run() {
   run.calibration.gyros[1].momentum_in = {0, 1, 0};
   run.calibration.states = parameters({"gyro1.k0", "gyro1.align_x"});
   run.calibration.covariance = Eigen::Vector2d(1e-18, 1e-12).asDiagonal();
+  run.known_before.gyros = run.calibration.gyros;
   run.known_before.covariance = Eigen::Vector2d(2e-6, 8.7e-3).cwiseAbs2().asDiagonal();
   for (int i = 0; i <= 3600; ++i) {
     FixRecord& fix = run.fixes.emplace_back();
@@ -418,6 +419,29 @@ TEST(Verdict, FindsAPriorThatIsContradicted) {
   EXPECT_THAT(codes(judge(good_pass(), unknown)), Not(Contains("prior-contradicted")));
   run.known_before.gyros[0].drift_rad_s[0] += 0.2 * 2e-6;
   EXPECT_THAT(codes(judge(good_pass(), run)), IsEmpty());
+}
+
+// Half as uncertain as before: a prior that is off moves the estimate by half of its sigmas.
+TEST(Verdict, FindsAPriorThatIsContradictedAsAWhole) {
+  const auto found_off_by = [](double prior_sigmas, double left) {
+    auto run = good_run();
+    run.calibration.covariance = left * run.known_before.covariance;
+    run.calibration.gyros[0].drift_rad_s.assign(Layout::kEq1, 0);
+    run.known_before.gyros = run.calibration.gyros;
+    run.known_before.gyros[0].drift_rad_s[0] = -prior_sigmas * 2e-6;
+    run.known_before.gyros[0].alignment_rotation_vector_rad.x() = prior_sigmas * 8.7e-3;
+    return run;
+  };
+  auto pass = good_pass();
+  EXPECT_THAT(codes(judge(pass, found_off_by(3, 0.24))), IsEmpty());
+  EXPECT_THAT(codes(judge(pass, found_off_by(4, 0.01))), IsEmpty());  // the data alone tell it
+  const Verdict verdict = judge(pass, found_off_by(4, 0.24));
+  EXPECT_THAT(codes(verdict), ElementsAre("prior-contradicted"));
+  EXPECT_THAT(verdict.findings[0].evidence, HasSubstr("of 2 degrees of freedom"));
+  EXPECT_THAT(verdict.findings[0].cure, HasSubstr("larger prior sigmas"));
+  EXPECT_FALSE(verdict.trustworthy);
+  pass.settings.prior = found_off_by(4, 0.24).known_before;
+  EXPECT_THAT(judge(pass, found_off_by(4, 0.24)).findings[0].text, HasSubstr("the earlier calibration"));
 }
 
 TEST(Verdict, FindsAPriorSoTightThatDriftOutsideEq1StandsForTheCoefficients) {

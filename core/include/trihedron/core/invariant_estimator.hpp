@@ -45,6 +45,7 @@ class InvariantEstimator {
   using Information = SquareRootInformation<kMaxStates, kMaxDynamic>;
   using Vector = typename Information::Vector;
   using Rows3 = StateRows3<kMaxStates>;
+  using Shared = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, kCapacity.shared_states, 1>;
 
   /// Makes it ready. `prior`: means of drift coefficients, alignments, biases; the momenta come from the first fix.
   /// `covariance`: of κ and δ, gyro by gyro, rad/s and rad, positive definite; only its lower triangle is used. Behind
@@ -65,7 +66,7 @@ class InvariantEstimator {
   [[nodiscard]] const DriftModel& drift() const { return drift_; }
   [[nodiscard]] const Gyros& gyros() const { return gyros_; }
   /// Estimates of the shared states, in the order of the layout.
-  [[nodiscard]] const SharedStates& shared() const { return shared_; }
+  [[nodiscard]] const Shared& shared() const { return shared_; }
   /// How errors at the last fix have changed the present directions.
   [[nodiscard]] const Sensitivities& since_fix() const { return since_fix_; }
   [[nodiscard]] double time_since_fix_s() const { return time_since_fix_s_; }
@@ -274,7 +275,7 @@ class InvariantEstimator {
   DriftModel drift_;
   Gyros prior_gyros_;
   Gyros gyros_;
-  SharedStates shared_;
+  Shared shared_;
   Sensitivities since_fix_;
   Information information_;
   PackedTriangle<kMaxStates> prior_;  ///< root of the information, without anything of the directions

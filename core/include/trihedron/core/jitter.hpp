@@ -26,7 +26,9 @@ class Jitter {
     // One in which the body began to turn is no jitter.
     const float square_rad2 = std::min(static_cast<float>(seen.square_rad2), kMostSigmas * sigma_rad2);
     mean_rad2_ += part * (square_rad2 - mean_rad2_);
-    sigma_rad2_ = std::hypot((1 - part) * sigma_rad2_, part * sigma_rad2);
+    const float before = (1 - part) * sigma_rad2_;
+    const float its = part * sigma_rad2;
+    sigma_rad2_ = std::sqrt(before * before + its * its);
   }
   /// About each axis, rad²; 0 where chance may have made it.
   [[nodiscard]] float square_rad2() const { return mean_rad2_ > kSureSigmas * sigma_rad2_ ? mean_rad2_ : 0; }

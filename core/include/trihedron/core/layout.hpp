@@ -18,7 +18,7 @@ inline constexpr int kMaxStarTrackers = 4;
 enum class FurtherState : std::uint8_t {
   kClockOffset,           ///< τ of the star trackers: a fix stamped t holds the attitude at t + τ
   kClockRate,             ///< of the star trackers: τ grows by so many seconds per second
-  kOrbitalError,          ///< of the first star tracker: exp([(p_s sin nt + p_c cos nt)×]) in c
+  kOrbitalError,          ///< of each star tracker: exp([(p_s sin nt + p_c cos nt)×]) in c
   kStarTrackerAlignment,  ///< of the star trackers other than the first; always there for those of the layout
   kReadoutBias,           ///< of the direction cosines of each gyro
   kCoefficientChange,     ///< of the coefficients of eq. (1) of each gyro, by the course of the set-up
@@ -47,6 +47,7 @@ inline constexpr FurtherStates kAllFurtherStates{true, true, true, true, true, t
 /// First the states that move, then the constants gyro by gyro, then those that the gyros share.
 struct Layout {
   static constexpr int kEq1 = 7;             ///< coefficients of eq. (1), the first ones of each drift model
+  static constexpr int kOrbitalError = 6;    ///< amplitudes of the error of a star tracker at orbital period
   static constexpr int kOrbitalDrift = 6;    ///< amplitudes of the drift at orbital period
   static constexpr int kPolhode = 2 * kEq1;  ///< amplitudes of the coefficients with the polhode
 
@@ -101,12 +102,12 @@ struct Layout {
   [[nodiscard]] constexpr int clock_rate(int /*of the pass*/ = 0) const {
     return shared() + (further.clock_offset ? 1 : 0);
   }
-  [[nodiscard]] constexpr int orbital_error(int /*of the pass*/ = 0) const {
-    return clock_rate() + (further.clock_rate ? 1 : 0);
+  [[nodiscard]] constexpr int orbital_error(int head = 0) const {
+    return clock_rate() + (further.clock_rate ? 1 : 0) + kOrbitalError * head;
   }
   /// Alignment of star tracker 1, 2 …; the first, 0, has none, since its axes are c.
   [[nodiscard]] constexpr int star_tracker(int head) const {
-    return orbital_error() + (further.orbital_error ? 6 : 0) + 3 * (head - 1);
+    return orbital_error(further.orbital_error ? star_trackers : 0) + 3 * (head - 1);
   }
   [[nodiscard]] constexpr int size() const { return star_tracker(star_trackers); }
   [[nodiscard]] constexpr int constants() const { return size() - dynamic(); }
@@ -148,7 +149,7 @@ struct Layout {
 /// What the library has to know of a kind of further states.
 struct FurtherStateKind {
   /// What has a set of the components of its own.
-  enum class Owner : std::uint8_t { kPass, kGyro, kFurtherStarTracker };
+  enum class Owner : std::uint8_t { kPass, kGyro, kStarTracker, kFurtherStarTracker };
 
   FurtherState state;
   bool FurtherStates::*flag;  ///< null: not a choice
@@ -167,8 +168,8 @@ inline constexpr std::array<FurtherStateKind, kFurtherStateCount> kFurtherStateK
     // A quartz oscillator is within 20 ppm or so of its rate; with compensation of its temperature, within some ppm.
     {FurtherState::kClockRate, &FurtherStates::clock_rate, FurtherStateKind::Owner::kPass, 1, &Layout::clock_rate,
      2e-5},
-    {FurtherState::kOrbitalError, &FurtherStates::orbital_error, FurtherStateKind::Owner::kPass, 6,
-     &Layout::orbital_error, 1e-4},
+    {FurtherState::kOrbitalError, &FurtherStates::orbital_error, FurtherStateKind::Owner::kStarTracker,
+     Layout::kOrbitalError, &Layout::orbital_error, 1e-4},
     {FurtherState::kStarTrackerAlignment, nullptr, FurtherStateKind::Owner::kFurtherStarTracker, 3,
      &Layout::star_tracker, 0},
     {FurtherState::kReadoutBias, &FurtherStates::readout_bias, FurtherStateKind::Owner::kGyro, 3, &Layout::readout_bias,
@@ -197,6 +198,8 @@ constexpr auto Layout::owners(FurtherState state) const -> Owners {
   switch (kind_of(state).owner) {
     case FurtherStateKind::Owner::kGyro:
       return {0, gyros};
+    case FurtherStateKind::Owner::kStarTracker:
+      return {0, star_trackers};
     case FurtherStateKind::Owner::kFurtherStarTracker:
       return {1, star_trackers};
     case FurtherStateKind::Owner::kPass:
@@ -214,16 +217,17 @@ struct Capacity {
   int states = 0;
   int dynamic = 0;  ///< of the states, those that move
   int star_trackers = 0;
+  int shared_states = 0;         ///< of the states, those that the gyros share
   bool fix_covariances = false;  ///< each fix may come with its own; else the noise of the set-up is that of all
 
   [[nodiscard]] static constexpr Capacity of(const Layout& largest, bool fix_covariances = false) {
-    return {largest.gyros,     largest.drift_columns(), largest.size(),
-            largest.dynamic(), largest.star_trackers,   fix_covariances};
+    return {largest.gyros,         largest.drift_columns(), largest.size(), largest.dynamic(),
+            largest.star_trackers, largest.shared_size(),   fix_covariances};
   }
   [[nodiscard]] constexpr bool holds(const Layout& layout) const {
     return layout.gyros >= 2 && layout.gyros <= gyros && layout.drift_columns() <= drift_columns &&
            layout.size() <= states && layout.dynamic() <= dynamic && layout.star_trackers >= 1 &&
-           layout.star_trackers <= star_trackers;
+           layout.star_trackers <= star_trackers && layout.shared_size() <= shared_states;
   }
 };
 
@@ -243,7 +247,7 @@ inline constexpr Capacity kPassCapacity = Capacity::of({.gyros = kMaxGyros,
                                                         .further = kAllFurtherStates,
                                                         .star_trackers = kMaxStarTrackers});
 inline constexpr int kMaxDriftColumns = kPassCapacity.drift_columns;
-/// Offset and rate of the clock, error at orbital period, alignments of further star trackers.
+/// Offset and rate of the clock, errors at orbital period, alignments of further star trackers.
 inline constexpr int kMaxSharedStates = kLargestLayout.shared_size();
 /// Components of a fix: two across each momentum.
 inline constexpr int kMaxComponents = 2 * kMaxGyros;

@@ -23,8 +23,8 @@ using SharedStates = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, kMaxSharedState
 /// Covariance of a fix's noise, c axes, rad²: its own, or where it comes without one that of its star tracker.
 [[nodiscard]] Eigen::Matrix3d fix_noise(const CalibrationSetup& setup, const StarFix& fix);
 
-/// The fix with the estimate of its error taken off.
-[[nodiscard]] Rot<In, C> corrected(const StarFix& fix, const FixBySharedStates& by_shared, const SharedStates& shared);
+/// The fix with what is known of its error taken off: a rotation vector, c axes, rad.
+[[nodiscard]] Rot<In, C> corrected(const StarFix& fix, const Eigen::Vector3d& error_rad);
 
 /// One gyro's part of a comparison: the two components of y = h × h_et across h, the first along h × (h of the next
 /// gyro), and how they change with φ (in), with the fix's error and −δ (c), and with the errors of the readout.

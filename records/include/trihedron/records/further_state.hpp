@@ -57,7 +57,7 @@ inline constexpr std::array<FurtherStateRow, kFurtherStateCount> kFurtherStates 
      further_state_components::kClockOffset},
     {FurtherState::kClockRate, "clock_rate", "Clock rate", "of the star tracker, against that of the gyros",
      Unit::kSecondPerSecond, further_state_components::kClockRate},
-    {FurtherState::kOrbitalError, "orbital_error", "Error at orbital period", "of the star tracker, at orbital period",
+    {FurtherState::kOrbitalError, "orbital_error", "Error at orbital period", "of each star tracker, at orbital period",
      Unit::kRadian, further_state_components::kOrbitalError},
     {FurtherState::kStarTrackerAlignment, "", "Alignment of a further star tracker", "", Unit::kRadian,
      further_state_components::kStarTrackerAlignment},

@@ -27,6 +27,12 @@ struct Agreement {
 [[nodiscard]] Agreement agreement_within(const Eigen::VectorXd& difference, const Eigen::MatrixXd& covariance,
                                          const Eigen::MatrixXd& scale);
 
+/// Of an estimate with what was known before it, whose covariances these are, positive definite. `difference`: between
+/// them. Only in the directions in which a prior that is wrong does harm and can be seen to be so: those in which both
+/// the data and the prior tell something. `sure`: the part of agreeing ones that lie below the limit.
+[[nodiscard]] Agreement agreement_with_prior(const Eigen::VectorXd& difference, const Eigen::MatrixXd& prior,
+                                             const Eigen::MatrixXd& posterior, double sure);
+
 /// The states of a drift coefficient or alignment that both calibrations have, in the order of the first.
 [[nodiscard]] std::vector<ParameterId> common_states(const Calibration& a, const Calibration& b, bool alignments);
 
