@@ -13,6 +13,7 @@
 #include "batch/left_out_walk.hpp"
 #include "batch/pass_setup.hpp"
 #include "batch/refine.hpp"
+#include "calibrate/beside_outages.hpp"
 #include "calibrate/calibrate_after.hpp"
 #include "calibrate/contradicted_fixes.hpp"
 #include "calibrate/readout_noise.hpp"
@@ -432,6 +433,29 @@ std::vector<Measured> further_star_trackers_s(const Pass& pass, const Measured& 
 
 }  // namespace
 
+/// A pass without the fixes beside outages of the star tracker, where these are off.
+struct WithoutErrorsBesideOutages {
+  Pass pass;
+  ErrorsBesideOutages errors;
+};
+std::optional<WithoutErrorsBesideOutages> without_errors_beside_outages(const Pass& pass, CalibrationOptions options,
+                                                                        const Progress& progress) {
+  const std::optional<Pass> rest = without_fixes_beside_outages(pass);
+  if (!rest) {
+    return std::nullopt;
+  }
+  begin_stage(progress, "looks at the fixes beside outages of the star tracker");
+  options.estimator = Estimator::kBatch;
+  options.definitive_attitude = true;
+  const CalibrationRun without = calibrate_as_stamped(*rest, options, {});
+  const std::optional<ErrorsBesideOutages> errors = errors_beside_outages(pass, without);
+  if (!errors) {
+    return std::nullopt;
+  }
+  return WithoutErrorsBesideOutages{
+      without_fixes_beside_outages(pass, {.before = errors->before, .after = !errors->before}).value(), *errors};
+}
+
 CalibrationRun calibrate(const Pass& pass, const CalibrationOptions& options, const Progress& progress) {
   return calibrate_after(pass, options, progress, std::nullopt);
 }
@@ -464,8 +488,16 @@ CalibrationRun calibrate_after(const Pass& as_given, const CalibrationOptions& o
     corrected = pass;
     correct(*corrected, correction);
   }
-  const Pass& stamped = corrected ? *corrected : pass;
-  CalibrationRun run = calibrate_as_stamped(stamped, with_clock_states(options, correction), progress);
+  const CalibrationOptions asked = with_clock_states(options, correction);
+  std::optional<WithoutErrorsBesideOutages> without_errors;
+  if (finds_noise) {
+    without_errors = without_errors_beside_outages(corrected ? *corrected : pass, asked, progress);
+  }
+  const Pass& stamped = without_errors ? without_errors->pass : corrected ? *corrected : pass;
+  CalibrationRun run = calibrate_as_stamped(stamped, asked, progress);
+  if (without_errors) {
+    run.beside_outages = without_errors->errors;
+  }
   run.clocks = clocks;
   run.corrected_step = step;
   run.clock_correction = correction;

@@ -617,6 +617,23 @@ void judge_noise(const Pass& pass, const CalibrationRun& run, std::vector<Findin
   }
 }
 
+void judge_beside_outages(const std::optional<ErrorsBesideOutages>& errors, std::vector<Finding>& findings) {
+  if (!errors) {
+    return;
+  }
+  add(findings, FindingCode::kErrorsBesideOutages,
+      errors->before ? "The star tracker is off before it loses the stars; its fixes of the ten minutes before each of "
+                       "these outages were not used."
+                     : "The star tracker is off after it has found the stars again; its fixes of the ten minutes after "
+                       "each of these outages were not used.",
+      fmt::format(
+          "{} outages; {:.1f}″ in the mean of them, about the axis where it is most, {} to {} min from them, {:.0f} "
+          "sigmas",
+          errors->outages, errors->error_rad / kArcsecond, errors->minute, errors->minute + 2, errors->sigmas),
+      "Look for what lights or warms it there: the Sun or the Earth near its field of view, a new start of its filter. "
+      "What is less and lasts longer stays in the fixes that were used.");
+}
+
 void judge_readout_noise(const std::optional<ReadoutNoise>& noise, std::vector<Finding>& findings) {
   if (noise) {
     const auto text = [&](const PerGyro<double>& noise_rad) {
@@ -1002,6 +1019,7 @@ Verdict judge(const Pass& pass, const CalibrationRun& run) {
   judge_at_orbital_period(kErrorAtOrbitalPeriod, run, findings);
   judge_at_orbital_period(kDriftAtOrbitalPeriod, run, findings);
   judge_polhodes(run, findings);
+  judge_beside_outages(run.beside_outages, findings);
   judge_determination(run, findings);
   const std::size_t before_priors = findings.size();
   judge_prior_sigmas(pass, run, findings);

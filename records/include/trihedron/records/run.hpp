@@ -151,6 +151,15 @@ struct ReadoutNoise {
   }
 };
 
+/// What a star tracker is off beside its outages, by the attitude without these fixes.
+struct ErrorsBesideOutages {
+  int outages = 0;
+  bool before = false;   ///< before it loses the stars; else after it has found them again
+  int minute = 0;        ///< from an outage, where it is most
+  double error_rad = 0;  ///< there, in the mean of the outages
+  double sigmas = 0;     ///< how sure that is
+};
+
 /// Drift as a field against eq. (1) alone, by the whole pass.
 struct AgainstField {
   double log_odds = 0;                ///< ln of the odds of the field
@@ -159,13 +168,14 @@ struct AgainstField {
 
 /// A calibration of a pass, and everything that was recorded on the way.
 struct CalibrationRun {
-  CalibrationOptions options;                 ///< as decided
-  std::optional<Clocks> clocks;               ///< where the pass shows them, by its stamps as they are given
-  std::optional<ClockStep> corrected_step;    ///< taken off the stamps before all else
-  ClockCorrection clock_correction;           ///< of the stamps, made before the calibration
-  double gyro_stamps_off_s = 0;               ///< rms off the regular times that were used in their place, or 0
-  std::optional<ReadoutNoise> readout_noise;  ///< that was used in the place of that of the settings
-  std::vector<Evidence> evidence;             ///< of what was left to the program to decide
+  CalibrationOptions options;                         ///< as decided
+  std::optional<Clocks> clocks;                       ///< where the pass shows them, by its stamps as they are given
+  std::optional<ClockStep> corrected_step;            ///< taken off the stamps before all else
+  ClockCorrection clock_correction;                   ///< of the stamps, made before the calibration
+  double gyro_stamps_off_s = 0;                       ///< rms off the regular times that were used in their place, or 0
+  std::optional<ReadoutNoise> readout_noise;          ///< that was used in the place of that of the settings
+  std::optional<ErrorsBesideOutages> beside_outages;  ///< for which fixes were left out
+  std::vector<Evidence> evidence;                     ///< of what was left to the program to decide
   /// Where an error of the star tracker at orbital period was accepted: ln of its odds against drift at that period.
   std::optional<double> orbital_error_over_drift;
   std::vector<DriftModelForecast> drift_models;  ///< that were compared, smallest first
