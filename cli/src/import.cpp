@@ -265,7 +265,7 @@ void add_import(CLI::App& program, const Common& common, int& exit_status) {
       "# Columns of others' CSV or NetCDF files, by a map of them: docs/telemetry.md\n"
       "trihedron import examples/telemetry/telemetry.toml -o pass.nc\n"
       "# A part of it, without manoeuvres\n"
-      "trihedron import telemetry.toml -o pass.nc --from 2009-05-20T00:10:00 --exclude slews.csv\n"
+      "trihedron import telemetry.toml -o pass.nc --from 2009-05-20T00:10:00 --exclude left-out.csv\n"
       "trihedron import attitude.aem -o attitude.csv --pass pass.nc\n"
       "# A calibration that export wrote, with its covariance file beside it\n"
       "trihedron import calibration.acm -o calibration.json\n"

@@ -88,8 +88,10 @@ int run(int argc, char** argv) {
     } catch (const CLI::ParseError& error) {
       if (error.get_exit_code() != 0) {
         const std::string better = cli::meant(program, {argv, static_cast<std::size_t>(argc)});
+        const auto commands = program.get_subcommands();
         return fail(cli::kWrongUsage,
-                    fmt::format("{}; see trihedron --help", better.empty() ? std::string(error.what()) : better));
+                    fmt::format("{}; see trihedron {}--help", better.empty() ? std::string(error.what()) : better,
+                                commands.empty() ? std::string() : commands.front()->get_name() + " "));
       }
       program.exit(error);  // --version, --print-config
       exit_status = cli::kTrustworthy;

@@ -554,7 +554,13 @@ void judge_at_orbital_period(const AtOrbitalPeriod& its, const CalibrationRun& r
   if (over_other && !is_error) {
     over_other = -*over_other;
   }
-  const bool may_be_other = over_other && *over_other < kSureLogOdds;
+  // Drift that is taken in place of an error of the star tracker, but of which nothing is seen for itself, is told
+  // apart by so little that a few outliers may do it.
+  const bool is_unseen =
+      !is_error && !run.options.further_states.is_on(FurtherState::kOrbitalError) &&
+      largest_of(run, its.state, 0) != nullptr && largest_of(run, its.state, kSigmasToReport) == nullptr &&
+      std::ranges::any_of(run.evidence, [&](const Evidence& of) { return of.state == its.state && of.accepted; });
+  const bool may_be_other = (over_other && *over_other < kSureLogOdds) || is_unseen;
   // What may be the other is told however small it is: where it is the other, its sigmas mean nothing.
   const FurtherEstimate* const largest = largest_of(run, its.state, may_be_other ? 0 : kSigmasToReport);
   if (largest == nullptr) {

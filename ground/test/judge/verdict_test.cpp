@@ -174,7 +174,13 @@ TEST(Verdict, ForbidsDriftAtOrbitalPeriodThatMayBeAnErrorOfTheStarTracker) {
   const ParameterId amplitude = ParameterId::further(FurtherState::kOrbitalDrift, 1, 4);
   run.calibration.further = {{amplitude, 1e-9, 1e-9}};
   EXPECT_THAT(codes(judge(good_pass(), run)), IsEmpty());
-  run.orbital_error_over_drift = -3;  // what may be the other is told however small it is
+  auto unseen = run;  // decided for, with none of it seen for itself
+  unseen.evidence = {{FurtherState::kOrbitalDrift, 23, true}};
+  EXPECT_THAT(codes(judge(good_pass(), unseen)), ElementsAre("orbital-drift-found"));
+  EXPECT_FALSE(judge(good_pass(), unseen).trustworthy);
+  unseen.options.further_states[FurtherState::kOrbitalError] = FurtherStateOptions::Choice::kOn;
+  EXPECT_THAT(codes(judge(good_pass(), unseen)), IsEmpty());  // beside an error, not in place of it
+  run.orbital_error_over_drift = -3;                          // what may be the other is told however small it is
   EXPECT_THAT(codes(judge(good_pass(), run)), ElementsAre("orbital-drift-found"));
   EXPECT_FALSE(judge(good_pass(), run).trustworthy);
   run.orbital_error_over_drift.reset();
