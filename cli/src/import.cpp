@@ -165,19 +165,22 @@ void import_attitude(const ImportArguments& arguments, const Common& common, con
   const std::optional<Time> told = epoch_of(arguments.epoch).epoch;
   const Time epoch = told.value_or(message.epoch.value_or(message.attitude.t.front()));
   put_imported(arguments, io::format_attitude(epoch, message.attitude, io::AttitudeDigits::kAll, message.rate_rad_s));
-  show_interchange(beside(arguments.output, common), {arguments.file,
-                                                      message.format,
-                                                      {arguments.output},
-                                                      "attitude file",
-                                                      message.attitude.size(),
-                                                      message.segments,
-                                                      message.left_out,
-                                                      epoch,
-                                                      message.time_system,
-                                                      message.inertial_frame,
-                                                      message.body_frame,
-                                                      message.object_name,
-                                                      message.object_id});
+  show_interchange(beside(arguments.output, common),
+                   {arguments.file,
+                    message.format,
+                    {arguments.output},
+                    told || message.epoch ? "attitude file"
+                                          : "attitude file, whose t_s counts from its first attitude; "
+                                            "--pass or --epoch make it count from another time",
+                    message.attitude.size(),
+                    message.segments,
+                    message.left_out,
+                    epoch,
+                    message.time_system,
+                    message.inertial_frame,
+                    message.body_frame,
+                    message.object_name,
+                    message.object_id});
 }
 
 void import_calibration(const ImportArguments& arguments, const Common& common, const io::CalibrationMessage& message) {

@@ -274,6 +274,9 @@ std::string calibration_text(const CalibrationRun& run, const Eigen::VectorXd& e
   for (const NamedCount& its : named_counts(run.fix_counts)) {
     fmt::format_to(out, " {} {};", its.count, its.name);
   }
+  if (run.beside_outages) {
+    fmt::format_to(out, " {} beside outages, not used;", run.beside_outages->fixes);
+  }
   text.back() = '\n';
   text += "Samples    ";
   for (const NamedCount& its : named_counts(run.samples)) {

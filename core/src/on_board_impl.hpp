@@ -446,7 +446,7 @@ void OnBoard<Estimator>::prepare(Time t, const FittedReadings& readings, typenam
   work_ = {};
   work_.stage = stage;
   work_.t = t;
-  jitter_.add(readings.unfollowed);
+  jitter_.add(t, reach(), readings.unfollowed);
   work_.its.readings = with_jitter(readings);
 }
 

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <chrono>
 #include <cmath>
 #include <limits>
 #include <random>
@@ -14,9 +15,18 @@ namespace trihedron {
 namespace {
 
 constexpr UnfollowedMotion kNothing{0, 1e-10};
+constexpr Duration kReach = std::chrono::milliseconds(1400);
+
+/// One after another, of a fix each three seconds.
+struct OverTime {
+  Jitter jitter;
+  int fixes = 0;
+  void add(const UnfollowedMotion& seen) { jitter.add(Time(3 * ++fixes * std::chrono::seconds(1)), kReach, seen); }
+  [[nodiscard]] float square_rad2() const { return jitter.square_rad2(); }
+};
 
 TEST(Jitter, IsNoneWhereNothingIsKnown) {
-  Jitter jitter;
+  OverTime jitter;
   EXPECT_EQ(jitter.square_rad2(), 0);
   jitter.add({});
   jitter.add({1, std::numeric_limits<double>::quiet_NaN()});
@@ -26,7 +36,7 @@ TEST(Jitter, IsNoneWhereNothingIsKnown) {
 TEST(Jitter, IsNoneByChance) {
   std::mt19937 random(2);
   std::normal_distribution<double> normal;
-  Jitter jitter;
+  OverTime jitter;
   int told = 0;
   for (int i = 0; i < 10000; ++i) {
     jitter.add({1e-10 * normal(random), 1e-10});
@@ -36,7 +46,7 @@ TEST(Jitter, IsNoneByChance) {
 }
 
 TEST(Jitter, IsTheMeanOfTheLatest) {
-  Jitter jitter;
+  OverTime jitter;
   for (int i = 0; i < 40; ++i) {
     jitter.add({2e-10, 1e-10});
   }
@@ -52,12 +62,24 @@ TEST(Jitter, IsTheMeanOfTheLatest) {
 }
 
 TEST(Jitter, IsNotWhereTheBodyOnceBeginsToTurn) {
-  Jitter jitter;
+  OverTime jitter;
   for (int i = 0; i < 200; ++i) {
     jitter.add(kNothing);
   }
   jitter.add({1, 1e-10});
   EXPECT_EQ(jitter.square_rad2(), 0);
+}
+
+TEST(Jitter, OfPolynomialsThatShareSamplesIsThatOfOne) {
+  Jitter jitter;
+  for (int i = 0; i < 10; ++i) {
+    jitter.add(Time(i * std::chrono::milliseconds(200)), kReach, {2e-10, 1e-10});
+  }
+  EXPECT_EQ(jitter.square_rad2(), 0);  // two sigmas
+  for (int i = 0; i < 10; ++i) {
+    jitter.add(Time(i * std::chrono::milliseconds(2800)), kReach, {2e-10, 1e-10});
+  }
+  EXPECT_GT(jitter.square_rad2(), 0);
 }
 
 /// Cubics through 23 samples of a body that turns, by momenta 60° apart and readouts of different noise.

@@ -265,6 +265,9 @@ json verdict_values(const ReportInput& input, const std::vector<Parameter>& para
     }
   }
   json rejected = rejected_of(named_counts(input.run.fix_counts), "fix", "fixes");
+  if (input.run.beside_outages) {
+    rejected.push_back(counted(input.run.beside_outages->fixes, "fix", "fixes") + " beside outages, not used");
+  }
   for (json& line : rejected_of(named_counts(input.run.samples), "gyro sample", "gyro samples")) {
     rejected.push_back(std::move(line));
   }

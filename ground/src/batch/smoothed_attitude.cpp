@@ -21,7 +21,7 @@ using Eigen::Vector3d;
 constexpr std::array<Duration, SmoothReadings::kReaches> kHalfWidths = {
     std::chrono::milliseconds(700), std::chrono::milliseconds(1400), std::chrono::milliseconds(3000)};
 
-constexpr int kDegree = 3;
+constexpr int kPolynomialDegree = 3;
 
 /// Over so long to both sides of a time fixes are averaged, some tens of them.
 constexpr Duration kMisfitReach = std::chrono::minutes(1);
@@ -142,7 +142,7 @@ std::optional<UnfollowedMotion> SmoothReadings::off_the_readings(Time t, const G
 }
 
 std::optional<SmoothReadings::Fit> SmoothReadings::fit(Time t, const GyroMask& used, int reach) const {
-  constexpr int kLeast = DirectionsFit::least_samples(kDegree);
+  constexpr int kLeast = DirectionsFit::least_samples(kPolynomialDegree);
   const Duration half = kHalfWidths[static_cast<std::size_t>(reach)];
   const std::size_t first = samples_.from(t - half);
   const std::size_t end = samples_.from(t + half + Duration{1});
@@ -167,7 +167,7 @@ std::optional<SmoothReadings::Fit> SmoothReadings::fit(Time t, const GyroMask& u
   const auto [one, other] = first_two(found.used);
   const Eigen::Matrix3d C = C_c_b_[one].transpose() * C_c_b_[other];
   const auto cosine = [&, i = one, j = other](const Directions& h_b) { return h_b[i].dot(C * h_b[j]); };
-  DirectionsFit fit(t, samples_.t(first), samples_.t(end - 1), size, kDegree, gyros_);
+  DirectionsFit fit(t, samples_.t(first), samples_.t(end - 1), size, kPolynomialDegree, gyros_);
   for (std::size_t i = first; i < end; ++i) {
     const Directions h_b = samples_.h_b(i);
     fit.add(samples_.t(i), h_b, cosine(h_b));

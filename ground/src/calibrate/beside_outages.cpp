@@ -156,7 +156,11 @@ std::optional<ErrorsBesideOutages> errors_beside_outages(const Pass& pass, const
         }
         const double sigmas = its.sigma_rad > 0 ? std::abs(its.off_rad) / its.sigma_rad : 0;
         if (sigmas > std::max(kLeastSigmas, found.sigmas) && std::abs(its.off_rad) > kOneSided * on_other_side) {
-          found = {static_cast<int>(outages.size()), before, kBinMinutes * static_cast<int>(n), std::abs(its.off_rad),
+          found = {static_cast<int>(outages.size()),
+                   0,
+                   before,
+                   kBinMinutes * static_cast<int>(n),
+                   std::abs(its.off_rad),
                    sigmas};
         }
       }

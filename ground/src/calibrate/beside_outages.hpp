@@ -20,7 +20,8 @@ struct BesideOutages {
 
 /// What these fixes are off the definitive attitude of `run`, a calibration without them: of all outages alike, more
 /// than chance and the uncertainty of the attitude make of it, and on one side far more than on the other. Drift
-/// that the gyros have and their model has not would take the attitude away from both sides of an outage.
+/// that the gyros have and their model has not would take the attitude away from both sides of an outage. How many are
+/// to be left out is not counted.
 [[nodiscard]] std::optional<ErrorsBesideOutages> errors_beside_outages(const Pass& pass, const CalibrationRun& run);
 
 }  // namespace trihedron::ground

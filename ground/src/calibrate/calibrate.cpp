@@ -448,12 +448,13 @@ std::optional<WithoutErrorsBesideOutages> without_errors_beside_outages(const Pa
   options.estimator = Estimator::kBatch;
   options.definitive_attitude = true;
   const CalibrationRun without = calibrate_as_stamped(*rest, options, {});
-  const std::optional<ErrorsBesideOutages> errors = errors_beside_outages(pass, without);
+  std::optional<ErrorsBesideOutages> errors = errors_beside_outages(pass, without);
   if (!errors) {
     return std::nullopt;
   }
-  return WithoutErrorsBesideOutages{
-      without_fixes_beside_outages(pass, {.before = errors->before, .after = !errors->before}).value(), *errors};
+  Pass used = without_fixes_beside_outages(pass, {.before = errors->before, .after = !errors->before}).value();
+  errors->fixes = std::ssize(pass.star_tracker.t) - std::ssize(used.star_tracker.t);
+  return WithoutErrorsBesideOutages{std::move(used), *errors};
 }
 
 CalibrationRun calibrate(const Pass& pass, const CalibrationOptions& options, const Progress& progress) {

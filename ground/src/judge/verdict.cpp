@@ -632,10 +632,11 @@ void judge_beside_outages(const std::optional<ErrorsBesideOutages>& errors, std:
                        "these outages were not used."
                      : "The star tracker is off after it has found the stars again; its fixes of the ten minutes after "
                        "each of these outages were not used.",
-      fmt::format(
-          "{} outages; {:.1f}″ in the mean of them, about the axis where it is most, {} to {} min from them, {:.0f} "
-          "sigmas",
-          errors->outages, errors->error_rad / kArcsecond, errors->minute, errors->minute + 2, errors->sigmas),
+      fmt::format("{} fixes beside {} outages; off by {:.1f}″ in the mean of these, about the axis where it is most, "
+                  "{} to {} min "
+                  "from them, {:.0f} sigmas",
+                  errors->fixes, errors->outages, errors->error_rad / kArcsecond, errors->minute, errors->minute + 2,
+                  errors->sigmas),
       "Look for what lights or warms it there: the Sun or the Earth near its field of view, a new start of its filter. "
       "What is less and lasts longer stays in the fixes that were used.");
 }

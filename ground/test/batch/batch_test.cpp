@@ -109,7 +109,7 @@ TEST(Batch, TakesThreeGyrosTwoStarTrackersAndFurtherStates) {
     options.further_states[state] = FurtherStateOptions::Choice::kOn;
   }
   run = calibrate(simulated.pass, options);
-  ASSERT_EQ(run.calibration.further.size(), 1 + 6 + 3 + 6U);
+  ASSERT_EQ(run.calibration.further.size(), 1 + 2 * 6 + 3 + 6U);
   EXPECT_LT(nees_of(simulated.truth, run.calibration), 45);
   for (const FurtherEstimate& estimate : run.calibration.further) {
     const bool head = estimate.parameter.is_further(FurtherState::kStarTrackerAlignment);

@@ -57,6 +57,7 @@ TEST(BesideOutages, AreLeftOutWhereTheStarTrackerIsOff) {
     ASSERT_TRUE(run.beside_outages.has_value()) << before;
     EXPECT_EQ(run.beside_outages->before, before);
     EXPECT_EQ(run.beside_outages->outages, kOutages);
+    EXPECT_NEAR(static_cast<double>(run.beside_outages->fixes), kOutages * 200, 5);
     EXPECT_EQ(run.beside_outages->minute, 0);
     EXPECT_NEAR(run.beside_outages->error_rad, 8 * kArcsecond, 2 * kArcsecond);
     EXPECT_TRUE(has(run, FindingCode::kErrorsBesideOutages));

@@ -194,7 +194,7 @@ double truth_of(const ParameterId& parameter, const Truth& truth) {
     case FurtherState::kClockOffset:
       return kClockOffset_s;
     case FurtherState::kOrbitalError:
-      return parameter.component < 3 ? kOrbitalSine(parameter.component) : 0;
+      return parameter.owner == 0 && parameter.component < 3 ? kOrbitalSine(parameter.component) : 0;
     case FurtherState::kStarTrackerAlignment:
       return kHeadMisalignment(parameter.component);
     case FurtherState::kReadoutBias:
@@ -220,7 +220,8 @@ double truth_of(const ParameterId& parameter, const Truth& truth) {
 }
 
 std::size_t further_components(const Spacecraft& its) {
-  return (its.further.clock_offset ? 1U : 0U) + (its.further.orbital_error ? 6U : 0U) +
+  return (its.further.clock_offset ? 1U : 0U) +
+         (its.further.orbital_error ? 6U * static_cast<std::size_t>(its.star_trackers) : 0U) +
          3U * static_cast<std::size_t>(its.star_trackers - 1) +
          static_cast<std::size_t>(its.gyros) *
              ((its.further.readout_bias ? 3U : 0U) + (its.further.coefficient_change ? 7U : 0U) +

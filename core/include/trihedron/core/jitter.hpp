@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "trihedron/core/time.hpp"
+
 namespace trihedron {
 
 /// Of one polynomial: mean square, about each axis, of the motion that it does not follow, less what noise makes of
@@ -16,10 +18,13 @@ struct UnfollowedMotion {
 /// The same in the mean of the latest polynomials, each counting for one percent.
 class Jitter {
  public:
-  void add(const UnfollowedMotion& seen) {
-    if (!(seen.sigma_rad2 > 0)) {
+  /// Of the polynomial about time t, over samples so far to both sides of it; those that share samples with the last
+  /// one say nothing more.
+  void add(Time t, Duration reach, const UnfollowedMotion& seen) {
+    if (!(seen.sigma_rad2 > 0) || (count_ > 0 && t > latest_t_ && t - latest_t_ < 2 * reach)) {
       return;
     }
+    latest_t_ = t;
     count_ = std::min(count_ + 1, kMemory);
     const float part = 1 / static_cast<float>(count_);
     const auto sigma_rad2 = static_cast<float>(seen.sigma_rad2);
@@ -38,6 +43,7 @@ class Jitter {
   static constexpr float kMostSigmas = 4;
   static constexpr float kSureSigmas = 3;
 
+  Time latest_t_{};
   float mean_rad2_ = 0;
   float sigma_rad2_ = 0;  ///< of the mean
   int count_ = 0;

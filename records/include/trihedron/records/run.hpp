@@ -154,6 +154,7 @@ struct ReadoutNoise {
 /// What a star tracker is off beside its outages, by the attitude without these fixes.
 struct ErrorsBesideOutages {
   int outages = 0;
+  long fixes = 0;        ///< left out for it
   bool before = false;   ///< before it loses the stars; else after it has found them again
   int minute = 0;        ///< from an outage, where it is most
   double error_rad = 0;  ///< there, in the mean of the outages
