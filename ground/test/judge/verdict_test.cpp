@@ -54,6 +54,9 @@ CalibrationRun good_run() {
   run.calibration.gyros[1].momentum_in = {0, 1, 0};
   run.calibration.states = parameters({"gyro1.k0", "gyro1.align_x"});
   run.calibration.covariance = Eigen::Vector2d(1e-18, 1e-12).asDiagonal();
+  for (GyroCalibration& gyro : run.calibration.gyros) {
+    gyro.drift_rad_s.assign(Layout::kEq1, 0);
+  }
   run.known_before.gyros = run.calibration.gyros;
   run.known_before.covariance = Eigen::Vector2d(2e-6, 8.7e-3).cwiseAbs2().asDiagonal();
   for (int i = 0; i <= 3600; ++i) {

@@ -204,7 +204,8 @@ class OnBoard {
     return readings_.at(t, estimator_.setup(), intake_.health(), estimator_.gyros());
   }
   /// Readings by a polynomial, with what the latest of them have not followed.
-  [[nodiscard]] FixReadings with_jitter(FixReadings readings) const {
+  [[nodiscard]] FixReadings with_jitter(const FixReadings& fitted) const {
+    FixReadings readings = fitted;
     readings.jitter_rad2 = readings.noise_factor < 1 ? jitter_.square_rad2() : 0;
     return readings;
   }
