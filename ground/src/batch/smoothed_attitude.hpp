@@ -30,8 +30,9 @@ class SmoothReadings {
   /// By the longest polynomial that fits, and where the readings bend agrees with those over shorter times. Returns
   /// `otherwise` where none fits; only the gyros that it uses are fitted.
   [[nodiscard]] At at(Time t, const At& otherwise) const;
-  /// What at() is off the polynomial over the shortest time. Nothing where it is that one, or none.
-  [[nodiscard]] std::optional<UnfollowedMotion> off_the_shortest(Time t, const At& at) const;
+  /// What one by a longer polynomial, as of at(), is off that over the shortest time. Nothing where it is that one, or
+  /// none.
+  [[nodiscard]] std::optional<UnfollowedMotion> off_the_shortest(Time t, const At& longer) const;
   /// What the readings are off that one. Nothing where there is none.
   [[nodiscard]] std::optional<UnfollowedMotion> off_the_readings(Time t, const GyroMask& used) const;
 

@@ -431,8 +431,6 @@ std::vector<Measured> further_star_trackers_s(const Pass& pass, const Measured& 
   return apart_s;
 }
 
-}  // namespace
-
 /// A pass without the fixes beside outages of the star tracker, where these are off.
 struct WithoutErrorsBesideOutages {
   Pass pass;
@@ -456,6 +454,8 @@ std::optional<WithoutErrorsBesideOutages> without_errors_beside_outages(const Pa
   errors->fixes = std::ssize(pass.star_tracker.t) - std::ssize(used.star_tracker.t);
   return WithoutErrorsBesideOutages{std::move(used), *errors};
 }
+
+}  // namespace
 
 CalibrationRun calibrate(const Pass& pass, const CalibrationOptions& options, const Progress& progress) {
   return calibrate_after(pass, options, progress, std::nullopt);
