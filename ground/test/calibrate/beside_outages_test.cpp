@@ -71,6 +71,14 @@ TEST(BesideOutages, AreUsedWhereItIsNot) {
   EXPECT_EQ(run.fixes.size(), undisturbed().pass.star_tracker.size());
 }
 
+TEST(BesideOutages, AreUsedWhereTheBatchRefusesThePass) {
+  Pass pass = undisturbed().pass;
+  for (std::size_t i = pass.gyro.t.size() / 2; i < pass.gyro.t.size(); ++i) {
+    pass.gyro.t[i] -= std::chrono::minutes(10);
+  }
+  EXPECT_FALSE(calibrate(pass, {}).beside_outages.has_value());
+}
+
 TEST(BesideOutages, AreThoseUpToTenMinutesFromThem) {
   const Pass& pass = undisturbed().pass;
   const auto left = [&](BesideOutages sides) {

@@ -51,7 +51,7 @@ double square_of_attitude(const CalibrationRun& run, const Truth& truth) {
   return sum / (3 * static_cast<double>(errors.t.size() - late));
 }
 
-// Two arcseconds at up to 2 Hz, of which the readings around a fix show about half beyond the polynomial through them.
+// Faster than the polynomials through the readings around a fix follow.
 TEST(Calibrate, KnowsHowFarTheAttitudeOfABodyThatShakesIsOff) {
   Scenario scenario;
   scenario.duration = std::chrono::hours(1);
@@ -618,7 +618,7 @@ TEST(Calibrate, DecidesByItselfForClockOffsetAndErrorAtOrbitalPeriod) {
   EXPECT_GT(run.orbital_error_over_drift.value(), 5);
 }
 
-// By one error for both heads, or for the first alone, the attitude was off by four of its sigmas, and trusted.
+// With a state for the first head alone the error of the second one goes into the attitude, which is then trusted.
 TEST(Calibrate, FindsTheErrorAtOrbitalPeriodOfEachStarTracker) {
   Scenario scenario = scenario_in_eq1(6, std::chrono::hours(4));
   StarTrackerScenario& second = scenario.further_star_trackers.emplace_back(scenario.star_tracker);
