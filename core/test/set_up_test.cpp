@@ -42,6 +42,8 @@ TEST(SetUp, RefusesLayoutsForWhichThereIsNoRoom) {
     EXPECT_EQ(test::PaperGiven(layout).fault(), SetupFault::kTooLarge);
     EXPECT_EQ(FullGiven(layout).fault(), std::nullopt);
   }
+  // No more of anything but of what the gyros share.
+  EXPECT_EQ(PairGiven(Layout{.further = {.clock_offset = true}, .direction_size = 2}).fault(), SetupFault::kTooLarge);
   const auto with = [](auto&& change) { return fault_after([&](FullGiven& given) { change(given.setup.layout); }); };
   EXPECT_EQ(with([](Layout& layout) { layout.gyros = 1; }), SetupFault::kTooLarge);
   EXPECT_EQ(with([](Layout& layout) { layout.gyros = 5; }), SetupFault::kTooLarge);

@@ -45,7 +45,9 @@ class InvariantEstimator {
   using Information = SquareRootInformation<kMaxStates, kMaxDynamic>;
   using Vector = typename Information::Vector;
   using Rows3 = StateRows3<kMaxStates>;
-  using Shared = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, kCapacity.shared_states, 1>;
+  // Where there is room for none the size is fixed: Eigen's vector of a size up to none has no column either.
+  using Shared =
+      Eigen::Matrix<double, kCapacity.shared_states == 0 ? 0 : Eigen::Dynamic, 1, 0, kCapacity.shared_states, 1>;
 
   /// Makes it ready. `prior`: means of drift coefficients, alignments, biases; the momenta come from the first fix.
   /// `covariance`: of κ and δ, gyro by gyro, rad/s and rad, positive definite; only its lower triangle is used. Behind
