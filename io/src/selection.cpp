@@ -90,6 +90,12 @@ void select(UnscreenedPass& raw, const fs::path& path, std::vector<Defect>& defe
   for (Series& fixes : raw.star_trackers) {
     apply(fixes, &LeftOut::star_trackers);
   }
+  // What was found before counts from the epoch of the whole, what screening finds from that of the part.
+  for (Defect& defect : defects) {
+    for (Place& place : defect.first) {
+      place.t_s -= begin_s;
+    }
+  }
   settings.epoch = begin;
   settings.duration = end - begin;
 }

@@ -19,7 +19,8 @@ void add_place(Defect& defect, const Series& series, std::size_t row);
 void leave_out(Series& series, const std::function<bool(std::size_t)>& is_left_out, Defect::Kind kind,
                std::vector<Defect>& defects);
 
-/// Cuts the pass to the range of `raw.selection`, and leaves out what lies in its intervals. Throws InputRefused where
+/// Cuts the pass to the range of `raw.selection`, and leaves out what lies in its intervals. Times of places in
+/// `defects`, which count from the epoch of the pass, count from that of the part afterwards. Throws InputRefused where
 /// less than a minute of the pass lies in that range.
 void select(UnscreenedPass& raw, const std::filesystem::path& path, std::vector<Defect>& defects);
 

@@ -303,6 +303,21 @@ of = "star-trackers"
   EXPECT_EQ(foreign.load().pass.settings.duration, loaded.pass.settings.duration);
 }
 
+TEST(Telemetry, PlacesOfDefectsCountFromTheEpochOfThePart) {
+  Foreign foreign;
+  const std::size_t row = foreign.gyros.find("1242777576.000;");  // 10 s after the epoch
+  foreign.gyros.replace(foreign.gyros.find(";1;", row), 3, ";2;");
+  Selection selection;
+  selection.from = sample_calibration().epoch + std::chrono::seconds(6);
+  const LoadedPass loaded = foreign.load(selection);
+  // The first is found before the pass is cut, the second after it.
+  EXPECT_EQ(only(loaded.defects, Kind::kFlagged).first.front().t_s, 4);
+  EXPECT_EQ(only(loaded.defects, Kind::kMissingValue).first.front().t_s, 4);
+  const auto outside = std::ranges::find(loaded.defects, Kind::kOutsideRange, &Defect::kind);
+  ASSERT_NE(outside, loaded.defects.end());
+  EXPECT_EQ(outside->first.front().t_s, -6);
+}
+
 TEST(Telemetry, APartOfAnyPassIsAPass) {
   const TemporaryDirectory directory;
   clean_pass().save_directory(directory / "pass");
@@ -550,14 +565,15 @@ TEST_P(RefusedTables, NameThePlace) {
 
 INSTANTIATE_TEST_SUITE_P(
     Text, RefusedTables,
-    testing::Values(SpoiltText{true, "\n1242777567.000;", "\n1242777567,000;",
+    testing::Values(
+        SpoiltText{true, "\n1242777567.000;", "\n1242777567,000;",
                                "gyros.txt:6:1: \"1242777567,000\" of column \"Time UTC\" is not a number"},
                     SpoiltText{true, ";32768;", ";0x8000;", "of column \"A3\" is not a number"},
-                    SpoiltText{true, ";A2;", ";A1;", "gyros.txt:2:13: column \"A1\" is there twice"},
-                    SpoiltText{true, ";1;", ";1;7;", "gyros.txt:4:1: the line has 9 fields, the header 8"},
-                    SpoiltText{false, "23:59:29Z", "23:59:79Z", "stars.csv:3:2: column \"utc\": "},
-                    SpoiltText{false, "23:59:29Z", "23:59:29+03", "stars.csv:3:2: column \"utc\": "},
-                    SpoiltText{false, "utc,s,", "utc,scalar,", "stars.csv:1: lacks column \"s\""}));
+        SpoiltText{true, ";A2;", ";A1;", "gyros.txt:2:13: column \"A1\" is there twice"},
+        SpoiltText{true, ";1;", ";1;7;", "gyros.txt:4:1: the line has 9 fields, the header 8"},
+        SpoiltText{false, "23:59:29Z", "23:59:79Z", "stars.csv:3:2: column \"utc\": "},
+        SpoiltText{false, "23:59:29Z", "23:59:29+03", "stars.csv:3:2: column \"utc\": "},
+        SpoiltText{false, "utc,s,", "utc,scalar,", "stars.csv:1: lacks column \"s\""}));
 
 TEST(Telemetry, WithoutAnySigmaOrNoiseIsRefused) {
   Foreign foreign;

@@ -22,7 +22,7 @@ namespace trihedron::io {
 struct Place {
   std::int64_t line = 0;    ///< of the CSV file, from 1; 0 in a NetCDF file
   std::int64_t sample = 0;  ///< of the table, from 0, as the file has it
-  double t_s = 0;           ///< as the file has it; NaN where it has none
+  double t_s = 0;           ///< since the epoch of the pass, before it where a part is used; NaN where there is none
   std::int64_t packet = 0;  ///< number of a space packet, from 1; 0 in other files
   std::int64_t octet = 0;   ///< of the file, where it begins
 };
