@@ -1,4 +1,5 @@
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <Eigen/Core>
 #include <algorithm>
@@ -62,6 +63,7 @@ class Wanted {
 struct Flag {
   std::optional<std::size_t> place;
   std::vector<double> good;
+  std::string column{};
 
   [[nodiscard]] bool is_good(const ForeignTable& table, std::size_t row) const {
     return !place || std::ranges::find(good, table.numbers[*place][row]) != good.end();
@@ -69,7 +71,31 @@ struct Flag {
 };
 
 Flag flag_of(const FlagMap& map, Wanted& wanted) {
-  return {map.column.empty() ? std::nullopt : std::optional(wanted.place(map.column)), map.good};
+  return {map.column.empty() ? std::nullopt : std::optional(wanted.place(map.column)), map.good, map.column};
+}
+
+/// Throws InputRefused where not one row is good, as where `good` has the values that are bad. `whose`: for people.
+void expect_any_good(const Flag& flag, const ForeignTable& table, std::string_view whose, const fs::path& file) {
+  constexpr std::size_t kShown = 5;
+  std::vector<double> values;
+  for (std::size_t row = 0; row < table.rows(); ++row) {
+    if (flag.is_good(table, row)) {
+      return;
+    }
+    const double value = table.numbers[*flag.place][row];
+    if (std::isfinite(value) && values.size() < kShown && std::ranges::find(values, value) == values.end()) {
+      values.push_back(value);
+    }
+  }
+  if (table.rows() == 0) {
+    return;  // is refused for that
+  }
+  throw InputRefused(file, {},
+                     fmt::format("flag \"{}\" of {} is in no row of {} a value of good = [{}]", flag.column, whose,
+                                 table.name, fmt::join(flag.good, ", ")),
+                     values.empty()
+                         ? "name the column of the flag: this one has no numbers"
+                         : fmt::format("give the values that are good: there are {}", fmt::join(values, ", ")));
 }
 
 ForeignTable read_table(const TableMap& map, const fs::path& directory, const Wanted& wanted,
@@ -451,6 +477,10 @@ UnscreenedPass read_raw_telemetry(const fs::path& file, const ReadColumns& other
     }
     heads.push_back(read_star_tracker(head, C_c_s, read));
   }
+  for (std::size_t k = 0; k < gyros.gyros.size(); ++k) {
+    expect_any_good(gyros.gyros[k].flag, gyros.table, fmt::format("gyro {}", k + 1), file);
+  }
+  expect_any_good(heads.front().flag, heads.front().table, "the star tracker", file);
   raw.columns = columns_read(map);
   measure(raw.settings, gyros, heads.front(), file);
   raw.gyro = gyro_series(gyros, raw.settings.epoch, raw.left_out);

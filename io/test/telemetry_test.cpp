@@ -575,6 +575,23 @@ INSTANTIATE_TEST_SUITE_P(
         SpoiltText{false, "23:59:29Z", "23:59:29+03", "stars.csv:3:2: column \"utc\": "},
         SpoiltText{false, "utc,s,", "utc,scalar,", "stars.csv:1: lacks column \"s\""}));
 
+TEST(Telemetry, FlagsThatAreNeverGoodAreRefusedWithTheValuesThatAreThere) {
+  Foreign foreign;
+  foreign.toml = replaced(foreign.toml, "good = [1, 3]", "good = [0, 3]");
+  EXPECT_NE(refusal([&] { static_cast<void>(foreign.load()); })
+                .find("telemetry.toml: flag \"OK\" of gyro 1 is in no row of gyros.txt a value of good = [0, 3]; give "
+                      "the values that are good: there are 1"),
+            std::string::npos);
+  foreign.toml = replaced(foreign.toml, "good = [0, 3]", "good = [1]");
+  foreign.toml = replaced(foreign.toml, "good = [0]", "good = [7]");
+  EXPECT_NE(refusal([&] { static_cast<void>(foreign.load()); }).find("\"state\" of the star tracker"),
+            std::string::npos);
+  while (foreign.stars.find(",0,2,2,20") != std::string::npos) {
+    foreign.stars = replaced(foreign.stars, ",0,2,2,20", ",,2,2,20");
+  }
+  EXPECT_NE(refusal([&] { static_cast<void>(foreign.load()); }).find("this one has no numbers"), std::string::npos);
+}
+
 TEST(Telemetry, WithoutAnySigmaOrNoiseIsRefused) {
   Foreign foreign;
   foreign.toml = replaced(foreign.toml, "noise_rad = [1e-05, 2e-05, 9e-05]", "");
