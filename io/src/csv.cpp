@@ -3,8 +3,10 @@
 #include <fast_float/fast_float.h>
 
 #include <algorithm>
+#include <array>
 #include <cstring>
 #include <limits>
+#include <utility>
 
 #include "trihedron/records/stop.hpp"
 #include "wording.hpp"
@@ -64,6 +66,22 @@ bool is_row_of_numbers(std::span<const ColumnName> header) {
          std::ranges::all_of(header, [&](const ColumnName& column) { return is_empty(column) || is_number(column); });
 }
 
+/// Throws InputRefused where the first line names columns with something else between them than commas.
+void expect_commas(const fs::path& file, std::string_view line) {
+  constexpr std::array kOthers = {std::pair{';', "semicolons"}, std::pair{'\t', "tabs"}};
+  if (line.find(',') != std::string_view::npos) {
+    return;
+  }
+  for (const auto& [separator, called] : kOthers) {
+    const std::size_t at = line.find(separator);
+    if (at != std::string_view::npos) {
+      throw InputRefused(file, {1, static_cast<std::int64_t>(at) + 1},
+                         fmt::format("{} stand between the names of the columns, not commas", called),
+                         "write commas between columns, and points in numbers");
+    }
+  }
+}
+
 /// Says what is wrong with a line that does not hold one number per column.
 [[noreturn]] void refuse_line(const fs::path& file, std::int64_t line_number, std::string_view line,
                               std::span<const ColumnName> header) {
@@ -72,10 +90,11 @@ bool is_row_of_numbers(std::span<const ColumnName> header) {
     throw InputRefused(file, {line_number, 1}, "an empty line between samples", "remove it");
   }
   if (fields != header.size()) {
+    const bool has_decimal_commas = fields > header.size() && line.find('.') == std::string_view::npos;
     throw InputRefused(
         file, {line_number, 1},
         fmt::format("the line has {} field{}, the header {}", fields, fields == 1 ? "" : "s", header.size()),
-        "repair or remove the line");
+        has_decimal_commas ? "write numbers with decimal points, not commas" : "repair or remove the line");
   }
   const std::string terminated = std::string(line) + '\n';
   const char* p = terminated.data();
@@ -113,8 +132,14 @@ Series parse_csv(const TextFile& content, const fs::path& file, ChooseRules choo
   std::string_view text = content.text();
   text.remove_prefix(text.starts_with(kByteOrderMark) ? kByteOrderMark.size() : 0);
 
+  expect_utf8(text, file);
   const std::size_t header_end = std::min(text.find('\n'), text.size());
-  const std::vector<ColumnName> header = parse_header(text.substr(0, header_end));
+  const std::string_view first_line = text.substr(0, header_end);
+  if (text.find_first_not_of(" \t\r\n") == std::string_view::npos) {
+    throw InputRefused(file, {}, "is empty", "write it again; its first line names its columns, t_s and others");
+  }
+  expect_commas(file, first_line);
+  const std::vector<ColumnName> header = parse_header(first_line);
   if (is_row_of_numbers(header)) {
     const std::string names = header_for(file, choose, header.size());
     throw InputRefused(file, {1, 1}, "the first line holds numbers, where the names of the columns should be",

@@ -5,11 +5,13 @@
 #include <algorithm>
 #include <cmath>
 
+#include "text_file.hpp"
 #include "wording.hpp"
 
 namespace trihedron::io {
 
 Json parse_json(std::string_view text, const std::filesystem::path& file) {
+  expect_utf8(text, file);
   try {
     return Json::parse(text);
   } catch (const nlohmann::json::parse_error& error) {

@@ -111,6 +111,13 @@ std::size_t column_named(const std::string& name, const Header& header, const fs
   const auto found = std::ranges::find(header.names, name);
   if (found == header.names.end()) {
     const std::vector<std::string_view> known(header.names.begin(), header.names.end());
+    const std::size_t other = known.size() == 1 ? known.front().find_first_of(",;\t") : std::string_view::npos;
+    if (other != std::string_view::npos) {
+      throw InputRefused(file, {header.line, static_cast<std::int64_t>(header.begin.front() + other) + 1},
+                         fmt::format("lacks column {}: the line is a single field", in_quotes(name)),
+                         fmt::format("give separator = \"{}\" in its table of the telemetry.toml",
+                                     known.front()[other] == '\t' ? "\\t" : known.front().substr(other, 1)));
+    }
     throw InputRefused(file, {header.line, 0}, fmt::format("lacks column {}", in_quotes(name)),
                        suggestion(name, known));
   }
@@ -137,9 +144,12 @@ double number_in(const CsvField& field, const TableMap& map, const fs::path& fil
   first += *first == '+' && field.text.size() > 1 && first[1] != '-' ? 1 : 0;
   const auto [end, fault] = fast_float::from_chars(first, last, value);
   if (fault != std::errc() || end != last) {
+    const bool has_decimal_comma = std::ranges::count(field.text, ',') == 1 && end < last && *end == ',';
     throw InputRefused(file, {line, static_cast<std::int64_t>(field.begin) + 1},
                        fmt::format("{} of column {} is not a number", in_quotes(field.text), in_quotes(column)),
-                       "repair the field, or name the text in \"missing\" where it stands for no value");
+                       has_decimal_comma
+                           ? "write numbers with decimal points, not commas"
+                           : "repair the field, or name the text in \"missing\" where it stands for no value");
   }
   return value;
 }
@@ -227,6 +237,10 @@ ForeignTable parse_foreign_csv(std::string_view text, const fs::path& file, cons
                                const std::vector<std::string>& stamps, const std::vector<std::string>& numbers) {
   constexpr std::string_view kByteOrderMark = "\xEF\xBB\xBF";
   text.remove_prefix(text.starts_with(kByteOrderMark) ? kByteOrderMark.size() : 0);
+  expect_utf8(text, file);
+  if (text.find_first_not_of(" \t\r\n") == std::string_view::npos) {
+    throw InputRefused(file, {}, "is empty", "give a file with the columns that the telemetry.toml names");
+  }
 
   const char separator = map.separator.front();
   std::vector<CsvField> fields;

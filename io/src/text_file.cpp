@@ -67,4 +67,14 @@ TextFile::TextFile(const std::filesystem::path& path) {
   bytes_[size_] = '\n';
 }
 
+void expect_utf8(std::string_view text, const std::filesystem::path& file) {
+  const bool has_mark = text.starts_with("\xFF\xFE") || text.starts_with("\xFE\xFF");
+  // Without a mark: every other octet of ASCII is zero.
+  const bool is_wide = text.size() > 1 && (text[0] == '\0') != (text[1] == '\0');
+  if (has_mark || is_wide) {
+    throw InputRefused(file, {1, 1}, "is UTF-16, and texts here are UTF-8",
+                       "convert it: iconv -f UTF-16 -t UTF-8, or save it again as UTF-8");
+  }
+}
+
 }  // namespace trihedron::io

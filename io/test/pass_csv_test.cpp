@@ -119,6 +119,28 @@ TEST_F(PassCsv, RefusesATableWithoutItsLineOfNamesAndGivesIt) {
   EXPECT_THAT(refusal_with("gyro.csv", ",,,,,,\n"), HasSubstr("column \"\" is not known"));
 }
 
+TEST_F(PassCsv, RefusesOtherSeparatorsDecimalCommasAndUtf16NamingThem) {
+  const auto with = [&](char from, char to) {
+    std::string text = gyro_;
+    std::ranges::replace(text, from, to);
+    return text;
+  };
+  EXPECT_THAT(
+      refusal_with("gyro.csv", with(',', ';')),
+      EndsWith("gyro.csv:1:4: semicolons stand between the names of the columns, not commas; write commas between "
+               "columns, and points in numbers"));
+  EXPECT_THAT(refusal_with("gyro.csv", with(',', '\t')), HasSubstr("gyro.csv:1:4: tabs stand between"));
+  EXPECT_THAT(refusal_with("gyro.csv", with('.', ',')), EndsWith("write numbers with decimal points, not commas"));
+  std::string wide;
+  for (const char c : gyro_) {
+    wide += {c, '\0'};
+  }
+  EXPECT_THAT(refusal_with("gyro.csv", wide), HasSubstr("gyro.csv:1:1: is UTF-16"));
+  EXPECT_THAT(refusal_with("gyro.csv", "\xFF\xFE" + wide), HasSubstr("gyro.csv:1:1: is UTF-16"));
+  clean_pass().save_directory(directory_.path());
+  EXPECT_THAT(refusal_with("pass.toml", "\xFE\xFF[pass]\n"), HasSubstr("pass.toml:1:1: is UTF-16"));
+}
+
 TEST_F(PassCsv, RefusesMissingFilesNamingThem) {
   EXPECT_THAT(refusal([] { static_cast<void>(read_pass("no-such-pass")); }),
               HasSubstr("no-such-pass: there is no such file or directory; give a pass"));
@@ -173,7 +195,7 @@ TEST_F(PassCsv, RefusesUnknownColumnNamingItsPlaceAndTheNearest) {
 TEST_F(PassCsv, RefusesMissingColumn) {
   EXPECT_THAT(refusal_with("star_tracker.csv", "t_s,q_x,q_y,q_w\n0,0,0,1\n"),
               EndsWith("star_tracker.csv:1: lacks column \"q_z\"; its columns must be t_s,q_x,q_y,q_z,q_w"));
-  EXPECT_THAT(refusal_with("star_tracker.csv", ""), HasSubstr("star_tracker.csv:1:1: column \"\" is not known"));
+  EXPECT_THAT(refusal_with("star_tracker.csv", ""), HasSubstr("star_tracker.csv: is empty; write it again"));
 }
 
 TEST_F(PassCsv, RefusesColumnThatIsThereTwice) {

@@ -497,7 +497,8 @@ INSTANTIATE_TEST_SUITE_P(
         Spoilt{"leap_seconds = \"left-out\"", "leap_seconds = \"perhaps\"", "\"leap_seconds\" cannot be \"perhaps\""},
         Spoilt{"separator = \";\"", "separator = \";;\"", "not a character that separates"},
         Spoilt{"separator = \";\"", "separator = \".\"", "not a character that separates"},
-        Spoilt{"separator = \";\"", "separator = \",\"", "lacks column \"Time UTC\""},
+        Spoilt{"separator = \";\"", "separator = \",\"",
+               "gyros.txt:2:9: lacks column \"Time UTC\": the line is a single field; give separator = \";\""},
         Spoilt{"header_line = 2", "header_line = -1", "header_line"},
         Spoilt{"header_line = 2", "header_line = 1.5", "not a whole number"},
         Spoilt{"header_line = 2", "header_line = 1", "gyros.txt:1"},
@@ -567,8 +568,9 @@ INSTANTIATE_TEST_SUITE_P(
     Text, RefusedTables,
     testing::Values(
         SpoiltText{true, "\n1242777567.000;", "\n1242777567,000;",
-                               "gyros.txt:6:1: \"1242777567,000\" of column \"Time UTC\" is not a number"},
-                    SpoiltText{true, ";32768;", ";0x8000;", "of column \"A3\" is not a number"},
+                   "gyros.txt:6:1: \"1242777567,000\" of column \"Time UTC\" is not a number; write numbers "
+                   "with decimal points"},
+        SpoiltText{true, ";32768;", ";0x8000;", "of column \"A3\" is not a number"},
         SpoiltText{true, ";A2;", ";A1;", "gyros.txt:2:13: column \"A1\" is there twice"},
         SpoiltText{true, ";1;", ";1;7;", "gyros.txt:4:1: the line has 9 fields, the header 8"},
         SpoiltText{false, "23:59:29Z", "23:59:79Z", "stars.csv:3:2: column \"utc\": "},
@@ -590,6 +592,21 @@ TEST(Telemetry, FlagsThatAreNeverGoodAreRefusedWithTheValuesThatAreThere) {
     foreign.stars = replaced(foreign.stars, ",0,2,2,20", ",,2,2,20");
   }
   EXPECT_NE(refusal([&] { static_cast<void>(foreign.load()); }).find("this one has no numbers"), std::string::npos);
+}
+
+TEST(Telemetry, TextsThatAreNoneAreRefused) {
+  Foreign foreign;
+  const std::string gyros = foreign.gyros;
+  foreign.gyros = " \r\n";
+  EXPECT_NE(refusal([&] { static_cast<void>(foreign.load()); }).find("gyros.txt: is empty; "), std::string::npos);
+  for (const char* const mark : {"\xFF\xFE", "\xFE\xFF"}) {
+    foreign.gyros = mark + gyros;
+    EXPECT_NE(refusal([&] { static_cast<void>(foreign.load()); }).find("gyros.txt:1:1: is UTF-16"), std::string::npos);
+  }
+  foreign.gyros = gyros;
+  foreign.toml.insert(1, 1, '\0');
+  EXPECT_NE(refusal([&] { static_cast<void>(foreign.load()); }).find("telemetry.toml:1:1: is UTF-16"),
+            std::string::npos);
 }
 
 TEST(Telemetry, WithoutAnySigmaOrNoiseIsRefused) {
