@@ -166,9 +166,20 @@ def test_what_is_read_is_never_replaced(flown, tmp_path):
     assert sorted(path.name for path in tmp_path.iterdir()) == ["a.aem", "a.csv", "b.tf"]
 
 
+def test_what_is_of_another_kind_is_refused_for_what_it_is(flown, tmp_path):
+    exporting = ("-o", tmp_path / "none")
+    refused(run("export", flown / "pass" / "truth.json", "--format", "aem", *exporting), INPUT_REFUSED, "truth.json: is JSON", "`export` writes acm, acm-xml and fk")
+    refused(run("export", flown / "a.csv", "--format", "acm", *exporting), INPUT_REFUSED, "a.csv: is no calibration.json", "ACM")
+    (tmp_path / "empty.json").write_text("")
+    refused(run("export", tmp_path / "empty.json", "--format", "fk", *exporting), INPUT_REFUSED, "empty.json: is no calibration.json")
+    assert not (tmp_path / "none").exists()
+
+
 def test_what_is_no_message_is_refused(flown, tmp_path):
-    refused(run("import", flown / "a.csv", "-o", tmp_path / "b.csv"), INPUT_REFUSED, "does not begin with CCSDS_AEM_VERS")
-    refused(run("import", flown / "pass" / "truth.json", "-o", tmp_path / "b.csv"), INPUT_REFUSED)
+    for name in ("a.csv", "pass/truth.json", "pass/gyro.csv"):
+        refused(run("import", flown / name, "-o", tmp_path / "b.csv"), INPUT_REFUSED, "is nothing that can be imported; give a telemetry.toml, a pass, or a message")
+    (tmp_path / "wide.aem").write_text("CCSDS_AEM_VERS = 2.0\n", encoding="utf-16")
+    refused(run("import", tmp_path / "wide.aem", "-o", tmp_path / "b.csv"), INPUT_REFUSED, "wide.aem:1:1: is UTF-16")
     (tmp_path / "cut.aem").write_text(
         done("export", flown / "a.csv", "--format", "aem", "-o", "-", "--pass", flown / "pass").stdout[:3000])
     refused(run("evaluate", flown / "pass", "--attitude", tmp_path / "cut.aem"), INPUT_REFUSED, "cut.aem:", ";")

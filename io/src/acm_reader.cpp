@@ -662,6 +662,12 @@ std::variant<AttitudeMessage, CalibrationMessage> read_message(const std::filesy
   if (is_calibration_message(content.text())) {
     return parse_calibration_message(content.text(), file);
   }
+  if (!is_attitude_message(content.text())) {
+    expect_utf8(content.text(), file);
+    throw InputRefused(file, {}, "is nothing that can be imported",
+                       "give a telemetry.toml, a pass, or a message: AEM, APM or ACM as text (CCSDS_AEM_VERS in its "
+                       "first line) or XML, or a C-kernel of SPICE");
+  }
   return parse_attitude_message(content.text(), file);
 }
 

@@ -45,6 +45,12 @@ AttitudeMessage read_attitude_of_any_format(const std::filesystem::path& path, s
   if (is_attitude_message(content.text())) {
     return parse_attitude_message(content.text(), path);
   }
+  const std::size_t first = content.text().find_first_not_of(" \t\r\n");
+  if (first != std::string_view::npos && content.text()[first] == '{') {
+    throw InputRefused(path, {}, "is JSON, as calibration.json is, and no attitude",
+                       "give an attitude: attitude.csv, a message (AEM, APM) or a C-kernel of SPICE; of a calibration "
+                       "`export` writes acm, acm-xml and fk");
+  }
   if (!given_epoch) {
     throw UsageError("an attitude file counts t_s from the epoch of its pass: give the pass by --pass, or --epoch");
   }

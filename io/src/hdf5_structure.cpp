@@ -17,8 +17,6 @@ namespace {
 
 constexpr std::size_t kMostLinks = 10'000;
 constexpr std::ptrdiff_t kDeepest = 16;
-constexpr const char* kGiveAPass =
-    "give a pass: a directory with pass.toml, gyro.csv and star_tracker.csv, a NetCDF-4 file, or a telemetry.toml";
 
 /// An identifier of HDF5, negative where there is none.
 class Handle {

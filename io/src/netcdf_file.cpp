@@ -66,9 +66,7 @@ NetcdfReader::NetcdfReader(fs::path file) : file_(std::move(file)) {
   // Absolute, because the library takes a name with "://" for a web address.
   const int status = nc_open(fs::absolute(file_).c_str(), NC_NOWRITE, &id_);
   if (status != NC_NOERR) {
-    refuse(
-        fmt::format("is no NetCDF-4 file that can be read ({})", nc_strerror(status)),
-        "give a pass: a directory with pass.toml, gyro.csv and star_tracker.csv, a NetCDF-4 file, or a telemetry.toml");
+    refuse(fmt::format("is no NetCDF-4 file that can be read ({})", nc_strerror(status)), kGiveAPass);
   }
 }
 

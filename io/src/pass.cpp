@@ -24,6 +24,7 @@
 #include "trihedron/records/clocks.hpp"
 #include "trihedron/records/stop.hpp"
 #include "truth.hpp"
+#include "wording.hpp"
 
 namespace trihedron::io {
 namespace fs = std::filesystem;
@@ -60,9 +61,7 @@ fs::path inside(const fs::path& file, const char* part) { return file.string() +
 void check_there(const fs::path& path) {
   std::error_code ignored;
   if (!fs::exists(path, ignored)) {
-    throw InputRefused(path, {}, "there is no such file or directory",
-                       "give a pass: a directory with pass.toml, gyro.csv and star_tracker.csv, a NetCDF-4 file, or a "
-                       "telemetry.toml");
+    throw InputRefused(path, {}, "there is no such file or directory", kGiveAPass);
   }
 }
 

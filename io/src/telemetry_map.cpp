@@ -437,10 +437,26 @@ Field telemetry(TelemetryMap& map, const fs::path& file) {
                    }});
 }
 
+/// Says what was given in place of a telemetry.toml.
+[[noreturn]] void refuse_other_toml(const toml::table& document, const fs::path& file) {
+  if (document.contains("scenario")) {
+    throw InputRefused(file, {}, "is a scenario, not a pass",
+                       "make a pass of it by `trihedron simulate`, and give that");
+  }
+  if (document.contains("pass")) {
+    throw InputRefused(file, {}, "says what a pass is, and has no table [telemetry] that says where its columns are",
+                       "give the directory in which it stands with gyro.csv and star_tracker.csv, or add the table");
+  }
+  throw InputRefused(file, {}, "is no telemetry.toml: it has no table [telemetry]", kGiveAPass);
+}
+
 }  // namespace
 
 TelemetryToml parse_telemetry_toml(std::string_view text, const fs::path& file, const fs::path& directory) {
   const toml::table document = parse_toml(text, file);
+  if (!document.contains("telemetry")) {
+    refuse_other_toml(document, file);
+  }
   TelemetryToml result;
   Field field = telemetry(result.map, file);
   const TomlTable root(document, file, "the file");

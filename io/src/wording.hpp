@@ -12,6 +12,10 @@ namespace trihedron::io {
 /// Without the blanks (space, tab, CR) at both ends.
 [[nodiscard]] std::string_view trimmed(std::string_view text);
 
+/// The cure where something else was given than a pass.
+inline constexpr const char* kGiveAPass =
+    "give a pass: a directory with pass.toml, gyro.csv and star_tracker.csv, a NetCDF-4 file, or a telemetry.toml";
+
 /// In quotation marks, printable and of bounded length, whatever the text is.
 [[nodiscard]] std::string in_quotes(std::string_view text);
 

@@ -594,6 +594,19 @@ TEST(Telemetry, FlagsThatAreNeverGoodAreRefusedWithTheValuesThatAreThere) {
   EXPECT_NE(refusal([&] { static_cast<void>(foreign.load()); }).find("this one has no numbers"), std::string::npos);
 }
 
+TEST(Telemetry, ThatIsAnotherFileIsRefusedForWhatItIs) {
+  Foreign foreign;
+  foreign.toml = "[scenario]\nseed = 1\n";
+  EXPECT_NE(refusal([&] { static_cast<void>(foreign.load()); }).find("telemetry.toml: is a scenario, not a pass; make"),
+            std::string::npos);
+  foreign.toml = "[pass]\nspacecraft = \"TEST\"\n";
+  EXPECT_NE(refusal([&] { static_cast<void>(foreign.load()); }).find("give the directory in which it stands"),
+            std::string::npos);
+  foreign.toml = "drift_model = \"esg7\"\n";
+  EXPECT_NE(refusal([&] { static_cast<void>(foreign.load()); }).find("has no table [telemetry]; give a pass: "),
+            std::string::npos);
+}
+
 TEST(Telemetry, TextsThatAreNoneAreRefused) {
   Foreign foreign;
   const std::string gyros = foreign.gyros;
