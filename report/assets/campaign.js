@@ -54,14 +54,17 @@ FIGURES.influences = (data, look) => {
   const longest = Math.max(...keys.map((key) => key.length));
   const left = Math.min(7 * longest + 20, 0.42 * look.width);
   const letters = Math.floor((left - 20) / 7);
-  const layout = { ...baseLayout(look, 34 * keys.length + 270), margin: { l: left, r: look.print ? 70 : 110, t: 14, b: 240 } };
+  const right = look.print ? 70 : 110;
+  // Narrower, names of measures would stand over each other; what is wider than the screen scrolls.
+  const width = look.print ? look.width : Math.max(look.width, left + 22 * measures.length + right);
+  const layout = { ...baseLayout({ ...look, width }, 34 * keys.length + 270), margin: { l: left, r: right, t: 14, b: 240 } };
   const short = (key) => (key.length <= letters ? key : `…${key.slice(1 - letters)}`);
   layout.xaxis = { ...axisStyle(colour), tickvals: measures.map((_, i) => i), ticktext: measures, tickangle: -45, showgrid: false, ticks: "", showline: false };
   layout.yaxis = { ...axisStyle(colour), tickvals: keys.map((_, i) => i), ticktext: keys.map(short), autorange: "reversed", showgrid: false, ticks: "", showline: false };
   const traces = [{
     type: "heatmap", z: rho, x: measures.map((_, i) => i), y: keys.map((_, i) => i), zmin: -1, zmax: 1, xgap: 1, ygap: 1,
     colorscale: [[0, colour["correlation-minus"]], [0.5, colour["correlation-zero"]], [1, colour["correlation-plus"]]],
-    text: marks, texttemplate: "%{text}", textfont: { size: Math.min(11, (look.width - layout.margin.l - layout.margin.r) / measures.length / 3.2) },
+    text: marks, texttemplate: "%{text}", textfont: { size: Math.min(11, (width - left - right) / measures.length / 3.2) },
     customdata: keys.map((key) => measures.map((measure) => `${key}, ${measure}`)),
     hovertemplate: "%{customdata}: %{z:+.2f}<extra></extra>",
     colorbar: { thickness: 12, outlinewidth: 0, tickvals: [-1, -0.5, 0, 0.5, 1], ticktext: ["−1", "−0.5", "0", "+0.5", "+1"] },

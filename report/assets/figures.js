@@ -76,10 +76,10 @@ function withRoomForLegend(layout, traces) {
 
 const axisTitle = (text, standoff) => ({ text, standoff, font: { size: 12.5 } });
 
-function baseLayout({ width, colour }, height) {
+function baseLayout({ width, colour, print }, height) {
   return {
     width, height, autosize: false,
-    margin: { l: 74, r: 14, t: 46, b: 50 },
+    margin: { l: 74, r: print ? 14 : 40, t: 46, b: 50 },  // on a screen with room for the buttons at the right edge
     paper_bgcolor: CLEAR, plot_bgcolor: CLEAR,
     font: { family: colour.sans, size: 12.5, color: colour.muted },
     legend: { orientation: "h", x: 0, xanchor: "left", y: 1, yref: "container", yanchor: "top", font: { color: colour.ink } },

@@ -22,7 +22,9 @@ FIGURES.trend = (data, look, { name }) => {
     Object.assign(layout[axes.xkey], { range: [0.5, calibrations.length + 0.5], dtick: Math.ceil(calibrations.length / 20), tick0: 1,
       title: layout[axes.xkey].title && axisTitle("calibration, as numbered above", 8), showgrid: false });
     Object.assign(layout[axes.ykey], { range: trendRange(value, sigma), zeroline: false });
-    layout.shapes.push(...startUpBands(calibrations, axes, look.width / columns, colour));
+    const bands = startUpBands(calibrations, axes, look.width / columns, colour);
+    layout.shapes.push(...bands.map(({ shape }) => shape));
+    layout.annotations.push(...bands.map(({ label }) => label));
     return KINDS.map((kind) => {
       const shown = value.map((v, k) => (kind.holds(calibrations[k]) ? v : null));
       return {
@@ -54,11 +56,16 @@ function startUpBands(calibrations, { xaxis, yaxis }, width, colour) {
     else bands.push({ start_up, from: k + 0.5, to: k + 1.5 });
   });
   return bands.map(({ start_up, from, to }, i) => ({
-    type: "rect", xref: xaxis, yref: `${yaxis} domain`, x0: from, x1: to, y0: 0, y1: 1, layer: "below", line: { width: 0 },
-    fillcolor: i % 2 === 0 ? colour.shade : CLEAR,
-    label: { text: start_up.slice(0, letters(from, to)), textposition: "top left", font: { size: 11, color: colour.muted } },
+    shape: { type: "rect", xref: xaxis, yref: `${yaxis} domain`, x0: from, x1: to, y0: 0, y1: 1, layer: "below", line: { width: 0 },
+      fillcolor: i % 2 === 0 ? colour.shade : CLEAR },
+    // On a ground of its own: a line of the grid would strike it out.
+    label: { text: shortened(start_up, letters(from, to)), xref: xaxis, yref: `${yaxis} domain`, x: from, y: 1, xanchor: "left", yanchor: "top",
+      showarrow: false, borderpad: 2, bgcolor: i % 2 === 0 ? colour.shade : colour.sheet, font: { size: 11, color: colour.muted } },
   }));
 }
+
+/** At most so many letters, the last of them … where some are missing. */
+const shortened = (text, letters) => (text.length <= letters ? text : letters > 1 ? `${text.slice(0, letters - 1)}…` : "");
 
 /** Range of values with room for the usual sigmas and for the names above; longer error bars are cut off. */
 function trendRange(value, sigma) {

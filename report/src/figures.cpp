@@ -282,7 +282,8 @@ class Figures {
     Series mean(1, fix_step_min_);
     double total = std::accumulate(nis.begin(), nis.begin() + static_cast<std::ptrdiff_t>(window), 0.0);
     for (std::size_t end = window; end <= nis.size(); ++end) {
-      mean.add((t[end - window] + t[end - 1]) / 2, {total / static_cast<double>(window)});
+      // At the fix in the middle, so that the line is interrupted where fixes are missing.
+      mean.add(t[end - 1 - window / 2], {total / static_cast<double>(window)});
       if (end < nis.size()) {
         total += nis[end] - nis[end - window];
       }

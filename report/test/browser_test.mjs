@@ -52,6 +52,16 @@ test("a campaign draws each figure, on a screen and on paper", () =>
     assert.deepEqual(complaints, []);
   }));
 
+test("what matters in a campaign stays legible on a screen of 400 pixels, and scrolls", () =>
+  openAndDraw("campaign.html", { width: 400 }, async (page) => {
+    assert.ok((await overflow(page)) <= 0, `wider by ${await overflow(page)} pixels`);
+    const [shown, drawn, columns] = await page.evaluate(() => {
+      const plot = document.querySelector('figure[data-figure="influences"] .plot');
+      return [plot.clientWidth, plot.scrollWidth, plot.data[0].x.length];
+    });
+    assert.ok(drawn > shown && drawn > 22 * columns, `${drawn} pixels in ${shown} for ${columns} columns`);
+  }));
+
 test("what a window shows is drawn before the page has loaded", () =>
   open("campaign.html", { height: 8000 }, async (page) => {
     const blank = await page.evaluate(() => [...document.querySelectorAll("figure")].filter((figure) =>

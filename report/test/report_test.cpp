@@ -2,7 +2,9 @@
 
 #include <gmock/gmock.h>
 
+#include <nlohmann/json.hpp>
 #include <regex>
+#include <vector>
 
 #include "synthetic_run.hpp"
 #include "wording.hpp"
@@ -71,6 +73,26 @@ TEST(Report, EscapesFindingsAndNotes) {
     EXPECT_THAT(html, Not(HasSubstr(tag)));
   }
   EXPECT_THAT(html, HasSubstr("&lt;n&gt;"));
+}
+
+TEST(Report, InterruptsTheMeanNisWhereFixesAreMissing) {
+  test::SyntheticRun run = short_run();
+  const Time epoch = run.pass.settings.epoch;
+  const Time from = epoch + std::chrono::minutes(12);
+  const Time to = epoch + std::chrono::minutes(18);
+  std::erase_if(run.run.fixes, [&](const FixRecord& fix) { return fix.t > from && fix.t < to; });
+  const std::string html = render(run.judged());
+  const std::string opening = R"(<script type="application/json" id="data">)";
+  const std::size_t begin = html.find(opening) + opening.size();
+  const auto mean = nlohmann::json::parse(html.substr(begin, html.find("</script>", begin) - begin))["nis"]["mean"];
+  std::vector<nlohmann::json> within;
+  for (std::size_t i = 0; i < mean["t"].size(); ++i) {
+    if (mean["t"][i] > 12.01 && mean["t"][i] < 17.99) {
+      within.push_back(mean["y"][0][i]);
+    }
+  }
+  ASSERT_EQ(within.size(), 1U);
+  EXPECT_TRUE(within.front().is_null());
 }
 
 TEST(Report, ExpectsTheNisOfAsManyGyrosAsThereAre) {
