@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <set>
+#include <utility>
 
 #include "trihedron/records/run.hpp"
 #include "units.hpp"
@@ -48,7 +49,7 @@ json verdict_of(const Verdict& verdict) {
   json result = {{"findings", findings_of(findings)}, {"to_do", json::array()}};
   std::set<std::string> cures;
   for (const Finding& finding : findings) {
-    if (finding.severity != Severity::kNote && !finding.cure.empty() && cures.insert(finding.cure).second) {
+    if (!finding.cure.empty() && cures.insert(finding.cure).second) {
       result["to_do"].push_back(finding.cure);
     }
   }
@@ -271,9 +272,15 @@ json verdict_values(const ReportInput& input, const std::vector<Parameter>& para
   for (json& line : rejected_of(named_counts(input.run.samples), "gyro sample", "gyro samples")) {
     rejected.push_back(std::move(line));
   }
+  json undetermined = undetermined_of(parameters);
+  // Of which no parameter alone is the place.
+  const bool has_weak_axis = input.run.calibration.verdict.has(FindingCode::kWeakAlignmentAxis);
+  const bool is_all_determined = undetermined.empty() && !has_weak_axis;
   return {{"verdict", verdict_of(input.run.calibration.verdict)},
           {"numbers", numbers},
-          {"undetermined", undetermined_of(parameters)},
+          {"undetermined", std::move(undetermined)},
+          {"has_weak_axis", has_weak_axis},
+          {"is_all_determined", is_all_determined},
           {"rejected", rejected}};
 }
 

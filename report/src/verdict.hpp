@@ -12,7 +12,7 @@ namespace trihedron::report {
 /// Each with its word and style.
 [[nodiscard]] nlohmann::json findings_of(const std::vector<Finding>& findings);
 
-/// verdict, numbers, undetermined, rejected.
+/// verdict, numbers, undetermined, has_weak_axis, is_all_determined, rejected.
 [[nodiscard]] nlohmann::json verdict_values(const ReportInput& input, const std::vector<Parameter>& parameters);
 
 }  // namespace trihedron::report

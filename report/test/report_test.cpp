@@ -75,6 +75,21 @@ TEST(Report, EscapesFindingsAndNotes) {
   EXPECT_THAT(html, HasSubstr("&lt;n&gt;"));
 }
 
+TEST(Report, ListsWhatToDoOfNotesAsWell) {
+  test::SyntheticRun run = short_run();
+  run.run.calibration.verdict = {true, {{FindingCode::kClockOffsetFound, "late", "by 2 s", "tell the offset"}}};
+  EXPECT_THAT(render(run.judged()), HasSubstr("<li>tell the offset</li>"));
+  run.run.calibration.verdict.findings.front().cure.clear();
+  EXPECT_THAT(render(run.judged()), HasSubstr("<li>Nothing. Use it until the rotors are started anew.</li>"));
+}
+
+TEST(Report, ListsAWeakAxisWhereEachParameterIsDetermined) {
+  test::SyntheticRun run = short_run();
+  run.run.calibration.verdict = {false, {{FindingCode::kWeakAlignmentAxis, "no axis", "", "slew"}}};
+  EXPECT_THAT(render(run.judged()), HasSubstr("<li>Alignment of each gyro about the axis that is fixed"));
+  EXPECT_THAT(render(run.judged()), Not(HasSubstr("Nothing: every parameter")));
+}
+
 TEST(Report, InterruptsTheMeanNisWhereFixesAreMissing) {
   test::SyntheticRun run = short_run();
   const Time epoch = run.pass.settings.epoch;
