@@ -140,6 +140,7 @@ void import_pass(const ImportArguments& arguments, const Common& common) {
   inputs.insert(inputs.end(), loaded.sources.begin(), loaded.sources.end());
   std::vector<std::filesystem::path> outputs =
       io::files_of_pass(arguments.output, 1 + loaded.pass.further_star_trackers.size());
+  const bool was_there = any_is_there(outputs);
   outputs.emplace_back(arguments.output);
   io::expect_apart(inputs, outputs);
   io::write_pass(arguments.output, loaded.pass, nullptr);
@@ -150,7 +151,7 @@ void import_pass(const ImportArguments& arguments, const Common& common) {
         json["written"] = arguments.output;
         return json;
       },
-      [&] { return fmt::format("{}Written     {}\n", pass_text(loaded), printable(arguments.output)); });
+      [&] { return pass_text(loaded) + written_pass_text(arguments.output, was_there); });
 }
 
 void put_imported(const ImportArguments& arguments, const std::string& text) {

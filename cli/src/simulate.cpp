@@ -12,7 +12,6 @@
 #include "trihedron/io/error.hpp"
 #include "trihedron/io/pass.hpp"
 #include "trihedron/io/scenario.hpp"
-#include "trihedron/records/text.hpp"
 
 namespace trihedron::cli {
 namespace {
@@ -38,6 +37,7 @@ void simulate_pass(const std::filesystem::path& scenario_file, const std::string
   std::vector<std::filesystem::path> inputs = io::files_of_scenario(scenario_file);
   inputs.push_back(scenario_file);
   std::vector<std::filesystem::path> outputs = io::files_of_pass(pass, 1 + scenario.further_star_trackers.size());
+  const bool was_there = any_is_there(outputs);
   outputs.push_back(pass);
   io::expect_apart(inputs, outputs);
   io::PassWriter writer(pass);
@@ -51,7 +51,7 @@ void simulate_pass(const std::filesystem::path& scenario_file, const std::string
         return pass_json({result.pass, {}});
       },
       [&] {
-        return fmt::format("{}Written     {}\n", pass_text({result.pass, {}}), printable(pass.string()));
+        return pass_text({result.pass, {}}) + written_pass_text(pass.string(), was_there);
       });
 }
 

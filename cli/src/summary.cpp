@@ -3,9 +3,11 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <iterator>
+#include <system_error>
 
 #include "trihedron/ground/judge/verdict.hpp"
 #include "trihedron/io/time_text.hpp"
@@ -86,6 +88,17 @@ std::string pass_text(const io::LoadedPass& loaded) {
     fmt::format_to(out, "            {}\n", printable(defect.text()));
   }
   return text;
+}
+
+bool any_is_there(const std::vector<std::filesystem::path>& files_of_pass) {
+  return std::ranges::any_of(files_of_pass, [](const std::filesystem::path& file) {
+    std::error_code ignored;
+    return std::filesystem::exists(file, ignored);
+  });
+}
+
+std::string written_pass_text(const std::string& path, bool was_there) {
+  return fmt::format("Written     {}{}\n", printable(path), was_there ? ", in place of the pass that was there" : "");
 }
 
 std::string clocks_text(const std::optional<Clocks>& clocks, const Pass& pass) {

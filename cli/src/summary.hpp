@@ -4,6 +4,7 @@
 #include <fmt/core.h>
 
 #include <Eigen/Core>
+#include <filesystem>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
@@ -24,6 +25,10 @@ namespace trihedron::cli {
 [[nodiscard]] std::string figure(fmt::format_string<const double&> format, double value);
 
 [[nodiscard]] std::string pass_text(const io::LoadedPass& loaded);
+/// Whether one of the files that a pass is going to be written to is there already.
+[[nodiscard]] bool any_is_there(const std::vector<std::filesystem::path>& files_of_pass);
+/// The line that says where a pass is, and what it has replaced.
+[[nodiscard]] std::string written_pass_text(const std::string& path, bool was_there);
 /// How far the clocks of the pass are apart.
 [[nodiscard]] std::string clocks_text(const std::optional<Clocks>& clocks, const Pass& pass);
 [[nodiscard]] std::string finding_text(const Finding& finding);

@@ -116,6 +116,15 @@ def test_an_own_earlier_output_is_replaced(given, tmp_path, calibrate):
     assert (out / "pass.nc").read_bytes() == (given / "first.nc").read_bytes()
 
 
+def test_a_pass_that_is_replaced_is_told(given, tmp_path):
+    replaced = ", in place of the pass that was there\n"
+    for name in ("pass", "pass.nc"):
+        for arguments in (("simulate", given / "first.toml"), ("import", given / "second")):
+            output = tmp_path / f"{arguments[0]}-{name}"
+            assert program.run(*arguments, "-o", output).stdout.endswith(f"Written     {output}\n")
+            assert program.run(*arguments, "-o", output).stdout.endswith(f"Written     {output}{replaced}")
+
+
 def test_a_navigation_destroys_nothing_it_reads(given, own, tmp_path):
     done("calibrate", own, "-o", tmp_path / "out", "--config", given / "told.toml")
     shutil.copy(given / "first.nc", tmp_path / "p.nc")
