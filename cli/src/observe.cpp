@@ -55,7 +55,18 @@ std::string sigmas_text(const Observability& observability, Time epoch) {
     }
     text += '\n';
   }
+  if (observability.angle_gain.size() > 0) {
+    text +=
+        "  z1 adds: 1σ by the readings at the fixes alone over 1σ with z1 of eq. (3) as well, the angle between the "
+        "momenta at every sample\n";
+  }
   return text;
+}
+
+/// Of the combinations of parameters those that are not listed as unobservable.
+std::ptrdiff_t observable_count(const Observability& observability) {
+  return observability.singular_values.size() -
+         std::ranges::count_if(observability.weak, &ground::Combination::is_unobservable);
 }
 
 std::string combinations_text(const Observability& observability) {
@@ -85,11 +96,13 @@ std::string combinations_text(const Observability& observability) {
 std::string observability_text(const Observability& observability, Time epoch) {
   const Eigen::VectorXd& s = observability.singular_values;
   return fmt::format(
-      "Observable  {} of {} parameters, priors removed; prior 1σ over that by the data alone: {} … {}\n"
+      "Observable  {} of {} combinations of parameters: known from the data alone by {:.0f} times what was known "
+      "before, "
+      "or more; all by {} … {} times\n"
       "Attitude    {} rms per axis by what the parameters leave, between corrections and slewing\n{}{}",
-      observability.rank, s.size(), figure("{:.2g}", s(0)), figure("{:.2g}", s(s.size() - 1)),
-      angle_text(observability.attitude_error_rad), sigmas_text(observability, epoch),
-      combinations_text(observability));
+      observable_count(observability), s.size(), Observability::kUnobservable, figure("{:.2g}", s(0)),
+      figure("{:.2g}", s(s.size() - 1)), angle_text(observability.attitude_error_rad),
+      sigmas_text(observability, epoch), combinations_text(observability));
 }
 
 nlohmann::ordered_json observability_json(const Observability& observability, Time epoch) {
@@ -146,8 +159,8 @@ ExitStatus observe_pass(const std::string& path, const CalibrationOptions& optio
       is_scenario(path) ? simulated_by(io::read_scenario(source(path)), path).pass : io::read_pass(path).pass;
   const Observability observability = refusing(path, [&] { return ground::observe(pass, options); });
   const Time epoch = pass.settings.epoch;
-  common.log.say(
-      fmt::format("{} of {} parameters are observable", observability.rank, observability.parameters.size()));
+  common.log.say(fmt::format("{} of {} combinations of parameters are observable", observable_count(observability),
+                             observability.singular_values.size()));
   show(
       common, [&] { return observability_json(observability, epoch); },
       [&] { return observability_text(observability, epoch); });
@@ -159,7 +172,7 @@ ExitStatus advise_for(const std::string& path, const CalibrationOptions& options
   if (!is_scenario(path)) {
     throw io::UsageError(
         "--advise needs a scenario; for a pass, give its attitude to one: calibrate PASS -o OUT, then "
-        "reference = \"recorded\" and recorded = \"attitude.csv\" in [attitude]");
+        "reference = \"recorded\", recorded = \"OUT/attitude.csv\" and slews = \"none\" in [attitude]");
   }
   const Scenario scenario = io::read_scenario(source(path));
   const plan::Advice advice = refusing(path, [&] {

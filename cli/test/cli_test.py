@@ -779,9 +779,13 @@ def test_observe_names_what_steady_flight_cannot_tell(observe):
     assert "Unobservable" in result.stdout and "z1 adds" in result.stdout and "--advise" in result.stdout
     for gyro in (1, 2):
         assert f"gyro {gyro} alignment about the orbit normal, against its initial direction" in result.stdout
+    told = result.stdout
     result = observe("--json")
     assert result.returncode == DO_NOT_USE
     summary = json.loads(result.stdout)
+    unobservable = sum(combination["unobservable"] for combination in summary["combinations"])
+    assert unobservable > 0 and told.startswith(f"Observable  {20 - unobservable} of 20 combinations of parameters: ")
+    assert "  z1 adds: 1σ by the readings at the fixes alone over " in told
     assert [c["harmful"] for c in summary["combinations"] if c["unobservable"]] == [True, True]
     assert summary["rank"] == len(summary["parameters"]) == 20
     for parameter in summary["parameters"]:
@@ -823,7 +827,7 @@ def test_advice_can_be_pasted_and_is_confirmed(observe):
 
 
 def test_observe_refuses(observe, tmp_path):
-    refused(observe("--advise", of=EXAMPLE), WRONG_USAGE, "scenario", "recorded")
+    refused(observe("--advise", of=EXAMPLE), WRONG_USAGE, "scenario", "recorded", 'slews = "none"')
     refused(observe("--confirm", "2"), WRONG_USAGE, "--advise")
     refused(observe("--advise", "--max-angle", "30"), WRONG_USAGE, "unit")
     refused(observe("--advise", "--slews", "0"), WRONG_USAGE, "--slews")
