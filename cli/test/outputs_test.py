@@ -189,16 +189,17 @@ def test_an_output_that_cannot_be_written_is_refused_before_the_work(given, tmp_
     refused(calibrate(in_work, "-o", tmp_path / "out"), INPUT_REFUSED, "parallel")
     (tmp_path / "file").write_text("mine")
     (tmp_path / "taken" / "report.html").mkdir(parents=True)
-    for out in (tmp_path / "file", tmp_path / "file" / "out", "/proc/trihedron", tmp_path / "taken"):
+    for out in (tmp_path / "file" / "out", "/proc/trihedron", tmp_path / "taken"):
         refused(calibrate(in_work, "-o", out), MACHINE_FAILED, out)
+    refused(calibrate(in_work, "-o", tmp_path / "file"), WRONG_USAGE, tmp_path / "file", "give the name of a directory")
     (tmp_path / "parallel").write_text("mine")
     later = shutil.copytree(given / "second", tmp_path / "in" / "later")
     (later / "pass.toml").write_text((later / "pass.toml").read_text().replace("2009-05-20T", "2009-05-21T"))
     refused(calibrate(in_work, later, "-o", tmp_path), MACHINE_FAILED, tmp_path / "parallel")
     shutil.rmtree(tmp_path / "in")
     (tmp_path / "parallel").unlink()
-    for output in (tmp_path / "none" / "a.csv", tmp_path / "taken"):
-        refused(run("navigate", in_work, "--online", "-o", output), MACHINE_FAILED, output)
+    refused(run("navigate", in_work, "--online", "-o", tmp_path / "none" / "a.csv"), MACHINE_FAILED, tmp_path / "none" / "a.csv")
+    refused(run("navigate", in_work, "--online", "-o", tmp_path / "taken"), WRONG_USAGE, tmp_path / "taken", "give the name of a file")
     assert (tmp_path / "file").read_text() == "mine"
     assert content(tmp_path) == {b"file": b"mine"}
 
@@ -207,8 +208,8 @@ def test_a_simulation_refuses_its_output_before_the_work(tmp_path):
     (tmp_path / "impossible.toml").write_text(SCENARIO.format(1) + '[attitude]\nreference = "recorded"\n')
     refused(run("simulate", tmp_path / "impossible.toml", "-o", tmp_path / "pass"), INPUT_REFUSED, "impossible.toml")
     (tmp_path / "file").write_text("mine")
-    for output in (tmp_path / "file", tmp_path / "none" / "p.nc"):
-        refused(run("simulate", tmp_path / "impossible.toml", "-o", output), MACHINE_FAILED, output)
+    refused(run("simulate", tmp_path / "impossible.toml", "-o", tmp_path / "none" / "p.nc"), MACHINE_FAILED, tmp_path / "none" / "p.nc")
+    refused(run("simulate", tmp_path / "impossible.toml", "-o", tmp_path / "file"), WRONG_USAGE, tmp_path / "file", "give the name of a directory")
     assert sorted(path.name for path in tmp_path.iterdir()) == ["file", "impossible.toml"]
 
 

@@ -70,7 +70,7 @@ AtomicFile::AtomicFile(fs::path target) : target_(behind_links(std::move(target)
     fail(fault.value());
   }
   if (fs::is_directory(status)) {
-    throw MachineFailed(unstaged(target_), "is a directory", "give the name of a file");
+    throw UsageError(fmt::format("{}: is a directory; give the name of a file", unstaged(target_).string()));
   }
   // Renaming onto a device would replace the device.
   if (fs::exists(status) && !fs::is_regular_file(status)) {

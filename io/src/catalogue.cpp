@@ -2,6 +2,7 @@
 
 #include <SQLiteCpp/SQLiteCpp.h>
 #include <SQLiteCpp/VariadicBind.h>
+#include <fcntl.h>
 #include <fmt/format.h>
 #include <sqlite3.h>
 #include <unistd.h>
@@ -387,6 +388,10 @@ std::vector<CatalogueEntry> read_catalogue(const fs::path& file) {
   std::error_code ignored;
   if (!fs::exists(file, ignored)) {
     throw InputRefused(file, {}, "there is no such catalogue", "make one with `trihedron calibrate --catalogue`");
+  }
+  if (::faccessat(AT_FDCWD, file.c_str(), R_OK, AT_EACCESS) != 0) {  // SQLite does not say why it cannot open a file
+    throw InputRefused(file, {}, fmt::format("cannot be opened: {}", std::generic_category().message(errno)),
+                       "check the name and the rights");
   }
   return told_of(file, [&] {
     take_back_half_done(file);

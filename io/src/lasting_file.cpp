@@ -26,6 +26,9 @@ namespace {
 constexpr std::size_t kMostOfSlots = std::size_t{1} << 26U;
 
 [[noreturn]] void fail_to_write(const fs::path& path) {
+  if (errno == EISDIR) {
+    throw UsageError(fmt::format("{}: is a directory; give the name of a file", path.string()));
+  }
   throw MachineFailed(path, fmt::format("cannot be written: {}", std::generic_category().message(errno)),
                       "check that the directory is there and may be written, and that the disk has room");
 }

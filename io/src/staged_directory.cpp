@@ -165,6 +165,9 @@ bool is_still(const fs::path& file, int descriptor) {
 
 MadeDirectory::MadeDirectory(fs::path directory) : directory_(std::move(directory)) {
   std::error_code fault;
+  if (fs::exists(directory_, fault) && !fs::is_directory(directory_, fault)) {
+    throw UsageError(fmt::format("{}: is a file; give the name of a directory", directory_.string()));
+  }
   for (fs::path above = directory_; !above.empty() && !fs::exists(above, fault); above = above.parent_path()) {
     made_ += above.has_filename() ? 1 : 0;  // not where the name ends with a slash
   }

@@ -348,6 +348,13 @@ TEST_F(Catalogue, FailsWhereTheDirectoryIsMissing) {
   EXPECT_THROW(add_to_catalogue(directory_ / "none/c.db", {&entry, 1}), MachineFailed);
 }
 
+TEST_F(Catalogue, IsRefusedWhereItMayNotBeRead) {
+  add(sample_entry());
+  std::filesystem::permissions(file_, std::filesystem::perms::none);
+  const NotRoot other_user(directory_.path());
+  EXPECT_THROW(static_cast<void>(read_catalogue(file_)), InputRefused);
+}
+
 TEST_F(Catalogue, RefusesTheNameOfADirectoryOrAFifo) {
   std::filesystem::create_directory(file_);
   EXPECT_THAT(refusal_of_all(), HasSubstr("catalogue.db: is a directory, not a regular file"));

@@ -3,11 +3,14 @@
 
 #include <gtest/gtest.h>
 #include <sys/resource.h>
+#include <unistd.h>
 
 #include <Eigen/Core>
 #include <csignal>
+#include <cstdlib>
 #include <filesystem>
 #include <limits>
+#include <stdexcept>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -35,6 +38,27 @@ class TemporaryDirectory {
 
  private:
   std::filesystem::path path_;
+};
+
+/// Another user for a while, where the test runs as root: root may write into read-only directories.
+class NotRoot {
+ public:
+  explicit NotRoot(const std::filesystem::path& directory) : was_root_(::geteuid() == 0) {
+    constexpr ::uid_t kNobody = 65534;
+    if (was_root_ && (::chown(directory.c_str(), kNobody, kNobody) != 0 || ::seteuid(kNobody) != 0)) {
+      throw std::runtime_error("cannot become another user");
+    }
+  }
+  ~NotRoot() {
+    if (was_root_ && ::seteuid(0) != 0) {
+      std::abort();
+    }
+  }
+  NotRoot(const NotRoot&) = delete;
+  NotRoot& operator=(const NotRoot&) = delete;
+
+ private:
+  bool was_root_;
 };
 
 /// Makes every file of this process end at `bytes`, as a full disk would.

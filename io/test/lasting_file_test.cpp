@@ -86,6 +86,11 @@ TEST(SlotFile, KeepsWhatIsPutIntoIt) {
   EXPECT_EQ(SlotFile::open(directory / "state").content(), bytes_of("first SECOND"));
 }
 
+TEST(GrowingFile, RefusesTheNameOfADirectory) {
+  const TemporaryDirectory directory;
+  EXPECT_THROW(static_cast<void>(GrowingFile::begin(directory.path())), UsageError);
+}
+
 TEST(SlotFile, IsOfOneProgramAtATime) {
   const TemporaryDirectory directory;
   std::optional<SlotFile> file = SlotFile::begin(directory / "state", bytes_of("text"));

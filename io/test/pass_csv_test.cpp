@@ -288,7 +288,7 @@ TEST_F(PassCsv, PassWrittenWithoutTruthLeavesNoStaleTruthBehind) {
 
 TEST_F(PassCsv, WritingADirectoryOverAFileFails) {
   write_text(directory_ / "file", "x");
-  EXPECT_THROW(write_pass(directory_ / "file", read_pass(directory_.path()).pass, nullptr), MachineFailed);
+  EXPECT_THROW(write_pass(directory_ / "file", read_pass(directory_.path()).pass, nullptr), UsageError);
 }
 
 }  // namespace

@@ -37,7 +37,7 @@ TEST(MadeDirectory, GoesAgainWithThoseAboveItWhereNothingHasBeenPutIntoThem) {
 TEST(MadeDirectory, RefusesTheNameOfAFile) {
   const TemporaryDirectory directory;
   write_text(directory / "file", "x");
-  EXPECT_THROW(MadeDirectory(directory / "file"), MachineFailed);
+  EXPECT_THROW(MadeDirectory(directory / "file"), UsageError);
   EXPECT_THROW(MadeDirectory(directory / "file/a"), MachineFailed);
   EXPECT_THAT(directory.names(), ElementsAre("file"));
 }

@@ -9,8 +9,8 @@ namespace trihedron::io {
 /// A file written under a temporary name beside its target and renamed onto it by commit(); without commit() it is
 /// removed. What a killed program of this machine left under such a name is removed by the next one that writes into
 /// the same directory. A target that is a symbolic link stays one: the file it leads to is replaced. A file that is
-/// replaced hands its mode on. A target that is not a regular file (a pipe, /dev/null) is written straight. Every
-/// failure throws MachineFailed.
+/// replaced hands its mode on. A target that is not a regular file (a pipe, /dev/null) is written straight. A target
+/// that is a directory throws UsageError, every other failure MachineFailed.
 class AtomicFile {
  public:
   explicit AtomicFile(std::filesystem::path target);
@@ -40,7 +40,7 @@ class AtomicFile {
 /// One text, all or nothing.
 void write_file(const std::filesystem::path& path, std::string_view content);
 
-/// Asked before a long calculation: throws MachineFailed where a file of this name could not even be begun. Leaves
+/// Asked before a long calculation: throws as AtomicFile where a file of this name could not even be begun. Leaves
 /// nothing.
 void expect_writable(const std::filesystem::path& path);
 

@@ -1,6 +1,7 @@
 #pragma once
 /// Files that a program keeps up to date while it works, so that what it has confirmed outlives it whatever ends it.
-/// Other than those of atomic_file.hpp they are there while they grow. Every failure throws MachineFailed.
+/// Other than those of atomic_file.hpp they are there while they grow. The name of a directory throws UsageError, every
+/// other failure MachineFailed.
 
 #include <cstddef>
 #include <cstdint>

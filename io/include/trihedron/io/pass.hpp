@@ -188,7 +188,7 @@ struct PassFormat {
 /// directory from others as long as it lives.
 class PassWriter {
  public:
-  /// Throws MachineFailed.
+  /// Throws MachineFailed, and UsageError where the path is of another kind.
   explicit PassWriter(std::filesystem::path path);
   /// Once. `truth` may be null. The prior calibration goes along. Throws MachineFailed when it cannot be written; then
   /// the pass that was there before stays.

@@ -7,7 +7,8 @@
 
 namespace trihedron::io {
 
-/// Makes a directory and those above it; those that are still empty go again with the object. Throws MachineFailed.
+/// Makes a directory and those above it; those that are still empty go again with the object. Throws
+/// UsageError for the name of a file, MachineFailed for what else fails.
 class MadeDirectory {
  public:
   explicit MadeDirectory(std::filesystem::path directory);
@@ -38,7 +39,8 @@ class DirectoryLock {
 /// moves them to their places, and keep() makes that final. Until then the destructor takes everything back, and after
 /// a `kill -9` or a loss of power the next one that stages files for the same directory does: what a set replaces is
 /// held in a hidden directory beside it until keep(), which only renames that one. Other files stay. Links and modes
-/// are kept as AtomicFile keeps them. Every failure throws MachineFailed.
+/// are kept as AtomicFile keeps them. Throws UsageError for the name of a file; every other failure throws
+/// MachineFailed.
 class StagedDirectory {
  public:
   /// Refuses at once a directory that cannot be written, and one that another process stages files for.
