@@ -32,12 +32,12 @@ std::string speed_text(double speed) {
   return speed == ground::kAtOnce ? "as fast as can be" : fmt::format("{:g} × real time", speed);
 }
 
-/// A row for each parameter, a column for each gyro.
+/// A row for each parameter, a column for each gyro. Of three gyros they fit into 80 columns.
 void add_parameters(const Calibration& calibration, std::vector<std::string>& lines) {
-  constexpr int kColumn = 30;
+  constexpr int kColumn = 22;
   std::string head = fmt::format("{:<12}", "Parameters");
   for (std::size_t k = 0; k < calibration.gyros.size(); ++k) {
-    head += fmt::format("{:<{}}", fmt::format("gyro {}", k + 1), kColumn);
+    head += fmt::format("{:<{}}", fmt::format("gyro {}, rad/s", k + 1), kColumn);
   }
   lines.push_back(head);
   const std::size_t of_one = calibration.states.size() / calibration.gyros.size();
@@ -55,7 +55,7 @@ void add_parameters(const Calibration& calibration, std::vector<std::string>& li
       }
       line += fmt::format("{:<{}}",
                           row < coefficients
-                              ? fmt::format("{} ± {} rad/s", figure("{:+.4e}", value), figure("{:.1e}", sigma))
+                              ? fmt::format("{} ± {}", figure("{:+.4e}", value), figure("{:.1e}", sigma))
                               : fmt::format("{}{} ± {}", value > 0 ? "+" : "", angle_text(value), angle_text(sigma)),
                           kColumn);
     }
@@ -110,12 +110,12 @@ std::vector<std::string> screen_of(const ReplayMoment& moment) {
   }
   lines.push_back(fmt::format("Readiness   {}", readiness_in_words(record)));
   lines.push_back(fmt::format("Calibration {}adoptions {}, taken back {}; residuals {:.2f}, navigator {:.2f}",
-                              record.adopted != 0 ? "in use; " : "not in use; ", record.adoptions, record.withdrawals,
+                              record.adopted != 0 ? "in use; " : "unused; ", record.adoptions, record.withdrawals,
                               record.residual_ratio, record.navigation_ratio));
-  lines.push_back(fmt::format("Samples     {} used, {} thinned, {} rejected; gaps {}, clock set back {} times",
+  lines.push_back(fmt::format("Samples     {} used, {} thinned, {} rejected; gaps {}, clock set back {}",
                               record.samples_used, record.samples_thinned, record.samples_rejected, record.gaps,
                               record.clock_set_backs));
-  lines.push_back(fmt::format("Fixes       {} used, {} rejected, {} not looked at; filter restarted {} times",
+  lines.push_back(fmt::format("Fixes       {} used, {} rejected, {} not looked at; filter restarts {}",
                               record.fixes_used, record.fixes_rejected, record.fixes_ignored, record.filter_restarts));
   for (std::size_t i = 0; i < kRejectionsShown; ++i) {
     const std::string_view title = i == 0 ? "Rejections" : "";

@@ -206,6 +206,14 @@ def test_a_screen_fits_its_terminal(minutes):
         assert len(lines) <= 11 and max(map(len, lines)) < 40
 
 
+def test_a_screen_of_80_columns_shows_whole_lines(minutes):
+    terminal = Terminal("replay", minutes, "--speed", "480", columns=300)
+    terminal.end()
+    screen = terminal.shown.decode().split("\x1b[?25h")[0]
+    lines = re.sub(r"\x1b\[[\d;?]*[A-Za-z]", "", screen).replace("\r", "").split("\n")
+    assert any("; adoptions " in line for line in lines) and max(map(len, lines)) < 80, max(lines, key=len)
+
+
 @pytest.mark.long
 def test_no_colour_and_a_dumb_terminal(two_hours, minutes):
     arguments = ("replay", two_hours, "--speed", "max", *SOON)

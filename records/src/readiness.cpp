@@ -31,7 +31,7 @@ std::string readiness_in_words(const Housekeeping& record) {
     return "no attitude";
   }
   if (record.predicted == 0) {
-    return "not yet known: the stretch that a prediction needs has not been flown";
+    return "not yet known: the stretch for a prediction has not been flown";
   }
   const std::string error = angle_in_words(record.required_error_rad);
   const double minutes = std::floor(readiness_s(record) / 60);
@@ -40,8 +40,8 @@ std::string readiness_in_words(const Housekeeping& record) {
   }
   char duration[32];
   std::snprintf(duration, sizeof duration, "%.0f min", minutes);
-  return (record.adopted != 0 ? "attitude within " : "with this calibration, attitude within ") + error +
-         " for the next " + duration + " (99.7 %)";
+  return (record.adopted != 0 ? "attitude within " : "if adopted, attitude within ") + error + " for the next " +
+         duration + " (99.7 %)";
 }
 
 }  // namespace trihedron

@@ -19,7 +19,7 @@ TEST(Readiness, IsASentence) {
   its.required_error_rad /= 10;
   EXPECT_EQ(readiness_in_words(its), "attitude within 30″ for the next 270 min (99.7 %)");
   its.adopted = 0;
-  EXPECT_EQ(readiness_in_words(its), "with this calibration, attitude within 30″ for the next 270 min (99.7 %)");
+  EXPECT_EQ(readiness_in_words(its), "if adopted, attitude within 30″ for the next 270 min (99.7 %)");
 }
 
 TEST(Readiness, RunsOutFromTheLastCorrectionOn) {
@@ -37,7 +37,7 @@ TEST(Readiness, PromisesNothingWhereNothingIsKnown) {
   Housekeeping its = record();
   its.predicted = 0;
   EXPECT_EQ(readiness_s(its), 0);
-  EXPECT_EQ(readiness_in_words(its), "not yet known: the stretch that a prediction needs has not been flown");
+  EXPECT_EQ(readiness_in_words(its), "not yet known: the stretch for a prediction has not been flown");
   its.attitude_valid = 0;
   EXPECT_EQ(readiness_in_words(its), "no attitude");
 }
