@@ -105,7 +105,8 @@ std::string cells_text(const CampaignPlan& plan, const CampaignSummary& summary)
     rows.front().emplace_back(head);
   }
   for (const std::string_view key : campaign::kCellMeasures) {
-    rows.front().emplace_back(key);
+    std::string& head = rows.front().emplace_back(key);
+    std::ranges::replace(head, '_', ' ');
   }
   for (const campaign::GridCell& cell : summary.cells) {
     if (rows.size() > kShownCells) {

@@ -3,6 +3,7 @@ build directory."""
 import json
 import os
 import pty
+import re
 import shutil
 import signal
 import subprocess
@@ -275,6 +276,7 @@ def test_settings_of_a_grid_are_tried_over_the_same_flights(tmp_path):
         "attitude", "calibration.estimator", "gyro.readout.noise", "star_tracker.dropout_probability"}
     shown = run("campaign", tmp_path / "c.toml", "-o", out, "--resume").stdout
     assert "By the grid" in shown and "along track" in shown
+    assert re.search(r"NEES +NIS +alignment error +open loop error +extension\n", shown)
     alone = run("campaign", tmp_path / "c.toml", "-o", out, "--only", "30")
     assert "bit for bit" in alone.stdout
     assert 'estimator = "invariant"' in (out / "run-30" / "effective-config.toml").read_text()
