@@ -261,7 +261,9 @@ void add_calibrate(CLI::App& program, const Common& common, int& exit_status) {
   auto arguments = std::make_shared<Arguments>();
   CLI::App* command =
       program.add_subcommand("calibrate", "Calibrate drift and alignment of the gyros against the star tracker");
-  command->add_option("PASS", arguments->passes, "Directory or NetCDF file; several of one start of the rotors")
+  command
+      ->add_option("PASS", arguments->passes,
+                   "Directory, NetCDF file or telemetry.toml; several of one start of the rotors")
       ->required();
   command->add_option("-o,--output", arguments->out, "Directory to write into")->required()->type_name("DIRECTORY");
   command

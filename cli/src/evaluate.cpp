@@ -26,7 +26,7 @@ void add_evaluate(CLI::App& program, const Common& common, int& exit_status) {
   auto arguments = std::make_shared<Arguments>();
   CLI::App* command =
       program.add_subcommand("evaluate", "Measure an attitude against the truth, or else the star tracker");
-  command->add_option("PASS", arguments->pass, "Directory or NetCDF file")->required();
+  command->add_option("PASS", arguments->pass, "Directory, NetCDF file or telemetry.toml")->required();
   command
       ->add_option("--attitude", arguments->attitude,
                    "Attitude file (CSV), CCSDS AEM or SPICE CK; - for standard input")

@@ -88,7 +88,7 @@ void add_navigate(CLI::App& program, const Common& common, int& exit_status) {
   };
   auto arguments = std::make_shared<Arguments>();
   CLI::App* command = program.add_subcommand("navigate", "Give the attitude at every gyro sample");
-  command->add_option("PASS", arguments->pass, "Directory or NetCDF file")->required();
+  command->add_option("PASS", arguments->pass, "Directory, NetCDF file or telemetry.toml")->required();
   CLI::Option_group* source = command->add_option_group("parameters");
   source
       ->add_option("--calibration", arguments->calibration,

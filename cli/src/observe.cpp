@@ -215,7 +215,7 @@ void add_observe(CLI::App& program, const Common& common, int& exit_status) {
   CLI::App* command = program.add_subcommand("observe", "Say what a pass can tell of the parameters, and what not");
   command
       ->add_option("PASS|SCENARIO.toml", arguments->path,
-                   "Directory or NetCDF file; or a scenario to be simulated, - for standard input")
+                   "Directory, NetCDF file or telemetry.toml; or a scenario to be simulated, - for standard input")
       ->required();
   CLI::Option* advise =
       command->add_flag("--advise", arguments->advise, "Search the slews that calibrate best; of a scenario");

@@ -473,7 +473,8 @@ void add_replay(CLI::App& program, const Common& common, int& exit_status) {
   auto arguments = std::make_shared<Arguments>();
   CLI::App* command = program.add_subcommand(
       "replay", "Feed the on-board application by the clock, and show what it does: a live screen in a terminal");
-  command->add_option("PASS", arguments->pass, "Directory or NetCDF file, of two or three gyros")->required();
+  command->add_option("PASS", arguments->pass, "Directory, NetCDF file or telemetry.toml, of two or three gyros")
+      ->required();
   command->add_option("--speed", arguments->speed, "Times real time; max, as fast as can be")
       ->capture_default_str()
       ->type_name("NUMBER|max");
