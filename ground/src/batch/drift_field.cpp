@@ -29,7 +29,8 @@ using Eigen::VectorXd;
 /// degree is likely to have some of the next, and near a great circle W and D of a degree look alike; but of low
 /// degrees, which act much as eq. (1) does, a pass without slews shows little, and that it shows nothing of high ones
 /// says little of them. Symmetric members look more like eq. (1) than others, so that a pass shows less of them than of
-/// these: they may be there alone, and where the others are, they are as well.
+/// these: they may be there alone, and where the others are, they are as well. A rotor may also have a single member
+/// that is larger than the others of its group: each is uncertain by e^0.8 beside the level of its group.
 constexpr double kRmsOfDegree1_rad_s = 5e-9;
 constexpr double kFallPerDegree = 0.7;
 constexpr double kLeastRms_rad_s = 1e-10;
@@ -40,6 +41,7 @@ constexpr double kSigmaOfDegree = 2;
 constexpr double kDegreesAlike = 3;
 constexpr double kSigmaOfSymmetry = 1;
 constexpr double kSigmaOfGroup = 0.5;
+constexpr double kSigmaOfMember = 0.8;
 /// Larger than all of eq. (1): a rotor that drifts so is not one that it describes.
 constexpr double kMostRms_rad_s = 1e-5;
 
@@ -108,9 +110,17 @@ class Posteriors {
         prior_(prior_information(members.groups())) {}
 
   [[nodiscard]] FieldLikelihood at(const VectorXd& log_rms) const {
+    FieldLikelihood found = with(members_.sigma(log_rms));
+    const VectorXd apart_from_prior = log_rms - prior_mean_;
+    found.log_likelihood -= apart_from_prior.dot(prior_ * apart_from_prior) / 2;
+    return found;
+  }
+
+  /// With these sigmas of the members; the likelihood is that of the pass alone.
+  [[nodiscard]] FieldLikelihood with(const VectorXd& sigma) const {
     check_stop();
     FieldLikelihood found;
-    found.sigma = members_.sigma(log_rms);
+    found.sigma = sigma;
     // y by its own covariance: there are fewer of it than of the members.
     MatrixXd covariance = MatrixXd::Identity(information_.R.rows(), information_.R.rows());
     add_gram(information_.R * found.sigma.asDiagonal(), 1, covariance);
@@ -119,9 +129,8 @@ class Posteriors {
     }
     found.L = std::move(covariance);
     found.y = found.L.triangularView<Eigen::Lower>().solve(information_.y);
-    const VectorXd apart_from_prior = log_rms - prior_mean_;
-    found.log_likelihood = information_.log_likelihood - found.L.diagonal().array().log().sum() -
-                           found.y.squaredNorm() / 2 - apart_from_prior.dot(prior_ * apart_from_prior) / 2;
+    found.log_likelihood =
+        information_.log_likelihood - found.L.diagonal().array().log().sum() - found.y.squaredNorm() / 2;
     return found;
   }
 
@@ -440,6 +449,33 @@ VectorXd log_of_mean_squares(const Posteriors& posteriors, const FieldSpectrum& 
   return spectrum.log_rms + VectorXd::Map(found.data(), size);
 }
 
+/// By how much the variance of each member is larger than that of its group, in the mean over what the pass allows; not
+/// below 1. `by_group`: with the variances of the groups. The covariance of the spectrum alone would have it that of a
+/// group of which a pass shows some members, and small ones, those that it does not show are as small.
+VectorXd own_variances(const Posterior& by_group) {
+  constexpr double kStep = 0.25;  // of the normal variable
+  constexpr double kMost = 4;
+  VectorXd found(by_group.mean.size());
+  for (Index i = 0; i < found.size(); ++i) {
+    // Of the amplitude in sigmas z the pass says exp(h z - L z^2 / 2), all others integrated over.
+    const double left = std::max(1 - by_group.white.col(i).squaredNorm(), 1e-12);
+    const double L = 1 / left - 1;
+    const double h = by_group.mean(i) / left;
+    double weights = 0;
+    double variances = 0;
+    const auto exponent = [&](double variance) { return h * h * variance / (1 + variance * L) / 2; };
+    const double most = exponent(std::exp(2 * kSigmaOfMember * kMost));
+    for (double x = -kMost; x <= kMost; x += kStep) {
+      const double variance = std::exp(2 * kSigmaOfMember * x);
+      const double weight = std::exp(exponent(variance) - most - x * x / 2) / std::sqrt(1 + variance * L);
+      weights += weight;
+      variances += weight * variance;
+    }
+    found(i) = std::max(variances / weights, 1.0);
+  }
+  return found;
+}
+
 }  // namespace
 
 MatrixXd covariance_of_spectrum(const FieldMembers& members, const FieldInformation& information,
@@ -447,8 +483,9 @@ MatrixXd covariance_of_spectrum(const FieldMembers& members, const FieldInformat
   const Posteriors posteriors(members, information);
   const FieldLikelihood likelihood = posteriors.at(spectrum.log_rms);
   const Posterior most_likely = posteriors.posterior(likelihood);
-  const Posterior mean =
-      posteriors.posterior(posteriors.at(log_of_mean_squares(posteriors, spectrum, likelihood.log_likelihood)));
+  const FieldLikelihood by_group = posteriors.at(log_of_mean_squares(posteriors, spectrum, likelihood.log_likelihood));
+  const VectorXd own = own_variances(posteriors.posterior(by_group));
+  const Posterior mean = posteriors.posterior(posteriors.with(by_group.sigma.cwiseProduct(own.cwiseSqrt())));
   MatrixXd added = MatrixXd::Zero(members.size(), members.size());
   mean.add_covariance(1, added);
   most_likely.add_covariance(-1, added);

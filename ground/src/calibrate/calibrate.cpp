@@ -351,6 +351,7 @@ CalibrationRun calibrate_as_stamped(const Pass& pass, const CalibrationOptions& 
   run.options = decision.options;
   run.evidence = decision.evidence;
   run.orbital_error_over_drift = decision.orbital_error_over_drift;
+  run.orbital_error_over_field = decision.orbital_error_over_field;
   run.against_field = decision.against_field;
   run.changes = decision.changes;
   run.known_before = known_before(settings, decision.options, decision.field);

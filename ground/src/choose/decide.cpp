@@ -37,15 +37,17 @@ bool is_judged_by_trial(const FurtherStateRow& row) {
          row.state != FurtherState::kPolhode;
 }
 
-/// Smallest number of pairs of fixes from which the noise of the star tracker is estimated, to some percent.
-constexpr std::size_t kLeastFixPairs = 1000;
+/// Smallest number of pairs of fixes from which noise is looked for: it is then known to a tenth.
+constexpr std::size_t kLeastFixPairs = 100;
+/// So many tell the noise of a stretch of the pass to some percent.
+constexpr std::size_t kFixPairsOfStretch = 1000;
 
 /// 1-sigma of the star tracker by the changes of a trial, in the order of their times. Needs changes. Noise may be more
 /// for a part of the pass: the root mean square over stretches, without outliers, of which no stretch counts as more
 /// than three times the median of all.
 Eigen::Vector3d star_tracker_noise_rad(const std::vector<Eigen::Vector3d>& changes_rad) {
   constexpr double kMost = 3;
-  const std::size_t stretches = std::max<std::size_t>(changes_rad.size() / kLeastFixPairs, 1);
+  const std::size_t stretches = std::max<std::size_t>(changes_rad.size() / kFixPairsOfStretch, 1);
   Eigen::Vector3d noise_rad;
   for (int axis = 0; axis < 3; ++axis) {
     std::vector<double> sigmas;
@@ -72,7 +74,9 @@ std::optional<Eigen::Vector3d> other_star_tracker_noise(const Pass& pass,
                                                         const std::vector<Eigen::Vector3d>& changes_rad) {
   const Eigen::Vector3d& given = pass.settings.star_tracker_noise_rad;
   const Eigen::Vector3d found = star_tracker_noise_rad(changes_rad);
-  const bool other = ((found - given).array().abs() > kNoiseTolerance * given.array()).any();
+  // Neighbours share a fix, so that n changes tell a sigma to the root of 3/4n.
+  const double chance = 3 * std::sqrt(0.75 / static_cast<double>(changes_rad.size()));
+  const bool other = ((found - given).array().abs() > std::max(kNoiseTolerance, chance) * given.array()).any();
   return other ? std::optional(found) : std::nullopt;
 }
 
@@ -738,10 +742,16 @@ class AtOrbit {
     if (!has_error_) {
       drift_odds_ = instead->odds.drift;
       drift_over_field_ = less + log_odds(drift_odds_);
+      if (const double error_odds = log_odds(instead->odds.error); error_odds > kLogOddsToAccept) {
+        error_over_field_ = less + error_odds;
+      }
     }
   }
 
   [[nodiscard]] bool has_error() const { return has_error_; }
+  /// Where a field was found without an error of the star tracker, and eq. (1) alone would show one: ln of the
+  /// likelihood by eq. (1) with the error less that of the field.
+  [[nodiscard]] std::optional<double> error_over_field() const { return error_over_field_; }
   [[nodiscard]] double error_over_drift() const { return log_odds(odds_.error) - log_odds(odds_.drift); }
   [[nodiscard]] bool may_be_drift() const {
     constexpr double kMayBeDrift = 20;
@@ -778,6 +788,7 @@ class AtOrbit {
   /// ln of the likelihood by eq. (1) with drift, or both, less that of the field.
   double drift_over_field_ = -std::numeric_limits<double>::infinity();
   double both_over_field_ = -std::numeric_limits<double>::infinity();
+  std::optional<double> error_over_field_;
 };
 
 /// What is decided with drift at orbital period.
@@ -827,6 +838,9 @@ Decision decide_on_orbital_drift(const Pass& pass, const Screened& screened, Cal
     instead = by_eq1_instead_of_field(pass, screened, asked, decision.options);
   }
   const AtOrbit at_orbit(decision, instead);
+  if (asked.further_states[kError] == Choice::kAuto) {
+    decision.orbital_error_over_field = at_orbit.error_over_field();
+  }
   CalibrationOptions without_error = asked;
   CalibrationOptions with_error = asked;
   with_error.further_states[kError] = Choice::kOn;
@@ -879,6 +893,7 @@ void keep_what_comes_back(const Decision& before, Decision& again) {
   std::ranges::copy_if(before.evidence, std::back_inserter(again.evidence),
                        [](const Evidence& evidence) { return evidence.state == FurtherState::kOrbitalDrift; });
   again.orbital_error_over_drift = before.orbital_error_over_drift;
+  again.orbital_error_over_field = before.orbital_error_over_field;
 }
 
 /// The polhodes with which the pass is most likely by eq. (1), from those on that the changes of the coefficients show:

@@ -33,6 +33,8 @@ struct Decision {
   std::optional<OrbitalOdds> orbital_odds;  ///< where the pass was looked at for them
   /// Where an error of the star tracker at orbital period was accepted: ln of its odds against such drift.
   std::optional<double> orbital_error_over_drift;
+  /// Where a drift field was found and no such error, which eq. (1) alone would show: ln of its odds against the field.
+  std::optional<double> orbital_error_over_field;
   std::optional<AgainstField> against_field;  ///< where eq. (1) alone was asked for, and the noise was found
   /// Those of the pass with what it shows of the size of members outside eq. (1), for an estimator on board.
   std::optional<PassSettings> settings;

@@ -256,7 +256,7 @@ std::vector<Forecast> Trial::forecasts() const {
 }
 
 std::vector<Eigen::Vector3d> Trial::changes_rad() const {
-  constexpr Duration kClose = std::chrono::seconds(10);  // over which nothing slow changes
+  constexpr Duration kClose = std::chrono::seconds(100);  // over which nothing slow changes by as much as the noise
   const CalibrationSetup& setup = problem_.setup().on_board;
   std::vector<Eigen::Vector3d> changes;
   std::optional<Eigen::Quaterniond> last;

@@ -585,6 +585,20 @@ void judge_at_orbital_period(const AtOrbitalPeriod& its, const CalibrationRun& r
   }
 }
 
+void judge_field_or_error(const std::optional<double>& error_over_field, std::vector<Finding>& findings) {
+  constexpr double kSureLogOdds = 5;
+  if (!error_over_field || *error_over_field < -kSureLogOdds) {
+    return;
+  }
+  add(findings, FindingCode::kOrbitalErrorOrDrift,
+      "What was taken for drift that eq. (1) does not contain may as well be an error of the star tracker at orbital "
+      "period: in this pass both look alike. Sigmas do not tell of the error.",
+      fmt::format("ln of the odds of such an error, with drift by eq. (1) alone, against the drift {:+.1f}",
+                  *error_over_field),
+      "Calibrate by a longer pass, with more fixes and with slews about two axes. Where the star tracker is known to "
+      "have no such error: orbital_error = \"off\" in [further_states].");
+}
+
 void judge_polhodes(const CalibrationRun& run, std::vector<Finding>& findings) {
   constexpr double kSigmasToReport = 5;
   constexpr double kNearlyAlike = 0.1;
@@ -1025,6 +1039,7 @@ Verdict judge(const Pass& pass, const CalibrationRun& run) {
   judge_clocks(pass, run, findings);
   judge_at_orbital_period(kErrorAtOrbitalPeriod, run, findings);
   judge_at_orbital_period(kDriftAtOrbitalPeriod, run, findings);
+  judge_field_or_error(run.orbital_error_over_field, findings);
   judge_polhodes(run, findings);
   judge_beside_outages(run.beside_outages, findings);
   judge_determination(run, findings);

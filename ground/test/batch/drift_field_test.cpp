@@ -23,6 +23,7 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
 const Layout kSmall{.drift_model = vsh(3)};
+constexpr double kSigmaOfMember = 0.8;  // ln, as the prior has it
 
 MatrixXd normal_matrix(Index rows, Index columns, std::mt19937_64& random) {
   std::normal_distribution<double> normal;
@@ -243,8 +244,8 @@ TEST(DriftField, TheUncertaintyOfTheSpectrumIsThatOfAllSpectraThatThePassAllows)
   const FieldSpectrum found = most_likely_spectrum(members, information);
   const MatrixXd added = covariance_of_spectrum(members, information, found);
 
-  const auto posterior = [&](const VectorXd& log_rms, VectorXd& mean) {
-    const VectorXd weight = members.sigma(log_rms).cwiseAbs2().cwiseInverse();
+  const auto posterior = [&](const VectorXd& sigma, VectorXd& mean) {
+    const VectorXd weight = sigma.cwiseAbs2().cwiseInverse();
     MatrixXd square = information.R.transpose() * information.R;
     square.diagonal() += weight;
     const Eigen::LLT<MatrixXd> root(square);
@@ -252,29 +253,48 @@ TEST(DriftField, TheUncertaintyOfTheSpectrumIsThatOfAllSpectraThatThePassAllows)
     return MatrixXd(root.solve(MatrixXd::Identity(members.size(), members.size())));
   };
   VectorXd centre;
-  const MatrixXd covariance = posterior(found.log_rms, centre);
+  const MatrixXd covariance = posterior(members.sigma(found.log_rms), centre);
   const Eigen::LLT<MatrixXd> information_root(found.information);
   const MatrixXd to_log = information_root.matrixU().solve(MatrixXd::Identity(4, 4));
-  const auto log_posterior = [&](const VectorXd& log_rms) {
-    return log_density(information, members.sigma(log_rms)) + log_prior(members, log_rms);
-  };
-  const double highest = log_posterior(found.log_rms);
+  const double highest = log_density(information, members.sigma(found.log_rms)) + log_prior(members, found.log_rms);
   MatrixXd sum = MatrixXd::Zero(members.size(), members.size());
   double weights = 0;
   constexpr int kDraws = 20000;
   for (int i = 0; i < kDraws; ++i) {
-    // From the normal approximation, weighted by how likely they are.
+    // From the normal approximation, and what each member differs by from its prior, weighted by how likely they are.
     const VectorXd drawn = normal_matrix(4, 1, random).col(0);
     const VectorXd log_rms = found.log_rms + to_log * drawn;
-    const double weight = std::exp(log_posterior(log_rms) - highest + drawn.squaredNorm() / 2);
+    const VectorXd own_factor = (kSigmaOfMember * normal_matrix(members.size(), 1, random).col(0)).array().exp();
+    const VectorXd sigma = members.sigma(log_rms).cwiseProduct(own_factor);
+    const double weight =
+        std::exp(log_density(information, sigma) + log_prior(members, log_rms) - highest + drawn.squaredNorm() / 2);
     VectorXd mean;
-    const MatrixXd own = posterior(log_rms, mean);
+    const MatrixXd own = posterior(sigma, mean);
     sum += weight * (own + (mean - centre) * (mean - centre).transpose() - covariance);
     weights += weight;
   }
   sum /= weights;
   EXPECT_NEAR((added.trace() + covariance.trace()) / (sum.trace() + covariance.trace()), 1, 0.25);
   EXPECT_GT(added.trace(), 0);
+}
+
+/// All but the last member seen, and small.
+TEST(DriftField, AMemberThatIsNotSeenMayBeLargerThanThoseOfItsGroup) {
+  std::mt19937_64 random(29);
+  const FieldMembers members(kSmall);
+  const Index size = members.size();
+  const double seen_rad_s = 1e-11;
+  FieldInformation information = seen_with(seen_rad_s, normal_matrix(size, 1, random).col(0) * 1e-9, random);
+  information.R = MatrixXd::Identity(size - 1, size) / seen_rad_s;
+  information.y = normal_matrix(size - 1, 1, random).col(0) * 1e-9 / seen_rad_s;
+  const FieldSpectrum found = most_likely_spectrum(members, information);
+  const MatrixXd added = covariance_of_spectrum(members, information, found);
+  const VectorXd by_group = members.sigma(found.log_rms);
+  const double factor = std::exp(2 * kSigmaOfMember * kSigmaOfMember);
+  const double of_unseen = 1 + added(size - 1, size - 1) / std::pow(by_group(size - 1), 2);
+  EXPECT_GT(of_unseen, 0.95 * factor);
+  EXPECT_LT(of_unseen, 3 * factor);  // with what the uncertainty of the level adds
+  EXPECT_LT(added.diagonal().head(size - 1).maxCoeff(), 0.01 * seen_rad_s * seen_rad_s);
 }
 
 TEST(DriftField, PutsItsVariancesIntoThePrior) {

@@ -701,6 +701,33 @@ TEST(Calibrate, FollowsCoefficientsThatChangeEvenly) {
   EXPECT_LT(nees_of(simulated.truth, run.calibration), 45);
 }
 
+/// 360 fixes in three hours.
+Scenario scenario_of_few_fixes(std::uint64_t seed) {
+  Scenario scenario = scenario_in_eq1(seed, std::chrono::hours(3));
+  scenario.star_tracker_period = std::chrono::seconds(30);
+  return scenario;
+}
+
+TEST(Calibrate, FindsTheNoiseOfFewFixes) {
+  Scenario scenario = scenario_of_few_fixes(2);
+  for (GyroScenario& gyro : scenario.gyros) {
+    gyro.drift.markov_sigma_rad_s = 2e-8;
+  }
+  const auto simulated = sim::simulate(scenario);
+  const auto run = calibrate(simulated.pass, {});
+  EXPECT_TRUE(run.options.find_noise);
+  EXPECT_EQ(run.options.star_tracker_noise_rad, std::nullopt);  // what so few show of it may be chance
+  EXPECT_LT(nees_of(simulated.truth, run.calibration), 45);
+  EXPECT_LT(square_of_attitude(run, simulated.truth), 1.5);
+}
+
+TEST(Calibrate, FindsNoNoiseByLessThanAHundredFixes) {
+  Scenario scenario = scenario_of_few_fixes(2);
+  scenario.star_tracker_period = std::chrono::seconds(110);
+  const auto simulated = sim::simulate(scenario);
+  EXPECT_FALSE(calibrate(simulated.pass, {}).options.find_noise);
+}
+
 // As in the magnetic field of the Earth, which turns both momenta nearly alike: no residual contradicts an error of the
 // star tracker.
 TEST(Calibrate, DoesNotTrustAnErrorAtOrbitalPeriodThatMayBeDriftOfAllGyros) {

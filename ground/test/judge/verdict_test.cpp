@@ -199,6 +199,17 @@ TEST(Verdict, ForbidsDriftAtOrbitalPeriodThatMayBeAnErrorOfTheStarTracker) {
   EXPECT_FALSE(judge(good_pass(), run).trustworthy);
 }
 
+TEST(Verdict, ForbidsDriftOutsideEq1ThatMayBeAnErrorOfTheStarTracker) {
+  auto run = good_run();
+  run.orbital_error_over_field = -7;
+  EXPECT_THAT(codes(judge(good_pass(), run)), IsEmpty());
+  run.orbital_error_over_field = -3;
+  const Verdict found = judge(good_pass(), run);
+  ASSERT_THAT(codes(found), ElementsAre("orbital-error-or-drift"));
+  EXPECT_FALSE(found.trustworthy);
+  EXPECT_THAT(found.findings[0].evidence, HasSubstr("-3.0"));
+}
+
 TEST(Verdict, TellsOfPolhodesAndOfPeriodsThatMayBeThoseOfTheOrbit) {
   auto run = good_run();
   run.options.orbital_rate_rad_s = 2 * std::numbers::pi / 6000;

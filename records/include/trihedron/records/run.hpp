@@ -179,6 +179,8 @@ struct CalibrationRun {
   std::vector<Evidence> evidence;                     ///< of what was left to the program to decide
   /// Where an error of the star tracker at orbital period was accepted: ln of its odds against drift at that period.
   std::optional<double> orbital_error_over_drift;
+  /// Where a drift field was found and no such error, which eq. (1) alone would show: ln of its odds against the field.
+  std::optional<double> orbital_error_over_field;
   std::vector<DriftModelForecast> drift_models;  ///< that were compared, smallest first
   std::optional<AgainstField> against_field;     ///< where eq. (1) alone was asked for
   Calibration known_before;                      ///< values and covariance before the pass; states as in `calibration`
