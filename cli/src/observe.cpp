@@ -96,9 +96,8 @@ std::string combinations_text(const Observability& observability) {
 std::string observability_text(const Observability& observability, Time epoch) {
   const Eigen::VectorXd& s = observability.singular_values;
   return fmt::format(
-      "Observable  {} of {} combinations of parameters: known from the data alone by {:.0f} times what was known "
-      "before, "
-      "or more; all by {} … {} times\n"
+      "Observable  {} of {} combinations of parameters: the data alone tell them at least {:.0f} times as well as they "
+      "were known before; all of them {} … {} times\n"
       "Attitude    {} rms per axis by what the parameters leave, between corrections and slewing\n{}{}",
       observable_count(observability), s.size(), Observability::kUnobservable, figure("{:.2g}", s(0)),
       figure("{:.2g}", s(s.size() - 1)), angle_text(observability.attitude_error_rad),

@@ -15,6 +15,7 @@
 #include "trihedron/io/attitude_message.hpp"
 #include "trihedron/io/time_text.hpp"
 #include "trihedron/records/stop.hpp"
+#include "wording.hpp"
 
 namespace trihedron::io {
 namespace {
@@ -45,8 +46,7 @@ AttitudeMessage read_attitude_of_any_format(const std::filesystem::path& path, s
   if (is_attitude_message(content.text())) {
     return parse_attitude_message(content.text(), path);
   }
-  const std::size_t first = content.text().find_first_not_of(" \t\r\n");
-  if (first != std::string_view::npos && content.text()[first] == '{') {
+  if (begins_as_json(content.text())) {
     throw InputRefused(path, {}, "is JSON, as calibration.json is, and no attitude",
                        "give an attitude: attitude.csv, a message (AEM, APM) or a C-kernel of SPICE; of a calibration "
                        "`export` writes acm, acm-xml and fk");

@@ -765,9 +765,8 @@ Eigen::MatrixXd covariance_of_all(const Calibration& calibration) {
 
 Calibration read_calibration(const std::filesystem::path& path) {
   const TextFile file(path);
-  expect_utf8(file.text(), path);
-  const std::size_t first = file.text().find_first_not_of(" \t\r\n");
-  if (first == std::string_view::npos || file.text()[first] != '{') {
+  refuse_utf16(file.text(), path);
+  if (!begins_as_json(file.text())) {
     throw InputRefused(path, {}, "is no calibration.json: it does not begin with {",
                        "give the calibration.json that `trihedron calibrate` writes; `import` makes one of an ACM");
   }

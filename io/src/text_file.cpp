@@ -67,7 +67,7 @@ TextFile::TextFile(const std::filesystem::path& path) {
   bytes_[size_] = '\n';
 }
 
-void expect_utf8(std::string_view text, const std::filesystem::path& file) {
+void refuse_utf16(std::string_view text, const std::filesystem::path& file) {
   const bool has_mark = text.starts_with("\xFF\xFE") || text.starts_with("\xFE\xFF");
   // Without a mark: every other octet of ASCII is zero.
   const bool is_wide = text.size() > 1 && (text[0] == '\0') != (text[1] == '\0');

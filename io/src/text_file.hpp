@@ -25,6 +25,6 @@ class TextFile {
 };
 
 /// Throws InputRefused for a text in UTF-16, as some programs of Windows write it: what reads texts here takes UTF-8.
-void expect_utf8(std::string_view text, const std::filesystem::path& file);
+void refuse_utf16(std::string_view text, const std::filesystem::path& file);
 
 }  // namespace trihedron::io

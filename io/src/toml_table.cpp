@@ -114,7 +114,7 @@ void TomlTable::refuse(const toml::node& node, std::string reason, std::string c
 }
 
 toml::table parse_toml(std::string_view text, const std::filesystem::path& file) {
-  expect_utf8(text, file);
+  refuse_utf16(text, file);
   try {
     toml::table document = toml::parse(text, file.string());
     if (const toml::node* const version = document.get(kVersionKey)) {

@@ -12,6 +12,9 @@ namespace trihedron::io {
 /// Without the blanks (space, tab, CR) at both ends.
 [[nodiscard]] std::string_view trimmed(std::string_view text);
 
+/// Whether a text can be a JSON object: its first character but for blanks and ends of lines is {.
+[[nodiscard]] bool begins_as_json(std::string_view text);
+
 /// The cure where something else was given than a pass.
 inline constexpr const char* kGiveAPass =
     "give a pass: a directory with pass.toml, gyro.csv and star_tracker.csv, a NetCDF-4 file, or a telemetry.toml";
