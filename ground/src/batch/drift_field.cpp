@@ -453,8 +453,8 @@ VectorXd log_of_mean_squares(const Posteriors& posteriors, const FieldSpectrum& 
 /// below 1. `by_group`: with the variances of the groups. The covariance of the spectrum alone would have it that of a
 /// group of which a pass shows some members, and small ones, those that it does not show are as small.
 VectorXd own_variances(const Posterior& by_group) {
-  constexpr double kStep = 0.25;  // of the normal variable
-  constexpr double kMost = 4;
+  constexpr int kPerSigma = 4;  // values of the normal variable at which the integral is taken
+  constexpr int kMost = 4;      // sigmas, on both sides
   VectorXd found(by_group.mean.size());
   for (Index i = 0; i < found.size(); ++i) {
     // Of the amplitude in sigmas z the pass says exp(h z - L z^2 / 2), all others integrated over.
@@ -465,7 +465,8 @@ VectorXd own_variances(const Posterior& by_group) {
     double variances = 0;
     const auto exponent = [&](double variance) { return h * h * variance / (1 + variance * L) / 2; };
     const double most = exponent(std::exp(2 * kSigmaOfMember * kMost));
-    for (double x = -kMost; x <= kMost; x += kStep) {
+    for (int step = -kMost * kPerSigma; step <= kMost * kPerSigma; ++step) {
+      const double x = static_cast<double>(step) / kPerSigma;
       const double variance = std::exp(2 * kSigmaOfMember * x);
       const double weight = std::exp(exponent(variance) - most - x * x / 2) / std::sqrt(1 + variance * L);
       weights += weight;

@@ -119,7 +119,7 @@ void judge_step(const Pass& pass, const ClockStep& step, Finding::Severity sever
 
 /// What the navigation corrected by the calibration in use.
 void tell_correction(const PassSettings& settings, const ClockCorrection& correction, std::vector<Finding>& findings) {
-  constexpr const char* kNone = "None needed while the clocks stay as they are.";
+  constexpr const char* kCure = "Calibrate again when a clock has been set.";
   if (correction.of_star_tracker()) {
     const double change_s = correction.rate_s_s * to_seconds(settings.duration);
     add(findings, FindingCode::kClockOffsetFound, Finding::Severity::kNote,
@@ -127,14 +127,14 @@ void tell_correction(const PassSettings& settings, const ClockCorrection& correc
         fmt::format("fixes hold the attitude {} after their stamp at the epoch of this pass; over the pass that "
                     "changes by {}",
                     offset_text(correction.offset_s), offset_text(change_s)),
-        kNone);
+        kCure);
   }
   for (int k = 0; k < static_cast<int>(settings.gyros.size()); ++k) {
     if (correction.late_s[k] != 0) {
       add(findings, FindingCode::kGyroLate, Finding::Severity::kNote,
           fmt::format("The readings of gyro {} were interpolated by what the calibration in use found of its stamps.",
                       k + 1),
-          fmt::format("{:+.2f} ms", 1e3 * correction.late_s[k]), kNone);
+          fmt::format("{:+.2f} ms", 1e3 * correction.late_s[k]), kCure);
     }
   }
 }

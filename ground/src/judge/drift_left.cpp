@@ -111,7 +111,7 @@ double in_sigmas_of_attitude(const CalibrationRun& run, double moved_rad) {
 }  // namespace
 
 std::optional<SlowLine> strongest_slow_line(const std::vector<FixRecord>& fixes, double shortest_period_s) {
-  constexpr std::size_t kFew = 200;
+  constexpr std::size_t kFew = 200;  // of more the sums below are normal
   std::optional<SlowLine> strongest;
   double most = 0;
   double tried = 0;

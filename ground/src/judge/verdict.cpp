@@ -231,7 +231,7 @@ void judge_gyro_rate(const Pass& pass, const CalibrationRun& run, std::vector<Fi
             "others were left out.",
             std::chrono::seconds(1) / Readings<2>::kMinSpacing),
         fmt::format("{} of {} samples left out; sampled every {:.3g} s", thinned, pass.gyro.size(), period_s),
-        "None needed.");
+        "Send fewer of them where that saves telemetry: the calibration is the same.");
   }
   CalibrationSetup setup;
   const Duration usual_reach = setup.reach();
@@ -501,6 +501,9 @@ void judge_change(const CalibrationRun& run, std::vector<Finding>& findings) {
   }
 }
 
+/// ln of the odds from which on an error of the star tracker at orbital period and drift are told apart.
+constexpr double kSureOfOrbit = 5;
+
 /// What is said of states that come back with the orbit.
 struct AtOrbitalPeriod {
   FurtherState state;
@@ -516,7 +519,7 @@ constexpr AtOrbitalPeriod kErrorAtOrbitalPeriod = {
     FurtherState::kOrbitalError,
     FindingCode::kOrbitalErrorFound,
     "The star tracker has an error at orbital period; the calibration has taken account of it.",
-    "None needed; look for what warms its mounting.",
+    "Look for what warms its mounting.",
     "The star tracker has an error at orbital period, or the gyros have drift at it: both look alike, and it was taken "
     "for an error of the star tracker. Sigmas do not tell of drift.",
     "Look for what follows the orbit: the temperature of the mounting, or that of the gyros, a magnetic field. Where "
@@ -527,7 +530,7 @@ constexpr AtOrbitalPeriod kDriftAtOrbitalPeriod = {
     FurtherState::kOrbitalDrift,
     FindingCode::kOrbitalDriftFound,
     "The gyros have drift at orbital period; the calibration has taken account of it.",
-    "None needed; look for what follows the orbit: the temperature of the gyros, a magnetic field.",
+    "Look for what follows the orbit: the temperature of the gyros, a magnetic field.",
     "The gyros have drift at orbital period, or the star tracker has an error at it: both look alike, and it was taken "
     "for drift. Sigmas do not tell of the error.",
     "Look for what follows the orbit: the temperature of the gyros, a magnetic field, or the temperature of the star "
@@ -547,7 +550,6 @@ const FurtherEstimate* largest_of(const CalibrationRun& run, FurtherState kind, 
 }
 
 void judge_at_orbital_period(const AtOrbitalPeriod& its, const CalibrationRun& run, std::vector<Finding>& findings) {
-  constexpr double kSureLogOdds = 5;
   constexpr double kSigmasToReport = 5;
   const bool is_error = its.state == FurtherState::kOrbitalError;
   std::optional<double> over_other = run.orbital_error_over_drift;
@@ -560,7 +562,7 @@ void judge_at_orbital_period(const AtOrbitalPeriod& its, const CalibrationRun& r
       !is_error && !run.options.further_states.is_on(FurtherState::kOrbitalError) &&
       largest_of(run, its.state, 0) != nullptr && largest_of(run, its.state, kSigmasToReport) == nullptr &&
       std::ranges::any_of(run.evidence, [&](const Evidence& of) { return of.state == its.state && of.accepted; });
-  const bool may_be_other = (over_other && *over_other < kSureLogOdds) || is_unseen;
+  const bool may_be_other = (over_other && *over_other < kSureOfOrbit) || is_unseen;
   // What may be the other is told however small it is: where it is the other, its sigmas mean nothing.
   const FurtherEstimate* const largest = largest_of(run, its.state, may_be_other ? 0 : kSigmasToReport);
   if (largest == nullptr) {
@@ -586,8 +588,7 @@ void judge_at_orbital_period(const AtOrbitalPeriod& its, const CalibrationRun& r
 }
 
 void judge_field_or_error(const std::optional<double>& error_over_field, std::vector<Finding>& findings) {
-  constexpr double kSureLogOdds = 5;
-  if (!error_over_field || *error_over_field < -kSureLogOdds) {
+  if (!error_over_field || *error_over_field < -kSureOfOrbit) {
     return;
   }
   add(findings, FindingCode::kOrbitalErrorOrDrift,
@@ -621,8 +622,7 @@ void judge_polhodes(const CalibrationRun& run, std::vector<Finding>& findings) {
       fmt::format("periods at the start of the pass {:.1f} min; largest amplitude {:.1e} rad/s, {}, {:.0f} sigmas",
                   fmt::join(periods_min, " and "), largest->value, name_of(largest->parameter),
                   std::abs(largest->value / largest->sigma)),
-      "None needed. The periods change, and what is not known of them is in no sigma: calibrate again after some of "
-      "them.");
+      "Calibrate again after some of these periods: they change, and what is not known of them is in no sigma.");
 }
 
 void judge_noise(const Pass& pass, const CalibrationRun& run, std::vector<Finding>& findings) {
@@ -814,7 +814,7 @@ void judge_unused_sensors(const Pass& pass, const CalibrationRun& run, std::vect
     add(findings, FindingCode::kGyrosNotUsed,
         fmt::format("Estimator {} works on a pair: gyros beyond the first {} were not used.",
                     name_of(run.options.estimator), used),
-        fmt::format("{} gyros in the telemetry", pass.gyro.gyros), "None needed; put the pair you want first.");
+        fmt::format("{} gyros in the telemetry", pass.gyro.gyros), "Put the pair you want first.");
   }
   const bool second = std::ranges::any_of(run.calibration.further, [](const FurtherEstimate& state) {
     return state.parameter.is_further(FurtherState::kStarTrackerAlignment);
@@ -824,7 +824,8 @@ void judge_unused_sensors(const Pass& pass, const CalibrationRun& run, std::vect
     add(findings, FindingCode::kStarTrackersNotUsed,
         fmt::format("Estimator {} of {} gyros works with {} star tracker{}: those beyond were not used.",
                     name_of(run.options.estimator), used, heads, second ? "s" : ""),
-        fmt::format("{} star trackers in the telemetry", 1 + pass.further_star_trackers.size()), "None needed.");
+        fmt::format("{} star trackers in the telemetry", 1 + pass.further_star_trackers.size()),
+        "Put those that you want first.");
   }
 }
 

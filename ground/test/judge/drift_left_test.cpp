@@ -72,7 +72,7 @@ TEST(SlowLine, IsNotLookedForInFewOrUnusedInnovations) {
   EXPECT_FALSE(strongest_slow_line(fixes, 550));
   EXPECT_FALSE(strongest_slow_line({}, 550));
   fixes = innovations(1);
-  fixes.resize(900);
+  fixes.resize(190);
   EXPECT_FALSE(strongest_slow_line(fixes, 550));
 }
 
