@@ -123,7 +123,7 @@ class PassProblem {
   struct Moment;
   using Beside = std::function<Eigen::MatrixXd(const Moment&, const Layout&, const Eigen::MatrixXd&)>;
   /// The fixes of each arc in turn as the rows of linearise(), before these are reduced: columns about its states,
-  /// those `beside`, of which there is one at least, and the misfit.
+  /// those `beside`, of which there is one at least, and the misfit. An arc without a fix has no rows, of any length.
   void for_each_arc(const PassSolution& solution, const Beside& beside,
                     const std::function<void(std::size_t, const Eigen::MatrixXd&)>& use) const;
   static constexpr std::size_t kParts = 6;

@@ -60,6 +60,9 @@ class Stretch {
   /// Rows about the states of the arc that it has come to, constants, shapes, and what they are compared with; unit
   /// noise.
   void measure(const MatrixXd& rows) {
+    if (rows.rows() == 0) {
+      return;
+    }
     MatrixXd its = MatrixXd::Zero(rows.rows(), 2 * d_ + rest_);
     its.middleCols(stages_.empty() ? d_ : 0, d_) = rows.leftCols(d_);
     its.rightCols(rest_) = rows.middleCols(d_, rest_);
