@@ -75,6 +75,8 @@ Json clocks() {
                         {"reference_gyro", count()},
                         {"gyros_late_s", array(number())},
                         {"gyros_late_sigma_s", array(number())},
+                        {"gyros_late_rate_s_s", array(number())},
+                        {"gyros_late_rate_sigma_s_s", array(number())},
                         {"step", step}});
   schema["type"] = Json::array({"object", "null"});
   return schema;

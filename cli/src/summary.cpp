@@ -115,8 +115,10 @@ std::string clocks_text(const std::optional<Clocks>& clocks, const Pass& pass) {
       1e6 * clocks->rate_s_s.sigma);
   for (int k = 0; k < gyros; ++k) {
     if (k != clocks->reference) {
-      text += fmt::format("            gyro {} is stamped {:+.2f} ± {:.2f} ms late against gyro {}\n", k + 1,
-                          1e3 * clocks->late_s[k].value, 1e3 * clocks->late_s[k].sigma, clocks->reference + 1);
+      text +=
+          fmt::format("            gyro {} is stamped {:+.2f} ± {:.2f} ms late against gyro {}; {:+.4g} ± {:.2g} ppm\n",
+                      k + 1, 1e3 * clocks->late_s[k].value, 1e3 * clocks->late_s[k].sigma, clocks->reference + 1,
+                      1e6 * clocks->late_rate_s_s[k].value, 1e6 * clocks->late_rate_s_s[k].sigma);
     }
   }
   if (clocks->step) {
@@ -463,16 +465,26 @@ nlohmann::ordered_json clocks_json(const std::optional<Clocks>& clocks, const Pa
   }
   nlohmann::ordered_json late_s = nlohmann::ordered_json::array();
   nlohmann::ordered_json late_sigma_s = nlohmann::ordered_json::array();
+  nlohmann::ordered_json late_rate_s_s = nlohmann::ordered_json::array();
+  nlohmann::ordered_json late_rate_sigma_s_s = nlohmann::ordered_json::array();
   for (int k = 0; k < gyros; ++k) {
     late_s.push_back(clocks->late_s[k].value);
     late_sigma_s.push_back(clocks->late_s[k].sigma);
+    late_rate_s_s.push_back(clocks->late_rate_s_s[k].value);
+    late_rate_sigma_s_s.push_back(clocks->late_rate_s_s[k].sigma);
   }
-  nlohmann::ordered_json json = {
-      {"mid_offset_s", clocks->mid_offset_s.value}, {"mid_offset_sigma_s", clocks->mid_offset_s.sigma},
-      {"offset_s", clocks->offset_s.value},         {"offset_sigma_s", clocks->offset_s.sigma},
-      {"rate_s_s", clocks->rate_s_s.value},         {"rate_sigma_s_s", clocks->rate_s_s.sigma},
-      {"reference_gyro", clocks->reference + 1},    {"gyros_late_s", late_s},
-      {"gyros_late_sigma_s", late_sigma_s},         {"step", nullptr}};
+  nlohmann::ordered_json json = {{"mid_offset_s", clocks->mid_offset_s.value},
+                                 {"mid_offset_sigma_s", clocks->mid_offset_s.sigma},
+                                 {"offset_s", clocks->offset_s.value},
+                                 {"offset_sigma_s", clocks->offset_s.sigma},
+                                 {"rate_s_s", clocks->rate_s_s.value},
+                                 {"rate_sigma_s_s", clocks->rate_s_s.sigma},
+                                 {"reference_gyro", clocks->reference + 1},
+                                 {"gyros_late_s", late_s},
+                                 {"gyros_late_sigma_s", late_sigma_s},
+                                 {"gyros_late_rate_s_s", late_rate_s_s},
+                                 {"gyros_late_rate_sigma_s_s", late_rate_sigma_s_s},
+                                 {"step", nullptr}};
   if (clocks->step) {
     const ClockStep& step = *clocks->step;
     json["step"] = {{"gyro", step.gyro + 1},

@@ -37,6 +37,9 @@ TurnFit::TurnFit(const Pass& pass, const GyroReadings& readings, double offset_s
   prior_sigma_(Unknowns::offset()) = 10;
   prior_sigma_(Unknowns::rate()) = 1e-2;
   for (int k = 0; k < unknowns_.gyros; ++k) {
+    if (k > 0) {
+      prior_sigma_(unknowns_.late_rate(k)) = prior_sigma_(Unknowns::rate());
+    }
     prior_sigma_.segment<3>(unknowns_.alignment(k)).setConstant(3 * largest_alignment_sigma(pass.settings));
     prior_sigma_.segment<Esg7::kSize>(unknowns_.drift(k)).setConstant(1e-4);
   }
@@ -112,8 +115,8 @@ void TurnFit::read(bool roughly) {
     }
     const double more_s = steps(fixes.t[i]) ? x_(place_of_step()) : 0;
     const bool of_star_tracker = stepping_ && stepping_->gyro < 0;
-    const double clock_s = x_(Unknowns::offset()) + x_(Unknowns::rate()) * to_seconds(fixes.t[i] - middle_) +
-                           (of_star_tracker ? more_s : 0);
+    const double age_s = to_seconds(fixes.t[i] - middle_);
+    const double clock_s = x_(Unknowns::offset()) + x_(Unknowns::rate()) * age_s + (of_star_tracker ? more_s : 0);
     // Over a millisecond even a slew that begins bends by 1e-9 rad.
     constexpr double kNear_s = 1e-3;
     std::optional<Fitted>& its = fitted_[i];
@@ -128,7 +131,7 @@ void TurnFit::read(bool roughly) {
     for (int k = 0; k < unknowns_.gyros; ++k) {
       const Vector3d& rate = its->directions->h_b_rate[k];
       const double late_more_s = stepping_ && stepping_->gyro == k ? more_s : 0;
-      const double late_s = (k == 0 ? 0 : x_(Unknowns::late(k))) + late_more_s;
+      const double late_s = (k == 0 ? 0 : x_(Unknowns::late(k)) + x_(unknowns_.late_rate(k)) * age_s) + late_more_s;
       at.h[k] = (its->directions->h_b[k] + (clock_s - its->clock_s) * rate).normalized();
       at.aligned[k] = align[k] * (at.h[k] + late_s * rate);
       at.aligned_rate[k] = align[k] * rate;
@@ -175,6 +178,7 @@ bool TurnFit::rows_of(const Turn& turn, bool roughly, Rows& rows, double& noise_
     its.col(Unknowns::rate()) = across * (ages_s[1] * rate2 - ages_s[0] * (smooth * rate1));
     if (k > 0) {
       its.col(Unknowns::late(k)) = its.col(Unknowns::offset());
+      its.col(unknowns_.late_rate(k)) = its.col(Unknowns::rate());
     }
     if (stepping_ && (stepping_->gyro < 0 || stepping_->gyro == k)) {
       const double at_second = steps(turn.second) ? 1 : 0;
@@ -312,6 +316,11 @@ VectorXd TurnFit::offset_of(int gyro) const {
   return gyro == 0 ? unit(Unknowns::offset()) : VectorXd(unit(Unknowns::offset()) + unit(Unknowns::late(gyro)));
 }
 
+/// The function of the unknowns by which that offset grows.
+VectorXd TurnFit::rate_of(int gyro) const {
+  return gyro == 0 ? unit(Unknowns::rate()) : VectorXd(unit(Unknowns::rate()) + unit(unknowns_.late_rate(gyro)));
+}
+
 /// How the unknowns change where the stamps of a gyro are later by a unit, or fixes hold the attitude so much later
 /// (−1).
 VectorXd TurnFit::by_stepping(int gyro) const {
@@ -328,24 +337,30 @@ VectorXd TurnFit::by_stepping(int gyro) const {
 Clocks TurnFit::clocks() const {
   Clocks clocks;
   // The star tracker is a witness as well: where it agrees with one gyro, the others are late. Of three gyros and
-  // more, the one in the middle.
+  // more, the one in the middle. Clocks that agree in the middle of the pass may run apart.
+  const double half_s = to_seconds(pass_.star_tracker.t.back() - middle_);
   std::vector<int> order;
   for (int k = 0; k < unknowns_.gyros; ++k) {
     order.push_back(k);
   }
-  const auto of_gyro = [&](int k) { return offset_of(k).dot(x_); };
+  const auto of_gyro = [&](int k, double age_s) { return (offset_of(k) + age_s * rate_of(k)).dot(x_); };
   if (unknowns_.gyros > 2) {
-    std::ranges::sort(order, {}, of_gyro);
+    std::ranges::sort(order, {}, [&](int k) { return of_gyro(k, half_s); });
     clocks.reference = order[(order.size() - 1) / 2];
   } else {
-    clocks.reference = *std::ranges::min_element(order, {}, [&](int k) { return std::abs(of_gyro(k)); });
+    clocks.reference = *std::ranges::min_element(
+        order, {}, [&](int k) { return std::max(std::abs(of_gyro(k, -half_s)), std::abs(of_gyro(k, half_s))); });
   }
   const VectorXd middle = offset_of(clocks.reference);
+  const VectorXd rate = rate_of(clocks.reference);
   clocks.mid_offset_s = measured(middle);
-  clocks.rate_s_s = measured(unit(Unknowns::rate()));
-  clocks.offset_s = measured(middle + to_seconds(pass_.settings.epoch - middle_) * unit(Unknowns::rate()));
+  clocks.rate_s_s = measured(rate);
+  clocks.offset_s = measured(middle + to_seconds(pass_.settings.epoch - middle_) * rate);
   for (int k = 0; k < unknowns_.gyros; ++k) {
-    clocks.late_s[k] = k == clocks.reference ? Measured{} : measured(offset_of(k) - middle);
+    if (k != clocks.reference) {
+      clocks.late_s[k] = measured(offset_of(k) - middle);
+      clocks.late_rate_s_s[k] = measured(rate_of(k) - rate);
+    }
   }
   return clocks;
 }

@@ -15,13 +15,15 @@
 namespace trihedron::ground {
 
 /// What is fitted: offset and rate of the star tracker's clock about the middle of the pass, how late each gyro is
-/// against the first, and of each gyro what would pass for it: alignment and coefficients of eq. (1).
+/// there against the first and how fast that grows, and of each gyro what would pass for it: alignment and coefficients
+/// of eq. (1).
 struct Unknowns {
   int gyros;
   [[nodiscard]] static constexpr int offset() { return 0; }
   [[nodiscard]] static constexpr int rate() { return 1; }
-  [[nodiscard]] static constexpr int late(int gyro) { return 1 + gyro; }  ///< of gyro 2 on
-  [[nodiscard]] constexpr int alignment(int gyro) const { return 1 + gyros + kOwn * gyro; }
+  [[nodiscard]] static constexpr int late(int gyro) { return 1 + gyro; }          ///< of gyro 2 on
+  [[nodiscard]] constexpr int late_rate(int gyro) const { return gyros + gyro; }  ///< likewise
+  [[nodiscard]] constexpr int alignment(int gyro) const { return 2 * gyros + kOwn * gyro; }
   [[nodiscard]] constexpr int drift(int gyro) const { return alignment(gyro) + 3; }
   [[nodiscard]] constexpr int size() const { return alignment(gyros); }
   static constexpr int kOwn = 3 + Esg7::kSize;
@@ -106,6 +108,7 @@ class TurnFit {
   [[nodiscard]] bool steps(Time t) const { return stepping_ && stepping_->part.has(t); }
   [[nodiscard]] Eigen::VectorXd unit(int unknown) const { return Eigen::VectorXd::Unit(size(), unknown); }
   [[nodiscard]] Eigen::VectorXd offset_of(int gyro) const;
+  [[nodiscard]] Eigen::VectorXd rate_of(int gyro) const;
   [[nodiscard]] Eigen::VectorXd by_stepping(int gyro) const;
   [[nodiscard]] long used_stretches() const;
   [[nodiscard]] Measured measured(const Eigen::VectorXd& a) const;

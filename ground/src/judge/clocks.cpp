@@ -79,6 +79,31 @@ void judge_late_gyros(const PassSettings& settings, const Clocks& clocks, const 
   }
 }
 
+/// Gyros whose clocks run at another rate, which nothing corrects: what the ends of the pass are off by is forbidden
+/// from `too_late_s` on.
+void judge_gyro_rates(const PassSettings& settings, const Clocks& clocks, double too_late_s,
+                      std::vector<Finding>& findings) {
+  const double half_s = to_seconds(settings.duration) / 2;
+  for (int k = 0; k < static_cast<int>(settings.gyros.size()); ++k) {
+    const Measured& rate = clocks.late_rate_s_s[k];
+    const double farthest_s = half_s * std::abs(rate.value);
+    if (rate.is_sure(kSigmasToTell) && farthest_s > kSeenLate_s) {
+      add(findings, FindingCode::kGyroClockRate,
+          farthest_s > too_late_s ? Finding::Severity::kDoNotUse : Finding::Severity::kWarning,
+          fmt::format(
+              "The clock of gyro {} runs at another rate than that of gyro {}; the estimates take its lateness for "
+              "constant.",
+              k + 1, clocks.reference + 1),
+          fmt::format(
+              "{:+.3g} ± {:.2g} ppm: at the ends of the pass its stamps are {:.1f} ms later and earlier than in the "
+              "middle",
+              1e6 * rate.value, 1e6 * rate.sigma, 1e3 * farthest_s),
+          fmt::format("Subtract {:.4g} (t - epoch) from the stamps of gyro {}, or calibrate shorter passes.",
+                      rate.value, k + 1));
+    }
+  }
+}
+
 /// Of the gyros of a pair one is late against the other, and that one against the star tracker: of three clocks no two
 /// agree. `late_s`: of which 0 is not there; `offset_s`: of the star tracker against the gyro that is not late.
 bool do_no_two_agree(const PassSettings& settings, const PerGyro<double>& late_s, double offset_s) {
@@ -214,6 +239,7 @@ void judge_clocks(const Pass& pass, const CalibrationRun& run, std::vector<Findi
                "; the estimates take it for constant", findings);
   }
   const Measured& middle = run.clocks->mid_offset_s;
+  judge_gyro_rates(pass.settings, *run.clocks, kSeenLate_s, findings);
   const std::size_t before = findings.size();
   judge_late_gyros(pass.settings, *run.clocks, correction.late_s, findings, Finding::Severity::kWarning,
                    "; the calibration has interpolated them");
@@ -271,6 +297,7 @@ void judge_clocks(const Pass& pass, const NavigationRun& run, std::vector<Findin
     late_s[k] = its.is_sure(kSigmasToTell) && std::abs(its.value) > kSeenLate_s ? its.value : 0;
     latest_s = std::max(latest_s, std::abs(late_s[k]));
   }
+  judge_gyro_rates(pass.settings, clocks, kTooLate_s, findings);
   const std::size_t before = findings.size();
   judge_late_gyros(pass.settings, clocks, late_s, findings,
                    latest_s > kTooLate_s ? Finding::Severity::kDoNotUse : Finding::Severity::kWarning,

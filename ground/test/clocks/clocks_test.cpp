@@ -47,6 +47,8 @@ TEST(Clocks, ThatAgreeAreLeftAlone) {
     expect_within(clocks.mid_offset_s, 0, kSigmas);
     expect_within(clocks.rate_s_s, 0, kSigmas);
     expect_within(clocks.late_s[1 - clocks.reference], 0, kSigmas);
+    // Drift outside eq. (1) is in it: 1 ms over half of the pass.
+    EXPECT_LT(std::abs(clocks.late_rate_s_s[1 - clocks.reference].value), 1.4e-7);
     EXPECT_LT(clocks.mid_offset_s.sigma, 5e-4);
     EXPECT_FALSE(clocks.step.has_value()) << seed;
     const ClockCorrection correction = correction_by(clocks, sim::simulate(scenario).pass.settings);
@@ -102,6 +104,41 @@ TEST(Clocks, OfThreeGyrosTheOneThatDiffersIsLate) {
   expect_within(clocks.mid_offset_s, 2, kSigmas);
   expect_within(clocks.late_s[1], -0.01, kSigmas);
   expect_within(clocks.late_s[2 - clocks.reference], 0, kSigmas);
+}
+
+/// As its clock, which agrees with the others in the middle of the pass, runs at another rate.
+Pass with_gyro_clock_rate(Pass pass, std::size_t gyro, double rate_s_s) {
+  const GyroTelemetry good = pass.gyro;
+  const Time middle = good.t[good.size() / 2];
+  const auto gyros = static_cast<std::size_t>(good.gyros);
+  for (std::size_t i = 1; i + 1 < good.size(); ++i) {
+    const double late_samples = rate_s_s * to_seconds(good.t[i] - middle) / to_seconds(pass.settings.gyro_period);
+    const std::size_t other = late_samples > 0 ? i - 1 : i + 1;
+    const double part = std::abs(late_samples);
+    Eigen::Map<Eigen::Vector3d>(&pass.gyro.h[(gyros * i + gyro) * 3]) =
+        (1 - part) * good.direction(i, static_cast<int>(gyro)) + part * good.direction(other, static_cast<int>(gyro));
+  }
+  return pass;
+}
+
+TEST(Clocks, OfAGyroThatRunsAtAnotherRateAreFoundAndForbidden) {
+  for (const std::size_t gyro : {0U, 1U}) {
+    const double rate = gyro == 0 ? 1e-6 : -1e-6;
+    const Pass pass = with_gyro_clock_rate(sim::simulate(four_hours(14)).pass, gyro, rate);
+    const Clocks clocks = ground::clocks_of(pass).value();
+    EXPECT_EQ(clocks.reference, gyro == 0 ? 1 : 0);
+    expect_within(clocks.late_rate_s_s[static_cast<int>(gyro)], rate, kSigmas);
+    expect_within(clocks.rate_s_s, 0, kSigmas);
+    const CalibrationRun run = calibrate(pass, {});
+    expect_finding(judge(pass, run), FindingCode::kGyroClockRate, gyro == 0 ? "Subtract 1" : "Subtract -");
+  }
+  // Of three the one that differs.
+  Scenario three = four_hours(15);
+  three.gyros.push_back(three.gyros[0]);
+  three.gyros[2].start_direction_c = {0.1, -0.2, 0.97};
+  const Clocks clocks = ground::clocks_of(with_gyro_clock_rate(sim::simulate(three).pass, 2, 1e-6)).value();
+  EXPECT_NE(clocks.reference, 2);
+  expect_within(clocks.late_rate_s_s[2], 1e-6, kSigmas);
 }
 
 TEST(Clocks, AreNotInventedWhereTheBodyTurnsEvenly) {

@@ -31,9 +31,10 @@ struct ClockStep {
 struct Clocks {
   Measured offset_s;  ///< of the star trackers, at the epoch; as in ClockCorrection
   Measured rate_s_s;
-  Measured mid_offset_s;       ///< in the middle of the pass, where it is best known
-  PerGyro<Measured> late_s{};  ///< against the reference
-  int reference = 0;           ///< index of the gyro whose clock the others are compared with
+  Measured mid_offset_s;              ///< in the middle of the pass, where it is best known
+  PerGyro<Measured> late_s{};         ///< against the reference, in the middle of the pass
+  PerGyro<Measured> late_rate_s_s{};  ///< by which that grows
+  int reference = 0;                  ///< index of the gyro whose clock the others are compared with
   std::optional<ClockStep> step{};
   /// mid_offset_s of each less that of the first; zeros where the pass does not show it, empty where nobody looked.
   std::vector<Measured> further_star_trackers_s{};
