@@ -77,10 +77,13 @@ Whiteness::Line line_of(const std::vector<Series>& all, int multiple, double orb
 double alternation(const Series& series) {
   std::vector<double> steps_s(series.t_s.size());
   std::adjacent_difference(series.t_s.begin(), series.t_s.end(), steps_s.begin());
-  const double step_s = median_of(steps_s);
+  std::vector<double> sorted_s = steps_s;
+  const double step_s = median_of(sorted_s);
   double sum = 0;
+  long number = 0;  // step by step: rounded stamps have a step that is not quite right
   for (std::size_t i = 0; i < series.z.size(); ++i) {
-    const bool is_odd = std::lround((series.t_s[i] - series.t_s.front()) / step_s) % 2 != 0;
+    number += i > 0 ? std::lround(steps_s[i] / step_s) : 0;
+    const bool is_odd = number % 2 != 0;
     sum += is_odd ? -series.z[i] : series.z[i];
   }
   return std::abs(sum) / static_cast<double>(series.z.size());

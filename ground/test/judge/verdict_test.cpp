@@ -160,6 +160,17 @@ TEST(Verdict, ForbidsFixesThatAreOffByTurns) {
   }
 }
 
+TEST(Verdict, ForbidsFixesThatAreOffByTurnsAlsoByRoundedStamps) {
+  auto run = with_turns(10'000, 0.4);
+  const Time first = run.fixes.front().t;
+  for (std::size_t i = 0; i < run.fixes.size(); ++i) {
+    run.fixes[i].t = first + std::chrono::milliseconds(std::lround(3000.4 * static_cast<double>(i)));
+  }
+  const Verdict verdict = judge(good_pass(), run);
+  ASSERT_THAT(codes(verdict), Contains("innovations-not-white"));
+  EXPECT_THAT(verdict.findings[0].text, HasSubstr("by turns"));
+}
+
 TEST(Verdict, ForbidsAnErrorAtOrbitalPeriodThatMayBeDrift) {
   auto run = good_run();
   run.calibration.further = {{parameter("orbital_sine_x_rad"), 1e-4, 1e-6}};
