@@ -30,13 +30,14 @@ FixStatus OutlierGate::judge(double nis, double misfit_rad, int freedom) {
     }
     status = under_suspicion_ > 0 ? FixStatus::kRestarted : FixStatus::kUsedAfterReopening;
     restarted_ = status == FixStatus::kRestarted;
-    under_suspicion_ = restart_within_ + 1;
+    under_suspicion_ = restart_within_;
     misfit_rad_ = 0;
+  } else {
+    under_suspicion_ = std::max(under_suspicion_ - 1, 0);
   }
   confirmed_ = status == FixStatus::kUsed;
   jumped_ = false;
   rejections_in_a_row_ = 0;
-  under_suspicion_ = std::max(under_suspicion_ - 1, 0);
   return status;
 }
 

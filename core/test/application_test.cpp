@@ -252,6 +252,8 @@ TEST(ParameterTable, WithAnythingWrongIsRefusedAndNothingIsChanged) {
       {"period 0", Answer::kNotPositive, [](Parameters& table) { table.gyro_period_ns = 0; }},
       {"period of centuries", Answer::kNotPositive, [](Parameters& table) { table.gyro_period_ns = INT64_MAX; }},
       {"negative interval", Answer::kNotPositive, [](Parameters& table) { table.correction_interval_ns = -1; }},
+      {"angles after centuries", Answer::kNotPositive,
+       [](Parameters& table) { table.angles_after_ns = INT64_MAX - 1; }},
       {"negative angles", Answer::kNotPositive, [](Parameters& table) { table.angles_after_ns = INT64_MIN; }},
       {"required interval 0", Answer::kNotPositive, [](Parameters& table) { table.required_interval_ns = 0; }},
       {"window of centuries", Answer::kNotPositive, [](Parameters& table) { table.window_ns = INT64_MAX; }},
@@ -765,6 +767,8 @@ TEST(NoAttitude, BeforeASampleHasBeenUsedByTheClockThatHasBeenSetBack) {
               i < 15 ? SampleStatus::kRejectedOutOfOrder : SampleStatus::kRejectedNotDirection);
   }
   EXPECT_FALSE(application.attitude());
+  EXPECT_FALSE(application.on_board().navigation_attitude());
+  EXPECT_EQ(application.on_board().t(), samples[15].t);
   EXPECT_EQ(application.housekeeping().attitude_valid, 0);
   EXPECT_EQ(application.command(Command::kSelectGyros, 0b11), Answer::kMomentaNearlyParallel);
   EXPECT_EQ(application.on_gyro(samples[16]).sample, SampleStatus::kUsedAfterClockSetBack);

@@ -77,7 +77,6 @@ class PipelineOfPass {
     for (std::size_t k = 0; k < directions.shape(0) && k < std::size_t{kMaxGyros}; ++k) {
       sample.h_b[static_cast<int>(k)] = Eigen::Vector3d(directions(k, 0), directions(k, 1), directions(k, 2));
     }
-    last_ = t;
     return reports_of(pipeline_.feed(sample));
   }
   std::vector<Report> push_fix(Time t, const GivenVector& q, int head, const std::optional<GivenMatrix>& covariance) {
@@ -98,7 +97,7 @@ class PipelineOfPass {
     if (!solution) {
       return std::nullopt;
     }
-    return Attitude{last_, Eigen::VectorXd(solution->C_in_c.quaternion().coeffs()),
+    return Attitude{pipeline_.t(), Eigen::VectorXd(solution->C_in_c.quaternion().coeffs()),
                     Eigen::MatrixXd(solution->covariance_rad2)};
   }
   [[nodiscard]] const ground::Pipeline& pipeline() const { return pipeline_; }
@@ -113,7 +112,6 @@ class PipelineOfPass {
   }
 
   ground::Pipeline pipeline_;
-  Time last_{};
 };
 
 }  // namespace

@@ -123,8 +123,12 @@ bool Pipeline::started() const {
   return program_->visit([](const auto& its) { return its.estimator().started(); });
 }
 
+Time Pipeline::t() const {
+  return program_->visit([](const auto& its) { return its.t(); });
+}
+
 double Pipeline::part_of_change() const {
-  return program_->visit([](const auto& its) { return its.estimator().setup().part_of_change(its.t()); });
+  return program_->visit([&](const auto& its) { return its.estimator().setup().part_of_change(t()); });
 }
 
 std::vector<GyroCalibration> Pipeline::gyros() const {
@@ -159,7 +163,7 @@ OpenLoopStart Pipeline::errors() const {
     const Layout layout = estimator.error_layout();
     OpenLoopStart start =
         open_loop_start(estimator.setup(), layout, program_->gyros(), error_covariance(estimator, part_of_change()));
-    start.change.zero_at = its.t();
+    start.change.zero_at = t();
     return start;
   });
 }

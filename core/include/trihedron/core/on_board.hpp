@@ -71,15 +71,20 @@ class OnBoard {
   [[nodiscard]] const Estimator& estimator() const { return estimator_; }
   [[nodiscard]] const Navigator<Estimator>& navigator() const { return navigator_; }
   [[nodiscard]] const GyroHealth<Estimator::Gyros::capacity()>& health() const { return intake_.health(); }
-  /// Time of the latest sample used; needs one.
-  [[nodiscard]] Time t() const { return readings_.latest_t(); }
+  /// Time of the latest sample used, or where none has been since the clock was set back, of the sample that said so;
+  /// needs one.
+  [[nodiscard]] Time t() const { return readings_.latest().value_or(passed_t_); }
   /// The same, if there is one since the start or since the clock was set back.
   [[nodiscard]] std::optional<Time> latest() const { return readings_.latest(); }
   /// Of the navigator's last correction; needs navigator().started().
   [[nodiscard]] Time corrected_t() const { return corrected_t_; }
 
-  /// Open-loop attitude at the latest sample. Needs navigator().started().
+  /// Open-loop attitude at the latest sample; kTooFew where there is none since the clock was set back. Needs
+  /// navigator().started().
   [[nodiscard]] Result<AttitudeSolution, DirectionsFault> navigation_attitude() const {
+    if (readings_.size() == 0) {
+      return DirectionsFault::kTooFew;
+    }
     return navigator_.attitude(estimator_,
                                with_jitter(readings_.now(estimator_.setup(), intake_.health(), estimator_.gyros())),
                                navigator_.state());

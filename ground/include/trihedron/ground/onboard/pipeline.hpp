@@ -64,6 +64,8 @@ class Pipeline {
   /// (estimated − prior)ᵀ P⁻¹ (estimated − prior) of κ and δ, P the covariance of the prior.
   [[nodiscard]] double squared_distance_from_prior() const;
 
+  /// Of the latest sample used; needs one.
+  [[nodiscard]] Time t() const;
   /// Open-loop attitude at the latest sample; nothing where there is none yet.
   [[nodiscard]] std::optional<AttitudeSolution> navigation_attitude() const;
   /// Rotation vector from an attitude at the time of a fix to that of the fix, c axes, rad; the fix as the states that
