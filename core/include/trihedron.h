@@ -19,7 +19,7 @@ extern "C" {
 /* C has no `using`, and constants are to be known to the preprocessor. NOLINTBEGIN(modernize-*) */
 
 /** Of the functions; of the records there is TRIHEDRON_TABLES_VERSION. */
-#define TRIHEDRON_INTERFACE_VERSION 1u
+#define TRIHEDRON_INTERFACE_VERSION 2u
 /** As compiled into the library; to be compared with TRIHEDRON_INTERFACE_VERSION and TRIHEDRON_TABLES_VERSION. */
 uint32_t trihedron_interface_version(void);
 /** The same of the tables. */
@@ -72,6 +72,9 @@ uint32_t trihedron_on_fix(trihedron_application* its, const trihedron_star_fix* 
 
 /** The attitude at the latest sample. 1, or 0 where there is none, and nothing is written. */
 uint32_t trihedron_get_attitude(const trihedron_application* its, trihedron_attitude* attitude);
+
+/** What the filter has found. 1, or 0 before the first fix, and nothing is written. Some thousand operations more than others. */
+uint32_t trihedron_get_calibration(const trihedron_application* its, trihedron_calibration* calibration);
 
 /** What the application tells of itself, in any mode. */
 void trihedron_get_housekeeping(const trihedron_application* its, trihedron_housekeeping* housekeeping);

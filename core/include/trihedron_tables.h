@@ -29,7 +29,7 @@ enum trihedron_mode {
   TRIHEDRON_MODE_FAILED = 6
 };
 
-/** Commands; which of them a mode accepts is in the table of transitions. */
+/** Commands; which of them a mode accepts is in the table of transitions (docs/flight-interface.md). */
 enum trihedron_command {
   /** Waits for the first fix from now on. */
   TRIHEDRON_COMMAND_START = 0,
@@ -208,6 +208,27 @@ typedef struct trihedron_attitude {
 
 /** Of the record, bytes. */
 #define TRIHEDRON_ATTITUDE_SIZE 112u
+
+/** What the filter has found, whether the navigator uses it or not; `drift_rad_s`, `alignment_rad` and `covariance`
+ *  as the table of parameters takes them. */
+typedef struct trihedron_calibration {
+  /** ns. TAI of the last fix used. */
+  int64_t time_ns;
+  /** Of these tables. */
+  uint32_t version;
+  /** How many there are; what is of others is 0. */
+  uint32_t gyros;
+  /** rad/s. k0, μ12, μ23, μ31, ν12, ν23, ν31 of each gyro. */
+  double drift_rad_s[3][7];
+  /** rad. Rotation vector of C_c_b of each gyro, c axes. */
+  double alignment_rad[3][3];
+  /** (rad/s)², rad². Of the errors of these, the drift and then the alignment of each gyro: lower triangle, row by
+   *  row. */
+  double covariance[465];
+} trihedron_calibration;
+
+/** Of the record, bytes. */
+#define TRIHEDRON_CALIBRATION_SIZE 3976u
 
 /** The housekeeping record; every member is valid at any time. Counters begin with the set-up and do not count beyond
  *  2³² − 1. */

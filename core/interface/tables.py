@@ -4,6 +4,7 @@ and the document. With a folder as argument it writes them there instead; the te
 """
 import math
 import pathlib
+import re
 import sys
 import textwrap
 import tomllib
@@ -142,6 +143,7 @@ def document():
     for enum in TABLES["enum"]:
         lines += [f"## `trihedron_{enum['name']}`", "", enum["doc"], ""]
         lines += table(("number", "name", "meaning"), [(str(value), f"`{row['name']}`", row["doc"]) for value, row in numbered(enum)])
+    lines += document_of_transitions()
     for struct in TABLES["struct"]:
         rows, size = with_offsets(struct)
         lines += [f"## `trihedron_{struct['name']}`, {size} bytes", "", struct["doc"], ""]
@@ -150,6 +152,25 @@ def document():
         lines += table(head, [(str(offset), f"`{field['type']}`", f"`{declarator(field)}`", field["unit"])
                               + ((f"{field['default']}",) if has_default else ()) + (field["doc"],) for offset, field in rows])
     return "\n".join(lines).rstrip() + "\n"
+
+
+def transitions():
+    """The table of transitions.hpp: for each event its name and the mode after it, by the mode that it comes in; none where it is refused."""
+    rows = re.findall(r"^ *\{\{(.*?)\}\}, +// (.*)$", (ROOT / "core/include/trihedron/core/transitions.hpp").read_text(), re.MULTILINE)
+    modes = {enumerator(row): row["name"] for row in TABLES["enum"][0]["values"]}
+    assert rows and all(name in modes or name == "kNo" for cells, _ in rows for name in cells.replace(" ", "").split(","))
+    return [(event, [modes.get(name) for name in cells.replace(" ", "").split(",")]) for cells, event in rows]
+
+
+def document_of_transitions():
+    modes = [f"`{row['name']}`" for row in TABLES["enum"][0]["values"]]
+    commands = len(next(enum for enum in TABLES["enum"] if enum["name"] == "command")["values"])
+    rows = transitions()
+    cells = lambda after: [f"`{mode}`" if mode else "–" for mode in after]
+    return ["## Transitions", "", "The mode after a command, by the mode that it is given in; – where it is refused with `not_in_this_mode`.", "",
+            *table(["command", *modes], [[f"`{event.replace(' ', '_')}`", *cells(after)] for event, after in rows[:commands]]),
+            "The mode after what happens by itself; – where it changes nothing.", "",
+            *table(["event", *modes], [[event, *cells(after)] for event, after in rows[commands:]])]
 
 
 OUTPUTS = {"core/include/trihedron_tables.h": c_header, "core/include/trihedron/core/tables.hpp": cpp_header,

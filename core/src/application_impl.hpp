@@ -35,9 +35,11 @@ inline void count_up(std::uint32_t& counter) { counter += counter < UINT32_MAX ?
   const Duration zero{};
   constexpr Duration kLongest = std::chrono::hours(24 * 365);
   constexpr Duration kSlowest = std::chrono::minutes(1);
+  const bool never_by_angles = setup.angles_after == Duration::max();
   const auto is_time = [&](Duration its) { return its > zero && its <= kLongest; };
   return setup.gyro_period > zero && setup.gyro_period <= kSlowest && setup.angles_after >= zero &&
-         std::isfinite(setup.gate_nis) && policy.correction_interval >= zero && policy.required_error_rad > 0 &&
+         (setup.angles_after <= kLongest || never_by_angles) && std::isfinite(setup.gate_nis) &&
+         policy.correction_interval >= zero && policy.required_error_rad > 0 &&
          std::isfinite(policy.required_error_rad) && is_time(policy.required_interval) && is_time(policy.window) &&
          is_time(policy.star_tracker_timeout) && is_time(policy.failed_after) && policy.aligned_after_fixes > 0 &&
          policy.spread_over >= 0;
@@ -431,11 +433,44 @@ bool Application<Estimator>::is_degraded() const {
 
 template <class Estimator>
 std::optional<AttitudeSolution> Application<Estimator>::attitude() const {
-  if (!on_board_.navigator().started() || !on_board_.latest() || has(Fault::kNoAttitude)) {
+  if (!on_board_.navigator().started() || has(Fault::kNoAttitude)) {
     return std::nullopt;
   }
   const auto solution = on_board_.navigation_attitude();
   return solution ? std::optional(solution.value()) : std::nullopt;
+}
+
+template <class Estimator>
+std::optional<CalibrationRecord> Application<Estimator>::calibration() const {
+  const Estimator& estimator = on_board_.estimator();
+  const Layout& layout = estimator.layout();
+  constexpr int kMost = Estimator::Gyros::capacity();
+  static_assert(kMost <= TRIHEDRON_MAX_GYROS && Estimator::kMaxStates == Layout{.gyros = kMost}.size(),
+                "the record has room for eq. (1) alone");
+  if (!estimator.started()) {
+    return std::nullopt;
+  }
+  std::optional<CalibrationRecord> record(std::in_place);
+  record->time_ns = fix_t_.time_since_epoch().count();
+  record->version = TRIHEDRON_TABLES_VERSION;
+  record->gyros = static_cast<std::uint32_t>(layout.gyros);
+  for (int k = 0; k < layout.gyros; ++k) {
+    const auto& gyro = estimator.gyros()[k];
+    Eigen::Map<Eigen::Matrix<double, Layout::kEq1, 1>>(record->drift_rad_s[k]) =
+        gyro.drift_rad_s.template head<Layout::kEq1>();
+    Eigen::Map<Eigen::Vector3d>(record->alignment_rad[k]) = Rot<C, C>::assume(gyro.C_c_b).log().raw();
+  }
+  constexpr int kStates = Estimator::kMaxStates;
+  Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor, kStates, kStates> root(
+      layout.behind_parameters(), estimator.states());
+  estimator.error_root(rows_of(root));
+  double* element = record->covariance;
+  for (int row = layout.drift(0); row < layout.behind_parameters(); ++row) {
+    for (int column = layout.drift(0); column <= row; ++column) {
+      *element++ = root.row(row).dot(root.row(column));
+    }
+  }
+  return record;
 }
 
 template <class Estimator>

@@ -112,6 +112,47 @@ TEST(CInterface, IsTheApplicationBitForBit) {
   }
 }
 
+TEST(CInterface, GivesTheCalibrationAsItIsLoaded) {
+  const test::Flight flight({.duration_s = 600});
+  Parameters parameters = test::nominal_parameters();
+  OfTwo memory;
+  ByC by_c{trihedron_create(memory.bytes, sizeof memory, 2)};
+  CalibrationRecord found{};
+  EXPECT_EQ(trihedron_get_calibration(by_c.its, &found), 0U);
+  EXPECT_EQ(trihedron_load_parameters(by_c.its, &parameters), TRIHEDRON_ANSWER_ACCEPTED);
+  EXPECT_EQ(trihedron_command(by_c.its, TRIHEDRON_COMMAND_START, 0), TRIHEDRON_ANSWER_ACCEPTED);
+  EXPECT_EQ(trihedron_get_calibration(by_c.its, &found), 0U);
+  test::fly(flight, by_c);
+  ASSERT_EQ(trihedron_get_calibration(by_c.its, &found), 1U);
+  EXPECT_EQ(found.gyros, 2U);
+  EXPECT_EQ(found.version, TRIHEDRON_TABLES_VERSION);
+  Housekeeping housekeeping{};
+  trihedron_get_housekeeping(by_c.its, &housekeeping);
+  EXPECT_EQ(found.time_ns, housekeeping.last_fix_ns);
+
+  test::PairGyros estimates;
+  for (int k = 0; k < 2; ++k) {
+    estimates[k].drift_rad_s = Eigen::Map<const Eigen::Matrix<double, 7, 1>>(found.drift_rad_s[k]);
+    estimates[k].C_c_b = Rot<C, C>::exp(Vec<C>::assume(Eigen::Vector3d(found.alignment_rad[k]))).raw();
+  }
+  Eigen::MatrixXd covariance(20, 20);
+  for (int row = 0; row < 20; ++row) {
+    for (int column = 0; column <= row; ++column) {
+      covariance(row, column) = covariance(column, row) = found.covariance[test::covariance_index(row, column)];
+    }
+  }
+  const double nees = test::normalised_square(test::parameter_errors(flight.truth, estimates), covariance);
+  EXPECT_GT(nees, 5);  // χ² of 20, once in a thousand times each
+  EXPECT_LT(nees, 45);
+
+  // It is loaded again as it is.
+  std::memcpy(parameters.drift_rad_s, found.drift_rad_s, sizeof found.drift_rad_s);
+  std::memcpy(parameters.alignment_rad, found.alignment_rad, sizeof found.alignment_rad);
+  std::memcpy(parameters.covariance, found.covariance, sizeof found.covariance);
+  EXPECT_EQ(trihedron_command(by_c.its, TRIHEDRON_COMMAND_RESET, 0), TRIHEDRON_ANSWER_ACCEPTED);
+  EXPECT_EQ(trihedron_load_parameters(by_c.its, &parameters), TRIHEDRON_ANSWER_ACCEPTED);
+}
+
 TEST(CInterface, OfThreeGyrosIsTheirApplicationBitForBit) {
   const test::Flight flight({.duration_s = 120});
   const auto samples = test::with_third_gyro(flight, Eigen::Vector3d(0.1, -0.8, 0.6).normalized(), 1);

@@ -29,7 +29,7 @@ enum class Mode : std::uint8_t {
 };
 inline constexpr std::size_t kModes = 7;
 
-/// Commands; which of them a mode accepts is in the table of transitions.
+/// Commands; which of them a mode accepts is in the table of transitions (docs/flight-interface.md).
 enum class Command : std::uint8_t {
   /// Waits for the first fix from now on.
   kStart = 0,
@@ -116,6 +116,9 @@ using GyroSampleRecord = ::trihedron_gyro_sample;
 using StarFixRecord = ::trihedron_star_fix;
 /// The attitude at the latest sample.
 using AttitudeRecord = ::trihedron_attitude;
+/// What the filter has found, whether the navigator uses it or not; `drift_rad_s`, `alignment_rad` and `covariance`
+/// as the table of parameters takes them.
+using CalibrationRecord = ::trihedron_calibration;
 /// The housekeeping record; every member is valid at any time. Counters begin with the set-up and do not count beyond
 /// 2³² − 1.
 using Housekeeping = ::trihedron_housekeeping;
