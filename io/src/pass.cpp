@@ -429,7 +429,7 @@ PassInMemory read_tables(const fs::path& directory) {
   };
   PassInMemory tables;
   tables.name = directory;
-  tables.settings = format_pass_toml(raw.settings, "");
+  tables.settings = format_pass_toml(raw.settings, "", TelemetryStamps::kAsReceived);
   tables.prior = raw.settings.prior ? format_calibration(*raw.settings.prior) : "";
   tables.gyros = gyros_of(raw.gyro);
   tables.gyro = table(std::move(raw.gyro));

@@ -299,9 +299,10 @@ std::string format_sigmas(const Eigen::Vector3d& v) {
 }
 
 /// Whether a gyro needs its own [[gyro.unit]] because it differs from the common values in [gyro].
-bool differs(const GyroPrior& gyro, const GyroPrior& common) {
-  return !gyro.drift_rad_s.empty() || !gyro.drift_sigma_rad_s.empty() ||
-         !gyro.alignment_rotation_vector_rad.isZero(0) || gyro.readout_noise_rad != common.readout_noise_rad ||
+bool differs(const GyroPrior& gyro, const GyroPrior& common, TelemetryStamps stamps) {
+  return (stamps == TelemetryStamps::kAsReceived && gyro.latency_s != 0) || !gyro.drift_rad_s.empty() ||
+         !gyro.drift_sigma_rad_s.empty() || !gyro.alignment_rotation_vector_rad.isZero(0) ||
+         gyro.readout_noise_rad != common.readout_noise_rad ||
          gyro.drift_common_sigma_rad_s != common.drift_common_sigma_rad_s ||
          gyro.alignment_sigma_rad != common.alignment_sigma_rad;
 }
@@ -314,12 +315,18 @@ std::string format_map(const std::map<DriftCoefficient, double>& values) {
   return "{" + text + "}";
 }
 
+/// How far stamps are off: nothing where they are not.
+std::string format_clock(std::string_view key, double value, TelemetryStamps stamps) {
+  return stamps == TelemetryStamps::kCorrected || value == 0 ? "" : fmt::format("{} = {}\n", key, value);
+}
+
 /// The [[gyro.unit]] of one gyro.
-std::string format_unit(const GyroPrior& gyro, const GyroPrior& common) {
+std::string format_unit(const GyroPrior& gyro, const GyroPrior& common, TelemetryStamps stamps) {
   std::string text =
       fmt::format("\n[[gyro.unit]]\n{} = {}\n{} = {}\n{} = {}\n{} = {}\n", kNoise, gyro.readout_noise_rad, kDrift,
                   format_map(gyro.drift_rad_s), kAlignment, format_three(gyro.alignment_rotation_vector_rad),
-                  kAlignmentSigma, format_sigmas(gyro.alignment_sigma_rad));
+                  kAlignmentSigma, format_sigmas(gyro.alignment_sigma_rad)) +
+      format_clock(kLatency, gyro.latency_s, stamps);
   if (gyro.drift_sigma_rad_s.empty()) {
     return text + fmt::format("{} = {}\n", kDriftSigma, gyro.drift_common_sigma_rad_s);
   }
@@ -391,7 +398,7 @@ std::string format_text(const std::string& text) {
   return stream.str();
 }
 
-std::string format_pass_toml(const PassSettings& settings, std::string_view prior_file) {
+std::string format_pass_toml(const PassSettings& settings, std::string_view prior_file, TelemetryStamps stamps) {
   const GyroPrior common = settings.gyros.empty() ? GyroPrior{} : settings.gyros.front();
   std::string text =
       fmt::format("# One pass of telemetry.\n{} = {}\n\n[pass]\nspacecraft = {}\nepoch_tai = \"{}\"\nduration_s = {}\n",
@@ -408,9 +415,9 @@ std::string format_pass_toml(const PassSettings& settings, std::string_view prio
                   settings.start_up.empty() ? "" : fmt::format("{} = {}\n", kStartUp, format_text(settings.start_up)),
                   format_seconds(settings.gyro_period), kNoise, common.readout_noise_rad, kDriftSigma,
                   common.drift_common_sigma_rad_s, kAlignmentSigma, format_sigmas(common.alignment_sigma_rad));
-  if (std::ranges::any_of(settings.gyros, [&](const GyroPrior& gyro) { return differs(gyro, common); })) {
+  if (std::ranges::any_of(settings.gyros, [&](const GyroPrior& gyro) { return differs(gyro, common, stamps); })) {
     for (const GyroPrior& gyro : settings.gyros) {
-      text += format_unit(gyro, common);
+      text += format_unit(gyro, common, stamps);
     }
   }
   text += fmt::format("\n[star_tracker]\nperiod_s = {}\n{} = {}  # 1-sigma about c x, y, z\n",
@@ -420,6 +427,8 @@ std::string format_pass_toml(const PassSettings& settings, std::string_view prio
     text += fmt::format("{} = {}  # in the body\n", kMounting,
                         format_three(*settings.star_tracker_mounting_rotation_vector_rad));
   }
+  text += format_clock(kClockOffset, settings.star_tracker_clock_offset_s, stamps) +
+          format_clock(kClockRate, settings.star_tracker_clock_rate_s_s, stamps);
   for (const FurtherStarTracker& head : settings.further_star_trackers) {
     text += fmt::format("\n[[star_tracker.further]]\n{} = {}  # about its own axes\n{} = {}\n{} = {}\n", kHeadNoise,
                         format_three(head.noise_rad), kMounting, format_three(head.mounting_rotation_vector_rad),

@@ -37,8 +37,13 @@ struct SettingsOfTelemetry {
 [[nodiscard]] Fields telemetry_settings_fields(PassSettings& settings, std::optional<std::string>& prior_name,
                                                const std::filesystem::path& file);
 
-/// The text that parses back to the same settings. `prior_file` is the name for `prior`, empty for none.
-[[nodiscard]] std::string format_pass_toml(const PassSettings& settings, std::string_view prior_file);
+/// Whether the stamps of the telemetry beside the settings are corrected already by what these say of clocks.
+enum class TelemetryStamps { kCorrected, kAsReceived };
+
+/// The text that parses back to the same settings; clock corrections are in it only where the stamps still need them.
+/// `prior_file` is the name for `prior`, empty for none.
+[[nodiscard]] std::string format_pass_toml(const PassSettings& settings, std::string_view prior_file,
+                                           TelemetryStamps stamps = TelemetryStamps::kCorrected);
 
 /// As a string of TOML.
 [[nodiscard]] std::string format_text(const std::string& text);

@@ -32,6 +32,23 @@ TEST_F(PassInMemoryTest, IsThePassOfItsDirectory) {
   EXPECT_TRUE(loaded.defects.empty());
 }
 
+TEST_F(PassInMemoryTest, IsCorrectedByWhatItsSettingsSayOfClocks) {
+  const Pass uncorrected = read_pass(directory_.path()).pass;
+  raw_.toml += "clock_offset_s = 1.5\nclock_rate_s_s = 1e-3\n[[gyro.unit]]\n[[gyro.unit]]\nlatency_s = 0.25\n";
+  raw_.save_directory(directory_.path());
+  const Pass expected = read_pass(directory_.path()).pass;
+  const Pass pass = screened(tables()).pass;
+  expect_same_pass(pass, expected, 0, 0);
+  EXPECT_EQ(pass.settings.star_tracker_clock_offset_s, 1.5);
+  EXPECT_EQ(pass.settings.star_tracker_clock_rate_s_s, 1e-3);
+  EXPECT_EQ(pass.settings.gyros[0].latency_s, 0);
+  EXPECT_EQ(pass.settings.gyros[1].latency_s, 0.25);
+  EXPECT_NE(pass.star_tracker.t, uncorrected.star_tracker.t);
+  EXPECT_NE(pass.gyro.h, uncorrected.gyro.h);
+  // The tables of what was read so are corrected already, and are not corrected twice.
+  expect_same_pass(screened(tables_of(pass, 1e-15)).pass, expected, 1e-15, 0);
+}
+
 TEST_F(PassInMemoryTest, IsScreenedAsAFileIs) {
   PassInMemory spoilt = tables();
   std::swap(spoilt.gyro.t_s[20], spoilt.gyro.t_s[21]);

@@ -1,5 +1,6 @@
 """What Python gives is what the program gives: files byte for byte, numbers bit for bit."""
 import json
+import shutil
 
 import numpy as np
 import pytest
@@ -118,6 +119,24 @@ def test_a_directory_is_read_as_the_program_reads_it(pass_directory, work):
     read = trihedron.read_pass(pass_directory)
     assert trihedron.calibrate(read).to_json() == (work / "of-directory" / "calibration.json").read_text()
     assert read.truth is not None
+
+
+def test_the_clocks_of_a_directory_are_corrected_as_by_the_program(pass_directory, tmp_path):
+    """Its stamps are raw in Python, with settings that say how far they are off."""
+    shutil.copytree(pass_directory, tmp_path / "late")
+    toml = (tmp_path / "late" / "pass.toml").read_text()
+    assert "[[gyro.unit]]" not in toml
+    toml += "\n[[gyro.unit]]\n[[gyro.unit]]\nlatency_s = 0.02\n"
+    toml = toml.replace("[star_tracker]\n", "[star_tracker]\nclock_offset_s = 0.3\nclock_rate_s_s = 1e-5\n")
+    (tmp_path / "late" / "pass.toml").write_text(toml)
+    program("import", tmp_path / "late", "-o", tmp_path / "corrected.nc")
+    read, corrected = trihedron.read_pass(tmp_path / "late"), trihedron.read_pass(tmp_path / "corrected.nc")
+    assert read.settings.to_dict()["star_tracker"]["clock_offset_s"] == 0.3
+    assert "clock_offset_s" not in corrected.settings.to_dict()["star_tracker"]
+    for one, other in zip(read.events(), corrected.events(), strict=True):
+        assert type(one) is type(other) and abs(one.t_s - other.t_s) < 2e-9
+        if isinstance(one, trihedron.GyroSample):
+            np.testing.assert_allclose(one.directions, other.directions, rtol=0, atol=3e-10)  # in steps of 5e-10 in the file
 
 
 def test_the_program_reads_what_python_writes(flown, work):
