@@ -121,8 +121,7 @@ class Source {
   Found take(const Packet& packet) {
     const std::string_view octets = packet.octets;
     const std::size_t checked = octets.size() - kCrcOctets;
-    if (octets.size() < header_octets() + kCrcOctets ||
-        packet_crc(octets.substr(0, checked)) != bits_at(octets, 8 * checked, 8 * kCrcOctets)) {
+    if (packet_crc(octets.substr(0, checked)) != bits_at(octets, 8 * checked, 8 * kCrcOctets)) {
       if (octets.size() != octets_) {
         refuse(
             packet,
@@ -134,7 +133,7 @@ class Source {
       sequence_.add_damaged(packet);
       return Found::kDamaged;
     }
-    if (!is_selected(octets)) {
+    if (checked < header_octets() || !is_selected(octets)) {
       return Found::kOther;
     }
     if (octets.size() != octets_) {

@@ -78,6 +78,15 @@ std::string foreign(int apid) {
   return packet;
 }
 
+/// TM[17,2], "are you alive": a secondary header without source data, 25 octets, which ends before a structure ID.
+std::string short_report(int apid) {
+  std::string packet(25, '\0');
+  packet.replace(0, 9, std::string("\x08\0\xC0\0\0\x12\x20\x11\x02", 9));
+  packet[1] = static_cast<char>(apid);
+  packet.replace(13, 2, "\x9F\x04");
+  return sealed(packet);
+}
+
 const std::string& clean_bytes() {
   static const std::string bytes = format_packets(plain_pass(), kDefaultApid, "p", "").packets;
   return bytes;
@@ -204,9 +213,11 @@ TEST(Packets, OfOtherProcessesAreSkippedAndCountedIdleOnesOnlySkipped) {
   packets.insert(packets.begin() + 1, {foreign(5), foreign(kIdleApid), foreign(99)});
   packets.push_back(foreign(5));
   packets.push_back(sealed(with_octet(packets.front(), 7, 5)));  // an event report of the gyros
+  packets.push_back(short_report(kDefaultApid));
+  packets.push_back(short_report(kDefaultApid + 1));
   const PacketTables tables = parsed(joined(packets));
-  EXPECT_EQ(counts(tables), (std::map<DefectKind, std::int64_t>{{DefectKind::kOtherPackets, 4}}));
-  EXPECT_EQ(tables.defects.front().where, "p.ccsds, APID 5, 99, 100");
+  EXPECT_EQ(counts(tables), (std::map<DefectKind, std::int64_t>{{DefectKind::kOtherPackets, 6}}));
+  EXPECT_EQ(tables.defects.front().where, "p.ccsds, APID 5, 99, 100, 101");
   EXPECT_EQ(tables.defects.front().first.front().packet, 2);
   const PacketTables plain = parsed(clean_bytes());
   EXPECT_EQ(tables.tables[0].numbers, plain.tables[0].numbers);
