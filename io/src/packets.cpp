@@ -347,6 +347,18 @@ void expect_writable(const Pass& pass, int apid) {
   }
 }
 
+/// Fixes that have a covariance of their own.
+std::size_t fixes_with_covariance(const Pass& pass) {
+  const auto told = [](const StarTrackerTelemetry& fixes) {
+    return static_cast<std::size_t>(std::ranges::count_if(fixes.covariances, &FixCovariance::is_told));
+  };
+  std::size_t count = told(pass.star_tracker);
+  for (const StarTrackerTelemetry& fixes : pass.further_star_trackers) {
+    count += told(fixes);
+  }
+  return count;
+}
+
 }  // namespace
 
 PacketFiles format_packets(const Pass& pass, int apid, const std::string& packets_name, const std::string& prior_name) {
@@ -354,7 +366,13 @@ PacketFiles format_packets(const Pass& pass, int apid, const std::string& packet
   const std::vector<PacketLayout> layouts = layouts_of(apid, pass.gyro.gyros, 1 + pass.further_star_trackers.size());
   PacketFiles files;
   files.xtce = format_xtce(layouts);
+  files.covariances_left_out = fixes_with_covariance(pass);
   files.toml = format_pass_toml(pass.settings, pass.settings.prior ? prior_name : "") +
+               (files.covariances_left_out == 0
+                    ? ""
+                    : fmt::format("\n# {} fixes had covariances of their own, which packets do not hold: the noise of "
+                                  "all is noise_rad.\n",
+                                  files.covariances_left_out)) +
                fmt::format(
                    "\n[telemetry.packets]\nfile = {}\napid = {}  # of the gyros; the star trackers follow\n"
                    "gyros = {}\n",

@@ -408,7 +408,7 @@ std::string format_pass_toml(const PassSettings& settings, std::string_view prio
     text += fmt::format("{} = {}\n", kInertialFrame, format_text(settings.inertial_frame));
   }
   if (!prior_file.empty()) {
-    text += fmt::format("prior = \"{}\"\n", prior_file);
+    text += fmt::format("prior = {}\n", format_text(std::string(prior_file)));
   }
   text +=
       fmt::format("\n[gyro]\n{}period_s = {}\n{} = {}  # 1-sigma per direction cosine\n{} = {}\n{} = {}\n",

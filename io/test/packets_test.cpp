@@ -102,11 +102,11 @@ std::map<DefectKind, std::int64_t> counts(const PacketTables& tables) {
   return result;
 }
 
-Pass read_back(const PacketFiles& files) {
+Pass read_back(const PacketFiles& files, const char* prior_name = "prior.json") {
   const TemporaryDirectory directory;
   write_text(directory / "p.ccsds", files.packets);
   write_text(directory / "p.toml", files.toml);
-  write_text(directory / "prior.json", files.prior);
+  write_text(directory / prior_name, files.prior);
   return read_pass(directory / "p.toml").pass;
 }
 
@@ -150,9 +150,24 @@ TEST(Packets, BringBackEveryNumberAndTime) {
 TEST(Packets, BringBackThePriorCalibration) {
   Pass pass = plain_pass();
   pass.settings.prior = sample_calibration();
-  const Pass back = read_back(format_packets(pass, kDefaultApid, "p.ccsds", "prior.json"));
-  ASSERT_TRUE(back.settings.prior);
-  EXPECT_EQ(back.settings.prior->covariance, pass.settings.prior->covariance);
+  for (const char* const name : {"prior.json", "the \"first\" \\ 'best'.json"}) {
+    const Pass back = read_back(format_packets(pass, kDefaultApid, "p.ccsds", name), name);
+    ASSERT_TRUE(back.settings.prior);
+    EXPECT_EQ(back.settings.prior->covariance, pass.settings.prior->covariance);
+  }
+}
+
+TEST(Packets, SayThatTheyHoldNoCovariancesOfFixes) {
+  Pass pass = plain_pass();
+  EXPECT_EQ(format_packets(pass, kDefaultApid, "p", "").covariances_left_out, 0U);
+  EXPECT_EQ(format_packets(pass, kDefaultApid, "p", "").toml.find("covariances"), std::string::npos);
+  pass.star_tracker.covariances.assign(pass.star_tracker.size(), {{1e-10, 2e-10, 3e-10, 0, 0, 0}});
+  pass.star_tracker.covariances[3] = {};  // one that tells none
+  const PacketFiles files = format_packets(pass, kDefaultApid, "p.ccsds", "");
+  EXPECT_EQ(files.covariances_left_out, pass.star_tracker.size() - 1);
+  EXPECT_NE(files.toml.find(fmt::format("# {} fixes had covariances of their own", pass.star_tracker.size() - 1)),
+            std::string::npos);
+  EXPECT_TRUE(read_back(files).star_tracker.covariances.empty());
 }
 
 TEST(Packets, HaveTheOctetsOfTheStandards) {
