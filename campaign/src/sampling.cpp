@@ -11,6 +11,9 @@
 namespace trihedron::campaign {
 namespace {
 
+/// The largest number below it: by rounding, a number that is drawn may be 1.
+constexpr double kBelowOne = 1 - 0x1p-53;
+
 /// FNV-1a.
 std::uint64_t hash_of(std::string_view text) {
   std::uint64_t hash = 0xcbf29ce484222325;
@@ -76,7 +79,7 @@ std::uint64_t seed_of_run(const CampaignPlan& plan, std::uint64_t run) {
 }
 
 double uniform_of(std::uint64_t seed, std::uint64_t flight, std::string_view key) {
-  return (static_cast<double>(mixed(seed, flight, hash_of(key)) >> 11U) + 0.5) * 0x1p-53;
+  return std::min((static_cast<double>(mixed(seed, flight, hash_of(key)) >> 11U) + 0.5) * 0x1p-53, kBelowOne);
 }
 
 double quantile_of(const Distribution& distribution, double u) {
@@ -142,7 +145,7 @@ std::vector<double> draws_of_run(const CampaignPlan& plan, std::uint64_t run) {
     double u = uniform_of(plan.seed, flight, input.key);
     if (plan.latin_hypercube) {
       const std::uint64_t stratum = permuted(flight, flights, mixed(plan.seed, 0, hash_of("order of " + input.key)));
-      u = (static_cast<double>(stratum) + u) / static_cast<double>(flights);
+      u = std::min((static_cast<double>(stratum) + u) / static_cast<double>(flights), kBelowOne);
     }
     draws.push_back(quantile_of(input.distribution, u));
   }

@@ -57,6 +57,11 @@ constexpr std::uint64_t kRuns = 20000;
 /// Of the mean of kRuns values, four standard deviations: 6e-5 of right programs are beyond.
 double tolerance_of_mean(double sigma) { return 4 * sigma / std::sqrt(static_cast<double>(kRuns)); }
 
+TEST(Sampling, IsBelowOneForTheLargestNumberThatIsDrawn) {
+  // splitmix64 is a bijection: for this flight all bits of its last value are ones.
+  EXPECT_EQ(uniform_of(1, 0x8e1310d3876fac59, "u"), std::nextafter(1.0, 0.0));
+}
+
 TEST(Sampling, HasTheMomentsOfItsDistributions) {
   CampaignPlan plan;
   plan.seed = 7;
