@@ -21,6 +21,7 @@
 namespace trihedron::campaign {
 namespace {
 
+/// Where there is no number. std::fmax(), by which the largest of several is found, leaves it out.
 constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
 
 /// Corrections that count: at the first nothing is calibrated yet.
@@ -141,9 +142,11 @@ void measure_attitude(const ground::CalibrationEvaluation& evaluation, RunRecord
       continue;
     }
     const double error = navigation.error_rad[i].norm();
-    errors.push_back(error);
-    if (is_first_after && !(error <= corrected)) {
-      corrected = error;
+    if (!std::isnan(error)) {
+      errors.push_back(error);
+    }
+    if (is_first_after) {
+      corrected = std::fmax(corrected, error);
     }
   }
   std::ranges::sort(errors);
@@ -157,8 +160,7 @@ void measure_attitude(const ground::CalibrationEvaluation& evaluation, RunRecord
 double largest(const ground::AttitudeErrors& errors, Duration length) {
   double greatest = kNone;
   for (std::size_t i = 0; i < errors.t.size() && errors.t[i] - errors.t.front() <= length; ++i) {
-    const double error = errors.error_rad[i].norm();
-    greatest = error <= greatest ? greatest : error;
+    greatest = std::fmax(greatest, errors.error_rad[i].norm());
   }
   return greatest;
 }
@@ -170,18 +172,15 @@ void measure_open_loops(const ground::CalibrationEvaluation& evaluation, RunReco
   std::vector<double> interval_before;
   std::vector<double> interval_after;
   bool is_lower_bound = false;
-  const auto keep_larger = [](double& greatest, double value) {
-    greatest = value <= greatest || std::isnan(value) ? greatest : value;
-  };
   for (std::size_t i = kFirstCounted; i < evaluation.open_loops.size(); ++i) {
     const ground::OpenLoops& loops = evaluation.open_loops[i];
     const ground::IntervalPair& pair = loops.intervals;
     if (loops.calibrated.t.empty() || pair.calibrated.observed <= Duration::zero()) {
       continue;
     }
-    keep_larger(within, largest(loops.calibrated, ground::kEvaluatedStretch));
-    keep_larger(before, largest(loops.known_before, ground::kEvaluatedStretch));
-    keep_larger(to_end, largest(loops.calibrated, Duration::max()));
+    within = std::fmax(within, largest(loops.calibrated, ground::kEvaluatedStretch));
+    before = std::fmax(before, largest(loops.known_before, ground::kEvaluatedStretch));
+    to_end = std::fmax(to_end, largest(loops.calibrated, Duration::max()));
     interval_before.push_back(to_seconds(pair.known_before.passed.value_or(pair.known_before.observed)));
     interval_after.push_back(to_seconds(pair.calibrated.passed.value_or(pair.calibrated.observed)));
     is_lower_bound = is_lower_bound || !pair.calibrated.passed;

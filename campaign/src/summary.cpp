@@ -39,8 +39,7 @@ double norm_of(const RunRecord& record, RunQuantity quantity, std::size_t from) 
 double largest_alignment_error(const RunRecord& record) {
   double largest = std::numeric_limits<double>::quiet_NaN();
   for (std::size_t i = 0; i + 2 < record[RunQuantity::kAlignmentError].size(); i += 3) {
-    const double error = norm_of(record, RunQuantity::kAlignmentError, i);
-    largest = error <= largest || std::isnan(error) ? largest : error;
+    largest = std::fmax(largest, norm_of(record, RunQuantity::kAlignmentError, i));  // leaves out NaN
   }
   return largest;
 }

@@ -6,6 +6,8 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <cstdint>
+#include <limits>
 #include <new>
 #include <stdexcept>
 #include <vector>
@@ -98,6 +100,33 @@ TEST(Campaign, MeasuresARunAgainstItsTruth) {
   EXPECT_GT(record.cpu_s, 0);
   // Five minutes have one correction, and an open loop counts from the second on.
   EXPECT_TRUE(std::isnan(record.at(RunQuantity::kOpenLoopError)));
+}
+
+TEST(Campaign, LeavesErrorsThatAreNoNumbersOutOfTheLargest) {
+  const CampaignPlan plan = six_runs();
+  Flight flight = fly(short_flight(1, std::vector<double>{2}), plan.limit_rad, ground::OpenLoopScope::kExtension);
+  const double none = std::numeric_limits<double>::quiet_NaN();
+  const auto errors_of = [](const std::vector<double>& sizes) {
+    ground::AttitudeErrors errors;
+    for (const double size : sizes) {
+      errors.t.push_back(Time(std::chrono::seconds(static_cast<std::int64_t>(errors.t.size()))));
+      errors.error_rad.emplace_back(0, size, 0);
+      errors.age_s.push_back(static_cast<double>(errors.t.size() % 2));  // a correction at every second
+    }
+    return errors;
+  };
+  flight.evaluation.navigation.errors = errors_of({9, 3, 2, none, 2, 1, 2});
+  flight.evaluation.open_loops.resize(2);
+  ground::OpenLoops& loops = flight.evaluation.open_loops[1];
+  loops.calibrated = errors_of({none, 5, none, 4});
+  loops.known_before = errors_of({7, none, 6});
+  loops.intervals.calibrated.observed = std::chrono::minutes(1);
+  const RunRecord record = record_of(flight, plan);
+  EXPECT_EQ(record.at(RunQuantity::kCorrectedError), 3);
+  EXPECT_EQ(record.at(RunQuantity::kNavigationError, kErrorQuantiles.size() - 1), 3);
+  EXPECT_EQ(record.at(RunQuantity::kOpenLoopError), 5);
+  EXPECT_EQ(record.at(RunQuantity::kOpenLoopErrorBefore), 7);
+  EXPECT_EQ(record.at(RunQuantity::kOpenLoopErrorToEnd), 5);
 }
 
 TEST(Campaign, TellsTheInnovationsOfRejectedFixesApart) {
