@@ -49,7 +49,7 @@ QuantileBounds quantile_bounds(std::span<const double> values, double p, double 
   std::size_t end = values.size() + 1;
   for (std::size_t last = end; first < last;) {
     const std::size_t middle = first + (last - first) / 2;
-    (middle == end || is_upper(middle)) ? last = middle : first = middle + 1;
+    is_upper(middle) ? last = middle : first = middle + 1;
   }
   if (first < end) {
     bounds.upper = values[first - 1];
