@@ -10,7 +10,7 @@
 #include <set>
 #include <utility>
 
-#include "trihedron/core/drift.hpp"
+#include "trihedron/records/parameter_id.hpp"
 
 namespace trihedron::campaign {
 namespace {
@@ -112,72 +112,68 @@ MeasureStatistics statistics_of(const Measure& measure, const Records& records) 
   return result;
 }
 
-/// within: how many runs lie within the 95 % of their own χ².
-Consistency over_runs(double sum, double freedom, double count, std::size_t runs, std::size_t within) {
-  Consistency result = consistency_of(sum, freedom, count);
-  result.runs = runs;
-  result.within = static_cast<double>(within) / static_cast<double>(runs);
-  return result;
-}
+/// Squared errors by their covariance, run by run.
+class SquaredErrors {
+ public:
+  /// The sum of a run over so many errors, with its degrees of freedom. Left out where it is no number.
+  void add(double sum, double freedom, double count) {
+    if (!std::isfinite(sum) || !(freedom > 0)) {
+      return;
+    }
+    ++runs_;
+    sum_ += sum;
+    freedom_ += freedom;
+    count_ += count;
+    const double share = chi_square_share(sum, freedom);
+    within_ += share >= (1 - kUsual) / 2 && share <= (1 + kUsual) / 2 ? 1U : 0U;
+  }
+  /// Nothing without a run.
+  [[nodiscard]] std::optional<Consistency> consistency() const {
+    if (runs_ == 0) {
+      return std::nullopt;
+    }
+    Consistency result = consistency_of(sum_, freedom_, count_);
+    result.runs = runs_;
+    result.within = static_cast<double>(within_) / static_cast<double>(runs_);
+    return result;
+  }
+
+ private:
+  std::size_t runs_ = 0;
+  std::size_t within_ = 0;  ///< the 95 % of their own χ²
+  double sum_ = 0;
+  double freedom_ = 0;
+  double count_ = 0;
+};
 
 std::optional<Consistency> nees_of(const Records& records) {
-  std::size_t runs = 0;
-  std::size_t within = 0;
-  double sum = 0;
-  double freedom = 0;
+  SquaredErrors errors;
   for (const RunRecord* record : records) {
-    const double nees = record->at(RunQuantity::kNees);
-    const double of_run = record->at(RunQuantity::kNeesFreedom);
-    if (!std::isfinite(nees) || !(of_run > 0)) {
-      continue;
-    }
-    ++runs;
-    sum += nees;
-    freedom += of_run;
-    const double share = chi_square_share(nees, of_run);
-    within += share >= (1 - kUsual) / 2 && share <= (1 + kUsual) / 2 ? 1U : 0U;
+    errors.add(record->at(RunQuantity::kNees), record->at(RunQuantity::kNeesFreedom), 1);
   }
-  if (runs == 0) {
-    return std::nullopt;
-  }
-  return over_runs(sum, freedom, static_cast<double>(runs), runs, within);
+  return errors.consistency();
 }
 
 /// Per fix.
 std::optional<Consistency> nis_of(const Records& records) {
-  std::size_t runs = 0;
-  std::size_t within = 0;
-  double sum = 0;
-  double freedom = 0;
-  double fixes = 0;
+  SquaredErrors errors;
   for (const RunRecord* record : records) {
-    const double count = record->at(RunQuantity::kNisFixes);
-    const double nis = record->at(RunQuantity::kNisMean);
-    const double of_fix = record->at(RunQuantity::kNisFreedom);
-    if (!std::isfinite(nis) || !(count > 0) || !(of_fix > 0)) {
-      continue;
-    }
-    ++runs;
-    sum += nis * count;
-    freedom += of_fix * count;
-    fixes += count;
-    const double share = chi_square_share(nis * count, of_fix * count);
-    within += share >= (1 - kUsual) / 2 && share <= (1 + kUsual) / 2 ? 1U : 0U;
+    const double fixes = record->at(RunQuantity::kNisFixes);
+    errors.add(record->at(RunQuantity::kNisMean) * fixes, record->at(RunQuantity::kNisFreedom) * fixes, fixes);
   }
-  if (runs == 0) {
-    return std::nullopt;
-  }
-  return over_runs(sum, freedom, fixes, runs, within);
+  return errors.consistency();
 }
 
-ParameterErrors parameter_errors(std::string name, bool is_alignment, std::size_t place, const Records& records) {
+ParameterErrors parameter_errors(const ParameterId& parameter, std::size_t place, const Records& records) {
   ParameterErrors result;
-  result.name = std::move(name);
-  result.is_alignment = is_alignment;
+  result.name = name_of(parameter);
+  result.is_alignment = parameter.is_alignment();
   double normalised = 0;
   for (const RunRecord* record : records) {
-    const double error = record->at(is_alignment ? RunQuantity::kAlignmentError : RunQuantity::kDriftError, place);
-    const double sigma = record->at(is_alignment ? RunQuantity::kAlignmentSigma : RunQuantity::kDriftSigma, place);
+    const double error =
+        record->at(result.is_alignment ? RunQuantity::kAlignmentError : RunQuantity::kDriftError, place);
+    const double sigma =
+        record->at(result.is_alignment ? RunQuantity::kAlignmentSigma : RunQuantity::kDriftSigma, place);
     if (std::isfinite(error) && sigma > 0) {
       ++result.runs;
       result.rms += error * error;
@@ -198,15 +194,10 @@ ParameterErrors parameter_errors(std::string name, bool is_alignment, std::size_
 
 std::vector<ParameterErrors> errors_of_parameters(std::size_t gyros, const Records& records) {
   std::vector<ParameterErrors> all;
-  for (std::size_t gyro = 0; gyro < gyros; ++gyro) {
-    for (std::size_t k = 0; k < kCampaignCoefficients; ++k) {
-      all.push_back(parameter_errors(fmt::format("gyro{}.{}", gyro + 1, Esg7::kNames[k]), false,
-                                     kCampaignCoefficients * gyro + k, records));
-    }
-    for (std::size_t axis = 0; axis < 3; ++axis) {
-      all.push_back(
-          parameter_errors(fmt::format("gyro{}.align_{}", gyro + 1, "xyz"[axis]), true, 3 * gyro + axis, records));
-    }
+  std::size_t coefficients = 0;
+  std::size_t axes = 0;
+  for (const ParameterId& parameter : drift_and_alignment(kEsg7, gyros)) {
+    all.push_back(parameter_errors(parameter, parameter.is_alignment() ? axes++ : coefficients++, records));
   }
   return all;
 }
