@@ -11,6 +11,7 @@
 #include "netcdf_file.hpp"
 #include "trihedron/core/drift.hpp"
 #include "trihedron/io/campaign.hpp"
+#include "trihedron/records/parameter_id.hpp"
 
 namespace trihedron::io {
 namespace {
@@ -60,7 +61,8 @@ std::string name_of_input(const std::string& key, std::map<std::string, int>& ta
 ShapedVariable input_variable(const CampaignPlan& plan, std::size_t i, const std::string& name,
                               std::span<const RunRecord> records) {
   const CampaignInput& input = plan.inputs[i];
-  ShapedVariable variable{name, {kRun}, {}, {{"long_name", input.key + " of the scenario"}, {"key", input.key}}};
+  const char* const where = input.is_setting() ? ", a setting of the calibration" : " of the scenario";
+  ShapedVariable variable{name, {kRun}, {}, {{"long_name", input.key + where}, {"key", input.key}}};
   if (input.is_number()) {
     variable.values = column<double>(records, [&](const RunRecord& record) { return input.shown(record.draws[i]); });
     variable.attributes.emplace_back("units", input.unit.empty() ? "1" : input.unit);
@@ -92,13 +94,8 @@ ShapedVariable quantity_variable(const CampaignPlan& plan, const RunQuantityRow&
 /// As covariance has them: "gyro1.k0".
 std::vector<std::string> names_of_parameters(std::size_t gyros) {
   std::vector<std::string> names;
-  for (std::size_t gyro = 1; gyro <= gyros; ++gyro) {
-    for (const auto& name : Esg7::kNames) {
-      names.push_back(fmt::format("gyro{}.{}", gyro, name));
-    }
-    for (const char axis : {'x', 'y', 'z'}) {
-      names.push_back(fmt::format("gyro{}.align_{}", gyro, axis));
-    }
+  for (const ParameterId& parameter : drift_and_alignment(kEsg7, gyros)) {
+    names.push_back(name_of(parameter));
   }
   return names;
 }

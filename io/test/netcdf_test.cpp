@@ -9,6 +9,7 @@
 
 #include "fixtures.hpp"
 #include "netcdf_file.hpp"
+#include "trihedron/io/campaign.hpp"
 #include "trihedron/io/pass.hpp"
 #include "trihedron/io/residuals.hpp"
 
@@ -383,6 +384,28 @@ TEST(Xarray, OpensEveryGroupWithItsUnitsAndTimes) {
                               (directory / "residuals.nc").string();
   const int status = std::system(command.c_str());
   EXPECT_EQ(status, 0);
+}
+
+TEST_F(PassNetcdf, TheTableOfRunsSaysWhichInputsAreSettings) {
+  CampaignPlan plan;
+  plan.inputs.resize(2);
+  plan.inputs[0].key = "gyro.readout.noise";
+  plan.inputs[1].key = "calibration.gate";
+  RunRecord record;
+  record.draws = {1, 2};
+  write_run_table(directory_ / "runs.nc", plan, "digest", {&record, 1});
+  int id = 0;
+  ASSERT_EQ(nc_open((directory_ / "runs.nc").c_str(), NC_NOWRITE, &id), NC_NOERR);
+  const auto long_name = [&](const char* name) {
+    std::size_t length = 0;
+    EXPECT_EQ(nc_inq_attlen(id, variable(id, name), "long_name", &length), NC_NOERR);
+    std::string text(length, '\0');
+    EXPECT_EQ(nc_get_att_text(id, variable(id, name), "long_name", text.data()), NC_NOERR);
+    return text;
+  };
+  EXPECT_EQ(long_name("input_gyro_readout_noise"), "gyro.readout.noise of the scenario");
+  EXPECT_EQ(long_name("input_calibration_gate"), "calibration.gate, a setting of the calibration");
+  ASSERT_EQ(nc_close(id), NC_NOERR);
 }
 
 }  // namespace
