@@ -253,6 +253,14 @@ Members covariance_members(Calibration& calibration, std::vector<std::string>& n
            [&](const JsonNode& node) { read_matrix(node, names, calibration); }}};
 }
 
+Member number_member(std::string_view key, double& target, const Range& range, std::string_view about) {
+  return {key, about, number_schema(range), [&target, range](const JsonNode& node) { target = node.number(range); }};
+}
+
+Member flag_member(std::string_view key, bool& target, std::string_view about) {
+  return {key, about, {{"type", "boolean"}}, [&target](const JsonNode& node) { target = node.boolean(); }};
+}
+
 /// Zero as well: there is no such noise.
 Range zero_or(Range range) {
   range.zero_allowed = true;
@@ -260,14 +268,11 @@ Range zero_or(Range range) {
 }
 
 Members noise_members(CalibrationNoise& noise) {
-  const auto member = [](std::string_view key, double& target, const Range& range, std::string_view about) -> Member {
-    return {key, about, number_schema(range), [&target, range](const JsonNode& node) { target = node.number(range); }};
-  };
   const Range time = zero_or(limits::kWanderingTime_s);
-  return {member("direction_random_walk_rad_sqrt_s", noise.direction_random_walk_rad_sqrt_s,
-                 limits::kRandomWalk_rad_sqrt_s, "of each momentum, per axis across it"),
-          member("wandering_drift_rad_s", noise.wandering_drift_rad_s, zero_or(limits::kWanderingDrift_rad_s),
-                 "1-sigma; 0: there is none"),
+  return {number_member("direction_random_walk_rad_sqrt_s", noise.direction_random_walk_rad_sqrt_s,
+                        limits::kRandomWalk_rad_sqrt_s, "of each momentum, per axis across it"),
+          number_member("wandering_drift_rad_s", noise.wandering_drift_rad_s, zero_or(limits::kWanderingDrift_rad_s),
+                        "1-sigma; 0: there is none"),
           {"wandering_time_s", "its correlation time, 0 where there is none", number_schema(time),
            [&noise, time](const JsonNode& node) {
              noise.wandering_time_s = node.number(noise.wandering_drift_rad_s > 0 ? limits::kWanderingTime_s : time);
@@ -388,10 +393,9 @@ Members level_members(DriftFieldLevel& level, std::size_t gyros) {
          level.degree =
              static_cast<int>(node.number({1, DriftModelId::kMaxDegree, "", "it is a degree of the drift field"}));
        }},
-      {"rms_rad_s", "over the sphere, most likely", number_schema(limits::kDriftField_rad_s),
-       [&level](const JsonNode& node) { level.rms_rad_s = node.number(limits::kDriftField_rad_s); }},
-      {"sigma_factor", "its 1-sigma: from rms / factor to rms * factor", number_schema(limits::kSigmaFactor),
-       [&level](const JsonNode& node) { level.sigma_factor = node.number(limits::kSigmaFactor); }}};
+      number_member("rms_rad_s", level.rms_rad_s, limits::kDriftField_rad_s, "over the sphere, most likely"),
+      number_member("sigma_factor", level.sigma_factor, limits::kSigmaFactor,
+                    "its 1-sigma: from rms / factor to rms * factor")};
 }
 
 Members on_board_members(OnBoardDrift& drift) {
@@ -403,10 +407,8 @@ Members on_board_members(OnBoardDrift& drift) {
                            fmt::format("there is room for degree {} and less", DriftModelId::kMaxDegreeOnBoard));
              }
            }},
-          {"random_walk_rad_sqrt_s", "of each momentum, per axis across it, for what it leaves out",
-           number_schema(limits::kRandomWalk_rad_sqrt_s), [&drift](const JsonNode& node) {
-             drift.random_walk_rad_sqrt_s = node.number(limits::kRandomWalk_rad_sqrt_s);
-           }}};
+          number_member("random_walk_rad_sqrt_s", drift.random_walk_rad_sqrt_s, limits::kRandomWalk_rad_sqrt_s,
+                        "of each momentum, per axis across it, for what it leaves out")};
 }
 
 Json level_json(const DriftFieldLevel& level) {
@@ -417,17 +419,9 @@ Json level_json(const DriftFieldLevel& level) {
           {"sigma_factor", level.sigma_factor}};
 }
 
-Member number_member(std::string_view key, double& target, const Range& range, std::string_view about) {
-  return {key, about, number_schema(range), [&target, range](const JsonNode& node) { target = node.number(range); }};
-}
-
 Member time_member(std::string_view key, Duration& target, std::string_view about) {
   return {key, about, number_schema(limits::kForecastTime_s),
           [&target](const JsonNode& node) { target = from_seconds(node.number(limits::kForecastTime_s)); }};
-}
-
-Member flag_member(std::string_view key, bool& target, std::string_view about) {
-  return {key, about, {{"type", "boolean"}}, [&target](const JsonNode& node) { target = node.boolean(); }};
 }
 
 Members accuracy_members(AccuracyForecast& accuracy) {
@@ -655,10 +649,7 @@ void read_further(const JsonNode& node, Calibration& calibration) {
 
 Members verdict_members(Verdict& verdict) {
   Finding finding;
-  return {{"trustworthy",
-           "false: do not use",
-           {{"type", "boolean"}},
-           [&verdict](const JsonNode& node) { verdict.trustworthy = node.boolean(); }},
+  return {flag_member("trustworthy", verdict.trustworthy, "false: do not use"),
           {"findings", "why, and what else was found", array_of(schema_of(finding_members(finding))),
            [&verdict](const JsonNode& node) {
              for (const JsonNode& element : node.elements()) {
