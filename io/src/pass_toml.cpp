@@ -393,8 +393,11 @@ void check_prior(const Calibration& prior, const fs::path& prior_file, int gyros
 }
 
 std::string format_text(const std::string& text) {
+  // In double quotes, as strings are written in all documents.
+  constexpr auto kFlags = toml::toml_formatter::default_flags & ~toml::format_flags::allow_literal_strings;
+  const toml::value<std::string> value(text);
   std::ostringstream stream;
-  stream << toml::value<std::string>(text);
+  stream << toml::toml_formatter(value, kFlags);
   return stream.str();
 }
 

@@ -151,7 +151,9 @@ TEST(Packets, BringBackThePriorCalibration) {
   Pass pass = plain_pass();
   pass.settings.prior = sample_calibration();
   for (const char* const name : {"prior.json", "the \"first\" \\ 'best'.json"}) {
-    const Pass back = read_back(format_packets(pass, kDefaultApid, "p.ccsds", name), name);
+    const PacketFiles files = format_packets(pass, kDefaultApid, "p.ccsds", name);
+    EXPECT_NE(files.toml.find("prior = \""), std::string::npos);
+    const Pass back = read_back(files, name);
     ASSERT_TRUE(back.settings.prior);
     EXPECT_EQ(back.settings.prior->covariance, pass.settings.prior->covariance);
   }
