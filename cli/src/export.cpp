@@ -330,6 +330,7 @@ void export_pass(const ExportArguments& arguments, const Common& common) {
   for (const StarTrackerTelemetry& fixes : pass.further_star_trackers) {
     summary.epochs += fixes.size();
   }
+  summary.covariances_left_out = files.covariances_left_out;
   show_interchange(common, summary);
 }
 

@@ -63,7 +63,8 @@ void show_interchange(const Common& common, const InterchangeSummary& summary) {
                                   {"inertial_frame", summary.inertial_frame},
                                   {"body_frame", summary.body_frame},
                                   {"object_name", summary.object_name},
-                                  {"object_id", summary.object_id}};
+                                  {"object_id", summary.object_id},
+                                  {"covariances_left_out", summary.covariances_left_out}};
   };
   show(common, as_json, [&] {
     std::string text = fmt::format("Read        {}: {}", printable(summary.input), summary.input_format);
@@ -74,6 +75,10 @@ void show_interchange(const Common& common, const InterchangeSummary& summary) {
     text += '\n';
     if (summary.left_out > 0) {
       text += fmt::format("  left out  {} epochs outside the useable spans\n", summary.left_out);
+    }
+    if (summary.covariances_left_out > 0) {
+      text += fmt::format("  left out  covariances of {} fixes, for which packets have no room\n",
+                          summary.covariances_left_out);
     }
     text +=
         fmt::format("Spacecraft  {}, {}\nFrames      {} in {}\nTime        {}, epoch {} TAI\n",

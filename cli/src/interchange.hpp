@@ -44,6 +44,7 @@ struct InterchangeSummary {
   std::string body_frame;
   std::string object_name;
   std::string object_id;
+  std::size_t covariances_left_out = 0;  ///< of fixes, for which the format has no room
 };
 
 void show_interchange(const Common& common, const InterchangeSummary& summary);

@@ -298,7 +298,8 @@ Json interchange_output() {
                  {"inertial_frame", text()},
                  {"body_frame", text()},
                  {"object_name", text()},
-                 {"object_id", text()}});
+                 {"object_id", text()},
+                 {"covariances_left_out", count()}});
 }
 
 Json import_output() {
