@@ -688,6 +688,10 @@ Members calibration_members(Calibration& calibration) {
       {"gyros", "one element per gyro", gyros, [&](const JsonNode& node) { read_gyros(node, calibration); }},
       optional_member({"further", "further states by name", object_of({}, estimate),
                        [&](const JsonNode& node) { read_further(node, calibration); }}),
+      optional_member(
+          {"orbital_rate_rad_s", "by which an error of the star trackers at orbital period is estimated",
+           number_schema(limits::kOrbitalRate_rad_s),
+           [&](const JsonNode& node) { calibration.orbital_rate_rad_s = node.number(limits::kOrbitalRate_rad_s); }}),
       optional_member({"clocks", "how far the stamps of the telemetry are off, as in pass.toml, whose own are in it",
                        schema_of(clock_members(clocks, kMaxGyros)),
                        [&](const JsonNode& node) {
@@ -794,6 +798,10 @@ std::string format_calibration(const Calibration& calibration) {
   for (const FurtherEstimate& estimate : calibration.further) {
     further[name_of(estimate.parameter)] = {{"value", estimate.value}, {"sigma", estimate.sigma}};
   }
+  const std::string orbital_rate =
+      calibration.orbital_rate_rad_s
+          ? fmt::format(" \"orbital_rate_rad_s\": {},\n", dump(Json(*calibration.orbital_rate_rad_s)))
+          : "";
   Json states = Json::array();
   for (const ParameterId& state : calibration.states) {
     states.push_back(name_of(state));
@@ -841,14 +849,14 @@ std::string format_calibration(const Calibration& calibration) {
       "{{\"format\": \"{}\", \"version\": {},\n"
       " \"estimator\": {}, \"epoch_tai\": \"{}\",{} \"t_s\": {},\n"
       " \"gyros\": {},\n"
-      " \"further\": {},\n{}{}{}{}{}{}"
+      " \"further\": {},\n{}{}{}{}{}{}{}"
       " \"covariance\": {{\n  \"states\": {},\n  \"matrix\": {}}},\n"
       " \"verdict\": {{\"trustworthy\": {}, \"findings\": {}}},\n"
       " \"statistics\": {}}}\n",
       kFormat, kVersion, dump(Json(name_of(calibration.estimator))), format_epoch(calibration.epoch), start_up,
-      dump(Json(to_seconds(calibration.t - calibration.epoch))), lines(gyros), dump(further), clocks, noise, field,
-      on_board, determined, forecast, dump(states), lines(matrix), calibration.verdict.trustworthy, lines(findings),
-      dump(statistics));
+      dump(Json(to_seconds(calibration.t - calibration.epoch))), lines(gyros), dump(further), orbital_rate, clocks,
+      noise, field, on_board, determined, forecast, dump(states), lines(matrix), calibration.verdict.trustworthy,
+      lines(findings), dump(statistics));
 }
 
 void write_calibration(const std::filesystem::path& path, const Calibration& calibration) {

@@ -241,6 +241,16 @@ TEST(CalibrationJson, KeepsTheDriftField) {
               HasSubstr("drift_field[0].sigma_factor"));
 }
 
+TEST(CalibrationJson, KeepsTheOrbitalRateWhereThereIsOne) {
+  Calibration calibration = sample_calibration();
+  EXPECT_FALSE(parse_calibration(format_calibration(calibration), "c.json").orbital_rate_rad_s.has_value());
+  calibration.orbital_rate_rad_s = 1.059e-3;
+  const std::string text = format_calibration(calibration);
+  EXPECT_EQ(parse_calibration(text, "c.json").orbital_rate_rad_s, 1.059e-3);
+  EXPECT_THAT(refusal_of(replaced(text, "\"orbital_rate_rad_s\": 0.001059", "\"orbital_rate_rad_s\": 1")),
+              HasSubstr("orbital_rate_rad_s is 1"));
+}
+
 TEST(CalibrationJson, KeepsTheClocksWhereTheyAreOff) {
   Calibration calibration = sample_calibration();
   EXPECT_FALSE(parse_calibration(format_calibration(calibration), "c.json").clocks.has_value());

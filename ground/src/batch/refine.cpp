@@ -288,6 +288,9 @@ void Refinement::put_into(CalibrationRun& run) && {
   rearrange(calibration.states, states, problem_.setup(), run.parameters);
   calibration.states = states;
   calibration.further = further_of(problem_, result_);
+  if (layout.further.orbital_error) {
+    calibration.orbital_rate_rad_s = problem_.setup().on_board.orbital_rate_rad_s;
+  }
   if (halves_) {
     calibration.statistics.halves_chi_square = halves_->chi_square;
     calibration.statistics.halves_degrees_of_freedom = halves_->degrees_of_freedom;

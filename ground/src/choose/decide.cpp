@@ -107,6 +107,8 @@ CalibrationOptions as_before(CalibrationOptions options, const Calibration& prio
   }
   if (const auto& drift = prior.gyros.at(0).orbital_drift) {
     options.orbital_rate_rad_s = drift->rate_rad_s;
+  } else if (prior.orbital_rate_rad_s) {
+    options.orbital_rate_rad_s = prior.orbital_rate_rad_s;
   }
   for (std::size_t k = 0; k < prior.gyros.size(); ++k) {
     if (const auto& drift = prior.gyros[k].polhode) {

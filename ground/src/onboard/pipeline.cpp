@@ -1,10 +1,14 @@
 #include "trihedron/ground/onboard/pipeline.hpp"
 
 #include <Eigen/Cholesky>
+#include <chrono>
+#include <cmath>
+#include <type_traits>
 #include <utility>
 #include <variant>
 
 #include "model/open_loop_start.hpp"
+#include "model/orbital_rate.hpp"
 #include "model/prior.hpp"
 #include "model/setup.hpp"
 #include "onboard/calibration_of.hpp"
@@ -32,6 +36,12 @@ SetupError error_of(SetupFault fault) {
   }
   return {"there are more states than there is room for", "use fewer gyros, or a smaller drift model"};
 }
+
+/// Of the fixes: when the rate of the orbit is told first, and last, each time after twice the time before.
+constexpr Duration kFirstLookAtOrbit = std::chrono::minutes(20);
+constexpr Duration kLastLookAtOrbit = std::chrono::minutes(320);
+/// A hundredth of an error at orbital period.
+constexpr double kPhaseThatMatters_rad = 0.01;
 
 }  // namespace
 
@@ -62,17 +72,25 @@ struct Pipeline::Program {
 };
 
 Pipeline::Pipeline(const PassSettings& settings, const CalibrationOptions& options, Steps steps, bool navigate)
-    : settings_(settings), options_(options), program_(std::make_unique<Program>()) {
-  const CalibrationSetup setup = setup_of(settings, options);
+    : settings_(settings), options_(options), policy_(policy_of(options.corrections)) {
+  policy_.navigate = navigate;
+  policy_.steps_over_samples = steps == Steps::kOverSamples;
+  set_up();
+  const FurtherStates& further = layout().further;
+  if ((further.orbital_error || further.orbital_drift) && !options.orbital_rate_rad_s) {
+    orbit_.emplace().next = kFirstLookAtOrbit;
+  }
+}
+
+void Pipeline::set_up() {
+  program_ = std::make_unique<Program>();
+  const CalibrationSetup setup = setup_of(settings_, options_);
   program_->layout = setup.layout;
-  program_->prior = prior_of(settings, setup.layout);
-  CorrectionPolicy policy = policy_of(options.corrections);
-  policy.navigate = navigate;
-  policy.steps_over_samples = steps == Steps::kOverSamples;
-  if (options.estimator == Estimator::kPaper) {
-    program_->set_up<Program::Paper>(setup, policy);
+  program_->prior = prior_of(settings_, setup.layout);
+  if (options_.estimator == Estimator::kPaper) {
+    program_->set_up<Program::Paper>(setup, policy_);
   } else {
-    program_->set_up<FullOnBoard>(setup, policy);
+    program_->set_up<FullOnBoard>(setup, policy_);
   }
 }
 
@@ -81,11 +99,55 @@ Pipeline& Pipeline::operator=(Pipeline&&) noexcept = default;
 Pipeline::~Pipeline() = default;
 
 std::span<const StepReport> Pipeline::feed(const GyroSample& sample) {
+  if (orbit_) {
+    learn_orbit(sample);
+  }
   return report_all([&](auto& its) { return its.on_gyro(sample); });
 }
 
 std::span<const StepReport> Pipeline::feed(const StarFix& fix) {
+  if (orbit_) {
+    learn_orbit(fix);
+  }
   return report_all([&](auto& its) { return its.on_fix(fix); });
+}
+
+/// Before the event is dealt with: that the rate is known better by now, and then what came before is flown again.
+template <class Event>
+void Pipeline::learn_orbit(const Event& event) {
+  StarTrackerTelemetry& fixes = orbit_->fixes;
+  if (fixes.size() > 0 && event.t - fixes.t.front() > orbit_->next) {
+    const double so_far_rad_s = orbital_rate_so_far_rad_s(fixes);
+    const double off_rad =
+        (so_far_rad_s - options_.orbital_rate_rad_s.value_or(kLowOrbit_rad_s)) * to_seconds(orbit_->next);
+    if (std::abs(off_rad) > kPhaseThatMatters_rad) {
+      options_.orbital_rate_rad_s = so_far_rad_s;
+      set_up();
+      for (const auto& before : orbit_->events) {
+        std::visit(
+            [&](const auto& its) {
+              if constexpr (std::is_same_v<std::decay_t<decltype(its)>, GyroSample>) {
+                static_cast<void>(report_all([&](auto& on_board) { return on_board.on_gyro(its); }));
+              } else {
+                static_cast<void>(report_all([&](auto& on_board) { return on_board.on_fix(its); }));
+              }
+            },
+            before);
+      }
+    }
+    orbit_->next *= 2;
+    if (orbit_->next > kLastLookAtOrbit) {
+      orbit_.reset();
+      return;
+    }
+  }
+  orbit_->events.emplace_back(event);
+  if constexpr (std::is_same_v<Event, StarFix>) {
+    if (event.head == 0 && nearly_unit(event.q_in_c.norm()) && (fixes.t.empty() || event.t > fixes.t.back())) {
+      fixes.t.push_back(event.t);
+      fixes.q_in_c.push_back(event.q_in_c.normalized());
+    }
+  }
 }
 
 // A step deals with one fix at most: goes on while another is due.
@@ -149,6 +211,9 @@ Eigen::VectorXd Pipeline::state_sigmas() const {
 Calibration Pipeline::calibration() const {
   Calibration result = program_->visit([&](const auto& its) { return calibration_of(its, settings_.epoch); });
   result.estimator = options_.estimator;
+  if (layout().further.orbital_error) {
+    result.orbital_rate_rad_s = setup_of(settings_, options_).orbital_rate_rad_s;
+  }
   result.noise->star_tracker_noise_rad = options_.star_tracker_noise_rad;
   if (layout().further.wandering_drift) {
     result.noise->wandering_drift_rad_s = options_.further_states.wandering_drift_rad_s;

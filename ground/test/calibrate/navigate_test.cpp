@@ -179,6 +179,36 @@ TEST(Navigate, DoesNotTakeWhatOnlyTheWholePassShows) {
   EXPECT_TRUE(all_same_bits(by_default.attitude.q_in_c.back().coeffs(), without.attitude.q_in_c.back().coeffs()));
 }
 
+/// (error/σ)² of the attitude in the last hour.
+double normalised_square_at_end(const sim::SimulatedPass& simulated, const NavigationRun& run) {
+  const auto errors = attitude_errors(run.attitude, simulated.truth.t, simulated.truth.q_in_c);
+  return *statistics_by_stretch(errors, simulated.pass.settings.epoch, minutes(60)).at(3).normalised_square;
+}
+
+TEST(Navigate, FollowsAnErrorOfTheStarTrackerAtThePeriodOfAnyOrbit) {
+  Scenario scenario = scenario_in_eq1(8, std::chrono::hours(4));
+  scenario.orbit.perigee_altitude_m = scenario.orbit.apogee_altitude_m = 1000e3;
+  scenario.star_tracker.orbital_sine_rad = {2e-4, -1e-4, 2e-4};
+  scenario.star_tracker.orbital_cosine_rad = {-1e-4, 2e-4, 1e-4};
+  sim::SimulatedPass simulated = sim::simulate(scenario);
+  EXPECT_LT(normalised_square_at_end(simulated, navigate(simulated.pass, {})), 2);
+  CalibrationOptions of_another_orbit;
+  of_another_orbit.orbital_rate_rad_s = 1.1e-3;
+  EXPECT_GT(normalised_square_at_end(simulated, navigate(simulated.pass, of_another_orbit)), 4);
+  // An earlier calibration tells it from the beginning on.
+  const Calibration calibration = calibrate(simulated.pass, {}).calibration;
+  ASSERT_TRUE(calibration.orbital_rate_rad_s);
+  EXPECT_NEAR(*calibration.orbital_rate_rad_s, simulated.truth.orbital_rate_rad_s, 1e-6);
+  simulated.pass.settings.prior = calibration;
+  EXPECT_LT(normalised_square_at_end(simulated, navigate(simulated.pass, {})), 2);
+}
+
+TEST(Navigate, IsCausalWhereTheRateOfTheOrbitIsLearnt) {
+  Scenario scenario = scenario_in_eq1(8, minutes(50));
+  scenario.orbit.perigee_altitude_m = scenario.orbit.apogee_altitude_m = 1000e3;
+  expect_causal(sim::simulate(scenario).pass, {}, {minutes(19), minutes(21), minutes(41)});
+}
+
 /// A pass navigated with the values of its own calibration, after they have been spoilt.
 template <class Spoil>
 NavigationRun navigate_with(const Spoil& spoil) {

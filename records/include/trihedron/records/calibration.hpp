@@ -102,7 +102,8 @@ struct Calibration {
   /// Of the errors, estimate − truth: rad/s for drift; for alignment rad, δ of C_c_b(est) = exp([δ×]) C_c_b(true), c
   /// axes.
   Eigen::MatrixXd covariance;
-  std::vector<FurtherEstimate> further;  ///< empty where none was estimated
+  std::vector<FurtherEstimate> further;      ///< empty where none was estimated
+  std::optional<double> orbital_rate_rad_s;  ///< by which an error of the star trackers at orbital period is estimated
   /// Of the amplitudes of drift that comes back: at orbital period, gyro by gyro, sine before cosine; then with the
   /// polhode. A row each, columns about `states` and then about these amplitudes. Empty where none is estimated. In
   /// calibration.json it is a part of the covariance.

@@ -5,6 +5,7 @@
 #include <memory>
 #include <optional>
 #include <span>
+#include <variant>
 #include <vector>
 
 #include "trihedron/core/layout.hpp"
@@ -17,7 +18,9 @@
 
 namespace trihedron::ground {
 
-/// Everything that it does is in its reports. Its results depend on nothing but the events that it was given.
+/// Everything that it does is in its reports. Its results depend on nothing but the events that it was given. Where
+/// something is estimated at orbital period and the options do not tell the rate of the orbit, that of the fixes so far
+/// is taken: from time to time, as it becomes better known, what came before is flown again with it, without reports.
 class Pipeline {
  public:
   /// Whether the calibration predicts to each sample, as on board, or may pass over some
@@ -80,11 +83,23 @@ class Pipeline {
   template <class Step>
   [[nodiscard]] std::span<const StepReport> report_all(const Step& step);
   [[nodiscard]] double part_of_change() const;
+  void set_up();
+  template <class Event>
+  void learn_orbit(const Event& event);
+
+  /// The events of the beginning, by which the rate of the orbit is told.
+  struct Orbit {
+    std::vector<std::variant<GyroSample, StarFix>> events;
+    StarTrackerTelemetry fixes;  ///< of the first star tracker
+    Duration next;               ///< since its first fix: when to look again
+  };
 
   PassSettings settings_;
   CalibrationOptions options_;
+  CorrectionPolicy policy_;
   std::unique_ptr<Program> program_;
   std::vector<StepReport> reports_;
+  std::optional<Orbit> orbit_;  ///< until the rate is known well enough
 };
 
 }  // namespace trihedron::ground
