@@ -17,6 +17,7 @@
 #include "calibrate/calibrate_after.hpp"
 #include "calibrate/contradicted_fixes.hpp"
 #include "calibrate/readout_noise.hpp"
+#include "calibrate/restarted_gyro.hpp"
 #include "choose/decide.hpp"
 #include "judge/changes.hpp"
 #include "model/drift_on_board.hpp"
@@ -494,6 +495,7 @@ CalibrationRun calibrate_after(const Pass& as_given, const CalibrationOptions& o
     corrected = pass;
     correct(*corrected, correction);
   }
+  refuse_restarted_gyro(corrected ? *corrected : pass);
   const CalibrationOptions asked = with_clock_states(options, correction);
   std::optional<WithoutErrorsBesideOutages> without_errors;
   if (finds_noise) {

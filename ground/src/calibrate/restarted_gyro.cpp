@@ -1,0 +1,144 @@
+#include "calibrate/restarted_gyro.hpp"
+
+#include <fmt/format.h>
+
+#include <Eigen/Core>
+#include <algorithm>
+#include <array>
+#include <chrono>
+#include <cmath>
+#include <numbers>
+#include <optional>
+#include <vector>
+
+#include "model/scatter.hpp"
+#include "trihedron/core/frames.hpp"
+#include "trihedron/core/per_gyro.hpp"
+#include "trihedron/ground/model/setup_error.hpp"
+
+namespace trihedron::ground {
+namespace {
+
+using Eigen::Vector3d;
+
+/// The momenta at a fix, by readings and alignments known before.
+struct MomentaAtFix {
+  Time t{};
+  Eigen::Quaterniond q_in_c;
+  PerGyro<Vector3d> h_in;
+};
+
+double angle_rad(const Vector3d& a, const Vector3d& b) { return std::atan2(a.cross(b).norm(), a.dot(b)); }
+
+std::optional<PerGyro<Vector3d>> momenta(const Pass& pass, const Eigen::Quaterniond& q_in_c, std::size_t sample) {
+  PerGyro<Vector3d> h_in;
+  for (int k = 0; k < pass.gyro.gyros; ++k) {
+    const Vector3d h_b = pass.gyro.direction(sample, k);
+    if (!nearly_unit(h_b.norm())) {
+      return std::nullopt;
+    }
+    const Vector3d& rotation = pass.settings.gyros[static_cast<std::size_t>(k)].alignment_rotation_vector_rad;
+    h_in[k] = q_in_c * (Rot<C, B<1>>::exp(Vec<C>::assume(rotation)).raw() * h_b);
+  }
+  return h_in;
+}
+
+std::vector<MomentaAtFix> momenta_at_fixes(const Pass& pass) {
+  const StarTrackerTelemetry& fixes = pass.star_tracker;
+  std::vector<MomentaAtFix> all;
+  std::size_t after = 0;
+  for (std::size_t i = 0; i < fixes.size(); ++i) {
+    while (after < pass.gyro.size() && pass.gyro.t[after] < fixes.t[i]) {
+      ++after;
+    }
+    if (after == pass.gyro.size() || pass.gyro.t[after] - fixes.t[i] > pass.settings.gyro_period ||
+        !nearly_unit(fixes.q_in_c[i].norm())) {
+      continue;
+    }
+    const Eigen::Quaterniond q_in_c = fixes.q_in_c[i].normalized();
+    if (const auto h_in = momenta(pass, q_in_c, after)) {
+      all.push_back({fixes.t[i], q_in_c, *h_in});
+    }
+  }
+  return all;
+}
+
+/// Component by component.
+Vector3d median_momentum(const std::vector<MomentaAtFix>& all, std::size_t from, std::size_t until, int gyro) {
+  Vector3d h_in;
+  for (int axis = 0; axis < 3; ++axis) {
+    std::vector<double> values;
+    for (std::size_t i = from; i < until; ++i) {
+      values.push_back(all[i].h_in[gyro](axis));
+    }
+    h_in(axis) = median_of(values);
+  }
+  return h_in;
+}
+
+constexpr std::size_t kFixesBeside = 20;  ///< to each side of a jump
+
+/// Whether a momentum that turns by this angle before a fix is not back within an hour, of which ten minutes have to be
+/// there.
+bool stays_turned(const std::vector<MomentaAtFix>& all, std::size_t fix, int gyro, double turned_rad) {
+  constexpr Duration kLongest = std::chrono::hours(1);
+  constexpr Duration kLeast = std::chrono::minutes(10);
+  constexpr std::size_t kOneIn = 100;  // may be an outlier
+  const Vector3d before = median_momentum(all, fix - kFixesBeside, fix, gyro);
+  std::size_t later = fix;
+  std::size_t back = 0;
+  for (; later < all.size() && all[later].t - all[fix].t < kLongest; ++later) {
+    back += angle_rad(all[later].h_in[gyro], before) < turned_rad / 2 ? 1 : 0;
+  }
+  return all[later - 1].t - all[fix].t >= kLeast && kOneIn * back <= later - fix;
+}
+
+struct Jump {
+  int gyro = 0;
+  double turned_rad = 0;
+};
+
+/// Of one momentum before a fix, by more than the limit, while another turns by less than half of it.
+std::optional<Jump> jump_before(const std::vector<MomentaAtFix>& all, std::size_t fix, int gyros, double limit_rad) {
+  Jump jump;
+  bool another_stays = false;
+  for (int k = 0; k < gyros; ++k) {
+    const bool seems_to = angle_rad(all[fix - 1].h_in[k], all[fix].h_in[k]) > limit_rad;
+    const double turned_rad = seems_to ? angle_rad(median_momentum(all, fix - kFixesBeside, fix, k),
+                                                   median_momentum(all, fix, fix + kFixesBeside, k))
+                                       : 0;
+    another_stays = another_stays || turned_rad < limit_rad / 2;
+    jump = turned_rad > jump.turned_rad ? Jump{k, turned_rad} : jump;
+  }
+  return another_stays && jump.turned_rad > limit_rad ? std::optional(jump) : std::nullopt;
+}
+
+}  // namespace
+
+void refuse_restarted_gyro(const Pass& pass) {
+  constexpr double kLeastJump_rad = 0.0175;
+  constexpr double kSigmas = 3;
+  const std::vector<MomentaAtFix> all = momenta_at_fixes(pass);
+  double alignment_rad = 0;
+  for (const GyroPrior& gyro : pass.settings.gyros) {
+    alignment_rad = std::max(alignment_rad, kSigmas * gyro.alignment_sigma_rad.maxCoeff());
+  }
+  for (std::size_t i = kFixesBeside; i + kFixesBeside < all.size(); ++i) {
+    // What alignments that are not known yet make of a turn of the body.
+    const double turn_rad = all[i - 1].q_in_c.angularDistance(all[i].q_in_c);
+    const double limit_rad = kLeastJump_rad + 2 * alignment_rad * std::min(1.0, turn_rad);
+    const auto jump = jump_before(all, i, pass.gyro.gyros, limit_rad);
+    if (jump && stays_turned(all, i, jump->gyro, jump->turned_rad)) {
+      const double last_s = to_seconds(all[i - 1].t - pass.settings.epoch);
+      const double first_s = to_seconds(all[i].t - pass.settings.epoch);
+      throw SetupError(
+          fmt::format(
+              "the momentum of gyro {} turns by {:.1f} deg between t = {:.0f} s and {:.0f} s, and stays there: as "
+              "of a rotor that was started anew, whose coefficients are others then",
+              jump->gyro + 1, jump->turned_rad * 180 / std::numbers::pi, last_s, first_s),
+          fmt::format("calibrate the parts apart: with --to {:.0f}s, and with --from {:.0f}s", last_s, first_s));
+    }
+  }
+}
+
+}  // namespace trihedron::ground

@@ -1,0 +1,13 @@
+#pragma once
+/// A gyro that was started anew within the pass.
+
+#include "trihedron/records/pass.hpp"
+
+namespace trihedron::ground {
+
+/// Throws SetupError, with what to do, where the momentum of one gyro has another direction from one fix to the next,
+/// by more than a degree, and keeps it for an hour or to the end of the pass, while that of another stays: its
+/// coefficients have changed as well. `pass`: with its stamps corrected.
+void refuse_restarted_gyro(const Pass& pass);
+
+}  // namespace trihedron::ground

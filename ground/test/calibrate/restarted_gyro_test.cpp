@@ -1,0 +1,72 @@
+#include "calibrate/restarted_gyro.hpp"
+
+#include <gmock/gmock.h>
+
+#include <chrono>
+#include <string>
+
+#include "passes.hpp"
+#include "trihedron/ground/calibrate/calibrate.hpp"
+#include "trihedron/ground/model/setup_error.hpp"
+
+namespace trihedron::ground {
+namespace {
+
+using std::chrono::minutes;
+using testing::HasSubstr;
+
+/// The readings of gyro 2 between two times as of a momentum turned by this angle.
+Pass with_turned_momentum(double angle_rad, Duration from, Duration until) {
+  Pass pass = two_hours().pass;
+  const Truth& truth = two_hours().truth;
+  // Across the momentum, in inertial axes.
+  const auto& h = truth.h_in;
+  const Eigen::Vector3d axis = Eigen::Vector3d(h[3], h[4], h[5]).unitOrthogonal();
+  const Eigen::Quaterniond turn(Eigen::AngleAxisd(angle_rad, axis));
+  const auto C_c_b = Rot<C, B<1>>::exp(Vec<C>::assume(truth.gyros[1].alignment_rotation_vector_rad)).raw();
+  std::size_t row = 0;
+  for (std::size_t i = 0; i < pass.gyro.size(); ++i) {
+    while (row + 1 < truth.t.size() && truth.t[row] < pass.gyro.t[i]) {
+      ++row;
+    }
+    const Duration t = pass.gyro.t[i] - pass.settings.epoch;
+    if (t >= from && t < until) {
+      const Eigen::Matrix3d C_in_b = truth.q_in_c[row] * C_c_b;
+      Eigen::Map<Eigen::Vector3d>(&pass.gyro.h[(2 * i + 1) * 3]) =
+          C_in_b.transpose() * (turn * (C_in_b * pass.gyro.direction(i, 1)));
+    }
+  }
+  return pass;
+}
+
+TEST(RestartedGyro, IsRefusedWithTheTimeToCutThePass) {
+  for (const double angle_rad : {0.05, -1.0}) {
+    try {
+      static_cast<void>(calibrate(with_turned_momentum(angle_rad, minutes(50), minutes(200)), {}));
+      FAIL() << "it is taken";
+    } catch (const SetupError& refusal) {
+      EXPECT_THAT(refusal.what(),
+                  HasSubstr("momentum of gyro 2 turns by " + std::string(angle_rad > 0 ? "2.9" : "57.3")));
+      EXPECT_THAT(refusal.what(), HasSubstr("between t = 2997 s and 3000 s"));
+      EXPECT_THAT(refusal.cure(), HasSubstr("--to 2997s"));
+      EXPECT_THAT(refusal.cure(), HasSubstr("--from 3000s"));
+    }
+  }
+}
+
+TEST(RestartedGyro, IsNoneWhereTheReadingsComeBackOrTheStarTrackerIsOff) {
+  refuse_restarted_gyro(two_hours().pass);
+  refuse_restarted_gyro(with_turned_momentum(0.05, minutes(50), minutes(55)));
+  refuse_restarted_gyro(with_turned_momentum(0.05, minutes(115), minutes(200)));  // too late to be told
+  Pass pass = two_hours().pass;
+  for (std::size_t i = pass.star_tracker.size() / 2; i < pass.star_tracker.size(); ++i) {
+    pass.star_tracker.q_in_c[i] =
+        pass.star_tracker.q_in_c[i] * Eigen::Quaterniond(Eigen::AngleAxisd(0.1, Eigen::Vector3d::Ones().normalized()));
+  }
+  refuse_restarted_gyro(pass);
+  pass.star_tracker = {};
+  refuse_restarted_gyro(pass);
+}
+
+}  // namespace
+}  // namespace trihedron::ground
