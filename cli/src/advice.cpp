@@ -1,8 +1,10 @@
 #include "advice.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <iterator>
+#include <vector>
 
 #include "summary.hpp"
 #include "trihedron/core/time.hpp"
@@ -27,9 +29,29 @@ std::string slew_toml(const Slew& slew) {
   return text + "}";
 }
 
+/// Why there are none, and the limit to widen.
+std::vector<std::string> why_no_slews(const plan::Advice& advice, const plan::SlewLimits& limits) {
+  const std::string angle = io::format_angle(limits.max_angle_rad);
+  std::vector<std::string> sentences = {
+      fmt::format("No slews within these limits make the mean square of the attitude error smaller by {:.0f} %.",
+                  100 * plan::Advice::kLeastGain),
+      limits.manoeuvre_time < advice.time_of_largest_slew
+          ? fmt::format("Give a longer --manoeuvre-time than {}: a slew of {}, there and back, takes {}.",
+                        io::format_duration(limits.manoeuvre_time), angle,
+                        io::format_duration(advice.time_of_largest_slew))
+          : fmt::format("Give a larger --max-angle than {}.", angle)};
+  if (!advice.before.is_harmful()) {
+    sentences.emplace_back("The flight needs none: nothing that it leaves undetermined harms the attitude.");
+  }
+  return sentences;
+}
+
 }  // namespace
 
-std::string advice_text(const plan::Advice& advice) {
+std::string advice_text(const plan::Advice& advice, const plan::SlewLimits& limits) {
+  if (advice.slews().empty()) {
+    return fmt::format("\nAdvice      {}\n", fmt::join(why_no_slews(advice, limits), "\n            "));
+  }
   std::string text = fmt::format(
       "\nAdvice      {} slew{}, there and back; in the scenario\n\n[attitude]\nmax_slew_rate = \"{}\"\nslews = [\n",
       advice.slews().size() / 2, advice.slews().size() == 2 ? "" : "s",
@@ -39,7 +61,8 @@ std::string advice_text(const plan::Advice& advice) {
     fmt::format_to(out, "  {},\n", slew_toml(slew));
   }
   const auto row = [&](const std::string& before, const std::string& after, double times, const std::string& what) {
-    fmt::format_to(out, "  {:>14} {:>14} {:>8} times   {}\n", before, after, figure("{:.0f}", times), what);
+    fmt::format_to(out, "  {:>14} {:>14} {:>8} times   {}\n", before, after,
+                   times < 10 ? figure("{:.1f}", times) : figure("{:.0f}", times), what);
   };
   fmt::format_to(out, "]\n\n  {:>14} {:>14} {:>14}\n", "1σ as it is", "with slews", "better");
   const double before_rad = advice.before.attitude_error_rad;
@@ -67,7 +90,8 @@ std::string confirmation_text(const plan::Confirmation& confirmation) {
   return text;
 }
 
-nlohmann::ordered_json advice_json(const plan::Advice& advice, const std::optional<plan::Confirmation>& confirmation) {
+nlohmann::ordered_json advice_json(const plan::Advice& advice, const plan::SlewLimits& limits,
+                                   const std::optional<plan::Confirmation>& confirmation) {
   nlohmann::ordered_json json = {
       {"max_slew_rate_rad_s", advice.scenario.attitude.max_slew_rate_rad_s},
       {"slews", nlohmann::ordered_json::array()},
@@ -79,6 +103,9 @@ nlohmann::ordered_json advice_json(const plan::Advice& advice, const std::option
                              {"roll_rad", slew.roll_rad},
                              {"pitch_rad", slew.pitch_rad},
                              {"yaw_rad", slew.yaw_rad}});
+  }
+  if (advice.slews().empty()) {
+    json["why_no_slews"] = fmt::format("{}", fmt::join(why_no_slews(advice, limits), " "));
   }
   for (const plan::Advice::Gain& gain : advice.gains()) {
     json["combinations"].push_back(

@@ -10,10 +10,10 @@
 
 namespace trihedron::cli {
 
-/// The slews as a part of a scenario file, and what is gained.
-[[nodiscard]] std::string advice_text(const plan::Advice& advice);
+/// The slews as a part of a scenario file, and what is gained; or why there are none. `limits`: as they were given.
+[[nodiscard]] std::string advice_text(const plan::Advice& advice, const plan::SlewLimits& limits);
 [[nodiscard]] std::string confirmation_text(const plan::Confirmation& confirmation);
-[[nodiscard]] nlohmann::ordered_json advice_json(const plan::Advice& advice,
+[[nodiscard]] nlohmann::ordered_json advice_json(const plan::Advice& advice, const plan::SlewLimits& limits,
                                                  const std::optional<plan::Confirmation>& confirmation);
 
 }  // namespace trihedron::cli

@@ -179,7 +179,7 @@ ExitStatus advise_for(const std::string& path, const CalibrationOptions& options
     return plan::advise(scenario, options, limits, {}, bar.meter());
   });
   std::optional<plan::Confirmation> confirmation;
-  if (confirming_runs > 0) {
+  if (confirming_runs > 0 && !advice.slews().empty()) {
     const ProgressBar bar("confirm", common.quiet);
     confirmation = refusing(path, [&] {
       return plan::confirm(advice.scenario, advice.formerly_weak(), advice.after, confirming_runs, bar.meter());
@@ -187,11 +187,11 @@ ExitStatus advise_for(const std::string& path, const CalibrationOptions& options
   }
   const auto as_json = [&] {
     nlohmann::ordered_json json = observability_json(advice.before, scenario.epoch);
-    json["advice"] = advice_json(advice, confirmation);
+    json["advice"] = advice_json(advice, limits, confirmation);
     return json;
   };
   show(common, as_json, [&] {
-    return observability_text(advice.before, scenario.epoch) + advice_text(advice) +
+    return observability_text(advice.before, scenario.epoch) + advice_text(advice, limits) +
            (confirmation ? confirmation_text(*confirmation) : "");
   });
   return advice.after.is_harmful() ? kDoNotUse : kTrustworthy;

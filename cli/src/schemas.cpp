@@ -250,6 +250,7 @@ Json observe_output() {
       object({{"runs", count()}, {"simulated_over_predicted", number()}, {"nees", number()}, {"parameters", count()}});
   const Json advice = object({{"max_slew_rate_rad_s", number()},
                               {"slews", array(slew)},
+                              {"why_no_slews?", text()},
                               {"attitude_error_rad", object({{"before", number()}, {"after", number()}})},
                               {"combinations", array(gain)},
                               {"confirmation?", confirmation}});

@@ -826,6 +826,20 @@ def test_advice_can_be_pasted_and_is_confirmed(observe):
     assert advice["confirmation"]["runs"] == 2
 
 
+@pytest.mark.parametrize("limit, value, cure", [
+    ("--manoeuvre-time", "1s", "Give a longer --manoeuvre-time than 1s: a slew of 30deg, there and back, takes "),
+    ("--max-angle", "0.01deg", "Give a larger --max-angle than 0.01deg."),
+])
+def test_where_no_slew_helps_the_advice_says_which_limit_to_widen(observe, limit, value, cure):
+    result = observe("--advise", limit, value, "--confirm", "2")
+    assert result.returncode == DO_NOT_USE
+    advice = result.stdout.split("\nAdvice ")[1]
+    assert "smaller by 5 %" in advice and cure in advice and "begin = " not in advice and "Confirmed" not in advice
+    advice = json.loads(observe("--json", "--advise", limit, value).stdout)["advice"]
+    assert advice["slews"] == [] and cure in advice["why_no_slews"]
+    assert advice["attitude_error_rad"]["after"] == advice["attitude_error_rad"]["before"]
+
+
 def test_observe_refuses(observe, tmp_path):
     refused(observe("--advise", of=EXAMPLE), WRONG_USAGE, "scenario", "recorded", 'slews = "none"')
     refused(observe("--confirm", "2"), WRONG_USAGE, "--advise")

@@ -5,7 +5,6 @@
 #include <array>
 #include <cmath>
 #include <iterator>
-#include <limits>
 #include <map>
 #include <numbers>
 #include <utility>
@@ -41,10 +40,10 @@ std::vector<Eigen::Vector3d> axes() {
 
 constexpr std::array<double, 6> kPartsOfAngle = {1, -1, 0.75, -0.75, 0.5, -0.5};
 constexpr int kTimes = 9;
+/// Times of slews are in whole seconds.
+constexpr double kRounding_s = 1;
 /// Rounds of coordinate exchange; further ones improve the result by nothing that matters.
 constexpr int kRounds = 2;
-/// One more slew is accepted when it brings the mean square error below this fraction of that without it.
-constexpr double kLargestErrorRatio = 0.95;
 
 /// Rounded towards zero to tenths of a degree, so that a limit stays kept.
 double rounded_rad(double angle_rad) {
@@ -73,7 +72,7 @@ class Search {
   [[nodiscard]] std::vector<Slew> best() {
     Plan plan;
     Plan best;
-    double least = std::numeric_limits<double>::infinity();
+    double least = errors({best}).front();
     for (int slews = 1; slews <= limits_.slews; ++slews) {
       const std::vector<double> times = free_times(plan, plan.size());
       if (times.empty()) {
@@ -86,7 +85,7 @@ class Search {
         }
       }
       const double mean_square = errors({plan}).front();
-      if (!(mean_square < kLargestErrorRatio * least)) {
+      if (!(mean_square < (1 - Advice::kLeastGain) * least)) {
         break;
       }
       least = mean_square;
@@ -103,10 +102,10 @@ class Search {
   [[nodiscard]] double turn_s(double angle_rad) const {
     return sim::turn_duration_s(angle_rad, attitude_.max_slew_rate_rad_s, attitude_.max_slew_acceleration_rad_s2);
   }
-  /// Largest angle from which there is time to come back; times are in whole seconds.
+  /// Largest angle from which there is time to come back.
   [[nodiscard]] double largest_rad(std::size_t excursions) const {
     const double whole_s = 2 * turn_s(limits_.max_angle_rad);
-    const double part = std::clamp((share_s(excursions) - 1) / whole_s, 0.0, 1.0);
+    const double part = std::clamp((share_s(excursions) - kRounding_s) / whole_s, 0.0, 1.0);
     // The time of a turn that is limited by acceleration grows with the root of its angle.
     return limits_.max_angle_rad * part * part;
   }
@@ -236,11 +235,18 @@ std::vector<Advice::Gain> Advice::gains() const {
 Advice advise(const Scenario& scenario, const CalibrationOptions& options, const SlewLimits& limits,
               const ground::Mission& mission, const Progress& progress) {
   check(scenario, limits);
-  Advice advice{scenario, {}, {}};
+  Advice advice{scenario, {}, {}, {}};
   AttitudeScenario& attitude = advice.scenario.attitude;
   attitude.max_slew_rate_rad_s = limits.max_rate_rad_s.value_or(attitude.max_slew_rate_rad_s);
+  advice.time_of_largest_slew =
+      from_seconds(std::ceil(kRounding_s + 2 * sim::turn_duration_s(limits.max_angle_rad, attitude.max_slew_rate_rad_s,
+                                                                    attitude.max_slew_acceleration_rad_s2)));
   advice.before = ground::observe(sim::simulate(scenario).pass, options, mission);
   attitude.slews = Search(advice.scenario, advice.before, limits, progress).best();
+  if (advice.slews().empty()) {
+    advice.after = advice.before;
+    return advice;
+  }
   advice.after = ground::observe(sim::simulate(advice.scenario).pass, advice.before.options, mission);
   return advice;
 }

@@ -109,6 +109,22 @@ TEST(Advice, BeatsRandomSlews) {
   }
 }
 
+TEST(Advice, HasNoSlewsWhereTheyGainNothing) {
+  SlewLimits short_of_time = kTwoSlews;
+  short_of_time.manoeuvre_time = std::chrono::seconds(1);
+  SlewLimits small = kTwoSlews;
+  small.max_angle_rad = 0.01 * kDegree;
+  for (const SlewLimits& limits : {short_of_time, small}) {
+    const Advice advice = advise(steady_flight(), told(), limits);
+    EXPECT_TRUE(advice.slews().empty());
+    EXPECT_EQ(advice.after.attitude_error_rad, advice.before.attitude_error_rad);
+    EXPECT_TRUE(advice.after.is_harmful());
+  }
+}
+
+/// 15/8 of 25° at 0.4°/s there, and the same back, and the second that rounding takes.
+TEST(Advice, SaysHowLongTheLargestSlewTakes) { EXPECT_EQ(advised().time_of_largest_slew, std::chrono::seconds(236)); }
+
 TEST(Advice, RefusesWhatItCannotPlanFor) {
   const auto reason = [](const std::function<void(Scenario&, SlewLimits&)>& change) {
     Scenario scenario = steady_flight();
