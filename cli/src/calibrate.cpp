@@ -300,7 +300,7 @@ void add_calibrate(CLI::App& program, const Common& common, int& exit_status) {
       static_cast<void>(set_drift_model(arguments->drift_model, options));
     }
     if (!arguments->need.empty()) {
-      options.need = io::parse_need(arguments->need);
+      options.need = of_option("--need", [&] { return io::parse_need(arguments->need); });
     }
     if (arguments->definitive) {
       if (!arguments->estimator.empty() && options.estimator != Estimator::kBatch) {

@@ -6,6 +6,7 @@
 #include <string>
 
 #include "output.hpp"
+#include "trihedron/io/error.hpp"
 #include "trihedron/records/limits.hpp"
 #include "trihedron/records/options.hpp"
 
@@ -38,6 +39,16 @@ void add_config(CLI::App& command, std::string& file, const std::function<Calibr
 
 /// Settings of the file, "-" for standard input, or of the program where there is none.
 [[nodiscard]] CalibrationOptions settings_of(const std::string& file);
+
+/// What `parse` gives of an option; a UsageError of it names the option.
+template <class Parse>
+[[nodiscard]] auto of_option(const char* name, const Parse& parse) {
+  try {
+    return parse();
+  } catch (const io::UsageError& error) {
+    throw io::UsageError(std::string(name) + ": " + error.what());
+  }
+}
 
 /// For a whole number in a range.
 [[nodiscard]] CLI::Validator whole(const Range& range);

@@ -52,7 +52,7 @@ void add_evaluate(CLI::App& program, const Common& common, int& exit_status) {
       "  trihedron evaluate pass.nc --attitude - --before before.csv");
   command->callback([&common, &exit_status, arguments] {
     const double limit_rad =
-        io::within(limits::kAttitudeLimit_rad, io::parse_angle_rad(arguments->limit), "--limit " + arguments->limit);
+        of_option("--limit", [&] { return io::parse_angle_rad(arguments->limit, limits::kAttitudeLimit_rad); });
     const io::NamedPass pass = io::read_named_pass(arguments->pass);
     const Time epoch = pass.pass().settings.epoch;
     Truth told;

@@ -192,12 +192,17 @@ std::size_t row_of(const ExportArguments& arguments, const io::AttitudeMessage& 
   return static_cast<std::size_t>(found - t.begin());
 }
 
+Duration gap_of(const ExportArguments& arguments, const AttitudeHistory& attitude) {
+  return arguments.gap.empty() ? io::usual_gap(attitude)
+                               : of_option("--gap", [&] { return io::parse_duration(arguments.gap); });
+}
+
 void export_attitude(const ExportArguments& arguments, const Common& common) {
   const EpochSource epoch_source = epoch_of(arguments.epoch);
   const io::MessageDescription description = description_of(arguments, epoch_source);
   const io::AttitudeMessage read = io::read_attitude_of_any_format(source(arguments.file), epoch_source.epoch);
   const Time epoch = epoch_source.epoch.value_or(read.epoch.value_or(read.attitude.t.front()));
-  const Duration gap = arguments.gap.empty() ? io::usual_gap(read.attitude) : io::parse_duration(arguments.gap);
+  const Duration gap = gap_of(arguments, read.attitude);
   const std::vector<std::size_t> stretches = io::stretches(read.attitude, gap);
   InterchangeSummary summary{arguments.file,
                              read.format,
@@ -272,8 +277,7 @@ void export_calibration(const ExportArguments& arguments, const Common& common) 
     context.attitude = attitude ? &*attitude : nullptr;
     context.pass = pass ? &pass->pass().settings : nullptr;
     if (attitude) {
-      const Duration gap =
-          arguments.gap.empty() ? io::usual_gap(attitude->attitude) : io::parse_duration(arguments.gap);
+      const Duration gap = gap_of(arguments, attitude->attitude);
       context.manoeuvres = io::slews_of(attitude->attitude, gap);
       context.gyro_bias_rad_s = ground::equivalent_gyro_bias_rad_s(calibration, attitude->attitude);
     }

@@ -109,10 +109,11 @@ void add_navigate(CLI::App& program, const Common& common, int& exit_status) {
   const auto settle = [arguments] {
     CalibrationOptions options = settings_of(arguments->config);
     if (!arguments->interval.empty()) {
-      options.corrections = io::parse_correction_interval(arguments->interval);
+      options.corrections =
+          of_option("--correction-interval", [&] { return io::parse_correction_interval(arguments->interval); });
     }
     if (!arguments->need.empty()) {
-      options.need = io::parse_need(arguments->need);
+      options.need = of_option("--need", [&] { return io::parse_need(arguments->need); });
     }
     return options;
   };

@@ -246,15 +246,15 @@ void add_observe(CLI::App& program, const Common& common, int& exit_status) {
     }
     plan::SlewLimits limits;
     if (!arguments->max_rate.empty()) {
-      limits.max_rate_rad_s = io::within(trihedron::limits::kSlewRate_rad_s, io::parse_rate_rad_s(arguments->max_rate),
-                                         "--max-rate " + arguments->max_rate);
+      limits.max_rate_rad_s = of_option(
+          "--max-rate", [&] { return io::parse_rate_rad_s(arguments->max_rate, trihedron::limits::kSlewRate_rad_s); });
     }
-    limits.max_angle_rad = io::within(trihedron::limits::kSlewAngle_rad, io::parse_angle_rad(arguments->max_angle),
-                                      "--max-angle " + arguments->max_angle);
+    limits.max_angle_rad = of_option(
+        "--max-angle", [&] { return io::parse_angle_rad(arguments->max_angle, trihedron::limits::kSlewAngle_rad); });
     limits.slews = arguments->slews;
-    limits.manoeuvre_time =
-        io::within(trihedron::limits::kManoeuvreTime_s, io::parse_duration(arguments->manoeuvre_time),
-                   "--manoeuvre-time " + arguments->manoeuvre_time);
+    limits.manoeuvre_time = of_option("--manoeuvre-time", [&] {
+      return io::parse_duration(arguments->manoeuvre_time, trihedron::limits::kManoeuvreTime_s);
+    });
     exit_status = advise_for(arguments->path, options, limits, arguments->confirming_runs, common);
   });
 }

@@ -445,7 +445,7 @@ double speed_of(const std::string& text) {
     return ground::kAtOnce;
   }
   try {
-    return io::within(limits::kSpeed, io::parse_number(text), text);
+    return io::parse_number(text, limits::kSpeed);
   } catch (const io::UsageError& error) {
     throw io::UsageError(
         fmt::format("--speed: {}; give 1 for real time, another positive number, or max", error.what()));
@@ -539,7 +539,8 @@ void add_replay(CLI::App& program, const Common& common, int& exit_status) {
       options.corrections.when = CorrectionOptions::When::kEachFix;
     }
     if (!arguments->interval.empty()) {
-      options.corrections = io::parse_correction_interval(arguments->interval);
+      options.corrections =
+          of_option("--correction-interval", [&] { return io::parse_correction_interval(arguments->interval); });
     }
     return options;
   };
@@ -556,12 +557,13 @@ void add_replay(CLI::App& program, const Common& common, int& exit_status) {
     request.files = {arguments->attitude, arguments->calibration, arguments->state, arguments->records,
                      arguments->config};
     request.speed = speed_of(arguments->speed);
-    request.required.error_rad = io::within(limits::kAttitudeLimit_rad, io::parse_angle_rad(arguments->required_error),
-                                            arguments->required_error);
-    request.required.interval = io::within(
-        limits::kRequiredInterval_s, io::parse_duration(arguments->required_interval), arguments->required_interval);
+    request.required.error_rad = of_option(
+        "--required-error", [&] { return io::parse_angle_rad(arguments->required_error, limits::kAttitudeLimit_rad); });
+    request.required.interval = of_option("--required-interval", [&] {
+      return io::parse_duration(arguments->required_interval, limits::kRequiredInterval_s);
+    });
     request.required.window =
-        io::within(limits::kRequiredInterval_s, io::parse_duration(arguments->window), arguments->window);
+        of_option("--window", [&] { return io::parse_duration(arguments->window, limits::kPredictionWindow_s); });
     request.required.spread_over = arguments->spread_over;
     request.options = settle();
     request.resume = arguments->resume;

@@ -94,16 +94,26 @@ def test_the_ends_of_the_ranges_end_in_a_status(edited, tmp_path, key, values, e
 
 
 @pytest.mark.parametrize("arguments, word", [
-    (("evaluate", "p", "--attitude", "x", "--limit", "-5arcmin"), "--limit -5arcmin"),
-    (("evaluate", "p", "--attitude", "x", "--limit", "400deg"), "outside 1e-09 to 3.15 rad"),
+    (("evaluate", "p", "--attitude", "x", "--limit", "-5arcmin"), '--limit: "-5arcmin" is outside'),
+    (("evaluate", "p", "--attitude", "x", "--limit", "400deg"), "outside 5.72958e-08 to 180.482 deg"),
     (("observe", "s.toml", "--advise", "--slews", "0"), "is not a whole number from 1 to 100;"),
     (("observe", "s.toml", "--advise", "--slews", "-3"), "is not a whole number from 1 to 100;"),
     (("observe", "s.toml", "--advise", "--confirm", "10000000"), "is not a whole number from 1 to 1000000;"),
-    (("replay", "p", "--spread-over", "-1"), "is not a whole number from 0 to 10000;"),
-    (("observe", "s.toml", "--advise", "--max-angle", "-1deg"), "--max-angle -1deg"),
-    (("observe", "s.toml", "--advise", "--max-rate", "1e9deg/s"), "outside 1e-06 to 1 rad/s"),
-    (("observe", "s.toml", "--advise", "--manoeuvre-time", "0s"), "--manoeuvre-time 0s"),
-    (("navigate", "p", "-o", "x", "--online", "--correction-interval", "100000d"), "outside"),
+    (("replay", "p", "--spread-over", "-1"), "is not a whole number from 0 to 20;"),
+    (("observe", "s.toml", "--advise", "--max-angle", "-1deg"), '--max-angle: "-1deg" is outside'),
+    (("observe", "s.toml", "--advise", "--max-rate", "1e9deg/s"), "outside 5.72958e-05 to 57.2958 deg/s"),
+    (("observe", "s.toml", "--advise", "--manoeuvre-time", "0s"), '--manoeuvre-time: "0s" is outside 1 to '),
+    (("navigate", "p", "-o", "x", "--online", "--correction-interval", "100000d"), '--correction-interval: "100000d" is outside'),
+    (("navigate", "p", "-o", "x", "--online", "--correction-interval", "never"), "or say none (only the first correction) or continuous (one at each fix)"),
+    (("navigate", "p", "-o", "x", "--online", "--correction-interval", "90"), '--correction-interval: "90" is not a duration: the unit is missing'),
+    (("navigate", "p", "-o", "x", "--online", "--need", "5arcmin"), "--need: "),
+    (("replay", "p", "--spread-over", "21"), "is not a whole number from 0 to 20;"),
+    (("replay", "p", "--required-error", "0arcsec"), '--required-error: "0arcsec" is outside'),
+    (("replay", "p", "--required-interval", "0s"), '--required-interval: "0s" is outside 1 to 3.1e+07 s'),
+    (("replay", "p", "--window", "0.1s"), "it is the stretch of the pass from which errors are predicted"),
+    (("evaluate", "p", "--attitude", "x", "--limit", "5"), '--limit: "5" is not an angle: the unit is missing'),
+    (("observe", "s.toml", "--advise", "--max-angle", "20"), '--max-angle: "20" is not an angle: the unit is missing'),
+    (("observe", "s.toml", "--advise", "--max-rate", "5"), '--max-rate: "5" is not a rate: the unit is missing'),
 ])
 def test_each_option_has_its_range(arguments, word):
     result = run(*arguments)

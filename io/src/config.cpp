@@ -132,7 +132,7 @@ Field wandering_drift(const FurtherStateRow& row, FurtherStateOptions& states) {
               return;
             }
             states[row.state] = Choice::kOn;
-            states.wandering_drift_rad_s = within(limits::kWanderingDrift_rad_s, parse_rate_rad_s(given), given);
+            states.wandering_drift_rad_s = parse_rate_rad_s(given, limits::kWanderingDrift_rad_s);
           }};
 }
 
@@ -155,7 +155,7 @@ Fields polhode_fields(FurtherStateOptions& states) {
            [&states](const TomlTable& table, const toml::node& node) {
              read_for_each_gyro(table, node, kPolhodePeriod, [&](int k, const toml::node& value) {
                const std::string given = quantity_text(table, value, kPolhodePeriod);
-               const Duration period = within(limits::kPolhodePeriod_s, parse_duration(given), given);
+               const Duration period = parse_duration(given, limits::kPolhodePeriod_s);
                states.polhodes[k].period_s = static_cast<float>(to_seconds(period));
              });
            }},
@@ -253,7 +253,12 @@ CorrectionOptions parse_correction_interval(std::string_view text) {
   } else if (text == kEachFix) {
     corrections.when = CorrectionOptions::When::kEachFix;
   } else {
-    corrections.interval = within(limits::kCorrectionInterval_s, parse_duration(text), text);
+    try {
+      corrections.interval = parse_duration(text, limits::kCorrectionInterval_s);
+    } catch (const UsageError& error) {
+      throw UsageError(fmt::format("{}; or say {} (only the first correction) or {} (one at each fix)", error.what(),
+                                   kOnlyFirst, kEachFix));
+    }
   }
   return corrections;
 }

@@ -59,7 +59,14 @@ std::string format(double value, const QuantityKind& kind) {
 
 }  // namespace
 
-double parse_quantity(std::string_view text, const QuantityKind& kind) {
+namespace {
+
+struct Measured {
+  double value;  ///< in the unit that the program computes in
+  const UnitOfMeasure& unit;
+};
+
+Measured measured(std::string_view text, const QuantityKind& kind) {
   const std::optional<Parsed> parsed = parse_head(trimmed(text));
   if (!parsed) {
     refuse(text, kind, "it does not begin with a finite number");
@@ -73,10 +80,30 @@ double parse_quantity(std::string_view text, const QuantityKind& kind) {
       if (!std::isfinite(value)) {
         refuse(text, kind, "it is too large");
       }
-      return value;
+      return {value, unit};
     }
   }
   refuse(text, kind, fmt::format("unit {} is unknown", in_quotes(parsed->rest)));
+}
+
+[[noreturn]] void refuse_outside(std::string_view text, const Range& range) {
+  throw UsageError(fmt::format("{} is {}: {}", in_quotes(text), outside(range), range.why));
+}
+
+}  // namespace
+
+double parse_quantity(std::string_view text, const QuantityKind& kind) { return measured(text, kind).value; }
+
+double parse_quantity(std::string_view text, const QuantityKind& kind, const Range& range) {
+  const auto& [value, unit] = measured(text, kind);
+  if (!range.holds(value / kind.range_factor)) {
+    Range in_its_unit = range;
+    in_its_unit.least *= kind.range_factor / unit.factor;
+    in_its_unit.most *= kind.range_factor / unit.factor;
+    in_its_unit.unit = unit.name;
+    refuse_outside(text, in_its_unit);
+  }
+  return value;
 }
 
 std::string pattern_of(const QuantityKind& kind) {
@@ -111,8 +138,22 @@ Duration parse_duration(std::string_view text) {
   return duration;
 }
 
+Duration parse_duration(std::string_view text, const Range& range_s) {
+  const Duration duration = parse_duration(text);
+  static_cast<void>(parse_quantity(text, kDuration, range_s));
+  return duration;
+}
+
+Duration parse_signed_duration(std::string_view text, const Range& range_s) {
+  const Duration duration = parse_signed_duration(text);
+  static_cast<void>(parse_quantity(text, kDuration, range_s));
+  return duration;
+}
+
 double parse_angle_rad(std::string_view text) { return parse_quantity(text, kAngle); }
+double parse_angle_rad(std::string_view text, const Range& range) { return parse_quantity(text, kAngle, range); }
 double parse_rate_rad_s(std::string_view text) { return parse_quantity(text, kRate); }
+double parse_rate_rad_s(std::string_view text, const Range& range) { return parse_quantity(text, kRate, range); }
 double parse_random_walk_rad_sqrt_s(std::string_view text) { return parse_quantity(text, kRandomWalk); }
 
 Need parse_need(std::string_view text) {
@@ -126,20 +167,7 @@ Need parse_need(std::string_view text) {
   }
   const std::string_view error = text.substr(0, at);
   const std::string_view interval = text.substr(at + kFor.size());
-  return {within(limits::kNeededError_rad, parse_angle_rad(error), error),
-          within(limits::kNeededInterval_s, parse_duration(interval), interval)};
-}
-
-double within(const Range& range, double value, std::string_view text) {
-  if (!range.holds(value)) {
-    throw UsageError(fmt::format("{} {}: {}", in_quotes(text), is_outside(value, range), range.why));
-  }
-  return value;
-}
-
-Duration within(const Range& range, Duration value, std::string_view text) {
-  static_cast<void>(within(range, to_seconds(value), text));
-  return value;
+  return {parse_angle_rad(error, limits::kNeededError_rad), parse_duration(interval, limits::kNeededInterval_s)};
 }
 
 double parse_number(std::string_view text) {
@@ -149,6 +177,14 @@ double parse_number(std::string_view text) {
                                  in_quotes(text)));
   }
   return parsed->number;
+}
+
+double parse_number(std::string_view text, const Range& range) {
+  const double number = parse_number(text);
+  if (!range.holds(number)) {
+    refuse_outside(text, range);
+  }
+  return number;
 }
 
 std::string format_need(const Need& need) {

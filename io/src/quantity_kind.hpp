@@ -20,7 +20,10 @@ struct QuantityKind {
   std::string_view name;  ///< "an angle"
   std::span<const UnitOfMeasure> units;
   std::string_view example;
-  Range range;  ///< where nothing narrower is told; durations in seconds
+  Range range;  ///< where nothing narrower is told
+  /// Of the unit of the range to that which the program computes in: durations are in nanoseconds, their ranges in
+  /// seconds.
+  double range_factor = 1;
 };
 
 namespace units {
@@ -49,9 +52,9 @@ inline constexpr std::array kRateWalks = {UnitOfMeasure{"deg/h/s^0.5", kDegree /
 
 }  // namespace units
 
-inline constexpr QuantityKind kDuration{"a duration", units::kDurations, "90min", limits::kInterval_s};  ///< ns
-inline constexpr QuantityKind kAngle{"an angle", units::kAngles, "5arcmin", limits::kAngle_rad};         ///< rad
-inline constexpr QuantityKind kRate{"a rate", units::kRates, "0.1deg/h", limits::kRate_rad_s};           ///< rad/s
+inline constexpr QuantityKind kDuration{"a duration", units::kDurations, "90min", limits::kInterval_s, 1e9};  ///< ns
+inline constexpr QuantityKind kAngle{"an angle", units::kAngles, "5arcmin", limits::kAngle_rad};              ///< rad
+inline constexpr QuantityKind kRate{"a rate", units::kRates, "0.1deg/h", limits::kRate_rad_s};                ///< rad/s
 inline constexpr QuantityKind kRandomWalk{"an angle random walk", units::kRandomWalks, "0.001deg/h^0.5",
                                           limits::kScenarioRandomWalk_rad_sqrt_s};               ///< rad/√s
 inline constexpr QuantityKind kLength{"a length", units::kLengths, "360km", limits::kLength_m};  ///< m
@@ -63,6 +66,8 @@ inline constexpr QuantityKind kRateWalk{"a random walk of a rate", units::kRateW
 
 /// The value of a text, in the unit of the kind. Throws UsageError that names what is accepted.
 [[nodiscard]] double parse_quantity(std::string_view text, const QuantityKind& kind);
+/// Same, within a range, which the UsageError tells in the unit of the text.
+[[nodiscard]] double parse_quantity(std::string_view text, const QuantityKind& kind, const Range& range);
 
 /// Regular expression (ECMA) of the texts that parse_quantity() takes.
 [[nodiscard]] std::string pattern_of(const QuantityKind& kind);

@@ -171,8 +171,7 @@ namespace {
 
 double quantity_value(const TomlTable& table, const toml::node& node, std::string_view key, const QuantityKind& kind,
                       const Range& range) {
-  const std::string given = quantity_text(table, node, key);
-  return within(range, parse_quantity(given, kind), given);
+  return parse_quantity(quantity_text(table, node, key), kind, range);
 }
 
 template <class T>
@@ -185,16 +184,17 @@ Field one_quantity(std::string_view key, T& target, const QuantityKind& kind, st
 }
 
 template <class T>
-Field vector_of_quantities(std::string_view key, T& target, const QuantityKind& kind, std::string_view about) {
+Field vector_of_quantities(std::string_view key, T& target, const QuantityKind& kind, const Range& range,
+                           std::string_view about) {
   return {key, about, [&kind] { return three_of(quantity_schema(kind)); },
-          [key, &target, &kind](const TomlTable& table, const toml::node& node) {
+          [key, &target, &kind, range](const TomlTable& table, const toml::node& node) {
             const toml::array* array = node.as_array();
             if (array == nullptr || array->size() != 3) {
               table.refuse(node, fmt::format("\"{}\" is not a list of three", key), "give [x, y, z]");
             }
             Eigen::Vector3d values;
             for (int i = 0; i < 3; ++i) {
-              values(i) = quantity_value(table, (*array)[static_cast<std::size_t>(i)], key, kind, kind.range);
+              values(i) = quantity_value(table, (*array)[static_cast<std::size_t>(i)], key, kind, range);
             }
             target = values;
           }};
@@ -215,30 +215,42 @@ Field quantity(std::string_view key, std::optional<double>& target, const Quanti
   return one_quantity(key, target, kind, about, kind.range);
 }
 
+Field quantity(std::string_view key, std::optional<double>& target, const QuantityKind& kind, const Range& range,
+               std::string_view about) {
+  return one_quantity(key, target, kind, about, range);
+}
+
 Field duration(std::string_view key, Duration& target, const Range& range_s, std::string_view about) {
   return {key, about, [] { return quantity_schema(kDuration); },
           [key, &target, range_s](const TomlTable& table, const toml::node& node) {
-            const std::string given = quantity_text(table, node, key);
-            target = within(range_s, parse_duration(given), given);
+            target = parse_duration(quantity_text(table, node, key), range_s);
+          }};
+}
+
+Field signed_duration(std::string_view key, double& target_s, const Range& range_s, std::string_view about) {
+  return {key, about, [] { return quantity_schema(kDuration); },
+          [key, &target_s, range_s](const TomlTable& table, const toml::node& node) {
+            target_s = to_seconds(parse_signed_duration(quantity_text(table, node, key), range_s));
           }};
 }
 
 Field signed_duration(std::string_view key, double& target_s, std::string_view about) {
-  return {key, about, [] { return quantity_schema(kDuration); },
-          [key, &target_s](const TomlTable& table, const toml::node& node) {
-            const std::string given = quantity_text(table, node, key);
-            target_s = to_seconds(within(kDuration.range, parse_signed_duration(given), given));
-          }};
+  return signed_duration(key, target_s, kDuration.range, about);
 }
 
 Field three_quantities(std::string_view key, Eigen::Vector3d& target, const QuantityKind& kind,
                        std::string_view about) {
-  return vector_of_quantities(key, target, kind, about);
+  return vector_of_quantities(key, target, kind, kind.range, about);
+}
+
+Field three_quantities(std::string_view key, Eigen::Vector3d& target, const QuantityKind& kind, const Range& range,
+                       std::string_view about) {
+  return vector_of_quantities(key, target, kind, range, about);
 }
 
 Field three_quantities(std::string_view key, std::optional<Eigen::Vector3d>& target, const QuantityKind& kind,
                        std::string_view about) {
-  return vector_of_quantities(key, target, kind, about);
+  return vector_of_quantities(key, target, kind, kind.range, about);
 }
 
 void refuse_word(const TomlTable& table, const toml::node& node, std::string_view key,

@@ -70,12 +70,18 @@ void read_fields(const toml::table& table, const std::filesystem::path& file, co
                              std::string_view about);
 [[nodiscard]] Field quantity(std::string_view key, std::optional<double>& target, const QuantityKind& kind,
                              std::string_view about);
+[[nodiscard]] Field quantity(std::string_view key, std::optional<double>& target, const QuantityKind& kind,
+                             const Range& range, std::string_view about);
 /// Not negative.
 [[nodiscard]] Field duration(std::string_view key, Duration& target, const Range& range_s, std::string_view about);
-/// In seconds; it may be negative.
+/// In seconds; it may be negative where the range allows it.
 [[nodiscard]] Field signed_duration(std::string_view key, double& target_s, std::string_view about);
+[[nodiscard]] Field signed_duration(std::string_view key, double& target_s, const Range& range_s,
+                                    std::string_view about);
 [[nodiscard]] Field three_quantities(std::string_view key, Eigen::Vector3d& target, const QuantityKind& kind,
                                      std::string_view about);
+[[nodiscard]] Field three_quantities(std::string_view key, Eigen::Vector3d& target, const QuantityKind& kind,
+                                     const Range& range, std::string_view about);
 [[nodiscard]] Field three_quantities(std::string_view key, std::optional<Eigen::Vector3d>& target,
                                      const QuantityKind& kind, std::string_view about);
 

@@ -38,10 +38,13 @@ std::string suggestion(std::string_view unknown, std::span<const std::string_vie
                        : fmt::format("did you mean \"{}\"?", meant);
 }
 
+std::string outside(const Range& range) {
+  return fmt::format("outside {}{:g} to {:g}{}{}", range.zero_allowed ? "0 and " : "", range.least, range.most,
+                     range.unit.empty() ? "" : " ", range.unit);
+}
+
 std::string is_outside(double value, const Range& range) {
-  const std::string unit = range.unit.empty() ? "" : fmt::format(" {}", range.unit);
-  return fmt::format("is {}{}, outside {}{:g} to {:g}{}", value, unit, range.zero_allowed ? "0 and " : "", range.least,
-                     range.most, unit);
+  return fmt::format("is {}{}{}, {}", value, range.unit.empty() ? "" : " ", range.unit, outside(range));
 }
 
 std::string estimator_choices() {

@@ -26,6 +26,8 @@ inline constexpr const char* kGiveAPass =
 /// (its unit suffix is missing) is nearest.
 [[nodiscard]] std::string suggestion(std::string_view unknown, std::span<const std::string_view> known);
 
+/// "outside 1e-09 to 0.1 rad"
+[[nodiscard]] std::string outside(const Range& range);
 /// "is 2 rad, outside 1e-09 to 0.1 rad"
 [[nodiscard]] std::string is_outside(double value, const Range& range);
 

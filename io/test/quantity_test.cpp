@@ -14,8 +14,8 @@ namespace {
 
 using testing::HasSubstr;
 
-template <class Parse>
-std::string usage_error(Parse parse, std::string_view text) {
+template <class Value>
+std::string usage_error(Value (*parse)(std::string_view), std::string_view text) {
   try {
     static_cast<void>(parse(text));
   } catch (const UsageError& error) {
@@ -76,6 +76,16 @@ TEST(Quantity, RefusesBareNumberSayingWhichUnitsAreAccepted) {
   EXPECT_THAT(usage_error(parse_angle_rad, "5"), HasSubstr("accepted units: deg, arcmin, arcsec, rad"));
   EXPECT_THAT(usage_error(parse_rate_rad_s, "5"), HasSubstr("deg/h"));
   EXPECT_THAT(usage_error(parse_random_walk_rad_sqrt_s, "5"), HasSubstr("deg/h^0.5"));
+}
+
+TEST(Quantity, TellsARangeInTheUnitThatWasGiven) {
+  const auto angle = [](std::string_view text) { return parse_angle_rad(text, limits::kAttitudeLimit_rad); };
+  EXPECT_DOUBLE_EQ(angle("180deg"), std::numbers::pi);
+  EXPECT_THAT(usage_error(+angle, "400deg"), HasSubstr("\"400deg\" is outside 5.72958e-08 to 180.482 deg: an error"));
+  const auto duration = [](std::string_view text) { return parse_duration(text, {60, 3600, "s", "because"}); };
+  EXPECT_EQ(duration("1h"), std::chrono::hours(1));
+  EXPECT_THAT(usage_error(+duration, "61min"), HasSubstr("\"61min\" is outside 1 to 60 min: because"));
+  EXPECT_THAT(usage_error(+duration, "-1min"), HasSubstr("must not be negative"));
 }
 
 TEST(Quantity, RefusesGarbageNotFiniteOverflowAndUnitsOfAnotherKind) {

@@ -5,6 +5,7 @@
 
 #include <cmath>
 #include <limits>
+#include <numbers>
 #include <string_view>
 
 namespace trihedron {
@@ -68,7 +69,7 @@ inline constexpr Range kGateNis{0.1, 1e12, "", "30 passes good fixes; a large nu
 inline constexpr Range kStudentTFreedom{1, 1e6, "", "give 5 to 20, or 0 for the gate alone", true};
 inline constexpr Range kRejections{1, 1e6, "", "it is a number of fixes"};
 inline constexpr Range kAnglesAfter_s{1e-3, kYear_s, "s", "give some seconds or minutes, or never"};
-inline constexpr Range kCorrectionInterval_s{1e-3, kYear_s, "s", "it must be positive; say continuous to use each fix"};
+inline constexpr Range kCorrectionInterval_s{1e-3, kYear_s, "s", "it is the time between two corrections"};
 inline constexpr Range kNeededError_rad{1e-9, 3.15, "rad", "an arcminute is 2.9e-4, and a half turn is all there is"};
 inline constexpr Range kNeededInterval_s{1, 3.2e6, "s",
                                          "it is the time between two astro-corrections, a month at most"};
@@ -90,16 +91,28 @@ inline constexpr Range kForecastError_rad{0, 1e9, "rad", "it is an angle"};
 inline constexpr Range kShare{0, 1e9, "", "it is a share"};
 inline constexpr Range kTimeOfCalibration_s{-1e9, 1e9, "s", "it is the time since the epoch"};
 
-// ---- Scenarios; what goes together is judged by the simulation
+// ---- Scenarios; what several keys say together is judged by the simulation
 
 inline constexpr Range kLength_m{0, 1e9, "m", "the Moon is 3.8e8 m away"};
+inline constexpr Range kAltitude_m{1, 1e9, "m", "an orbit is above the Earth, and the Moon is 3.8e8 m away"};
 inline constexpr Range kFrequency_hz{0, 1e4, "Hz", "a spacecraft does not shake faster"};
-inline constexpr Range kAcceleration_rad_s2{0, 10, "rad/s^2", "no spacecraft turns faster"};
+inline constexpr Range kAcceleration_rad_s2{1e-9, 10, "rad/s^2", "a spacecraft turns by hundredths of a degree/s^2"};
 inline constexpr Range kRate_rad_s{-10, 10, "rad/s", "no spacecraft turns faster"};
 inline constexpr Range kRateWalk_rad_s_sqrt_s{0, 1e-2, "rad/s/s^0.5", "no gyro drifts so fast"};
 inline constexpr Range kScenarioRandomWalk_rad_sqrt_s{0, 1e-2, "rad/s^0.5", "no gyro drifts so fast"};
 inline constexpr Range kAngle_rad{-kFullTurn_rad, kFullTurn_rad, "rad", "it is at most a full turn"};
+inline constexpr Range kSizeOfAngle_rad{0, kFullTurn_rad, "rad", "it is a size, which is not negative"};
+inline constexpr Range kHalfTurn_rad{0, std::numbers::pi, "rad", "it is an angle between two directions"};
+inline constexpr Range kRadius_rad{1e-6, std::numbers::pi / 2, "rad", "it is a radius of some degrees"};
+inline constexpr Range kCorrelation_rad{1e-6, kFullTurn_rad, "rad", "it is the angle after which an error is another"};
+inline constexpr Range kSizeOfRate_rad_s{0, 10, "rad/s", "it is a size, which is not negative"};
+inline constexpr Range kBodyRate_rad_s{1e-6, 10, "rad/s", "a spacecraft turns by some tenths of a degree a second"};
 inline constexpr Range kInterval_s{-kYear_s, kYear_s, "s", "it is at most a year"};
+inline constexpr Range kStretch_s{0, kYear_s, "s", "it is a length of time, which is not negative"};
+inline constexpr Range kTimeConstant_s{1e-3, kYear_s, "s", "it is the time in which something decays or changes"};
+inline constexpr Range kProbability{0, 1, "", "it is a probability"};
+inline constexpr Range kHarmonicDegree{1, 20, "", "it is the degree of a spherical harmonic"};
+inline constexpr Range kHarmonicOrder{-20, 20, "", "it is the order of a spherical harmonic"};
 inline constexpr Range kPureNumber{-1e3, 1e3, "", "no fraction or component is so large"};
 
 inline constexpr Range kOrbitRadius_m{6.3e6, 2e9, "m", "an orbit goes round the Earth, whose radius is 6378 km"};
@@ -117,10 +130,13 @@ inline constexpr Range kSpeed{1e-3, 1e9, "",
                               "it is how many times faster than the telemetry was taken; max is as fast as can be"};
 inline constexpr Range kRequiredInterval_s{1, 3.1e7, "s",
                                            "it is the time for which an attitude is to hold, at most a year"};
+inline constexpr Range kPredictionWindow_s{1, 3.1e7, "s",
+                                           "it is the stretch of the pass from which errors are predicted, an orbit or "
+                                           "more"};
 inline constexpr Range kFlights{1, 1e6, "", "it is a number of flights"};
 /// A row of a campaign takes a kilobyte of memory when its table is written.
 inline constexpr Range kCampaignRuns{1, 1e6, "", "it is a number of runs"};
-inline constexpr Range kSpreadOver{0, 1e4, "", "it is a number of samples, 8 a second"};
+inline constexpr Range kSpreadOver{0, 20, "", "it is a number of samples; on board no more are taken"};
 inline constexpr Range kJobs{1, 1024, "", "it is a number of threads"};
 
 }  // namespace limits
