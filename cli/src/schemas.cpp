@@ -111,6 +111,7 @@ Json pass() {
                  {"gyro_samples", count()},
                  {"fixes", count()},
                  {"defects", array(defect)},
+                 {"left_out?", array(text())},
                  {"fixes_of_further_star_trackers?", array(count())},
                  {"periods?", object({{"gyro_s", number()},
                                       {"gyro_told_s", number()},

@@ -1,8 +1,10 @@
 #include <fmt/core.h>
 
+#include <algorithm>
 #include <memory>
 #include <stdexcept>
 #include <string>
+#include <variant>
 #include <vector>
 
 #include "commands.hpp"
@@ -11,7 +13,9 @@
 #include "trihedron/io/apart.hpp"
 #include "trihedron/io/error.hpp"
 #include "trihedron/io/pass.hpp"
+#include "trihedron/io/quantity.hpp"
 #include "trihedron/io/scenario.hpp"
+#include "trihedron/sim/attitude.hpp"
 
 namespace trihedron::cli {
 namespace {
@@ -20,6 +24,41 @@ struct SimulateArguments {
   std::string scenario;
   std::string pass;
 };
+
+/// "2 of 3 slews begin after the end of the pass"
+template <class Stretch>
+void say_begins_after(const std::vector<Stretch>& all, double end_s, const std::string& name,
+                      std::vector<std::string>& lines) {
+  const auto late = std::ranges::count_if(all, [end_s](const Stretch& its) { return its.begin_s >= end_s; });
+  if (late > 0) {
+    lines.push_back(fmt::format("{} of {} {} {} after the end of the pass", late, all.size(), name,
+                                late == 1 ? "begins" : "begin"));
+  }
+}
+
+/// What the scenario asks for and the pass is too short for.
+std::vector<std::string> left_out(const Scenario& scenario) {
+  const double end_s = to_seconds(scenario.duration);
+  const AttitudeScenario& attitude = scenario.attitude;
+  std::vector<std::string> lines;
+  if (const auto* slews = std::get_if<std::vector<Slew>>(&attitude.slews)) {
+    say_begins_after(*slews, end_s, "slews", lines);
+    const sim::SlewPlan plan(*slews, attitude.max_slew_rate_rad_s, attitude.max_slew_acceleration_rad_s2);
+    for (const sim::SlewPlan::Turn& turn : plan.turns()) {
+      if (turn.begin_s < end_s && turn.end_s > end_s) {
+        lines.push_back(fmt::format("the slew that begins at {} is not over by the end of the pass",
+                                    io::format_duration(from_seconds(turn.begin_s))));
+      }
+    }
+  }
+  say_begins_after(scenario.gyro_gaps, end_s, "gaps of the gyros", lines);
+  say_begins_after(scenario.star_tracker.outages, end_s, "outages of the star tracker", lines);
+  for (std::size_t i = 0; i < scenario.further_star_trackers.size(); ++i) {
+    say_begins_after(scenario.further_star_trackers[i].outages, end_s, fmt::format("outages of star tracker {}", i + 2),
+                     lines);
+  }
+  return lines;
+}
 
 }  // namespace
 
@@ -45,14 +84,24 @@ void simulate_pass(const std::filesystem::path& scenario_file, const std::string
   writer.write(result.pass, &result.truth, io::format_for(scenario));
   common.log.say(fmt::format("simulated {}: {} samples, {} fixes; written {}", name, result.pass.gyro.size(),
                              result.pass.star_tracker.size(), pass.string()));
-  show(
-      common,
-      [&] {
-        return pass_json({result.pass, {}});
-      },
-      [&] {
-        return pass_text({result.pass, {}}) + written_pass_text(pass.string(), was_there);
-      });
+  const std::vector<std::string> missing = left_out(scenario);
+  for (const std::string& line : missing) {
+    common.log.say("left out: " + line);
+  }
+  const auto as_json = [&] {
+    nlohmann::ordered_json json = pass_json({result.pass, {}});
+    if (!missing.empty()) {
+      json["left_out"] = missing;
+    }
+    return json;
+  };
+  show(common, as_json, [&] {
+    std::string text = pass_text({result.pass, {}});
+    for (const std::string& line : missing) {
+      text += fmt::format("Left out    {}\n", line);
+    }
+    return text + written_pass_text(pass.string(), was_there);
+  });
 }
 
 void add_simulate(CLI::App& program, const Common& common, int& exit_status) {

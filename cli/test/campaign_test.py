@@ -356,7 +356,7 @@ def with_key(line):
     (with_key('gyro.readout.spike = {of = "gyro.readout.nose"}'), ["c.toml:23:", "no numbers are drawn"]),
     (with_key('gyro.readout.spike = {of = "attitude.reference"}'), ["c.toml:23:", "no numbers are drawn"]),
     (with_key('gyro.readout.spike = {of = "gyro.readout.noise", times = "2arcsec"}'), ["c.toml:23:", "times"]),
-    (with_key('gyro.readout.spike_probability = {of = "star_tracker.dropout_probability", times = 20}'), ["c.toml:23:", "can be drawn", "0 … 1"]),
+    (with_key('gyro.readout.spike_probability = {of = "star_tracker.dropout_probability", times = 20}'), ["c.toml:23:", "can be drawn", "outside 0 to 1"]),
     (with_key('gyro.drift.direction_walk = {of = "calibration.filter.direction_random_walk"}\ncalibration.filter.direction_random_walk = {choice = ["1e-9rad/s^0.5", "1e-8rad/s^0.5"]}'),
      ["c.toml:23:", "follows a setting"]),
     (with_key('gyro.readout.spike = {uniform = ["1arcsec", "2arcsec"], times = 2}'), ["c.toml:23:", "no meaning"]),

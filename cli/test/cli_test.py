@@ -365,6 +365,21 @@ def test_calibrate_measures_convergence_and_extension(outcome):
     assert outcome["extension"]["factor"] > 3
 
 
+def test_simulate_says_what_the_pass_is_too_short_for(tmp_path):
+    (tmp_path / "s.toml").write_text('[scenario]\nduration = "4min"\n[attitude]\n'
+                                     'slews = [{begin = "3min", roll = "30deg"}, {begin = "1h"}]\n'
+                                     '[star_tracker]\noutages = [{begin = "5min", end = "6min"}]\n')
+    lines = ["1 of 2 slews begins after the end of the pass", "the slew that begins at 3min is not over by the end of the pass",
+             "1 of 1 outages of the star tracker begins after the end of the pass"]
+    result = run("simulate", tmp_path / "s.toml", "-o", tmp_path / "p")
+    assert result.returncode == TRUSTWORTHY
+    assert [line[12:] for line in result.stdout.splitlines() if line.startswith("Left out")] == lines
+    assert json.loads(run("--json", "simulate", tmp_path / "s.toml", "-o", tmp_path / "p").stdout)["left_out"] == lines
+    (tmp_path / "s.toml").write_text('[scenario]\nduration = "4min"\n')
+    result = run("simulate", tmp_path / "s.toml", "-o", tmp_path / "p")
+    assert "Left out" not in result.stdout
+
+
 # Nine hours of paper.toml are calibrated by the demonstration, of steady-flight.toml as a pass of validation/passes: here four of the others, which
 # hold what they have happen, with nothing to decide: decisions on a pass as dirty are tested with those of validation/passes. The pages of docs/ fly
 # short.toml.

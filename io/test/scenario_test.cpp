@@ -210,5 +210,54 @@ TEST(ScenarioToml, RefusalNamesPlaceReasonAndCure) {
   EXPECT_THAT(why_refused("[scenario]\nseed = -1"), HasSubstr("whole number"));
 }
 
+TEST(ScenarioToml, ValuesOutsideTheirRangeAreRefusedWhereTheyStand) {
+  const auto refuses = [](const char* table, const char* line, const char* words) {
+    const std::string why = why_refused(std::string("[") + table + "]\n" + line);
+    EXPECT_THAT(why, HasSubstr("scenario.toml:2:")) << line;
+    EXPECT_THAT(why, HasSubstr(words)) << line;
+  };
+  refuses("gyro.readout", "noise = \"-2arcsec\"", "\"noise\" in [gyro.readout]: \"-2arcsec\" is outside 0 to ");
+  refuses("gyro.readout", "stuck = \"-1s\"", "\"stuck\"");
+  refuses("gyro.readout", "spike_probability = -0.1", "\"spike_probability\" is -0.1, outside 0 to 1; it is a prob");
+  refuses("star_tracker", "dropout_probability = 1.5", "\"dropout_probability\" is 1.5, outside 0 to 1; it is a prob");
+  refuses("star_tracker", "noise = [\"1arcsec\", \"-1arcsec\", \"1arcsec\"]", "\"-1arcsec\" is outside");
+  refuses("star_tracker", "sun_exclusion = \"190deg\"", "outside 0 to 180 deg");
+  refuses("star_tracker", "earth_exclusion = \"-1deg\"", "outside 0 to 180 deg");
+  refuses("star_tracker", "field_correlation = \"0deg\"", "\"field_correlation\"");
+  refuses("star_tracker", "max_rate = \"-1deg/s\"", "\"max_rate\"");
+  refuses("orbit", "inclination = \"270deg\"", "outside 0 to 180 deg");
+  refuses("orbit", "perigee_altitude = \"0km\"", "above the Earth");
+  refuses("attitude", "max_slew_rate = \"0deg/s\"", "\"max_slew_rate\" in [attitude]: \"0deg/s\" is outside");
+  refuses("attitude", "max_slew_acceleration = \"0deg/s^2\"", "\"max_slew_acceleration\"");
+  refuses("attitude", "jitter = \"-1arcsec\"", "\"jitter\"");
+  refuses("attitude.imaging", "mean_rest = \"0s\"", "\"mean_rest\" in [attitude.imaging]");
+  refuses("attitude.imaging", "dwell = \"-1s\"", "\"dwell\"");
+  refuses("gyro", "alignment_prior_sigma = \"0deg\"", "\"alignment_prior_sigma\"");
+  refuses("gyro", "start_direction_c = [0, 0, 0]", "\"start_direction_c\" is zero");
+  refuses("gyro.drift", "prior_sigma = \"0rad/s\"", "\"prior_sigma\"");
+  refuses("gyro.drift", "markov_time = \"0s\"", "\"markov_time\"");
+  refuses("gyro.drift", "bump_radius = \"91deg\"", "to 90 deg");
+  refuses("gyro.drift", "bump_centre = [0, 0, 0]", "\"bump_centre\" is zero");
+  refuses("gyro.drift", "harmonics = [{degree = 21}]", "\"degree\" is 21, outside 1 to 20");
+}
+
+TEST(ScenarioToml, WhatSeveralKeysSayTogetherIsRefusedWhereItStands) {
+  EXPECT_THAT(why_refused("[orbit]\nperigee_altitude = \"700km\""),
+              HasSubstr("scenario.toml:1:1: \"perigee_altitude\" is 700km, above \"apogee_altitude\", 604km"));
+  EXPECT_THAT(why_refused("[gyro.drift]\nharmonics = [{degree = 3, order = 7}]"),
+              HasSubstr("scenario.toml:2:14: a harmonic of degree 3 has no order 7; give an order from -3 to 3"));
+  for (const char* list : {"[star_tracker]\noutages", "[gyro]\ngaps"}) {
+    const std::string key = list;
+    EXPECT_THAT(why_refused(key + " = [{begin = \"1h\", end = \"30min\"}]"),
+                HasSubstr("ends at 30min, before it begins at 1h; give an \"end\" after \"begin\""));
+    EXPECT_THAT(why_refused(key + " = [{begin = \"1h\"}]"), HasSubstr("key \"end\" is missing"));
+    EXPECT_EQ(why_refused(key + " = [{end = \"1h\"}]"), "");
+  }
+  EXPECT_THAT(why_refused("[attitude]\nreference = \"inertial\""),
+              HasSubstr("scenario.toml:2:13: this reference needs \"inertial_q_in_c\", which is missing"));
+  EXPECT_THAT(why_refused("[attitude]\nreference = \"recorded\""), HasSubstr("add recorded = \"attitude.csv\""));
+  EXPECT_EQ(why_refused("[attitude]\nreference = \"inertial\"\ninertial_q_in_c = [0, 0, 0, 1]"), "");
+}
+
 }  // namespace
 }  // namespace trihedron::io

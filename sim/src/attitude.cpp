@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <numbers>
+#include <sstream>
 #include <stdexcept>
 
 #include "trihedron/records/stop.hpp"
@@ -102,9 +103,10 @@ SlewPlan::SlewPlan(const std::vector<Slew>& slews, double max_rate_rad_s, double
   Quaterniond from = Quaterniond::Identity();
   for (const Slew& slew : slews) {
     if (!turns_.empty() && !(slew.begin_s >= turns_.back().end_s)) {
-      throw std::invalid_argument("slews: the slew at " + std::to_string(slew.begin_s) +
-                                  " s begins before the one before has ended, at " +
-                                  std::to_string(turns_.back().end_s) + " s");
+      std::ostringstream reason;
+      reason << "slews: the slew at " << slew.begin_s << " s begins before the one before has ended, at "
+             << turns_.back().end_s << " s: begin it later, or raise max_slew_rate or max_slew_acceleration";
+      throw std::invalid_argument(reason.str());
     }
     const Quaterniond to = slew_target(slew);
     const Vector3d v = rotation_vector(from.conjugate() * to);
@@ -155,7 +157,7 @@ std::vector<Slew> imaging_slews(const ImagingProgramme& programme, double max_ra
 SmoothNoise::SmoothNoise(double bandwidth_hz, double begin_s, double end_s, Stream random)
     : begin_s_(begin_s), knots_per_s_(bandwidth_hz / 0.1863) {
   if (!(bandwidth_hz > 0)) {
-    throw std::invalid_argument("jitter: the bandwidth must be positive");
+    throw std::invalid_argument("jitter_bandwidth must be positive where there is jitter");
   }
   const double to_unit_variance = 1 / std::sqrt(655177.0 / 1663200.0);
   const auto intervals = static_cast<std::size_t>(std::ceil((end_s - begin_s) * knots_per_s_)) + 1;

@@ -41,7 +41,7 @@ void check(const GyroScenario& gyro, const std::string& name, double duration_s)
   require(drift.slew_time_s > 0, name + ".drift.slew_time_s must be positive");
   require(drift.polhode_period_s > 0, name + ".drift.polhode_period_s must be positive");
   require(drift.polhode_period_s + drift.polhode_period_rate * duration_s > 0,
-          name + ".drift.polhode_period_rate makes the period negative within the pass");
+          "polhode_period_rate of [gyro.drift] makes the polhode_period of " + name + " negative within the pass");
   require(drift.thermal_time_s > 0, name + ".drift.thermal_time_s must be positive");
   require(readout.noise_rad >= 0, name + ".readout.noise_rad must not be negative");
   require(std::isfinite(readout.latency_s), name + ".readout.latency_s must be finite");
@@ -70,7 +70,7 @@ void check(const Scenario& scenario) {
   require(scenario.gyro_period > Duration{0}, "gyro_period must be positive");
   require(
       scenario.star_tracker_period > Duration{0} && scenario.star_tracker_period % scenario.gyro_period == Duration{0},
-      "star_tracker_period must be a multiple of gyro_period");
+      "the period of [star_tracker] must be a multiple of the period of [gyro]");
   require(scenario.gyros.size() >= 2 && scenario.gyros.size() <= 4, "there must be 2 to 4 gyros");
   for (std::size_t i = 0; i < scenario.gyros.size(); ++i) {
     check(scenario.gyros[i], "gyros[" + std::to_string(i) + "]", to_seconds(scenario.duration));

@@ -226,7 +226,7 @@ TEST(Simulate, RefusesWhatMakesNoSenseAndNamesTheField) {
     EXPECT_NE(refusal(change).find(field), std::string::npos) << field << ": " << refusal(change);
   };
   names("duration", [](Scenario& s) { s.duration = Duration{0}; });
-  names("star_tracker_period", [](Scenario& s) { s.star_tracker_period = std::chrono::milliseconds{3001}; });
+  names("the period of [star_tracker]", [](Scenario& s) { s.star_tracker_period = std::chrono::milliseconds{3001}; });
   names("gyros", [](Scenario& s) { s.gyros.resize(1); });
   names("gyros", [](Scenario& s) { s.gyros.resize(5); });
   names("gyros[1].readout.noise_rad", [](Scenario& s) { s.gyros[1].readout.noise_rad = std::nan(""); });
