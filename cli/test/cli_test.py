@@ -865,5 +865,7 @@ def test_observe_refuses(observe, tmp_path):
     refused(observe(of=tmp_path / "nothing"), INPUT_REFUSED, "nothing")
     refused(observe(of=tmp_path / "nothing.toml"), INPUT_REFUSED, "nothing.toml")
     (tmp_path / "blind.toml").write_text(STEADY.replace("{slews}", '"none"') + '[star_tracker]\ndropout_probability = 1\n')
-    refused(observe(of=tmp_path / "blind.toml"), INPUT_REFUSED, "no fix")
+    refused(observe(of=tmp_path / "blind.toml"), INPUT_REFUSED, "no fix", "there is none")
+    (tmp_path / "parallel.toml").write_text(STEADY.replace("{slews}", '"none"').replace("[0.050, 0.124, 0.991]", "[0.995, 0.085, 0.043]"))
+    refused(observe(of=tmp_path / "parallel.toml"), INPUT_REFUSED, "momenta nearly parallel", "start the rotors along other directions")
     refused(observe("--advise", of=tmp_path / "blind.toml"), INPUT_REFUSED, "no fix")

@@ -21,6 +21,7 @@
 #include "choose/decide.hpp"
 #include "judge/changes.hpp"
 #include "model/drift_on_board.hpp"
+#include "model/nothing_used.hpp"
 #include "model/prior.hpp"
 #include "model/setup.hpp"
 #include "trihedron/ground/clocks/clocks.hpp"
@@ -60,23 +61,6 @@ class ProgressMeter {
   std::size_t every_;
   std::size_t done_ = 0;
 };
-
-/// The error that no fix started the filter; says what became of the fixes.
-SetupError nothing_used(const std::vector<FixRecord>& fixes) {
-  FixCounts counts;
-  for (const FixRecord& fix : fixes) {
-    ++counts[fix.status];
-  }
-  std::string what_became;
-  for (const NamedCount& its : named_counts(counts)) {
-    what_became += fmt::format("{}{} {}", what_became.empty() ? "" : ", ", its.count, its.name);
-  }
-  const bool are_parallel = !fixes.empty() && counts[FixStatus::kRejectedGeometry] == std::ssize(fixes);
-  return {fmt::format("no fix could be used to start from ({})", what_became.empty() ? "there is none" : what_became),
-          are_parallel ? "two momenta on one line give no attitude: start the rotors along other directions, or take "
-                         "another pair of gyros"
-                       : "look at the telemetry with `trihedron inspect`"};
-}
 
 /// With the variances of the members of a drift field that the pass has determined.
 Prior prior_by(const PassSettings& settings, const Layout& layout, const std::optional<FieldPrior>& field) {

@@ -12,13 +12,13 @@
 #include "batch/pass_setup.hpp"
 #include "choose/decide.hpp"
 #include "model/drift_on_board.hpp"
+#include "model/nothing_used.hpp"
 #include "model/orbital_rate.hpp"
 #include "model/setup.hpp"
 #include "observe/angle_row.hpp"
 #include "observe/attitude_metric.hpp"
 #include "observe/combinations.hpp"
 #include "onboard/screen.hpp"
-#include "trihedron/ground/model/setup_error.hpp"
 
 namespace trihedron::ground {
 namespace {
@@ -235,8 +235,6 @@ ScreenedPass as_it_is(const Pass& pass, int gyros, int heads) {
   return screened;
 }
 
-SetupError no_fix() { return {"no fix could be used", "look at the telemetry with `trihedron inspect`"}; }
-
 }  // namespace
 
 double sigma_along(const Combination& combination, const Observability& observability,
@@ -258,7 +256,7 @@ Observability observe(const Pass& pass, const CalibrationOptions& asked, const M
   const CalibrationOptions& options = decision.options;
   const Screened screened = decision.screened ? std::move(*decision.screened) : screen(pass, options);
   if (screened.pass.fixes.empty()) {
-    throw no_fix();
+    throw nothing_used(screen(pass, options, true).run->recorder.run().fixes);
   }
   const PassProblem problem(screened.pass, pass_setup(pass.settings, options));
   const BatchResult found = most_likely(problem, first_solution(problem, screened));
@@ -286,7 +284,7 @@ Eigen::MatrixXd predicted_covariance(const Pass& exact, const CalibrationOptions
   setup.sample_step = std::chrono::seconds(3);  // in slews a body turns by a degree or two
   const ScreenedPass screened = as_it_is(exact, setup.layout().gyros, setup.layout().star_trackers);
   if (screened.fixes.empty()) {
-    throw no_fix();
+    throw nothing_used({});
   }
   const PassProblem problem(screened, setup);
   const PassProblem::Linear linear = problem.linearise(problem.start(setup.prior.gyros));
