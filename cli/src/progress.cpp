@@ -1,7 +1,6 @@
 #include "progress.hpp"
 
 #include <fmt/core.h>
-#include <unistd.h>
 
 #include <chrono>
 #include <string>
@@ -9,11 +8,12 @@
 #include <utility>
 
 #include "standard_streams.hpp"
+#include "terminal.hpp"
 
 namespace trihedron::cli {
 
 ProgressBar::ProgressBar(std::string what, bool quiet)
-    : what_(std::move(what)), shown_(!quiet && isatty(STDERR_FILENO) == 1) {}
+    : what_(std::move(what)), shown_(!quiet && is_terminal(stderr)) {}
 
 ProgressBar::~ProgressBar() {
   if (shown_) {
@@ -50,7 +50,7 @@ std::string about(double seconds) {
 }  // namespace
 
 RunCounter::RunCounter(std::string what, std::size_t done, std::size_t all, bool quiet)
-    : what_(std::move(what)), before_(done), done_(done), all_(all), shown_(!quiet && isatty(STDERR_FILENO) == 1) {
+    : what_(std::move(what)), before_(done), done_(done), all_(all), shown_(!quiet && is_terminal(stderr)) {
   show();
 }
 

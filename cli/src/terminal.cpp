@@ -6,6 +6,8 @@
 #include <algorithm>
 #include <cstdlib>
 
+#include "transport.hpp"
+
 namespace trihedron::cli {
 namespace {
 
@@ -13,9 +15,12 @@ bool begins_character(char c) { return (static_cast<unsigned char>(c) & 0xC0U) !
 
 }  // namespace
 
+// mpirun gives its ranks a terminal of its own, whose text it passes on to wherever its own output goes.
+bool is_terminal(std::FILE* stream) { return ::isatty(::fileno(stream)) == 1 && !is_in_a_job(); }
+
 bool is_screen(std::FILE* stream) {
   const char* const terminal = std::getenv("TERM");  // NOLINT(concurrency-mt-unsafe): nothing sets it
-  return terminal != nullptr && std::string_view(terminal) != "dumb" && ::isatty(::fileno(stream)) == 1;
+  return terminal != nullptr && std::string_view(terminal) != "dumb" && is_terminal(stream);
 }
 
 bool is_coloured(std::FILE* stream) {

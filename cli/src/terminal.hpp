@@ -8,6 +8,8 @@
 
 namespace trihedron::cli {
 
+/// Whether it is a terminal that somebody looks at: not in a job of MPI.
+[[nodiscard]] bool is_terminal(std::FILE* stream);
 /// Whether it is a terminal on which the cursor can be moved: not with TERM=dumb.
 [[nodiscard]] bool is_screen(std::FILE* stream);
 /// The same, and NO_COLOR is not set.

@@ -40,7 +40,8 @@ Transport& transport_of_the_job() {
   const fs::path file = library();
   const auto missing = [&](const std::string& why) {
     return io::MachineFailed(file, fmt::format("cannot be loaded ({}), and carries what the ranks of a job tell", why),
-                             "install trihedron-mpi, or start the campaign without mpirun");
+                             "install trihedron-mpi; or, from sources, install libopenmpi-dev and build again, which "
+                             "puts it beside the program; or start the campaign without mpirun");
   };
   // The parts of Open MPI that it loads by itself look for their functions among all that are loaded.
   void* const handle = ::dlopen(file.c_str(), RTLD_NOW | RTLD_GLOBAL);

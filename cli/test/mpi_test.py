@@ -115,7 +115,7 @@ def test_a_job_without_the_library_is_refused_with_the_cure(alone, tmp_path):
     command = [tmp_path / "trihedron", "campaign", alone[0] / "c.toml", "-o", tmp_path / "out"]
     environment = {**os.environ, "PMIX_RANK": "0"}
     result = subprocess.run(command, env=environment, capture_output=True, text=True)
-    refused(result, MACHINE_FAILED, "trihedron-mpi.so", "install trihedron-mpi")
+    refused(result, MACHINE_FAILED, "trihedron-mpi.so", "install trihedron-mpi", "libopenmpi-dev")
     another = re.search(r"libz\S* => (\S+)", subprocess.run(["ldd", PROGRAM], check=True, capture_output=True, text=True).stdout)[1]
     shutil.copy(another, tmp_path / "trihedron-mpi.so")
     result = subprocess.run(command, env=environment, capture_output=True, text=True)
@@ -144,8 +144,12 @@ def test_a_run_alone_is_no_job(alone):
 @pytest.mark.parametrize("ranks, jobs", [(1, "1"), (3, "2")])
 def test_a_job_gives_the_table_of_one_process(alone, tmp_path, ranks, jobs):
     directory, status = alone
-    result = subprocess.run(mpirun(ranks, "campaign", directory / "c.toml", "-o", tmp_path / "out", "--jobs", jobs), capture_output=True, text=True)
+    # mpirun gives the program a terminal of its own.
+    environment = {**{name: value for name, value in os.environ.items() if name != "NO_COLOR"}, "TERM": "xterm"}
+    result = subprocess.run(mpirun(ranks, "campaign", directory / "c.toml", "-o", tmp_path / "out", "--jobs", jobs), capture_output=True, text=True,
+                            env=environment)
     assert result.returncode == status, result.stderr
+    assert "\x1b" not in result.stdout + result.stderr
     assert result.stdout.count("Test: 12 runs") == 1
     assert table(tmp_path / "out") == table(directory / "out")
     assert sorted(os.listdir(tmp_path / "out")) == ["report.html", "runs.journal", "runs.nc", "times.csv"]
