@@ -111,13 +111,21 @@ json navigation_number(const ReportInput& input) {
   }
   const auto stretches = whole_stretches(input.evaluation->navigation);
   const auto greatest = [](const ground::ErrorStatistics& stretch) { return angle(stretch.max_total_rad, 2); };
+  // Until the first correction after that of the start there is nothing else to fly by.
+  const auto& intervals = input.evaluation->navigation.intervals;
+  const auto by_what = [&](const ground::ErrorStatistics& stretch) {
+    return !intervals.empty() && intervals.front().max_total_rad >= stretch.max_total_rad
+               ? ", by the parameters known before the calibration"
+               : "";
+  };
   const std::string name = "Greatest error between corrections";
   if (stretches.size() == 1) {
-    return figure_of_merit(name, greatest(input.evaluation->navigation.whole), "", "open loop, total angle");
+    const ground::ErrorStatistics& whole = input.evaluation->navigation.whole;
+    return figure_of_merit(name, greatest(whole), "", std::string("open loop, total angle") + by_what(whole));
   }
   return figure_of_merit(name, greatest(stretches.front()) + " → " + greatest(stretches.back()), "",
-                         "open loop, total angle: in " + minutes_of(input, stretches.front()) + " and in " +
-                             minutes_of(input, stretches.back()));
+                         fmt::format("open loop, total angle: in {}{}, and in {}", minutes_of(input, stretches.front()),
+                                     by_what(stretches.front()), minutes_of(input, stretches.back())));
 }
 
 json alignment_number(const std::vector<Parameter>& parameters) {

@@ -120,6 +120,18 @@ TEST(Report, SaysOfWhichMinutesItsErrorsAre) {
   EXPECT_THAT(render(nine_hours().judged()), HasSubstr("rms in minutes 450–540 against"));
 }
 
+TEST(Report, SaysWhichErrorsAreByParametersKnownBeforeTheCalibration) {
+  EXPECT_THAT(render(short_run().judged()),
+              HasSubstr("open loop, total angle, by the parameters known before the calibration"));
+  EXPECT_THAT(render(nine_hours().judged()),
+              HasSubstr("minutes 0–90, by the parameters known before the calibration, and in minutes 450–540"));
+  const test::SyntheticRun run = short_run();
+  ground::CalibrationEvaluation evaluation = run.evaluation;
+  evaluation.navigation.intervals.front().max_total_rad = 0;
+  EXPECT_THAT(render({run.pass, run.run, &run.truth, {}, &evaluation}),
+              Not(HasSubstr("by the parameters known before")));
+}
+
 TEST(Report, SaysFirstWhetherTheResultCanBeTrusted) {
   test::SyntheticRun run = short_run();
   EXPECT_THAT(render(run.judged()), HasSubstr("<p class=\"word\">Trustworthy</p>"));

@@ -89,7 +89,7 @@ void judge_length(const Pass& pass, std::vector<Finding>& findings) {
     add(findings, FindingCode::kShortPass,
         "The pass is shorter than one orbit: alignment and drift coefficients are not yet separated.",
         fmt::format("{:.1f} min of telemetry", span_s / 60),
-        "Alignment takes about one orbit, drift coefficients two to three.");
+        "Calibrate by a pass of three orbits: alignment takes about one, drift coefficients two to three.");
   }
 }
 
