@@ -39,6 +39,25 @@ ErrorStatistics statistics_of(const AttitudeErrors& errors, std::size_t begin, s
   return result;
 }
 
+/// The first epoch of the stretch that begins at `boundary`. A correction by the fix at that time shows a little later,
+/// when the samples after the fix are known: the errors until then are of the stretch before.
+std::size_t end_of_stretch(const AttitudeErrors& errors, Time boundary) {
+  constexpr Duration kUntilCorrectionShows = std::chrono::seconds(10);
+  const auto at = [&](Time t) {
+    return static_cast<std::size_t>(std::ranges::lower_bound(errors.t, t) - errors.t.begin());
+  };
+  const std::size_t first = at(boundary);
+  if (errors.age_s.empty()) {
+    return first;
+  }
+  for (std::size_t i = first; i < at(boundary + kUntilCorrectionShows); ++i) {
+    if (errors.t[i] - from_seconds(errors.age_s[i]) > boundary - kSameEpoch) {
+      return i;
+    }
+  }
+  return first;
+}
+
 }  // namespace
 
 AttitudeErrors attitude_errors(const AttitudeHistory& solution, const std::vector<Time>& reference_t,
@@ -120,10 +139,7 @@ std::vector<ErrorStatistics> statistics_by_stretch(const AttitudeErrors& errors,
   std::vector<ErrorStatistics> stretches;
   for (std::size_t begin = 0; begin < errors.t.size();) {
     const auto number = (errors.t[begin] - start) / length;
-    std::size_t end = begin;
-    while (end < errors.t.size() && (errors.t[end] - start) / length == number) {
-      ++end;
-    }
+    const std::size_t end = end_of_stretch(errors, start + (number + 1) * length);
     stretches.push_back(statistics_of(errors, begin, end));
     begin = end;
   }

@@ -91,6 +91,22 @@ TEST(ErrorStatistics, SumUpTheWholeAndEachStretch) {
   EXPECT_EQ(stretches[1].to, at(minutes(49)));
 }
 
+/// The fix at the boundary corrects the attitude from two epochs later on.
+TEST(ErrorStatistics, AStretchBeginsWhereItsCorrectionShows) {
+  AttitudeErrors errors;
+  for (int i = 0; i < 20; ++i) {
+    errors.t.push_back(at(seconds(i)));
+    errors.error_rad.emplace_back(i < 12 ? 1e-3 : 1e-6, 0, 0);
+    errors.age_s.push_back(i < 12 ? i : i - 10);
+  }
+  const auto stretches = statistics_by_stretch(errors, at(seconds(0)), seconds(10));
+  ASSERT_EQ(stretches.size(), 2U);
+  EXPECT_EQ(stretches[1].from, at(seconds(12)));
+  EXPECT_EQ(stretches[1].max_total_rad, 1e-6);
+  errors.age_s.clear();
+  EXPECT_EQ(statistics_by_stretch(errors, at(seconds(0)), seconds(10))[1].from, at(seconds(10)));
+}
+
 TEST(ErrorStatistics, OfNothingAreEmpty) {
   const auto nothing = statistics({});
   EXPECT_EQ(nothing.count, 0U);

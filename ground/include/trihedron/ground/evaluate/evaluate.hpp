@@ -54,7 +54,8 @@ struct ErrorStatistics {
 
 /// Over the whole.
 [[nodiscard]] ErrorStatistics statistics(const AttitudeErrors& errors);
-/// Over consecutive stretches of `length` from `start` on.
+/// Over consecutive stretches of `length` from `start` on. Where a correction is by a fix at the boundary, the next
+/// stretch begins with the first epoch after it that has it.
 [[nodiscard]] std::vector<ErrorStatistics> statistics_by_stretch(const AttitudeErrors& errors, Time start,
                                                                  Duration length);
 
