@@ -445,6 +445,9 @@ std::string meant(const CLI::App& program, std::span<const char* const> argument
   }
   const CLI::App* command = nullptr;
   const auto suggested = [](std::string_view word, const std::vector<std::string>& known) {
+    if (word == "plan" || word == "advise") {
+      return fmt::format("there is no {}: observe SCENARIO.toml --advise looks for slews", word);
+    }
     const std::vector<std::string_view> names(known.begin(), known.end());
     const std::string_view name = nearest(word, names);
     return name.empty() ? fmt::format("there is no {}", printable(word))

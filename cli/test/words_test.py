@@ -50,6 +50,7 @@ def with_scenario(directory, name, text):
     (("observe", "p", "--max-angl=3deg"), "did you mean --max-angle?"),
     (("--log-file", "x", "histroy", "c.db"), "did you mean history?"),
     (("xyzzyxyzzy",), "there is no xyzzyxyzzy;"),
+    (("plan", "s.toml"), "observe SCENARIO.toml --advise looks for slews"),
     (("schema", "scenari"), "scenario"),
 ])
 def test_the_nearest_word_is_suggested(arguments, meant, tmp_path):

@@ -101,6 +101,9 @@ void put(toml::table& scenario, const std::vector<std::string>& path, const toml
       if (is_last) {
         table->insert_or_assign(path[i], value);
       } else {
+        if (path[i + 1] == "0") {
+          throw NoPlace{fmt::format("there is no element 0 of {}", in_quotes(path[i])), "elements are counted from 1"};
+        }
         if (!table->contains(path[i])) {
           if (number_of(path[i + 1])) {
             throw NoPlace{fmt::format("the base scenario has no list {}", in_quotes(path[i])),
@@ -204,7 +207,8 @@ class DistributionReader {
     }
     const toml::array* list = parameters->as_array();
     if (list == nullptr || list->empty()) {
-      refuse(*parameters, fmt::format("\"{}\" is not a list", word_), std::string(kForms));
+      refuse(*parameters, fmt::format("\"{}\" is {}", word_, list == nullptr ? "not a list" : "an empty list"),
+             std::string(kForms));
     }
     if (distribution.has_options()) {
       read_options(*list);
@@ -526,6 +530,8 @@ struct CampaignFile::Content {
     TomlTable(document, file, "the file").refuse(place, std::move(reason), std::move(cure));
   }
 
+  static constexpr const char* kNarrow = "narrow the distribution, by min and max where it has no ends";
+
   void try_draw(const Varied& one, double draw, const ScenarioCheck& check) const {
     const std::string what = one.input.distribution.has_options() ? one.input.options[static_cast<std::size_t>(draw)]
                                                                   : fmt::format("{}{}", draw, one.input.unit);
@@ -540,11 +546,12 @@ struct CampaignFile::Content {
       }
     } catch (const NoPlace& none) {
       refuse(*one.place, fmt::format("{}: {}", drawn, none.reason), none.cure);
+    } catch (const InputOutsideRange& refused) {
+      refuse(*one.place, fmt::format("{} can be drawn: {}", drawn, refused.reason()), kNarrow);
     } catch (const InputRefused& refused) {
       refuse(*one.place, fmt::format("{} can be drawn: {}", drawn, refused.reason()), refused.cure());
     } catch (const std::invalid_argument& refused) {
-      refuse(*one.place, fmt::format("{} can be drawn: {}", drawn, refused.what()),
-             "narrow the distribution, by min and max where it has no ends");
+      refuse(*one.place, fmt::format("{} can be drawn: {}", drawn, refused.what()), kNarrow);
     }
   }
 
@@ -673,8 +680,10 @@ struct CampaignFile::Content {
       return;
     }
     if (head.runs != 0) {
-      refuse(place_of("runs"), fmt::format("\"runs\" and a grid of {} points are both there", points),
-             "leave it out, and give \"repeats\": how many runs there are at each point");
+      refuse(
+          place_of("runs"),
+          fmt::format("\"runs\" has no meaning with a grid: there is one run at each of its points, {} in all", points),
+          "leave \"runs\" out; for several runs at each point give their number as \"repeats\"");
     }
     plan.repeats = std::max<std::uint64_t>(head.repeats, 1);
     const double runs = points * static_cast<double>(plan.repeats);

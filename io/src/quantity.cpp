@@ -87,7 +87,7 @@ Measured measured(std::string_view text, const QuantityKind& kind) {
 }
 
 [[noreturn]] void refuse_outside(std::string_view text, const Range& range) {
-  throw UsageError(fmt::format("{} is {}: {}", in_quotes(text), outside(range), range.why));
+  throw UsageOutsideRange(fmt::format("{} is {}: {}", in_quotes(text), outside(range), range.why));
 }
 
 }  // namespace

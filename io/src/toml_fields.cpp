@@ -2,10 +2,15 @@
 
 #include <fmt/format.h>
 
+#include <functional>
+#include <map>
+#include <ranges>
+#include <span>
 #include <sstream>
 
 #include "trihedron/io/quantity.hpp"
 #include "trihedron/io/time_text.hpp"
+#include "trihedron/records/text.hpp"
 #include "wording.hpp"
 
 namespace trihedron::io {
@@ -22,6 +27,36 @@ const toml::array& elements_of(const TomlTable& table, const toml::node& node, s
   return *array;
 }
 
+/// As people name a table in the table `name`.
+std::string name_within(const std::string& name, std::string_view key) {
+  if (name.starts_with("[[")) {
+    return fmt::format("\"{}\" of {}", key, name);
+  }
+  return name.starts_with("[") ? fmt::format("{}.{}]", name.substr(0, name.size() - 1), key) : fmt::format("[{}]", key);
+}
+
+/// The cure where a key that is not known here is one of a table in it; empty where it is none. `name`: of the table
+/// that is read.
+std::string belongs_into(std::string_view unknown, const std::string& name, const Fields& fields,
+                         std::span<const std::string_view> known) {
+  std::map<std::string, std::string, std::less<>> tables;  // of each key
+  for (const Field& field : fields) {
+    const Json its = field.schema().value("properties", Json::object());
+    for (const auto& [key, ignored] : its.items()) {
+      std::string& among = tables[key];
+      among += (among.empty() ? "" : " or ") + name_within(name, field.key);
+    }
+  }
+  if (const auto found = tables.find(unknown); found != tables.end()) {
+    return fmt::format("it belongs into {}", found->second);
+  }
+  const std::vector<std::string_view> keys(std::views::keys(tables).begin(), std::views::keys(tables).end());
+  const std::string_view meant = nearest(unknown, keys);
+  return meant.empty() || !nearest(unknown, known).empty()
+             ? ""
+             : fmt::format("did you mean \"{}\", which belongs into {}?", meant, tables.find(meant)->second);
+}
+
 }  // namespace
 
 Fields operator+(Fields a, const Fields& b) {
@@ -35,7 +70,7 @@ void read_fields(const toml::table& table, const fs::path& file, const std::stri
     known.push_back(field.key);
   }
   const TomlTable reader(table, file, name);
-  reader.expect_known(known);
+  reader.expect_known(known, [&](std::string_view key) { return belongs_into(key, name, fields, known); });
   for (const Field& field : fields) {
     const toml::node* node = field.is_required ? &reader.at(field.key) : reader.find(field.key);
     if (node == nullptr) {
@@ -43,6 +78,9 @@ void read_fields(const toml::table& table, const fs::path& file, const std::stri
     }
     try {
       field.read(reader, *node);
+    } catch (const UsageOutsideRange& error) {
+      reader.refuse<InputOutsideRange>(*node, fmt::format("\"{}\" in {}: {}", field.key, name, error.what()),
+                                       "correct the value");
     } catch (const UsageError& error) {
       reader.refuse(*node, fmt::format("\"{}\" in {}: {}", field.key, name, error.what()), "correct the value");
     }

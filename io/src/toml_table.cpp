@@ -11,10 +11,6 @@
 namespace trihedron::io {
 namespace {
 
-Position position_of(const toml::source_region& region) {
-  return {static_cast<std::int64_t>(region.begin.line), static_cast<std::int64_t>(region.begin.column)};
-}
-
 std::string_view type_of(const toml::node& node) {
   switch (node.type()) {
     case toml::node_type::table:
@@ -47,12 +43,14 @@ void check_version(const TomlTable& root, const toml::node& node) {
 
 }  // namespace
 
-void TomlTable::expect_known(const std::vector<std::string_view>& known) const {
+void TomlTable::expect_known(const std::vector<std::string_view>& known,
+                             const std::function<std::string(std::string_view)>& elsewhere) const {
   for (const auto& [key, node] : table_) {
     if (std::ranges::find(known, key.str()) == known.end()) {
+      const std::string better = elsewhere ? elsewhere(key.str()) : std::string();
       throw InputRefused(file_, position_of(key.source()),
                          fmt::format("key {} is not known in {}", in_quotes(key.str()), name_),
-                         suggestion(key.str(), known));
+                         better.empty() ? suggestion(key.str(), known) : better);
     }
   }
 }
@@ -93,7 +91,7 @@ double TomlTable::number(const toml::node& node, std::string_view key, const Ran
     refuse(node, fmt::format("\"{}\" is not finite", key), "give a finite number");
   }
   if (!range.holds(*value)) {
-    refuse(node, fmt::format("\"{}\" {}", key, is_outside(*value, range)), std::string(range.why));
+    refuse<InputOutsideRange>(node, fmt::format("\"{}\" {}", key, is_outside(*value, range)), std::string(range.why));
   }
   return *value;
 }
@@ -107,10 +105,6 @@ Eigen::Vector3d TomlTable::three_numbers(const toml::node& node, std::string_vie
            "give three numbers: [x, y, z]");
   }
   return {number((*array)[0], key, range), number((*array)[1], key, range), number((*array)[2], key, range)};
-}
-
-void TomlTable::refuse(const toml::node& node, std::string reason, std::string cure) const {
-  throw InputRefused(file_, position_of(node.source()), std::move(reason), std::move(cure));
 }
 
 toml::table parse_toml(std::string_view text, const std::filesystem::path& file) {

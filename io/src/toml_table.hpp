@@ -4,7 +4,9 @@
 #include <toml++/toml.h>
 
 #include <Eigen/Core>
+#include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -16,6 +18,10 @@
 
 namespace trihedron::io {
 
+[[nodiscard]] inline Position position_of(const toml::source_region& region) {
+  return {static_cast<std::int64_t>(region.begin.line), static_cast<std::int64_t>(region.begin.column)};
+}
+
 /// One table of a document; the document must outlive it.
 class TomlTable {
  public:
@@ -23,8 +29,10 @@ class TomlTable {
   TomlTable(const toml::table& table, std::filesystem::path file, std::string name)
       : table_(table), file_(std::move(file)), name_(std::move(name)) {}
 
-  /// Refuses every key that is not known, suggesting the nearest.
-  void expect_known(const std::vector<std::string_view>& known) const;
+  /// Refuses every key that is not known, suggesting the nearest. `elsewhere` may give a better cure for a key, or an
+  /// empty one.
+  void expect_known(const std::vector<std::string_view>& known,
+                    const std::function<std::string(std::string_view)>& elsewhere = {}) const;
 
   [[nodiscard]] const toml::node* find(std::string_view key) const { return table_.get(key); }
   /// The value; refuses a missing key.
@@ -38,7 +46,10 @@ class TomlTable {
   [[nodiscard]] Eigen::Vector3d three_numbers(const toml::node& node, std::string_view key,
                                               const Range& range = kAnyNumber) const;
 
-  [[noreturn]] void refuse(const toml::node& node, std::string reason, std::string cure) const;
+  template <class Refused = InputRefused>
+  [[noreturn]] void refuse(const toml::node& node, std::string reason, std::string cure) const {
+    throw Refused(file_, position_of(node.source()), std::move(reason), std::move(cure));
+  }
 
  private:
   const toml::table& table_;

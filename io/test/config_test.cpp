@@ -63,6 +63,13 @@ TEST(Config, RefusesNamesThatThereAreNot) {
               HasSubstr("\"wandering_drift\" in [further_states]: \"-1e-8rad/s\" is outside 1e-15 to 0.01 rad/s"));
 }
 
+TEST(Config, AKeyOfATableIsSentThere) {
+  EXPECT_THAT(refused_config("gate_nis = 3\n"),
+              HasSubstr("config.toml:1:1: key \"gate_nis\" is not known in the file; it belongs into [filter]"));
+  EXPECT_THAT(refused_config("gate_niss = 3\n"), HasSubstr("did you mean \"gate_nis\", which belongs into [filter]?"));
+  EXPECT_THAT(refused_config("estimater = 3\n"), HasSubstr("did you mean \"estimator\"?"));
+}
+
 TEST(Config, RefusesNumbersOutsideTheirRanges) {
   EXPECT_THAT(refused_config("[filter]\ndirection_random_walk = \"1rad/s^0.5\"\n"),
               HasSubstr("outside 0 and 1e-15 to 0.1 rad/s^0.5: give 0 where there is none"));

@@ -37,6 +37,12 @@ class InputIncomplete : public InputRefused {
   using InputRefused::InputRefused;
 };
 
+/// A value in a file that is outside its range.
+class InputOutsideRange : public InputRefused {
+ public:
+  using InputRefused::InputRefused;
+};
+
 /// The disk or the system failed while a file was read or written. what() is `file: reason; cure`.
 class MachineFailed : public std::runtime_error {
  public:
@@ -56,6 +62,12 @@ class MachineFailed : public std::runtime_error {
 class UsageError : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;
+};
+
+/// One that is outside its range.
+class UsageOutsideRange : public UsageError {
+ public:
+  using UsageError::UsageError;
 };
 
 }  // namespace trihedron::io

@@ -135,7 +135,8 @@ inline constexpr Range kPredictionWindow_s{1, 3.1e7, "s",
                                            "more"};
 inline constexpr Range kFlights{1, 1e6, "", "it is a number of flights"};
 /// A row of a campaign takes a kilobyte of memory when its table is written.
-inline constexpr Range kCampaignRuns{1, 1e6, "", "it is a number of runs"};
+inline constexpr Range kCampaignRuns{1, 1e6, "",
+                                     "give fewer, or divide the campaign into several with seeds of their own"};
 inline constexpr Range kSpreadOver{0, 20, "", "it is a number of samples; on board no more are taken"};
 inline constexpr Range kJobs{1, 1024, "", "it is a number of threads"};
 
