@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <filesystem>
 #include <iterator>
 #include <memory>
@@ -95,13 +96,17 @@ std::string combinations_text(const Observability& observability) {
 
 std::string observability_text(const Observability& observability, Time epoch) {
   const Eigen::VectorXd& s = observability.singular_values;
+  const auto times = [](double value) {
+    const double unit = value >= 100 ? std::pow(10, std::floor(std::log10(value)) - 1) : 0;
+    return unit > 0 ? figure("{:.0f}", unit * std::round(value / unit)) : figure("{:.2g}", value);
+  };
   return fmt::format(
       "Observable  {} of {} combinations of parameters: the data alone tell them at least {:.0f} times as well as they "
-      "were known before; all of them {} … {} times\n"
+      "were known before; the best of all {} times, the worst {} times\n"
       "Attitude    {} rms per axis by what the parameters leave, between corrections and slewing\n{}{}",
-      observable_count(observability), s.size(), Observability::kUnobservable, figure("{:.2g}", s(0)),
-      figure("{:.2g}", s(s.size() - 1)), angle_text(observability.attitude_error_rad),
-      sigmas_text(observability, epoch), combinations_text(observability));
+      observable_count(observability), s.size(), Observability::kUnobservable, times(s(0)), times(s(s.size() - 1)),
+      angle_text(observability.attitude_error_rad), sigmas_text(observability, epoch),
+      combinations_text(observability));
 }
 
 nlohmann::ordered_json observability_json(const Observability& observability, Time epoch) {

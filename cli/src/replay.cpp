@@ -290,6 +290,16 @@ nlohmann::ordered_json result_json(const ReplayResult& result) {
   return json;
 }
 
+std::string why_not_taken(const ground::NotTaken& not_taken) {
+  if (not_taken.samples > 0) {
+    return ": it had failed";
+  }
+  return not_taken.fixes > 0
+             ? ": at the start it looks at none; at the end the samples after a fix are missing; a jump "
+               "of the clock loses some"
+             : "";
+}
+
 std::string result_text(const ReplayResult& result, const ReplayRequest& request) {
   const Housekeeping& record = result.record;
   std::string text = pass_text(result.loaded) + verdict_text(result.verdict);
@@ -301,7 +311,8 @@ std::string result_text(const ReplayResult& result, const ReplayRequest& request
                  record.samples_rejected);
   fmt::format_to(out, "Fixes       {} used, {} rejected\n", record.fixes_used, record.fixes_rejected);
   const ground::NotTaken& not_taken = result.not_taken;
-  fmt::format_to(out, "Not taken   {} samples, {} fixes\n", not_taken.samples, not_taken.fixes);
+  fmt::format_to(out, "Not taken   {} samples, {} fixes{}\n", not_taken.samples, not_taken.fixes,
+                 why_not_taken(not_taken));
   fmt::format_to(out, "Call        {}\n", percentiles_text(result.timing.calls));
   if (result.timing.late.count() > 0) {
     fmt::format_to(out, "Late        {}\n", percentiles_text(result.timing.late));

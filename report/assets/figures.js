@@ -349,7 +349,7 @@ const FIGURES = {
     }
     if (loops.length > 0) {
       traces.push(legendOnly("flown in the pass", { color: colour.vermillion, width: 1 }),
-        legendOnly("99.7 % of it, predicted then", { color: colour.vermillion, width: 1, dash: "dash" }));
+        legendOnly("99.7 %, as predicted at each correction", { color: colour.vermillion, width: 1, dash: "dash" }));
     }
     traces.push(legendOnly("limit", { color: colour.ink, dash: "dot", width: 1.4 }));
     if (need) {
