@@ -562,7 +562,7 @@ def test_a_catalogue_that_cannot_be_written_is_a_machine_failure(start_ups, tmp_
     (("navigate", EXAMPLE, "-o", "x"), "--online"),
     (("navigate", EXAMPLE, "-o", "x", "--online", "--calibration", "y"), "--online"),
     (("navigate", EXAMPLE, "-o", "x", "--online", "--correction-interval", "90"), "unit"),
-    (("navigate", EXAMPLE, "-o", "x", "--online", "--correction-interval", "0min"), "positive"),
+    (("navigate", EXAMPLE, "-o", "x", "--online", "--correction-interval", "0min"), "it is the time between two corrections"),
     (("evaluate", EXAMPLE, "--attitude", "x", "--limit", "5"), "unit"),
     (("calibrate", EXAMPLE, "-o", "x", "--need", "5arcmin"), "5arcmin for 270min"),
     (("calibrate", EXAMPLE, "-o", "x", "--need", "5arcmin for 270"), "unit"),

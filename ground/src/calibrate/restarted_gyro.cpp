@@ -78,19 +78,29 @@ Vector3d median_momentum(const std::vector<MomentaAtFix>& all, std::size_t from,
 
 constexpr std::size_t kFixesBeside = 20;  ///< to each side of a jump
 
-/// Whether a momentum that turns by this angle before a fix is not back within an hour, of which ten minutes have to be
-/// there.
-bool stays_turned(const std::vector<MomentaAtFix>& all, std::size_t fix, int gyro, double turned_rad) {
+/// Whether a momentum that turns by this angle before a fix is not where it was before for an hour after, nor where it
+/// is after for an hour before; ten minutes of each have to be there.
+bool turns_for_good(const std::vector<MomentaAtFix>& all, std::size_t fix, int gyro, double turned_rad) {
   constexpr Duration kLongest = std::chrono::hours(1);
   constexpr Duration kLeast = std::chrono::minutes(10);
   constexpr std::size_t kOneIn = 100;  // may be an outlier
-  const Vector3d before = median_momentum(all, fix - kFixesBeside, fix, gyro);
-  std::size_t later = fix;
-  std::size_t back = 0;
-  for (; later < all.size() && all[later].t - all[fix].t < kLongest; ++later) {
-    back += angle_rad(all[later].h_in[gyro], before) < turned_rad / 2 ? 1 : 0;
+  const auto is_never = [&](const Vector3d& at, std::size_t from, std::size_t until) {
+    std::size_t there = 0;
+    for (std::size_t i = from; i < until; ++i) {
+      there += angle_rad(all[i].h_in[gyro], at) < turned_rad / 2 ? 1 : 0;
+    }
+    return all[until - 1].t - all[from].t >= kLeast && kOneIn * there <= until - from;
+  };
+  std::size_t from = fix;
+  while (from > 0 && all[fix].t - all[from - 1].t < kLongest) {
+    --from;
   }
-  return all[later - 1].t - all[fix].t >= kLeast && kOneIn * back <= later - fix;
+  std::size_t until = fix;
+  while (until < all.size() && all[until].t - all[fix].t < kLongest) {
+    ++until;
+  }
+  return is_never(median_momentum(all, fix - kFixesBeside, fix, gyro), fix, until) &&
+         is_never(median_momentum(all, fix, fix + kFixesBeside, gyro), from, fix);
 }
 
 struct Jump {
@@ -128,7 +138,7 @@ void refuse_restarted_gyro(const Pass& pass) {
     const double turn_rad = all[i - 1].q_in_c.angularDistance(all[i].q_in_c);
     const double limit_rad = kLeastJump_rad + 2 * alignment_rad * std::min(1.0, turn_rad);
     const auto jump = jump_before(all, i, pass.gyro.gyros, limit_rad);
-    if (jump && stays_turned(all, i, jump->gyro, jump->turned_rad)) {
+    if (jump && turns_for_good(all, i, jump->gyro, jump->turned_rad)) {
       const double last_s = to_seconds(all[i - 1].t - pass.settings.epoch);
       const double first_s = to_seconds(all[i].t - pass.settings.epoch);
       throw SetupError(

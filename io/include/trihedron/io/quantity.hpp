@@ -22,17 +22,18 @@ namespace trihedron::io {
 [[nodiscard]] double parse_angle_rad(std::string_view text);
 /// `0.1deg/h`, `1e-6rad/s` and the like; gives rad/s.
 [[nodiscard]] double parse_rate_rad_s(std::string_view text);
-// The same within a range; the text of the UsageError has the range in the unit that was given, and the reason for it.
+/// Within a range; the UsageOutsideRange tells the range in the unit that was given, and the reason for it.
 [[nodiscard]] Duration parse_duration(std::string_view text, const Range& range_s);
-[[nodiscard]] Duration parse_signed_duration(std::string_view text, const Range& range_s);
-[[nodiscard]] double parse_angle_rad(std::string_view text, const Range& range);
-[[nodiscard]] double parse_rate_rad_s(std::string_view text, const Range& range);
+[[nodiscard]] Duration parse_signed_duration(std::string_view text, const Range& range_s);  ///< Same.
+[[nodiscard]] double parse_angle_rad(std::string_view text, const Range& range);            ///< Same.
+[[nodiscard]] double parse_rate_rad_s(std::string_view text, const Range& range);           ///< Same.
 /// Angle random walk, `0.001deg/h^0.5`, `1e-8rad/s^0.5`; gives rad/s^0.5.
 [[nodiscard]] double parse_random_walk_rad_sqrt_s(std::string_view text);
 /// `5arcmin for 270min`: an attitude error and how long it must not be exceeded.
 [[nodiscard]] Need parse_need(std::string_view text);
 /// A pure number, finite.
 [[nodiscard]] double parse_number(std::string_view text);
+/// Within a range; throws UsageOutsideRange.
 [[nodiscard]] double parse_number(std::string_view text, const Range& range);
 
 /// As `5arcmin for 270min`.
