@@ -205,8 +205,9 @@ def test_an_output_that_cannot_be_written_is_refused_before_the_work(given, tmp_
 
 
 def test_a_simulation_refuses_its_output_before_the_work(tmp_path):
-    (tmp_path / "impossible.toml").write_text(SCENARIO.format(1) + '[attitude]\nreference = "recorded"\n')
-    refused(run("simulate", tmp_path / "impossible.toml", "-o", tmp_path / "pass"), INPUT_REFUSED, "impossible.toml")
+    overlapping = '[attitude]\nslews = [{begin = "10s", roll = "30deg"}, {begin = "11s"}]\n'  # which only the simulation finds
+    (tmp_path / "impossible.toml").write_text(SCENARIO.format(1) + overlapping)
+    refused(run("simulate", tmp_path / "impossible.toml", "-o", tmp_path / "pass"), INPUT_REFUSED, "impossible.toml", "raise max_slew_rate")
     (tmp_path / "file").write_text("mine")
     refused(run("simulate", tmp_path / "impossible.toml", "-o", tmp_path / "none" / "p.nc"), MACHINE_FAILED, tmp_path / "none" / "p.nc")
     refused(run("simulate", tmp_path / "impossible.toml", "-o", tmp_path / "file"), WRONG_USAGE, tmp_path / "file", "give the name of a directory")

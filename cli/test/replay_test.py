@@ -140,7 +140,7 @@ def test_an_application_that_has_failed_is_not_to_be_used(tmp_path):
     result = run("replay", tmp_path / "pass", *options)
     assert result.returncode == DO_NOT_USE
     assert "DO NOT USE" in result.stdout and "application-failed" in result.stdout
-    assert re.search(rf"^Not taken   {told['samples_not_taken']} samples, {told['fixes_not_taken']} fixes$", result.stdout, re.MULTILINE)
+    assert re.search(rf"^Not taken   {told['samples_not_taken']} samples, {told['fixes_not_taken']} fixes: it had failed$", result.stdout, re.MULTILINE)
 
 
 def test_data_on_standard_output_leave_the_lines_to_standard_error(minutes, tmp_path):
