@@ -30,16 +30,20 @@ inline void count_up(std::uint32_t& counter) { counter += counter < UINT32_MAX ?
   return Answer::kNotPositive;
 }
 
+inline constexpr Duration kLongestTime = std::chrono::hours(24 * 365);
+
 /// What the estimator does not check: times with which no sum can overflow, and numbers that are finite.
-[[nodiscard]] inline bool is_usable(const CalibrationSetup& setup, const ApplicationPolicy& policy) {
-  const Duration zero{};
-  constexpr Duration kLongest = std::chrono::hours(24 * 365);
+[[nodiscard]] inline bool is_usable(const CalibrationSetup& setup) {
   constexpr Duration kSlowest = std::chrono::minutes(1);
   const bool never_by_angles = setup.angles_after == Duration::max();
-  const auto is_time = [&](Duration its) { return its > zero && its <= kLongest; };
-  return setup.gyro_period > zero && setup.gyro_period <= kSlowest && setup.angles_after >= zero &&
-         (setup.angles_after <= kLongest || never_by_angles) && std::isfinite(setup.gate_nis) &&
-         policy.correction_interval >= zero && policy.required_error_rad > 0 &&
+  return setup.gyro_period > Duration{} && setup.gyro_period <= kSlowest && setup.angles_after >= Duration{} &&
+         (setup.angles_after <= kLongestTime || never_by_angles) && std::isfinite(setup.gate_nis);
+}
+
+/// The same of what the estimator does not know.
+[[nodiscard]] inline bool is_usable(const ApplicationPolicy& policy) {
+  const auto is_time = [](Duration its) { return its > Duration{} && its <= kLongestTime; };
+  return policy.correction_interval >= Duration{} && policy.required_error_rad > 0 &&
          std::isfinite(policy.required_error_rad) && is_time(policy.required_interval) && is_time(policy.window) &&
          is_time(policy.star_tracker_timeout) && is_time(policy.failed_after) && policy.aligned_after_fixes > 0 &&
          policy.spread_over >= 0;
@@ -56,7 +60,7 @@ Answer Application<Estimator>::load(const CalibrationSetup& setup, const Gyros& 
   if (!next_mode(mode_, Event::kLoadParameters)) {
     return answer(Answer::kNotInThisMode);
   }
-  if (!detail::is_usable(setup, policy)) {
+  if (!detail::is_usable(setup) || !detail::is_usable(policy)) {
     return answer(Answer::kNotPositive);
   }
   const CorrectionPolicy corrections{

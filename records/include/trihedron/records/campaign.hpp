@@ -16,7 +16,8 @@ namespace trihedron {
 /// Keys that begin so are settings of the calibration; all others are of the scenario.
 inline constexpr std::string_view kSettingKeys = "calibration.";
 
-/// How a value of the scenario, or a setting, is drawn. `a` and `b`, `least` and `most` are in the unit of CampaignInput.
+/// How a value of the scenario, or a setting, is drawn. `a` and `b`, `least` and `most` are in the unit of
+/// CampaignInput.
 struct Distribution {
   enum class Kind : std::uint8_t {
     kUniform,     ///< from a to b
