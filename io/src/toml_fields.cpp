@@ -32,7 +32,7 @@ std::string name_within(const std::string& name, std::string_view key) {
   if (name.starts_with("[[")) {
     return fmt::format("\"{}\" of {}", key, name);
   }
-  return name.starts_with("[") ? fmt::format("{}.{}]", name.substr(0, name.size() - 1), key) : fmt::format("[{}]", key);
+  return name.starts_with('[') ? fmt::format("{}.{}]", name.substr(0, name.size() - 1), key) : fmt::format("[{}]", key);
 }
 
 /// The cure where a key that is not known here is one of a table in it; empty where it is none. `name`: of the table

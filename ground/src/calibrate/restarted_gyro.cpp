@@ -108,19 +108,32 @@ struct Jump {
   double turned_rad = 0;
 };
 
-/// Of one momentum before a fix, by more than the limit, while another turns by less than half of it.
+/// Of one momentum before a fix, by more than the limit, while another turns by less than half of it and the angle
+/// between these two, which no attitude and no stamp changes, is another.
 std::optional<Jump> jump_before(const std::vector<MomentaAtFix>& all, std::size_t fix, int gyros, double limit_rad) {
-  Jump jump;
-  bool another_stays = false;
+  bool seems_to = false;
   for (int k = 0; k < gyros; ++k) {
-    const bool seems_to = angle_rad(all[fix - 1].h_in[k], all[fix].h_in[k]) > limit_rad;
-    const double turned_rad = seems_to ? angle_rad(median_momentum(all, fix - kFixesBeside, fix, k),
-                                                   median_momentum(all, fix, fix + kFixesBeside, k))
-                                       : 0;
-    another_stays = another_stays || turned_rad < limit_rad / 2;
-    jump = turned_rad > jump.turned_rad ? Jump{k, turned_rad} : jump;
+    seems_to = seems_to || angle_rad(all[fix - 1].h_in[k], all[fix].h_in[k]) > limit_rad;
   }
-  return another_stays && jump.turned_rad > limit_rad ? std::optional(jump) : std::nullopt;
+  if (!seems_to) {
+    return std::nullopt;
+  }
+  Jump jump;
+  PerGyro<double> turned_rad{};
+  PerGyro<Vector3d> before;
+  PerGyro<Vector3d> after;
+  for (int k = 0; k < gyros; ++k) {
+    before[k] = median_momentum(all, fix - kFixesBeside, fix, k);
+    after[k] = median_momentum(all, fix, fix + kFixesBeside, k);
+    turned_rad[k] = angle_rad(before[k], after[k]);
+    jump = turned_rad[k] > jump.turned_rad ? Jump{k, turned_rad[k]} : jump;
+  }
+  bool is_alone = false;
+  for (int k = 0; k < gyros; ++k) {
+    const double opened_rad = angle_rad(after[jump.gyro], after[k]) - angle_rad(before[jump.gyro], before[k]);
+    is_alone = is_alone || (turned_rad[k] < limit_rad / 2 && std::abs(opened_rad) > limit_rad / 4);
+  }
+  return is_alone && jump.turned_rad > limit_rad ? std::optional(jump) : std::nullopt;
 }
 
 }  // namespace

@@ -66,6 +66,12 @@ TEST(RestartedGyro, IsNoneWhereTheReadingsComeBackOrTheStarTrackerIsOff) {
   refuse_restarted_gyro(pass);
   pass.star_tracker = {};
   refuse_restarted_gyro(pass);
+  // Stamps that are off turn both, one of which may lie along the axis of the turn.
+  pass = two_hours().pass;
+  for (std::size_t i = pass.gyro.size() / 2; i < pass.gyro.size(); ++i) {
+    pass.gyro.t[i] -= minutes(10);
+  }
+  refuse_restarted_gyro(pass);
 }
 
 }  // namespace
