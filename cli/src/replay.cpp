@@ -8,6 +8,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <variant>
 #include <vector>
@@ -290,7 +291,7 @@ nlohmann::ordered_json result_json(const ReplayResult& result) {
   return json;
 }
 
-std::string why_not_taken(const ground::NotTaken& not_taken) {
+std::string_view why_not_taken(const ground::NotTaken& not_taken) {
   if (not_taken.samples > 0) {
     return ": it had failed";
   }
