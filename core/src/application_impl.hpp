@@ -445,36 +445,36 @@ std::optional<AttitudeSolution> Application<Estimator>::attitude() const {
 }
 
 template <class Estimator>
-std::optional<CalibrationRecord> Application<Estimator>::calibration() const {
+bool Application<Estimator>::get(CalibrationRecord& record) const {
   const Estimator& estimator = on_board_.estimator();
   const Layout& layout = estimator.layout();
   constexpr int kMost = Estimator::Gyros::capacity();
   static_assert(kMost <= TRIHEDRON_MAX_GYROS && Estimator::kMaxStates == Layout{.gyros = kMost}.size(),
                 "the record has room for eq. (1) alone");
   if (!estimator.started()) {
-    return std::nullopt;
+    return false;
   }
-  std::optional<CalibrationRecord> record(std::in_place);
-  record->time_ns = fix_t_.time_since_epoch().count();
-  record->version = TRIHEDRON_TABLES_VERSION;
-  record->gyros = static_cast<std::uint32_t>(layout.gyros);
+  record = {};
+  record.time_ns = fix_t_.time_since_epoch().count();
+  record.version = TRIHEDRON_TABLES_VERSION;
+  record.gyros = static_cast<std::uint32_t>(layout.gyros);
   for (int k = 0; k < layout.gyros; ++k) {
     const auto& gyro = estimator.gyros()[k];
-    Eigen::Map<Eigen::Matrix<double, Layout::kEq1, 1>>(record->drift_rad_s[k]) =
+    Eigen::Map<Eigen::Matrix<double, Layout::kEq1, 1>>(record.drift_rad_s[k]) =
         gyro.drift_rad_s.template head<Layout::kEq1>();
-    Eigen::Map<Eigen::Vector3d>(record->alignment_rad[k]) = Rot<C, C>::assume(gyro.C_c_b).log().raw();
+    Eigen::Map<Eigen::Vector3d>(record.alignment_rad[k]) = Rot<C, C>::assume(gyro.C_c_b).log().raw();
   }
   constexpr int kStates = Estimator::kMaxStates;
   Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor, kStates, kStates> root(
       layout.behind_parameters(), estimator.states());
   estimator.error_root(rows_of(root));
-  double* element = record->covariance;
+  double* element = record.covariance;
   for (int row = layout.drift(0); row < layout.behind_parameters(); ++row) {
     for (int column = layout.drift(0); column <= row; ++column) {
       *element++ = root.row(row).dot(root.row(column));
     }
   }
-  return record;
+  return true;
 }
 
 template <class Estimator>

@@ -158,11 +158,7 @@ std::uint32_t trihedron_get_attitude(const trihedron_application* its, trihedron
 }
 
 std::uint32_t trihedron_get_calibration(const trihedron_application* its, trihedron_calibration* calibration) {
-  return with(its, [&](const auto& application) -> std::uint32_t {
-    const auto found = application.calibration();
-    *calibration = found.value_or(*calibration);
-    return found ? 1 : 0;
-  });
+  return with(its, [&](const auto& application) -> std::uint32_t { return application.get(*calibration) ? 1 : 0; });
 }
 
 void trihedron_get_housekeeping(const trihedron_application* its, trihedron_housekeeping* housekeeping) {

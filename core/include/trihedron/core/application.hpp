@@ -67,8 +67,8 @@ class Application {
   [[nodiscard]] Housekeeping housekeeping() const;
   /// The attitude at the latest sample; nothing before the first fix, and while there is none.
   [[nodiscard]] std::optional<AttitudeSolution> attitude() const;
-  /// What the filter has found; nothing before the first fix.
-  [[nodiscard]] std::optional<CalibrationRecord> calibration() const;
+  /// What the filter has found. False before the first fix, and nothing is written.
+  [[nodiscard]] bool get(CalibrationRecord& record) const;
   [[nodiscard]] const OnBoard<Estimator>& on_board() const { return on_board_; }
   [[nodiscard]] const Forecast<Estimator>& forecast() const { return forecast_; }
 
