@@ -11,8 +11,8 @@
 #include <optional>
 #include <vector>
 
+#include "clocks/turns.hpp"
 #include "model/scatter.hpp"
-#include "trihedron/core/frames.hpp"
 #include "trihedron/core/per_gyro.hpp"
 #include "trihedron/ground/model/setup_error.hpp"
 
@@ -30,21 +30,9 @@ struct MomentaAtFix {
 
 double angle_rad(const Vector3d& a, const Vector3d& b) { return std::atan2(a.cross(b).norm(), a.dot(b)); }
 
-std::optional<PerGyro<Vector3d>> momenta(const Pass& pass, const Eigen::Quaterniond& q_in_c, std::size_t sample) {
-  PerGyro<Vector3d> h_in;
-  for (int k = 0; k < pass.gyro.gyros; ++k) {
-    const Vector3d h_b = pass.gyro.direction(sample, k);
-    if (!nearly_unit(h_b.norm())) {
-      return std::nullopt;
-    }
-    const Vector3d& rotation = pass.settings.gyros[static_cast<std::size_t>(k)].alignment_rotation_vector_rad;
-    h_in[k] = q_in_c * (Rot<C, B<1>>::exp(Vec<C>::assume(rotation)).raw() * h_b);
-  }
-  return h_in;
-}
-
 std::vector<MomentaAtFix> momenta_at_fixes(const Pass& pass) {
   const StarTrackerTelemetry& fixes = pass.star_tracker;
+  const GyroReadings readings(pass);
   std::vector<MomentaAtFix> all;
   std::size_t after = 0;
   for (std::size_t i = 0; i < fixes.size(); ++i) {
@@ -56,8 +44,11 @@ std::vector<MomentaAtFix> momenta_at_fixes(const Pass& pass) {
       continue;
     }
     const Eigen::Quaterniond q_in_c = fixes.q_in_c[i].normalized();
-    if (const auto h_in = momenta(pass, q_in_c, after)) {
-      all.push_back({fixes.t[i], q_in_c, *h_in});
+    if (const auto h_c = readings.sample(after)) {
+      MomentaAtFix& its = all.emplace_back(MomentaAtFix{fixes.t[i], q_in_c, {}});
+      for (int k = 0; k < pass.gyro.gyros; ++k) {
+        its.h_in[k] = q_in_c * (*h_c)[k];
+      }
     }
   }
   return all;

@@ -37,6 +37,15 @@ SetupError error_of(SetupFault fault) {
   return {"there are more states than there is room for", "use fewer gyros, or a smaller drift model"};
 }
 
+template <class OnBoard>
+StepReport give(OnBoard& on_board, const GyroSample& sample) {
+  return on_board.on_gyro(sample);
+}
+template <class OnBoard>
+StepReport give(OnBoard& on_board, const StarFix& fix) {
+  return on_board.on_fix(fix);
+}
+
 /// Of the fixes: when the rate of the orbit is told first, and last, each time after twice the time before.
 constexpr Duration kFirstLookAtOrbit = std::chrono::minutes(20);
 constexpr Duration kLastLookAtOrbit = std::chrono::minutes(320);
@@ -102,14 +111,14 @@ std::span<const StepReport> Pipeline::feed(const GyroSample& sample) {
   if (orbit_) {
     learn_orbit(sample);
   }
-  return report_all([&](auto& its) { return its.on_gyro(sample); });
+  return report_all([&](auto& on_board) { return give(on_board, sample); });
 }
 
 std::span<const StepReport> Pipeline::feed(const StarFix& fix) {
   if (orbit_) {
     learn_orbit(fix);
   }
-  return report_all([&](auto& its) { return its.on_fix(fix); });
+  return report_all([&](auto& on_board) { return give(on_board, fix); });
 }
 
 /// Before the event is dealt with: that the rate is known better by now, and then what came before is flown again.
@@ -126,11 +135,7 @@ void Pipeline::learn_orbit(const Event& event) {
       for (const auto& before : orbit_->events) {
         std::visit(
             [&](const auto& its) {
-              if constexpr (std::is_same_v<std::decay_t<decltype(its)>, GyroSample>) {
-                static_cast<void>(report_all([&](auto& on_board) { return on_board.on_gyro(its); }));
-              } else {
-                static_cast<void>(report_all([&](auto& on_board) { return on_board.on_fix(its); }));
-              }
+              static_cast<void>(report_all([&](auto& on_board) { return give(on_board, its); }));
             },
             before);
       }
