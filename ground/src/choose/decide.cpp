@@ -105,10 +105,10 @@ CalibrationOptions as_before(CalibrationOptions options, const Calibration& prio
       choice = on ? Choice::kOn : Choice::kOff;
     }
   }
+  // Amplitudes of drift hold for the rate that they were found with. Of an error of the star tracker none are kept, and
+  // the pass tells the rate better.
   if (const auto& drift = prior.gyros.at(0).orbital_drift) {
     options.orbital_rate_rad_s = drift->rate_rad_s;
-  } else if (prior.orbital_rate_rad_s) {
-    options.orbital_rate_rad_s = prior.orbital_rate_rad_s;
   }
   for (std::size_t k = 0; k < prior.gyros.size(); ++k) {
     if (const auto& drift = prior.gyros[k].polhode) {
@@ -1150,7 +1150,8 @@ Decision decide(const Pass& pass, const CalibrationOptions& asked_for, const Pro
                      "give the telemetry of all of them, or the settings of those that there are");
   }
   if (!asked.orbital_rate_rad_s) {
-    asked.orbital_rate_rad_s = orbital_rate_rad_s(pass.star_tracker);
+    const std::optional<double> shown = shown_orbital_rate_rad_s(pass.star_tracker);
+    asked.orbital_rate_rad_s = shown ? *shown : first_orbital_rate_rad_s(pass.settings);
   }
   const bool change_is_open = asked.further_states[FurtherState::kCoefficientChange] == Choice::kAuto;
   settle_by_estimator(asked);

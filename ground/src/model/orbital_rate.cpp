@@ -1,7 +1,10 @@
 #include "model/orbital_rate.hpp"
 
+#include <Eigen/Core>
+#include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <optional>
 #include <vector>
 
 #include "model/scatter.hpp"
@@ -13,10 +16,20 @@ namespace {
 /// Slower than a geostationary orbit, 7.3e-5 rad/s.
 constexpr double kSlowest_rad_s = 6e-5;
 
-/// Median of how fast the body turns over a minute, rad/s; 0 where there are no fixes for it.
-double usual_rate_rad_s(const StarTrackerTelemetry& tracker) {
+/// Of an orbit as low as the ground, the root of GM/R³.
+constexpr double kFastest_rad_s = 1.24e-3;
+
+/// How the body usually turns in `in`.
+struct UsualTurn {
+  Eigen::Vector3d rate_rad_s;
+  double sigma_rad_s;  ///< by the scatter over the pass
+};
+
+/// Median of the angular velocity over a minute, component by component: slews there and back lie to both sides of it.
+/// Nothing where there are no fixes for it.
+std::optional<UsualTurn> usual_turn(const StarTrackerTelemetry& tracker) {
   constexpr double kApart_s = 60;
-  std::vector<double> rates;
+  std::vector<Eigen::Vector3d> rates;
   std::size_t j = 0;
   for (std::size_t i = 0; i < tracker.size(); ++i) {
     while (j < tracker.size() && to_seconds(tracker.t[j] - tracker.t[i]) < kApart_s) {
@@ -25,27 +38,53 @@ double usual_rate_rad_s(const StarTrackerTelemetry& tracker) {
     if (j == tracker.size()) {
       break;
     }
-    const double rate = tracker.q_in_c[i].angularDistance(tracker.q_in_c[j]) / to_seconds(tracker.t[j] - tracker.t[i]);
-    if (std::isfinite(rate)) {
+    const auto before = Rot<In, C>::assume(tracker.q_in_c[i].normalized());
+    const auto after = Rot<In, C>::assume(tracker.q_in_c[j].normalized());
+    const Eigen::Vector3d rate =
+        (after * before.inverse()).log().raw() / to_seconds(tracker.t[j] - tracker.t[i]);
+    if (rate.allFinite()) {
       rates.push_back(rate);
     }
   }
-  return rates.empty() ? 0 : median_of(rates);
+  if (rates.empty()) {
+    return std::nullopt;
+  }
+  UsualTurn usual{};
+  std::vector<double> sizes(rates.size());
+  for (int axis = 0; axis < 3; ++axis) {
+    std::ranges::transform(rates, sizes.begin(), [axis](const Eigen::Vector3d& rate) { return rate(axis); });
+    usual.rate_rad_s(axis) = median_of(sizes);
+  }
+  std::ranges::transform(rates, sizes.begin(),
+                         [&](const Eigen::Vector3d& rate) { return (rate - usual.rate_rad_s).norm(); });
+  const double minutes = to_seconds(tracker.t.back() - tracker.t.front()) / kApart_s;
+  usual.sigma_rad_s = median_of(sizes) / std::sqrt(std::max(minutes, 1.0));
+  return usual;
+}
+
+bool is_of_an_orbit(double rate_rad_s) {
+  return std::abs(rate_rad_s) > kSlowest_rad_s && std::abs(rate_rad_s) < kFastest_rad_s;
 }
 
 }  // namespace
 
-double orbital_rate_so_far_rad_s(const StarTrackerTelemetry& tracker) {
-  constexpr double kLong_s = 2 * 3600;  // of it the mean over half is told
-  if (tracker.size() > 0 && to_seconds(tracker.t.back() - tracker.t.front()) > kLong_s) {
-    return orbital_rate_rad_s(tracker);
+std::optional<double> orbital_rate_so_far_rad_s(const StarTrackerTelemetry& tracker) {
+  constexpr double kWellEnough = 0.03;  // over a short time the phase is off by little
+  if (tracker.size() > 0 && tracker.t.back() - tracker.t.front() > kLongForOrbitalRate) {
+    return shown_orbital_rate_rad_s(tracker);
   }
-  const double usual_rad_s = usual_rate_rad_s(tracker);
-  return usual_rad_s > kSlowest_rad_s ? usual_rad_s : kLowOrbit_rad_s;
+  const std::optional<UsualTurn> usual = usual_turn(tracker);
+  const double rate_rad_s = usual ? usual->rate_rad_s.norm() : 0;
+  const bool is_known = is_of_an_orbit(rate_rad_s) && usual->sigma_rad_s < kWellEnough * rate_rad_s;
+  return is_known ? std::optional(rate_rad_s) : std::nullopt;
 }
 
 double orbital_rate_rad_s(const StarTrackerTelemetry& tracker) {
-  constexpr double kFastest_rad_s = 0.02;  // beyond, an outlier
+  return shown_orbital_rate_rad_s(tracker).value_or(kLowOrbit_rad_s);
+}
+
+std::optional<double> shown_orbital_rate_rad_s(const StarTrackerTelemetry& tracker) {
+  constexpr double kFastestSlew_rad_s = 0.02;  // beyond, an outlier
   // The mean angular velocity in `in`: a slew and the slew back nearly cancel.
   Eigen::Vector3d turned = Eigen::Vector3d::Zero();
   double time_s = 0;
@@ -54,7 +93,7 @@ double orbital_rate_rad_s(const StarTrackerTelemetry& tracker) {
     const auto before = Rot<In, C>::assume(tracker.q_in_c[i - 1].normalized());
     const auto after = Rot<In, C>::assume(tracker.q_in_c[i].normalized());
     const Eigen::Vector3d turn = (after * before.inverse()).log().raw();
-    if (step_s < 60 && turn.norm() < kFastest_rad_s * step_s) {
+    if (step_s < 60 && turn.norm() < kFastestSlew_rad_s * step_s) {
       turned += turn;
       time_s += step_s;
     }
@@ -62,9 +101,10 @@ double orbital_rate_rad_s(const StarTrackerTelemetry& tracker) {
   const double rough_rad_s = time_s > 0 ? turned.norm() / time_s : 0;
   // Slower orbits are told from an attitude that is fixed in space between slews by what it does at most times.
   constexpr double kSteady = 0.1;
-  const bool is_steady = std::abs(usual_rate_rad_s(tracker) - rough_rad_s) < kSteady * rough_rad_s;
+  const std::optional<UsualTurn> usual = usual_turn(tracker);
+  const bool is_steady = usual && (usual->rate_rad_s - turned / time_s).norm() < kSteady * rough_rad_s;
   if (!(rough_rad_s > 0.5 * kLowOrbit_rad_s || (is_steady && rough_rad_s > kSlowest_rad_s))) {
-    return kLowOrbit_rad_s;
+    return std::nullopt;
   }
   // Refined, and robust by the median against outliers and slews: the turn about that axis over half of the pass.
   const Eigen::Vector3d axis = turned.normalized();
@@ -80,10 +120,9 @@ double orbital_rate_rad_s(const StarTrackerTelemetry& tracker) {
       rates.push_back(rate);
     }
   }
-  if (rates.empty()) {
-    return rough_rad_s;
-  }
-  return median_of(rates);
+  // What turns faster than any orbit does spins.
+  const double rate_rad_s = rates.empty() ? rough_rad_s : median_of(rates);
+  return is_of_an_orbit(rate_rad_s) ? std::optional(rate_rad_s) : std::nullopt;
 }
 
 }  // namespace trihedron::ground

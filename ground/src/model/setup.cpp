@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <optional>
 
+#include "model/orbital_rate.hpp"
 #include "model/prior.hpp"
 #include "trihedron/ground/model/setup_error.hpp"
 #include "trihedron/records/drift_models.hpp"
@@ -32,6 +33,11 @@ double sigma_before(const std::optional<Calibration>& earlier, FurtherState stat
 }
 
 }  // namespace
+
+double first_orbital_rate_rad_s(const PassSettings& settings) {
+  const std::optional<double> before = settings.prior ? settings.prior->orbital_rate_rad_s : std::nullopt;
+  return before.value_or(kLowOrbit_rad_s);
+}
 
 Layout layout_of(const PassSettings& settings, const CalibrationOptions& options) {
   if (!options.drift_model) {
@@ -121,7 +127,7 @@ CalibrationSetup setup_of(const PassSettings& settings, const CalibrationOptions
   if (settings.duration > Duration::zero()) {
     setup.change.duration_s = to_seconds(settings.duration);
   }
-  setup.orbital_rate_rad_s = options.orbital_rate_rad_s.value_or(setup.orbital_rate_rad_s);
+  setup.orbital_rate_rad_s = options.orbital_rate_rad_s.value_or(first_orbital_rate_rad_s(settings));
   setup.orbital_phase_zero = settings.epoch;
   setup.polhodes = states.polhodes;
 

@@ -20,6 +20,9 @@ namespace trihedron::ground {
 /// Noise, priors of the further states, gates; the layout is layout_of().
 [[nodiscard]] CalibrationSetup setup_of(const PassSettings& settings, const CalibrationOptions& options);
 
+/// The rate of the orbit before the pass tells it: that of an earlier calibration, else that of a low orbit.
+[[nodiscard]] double first_orbital_rate_rad_s(const PassSettings& settings);
+
 [[nodiscard]] CorrectionPolicy policy_of(const CorrectionOptions& options);
 
 /// The components of the further states that a layout has and calibration.json lists, in its order.

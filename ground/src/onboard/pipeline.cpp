@@ -3,7 +3,7 @@
 #include <Eigen/Cholesky>
 #include <chrono>
 #include <cmath>
-#include <type_traits>
+#include <optional>
 #include <utility>
 #include <variant>
 
@@ -51,6 +51,8 @@ constexpr Duration kFirstLookAtOrbit = std::chrono::minutes(20);
 constexpr Duration kLastLookAtOrbit = std::chrono::minutes(320);
 /// A hundredth of an error at orbital period.
 constexpr double kPhaseThatMatters_rad = 0.01;
+/// More than samples and fixes until the last look; with stamps that stand still it does not come.
+constexpr std::size_t kMostEvents = 500'000;
 
 }  // namespace
 
@@ -109,50 +111,91 @@ Pipeline::~Pipeline() = default;
 
 std::span<const StepReport> Pipeline::feed(const GyroSample& sample) {
   if (orbit_) {
-    learn_orbit(sample);
+    look_at_orbit();
   }
-  return report_all([&](auto& on_board) { return give(on_board, sample); });
+  const std::span<const StepReport> reports = report_all([&](auto& on_board) { return give(on_board, sample); });
+  if (orbit_) {
+    keep(sample, reports.front().sample);
+  }
+  return reports;
 }
 
 std::span<const StepReport> Pipeline::feed(const StarFix& fix) {
   if (orbit_) {
-    learn_orbit(fix);
+    look_at_orbit();
+  }
+  if (orbit_) {
+    keep(fix);
   }
   return report_all([&](auto& on_board) { return give(on_board, fix); });
 }
 
-/// Before the event is dealt with: that the rate is known better by now, and then what came before is flown again.
-template <class Event>
-void Pipeline::learn_orbit(const Event& event) {
-  StarTrackerTelemetry& fixes = orbit_->fixes;
-  if (fixes.size() > 0 && event.t - fixes.t.front() > orbit_->next) {
-    const double so_far_rad_s = orbital_rate_so_far_rad_s(fixes);
-    const double off_rad =
-        (so_far_rad_s - options_.orbital_rate_rad_s.value_or(kLowOrbit_rad_s)) * to_seconds(orbit_->next);
-    if (std::abs(off_rad) > kPhaseThatMatters_rad) {
-      options_.orbital_rate_rad_s = so_far_rad_s;
-      set_up();
-      for (const auto& before : orbit_->events) {
-        std::visit(
-            [&](const auto& its) {
-              static_cast<void>(report_all([&](auto& on_board) { return give(on_board, its); }));
-            },
-            before);
-      }
+/// Before an event is dealt with: that the rate is known better by now, and then what came before is flown again.
+void Pipeline::look_at_orbit() {
+  const StarTrackerTelemetry& fixes = orbit_->fixes;
+  const Duration passed = fixes.size() > 0 ? fixes.t.back() - fixes.t.front() : Duration::zero();
+  const bool is_long = orbit_->latest && *orbit_->latest - *orbit_->first > kLastLookAtOrbit;
+  const bool is_last = is_long || orbit_->events.size() >= kMostEvents;
+  if (passed <= orbit_->next && !is_last) {
+    return;
+  }
+  const std::optional<double> so_far_rad_s = orbital_rate_so_far_rad_s(fixes);
+  if (so_far_rad_s && is_another_rate(*so_far_rad_s, passed)) {
+    options_.orbital_rate_rad_s = so_far_rad_s;
+    set_up();
+    for (const auto& before : orbit_->events) {
+      std::visit(
+          [&](const auto& its) {
+            static_cast<void>(report_all([&](auto& on_board) { return give(on_board, its); }));
+          },
+          before);
     }
+  }
+  while (orbit_->next < passed) {
     orbit_->next *= 2;
-    if (orbit_->next > kLastLookAtOrbit) {
-      orbit_.reset();
-      return;
-    }
   }
-  orbit_->events.emplace_back(event);
-  if constexpr (std::is_same_v<Event, StarFix>) {
-    if (event.head == 0 && nearly_unit(event.q_in_c.norm()) && (fixes.t.empty() || event.t > fixes.t.back())) {
-      fixes.t.push_back(event.t);
-      fixes.q_in_c.push_back(event.q_in_c.normalized());
-    }
+  if (is_last) {
+    orbit_.reset();
   }
+}
+
+/// Whether it matters over that time. What an earlier calibration found is better than what a short time tells, but for
+/// that of another orbit.
+bool Pipeline::is_another_rate(double rate_rad_s, Duration passed) const {
+  constexpr double kAnotherOrbit = 0.03;
+  const double before_rad_s = setup_of(settings_, options_).orbital_rate_rad_s;
+  const bool is_of_calibration =
+      !options_.orbital_rate_rad_s && settings_.prior && settings_.prior->orbital_rate_rad_s.has_value();
+  const double off_rad_s = std::abs(rate_rad_s - before_rad_s);
+  return off_rad_s * to_seconds(passed) > kPhaseThatMatters_rad &&
+         (!is_of_calibration || passed > kLongForOrbitalRate || off_rad_s > kAnotherOrbit * std::abs(before_rad_s));
+}
+
+void Pipeline::keep(const GyroSample& sample, SampleStatus status) {
+  if (status == SampleStatus::kThinned) {
+    return;
+  }
+  // Times before and after have nothing in common.
+  if (status == SampleStatus::kUsedAfterClockSetBack) {
+    orbit_.reset();
+    return;
+  }
+  if (status != SampleStatus::kRejectedOutOfOrder) {
+    orbit_->first = orbit_->first.value_or(sample.t);
+    orbit_->latest = sample.t;
+  }
+  orbit_->events.emplace_back(sample);
+}
+
+void Pipeline::keep(const StarFix& fix) {
+  constexpr Duration kNear = std::chrono::minutes(1);
+  StarTrackerTelemetry& fixes = orbit_->fixes;
+  if (orbit_->latest && std::chrono::abs(fix.t - *orbit_->latest) < kNear && fix.head == 0 &&
+      nearly_unit(fix.q_in_c.norm()) && (fixes.t.empty() || fix.t > fixes.t.back())) {
+    fixes.t.push_back(fix.t);
+    fixes.q_in_c.push_back(fix.q_in_c.normalized());
+  }
+  orbit_->events.emplace_back(fix);
 }
 
 // A step deals with one fix at most: goes on while another is due.

@@ -1,15 +1,20 @@
 // navigate() is what flies: it knows nothing of what comes later in the pass.
 
 #include <gtest/gtest.h>
+#include <malloc.h>
 
 #include <chrono>
 #include <cmath>
 #include <cstring>
 #include <limits>
+#include <utility>
+#include <variant>
 #include <vector>
 
+#include "choose/decide.hpp"
 #include "passes.hpp"
 #include "trihedron/ground/calibrate/calibrate.hpp"
+#include "trihedron/ground/onboard/pipeline.hpp"
 #include "trihedron/ground/onboard/recorder.hpp"
 #include "trihedron/records/run.hpp"
 
@@ -179,17 +184,21 @@ TEST(Navigate, DoesNotTakeWhatOnlyTheWholePassShows) {
   EXPECT_TRUE(all_same_bits(by_default.attitude.q_in_c.back().coeffs(), without.attitude.q_in_c.back().coeffs()));
 }
 
-/// (error/σ)² of the attitude in the last hour.
-double normalised_square_at_end(const sim::SimulatedPass& simulated, const NavigationRun& run) {
+/// (error/σ)² of the attitude in this hour, counted from 0.
+double normalised_square_at_end(const sim::SimulatedPass& simulated, const NavigationRun& run, std::size_t hour = 3) {
   const auto errors = attitude_errors(run.attitude, simulated.truth.t, simulated.truth.q_in_c);
-  return *statistics_by_stretch(errors, simulated.pass.settings.epoch, minutes(60)).at(3).normalised_square;
+  return *statistics_by_stretch(errors, simulated.pass.settings.epoch, minutes(60)).at(hour).normalised_square;
+}
+
+Scenario with_orbital_error(Scenario scenario, double altitude_m) {
+  scenario.orbit.perigee_altitude_m = scenario.orbit.apogee_altitude_m = altitude_m;
+  scenario.star_tracker.orbital_sine_rad = {2e-4, -1e-4, 2e-4};
+  scenario.star_tracker.orbital_cosine_rad = {-1e-4, 2e-4, 1e-4};
+  return scenario;
 }
 
 TEST(Navigate, FollowsAnErrorOfTheStarTrackerAtThePeriodOfAnyOrbit) {
-  Scenario scenario = scenario_in_eq1(8, std::chrono::hours(4));
-  scenario.orbit.perigee_altitude_m = scenario.orbit.apogee_altitude_m = 1000e3;
-  scenario.star_tracker.orbital_sine_rad = {2e-4, -1e-4, 2e-4};
-  scenario.star_tracker.orbital_cosine_rad = {-1e-4, 2e-4, 1e-4};
+  const Scenario scenario = with_orbital_error(scenario_in_eq1(8, std::chrono::hours(4)), 1000e3);
   sim::SimulatedPass simulated = sim::simulate(scenario);
   EXPECT_LT(normalised_square_at_end(simulated, navigate(simulated.pass, {})), 2);
   CalibrationOptions of_another_orbit;
@@ -201,6 +210,83 @@ TEST(Navigate, FollowsAnErrorOfTheStarTrackerAtThePeriodOfAnyOrbit) {
   EXPECT_NEAR(*calibration.orbital_rate_rad_s, simulated.truth.orbital_rate_rad_s, 1e-6);
   simulated.pass.settings.prior = calibration;
   EXPECT_LT(normalised_square_at_end(simulated, navigate(simulated.pass, {})), 2);
+  // That of another orbit does not: the pass itself does.
+  sim::SimulatedPass lower = sim::simulate(with_gyros_of(
+      simulated.truth, with_orbital_error(scenario_in_eq1(9, std::chrono::hours(4)), 400e3), std::chrono::hours(24)));
+  lower.pass.settings.prior = calibration;
+  EXPECT_LT(normalised_square_at_end(lower, navigate(lower.pass, {})), 2);
+  const CalibrationRun again = calibrate(lower.pass, {});
+  EXPECT_NEAR(again.calibration.orbital_rate_rad_s.value_or(0), lower.truth.orbital_rate_rad_s, 1e-6);
+}
+
+TEST(Navigate, KeepsTheRateOfTheOrbitFromAnEarlierCalibrationWhereTheAttitudeIsFixedInSpace) {
+  const Pass& pass = two_hours().pass;
+  CalibrationOptions options = told();
+  options.further_states[FurtherState::kOrbitalError] = FurtherStateOptions::Choice::kOn;
+  Calibration prior = calibrate(pass, options).calibration;
+  prior.orbital_rate_rad_s = 9.97e-4;
+  Scenario fixed = scenario_in_eq1(10, minutes(30));
+  fixed.attitude.reference = AttitudeScenario::Reference::kInertial;
+  fixed.attitude.slews = std::vector<Slew>{};
+  Pass later = sim::simulate(with_gyros_of(two_hours().truth, fixed, std::chrono::hours(24))).pass;
+  later.settings.prior = prior;
+  EXPECT_EQ(calibrate(later, options).options.orbital_rate_rad_s, 9.97e-4);
+}
+
+/// Of a body that slews most of the time the orbit is told late.
+TEST(Navigate, IsNotMisledBySlewsAboutThePeriodOfTheOrbit) {
+  for (const auto& [rest_s, dwell_s] : {std::pair{5.0, 5.0}, std::pair{60.0, 20.0}, std::pair{120.0, 60.0}}) {
+    Scenario scenario = scenario_in_eq1(8, minutes(160));
+    scenario.star_tracker.orbital_sine_rad = {2e-4, -1e-4, 2e-4};
+    scenario.star_tracker.orbital_cosine_rad = {-1e-4, 2e-4, 1e-4};
+    auto& imaging = std::get<ImagingProgramme>(scenario.attitude.slews);
+    imaging.mean_rest_s = rest_s;
+    imaging.dwell_s = dwell_s;
+    const sim::SimulatedPass simulated = sim::simulate(scenario);
+    CalibrationOptions options;
+    options.corrections.interval = minutes(20);
+    EXPECT_LT(normalised_square_at_end(simulated, navigate(simulated.pass, options), 1), 3) << rest_s;
+    EXPECT_LT(normalised_square_at_end(simulated, navigate(simulated.pass, options), 2), 3) << rest_s;
+  }
+}
+
+/// A stamp that is off by hours is rejected, and says nothing of how long the fixes have come.
+TEST(Navigate, LearnsTheRateOfTheOrbitThoughSomeStampsAreFarAhead) {
+  const Scenario scenario = with_orbital_error(scenario_in_eq1(8, minutes(50)), 1000e3);
+  sim::SimulatedPass simulated = sim::simulate(scenario);
+  for (std::size_t i = 100; i < 1000; i += 100) {
+    simulated.pass.gyro.t[i] += std::chrono::hours(30);
+  }
+  const Pass& pass = simulated.pass;
+  Pipeline pipeline(pass.settings, settled_before(pass.settings, {}));
+  std::size_t fix = 0;
+  for (std::size_t i = 0; i < pass.gyro.size(); ++i) {
+    static_cast<void>(pipeline.feed(sample_of(pass.gyro, i)));
+    for (; fix < pass.star_tracker.size() && pass.star_tracker.t[fix] < pass.gyro.t[i]; ++fix) {
+      static_cast<void>(pipeline.feed(pass.star_tracker.fix(fix, 0)));
+    }
+  }
+  EXPECT_NEAR(pipeline.options().orbital_rate_rad_s.value_or(0), simulated.truth.orbital_rate_rad_s, 2e-5);
+}
+
+/// What is kept to learn the rate of the orbit does not grow for ever, nor by samples that are too close to be used.
+TEST(Navigate, KeepsNoTelemetryForEver) {
+  const PassSettings& settings = two_hours().pass.settings;
+  const GyroSample first = sample_of(two_hours().pass.gyro, 0);
+  const auto grown_by = [&](Duration spacing, int samples) {
+    Pipeline pipeline(settings, settled_before(settings, {}));
+    const auto used = [] { return mallinfo2().uordblks + mallinfo2().hblkhd; };
+    const std::size_t before = used();
+    GyroSample sample = first;
+    for (int i = 0; i < samples; ++i) {
+      static_cast<void>(pipeline.feed(sample));
+      sample.t += spacing;
+    }
+    return used() - before;
+  };
+  constexpr std::size_t kLittle = 1'000'000;
+  EXPECT_LT(grown_by(std::chrono::milliseconds(500), 60'000), kLittle);
+  EXPECT_LT(grown_by(std::chrono::microseconds(100), 60'000), kLittle);
 }
 
 TEST(Navigate, IsCausalWhereTheRateOfTheOrbitIsLearnt) {

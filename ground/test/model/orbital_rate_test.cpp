@@ -2,7 +2,9 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
+#include <optional>
 #include <random>
 
 namespace trihedron::ground {
@@ -35,16 +37,38 @@ TEST(OrbitalRate, IsThatOfAnyOrbit) {
 TEST(OrbitalRate, IsThatOfALowOrbitWhereTheAttitudeIsFixedInSpace) {
   EXPECT_EQ(orbital_rate_rad_s(fixes_of(0, 9, 3000, 4000)), kLowOrbit_rad_s);
   EXPECT_EQ(orbital_rate_rad_s(fixes_of(0, 2, 3000, 1e9)), kLowOrbit_rad_s);  // turned once, to stay: 7e-5 rad/s
-  EXPECT_EQ(orbital_rate_so_far_rad_s(fixes_of(0, 0.5, 1e9, 1e9)), kLowOrbit_rad_s);
-  EXPECT_EQ(orbital_rate_so_far_rad_s({}), kLowOrbit_rad_s);
+  EXPECT_EQ(orbital_rate_so_far_rad_s(fixes_of(0, 0.5, 1e9, 1e9)), std::nullopt);
+  EXPECT_EQ(orbital_rate_so_far_rad_s({}), std::nullopt);
+}
+
+TEST(OrbitalRate, IsNotToldByABodyThatSpins) {
+  for (const double rate_rad_s : {1.5e-3, 0.01}) {
+    EXPECT_EQ(orbital_rate_rad_s(fixes_of(rate_rad_s, 9, 3000, 4000)), kLowOrbit_rad_s);
+    EXPECT_EQ(orbital_rate_so_far_rad_s(fixes_of(rate_rad_s, 0.5, 1e9, 1e9)), std::nullopt);
+  }
+}
+
+/// Of a body that slews there and back all the time the rate over a minute is usually several times that of its orbit.
+TEST(OrbitalRate, IsNotThatOfSlews) {
+  const auto agile = [](double hours) {
+    StarTrackerTelemetry fixes = fixes_of(1.12e-3, hours, 1e9, 1e9);
+    for (std::size_t i = 0; i < fixes.size(); ++i) {
+      const double phase = std::fmod(to_seconds(fixes.t[i] - Time{}), 130) / 130;
+      fixes.q_in_c[i] = fixes.q_in_c[i] *
+                        Eigen::Quaterniond(Eigen::AngleAxisd(std::abs(phase - 0.5), Eigen::Vector3d::UnitX()));
+    }
+    return fixes;
+  };
+  EXPECT_EQ(orbital_rate_so_far_rad_s(agile(1.0 / 3)), std::nullopt);
+  EXPECT_NEAR(orbital_rate_so_far_rad_s(agile(2.67)).value_or(0), 1.12e-3, 2e-5);
 }
 
 TEST(OrbitalRate, IsKnownSoonInASlewThatIsNotTakenBack) {
   for (const double rate_rad_s : {1.12e-3, 9.97e-4, 7.3e-5}) {
     const StarTrackerTelemetry fixes = fixes_of(rate_rad_s, 1.0 / 3, 800, 1e9);
-    EXPECT_NEAR(orbital_rate_so_far_rad_s(fixes), rate_rad_s, 0.01 * rate_rad_s);
+    EXPECT_NEAR(orbital_rate_so_far_rad_s(fixes).value_or(0), rate_rad_s, 0.01 * rate_rad_s);
   }
-  EXPECT_NEAR(orbital_rate_so_far_rad_s(fixes_of(9.97e-4, 3, 3000, 4000)), 9.97e-4, 1e-6);
+  EXPECT_NEAR(orbital_rate_so_far_rad_s(fixes_of(9.97e-4, 3, 3000, 4000)).value_or(0), 9.97e-4, 1e-6);
 }
 
 }  // namespace

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "trihedron/core/layout.hpp"
+#include "trihedron/core/status.hpp"
 #include "trihedron/core/step_report.hpp"
 #include "trihedron/core/telemetry.hpp"
 #include "trihedron/records/calibration.hpp"
@@ -19,8 +20,9 @@
 namespace trihedron::ground {
 
 /// Everything that it does is in its reports. Its results depend on nothing but the events that it was given. Where
-/// something is estimated at orbital period and the options do not tell the rate of the orbit, that of the fixes so far
-/// is taken: from time to time, as it becomes better known, what came before is flown again with it, without reports.
+/// something is estimated at orbital period and the options do not tell the rate of the orbit, that of an earlier
+/// calibration is taken at first, and then that of the fixes so far: from time to time, as it becomes better known, what
+/// came before is flown again with it, without reports. After some hours it stays as it is.
 class Pipeline {
  public:
   /// Whether the calibration predicts to each sample, as on board, or may pass over some
@@ -84,12 +86,16 @@ class Pipeline {
   [[nodiscard]] std::span<const StepReport> report_all(const Step& step);
   [[nodiscard]] double part_of_change() const;
   void set_up();
-  template <class Event>
-  void learn_orbit(const Event& event);
+  void look_at_orbit();
+  [[nodiscard]] bool is_another_rate(double rate_rad_s, Duration passed) const;
+  void keep(const GyroSample& sample, SampleStatus status);
+  void keep(const StarFix& fix);
 
   /// The events of the beginning, by which the rate of the orbit is told.
   struct Orbit {
     std::vector<std::variant<GyroSample, StarFix>> events;
+    std::optional<Time> first;   ///< sample whose stamp was believed
+    std::optional<Time> latest;  ///< the same
     StarTrackerTelemetry fixes;  ///< of the first star tracker
     Duration next;               ///< since its first fix: when to look again
   };
