@@ -6,10 +6,11 @@
 #include <charconv>
 #include <chrono>
 
+#include "trihedron/records/text.hpp"
+
 namespace trihedron::io {
 namespace {
 
-using std::chrono::days;
 using std::chrono::hours;
 using std::chrono::milliseconds;
 using std::chrono::minutes;
@@ -73,19 +74,7 @@ std::optional<Time> parse_epoch(std::string_view iso) {
               Duration(fraction_ns));
 }
 
-std::string format_epoch(Time epoch) {
-  const Duration since_origin = epoch.time_since_epoch();
-  const days whole_days = std::chrono::floor<days>(since_origin);
-  const std::chrono::year_month_day date(kTaiOrigin + whole_days);
-  const std::chrono::hh_mm_ss<Duration> clock(since_origin - whole_days);
-  std::string text = fmt::format("{:04}-{:02}-{:02}T{:02}:{:02}:{:02}", static_cast<int>(date.year()),
-                                 static_cast<unsigned>(date.month()), static_cast<unsigned>(date.day()),
-                                 clock.hours().count(), clock.minutes().count(), clock.seconds().count());
-  if (clock.subseconds() != Duration::zero()) {
-    text += fmt::format(".{:09}", clock.subseconds().count());
-  }
-  return text;
-}
+std::string format_epoch(Time epoch) { return iso_time(epoch); }
 
 std::string format_seconds(Duration duration) {
   const char* sign = duration < Duration::zero() ? "-" : "";

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <charconv>
+#include <chrono>
 #include <cmath>
 #include <cstdint>
 #include <numeric>
@@ -52,6 +53,12 @@ std::string hexadecimal(std::uint32_t value) {
   const auto written = std::to_chars(digits.data(), digits.data() + digits.size(), value, 16);
   const std::string text(digits.data(), written.ptr);
   return text.size() < 2 ? "0" + text : text;
+}
+
+/// Of a number that is not negative.
+std::string with_leading_zeros(std::int64_t number, std::size_t digits) {
+  std::string text = std::to_string(number);
+  return std::string(digits - std::min(digits, text.size()), '0') + text;
 }
 
 std::string shown(std::string_view text, bool keep_line_ends) {
@@ -106,6 +113,24 @@ std::string_view nearest(std::string_view unknown, std::span<const std::string_v
   const bool near =
       found != known.end() && distance(*found) <= std::max<std::size_t>(2, std::max(unknown.size(), found->size()) / 2);
   return near ? *found : std::string_view();
+}
+
+std::string iso_time(Time t) {
+  constexpr std::chrono::sys_days kTaiOrigin = std::chrono::year(1958) / 1 / 1;
+  const Duration since_origin = t.time_since_epoch();
+  const std::chrono::days whole_days = std::chrono::floor<std::chrono::days>(since_origin);
+  const std::chrono::year_month_day date(kTaiOrigin + whole_days);
+  const std::chrono::hh_mm_ss<Duration> clock(since_origin - whole_days);
+  std::string text = with_leading_zeros(static_cast<int>(date.year()), 4) + '-' +
+                     with_leading_zeros(static_cast<unsigned>(date.month()), 2) + '-' +
+                     with_leading_zeros(static_cast<unsigned>(date.day()), 2) + 'T' +
+                     with_leading_zeros(clock.hours().count(), 2) + ':' +
+                     with_leading_zeros(clock.minutes().count(), 2) + ':' +
+                     with_leading_zeros(clock.seconds().count(), 2);
+  if (clock.subseconds() != Duration::zero()) {
+    text += '.' + with_leading_zeros(clock.subseconds().count(), 9);
+  }
+  return text;
 }
 
 AngleUnit unit_of_angle(double rad) {

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <array>
+#include <chrono>
 #include <cmath>
 #include <limits>
 #include <string>
@@ -38,6 +39,11 @@ TEST(Text, BytesThatAreNoUtf8AreShownAsNumbers) {
   EXPECT_EQ(printable("\xED\xA0\x80"), "\\xed\\xa0\\x80") << "half of a pair of UTF-16";
   EXPECT_EQ(printable("\xF4\x90\x80\x80"), "\\xf4\\x90\\x80\\x80") << "beyond Unicode";
   EXPECT_EQ(printable("\xE2\x28\xA1"), "\\xe2(\\xa1");
+}
+
+TEST(Text, OfATimeIsIso8601) {
+  EXPECT_EQ(iso_time(Time{}), "1958-01-01T00:00:00");
+  EXPECT_EQ(iso_time(Scenario{}.epoch + std::chrono::milliseconds(3600250)), "2009-05-20T01:00:00.250000000");
 }
 
 TEST(Text, LinesKeepTheirEnds) { EXPECT_EQ(printable_lines("a\nb\r\x1b\n"), "a\nb\\x0d\\x1b\n"); }

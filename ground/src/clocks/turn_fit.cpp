@@ -337,19 +337,23 @@ VectorXd TurnFit::by_stepping(int gyro) const {
 Clocks TurnFit::clocks() const {
   Clocks clocks;
   // The star tracker is a witness as well: where it agrees with one gyro, the others are late. Of three gyros and
-  // more, the one in the middle. Clocks that agree in the middle of the pass may run apart.
+  // more, the one that is nearest to the middle of them over the whole pass: clocks that agree at one time may run
+  // apart.
   const double half_s = to_seconds(pass_.star_tracker.t.back() - middle_);
-  std::vector<int> order;
-  for (int k = 0; k < unknowns_.gyros; ++k) {
-    order.push_back(k);
-  }
   const auto of_gyro = [&](int k, double age_s) { return (offset_of(k) + age_s * rate_of(k)).dot(x_); };
-  if (unknowns_.gyros > 2) {
-    std::ranges::sort(order, {}, [&](int k) { return of_gyro(k, half_s); });
-    clocks.reference = order[(order.size() - 1) / 2];
-  } else {
-    clocks.reference = *std::ranges::min_element(
-        order, {}, [&](int k) { return std::max(std::abs(of_gyro(k, -half_s)), std::abs(of_gyro(k, half_s))); });
+  PerGyro<double> farthest_s{};
+  for (const double age_s : {-half_s, half_s}) {
+    std::vector<double> all_s;
+    for (int k = 0; k < unknowns_.gyros; ++k) {
+      all_s.push_back(of_gyro(k, age_s));
+    }
+    const double middle_s = unknowns_.gyros > 2 ? median_of(all_s) : 0;
+    for (int k = 0; k < unknowns_.gyros; ++k) {
+      farthest_s[k] = std::max(farthest_s[k], std::abs(of_gyro(k, age_s) - middle_s));
+    }
+  }
+  for (int k = 1; k < unknowns_.gyros; ++k) {
+    clocks.reference = farthest_s[k] < farthest_s[clocks.reference] ? k : clocks.reference;
   }
   const VectorXd middle = offset_of(clocks.reference);
   const VectorXd rate = rate_of(clocks.reference);

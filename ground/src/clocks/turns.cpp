@@ -81,15 +81,20 @@ GyroReadings::GyroReadings(const Pass& pass)
   least_samples_ = std::max(4, static_cast<int>(to_seconds(reach_) / period_s));
 }
 
+std::optional<Vector3d> GyroReadings::reading(std::size_t i, int gyro) const {
+  const Vector3d h_b = pass_.gyro.direction(i, gyro);
+  const double norm = h_b.norm();
+  return std::abs(norm - 1) < 0.1 ? std::optional<Vector3d>(C_c_b_[gyro] * (h_b / norm)) : std::nullopt;
+}
+
 std::optional<Directions> GyroReadings::sample(std::size_t i) const {
   Directions h_c;
   for (int k = 0; k < gyros_; ++k) {
-    const Vector3d h_b = pass_.gyro.direction(i, k);
-    const double norm = h_b.norm();
-    if (!(std::abs(norm - 1) < 0.1)) {
+    const std::optional<Vector3d> its = reading(i, k);
+    if (!its) {
       return std::nullopt;
     }
-    h_c[k] = C_c_b_[k] * (h_b / norm);
+    h_c[k] = *its;
   }
   return h_c;
 }

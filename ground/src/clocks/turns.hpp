@@ -40,6 +40,8 @@ class GyroReadings {
     return C_c_b_[gyro] * Esg7::basis<double>(C_c_b_[gyro].transpose() * h_c);
   }
 
+  /// Of one gyro in one sample; nothing where it is none.
+  [[nodiscard]] std::optional<Eigen::Vector3d> reading(std::size_t i, int gyro) const;
   /// One sample; nothing where a reading is none.
   [[nodiscard]] std::optional<Directions> sample(std::size_t i) const;
 

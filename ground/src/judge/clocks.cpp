@@ -3,8 +3,13 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <chrono>
 #include <cmath>
+#include <optional>
 #include <string>
+#include <vector>
+
+#include "trihedron/records/text.hpp"
 
 namespace trihedron::ground {
 namespace {
@@ -79,15 +84,34 @@ void judge_late_gyros(const PassSettings& settings, const Clocks& clocks, const 
   }
 }
 
+/// By how much the stamps of a gyro whose clock runs at another rate are off at the ends of the pass; 0 where that is
+/// not seen.
+double late_at_the_ends_s(const PassSettings& settings, const Measured& rate) {
+  const double farthest_s = to_seconds(settings.duration) / 2 * std::abs(rate.value);
+  return rate.is_sure(kSigmasToTell) && farthest_s > kSeenLate_s ? farthest_s : 0;
+}
+
+bool has_gyro_of_another_rate(const PassSettings& settings, const std::optional<Clocks>& clocks) {
+  bool has_one = false;
+  for (int k = 0; clocks && k < static_cast<int>(settings.gyros.size()); ++k) {
+    has_one = has_one || late_at_the_ends_s(settings, clocks->late_rate_s_s[k]) > 0;
+  }
+  return has_one;
+}
+
+/// The middle of the pass, in which the clocks are compared.
+Time middle_of(const Pass& pass) {
+  const std::vector<Time>& fixes = pass.star_tracker.t;
+  return std::chrono::round<std::chrono::seconds>(fixes.front() + (fixes.back() - fixes.front()) / 2);
+}
+
 /// Gyros whose clocks run at another rate, which nothing corrects: what the ends of the pass are off by is forbidden
-/// from `too_late_s` on.
-void judge_gyro_rates(const PassSettings& settings, const Clocks& clocks, double too_late_s,
-                      std::vector<Finding>& findings) {
-  const double half_s = to_seconds(settings.duration) / 2;
+/// from `too_late_s` on. The cure leaves what they are late in the middle, which is told as well.
+void judge_gyro_rates(const Pass& pass, const Clocks& clocks, double too_late_s, std::vector<Finding>& findings) {
+  const PassSettings& settings = pass.settings;
   for (int k = 0; k < static_cast<int>(settings.gyros.size()); ++k) {
     const Measured& rate = clocks.late_rate_s_s[k];
-    const double farthest_s = half_s * std::abs(rate.value);
-    if (rate.is_sure(kSigmasToTell) && farthest_s > kSeenLate_s) {
+    if (const double farthest_s = late_at_the_ends_s(settings, rate); farthest_s > 0) {
       add(findings, FindingCode::kGyroClockRate,
           farthest_s > too_late_s ? Finding::Severity::kDoNotUse : Finding::Severity::kWarning,
           fmt::format(
@@ -98,8 +122,8 @@ void judge_gyro_rates(const PassSettings& settings, const Clocks& clocks, double
               "{:+.3g} ± {:.2g} ppm: at the ends of the pass its stamps are {:.1f} ms later and earlier than in the "
               "middle",
               1e6 * rate.value, 1e6 * rate.sigma, 1e3 * farthest_s),
-          fmt::format("Subtract {:.4g} (t - epoch) from the stamps of gyro {}, or calibrate shorter passes.",
-                      rate.value, k + 1));
+          fmt::format("Subtract {:.4g} (t - {}) from the stamps of gyro {}, or calibrate shorter passes.", rate.value,
+                      iso_time(middle_of(pass)), k + 1));
     }
   }
 }
@@ -202,7 +226,9 @@ void judge_clocks(const Pass& pass, const CalibrationRun& run, std::vector<Findi
   const bool corrected = correction.of_star_tracker();
   double offset_s = sure_value_of(run, FurtherState::kClockOffset);
   double rate = sure_value_of(run, FurtherState::kClockRate);
-  if (offset_s == 0 && rate == 0 && corrected) {  // estimator paper has no states for them
+  // Estimator paper has no states for them, and those of the others follow a gyro that runs at another rate.
+  const bool follows_gyro = has_gyro_of_another_rate(pass.settings, run.clocks);
+  if (follows_gyro || (offset_s == 0 && rate == 0 && corrected)) {
     offset_s = correction.offset_s;
     rate = correction.rate_s_s;
   }
@@ -239,7 +265,7 @@ void judge_clocks(const Pass& pass, const CalibrationRun& run, std::vector<Findi
                "; the estimates take it for constant", findings);
   }
   const Measured& middle = run.clocks->mid_offset_s;
-  judge_gyro_rates(pass.settings, *run.clocks, kSeenLate_s, findings);
+  judge_gyro_rates(pass, *run.clocks, kSeenLate_s, findings);
   const std::size_t before = findings.size();
   judge_late_gyros(pass.settings, *run.clocks, correction.late_s, findings, Finding::Severity::kWarning,
                    "; the calibration has interpolated them");
@@ -297,7 +323,7 @@ void judge_clocks(const Pass& pass, const NavigationRun& run, std::vector<Findin
     late_s[k] = its.is_sure(kSigmasToTell) && std::abs(its.value) > kSeenLate_s ? its.value : 0;
     latest_s = std::max(latest_s, std::abs(late_s[k]));
   }
-  judge_gyro_rates(pass.settings, clocks, kTooLate_s, findings);
+  judge_gyro_rates(pass, clocks, kTooLate_s, findings);
   const std::size_t before = findings.size();
   judge_late_gyros(pass.settings, clocks, late_s, findings,
                    latest_s > kTooLate_s ? Finding::Severity::kDoNotUse : Finding::Severity::kWarning,

@@ -2,8 +2,11 @@
 
 #include <gmock/gmock.h>
 
+#include <algorithm>
 #include <chrono>
+#include <cmath>
 #include <string>
+#include <vector>
 
 #include "passes.hpp"
 #include "trihedron/ground/calibrate/calibrate.hpp"
@@ -48,10 +51,76 @@ TEST(RestartedGyro, IsRefusedWithTheTimeToCutThePass) {
       EXPECT_THAT(refusal.what(),
                   HasSubstr("momentum of gyro 2 turns by " + std::string(angle_rad > 0 ? "2." : "57.")));
       EXPECT_THAT(refusal.what(), HasSubstr("between t = 2997 s and 3000 s"));
-      EXPECT_THAT(refusal.cure(), HasSubstr("--to 2997s"));
-      EXPECT_THAT(refusal.cure(), HasSubstr("--from 3000s"));
+      EXPECT_THAT(refusal.cure(), HasSubstr("import PASS --to 2009-05-20T00:49:57 -o"));
+      EXPECT_THAT(refusal.cure(), HasSubstr("import PASS --from 2009-05-20T00:50:00 -o"));
     }
   }
+}
+
+void expect_restart_of(const Pass& pass, const std::string& gyro) {
+  try {
+    refuse_restarted_gyro(pass);
+    FAIL() << "it is taken";
+  } catch (const SetupError& refusal) {
+    EXPECT_THAT(refusal.what(), HasSubstr("momentum of " + gyro + " turns"));
+  }
+}
+
+/// Nothing of the other part is left in either, whatever the fractions of a second are.
+TEST(RestartedGyro, IsCutAtWholeSecondsBetweenTheFixes) {
+  Pass pass = with_turned_momentum(0.05, minutes(50), minutes(200));
+  const auto later = std::chrono::milliseconds(300);
+  for (std::vector<Time>* times : {&pass.gyro.t, &pass.star_tracker.t}) {
+    std::ranges::for_each(*times, [&](Time& t) { t += later; });
+  }
+  try {
+    refuse_restarted_gyro(pass);
+    FAIL() << "it is taken";
+  } catch (const SetupError& refusal) {
+    EXPECT_THAT(refusal.cure(), HasSubstr("--to 2009-05-20T00:49:57 "));
+    EXPECT_THAT(refusal.cure(), HasSubstr("--from 2009-05-20T00:50:01 "));
+  }
+}
+
+TEST(RestartedGyro, IsFoundBesideOneThatIsSilent) {
+  const Pass two = with_turned_momentum(0.05, minutes(50), minutes(200));
+  Pass three = two;
+  three.settings.gyros.push_back(two.settings.gyros[0]);
+  three.gyro.gyros = 3;
+  three.gyro.h.clear();
+  for (std::size_t i = 0; i < two.gyro.size(); ++i) {
+    for (const Eigen::Vector3d& h : {Eigen::Vector3d(two.gyro.direction(i, 0)), Eigen::Vector3d(std::nan(""), 0, 0),
+                                     Eigen::Vector3d(two.gyro.direction(i, 1))}) {
+      three.gyro.h.insert(three.gyro.h.end(), h.begin(), h.end());
+    }
+  }
+  expect_restart_of(three, "gyro 3");
+}
+
+/// The case turns with the body, which no rotor does.
+TEST(RestartedGyro, IsNoneOfReadingsThatDoNotChangeOrAreOfOtherAxes) {
+  Pass dead = two_hours().pass;
+  Pass swapped = dead;
+  for (std::size_t i = dead.gyro.size() / 2; i < dead.gyro.size(); ++i) {
+    Eigen::Map<Eigen::Vector3d>(&dead.gyro.h[(2 * i + 1) * 3]) =
+        (Eigen::Vector3d(0.6, 0, 0.8) + 1e-5 * Eigen::Vector3d(dead.gyro.direction(i, 1))).normalized();
+    const Eigen::Vector3d h = swapped.gyro.direction(i, 1);
+    Eigen::Map<Eigen::Vector3d>(&swapped.gyro.h[(2 * i + 1) * 3]) = Eigen::Vector3d(h.y(), h.x(), h.z());
+  }
+  refuse_restarted_gyro(dead);
+  refuse_restarted_gyro(swapped);
+}
+
+/// Which moves it as far while no fix comes.
+TEST(RestartedGyro, IsNoneWhereDriftExplainsTheTurn) {
+  Scenario scenario = scenario_in_eq1(5, std::chrono::hours(3));
+  scenario.star_tracker.outages = {{3600, 3600 + 45 * 60}};
+  for (GyroScenario& gyro : scenario.gyros) {
+    gyro.drift.prior_sigma_rad_s = 6e-5;
+    gyro.drift.kappa_rad_s.emplace().fill(0);
+  }
+  scenario.gyros[1].drift.kappa_rad_s->at(5) = 6e-5;
+  refuse_restarted_gyro(sim::simulate(scenario).pass);
 }
 
 TEST(RestartedGyro, IsNoneWhereTheReadingsComeBackOrTheStarTrackerIsOff) {

@@ -106,13 +106,13 @@ TEST(Clocks, OfThreeGyrosTheOneThatDiffersIsLate) {
   expect_within(clocks.late_s[2 - clocks.reference], 0, kSigmas);
 }
 
-/// As its clock, which agrees with the others in the middle of the pass, runs at another rate.
-Pass with_gyro_clock_rate(Pass pass, std::size_t gyro, double rate_s_s) {
+/// As its clock, which agrees with the others at one time, by default the middle of the pass, runs at another rate.
+Pass with_gyro_clock_rate(Pass pass, std::size_t gyro, double rate_s_s, std::optional<Time> agrees_at = {}) {
   const GyroTelemetry good = pass.gyro;
-  const Time middle = good.t[good.size() / 2];
+  const Time at = agrees_at.value_or(good.t[good.size() / 2]);
   const auto gyros = static_cast<std::size_t>(good.gyros);
   for (std::size_t i = 1; i + 1 < good.size(); ++i) {
-    const double late_samples = rate_s_s * to_seconds(good.t[i] - middle) / to_seconds(pass.settings.gyro_period);
+    const double late_samples = rate_s_s * to_seconds(good.t[i] - at) / to_seconds(pass.settings.gyro_period);
     const std::size_t other = late_samples > 0 ? i - 1 : i + 1;
     const double part = std::abs(late_samples);
     Eigen::Map<Eigen::Vector3d>(&pass.gyro.h[(gyros * i + gyro) * 3]) =
@@ -139,6 +139,37 @@ TEST(Clocks, OfAGyroThatRunsAtAnotherRateAreFoundAndForbidden) {
   const Clocks clocks = ground::clocks_of(with_gyro_clock_rate(sim::simulate(three).pass, 2, 1e-6)).value();
   EXPECT_NE(clocks.reference, 2);
   expect_within(clocks.late_rate_s_s[2], 1e-6, kSigmas);
+}
+
+/// Though all agree at the end of the pass.
+TEST(Clocks, OfThreeGyrosTheOneThatRunsAtAnotherRateIsNotTheReference) {
+  Scenario three = four_hours(15);
+  three.gyros.push_back(three.gyros[0]);
+  three.gyros[2].start_direction_c = {0.1, -0.2, 0.97};
+  const Pass pass = sim::simulate(three).pass;
+  for (const int gyro : {0, 1, 2}) {
+    const Clocks clocks =
+        ground::clocks_of(with_gyro_clock_rate(pass, static_cast<std::size_t>(gyro), 2e-6, pass.gyro.t.back())).value();
+    EXPECT_NE(clocks.reference, gyro);
+    expect_within(clocks.late_rate_s_s[gyro], 2e-6, kSigmas);
+    EXPECT_LT(std::abs(clocks.late_rate_s_s[3 - gyro - clocks.reference].value), 1.4e-7);
+  }
+}
+
+/// The state of the star tracker's clock follows half of what the gyro is late: its cure would be another.
+TEST(Clocks, OfAGyroThatRunsAtAnotherRateAreNotBlamedOnTheStarTracker) {
+  const Pass good = sim::simulate(four_hours(14)).pass;
+  const Pass pass = with_gyro_clock_rate(good, 1, 2e-6, good.gyro.t.back());
+  const CalibrationRun run = calibrate(pass, {});
+  const Verdict verdict = judge(pass, run);
+  const auto rate = std::ranges::find(verdict.findings, FindingCode::kGyroClockRate, &Finding::code);
+  ASSERT_NE(rate, verdict.findings.end());
+  // It adds up with the latency of the middle of the pass.
+  EXPECT_THAT(rate->cure, HasSubstr("(t - 2009-05-20T01:59:5"));
+  expect_finding(verdict, FindingCode::kGyroLate, "latency_s = -0.014");
+  for (const FindingCode code : {FindingCode::kClockOffsetFound, FindingCode::kClockRateFound}) {
+    EXPECT_EQ(std::ranges::find(verdict.findings, code, &Finding::code), verdict.findings.end()) << name_of(code);
+  }
 }
 
 TEST(Clocks, AreNotInventedWhereTheBodyTurnsEvenly) {

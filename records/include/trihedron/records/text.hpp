@@ -6,6 +6,8 @@
 #include <string>
 #include <string_view>
 
+#include "trihedron/core/time.hpp"
+
 namespace trihedron {
 
 /// `text` as valid UTF-8 on one line, fit for a terminal, for JSON and for HTML: bytes that are no UTF-8 as \\xff,
@@ -22,6 +24,9 @@ namespace trihedron {
 
 /// What stands in a sentence in place of a number that is infinite or none.
 inline constexpr std::string_view kNoNumber = "not determined";
+
+/// `2009-05-20T00:00:00`, TAI; with nine decimals where it is no whole second.
+[[nodiscard]] std::string iso_time(Time t);
 
 /// A unit in which angles are shown.
 struct AngleUnit {
