@@ -29,21 +29,20 @@ std::string slew_toml(const Slew& slew) {
   return text + "}";
 }
 
-/// Why there are none, and the limit to widen.
+/// Why there are none, and the limit to widen where the flight needs some.
 std::vector<std::string> why_no_slews(const plan::Advice& advice, const plan::SlewLimits& limits) {
   const std::string angle = io::format_angle(limits.max_angle_rad);
-  std::vector<std::string> sentences = {
+  const std::string none =
       fmt::format("No slews within these limits make the mean square of the attitude error smaller by {:.0f} %.",
-                  100 * plan::Advice::kLeastGain),
-      limits.manoeuvre_time < advice.time_of_largest_slew
-          ? fmt::format("Give a longer --manoeuvre-time than {}: a slew of {}, there and back, takes {}.",
-                        io::format_duration(limits.manoeuvre_time), angle,
-                        io::format_duration(advice.time_of_largest_slew))
-          : fmt::format("Give a larger --max-angle than {}.", angle)};
+                  100 * plan::Advice::kLeastGain);
   if (!advice.before.is_harmful()) {
-    sentences.emplace_back("The flight needs none: nothing that it leaves undetermined harms the attitude.");
+    return {none, "The flight needs none: nothing that it leaves undetermined harms the attitude."};
   }
-  return sentences;
+  return {none, limits.manoeuvre_time < advice.time_of_largest_slew
+                    ? fmt::format("Give a longer --manoeuvre-time than {}: a slew of {}, there and back, takes {}.",
+                                  io::format_duration(limits.manoeuvre_time), angle,
+                                  io::format_duration(advice.time_of_largest_slew))
+                    : fmt::format("Give a larger --max-angle than {}.", angle)};
 }
 
 }  // namespace

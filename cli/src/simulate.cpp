@@ -36,6 +36,38 @@ void say_begins_after(const std::vector<Stretch>& all, double end_s, const std::
   }
 }
 
+/// "the jump of the coefficients of gyro 1 at 5h is after the end of the pass", of a step that is there.
+void say_is_after(bool is_there, double at_s, double end_s, const std::string& name, std::vector<std::string>& lines) {
+  if (is_there && at_s >= end_s) {
+    lines.push_back(
+        fmt::format("the {} at {} is after the end of the pass", name, io::format_duration(from_seconds(at_s))));
+  }
+}
+
+void say_mounting_is_after(const MountingChange& change, double end_s, const std::string& whose,
+                           std::vector<std::string>& lines) {
+  say_is_after(!change.step_rad.isZero(0), change.step_at_s, end_s, "step of the mounting of " + whose, lines);
+}
+
+void say_steps_after(const Scenario& scenario, double end_s, std::vector<std::string>& lines) {
+  for (std::size_t k = 0; k < scenario.gyros.size(); ++k) {
+    const GyroScenario& gyro = scenario.gyros[k];
+    const std::string whose = fmt::format("gyro {}", k + 1);
+    say_is_after(gyro.drift.jump_sigma_rad_s > 0, gyro.drift.jump_at_s, end_s, "jump of the coefficients of " + whose,
+                 lines);
+    say_mounting_is_after(gyro.mounting_change, end_s, whose, lines);
+  }
+  const auto say_of_head = [&](const StarTrackerScenario& head, const std::string& whose) {
+    say_mounting_is_after(head.mounting_change, end_s, whose, lines);
+    say_is_after(!head.inertial_step_rad.isZero(0), head.inertial_step_at_s, end_s,
+                 "step of the inertial axes of " + whose, lines);
+  };
+  say_of_head(scenario.star_tracker, "the star tracker");
+  for (std::size_t i = 0; i < scenario.further_star_trackers.size(); ++i) {
+    say_of_head(scenario.further_star_trackers[i], fmt::format("star tracker {}", i + 2));
+  }
+}
+
 /// What the scenario asks for and the pass is too short for.
 std::vector<std::string> left_out(const Scenario& scenario) {
   const double end_s = to_seconds(scenario.duration);
@@ -57,6 +89,7 @@ std::vector<std::string> left_out(const Scenario& scenario) {
     say_begins_after(scenario.further_star_trackers[i].outages, end_s, fmt::format("outages of star tracker {}", i + 2),
                      lines);
   }
+  say_steps_after(scenario, end_s, lines);
   return lines;
 }
 

@@ -372,6 +372,7 @@ def with_key(line):
         f'star_tracker.{key} = {{grid = [{", ".join(["0"] * 100)}]}}' for key in ("outlier_probability", "wrong_sign_probability")) + "\n" +
         f'gyro.readout.dropout_probability = {{grid = [{", ".join(["0"] * 100)}]}}\ngyro.drift.warm_up_fraction = {{grid = [{", ".join(["0"] * 100)}]}}'),
      ["6e+12 points", "1000000", "latin-hypercube"]),
+    (CAMPAIGN.replace("grid", "choice").replace("repeats = 2", "runs = 0"), ["c.toml:4:", "one run at least"]),
     (CAMPAIGN.replace("grid", "choice"), ["repeats", "runs"]),
     (CAMPAIGN.replace("grid", "choice").replace("repeats = 2", ""), ["runs", "missing"]),
     (CAMPAIGN.replace('duration = "5min"', 'duratio = "5min"'), ["c.toml:7:", "did you mean \"duration\""]),

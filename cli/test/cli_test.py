@@ -375,9 +375,22 @@ def test_simulate_says_what_the_pass_is_too_short_for(tmp_path):
     assert result.returncode == TRUSTWORTHY
     assert [line[12:] for line in result.stdout.splitlines() if line.startswith("Left out")] == lines
     assert json.loads(run("--json", "simulate", tmp_path / "s.toml", "-o", tmp_path / "p").stdout)["left_out"] == lines
-    (tmp_path / "s.toml").write_text('[scenario]\nduration = "4min"\n')
+    (tmp_path / "s.toml").write_text('[scenario]\nduration = "4min"\n[gyro]\nmounting_step_at = "5min"\n')
     result = run("simulate", tmp_path / "s.toml", "-o", tmp_path / "p")
     assert "Left out" not in result.stdout
+
+
+def test_simulate_says_which_steps_come_after_the_end_of_the_pass(tmp_path):
+    (tmp_path / "s.toml").write_text('[scenario]\nduration = "4min"\n[gyro.drift]\njump_at = "5min"\n[[gyro.unit]]\ndrift = {jump_sigma = "1e-8rad/s"}\n'
+                                     '[[gyro.unit]]\nmounting_step = ["0deg", "1arcmin", "0deg"]\nmounting_step_at = "4min"\n'
+                                     '[star_tracker]\ninertial_step = ["1arcmin", "0deg", "0deg"]\ninertial_step_at = "1h"\n'
+                                     '[[star_tracker.further]]\ninertial_step_at = "1min"\nmounting_step = ["1arcmin", "0deg", "0deg"]\nmounting_step_at = "1d"\n')
+    result = run("simulate", tmp_path / "s.toml", "-o", tmp_path / "p")
+    assert [line[12:] for line in result.stdout.splitlines() if line.startswith("Left out")] == [
+        "the jump of the coefficients of gyro 1 at 5min is after the end of the pass",
+        "the step of the mounting of gyro 2 at 4min is after the end of the pass",
+        "the step of the inertial axes of the star tracker at 1h is after the end of the pass",
+        "the step of the mounting of star tracker 2 at 1d is after the end of the pass"]
 
 
 # Nine hours of paper.toml are calibrated by the demonstration, of steady-flight.toml as a pass of validation/passes: here four of the others, which
@@ -853,6 +866,14 @@ def test_where_no_slew_helps_the_advice_says_which_limit_to_widen(observe, limit
     advice = json.loads(observe("--json", "--advise", limit, value).stdout)["advice"]
     assert advice["slews"] == [] and cure in advice["why_no_slews"]
     assert advice["attitude_error_rad"]["after"] == advice["attitude_error_rad"]["before"]
+
+
+def test_a_flight_that_needs_no_slews_is_not_told_to_widen_a_limit(observe, tmp_path):
+    known = STEADY.replace("{slews}", '"none"').replace('outside_sigma = "0rad/s"', 'outside_sigma = "0rad/s"\nprior_sigma = "1e-12rad/s"')
+    (tmp_path / "known.toml").write_text(known.replace("[gyro.drift]", '[gyro]\nalignment_prior_sigma = "1arcsec"\n[gyro.drift]'))
+    for limit in (("--max-angle", "0.01deg"), ("--manoeuvre-time", "1s")):
+        result = observe("--advise", *limit, of=tmp_path / "known.toml")
+        assert "The flight needs none" in result.stdout and "Give a " not in result.stdout
 
 
 def test_observe_refuses(observe, tmp_path):

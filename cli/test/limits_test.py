@@ -51,7 +51,7 @@ def edited(short_pass, tmp_path):
     ("drift_prior_sigma_rad_s", "1e30", ("outside", "no gyro drifts")),
     ("noise_rad", "[1e100, 1e100, 1e100]", ("is 1e+100 rad", "it is the 1-sigma of an attitude")),
     ("readout_noise_rad", "2", ("is 2 rad, outside 1e-09 to 0.1 rad",)),
-    ("period_s", "125", ("is 125 s, outside 1e-05 to 60 s", "0.125 for 8 Hz")),
+    ("period_s", "125", ("is 125 s, outside 1e-05 to 60 s", "0.125 s for 8 Hz")),
 ])
 def test_numbers_that_are_no_measurements_are_refused_with_their_bounds(edited, tmp_path, key, value, words):
     directory = edited(key, f"{key} = {value}")
@@ -95,13 +95,13 @@ def test_the_ends_of_the_ranges_end_in_a_status(edited, tmp_path, key, values, e
 
 @pytest.mark.parametrize("arguments, word", [
     (("evaluate", "p", "--attitude", "x", "--limit", "-5arcmin"), '--limit: "-5arcmin" is outside'),
-    (("evaluate", "p", "--attitude", "x", "--limit", "400deg"), "outside 5.72958e-08 to 180.482 deg"),
+    (("evaluate", "p", "--attitude", "x", "--limit", "400deg"), "outside 5.72958e-08 to 180.481 deg: an error has no sign"),
     (("observe", "s.toml", "--advise", "--slews", "0"), "is not a whole number from 1 to 100;"),
     (("observe", "s.toml", "--advise", "--slews", "-3"), "is not a whole number from 1 to 100;"),
     (("observe", "s.toml", "--advise", "--confirm", "10000000"), "is not a whole number from 1 to 1000000;"),
     (("replay", "p", "--spread-over", "-1"), "is not a whole number from 0 to 20;"),
     (("observe", "s.toml", "--advise", "--max-angle", "-1deg"), '--max-angle: "-1deg" is outside'),
-    (("observe", "s.toml", "--advise", "--max-rate", "1e9deg/s"), "outside 5.72958e-05 to 57.2958 deg/s"),
+    (("observe", "s.toml", "--advise", "--max-rate", "1e9deg/s"), "outside 5.72958e-05 to 57.2957 deg/s"),
     (("observe", "s.toml", "--advise", "--manoeuvre-time", "0s"), '--manoeuvre-time: "0s" is outside 1 to '),
     (("navigate", "p", "-o", "x", "--online", "--correction-interval", "100000d"), '--correction-interval: "100000d" is outside'),
     (("navigate", "p", "-o", "x", "--online", "--correction-interval", "never"), "or say none (only the first correction) or continuous (one at each fix)"),

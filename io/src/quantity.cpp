@@ -86,6 +86,23 @@ Measured measured(std::string_view text, const QuantityKind& kind) {
   refuse(text, kind, fmt::format("unit {} is unknown", in_quotes(parsed->rest)));
 }
 
+/// The range in another unit, which is `factor` of its own: with ends that are in it as they are shown, of six digits.
+Range in_unit(const Range& range, double factor, std::string_view unit) {
+  constexpr double kDigits = 5;  // beside the first
+  const auto inwards = [&](double end, double (*towards)(double)) {
+    const double exact = end / factor;
+    const double scale = exact == 0 ? 1 : std::pow(10, kDigits - std::floor(std::log10(std::abs(exact))));
+    const double nearest = std::round(exact * scale) / scale;
+    const bool is_in = nearest * factor >= range.least && nearest * factor <= range.most;
+    return is_in || !std::isfinite(scale) ? nearest : towards(exact * scale) / scale;
+  };
+  Range shown = range;
+  shown.least = inwards(range.least, [](double value) { return std::ceil(value); });
+  shown.most = inwards(range.most, [](double value) { return std::floor(value); });
+  shown.unit = unit;
+  return shown;
+}
+
 [[noreturn]] void refuse_outside(std::string_view text, const Range& range) {
   throw UsageOutsideRange(fmt::format("{} is {}: {}", in_quotes(text), outside(range), range.why));
 }
@@ -97,11 +114,7 @@ double parse_quantity(std::string_view text, const QuantityKind& kind) { return 
 double parse_quantity(std::string_view text, const QuantityKind& kind, const Range& range) {
   const auto& [value, unit] = measured(text, kind);
   if (!range.holds(value / kind.range_factor)) {
-    Range in_its_unit = range;
-    in_its_unit.least *= kind.range_factor / unit.factor;
-    in_its_unit.most *= kind.range_factor / unit.factor;
-    in_its_unit.unit = unit.name;
-    refuse_outside(text, in_its_unit);
+    refuse_outside(text, in_unit(range, unit.factor / kind.range_factor, unit.name));
   }
   return value;
 }

@@ -48,9 +48,10 @@ template <class Vector>
 Field direction(std::string_view key, Vector& vector, std::string_view about) {
   return checked(three_numbers(key, vector, limits::kPureNumber, about),
                  [key](const TomlTable& table, const toml::node& node) {
-                   if (table.three_numbers(node, key).isZero(0)) {
+                   // Squares of very small numbers are zero.
+                   if (!(table.three_numbers(node, key).norm() > 0)) {
                      table.refuse(node, fmt::format("\"{}\" is zero, which is no direction", key),
-                                  "give a vector of any other length");
+                                  "give a vector of any other length, as one of length 1");
                    }
                  });
 }
@@ -111,7 +112,7 @@ Fields slew_fields(Slew& slew) {
 Fields imaging_fields(ImagingProgramme& imaging) {
   return {quantity("max_roll", imaging.max_roll_rad, kAngle, limits::kSizeOfAngle_rad, "of the targets"),
           quantity("max_pitch", imaging.max_pitch_rad, kAngle, limits::kSizeOfAngle_rad, "of the targets"),
-          signed_duration("mean_rest", imaging.mean_rest_s, limits::kTimeConstant_s,
+          signed_duration("mean_rest", imaging.mean_rest_s, limits::kMeanRest_s,
                           "between slews, exponentially distributed"),
           signed_duration("dwell", imaging.dwell_s, limits::kStretch_s, "at the target")};
 }
@@ -253,7 +254,7 @@ Fields drift_fields(DriftScenario& drift, const fs::path& file) {
       quantity("bump_radius", drift.bump_radius_rad, kAngle, limits::kRadius_rad, "beyond which it is nothing"),
       quantity("hysteresis", drift.hysteresis_rad_s, kRate,
                "largest drift that depends on the side from which a direction was reached"),
-      quantity("hysteresis_width", drift.hysteresis_width_rad, kAngle, limits::kRadius_rad,
+      quantity("hysteresis_width", drift.hysteresis_width_rad, kAngle, limits::kHysteresisWidth_rad,
                "after which it has changed sides"),
       one_number("slew_fraction", drift.slew_fraction, limits::kPureNumber,
                  "by which the coefficients are larger in a slew"),
@@ -449,6 +450,10 @@ Field attitude(Scenario& scenario, const fs::path& file) {
                                     fmt::format("this reference needs \"{}\", which is missing", key),
                                     fmt::format("add {} = {}", key, form));
                      }
+                   }
+                   if (its.jitter_rad > 0 && !(its.jitter_bandwidth_hz > 0)) {
+                     table.refuse(*own.get("jitter_bandwidth"), "\"jitter_bandwidth\" is zero where there is jitter",
+                                  "give a frequency, or jitter = \"0deg\"");
                    }
                  });
 }

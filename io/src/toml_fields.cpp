@@ -1,12 +1,13 @@
 #include "toml_fields.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <functional>
 #include <map>
 #include <ranges>
-#include <span>
 #include <sstream>
+#include <vector>
 
 #include "trihedron/io/quantity.hpp"
 #include "trihedron/io/time_text.hpp"
@@ -27,34 +28,68 @@ const toml::array& elements_of(const TomlTable& table, const toml::node& node, s
   return *array;
 }
 
-/// As people name a table in the table `name`.
-std::string name_within(const std::string& name, std::string_view key) {
-  if (name.starts_with("[[")) {
-    return fmt::format("\"{}\" of {}", key, name);
+/// Where keys stand: the tables in which one is known, those that are no element of an array first.
+using Places = std::map<std::string, std::vector<std::string>, std::less<>>;
+
+/// Adds the keys of the tables in a table of this schema. `path`: of that table, as "gyro.drift", empty for the file.
+void find_places(const Json& schema, const std::string& path, bool in_array, Places& single, Places& repeated) {
+  for (const Json& one : schema.value("anyOf", Json::array())) {
+    find_places(one, path, in_array, single, repeated);
   }
-  return name.starts_with('[') ? fmt::format("{}.{}]", name.substr(0, name.size() - 1), key) : fmt::format("[{}]", key);
+  if (schema.contains("items")) {
+    find_places(schema["items"], path, true, single, repeated);
+  }
+  for (const auto& [key, its] : schema.value("properties", Json::object()).items()) {
+    if (!path.empty()) {
+      (in_array ? repeated : single)[key].push_back(fmt::format(in_array ? "[[{}]]" : "[{}]", path));
+    }
+    find_places(its, path.empty() ? key : path + '.' + key, in_array, single, repeated);
+  }
 }
 
-/// The cure where a key that is not known here is one of a table in it; empty where it is none. `name`: of the table
-/// that is read.
-std::string belongs_into(std::string_view unknown, const std::string& name, const Fields& fields,
-                         std::span<const std::string_view> known) {
-  std::map<std::string, std::string, std::less<>> tables;  // of each key
+/// The cure where a key that a table does not know is one of another table of the document; empty where it is none.
+/// `fields`: of the document, or of a table in it that is called `name`.
+std::string belongs_into(const UnknownKey& unknown, const std::string& name, const Fields& fields) {
+  if (name.starts_with("[[") || name.starts_with('"')) {  // what it holds, the document tells better
+    return "";
+  }
+  const std::string path = name.starts_with('[') ? name.substr(1, name.size() - 2) : "";
+  Places single;
+  Places repeated;
   for (const Field& field : fields) {
-    const Json its = field.schema().value("properties", Json::object());
-    for (const auto& [key, ignored] : its.items()) {
-      std::string& among = tables[key];
-      among += (among.empty() ? "" : " or ") + name_within(name, field.key);
+    find_places(field.schema(), path.empty() ? std::string(field.key) : fmt::format("{}.{}", path, field.key), false,
+                single, repeated);
+  }
+  for (const Places* places : {&single, &repeated}) {
+    if (const auto found = places->find(unknown.key()); found != places->end()) {
+      return fmt::format("it belongs into {}", fmt::join(found->second, " or "));
     }
   }
-  if (const auto found = tables.find(unknown); found != tables.end()) {
-    return fmt::format("it belongs into {}", found->second);
+  if (unknown.is_like_another()) {
+    return "";
   }
-  const std::vector<std::string_view> keys(std::views::keys(tables).begin(), std::views::keys(tables).end());
-  const std::string_view meant = nearest(unknown, keys);
-  return meant.empty() || !nearest(unknown, known).empty()
-             ? ""
-             : fmt::format("did you mean \"{}\", which belongs into {}?", meant, tables.find(meant)->second);
+  const std::vector<std::string_view> keys(std::views::keys(single).begin(), std::views::keys(single).end());
+  const std::string_view meant = nearest(unknown.key(), keys);
+  return meant.empty() ? ""
+                       : fmt::format("did you mean \"{}\", which belongs into {}?", meant,
+                                     fmt::join(single.find(meant)->second, " or "));
+}
+
+void read_each(const TomlTable& reader, const std::string& name, const Fields& fields) {
+  for (const Field& field : fields) {
+    const toml::node* node = field.is_required ? &reader.at(field.key) : reader.find(field.key);
+    if (node == nullptr) {
+      continue;
+    }
+    try {
+      field.read(reader, *node);
+    } catch (const UsageOutsideRange& error) {
+      reader.refuse<InputOutsideRange>(*node, fmt::format("\"{}\" in {}: {}", field.key, name, error.what()),
+                                       "correct the value");
+    } catch (const UsageError& error) {
+      reader.refuse(*node, fmt::format("\"{}\" in {}: {}", field.key, name, error.what()), "correct the value");
+    }
+  }
 }
 
 }  // namespace
@@ -70,20 +105,15 @@ void read_fields(const toml::table& table, const fs::path& file, const std::stri
     known.push_back(field.key);
   }
   const TomlTable reader(table, file, name);
-  reader.expect_known(known, [&](std::string_view key) { return belongs_into(key, name, fields, known); });
-  for (const Field& field : fields) {
-    const toml::node* node = field.is_required ? &reader.at(field.key) : reader.find(field.key);
-    if (node == nullptr) {
-      continue;
+  try {
+    reader.expect_known(known);
+    read_each(reader, name, fields);
+  } catch (const UnknownKey& unknown) {
+    const std::string cure = belongs_into(unknown, name, fields);
+    if (cure.empty()) {
+      throw;
     }
-    try {
-      field.read(reader, *node);
-    } catch (const UsageOutsideRange& error) {
-      reader.refuse<InputOutsideRange>(*node, fmt::format("\"{}\" in {}: {}", field.key, name, error.what()),
-                                       "correct the value");
-    } catch (const UsageError& error) {
-      reader.refuse(*node, fmt::format("\"{}\" in {}: {}", field.key, name, error.what()), "correct the value");
-    }
+    throw UnknownKey(unknown, cure);
   }
 }
 

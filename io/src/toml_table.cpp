@@ -43,14 +43,18 @@ void check_version(const TomlTable& root, const toml::node& node) {
 
 }  // namespace
 
-void TomlTable::expect_known(const std::vector<std::string_view>& known,
-                             const std::function<std::string(std::string_view)>& elsewhere) const {
+UnknownKey::UnknownKey(const std::filesystem::path& file, Position position, std::string key, const std::string& table,
+                       std::string_view meant, std::span<const std::string_view> known)
+    : InputRefused(file, position, fmt::format("key {} is not known in {}", in_quotes(key), table),
+                   suggestion(key, known)),
+      key_(std::move(key)),
+      is_like_another_(!meant.empty()) {}
+
+void TomlTable::expect_known(const std::vector<std::string_view>& known) const {
   for (const auto& [key, node] : table_) {
     if (std::ranges::find(known, key.str()) == known.end()) {
-      const std::string better = elsewhere ? elsewhere(key.str()) : std::string();
-      throw InputRefused(file_, position_of(key.source()),
-                         fmt::format("key {} is not known in {}", in_quotes(key.str()), name_),
-                         better.empty() ? suggestion(key.str(), known) : better);
+      throw UnknownKey(file_, position_of(key.source()), std::string(key.str()), name_, nearest(key.str(), known),
+                       known);
     }
   }
 }

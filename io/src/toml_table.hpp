@@ -6,8 +6,8 @@
 #include <Eigen/Core>
 #include <cstdint>
 #include <filesystem>
-#include <functional>
 #include <optional>
+#include <span>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -22,6 +22,26 @@ namespace trihedron::io {
   return {static_cast<std::int64_t>(region.begin.line), static_cast<std::int64_t>(region.begin.column)};
 }
 
+/// A key that a table does not know. Who knows more of the document than that table may tell a better cure.
+class UnknownKey : public InputRefused {
+ public:
+  UnknownKey(const std::filesystem::path& file, Position position, std::string key, const std::string& table,
+             std::string_view meant, std::span<const std::string_view> known);
+  /// Of the same key.
+  UnknownKey(const UnknownKey& unknown, std::string cure)
+      : InputRefused(unknown.file(), unknown.position(), unknown.reason(), std::move(cure)),
+        key_(unknown.key_),
+        is_like_another_(unknown.is_like_another_) {}
+
+  [[nodiscard]] const std::string& key() const { return key_; }
+  /// Whether it is like a key that its table knows.
+  [[nodiscard]] bool is_like_another() const { return is_like_another_; }
+
+ private:
+  std::string key_;
+  bool is_like_another_;
+};
+
 /// One table of a document; the document must outlive it.
 class TomlTable {
  public:
@@ -29,10 +49,8 @@ class TomlTable {
   TomlTable(const toml::table& table, std::filesystem::path file, std::string name)
       : table_(table), file_(std::move(file)), name_(std::move(name)) {}
 
-  /// Refuses every key that is not known, suggesting the nearest. `elsewhere` may give a better cure for a key, or an
-  /// empty one.
-  void expect_known(const std::vector<std::string_view>& known,
-                    const std::function<std::string(std::string_view)>& elsewhere = {}) const;
+  /// Refuses every key that is not known, by an UnknownKey that suggests the nearest.
+  void expect_known(const std::vector<std::string_view>& known) const;
 
   [[nodiscard]] const toml::node* find(std::string_view key) const { return table_.get(key); }
   /// The value; refuses a missing key.

@@ -6,6 +6,7 @@
 
 #include <cmath>
 #include <numbers>
+#include <string>
 
 #include "trihedron/io/error.hpp"
 
@@ -81,11 +82,32 @@ TEST(Quantity, RefusesBareNumberSayingWhichUnitsAreAccepted) {
 TEST(Quantity, TellsARangeInTheUnitThatWasGiven) {
   const auto angle = [](std::string_view text) { return parse_angle_rad(text, limits::kAttitudeLimit_rad); };
   EXPECT_DOUBLE_EQ(angle("180deg"), std::numbers::pi);
-  EXPECT_THAT(usage_error(+angle, "400deg"), HasSubstr("\"400deg\" is outside 5.72958e-08 to 180.482 deg: an error"));
+  EXPECT_THAT(usage_error(+angle, "400deg"), HasSubstr("\"400deg\" is outside 5.72958e-08 to 180.481 deg: an error"));
   const auto duration = [](std::string_view text) { return parse_duration(text, {60, 3600, "s", "because"}); };
   EXPECT_EQ(duration("1h"), std::chrono::hours(1));
   EXPECT_THAT(usage_error(+duration, "61min"), HasSubstr("\"61min\" is outside 1 to 60 min: because"));
   EXPECT_THAT(usage_error(+duration, "-1min"), HasSubstr("must not be negative"));
+}
+
+std::string refusal_of_angle(const std::string& text, const Range& range) {
+  try {
+    static_cast<void>(parse_angle_rad(text, range));
+  } catch (const UsageError& error) {
+    return error.what();
+  }
+  return {};
+}
+
+TEST(Quantity, TakesTheEndsOfARangeAsTheyAreTold) {
+  for (const char* unit : {"deg", "arcmin", "arcsec", "rad"}) {
+    for (const Range& range : {limits::kAttitudeLimit_rad, limits::kHalfTurn_rad, limits::kAngle_rad}) {
+      const std::string refused = refusal_of_angle(std::string("1e9") + unit, range);
+      const std::string ends = refused.substr(refused.find("outside ") + 8);
+      EXPECT_EQ(refusal_of_angle(ends.substr(0, ends.find(' ')) + unit, range), "") << refused;
+      const std::string most = ends.substr(ends.find("to ") + 3);
+      EXPECT_EQ(refusal_of_angle(most.substr(0, most.find(' ')) + unit, range), "") << refused;
+    }
+  }
 }
 
 TEST(Quantity, RefusesGarbageNotFiniteOverflowAndUnitsOfAnotherKind) {

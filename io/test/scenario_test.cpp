@@ -230,7 +230,11 @@ TEST(ScenarioToml, ValuesOutsideTheirRangeAreRefusedWhereTheyStand) {
   refuses("attitude", "max_slew_rate = \"0deg/s\"", "\"max_slew_rate\" in [attitude]: \"0deg/s\" is outside");
   refuses("attitude", "max_slew_acceleration = \"0deg/s^2\"", "\"max_slew_acceleration\"");
   refuses("attitude", "jitter = \"-1arcsec\"", "\"jitter\"");
+  refuses("attitude", "jitter_bandwidth = \"0Hz\"", "\"jitter_bandwidth\" is zero where there is jitter");
   refuses("attitude.imaging", "mean_rest = \"0s\"", "\"mean_rest\" in [attitude.imaging]");
+  refuses("attitude.imaging", "mean_rest = \"0s\"", "it is the mean of times that are drawn");
+  refuses("gyro.drift", "hysteresis_width = \"0deg\"", "it is the angle over which the drift changes sides");
+  refuses("gyro", "start_direction_c = [1e-200, 0, 0]", "\"start_direction_c\" is zero");
   refuses("attitude.imaging", "dwell = \"-1s\"", "\"dwell\"");
   refuses("gyro", "alignment_prior_sigma = \"0deg\"", "\"alignment_prior_sigma\"");
   refuses("gyro", "start_direction_c = [0, 0, 0]", "\"start_direction_c\" is zero");
@@ -239,6 +243,20 @@ TEST(ScenarioToml, ValuesOutsideTheirRangeAreRefusedWhereTheyStand) {
   refuses("gyro.drift", "bump_radius = \"91deg\"", "to 90 deg");
   refuses("gyro.drift", "bump_centre = [0, 0, 0]", "\"bump_centre\" is zero");
   refuses("gyro.drift", "harmonics = [{degree = 21}]", "\"degree\" is 21, outside 1 to 20");
+}
+
+TEST(ScenarioToml, AKeyOfAnotherTableIsSentThere) {
+  EXPECT_THAT(why_refused("[gyro.drift]\nspike = \"1deg\""),
+              HasSubstr("scenario.toml:2:1: key \"spike\" is not known in [gyro.drift]; it belongs into [gyro.readout]"));
+  EXPECT_THAT(why_refused("[gyro]\nnoise = \"1arcsec\""),
+              HasSubstr("it belongs into [gyro.readout] or [star_tracker]"));
+  EXPECT_THAT(why_refused("[attitude]\nnu12 = \"1deg/h\""), HasSubstr("it belongs into [gyro.drift.kappa]"));
+  EXPECT_THAT(why_refused("[attitude]\namplitude = \"1deg/h\""), HasSubstr("it belongs into [[gyro.drift.harmonics]]"));
+  EXPECT_THAT(why_refused("[gyro.drift]\nperiod = \"1s\""), HasSubstr("it belongs into [gyro] or [star_tracker]"));
+  EXPECT_THAT(why_refused("[orbit]\nmax_slew_rates = \"1deg/s\""),
+              HasSubstr("did you mean \"max_slew_rate\", which belongs into [attitude]?"));
+  EXPECT_THAT(why_refused("[gyro.drift]\nprior_sigmas = \"1deg/h\""), HasSubstr("did you mean \"prior_sigma\"?"));
+  EXPECT_THAT(why_refused("seed = 3"), HasSubstr("it belongs into [scenario]"));
 }
 
 TEST(ScenarioToml, WhatSeveralKeysSayTogetherIsRefusedWhereItStands) {
@@ -257,6 +275,7 @@ TEST(ScenarioToml, WhatSeveralKeysSayTogetherIsRefusedWhereItStands) {
               HasSubstr("scenario.toml:2:13: this reference needs \"inertial_q_in_c\", which is missing"));
   EXPECT_THAT(why_refused("[attitude]\nreference = \"recorded\""), HasSubstr("add recorded = \"attitude.csv\""));
   EXPECT_EQ(why_refused("[attitude]\nreference = \"inertial\"\ninertial_q_in_c = [0, 0, 0, 1]"), "");
+  EXPECT_EQ(why_refused("[attitude]\njitter = \"0deg\"\njitter_bandwidth = \"0Hz\""), "");
 }
 
 }  // namespace

@@ -35,24 +35,26 @@ inline constexpr double kYear_s = 3.2e7;
 inline constexpr Range kPassDuration_s{60, kYear_s, "s",
                                        "in a pass shorter than a minute nothing can be calibrated, and none is longer "
                                        "than a year"};
-inline constexpr Range kGyroPeriod_s{1e-5, 60, "s", "it is the time between samples: 0.125 for 8 Hz"};
-inline constexpr Range kStarTrackerPeriod_s{1e-3, 86400, "s", "it is the time between fixes: 3 for one every 3 s"};
+inline constexpr Range kGyroPeriod_s{1e-5, 60, "s", "it is the time between samples: 0.125 s for 8 Hz"};
+inline constexpr Range kStarTrackerPeriod_s{1e-3, 86400, "s", "it is the time between fixes, a fraction of a second to some seconds"};
 inline constexpr Range kClockOffset_s{-1e3, 1e3, "s", "it is the time from a stamp to what it stands for"};
-inline constexpr Range kClockRate_s_s{-1e-2, 1e-2, "s/s", "1e-6 is a clock that gains a microsecond each second"};
+inline constexpr Range kClockRate_s_s{-1e-2, 1e-2, "s/s", "1e-6 s/s is a clock that gains a microsecond each second"};
 inline constexpr Range kLatency_s{-10, 10, "s", "it is the time from a reading to its stamp"};
 inline constexpr Range kReadoutNoise_rad{1e-9, 0.1, "rad",
                                          "it is the 1-sigma of a direction cosine, which is at most 1; an arcsecond is "
-                                         "4.8e-6"};
+                                         "4.8e-6 rad"};
 inline constexpr Range kStarTrackerNoise_rad{1e-9, 0.1, "rad",
-                                             "it is the 1-sigma of an attitude; an arcsecond is 4.8e-6"};
-inline constexpr Range kDrift_rad_s{-0.1, 0.1, "rad/s", "no gyro drifts by degrees a second; 1 deg/h is 4.8e-6"};
+                                             "it is the 1-sigma of an attitude; an arcsecond is 4.8e-6 rad"};
+inline constexpr Range kDrift_rad_s{-0.1, 0.1, "rad/s", "no gyro drifts by degrees a second; 1 deg/h is 4.8e-6 rad/s"};
 inline constexpr Range kDriftSigma_rad_s{1e-15, 1e-2, "rad/s",
-                                         "no gyro drifts by half a degree a second; 1 deg/h is 4.8e-6"};
-inline constexpr Range kDriftField_rad_s{0, 0.1, "rad/s", "no gyro drifts by degrees a second; 1 deg/h is 4.8e-6"};
+                                         "no gyro drifts by half a degree a second; 1 deg/h is 4.8e-6 rad/s"};
+inline constexpr Range kDriftField_rad_s{0, 0.1, "rad/s",
+                                          "no gyro drifts by degrees a second; 1 deg/h is 4.8e-6 rad/s"};
 inline constexpr Range kSigmaFactor{1, 1e9, "", "a level is known to a factor of 1 or more"};
 inline constexpr Range kRotation_rad{-kFullTurn_rad, kFullTurn_rad, "rad",
-                                     "it is one component of a rotation vector; a degree is 0.0175"};
-inline constexpr Range kAlignmentSigma_rad{1e-9, 3.15, "rad", "a half turn is all there is; an arcminute is 2.9e-4"};
+                                     "it is one component of a rotation vector; a degree is 0.0175 rad"};
+inline constexpr Range kAlignmentSigma_rad{1e-9, 3.15, "rad",
+                                           "a half turn is all there is; an arcminute is 2.9e-4 rad"};
 
 // ---- Telemetry of others
 
@@ -70,7 +72,8 @@ inline constexpr Range kStudentTFreedom{1, 1e6, "", "give 5 to 20, or 0 for the 
 inline constexpr Range kRejections{1, 1e6, "", "it is a number of fixes"};
 inline constexpr Range kAnglesAfter_s{1e-3, kYear_s, "s", "give some seconds or minutes, or never"};
 inline constexpr Range kCorrectionInterval_s{1e-3, kYear_s, "s", "it is the time between two corrections"};
-inline constexpr Range kNeededError_rad{1e-9, 3.15, "rad", "an arcminute is 2.9e-4, and a half turn is all there is"};
+inline constexpr Range kNeededError_rad{1e-9, 3.15, "rad",
+                                        "an arcminute is 2.9e-4 rad, and a half turn is all there is"};
 inline constexpr Range kNeededInterval_s{1, 3.2e6, "s",
                                          "it is the time between two astro-corrections, a month at most"};
 inline constexpr Range kWanderingDrift_rad_s{1e-15, 1e-2, "rad/s", "give auto, off, or a 1-sigma like 0.01deg/h"};
@@ -81,7 +84,7 @@ inline constexpr Range kPolhodePeriodRate{-0.5, 0.5, "", "it is the change of th
 
 // ---- Calibrations
 
-inline constexpr Range kOrbitalRate_rad_s{-0.01, 0.01, "rad/s", "a low orbit has 1.1e-3"};
+inline constexpr Range kOrbitalRate_rad_s{-0.01, 0.01, "rad/s", "a low orbit has 1.1e-3 rad/s"};
 inline constexpr Range kReadoutBias{-0.1, 0.1, "", "it is the error of a direction cosine, which is at most 1"};
 /// Clock offset in seconds, errors of a star tracker in rad, drift in rad/s.
 inline constexpr Range kFurtherState{-1e3, 1e3, "", "no error of a star tracker or gyro is so large"};
@@ -103,6 +106,8 @@ inline constexpr Range kScenarioRandomWalk_rad_sqrt_s{0, 1e-2, "rad/s^0.5", "no 
 inline constexpr Range kAngle_rad{-kFullTurn_rad, kFullTurn_rad, "rad", "it is at most a full turn"};
 inline constexpr Range kSizeOfAngle_rad{0, kFullTurn_rad, "rad", "it is a size, which is not negative"};
 inline constexpr Range kHalfTurn_rad{0, std::numbers::pi, "rad", "it is an angle between two directions"};
+inline constexpr Range kHysteresisWidth_rad{1e-6, std::numbers::pi / 2, "rad",
+                                            "it is the angle over which the drift changes sides"};
 inline constexpr Range kRadius_rad{1e-6, std::numbers::pi / 2, "rad", "it is a radius of some degrees"};
 inline constexpr Range kCorrelation_rad{1e-6, kFullTurn_rad, "rad", "it is the angle after which an error is another"};
 inline constexpr Range kSizeOfRate_rad_s{0, 10, "rad/s", "it is a size, which is not negative"};
@@ -110,6 +115,7 @@ inline constexpr Range kBodyRate_rad_s{1e-6, 10, "rad/s", "a spacecraft turns by
 inline constexpr Range kInterval_s{-kYear_s, kYear_s, "s", "it is at most a year"};
 inline constexpr Range kStretch_s{0, kYear_s, "s", "it is a length of time, which is not negative"};
 inline constexpr Range kTimeConstant_s{1e-3, kYear_s, "s", "it is the time in which something decays or changes"};
+inline constexpr Range kMeanRest_s{1e-3, kYear_s, "s", "it is the mean of times that are drawn, which cannot all be zero"};
 inline constexpr Range kProbability{0, 1, "", "it is a probability"};
 inline constexpr Range kHarmonicDegree{1, 20, "", "it is the degree of a spherical harmonic"};
 inline constexpr Range kHarmonicOrder{-20, 20, "", "it is the order of a spherical harmonic"};
@@ -136,7 +142,8 @@ inline constexpr Range kPredictionWindow_s{1, 3.1e7, "s",
 inline constexpr Range kFlights{1, 1e6, "", "it is a number of flights"};
 /// A row of a campaign takes a kilobyte of memory when its table is written.
 inline constexpr Range kCampaignRuns{1, 1e6, "",
-                                     "give fewer, or divide the campaign into several with seeds of their own"};
+                                     "a campaign has one run at least; divide one of more than a million into several "
+                                     "with seeds of their own"};
 inline constexpr Range kSpreadOver{0, 20, "", "it is a number of samples; on board no more are taken"};
 inline constexpr Range kJobs{1, 1024, "", "it is a number of threads"};
 
