@@ -67,8 +67,9 @@ TEST(Config, AKeyOfATableIsSentThere) {
   EXPECT_THAT(refused_config("gate_nis = 3\n"),
               HasSubstr("config.toml:1:1: key \"gate_nis\" is not known in the file; it belongs into [filter]"));
   EXPECT_THAT(refused_config("gate_niss = 3\n"), HasSubstr("did you mean \"gate_nis\", which belongs into [filter]?"));
-  EXPECT_THAT(refused_config("[further_states]\ngate_nis = 3\n"),
-              HasSubstr("config.toml:2:1: key \"gate_nis\" is not known in [further_states]; it belongs into [filter]"));
+  EXPECT_THAT(
+      refused_config("[further_states]\ngate_nis = 3\n"),
+      HasSubstr("config.toml:2:1: key \"gate_nis\" is not known in [further_states]; it belongs into [filter]"));
   EXPECT_THAT(refused_config("estimater = 3\n"), HasSubstr("did you mean \"estimator\"?"));
 }
 

@@ -246,8 +246,9 @@ TEST(ScenarioToml, ValuesOutsideTheirRangeAreRefusedWhereTheyStand) {
 }
 
 TEST(ScenarioToml, AKeyOfAnotherTableIsSentThere) {
-  EXPECT_THAT(why_refused("[gyro.drift]\nspike = \"1deg\""),
-              HasSubstr("scenario.toml:2:1: key \"spike\" is not known in [gyro.drift]; it belongs into [gyro.readout]"));
+  EXPECT_THAT(
+      why_refused("[gyro.drift]\nspike = \"1deg\""),
+      HasSubstr("scenario.toml:2:1: key \"spike\" is not known in [gyro.drift]; it belongs into [gyro.readout]"));
   EXPECT_THAT(why_refused("[gyro]\nnoise = \"1arcsec\""),
               HasSubstr("it belongs into [gyro.readout] or [star_tracker]"));
   EXPECT_THAT(why_refused("[attitude]\nnu12 = \"1deg/h\""), HasSubstr("it belongs into [gyro.drift.kappa]"));

@@ -121,12 +121,11 @@ std::string iso_time(Time t) {
   const std::chrono::days whole_days = std::chrono::floor<std::chrono::days>(since_origin);
   const std::chrono::year_month_day date(kTaiOrigin + whole_days);
   const std::chrono::hh_mm_ss<Duration> clock(since_origin - whole_days);
-  std::string text = with_leading_zeros(static_cast<int>(date.year()), 4) + '-' +
-                     with_leading_zeros(static_cast<unsigned>(date.month()), 2) + '-' +
-                     with_leading_zeros(static_cast<unsigned>(date.day()), 2) + 'T' +
-                     with_leading_zeros(clock.hours().count(), 2) + ':' +
-                     with_leading_zeros(clock.minutes().count(), 2) + ':' +
-                     with_leading_zeros(clock.seconds().count(), 2);
+  std::string text =
+      with_leading_zeros(static_cast<int>(date.year()), 4) + '-' +
+      with_leading_zeros(static_cast<unsigned>(date.month()), 2) + '-' +
+      with_leading_zeros(static_cast<unsigned>(date.day()), 2) + 'T' + with_leading_zeros(clock.hours().count(), 2) +
+      ':' + with_leading_zeros(clock.minutes().count(), 2) + ':' + with_leading_zeros(clock.seconds().count(), 2);
   if (clock.subseconds() != Duration::zero()) {
     text += '.' + with_leading_zeros(clock.subseconds().count(), 9);
   }

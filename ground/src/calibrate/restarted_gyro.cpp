@@ -139,12 +139,14 @@ bool turns_for_good(const std::vector<MomentaAtFix>& all, const JumpOfMomentum& 
   const Vector3d after = median_momentum(all, fix, fix + kFixesBeside, jump.gyro);
   return kOneIn * count_near(before, jump.turned_rad / 2, fix, until) <= until - fix &&
          kOneIn * count_near(after, jump.turned_rad / 2, from, fix) <= fix - from &&
-         2 * count_near(before, stays_rad, from, fix) > fix - from && 2 * count_near(after, stays_rad, fix, until) > until - fix;
+         2 * count_near(before, stays_rad, from, fix) > fix - from &&
+         2 * count_near(after, stays_rad, fix, until) > until - fix;
 }
 
 /// Of one momentum before a fix, by more than the limit, while the other turns by less than half of it and the angle
 /// between these two, which no attitude and no stamp changes, is another.
-std::optional<JumpOfMomentum> jump_before(const std::vector<MomentaAtFix>& all, std::size_t fix, const MayTurn& may_turn) {
+std::optional<JumpOfMomentum> jump_before(const std::vector<MomentaAtFix>& all, std::size_t fix,
+                                          const MayTurn& may_turn) {
   const double limit = jump_limit_rad(may_turn, all, fix);
   if (angle_rad(all[fix - 1].h_in[0], all[fix].h_in[0]) < limit &&
       angle_rad(all[fix - 1].h_in[1], all[fix].h_in[1]) < limit) {
@@ -161,7 +163,8 @@ std::optional<JumpOfMomentum> jump_before(const std::vector<MomentaAtFix>& all, 
   const std::size_t gyro = turned_rad[1] > turned_rad[0] ? 1 : 0;
   const double opened_rad = angle_rad(after[0], after[1]) - angle_rad(before[0], before[1]);
   const bool is_alone = turned_rad[1 - gyro] < limit / 2 && std::abs(opened_rad) > limit / 4;
-  return is_alone && turned_rad[gyro] > limit ? std::optional(JumpOfMomentum{fix, gyro, turned_rad[gyro]}) : std::nullopt;
+  return is_alone && turned_rad[gyro] > limit ? std::optional(JumpOfMomentum{fix, gyro, turned_rad[gyro]})
+                                              : std::nullopt;
 }
 
 std::optional<JumpOfMomentum> jump_for_good(const std::vector<MomentaAtFix>& all, const MayTurn& may_turn) {
@@ -195,7 +198,8 @@ void refuse_restarted_gyro(const Pass& pass) {
       const PairOfGyros pair{first, second};
       const std::vector<MomentaAtFix> all = momenta_at_fixes(pass, pair);
       if (const auto jump = jump_for_good(all, may_turn)) {
-        throw error_of_restart(pass.settings, pair[jump->gyro], jump->turned_rad, all[jump->fix - 1].t, all[jump->fix].t);
+        throw error_of_restart(pass.settings, pair[jump->gyro], jump->turned_rad, all[jump->fix - 1].t,
+                               all[jump->fix].t);
       }
     }
   }

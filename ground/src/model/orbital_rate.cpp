@@ -40,8 +40,7 @@ std::optional<UsualTurn> usual_turn(const StarTrackerTelemetry& tracker) {
     }
     const auto before = Rot<In, C>::assume(tracker.q_in_c[i].normalized());
     const auto after = Rot<In, C>::assume(tracker.q_in_c[j].normalized());
-    const Eigen::Vector3d rate =
-        (after * before.inverse()).log().raw() / to_seconds(tracker.t[j] - tracker.t[i]);
+    const Eigen::Vector3d rate = (after * before.inverse()).log().raw() / to_seconds(tracker.t[j] - tracker.t[i]);
     if (rate.allFinite()) {
       rates.push_back(rate);
     }

@@ -145,9 +145,7 @@ void Pipeline::look_at_orbit() {
     set_up();
     for (const auto& before : orbit_->events) {
       std::visit(
-          [&](const auto& its) {
-            static_cast<void>(report_all([&](auto& on_board) { return give(on_board, its); }));
-          },
+          [&](const auto& its) { static_cast<void>(report_all([&](auto& on_board) { return give(on_board, its); })); },
           before);
     }
   }

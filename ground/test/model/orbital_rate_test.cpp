@@ -54,8 +54,8 @@ TEST(OrbitalRate, IsNotThatOfSlews) {
     StarTrackerTelemetry fixes = fixes_of(1.12e-3, hours, 1e9, 1e9);
     for (std::size_t i = 0; i < fixes.size(); ++i) {
       const double phase = std::fmod(to_seconds(fixes.t[i] - Time{}), 130) / 130;
-      fixes.q_in_c[i] = fixes.q_in_c[i] *
-                        Eigen::Quaterniond(Eigen::AngleAxisd(std::abs(phase - 0.5), Eigen::Vector3d::UnitX()));
+      fixes.q_in_c[i] =
+          fixes.q_in_c[i] * Eigen::Quaterniond(Eigen::AngleAxisd(std::abs(phase - 0.5), Eigen::Vector3d::UnitX()));
     }
     return fixes;
   };

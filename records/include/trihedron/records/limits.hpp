@@ -36,7 +36,8 @@ inline constexpr Range kPassDuration_s{60, kYear_s, "s",
                                        "in a pass shorter than a minute nothing can be calibrated, and none is longer "
                                        "than a year"};
 inline constexpr Range kGyroPeriod_s{1e-5, 60, "s", "it is the time between samples: 0.125 s for 8 Hz"};
-inline constexpr Range kStarTrackerPeriod_s{1e-3, 86400, "s", "it is the time between fixes, a fraction of a second to some seconds"};
+inline constexpr Range kStarTrackerPeriod_s{1e-3, 86400, "s",
+                                            "it is the time between fixes, a fraction of a second to some seconds"};
 inline constexpr Range kClockOffset_s{-1e3, 1e3, "s", "it is the time from a stamp to what it stands for"};
 inline constexpr Range kClockRate_s_s{-1e-2, 1e-2, "s/s", "1e-6 s/s is a clock that gains a microsecond each second"};
 inline constexpr Range kLatency_s{-10, 10, "s", "it is the time from a reading to its stamp"};
@@ -49,7 +50,7 @@ inline constexpr Range kDrift_rad_s{-0.1, 0.1, "rad/s", "no gyro drifts by degre
 inline constexpr Range kDriftSigma_rad_s{1e-15, 1e-2, "rad/s",
                                          "no gyro drifts by half a degree a second; 1 deg/h is 4.8e-6 rad/s"};
 inline constexpr Range kDriftField_rad_s{0, 0.1, "rad/s",
-                                          "no gyro drifts by degrees a second; 1 deg/h is 4.8e-6 rad/s"};
+                                         "no gyro drifts by degrees a second; 1 deg/h is 4.8e-6 rad/s"};
 inline constexpr Range kSigmaFactor{1, 1e9, "", "a level is known to a factor of 1 or more"};
 inline constexpr Range kRotation_rad{-kFullTurn_rad, kFullTurn_rad, "rad",
                                      "it is one component of a rotation vector; a degree is 0.0175 rad"};
@@ -115,7 +116,8 @@ inline constexpr Range kBodyRate_rad_s{1e-6, 10, "rad/s", "a spacecraft turns by
 inline constexpr Range kInterval_s{-kYear_s, kYear_s, "s", "it is at most a year"};
 inline constexpr Range kStretch_s{0, kYear_s, "s", "it is a length of time, which is not negative"};
 inline constexpr Range kTimeConstant_s{1e-3, kYear_s, "s", "it is the time in which something decays or changes"};
-inline constexpr Range kMeanRest_s{1e-3, kYear_s, "s", "it is the mean of times that are drawn, which cannot all be zero"};
+inline constexpr Range kMeanRest_s{1e-3, kYear_s, "s",
+                                   "it is the mean of times that are drawn, which cannot all be zero"};
 inline constexpr Range kProbability{0, 1, "", "it is a probability"};
 inline constexpr Range kHarmonicDegree{1, 20, "", "it is the degree of a spherical harmonic"};
 inline constexpr Range kHarmonicOrder{-20, 20, "", "it is the order of a spherical harmonic"};

@@ -21,8 +21,8 @@ namespace trihedron::ground {
 
 /// Everything that it does is in its reports. Its results depend on nothing but the events that it was given. Where
 /// something is estimated at orbital period and the options do not tell the rate of the orbit, that of an earlier
-/// calibration is taken at first, and then that of the fixes so far: from time to time, as it becomes better known, what
-/// came before is flown again with it, without reports. After some hours it stays as it is.
+/// calibration is taken at first, and then that of the fixes so far: from time to time, as it becomes better known,
+/// what came before is flown again with it, without reports. After some hours it stays as it is.
 class Pipeline {
  public:
   /// Whether the calibration predicts to each sample, as on board, or may pass over some
