@@ -41,7 +41,7 @@ void find_places(const Json& schema, const std::string& path, bool in_array, Pla
   }
   for (const auto& [key, its] : schema.value("properties", Json::object()).items()) {
     if (!path.empty()) {
-      (in_array ? repeated : single)[key].push_back(fmt::format(in_array ? "[[{}]]" : "[{}]", path));
+      (in_array ? repeated : single)[key].push_back(in_array ? fmt::format("[[{}]]", path) : fmt::format("[{}]", path));
     }
     find_places(its, path.empty() ? key : path + '.' + key, in_array, single, repeated);
   }

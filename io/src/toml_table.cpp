@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "text_file.hpp"
+#include "trihedron/records/text.hpp"
 #include "wording.hpp"
 
 namespace trihedron::io {
