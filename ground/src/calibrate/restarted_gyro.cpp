@@ -179,10 +179,13 @@ std::optional<JumpOfMomentum> jump_for_good(const std::vector<MomentaAtFix>& all
 
 SetupError error_of_restart(const PassSettings& settings, int gyro, double turned_rad, Time last, Time first) {
   using std::chrono::seconds;
+  const bool is_reversed = turned_rad > std::numbers::pi - kLeastJump_rad;
   return {fmt::format("the momentum of gyro {} turns by {:.1f} deg between t = {:.0f} s and {:.0f} s, and stays there: "
-                      "as of a rotor that was started anew, whose coefficients are others then",
+                      "as of {}",
                       gyro + 1, turned_rad * 180 / std::numbers::pi, to_seconds(last - settings.epoch),
-                      to_seconds(first - settings.epoch)),
+                      to_seconds(first - settings.epoch),
+                      is_reversed ? "readings that are given with another sign from then on"
+                                  : "a rotor that was started anew, whose coefficients are others then"),
           fmt::format("calibrate the parts apart: cut them out by \"trihedron import PASS --to {} -o BEFORE\" and "
                       "\"trihedron import PASS --from {} -o AFTER\"",
                       iso_time(std::chrono::floor<seconds>(last)), iso_time(std::chrono::ceil<seconds>(first)))};

@@ -97,6 +97,20 @@ TEST(RestartedGyro, IsFoundBesideOneThatIsSilent) {
   expect_restart_of(three, "gyro 3");
 }
 
+TEST(RestartedGyro, IsNotWhatIsSaidOfReadingsThatChangeTheirSign) {
+  Pass pass = two_hours().pass;
+  for (std::size_t i = pass.gyro.size() / 2; i < pass.gyro.size(); ++i) {
+    Eigen::Map<Eigen::Vector3d>(&pass.gyro.h[(2 * i + 1) * 3]) *= -1;
+  }
+  try {
+    refuse_restarted_gyro(pass);
+    FAIL() << "it is taken";
+  } catch (const SetupError& refusal) {
+    EXPECT_THAT(refusal.what(), HasSubstr("gyro 2 turns by 180.0 deg"));
+    EXPECT_THAT(refusal.what(), HasSubstr("with another sign"));
+  }
+}
+
 /// The case turns with the body, which no rotor does.
 TEST(RestartedGyro, IsNoneOfReadingsThatDoNotChangeOrAreOfOtherAxes) {
   Pass dead = two_hours().pass;
