@@ -2,6 +2,7 @@
 
 #include <Eigen/Core>
 #include <algorithm>
+#include <chrono>
 #include <cmath>
 #include <numbers>
 #include <optional>
@@ -68,14 +69,19 @@ bool is_of_an_orbit(double rate_rad_s) {
 }  // namespace
 
 std::optional<double> orbital_rate_so_far_rad_s(const StarTrackerTelemetry& tracker) {
-  constexpr double kWellEnough = 0.03;  // over a short time the phase is off by little
-  if (tracker.size() > 0 && tracker.t.back() - tracker.t.front() > kLongForOrbitalRate) {
+  constexpr double kWellEnough = 0.03;                        // over a short time the phase is off by little
+  constexpr Duration kEnoughOfSlews = std::chrono::hours(1);  // their mean is known to some hundredths
+  const Duration passed = tracker.size() > 0 ? tracker.t.back() - tracker.t.front() : Duration::zero();
+  if (passed > kLongForOrbitalRate) {
     return shown_orbital_rate_rad_s(tracker);
   }
   const std::optional<UsualTurn> usual = usual_turn(tracker);
   const double rate_rad_s = usual ? usual->rate_rad_s.norm() : 0;
-  const bool is_known = is_of_an_orbit(rate_rad_s) && usual->sigma_rad_s < kWellEnough * rate_rad_s;
-  return is_known ? std::optional(rate_rad_s) : std::nullopt;
+  if (usual && is_of_an_orbit(rate_rad_s) && usual->sigma_rad_s < kWellEnough * rate_rad_s) {
+    return rate_rad_s;
+  }
+  const bool slews_mostly = usual && usual->sigma_rad_s > kWellEnough * kLowOrbit_rad_s;
+  return slews_mostly && passed > kEnoughOfSlews ? shown_orbital_rate_rad_s(tracker) : std::nullopt;
 }
 
 double orbital_rate_rad_s(const StarTrackerTelemetry& tracker) {

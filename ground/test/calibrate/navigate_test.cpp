@@ -235,18 +235,21 @@ TEST(Navigate, KeepsTheRateOfTheOrbitFromAnEarlierCalibrationWhereTheAttitudeIsF
 
 /// Of a body that slews most of the time the orbit is told late.
 TEST(Navigate, IsNotMisledBySlewsAboutThePeriodOfTheOrbit) {
-  for (const auto& [rest_s, dwell_s] : {std::pair{5.0, 5.0}, std::pair{60.0, 20.0}, std::pair{120.0, 60.0}}) {
-    Scenario scenario = scenario_in_eq1(8, minutes(160));
-    scenario.star_tracker.orbital_sine_rad = {2e-4, -1e-4, 2e-4};
-    scenario.star_tracker.orbital_cosine_rad = {-1e-4, 2e-4, 1e-4};
+  struct Case {
+    double rest_s, dwell_s, altitude_m;
+  };
+  for (const auto& [rest_s, dwell_s, altitude_m] :
+       {Case{5, 5, 500e3}, Case{60, 20, 500e3}, Case{120, 60, 500e3}, Case{5, 5, 1000e3}}) {
+    Scenario scenario = with_orbital_error(scenario_in_eq1(8, minutes(160)), altitude_m);
     auto& imaging = std::get<ImagingProgramme>(scenario.attitude.slews);
     imaging.mean_rest_s = rest_s;
     imaging.dwell_s = dwell_s;
     const sim::SimulatedPass simulated = sim::simulate(scenario);
     CalibrationOptions options;
     options.corrections.interval = minutes(20);
-    EXPECT_LT(normalised_square_at_end(simulated, navigate(simulated.pass, options), 1), 3) << rest_s;
-    EXPECT_LT(normalised_square_at_end(simulated, navigate(simulated.pass, options), 2), 3) << rest_s;
+    const NavigationRun run = navigate(simulated.pass, options);
+    EXPECT_LT(normalised_square_at_end(simulated, run, 1), altitude_m < 800e3 ? 3 : 10) << rest_s;
+    EXPECT_LT(normalised_square_at_end(simulated, run, 2), 3) << rest_s << " " << altitude_m;
   }
 }
 

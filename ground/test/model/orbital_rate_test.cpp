@@ -60,6 +60,7 @@ TEST(OrbitalRate, IsNotThatOfSlews) {
     return fixes;
   };
   EXPECT_EQ(orbital_rate_so_far_rad_s(agile(1.0 / 3)), std::nullopt);
+  EXPECT_NEAR(orbital_rate_so_far_rad_s(agile(1.33)).value_or(0), 1.12e-3, 4e-5);
   EXPECT_NEAR(orbital_rate_so_far_rad_s(agile(2.67)).value_or(0), 1.12e-3, 2e-5);
 }
 
