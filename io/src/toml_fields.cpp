@@ -39,7 +39,8 @@ void find_places(const Json& schema, const std::string& path, bool in_array, Pla
   if (schema.contains("items")) {
     find_places(schema["items"], path, true, single, repeated);
   }
-  for (const auto& [key, its] : schema.value("properties", Json::object()).items()) {
+  const Json properties = schema.value("properties", Json::object());
+  for (const auto& [key, its] : properties.items()) {
     if (!path.empty()) {
       (in_array ? repeated : single)[key].push_back(in_array ? fmt::format("[[{}]]", path) : fmt::format("[{}]", path));
     }
