@@ -28,25 +28,28 @@ const toml::array& elements_of(const TomlTable& table, const toml::node& node, s
   return *array;
 }
 
-/// Where keys stand: the tables in which one is known, those that are no element of an array first.
-using Places = std::map<std::string, std::vector<std::string>, std::less<>>;
+/// Where keys stand: the tables in which one is known.
+struct Places {
+  using OfKeys = std::map<std::string, std::vector<std::string>, std::less<>>;
+  OfKeys single;
+  OfKeys in_arrays;  ///< in elements of arrays
 
-/// Adds the keys of the tables in a table of this schema. `path`: of that table, as "gyro.drift", empty for the file.
-void find_places(const Json& schema, const std::string& path, bool in_array, Places& single, Places& repeated) {
-  for (const Json& one : schema.value("anyOf", Json::array())) {
-    find_places(one, path, in_array, single, repeated);
-  }
-  if (schema.contains("items")) {
-    find_places(schema["items"], path, true, single, repeated);
-  }
-  const Json properties = schema.value("properties", Json::object());
-  for (const auto& [key, its] : properties.items()) {
-    if (!path.empty()) {
-      (in_array ? repeated : single)[key].push_back(in_array ? fmt::format("[[{}]]", path) : fmt::format("[{}]", path));
+  /// Adds the keys of the tables in a table of this schema. `path`: of that table, as "gyro.drift".
+  void add(const Json& schema, const std::string& path, bool is_element, bool in_array) {
+    for (const Json& one : schema.value("anyOf", Json::array())) {
+      add(one, path, is_element, in_array);
     }
-    find_places(its, path.empty() ? key : path + '.' + key, in_array, single, repeated);
+    if (schema.contains("items")) {
+      add(schema["items"], path, true, true);
+    }
+    const Json properties = schema.value("properties", Json::object());
+    for (const auto& [key, its] : properties.items()) {
+      (in_array ? in_arrays : single)[key].push_back(is_element ? fmt::format("[[{}]]", path)
+                                                                : fmt::format("[{}]", path));
+      add(its, fmt::format("{}.{}", path, key), false, in_array);
+    }
   }
-}
+};
 
 /// The cure where a key that a table does not know is one of another table of the document; empty where it is none.
 /// `fields`: of the document, or of a table in it that is called `name`.
@@ -55,25 +58,25 @@ std::string belongs_into(const UnknownKey& unknown, const std::string& name, con
     return "";
   }
   const std::string path = name.starts_with('[') ? name.substr(1, name.size() - 2) : "";
-  Places single;
-  Places repeated;
+  Places places;
   for (const Field& field : fields) {
-    find_places(field.schema(), path.empty() ? std::string(field.key) : fmt::format("{}.{}", path, field.key), false,
-                single, repeated);
+    places.add(field.schema(), path.empty() ? std::string(field.key) : fmt::format("{}.{}", path, field.key), false,
+               false);
   }
-  for (const Places* places : {&single, &repeated}) {
-    if (const auto found = places->find(unknown.key()); found != places->end()) {
+  for (const Places::OfKeys* tables : {&places.single, &places.in_arrays}) {
+    if (const auto found = tables->find(unknown.key()); found != tables->end()) {
       return fmt::format("it belongs into {}", fmt::join(found->second, " or "));
     }
   }
   if (unknown.is_like_another()) {
     return "";
   }
-  const std::vector<std::string_view> keys(std::views::keys(single).begin(), std::views::keys(single).end());
+  const std::vector<std::string_view> keys(std::views::keys(places.single).begin(),
+                                           std::views::keys(places.single).end());
   const std::string_view meant = nearest(unknown.key(), keys);
   return meant.empty() ? ""
                        : fmt::format("did you mean \"{}\", which belongs into {}?", meant,
-                                     fmt::join(single.find(meant)->second, " or "));
+                                     fmt::join(places.single.find(meant)->second, " or "));
 }
 
 void read_each(const TomlTable& reader, const std::string& name, const Fields& fields) {

@@ -252,7 +252,7 @@ TEST(ScenarioToml, AKeyOfAnotherTableIsSentThere) {
   EXPECT_THAT(why_refused("[gyro]\nnoise = \"1arcsec\""),
               HasSubstr("it belongs into [gyro.readout] or [star_tracker]"));
   EXPECT_THAT(why_refused("[attitude]\nnu12 = \"1deg/h\""), HasSubstr("it belongs into [gyro.drift.kappa]"));
-  EXPECT_THAT(why_refused("[attitude]\namplitude = \"1deg/h\""), HasSubstr("it belongs into [[gyro.drift.harmonics]]"));
+  EXPECT_THAT(why_refused("[attitude]\namplitude = \"1deg/h\""), HasSubstr("or [[gyro.drift.harmonics]]"));
   EXPECT_THAT(why_refused("[gyro.drift]\nperiod = \"1s\""), HasSubstr("it belongs into [gyro] or [star_tracker]"));
   EXPECT_THAT(why_refused("[orbit]\nmax_slew_rates = \"1deg/s\""),
               HasSubstr("did you mean \"max_slew_rate\", which belongs into [attitude]?"));
