@@ -73,8 +73,10 @@ uint32_t trihedron_on_fix(trihedron_application* its, const trihedron_star_fix* 
 /** The attitude at the latest sample. 1, or 0 where there is none, and nothing is written. */
 uint32_t trihedron_get_attitude(const trihedron_application* its, trihedron_attitude* attitude);
 
-/** What the filter has found. 1, or 0 before the first fix, and nothing is written. Some ten thousand operations, and 6 KB of stack for two gyros, 13 KB
- * for three. */
+/**
+ * What the filter has found. 1; or 0 before the first fix, and between the two calls in which a fix is taken in, and nothing is written: to be asked
+ * again after the next sample. Some ten thousand operations, and 6 KB of stack for two gyros, 13 KB for three.
+ */
 uint32_t trihedron_get_calibration(const trihedron_application* its, trihedron_calibration* calibration);
 
 /** What the application tells of itself, in any mode. */

@@ -144,7 +144,9 @@ enum trihedron_fix {
   /** The estimate was no longer finite: the filter returns to the prior and starts with the next fix. */
   TRIHEDRON_FIX_ESTIMATE_LOST = 14,
   /** The quaternion of the fix before it once more, while the gyros show that the body has turned. */
-  TRIHEDRON_FIX_REJECTED_FROZEN = 15
+  TRIHEDRON_FIX_REJECTED_FROZEN = 15,
+  /** Used with wider sigmas: the innovations were correlated in time. */
+  TRIHEDRON_FIX_USED_AFTER_WIDENING = 16
 };
 
 /** Whether a gyro is used. */
@@ -212,7 +214,7 @@ typedef struct trihedron_attitude {
 /** What the filter has found, whether the navigator uses it or not; `drift_rad_s`, `alignment_rad` and `covariance`
  *  as the table of parameters takes them. */
 typedef struct trihedron_calibration {
-  /** ns. TAI of the last fix used. */
+  /** ns. TAI of the last fix that it rests on. */
   int64_t time_ns;
   /** Of these tables. */
   uint32_t version;
@@ -299,8 +301,8 @@ typedef struct trihedron_housekeeping {
   uint8_t last_answer;
   /** Of `gyro`, gyro by gyro. */
   uint8_t gyros[4];
-  /** 0. */
-  uint8_t reserved[4];
+  /** Of the sigmas of the filter, whose innovations were correlated in time. */
+  uint32_t widenings;
 } trihedron_housekeeping;
 
 /** Of the record, bytes. */
@@ -347,8 +349,8 @@ typedef struct trihedron_parameters {
   /** Samples over which the work of a fix is spread, or over those up to the next fix if these are fewer, so that no
    *  call takes much longer than another; 0: it is done at once. */
   uint32_t spread_over;
-  /** 0. */
-  uint32_t reserved;
+  /** 1: where its innovations are correlated in time the filter widens its sigmas; 0: it does not. */
+  uint32_t widen_where_correlated;
   /** rad/s. k0, μ12, μ23, μ31, ν12, ν23, ν31 of each gyro, as known before. */
   double drift_rad_s[3][7];
   /** rad. Rotation vector of C_c_b of each gyro, c axes, as known before. */
@@ -380,7 +382,7 @@ typedef struct trihedron_parameters {
     .restart_within_fixes = 200, \
     .aligned_after_fixes = 20, \
     .spread_over = 20, \
-    .reserved = 0, \
+    .widen_where_correlated = 1, \
     .drift_rad_s = {{0}}, \
     .alignment_rad = {{0}}, \
     .covariance = {0}, \

@@ -265,6 +265,9 @@ void Application<Estimator>::note_fix(const StepReport& report) {
     return;
   }
   detail::count_up(counts_.fixes_used);
+  if (report.fix.status == FixStatus::kUsedAfterWidening) {
+    detail::count_up(counts_.widenings);
+  }
   note_used_fix(report);
 }
 
@@ -451,11 +454,11 @@ bool Application<Estimator>::get(CalibrationRecord& record) const {
   constexpr int kMost = Estimator::Gyros::capacity();
   static_assert(kMost <= TRIHEDRON_MAX_GYROS && Estimator::kMaxStates == Layout{.gyros = kMost}.size(),
                 "the record has room for eq. (1) alone");
-  if (!estimator.started()) {
+  if (!estimator.started() || !on_board_.estimate_is_whole()) {
     return false;
   }
   record = {};
-  record.time_ns = fix_t_.time_since_epoch().count();
+  record.time_ns = on_board_.fix_taken_in().value_or(fix_t_).time_since_epoch().count();
   record.version = TRIHEDRON_TABLES_VERSION;
   record.gyros = static_cast<std::uint32_t>(layout.gyros);
   for (int k = 0; k < layout.gyros; ++k) {
@@ -542,6 +545,7 @@ Answer Application<Estimator>::load(const Parameters& table) {
   setup.reopen_after_rejections = as_int(table.reopen_after_rejections);
   setup.reopen_after_jump_rejections = as_int(table.reopen_after_jump_rejections);
   setup.restart_within_fixes = as_int(table.restart_within_fixes);
+  setup.widen_where_correlated = table.widen_where_correlated != 0;
   Gyros prior;
   for (int k = 0; k < gyros; ++k) {
     setup.readout_noise_rad[k] = table.readout_noise_rad[k];

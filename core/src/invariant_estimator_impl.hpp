@@ -52,7 +52,8 @@ void InvariantEstimator<kCapacity>::forget() {
   gyros_ = prior_gyros_;
   shared_ = Shared::Zero(layout().shared_size());
   information_.reset(layout().size(), layout().dynamic());
-  gate_ = OutlierGate(setup_);
+  gate_ = {};
+  correlation_ = {};
   begin_stretch();
   angles_since_fix_ = 0;
   angle_rejections_in_a_row_ = 0;
@@ -210,6 +211,7 @@ void InvariantEstimator<kCapacity>::start(const Seen& its, const FixReadings& re
     R.template block<3, 3>(row, row).diagonal().array() += sigma * sigma;
   }
   information_.reset(layout.size(), layout.dynamic());
+  correlation_ = {};
   prior_.unpack(information_.root());
   std::ranges::fill(second_order_rad_, 0.0);
   second_order_ = {};
@@ -359,9 +361,9 @@ void InvariantEstimator<kCapacity>::put_innovation(White& white) const {
   }
   ComponentCovariance root = white.covariance;
   static_cast<void>(factorize(root));
-  FixReport::Innovation y = white.rows.col(layout().size());
-  solve_lower(matrix_of(root), y);
-  white.nis = y.squaredNorm();
+  white.y = white.rows.col(layout().size());
+  solve_lower(matrix_of(root), white.y);
+  white.nis = white.y.squaredNorm();
 }
 
 template <Capacity kCapacity>
@@ -510,7 +512,7 @@ void InvariantEstimator<kCapacity>::ask_gate(const FixComparison& comparison, co
   const ComponentCovariance left = white.L.lazyProduct(white.covariance);
   detail::report_innovation(layout(), comparison, left.lazyProduct(white.L.transpose()), report);
 
-  report.status = gate_.judge(report.nis, misfit_rad, comparison.components());
+  report.status = gate_.judge(setup_, report.nis, misfit_rad, comparison.components());
   report.rejections_in_a_row = gate_.rejections_in_a_row();
   report.jumped = gate_.jumped();
   report.weight = student_t_weight(setup_.student_t_freedom, report.nis, comparison.components());
@@ -520,7 +522,7 @@ void InvariantEstimator<kCapacity>::ask_gate(const FixComparison& comparison, co
 
 template <Capacity kCapacity>
 int InvariantEstimator<kCapacity>::cost(const Correction& correction) {
-  constexpr std::array<int, 11> kCosts = {25, 120, 185, 85, 150, 140, 420, 300, 160, 30, 0};
+  constexpr std::array<int, 12> kCosts = {25, 120, 185, 85, 150, 140, 420, 300, 300, 160, 30, 0};
   return kCosts[static_cast<std::size_t>(correction.stage)];
 }
 
@@ -531,7 +533,7 @@ int InvariantEstimator<kCapacity>::cost_to_end(const Correction& correction) {
   int sum = 0;
   for (auto stage = static_cast<int>(correction.stage); stage < static_cast<int>(Stage::kDone); ++stage) {
     next.stage = static_cast<Stage>(stage);
-    const bool is_unusual = next.stage == Stage::kFault || next.stage == Stage::kRestart;
+    const bool is_unusual = next.stage == Stage::kFault || next.stage == Stage::kRestart || next.stage == Stage::kWidening;
     sum += is_unusual && next.stage != correction.stage ? 0 : cost(next);
   }
   return sum;
@@ -630,6 +632,10 @@ void InvariantEstimator<kCapacity>::take(Correction& correction, const StarFix& 
       report.weight = 1;
       correction.stage = Stage::kDone;
       break;
+    case Stage::kWidening:
+      widen();
+      correction.stage = Stage::kUpdate;
+      break;
     case Stage::kUpdate:
       update(correction, seen(fix, readings), fix, readings, report);
       break;
@@ -668,7 +674,8 @@ void InvariantEstimator<kCapacity>::judge(Correction& correction, const Seen& it
   using Stage = typename Correction::Stage;
   const FixComparison comparison = compared(its, correction, readings);
   const double misfit_rad = detail::misfit_rad(comparison);
-  ask_gate(comparison, whitened(comparison, its.R_c, correction.reading_noise_rad), misfit_rad, report);
+  const White white = whitened(comparison, its.R_c, correction.reading_noise_rad);
+  ask_gate(comparison, white, misfit_rad, report);
   correction.stage = Stage::kUpdate;
   if (report.status != FixStatus::kUsed) {
     second_order_.hold_s = 0;  // the next fix is further from the last that was used
@@ -692,7 +699,42 @@ void InvariantEstimator<kCapacity>::judge(Correction& correction, const Seen& it
       report.weight = 1;
       break;
     default:
+      look_for_correlation(correction, white, report);
       break;
+  }
+}
+
+template <Capacity kCapacity>
+void InvariantEstimator<kCapacity>::look_for_correlation(Correction& correction, const White& white,
+                                                         FixReport& report) {
+  if (!setup_.widen_where_correlated) {
+    return;
+  }
+  correlation_.add(white.y);
+  if (correlation_.found()) {
+    correlation_ = {};
+    report.status = FixStatus::kUsedAfterWidening;
+    correction.stage = Correction::Stage::kWidening;
+  }
+}
+
+template <Capacity kCapacity>
+void InvariantEstimator<kCapacity>::widen() {
+  const int size = layout().size();
+  const RowsView R = information_.root();
+  for (int i = 0; i < size; ++i) {
+    for (int j = i; j < size; ++j) {
+      R(i, j) /= kWidening;
+    }
+  }
+  const double rest = std::sqrt(1 - 1 / (kWidening * kWidening));
+  Eigen::Matrix<double, 1, Eigen::Dynamic, Eigen::RowMajor, 1, kMaxStates> row(1, size);
+  for (int i = layout().dynamic(); i < size; ++i) {
+    row.setZero();
+    for (int j = i; j < size; ++j) {
+      row(0, j) = rest * prior_(i, j);
+    }
+    information_.add_information(rows_of(row));
   }
 }
 

@@ -17,20 +17,20 @@ double gate_of_freedom(int freedom, double gate_nis) {
   return freedom * root * root * root;
 }
 
-FixStatus OutlierGate::judge(double nis, double misfit_rad, int freedom) {
+FixStatus OutlierGate::judge(const CalibrationSetup& setup, double nis, double misfit_rad, int freedom) {
   const double largest_rad = kLargestStep_rad + kLargestRate_rad_s * since_fix_s_;
   const double before_rad = std::exchange(misfit_rad_, misfit_rad);
   const bool jumped_now = !(misfit_rad - before_rad <= largest_rad);
   since_fix_s_ = 0;
   FixStatus status = FixStatus::kUsed;
-  if (!(nis <= gate_of_freedom(freedom, gate_nis_))) {
-    look_for_jump(jumped_now, before_rad, largest_rad);
-    if (++rejections_in_a_row_ < (jumped_ ? reopen_after_jump_ : reopen_after_)) {
+  if (!(nis <= gate_of_freedom(freedom, setup.gate_nis))) {
+    look_for_jump(jumped_now, before_rad, largest_rad, setup.reopen_after_rejections);
+    if (++rejections_in_a_row_ < (jumped_ ? setup.reopen_after_jump_rejections : setup.reopen_after_rejections)) {
       return FixStatus::kRejectedByGate;
     }
     status = under_suspicion_ > 0 ? FixStatus::kRestarted : FixStatus::kUsedAfterReopening;
     restarted_ = status == FixStatus::kRestarted;
-    under_suspicion_ = restart_within_;
+    under_suspicion_ = setup.restart_within_fixes;
     misfit_rad_ = 0;
   } else {
     under_suspicion_ = std::max(under_suspicion_ - 1, 0);
@@ -41,14 +41,14 @@ FixStatus OutlierGate::judge(double nis, double misfit_rad, int freedom) {
   return status;
 }
 
-void OutlierGate::look_for_jump(bool jumped_now, double before_rad, double largest_rad) {
+void OutlierGate::look_for_jump(bool jumped_now, double before_rad, double largest_rad, int reopen_after) {
   if (jumped_now && confirmed_) {
     before_jump_rad_ = jumped_ ? before_jump_rad_ : before_rad;
     jumped_ = true;
     back_ = 0;
   } else if (jumped_) {
     back_ = misfit_rad_ <= before_jump_rad_ + largest_rad ? back_ + 1 : 0;
-    jumped_ = back_ < reopen_after_;
+    jumped_ = back_ < reopen_after;
   }
 }
 

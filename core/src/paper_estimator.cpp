@@ -37,7 +37,7 @@ std::optional<SetupFault> PaperEstimator::set_up(const CalibrationSetup& setup, 
 void PaperEstimator::forget() {
   gyros_ = prior_gyros_;
   information_ = prior_;
-  gate_ = OutlierGate(setup_);
+  gate_ = {};
   since_fix_ = {};
   time_since_fix_s_ = 0;
   extra_variance_rad2_ = 0;
@@ -188,7 +188,7 @@ FixReport PaperEstimator::take(const StarFix& fix, const FixReadings& readings) 
   }
 
   report_innovation(measurement, rows, L, report);
-  report.status = gate_.judge(report.nis, measurement.innovation.norm());
+  report.status = gate_.judge(setup_, report.nis, measurement.innovation.norm());
   report.rejections_in_a_row = gate_.rejections_in_a_row();
   report.jumped = gate_.jumped();
   report.weight = student_t_weight(setup_.student_t_freedom, report.nis, kMeasurements);

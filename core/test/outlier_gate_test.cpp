@@ -10,17 +10,25 @@ namespace {
 constexpr double kSmall_rad = 1e-3;
 constexpr double kLie_rad = 0.05;
 
-OutlierGate make_gate(int reopen_after, int reopen_after_jump) {
-  CalibrationSetup setup;
-  setup.gate_nis = 30;
-  setup.reopen_after_rejections = reopen_after;
-  setup.reopen_after_jump_rejections = reopen_after_jump;
-  setup.restart_within_fixes = 10;
-  return OutlierGate(setup);
-}
+/// With the set-up that it is asked by.
+class Gate : public OutlierGate {
+ public:
+  Gate(int reopen_after, int reopen_after_jump) {
+    setup_.gate_nis = 30;
+    setup_.reopen_after_rejections = reopen_after;
+    setup_.reopen_after_jump_rejections = reopen_after_jump;
+    setup_.restart_within_fixes = 10;
+  }
+  FixStatus judge(double nis, double misfit_rad, int freedom = kPairComponents) {
+    return OutlierGate::judge(setup_, nis, misfit_rad, freedom);
+  }
+
+ private:
+  CalibrationSetup setup_;
+};
 
 /// How many of the same misfit, one each 3 s, are rejected before one is used.
-int rejections(OutlierGate& gate, double misfit_rad) {
+int rejections(Gate& gate, double misfit_rad) {
   int count = 0;
   while (gate.judge(100, misfit_rad) == FixStatus::kRejectedByGate) {
     gate.elapse(3);
@@ -39,7 +47,7 @@ TEST(GateOfFreedom, IsPassedAsOftenByGoodMeasurements) {
 }
 
 TEST(OutlierGate, RejectsAboveTheGateAndWhatIsNoNumber) {
-  OutlierGate gate = make_gate(5, 50);
+  Gate gate(5, 50);
   EXPECT_EQ(gate.judge(29.9, kSmall_rad), FixStatus::kUsed);
   EXPECT_EQ(gate.judge(30.1, kSmall_rad), FixStatus::kRejectedByGate);
   EXPECT_FALSE(gate.jumped());
@@ -53,7 +61,7 @@ TEST(OutlierGate, RejectsAboveTheGateAndWhatIsNoNumber) {
 }
 
 TEST(OutlierGate, ReopensAfterARunAndRestartsAfterAnotherSoon) {
-  OutlierGate gate = make_gate(3, 50);
+  Gate gate(3, 50);
   const auto run = [&] {
     EXPECT_EQ(gate.judge(100, kSmall_rad), FixStatus::kRejectedByGate);
     EXPECT_EQ(gate.judge(100, kSmall_rad), FixStatus::kRejectedByGate);
@@ -71,7 +79,7 @@ TEST(OutlierGate, ReopensAfterARunAndRestartsAfterAnotherSoon) {
 }
 
 TEST(OutlierGate, WaitsLongerWhereTheMisfitHasJumped) {
-  OutlierGate gate = make_gate(3, 50);
+  Gate gate(3, 50);
   EXPECT_EQ(gate.judge(4, kSmall_rad), FixStatus::kUsed);
   EXPECT_EQ(rejections(gate, kLie_rad), 49);
   // What it has reopened to is in doubt until a fix agrees with it.
@@ -81,21 +89,21 @@ TEST(OutlierGate, WaitsLongerWhereTheMisfitHasJumped) {
 }
 
 TEST(OutlierGate, DoesNotWaitLongerOnceTheMisfitIsBackAsFarAsDriftMayTell) {
-  OutlierGate gate = make_gate(3, 50);
+  Gate gate(3, 50);
   EXPECT_EQ(gate.judge(4, kSmall_rad), FixStatus::kUsed);
   EXPECT_EQ(gate.judge(100, kLie_rad), FixStatus::kRejectedByGate);
   EXPECT_EQ(rejections(gate, kSmall_rad + 0.9 * OutlierGate::kLargestStep_rad), 2);
 }
 
 TEST(OutlierGate, WaitsLongerWhereASmallOutlierWentBefore) {
-  OutlierGate gate = make_gate(3, 50);
+  Gate gate(3, 50);
   EXPECT_EQ(gate.judge(4, kSmall_rad), FixStatus::kUsed);
   EXPECT_EQ(gate.judge(100, kSmall_rad), FixStatus::kRejectedByGate);
   EXPECT_EQ(rejections(gate, kLie_rad), 48);
 }
 
 TEST(OutlierGate, DoesNotWaitLongerForAnOutlierInARun) {
-  OutlierGate gate = make_gate(5, 50);
+  Gate gate(5, 50);
   EXPECT_EQ(gate.judge(4, kSmall_rad), FixStatus::kUsed);
   for (const double misfit_rad : {kSmall_rad, kSmall_rad, kLie_rad, kSmall_rad, kSmall_rad, kSmall_rad, kSmall_rad}) {
     EXPECT_EQ(gate.judge(100, misfit_rad), FixStatus::kRejectedByGate);
@@ -104,7 +112,7 @@ TEST(OutlierGate, DoesNotWaitLongerForAnOutlierInARun) {
 }
 
 TEST(OutlierGate, WaitsLongerWhereTheMisfitComesBackNowAndThen) {
-  OutlierGate gate = make_gate(3, 50);
+  Gate gate(3, 50);
   EXPECT_EQ(gate.judge(4, kSmall_rad), FixStatus::kUsed);
   int count = 0;
   while (gate.judge(100, count % 3 == 0 ? kLie_rad : kSmall_rad) == FixStatus::kRejectedByGate) {
@@ -114,20 +122,20 @@ TEST(OutlierGate, WaitsLongerWhereTheMisfitComesBackNowAndThen) {
 }
 
 TEST(OutlierGate, IsAsWideForEachNumberOfComponents) {
-  OutlierGate gate = make_gate(5, 50);
+  Gate gate(5, 50);
   EXPECT_EQ(gate.judge(33, kSmall_rad), FixStatus::kRejectedByGate);
   EXPECT_EQ(gate.judge(33, kSmall_rad, 6), FixStatus::kUsed);
 }
 
 TEST(OutlierGate, DoesNotTakeWhatDriftMayDoInTheTimeForAJump) {
   for (const double since_s : {3.0, 6000.0}) {
-    OutlierGate gate = make_gate(3, 50);
+    Gate gate(3, 50);
     EXPECT_EQ(gate.judge(4, kSmall_rad), FixStatus::kUsed);
     gate.elapse(since_s);
     EXPECT_EQ(rejections(gate, kLie_rad), since_s > 5000 ? 2 : 49) << since_s;
   }
   // Nor what grows step by step.
-  OutlierGate gate = make_gate(10, 50);
+  Gate gate(10, 50);
   EXPECT_EQ(gate.judge(4, 0), FixStatus::kUsed);
   int count = 0;
   for (double misfit_rad = 2e-3; gate.judge(100, misfit_rad) == FixStatus::kRejectedByGate; misfit_rad += 2e-3) {
@@ -137,7 +145,7 @@ TEST(OutlierGate, DoesNotTakeWhatDriftMayDoInTheTimeForAJump) {
 }
 
 TEST(OutlierGate, BelievesAllOthersAgainstAStartThatNoneConfirms) {
-  OutlierGate gate = make_gate(3, 50);
+  Gate gate(3, 50);
   EXPECT_EQ(rejections(gate, kLie_rad), 2);
 }
 

@@ -69,7 +69,7 @@ Report report_of(const StepReport& report, int gyros) {
 class PipelineOfPass {
  public:
   PipelineOfPass(const PassSettings& settings, const CalibrationOptions& options)
-      : pipeline_(settings, ground::settled_before(settings, options)) {}
+      : pipeline_(settings, ground::settled_for_flight(settings, options)) {}
 
   std::vector<Report> push_gyro(Time t, const GivenMatrix& directions) {
     GyroSample sample;

@@ -519,7 +519,7 @@ NavigationRun navigate(const Pass& pass, const CalibrationOptions& options, cons
   const std::optional<ReadoutNoise> noise = options.find_noise ? other_readout_noise(in_time) : std::nullopt;
   const std::optional<Pass> with_noise = noise ? std::optional(with(*noise, in_time)) : std::nullopt;
   const Pass& stamped = with_noise ? *with_noise : in_time;
-  Pipeline pipeline(stamped.settings, settled_before(stamped.settings, options));
+  Pipeline pipeline(stamped.settings, settled_for_flight(stamped.settings, options));
   NavigationRecorder recorder;
   ProgressMeter meter(progress, stamped.gyro.size());
   replay(stamped, pipeline, [&](const StepReport& report) {

@@ -1142,6 +1142,12 @@ CalibrationOptions settled_before(const PassSettings& settings, CalibrationOptio
   return options;
 }
 
+CalibrationOptions settled_for_flight(const PassSettings& settings, const CalibrationOptions& options) {
+  CalibrationOptions settled = settled_before(settings, options);
+  settled.widen_where_correlated = options.corrections.take_parameters;
+  return settled;
+}
+
 Decision decide(const Pass& pass, const CalibrationOptions& asked_for, const Progress& progress) {
   CalibrationOptions asked = asked_for;
   if (pass.gyro.gyros < static_cast<int>(pass.settings.gyros.size())) {

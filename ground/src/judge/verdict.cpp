@@ -113,6 +113,23 @@ void judge_rejections(const Statistics& statistics, std::vector<Finding>& findin
   }
 }
 
+void judge_widenings(const std::vector<FixRecord>& fixes, Time epoch, std::vector<Finding>& findings) {
+  std::vector<Time> times;
+  for (const FixRecord& fix : fixes) {
+    if (fix.status == FixStatus::kUsedAfterWidening) {
+      times.push_back(fix.t);
+    }
+  }
+  if (!times.empty()) {
+    add(findings, FindingCode::kSigmasWidened,
+        "Fixes that follow each other were off alike: the coefficients changed, or the model did not hold. The filter "
+        "widened its sigmas and calibrated anew by what came after.",
+        fmt::format("{} time(s), from {:.1f} min to {:.1f} min", times.size(), to_seconds(times.front() - epoch) / 60,
+                    to_seconds(times.back() - epoch) / 60),
+        "Calibrate the pass, which tells what changed; drift outside the drift model takes a larger one.");
+  }
+}
+
 void judge_batch(const Statistics& statistics, std::vector<Finding>& findings) {
   if (!statistics.batch_converged.value_or(true)) {
     add(findings, FindingCode::kBatchNotConverged,
@@ -1080,6 +1097,7 @@ Verdict judge_navigation(const Pass& pass, const NavigationRun& run) {
   judge_corrections(run, findings);
   judge_open_loops(run, findings);
   judge_rejections(run.statistics, findings);
+  judge_widenings(run.fixes, pass.settings.epoch, findings);
   judge_star_tracker(run.statistics, findings);
   judge_contradictions(run.fixes, run.gyro_events, pass.settings.epoch, findings);
   judge_gyros(pass, run.gyro_events, run.gyros, " Without it there is no pair at the end of the pass, and no attitude.",

@@ -134,6 +134,7 @@ CalibrationSetup setup_of(const PassSettings& settings, const CalibrationOptions
   setup.gate_nis = options.gate_nis;
   setup.reopen_after_rejections = options.reopen_after_rejections;
   setup.reopen_after_jump_rejections = options.reopen_after_jump_rejections;
+  setup.widen_where_correlated = options.widen_where_correlated;
   setup.student_t_freedom = options.student_t_freedom;
   setup.angles_after = options.angles_after;
   return setup;

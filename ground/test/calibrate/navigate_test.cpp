@@ -301,6 +301,27 @@ TEST(Navigate, IsCausalWhereTheRateOfTheOrbitIsLearnt) {
   expect_causal(sim::simulate(scenario).pass, {}, {minutes(19), minutes(21), minutes(41)});
 }
 
+/// Coefficients that jump by a twentieth of what they are, which no fix is rejected for.
+TEST(Navigate, StaysHonestWhereCoefficientsJump) {
+  Scenario scenario = scenario_in_eq1(9, std::chrono::hours(4));
+  for (GyroScenario& gyro : scenario.gyros) {
+    gyro.drift.jump_sigma_rad_s = 1e-7;
+    gyro.drift.jump_at_s = 2.5 * 3600;
+  }
+  const sim::SimulatedPass simulated = sim::simulate(scenario);
+  CalibrationOptions options;
+  options.corrections.when = CorrectionOptions::When::kEachFix;
+  const NavigationRun run = navigate(simulated.pass, options);
+  EXPECT_LT(normalised_square_at_end(simulated, run), 3);
+  EXPECT_TRUE(run.verdict.has(FindingCode::kSigmasWidened));
+  EXPECT_TRUE(run.verdict.trustworthy);
+  // What calibrates the whole pass finds the jump, and has nothing to widen.
+  EXPECT_EQ(calibrate(simulated.pass, {}).fix_counts[FixStatus::kUsedAfterWidening], 0);
+  // Nor is there anything where parameters are held.
+  options.corrections.take_parameters = false;
+  EXPECT_FALSE(navigate(simulated.pass, options).verdict.has(FindingCode::kSigmasWidened));
+}
+
 /// A pass navigated with the values of its own calibration, after they have been spoilt.
 template <class Spoil>
 NavigationRun navigate_with(const Spoil& spoil) {

@@ -35,7 +35,7 @@ class Application {
  public:
   using Gyros = typename Estimator::Gyros;
   /// For SnapshotStore. To be counted up whenever a member of the state is added, removed or gets another meaning.
-  static constexpr std::uint32_t kStateVersion = 10;
+  static constexpr std::uint32_t kStateVersion = 11;
   static constexpr std::uint32_t kSnapshotLayout =
       kStateVersion << 16 | static_cast<std::uint32_t>(Estimator::kMaxStates) << 4 | sizeof(void*);
 
@@ -67,7 +67,8 @@ class Application {
   [[nodiscard]] Housekeeping housekeeping() const;
   /// The attitude at the latest sample; nothing before the first fix, and while there is none.
   [[nodiscard]] std::optional<AttitudeSolution> attitude() const;
-  /// What the filter has found. False before the first fix, and nothing is written.
+  /// What the filter has found. False before the first fix, and between the two steps in which a fix is taken in; then
+  /// nothing is written.
   [[nodiscard]] bool get(CalibrationRecord& record) const;
   [[nodiscard]] const OnBoard<Estimator>& on_board() const { return on_board_; }
   [[nodiscard]] const Forecast<Estimator>& forecast() const { return forecast_; }

@@ -10,6 +10,7 @@
 #include "trihedron/core/drift.hpp"
 #include "trihedron/core/fix_readings.hpp"
 #include "trihedron/core/fix_report.hpp"
+#include "trihedron/core/innovation_correlation.hpp"
 #include "trihedron/core/layout.hpp"
 #include "trihedron/core/measurement.hpp"
 #include "trihedron/core/optimal_attitude.hpp"
@@ -119,6 +120,7 @@ class InvariantEstimator {
       kJudgement,    ///< innovation and gate; of the angles, also the update
       kFault,        ///< which gyro is at fault
       kRestart,
+      kWidening,  ///< of all sigmas
       kUpdate,    ///< of the information
       kFeedback,  ///< of the correction to the estimate
       kDone,
@@ -130,6 +132,8 @@ class InvariantEstimator {
     Eigen::Matrix3d C_linear = Eigen::Matrix3d::Identity();
 
     [[nodiscard]] bool done() const { return stage == Stage::kDone; }
+    /// The covariance is already that after the fix, the estimate not yet.
+    [[nodiscard]] bool awaits_feedback() const { return stage == Stage::kFeedback; }
   };
   /// Stages of a correction, at most; those of a reopening come twice.
   static constexpr int kMostStages = 13;
@@ -157,6 +161,7 @@ class InvariantEstimator {
     Compared rows;                   ///< (H, y), unit white noise
     ComponentCovariance L;           ///< y of the comparison itself is L times that of the rows
     ComponentCovariance covariance;  ///< of y in `rows`: 1 + H P Hᵀ
+    FixReport::Innovation y;         ///< that of `rows`, of unit variance
     double nis = 0;
   };
 
@@ -169,6 +174,8 @@ class InvariantEstimator {
   /// and for a misfit larger than an alignment wrong by 5° in a body that turns at orbital rate adds to the misfit in
   /// the minute until a run of rejections reopens the filter.
   static constexpr double kFaultMisfitOfPair_rad = 5.8e-3;  // 20′
+  /// Less takes longer to be honest, more forgets more (docs/mathematics.md, section 11).
+  static constexpr double kWidening = 3;
 
   /// Whether the estimate is finite and has a covariance.
   [[nodiscard]] bool sound() const;
@@ -198,6 +205,11 @@ class InvariantEstimator {
   /// The stages of take(), as they are named.
   void begin(Correction& correction, const StarFix& fix, const FixReadings& readings, FixReport& report);
   void judge(Correction& correction, const Seen& its, const FixReadings& readings, FixReport& report);
+  /// Of a fix within the gate: whether its innovation goes along with those before it.
+  void look_for_correlation(Correction& correction, const White& white, FixReport& report);
+  /// All sigmas to kWidening of themselves where nothing was known before, about the present estimates, and to those
+  /// of the prior at most.
+  void widen();
   /// Of a fix above the gate: whether a lower weight takes it.
   static void use_all_the_same(Correction& correction, FixReport& report);
   void look_for_fault(Correction& correction, const Seen& its, const FixReadings& readings, FixReport& report) const;
@@ -282,6 +294,7 @@ class InvariantEstimator {
   Information information_;
   PackedTriangle<kMaxStates> prior_;  ///< root of the information, without anything of the directions
   OutlierGate gate_;
+  InnovationCorrelation<kMaxCompared> correlation_;
   std::array<std::optional<Time>, kStarTrackers> used_fix_t_;
   /// 1-sigma of the second-order terms left out of the prediction since the start.
   PerGyro<double, kCapacity.gyros> second_order_rad_{};

@@ -69,6 +69,17 @@ class OnBoard {
   void begin_stretch();
 
   [[nodiscard]] const Estimator& estimator() const { return estimator_; }
+  /// Whether the estimate and its covariance belong together: not between two stages of a fix, where the covariance is
+  /// already that after it.
+  [[nodiscard]] bool estimate_is_whole() const {
+    return work_.stage != Work::Stage::kFix || !work_.correction.awaits_feedback();
+  }
+  /// Of the fix that the estimate rests on already, while the work that follows goes on; it is reported with the end of
+  /// that.
+  [[nodiscard]] std::optional<Time> fix_taken_in() const {
+    const bool is_in = work_.stage > Work::Stage::kFix && work_.has_fix && work_.outcome.fix.used();
+    return is_in ? std::optional(work_.its.fix.t) : std::nullopt;
+  }
   [[nodiscard]] const Navigator<Estimator>& navigator() const { return navigator_; }
   [[nodiscard]] const GyroHealth<Estimator::Gyros::capacity()>& health() const { return intake_.health(); }
   /// Time of the latest sample used, or where none has been since the clock was set back, of the sample that said so;

@@ -24,19 +24,13 @@ class OutlierGate {
   static constexpr double kLargestStep_rad = 8.7e-3;  // 30′
   static constexpr double kLargestRate_rad_s = 1e-5;
 
-  OutlierGate() = default;
-  explicit OutlierGate(const CalibrationSetup& setup)
-      : gate_nis_(setup.gate_nis),
-        reopen_after_(setup.reopen_after_rejections),
-        reopen_after_jump_(setup.reopen_after_jump_rejections),
-        restart_within_(setup.restart_within_fixes) {}
-
   /// Adds to the time since the last fix.
   void elapse(double dt_s) { since_fix_s_ += dt_s; }
 
   /// kUsed, kRejectedByGate, kUsedAfterReopening or kRestarted: what to do with the fix. `misfit_rad`: the length of
   /// the innovation; `freedom`: its components.
-  [[nodiscard]] FixStatus judge(double nis, double misfit_rad, int freedom = kPairComponents);
+  [[nodiscard]] FixStatus judge(const CalibrationSetup& setup, double nis, double misfit_rad,
+                                int freedom = kPairComponents);
   [[nodiscard]] int rejections_in_a_row() const { return rejections_in_a_row_; }
   /// Whether the present run of rejections is put down to the tracker.
   [[nodiscard]] bool jumped() const { return jumped_; }
@@ -46,12 +40,8 @@ class OutlierGate {
  private:
   /// A jump counts only after the start has been confirmed by a fix. It is over when the misfit has been back where it
   /// came from for as long as a run takes.
-  void look_for_jump(bool jumped_now, double before_rad, double largest_rad);
+  void look_for_jump(bool jumped_now, double before_rad, double largest_rad, int reopen_after);
 
-  double gate_nis_ = 0;
-  int reopen_after_ = 0;
-  int reopen_after_jump_ = 0;
-  int restart_within_ = 0;
   double since_fix_s_ = 0;
   double misfit_rad_ = 0;  ///< of the last fix
   int rejections_in_a_row_ = 0;

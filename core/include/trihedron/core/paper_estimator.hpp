@@ -98,6 +98,7 @@ class PaperEstimator {
     static constexpr bool reopened = false;
 
     [[nodiscard]] bool done() const { return stage == Stage::kDone; }
+    [[nodiscard]] static constexpr bool awaits_feedback() { return false; }
   };
   static constexpr int kMostStages = 1;
   [[nodiscard]] static int cost(const Correction& /*not done*/) { return 600; }

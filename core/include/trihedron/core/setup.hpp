@@ -95,6 +95,9 @@ struct CalibrationSetup {
   /// information gathered. The estimates are kept; estimator invariant returns to the prior means where keeping them
   /// has not helped or the prior excludes them.
   int restart_within_fixes = 200;
+  /// Whether estimator invariant widens its sigmas where its innovations are correlated in time: the coefficients have
+  /// changed, or the model does not hold.
+  bool widen_where_correlated = false;
   /// Without a fix that could be used for longer than this, the angles between the momenta are used alone; or kNever.
   Duration angles_after = std::chrono::minutes(1);
 

@@ -45,13 +45,14 @@ enum class FixStatus : std::uint8_t {
   kEstimateLost,         ///< estimate or its covariance was no longer finite: the filter returns to the prior, and the
                          ///< next fix starts it; the navigator keeps what it has
   kRejectedFrozen,  ///< the quaternion of the fix before it once more, while the gyros show that the body has turned
+  kUsedAfterWidening,  ///< used with wider sigmas: the innovations were correlated in time
 };
-inline constexpr std::size_t kFixStatuses = 16;
+inline constexpr std::size_t kFixStatuses = 17;
 
 /// Whether the fix took part in the estimation.
 [[nodiscard]] constexpr bool is_used(FixStatus status) {
   return status == FixStatus::kStarted || status == FixStatus::kUsed || status == FixStatus::kUsedAfterReopening ||
-         status == FixStatus::kRestarted;
+         status == FixStatus::kRestarted || status == FixStatus::kUsedAfterWidening;
 }
 
 /// Whether a gyro is used.

@@ -33,6 +33,7 @@ inline constexpr std::array<StatusRow<FixStatus>, kFixStatuses> kFixStatusRows =
     {FixStatus::kRejectedByGate, "rejected: outlier"},
     {FixStatus::kEstimateLost, "rejected: estimate was not finite and was dropped"},
     {FixStatus::kRejectedFrozen, "rejected: star tracker frozen"},
+    {FixStatus::kUsedAfterWidening, "used after widening"},
 }};
 
 inline constexpr std::array<StatusRow<SampleStatus>, kSampleStatuses> kSampleStatusRows = {{

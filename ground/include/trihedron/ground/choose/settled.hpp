@@ -12,4 +12,8 @@ namespace trihedron::ground {
 /// drift_on_board(). Throws SetupError.
 [[nodiscard]] CalibrationOptions settled_before(const PassSettings& settings, CalibrationOptions options);
 
+/// The same for what is flown event by event. Where the navigator takes over the estimates, their sigmas are widened
+/// where the innovations are correlated in time.
+[[nodiscard]] CalibrationOptions settled_for_flight(const PassSettings& settings, const CalibrationOptions& options);
+
 }  // namespace trihedron::ground
