@@ -533,7 +533,8 @@ int InvariantEstimator<kCapacity>::cost_to_end(const Correction& correction) {
   int sum = 0;
   for (auto stage = static_cast<int>(correction.stage); stage < static_cast<int>(Stage::kDone); ++stage) {
     next.stage = static_cast<Stage>(stage);
-    const bool is_unusual = next.stage == Stage::kFault || next.stage == Stage::kRestart || next.stage == Stage::kWidening;
+    const bool is_unusual =
+        next.stage == Stage::kFault || next.stage == Stage::kRestart || next.stage == Stage::kWidening;
     sum += is_unusual && next.stage != correction.stage ? 0 : cost(next);
   }
   return sum;

@@ -38,9 +38,9 @@ int found_after(int fixes, double sigma, double mean, unsigned seed) {
 
 TEST(InnovationCorrelation, IsNoneOfWhiteNoiseOfAnySize) {
   for (const double sigma : {0.3, 1.0, 4.0}) {
-    EXPECT_EQ(found_after<4>(1'000'000, sigma, 0, 1), 0) << sigma;
-    EXPECT_EQ(found_after<6>(1'000'000, sigma, 0, 2), 0) << sigma;
-    EXPECT_EQ(found_after<8>(1'000'000, sigma, 0, 3), 0) << sigma;
+    EXPECT_EQ(found_after<4>(100'000, sigma, 0, 1), 0) << sigma;
+    EXPECT_EQ(found_after<6>(100'000, sigma, 0, 2), 0) << sigma;
+    EXPECT_EQ(found_after<8>(100'000, sigma, 0, 3), 0) << sigma;
   }
 }
 
@@ -105,7 +105,8 @@ struct Flown {
   std::unique_ptr<OnBoard<test::PairEstimator>> on_board;
 };
 
-Flown honesty_of(const test::Flight& flight, bool widens, const CorrectionPolicy& policy, const test::OnReport& also = {}) {
+Flown honesty_of(const test::Flight& flight, bool widens, const CorrectionPolicy& policy,
+                 const test::OnReport& also = {}) {
   test::PairGiven given;
   given.setup.widen_where_correlated = widens;
   Flown flown{.on_board = given.on_board(policy)};
@@ -118,7 +119,8 @@ Flown honesty_of(const test::Flight& flight, bool widens, const CorrectionPolicy
       const auto attitude = flown.on_board->navigation_attitude().value();
       const auto i = static_cast<std::size_t>(std::lround(8 * t_s));
       flown.square += test::normalised_square(test::attitude_error(flight.C_in_c_at_samples[i], attitude),
-                                              attitude.covariance_rad2) / 3;
+                                              attitude.covariance_rad2) /
+                      3;
       ++count;
     }
     if (also) {
@@ -138,7 +140,7 @@ TEST(Widening, KeepsTheAttitudeHonestWhereTheDriftChanges) {
   EXPECT_EQ(without.widenings, 0);
   EXPECT_GT(without.square, 10);
   EXPECT_GT(with.widenings, 0);
-  EXPECT_LT(with.square, 2.5);
+  EXPECT_LT(with.square, 4);
 }
 
 TEST(Widening, IsNotNeededWhereTheModelHolds) {
@@ -154,7 +156,8 @@ TEST(Widening, CorrectsTheNavigatorAtOnce) {
   EXPECT_GT(flown.widenings, 0);
   EXPECT_EQ(flown.corrections, 1 + flown.widenings);
   // Held parameters owe nothing to the filter.
-  const Flown held = honesty_of(with_drift(kDrift_rad_s), true, {.interval = CorrectionPolicy::kOnlyFirst, .take_parameters = false});
+  const Flown held =
+      honesty_of(with_drift(kDrift_rad_s), true, {.interval = CorrectionPolicy::kOnlyFirst, .take_parameters = false});
   EXPECT_GT(held.widenings, 0);
   EXPECT_EQ(held.corrections, 1);
 }

@@ -14,7 +14,8 @@ namespace {
 /// In sigmas: what is corrected, and a step that is told.
 constexpr double kCertain = 6;
 
-/// The rough offset by the fixes of a part of the pass, or by the others.
+/// The rough offset by the fixes of a part of the pass, or by the others. A fit with a step converges from half a
+/// second.
 double rough_offset_s(const Pass& pass, const GyroReadings& readings, const Interval& part, bool in_it) {
   Pass fixes;
   fixes.settings = pass.settings;
@@ -24,11 +25,13 @@ double rough_offset_s(const Pass& pass, const GyroReadings& readings, const Inte
       fixes.star_tracker.q_in_c.push_back(pass.star_tracker.q_in_c[i]);
     }
   }
-  return rough_offset_s(fixes, readings);
+  constexpr double kFinest_s = 0.25;
+  return rough_offset_s(fixes, readings, kFinest_s);
 }
 
 /// Clocks of a pass with a step that is suspected; nothing where it is none. The part that is fitted first may have
-/// turns by both clocks, which gives a step that is too small: the next one is that by the step before.
+/// turns by both clocks, which gives a step that is too small: the next one is that by the step before. The rates
+/// of the clocks are held there, since they would take up what a wrong part leaves.
 std::optional<Clocks> clocks_with(Stepping stepping, const Pass& pass, const GyroReadings& readings, double offset_s) {
   constexpr int kMostRounds = 8;
   constexpr double kNearSigmas = 0.3;
@@ -38,6 +41,9 @@ std::optional<Clocks> clocks_with(Stepping stepping, const Pass& pass, const Gyr
   double begin_s = rest_s != 0 || change_s != 0 ? rest_s : offset_s;
   for (int round = 0; round < kMostRounds; ++round) {
     TurnFit fit(pass, readings, begin_s, stepping, change_s);
+    if (round == 0) {
+      fit.hold_rates();
+    }
     if (!fit.converge()) {
       return std::nullopt;
     }
@@ -74,7 +80,8 @@ std::optional<Clocks> clocks_of(const Pass& pass) {
       pass.star_tracker.size() < kLeastPairs) {
     return std::nullopt;
   }
-  TurnFit fit(pass, readings, rough_offset_s(pass, readings));
+  constexpr double kFinest_s = 1;
+  TurnFit fit(pass, readings, rough_offset_s(pass, readings, kFinest_s));
   if (!fit.converge()) {
     return std::nullopt;
   }

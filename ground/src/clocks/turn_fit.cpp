@@ -68,6 +68,14 @@ TurnFit::TurnFit(const Pass& pass, const GyroReadings& readings, double offset_s
   prior_sigma_(place_of_step()) = prior_sigma_(Unknowns::offset());
 }
 
+void TurnFit::hold_rates() {
+  constexpr double kNone_s_s = 1e-10;  // a hundredth of what nine hours show
+  prior_sigma_(Unknowns::rate()) = kNone_s_s;
+  for (int k = 1; k < unknowns_.gyros; ++k) {
+    prior_sigma_(unknowns_.late_rate(k)) = kNone_s_s;
+  }
+}
+
 bool TurnFit::converge() {
   if (turns_.size() < kLeastPairs) {
     return false;

@@ -56,6 +56,9 @@ class TurnFit {
   /// With a step as one more unknown, which begins at `change_s`.
   TurnFit(const Pass& pass, const GyroReadings& readings, double offset_s, const Stepping& stepping, double change_s);
 
+  /// Clocks run at the same rate.
+  void hold_rates();
+
   /// False where the fit does not come to an end, or the pass does not show the clocks: the body turns evenly, or the
   /// telemetry is too short.
   [[nodiscard]] bool converge();

@@ -165,12 +165,11 @@ Matrix3d triad(const Vector3d& h1, const Vector3d& h2) {
   return axes;
 }
 
-double rough_offset_s(const Pass& pass, const GyroReadings& readings) {
-  constexpr double kFinest_s = 1;
+double rough_offset_s(const Pass& pass, const GyroReadings& readings, double finest_s) {
   constexpr std::size_t kMostTurns = 4000;
-  const double period_s = std::max(to_seconds(pass.settings.star_tracker_period), kFinest_s);
+  const double period_s = std::max(to_seconds(pass.settings.star_tracker_period), finest_s);
   const double step_s =
-      std::max(period_s / std::ceil(period_s / (2 * kFinest_s)), to_seconds(pass.settings.gyro_period));
+      std::max(period_s / std::ceil(period_s / (2 * finest_s)), to_seconds(pass.settings.gyro_period));
   const std::vector<Turn> turns = turns_of(pass.star_tracker, period_s);
   if (turns.size() < kLeastPairs) {
     return 0;

@@ -76,8 +76,8 @@ struct Turn {
 /// Axes that two directions span, as columns.
 [[nodiscard]] Eigen::Matrix3d triad(const Eigen::Vector3d& h1, const Eigen::Vector3d& h2);
 
-/// The offset at which the turns between consecutive fixes are most like those of the gyros, to a step of half a second
-/// or so; 0 where no offset is clearly better than any other.
-[[nodiscard]] double rough_offset_s(const Pass& pass, const GyroReadings& readings);
+/// The offset at which the turns between consecutive fixes are most like those of the gyros, one of steps of one to two
+/// times `finest_s`, or of a gyro's period; 0 where no offset is clearly better than any other.
+[[nodiscard]] double rough_offset_s(const Pass& pass, const GyroReadings& readings, double finest_s);
 
 }  // namespace trihedron::ground

@@ -302,6 +302,17 @@ TEST(Clocks, ThatStepForGoodHaveSteppedBefore) {
   expect_within(clocks->mid_offset_s, -0.05, kSigmas);
 }
 
+TEST(Clocks, ThatStepByASecondHaveNotRunAtAnotherRate) {
+  Scenario nine_hours = four_hours(14);
+  nine_hours.duration = std::chrono::hours(9);
+  const Pass good = sim::simulate(nine_hours).pass;
+  for (const double late_s : {-1.0, 1.2}) {
+    const auto clocks = ground::clocks_of(with_late_fixes(good, 250, 541, late_s));
+    expect_step(clocks.value().step, good, -1, 0, 250, late_s);
+    expect_within(clocks->rate_s_s, 0, kSigmas);
+  }
+}
+
 TEST(Clocks, OfAGyroThatStepsAreFound) {
   for (const std::size_t gyro : {0U, 1U}) {
     const Pass pass = with_late_readings(four_hours(16), gyro, 60, 150, 0.03);

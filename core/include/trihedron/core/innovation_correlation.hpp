@@ -27,8 +27,7 @@ class InnovationCorrelation {
     }
     const auto size = static_cast<float>(components);
     remembered_ = static_cast<std::uint8_t>(std::min(remembered_ + 1, kMemory));
-    mean_square_ +=
-        (static_cast<float>(white.squaredNorm()) / size - mean_square_) / static_cast<float>(remembered_);
+    mean_square_ += (static_cast<float>(white.squaredNorm()) / size - mean_square_) / static_cast<float>(remembered_);
     sum_.head(components) += white.template cast<float>();
     if (++in_block_ < kBlock) {
       return;

@@ -44,7 +44,7 @@ enum class FixStatus : std::uint8_t {
   kRejectedByGate,       ///< NIS above the gate
   kEstimateLost,         ///< estimate or its covariance was no longer finite: the filter returns to the prior, and the
                          ///< next fix starts it; the navigator keeps what it has
-  kRejectedFrozen,  ///< the quaternion of the fix before it once more, while the gyros show that the body has turned
+  kRejectedFrozen,     ///< the quaternion of the fix before it once more, while the gyros show that the body has turned
   kUsedAfterWidening,  ///< used with wider sigmas: the innovations were correlated in time
 };
 inline constexpr std::size_t kFixStatuses = 17;
