@@ -522,7 +522,7 @@ void InvariantEstimator<kCapacity>::ask_gate(const FixComparison& comparison, co
 
 template <Capacity kCapacity>
 int InvariantEstimator<kCapacity>::cost(const Correction& correction) {
-  constexpr std::array<int, 12> kCosts = {25, 120, 185, 85, 150, 140, 420, 300, 300, 160, 30, 0};
+  constexpr std::array<int, 12> kCosts = {25, 120, 185, 85, 150, 140, 420, 300, 350, 160, 30, 0};
   return kCosts[static_cast<std::size_t>(correction.stage)];
 }
 

@@ -293,6 +293,17 @@ TEST(ParameterTable, WithAnythingWrongIsRefusedAndNothingIsChanged) {
   }
 }
 
+TEST(ParameterTable, MayKeepTheAnglesFromBeingUsed) {
+  Parameters table = test::nominal_parameters();
+  table.angles_after_ns = INT64_MAX;
+  const auto application = test::started<PairApplication>(table);
+  int by_angles = 0;
+  const auto count = [&](const StepReport& report) { by_angles += report.angles.status != FixStatus::kNone ? 1 : 0; };
+  fly_from(flight(), 0, 60, *application, count);
+  fly_from(flight().samples, kNoFixes, 60, 300, *application, count);
+  EXPECT_EQ(by_angles, 0);
+}
+
 TEST(ParameterTable, SaysTheSameAsTheSetUp) {
   // Means and a covariance of the full kind, by the table and by what it stands for.
   Parameters table = test::nominal_parameters();

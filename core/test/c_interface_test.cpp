@@ -184,6 +184,26 @@ TEST(CInterface, GivesTheCalibrationOfOneMomentWhileAFixIsDealtWith) {
   EXPECT_GE(taken_in, 18);
 }
 
+TEST(CInterface, TimeOfTheCalibrationIsThatOfAFixThatWasUsed) {
+  test::Flight flight({.duration_s = 400});
+  flight.fixes[20].q_in_c = flight.fixes[20].q_in_c * Eigen::Quaterniond(test::turn(0.05, 0, 0));  // an outlier
+  const std::int64_t wrong_ns = flight.fixes[20].t.time_since_epoch().count();
+  flight.fixes.resize(40);  // from then on the angles alone
+  const std::int64_t last_ns = flight.fixes.back().t.time_since_epoch().count();
+  const auto application = test::started<PairApplication>(test::nominal_parameters());
+  int by_angles = 0;
+  test::fly(flight, *application, [&](const StepReport& report) {
+    by_angles += report.angles.status == FixStatus::kUsed ? 1 : 0;
+    CalibrationRecord now{};
+    if (application->get(now)) {
+      EXPECT_NE(now.time_ns, wrong_ns);
+      EXPECT_LE(now.time_ns, last_ns);
+      EXPECT_TRUE(by_angles == 0 || now.time_ns == last_ns);
+    }
+  });
+  EXPECT_GT(by_angles, 2);
+}
+
 TEST(CInterface, OfThreeGyrosIsTheirApplicationBitForBit) {
   const test::Flight flight({.duration_s = 120});
   const auto samples = test::with_third_gyro(flight, Eigen::Vector3d(0.1, -0.8, 0.6).normalized(), 1);
