@@ -867,8 +867,8 @@ constexpr const char* kLookAtCalibration =
     "Look at the calibration in use: its units (rad/s, rad), whether it is of these gyros and of this start-up.";
 
 /// The momenta of any pair that can be used are tens of degrees apart: where a few percent of the samples give no
-/// attitude because they are predicted nearly parallel, it is the parameters that are wrong. Other samples may be
-/// refused for a stuck gyro; in a gap there are none.
+/// attitude because they are predicted nearly parallel, it is the parameters that are wrong; or the readings leap with
+/// a body that shakes. Other samples may be refused for a stuck gyro; in a gap there are none.
 void judge_coverage(const NavigationRun& run, std::vector<Finding>& findings) {
   const long used = run.samples[SampleStatus::kUsed];
   const long parallel = run.samples[SampleStatus::kRejectedGeometry] + used - static_cast<long>(run.attitude.size());
@@ -882,7 +882,9 @@ void judge_coverage(const NavigationRun& run, std::vector<Finding>& findings) {
       fmt::format("{:.0f} of {:.0f} samples: no attitude by the readings at {}, too few gyros at {}", missing, all,
                   parallel, too_few),
       parallel > too_few
-          ? kLookAtCalibration
+          ? fmt::format("{} Or the body shakes faster than the gyros are read: a reading that does not continue those "
+                        "before it is not believed.",
+                        kLookAtCalibration)
           : "Look at the gyros with `trihedron inspect`, and at the calibration in use: a gyro that does "
             "not fit it is left out.");
   if (static_cast<double>(parallel) > kSomeMissing * all || missing > kMostMissing * all) {
