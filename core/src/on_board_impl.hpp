@@ -561,11 +561,11 @@ auto OnBoard<Estimator>::after_calibration() -> typename Work::Stage {
   // All later fixes contradicted the one that started filter and navigator: the navigator must be corrected again.
   const bool start_was_wrong = start_unconfirmed_ && work_.outcome.fix.status == FixStatus::kUsedAfterReopening;
   start_unconfirmed_ = work_.outcome.fix.status == FixStatus::kStarted;
-  // What the navigator took over from a filter that was contradicted is as far off.
-  const bool was_wrong =
+  // The navigator rests on what the filter knew before it was contradicted.
+  const bool was_contradicted =
       work_.outcome.fix.status == FixStatus::kUsedAfterWidening && parameters_ == ParametersInUse::kOfCalibration;
   const bool has_source = parameters_ == ParametersInUse::kOfCalibration || work_.outcome.calibrated;
-  if (!has_source || !(is_correction_due(fix.t) || start_was_wrong || was_wrong)) {
+  if (!has_source || !(is_correction_due(fix.t) || start_was_wrong || was_contradicted)) {
     return Work::Stage::kNavigated;
   }
   work_.parameters = parameters_;

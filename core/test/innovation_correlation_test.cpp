@@ -4,7 +4,6 @@
 
 #include <Eigen/Core>
 #include <cmath>
-#include <memory>
 #include <random>
 
 #include "application_flight.hpp"
@@ -102,29 +101,25 @@ struct Flown {
   int widenings = 0;
   int corrections = 0;
   double square = 0;  ///< of the attitude's error, in its sigmas, over the last twenty minutes; 1 where it is honest
-  std::unique_ptr<OnBoard<test::PairEstimator>> on_board;
 };
 
-Flown honesty_of(const test::Flight& flight, bool widens, const CorrectionPolicy& policy,
-                 const test::OnReport& also = {}) {
+Flown honesty_of(const test::Flight& flight, bool widens, const CorrectionPolicy& policy) {
   test::PairGiven given;
   given.setup.widen_where_correlated = widens;
-  Flown flown{.on_board = given.on_board(policy)};
+  const auto on_board = given.on_board(policy);
+  Flown flown;
   int count = 0;
-  test::fly(flight, *flown.on_board, [&](const StepReport& report) {
+  test::fly(flight, *on_board, [&](const StepReport& report) {
     flown.widenings += report.fix.status == FixStatus::kUsedAfterWidening ? 1 : 0;
     flown.corrections += report.corrected ? 1 : 0;
     const double t_s = to_seconds(report.t.time_since_epoch());
     if (is_used(report.sample) && t_s > 4800) {
-      const auto attitude = flown.on_board->navigation_attitude().value();
+      const auto attitude = on_board->navigation_attitude().value();
       const auto i = static_cast<std::size_t>(std::lround(8 * t_s));
       flown.square += test::normalised_square(test::attitude_error(flight.C_in_c_at_samples[i], attitude),
                                               attitude.covariance_rad2) /
                       3;
       ++count;
-    }
-    if (also) {
-      also(report);
     }
   });
   flown.square /= count;
@@ -163,24 +158,17 @@ TEST(Widening, CorrectsTheNavigatorAtOnce) {
 }
 
 TEST(Widening, GoesToThePriorAtMost) {
-  const test::PairGiven given;
+  test::PairGiven given;
+  given.setup.widen_where_correlated = true;
   const Eigen::VectorXd prior = given.covariance.diagonal().cwiseSqrt();
   Eigen::VectorXd before = prior;
   int seen = 0;
-  const OnBoard<test::PairEstimator>* on_board = nullptr;
-  const auto sigmas = [&] {
-    return Eigen::VectorXd(test::error_root(on_board->estimator()).middleRows(6, 20).rowwise().norm());
-  };
-  test::Flight flight = with_drift(kDrift_rad_s);
-  test::PairGiven widening;
-  widening.setup.widen_where_correlated = true;
-  const auto made = widening.on_board(kEachFix);
-  on_board = made.get();
-  test::fly(flight, *made, [&](const StepReport& report) {
+  const auto on_board = given.on_board(kEachFix);
+  test::fly(with_drift(kDrift_rad_s), *on_board, [&](const StepReport& report) {
     if (!report.fix.used()) {
       return;
     }
-    const Eigen::VectorXd now = sigmas();
+    const Eigen::VectorXd now = test::error_root(on_board->estimator()).middleRows(6, 20).rowwise().norm();
     if (report.fix.status == FixStatus::kUsedAfterWidening && ++seen == 1) {
       EXPECT_LE((now.array() / prior.array()).maxCoeff(), 1 + 1e-9);
       EXPECT_LE((now.array() / before.array()).maxCoeff(), 3 + 1e-9);

@@ -174,7 +174,7 @@ class InvariantEstimator {
   /// and for a misfit larger than an alignment wrong by 5° in a body that turns at orbital rate adds to the misfit in
   /// the minute until a run of rejections reopens the filter.
   static constexpr double kFaultMisfitOfPair_rad = 5.8e-3;  // 20′
-  /// Less takes longer to be honest, more forgets more (docs/mathematics.md, section 11).
+  /// Of sigmas: with less it takes longer until they are honest, with more more is forgotten (docs/mathematics.md, 11).
   static constexpr double kWidening = 3;
 
   /// Whether the estimate is finite and has a covariance.
@@ -207,8 +207,8 @@ class InvariantEstimator {
   void judge(Correction& correction, const Seen& its, const FixReadings& readings, FixReport& report);
   /// Of a fix within the gate: whether its innovation goes along with those before it.
   void look_for_correlation(Correction& correction, const White& white, FixReport& report);
-  /// All sigmas to kWidening of themselves where nothing was known before, about the present estimates, and to those
-  /// of the prior at most.
+  /// Makes all sigmas kWidening times as large, but no larger than those of the prior. The estimates stay, and with
+  /// them what they are off by.
   void widen();
   /// Of a fix above the gate: whether a lower weight takes it.
   static void use_all_the_same(Correction& correction, FixReport& report);
