@@ -50,10 +50,6 @@ std::string star_tracker_name(std::size_t head) {
   return head == 0 ? "star_tracker" : fmt::format("star_tracker_{}", head + 1);
 }
 
-const StarTrackerTelemetry& star_tracker_of(const Pass& pass, std::size_t head) {
-  return head == 0 ? pass.star_tracker : pass.further_star_trackers[head - 1];
-}
-
 bool is_netcdf_name(const fs::path& path) { return path.extension() == ".nc"; }
 
 fs::path inside(const fs::path& file, const char* part) { return file.string() + ":" + part; }
@@ -173,7 +169,7 @@ void write_directory(StagedDirectory& staged, const Pass& pass, const Truth* tru
   add(kSettingsFile, format_pass_toml(pass.settings, pass.settings.prior ? kPriorFile : ""));
   add(kGyroFile, csv_text(epoch, direction_names(pass.gyro.gyros), pass.gyro.t, pass.gyro.h, kGyroDecimals));
   for (std::size_t head = 0; head <= pass.further_star_trackers.size(); ++head) {
-    const StarTrackerTelemetry& fixes = star_tracker_of(pass, head);
+    const StarTrackerTelemetry& fixes = pass.fixes_of(head);
     add(star_tracker_name(head) + ".csv", csv_text(epoch, fixes, kFixDecimals));
   }
   // What the pass that was here before had more is not of this one.
@@ -234,7 +230,7 @@ void write_netcdf(const fs::path& path, const Pass& pass, const Truth* truth, co
   file.write_group(kGyroGroup, epoch, pass.gyro.t,
                    columns_of(direction_names(pass.gyro.gyros), pass.gyro.h, format.direction_step, true));
   for (std::size_t head = 0; head <= pass.further_star_trackers.size(); ++head) {
-    const StarTrackerTelemetry& fixes = star_tracker_of(pass, head);
+    const StarTrackerTelemetry& fixes = pass.fixes_of(head);
     std::vector<PackedColumn> columns = columns_of(kQuaternionNames, quaternion_values(fixes.q_in_c), 0, true);
     if (!fixes.covariances.empty()) {
       std::ranges::move(columns_of(covariance_names(), covariance_values(fixes.covariances), 0, true),
@@ -481,7 +477,7 @@ PassInMemory tables_of(const Pass& pass, double direction_step) {
     value = std::isfinite(value) ? static_cast<double>(std::lround(value / direction_step)) * direction_step : value;
   }
   for (std::size_t head = 0; head <= pass.further_star_trackers.size(); ++head) {
-    const StarTrackerTelemetry& fixes = star_tracker_of(pass, head);
+    const StarTrackerTelemetry& fixes = pass.fixes_of(head);
     tables.star_trackers.push_back(fixes_in_memory(star_tracker_name(head), epoch, fixes));
   }
   return tables;

@@ -73,11 +73,8 @@ void correct(Pass& pass, const ClockStep& step) {
       const bool is_off = fixes.t[i] >= step.from && fixes.t[i] < step.until;
       const Time t = fixes.t[i] + (is_off ? from_seconds(step.change_s.value) : Duration{});
       if (mended.t.empty() || t > mended.t.back()) {
-        mended.t.push_back(t);
-        mended.q_in_c.push_back(fixes.q_in_c[i]);
-        if (!fixes.covariances.empty()) {
-          mended.covariances.push_back(fixes.covariances[i]);
-        }
+        mended.add(fixes, i);
+        mended.t.back() = t;
       }
     }
     fixes = std::move(mended);

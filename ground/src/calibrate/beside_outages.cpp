@@ -100,11 +100,7 @@ std::optional<Pass> without_fixes_beside_outages(const Pass& pass, BesideOutages
     const bool is_beside = (sides.before && to_outage(outages, t, true) >= Duration::zero()) ||
                            (sides.after && to_outage(outages, t, false) >= Duration::zero());
     if (!is_beside) {
-      fixes.t.push_back(t);
-      fixes.q_in_c.push_back(pass.star_tracker.q_in_c[i]);
-      if (!pass.star_tracker.covariances.empty()) {
-        fixes.covariances.push_back(pass.star_tracker.covariances[i]);
-      }
+      fixes.add(pass.star_tracker, i);
     }
   }
   return 2 * fixes.size() > pass.star_tracker.size() ? std::optional(std::move(rest)) : std::nullopt;

@@ -16,6 +16,7 @@
 #include "calibrate/beside_outages.hpp"
 #include "calibrate/calibrate_after.hpp"
 #include "calibrate/contradicted_fixes.hpp"
+#include "calibrate/correlated_fixes.hpp"
 #include "calibrate/readout_noise.hpp"
 #include "calibrate/restarted_gyro.hpp"
 #include "choose/decide.hpp"
@@ -417,6 +418,24 @@ std::vector<Measured> further_star_trackers_s(const Pass& pass, const Measured& 
   return apart_s;
 }
 
+/// A pass without fixes whose errors are those of others, as far as these are alike.
+struct OfIndependentFixes {
+  Pass pass;
+  std::vector<CorrelatedFixes> left_out;
+};
+std::optional<OfIndependentFixes> of_independent_fixes(const Pass& pass, const CalibrationOptions& options) {
+  std::vector<CorrelatedFixes> correlated;
+  if (options.find_noise && options.estimator != Estimator::kPaper) {
+    correlated = correlated_fixes(pass);
+  }
+  if (correlated.empty()) {
+    return std::nullopt;
+  }
+  OfIndependentFixes found{pass, std::move(correlated)};
+  leave_out(found.left_out, found.pass);
+  return found;
+}
+
 /// A pass without the fixes beside outages of the star tracker, where these are off.
 struct WithoutErrorsBesideOutages {
   Pass pass;
@@ -479,16 +498,22 @@ CalibrationRun calibrate_after(const Pass& as_given, const CalibrationOptions& o
     corrected = pass;
     correct(*corrected, correction);
   }
-  refuse_restarted_gyro(corrected ? *corrected : pass);
+  const Pass& in_step = corrected ? *corrected : pass;
+  refuse_restarted_gyro(in_step);
+  const std::optional<OfIndependentFixes> independent = of_independent_fixes(in_step, options);
+  const Pass& of_independent = independent ? independent->pass : in_step;
   const CalibrationOptions asked = with_clock_states(options, correction);
   std::optional<WithoutErrorsBesideOutages> without_errors;
   if (finds_noise) {
-    without_errors = without_errors_beside_outages(corrected ? *corrected : pass, asked, progress);
+    without_errors = without_errors_beside_outages(of_independent, asked, progress);
   }
-  const Pass& stamped = without_errors ? without_errors->pass : corrected ? *corrected : pass;
+  const Pass& stamped = without_errors ? without_errors->pass : of_independent;
   CalibrationRun run = calibrate_as_stamped(stamped, asked, progress);
   if (without_errors) {
     run.beside_outages = without_errors->errors;
+  }
+  if (independent) {
+    run.correlated_fixes = independent->left_out;
   }
   run.clocks = clocks;
   run.corrected_step = step;
@@ -518,7 +543,9 @@ NavigationRun navigate(const Pass& pass, const CalibrationOptions& options, cons
   const Pass& in_time = corrected ? *corrected : pass;
   const std::optional<ReadoutNoise> noise = options.find_noise ? other_readout_noise(in_time) : std::nullopt;
   const std::optional<Pass> with_noise = noise ? std::optional(with(*noise, in_time)) : std::nullopt;
-  const Pass& stamped = with_noise ? *with_noise : in_time;
+  const Pass& as_stamped = with_noise ? *with_noise : in_time;
+  const std::optional<OfIndependentFixes> independent = of_independent_fixes(as_stamped, options);
+  const Pass& stamped = independent ? independent->pass : as_stamped;
   Pipeline pipeline(stamped.settings, settled_for_flight(stamped.settings, options));
   NavigationRecorder recorder;
   ProgressMeter meter(progress, stamped.gyro.size());
@@ -541,7 +568,10 @@ NavigationRun navigate(const Pass& pass, const CalibrationOptions& options, cons
   }
   run.clock_correction = correction;
   run.readout_noise = noise;
-  run.clocks = clocks_of(stamped);
+  if (independent) {
+    run.correlated_fixes = independent->left_out;
+  }
+  run.clocks = clocks_of(as_stamped);
   if (const std::optional<RegularStamps> regular = regular_stamps(pass)) {
     run.gyro_stamps_off_s = regular->scatter_s;
   }

@@ -67,19 +67,14 @@ void leave_out(const std::vector<FixRecord>& fixes, int head, StarTrackerTelemet
     if (std::ranges::any_of(same, [head](const FixRecord& fix) { return fix.head == head; })) {
       continue;
     }
-    kept.t.push_back(telemetry.t[i]);
-    kept.q_in_c.push_back(telemetry.q_in_c[i]);
-    if (!telemetry.covariances.empty()) {
-      kept.covariances.push_back(telemetry.covariances[i]);
-    }
+    kept.add(telemetry, i);
   }
   telemetry = std::move(kept);
 }
 
 Pass without(const std::vector<FixRecord>& fixes, Pass pass) {
-  leave_out(fixes, 0, pass.star_tracker);
-  for (std::size_t i = 0; i < pass.further_star_trackers.size(); ++i) {
-    leave_out(fixes, static_cast<int>(i) + 1, pass.further_star_trackers[i]);
+  for (std::size_t head = 0; head <= pass.further_star_trackers.size(); ++head) {
+    leave_out(fixes, static_cast<int>(head), pass.fixes_of(head));
   }
   return pass;
 }

@@ -28,6 +28,8 @@ class GyroReadings {
   [[nodiscard]] int gyros() const { return gyros_; }
   [[nodiscard]] std::size_t size() const { return pass_.gyro.size(); }
   [[nodiscard]] Time t(std::size_t i) const { return pass_.gyro.t[i]; }
+  /// To both sides of a time, the samples that at() takes.
+  [[nodiscard]] Duration reach() const { return reach_; }
 
   /// Variance of the rates of at() over that of a single reading, 1/s²: that of the slope of a parabola.
   [[nodiscard]] double rate_variance() const {

@@ -672,6 +672,24 @@ void judge_beside_outages(const std::optional<ErrorsBesideOutages>& errors, std:
       "What is less and lasts longer stays in the fixes that were used.");
 }
 
+void judge_correlated_fixes(const std::vector<CorrelatedFixes>& star_trackers, std::vector<Finding>& findings) {
+  for (const CorrelatedFixes& its : star_trackers) {
+    add(findings, FindingCode::kCorrelatedFixes,
+        fmt::format(
+            "The errors of fixes that follow each other are alike; one fix each {:.0f} s was used, whose errors "
+            "are independent.",
+            its.apart_s),
+        fmt::format(
+            "star tracker {}: {:.0f} % of the variance has a correlation that falls to 1/e in {:.0f} s; {} fixes "
+            "left out",
+            its.head + 1, 100 * its.part, its.time_s, its.left_out),
+        fmt::format(
+            "Where the star tracker filters its fixes, give those before the filter. On board, give one fix each "
+            "{:.0f} s.",
+            its.apart_s));
+  }
+}
+
 void judge_readout_noise(const std::optional<ReadoutNoise>& noise, std::vector<Finding>& findings) {
   if (noise) {
     const auto text = [&](const PerGyro<double>& noise_rad) {
@@ -1049,6 +1067,7 @@ Verdict judge(const Pass& pass, const CalibrationRun& run) {
   judge_nis(statistics, "its model is incomplete or the noise is understated", findings);
   judge_noise(pass, run, findings);
   judge_readout_noise(run.readout_noise, findings);
+  judge_correlated_fixes(run.correlated_fixes, findings);
   judge_whiteness(pass, run, findings);
   judge_shape_of_errors(pass, run, findings);
   judge_drift_left(pass, run, findings);
@@ -1105,6 +1124,7 @@ Verdict judge_navigation(const Pass& pass, const NavigationRun& run) {
   judge_gyros(pass, run.gyro_events, run.gyros, " Without it there is no pair at the end of the pass, and no attitude.",
               findings);
   judge_readout_noise(run.readout_noise, findings);
+  judge_correlated_fixes(run.correlated_fixes, findings);
   judge_nis(run.statistics, "the calibration in use does not fit this pass, or the model is incomplete", findings);
   judge_need(run.forecast, findings);
   return verdict_of(std::move(findings));

@@ -214,8 +214,7 @@ ScreenedPass as_it_is(const Pass& pass, int gyros, int heads) {
     screened.samples.add(i, all_gyros(gyros));
   }
   for (int head = 0; head < heads; ++head) {
-    const StarTrackerTelemetry& fixes =
-        head == 0 ? pass.star_tracker : pass.further_star_trackers[static_cast<std::size_t>(head - 1)];
+    const StarTrackerTelemetry& fixes = pass.fixes_of(static_cast<std::size_t>(head));
     for (std::size_t i = 0; i < fixes.size(); ++i) {
       const std::size_t sample = screened.samples.from(fixes.t[i]);
       if (sample == screened.samples.size()) {

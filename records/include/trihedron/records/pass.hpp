@@ -92,6 +92,14 @@ struct StarTrackerTelemetry {
   [[nodiscard]] StarFix fix(std::size_t i, int head) const {
     return {t[i], q_in_c[i], head, covariances.empty() ? FixCovariance{} : covariances[i]};
   }
+  /// Takes fix i of another, which has covariances as this one has.
+  void add(const StarTrackerTelemetry& other, std::size_t i) {
+    t.push_back(other.t[i]);
+    q_in_c.push_back(other.q_in_c[i]);
+    if (!other.covariances.empty()) {
+      covariances.push_back(other.covariances[i]);
+    }
+  }
 };
 
 /// Settings and telemetry of one pass.
@@ -100,6 +108,14 @@ struct Pass {
   GyroTelemetry gyro;
   StarTrackerTelemetry star_tracker;                        ///< of the first head
   std::vector<StarTrackerTelemetry> further_star_trackers;  ///< as in PassSettings
+
+  /// Of a head, 0 being the first.
+  [[nodiscard]] StarTrackerTelemetry& fixes_of(std::size_t head) {
+    return head == 0 ? star_tracker : further_star_trackers.at(head - 1);
+  }
+  [[nodiscard]] const StarTrackerTelemetry& fixes_of(std::size_t head) const {
+    return head == 0 ? star_tracker : further_star_trackers.at(head - 1);
+  }
 };
 
 /// What a simulator knows. Never part of a Pass, so that no estimator can read it.

@@ -161,6 +161,16 @@ struct ErrorsBesideOutages {
   double sigmas = 0;     ///< how sure that is
 };
 
+/// Errors of the fixes of a star tracker that are alike from one to the next: fixes were left out, so that the errors of
+/// those that stay are independent.
+struct CorrelatedFixes {
+  int head = 0;
+  double part = 0;     ///< of the variance of these errors, about the axis where it is most, has a correlation
+  double time_s = 0;   ///< of exp(−t / time_s)
+  double apart_s = 0;  ///< the fixes that were used, at least
+  long left_out = 0;   ///< fixes
+};
+
 /// Drift as a field against eq. (1) alone, by the whole pass.
 struct AgainstField {
   double log_odds = 0;                ///< ln of the odds of the field
@@ -176,6 +186,7 @@ struct CalibrationRun {
   double gyro_stamps_off_s = 0;                       ///< rms off the regular times that were used in their place, or 0
   std::optional<ReadoutNoise> readout_noise;          ///< that was used in the place of that of the settings
   std::optional<ErrorsBesideOutages> beside_outages;  ///< for which fixes were left out
+  std::vector<CorrelatedFixes> correlated_fixes;      ///< of the star trackers of which fixes were left out for it
   std::vector<Evidence> evidence;                     ///< of what was left to the program to decide
   /// Where an error of the star tracker at orbital period was accepted: ln of its odds against drift at that period.
   std::optional<double> orbital_error_over_drift;
@@ -222,8 +233,9 @@ struct NavigationRun {
   ClockCorrection clock_correction;           ///< of the stamps, by the calibration in use
   double gyro_stamps_off_s = 0;               ///< rms off the regular times that the samples are of, or 0
   std::optional<ReadoutNoise> readout_noise;  ///< that was used in the place of that of the settings
-  std::optional<Clocks> clocks;               ///< where the pass shows them, behind this correction
-  std::vector<OpenLoopEnd> open_loops;        ///< where fixes could be compared with it
+  std::vector<CorrelatedFixes> correlated_fixes;  ///< of the star trackers of which fixes were left out for it
+  std::optional<Clocks> clocks;                   ///< where the pass shows them, behind this correction
+  std::vector<OpenLoopEnd> open_loops;            ///< where fixes could be compared with it
   Statistics statistics;
   /// Where parameters are held: (estimated − held)ᵀ P⁻¹ (estimated − held), P the covariance they were given with, and
   /// its 99.9 % limit.

@@ -1,0 +1,19 @@
+#pragma once
+/// Errors of a star tracker that are alike from one fix to the next, as behind a filter of its own.
+
+#include <vector>
+
+#include "trihedron/records/pass.hpp"
+#include "trihedron/records/run.hpp"
+
+namespace trihedron::ground {
+
+/// The star trackers whose fixes have such errors, by the gyros while the body does not slew (docs/mathematics.md,
+/// section 12). Not those whose errors stay alike for more than about a minute: with fixes far enough apart little
+/// would be left of the pass.
+[[nodiscard]] std::vector<CorrelatedFixes> correlated_fixes(const Pass& pass);
+
+/// Leaves out the fixes of these star trackers that come too soon after the last one that stays, and counts them.
+void leave_out(std::vector<CorrelatedFixes>& correlated, Pass& pass);
+
+}  // namespace trihedron::ground

@@ -1,0 +1,124 @@
+#include "calibrate/correlated_fixes.hpp"
+
+#include <gmock/gmock.h>
+
+#include <cmath>
+#include <cstdint>
+#include <random>
+
+#include "passes.hpp"
+#include "trihedron/core/frames.hpp"
+#include "trihedron/ground/calibrate/calibrate.hpp"
+#include "trihedron/sim/simulate.hpp"
+
+namespace trihedron::ground {
+namespace {
+
+const Eigen::Vector3d kErrors_rad = Eigen::Vector3d(3, 3, 20) * kArcsecond;
+constexpr Duration kPass = std::chrono::hours(6);
+
+/// Errors that are alike over `time_s`, first-order Gauss–Markov, of this 1-sigma.
+void add_errors(StarTrackerTelemetry& fixes, double time_s, const Eigen::Vector3d& sigma_rad, std::uint64_t seed) {
+  std::mt19937_64 random(seed);
+  std::normal_distribution<double> normal;
+  const auto drawn = [&] { return Eigen::Vector3d(normal(random), normal(random), normal(random)); };
+  Eigen::Vector3d error = drawn();
+  for (std::size_t i = 0; i < fixes.size(); ++i) {
+    if (i > 0) {
+      const double kept = std::exp(-to_seconds(fixes.t[i] - fixes.t[i - 1]) / time_s);
+      error = kept * error + std::sqrt(1 - kept * kept) * drawn();
+    }
+    const Eigen::Vector3d off_rad = error.cwiseProduct(sigma_rad);
+    fixes.q_in_c[i] = fixes.q_in_c[i] * Rot<C, C>::exp(Vec<C>::assume(off_rad)).quaternion();
+  }
+}
+
+/// With slews, and white noise of 0.3″ about each axis beside these errors.
+sim::SimulatedPass with_errors(double time_s, std::uint64_t seed = 1) {
+  Scenario scenario = scenario_in_eq1(seed, kPass);
+  scenario.star_tracker.noise_rad.setConstant(0.3 * kArcsecond);
+  sim::SimulatedPass simulated = sim::simulate(scenario);
+  add_errors(simulated.pass.star_tracker, time_s, kErrors_rad, seed);
+  simulated.pass.settings.star_tracker_noise_rad = kErrors_rad;
+  return simulated;
+}
+
+TEST(CorrelatedFixes, AreLeftOutSoThatWhatStaysIsIndependent) {
+  for (const Estimator estimator : {Estimator::kInvariant, Estimator::kBatch}) {
+    const sim::SimulatedPass simulated = with_errors(10);
+    const CalibrationRun run = calibrate(simulated.pass, {.estimator = estimator});
+    ASSERT_EQ(run.correlated_fixes.size(), 1U);
+    const CorrelatedFixes& its = run.correlated_fixes[0];
+    EXPECT_EQ(its.head, 0);
+    EXPECT_NEAR(its.time_s, 10, 2);
+    EXPECT_GT(its.part, 0.9);
+    EXPECT_NEAR(its.apart_s, 27, 6);
+    EXPECT_EQ(static_cast<std::size_t>(its.left_out) + run.fixes.size(), simulated.pass.star_tracker.size());
+    EXPECT_TRUE(run.calibration.verdict.has(FindingCode::kCorrelatedFixes));
+    EXPECT_TRUE(run.calibration.verdict.trustworthy);
+    EXPECT_LT(nees_of(simulated.truth, run.calibration), 45);  // 20 degrees of freedom, once in a thousand
+  }
+}
+
+TEST(CorrelatedFixes, OfWhichAllAreUsedForbidUse) {
+  const CalibrationRun run = calibrate(with_errors(10).pass, told());
+  EXPECT_TRUE(run.correlated_fixes.empty());
+  EXPECT_FALSE(run.calibration.verdict.trustworthy);
+}
+
+TEST(CorrelatedFixes, AreLeftOutWhereThePassDoesNotShowThemIndependent) {
+  const sim::SimulatedPass simulated = with_errors(60);
+  const CalibrationRun run = calibrate(simulated.pass, {});
+  ASSERT_EQ(run.correlated_fixes.size(), 1U);
+  EXPECT_NEAR(run.correlated_fixes[0].time_s, 60, 25);
+  EXPECT_TRUE(run.calibration.verdict.trustworthy);
+  EXPECT_LT(nees_of(simulated.truth, run.calibration), 45);
+}
+
+TEST(CorrelatedFixes, AreLeftOutForNavigationToo) {
+  const sim::SimulatedPass simulated = with_errors(10);
+  const NavigationRun run = navigate(simulated.pass, {});
+  ASSERT_EQ(run.correlated_fixes.size(), 1U);
+  EXPECT_LT(run.fixes.size(), simulated.pass.star_tracker.size() / 6);
+  EXPECT_TRUE(run.verdict.has(FindingCode::kCorrelatedFixes));
+}
+
+TEST(CorrelatedFixes, AreNotThoseWithWhiteNoise) {
+  for (std::uint64_t seed = 1; seed <= 20; ++seed) {
+    const sim::SimulatedPass simulated =
+        sim::simulate(scenario_in_eq1(seed, std::chrono::hours(1) + seed * std::chrono::minutes(10)));
+    EXPECT_TRUE(correlated_fixes(simulated.pass).empty()) << seed;
+  }
+}
+
+TEST(CorrelatedFixes, AreNotThoseOfErrorsThatLast) { EXPECT_TRUE(correlated_fixes(with_errors(600).pass).empty()); }
+
+TEST(CorrelatedFixes, OfFewAreNotLookedFor) {
+  Pass pass = with_errors(10).pass;
+  pass.star_tracker.t.resize(500);
+  pass.star_tracker.q_in_c.resize(500);
+  EXPECT_TRUE(correlated_fixes(pass).empty());
+  pass.gyro = {};
+  EXPECT_TRUE(correlated_fixes(pass).empty());
+}
+
+TEST(CorrelatedFixes, AreThoseOfEachStarTracker) {
+  Scenario scenario = scenario_in_eq1(2, kPass);
+  scenario.further_star_trackers.resize(1);
+  Pass pass = sim::simulate(scenario).pass;
+  add_errors(pass.further_star_trackers.at(0), 10, 3 * kErrors_rad, 2);
+  std::vector<CorrelatedFixes> found = correlated_fixes(pass);
+  ASSERT_EQ(found.size(), 1U);
+  EXPECT_EQ(found[0].head, 1);
+  const std::size_t of_first = pass.star_tracker.size();
+  const std::size_t of_second = pass.further_star_trackers[0].size();
+  leave_out(found, pass);
+  EXPECT_EQ(pass.star_tracker.size(), of_first);
+  EXPECT_EQ(pass.further_star_trackers[0].size() + static_cast<std::size_t>(found[0].left_out), of_second);
+  EXPECT_GT(found[0].left_out, 0);
+  EXPECT_EQ(pass.settings.star_tracker_period, scenario.star_tracker_period);
+  EXPECT_GE(to_seconds(pass.further_star_trackers[0].t[1] - pass.further_star_trackers[0].t[0]), found[0].apart_s - 1);
+}
+
+}  // namespace
+}  // namespace trihedron::ground
