@@ -292,6 +292,9 @@ std::string calibration_text(const CalibrationRun& run, const Eigen::VectorXd& e
   if (run.beside_outages) {
     fmt::format_to(out, " {} beside outages, not used;", run.beside_outages->fixes);
   }
+  for (const CorrelatedFixes& its : run.correlated_fixes) {
+    fmt::format_to(out, " {} with errors like the one before, not used;", its.left_out);
+  }
   text.back() = '\n';
   text += "Samples    ";
   for (const NamedCount& its : named_counts(run.samples)) {

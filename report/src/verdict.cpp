@@ -277,6 +277,9 @@ json verdict_values(const ReportInput& input, const std::vector<Parameter>& para
   if (input.run.beside_outages) {
     rejected.push_back(counted(input.run.beside_outages->fixes, "fix", "fixes") + " beside outages, not used");
   }
+  for (const CorrelatedFixes& its : input.run.correlated_fixes) {
+    rejected.push_back(counted(its.left_out, "fix", "fixes") + " with errors like the one before, not used");
+  }
   for (json& line : rejected_of(named_counts(input.run.samples), "gyro sample", "gyro samples")) {
     rejected.push_back(std::move(line));
   }

@@ -5,6 +5,7 @@
 #include <chrono>
 #include <cmath>
 #include <iterator>
+#include <numbers>
 #include <utility>
 
 #include "trihedron/core/directions_fit.hpp"
@@ -53,17 +54,30 @@ void LocalMisfit::add(Time t, const Vector3d& off_rad, const Vector3d& sigma_rad
   weighted_.emplace_back(weighted_.back() + weight.cwiseProduct(off_rad));
 }
 
-void LocalMisfit::Readings::add(Time t, const UnfollowedMotion& misfit) {
+void LocalMisfit::Readings::add(Time t, const MisfitOfReadings& misfit) {
   t_.push_back(t);
-  squares_.push_back(squares_.back() + misfit.square_rad2);
-  variances_.push_back(variances_.back() + misfit.sigma_rad2 * misfit.sigma_rad2);
+  squares_.emplace_back(squares_.back() + misfit.square_rad2);
+  variances_.emplace_back(variances_.back() + misfit.sigma_rad2.square());
 }
 
-double LocalMisfit::Readings::square_rad2(Time t) const {
+MisfitOfReadings LocalMisfit::Readings::mean(std::size_t from, std::size_t to) const {
+  const auto count = static_cast<double>(to - from);
+  return {(squares_[to] - squares_[from]) / count, (variances_[to] - variances_[from]).sqrt() / count};
+}
+
+// A body that shakes for hours is seen in the mean of the pass before ten minutes show it; but no more of it than these
+// leave room for.
+Eigen::Array3d LocalMisfit::Readings::square_rad2(Time t) const {
   const auto [from, to] = within(t_, t, kReadingsReach);
-  const double sum = squares_[to] - squares_[from];
-  const double by_chance = std::sqrt(variances_[to] - variances_[from]);
-  return from < to && sum > kMisfitSigmas * by_chance ? sum / static_cast<double>(to - from) : 0;
+  if (from == to) {
+    return Eigen::Array3d::Zero();
+  }
+  const MisfitOfReadings here = mean(from, to);
+  const MisfitOfReadings whole = mean(0, t_.size());
+  const Eigen::Array3d room_rad2 = here.square_rad2 + kMisfitSigmas * here.sigma_rad2;
+  const Eigen::Array3d otherwise_rad2 =
+      (whole.square_rad2 > kMisfitSigmas * whole.sigma_rad2).select(whole.square_rad2.min(room_rad2).max(0.0), 0.0);
+  return (here.square_rad2 > kMisfitSigmas * here.sigma_rad2).select(here.square_rad2, otherwise_rad2);
 }
 
 Vector3d LocalMisfit::square_rad2(Time t, int reach) const {
@@ -74,10 +88,10 @@ Vector3d LocalMisfit::square_rad2(Time t, int reach) const {
     found += (square > kMisfitSigmas * kMisfitSigmas * variance).select(square - variance, 0.0).matrix();
   }
   if (reach != SmoothReadings::kNone) {
-    found.array() += readings_.front().square_rad2(t);
+    found += readings_.front().square_rad2(t).matrix();
   }
   if (reach > 0) {
-    found.array() += readings_[static_cast<std::size_t>(reach)].square_rad2(t);
+    found += readings_[static_cast<std::size_t>(reach)].square_rad2(t).matrix();
   }
   return found;
 }
@@ -119,21 +133,23 @@ bool SmoothReadings::agree(const At& longer, const At& shorter) const {
   return square <= (freedom + kSigmas * std::sqrt(2.0 * freedom)) * variance_apart(longer, shorter);
 }
 
-std::optional<UnfollowedMotion> SmoothReadings::off_the_shortest(Time t, const At& longer) const {
+std::optional<MisfitOfReadings> SmoothReadings::off_the_shortest(Time t, const At& longer,
+                                                                 const AttitudeByDirections& attitude) const {
   const std::optional<Fit> shortest = longer.reach > 0 ? fit(t, longer.used, 0) : std::nullopt;
   if (!shortest) {
     return std::nullopt;
   }
-  const double gyros = count(shortest->used);
-  UnfollowedMotion misfit;
+  Vector3d off_rad = Vector3d::Zero();
+  Eigen::Array3d variance_rad2 = Eigen::Array3d::Zero();
   for (int k = 0; k < gyros_; ++k) {
     if (shortest->used[k]) {
-      const double variance_rad2 = std::pow(setup_.readout_noise_rad[k], 2) * variance_apart(longer, at(*shortest));
-      misfit.square_rad2 += ((longer.h_b[k] - shortest->its.h_b[k]).squaredNorm() / 2 - variance_rad2) / gyros;
-      misfit.sigma_rad2 = std::hypot(misfit.sigma_rad2, variance_rad2 / gyros);
+      const Eigen::Matrix3d by_turn = attitude.by_direction(k) * C_c_b_[k];
+      off_rad += by_turn * shortest->its.h_b[k].cross(longer.h_b[k]);
+      variance_rad2 += std::pow(setup_.readout_noise_rad[k], 2) * variance_apart(longer, at(*shortest)) *
+                       by_turn.rowwise().squaredNorm().array();
     }
   }
-  return misfit;
+  return MisfitOfReadings{off_rad.array().square() - variance_rad2, std::numbers::sqrt2 * variance_rad2};
 }
 
 std::optional<UnfollowedMotion> SmoothReadings::off_the_readings(Time t, const GyroMask& used) const {
@@ -202,8 +218,8 @@ std::optional<SmoothedAttitude::Rows> SmoothedAttitude::rows_at(const PassProble
   if (!attitude) {
     return std::nullopt;
   }
-  Rows rows{attitude.value().C_in_c, problem_.attitude_by_states(moment, attitude.value(), reading.h_b),
-            Vector3d::Zero(), reading};
+  Rows rows{attitude.value(), problem_.attitude_by_states(moment, attitude.value(), reading.h_b), Vector3d::Zero(),
+            reading};
   for (int k = 0; k < problem_.layout().gyros; ++k) {
     const double noise_rad = problem_.setup().on_board.readout_noise_rad[k] * reading.noise_factor;
     rows.readout_variance_rad2 += noise_rad * noise_rad * attitude.value().by_direction(k).rowwise().squaredNorm();
@@ -213,7 +229,7 @@ std::optional<SmoothedAttitude::Rows> SmoothedAttitude::rows_at(const PassProble
 
 SmoothedAttitude::At SmoothedAttitude::with_sigma(const Rows& rows, const Eigen::Ref<const MatrixXd>& spread) {
   const Vector3d variance_rad2 = spread.rowwise().squaredNorm();
-  return {rows.C_in_c, (variance_rad2 + rows.readout_variance_rad2).cwiseSqrt(), rows.reading.reach};
+  return {rows.attitude.C_in_c, (variance_rad2 + rows.readout_variance_rad2).cwiseSqrt(), rows.reading.reach};
 }
 
 std::optional<SmoothedAttitude::At> SmoothedAttitude::at(const PassProblem::Moment& moment,
@@ -259,9 +275,9 @@ SmoothedCourse SmoothedAttitude::course() const {
       return;
     }
     if (const auto misfit = readings_.off_the_readings(moment.t, rows->reading.used)) {
-      course.misfit.add_readings(moment.t, 0, *misfit);
+      course.misfit.add_readings(moment.t, 0, MisfitOfReadings::about_all_axes(*misfit));
     }
-    if (const auto misfit = readings_.off_the_shortest(moment.t, rows->reading)) {
+    if (const auto misfit = readings_.off_the_shortest(moment.t, rows->reading, rows->attitude)) {
       course.misfit.add_readings(moment.t, rows->reading.reach, *misfit);
     }
     reaches.push_back(rows->reading.reach);
@@ -272,14 +288,15 @@ SmoothedCourse SmoothedAttitude::course() const {
     if (moment.fix->fix.head == 0) {
       const FixBySharedStates by_shared = fix_by_shared_states(setup, moment.fix->fix, moment.fix->rate_c);
       const Rot<In, C> fix = corrected(moment.fix->fix, by_shared.lazyProduct(solution_.shared));
-      course.misfit.add(moment.t, (rows->C_in_c.inverse() * fix).log().raw(),
+      course.misfit.add(moment.t, (rows->attitude.C_in_c.inverse() * fix).log().raw(),
                         fix_noise(setup, moment.fix->fix).diagonal().cwiseSqrt());
     }
     course.attitude.t.push_back(moment.t);
-    course.attitude.q_in_c.push_back(rows->C_in_c.quaternion());
+    course.attitude.q_in_c.push_back(rows->attitude.C_in_c.quaternion());
     course.readings.t.push_back(moment.t);
     for (int k = 0; k < gyros; ++k) {
-      const Vector3d h_b = moment.gyros[k].C_c_b.transpose() * (rows->C_in_c.raw().transpose() * moment.gyros[k].h_in);
+      const Vector3d h_b =
+          moment.gyros[k].C_c_b.transpose() * (rows->attitude.C_in_c.raw().transpose() * moment.gyros[k].h_in);
       course.readings.h.insert(course.readings.h.end(), h_b.begin(), h_b.end());
     }
     of_arc.push_back(*std::move(rows));

@@ -8,8 +8,20 @@
 
 #include "batch/pass_problem.hpp"
 #include "trihedron/core/directions_fit.hpp"
+#include "trihedron/core/optimal_attitude.hpp"
 
 namespace trihedron::ground {
+
+/// UnfollowedMotion axis by axis, c.
+struct MisfitOfReadings {
+  Eigen::Array3d square_rad2 = Eigen::Array3d::Zero();
+  Eigen::Array3d sigma_rad2 = Eigen::Array3d::Zero();
+
+  /// About each axis the same.
+  [[nodiscard]] static MisfitOfReadings about_all_axes(const UnfollowedMotion& motion) {
+    return {Eigen::Array3d::Constant(motion.square_rad2), Eigen::Array3d::Constant(motion.sigma_rad2)};
+  }
+};
 
 /// Readings at any time, by a polynomial through the samples around it.
 class SmoothReadings {
@@ -30,9 +42,10 @@ class SmoothReadings {
   /// By the longest polynomial that fits, and where the readings bend agrees with those over shorter times. Returns
   /// `otherwise` where none fits; only the gyros that it uses are fitted.
   [[nodiscard]] At at(Time t, const At& otherwise) const;
-  /// What one by a longer polynomial, as of at(), is off that over the shortest time. Nothing where it is that one, or
-  /// none.
-  [[nodiscard]] std::optional<UnfollowedMotion> off_the_shortest(Time t, const At& longer) const;
+  /// What `attitude`, by a longer polynomial, as of at(), is off that by the one over the shortest time. Nothing where
+  /// it is that one, or none.
+  [[nodiscard]] std::optional<MisfitOfReadings> off_the_shortest(Time t, const At& longer,
+                                                                 const AttitudeByDirections& attitude) const;
   /// What the readings are off that one. Nothing where there is none.
   [[nodiscard]] std::optional<UnfollowedMotion> off_the_readings(Time t, const GyroMask& used) const;
 
@@ -71,12 +84,12 @@ class LocalMisfit {
   void add(Time t, const Eigen::Vector3d& off_rad, const Eigen::Vector3d& sigma_rad);
   /// Of the readings next: what the polynomial `reach` over them is off the one over the shortest time, and this one
   /// off the readings themselves.
-  void add_readings(Time t, int reach, const UnfollowedMotion& misfit) {
+  void add_readings(Time t, int reach, const MisfitOfReadings& misfit) {
     readings_[static_cast<std::size_t>(reach)].add(t, misfit);
   }
   /// Square of the error about c x, y, z of the smoothed attitude by the polynomial `reach` that the fixes up to a
   /// minute and the readings up to five minutes from t show, rad²; 0 for each where its mean is within 2.5 of its
-  /// sigmas.
+  /// sigmas, for the readings also that over the whole pass.
   [[nodiscard]] Eigen::Vector3d square_rad2(Time t, int reach) const;
 
  private:
@@ -87,14 +100,16 @@ class LocalMisfit {
   /// Mean of misfits over some time.
   class Readings {
    public:
-    void add(Time t, const UnfollowedMotion& misfit);
-    [[nodiscard]] double square_rad2(Time t) const;
+    void add(Time t, const MisfitOfReadings& misfit);
+    [[nodiscard]] Eigen::Array3d square_rad2(Time t) const;
 
    private:
+    [[nodiscard]] MisfitOfReadings mean(std::size_t from, std::size_t to) const;
+
     std::vector<Time> t_;
     // Of the readings before each, and of all at the end.
-    std::vector<double> squares_{0};    ///< rad²
-    std::vector<double> variances_{0};  ///< rad⁴
+    std::vector<Eigen::Array3d> squares_{Eigen::Array3d::Zero()};    ///< rad²
+    std::vector<Eigen::Array3d> variances_{Eigen::Array3d::Zero()};  ///< rad⁴
   };
   std::array<Readings, SmoothReadings::kReaches> readings_;  ///< the first: of the shortest off the readings
 };
@@ -138,7 +153,7 @@ class SmoothedAttitude {
   };
   /// An attitude before its sigmas are known.
   struct Rows {
-    Rot<In, C> C_in_c;
+    AttitudeByDirections attitude;
     Eigen::MatrixXd by_states;              ///< its error, c axes, by the states of the arc
     Eigen::Vector3d readout_variance_rad2;  ///< of the noise of the readings
     SmoothReadings::At reading;

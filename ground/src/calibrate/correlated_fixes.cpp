@@ -4,23 +4,31 @@
 #include <Eigen/QR>
 #include <algorithm>
 #include <array>
+#include <chrono>
 #include <cmath>
 #include <cstddef>
 #include <iterator>
 #include <limits>
+#include <numbers>
 #include <optional>
 #include <utility>
 
 #include "clocks/turns.hpp"
 #include "model/scatter.hpp"
-#include "model/slews.hpp"
 #include "trihedron/core/frames.hpp"
+#include "trihedron/core/optimal_attitude.hpp"
+#include "trihedron/records/units.hpp"
 
 namespace trihedron::ground {
 namespace {
 
-/// Fixes further apart are not compared: over four times as long what the alignments are off turns with the body.
+/// Fixes further apart are not compared, nor those between which the body turns further: what the alignments are off
+/// turns with it, and fourth differences no longer take it away.
 constexpr double kFarthestCompared_s = 240;
+constexpr double kFarthestTurn_rad = 0.2;
+/// The body is at rest where its rate is so near to the usual one, or to this part of it.
+constexpr double kSlowestTurn_rad_s = 0.01 * kDegree;
+constexpr double kPartOfUsual = 0.2;
 /// Fourth differences from which a variance is told, and those that are enough.
 constexpr std::size_t kFewestFourths = 500;
 constexpr std::size_t kEnoughFourths = 10000;
@@ -32,8 +40,9 @@ struct FixByGyros {
   Eigen::Matrix3d C_c_g;   ///< by the readings
 };
 
-/// rad² about c x, y, z, from so many differences.
+/// About c x, y, z, by errors so far apart, from so many differences.
 struct Variance {
+  double lag_s;
   Eigen::Array3d rad2;
   std::size_t differences;
 };
@@ -42,14 +51,15 @@ struct Variance {
 class ErrorsAtRest {
  public:
   ErrorsAtRest(const StarTrackerTelemetry& fixes, const GyroReadings& readings) {
-    std::vector<double> turning_rad_s;
+    std::vector<double> rates_rad_s;
     std::size_t from = 0;
     for (std::size_t i = 0; i < fixes.size(); ++i) {
       const std::optional<FittedDirections> fitted = readings.at(fixes.t[i], from);
       if (fitted && nearly_unit(fixes.q_in_c[i].norm())) {
         compared_.push_back({to_seconds(fixes.t[i] - fixes.t.front()), fixes.q_in_c[i].normalized().toRotationMatrix(),
                              triad(fitted->h_b[0], fitted->h_b[1])});
-        turning_rad_s.push_back(std::max(fitted->h_b_rate[0].norm(), fitted->h_b_rate[1].norm()));
+        const Eigen::Vector3d rate = rate_by_directions(fitted->h_b, fitted->h_b_rate, all_gyros(readings.gyros()));
+        rates_rad_s.insert(rates_rad_s.end(), rate.begin(), rate.end());
       }
     }
     if (compared_.size() <= kFewestFourths) {
@@ -60,11 +70,14 @@ class ErrorsAtRest {
       steps_s.push_back(compared_[i].t_s - compared_[i - 1].t_s);
     }
     step_s_ = median_of(steps_s);
-    std::vector<double> sorted = turning_rad_s;
-    const double usual_rad_s = median_of(sorted);
-    for (const double rate : turning_rad_s) {
-      const bool rests = is_at_rest(rate, usual_rad_s) || rate < kSlowestSlew_rad_s;
-      in_motion_.push_back((in_motion_.empty() ? 0 : in_motion_.back()) + (rests ? 0 : 1));
+    const auto columns = Eigen::Matrix3Xd::Map(rates_rad_s.data(), 3, std::ssize(compared_));
+    const Eigen::Vector3d usual_rad_s = medians_of(columns);
+    farthest_s_ = std::min(kFarthestCompared_s, kFarthestTurn_rad / usual_rad_s.norm());
+    const double rest_rad_s = std::max(kSlowestTurn_rad_s, kPartOfUsual * usual_rad_s.norm());
+    long in_motion = 0;
+    for (Eigen::Index i = 0; i < columns.cols(); ++i) {
+      in_motion += (columns.col(i) - usual_rad_s).norm() < rest_rad_s ? 0 : 1;
+      in_motion_.push_back(in_motion);
     }
   }
 
@@ -75,7 +88,7 @@ class ErrorsAtRest {
   /// less than theirs. Nothing where there are too few.
   [[nodiscard]] std::optional<Variance> variance(std::size_t lag) const {
     const std::size_t span = 4 * lag;
-    if (compared_.size() <= span) {
+    if (compared_.size() <= span || static_cast<double>(lag) * step_s_ > farthest_s_) {
       return std::nullopt;
     }
     const std::size_t count = compared_.size() - span;
@@ -92,7 +105,7 @@ class ErrorsAtRest {
     if (sizes[0].size() < kFewestFourths) {
       return std::nullopt;
     }
-    Variance found{{}, sizes[0].size()};
+    Variance found{static_cast<double>(lag) * step_s_, {}, sizes[0].size()};
     for (std::size_t axis = 0; axis < 3; ++axis) {
       const double sigma = sigma_without_outliers(sizes[axis]);
       found.rad2(static_cast<Eigen::Index>(axis)) = sigma * sigma / (1 + 16 + 36 + 16 + 1);
@@ -128,6 +141,7 @@ class ErrorsAtRest {
   std::vector<FixByGyros> compared_;
   std::vector<long> in_motion_;  ///< fixes up to each, and with it, at which the body slews
   double step_s_ = 0;
+  double farthest_s_ = 0;
 };
 
 /// How much less than theirs the variance by fourth differences is of errors with the correlation exp(−lag / τ).
@@ -143,48 +157,55 @@ struct ErrorModel {
   double misfit = std::numeric_limits<double>::infinity();
 };
 
-/// By the variances, rad², one column for each of the lags, about the axes about which errors are `correlated`: least
-/// squares of relative differences.
-ErrorModel model_with(double time_s, const Eigen::VectorXd& lags_s, const Eigen::Array3Xd& variances_rad2,
-                      const Eigen::Array<bool, 3, 1>& correlated) {
+/// Least squares of relative differences from the variances by errors a lag apart.
+ErrorModel model_with(double time_s, const std::vector<Variance>& variances) {
+  const auto size = static_cast<Eigen::Index>(variances.size());
   ErrorModel model{time_s, Eigen::Array3d::Zero(), 0};
-  Eigen::MatrixX2d parts(lags_s.size(), 2);
-  parts.col(0).setOnes();
-  parts.col(1) = -lags_s.unaryExpr([time_s](double lag_s) { return alike(lag_s / time_s); });
   for (int axis = 0; axis < 3; ++axis) {
-    if (correlated(axis)) {
-      const Eigen::MatrixX2d relative = parts.array().colwise() / variances_rad2.row(axis).transpose();
-      const Eigen::VectorXd ones = Eigen::VectorXd::Ones(lags_s.size());
-      const Eigen::Vector2d found = relative.colPivHouseholderQr().solve(ones);
-      model.part(axis) = std::clamp(found(1) / found(0), 0.0, 1.0);
-      model.misfit += (relative * found - ones).squaredNorm();
+    Eigen::MatrixX2d parts(size, 2);
+    Eigen::VectorXd weights(size);
+    for (Eigen::Index i = 0; i < size; ++i) {
+      const Variance& its = variances[static_cast<std::size_t>(i)];
+      weights(i) = std::sqrt(static_cast<double>(its.differences));
+      parts.row(i) << 1, -alike(its.lag_s / time_s);
+      parts.row(i) *= weights(i) / its.rad2(axis);
     }
+    const Eigen::Vector2d found = parts.colPivHouseholderQr().solve(weights);
+    model.part(axis) = std::clamp(found(1) / found(0), 0.0, 1.0);
+    model.misfit += (parts * found - weights).squaredNorm();
   }
   return model;
 }
 
-/// The most likely τ up to kLongest_s; nothing where it is no less than that.
-std::optional<ErrorModel> model_of(const Eigen::VectorXd& lags_s, const Eigen::Array3Xd& variances_rad2,
-                                   const Eigen::Array<bool, 3, 1>& correlated) {
+/// 1-sigma of a variance, as a part of it, by one of differences that overlap.
+constexpr double kChanceOfOne = 2.3;
+
+/// The most likely τ; nothing where it may as well be kLongest_s or more.
+std::optional<ErrorModel> model_of(const std::vector<Variance>& variances) {
   constexpr double kLongest_s = 120;
   constexpr double kStep = 1.05;
+  constexpr double kSure = 3;  // sigmas
   ErrorModel best;
-  for (double time_s = lags_s(0) / 4; time_s <= kLongest_s; time_s *= kStep) {
-    const ErrorModel model = model_with(time_s, lags_s, variances_rad2, correlated);
+  for (double time_s = variances.front().lag_s / 4; time_s < kLongest_s; time_s *= kStep) {
+    const ErrorModel model = model_with(time_s, variances);
     best = model.misfit < best.misfit ? model : best;
   }
-  return best.time_s * kStep * kStep < kLongest_s ? std::optional(best) : std::nullopt;
+  const double more = model_with(kLongest_s, variances).misfit - best.misfit;
+  return more > std::pow(kSure * kChanceOfOne, 2) ? std::optional(best) : std::nullopt;
 }
 
-/// Axes about which the errors of fixes `near` differ less than those of fixes eight times as far apart, by more than
-/// chance makes of it.
-Eigen::Array<bool, 3, 1> correlated_axes(const Variance& near, const Variance& far) {
-  constexpr double kMore = 1.25;   // times the variance
-  constexpr double kSure = 5;      // sigmas
-  constexpr double kChance = 2.3;  // 1-sigma of a variance by one difference, for those that overlap
+/// Whether errors of fixes `near` each other differ less than those of fixes further apart, about one axis or all three
+/// together, by more than chance makes of it.
+bool are_correlated(const Variance& near, const Variance& far) {
+  constexpr double kMore = 1.05;    // times the variance
+  constexpr double kSure = 5;       // sigmas
+  constexpr double kLeast = 1e-14;  // rad², a fiftieth of an arcsecond
+  constexpr double kMost = 2e-6;    // rad², 5′: more is no noise, but axes that are exchanged
   const double chance =
-      kChance * std::sqrt(1 / static_cast<double>(near.differences) + 1 / static_cast<double>(far.differences));
-  return far.rad2 > (kMore + kSure * chance) * near.rad2;
+      kChanceOfOne * std::sqrt(1 / static_cast<double>(near.differences) + 1 / static_cast<double>(far.differences));
+  const Eigen::Array3d ratio = far.rad2 / near.rad2.max(kLeast);
+  return (far.rad2 < kMost).all() &&
+         (ratio.maxCoeff() > kMore + kSure * chance || ratio.mean() > kMore + kSure * chance / std::numbers::sqrt3);
 }
 
 std::optional<CorrelatedFixes> correlated(const StarTrackerTelemetry& fixes, const GyroReadings& readings) {
@@ -197,31 +218,28 @@ std::optional<CorrelatedFixes> correlated(const StarTrackerTelemetry& fixes, con
   const auto first =
       static_cast<std::size_t>(std::max(std::ceil(2 * to_seconds(readings.reach()) / errors.step_s()), 1.0));
   const std::optional<Variance> near = errors.variance(first);
-  const std::optional<Variance> far = errors.variance(8 * first);
-  if (!near || !far || !correlated_axes(*near, *far).any()) {
+  const auto differ_less = [&](std::size_t lag) {
+    const std::optional<Variance> far = errors.variance(lag);
+    return far && are_correlated(*near, *far);
+  };
+  if (!near || !(differ_less(8 * first) || differ_less(32 * first))) {
     return std::nullopt;
   }
-  std::vector<double> lags_s;
-  std::vector<double> variances_rad2;
+  std::vector<Variance> variances;
   for (std::size_t lag = first; static_cast<double>(lag) * errors.step_s() <= kFarthestCompared_s; lag += lag / 3 + 1) {
-    if (const std::optional<Variance> its = errors.variance(lag)) {
-      lags_s.push_back(static_cast<double>(lag) * errors.step_s());
-      variances_rad2.insert(variances_rad2.end(), its->rad2.begin(), its->rad2.end());
+    if (const std::optional<Variance> its = errors.variance(lag); its && (its->rad2 > 0).all()) {
+      variances.push_back(*its);
     }
   }
-  const auto count = std::ssize(lags_s);
-  const std::optional<ErrorModel> model =
-      model_of(Eigen::VectorXd::Map(lags_s.data(), count), Eigen::Array3Xd::Map(variances_rad2.data(), 3, count),
-               correlated_axes(*near, *far));
+  const std::optional<ErrorModel> model = variances.empty() ? std::nullopt : model_of(variances);
   if (!model) {
     return std::nullopt;
   }
   CorrelatedFixes found;
   found.time_s = model->time_s;
   found.part = model->part.maxCoeff();
-  const double steps = found.time_s * std::log(found.part / kLeft) / errors.step_s();
-  found.apart_s = std::max(std::ceil(steps), 1.0) * errors.step_s();
-  return found;
+  found.apart_s = std::ceil(found.time_s * std::log(found.part / kLeft) / errors.step_s()) * errors.step_s();
+  return found.apart_s > errors.step_s() ? std::optional(found) : std::nullopt;
 }
 
 }  // namespace
@@ -248,7 +266,7 @@ void leave_out(std::vector<CorrelatedFixes>& correlated, Pass& pass) {
     StarTrackerTelemetry kept;
     const Duration apart = from_seconds(0.98 * its.apart_s);  // stamps are not quite regular
     for (std::size_t i = 0; i < fixes.size(); ++i) {
-      if (kept.t.empty() || fixes.t[i] - kept.t.back() >= apart) {
+      if (kept.t.empty() || std::chrono::abs(fixes.t[i] - kept.t.back()) >= apart) {
         kept.add(fixes, i);
       }
     }

@@ -12,15 +12,6 @@ namespace {
 
 constexpr Eigen::Index kFewest = 1000;
 
-Eigen::Vector3d median(const Eigen::Ref<const Eigen::Matrix3Xd>& values) {
-  Eigen::Vector3d result;
-  for (Eigen::Index axis = 0; axis < 3; ++axis) {
-    std::vector<double> of_axis(values.row(axis).begin(), values.row(axis).end());
-    result(axis) = median_of(of_axis);
-  }
-  return result;
-}
-
 /// What the fixes are off the navigator, from each of its corrections to the next.
 std::vector<Eigen::Matrix3Xd> off_navigator(const std::vector<FixRecord>& fixes, int head) {
   std::vector<std::vector<double>> found;
@@ -109,7 +100,8 @@ std::optional<ShapeOfErrors> shape_of_errors(const std::vector<FixRecord>& fixes
     return std::nullopt;
   }
   const Eigen::Matrix3Xd z = root.matrixL().solve(centred);
-  ShapeOfErrors shape{.fixes = static_cast<std::size_t>(errors.cols()), .mean_off_median_rad = mean - median(errors)};
+  ShapeOfErrors shape{.fixes = static_cast<std::size_t>(errors.cols()),
+                      .mean_off_median_rad = mean - medians_of(errors)};
   for (const Eigen::Vector3d& direction : directions()) {
     const Eigen::ArrayXd along = (direction.transpose() * z).transpose();
     const Eigen::ArrayXd cube = along.cube();

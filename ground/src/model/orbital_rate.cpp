@@ -30,7 +30,7 @@ struct UsualTurn {
 /// Nothing where there are no fixes for it.
 std::optional<UsualTurn> usual_turn(const StarTrackerTelemetry& tracker) {
   constexpr double kApart_s = 60;
-  std::vector<Eigen::Vector3d> rates;
+  std::vector<double> rates;
   std::size_t j = 0;
   for (std::size_t i = 0; i < tracker.size(); ++i) {
     while (j < tracker.size() && to_seconds(tracker.t[j] - tracker.t[i]) < kApart_s) {
@@ -43,20 +43,16 @@ std::optional<UsualTurn> usual_turn(const StarTrackerTelemetry& tracker) {
     const auto after = Rot<In, C>::assume(tracker.q_in_c[j].normalized());
     const Eigen::Vector3d rate = (after * before.inverse()).log().raw() / to_seconds(tracker.t[j] - tracker.t[i]);
     if (rate.allFinite()) {
-      rates.push_back(rate);
+      rates.insert(rates.end(), rate.begin(), rate.end());
     }
   }
   if (rates.empty()) {
     return std::nullopt;
   }
-  UsualTurn usual{};
-  std::vector<double> sizes(rates.size());
-  for (int axis = 0; axis < 3; ++axis) {
-    std::ranges::transform(rates, sizes.begin(), [axis](const Eigen::Vector3d& rate) { return rate(axis); });
-    usual.rate_rad_s(axis) = median_of(sizes);
-  }
-  std::ranges::transform(rates, sizes.begin(),
-                         [&](const Eigen::Vector3d& rate) { return (rate - usual.rate_rad_s).norm(); });
+  const auto columns = Eigen::Matrix3Xd::Map(rates.data(), 3, std::ssize(rates) / 3);
+  UsualTurn usual{.rate_rad_s = medians_of(columns), .sigma_rad_s = 0};
+  const Eigen::ArrayXd off_rad_s = (columns.colwise() - usual.rate_rad_s).colwise().norm();
+  std::vector<double> sizes(off_rad_s.begin(), off_rad_s.end());
   const double minutes = to_seconds(tracker.t.back() - tracker.t.front()) / kApart_s;
   usual.sigma_rad_s = median_of(sizes) / std::sqrt(std::max(minutes, 1.0));
   return usual;

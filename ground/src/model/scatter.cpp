@@ -12,6 +12,15 @@ double median_of(std::vector<double>& values) {
   return *middle;
 }
 
+Eigen::Vector3d medians_of(const Eigen::Ref<const Eigen::Matrix3Xd>& columns) {
+  Eigen::Vector3d medians;
+  for (Eigen::Index axis = 0; axis < 3; ++axis) {
+    std::vector<double> of_axis(columns.row(axis).begin(), columns.row(axis).end());
+    medians(axis) = median_of(of_axis);
+  }
+  return medians;
+}
+
 double sigma_without_outliers(std::vector<double>& sizes) {
   constexpr double kMedianOfNormal = 0.6744897501960817;
   constexpr double kWithin = 4;

@@ -9,6 +9,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <numbers>
 #include <random>
 #include <utility>
 
@@ -413,17 +414,43 @@ TEST(LocalMisfit, TellsWhereTheReadingsMoveOtherwise) {
   std::normal_distribution<double> normal;
   for (int i = 0; i < 1200; ++i) {  // an hour, in whose last half there is something
     const double by_chance = kByChance_rad2 * (std::pow(normal(random), 2) + std::pow(normal(random), 2) - 2) / 2;
-    misfit.add_readings(Time(from_seconds(3 * i)), 1, {by_chance + (i < 600 ? 0 : 4e-13), kByChance_rad2});
-    misfit.add_readings(Time(from_seconds(3 * i)), 0, {i < 600 ? 0 : 1e-12, kByChance_rad2});
+    const auto add = [&](int reach, double square_rad2) {
+      misfit.add_readings(Time(from_seconds(3 * i)), reach,
+                          MisfitOfReadings::about_all_axes({square_rad2, kByChance_rad2}));
+    };
+    add(1, by_chance + (i < 600 ? 0 : 4e-13));
+    add(0, i < 600 ? 0 : 1e-12);
   }
   const auto at = [&](double t_s, int reach) { return misfit.square_rad2(Time(from_seconds(t_s)), reach); };
-  EXPECT_EQ(at(900, 1), Eigen::Vector3d::Zero());
+  EXPECT_NEAR(at(900, 0).x(), 2.5 * kByChance_rad2 / std::sqrt(201),
+              1e-20);  // not more than ten minutes leave room for
+  EXPECT_LE(at(900, 1).x(), 5e-13);
   EXPECT_NEAR(at(2700, 1).x(), 1.4e-12, 2e-13);
   EXPECT_EQ(at(2700, 1), Eigen::Vector3d::Constant(at(2700, 1).x()));
   EXPECT_NEAR(at(2700, 0).x(), 1e-12, 1e-20);  // no polynomial is off more than the one over the shortest time
   EXPECT_NEAR(at(2700, 2).x(), 1e-12, 1e-20);
   EXPECT_EQ(at(2700, SmoothReadings::kNone), Eigen::Vector3d::Zero());
   EXPECT_EQ(at(1e5, 1), Eigen::Vector3d::Zero());  // nothing is near
+}
+
+TEST(LocalMisfit, TellsOfAWholePassWhatTenMinutesDoNotShow) {
+  constexpr double kVariance_rad2 = 1e-12;
+  const Eigen::Array3d more_rad2(0.2 * kVariance_rad2, 0, 0);
+  LocalMisfit misfit;
+  std::mt19937 random(3);
+  std::normal_distribution<double> normal;
+  for (int i = 0; i < 10800; ++i) {
+    const Eigen::Array3d z(normal(random), normal(random), normal(random));
+    const Eigen::Array3d square_rad2 = z.square() * (kVariance_rad2 + more_rad2) - kVariance_rad2;
+    misfit.add_readings(Time(from_seconds(3 * i)), 2,
+                        {square_rad2, Eigen::Array3d::Constant(std::numbers::sqrt2 * kVariance_rad2)});
+  }
+  Eigen::Vector3d mean = Eigen::Vector3d::Zero();
+  for (int i = 0; i < 100; ++i) {
+    mean += misfit.square_rad2(Time(from_seconds(324 * i)), 2) / 100;
+  }
+  EXPECT_NEAR(mean.x(), more_rad2.x(), 0.3 * more_rad2.x());
+  EXPECT_LT(mean.tail<2>().maxCoeff(), 0.02 * kVariance_rad2);
 }
 
 TEST(LocalMisfit, TellsWhereFixesAreOffTheAttitudeAlike) {
