@@ -293,7 +293,7 @@ std::string calibration_text(const CalibrationRun& run, const Eigen::VectorXd& e
     fmt::format_to(out, " {} beside outages, not used;", run.beside_outages->fixes);
   }
   for (const CorrelatedFixes& its : run.correlated_fixes) {
-    fmt::format_to(out, " {} with errors like the one before, not used;", its.left_out);
+    fmt::format_to(out, " {} of star tracker {} with errors like those used, not used;", its.left_out, its.head + 1);
   }
   text.back() = '\n';
   text += "Samples    ";

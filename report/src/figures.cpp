@@ -35,7 +35,8 @@ class Figures {
       : input_(input),
         run_(input.run),
         parameters_(parameters),
-        fix_step_min_(kFixesOfGap * to_minutes(input.pass.settings.star_tracker_period)) {}
+        fix_period_(period_of_fixes(input)),
+        fix_step_min_(kFixesOfGap * to_minutes(fix_period_)) {}
 
   [[nodiscard]] json all() const {
     json data = {{"duration_min", to_minutes(input_.pass.settings.duration)}, {"gyros", run_.calibration.gyros.size()}};
@@ -387,17 +388,27 @@ class Figures {
       }
       return result;
     };
-    return {{"width", width_min},
-            {"bins", bins},
-            {"gyro", {percent(gyro[0], settings.gyro_period), percent(gyro[1], settings.gyro_period)}},
-            {"fixes",
-             {percent(fixes[0], settings.star_tracker_period), percent(fixes[1], settings.star_tracker_period),
-              percent(fixes[2], settings.star_tracker_period)}}};
+    return {
+        {"width", width_min},
+        {"bins", bins},
+        {"gyro", {percent(gyro[0], settings.gyro_period), percent(gyro[1], settings.gyro_period)}},
+        {"fixes", {percent(fixes[0], fix_period_), percent(fixes[1], fix_period_), percent(fixes[2], fix_period_)}}};
+  }
+
+  /// Of those of the first star tracker that are used where none is rejected.
+  static Duration period_of_fixes(const ReportInput& input) {
+    for (const CorrelatedFixes& its : input.run.correlated_fixes) {
+      if (its.head == 0) {
+        return from_seconds(its.apart_s);
+      }
+    }
+    return input.pass.settings.star_tracker_period;
   }
 
   const ReportInput& input_;
   const CalibrationRun& run_;
   const std::vector<Parameter>& parameters_;
+  Duration fix_period_;
   double fix_step_min_;
 };
 

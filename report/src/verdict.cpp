@@ -278,7 +278,8 @@ json verdict_values(const ReportInput& input, const std::vector<Parameter>& para
     rejected.push_back(counted(input.run.beside_outages->fixes, "fix", "fixes") + " beside outages, not used");
   }
   for (const CorrelatedFixes& its : input.run.correlated_fixes) {
-    rejected.push_back(counted(its.left_out, "fix", "fixes") + " with errors like the one before, not used");
+    rejected.push_back(counted(its.left_out, "fix", "fixes") +
+                       fmt::format(" of star tracker {} with errors like those used, not used", its.head + 1));
   }
   for (json& line : rejected_of(named_counts(input.run.samples), "gyro sample", "gyro samples")) {
     rejected.push_back(std::move(line));

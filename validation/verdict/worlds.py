@@ -353,6 +353,7 @@ WORLDS = [
     World("clock-offset-20ms", "dirty telemetry", tracker(clock_offset='"20ms"')),
     World("orbital-error-15", "dirty telemetry", tracker(orbital_sine='["15arcsec", "-10arcsec", "5arcsec"]', orbital_cosine='["5arcsec", "10arcsec", "-15arcsec"]')),
     World("field-error", "dirty telemetry", tracker(field_error='["2arcsec", "2arcsec", "10arcsec"]'), faults=("innovations-not-white",)),
+    World("tracker-alike-20s", "dirty telemetry", constant(SLEWS), tracker_wanders(5 * ARCSECOND, 20)),
     World("tracker-noise-doubles", "dirty telemetry", constant(SLEWS), tracker_noise_grows(2, [3 * ARCSECOND, 3 * ARCSECOND, 20 * ARCSECOND])),
     World("blinded", "dirty telemetry", tracker(sun_exclusion='"40deg"', earth_exclusion='"25deg"')),
 

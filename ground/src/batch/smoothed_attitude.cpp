@@ -66,18 +66,22 @@ MisfitOfReadings LocalMisfit::Readings::mean(std::size_t from, std::size_t to) c
 }
 
 // A body that shakes for hours is seen in the mean of the pass before ten minutes show it; but no more of it than these
-// leave room for.
+// leave room for, where there are readings at fixes at all.
 Eigen::Array3d LocalMisfit::Readings::square_rad2(Time t) const {
-  const auto [from, to] = within(t_, t, kReadingsReach);
-  if (from == to) {
+  if (t_.empty()) {
     return Eigen::Array3d::Zero();
   }
+  const auto shown_rad2 = [](const MisfitOfReadings& its, const Eigen::Array3d& otherwise_rad2) {
+    return Eigen::Array3d((its.square_rad2 > kMisfitSigmas * its.sigma_rad2).select(its.square_rad2, otherwise_rad2));
+  };
+  const Eigen::Array3d of_pass_rad2 = shown_rad2(mean(0, t_.size()), Eigen::Array3d::Zero());
+  const auto [from, to] = within(t_, t, kReadingsReach);
+  if (from == to) {
+    return of_pass_rad2;
+  }
   const MisfitOfReadings here = mean(from, to);
-  const MisfitOfReadings whole = mean(0, t_.size());
   const Eigen::Array3d room_rad2 = here.square_rad2 + kMisfitSigmas * here.sigma_rad2;
-  const Eigen::Array3d otherwise_rad2 =
-      (whole.square_rad2 > kMisfitSigmas * whole.sigma_rad2).select(whole.square_rad2.min(room_rad2).max(0.0), 0.0);
-  return (here.square_rad2 > kMisfitSigmas * here.sigma_rad2).select(here.square_rad2, otherwise_rad2);
+  return shown_rad2(here, of_pass_rad2.min(room_rad2).max(0.0));
 }
 
 Vector3d LocalMisfit::square_rad2(Time t, int reach) const {

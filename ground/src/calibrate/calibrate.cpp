@@ -504,8 +504,8 @@ CalibrationRun calibrate_after(const Pass& as_given, const CalibrationOptions& o
   const Pass& of_independent = independent ? independent->pass : in_step;
   const CalibrationOptions asked = with_clock_states(options, correction);
   std::optional<WithoutErrorsBesideOutages> without_errors;
-  if (finds_noise) {
-    without_errors = without_errors_beside_outages(of_independent, asked, progress);
+  if (finds_noise && !independent) {  // too few of those that stay are beside outages
+    without_errors = without_errors_beside_outages(in_step, asked, progress);
   }
   const Pass& stamped = without_errors ? without_errors->pass : of_independent;
   CalibrationRun run = calibrate_as_stamped(stamped, asked, progress);

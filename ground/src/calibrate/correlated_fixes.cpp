@@ -13,29 +13,17 @@
 #include <optional>
 #include <utility>
 
+#include "calibrate/at_rest.hpp"
 #include "clocks/turns.hpp"
 #include "model/scatter.hpp"
 #include "trihedron/core/frames.hpp"
 #include "trihedron/core/optimal_attitude.hpp"
-#include "trihedron/records/units.hpp"
 
 namespace trihedron::ground {
 namespace {
 
-/// Fixes further apart are not compared, nor those between which the body turns further: what the alignments are off
-/// turns with it, and fourth differences no longer take it away.
-constexpr double kFarthestCompared_s = 240;
-constexpr double kFarthestTurn_rad = 0.2;
-/// The body is at rest where its rate is so near to the usual one, or to this part of it.
-constexpr double kSlowestTurn_rad_s = 0.01 * kDegree;
-constexpr double kPartOfUsual = 0.2;
-/// Fourth differences from which a variance is told, and those that are enough.
-constexpr std::size_t kFewestFourths = 500;
-constexpr std::size_t kEnoughFourths = 10000;
-
 /// A fix beside the trihedron g of the first two momenta.
 struct FixByGyros {
-  double t_s;
   Eigen::Matrix3d C_in_c;  ///< by the fix
   Eigen::Matrix3d C_c_g;   ///< by the readings
 };
@@ -51,103 +39,80 @@ struct Variance {
 class ErrorsAtRest {
  public:
   ErrorsAtRest(const StarTrackerTelemetry& fixes, const GyroReadings& readings) {
-    std::vector<double> rates_rad_s;
+    constexpr std::size_t kMostFixes = 100'000;  // days, at the usual rate
+    const GyroMask all = all_gyros(readings.gyros());
     std::size_t from = 0;
-    for (std::size_t i = 0; i < fixes.size(); ++i) {
+    for (std::size_t i = 0; i < std::min(fixes.size(), kMostFixes); ++i) {
       const std::optional<FittedDirections> fitted = readings.at(fixes.t[i], from);
       if (fitted && nearly_unit(fixes.q_in_c[i].norm())) {
-        compared_.push_back({to_seconds(fixes.t[i] - fixes.t.front()), fixes.q_in_c[i].normalized().toRotationMatrix(),
-                             triad(fitted->h_b[0], fitted->h_b[1])});
-        const Eigen::Vector3d rate = rate_by_directions(fitted->h_b, fitted->h_b_rate, all_gyros(readings.gyros()));
-        rates_rad_s.insert(rates_rad_s.end(), rate.begin(), rate.end());
+        fixes_.push_back({fixes.q_in_c[i].normalized().toRotationMatrix(), triad(fitted->h_b[0], fitted->h_b[1])});
+        at_rest_.add(to_seconds(fixes.t[i] - fixes.t.front()), rate_by_directions(fitted->h_b, fitted->h_b_rate, all));
       }
     }
-    if (compared_.size() <= kFewestFourths) {
-      return;
-    }
-    std::vector<double> steps_s;
-    for (std::size_t i = 1; i < compared_.size(); ++i) {
-      steps_s.push_back(compared_[i].t_s - compared_[i - 1].t_s);
-    }
-    step_s_ = median_of(steps_s);
-    const auto columns = Eigen::Matrix3Xd::Map(rates_rad_s.data(), 3, std::ssize(compared_));
-    const Eigen::Vector3d usual_rad_s = medians_of(columns);
-    farthest_s_ = std::min(kFarthestCompared_s, kFarthestTurn_rad / usual_rad_s.norm());
-    const double rest_rad_s = std::max(kSlowestTurn_rad_s, kPartOfUsual * usual_rad_s.norm());
-    long in_motion = 0;
-    for (Eigen::Index i = 0; i < columns.cols(); ++i) {
-      in_motion += (columns.col(i) - usual_rad_s).norm() < rest_rad_s ? 0 : 1;
-      in_motion_.push_back(in_motion);
-    }
+    at_rest_.settle();
   }
 
   /// Between fixes; 0 where there are too few.
-  [[nodiscard]] double step_s() const { return step_s_; }
+  [[nodiscard]] double step_s() const { return at_rest_.step_s(); }
+  [[nodiscard]] double farthest_s() const { return at_rest_.farthest_s(); }
 
-  /// Of the errors of fixes so many steps apart, by their fourth differences: as far as these errors are alike it is
-  /// less than theirs. Nothing where there are too few.
+  /// Of the errors of fixes so many steps apart: as far as these errors are alike it is less than theirs. Nothing where
+  /// there are too few.
   [[nodiscard]] std::optional<Variance> variance(std::size_t lag) const {
-    const std::size_t span = 4 * lag;
-    if (compared_.size() <= span || static_cast<double>(lag) * step_s_ > farthest_s_) {
-      return std::nullopt;
-    }
-    const std::size_t count = compared_.size() - span;
-    const std::size_t every = count / kEnoughFourths + 1;
     std::array<std::vector<double>, 3> sizes;
-    for (std::size_t i = 0; i < count; i += every) {
-      if (in_motion_[i] == in_motion_[i + span] && is_even(i, lag)) {
-        const Eigen::Array3d difference = fourth_difference(i, lag);
+    at_rest_.for_each_five(lag, [&](const AtRest::Five& five) {
+      const std::array<Eigen::Array3d, 5> off_rad = off_from_first(five);
+      if (is_near(five, off_rad.back())) {
+        const Eigen::Array3d difference = AtRest::fourth_difference(off_rad);
         for (std::size_t axis = 0; axis < 3; ++axis) {
           sizes[axis].push_back(std::abs(difference(static_cast<Eigen::Index>(axis))));
         }
       }
-    }
-    if (sizes[0].size() < kFewestFourths) {
+    });
+    if (sizes[0].size() < AtRest::kFewest) {
       return std::nullopt;
     }
-    Variance found{static_cast<double>(lag) * step_s_, {}, sizes[0].size()};
+    Variance found{static_cast<double>(lag) * step_s(), {}, sizes[0].size()};
     for (std::size_t axis = 0; axis < 3; ++axis) {
       const double sigma = sigma_without_outliers(sizes[axis]);
-      found.rad2(static_cast<Eigen::Index>(axis)) = sigma * sigma / (1 + 16 + 36 + 16 + 1);
+      found.rad2(static_cast<Eigen::Index>(axis)) = sigma * sigma / AtRest::kSquares;
     }
     return found;
   }
 
  private:
-  [[nodiscard]] bool is_even(std::size_t i, std::size_t lag) const {
-    constexpr double kEven = 0.25;  // steps
-    for (std::size_t n = 0; n < 4; ++n) {
-      const double apart_s = compared_[i + (n + 1) * lag].t_s - compared_[i + n * lag].t_s;
-      if (std::abs(apart_s - static_cast<double>(lag) * step_s_) > kEven * step_s_) {
-        return false;
-      }
-    }
-    return true;
+  /// The rotations, c axes, from the attitude by the readings to that by each fix, both from the first fix on.
+  [[nodiscard]] std::array<Eigen::Array3d, 5> off_from_first(const AtRest::Five& five) const {
+    const FixByGyros& first = fixes_[five.front()];
+    const Eigen::Matrix3d C_g_in = (first.C_in_c * first.C_c_g).transpose();
+    std::array<Eigen::Array3d, 5> off_rad;
+    std::ranges::transform(five, off_rad.begin(), [&](std::size_t i) {
+      const Eigen::Matrix3d off = fixes_[i].C_c_g * C_g_in * fixes_[i].C_in_c;
+      return Eigen::Array3d(0.5 * (off(2, 1) - off(1, 2)), 0.5 * (off(0, 2) - off(2, 0)),
+                            0.5 * (off(1, 0) - off(0, 1)));
+    });
+    return off_rad;
   }
 
-  /// Of the rotation, c axes, from the attitude by the readings to that by each fix, both from the first fix on.
-  [[nodiscard]] Eigen::Array3d fourth_difference(std::size_t i, std::size_t lag) const {
-    constexpr double kBinomial[] = {1, -4, 6, -4, 1};
-    const Eigen::Matrix3d C_g_in = (compared_[i].C_in_c * compared_[i].C_c_g).transpose();
-    Eigen::Array3d sum = Eigen::Array3d::Zero();
-    for (std::size_t n = 0; n < 5; ++n) {
-      const FixByGyros& its = compared_[i + n * lag];
-      const Eigen::Matrix3d off = its.C_c_g * C_g_in * its.C_in_c;
-      sum += 0.5 * kBinomial[n] * Eigen::Array3d(off(2, 1) - off(1, 2), off(0, 2) - off(2, 0), off(1, 0) - off(0, 1));
-    }
-    return sum;
+  /// Whether fixes and gyros have turned alike, as far as alignments may be off: no fix that was frozen, no axis that
+  /// is exchanged.
+  [[nodiscard]] bool is_near(const AtRest::Five& five, const Eigen::Array3d& last_rad) const {
+    constexpr double kOfTurn = 0.2;
+    constexpr double kMost_rad = 1.5e-3;  // 5′
+    const FixByGyros& first = fixes_[five.front()];
+    const FixByGyros& last = fixes_[five.back()];
+    const double turned_rad = (last.C_c_g - first.C_c_g).norm() / std::numbers::sqrt2;
+    return last_rad.matrix().norm() < kMost_rad + kOfTurn * turned_rad;
   }
 
-  std::vector<FixByGyros> compared_;
-  std::vector<long> in_motion_;  ///< fixes up to each, and with it, at which the body slews
-  double step_s_ = 0;
-  double farthest_s_ = 0;
+  std::vector<FixByGyros> fixes_;
+  AtRest at_rest_;
 };
 
 /// How much less than theirs the variance by fourth differences is of errors with the correlation exp(−lag / τ).
 double alike(double lag_over_time) {
   const double r = std::exp(-lag_over_time);
-  return (112 * r - 56 * r * r + 16 * std::pow(r, 3) - 2 * std::pow(r, 4)) / (1 + 16 + 36 + 16 + 1);
+  return (112 * r - 56 * r * r + 16 * std::pow(r, 3) - 2 * std::pow(r, 4)) / AtRest::kSquares;
 }
 
 /// Errors one part of which has the correlation exp(−lag / τ), and the rest none.
@@ -162,23 +127,22 @@ ErrorModel model_with(double time_s, const std::vector<Variance>& variances) {
   const auto size = static_cast<Eigen::Index>(variances.size());
   ErrorModel model{time_s, Eigen::Array3d::Zero(), 0};
   for (int axis = 0; axis < 3; ++axis) {
-    Eigen::MatrixX2d parts(size, 2);
-    Eigen::VectorXd weights(size);
+    Eigen::ArrayX2d parts(size, 2);
+    Eigen::ArrayXd weights(size);
     for (Eigen::Index i = 0; i < size; ++i) {
       const Variance& its = variances[static_cast<std::size_t>(i)];
       weights(i) = std::sqrt(static_cast<double>(its.differences));
       parts.row(i) << 1, -alike(its.lag_s / time_s);
       parts.row(i) *= weights(i) / its.rad2(axis);
     }
-    const Eigen::Vector2d found = parts.colPivHouseholderQr().solve(weights);
+    const Eigen::Vector2d found = parts.matrix().colPivHouseholderQr().solve(weights.matrix());
     model.part(axis) = std::clamp(found(1) / found(0), 0.0, 1.0);
-    model.misfit += (parts * found - weights).squaredNorm();
+    const Eigen::ArrayXd shape = parts.col(0) + model.part(axis) * parts.col(1);
+    const double variance_rad2 = (shape * weights).sum() / shape.square().sum();
+    model.misfit += (variance_rad2 * shape - weights).square().sum();
   }
   return model;
 }
-
-/// 1-sigma of a variance, as a part of it, by one of differences that overlap.
-constexpr double kChanceOfOne = 2.3;
 
 /// The most likely τ; nothing where it may as well be kLongest_s or more.
 std::optional<ErrorModel> model_of(const std::vector<Variance>& variances) {
@@ -191,7 +155,7 @@ std::optional<ErrorModel> model_of(const std::vector<Variance>& variances) {
     best = model.misfit < best.misfit ? model : best;
   }
   const double more = model_with(kLongest_s, variances).misfit - best.misfit;
-  return more > std::pow(kSure * kChanceOfOne, 2) ? std::optional(best) : std::nullopt;
+  return more > std::pow(kSure * AtRest::kChanceOfOne, 2) ? std::optional(best) : std::nullopt;
 }
 
 /// Whether errors of fixes `near` each other differ less than those of fixes further apart, about one axis or all three
@@ -200,16 +164,15 @@ bool are_correlated(const Variance& near, const Variance& far) {
   constexpr double kMore = 1.05;    // times the variance
   constexpr double kSure = 5;       // sigmas
   constexpr double kLeast = 1e-14;  // rad², a fiftieth of an arcsecond
-  constexpr double kMost = 2e-6;    // rad², 5′: more is no noise, but axes that are exchanged
-  const double chance =
-      kChanceOfOne * std::sqrt(1 / static_cast<double>(near.differences) + 1 / static_cast<double>(far.differences));
+  const double chance = AtRest::kChanceOfOne *
+                        std::sqrt(1 / static_cast<double>(near.differences) + 1 / static_cast<double>(far.differences));
   const Eigen::Array3d ratio = far.rad2 / near.rad2.max(kLeast);
-  return (far.rad2 < kMost).all() &&
-         (ratio.maxCoeff() > kMore + kSure * chance || ratio.mean() > kMore + kSure * chance / std::numbers::sqrt3);
+  return ratio.maxCoeff() > kMore + kSure * chance || ratio.mean() > kMore + kSure * chance / std::numbers::sqrt3;
 }
 
 std::optional<CorrelatedFixes> correlated(const StarTrackerTelemetry& fixes, const GyroReadings& readings) {
-  constexpr double kLeft = 0.07;  // of the correlation, between fixes that are used
+  // Of what is left of the correlation the variance of a mean is so much more.
+  constexpr double kMoreOfMean = 0.15;
   const ErrorsAtRest errors(fixes, readings);
   if (!(errors.step_s() > 0)) {
     return std::nullopt;
@@ -226,7 +189,7 @@ std::optional<CorrelatedFixes> correlated(const StarTrackerTelemetry& fixes, con
     return std::nullopt;
   }
   std::vector<Variance> variances;
-  for (std::size_t lag = first; static_cast<double>(lag) * errors.step_s() <= kFarthestCompared_s; lag += lag / 3 + 1) {
+  for (std::size_t lag = first; static_cast<double>(lag) * errors.step_s() <= errors.farthest_s(); lag += lag / 3 + 1) {
     if (const std::optional<Variance> its = errors.variance(lag); its && (its->rad2 > 0).all()) {
       variances.push_back(*its);
     }
@@ -238,8 +201,10 @@ std::optional<CorrelatedFixes> correlated(const StarTrackerTelemetry& fixes, con
   CorrelatedFixes found;
   found.time_s = model->time_s;
   found.part = model->part.maxCoeff();
-  found.apart_s = std::ceil(found.time_s * std::log(found.part / kLeft) / errors.step_s()) * errors.step_s();
-  return found.apart_s > errors.step_s() ? std::optional(found) : std::nullopt;
+  found.step_s = errors.step_s();
+  const double apart_s = found.time_s * std::log(1 + 2 * found.part / kMoreOfMean);
+  found.apart_s = std::ceil(apart_s / found.step_s) * found.step_s;
+  return found.apart_s > found.step_s ? std::optional(found) : std::nullopt;
 }
 
 }  // namespace
@@ -264,17 +229,15 @@ void leave_out(std::vector<CorrelatedFixes>& correlated, Pass& pass) {
   for (CorrelatedFixes& its : correlated) {
     StarTrackerTelemetry& fixes = pass.fixes_of(static_cast<std::size_t>(its.head));
     StarTrackerTelemetry kept;
-    const Duration apart = from_seconds(0.98 * its.apart_s);  // stamps are not quite regular
+    const Duration apart = from_seconds(its.apart_s - its.step_s / 4);  // stamps are not quite regular
     for (std::size_t i = 0; i < fixes.size(); ++i) {
-      if (kept.t.empty() || std::chrono::abs(fixes.t[i] - kept.t.back()) >= apart) {
+      const bool is_first = kept.t.empty() || std::chrono::abs(fixes.t[i] - kept.t.back()) >= apart;
+      if (is_first && nearly_unit(fixes.q_in_c[i].norm())) {
         kept.add(fixes, i);
       }
     }
     its.left_out = std::ssize(fixes.t) - std::ssize(kept.t);
     fixes = std::move(kept);
-    if (its.head == 0) {
-      pass.settings.star_tracker_period = from_seconds(its.apart_s);
-    }
   }
 }
 

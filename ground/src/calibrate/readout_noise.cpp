@@ -2,6 +2,7 @@
 
 #include <Eigen/Core>
 #include <algorithm>
+#include <array>
 #include <chrono>
 #include <cmath>
 #include <cstddef>
@@ -9,9 +10,12 @@
 #include <limits>
 #include <vector>
 
+#include "calibrate/at_rest.hpp"
+#include "clocks/turns.hpp"
 #include "model/scatter.hpp"
 #include "model/slews.hpp"
 #include "trihedron/core/frames.hpp"
+#include "trihedron/core/optimal_attitude.hpp"
 
 namespace trihedron::ground {
 namespace {
@@ -221,6 +225,68 @@ double noise_in_slews_over_rest(const Pass& pass, const Angles& angles, int gyro
   return most;
 }
 
+/// By how much more than single readings of noise without correlation say, these 1-sigmas, the angle between the
+/// momenta of a gyro and the next one scatters where readings are fitted together, as for a fix; 1 where it is no more,
+/// or not known.
+double noise_of_fits_over_told(const Pass& pass, const PerGyro<double>& noise_rad, int gyro) {
+  constexpr std::size_t kLagsOfFits[] = {1, 4, 12};
+  constexpr double kMoreThanReadings = 1.2;
+  constexpr double kSureOfMore = 5;
+  const GyroReadings readings(pass);
+  if (readings.size() < 2 || !(noise_rad[gyro] > 0) || !(noise_rad[gyro + 1] > 0)) {
+    return 1;
+  }
+  const Duration apart = 2 * readings.reach();  // so that fits share no reading
+  const GyroMask all = all_gyros(readings.gyros());
+  AtRest at_rest;
+  std::vector<double> angles_rad;
+  std::vector<double> factors;
+  std::size_t from = 0;
+  Time next = readings.t(0);
+  for (std::size_t i = 0; i < readings.size(); ++i) {
+    const Time t = readings.t(i);
+    if (t < next) {
+      continue;
+    }
+    next = t + apart;
+    if (const std::optional<FittedDirections> fitted = readings.at(t, from)) {
+      const Eigen::Vector3d& a = fitted->h_b[gyro];
+      const Eigen::Vector3d& b = fitted->h_b[gyro + 1];
+      angles_rad.push_back(std::atan2(a.cross(b).norm(), a.dot(b)));
+      factors.push_back(fitted->noise_factor);
+      at_rest.add(to_seconds(t - readings.t(0)), rate_by_directions(fitted->h_b, fitted->h_b_rate, all));
+    }
+  }
+  at_rest.settle();
+  double most = 1;
+  for (const std::size_t lag : kLagsOfFits) {
+    std::vector<double> sizes;
+    at_rest.for_each_five(lag, [&](const AtRest::Five& five) {
+      std::array<double, 5> its{};
+      std::ranges::transform(five, its.begin(), [&](std::size_t i) { return angles_rad[i]; });
+      sizes.push_back(std::abs(AtRest::fourth_difference(its)));
+    });
+    if (sizes.size() >= AtRest::kFewest) {
+      const double chance = AtRest::kChanceOfOne / std::sqrt(static_cast<double>(sizes.size()));
+      const double told_rad = median_of(factors) * std::hypot(noise_rad[gyro], noise_rad[gyro + 1]);
+      const double ratio = std::pow(sigma_without_outliers(sizes) / told_rad, 2) / AtRest::kSquares;
+      most = ratio > std::pow(kMoreThanReadings, 2) + kSureOfMore * chance ? std::max(most, std::sqrt(ratio)) : most;
+    }
+  }
+  return most;
+}
+
+/// The same of each gyro by itself: it is in all angles to others.
+PerGyro<double> lasting_noise(const Pass& pass, const PerGyro<double>& noise_rad, int gyros) {
+  PerGyro<double> times{};
+  for (int k = 0; k + 1 < gyros; ++k) {
+    const double its = noise_of_fits_over_told(pass, noise_rad, k);
+    times[k] = k == 0 ? its : std::min(times[k], its);
+    times[k + 1] = its;
+  }
+  return times;
+}
+
 }  // namespace
 
 std::optional<ReadoutNoise> other_readout_noise(const Pass& pass) {
@@ -241,6 +307,11 @@ std::optional<ReadoutNoise> other_readout_noise(const Pass& pass) {
       noise.found_rad[k] = hours[hours.size() / 2];
       noise.most_rad[k] = hours.back();
     }
+  }
+  noise.lasting = lasting_noise(pass, noise.found_rad, noise.gyros);
+  for (int k = 0; k < noise.gyros; ++k) {
+    noise.found_rad[k] *= noise.lasting[k];
+    noise.most_rad[k] *= noise.lasting[k];
     is_other = is_other || std::abs(noise.found_rad[k] - noise.told_rad[k]) > kTolerance * noise.told_rad[k];
   }
   noise.in_slews = noise_in_slews_over_rest(pass, angles, noise.gyros);

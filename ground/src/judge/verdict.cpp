@@ -673,20 +673,22 @@ void judge_beside_outages(const std::optional<ErrorsBesideOutages>& errors, std:
 }
 
 void judge_correlated_fixes(const std::vector<CorrelatedFixes>& star_trackers, std::vector<Finding>& findings) {
+  const auto seconds = [](double s) { return fmt::format("{:.{}f} s", s, s < 10 ? 1 : 0); };
   for (const CorrelatedFixes& its : star_trackers) {
     add(findings, FindingCode::kCorrelatedFixes,
         fmt::format(
-            "The errors of fixes that follow each other are alike; one fix each {:.0f} s was used, whose errors "
-            "are independent.",
-            its.apart_s),
+            "The errors of fixes that follow each other are alike. One fix each {} was used, so that their errors "
+            "are nearly independent.",
+            seconds(its.apart_s)),
         fmt::format(
-            "star tracker {}: {:.0f} % of the variance has a correlation that falls to 1/e in {:.0f} s; {} fixes "
-            "left out",
-            its.head + 1, 100 * its.part, its.time_s, its.left_out),
+            "star tracker {}: {:.0f} % of the variance has a correlation that falls to 1/e in {}; {} fixes, which "
+            "come each {}, left out",
+            its.head + 1, 100 * its.part, seconds(its.time_s), its.left_out, seconds(its.step_s)),
         fmt::format(
-            "Where the star tracker filters its fixes, give those before the filter. On board, give one fix each "
-            "{:.0f} s.",
-            its.apart_s));
+            "Where the star tracker filters its fixes, give those before the filter. Errors that the same stars "
+            "make at the same places of the field of view, or a filter of the gyros, stay. On board, give one "
+            "fix each {}.",
+            seconds(its.apart_s)));
   }
 }
 
@@ -699,10 +701,15 @@ void judge_readout_noise(const std::optional<ReadoutNoise>& noise, std::vector<F
       }
       return all;
     };
+    const double lasting = *std::max_element(noise->lasting.begin(), noise->lasting.begin() + noise->gyros);
     add(findings, FindingCode::kReadoutNoise,
         "The readings of the gyros do not scatter as pass.toml says; the noise found was used.",
-        fmt::format("{} found, up to {} for an hour{}, {} in pass.toml", text(noise->found_rad), text(noise->most_rad),
-                    noise->in_slews > 1 ? fmt::format(", {:.1f} times as much in slews", noise->in_slews) : "",
+        fmt::format("{} found{}, up to {} for an hour{}, {} in pass.toml", text(noise->found_rad),
+                    lasting > 1
+                        ? fmt::format(", {:.1f} times what single readings show, since their noise lasts", lasting)
+                        : "",
+                    text(noise->most_rad),
+                    noise->in_slews >= 1.05 ? fmt::format(", {:.1f} times as much in slews", noise->in_slews) : "",
                     text(noise->told_rad)),
         noise->is_steady() ? "Correct the noise figures of the gyros in pass.toml."
                            : "Look for what makes the readings noisier in slews or for a part of the pass: there the "

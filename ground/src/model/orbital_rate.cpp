@@ -86,6 +86,14 @@ double orbital_rate_rad_s(const StarTrackerTelemetry& tracker) {
 
 std::optional<double> shown_orbital_rate_rad_s(const StarTrackerTelemetry& tracker) {
   constexpr double kFastestSlew_rad_s = 0.02;  // beyond, an outlier
+  if (tracker.size() < 2) {
+    return std::nullopt;
+  }
+  std::vector<double> steps_s;
+  for (std::size_t i = 1; i < tracker.size(); ++i) {
+    steps_s.push_back(to_seconds(tracker.t[i] - tracker.t[i - 1]));
+  }
+  const double longest_step_s = std::clamp(2 * median_of(steps_s), 60.0, 600.0);
   // The mean angular velocity in `in`: a slew and the slew back nearly cancel.
   Eigen::Vector3d turned = Eigen::Vector3d::Zero();
   double time_s = 0;
@@ -94,7 +102,7 @@ std::optional<double> shown_orbital_rate_rad_s(const StarTrackerTelemetry& track
     const auto before = Rot<In, C>::assume(tracker.q_in_c[i - 1].normalized());
     const auto after = Rot<In, C>::assume(tracker.q_in_c[i].normalized());
     const Eigen::Vector3d turn = (after * before.inverse()).log().raw();
-    if (step_s < 60 && turn.norm() < kFastestSlew_rad_s * step_s) {
+    if (step_s < longest_step_s && turn.norm() < kFastestSlew_rad_s * step_s) {
       turned += turn;
       time_s += step_s;
     }

@@ -167,19 +167,51 @@ TEST(ReadoutNoise, IsNotWhatShakesTheBody) {
   }
 }
 
-TEST(ReadoutNoise, ThatHasPassedAFilterIsNotTakenForLess) {
-  // The mean of the last four: half the noise, of which neighbours share most.
-  struct Filtered {
-    White white{.sigma_rad = {2e-5, 2e-5}};
-    std::array<std::array<double, 4>, 6> last{};  // of each component
-    std::size_t calls = 0;
-    double operator()(int gyro) {
-      std::array<double, 4>& its = last.at(calls % 6);
-      its.at(calls++ / 6 % 4) = white(gyro);
-      return (its[0] + its[1] + its[2] + its[3]) / 4;
-    }
-  };
-  EXPECT_FALSE(other_readout_noise(turning(std::chrono::milliseconds(125), std::chrono::hours(2), Filtered{})));
+TEST(ReadoutNoise, ThatHasPassedAFilterIsThatOfReadingsTogether) {
+  // The mean of the last four: half the noise, of which neighbours share most, and together no less than before.
+  Scenario scenario = scenario_in_eq1(5, std::chrono::hours(2));
+  for (GyroScenario& gyro : scenario.gyros) {
+    gyro.readout.noise_rad = 1e-9;
+  }
+  Pass pass = sim::simulate(scenario).pass;
+  std::array<std::array<double, 4>, 6> last{};  // of each component
+  White white{.sigma_rad = {2e-5, 2e-5}};
+  for (std::size_t i = 0; i < pass.gyro.h.size(); ++i) {
+    std::array<double, 4>& its = last.at(i % 6);
+    its.at(i / 6 % 4) = white(0);
+    pass.gyro.h[i] += (its[0] + its[1] + its[2] + its[3]) / 4;
+  }
+  const auto noise = other_readout_noise(pass);
+  ASSERT_TRUE(noise);
+  for (const int gyro : {0, 1}) {
+    EXPECT_NEAR(noise->found_rad[gyro], 1.8e-5, 0.15e-5);  // of a mean 2e-5, but these are parabolas
+    EXPECT_NEAR(noise->lasting[gyro], 1.8, 0.15);
+  }
+  EXPECT_TRUE(noise->is_steady());
+}
+
+TEST(ReadoutNoise, ThatLastsIsFoundAndNamed) {
+  sim::SimulatedPass simulated = two_hours();
+  std::mt19937_64 random(1);
+  std::normal_distribution<double> normal;
+  std::array<double, 6> lasting{};
+  const double kept = std::exp(-0.125);  // over 1 s
+  for (std::size_t i = 0; i < simulated.pass.gyro.h.size(); ++i) {
+    double& its = lasting.at(i % 6);
+    its = kept * its + std::sqrt(1 - kept * kept) * normal(random);
+    simulated.pass.gyro.h[i] += 2 * kArcsecond * its;
+  }
+  const CalibrationRun run = calibrate(simulated.pass, {});
+  ASSERT_TRUE(run.readout_noise);
+  EXPECT_GT(run.readout_noise->lasting[0], 1.5);
+  EXPECT_GT(run.readout_noise->found_rad[0], 4 * kArcsecond);
+  EXPECT_LT(nees_of(simulated.truth, run.calibration), 45);
+  const auto& findings = run.calibration.verdict.findings;
+  const auto is_it = [](const Finding& its) { return its.code == FindingCode::kReadoutNoise; };
+  const auto finding = std::ranges::find_if(findings, is_it);
+  ASSERT_NE(finding, findings.end());
+  EXPECT_NE(finding->evidence.find("their noise lasts"), std::string::npos);
+  EXPECT_TRUE(run.calibration.verdict.trustworthy);
 }
 
 TEST(ReadoutNoise, ToldWrongIsReplacedByThatFoundAndNamed) {

@@ -62,7 +62,8 @@ struct CalibrationOptions {
   std::optional<DriftModelId> drift_model;  ///< without it the one that the pass gives evidence of
   /// Whether the prior variances of the members outside eq. (1) are found from the pass; needs kLargestDriftModel.
   bool drift_field = false;
-  /// Whether the noise is estimated from a pass that is long enough, instead of taken from the settings.
+  /// Whether the noise, and what of it is correlated in time, is estimated from a pass that is long enough, instead of
+  /// taken from the settings.
   bool find_noise = true;
   /// Process noise of each momentum, per axis across it; where the noise is found from the pass, its lower limit. The
   /// default is small against the readout noise: 0.1″ in 9 h.

@@ -142,6 +142,7 @@ struct ReadoutNoise {
   PerGyro<double> found_rad{};  ///< the median of the hours of the pass
   PerGyro<double> most_rad{};   ///< in one of them
   PerGyro<double> told_rad{};
+  PerGyro<double> lasting{};  ///< times what single readings show, found where they are fitted together; 1: no more
   double in_slews = 1;  ///< times as much while the body turns fast as while it does not; 1: no more, or not known
 
   [[nodiscard]] bool is_steady() const {
@@ -161,12 +162,13 @@ struct ErrorsBesideOutages {
   double sigmas = 0;     ///< how sure that is
 };
 
-/// Errors of the fixes of a star tracker that are alike from one to the next: fixes were left out, so that the errors of
-/// those that stay are independent.
+/// Errors of the fixes of a star tracker that are alike from one to the next: fixes were left out, so that the errors
+/// of those that stay are nearly independent.
 struct CorrelatedFixes {
   int head = 0;
   double part = 0;     ///< of the variance of these errors, about the axis where it is most, has a correlation
   double time_s = 0;   ///< of exp(−t / time_s)
+  double step_s = 0;   ///< between the fixes as they were given
   double apart_s = 0;  ///< the fixes that were used, at least
   long left_out = 0;   ///< fixes
 };

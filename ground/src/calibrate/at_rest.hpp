@@ -1,0 +1,105 @@
+#pragma once
+/// Noise of what changes smoothly while the body is at rest.
+
+#include <Eigen/Core>
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <vector>
+
+#include "model/scatter.hpp"
+#include "trihedron/records/units.hpp"
+
+namespace trihedron::ground {
+
+/// Times at which something was seen, and the fourth differences x_0 − 4 x_1 + 6 x_2 − 4 x_3 + x_4 of it at five of
+/// them that are evenly apart, between which the body turns at its usual rate: what the alignments are off and the
+/// gyros drift is not in them. Where the errors of x at these five are independent, the variance of such a difference
+/// is kSquares times theirs.
+class AtRest {
+ public:
+  static constexpr double kSquares = 1 + 16 + 36 + 16 + 1;
+  /// Five times evenly apart.
+  using Five = std::array<std::size_t, 5>;
+  /// Fewer differences tell nothing.
+  static constexpr std::size_t kFewest = 500;
+  /// 1-sigma of a variance, as a part of it, by one of differences that overlap: √(2 (1 + 2 Σ ρ²)).
+  static constexpr double kChanceOfOne = 2.3;
+
+  template <class Value>
+  [[nodiscard]] static Value fourth_difference(const std::array<Value, 5>& x) {
+    return x[0] + x[4] - 4 * (x[1] + x[3]) + 6 * x[2];
+  }
+
+  void add(double t_s, const Eigen::Vector3d& rate_rad_s) {
+    t_s_.push_back(t_s);
+    rates_rad_s_.insert(rates_rad_s_.end(), rate_rad_s.begin(), rate_rad_s.end());
+  }
+  /// When all times are added.
+  void settle() {
+    if (t_s_.size() <= kFewest) {
+      return;
+    }
+    std::vector<double> steps_s;
+    for (std::size_t i = 1; i < t_s_.size(); ++i) {
+      steps_s.push_back(t_s_[i] - t_s_[i - 1]);
+    }
+    step_s_ = median_of(steps_s);
+    const auto rates = Eigen::Matrix3Xd::Map(rates_rad_s_.data(), 3, static_cast<Eigen::Index>(t_s_.size()));
+    const Eigen::Vector3d usual_rad_s = medians_of(rates);
+    farthest_s_ = std::min(kFarthest_s, kFarthestTurn_rad / usual_rad_s.norm());
+    const double rest_rad_s = std::max(kSlowest_rad_s, kPartOfUsual * usual_rad_s.norm());
+    in_motion_ = {0};
+    for (Eigen::Index i = 0; i < rates.cols(); ++i) {
+      const bool rests = (rates.col(i) - usual_rad_s).norm() < rest_rad_s;
+      in_motion_.push_back(in_motion_.back() + (rests ? 0 : 1));
+    }
+  }
+
+  /// Median of the times from one to the next; 0 where there are too few.
+  [[nodiscard]] double step_s() const { return step_s_; }
+  /// Times further apart are not compared.
+  [[nodiscard]] double farthest_s() const { return farthest_s_; }
+
+  /// Calls take(Five) for all five times `lag` steps apart, or for enough of them.
+  template <class Take>
+  void for_each_five(std::size_t lag, const Take& take) const {
+    constexpr std::size_t kEnough = 10000;
+    constexpr double kEven = 0.25;  // steps
+    const double lag_s = static_cast<double>(lag) * step_s_;
+    if (in_motion_.empty() || lag_s > farthest_s_) {
+      return;
+    }
+    const std::size_t every = t_s_.size() / kEnough + 1;
+    Five five{};
+    for (std::size_t i = 0; i < t_s_.size(); i += every) {
+      bool is_even = true;
+      for (std::size_t n = 0; n < five.size() && is_even; ++n) {
+        const double wanted_s = t_s_[i] + static_cast<double>(n) * lag_s;
+        five[n] = std::max(five[n], i);
+        while (five[n] < t_s_.size() && t_s_[five[n]] < wanted_s - kEven * step_s_) {
+          ++five[n];
+        }
+        is_even = five[n] < t_s_.size() && t_s_[five[n]] <= wanted_s + kEven * step_s_;
+      }
+      if (is_even && in_motion_[five.front()] == in_motion_[five.back() + 1]) {
+        take(five);
+      }
+    }
+  }
+
+ private:
+  static constexpr double kFarthest_s = 240;
+  static constexpr double kFarthestTurn_rad = 0.2;
+  static constexpr double kSlowest_rad_s = 0.01 * kDegree;
+  static constexpr double kPartOfUsual = 0.2;
+
+  std::vector<double> t_s_;
+  std::vector<double> rates_rad_s_;     ///< of the body, three for each time
+  std::vector<std::size_t> in_motion_;  ///< times before each, and all, at which the body turns otherwise
+  double step_s_ = 0;
+  double farthest_s_ = 0;
+};
+
+}  // namespace trihedron::ground
